@@ -21,7 +21,7 @@ struct BiomeTints {
 /// Returns the name of a biome by its number before 1.18; "plains" if it is unknown.
 [[nodiscard]] std::string_view name_of_biome(std::int64_t number);
 
-/// The index of tints in a list, which they are added to where they are new; beyond 255 of them the first's.
+/// Returns the index of tints in a list, appending new ones. Beyond 255 entries returns the first one's.
 [[nodiscard]] std::uint8_t index_of_tints(std::vector<BiomeTints>& all, const BiomeTints& tints);
 
 }  // namespace quoin::minecraft

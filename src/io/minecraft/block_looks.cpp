@@ -17,20 +17,20 @@ namespace {
 /// The visual kind of a block.
 enum class Kind : std::uint8_t {
   Air,
-  Invisible,  // air to the eye, and a block to the game
+  Invisible,  // invisible, but a block in the game
   Solid,
-  Plant,   // thin leaves and stalks, which one walks through: mostly air
+  Plant,   // thin leaves and stalks without collision: mostly air
   Thin,    // rails, plates and the like: mostly air
   Glass,   // clear, apart from its colour
   Liquid,  // water
   Clear,   // ice, slime
-  Glow,    // solid, and shines
-  Flame,   // shines, and one walks through it
-  Lamp,    // shines where its state "lit" is true
-  Grass,   // solid, coloured by the biome's grass
-  Leaves,  // solid, coloured by its foliage
-  Herb,    // a plant that is coloured by its grass
-  Vine,    // a plant that is coloured by its foliage
+  Glow,    // solid, and emits light
+  Flame,   // emits light, without collision
+  Lamp,    // emits light if its state "lit" is true
+  Grass,   // solid, tinted by the biome's grass
+  Leaves,  // solid, tinted by the biome's foliage
+  Herb,    // a plant tinted by the biome's grass
+  Vine,    // a plant tinted by the biome's foliage
 };
 
 struct Entry {
@@ -651,12 +651,12 @@ bool is_no_material(Kind kind) {
          kind == Kind::Vine || kind == Kind::Flame;
 }
 
-/// A block of that name, or of the names that a shape's may stand for: "brick" of "brick_stairs".
+/// Returns the entry of that name, or of a name that a shape's may stand for: "brick" for "brick_stairs".
 std::optional<BlockLook> look_of_material(std::string_view name, bool is_of_shape) {
   for (const std::string_view ending : {"", "s", "_planks", "_block"}) {
     const std::string full = std::string(name) + std::string(ending);
     const Entry* const entry = find_entry(full);
-    // A shape is made of no plant: "bamboo_stairs" are of the wood of that name.
+    // No shape is made of a plant: "bamboo_stairs" are of the wood of that name.
     if (entry != nullptr && !(is_of_shape && is_no_material(entry->kind))) return look_of(entry->rgb, entry->kind);
     if (auto wood = look_of_wood(full)) return wood;
     if (auto dyed = look_of_dyed(full)) return dyed;
@@ -832,7 +832,7 @@ std::optional<BlockLook> look_by_words(std::string_view name) {
   return look;
 }
 
-/// A grey of its own for each name.
+/// Returns a grey that depends on the name.
 BlockLook look_of_nothing(std::string_view name) {
   std::uint32_t hash = 2166136261U;
   for (const char c : name) hash = (hash ^ static_cast<std::uint8_t>(c)) * 16777619U;

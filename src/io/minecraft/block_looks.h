@@ -17,7 +17,7 @@ enum class Tint : std::uint8_t { None, Grass, Foliage, Water };
 
 /// Returns a biome's colour of a tint, 0xRRGGBB; white for Tint::None.
 [[nodiscard]] std::uint32_t colour_of(Tint tint, const BiomeTints& biome);
-/// A colour multiplied by that; its alpha stays.
+/// Returns a colour multiplied by the tint; alpha is unchanged.
 [[nodiscard]] Rgba8 tinted_colour(Rgba8 colour, std::uint32_t tint);
 
 /// The source of a block's look.
@@ -30,7 +30,7 @@ enum class Knowledge : std::uint8_t {
 struct BlockLook {
   Rgba8 colour;  ///< sRGB, alpha below 255 where it is transparent
   bool is_air = false;
-  bool is_invisible = false;  ///< air to the eye, and a block to the game: a barrier, a light
+  bool is_invisible = false;  ///< invisible, but a block in the game: a barrier, a light
   bool collides = true;
   float emission = 0.0F;
   float roughness = 1.0F;

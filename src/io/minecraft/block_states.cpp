@@ -76,7 +76,7 @@ std::optional<std::uint32_t> number_of(std::string_view text) {
   return is_plain ? std::optional(number) : std::nullopt;
 }
 
-/// A property's value as bits; none where it has no place in a word.
+/// Returns a property's value as bits; nullopt if it has no code.
 struct Coded {
   std::uint32_t code = 0;
   int bits = 0;
@@ -159,7 +159,7 @@ BlockText block_text(const VoxelProperties& type, std::uint32_t state) {
     const std::string_view one = rest.substr(0, comma);
     rest = comma == std::string_view::npos ? std::string_view() : rest.substr(comma + 1);
     const std::size_t colon = one.find(':');
-    if (colon == std::string_view::npos || colon + 2 >= one.size()) break;  // of another program
+    if (colon == std::string_view::npos || colon + 2 >= one.size()) break;  // written by another program
     const auto bits = number_of(one.substr(colon + 2));
     if (!bits) break;
     const std::string_view key = one.substr(0, colon);

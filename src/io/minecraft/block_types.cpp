@@ -28,7 +28,7 @@ VoxelProperties properties_of(const BlockState& state, const BlockLook& look) {
   return type;
 }
 
-/// The light level that the property "level" says, 15 where it is absent.
+/// Returns the light level of the property "level"; 15 if it is absent.
 std::uint8_t level_of(const std::vector<Property>& properties) {
   constexpr int kMaxLevel = 15;
   const auto found = std::ranges::find(properties, "level", &Property::first);

@@ -23,25 +23,25 @@ struct Block {
   VoxelType type = kAir;  ///< kAir too where it is tinted
   std::uint32_t state = 0;
   Tint tint = Tint::None;
-  std::uint32_t number = 0;     ///< of the block among the tinted blocks
+  std::uint32_t number = 0;     ///< number among the tinted blocks
   std::uint16_t invisible = 0;  ///< not 0: the block is read as air, and BlockTypes::invisible_name has its name
   std::uint8_t light = 0;       ///< light level of an invisible block, 0 to 15
 
   /// Returns true for visible air of any kind.
   [[nodiscard]] bool is_air() const { return type == kAir && tint == Tint::None && invisible == 0; }
-  /// Returns true if the type is all there is to the block, in every biome.
+  /// Returns true if the block has only a type, in every biome.
   [[nodiscard]] bool is_plain() const { return state == 0 && tint == Tint::None && invisible == 0; }
 };
 
-/// The types of the blocks that were met so far. Threads: any function from any thread, also at once.
+/// The types of the blocks met so far. Threads: all functions can be called at once.
 class BlockTypes {
  public:
-  /// The block of that name with these properties, in any order. Errors: LimitExceeded.
+  /// Returns the block of that name with these properties, in any order. Errors: LimitExceeded.
   [[nodiscard]] Result<Block> block(std::string_view name, const std::vector<Property>& properties);
-  /// The type of a block with a tint, in a biome. Errors: LimitExceeded.
+  /// Returns the type of a tinted block in a biome. Errors: LimitExceeded.
   [[nodiscard]] Result<VoxelType> tinted(const Block& block, const BiomeTints& tints);
   [[nodiscard]] VoxelRegistry types() const;
-  /// The name of an invisible block: "minecraft:barrier". Requires: `number` is some Block::invisible, not 0.
+  /// Returns the name of an invisible block: "minecraft:barrier". Requires: `number` is a Block::invisible, not 0.
   [[nodiscard]] std::string invisible_name(std::uint16_t number) const;
 
  private:

@@ -79,8 +79,8 @@ void ColumnBuilder::fill(const Section& section, Cell& cell, IVec3 first) const 
   }
 }
 
-// A lamp shines as a voxel of the same level and emission 1 does: a face of area 1 and radiance 1 lights a white
-// surface 1 unit away by 1 / pi.
+// A lamp lights like a voxel of the same level and emission 1: a face of area 1 and radiance 1 lights a white surface 1
+// unit away by 1 / pi.
 void ColumnBuilder::count_invisible(const Section& section, IVec3 corner) {
   constexpr double kMaxLevel = 15.0;
   for (std::size_t i = 0; i < kSectionBlocks; ++i) {

@@ -16,13 +16,13 @@ class ColumnBuilder {
  public:
   explicit ColumnBuilder(BlockTypes& types) : types_(types) {}
 
-  /// Adds a section at its minimum corner, a multiple of 16. Errors: LimitExceeded, of types.
+  /// Adds a section at its minimum corner, a multiple of 16. Errors: LimitExceeded for types.
   [[nodiscard]] Status put(const Section& section, IVec3 corner);
   /// Adds a section of one block. Requires: as `put`; block.is_plain().
   void put_block(const Block& block, IVec3 corner);
-  /// Returns the chunks, by y, then z, then x, without chunks of air. The builder keeps only the invisible blocks.
+  /// Returns the chunks by y, then z, then x, without chunks of air. The builder then keeps only the invisible blocks.
   [[nodiscard]] std::vector<SourceChunk> take();
-  /// Moves the counts of invisible blocks so far, and a lamp for each that gives light, to `part`.
+  /// Moves the counts of invisible blocks so far to `part`, with a lamp for each light-emitting one.
   void take_invisible(SourcePart& part);
 
  private:

@@ -26,7 +26,7 @@ bool is_uniform(std::span<const std::byte> bytes) {
   return std::memcmp(bytes.data(), bytes.data() + 1, bytes.size() - 1) == 0;
 }
 
-/// Bytes of a number, or of an array's element; 0 for tags without a fixed size.
+/// Returns the bytes of a number, or of an array's element; 0 for tags without a fixed size.
 std::size_t bytes_of_tag(Tag tag) {
   constexpr std::array<std::size_t, 13> kBytes = {0, 1, 2, 4, 8, 4, 8, 1, 0, 0, 0, 4, 8};
   return kBytes.at(static_cast<std::size_t>(tag));
@@ -73,7 +73,7 @@ class Walker {
     }
     return {};
   }
-  /// Copies a number. Its bytes are the last of the document then.
+  /// Copies a number to the end of the document.
   template <class T>
   Result<T> number() {
     if (auto copied = copy(sizeof(T)); !copied) return copied.error();
@@ -152,7 +152,7 @@ class Walker {
     return {};
   }
 
-  /// Puts a long array apart; in the document it gets the length 0.
+  /// Stores a long array separately; the document gets length 0 for it.
   Status walk_long_array() {
     const auto elements = count();
     if (!elements) return elements.error();
@@ -187,17 +187,17 @@ class Walker {
   LargeNbt out_;
 };
 
-/// Bytes of a page of so many bits per byte, with its values.
+/// Returns the bytes of a page with so many bits per byte, including its values.
 std::size_t bytes_of_page(std::uint8_t bits) {
   if (bits == 8) return PagedBytes::kPageBytes;
   return (std::size_t{1} << bits) + PagedBytes::kPageBytes * bits / 8;
 }
 
-/// The values of a page, in the order in which they come, as far as 4 bits can number them.
+/// The distinct values of a page in order of occurrence, as far as 4 bits can number them.
 struct PageValues {
   static constexpr std::size_t kMost = 16;
   std::array<std::byte, kMost> values{};
-  std::size_t count = 0;  ///< kMost + 1: there are more
+  std::size_t count = 0;  ///< kMost + 1: more values
 
   explicit PageValues(std::span<const std::byte> content) {
     constexpr std::size_t kStep = 64;
@@ -213,7 +213,7 @@ struct PageValues {
     }
   }
   [[nodiscard]] std::uint8_t bits() const { return count <= 2 ? 1 : count <= 4 ? 2 : count <= kMost ? 4 : 8; }
-  /// Writes the number of each byte's value.
+  /// Writes for each byte the number of its value.
   void number(std::span<const std::byte> content, PagedBytes::PageContent& out) const {
     if (count <= 4) {
       for (std::size_t i = 0; i < content.size(); ++i) {
@@ -229,7 +229,7 @@ struct PageValues {
   }
 
  private:
-  /// Returns true if all are among the values so far. Requires: 0 < count <= 4.
+  /// Returns true if all bytes are among the values so far. Requires: 0 < count <= 4.
   [[nodiscard]] bool are_first_four(std::span<const std::byte> some) const {
     const auto value = [&](std::size_t i) { return values[i < count ? i : 0]; };
     const std::array<std::byte, 4> four = {value(0), value(1), value(2), value(3)};

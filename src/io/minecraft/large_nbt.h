@@ -21,15 +21,15 @@ class PagedBytes {
   using PageContent = std::array<std::byte, kPageBytes>;
 
   [[nodiscard]] std::uint64_t size() const { return size_; }
-  /// Bytes of memory that pages of several values take.
+  /// Returns the memory of pages with several values, in bytes.
   [[nodiscard]] std::uint64_t held_bytes() const { return held_bytes_; }
-  /// Appends bytes. Requires: all calls before the last one append whole pages.
+  /// Appends bytes. Requires: each call except the last appends whole pages.
   void append(std::span<const std::byte> bytes);
   /// Returns the common value of a page's bytes; nullopt if they differ. Requires: page * kPageBytes < size().
   [[nodiscard]] std::optional<std::byte> uniform_page(std::size_t page) const {
     return pages_[page].bits == 0 ? std::optional(pages_[page].value) : std::nullopt;
   }
-  /// Writes the bytes of a page; bytes past the array's end are unspecified. Requires: as uniform_page.
+  /// Writes the bytes of a page. Bytes past the end of the array are unspecified. Requires: as uniform_page.
   void read_page(std::size_t page, PageContent& out) const;
   /// Returns the common value of a range's bytes; nullopt if they differ. Cost: O(pages).
   /// Requires: begin < end <= size().
@@ -51,7 +51,7 @@ class PagedBytes {
 /// A compressed NBT document without its longest arrays of bytes.
 struct LargeNbt {
   std::vector<std::byte> bytes;  ///< the document; a long array has no elements in it
-  /// The long arrays, by where the elements would begin in `bytes`.
+  /// The long arrays, by the offset in `bytes` where their elements would begin.
   std::map<std::size_t, PagedBytes> arrays;
 };
 

@@ -319,7 +319,7 @@ constexpr std::string_view kWoods = "oak spruce birch jungle acacia dark_oak";
 constexpr std::string_view kDyes =
     "white orange magenta light_blue yellow lime pink gray light_gray cyan purple blue brown green red black";
 
-/// The i-th word of a text; of more than there are the first.
+/// Returns the i-th word of a text, or the first one if there are fewer.
 std::string word(std::string_view words, int i) {
   std::string_view rest = words;
   for (; i > 0; --i) {
@@ -494,7 +494,7 @@ std::pair<std::string, Properties> legacy_block(int id, int data) {
   }
   Properties properties;
   std::string name = name_of(*found, data);
-  if (auto block = parse_block(name); block && !block->properties.empty()) {  // a kind that says how it lies
+  if (auto block = parse_block(name); block && !block->properties.empty()) {  // a kind with an orientation
     return {"minecraft:" + block->name, std::move(block->properties)};
   }
   add_turn(found->how, data, name, properties);

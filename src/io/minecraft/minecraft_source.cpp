@@ -26,9 +26,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kChunksOfColumn = kChunkEdge / kSectionEdge;       // the game's, along an edge of a column of ours
+constexpr int kChunksOfColumn = kChunkEdge / kSectionEdge;       // game chunks along the edge of a chunk column
 constexpr int kColumnsOfRegion = kRegionEdge / kChunksOfColumn;  // along an edge
-// Sections' heights are signed bytes.
+// Section heights are signed bytes.
 constexpr int kLowestChunk = -32;
 constexpr int kHighestChunk = 32;
 /// Regions beyond this would have block coordinates outside int32, or too close to its limits for border reads.
@@ -73,7 +73,7 @@ std::vector<Region> regions_in(const fs::path& folder, std::vector<Error>& broke
   return regions;
 }
 
-/// Regions that are open, a few at a time.
+/// Keeps a few regions open.
 class OpenRegions {
  public:
   explicit OpenRegions(std::vector<Region> regions) : regions_(std::move(regions)) {}
@@ -108,7 +108,7 @@ class OpenRegions {
   std::list<Open> open_;
 };
 
-/// The columns of 4 x 4 of the game's chunks that a region has.
+/// The columns of 4 x 4 game chunks in a region.
 std::vector<IBox> columns_of(const RegionFile& file, RegionName name) {
   std::vector<IBox> columns;
   for (int cz = 0; cz < kColumnsOfRegion; ++cz) {
@@ -221,7 +221,7 @@ void read_level(const fs::path& path, ChunkSourceInfo& info) {
   if (level->spawn_dimension == info.dimension) info.spawn = level->spawn;
 }
 
-/// The dimension that was asked for, else the first.
+/// Returns the requested dimension, or the first one.
 Result<Dimension> choose_dimension(const WorldFolder& world, std::string_view wanted, const fs::path& path) {
   QUOIN_ASSERT(!world.dimensions.empty(), "a world with regions");
   if (wanted.empty()) return world.dimensions.front();
@@ -236,7 +236,7 @@ Result<Dimension> choose_dimension(const WorldFolder& world, std::string_view wa
                     path.string());
 }
 
-/// Refuses regions of entities and of points of interest, which the game keeps apart from blocks.
+/// Rejects regions of entities and points of interest, which the game stores separately from blocks.
 Status check_holds_blocks(const RegionFile& file) {
   for (int i = 0; i < kRegionEdge * kRegionEdge; ++i) {
     const int x = i % kRegionEdge;

@@ -10,8 +10,8 @@
 
 namespace quoin::minecraft {
 
-/// Returns true if a folder is a world of Minecraft's (Java), one of its dimensions, or holds region files; also of the
-/// path of its level.dat.
+/// Returns true if a folder is a Minecraft (Java) world or one of its dimensions, or holds region files. Also accepts
+/// the path of a world's level.dat.
 [[nodiscard]] bool is_minecraft_folder(const std::filesystem::path& path);
 
 /// Opens a Minecraft (Java) world: its folder or level.dat, the folder of a dimension, a folder of region files, or a
@@ -21,7 +21,7 @@ namespace quoin::minecraft {
 [[nodiscard]] Result<std::unique_ptr<ChunkSource>> open_minecraft(const std::filesystem::path& path,
                                                                   std::string_view dimension = {});
 
-/// A region file's bytes, which are copied. Errors: BadFormat.
+/// Opens the bytes of a region file, which are copied. Errors: BadFormat.
 [[nodiscard]] Result<std::unique_ptr<ChunkSource>> open_minecraft(std::span<const std::byte> region);
 
 }  // namespace quoin::minecraft

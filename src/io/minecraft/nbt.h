@@ -40,17 +40,17 @@ struct Limits {
 
 class Value;
 
-/// A parsed document: where each value lies in the bytes, which it does not own.
-/// Memory: 32 bytes a value; elements of arrays, and of lists of numbers, are none.
+/// A parsed document: the positions of its values in bytes that it does not own.
+/// Memory: 32 bytes per value, except elements of arrays and of lists of numbers.
 class Document {
  public:
-  /// Requires: `bytes` outlive it.
+  /// Requires: `bytes` outlives the document.
   /// Errors: BadFormat, LimitExceeded, with the offset in `bytes`.
   [[nodiscard]] static Result<Document> parse(std::span<const std::byte> bytes, const Limits& limits = {});
 
   /// Returns the root value, usually a compound.
   [[nodiscard]] Value root() const;
-  /// Bytes of the document: others may follow it.
+  /// Returns the size of the document in bytes; other bytes may follow it.
   [[nodiscard]] std::size_t size() const { return size_; }
 
  private:
@@ -81,7 +81,7 @@ class Value {
   [[nodiscard]] std::size_t offset() const { return document_ != nullptr ? node().begin : 0; }
   [[nodiscard]] std::string_view name() const;
 
-  /// The value of that name in a compound.
+  /// Returns the value of that name in a compound.
   [[nodiscard]] Value operator[](std::string_view name) const;
   /// Calls `visit(Value)` for the values in a compound, or in a list of non-numbers, in order.
   template <class Visit>
@@ -90,22 +90,22 @@ class Value {
     for (std::uint32_t at = index_ + 1; at < node().next; at = document_->nodes_[at].next) visit(Value(document_, at));
   }
 
-  /// The value of a byte, short, int or long.
+  /// Returns the value of a byte, short, int or long.
   [[nodiscard]] std::optional<std::int64_t> integer() const;
-  /// The value of a number of any type.
+  /// Returns the value of a number of any type.
   [[nodiscard]] std::optional<double> number() const;
-  /// The value of a string: UTF-8, except for NUL and characters beyond 16 bits.
+  /// Returns the value of a string: UTF-8, except for NUL and characters beyond 16 bits.
   [[nodiscard]] std::optional<std::string_view> text() const;
-  /// Elements of an array or a list.
+  /// Returns the number of elements of an array or a list.
   [[nodiscard]] std::size_t count() const;
-  /// The bytes of a byte array (or of a list of bytes).
+  /// Returns the bytes of a byte array (or of a list of bytes).
   [[nodiscard]] std::span<const std::byte> bytes() const;
-  /// Element `i` of an array, or of a list of integers. Requires: i < count(); is_integers().
+  /// Returns element `i` of an array, or of a list of integers. Requires: i < count(); is_integers().
   [[nodiscard]] std::int64_t integer(std::size_t i) const;
   [[nodiscard]] bool is_integers() const;
-  /// Element `i` of a list of numbers of any type, or of an array.
+  /// Returns element `i` of a list of numbers of any type, or of an array.
   [[nodiscard]] std::optional<double> number(std::size_t i) const;
-  /// The raw words of a long array; empty for other values.
+  /// Returns the raw words of a long array; empty for other values.
   [[nodiscard]] std::span<const std::byte> long_bytes() const;
 
  private:
@@ -118,7 +118,7 @@ class Value {
   std::uint32_t index_ = 0;
 };
 
-/// BadFormat at a value.
+/// Returns BadFormat at a value.
 [[nodiscard]] inline Error fault(std::string what, Value at) {
   return make_error(ErrorCode::BadFormat, std::move(what), {}, at.offset());
 }

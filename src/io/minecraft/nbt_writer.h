@@ -45,7 +45,7 @@ class DocumentWriter {
   void put(std::int64_t value, int size) {
     for (int i = size - 1; i >= 0; --i) bytes_.push_back(static_cast<std::byte>(value >> (8 * i) & 0xFF));
   }
-  // Of at most 65,535 bytes.
+  // At most 65,535 bytes.
   void text(std::string_view value) {
     constexpr std::size_t kLongest = 0xFFFF;
     value = value.substr(0, kLongest);

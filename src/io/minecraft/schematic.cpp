@@ -42,29 +42,29 @@ std::string text_of(IVec3 size) {
 /// The biomes that tint the grass of columns: one per column, or one per slab of 16 layers.
 struct ColumnBiomes {
   std::vector<BiomeTints> tints;
-  std::vector<std::uint8_t> of_columns;  ///< by slab, z, x; empty: all have the first, or plains'
+  std::vector<std::uint8_t> of_columns;  ///< by slab, z, x; empty: all have the first one's, or plains'
 
-  /// Those of 16 x 16 columns from (x, z) on; beyond the region the first's.
+  /// Writes the biomes of 16 x 16 columns from (x, z). Beyond the region the first one is used.
   void put_into(Section& section, IVec3 corner, IVec3 size) const;
 };
 
-/// Blocks that one array holds.
+/// The blocks of one array.
 struct Region {
   std::string name;
   IVec3 min{0};
   IVec3 size{0};
   std::vector<Block> palette;
   ColumnBiomes biomes;
-  /// Fills a layer: indices in the palette, by z, then x. Called for each layer once, from below. May be empty of a
-  /// region of one block.
+  /// Fills a layer with palette indices, by z, then x. Called once per layer, from below. May be null for a region of
+  /// one block.
   std::function<Status(int y, std::span<std::uint16_t> layer)> read_layer;
-  /// The index that all blocks of the next layers have, which are read then; nothing where they differ, or where
-  /// nothing is known. May be empty.
+  /// Returns the common index of all blocks in the next layers, and skips them. Returns nullopt and skips nothing if
+  /// they differ, or if that is not known. May be null.
   std::function<std::optional<std::uint16_t>(int layers)> read_uniform{};
 };
 
-/// Numbers of seven bits a byte, the lowest first, that say more is to come by the eighth: of an array of the document,
-/// or of a long one apart from it.
+/// Reads variable-length numbers: seven bits per byte, lowest first; the eighth bit marks that more bytes follow. The
+/// bytes are an array of the document, or a long array stored separately.
 class VarintReader {
  public:
   VarintReader(std::span<const std::byte> bytes, const PagedBytes* pages)
@@ -81,7 +81,7 @@ class VarintReader {
     }
     return std::nullopt;
   }
-  /// Reads numbers until `out` is full; those above 65,535 become that. Returns how many there were.
+  /// Reads numbers until `out` is full; larger ones become 65,535. Returns how many were read.
   [[nodiscard]] std::size_t read(std::span<std::uint16_t> out) {
     std::size_t count = 0;
     while (count < out.size() && at_ < size_) {
@@ -95,8 +95,8 @@ class VarintReader {
     }
     return count;
   }
-  /// The number that the next `count` numbers are, past which it then is; nothing, and it stays, where they differ, or
-  /// it would take long to find out.
+  /// Returns the common value of the next `count` numbers, and skips them. Returns nullopt and does not move if they
+  /// differ, or if finding out would take long.
   [[nodiscard]] std::optional<std::uint32_t> next_same(std::uint64_t count) {
     if (pages_ == nullptr || count == 0 || count > size_ - at_) return std::nullopt;
     const auto value = pages_->uniform(at_, at_ + count);
@@ -106,7 +106,7 @@ class VarintReader {
   }
 
  private:
-  /// The bytes that follow, as far as they lie together. Requires: at_ < size_.
+  /// Returns the contiguous bytes at the position. Requires: at_ < size_.
   [[nodiscard]] std::span<const std::byte> run() {
     if (pages_ == nullptr) return bytes_.subspan(static_cast<std::size_t>(at_));
     const auto page = static_cast<std::size_t>(at_ / PagedBytes::kPageBytes);
@@ -116,7 +116,7 @@ class VarintReader {
     const auto end = std::min<std::uint64_t>(PagedBytes::kPageBytes, size_ - page * PagedBytes::kPageBytes);
     return std::span(content_).subspan(first, static_cast<std::size_t>(end) - first);
   }
-  /// Copies bytes below 128, by sixteens as long as all of them are. Does not move. Returns how many.
+  /// Copies bytes below 128, in steps of sixteen. Does not move the position. Returns how many were copied.
   std::size_t read_small(std::span<std::uint16_t> out) {
     constexpr std::size_t kStep = 16;
     const std::span<const std::byte> bytes = run();
@@ -140,13 +140,13 @@ class VarintReader {
   const PagedBytes* pages_;
   std::uint64_t size_;
   std::uint64_t at_ = 0;
-  std::size_t page_ = kNoPage;  ///< that `content_` holds
+  std::size_t page_ = kNoPage;  ///< the page in `content_`
   PagedBytes::PageContent content_;
 };
 
 class SchematicReader {
  public:
-  /// `arrays`: long arrays that are not in the document, by where their elements would begin.
+  /// `arrays`: long arrays outside the document, by the offset where their elements would begin.
   SchematicReader(nbt::Value root, const std::map<std::size_t, PagedBytes>& arrays, const Progress& progress)
       : root_(root), arrays_(arrays), progress_(progress) {}
 
@@ -227,7 +227,7 @@ std::optional<IVec3> vector_of_list(nbt::Value list) {
   return vector;
 }
 
-// The three sizes are shorts without a sign.
+// The three sizes are unsigned shorts.
 Result<IVec3> SchematicReader::size_of(nbt::Value schematic) const {
   IVec3 size{0};
   constexpr std::array kNames = {"Width", "Height", "Length"};
@@ -242,7 +242,7 @@ Result<IVec3> SchematicReader::size_of(nbt::Value schematic) const {
   return size;
 }
 
-// A compound of blocks as texts, with their indices.
+// Reads a compound of block texts and their indices.
 Result<std::vector<Block>> palette_of_texts(nbt::Value palette, BlockTypes& types) {
   std::vector<Block> blocks;
   Status done;
@@ -323,7 +323,7 @@ VarintReader SchematicReader::varints(nbt::Value array) const {
   return {array.bytes(), found != arrays_.end() ? &found->second : nullptr};
 }
 
-// Biome indices into a palette of names: one per column, or one per block, where the lowest of 16 is used.
+// Reads biome indices into a palette of names: one per column, or one per block, where the lowest of 16 is used.
 void SchematicReader::take_biomes(Region& region, nbt::Value palette, nbt::Value data, int layers) {
   ColumnBiomes& biomes = region.biomes;
   std::vector<std::uint8_t> of_palette;
@@ -354,7 +354,7 @@ void SchematicReader::take_biomes(Region& region, nbt::Value palette, nbt::Value
   }
 }
 
-// A number for each column.
+// One number per column.
 void SchematicReader::take_numbered_biomes(Region& region, nbt::Value numbers) {
   if (numbers.count() == 0) return;
   const auto area = static_cast<std::size_t>(region.size.x) * static_cast<std::size_t>(region.size.z);
@@ -366,7 +366,7 @@ void SchematicReader::take_numbered_biomes(Region& region, nbt::Value numbers) {
   }
 }
 
-// Blocks by the numbers that they had before 1.13.
+// Reads blocks by their numbers before 1.13.
 Status SchematicReader::read_mcedit() {
   const auto size = size_of(root_);
   if (!size) return size.error();
@@ -424,7 +424,7 @@ Status SchematicReader::read_litematic(nbt::Value regions) {
   return done;
 }
 
-// A size below 0 reaches from the position downwards.
+// A negative size extends downwards from the position.
 Status SchematicReader::read_litematic_region(nbt::Value from) {
   const auto place = vector_of(from["Position"]);
   const auto reach = vector_of(from["Size"]);
@@ -470,7 +470,7 @@ Status SchematicReader::read_structure() {
   const auto size = vector_of_list(root_["size"]);
   if (!size) return fault("the structure has no size", root_);
   if (auto sound = check_size(*size, root_["size"]); !sound) return sound;
-  // Only the content determines the size of such files.
+  // Only the content determines the size of these files.
   constexpr std::int64_t kMaxArea = std::int64_t{1} << 22;
   if (std::int64_t{size->x} * size->z > kMaxArea) {
     return make_error(ErrorCode::LimitExceeded, "the structure of " + text_of(*size) + " blocks is too large");
@@ -478,7 +478,7 @@ Status SchematicReader::read_structure() {
   Region region;
   region.size = *size;
   nbt::Value palette = root_["palette"];
-  if (!palette) {  // of several that the game chooses from by chance the first
+  if (!palette) {  // the game picks one of several at random; this reads the first
     bool is_first = true;
     root_["palettes"].for_each([&](nbt::Value each) {
       if (std::exchange(is_first, false)) palette = each;
@@ -511,7 +511,7 @@ void ColumnBiomes::put_into(Section& section, IVec3 corner, IVec3 size) const {
   }
 }
 
-// Where nothing is said there is air.
+// Positions without a block are air.
 Status SchematicReader::put_structure(Region& region, nbt::Value blocks) {
   struct Placed {
     int y;
@@ -547,7 +547,7 @@ Status SchematicReader::put_structure(Region& region, nbt::Value blocks) {
   return put(region);
 }
 
-// One slab of 16 layers at a time, cut into sections.
+// Cuts one slab of 16 layers at a time into sections.
 Status SchematicReader::fill(const Region& region, int first_y, std::span<const std::uint16_t> layers) {
   const auto width = static_cast<std::size_t>(region.size.x);
   const std::size_t area = width * static_cast<std::size_t>(region.size.z);
@@ -599,8 +599,8 @@ void SchematicReader::take_invisible(const Region& region) {
   }
 }
 
-// Puts layers of one block, up to the next border of chunks, without looking at each. Returns false and reads nothing
-// where a block has more than its type, or where blocks differ.
+// Adds layers of one block up to the next chunk border, without visiting each block. Returns false and reads nothing if
+// a block has more than its type, or if blocks differ.
 bool SchematicReader::put_uniform(const Region& region, int first_y, int height, Grid& grid) {
   if (!region.read_uniform || !std::ranges::all_of(region.palette, &Block::is_plain)) return false;
   const auto index = region.read_uniform(height);
@@ -673,8 +673,7 @@ Status SchematicReader::read_any() {
                     "an NBT file that is not a schematic; it has " + (keys.empty() ? std::string("nothing") : keys));
 }
 
-// NBT with the least significant byte first: a compound without a name, whose first value has a name of printable
-// characters that way round.
+// Bedrock NBT is little-endian: a compound without a name, whose first value has a printable name in that byte order.
 bool is_bedrock_structure(std::span<const std::byte> bytes) {
   constexpr std::size_t kNameAt = 6;
   const auto at = [&](std::size_t i) { return std::to_integer<unsigned>(bytes[i]); };

@@ -9,7 +9,7 @@
 
 #include "io/placed/placed_grids.h"
 
-// Pieces of Minecraft's worlds, as players and programs pass them on:
+// Pieces of Minecraft worlds, as players and programs share them:
 //   .schem      https://github.com/SpongePowered/Schematic-Specification, versions 1 to 3
 //   .schematic  https://minecraft.wiki/w/Schematic_file_format
 //   .litematic  of the mod Litematica, versions 1 to 7

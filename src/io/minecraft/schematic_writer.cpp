@@ -1,4 +1,5 @@
-// A schematic of Sponge's, version 2, which most programs read: a palette of blocks, and an index of it for each place.
+// Writes Sponge schematics, version 2, which most programs read: a block palette, and a palette index for each
+// position.
 
 #include <algorithm>
 #include <array>
@@ -26,14 +27,14 @@ constexpr models::FormatHolds kHolds = {
 constexpr int kMaxEdge = 65'535;
 constexpr std::int64_t kMaxBlocks = (std::int64_t{1} << 30) - (std::int64_t{1} << 20);
 constexpr std::int32_t kVersion = 2;
-// The game's 1.20.1.
+// The data version of the game's 1.20.1.
 constexpr std::int32_t kDataVersion = 3465;
 
 constexpr std::array<std::string_view, 16> kDyes = {"white", "orange", "magenta",    "light_blue", "yellow", "lime",
                                                     "pink",  "gray",   "light_gray", "cyan",       "purple", "blue",
                                                     "brown", "green",  "red",        "black"};
 
-/// Blocks of one colour that fill their place.
+/// Full blocks of one colour.
 std::vector<std::string> plain_blocks() {
   std::vector<std::string> names = {
       "stone",         "smooth_stone", "deepslate",       "dirt",       "sand",       "red_sand",   "oak_planks",
@@ -63,7 +64,7 @@ class Blocks {
   explicit Blocks(const std::vector<std::string>& names) {
     for (const std::string& name : names) all_.emplace_back(name, look_of_block(name, false, false).colour);
   }
-  /// The one of the nearest colour, as eyes weigh its channels.
+  /// Returns the available block of the nearest colour, weighting channels like human vision.
   [[nodiscard]] std::string nearest(Rgba8 colour) const {
     const auto distance = [&](Rgba8 other) {
       const auto squared = [](int a, int b) { return (a - b) * (a - b); };
@@ -78,7 +79,7 @@ class Blocks {
   std::vector<std::pair<std::string, Rgba8>> all_;
 };
 
-/// A type that was read of the game, or is named as one of its blocks.
+/// A type that was read from the game, or has the name of one of its blocks.
 bool is_block(const VoxelProperties& type) {
   constexpr std::string_view kGame = "minecraft:";
   if (!type.name.starts_with(kGame) && !type.attributes.contains(kStatesAttribute)) return false;
@@ -105,7 +106,7 @@ BlockText as_in_game(BlockText block) {
   return block;
 }
 
-/// The blocks of a scene's types, and their numbers.
+/// The blocks of a scene's types, and their palette numbers.
 class Palette {
  public:
   explicit Palette(const VoxelRegistry& types) : types_(types), guessed_(types.size(), false) {
@@ -148,7 +149,7 @@ class Palette {
   std::vector<bool> of_game_ = std::vector<bool>(types_.size(), false);
 };
 
-/// Seven bits a byte, the lowest first; the eighth says that more is to come.
+/// Writes seven bits per byte, lowest first; the eighth bit marks that more bytes follow.
 void put_varint(std::uint32_t value, std::vector<std::byte>& out) {
   for (; value >= 0x80; value >>= 7) out.push_back(static_cast<std::byte>(value | 0x80));
   out.push_back(static_cast<std::byte>(value));
@@ -222,7 +223,7 @@ Result<models::ModelBytes> write_schematic(const Scene& scene, const Progress& p
     merged->warnings.push_back("voxels whose data is left out, since .schem cannot store it: " +
                                with_thousands(lost_data));
   }
-  // What readers take.
+  // The limit of readers.
   constexpr std::size_t kMost = std::size_t{1} << 30;
   if (out.document().size() > kMost) return make_error(ErrorCode::LimitExceeded, "more than 1 GiB of blocks");
   constexpr int kLevel = 6;

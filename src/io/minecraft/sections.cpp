@@ -38,7 +38,7 @@ bool unpack_indices(nbt::Value longs, int bits, std::span<std::uint16_t> out) {
   const auto width = static_cast<std::size_t>(bits);
   const std::size_t per_word = 64 / width;
   const std::uint64_t mask = (std::uint64_t{1} << width) - 1;
-  if (words == (out.size() + per_word - 1) / per_word) {  // none spans two
+  if (words == (out.size() + per_word - 1) / per_word) {  // no index spans two longs
     std::size_t at = 0;
     for (std::size_t i = 0; i < words; ++i) {
       std::uint64_t rest = word(bytes, i);
@@ -72,7 +72,7 @@ Status read_block_palette(nbt::Value palette, BlockTypes& types, std::vector<Blo
   std::vector<Property> properties;
   palette.for_each([&](nbt::Value entry) {
     if (!done) return;
-    // Before 20w17 and since: a compound; a few snapshots had the name alone.
+    // A compound before 20w17 and today; a few snapshots stored only the name.
     const auto name = entry.tag() == nbt::Tag::String ? entry.text() : entry["Name"].text();
     if (!name) {
       done = fault("a block has no name", entry);
@@ -181,7 +181,7 @@ void SectionReader::read_biomes(nbt::Value section, nbt::Value level) {
           index_of(tints_of_biome(name_of_biome(numbers.tag() == nbt::Tag::ByteArray ? number & 255 : number)));
     }
   } else if (numbers.is_integers() && numbers.count() >= 1024 && section_.y >= 0) {
-    // Cells of the whole chunk, from below.
+    // Cells of the whole chunk, from the bottom.
     const std::size_t first = std::min(static_cast<std::size_t>(section_.y) * 64, numbers.count() - 64);
     for (std::size_t i = 0; i < 64; ++i)
       indices[i] = index_of(tints_of_biome(name_of_biome(numbers.integer(first + i))));
@@ -205,10 +205,10 @@ Status SectionReader::read_section(nbt::Value section, nbt::Value level) {
     if (auto read = read_block_palette(palette, types_, section_.palette); !read) return read;
     const std::size_t size = section_.palette.size();
     if (size == 0 || size > kSectionBlocks) return fault("invalid palette size " + std::to_string(size), palette);
-    // Some servers write the array of a section of one block, without longs.
+    // Some servers write the array of a section of one block without longs.
     if (data && (size > 1 || data.count() > 0)) {
       if (is_air()) return {};
-      // The game takes 4 bits at least, some servers no more than the palette needs.
+      // The game uses at least 4 bits; some servers use no more than the palette needs.
       if (!unpack_indices(data, bits_of_palette(size, 4), section_.indices) &&
           !unpack_indices(data, bits_of_palette(size, 1), section_.indices)) {
         return fault("the indices into " + std::to_string(size) + " blocks do not fit in " +

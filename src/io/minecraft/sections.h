@@ -61,11 +61,11 @@ class SectionReader {
 /// Unpacks indices of `bits` each from longs, from the lowest bit up. The number of longs shows if indices span two of
 /// them. Returns false if it fits neither form. Requires: 1 <= bits <= 16.
 [[nodiscard]] bool unpack_indices(nbt::Value longs, int bits, std::span<std::uint16_t> out);
-/// The same of indices that span longs, from the one of number `first` on. Requires: they are all there.
+/// As above, for indices that span longs, starting at index `first`. Requires: the longs hold them all.
 void unpack_spanning(nbt::Value longs, int bits, std::size_t first, std::span<std::uint16_t> out);
 /// Reads a list of blocks: compounds with a Name and Properties. Errors: BadFormat, LimitExceeded.
 [[nodiscard]] Status read_block_palette(nbt::Value palette, BlockTypes& types, std::vector<Block>& out);
-/// Bits that an index of a palette takes. Requires: size > 0.
+/// Returns the bits per index of a palette. Requires: size > 0.
 [[nodiscard]] int bits_of_palette(std::size_t size, int least);
 
 }  // namespace quoin::minecraft

@@ -1,4 +1,5 @@
-// Goxel's files: chunks of a type, a size, content and a sum. Its z points up; +x, +z, -y are this library's axes.
+// Goxel files: chunks of a type, a size, content and a checksum. Goxel's z points up; +x, +z, -y are this library's
+// axes.
 //
 //   BL16   16^3 voxels as a PNG of 64 x 64 pixels
 //   MATE   a material
@@ -78,7 +79,7 @@ Result<LoadedScene> GoxelReader::read() {
     const std::size_t size = reader.u32();
     const std::size_t begin = reader.position();
     static_cast<void>(reader.take(size));
-    static_cast<void>(reader.u32());  // its sum, which programs do not agree on
+    static_cast<void>(reader.u32());  // the checksum; programs compute it differently
     if (reader.failed()) return bad_at(at, "a chunk extends past the end of the file");
     if (auto done = read_chunk(type, ByteReader(bytes_, begin, begin + size)); !done) return done.error();
   }
@@ -119,7 +120,7 @@ Status GoxelReader::read_block(ByteReader& chunk) {
   return {};
 }
 
-// Names and values, until a name of no length.
+// Names and values, until an empty name.
 GoxelReader::Dict GoxelReader::read_dict(ByteReader& chunk) {
   Dict dict;
   for (;;) {
@@ -218,7 +219,7 @@ bool is_inside(Shape shape, const DVec3& p) {
   return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) <= 1.0;
 }
 
-/// A matrix by columns; the numbers that are missing are those of no turn.
+/// Reads a column-major matrix; missing numbers are the identity's.
 glm::dmat4 matrix_of(std::span<const std::byte> bytes) {
   std::array<float, 16> numbers{};
   for (std::size_t i = 0; i < 4; ++i) numbers[5 * i] = 1.0F;
@@ -228,7 +229,7 @@ glm::dmat4 matrix_of(std::span<const std::byte> bytes) {
   return matrix;
 }
 
-/// The voxels that the box from -1 to 1 may reach, placed by a matrix.
+/// Returns the voxels that the box from -1 to 1 may cover under a matrix.
 DBox box_of_shape(const glm::dmat4& placed) {
   DVec3 reach(0.0);
   for (int axis = 0; axis < 3; ++axis) reach += glm::abs(DVec3(placed[axis]));
@@ -243,7 +244,7 @@ Rgba8 GoxelReader::tinted(const std::uint8_t* rgba, const Material& material) co
   return {times(rgba[0], 0), times(rgba[1], 1), times(rgba[2], 2), std::max<std::uint8_t>(times(255, 3), 1)};
 }
 
-// A voxel is there where its centre is inside.
+// A voxel is set if its centre is inside.
 Status GoxelReader::put_shape(const Dict& dict, const Material& material, std::size_t at) {
   const std::string_view name = text_of(dict.find("shape")->second);
   const auto shape = shape_named(name);

@@ -13,7 +13,7 @@ namespace {
 using minecraft::BlockLook;
 using minecraft::Knowledge;
 
-/// A node of Luanti's own game, and the block of Minecraft's that looks like it.
+/// A node of Luanti's own game, and the Minecraft block that looks like it.
 struct Alike {
   std::string_view node;
   std::string_view block;

@@ -1,4 +1,4 @@
-// Luanti's schematics: names of nodes, and three arrays in a zlib stream. Its axes are left-handed: z is turned round.
+// Luanti schematics: node names, and three arrays in a zlib stream. The axes are left-handed, so z is reversed.
 
 #include <algorithm>
 #include <bit>
@@ -43,13 +43,13 @@ Result<LoadedScene> read_mts(std::span<const std::byte> bytes) {
   const int size_x = read_u16(reader);
   const int size_y = read_u16(reader);
   const int size_z = read_u16(reader);
-  if (version >= 3) static_cast<void>(reader.take(static_cast<std::size_t>(size_y)));  // how likely each layer is
-  // A name has two bytes at least. Of a file that ends too early no node is looked up: that takes longer than reading.
+  if (version >= 3) static_cast<void>(reader.take(static_cast<std::size_t>(size_y)));  // the probability of each layer
+  // A name has at least two bytes. Nodes of truncated files are not looked up, since that takes longer than reading.
   const std::size_t count = read_u16(reader);
   std::vector<std::string_view> names(count <= reader.remaining() / 2 ? count : 0);
   for (std::string_view& name : names) name = reader.text(read_u16(reader));
   if (reader.failed() || names.size() < count) return bad_at(bytes.size(), "the file ends before its nodes");
-  std::vector<std::optional<VoxelProperties>> nodes(count);  // nothing: air
+  std::vector<std::optional<VoxelProperties>> nodes(count);  // nullopt: air
   std::ranges::transform(names, nodes.begin(), node_properties);
   const std::size_t begin = reader.position();
   const std::uint64_t volume =
@@ -79,7 +79,7 @@ Result<LoadedScene> read_mts(std::span<const std::byte> bytes) {
       for (int x = 0; x < size_x; ++x, ++at) {
         const auto index = load<std::uint16_t>(content.data() + 2 * at, std::endian::big);
         if (index >= nodes.size()) return bad_at(begin, "a node index is beyond the names");
-        // How likely the node is, of 127 since version 4 and of 255 before.
+        // The node's probability, out of 127 since version 4 and out of 255 before.
         const auto chance = std::to_integer<unsigned>(content[2 * volume + at]);
         if (version >= 2 && (version >= 4 ? chance & 0x7FU : chance >> 1) == 0) continue;
         if (!nodes[index]) continue;

@@ -22,23 +22,24 @@ struct Model {
   bool visible = true;
 };
 
-/// Collects coloured voxels, in any number of models, and makes a scene of them: a type for each colour and material.
-/// Memory: 24 bytes a voxel, or a run of them.
+/// Collects coloured voxels of any number of models and makes a scene of them, with a type for each colour and
+/// material.
+/// Memory: 24 bytes per voxel or run of voxels.
 class ModelBuilder {
  public:
-  /// Voxels that follow are of this model. Requires: sizes are finite and positive.
+  /// Starts a model; the following voxels belong to it. Requires: sizes are finite and positive.
   void begin(Model model);
   /// Adds the voxel properties other than colour and transparency. Returns the material's number; 0 is the default
   /// material.
   [[nodiscard]] std::uint32_t add_material(VoxelProperties material);
-  /// Voxels that follow are of this material. Requires: it was added.
+  /// Sets the material of the following voxels. Requires: it was added.
   void use_material(std::uint32_t material);
-  /// `count` voxels from `voxel` on along an axis. Alpha below 255 makes a type transparent, 0 is no voxel.
-  /// Errors: LimitExceeded beyond 2^25 of such calls.
+  /// Adds `count` voxels from `voxel` along an axis. Alpha below 255 makes a type transparent; alpha 0 adds no voxel.
+  /// Errors: LimitExceeded beyond 2^25 such calls.
   [[nodiscard]] Status put(IVec3 voxel, Rgba8 colour, int count = 1, int axis = 1);
   void warn(std::string line);
 
-  /// The scene. Where there are more colours than types there can be, their last bits are rounded, with a warning.
+  /// Returns the scene. If there are more colours than possible types, their lowest bits are rounded, with a warning.
   [[nodiscard]] Result<LoadedScene> take(std::string format);
 
  private:

@@ -21,19 +21,19 @@ namespace quoin::models {
 [[nodiscard]] bool is_binvox(std::span<const std::byte> beginning);
 [[nodiscard]] Result<LoadedScene> read_binvox(std::span<const std::byte> bytes);
 
-/// Cube World's models: three sizes, and three bytes a voxel, black ones empty.
+/// Cube World models: three sizes, and three bytes per voxel; black is empty.
 [[nodiscard]] bool is_cub(std::span<const std::byte> whole);
 [[nodiscard]] Result<LoadedScene> read_cub(std::span<const std::byte> bytes);
 
-/// Ken Silverman's formats: KV6 and KVX models, SLAB6's .vox, and .vxl maps of Ace of Spades (without a header, 64 or
-/// 240 high) and of Voxlap.
+/// Ken Silverman's formats: KV6 and KVX models, SLAB6 .vox, and .vxl maps of Ace of Spades (without a header, 64 or 240
+/// high) and of Voxlap.
 [[nodiscard]] bool is_kv6(std::span<const std::byte> beginning);
 [[nodiscard]] Result<LoadedScene> read_kv6(std::span<const std::byte> bytes);
 [[nodiscard]] bool is_kvx(std::span<const std::byte> whole);
 [[nodiscard]] Result<LoadedScene> read_kvx(std::span<const std::byte> bytes);
 [[nodiscard]] bool is_slab6(std::span<const std::byte> whole);
 [[nodiscard]] Result<LoadedScene> read_slab6(std::span<const std::byte> bytes);
-/// Ground of a .vxl that no surface shows has no colour in the file: this one.
+/// The colour of .vxl ground that no surface shows; the file has none for it.
 inline constexpr Rgba8 kEarth{101, 77, 51, 255};
 inline constexpr std::uint32_t kVoxlapMagic = 0x09072000;
 [[nodiscard]] bool is_vxl(std::span<const std::byte> whole);

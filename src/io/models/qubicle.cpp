@@ -36,7 +36,7 @@ Rgba8 colour_of(std::uint32_t rgba, bool is_bgra) {
           static_cast<std::uint8_t>(rgba >> 24)};
 }
 
-/// A matrix's place and size. Qubicle gives an empty matrix any place.
+/// A matrix's size and position. Qubicle gives empty matrices any position.
 struct Matrix {
   std::string name;
   IVec3 size{0};
@@ -72,7 +72,8 @@ std::optional<IVec3> read_place(ByteReader& reader) {
   return is_sound ? std::optional(place) : std::nullopt;
 }
 
-/// A matrix that turns about a pivot, in voxels from its place; about its place where that is out of range.
+/// Returns a model that rotates about a pivot, in voxels from its position. If the pivot is out of range it rotates
+/// about the position.
 Model model_about(const Matrix& matrix, const DVec3& pivot) {
   constexpr double kFarthest = 1e6;
   Model model;
@@ -90,7 +91,7 @@ class QbReader {
   Result<LoadedScene> read() {
     static_cast<void>(reader_.u32());  // version
     is_bgra_ = reader_.u32() == 1;
-    static_cast<void>(reader_.u32());  // z axis: how Qubicle showed it; the data are the same
+    static_cast<void>(reader_.u32());  // z axis: affects only Qubicle's display; the data is the same
     is_packed_ = reader_.u32() != 0;
     has_masks_ = reader_.u32() != 0;
     const std::uint32_t matrices = reader_.u32();
@@ -126,7 +127,7 @@ Status QbReader::read_matrix() {
   matrix.size = *size;
   if (is_empty(matrix.size)) {
     builder_.warn(empty_text(matrix.name));
-    return read_slices(matrix);  // which end in the packed form
+    return read_slices(matrix);  // in the packed form, slices have end marks
   }
   matrix.place = *place;
   Model model;
@@ -196,7 +197,7 @@ class QbtReader {
   Result<LoadedScene> read() {
     ByteReader reader(bytes_);
     static_cast<void>(reader.take(4 + 2 + 12));  // magic, version, scale
-    // Before version 1.1 colours stood in voxels alone.
+    // Before version 1.1 only voxels had colours.
     std::size_t at = reader.position();
     std::string_view part = reader.text(8);
     if (part == "COLORMAP") {
@@ -350,7 +351,7 @@ Status QbclReader::read_node(int depth, bool is_used, bool is_shown) {
     static_cast<void>(reader_.take(36));
     return read_children(depth, is_used, is_shown);
   }
-  // Nothing says how long a node is.
+  // The file does not store a node's size.
   if (kind != Kind::Matrix && kind != Kind::Compound) return bad_at(at, "unknown node kind");
   if (auto done = read_matrix(std::move(name), is_used, is_shown); !done) return done;
   return kind == Kind::Compound ? read_children(depth, false, is_shown) : Status();
@@ -413,7 +414,7 @@ Status QbclReader::put_columns(const Matrix& matrix, std::span<const std::byte> 
         std::uint32_t entry = column.u32();
         std::uint32_t length = 1;
         if (entry >> 24 == kRun) {
-          length = entry & 0xFFU;  // the other bytes may hold anything
+          length = entry & 0xFFU;  // the other bytes are unused
           entry = column.u32();
         }
         if (column.failed() || length > static_cast<std::uint32_t>(matrix.size.y) - y) {
@@ -432,7 +433,7 @@ Status QbclReader::put_columns(const Matrix& matrix, std::span<const std::byte> 
   return {};
 }
 
-/// Numbers of a text, line by line.
+/// Reads the numbers of a text, line by line.
 class NumberReader {
  public:
   NumberReader(std::string_view text, std::size_t begin) : text_(text), at_(begin) {}

@@ -1,4 +1,4 @@
-// Two formats that are an array of voxels, and little else.
+// Two formats that consist of an array of voxels.
 
 #include <array>
 #include <charconv>
@@ -130,7 +130,7 @@ bool is_cub(std::span<const std::byte> whole) {
   return !reader.failed() && volume == reader.remaining();
 }
 
-// x changes fastest, then the second ground axis, then the height: rotated so that up is +y.
+// x changes fastest, then the second ground axis, then the height. Rotated so that up is +y.
 Result<LoadedScene> read_cub(std::span<const std::byte> bytes) {
   if (!is_cub(bytes)) return bad_at(0, "the file size does not match the model's three sizes");
   ByteReader reader(bytes);

@@ -1,9 +1,9 @@
-// Ken Silverman's formats. Their z points down; +x, -z, +y are this library's axes.
+// Ken Silverman's formats. The files' z points down; +x, -z, +y are this library's axes.
 //
 //   KV6    voxels of the surface by columns of x, then y: colour, height, faces
-//   KVX    the same as slabs with a palette, once a level of detail: the first is read
+//   KVX    the same as slabs with a palette, for each level of detail; the first is read
 //   SLAB6  an array of palette indices, 255 is empty
-//   VXL    columns of spans: air, the colours of a surface from above, solid ground, those of a surface from below
+//   VXL    columns of spans: air, colours of an upper surface, solid ground, colours of a lower surface
 
 #include <array>
 #include <optional>
@@ -49,7 +49,7 @@ Rgba8 colour_of(std::span<const std::byte> bgr) {
           std::to_integer<std::uint8_t>(bgr[0]), 255};
 }
 
-// Six bits a channel, as screens once had them.
+// Six bits per channel, like VGA palettes.
 Rgba8 colour_of(std::span<const std::byte> palette, std::uint8_t index) {
   const auto channel = [&](std::size_t i) {
     const auto six = std::to_integer<unsigned>(palette[std::size_t{3} * index + i]) & 63U;
@@ -207,7 +207,7 @@ Result<LoadedScene> read_slab6(std::span<const std::byte> bytes) {
 
 namespace {
 
-// Maps of Ace of Spades have no header: 64 high, and 240 since version 1.0, where columns may be empty.
+// Ace of Spades maps have no header. They are 64 high; since version 1.0 they are 240 high and columns may be empty.
 constexpr std::array<Sizes, 2> kAceOfSpades = {{{512, 512, 64}, {512, 512, 240}}};
 constexpr Sizes kVoxlapMap{1024, 1024, 256};
 
@@ -217,11 +217,11 @@ struct VxlLayout {
   std::size_t columns = 0;
 };
 
-/// Returns the layout in a header; the lower map has none.
+/// Returns the layout from a header; the lower map has none.
 VxlLayout layout_in_header(std::span<const std::byte> whole) {
   ByteReader reader(whole);
   if (reader.u32() != kVoxlapMagic) return {};
-  // The two sizes, and where one stands first: a place and three axes.
+  // The two sizes and the start position: a point and three axes.
   constexpr std::size_t kHeader = 12 + 12 * sizeof(double);
   VxlLayout layout{kVoxlapMap, kHeader};
   layout.sizes.x = static_cast<int>(std::min(reader.u32(), kMaxEdge));
@@ -229,8 +229,8 @@ VxlLayout layout_in_header(std::span<const std::byte> whole) {
   return layout;
 }
 
-/// Reads one column, from above. `take(z, count, colour)`: a colour of null is ground without one. False where it does
-/// not fit its map.
+/// Reads one column from above. `take(z, count, colour)`: a null colour is ground without a colour. Returns false if
+/// the column does not fit its map.
 template <class Take>
 bool read_column(ByteReader& reader, int depth, Take take) {
   int z = 0;
@@ -238,7 +238,7 @@ bool read_column(ByteReader& reader, int depth, Take take) {
     const int words = reader.u8();
     const int top_begin = reader.u8();
     const int top_end = reader.u8();
-    static_cast<void>(reader.u8());  // where the air above begins, known from the span before
+    static_cast<void>(reader.u8());  // the top of the air above, from the previous span
     const int top = top_end - top_begin + 1;
     if (reader.failed() || top_begin < z || top < 0 || top_end >= depth) return false;
     for (int i = 0; i < top; ++i) {
@@ -267,7 +267,7 @@ bool read_column(ByteReader& reader, int depth, Take take) {
   }
 }
 
-/// Returns true if all columns fit a map, and its file where that has no header.
+/// Returns true if all columns fit a map, and fill its file if it has no header.
 bool fits(std::span<const std::byte> whole, const VxlLayout& layout) {
   if (layout.columns > whole.size() || layout.sizes.x == 0 || layout.sizes.y == 0) return false;
   ByteReader reader(whole, layout.columns, whole.size());
@@ -278,7 +278,7 @@ bool fits(std::span<const std::byte> whole, const VxlLayout& layout) {
   return layout.columns != 0 || reader.remaining() == 0;
 }
 
-/// The lowest map that the columns fit, where there is no header to say it.
+/// Returns the lowest map that the columns fit, for files without a header.
 VxlLayout vxl_layout(std::span<const std::byte> whole) {
   const VxlLayout said = layout_in_header(whole);
   if (said.columns != 0) return said;

@@ -45,7 +45,7 @@ std::vector<fs::path> folders_in(const fs::path& folder) {
   return folders;
 }
 
-/// Names of dimensions may have slashes: folders within folders. `folders_left` ends loops of links.
+/// Names of dimensions may contain slashes: nested folders. `folders_left` stops at cycles of links.
 void add_nested(const fs::path& folder, const std::string& name, int depth, int& folders_left,
                 std::vector<Dimension>& found) {
   constexpr int kMaxDepth = 16;
@@ -61,7 +61,7 @@ void add_nested(const fs::path& folder, const std::string& name, int depth, int&
   }
 }
 
-/// "DIM-1", "DIM1", and "DIM7" of mods before 1.16.
+/// Returns the dimension of a folder "DIM-1", "DIM1", or "DIM7" (mods before 1.16).
 std::optional<std::string> name_of_old_folder(const std::string& folder) {
   for (const OwnDimension& own : kOwn) {
     if (!own.folder.empty() && folder == own.folder) return std::string(own.name);
@@ -94,7 +94,7 @@ std::optional<fs::path> level_file_of(const fs::path& path) {
   return std::nullopt;
 }
 
-/// The name of the dimension whose regions lie in a folder of a world; empty where the folder says nothing.
+/// Returns the name of the dimension whose regions are in a world's subfolder; empty if unknown.
 std::string name_of_regions(const fs::path& regions, const std::optional<fs::path>& level) {
   std::error_code error;
   if (level) {

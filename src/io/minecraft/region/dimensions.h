@@ -19,10 +19,10 @@ struct Dimension {
   std::filesystem::path regions;  ///< the folder that holds r.X.Z.mca
 };
 
-/// The regions that a path leads to, and the dimensions of its world.
+/// The regions at a path, and the dimensions of its world.
 struct WorldFolder {
   std::vector<Dimension> dimensions;             ///< the overworld first if there is one, then by name
-  std::vector<std::string> warnings{};           ///< a line per dimension that is there twice
+  std::vector<std::string> warnings{};           ///< a line per duplicate dimension
   std::optional<std::filesystem::path> level{};  ///< level.dat
 };
 
@@ -32,8 +32,8 @@ struct WorldFolder {
 /// Returns true if the folder holds region files.
 [[nodiscard]] bool has_regions(const std::filesystem::path& folder);
 
-/// Finds the dimensions of a world folder; of a folder of one dimension, or of regions, that one. A path to level.dat
-/// counts as its folder. No dimensions: it is no world of the Java edition, or one without chunks.
+/// Finds the dimensions of a world folder, or the dimension of a dimension or region folder. A path to level.dat counts
+/// as its folder. Finds no dimensions if the folder is not a Java world, or has no chunks.
 /// Cost: lists the folders below `dimensions`.
 [[nodiscard]] WorldFolder find_dimensions(const std::filesystem::path& path);
 

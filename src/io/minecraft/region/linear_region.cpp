@@ -35,7 +35,7 @@ Error bad(std::string message, std::size_t at) {
 
 #ifdef QUOIN_HAVE_ZSTD
 
-/// Expands the first `wanted` bytes of a zstd stream. Memory grows with the bytes that come out of it.
+/// Expands the first `wanted` bytes of a zstd stream. Memory grows with the output.
 Result<std::vector<std::byte>> expand_zstd(std::span<const std::byte> stream, std::size_t wanted) {
   const std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> context(ZSTD_createDCtx(), &ZSTD_freeDCtx);
   if (!context) return make_error(ErrorCode::LimitExceeded, "not enough memory");

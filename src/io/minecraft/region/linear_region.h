@@ -21,7 +21,7 @@
 namespace quoin::minecraft {
 
 /// A Linear region. Threads: any number at once.
-/// Memory: the file, and once a chunk was read, all its chunks as NBT.
+/// Memory: the file and, once a chunk was read, all its chunks as NBT.
 class LinearRegion {
  public:
   static constexpr std::size_t kDataOffset = 32;

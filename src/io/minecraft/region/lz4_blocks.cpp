@@ -36,7 +36,7 @@ Result<std::vector<std::byte>> expand_lz4_blocks(std::span<const std::byte> byte
     if (packed > bytes.size() - at - kHeader) return fault("LZ4: cut off");
     if (size > max_bytes - out.size())
       return make_error(ErrorCode::LimitExceeded, "LZ4: the output exceeds the limit", {}, at);
-    // A byte of LZ4 gives 255 at most.
+    // LZ4 expands a byte to at most 255 bytes.
     if (size / 255 > packed) return fault("LZ4: a block claims more output than its bytes can hold");
     const std::byte* const content = header + kHeader;
     if (method == kStored) {

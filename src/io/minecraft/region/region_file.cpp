@@ -176,7 +176,7 @@ Status RegionFile::read_linear() {
 }
 
 Status RegionFile::read_table() {
-  if (size_ == 0) return {};  // as the game leaves files that it made and did not fill
+  if (size_ == 0) return {};  // the game creates files and may leave them empty
   std::array<std::byte, 8> magic{};
   if (const auto count = read_at(0, magic); count && LinearRegion::begins(std::span(magic).first(*count))) {
     return read_linear();
@@ -233,7 +233,7 @@ Result<std::vector<std::byte>> RegionFile::read_sectors(int x, int z, std::uint8
   }
   const std::uint64_t bytes = load<std::uint32_t>(header.data(), std::endian::big);
   compression = std::to_integer<std::uint8_t>(header[4]);
-  // It may have more sectors than the table says, which the checksum of its compressed data then bears out.
+  // The chunk may have more sectors than the table says; the checksum of its compressed data then confirms it.
   if (bytes < 1 || begin + 4 + bytes > size_) {
     return fault(x, z, "claims " + std::to_string(bytes) + " bytes");
   }

@@ -22,7 +22,7 @@
 namespace quoin::minecraft {
 
 inline constexpr int kRegionEdge = 32;
-/// The most bytes that a chunk may expand to; the game's have some 100,000.
+/// The maximum decompressed bytes of a chunk; the game's have some 100,000.
 inline constexpr std::size_t kMaxChunkBytes = std::size_t{64} << 20;
 
 /// Decompresses the NBT of a chunk, or of a whole file.
@@ -31,12 +31,12 @@ enum class ChunkCompression : std::uint8_t { Gzip = 1, Zlib = 2, None = 3, Lz4 =
 /// for LZ4 in builds without it.
 [[nodiscard]] Result<std::vector<std::byte>> decompress(std::span<const std::byte> bytes, std::uint8_t compression,
                                                         std::size_t max_bytes);
-/// A file of NBT, as it is or within gzip or zlib, by how it begins. Errors: as `decompress`.
+/// Decompresses an NBT file, detecting gzip, zlib and plain NBT. Errors: as `decompress`.
 [[nodiscard]] Result<std::vector<std::byte>> decompress_file(std::span<const std::byte> bytes, std::size_t max_bytes);
 
 enum class RegionKind : std::uint8_t { Anvil, Linear, McRegion };
 
-/// The region coordinates in a file name: (x, z) of "r.X.Z.mca", after any prefix.
+/// Parses the region coordinates in a file name: (x, z) of "r.X.Z.mca", after any prefix.
 struct RegionName {
   int x = 0;
   int z = 0;
@@ -52,18 +52,18 @@ struct RegionName {
 /// A region that is open for reading. Threads: any number at once.
 class RegionFile {
  public:
-  /// Errors: CannotRead; BadFormat where it is shorter than its table.
+  /// Errors: CannotRead; BadFormat if the file is shorter than its table.
   [[nodiscard]] static Result<std::unique_ptr<RegionFile>> open(const std::filesystem::path& path, RegionName name);
-  /// Opens a file's bytes, which are copied, in the same way; chunks in sidecar files are not found.
+  /// Opens the bytes of a file, which are copied. Chunks in sidecar files are not found.
   [[nodiscard]] static Result<std::unique_ptr<RegionFile>> of(std::span<const std::byte> bytes);
   RegionFile(const RegionFile&) = delete;
   RegionFile& operator=(const RegionFile&) = delete;
   ~RegionFile();
 
-  /// Returns true if a chunk is there. Requires: 0 <= x, z < 32.
+  /// Returns true if the chunk exists. Requires: 0 <= x, z < 32.
   [[nodiscard]] bool has(int x, int z) const { return linear_ ? linear_->has(index_of(x, z)) : entry(x, z) != 0; }
-  /// The NBT of a chunk, decompressed. Requires: has(x, z).
-  /// Errors: BadFormat, Unsupported, LimitExceeded, CannotRead; with the file, and the offset in it.
+  /// Returns the decompressed NBT of a chunk. Requires: has(x, z).
+  /// Errors: BadFormat, Unsupported, LimitExceeded, CannotRead; with the file and the offset in it.
   [[nodiscard]] Result<std::vector<std::byte>> read(int x, int z) const;
   /// Returns the offset of a chunk in the file; in a Linear file the offset of all compressed data.
   [[nodiscard]] std::uint64_t offset(int x, int z) const {
@@ -86,8 +86,8 @@ class RegionFile {
 
   std::filesystem::path path_;
   RegionName name_;
-  int descriptor_;                // -1: of `bytes_`
-  std::vector<std::byte> bytes_;  // of a file that has no name
+  int descriptor_;                // -1: reads `bytes_`
+  std::vector<std::byte> bytes_;  // for data without a file
   std::uint64_t size_ = 0;
   std::array<std::uint32_t, kRegionEdge * kRegionEdge> table_{};
   std::unique_ptr<const LinearRegion> linear_;

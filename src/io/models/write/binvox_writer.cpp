@@ -1,4 +1,4 @@
-// Lines of text, then runs of a value and a count: y changes fastest, then z, then x.
+// Writes lines of text, then runs of a value and a count: y changes fastest, then z, then x.
 
 #include <algorithm>
 #include <array>
@@ -18,7 +18,7 @@ namespace {
 constexpr FormatHolds kHolds = {.extension = ".binvox", .colours = false, .place_in_units = true};
 constexpr int kMaxEdge = 1 << 14;
 constexpr std::int64_t kMaxVoxels = std::int64_t{1} << 32;
-/// Some readers take nothing but cubes (trimesh): written where that is little more, or little at all.
+/// Some readers accept only cubes (trimesh). A cube is written if it is not much larger than the box, or small anyway.
 constexpr int kMaxCube = 1 << 8;
 constexpr std::int64_t kMostAir = 8;  // times the box
 
@@ -30,7 +30,7 @@ bool is_better_a_cube(const IVec3& size, int longest) {
 
 constexpr unsigned kLongestRun = 255;
 
-/// The shortest that gives the same number.
+/// Returns the shortest text that parses to the same number.
 std::string text_of(double number) {
   std::array<char, 32> text{};
   const auto end = std::to_chars(text.data(), text.data() + text.size(), number).ptr;
@@ -72,7 +72,7 @@ Result<ModelBytes> write_binvox(const Scene& scene, const Progress& progress) {
   if (longest > kMaxEdge || volume > kMaxVoxels / std::max(size.z, 1)) {
     return make_error(ErrorCode::LimitExceeded, "more than 16,384 voxels per side, or 2^32 in total");
   }
-  // What readers take for a size.
+  // The size limits of readers.
   constexpr double kLeastVoxel = 1e-8;
   constexpr double kMostVoxel = 1e8;
   if (!(merged->voxel_size > kLeastVoxel && merged->voxel_size < kMostVoxel)) {
@@ -85,7 +85,7 @@ Result<ModelBytes> write_binvox(const Scene& scene, const Progress& progress) {
   out.text("translate " + numbers(DVec3(box.min) * merged->voxel_size) + "\n");
   out.text("scale " + text_of(merged->voxel_size * longest) + "\ndata\n");
   RunWriter runs(out);
-  // A slice of x lies across all rows: slices are taken in the chunks' width at once.
+  // A slice of x crosses all rows, so slices are read at once for the width of a chunk.
   std::vector<bool> slices;
   std::vector<VoxelType> row;
   ProgressSteps steps(progress, static_cast<std::size_t>((size.x + kChunkEdge - 1) / kChunkEdge));

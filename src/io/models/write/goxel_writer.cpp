@@ -1,5 +1,5 @@
-// Blocks of 16^3 voxels as pictures, each once; materials; and layers that say which block stands where. A layer has
-// one material, so that an instance of several materials becomes several layers.
+// Writes blocks of 16^3 voxels as images, each once; materials; and layers that place blocks. A layer has one material,
+// so an instance of several materials becomes several layers.
 
 #include <algorithm>
 #include <array>
@@ -73,12 +73,12 @@ class GoxelWriter {
   std::vector<Rgba8> colours_;
   std::map<Material, std::uint32_t> numbers_;
   std::vector<Material> materials_;
-  std::vector<std::uint32_t> material_of_;                   // of each type
-  std::unordered_map<std::string, std::uint32_t> pictures_;  // by their pixels
+  std::vector<std::uint32_t> material_of_;                   // materials by type
+  std::unordered_map<std::string, std::uint32_t> pictures_;  // blocks by their pixels
   ByteWriter out_;
 };
 
-// Its sum, which comes behind it, is 0: no program asks for it.
+// The checksum after the content is 0: no program checks it.
 std::size_t GoxelWriter::begin_chunk(std::string_view id) {
   out_.text(id);
   out_.u32(0);
@@ -118,7 +118,7 @@ Result<std::uint32_t> GoxelWriter::picture_of(const std::vector<std::uint8_t>& p
   return number;
 }
 
-/// The file's axes are x, -z and y. Chunks are whole blocks there, too.
+/// The file's axes are x, -z and y. Chunks are whole blocks in these axes too.
 Status GoxelWriter::add_blocks(IVec3 chunk, const Chunk& voxels, std::map<std::uint32_t, std::vector<Block>>& layers) {
   const IVec3 origin = chunk * kChunkEdge;
   std::array<VoxelType, kChunkEdge> row{};

@@ -1,4 +1,4 @@
-// A matrix for each instance: its slices by z, rows by y, runs of equal colours along x.
+// Writes a matrix for each instance: slices by z, rows by y, runs of equal colours along x.
 
 #include <algorithm>
 #include <string>
@@ -19,7 +19,7 @@ constexpr std::uint32_t kVersion = 0x0000'0101;
 constexpr std::uint32_t kRun = 2;
 constexpr std::uint32_t kNextSlice = 6;
 constexpr std::size_t kLongestName = 255;
-// What readers take.
+// The size limit of readers.
 constexpr int kMaxEdge = 1 << 14;
 constexpr std::uint64_t kMaxBytes = std::uint64_t{1} << 32;
 
@@ -28,7 +28,7 @@ std::uint32_t word_of(Rgba8 colour) {
   return shifted(colour.r, 0) | shifted(colour.g, 8) | shifted(colour.b, 16) | shifted(colour.a, 24);
 }
 
-/// Runs of equal words, which do not reach beyond a slice.
+/// Writes runs of equal words, which do not extend past a slice.
 class RunWriter {
  public:
   explicit RunWriter(ByteWriter& out) : out_(out) {}
@@ -47,8 +47,8 @@ class RunWriter {
   }
 
  private:
-  // Runs of up to three are no longer as plain words. Colours cannot be mistaken for codes, since solid voxels have an
-  // alpha.
+  // Runs of up to three are not longer as plain words. Colours cannot be mistaken for codes, since solid voxels have
+  // non-zero alpha.
   void end_run() {
     constexpr std::uint32_t kWords = 3;
     if (count_ > kWords) {
@@ -110,7 +110,7 @@ Result<ModelBytes> write_qb(const Scene& scene, const Progress& progress) {
   out.u32(0);  // colours are red, green, blue, alpha
   out.u32(1);  // right-handed
   out.u32(1);  // runs
-  out.u32(0);  // alpha is alpha, not which faces are seen
+  out.u32(0);  // alpha is alpha, not a mask of visible faces
   out.u32(static_cast<std::uint32_t>(placed->grids.size()));
   std::size_t slices = 0;
   for (const PlacedGrid& grid : placed->grids) slices += static_cast<std::size_t>(grid.box.size().z);

@@ -57,7 +57,7 @@ class MapWriter {
   const std::vector<Rgba8>& colours_;
   IVec3 size_;
   IVec3 min_;                    // of the map, in the grid
-  std::array<Slice, 3> slices_;  // of the column's z and of its two neighbours
+  std::array<Slice, 3> slices_;  // the column's z, and its two neighbours
   std::vector<VoxelType> column_;
   std::vector<bool> has_colour_;
   std::int64_t grounded_ = 0;
@@ -86,7 +86,7 @@ void MapWriter::write_column(int x, ByteWriter& out) {
   const int depth = size_.y;
   column_.resize(static_cast<std::size_t>(depth));
   has_colour_.assign(static_cast<std::size_t>(depth), false);
-  // Beyond the map there is nothing to look from.
+  // The outside of the map counts as solid.
   const auto is_air = [&](std::size_t slice, int beside, int z) {
     if (beside < 0 || beside >= size_.x) return false;
     return at(slices_.at(slice), beside, z) == kAir;
@@ -120,10 +120,10 @@ void MapWriter::write_column(int x, ByteWriter& out) {
   }
 }
 
-/// `air`: where the air above begins, which is where the span before ended.
+/// `air`: the top of the air above, where the previous span ended.
 void MapWriter::write_span(int begin, int end, bool is_last, int air, ByteWriter& out) {
   const auto has_colour = [&](int z) { return has_colour_[static_cast<std::size_t>(z)]; };
-  // The longest stretch without colours parts the top from the bottom; a span down to the ground has no bottom.
+  // The longest stretch without colours separates the top from the bottom; a span down to the ground has no bottom.
   int top_end = begin + 1;
   int bottom = end;
   int last = end;
@@ -171,7 +171,7 @@ Status MapWriter::run(ByteWriter& out, const Progress& progress) {
   return {};
 }
 
-/// The sizes, and where one stands first: a place and three axes, at the middle of the map's sky.
+/// Writes the sizes and the start position: a point in the middle of the map's sky, and three axes.
 void write_header(IVec3 size, ByteWriter& out) {
   out.u32(kVoxlapMagic);
   out.u32(static_cast<std::uint32_t>(size.x));

@@ -21,12 +21,12 @@ namespace quoin::models {
 /// Goxel's .gox, version 2: a layer for each instance, and for each material of it.
 [[nodiscard]] Result<ModelBytes> write_goxel(const Scene& scene, const Progress& progress = {});
 
-/// A map of Ace of Spades where 512 x 64 x 512 voxels hold it, of Voxlap's where 1024 x 256 x 1024 do. It stays at its
-/// place where that is within the map, and is moved to its middle otherwise. Below each column there is ground, since
-/// the format knows no column without.
+/// Writes an Ace of Spades map if the scene fits 512 x 64 x 512 voxels, or a Voxlap map if it fits 1024 x 256 x 1024.
+/// The scene keeps its position if that is within the map, and is centred otherwise. Each column gets ground below it,
+/// since the format requires it.
 [[nodiscard]] Result<ModelBytes> write_vxl(const Scene& scene, const Progress& progress = {});
 
-/// One grid of full and empty voxels, with its place and their size.
+/// Writes one grid of full and empty voxels, with its position and voxel size.
 [[nodiscard]] Result<ModelBytes> write_binvox(const Scene& scene, const Progress& progress = {});
 
 }  // namespace quoin::models
