@@ -28,7 +28,7 @@ bool stays_in_folder(const std::string& name) {
 bool leads_into_folder(const fs::path& folder, const fs::path& file) {
   std::error_code failed;
   const fs::path whole = fs::canonical(file, failed);
-  // Reading fails for these reasons too, and says so.
+  // Reading fails for the same reasons and reports them.
   if (failed) {
     return failed == std::errc::no_such_file_or_directory || failed == std::errc::not_a_directory ||
            failed == std::errc::permission_denied || failed == std::errc::too_many_symbolic_link_levels;

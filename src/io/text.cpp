@@ -16,7 +16,7 @@ unsigned char byte_at(std::string_view text, std::size_t i) {
   return static_cast<unsigned char>(text[i]);
 }
 
-/// Length of the well-formed UTF-8 sequence that starts at `i`, 0 when there is none (Unicode 15, table 3-7).
+/// Returns the length of the well-formed UTF-8 sequence that starts at `i`; 0 if there is none (Unicode 15, table 3-7).
 std::size_t sequence_length(std::string_view text, std::size_t i) {
   const unsigned char first = byte_at(text, i);
   if (first < 0x80) return 1;

@@ -8,7 +8,7 @@
 
 namespace quoin {
 
-/// Parses all of `text` as a decimal integer; nullopt if it is none or does not fit.
+/// Parses all of `text` as a decimal integer; nullopt if it is not a number or does not fit.
 [[nodiscard]] std::optional<std::int64_t> parse_integer(std::string_view text);
 
 /// Parses all of `text` as a finite number, independent of the locale; nullopt if that fails.
@@ -22,7 +22,7 @@ namespace quoin {
 
 [[nodiscard]] bool is_utf8(std::string_view text);
 
-/// `text` as valid UTF-8 on one line: bytes that are not UTF-8 become U+FFFD, control characters become blanks.
+/// Returns `text` as valid UTF-8 on one line: bytes that are not UTF-8 become U+FFFD, control characters become blanks.
 [[nodiscard]] std::string printable(std::string_view text);
 
 }  // namespace quoin

@@ -59,14 +59,14 @@ char* write_number(double value, char* out) {
   return std::to_chars(out, out + kMaxDigits, rounded).ptr;
 }
 
-/// Writes the parts that lines of an OBJ file consist of.
+/// Writes the elements of OBJ lines.
 class ObjLines {
  public:
   explicit ObjLines(BlockWriter& out) : out_(out) {}
 
-  /// `value` rounded to a millionth.
+  /// Writes `value` rounded to a millionth.
   [[nodiscard]] static std::string text_of(double value);
-  /// "KEYWORD x y z", without a line's end; `digits` 0: to a millionth, as far from the origin.
+  /// Writes "KEYWORD x y z" without a line end. `digits` 0: to a millionth, as far from the origin.
   void triple(std::string_view keyword, const DVec3& v, int digits = 0);
   /// Writes "o NAME" and a line end: the name as one word, with a number if it is not unique; "object" for an empty
   /// name.
@@ -110,7 +110,7 @@ std::string shortest(float value) {
   return {text.data(), end};
 }
 
-/// A material's name as OBJ and MTL can say it: without spaces.
+/// Returns a material's name for OBJ and MTL, without spaces.
 std::string mtl_name(const SurfaceMaterial& material) {
   std::string name = material.name;
   std::replace(name.begin(), name.end(), ' ', '_');
@@ -130,7 +130,7 @@ std::string mtl_glass(const SurfaceMaterial& material, const VoxelProperties& pr
   return text;
 }
 
-/// The names of the files that belong to one OBJ.
+/// The names of an OBJ's sidecar files.
 struct ObjNames {
   std::filesystem::path library;
   std::filesystem::path palette;
@@ -143,7 +143,7 @@ ObjNames names_beside(const std::filesystem::path& path) {
   return {stem + ".mtl", stem + "_palette.png", stem + "_emissive.png", stem + "_atlas.png"};
 }
 
-/// One material for each of the palette's, by name. MTL has no strength beyond the colour, so Ke holds it.
+/// Writes one material for each of the palette's, by name. MTL has no emission strength, so Ke holds it.
 std::string mtl_text(const SceneMeshes& meshes, const MaterialPalette& palette, const ObjNames& names) {
   std::string text = first_line();
   for (const SurfaceMaterial& material : palette.materials()) {
@@ -195,7 +195,7 @@ class ObjText {
   }
 
  private:
-  /// One texture coordinate a type, so that type t is number t.
+  /// Writes one texture coordinate per type, so that type t has number t.
   void write_texture_coordinates() {
     for (std::size_t type = 1; type < meshes_.types.size(); ++type) {
       const auto centre = palette_.texel_centre(static_cast<VoxelType>(type));
@@ -204,8 +204,8 @@ class ObjText {
     textures_ = meshes_.types.size() - 1;
   }
 
-  /// OBJ counts v from the bottom; those of textures whose sides are powers of two have few binary digits, so that both
-  /// forms are exact.
+  /// OBJ counts v from the bottom. Textures have power-of-two sides, so their coordinates have few binary digits and
+  /// both forms are exact.
   void write_texture_coordinate(const std::array<float, 2>& uv) {
     out_.put_text("vt " + shortest(uv[0]) + " " + shortest(1.0F - uv[1]) + "\n");
   }
@@ -253,7 +253,7 @@ class ObjText {
     }
   }
 
-  /// `normal_and_texture(corner)`: the number of its normal among those of the object, and its texture or 0.
+  /// `normal_and_texture(corner)`: the number of its normal within the object, and its texture coordinate or 0.
   template <class Numbers>
   void write_faces(const MeshView& view, bool turned, Numbers normal_and_texture) {
     constexpr std::size_t kMaxOfCorner = 64;
@@ -275,7 +275,7 @@ class ObjText {
     }
   }
 
-  /// Vertices with colours, normals and triangles of a smooth surface.
+  /// Writes coloured vertices, normals and triangles of a smooth surface.
   void write_smooth(const MeshView& view, const VertexTransform& transform) {
     constexpr int kFloatDigits = 9;
     constexpr int kColourDigits = 4;
@@ -305,7 +305,7 @@ class ObjText {
   std::uint64_t textures_ = 0;
 };
 
-/// A guess, for progress only.
+/// An estimate, for progress only.
 std::uint64_t expected_bytes(const SceneMeshes& meshes) {
   constexpr std::uint64_t kVertexLine = 24;
   constexpr std::uint64_t kSmoothVertexLines = 80;

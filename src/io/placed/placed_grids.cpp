@@ -21,7 +21,7 @@ namespace {
 constexpr double kRounding = 1e-6;
 constexpr double kFarthest = 1 << 26;
 
-/// Nothing when it is not by quarter turns.
+/// Returns nullopt if the rotation is not a multiple of 90 degrees.
 std::optional<AxisOrientation> orientation_of(const Instance& instance) {
   const double length = glm::length(instance.rotation);
   const DQuat rotation = length > 0.0 ? instance.rotation / length : DQuat(1.0, 0.0, 0.0, 0.0);
@@ -128,7 +128,7 @@ class Losses {
   std::int64_t states_ = 0;
 };
 
-/// Hands over each placement, in the order of the instances' handles.
+/// Passes on each placement, in the order of the instances' handles.
 class Placer {
  public:
   using Take = FunctionRef<void(PlacedGrid&&)>;
@@ -194,7 +194,7 @@ class Placer {
     const DVec3 a = world_from_grid(instance, grid, DVec3(box.min)) / voxel_size_;
     const DVec3 b = world_from_grid(instance, grid, DVec3(box.max)) / voxel_size_;
     const DVec3 least = glm::min(a, b);
-    // Halves all go the same way, so that what touches still does.
+    // Halves always round the same way, so that touching instances still touch.
     const DVec3 nearest = glm::floor(least + 0.5);
     const IVec3 size = orientation->size_of(box.size());
     const double reach = std::max({std::abs(nearest.x), std::abs(nearest.y), std::abs(nearest.z)}) +
@@ -216,7 +216,7 @@ class Placer {
     return {};
   }
 
-  // Of a voxel: what arithmetic leaves.
+  // Rounding error, in voxels.
   static constexpr double kNearestVoxel = 1e-4;
   const Scene& scene_;
   const FormatHolds& holds_;

@@ -24,22 +24,22 @@ struct ModelBytes {
 /// The properties of models that a format can store, except their voxels' colours.
 struct FormatHolds {
   std::string_view extension;   ///< for messages: ".qb"
-  bool names = false;           ///< of models
+  bool names = false;           ///< names of models
   bool hidden = false;          ///< hidden models; otherwise they are dropped
   bool several = false;         ///< several models; otherwise they are merged
-  bool colours = true;          ///< of voxels
-  bool transparency = false;    ///< of colours
+  bool colours = true;          ///< colours of voxels
+  bool transparency = false;    ///< transparency of colours
   bool materials = false;       ///< roughness, metalness and light of voxels
   bool type_names = false;      ///< names of types, and states of voxels
-  bool place_in_units = false;  ///< how large a voxel is
+  bool place_in_units = false;  ///< the size of a voxel
 };
 
 /// A placement of a grid in the file's lattice.
 struct PlacedGrid {
-  std::string name;  ///< of the instance, or of the grid where it has none
+  std::string name;  ///< the instance's name, or the grid's if it has none
   bool visible = true;
-  Grid voxels{};  ///< turned and moved: in voxels of the file; shares chunks with the scene's where it can
-  IBox box{};     ///< in the same space, of its declared box; never empty
+  Grid voxels{};  ///< rotated and moved, in voxels of the file; shares chunks with the scene's grid if possible
+  IBox box{};     ///< the declared box in the same space; never empty
 };
 
 /// A scene in one lattice: voxel v of it lies at voxel_size * v in the world.
@@ -68,10 +68,10 @@ struct MergedGrid {
 };
 [[nodiscard]] Result<MergedGrid> merge_grids(const Scene& scene, const FormatHolds& holds);
 
-/// So much of a text as fits, without a part of a character at its end; warns where that is not all.
+/// Returns the longest prefix of a text that fits, without a partial character at its end. Warns if it is shortened.
 [[nodiscard]] std::string cut_name(const std::string& name, std::size_t bytes, std::vector<std::string>& warnings);
 
-/// Types of the voxels from `first` on along x.
+/// Reads the types of the voxels from `first` along x.
 void read_voxels(const Grid& grid, IVec3 first, std::span<VoxelType> out);
 
 /// Returns the colours of all types. Alpha is 255 for opaque types, and at least 1 for transparent types. Air is 0, 0,

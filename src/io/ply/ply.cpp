@@ -19,7 +19,7 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "the format written is little-endian");
 
 constexpr std::size_t kVertexBytes = 6 * 4 + 3;  // position and normal as floats, red, green and blue as bytes
-constexpr std::size_t kFaceBytes = 1 + 3 * 4;    // the byte 3 and three int
+constexpr std::size_t kFaceBytes = 1 + 3 * 4;    // a byte of 3, and three int
 constexpr std::size_t kOcclusions = 4;
 
 using Srgb = std::array<std::uint8_t, 3>;
@@ -29,7 +29,7 @@ struct Counts {
   std::uint64_t faces = 0;
 };
 
-/// "20000000 64 0": whole numbers.
+/// Formats whole numbers: "20000000 64 0".
 std::string text_of(const DVec3& v) {
   std::array<char, 128> text{};
   return {text.data(), static_cast<std::size_t>(
@@ -48,10 +48,10 @@ std::string header_of(const Counts& counts, OcclusionIn occlusion, const DVec3& 
   return text + "property list uchar int vertex_indices\nend_header\n";
 }
 
-/// The colour of every type at every occlusion, [type * kOcclusions + occlusion].
+/// The colours of all types at every occlusion, [type * kOcclusions + occlusion].
 std::vector<Srgb> colours_of(const VoxelRegistry& types) {
   const SrgbEncoder& encode = SrgbEncoder::shared();
-  // By way of 16 bits, as smooth meshes hold their colours.
+  // Rounded through 16 bits, like the colours of smooth meshes.
   const auto darkened = [&](std::uint8_t byte, std::uint8_t occlusion) {
     const auto linear = static_cast<std::uint16_t>(std::lround(linear_from_srgb(byte) * 65'535.0F));
     return encode(static_cast<float>(linear) / 65'535.0F * occlusion_brightness(occlusion));
@@ -120,7 +120,7 @@ void for_each_surface(const SceneMeshes& meshes, const DVec3& origin, Use use) {
   }
 }
 
-/// All of a file but the meshes.
+/// The content of a file except its meshes.
 struct PlyPlan {
   std::string header;
   OcclusionIn occlusion{};

@@ -28,7 +28,7 @@ struct KeyHash {
   std::size_t operator()(std::uint64_t key) const { return mixed(key, key >> 32); }
 };
 
-/// Uses of an edge, by direction.
+/// The uses of an edge, by direction.
 struct Uses {
   std::uint32_t there = 0;
   std::uint32_t back = 0;
@@ -38,7 +38,7 @@ std::uint64_t open_edges_of(const MeshPart& part) {
   std::unordered_map<Bits, std::uint32_t, BitsHash> numbers;
   std::unordered_map<std::uint64_t, Uses, KeyHash> edges;
   const auto number_of = [&](const Vec3& at) {
-    // 0 and -0 are one place.
+    // 0 and -0 are the same position.
     const Bits bits{{std::bit_cast<std::uint32_t>(at.x + 0.0F), std::bit_cast<std::uint32_t>(at.y + 0.0F),
                      std::bit_cast<std::uint32_t>(at.z + 0.0F)}};
     return numbers.try_emplace(bits, static_cast<std::uint32_t>(numbers.size())).first->second;

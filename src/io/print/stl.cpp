@@ -32,7 +32,7 @@ void put_triangle(const std::array<Vec3, 3>& corners, BlockWriter& out) {
   out.advance(at + kRecord);
 }
 
-/// ", offset 20000000 64 0", whole numbers: as much as the header has room for.
+/// Returns ", offset 20000000 64 0" with whole numbers, as far as the header has space.
 std::string offset_text(const DVec3& offset) {
   std::array<char, kHeader> text{};
   std::snprintf(text.data(), text.size(), ", offset %.0f %.0f %.0f", offset.x + 0.0, offset.y + 0.0, offset.z + 0.0);

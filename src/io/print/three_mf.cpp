@@ -43,7 +43,7 @@ constexpr std::string_view kModel =
 
 using Colour = std::array<std::uint8_t, 4>;
 
-/// The colours of all meshes, numbered as they come.
+/// The colours of all meshes, numbered in order of occurrence.
 class Colours {
  public:
   std::uint32_t number_of(const Colour& colour) {
@@ -71,7 +71,7 @@ Colour colour_of(const MeshView& view, std::size_t vertex, const VoxelRegistry& 
 
 void append(std::string& text, double value) {
   std::array<char, 32> room;
-  // As exactly as floats are.
+  // As exactly as floats.
   const auto end = std::to_chars(room.data(), room.data() + room.size(), static_cast<float>(value)).ptr;
   text.append(room.data(), end);
 }
@@ -107,7 +107,7 @@ struct PositionHash {
   }
 };
 
-/// Writes the model, a piece at a time.
+/// Writes the model piece by piece.
 class ModelWriter {
  public:
   ModelWriter(const SceneMeshes& meshes, ZipFile& zip) : meshes_(meshes), zip_(zip) {}
@@ -175,7 +175,7 @@ class ModelWriter {
     std::unordered_map<Vec3, std::uint32_t, PositionHash> numbers;
     for (const MeshView& view : part.surfaces) {
       for (const std::uint32_t index : view.indices) {
-        // 0 and -0 are one place.
+        // 0 and -0 are the same position.
         const Vec3 at = view.positions[index] + 0.0F;
         if (!numbers.try_emplace(at, static_cast<std::uint32_t>(numbers.size())).second) continue;
         const DVec3 p = transform.position(at);
@@ -193,7 +193,7 @@ class ModelWriter {
     for (const MeshView& view : part.surfaces) write_triangles(view, transform.mirrors(), numbers);
     text_ += "</triangles>\n</mesh>\n</object>\n";
   }
-  /// Returns the attribute that places an object whose vertices are relative to `origin`.
+  /// Returns the attribute that positions an object whose vertices are relative to `origin`.
   static std::string transform_text(const DVec3& origin) {
     if (origin == DVec3(0.0)) return {};
     std::array<char, 160> text{};

@@ -13,11 +13,11 @@ namespace {
 
 constexpr std::uint64_t kMost = 0xFFFF'FFFF;
 constexpr std::size_t kLocalHeader = 30;
-// Of the local header: where the sum and both sizes are, which are known at the end.
+// Offset in the local header of the checksum and both sizes, which are known only at the end.
 constexpr std::size_t kSumAt = 14;
 
 void put_number(std::vector<std::byte>& to, std::uint64_t value, int bytes) {
-  // Runs of zeros are longer than a number.
+  // `bytes` may exceed the size of a number, to write zeros.
   for (int i = 0; i < bytes; ++i) to.push_back(i < 8 ? static_cast<std::byte>(value >> (8 * i)) : std::byte{0});
 }
 
@@ -25,7 +25,7 @@ void set_number(std::vector<std::byte>& in, std::uint64_t at, std::uint64_t valu
   for (std::size_t i = 0; i < 4; ++i) in[static_cast<std::size_t>(at) + i] = static_cast<std::byte>(value >> (8 * i));
 }
 
-// 1980-01-01, the first day that the format knows.
+// 1980-01-01, the first day of the format.
 constexpr std::uint32_t kDate = 0x0021;
 
 void put_text(std::vector<std::byte>& to, std::string_view text) {
@@ -37,7 +37,7 @@ void put_text(std::vector<std::byte>& to, std::string_view text) {
 struct ZipFile::Deflater {
   z_stream stream{};
   Deflater() {
-    // Without zlib's own header. It fails for want of memory alone.
+    // Without a zlib header. Fails only if memory runs out.
     const int made = deflateInit2(&stream, 6, Z_DEFLATED, -MAX_WBITS, 8, Z_DEFAULT_STRATEGY);
     if (made != Z_OK) throw std::bad_alloc();
   }
@@ -47,7 +47,7 @@ struct ZipFile::Deflater {
 
   void run(std::string_view text, int flush, std::vector<std::byte>& out) {
     std::array<Bytef, 1 << 16> room;
-    // zlib only reads it.
+    // zlib only reads through this pointer.
     stream.next_in = const_cast<Bytef*>(reinterpret_cast<const Bytef*>(text.data()));  // NOLINT
     stream.avail_in = static_cast<uInt>(text.size());
     do {

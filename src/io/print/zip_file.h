@@ -11,7 +11,7 @@
 
 namespace quoin {
 
-/// Writes texts to a zip file, one after the other, compressed. The bytes are the same on every run.
+/// Writes texts to a zip file one after another, compressed. The bytes are the same on every run.
 ///
 /// Source: PKWARE, ".ZIP File Format Specification" 6.3.3. Memory: the compressed bytes.
 class ZipFile {
@@ -24,7 +24,7 @@ class ZipFile {
   /// Starts a file; later writes belong to it. Requires: the name is ASCII.
   void begin(std::string name);
   void put(std::string_view text);
-  /// All of it. Errors: LimitExceeded where a file, or all of them, take 4 GiB or more.
+  /// Returns the whole file. Errors: LimitExceeded if a file, or the whole, has 4 GiB or more.
   [[nodiscard]] Result<std::vector<std::byte>> take();
 
  private:

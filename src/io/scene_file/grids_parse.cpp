@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::size_t kMaxGrids = std::size_t{1} << 22;
 
-/// Text of a grid's content, under one of its keys, with its place in the file.
+/// The text of a grid's content under one of its keys, with its position in the file.
 struct Piece {
   enum class Kind : std::uint8_t { Voxels, Densities, Data };
   std::size_t grid = 0;
@@ -52,7 +52,7 @@ SceneGrid grid_of(const Json& json, const Place& place, std::size_t index, std::
     read_band(object, grid);
     read_pieces(object, Piece::Kind::Densities, index, pieces);
   }
-  // Behind the voxels that hold it.
+  // After the voxels that hold it.
   if (object.find("data") != nullptr) read_pieces(object, Piece::Kind::Data, index, pieces);
   return grid;
 }
@@ -63,7 +63,7 @@ std::string about(IVec3 chunk, std::string_view what) {
   return text.append(what);
 }
 
-// Adds a piece's chunks to their grid; returns a fault, or "".
+// Adds a piece's chunks to their grid. Returns a fault, or "".
 std::string put(std::vector<PlacedChunk> chunks, Grid& grid) {
   for (PlacedChunk& chunk : chunks) {
     if (chunk.voxels.non_air_count() == 0) return about(chunk.place, "is empty");
@@ -73,7 +73,7 @@ std::string put(std::vector<PlacedChunk> chunks, Grid& grid) {
   return "";
 }
 
-// The same of a field.
+// As above, for a field.
 std::string put(std::vector<PlacedDensities> chunks, DensityGrid& field) {
   for (PlacedDensities& chunk : chunks) {
     if (field.find_chunk(chunk.place) != nullptr) return about(chunk.place, "is a duplicate");
@@ -83,7 +83,7 @@ std::string put(std::vector<PlacedDensities> chunks, DensityGrid& field) {
   return "";
 }
 
-// The same of data, whose voxels are there already.
+// As above, for data of voxels that were added before.
 std::string put(const DataPiece& piece, Grid& grid, const VoxelRegistry& types) {
   std::string fault;
   for_each_data(piece, [&](IVec3 voxel, const VoxelData& data) {
@@ -107,7 +107,7 @@ struct Decoded {
   Result<DataPiece> data;
 };
 
-/// The chunks of all pieces; nothing where they take more than `max_bytes`.
+/// Decodes all pieces; returns nullopt if their chunks need more than `max_bytes`.
 std::optional<std::vector<Decoded>> decode(const std::vector<Piece>& pieces, const std::vector<SceneGrid>& grids,
                                            std::size_t type_count, std::size_t max_bytes, Threads threads) {
   std::vector<Decoded> decoded(pieces.size());

@@ -10,7 +10,7 @@
 
 namespace quoin::scene_json {
 
-/// The list "types" of a scene file, if there is one: type 1, 2 and so on.
+/// Reads the list "types" of a scene file, if present: type 1, 2 and so on.
 [[nodiscard]] VoxelRegistry read_types(const Object& file);
 
 /// Reads the list "grids" of a scene file of `file_bytes`, if present; its voxels use `types`.

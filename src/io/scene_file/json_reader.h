@@ -17,8 +17,8 @@ namespace quoin::scene_json {
 
 using Json = nlohmann::json;
 
-/// A place in the file: a key or an index below another place, the file itself without. Text is made of it only where
-/// something is wrong.
+/// A position in the file: a key or an index below another position; the file itself has neither. The text is only made
+/// for errors.
 struct Place {
   const Place* parent = nullptr;
   std::string_view key;
@@ -35,21 +35,21 @@ class Faults {
   std::optional<Error> error_;
 };
 
-/// A piece of the file in a message.
+/// Returns a piece of the file for a message.
 [[nodiscard]] std::string excerpt(std::string_view text);
 
-/// An object of the file, read key by key. Missing keys leave the output of `read` unchanged.
+/// An object of the file that is read key by key. Missing keys leave the output of `read` unchanged.
 class Object {
  public:
   Object(const Json& json, const Place& place, std::initializer_list<std::string_view> keys, Faults& faults);
 
   [[nodiscard]] const Json* find(std::string_view key) const;
   [[nodiscard]] const Json* need(std::string_view key) const;
-  /// Requires: this object outlives it.
+  /// Requires: this object outlives the returned one.
   [[nodiscard]] Place place_of(std::string_view key) const { return {&place_, key, std::nullopt}; }
 
   void read(std::string_view key, std::string& out) const;
-  /// Text of any bytes: a string, or {"base64": "..."} where they are not UTF-8.
+  /// Reads text of any bytes: a string, or {"base64": "..."} if it is not UTF-8.
   void read_text(std::string_view key, std::string& out) const;
   void read(std::string_view key, bool& out) const;
   void read(std::string_view key, double& out) const;
@@ -58,7 +58,7 @@ class Object {
 
   [[nodiscard]] std::string text(const Json& json, const Place& place) const;
   [[nodiscard]] std::vector<double> numbers(const Json& json, const Place& place, std::size_t count) const;
-  /// Whole numbers from `least` to `most`.
+  /// Reads whole numbers from `least` to `most`.
   [[nodiscard]] std::vector<int> whole_numbers(const Json& json, const Place& place, std::size_t count, int least,
                                                int most) const;
   Faults& faults() const { return faults_; }
@@ -74,7 +74,7 @@ class Object {
 /// Normalises a vector unless it is unit up to rounding; reports a fault if it is all 0.
 [[nodiscard]] std::vector<double> unit(std::vector<double> v, const Place& place, Faults& faults);
 
-/// The list of that key, with at most so many entries; null where it is none.
+/// Returns the list of that key, with at most so many entries; null if there is none.
 [[nodiscard]] const Json* find_list(const Object& object, std::string_view key, std::size_t most);
 
 /// Calls `read(element, place)` for each element of a list.

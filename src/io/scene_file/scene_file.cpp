@@ -15,7 +15,7 @@ namespace quoin {
 
 namespace {
 
-/// Gives types new numbers; returns whether any changed.
+/// Renumbers types. Returns true if any number changed.
 bool renumber(Chunk& chunk, const std::vector<VoxelType>& new_type_of) {
   bool is_same = true;
   for (const VoxelType type : chunk.types()) is_same = is_same && new_type_of[type] == type;
@@ -45,13 +45,13 @@ void renumber(SceneGrid& grid, const std::vector<VoxelType>& new_type_of) {
   }
 }
 
-/// A file that was read, its grids and layers moved into the scene.
+/// A loaded file whose grids and layers were moved into the scene.
 struct Body {
   struct Group {
     GroupHandle handle;  ///< in the file's own scene
     SceneGroup group;    ///< its parent in that scene, its layer in the new one
   };
-  std::vector<Group> groups;  ///< parents first
+  std::vector<Group> groups;  ///< parents come first
   std::vector<Instance> instances;
   std::vector<Lamp> lamps;
 };
@@ -77,7 +77,7 @@ Result<std::map<GridHandle, GridHandle>> take_over_grids(Scene& from, Scene& int
 Result<Body> take_over(Scene& from, Scene& into) {
   auto new_grid_of = take_over_grids(from, into);
   if (!new_grid_of) return new_grid_of.error();
-  // Layers that nothing is on stay behind: MagicaVoxel's files have 8 or more.
+  // Layers without content are dropped: MagicaVoxel files have 8 or more.
   std::map<LayerHandle, LayerHandle> new_layer_of;
   const auto layer_of = [&](LayerHandle handle) {
     const SceneLayer* layer = from.layers().find(handle);
@@ -97,7 +97,7 @@ Result<Body> take_over(Scene& from, Scene& into) {
   for (const InstanceHandle handle : handles) {
     Instance instance = from.instances()[handle];
     instance.grid = new_grid_of->at(instance.grid);
-    // Alone it is placed without its groups, but on its layer.
+    // If it is the only item, its groups are dropped but its layer stays.
     const SceneGroup* group = handles.size() == 1 ? from.groups().find(instance.group) : nullptr;
     if (group != nullptr) instance.visible = instance.visible && is_shown(from, *group);
     instance.layer = layer_of(instance.layer);
@@ -107,7 +107,7 @@ Result<Body> take_over(Scene& from, Scene& into) {
   return body;
 }
 
-/// Returns a body's direction, or point, under a placement.
+/// Returns the direction, or point, of a body under a placement.
 DVec3 placed_direction(DVec3 direction, const SceneFile::Placement& outer) {
   return outer.rotation * (direction * DVec3(outer.mirrored ? -1.0 : 1.0, 1.0, 1.0));
 }
@@ -115,7 +115,7 @@ DVec3 placed_point(DVec3 point, const SceneFile::Placement& outer) {
   return outer.position + placed_direction(point * outer.scale, outer);
 }
 
-/// Puts an instance or a group of a body where a placement puts the body.
+/// Moves an instance or a group of a body by a placement of the body.
 template <class Placed>
 void put(const SceneFile::Placement& outer, Placed& placed) {
   const double side = outer.mirrored ? -1.0 : 1.0;
@@ -126,7 +126,7 @@ void put(const SceneFile::Placement& outer, Placed& placed) {
   placed.mirrored = placed.mirrored != outer.mirrored;
 }
 
-/// A lamp of a body: at a distance that is scaled as it is, it is as bright as before.
+/// Moves a lamp of a body. Its brightness at the scaled distance is unchanged.
 Lamp placed(const Lamp& inner, const SceneFile::Placement& outer) {
   Lamp lamp = inner;
   lamp.position = placed_point(inner.position, outer);
@@ -136,7 +136,7 @@ Lamp placed(const Lamp& inner, const SceneFile::Placement& outer) {
   return lamp;
 }
 
-/// An instance of a body, where a placement puts the body.
+/// Moves an instance of a body by a placement of the body.
 Instance placed(const Instance& inner, const SceneFile::Placement& outer, bool is_alone) {
   Instance instance = inner;
   put(outer, instance);
@@ -161,7 +161,7 @@ Result<LoadedScene> load_source(const std::filesystem::path& path, const LoadOpt
   if (*format == FileFormat::Scene) {
     auto file = parse_scene_file(path, threads);
     if (!file) return file.error();
-    // These may name each other in a circle.
+    // References between scene files could be circular.
     if (!file->sources.empty()) {
       return make_error(ErrorCode::Unsupported,
                         "a scene file that references files cannot be referenced itself; save it as one file first",
@@ -174,7 +174,7 @@ Result<LoadedScene> load_source(const std::filesystem::path& path, const LoadOpt
 
 using Bodies = std::map<std::string, Body, std::less<>>;
 
-/// Reads the files that the scene file `path` names.
+/// Reads the files that the scene file `path` references.
 Result<Bodies> read_sources(const std::vector<SceneFile::Source>& sources, const std::filesystem::path& path,
                             const LoadOptions& options, Threads threads, LoadedScene& loaded,
                             const Progress& progress) {
@@ -290,7 +290,7 @@ class Placer {
   std::vector<GroupHandle> groups_;
 };
 
-/// `path`: of the scene file, whose folder the sources' names start from.
+/// `path`: the scene file, whose folder source paths are relative to.
 Result<LoadedScene> put_together(SceneFile& file, const std::filesystem::path& path, const LoadOptions& options,
                                  Threads threads, const Progress& progress) {
   std::vector<GridHandle> grids;

@@ -16,7 +16,7 @@ namespace {
 
 using namespace scene_json;
 
-// Outside of strings, where every byte may become a value of some tens of bytes.
+// Outside strings, where each byte may become a value of some tens of bytes.
 constexpr std::size_t kMaxBytes = std::size_t{64} << 20;
 constexpr int kMaxDepth = 32;
 constexpr std::size_t kMaxFiles = 65'536;
@@ -39,7 +39,7 @@ class NameCheck {
  public:
   NameCheck(const SceneFile& scene, Faults& faults) : scene_(scene), faults_(faults) {}
 
-  // Sources' ids differ, and placements name one of them; groups and layers are there.
+  // Checks that source ids differ, and that placements, groups and layers refer to existing entries.
   void check() {
     for (std::size_t i = 0; i < scene_.sources.size(); ++i) {
       if (!ids_.insert(scene_.sources[i].id).second) {
@@ -127,8 +127,8 @@ void read_file_object(const Json& json, std::size_t file_bytes, Threads threads,
 
 /// The structure of a text outside its strings.
 struct Outside {
-  int deepest = 0;        ///< brackets within each other
-  std::size_t bytes = 0;  ///< and strings, each as one
+  int deepest = 0;        ///< nested brackets
+  std::size_t bytes = 0;  ///< values, and strings as one each
 };
 
 // Determines the memory needs before anything is built.

@@ -16,11 +16,11 @@ using scene_json::is_same;
 using scene_json::OrderedJson;
 using scene_json::PartWriter;
 
-/// Writes a scene file, and knows which version of the format it needs.
+/// Writes a scene file, and finds the format version that it needs.
 class SceneText {
  public:
   using Texts = std::vector<std::vector<std::string>>;
-  /// By grid.
+  /// The encoded pieces, by grid.
   struct Pieces {
     Texts voxels;
     Texts densities;
@@ -47,7 +47,7 @@ class SceneText {
       for (const Lamp& lamp : scene.lamps) lamps_.push_back(parts_.json_of(lamp));
       if (scene.camera) camera_ = parts_.json_of(*scene.camera);
       return text_of(scene);
-    } catch (const OrderedJson::type_error&) {  // of text: numbers that are not finite become null
+    } catch (const OrderedJson::type_error&) {  // from text; numbers that are not finite become null
       return make_error(ErrorCode::InvalidArgument, "an id or path is not UTF-8");
     }
   }
@@ -65,7 +65,7 @@ class SceneText {
     grids_.push_back(std::move(json));
   }
 
-  // A line an entry: what people look for is found.
+  // One entry per line, so that people can search the file.
   void put_list(std::string& text, const char* key, const std::vector<OrderedJson>& entries) const {
     text.append(",\n  \"").append(key).append("\": [");
     const char* before = "\n    ";
@@ -172,7 +172,7 @@ class Contents {
   }
 
  private:
-  // Of the work; a chunk of a field is twice as large.
+  // Weights for progress; a chunk of a field is twice as large.
   [[nodiscard]] double share_of_voxels() const {
     double voxels = 0.0;
     double densities = 0.0;
@@ -209,7 +209,7 @@ std::optional<std::size_t> place_of(const std::map<Handle<T>, std::size_t>& plac
   return found == places.end() ? std::nullopt : std::optional(found->second);
 }
 
-// Where a scene's elements are in the lists of its file.
+// The positions of a scene's elements in the lists of its file.
 struct PlacesInFile {
   std::map<GridHandle, std::size_t> grids;
   std::map<LayerHandle, std::size_t> layers;
@@ -274,7 +274,7 @@ Result<std::vector<std::byte>> write_scene_file(const SceneFile& scene, Threads 
   const Contents contents(scene);
   auto text = text_of(scene, contents, VoxelCompression::Small, threads, progress);
   if (text && contents.bytes() > max_voxel_bytes(text->size())) {
-    // Almost done here; the caller may still cancel.
+    // Almost done; the caller may still cancel.
     text = text_of(scene, contents, VoxelCompression::Stored, threads, part_of(progress, 1.0, 1.0));
   }
   if (!text) return text.error();

@@ -52,14 +52,14 @@ DQuat rotation_of(const Object& instance, const Json& json) {
   return {std::cos(half), a[0] * std::sin(half), a[1] * std::sin(half), a[2] * std::sin(half)};
 }
 
-// A quaternion as it is: of a grid's instance, which may have any length.
+// Reads a quaternion unchanged: that of a grid instance may have any length.
 DQuat kept_rotation(const Object& instance, const Json& json) {
   if (!json.is_array()) return rotation_of(instance, json);
   const std::vector<double> q = instance.numbers(json, instance.place_of("rotation"), 4);
   return {q[3], q[0], q[1], q[2]};
 }
 
-// A place in another list; whether there is one is known once all is read.
+// Reads an index into another list. Whether the entry exists is checked once everything is read.
 std::optional<std::size_t> place_in(const Object& object, std::string_view key, std::string_view list) {
   const Json* json = object.find(key);
   if (json == nullptr) return std::nullopt;
@@ -68,7 +68,7 @@ std::optional<std::size_t> place_in(const Object& object, std::string_view key, 
   return 0;
 }
 
-// Bits of 32.
+// Reads a number of 32 bits.
 std::optional<std::uint32_t> bits_in(const Object& object, std::string_view key) {
   const Json* json = object.find(key);
   if (json == nullptr) return std::nullopt;
@@ -88,7 +88,7 @@ bool is_frame(const Camera& camera) {
          is_near(glm::cross(camera.forward, camera.up), camera.right);
 }
 
-/// A camera of any kind, number by number.
+/// Reads a camera of any kind, number by number.
 Camera kept_camera(const Json& json, const Place& place, Faults& faults) {
   const Object object(json, place, {"position", "right", "up", "forward", "fov_radians", "view_height"}, faults);
   Camera camera;
@@ -110,7 +110,7 @@ Camera kept_camera(const Json& json, const Place& place, Faults& faults) {
   return camera;
 }
 
-/// A list "attributes" of pairs.
+/// Reads a list "attributes" of pairs.
 void read_attributes(const Object& object, std::map<std::string, std::string>& attributes) {
   read_list(object, "attributes", std::numeric_limits<std::size_t>::max(), [&](const Json& pair, const Place& place) {
     if (!pair.is_array() || pair.size() != 2) {
@@ -218,10 +218,10 @@ OrderedJson PartWriter::json_of(const Lamp& lamp) {
   return json;
 }
 
-// An upright perspective camera is said by a point that it looks at and an angle in degrees, where these give it to
-// the last bit; any other by its axes.
+// An upright perspective camera is stored as a point to look at and an angle in degrees if these restore it bit for
+// bit; any other camera is stored by its axes.
 OrderedJson PartWriter::json_of(const Camera& camera) {
-  // So far that the sum's rounding turns nothing.
+  // Far enough that rounding the sum does not rotate it.
   const DVec3 reach = glm::abs(camera.position);
   const DVec3 target = camera.position + camera.forward * std::max({1.0, reach.x, reach.y, reach.z});
   const double degrees = camera.vertical_fov_radians * 180.0 / std::numbers::pi;

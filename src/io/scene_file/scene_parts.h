@@ -12,17 +12,17 @@
 
 namespace quoin::scene_json {
 
-/// With keys in the order in which they are put.
+/// Keeps keys in insertion order.
 using OrderedJson = nlohmann::ordered_json;
 
-/// The same bits: -0 is another number than 0.
+/// Returns true for equal bits: -0 differs from 0.
 [[nodiscard]] bool is_same(double a, double b);
 
 /// Writes parts, and records if they need version 2 of the format.
 class PartWriter {
  public:
   [[nodiscard]] OrderedJson json_of(const VoxelProperties& type);
-  /// Without its voxels, densities and data.
+  /// Writes a grid without its voxels, densities and data.
   [[nodiscard]] OrderedJson json_of(const SceneGrid& grid);
   [[nodiscard]] OrderedJson json_of(const SceneFile::Placement& placement);
   [[nodiscard]] OrderedJson json_of(const SceneFile::Group& group);
@@ -45,7 +45,7 @@ class PartWriter {
 [[nodiscard]] SceneLayer layer_of(const Json& json, const Place& place, Faults& faults);
 [[nodiscard]] Lamp lamp_of(const Json& json, const Place& place, Faults& faults);
 [[nodiscard]] Camera camera_of(const Json& json, const Place& place, Faults& faults);
-/// Name, pivot and canvas.
+/// Reads name, pivot and canvas.
 void read_grid_header(const Object& object, SceneGrid& grid);
 /// Reads the density band that a field is clamped to, if the key is present.
 void read_band(const Object& object, SceneGrid& grid);

@@ -20,7 +20,7 @@ namespace quoin {
 namespace {
 
 constexpr std::size_t kChunksPerPiece = 32;
-constexpr std::size_t kFieldChunksPerPiece = 16;  // which are twice as large
+constexpr std::size_t kFieldChunksPerPiece = 16;  // field chunks are twice as large
 constexpr std::uint32_t kMixedSlab = 0xFFFF'FFFFU;
 constexpr int kSlabs = 256;
 constexpr std::size_t kSlabVoxels = 1'024;
@@ -33,7 +33,7 @@ constexpr int kMinPlace = -kMaxPlace - 1;
 constexpr std::size_t kMaxPieceBytes = std::size_t{32} << 20;
 static_assert(kChunksPerPiece * (16 + 2 * kMaxTypesOfChunk + kSlabs * (4 + 2 * kSlabVoxels)) <= kMaxPieceBytes);
 
-// Data is cut into pieces anywhere between two voxels.
+// Data can be cut into pieces between any two voxels.
 constexpr std::size_t kDataPieceBytes = std::size_t{8} << 20;
 static_assert(kDataPieceBytes + kMaxVoxelDataBytes < kMaxPieceBytes);
 // Data sizes in addition to a voxel's bytes, and per chunk.
@@ -71,7 +71,7 @@ void for_each_run(Voxels voxels, int slab, Visit visit) {
   }
 }
 
-/// Writes chunk after chunk into bytes.
+/// Writes chunks into bytes.
 class PieceWriter {
  public:
   void put(IVec3 place, const Chunk& chunk) {
@@ -113,7 +113,7 @@ class PieceWriter {
     for (const VoxelType type : types) put_number(type);
   }
 
-  // The chunk's types, and which there are, in the order in which they first occur.
+  // The chunk's types, in order of first occurrence.
   void read(const Chunk& chunk) {
     palette_.clear();
     dense_.resize(kChunkVoxels);
@@ -179,7 +179,7 @@ class PieceWriter {
   std::vector<std::byte> bytes_;
   DenseChunk dense_;
   std::vector<Half> halves_;
-  std::vector<std::uint32_t> index_of_;  // by type; kNone but while a chunk is put
+  std::vector<std::uint32_t> index_of_;  // by type; kNone except while a chunk is written
   std::vector<VoxelType> palette_;
 };
 
@@ -188,7 +188,7 @@ std::string text_of(const std::vector<std::byte>& bytes, VoxelCompression compre
   return to_base64(gzipped(bytes, compression == VoxelCompression::Small ? kLevel : 0));
 }
 
-/// Reads a piece, number after number.
+/// Reads a piece number by number.
 class PieceReader {
  public:
   PieceReader(std::span<const std::byte> bytes, std::size_t type_count) : bytes_(bytes), type_count_(type_count) {}
@@ -219,7 +219,7 @@ class PieceReader {
     return chunk;
   }
 
-  /// Calls `visit(place in the chunk, data)` for the voxels of a chunk's data, and returns the chunk.
+  /// Calls `visit(index in the chunk, data)` for the voxels of a chunk's data. Returns the chunk.
   template <class Visit>
   Result<IVec3> read_data(Visit&& visit) {
     if (!has(kDataHeaderBytes)) return cut_off();
@@ -292,7 +292,7 @@ class PieceReader {
   }
   [[nodiscard]] Error cut_off() const { return fault("cut off", bytes_.size()); }
 
-  // Requires: its bytes are there.
+  // Requires: the bytes are available.
   Result<IVec3> read_place() {
     const std::size_t begin = at_;
     IVec3 place{0};
@@ -343,7 +343,8 @@ class PieceReader {
     });
     return status;
   }
-  // What `stored_density` makes: infinities and NaN are beyond any band, and neither -0 nor subnormal numbers occur.
+  // Returns true for results of `stored_density`: infinities and NaN are outside any band, and neither -0 nor subnormal
+  // numbers occur.
   [[nodiscard]] bool is_density(std::uint32_t half) const {
     constexpr std::uint32_t kExponent = 0x7C00;
     if (half > 0xFFFF || (half != 0 && (half & kExponent) == 0)) return false;
@@ -393,7 +394,7 @@ class PieceReader {
   float band_ = 0.0F;
 };
 
-/// An error whose place is no place of the file.
+/// Returns an error whose position is within the data, not in the file.
 Error placed(const Error& error, const std::string& unit, const std::string& of) {
   return make_error(error.code, unit + " " + std::to_string(error.byte_offset.value_or(0)) + of + ": " + error.message);
 }
@@ -426,7 +427,7 @@ std::size_t max_voxel_bytes(std::size_t file_bytes) {
 
 std::size_t voxel_bytes(const Chunk& chunk) {
   const std::size_t bytes = kBytesAboveChunk + chunk.bytes();
-  // The reader counts twice what two pieces share of a chunk's data.
+  // Two pieces may share a part of a chunk's data, which the reader then counts twice.
   return chunk.data_count() == 0 ? bytes : bytes + bytes / 32;
 }
 
@@ -436,7 +437,7 @@ std::size_t voxel_bytes(const DensityChunk& chunk) {
 
 namespace {
 
-/// As encode_voxels, of anything that has chunks.
+/// As encode_voxels, for any container of chunks.
 template <class Any>
 Result<std::vector<std::vector<std::string>>> encode(std::span<const Any* const> grids, std::size_t chunks_per_piece,
                                                      VoxelCompression compression, Threads threads,
@@ -470,7 +471,7 @@ Result<std::vector<std::vector<std::string>>> encode(std::span<const Any* const>
   return of_grids;
 }
 
-/// The chunks of a piece, each as `read(reader)` gives it.
+/// Decodes the chunks of a piece with `read(reader)`.
 template <class Placed, class Read>
 Result<std::vector<Placed>> decode(std::string_view piece, std::size_t type_count, Read read) {
   const auto bytes = expanded(piece);
@@ -501,7 +502,7 @@ Result<std::vector<std::vector<std::string>>> encode_fields(std::span<const Dens
 
 namespace {
 
-/// Writes the data of chunk after chunk, cut into pieces.
+/// Writes the data of chunks, cut into pieces.
 class DataWriter {
  public:
   void put(IVec3 chunk, std::uint32_t place, const VoxelData& data) {
@@ -535,7 +536,7 @@ class DataWriter {
 
   std::vector<std::vector<std::byte>> pieces_;
   IVec3 chunk_{0};
-  std::size_t count_at_ = 0;  // in the last piece: how many voxels of the chunk it holds
+  std::size_t count_at_ = 0;  // number of this chunk's voxels in the last piece
   std::uint32_t count_ = 0;
 };
 
@@ -581,7 +582,7 @@ Result<DataPiece> decode_data(std::string_view text) {
   DataPiece piece;
   PieceReader reader(*bytes, 0);
   while (!reader.is_at_end()) {
-    // Chunk, slabs, states and bytes, as they are kept.
+    // Chunk, slabs, states and bytes, as stored in memory.
     constexpr std::size_t kOfChunk = 2'048;
     constexpr std::size_t kOfSlab = 180;
     constexpr std::size_t kBesideBytes = 48;

@@ -61,7 +61,7 @@ enum class VoxelCompression : std::uint8_t { Stored, Small };
                                                                           VoxelCompression compression, Threads threads,
                                                                           const Progress& progress);
 
-/// The same of fields.
+/// As above, for fields.
 [[nodiscard]] Result<std::vector<std::vector<std::string>>> encode_fields(std::span<const DensityGrid* const> fields,
                                                                           VoxelCompression compression, Threads threads,
                                                                           const Progress& progress);
@@ -87,20 +87,20 @@ struct PlacedDensities {
 /// least `type_count`. LimitExceeded for a piece that would expand to more than 32 MiB, which the writer never
 /// produces.
 [[nodiscard]] Result<std::vector<PlacedChunk>> decode_voxels(std::string_view piece, std::size_t type_count);
-/// The same of a field with that band; also for densities that are not within it.
+/// As above, for a field with that band; also fails for densities outside the band.
 [[nodiscard]] Result<std::vector<PlacedDensities>> decode_field(std::string_view piece, std::size_t type_count,
                                                                 float band);
 
 /// A well-formed piece of data; its voxels are checked when it is added to a grid.
 struct DataPiece {
   std::vector<std::byte> bytes;
-  std::size_t memory = 0;  ///< that it will take in a grid, at least
+  std::size_t memory = 0;  ///< minimum memory in a grid
 };
 /// Returns the fault of a voxel's state, or "": more bits than its type allows.
 [[nodiscard]] std::string fault_of_state(IVec3 voxel, const VoxelData& data, const VoxelProperties& type);
 /// Errors: as `decode_voxels`.
 [[nodiscard]] Result<DataPiece> decode_data(std::string_view piece);
-/// Calls `visit` for all that a piece holds, in its order, until that returns false.
+/// Calls `visit` for each voxel of a piece in order, until it returns false.
 void for_each_data(const DataPiece& piece, FunctionRef<bool(IVec3 voxel, const VoxelData& data)> visit);
 
 }  // namespace quoin

@@ -48,7 +48,7 @@ struct ChunkSource::Cache {
   void keep_within_limit() {
     for (auto last = entries.end(); bytes > kCacheBytes && last != entries.begin();) {
       --last;
-      if (last == entries.begin() || !last->is_read) continue;  // a part read just now stays
+      if (last == entries.begin() || !last->is_read) continue;  // a part that was just read stays
       const auto gone = last++;
       forget(gone);
     }

@@ -13,8 +13,8 @@ bool is_luanti_map(std::span<const std::byte> beginning) {
   constexpr std::size_t kIdAt = 68;
   const std::string_view text = text_of(beginning);
   if (!text.starts_with(kHeader) || text.size() < kIdAt + 4) return false;
-  if (text.substr(kIdAt, 4) != std::string_view("\0\0\0\0", 4)) return false;  // the mark of another program
-  // What tables there are stands in the first page, as SQL.
+  if (text.substr(kIdAt, 4) != std::string_view("\0\0\0\0", 4)) return false;  // the application id of another program
+  // The first page lists the tables, as SQL.
   const std::size_t page =
       std::to_integer<std::size_t>(beginning[16]) << 8 | std::to_integer<std::size_t>(beginning[17]);
   const std::string_view tables = text.substr(0, page == 1 ? 65536 : page);

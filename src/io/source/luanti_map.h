@@ -20,7 +20,7 @@ namespace quoin {
 /// Opens a Luanti world: its folder, or the database in it (map.sqlite).
 /// Errors: CannotRead; BadFormat; Unsupported if world.mt names another storage.
 [[nodiscard]] Result<std::unique_ptr<ChunkSource>> open_luanti(const std::filesystem::path& path);
-/// The database's bytes, which are copied.
+/// Opens the bytes of a database, which are copied.
 [[nodiscard]] Result<std::unique_ptr<ChunkSource>> open_luanti(std::span<const std::byte> database);
 
 }  // namespace quoin

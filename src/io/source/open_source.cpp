@@ -16,7 +16,7 @@ std::optional<FileFormat> detect_world(const fs::path& path) {
   if (is_world_folder(path)) {
     return minecraft::is_minecraft_folder(path) ? FileFormat::Minecraft : FileFormat::LuantiMap;
   }
-  // Worlds without regions too: their reader reports the missing files.
+  // Also accepts worlds without regions: their reader reports the missing files.
   const bool is_level = path.filename() == "level.dat" && fs::is_regular_file(path, error);
   const bool has_level = fs::is_directory(path, error) && fs::is_regular_file(path / "level.dat", error);
   return is_level || has_level ? std::optional(FileFormat::Minecraft) : std::nullopt;

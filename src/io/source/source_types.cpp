@@ -24,7 +24,7 @@ bool comes_before(const VoxelProperties& a, const VoxelProperties& b) {
   return key(a) < key(b);
 }
 
-/// Requires: the chunk is compact; `number` gives no two types of the chunk the same number, and air none but its own.
+/// Requires: the chunk is compact; `number` maps its types to distinct numbers, and only air to air.
 Chunk renumbered(const Chunk& chunk, FunctionRef<VoxelType(VoxelType)> number) {
   if (const auto uniform = chunk.uniform()) {
     Chunk result(number(*uniform));

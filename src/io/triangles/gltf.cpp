@@ -72,13 +72,13 @@ bool is_too_deep(std::string_view json) {
   return false;
 }
 
-/// The data for tinygltf's callbacks, and the images as bytes, by number.
+/// The data for tinygltf's callbacks, and the bytes of the images by number.
 struct Asked {
   Beside* beside = nullptr;
   std::vector<std::vector<std::byte>> pictures{};
 };
 
-// Pictures in buffer views are found by GltfReader: tinygltf hands them over without looking where the buffer ends.
+// GltfReader finds images in buffer views: tinygltf passes them on without checking the end of the buffer.
 bool keep_picture(tinygltf::Image* image, const int index, std::string*, std::string*, int, int,
                   const unsigned char* bytes, int size, void* user) {
   auto& pictures = static_cast<Asked*>(user)->pictures;
@@ -90,7 +90,7 @@ bool keep_picture(tinygltf::Image* image, const int index, std::string*, std::st
 }
 
 bool is_there(const std::string&, void*) {
-  return true;  // reading says why not
+  return true;  // reading reports the reason
 }
 
 std::string as_it_is(const std::string& path, void*) {
@@ -119,13 +119,13 @@ std::string first_line(const std::string& text) {
   return text.substr(first, text.find('\n', first) - first);
 }
 
-/// An entry of a list, or null.
+/// Returns an entry of a list, or null.
 template <class T>
 const T* entry(const std::vector<T>& list, int index) {
   return index >= 0 && static_cast<std::size_t>(index) < list.size() ? &list[static_cast<std::size_t>(index)] : nullptr;
 }
 
-/// Numbers of an accessor by element and component; those of whole types as they are, or as shares of 1.
+/// Reads numbers of an accessor by element and component: integers as they are, or normalized.
 class Accessor {
  public:
   /// Opens an accessor. Errors: BadFormat if it extends past the end of its buffer.
@@ -170,10 +170,10 @@ class Accessor {
   }
 
  private:
-  // More triangles than may be, times three.
+  // Above three times the maximum number of triangles.
   static constexpr std::size_t kMost = std::size_t{1} << 30;
 
-  /// Elements within a buffer; without one, zeros.
+  /// Reads elements within a buffer; without a buffer, zeros.
   class View {
    public:
     Status open(const tinygltf::Model& model, int view, std::size_t offset, int type, int components,
@@ -258,7 +258,7 @@ class Accessor {
   int components_ = 0;
   bool is_normalized_ = false;
   View view_;
-  std::vector<std::size_t> replaced_;  // of sparse ones
+  std::vector<std::size_t> replaced_;  // of sparse accessors
   View values_;
 };
 
@@ -354,7 +354,7 @@ class GltfReader {
     }
     material.roughness = static_cast<float>(pbr.roughnessFactor);
     material.metalness = static_cast<float>(pbr.metallicFactor);
-    // Maps of roughness and metalness are not looked at: their factors alone would make all of it mirrors.
+    // Metallic-roughness textures are not read: their factors alone would make everything a mirror.
     if (pbr.metallicRoughnessTexture.index >= 0) {
       material.roughness = 1.0F;
       material.metalness = 0.0F;
@@ -374,8 +374,8 @@ class GltfReader {
     loaded_.mesh.materials.push_back(std::move(material));
     places_.push_back(place);
   }
-  /// Takes the diffuse colour and texture and the glossiness, which replace those of metal and roughness. Specular
-  /// colours have no place in voxel types.
+  /// Takes the diffuse colour and texture and the glossiness in place of metallic-roughness. Voxel types have no
+  /// specular colour.
   void take_specular(const tinygltf::Value& from, MeshMaterial& material, PlaceTransform& place) {
     material.colour = glm::vec4(1.0F);
     if (from.Has("diffuseFactor") && from.Get("diffuseFactor").IsArray()) {
@@ -408,11 +408,11 @@ class GltfReader {
     }
     return info;
   }
-  /// Takes the emissive factor and texture; returns where the texture lies.
+  /// Takes the emissive factor and texture. Returns the texture's transform.
   PlaceTransform take_emission(const tinygltf::Material& from, MeshMaterial& material) {
     material.emission = emission_of(from);
     if (from.emissiveTexture.index < 0 || !(material.emission > 0.0F)) return {};
-    // A texture that cannot be read has left a warning: the factor alone would make all of it glow.
+    // A texture that cannot be read has left a warning: with the factor alone everything would glow.
     material.emissive_texture = texture_of(from.emissiveTexture.index);
     if (!material.emissive_texture) {
       material.emission = 0.0F;
@@ -488,7 +488,7 @@ class GltfReader {
     return known_textures_[at];
   }
 
-  /// Returns the file of an image; nothing where it is not there, or ends beyond its buffer.
+  /// Returns the file of an image; nullopt if it does not exist or extends past its buffer.
   [[nodiscard]] std::span<const std::byte> picture_of(const tinygltf::Image& image, std::size_t index) const {
     if (image.bufferView < 0) {
       return index < asked_.pictures.size() ? asked_.pictures[index] : std::span<const std::byte>();
@@ -531,7 +531,7 @@ class GltfReader {
       const tinygltf::Node* const node = entry(model_.nodes, at.node);
       if (node == nullptr)
         return make_error(ErrorCode::BadFormat, "node " + std::to_string(at.node) + " does not exist");
-      // A node has one parent: a second visit is a cycle or a duplicate.
+      // A node has one parent, so a second visit is a cycle or a duplicate.
       if (seen_[static_cast<std::size_t>(at.node)]) {
         return make_error(ErrorCode::BadFormat, "node " + std::to_string(at.node) + " has several parents");
       }
@@ -620,7 +620,7 @@ class GltfReader {
         mode, indices->count(),
         [&](std::size_t i) { return static_cast<std::size_t>(std::max(indices->at(i, 0), 0.0)); }, add);
   }
-  /// Returns where the vertices lie in a texture; nothing where there is no texture, or no coordinates for it.
+  /// Returns the texture coordinates of the vertices; nullopt without a texture or coordinates.
   Result<std::optional<Accessor>> texture_places(const tinygltf::Primitive& primitive, bool has_texture,
                                                  const PlaceTransform& transform, std::size_t vertices) const {
     const int place = attribute(primitive, "TEXCOORD_" + std::to_string(transform.set));
@@ -651,7 +651,7 @@ class GltfReader {
     }
     return {};
   }
-  /// Returns true for the vertex colours that Quoin writes for blocks: the ambient light that arrives, not a colour.
+  /// Returns true for the vertex colours that Quoin writes for blocks: ambient occlusion, not a surface colour.
   [[nodiscard]] bool is_baked_occlusion(const tinygltf::Primitive& primitive, int index) const {
     const tinygltf::Accessor* const of = entry(model_.accessors, index);
     const bool may_be = of != nullptr && model_.asset.generator.starts_with("Quoin ") &&
@@ -666,7 +666,7 @@ class GltfReader {
     }
     return true;
   }
-  /// White where there are none, once any primitive has some.
+  /// Vertices without colours are white once any primitive has colours.
   Status take_colours(const tinygltf::Primitive& primitive, std::size_t first, std::size_t count) {
     auto& all = loaded_.mesh.colours;
     const int index = attribute(primitive, "COLOR_0");
@@ -702,8 +702,8 @@ class GltfReader {
   const Asked& asked_;
   LoadedMesh loaded_;
   MeshBuilder builder_{loaded_};
-  std::vector<PlaceTransform> places_;       // of materials' colours
-  std::vector<PlaceTransform> glow_places_;  // of materials' emission
+  std::vector<PlaceTransform> places_;       // texture transforms of base colours
+  std::vector<PlaceTransform> glow_places_;  // texture transforms of emission
   std::vector<std::optional<std::size_t>> known_textures_;
   std::vector<bool> asked_textures_;
   std::vector<bool> seen_;
@@ -714,7 +714,7 @@ class GltfReader {
   bool has_skins_ = false;
 };
 
-/// Returns the JSON of a file; in a GLB it is the first chunk.
+/// Returns the JSON of a file. In a GLB it is the first chunk.
 std::string_view json_of(std::span<const std::byte> bytes) {
   const std::string_view text = text_of(bytes);
   if (!is_glb(bytes)) return text;
@@ -725,7 +725,7 @@ std::string_view json_of(std::span<const std::byte> bytes) {
   return text.size() <= kJsonAt ? std::string_view() : text.substr(kJsonAt, length);
 }
 
-/// Returns the version that the file states if it is not 2; nothing for version 2 and for files that state none.
+/// Returns the file's version if it is not 2; nullopt for version 2 and for files without a version.
 std::optional<std::string> other_version(std::span<const std::byte> bytes, std::string_view json) {
   if (is_glb(bytes) && bytes.size() >= 8) {
     ByteReader reader(bytes);

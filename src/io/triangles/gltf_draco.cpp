@@ -29,7 +29,7 @@ constexpr const char* kDraco = "KHR_draco_mesh_compression";
 
 #ifdef QUOIN_HAVE_DRACO
 
-/// Draco's densest codes take a few bits per hundred vertices; more than this is a claim without content.
+/// Draco's densest codes use a few bits per hundred vertices, so larger counts are invalid.
 constexpr std::size_t kMostPointsPerByte = 4'096;
 
 Error bad(std::string why) {
@@ -43,7 +43,7 @@ std::optional<std::size_t> index_in(const tinygltf::Value& object, const std::st
   return static_cast<std::size_t>(number);
 }
 
-/// The bytes that an extension names.
+/// Returns the bytes that an extension refers to.
 Result<std::pair<const char*, std::size_t>> coded_bytes(const tinygltf::Model& model,
                                                         const tinygltf::Value& extension) {
   const auto view = index_in(extension, "bufferView");
@@ -76,7 +76,7 @@ Result<std::unique_ptr<draco::Mesh>> decoded_mesh(const char* bytes, std::size_t
   }
 }
 
-/// Adds a buffer and a view of it; returns the number of the view.
+/// Adds a buffer with a view of it. Returns the view's number.
 int add_view(tinygltf::Model& model, std::vector<unsigned char> bytes) {
   tinygltf::BufferView view;
   view.buffer = static_cast<int>(model.buffers.size());
@@ -94,7 +94,7 @@ void put(const T& value, unsigned char*& at) {
   at += sizeof(T);
 }
 
-/// An attribute of all points as floats; integers that are shares of 1 as such.
+/// Reads an attribute of all points as floats, normalized integers as fractions.
 Result<std::vector<unsigned char>> floats_of(const draco::Mesh& mesh, const draco::PointAttribute& attribute,
                                              const tinygltf::Accessor& accessor, int components) {
   double most = 1.0;
@@ -218,7 +218,7 @@ Status decode_draco(tinygltf::Model& model) {
         return make_error(done.error().code, "mesh " + std::to_string(i) + ", primitive " + std::to_string(k) + ": " +
                                                  done.error().message);
       }
-      // readable_by_tinygltf put them aside.
+      // readable_by_tinygltf moved them.
       model.meshes[i].primitives[k].indices = static_cast<int>(extension->second.Get("indices").GetNumberAsDouble());
     }
   }

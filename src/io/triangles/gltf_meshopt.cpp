@@ -36,7 +36,7 @@ bool is_fallback(const Json& buffer) {
   return extension != extensions->end() && extension->is_object() && extension->value("fallback", Json()) == true;
 }
 
-/// Returns true if any was replaced.
+/// Returns true if any buffer was replaced.
 bool replace_fallback_buffers(Json& document) {
   if (!document.contains("buffers") || !document["buffers"].is_array()) return false;
   bool is_changed = false;
@@ -49,7 +49,7 @@ bool replace_fallback_buffers(Json& document) {
   return is_changed;
 }
 
-/// Moves the indices of one primitive. Returns true if there were any.
+/// Moves the indices of one primitive. Returns true if it had any.
 bool move_indices_of(Json& primitive) {
   if (!primitive.is_object() || !primitive.contains("extensions") || !primitive.contains("indices")) return false;
   Json& extensions = primitive["extensions"];
@@ -70,7 +70,7 @@ bool move_draco_indices(Json& document) {
   return is_changed;
 }
 
-/// A file with other JSON in place of `old`, which lies in it; of a GLB all that follows stays.
+/// Returns a file with other JSON in place of `old`, which is within the file. In a GLB the rest is unchanged.
 std::vector<std::byte> with_json(std::span<const std::byte> file, std::string_view old, std::string json) {
   ByteWriter out;
   if (!is_glb(file)) {
@@ -92,7 +92,8 @@ std::vector<std::byte> with_json(std::span<const std::byte> file, std::string_vi
 
 #ifdef QUOIN_HAVE_MESHOPTIMIZER
 
-/// Bytes that one of code can stand for: of 64 that are alike one is left, and indices of one byte become four.
+/// Maximum number of output bytes per encoded byte: of 64 equal bytes one is stored, and one-byte indices become four
+/// bytes.
 constexpr std::size_t kMostPacked = 256;
 
 /// The content of a view's extension.
@@ -104,7 +105,7 @@ struct CodedView {
   std::string filter;
 };
 
-/// Nothing where it is no whole number.
+/// Returns nullopt if it is not a whole number.
 std::optional<std::size_t> whole_in(const tinygltf::Value& object, const char* key) {
   if (!object.Has(key) || !object.Get(key).IsNumber()) return std::nullopt;
   const double number = object.Get(key).GetNumberAsDouble();
@@ -191,7 +192,7 @@ bool has_meshopt() {
 }
 
 Status decode_views(tinygltf::Model& model) {
-  // Any number of views may be of the same code.
+  // Any number of views may share the same encoded bytes.
   std::size_t most = kMostPacked;
   for (const tinygltf::Buffer& buffer : model.buffers) most += kMostPacked * buffer.data.size();
   for (std::size_t i = 0; i < model.bufferViews.size(); ++i) {

@@ -11,13 +11,13 @@ namespace tinygltf {
 class Model;
 }
 
-// EXT_meshopt_compression: views with coded bytes, which lie in another buffer than the view's own.
+// EXT_meshopt_compression: views with encoded bytes, which are in another buffer than the view's own.
 //
 // Source: Khronos, "EXT_meshopt_compression"; meshoptimizer implements the codecs.
 
 namespace quoin::triangles {
 
-/// Returns true if this build can decode them.
+/// Returns true if this build can decode meshopt compression.
 [[nodiscard]] bool has_meshopt();
 
 /// Returns the file in a form that tinygltf reads; empty if it already is. Buffers that only stand for decoded views,

@@ -28,7 +28,7 @@ namespace quoin::triangles {
 
 namespace {
 
-// The mark of UTF-8 that programs for Windows write before a text.
+// The UTF-8 byte order mark, which Windows programs write before a text.
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 
 bool is_other_keyword(std::string_view word) {
@@ -48,7 +48,7 @@ bool is_obj(std::span<const std::byte> beginning) {
   std::size_t geometry = 0;
   for (std::size_t at = 0; at < text.size() && at < kBeginning;) {
     const std::size_t end = std::min(text.find_first_of("\r\n", at), text.size());
-    // The last line of a beginning may be cut off.
+    // The last line of a truncated text may be incomplete.
     if (end == text.size() && text.size() >= kBeginning) break;
     Words words(text.substr(at, end - at));
     at = end + 1;
@@ -62,7 +62,7 @@ bool is_obj(std::span<const std::byte> beginning) {
     geometry += is_geometry || is_material ? 1 : 0;
     ++(is_geometry || is_material || is_other_keyword(*key) ? known : unknown);
   }
-  // Programs add words of their own.
+  // Programs add keywords of their own.
   return geometry > 0 && unknown * 4 <= known;
 }
 
@@ -74,7 +74,7 @@ bool has_obj() {
 
 namespace {
 
-/// Bytes as a stream.
+/// Reads bytes as a stream.
 class Bytes : public std::streambuf {
  public:
   explicit Bytes(std::span<const std::byte> bytes) {
@@ -84,7 +84,7 @@ class Bytes : public std::streambuf {
   }
 
  protected:
-  // How far tinyobjloader has come.
+  // The progress of tinyobjloader.
   pos_type seekoff(off_type offset, std::ios_base::seekdir from, std::ios_base::openmode) override {
     const off_type base = from == std::ios_base::beg   ? 0
                           : from == std::ios_base::cur ? gptr() - eback()
@@ -140,7 +140,7 @@ std::string prepared(std::string_view text) {
   return out;
 }
 
-/// The corners of a face line as words; empty for other lines.
+/// Returns the corners of a face line as words; empty for other lines.
 std::vector<std::string_view> face_words(std::string_view line) {
   Words words(line);
   std::vector<std::string_view> corners;
@@ -149,7 +149,7 @@ std::vector<std::string_view> face_words(std::string_view line) {
   return corners;
 }
 
-/// The number of the vertex that a corner names, from 0; far beyond any where it is none.
+/// Returns the vertex number of a corner, from 0; far out of range if it is invalid.
 std::size_t vertex_of(std::string_view corner, std::size_t vertices) {
   const auto number = number_in(corner.substr(0, corner.find('/')));
   if (!number || *number == 0.0 || std::abs(*number) > 1e15) return std::string_view::npos;
@@ -157,7 +157,7 @@ std::size_t vertex_of(std::string_view corner, std::size_t vertices) {
   return static_cast<std::size_t>(index > 0 ? index - 1 : static_cast<std::int64_t>(vertices) + index);
 }
 
-/// Cuts faces of more corners than tinyobjloader counts (255) into triangles, in the text.
+/// Cuts faces with more corners than tinyobjloader supports (255) into triangles, in the text.
 std::string without_large_faces(const std::string& text) {
   constexpr std::size_t kMost = 255;
   std::string out;
@@ -208,7 +208,7 @@ bool has_large_face(std::string_view text) {
   return false;
 }
 
-/// Coordinates that are no numbers, which tinyobjloader takes for 0.
+/// Counts invalid coordinates, which tinyobjloader reads as 0.
 std::size_t count_bad_numbers(std::string_view text) {
   std::size_t bad = 0;
   for (std::size_t at = 0; at < text.size();) {
@@ -274,14 +274,14 @@ class ObjReader {
       const std::size_t end = std::min(text.find('\n', at), text.size());
       std::string line = text.substr(at, end - at);
       at = end + 1;
-      // The code that looked for the file already reported it as missing, with the reason.
+      // The code that looked for the file has already reported why it is missing.
       if (line.empty() || line.find("Failed to load material file") != std::string::npos) continue;
       if (++count <= kMost) loaded_.warnings.push_back(std::move(line));
     }
     if (count > kMost) loaded_.warnings.push_back("and " + std::to_string(count - kMost) + " more warnings like these");
   }
-  /// Drops the vertex colours that Quoin writes for blocks: the ambient light that arrives, no surface colour. Colours
-  /// of its smooth meshes, which have no materials, stay.
+  /// Drops the vertex colours that Quoin writes for blocks: ambient occlusion, not a surface colour. Keeps colours of
+  /// its smooth meshes, which have no materials.
   void drop_baked_occlusion(std::string_view text) {
     const auto& c = attributes_.colors;
     if (!text.starts_with("# Quoin ") || materials_.empty()) return;
@@ -330,7 +330,7 @@ class ObjReader {
     }
     return known->second;
   }
-  /// Takes Ke times map_Ke. Without the image, which left a warning, nothing glows.
+  /// Takes Ke times map_Ke. If the image cannot be read (which left a warning), nothing glows.
   void take_emission(const tinyobj::material_t& from, MeshMaterial& material) {
     material.emissive_texture = texture_of(from.emissive_texname);
     if (!material.emissive_texture) {
@@ -348,7 +348,7 @@ class ObjReader {
     has_textures_ = true;
     MeshTexture& texture = loaded_.mesh.textures[*material.texture];
     if (from.diffuse_texopt.clamp) texture.wrap_u = texture.wrap_v = TextureWrap::Clamp;
-    // The picture takes the place of Kd, as in most programs; d stays.
+    // The image replaces Kd, as in most programs; d stays.
     material.colour = {1.0F, 1.0F, 1.0F, material.colour.a};
     const auto& pixels = texture.image.rgba;
     bool has_holes = false;
@@ -378,7 +378,7 @@ class ObjReader {
     }
     return {};
   }
-  /// Some programs write opacity where others write transparency. A model that is all invisible is such a mistake.
+  /// Some programs swap opacity and transparency. A fully invisible model is such a mistake.
   void show_what_is_all_invisible() {
     TriangleMesh& mesh = loaded_.mesh;
     const auto is_invisible = [&](std::uint32_t material) { return mesh.materials[material].colour.a == 0.0F; };

@@ -20,7 +20,7 @@ namespace quoin::triangles {
 
 namespace {
 
-/// The numbers of a vertex apart from its coordinates, as the first word of the file names them.
+/// The numbers of a vertex in addition to its coordinates, as declared in the first word of the file.
 struct Layout {
   bool has_texture = false;
   bool has_colour = false;
@@ -66,10 +66,10 @@ class Lines {
     return false;
   }
   [[nodiscard]] std::string_view line() const { return line_; }
-  /// The offset of the line.
+  /// Returns the offset of the line.
   [[nodiscard]] std::size_t position() const { return begin_; }
   [[nodiscard]] std::size_t remaining() const { return text_.size() - at_; }
-  /// Drops bytes from the beginning of the line.
+  /// Drops bytes at the beginning of the line.
   void drop(std::size_t bytes) { line_.remove_prefix(bytes); }
 
  private:
@@ -86,7 +86,7 @@ std::vector<double> numbers_in(std::string_view line) {
   return numbers;
 }
 
-/// Three or four channels, of 0 to 1 or, where they are whole and one is larger, to 255.
+/// Reads three or four channels: 0 to 1 if the text has a decimal point, else 0 to 255.
 glm::vec4 colour_of(std::span<const double> channels, std::string_view text) {
   const bool is_fraction = text.find('.') != std::string_view::npos;
   const double most = is_fraction ? 1.0 : 255.0;
@@ -132,7 +132,7 @@ class OffReader {
       return bad("the numbers of vertices and faces are missing or invalid");
     vertices_ = static_cast<std::uint64_t>(counts[0]);
     faces_ = static_cast<std::uint64_t>(counts[1]);
-    // "0 0 0" and "3 0 1 2", with their ends of lines.
+    // The minimum: "0 0 0" and "3 0 1 2" with their line ends.
     constexpr std::uint64_t kLeastVertex = 6;
     if (vertices_ > (lines_.remaining() + 1) / kLeastVertex || faces_ > (lines_.remaining() + 1) / 2) {
       return bad("the file claims " + std::to_string(vertices_) + " vertices and " + std::to_string(faces_) +
@@ -160,7 +160,7 @@ class OffReader {
     }
     return {};
   }
-  /// The text of some words of the line.
+  /// Returns the text of some words of the line.
   [[nodiscard]] std::string_view colour_text(std::size_t first, std::size_t count) const {
     Words words(lines_.line());
     for (std::size_t i = 0; i < first; ++i) (void)words.next();
@@ -189,7 +189,7 @@ class OffReader {
     }
     return {};
   }
-  /// The number of a face's colour: 0 without one.
+  /// Returns the number of a face's colour; 0 without one.
   std::uint32_t material_of(std::span<const double> channels, std::size_t first) {
     if (channels.size() == 1 || channels.size() == 2) has_map_ = true;
     if (channels.size() < 3) return 0;

@@ -67,13 +67,13 @@ struct Header {
   std::size_t end = 0;
 };
 
-/// Returns the character that ends the lines of a header: old programs for the Macintosh wrote a carriage return alone.
-/// The first line decides, since a line feed behind the last may be the first byte of the values.
+/// Returns the character that ends header lines: old Macintosh programs wrote only a carriage return. The first line
+/// decides, since a line feed after the last line may be the first byte of the values.
 char line_end(std::string_view text) {
   return text.starts_with("ply\r") && !text.starts_with("ply\r\n") ? '\r' : '\n';
 }
 
-/// A line without its end, and where the next begins.
+/// A line without its end, and the start of the next line.
 std::string_view line_at(std::string_view text, char line_end, std::size_t& at) {
   const std::size_t first = at;
   const std::size_t end = std::min(text.find(line_end, first), text.size());
@@ -143,7 +143,7 @@ Result<Header> read_header(std::string_view text) {
   return bad_at(text.size(), "the file ends within the PLY header");
 }
 
-/// The values of a body one after the other.
+/// Reads the values of a body one after another.
 class Values {
  public:
   Values(std::span<const std::byte> bytes, const Header& header)
@@ -151,7 +151,7 @@ class Values {
 
   [[nodiscard]] bool failed() const { return failed_; }
   [[nodiscard]] std::size_t position() const { return encoding_ == Encoding::Text ? words_.position() : at_; }
-  /// Bytes that are left.
+  /// Returns the number of bytes left.
   [[nodiscard]] std::size_t remaining() const { return bytes_.size() - std::min(position(), bytes_.size()); }
   /// Returns the minimum size of values of a type.
   [[nodiscard]] std::size_t least_bytes(Scalar type) const {
@@ -251,7 +251,7 @@ class PlyReader {
                                             " but has bytes for " + std::to_string(values_.remaining() / least));
     }
     if (element.name == "vertex") {
-      // Their properties may differ, and indices would not say which of them they mean.
+      // Their properties may differ, and indices do not say which element they refer to.
       if (std::exchange(has_vertices_, true))
         return bad_at(values_.position(), "more than one element is named vertex");
       return read_vertices(element);
@@ -271,7 +271,7 @@ class PlyReader {
     }
     return {};
   }
-  /// A list, or a value.
+  /// Reads a list or a value.
   Status read_list(const Property& property) {
     list_.clear();
     if (!property.count) {
@@ -301,7 +301,7 @@ class PlyReader {
     for (const std::int64_t corner : list_) corners_.push_back(static_cast<std::size_t>(corner));
     return builder_.add_polygon(corners_, [](const std::array<std::uint32_t, 3>&) {});
   }
-  /// Strips end at -1; every other triangle is turned.
+  /// Strips end at -1. Every other triangle is reversed.
   Status add_strip() {
     std::size_t first = 0;
     for (std::size_t i = 0; i < list_.size(); ++i) {

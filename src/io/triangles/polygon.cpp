@@ -14,12 +14,12 @@ struct Point {
   bool operator==(const Point&) const = default;
 };
 
-/// Twice the area of a triangle, positive where it turns to the left.
+/// Returns twice the area of a triangle; positive if it turns left.
 double area(const Point& a, const Point& b, const Point& c) {
   return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
 }
 
-/// The corners in the plane that shows the polygon largest, in which it turns to the left.
+/// Projects the corners to the plane in which the polygon is largest, where it turns left.
 std::vector<Point> flattened(std::span<const DVec3> corners) {
   DVec3 normal(0.0);
   for (std::size_t i = 1; i + 1 < corners.size(); ++i) {
@@ -36,7 +36,7 @@ std::vector<Point> flattened(std::span<const DVec3> corners) {
   return points;
 }
 
-/// Turns nowhere to the right, and goes round once: from left to right and back.
+/// Returns true if it never turns right and goes round once: from left to right and back.
 bool is_convex(const std::vector<Point>& points) {
   const std::size_t count = points.size();
   int turns = 0;
@@ -53,7 +53,7 @@ bool is_convex(const std::vector<Point>& points) {
   return turns <= 2;
 }
 
-/// The ring of corners that is left of a polygon while ears are cut off.
+/// The ring of corners that remains while ears are cut off.
 class Ring {
  public:
   explicit Ring(const std::vector<Point>& points) : points_(points), next_(points.size()), last_(points.size()) {
@@ -91,7 +91,7 @@ class Ring {
   std::vector<std::uint32_t> last_;
 };
 
-/// Returns the corner to cut off where none is an ear: the ring crosses itself there, or lies on a line.
+/// Returns the corner to cut off if there is no ear: the ring crosses itself there, or is on a line.
 std::uint32_t flattest(const Ring& ring, std::uint32_t first, std::size_t left) {
   std::uint32_t best = first;
   std::uint32_t at = first;
@@ -114,7 +114,7 @@ void cut_ears(const std::vector<Point>& points, std::vector<std::array<std::uint
     triangles.push_back(ring.corner(at));
     const std::uint32_t after = ring.next(at);
     ring.remove(at);
-    at = ring.next(after);  // ears one after the other would make slivers
+    at = ring.next(after);  // cutting adjacent ears in sequence would make slivers
   }
 }
 

@@ -22,7 +22,7 @@ namespace {
 constexpr std::size_t kHeader = 80;
 constexpr std::size_t kRecord = 50;
 
-/// A colour of 5 bits a channel, in linear light.
+/// A colour of 5 bits per channel, in linear light.
 glm::vec4 colour_of(unsigned r, unsigned g, unsigned b) {
   const auto channel = [](unsigned five) { return linear_from_srgb(static_cast<float>(five & 31U) / 31.0F); };
   return {channel(r), channel(g), channel(b), 1.0F};
@@ -31,7 +31,7 @@ glm::vec4 colour_of(unsigned r, unsigned g, unsigned b) {
 /// Returns the colour in the two bytes after a triangle; nullopt if there is none.
 std::optional<glm::vec4> colour_of(std::uint16_t bits, const std::optional<glm::vec4>& of_all) {
   const bool is_set = (bits & 0x8000U) != 0;
-  // Magics: a colour for all stands in the header, and the highest bit says that it holds.
+  // Magics: the header has a colour for the whole model, and the highest bit selects it.
   if (of_all) return is_set ? *of_all : colour_of(bits, bits >> 5U, bits >> 10U);
   if (is_set) return colour_of(bits >> 10U, bits >> 5U, bits);
   return std::nullopt;
@@ -67,7 +67,7 @@ Result<LoadedMesh> read_bytes(std::span<const std::byte> bytes) {
   bool has_colours = of_all.has_value();
   constexpr float kGrey = 0.577580F;
   for (std::uint32_t i = 0; i < count; ++i) {
-    (void)reader.take(12);  // the normal: corners say it too
+    (void)reader.take(12);  // the normal, which the corners define too
     const std::size_t first = loaded.mesh.positions.size();
     for (int corner = 0; corner < 3; ++corner) {
       const float x = reader.f32();
@@ -130,7 +130,7 @@ bool is_stl(std::span<const std::byte> whole) {
 }
 
 Result<LoadedMesh> read_stl(std::span<const std::byte> bytes, Beside&) {
-  // Some programs begin binary files with "solid" too.
+  // Some programs also begin binary files with "solid".
   return is_stl(bytes) || !is_stl_text(bytes) ? read_bytes(bytes) : read_text(bytes);
 }
 

@@ -55,7 +55,7 @@ struct Triangle {
 
 /// An object within an object, or one of the build items.
 struct Placed {
-  std::string path;  // of its part; empty: the same
+  std::string path;  // its part; empty: the same part
   std::int64_t object = kNone;
   glm::dmat4 transform{1.0};
 };
@@ -75,10 +75,10 @@ struct Part {
   std::map<std::int64_t, std::vector<Rgba8>> colours;  // by group
   std::vector<Placed> build;
   std::map<std::string, std::size_t, std::less<>> left_out;  // elements by name
-  std::string target;                                        // of relationships: where the root part lies
+  std::string target;                                        // the root part, from relationships
 };
 
-/// The attributes of an element. Lifetime: of the call.
+/// The attributes of an element. Lifetime: the call.
 class Attributes {
  public:
   explicit Attributes(const char** pairs) : pairs_(pairs) {}
@@ -91,7 +91,7 @@ class Attributes {
     return {};
   }
   [[nodiscard]] std::optional<double> number(std::string_view name) const { return number_in((*this)[name]); }
-  /// A whole number of at least 0, else kNone.
+  /// Returns a whole number of at least 0, else kNone.
   [[nodiscard]] std::int64_t index(std::string_view name) const {
     const auto value = number(name);
     const bool is_index = value && *value >= 0.0 && *value <= 4294967295.0 && *value == std::floor(*value);
@@ -102,7 +102,7 @@ class Attributes {
   const char** pairs_;
 };
 
-/// "#RRGGBB" or "#RRGGBBAA".
+/// Parses "#RRGGBB" or "#RRGGBBAA".
 std::optional<Rgba8> colour_in(std::string_view text) {
   if (!text.starts_with('#') || (text.size() != 7 && text.size() != 9)) return std::nullopt;
   std::uint32_t value = 0;
@@ -113,7 +113,7 @@ std::optional<Rgba8> colour_in(std::string_view text) {
   return Rgba8{byte(24), byte(16), byte(8), byte(0)};
 }
 
-/// Twelve numbers: the images of the axes, and of the origin.
+/// Parses twelve numbers: the images of the axes, and of the origin.
 std::optional<glm::dmat4> transform_in(std::string_view text) {
   glm::dmat4 matrix(1.0);
   if (text.empty()) return matrix;
@@ -141,7 +141,7 @@ double millimetres_of(std::string_view unit) {
   return 1.0;
 }
 
-/// Takes a part from its XML.
+/// Parses a part from its XML.
 class PartReader {
  public:
   explicit PartReader(std::string name)
@@ -149,7 +149,7 @@ class PartReader {
     if (!parser_) throw std::bad_alloc();
     XML_SetUserData(parser_.get(), this);
     XML_SetElementHandler(parser_.get(), &PartReader::on_start, &PartReader::on_end);
-    // Packages have none, and each could stand for any number of bytes.
+    // Packages have no entities, and each could expand to any number of bytes.
     XML_SetEntityDeclHandler(parser_.get(), &PartReader::on_entity);
   }
 
@@ -262,7 +262,7 @@ class PartReader {
   std::string fault_;
 };
 
-/// Puts all that is to be built into one mesh, in millimetres.
+/// Collects all items to build in one mesh, in millimetres.
 class Package {
  public:
   explicit Package(ZipParts zip) : zip_(std::move(zip)) {}
@@ -329,7 +329,7 @@ class Package {
     }
     return {};
   }
-  // Components of components would grow without bounds.
+  // Nested components could otherwise grow without bounds.
   Status count_component() {
     constexpr std::size_t kMost = std::size_t{1} << 20;
     if (++components_ <= kMost) return {};
@@ -401,7 +401,7 @@ class Package {
   LoadedMesh loaded_;
   MeshBuilder builder_{loaded_};
   std::map<std::string, std::size_t> left_out_;
-  std::size_t defined_ = 0;  // triangles
+  std::size_t defined_ = 0;  // number of triangles
   std::size_t placed_ = 0;
   std::size_t components_ = 0;
   std::size_t without_colour_ = 0;

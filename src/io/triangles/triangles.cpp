@@ -16,7 +16,7 @@ namespace triangles {
 
 namespace {
 
-/// Points of a file whose z axis points up, in Quoin's axes.
+/// Converts points of a file whose z axis points up to Quoin's axes.
 void turn_up(TriangleMesh& mesh) {
   for (DVec3& p : mesh.positions) p = {p.x, p.z, -p.y};
 }

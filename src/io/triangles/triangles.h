@@ -31,20 +31,20 @@ class Beside {
   Beside() = default;
   Beside(std::filesystem::path file, SidecarFiles allowed) : file_(std::move(file)), allowed_(allowed) {}
 
-  /// Reads a file that sidecar_path allows. Errors: CannotRead, for the caller to complete with `name`, except that a
-  /// refusal has the name and becomes `refused` too.
+  /// Reads a file that sidecar_path allows. Errors: CannotRead; the caller adds `name`. A refusal includes the name, and
+  /// is also stored in `refused`.
   [[nodiscard]] Result<std::vector<std::byte>> read(const std::string& name);
-  /// Reads such a file, or the file of the same name in the folder if `name` leads out of it. Errors: as `read`.
+  /// Reads a file or, if `name` leads out of the folder, the file of the same name in the folder. Errors: as `read`.
   [[nodiscard]] Result<std::vector<std::byte>> read_or_same_name(const std::string& name);
   /// The first refusal of `read`.
   [[nodiscard]] const std::optional<Error>& refused() const { return refused_; }
-  /// The files read so far.
+  /// The files that were read.
   [[nodiscard]] std::vector<std::filesystem::path>& files() { return files_; }
 
  private:
   [[nodiscard]] Result<std::vector<std::byte>> read_path(const std::filesystem::path& path);
 
-  std::filesystem::path file_;  // empty: there is none
+  std::filesystem::path file_;  // empty if there is none
   SidecarFiles allowed_ = SidecarFiles::WithinFolder;
   std::vector<std::filesystem::path> files_;
   std::optional<Error> refused_;
@@ -57,8 +57,8 @@ class MeshBuilder {
   /// Adds a triangle. Returns false and adds no triangle if a position is missing or not finite.
   /// Errors: LimitExceeded.
   [[nodiscard]] Result<bool> add(std::size_t a, std::size_t b, std::size_t c);
-  /// The triangles of a polygon, as cut_polygon cuts it. `added` gets the corners of each triangle that is added, as
-  /// places in `corners`. Errors: LimitExceeded.
+  /// Adds the triangles of a polygon, cut by cut_polygon. `added` receives the corners of each added triangle as
+  /// indices into `corners`. Errors: LimitExceeded.
   [[nodiscard]] Status add_polygon(std::span<const std::size_t> corners,
                                    FunctionRef<void(const std::array<std::uint32_t, 3>&)> added);
   /// Adds warnings for dropped items. Call at the end.
@@ -73,14 +73,14 @@ class MeshBuilder {
   std::vector<std::array<std::uint32_t, 3>> cut_;
 };
 
-/// Returns true for the greys of occlusion that Quoin writes after the corners of blocks: quarters, exact or as bytes.
+/// Returns true for the occlusion greys that Quoin writes at the corners of blocks: quarters, exact or as bytes.
 [[nodiscard]] bool is_occlusion_grey(double linear);
 
 /// Adds an image as a texture; returns nullopt, with a warning, if it cannot be decoded.
 [[nodiscard]] std::optional<std::size_t> add_texture(std::span<const std::byte> picture, const std::string& name,
                                                      LoadedMesh& loaded);
 
-// Readers: the mesh in the file's own axes.
+// Readers return the mesh in the file's own axes.
 
 [[nodiscard]] bool is_stl_text(std::span<const std::byte> beginning);
 [[nodiscard]] bool is_stl(std::span<const std::byte> whole);
@@ -112,7 +112,7 @@ class MeshBuilder {
 [[nodiscard]] std::optional<FileFormat> detect_by_name(const std::filesystem::path& path,
                                                        std::span<const std::byte> bytes);
 
-/// A mesh as a scene of one grid. `name`: of the grid.
+/// Converts a mesh to a scene with one grid. `name`: the grid's name.
 [[nodiscard]] Result<LoadedScene> scene_from_mesh(LoadedMesh loaded, const MeshLoadOptions& options,
                                                   const std::string& name, Threads threads, const Progress& progress);
 

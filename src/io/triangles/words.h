@@ -8,18 +8,18 @@
 
 namespace quoin::triangles {
 
-/// A decimal number, or "nan" and "inf", that is all of a word.
+/// Parses a decimal number, "nan" or "inf" that is the whole word.
 [[nodiscard]] inline std::optional<double> number_in(std::string_view word) {
   if (word.starts_with('+')) word.remove_prefix(1);
   double value = 0.0;
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
   if (end != word.data() + word.size() || word.empty()) return std::nullopt;
-  // Too large or too small a number is none that is finite.
+  // Too large or too small numbers are not finite.
   if (error == std::errc::result_out_of_range) return value;
   return error == std::errc() ? std::optional(value) : std::nullopt;
 }
 
-/// The words of a text, between blanks and ends of lines. Lifetime: of the text.
+/// Reads the words of a text, separated by blanks and line ends. Lifetime: the text.
 class Words {
  public:
   explicit Words(std::string_view text, std::size_t position = 0) : text_(text), at_(position) {}
@@ -35,7 +35,7 @@ class Words {
     const auto word = next();
     return word ? number_in(*word) : std::nullopt;
   }
-  /// Returns the position where the next word is searched.
+  /// Returns the position where the search for the next word starts.
   [[nodiscard]] std::size_t position() const { return at_; }
 
  private:

@@ -11,17 +11,17 @@
 
 namespace quoin::triangles {
 
-/// The files in a zip file, by its directory at the end: stored, or compressed by deflate.
-/// Source: PKWARE, ".ZIP File Format Specification" 6.3.3. Lifetime: of the bytes.
+/// The files in a zip file, stored or compressed by deflate, found by the directory at its end.
+/// Source: PKWARE, ".ZIP File Format Specification" 6.3.3. Lifetime: the bytes.
 class ZipParts {
  public:
   /// Errors: BadFormat, with the offset; Unsupported for zip64 and files in several parts.
   [[nodiscard]] static Result<ZipParts> open(std::span<const std::byte> zip);
 
-  /// Names as they stand in the directory.
+  /// The names as stored in the directory.
   [[nodiscard]] std::vector<std::string> names() const;
   [[nodiscard]] bool has(const std::string& name) const { return entries_.contains(name); }
-  /// A file's content. Memory: its size, which its compressed bytes justify.
+  /// Returns a file's content. Memory: its size, which is limited by its compressed bytes.
   /// Errors: BadFormat; Unsupported for other compressions and for encrypted files. Requires: has(name).
   [[nodiscard]] Result<std::vector<std::byte>> read(const std::string& name) const;
 
