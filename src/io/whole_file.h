@@ -14,7 +14,7 @@
 
 namespace quoin {
 
-/// `result`; its error names `path`, unless it names a file already.
+/// Returns `result`; its error names `path` unless it already names a file.
 template <class T>
 [[nodiscard]] Result<T> with_path(Result<T> result, const std::filesystem::path& path) {
   if (!result && result.error().path.empty()) result.error().path = path.string();
@@ -44,7 +44,7 @@ template <class Read>
 /// Returns the data file of a NIfTI pair with the header `path`; empty if it is no pair.
 [[nodiscard]] std::vector<std::filesystem::path> files_of_pair(const std::filesystem::path& path);
 
-/// Makes a rename last: without it a power cut may bring the old folder entry back. Not all file systems can.
+/// Syncs a folder, so that a power cut cannot undo a rename. Some file systems do not support it.
 void sync_folder(const std::filesystem::path& folder);
 
 }  // namespace quoin

@@ -17,7 +17,7 @@ namespace quoin {
 
 /// The SQLite application id of a world: "Quon".
 inline constexpr std::uint32_t kWorldApplicationId = 0x51756F6E;
-/// Bytes of a file that `is_world_format` has to see.
+/// The number of bytes that `is_world_format` needs.
 inline constexpr std::size_t kWorldHeaderBytes = 100;
 
 /// Returns true if bytes begin like a world: with SQLite's header, and Quoin's application id.
@@ -26,7 +26,7 @@ inline constexpr std::size_t kWorldHeaderBytes = 100;
                                                     Threads threads, const Progress& progress);
 [[nodiscard]] Result<LoadedScene> read_world_format(std::span<const std::byte> bytes, const LoadOptions& options,
                                                     Threads threads, const Progress& progress);
-/// `loaded`: the scene with the data read in addition to it, if it was read; otherwise null.
+/// `loaded`: the scene with its additional loaded data; null if it was not loaded.
 [[nodiscard]] Result<SavedScene> write_world_format(const Scene& scene, const LoadedScene* loaded,
                                                     const std::filesystem::path& path, Threads threads,
                                                     const Progress& progress);

@@ -31,8 +31,8 @@ class Beside {
   Beside() = default;
   Beside(std::filesystem::path file, SidecarFiles allowed) : file_(std::move(file)), allowed_(allowed) {}
 
-  /// Reads a file that sidecar_path allows. Errors: CannotRead; the caller adds `name`. A refusal includes the name, and
-  /// is also stored in `refused`.
+  /// Reads a file that sidecar_path allows. Errors: CannotRead; the caller adds `name`. A refusal includes the name,
+  /// and is also stored in `refused`.
   [[nodiscard]] Result<std::vector<std::byte>> read(const std::string& name);
   /// Reads a file or, if `name` leads out of the folder, the file of the same name in the folder. Errors: as `read`.
   [[nodiscard]] Result<std::vector<std::byte>> read_or_same_name(const std::string& name);

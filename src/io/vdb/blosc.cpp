@@ -1,6 +1,6 @@
 // A frame: u8 version, u8, u8 flags, u8 bytes of an element, u32 bytes, u32 bytes of a block, u32 bytes of the frame;
-// then for each block where it begins (i32), and blocks: streams of i32 size and bytes, one for each byte of an element
-// where blocks are split. Shuffled: first byte of all elements first.
+// then the offset of each block (i32), and the blocks: streams of i32 size and bytes; split blocks have a stream for
+// each byte of an element. Shuffled: the first bytes of all elements come first.
 
 #include "io/vdb/blosc.h"
 

@@ -39,15 +39,15 @@ enum class Type : std::uint32_t { Float = 1, Double = 2, Mask = 8, Bool = 11 };
 /// The layout of a node's bytes.
 struct NodeShape {
   std::size_t places;  // 32^3 or 16^3
-  std::size_t table;   // where they begin
+  std::size_t table;   // offset of the table of entries
   std::size_t bytes;
-  int bits;  // of a place along an axis
-  int edge;  // of a place, in voxels
+  int bits;  // position bits per axis
+  int edge;  // edge of an entry, in voxels
 };
 constexpr NodeShape kUpper{32'768, 8'256, 8'256 + 8 * 32'768, 5, kLowerEdge};
 constexpr NodeShape kLower{4'096, 1'088, 1'088 + 8 * 4'096, 4, kLeafEdge};
 
-/// Reads the tree of one grid, whose bytes may say anything.
+/// Reads the tree of one grid from untrusted bytes.
 class GridReader {
  public:
   GridReader(std::span<const std::byte> bytes, Type type, Grid& grid)
@@ -140,7 +140,7 @@ class GridReader {
     return mask;
   }
 
-  /// `said_at`: where its place is said.
+  /// `said_at`: the position of the node's offset.
   Status read_node(const NodeShape& shape, std::size_t node, IVec3 origin, std::size_t said_at) {
     std::size_t& left = &shape == &kUpper ? most_upper_ : most_lower_;
     if (!has(node, shape.bytes) || left == 0) return bad_at(said_at, "a node offset is out of bounds");
@@ -187,7 +187,7 @@ class GridReader {
   std::span<const std::byte> bytes_;
   Type type_;
   Grid& grid_;
-  // More would be read twice.
+  // Upper limits; more nodes would share bytes.
   std::size_t most_leaves_;
   std::size_t most_lower_;
   std::size_t most_upper_;

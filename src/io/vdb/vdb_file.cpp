@@ -40,7 +40,7 @@ constexpr std::uint32_t kZip = 1;
 constexpr std::uint32_t kActiveAlone = 2;
 constexpr std::uint32_t kBlosc = 4;
 constexpr std::string_view kHalfSuffix = "_HalfFloat";
-/// Larger coordinates would leave no room for reads past the border.
+/// Larger coordinates would leave no space for reads past the border.
 constexpr std::int32_t kMaxCoordinate = 1 << 30;
 
 /// The value type of a tree.
@@ -69,7 +69,7 @@ double read_f64(ByteReader& reader) {
 
 /// The metadata used here; other entries are skipped.
 struct Metadata {
-  std::string kind;  // "class"
+  std::string kind;  // the value of "class"
   bool is_half = false;
 };
 
@@ -86,7 +86,7 @@ Metadata read_metadata(ByteReader& reader) {
   return metadata;
 }
 
-/// Nothing for maps that are no matrix.
+/// Returns nullopt for maps that are not affine.
 std::optional<glm::dmat4> read_map(ByteReader& reader, const std::string& kind) {
   glm::dmat4 matrix(1.0);
   const auto vector = [&] {
@@ -107,7 +107,7 @@ std::optional<glm::dmat4> read_map(ByteReader& reader, const std::string& kind) 
   if (is_scaled) {
     const DVec3 scale = vector();
     for (int axis = 0; axis < 3; ++axis) matrix[axis][axis] = scale[axis];
-    static_cast<void>(reader.take(std::size_t{4} * 3 * 8));  // what follows from it
+    static_cast<void>(reader.take(std::size_t{4} * 3 * 8));  // values derived from the scale
   }
   return matrix;
 }
@@ -171,7 +171,7 @@ class TreeReader {
   Status read_data(std::size_t count, std::span<float> out);
   Status read_buffer(Leaf& leaf);
   void add_tile(IVec3 origin, int edge, float value, bool is_active) {
-    // A mask holds its active voxels; a bool grid holds its true voxels.
+    // In a mask, active voxels are set; in a bool grid, true voxels.
     if (scalar_ == Scalar::Mask) value = is_active ? 1.0F : 0.0F;
     if (!is_active && value == grid_.background) return;
     grid_.tiles.push_back({origin, edge, value, is_active});
@@ -241,7 +241,7 @@ Status TreeReader::read_lower(IVec3 origin) {
       add_tile(place, kLeafEdge, (*values)[i], bit_of(active, i));
       continue;
     }
-    static_cast<void>(reader_.take(kLeafVoxels / 8));  // again in its buffer
+    static_cast<void>(reader_.take(kLeafVoxels / 8));  // the mask, which the leaf's buffer repeats
     if (reader_.failed()) return too_short();
     grid_.leaves.push_back({place, {}});
   }
@@ -265,7 +265,7 @@ Result<std::vector<float>> TreeReader::read_values(std::size_t count, std::span<
   std::vector<float> values(count);
   if (auto done = read_data(stored, std::span(values).first(stored)); !done) return done.error();
   if (stored == count) return values;
-  // From behind, so that none is written over before it is moved.
+  // From the end, so that no value is overwritten before it is moved.
   std::size_t next = stored;
   for (std::size_t i = count; i-- > 0;) {
     if (bit_of(active, i)) {
@@ -280,7 +280,7 @@ Result<std::vector<float>> TreeReader::read_values(std::size_t count, std::span<
 Status TreeReader::read_data(std::size_t count, std::span<float> out) {
   const bool is_half = is_half_ && !is_truth();
   const std::size_t size = is_half ? 2 : value_bytes();
-  if (is_half && count == 0) return {};  // of other values there is a size even then
+  if (is_half && count == 0) return {};  // other types store a size even then
   const std::size_t bytes = count * size;
   std::span<const std::byte> data;
   if ((compression_ & (kZip | kBlosc)) == 0) {
@@ -361,7 +361,7 @@ std::optional<Scalar> scalar_of(std::string_view type) {
   return std::nullopt;
 }
 
-/// A name that is there several times has a number behind it.
+/// Returns a name without the number that OpenVDB appends to duplicate names.
 std::string shown_name(const std::string& name) {
   return printable(std::string_view(name).substr(0, name.find('\x1e')));
 }
@@ -378,7 +378,7 @@ class FileReader {
                         ".vdb version " + std::to_string(version) + " is not supported (222 to 225 are)", {},
                         kMagic.size());
     }
-    static_cast<void>(reader_.take(8));  // of the library
+    static_cast<void>(reader_.take(8));  // version of the library
     const std::size_t offsets_at = reader_.position();
     const bool has_offsets = reader_.u8() != 0;
     static_cast<void>(reader_.take(36));
@@ -409,7 +409,7 @@ class FileReader {
   }
 
  private:
-  /// A descriptor, and goes on to where the next begins.
+  /// Reads a descriptor and moves to the next one.
   Status read_next(std::vector<Descriptor>& descriptors) {
     Descriptor next;
     next.at = reader_.position();
@@ -422,7 +422,7 @@ class FileReader {
     if (reader_.failed() || next.begin < reader_.position() || end < next.begin || end > bytes_.size()) {
       return bad_at(next.at, "a grid's start or end is out of bounds");
     }
-    // So grids do not overlap, and each byte is read once.
+    // Ensures that grids do not overlap, so each byte is read once.
     reader_ = ByteReader(bytes_, end, bytes_.size());
     ends_.push_back(end);
     descriptors.push_back(std::move(next));

@@ -46,7 +46,7 @@ std::optional<Instance> place_of(const glm::dmat4& world_from_index) {
   return placed;
 }
 
-/// A leaf or a tile that lies in a chunk, or a tile that fills it.
+/// A leaf or a tile in a chunk, or a tile that fills the chunk.
 struct Piece {
   IVec3 chunk{0};
   std::uint32_t index = 0;
@@ -105,7 +105,7 @@ Status for_chunks(const std::vector<Piece>& pieces, Threads threads, const Progr
   return {};
 }
 
-/// Calls `set(place in a chunk's rows, place in a leaf)` for all voxels of a leaf.
+/// Calls `set(index in a chunk's rows, index in a leaf)` for all voxels of a leaf.
 template <class Set>
 void for_leaf(IVec3 origin, Set set) {
   const IVec3 corner = local_of(origin);
@@ -220,7 +220,7 @@ class SceneMaker {
   }
 
   void place(Instance placed, GridHandle handle, const Grid& grid) {
-    // Voxels lie around their indices, samples at them.
+    // Voxels are centred at their indices; samples are at them.
     if (grid.meaning == Meaning::Mask) {
       placed.position -= DVec3(glm::dmat3(grid.world_from_index) * DVec3(0.5));
     }
@@ -230,7 +230,7 @@ class SceneMaker {
   }
 
   void place_again(const Grid& grid, GridHandle handle, std::size_t first) {
-    // Of fog the grid begins at its box.
+    // A fog grid begins at the minimum corner of its box.
     glm::dmat4 matrix = grid.world_from_index;
     const DVec3 corner = DVec3(origins_[first]);
     matrix[3] = matrix * glm::dvec4(corner, 1.0);
@@ -270,11 +270,11 @@ class SceneMaker {
   Threads threads_;
   const Progress& progress_;
   LoadedScene loaded_;
-  std::vector<std::optional<GridHandle>> handles_;  // by place in the file
-  std::vector<IVec3> origins_;                      // of fog grids, in the same order: the minimum corner of the box
+  std::vector<std::optional<GridHandle>> handles_;  // by index in the file
+  std::vector<IVec3> origins_;                      // minimum corners of the boxes of fog grids, in the same order
 };
 
-// The smallest box around all that is in a grid.
+// Returns the smallest box around the content of a grid.
 IBox box_of(const Grid& grid) {
   IBox box;
   const auto extend = [&](IVec3 origin, int edge) {
@@ -286,7 +286,7 @@ IBox box_of(const Grid& grid) {
   return box;
 }
 
-// Requires: all that is in the grid lies in the box, of as many values as `values` has.
+// Requires: the grid's content is in the box, which has values.size() voxels.
 void fill_values(const Grid& grid, const IBox& box, std::vector<float>& values) {
   const IVec3 size = box.size();
   const auto at = [&](IVec3 place) -> float& {
@@ -311,7 +311,7 @@ void fill_values(const Grid& grid, const IBox& box, std::vector<float>& values) 
   }
 }
 
-// The least and the greatest of the finite ones, 0 where there are none, and how many others.
+// Finds the minimum and maximum of the finite values (0 if there are none), and counts the others.
 void find_range(Volume& volume) {
   std::tie(volume.min, volume.max) = std::pair(0.0F, 0.0F);
   bool has_finite = false;
@@ -325,7 +325,7 @@ void find_range(Volume& volume) {
   }
 }
 
-// Fog is a volume: the box around all that is in it.
+// Converts fog to a volume: the box around its content.
 Status SceneMaker::add_fog(std::size_t i) {
   const Grid& grid = file_.grids[i];
   const IBox box = box_of(grid);
@@ -360,7 +360,7 @@ Status SceneMaker::add_fog(std::size_t i) {
   return {};
 }
 
-// Puts the one grid of a scene of a volume into the scene that is made.
+// Adds the grid of a volume's scene to the loaded scene.
 void SceneMaker::place_fog(const Scene& made, std::size_t i) {
   const std::string& name = file_.grids[i].name;
   SceneGrid content;

@@ -13,8 +13,8 @@
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
 
-// Trees of OpenVDB's, of the usual shape: a root of nodes of 32^3, of nodes of 16^3, of leaves of 8^3 voxels. In all of
-// them z is the fastest axis.
+// OpenVDB trees of the usual shape: a root of 32^3 nodes, of 16^3 nodes, of leaves with 8^3 voxels. z is the fastest
+// axis in all of them.
 
 namespace quoin::vdb {
 
@@ -23,7 +23,7 @@ inline constexpr int kLowerEdge = 16 * kLeafEdge;
 inline constexpr int kUpperEdge = 32 * kLowerEdge;
 inline constexpr std::size_t kLeafVoxels = 512;
 
-/// The place of a leaf's voxel among its values, and in its masks.
+/// Returns the index of a leaf's voxel among its values and in its masks.
 [[nodiscard]] constexpr std::size_t place_in_leaf(int x, int y, int z) {
   return static_cast<std::size_t>(x << 6 | y << 3 | z);
 }
@@ -31,8 +31,8 @@ inline constexpr std::size_t kLeafVoxels = 512;
 /// The meaning of a grid's values.
 enum class Meaning : std::uint8_t {
   LevelSet,  ///< signed distances in world units, negative inside
-  Fog,       ///< densities: the more the denser
-  Mask,      ///< voxels that are there
+  Fog,       ///< densities: larger values are denser
+  Mask,      ///< voxels: the active ones are set
 };
 
 using LeafMask = std::array<std::uint64_t, kLeafVoxels / 64>;
@@ -42,7 +42,7 @@ struct Leaf {
   LeafMask active{};
 };
 
-/// A cube of one value.
+/// A cube with a single value.
 struct Tile {
   IVec3 origin{0};
   std::int32_t edge = kLeafEdge;
@@ -63,7 +63,7 @@ struct Grid {
 
 struct File {
   std::vector<Grid> grids;
-  std::vector<std::string> warnings;  ///< of grids that are left out
+  std::vector<std::string> warnings;  ///< for skipped grids
 };
 
 /// " BDV" and zeros.
@@ -78,7 +78,7 @@ struct File {
 
 /// "NanoVDB0".
 [[nodiscard]] bool is_nvdb(std::span<const std::byte> beginning);
-/// The same of NanoVDB's files, version 32. Errors: as read_vdb_file.
+/// As above, for NanoVDB files, version 32. Errors: as read_vdb_file.
 [[nodiscard]] Result<File> read_nvdb_file(std::span<const std::byte> bytes);
 
 }  // namespace quoin::vdb

@@ -1,5 +1,5 @@
-// What vdb_file.cpp reads, by zip and with active values alone. Densities are a level set with a band as wide as
-// theirs; voxels are true where they are there.
+// Writes files that vdb_file.cpp reads, with zip and active values only. Densities become a level set with the band of
+// the field; voxels become true.
 
 #include <zlib.h>
 
@@ -56,12 +56,12 @@ class Writer {
   void vector(const DVec3& value) {
     for (int axis = 0; axis < 3; ++axis) number(value[axis]);
   }
-  /// Says at `at` where the next byte goes.
+  /// Writes the current offset at `at`.
   void mark(std::size_t at) {
     put_number(bytes.data() + at, static_cast<std::uint64_t>(bytes.size()), std::endian::little);
   }
 
-  /// As zlib makes it, or as it is where that is no shorter.
+  /// Writes zlib data, or the content itself if that is not longer.
   void zipped(std::span<const std::byte> content) {
     uLongf size = compressBound(static_cast<uLong>(content.size()));
     packed_.resize(size);
@@ -79,10 +79,10 @@ class Writer {
   std::vector<std::byte> packed_;
 };
 
-/// A node of 16^3 places, x slowest.
+/// A node of 16^3 entries, x slowest.
 struct Lower {
-  std::array<std::uint64_t, 64> inside{};  // places without a leaf that are solid throughout
-  std::map<int, LeafMask> leaves;          // the active voxels of each, by its place
+  std::array<std::uint64_t, 64> inside{};  // entries without a leaf that are solid
+  std::map<int, LeafMask> leaves;          // active voxels by entry
 };
 using Place = std::tuple<int, int, int>;
 using Upper = std::map<int, Lower>;
@@ -92,7 +92,7 @@ void set_bit(std::span<std::uint64_t> bits, int i) {
   bits[static_cast<std::size_t>(i) >> 6] |= std::uint64_t{1} << (i & 63);
 }
 
-/// Adds the nodes of an 8^3 block of a chunk.
+/// Adds an 8^3 block of a chunk to its nodes.
 void add_block(Tree& tree, IVec3 origin, bool is_inside, const LeafMask* leaf) {
   const IVec3 upper = origin >> 12;  // rounded down
   static_assert(kUpperEdge == 1 << 12);
@@ -195,7 +195,7 @@ Tree tree_of(const quoin::Grid& voxels) {
   return tree;
 }
 
-/// Writes trees: of `field`, or of voxels where it is null.
+/// Writes trees of `field`, or of voxels if it is null.
 class TreeWriter {
  public:
   TreeWriter(Writer& out, const DensityGrid* field, double voxel_size) : out_(out), field_(field) {
@@ -214,7 +214,7 @@ class TreeWriter {
       for (const auto& [i, lower] : upper) set_bit(children, i);
       out_.words(children);
       out_.words(std::array<std::uint64_t, 512>{});
-      out_.number(std::uint8_t{0});  // all others are background
+      out_.number(std::uint8_t{0});  // all other entries are background
       out_.zipped({});
       for (const auto& [i, lower] : upper) write_lower(lower);
     }
@@ -225,7 +225,7 @@ class TreeWriter {
       const auto [x, y, z] = place;
       for (const auto& [i, lower] : upper) {
         const IVec3 corner = IVec3{x, y, z} * kUpperEdge + IVec3{i >> 10, i >> 5 & 31, i & 31} * kLowerEdge;
-        std::map<Place, Dense> chunks;  // of this node
+        std::map<Place, Dense> chunks;  // chunks of this node
         for (const auto& [leaf, mask] : lower.leaves) {
           const IVec3 origin = corner + IVec3{leaf >> 8, leaf >> 4 & 15, leaf & 15} * kLeafEdge;
           out_.words(mask);
@@ -321,7 +321,7 @@ class SceneWriter {
   std::vector<std::byte> write() {
     out_.text({" BDV\0\0\0\0", 8});
     out_.number(kVersion);
-    out_.number(std::uint32_t{10});  // of the library of that version
+    out_.number(std::uint32_t{10});  // the library version of that file version
     out_.number(std::uint32_t{0});
     out_.number(std::uint8_t{1});
     out_.text("00000000-0000-0000-0000-000000000000");
@@ -339,7 +339,7 @@ class SceneWriter {
     out_.string(value);
   }
 
-  /// Each name once, by a number behind it.
+  /// Returns a unique name: duplicates get a number.
   std::string unique(const std::string& name) {
     const int count = names_[name]++;
     return count == 0 ? name : name + '\x1e' + std::to_string(count);
@@ -348,7 +348,7 @@ class SceneWriter {
   void write_grid(const Wanted& wanted) {
     const std::string& shown = wanted.instance->name.empty() ? wanted.grid->name : wanted.instance->name;
     const std::string name = unique(shown);
-    // Densities are in world units, so that only those of one size are the same.
+    // Densities are in world units, so only instances of equal voxel size share a tree.
     const auto key = std::tuple(wanted.grid, wanted.is_field ? wanted.instance->voxel_size : 0.0);
     const auto known = trees_.find(key);
     out_.string(name);
@@ -378,7 +378,7 @@ class SceneWriter {
 
   void write_transform(const Wanted& wanted) {
     glm::dmat4 matrix = world_from_grid(*wanted.instance, *wanted.grid);
-    // Voxels lie around their indices, samples at them.
+    // Voxels are centred at their indices; samples are at them.
     if (!wanted.is_field) matrix[3] = matrix * glm::dvec4(0.5, 0.5, 0.5, 1.0);
     const double size = wanted.instance->voxel_size;
     const bool is_upright = glm::dmat3(matrix) == glm::dmat3(size);
@@ -401,7 +401,7 @@ class SceneWriter {
   Writer out_;
   std::vector<Wanted> wanted_;
   std::map<std::string, int> names_;
-  std::map<std::tuple<const SceneGrid*, double>, std::string> trees_;  // by content
+  std::map<std::tuple<const SceneGrid*, double>, std::string> trees_;  // names of written trees, by content
 };
 
 }  // namespace

@@ -44,7 +44,7 @@ Status set_size(const std::array<std::int64_t, 3>& extents, const VolumeOptions&
   std::string text;
   for (const std::int64_t extent : extents) {
     text += (text.empty() ? "" : " x ") + std::to_string(extent);
-    // Rounding down twice is rounding down once.
+    // Dividing step by step rounds like one division.
     room = extent > std::numeric_limits<std::int32_t>::max() ? 0 : room / extent;
   }
   if (room < 1) {
@@ -142,7 +142,7 @@ struct Survey {
     float high = max;
     bool is_finite = true;
     for (const float value : values) {
-      // NaN gives false in both.
+      // NaN fails both comparisons.
       is_finite &= std::abs(value) <= std::numeric_limits<float>::max();
       low = value < low ? value : low;
       high = value > high ? value : high;
@@ -209,7 +209,7 @@ Status read_values(ByteStream& stream, VolumeHeader& header, std::uint64_t offse
   if (count > most / stride) return cut_off(most, stream.is_compressed() ? "at most " : "");
   const std::size_t at_once = std::max<std::size_t>(kValuesAtOnce / header.components, 1);
   std::vector<std::byte> piece(std::min(count, at_once) * stride);
-  // Reserved memory costs nothing until values come to fill it.
+  // Reserved memory costs nothing until values fill it.
   volume.values.reserve(count);
   Survey survey;
   for (std::size_t done = 0; done < count;) {

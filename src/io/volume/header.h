@@ -21,17 +21,17 @@ enum class DataEncoding : std::uint8_t { Raw, Gzip, Bzip2, Ascii, Hex };
 
 /// The header of a volume: its properties except the values, and the position and format of the stored values.
 struct VolumeHeader {
-  Progress progress;  ///< of reading the values
+  Progress progress;  ///< progress of reading the values
   Volume volume;
   std::endian order = std::endian::little;
   double slope = 1.0;  ///< value = slope * stored value + intercept
   double intercept = 0.0;
 
-  std::uint64_t data_at = 0;                       ///< where the values, or their encoded form, begin
-  DataEncoding data_encoding = DataEncoding::Raw;  ///< of the values alone
+  std::uint64_t data_at = 0;                       ///< offset of the values, or of their encoded form
+  DataEncoding data_encoding = DataEncoding::Raw;  ///< compression of the values only
   std::size_t components = 1;                      ///< values per voxel; the first is read
-  std::uint64_t lines_to_skip = 0;                 ///< of the file that `data_file` names, before `skip`
-  std::uint64_t skip = 0;                          ///< bytes before the values, once decompressed
+  std::uint64_t lines_to_skip = 0;                 ///< lines to skip in `data_file`, before `skip`
+  std::uint64_t skip = 0;                          ///< bytes to skip before the values, after decompression
   bool is_data_at_end = false;                     ///< the values are the file's last bytes, wherever they begin
   bool is_data_elsewhere = false;                  ///< in another file: `data_file`, or the other of a NIfTI pair
   std::string data_file{};                         ///< a plain name: it lies next to the header
@@ -40,7 +40,7 @@ struct VolumeHeader {
 /// The frames in which files give positions.
 enum class VolumeSpace : std::uint8_t { RightFrontHead, LeftFrontHead, LeftBackHead, RightHanded, LeftHanded };
 
-/// The turn that `read_volume` documents, as a linear map.
+/// Returns the rotation that `read_volume` documents, as a linear map.
 [[nodiscard]] glm::dmat4 quoin_from_space(VolumeSpace space);
 
 /// Sets `size` if Quoin supports it.
@@ -64,7 +64,7 @@ enum class VolumeSpace : std::uint8_t { RightFrontHead, LeftFrontHead, LeftBackH
 /// Errors:   BadFormat if there are fewer values than `size` requires.
 [[nodiscard]] Status read_values(ByteStream& stream, VolumeHeader& header, std::uint64_t offset);
 
-/// Bytes that the values of a header take, with all components.
+/// Returns the number of bytes of a header's values, with all components.
 [[nodiscard]] std::uint64_t bytes_of_values(const VolumeHeader& header);
 
 }  // namespace quoin

@@ -98,7 +98,7 @@ bool is_sound(const glm::dmat4& affine) {
   return std::isfinite(box) && box > 0.0 && volume > kFlattest * box;
 }
 
-/// pixdim without the signs that some programs give it; 1 where it says nothing.
+/// Returns pixdim without the signs that some programs add; 1 for invalid values.
 DVec3 spacing_of(const Fields& fields, std::vector<std::string>& warnings) {
   DVec3 spacing(1.0);
   bool is_amiss = false;
@@ -106,7 +106,7 @@ DVec3 spacing_of(const Fields& fields, std::vector<std::string>& warnings) {
     const double said = std::abs(fields.real(kPixdim, static_cast<std::size_t>(axis) + 1));
     const bool is_good = is_distance(said);
     if (is_good) spacing[axis] = said;
-    // Axes that have one sample need no spacing.
+    // Axes with a single sample need no spacing.
     is_amiss |= !is_good && axis < fields.dim(0);
   }
   if (is_amiss) warnings.emplace_back("pixdim is not a valid distance; 1 is used");
@@ -126,7 +126,7 @@ glm::dmat4 sform(const Fields& fields) {
 glm::dmat4 qform(const Fields& fields, DVec3 spacing) {
   const DVec3 turn(fields.real(kQuaternion, 0), fields.real(kQuaternion, 1), fields.real(kQuaternion, 2));
   const double rest = 1.0 - glm::dot(turn, turn);
-  // Rounding may leave no room for the real part: a half turn.
+  // Rounding may make `rest` negative: a half turn.
   const DQuat quaternion = rest > 0.0 ? DQuat(std::sqrt(rest), turn) : DQuat(0.0, glm::normalize(turn));
   const double qfac = fields.real(kPixdim) < 0.0 ? -1.0 : 1.0;
   const glm::dmat3 rotation = glm::mat3_cast(quaternion);
@@ -138,7 +138,7 @@ glm::dmat4 qform(const Fields& fields, DVec3 spacing) {
   return affine;
 }
 
-/// Programs that go by the qform show a volume mirrored, or turned round, where the sform says something else.
+/// Programs that use the qform show the volume mirrored or rotated if the sform differs.
 void compare_forms(const glm::dmat4& sform, const glm::dmat4& qform, std::vector<std::string>& warnings) {
   const glm::dmat3 a(sform);
   const glm::dmat3 b(qform);
@@ -151,7 +151,7 @@ void compare_forms(const glm::dmat4& sform, const glm::dmat4& qform, std::vector
   if (is_opposite) warnings.emplace_back("the sform and the qform orient the axes differently; the sform is used");
 }
 
-/// The first of sform and qform that the header gives and that places samples in space.
+/// Returns the first of sform and qform that is present and invertible.
 std::optional<glm::dmat4> given(const Fields& fields, DVec3 spacing, std::vector<std::string>& warnings) {
   if (fields.code(kSformCode) > 0) {
     const glm::dmat4 affine = sform(fields);
@@ -179,7 +179,7 @@ void place(const Fields& fields, Volume& volume) {
   for (int axis = 0; axis < 3; ++axis) {
     const double length = glm::length(DVec3(ras_from_voxel[axis]));
     constexpr double kRounding = 1e-3;
-    // What places the samples is what counts.
+    // The transform takes precedence over pixdim.
     if (std::abs(length - volume.spacing[axis]) > kRounding * length) volume.spacing[axis] = length;
   }
   volume.world_from_voxel = quoin_from_space(VolumeSpace::RightFrontHead) * ras_from_voxel;
@@ -189,7 +189,7 @@ constexpr std::int32_t kFirstHeader = 348;
 constexpr std::int32_t kSecondHeader = 540;
 constexpr std::size_t kFirstMagicAt = 344;
 constexpr std::size_t kSecondMagicAt = 4;
-// Four bytes behind the header say whether extensions follow.
+// Four bytes after the header, which announce extensions.
 constexpr std::size_t kExtenderBytes = 4;
 
 Error bad(std::string message, std::size_t at) {
@@ -257,7 +257,7 @@ std::optional<ScalarType> scalar_type(int datatype) {
   }
 }
 
-/// Why a datatype that is no scalar of ours is refused.
+/// Returns the error for a datatype that is not a supported scalar.
 Error refuse_type(int datatype, std::size_t at) {
   const char* what = nullptr;
   if (datatype == 1) what = "bits";
@@ -292,7 +292,7 @@ Status read_size(const Fields& fields, const VolumeOptions& options, Volume& vol
   bool has_more = false;
   for (std::size_t i = 1; i <= static_cast<std::size_t>(dimensions); ++i) {
     const std::int64_t extent = fields.dim(i);
-    // Some programs leave the dimensions beyond space at 0.
+    // Some programs set the dimensions beyond space to 0.
     if (extent < 0 || (extent == 0 && i <= 3)) {
       return bad("dim[" + std::to_string(i) + "] is " + std::to_string(extent), fields.dim_offset(i));
     }
@@ -322,7 +322,7 @@ Status read_scale(const Fields& fields, VolumeHeader& header) {
 Status read_data_place(const Fields& fields, bool is_pair, VolumeHeader& header) {
   const std::size_t at = fields.offset(kVoxOffset);
   const std::uint64_t least = is_pair ? 0 : fields.header_bytes() + kExtenderBytes;
-  // Farther than any file reaches, and exact in a double.
+  // Larger than any file, and exact in a double.
   constexpr double kMost = 1LL << 50;
   const double said = fields.is_second() ? static_cast<double>(fields.vox_offset_of_second()) : fields.real(kVoxOffset);
   if (!(said >= 0.0 && said <= kMost) || said != std::floor(said)) {
@@ -331,11 +331,11 @@ Status read_data_place(const Fields& fields, bool is_pair, VolumeHeader& header)
   header.is_data_elsewhere = is_pair;
   header.data_at = static_cast<std::uint64_t>(said);
   if (header.data_at >= least) return {};
-  // Files without an extender exist.
+  // Some files have no extender.
   if (header.data_at == fields.header_bytes()) return {};
   if (header.data_at != 0) return bad("vox_offset is " + std::to_string(header.data_at) + ", within the header", at);
   header.data_at = least;
-  // Two statements: in a single one, GCC 12 gives a false warning about the concatenation.
+  // Two statements: GCC 12 gives a false warning about a single concatenation.
   std::string& warning = header.volume.warnings.emplace_back("vox_offset is 0; the values are read from byte ");
   warning += std::to_string(least);
   return {};

@@ -1,4 +1,4 @@
-// One header, then the samples: i runs along x, j along z, k along y.
+// Writes one header, then the samples: i runs along x, j along z, k along y.
 
 #include "io/volume/write.h"
 
@@ -34,10 +34,10 @@ constexpr std::size_t kLongestName = 15;
 
 /// The content of the file except its samples.
 struct Header {
-  IBox box{};  ///< of the samples, in the grid
+  IBox box{};  ///< box of the samples, in the grid
   glm::dmat4 world_from_grid{1.0};
   std::int16_t datatype = kUInt8;
-  int bytes = 1;  ///< a sample
+  int bytes = 1;  ///< bytes per sample
   std::int16_t intent = 0;
   std::string_view description{};
   std::string name{};
@@ -55,7 +55,7 @@ void write_header(const Header& header, ByteWriter& out) {
   constexpr std::size_t kHeaderBytes = 348;
   constexpr std::size_t kExtenderBytes = 4;
   const IVec3 size = header.box.size();
-  // From (i, j, k) to samples of the grid, whose axes are (i, k, j).
+  // Maps (i, j, k) to samples of the grid, whose axes are (i, k, j).
   glm::dmat4 grid_from_file(0.0);
   grid_from_file[0][0] = grid_from_file[1][2] = grid_from_file[2][1] = 1.0;
   grid_from_file[3] = glm::dvec4(DVec3(header.box.min), 1.0);
@@ -80,7 +80,7 @@ void write_header(const Header& header, ByteWriter& out) {
   for (int axis = 0; axis < 3; ++axis) out.f32(static_cast<float>(glm::length(DVec3(affine[axis]))));
   pad_to(108);
   out.f32(static_cast<float>(kHeaderBytes + kExtenderBytes));
-  out.f32(1.0F);  // values are as they are
+  out.f32(1.0F);  // values are not scaled
   pad_to(148);
   text(header.description, 80);
   pad_to(252);
@@ -118,7 +118,7 @@ Result<models::ModelBytes> write_labels(const Scene& scene, const Progress& prog
   Header header{merged->box};
   const double size = merged->voxel_size;
   for (int axis = 0; axis < 3; ++axis) header.world_from_grid[axis][axis] = size;
-  header.world_from_grid[3] = glm::dvec4(DVec3(0.5 * size), 1.0);  // samples are amid their voxels
+  header.world_from_grid[3] = glm::dvec4(DVec3(0.5 * size), 1.0);  // samples are at voxel centres
   header.datatype = is_wide ? kUInt16 : kUInt8;
   header.bytes = is_wide ? 2 : 1;
   header.intent = kIntentLabel;

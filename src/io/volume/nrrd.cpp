@@ -30,13 +30,13 @@ struct Field {
   std::size_t at = 0;
 };
 
-/// The fields of a header by their names in lower case without blanks ("spacedirections"), which views `bytes`.
+/// The fields of a header by lower-case names without blanks ("spacedirections"), which view `bytes`.
 struct Fields {
   std::map<std::string, Field, std::less<>> all;
-  std::size_t end = 0;   ///< behind the empty line that ends the header
-  bool has_end = false;  ///< whether there is such a line
+  std::size_t end = 0;   ///< end of the empty line after the header
+  bool has_end = false;  ///< true if there is such a line
 
-  /// Null when the header has no such field.
+  /// Returns null if the header has no such field.
   [[nodiscard]] const Field* find(std::string_view name) const;
 };
 
@@ -58,7 +58,7 @@ Error bad(std::string message, std::size_t at) {
   return make_error(ErrorCode::BadFormat, std::move(message), {}, at);
 }
 
-/// `text`, or as much of it as a message can hold, on one line between quotation marks.
+/// Returns `text`, shortened for a message, on one line in quotation marks.
 std::string quoted(std::string_view text) {
   constexpr std::size_t kMost = 40;
   // Appended piece by piece: GCC 12 gives a false warning about operator+ here.
@@ -68,7 +68,7 @@ std::string quoted(std::string_view text) {
   return shown.append("\"");
 }
 
-/// `text` without blanks at its ends.
+/// Returns `text` without leading and trailing blanks.
 std::string_view trimmed(std::string_view text) {
   const std::size_t first = text.find_first_not_of(kBlanks);
   if (first == std::string_view::npos) return {};
@@ -92,8 +92,8 @@ const Field* Fields::find(std::string_view name) const {
   return found == all.end() ? nullptr : &found->second;
 }
 
-/// Splits a header into its fields; comments and keys with values of their own are left out.
-/// Errors: BadFormat for lines that are neither, and for fields that are there twice.
+/// Splits a header into its fields; skips comments and key/value pairs.
+/// Errors: BadFormat for other lines and for duplicate fields.
 Result<Fields> split_header(std::string_view bytes) {
   Fields fields;
   // The first line is the magic number.
@@ -114,7 +114,7 @@ Result<Fields> split_header(std::string_view bytes) {
   return fields;
 }
 
-/// The words between blanks.
+/// Returns the words between blanks.
 std::vector<std::string_view> words_of(std::string_view text) {
   std::vector<std::string_view> words;
   for (std::size_t at = text.find_first_not_of(kBlanks); at != std::string_view::npos;) {
@@ -125,7 +125,7 @@ std::vector<std::string_view> words_of(std::string_view text) {
   return words;
 }
 
-/// In lower case, with one blank between words.
+/// Returns `text` in lower case with one blank between words.
 std::string normalised(std::string_view text) {
   std::string words;
   for (const std::string_view word : words_of(text)) {
@@ -135,7 +135,7 @@ std::string normalised(std::string_view text) {
   return words;
 }
 
-/// A finite number, "nan" or an infinity, in any case; nothing when `text` is neither.
+/// Parses a finite number, "nan" or an infinity in any case; nullopt for other text.
 std::optional<double> parse_number(std::string_view text) {
   if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
   double value = 0.0;
@@ -144,8 +144,8 @@ std::optional<double> parse_number(std::string_view text) {
   return value;
 }
 
-/// A list of vectors as "(1,0,0) none (0,0,2.5)": as many numbers as each has, none for "none". Nothing when it is
-/// none.
+/// Parses a list of vectors like "(1,0,0) none (0,0,2.5)": the numbers of each vector, none for "none". Returns nullopt
+/// for other text.
 std::optional<std::vector<std::vector<double>>> parse_vectors(std::string_view text) {
   std::vector<std::vector<double>> vectors;
   for (text = trimmed(text); !text.empty(); text = trimmed(text)) {
@@ -195,19 +195,19 @@ Result<VolumeSpace> space_of(const Fields& fields) {
                      *field);
 }
 
-/// Kinds of axes that are not space.
+/// Returns true for kinds of axes that are not spatial.
 bool is_spatial(std::string_view kind) {
   const std::string name = normalised(kind);
   return name == "domain" || name == "space" || name == "???" || name == "none";
 }
 
-/// The axes of a file: those of its values, and which of these is the first of space.
+/// The axes of a file: their number, and the first spatial one.
 struct Axes {
   std::size_t count = 0;
-  std::size_t first = 0;  ///< 1: axis 1 counts the components of a value, or slices in time
+  std::size_t first = 0;  ///< 1: axis 1 counts components of a value, or slices in time
 };
 
-/// Values of several components, and slices in time, come before space in some files.
+/// In some files, components of a value or slices in time come before the spatial axes.
 Result<Axes> read_axes(const Fields& fields, std::size_t dimensions) {
   Axes axes{dimensions, 0};
   const Field* const directions = fields.find("spacedirections");
@@ -286,7 +286,7 @@ Status read_spacings(const Field& field, const Axes& axes, Volume& volume) {
   return {};
 }
 
-/// "mm" from "\"mm\" \"mm\" \"mm\"".
+/// Returns "mm" for "\"mm\" \"mm\" \"mm\"".
 std::string units_of(const Fields& fields) {
   const Field* field = fields.find("spaceunits");
   if (field == nullptr) field = fields.find("units");
@@ -385,7 +385,7 @@ Result<std::size_t> read_dimensions(const Fields& fields) {
   return unsupported("it has " + std::to_string(*dimensions) + " dimensions; a volume has 3", field->at);
 }
 
-/// The kind of an axis as the file names it.
+/// Returns the kind of an axis as named in the file.
 std::string kind_of(const Fields& fields, std::size_t axis) {
   const Field* const field = fields.find("kinds");
   const auto kinds = field != nullptr ? words_of(field->text) : std::vector<std::string_view>();
@@ -449,7 +449,7 @@ Status read_encoding(const Fields& fields, VolumeHeader& header) {
   return {};
 }
 
-/// A whole number of at least `least`; 0 when the field is not there.
+/// Reads a whole number of at least `least`; 0 if the field is absent.
 Result<std::int64_t> read_count(const Fields& fields, const char* name, std::int64_t least) {
   const Field* field = fields.find(name);
   if (field == nullptr) return 0;
@@ -483,7 +483,7 @@ Status read_skips(const Fields& fields, std::string_view bytes, VolumeHeader& he
   return {};
 }
 
-/// The values lie in the file itself, or in a file next to it. Files elsewhere are not opened.
+/// The values are in the file itself, or in a file next to it. Files in other folders are not opened.
 Status read_data_file(const Fields& fields, VolumeHeader& header) {
   const Field* const file = fields.find("datafile");
   if (file == nullptr) {

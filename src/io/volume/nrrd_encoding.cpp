@@ -15,7 +15,7 @@
 #include <bzlib.h>
 #endif
 
-// Encodings of NRRD that are no raw bytes: http://teem.sourceforge.net/nrrd/format.html#encoding.
+// NRRD encodings other than raw bytes: http://teem.sourceforge.net/nrrd/format.html#encoding.
 
 namespace quoin::nrrd {
 
@@ -25,7 +25,7 @@ Error bad(std::string message, std::size_t at) {
   return make_error(ErrorCode::BadFormat, std::move(message), {}, at);
 }
 
-/// A text, or as much of it as a message can hold, between quotation marks.
+/// Returns a text, shortened for a message, in quotation marks.
 std::string quoted(std::string_view text) {
   constexpr std::size_t kMost = 40;
   // Appended piece by piece: GCC 12 warns of operator+ here.
@@ -41,7 +41,7 @@ void append(T value, std::endian order, std::vector<std::byte>& out) {
   out.insert(out.end(), raw.begin(), raw.end());
 }
 
-/// Appends a number of a text. Returns false for a word that is none, or beyond the type.
+/// Appends a number of a text. Returns false for a word that is not a number, or out of the type's range.
 template <class T>
 bool append_number(std::string_view word, std::endian order, std::vector<std::byte>& out) {
   if (word.starts_with('+')) word.remove_prefix(1);
@@ -80,7 +80,7 @@ Append appender(ScalarType type) {
   return nullptr;
 }
 
-/// Numbers between blanks or commas.
+/// Reads numbers separated by blanks or commas.
 Result<std::vector<std::byte>> decode_ascii(std::string_view text, std::size_t begin, const VolumeHeader& header) {
   constexpr std::string_view kBetween = " \t\r\n,";
   const Append append_one = appender(header.volume.type);
@@ -104,7 +104,7 @@ int hex_digit(char c) {
   return -1;
 }
 
-/// Two digits per byte; blanks may be anywhere.
+/// Reads two digits per byte; blanks may be anywhere.
 Result<std::vector<std::byte>> decode_hex(std::string_view text, std::size_t begin, const VolumeHeader& header) {
   constexpr std::string_view kBlanks = " \t\r\n";
   const std::uint64_t wanted = bytes_of_values(header);
@@ -122,7 +122,7 @@ Result<std::vector<std::byte>> decode_hex(std::string_view text, std::size_t beg
 
 #ifdef QUOIN_HAVE_BZIP2
 
-/// A bzip2 stream that is ended with its scope.
+/// Ends a bzip2 stream at the end of its scope.
 struct Decompressor {
   bz_stream state{};
   Decompressor() {
@@ -147,7 +147,7 @@ Result<std::vector<std::byte>> decode_bzip2(std::span<const std::byte> bytes, st
     out.resize(filled + static_cast<std::size_t>(std::min<std::uint64_t>(wanted - filled, std::max(kStep, filled))));
     const std::size_t offered = std::min(bytes.size() - at, kMaxAtOnce);
     const std::size_t room = std::min(out.size() - filled, kMaxAtOnce);
-    // bzip2 reads through this pointer only.
+    // bzip2 only reads through this pointer.
     state.next_in = const_cast<char*>(reinterpret_cast<const char*>(bytes.data() + at));  // NOLINT
     state.avail_in = static_cast<unsigned>(offered);
     state.next_out = reinterpret_cast<char*>(out.data() + filled);

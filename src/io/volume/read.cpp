@@ -13,7 +13,7 @@ namespace quoin {
 
 namespace {
 
-/// The decompressed beginning of a file, and whether it was compressed.
+/// The decompressed beginning of a file, and its compression.
 struct Beginning {
   std::vector<std::byte> bytes;
   Compression compression = Compression::None;
@@ -21,7 +21,7 @@ struct Beginning {
 
 Result<Beginning> beginning_of(std::span<const std::byte> bytes) {
   auto first = first_bytes(bytes, std::max(nifti::kMaxHeaderBytes, nrrd::kMaxHeaderBytes));
-  // Damage farther on shows when the values are read; what came before it may still be a header.
+  // Damage farther on is reported when the values are read. The bytes before it may still contain the header.
   if (!first) first = first_bytes(bytes, nifti::kMaxHeaderBytes);
   if (!first) return first.error();
   return Beginning{std::move(*first), begins_gzip(bytes) ? Compression::Gzip : Compression::None};
@@ -47,7 +47,7 @@ Status skip(ByteStream& stream, std::uint64_t count, std::uint64_t byte_offset) 
                     {}, byte_offset);
 }
 
-/// Reads a byte more, so that a checksum at the end is looked at.
+/// Reads one more byte, so that a checksum at the end is verified.
 Status check_end(ByteStream& stream) {
   if (!stream.is_compressed()) return {};
   const auto skipped = stream.skip(1);
@@ -63,7 +63,7 @@ Result<Volume> read_stream(ByteStream& stream, std::uint64_t skipped, VolumeHead
   return std::move(header.volume);
 }
 
-/// Skips to values that are the last bytes of a file.
+/// Skips to values that are at the end of the file.
 Result<Volume> read_from_end(std::span<const std::byte> bytes, VolumeHeader& header) {
   const std::uint64_t taken = bytes_of_values(header);
   const std::uint64_t room = bytes.size() - header.data_at;
@@ -111,7 +111,7 @@ std::filesystem::path image_beside(const std::filesystem::path& header_path) {
   return std::filesystem::exists(compressed, ignored) ? compressed : image;
 }
 
-/// The file that holds the values of a header. Requires: they are elsewhere.
+/// Returns the file with the values of a header. Requires: they are in another file.
 Result<std::filesystem::path> data_file_of(const std::filesystem::path& header_path, const VolumeHeader& header,
                                            const VolumeOptions& options) {
   const std::string name = header.data_file.empty() ? image_beside(header_path).filename().string() : header.data_file;
@@ -145,7 +145,7 @@ Result<Volume> read_pair(const std::filesystem::path& header_path, const VolumeO
   return volume;
 }
 
-/// `path` is empty when it is not known.
+/// `path` is empty if it is unknown.
 Result<Volume> decode(std::span<const std::byte> bytes, const std::filesystem::path& path, const VolumeOptions& options,
                       const Progress& progress) {
   const auto beginning = beginning_of(bytes);

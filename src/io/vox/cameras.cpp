@@ -27,7 +27,7 @@ std::optional<DVec3> parse_three(std::string_view text) {
   return DVec3(numbers[0], numbers[1], numbers[2]);
 }
 
-/// Reads a key, where the camera has it; says which one is none.
+/// Reads a key if the camera has it; reports a fault if it is invalid.
 template <class Parse, class Value>
 void read_key(const Dict& attributes, std::string_view key, Parse parse, Value& value, std::string& fault) {
   const std::string_view text = attributes.get(key);

@@ -30,7 +30,7 @@ std::string_view text_of(std::span<const std::byte> bytes, std::size_t count) {
   return {reinterpret_cast<const char*>(bytes.data()), std::min(count, bytes.size())};
 }
 
-/// SLAB6's .vox: three sizes, that many bytes, and a palette of 768.
+/// The layout of SLAB6's .vox: three sizes, the voxels, and a palette of 768 bytes.
 bool is_slab6(std::span<const std::byte> bytes) {
   constexpr std::uint64_t kPaletteBytes = 768;
   ByteReader reader(bytes);
@@ -78,7 +78,7 @@ std::string text_of(const FileSize& size) {
   return std::to_string(size[0]) + " x " + std::to_string(size[1]) + " x " + std::to_string(size[2]) + " voxels";
 }
 
-/// Three edges of at most `kMaxModelEdge`.
+/// Reads three edges of at most `kMaxModelEdge`.
 Result<FileSize> read_size(ChunkReader& chunk) {
   FileSize size{};
   for (std::uint32_t& edge : size) edge = chunk.u32();
@@ -115,7 +115,7 @@ Status parse_voxels(ChunkReader& chunk, Model& model) {
   return {};
 }
 
-/// Its size is its own: a SIZE before it says the same.
+/// A TDCZ stores its size; a SIZE before it must agree.
 Status parse_packed_voxels(ChunkReader& chunk, bool has_size, Document& out) {
   const Result<FileSize> size = read_size(chunk);
   if (!size) return size.error();
@@ -134,7 +134,7 @@ Status parse_packed_voxels(ChunkReader& chunk, bool has_size, Document& out) {
   return {};
 }
 
-/// The 256th entry belongs to air, and Teardown does not write it. Other programs write the colours that they use.
+/// The 256th entry belongs to air, and Teardown omits it. Other programs write only the colours that they use.
 Status parse_palette(ChunkReader& chunk, Document& out) {
   const std::size_t entries = std::min(chunk.remaining() / 4, kColours);
   if (entries == 0) return chunk.too_short();
@@ -324,7 +324,7 @@ namespace {
 constexpr std::int64_t kMaxInt32 = std::numeric_limits<std::int32_t>::max();
 constexpr std::int64_t kMinInt32 = std::numeric_limits<std::int32_t>::min();
 
-// The least bytes that one of them takes: a frame is an empty DICT, a shape's model an id and an empty DICT.
+// The minimum sizes: a frame is an empty DICT, a shape's model an id and an empty DICT.
 constexpr std::size_t kLeastFrameBytes = 4;
 constexpr std::size_t kLeastModelBytes = 8;
 constexpr std::size_t kChildBytes = 4;
@@ -337,7 +337,7 @@ std::string quoted(std::string_view text) {
   return out;
 }
 
-/// `_f`; a key without one takes its place in the list.
+/// Reads `_f`; a key without it has its index as its frame.
 Result<std::int32_t> parse_frame(const ChunkReader& chunk, const Dict& dict, std::size_t place) {
   const std::string_view text = dict.get("_f");
   const std::optional<std::int32_t> frame = frame_of_key(text, place);
@@ -411,7 +411,7 @@ std::optional<Orientation> parse_orientation(std::string_view text) {
   return orientation_from_byte(static_cast<std::uint8_t>(*byte));
 }
 
-/// Three integers with blanks between them.
+/// Reads three integers separated by blanks.
 std::optional<IVec3> parse_translation(std::string_view text) {
   IVec3 translation{0};
   std::string_view rest = text;

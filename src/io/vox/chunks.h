@@ -16,7 +16,7 @@
 
 #include "io/vox/orientation.h"
 
-/// The parts of a MagicaVoxel file as they stand in it: axes, ids and colour indices are the file's.
+/// The content of a MagicaVoxel file: axes, ids and colour indices are the file's.
 ///
 /// Source: MagicaVoxel-file-format-vox.txt and -vox-extension.txt, github.com/ephtracy/voxel-model. Of TDCZ, Teardown's
 ///         compressed models, the description of github.com/vengi-voxel/vengi/pull/778 and the order in which
@@ -31,7 +31,7 @@ inline constexpr int kMaxModelEdge = 256;
 struct Dict {
   std::vector<std::pair<std::string_view, std::string_view>> entries;
 
-  /// The last value of that key; empty when there is none.
+  /// Returns the last value of that key; empty if there is none.
   [[nodiscard]] std::string_view get(std::string_view key) const;
   [[nodiscard]] bool is_set(std::string_view key) const { return get(key) == "1"; }
 };
@@ -41,8 +41,8 @@ struct Model {
   IVec3 size{1};
   std::span<const std::byte> voxels;  ///< x, y, z, colour index: a byte each
   std::uint64_t offset = 0;           ///< of the SIZE chunk, or of the TDCZ
-  std::size_t packed_begin = 0;       ///< in the file: the compressed voxels of a TDCZ, which `unpack_voxels` reads
-  std::size_t packed_end = 0;         ///< 0 where there are none
+  std::size_t packed_begin = 0;  ///< offset in the file of the compressed voxels of a TDCZ, which `unpack_voxels` reads
+  std::size_t packed_end = 0;    ///< 0 for uncompressed voxels
 };
 
 struct TransformKey {
@@ -95,13 +95,13 @@ enum class ChunkKind : std::uint8_t { Other, ModelCount, Size, Voxels, PackedVox
 
 struct ChunkPlace {
   ChunkKind kind = ChunkKind::Other;
-  std::size_t begin = 0;  ///< of its header
+  std::size_t begin = 0;  ///< offset of its header
   std::size_t content_bytes = 0;
   std::size_t children_bytes = 0;
-  std::size_t number = 0;  ///< in the list of its kind; of voxels the model, of a material its colour index
+  std::size_t number = 0;  ///< index in the list of its kind; for voxels the model's, for a material its colour index
 };
 
-/// MATL's keys and values, or MATT's under MATL's names.
+/// The keys and values of a MATL, or of a MATT under MATL's names.
 using Attributes = std::map<std::string, std::string>;
 
 /// Views point into the file's bytes.
@@ -122,9 +122,9 @@ struct Document {
   std::int64_t stray_materials = 0;  ///< MATL and MATT chunks whose id is not a colour index
   std::vector<std::string> warnings;
   std::vector<ChunkPlace> chunks;
-  std::size_t main_content = 0;  ///< bytes; of a MAIN that has content of its own
-  std::size_t chunks_begin = 0;  ///< where the first chunk within MAIN begins
-  std::size_t chunks_end = 0;    ///< and where the last one ends
+  std::size_t main_content = 0;  ///< bytes of a MAIN with content of its own
+  std::size_t chunks_begin = 0;  ///< offset of the first chunk within MAIN
+  std::size_t chunks_end = 0;    ///< end of the last one
 };
 
 /// The size of a chunk's header: its id, the size of its content, and of its children.
@@ -139,7 +139,7 @@ inline constexpr std::size_t kChunkHeaderBytes = 12;
 
 /// Returns true if the file has several frames.
 [[nodiscard]] bool is_animated(const Document& document);
-/// The last frame that there is.
+/// Returns the last frame of the file.
 [[nodiscard]] std::int64_t last_frame(const Document& document);
 
 /// Reads all chunks and checks each against the available bytes; references of nodes are not checked.

@@ -19,7 +19,7 @@ constexpr double kRadians = std::numbers::pi / 180.0;
 constexpr double kUsualAir = 0.4;                            // _ray_d, _mie_d and _o3_d of the Earth
 constexpr std::array kUsualRayleigh = {45.0, 104.0, 255.0};  // default of _ray_k
 constexpr std::array kUsualOzone = {105.0, 255.0, 110.0};
-constexpr double kBloomRadius = 0.05;  // of a _scale of 1
+constexpr double kBloomRadius = 0.05;  // for a _scale of 1
 
 // The default of a key that Quoin does not support.
 struct Usual {
@@ -235,7 +235,7 @@ std::optional<FileLook> look_of(const Document& document) {
   const double bounces = std::max(diffuse, specular);
   if (bounces > 0.0) out.max_bounces = 1 + static_cast<int>(bounces);
   out.max_scatterings = static_cast<int>(scatter);
-  // How edges and grids look does not matter where they are not drawn; whether they are says _setting, or _enable.
+  // Keys of edges and grids only matter if these are drawn, which _setting or _enable say.
   settings.pass("_grid");
   settings.pass("_edge");
   out.not_drawn = settings.unread();

@@ -38,13 +38,14 @@ Rgba8 palette_entry(std::span<const std::byte> palette, std::size_t colour_index
           static_cast<std::uint8_t>(entry[3])};
 }
 
-/// The colour index that a MATL or MATT id names: some versions count 0 to 255, others 1 to 256; 256 is air's, as 0.
+/// Returns the colour index of a MATL or MATT id. Some versions count 0 to 255, others 1 to 256; 256 is air, like 0.
 std::optional<std::size_t> colour_index_of(std::int32_t id) {
   if (id < 0 || id > static_cast<std::int32_t>(kColours)) return std::nullopt;
   return static_cast<std::size_t>(id) % kColours;
 }
 
-/// Null, and counted, when the id belongs to no colour. The chunk being read becomes known as that colour's.
+/// Returns the attributes for an id, and links the current chunk to that colour. Returns null for an invalid id, and
+/// counts it.
 Attributes* slot_for(std::int32_t id, Document& out) {
   const std::optional<std::size_t> index = colour_index_of(id);
   if (index.has_value()) {
@@ -93,8 +94,8 @@ Status parse_old_material(ChunkReader& chunk, Document& out) {
 }
 
 std::array<Rgba8, kColours> default_palette() {
-  // A cube of six steps a channel, white first and blue fastest, whose last entry, black, gives way to ramps of ten
-  // steps in red, green, blue and grey.
+  // The first entries are a cube of six steps per channel, white first and blue fastest. Its last entry, black, is
+  // replaced by ramps of ten steps in red, green, blue and grey.
   constexpr std::array<std::uint8_t, 6> kSteps = {0xFF, 0xCC, 0x99, 0x66, 0x33, 0x00};
   constexpr std::array<std::uint8_t, 10> kRamp = {0xEE, 0xDD, 0xBB, 0xAA, 0x88, 0x77, 0x55, 0x44, 0x22, 0x11};
   constexpr std::size_t kCube = 215;
@@ -196,7 +197,7 @@ float emitted(const Attributes& attributes) {
   return share * std::exp2(flux);
 }
 
-/// Clouds and what light enters below its surface scatter; the other kinds of medium are drawn as glass.
+/// Clouds and subsurface materials scatter; other media are drawn as glass.
 void decode_cloud(const Attributes& attributes, VoxelProperties& out) {
   const auto kind = attributes.find("_media_type");
   if (kind == attributes.end() || (kind->second != "_scatter" && kind->second != "_sss")) return;
@@ -276,7 +277,7 @@ void encode_emission(float emission, Attributes& out) {
   if (flux > 0) out["_flux"] = std::to_string(flux);
 }
 
-/// The material of MagicaVoxel that comes nearest.
+/// Returns MagicaVoxel's nearest material.
 void encode_published(const VoxelProperties& properties, Attributes& out) {
   const bool transparent = properties.visibility == Visibility::Transparent;
   if (properties.emission > 0.0F) {

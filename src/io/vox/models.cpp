@@ -10,11 +10,11 @@ namespace quoin::vox {
 
 namespace {
 
-// Below this many voxels in a chunk single edits of the grid are cheaper than making a chunk of its own, and below the
-// second one single edits of a chunk are cheaper than going over all its 64^3 places.
+// With fewer voxels per chunk than the first number, editing the grid voxel by voxel is cheaper than making a chunk.
+// With fewer than the second, editing the chunk voxel by voxel is cheaper than visiting all its 64^3 voxels.
 constexpr std::size_t kFewVoxels = 128;
 constexpr std::size_t kSomeVoxels = 8'192;
-// From this many voxels a chunk on, over all of a model, sorting them first costs more than room for all its chunks.
+// With at least this many voxels per chunk, averaged over a model, sorting costs more than memory for all its chunks.
 constexpr std::size_t kManyVoxels = 32'768;
 
 constexpr unsigned kTypeShift = 3 * kChunkShift;
@@ -58,7 +58,7 @@ Places places_in(IVec3 model_size, IVec3 strides) {
   return places;
 }
 
-/// Calls `visit(place, colour index)` for every voxel of a model, also those outside it.
+/// Calls `visit(address, colour index)` for every voxel of a model, including voxels outside it.
 template <class Visit>
 void for_each_voxel(const Model& model, const Places& places, Visit visit) {
   for (std::size_t i = 0; i + 3 < model.voxels.size(); i += 4) {
@@ -75,14 +75,14 @@ IBox canvas_of(IVec3 model_size) {
 }
 
 DVec3 pivot_of(IVec3 model_size) {
-  // The pivot is a corner between voxels, not a voxel: along the axis that is turned round it is counted from the end.
+  // The pivot is a corner between voxels. Along the reversed axis it is counted from the end.
   return {model_size.x / 2, model_size.z / 2, model_size.y - model_size.y / 2};
 }
 
 void ModelBuilder::sort_into_chunks(const Model& model) {
   const Places places = places_in(model.size, {1, 1 << kChunksShift, 1 << (2 * kChunksShift)});
   std::array<std::size_t, 65> counts{};
-  // Most voxels lie in the chunk of the one before, whose count, and below whose end, need not go through memory.
+  // Adjacent voxels mostly lie in the same chunk, so its count is kept in a register.
   std::size_t chunk = 64;
   std::size_t in_a_row = 0;
   for_each_voxel(model, places, [&](std::uint32_t place, std::uint8_t colour_index) {

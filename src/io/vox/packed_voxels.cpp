@@ -15,7 +15,7 @@ Error wrong_count(const Model& model, const std::string& held) {
   return bad_at(model.offset, "chunk TDCZ holds " + held + " voxels, but its size needs " + std::to_string(wanted));
 }
 
-// What follows the last voxel: nothing, or no end at all.
+// The data must end after the last voxel. Unterminated streams are accepted.
 Status check_end(ByteStream& stream, const Model& model) {
   std::array<std::byte, 1> more{};
   const auto count = stream.read(more);

@@ -11,8 +11,8 @@ namespace quoin::vox {
 
 namespace {
 
-// Ways down the graph that any file may have, and how many more for each byte of it. Real files have one way to a node
-// and 24 bytes or more a node.
+// The number of graph visits that any file may need, and the file bytes per additional visit. Real files visit each
+// node once and have at least 24 bytes per node.
 constexpr std::size_t kFreeVisits = 65'536;
 constexpr std::size_t kBytesPerVisit = 4;
 
@@ -33,7 +33,7 @@ class NodeIndex {
     return index;
   }
 
-  /// kNone when no node has this id.
+  /// kNone if no node has this id.
   [[nodiscard]] std::size_t find(std::int32_t id) const {
     const auto found = std::ranges::lower_bound(by_id_, std::pair{id, std::size_t{0}});
     return found != by_id_.end() && found->first == id ? found->second : kNone;
@@ -50,7 +50,7 @@ std::int64_t folded(std::int64_t frame, std::int64_t first, std::int64_t last) {
   return first + ((frame - first) % length + length) % length;
 }
 
-/// The last key at or before the frame, or the first of all.
+/// Returns the last key at or before the frame, or the first key.
 template <class Key>
 std::size_t key_at(std::span<const Key> keys, std::int64_t frame) {
   const auto after = std::ranges::upper_bound(keys, frame, {}, &Key::frame);
@@ -91,7 +91,7 @@ Motion motion_at(const Document& document, const Node& node, int requested) {
   for (int axis = 0; axis < 3; ++axis) {
     std::int64_t value = keys[i].translation[axis];
     if (between) {
-      // Below 2^62: a translation has 32 bits, and the two shares add up to a length of at most 31.
+      // Below 2^62: a translation has 32 bits, and the two weights add up to a length of at most 31.
       const std::int64_t length = std::int64_t{keys[i + 1].frame} - keys[i].frame;
       const std::int64_t past = frame - keys[i].frame;
       value = (value * (length - past) + std::int64_t{keys[i + 1].translation[axis]} * past) / length;
@@ -103,8 +103,8 @@ Motion motion_at(const Document& document, const Node& node, int requested) {
 
 namespace {
 
-/// A transform or a group on the way from the root to where the walk stands; `hanging` is how it hangs if it is a
-/// group, else the chain down to it.
+/// A transform or a group on the path from the root to the current node. `hanging` is its position if it is a group,
+/// else the chain down to it.
 struct Step {
   std::size_t node = 0;
   std::size_t next_child = 0;
@@ -157,8 +157,8 @@ bool GraphWalk::has_layer(std::int32_t id) const {
   return std::ranges::binary_search(layers_, id);
 }
 
-/// MagicaVoxel's root is transform 0; other writers' is the first node that no node refers to. In a graph that is all
-/// cycles the first node serves to find one.
+/// Returns MagicaVoxel's root, transform 0, or else the first node without a parent. If the graph is all cycles,
+/// returns the first node, to detect one.
 std::size_t GraphWalk::find_root() const {
   const std::size_t zero = index_.find(0);
   if (zero != kNone && document_.nodes[zero].kind == NodeKind::Transform) return zero;
@@ -171,7 +171,7 @@ std::size_t GraphWalk::find_root() const {
   return root == has_parent.end() ? 0 : static_cast<std::size_t>(root - has_parent.begin());
 }
 
-/// Every model that a shape shows at any frame must be there.
+/// Checks that every model that a shape shows at any frame exists.
 Status GraphWalk::check_shapes() {
   out_.is_model_used.assign(document_.models.size(), false);
   for (const Node& node : document_.nodes) {
@@ -220,13 +220,13 @@ Status GraphWalk::place(std::size_t at, const Step& parent) {
   return {};
 }
 
-/// The chain's transforms are the last steps of the way.
+/// The chain's transforms are the last steps of the path.
 void GraphWalk::close_chain(Hanging& hanging) {
   hanging.first_transform = out_.chains.size();
   for (std::size_t i = way_.size() - hanging.transform_count; i < way_.size(); ++i) out_.chains.push_back(way_[i].node);
 }
 
-/// The topmost group is the scene itself, as long as it says nothing that a scene cannot.
+/// Returns true if the topmost group is the scene itself: it has no properties that a scene cannot hold.
 bool GraphWalk::is_scene_itself(const Hanging& hanging) const {
   return out_.top_group == kNone && out_.groups.empty() && out_.all.empty() && hanging.parent == kNone &&
          !hanging.hidden && hanging.name.empty() && !has_layer(hanging.layer);
@@ -307,7 +307,7 @@ Status GraphWalk::walk(std::size_t root) {
       return bad_at(node.offset, "node " + std::to_string(node.id) + " refers to node " + std::to_string(id) +
                                      ", which does not exist");
     }
-    // A copy: entering grows the way.
+    // A copy, because entering extends the path.
     const Step parent = step;
     if (Status status = enter(child, parent); !status) return status;
   }
@@ -334,7 +334,7 @@ Result<Placements> GraphWalk::run() {
   return std::move(out_);
 }
 
-/// Models without a scene graph: one of them is shown, as MagicaVoxel places a model that it loads.
+/// Shows one of several models without a scene graph, where MagicaVoxel places a model that it loads.
 Result<Placements> place_lone_model(const Document& document, int frame) {
   Placements out;
   out.is_model_used.assign(document.models.size(), true);

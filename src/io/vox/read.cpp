@@ -20,8 +20,8 @@ namespace quoin {
 
 namespace {
 
-// Voxels that lie far apart cost up to a few hundred times the four bytes that they take in the file. Grids may take
-// this much, and so many times the file's size above it; real files stay far below.
+// Scattered voxels need up to a few hundred times their four bytes in the file. Grids may use this much memory, plus a
+// multiple of the file's size; real files stay far below.
 constexpr std::size_t kFreeGridBytes = std::size_t{256} << 20;
 constexpr std::size_t kGridBytesPerFileByte = 64;
 
@@ -65,7 +65,7 @@ void put_place(const vox::Motion& motion, Placed& out) {
   out.mirrored = turn.mirrored;
 }
 
-/// Layers by their ids; a hidden layer wins among layers of equal id, since it hides.
+/// Layers by id. Among layers of equal id, a hidden one takes precedence.
 using LayersById = std::map<std::int32_t, LayerHandle>;
 
 LayersById add_layers(VoxSource& source, Scene& scene) {
@@ -102,7 +102,7 @@ std::vector<GroupHandle> add_groups(const vox::Placements& placements, const Lay
   return handles;
 }
 
-/// A grid is called what its shape is called, else as the first of its instances that has a name.
+/// Names a grid after its shape, else after its first instance with a name.
 void add_instances(const vox::Placements& placements, const std::vector<GridHandle>& grids, const LayersById& layers,
                    Scene& scene) {
   const std::vector<GroupHandle> groups = add_groups(placements, layers, scene);

@@ -15,46 +15,47 @@ namespace quoin::vox {
 
 inline constexpr std::size_t kNone = static_cast<std::size_t>(-1);
 
-/// The position of a shape or a group in the scene graph: below the nearest group above it, by a chain of transforms,
-/// usually a single one.
+/// The position of a shape or a group in the scene graph: below its nearest ancestor group, through a chain of
+/// transforms, usually one.
 struct Hanging {
-  std::size_t node = kNone;    ///< the shape or the group itself, in Document::nodes; kNone where there is no graph
-  std::size_t parent = kNone;  ///< in Placements::groups; kNone: the scene itself
-  std::size_t first_transform = 0;  ///< in Placements::chains, from the highest down
+  std::size_t node = kNone;         ///< the shape or group in Document::nodes; kNone without a scene graph
+  std::size_t parent = kNone;       ///< in Placements::groups; kNone: the scene itself
+  std::size_t first_transform = 0;  ///< in Placements::chains, from the top down
   std::size_t transform_count = 0;
-  Motion parent_motion;     ///< of the group above, in the world
-  Motion before;            ///< of all transforms of the chain but the last, together
-  Motion world;             ///< of all transforms down to here
+  Motion parent_motion;     ///< the parent group's motion in the world
+  Motion before;            ///< the combined motion of all transforms of the chain except the last
+  Motion world;             ///< the combined motion down to here
   bool hidden = false;      ///< by itself or its chain, regardless of the groups above
-  std::int32_t layer = -1;  ///< of the last transform
-  std::string_view name;    ///< of the last transform
+  std::int32_t layer = -1;  ///< the last transform's layer
+  std::string_view name;    ///< the last transform's name
 };
 
-/// A model as the scene graph shows it: the sum of all transforms on one way down to a shape. MagicaVoxel's axes.
+/// A model in the scene graph: the combined motion of all transforms on one path down to a shape. MagicaVoxel's axes.
 struct Placement : Hanging {
   std::uint32_t model = 0;
-  std::string_view shape_name;  ///< of the shape itself; Quoin's writer stores a grid's name there
+  std::string_view shape_name;  ///< the shape's own name; Quoin's writer stores a grid's name there
 };
 
 /// The placements at one frame, in the order of the graph, with warnings.
 struct Placements {
   std::vector<Placement> all;
-  /// Groups but the topmost, which is the scene itself unless it is hidden, on a layer or named; parents come first.
+  /// All groups except the topmost, which is the scene itself unless it is hidden, on a layer or named. Parents come
+  /// first.
   std::vector<Hanging> groups;
-  std::vector<std::size_t> chains;  ///< of transforms, in Document::nodes
-  std::size_t top_group = kNone;    ///< the topmost group's node; kNone where it is in `groups` or is not there
-  Motion top_motion;                ///< of it
+  std::vector<std::size_t> chains;  ///< transforms, as indices into Document::nodes
+  std::size_t top_group = kNone;    ///< the topmost group's node; kNone if it is in `groups` or does not exist
+  Motion top_motion;                ///< its motion
   bool is_tree = true;              ///< no node has two parents
-  std::size_t nodes_apart = 0;      ///< that no way from the root leads to
-  std::vector<bool> is_model_used;  ///< at any frame
+  std::size_t nodes_apart = 0;      ///< number of nodes that are not reachable from the root
+  std::vector<bool> is_model_used;  ///< true if a model is used at any frame
   std::vector<std::string> warnings;
 };
 
 /// Returns a transform's motion at a frame, as in `place_models`.
 [[nodiscard]] Motion motion_at(const Document& document, const Node& node, int frame);
-/// The place of the key, in the file's order sorted by frames, that a shape shows at a frame.
+/// Returns the index of the key that a shape shows at a frame, in the file's order sorted by frames.
 [[nodiscard]] std::size_t key_of_shape(const Document& document, const Node& shape, int frame);
-/// The frame as the keys of a node count it: folded into their range where it loops.
+/// Returns a frame as a node's keys count it: folded into their range if the node loops.
 [[nodiscard]] std::int64_t frame_of_transform(const Document& document, const Node& node, int frame);
 
 /// Walks the scene graph of the document.
@@ -78,7 +79,7 @@ class ModelBuilder {
   explicit ModelBuilder(const std::array<std::uint8_t, kColours>& type_of) : type_of_(type_of) {}
 
   /// Voxel (x, y, z) of the model becomes voxel (x, z, size.y - 1 - y) of the grid; canvas and pivot as in SceneGrid.
-  /// The last voxel of a position counts. Voxels outside the model or without a colour are dropped.
+  /// If a position occurs twice, the last voxel counts. Voxels outside the model or without a colour are dropped.
   ///
   /// Cost: O(voxels), independent of the model's size.
   [[nodiscard]] SceneGrid build(const Model& model);
@@ -97,7 +98,7 @@ class ModelBuilder {
   std::vector<VoxelType> dense_;       ///< chunks, one after the other
 };
 
-/// The box and pivot of a grid made from a model of that size.
+/// Returns the box and pivot of a grid made from a model of that size.
 [[nodiscard]] IBox canvas_of(IVec3 model_size);
 [[nodiscard]] DVec3 pivot_of(IVec3 model_size);
 

@@ -16,7 +16,7 @@ std::string kept_as(std::string_view id) {
   if (id == "rCAM") return "cameras";
   if (id == "rOBJ") return "render settings";
   if (id == "NOTE") return "notes";
-  // IMAP is the order of the types; META the range of the frames.
+  // IMAP is stored as the order of the types, META as the frame range.
   if (id == "IMAP" || id == "META" || id == "MATL" || id == "MATT") return {};
   return "chunks " + printable(id);
 }

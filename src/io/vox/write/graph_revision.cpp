@@ -17,7 +17,7 @@ namespace quoin::vox {
 
 namespace {
 
-// In RevisedGraph::added, of the nodes that begin_graph puts there.
+// Indices in RevisedGraph::added of the nodes from begin_graph.
 constexpr std::size_t kNewRoot = 0;
 constexpr std::size_t kNewTop = 1;
 constexpr std::int32_t kOnlyLayer = 0;
@@ -30,7 +30,7 @@ std::string instance_text(const Instance& instance) {
   return text;
 }
 
-/// A point of the world in MagicaVoxel's axes, between voxels moved to the nearest; nothing beyond 32 bits.
+/// Converts a world point to MagicaVoxel's axes, rounded to whole voxels; nullopt beyond 32 bits.
 std::optional<Offset> rounded(DVec3 point, bool& is_exact) {
   constexpr double kRounding = 1e-6;
   Offset offset{};
@@ -57,7 +57,7 @@ bool has_same_place(const Placed& a, const Placed& b) {
 
 bool has_32_bits(const Offset& offset) {
   return std::ranges::all_of(offset, [](std::int64_t value) {
-    // Less than the largest, so that it can be negated.
+    // Below the maximum, so that it can be negated.
     return value > -std::int64_t{std::numeric_limits<std::int32_t>::max()} &&
            value < std::numeric_limits<std::int32_t>::max();
   });
@@ -115,7 +115,7 @@ void GraphRevision::number_layers() {
   out_.adds_only_layer = layers.empty() && scene_.layers().empty() && !keeps_graph_;
 }
 
-/// A root and a group as the scene itself, with children of the source.
+/// Adds a root and a group that represents the scene itself, with children of the source.
 void GraphRevision::begin_graph(std::vector<std::int32_t> below) {
   NodeContent transform;
   transform.kind = NodeKind::Transform;
@@ -131,7 +131,7 @@ void GraphRevision::begin_graph(std::vector<std::int32_t> below) {
   top_ = {kNone, kNewTop, {}};
 }
 
-/// The source's root, where no group of it is the scene itself. Requires: the source has a graph.
+/// Returns the source's root if no group of it is the scene itself. Requires: the source has a graph.
 std::optional<std::int32_t> GraphRevision::root_below_no_group() const {
   const Placements& placements = source_.placements;
   const auto first_of = [&](const auto& all) -> std::optional<std::int32_t> {
@@ -159,7 +159,7 @@ void GraphRevision::find_top() {
   }
 }
 
-/// Removes it and the chain above it from the graph; nodes below stay, or are removed separately.
+/// Removes a node and its chain from the graph. Nodes below stay, or are removed separately.
 void GraphRevision::remove(const Hanging& hanging) {
   if (!source_.placements.is_tree) out_.must_be_new = true;
   const Document& document = source_.document;
@@ -208,8 +208,7 @@ Result<Motion> GraphRevision::place(const Instance& instance, const GridPlan& pl
   return Motion{*orientation, *translation};
 }
 
-/// A group's placement only serves its handling: the part that the file cannot store is dropped, and no other node
-/// moves.
+/// A group's placement only affects editing: the part that the file cannot store is dropped, and no other node moves.
 Motion GraphRevision::place(const SceneGroup& group, const Motion& parent) {
   bool is_exact = true;
   const auto translation = rounded(group.position, is_exact);
@@ -221,7 +220,7 @@ Motion GraphRevision::place(const SceneGroup& group, const Motion& parent) {
   return {*orientation, *translation};
 }
 
-/// The transform right above a node, put there where there is none.
+/// Returns the transform right above a node, inserting one if there is none.
 NodeContent& GraphRevision::transform_of(const Known& known) {
   const std::size_t last = last_transform(known.hanging);
   if (last != kNone) return change(last);
@@ -270,8 +269,8 @@ bool GraphRevision::is_hidden(std::int32_t layer) const {
   return false;
 }
 
-/// A chain's transforms above its last one may lie on layers that the scene does not track: when such a layer is shown
-/// or hidden, they leave it.
+/// Other transforms of a chain may be on layers that the scene does not track. If such a layer was shown or hidden,
+/// they are removed from it.
 void GraphRevision::keep_shown_by_chain(const Wanted& wanted, const Known& known) {
   const Hanging& hanging = known.hanging;
   for (std::size_t i = 0; i + 1 < hanging.transform_count; ++i) {
@@ -283,7 +282,7 @@ void GraphRevision::keep_shown_by_chain(const Wanted& wanted, const Known& known
   }
 }
 
-/// `transform`: null where there is none; then it is put in when it has to move.
+/// `transform`: null if there is none; one is inserted if the node has to move.
 Status GraphRevision::move(const Wanted& wanted, const Known& known, NodeContent* transform, const NodeContent& read) {
   const Hanging& hanging = known.hanging;
   const bool is_elsewhere = !wanted.parent.is_same(known.parent);
@@ -292,7 +291,7 @@ Status GraphRevision::move(const Wanted& wanted, const Known& known, NodeContent
   const Motion local = inverse(above_now) * wanted.world;
   Motion now = inverse(above_before) * hanging.world;
   if (is_elsewhere && read.frames.size() > 1) {
-    // All keys come along.
+    // Moves all keys.
     const Motion from_before = inverse(above_now) * above_before;
     if (transform == nullptr) transform = &transform_of(known);
     for (Entries& key : transform->frames) {
@@ -336,7 +335,7 @@ Status GraphRevision::revise_transform(const Wanted& wanted, const Known& known)
       source_.document.nodes[has_chain ? source_.placements.chains[hanging.first_transform] : hanging.node].id;
   ChildChanges& before = children_[known.parent];
   before.removed.insert(top);
-  // A transform that was put in goes along.
+  // An inserted transform moves with its node.
   if (const auto inserted = before.replaced.find(top); inserted != before.replaced.end()) top = inserted->second;
   children_[wanted.parent].added.push_back(top);
   return {};
@@ -430,7 +429,7 @@ Status GraphRevision::revise_instance(const Instance& instance, const Placement&
   return revise_transform(wanted, known);
 }
 
-/// Leaves out instances of grids that are not there.
+/// Removes instances without a grid.
 Status GraphRevision::revise_instances() {
   for (const InstanceHandle handle : scene_.instances().handles()) {
     const Instance& instance = scene_.instances()[handle];
@@ -473,7 +472,7 @@ bool GraphRevision::needs_new_top() const {
   return group != nullptr && would_be_the_scene(*group);
 }
 
-/// Gives the node that has the root's id another one.
+/// Gives the node with the root's id another id.
 void GraphRevision::free_root_id() {
   const std::vector<Node>& nodes = source_.document.nodes;
   const auto taken = std::ranges::find(nodes, kRootTransform, &Node::id);
@@ -489,7 +488,7 @@ void GraphRevision::free_root_id() {
   change(static_cast<std::size_t>(taken - nodes.begin())).id = id;
 }
 
-/// If the source had no group as the scene itself, the new root stays only if new nodes hang below it.
+/// If the source had no group for the scene itself, the new root is kept only if it gets new nodes.
 void GraphRevision::settle_root() {
   if (!keeps_graph_ || source_.placements.top_group != kNone) return;
   if (!needs_new_top()) {
@@ -527,7 +526,7 @@ Result<RevisedGraph> revise_graph(const Scene& scene, const VoxSource& source, c
 bool needs_graph(const Scene& scene, const VoxSource& source, const ModelPlan& models) {
   if (!source.document.nodes.empty()) return false;
   if (!scene.groups().empty()) return true;
-  // Of models without a graph the reader shows one.
+  // The reader shows one of several models without a graph.
   if (scene.instances().empty()) return models.count > 0;
   if (source.placements.all.empty() || scene.instances().size() != 1) return true;
   const auto handle = scene.instances().handle_at(0);

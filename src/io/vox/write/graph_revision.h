@@ -17,16 +17,16 @@ namespace quoin::vox {
 
 /// The revised scene graph and layers of a file.
 struct RevisedGraph {
-  std::map<std::size_t, NodeContent> changed;  ///< by their places in the source's nodes
-  std::vector<bool> is_removed;                ///< by their positions in the source's nodes
+  std::map<std::size_t, NodeContent> changed;  ///< by index in the source's nodes
+  std::vector<bool> is_removed;                ///< by index in the source's nodes
   std::vector<NodeContent> added;
-  std::vector<std::int32_t> layer_ids;  ///< by slots of the scene's layers
-  bool adds_only_layer = false;         ///< the file has none, and its shapes lie on layer 0
-  std::int64_t rounded = 0;             ///< instances between voxels, which were moved
+  std::vector<std::int32_t> layer_ids;  ///< by slot of the scene's layers
+  bool adds_only_layer = false;         ///< the file has no layers, and its shapes are on layer 0
+  std::int64_t rounded = 0;             ///< instances that were rounded to whole voxels
   std::int64_t beyond_limit = 0;        ///< instances farther out than MagicaVoxel shows
   std::int64_t turns_left_out = 0;      ///< groups whose rotation or reflection the file cannot store
-  std::int64_t frames_left_out = 0;     ///< frames of a file without a graph that are no longer kept
-  bool has_empty_model = false;         ///< shapes show a model without voxels, whose number is the plan's count
+  std::int64_t frames_left_out = 0;     ///< dropped frames of a file without a graph
+  bool has_empty_model = false;         ///< shapes show an empty model, whose number is the plan's count
   /// A node with several parents has to change, so the whole graph must be rewritten.
   bool must_be_new = false;
 };
@@ -38,7 +38,7 @@ struct RevisedGraph {
 [[nodiscard]] Result<RevisedGraph> revise_graph(const Scene& scene, const VoxSource& source, const ModelPlan& models,
                                                 bool keeps_graph);
 
-/// The same of a file without a scene graph that needs none: its layers.
+/// As above, for a file without a scene graph that needs none: only its layers.
 [[nodiscard]] RevisedGraph revise_layers(const Scene& scene, const VoxSource& source);
 
 /// Returns true if a file without a scene graph needs one to show the scene: without a graph, its reader shows one

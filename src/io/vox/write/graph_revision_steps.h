@@ -1,6 +1,6 @@
 #pragma once
 
-// The scene graph to be written. A single class, since each step continues on the members left by the last:
+// Builds the scene graph to write. A single class, since each step uses the members that the previous one set:
 //
 //  number_layers, find_top    ids of layers; the group that is the scene itself, perhaps a new one
 //  remove_what_is_gone        removed nodes of the source
@@ -39,7 +39,7 @@ inline constexpr std::int32_t kNoLayer = -1;
 /// Returns the motion of a grid's piece relative to the first piece.
 [[nodiscard]] Motion from_first_piece(const GridPlan& plan, std::size_t piece);
 
-/// Looks for ids that no node has.
+/// Finds ids that no node uses.
 class FreshIds {
  public:
   explicit FreshIds(const Document* document) {
@@ -62,7 +62,7 @@ class FreshIds {
 
 /// The parent of new children: a group of the source or a new one.
 struct Parent {
-  std::size_t source_node = kNone;  ///< else it is new
+  std::size_t source_node = kNone;  ///< kNone: it is new
   std::size_t added = kNone;        ///< in RevisedGraph::added
   Motion world;
 
@@ -179,11 +179,12 @@ class GraphRevision {
   FreshIds ids_;
   RevisedGraph out_;
   Parent top_;
-  std::map<GroupHandle, Parent> groups_;  // of the scene
+  std::map<GroupHandle, Parent> groups_;  // groups of the scene
   std::map<Parent, ChildChanges> children_;
-  std::map<std::size_t, std::size_t> inserted_;  // transforms that were put above nodes, in RevisedGraph::added
-  std::map<GridHandle, std::vector<std::size_t>> added_shapes_;   // of grids, in RevisedGraph::added
-  std::map<GridHandle, std::vector<std::size_t>> source_shapes_;  // by grid: its shapes among the source's nodes
+  std::map<std::size_t, std::size_t> inserted_;  // inserted transforms by node, as indices into RevisedGraph::added
+  std::map<GridHandle, std::vector<std::size_t>>
+      added_shapes_;  // new shapes by grid, as indices into RevisedGraph::added
+  std::map<GridHandle, std::vector<std::size_t>> source_shapes_;  // shapes in the source's nodes, by grid
 };
 
 }  // namespace quoin::vox

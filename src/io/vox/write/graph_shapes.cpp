@@ -37,7 +37,8 @@ NodeContent GraphRevision::shape_of(std::int32_t id, std::uint32_t model) const 
   return shape;
 }
 
-/// Without a scene graph each model was a frame. `box`: where the pivot of the shown one's box in the source goes.
+/// Returns the frames of a file without a scene graph, where each model was a frame. `box`: the new motion of the
+/// source box's pivot for the current frame.
 std::vector<GraphRevision::Frame> GraphRevision::frames_about(const Motion& box) const {
   const auto lone = [&](std::size_t model) {
     Motion motion;
@@ -49,7 +50,7 @@ std::vector<GraphRevision::Frame> GraphRevision::frames_about(const Motion& box)
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const GridPlan* plan = models_.find(handle_read(source_.scene.grids(), i));
     if (plan == nullptr || source_.scene.grids().find(plan->grid) == nullptr) continue;
-    // What outgrew its box has another pivot.
+    // A model that outgrew its box has another pivot.
     frames[i] = {plan, ground * lone(i) * inverse(from_source_box(*plan, i))};
   }
   return frames;
@@ -63,7 +64,7 @@ Motion GraphRevision::from_source_box(const GridPlan& plan, std::size_t model) c
   return from_first_piece(boxes, plan.pieces.size());
 }
 
-/// A shape that shows, at each frame, the model that is one piece, and nothing where there are several.
+/// Makes a shape that shows at each frame the model of a single piece, and nothing for several pieces.
 void GraphRevision::show_frames(const std::vector<Frame>& frames, NodeContent& transform, NodeContent& shape) {
   transform.frames.clear();
   shape.models.clear();
@@ -115,7 +116,8 @@ void GraphRevision::add_model(NodeContent transform, NodeContent shape, const Gr
   }
 }
 
-/// All models that were frames: keys of one shape; those of several pieces are a group, with a shape for each.
+/// Adds all models that were frames as keys of one shape. Models of several pieces become a group with a shape for
+/// each.
 Status GraphRevision::add_frames(NodeContent transform, NodeContent shape, const GridPlan& plan,
                                  const std::string& name) {
   const Motion box = from_source_box(plan, static_cast<std::size_t>(source_.frame));
@@ -158,7 +160,7 @@ Status GraphRevision::add_frames(NodeContent transform, NodeContent shape, const
   return {};
 }
 
-/// Adds a shape, like one of the source but that it shows other models, below a transform. Returns the transform's id.
+/// Adds a shape below a transform: a copy of a source shape that shows other models. Returns the transform's id.
 std::int32_t GraphRevision::add_shape(const NodeContent& before, const std::vector<std::uint32_t>& shown,
                                       const Motion& motion) {
   const std::int32_t id = ids_.take();
@@ -216,7 +218,7 @@ void GraphRevision::show_model(const Placement& placement, const GridPlan& plan)
   shape.models[model_in_force(shape, source_.frame).place].first = plan.first_model;
 }
 
-/// Shapes name their grids where the names of instances do not.
+/// Names shapes after their grids where the instances' names differ.
 void GraphRevision::name_shapes() {
   std::map<GridHandle, std::string> of_instances;
   for (const InstanceHandle handle : scene_.instances().handles()) {

@@ -51,13 +51,13 @@ bool fits_a_model(const IBox& box) {
   return true;
 }
 
-/// The least box around another whose pivot, as MagicaVoxel rounds it, lies at a point of the grid.
+/// Returns the smallest box around another whose pivot, with MagicaVoxel's rounding, is at a point of the grid.
 IBox grown_about(const IBox& box, IVec3 pivot) {
   IBox grown = box;
   for (int axis = 0; axis < 3; ++axis) {
     const int below = pivot[axis] - box.min[axis];
     const int above = box.max[axis] - pivot[axis];
-    // Of an odd length the longer half lies above the pivot; along the axis that is turned round, below.
+    // For odd lengths the longer half is above the pivot, or below it along the reversed axis.
     const bool turned = axis == 2;
     const int shorter = std::max({turned ? above : below, (turned ? below : above) - 1, 0});
     const int longer = std::max(shorter, turned ? below : above);
@@ -71,7 +71,7 @@ Piece piece_of(const IBox& box) {
   return {box.min, box.max - box.min, 0};
 }
 
-/// Plans a grid that was a model of the source; false when it becomes new models.
+/// Plans a grid that was a model of the source. Returns false if it becomes new models.
 bool plan_in_place(const SceneGrid& now, const VoxSource& source, std::size_t model, bool may_move, GridPlan& plan) {
   const SceneGrid& before = source.scene.grids()[plan.grid];
   const IBox box = canvas_of(source.document.models[model].size);
@@ -79,7 +79,7 @@ bool plan_in_place(const SceneGrid& now, const VoxSource& source, std::size_t mo
   if (wanted.empty()) wanted = {wanted.min, wanted.min + 1};
   if (!fits_a_model(wanted)) return false;
   if (!(wanted == box) && !may_move) {
-    // Far from the pivot no model reaches it.
+    // Too far from the pivot for one model.
     if (!fits_a_model(unite(wanted, box))) return false;
     wanted = grown_about(wanted, IVec3(pivot_of(source.document.models[model].size)));
     if (!fits_a_model(wanted)) return false;
@@ -92,7 +92,7 @@ bool plan_in_place(const SceneGrid& now, const VoxSource& source, std::size_t mo
   return true;
 }
 
-/// The content of a TDCZ: its size, then colour indices of the whole box, compressed.
+/// Returns the content of a TDCZ: its size, then the compressed colour indices of the whole box.
 Result<std::vector<std::byte>> packed(IVec3 model_size, std::span<const std::byte> colours) {
   ChunkWriter out;
   for (int axis = 0; axis < 3; ++axis) out.i32(model_size[axis]);
@@ -135,7 +135,7 @@ ModelPlan plan_models(const Scene& scene, const VoxSource& source, bool keeps_gr
 
 namespace {
 
-/// Colour indices of a box, in the order of TDCZ: x fastest, then y, then z, along the file's axes. 0 is air.
+/// The colour indices of a box in TDCZ order: x fastest, then y, then z, along the file's axes. 0 is air.
 class ColourBox {
  public:
   ColourBox(const Grid& grid, const Piece& piece, const std::vector<std::uint8_t>& index_of_type)
@@ -171,7 +171,7 @@ class ColourBox {
 
 using FileVoxel = std::array<std::byte, 4>;
 
-/// The voxels of the file that stay, from the last to the first: where a position is named twice the last one counts.
+/// Returns the remaining voxels of the file, from last to first: if a position occurs twice, the last one counts.
 std::vector<FileVoxel> kept_backwards(std::span<const std::byte> voxels, bool keeps_unseen, ColourBox& box) {
   std::vector<FileVoxel> kept;
   for (std::size_t i = voxels.size() / 4; i-- > 0;) {
@@ -194,7 +194,7 @@ Result<std::vector<std::byte>> revised_voxels(const Grid& grid, const GridPlan& 
   const Model& model = source.document.models[plan.source_model];
   ColourBox box(grid, plan.pieces.front(), index_of_type);
   if (model.packed_end > 0) return packed(box.size(), box.colours());
-  // In another box they lie elsewhere: their order means nothing there.
+  // A resized box gets new positions, so the old order is meaningless.
   const std::span<const std::byte> before = plan.is_resized ? std::span<const std::byte>{} : model.voxels;
   std::vector<FileVoxel> voxels = kept_backwards(before, !plan.is_resized, box);
   std::ranges::reverse(voxels);

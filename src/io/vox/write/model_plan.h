@@ -15,19 +15,19 @@ namespace quoin::vox {
 /// The models of a grid in the file.
 struct GridPlan {
   GridHandle grid;
-  std::vector<Piece> pieces;         ///< never empty; of a model of the source one
-  std::size_t source_model = kNone;  ///< the source's model that it stays; kNone for new models
-  bool is_resized = false;           ///< of a model of the source: its box changed
-  bool is_changed = false;           ///< of a model of the source: its voxels changed, or their positions in the box
-  std::uint32_t first_model = 0;     ///< number of its first piece's model: the source's come first, then new ones
+  std::vector<Piece> pieces;         ///< never empty; a single piece for a model of the source
+  std::size_t source_model = kNone;  ///< the source's model that it replaces; kNone for new models
+  bool is_resized = false;           ///< for a model of the source: its box changed
+  bool is_changed = false;           ///< for a model of the source: its voxels changed, or their positions in the box
+  std::uint32_t first_model = 0;     ///< model number of its first piece: the source's models come first, then new ones
 };
 
 /// All grids, in the order of their handles.
 struct ModelPlan {
   std::vector<GridPlan> grids;
-  std::uint32_t count = 0;  ///< of models, the source's and new ones
+  std::uint32_t count = 0;  ///< number of models, including the source's
 
-  /// Null for a grid that is not in the scene.
+  /// Returns null for a grid that is not in the scene.
   [[nodiscard]] const GridPlan* find(GridHandle grid) const;
 };
 

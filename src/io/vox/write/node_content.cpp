@@ -180,7 +180,7 @@ void set_motion_at(NodeContent& transform, int frame, const Motion& motion) {
     set_motion(transform.frames[key.place], motion);
     return;
   }
-  // At the end: keys that do not say their frame count by their place.
+  // Added at the end: keys without `_f` have their index as their frame.
   Entries& added = transform.frames.emplace_back();
   set_motion(added, motion);
   added.set("_f", std::to_string(key.frame));

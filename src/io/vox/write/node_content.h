@@ -15,7 +15,7 @@
 
 namespace quoin::vox {
 
-/// Keys and values of a DICT, to be changed and written again: every entry stays where it is, bytes as they are.
+/// Keys and values of a DICT for editing: unchanged entries keep their positions and bytes.
 class Entries {
  public:
   Entries() = default;
@@ -23,9 +23,9 @@ class Entries {
     for (const auto& [key, value] : dict.entries) all_.emplace_back(key, value);
   }
 
-  /// The last value of that key; empty when there is none.
+  /// Returns the last value of that key; empty if there is none.
   [[nodiscard]] std::string_view get(std::string_view key) const;
-  /// The last value of that key, or a new one after all others.
+  /// Sets the last value of that key, or appends a new entry.
   void set(std::string_view key, std::string value);
   void erase(std::string_view key);
   /// Sets the key, or erases it if the value is empty.
@@ -37,16 +37,16 @@ class Entries {
   ChunkWriter::Entries all_;
 };
 
-/// The complete content of a scene graph chunk, to be changed and written again.
+/// The complete content of a scene graph chunk for editing.
 struct NodeContent {
   NodeKind kind = NodeKind::Group;
   std::int32_t id = 0;
   Entries attributes;
-  std::int32_t reserved = -1;                             ///< of a transform
-  std::int32_t layer = -1;                                ///< of a transform
-  std::vector<std::int32_t> children;                     ///< of a transform one; of a group
-  std::vector<Entries> frames;                            ///< of a transform, in the file's order
-  std::vector<std::pair<std::uint32_t, Entries>> models;  ///< of a shape, in the file's order
+  std::int32_t reserved = -1;                             ///< transforms only
+  std::int32_t layer = -1;                                ///< transforms only
+  std::vector<std::int32_t> children;                     ///< one for a transform; any number for a group
+  std::vector<Entries> frames;                            ///< transforms only, in the file's order
+  std::vector<std::pair<std::uint32_t, Entries>> models;  ///< shapes only, in the file's order
   std::vector<std::byte> tail;                            ///< trailing bytes of the chunk
 };
 
@@ -72,7 +72,7 @@ void set_motion(Entries& key, const Motion& motion);
 /// The key of a node that applies at a frame, by its index in the file's order; `is_exact` if the key is at that frame.
 struct KeyInForce {
   std::size_t place = 0;
-  std::int64_t frame = 0;  ///< as the keys count: folded where the node loops
+  std::int64_t frame = 0;  ///< folded frame if the node loops
   bool is_exact = false;
 };
 

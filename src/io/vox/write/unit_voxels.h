@@ -6,7 +6,7 @@
 #include <quoin/io/loaded_scene.h>
 #include <quoin/scene/scene.h>
 
-/// Scenes with voxels of another size than 1, the only size in .vox.
+/// Converts scenes with a voxel size other than 1, the only size in .vox.
 namespace quoin::vox {
 
 /// Returns the common voxel size of all instances; nullopt if it is 1 or they differ.
@@ -16,7 +16,7 @@ namespace quoin::vox {
 [[nodiscard]] Scene divided(const Scene& given, double voxel_size);
 [[nodiscard]] LoadedScene divided(const LoadedScene& given, double voxel_size);
 
-/// Returns the warning that the file does not hold the size.
+/// Returns the warning that the file does not store the voxel size.
 [[nodiscard]] std::string size_warning(double voxel_size);
 
 }  // namespace quoin::vox

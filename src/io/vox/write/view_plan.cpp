@@ -57,7 +57,7 @@ void plan_cameras(const LoadedScene& loaded, const VoxSource& source, ViewPlan& 
   }
 }
 
-// How a file without other settings than the sun's is drawn.
+// Returns true if a look has settings other than the sun's.
 bool says_more(const FileLook& all) {
   FileLook only_sun;
   only_sun.look.sky = SkyModel::Uniform;
@@ -97,7 +97,7 @@ void set_camera_keys(const FileCamera& file_camera, Entries& keys) {
   const double radius = is_flat ? camera.view_height / (2.0 * half) : file_camera.focus_distance;
   const DVec3 focus = camera.position + camera.forward * radius;
   const double pitch = std::asin(std::clamp(camera.forward.y, -1.0, 1.0));
-  // Straight up or down the yaw is the picture's: all of its turn.
+  // If the camera looks straight up or down, the yaw is the whole rotation of the image.
   constexpr double kLeast = 1e-6;
   const bool is_upright = std::hypot(camera.forward.x, camera.forward.z) < kLeast;
   const double yaw =
@@ -106,7 +106,7 @@ void set_camera_keys(const FileCamera& file_camera, Entries& keys) {
   const double roll =
       std::atan2(glm::dot(camera.right, glm::cross(level, camera.forward)), glm::dot(camera.right, level));
   DVec3 angle = DVec3(pitch, yaw, roll) * kDegrees;
-  // An unused camera looks like this.
+  // Unused cameras have these values.
   const bool looks_unset = focus == DVec3(0.0) && angle == DVec3(0.0) && (radius == 0.0 || radius == 1.0);
   if (looks_unset) angle.z = 360.0;
   keys.set("_mode", is_flat ? "orth" : "pers");

@@ -18,9 +18,9 @@ namespace quoin::vox {
 
 /// The changes to cameras and sun relative to the source.
 struct ViewPlan {
-  std::map<std::int32_t, FileCamera> cameras;  ///< by number: new and changed ones
-  std::vector<std::int32_t> order;             ///< their numbers, as the scene has them
-  std::vector<std::int32_t> removed;           ///< numbers that the source has
+  std::map<std::int32_t, FileCamera> cameras;  ///< new and changed cameras, by number
+  std::vector<std::int32_t> order;             ///< their numbers, in the scene's order
+  std::vector<std::int32_t> removed;           ///< numbers of removed source cameras
   std::optional<Look> sun;
   bool has_more_settings = false;  ///< the look has settings other than the sun, which are not written
 };

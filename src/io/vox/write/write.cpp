@@ -27,7 +27,7 @@ namespace quoin {
 
 namespace {
 
-// Rejects fields, so that they are not lost silently.
+// Rejects density fields, so that they are not lost silently.
 Status check_has_no_field(const SceneGrid& grid) {
   if (grid.field.chunk_count() == 0) return {};
   return make_error(ErrorCode::Unsupported, "grid \"" + grid.name + "\" is a density field, which .vox cannot store");
@@ -35,7 +35,7 @@ Status check_has_no_field(const SceneGrid& grid) {
 
 constexpr std::uint32_t kVersion = 150;
 constexpr std::uint32_t kGone = std::numeric_limits<std::uint32_t>::max();
-// Of a file: its name, its version, and what MAIN's header says.
+// The offsets of MAIN's two sizes in a file, after its name, its version and MAIN's id.
 constexpr std::size_t kContentOfMain = 12;
 constexpr std::size_t kChildrenOfMain = 16;
 
@@ -156,19 +156,19 @@ class Writer {
   const Scene& scene_;
   const VoxSource& source_;
   const Progress progress_;
-  std::size_t done_ = 0;  // of the grids
+  std::size_t done_ = 0;  // grids done
   vox::RevisedTypes types_;
   vox::ModelPlan models_;
   vox::RevisedGraph graph_;
   vox::ViewPlan view_;
-  std::vector<std::int32_t> written_cameras_;  // numbers of `view_` that chunks of the source had
-  bool has_written_sun_ = false;               // a chunk of the source had the sun
+  std::vector<std::int32_t> written_cameras_;  // numbers in `view_` of cameras that replaced source chunks
+  bool has_written_sun_ = false;               // true if a source chunk had the sun
   std::vector<std::string> lost_;              ///< data lost with the file's scene graph if it is rewritten
   std::vector<const vox::GridPlan*> plan_of_;  // by the source's models; null for removed models
-  std::vector<std::uint32_t> number_of_;       // of models, by their numbers in the plan; kGone for omitted models
-  std::vector<bool> shown_;                    // by the same numbers: true if a shape shows the model at any frame
+  std::vector<std::uint32_t> number_of_;       // number of each model of the plan in the file; kGone for omitted models
+  std::vector<bool> shown_;                    // by the plan's numbers: true if a shape shows the model at any frame
   std::uint32_t model_count_ = 0;
-  std::array<std::size_t, vox::kColours> material_chunk_{};  // by colour index, the last one; kNone without
+  std::array<std::size_t, vox::kColours> material_chunk_{};  // by colour index, the last chunk; kNone if there is none
   std::size_t palette_chunk_ = vox::kNone;
   Anchors anchors_;
   Status failure_;
@@ -207,7 +207,7 @@ Status Writer::plan_graph() {
   return {};
 }
 
-/// By the plan's numbers, whether a shape of the file to be shows them at any frame.
+/// Returns, by the plan's numbers, which models a shape of the new file shows at any frame.
 std::vector<bool> Writer::shown_models() const {
   const vox::Document& document = source_.document;
   std::vector<bool> shown(std::size_t{models_.count} + 1);
@@ -227,7 +227,7 @@ std::vector<bool> Writer::shown_models() const {
   return shown;
 }
 
-/// Models whose grid was removed, or became others, and that nothing shows any more, are left out.
+/// Numbers the models. Omits models whose grid was removed or split, and that no shape shows any more.
 void Writer::number_models() {
   shown_ = shown_models();
   const std::size_t known = source_.document.models.size();
@@ -302,7 +302,7 @@ void Writer::warn(std::vector<std::string>& warnings) const {
   warnings.insert(warnings.end(), lost_.begin(), lost_.end());
 }
 
-/// Models of the file that shapes show at frames that are not in the scene, and whose grids became pieces.
+/// Counts models of the file that shapes show only at frames outside the scene, and whose grids were split into pieces.
 std::int64_t Writer::models_left_as_they_were() const {
   return std::ranges::count_if(models_.grids, [&](const vox::GridPlan& plan) {
     const bool was_model = plan.source_model == vox::kNone && source_.scene.grids().find(plan.grid) != nullptr;
@@ -335,7 +335,7 @@ std::span<const std::byte> Writer::content_of(const vox::ChunkPlace& place) cons
   return std::span(source_.bytes).subspan(place.begin + vox::kChunkHeaderBytes, place.content_bytes);
 }
 
-/// Null when the scene has it no more.
+/// Returns null if the scene no longer has the layer.
 const SceneLayer* Writer::layer_of(std::size_t number) const {
   const std::size_t slot = source_.layer_of[number];
   return slot == vox::kNone ? nullptr : scene_.layers().find(handle_read(source_.scene.layers(), slot));
@@ -387,7 +387,7 @@ std::optional<Chunk> Writer::revised_model(const vox::ChunkPlace& place) {
     return std::nullopt;
   }
   if (place.kind == vox::ChunkKind::Voxels) {
-    // What follows the voxels in their chunk stays.
+    // Bytes after the voxels in their chunk are kept.
     const std::size_t voxel_bytes = source_.document.models[place.number].voxels.size();
     const std::span<const std::byte> tail = content_of(place).subspan(4 + voxel_bytes);
     content->insert(content->end(), tail.begin(), tail.end());
@@ -439,7 +439,7 @@ std::optional<Chunk> Writer::revised_material(const vox::ChunkPlace& place) cons
   vox::ChunkReader reader(bytes, "MATL", 0, 0, bytes.size());
   vox::ChunkWriter content;
   content.i32(reader.i32());
-  // MATT has no keys: a MATL takes its place.
+  // MATT has no keys, so a MATL replaces it.
   vox::Attributes wanted = material(index);
   vox::ChunkWriter::Entries entries;
   const std::string_view id = id_of(place);
@@ -505,7 +505,7 @@ std::optional<Chunk> Writer::revised_view(const vox::ChunkPlace& place) {
   return Chunk{is_sun ? "rOBJ" : "rCAM", content.take()};
 }
 
-/// The chunk as it is now; nothing when it is as it was.
+/// Returns the revised chunk; nullopt if it is unchanged.
 std::optional<Chunk> Writer::revised(const vox::ChunkPlace& place) {
   switch (place.kind) {
     case vox::ChunkKind::ModelCount:
@@ -546,12 +546,11 @@ void Writer::write_chunk(const vox::ChunkPlace& place) {
   out_.raw(file.subspan(place.begin + header_and_content, place.children_bytes));
 }
 
-/// The voxels are what takes memory: they go where they belong in the file at once, and the file has room for all that
-/// follows, so that it is not moved.
+/// Reserves the memory of new models. Voxels dominate the file's size, so the output does not move as it grows.
 std::size_t Writer::bytes_of_new_models() const {
-  constexpr std::size_t kHeadBytes = 64;          // of a model, and more
-  constexpr std::size_t kNodeBytes = 128;         // of a node, with a name that is not long
-  constexpr std::size_t kPaletteBytes = 262'144;  // with materials, and more
+  constexpr std::size_t kHeadBytes = 64;          // of a model's headers
+  constexpr std::size_t kNodeBytes = 128;         // of a node with a short name
+  constexpr std::size_t kPaletteBytes = 262'144;  // with materials
   std::size_t bytes = kPaletteBytes + kNodeBytes * graph_.added.size();
   for (const vox::GridPlan& plan : models_.grids) {
     if (plan.source_model != vox::kNone) continue;
@@ -629,7 +628,7 @@ void Writer::write_new_palette() {
     const Rgba8& colour = types_.table.by_index[index].colour;
     out_.raw(std::array{std::byte{colour.r}, std::byte{colour.g}, std::byte{colour.b}, std::byte{255}});
   }
-  out_.u32(0);  // air's entry stands last
+  out_.u32(0);  // air's entry is last
   out_.end_chunk(chunk);
 }
 

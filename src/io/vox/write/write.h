@@ -33,7 +33,7 @@ struct TypeTable {
 
 struct RevisedTypes {
   TypeTable table;
-  std::int64_t replaced = 0;  ///< colours of the palette that no voxel had, and that new ones took the place of
+  std::int64_t replaced = 0;  ///< replaced palette colours that no voxel used
 };
 
 /// Makes the table for a scene that was read from a file: the types of its palette keep their indices. Other used types
@@ -45,13 +45,13 @@ struct RevisedTypes {
 
 /// A model to write, cut from a grid.
 struct Piece {
-  IVec3 min{0};            ///< the grid's voxel that is lowest on each axis
+  IVec3 min{0};            ///< the minimum corner in the grid
   IVec3 size{1};           ///< along Quoin's axes, at most 256 each
-  std::size_t voxels = 0;  ///< how many
+  std::size_t voxels = 0;  ///< number of voxels
 };
 
-/// Cuts a grid's declared box into pieces of at most 256 voxels a side, sorted by z, then y, then x; pieces without
-/// voxels are left out unless they are all there is.
+/// Cuts a grid's declared box into pieces of at most 256 voxels per side, sorted by z, then y, then x. Pieces without
+/// voxels are omitted unless all are empty.
 [[nodiscard]] std::vector<Piece> cut_into_pieces(const SceneGrid& grid);
 
 /// Writes the voxels of all pieces of a grid in XYZI form, each piece from its offset in `starts` on.
@@ -60,7 +60,7 @@ struct Piece {
 void write_voxels(const Grid& grid, const std::vector<std::uint8_t>& index_of_type, std::span<const Piece> pieces,
                   std::span<const std::size_t> starts, std::span<std::byte> out);
 
-/// The point of the grid that MagicaVoxel's pivot of that piece's model is.
+/// Returns the point of the grid at MagicaVoxel's pivot of that piece's model.
 [[nodiscard]] DVec3 pivot_of(const Piece& piece);
 
 }  // namespace quoin::vox

@@ -79,7 +79,7 @@ Result<TypeTable> make_type_table(const Scene& scene) {
 
 namespace {
 
-/// A name is kept where it says something: the default one of another type does not.
+/// Returns true if two types differ at most in name and attributes.
 bool looks_the_same(VoxelProperties a, VoxelProperties b) {
   a.name.clear();
   b.name.clear();
@@ -88,7 +88,7 @@ bool looks_the_same(VoxelProperties a, VoxelProperties b) {
   return a == b;
 }
 
-/// Gives types that are no entries of the palette some of its places.
+/// Assigns palette entries to types outside the palette.
 class PaletteRoom {
  public:
   PaletteRoom(const Scene& scene, const VoxSource& source, TypeTable& table) : source_(source), table_(table) {
@@ -124,7 +124,7 @@ class PaletteRoom {
   [[nodiscard]] std::int64_t replaced() const { return replaced_; }
 
  private:
-  /// A plain colour that MagicaVoxel's own palette has, or that is there twice.
+  /// Returns true for a plain colour that is a duplicate or in MagicaVoxel's own palette.
   [[nodiscard]] bool says_little(std::size_t index) const {
     const VoxelProperties& entry = table_.by_index[index];
     if (entry.visibility != Visibility::Opaque || entry.emission > 0.0F || entry.metalness > 0.0F) return false;
@@ -134,7 +134,7 @@ class PaletteRoom {
     }
     return false;
   }
-  /// From the end of the palette as the artist sees it.
+  /// Returns a free entry, from the end of the displayed palette.
   [[nodiscard]] std::optional<std::size_t> best_free() const {
     std::array<std::size_t, kColours> index_of{};
     for (std::size_t i = 0; i < kColours; ++i) index_of[source_.type_of[i]] = i;
@@ -223,7 +223,7 @@ class PieceMap {
   Piece* last_ = nullptr;
 };
 
-/// The write positions of each piece's next voxel.
+/// The write position of each piece's next voxel.
 class Cursors {
  public:
   Cursors(std::span<const Piece> pieces, std::span<const std::size_t> starts)
@@ -231,7 +231,7 @@ class Cursors {
     for (std::size_t i = 0; i < pieces_.size(); ++i) number_of_.emplace(cell(pieces_[i].min), i);
   }
 
-  /// The piece of a voxel, which is among them.
+  /// Returns the piece that contains a voxel. Requires: there is one.
   std::size_t piece_of(IVec3 voxel) {
     if (!is_inside(voxel, pieces_[last_])) last_ = number_of_.find(cell(voxel))->second;
     return last_;
@@ -239,7 +239,7 @@ class Cursors {
   std::size_t advance(std::size_t piece) { return std::exchange(next_[piece], next_[piece] + 4); }
 
  private:
-  /// Counted from the first piece, whose place in the box does not matter.
+  /// Relative to the first piece.
   [[nodiscard]] Cell cell(IVec3 voxel) const {
     Cell found{};
     for (int axis = 0; axis < 3; ++axis) {
