@@ -121,7 +121,7 @@ class ArrayPlan {
     add(GltfArrayKind::Position, mesh_.stored.component, 3, vertices);
     add(GltfArrayKind::Normal, normal_component(), 3, vertices);
     const bool is_short = options_.quantize;
-    // 1/65,535 of an atlas may be a noticeable part of a texel.
+    // A step of 1/65,535 may be a noticeable part of an atlas texel.
     if (!view_.atlas.empty()) add(GltfArrayKind::AtlasCoordinate, GltfComponent::Float, 2, vertices);
     if (!is_smooth)
       add(GltfArrayKind::PaletteCoordinate, is_short ? GltfComponent::UnsignedShort : GltfComponent::Float, 2,

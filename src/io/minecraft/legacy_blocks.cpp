@@ -11,14 +11,14 @@ namespace {
 /// The meaning of a block's four data bits (https://minecraft.wiki/w/Java_Edition_data_values/Pre-flattening).
 enum class How : std::uint8_t {
   Plain,        // nothing
-  Kinds,        // which of a list of blocks
-  Woods8,       // bits 0 to 2: which wood
-  Woods4,       // bits 0 and 1: which of a list of woods; the others when leaves decay
-  Logs,         // as Woods4, bits 2 and 3: how the log lies
-  Pillar,       // bits 2 and 3: how it lies
-  Dyed,         // which dye
-  Slab,         // bits 0 to 2: which of a list, bit 3: the upper half
-  DoubleSlab,   // bits 0 to 2: which of a list
+  Kinds,        // one of a list of blocks
+  Woods8,       // bits 0 to 2: the wood
+  Woods4,       // bits 0 and 1: one of a list of woods; other bits: decay of leaves
+  Logs,         // as Woods4, bits 2 and 3: the axis of the log
+  Pillar,       // bits 2 and 3: its axis
+  Dyed,         // a dye
+  Slab,         // bits 0 to 2: one of a list, bit 3: the upper half
+  DoubleSlab,   // bits 0 to 2: one of a list
   Stairs,       // bits 0 and 1: east, west, south, north; bit 2: upside down
   Facing4,      // 2 to 5: north, south, west, east
   LitFacing4,   // the same, burning
@@ -33,7 +33,7 @@ enum class How : std::uint8_t {
   Rail,         // shapes
   Door,         // bit 3: the upper half; of the lower one bits 0 and 1: east, south, west, north, bit 2: open
   Trapdoor,     // bits 0 and 1: north, south, west, east; bit 2: open, bit 3: top
-  DoublePlant,  // bits 0 to 2: which of a list, bit 3: the upper half
+  DoublePlant,  // bits 0 to 2: one of a list, bit 3: the upper half
   Portal,       // 1: along x, 2: along z
   Layers,       // bits 0 to 2: layers of snow, less 1
   Level,        // a number: of water and lava

@@ -13,8 +13,8 @@
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
 
-// OpenVDB trees of the usual shape: a root of 32^3 nodes, of 16^3 nodes, of leaves with 8^3 voxels. z is the fastest
-// axis in all of them.
+// OpenVDB trees of the usual shape: below the root, nodes of 32^3 entries, nodes of 16^3 entries, and leaves of 8^3
+// voxels. z is the fastest axis in all of them.
 
 namespace quoin::vdb {
 

@@ -28,7 +28,7 @@ struct VolumeHeader {
   double intercept = 0.0;
 
   std::uint64_t data_at = 0;                       ///< offset of the values, or of their encoded form
-  DataEncoding data_encoding = DataEncoding::Raw;  ///< compression of the values only
+  DataEncoding data_encoding = DataEncoding::Raw;  ///< encoding of the values
   std::size_t components = 1;                      ///< values per voxel; the first is read
   std::uint64_t lines_to_skip = 0;                 ///< lines to skip in `data_file`, before `skip`
   std::uint64_t skip = 0;                          ///< bytes to skip before the values, after decompression

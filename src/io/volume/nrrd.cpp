@@ -195,7 +195,7 @@ Result<VolumeSpace> space_of(const Fields& fields) {
                      *field);
 }
 
-/// Returns true for kinds of axes that are not spatial.
+/// Returns true for kinds of spatial axes.
 bool is_spatial(std::string_view kind) {
   const std::string name = normalised(kind);
   return name == "domain" || name == "space" || name == "???" || name == "none";

@@ -277,7 +277,7 @@ void encode_emission(float emission, Attributes& out) {
   if (flux > 0) out["_flux"] = std::to_string(flux);
 }
 
-/// Returns MagicaVoxel's nearest material.
+/// Writes the keys of MagicaVoxel's nearest material.
 void encode_published(const VoxelProperties& properties, Attributes& out) {
   const bool transparent = properties.visibility == Visibility::Transparent;
   if (properties.emission > 0.0F) {

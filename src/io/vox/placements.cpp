@@ -91,7 +91,7 @@ Motion motion_at(const Document& document, const Node& node, int requested) {
   for (int axis = 0; axis < 3; ++axis) {
     std::int64_t value = keys[i].translation[axis];
     if (between) {
-      // Below 2^62: a translation has 32 bits, and the two weights add up to a length of at most 31.
+      // Below 2^62: a translation has 32 bits, and the two weights add up to a length of at most 31 bits.
       const std::int64_t length = std::int64_t{keys[i + 1].frame} - keys[i].frame;
       const std::int64_t past = frame - keys[i].frame;
       value = (value * (length - past) + std::int64_t{keys[i + 1].translation[axis]} * past) / length;
@@ -334,7 +334,7 @@ Result<Placements> GraphWalk::run() {
   return std::move(out_);
 }
 
-/// Shows one of several models without a scene graph, where MagicaVoxel places a model that it loads.
+/// Shows one model of a file without a scene graph, where MagicaVoxel places a model that it loads.
 Result<Placements> place_lone_model(const Document& document, int frame) {
   Placements out;
   out.is_model_used.assign(document.models.size(), true);

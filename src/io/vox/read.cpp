@@ -102,7 +102,7 @@ std::vector<GroupHandle> add_groups(const vox::Placements& placements, const Lay
   return handles;
 }
 
-/// Names a grid after its shape, else after its first instance with a name.
+/// Adds the instances. Names a grid after its shape, else after its first instance with a name.
 void add_instances(const vox::Placements& placements, const std::vector<GridHandle>& grids, const LayersById& layers,
                    Scene& scene) {
   const std::vector<GroupHandle> groups = add_groups(placements, layers, scene);

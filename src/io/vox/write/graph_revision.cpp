@@ -269,8 +269,8 @@ bool GraphRevision::is_hidden(std::int32_t layer) const {
   return false;
 }
 
-/// Other transforms of a chain may be on layers that the scene does not track. If such a layer was shown or hidden,
-/// they are removed from it.
+/// A chain's transforms above its last one may be on layers that the scene does not track. If such a layer was shown or
+/// hidden, they are removed from it.
 void GraphRevision::keep_shown_by_chain(const Wanted& wanted, const Known& known) {
   const Hanging& hanging = known.hanging;
   for (std::size_t i = 0; i + 1 < hanging.transform_count; ++i) {
@@ -526,7 +526,7 @@ Result<RevisedGraph> revise_graph(const Scene& scene, const VoxSource& source, c
 bool needs_graph(const Scene& scene, const VoxSource& source, const ModelPlan& models) {
   if (!source.document.nodes.empty()) return false;
   if (!scene.groups().empty()) return true;
-  // The reader shows one of several models without a graph.
+  // Without a graph the reader shows one model.
   if (scene.instances().empty()) return models.count > 0;
   if (source.placements.all.empty() || scene.instances().size() != 1) return true;
   const auto handle = scene.instances().handle_at(0);

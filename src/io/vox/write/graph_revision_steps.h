@@ -182,8 +182,7 @@ class GraphRevision {
   std::map<GroupHandle, Parent> groups_;  // groups of the scene
   std::map<Parent, ChildChanges> children_;
   std::map<std::size_t, std::size_t> inserted_;  // inserted transforms by node, as indices into RevisedGraph::added
-  std::map<GridHandle, std::vector<std::size_t>>
-      added_shapes_;  // new shapes by grid, as indices into RevisedGraph::added
+  std::map<GridHandle, std::vector<std::size_t>> added_shapes_;   // new shapes by grid, in RevisedGraph::added
   std::map<GridHandle, std::vector<std::size_t>> source_shapes_;  // shapes in the source's nodes, by grid
 };
 

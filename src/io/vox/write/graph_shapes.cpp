@@ -64,7 +64,7 @@ Motion GraphRevision::from_source_box(const GridPlan& plan, std::size_t model) c
   return from_first_piece(boxes, plan.pieces.size());
 }
 
-/// Makes a shape that shows at each frame the model of a single piece, and nothing for several pieces.
+/// Makes `shape` show at each frame the model of a single piece, and nothing for several pieces.
 void GraphRevision::show_frames(const std::vector<Frame>& frames, NodeContent& transform, NodeContent& shape) {
   transform.frames.clear();
   shape.models.clear();

@@ -16,7 +16,7 @@ namespace quoin::vox {
 struct GridPlan {
   GridHandle grid;
   std::vector<Piece> pieces;         ///< never empty; a single piece for a model of the source
-  std::size_t source_model = kNone;  ///< the source's model that it replaces; kNone for new models
+  std::size_t source_model = kNone;  ///< the source's model that it keeps; kNone for new models
   bool is_resized = false;           ///< for a model of the source: its box changed
   bool is_changed = false;           ///< for a model of the source: its voxels changed, or their positions in the box
   std::uint32_t first_model = 0;     ///< model number of its first piece: the source's models come first, then new ones
