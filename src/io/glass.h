@@ -28,7 +28,7 @@ struct GlassMaterial {
   float thickness = 1.0F;  ///< voxels
   float alpha = 1.0F;
   float transmission = 0.0F;
-  Vec3 attenuation{1.0F};  ///< of each channel by the whole thickness; above 0
+  Vec3 attenuation{1.0F};  ///< per channel through the whole thickness; above 0
   Vec3 tint{1.0F};         ///< transmittance of each channel in the uncovered part
 };
 

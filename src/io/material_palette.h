@@ -115,7 +115,7 @@ class MaterialPalette {
 
   const VoxelRegistry& types_;
   std::uint32_t rows_ = 1;
-  float row_height_ = 1.0F;   // of the texture's
+  float row_height_ = 1.0F;   // of a texture row
   std::vector<float> bands_;  ///< strongest of each, descending
   std::vector<std::uint16_t> band_of_type_;
   std::vector<SurfaceMaterial> materials_;

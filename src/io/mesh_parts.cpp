@@ -341,7 +341,7 @@ LinearRgba16 linear_colour(const MeshView& view, std::size_t vertex) {
 }
 
 std::array<std::uint8_t, 3> srgb_colour(const MeshView& view, std::size_t vertex) {
-  constexpr float kFull = 65'535.0F;  // of LinearRgba16
+  constexpr float kFull = 65'535.0F;  // the maximum value of LinearRgba16
   const SrgbEncoder& encode = SrgbEncoder::shared();
   const float open = view.occlusion.empty() ? 1.0F : 1.0F - view.occlusion[vertex];
   std::array<std::uint8_t, 3> colour{};

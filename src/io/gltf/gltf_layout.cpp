@@ -340,7 +340,7 @@ class MeshLayout {
   const SceneMeshes& meshes_;
   const MeshFileOptions& options_;
   GltfLayout& layout_;
-  std::map<Key, std::size_t> mesh_of_;  ///< by part and baked transform
+  std::map<Key, std::size_t> mesh_of_;  ///< mesh index by part and baked transform
   std::optional<std::size_t> part_;     ///< part of the last mesh
   std::size_t variants_ = 0;            ///< meshes of that part
 };

@@ -62,7 +62,7 @@ struct GltfArray {
 struct GltfPrimitive {
   MeshView view;
   std::size_t material = 0;
-  Vec3 min{0.0F};  ///< of the positions as written
+  Vec3 min{0.0F};  ///< bounds of the positions as written
   Vec3 max{0.0F};
   std::vector<GltfArray> arrays{};
 };
@@ -128,7 +128,7 @@ struct GltfLayout {
   std::vector<GltfNode> nodes;  ///< the placements in their order, then the groups
   std::vector<GltfMesh> meshes;
   std::vector<GltfImage> images;           ///< block textures; the first is the first texture
-  std::vector<MaterialSurfaces> surfaces;  ///< of every part
+  std::vector<MaterialSurfaces> surfaces;  ///< by part
   std::vector<GltfChannel> channels{};     ///< the animation's times and values; after the images
   std::vector<Lamp> lamps{};               ///< lamps that give light; their nodes come after `nodes`
   std::vector<MeshCamera> cameras{};       ///< their nodes come last

@@ -21,7 +21,7 @@ enum class Kind : std::uint8_t {
   Solid,
   Plant,   // thin leaves and stalks without collision: mostly air
   Thin,    // rails, plates and the like: mostly air
-  Glass,   // clear, apart from its colour
+  Glass,   // clear except for its colour
   Liquid,  // water
   Clear,   // ice, slime
   Glow,    // solid, and emits light

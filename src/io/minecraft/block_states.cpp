@@ -8,7 +8,7 @@ namespace quoin::minecraft {
 
 namespace {
 
-// Properties whose values are words, the commonest first; those of true and false, and of numbers, need no line.
+// Properties whose values are words, the commonest first. Booleans and numbers need no line.
 struct Words {
   std::string_view key;
   std::vector<std::string_view> values;
@@ -80,7 +80,7 @@ std::optional<std::uint32_t> number_of(std::string_view text) {
 struct Coded {
   std::uint32_t code = 0;
   int bits = 0;
-  char kind = 'w';  // of words, 'b': true or false, 'n': a number
+  char kind = 'w';  // 'w': words, 'b': true or false, 'n': a number
 };
 
 std::optional<Coded> coded(const Property& property) {
@@ -118,7 +118,7 @@ BlockState block_state(std::string_view name, std::vector<Property> properties) 
     block.is_snowy |= key == "snowy" && value == "true";
     const auto code = is_look ? std::nullopt : coded(property);
     if (!code || block.bits + code->bits > kMaxStateBits) {
-      if (is_look && value == "false") continue;  // as blocks are that have no such property
+      if (is_look && value == "false") continue;  // like blocks without this property
       in_name.append(in_name.empty() ? "[" : ",").append(key).append("=").append(value);
       continue;
     }

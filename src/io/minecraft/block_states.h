@@ -28,7 +28,7 @@ inline constexpr const char* kTintAttribute = "minecraft.tint";
 struct BlockState {
   std::string name;         ///< "minecraft:furnace[lit=true]": with the properties that change the look, which have no
                             ///< bits
-  std::string layout;       ///< as kStatesAttribute
+  std::string layout;       ///< in the form of kStatesAttribute
   std::uint32_t state = 0;  ///< 0 where all properties have their commonest value
   std::uint8_t bits = 0;
   bool is_lit = false;

@@ -20,7 +20,7 @@ namespace quoin::minecraft {
 
 /// A block in voxel form. Biome-coloured blocks have one type per colour: BlockTypes::tinted.
 struct Block {
-  VoxelType type = kAir;  ///< kAir too where it is tinted
+  VoxelType type = kAir;  ///< also kAir for tinted blocks
   std::uint32_t state = 0;
   Tint tint = Tint::None;
   std::uint32_t number = 0;     ///< number among the tinted blocks
@@ -49,9 +49,9 @@ class BlockTypes {
   mutable std::shared_mutex mutex_;
   VoxelRegistry types_;
   std::unordered_map<std::string, Block> blocks_;
-  std::vector<std::string> invisible_;                         // by Block::invisible - 1
-  std::vector<VoxelProperties> tinted_;                        // by Block::number, before their tint
-  std::unordered_map<std::uint64_t, VoxelType> tinted_types_;  // by number and colour
+  std::vector<std::string> invisible_;                         // names by Block::invisible - 1
+  std::vector<VoxelProperties> tinted_;                        // by Block::number, before tinting
+  std::unordered_map<std::uint64_t, VoxelType> tinted_types_;  // types, by Block::number and colour
 };
 
 }  // namespace quoin::minecraft

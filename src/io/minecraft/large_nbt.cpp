@@ -183,7 +183,7 @@ class Walker {
   std::vector<std::byte> buffer_;
   std::size_t at_ = 0;
   std::size_t end_ = 0;
-  std::uint64_t held_bytes_ = 0;  // of pages
+  std::uint64_t held_bytes_ = 0;  // memory of pages
   LargeNbt out_;
 };
 

@@ -37,7 +37,7 @@ constexpr int kMaxRegion = 1 << 21;
 struct Region {
   fs::path path;
   RegionName name;
-  std::shared_ptr<const RegionFile> file = nullptr;  // where it has no name
+  std::shared_ptr<const RegionFile> file = nullptr;  // for files whose name has no region
 };
 
 bool is_too_far(RegionName name) {

@@ -34,7 +34,7 @@ enum class Tag : std::uint8_t {
 
 /// The limits of a document; larger ones are rejected.
 struct Limits {
-  int depth = 512;  ///< of lists and compounds, as the game has it
+  int depth = 512;  ///< nesting of lists and compounds, the game's limit
   std::size_t nodes = std::size_t{1} << 22;
 };
 
@@ -58,8 +58,8 @@ class Document {
   friend class Parser;
   struct Node {
     Tag tag = Tag::End;
-    Tag element = Tag::End;   // of a list
-    std::uint32_t name = 0;   // offset of its text, which has its length in front; 0: no name
+    Tag element = Tag::End;   // element tag of a list
+    std::uint32_t name = 0;   // offset of its name, which follows its length; 0: no name
     std::uint32_t begin = 0;  // offset of the payload, after any count
     std::uint32_t count = 0;  // elements, or bytes of a string
     std::uint32_t next = 0;   // node after all that is in it

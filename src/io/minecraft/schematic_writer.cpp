@@ -144,7 +144,7 @@ class Palette {
 
   const VoxelRegistry& types_;
   std::map<std::string, std::int32_t> numbers_;
-  std::vector<std::int32_t> plain_;  // of types without a state
+  std::vector<std::int32_t> plain_;  // palette numbers of types without a state
   std::vector<bool> guessed_;
   std::vector<bool> of_game_ = std::vector<bool>(types_.size(), false);
 };

@@ -227,7 +227,7 @@ class ModelWriter {
   ZipFile& zip_;
   Colours colours_;
   std::string text_;
-  std::vector<DVec3> origins_;  ///< of objects
+  std::vector<DVec3> origins_;  ///< origins of objects
 };
 
 }  // namespace

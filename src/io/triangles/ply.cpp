@@ -52,7 +52,7 @@ std::optional<Scalar> scalar_of(std::string_view word) {
 struct Property {
   std::string name;
   Scalar type = Scalar::Float32;
-  std::optional<Scalar> count{};  // of a list
+  std::optional<Scalar> count{};  // type of a list's length
 };
 
 struct Element {

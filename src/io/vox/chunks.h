@@ -27,7 +27,7 @@ inline constexpr std::size_t kColours = 256;
 /// Maximum voxels along a model's axis: XYZI has one byte per coordinate.
 inline constexpr int kMaxModelEdge = 256;
 
-/// Keys and values of a DICT, as they lie in the file.
+/// Keys and values of a DICT, in the file's order.
 struct Dict {
   std::vector<std::pair<std::string_view, std::string_view>> entries;
 
@@ -40,7 +40,7 @@ struct Dict {
 struct Model {
   IVec3 size{1};
   std::span<const std::byte> voxels;  ///< x, y, z, colour index: a byte each
-  std::uint64_t offset = 0;           ///< of the SIZE chunk, or of the TDCZ
+  std::uint64_t offset = 0;           ///< offset of the SIZE chunk, or of the TDCZ
   std::size_t packed_begin = 0;  ///< offset in the file of the compressed voxels of a TDCZ, which `unpack_voxels` reads
   std::size_t packed_end = 0;    ///< 0 for uncompressed voxels
 };
@@ -113,12 +113,12 @@ struct Document {
   std::array<Attributes, kColours> materials;  ///< by colour index
   std::vector<Node> nodes;
   std::vector<std::int32_t> children;        ///< node ids
-  std::vector<TransformKey> transform_keys;  ///< of one node: by ascending frame
-  std::vector<ModelKey> model_keys;          ///< of one node: by ascending frame
+  std::vector<TransformKey> transform_keys;  ///< keys of each node by ascending frame
+  std::vector<ModelKey> model_keys;          ///< keys of each node by ascending frame
   std::vector<Layer> layers;
   std::vector<CameraChunk> cameras;
   std::vector<SettingChunk> settings;
-  std::int32_t last_frame = 0;       ///< of the keys and META's range
+  std::int32_t last_frame = 0;       ///< over the keys and META's range
   std::int64_t stray_materials = 0;  ///< MATL and MATT chunks whose id is not a colour index
   std::vector<std::string> warnings;
   std::vector<ChunkPlace> chunks;

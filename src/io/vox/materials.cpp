@@ -122,7 +122,7 @@ std::array<std::uint8_t, kColours> types_by_colour_index(const Document& documen
   std::array<std::uint8_t, kColours> type_of{};
   for (std::size_t i = 0; i < kColours; ++i) type_of[i] = static_cast<std::uint8_t>(i);
   if (document.index_map.empty()) return type_of;
-  // IMAP's byte i is the colour index that the palette shows in place i + 1; place 256 is air's.
+  // IMAP's byte i is the colour index that the palette shows at position i + 1; position 256 is air's.
   std::array<std::uint8_t, kColours> shown_as{};
   for (std::size_t i = 0; i + 1 < kColours; ++i) {
     const auto colour_index = static_cast<std::uint8_t>(document.index_map[i]);

@@ -62,7 +62,7 @@ Places places_in(IVec3 model_size, IVec3 strides) {
 template <class Visit>
 void for_each_voxel(const Model& model, const Places& places, Visit visit) {
   for (std::size_t i = 0; i + 3 < model.voxels.size(); i += 4) {
-    std::array<std::uint8_t, 4> bytes{};  // as one load
+    std::array<std::uint8_t, 4> bytes{};  // loads the four bytes at once
     std::memcpy(bytes.data(), model.voxels.data() + i, bytes.size());
     visit(places.of_x[bytes[0]] + places.of_y[bytes[1]] + places.of_z[bytes[2]], bytes[3]);
   }

@@ -56,7 +56,7 @@ class MapWriter {
   const MergedGrid& merged_;
   const std::vector<Rgba8>& colours_;
   IVec3 size_;
-  IVec3 min_;                    // of the map, in the grid
+  IVec3 min_;                    // minimum corner of the map, in the grid
   std::array<Slice, 3> slices_;  // the column's z, and its two neighbours
   std::vector<VoxelType> column_;
   std::vector<bool> has_colour_;
