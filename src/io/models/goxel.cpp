@@ -4,7 +4,7 @@
 //   BL16   16^3 voxels as a PNG of 64 x 64 pixels
 //   MATE   a material
 //   LAYR   a layer: its blocks with their positions, and its properties; without blocks a shape in the box from -1 to
-//          1, which `mat` places
+//          1 (`mat` places it)
 
 #include <array>
 #include <cmath>

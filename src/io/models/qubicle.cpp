@@ -297,10 +297,10 @@ Status QbtReader::put_voxels(const Matrix& matrix, std::span<const std::byte> pa
 ///
 ///   "QBCL"      8 bytes of versions, u32 width and height of a thumbnail and its pixels, 7 strings, 16 bytes of times;
 ///               a node
-///   a node      u32 kind, u32, string name, 3 bytes (is it shown, is it locked ...); of a model: 36 bytes, u32 nodes,
-///               these; of a matrix: size, place, pivot, u32 bytes, a zlib stream; of a compound: both
-///   a stream    of each column (x slowest, then z) u16 entries, each of 4 bytes: r, g, b and which faces are seen,
-///               where 2 says that the next is there r times
+///   a node      u32 kind, u32, string name, 3 bytes (visible, locked ...); a model: 36 bytes, u32 number of nodes, the
+///               nodes; a matrix: size, position, pivot, u32 bytes, a zlib stream; a compound: both
+///   a stream    for each column (x slowest, then z): u16 entries, each of 4 bytes: r, g, b and a mask of visible
+///               faces; mask 2 means that the next entry repeats r times
 class QbclReader {
  public:
   explicit QbclReader(std::span<const std::byte> bytes) : reader_(bytes) {}

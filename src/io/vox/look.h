@@ -12,8 +12,8 @@ namespace quoin::vox {
 ///
 ///   _bounce  _diffuse, _specular: the larger, and direct light; _scatter
 ///   _env     _mode: 0 _uni, 1 _atm, 2 _ibl
-///   _inf     the sun: _i, _k, _angle (pitch above the horizon; yaw, as cameras that look from there), _area (tangent
-///            of half its disc), _disk (1: it is visible)
+///   _inf     the sun: _i, _k, _angle (pitch above the horizon; yaw, as cameras that look from there), _area
+///            (tangent of half its disc), _disk (1: it is visible)
 ///   _uni     the sky: _i, _k                         _atm  _ray_, _mie_, _o3_: _d (0.4 is the Earth's), _k; _mie_g
 ///   _ibl     _path, _i, _rot or _angle (its yaw)     _fog_uni  _d (per voxel), _k, _g
 ///   _lens    _aperture (radius in voxels), _blade_n, _blade_r (degrees)
