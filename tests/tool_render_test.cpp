@@ -574,7 +574,7 @@ TEST_F(ToolRender, WrongUsageIsOneLineAndStatus2) {
       {out + "--camera nan,2,3 --look-at 0,0,0", "--camera: must be three numbers"},
       {out + "--camera 1,2,3 --look-at inf,0,0", "--look-at: must be three numbers"},
       {out + "--camera 1,2,3 --look-at 1e999,0,0", "--look-at: must be three numbers"},
-      {out + "--camera 1,2,3 --look-at 1,2,3", "the camera looks at the point where it stands"},
+      {out + "--camera 1,2,3 --look-at 1,2,3", "camera: position and target must differ"},
       {out + "--camera 1,2,3 --look-at 0,0,0 --fov 0", "--fov: must be more than 0 and less than 180, not \"0\""},
       {out + "--camera 1,2,3 --look-at 0,0,0 --fov 180", "--fov: must be"},
       {out + "--camera 1,2,3 --look-at 0,0,0 --fov nan", "--fov: must be"},

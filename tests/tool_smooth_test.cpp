@@ -315,7 +315,7 @@ TEST_F(ToolSmooth, VolumesWithoutAFiniteValueAreErrors) {
       const ToolRun result = run(command + raw);
       EXPECT_EQ(result.status, 1) << command;
       expect_one_error_line(result);
-      EXPECT_NE(result.err.find(std::isnan(value) ? "no value is a number" : "no value is finite"), std::string::npos)
+      EXPECT_NE(result.err.find(std::isnan(value) ? "all values are NaN" : "no value is finite"), std::string::npos)
           << result.err;
       EXPECT_NE(result.err.find("none.raw"), std::string::npos) << result.err;
     }

@@ -17,7 +17,7 @@ class ToolWorld : public ToolTest {
   void SetUp() override {
     ToolTest::SetUp();
     const ToolRun made = run("generate terrain hills.quoin --chunks 4x4x4 -q");
-    if (made.err.find("no worlds on disk") != std::string::npos) GTEST_SKIP() << made.err;
+    if (made.err.find("not supported by this build") != std::string::npos) GTEST_SKIP() << made.err;
     ASSERT_EQ(made.status, 0) << made.err;
   }
   /// Flips 100 bytes in the middle of a file.
@@ -79,7 +79,7 @@ TEST_F(ToolWorld, BackupAndCompact) {
   EXPECT_EQ(run("world check monday.quoin").status, 0);
   const ToolRun again = run("world backup hills.quoin monday.quoin");
   EXPECT_EQ(again.status, 1);
-  EXPECT_NE(again.err.find("there is a file of that name"), std::string::npos) << again.err;
+  EXPECT_NE(again.err.find("file already exists"), std::string::npos) << again.err;
   EXPECT_EQ(run("world compact hills.quoin").status, 0);
   EXPECT_EQ(run("world check hills.quoin").status, 0);
   auto writer = WorldStore::open(folder_.file("hills.quoin"), WorldAccess::Write);
@@ -173,7 +173,7 @@ TEST_F(ToolWorld, ReportsInsufficientMemoryBeforeLoading) {
   }
   const ToolRun refused = shell("ulimit -v 400000; '" QUOIN_TOOL "' convert large.quoin large.json");
   EXPECT_EQ(refused.status, 1);
-  EXPECT_NE(refused.err.find("as a whole it takes about"), std::string::npos) << refused.err;
+  EXPECT_NE(refused.err.find("loading the whole world needs about"), std::string::npos) << refused.err;
   EXPECT_EQ(std::count(refused.err.begin(), refused.err.end(), '\n'), 1) << refused.err;
   const ToolRun copied = shell("ulimit -v 400000; '" QUOIN_TOOL "' convert large.quoin copy.quoin -q");
   EXPECT_EQ(copied.status, 0) << copied.err;

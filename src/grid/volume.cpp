@@ -93,11 +93,11 @@ float volume_threshold(const Volume& volume) {
 Result<float> surface_value(const Volume& volume, std::optional<float> iso) {
   const auto all = static_cast<std::int64_t>(volume.values.size());
   if (all > 0 && volume.nan_count == all) {
-    return make_error(ErrorCode::InvalidArgument, "no value is a number: there is no surface");
+    return make_error(ErrorCode::InvalidArgument, "cannot find a surface: all values are NaN");
   }
   if (iso) return *iso;
   if (all > 0 && volume.nan_count + volume.infinite_count == all) {
-    return make_error(ErrorCode::InvalidArgument, "no value is finite: nothing says where its surface is");
+    return make_error(ErrorCode::InvalidArgument, "cannot choose a surface value: no value is finite");
   }
   return volume_threshold(volume);
 }

@@ -184,10 +184,9 @@ class ChunkMaker {
 
 Result<DensityGrid> field_from_volume(const Volume& volume, const VolumeFieldOptions& options, Threads threads,
                                       const Progress& progress) {
-  if (std::isnan(options.iso))
-    return make_error(ErrorCode::InvalidArgument, "the value of the surface is not a number");
+  if (std::isnan(options.iso)) return make_error(ErrorCode::InvalidArgument, "the surface value must not be NaN");
   if (!is_consistent(volume)) {
-    return make_error(ErrorCode::InvalidArgument, "the volume has not as many values as its size says");
+    return make_error(ErrorCode::InvalidArgument, "the number of values does not match the volume's size");
   }
   const Samples samples(volume);
   const ChunkMaker maker(samples, options, slope_of(samples, volume, options.iso, threads));

@@ -78,10 +78,10 @@ void VoxelRegistry::note(TypeChange change) {
 
 Result<VoxelType> VoxelRegistry::add(VoxelProperties properties) {
   if (properties.visibility == Visibility::Air) {
-    return make_error(ErrorCode::InvalidArgument, "type 0 is the only air");
+    return make_error(ErrorCode::InvalidArgument, "only type 0 can be air");
   }
   if (properties.state_bits > kMaxStateBits) {
-    return make_error(ErrorCode::InvalidArgument, "a state of more than 32 bits");
+    return make_error(ErrorCode::InvalidArgument, "state_bits: must be 0 to 32");
   }
   if (size() > kMaxVoxelTypes) {
     return make_error(ErrorCode::LimitExceeded, "more than 65,535 distinct voxel types");

@@ -123,7 +123,7 @@ Status check(const DensitySliceOptions& options) {
   if (options.width <= 0 || options.height <= 0) return refuse("size: width and height must be positive");
   if (std::int64_t{options.width} * options.height > kMaxPixels) return refuse("size: more than 268,435,456 pixels");
   if (options.axis < 0 || options.axis > 2) return refuse("slice: the axis must be 0, 1 or 2");
-  if (!(options.at >= 0.0 && options.at <= 1.0)) return refuse("slice: the place must be 0 to 1");
+  if (!(options.at >= 0.0 && options.at <= 1.0)) return refuse("slice: the position must be 0 to 1");
   return {};
 }
 
@@ -134,7 +134,7 @@ Result<DensitySlice> draw_density_slice(const Scene& scene, const DensitySliceOp
   const std::vector<PlacedField> fields = fields_of(scene, options.instances);
   const DBox box = bounds_of(fields);
   if (box.empty()) {
-    return make_error(ErrorCode::InvalidArgument, "slice: there is no field of densities with a solid to cut through");
+    return make_error(ErrorCode::InvalidArgument, "slice: the scene has no density field with a solid");
   }
   const Plane plane = plane_of(box, options);
   const auto width = static_cast<std::size_t>(options.width);

@@ -9,7 +9,7 @@ namespace quoin {
 namespace {
 
 Error refusal() {
-  return make_error(ErrorCode::Unsupported, "vulkan: this build is without it: " QUOIN_VULKAN_MISSING);
+  return make_error(ErrorCode::Unsupported, "vulkan: not supported by this build: " QUOIN_VULKAN_MISSING);
 }
 
 }  // namespace

@@ -54,9 +54,9 @@ Result<std::size_t> choose_vulkan_device(std::span<const VulkanDeviceInfo> devic
     }
   }
   if (chosen == nullptr) {
-    std::string message = "there is no device \"";
+    std::string message = "no device \"";
     message += wanted;
-    message += devices.empty() ? "\", nor any other" : "\"; there is ";
+    message += devices.empty() ? "\": no devices found" : "\"; available: ";
     for (std::size_t i = 0; i < devices.size(); ++i) {
       if (i != 0) message += ", ";
       message += std::to_string(i);

@@ -35,8 +35,8 @@ TEST(ChooseVulkanDevice, SaysWhatThereIsAndWhatIsMissing) {
   expect_refusal(kDevices, "old", "vulkan: Old Card lacks bufferDeviceAddress");
   expect_refusal(kDevices, "1", "vulkan: Old Card lacks bufferDeviceAddress");
   expect_refusal(std::span(kDevices).first(2), "7",
-                 "vulkan: there is no device \"7\"; there is 0 llvmpipe (LLVM 15), 1 Old Card");
-  expect_refusal({}, "", "vulkan: there is no device \"\", nor any other");
+                 "vulkan: no device \"7\"; available: 0 llvmpipe (LLVM 15), 1 Old Card");
+  expect_refusal({}, "", "vulkan: no device \"\": no devices found");
 }
 
 }  // namespace

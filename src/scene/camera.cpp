@@ -66,15 +66,15 @@ Stand stand_for(const Reach& reach, DVec3 axis, DVec3 forward, double slope) {
 }  // namespace
 
 Result<Camera> look_along(DVec3 position, DVec3 direction, double vertical_fov_radians) {
-  if (!is_finite(position)) return make_error(ErrorCode::InvalidArgument, "the camera's position is not finite");
-  if (!is_finite(direction)) return make_error(ErrorCode::InvalidArgument, "the direction to look along is not finite");
+  if (!is_finite(position)) return make_error(ErrorCode::InvalidArgument, "camera: position must be finite");
+  if (!is_finite(direction)) return make_error(ErrorCode::InvalidArgument, "camera: direction must be finite");
   if (!(vertical_fov_radians > 0.0 && vertical_fov_radians < std::numbers::pi)) {
     return make_error(ErrorCode::InvalidArgument,
-                      "the field of view is not more than 0 and less than pi radians (180 degrees)");
+                      "camera: field of view must be more than 0 and less than pi radians (180 degrees)");
   }
   // Scaled so that no square is lost.
   const double largest = std::max({std::abs(direction.x), std::abs(direction.y), std::abs(direction.z)});
-  if (!(largest > 0.0)) return make_error(ErrorCode::InvalidArgument, "the direction to look along is 0");
+  if (!(largest > 0.0)) return make_error(ErrorCode::InvalidArgument, "camera: direction must not be 0");
   Camera camera;
   camera.position = position;
   camera.vertical_fov_radians = vertical_fov_radians;
@@ -83,9 +83,8 @@ Result<Camera> look_along(DVec3 position, DVec3 direction, double vertical_fov_r
 }
 
 Result<Camera> look_at(DVec3 position, DVec3 target, double vertical_fov_radians) {
-  if (!is_finite(target)) return make_error(ErrorCode::InvalidArgument, "the point to look at is not finite");
-  if (position == target)
-    return make_error(ErrorCode::InvalidArgument, "the camera looks at the point where it stands");
+  if (!is_finite(target)) return make_error(ErrorCode::InvalidArgument, "camera: target must be finite");
+  if (position == target) return make_error(ErrorCode::InvalidArgument, "camera: position and target must differ");
   // Halved so that the difference of the greatest numbers is one.
   return look_along(position, 0.5 * target - 0.5 * position, vertical_fov_radians);
 }

@@ -12,7 +12,7 @@ Result<DVec3> sun_direction(const SunTime& time) {
   const auto refuse = [](const char* message) { return make_error(ErrorCode::InvalidArgument, message); };
   if (time.month < 1 || time.month > 12) return refuse("month: must be 1 to 12");
   const auto month = static_cast<std::size_t>(time.month - 1);
-  if (time.day < 1 || time.day > kDays[month]) return refuse("day: the month does not have it");
+  if (time.day < 1 || time.day > kDays[month]) return refuse("day: out of range for the month");
   if (!(time.hour >= 0.0 && time.hour <= 24.0)) return refuse("hour: must be 0 to 24");
   if (!(std::abs(time.latitude_degrees) <= 90.0)) return refuse("latitude_degrees: must be -90 to 90");
 

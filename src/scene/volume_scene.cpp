@@ -33,14 +33,14 @@ Result<Lattice> lattice_of(const Volume& volume) {
     const DVec3 step(volume.world_from_voxel[axis]);
     const double length = glm::length(step);
     if (!(length > 0.0) || !std::isfinite(length) || !is_finite(lattice.corner)) {
-      return make_error(ErrorCode::InvalidArgument, "the volume's samples have no place");
+      return make_error(ErrorCode::InvalidArgument, "the volume's transform must be finite, with axes that are not 0");
     }
     lattice.spacing[axis] = length;
     lattice.axes[axis] = step / length;
   }
   for (int axis = 0; axis < 3; ++axis) {
     if (std::abs(glm::dot(lattice.axes[axis], lattice.axes[(axis + 1) % 3])) > kSkew) {
-      return make_error(ErrorCode::Unsupported, "the volume's axes are not upright to each other");
+      return make_error(ErrorCode::Unsupported, "the volume's axes are not perpendicular");
     }
   }
   return lattice;
@@ -84,7 +84,7 @@ Result<Volume> with_even_spacing(const Volume& volume, const Lattice& lattice, d
   const double most = std::min(kMostSamples, kFew + kMostTimes * static_cast<double>(volume.values.size()));
   if (!(samples <= most)) {
     return make_error(ErrorCode::LimitExceeded,
-                      "cannot resample the volume: its spacings differ so much that it would have more than " +
+                      "cannot resample the volume: its spacings differ so much that the result would exceed " +
                           std::to_string(static_cast<std::int64_t>(most)) + " samples; make them more alike");
   }
   const std::vector<Between> x = stations(volume.size.x, lattice.spacing.x, step);

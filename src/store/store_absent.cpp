@@ -20,7 +20,7 @@ struct ChangeSet {};
 namespace {
 
 Error absent(const std::filesystem::path& path = {}) {
-  return make_error(ErrorCode::Unsupported, "this build of Quoin has no worlds on disk: " QUOIN_STORE_MISSING,
+  return make_error(ErrorCode::Unsupported, "cannot open worlds: not supported by this build: " QUOIN_STORE_MISSING,
                     path.string());
 }
 
@@ -179,8 +179,8 @@ Result<SavedScene> write_world_format(const Scene&, const LoadedScene*, const st
 }
 
 Result<std::unique_ptr<ChunkSource>> open_luanti(const std::filesystem::path& path) {
-  return make_error(ErrorCode::Unsupported, "this build of Quoin reads no worlds of Luanti's: " QUOIN_STORE_MISSING,
-                    path.string());
+  return make_error(ErrorCode::Unsupported,
+                    "cannot read Luanti worlds: not supported by this build: " QUOIN_STORE_MISSING, path.string());
 }
 Result<std::unique_ptr<ChunkSource>> open_luanti(std::span<const std::byte>) {
   return open_luanti(std::filesystem::path());

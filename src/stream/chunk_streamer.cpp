@@ -113,7 +113,7 @@ void ChunkStreamer::take(Outbox& out) {
   out.read = outbox_.read;
   out.made = outbox_.made;
   out.begun = working_;
-  if (std::exchange(is_short_, false)) out.problems.emplace_back("there is not enough memory to load what is wanted");
+  if (std::exchange(is_short_, false)) out.problems.emplace_back("not enough memory to load all requested chunks");
 }
 
 void ChunkStreamer::wait() {

@@ -21,7 +21,7 @@ Status check_types(const WorldEdit& edit, const VoxelRegistry& types) {
     fits = is_known(field_box->material);
   }
   if (fits) return {};
-  return make_error(ErrorCode::InvalidArgument, "an edit of a type that the world does not have");
+  return make_error(ErrorCode::InvalidArgument, "the edit uses a type that the world does not have");
 }
 
 std::int64_t apply_fitting(const WorldEdit& edit, Grid& grid, DensityGrid& field, const VoxelRegistry& types) {

@@ -149,17 +149,17 @@ Result<LoggedEdit> read_edit(std::span<const std::byte> body, std::size_t offset
   ContentReader in(body);
   const auto fault = [&](const char* what) { return make_error(ErrorCode::BadFormat, what, {}, offset + in.at()); };
   constexpr std::size_t kFixed = 8 + 4 + 4 + 4;
-  if (!in.has(kFixed)) return fault("an edit that is cut off");
+  if (!in.has(kFixed)) return fault("unexpected end in an edit");
   LoggedEdit read;
   read.number = in.take<std::uint64_t>();
   read.author = in.take<std::uint32_t>();
   read.edit.grid = in.take<std::uint32_t>();
-  if (!begin_kind(in.take<std::uint32_t>(), read.edit.content)) return fault("an edit of an unknown kind");
+  if (!begin_kind(in.take<std::uint32_t>(), read.edit.content)) return fault("unknown kind of edit");
   Reader fields(in);
   if (!std::visit([&](auto& content) { return visit_fields(content, fields); }, read.edit.content)) {
-    return fault("an edit that is cut off");
+    return fault("unexpected end in an edit");
   }
-  if (!in.is_at_end()) return fault("bytes that are left over in an edit");
+  if (!in.is_at_end()) return fault("extra bytes in an edit");
   return read;
 }
 
@@ -182,7 +182,7 @@ Result<EditLog> EditLog::merged(const EditLog& a, const EditLog& b) {
     } else {
       if (*one != *other) {
         return make_error(ErrorCode::InvalidArgument, "edit " + std::to_string(one->number) + " of author " +
-                                                          std::to_string(one->author) + " is another in each log");
+                                                          std::to_string(one->author) + " differs between the logs");
       }
       both.edits_.push_back(*one++);
       ++other;
@@ -217,24 +217,24 @@ Result<EditLog> EditLog::decode(std::span<const std::byte> bytes) {
     return std::ranges::equal(in.take_bytes(kMagic.size()), kMagic,
                               [](std::byte a, char b) { return a == static_cast<std::byte>(b); });
   };
-  if (!in.has(kMagic.size() + sizeof(kVersion)) || !has_magic()) return fault("no log of edits", 0);
+  if (!in.has(kMagic.size() + sizeof(kVersion)) || !has_magic()) return fault("not an edit log", 0);
   if (const auto version = in.take<std::uint32_t>(); version != kVersion) {
-    return make_error(ErrorCode::Unsupported, "a log of edits of version " + std::to_string(version), {},
+    return make_error(ErrorCode::Unsupported, "unsupported edit log version " + std::to_string(version), {},
                       kMagic.size());
   }
   EditLog log;
   while (!in.is_at_end()) {
     const std::size_t start = in.at();
-    if (!in.has(8)) return fault("an edit that is cut off", start);
+    if (!in.has(8)) return fault("unexpected end in an edit", start);
     const auto size = in.take<std::uint32_t>();
     const auto checksum = in.take<std::uint32_t>();
-    if (!in.has(size)) return fault("an edit that is cut off", start);
+    if (!in.has(size)) return fault("unexpected end in an edit", start);
     const auto body = in.take_bytes(size);
-    if (checksum_of(body) != checksum) return fault("an edit whose checksum is another", start);
+    if (checksum_of(body) != checksum) return fault("wrong checksum of an edit", start);
     auto edit = read_edit(body, start + 8);
     if (!edit) return edit.error();
     if (!log.edits_.empty() && order_of(log.edits_.back()) >= order_of(*edit)) {
-      return fault("an edit out of its order", start);
+      return fault("edit out of order", start);
     }
     log.edits_.push_back(std::move(*edit));
   }

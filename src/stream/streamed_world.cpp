@@ -194,7 +194,8 @@ Status StreamedWorld::Impl::begin() {
     if (!*value) continue;
     const auto terrain = terrain_from(**value);
     if (!terrain) {
-      problems.push_back("the landscape of grid " + std::to_string(*number) + " is of an unknown kind, and ends");
+      problems.push_back("the terrain of grid " + std::to_string(*number) +
+                         " has an unknown kind and is not generated");
       continue;
     }
     auto generator = make_terrain_generator(*terrain, scene().types);
@@ -640,7 +641,7 @@ Result<WorldExtent> StreamedWorld::extent() const {
 Result<GridHandle> StreamedWorld::add_grid(SceneGrid grid, std::shared_ptr<const ChunkGenerator> generator) {
   QUOIN_ASSERT(grid.grid.voxel_count() == 0 && grid.field.chunk_count() == 0, "neither voxels nor densities");
   if (!impl_->store.is_writable()) {
-    return make_error(ErrorCode::CannotWrite, "it was opened to be read", impl_->store.path().string());
+    return make_error(ErrorCode::CannotWrite, "opened read-only", impl_->store.path().string());
   }
   grid.grid.make_partial();
   grid.field.make_partial();

@@ -57,7 +57,7 @@ class SmoothTerrain final : public ChunkGenerator {
 Result<std::shared_ptr<const ChunkGenerator>> make_terrain_generator(const EndlessTerrain& terrain,
                                                                      VoxelRegistry& types) {
   if (terrain.height < 1 || terrain.height > 16) {
-    return make_error(ErrorCode::InvalidArgument, "a landscape is 1 to 16 chunks high");
+    return make_error(ErrorCode::InvalidArgument, "height: must be 1 to 16 chunks");
   }
   const auto filled = add_terrain_types(types);
   if (!filled) return filled.error();

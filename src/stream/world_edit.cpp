@@ -23,7 +23,8 @@ bool is_length(double value) {
 }
 
 Error not_sound(const char* what) {
-  return make_error(ErrorCode::InvalidArgument, std::string(what) + " that is not finite, or negative");
+  return make_error(ErrorCode::InvalidArgument,
+                    std::string(what) + ": coordinates must be finite, lengths finite and not negative");
 }
 
 Result<std::vector<IVec3>> chunks_of_box(const LongBox& wanted) {
@@ -34,7 +35,7 @@ Result<std::vector<IVec3>> chunks_of_box(const LongBox& wanted) {
   const DVec3 size(range.size());
   if (size.x * size.y * size.z > static_cast<double>(kMaxEditChunks)) {
     return make_error(ErrorCode::LimitExceeded,
-                      "an edit of more than " + std::to_string(kMaxEditChunks) + " chunks at once");
+                      "an edit must not touch more than " + std::to_string(kMaxEditChunks) + " chunks");
   }
   for (int z = range.min.z; z < range.max.z; ++z) {
     for (int y = range.min.y; y < range.max.y; ++y) {
@@ -53,7 +54,7 @@ Result<std::vector<IVec3>> chunks_of_voxels(std::span<const PlacedVoxel> voxels)
   sort_and_unite(chunks);
   if (chunks.size() > kMaxEditChunks) {
     return make_error(ErrorCode::LimitExceeded,
-                      "an edit of more than " + std::to_string(kMaxEditChunks) + " chunks at once");
+                      "an edit must not touch more than " + std::to_string(kMaxEditChunks) + " chunks");
   }
   return chunks;
 }
@@ -66,19 +67,19 @@ Result<std::vector<IVec3>> chunks_of_edit(const WorldEdit& edit, float band) {
       Overloaded{[](const WorldEdit::SetVoxels& set) { return chunks_of_voxels(set.voxels); },
                  [](const WorldEdit::SetData& set) -> Chunks {
                    if (set.bytes.size() > kMaxVoxelDataBytes) {
-                     return make_error(ErrorCode::LimitExceeded, "more data at a voxel than it can hold");
+                     return make_error(ErrorCode::LimitExceeded, "the data exceeds the limit of a voxel");
                    }
                    const PlacedVoxel voxel{set.voxel, 0};
                    return chunks_of_voxels({&voxel, 1});
                  },
                  [](const WorldEdit::FillBox& fill) { return chunks_of_box(box_from(fill.box)); },
                  [](const WorldEdit::FillSphere& fill) -> Chunks {
-                   if (!is_finite(fill.centre) || !is_length(fill.radius)) return not_sound("a sphere");
+                   if (!is_finite(fill.centre) || !is_length(fill.radius)) return not_sound("sphere");
                    return chunks_of_box(box_around(fill.centre - fill.radius, fill.centre + fill.radius));
                  },
                  [&](const WorldEdit::FieldSphere& sphere) -> Chunks {
                    if (!is_finite(sphere.centre) || !is_length(sphere.radius) || !is_length(sphere.blend)) {
-                     return not_sound("a sphere");
+                     return not_sound("sphere");
                    }
                    const double reach = sphere.radius + double{band};
                    return chunks_of_box(box_around(sphere.centre - reach, sphere.centre + reach));
@@ -86,7 +87,7 @@ Result<std::vector<IVec3>> chunks_of_edit(const WorldEdit& edit, float band) {
                  [&](const WorldEdit::FieldBox& box) -> Chunks {
                    if (!is_finite(box.min) || !is_finite(box.max) || !is_length(box.rounding) ||
                        !is_length(box.blend)) {
-                     return not_sound("a box");
+                     return not_sound("box");
                    }
                    return chunks_of_box(box_around(box.min - double{band}, box.max + double{band}));
                  }},

@@ -30,11 +30,11 @@ Status check(const SmoothTerrainOptions& options) {
   const IVec3 size = options.size;
   if (std::min({size.x, size.y, size.z}) < 1 || size.y > kMaxUp || std::max(size.x, size.z) > kMaxAcross) {
     return make_error(ErrorCode::InvalidArgument,
-                      "a smooth terrain is 1 to 512 chunks of 64 samples wide and deep, 1 to 16 high");
+                      "smooth terrain size: must be 1 to 512 chunks of 64 samples wide and deep, 1 to 16 high");
   }
   if (std::min(options.first_x, options.first_z) < -kMaxPlace ||
       std::max(options.first_x, options.first_z) > kMaxPlace) {
-    return make_error(ErrorCode::InvalidArgument, "a smooth terrain begins at most 524288 chunks from the origin");
+    return make_error(ErrorCode::InvalidArgument, "smooth terrain origin: must be at most 524288 chunks from 0");
   }
   return {};
 }

@@ -21,11 +21,11 @@ Status check(const TerrainOptions& options) {
   const IVec3 size = options.size;
   if (std::min({size.x, size.y, size.z}) < 1 || size.y > kMaxUp || std::max(size.x, size.z) > kMaxAcross) {
     return make_error(ErrorCode::InvalidArgument,
-                      "a terrain is 1 to 1024 units of 32 voxels wide and deep, 1 to 32 high");
+                      "terrain size: must be 1 to 1024 units of 32 voxels wide and deep, 1 to 32 high");
   }
   if (std::min(options.first_x, options.first_z) < -kMaxPlace ||
       std::max(options.first_x, options.first_z) > kMaxPlace) {
-    return make_error(ErrorCode::InvalidArgument, "a terrain begins at most 1048576 units from the origin");
+    return make_error(ErrorCode::InvalidArgument, "terrain origin: must be at most 1048576 units from 0");
   }
   return {};
 }

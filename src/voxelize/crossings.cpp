@@ -313,8 +313,8 @@ double expected_crossings(const Frame& frame) {
 Result<Crossings> Crossings::find(const Frame& frame, SolidVoxels rule, Threads threads, const Progress& progress) {
   if (const double expected = expected_crossings(frame); !(expected <= kMostCrossings)) {
     return make_error(ErrorCode::LimitExceeded,
-                      "the mesh would take more than 2^30 crossings of lines: its surface is " +
-                          std::to_string(static_cast<std::int64_t>(std::min(expected, 1e18))) + " voxels large");
+                      "the mesh needs more than 2^30 line crossings: its surface spans about " +
+                          std::to_string(static_cast<std::int64_t>(std::min(expected, 1e18))) + " voxels");
   }
   Crossings found;
   found.chunks_ = frame.chunks();

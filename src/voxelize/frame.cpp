@@ -19,11 +19,11 @@ constexpr int kMostVoxels = 1 << 14;
 constexpr double kClear = 1e-3;
 
 Error nothing_there() {
-  return make_error(ErrorCode::InvalidArgument, "the mesh has no triangle");
+  return make_error(ErrorCode::InvalidArgument, "the mesh has no triangles");
 }
 
 Error too_many(double voxels) {
-  return make_error(ErrorCode::LimitExceeded, "more than " + std::to_string(kMostVoxels) + " voxels along a side: " +
+  return make_error(ErrorCode::LimitExceeded, "more than " + std::to_string(kMostVoxels) + " voxels along an axis: " +
                                                   std::to_string(static_cast<std::int64_t>(std::min(voxels, 1e18))));
 }
 
@@ -36,29 +36,29 @@ Status check_materials(const TriangleMesh& mesh) {
   const std::size_t materials = std::max<std::size_t>(mesh.materials.size(), 1);
   for (const std::uint32_t material : mesh.material_of) {
     if (material >= materials) {
-      return make_error(ErrorCode::InvalidArgument,
-                        "a triangle of material " + std::to_string(material) + " of " + std::to_string(materials));
+      return make_error(ErrorCode::InvalidArgument, "a triangle has material index " + std::to_string(material) +
+                                                        ", but there are " + std::to_string(materials) + " materials");
     }
   }
   for (const MeshMaterial& material : mesh.materials) {
     if (material.texture && *material.texture >= mesh.textures.size()) {
-      return make_error(ErrorCode::InvalidArgument, "a material with a texture that is not there");
+      return make_error(ErrorCode::InvalidArgument, "a material's texture index is out of range");
     }
     if (material.emissive_texture && *material.emissive_texture >= mesh.textures.size()) {
-      return make_error(ErrorCode::InvalidArgument, "a material with an emissive texture that is not there");
+      return make_error(ErrorCode::InvalidArgument, "a material's emissive texture index is out of range");
     }
     const glm::vec4& colour = material.colour;
     const float sum = colour.x + colour.y + colour.z + colour.w + material.alpha_cutoff + material.roughness +
                       material.metalness + material.emission + material.emissive_tint.x + material.emissive_tint.y +
                       material.emissive_tint.z;
-    if (!std::isfinite(sum)) return make_error(ErrorCode::InvalidArgument, "a material that is not finite");
+    if (!std::isfinite(sum)) return make_error(ErrorCode::InvalidArgument, "a material has a value that is not finite");
   }
   for (const MeshTexture& texture : mesh.textures) {
     const AlphaImage& image = texture.image;
     const bool sound = image.width > 0 && image.height > 0 &&
                        image.rgba.size() == std::size_t{4} * static_cast<std::size_t>(image.width) *
                                                 static_cast<std::size_t>(image.height);
-    if (!sound) return make_error(ErrorCode::InvalidArgument, "a texture of another size than it says");
+    if (!sound) return make_error(ErrorCode::InvalidArgument, "a texture's size does not match its pixels");
   }
   return {};
 }
@@ -79,13 +79,13 @@ Status check_mesh(const TriangleMesh& mesh) {
   const auto fits = [](std::size_t size, std::size_t wanted) { return size == 0 || size == wanted; };
   if (!fits(mesh.colours.size(), mesh.positions.size()) || !fits(mesh.material_of.size(), triangles) ||
       !fits(mesh.texture_places.size(), 3 * triangles) || !fits(mesh.emissive_places.size(), 3 * triangles)) {
-    return make_error(ErrorCode::InvalidArgument, "a mesh whose arrays are of different lengths");
+    return make_error(ErrorCode::InvalidArgument, "the mesh's array lengths do not match");
   }
   for (std::size_t i = 0; i < triangles; ++i) {
     for (const std::uint32_t index : mesh.triangles[i]) {
       if (index >= mesh.positions.size()) {
-        return make_error(ErrorCode::InvalidArgument, "triangle " + std::to_string(i) + " has a corner " +
-                                                          std::to_string(index) + " of " +
+        return make_error(ErrorCode::InvalidArgument, "triangle " + std::to_string(i) + " has vertex index " +
+                                                          std::to_string(index) + ", but the number of positions is " +
                                                           std::to_string(mesh.positions.size()));
       }
       if (!is_finite(mesh.positions[index])) {
@@ -97,7 +97,7 @@ Status check_mesh(const TriangleMesh& mesh) {
 }
 
 Result<VoxelLattice> lattice_of_size(const TriangleMesh& mesh, int voxels) {
-  if (voxels <= 0) return make_error(ErrorCode::InvalidArgument, "a size of no voxels");
+  if (voxels <= 0) return make_error(ErrorCode::InvalidArgument, "size: must be at least 1 voxel");
   if (voxels > kMostVoxels) return too_many(voxels);
   if (const auto sound = check_mesh(mesh); !sound) return sound.error();
   const DBox box = mesh.bounds();
@@ -115,7 +115,7 @@ Result<VoxelLattice> lattice_of_size(const TriangleMesh& mesh, int voxels) {
 
 Result<VoxelLattice> lattice_of_voxel(const TriangleMesh& mesh, double voxel_size) {
   if (!(voxel_size > 0.0) || !std::isfinite(voxel_size)) {
-    return make_error(ErrorCode::InvalidArgument, "a voxel without a size");
+    return make_error(ErrorCode::InvalidArgument, "voxel size: must be finite and more than 0");
   }
   if (const auto sound = check_mesh(mesh); !sound) return sound.error();
   const DBox box = mesh.bounds();
@@ -143,7 +143,7 @@ DVec3 snapped(const DVec3& position) {
 
 Result<Frame> Frame::make(const TriangleMesh& mesh, const VoxelLattice& lattice, double margin) {
   if (!(lattice.voxel_size > 0.0) || !std::isfinite(lattice.voxel_size) || !is_finite(lattice.origin)) {
-    return make_error(ErrorCode::InvalidArgument, "a lattice without a size or a place");
+    return make_error(ErrorCode::InvalidArgument, "lattice: voxel size must be finite and more than 0, origin finite");
   }
   if (auto sound = check_mesh(mesh); !sound) return sound.error();
   Frame frame;

@@ -333,9 +333,9 @@ void warn_of_thin_parts(const TriangleMesh& mesh, const VoxelLattice& lattice, c
     }
   }
   if (lost == 0) return;
-  warnings.push_back("parts thinner than a voxel left out: " + with_thousands(lost) +
-                     " corners of the mesh have no voxel next to them (--separating 26, in programs "
-                     "SurfaceVoxels::Separating26, keeps them)");
+  warnings.push_back("some parts thinner than a voxel were left out: " + with_thousands(lost) +
+                     " mesh vertices have no adjacent voxel (--separating 26, or "
+                     "SurfaceVoxels::Separating26 in code, keeps them)");
 }
 
 }  // namespace
@@ -373,10 +373,10 @@ Result<VoxelizedMesh> voxelize(const TriangleMesh& mesh, const VoxelizeOptions& 
 Result<FieldOfMesh> distance_field(const TriangleMesh& mesh, const DistanceFieldOptions& options, VoxelRegistry& types,
                                    Threads threads, const Progress& progress) {
   if (options.solid == SolidVoxels::None) {
-    return make_error(ErrorCode::InvalidArgument, "a field needs a rule for what is solid");
+    return make_error(ErrorCode::InvalidArgument, "a distance field needs a rule for solid voxels");
   }
   if (!(options.band > 0.0F && options.band <= kMostBand)) {
-    return make_error(ErrorCode::InvalidArgument, "a band that is not within 0 and 64");
+    return make_error(ErrorCode::InvalidArgument, "band: must be more than 0 and at most 64");
   }
   FieldOfMesh made{DensityGrid(options.band), {}};
   DistanceFieldOptions own = options;

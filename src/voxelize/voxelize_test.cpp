@@ -339,7 +339,7 @@ TEST(VoxelizeSurface, WarnsOfTipsThatAreThinnerThanAVoxel) {
   const auto thin = voxelize(with_box, options, types);
   ASSERT_TRUE(thin);
   ASSERT_EQ(thin->warnings.size(), 1U);
-  EXPECT_NE(thin->warnings[0].find("1 corners of the mesh"), std::string::npos) << thin->warnings[0];
+  EXPECT_NE(thin->warnings[0].find("1 mesh vertices"), std::string::npos) << thin->warnings[0];
   options.surface = SurfaceVoxels::Separating26;
   const auto thick = voxelize(with_box, options, types);
   ASSERT_TRUE(thick);

@@ -126,7 +126,7 @@ Status light_meshes(const Scene& scene, const SceneLight& light, const LightOpti
   for (std::size_t i = 0; i < meshes.parts.size(); ++i) {
     MeshPart& part = meshes.parts[i];
     if (part.surfaces.empty()) continue;
-    if (!grids[i]) return refused(part, "no instance of the scene places it, so that it has no light");
+    if (!grids[i]) return refused(part, "cannot light it: no instance of the scene places it");
     const VertexLights lights(light.of(*grids[i]), scene.types, options);
     if (Status done = light_part(lights, threads, part); !done) return done;
   }

@@ -101,7 +101,7 @@ Status make_quads(const Lattice& lattice, const Signs& signs, const CellIndex& i
 Result<ArraySurface> surface_from_array(const ArrayView& array, const ArraySurfaceOptions& options, Threads threads,
                                         const Progress& progress) {
   if (std::isnan(options.iso)) {
-    return make_error(ErrorCode::InvalidArgument, "the value of the surface is not a number");
+    return make_error(ErrorCode::InvalidArgument, "the surface value must not be NaN");
   }
   const Result<Lattice> found = lattice_of(array);
   if (!found) return found.error();

@@ -274,16 +274,16 @@ class Builder {
 Result<LabelSurfaces> surfaces_from_labels(const ArrayView& labels, const LabelSurfaceOptions& options, Threads threads,
                                            const Progress& progress) {
   if (labels.type == ScalarType::Float32 || labels.type == ScalarType::Float64) {
-    return make_error(ErrorCode::InvalidArgument, "labels are whole numbers");
+    return make_error(ErrorCode::InvalidArgument, "labels must be integers");
   }
   if (options.relaxation_steps < 0 || options.relaxation_steps > kMaxRelaxationSteps) {
-    return make_error(ErrorCode::InvalidArgument, "the relaxation steps are not 0 to 1,000");
+    return make_error(ErrorCode::InvalidArgument, "relaxation steps: must be 0 to 1,000");
   }
   const Result<Lattice> lattice = lattice_of(labels);
   if (!lattice) return lattice.error();
   if (!LabelCode(labels.type).holds(options.background)) {
     return make_error(ErrorCode::InvalidArgument,
-                      "the array cannot hold the background " + std::to_string(options.background));
+                      "the array's type cannot represent the background label " + std::to_string(options.background));
   }
   return Builder(*lattice, options, threads, progress).build();
 }

@@ -51,7 +51,7 @@ Status check(const ArrayView& array) {
     }
   }
   if (!is_addressable(array)) {
-    return make_error(ErrorCode::InvalidArgument, "the array's strides lead out of the address space");
+    return make_error(ErrorCode::InvalidArgument, "the array's strides leave the address space");
   }
   return {};
 }

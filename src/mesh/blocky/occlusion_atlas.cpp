@@ -172,8 +172,8 @@ Result<Image> OcclusionAtlas::draw() {
   while (!place(order, edge, used)) {
     edge *= 2;
     if (edge > kMaxEdge) {
-      return make_error(ErrorCode::LimitExceeded, "the faces need a texture of more than " + std::to_string(kMaxEdge) +
-                                                      " texels a side; without an atlas they need none");
+      return make_error(ErrorCode::LimitExceeded, "the atlas needs a texture larger than " + std::to_string(kMaxEdge) +
+                                                      " texels per side; mesh without an atlas");
     }
   }
   width_ = edge;

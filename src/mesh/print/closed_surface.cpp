@@ -252,8 +252,9 @@ Result<BlockyTriangles> closed_surface(const Grid& grid, const Progress& progres
   const IBox bounds = grid.bounds();
   for (int axis = 0; axis < 3; ++axis) {
     if (bounds.min[axis] < -kFarthest || bounds.max[axis] > kFarthest) {
-      return make_error(ErrorCode::LimitExceeded,
-                        "voxels lie beyond 65,536, where floats are too coarse to part what touches");
+      return make_error(
+          ErrorCode::LimitExceeded,
+          "voxel coordinates must be -65,536 to 65,536: floats cannot separate touching parts beyond that");
     }
   }
   SurfaceMaker maker(grid);

@@ -432,8 +432,7 @@ bool can_simplify() {
 }
 
 Result<float> simplify_tagged(SmoothMesh& mesh, float error_in_samples, std::vector<std::uint32_t>& tags) {
-  if (!(error_in_samples >= 0.0F))
-    return make_error(ErrorCode::InvalidArgument, "the error must be a number of at least 0");
+  if (!(error_in_samples >= 0.0F)) return make_error(ErrorCode::InvalidArgument, "the error must be at least 0");
 #if QUOIN_ASSERT_ENABLED
   QUOIN_ASSERT(has_arrays_of_one_length(mesh));
   QUOIN_ASSERT(names_vertices(mesh));
@@ -452,11 +451,9 @@ bool can_simplify() {
 }
 
 Result<float> simplify_tagged(SmoothMesh&, float error_in_samples, std::vector<std::uint32_t>&) {
-  if (!(error_in_samples >= 0.0F))
-    return make_error(ErrorCode::InvalidArgument, "the error must be a number of at least 0");
-  return make_error(
-      ErrorCode::Unsupported,
-      "this build cannot simplify meshes: it was made without meshoptimizer (libmeshoptimizer-dev in Debian)");
+  if (!(error_in_samples >= 0.0F)) return make_error(ErrorCode::InvalidArgument, "the error must be at least 0");
+  return make_error(ErrorCode::Unsupported,
+                    "cannot simplify meshes: this build lacks meshoptimizer (libmeshoptimizer-dev in Debian)");
 }
 
 #endif

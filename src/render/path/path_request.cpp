@@ -35,23 +35,23 @@ bool is_anisotropy(double value) {
 
 Status check_air(const AirOptions& air) {
   for (const double part : {air.rayleigh, air.mie, air.ozone}) {
-    if (!(part >= 0.0 && part <= kMaxAir)) return refuse("air: must be 0 to 100 each");
+    if (!(part >= 0.0 && part <= kMaxAir)) return refuse("air: each factor must be 0 to 100");
   }
   for (const Vec3& colour : {air.rayleigh_colour, air.mie_colour, air.ozone_colour}) {
-    if (!is_colour(colour, static_cast<float>(kMaxAir))) return refuse("air: its colours must be 0 to 100 each");
+    if (!is_colour(colour, static_cast<float>(kMaxAir))) return refuse("air: each colour component must be 0 to 100");
   }
   return is_anisotropy(air.mie_anisotropy) ? Status() : refuse("air: its mie_anisotropy must be -0.99 to 0.99");
 }
 
 Status check_ground(const GroundPlane& ground) {
   if (!std::isfinite(ground.height)) return refuse("ground: its height must be finite");
-  if (!is_colour(ground.colour, 1.0F)) return refuse("ground: its colour must be 0 to 1 each");
+  if (!is_colour(ground.colour, 1.0F)) return refuse("ground: each colour component must be 0 to 1");
   return ground.fade >= 0.0 && ground.fade <= 1.0 ? Status() : refuse("ground: its fade must be 0 to 1");
 }
 
 Status check_fog(const Fog& fog) {
   if (!(fog.density >= 0.0 && fog.density <= kMaxFogDensity)) return refuse("fog: its density must be 0 to 1e6");
-  if (!is_colour(fog.colour, 1.0F)) return refuse("fog: its colour must be 0 to 1 each");
+  if (!is_colour(fog.colour, 1.0F)) return refuse("fog: each colour component must be 0 to 1");
   if (!is_anisotropy(fog.anisotropy)) return refuse("fog: its anisotropy must be -0.99 to 0.99");
   return std::isfinite(fog.top) ? Status() : refuse("fog: its top must be finite");
 }

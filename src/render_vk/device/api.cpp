@@ -23,7 +23,7 @@ PFN_vkGetInstanceProcAddr loader() {
 }
 
 Error no_loader() {
-  return make_error(ErrorCode::Unsupported, "vulkan: there is no loader (libvulkan.so.1) of version 1.1 or newer here");
+  return make_error(ErrorCode::Unsupported, "vulkan: no Vulkan loader found (libvulkan.so.1, version 1.1 or newer)");
 }
 
 }  // namespace

@@ -82,7 +82,7 @@ Status Device::adopt(const BorrowedVulkanDevice& lent) {
     const std::string family = std::to_string(lent.queue_family);
     return make_error(ErrorCode::InvalidArgument, "vulkan: " + description.name + " has no queue family " + family);
   }
-  if ((can & VK_QUEUE_COMPUTE_BIT) == 0) return refuse(description.name + ": the queue does not compute");
+  if ((can & VK_QUEUE_COMPUTE_BIT) == 0) return refuse(description.name + ": the queue does not support compute");
   physical_.queue_family = lent.queue_family;
   physical_.draws_triangles = (can & VK_QUEUE_GRAPHICS_BIT) != 0;
   physical_.draws_lines = physical_.draws_triangles && lent.fill_mode_non_solid;
@@ -129,11 +129,11 @@ Error Device::error_of(VkResult result, const std::string& doing) const {
   const std::string who = "vulkan: " + description().name + ": ";
   switch (result) {
     case VK_ERROR_OUT_OF_DEVICE_MEMORY:
-      return {ErrorCode::LimitExceeded, who + "out of its memory while " + doing, {}, {}};
+      return {ErrorCode::LimitExceeded, who + "out of device memory while " + doing, {}, {}};
     case VK_ERROR_OUT_OF_HOST_MEMORY:
-      return {ErrorCode::LimitExceeded, who + "out of the machine's memory while " + doing, {}, {}};
+      return {ErrorCode::LimitExceeded, who + "out of host memory while " + doing, {}, {}};
     case VK_ERROR_TOO_MANY_OBJECTS:
-      return {ErrorCode::LimitExceeded, who + "out of blocks of memory while " + doing, {}, {}};
+      return {ErrorCode::LimitExceeded, who + "too many memory allocations while " + doing, {}, {}};
     case VK_ERROR_DEVICE_LOST:
       return {ErrorCode::DeviceLost, who + "the device was lost while " + doing, {}, {}};
     default:

@@ -101,7 +101,7 @@ PhysicalDevice describe(const Api& api, VkPhysicalDevice handle) {
   if (properties.apiVersion < VK_API_VERSION_1_2) {
     device.description.missing = "Vulkan 1.2";
   } else if (!family) {
-    device.description.missing = "a queue that computes";
+    device.description.missing = "a compute queue";
   } else if (!has_addresses(api, handle)) {
     device.description.missing = "bufferDeviceAddress";
   }
@@ -134,9 +134,9 @@ VulkanInstance::~VulkanInstance() {
 Status VulkanInstance::open() {
   std::uint32_t version = 0;
   if (api_.vkEnumerateInstanceVersion(&version) != VK_SUCCESS || version < VK_API_VERSION_1_2) {
-    return refuse("the loader here is older than version 1.2");
+    return refuse("the Vulkan loader is older than version 1.2");
   }
-  if (listener_ && !has_validation(api_)) return refuse(std::string("there is no ") + kValidationLayer + " here");
+  if (listener_ && !has_validation(api_)) return refuse(std::string(kValidationLayer) + " is not installed");
   auto application = info_of<VkApplicationInfo>(VK_STRUCTURE_TYPE_APPLICATION_INFO);
   application.pApplicationName = application.pEngineName = "quoin";
   application.apiVersion = VK_API_VERSION_1_2;
@@ -153,10 +153,11 @@ Status VulkanInstance::open() {
   info.enabledExtensionCount = static_cast<std::uint32_t>(extensions.size());
   info.ppEnabledExtensionNames = extensions.data();
   if (const VkResult result = api_.vkCreateInstance(&info, nullptr, &handle_); result != VK_SUCCESS) {
-    if (result == VK_ERROR_INCOMPATIBLE_DRIVER) return refuse("there is no driver for any graphics device here");
-    return refuse("no instance can be made (VkResult " + std::to_string(result) + ")");
+    if (result == VK_ERROR_INCOMPATIBLE_DRIVER) return refuse("no graphics driver found");
+    return refuse("cannot create an instance (VkResult " + std::to_string(result) + ")");
   }
-  if (const char* missing = api_.load_instance(handle_)) return refuse(std::string("the loader here lacks ") + missing);
+  if (const char* missing = api_.load_instance(handle_))
+    return refuse(std::string("the Vulkan loader lacks ") + missing);
   return listen();
 }
 
@@ -165,7 +166,8 @@ Status VulkanInstance::listen() {
   const VkDebugUtilsMessengerCreateInfoEXT messenger = messenger_info(listener_);
   const auto create = reinterpret_cast<PFN_vkCreateDebugUtilsMessengerEXT>(
       api_.vkGetInstanceProcAddr(handle_, "vkCreateDebugUtilsMessengerEXT"));
-  if (create(handle_, &messenger, nullptr, &messenger_) != VK_SUCCESS) return refuse("validation cannot be heard");
+  if (create(handle_, &messenger, nullptr, &messenger_) != VK_SUCCESS)
+    return refuse("cannot receive validation messages");
   return {};
 }
 
@@ -177,7 +179,7 @@ Status VulkanInstance::list_devices() {
     api_.vkEnumeratePhysicalDevices(handle_, &count, handles.data());
     handles.resize(count);
   }
-  if (handles.empty()) return refuse("there is no driver for any graphics device here");
+  if (handles.empty()) return refuse("no graphics driver found");
   for (const VkPhysicalDevice handle : handles) devices_.push_back(describe(api_, handle));
   return {};
 }

@@ -70,7 +70,7 @@ TEST_F(VulkanMemory, AFullMemoryIsAnErrorAndNoMore) {
   const auto refused = memory.allocate(VkDeviceSize{1} << 50, "testing");
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::LimitExceeded);
-  EXPECT_NE(refused.error().message.find("out of its memory while testing"), std::string::npos)
+  EXPECT_NE(refused.error().message.find("out of device memory while testing"), std::string::npos)
       << refused.error().message;
   EXPECT_TRUE(memory.allocate(100, "testing"));
 }

@@ -84,7 +84,7 @@ TEST_F(VulkanBorrowed, TwoRenderersShareADevice) {
   VulkanPicture picture(first);
   const Status refused = second.draw(picture, camera_, options_, Accumulation::Restart);
   ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().message, "vulkan: the picture is of another renderer");
+  EXPECT_EQ(refused.error().message, "vulkan: the image belongs to another renderer");
   // Each renderer runs on its own thread, with the queue guarded.
   std::vector<std::thread> threads;
   for (VulkanRenderer* one : {&first, &second}) {

@@ -36,8 +36,7 @@ TEST_F(VulkanErrors, DevicesAreChosenByNumberOrName) {
   auto refused = VulkanRenderer::create(options);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::Unsupported);
-  EXPECT_EQ(
-      refused.error().message.find("vulkan: there is no device \"no such device\"; there is 0 " + devices[0].name), 0U)
+  EXPECT_EQ(refused.error().message.find("vulkan: no device \"no such device\"; available: 0 " + devices[0].name), 0U)
       << refused.error().message;
   options.device = std::to_string(devices.size());
   EXPECT_FALSE(VulkanRenderer::create(options));

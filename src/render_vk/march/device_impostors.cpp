@@ -287,7 +287,7 @@ Status DeviceImpostors::draw(const Scene& scene, std::span<const FarInstance> se
     number += std::uint64_t{shown.level.count} + shown.coarser.count + shown.unseen.count;
     // Shaders put the chosen view below the number.
     if (number <= std::numeric_limits<std::uint32_t>::max() / 4) continue;
-    return make_error(ErrorCode::LimitExceeded, "vulkan: impostors of more than 2^30 rectangles in an image");
+    return make_error(ErrorCode::LimitExceeded, "vulkan: an image shows more than 2^30 impostor rectangles");
   }
   return {};
 }

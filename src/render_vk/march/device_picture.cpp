@@ -9,7 +9,7 @@ namespace quoin {
 
 namespace {
 
-const char* const kDoing = "making room for a picture";
+const char* const kDoing = "allocating an image";
 
 }  // namespace
 
@@ -66,12 +66,11 @@ std::size_t VulkanPicture::bytes() const {
 
 Result<Image> VulkanPicture::read() const {
   if (impl_->samples == 0)
-    return make_error(ErrorCode::InvalidArgument, "vulkan: nothing was drawn that could be read");
+    return make_error(ErrorCode::InvalidArgument, "vulkan: cannot read the image: nothing was drawn");
   vulkan::Device& device = *impl_->device;
-  auto landing =
-      vulkan::Buffer::create(device, impl_->colours.size(), vulkan::Buffer::Where::Read, "reading a picture");
+  auto landing = vulkan::Buffer::create(device, impl_->colours.size(), vulkan::Buffer::Where::Read, "reading an image");
   if (!landing) return landing.error();
-  const Status done = device.run("reading a picture", [&](VkCommandBuffer commands) {
+  const Status done = device.run("reading an image", [&](VkCommandBuffer commands) {
     const VkBufferCopy all{0, 0, landing->size()};
     device.api().vkCmdCopyBuffer(commands, impl_->colours.handle(), landing->handle(), 1, &all);
   });
@@ -90,7 +89,7 @@ Status VulkanPicture::write(const Image& image) {
   const std::size_t pixels =
       has_pixels ? static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height) : 0;
   if (pixels == 0 || image.rgb.size() != 3 * pixels) {
-    return make_error(ErrorCode::InvalidArgument, "vulkan: a picture without pixels");
+    return make_error(ErrorCode::InvalidArgument, "vulkan: the image's size does not match its pixels");
   }
   if (Status sized = impl_->resize(image.width, image.height); !sized) return sized;
   vulkan::Device& device = *impl_->device;
@@ -98,7 +97,7 @@ Status VulkanPicture::write(const Image& image) {
   if (!staging) return staging.error();
   std::memset(staging->mapped(), 0xFF, 4 * pixels);  // opaque
   for (std::size_t i = 0; i < pixels; ++i) std::memcpy(staging->mapped() + 4 * i, image.rgb.data() + 3 * i, 3);
-  Status done = device.run("uploading a picture", [&](VkCommandBuffer commands) {
+  Status done = device.run("uploading an image", [&](VkCommandBuffer commands) {
     const VkBufferCopy all{0, 0, staging->size()};
     device.api().vkCmdCopyBuffer(commands, staging->handle(), impl_->colours.handle(), 1, &all);
   });

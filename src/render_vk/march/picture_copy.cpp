@@ -9,7 +9,7 @@ namespace {
 
 using vulkan::info_of;
 
-const char* const kDoing = "putting a picture into an image";
+const char* const kDoing = "copying to an image";
 
 Error wrong(const std::string& message) {
   return make_error(ErrorCode::InvalidArgument, "vulkan: " + message);
@@ -41,19 +41,19 @@ Status check(const VulkanImageTarget& target, int width, int height) {
   if (target.image == VK_NULL_HANDLE) return wrong("the image is null");
   if (!has_red_first(target.format) && !has_blue_first(target.format)) {
     return make_error(ErrorCode::Unsupported,
-                      "vulkan: pictures go into images of R8G8B8A8 and B8G8R8A8, UNORM and SRGB, not of VkFormat " +
+                      "vulkan: the target must be R8G8B8A8 or B8G8R8A8, UNORM or SRGB, not VkFormat " +
                           std::to_string(target.format));
   }
   if (target.width <= 0 || target.height <= 0)
-    return wrong("an image of " + size_text(target.width, target.height) + " pixels");
+    return wrong("invalid image size " + size_text(target.width, target.height));
   if (!lies_within(target.x, width, target.width) || !lies_within(target.y, height, target.height)) {
-    std::string message = "a picture of " + size_text(width, height);
+    std::string message = "a drawn image of " + size_text(width, height);
     message += " at (" + std::to_string(target.x) + ", " + std::to_string(target.y);
-    message += ") does not lie within an image of " + size_text(target.width, target.height);
+    message += ") does not fit the target image of " + size_text(target.width, target.height);
     return wrong(message);
   }
   if (!is_layout_to_leave(target.layout_after)) {
-    return wrong("an image cannot be left in VkImageLayout " + std::to_string(target.layout_after));
+    return wrong("layout_after: an image cannot be left in VkImageLayout " + std::to_string(target.layout_after));
   }
   return {};
 }
@@ -83,7 +83,7 @@ void end_copy(const vulkan::Api& api, VkCommandBuffer commands, VkImageMemoryBar
 }  // namespace
 
 Status VulkanPicture::Impl::prepare_copy(const VulkanImageTarget& target) {
-  if (samples == 0) return wrong("nothing was drawn that could be put into an image");
+  if (samples == 0) return wrong("cannot copy the image: nothing was drawn");
   if (Status right = check(target, width, height); !right) return right;
   if (!has_blue_first(target.format) || swapped.handle() != VK_NULL_HANDLE) return {};
   auto made = vulkan::Buffer::create(*device, colours.size(), vulkan::Buffer::Where::Device, kDoing);

@@ -213,20 +213,20 @@ TEST_F(VulkanImages, RefusesInvalidTargets) {
   for (const VkFormat format : {VK_FORMAT_R16G16B16A16_SFLOAT, VK_FORMAT_UNDEFINED, VK_FORMAT_R8G8B8_UNORM}) {
     wrong = right;
     wrong.format = format;
-    expect_error(wrong, ErrorCode::Unsupported, "not of VkFormat " + std::to_string(format));
+    expect_error(wrong, ErrorCode::Unsupported, "not VkFormat " + std::to_string(format));
   }
   for (const auto& [width, height] : {std::pair{0, 30}, {40, 0}, {-40, 30}}) {
     wrong = right;
     wrong.width = width;
     wrong.height = height;
-    expect_error(wrong, ErrorCode::InvalidArgument, "an image of " + std::to_string(width) + " x ");
+    expect_error(wrong, ErrorCode::InvalidArgument, "invalid image size " + std::to_string(width) + " x ");
   }
   constexpr int kMost = std::numeric_limits<int>::max();
   for (const auto& [x, y] : {std::pair{21, 0}, {0, 21}, {-1, 0}, {0, -1}, {kMost, 0}, {0, kMost}}) {
     wrong = right;
     wrong.x = x;
     wrong.y = y;
-    expect_error(wrong, ErrorCode::InvalidArgument, "does not lie within an image of 40 x 30");
+    expect_error(wrong, ErrorCode::InvalidArgument, "does not fit the target image of 40 x 30");
   }
   for (const VkImageLayout layout : {VK_IMAGE_LAYOUT_UNDEFINED, VK_IMAGE_LAYOUT_PREINITIALIZED}) {
     wrong = right;

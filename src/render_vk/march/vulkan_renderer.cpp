@@ -13,7 +13,7 @@ namespace {
 
 Status check_request(const Camera& camera, const RenderOptions& options) {
   if (options.light.occlusion_mode == OcclusionMode::Smooth) {
-    return make_error(ErrorCode::Unsupported, "vulkan: smooth occlusion of marched fields is the processor's");
+    return make_error(ErrorCode::Unsupported, "vulkan: smooth occlusion of marched fields needs the CPU renderer");
   }
   return check(camera, options);
 }
@@ -102,7 +102,7 @@ Status VulkanRenderer::draw(VulkanPicture& picture, const Camera& camera, const 
   if (Status status = check_request(camera, options); !status) return status;
   vulkan::PictureImpl& target = vulkan::Access::of(picture);
   if (target.device != impl_->device.get()) {
-    return make_error(ErrorCode::InvalidArgument, "vulkan: the picture is of another renderer");
+    return make_error(ErrorCode::InvalidArgument, "vulkan: the image belongs to another renderer");
   }
   if (Status status = target.resize(options.width, options.height); !status) return status;
   // Samples of meshes, and of pictures that were written, have no sums to add to.
@@ -113,7 +113,7 @@ Status VulkanRenderer::draw(VulkanPicture& picture, const Camera& camera, const 
   QUOIN_ASSERT(target.camera == camera, "a picture's samples are of one camera");
   QUOIN_ASSERT(target.light == options.light, "a picture's samples are of one light");
   if (target.samples + options.samples > kMaxSamples) {
-    return make_error(ErrorCode::LimitExceeded, "vulkan: a picture has 4096 samples a pixel at most");
+    return make_error(ErrorCode::LimitExceeded, "vulkan: an image accumulates at most 4096 samples per pixel");
   }
   const auto subject = vulkan::Subject::of(*impl_, camera, options, threads);
   if (!subject) return subject.error();

@@ -16,7 +16,7 @@ namespace {
 using DeviceBuffer = vulkan::Buffer;
 using vulkan::Vec4;
 
-const char* const kDoing = "making room for a picture";
+const char* const kDoing = "allocating an image";
 
 constexpr std::size_t kPartBytes = sizeof(path::SurfaceParts::OfPixel);
 static_assert(sizeof(path::SurfacePart) == 15 * sizeof(float));
@@ -95,8 +95,9 @@ std::size_t VulkanPathPicture::bytes() const {
 
 Result<PathPicture> VulkanPathPicture::read(Threads threads) const {
   const Impl& from = *impl_;
-  if (from.samples == 0) return make_error(ErrorCode::InvalidArgument, "vulkan: nothing was drawn that could be read");
-  const char* const doing = "reading a picture";
+  if (from.samples == 0)
+    return make_error(ErrorCode::InvalidArgument, "vulkan: cannot read the image: nothing was drawn");
+  const char* const doing = "reading an image";
   const auto fetch = [&](const DeviceBuffer& buffer) -> Result<DeviceBuffer> {
     auto landing = DeviceBuffer::create(*from.device, buffer.size(), DeviceBuffer::Where::Read, doing);
     if (!landing) return landing.error();

@@ -16,7 +16,7 @@ namespace quoin {
 namespace vulkan {
 namespace {
 
-const char* const kDoing = "drawing by paths";
+const char* const kDoing = "path tracing";
 constexpr int kSamplesAtOnce = 16;  // samples of a tile between progress reports
 constexpr int kDispatchesAtOnce = 8;
 constexpr int kFewSamples = 4;  // so few are over before larger buffers are made
@@ -218,7 +218,7 @@ Status VulkanRenderer::draw_paths(VulkanPathPicture& picture, const Camera& came
   if (Status status = path::check(camera, options); !status) return status;
   vulkan::PathPictureImpl& target = vulkan::Access::of(picture);
   if (target.device != impl_->device.get()) {
-    return make_error(ErrorCode::InvalidArgument, "vulkan: the picture is of another renderer");
+    return make_error(ErrorCode::InvalidArgument, "vulkan: the image belongs to another renderer");
   }
   const bool has_another_size = target.options.width != options.width || target.options.height != options.height;
   if (accumulation == Accumulation::Restart || target.samples == 0 || has_another_size) {
@@ -229,7 +229,8 @@ Status VulkanRenderer::draw_paths(VulkanPathPicture& picture, const Camera& came
   QUOIN_ASSERT(target.camera == camera, "a picture's samples are of one camera");
   QUOIN_ASSERT(target.options == as_before, "a picture's samples are of the same options");
   if (target.samples + options.samples > path::kMaxPathSamples) {
-    return make_error(ErrorCode::LimitExceeded, "vulkan: a picture by paths has 65,536 samples a pixel at most");
+    return make_error(ErrorCode::LimitExceeded,
+                      "vulkan: a path-traced image accumulates at most 65,536 samples per pixel");
   }
   if (impl_->paths == nullptr) {
     auto made = vulkan::PathPipelines::create(*impl_->device);

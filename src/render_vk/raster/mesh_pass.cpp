@@ -54,12 +54,12 @@ struct MeshPass::Step {
 Result<std::unique_ptr<MeshPass>> MeshPass::create(Device& device, DeviceMemory& memory) {
   const std::string& name = device.description().name;
   if (!device.physical().draws_triangles) {
-    return make_error(ErrorCode::Unsupported, "vulkan: " + name + ": its queue that computes draws no triangles");
+    return make_error(ErrorCode::Unsupported, "vulkan: " + name + ": its compute queue does not support graphics");
   }
   VkFormatProperties depths{};
   device.api().vkGetPhysicalDeviceFormatProperties(device.physical().handle, kMeshDepth, &depths);
   if ((depths.optimalTilingFeatures & VK_FORMAT_FEATURE_DEPTH_STENCIL_ATTACHMENT_BIT) == 0) {
-    return make_error(ErrorCode::Unsupported, "vulkan: " + name + " lacks depths in single precision");
+    return make_error(ErrorCode::Unsupported, "vulkan: " + name + " lacks 32-bit float depth buffers");
   }
   std::unique_ptr<MeshPass> pass(new MeshPass(device, memory));
   if (Status opened = pass->open(); !opened) return opened.error();

@@ -38,13 +38,13 @@ Status check(const ChunkSurface& surface) {
   const std::size_t count = mesh.positions.size();
   const bool is_whole = mesh.normals.size() == count && surface.albedo.size() == count &&
                         surface.types.size() == count && (mesh.occlusion.empty() || mesh.occlusion.size() == count);
-  if (!is_whole) return refuse("surface: its vertices' arrays are not of one size");
+  if (!is_whole) return refuse("surface: its vertex arrays have different lengths");
   const bool is_of_triangles = mesh.indices.size() % 3 == 0 && surface.glass_indices % 3 == 0;
-  if (!is_of_triangles) return refuse("surface: its indices are no whole triangles");
-  if (surface.glass_indices > mesh.indices.size()) return refuse("surface: more indices of glass than indices");
+  if (!is_of_triangles) return refuse("surface: its index counts are not multiples of 3");
+  if (surface.glass_indices > mesh.indices.size()) return refuse("surface: more glass indices than indices");
   const bool is_inside =
       std::all_of(mesh.indices.begin(), mesh.indices.end(), [&](std::uint32_t index) { return index < count; });
-  if (!is_inside) return refuse("surface: an index names no vertex");
+  if (!is_inside) return refuse("surface: an index is out of range");
   return {};
 }
 

@@ -70,7 +70,7 @@ void Attachment::swap(Attachment& other) noexcept {
 }
 
 Result<MeshTarget> MeshTarget::create(const Device& device, VkRenderPass pass, VkExtent2D size, std::uint32_t samples) {
-  const std::string doing = "making room for a picture";
+  const std::string doing = "allocating an image";
   constexpr VkImageUsageFlags kColour = VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT;
   const Attachment::Kind drawn{kMeshColour, samples > 1 ? kColour : kColour | VK_IMAGE_USAGE_TRANSFER_SRC_BIT,
                                VK_IMAGE_ASPECT_COLOR_BIT};

@@ -39,7 +39,7 @@ Status check(const Camera& camera, const MeshPictureOptions& options) {
   constexpr std::array kSamples = {1, 2, 4, 8};
   if (Status right = check(camera, request_of(options)); !right) return right;
   if (std::find(kSamples.begin(), kSamples.end(), options.samples) == kSamples.end()) {
-    return make_error(ErrorCode::InvalidArgument, "samples: of meshes must be 1, 2, 4 or 8");
+    return make_error(ErrorCode::InvalidArgument, "samples: must be 1, 2, 4 or 8 for meshes");
   }
   return {};
 }
@@ -191,17 +191,17 @@ Status VulkanMeshRenderer::Impl::check_request(const vulkan::PictureImpl& target
     return refuse(who + " draws meshes of at most " + edge + " x " + edge + " pixels");
   }
   if (options.wireframe != Wireframe::Off && !device->physical().draws_lines) {
-    return make_error(ErrorCode::Unsupported, who + " lacks fillModeNonSolid, which draws edges of triangles");
+    return make_error(ErrorCode::Unsupported, who + " lacks fillModeNonSolid, which wireframes need");
   }
-  if (target.device != device) return refuse("vulkan: the picture is of another renderer than the meshes");
+  if (target.device != device) return refuse("vulkan: the image belongs to another renderer than the meshes");
   const bool needs_voxels =
       options.detail.policy.has_value() || traces_light(options.light) || has_glass_by_rays(options);
   const bool has_voxels =
       renderer->voxels == scene && renderer->at_update.is_beside(at_update) && renderer->instances == shown;
   if (needs_voxels && scene != nullptr && !has_voxels) {
     return refuse(
-        "vulkan: shadows, lamps, glass by rays and levels of detail need VulkanRenderer::update with the scene of the "
-        "meshes");
+        "vulkan: shadows, lamps, ray-traced glass and levels of detail need VulkanRenderer::update with the meshes' "
+        "scene");
   }
   return {};
 }

@@ -217,10 +217,10 @@ TEST_F(VulkanMeshUpdate, WrongSurfacesAreRefusedAndChangeNothing) {
   const auto smooth = [&] { return vulkan_test::smooth_surface(field, scene.types, {0, 0, 0}); };
   const auto short_albedo = smooth();
   short_albedo->albedo.pop_back();
-  expect_refused(short_albedo, "surface: its vertices' arrays are not of one size");
+  expect_refused(short_albedo, "surface: its vertex arrays have different lengths");
   const auto outside = smooth();
   outside->smooth.indices.data()[5] = static_cast<std::uint32_t>(outside->types.size());
-  expect_refused(outside, "surface: an index names no vertex");
+  expect_refused(outside, "surface: an index is out of range");
   surfaces[1].surface = smooth();
   EXPECT_TRUE(meshes_->put(surfaces));
 }
@@ -244,7 +244,7 @@ TEST_F(VulkanMeshUpdate, WrongPicturesAreRefused) {
   expect_refused(camera, with([](auto& o) { o.width = o.height = 1 << 20; }), "size: more than");
   expect_refused(camera, with([](auto& o) { o.width = 1 << 24; }), "draws meshes of at most");
   for (const int samples : {0, 3, -1, 16}) {
-    expect_refused(camera, with([=](auto& o) { o.samples = samples; }), "samples: of meshes must be 1, 2, 4 or 8");
+    expect_refused(camera, with([=](auto& o) { o.samples = samples; }), "samples: must be 1, 2, 4 or 8 for meshes");
   }
   expect_refused(camera, with([](auto& o) { o.light.sun = DVec3(0.0); }), "sun");
   Camera wrong = camera;
@@ -255,7 +255,7 @@ TEST_F(VulkanMeshUpdate, WrongPicturesAreRefused) {
   auto other = VulkanRenderer::create();
   ASSERT_TRUE(other);
   VulkanPicture elsewhere(*other);
-  expect_error(meshes_->draw(elsewhere, camera, right), ErrorCode::InvalidArgument, "of another renderer");
+  expect_error(meshes_->draw(elsewhere, camera, right), ErrorCode::InvalidArgument, "belongs to another renderer");
   EXPECT_TRUE(meshes_->draw(picture, camera, right));
 }
 

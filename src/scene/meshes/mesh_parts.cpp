@@ -15,9 +15,8 @@ Status check_instances(const Scene& scene, InstanceFilter filter) {
     const Instance& instance = scene.instances()[handle];
     if (!is_drawn(scene, instance, filter)) continue;
     if (has_place(instance)) continue;
-    return make_error(
-        ErrorCode::InvalidArgument,
-        "instance \"" + instance.name + "\" has a transform that is not finite or a size that is not positive");
+    return make_error(ErrorCode::InvalidArgument,
+                      "instance \"" + instance.name + "\" needs a finite transform with a positive scale");
   }
   return {};
 }

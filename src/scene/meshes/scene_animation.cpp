@@ -34,8 +34,9 @@ Status SceneAnimation::add(const Scene& frame, InstanceFilter filter) {
     instances_.resize(count);
   }
   if (count != instances_.size() || !has_the_same_grids(frame)) {
-    return make_error(ErrorCode::InvalidArgument,
-                      "frame " + std::to_string(frames_) + " has other instances or grids than those before it");
+    return make_error(
+        ErrorCode::InvalidArgument,
+        "frame " + std::to_string(frames_) + " must have the same instances and grids as the frames before it");
   }
   std::size_t place = 0;
   for (const InstanceHandle handle : frame.instances().handles()) {

@@ -104,14 +104,14 @@ Status check_atlas(const Scene& scene, const std::vector<GridHandle>& grids, con
   const BlockyMeshOptions& mesh = options.mesh;
   if (!mesh.merge || !mesh.bake_occlusion || mesh.watertight || mesh.cut || options.cut) {
     return make_error(ErrorCode::InvalidArgument,
-                      "an atlas is of faces that are merged, not cut or watertight, and have occlusion");
+                      "cannot make an atlas: it needs merged faces with occlusion, neither cut nor watertight");
   }
   constexpr int kFarthest = 1 << 24;  // floats cannot represent larger integers exactly
   for (const GridHandle handle : grids) {
     const IBox bounds = scene.grids()[handle].grid.bounds();
     const bool is_near = bounds.empty() || (glm::all(glm::greaterThanEqual(bounds.min, IVec3(-kFarthest))) &&
                                             glm::all(glm::lessThanEqual(bounds.max, IVec3(kFarthest))));
-    if (!is_near) return make_error(ErrorCode::LimitExceeded, "an atlas of voxels beyond 2^24");
+    if (!is_near) return make_error(ErrorCode::LimitExceeded, "cannot make an atlas: voxel coordinates exceed 2^24");
   }
   return {};
 }

@@ -194,7 +194,7 @@ Error SmoothScene::Impl::refuse(const Scene& of) {
   bytes = 0;
   is_placed_anew = true;
   return Error{ErrorCode::LimitExceeded,
-               "the densities of " + std::to_string(chunk_count(of)) + " chunks of voxels take more than " +
+               "the densities of " + std::to_string(chunk_count(of)) + " chunks exceed the limit of " +
                    std::to_string(options.max_bytes >> 20) + " MiB",
                "", std::nullopt};
 }

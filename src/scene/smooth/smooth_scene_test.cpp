@@ -156,7 +156,7 @@ TEST(SmoothScene, RefusesWhatIsTooLargeUntilItIsSmaller) {
     const Status refused = smooth.update(made.scene, {2});
     ASSERT_FALSE(refused);
     EXPECT_EQ(refused.error().code, ErrorCode::LimitExceeded);
-    EXPECT_EQ(refused.error().message, "the densities of 3 chunks of voxels take more than 1 MiB");
+    EXPECT_EQ(refused.error().message, "the densities of 3 chunks exceed the limit of 1 MiB");
     EXPECT_EQ(smooth.bytes(), 0U);
   }
   made.scene.edit(made.hill).grid.clear();

@@ -50,7 +50,7 @@ void FoundParts::take(const Part& part) {
   const bool is_named = std::holds_alternative<std::string>(part.key.id);
   if ((!is_named && (number_of(part.key) < 0 || number_of(part.key) > kMaxPartNumber)) ||
       !check_part(part.key, part.body)) {
-    lost_.push_back(name_of(part.key) + " is no part of that kind");
+    lost_.push_back(name_of(part.key) + " is not valid");
     return;
   }
   const auto found = parts_.find(part.key);
@@ -115,7 +115,7 @@ float FoundParts::band(std::uint32_t grid) const {
 void FoundParts::add_grid(std::uint32_t grid) {
   if (grids_.contains(grid)) return;
   const std::string name = "lost grid " + std::to_string(grid);
-  lost_.push_back(name_of({part::kGrid, std::int64_t{grid}}) + ": its name, place of its pivot and band are lost");
+  lost_.push_back(name_of({part::kGrid, std::int64_t{grid}}) + ": its name, pivot and band are lost");
   const WorldGrid header{.name = name};
   const auto put = [&](const PartKey& key, const std::string& text) { parts_[key] = {0, body_of(text)}; };
   put({part::kGrid, std::int64_t{grid}}, text_of(header));

@@ -151,7 +151,7 @@ class Check {
       if (!reading_.add(body.size())) return RowVerdict::Stop;
       const auto region = regions.find(key >> kRegionBits);
       if (region == regions.end()) {
-        tell("the chunk of key " + std::to_string(key) + " lies in a region that is not there");
+        tell("the chunk with key " + std::to_string(key) + " lies in a missing region");
         return RowVerdict::Damaged;
       }
       const ChunkPlace place{region->second.grid, region->second.level, chunk_of_key(region->second, key)};
@@ -198,7 +198,7 @@ class Check {
 Result<std::uint64_t> back_up(const std::filesystem::path& from, const std::filesystem::path& to) {
   std::error_code error;
   if (std::filesystem::exists(std::filesystem::symlink_status(to, error))) {
-    return make_error(ErrorCode::CannotWrite, "there is a file of that name", to.string());
+    return make_error(ErrorCode::CannotWrite, "file already exists", to.string());
   }
   const auto lock = WorldLock::take(to);
   if (!lock) return with_path(Result<std::uint64_t>(lock.error()), to);
@@ -233,7 +233,7 @@ Status compact(const std::filesystem::path& named) {
   auto connection = Connection::open(path.string(), Connection::Mode::Write);
   if (!connection) return connection.error();
   if (auto done = check_schema(*connection); !done) return done;
-  if (!end_writing(*connection)) return make_error(ErrorCode::CannotWrite, "another program reads it");
+  if (!end_writing(*connection)) return make_error(ErrorCode::CannotWrite, "another program is reading it");
   if (auto done = connection->run("PRAGMA temp_store=FILE; VACUUM"); !done) return done;
   return connection->close();
 }

@@ -63,7 +63,7 @@ class Copy {
 
  private:
   static Status damaged(const std::string& what) {
-    return make_error(ErrorCode::BadFormat, what + ": `quoin world repair` keeps what is sound");
+    return make_error(ErrorCode::BadFormat, what + "; `quoin world repair` recovers the undamaged data");
   }
 
   Status copy_parts() {
@@ -112,7 +112,8 @@ class Copy {
     const auto gaps = rows.each([&](std::int64_t key, std::span<const std::byte> body) {
       const auto region = regions_.find(key >> kRegionBits);
       if (region == regions_.end()) {
-        copied_.lost.push_back({std::nullopt, "the chunk of key " + std::to_string(key) + " lies in no region"});
+        copied_.lost.push_back(
+            {std::nullopt, "the chunk with key " + std::to_string(key) + " lies in a missing region"});
         return RowVerdict::Damaged;
       }
       const ChunkPlace place{region->second.grid, region->second.level, chunk_of_key(region->second, key)};

@@ -101,7 +101,7 @@ class Repair {
     for (std::string& line : parts_.lost()) tell(std::move(line));
     check_.parts = parts_.count();
     if (check_.chunks == 0 && check_.parts == 0) {
-      return make_error(ErrorCode::BadFormat, "nothing of a world is left in it");
+      return make_error(ErrorCode::BadFormat, "cannot repair it: no world data found");
     }
     return std::move(check_);
   }
@@ -132,7 +132,7 @@ class Repair {
       if (is_key_right) {
         lost_.insert({region->second.grid, region->second.level, chunk_of_key(region->second, key)});
       } else {
-        tell("the chunk of key " + std::to_string(key) + " is damaged");
+        tell("the chunk with key " + std::to_string(key) + " is damaged");
       }
       return RowVerdict::Damaged;
     });
@@ -230,7 +230,7 @@ Result<WorldRepair> repair_world(const std::filesystem::path& from, const std::f
   if (!lock) return fail(lock.error(), target);
   std::error_code error;
   if (!is_in_place && std::filesystem::exists(std::filesystem::symlink_status(target, error))) {
-    return fail(make_error(ErrorCode::CannotWrite, "there is a file of that name"), to);
+    return fail(make_error(ErrorCode::CannotWrite, "file already exists"), to);
   }
   const std::filesystem::path fresh = fresh_name(target);
   WorldRepair repair;

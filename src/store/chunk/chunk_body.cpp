@@ -48,12 +48,11 @@ std::size_t max_content(std::uint8_t sections) {
 
 Status check_magic(std::span<const std::byte> body) {
   if (std::memcmp(body.data() + kMagicAt, kMagic.data(), kMagic.size() - 1) != 0) {
-    return fault("not the body of a chunk", kMagicAt);
+    return fault("not a chunk body", kMagicAt);
   }
   const auto version = std::to_integer<char>(body[kMagicAt + kMagic.size() - 1]);
   if (version == kMagic.back()) return {};
-  return make_error(ErrorCode::Unsupported, "a chunk of a later version of the format", {},
-                    kMagicAt + kMagic.size() - 1);
+  return make_error(ErrorCode::Unsupported, "the chunk has a later format version", {}, kMagicAt + kMagic.size() - 1);
 }
 
 Status check_sections(const ChunkBodyHeader& header, std::size_t stored_bytes) {
@@ -63,11 +62,11 @@ Status check_sections(const ChunkBodyHeader& header, std::size_t stored_bytes) {
   const bool has_content = (header.sections & (kVoxels | kDensities)) != 0;
   if ((header.sections & ~kKnown) != 0 || (has_content ? header.content_bytes == 0 : header.sections != 0) ||
       ((header.sections & kData) != 0 && (header.sections & kVoxels) == 0)) {
-    return fault("sections " + std::to_string(header.sections), kSectionsAt);
+    return fault("invalid sections " + std::to_string(header.sections), kSectionsAt);
   }
   if (header.content_bytes > max_content(header.sections) || (!is_compressed && header.content_bytes != stored_bytes) ||
       (is_compressed && header.content_bytes <= stored_bytes)) {
-    return fault("a content of " + std::to_string(header.content_bytes) + " bytes", kContentBytesAt);
+    return fault("invalid content size of " + std::to_string(header.content_bytes) + " bytes", kContentBytesAt);
   }
   return {};
 }
@@ -81,14 +80,14 @@ void put_checksum(std::span<std::byte> body) {
 }
 
 Result<ChunkBodyHeader> read_header(std::span<const std::byte> body) {
-  if (body.size() < kChunkBodyHeader) return fault("cut off", body.size());
+  if (body.size() < kChunkBodyHeader) return fault("unexpected end", body.size());
   if (auto status = check_magic(body); !status) return status.error();
-  if (number_at<std::uint64_t>(body.data()) != checksum_of(body)) return fault("the checksum is wrong", 0);
+  if (number_at<std::uint64_t>(body.data()) != checksum_of(body)) return fault("wrong checksum", 0);
   ContentReader reader(body.subspan(kSectionsAt, kChunkBodyHeader - kSectionsAt));
   ChunkBodyHeader header;
   header.sections = reader.take<std::uint8_t>();
   header.place.level = reader.take<std::uint8_t>();
-  if (reader.take<std::uint16_t>() != 0) return fault("bytes that are to be 0", kSectionsAt + 2);
+  if (reader.take<std::uint16_t>() != 0) return fault("reserved bytes are not 0", kSectionsAt + 2);
   header.place.grid = reader.take<std::uint32_t>();
   for (int axis = 0; axis < 3; ++axis)
     header.place.chunk[axis] = static_cast<std::int32_t>(reader.take<std::uint32_t>());
@@ -187,16 +186,16 @@ Result<std::span<const std::byte>> ChunkDecoder::content_of(const ChunkBodyHeade
   if ((header.sections & chunk_sections::kCompressed) == 0) return stored;
   // Checked before memory is allocated; the encoder always stores the size in the frame.
   if (ZSTD_getFrameContentSize(stored.data(), stored.size()) != header.content_bytes) {
-    return fault("no zstd frame of " + std::to_string(header.content_bytes) + " bytes", kChunkBodyHeader);
+    return fault("not a zstd frame of " + std::to_string(header.content_bytes) + " bytes", kChunkBodyHeader);
   }
   content_.resize(header.content_bytes);
   const std::size_t bytes =
       ZSTD_decompressDCtx(expander_->context, content_.data(), content_.size(), stored.data(), stored.size());
   if (ZSTD_isError(bytes) != 0) {
     if (ZSTD_getErrorCode(bytes) == ZSTD_error_memory_allocation) throw std::bad_alloc();
-    return fault(std::string("the zstd frame: ") + ZSTD_getErrorName(bytes), kChunkBodyHeader);
+    return fault(std::string("zstd: ") + ZSTD_getErrorName(bytes), kChunkBodyHeader);
   }
-  if (bytes != content_.size()) return fault("a zstd frame that ends early", kChunkBodyHeader);
+  if (bytes != content_.size()) return fault("zstd: unexpected end", kChunkBodyHeader);
   return std::span<const std::byte>(content_);
 }
 
@@ -217,7 +216,7 @@ Result<StoredChunk> ChunkDecoder::read_sections(const ChunkBodyHeader& header, s
     if (!densities) return densities.error();
     chunk.densities = std::move(*densities);
   }
-  if (!reader.is_at_end()) return ContentReader::fault("something behind the last section", reader.at());
+  if (!reader.is_at_end()) return ContentReader::fault("extra bytes after the last section", reader.at());
   return chunk;
 }
 
@@ -227,7 +226,7 @@ Result<StoredChunk> ChunkDecoder::decode(const ChunkPlace& expected, std::span<c
   const auto header = read_header(body);
   if (!header) return header.error();
   if (header->place != expected) {
-    return fault("it is of " + text_of(header->place) + ", not of " + text_of(expected), kSectionsAt);
+    return fault("it is " + text_of(header->place) + ", not " + text_of(expected), kSectionsAt);
   }
   const auto content = content_of(*header, body);
   if (!content) return content.error();

@@ -267,7 +267,7 @@ TEST(ChunkBody, SaysWhatItIs) {
     const auto back = decoder.decode(other, body, {&many_types(), 8.0F});
     ASSERT_FALSE(back.has_value());
     EXPECT_EQ(back.error().code, ErrorCode::BadFormat);
-    EXPECT_NE(back.error().message.find("it is of chunk"), std::string::npos);
+    EXPECT_NE(back.error().message.find("it is chunk"), std::string::npos);
   }
 }
 
@@ -376,17 +376,17 @@ TEST(ChunkBody, LiesAreNamed) {
     const auto back = decoded(stored_raw(content, 1), types);
     return back ? std::string() : to_string(back.error());
   };
-  EXPECT_EQ(message(0, 3), "byte 44: voxels of form 3 with 2 types");
-  EXPECT_EQ(message(0, 0), "byte 44: voxels of form 0 with 2 types");
-  EXPECT_EQ(message(3, 4), "byte 47: type 4, and the world has 3");
-  EXPECT_EQ(message(5, 1), "byte 49: type 1 twice");
-  EXPECT_EQ(message(7, 1), "byte 51: 1 runs of 2 types");
-  EXPECT_EQ(message(7, 2), "byte 59: runs that end at voxel 6");
-  EXPECT_EQ(message(15, 5), "byte 59: a run's length at voxel 7");
-  EXPECT_EQ(message(15, 3), "byte 59: runs that end at voxel 262143");
+  EXPECT_EQ(message(0, 3), "byte 44: unknown voxel encoding 3 with 2 types");
+  EXPECT_EQ(message(0, 0), "byte 44: unknown voxel encoding 0 with 2 types");
+  EXPECT_EQ(message(3, 4), "byte 47: type 4, but the last type of the world is 3");
+  EXPECT_EQ(message(5, 1), "byte 49: duplicate type 1");
+  EXPECT_EQ(message(7, 1), "byte 51: invalid number of runs: 1 for 2 types");
+  EXPECT_EQ(message(7, 2), "byte 59: runs end early, at voxel 6");
+  EXPECT_EQ(message(15, 5), "byte 59: invalid run length at voxel 7");
+  EXPECT_EQ(message(15, 3), "byte 59: runs end early, at voxel 262143");
   auto longer = good;
   longer.push_back(std::byte{0});
-  EXPECT_EQ(to_string(decoded(stored_raw(longer, 1), types).error()), "byte 64: something behind the last section");
+  EXPECT_EQ(to_string(decoded(stored_raw(longer, 1), types).error()), "byte 64: extra bytes after the last section");
   auto later = encoded(chunk);
   later[11] = std::byte{'2'};
   put_checksum(later);

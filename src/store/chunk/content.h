@@ -59,7 +59,7 @@ class ContentReader {
       if ((byte == 0 && shift != 0) || number > 0xFFFF'FFFFU) break;
       return static_cast<std::uint32_t>(number);
     }
-    return fault("a number that is too long", at_ - 1);
+    return fault("number too long", at_ - 1);
   }
   /// Requires: has(count).
   std::span<const std::byte> take_bytes(std::size_t count) {
@@ -71,7 +71,7 @@ class ContentReader {
   [[nodiscard]] static Error fault(const std::string& what, std::size_t at) {
     return make_error(ErrorCode::BadFormat, what, {}, at);
   }
-  [[nodiscard]] Error cut_off() const { return fault("cut off", bytes_.size()); }
+  [[nodiscard]] Error cut_off() const { return fault("unexpected end", bytes_.size()); }
 
  private:
   std::span<const std::byte> bytes_;

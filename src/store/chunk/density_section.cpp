@@ -199,7 +199,7 @@ class StoredHalves {
 };
 
 Error wrong_density(std::size_t at) {
-  return ContentReader::fault("a density beyond the band, or one that is -0 or nearer to 0 than any is stored", at);
+  return ContentReader::fault("invalid density: beyond the band, -0 or too close to 0", at);
 }
 
 // Requires: as many bytes as rows of mixed slabs take.
@@ -275,7 +275,7 @@ Result<DensityChunk> DensityReader::read(ContentReader& reader, VoxelRunReader& 
   if (!reader.has(3)) return reader.cut_off();
   const StoredHalves stored(band);
   const auto form = reader.take<std::uint8_t>();
-  if (form > 1) return ContentReader::fault("densities of form " + std::to_string(form), reader.at() - 1);
+  if (form > 1) return ContentReader::fault("unknown density encoding " + std::to_string(form), reader.at() - 1);
   const auto half = reader.take<Half>();
   if (!stored.has(half)) return wrong_density(reader.at() - sizeof(half));
   if (form == 0) {

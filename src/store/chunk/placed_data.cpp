@@ -48,9 +48,10 @@ Status read_voxel(Streams& streams, const VoxelRegistry& types, std::uint32_t& n
   const std::size_t lengths_at = streams.lengths_at + streams.lengths.at() - 1;
   if (type == kAir) return ContentReader::fault("data" + at_voxel(local) + ", which is air", lengths_at);
   if (*length > kMaxVoxelDataBytes || !streams.bytes.has(*length)) {
-    return ContentReader::fault(std::to_string(*length) + " bytes of data" + at_voxel(local), lengths_at);
+    return ContentReader::fault(std::to_string(*length) + " bytes of data" + at_voxel(local) + ": too many",
+                                lengths_at);
   }
-  if (*state == 0 && *length == 0) return ContentReader::fault("no data" + at_voxel(local), lengths_at);
+  if (*state == 0 && *length == 0) return ContentReader::fault("empty data" + at_voxel(local), lengths_at);
   if (static_cast<unsigned>(std::bit_width(*state)) > types[type].state_bits) {
     return ContentReader::fault("state " + std::to_string(*state) + at_voxel(local) + ", whose type has " +
                                     std::to_string(types[type].state_bits) + " bits",
@@ -75,8 +76,9 @@ Status write_placed_data(const Chunk& chunk, std::vector<std::byte>& out) {
     total += data.bytes.size();
   });
   if (total > kMaxChunkDataBytes) {
-    return make_error(ErrorCode::LimitExceeded, "voxels of one chunk hold " + std::to_string(total) +
-                                                    " bytes, and a world keeps " + std::to_string(kMaxChunkDataBytes));
+    return make_error(ErrorCode::LimitExceeded, "the voxels of a chunk hold " + std::to_string(total) +
+                                                    " bytes of data; the limit is " +
+                                                    std::to_string(kMaxChunkDataBytes));
   }
   put_number(out, static_cast<std::uint32_t>(chunk.data_count()));
   for (const auto& stream : streams) put_number(out, static_cast<std::uint32_t>(stream.size()));
@@ -93,7 +95,7 @@ Status read_placed_data(ContentReader& reader, const VoxelRegistry& types, Chunk
   const std::size_t begin = reader.at();
   const auto count = reader.take<std::uint32_t>();
   if (count == 0 || count > kChunkVoxels) {
-    return ContentReader::fault("data at " + std::to_string(count) + " voxels", begin);
+    return ContentReader::fault("invalid number of voxels with data: " + std::to_string(count), begin);
   }
   std::array<std::size_t, 3> sizes{};
   for (std::size_t& size : sizes) size = reader.take<std::uint32_t>();
@@ -111,7 +113,7 @@ Status read_placed_data(ContentReader& reader, const VoxelRegistry& types, Chunk
     if (auto status = read_voxel(streams, types, next, chunk); !status) return status;
   }
   if (!streams.gaps.is_at_end() || !streams.states.is_at_end() || !streams.lengths.is_at_end()) {
-    return ContentReader::fault("more data than voxels that hold it", begin);
+    return ContentReader::fault("extra bytes after the voxel data", begin);
   }
   reader = streams.bytes;
   return {};

@@ -26,9 +26,7 @@ constexpr std::uint32_t kRows = kLayers * kChunkEdge;
 constexpr std::uint32_t kVoxels = kRows * kChunkEdge;
 
 Error wrong_index(std::size_t types, std::size_t at) {
-  return ContentReader::fault(
-      "an index of a palette of " + std::to_string(types) + " that comes too early, repeats the one before or is none",
-      at);
+  return ContentReader::fault("invalid palette index: too early, repeated or not below " + std::to_string(types), at);
 }
 
 // Fields each XORed with all before it in the word.
@@ -80,8 +78,8 @@ Result<Chunk> VoxelRunReader::read(ContentReader& reader, std::size_t type_count
   const auto form = reader.take<std::uint8_t>();
   const std::size_t types = std::size_t{reader.take<std::uint16_t>()} + 1;
   if (form > 2 || (form == 0) != (types == 1)) {
-    return ContentReader::fault("voxels of form " + std::to_string(form) + " with " + std::to_string(types) + " types",
-                                begin);
+    return ContentReader::fault(
+        "unknown voxel encoding " + std::to_string(form) + " with " + std::to_string(types) + " types", begin);
   }
   if (auto status = read_palette(reader, types, type_count); !status) return status.error();
   if (form == 0) return Chunk(palette_[0]);
@@ -98,11 +96,11 @@ Status VoxelRunReader::read_palette(ContentReader& reader, std::size_t count, st
     const auto type = reader.take<VoxelType>();
     palette_[taken] = type;
     if (type >= type_count) {
-      status =
-          ContentReader::fault("type " + std::to_string(type) + ", and the world has " + std::to_string(type_count - 1),
-                               reader.at() - sizeof(type));
+      status = ContentReader::fault(
+          "type " + std::to_string(type) + ", but the last type of the world is " + std::to_string(type_count - 1),
+          reader.at() - sizeof(type));
     } else if ((seen_[type / 64] >> (type % 64) & 1U) != 0) {
-      status = ContentReader::fault("type " + std::to_string(type) + " twice", reader.at() - sizeof(type));
+      status = ContentReader::fault("duplicate type " + std::to_string(type), reader.at() - sizeof(type));
     }
     seen_[type / 64] |= std::uint64_t{1} << (type % 64);
   }
@@ -310,13 +308,13 @@ Result<Chunk> VoxelRunReader::build(Streams streams) {
     const Fault fault = builder.take_runs(streams);
     if (fault == Fault::Index) return wrong_index(palette_.size(), streams.indices_at + streams.next - 1);
     if (fault != Fault::None) {
-      const char* const what = fault == Fault::End ? "runs that end at voxel " : "a run's length at voxel ";
+      const char* const what = fault == Fault::End ? "runs end early, at voxel " : "invalid run length at voxel ";
       return ContentReader::fault(what + std::to_string(builder.voxels()), streams.lengths_at);
     }
     builder.end_layers();
   }
   if (streams.next != streams.runs || streams.length != streams.lengths_end || builder.seen() != palette_.size()) {
-    return ContentReader::fault("runs beyond the chunk, or types without any", streams.lengths_at);
+    return ContentReader::fault("runs exceed the chunk, or a type is unused", streams.lengths_at);
   }
   return builder.finish();
 }
@@ -328,8 +326,9 @@ Result<Chunk> VoxelRunReader::read_runs(ContentReader& reader) {
   const std::size_t length_bytes = reader.take<std::uint32_t>();
   const std::size_t types = palette_.size();
   if (streams.runs < types || streams.runs > kChunkVoxels) {
-    return ContentReader::fault(std::to_string(streams.runs) + " runs of " + std::to_string(types) + " types",
-                                reader.at() - 8);
+    return ContentReader::fault(
+        "invalid number of runs: " + std::to_string(streams.runs) + " for " + std::to_string(types) + " types",
+        reader.at() - 8);
   }
   streams.lengths_at = reader.at();
   if (!reader.has(length_bytes)) return reader.cut_off();
@@ -377,7 +376,7 @@ Result<Chunk> VoxelRunReader::read_packed(ContentReader& reader) {
       types[first + static_cast<std::size_t>(x)] = palette_[index];
     }
   }
-  if (seen != palette_.size()) return ContentReader::fault("types without any voxels", begin);
+  if (seen != palette_.size()) return ContentReader::fault("unused types in the palette", begin);
   return Chunk::from_dense(std::span<const VoxelType, kChunkVoxels>(types));
 }
 

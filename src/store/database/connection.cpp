@@ -41,7 +41,7 @@ Status harden(sqlite3* database) {
   };
   const bool is_set = set(SQLITE_DBCONFIG_DEFENSIVE, 1) && set(SQLITE_DBCONFIG_ENABLE_TRIGGER, 0) &&
                       set(SQLITE_DBCONFIG_ENABLE_VIEW, 0) && set(SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0);
-  if (!is_set) return make_error(ErrorCode::Unsupported, "this version of SQLite cannot read files of others safely");
+  if (!is_set) return make_error(ErrorCode::Unsupported, "this version of SQLite cannot read untrusted files safely");
   sqlite3_limit(database, SQLITE_LIMIT_LENGTH, kMaxRowBytes);
   sqlite3_extended_result_codes(database, 1);
   sqlite3_busy_timeout(database, kBusyMilliseconds);
@@ -55,23 +55,23 @@ Error error_of(sqlite3* database, int code) {
     case SQLITE_FULL:
       return make_error(ErrorCode::CannotWrite, "the disk is full");
     case SQLITE_READONLY:
-      return make_error(ErrorCode::CannotWrite, "it may not be written");
+      return make_error(ErrorCode::CannotWrite, "file is read-only");
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
-      return make_error(ErrorCode::CannotWrite, "another program holds it locked");
+      return make_error(ErrorCode::CannotWrite, "another program has locked it");
     case SQLITE_NOTADB:
-      return make_error(ErrorCode::BadFormat, "it is no world of Quoin's, nor another SQLite database");
+      return make_error(ErrorCode::BadFormat, "not a Quoin world (not an SQLite database)");
     case SQLITE_CORRUPT:
-      return make_error(ErrorCode::BadFormat, "the database is damaged (quoin world repair)");
+      return make_error(ErrorCode::BadFormat, "the database is damaged; run quoin world repair");
     case SQLITE_NOMEM:
       throw std::bad_alloc();
     case SQLITE_TOOBIG:
-      return make_error(ErrorCode::LimitExceeded, "a row of more than 256 MiB");
+      return make_error(ErrorCode::LimitExceeded, "a row exceeds 256 MiB");
     case SQLITE_CANTOPEN:
-      return with_reason(ErrorCode::CannotRead, "it cannot be opened", database, code);
+      return with_reason(ErrorCode::CannotRead, "cannot open it", database, code);
     case SQLITE_IOERR:
-      if (is_of_reading(code)) return with_reason(ErrorCode::CannotRead, "it cannot be read", database, code);
-      return with_reason(ErrorCode::CannotWrite, "it cannot be written", database, code);
+      if (is_of_reading(code)) return with_reason(ErrorCode::CannotRead, "cannot read it", database, code);
+      return with_reason(ErrorCode::CannotWrite, "cannot write it", database, code);
     default:
       break;
   }
@@ -232,7 +232,7 @@ Result<std::int64_t> Connection::number(const char* sql) {
   if (!statement) return statement.error();
   const auto row = statement->step();
   if (!row) return row.error();
-  if (!*row) return make_error(ErrorCode::BadFormat, "it lacks what every world has");
+  if (!*row) return make_error(ErrorCode::BadFormat, "the world header is missing");
   return statement->integer(0);
 }
 

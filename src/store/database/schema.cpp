@@ -67,20 +67,20 @@ Status check_schema(Connection& database) {
   const auto id = database.number("PRAGMA application_id");
   if (!id) return id.error();
   if (static_cast<std::uint32_t>(*id) != kWorldApplicationId) {
-    return make_error(ErrorCode::BadFormat, "a SQLite database of another program, no world of Quoin's");
+    return make_error(ErrorCode::BadFormat, "not a Quoin world (an SQLite database of another program)");
   }
   const auto version = database.number("PRAGMA user_version");
   if (!version) return version.error();
   if (*version > kSchemaVersion) {
-    return make_error(ErrorCode::Unsupported, "a world of version " + std::to_string(*version) +
-                                                  ", made by a later Quoin; this one reads up to version " +
+    return make_error(ErrorCode::Unsupported, "world version " + std::to_string(*version) +
+                                                  " needs a later Quoin; this one reads up to version " +
                                                   std::to_string(kSchemaVersion));
   }
-  if (*version < 1) return make_error(ErrorCode::BadFormat, "a world without a version");
+  if (*version < 1) return make_error(ErrorCode::BadFormat, "the world has no version");
   const auto tables = database.number(
       "SELECT count(*) FROM sqlite_schema WHERE type='table' AND name IN ('parts', 'regions', 'chunks')");
   if (!tables) return tables.error();
-  if (*tables != 3) return make_error(ErrorCode::BadFormat, "it lacks tables that every world has");
+  if (*tables != 3) return make_error(ErrorCode::BadFormat, "world tables are missing");
   return {};
 }
 

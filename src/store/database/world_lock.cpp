@@ -23,10 +23,9 @@ bool is_without_locks(int number) {
 Error refused(int number) {
   if (number == EWOULDBLOCK) return make_error(ErrorCode::CannotWrite, "another program is writing it");
   if (is_without_locks(number)) {
-    return make_error(ErrorCode::CannotWrite,
-                      "there are no locks on its file system, so that it cannot be written safely");
+    return make_error(ErrorCode::CannotWrite, "cannot write it safely: its file system has no locks");
   }
-  return make_error(ErrorCode::CannotWrite, "its lock cannot be taken: " + std::generic_category().message(number));
+  return make_error(ErrorCode::CannotWrite, "cannot lock it: " + std::generic_category().message(number));
 }
 
 // Whether the file that a descriptor is of still has that name: its last holder may have removed it meanwhile.
@@ -47,7 +46,8 @@ Result<WorldLock> WorldLock::take(const std::filesystem::path& world) {
     lock.descriptor_ = ::open(lock.file_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
     if (lock.descriptor_ < 0) {
       const int number = errno;
-      return make_error(ErrorCode::CannotWrite, "its lock cannot be made: " + std::generic_category().message(number));
+      return make_error(ErrorCode::CannotWrite,
+                        "cannot create its lock file: " + std::generic_category().message(number));
     }
     const int number = ::flock(lock.descriptor_, LOCK_EX | LOCK_NB) == 0 ? 0 : errno;
     if (number == 0 && is_named(lock.descriptor_, lock.file_)) return lock;

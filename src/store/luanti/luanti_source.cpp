@@ -100,7 +100,7 @@ class Readers {
     }
     const auto by_three = connection.prepare("SELECT x, y, z, data FROM blocks LIMIT 1");
     if (!by_three) {
-      return make_error(ErrorCode::BadFormat, "no map of Luanti's: it has no table of blocks", path_.string());
+      return make_error(ErrorCode::BadFormat, "not a Luanti map: the table of blocks is missing", path_.string());
     }
     places_ = Places::Three;
     return {};
@@ -301,8 +301,7 @@ class LuantiSource final : public ChunkSource {
     if (!*found) return {};
     const std::span<const std::byte> row = reader.row.bytes(0);
     if (!reader.row.is_bytes(0) || row.size() > kMaxRow) {
-      tell(make_error(ErrorCode::BadFormat,
-                      reader.row.is_bytes(0) ? "a row of more than 16 MiB" : "a row without data"));
+      tell(make_error(ErrorCode::BadFormat, reader.row.is_bytes(0) ? "the row exceeds 16 MiB" : "the row has no data"));
       return {};
     }
     if (const auto read = reader.blocks.read(row, reader.block); !read) {
@@ -384,7 +383,7 @@ Result<std::unique_ptr<ChunkSource>> open(std::unique_ptr<Readers> readers, std:
   info.name = std::move(name);
   if (extent->stray > 0) {
     info.broken.push_back(make_error(ErrorCode::BadFormat,
-                                     std::to_string(extent->stray) + " rows of places that there cannot be",
+                                     std::to_string(extent->stray) + " rows with invalid block positions",
                                      readers->path().string()));
   }
   std::vector<IBox> parts = extent->parts();
@@ -432,13 +431,13 @@ Result<std::unique_ptr<ChunkSource>> open_luanti(const std::filesystem::path& pa
   const std::string backend = value_of(text, "backend");
   if (!backend.empty() && backend != "sqlite3") {
     return make_error(ErrorCode::Unsupported,
-                      "a world that is kept by " + printable(backend) +
-                          ", and only sqlite3 is read (luanti --migrate sqlite3 turns it into that)",
+                      "cannot read a Luanti world with backend " + printable(backend) +
+                          ": only sqlite3 is supported (luanti --migrate sqlite3 converts it)",
                       (path / "world.mt").string());
   }
   const fs::path map = path / "map.sqlite";
   if (!fs::is_regular_file(map, error)) {
-    return make_error(ErrorCode::BadFormat, "a world of Luanti's without its map.sqlite", path.string());
+    return make_error(ErrorCode::BadFormat, "the Luanti world has no map.sqlite", path.string());
   }
   std::string name = value_of(text, "world_name");
   if (name.empty()) name = fs::absolute(path, error).lexically_normal().filename().string();

@@ -118,7 +118,7 @@ TEST(LuantiMap, IsKnownByItsTable) {
   }
   const auto refused = load_scene(folder / "without");
   ASSERT_FALSE(refused);
-  EXPECT_NE(refused.error().message.find("no table of blocks"), std::string::npos);
+  EXPECT_NE(refused.error().message.find("the table of blocks is missing"), std::string::npos);
 }
 
 TEST(LuantiMap, NamesAndSkipsBrokenBlocks) {
@@ -147,12 +147,12 @@ TEST(LuantiMap, NamesAndSkipsBrokenBlocks) {
                                [&](const std::string& line) { return line.find(text) != std::string::npos; });
   };
   EXPECT_EQ(loaded.warnings.size(), 6U);
-  EXPECT_TRUE(said("2 rows of places that there cannot be"));
+  EXPECT_TRUE(said("2 rows with invalid block positions"));
   EXPECT_TRUE(said("block (1, 0, 0): byte "));
-  EXPECT_TRUE(said("block (2, 0, 0): byte 0 of its row: version 22 of blocks"));
+  EXPECT_TRUE(said("block (2, 0, 0): byte 0 of its row: unsupported block version 22"));
   EXPECT_TRUE(said("node 4 has number 5, which has no name"));
-  EXPECT_TRUE(said("block (0, 1, 0): byte 0 of its row: an empty row"));
-  EXPECT_TRUE(said("block (0, 0, 1): a row without data"));
+  EXPECT_TRUE(said("block (0, 1, 0): byte 0 of its row: the row is empty"));
+  EXPECT_TRUE(said("block (0, 0, 1): the row has no data"));
 }
 
 TEST(LuantiMap, ReadsRowsThatAreCutOffOrChangedAnywhere) {

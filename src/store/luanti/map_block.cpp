@@ -45,8 +45,8 @@ Result<std::size_t> read_widths(ByteReader& reader) {
   const std::size_t at = reader.position();
   const std::size_t content = reader.u8();
   const std::size_t params = reader.u8();
-  if (reader.failed()) return bad_at(at, "a block that ends before its nodes");
-  if ((content != 1 && content != 2) || params != 2) return bad_at(at, "nodes of a width that there is not");
+  if (reader.failed()) return bad_at(at, "unexpected end before the nodes");
+  if ((content != 1 && content != 2) || params != 2) return bad_at(at, "invalid node width");
   return content;
 }
 
@@ -74,7 +74,8 @@ Status read_names(ByteReader& reader, std::vector<std::uint32_t>& name_of, std::
   const std::size_t at = reader.position();
   const int version = reader.u8();
   const std::size_t count = read_u16(reader);
-  if (!reader.failed() && version != 0) return bad_at(at, "names of the unknown version " + std::to_string(version));
+  if (!reader.failed() && version != 0)
+    return bad_at(at, "unknown version of the name table: " + std::to_string(version));
   names.clear();
   name_of.clear();
   for (std::size_t i = 0; i < count && !reader.failed(); ++i) {
@@ -84,7 +85,7 @@ Status read_names(ByteReader& reader, std::vector<std::uint32_t>& name_of, std::
     name_of[number] = static_cast<std::uint32_t>(names.size());
     names.emplace_back(name);
   }
-  if (reader.failed()) return bad_at(at, "a block that ends before its names do");
+  if (reader.failed()) return bad_at(at, "unexpected end in the names");
   return {};
 }
 
@@ -109,7 +110,7 @@ Status skip_objects(ByteReader& reader) {
     static_cast<void>(reader.take(1 + 12));
     static_cast<void>(reader.take(read_u16(reader)));
   }
-  if (reader.failed()) return bad_at(at, "a block that ends before its objects do");
+  if (reader.failed()) return bad_at(at, "unexpected end in the objects");
   return {};
 }
 
@@ -128,12 +129,12 @@ Status read_zlib(std::span<const std::byte> row, int version, std::vector<std::u
   // Only the stream's end must be left.
   const auto more = node_stream.skip(1);
   if (!more) return more.error();
-  if (*count != nodes.size() || *more != 0) return bad_at(nodes_at, "not the bytes of 4096 nodes");
+  if (*count != nodes.size() || *more != 0) return bad_at(nodes_at, "expected the bytes of 4096 nodes");
   put_nodes(nodes, *width, block);
   ByteStream metadata(row, node_stream.position(), Compression::Zlib);
   const auto skipped = metadata.skip(kMaxMetadata + 1);
   if (!skipped) return skipped.error();
-  if (*skipped > kMaxMetadata) return bad_at(node_stream.position(), "metadata of more than 16 MiB");
+  if (*skipped > kMaxMetadata) return bad_at(node_stream.position(), "metadata exceeds 16 MiB");
   ByteReader rest(row, metadata.position(), row.size());
   if (auto done = skip_objects(rest); !done) return done;
   static_cast<void>(rest.u32());  // time
@@ -150,7 +151,7 @@ Status read_expanded(std::span<const std::byte> content, std::vector<std::uint32
   if (!width) return width.error();
   const std::size_t at = reader.position();
   const auto nodes = reader.take(kBlockNodes * (*width + 2));
-  if (reader.failed()) return bad_at(at, "not the bytes of 4096 nodes");
+  if (reader.failed()) return bad_at(at, "expected the bytes of 4096 nodes");
   put_nodes(nodes, *width, block);
   return name_nodes(at, name_of, block);
 }
@@ -180,27 +181,26 @@ Status MapBlockReader::expand(std::span<const std::byte> frame) {
     left = ZSTD_decompressStream(context_.get(), &out, &in);
     content_.resize(begin + out.pos);
     if (ZSTD_isError(left) != 0) {
-      return bad_at(1 + at, std::string("its zstd frame: ") + ZSTD_getErrorName(left));
+      return bad_at(1 + at, std::string("zstd: ") + ZSTD_getErrorName(left));
     }
-    if (left != 0 && out.pos == 0 && in.pos == in.size) return bad_at(1 + in.pos, "its zstd frame ends early");
+    if (left != 0 && out.pos == 0 && in.pos == in.size) return bad_at(1 + in.pos, "zstd: unexpected end");
   }
   return {};
 }
 
 Status MapBlockReader::read(std::span<const std::byte> row, MapBlock& block) {
-  if (row.empty()) return bad_at(0, "an empty row");
+  if (row.empty()) return bad_at(0, "the row is empty");
   const auto version = std::to_integer<int>(row[0]);
   if (version < kOldest || version > kNewest) {
     return make_error(ErrorCode::Unsupported,
-                      "version " + std::to_string(version) +
-                          " of blocks (25 to 29 are read; Luanti writes what it "
-                          "loads anew)",
+                      "unsupported block version " + std::to_string(version) +
+                          " (supported: 25 to 29; Luanti upgrades blocks that it loads)",
                       {}, 0);
   }
   if (version < kFirstOfZstd) return read_zlib(row, version, name_of_, block);
   if (auto done = expand(row.subspan(1)); !done) return done;
   Status read = read_expanded(content_, name_of_, block);
-  if (!read) read.error().message += " (of what its frame expands to)";
+  if (!read) read.error().message += " (offset in the decompressed data)";
   return read;
 }
 

@@ -205,7 +205,7 @@ class WorldMesher {
     return make_error(ErrorCode::Cancelled, "cancelled", world_.path().string());
   }
   [[nodiscard]] static Status densities() {
-    return make_error(ErrorCode::Unsupported, "it holds densities, which are meshed as a whole");
+    return make_error(ErrorCode::Unsupported, "cannot mesh densities in parts: load the whole world");
   }
   [[nodiscard]] Error of_folder(Error error) const {
     if (error.code == ErrorCode::CannotWrite) error.path = options_.folder.empty() ? "." : options_.folder.string();
@@ -275,7 +275,7 @@ class WorldMesher {
     if (std::max({far.x, far.y, far.z}) <= kNearChunks) return IVec3(0);
     const IVec3 size = max + 1 - min;
     if (std::max({size.x, size.y, size.z}) <= kMostChunks) return min;
-    return make_error(ErrorCode::Unsupported, "its chunks lie so far apart that they are meshed as several grids");
+    return make_error(ErrorCode::Unsupported, "chunks are too far apart to mesh in one grid");
   }
 
   Status mesh_batch(std::span<const IVec3> batch, IVec3 origin, ChunkCache& cache, ChunkTriangles& triangles,

@@ -18,7 +18,7 @@ constexpr std::size_t kBufferBytes = std::size_t{1} << 20;
 
 Status failed(int number) {
   return make_error(ErrorCode::CannotWrite,
-                    "a file for what does not fit into memory: " + std::generic_category().message(number));
+                    "cannot write a temporary file: " + std::generic_category().message(number));
 }
 
 // A file that has no name, or loses it at once.

@@ -41,7 +41,7 @@ Result<std::optional<RandomFile>> RandomFile::open(const std::filesystem::path& 
   struct stat status {};
   if (::fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode)) {
     ::close(descriptor);
-    return make_error(ErrorCode::CannotRead, "not a file", path.string());
+    return make_error(ErrorCode::CannotRead, "not a regular file", path.string());
   }
   return std::optional(RandomFile(descriptor, static_cast<std::uint64_t>(status.st_size)));
 }
@@ -64,7 +64,7 @@ void RandomFile::read(std::uint64_t offset, std::span<std::byte> out) const {
 Result<PageFile> PageFile::open(const std::filesystem::path& database) {
   auto file = RandomFile::open(database);
   if (!file) return file.error();
-  if (!*file) return make_error(ErrorCode::CannotRead, "there is no such file", database.string());
+  if (!*file) return make_error(ErrorCode::CannotRead, "no such file", database.string());
   std::filesystem::path log_path = database;
   log_path += "-wal";
   auto log = RandomFile::open(log_path);

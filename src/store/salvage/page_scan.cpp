@@ -109,7 +109,7 @@ class Scan {
   }
   [[nodiscard]] Status status() const {
     if (!is_too_slow_) return {};
-    return make_error(ErrorCode::LimitExceeded, "its pages lead to one another without end");
+    return make_error(ErrorCode::LimitExceeded, "too many page references: the pages form cycles");
   }
   [[nodiscard]] bool is_too_slow() const { return is_too_slow_; }
 

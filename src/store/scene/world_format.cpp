@@ -23,10 +23,10 @@ Status check_memory(const WorldStore& world) {
   if (!needed || *needed < kSmall) return {};
   const auto available = available_memory();
   if (!available || *needed <= *available) return {};
-  return make_error(
-      ErrorCode::LimitExceeded,
-      "as a whole it takes about " + megabytes(*needed) + " of memory, and " + megabytes(*available) + " are available",
-      world.path().string());
+  return make_error(ErrorCode::LimitExceeded,
+                    "loading the whole world needs about " + megabytes(*needed) + " of memory; " +
+                        megabytes(*available) + " are available",
+                    world.path().string());
 }
 
 Result<LoadedScene> load(const WorldStore& world, const LoadOptions& options, Threads threads,
@@ -37,9 +37,9 @@ Result<LoadedScene> load(const WorldStore& world, const LoadOptions& options, Th
   const auto values = world.value_names();
   if (!values) return values.error();
   if (!values->empty()) {
-    loaded->loaded.warnings.push_back("a game keeps " + std::to_string(values->size()) +
-                                      (values->size() == 1 ? " value" : " values") +
-                                      " in it, which no other file holds (quoin world backup copies all)");
+    loaded->loaded.warnings.push_back("it holds " + std::to_string(values->size()) +
+                                      (values->size() == 1 ? " application value" : " application values") +
+                                      ", which other formats cannot store (quoin world backup copies them)");
   }
   return std::move(loaded->loaded);
 }

@@ -78,9 +78,9 @@ Result<Done> parse_done(std::span<const std::byte> bytes, const std::string& ide
                                                                                     : 0;
   };
   if (!json.is_object() || json.value("source", Json()) != identity) {
-    return make_error(ErrorCode::InvalidArgument,
-                      "is the unfinished world of another source, or of this one before it changed; remove it to begin "
-                      "anew");
+    return make_error(
+        ErrorCode::InvalidArgument,
+        "is an unfinished import of another source, or of an older state of this one; remove it to start again");
   }
   Done done;
   done.parts = number("parts");
@@ -110,7 +110,7 @@ class Import {
       const double fraction = static_cast<double>(done_.parts) / static_cast<double>(source_.parts().size());
       if (progress && !progress(fraction)) {
         if (auto saved = world_->flush(); !saved) return saved;
-        return make_error(ErrorCode::Cancelled, "stopped; the same command goes on from here", path_.string());
+        return make_error(ErrorCode::Cancelled, "cancelled; run the same command to resume", path_.string());
       }
       const std::size_t count = std::min(at_once, source_.parts().size() - done_.parts);
       if (auto read = read_parts(count); !read) return read;
@@ -154,7 +154,7 @@ class Import {
       const auto grids = world_->grids();
       if (!grids) return grids.error();
       if (!grids->empty()) {
-        return make_error(ErrorCode::InvalidArgument, "is no unfinished world", path_.string());
+        return make_error(ErrorCode::InvalidArgument, "is not an unfinished import", path_.string());
       }
     }
     return *known ? resume(**known) : begin_anew();
@@ -170,7 +170,7 @@ class Import {
     const auto grids = world_->grids();
     if (!grids) return grids.error();
     if (grids->size() != 1 || done_.parts > source_.parts().size()) {
-      return make_error(ErrorCode::BadFormat, "is damaged; remove it to begin anew", path_.string());
+      return make_error(ErrorCode::BadFormat, "is damaged; remove it to start again", path_.string());
     }
     grid_ = grids->begin()->first;
     return {};

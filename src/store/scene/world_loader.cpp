@@ -96,7 +96,7 @@ class Load {
       // If the tables themselves are damaged, the parts read so far are kept.
       if (read.error().code != ErrorCode::BadFormat) return read;
       saved.is_partly_read = true;
-      add_line("grid " + std::to_string(number) + ": not all could be read: " + read.error().message);
+      add_line("grid " + std::to_string(number) + ": read in part: " + read.error().message);
     }
     add_grid(number, std::move(grid), std::move(saved));
     return {};

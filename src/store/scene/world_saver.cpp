@@ -83,7 +83,7 @@ class Save {
       for (std::size_t type = 1; type < held->size(); ++type) {
         const auto number = static_cast<VoxelType>(type);
         if (type < scene_.types.size() && (*held)[number] == scene_.types[number]) continue;
-        return make_error(ErrorCode::InvalidArgument, "the world has another type " + std::to_string(type));
+        return make_error(ErrorCode::InvalidArgument, "the world and the scene differ in type " + std::to_string(type));
       }
       changes_.put_types(scene_.types, static_cast<VoxelType>(std::min<std::size_t>(held->size(), kMaxVoxelTypes)));
       return {};
@@ -101,7 +101,7 @@ class Save {
       if (!read) return read;
     }
     if (is_empty) return {};
-    return make_error(ErrorCode::InvalidArgument, "the world holds a scene already, which load_world reads");
+    return make_error(ErrorCode::InvalidArgument, "the world already holds a scene; load it with load_world");
   }
 
   // All that there is, and all that there was.
@@ -165,7 +165,7 @@ class Save {
     }
     const auto grid = state_.grids.find(instance->grid);
     if (grid == state_.grids.end()) {
-      return make_error(ErrorCode::InvalidArgument, "the grid of instance \"" + instance->name + "\" is not there");
+      return make_error(ErrorCode::InvalidArgument, "the grid of instance \"" + instance->name + "\" does not exist");
     }
     SceneFile::Placement text;
     text.grid = grid->second.number;

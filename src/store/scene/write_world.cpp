@@ -32,7 +32,7 @@ Status clear_log(const std::filesystem::path& path) {
     Status sound = check_schema(*connection);
     if (!sound && sound.error().code != ErrorCode::BadFormat) return sound;
     if (sound) {
-      if (!end_writing(*connection)) return make_error(ErrorCode::CannotWrite, "another program reads it");
+      if (!end_writing(*connection)) return make_error(ErrorCode::CannotWrite, "another program is reading it");
       if (auto done = connection->close(); !done) return done;
     }
   }
@@ -94,7 +94,7 @@ Status store::put_world_in_place(const std::filesystem::path& from, const std::f
   const auto status = std::filesystem::status(to, error);
   if (std::filesystem::exists(status)) {
     if (!std::filesystem::is_regular_file(status)) {
-      return make_error(ErrorCode::CannotWrite, "it is not a regular file");
+      return make_error(ErrorCode::CannotWrite, "not a regular file");
     }
     if (auto done = clear_log(to); !done) return done;
     std::filesystem::permissions(from, status.permissions(), error);

@@ -25,8 +25,7 @@ Status keep_copy(Connection& database, const std::filesystem::path& path) {
   const std::filesystem::path kept = FileBackup::name_for(path, FileBackup::Older::Kept);
   if (kept.empty()) {
     return make_error(ErrorCode::CannotWrite,
-                      "there is no name left under which the world could be kept before it is "
-                      "taken to another version");
+                      "cannot back up the world before upgrading it: all backup names are taken");
   }
   const std::filesystem::path fresh = fresh_name(path);
   Status done = [&]() -> Status {

@@ -141,7 +141,7 @@ TEST(Migration, ACopyIsKeptWhereRowsChange) {
   const auto refused = WorldStore::open(path, WorldAccess::Read);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::Unsupported);
-  EXPECT_NE(to_string(refused.error()).find("made by a later Quoin"), std::string::npos);
+  EXPECT_NE(to_string(refused.error()).find("needs a later Quoin"), std::string::npos);
   EXPECT_EQ(to_string(refused.error()).find('\n'), std::string::npos);
   EXPECT_EQ(WorldStore::open(path, WorldAccess::Write).error().code, ErrorCode::Unsupported);
 }

@@ -47,7 +47,7 @@ WorldGrid read(const Json& json, const Place& place, Faults& faults, WorldGrid*)
 
 SceneFile::Placement read(const Json& json, const Place& place, Faults& faults, SceneFile::Placement*) {
   SceneFile::Placement instance = scene_json::placement_of(json, place, faults);
-  if (!instance.grid) faults.add(place, "names no grid");
+  if (!instance.grid) faults.add(place, "has no grid");
   return instance;
 }
 
@@ -194,8 +194,8 @@ Status check_thumbnail(std::span<const std::byte> body, const std::string& name)
   const bool is_png =
       body.size() > kPng.size() &&
       std::equal(kPng.begin(), kPng.end(), body.begin(), [](std::uint8_t a, std::byte b) { return std::byte{a} == b; });
-  if (!is_png) return make_error(ErrorCode::InvalidArgument, name + " is no PNG");
-  if (body.size() > kMaxBytes) return make_error(ErrorCode::InvalidArgument, name + " has more than 16 MiB");
+  if (!is_png) return make_error(ErrorCode::InvalidArgument, name + " is not a PNG file");
+  if (body.size() > kMaxBytes) return make_error(ErrorCode::InvalidArgument, name + " exceeds 16 MiB");
   return {};
 }
 

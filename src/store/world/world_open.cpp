@@ -19,7 +19,7 @@ namespace quoin::store {
 namespace {
 
 Error failed(int number) {
-  return make_error(ErrorCode::CannotWrite, "it cannot be written: " + std::generic_category().message(number));
+  return make_error(ErrorCode::CannotWrite, "cannot write it: " + std::generic_category().message(number));
 }
 
 Status sync_file(const std::filesystem::path& path) {
@@ -55,7 +55,7 @@ Result<WorldReader> open_unlocked(const std::filesystem::path& path) {
     const std::uintmax_t bytes = std::filesystem::file_size(path.string() + log, unknown);
     if (!unknown && bytes != 0) {
       return make_error(ErrorCode::CannotRead,
-                        "it was not closed, and there are no locks on its file system: copy it elsewhere, with " +
+                        "it was not closed, and its file system has no locks: copy it elsewhere, together with " +
                             path.filename().string() + log);
     }
   }
@@ -72,7 +72,7 @@ Status begin_writing(Connection& connection, bool is_network) {
   if (is_network) {  // of another machine it may still have one
     const auto mode = connection.text("PRAGMA journal_mode=DELETE");
     if (!mode) return mode.error();
-    return *mode == "delete" ? Status() : Status(make_error(ErrorCode::CannotWrite, "another program reads it"));
+    return *mode == "delete" ? Status() : Status(make_error(ErrorCode::CannotWrite, "another program is reading it"));
   }
   const auto mode = connection.text("PRAGMA journal_mode=WAL");
   if (!mode) return mode.error();
@@ -133,7 +133,7 @@ Status move_in_place(const std::filesystem::path& from, const std::filesystem::p
     const int number = errno;
     const bool is_there = std::filesystem::exists(std::filesystem::symlink_status(to, error));
     if (existing == Existing::Refused && is_there) {
-      return make_error(ErrorCode::CannotWrite, "there is a file of that name");
+      return make_error(ErrorCode::CannotWrite, "file already exists");
     }
     if (number != EINVAL && number != ENOSYS) return failed(number);
     std::filesystem::rename(from, to, error);  // a file system without such flags; the lock keeps others away

@@ -73,7 +73,7 @@ Result<std::optional<std::int64_t>> WorldReader::region_id(const RegionPlace& pl
   if (!row) return row.error();
   if (!*row) return std::optional<std::int64_t>();
   const std::int64_t id = select.integer(0);
-  if (id < 0 || id > kMaxRegion) return make_error(ErrorCode::BadFormat, "a region's number is out of range");
+  if (id < 0 || id > kMaxRegion) return make_error(ErrorCode::BadFormat, "region number out of range");
   known_regions_[place] = id;
   return id;
 }
@@ -125,7 +125,7 @@ Result<std::vector<WorldReader::Region>> WorldReader::find_regions(std::uint32_t
     if (!row) return row.error();
     if (!*row) break;
     const std::int64_t id = select.integer(0);
-    if (id < 0 || id > kMaxRegion) return make_error(ErrorCode::BadFormat, "a region's number is out of range");
+    if (id < 0 || id > kMaxRegion) return make_error(ErrorCode::BadFormat, "region number out of range");
     const auto along = [&](int column) { return static_cast<int>(select.integer(column)); };
     found.push_back({id, {grid, level, {along(1), along(2), along(3)}}});
   }

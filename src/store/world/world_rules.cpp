@@ -40,10 +40,10 @@ Status check_data(const ChunkPlace& place, const Chunk& chunk, const VoxelRegist
   chunk.for_each_data([&](IVec3 local, const VoxelData& data) {
     const std::uint8_t bits = types[chunk.get(local)].state_bits;
     const bool fits = bits == kMaxStateBits || data.state >> bits == 0;
-    if (!fits && fault.empty()) fault = about(place) + ": a state of more bits than its type has";
+    if (!fits && fault.empty()) fault = about(place) + ": a state has more bits than its type allows";
     bytes += data.bytes.size();
   });
-  if (bytes > kMaxChunkDataBytes) fault = about(place) + ": its voxels hold more than 64 MiB of data";
+  if (bytes > kMaxChunkDataBytes) fault = about(place) + ": its voxel data exceeds 64 MiB";
   if (!fault.empty()) return make_error(ErrorCode::InvalidArgument, fault);
   return {};
 }
@@ -52,7 +52,7 @@ Status check_types(const ChunkPlace& place, const Chunk& chunk, const VoxelRegis
   for (const VoxelType type : chunk.types()) {
     if (type < types.size()) continue;
     return make_error(ErrorCode::InvalidArgument,
-                      about(place) + " has voxels of type " + std::to_string(type) + ", which was never put");
+                      about(place) + " has voxels of type " + std::to_string(type) + ", which is not defined");
   }
   return {};
 }
@@ -88,17 +88,17 @@ Result<WorldRules> WorldRules::after(const ChangeSet& changes) const {
       const auto type = part_from<VoxelProperties>(*body, name_of(key));
       if (!type) return make_error(ErrorCode::InvalidArgument, type.error().message);
       if (*number > static_cast<std::int64_t>(rules.types.size())) {
-        return make_error(ErrorCode::InvalidArgument, name_of(key) + " is put before those below it");
+        return make_error(ErrorCode::InvalidArgument, name_of(key) + " must not be put before lower numbers");
       }
       if (*number < static_cast<std::int64_t>(rules.types.size()) &&
           type->state_bits < rules.types[static_cast<VoxelType>(*number)].state_bits) {
-        return make_error(ErrorCode::InvalidArgument, name_of(key) + " may not have fewer state bits than before");
+        return make_error(ErrorCode::InvalidArgument, name_of(key) + " must not have fewer state bits than before");
       }
       if (auto done = put_type(rules.types, *number, *type); !done) return done.error();
     }
     if (key.kind == part::kGrid && number != nullptr) {
       if (*number < 0 || *number > kMaxGrid)
-        return make_error(ErrorCode::InvalidArgument, name_of(key) + ": no number");
+        return make_error(ErrorCode::InvalidArgument, name_of(key) + ": number out of range");
       const auto grid_number = static_cast<std::uint32_t>(*number);
       if (!body) {
         rules.grids.erase(grid_number);
@@ -121,7 +121,7 @@ Result<WorldRules> read_rules(WorldReader& reader) {
   const Status types = reader.each_part(part::kType, [&](const Part& part, bool is_sound) {
     const auto* const number = std::get_if<std::int64_t>(&part.key.id);
     if (number == nullptr || *number < 1 || *number > static_cast<std::int64_t>(kMaxVoxelTypes)) {
-      rules.damage.push_back(name_of(part.key) + " is none");
+      rules.damage.push_back(name_of(part.key) + " has an invalid number");
       return;
     }
     keep(fill_types(rules.types, *number, rules.damage));
@@ -134,7 +134,7 @@ Result<WorldRules> read_rules(WorldReader& reader) {
   const Status grids = reader.each_part(part::kGrid, [&](const Part& part, bool is_sound) {
     const auto* const number = std::get_if<std::int64_t>(&part.key.id);
     if (number == nullptr || *number < 0 || *number > kMaxGrid) {
-      rules.damage.push_back(name_of(part.key) + " is none");
+      rules.damage.push_back(name_of(part.key) + " has an invalid number");
       return;
     }
     const auto grid = is_sound ? part_from<WorldGrid>(part.body, name_of(part.key))
@@ -152,7 +152,7 @@ Status check_changes(const ChangeSet& changes, const WorldRules& rules) {
     if (!chunk) continue;
     const auto grid = rules.grids.find(place.grid);
     if (grid == rules.grids.end()) {
-      return make_error(ErrorCode::InvalidArgument, about(place) + ", which was never put");
+      return make_error(ErrorCode::InvalidArgument, about(place) + ": the grid is not defined");
     }
     if (auto done = check_types(place, chunk->voxels, rules.types); !done) return done;
     if (auto done = check_data(place, chunk->voxels, rules.types); !done) return done;
@@ -162,7 +162,7 @@ Status check_changes(const ChangeSet& changes, const WorldRules& rules) {
   for (const auto& [key, body] : changes.parts) {
     if (!body) continue;
     if (body->size() > kMaxValueBytes) {
-      return make_error(ErrorCode::InvalidArgument, name_of(key) + " has more than 64 MiB");
+      return make_error(ErrorCode::InvalidArgument, name_of(key) + " exceeds 64 MiB");
     }
     // Types and grids were read by `after`.
     if (key.kind == part::kType || key.kind == part::kGrid) continue;

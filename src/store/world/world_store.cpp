@@ -105,7 +105,7 @@ struct WorldStore::Impl {
   Result<std::unique_ptr<ReadKit>> take() const {
     // A log that belongs to another file of that name must not be read with this one.
     if (identity && FileIdentity::of(path) != identity) {
-      return make_error(ErrorCode::CannotRead, "another file took its place: open it again", path.string());
+      return make_error(ErrorCode::CannotRead, "another file replaced it: open it again", path.string());
     }
     {
       const std::scoped_lock guard(mutex);
@@ -183,7 +183,7 @@ Result<WorldStore> WorldParts::create(const std::filesystem::path& named, Thread
   }
   std::error_code error;
   if (std::filesystem::exists(std::filesystem::symlink_status(path, error))) {
-    return make_error(ErrorCode::CannotWrite, "there is a file of that name", path.string());
+    return make_error(ErrorCode::CannotWrite, "file already exists", path.string());
   }
   {
     const auto lock = WorldLock::take(path);
@@ -232,7 +232,7 @@ Result<WorldStore> WorldParts::open(const std::filesystem::path& named, WorldAcc
   if (vfs == nullptr) {
     const auto beginning = read_file_beginning(path, kWorldHeaderBytes);
     if (!beginning) return beginning.error();
-    if (!is_world_format(*beginning)) return fail(make_error(ErrorCode::BadFormat, "it is no world of Quoin's"));
+    if (!is_world_format(*beginning)) return fail(make_error(ErrorCode::BadFormat, "not a Quoin world"));
     impl->hold();
   }
   std::optional<Connection> writing;
@@ -241,7 +241,7 @@ Result<WorldStore> WorldParts::open(const std::filesystem::path& named, WorldAcc
       auto lock = WorldLock::take(path);
       if (!lock) return fail(lock.error());
       impl->lock = std::move(*lock);
-      if (::access(path.c_str(), W_OK) != 0) return fail(make_error(ErrorCode::CannotWrite, "it may not be written"));
+      if (::access(path.c_str(), W_OK) != 0) return fail(make_error(ErrorCode::CannotWrite, "file is read-only"));
     }
     auto connection = Connection::open(path.string(), Connection::Mode::Write, vfs);
     if (!connection) return fail(connection.error());
@@ -254,7 +254,7 @@ Result<WorldStore> WorldParts::open(const std::filesystem::path& named, WorldAcc
 }
 
 Result<WorldStore> WorldParts::open(std::span<const std::byte> bytes) {
-  if (!is_world_format(bytes)) return make_error(ErrorCode::BadFormat, "it is no world of Quoin's");
+  if (!is_world_format(bytes)) return make_error(ErrorCode::BadFormat, "not a Quoin world");
   auto impl = std::make_unique<WorldStore::Impl>();
   impl->in_memory.assign(bytes.begin(), bytes.end());
   return begin(std::move(impl), std::nullopt, {});

@@ -189,8 +189,9 @@ TEST(WorldStore, SaysWhatIsWrongWithFiles) {
   const auto text_of = [](const Result<WorldStore>& world) { return world ? "" : to_string(world.error()); };
   EXPECT_NE(text_of(WorldStore::open(folder / "none", WorldAccess::Read)).find("No such file"), std::string::npos);
   std::ofstream(folder / "text") << std::string(200, 'x');
-  EXPECT_NE(text_of(WorldStore::open(folder / "text", WorldAccess::Write)).find("no world"), std::string::npos);
-  EXPECT_NE(text_of(WorldStore::create(folder / "text")).find("there is a file of that name"), std::string::npos);
+  EXPECT_NE(text_of(WorldStore::open(folder / "text", WorldAccess::Write)).find("not a Quoin world"),
+            std::string::npos);
+  EXPECT_NE(text_of(WorldStore::create(folder / "text")).find("file already exists"), std::string::npos);
   EXPECT_NE(text_of(WorldStore::create(folder / "no" / "w.quoin")).find("w.quoin"), std::string::npos);
   { WorldStore world = made(folder / "w.quoin"); }
   std::filesystem::resize_file(folder / "w.quoin", 5000);

@@ -200,7 +200,7 @@ void WorldWriter::run() {
       outcome = write(group.front().changes);
     } catch (const std::bad_alloc&) {
       roll_back();
-      outcome = make_error(ErrorCode::LimitExceeded, "there is not enough memory to save");
+      outcome = make_error(ErrorCode::LimitExceeded, "not enough memory to save");
     }
     finish(std::move(group), outcome);
     lock.lock();
@@ -307,7 +307,7 @@ Status WorldWriter::remove_grid(std::uint32_t number) {
     const std::int64_t id = *row ? (*select)->integer(0) : 0;
     (*select)->reset();
     if (!*row) return {};
-    if (id < 0 || id > kMaxRegion) return make_error(ErrorCode::BadFormat, "a region's number is out of range");
+    if (id < 0 || id > kMaxRegion) return make_error(ErrorCode::BadFormat, "region number out of range");
     (*chunks)->bind(0, first_key(id));
     (*chunks)->bind(1, first_key(id + 1) - 1);
     if (auto done = (*chunks)->run(); !done) return done;
@@ -330,11 +330,11 @@ Result<std::optional<std::int64_t>> WorldWriter::region_for(const RegionPlace& p
     if (!row) return row.error();
     if (!*row) continue;
     const std::int64_t id = (*statement)->integer(0);
-    if (id < 0 || id > kMaxRegion) return make_error(ErrorCode::BadFormat, "a region's number is out of range");
+    if (id < 0 || id > kMaxRegion) return make_error(ErrorCode::BadFormat, "region number out of range");
     regions_[place] = id;
     return id;
   }
-  return make_error(ErrorCode::BadFormat, "a region was not added");
+  return make_error(ErrorCode::BadFormat, "cannot add a region");
 }
 
 Status WorldWriter::write_chunks(const ChangeSet& changes) {

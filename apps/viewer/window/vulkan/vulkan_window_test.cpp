@@ -198,7 +198,7 @@ TEST_F(VulkanWindowTest, ReportsUnsupportedDevices) {
   expect_refusal(wrong, "the window cannot show pictures");
   wrong = options(false);
   wrong.device = "no such device";
-  expect_refusal(wrong, "there is no device \"no such device\"; there is 0 ");
+  expect_refusal(wrong, "no device \"no such device\"; available: 0 ");
   wrong = options(false);
   wrong.get_instance_proc_addr = nullptr;
   expect_refusal(wrong, "there is no loader");
