@@ -123,8 +123,8 @@ class ChangeJournal {
   void observe() const { seen_.store(end_ - 1, std::memory_order_relaxed); }
 
   [[nodiscard]] Record& at(std::uint64_t serial) const {
-    QUOIN_ASSERT(serial >= first_ && serial < end_, "a record that is kept");
-    QUOIN_ASSERT(serial / kBlock - first_ / kBlock < blocks_.size(), "blocks cover all that is kept");
+    QUOIN_ASSERT(serial >= first_ && serial < end_, "a kept record");
+    QUOIN_ASSERT(serial / kBlock - first_ / kBlock < blocks_.size(), "blocks cover all kept records");
     return (*blocks_[static_cast<std::size_t>(serial / kBlock - first_ / kBlock)])[serial % kBlock];
   }
 
@@ -150,7 +150,7 @@ class ChangeJournal {
 
   // Drops the oldest block. Records up to its end count as read, so that no change merges into them.
   void let_go() {
-    QUOIN_ASSERT(end_ - first_ > kBlock && blocks_.size() > 1, "more than what goes");
+    QUOIN_ASSERT(end_ - first_ > kBlock && blocks_.size() > 1, "more blocks than are removed");
     first_ = (first_ / kBlock + 1) * kBlock;
     blocks_.erase(blocks_.begin());
     if (seen_.load(std::memory_order_relaxed) + 1 < first_) seen_.store(first_ - 1, std::memory_order_relaxed);

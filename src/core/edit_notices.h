@@ -45,7 +45,7 @@ class EditNotices {
   friend class EditNotice;
   void give(std::uint32_t index) {
     const std::lock_guard lock(mutex_);
-    QUOIN_ASSERT(index < is_given_.size(), "room was made when it was followed");
+    QUOIN_ASSERT(index < is_given_.size(), "an index of a followed item");
     // A number is listed once, even if its item was removed and another item has the number now.
     if (is_given_[index]) return;
     is_given_[index] = true;

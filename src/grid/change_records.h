@@ -87,7 +87,7 @@ struct VoxelRecord {
   }
   /// Adds all voxels of a non-empty box.
   void add_box(const IBox& all) {
-    QUOIN_ASSERT(!all.empty(), "voxels that changed");
+    QUOIN_ASSERT(!all.empty(), "changed voxels");
     neighbours = kEverywhere;
     box.unite(PackedBox::of(all.min.x, all.min.y, all.min.z));
     box.unite(PackedBox::of(all.max.x - 1, all.max.y - 1, all.max.z - 1));

@@ -41,14 +41,14 @@ ChunkWindow::Box ChunkWindow::Box::grown_to(IVec3 chunk) const {
 ChunkWindow::ChunkWindow() : air_(&all_air()) {}
 
 void ChunkWindow::put(std::uint32_t cell, ChunkEntry* entry, std::uint32_t epoch) {
-  QUOIN_ASSERT(cell < cells(), "a place of the window");
+  QUOIN_ASSERT(cell < cells(), "a cell of the window");
   entries_[cell] = entry;
   epochs_[cell] = epoch;
   voxels_[cell] = entry == nullptr ? air_ : ChunkStorage::of(entry->chunk);
 }
 
 void ChunkWindow::move_to(const Box& box) {
-  QUOIN_ASSERT(box.log_cells() < 31, "places are counted in 32 bits");
+  QUOIN_ASSERT(box.log_cells() < 31, "cell numbers fit in 32 bits");
   const std::size_t cells = std::size_t{1} << box.log_cells();
   std::vector<ChunkEntry*> entries(cells, nullptr);
   std::vector<std::uint32_t> epochs(cells, 0);
@@ -143,7 +143,7 @@ ChunkTable::Slot ChunkTable::find_or_create(const IVec3& chunk) {
   if (const Slot slot = find_to_edit(chunk); slot.entry != nullptr) return slot;
   ChunkEntry& made = trie_.find_or_create(chunk, [this](Leaf& leaf) { put_leaf(leaf); });
   place(chunk, made);
-  QUOIN_ASSERT(outside_ <= size(), "no more outside than there are");
+  QUOIN_ASSERT(outside_ <= size(), "at most as many entries outside as in total");
   return {&made, window_.cell(chunk.x, chunk.y, chunk.z)};
 }
 
@@ -168,7 +168,7 @@ void ChunkTable::erase(const IVec3& chunk) {
   if (cell != ChunkWindow::kOutside) {
     window_.put(cell, nullptr, 0);
   } else if (was_there) {
-    QUOIN_ASSERT(outside_ != 0, "what stands in no window is counted");
+    QUOIN_ASSERT(outside_ != 0, "entries outside the windows are counted");
     --outside_;
     outside_changed();
   }
@@ -297,7 +297,7 @@ void ChunkTable::move_to(const ChunkWindow::Box& box) {
       ++outside_;
     }
   });
-  QUOIN_ASSERT(outside_ <= size(), "no more outside than there are");
+  QUOIN_ASSERT(outside_ <= size(), "at most as many entries outside as in total");
 }
 
 }  // namespace quoin

@@ -148,7 +148,7 @@ class ChunkTable {
   }
   /// Call after every change of a chunk's voxels.
   void voxels_changed(const Slot& slot) {
-    QUOIN_ASSERT(slot.entry != nullptr, "a chunk that is there");
+    QUOIN_ASSERT(slot.entry != nullptr, "an existing chunk");
     if (slot.cell != ChunkWindow::kOutside && window_.voxels(slot.cell) != ChunkStorage::of(slot.entry->chunk)) {
       window_.put(slot.cell, slot.entry, epoch());
     }

@@ -75,7 +75,7 @@ struct Lighting::Group {
 
   // `lift`: in the voxels that are traced.
   void add(const SurfacePoint& point, double lift) {
-    QUOIN_ASSERT(size < points.size(), "a group has as many points as a packet has rays");
+    QUOIN_ASSERT(size < points.size(), "a group has at most as many points as a packet has rays");
     if (point.kind == PointKind::Surface) {
       surfaces |= 1U << size;
       if (point.openness < 0.0F) unknown |= 1U << size;
@@ -111,7 +111,7 @@ Lighting::Lighting(const SceneView& view, const VoxelRegistry& types, const Surf
       exposure_(exposure_of(options)),
       sky_(static_cast<float>(options.sky_brightness)),
       daylight_(daylight_of(options)) {
-  QUOIN_ASSERT(check(options).has_value(), "light that `check` accepts");
+  QUOIN_ASSERT(check(options).has_value(), "options that `check` accepts");
   QUOIN_ASSERT(!is_propagated() || levels_.size() == placed_in(view.tracer()).size(), "levels of each placed grid");
   const DVec3 sun = to_sun(options);
   for (const PlacedGrid& placed : placed_in(view.tracer())) {

@@ -66,7 +66,7 @@ OcclusionDirections::Turn OcclusionDirections::turn_of(int sample, int rays) {
 }
 
 OcclusionDirections::Fixed OcclusionDirections::turned(const Turn& turn) const {
-  QUOIN_ASSERT(is_fixed_, "directions that all pixels have");
+  QUOIN_ASSERT(is_fixed_, "directions shared by all pixels");
   Fixed all = fixed_;
   const auto [cosine, sine] = turn.about_normal;
   if (sine == 0.0) return all;

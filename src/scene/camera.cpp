@@ -109,7 +109,7 @@ double pixel_size(const Camera& camera, int height) {
 }  // namespace
 
 std::optional<PicturePoint> picture_point(const Camera& camera, DVec3 point_in_world, int width, int height) {
-  QUOIN_ASSERT(width > 0 && height > 0, "a picture of positive size");
+  QUOIN_ASSERT(width > 0 && height > 0, "a positive image size");
   const DVec3 from_camera = point_in_world - camera.position;
   double pixel = pixel_size(camera, height);
   if (camera.projection == Camera::Projection::Perspective) {
@@ -125,7 +125,7 @@ std::optional<PicturePoint> picture_point(const Camera& camera, DVec3 point_in_w
 
 Ray ray_through(const Camera& camera, const PicturePoint& point) {
   const auto [x, y, width, height] = point;
-  QUOIN_ASSERT(width > 0 && height > 0, "a picture of positive size");
+  QUOIN_ASSERT(width > 0 && height > 0, "a positive image size");
   const bool is_perspective = camera.projection == Camera::Projection::Perspective;
   const double pixel = pixel_size(camera, height);
   const DVec3 across = camera.right * ((x - 0.5 * width) * pixel) + camera.up * ((0.5 * height - y) * pixel);

@@ -221,7 +221,7 @@ DetailSelector::~DetailSelector() = default;
 
 void DetailSelector::select(const Scene& scene, const Camera& camera, int width, int height, const DetailPolicy& policy,
                             std::vector<SelectedInstance>& out) {
-  QUOIN_ASSERT(width > 0 && height > 0, "a picture of positive size");
+  QUOIN_ASSERT(width > 0 && height > 0, "a positive image size");
   out.clear();
   content_of(impl_).look_at_grids(scene);
   const Frustum frustum(camera, width, height);

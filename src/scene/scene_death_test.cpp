@@ -179,12 +179,12 @@ TEST(SceneDeathTest, SlidingWithoutContactsIsAMistake) {
 }
 
 TEST(CameraDeathTest, APictureWithoutPixelsIsAMistake) {
-  QUOIN_EXPECT_MISTAKE((void)ray_through({}, {0.0, 0.0, 0, 5}), "a picture of positive size");
+  QUOIN_EXPECT_MISTAKE((void)ray_through({}, {0.0, 0.0, 0, 5}), "a positive image size");
   DetailSelector selector;
   std::vector<SelectedInstance> selected;
   const Scene scene;
-  QUOIN_EXPECT_MISTAKE((void)pick(SceneTracer(scene), {}, {0.0, 0.0, 5, 0}), "a picture of positive size");
-  QUOIN_EXPECT_MISTAKE(selector.select(Scene(), {}, 5, -1, {}, selected), "a picture of positive size");
+  QUOIN_EXPECT_MISTAKE((void)pick(SceneTracer(scene), {}, {0.0, 0.0, 5, 0}), "a positive image size");
+  QUOIN_EXPECT_MISTAKE(selector.select(Scene(), {}, 5, -1, {}, selected), "a positive image size");
 }
 
 TEST(CameraDeathTest, BoundsAndAspectsThatAreNoneAreMistakes) {

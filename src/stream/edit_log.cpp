@@ -166,7 +166,7 @@ Result<LoggedEdit> read_edit(std::span<const std::byte> body, std::size_t offset
 }  // namespace
 
 void EditLog::add(LoggedEdit edit) {
-  QUOIN_ASSERT(edits_.empty() || order_of(edits_.back()) < order_of(edit), "later than the last one");
+  QUOIN_ASSERT(edits_.empty() || order_of(edits_.back()) < order_of(edit), "an edit later than the last one");
   edits_.push_back(std::move(edit));
 }
 

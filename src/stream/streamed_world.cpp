@@ -187,7 +187,7 @@ struct StreamedWorld::Impl {
 Status StreamedWorld::Impl::begin() {
   for (const GridHandle handle : scene().grids().handles()) {
     const auto number = world.saver.number_of(handle);
-    QUOIN_ASSERT(number.has_value(), "a grid that was read has a number");
+    QUOIN_ASSERT(number.has_value(), "a loaded grid has a number");
     add_streamed(handle, *number);
     const auto value = store.value(std::string(kTerrainValue) + std::to_string(*number));
     if (!value) return value.error();
@@ -436,7 +436,7 @@ void StreamedWorld::Impl::take_away(const ChunkPlace& place, ChunkStreamer::Note
   note.let_go.push_back(std::move(last));
   note.add(place, What::Gone);
   const auto size = grid->sizes.find(place.chunk);
-  QUOIN_ASSERT(size != grid->sizes.end(), "what is loaded was counted");
+  QUOIN_ASSERT(size != grid->sizes.end(), "loaded chunks are counted");
   budget.remove_chunk(size->second);
   grid->sizes.erase(size);
   ++moved_since_save;
@@ -639,7 +639,7 @@ Result<WorldExtent> StreamedWorld::extent() const {
 }
 
 Result<GridHandle> StreamedWorld::add_grid(SceneGrid grid, std::shared_ptr<const ChunkGenerator> generator) {
-  QUOIN_ASSERT(grid.grid.voxel_count() == 0 && grid.field.chunk_count() == 0, "neither voxels nor densities");
+  QUOIN_ASSERT(grid.grid.voxel_count() == 0 && grid.field.chunk_count() == 0, "an empty grid and an empty field");
   if (!impl_->store.is_writable()) {
     return make_error(ErrorCode::CannotWrite, "opened read-only", impl_->store.path().string());
   }
@@ -651,7 +651,7 @@ Result<GridHandle> StreamedWorld::add_grid(SceneGrid grid, std::shared_ptr<const
     return saved.error();
   }
   const auto number = impl_->world.saver.number_of(handle);
-  QUOIN_ASSERT(number.has_value(), "a grid that was saved has a number");
+  QUOIN_ASSERT(number.has_value(), "a saved grid has a number");
   impl_->add_streamed(handle, *number);
   if (generator != nullptr) impl_->streamer.set_generator(*number, std::move(generator));
   impl_->must_plan = true;
@@ -665,7 +665,7 @@ std::optional<std::uint32_t> StreamedWorld::number_of(GridHandle grid) const {
 
 void StreamedWorld::use_generator(GridHandle grid, std::shared_ptr<const ChunkGenerator> generator) {
   const auto number = impl_->world.saver.number_of(grid);
-  QUOIN_ASSERT(number && impl_->streamed(*number) != nullptr, "a grid that is streamed");
+  QUOIN_ASSERT(number && impl_->streamed(*number) != nullptr, "a streamed grid");
   // Saves the generator's types first.
   if (const auto saved = impl_->save_now(); !saved) impl_->problems.push_back(to_string(saved.error()));
   impl_->streamer.set_generator(*number, std::move(generator));

@@ -60,7 +60,7 @@ IBox samples_of(const IBox& chunks) {
 
 DensityChunk generate_smooth_terrain_chunk(const SmoothTerrainOptions& options, const TerrainTypes& types,
                                            IVec3 chunk) {
-  QUOIN_ASSERT(check(options).has_value(), "sizes and places within their ranges");
+  QUOIN_ASSERT(check(options).has_value(), "sizes and origins within their ranges");
   QUOIN_ASSERT(are_filled(types), "types that add_terrain_types filled");
   const IBox chunks = chunks_of(options);
   if (!chunks.contains(chunk)) return DensityChunk(stored_density(kBand, kBand));

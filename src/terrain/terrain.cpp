@@ -123,7 +123,7 @@ Result<TerrainTypes> add_terrain_types(VoxelRegistry& types) {
 }
 
 Chunk generate_terrain_chunk(const TerrainOptions& options, const TerrainTypes& types, IVec3 chunk) {
-  QUOIN_ASSERT(check(options).has_value(), "sizes and places within their ranges");
+  QUOIN_ASSERT(check(options).has_value(), "sizes and origins within their ranges");
   QUOIN_ASSERT(are_filled(types), "types that add_terrain_types filled");
   if (!chunks_of(world_box(options)).contains(chunk)) return Chunk();
   const terrain::Landform land(options);

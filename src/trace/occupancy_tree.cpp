@@ -173,7 +173,7 @@ struct OccupancyTree::Impl {
     const IVec3 unit{chunk.x & 15, chunk.y & 15, chunk.z & 15};
     std::uint32_t& index = region.nodes[table_index(unit)];
     if (index == 0) return;
-    QUOIN_ASSERT((region.chunks[word_of(unit)] >> bit_of(unit) & 1U) != 0, "a region's bits tell of its nodes");
+    QUOIN_ASSERT((region.chunks[word_of(unit)] >> bit_of(unit) & 1U) != 0, "a region's bits match its nodes");
     release_bricks(chunk_nodes[index]);
     free_chunks.push_back(index);
     index = 0;
@@ -199,7 +199,7 @@ struct OccupancyTree::Impl {
       }
       region->chunks[word_of(unit)] |= std::uint64_t{1} << bit_of(unit);
     }
-    QUOIN_ASSERT(index < chunk_nodes.size(), "a node that is there");
+    QUOIN_ASSERT(index < chunk_nodes.size(), "an existing node");
     return chunk_nodes[index];
   }
 
@@ -435,7 +435,7 @@ struct OccupancyTree::Impl {
   void set_uniform_blocks(IVec3 chunk, const Find& find_blocks) {
     uniform.resize(chunk_nodes.size());
     const std::size_t index = static_cast<std::size_t>(&node_of(chunk) - chunk_nodes.data());
-    QUOIN_ASSERT(index < uniform.size(), "a node that is there");
+    QUOIN_ASSERT(index < uniform.size(), "an existing node");
     if (index != 0) find_blocks(uniform[index]);
   }
 

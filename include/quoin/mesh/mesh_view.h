@@ -76,7 +76,7 @@ struct MeshView {
 /// Lifetime: surface and albedo must outlive the view, unchanged.
 /// Requires: one albedo per vertex.
 [[nodiscard]] inline MeshView view_of(const ArraySurface& surface, std::span<const LinearRgba16> albedo) {
-  QUOIN_ASSERT(albedo.size() == surface.positions.size(), "an albedo a vertex");
+  QUOIN_ASSERT(albedo.size() == surface.positions.size(), "one albedo per vertex");
   MeshView view;
   view.positions = {surface.positions.data(), surface.positions.size()};
   view.indices = {surface.indices.data(), surface.indices.size()};

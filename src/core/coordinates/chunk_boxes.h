@@ -77,7 +77,7 @@ class ChunkBoxes {
   static void count(std::map<int, int>& ends, int at, int by) {
     const auto found = ends.try_emplace(at, 0).first;
     found->second += by;
-    QUOIN_ASSERT(found->second >= 0, "no box goes that was not counted");
+    QUOIN_ASSERT(found->second >= 0, "only counted boxes are removed");
     if (found->second == 0) ends.erase(found);
   }
 

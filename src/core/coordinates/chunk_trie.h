@@ -207,7 +207,7 @@ class ChunkTrie {
 
   // Requires: the entry exists, and no node on the path to it is shared.
   static void erase_below(Ref<Node>& here, const Place& at) {
-    QUOIN_ASSERT(!here.is_shared(), "the way to an entry is copied before it changes");
+    QUOIN_ASSERT(!here.is_shared(), "nodes are copied before they change");
     Node& node = *here;
     const unsigned slot = slot_of(at, node.level);
     const std::uint64_t bit = std::uint64_t{1} << slot;

@@ -124,7 +124,7 @@ void Chunk::count_change(int y, int z, std::uint64_t became_air, std::uint64_t b
   ChunkStorage& m = *storage_;
   const int delta = std::popcount(became_solid) - std::popcount(became_air);
   m.non_air += delta;
-  QUOIN_ASSERT(m.non_air >= 0 && m.non_air <= static_cast<int>(kChunkVoxels), "as many voxels as a chunk has");
+  QUOIN_ASSERT(m.non_air >= 0 && m.non_air <= static_cast<int>(kChunkVoxels), "0 <= voxels <= voxels per chunk");
   m.layer_counts[1][static_cast<std::size_t>(y)] += static_cast<std::uint16_t>(delta);
   m.layer_counts[2][static_cast<std::size_t>(z)] += static_cast<std::uint16_t>(delta);
   add_columns(m.layer_counts[0], became_solid, 1);
@@ -201,7 +201,7 @@ inline std::uint32_t Chunk::index_for(VoxelType type) {
 // Replaces the types of voxels that have other types. Updates the palette's counts, but not the air counts
 // (see count_change).
 std::uint32_t Chunk::replace(int y, int z, std::uint64_t changed, VoxelType type) {
-  QUOIN_ASSERT(changed != 0, "voxels that are of other types");
+  QUOIN_ASSERT(changed != 0, "voxels that change type");
   types_will_change(y, z, changed);
   if (storage_ == nullptr) make_mixed();
   ChunkStorage& m = own();

@@ -107,7 +107,7 @@ std::size_t SlabData::allocated() const {
 
 void ChunkData::put(int x, int y, int z, const VoxelData& data) {
   Ref<SlabData>& slab = slabs_[ChunkStorage::slab_index(y, z)];
-  QUOIN_ASSERT(!data.empty(), "something to put");
+  QUOIN_ASSERT(!data.empty(), "data that is not empty");
   const bool had_some = !get(x, y, z).empty();
   if (slab == nullptr) {
     slab = make_ref<SlabData>();
@@ -125,7 +125,7 @@ void ChunkData::clear(int y, int z, std::uint64_t mask) {
   slab.make_own();
   slab->clear(ChunkStorage::row_in_slab(y, z), gone);
   count_ -= std::popcount(gone);
-  QUOIN_ASSERT(count_ >= 0, "as many voxels as have data");
+  QUOIN_ASSERT(count_ >= 0, "a count that is not negative");
   if (slab->empty()) slab.reset();
 }
 

@@ -166,7 +166,7 @@ std::uint32_t Chunk::slot_for_writing(std::size_t slab) {
 void Chunk::release_slot(std::size_t slab, std::uint32_t index) {
   ChunkStorage& m = *storage_;
   const std::uint32_t slot = std::exchange(m.slabs[slab], ChunkStorage::kUniformSlab | index);
-  QUOIN_ASSERT(slot < m.slot_count && m.free_count < m.slot_count, "a slot that is not free");
+  QUOIN_ASSERT(slot < m.slot_count && m.free_count < m.slot_count, "a used slot");
   *m.own_row(slot, 0) = m.first_free;
   m.first_free = slot;
   ++m.free_count;
@@ -229,7 +229,7 @@ bool Chunk::is_one_entry() const {
 void Chunk::repack(int bits) {
   ChunkStorage& m = *storage_;
   Numbering to = m.direct() ? numbering_of_types(m, bits) : numbering_of_palette(m, bits);
-  QUOIN_ASSERT(bits == 16 || to.palette.size() <= std::size_t{1} << bits, "bits enough for the palette");
+  QUOIN_ASSERT(bits == 16 || to.palette.size() <= std::size_t{1} << bits, "enough bits for the palette");
   const bool is_same = m.direct() ? bits == 16 : bits == m.bits && to.palette.size() == m.palette.size();
   const auto old_words = static_cast<std::size_t>(kSlabRows * m.bits);
   const auto new_words = static_cast<std::size_t>(kSlabRows * bits);
@@ -253,7 +253,7 @@ void Chunk::repack(int bits) {
       renumber_row(m.row(entry, row), m.bits, to.new_index, out + row * bits, bits);
     }
   }
-  QUOIN_ASSERT(slots * new_words == words.size(), "each slot is free or one slab's");
+  QUOIN_ASSERT(slots * new_words == words.size(), "each slot is free or belongs to one slab");
   m.words = std::move(words);
   m.palette = std::move(to.palette);
   m.counts = std::move(to.counts);

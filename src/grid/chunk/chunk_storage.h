@@ -74,7 +74,7 @@ struct ChunkStorage : RefCounted {
   void move_counts(std::uint32_t from_index, std::uint32_t to_index, std::uint32_t voxels) {
     const std::uint32_t from = counted_at(from_index);
     const std::uint32_t to = counted_at(to_index);
-    QUOIN_ASSERT(from < counts.size() && to < counts.size() && counts[from] >= voxels, "voxels that are counted");
+    QUOIN_ASSERT(from < counts.size() && to < counts.size() && counts[from] >= voxels, "counted voxels");
     if (counts[to] == 0) ++used;
     counts[to] += voxels;
     counts[from] -= voxels;
@@ -83,7 +83,7 @@ struct ChunkStorage : RefCounted {
   /// Books that a voxel became air, or was: -1 or 1.
   void count_voxel(int x, int y, int z, int delta) {
     non_air += delta;
-    QUOIN_ASSERT(non_air >= 0 && non_air <= static_cast<int>(kChunkVoxels), "as many voxels as a chunk has");
+    QUOIN_ASSERT(non_air >= 0 && non_air <= static_cast<int>(kChunkVoxels), "0 <= voxels <= voxels per chunk");
     layer_counts[0][static_cast<std::size_t>(x)] += static_cast<std::uint16_t>(delta);
     layer_counts[1][static_cast<std::size_t>(y)] += static_cast<std::uint16_t>(delta);
     layer_counts[2][static_cast<std::size_t>(z)] += static_cast<std::uint16_t>(delta);
@@ -126,7 +126,7 @@ struct ChunkStorage : RefCounted {
 inline ChunkStorage& Chunk::own() {
   if (storage_.is_shared()) [[unlikely]]
     copy_storage();
-  QUOIN_ASSERT(storage_ != nullptr && !storage_.is_shared(), "what is written belongs to one chunk");
+  QUOIN_ASSERT(storage_ != nullptr && !storage_.is_shared(), "storage that no other chunk shares");
   return *storage_;
 }
 

@@ -40,7 +40,7 @@ void PagedWords::replace_page(std::size_t page, std::size_t capacity) {
 }
 
 void PagedWords::make_page_own(std::size_t page) {
-  QUOIN_ASSERT(page < pages_.size(), "a page that there is");
+  QUOIN_ASSERT(page < pages_.size(), "an existing page");
   if (pages_[page].is_shared()) {
     replace_page(page, pages_[page]->capacity());
   } else {

@@ -49,7 +49,7 @@ class PagedWords {
   [[nodiscard]] std::size_t size() const { return size_; }
   /// Returns a pointer to the word and those after it in its page.
   [[nodiscard]] const std::uint64_t* at(std::size_t word) const {
-    QUOIN_ASSERT(word < size_, "a word that there is");
+    QUOIN_ASSERT(word < size_, "an existing word");
     return pages_[word / kPageWords]->words() + word % kPageWords;
   }
   /// Returns true if its page is known to be unshared.
@@ -59,7 +59,7 @@ class PagedWords {
   }
   /// Returns writable words. Requires: `owns(word)`.
   [[nodiscard]] std::uint64_t* own_at(std::size_t word) {
-    QUOIN_ASSERT(word < size_ && owns(word), "a word whose page was made one's own");
+    QUOIN_ASSERT(word < size_ && owns(word), "a word on an unshared page");
     return pages_[word / kPageWords]->words() + word % kPageWords;
   }
   /// Copies the page of the word if it is shared. Requires: this object is not shared.

@@ -84,7 +84,7 @@ TEST(PagedWords, GrowAndShrinkWithoutTouchingCopies) {
 TEST(PagedWordsDeathTest, ASharedPageIsNotWritten) {
   PagedWords words(10);
   const PagedWords copy = words;
-  QUOIN_EXPECT_MISTAKE((void)words.own_at(3), "made one's own");
+  QUOIN_EXPECT_MISTAKE((void)words.own_at(3), "a word on an unshared page");
 }
 
 // Compares chunks and copies of them, written in turn, with plain arrays.

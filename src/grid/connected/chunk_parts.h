@@ -142,7 +142,7 @@ class ChunkParts {
     return layer_starts_[static_cast<std::size_t>(z)] + row_starts_[static_cast<std::size_t>(z * kChunkEdge + y)];
   }
   [[nodiscard]] std::uint32_t part_of_run(std::uint32_t run) const {
-    QUOIN_ASSERT(run < (few_parts_.empty() ? many_parts_.size() : few_parts_.size()), "a run that was found");
+    QUOIN_ASSERT(run < (few_parts_.empty() ? many_parts_.size() : few_parts_.size()), "an existing run");
     return few_parts_.empty() ? many_parts_[run] : few_parts_[run];
   }
   [[nodiscard]] std::uint64_t search_row(int y, int z) const;

@@ -309,12 +309,12 @@ void ConnectedPieces::Impl::make_pieces() {
     for (const Link& link : entry->links) {
       if (link.next != next) {
         const auto found = entries.find(entry->at + next_chunk(link.next));
-        QUOIN_ASSERT(found != entries.end(), "links lead to chunks that are there");
+        QUOIN_ASSERT(found != entries.end(), "links lead to existing chunks");
         other = &found->second;
       }
       next = link.next;
       QUOIN_ASSERT(link.part < entry->parts.parts().size() && link.other < other->parts.parts().size(),
-                   "links lead to parts that are there");
+                   "links lead to existing parts");
       sets.unite(entry->first_node + link.part, other->first_node + link.other);
     }
   }
@@ -329,7 +329,7 @@ void ConnectedPieces::Impl::number_pieces(UnionFind<std::size_t>& sets) {
     for (std::size_t part = 0; part < entry->parts.parts().size(); ++part) {
       const std::size_t node = entry->first_node + part;
       const std::size_t root = sets.find(node);
-      QUOIN_ASSERT(root <= node, "the first node of a piece stands for it");
+      QUOIN_ASSERT(root <= node, "the first node of a piece represents it");
       piece_of_node[node] = root == node ? pieces.size() : piece_of_node[root];
       if (root == node) pieces.emplace_back();
       add_node(piece_of_node[node], *entry, part);

@@ -77,7 +77,7 @@ class LightDomain {
       for (int dx = -1; dx <= 1; ++dx) {
         const auto found = columns_.find({x + dx, 0, z + dz});
         if (found == columns_.end()) continue;
-        QUOIN_ASSERT(!found->second.empty(), "a column is there for its chunks");
+        QUOIN_ASSERT(!found->second.empty(), "a column has chunks");
         const int begin = *found->second.begin() - 1;
         const int end = *found->second.rbegin() + 2;
         all = all ? Range{std::min(all->begin, begin), std::max(all->end, end)} : Range{begin, end};

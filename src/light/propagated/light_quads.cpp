@@ -48,7 +48,7 @@ class ChunkWords {
   [[nodiscard]] std::uint16_t at(IVec3 voxel) {
     if (voxel.x < 0 || voxel.x >= kChunkEdge) return reader_->at(low_ + voxel);
     const auto row = static_cast<std::size_t>((voxel.y + 1) + kStride * (voxel.z + 1));
-    QUOIN_ASSERT(row < kRows, "at most one beside the chunk");
+    QUOIN_ASSERT(row < kRows, "a row of the chunk or next to it");
     std::uint16_t* words = words_.data() + row * kChunkEdge;
     if (!is_read_[row]) {
       is_read_[row] = true;

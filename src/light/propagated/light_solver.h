@@ -41,7 +41,7 @@ struct LightRegion {
   std::vector<ChunkAround> around;      ///< [x, y, z] of these, x fastest
 
   [[nodiscard]] std::size_t index(IVec3 chunk) const {
-    QUOIN_ASSERT(chunks.contains(chunk), "a chunk in the region or beside it");
+    QUOIN_ASSERT(chunks.contains(chunk), "a chunk in the region or next to it");
     const IVec3 p = chunk - chunks.min;
     const IVec3 size = chunks.max - chunks.min;
     return static_cast<std::size_t>(p.x + size.x * (p.y + size.y * p.z));

@@ -97,8 +97,8 @@ bool are_corners_of_quads(const MeshView& view) {
 Status light_part(const VertexLights& lights, Threads threads, MeshPart& part) {
   auto lit = std::make_shared<LitPart>(LitPart{part.owner, {}});
   for (MeshView& view : part.surfaces) {
-    if (!view.atlas.empty()) return refused(part, "light beside an atlas");
-    if (!are_corners_of_quads(view)) return refused(part, "light of blocks that are watertight");
+    if (!view.atlas.empty()) return refused(part, "cannot light a mesh with an atlas");
+    if (!are_corners_of_quads(view)) return refused(part, "cannot light watertight block meshes");
     std::vector<LinearRgba16>& light = lit->lights.emplace_back(view.positions.size());
     parallel_for((light.size() + kAtOnce - 1) / kAtOnce, threads, [&](std::size_t i) {
       const std::size_t begin = i * kAtOnce;

@@ -506,7 +506,7 @@ TEST(ArraySurfaceDeathTest, AViewWithoutAColourForEachVertexIsAMistake) {
   surface.positions.resize(3);
   surface.normals.resize(3);
   const std::vector<LinearRgba16> albedo(2);
-  QUOIN_EXPECT_MISTAKE((void)view_of(surface, albedo), "an albedo a vertex");
+  QUOIN_EXPECT_MISTAKE((void)view_of(surface, albedo), "one albedo per vertex");
 }
 
 }  // namespace

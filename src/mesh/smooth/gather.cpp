@@ -24,7 +24,7 @@ struct ChunkCoordinate {
 
 ChunkCoordinate chunk_coordinate(int point, int level) {
   const int sample = point * (1 << level);
-  QUOIN_ASSERT(sample >= -kChunkEdge && sample < 2 * kChunkEdge, "a sample of the chunk or of one beside it");
+  QUOIN_ASSERT(sample >= -kChunkEdge && sample < 2 * kChunkEdge, "a sample of the chunk or of a neighbour");
   return {sample >> kChunkShift, sample & (kChunkEdge - 1)};
 }
 

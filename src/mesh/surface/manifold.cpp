@@ -54,7 +54,7 @@ void arcs_around(const Triangulation& mesh, const Corners& corners, std::uint32_
 }
 
 void remove_back_to_back(Triangulation& mesh) {
-  QUOIN_ASSERT(mesh.corners.size() == mesh.indices.size(), "a corner an index");
+  QUOIN_ASSERT(mesh.corners.size() == mesh.indices.size(), "one corner per index");
   const Corners corners(mesh);
   std::vector<bool> is_removed(mesh.indices.size() / 3);
   std::vector<Arc> arcs;

@@ -287,8 +287,8 @@ TEST(VertexWriterDeathTest, MismatchedBuffersAndLayoutsAreMistakes) {
   std::vector<std::byte> out(8 * 16 - 1);
   QUOIN_EXPECT_MISTAKE(writer.write(quads, Vec3(0.0F), out), "room for four vertices a quad");
   out.resize(8 * 16);
-  QUOIN_EXPECT_MISTAKE(writer.write(quads, Vec3(0.5F), out), "positions are whole and within the format's range");
-  QUOIN_EXPECT_MISTAKE(writer.write(quads, Vec3(32'704.0F), out), "positions are whole and within the format's range");
+  QUOIN_EXPECT_MISTAKE(writer.write(quads, Vec3(0.5F), out), "positions are integers within the format's range");
+  QUOIN_EXPECT_MISTAKE(writer.write(quads, Vec3(32'704.0F), out), "positions are integers within the format's range");
   QUOIN_EXPECT_MISTAKE(writer.write(SmoothChunkMesh(), Vec3(0.0F), out), "a layout for smooth chunks");
   QUOIN_EXPECT_MISTAKE(writer.write(MeshView(), Vec3(0.0F), out), "a layout for this kind of mesh");
   const VertexWriter positions({12, {{VertexAttribute::Position, Float32x3, 0}}}, {});

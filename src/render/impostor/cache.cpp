@@ -174,7 +174,7 @@ void ImpostorCache::Impl::work() {
 Entries::iterator ImpostorCache::Impl::next_to_build() {
   for (auto each = queue.begin(); each != queue.end(); ++each) {
     const auto entry = entries.find(*each);
-    QUOIN_ASSERT(entry != entries.end() && entry->second.waiting, "what is queued waits");
+    QUOIN_ASSERT(entry != entries.end() && entry->second.waiting, "a queued impostor waits");
     if (entry->second.building) continue;
     queue.erase(each);
     return entry;
@@ -205,7 +205,7 @@ void ImpostorCache::Impl::build(Entries::iterator entry, std::unique_lock<std::m
   const Origin origin = job->origin;
   job.reset();  // frees the snapshot's data without the lock
   lock.lock();
-  QUOIN_ASSERT(building != 0 && entry->second.building, "what is built was begun");
+  QUOIN_ASSERT(building != 0 && entry->second.building, "a finished build was started");
   --building;
   Entry& built = entry->second;
   if (std::exchange(built.is_replaced, false)) {
@@ -241,14 +241,14 @@ void ImpostorCache::Impl::put(GridHandle handle, const Origin& origin, std::shar
   }
   ++stats.held;
   stats.bytes += bytes;
-  QUOIN_ASSERT(entry->second.impostor == nullptr, "the one before was released");
+  QUOIN_ASSERT(entry->second.impostor == nullptr, "the previous impostor was released");
   entry->second.impostor = std::move(made);
   entry->second.origin = origin;
 }
 
 void ImpostorCache::Impl::release(Entry& entry) {
   if (entry.impostor == nullptr) return;
-  QUOIN_ASSERT(stats.held != 0 && stats.bytes >= entry.impostor->bytes(), "what is held is counted");
+  QUOIN_ASSERT(stats.held != 0 && stats.bytes >= entry.impostor->bytes(), "held impostors are counted");
   --stats.held;
   stats.bytes -= entry.impostor->bytes();
   replaced.push_back(std::exchange(entry.impostor, nullptr));

@@ -100,10 +100,10 @@ class FarTile {
 void draw_impostors(const SceneTracer& scene, std::span<const FarInstance> far, const Camera& camera,
                     const RenderOptions& options, Picture& picture, Threads threads) {
   QUOIN_ASSERT(check(camera, options).has_value(), "a camera and options that CpuRenderer accepts");
-  QUOIN_ASSERT(options.light.model == LightModel::Rays, "light by rays");
+  QUOIN_ASSERT(options.light.model == LightModel::Rays, "ray-traced light");
   QUOIN_ASSERT(picture.colour.width == options.width && picture.colour.height == options.height &&
                    picture.depth.width == options.width && picture.depth.height == options.height,
-               "a picture of the options' size, with depth");
+               "an image of the options' size, with depth");
   const SceneView view(scene, camera.position);
   const VoxelRegistry& types = scene.scene().types;
   const Surfaces surfaces(types);

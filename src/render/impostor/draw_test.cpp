@@ -254,11 +254,11 @@ TEST(DrawImpostorsDeathTest, WantsAPictureOfTheSizeThatIsAskedFor) {
     const Scene empty;
     draw_impostors(SceneTracer(empty), {}, camera, options, picture);
   };
-  QUOIN_EXPECT_MISTAKE(draw(sized(32, 32)), "a picture of the options' size");
+  QUOIN_EXPECT_MISTAKE(draw(sized(32, 32)), "an image of the options' size");
   QUOIN_EXPECT_MISTAKE(draw(sized(0, 32)), "that CpuRenderer accepts");
   RenderOptions propagated = sized(32, 32);
   propagated.light.model = LightModel::Propagated;
-  QUOIN_EXPECT_MISTAKE(draw(propagated), "light by rays");
+  QUOIN_EXPECT_MISTAKE(draw(propagated), "ray-traced light");
 }
 
 }  // namespace

@@ -31,7 +31,7 @@ std::array<DVec3, kImpostorViews> all_views() {
       for (const double z : {-1.0, 1.0}) add(x, y, z);
     }
   }
-  QUOIN_ASSERT(count == views.size(), "a direction a view");
+  QUOIN_ASSERT(count == views.size(), "one direction per view");
   return views;
 }
 

@@ -38,7 +38,7 @@ class ImpostorShell {
   /// Requires: `voxel` is at most one voxel outside the box.
   [[nodiscard]] bool is_occupied(IVec3 voxel) const {
     const IVec3 local = voxel - origin_;
-    QUOIN_ASSERT((IBox{IVec3{0}, size_ * 4}.contains(local)), "at most one beside the box");
+    QUOIN_ASSERT((IBox{IVec3{0}, size_ * 4}.contains(local)), "a position in the box or next to it");
     return (cells_[cell_of(local)] >> bit_of(local) & 1U) != 0;
   }
 

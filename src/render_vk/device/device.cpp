@@ -150,7 +150,7 @@ VkResult Device::submit(const VkSubmitInfo& info) {
   } else {
     use();
   }
-  QUOIN_ASSERT(result != VK_NOT_READY, "BorrowedVulkanDevice::with_queue must call what it is given");
+  QUOIN_ASSERT(result != VK_NOT_READY, "BorrowedVulkanDevice::with_queue must call its argument");
   return result;
 }
 

@@ -132,7 +132,7 @@ void DeviceMemory::release(Place& place) {
   QUOIN_ASSERT(old.block < blocks_.size() && blocks_[old.block] != nullptr, "a place of a block that is there");
   std::map<VkDeviceSize, VkDeviceSize>& free = blocks_[old.block]->free;
   const auto [freed, is_new] = free.emplace(old.offset, old.size);
-  QUOIN_ASSERT(is_new, "each place is given back once");
+  QUOIN_ASSERT(is_new, "each allocation is freed once");
   auto at = freed;
   QUOIN_ASSERT(std::next(at) == free.end() || at->first + at->second <= std::next(at)->first, "gaps lie apart");
   if (const auto next = std::next(at); next != free.end() && at->first + at->second == next->first) {

@@ -173,10 +173,10 @@ TEST_F(VulkanBorrowed, ChecksPreconditions) {
   ASSERT_TRUE(one.draw(picture, camera_, options_, Accumulation::Restart));
   Camera other = camera_;
   other.position.x += 1.0;
-  QUOIN_EXPECT_MISTAKE((void)one.draw(picture, other, options_, Accumulation::Continue), "of one camera");
+  QUOIN_EXPECT_MISTAKE((void)one.draw(picture, other, options_, Accumulation::Continue), "have the same camera");
   RenderOptions darker = options_;
   darker.light.exposure = 0.5;
-  QUOIN_EXPECT_MISTAKE((void)one.draw(picture, camera_, darker, Accumulation::Continue), "of one light");
+  QUOIN_EXPECT_MISTAKE((void)one.draw(picture, camera_, darker, Accumulation::Continue), "have the same light");
   EXPECT_TRUE(one.draw(picture, other, darker, Accumulation::Restart));
   BorrowedVulkanDevice lent = own_->lent();
   QUOIN_EXPECT_MISTAKE((void)VulkanRenderer::create(lent, 1000), "at least 64 KiB");
@@ -184,7 +184,7 @@ TEST_F(VulkanBorrowed, ChecksPreconditions) {
   auto unguarded = VulkanRenderer::create(lent);
   ASSERT_TRUE(unguarded);
   VulkanPicture never(*unguarded);
-  QUOIN_EXPECT_MISTAKE((void)never.write({1, 1, {1, 2, 3}}), "must call what it is given");
+  QUOIN_EXPECT_MISTAKE((void)never.write({1, 1, {1, 2, 3}}), "must call its argument");
 }
 
 TEST(VulkanFeatures, AreEnabledInTheStructuresThatAreThere) {
@@ -222,7 +222,7 @@ TEST(VulkanFeatures, AreEnabledInTheStructuresThatAreThere) {
 TEST(VulkanFeatures, AStructureThatDoesNotSayWhatItIsIsAMistake) {
   VkDeviceCreateInfo info{};
   VulkanFeatureStorage storage;
-  QUOIN_EXPECT_MISTAKE((void)enable_vulkan_features(info, storage), "says what it is");
+  QUOIN_EXPECT_MISTAKE((void)enable_vulkan_features(info, storage), "with its sType set");
 }
 
 TEST(VulkanRequirements, AreThoseOfTheHeaders) {

@@ -38,7 +38,7 @@ Result<VulkanDeviceInfo> describe_vulkan_device(VkInstance_T* instance, VkPhysic
 Status enable_vulkan_features(VkDeviceCreateInfo& info, VulkanFeatureStorage& storage) {
   using Addresses = VkPhysicalDeviceBufferDeviceAddressFeatures;
   static_assert(sizeof(Addresses) <= sizeof storage.bytes && alignof(Addresses) <= 8);
-  QUOIN_ASSERT(info.sType == VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO, "a VkDeviceCreateInfo that says what it is");
+  QUOIN_ASSERT(info.sType == VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO, "a VkDeviceCreateInfo with its sType set");
   // Vulkan declares extension chains const, although some structures in them are outputs.
   for (auto* one = static_cast<VkBaseOutStructure*>(const_cast<void*>(info.pNext)); one != nullptr; one = one->pNext) {
     if (one->sType == VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES) {

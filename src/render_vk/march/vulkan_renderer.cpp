@@ -110,8 +110,8 @@ Status VulkanRenderer::draw(VulkanPicture& picture, const Camera& camera, const 
   if (is_new || target.sums.handle() == VK_NULL_HANDLE) {
     if (Status status = target.begin_sums(camera, options.light); !status) return status;
   }
-  QUOIN_ASSERT(target.camera == camera, "a picture's samples are of one camera");
-  QUOIN_ASSERT(target.light == options.light, "a picture's samples are of one light");
+  QUOIN_ASSERT(target.camera == camera, "all samples of an image have the same camera");
+  QUOIN_ASSERT(target.light == options.light, "all samples of an image have the same light");
   if (target.samples + options.samples > kMaxSamples) {
     return make_error(ErrorCode::LimitExceeded, "vulkan: an image accumulates at most 4096 samples per pixel");
   }

@@ -150,7 +150,7 @@ Status DevicePaths::put_faces(DeviceMemory& memory) {
     keys.emplace_back(0);
     lamps.push_back(-1);
   }
-  QUOIN_ASSERT(std::has_single_bit(lamps.size()), "slots that a mask of their number chooses from");
+  QUOIN_ASSERT(std::has_single_bit(lamps.size()), "a power of two of slots");
   Status done = put_values(memory, lamp_ways_, lamps_->tree().ways());
   if (done) done = put_values(memory, face_keys_, std::span<const IVec4>(keys));
   if (done) done = put_values(memory, face_lamps_, std::span<const std::int32_t>(lamps));

@@ -226,8 +226,8 @@ Status VulkanRenderer::draw_paths(VulkanPathPicture& picture, const Camera& came
   }
   PathOptions as_before = options;
   as_before.samples = target.options.samples;
-  QUOIN_ASSERT(target.camera == camera, "a picture's samples are of one camera");
-  QUOIN_ASSERT(target.options == as_before, "a picture's samples are of the same options");
+  QUOIN_ASSERT(target.camera == camera, "all samples of an image have the same camera");
+  QUOIN_ASSERT(target.options == as_before, "all samples of an image have the same options");
   if (target.samples + options.samples > path::kMaxPathSamples) {
     return make_error(ErrorCode::LimitExceeded,
                       "vulkan: a path-traced image accumulates at most 65,536 samples per pixel");

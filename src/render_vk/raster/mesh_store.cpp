@@ -177,7 +177,8 @@ void MeshStore::replace(Change& change) {
 }
 
 void MeshStore::give_back(StoredMesh& mesh) {
-  QUOIN_ASSERT(chunks_ > 0 && bytes_ >= mesh.place.size && triangles_ >= mesh.triangles(), "what is there was counted");
+  QUOIN_ASSERT(chunks_ > 0 && bytes_ >= mesh.place.size && triangles_ >= mesh.triangles(),
+               "removed meshes were counted");
   --chunks_;
   chunks_with_glass_ -= mesh.has_glass() ? 1 : 0;
   triangles_ -= mesh.triangles();
@@ -196,7 +197,7 @@ const MeshStore::StoredGrid* MeshStore::find(MeshKey key) {
   const auto found = grids_.find(key);
   if (found == grids_.end()) return nullptr;
   StoredGrid& grid = found->second;
-  QUOIN_ASSERT(!grid.chunks.empty(), "a grid without meshes is not kept");
+  QUOIN_ASSERT(!grid.chunks.empty(), "grids without meshes are removed");
   if (!grid.bounds_known) {
     grid.low = grid.high = grid.chunks.begin()->first;
     grid.opaque_quads = 0;

@@ -222,7 +222,7 @@ Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockySceneOptions& opt
   if (options.atlas) {
     if (auto sound = check_atlas(scene, grids, options); !sound) return sound.error();
   }
-  QUOIN_ASSERT(!options.atlas || !options.part_of, "an atlas is of grids that are held whole");
+  QUOIN_ASSERT(!options.atlas || !options.part_of, "an atlas needs completely loaded grids");
   const double first_share = options.atlas ? 0.5 : 1.0;
   MeshResults results;
   if (!options.part_of) results = mesh_all(scene, grids, options, threads, part_of(progress, 0.0, first_share));

@@ -158,7 +158,7 @@ bool ChunkEncoder::compress(std::vector<std::byte>& out) {
   const std::size_t bytes = ZSTD_compressCCtx(compressor_->context, out.data() + begin, out.size() - begin,
                                               content_.data(), content_.size(), kCompressionLevel);
   if (ZSTD_isError(bytes) != 0 && ZSTD_getErrorCode(bytes) == ZSTD_error_memory_allocation) throw std::bad_alloc();
-  QUOIN_ASSERT(ZSTD_isError(bytes) == 0, "room for what cannot be compressed");
+  QUOIN_ASSERT(ZSTD_isError(bytes) == 0, "room for incompressible content");
   const bool is_smaller = bytes < content_.size();
   out.resize(is_smaller ? begin + bytes : begin);
   return is_smaller;

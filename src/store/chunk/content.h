@@ -63,7 +63,7 @@ class ContentReader {
   }
   /// Requires: has(count).
   std::span<const std::byte> take_bytes(std::size_t count) {
-    QUOIN_ASSERT(has(count), "bytes that were seen to be there");
+    QUOIN_ASSERT(has(count), "bytes that `has` confirmed");
     const auto taken = bytes_.subspan(at_, count);
     at_ += count;
     return taken;

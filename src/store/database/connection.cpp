@@ -84,14 +84,14 @@ void Statement::Finalizer::operator()(sqlite3_stmt* statement) const {
 
 void Statement::bind(int parameter, std::int64_t value) {
   [[maybe_unused]] const int code = sqlite3_bind_int64(statement_.get(), parameter + 1, value);
-  QUOIN_ASSERT(code == SQLITE_OK, "a parameter of a statement that is reset");
+  QUOIN_ASSERT(code == SQLITE_OK, "a parameter of a reset statement");
 }
 
 void Statement::bind(int parameter, std::string_view text) {
   const int code =
       sqlite3_bind_text64(statement_.get(), parameter + 1, text.data(), text.size(), SQLITE_TRANSIENT, SQLITE_UTF8);
   if (code == SQLITE_NOMEM) throw std::bad_alloc();
-  QUOIN_ASSERT(code == SQLITE_OK || code == SQLITE_TOOBIG, "a parameter of a statement that is reset");
+  QUOIN_ASSERT(code == SQLITE_OK || code == SQLITE_TOOBIG, "a parameter of a reset statement");
 }
 
 void Statement::bind(int parameter, std::span<const std::byte> bytes) {
@@ -99,7 +99,7 @@ void Statement::bind(int parameter, std::span<const std::byte> bytes) {
   const void* data = bytes.empty() ? static_cast<const void*>("") : bytes.data();
   [[maybe_unused]] const int code =
       sqlite3_bind_blob64(statement_.get(), parameter + 1, data, bytes.size(), SQLITE_STATIC);
-  QUOIN_ASSERT(code == SQLITE_OK || code == SQLITE_TOOBIG, "a parameter of a statement that is reset");
+  QUOIN_ASSERT(code == SQLITE_OK || code == SQLITE_TOOBIG, "a parameter of a reset statement");
 }
 
 Result<bool> Statement::step() {

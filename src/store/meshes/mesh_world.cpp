@@ -198,7 +198,7 @@ class WorldMesher {
  private:
   [[nodiscard]] std::uint32_t number_of(GridHandle grid) const {
     const auto number = loaded_.saver.number_of(grid);
-    QUOIN_ASSERT(number.has_value(), "a grid that was read has a number");
+    QUOIN_ASSERT(number.has_value(), "a loaded grid has a number");
     return *number;
   }
   [[nodiscard]] Status cancelled() const {
@@ -329,7 +329,7 @@ Result<FaceCounts> count_world_faces(const WorldStore& world, const LoadedWorld&
   std::size_t done = 0;
   for (const GridHandle grid : drawn) {
     const auto number = loaded.saver.number_of(grid);
-    QUOIN_ASSERT(number.has_value(), "a grid that was read has a number");
+    QUOIN_ASSERT(number.has_value(), "a loaded grid has a number");
     ChunkCache cache(world, *number, WorldMeshOptions().cache_bytes);
     const auto share = [&](std::size_t i) { return static_cast<double>(i) / static_cast<double>(drawn.size()); };
     const auto more = count_grid_faces(cache, scene.types, threads, part_of(progress, share(done), share(done + 1)));

@@ -59,7 +59,7 @@ void WorldChanges::put_types(const VoxelRegistry& types, VoxelType first) {
 }
 
 void WorldChanges::put_type(VoxelType type, const VoxelProperties& properties) {
-  QUOIN_ASSERT(type != kAir, "a type besides air");
+  QUOIN_ASSERT(type != kAir, "a type other than air");
   WorldParts::put(*this, store::part::kType, type, store::text_of(properties));
 }
 

@@ -428,7 +428,7 @@ std::vector<std::string> WorldParts::damage(const WorldStore& world) {
 }
 
 Result<SaveTicket> WorldStore::save(WorldChanges changes, std::function<void(const Status&)> on_saved) {
-  QUOIN_ASSERT(impl_->writer != nullptr, "a world that is open for writing");
+  QUOIN_ASSERT(impl_->writer != nullptr, "a world opened for writing");
   ChangeSet& content = *changes.content_;
   if (content.empty() && !on_saved) return SaveTicket{};
   // Under the lock: two threads that put types must not overtake each other.

@@ -122,7 +122,7 @@ class Crossings {
     add_between(f, low, 1.0);
   }
   void add(double at) {
-    QUOIN_ASSERT(count_ < kMost, "room for every crossing that there can be");
+    QUOIN_ASSERT(count_ < kMost, "room for the maximum number of crossings");
     places_[count_++] = at;
   }
   void sort() { std::sort(places_.begin(), places_.begin() + static_cast<std::ptrdiff_t>(count_)); }
