@@ -1,4 +1,4 @@
-// The camera's rays, one an invocation; in view, and in the grids of instances.
+// The camera's rays, one per invocation, in view space and in the grids of instances.
 #include "picture_rays.glsl"
 
 // Returns the image position of the invocation's ray, in pixels.
@@ -31,7 +31,7 @@ struct ExactRay {
   Pair direction;
 };
 
-// Of the invocation's ray, in view; a unit vector.
+// Returns the direction of the invocation's ray in view; unit.
 Pair exact_direction() {
   Frame f = frame();
   Pair forward = Pair(f.forward.xyz, f.forward_low.xyz);
@@ -58,7 +58,7 @@ bool is_before(Pair a, Pair b, int axis) {
 }
 
 // Moves a ray that starts more than 64 voxels from a tree's bounds to its entry point, as the CPU does before rounding.
-// `axis`: of the plane where it enters; -1 if it is unchanged. Returns false if the ray misses.
+// `axis`: the axis of the entry plane; -1 if the ray is unchanged. Returns false if the ray misses.
 bool move_to_bounds(Tree tree, Placed placed, inout ExactRay ray, out float moved_t, out int axis) {
   vec3 low = vec3(tree.low.xyz - placed.start_base.xyz);
   vec3 high = vec3(tree.high.xyz - placed.start_base.xyz);
@@ -80,11 +80,11 @@ bool move_to_bounds(Tree tree, Placed placed, inout ExactRay ray, out float move
   ray.start = sum_of(ray.start, product_of(component(t, axis), ray.direction));
   ray.start.high[axis] = planes.high[axis];
   ray.start.low[axis] = 0.0;
-  // The others are inside by now, or never will be.
+  // The other coordinates are inside now, or the ray misses.
   return all(greaterThanEqual(ray.start.high, low - 1e-3)) && all(lessThanEqual(ray.start.high, high + 1e-3));
 }
 
-// From the multiple of 64 voxels next to its start, and then rounded.
+// Returns the ray relative to the multiple of 64 voxels near its start, rounded to single precision.
 GridRay rounded(Placed placed, ExactRay ray, float t) {
   vec3 whole = clamp(floor(ray.start.high), vec3(-1e9), vec3(1e9));
   ivec3 shift = ivec3(whole) & ~63;
@@ -92,7 +92,7 @@ GridRay rounded(Placed placed, ExactRay ray, float t) {
   return GridRay(placed.start_base.xyz + shift, start.high, ray.direction.high, t);
 }
 
-// How far along such a ray, from the instance's start, the plane of a voxel's face is.
+// Returns the distance along a ray from the instance's start to the plane of a voxel's face.
 Pair distance_to_face(ExactRay ray, Pair from_voxel, uint face) {
   int axis = int(face >> 1);
   float plane = (face & 1) == 0 ? 1.0 : 0.0;
@@ -100,12 +100,12 @@ Pair distance_to_face(ExactRay ray, Pair from_voxel, uint face) {
   return quotient_of(from_plane, component(ray.direction, axis));
 }
 
-// A ray's start, from the voxel's lower corner.
+// Returns a ray's start relative to the voxel's lower corner.
 Pair start_from(ExactRay ray, Placed placed, ivec3 voxel) {
   return sum_of(ray.start, Pair(-vec3(voxel - placed.start_base.xyz), vec3(0.0)));
 }
 
-// Where such a ray meets the face through which it enters a voxel, from the voxel's lower corner.
+// Returns the point where a ray enters a voxel through a face, relative to the voxel's lower corner.
 vec3 exact_place(Placed placed, Pair d, ivec3 voxel, uint face) {
   ExactRay ray = exact_ray_in(placed, d);
   Pair start = start_from(ray, placed, voxel);

@@ -12,9 +12,9 @@ layout(push_constant) uniform Push {
   uint seed;        // of the sample
   uint first;       // 1: of the pixel's samples
   uint round;       // of the sample
-  uint base;        // of the tile's first pixel in sums and colours, and from one row there to the next
+  uint base;        // of the tile's first pixel in sums and colours, and the distance of two rows there
   uint pitch;
-  uint far_first;   // the tile's part of the list of impostors, and how many workgroups draw it
+  uint far_first;   // the tile's part of the impostor list, and the number of workgroups that draw it
   uint far_count;
   uint far_groups;
   uint sample_number;

@@ -1,11 +1,11 @@
 // The corner occlusion of blocky meshes, found in a tree; matches light/corner_light.h on the CPU.
 
-// 3 when both sides are occluders, else how many of the three are.
+// Returns 3 if both sides are occluders, otherwise the number of occluders among the three.
 float vertex_occlusion(bool side_u, bool side_v, bool corner) {
   return side_u && side_v ? 3.0 : float(side_u) + float(side_v) + float(corner);
 }
 
-// The occlusion of the corners that a blocky mesh carries, counted around the face.
+// Returns the corner occlusion that a blocky mesh stores, in order around the face.
 vec4 corner_occlusion(Tree opaque, ivec3 voxel, uint face) {
   int u = kFaceU[face];
   int v = kFaceV[face];
@@ -27,7 +27,7 @@ vec4 corner_occlusion(Tree opaque, ivec3 voxel, uint face) {
               vertex_occlusion(west, north, (occluders & 64) != 0));
 }
 
-// Interpolated over the mesh's two triangles.
+// Interpolates occlusion over the mesh's two triangles.
 float occlusion_at(vec4 corners, uint face, vec3 inside) {
   float a = corners.x;
   float b = corners.y;
@@ -43,7 +43,7 @@ float occlusion_at(vec4 corners, uint face, vec3 inside) {
   return c + (1.0 - x) * (d - c) + (1.0 - y) * (b - c);
 }
 
-// Where a ray meets a face: put onto it, and a little inside its edges.
+// Moves a hit point onto its face, slightly inside the edges.
 vec3 on_face(vec3 inside, uint face) {
   vec3 at = clamp(inside, vec3(1e-6), vec3(1.0 - 1e-6));
   at[axis_of(face)] = (face & 1) == 0 ? 1.0 : 0.0;

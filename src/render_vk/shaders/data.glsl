@@ -2,9 +2,9 @@
 #extension GL_EXT_buffer_reference : require
 #extension GL_EXT_buffer_reference_uvec2 : require
 
-// Whether any grid has a field; where none has, shaders are made without.
+// True if any grid has a field; otherwise shaders are compiled without field code.
 layout(constant_id = 4) const bool kHasFields = false;
-// Whether anything of them is transparent.
+// True if any field has a transparent part.
 layout(constant_id = 6) const bool kHasFieldGlass = false;
 // The trees of a grid: its voxels, then its field.
 const int kContents = kHasFields ? 2 : 1;
@@ -27,7 +27,7 @@ const uint kPropagated = 8192;
 
 #define kInfinity uintBitsToFloat(0x7F800000u)
 
-// A direction kept in a word: the octahedron's faces folded into a square.
+// Unpacks a direction from a word: the octahedron's faces folded into a square.
 // Source: Z. Cigolle et al., "A Survey of Efficient Representations for Independent Unit Vectors" (2014): octahedral.
 vec3 unit_vector(uint word) {
   vec2 e = unpackSnorm2x16(word);
@@ -36,7 +36,7 @@ vec3 unit_vector(uint word) {
   return normalize(v);
 }
 
-const uint kBodies = 16;  // of glass that are kept for a pixel at a time
+const uint kBodies = 16;  // maximum number of glass bodies stored per pixel at a time
 
 // A sparse tree whose nodes have 4^3 children each; a node of level l spans 4^(l + 1) voxels. Level 0 is a word of
 // voxels, level 1 a brick of 16^3, level 2 a chunk.
@@ -53,16 +53,16 @@ struct GridTrees {
 };
 
 // An instance. View space has the world's axes and units; its origin is the camera, or a point before it where
-// everything is far. `ref` is a point of the grid not far from there.
+// everything is far. `ref` is a point of the grid near there.
 struct Placed {
   vec4 grid_axes[3];  // columns: grid from view
   vec4 view_axes[3];  // columns: view from grid
-  ivec4 ref_base;     // of the tree's coordinates; w: the grid
-  vec4 ref_inside;    // from there; w: world units a voxel
-  vec4 ref_view;      // the same point in view; w: voxels of the full grid a voxel
-  ivec4 start_base;   // of the picture's rays, which start at start + x start_x + y start_y for pixel (x, y); w: the
-                      // grid whose levels of light it has
-  vec4 start;         // w: how far along the rays that is, in lengths of their forward component
+  ivec4 ref_base;     // in the tree's coordinates; w: the grid
+  vec4 ref_inside;    // from there; w: world units per voxel
+  vec4 ref_view;      // the same point in view; w: voxels of the full grid per voxel
+  ivec4 start_base;   // of the image's rays, which start at start + x start_x + y start_y for pixel (x, y); w: the
+                      // grid whose light levels it uses
+  vec4 start;         // w: its distance along the rays, in lengths of their forward component
   vec4 start_x;
   vec4 start_y;
   vec4 to_sun;  // w: its brightness
@@ -73,17 +73,17 @@ struct Placed {
   vec4 start_low;
   vec4 start_x_low;
   vec4 start_y_low;
-  ivec4 origin;  // of the tree's coordinates, in the grid; w: how often that is halved
+  ivec4 origin;  // of the tree's coordinates, in the grid; w: the level, its number of halvings
 };
 
 // The surface point that a pixel shows: a voxel, or a cell of a field.
 struct Point {
   ivec4 voxel;  // w: the instance; -1: none
-  vec4 inside;  // where in the voxel; w: t
-  uvec4 what;   // type, face, kind; w: as a float, how far behind the start of the instance's ray
+  vec4 inside;  // position in the voxel; w: t
+  uvec4 what;   // type, face, kind; w: as a float, the distance from the start of the instance's ray
 };
-// Of a field the kind has kIsField, and instead of a face there is a normal, as `packed_normal` has it.
-// Of an impostor the kind is kSurface | kIsFar, with the corner occlusion and open rays of its face from bit 8 on.
+// For a field, the kind includes kIsField, and the face is a normal in the form of `packed_normal`. For an impostor,
+// the kind is kSurface | kIsFar, with the corner occlusion and open rays of its face from bit 8 on.
 
 // A run of transparent voxels, or of a field's transparent part, of one type. w of `voxel`: the instance. `lengths`:
 // entry t and exit t, voxels, and entry t from the start of the instance's ray. `what`: type, face, flags of its ends,
@@ -94,7 +94,7 @@ struct Body {
   uvec4 what;
 };
 
-// How a body begins and ends; from kExitNormal on, the normal where it ends, see normal_from_28.
+// Flags of a body's ends; the bits from kExitNormal on hold the normal at its exit, see normal_from_28.
 const uint kStartsInside = 1;
 const uint kBeginsInField = 2;
 const uint kEndsInField = 4;
@@ -108,7 +108,7 @@ struct State {
   vec4 colour;  // w: 0 when the sample is done, otherwise 1 plus the number of bodies to light in this round
 };
 
-// Rays of light start so high above a surfel, as in render/impostor/raster/faces.h.
+// Height above a surfel at which light rays start, as in render/impostor/raster/faces.h.
 const float kSurfelLift = 0.5;
 
 const uint kSurface = 0;
@@ -177,11 +177,11 @@ layout(buffer_reference, std430, buffer_reference_align = 16) buffer Counters {
 
 // The data of an image. Vectors are read as a whole: see docs/decisions/040.
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Frame {
-  vec4 right;  // per pixel to the right and down, and the image's upper left corner, at a distance of 1
+  vec4 right;  // per pixel to the right and down, and the image's upper left corner, at distance 1
   vec4 down;
   vec4 corner;
   vec4 forward;
-  vec4 start;  // of pixel (x, y)'s ray: start + x start_x + y start_y
+  vec4 start;  // ray of pixel (x, y): start + x start_x + y start_y
   vec4 start_x;
   vec4 start_y;
   vec4 right_low;
@@ -194,15 +194,15 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
   vec4 light;  // ambient, ambient without occlusion, light left by full occlusion, reach of its rays at fields
   vec4 ambient;  // colours: of the ambient light, of the sun's
   vec4 sun;
-  vec4 level_sky;  // what light of level 15 is like, of the sky, of lamps; and what shines everywhere
+  vec4 level_sky;  // light at level 15, from the sky and from lamps; and the minimum light
   vec4 level_lamps;
   vec4 level_least;
   uvec2 placed;
   uvec2 grids;
   uvec2 tree;    // nodes of the tree over the instances: low and high, w: first, count or -1 - axis
-  uvec2 leaves;  // their boxes: low and high, w: the instance, and whether it is drawn from its impostor
+  uvec2 leaves;  // their boxes: low and high, w: the instance, and 1 if it is drawn from its impostor
   uvec2 surfaces;    // three vectors each: colour and log clarity, emitted and index of refraction, log transmittance
-  uvec2 directions;  // of occlusion: nine a face; or the rings' angles
+  uvec2 directions;  // of occlusion: nine per face; or the rings' angles
   uvec2 turns;
   uvec2 thresholds;  // the least light of each byte
   uvec2 points;
@@ -214,8 +214,8 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
   uvec2 depths;
   uvec2 counters;
   uvec2 fars;         // impostors
-  uvec2 far_parts;    // which of them show in which tile
-  uvec2 far_depths;   // of the nearest at each pixel of a tile, as bits, and that one's number
+  uvec2 far_parts;    // the impostors visible in each tile
+  uvec2 far_depths;   // of the nearest impostor at each pixel of a tile, as bits, and its number
   uvec2 far_numbers;
   uvec2 lamps;
   uvec2 lamp_bricks;
@@ -235,11 +235,11 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
   float samples;
   float ground_begins;
   float ground_is_full;
-  float view_depth;  // where view space has its origin
+  float view_depth;  // depth of view space's origin
   float sky_scale;   // converts the distance from an orthographic image's centre to the tangent of an angle
   float lift;
   uint far_count;  // 0: no impostors are drawn
-  uint lamp_mask;  // of slots of bricks
-  uint light_mask;  // of slots of bricks of levels
+  uint lamp_mask;  // for slots of bricks
+  uint light_mask;  // for slots of light-level bricks
   uvec2 paths;  // for path tracing: paths/path_data.glsl
 };

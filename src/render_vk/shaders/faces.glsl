@@ -10,7 +10,7 @@ int axis_of(uint face) {
 float sign_of(uint face) {
   return (face & 1) == 0 ? 1.0 : -1.0;
 }
-// In the grid.
+// Returns a face's normal in the grid.
 vec3 face_normal(uint face) {
   vec3 normal = vec3(0.0);
   normal[axis_of(face)] = sign_of(face);

@@ -1,7 +1,7 @@
 #version 460
-// Draws the impostors of a tile, some rectangles per invocation: first the depth of the nearest at each pixel, then
-// which rectangle that is. Among equally near ones the lower number wins: the instance that comes first, then its part
-// (level, coarser level, unseen faces), then the rectangle.
+// Draws the impostors of a tile, some rectangles per invocation: first the nearest depth at each pixel, then the number
+// of that rectangle. At equal depth the lower number wins. Numbers order by instance, then by part (level, coarser
+// level, unseen faces), then by rectangle.
 #include "compute.glsl"
 #include "hash.glsl"
 #include "far.glsl"
@@ -12,14 +12,14 @@ layout(constant_id = 0) const bool kFindsFaces = false;
 const uint kFacesAGroup = 512;
 const float kMargin = 0.01;  // pixels: for rounding
 
-// Pixels from the area's corner, inclusive.
+// A pixel rectangle, from the area's corner, inclusive.
 struct Rectangle {
   vec2 low;
   vec2 high;
   bool is_shown;
 };
 
-// The pixels that a box around `q` may show in: never fewer than it does.
+// Returns a conservative bound of the pixels that a box around `q` covers.
 Rectangle rectangle_of(Far far, vec3 q, vec3 half_size) {
   vec2 at = far.at.xy - push.point;
   float ahead = dot(far.ahead.xyz, q) + far.ahead.w;
@@ -27,12 +27,12 @@ Rectangle rectangle_of(Far far, vec3 q, vec3 half_size) {
   float deep = dot(half_size, abs(far.ahead.xyz));
   vec2 wide = vec2(dot(half_size, abs(far.across.xyz - middle.x * far.ahead.xyz)),
                    dot(half_size, abs(far.down.xyz - middle.y * far.ahead.xyz)));
-  // Of the part of the area that lies in the tile.
+  // The part of the area in the tile.
   vec2 least = vec2(max(push.corner - far.area.xy, ivec2(0)));
   vec2 most = vec2(min(push.corner + push.size, far.area.zw) - far.area.xy - 1);
   float nearest = ahead - deep;
   Rectangle found = Rectangle(least, most, true);
-  // Boxes that reach to the camera's plane may show anywhere.
+  // Boxes that reach the camera's plane may be visible anywhere.
   if (0.01 * ahead < nearest) {
     vec2 size = wide / nearest;
     found.low = max(ceil(middle - size + (at - kMargin)), least);
@@ -52,7 +52,7 @@ void put(ivec2 pixel, float depth, uint number) {
   }
 }
 
-// The pixels that show the part: those with a pattern number from x to before y.
+// The pixels that show the part: pattern numbers from x up to, but not including, y.
 ivec2 share;
 
 bool is_shared(Far far, vec2 pixel) {
@@ -95,7 +95,7 @@ void draw(Far far, FarLevel level, vec3 q, uint side, vec2 reach, uint face, uin
   }
 }
 
-// A surfel: a plane that rises by a slope along each side.
+// Draws a surfel: a plane with a slope along each side.
 void draw_surfel(Far far, vec3 q, vec2 slope, vec2 reach, uint side, uint number) {
   int axis = int(side >> 1);
   int u = kFaceU[side];

@@ -3,32 +3,32 @@
 // A rectangle of a level.
 struct FarFace {
   vec4 centre;  // voxels from the content's centre; w: half its side along u, or a surfel's slope along u
-  uvec4 what;   // index of the face that lights it, or of its cell; 0 for fillers; direction (for surfels with
-                // kIsSurfel and half its sides); half its side along v, or a surfel's slope along v
+  uvec4 what;   // index of the face that lights it, or of its cell, 0 for fillers; direction (surfels: with kIsSurfel
+                // and half its sides); half its side along v, or a surfel's slope along v
 };
 
 // The surface in a cube of 4^3 bits.
 struct FarCell {
-  vec4 corner;    // the least one, voxels from the content's centre
+  vec4 corner;    // lowest corner, voxels from the content's centre
   uvec2 bits;     // bit x + 4 y + 16 z
-  uint face[26];  // that a view saw there
+  uint face[26];  // seen there by each view
 };
 
 struct FarLevel {
-  uvec4 faces;  // address of its rectangles, their number; bits of the sides that show
-  uvec4 cells;  // address of its cells, 0 where rectangles are faces; as a float, the width of their bits, voxels
+  uvec4 faces;  // address and number of its rectangles; bits of the visible sides
+  uvec4 cells;  // address of its cells, 0 if rectangles are faces; as a float, the width of their bits in voxels
 };
 
-// An instance in the picture. Vectors are in its grid, about the content's centre; rays depend on the pixel linearly,
-// from the upper left corner of its area. Each vector is x, y, z; w holds the value named after it.
+// An instance in the image. Vectors are in its grid, relative to the content's centre; rays depend linearly on the
+// pixel, from the upper left corner of its area. Each vector is x, y, z; w holds the value named after it.
 struct Far {
   vec4 point;  // of a pixel's ray, in the plane through the centre; w: the depth of that plane
   vec4 point_x;
   vec4 point_y;
-  vec4 direction;  // w: how depth grows along it
+  vec4 direction;  // w: the increase of depth along it
   vec4 direction_x;
   vec4 direction_y;
-  vec4 across;  // where points lie in the picture: ((across . q + across.w) / (ahead . q + ahead.w) + at.x, ...)
+  vec4 across;  // image position of a point q: ((across . q + across.w) / (ahead . q + ahead.w) + at.x, ...)
   vec4 down;
   vec4 ahead;
   vec4 at;        // z: tolerance of rays beyond a rectangle's sides; w: share of pixels, of 2^24, that use the coarser
@@ -38,10 +38,10 @@ struct Far {
   ivec4 origin;   // of the tree's coordinates, in the grid; w: the instance
   FarLevel level;
   FarLevel coarser;
-  FarLevel unseen;  // the faces that no view saw, or cells of these and of the solid behind surfels
-  uvec4 near;       // the views around the direction to the camera, a byte each; how often the first two are chosen
-  uvec4 faces;    // address of VoxelFaces; number of the first rectangle among those of the picture; how many of the
-                  // faces are of voxels
+  FarLevel unseen;  // faces not seen by any view, or cells of these and of the solid behind surfels
+  uvec4 near;       // the views around the direction to the camera, one byte each; frequencies of the first two
+  uvec4 faces;    // address of VoxelFaces; number of the first rectangle among all in the image; number of faces that
+                  // are voxel faces
 };
 
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer FarFaces {
@@ -53,28 +53,28 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fa
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fars {
   Far at[];
 };
-// Which instances show in a tile: ShaderFarPart.
+// The instances visible in a tile: ShaderFarPart.
 layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer FarParts {
   uvec2 at[];
 };
-// Voxel, and type | corner occlusion << 16 | direction << 24 | open rays << 27. Of a surfel, which come last, three:
-// then its offset and slopes, as floats, and its normal, packed; and its shift.
+// Voxel, and type | corner occlusion << 16 | direction << 24 | open rays << 27. Surfels come last and take three
+// elements: also their offset and slopes, as floats, their packed normal, and their shift.
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer VoxelFaces {
   ivec4 at[];
 };
 
 const uint kIsSurfel = 8;
-const uint kSurfelHalvesShift = 4;  // in whole 1/1,024, twelve bits each
-const float kSurfelRoom = 0.05;  // as render/impostor/raster/faces.h has them
+const uint kSurfelHalvesShift = 4;  // in units of 1/1,024, twelve bits each
+const float kSurfelRoom = 0.05;  // as in render/impostor/raster/faces.h
 
 const uint kNoFace = 0xFFFFFFFFu;
 
-// Which of two levels is drawn at a pixel: raster::Pattern.
+// Returns the pattern number that selects one of two levels at a pixel: raster::Pattern.
 int pattern_at(ivec2 pixel, uint sample_number) {
   return int((uint(pixel.x) * 12664745u + uint(pixel.y) * 9560333u + sample_number * 10368889u) & 0xFFFFFFu);
 }
 
-// Returns the view whose face lights a bit of a cell, chosen pseudo-randomly: 0 to 2 of those in `near`.
+// Returns the view whose face lights a bit of a cell, chosen pseudo-randomly: index 0 to 2 in `near`.
 uint chosen_view(uvec4 near, uint number) {
   uint at = mixed(number) >> 18;
   return at < near.y ? 0 : at < near.y + near.z ? 1 : 2;
@@ -83,9 +83,8 @@ uint view_of(uvec4 near, uint chosen) {
   return near.x >> 8 * chosen & 0xFF;
 }
 
-// Follows a ray, `point` + t * `direction` from the content's centre, through the bits of a cell, from where it enters
-// the cell's box at `along` through a side across axis `side`.
-// Returns the bit that it meets, with `along` there, or -1.
+// Follows a ray, `point` + t * `direction` from the content's centre, through the bits of a cell. It enters the cell's
+// box at `along` through a side across axis `side`. Returns the bit hit, and sets `along` to it; -1 if none.
 int follow(FarCell cell, float bit_width, int side, vec3 point, vec3 direction, inout float along) {
   const float kPast = 1e-3;  // bits: beyond the entered side, despite rounding
   float scale = 1.0 / bit_width;

@@ -1,7 +1,7 @@
 // The surface of a field; matches Surfaces::blend_of_field on the CPU. The including file defines `Surface`,
 // `surface_of`, `white_surface` and `mix_look`.
 
-// The samples around the word of a cell; false where the word has none, since all are solid.
+// Gets the samples around a cell's word. Returns false if the word has none because all samples are solid.
 bool samples_around(Tree field, ivec3 cell, out Numbers block) {
   if (any(lessThan(cell, field.low.xyz)) || any(greaterThanEqual(cell, field.high.xyz))) return false;
   uvec4 node = field.root;
@@ -16,7 +16,7 @@ bool samples_around(Tree field, ivec3 cell, out Numbers block) {
   return block_in(node, record, cell, block);
 }
 
-// A field without materials is white, as in smooth meshes.
+// Returns the surface of a material; fields without materials are white, as in smooth meshes.
 Surface surface_of_material(uint type) {
   if (type == 0) return white_surface();
   return surface_of(type);

@@ -42,7 +42,7 @@ void main() {
   if (is_in_tile()) {
     uint slot = slot_of_pixel();
     State state = States(frame().states).at[slot];
-    // In later rounds only where bodies were left over.
+    // Later rounds only handle pixels with remaining bodies.
     if (push.round == 0 || state.colour.w > 0.0) {
       float first_t;
       bool has_hit;

@@ -1,7 +1,7 @@
 // Glass bodies along a ray; matches light/glass.h on the CPU. They are kept in a list, nearest first. With KEEPS_BODIES
 // there is one of kBodies for each pixel of the tile; with HOLDS_BODIES the invocation has one.
 
-// ln of the share of light below which a body counts as closed.
+// Natural logarithm of the transmittance below which a body counts as closed.
 const float kClosed = -11.0;
 const float kDiagonal = 1.7320508;  // of a cube of 1
 // Lengths of t within which two bodies touch: the rounding of single precision.
@@ -10,7 +10,7 @@ const float kTouching = 4e-6;
 bool reaches(Body body, float t) {
   return t <= body.lengths.y + kTouching * max(1.0, body.lengths.y);
 }
-// No body of a field counts as longer than it is, nor one from within, nor a cloud.
+// Returns true if a body counts with its own length: bodies of fields, bodies that a ray starts in, and clouds.
 bool has_own_length(Body body) {
 #ifdef HAS_CLOUDS
   if (surface_of(body.what.x).scattering > 0.0) return true;
@@ -81,7 +81,7 @@ void keep_body(inout BodyList list, Body body, float from_t, inout vec3 passed) 
   passed *= passed_by(surface_of(dropped.what.x), dropped.lengths.z, has_own_length(dropped));
 }
 
-// The bodies of one instance that are found along a ray, in its order.
+// The bodies of one instance along a ray, in order.
 struct BodyRun {
   Body body;  // the last one
   bool has_body;
@@ -108,25 +108,26 @@ void add_to_run(inout BodyRun run, Body next, float from_t, inout BodyList list,
 }
 
 // The transparent part of a field; matches trace/density/density_glass.h on the CPU. Its tree holds the cells with a
-// transparent corner. A word of 4^3 cells has either one material throughout, or the samples around it and these
-// corners' bodies.
+// transparent corner. A word of 4^3 cells has either a single material, or the samples around it and the bodies of
+// these corners.
 
 const uint kOpaqueBody = 0xFFFF;  // no type's number
 const int kBodiesEdge = 5;
 const uint kBodiesBegin = 172;  // in a block, after its densities
 const uint kIsUniform = 0x80000000u;
 
-// A cell and its corners, by x + 2 y, of z and z + 1: densities, and 0 for air, kOpaqueBody, or a transparent type.
+// A cell and its corners, indexed by x + 2 y, at z and z + 1: densities, and 0 for air, kOpaqueBody, or a transparent
+// type.
 struct GlassCell {
   Numbers block;
-  ivec3 first;  // its least corner in the block
+  ivec3 first;  // its lowest corner in the block
   vec4 low;
   vec4 high;
   uvec4 body_low;
   uvec4 body_high;
 };
 
-// False where the word that was found is of one type.
+// Gets the block of the word found. Returns false if the word has a single type.
 bool glass_block_found(out Numbers block, out uint type) {
   uvec4 brick = walk_stack[1];
   uint child = child_of(brick, index_in(walk_voxel, 1));
@@ -177,7 +178,7 @@ struct RayInGlass {
   vec4 opaque;
   bool has_air;
   bool has_opaque;
-  bool has_several;  // transparent types
+  bool has_several;  // several transparent types
   uint type;         // the first of these
 };
 
@@ -257,7 +258,7 @@ float next_change(GlassCell cell, RayInGlass ray, float after) {
   return next;
 }
 
-// The transparent type there; 0 where there is none.
+// Returns the transparent type at `s`; 0 if there is none.
 uint glass_at(GlassCell cell, RayInGlass ray, float s) {
   if (!(value_at(ray.solid, s) < 0.0) || value_at(ray.opaque, s) < 0.0) return 0;
   if (!ray.has_several) return ray.type;
@@ -274,7 +275,7 @@ uint glass_at(GlassCell cell, RayInGlass ray, float s) {
   return nearest;
 }
 
-// The normal of a body's surface in the cell, towards air (`other` is 0) or another transparent type.
+// Returns the normal of a body's surface in the cell, towards air (`other` is 0) or another transparent type.
 vec3 glass_normal(GlassCell cell, vec3 inside, uint type, uint other) {
   if (other == 0) return normal_in(cell.block, cell.first, inside);
   vec4 low;
@@ -288,7 +289,7 @@ vec3 glass_normal(GlassCell cell, vec3 inside, uint type, uint other) {
   return size > 0.0 ? gradient / size : vec3(0.0);
 }
 
-// A unit vector, or 0, in 28 bits: as unit_vector's word, but rougher.
+// A unit vector, or 0, in 28 bits: like unit_vector's word, but coarser.
 const float kNormalSteps = 8191.0;
 uint packed_in_28(vec3 n) {
   uint word = packed_normal(n);
@@ -352,8 +353,8 @@ void add_bodies(GlassCell cell, bool is_mixed, Body next, float enter_t, float e
   }
 }
 
-// The bodies of an instance's voxels, or of its field, along a ray whose walk has been started. `voxels_a_t`: of the
-// full grid.
+// Finds the bodies of an instance's voxels, or of its field, along a ray whose walk has started. `voxels_a_t`: voxels
+// of the full grid per t.
 void find_bodies_in(int i, bool is_of_field, GridRay ray, float voxels_a_t, float max_t, float from_t,
                     inout BodyList list, inout vec3 passed) {
   float room = max_t - ray.t;
@@ -373,7 +374,8 @@ void find_bodies_in(int i, bool is_of_field, GridRay ray, float voxels_a_t, floa
       Numbers block;
       is_mixed = glass_block_found(block, next.what.x);
       next.what = uvec4(next.what.x, kNoNormal, inside | kBeginsInField | kEndsInField, 8 * uint(i));
-      // A whole word, along whose diagonal it does not close: it closes at the same cell as by single ones.
+      // A whole word is one body if it does not close along the diagonal; it then closes at the same cell as cell by
+      // cell.
       float closing = -surface_of(next.what.x).log_clarity * voxels_a_t / length(ray_direction) * kDiagonal;
       if (is_mixed) {
         cell = glass_cell(block, walk_voxel);
@@ -390,7 +392,7 @@ void find_bodies_in(int i, bool is_of_field, GridRay ray, float voxels_a_t, floa
   if (run.has_body) keep_body(list, run.body, from_t, passed);
 }
 
-// All bodies of one instance along a ray.
+// Finds all bodies of one instance along a ray.
 void find_bodies(int i, GridTrees trees, GridRay ray, float voxels_a_t, float max_t, float from_t,
                  inout BodyList list, inout vec3 passed) {
   for (int content = 0; content < kGlassContents; ++content) {
@@ -402,7 +404,7 @@ void find_bodies(int i, GridTrees trees, GridRay ray, float voxels_a_t, float ma
   }
 }
 
-// Returns the next body of a list, joined with the bodies that touch it; false at the list's end.
+// Gets the next body of a list, joined with the bodies that touch it. Returns false at the list's end.
 bool next_body(BodyList list, inout uint i, out Body body) {
   if (i >= list.count) return false;
   body = listed_body(list, i++);

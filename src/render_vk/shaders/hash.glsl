@@ -1,6 +1,6 @@
 // Matches core/hash.h on the CPU.
 
-// A well-mixed number of one.
+// Mixes the bits of a number.
 uint mixed(uint x) {
   x = (x ^ (x >> 16)) * 0x7FEB352Du;
   x = (x ^ (x >> 15)) * 0x846CA68Bu;

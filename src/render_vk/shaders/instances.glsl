@@ -4,7 +4,7 @@ struct GridRay {
   ivec3 base;
   vec3 origin;
   vec3 direction;
-  float t;  // of its start
+  float t;  // t of its start
 };
 
 struct ViewRay {
@@ -18,7 +18,7 @@ uint visit_stack[kVisitDepth];
 int visit_height;
 uint visit_next;
 uint visit_end;
-bool visited_is_far;  // the last one is drawn from its impostor
+bool visited_is_far;  // true if the last instance is drawn from its impostor
 
 vec3 visit_origin;
 vec3 visit_direction;
@@ -49,7 +49,7 @@ bool may_meet(vec3 low, vec3 high, float max_t) {
   return enter_t <= exit_t * 1.00001 + 1e-5;
 }
 
-// The next of them up to max_t, nearer ones mostly first; -1 when there is none left.
+// Returns the next listed instance up to max_t, roughly nearest first; -1 if none is left.
 int next_instance(float max_t) {
   Vectors nodes = Vectors(frame().tree);
   Vectors leaves = Vectors(frame().leaves);
@@ -100,7 +100,7 @@ ViewRay view_from_grid(Placed placed, GridRay ray) {
   return ViewRay(placed.ref_view.xyz + turned(placed.view_axes, from_ref), turned(placed.view_axes, ray.direction));
 }
 
-// A grid's contents are numbered (kContents): its voxels, then its field.
+// Returns true if a content number (kContents: voxels, then field) is the field.
 bool is_field_content(int content) {
   return kHasFields && content == 1;
 }

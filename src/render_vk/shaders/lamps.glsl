@@ -5,14 +5,14 @@ struct Lamp {
   vec4 position;  // in view; w: its reach
   vec4 axes[3];   // its own in view, unit; w: the term added to the squared distance, cosines of a spot's angles
   vec4 power[6];
-  vec4 low;       // of its box, from its position along its axes; w: 1 where it is a point, 2 where it is a spot
+  vec4 low;       // of its box, from its position along its axes; w: 1 for a point lamp, 2 for a spot
   vec4 high;
   vec4 direction;
 };
 
 struct LampBrick {
   ivec4 key;  // the brick; w: the instance
-  uvec4 list;  // first, count: 0 where the slot is free
+  uvec4 list;  // first, count: 0 if the slot is free
 };
 
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Lamps {
@@ -22,7 +22,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer La
   LampBrick at[];
 };
 
-// The lamps of a brick of 16^3 voxels of an instance's full grid: the first in the lists, and how many.
+// Returns the lamps of a 16^3 brick of an instance's full grid: the first index in the lists, and the count.
 uvec2 lamps_at(ivec3 brick, int placed) {
   LampBricks bricks = LampBricks(frame().lamp_bricks);
   uint mask = frame().lamp_mask;

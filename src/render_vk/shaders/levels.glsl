@@ -2,7 +2,7 @@
 
 struct LightBrick {
   ivec4 key;   // voxel coordinates / 8; w: the grid
-  uvec4 what;  // 0 where the slot is free; where its numbers begin, or kIsUniform | light
+  uvec4 what;  // 0 if the slot is free; the start of its numbers, or kIsUniform | light
 };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer LightBrickTable {
   LightBrick at[];
@@ -11,8 +11,8 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Li
 const uint kLightIsUniform = 0x80000000u;
 const uint kAllOpaque = 0xFFFFFFFFu;
 
-// Where the numbers of a brick begin, kLightIsUniform | light where it is all alike, or kAllOpaque. What lanes that go
-// different ways returned from within the loop was not theirs on every driver.
+// Returns the start of a brick's numbers, kLightIsUniform | light if it is uniform, or kAllOpaque. Returns only after
+// the loop: on some drivers, diverging lanes that returned from within it got wrong values.
 uint find_light_brick(ivec3 brick, int grid) {
   LightBrickTable bricks = LightBrickTable(frame().light_bricks);
   uint mask = frame().light_mask;
@@ -29,7 +29,7 @@ uint find_light_brick(ivec3 brick, int grid) {
   return what;
 }
 
-// The levels of a voxel: sky, red, green, blue. False where light does not get there.
+// Gets the levels of a voxel: sky, red, green, blue. Returns false if light cannot reach it.
 bool levels_of_voxel(ivec3 voxel, int grid, out vec4 levels) {
   uint what = find_light_brick(voxel >> 3, grid);
   bool passes = what != kAllOpaque;
@@ -45,8 +45,8 @@ bool levels_of_voxel(ivec3 voxel, int grid, out vec4 levels) {
   return passes;
 }
 
-// Returns the mean over the voxels at a corner in front of a face: the face's own, its two neighbours and the diagonal
-// one.
+// Returns the mean over the four voxels at a corner in front of a face: the face's own, its two neighbours and the
+// diagonal.
 vec4 corner_levels(vec4 levels[9], uint passing, int u, int v) {
   if ((passing & 16) == 0) return vec4(0.0);
   int side = 3 + u;
@@ -62,7 +62,7 @@ vec4 corner_levels(vec4 levels[9], uint passing, int u, int v) {
   return sum / count;
 }
 
-// On a face of a cell of (2^level)^3 voxels. `inside`: in the cell, 0 to 1.
+// Returns the levels on a face of a cell of (2^level)^3 voxels. `inside`: position in the cell, 0 to 1.
 vec4 levels_on_face(ivec3 cell, uint face, vec3 inside, int level, int grid) {
   int axis = axis_of(face);
   int edge = 1 << level;
@@ -148,15 +148,15 @@ vec3 light_colour(vec4 levels, vec3 normal) {
          (frame().level_least.xyz + light.x * frame().level_sky.xyz + light.yzw * frame().level_lamps.xyz);
 }
 
-// Where light by levels is looked up.
+// A lookup position for light levels.
 struct LevelPlace {
-  ivec3 voxel;  // of an instance's tree; or the surface sample that is the origin of `inside`
+  ivec3 voxel;  // in an instance's tree; or the surface sample that is the origin of `inside`
   vec3 inside;
   vec3 normal;  // in the grid
   int face;     // of the voxel; -1: on a surface
 };
 
-// All light of a surface point.
+// Returns all light at a surface point.
 vec3 light_by_levels(LevelPlace at, Placed placed) {
   ivec3 cell = at.voxel + placed.origin.xyz;
   vec4 levels;

@@ -65,12 +65,12 @@ float openness_of_far(Point point) {
   return 1.0 - occlusion_at(corners, point.what.y, point.inside.xyz) / 3.0;
 }
 
-// The upright of a surface point, in its grid.
+// Returns the normal of a surface point, in its grid.
 vec3 grid_normal(Point point) {
   return is_of_field(point) ? normal_of(point.what.y) : face_normal(point.what.y);
 }
 
-// A direction that stands to (0, 1, 0) as the result stands to a unit `normal`: light/occlusion_directions.h.
+// Rotates `direction` as (0, 1, 0) is rotated to the unit vector `normal`: light/occlusion_directions.h.
 vec3 turned_from_up(vec3 direction, vec3 normal) {
   if (normal.y < -1.0 + 1e-6) return vec3(-direction.xy, direction.z);
   vec3 axis = vec3(normal.z, 0.0, -normal.x);
@@ -78,7 +78,7 @@ vec3 turned_from_up(vec3 direction, vec3 normal) {
   return direction + once + cross(axis, once) / (1.0 + normal.y);
 }
 
-// Where rays start from a surface point: a little before its face.
+// Returns a ray that starts slightly in front of a surface point's face.
 GridRay ray_from(Point point, Placed placed) {
   GridRay ray = GridRay(point.voxel.xyz & ~63, vec3(point.voxel.xyz & 63) + point.inside.xyz, vec3(0.0), 0.0);
   if (is_of_field(point)) {
@@ -92,12 +92,12 @@ GridRay ray_from(Point point, Placed placed) {
 // The rays of a surface point, by number: -1 is the sun's ray, then the occlusion rays, then the lamps' rays.
 struct LightRays {
   vec3 normal;  // in the grid
-  uint face;    // directions at a field's surface are an upper face's, rotated with it
+  uint face;    // for a field's surface, directions are those for an upper face, rotated
   bool is_field;
   float cosine;  // of the sun
   int first;
   int open_count;
-  uvec2 lamps;  // where they are listed, and how many
+  uvec2 lamps;  // their first index in the lists, and the count
   vec3 in_view;
   vec3 normal_in_view;
   uint hash;  // of the pixel

@@ -16,18 +16,18 @@ Surface surface_of(uint type) {
   return Surface(colour.xyz, colour.w, emitted.xyz, surfaces.at[i + 2].xyz, emitted.w);
 }
 
-// The look of a field without materials.
+// Returns the surface of a field without materials.
 Surface white_surface() {
   return Surface(vec3(1.0), 0.0, vec3(0.0), vec3(0.0), 1.0);
 }
 
-// Takes over a share, 0 to 1, of how another surface looks.
+// Blends a share, 0 to 1, of another surface into `mixed`.
 void mix_look(Surface look, float share, inout Surface mixed) {
   mixed.colour = mix(mixed.colour, look.colour, share);
   mixed.emitted = mix(mixed.emitted, look.emitted, share);
 }
 
-// `has_own_length`: else it counts as one voxel long at least.
+// Returns the transmittance of a body. Without `has_own_length` it counts as at least one voxel long.
 vec3 passed_by(Surface surface, float voxels, bool has_own_length) {
   float length = max(voxels, has_own_length ? 0.0 : 1.0);
   return length > 0.0 ? exp(surface.log_transmittance * length) : vec3(1.0);
@@ -47,7 +47,7 @@ bool has_occlusion() {
   return has(kOcclusionRays) || has(kOcclusionVertex);
 }
 
-// Returns the share of all light that occlusion leaves at a point, 0 to 1 open.
+// Returns the share of light that occlusion leaves at a point. `openness`: 0 to 1.
 float left_by_occlusion(float openness) {
   vec4 share = frame().light;
   return share.z + (1.0 - share.z) * openness;

@@ -55,7 +55,7 @@ Pair quotient_of(Pair a, Pair b) {
   return renewed(first, second);
 }
 
-// One component, in all three.
+// Returns one component, in all three.
 Pair component(Pair a, int axis) {
   return Pair(vec3(a.high[axis]), vec3(a.low[axis]));
 }
@@ -63,7 +63,7 @@ Pair component(Pair a, int axis) {
 Pair unit_of(Pair a) {
   Pair squares = product_of(a, a);
   Pair length_squared = sum_of(sum_of(component(squares, 0), component(squares, 1)), component(squares, 2));
-  // One step of Newton's towards the inverse root.
+  // One Newton step towards the inverse square root.
   precise vec3 rough = 1.0 / sqrt(length_squared.high);
   Pair root = Pair(rough, vec3(0.0));
   Pair off = product_of(length_squared, product_of(root, root));

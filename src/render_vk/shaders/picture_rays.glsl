@@ -5,7 +5,7 @@ vec3 picture_vector(vec2 point) {
   return f.corner.xyz + f.right.xyz * point.x + f.down.xyz * point.y;
 }
 
-// A camera's ray. It starts where view space has its origin, at frame().view_depth times length_a_depth.
+// Returns a camera ray. It starts at the origin of view space, at frame().view_depth times length_a_depth.
 ViewRay camera_ray(vec2 point) {
   Frame f = frame();
   vec3 start = f.start.xyz + f.start_x.xyz * point.x + f.start_y.xyz * point.y;

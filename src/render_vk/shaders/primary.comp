@@ -1,5 +1,5 @@
 #version 460
-// The nearest opaque voxel of each pixel of a tile.
+// Finds the nearest opaque voxel at each pixel of a tile.
 #include "compute.glsl"
 #include "walk.glsl"
 #include "instances.glsl"
@@ -10,7 +10,7 @@
 #include "far.glsl"
 #include "faces.glsl"
 
-// The middle of a surfel, from the lower end of its edge.
+// Returns the middle of a surfel, from the lower end of its edge.
 vec3 middle_of_surfel(uint side, vec3 shape, vec2 shift) {
   vec3 middle = vec3(0.0);
   middle[side >> 1] = shape.x;
@@ -19,8 +19,9 @@ vec3 middle_of_surfel(uint side, vec3 shape, vec2 shift) {
   return middle;
 }
 
-// Where a ray meets a surfel, from the lower end of its edge, and how far along: by the point of the ray that is
-// nearest to the surfel's middle, so that only small numbers are left to be rounded. `from_voxel`: the ray's start.
+// Returns the point where a ray meets a surfel, from the lower end of its edge, and sets its distance `t`. Computes
+// from the ray's point nearest to the surfel's middle, so that only small numbers are rounded. `from_voxel`: the ray's
+// start.
 vec3 place_on_surfel(ExactRay ray, Pair from_voxel, uint side, vec3 shape, vec2 shift, out float t) {
   int axis = int(side >> 1);
   int u = kFaceU[side];
@@ -132,7 +133,7 @@ bool find_far(Pair direction, float scale, inout Point point, out float depth, o
   return true;
 }
 
-// Every instance has its own ray start. The start of the nearest hit's instance lies at this depth, and the hit `t`
+// Every instance has its own ray start. The ray start of the nearest hit's instance lies at this depth; the hit is `t`
 // behind it. Differences of depths are exact.
 struct Nearest {
   float depth;
@@ -197,7 +198,7 @@ Point first_hit(vec2 at) {
       meet_content(content, i, placed, direction, scale, nearest, point);
     }
   }
-  // Inside a voxel the position does not count; that on an impostor is known.
+  // Inside a voxel the position is not used; on an impostor it is already known.
   bool is_far = (point.what.z & kIsFar) != 0;
   if (point.voxel.w >= 0 && kind_of(point) == kSurface && !is_of_field(point) && !is_far) {
     point.inside.xyz = exact_place(placed_at(point.voxel.w), direction, point.voxel.xyz, point.what.y);

@@ -1,7 +1,7 @@
 // The light that reaches a point: rays among all instances. The including file defines `kHasGlass`: true if there is
 // glass.
 //
-// Compilers inline a function at each call, and a walk is long. So each function is called at a single place of a
+// Compilers inline a function at each call, and a walk is long. Each function is therefore called at one place in a
 // shader, in a loop over all its uses. See docs/decisions/archive/088.
 
 uint rays_taken;
@@ -29,8 +29,8 @@ bool is_blocked(int home, Placed own, GridRay ray, float max_t) {
   return false;
 }
 
-// The bodies of all instances along a ray in the space of grid `home`, and in view. `length`: of the ray's direction in
-// the world.
+// Finds the bodies of all instances along a ray, given in the space of grid `home` and in view. `length`: of the ray's
+// direction in the world.
 void find_bodies(int home, GridRay ray, ViewRay in_view, float length, float max_t, float from_t, inout BodyList list,
                  inout vec3 passed) {
   start_visit(in_view);
@@ -62,7 +62,7 @@ vec3 sunlight_passed(uint slot, int home, Placed own, GridRay ray, float max_t) 
   return passed;
 }
 
-// The lamps that may reach a voxel of an instance's tree: the first in the lists, and how many.
+// Returns the lamps that may reach a voxel of an instance's tree: the first index in the lists, and the count.
 uvec2 lamps_around(ivec4 voxel, Placed placed) {
   return lamps_at(((voxel.xyz + placed.origin.xyz) << placed.origin.w) >> 4, voxel.w);
 }

@@ -1,5 +1,6 @@
 #version 460
-// The samples' mean as sRGB bytes, rounded exactly: the byte is the number of thresholds that the light reaches.
+// Converts the samples' mean to sRGB bytes, rounded exactly: the byte is the number of thresholds that the light
+// reaches.
 #include "compute.glsl"
 
 uint encoded(float light) {

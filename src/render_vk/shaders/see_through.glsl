@@ -3,17 +3,17 @@
 vec3 seen_direction();
 vec3 normal_met(int instance, uint face, float t);
 
-// Of a face.
+// Returns the normal of a face in the world.
 vec3 face_normal(Placed placed, uint face) {
   return sign_of(face) * placed.view_axes[axis_of(face)].xyz / placed.ref_inside.w;
 }
 
-// Of a field's surface; `in_grid` is unit.
+// Returns the normal of a field's surface in the world; `in_grid` is unit.
 vec3 field_normal(int instance, vec3 in_grid) {
   Placed placed = placed_at(instance);
   return turned(placed.view_axes, in_grid) / placed.ref_inside.w;
 }
-// The upright of the surface through which a ray enters a body, or leaves it; unit, in the world.
+// Returns the normal of the surface where a ray enters or leaves a body; unit, in the world.
 vec3 normal_of_side(Body body, bool is_entered) {
   int instance = is_entered ? body.voxel.w : int(body.what.w >> 3);
   uint in_field = is_entered ? kBeginsInField : kEndsInField;
@@ -29,8 +29,8 @@ void meet_surface(vec3 normal, float before, float behind, vec3 tint, inout Stat
   state.colour.xyz += state.weight.xyz * tint * mirror.x * sky_colour(mirror.y);
   state.weight.xyz *= 1.0 - mirror.x;
 }
-// Handles the surfaces where a ray leaves one body for the next, or for air: a reflection at a body's end passes the
-// body once more.
+// Handles the surfaces where a ray leaves a body for the next, or for air. A reflection at a body's end passes through
+// the body again.
 void meet_surfaces(Body from, bool has_from, Body to, bool has_to, inout State state) {
   bool touches = has_from && has_to && reaches(from, to.lengths.x);
   for (int side = 0; side < 2; ++side) {
@@ -64,8 +64,8 @@ struct Passage {
   uint next;
   Body body;      // the latest body
   bool has_body;
-  bool is_entered;  // the first was entered before
-  bool is_last;     // all bodies fitted; otherwise it stops before the last body, which may continue in the next round
+  bool is_entered;  // the first body was entered earlier
+  bool is_last;     // all bodies fitted; otherwise stop before the last body, which may continue in the next round
 };
 
 Passage passage_through(BodyList list, bool is_entered) {

@@ -8,7 +8,7 @@ struct Sky {
   float ground_is_full;
 };
 
-// `up`: the y of a unit direction.
+// Returns the sky's colour. `up`: the y of a unit direction.
 vec3 sky_colour(Sky sky, float up) {
   float y = clamp(up, -1.0, 1.0);
   if (y >= 0.0) {

@@ -11,7 +11,7 @@ bool has(uint flag) {
   return (frame().flags & flag) != 0;
 }
 
-// The invocation's place in the tile, and in the buffers of a tile.
+// Returns the invocation's position in the tile.
 ivec2 tile_pixel() {
   return ivec2(gl_GlobalInvocationID.xy);
 }

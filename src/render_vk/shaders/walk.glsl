@@ -6,13 +6,13 @@
 // ordered by t, ties by axis, as defined in docs/decisions/011, so that the CPU kernels meet the same voxels. `origin`
 // is relative to a multiple of 64 voxels near the ray's start.
 
-// Where a voxel lies in the node of a level that holds it.
+// Returns the index of a voxel's child in the node of a level that contains it.
 uint index_in(ivec3 voxel, int level) {
   ivec3 place = (voxel >> (2 * level)) & 3;
   return uint(place.x + 4 * place.y + 16 * place.z);
 }
 
-// Whether a place of a node holds something, and which of its children that is.
+// `has_child` returns true if a node has a child at an index; `child_of` returns that child's number.
 bool has_child(uvec4 node, uint index) {
   return ((index < 32 ? node.x : node.y) & (1u << (index & 31))) != 0;
 }
@@ -35,7 +35,7 @@ bool ray_is_moved;
 ivec3 walk_low;  // the tree's bounds
 ivec3 walk_high;
 float walk_exit_t;
-// Where it stands: the voxel, when it came there, and through which axis; -1 where it started.
+// The walk's position: the voxel, the t at which the ray entered it, and the axis that it crossed; -1 at the start.
 ivec3 walk_voxel;
 float walk_t;
 int walk_axis;
@@ -136,8 +136,8 @@ bool start_walk(Tree tree, ivec3 base, vec3 origin, vec3 direction, float max_t,
   return true;
 }
 
-// Leaves the aligned block of edge 2^shift around the voxel; false when the ray then has left the bounds or is past
-// max_t.
+// Leaves the aligned block of edge 2^shift around the voxel. Returns false if the ray is then outside the bounds or
+// past max_t.
 bool leave_block(int shift, float max_t) {
   ivec3 from = walk_voxel;
   ivec3 low = ((from >> shift) << shift) - ray_base;
@@ -178,7 +178,7 @@ bool find_voxel(float max_t) {
   }
 }
 
-// Where the record of a chunk begins: types, storage, then the tree's bricks.
+// Returns the address of a chunk's record: types, storage, then the tree's bricks.
 uvec2 record_of(uvec4 chunk) {
   return uvec2(chunk.z & ~31u, chunk.w);
 }
@@ -186,7 +186,7 @@ uvec2 record_found() {
   return record_of(walk_level == 2 ? walk_node : walk_stack[2]);
 }
 
-// The type of a voxel, or of a sample, of a chunk.
+// Returns the type of a chunk's voxel or sample.
 uint type_in(uvec2 address, ivec3 at) {
   uvec4 record = Nodes(address).at[0];
   uint bits = record.z;
@@ -202,7 +202,7 @@ uint type_in(uvec2 address, ivec3 at) {
   return bits == 16 ? index : types.at[256 + (index >> 1)] >> (16 * (index & 1)) & 0xFFFF;
 }
 
-// The type of the voxel that was found.
+// Returns the type of the voxel found.
 uint type_found() {
   return type_in(record_found(), walk_voxel & 63);
 }
@@ -219,7 +219,7 @@ uint face_found() {
   return uint(2 * axis + (ray_forward[axis] ? 1 : 0));
 }
 
-// Whether a tree holds a voxel.
+// Returns true if a tree contains a voxel.
 bool holds(Tree tree, ivec3 voxel) {
   if (any(lessThan(voxel, tree.low.xyz)) || any(greaterThanEqual(voxel, tree.high.xyz))) return false;
   uvec4 node = tree.root;
@@ -243,7 +243,7 @@ uvec2 address_after(uvec2 address, uint bytes) {
   return uvec2(low, address.y + carry);
 }
 
-// The samples around the cells of a word, from the one before its first corner on.
+// Returns a sample of a block, which holds the samples around a word's cells, from the one before its first corner on.
 float sample_of(Numbers block, ivec3 at) {
   uint i = uint((at.z * kBlockEdge + at.y) * kBlockEdge + at.x);
   vec2 two = unpackHalf2x16(block.at[i >> 1]);
@@ -264,12 +264,12 @@ bool block_found(out Numbers block) {
   return walk_level == 0 && block_in(walk_stack[1], record_found(), walk_voxel, block);
 }
 
-// A cubic in powers of s.
+// Evaluates a cubic in powers of s.
 float value_at(vec4 f, float s) {
   return ((f.w * s + f.z) * s + f.y) * s + f.x;
 }
 
-// The root between `low`, where it is not negative, and `high`, where it is.
+// Returns the root between `low`, where the cubic is not negative, and `high`, where it is.
 float root_between(vec4 f, float low, float high) {
   float f_low = value_at(f, low);
   float f_high = value_at(f, high);
@@ -290,7 +290,7 @@ float root_between(vec4 f, float low, float high) {
   return s;
 }
 
-// Where it first becomes negative for 0 <= s <= 1; a negative number where it never does.
+// Returns the first s from 0 to 1 at which a cubic becomes negative; a negative number if it never does.
 float first_negative(vec4 f) {
   if (f.x < 0.0) return 0.0;
   float b1 = f.x + f.y * (1.0 / 3.0);
@@ -298,7 +298,7 @@ float first_negative(vec4 f) {
   float b3 = f.x + f.y + f.z + f.w;
   if (min(min(b1, b2), b3) >= 0.0) return -1.0;
   if (b3 < 0.0 && !(b1 < 0.0 && b2 >= 0.0)) return root_between(f, 0.0, 1.0);
-  // Between its extremes the curve only falls or only rises.
+  // Between its extremes the curve is monotonic.
   float a = 3.0 * f.w;
   float b = 2.0 * f.z;
   float discriminant = b * b - 4.0 * a * f.y;
@@ -323,7 +323,7 @@ float mixed_corners(vec4 low, vec4 high, vec3 at) {
   return y.x + (y.y - y.x) * at.x;
 }
 
-// Corners by x + 2 y, of z and z + 1.
+// Gets a cell's corners, indexed by x + 2 y, at z and z + 1.
 void corners_of(Numbers block, ivec3 first, out vec4 low, out vec4 high) {
   low = vec4(sample_of(block, first), sample_of(block, first + ivec3(1, 0, 0)),
              sample_of(block, first + ivec3(0, 1, 0)), sample_of(block, first + ivec3(1, 1, 0)));
@@ -331,8 +331,8 @@ void corners_of(Numbers block, ivec3 first, out vec4 low, out vec4 high) {
               sample_of(block, first + ivec3(0, 1, 1)), sample_of(block, first + ivec3(1, 1, 1)));
 }
 
-// The field of a cell along a ray, in powers of s. `entry` is a point in the cell, 0 to 1 on each axis, and `way` leads
-// from it to where s is 1.
+// Returns the field of a cell along a ray, in powers of s. `entry`: a point in the cell, 0 to 1 on each axis; `way`:
+// from there to the point at s = 1.
 vec4 cubic_of(vec4 low, vec4 high, vec3 entry, vec3 way) {
   vec4 rise = high - low;
   vec4 z0 = low + rise * entry.z;
@@ -351,11 +351,11 @@ vec4 cubic_of(vec4 low, vec4 high, vec3 entry, vec3 way) {
 // A hit on a field.
 struct FieldHit {
   float t;
-  vec3 inside;  // where in the cell
+  vec3 inside;  // position in the cell
   bool starts_inside;
 };
 
-// The ray in the cell that was found, up to `max_t`.
+// Intersects the ray with the field in the cell found, up to `max_t`.
 bool meet_cell(float max_t, out FieldHit hit) {
   hit.t = walk_t;
   hit.starts_inside = walk_axis < 0;
@@ -408,7 +408,7 @@ float field_in_block(Numbers block, vec3 at) {
   return mixed_corners(low, high, at - first);
 }
 
-// The gradient of a cell's field.
+// Returns the gradient of a cell's field.
 vec3 gradient_of(vec4 low, vec4 high, vec3 inside) {
   vec4 z = mix(low, high, inside.z);
   vec4 along_z = high - low;
@@ -425,7 +425,7 @@ vec3 normal_in(Numbers block, ivec3 first, vec3 inside) {
   vec4 low;
   vec4 high;
   corners_of(block, first, low, high);
-  // Of the cell itself.
+  // The gradient of the cell alone.
   vec3 own = gradient_of(low, high, inside);
   float own_size = length(own);
   own = own_size > 0.0 ? own / own_size : vec3(0.0);
@@ -444,7 +444,7 @@ vec3 normal_found(vec3 inside) {
   return block_found(block) ? normal_in(block, (walk_voxel & 3) + 1, inside) : vec3(0.0);
 }
 
-// The type of a sample of a field; 0 where the tree has no chunk.
+// Returns the type of a field's sample; 0 if the tree has no chunk there.
 uint type_at(Tree field, ivec3 at) {
   if (any(lessThan(at, field.low.xyz)) || any(greaterThanEqual(at, field.high.xyz))) return 0;
   uvec4 node = field.root;
@@ -457,7 +457,7 @@ uint type_at(Tree field, ivec3 at) {
   return type_in(record_of(node), at & 63);
 }
 
-// The material of the solid sample that is nearest to the hit.
+// Returns the material of the solid sample nearest to the hit.
 uint material_found(Tree field, vec3 inside) {
   ivec3 nearest = ivec3(greaterThan(inside, vec3(0.5)));
   Numbers block;
@@ -478,10 +478,10 @@ uint material_found(Tree field, vec3 inside) {
   return type_at(field, at);
 }
 
-// No unit vector's word.
+// Encodes the zero vector; no unit vector has this word.
 const uint kNoNormal = 0x80008000u;
 
-// A unit vector as `unit_vector` reads it, or 0.
+// Packs a unit vector, or 0, for `normal_of`.
 uint packed_normal(vec3 n) {
   float size = abs(n.x) + abs(n.y) + abs(n.z);
   if (!(size > 0.0)) return kNoNormal;

@@ -2,15 +2,15 @@
 
 // The data of a path-traced image: PathOptions and tables. Addresses of absent tables are 0.
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer PathFrame {
-  vec4 to_sun;    // w: one less the cosine of half its disc's angle; 0: it has none
+  vec4 to_sun;    // w: 1 minus the cosine of half its disc's angle; 0: no disc
   vec4 sunlight;  // irradiance of a surface that faces it; w: 1 if the camera sees its disc
   vec4 sky;       // of SkyModel::Uniform; w: factor for the light of other skies
-  vec4 background;    // w: 1 where there is one
+  vec4 background;    // w: 1 if there is one
   vec4 ground;        // its colour; w: its height in view
   vec4 fog;           // its colour; w: its top in view
   vec4 lens_right;    // of the camera; w: the lens's radius
   vec4 lens_up;       // w: the distance in focus
-  vec4 environment;   // its turn's sine and cosine; z: the ground's fade
+  vec4 environment;   // sine and cosine of its rotation; z: the ground's fade
   vec4 air;           // fog: density, anisotropy; lamps' brightness
   uvec2 sky_pixels;   // of the octahedron, or of the environment: 3 floats each
   uvec2 sky_rows;     // sums
@@ -35,7 +35,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Pa
   int lens_blades;
   float lens_turn;    // in turns, 0 to 1
   uint flags;
-  uint sum_pitch;     // vectors a pixel
+  uint sum_pitch;     // vectors per pixel
 };
 
 const uint kPathGround = 1;
@@ -52,11 +52,11 @@ const int kSkyUniform = 2;
 const int kSkyEnvironment = 3;
 
 struct PathLamp {
-  vec4 corner;  // in view; w: the reach of one without a body, else 0
+  vec4 corner;  // in view; w: the reach of a lamp without a body, else 0
   vec4 u;       // unit; w: size
   vec4 v;
   vec4 normal;    // w: cosine of a spot's inner angle
-  vec4 radiance;  // w: of its outer one
+  vec4 radiance;  // w: cosine of its outer angle
 };
 struct LampNode {
   vec4 low;   // in view; w: power
@@ -76,23 +76,23 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Ke
 
 // A path between two steps.
 struct PathState {
-  ivec4 voxel;      // where its next ray begins, of an instance's tree; w: the instance, -1: `inside` is in view
+  ivec4 voxel;      // start of its next ray, in an instance's tree; w: the instance, -1: `inside` is in view
   vec4 inside;      // from the voxel's lower corner; w: density of the sampled direction
   vec4 direction;   // in the world, unit; w: random number for glass ahead on this ray; -1: a new one
   vec4 throughput;  // w: glass bodies from this t on are still to be found
   vec4 radiance;
-  vec4 normal;      // in the world, where it was last scattered
+  vec4 normal;      // in the world, at the last scattering
   uvec4 counts;     // sample, dimension, bounces | scatterings << 16, flags
-  uvec4 more;       // the type of glass within, the part of the pixel's surfaces; zw: unused
+  uvec4 more;       // the glass type around the path, the part of the pixel's surfaces; zw: unused
 };
 layout(buffer_reference, std430, buffer_reference_align = 16) buffer PathStates {
   PathState at[];
 };
 
-const uint kIsSeen = 1;    // by the camera, itself or by glass and mirrors
+const uint kIsSeen = 1;    // by the camera, directly or through glass and mirrors
 const uint kIsFirst = 2;   // no surface has been hit yet
-const uint kIsCaught = 4;  // it passed ground that only catches shadows
-const uint kIsNoted = 8;   // in the layers
+const uint kIsCaught = 4;  // it passed shadow-catching ground
+const uint kIsNoted = 8;   // recorded in the layers
 const uint kIsAlive = 16;
 
 // The sums over a pixel's samples.

@@ -18,7 +18,7 @@ float length_of(Surface surface, Body body) {
   return max(body.lengths.z, has_own_length(body) ? 0.0 : 1.0);
 }
 
-// Where a ray is in an instance at `t`: voxel and place within.
+// Computes a ray's position in an instance at `t`: the voxel, and the position in it.
 void place_along(int instance, ViewRay ray, float t, out ivec4 voxel, out vec3 inside) {
   GridRay in_grid = ray_in(instance, path.voxel, path.inside.xyz, ray);
   vec3 at = in_grid.origin + t * in_grid.direction;
@@ -47,7 +47,7 @@ struct Glass {
   float anisotropy;
 };
 
-// Sends a path on from a surface of glass.
+// Continues a path from a glass surface.
 uint turn_at(Glass glass, ViewRay ray) {
   ivec4 voxel;
   vec3 inside;
@@ -82,7 +82,7 @@ uint hit_glass(Body body, ViewRay ray) {
   return kScatters;
 }
 
-// Somewhere in a cloud, if `u` is below the share of paths that are scattered there.
+// Scatters the path in a cloud if `u` is below the share of paths that scatter there.
 void scatter_in(Body body, float u, inout Glass glass) {
   Surface surface = surface_of(body.what.x);
   float share = free_way(u, surface.scattering) / max(body.lengths.z, 1e-12);
@@ -92,8 +92,8 @@ void scatter_in(Body body, float u, inout Glass glass) {
   glass.outcome = kInAir;
 }
 
-// Passes straight through a body: light between surfaces, and all paths in clouds. The opaque share of the glass stops
-// it at random.
+// Passes straight through a body: light between surfaces, and all paths in clouds. Stops at random, by the opaque share
+// of the glass.
 void pass_through(Body body, inout float u, inout Glass glass) {
   Surface surface = surface_of(body.what.x);
   bool is_cloud = surface.scattering > 0.0;
@@ -109,7 +109,7 @@ void pass_through(Body body, inout float u, inout Glass glass) {
   if (is_cloud) {
     scatter_in(body, u, glass);
   } else {
-    glass.outcome = is_begun(body) ? kEnds : kOnGlass;  // from within it glows, no more
+    glass.outcome = is_begun(body) ? kEnds : kOnGlass;  // from inside, only its emission counts
   }
 }
 
@@ -153,7 +153,7 @@ void leave_glass(Body body, bool has_next, Body next, float opaque_t, inout Glas
   int instance = int(body.what.w >> 3);
   Placed placed = placed_at(instance);
   bool touches = has_next && reaches(body, next.lengths.x);
-  // It lies on something opaque.
+  // The glass lies on an opaque surface.
   if (!touches && opaque_t <= body.lengths.y + frame().lift * placed.ref_inside.w) return;
   float other = touches ? surface_of(next.what.x).ior : 1.0;
   bool in_field = kHasFieldGlass && (body.what.z & kEndsInField) != 0;
@@ -180,12 +180,12 @@ void leave_glass(Body body, bool has_next, Body next, float opaque_t, inout Glas
 // Handles the first glass body on a ray (clouds are skipped), and the body after it.
 void look_into(bool has_body, Body body, bool has_next, Body next, float opaque_t, inout Glass glass) {
   bool is_within = has_body && is_begun(body) && (path.more.x == 0 || body.what.x == path.more.x);
-  if (is_within) {  // or the camera is in it
+  if (is_within) {  // or the camera is inside
     path.more.x = body.what.x;
     leave_glass(body, has_next, next, opaque_t, glass);
     return;
   }
-  // Where it was in glass it came through a corner, or out by rounding.
+  // A path that was in glass left through a corner, or by rounding.
   path.more.x = 0;
   if (has_body && !is_begun(body)) enter_glass(body, glass);
 }

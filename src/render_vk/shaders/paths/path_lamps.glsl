@@ -9,7 +9,7 @@ struct LampSample {
 
 const float kSmallLamp = 0.01;
 
-// The rectangle as it is seen from a point, which lies before it.
+// A rectangle as seen from a point in front of it.
 struct SphericalRectangle {
   vec2 low;   // along the lamp's u and v
   vec2 high;
@@ -38,7 +38,7 @@ SphericalRectangle rectangle_of(PathLamp lamp, vec3 to_corner) {
   return seen;
 }
 
-// From the point, along the lamp's u, v and normal.
+// Returns a sampled direction from the point, along the lamp's u, v and normal.
 vec3 sample_rectangle(SphericalRectangle seen, vec2 u) {
   float turns = (u.x * seen.solid_angle + seen.turn) / (2.0 * kPi);
   turns -= floor(turns);
@@ -136,8 +136,8 @@ float importance_of(LampNode node, vec3 point, vec3 normal) {
   return node.low.w * min(before, far) * shone / (distance2 * distance2);
 }
 
-// Descends the tree: to a random lamp, or with `lamp` >= 0 to that lamp. Returns the probability of the random choice;
-// 0: no lamp.
+// Descends the tree to a random lamp, or to `lamp` if it is >= 0. Returns the probability of the random choice; 0: no
+// lamp.
 float go_down(inout int lamp, vec3 point, vec3 normal, float u) {
   LampNodes nodes = LampNodes(path_frame().lamp_nodes);
   uvec2 way = uvec2(0);
@@ -168,7 +168,7 @@ float go_down(inout int lamp, vec3 point, vec3 normal, float u) {
   return probability;
 }
 
-// `point`: in view. A normal of 0 is of a point in the air.
+// Samples a point on a lamp. `point`: in view; `normal`: 0 for a point in air.
 LampSample sample_lamp(vec3 point, vec3 normal, float choice, vec2 u) {
   int lamp = -1;
   float probability = go_down(lamp, point, normal, choice);

@@ -9,7 +9,7 @@ struct SineCosine {
   float cosine;
 };
 
-// Of an angle in turns, 0 to 1.
+// Returns the sine and cosine of an angle in turns, 0 to 1.
 SineCosine of_turns(float turns) {
   float quarters = turns * 4.0;
   int nearest = int(turns * 8.0 + 1.0) / 2;
@@ -92,7 +92,7 @@ struct Axes {
   vec3 z;
 };
 
-// A right-handed frame whose third axis is a unit vector.
+// Returns a right-handed frame whose third axis is a unit vector.
 Axes axes_about(vec3 normal) {
   float sign = (floatBitsToUint(normal.z) & 0x80000000u) != 0 ? -1.0 : 1.0;
   float a = -1.0 / (sign + normal.z);
@@ -128,7 +128,7 @@ float balance(float own, float other) {
   return own / (own + other);
 }
 
-// Of a sorted list of sums from 0 to 1: where `u` lies, and how far within.
+// A position in a sorted list of sums from 0 to 1: the entry that contains `u`, and the fraction within it.
 struct Found {
   uint index;
   float within;

@@ -4,7 +4,7 @@
 struct SkySample {
   vec3 direction;
   vec3 radiance;
-  float density;  // infinite of a sun without a disc
+  float density;  // infinite for a sun without a disc
 };
 
 const int kSkyEdge = 256;
@@ -35,7 +35,7 @@ vec3 octahedral_sky(vec3 direction) {
          (sky_pixel(next) * (1.0 - fx) + sky_pixel(next + 1) * fx) * fy;
 }
 
-// About the vertical.
+// Rotates a vector about the vertical.
 vec3 turned_about_up(vec3 v, float sine, float cosine) {
   return vec3(v.x * cosine - v.z * sine, v.y, v.x * sine + v.z * cosine);
 }
@@ -50,7 +50,7 @@ vec2 environment_place(vec3 direction) {
   return vec2(turns * float(path_frame().sky_width), down * float(path_frame().sky_height));
 }
 
-// `direction`: in the environment image.
+// Returns the environment's radiance. `direction`: in the environment image.
 vec3 environment_at(vec3 direction) {
   int width = path_frame().sky_width;
   int height = path_frame().sky_height;
@@ -79,7 +79,7 @@ float environment_density(int x, int y, float sine) {
   return angle > 0.0 ? share / angle : 0.0;
 }
 
-// Of a run of `count` + 1 sums.
+// Finds `u` in a run of `count` + 1 sums.
 Found find_sum(Floats sums, uint first, uint count, float u) {
   uint low = 0;
   uint high = count;
@@ -108,7 +108,7 @@ vec3 sky_radiance(vec3 direction) {
 float sun_density(vec3 direction) {
   vec4 to_sun = path_frame().to_sun;
   if (!(to_sun.w > 0.0) || !has_path(kPathSun)) return 0.0;
-  // 1 - cos as a square: a small angle's cosine is 1 to a float.
+  // 1 - cos from a squared distance: in single precision a small angle's cosine is 1.
   vec3 apart = direction - to_sun.xyz;
   return 0.5 * dot(apart, apart) <= to_sun.w ? 1.0 / (2.0 * kPi * to_sun.w) : 0.0;
 }
@@ -126,7 +126,7 @@ SkySample sample_sun(vec2 u) {
   return SkySample(normalize(direction), sunlight * density, density);
 }
 
-// Of an environment.
+// Samples the sky's pixels or the environment.
 SkySample sample_sky(vec2 u) {
   uint width = uint(path_frame().sky_width);
   uint height = uint(path_frame().sky_height);

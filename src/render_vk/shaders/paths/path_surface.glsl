@@ -23,7 +23,7 @@ Surface surface_of(uint type) {
   return Surface(colour.xyz, colour.w, emitted.xyz, passed.xyz, emitted.w, passed.w, rest.x, rest.y, rest.z);
 }
 
-// As lit.glsl.
+// As in lit.glsl.
 Surface white_surface() {
   return Surface(vec3(1.0), 0.0, vec3(0.0), vec3(0.0), 1.0, 1.0, 0.0, 0.0, 0.0);
 }
@@ -178,7 +178,7 @@ vec4 evaluate(Scatter scatter, vec3 inward) {
   return both;
 }
 
-// A scattered direction; `weight` 0: no light arrives from there.
+// A scattered direction. `weight` is 0 if no light arrives from there.
 struct Scattered {
   vec3 direction;
   vec3 weight;

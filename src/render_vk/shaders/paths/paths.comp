@@ -43,14 +43,14 @@ const uint kGoesOn = 0;  // no surface has been hit yet
 const uint kTurns = 1;   // the path has a next ray
 const uint kScatters = 2;
 const uint kEnds = 3;
-// And of these, by glass.
+// The outcomes at glass.
 const uint kTurnsAtGlass = 4;
 const uint kOnGlass = 5;
 const uint kInAir = 6;
 
-// Where a path is scattered.
+// A point where a path scatters.
 struct Vertex {
-  ivec4 voxel;  // as PathState::voxel
+  ivec4 voxel;  // as in PathState::voxel
   vec3 inside;
   vec3 in_view;
   vec3 normal;  // in the world
@@ -86,7 +86,7 @@ Vertex vertex;
 Request requests[3];
 int request_count;
 uint rays_taken;
-float behind;  // how far behind the start of the path's ray the camera is, of its first
+float behind;  // distance of the camera behind the start of the path's first ray
 
 // ---- accessors of a path's state ----
 
@@ -126,7 +126,7 @@ bool is_first_sample() {
 
 // ---- rays ----
 
-// The ray of a place in the space of its own grid.
+// Returns a ray in the space of its start's own grid.
 GridRay ray_at(ivec4 voxel, vec3 inside, vec3 direction) {
   return GridRay(voxel.xyz & ~63, vec3(voxel.xyz & 63) + inside, turned(placed_at(voxel.w).grid_axes, direction), 0.0);
 }
@@ -134,7 +134,7 @@ ViewRay view_ray_at(ivec4 voxel, vec3 inside, vec3 direction) {
   if (voxel.w < 0) return ViewRay(inside, direction);
   return ViewRay(view_from_grid(placed_at(voxel.w), ray_at(voxel, inside, direction)).origin, direction);
 }
-// That ray in the space of an instance.
+// Returns the ray in the space of an instance.
 GridRay ray_in(int instance, ivec4 voxel, vec3 inside, ViewRay in_view) {
   if (instance == voxel.w) return ray_at(voxel, inside, in_view.direction);
   return grid_from_view(placed_at(instance), in_view);
@@ -168,7 +168,7 @@ bool meet_content(int content, int i, Placed placed, GridRay ray, float max_t, i
   return true;
 }
 
-// The nearest that is opaque up to `max_t`; or, with `is_any`, whether there is something.
+// Returns the nearest opaque hit up to `max_t`; with `is_any`, any opaque hit.
 Hit trace(ivec4 voxel, vec3 inside, ViewRay in_view, float max_t, bool is_any) {
   Hit hit;
   hit.voxel = ivec4(0, 0, 0, -1);
@@ -192,7 +192,7 @@ Hit trace(ivec4 voxel, vec3 inside, ViewRay in_view, float max_t, bool is_any) {
   return hit;
 }
 
-// The bodies of all instances along a ray up to `max_t`, from `from_t` on.
+// Finds the bodies of all instances along a ray, from `from_t` to `max_t`.
 void find_bodies(ivec4 voxel, vec3 inside, ViewRay in_view, float max_t, float from_t, inout BodyList list,
                  inout vec3 dropped) {
   start_visit(in_view);
@@ -211,7 +211,7 @@ float ground_at(vec3 origin, vec3 direction, float from) {
   return t > from ? t : kInfinity;
 }
 
-// The way through fog, from `from` to `max_t`.
+// Returns the part of a ray that lies in fog, from `from` to `max_t`.
 vec2 in_fog(vec3 origin, vec3 direction, float from, float max_t) {
   float above = origin.y - path_frame().fog.w;
   float up = direction.y;
@@ -287,7 +287,7 @@ void end_path() {
   }
 }
 
-// A path that leaves the scene.
+// Adds the sky's light to a path that leaves the scene.
 void leave(vec3 origin, vec3 direction) {
   if (is(kIsFirst) && !has(kPerspective)) {
     direction = normalize(frame().forward.xyz + origin * frame().sky_scale);
@@ -516,7 +516,7 @@ bool shade() {
       towards = lamp.direction;
       density = lamp.density;
       radiance = lamp.radiance;
-      max_t = lamp.distance * (1.0 - 1e-4);  // a little before the lamp, for rounding
+      max_t = lamp.distance * (1.0 - 1e-4);  // slightly in front of the lamp, because of rounding
     }
     vec3 inward = to_local(axes, towards);
     if (!(inward.z > 0.0) && !in_medium) continue;
@@ -617,7 +617,7 @@ void step_path() {
         if (is(kIsSeen) && (has_first || path.more.x != 0)) {
           look_into(has_first, first, has_next, body, opaque_t, glass);
         } else if (list.dropped_t < kInfinity) {
-          // Bodies that found no room are looked for in a step of their own.
+          // Bodies that did not fit are searched for in a separate step.
           path.throughput.w = list.dropped_t;
           path.direction.w = u;
           glass.outcome = kTurns;

@@ -1,5 +1,5 @@
 #version 460
-// A corner of a quad of a blocky mesh: eight bytes of mesh/quad.h are read, the rest is made here.
+// A corner of a blocky mesh's quad: reads the eight bytes of mesh/quad.h and derives the rest.
 #include "quad.glsl"
 
 // true: quads of many chunks, in the order stored in memory; false: one chunk's quads.
@@ -27,7 +27,7 @@ void main() {
   uvec2 bits = Words(data).at[number];
 
   uint face = bits.y >> 7 & 7;
-  // The corners of a flipped quad are counted from the next one, which turns the diagonal.
+  // The corners of a flipped quad are numbered from the next corner, which flips the diagonal.
   uint corner = ((index & 3) + (bits.y >> 6 & 1)) & 3;
   bool is_east = corner == 1 || corner == 2;
   bool is_north = corner >= 2;
@@ -41,7 +41,7 @@ void main() {
   vec3 local = low;
   if (is_east) local[u] = high[u];
   if (is_north) local[v] = high[v];
-  // Whole numbers: neighbouring chunks have the same corners to the bit.
+  // Integers: the corners of neighbouring chunks are bit-identical.
   precise vec3 point = local + offset;
   vec3 widened;
   if (!put_corner(seen, face, point, is_east, is_north, widened)) {

@@ -29,6 +29,6 @@ vec4 colour_of_face(uint face, uint type, uint instance, vec3 sunlight, float op
   vec3 lit = colour_in_light(surface.colour, min(surface.emitted, vec3(1e15)), sunlight, openness);
   lit = min(lit, vec3(1e15));
   if (!kIsGlass) return vec4(lit, 1.0);
-  // Of one voxel.
+  // The glass counts as one voxel.
   return vec4(own_share(surface, 1.0, false) * lit, 1.0 - passed_by(surface, 1.0, false)[drawn() - kGlass]);
 }

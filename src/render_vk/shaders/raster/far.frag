@@ -23,7 +23,7 @@ layout(location = 6) flat in uvec2 cell;
 
 layout(location = 0) out vec4 pixel;
 
-// Returns true where the other one of an impostor's two levels is drawn.
+// Returns true if the impostor's other level is drawn at this pixel.
 bool is_of_other_level() {
   bool is_coarser = (push.numbers >> 28 & 1) != 0;
   int coarser = int(push.numbers >> 4 & 0xFFFFFF);
@@ -37,7 +37,7 @@ bool find_face() {
   uvec4 addresses = f.instances[push.instance].far_cells;
   FarCell from = FarCells(is_coarser ? addresses.zw : addresses.xy).at[cell.x];
   vec2 steps = f.instances[push.instance].far_steps;
-  // Towards the camera at 0, from where the ray enters the cell's box at 1: its lengths are of that order.
+  // Parametrised to be 0 at the camera and 1 at the entry to the cell's box, so that lengths are of that order.
   precise vec3 eye = push.eye.xyz - push.offset;
   precise vec3 direction = push.eye.w != 0.0 ? met - eye : -push.eye.xyz;
   precise vec3 start = met - direction;

@@ -1,13 +1,13 @@
 #version 460
-// A corner of a rectangle of an impostor, which is lit by the face of one voxel.
+// A corner of an impostor's rectangle, lit as one voxel's face.
 #include "quad.glsl"
 #include "hash.glsl"
 #include "far.glsl"
 
-layout(location = 5) out vec3 met;         // where the ray enters, voxels from the content's centre
-layout(location = 6) flat out uvec2 cell;  // with cells the number of its own, and of the rectangle's direction
+layout(location = 5) out vec3 met;         // the ray's entry point, voxels from the content's centre
+layout(location = 6) flat out uvec2 cell;  // with cells: the cell's number, and the rectangle's direction
 
-// Which corner the triangles of such a face begin with: light/corner_light.h.
+// Returns the first corner of a face's triangles: light/corner_light.h.
 uint first_corner(uint corners) {
   return (corners & 3) + (corners >> 4 & 3) > (corners >> 2 & 3) + (corners >> 6 & 3) ? 1 : 0;
 }
@@ -20,7 +20,7 @@ void main() {
     hide_corner();
     return;
   }
-  // A fragment chooses the face of a cell.
+  // With cells, the fragment shader chooses the face.
   bool has_cells = (push.numbers >> 29 & 1) != 0;
   ivec4 voxel = VoxelFaces(push.far_faces).at[has_cells ? 0 : which.x];
   uint face = uint(voxel.w) >> 24 & 7;

@@ -1,4 +1,4 @@
-// A point that a fragment shows in the light of rays.
+// A fragment's point, lit by rays.
 
 // The point to be lit: the arguments of `traced_light`, its position in front of the surface, and its own colours.
 struct LitPoint {
@@ -20,7 +20,7 @@ vec3 colour_of(LitPoint point) {
   return colour_in_light(point.colour, point.emitted, sunlight, point.openness);
 }
 
-// From the camera through the fragment's pixel, in the world; unit.
+// Returns the direction from the camera through the fragment's pixel; in the world, unit.
 vec3 seen_direction() {
   Frame f = frame();
   vec3 direction = f.forward.xyz;

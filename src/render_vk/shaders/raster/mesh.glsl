@@ -13,19 +13,19 @@ const uint kGlassDepth = 7;
 const uint kGlassPassed = 8;
 const uint kGlassAdded = 9;
 
-// An instance, from a point of its grid that is not far from the camera. A grid's axes are unit in the world.
+// An instance, relative to a point of its grid near the camera. A grid's axes have unit length in the world.
 struct MeshInstance {
   vec4 clip[4];     // columns: clip space from there, in voxels
   vec4 axes[3];     // columns: the grid's axes in the world
   vec4 eye;         // the camera, in voxels from there, and 1; orthographic: the direction towards it, and 0
   vec4 diffuse[2];  // the sun's light on its faces
-  ivec4 home;       // that point in its tree's coordinates (an impostor's: the grid's origin), and which instance of
-                    // the frame it is: -1 where none
+  ivec4 home;       // that point in its tree's coordinates (an impostor's: the grid's origin); w: index of the
+                    // frame's instance, -1 if none
   float room;          // margin of faces in voxels per clip w
   float first_sample;  // position of sample 0 of a smooth mesh in voxel 0: 0.5, the voxel's centre; 0 for fields
   vec2 far_steps;   // of an impostor: the width of the bits of its level's cells, and of the coarser level's
   uvec4 far_cells;  // addresses of both levels' cells
-  uvec4 far_near;   // as Far has it
+  uvec4 far_near;   // as in Far
   vec4 far_centre;  // of the content, in the tree's coordinates
 };
 
@@ -44,15 +44,15 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Me
   uvec2 draws;
   uvec2 order;  // draw and quad indices of the transparent quads, in drawing order
   uvec2 pad;
-  vec4 sun;  // towards it, in the world, as long as it is bright
+  vec4 sun;  // direction to it in the world; its length is the brightness
   MeshInstance instances[];
 };
 
 // Data shared by many vertices are push constants instead of memory, up to the size that every Vulkan device supports.
 layout(push_constant) uniform Push {
-  vec4 clip[4];  // of the instance; the sky's: right, down, corner and forward, as CameraRays has them
+  vec4 clip[4];  // of the instance; the sky's: right, down, corner and forward, as in CameraRays
   vec4 eye;      // of the instance
-  vec3 offset;   // of the chunk, from where its instance is counted, in voxels; of an impostor its centre
+  vec3 offset;   // of the chunk, from its instance's reference point, in voxels; an impostor's centre
   uint instance;
   uvec2 frame;
   uvec2 data;       // of the chunk, or of the impostor's level
@@ -85,7 +85,7 @@ vec3 shown(vec3 colour) {
   if (has(kShowOcclusion) || has(kShowNormals)) colour = linear_from_srgb(clamp(colour, 0.0, 1.0));
   if (drawn() == kEdgesOnly) return vec3(0.02);
   if (drawn() != kEdgesOver) return colour;
-  // Edges stand out from dark and from bright surfaces.
+  // Edges contrast with dark and with bright surfaces.
   float luminance = dot(min(colour, vec3(1.0)), vec3(0.2126, 0.7152, 0.0722));
   return luminance > 0.03 ? vec3(0.002) : vec3(0.2);
 }

@@ -6,9 +6,9 @@ layout(constant_id = 1) const bool kIsGlass = false;
 layout(constant_id = 2) const bool kTraces = false;
 #include "face_colour.glsl"
 
-layout(location = 0) centroid out vec4 place;  // in voxels, from `base`; w: how open it is
+layout(location = 0) centroid out vec4 place;  // in voxels, from `base`; w: openness
 layout(location = 1) flat out ivec4 base;      // in the tree's coordinates; w: the type
-layout(location = 2) flat out vec4 edges;      // of the face: where it begins and ends, along each of its edges
+layout(location = 2) flat out vec4 edges;      // of the face: begin and end along each of its edges
 layout(location = 3) flat out uvec2 what;      // the face's direction, the instance
 layout(location = 4) centroid out vec4 colour;
 
@@ -23,7 +23,7 @@ void hide_corner() {
   colour = vec4(0.0);
 }
 
-// Where an instance is seen from, and how.
+// The view of an instance.
 struct Seen {
   vec4 clip[4];
   vec4 eye;
@@ -39,8 +39,8 @@ bool put_corner(Seen seen, uint face, vec3 point, bool is_east, bool is_north, o
   int v = kFaceV[face];
   vec3 to_eye = seen.eye.w != 0.0 ? seen.eye.xyz - point : seen.eye.xyz;
   if (sign_of(face) * to_eye[axis] <= 0.0 && drawn() != kEdgesOnly) return false;
-  // Faces are widened, in their planes, by less than a device can tell places apart: where the edge of one meets the
-  // corners of others, rounding would leave gaps.
+  // Faces are widened in their planes, by less than the device's resolution. Otherwise rounding would leave gaps where
+  // the edge of a face meets corners of other faces.
   vec4 at = clip_from(seen.clip, point);
   vec3 direction = to_eye / length(to_eye);
   float wide = seen.room * max(at.w, 0.0) / max(abs(direction[axis]), 0.0625);
@@ -52,7 +52,7 @@ bool put_corner(Seen seen, uint face, vec3 point, bool is_east, bool is_north, o
   return true;
 }
 
-// `corners`: of all four, two bits each.
+// Returns the openness of a corner. `corners`: occlusion of all four, two bits each.
 float openness_of(uint corners, uint corner) {
   return 1.0 - float(corners >> 2 * corner & 3) / 3.0;
 }

@@ -3,19 +3,19 @@
 // (`kGlassStep`).
 #include "see_through.glsl"
 
-// The ray from the fragment on. It starts within the body that the fragment is of.
+// The ray that continues from the fragment. It starts within the fragment's body.
 GridRay seen_ray;
 ViewRay seen_in_view;
 int seen_home;  // the instance
 
-// The ray in the space of an instance.
+// Returns the ray in the space of an instance.
 GridRay seen_ray_in(int instance, Placed placed) {
   GridRay ray = seen_ray;
   if (instance != seen_home) ray = grid_from_view(placed, seen_in_view);
   return ray;
 }
 
-// How far along the ray the first opaque voxel or solid of a field lies; kInfinity where there is none.
+// Returns the distance along the ray to the first opaque voxel or solid of a field; kInfinity if there is none.
 float opaque_behind() {
   float nearest = kInfinity;
   start_visit(seen_in_view);
@@ -31,8 +31,8 @@ float opaque_behind() {
   }
 }
 
-// The face through which a body is entered, with the occlusion that a blocky mesh would carry there. `normal`: unit, in
-// the world; `diffuse`: of the sun.
+// Returns the point of entry on a body's face, with the occlusion that a blocky mesh would store there. `normal`: unit,
+// in the world; `diffuse`: of the sun.
 LitPoint point_of_body(Body body, Placed placed, vec3 normal, float diffuse) {
   uint face = body.what.y;
   Surface surface = surface_of(body.what.x);
@@ -72,7 +72,7 @@ void enter_first(inout BodyList list);
 // Returns the view from a point of instance `home`, in its tree's coordinates relative to `base`: the transmittance of
 // each channel, or the light added to the image behind.
 vec4 seen_from(int home, ivec3 base, vec3 from) {
-  // The voxels that rays meet have no such instance any more.
+  // The marched scene no longer has this instance.
   if (home < 0) discard;
   Placed placed = placed_at(home);
   seen_home = home;

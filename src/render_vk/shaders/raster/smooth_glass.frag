@@ -42,7 +42,8 @@ vec3 blurred_normal(GridTrees trees, ivec3 base, vec3 point) {
   return size > 0.05 ? inwards / -size : vec3(0.0);
 }
 
-// The first surface is the fragment's; others are of voxels, between bodies that touch each other their faces.
+// Returns the normal of a surface on the ray. The first surface is the fragment's; later ones are of voxels, or their
+// faces between bodies that touch.
 vec3 normal_met(int instance, uint face, float t) {
   if (t <= 0.0) return own_normal();
   Placed placed = placed_at(instance);
@@ -60,7 +61,7 @@ LitPoint point_of_body(Body body) {
 }
 
 // The mesh surface lies up to about one voxel in front of its body's voxels, or within them. For a field with less
-// detail it lies up to some samples in front. If the ray finds no body there, the glass counts as one voxel, and for a
+// detail it lies up to a few samples in front. If the ray finds no body there, the glass counts as one voxel, and for a
 // field only as a surface.
 void enter_first(inout BodyList list) {
   bool is_of_field = kHasFieldGlass && mesh_frame().instances[push.instance].first_sample == 0.0;

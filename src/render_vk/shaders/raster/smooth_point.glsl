@@ -10,9 +10,9 @@ layout(location = 4) flat in ivec4 base;
 // voxels cast no shadow on it.
 const float kLift = 1.0;
 
-// Of the fragment; in its grid, and in the world.
+// Return the fragment's normal, in its grid and in the world.
 vec3 own_normal_in_grid() {
-  // Between opposite normals there may be none.
+  // Interpolation between opposite normals may give 0.
   float size = length(normal);
   return size > 0.0 ? normal / size : vec3(0.0);
 }
