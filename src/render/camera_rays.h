@@ -5,7 +5,7 @@
 
 namespace quoin {
 
-/// A place in a pixel, 0 to 1 from its upper left corner.
+/// A position in a pixel, 0 to 1 from its upper left corner.
 struct PixelPoint {
   double x = 0.5;
   double y = 0.5;
@@ -32,8 +32,8 @@ class CameraRays {
   /// they use the directions of a perspective camera of 50 degrees.
   [[nodiscard]] float sky_up(const RayPacket& rays, std::size_t lane) const;
 
-  // For renderers that make rays elsewhere: pixel (x, y) lies at corner + x right + y down, a perspective camera's at
-  // a distance of 1.
+  // For renderers that make rays elsewhere: pixel (x, y) lies at corner + x right + y down; for a perspective camera at
+  // distance 1.
   [[nodiscard]] bool is_perspective() const { return is_perspective_; }
   [[nodiscard]] DVec3 forward() const { return forward_; }
   [[nodiscard]] DVec3 right() const { return right_; }
@@ -48,7 +48,7 @@ class CameraRays {
   bool is_perspective_;
   DVec3 forward_;
   double sky_scale_ = 0.0;  // orthographic: converts the distance from the image's centre to the tangent of an angle
-  // Per pixel to the right and down, and the image's upper left corner, at a distance of 1.
+  // Per pixel to the right and down, and the image's upper left corner, at distance 1.
   DVec3 right_;
   DVec3 down_;
   DVec3 corner_;

@@ -40,7 +40,7 @@ struct CpuRenderer::Impl {
   LampCache lamps;
   LightCache levels;
 
-  // Of each placed grid of `of`; none where the light is another.
+  // Returns the light levels of each placed grid of `of`; empty for other light models.
   [[nodiscard]] std::vector<GridLight> levels_of(const SceneTracer& of, const LightOptions& light, Threads threads) {
     std::vector<GridLight> found;
     if (!is_propagated(light)) return found;

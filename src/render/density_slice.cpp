@@ -12,7 +12,7 @@ namespace {
 constexpr std::int64_t kMaxPixels = std::int64_t{1} << 28;
 // The margin on each side, as a share of the image's smaller side.
 constexpr double kMargin = 0.02;
-// Lines at whole samples where a pixel spans less of a sample.
+// Sample lines are drawn if a pixel spans less of a sample than this.
 constexpr double kWidestStep = 0.25;
 
 struct PlacedField {
@@ -31,7 +31,7 @@ std::vector<PlacedField> fields_of(const Scene& scene, InstanceFilter filter) {
   return fields;
 }
 
-// The box around all fields, in the world. Corners that are not finite are left out.
+// Returns the box around all fields, in the world. Ignores corners that are not finite.
 DBox bounds_of(const std::vector<PlacedField>& fields) {
   DBox box;
   for (const PlacedField& field : fields) {
@@ -44,10 +44,10 @@ DBox bounds_of(const std::vector<PlacedField>& fields) {
   return box;
 }
 
-// Where the pixels lie in the world.
+// The positions of the pixels in the world.
 struct Plane {
   DVec3 middle{0.0};
-  DVec3 right{0.0};  // of a pixel's width
+  DVec3 right{0.0};  // one pixel wide
   DVec3 down{0.0};
   double pixel = 1.0;  // world units
   int width = 0;
@@ -144,7 +144,7 @@ Result<DensitySlice> draw_density_slice(const Scene& scene, const DensitySliceOp
   slice.colour.rgb.resize(3 * width * static_cast<std::size_t>(options.height));
   std::vector<std::int64_t> solid(static_cast<std::size_t>(options.height));
   parallel_for(solid.size(), threads, [&](std::size_t y) {
-    // With one row and one column more, for the lines.
+    // Includes one more row and column, for the lines.
     const auto value = [&](std::size_t x, std::size_t row) {
       return value_at(fields, plane, plane.at(static_cast<int>(x), static_cast<int>(row)));
     };

@@ -43,7 +43,7 @@ FarImpostors DetailChooser::take_far(const Scene& scene, const std::vector<Selec
                                      const RenderOptions& options) {
   const auto is_far = [](const SelectedInstance& choice) { return choice.detail == Detail::Far; };
   if (std::none_of(selected.begin(), selected.end(), is_far)) return {};
-  // Pictures that wait do so one after another: none ends a round in which another's impostors must not be dropped.
+  // Only one image waits at a time. Otherwise an image could end a round that protects another image's impostors.
   std::unique_lock lock(waiting_, std::defer_lock);
   if (options.detail.impostor_seconds == std::numeric_limits<double>::infinity()) lock.lock();
   return take_impostors(impostors_, scene, selected, options.detail.impostor_seconds, {options.detail.impostor_edge});

@@ -16,7 +16,7 @@ namespace quoin {
 
 /// The level of detail of each instance in one image.
 struct PictureDetail {
-  std::vector<SelectedInstance> selected;  ///< traced so often halved; see keep_whole
+  std::vector<SelectedInstance> selected;  ///< with the level for tracing each; see keep_whole
   FarImpostors far;
 };
 
@@ -35,7 +35,7 @@ class DetailChooser {
   [[nodiscard]] PictureDetail choose(const Scene& scene, InstanceFilter filter, const Camera& camera,
                                      const RenderOptions& options);
 
-  /// As ImpostorCache::update_types.
+  /// As in ImpostorCache::update_types.
   void update_types(const VoxelRegistry& types) { impostors_.update_types(types); }
 
  private:
@@ -43,7 +43,7 @@ class DetailChooser {
                                       const RenderOptions& options);
 
   ImpostorCache impostors_;
-  std::mutex waiting_;  // for impostors, however long that takes
+  std::mutex waiting_;  // held while waiting for impostors
 };
 
 }  // namespace quoin

@@ -4,7 +4,7 @@
 
 namespace quoin {
 
-/// InvalidArgument for sizes and cameras that no renderer takes.
+/// Returns InvalidArgument for sizes and cameras that every renderer rejects.
 [[nodiscard]] Status check_picture(const Camera& camera, int width, int height);
 
 /// Returns the argument errors of CpuRenderer::render, which all renderers share.

@@ -179,7 +179,7 @@ void Tile::leave_body(const Ray& ray, const GlassBody& from, Sight& sight) const
 
 void Tile::meet_surface(const Mirror& mirror, const GlassBody* from, Sight& sight) const {
   Vec3 mirrored = sight.passed * mirror.share * context_->lighting->sky(mirror.up);
-  // From within it goes through the body once more.
+  // From inside, the reflection passes through the body again.
   if (from != nullptr) mirrored *= look_of(context_->lighting->surfaces()[from->type], *from).passed;
   sight.mirrored += mirrored;
   sight.passed *= 1.0F - mirror.share;

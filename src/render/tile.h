@@ -23,7 +23,7 @@ struct TileContext {
   const CameraRays* camera = nullptr;
   const Lighting* lighting = nullptr;
   const RenderOptions* options = nullptr;
-  const ImpostorPass* impostors = nullptr;  ///< null when there are none
+  const ImpostorPass* impostors = nullptr;  ///< null if there are none
 };
 
 /// One square of an image: its rays, their hits, and the light at the hits.
@@ -32,7 +32,7 @@ class Tile {
   static constexpr int kEdge = 32;  ///< pixels; a multiple of CameraRays::kBlock
   static_assert(kEdge == ImpostorPass::kTile);
 
-  /// `column` and `row` are of its upper left pixel.
+  /// `column` and `row`: its upper left pixel.
   Tile(const TileContext& context, int column, int row);
 
   /// Renders all samples of all pixels. The numbers do not depend on the tile's size and position.
@@ -62,7 +62,7 @@ class Tile {
   // Processes a ray's entry into a body from air (null) or from a touching body. `normal`: of that surface, in its
   // grid.
   void enter_body(const Ray& ray, const GlassBody* from, const GlassBody& to, const DVec3& normal, Sight& sight) const;
-  // Where it leaves a body into air.
+  // Processes a ray's exit from a body into air.
   void leave_body(const Ray& ray, const GlassBody& from, Sight& sight) const;
   // Adds the surface reflection on the way out of a body, or out of air (null).
   void meet_surface(const Mirror& mirror, const GlassBody* from, Sight& sight) const;
@@ -79,9 +79,9 @@ class Tile {
   std::int64_t rays_ = 0;
   std::int64_t pixels_hit_ = 0;
   std::array<Vec3, kPixels> sum_{};     // of the samples so far
-  std::array<Vec3, kPixels> sample_{};  // the present one
+  std::array<Vec3, kPixels> sample_{};  // of the current sample
   std::array<float, kPixels> depth_{};
-  // A point to be lit for the present sample, with its pixel and weight.
+  // A point to be lit for the current sample, with its pixel and weight.
   struct Target {
     std::uint32_t pixel = 0;
     Vec3 weight{1.0F};
@@ -90,8 +90,8 @@ class Tile {
   std::vector<Target> targets_;
   std::vector<Vec3> lit_;
   std::vector<GlassBody> glass_;
-  std::unique_ptr<raster::Canvas> far_;  // of the present sample; null when there are none
-  FarFaces far_faces_;                   // of the present block
+  std::unique_ptr<raster::Canvas> far_;  // of the current sample; null if there are none
+  FarFaces far_faces_;                   // of the current block
 };
 
 }  // namespace quoin

@@ -11,8 +11,8 @@
 
 namespace quoin {
 
-/// Counts the finished samples of an image's tiles and calls the progress callback, one call at a time: after each
-/// sample of a tile, or after several, since a tile of many samples can take minutes.
+/// Counts the finished samples of an image's tiles and calls the progress callback, one call at a time: after one or
+/// several samples of a tile, because a tile with many samples can take minutes.
 class TileProgress {
  public:
   /// `samples`: of all tiles together.
@@ -32,7 +32,7 @@ class TileProgress {
     rays_ += rays;
     pixels_hit_ += pixels_hit;
   }
-  // Once all is done.
+  // Valid when all tiles are done.
   [[nodiscard]] std::int64_t rays() const { return rays_; }
   [[nodiscard]] std::int64_t pixels_hit() const { return pixels_hit_; }
 
@@ -46,8 +46,8 @@ class TileProgress {
   std::atomic<bool> is_cancelled_{false};
 };
 
-/// Draws an image by squares of Tile::kEdge pixels: `Tile(context, column, row)`, given the upper left pixel, draws its
-/// samples and writes itself into the image. Errors: Cancelled.
+/// Draws an image in squares of Tile::kEdge pixels. `Tile(context, column, row)`, given the upper left pixel, draws its
+/// samples and writes them to the image. Errors: Cancelled.
 template <class Tile, class Context, class Options, class Drawn>
 [[nodiscard]] Status draw_tiles(const Context& context, const Options& options, Threads threads,
                                 const Progress& progress, Drawn& picture) {

@@ -20,9 +20,9 @@
 namespace quoin {
 namespace {
 
-constexpr std::int64_t kMaxVoxels = std::int64_t{1} << 26;  // of the box that faces are found in all at once
+constexpr std::int64_t kMaxVoxels = std::int64_t{1} << 26;  // of the box in which all faces are found at once
 
-// Texels a side: so many that one is no larger than a voxel, as far as the memory for that is worth it.
+// Returns the texels per side: a texel is at most a voxel wide, within a memory limit.
 int edge_for(const ContentSphere& content, const ImpostorOptions& options) {
   const double voxels = 2.0 * snapshot_camera(content, 0, options.edge).half_size();
   return voxels <= options.edge ? options.edge : 2 * options.edge;
@@ -43,12 +43,12 @@ std::uint8_t packed(const FaceOcclusion& corners) {
 
 constexpr double kOcclusionReach = LightOptions{}.occlusion_distance_voxels;
 
-// A point before the middle of a surfel, in the grid.
+// Returns a point in front of a surfel's middle, in the grid.
 DVec3 place_of(const ImpostorFaces::Face& face, const ImpostorFaces::Surfel& surfel, double lift) {
   return surfel.middle(DVec3(face.voxel) + lift * DVec3(surfel.normal), face.direction);
 }
 
-// Bit i: ray i meets a voxel or the field, if there is one.
+// Returns a mask; bit i is set if ray i meets a voxel or the field.
 std::uint32_t blocked_by(const OccupancyTree& opaque, const DensityTree* field, const RayPacket& rays) {
   const std::uint32_t blocked = any_hits(opaque, rays);
   if (field == nullptr) return blocked;
@@ -57,8 +57,8 @@ std::uint32_t blocked_by(const OccupancyTree& opaque, const DensityTree* field, 
   return blocked | any_hits(*field, rest);
 }
 
-// How many of the rays of OcclusionDirections reach open space from the middle of each of the faces at `wanted`; by
-// sixteens, which mostly are of one direction.
+// Counts the rays of OcclusionDirections that reach open space from the middle of each face at `wanted`. Handles
+// sixteen faces at a time, mostly of one direction.
 void count_open_rays(const OccupancyTree& opaque, const DensityTree* field, std::span<const std::uint32_t> wanted,
                      ImpostorFaces& impostor) {
   std::vector<ImpostorFaces::Face>& faces = impostor.faces;
@@ -107,9 +107,9 @@ class KnownFaces {
     for (const IBox& box : changed) near_.push_back({box.min - kReach, box.max + kReach});
   }
 
-  // Null where it has to be made. Requires: faces are asked for in the order of their list.
+  // Returns null if the face must be computed. Requires: faces are queried in list order.
   [[nodiscard]] const ImpostorFaces::Face* find(const VoxelFace& face) {
-    // Mostly the two lists go in step.
+    // The two lists mostly advance together.
     const auto next = [&] { return VoxelFace{faces_[next_].voxel, faces_[next_].direction}; };
     while (next_ < faces_.size() && next() != face && comes_before(next(), face)) ++next_;
     if (next_ == faces_.size() || next() != face) return nullptr;
@@ -123,7 +123,7 @@ class KnownFaces {
   std::size_t next_ = 0;
 };
 
-// Of a grid that is to have an impostor.
+// The input for a grid's impostor.
 struct Subject {
   const Grid* grid;
   const VoxelRegistry* types;
@@ -133,7 +133,7 @@ struct Subject {
   IBox box;  // of the drawn content
   int edge = 0;
   int first_width = 0;                 // see ImpostorFaces
-  std::optional<ImpostorShell> shell;  // none where there are very many faces
+  std::optional<ImpostorShell> shell;  // none if there are too many faces
   FieldSurfels surfels;
   bool is_left_to_rays = false;
 
@@ -144,7 +144,7 @@ struct Subject {
     box = unite(tree.bounds(), field == nullptr ? IBox{} : field->field().bounds());
     if (box.empty()) return;
     edge = edge_for(content, options);
-    // Beyond that, a ray for each texel takes less time.
+    // Above this, one ray per texel takes less time.
     const std::int64_t max_faces = std::int64_t{kImpostorViews} * edge * edge;
     shell = ImpostorShell::build(tree, kMaxVoxels, max_faces);
     if (!shell) first_width = first_width_for(content, edge);

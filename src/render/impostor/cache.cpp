@@ -26,7 +26,7 @@ using Clock = std::chrono::steady_clock;
 struct Origin {
   ChangeCursor grid;
   ChangeCursor field;
-  std::uint64_t types = 0;  // how often the transparency of types had changed
+  std::uint64_t types = 0;  // counter of transparency changes of types
   int edge = 0;
 };
 
@@ -47,7 +47,7 @@ struct Entry {
   std::uint64_t last_use = 0;
   std::size_t refused_bytes = 0;  // size of the last impostor, refused for lack of room
 
-  // Of the newest that there is, is being built or waits.
+  // Returns the origin of the newest impostor: waiting, being built or complete; null if none.
   [[nodiscard]] const Origin* newest() const {
     if (waiting) return &waiting->origin;
     return building ? &*building : impostor != nullptr ? &origin : nullptr;
@@ -57,7 +57,7 @@ using Entries = std::map<GridHandle, Entry>;
 
 }  // namespace
 
-// All that follows is guarded by the mutex.
+// The mutex guards all following members.
 struct ImpostorCache::Impl {
   explicit Impl(const ImpostorCacheOptions& given) : options(given) {}
   ~Impl();
@@ -79,20 +79,20 @@ struct ImpostorCache::Impl {
 
   const ImpostorCacheOptions options;
   mutable std::mutex mutex;
-  std::condition_variable wake;   // of workers: there is something to build, or the end
+  std::condition_variable wake;   // signals workers: a build waits, or the cache ends
   std::condition_variable ready;  // signalled to waiting callers when an impostor is built
   Entries entries;
-  std::deque<GridHandle> queue;  // of the entries that wait
+  std::deque<GridHandle> queue;  // waiting entries
   std::size_t building = 0;
   Stats stats;
   std::uint64_t built_bytes = 0;
   ChangeCursor followed_types;
   std::shared_ptr<const VoxelRegistry> types;
-  std::uint64_t types_changed = 0;  // how often, in whether they are transparent
-  std::uint64_t round = 0;          // up to a wait
-  // Impostors that were replaced while a caller held them: a worker frees them, since that takes time.
+  std::uint64_t types_changed = 0;  // counter of transparency changes of types
+  std::uint64_t round = 0;          // incremented at each wait
+  // Impostors replaced while a caller held them. A worker frees them, because that takes time.
   std::vector<std::shared_ptr<const Impostor>> replaced;
-  bool has_unused = false;  // among these, perhaps
+  bool has_unused = false;  // some of these may be unused
   bool is_stopped = false;
   std::vector<std::thread> workers;
 };
@@ -170,7 +170,7 @@ void ImpostorCache::Impl::work() {
   }
 }
 
-// The first that waits and is not being built already; it is taken from the queue.
+// Removes and returns the first queued entry that is not being built.
 Entries::iterator ImpostorCache::Impl::next_to_build() {
   for (auto each = queue.begin(); each != queue.end(); ++each) {
     const auto entry = entries.find(*each);
@@ -185,7 +185,7 @@ Entries::iterator ImpostorCache::Impl::next_to_build() {
 void ImpostorCache::Impl::build(Entries::iterator entry, std::unique_lock<std::mutex>& lock) {
   std::optional<Job> job = std::exchange(entry->second.waiting, std::nullopt);
   if (!has_room(entry->second)) {
-    drop(entry);  // until it is asked for again
+    drop(entry);  // until the next request
     ready.notify_all();
     return;
   }
@@ -255,7 +255,7 @@ void ImpostorCache::Impl::release(Entry& entry) {
   has_unused = true;
 }
 
-// Entries that are being built, queued or refused stay, without an impostor.
+// Frees the impostor. Entries that are being built, queued or refused remain, without an impostor.
 void ImpostorCache::Impl::drop(Entries::iterator entry) {
   release(entry->second);
   if (!entry->second.building && !entry->second.waiting && entry->second.refused_bytes == 0) entries.erase(entry);

@@ -25,7 +25,7 @@ namespace {
 constexpr int kWidest = 10;           // log2 of the widest cells, voxels; the Morton curve's origin is a multiple
 constexpr std::uint32_t kNone = ~0U;  // as a rank
 
-// The face's rectangle, as a box without thickness.
+// Returns the face's rectangle as a box without thickness.
 IBox box_of(const VoxelFace& face) {
   const FaceFrame& frame = frame_of(face.direction);
   IBox box{face.voxel, face.voxel + 1};
@@ -48,7 +48,7 @@ class Ranks {
     for (int view = 0; view < kImpostorViews; ++view) {
       for (const Direction direction : kDirections) {
         const double turned = std::max(glm::dot(impostor_view(view), DVec3(normal_of(direction))), 1e-3);
-        // Faces smaller than a texel are seen the more often the larger they show; they count alike then.
+        // Faces smaller than a texel are seen in proportion to their visible size, so they count alike.
         const double texels = turned / (texel * texel);
         const double size = texels / (1.0 - std::exp(-texels)) / std::max(1.0, 1.0 / (texel * texel));
         // The largest faces have ranks below 2^27, smaller ones more.
@@ -69,9 +69,9 @@ class Ranks {
   std::array<std::uint32_t, std::size_t{6} * kImpostorViews> factors_{};
 };
 
-constexpr std::uint32_t kUnseen = 0x8000'0000U;  // the least rank of a face that no view saw
+constexpr std::uint32_t kUnseen = 0x8000'0000U;  // the lowest rank of an unseen face
 
-// For each view all of them, the nearest first: itself.
+// For each view, all views sorted by distance; the first is the view itself.
 const std::array<std::array<std::uint8_t, kImpostorViews>, kImpostorViews>& views_by_distance() {
   static const auto all = [] {
     std::array<std::array<std::uint8_t, kImpostorViews>, kImpostorViews> lists{};
@@ -93,12 +93,12 @@ IVec3 least_voxel(const std::vector<SeenFace>& faces) {
   return least;
 }
 
-// The width of a texel of snapshots of `edge` texels a side, voxels.
+// Returns the texel width in voxels of snapshots with `edge` texels per side.
 double texel_of(const ContentSphere& content, int edge) {
   return 2.0 * snapshot_camera(content, 0, edge).half_size() / edge;
 }
 
-// The words of a tree, 4^3 voxels each, with the bricks that were read last.
+// The words of a tree, 4^3 voxels each, with a cache of the last bricks read.
 class TreeWords {
  public:
   explicit TreeWords(const OccupancyTree& tree) : nodes_(tree) {}
@@ -159,14 +159,14 @@ WordFaces faces_of_word(TreeWords& words, IVec3 at) {
   return found;
 }
 
-// The bits of a voxel in its cell, which is 2^`log2_width` voxels wide: eight where it is 2 wide.
+// Returns the bits of a voxel in its cell, which is 2^`log2_width` voxels wide: eight bits for width 2.
 std::uint64_t bits_of_voxel(IVec3 in_cell, int log2_width) {
   const IVec3 at = log2_width == 1 ? in_cell * 2 : in_cell >> (log2_width - 2);
   const std::uint64_t cube = log2_width == 1 ? 0x0033'0033U : 1U;
   return cube << (at.x + 4 * at.y + 16 * at.z);
 }
 
-// The bit of an eighth of a voxel. `half`: 0.5 where it is the upper half along an axis, else 0.
+// Returns the bit of an eighth of a voxel. `half`: 0.5 for the upper half along an axis, otherwise 0.
 std::uint64_t bit_of_eighth(IVec3 in_cell, DVec3 half, int log2_width) {
   if (log2_width > 1) return bits_of_voxel(in_cell, log2_width);
   const IVec3 at = in_cell * 2 + IVec3(half * 2.0);
@@ -187,7 +187,7 @@ std::uint64_t halved_bits(std::uint64_t bits, unsigned octant) {
 class SolidCells {
  public:
   explicit SolidCells(const DensityGrid& field) : field_(&field) {}
-  // `cell`: its least corner.
+  // `cell`: its lowest corner.
   [[nodiscard]] bool has(IVec3 cell) {
     for (int row = 0; row < 4; ++row) {
       const IVec3 low = cell + IVec3{0, row & 1, row >> 1};
@@ -206,7 +206,7 @@ class SolidCells {
   }
 
   const DensityGrid* field_;
-  const DensityChunk* chunk_ = nullptr;  // that at `at_`
+  const DensityChunk* chunk_ = nullptr;  // the chunk at `at_`
   IVec3 at_{0};
   bool is_known_ = false;
 };
@@ -300,7 +300,7 @@ class SurfaceCells::Collector {
 
   Cell& cell_at(IVec3 voxel) {
     const IVec3 at = (voxel - into_->origin_) >> into_->log2_width_;
-    // Faces that follow each other mostly lie in one cell.
+    // Consecutive faces mostly lie in one cell.
     if (at == last_at_) return into_->cells_[last_];
     last_at_ = at;
     const std::uint64_t code = morton_code(at);
@@ -331,7 +331,7 @@ class SurfaceCells::Collector {
   std::array<Recent, 1024> recent_{};
   tsl::robin_map<std::uint64_t, std::uint32_t, MortonHash> index_;
   IVec3 last_at_{std::numeric_limits<int>::min()};
-  std::size_t last_ = 0;  // the cell there
+  std::size_t last_ = 0;  // its cell
 };
 
 SurfaceCells::SurfaceCells(const ContentSphere& content, IVec3 least, int log2_width)

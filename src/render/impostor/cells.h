@@ -47,8 +47,8 @@ class SurfaceCells {
 
  private:
   // For each view, a face that it saw, and its rank: the lowest of all faces in the cell. Ranks are random numbers
-  // divided by how large the face shows to the view, so faces are chosen by lot as often as texels show them, and the
-  // choice for eight cells together is one of the eight choices.
+  // divided by the face's visible size, so faces are chosen at random in proportion to the texels that show them, and
+  // the choice for eight joined cells is one of their eight choices.
   struct Cell {
     std::uint64_t code = 0;  // the position along a Morton curve
     std::uint64_t bits = 0;

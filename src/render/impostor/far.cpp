@@ -9,7 +9,7 @@ namespace {
 // Number of grids to wait for at once without a time limit; small, so that memory beyond the limit stays small.
 constexpr std::size_t kAtOnce = 16;
 
-// The grids of the far ones, each once, in the order of the instances.
+// Returns the grids of the far instances, each once, in the order of the instances.
 std::vector<GridHandle> far_grids(const Scene& scene, std::span<const SelectedInstance> selected) {
   std::vector<GridHandle> grids;
   std::map<GridHandle, bool> known;

@@ -22,7 +22,7 @@ struct FarImpostors {
 
 /// Requests impostors for the Far instances in `selected`, and takes the ready ones after `seconds`.
 ///
-/// Without a time limit the scene alone decides which instances have an impostor: grids are taken in the order of the
+/// Without a time limit only the scene determines which instances have an impostor. Grids are taken in the order of the
 /// instances.
 [[nodiscard]] FarImpostors take_impostors(ImpostorCache& cache, const Scene& scene,
                                           std::span<const SelectedInstance> selected, double seconds,

@@ -49,7 +49,7 @@ DVec3 impostor_view(int index) {
 
 std::optional<int> nearest_impostor_view(DVec3 direction) {
   if (!is_finite(direction) || direction == DVec3(0.0)) return std::nullopt;
-  // Scaled first, so that neither huge nor tiny directions lose the order of their products.
+  // Scaled first, so that products of huge or tiny directions keep their order.
   const DVec3 size = glm::abs(direction);
   direction /= std::max({size.x, size.y, size.z});
   int best = 0;

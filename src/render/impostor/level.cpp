@@ -90,7 +90,7 @@ void LevelMaker::end_group() {
   }
 }
 
-// Fills the last group up with its last rectangle, which no view sees there.
+// Fills the last group with copies of its last rectangle that no view sees.
 void LevelMaker::end_sides(std::size_t side) {
   for (; side_ < side; ++side_) {
     while (level_.views.size() % kGroup != 0) put(last_, 0, level_.face.back());
@@ -100,7 +100,7 @@ void LevelMaker::end_sides(std::size_t side) {
 
 ImpostorFaces::Level LevelMaker::level() && {
   end_sides(kSides);
-  // Kernels read on.
+  // Kernels read past the end.
   for (auto* const boxes : {&level_.groups.centre, &level_.groups.half}) {
     for (std::vector<float>& values : *boxes) values.resize(values.size() + kGroup);
   }

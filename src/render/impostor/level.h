@@ -20,7 +20,7 @@ struct Rectangle {
   Vec3 centre{0.0F};  ///< voxels from the content's centre
   Direction direction = Direction::PosX;
   std::array<float, 2> reach = {0.5F, 0.5F};  ///< from the middle to the sides along kFaceFrames' u and v
-  std::array<float, 2> slope{};               ///< how much it rises along the direction's axis per voxel along these
+  std::array<float, 2> slope{};               ///< rise along the direction's axis per voxel along u and v
   bool is_inclined = false;
 
   /// Half the sides of the box around it.
@@ -30,7 +30,7 @@ struct Rectangle {
   }
 };
 
-/// Returns a face or surfel as it is. `centre` is the content's.
+/// Returns the rectangle of a face or surfel. `centre` is the content's.
 [[nodiscard]] Rectangle rectangle_of(const SeenFace& seen, DVec3 centre);
 
 /// Collects the rectangles of a level.
@@ -50,7 +50,7 @@ class LevelMaker {
   ImpostorFaces::Level level_;
   std::size_t side_ = 0;  // minimum side of the next rectangle
   Rectangle last_;
-  Vec3 low_{0.0F};  // of the group that is being filled
+  Vec3 low_{0.0F};  // of the current group
   Vec3 high_{0.0F};
   bool has_reach_ = false;
 };

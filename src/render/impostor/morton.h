@@ -7,7 +7,7 @@
 
 namespace quoin {
 
-/// Returns the 21 low bits of a number, three places apart.
+/// Returns the 21 low bits of a number, spread to every third bit.
 [[nodiscard]] constexpr std::uint64_t spread_bits(std::uint64_t bits) {
   bits &= 0x1F'FFFF;
   bits = (bits | bits << 32) & 0x001F'0000'0000'FFFF;

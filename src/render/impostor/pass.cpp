@@ -17,10 +17,10 @@ namespace {
 
 constexpr int kBlock = CameraRays::kBlock;
 constexpr std::size_t kLanes = RayPacket::kSize;
-// In the numbers of jobs: levels, and the crevices.
+// Parts per instance in job numbers: the levels, and the unseen faces.
 constexpr std::int32_t kParts = ImpostorFaces::kLevels + 1;
 
-// Its index in SceneTracer::placed; -1 where it is not there.
+// Returns the index of an instance in SceneTracer::placed; -1 if it is not there.
 std::int32_t index_of(const std::vector<PlacedGrid>& placed, InstanceHandle instance) {
   const auto found =
       std::lower_bound(placed.begin(), placed.end(), instance,

@@ -20,26 +20,25 @@ struct FarFaces {
   RayPacket::Lanes<const ImpostorFaces::Face*> face{};
   RayPacket::Lanes<const ImpostorFaces::Surfel*> surfel{};  ///< null: the face is a voxel's
 
-  /// Returns where rays of light start from a point of a lane's surfel, in the grid.
+  /// Returns the start of light rays for a point on a lane's surfel, in the grid.
   [[nodiscard]] DVec3 start_of_light(std::size_t lane, const DVec3& point) const {
     return surfel[lane]->start_of_light(point, DVec3(face[lane]->voxel), face[lane]->direction);
   }
 };
 
-/// The far instances of one image: the tiles where each may show, and the hits of rays on them.
+/// The far instances of one image: the tiles where each may be visible, and the hits of rays on them.
 class ImpostorPass {
  public:
   static constexpr int kTile = raster::kTile;  ///< pixels; blocks of rays lie in one tile
 
-  /// All arguments but the camera must outlive it. Cost: O(far instances + tiles that they touch).
+  /// All arguments except the camera must outlive it. Cost: O(far instances + tiles that they touch).
   ImpostorPass(const SceneTracer& tracer, std::span<const FarInstance> far, const Camera& camera, int width,
                int height);
 
-  /// Returns true if an instance may show in the tile from (`column`, `row`), multiples of kTile.
+  /// Returns true if an instance may be visible in the tile from (`column`, `row`), multiples of kTile.
   [[nodiscard]] bool may_show(int column, int row) const { return !bin_of(column, row).empty(); }
 
-  /// Draws the impostors that show in that tile, for the rays of one sample of each pixel. Cost: about 10 ns per
-  /// rectangle.
+  /// Draws the impostors visible in that tile, for one sample ray per pixel. Cost: about 10 ns per rectangle.
   void draw(int column, int row, int sample, raster::Canvas& canvas) const;
 
   /// Replaces `hits` by nearer hits on far instances, for the 4x4 pixels from (`column`, `row`), whose rays from the
@@ -52,7 +51,7 @@ class ImpostorPass {
   void fill_bins();
   [[nodiscard]] const std::vector<std::uint32_t>& bin_of(int column, int row) const;
   [[nodiscard]] static bool is_hidden(const DrawnImpostor& drawn, const raster::Job& job, const raster::Canvas& canvas);
-  // Along a ray to the plane of a rectangle that lies along the axes.
+  // Returns the distance along a ray to the plane of an axis-aligned rectangle.
   [[nodiscard]] static double distance_to(const DrawnImpostor& drawn, const ImpostorFaces::Level& level,
                                           std::size_t number, const Ray& ray);
   [[nodiscard]] static double distance_to_surfel(const DrawnImpostor& drawn, const ImpostorFaces::Face& face,
@@ -65,7 +64,7 @@ class ImpostorPass {
   DVec3 forward_;
   raster::Draw draw_;
   std::vector<DrawnImpostor> drawn_;              // in the order of `placed`
-  std::vector<std::vector<std::uint32_t>> bins_;  // of tiles: indices of these, nearest first
+  std::vector<std::vector<std::uint32_t>> bins_;  // by tile: indices into `drawn_`, nearest first
 };
 
 /// Returns the indices in SceneTracer::placed of the far instances in a tracer.

@@ -15,18 +15,19 @@ namespace quoin {
 namespace {
 
 constexpr double kRoom = 1.0 + 1e-6;  // for rounding
-// The least number of voxels per pixel for cells of 2^`log2_width` voxels. The bits of cells of 2 and 4 voxels are
-// exact; wider ones are a sixteenth of a pixel at most, so that outlines of 8 pixels stay (docs/decisions/120).
+// Returns the minimum number of voxels per pixel for cells of 2^`log2_width` voxels. The bits of cells of 2 and 4
+// voxels are exact; wider bits are at most a sixteenth of a pixel, so that outlines of 8 pixels stay
+// (docs/decisions/120).
 double least_voxels(int log2_width) {
   if (log2_width <= 2) return log2_width < 1 ? 0.0 : 3.0 * std::exp2(log2_width);
   return 4.0 * std::exp2(log2_width);
 }
-// The factor of distance, up to the end of a level's range, over which the next level comes in.
+// The factor of distance, up to the end of a level's range, over which the next level fades in.
 constexpr double kFade = 1.3;
 constexpr std::int32_t kAllPixels = 1 << 24;
 
-// How far to one side of a camera a sphere at (across, deep) may be seen, at a distance of 1: never less than it is.
-// Requires: the sphere is in front of the camera's plane.
+// Returns an upper bound of a sphere's extent to one side, projected to distance 1. (across, deep): the sphere's centre
+// from the camera. Requires: the sphere is in front of the camera's plane.
 double upper_tangent(double across, double deep, double radius) {
   const double edge = across + radius;
   return edge / (edge > 0.0 ? deep - radius : deep + radius);
@@ -36,7 +37,7 @@ int clamped(double pixel, int size) {
   return static_cast<int>(std::clamp(pixel, 0.0, static_cast<double>(size)));
 }
 
-// Chooses the coarsest level for so many voxels per pixel, and how much of the next one is mixed in.
+// Chooses the coarsest level for a number of voxels per pixel, and the share of the next level.
 void choose_level(double voxels, DrawnImpostor& drawn) {
   const auto least = [&](std::size_t level) {
     return least_voxels(drawn.faces->first_width + static_cast<int>(level));
@@ -48,9 +49,9 @@ void choose_level(double voxels, DrawnImpostor& drawn) {
   drawn.coarser = static_cast<std::int32_t>(std::clamp(share, 0.0, 1.0) * (kAllPixels - 1));
 }
 
-// The views at the corners of the spherical triangle around a direction: a face of the cube around the grid, one of its
-// edges and one of its corners. Each is chosen as often as the direction, as their sum, has of it. `towards`: from the
-// content to the camera, of any length but 0.
+// Returns the views at the corners of the spherical triangle around a direction: a face of the cube around the grid,
+// one of its edges and one of its corners. Their frequencies are the weights that make up the direction. `towards`:
+// from the content to the camera, any length except 0.
 raster::NearViews near_views(DVec3 towards) {
   const DVec3 size = glm::abs(towards);
   std::array<int, 3> order = {0, 1, 2};

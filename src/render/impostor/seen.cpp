@@ -52,9 +52,9 @@ void draw_texels(const ImpostorFaces::Level& level, std::uint32_t views, const S
   }
 }
 
-// Moves the faces of one view after an edit. A texel can only show another face than before where a changed voxel
-// shows; so within the texels of the changed boxes (`core`) all is drawn as it was and as it is, and every face that
-// shows there in either is given the texels it has in a wider area (`around`), which holds all of them.
+// Updates the faces of one view after an edit. A texel's face can only change where a changed voxel is visible. Within
+// the texels of the changed boxes (`core`), the old and the new state are drawn. Every face visible there in either
+// state gets its texels from a wider area (`around`), which contains all of them.
 class SeenAgain {
  public:
   SeenAgain(const std::vector<SeenFace>& old, std::vector<SeenFace>& now, const std::vector<std::uint32_t>& now_of_old,
@@ -95,7 +95,7 @@ class SeenAgain {
   static constexpr std::uint32_t kGone = ~0U;
 
  private:
-  // By as much as a face of a voxel may span.
+  // Widens an area by the maximum extent of a voxel face.
   [[nodiscard]] TexelArea widened(const TexelArea& area, const SnapshotCamera& camera) const {
     constexpr double kDiagonal = 1.7320508075688772;  // of a voxel
     const double texels = kDiagonal * camera.focal / (camera.distance - camera.reach);
@@ -148,7 +148,7 @@ struct FaceHash {
   }
 };
 
-// Faces as rays meet them.
+// Collects faces that rays meet.
 class MetFaces {
  public:
   void take(const OccupancyTree& opaque, const ContentSphere& content, int view, int edge) {
@@ -194,7 +194,7 @@ class MetFaces {
   std::uint32_t last_ = 0;
 };
 
-// All faces, before any view.
+// Returns all faces, not seen by any view.
 std::vector<SeenFace> unseen_of(const ImpostorShell& shell) {
   const std::vector<VoxelFace> all = shell.faces();
   std::vector<SeenFace> faces(all.size());
@@ -202,7 +202,7 @@ std::vector<SeenFace> unseen_of(const ImpostorShell& shell) {
   return faces;
 }
 
-// By direction, then along a curve that keeps neighbours together.
+// Sorts faces by direction, then along a Morton curve, which keeps neighbours together.
 std::vector<SeenFace> sorted(const std::vector<SeenFace>& faces, IVec3 least) {
   std::vector<std::pair<std::uint64_t, std::uint32_t>> keys;
   keys.reserve(faces.size());
@@ -241,7 +241,7 @@ std::vector<SeenFace> faces_seen_after(const ImpostorFaces& before, const Impost
   std::vector<std::uint32_t> now_of_old(old.size(), SeenAgain::kGone);
   std::size_t next = 0;
   for (std::size_t i = 0; i < old.size(); ++i) {
-    // Mostly they go in step.
+    // The two lists mostly advance together.
     const VoxelFace& face = old[i].face;
     while (next < now.size() && now[next].face != face && comes_before(now[next].face, face)) ++next;
     if (next == now.size()) break;

@@ -17,7 +17,7 @@ namespace quoin {
 /// A face and the views that saw it.
 struct SeenFace {
   VoxelFace face;
-  const ImpostorFaces::Surfel* surfel = nullptr;  ///< null: of a voxel
+  const ImpostorFaces::Surfel* surfel = nullptr;  ///< null: a voxel face
   std::uint32_t views = 0;
 };
 
@@ -31,7 +31,7 @@ struct SeenFace {
 /// Updates the faces after an edit. `before`: an impostor with the same content and edge, and complete faces.
 /// `changed`: boxes around the changed voxels.
 ///
-/// Cost: about 10 ns per face, plus the faces that may show in the texels of each box and view.
+/// Cost: about 10 ns per face, plus the faces that may be visible in the texels of each box and view.
 [[nodiscard]] std::vector<SeenFace> faces_seen_after(const ImpostorFaces& before, const ImpostorShell& shell,
                                                      const ContentSphere& content, std::span<const IBox> changed);
 

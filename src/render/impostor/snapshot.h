@@ -15,7 +15,7 @@
 
 namespace quoin {
 
-/// From where a snapshot is taken, in the grid's frame: a pinhole at `position` that looks at the content's centre.
+/// The camera of a snapshot, in the grid's frame: a pinhole at `position` that looks at the content's centre.
 struct SnapshotCamera {
   DVec3 position{0.0};
   DVec3 right{1.0, 0.0, 0.0};
@@ -29,17 +29,17 @@ struct SnapshotCamera {
   [[nodiscard]] double half_size() const;
 };
 
-/// Upright along the grid's +Y; along its +X where the view is within 8 degrees of the Y axis.
+/// Returns the camera of a view. Up is the grid's +Y, or its +X if the view is within 8 degrees of the Y axis.
 [[nodiscard]] SnapshotCamera snapshot_camera(const ContentSphere& content, int view, int edge);
 
 /// One view of a grid's opaque voxels: the hit of each texel, rows from the top. A texel with type air hit no voxel;
 /// its depth is infinite.
 struct Snapshot {
   SnapshotCamera camera;
-  int edge = 0;                         ///< texels a side
-  std::vector<VoxelType> types;         ///< coverage of its own: a black voxel is no hole
+  int edge = 0;                         ///< texels per side
+  std::vector<VoxelType> types;         ///< also coverage: distinguishes black voxels from holes
   std::vector<Direction> faces;         ///< of the voxel seen
-  std::vector<std::uint8_t> occlusion;  ///< that a blocky mesh's vertices give there: 0 open, 255 dark
+  std::vector<std::uint8_t> occlusion;  ///< interpolated from a blocky mesh's vertices: 0 open, 255 dark
   std::vector<float> depth;             ///< voxels, Euclidean, from the snapshot's camera
 };
 
@@ -55,10 +55,10 @@ struct TexelArea {
   int bottom = 0;
 };
 
-/// Whole blocks within which a box shows in a snapshot of `edge` texels a side.
+/// Returns the whole 4x4 blocks that contain a box in a snapshot of `edge` texels per side.
 [[nodiscard]] TexelArea texels_of(const SnapshotCamera& camera, const IBox& box, int edge);
 
-/// The rays of a snapshot's 4x4 texels from (`column`, `row`); lane x + 4 y. Texels beyond the snapshot are not active.
+/// Returns the rays of a snapshot's 4x4 texels from (`column`, `row`); lane x + 4 y. Texels outside are inactive.
 [[nodiscard]] RayPacket rays_of_texels(const SnapshotCamera& camera, int edge, int column, int row);
 
 inline constexpr int kTexelBlock = 4;

@@ -25,7 +25,7 @@ class SurfelMaker {
  public:
   SurfelMaker(const DensityGrid& field, std::size_t max_count) : field_(&field), max_count_(max_count) {}
 
-  // False when there are too many.
+  // Returns false if there are too many surfels.
   bool take_chunk(IVec3 chunk) {
     for (int i = 0; i < 4; ++i) {
       IVec3 offset{0};
@@ -64,7 +64,7 @@ class SurfelMaker {
   }
 
  private:
-  // Which samples of a row are solid, of this chunk or the next along x, y or z.
+  // Returns a mask of the solid samples in a row of this chunk or the next along x, y or z.
   [[nodiscard]] std::uint64_t signs(std::size_t of, int y, int z) const {
     return near_[of] == nullptr ? 0 : near_[of]->solid_row(y, z);
   }
@@ -97,7 +97,7 @@ class SurfelMaker {
     for (std::size_t i = 0; i < 2; ++i) {
       const FaceFrame& frame = frame_of(direction);
       const Side side = side_of(sample, axis, static_cast<int>(i == 0 ? frame.u : frame.v), is_solid_below, offset);
-      // In steps that a device can hold in a few bits.
+      // Rounded to steps that fit in a few bits on the device.
       surfel.half[i] = static_cast<float>(std::round(512.0 * (side.low + side.high)) / 1024.0);
       surfel.shift[i] = static_cast<float>(0.5 * (side.high - side.low));
       surfel.slope[i] = static_cast<float>(side.slope);
@@ -144,7 +144,7 @@ class SurfelMaker {
     if ((below < 0.0) != is_solid_below || (above < 0.0) == is_solid_below) return std::nullopt;
     return std::clamp(below / (below - above), 0.0, 1.0);
   }
-  // The same of the edge, or the one below or above it.
+  // As `height`, for the edge, or the edge below or above it.
   [[nodiscard]] std::optional<double> height_near(IVec3 sample, int axis, bool is_solid_below) const {
     for (const int up : {0, -1, 1}) {
       IVec3 at = sample;

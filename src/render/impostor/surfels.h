@@ -21,7 +21,7 @@ struct FieldSurfels {
 /// Returns all surfels of a field, sorted by `comes_before`. Returns nullopt if there would be more than `max_count`,
 /// or if more than a quarter of them lie on parts at most three samples thick.
 ///
-/// Which:  lattice edges that the surface crosses, if the normal's component along the edge is at least 0.8 of its
+/// Edges:  lattice edges that the surface crosses, if the normal's component along the edge is at least 0.8 of its
 ///         largest component or more than 0.55. So the surfels of both sides overlap where the largest axis changes,
 ///         and there is no gap.
 /// Normal: the normal of the traced surface.

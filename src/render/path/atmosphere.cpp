@@ -72,7 +72,7 @@ float along(float radius, float cosine, float t) {
   return std::sqrt(radius * radius + t * t + 2.0F * radius * cosine * t);
 }
 
-// Transmittance from the top of the atmosphere to any height, at any angle that is clear of the ground.
+// A table of the transmittance from the top of the atmosphere, by height and angle above the ground.
 class Transmittance {
  public:
   explicit Transmittance(const AirOptions& air) : table_(std::size_t{kAngles} * kHeights) {
@@ -87,7 +87,7 @@ class Transmittance {
     }
   }
 
-  // 0 where the ground is in between.
+  // Returns 0 if the ground is in between.
   [[nodiscard]] Vec3 at(float radius, float cosine) const {
     const float least = -std::sqrt(std::max(0.0F, 1.0F - square(kGround / radius)));
     if (cosine < least) return Vec3(0.0F);
@@ -121,7 +121,7 @@ class Transmittance {
   std::vector<Vec3> table_;
 };
 
-// Light that was scattered more than once, of an irradiance of 1, by height and the sun's angle.
+// A table of multiply scattered light for an irradiance of 1, by height and the sun's angle.
 class MultipleScattering {
  public:
   MultipleScattering(const AirOptions& air, const Transmittance& transmittance) {
@@ -202,7 +202,8 @@ class Sky {
 
   [[nodiscard]] Vec3 sunlight(float sun_up) const { return transmittance_.at(kEye, sun_up); }
 
-  // Of an irradiance of 1. `up`: the y of the ray; `towards`: its cosine with the sun's direction.
+  // Returns the radiance for an irradiance of 1. `up`: the y of the ray; `towards`: its cosine with the sun's
+  // direction.
   [[nodiscard]] Vec3 radiance(float up, float towards, float sun_up) const {
     constexpr int kSteps = 32;
     const bool on_ground = meets_ground(kEye, up);
@@ -219,7 +220,7 @@ class Sky {
     float before = 0.0F;
     for (int i = 0; i < kSteps; ++i) {
       const float share = static_cast<float>(i + 1) / kSteps;
-      const float end = length * share * share;  // short steps first, where the air is thick
+      const float end = length * share * share;  // shorter steps first, in dense air
       const float t = (before + end) * 0.5F;
       const float here = along(kEye, up, t);
       const float sun_here = (kEye * sun_up + t * towards) / here;
@@ -241,7 +242,7 @@ class Sky {
   MultipleScattering scattering_;
 };
 
-// The sky above the horizon, by elevation, and by the angle from the sun around the vertical: fine near the horizon and
+// A table of the sky above the horizon, by elevation and by azimuth from the sun. Steps are finer near the horizon and
 // near the sun.
 class Dome {
  public:

@@ -8,7 +8,7 @@ namespace quoin::path {
 
 /// A clear sky, and the sun through it, seen from the ground.
 struct AtmosphericSky {
-  RadianceImage radiance;  ///< of all directions as EnvironmentLight has them; without the sun
+  RadianceImage radiance;  ///< of all directions, laid out as in EnvironmentLight; without the sun
   Vec3 sunlight{0.0F};     ///< the transmitted sunlight
 };
 

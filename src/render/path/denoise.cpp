@@ -15,10 +15,10 @@ namespace {
 constexpr int kLevels = 5;             // with steps of 1 to 16 pixels
 constexpr float kLeastAlbedo = 1e-4F;  // lower bound of the divisor of light
 constexpr float kAllowed = 2.0F;       // largest difference of light, in standard deviations
-constexpr float kCurve = 32.0F;        // how fast other normals count less
+constexpr float kCurve = 32.0F;        // exponent of the cosine between normals
 constexpr std::array kKernel = {1.0F / 16, 1.0F / 4, 3.0F / 8, 1.0F / 4, 1.0F / 16};
 
-// The light of a part that falls on it, and the variance of its mean.
+// The incident light of a part, and the variance of its mean.
 struct Light {
   Vec3 mean{0.0F};
   float variance = 0.0F;
@@ -29,13 +29,14 @@ Vec3 albedo_of(const SurfacePart& part) {
   return glm::max(part.albedo / part.samples, Vec3(kLeastAlbedo));
 }
 
-// Whether they are the same surface, and how much of one: 1 where it is flat.
+// Returns the similarity of two parts: 0 for different surfaces, 1 on the same flat surface.
 float likeness(const SurfacePart& a, const SurfacePart& b) {
   if (a.surface != b.surface) return 0.0F;
   const float length2 = glm::dot(a.normal, a.normal) * glm::dot(b.normal, b.normal);
   if (!(length2 > 0.0F)) return 1.0F;
   const float cosine = glm::dot(a.normal, b.normal) / std::sqrt(length2);
-  // Next to it, not in front or behind: along the normal no farther than a third of the distance between them.
+  // The parts must lie side by side, not behind each other: the distance along the normal is at most a third of the
+  // distance between them.
   const Vec3 way = b.place / b.samples - a.place / a.samples;
   const float along = glm::dot(way, a.normal) / std::sqrt(glm::dot(a.normal, a.normal));
   if (along * along > glm::dot(way, way) / 9.0F) return 0.0F;
@@ -162,7 +163,7 @@ void denoise(const SurfaceParts& parts, int samples, Threads threads, PathPictur
   const auto count = static_cast<float>(samples);
   for (std::size_t pixel = 0; pixel < picture.scene.size(); ++pixel) {
     Vec3 change(0.0F);
-    Vec3 of_sky(0.0F);  // which is no part of the scene
+    Vec3 of_sky(0.0F);  // not part of the scene
     for (std::size_t slot = 0; slot < SurfaceParts::kOfPixel; ++slot) {
       const SurfacePart& part = parts.at(pixel)[slot];
       if (part.surface == 0) break;

@@ -13,7 +13,7 @@ namespace quoin::path {
 
 /// The part of a pixel that shows one surface: a face's plane in a grid, a field, the ground.
 struct SurfacePart {
-  std::uint32_t surface = 0;  ///< which; 0: none
+  std::uint32_t surface = 0;  ///< its id; 0: none
   float samples = 0.0F;
   float square = 0.0F;  ///< sum of the squares of the light's luminance
   Vec3 light{0.0F};     ///< sums
@@ -46,9 +46,9 @@ class SurfaceParts {
   std::vector<OfPixel> pixels_;
 };
 
-/// Replaces the light of an image's surfaces by means over the same surface nearby, within the limits of their noise.
-/// Light outside the parts is unchanged. Every edge between surfaces stays, down to each surface's share of a pixel.
-/// `samples`: per pixel.
+/// Replaces the light of an image's surfaces by means over the same surface nearby, within their noise. Does not change
+/// light outside the parts. Keeps every edge between surfaces, down to each surface's share of a pixel. `samples`: per
+/// pixel.
 ///
 /// Source: the a-trous wavelets of H. Dammertz et al. (2010), guided by variance as in C. Schied et al. (2017); over
 /// the exact parts of pixels instead of whole pixels.

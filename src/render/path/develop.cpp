@@ -138,7 +138,7 @@ void blur_line(std::vector<Vec3>& values, std::size_t first, std::size_t step, i
   for (int i = 0; i < count; ++i) at(i) = line[static_cast<std::size_t>(i)];
 }
 
-// Three means of a box come near Gauss's curve. `radius`: its standard deviation, in pixels.
+// Blurs by three box filters, which approximate a Gaussian. `radius`: its standard deviation, in pixels.
 void blur(std::vector<Vec3>& values, int width, int height, double radius_x, double radius_y) {
   std::vector<Vec3> line;
   const auto box_of = [](double radius, int most) {
@@ -181,7 +181,7 @@ std::vector<Vec3> bloomed(const std::vector<Vec3>& light, int width, int height,
   return out;
 }
 
-// From linear light to bytes.
+// Converts linear light to bytes.
 class Developer {
  public:
   Developer(const DevelopOptions& options, int width, int height)
@@ -192,7 +192,7 @@ class Developer {
         middle_x_(static_cast<float>(width) * 0.5F),
         middle_y_(static_cast<float>(height) * 0.5F) {}
 
-  // The light to show: the exposure is in it already where that is 1.
+  // Returns the light to display. If `exposure` is 1, the exposure is already applied.
   [[nodiscard]] std::vector<Vec3> spread(const std::vector<Vec3>& light, int width, int height) {
     std::vector<Vec3> out = bloomed(light, width, height, exposure_, options_->bloom);
     exposure_ = 1.0F;
@@ -210,7 +210,7 @@ class Developer {
  private:
   static constexpr double kUsualGamma = 2.2;
 
-  // 0 in the middle, 1 in the corners, by the square of the distance.
+  // Returns 0 in the middle and 1 in the corners, by the square of the distance.
   [[nodiscard]] float corner(std::size_t x, std::size_t y) const {
     const float across = (static_cast<float>(x) + 0.5F - middle_x_) / middle_x_;
     const float down = (static_cast<float>(y) + 0.5F - middle_y_) / middle_y_;
@@ -266,7 +266,7 @@ double mean_byte(const std::vector<Vec3>& light, double exposure, ToneCurve tone
 }  // namespace
 
 double find_exposure(const PathPicture& picture, ToneCurve tone) {
-  constexpr double kWidest = 256.0;  // how far the curves' exposures are apart at most, as a factor
+  constexpr double kWidest = 256.0;  // maximum ratio between the exposures of two curves
   constexpr int kHalvings = 24;
   const std::optional<double> neutral = neutral_exposure(picture);
   if (!neutral || tone == ToneCurve::Neutral) return neutral.value_or(1.0);

@@ -11,7 +11,7 @@ namespace {
 
 constexpr float kLeastShare = 1e-3F;  // of the mean: also samples black pixels, which interpolation can brighten
 
-// Sums of weights, to 1.
+// Computes cumulative sums of weights, normalised to 1.
 void accumulate(std::span<const float> weights, std::span<float> sums) {
   double sum = 0.0;
   sums[0] = 0.0F;

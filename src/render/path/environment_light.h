@@ -14,7 +14,7 @@ namespace quoin::path {
 struct SkySample {
   Vec3 direction{0.0F};  ///< towards it, unit
   Vec3 radiance{0.0F};
-  float density = 0.0F;  ///< by solid angle; infinite of a sun without a disc
+  float density = 0.0F;  ///< by solid angle; infinite for a sun without a disc
 };
 
 /// An emissive image of all directions: +y is up, the image's centre is -z, its left edge is +z, and +x is right of the
@@ -25,13 +25,13 @@ class EnvironmentLight {
   /// Requires: it has at least one pixel. Cost: O(pixels).
   explicit EnvironmentLight(RadianceImage image);
 
-  /// Between the middles of pixels; `direction` is unit.
+  /// Returns the light from a direction (unit), interpolated between pixel centres.
   [[nodiscard]] Vec3 at(Vec3 direction) const;
-  /// The brighter, the likelier.
+  /// Samples a direction in proportion to brightness.
   [[nodiscard]] SkySample sample(Pair u) const;
   [[nodiscard]] float density(Vec3 direction) const;
 
-  // For renderers that look up elsewhere.
+  // For renderers with their own lookup.
   [[nodiscard]] const RadianceImage& image() const { return image_; }
   [[nodiscard]] std::span<const float> rows() const { return rows_; }        ///< [height + 1]
   [[nodiscard]] std::span<const float> columns() const { return columns_; }  ///< [height][width + 1]

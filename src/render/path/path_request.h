@@ -24,9 +24,9 @@ inline constexpr int kMaxPathSamples = 65'536;
 struct PixelSums {
   Vec3 background{0.0F};  ///< the visible part of the background
   Vec3 scene{0.0F};
-  Vec3 caught{0.0F};  ///< background behind ground that only catches shadows
-  Vec3 lit{0.0F};     ///< that ground
-  Vec3 open{0.0F};    ///< the light it would have on an empty ground
+  Vec3 caught{0.0F};  ///< background behind shadow-catching ground
+  Vec3 lit{0.0F};     ///< the light on that ground
+  Vec3 open{0.0F};    ///< the light it would have if it were empty
   float scene_share = 0.0F;
   float caught_share = 0.0F;
   Vec3 albedo{0.0F};

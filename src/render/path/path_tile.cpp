@@ -23,10 +23,10 @@ namespace {
 constexpr int kBlock = CameraRays::kBlock;
 constexpr std::size_t kBlockPixels = std::size_t{kBlock} * kBlock;
 static_assert(kBlockPixels == kBlockPoints);
-constexpr int kSureBounces = 3;       // before chance may end a path
+constexpr int kSureBounces = 3;       // before a path may end at random
 constexpr float kMostLikely = 0.95F;  // maximum probability to continue
 
-// Calls `put(index)` in the order of keys, equal ones in theirs.
+// Calls `put(index)` in key order; stable.
 template <class Key, class Put>
 void sort_by_key(std::size_t count, std::size_t keys, std::vector<std::uint32_t>& starts, Key&& key, Put&& put) {
   starts.assign(keys + 1, 0);
@@ -135,7 +135,7 @@ bool PathTile::render(const std::function<bool(std::size_t)>& goes_on) {
 
 // Later points of a low-discrepancy sequence fill the gaps between earlier ones. Lamp choices learned from the earlier
 // points would then correlate with the later numbers and darken the image, so lamps are chosen by other numbers after
-// each step. These are spread equally well, since every power-of-two block of the sequence is.
+// each step. These are equally well distributed, as is every power-of-two block of the sequence.
 void PathTile::learn(int first) {
   static_assert(std::has_single_bit(static_cast<unsigned>(kSamplesAtOnce)));
   memory_.learn();
@@ -172,7 +172,7 @@ void PathTile::begin(int first, int count) {
 Pair PathTile::on_lens(Pair u) const {
   const int blades = context_->options->lens_blades;
   if (blades < 3) return on_disc(u);
-  // One of the triangles about the middle, then a point of it.
+  // Chooses one of the triangles around the middle, then a point in it.
   const float place = u.x * static_cast<float>(blades);
   const float first = std::min(std::floor(place), static_cast<float>(blades - 1));
   double turned = context_->options->lens_turn_radians / (2.0 * std::numbers::pi);
@@ -220,7 +220,7 @@ void PathTile::begin_path(std::size_t pixel, Pair jitter, int sample) {
 }
 
 void PathTile::order_paths() {
-  // The camera's rays are in blocks of pixels already.
+  // Camera rays already come in blocks of pixels.
   if (active_.empty() || paths_[active_.front()].is_first) return;
   next_.resize(active_.size());
   sort_by_key(
@@ -239,7 +239,7 @@ void PathTile::meet() {
 }
 
 void PathTile::meet_packet(std::span<const std::uint32_t> indices) {
-  // Kept: to clear them for each packet takes longer than to fill them.
+  // Reused: clearing a packet takes longer than filling it.
   RayPacket& rays = packet_;
   SceneHits& hits = hits_;
   rays.active = 0;
@@ -387,7 +387,7 @@ void PathTile::note_part(Path& path, const Vertex& vertex, std::uint32_t surface
 void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const SceneHits& hits, int lane) {
   Path& path = paths_[index];
   const auto i = static_cast<std::size_t>(lane);
-  Vertex& vertex = vertices_.emplace_back();  // filled in where it stays
+  Vertex& vertex = vertices_.emplace_back();  // filled in place
   vertex.path = index;
   vertex.placed = hits.placed[i];
   const PlacedGrid& placed = context_->placed[static_cast<std::size_t>(vertex.placed)];
@@ -414,7 +414,7 @@ void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const Scen
     surface = (*context_->surfaces)[type];
   }
   if (path.is_first) sums_[path.pixel].scene_share += 1.0F;
-  if (starts_inside) {  // its own colour, unlit
+  if (starts_inside) {  // from inside: its own colour, unlit
     path.radiance += path.throughput * (path.is_seen ? surface.colour : surface.emitted);
     if (path.is_first && path.is_first_sample) sums_[path.pixel].depth = 0.0F;
     vertices_.pop_back();
@@ -463,7 +463,7 @@ void PathTile::hit_ground(std::uint32_t index, double t) {
     if (!path.is_noted) note_part(path, vertex, kGroundSurface, false);
     note_layers(path, vertex, t, kAir);
   }
-  // Shadows are asked for in a grid: the first.
+  // Shadow rays start in a grid: the first.
   if (!context_->placed.empty()) vertex.in_grid = context_->view->grid_from_view(0).point(vertex.in_view);
   vertices_.push_back(vertex);
 }
@@ -481,7 +481,7 @@ bool PathTile::survives(Path& path, bool in_medium) const {
   if (in_medium) ++path.scatterings;
   const bool is_sure = in_medium ? path.scatterings <= kSureBounces : path.bounces < kSureBounces;
   if (!is_sure) {
-    // In white fog light stays until it is out.
+    // In white fog paths never end at random.
     const float likely = std::min(largest(path.throughput), in_medium ? 1.0F : kMostLikely);
     if (!(path.random.one(path.dimension + dimension::kRoulette) < likely)) return false;
     path.throughput /= likely;
@@ -620,7 +620,7 @@ void PathTile::ask_lamp(const Vertex& vertex, std::size_t lane, const Frame& fra
   const Vec3 value = scatter.value(in);
   Vec3 light = paths_[vertex.path].throughput * value * lamp.radiance;
   if (lamp.density < kNoOther) light *= balance(lamp.density, scatter.density(in));
-  // A little before the lamp, for rounding.
+  // Slightly in front of the lamp, because of rounding.
   if (!ask(vertex, lamp.direction, lamp.distance * (1.0F - 1e-4F), light, false)) return;
   Request& request = requests_.back();
   request.lamp = chosen.lamp;

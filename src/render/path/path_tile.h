@@ -41,7 +41,7 @@ struct TileContext {
   const Camera* camera = nullptr;
   const PathOptions* options = nullptr;
   SurfaceParts* parts = nullptr;  ///< of the image, to be filled; null: not requested
-  bool has_media = false;         ///< fog or clouds
+  bool has_media = false;         ///< true if there are fog or clouds
 };
 
 /// One square of an image.
@@ -54,11 +54,11 @@ class PathTile {
  public:
   static constexpr int kEdge = 32;  ///< pixels
 
-  /// `column` and `row` are of its upper left pixel.
+  /// `column` and `row`: its upper left pixel.
   PathTile(const TileContext& context, int column, int row);
 
-  /// All samples of all pixels. Asks `goes_on(samples)` after some of them; once that returns false, so does this, and
-  /// the tile is not to be used.
+  /// Renders all samples of all pixels. Calls `goes_on(samples)` after some of them. If that returns false, this
+  /// returns false and the tile must not be used.
   [[nodiscard]] bool render(const std::function<bool(std::size_t samples)>& goes_on);
   /// Writes the pixels within the image.
   void write_to(PathPicture& picture) const;
@@ -73,42 +73,42 @@ class PathTile {
 
   struct Path {
     Path() {}              // NOLINT: a defaulted one is cleared whole before its members are made, which takes longer
-    DVec3 origin{0.0};     // of its next ray, in view space
+    DVec3 origin{0.0};     // start of its next ray, in view space
     Vec3 direction{0.0F};  // unit
     float density = 0.0F;  // density of the last sampled direction; infinite if no other strategy can sample it
     Vec3 throughput{1.0F};
     Vec3 radiance{0.0F};
-    Vec3 normal{0.0F};  // where it was last scattered
+    Vec3 normal{0.0F};  // at the last scattering
     Random random;
-    std::uint32_t dimension = 0;  // the first that is free
-    std::uint16_t pixel = 0;      // of the tile
+    std::uint32_t dimension = 0;  // the next unused dimension
+    std::uint16_t pixel = 0;      // in the tile
     std::uint16_t bounces = 0;
     std::uint16_t scatterings = 0;  // in fog and clouds
-    std::uint8_t part = kNoPart;    // of the pixel's surfaces
-    VoxelType inside = kAir;        // the glass in which it is
-    std::int32_t place = 0;         // where it was last scattered
-    bool is_seen = true;            // by the camera, itself or by glass and mirrors
+    std::uint8_t part = kNoPart;    // index among the pixel's surfaces
+    VoxelType inside = kAir;        // the glass around it
+    std::int32_t place = 0;         // of the last scattering
+    bool is_seen = true;            // by the camera, directly or through glass and mirrors
     bool is_first = true;           // no surface has been hit yet
-    bool is_caught = false;         // it passed ground that only catches shadows
+    bool is_caught = false;         // it passed shadow-catching ground
     bool is_first_sample = false;
-    bool is_noted = false;  // in the layers
+    bool is_noted = false;  // recorded in the layers
     std::uint8_t bin = 0;   // of its direction
   };
-  // Where a path is scattered.
+  // A point where a path scatters.
   struct Vertex {
     Vertex() {}  // NOLINT: as Path
     std::uint32_t path = 0;
     std::int32_t placed = 0;
-    DVec3 in_grid{0.0};  // a hundredth of a voxel above the surface, so that rays start before it
-    DVec3 in_view{0.0};  // there
+    DVec3 in_grid{0.0};  // a hundredth of a voxel above the surface, so that rays start in front of it
+    DVec3 in_view{0.0};  // the same point in view space
     Vec3 normal{0.0F};   // in the world, towards the path's origin
     Material material;
     std::int32_t place = 0;
     bool is_ground = false;
     bool is_medium = false;   // in the air; it has no normal
-    float anisotropy = 0.0F;  // of that
+    float anisotropy = 0.0F;  // of the medium
 
-    // Without any gloss.
+    // Returns true without any gloss.
     [[nodiscard]] bool is_matte() const {
       return !is_medium && material.roughness >= 1.0F && material.metalness <= 0.0F;
     }
@@ -122,7 +122,7 @@ class PathTile {
     std::int32_t home = 0;
     std::uint32_t path = 0;
     std::uint32_t bin = 0;
-    std::int32_t lamp = -1;  // that sends it
+    std::int32_t lamp = -1;  // the lamp that sends it
     std::int32_t place = 0;
     float brightness = 0.0F;  // of the lamp's light at the point
   };
@@ -134,24 +134,24 @@ class PathTile {
   // Applies the lamp results of samples before `first`, a power of two.
   void learn(int first);
   void begin(int first, int count);
-  // A point of the lens, of radius 1.
+  // Returns a point of the lens, scaled to radius 1.
   [[nodiscard]] Pair on_lens(Pair u) const;
   void begin_path(std::size_t pixel, Pair jitter, int sample);
   void order_paths();
   void meet();
   void meet_packet(std::span<const std::uint32_t> paths);
-  // A path that leaves the scene towards `direction`.
+  // Adds the sky's light to a path that leaves the scene towards `direction`.
   void leave(Path& path, Vec3 direction);
   // Traces a ray through glass before `t`, if the scene has glass. Returns true if the path's ray ends there.
   bool meet_glass(std::uint32_t index, double t);
   bool pass_glass(std::uint32_t index);
   // Traces the scattering bodies before the first glass.
   bool pass_clouds(std::uint32_t index);
-  // Where a path ends in a body that scatters, if `u` is below the share of paths that do.
+  // Scatters a path in a body if `u` is below the share of paths that scatter there.
   void scatter_in(std::uint32_t index, const GlassBody& body, float u);
-  // The way through fog from a point, up to `max_t`.
+  // Returns the part of a ray that lies in fog, up to `max_t`.
   [[nodiscard]] Interval in_fog(const DVec3& origin, Vec3 direction, double max_t) const;
-  // Whether it meets fog before `until`, which is then where.
+  // Returns true if the path scatters in fog before `until`, and sets `until` to that distance.
   [[nodiscard]] bool ends_in_fog(const Path& path, double& until) const;
   void hit_air(std::uint32_t index, double t, Vec3 colour, float anisotropy, std::int32_t placed);
   bool enter_glass(std::uint32_t index);
@@ -167,7 +167,7 @@ class PathTile {
   void note_layers(Path& path, const Vertex& vertex, double t, VoxelType type);
   // Records the surface that a path would meet without fog and clouds, which it meets at random.
   void note_behind(Path& path, const SceneHits& hits, int lane, double t);
-  // Which of the pixel's surfaces that is. `surface`: not 0.
+  // Returns the part of the pixel that shows a surface. `surface`: not 0.
   [[nodiscard]] SurfacePart& part_of(const Path& path);
   void note_part(Path& path, const Vertex& vertex, std::uint32_t surface, bool is_curved);
 
@@ -176,7 +176,7 @@ class PathTile {
   void put_into_block(const Vertex& vertex, std::size_t lane);
   // Scatters a path, from the kernel's results in `block_`.
   void shade(const Vertex& vertex, std::size_t lane);
-  // Sends a path on that is scattered, into a direction of the world.
+  // Continues a scattered path in a direction of the world.
   void go_on(const Vertex& vertex, std::size_t lane, Vec3 normal, const Scattered& next);
   [[nodiscard]] Scatter scatter_at(const Vertex& vertex, const Path& path, const Frame& frame) const;
   // Counts the current scattering, and ends the path at random. Returns true if it continues.
@@ -184,7 +184,7 @@ class PathTile {
   void ask_sun(const Vertex& vertex, std::size_t lane, const Frame& frame, const Scatter& scatter);
   void ask_sky(const Vertex& vertex, const Path& path, const Frame& frame, const Scatter& scatter);
   void ask_lamp(const Vertex& vertex, std::size_t lane, const Frame& frame, const Scatter& scatter);
-  // False: no light would come from there.
+  // Requests a shadow ray. Returns false if no light would arrive from there.
   bool ask(const Vertex& vertex, Vec3 direction, float max_t, Vec3 light, bool is_sun);
   void trace_requests();
   void trace_request_packet(std::span<const std::uint32_t> requests);
@@ -199,7 +199,7 @@ class PathTile {
   ShadeLight light_;
   ShadeBlock block_;
   LampMemory memory_;
-  std::vector<std::uint32_t> pixels_;  // Random's, of the tile's
+  std::vector<std::uint32_t> pixels_;  // hashes for Random
   std::vector<Path> paths_;
   std::vector<std::uint32_t> active_, next_;
   std::vector<Vertex> vertices_;

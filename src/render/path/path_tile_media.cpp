@@ -17,7 +17,7 @@
 namespace quoin::path {
 namespace {
 
-constexpr int kMostGlass = 64;  // surfaces of glass that a path meets between two others
+constexpr int kMostGlass = 64;  // maximum number of glass surfaces that a path meets between two other surfaces
 
 // Refraction at a surface between two media, without polarisation; reflectance 1 on total reflection. `eta`: the
 // refractive index on the incident side over the index on the other side. `cosine`: of the incident angle, positive.
@@ -59,7 +59,7 @@ bool PathTile::pass_glass(std::uint32_t index) {
         scatter_in(index, body, u);
         return true;
       }
-      // From within it glows, no more.
+      // From inside, only its emission counts.
       if (body.starts_inside) {
         add_emitted(path, surface.emitted, -1, 0.0F);
       } else {
@@ -107,7 +107,7 @@ bool PathTile::enter_glass(std::uint32_t index) {
   const Surface& surface = (*context_->surfaces)[body.type];
   const Ray ray{path.origin, DVec3(path.direction)};
   const float u = path.random.one(path.dimension + dimension::kGlass);
-  if (body.starts_inside) {  // the camera is in it
+  if (body.starts_inside) {  // the camera is inside
     path.inside = body.type;
     return leave_glass(index);
   }
@@ -145,7 +145,7 @@ bool PathTile::leave_glass(std::uint32_t index) {
   Path& path = paths_[index];
   const Ray ray{path.origin, DVec3(path.direction)};
   const bool is_within = !glass_.empty() && glass_.front().starts_inside && glass_.front().type == path.inside;
-  if (!is_within) {  // it came through a corner, or out by rounding
+  if (!is_within) {  // the path left through a corner, or by rounding
     path.inside = kAir;
     return !glass_.empty() && !glass_.front().starts_inside && enter_glass(index);
   }
@@ -163,7 +163,7 @@ bool PathTile::leave_glass(std::uint32_t index) {
     SceneHits met;
     context_->view->first_hits(ahead, met);
     const double ground = ground_at(path.origin, path.direction);
-    if (met.grids.hit != 0 || ground <= body.t_exit + lift) return false;  // it lies on something opaque
+    if (met.grids.hit != 0 || ground <= body.t_exit + lift) return false;  // the glass lies on an opaque surface
   }
   const float other = has_next ? (*context_->surfaces)[glass_[1].type].ior : 1.0F;
   Vec3 normal(placed.world_axes * normal_left(*context_->view, ray, body));

@@ -25,11 +25,11 @@ namespace quoin::path {
 inline constexpr double kInfinite = std::numeric_limits<double>::infinity();
 inline constexpr float kNoOther = std::numeric_limits<float>::infinity();  // a density without an alternative strategy
 inline constexpr std::uint32_t kDimensions = 8;                            // per vertex
-inline constexpr std::uint32_t kFog = 0x4000'0000;                         // added to a vertex's: numbers of their own
+inline constexpr std::uint32_t kFog = 0x4000'0000;  // added to a vertex's dimensions for separate random numbers
 inline constexpr std::uint32_t kFade = 0x5000'0000;
 inline constexpr std::uint32_t kGroundSurface = 2;  // distinct from all results of surface_id
 
-// Of kBins.
+// Returns a direction's bin, below kBins.
 inline std::uint32_t bin_of(Vec3 direction) {
   const Vec3 size = glm::abs(direction);
   const int axis = size.x >= size.y ? (size.x >= size.z ? 0 : 2) : (size.y >= size.z ? 1 : 2);
@@ -58,13 +58,13 @@ inline float cover_of(const Surface& surface, double voxels) {
   return voxels > 0.0 ? 1.0F - exponential(surface.log_clarity * static_cast<float>(voxels)) : 0.0F;
 }
 
-// Of a body, which is a voxel long at least where it has edges that are to be crisp.
+// Returns a body's length; at least one voxel if its edges must be crisp.
 inline double length_of(const Surface& surface, const GlassBody& body) {
   const bool is_soft = body.starts_inside || body.in_field || surface.scattering > 0.0F;
   return std::max(body.voxels, is_soft ? 0.0 : 1.0);
 }
 
-// Names the plane of a voxel's face, or a field, of one grid and type; odd.
+// Returns an id for the plane of a voxel's face, or for a field, of one grid and type; odd.
 inline std::uint32_t surface_id(IVec3 voxel, Direction face, bool in_field, std::int32_t placed, VoxelType type) {
   const auto plane = in_field ? 0U : static_cast<std::uint32_t>(voxel[frame_of(face).axis]);
   std::uint32_t id = mix_bits(plane ^ (in_field ? 6U : static_cast<std::uint32_t>(face)) << 28);

@@ -15,11 +15,11 @@ struct Material {
   float metalness = 0.0F;
 };
 
-/// A direction into which light is scattered, and how much of it.
+/// A scattered direction and its weight.
 struct Scattered {
   Vec3 direction{0.0F};
   Vec3 weight{0.0F};     ///< the scattering function times the cosine, divided by the density
-  float density = 0.0F;  ///< by solid angle; infinite of a mirror
+  float density = 0.0F;  ///< by solid angle; infinite for a mirror
 };
 
 /// Scatters light towards a viewer who looks along -`out`: Lambert's law below a layer of gloss.
@@ -41,11 +41,11 @@ class Scatter {
   /// Source: L. Henyey, J. Greenstein, "Diffuse radiation in the galaxy" (1941).
   Scatter(Vec3 colour, float anisotropy);
 
-  /// The scattering function times the cosine of `in`; 0 below the surface.
+  /// Returns the scattering function times the cosine of `in`; 0 below the surface.
   [[nodiscard]] Vec3 value(Vec3 in) const;
   /// Returns the probability density of `in` in `sample`.
   [[nodiscard]] float density(Vec3 in) const;
-  /// A weight of 0: no light arrives from there.
+  /// Samples a direction. The weight is 0 if no light arrives from there.
   [[nodiscard]] Scattered sample(Pair u, float choice) const;
 
  private:
@@ -67,7 +67,7 @@ class Scatter {
   Vec3 dielectric_gain_{0.0F};
   float alpha_ = 1.0F;
   float gloss_share_ = 0.0F;  // of samples
-  bool is_mirror_ = false;    // only `sample` finds gloss that is so sharp
+  bool is_mirror_ = false;    // only `sample` finds gloss this sharp
   bool is_medium_ = false;
   float anisotropy_ = 0.0F;
 };

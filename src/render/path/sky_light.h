@@ -42,11 +42,12 @@ class SkyLight {
   [[nodiscard]] SkySample sample_sky(Pair u) const;
   [[nodiscard]] float sky_density(Vec3 direction) const;
 
-  // For renderers that look up elsewhere.
+  // For renderers with their own lookup.
   [[nodiscard]] SkyModel model() const { return model_; }
   [[nodiscard]] Vec3 to_sun() const { return to_sun_; }
-  [[nodiscard]] float one_less_cos() const { return one_less_cos_; }  ///< of half the angle of its disc; 0: it has none
-  [[nodiscard]] float brightness() const { return brightness_; }      ///< times the sky's light
+  /// Returns 1 minus the cosine of the sun disc's half angle; 0: no disc.
+  [[nodiscard]] float one_less_cos() const { return one_less_cos_; }
+  [[nodiscard]] float brightness() const { return brightness_; }  ///< factor of the sky's light
   [[nodiscard]] Vec3 uniform() const { return uniform_; }
   [[nodiscard]] const SkyColours& gradient() const { return gradient_; }
   [[nodiscard]] SineCosine turn() const { return turn_; }
@@ -57,7 +58,7 @@ class SkyLight {
   SkyModel model_;
   Vec3 to_sun_{0.0F, 1.0F, 0.0F};
   Vec3 sunlight_{0.0F};        // irradiance of a surface that faces the sun
-  float one_less_cos_ = 0.0F;  // of the disc's half angle; 0: no disc
+  float one_less_cos_ = 0.0F;  // 1 minus the cosine of the disc's half angle; 0: no disc
   float brightness_ = 1.0F;
   Vec3 uniform_{1.0F};
   SkyColours gradient_;

@@ -10,7 +10,7 @@
 
 namespace quoin::path {
 
-/// Light of all directions that is looked up without any angle: the sphere as an octahedron, folded open to a square.
+/// Light from all directions, looked up without computing angles: the sphere as an octahedron, unfolded to a square.
 ///
 /// Source: T. Engelhardt, C. Dachsbacher, "Octahedron environment maps" (2008).
 class SkyMap {
@@ -42,7 +42,7 @@ class SkyMap {
   }
 
   static constexpr int kEdge = 256;  ///< steps between two corners of the square
-  /// [y][x] of the square's corners, kEdge + 1 a row.
+  /// [y][x] of the square's corners, kEdge + 1 per row.
   [[nodiscard]] std::span<const Vec3> pixels() const { return pixels_; }
 
  private:

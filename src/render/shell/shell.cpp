@@ -92,7 +92,7 @@ void ImpostorShell::copy_chunk(const OccupancyTree& tree, IVec3 chunk) {
     const IVec3 corner = first + IVec3{brick & 3, brick >> 2 & 3, brick >> 4} * kCellsABrick;
     for (int word = 0; word < 64; ++word) {
       const std::uint64_t bits = words[static_cast<std::size_t>(word)];
-      if (bits == 0) continue;  // and may lie outside the box
+      if (bits == 0) continue;  // may lie outside the box
       const IVec3 cell = corner + IVec3{word & 3, word >> 2 & 3, word >> 4};
       cells_[cell_of(cell * 4)] = bits;
     }

@@ -25,7 +25,7 @@ struct VoxelFace {
 /// side.
 [[nodiscard]] std::uint64_t exposed_bits(std::uint64_t own, std::uint64_t next, Direction direction);
 
-/// The faces between a tree's voxels and other cells, as bits over the box around these voxels.
+/// The faces between a tree's voxels and empty cells, as bits over the box around these voxels.
 ///
 /// Memory: one bit per voxel of the box and of its margin of four voxels.
 class ImpostorShell {
@@ -33,7 +33,7 @@ class ImpostorShell {
   /// Returns nullopt if the box with its margin has more than `max_voxels`, or if there are more than `max_faces`.
   static std::optional<ImpostorShell> build(const OccupancyTree& tree, std::int64_t max_voxels, std::int64_t max_faces);
 
-  /// In the order of `comes_before`.
+  /// Returns all faces in the order of `comes_before`.
   [[nodiscard]] std::vector<VoxelFace> faces() const;
   /// Requires: `voxel` is at most one voxel outside the box.
   [[nodiscard]] bool is_occupied(IVec3 voxel) const {
@@ -49,11 +49,11 @@ class ImpostorShell {
   }
   [[nodiscard]] static int bit_of(IVec3 local) { return (local.x & 3) + 4 * (local.y & 3) + 16 * (local.z & 3); }
   void copy_chunk(const OccupancyTree& tree, IVec3 chunk);
-  // The voxels of a cell that have a face in that direction.
+  // Returns the voxels of a cell that have a face in that direction.
   [[nodiscard]] std::uint64_t exposed(Direction direction, std::size_t cell) const;
   [[nodiscard]] std::int64_t count_faces() const;
 
-  IVec3 origin_{0};  // the voxel at the least corner, a multiple of 4
+  IVec3 origin_{0};  // the voxel at the lowest corner, a multiple of 4
   IVec3 size_{0};    // cells; one empty cell around everything
   std::vector<std::uint64_t> cells_;
 };

@@ -108,7 +108,7 @@ struct State {
   vec4 colour;  // w: 0 when the sample is done, otherwise 1 plus the number of bodies to light in this round
 };
 
-// Height above a surfel at which light rays start, as in render/impostor/raster/faces.h.
+// Height of light ray starts above a surfel, as in render/impostor/raster/faces.h.
 const float kSurfelLift = 0.5;
 
 const uint kSurface = 0;

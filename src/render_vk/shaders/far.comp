@@ -1,6 +1,6 @@
 #version 460
-// Draws the impostors of a tile, some rectangles per invocation: first the nearest depth at each pixel, then the number
-// of that rectangle. At equal depth the lower number wins. Numbers order by instance, then by part (level, coarser
+// Draws the impostors of a tile, some rectangles per invocation: first the nearest depth at each pixel, then that
+// rectangle's number. At equal depth the lower number wins. Numbers order by instance, then by part (level, coarser
 // level, unseen faces), then by rectangle.
 #include "compute.glsl"
 #include "hash.glsl"

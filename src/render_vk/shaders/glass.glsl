@@ -353,8 +353,8 @@ void add_bodies(GlassCell cell, bool is_mixed, Body next, float enter_t, float e
   }
 }
 
-// Finds the bodies of an instance's voxels, or of its field, along a ray whose walk has started. `voxels_a_t`: voxels
-// of the full grid per t.
+// Finds the bodies of an instance's voxels, or of its field, along a ray whose walk has started. `voxels_a_t`:
+// full-grid voxels per t.
 void find_bodies_in(int i, bool is_of_field, GridRay ray, float voxels_a_t, float max_t, float from_t,
                     inout BodyList list, inout vec3 passed) {
   float room = max_t - ray.t;

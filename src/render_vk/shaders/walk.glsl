@@ -35,7 +35,7 @@ bool ray_is_moved;
 ivec3 walk_low;  // the tree's bounds
 ivec3 walk_high;
 float walk_exit_t;
-// The walk's position: the voxel, the t at which the ray entered it, and the axis that it crossed; -1 at the start.
+// The walk's position: the voxel, t at the entry, and the axis that the ray crossed there; -1 at the start.
 ivec3 walk_voxel;
 float walk_t;
 int walk_axis;
@@ -290,7 +290,7 @@ float root_between(vec4 f, float low, float high) {
   return s;
 }
 
-// Returns the first s from 0 to 1 at which a cubic becomes negative; a negative number if it never does.
+// Returns the first s from 0 to 1 where a cubic becomes negative; a negative number if it never does.
 float first_negative(vec4 f) {
   if (f.x < 0.0) return 0.0;
   float b1 = f.x + f.y * (1.0 / 3.0);

@@ -17,12 +17,12 @@
 
 namespace quoin {
 
-/// The faces that an impostor is drawn from.
+/// The faces of an impostor.
 struct ImpostorFaces {
   [[nodiscard]] static const ImpostorFaces& of(const Impostor& impostor) { return *impostor.faces_; }
 
   static constexpr int kLevels = 6;          ///< the faces themselves, then cells of 2, 4, 8, 16, 32 voxels
-  static constexpr std::size_t kGroup = 16;  ///< faces that are projected at once
+  static constexpr std::size_t kGroup = 16;  ///< faces projected at once
   static constexpr std::size_t kSides = 12;  ///< the six directions of voxels' faces, then those of surfels
 
   /// Rectangles close together in space. Positions match those of Level. Fillers at the end allow kernels to read past
@@ -30,12 +30,12 @@ struct ImpostorFaces {
   struct Groups {
     std::array<std::vector<float>, 3> centre;
     std::array<std::vector<float>, 3> half;  ///< from the centre to the sides of the box around them
-    std::vector<std::uint32_t> views;        ///< that saw any of them
+    std::vector<std::uint32_t> views;        ///< views that saw any of them
   };
 
   /// The surface in a cube of 4^3 bits.
   struct Cell {
-    Vec3 corner{0.0F};                                 ///< the least one, voxels from the content's centre
+    Vec3 corner{0.0F};                                 ///< lowest corner, voxels from the content's centre
     std::uint64_t bits = 0;                            ///< bit x + 4 y + 16 z
     std::array<std::uint32_t, kImpostorViews> face{};  ///< index into `faces` of a face that the view saw in this cell
     bool operator==(const Cell&) const = default;
@@ -51,10 +51,10 @@ struct ImpostorFaces {
   struct Level {
     std::array<std::vector<float>, 3> centre;       ///< of the rectangle, voxels from the content's centre
     std::vector<std::uint32_t> views;               ///< bit i: view i saw it; coarser levels: all
-    std::vector<std::uint32_t> face;                ///< index into `faces`, or into `cells` where there are any
+    std::vector<std::uint32_t> face;                ///< index into `faces`, or into `cells` if there are any
     std::array<std::vector<float>, 2> reach;        ///< from the middle to the sides along kFaceFrames' u and v; empty:
                                                     ///< 0.5 everywhere
-    std::array<std::vector<float>, 2> slope;        ///< see Surfel; empty where there are no surfels
+    std::array<std::vector<float>, 2> slope;        ///< see Surfel; empty if there are no surfels
     std::array<std::uint32_t, kSides + 1> begin{};  ///< of each side; the end of the last
     Groups groups;                                  ///< of each kGroup rectangles
     std::vector<Cell> cells;
@@ -73,12 +73,12 @@ struct ImpostorFaces {
     VoxelType type = kAir;
     std::uint8_t occlusion = 0;  ///< of the four corners, two bits each
     Direction direction : 3 = Direction::PosX;
-    std::uint8_t open_rays : 4 = kRays;  ///< of so many occlusion rays from the face's middle
+    std::uint8_t open_rays : 4 = kRays;  ///< number of open occlusion rays from the face's middle
     bool in_field : 1 = false;           ///< a surfel: `direction` is the axis direction nearest to its normal
     static constexpr int kRays = 9;
   };
 
-  /// Rays of light start so high above a surfel, since it is flat and the surface is curved.
+  /// Height of light ray starts above a surfel, because it is flat and the surface is curved.
   static constexpr float kSurfelLift = 0.5F;
 
   /// A piece of a field's surface at its crossing with an edge of the sample lattice. It is part of the plane through
@@ -89,11 +89,11 @@ struct ImpostorFaces {
     Vec3 normal{0.0F};             ///< normal for lighting
     float offset = 0.0F;           ///< of its centre from the edge's lower end, along the direction's axis
     std::array<float, 2> shift{};  ///< the same along kFaceFrames' u and v
-    std::array<float, 2> half{};   ///< from the middle to the sides along these, at most 1: whole 1/1,024
+    std::array<float, 2> half{};   ///< from the middle to the sides along these, at most 1: multiples of 1/1,024
     /// Rise of the plane along the direction's axis per sample along the other two axes.
     std::array<float, 2> slope{};
 
-    /// Returns its middle. `lower_end`: of the lattice's edge that it lies on.
+    /// Returns its middle. `lower_end`: of its lattice edge.
     [[nodiscard]] DVec3 middle(DVec3 lower_end, Direction direction) const {
       const FaceFrame& frame = frame_of(direction);
       lower_end[frame.axis] += double{offset};
@@ -102,8 +102,8 @@ struct ImpostorFaces {
       return lower_end;
     }
 
-    /// Returns where rays of light start from a point of the impostor that is lit with this surfel: off the plane
-    /// through its middle, along its normal. Points of cells may lie below that plane. `lower_end`: of its edge.
+    /// Returns the start of light rays for a point lit with this surfel: above the plane through its middle, along its
+    /// normal. Points of cells may lie below that plane. `lower_end`: of its edge.
     [[nodiscard]] DVec3 start_of_light(const DVec3& point, const DVec3& lower_end, Direction direction) const {
       const double below = glm::dot(middle(lower_end, direction) - point, DVec3(normal));
       return point + (std::max(below, 0.0) + double{kSurfelLift}) * DVec3(normal);
@@ -114,7 +114,7 @@ struct ImpostorFaces {
 
   int edge = 0;           ///< texels per side of the snapshots
   int first_width = 0;    ///< log2 of the width in voxels of level 0's cells; 0: level 0 holds the faces themselves
-  bool is_whole = false;  ///< `faces` are all that the opaque voxels have, in the order of ImpostorShell::faces
+  bool is_whole = false;  ///< `faces` are all faces of the opaque voxels, in the order of ImpostorShell::faces
   DVec3 centre{0.0};      ///< of the content, in the grid
   std::array<Level, kLevels> levels;
   /// Faces in crevices that no snapshot shows but a camera may see: drawn after level 0, if no face of that level hides
@@ -133,8 +133,8 @@ struct ImpostorFaces {
   [[nodiscard]] std::size_t bytes() const;
 };
 
-/// 0 to 1 at a point of a face (in the grid): of voxels in OcclusionMode::Vertex and Smooth by its corners, else by
-/// rays from its middle.
+/// Returns the openness, 0 to 1, at a point of a face (in the grid): from its corners for voxels in
+/// OcclusionMode::Vertex and Smooth, otherwise from rays at its middle.
 [[nodiscard]] float openness_of(const ImpostorFaces::Face& face, OcclusionMode mode, DVec3 position);
 
 [[nodiscard]] inline FaceOcclusion unpacked_corners(std::uint8_t packed) {

@@ -15,7 +15,7 @@ Vector single(DVec3 v) {
 
 void set_aim(const Aim& aim, double x, double y, Job& job) {
   const DVec3 centre = aim.centre;
-  const double step = (aim.is_perspective ? centre.z : 1.0) / aim.focal;  // voxels a pixel, at the centre
+  const double step = (aim.is_perspective ? centre.z : 1.0) / aim.focal;  // voxels per pixel at the centre
   job.point.at = single(aim.right * (x * step - centre.x) + aim.down * (y * step - centre.y));
   job.point.x = single(aim.right * step), job.point.y = single(aim.down * step);
   const double turn = aim.is_perspective ? 1.0 / aim.focal : 0.0;

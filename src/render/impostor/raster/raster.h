@@ -12,7 +12,7 @@
 /// voxels, with one vector register of faces at a time.
 namespace quoin::raster {
 
-inline constexpr int kTile = 32;  ///< pixels a side
+inline constexpr int kTile = 32;  ///< pixels per side
 inline constexpr int kBlock = 4;
 inline constexpr std::size_t kPixels = std::size_t{kTile} * kTile;
 
@@ -31,7 +31,7 @@ struct LinearVector {
   Vector y{};
 };
 
-/// The pixels that show one of two levels: those with a Pattern number from `first` to before `end`.
+/// The pixels that show one of two levels: Pattern numbers from `first` up to, but not including, `end`.
 struct Share {
   std::int32_t first = 0;
   std::int32_t end = 1 << 24;
@@ -41,7 +41,7 @@ struct Share {
 /// Numbers of 24 bits for the pixels of an image. Each range of them is spread evenly over the image, and over the
 /// samples of each pixel.
 ///
-/// Source: the sequence R2, as `sample_point`.
+/// Source: the sequence R2, as in `sample_point`.
 struct Pattern {
   static constexpr std::uint32_t kColumn = 12'664'745;  ///< 0.7548776662 of 2^24
   static constexpr std::uint32_t kRow = 9'560'333;      ///< 0.5698402910
@@ -55,7 +55,7 @@ struct Pattern {
   }
 };
 
-/// The three views around a direction, and how often each is chosen, of 2^14.
+/// The three views around a direction, and their frequencies in units of 1/2^14.
 struct NearViews {
   std::array<std::uint8_t, 3> view{};
   std::array<std::uint16_t, 2> share{1 << 14, 0};  ///< of the first two
@@ -78,8 +78,8 @@ struct Job {
   // A pixel's ray: its point in the plane through the content's centre, and its direction.
   LinearVector point;
   LinearVector direction;
-  // Depths along the camera's forward axis, in world units: `depth_at` in that plane, and how it grows a length of
-  // `direction`, which is one along `forward`.
+  // Depths along the camera's forward axis, in world units: `depth_at` in that plane, and the increase per length of
+  // `direction`, whose component along `forward` is 1.
   Vector forward{};
   float depth_at = 0.0F;
   float depth_step = 1.0F;
@@ -93,14 +93,14 @@ struct Job {
   float ahead_at = 1.0F;
   float column_at = 0.0F;
   float row_at = 0.0F;
-  // Pixels in which it may show; `right` and `bottom` exclusive.
+  // Pixels where it may be visible; `right` and `bottom` exclusive.
   int left = 0;
   int top = 0;
   int right = kTile;
   int bottom = kTile;
 };
 
-/// A camera, as the grid of an impostor sees it.
+/// A camera in the space of an impostor's grid.
 struct Aim {
   // Its axes, unit, in the grid's frame.
   DVec3 right{1.0, 0.0, 0.0};
@@ -108,7 +108,7 @@ struct Aim {
   DVec3 forward{0.0, 0.0, -1.0};
   DVec3 centre{0.0};  ///< of the content, along these, in voxels
   bool is_perspective = true;
-  double focal = 1.0;       ///< pixels a voxel, in perspective at a distance of one
+  double focal = 1.0;       ///< pixels per voxel; in perspective at distance 1
   double voxel_size = 1.0;  ///< world units
 };
 
@@ -139,7 +139,7 @@ struct Canvas {
   alignas(64) std::array<std::int32_t, kPixels> id{};    ///< of the job
   alignas(64) std::array<std::int32_t, kPixels> face{};  ///< see Met
   std::array<float, kPixels / 16> furthest{};            ///< depth of each 4x4 pixels
-  std::array<std::int32_t, kPixels> pattern{};           ///< see Pattern; 0 where all parts are drawn whole
+  std::array<std::int32_t, kPixels> pattern{};           ///< see Pattern; 0 if all parts are drawn whole
 
   void clear();
   /// Sets the pattern of the tile from (`column`, `row`) of an image. Cost: 1 microsecond.

@@ -1,8 +1,8 @@
-// The kernel of raster.h for lanes of any width, each of which holds a face.
+// The kernel of raster.h for registers of any width; each lane holds a face.
 //
-//   Groups      boxes around 16 rectangles   | box 0 | box 1 | ...      find the tile's pixels where each may show
-//     Level       rectangles of one side       | 0 | 1 | ...              find the pixels where each may show
-//       pixels      one of each lane's rectangle, until the largest has none left
+//   Groups      boxes around 16 rectangles   | box 0 | box 1 | ...      find the tile's pixels that each may cover
+//     Level       rectangles of one side       | 0 | 1 | ...              find the pixels that each may cover
+//       pixels      one of each lane's rectangle, until the largest is done
 
 #pragma once
 
@@ -48,7 +48,7 @@ inline F linear(const LinearVector& vector, std::size_t axis, F x, F y) {
   return all(vector.at[axis]) + all(vector.x[axis]) * x + all(vector.y[axis]) * y;
 }
 
-// The pixels that boxes around `q` may show in: never fewer than they do.
+// Computes a conservative bound of the pixels that boxes around `q` cover.
 inline void project(const Job& job, const F (&q)[3], const F (&half)[3], Areas& areas) {
   const F ahead = dot(job.ahead, q) + all(job.ahead_at);
   const F inverse = all(1.0F) / ahead;
@@ -63,7 +63,7 @@ inline void project(const Job& job, const F (&q)[3], const F (&half)[3], Areas& 
     wide = wide + half[axis] * abs(all(job.across[axis]) - column * forward);
     high = high + half[axis] * abs(all(job.down[axis]) - row * forward);
   }
-  // Boxes that reach to the camera's plane may show anywhere.
+  // Boxes that reach the camera's plane may be visible anywhere.
   const F nearest = ahead - deep;
   const Mask is_before = all(0.01F) * ahead < nearest;
   const F scale = all(1.0F) / nearest;
@@ -88,10 +88,10 @@ inline float linear(const LinearVector& vector, std::size_t axis, float x, float
   return vector.at[axis] + vector.x[axis] * x + vector.y[axis] * y;
 }
 
-// Follows the ray of a pixel through the bits of a cell, from where it enters the cell's box at `along` through a side
-// across axis `side`. Returns the bit that it meets, with `along` there, or -1.
+// Follows the ray of a pixel through the bits of a cell. It enters the cell's box at `along` through a side across axis
+// `side`. Returns the bit hit, and sets `along` to it; -1 if none.
 inline int follow(const Job& job, const ImpostorFaces::Cell& cell, std::size_t side, float x, float y, float& along) {
-  constexpr float kPast = 1e-3F;  // bits: how far past the entered side, so that rounding does not matter
+  constexpr float kPast = 1e-3F;  // bits: distance past the entered side, so that rounding does not matter
   const float scale = 1.0F / job.level->step;
   float from[3];
   float steps[3];
@@ -137,7 +137,7 @@ inline void put(const Job& job, std::size_t side, float x, float y, float depth,
     depth = std::max(depth, job.depth_at + along * job.depth_step);
   }
   const std::int32_t met = Met{rectangle, view}.packed();
-  // Rectangles of one plane may overlap, and wide registers come to them in another order than narrow ones.
+  // Rectangles in one plane may overlap, and their order differs between register widths.
   const bool is_lower = job.id < canvas.id[pixel] || (job.id == canvas.id[pixel] && met < canvas.face[pixel]);
   if (!(depth < nearest) && !(depth == nearest && is_lower)) return;
   canvas.depth[pixel] = depth;
@@ -172,7 +172,7 @@ inline void meet(const Job& job, const Side& side, const F (&q)[3], const F (&re
   put_met(job, side, x, y, depth, met, first, canvas);
 }
 
-// The same of a surfel: a plane that rises by a slope along each side.
+// As `meet`, for surfels: planes with a slope along each side.
 inline void meet_inclined(const Job& job, const Side& side, const F (&q)[3], const F (&slope)[2], const F (&reach)[2],
                           F x, F y, Mask wanted, std::size_t first, Canvas& canvas) {
   const F direction_u = linear(job.direction, side.u, x, y);

@@ -1,4 +1,4 @@
-// The kernel of impostors for x86-64 processors with AVX-512 F, BW, DQ and VL; called only where all were found.
+// The kernel of impostors for x86-64 processors with AVX-512 F, BW, DQ and VL; called only if the CPU has all of them.
 
 #ifdef QUOIN_X86_KERNELS
 

@@ -21,7 +21,7 @@ inline constexpr float kMaxPackedLight = 65'408.0F;
 [[nodiscard]] inline std::uint32_t pack_light(Vec3 light) {
   constexpr int kBias = 15;
   constexpr int kBits = 9;
-  // Not a number becomes 0: it is the second of two that cannot be compared.
+  // NaN becomes 0: std::max returns its first argument if the comparison fails.
   const auto bounded = [](float x) { return std::min(std::max(0.0F, x), kMaxPackedLight); };
   const Vec3 kept(bounded(light.x), bounded(light.y), bounded(light.z));
   const float most = std::max({kept.x, kept.y, kept.z});

@@ -17,7 +17,7 @@ namespace {
 using path::pack_light;
 using path::unpack_light;
 
-constexpr int kReach = 2;  // pixels around each that its share is found from
+constexpr int kReach = 2;  // radius in pixels of the area that determines a pixel's share
 
 std::size_t index_of(int x, int y, int width) {
   return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
@@ -42,7 +42,7 @@ Between between(int at, int size, int of_size) {
   return {bounded(low), bounded(low + 1), static_cast<float>(place - low)};
 }
 
-/// The values of a smaller image at the pixels of one row of a larger one.
+/// The values of a smaller image at one row of pixels of a larger image.
 template <typename At>
 auto value_at(const Between& x, const Between& y, int width, const At& at) {
   if (x.low == x.high && y.low == y.high) return at(index_of(x.low, y.low, width));
@@ -54,7 +54,7 @@ auto value_at(const Between& x, const Between& y, int width, const At& at) {
 
 enum class Along : std::uint8_t { Rows, Columns };
 
-/// Sums over the pixels within `kReach` of each, along one axis.
+/// Returns, for each pixel, the sum over the pixels within `kReach` along one axis.
 std::vector<float> sums_along(Along axis, const std::vector<float>& values, int width, int height, Threads threads) {
   const bool is_row = axis == Along::Rows;
   const int last = (is_row ? width : height) - 1;
@@ -72,7 +72,7 @@ std::vector<float> sums_along(Along axis, const std::vector<float>& values, int 
   return sums;
 }
 
-/// The same along both.
+/// Returns, for each pixel, the sum over the pixels within `kReach` along both axes.
 std::vector<float> sums_around(const std::vector<float>& values, int width, int height, Threads threads) {
   return sums_along(Along::Columns, sums_along(Along::Rows, values, width, height, threads), width, height, threads);
 }
@@ -111,7 +111,7 @@ void PathHistory::clear() {
 }
 
 void PathHistory::note_edit() {
-  // Images of earlier scenes are finer than all later ones: see `refine`.
+  // Images of earlier scenes are finer than all later images: see `refine`.
   if (earlier_.empty()) earlier_ = std::move(now_);
   now_.clear();
 }
@@ -143,7 +143,7 @@ void PathHistory::refine(PathPicture& picture, int samples, Threads threads) {
   combine(*before, best, shares(now_.back(), *before, best, threads), threads, picture);
 }
 
-// For two images of equal noise around the same light that have a share of samples in common, the mean square of their
+// If two images of the same light with equal noise have a share of samples in common, the mean square of their
 // difference is 2 * (1 - share) times the noise variance.
 std::vector<float> PathHistory::shares(const Taken& now, const Taken& before, const Taken& best, Threads threads) {
   std::vector<float> change(now.light.size());
@@ -173,7 +173,7 @@ void PathHistory::combine(const Taken& before, const Taken& best, const std::vec
                           PathPicture& picture) {
   const int of_width = picture.width;
   const int of_height = picture.height;
-  // An image of the same size is changed in place: each pixel is read before it is written, and by no other pixel.
+  // An image of the same size is changed in place: a pixel is read only for itself, before it is written.
   PathPicture smaller;
   const bool is_as_large = of_width == best.width && of_height == best.height;
   if (!is_as_large) {

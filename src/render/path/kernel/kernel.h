@@ -21,7 +21,7 @@ struct LampMeasures {
   float middle[3] = {0.0F, 0.0F, 0.0F};
   float power = 0.0F;
   float half[3] = {0.0F, 0.0F, 0.0F};  ///< of its box's size
-  float squared = 1e-12F;              ///< of that half's length, at least a little
+  float squared = 1e-12F;              ///< squared length of `half`, at least 1e-12
   /// One-sided lamps have an axis; `beyond` is the extent of the box along it. Otherwise 0 and infinity.
   float axis[3] = {0.0F, 0.0F, 0.0F};
   float beyond = 0.0F;
@@ -31,16 +31,16 @@ struct LampMeasures {
 struct alignas(64) LampBranch {
   LampMeasures first;
   LampMeasures second;
-  std::int32_t next[2] = {-1, -1};  ///< of each an inner node, or ~lamp
-  std::int32_t top[2] = {0, 0};     ///< of each its place in a table of shares; 0: it has none
+  std::int32_t next[2] = {-1, -1};  ///< for each, an inner node or ~lamp
+  std::int32_t top[2] = {0, 0};     ///< for each, its index in a table of shares; 0: none
 };
 
-/// Points that each ask a tree for a lamp.
+/// Points that each choose a lamp from a tree.
 struct alignas(64) LampBlock {
   BlockLanes<float> point[3] = {};   ///< from the tree's origin
   BlockLanes<float> normal[3] = {};  ///< unit; 0 in the air
   BlockLanes<float> u = {};
-  BlockLanes<std::int32_t> table = {};  ///< where in `shares` its table begins
+  BlockLanes<std::int32_t> table = {};  ///< start of its table in `shares`
   std::uint32_t active = 0;
   BlockLanes<std::int32_t> lamp = {};  ///< -1: none
   BlockLanes<float> probability = {};
@@ -48,25 +48,25 @@ struct alignas(64) LampBlock {
 
 /// Points where paths are scattered.
 struct alignas(64) ShadeBlock {
-  // Asked.
+  // Input.
   BlockLanes<std::uint32_t> pixel = {};  ///< Random's
   BlockLanes<std::uint32_t> sample = {};
   BlockLanes<std::uint32_t> dimension = {};  ///< of the vertex
-  BlockLanes<float> direction[3] = {};       ///< unit, of the path that comes
+  BlockLanes<float> direction[3] = {};       ///< unit, of the incoming path
   BlockLanes<float> colour[3] = {};          ///< of matte surfaces
   BlockLanes<float> throughput[3] = {};
   std::uint32_t in_air = 0;  ///< points without a normal
 
-  /// Asked, and turned a little where it looks away from the path.
+  /// Input and output: turned slightly if it points away from the path.
   BlockLanes<float> normal[3] = {};
 
-  // Answered.
-  BlockLanes<float> sun[3] = {};        ///< a direction, unit
-  BlockLanes<float> sun_light[3] = {};  ///< that matte surfaces scatter of it
-  BlockLanes<float> pair[2] = {};       ///< for the direction that follows
+  // Output.
+  BlockLanes<float> sun[3] = {};        ///< direction to a point of the sun, unit
+  BlockLanes<float> sun_light[3] = {};  ///< its light that matte surfaces scatter
+  BlockLanes<float> pair[2] = {};       ///< random numbers for the next direction
   BlockLanes<float> lamp_pair[2] = {};
-  BlockLanes<float> next[3] = {};       ///< the direction in which matte surfaces scatter the path, unit
-  BlockLanes<float> next_density = {};  ///< of it, by solid angle; 0: the path ends
+  BlockLanes<float> next[3] = {};       ///< scattered direction at matte surfaces, unit
+  BlockLanes<float> next_density = {};  ///< density of `next`, by solid angle; 0: the path ends
   BlockLanes<std::int32_t> next_bin = {};
 
   LampBlock lamps;  ///< `u` and `normal` are set
@@ -80,8 +80,8 @@ struct ShadeLight {
   std::uint32_t lamp_numbers = 0;  ///< bits of `pixel` flipped in the random numbers that choose lamps
   bool has_sun = false;
   float to_sun[3] = {0.0F, 1.0F, 0.0F};
-  float sun_frame[3][3] = {};  ///< whose third axis that is
-  float one_less_cos = 0.0F;   ///< of half the angle of the sun's disc; 0: it has none
+  float sun_frame[3][3] = {};  ///< frame with the sun's direction as its third axis
+  float one_less_cos = 0.0F;   ///< 1 minus the cosine of the sun disc's half angle; 0: no disc
   float sun_radiance[3] = {};  ///< without a disc: irradiance
   float sun_density = 0.0F;
 };
@@ -98,8 +98,8 @@ constexpr std::uint32_t kRoulette = 6;
 constexpr std::uint32_t kGlass = 7;
 }  // namespace dimension
 
-/// Rays of one bin point about the same way: by the largest component, and the other two in four steps each. The first
-/// is the sun's.
+/// Rays of a bin have similar directions: bins are by the largest component, and four steps of the other two. The first
+/// bin is the sun's.
 constexpr std::uint32_t kBins = 1 + 6 * 16;
 
 struct Kernel {

@@ -1,4 +1,4 @@
-// The kernel of kernel.h for lanes of any width.
+// The kernel of kernel.h for registers of any width.
 //
 //   ShadeBlock   | point 0 | point 1 | ... | point 15 |     a register's width of them at a time
 //     numbers -> sun, lamp, next direction
@@ -33,7 +33,7 @@ inline Measures measures_at(const float* from, const std::int32_t (&at)[kWidth])
   return m;
 }
 
-// As LightTree's importance.
+// As LightTree::importance.
 inline F importance_lanes(const Measures& of, const Vector& point, const Vector& normal, const Vector& normal_size,
                           Mask in_air) {
   const F none = all(0.0F);

@@ -11,14 +11,14 @@
 
 namespace quoin::path {
 
-/// The share of lamp light that reaches a place, as learned by the paths that passed it: a light tree ignores walls.
-/// The shares correct the upper levels of the tree, so that fewer shadow rays end at walls.
+/// The share of lamp light that reaches a place, learned from earlier paths. A light tree ignores walls; the shares
+/// correct its upper levels, so that fewer shadow rays end at walls.
 ///
 ///   place      one side of 8^3 voxels
 ///     table    [node of LightTree::kTopLevels]: its share, 1 if unknown
 ///
-/// Notes take effect at the next `learn`; until then shares are constant, so that a path may query the probability of a
-/// lamp that it hits. Estimates are unbiased for all shares, which are never 0.
+/// Notes take effect at the next `learn`. Until then shares are constant, so a path can query the probability of a hit
+/// lamp. Estimates are unbiased for all shares, which are never 0.
 class LampMemory {
  public:
   LampMemory();
@@ -26,13 +26,13 @@ class LampMemory {
   /// Returns the number of a place; 0 for places beyond the limit, which are not remembered. `of`: identifies the
   /// voxels' owner.
   [[nodiscard]] std::int32_t place_of(std::int32_t of, IVec3 voxel, Direction side);
-  /// [place][node]: `LightTree::kTopNodes` a place.
+  /// [place][node]: `LightTree::kTopNodes` per place.
   [[nodiscard]] const float* tables() const { return tables_.data(); }
   [[nodiscard]] const float* table(std::int32_t place) const {
     return tables_.data() + static_cast<std::size_t>(place) * LightTree::kTopNodes;
   }
 
-  /// Records a lamp sample: its light divided by its probability, and whether a wall blocked it.
+  /// Records a lamp sample: its light divided by its probability, and if a wall blocked it.
   void note(const LightTree& tree, std::int32_t place, std::int32_t lamp, float light, bool is_blocked);
   /// Applies the notes. Requires: later lamp choices use random numbers independent of all earlier ones. Later points
   /// in a low-discrepancy sequence are not independent: they fill the gaps between the earlier points.
@@ -55,7 +55,7 @@ class LampMemory {
 
   std::vector<Place> places_;
   std::vector<float> tables_;
-  std::vector<Light> lights_;        // as the tables
+  std::vector<Light> lights_;        // indexed like the tables
   std::vector<std::int32_t> slots_;  // of places by hash; a power of two; 0: free
 };
 

@@ -17,7 +17,7 @@ namespace quoin::path {
 namespace {
 
 constexpr int kBuckets = 12;
-constexpr int kDeepestSplit = 44;  // from there on halves: no way is longer than 64
+constexpr int kDeepestSplit = 44;  // deeper nodes split in halves, so that no path is longer than 64
 
 float sine_of(float cosine) {
   return std::sqrt(std::max(0.0F, 1.0F - cosine * cosine));
@@ -28,7 +28,7 @@ struct Cone {
   float cosine;
 };
 
-// The smallest cone around two.
+// Returns the smallest cone around two cones.
 Cone unite(const Cone& a, const Cone& b) {
   constexpr Cone kAll{{0.0F, 0.0F, 1.0F}, -1.0F};
   const double of_a = arc_cosine(a.cosine);
@@ -54,12 +54,13 @@ LampBounds unite(const LampBounds& a, const LampBounds& b) {
           std::min(a.cos_edge, b.cos_edge), a.power + b.power};
 }
 
-// How much light such a node may send to a point anywhere: its power, its size and how far it shines about itself.
+// Returns the cost of a node, an estimate of the light that it may send to any point: from its power, its size and the
+// spread of its directions.
 float cost_of(const LampBounds& bounds, float longest, float along) {
   const auto spread = static_cast<float>(arc_cosine(bounds.cos_spread));
   const float to_edge = std::min(spread + static_cast<float>(arc_cosine(bounds.cos_edge)), kPi);
   const float sine = sine_of(bounds.cos_spread);
-  const float turns = (2.0F * to_edge - spread) / (2.0F * kPi);  // its cosine and sine, wherever it lies
+  const float turns = (2.0F * to_edge - spread) / (2.0F * kPi);  // angle in turns, of any value
   const SineCosine end = of_turns(turns - std::floor(turns));
   const float measure = 2.0F * kPi * (1.0F - bounds.cos_spread) +
                         kPi / 2.0F * (2.0F * to_edge * sine - end.cosine - 2.0F * spread * sine + bounds.cos_spread);
@@ -218,7 +219,9 @@ float LightTree::importance(const LampMeasures& of, Vec3 point, Vec3 normal) {
   const auto vec = [](const float(&v)[3]) { return Vec3(v[0], v[1], v[2]); };
   const Vec3 way = vec(of.middle) - point;
   const float distance2 = std::max(glm::dot(way, way), of.squared);
-  // How far the box reaches before the surface, and the point before the lamps; at least a little of their distance.
+  // The extent of the box in front of the surface, and the point's distance in front of the lamps; both at least a
+  // small
+  // part of their distance.
   const float distance = std::sqrt(distance2);
   const float before =
       is_black(glm::abs(normal)) ? distance : glm::dot(way, normal) + glm::dot(vec(of.half), glm::abs(normal));

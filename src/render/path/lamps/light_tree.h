@@ -17,11 +17,11 @@ struct LampBounds {
   Vec3 axis{0.0F, 0.0F, 1.0F};  ///< emission axis, unit
   float cos_spread = 1.0F;      ///< cosine of the largest angle between the axis and the lamp's normals; -1: all
                                 ///< directions
-  float cos_edge = 0.0F;        ///< of the angle between a normal and where light ends; -1: nowhere
+  float cos_edge = 0.0F;        ///< cosine of the angle between a normal and the edge of its light; -1: no edge
   float power = 0.0F;           ///< positive
 };
 
-/// Finds a lamp for a point at random: the more light it may send there, the likelier.
+/// Chooses a random lamp for a point, in proportion to an estimate of its light there.
 ///
 /// Source: A. Conty Estevez, C. Kulla, "Importance sampling of many lights with adaptive tree splitting" (2018), with
 ///         bounds that cost a square root instead of the six of M. Pharr et al., "Physically based rendering" (4th
@@ -41,7 +41,7 @@ class LightTree {
   /// Nodes of the upper levels are numbered: the root is 0, the children of node i are 2 i + 1 and 2 i + 2.
   static constexpr int kTopLevels = 6;
   static constexpr std::size_t kTopNodes = (std::size_t{1} << (kTopLevels + 1)) - 1;
-  /// Shares of 1 of all of these.
+  /// Returns shares of 1 for all upper nodes.
   [[nodiscard]] static const float* whole_shares();
 
   /// `shares`: the learned shares of the upper nodes. Requires: 0 <= u < 1; `normal` is unit. Cost: O(log(lamps)).
@@ -50,7 +50,7 @@ class LightTree {
   [[nodiscard]] float probability(std::uint32_t lamp, Vec3 point, Vec3 normal,
                                   const float* shares = whole_shares()) const;
 
-  /// Calls `visit(number)` for the upper nodes that a lamp is below of, and itself.
+  /// Calls `visit(number)` for the upper nodes above a lamp, and for the lamp's own node.
   template <class Visit>
   void for_each_top_node(std::uint32_t lamp, Visit&& visit) const {
     std::uint64_t way = ways_[lamp];
@@ -67,14 +67,14 @@ class LightTree {
 
   struct Node {
     LampBounds bounds;
-    std::int32_t second = -1;  ///< of an inner node: the first child comes right after it
+    std::int32_t second = -1;  ///< of an inner node: the second child; the first child follows directly
     std::int32_t lamp = -1;    ///< of a leaf
   };
-  // For kernels, which choose for many points at once as `choose` does; null of a tree without lamps.
+  // For kernels, which implement `choose` for many points at once; null for a tree without lamps.
   [[nodiscard]] const LampBranch* branches() const { return branches_.empty() ? nullptr : branches_.data(); }
-  // For renderers that choose elsewhere.
+  // For renderers with their own choice.
   [[nodiscard]] std::span<const Node> nodes() const { return nodes_; }
-  /// [lamp]: a bit a level from the root, 1: the second child.
+  /// [lamp]: one bit per level from the root, 1: the second child.
   [[nodiscard]] std::span<const std::uint64_t> ways() const { return ways_; }
 
  private:
@@ -84,7 +84,7 @@ class LightTree {
   void set_branches();
 
   std::vector<Node> nodes_;
-  std::vector<LampBranch> branches_;  // the inner nodes, in their order; of a lone lamp one whose second has no power
+  std::vector<LampBranch> branches_;  // the inner nodes; a single lamp has one, whose second child has no power
   std::vector<std::uint64_t> ways_;   // [lamp]: one bit per level, 1: the second child
 };
 

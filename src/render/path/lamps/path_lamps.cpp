@@ -17,10 +17,11 @@ namespace {
 
 constexpr double kPiDouble = std::numbers::pi;
 
-// Where a lamp is so small from a point that all of it is as far away: its area is sampled instead of its solid angle.
+// A lamp that looks smaller than this from a point is sampled by area instead of solid angle, because its distance
+// hardly varies.
 constexpr float kSmallLamp = 0.01F;
 
-// The rectangle as it is seen from a point, which lies before it. Source: C. Ureña, M. Fajardo, A. King, "An
+// A rectangle as seen from a point in front of it. Source: C. Ureña, M. Fajardo, A. King, "An
 // area-preserving parametrization for spherical rectangles" (2013).
 class SphericalRectangle {
  public:
@@ -45,7 +46,7 @@ class SphericalRectangle {
 
   [[nodiscard]] double solid_angle() const { return solid_angle_; }
 
-  // From the point, along the lamp's u, v and normal.
+  // Returns a point of the rectangle relative to the viewer, along the lamp's u, v and normal.
   [[nodiscard]] DVec3 sample(Pair u) const {
     const double angle = u.x * solid_angle_ + turn_;
     double turns = angle / (2.0 * kPiDouble);
@@ -87,13 +88,13 @@ Seen seen_from(const PathLamp& lamp, DVec3 point) {
   return seen;
 }
 
-// By solid angle, of a lamp that is seen under it.
+// Returns the density of a rectangle sampled by solid angle.
 float density_of(const SphericalRectangle& seen) {
   const double angle = seen.solid_angle();
   return angle > 0.0 ? static_cast<float>(1.0 / angle) : 0.0F;
 }
 
-// Of a small one.
+// Returns the density of a small lamp, sampled by area.
 float density_of(const PathLamp& lamp, Vec3 direction, float distance) {
   const float cosine = -glm::dot(direction, lamp.normal);
   return cosine > 0.0F ? distance * distance / (cosine * lamp.size_u * lamp.size_v) : 0.0F;

@@ -20,9 +20,9 @@
 
 namespace quoin::path {
 
-/// A merged face that shines with the same radiance into all directions before it, or a lamp without a body.
+/// A merged face that emits the same radiance in all directions in front of it, or a lamp without a body.
 struct PathLamp {
-  DVec3 corner{0.0};  ///< in the world; where a lamp without a body is
+  DVec3 corner{0.0};  ///< in the world; the position of a lamp without a body
   Vec3 u{0.0F};       ///< along its sides, unit; they and the normal are perpendicular
   Vec3 v{0.0F};
   Vec3 normal{0.0F, 1.0F, 0.0F};  ///< a spot's direction
@@ -30,9 +30,9 @@ struct PathLamp {
   float size_v = 0.0F;
   Vec3 radiance{0.0F};  ///< without a body: intensity
   bool is_point = false;
-  float cos_inner = -2.0F;  ///< of a spot, as PlacedLamp
+  float cos_inner = -2.0F;  ///< of a spot, as in PlacedLamp
   float cos_outer = -3.0F;
-  float reach = 0.0F;  ///< of one without a body
+  float reach = 0.0F;  ///< of a lamp without a body
 };
 
 /// Light from a lamp towards a point.
@@ -40,7 +40,7 @@ struct LampSample {
   Vec3 direction{0.0F};  ///< to the lamp, unit, in the world
   float distance = 0.0F;
   Vec3 radiance{0.0F};   ///< divided by the density; 0: none
-  float density = 0.0F;  ///< by solid angle; infinite of a lamp without a body
+  float density = 0.0F;  ///< by solid angle; infinite for a lamp without a body
 };
 
 /// All lamps of a scene, for points anywhere.
@@ -51,15 +51,15 @@ class PathLamps {
 
   [[nodiscard]] bool empty() const { return lamps_.empty(); }
   [[nodiscard]] std::size_t size() const { return lamps_.size(); }
-  /// The tree that lamps are chosen from; its points are relative to `origin`.
+  /// The tree for choosing lamps; its points are relative to `origin`.
   [[nodiscard]] const LightTree& tree() const { return tree_; }
   [[nodiscard]] DVec3 origin() const { return origin_; }  ///< in the world
-  /// A point of a lamp that was chosen, as it is seen from `point`, in the world.
+  /// Samples a point of a chosen lamp as seen from `point`, in the world.
   [[nodiscard]] LampSample sample(LightTree::Choice chosen, DVec3 point, Pair u) const;
   /// Returns the density of `sample` for the point of a chosen lamp in `direction` at `distance`.
   [[nodiscard]] float density(std::int32_t lamp, DVec3 point, Vec3 direction, float distance) const;
 
-  /// Notes that a unit face of a placed grid's voxel is part of a lamp.
+  /// Records that a unit face of a placed grid's voxel is part of a lamp.
   void add_face(std::int32_t placed, IVec3 voxel, Direction face, std::int32_t lamp);
   /// Returns the index of the lamp that contains the face; -1 if none does.
   [[nodiscard]] std::int32_t lamp_of(std::int32_t placed, IVec3 voxel, Direction face) const;
@@ -72,9 +72,9 @@ class PathLamps {
 
     [[nodiscard]] friend bool operator==(const Face&, const Face&) = default;
   };
-  // For renderers that sample elsewhere.
+  // For renderers with their own sampling.
   [[nodiscard]] std::span<const PathLamp> lamps() const { return lamps_; }
-  /// By their hash, as `lamp_of` looks them up; a power of two, or none.
+  /// The hash table of `lamp_of`; a power of two of slots, or empty.
   [[nodiscard]] std::span<const Face> faces() const { return faces_; }
 
  private:
@@ -84,11 +84,11 @@ class PathLamps {
   DVec3 origin_;
   std::vector<PathLamp> lamps_;
   LightTree tree_;
-  std::vector<Face> faces_;  // by their hash; a power of two
+  std::vector<Face> faces_;  // hash table; a power of two of slots
   std::size_t face_count_ = 0;
 };
 
-/// Keeps the faces of a scene's grids that emit light while it is edited.
+/// Keeps the emissive faces of a scene's grids up to date across edits.
 class PathLampCache {
  public:
   /// Returns the lamps of the placed instances. `surfaces`: of the scene's types. `brightness`: factor of the lamps'

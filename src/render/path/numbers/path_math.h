@@ -44,7 +44,7 @@ struct SineCosine {
   }
 }
 
-/// The angle of (x, y) in radians, -pi to pi; 0 of (0, 0). Error: 1e-7.
+/// Returns the angle of (x, y) in radians, -pi to pi; 0 for (0, 0). Error: 1e-7.
 ///
 /// Source: the series of the arc tangent after one halving of the angle.
 [[nodiscard]] inline double arc_tangent(double y, double x) {
@@ -62,13 +62,13 @@ struct SineCosine {
   return y < 0.0 ? -angle : angle;
 }
 
-/// In radians, 0 to pi. Numbers beyond -1 and 1 count as these. Error: 1e-7.
+/// Returns the arc cosine in radians, 0 to pi. Arguments are clamped to -1 to 1. Error: 1e-7.
 [[nodiscard]] inline double arc_cosine(double x) {
   const double c = std::clamp(x, -1.0, 1.0);
   return arc_tangent(std::sqrt((1.0 - c) * (1.0 + c)), c);
 }
 
-/// 2^x; 0 far below, the largest float far above. Relative error: 2e-7.
+/// Returns 2^x; 0 on underflow, the largest float on overflow. Relative error: 2e-7.
 [[nodiscard]] inline float power_of_two(float x) {
   if (!(x > -126.0F)) return 0.0F;
   if (x >= 128.0F) return std::numeric_limits<float>::max();
@@ -99,7 +99,7 @@ struct SineCosine {
   return static_cast<float>(exponent) + natural * std::numbers::log2e_v<float>;
 }
 
-/// x^y of x >= 0.
+/// Returns x^y. Requires: x >= 0.
 [[nodiscard]] inline float power(float x, float y) {
   return x > 0.0F ? power_of_two(log_of_two(x) * y) : 0.0F;
 }
@@ -146,8 +146,8 @@ struct Pair {
   float y = 0.0F;
 };
 
-/// A point of the unit disc, of equal density. Source: P. Shirley, K. Chiu, "A low distortion map between disk and
-/// square" (1997).
+/// Maps a pair to a point of the unit disc with uniform density. Source: P. Shirley, K. Chiu, "A low distortion map
+/// between disk and square" (1997).
 [[nodiscard]] inline Pair on_disc(Pair u) {
   const float a = 2.0F * u.x - 1.0F;
   const float b = 2.0F * u.y - 1.0F;
@@ -160,7 +160,7 @@ struct Pair {
   return {radius * angle.cosine, radius * angle.sine};
 }
 
-/// A direction about +z with a density of cosine / pi.
+/// Returns a direction about +z with density cosine / pi.
 [[nodiscard]] inline Vec3 cosine_weighted(Pair u) {
   const Pair disc = on_disc(u);
   return {disc.x, disc.y, std::sqrt(std::max(0.0F, 1.0F - disc.x * disc.x - disc.y * disc.y))};

@@ -8,7 +8,7 @@
 
 namespace quoin::path {
 
-/// The bits in reverse order.
+/// Returns the bits in reverse order.
 [[nodiscard]] constexpr std::uint32_t reversed(std::uint32_t x) {
   x = (x >> 1 & 0x5555'5555U) | (x & 0x5555'5555U) << 1;
   x = (x >> 2 & 0x3333'3333U) | (x & 0x3333'3333U) << 2;
@@ -45,13 +45,13 @@ namespace quoin::path {
   return static_cast<float>(bits >> 8) * 0x1p-24F;
 }
 
-/// The numbers of one path: a function of pixel, sample and dimension alone.
+/// The random numbers of one path: a function of pixel, sample and dimension only.
 ///
-/// Each pair of dimensions is a scrambled (0, 2)-sequence over the samples of a pixel, in an order of its own.
+/// Each pair of dimensions is a scrambled (0, 2)-sequence over the samples of a pixel, in its own order.
 class Random {
  public:
   Random() = default;
-  /// `pixel`: a hash of its place. `sample`: counts up from 0.
+  /// `pixel`: a hash of its position. `sample`: counts up from 0.
   Random(std::uint32_t pixel, std::uint32_t sample) : pixel_(pixel), sample_(sample) {}
 
   [[nodiscard]] std::uint32_t pixel() const { return pixel_; }

@@ -92,8 +92,8 @@ void scatter_in(Body body, float u, inout Glass glass) {
   glass.outcome = kInAir;
 }
 
-// Passes straight through a body: light between surfaces, and all paths in clouds. Stops at random, by the opaque share
-// of the glass.
+// Passes straight through a body: light between surfaces, and all paths in clouds. The glass's opaque share stops the
+// path at random.
 void pass_through(Body body, inout float u, inout Glass glass) {
   Surface surface = surface_of(body.what.x);
   bool is_cloud = surface.scattering > 0.0;

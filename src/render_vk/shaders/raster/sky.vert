@@ -2,9 +2,9 @@
 // One triangle over the whole image, behind everything.
 #include "mesh.glsl"
 
-layout(location = 0) flat out vec4 zenith;  // w: height at which the ground begins
+layout(location = 0) flat out vec4 zenith;  // w: height where the ground begins
 layout(location = 1) flat out vec4 horizon;
-layout(location = 2) flat out vec4 ground;  // w: height at which it is fully visible
+layout(location = 2) flat out vec4 ground;  // w: height where it is fully visible
 
 void main() {
   Frame f = frame();
