@@ -5,7 +5,7 @@
 namespace quoin::vulkan {
 namespace {
 
-// Stays loaded until the program ends: drivers do not like to be unloaded.
+// The loader stays loaded until the program ends: some drivers fail when they are unloaded.
 PFN_vkGetInstanceProcAddr find_loader() {
   for (const char* name : {"libvulkan.so.1", "libvulkan.so"}) {
     void* library = dlopen(name, RTLD_NOW | RTLD_LOCAL);

@@ -7,7 +7,7 @@
 
 namespace quoin::vulkan {
 
-// Vulkan is not linked but looked up at run time, so that a program starts where there is none.
+// Vulkan is not linked but looked up at run time, so that a program also starts without it.
 #define QUOIN_VULKAN_OF_LOADER(X)           \
   X(vkCreateInstance)                       \
   X(vkEnumerateInstanceExtensionProperties) \
@@ -83,7 +83,7 @@ namespace quoin::vulkan {
   X(vkResetFences)                 \
   X(vkWaitForFences)
 
-/// One of Vulkan's many structures that begin by saying which they are.
+/// Returns an empty Vulkan structure with its sType set.
 template <class T>
 [[nodiscard]] T info_of(VkStructureType type) {
   T info{};
@@ -91,7 +91,7 @@ template <class T>
   return info;
 }
 
-/// Vulkan's functions, as far as they are looked up.
+/// The Vulkan functions in use.
 struct Api {
   // NOLINTBEGIN(readability-identifier-naming): Vulkan's own names
   PFN_vkGetInstanceProcAddr vkGetInstanceProcAddr = nullptr;
@@ -106,7 +106,7 @@ struct Api {
   [[nodiscard]] static Result<Api> load();
   /// Finds the functions for an instance made by the caller, through `entry` unless null. Errors: as `load`.
   [[nodiscard]] static Result<Api> find(PFN_vkGetInstanceProcAddr entry);
-  /// Return the first function that is not there; null: none.
+  /// Return the name of the first missing function; null if all are there.
   [[nodiscard]] const char* load_instance(VkInstance instance);
   [[nodiscard]] const char* load_device(VkDevice device);
 };

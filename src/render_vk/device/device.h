@@ -13,9 +13,9 @@ namespace quoin::vulkan {
 /// A device, its one queue, and one batch of commands at a time.
 class Device {
  public:
-  /// A device of its own. Errors: Unsupported, LimitExceeded.
+  /// Creates a device. Errors: Unsupported, LimitExceeded.
   [[nodiscard]] static Result<std::unique_ptr<Device>> create(const VulkanOptions& options);
-  /// Another's device, which is not destroyed. Errors: as VulkanRenderer::create.
+  /// Uses the caller's device, which is not destroyed. Errors: as VulkanRenderer::create.
   [[nodiscard]] static Result<std::unique_ptr<Device>> borrow(const BorrowedVulkanDevice& lent);
   ~Device();
   Device(const Device&) = delete;
@@ -30,7 +30,7 @@ class Device {
 
   /// Converts a failed call to an error. `doing`: as in "drawing".
   [[nodiscard]] Error error_of(VkResult result, const std::string& doing) const;
-  /// Nothing on success.
+  /// Converts a call's result to a status.
   [[nodiscard]] Status check(VkResult result, const std::string& doing) const {
     if (result == VK_SUCCESS) return {};
     return error_of(result, doing);
@@ -51,7 +51,7 @@ class Device {
   VkResult make_commands();
   VkResult submit(const VkSubmitInfo& info);
 
-  std::unique_ptr<VulkanInstance> instance_;  // null: the device is another's
+  std::unique_ptr<VulkanInstance> instance_;  // null: the device is borrowed
   std::function<void(const std::function<void()>&)> with_queue_;
   Api api_;
   PhysicalDevice physical_;
@@ -63,14 +63,14 @@ class Device {
   VkFence fence_ = VK_NULL_HANDLE;
 };
 
-/// A shader, to be destroyed once pipelines were made of it.
+/// Creates a shader, to be destroyed after its pipelines are created.
 [[nodiscard]] VkResult make_shader(const Device& device, std::span<const std::uint32_t> code, VkShaderModule& shader);
 /// A specialization constant of a compute shader.
 struct ShaderConstant {
   std::uint32_t number = 0;
   bool value = false;
 };
-/// A pipeline of one shader that computes.
+/// Creates a compute pipeline.
 [[nodiscard]] VkResult make_compute_pipeline(const Device& device, VkPipelineLayout layout,
                                              std::span<const std::uint32_t> code,
                                              std::span<const ShaderConstant> constants, VkPipeline& pipeline);

@@ -18,12 +18,12 @@ struct PhysicalDevice {
   VkPhysicalDevice handle = VK_NULL_HANDLE;
   VkPhysicalDeviceType type = VK_PHYSICAL_DEVICE_TYPE_OTHER;
   std::uint32_t queue_family = 0;
-  bool draws_triangles = false;  ///< that queue
-  bool draws_lines = false;      ///< for the edges of triangles
+  bool draws_triangles = false;  ///< true if the queue supports graphics
+  bool draws_lines = false;      ///< true if it can draw triangle edges
   VulkanDeviceInfo description;
 };
 
-/// A device as it is, with the first queue family that will do best.
+/// Describes a device, with its best suited queue family.
 [[nodiscard]] PhysicalDevice describe(const Api& api, VkPhysicalDevice handle);
 /// Returns the capabilities of a queue family; 0 if there is no such family.
 [[nodiscard]] VkQueueFlags queue_flags(const Api& api, VkPhysicalDevice device, std::uint32_t family);

@@ -12,7 +12,7 @@ namespace {
 
 constexpr VkDeviceSize kStagingBytes = VkDeviceSize{8} << 20;
 
-// The kinds of memory that will do, the best first.
+// Returns the acceptable kinds of memory, best first.
 std::vector<VkMemoryPropertyFlags> wishes(Buffer::Where where) {
   constexpr VkMemoryPropertyFlags kShared = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
   switch (where) {
@@ -25,7 +25,7 @@ std::vector<VkMemoryPropertyFlags> wishes(Buffer::Where where) {
   }
 }
 
-// From the best kind of memory that has room.
+// Allocates from the best kind of memory with room.
 VkResult allocate(const Device& device, VkBuffer buffer, Buffer::Where where, VkDeviceMemory& memory) {
   VkMemoryRequirements needs{};
   device.api().vkGetBufferMemoryRequirements(device.handle(), buffer, &needs);

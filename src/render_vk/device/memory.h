@@ -13,21 +13,21 @@
 
 namespace quoin::vulkan {
 
-/// A kind of memory that is among the `allowed` ones and has all that is wanted.
+/// Returns a memory type among `allowed` that has all wanted properties.
 [[nodiscard]] std::optional<std::uint32_t> memory_type(const VkPhysicalDeviceMemoryProperties& memory,
                                                        std::uint32_t allowed, VkMemoryPropertyFlags wanted);
 
-/// One buffer with memory of its own.
+/// A buffer with its own memory.
 class Buffer {
  public:
   enum class Where : std::uint8_t {
-    Device,  ///< where the device reads fastest
+    Device,  ///< fastest for the device to read
     Upload,  ///< written by the CPU through `mapped`
     Read,    ///< read by the CPU through `mapped`
   };
 
   Buffer() = default;
-  /// Errors: LimitExceeded when that memory is full.
+  /// Errors: LimitExceeded if that memory is full.
   [[nodiscard]] static Result<Buffer> create(const Device& device, VkDeviceSize size, Where where,
                                              const std::string& doing);
   Buffer(Buffer&& other) noexcept { swap(other); }
@@ -53,7 +53,7 @@ class Buffer {
   std::byte* mapped_ = nullptr;
 };
 
-/// Device memory, in as many blocks as it takes, each a buffer that is cut up; and the way there.
+/// Device memory in blocks as needed, each a buffer that is suballocated; and uploads to it.
 class DeviceMemory final : public ShaderMemory {
  public:
   DeviceMemory(Device& device, VkDeviceSize block_bytes) : device_(&device), block_bytes_(block_bytes) {}
@@ -67,10 +67,10 @@ class DeviceMemory final : public ShaderMemory {
   [[nodiscard]] Status flush() override;
   void discard() override;
 
-  /// The buffer that a place lies in, at its offset.
+  /// Returns the buffer that contains a place, at its offset.
   [[nodiscard]] VkBuffer buffer_of(const Place& place) const { return blocks_[place.block]->buffer.handle(); }
   [[nodiscard]] std::size_t block_count() const;
-  /// By `write`, so far.
+  /// Returns the bytes written so far by `write`.
   [[nodiscard]] std::uint64_t written() const { return written_; }
 
  private:
@@ -86,7 +86,7 @@ class DeviceMemory final : public ShaderMemory {
 
   Device* device_;
   VkDeviceSize block_bytes_;
-  std::vector<std::unique_ptr<Block>> blocks_;  // null: given back
+  std::vector<std::unique_ptr<Block>> blocks_;  // null: freed
   Buffer staging_;
   VkDeviceSize staged_ = 0;
   std::vector<Copy> copies_;
@@ -109,7 +109,7 @@ class Places {
   [[nodiscard]] Status upload(const std::vector<T>& values, std::uint64_t& address) {
     return upload(std::as_bytes(std::span(values)), address);
   }
-  /// The last one. Requires: there is one.
+  /// Returns the last place. Requires: there is one.
   [[nodiscard]] const Place& last() const { return places_.back(); }
 
  private:

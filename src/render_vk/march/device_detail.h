@@ -16,7 +16,7 @@
 
 namespace quoin::vulkan {
 
-/// Halved grids and impostors in device memory, made at the first request of an image and kept for later images.
+/// Halved grids and impostors in device memory, created when an image first requests them and kept for later images.
 class DeviceDetail {
  public:
   static constexpr std::uint64_t kMaxBytes = std::uint64_t{1} << 30;
@@ -30,7 +30,8 @@ class DeviceDetail {
 
   /// Returns the scene's instances in their detail: traced in grids halved as often as `detail` requests, or less often
   /// if that would change a grid's volume too much (see SceneTracer::with_detail), or drawn from impostors. Beyond
-  /// `max_bytes` of device memory for each kind, the least recently used ones are released; those of this image stay.
+  /// `max_bytes` of device memory for each kind, the least recently used entries are released, except those of this
+  /// image.
   ///
   /// Requires: `device` was updated with `scene`, which has not changed since; no commands run.
   /// Errors:   as DeviceImpostors::draw; it is then empty.

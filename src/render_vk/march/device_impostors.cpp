@@ -14,16 +14,16 @@
 namespace quoin::vulkan {
 namespace {
 
-constexpr std::uint32_t kFacesAGroup = 512;  // as far.comp has it
+constexpr std::uint32_t kFacesAGroup = 512;  // as in far.comp
 constexpr std::uint32_t kSides = ImpostorFaces::kSides;
-constexpr std::uint32_t kIsSurfel = 8;  // as far.glsl has it
+constexpr std::uint32_t kIsSurfel = 8;  // as in far.glsl
 constexpr std::uint32_t kSurfelHalvesShift = 4;
 
 Vec4 to_vec4(const raster::Vector& v, float w = 0.0F) {
   return {v[0], v[1], v[2], w};
 }
 
-// Shaders skip the rectangles that fill groups up, which no view saw.
+// Packs rectangles without the fillers of groups, which no view saw.
 std::vector<ShaderFarFace> packed(const ImpostorFaces& impostor, const ImpostorFaces::Level& level, std::size_t first,
                                   std::size_t count) {
   std::vector<ShaderFarFace> faces;
@@ -85,7 +85,7 @@ std::vector<ShaderVoxelFace> packed(const ImpostorFaces& impostor, std::size_t f
   return faces;
 }
 
-// Entries of such a list.
+// Returns the number of entries of an impostor's face list.
 std::size_t entries_of(const ImpostorFaces& impostor) {
   return impostor.faces.size() + 2 * impostor.surfels.size();
 }
@@ -109,7 +109,7 @@ std::uint32_t seen_sides(const raster::Job& job, const PixelArea& area) {
   return seen;
 }
 
-// Rays from the upper left corner of the area on.
+// Sets the rays, relative to the upper left corner of the area.
 void set_aim(const DrawnImpostor& drawn, int width, int height, ShaderFar& far) {
   raster::Job job;
   raster::set_aim(drawn.aim, drawn.area.left - 0.5 * width, drawn.area.top - 0.5 * height, job);

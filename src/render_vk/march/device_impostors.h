@@ -80,7 +80,7 @@ class DeviceImpostors {
   std::uint64_t picture_ = 0;
 };
 
-/// The impostors that show in each tile of an image.
+/// The impostors visible in each tile of an image.
 struct FarTiles {
   struct Range {
     std::uint32_t first = 0;  ///< in `parts`
@@ -91,7 +91,7 @@ struct FarTiles {
   std::vector<Range> ranges;  ///< of each tile, row by row
 };
 
-/// `edge`: of the tiles, in pixels. Cost: O(impostors + tiles that they touch).
+/// Assigns impostors to tiles. `edge`: of the tiles, in pixels. Cost: O(impostors + tiles that they touch).
 [[nodiscard]] FarTiles far_tiles(const std::vector<ShaderFar>& far, int edge, int width, int height);
 
 }  // namespace quoin::vulkan

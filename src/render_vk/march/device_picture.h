@@ -33,11 +33,11 @@ struct VulkanPicture::Impl {
   int samples = 0;
   std::int64_t rays = 0;
   vulkan::Buffer colours;
-  vulkan::Buffer swapped;  ///< the colours with blue the lowest; only where images wanted them
+  vulkan::Buffer swapped;  ///< the colours with blue lowest; only if a target image needed them
   /// the camera of its samples
   Camera camera;
   LightOptions light;
-  vulkan::Buffer sums;  ///< of the samples' light, four floats a pixel; only where samples are added one by one
+  vulkan::Buffer sums;  ///< sums of the samples' light, four floats per pixel; only if samples accumulate
 };
 
 }  // namespace quoin

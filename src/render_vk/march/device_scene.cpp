@@ -27,7 +27,7 @@ bool is_too_wide(const IBox& bounds) {
   return false;
 }
 
-// Of voxels and field.
+// Returns the bounds of voxels and field.
 IBox content_bounds(const SceneGrid& grid) {
   return unite(grid.grid.bounds(), grid.field.bounds());
 }
@@ -251,7 +251,7 @@ bool is_same(const std::vector<ShaderGrid>& a, const std::vector<ShaderGrid>& b)
 }
 
 void add_surface(const Surface& surface, float last, std::vector<Vec4>& table) {
-  // A product with an infinite logarithm is not sure to be a number on every device.
+  // A product with an infinite logarithm may be NaN on some devices.
   constexpr float kLeast = -1e30F;
   table.emplace_back(surface.colour, std::max(surface.log_clarity, kLeast));
   table.emplace_back(surface.emitted, surface.ior);

@@ -27,8 +27,8 @@ struct DevicePlaced {
   IVec3 origin{0};        ///< of the tree's coordinates, in the grid
   DVec3 low{0.0};         ///< tight bounds of all voxels and the field, in the tree's coordinates
   DVec3 high{0.0};
-  bool is_far = false;                      ///< drawn from its impostor: the camera's rays pass it by
-  const ImpostorFaces* impostor = nullptr;  ///< of that, until the next image
+  bool is_far = false;                      ///< drawn from its impostor: camera rays skip it
+  const ImpostorFaces* impostor = nullptr;  ///< its impostor, valid until the next image
   std::size_t impostor_level = 0;           ///< the finest level drawn
 };
 
@@ -40,17 +40,17 @@ template <class Iterator>
   });
 }
 
-/// The content of rays' space: instances, and the table of their grids.
+/// The content that rays traverse: instances, and the table of their grids.
 struct Placement {
   std::vector<DevicePlaced> placed;  ///< in the order of their handles
   InstanceTree instances;            ///< their boxes in the world
   std::uint64_t grids = 0;           ///< the table's address
   bool has_transparent = false;
   bool has_fields = false;
-  bool has_field_glass = false;  ///< something of these is transparent
+  bool has_field_glass = false;  ///< any field has a transparent part
   std::vector<ShaderFar> far;    ///< visible faces of impostors, in the order of the instances
 };
-/// Writes a table to its place, or to a larger one.
+/// Writes a table to its place, or to a larger place.
 [[nodiscard]] Status put_table(ShaderMemory& memory, Place& place, std::span<const std::byte> bytes);
 [[nodiscard]] bool is_same(const std::vector<ShaderGrid>& a, const std::vector<ShaderGrid>& b);
 
@@ -70,9 +70,9 @@ struct DeviceLamps {
   [[nodiscard]] Status put(ShaderMemory& memory, std::shared_ptr<const LampTable> now);
 };
 
-/// Levels of light around surfaces in device memory.
+/// Light levels around surfaces in device memory.
 struct DeviceLevels {
-  const LightBricks* table = nullptr;  ///< null: pictures are in another light
+  const LightBricks* table = nullptr;  ///< null: images use another light model
   Place bricks;
   Place numbers;
 
@@ -94,7 +94,7 @@ class DeviceScene {
  public:
   explicit DeviceScene(ShaderMemory& memory) : memory_(&memory) {}
 
-  /// Updates as VulkanRenderer::update. After an error it is empty.
+  /// As VulkanRenderer::update. After an error it is empty.
   [[nodiscard]] Status update(const Scene& scene, InstanceFilter filter, Threads threads);
 
   [[nodiscard]] const Placement& placement() const { return placement_; }

@@ -22,8 +22,8 @@
 namespace quoin::vulkan {
 namespace {
 
-// Maximum distance, in voxels, of a local origin from a grid's bounds: points within keep their precision; farther
-// points have none to lose.
+// Maximum distance, in voxels, of a local origin from a grid's bounds: points within keep their precision;
+// farther points have no precision to lose.
 constexpr double kNearby = 1024.0;
 
 Vec4 to_vec4(DVec3 v, double w = 0.0) {
@@ -35,13 +35,13 @@ Vec4 low_vec4(DVec3 v) {
   return to_vec4(v - DVec3(Vec3(v)));
 }
 
-// A multiple of 64 voxels at a point, not far from the grid.
+// Returns a multiple of 64 voxels near a point, clamped to near the grid.
 IVec3 base_at(DVec3 point, const DevicePlaced& grid) {
   const DVec3 near = glm::clamp(point, grid.low - kNearby, grid.high + kNearby);
   return IVec3(glm::floor(near)) & ~63;
 }
 
-// How far ahead of the camera, along its forward direction, the grid begins; 0 where that is not far.
+// Returns the grid's distance along the camera's forward direction; 0 if it is small.
 double depth_of(const DevicePlaced& grid, const glm::dmat3& view_axes, DVec3 camera_in_grid, DVec3 forward) {
   double depth = std::numeric_limits<double>::infinity();
   for (int corner = 0; corner < 8; ++corner) {
@@ -51,7 +51,7 @@ double depth_of(const DevicePlaced& grid, const glm::dmat3& view_axes, DVec3 cam
   }
   const double voxel = grid.placed.voxel_size;
   if (!(depth > kNearby * voxel)) return 0.0;
-  // A number of few bits, so that the difference of two of them is exact on the device too.
+  // Rounded to few bits, so that differences are exact on the device too.
   int exponent = 0;
   const double fraction = std::frexp(depth * (1.0 - 1e-5) - voxel, &exponent);
   return std::ldexp(std::floor(fraction * 4096.0), exponent - 12);
@@ -71,7 +71,7 @@ void add_box(const DBox& box, std::uint32_t low_w, std::int32_t high_w, std::vec
 // `view_origin`: from the camera.
 void add_instances(const Placement& scene, const Camera& camera, DVec3 view_origin, FrameData& data) {
   const InstanceTree& tree = scene.instances;
-  // Two far positions first, as everywhere.
+  // Subtracts the two far positions first, as everywhere.
   const auto in_view = [&](const DBox& box) {
     return DBox{box.min - camera.position - view_origin, box.max - camera.position - view_origin};
   };
@@ -83,7 +83,7 @@ void add_instances(const Placement& scene, const Camera& camera, DVec3 view_orig
     add_box(in_view(tree.boxes()[i]), static_cast<std::uint32_t>(i), scene.placed[i].is_far ? 1 : 0, data.leaves);
 }
 
-// The camera's numbers as CameraRays has them.
+// The camera's values, as in CameraRays.
 struct Rays {
   bool is_perspective;
   DVec3 right, down, corner, forward;
@@ -150,7 +150,7 @@ void set_sun(const PlacedGrid& placed, DVec3 sun, double brightness, ShaderPlace
   }
 }
 
-// Sets the start of rays, the origin of view space: as far ahead as space is empty.
+// Sets the start of rays, the origin of view space, as far ahead as space is empty.
 void add_placed(const Placement& scene, const Camera& camera, const RenderOptions& options, const Rays& rays,
                 FrameData& data) {
   const DVec3 sun = to_sun(options.light);
@@ -212,7 +212,7 @@ std::uint32_t flags_of(const Camera& camera, const RenderOptions& options) {
   if (light.shading == Shading::Normals) flags |= kShowNormals;
   if (light.shadows) flags |= kShadows;
   if (light.occlusion_mode == OcclusionMode::Rays) flags |= kOcclusionRays;
-  // Meshes carry the smooth occlusion of fields, and marched rays do not come here with it.
+  // Only meshes have the smooth occlusion of fields; marched images never use it.
   const bool is_of_vertices =
       light.occlusion_mode == OcclusionMode::Vertex || light.occlusion_mode == OcclusionMode::Smooth;
   if (is_of_vertices) flags |= kOcclusionVertex;
@@ -343,7 +343,7 @@ std::vector<float> srgb_thresholds() {
   const SrgbEncoder& encode = SrgbEncoder::shared();
   std::vector<float> thresholds(256, 0.0F);
   for (std::uint32_t byte = 1; byte < 256; ++byte) {
-    // Floats of one sign are in the order of their bits.
+    // Floats of equal sign are ordered like their bits.
     std::uint32_t below = 0;
     std::uint32_t reached = std::bit_cast<std::uint32_t>(1.0F);
     while (reached - below > 1) {

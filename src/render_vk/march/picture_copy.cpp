@@ -58,7 +58,7 @@ Status check(const VulkanImageTarget& target, int width, int height) {
   return {};
 }
 
-// Waits for all earlier uses of the image, and for the end of drawing.
+// Waits for all earlier uses of the image, and for drawing to end.
 void begin_copy(const vulkan::Api& api, VkCommandBuffer commands, VkImageMemoryBarrier image) {
   auto picture = info_of<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER);
   picture.srcAccessMask = VK_ACCESS_MEMORY_WRITE_BIT;

@@ -13,14 +13,14 @@ constexpr std::int64_t kMaxRays = std::int64_t{1} << 22;
 constexpr std::int64_t kMaxRaysAtOnce = std::int64_t{1} << 24;
 const char* const kDoing = "drawing";
 
-// `lamps`: that light a point at most.
+// `lamps`: the maximum number of lamps that light a point.
 std::int64_t rays_of_pixel(const RenderOptions& options, int lamps) {
   const LightOptions& light = options.light;
   return 2 + lamps + (light.occlusion_mode == OcclusionMode::Rays ? light.occlusion_rays : 0);
 }
 
-// The edge of the tiles, a power of two. Graphics hardware needs many pixels at a time to be busy; the lists of glass
-// take 1.5 kB a pixel.
+// Returns the edge of the tiles, a power of two. Graphics hardware needs many pixels at a time to be busy; glass lists
+// take 1.5 kB per pixel.
 std::int32_t tile_edge(const RenderOptions& options, int lamps, bool has_glass, bool is_processor) {
   std::int32_t edge = is_processor ? 256 : 1024;
   if (has_glass) edge = is_processor ? 128 : 256;

@@ -84,7 +84,7 @@ class PicturePass {
   std::vector<FarTiles::Range> far_;  // of the tiles
   Place far_place_;                   // depths and numbers of a tile's impostors, half each
   Buffer output_;                     // colours, depths, counters
-  Buffer results_;                    // the same, for the CPU
+  Buffer results_;                    // their copy for the CPU
 };
 
 }  // namespace quoin::vulkan

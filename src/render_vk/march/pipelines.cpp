@@ -25,7 +25,7 @@ constexpr std::uint32_t kSwap[] = {
 #include "swap.comp.inc"
 };
 
-// Every device takes as many in each direction.
+// Every device supports this many workgroups in each direction.
 constexpr std::uint32_t kMaxAcross = 32768;
 
 template <class T>

@@ -11,32 +11,32 @@
 
 namespace quoin::vulkan {
 
-/// The passes of a sample of a tile, in their order, and of a finished tile.
+/// The passes of a tile's sample, in order, and those of a finished tile.
 enum class Pass : std::uint8_t {
-  FarDepths,  ///< of the nearest faces of impostors
-  FarFaces,   ///< which these are
+  FarDepths,  ///< depths of the nearest impostor faces
+  FarFaces,   ///< numbers of these faces
   Primary,    ///< the nearest opaque voxel of each pixel
-  Glass,      ///< the transparent bodies before it
+  Glass,      ///< the transparent bodies in front of it
   Light,
   LightWithGlass,
-  PrimaryWithFields,  ///< these where grids have fields
+  PrimaryWithFields,  ///< the same passes, if grids have fields
   LightWithFields,
   LightWithGlassAndFields,
-  FieldGlass,  ///< these where something of fields is transparent
+  FieldGlass,  ///< the same passes, if fields have transparent parts
   LightWithFieldGlass,
   Resolve,  ///< the samples' mean as bytes
   Swap,     ///< swaps red and blue of a whole image
 };
 constexpr std::size_t kPassCount = 13;
 
-/// A pass as it is where grids have fields.
+/// Returns the variant of a pass for grids with fields.
 [[nodiscard]] constexpr Pass with_fields(Pass pass) {
   if (pass == Pass::Primary) return Pass::PrimaryWithFields;
   if (pass == Pass::Light) return Pass::LightWithFields;
   return pass == Pass::LightWithGlass ? Pass::LightWithGlassAndFields : pass;
 }
 
-/// A pass as it is where something of grids' fields is transparent.
+/// Returns the variant of a pass for fields with transparent parts.
 [[nodiscard]] constexpr Pass with_field_glass(Pass pass) {
   if (pass == Pass::Glass) return Pass::FieldGlass;
   return pass == Pass::LightWithGlass ? Pass::LightWithFieldGlass : with_fields(pass);
@@ -53,11 +53,11 @@ class Pipelines {
   Pipelines(const Pipelines&) = delete;
   Pipelines& operator=(const Pipelines&) = delete;
 
-  /// Records the pass over a tile, after which its results may be read.
+  /// Records the pass over a tile, and a barrier before its results are read.
   void dispatch(VkCommandBuffer commands, Pass pass, const ShaderPush& push) const;
-  /// The same over impostors: ShaderPush::far_groups workgroups.
+  /// As `dispatch`, over impostors: ShaderPush::far_groups workgroups.
   void dispatch_far(VkCommandBuffer commands, Pass pass, const ShaderPush& push) const;
-  /// Records a copy of an image's words with red and blue swapped, after which it may be read.
+  /// Records a copy of an image's words with red and blue swapped, and a barrier before it is read.
   void swap_red_and_blue(VkCommandBuffer commands, const SwapPush& push) const;
 
  private:

@@ -39,7 +39,7 @@ struct VulkanRenderer::Impl {
         scene(memory),
         detail(memory) {}
 
-  /// Null: there is none.
+  /// Sets the current scene; null: none.
   void look_at(const Scene* updated, InstanceFilter filter) {
     const ChangeCursor before = std::exchange(at_update, updated != nullptr ? updated->cursor() : ChangeCursor{});
     const bool is_same = updated == voxels && before.is_beside(at_update);
@@ -61,9 +61,9 @@ struct VulkanRenderer::Impl {
   vulkan::DeviceDetail detail;
   /// The source of levels of detail, as of the last update; null before the first.
   const Scene* voxels = nullptr;
-  ChangeCursor at_update;  ///< of it: where one scene was another may be by now
+  ChangeCursor at_update;  ///< its state then; detects another scene at the same address
   InstanceFilter instances = InstanceFilter::Visible;
-  std::unique_ptr<DetailChooser> chooser;  // for that scene
+  std::unique_ptr<DetailChooser> chooser;  // for `voxels`
   /// Returns the lamp table; sends it to the device if it changed.
   [[nodiscard]] Result<vulkan::DeviceLamps> lamp_table(const LightOptions& light, Threads threads) {
     if (light.max_lamps == 0 || is_propagated(light) || voxels == nullptr) return vulkan::DeviceLamps{};
@@ -91,7 +91,7 @@ struct VulkanRenderer::Impl {
   vulkan::DeviceLamps sent_lamps;
   LightCache levels;
   vulkan::DeviceLevels sent_levels;
-  std::uint64_t update_count = 0;            ///< of updates
+  std::uint64_t update_count = 0;            ///< number of updates
   std::shared_ptr<vulkan::PathScene> paths;  ///< null: no path-traced image was drawn
   std::uint64_t uploaded = 0;
 };

@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::size_t kVector = sizeof(Vec4);
 
-// Appends a table at a multiple of a vector's size; where it lies.
+// Appends a table at a multiple of a vector's size. Returns its offset.
 template <class T>
 std::uint64_t add_table(const std::vector<T>& values, std::vector<std::byte>& out) {
   const std::size_t begin = (out.size() + kVector - 1) / kVector * kVector;

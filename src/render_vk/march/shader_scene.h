@@ -25,7 +25,7 @@ class ShaderScene {
   [[nodiscard]] static Result<std::unique_ptr<ShaderScene>> of(const Scene& scene, InstanceFilter filter,
                                                                const LightOptions& light, Threads threads);
 
-  /// Trees, records of chunks, grids, types and lists of lamps; addresses count from the first byte.
+  /// Returns trees, chunk records, grids, types and lamp lists; addresses are relative to the first byte.
   [[nodiscard]] std::span<const std::byte> bytes() const { return memory_.bytes(); }
   [[nodiscard]] const Placement& placement() const { return scene_.placement(); }
 

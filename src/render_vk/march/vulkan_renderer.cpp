@@ -105,7 +105,7 @@ Status VulkanRenderer::draw(VulkanPicture& picture, const Camera& camera, const 
     return make_error(ErrorCode::InvalidArgument, "vulkan: the image belongs to another renderer");
   }
   if (Status status = target.resize(options.width, options.height); !status) return status;
-  // Samples of meshes, and of pictures that were written, have no sums to add to.
+  // Mesh images and written images have no sums to add to.
   const bool is_new = accumulation == Accumulation::Restart || target.samples == 0;
   if (is_new || target.sums.handle() == VK_NULL_HANDLE) {
     if (Status status = target.begin_sums(camera, options.light); !status) return status;

@@ -29,7 +29,7 @@ std::size_t pixels_of(const PathOptions& options) {
   return static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
 }
 
-// Of the vectors of a pixel.
+// Converts a pixel's vectors to sums.
 path::PixelSums sums_of(const Vec4* from, bool has_layers) {
   path::PixelSums sums;
   sums.background = Vec3(from[0]);

@@ -22,7 +22,7 @@ struct VulkanPathPicture::Impl {
   // The camera of its samples.
   Camera camera;
   PathOptions options;
-  vulkan::Buffer sums;   ///< vectors of four floats a pixel: path_data.glsl
+  vulkan::Buffer sums;   ///< vectors of four floats per pixel: path_data.glsl
   vulkan::Buffer parts;  ///< of surfaces, for the denoiser
 };
 

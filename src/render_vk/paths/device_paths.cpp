@@ -24,7 +24,7 @@ std::vector<Vec4> path_surface_table(const Surfaces& surfaces, std::size_t types
   return table;
 }
 
-// Whether the same faces are part of the same lamps, which one finds by the same ways.
+// Returns true if the lamps have the same faces, and the same paths in the tree.
 bool has_same_faces(const path::PathLamps& a, const path::PathLamps& b) {
   return std::ranges::equal(a.faces(), b.faces()) && std::ranges::equal(a.tree().ways(), b.tree().ways());
 }
@@ -145,7 +145,7 @@ Status DevicePaths::put_faces(DeviceMemory& memory) {
     keys.emplace_back(face.voxel, face.placed * 8 + static_cast<std::int32_t>(face.direction));
     lamps.push_back(face.lamp);
   }
-  // Where no face glows a lookup still needs a free slot.
+  // Without emissive faces, lookups still need a free slot.
   if (lamps.empty()) {
     keys.emplace_back(0);
     lamps.push_back(-1);

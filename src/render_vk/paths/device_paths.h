@@ -20,7 +20,7 @@ namespace quoin::vulkan {
 /// face. Sent again when it changes.
 class DevicePaths {
  public:
-  /// Follows this scene from now on, in its present state; null: none. Rebuilds the lamps.
+  /// Sets the current scene; null: none. Rebuilds the lamps.
   void look_at(const Scene* scene);
 
   /// Sends the data that an image of `placement` needs and refers to it in the frame, except the lamps' relative
@@ -47,7 +47,7 @@ class DevicePaths {
   bool has_sent_surfaces_ = false;
   std::uint32_t last_surface_ = 0;
   Place surfaces_place_;
-  std::optional<Look> look_;  // of the sky that was sent
+  std::optional<Look> look_;  // the settings of the sky that was sent
   std::unique_ptr<const path::SkyLight> sky_;
   Place sky_pixels_;
   Place sky_rows_;

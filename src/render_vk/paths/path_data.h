@@ -72,7 +72,7 @@ struct ShaderLampNode {
 };
 
 constexpr std::size_t kPathStateBytes = 8 * 16;
-constexpr std::uint32_t kPathSums = 5;  ///< vectors a pixel
+constexpr std::uint32_t kPathSums = 5;  ///< vectors per pixel
 constexpr std::uint32_t kPathSumsWithLayers = 7;
 
 struct PathPush {

@@ -19,7 +19,7 @@ namespace {
 const char* const kDoing = "path tracing";
 constexpr int kSamplesAtOnce = 16;  // samples of a tile between progress reports
 constexpr int kDispatchesAtOnce = 8;
-constexpr int kFewSamples = 4;  // so few are over before larger buffers are made
+constexpr int kFewSamples = 4;  // fewer samples finish before larger buffers are allocated
 
 Vec4 to_vec4(DVec3 v, double w = 0.0) {
   return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z), static_cast<float>(w)};
@@ -29,7 +29,7 @@ double capped(double value) {
   return std::min(value, 1e30);
 }
 
-// The options; `from`: where view space has its origin in the world.
+// Sets the options. `from`: the origin of view space in the world.
 void put_options(const Camera& camera, const PathOptions& options, DVec3 from, ShaderPathFrame& frame) {
   if (options.background) frame.background = Vec4(*options.background, 1.0F);
   if (const auto& ground = options.ground) {
@@ -56,7 +56,8 @@ void put_options(const Camera& camera, const PathOptions& options, DVec3 from, S
   frame.sum_pitch = options.layers ? kPathSumsWithLayers : kPathSums;
 }
 
-// Graphics hardware needs many pixels at a time to be busy; the lists of glass may take a sixteenth of its memory.
+// Returns the tile edge. Graphics hardware needs many pixels at a time to be busy; glass lists may take a sixteenth of
+// its memory.
 int tile_edge(const Device& device, int samples, bool has_glass) {
   if (device.physical().type == VK_PHYSICAL_DEVICE_TYPE_CPU) return 128;
   constexpr int kEdge = 1024;

@@ -20,7 +20,7 @@ struct PathScene {
 
   std::unique_ptr<PathPipelines> pipelines;
   DevicePaths tables;
-  std::uint64_t update_count = 0;  ///< of the renderer, when the tables last looked
+  std::uint64_t update_count = 0;  ///< of the renderer, when the tables were last updated
 };
 
 /// Adds samples to a path-traced image, tile by tile.
@@ -51,7 +51,7 @@ class PathPass {
   std::uint64_t frame_address_ = 0;
   std::int32_t tile_edge_ = 0;
   Buffer counters_;  // on the device
-  Buffer results_;   // the same, for the CPU
+  Buffer results_;   // their copy for the CPU
 };
 
 }  // namespace quoin::vulkan

@@ -9,8 +9,8 @@
 
 namespace quoin::vulkan {
 
-/// The path tracing shader in the variants that scenes need: with glass, with fields, with transparent fields. Each is
-/// made at first use.
+/// The path tracing shader in the variants that scenes need: with glass, with fields, with transparent fields. Each
+/// variant is created at first use.
 class PathPipelines {
  public:
   [[nodiscard]] static Result<std::unique_ptr<PathPipelines>> create(Device& device);
@@ -20,7 +20,7 @@ class PathPipelines {
 
   /// Errors: those of VulkanRenderer.
   [[nodiscard]] Status prepare(const Placement& placement);
-  /// Records steps of a tile's paths, after which their results may be read. Requires: it was prepared.
+  /// Records steps of a tile's paths, and a barrier before their results are read. Requires: it was prepared.
   void dispatch(VkCommandBuffer commands, const Placement& placement, const PathPush& push) const;
 
  private:

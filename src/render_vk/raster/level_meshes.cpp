@@ -28,7 +28,7 @@ void LevelMeshes::drop(std::map<MeshKey, Level>::iterator level) {
   levels_.erase(level);
 }
 
-// As the chunks of the full grid are, if there are any.
+// Returns the style of the full grid's chunks, if there are any.
 SurfaceStyle LevelMeshes::style_of(MeshKey key) {
   if (key.content == SurfaceContent::Field) return SurfaceStyle::Smooth;
   const MeshStore::StoredGrid* full = store_->find({key.grid, 0});

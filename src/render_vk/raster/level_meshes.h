@@ -14,8 +14,8 @@
 
 namespace quoin::vulkan {
 
-/// The meshes of halved grids, of their voxels and of their fields. Made at the first request of an image and kept.
-/// After edits only the chunks that can have changed are rebuilt.
+/// The meshes of halved grids and halved fields. Created when an image first requests them, and kept. After edits only
+/// the chunks that can have changed are rebuilt.
 class LevelMeshes {
  public:
   /// Its meshes live in `store` and are destroyed with it.
@@ -28,7 +28,7 @@ class LevelMeshes {
   /// Begins an image.
   void begin() { ++picture_; }
   /// Puts the meshes of a grid halved `key.level` times into the store, placed as `placed`. Called once per image.
-  /// Errors: of MeshStore::put, and bad_alloc; the level is then empty.
+  /// Errors: as MeshStore::put; also throws bad_alloc. The level is then empty.
   [[nodiscard]] Status put(MeshKey key, const PlacedGrid& placed, const VoxelRegistry& types, Threads threads);
   /// Drops the least recently used meshes not used by the last image, until at most `max_bytes` are held.
   void drop_unused(std::uint64_t max_bytes);

@@ -18,7 +18,7 @@ namespace quoin::vulkan {
 namespace {
 
 constexpr double kEdge = kChunkEdge;
-// Of a ball around a chunk; smooth surfaces reach a little past it.
+// Radius of a ball around a chunk; smooth surfaces extend slightly beyond the chunk.
 constexpr double kChunkRadius = (kEdge / 2 + 2.0) * 1.7320508075688774;
 constexpr double kNearest = 1.0 / 1024.0;  // voxels
 // In device subpixel steps; half a step closes the holes caused by rounding. In 2.3 million pixels of a room of merged
@@ -33,7 +33,7 @@ Vec4 to_vec4(DVec3 v, double w = 0.0) {
 struct View {
   CameraRays rays;
   Frustum frustum;
-  glm::dmat3 pixel_from_world;  // pixels to the right and down of the middle, at a distance of 1, and depth
+  glm::dmat3 pixel_from_world;  // pixels to the right and down of the middle, at distance 1, and depth
   double width, height;
   double nearest = std::numeric_limits<double>::infinity();
   double furthest = 0.0;
@@ -58,16 +58,16 @@ struct View {
   }
 };
 
-// An instance as the camera sees it.
+// An instance relative to the camera.
 struct Space {
   const MeshInstance* instance;
   glm::dmat3 view_axes;  // view from grid: the world's axes, the camera's position as origin
   DVec3 camera_in_grid;  // voxels
-  DVec3 base{0.0};       // in the grid: from where it is counted
-  DVec3 eye{0.0};        // the camera from there; orthographic: the direction towards it
+  DVec3 base{0.0};       // in the grid: the reference point
+  DVec3 eye{0.0};        // the camera relative to it; orthographic: the direction towards it
   DVec3 base_in_view{0.0};
 
-  /// `low` to `high`: places of its chunks.
+  /// `low` to `high`: range of its chunk coordinates.
   Space(const MeshInstance& of, IVec3 low, IVec3 high, const Camera& camera)
       : instance(&of), view_axes(of.world_axes * of.voxel_size) {
     const glm::dmat3 grid_axes = glm::transpose(of.world_axes);
@@ -151,7 +151,7 @@ void add_far(const Space& space, View& view, MeshFrameData& data) {
   }
 }
 
-// Lets its faces know their voxel in the grid.
+// Sets the data that maps its faces to voxels of the grid.
 void set_impostor(const Space& space, ShaderMeshInstance& out) {
   const MeshImpostor& impostor = space.instance->impostor;
   out.home = IVec4(-space.instance->origin, space.instance->placed);
@@ -163,7 +163,7 @@ void set_impostor(const Space& space, ShaderMeshInstance& out) {
   out.far_centre = Vec4(Vec3(impostor.centre - DVec3(space.instance->origin)), 0.0F);
 }
 
-// A vector in view, or with w = 1 a point, in clip space.
+// Converts a vector in view, or with w = 1 a point, to clip space.
 DVec3 scaled_pixel(const View& view, DVec3 in_view) {
   return view.pixel_from_world * in_view * DVec3(2.0 / view.width, 2.0 / view.height, 1.0);
 }
@@ -205,7 +205,7 @@ ShaderMeshInstance shader_instance(const Space& space, const View& view, const L
   return out;
 }
 
-// Of the middle of a quad.
+// Returns the distance of a quad's middle.
 float distance_of(const Quad& quad, const MeshDraw& draw, const Space& space, const View& view) {
   const DVec3 middle = DVec3(draw.offset) + 0.5 * DVec3(quad.corner(0) + quad.corner(2));
   if (view.rays.is_perspective()) {

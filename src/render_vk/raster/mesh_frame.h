@@ -18,49 +18,49 @@
 
 namespace quoin::vulkan {
 
-/// An impostor in device memory, as one instance shows it.
+/// An impostor in device memory, for one instance.
 struct MeshImpostor {
   /// The rectangles of a level.
   struct Part {
     ShaderFarLevel faces;                  ///< count 0: none
-    std::array<std::uint32_t, 7> begin{};  ///< of each direction; the end of the last
+    std::array<std::uint32_t, 7> begin{};  ///< start of each direction; end of the last
     bool is_coarser = false;
   };
-  std::vector<Part> parts;              ///< the levels that are drawn
+  std::vector<Part> parts;              ///< the drawn levels
   std::uint32_t coarser = 0;            ///< the number of pixels, of 2^24, that show the coarser level
-  std::array<std::uint32_t, 4> near{};  ///< as ShaderFar
+  std::array<std::uint32_t, 4> near{};  ///< as in ShaderFar
   std::uint64_t faces = 0;              ///< address
   DVec3 centre{0.0};                    ///< of the content, in the grid
-  double radius = 0.0;                  ///< of the content, voxels: no face lies further away
+  double radius = 0.0;                  ///< of the content, voxels: no face is farther away
 };
 
 /// An instance whose meshes are drawn.
 struct MeshInstance {
   InstanceHandle handle;
   MeshKey mesh;
-  glm::dmat3 world_axes{1.0};  ///< as PlacedGrid's
+  glm::dmat3 world_axes{1.0};  ///< as in PlacedGrid
   DVec3 position{0.0};
-  DVec3 pivot{0.0};  ///< in the coordinates of the mesh's grid, which may be a halved one
+  DVec3 pivot{0.0};  ///< in the coordinates of the mesh's grid, which may be halved
   double voxel_size = 1.0;
   bool mirrored = false;
   std::int32_t placed = -1;  ///< index among the frame's placed grids; -1: not placed
   IVec3 origin{0};           ///< of its tree's coordinates
   bool is_far = false;       ///< only the transparent parts of its own meshes are drawn
-  MeshImpostor impostor;     ///< of a far instance, if it shows
+  MeshImpostor impostor;     ///< of a far instance, if visible
 };
 
 /// A chunk of an instance in the image.
 struct MeshDraw {
   const StoredMesh* mesh = nullptr;
   std::uint32_t instance = 0;  ///< index into MeshFrameData::instances
-  Vec3 offset{0.0F};           ///< of the chunk, from where its instance is counted
+  Vec3 offset{0.0F};           ///< of the chunk, from its instance's reference point
   double distance = 0.0;       ///< of its middle, in world units; orthographic: along the view
   std::uint8_t faces = 0;      ///< the directions, as bits, of faces that the camera can see
   bool mirrored = false;
   bool is_far = false;  ///< only transparent parts are drawn
 };
 
-/// Runs of a chunk's quads, or of an impostor's faces, each from one number to before the next.
+/// Half-open ranges of a chunk's quads or an impostor's faces.
 using QuadRuns = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
 
 /// Faces of an impostor in the image.

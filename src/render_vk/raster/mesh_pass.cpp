@@ -10,7 +10,7 @@ namespace quoin::vulkan {
 namespace {
 
 const char* const kDoing = "drawing meshes";
-// Quads that 16-bit indices reach; more of them take several draws.
+// Number of quads that 16-bit indices reach; more quads take several draws.
 constexpr std::uint32_t kQuadsAtOnce = 16'384;
 constexpr VkDeviceSize kAlignment = 32;
 
@@ -157,7 +157,7 @@ Status MeshPass::put_frame(MeshFrameData& data) {
   return {};
 }
 
-// Has that, and images, ready.
+// Prepares the frame's data and the images.
 Status MeshPass::prepare(MeshFrameData& data, VkExtent2D size, std::uint32_t samples) {
   if (Status done = put_frame(data); !done) return done;
   if (target_.is_of(size, samples)) return {};
@@ -188,7 +188,7 @@ std::vector<MeshPass::Step> MeshPass::steps_for(const MeshFrameData& data, Wiref
     }
   };
   if (data.glass_by_rays) {
-    // Before it hides them.
+    // Drawn before the glass, which would hide them.
     if (has_edges) steps.push_back({Step::Over::Opaque, kDrawEdgesOver});
     add_nearest_glass(Step::Styles::All);
     if (has_edges) steps.push_back({Step::Over::GlassByChunk, kDrawEdgesOver});

@@ -12,7 +12,7 @@ namespace quoin::vulkan {
 /// Draws the content of MeshFrameData, and keeps its memory for later images.
 class MeshPass {
  public:
-  /// Errors: Unsupported when the device cannot draw meshes at all.
+  /// Errors: Unsupported if the device cannot draw meshes.
   [[nodiscard]] static Result<std::unique_ptr<MeshPass>> create(Device& device, DeviceMemory& memory);
   ~MeshPass();
   MeshPass(const MeshPass&) = delete;
@@ -20,7 +20,7 @@ class MeshPass {
 
   /// Returns the largest sample count of the device up to `wanted`.
   [[nodiscard]] std::uint32_t samples_for(int wanted) const;
-  /// The largest width and height of an image.
+  /// Returns the largest width and height of an image.
   [[nodiscard]] std::uint32_t largest_edge() const { return largest_edge_; }
   [[nodiscard]] int subpixels() const { return subpixels_; }
 

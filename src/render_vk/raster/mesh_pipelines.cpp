@@ -176,7 +176,7 @@ VkPipelineDepthStencilStateCreateInfo depth_of(const MeshWay& way) {
       info_of<VkPipelineDepthStencilStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_DEPTH_STENCIL_STATE_CREATE_INFO);
   const bool is_sky = way.what == MeshWay::What::Sky;
   state.depthTestEnable = way.mode != kDrawEdgesOnly ? VK_TRUE : VK_FALSE;
-  // Where light is traced, depths are there before: each pixel is lit once.
+  // With traced light, depths are drawn first, so that each pixel is lit once.
   const bool is_lit_once = way.mode == kDrawSurfaces && way.light != MeshLight::Plain;
   const bool has_depth = is_lit_once || way.mode == kDrawGlassPassed || way.mode == kDrawGlassAdded;
   const bool is_depth = way.mode == kDrawDepth || way.mode == kDrawGlassDepth;

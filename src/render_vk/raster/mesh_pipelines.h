@@ -15,22 +15,22 @@ constexpr VkFormat kMeshDepth = VK_FORMAT_D32_SFLOAT;
 
 /// The light of a fragment.
 enum class MeshLight : std::uint8_t {
-  Plain,              ///< all that its face is turned to
+  Plain,              ///< unblocked light
   Traced,             ///< by rays: shadows, lamps
   TracedThroughGlass  ///< the scene has glass
 };
 
-/// One of the few ways in which meshes are drawn.
+/// A variant of drawing meshes.
 struct MeshWay {
   enum class What : std::uint8_t { Sky, Blocky, Smooth, Far };
   What what = What::Sky;
-  /// As ShaderMeshPush: surfaces, edges over them, edges alone, a channel of glass, or a step of the nearest glass.
+  /// As in ShaderMeshPush: surfaces, edges over them, edges alone, a channel of glass, or a step of the nearest glass.
   std::uint32_t mode = 0;
   bool mirrored = false;  ///< smooth: the instance turns triangles round; blocky faces are culled by their shader
   bool ordered = false;   ///< blocky: quads of many chunks, in the order stored in memory
   MeshLight light = MeshLight::Plain;
-  bool glass_by_rays = false;  ///< of the nearest glass: with all that is seen through it
-  bool fields = false;         ///< rays may meet some
+  bool glass_by_rays = false;  ///< the nearest glass includes everything visible through it
+  bool fields = false;         ///< rays may meet fields
   std::uint32_t samples = 1;
 
   auto operator<=>(const MeshWay&) const = default;

@@ -60,7 +60,7 @@ constexpr std::uint32_t kDrawGlassAdded = 9;
 [[nodiscard]] constexpr bool is_nearest_glass(std::uint32_t mode) {
   return mode >= kDrawGlassDepth && mode <= kDrawGlassAdded;
 }
-// and for an impostor the number of pixels, of 2^24, that show the coarser level, and a bit set if that is this one.
+// and for an impostor the share of pixels, of 2^24, that show the coarser level, and a bit set if this is that level.
 constexpr int kMeshShareShift = 4;
 constexpr std::uint32_t kMeshIsCoarser = std::uint32_t{1} << 28;
 constexpr std::uint32_t kMeshHasCells = std::uint32_t{1} << 29;

@@ -139,7 +139,7 @@ Status MeshStore::upload(const ChunkSurface& surface, StoredMesh& mesh) {
   return memory_->write(mesh.place, bytes);
 }
 
-// Has the new surfaces take the old ones' places, or leaves the old ones.
+// Replaces the old surfaces by the new ones; keeps the old ones on failure.
 Status MeshStore::finish(std::vector<Change>& changes) {
   Status done = memory_->flush();
   for (Change& change : changes) {

@@ -16,14 +16,14 @@ namespace quoin::vulkan {
 struct StoredMesh {
   SurfaceStyle style = SurfaceStyle::Blocky;
   Place place;
-  /// Blocky: where each direction's opaque quads begin and the last one's end; then come the transparent ones.
+  /// Blocky: start of each direction's opaque quads, and end of the last; transparent quads follow.
   std::array<std::uint32_t, 7> opaque{};
-  bool is_by_direction = true;  ///< false: only the first and the last of these mean something
+  bool is_by_direction = true;  ///< false: only the first and the last entry are valid
   /// Smooth: the number of indices, the number of transparent ones at their end, and their offset in `place`.
   std::uint32_t indices = 0;
   std::uint32_t glass_indices = 0;
   VkDeviceSize first_index = 0;
-  std::vector<Quad> glass;  ///< the transparent quads, which may be sorted for each image
+  std::vector<Quad> glass;  ///< the transparent quads, to be sorted for each image
 
   [[nodiscard]] std::int64_t triangles() const {
     return std::int64_t{2} * opaque.back() + 2 * static_cast<std::int64_t>(glass.size()) + indices / 3;
@@ -31,7 +31,7 @@ struct StoredMesh {
   [[nodiscard]] bool has_glass() const { return !glass.empty() || glass_indices > 0; }
 };
 
-/// Identifies meshes: those of a grid's voxels, of its voxels halved that often, or of its field.
+/// Identifies meshes: of a grid's voxels, of its halved voxels at a level, or of its field.
 struct MeshKey {
   GridHandle grid;
   int level = 0;
@@ -42,7 +42,7 @@ struct MeshKey {
   }
 };
 
-/// Surfaces of chunks in device memory: 8 bytes a quad, or 28 a vertex and 4 an index.
+/// Surfaces of chunks in device memory: 8 bytes per quad, or 28 per vertex and 4 per index.
 class MeshStore {
  public:
   static constexpr std::size_t kVertexWords = 7;
@@ -52,7 +52,7 @@ class MeshStore {
   };
   struct StoredGrid {
     std::map<IVec3, StoredMesh, ByPlace> chunks;
-    IVec3 low{0};  ///< of the chunks' places, once `bounds_known`
+    IVec3 low{0};  ///< of the chunk coordinates, once `bounds_known`
     IVec3 high{0};
     std::int64_t opaque_quads = 0;  ///< of all, once `bounds_known`
     std::uint64_t bytes = 0;        ///< of all, once `bounds_known`
@@ -64,7 +64,7 @@ class MeshStore {
   MeshStore(const MeshStore&) = delete;
   MeshStore& operator=(const MeshStore&) = delete;
 
-  /// As VulkanMeshRenderer::put. `level`: how often the grids are halved that they are of.
+  /// As VulkanMeshRenderer::put. `level`: the number of halvings of the surfaces' grids.
   [[nodiscard]] Status put(std::span<const SurfaceUpdate> surfaces, int level = 0);
   void drop(MeshKey key);
   void clear();

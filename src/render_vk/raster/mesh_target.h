@@ -14,7 +14,7 @@ class Attachment {
   };
 
   Attachment() = default;
-  /// Errors: LimitExceeded when the device's memory is full.
+  /// Errors: LimitExceeded if the device's memory is full.
   [[nodiscard]] static Result<Attachment> create(const Device& device, const Kind& kind, VkExtent2D size,
                                                  std::uint32_t samples, const std::string& doing);
   Attachment(Attachment&& other) noexcept { swap(other); }
@@ -36,7 +36,7 @@ class Attachment {
   VkImageView view_ = VK_NULL_HANDLE;
 };
 
-/// The images that an image of meshes is drawn with.
+/// The render targets for an image of meshes.
 class MeshTarget {
  public:
   MeshTarget() = default;
@@ -57,7 +57,7 @@ class MeshTarget {
   [[nodiscard]] VkExtent2D size() const { return size_; }
   [[nodiscard]] std::uint32_t samples() const { return samples_; }
   [[nodiscard]] VkFramebuffer framebuffer() const { return framebuffer_; }
-  /// With one sample a pixel, once all is drawn.
+  /// Returns the drawn image, with one sample per pixel.
   [[nodiscard]] VkImage picture() const { return samples_ > 1 ? resolved_.image() : colour_.image(); }
 
  private:

@@ -23,7 +23,7 @@ using vulkan::Vec4;
 
 namespace {
 
-// Beyond this, meshes of halved grids go that pictures have not shown for longest.
+// Beyond this, the least recently drawn meshes of halved grids are dropped.
 constexpr std::size_t kMaxLevelBytes = std::size_t{256} << 20;
 
 RenderOptions request_of(const MeshPictureOptions& options) {

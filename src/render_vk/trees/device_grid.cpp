@@ -21,14 +21,14 @@ Status DeviceTree::put(ShaderMemory& memory, std::vector<ChunkNodeAt> chunks) {
   const std::size_t bytes = top.nodes.size() * sizeof(Node);
   if (bytes > place_.size) {
     memory.release(place_);
-    // Half as much again, so that a growing world does not move each time.
+    // Half as much again, so that a growing world is not moved at each update.
     const auto place = memory.allocate(bytes + bytes / 2, "uploading voxels");
     if (!place) return place.error();
     place_ = *place;
     top_.nodes.clear();
     top = build_top_tree(std::move(chunks), place_.address);
   }
-  // Only the pages that changed.
+  // Writes only the changed pages.
   constexpr std::size_t kNodes = kPage / sizeof(Node);
   const std::span<const Node> now(top.nodes);
   const std::span<const Node> before(top_.nodes);
@@ -130,7 +130,7 @@ Status DeviceGrid::update_voxels(ShaderMemory& memory, const Content& content) {
   return {};
 }
 
-// Null: there is none.
+// `field`: null if there is none.
 template <class PutChunk>
 Status DeviceGrid::update_field(ShaderMemory& memory, const DensityGrid* field, Chunks& chunks, ChangeCursor& followed,
                                 const PutChunk& put_chunk) {

@@ -13,7 +13,7 @@
 
 namespace quoin::vulkan {
 
-/// In the order in which grids list their chunks.
+/// Compares chunks in the order of grids' chunk lists.
 struct ByPlace {
   bool operator()(IVec3 a, IVec3 b) const { return a.z != b.z ? a.z < b.z : a.y != b.y ? a.y < b.y : a.x < b.x; }
 };
@@ -21,7 +21,7 @@ struct ByPlace {
 /// The nodes above the chunks of a tree in device memory.
 class DeviceTree {
  public:
-  /// Writes the nodes that changed.
+  /// Writes the changed nodes.
   [[nodiscard]] Status put(ShaderMemory& memory, std::vector<ChunkNodeAt> chunks);
   void release(ShaderMemory& memory);
 

@@ -8,14 +8,14 @@
 
 namespace quoin::vulkan {
 
-/// -1 to 1 in 16 bits.
+/// Packs -1 to 1 in 16 bits.
 [[nodiscard]] inline std::uint32_t signed_16(float value) {
   const float scaled = std::round(std::clamp(value, -1.0F, 1.0F) * 32767.0F);
   return static_cast<std::uint32_t>(static_cast<std::int32_t>(scaled)) & 0xFFFF;
 }
 
-/// A unit vector in a word, to 1/20,000: the octahedron's faces folded into a square. As `unit_vector` in
-/// shaders/data.glsl reads it.
+/// Packs a unit vector into a word, with precision 1/20,000: the octahedron's faces folded into a square. `unit_vector`
+/// in shaders/data.glsl reads it.
 [[nodiscard]] inline std::uint32_t octahedral(Vec3 v) {
   const float size = std::abs(v.x) + std::abs(v.y) + std::abs(v.z);
   if (!(size > 0.0F)) return 0;

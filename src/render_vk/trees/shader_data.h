@@ -18,17 +18,17 @@ using IVec4 = glm::ivec4;
 /// Edge of a density block: a field chunk's record has, for each word of 4^3 cells at the surface, the samples from one
 /// before its first corner to one past its last, along each axis.
 constexpr int kFieldBlockEdge = 7;
-constexpr std::size_t kFieldBlockWords = 172;  ///< two halves a word
+constexpr std::size_t kFieldBlockWords = 172;  ///< two halves per word
 /// Edge of a body block: a record of a field's transparent part also has, after the densities, the bodies of the cells'
 /// corners. A word of cells of one type has the type's number instead of a block's.
 constexpr int kGlassBlockEdge = 5;
-constexpr std::size_t kGlassBlockWords = 63;      ///< two numbers a word
+constexpr std::size_t kGlassBlockWords = 63;      ///< two numbers per word
 constexpr std::uint32_t kOpaqueBody = 0xFFFF;     ///< no type's number
 constexpr std::uint32_t kIsUniform = 0x80000000;  ///< the other bits are a type
 
-/// A node of a sparse tree with 4^3 places a node; see data.glsl.
+/// A node of a sparse tree with 4^3 children per node; see data.glsl.
 struct Node {
-  std::uint64_t mask = 0;      ///< bit x + 4 y + 16 z: that place holds something
+  std::uint64_t mask = 0;      ///< bit x + 4 y + 16 z: that child exists
   std::uint64_t children = 0;  ///< the address of the first child; odd: the node is full and has none
   bool operator==(const Node&) const = default;
 };

@@ -28,7 +28,7 @@ class ShaderMemory {
   ShaderMemory& operator=(const ShaderMemory&) = delete;
   virtual ~ShaderMemory() = default;
 
-  /// `doing`: as in "drawing". Errors: LimitExceeded when it is full.
+  /// `doing`: as in "drawing". Errors: LimitExceeded if it is full.
   [[nodiscard]] virtual Result<Place> allocate(std::uint64_t size, const std::string& doing) = 0;
   /// Leaves `place` empty. Requires: no shader that reads it runs.
   virtual void release(Place& place) = 0;

@@ -41,7 +41,7 @@ class FieldSamples {
     QUOIN_ASSERT((IBox{IVec3{0}, IVec3{kEdge}}.contains(at)), "a sample of the record");
     return halves_[static_cast<std::size_t>((at.z * kEdge + at.y) * kEdge + at.x)];
   }
-  // Whether a box of samples, `max` excluded, is all solid.
+  // Returns true if a box of samples, `max` excluded, is all solid.
   [[nodiscard]] bool is_solid(IVec3 min, IVec3 max) const {
     for (int z = min.z; z < max.z; ++z) {
       for (int y = min.y; y < max.y; ++y) {
