@@ -17,7 +17,8 @@ std::int64_t number_of(const PartKey& key) {
   return number != nullptr ? *number : -1;
 }
 
-// The part in a record of the columns kind, id, revision, sum, body, if its sum is right. Lifetime: of the record's.
+// Returns the part in a record with columns kind, id, revision, sum, body, if its checksum is right. Lifetime: as the
+// record.
 std::optional<Part> sound_part(const PageRecord& record) {
   if (record.columns.size() != 5) return std::nullopt;
   const auto* const kind = std::get_if<std::string>(&record.columns[0]);
@@ -46,7 +47,7 @@ FoundParts::FoundParts() {
 }
 
 void FoundParts::take(const Part& part) {
-  if (part.key.kind == part::kWorld) return;  // of the file that it is in
+  if (part.key.kind == part::kWorld) return;  // belongs to the damaged file
   const bool is_named = std::holds_alternative<std::string>(part.key.id);
   if ((!is_named && (number_of(part.key) < 0 || number_of(part.key) > kMaxPartNumber)) ||
       !check_part(part.key, part.body)) {
@@ -72,7 +73,7 @@ void FoundParts::take(const Part& part) {
 }
 
 bool FoundParts::read(Connection& connection, std::vector<WorldDamage>& damage) {
-  // Without the index, which may be damaged where the table is not.
+  // Without the index, which may be damaged even if the table is not.
   auto rows = connection.prepare("SELECT id, revision, sum, body, kind FROM parts NOT INDEXED");
   if (!rows) {
     damage.push_back({std::nullopt, "parts: " + rows.error().message});
@@ -121,7 +122,7 @@ void FoundParts::add_grid(std::uint32_t grid) {
   put({part::kGrid, std::int64_t{grid}}, text_of(header));
   grids_[grid] = header;
   if (placed_grids_.contains(grid)) return;
-  SceneFile::Placement instance;  // so that it is seen
+  SceneFile::Placement instance;  // makes the grid visible
   instance.grid = grid;
   instance.name = name;
   put({part::kInstance, next_instance_++}, text_of(instance));

@@ -19,7 +19,7 @@ class FoundParts {
  public:
   FoundParts();
 
-  /// Takes all parts that SQLite can read. False where it cannot read all of them.
+  /// Takes all parts that SQLite can read. Returns false if it cannot read all of them.
   bool read(Connection& connection, std::vector<WorldDamage>& damage);
   /// Takes a record found in the file's pages, if it is a sound part and newer than the stored version.
   void add(const PageRecord& record);
@@ -30,13 +30,13 @@ class FoundParts {
   [[nodiscard]] float band(std::uint32_t grid) const;
   /// The maximum number of types: chunks are checked against these until the lost types are known.
   [[nodiscard]] const VoxelRegistry& any_types() const { return any_types_; }
-  /// Sees to it that there is such a grid, and types up to a number.
+  /// `add_grid` ensures that a grid exists, `add_types_up_to` that all types up to a number exist.
   void add_grid(std::uint32_t grid);
   void add_types_up_to(VoxelType last);
   /// Moves the parts added since the last call into `changes`.
   void move_to(WorldChanges& changes);
 
-  /// Sound ones.
+  /// Returns the number of sound parts.
   [[nodiscard]] std::size_t count() const { return count_; }
   /// Returns a line for each lost item.
   [[nodiscard]] std::vector<std::string> lost() const { return lost_; }

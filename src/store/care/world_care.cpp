@@ -64,7 +64,7 @@ class ReadProgress {
 Result<WorldSummary> summarize(const std::filesystem::path& path, const Progress& progress) {
   auto reader = open_reader(path);
   if (!reader) return reader.error();
-  // All of one moment.
+  // Reads one consistent state.
   if (auto begun = reader->connection().run("BEGIN"); !begun) return begun.error();
   const auto rules = read_rules(*reader);
   if (!rules) return rules.error();
@@ -110,7 +110,7 @@ class Check {
       : reader_(reader), reading_(progress, path) {}
 
   Result<WorldCheck> run() {
-    // All of one moment: others may write it meanwhile.
+    // Reads one consistent state, even if others write to the world.
     if (auto begun = reader_.connection().run("BEGIN"); !begun) return begun.error();
     auto rules = read_rules(reader_);
     if (rules) {

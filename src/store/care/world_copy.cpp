@@ -46,7 +46,7 @@ class Copy {
 
   Result<WorldCopy> run() {
     if (Status goes_on = tell(); !goes_on) return goes_on.error();
-    // All of one moment.
+    // Reads one consistent state.
     if (auto begun = reader_.connection().run("BEGIN"); !begun) return begun.error();
     auto rules = read_rules(reader_);
     if (!rules) return rules.error();
@@ -130,7 +130,7 @@ class Copy {
     return {};
   }
 
-  // False where it is damaged.
+  // Returns false if the chunk is damaged.
   bool count(const ChunkPlace& place, std::span<const std::byte> body) {
     const auto grid = rules_.grids.find(place.grid);
     const float band = grid == rules_.grids.end() ? WorldGrid{}.band : grid->second.band;

@@ -27,7 +27,7 @@ using namespace store;
 
 namespace {
 
-// Chunks that are saved at once, so that memory stays bounded.
+// Number of chunks per save; bounds memory.
 constexpr std::size_t kSlice = 256;
 
 /// Chunks on their way into the new world, with the types and grids that only they refer to.
@@ -80,7 +80,7 @@ class Repair {
     if (!reader) tell("the tables: " + reader.error().message);
     bool needs_scan = !reader;
     if (reader && !parts_.read(reader->connection(), check_.damage)) needs_scan = true;
-    // Parts first, wherever they are: chunks are checked against them.
+    // All parts come first: chunks are checked against them.
     if (needs_scan) {
       const Status scanned = scan_parts();
       if (!scanned) return scanned.error();
@@ -192,14 +192,14 @@ class Repair {
   std::unordered_map<ChunkPlace, std::uint64_t, ChunkPlaceHash> revisions_;
 };
 
-/// Replaces the damaged world by the new one; the damaged content and its log stay under another name.
+/// Replaces the damaged world by the new world; keeps the damaged content and its log under another name.
 Result<std::filesystem::path> replace(const std::filesystem::path& fresh, const std::filesystem::path& path) {
   auto backup = FileBackup::of(path, FileBackup::Older::Kept);
   if (!backup) return backup.error();
   const std::filesystem::path kept = FileBackup::name_for(path, FileBackup::Older::Kept);
   if (auto done = backup->keep(); !done) return done.error();
-  // From here on the damaged world has the other name alone, so that no crash leaves it without its log; the new one
-  // must not find that.
+  // From here on the damaged world has only the other name, so that no crash separates it from its log. The new world
+  // must not find that log.
   std::error_code removed;
   std::filesystem::remove(path, removed);
   if (removed) return make_error(ErrorCode::CannotWrite, removed.message());

@@ -46,8 +46,8 @@ Result<std::vector<KeyGap>> ChunkRows::each(FunctionRef<RowVerdict(std::int64_t,
   }
   std::set<std::int64_t> unsound;
   std::optional<KeyGap> gap;
-  std::int64_t next = kFirstKey;    // behind the last row that was sound
-  std::int64_t resume = kFirstKey;  // where to begin once more
+  std::int64_t next = kFirstKey;    // after the last sound row
+  std::int64_t resume = kFirstKey;  // first key of the next query
   std::uint64_t step = 1;
   while (true) {
     rows->bind(0, resume);
@@ -79,7 +79,7 @@ Result<std::vector<KeyGap>> ChunkRows::each(FunctionRef<RowVerdict(std::int64_t,
       return gaps;
     }
     if (row.error().code != ErrorCode::BadFormat) return row.error();
-    // Continues behind the damage, at first near it. Readable rows between two damaged pages may also be reported as
+    // Continues after the damage, at first near it. Readable rows between two damaged pages may also be reported as
     // damaged.
     if (!gap) gap = KeyGap{next, kLastKey, row.error().message};
     const std::uint64_t room = static_cast<std::uint64_t>(kLastKey) - static_cast<std::uint64_t>(next);

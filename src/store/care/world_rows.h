@@ -40,7 +40,7 @@ class ChunkRows {
   Connection& connection_;
 };
 
-/// "chunks (0, 0, 0) to (31, 4, 2) of grid 0", as far as it is known.
+/// Returns a description such as "chunks (0, 0, 0) to (31, 4, 2) of grid 0", as far as known.
 [[nodiscard]] std::string about(const KeyGap& gap, const std::map<std::int64_t, RegionPlace>& regions);
 
 }  // namespace quoin::store

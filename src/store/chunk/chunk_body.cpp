@@ -22,7 +22,7 @@ constexpr std::size_t kSectionsAt = 12;
 constexpr std::size_t kContentBytesAt = 40;
 // docs/decisions/archive/102-chunks-on-disk.md
 constexpr int kCompressionLevel = 1;
-// Buffers that one large chunk made are given back.
+// Larger buffers are freed after use.
 constexpr std::size_t kKeptBytes = std::size_t{4} << 20;
 
 std::uint64_t checksum_of(std::span<const std::byte> body) {
@@ -39,7 +39,7 @@ std::string text_of(const ChunkPlace& place) {
          std::to_string(place.grid);
 }
 
-/// More than any content with these sections, or exactly the most.
+/// Returns an upper bound of the content size with these sections.
 std::size_t max_content(std::uint8_t sections) {
   return ((sections & chunk_sections::kVoxels) != 0 ? kMaxVoxelSection : 0) +
          ((sections & chunk_sections::kData) != 0 ? kMaxDataSection : 0) +
@@ -150,7 +150,7 @@ Status ChunkEncoder::encode(const ChunkPlace& place, std::uint64_t revision, con
   return {};
 }
 
-// Appends the content compressed, if that is smaller.
+// Appends the compressed content if it is smaller.
 bool ChunkEncoder::compress(std::vector<std::byte>& out) {
   const std::size_t begin = out.size();
   if (content_.empty()) return false;

@@ -37,7 +37,7 @@
 namespace quoin::store {
 
 inline constexpr std::size_t kChunkBodyHeader = 44;
-/// The most bytes that a chunk's content can be: without data at voxels below 2 MiB.
+/// Maximum size of a chunk's content. Without voxel data it is below 2 MiB.
 inline constexpr std::size_t kMaxChunkContent = kMaxVoxelSection + kMaxDataSection + kMaxDensitySection;
 
 namespace chunk_sections {
@@ -62,7 +62,7 @@ struct ChunkBodyHeader {
 /// Writes the correct checksum to a body's first bytes. Requires: kChunkBodyHeader bytes.
 void put_checksum(std::span<std::byte> body);
 
-/// Makes bodies, one after the other; keeps its buffers. One thread at a time.
+/// Encodes bodies and reuses its buffers. One thread at a time.
 class ChunkEncoder {
  public:
   ChunkEncoder();
@@ -93,10 +93,10 @@ struct ChunkLimits {
   float band = 8.0F;                     ///< of its densities
 };
 
-/// Reads bodies, one after the other; keeps its buffers. One thread at a time.
+/// Decodes bodies and reuses its buffers. One thread at a time.
 ///
-/// Hostile bytes give an error, and take no more memory than kMaxChunkContent and a chunk that is made of it; where no
-/// data at voxels is announced, 5 MiB.
+/// Hostile bytes give an error, and take at most the memory of kMaxChunkContent and the chunk decoded from it, or 5 MiB
+/// if the header announces no voxel data.
 class ChunkDecoder {
  public:
   ChunkDecoder();

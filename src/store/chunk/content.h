@@ -29,7 +29,7 @@ template <class T>
   return load<T>(bytes, std::endian::little);
 }
 
-/// Appends a number, seven bits a byte, lowest first; the top bit is set in all bytes but the last.
+/// Appends a number, seven bits per byte, lowest first; the top bit is set in all bytes except the last.
 inline void put_short_number(std::vector<std::byte>& out, std::uint32_t number) {
   for (; number >= 0x80; number >>= 7) out.push_back(static_cast<std::byte>(number | 0x80U));
   out.push_back(static_cast<std::byte>(number));

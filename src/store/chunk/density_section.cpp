@@ -23,7 +23,7 @@ constexpr Half kMagnitude = 0x7FFF;
 using HalfRow = std::array<Half, kRow>;
 using FloatRow = std::array<float, kRow>;
 
-// How many halves from 0.
+// Returns the rank of a half: its signed distance from 0, counted in halves.
 std::int32_t rank_of(Half half) {
   const std::int32_t magnitude = half & kMagnitude;
   return (half & kSign) != 0 ? -magnitude : magnitude;
@@ -46,7 +46,7 @@ class Expectation {
  public:
   explicit Expectation(Half largest) : largest_(largest) {}
 
-  /// The next row, by z, then y.
+  /// Predicts a row. Requires: rows come in the order of z, then y.
   void expect(int y, int z, std::array<std::int32_t, kRow>& ranks) const {
     const auto row = static_cast<std::size_t>(y);
     const FloatRow& below = layers_[z & 1][y > 0 ? row - 1 : 0];
@@ -88,7 +88,7 @@ std::uint64_t solid_bits(const Half* row) {
 bool is_uniform(const DensityStorage& m, std::uint32_t entry) {
   if ((entry & ChunkStorage::kUniformSlab) != 0) return true;
   const Half* const values = m.row(entry, 0);
-  // All are equal when each equals the next.
+  // All are equal if each equals the next.
   return std::memcmp(values, values + 1, sizeof(Half) * (kSlabValues - 1)) == 0;
 }
 
@@ -202,7 +202,7 @@ Error wrong_density(std::size_t at) {
   return ContentReader::fault("invalid density: beyond the band, -0 or too close to 0", at);
 }
 
-// Requires: as many bytes as rows of mixed slabs take.
+// Decodes one row. Requires: `low` and `high` have the row's bytes.
 void read_row(const std::byte* low, const std::byte* high, const std::array<std::int32_t, kRow>& expected, Half* row) {
   std::array<std::uint16_t, kRow> numbers;
   for (std::size_t x = 0; x < kRow; ++x) {
@@ -216,7 +216,7 @@ void read_row(const std::byte* low, const std::byte* high, const std::array<std:
   }
 }
 
-/// Reads the slabs of one density into the storage, and finds the others.
+/// Reads the slabs of one density into the storage, and determines the mixed slabs.
 Result<std::size_t> read_slabs(ContentReader& reader, const StoredHalves& stored, DensityStorage& m) {
   if (!reader.has(kSlabs / 8)) return reader.cut_off();
   const auto mixed = reader.take_bytes(kSlabs / 8);

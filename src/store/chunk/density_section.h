@@ -15,7 +15,7 @@
 
 // The densities of a chunk's samples, and their materials. 256 slabs of 64 x 4 x 4 samples, by z / 4, then y / 4.
 //
-//   materials            as the types of voxels: voxel_runs.h
+//   materials            like voxel types: voxel_runs.h
 //   uint8 form           0: one density for all samples, 1: several
 //   form 0:
 //     uint16 density     as a half
@@ -38,13 +38,13 @@
 
 namespace quoin::store {
 
-/// The most bytes that densities can take, with their materials.
+/// Maximum size of densities with their materials.
 inline constexpr std::size_t kMaxDensitySection = kMaxVoxelSection + 3 + 32 + 512 + kChunkVoxels * sizeof(Half);
 
-/// Writes the densities of one chunk after the other. One thread at a time.
+/// Writes the densities of chunks. One thread at a time.
 class DensityWriter {
  public:
-  /// Appends densities and materials. Materials' data is left out: a field's has none.
+  /// Appends densities and materials. Omits materials' data, since fields have none.
   void write(const DensityChunk& chunk, VoxelRunWriter& materials, std::vector<std::byte>& out);
 
  private:
@@ -54,10 +54,10 @@ class DensityWriter {
   std::vector<std::byte> high_;
 };
 
-/// Reads them. One thread at a time.
+/// Reads the densities of chunks. One thread at a time.
 class DensityReader {
  public:
-  /// Errors: BadFormat, with the offset in the content; also for densities that `stored_density` never gives in that
+  /// Errors: BadFormat, with the offset in the content; also for densities that `stored_density` never returns in that
   /// band.
   [[nodiscard]] Result<DensityChunk> read(ContentReader& reader, VoxelRunReader& materials, std::size_t type_count,
                                           float band);

@@ -19,7 +19,7 @@ IVec3 local_of_place(std::uint32_t place) {
   return {at % kChunkEdge, at / kChunkEdge % kChunkEdge, at / kChunkEdge / kChunkEdge};
 }
 
-/// One voxel's numbers after the other, each from its own stream.
+/// The streams of the voxels' numbers.
 struct Streams {
   ContentReader gaps, states, lengths;
   ContentReader bytes;

@@ -24,7 +24,7 @@ namespace quoin::store {
 
 /// The largest total data of a chunk's voxels that a world can store.
 inline constexpr std::size_t kMaxChunkDataBytes = std::size_t{64} << 20;
-/// The most that this can take of a chunk's content.
+/// Maximum size of this section.
 inline constexpr std::size_t kMaxDataSection = 16 + kChunkVoxels * (3 + 5 + 3) + kMaxChunkDataBytes;
 
 /// Appends the data of a chunk's voxels. Errors: LimitExceeded; `out` is then unchanged. Requires: some voxel has data.

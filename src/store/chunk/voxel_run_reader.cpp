@@ -29,7 +29,7 @@ Error wrong_index(std::size_t types, std::size_t at) {
   return ContentReader::fault("invalid palette index: too early, repeated or not below " + std::to_string(types), at);
 }
 
-// Fields each XORed with all before it in the word.
+// Returns a word whose fields are XORed with all fields before them.
 template <int kBits>
 std::uint64_t prefix_xor(std::uint64_t word) {
   for (int distance = kBits; distance < 64; distance *= 2) word ^= word << distance;
@@ -41,8 +41,8 @@ std::uint64_t prefix_xor(std::uint64_t word) {
 struct VoxelRunReader::Streams {
   const std::byte* length = nullptr;
   const std::byte* lengths_end = nullptr;
-  const std::byte* low = nullptr;   // null where runs alternate
-  const std::byte* high = nullptr;  // null to 256 types
+  const std::byte* low = nullptr;   // null if runs alternate
+  const std::byte* high = nullptr;  // null for up to 256 types
   std::size_t lengths_at = 0;       // in the content
   std::size_t indices_at = 0;
   std::uint32_t runs = 0;
@@ -55,7 +55,7 @@ struct VoxelRunReader::Streams {
     const auto index = std::to_integer<std::uint32_t>(low[i]);
     return kBits < 16 ? index : index | std::to_integer<std::uint32_t>(high[i]) << 8;
   }
-  /// 0 where the stream is cut off or a number too large.
+  /// Returns 0 if the stream ends or a number is too large.
   [[nodiscard]] std::uint32_t take_voxels() {
     if (length == lengths_end) return 0;
     const auto one = std::to_integer<std::uint32_t>(*length++);
@@ -108,7 +108,7 @@ Status VoxelRunReader::read_palette(ContentReader& reader, std::size_t count, st
   return status;
 }
 
-/// Storage that is filled four layers at a time.
+/// Builds storage, four layers at a time.
 template <int kBits>
 class VoxelRunReader::Builder {
  public:
@@ -146,7 +146,7 @@ class VoxelRunReader::Builder {
       }
       const std::uint32_t index = s.template take_index<kBits>();
       const std::uint32_t voxels = s.take_voxels();
-      // The first has to be 0, and all others differ from the one before.
+      // The first index must be 0, and each index must differ from the previous one.
       if (index >= seen_) [[unlikely]] {
         if (index > seen_ || index >= types) fault = Fault::Index;
         ++seen_;
@@ -177,7 +177,7 @@ class VoxelRunReader::Builder {
     return fault;
   }
 
-  /// Voxels so far, and indices.
+  /// Return the numbers of voxels and of palette indices read so far.
   [[nodiscard]] std::uint32_t voxels() const { return voxel_; }
   [[nodiscard]] std::uint32_t seen() const { return seen_; }
 
@@ -185,7 +185,7 @@ class VoxelRunReader::Builder {
   void end_layers() {
     const auto first_y = static_cast<int>(layers_begin_ / (kChunkEdge * kChunkEdge));
     std::array<std::uint32_t, kRows> before;  // index of the voxel before each row
-    std::array<std::uint32_t, kRows> first;   // of its first; with kMixed where others follow
+    std::array<std::uint32_t, kRows> first;   // index of its first voxel; with kMixed if others follow
     for (std::uint32_t row = 0; row < kRows; ++row) {
       constexpr std::uint64_t kField = (std::uint64_t{1} << kBits) - 1;
       std::uint64_t& changes = changes_[row * kBits];
@@ -262,7 +262,7 @@ class VoxelRunReader::Builder {
     counts[2][z] = static_cast<std::uint16_t>(counts[2][z] + solid);
   }
 
-  // And leaves no changes.
+  // Writes a row and clears its changes.
   static void put_row(std::uint64_t* changes, std::uint32_t before, std::uint64_t* out) {
     std::uint64_t carry = before;
     for (int i = 0; i < kBits; ++i) {
@@ -295,7 +295,7 @@ class VoxelRunReader::Builder {
   std::uint32_t last_ = 0;                  // index of the last voxel of the rows so far
   bool is_last_solid_ = false;
   std::uint32_t layers_begin_ = 0;  // their first voxel
-  std::uint32_t voxel_ = 0;         // that the next run starts with
+  std::uint32_t voxel_ = 0;         // first voxel of the next run
   std::uint32_t before_ = 0;        // index of the last run
   std::uint32_t seen_ = 0;          // indices so far
 };

@@ -1,5 +1,5 @@
-// From the packed rows of a chunk to runs: a voxel starts one where it differs from the voxel before, XORed a word of
-// voxels at a time.
+// Converts the packed rows of a chunk to runs. A voxel starts a run if it differs from the previous voxel, tested by
+// XOR on a word of voxels at a time.
 
 #include <algorithm>
 #include <array>
@@ -18,7 +18,7 @@ namespace {
 constexpr std::uint32_t kUnseen = 0xFFFF'FFFFU;
 constexpr std::size_t kAllTypes = std::size_t{1} << 16;
 
-// One bit, the lowest, of each of a word's fields that is not 0.
+// Returns the lowest bit of each non-zero field of a word.
 template <int kBits>
 std::uint64_t fields_not_0(std::uint64_t word) {
   for (int width = 1; width < kBits; width *= 2) word |= word >> width;
@@ -119,7 +119,7 @@ struct VoxelRunWriter::Scan {
 
   VoxelRunWriter& writer;
   const ChunkStorage& m;
-  std::uint32_t first = 0;  // voxel of the run that has no end yet
+  std::uint32_t first = 0;  // first voxel of the current run
   std::uint8_t* length = nullptr;
   std::uint16_t* index = nullptr;
 };

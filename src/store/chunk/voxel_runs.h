@@ -30,10 +30,10 @@
 
 namespace quoin::store {
 
-/// The most bytes that a chunk's types can take.
+/// Maximum size of a chunk's types.
 inline constexpr std::size_t kMaxVoxelSection = 3 + 2 * (std::size_t{1} << 16) + kChunkVoxels * sizeof(VoxelType);
 
-/// Writes the types of one chunk after the other. One thread at a time. Memory: 1.1 MiB once there was a noisy chunk.
+/// Writes the types of chunks. One thread at a time. Memory: 1.1 MiB after a noisy chunk.
 class VoxelRunWriter {
  public:
   /// Appends the runs of a chunk, without its data. Cost: O(rows + runs).
@@ -51,7 +51,7 @@ class VoxelRunWriter {
   std::vector<std::uint16_t> indices_;
 };
 
-/// Reads them, straight into a chunk's storage. One thread at a time. Memory: 0.6 MiB once there was a noisy chunk.
+/// Reads the types of chunks directly into their storage. One thread at a time. Memory: 0.6 MiB after a noisy chunk.
 class VoxelRunReader {
  public:
   /// Errors: BadFormat, with the offset in the content; also for types that are not below `type_count`.

@@ -15,10 +15,10 @@ namespace {
 
 // Time that a read or a commit waits for another process: long enough for any Quoin process, short enough to report.
 constexpr int kBusyMilliseconds = 10'000;
-// A row is a chunk, a part or a value; Quoin writes no larger ones.
+// Limit for a row: a chunk, a part or a value. Quoin writes no larger rows.
 constexpr int kMaxRowBytes = 256 << 20;
 
-// A system's reason where there is one, else SQLite's own words.
+// Returns the system's error text if there is one, otherwise SQLite's.
 std::string reason_of(sqlite3* database, int code) {
   const int number = database == nullptr ? 0 : sqlite3_system_errno(database);
   const int kind = code & 0xFF;

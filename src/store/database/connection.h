@@ -28,7 +28,7 @@ class Statement {
 
   /// Moves to the next row; returns false after the last. Errors: those of the database; the statement is then reset.
   [[nodiscard]] Result<bool> step();
-  /// Runs a statement that gives no rows, and resets it.
+  /// Runs a statement without rows, and resets it.
   [[nodiscard]] Status run();
   void reset();
 
@@ -71,21 +71,21 @@ class Connection {
     Write,
     Create,
   };
-  /// `vfs`: the name of a registered file system of SQLite's; null: the usual one.
+  /// `vfs`: the name of a registered SQLite file system; null: the default.
   [[nodiscard]] static Result<Connection> open(const std::string& path, Mode mode, const char* vfs = nullptr);
-  /// A database in memory, of its bytes, to be read.
+  /// Opens a database in memory for reading.
   [[nodiscard]] static Result<Connection> open(std::span<const std::byte> bytes);
 
   [[nodiscard]] Result<Statement> prepare(std::string_view sql);
   /// Runs statements without rows, or ignores their rows.
   [[nodiscard]] Status run(const char* sql);
-  /// The first column of the first row, as a number or as text. Errors: also where there is no row.
+  /// Return the first column of the first row, as a number or as text. Errors: also if there is no row.
   [[nodiscard]] Result<std::int64_t> number(const char* sql);
   [[nodiscard]] Result<std::string> text(const char* sql);
 
   /// Writes the write-ahead log's content into the database, except frames that readers still need.
   [[nodiscard]] Status checkpoint();
-  /// Pages in the write-ahead log as the last commit left it.
+  /// Returns the number of pages in the write-ahead log after the last commit.
   [[nodiscard]] int log_pages() const { return *log_pages_; }
   [[nodiscard]] bool is_in_transaction() const;
   /// Closes the connection. Errors: those of SQLite for a failed close.

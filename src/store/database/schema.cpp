@@ -16,7 +16,7 @@ namespace quoin::store {
 
 namespace {
 
-// Bits 0 to 4 of a number to every third bit.
+// Spreads bits 0 to 4 of a number to every third bit.
 std::uint32_t spread(std::uint32_t bits) {
   bits = (bits | bits << 8) & 0x100FU;
   bits = (bits | bits << 4) & 0x10C3U;

@@ -51,20 +51,20 @@ struct RegionPlace {
   }
 };
 
-/// All chunks that there can be.
+/// The range of possible chunks.
 inline constexpr IBox kAllChunks{{-(1 << 26), -(1 << 26), -(1 << 26)}, {1 << 26, 1 << 26, 1 << 26}};
 
 [[nodiscard]] RegionPlace region_of(const ChunkPlace& place);
 [[nodiscard]] std::int64_t key_of(std::int64_t region, IVec3 chunk);
-/// The chunk that a key names in a region of that place. The upper bits of the key are not looked at.
+/// Returns the chunk of a key in a region. Ignores the upper bits of the key.
 [[nodiscard]] IVec3 chunk_of_key(const RegionPlace& region, std::int64_t key);
 [[nodiscard]] inline std::int64_t first_key(std::int64_t region) {
   return region << kRegionBits;
 }
-/// Regions with ids beyond would have keys that are no int64.
+/// Maximum region id: keys of larger ids would overflow int64.
 inline constexpr std::int64_t kMaxRegion = (std::int64_t{1} << (62 - kRegionBits)) - 1;
 
-/// Names a part: a number, or a name.
+/// The id of a part: a number or a name.
 using PartId = std::variant<std::int64_t, std::string>;
 struct PartKey {
   std::string kind;
@@ -78,7 +78,7 @@ struct Part {
   std::span<const std::byte> body;
 };
 
-/// The greatest number of a part: far more than there can be, and safe to count on from.
+/// Maximum number of a part: far more parts than possible, and safe to increment.
 inline constexpr std::int64_t kMaxPartNumber = std::int64_t{1} << 53;
 
 /// Kinds of parts.
@@ -101,16 +101,16 @@ inline constexpr const char* kValue = "value";
 inline constexpr const char* kWorld = "world";
 }  // namespace part
 
-/// A text as the body of a part.
+/// Converts a text to the body of a part.
 [[nodiscard]] std::vector<std::byte> body_of(std::string_view text);
 /// Parses a body of decimal digits; returns 0 if it is none.
 [[nodiscard]] std::uint64_t number_in(std::span<const std::byte> digits);
 /// Binds the id of a part.
 void bind(Statement& statement, int parameter, const PartId& id);
 
-/// XXH3 (64 bits) of kind, id, revision and body.
+/// Returns the XXH3 (64 bits) of kind, id, revision and body.
 [[nodiscard]] std::uint64_t sum_of(const Part& part);
-/// "type 7", "value \"inventory\"".
+/// Returns a text such as "type 7" or "value \"inventory\"".
 [[nodiscard]] std::string name_of(const PartKey& key);
 
 }  // namespace quoin::store

@@ -28,7 +28,7 @@ Error refused(int number) {
   return make_error(ErrorCode::CannotWrite, "cannot lock it: " + std::generic_category().message(number));
 }
 
-// Whether the file that a descriptor is of still has that name: its last holder may have removed it meanwhile.
+// Returns true if the open file still has that name: its last holder may have removed it.
 bool is_named(int descriptor, const std::filesystem::path& file) {
   struct stat open_file {};
   struct stat named {};
@@ -74,7 +74,7 @@ WorldLock::~WorldLock() {
 }
 
 bool has_locks(const std::filesystem::path& world) {
-  // Of the folder: a descriptor of the world itself would take this process's locks on it along when it is closed.
+  // Queries the folder: closing a descriptor of the world itself would release this process's locks on it.
   const std::filesystem::path folder = world.parent_path();
   const int descriptor = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor < 0) return true;

@@ -9,7 +9,7 @@ namespace quoin::store {
 /// Ensures that only this process writes a world: a lock on NAME-lock that the system releases when the process ends.
 class WorldLock {
  public:
-  /// Errors: CannotWrite: another writer has it, or there are no locks on this file system.
+  /// Errors: CannotWrite if another writer has it, or the file system has no locks.
   [[nodiscard]] static Result<WorldLock> take(const std::filesystem::path& world);
   /// Holds no lock.
   WorldLock() = default;

@@ -1,5 +1,5 @@
-// A world of Luanti's: a database with a row a block of 16^3 nodes, by its place. Its axes are left-handed: z is turned
-// round, so that block z is -1 - z in ours. A part is up to eight of our chunks on top of each other.
+// A Luanti world: a database with one row per block of 16^3 nodes, by position. Its axes are left-handed: z is
+// mirrored, so that block z becomes -1 - z in Quoin. A part is up to eight Quoin chunks on top of each other.
 
 #include <algorithm>
 #include <condition_variable>
@@ -34,7 +34,7 @@ namespace fs = std::filesystem;
 
 constexpr int kBlocksOfChunk = kChunkEdge / kBlockEdge;  // along an edge
 constexpr int kLowestBlock = -2048;
-constexpr int kHighestBlock = 2048;  // the first that there cannot be
+constexpr int kHighestBlock = 2048;  // the first invalid coordinate
 constexpr int kChunksOfPart = 8;
 /// Size limit of a row. Luanti's rows have a few kilobytes; a larger zlib stream could expand to gigabytes.
 constexpr std::size_t kMaxRow = std::size_t{16} << 20;
@@ -79,7 +79,7 @@ struct Reader {
   MapBlock block{};
 };
 
-/// Readers of a database, each used by one thread at a time; of one in memory there is one.
+/// Readers of a database, each used by one thread at a time. A database in memory has one reader.
 class Readers {
  public:
   Readers(fs::path path, std::vector<std::byte> bytes) : path_(std::move(path)), bytes_(std::move(bytes)) {}
@@ -173,7 +173,7 @@ class Readers {
   int used_ = 0;
 };
 
-/// The types of the nodes that were met so far. Threads: any function from any thread, also at once.
+/// The types of the nodes found so far. Threads: all functions may run concurrently.
 class NodeTypes {
  public:
   /// Returns kAir for names without a node. Errors: LimitExceeded.
@@ -206,7 +206,7 @@ class NodeTypes {
   std::map<std::string, VoxelType, std::less<>> numbers_;
 };
 
-/// A chunk of ours that blocks are put into.
+/// Builds a Quoin chunk from blocks.
 class ChunkBuilder {
  public:
   explicit ChunkBuilder(NodeTypes& types) : types_(types), voxels_(kChunkVoxels) {}
@@ -243,7 +243,7 @@ class ChunkBuilder {
   NodeTypes& types_;
   std::vector<VoxelType> voxels_;
   std::vector<std::pair<IVec3, std::uint32_t>> states_;
-  std::vector<VoxelType> types_of_;  // by place in a block's names
+  std::vector<VoxelType> types_of_;  // by index in a block's names
 };
 
 class LuantiSource final : public ChunkSource {
@@ -388,7 +388,7 @@ Result<std::unique_ptr<ChunkSource>> open(std::unique_ptr<Readers> readers, std:
   }
   std::vector<IBox> parts = extent->parts();
   for (const IBox& part : parts) info.chunks = unite(info.chunks, part);
-  // Where a player begins is not in the map; the game looks for a place around the middle of the world.
+  // The map does not store the spawn position; the game searches around the middle of the world.
   const bool has_middle =
       std::ranges::any_of(parts, [](const IBox& part) { return part.min.x == 0 && part.min.z == -1; });
   if (has_middle) info.spawn = DVec3(0.0, 0.0, -0.5);

@@ -7,7 +7,7 @@
 //                      u32 time, names
 //                      timers
 //   version 29         u8 version, then zstd: u8 flags, u16 light, u32 time, names, u8 2 or 1, u8 2,
-//                      the nodes as they are, metadata, objects, timers
+//                      the nodes uncompressed, metadata, objects, timers
 //   names              u8 0, u16 count, each u16 number, u16 size, bytes
 
 #include "store/luanti/map_block.h"
@@ -50,7 +50,7 @@ Result<std::size_t> read_widths(ByteReader& reader) {
   return content;
 }
 
-/// Requires: as many bytes as 4096 nodes have.
+/// Sets the block's nodes. Requires: `content` has the bytes of 4096 nodes.
 void put_nodes(std::span<const std::byte> content, std::size_t width, MapBlock& block) {
   const std::byte* const param2 = content.data() + kBlockNodes * (width + 1);
   for (std::size_t i = 0; i < kBlockNodes; ++i) {
@@ -89,7 +89,7 @@ Status read_names(ByteReader& reader, std::vector<std::uint32_t>& name_of, std::
   return {};
 }
 
-/// Turns the numbers of a block's own table into places in its names.
+/// Replaces the numbers of a block's own table by indices into its names.
 Status name_nodes(std::size_t at, const std::vector<std::uint32_t>& name_of, MapBlock& block) {
   for (std::size_t i = 0; i < kBlockNodes; ++i) {
     const std::uint16_t number = block.nodes[i];
@@ -114,7 +114,7 @@ Status skip_objects(ByteReader& reader) {
   return {};
 }
 
-/// Versions before zstd.
+/// Reads versions before zstd.
 Status read_zlib(std::span<const std::byte> row, int version, std::vector<std::uint32_t>& name_of, MapBlock& block) {
   ByteReader reader(row);
   static_cast<void>(reader.take(version >= kFirstWithLight ? 4 : 2));
@@ -142,7 +142,7 @@ Status read_zlib(std::span<const std::byte> row, int version, std::vector<std::u
   return name_nodes(nodes_at, name_of, block);
 }
 
-/// `content`: of a row's frame.
+/// Reads the decompressed content of a zstd row.
 Status read_expanded(std::span<const std::byte> content, std::vector<std::uint32_t>& name_of, MapBlock& block) {
   ByteReader reader(content);
   static_cast<void>(reader.take(1 + 2 + 4));

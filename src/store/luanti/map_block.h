@@ -19,8 +19,8 @@ inline constexpr std::size_t kBlockNodes = 4096;
 
 /// A block of a map, 16^3 nodes, x fastest, then y, then z, in Luanti's axes.
 struct MapBlock {
-  std::vector<std::string> names;                  ///< of the nodes that are in it
-  std::array<std::uint16_t, kBlockNodes> nodes{};  ///< places in `names`
+  std::vector<std::string> names;                  ///< of the nodes in the block
+  std::array<std::uint16_t, kBlockNodes> nodes{};  ///< indices into `names`
   std::array<std::uint8_t, kBlockNodes>
       param2{};  ///< rotation, liquid level or colour, as defined by the node's definition
 };
@@ -48,7 +48,7 @@ class MapBlockReader {
   };
   std::unique_ptr<ZSTD_DCtx_s, Free> context_;
   std::vector<std::byte> content_;
-  std::vector<std::uint32_t> name_of_;  // place in the block's names, by number of its table
+  std::vector<std::uint32_t> name_of_;  // index into the block's names, by number in its table
 };
 
 }  // namespace quoin::store::luanti

@@ -65,7 +65,7 @@ void ChunkCache::trim() {
     if (entry.used != now_) old.emplace_back(entry.used, place);
   }
   std::ranges::sort(old, {}, [](const auto& each) { return each.first; });
-  // Some more than must go: it is not looked through for each chunk.
+  // Drops more than necessary, so that the cache is not searched for each chunk.
   for (const auto& [used, place] : old) {
     if (bytes_ <= max_bytes_ / 8 * 7) return;
     const auto found = loaded_.find(place);

@@ -17,16 +17,16 @@ namespace quoin::store {
 /// The chunks of a world's grid, level 0; the most recently used ones are in memory.
 class ChunkCache {
  public:
-  /// `bytes`: of voxels that are kept. `world` must outlive it. Errors of reading keys: `status`.
+  /// `bytes`: limit of the kept voxels. `world` must outlive it. Errors of reading keys: see `status`.
   ChunkCache(const WorldStore& world, std::uint32_t grid, std::size_t bytes);
-  /// The errors of reading the world itself.
+  /// Returns the errors of reading the world itself.
   [[nodiscard]] const Status& status() const { return status_; }
 
-  /// All that there are, by z, then y, then x.
+  /// Returns the coordinates of all chunks, sorted by z, then y, then x.
   [[nodiscard]] std::span<const IVec3> places() const { return places_; }
   /// Reads the missing chunks on several threads; skips addresses without a chunk.
   void load(std::span<const IVec3> places, Threads threads);
-  /// Null where there is none, or it is not loaded. Lifetime: until the next `trim`.
+  /// Returns null if the chunk does not exist or is not loaded. Lifetime: until the next `trim`.
   [[nodiscard]] const Chunk* find(IVec3 place) const;
   /// Drops chunks that are not part of the last load and exceed the limit.
   void trim();
@@ -35,7 +35,7 @@ class ChunkCache {
   [[nodiscard]] std::int64_t voxels() const { return voxels_; }
   [[nodiscard]] std::int64_t data() const { return data_; }
   [[nodiscard]] bool has_densities() const { return has_densities_; }
-  /// A line for each damaged chunk; these count as air.
+  /// Returns a line for each damaged chunk; these count as air.
   [[nodiscard]] const std::vector<std::string>& damage() const { return damage_; }
 
  private:

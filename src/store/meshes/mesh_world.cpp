@@ -27,7 +27,7 @@ using namespace store;
 
 namespace {
 
-// Chunks that are meshed at once.
+// Number of chunks meshed at once.
 constexpr std::size_t kBatch = 32;
 // Interval for releasing mapped file pages: memory statistics do not attribute these pages to the mesher.
 constexpr auto kGiveBack = std::chrono::milliseconds(10);
@@ -100,7 +100,7 @@ class SpooledMesh {
   std::array<Surface, kSurfaceClasses> surfaces_;
   std::mutex mutex_;
   std::condition_variable_any wake_;
-  std::jthread giver_;  // last: it ends first
+  std::jthread giver_;  // last member: it ends first
 };
 
 /// Reads voxels of a grid across chunks.
@@ -260,7 +260,7 @@ class WorldMesher {
     return part;
   }
 
-  /// The chunk that vertices are relative to: floats are exact near it.
+  /// Returns the chunk that vertices are relative to: floats are exact near it.
   static Result<IVec3> origin_of(std::span<const IVec3> places) {
     constexpr int kMostChunks = (1 << 24) / kChunkEdge;
     constexpr int kNearChunks = kNearVoxels / kChunkEdge;

@@ -21,7 +21,7 @@ Status failed(int number) {
                     "cannot write a temporary file: " + std::generic_category().message(number));
 }
 
-// A file that has no name, or loses it at once.
+// Opens a file without a name, or removes its name at once.
 int open_nameless(const std::filesystem::path& folder) {
   const std::string where = folder.empty() ? "." : folder.string();
   const int file = ::open(where.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);

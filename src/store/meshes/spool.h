@@ -18,16 +18,16 @@ class Spool {
   Spool& operator=(Spool&& other) noexcept;
   ~Spool();
 
-  /// Errors: CannotWrite (a full disk, a folder that is not there).
+  /// Errors: CannotWrite (a full disk, a missing folder).
   [[nodiscard]] Status append(std::span<const std::byte> bytes, const std::filesystem::path& folder);
   template <class T>
   [[nodiscard]] Status append(const std::vector<T>& values, const std::filesystem::path& folder) {
     return append(std::as_bytes(std::span(values)), folder);
   }
-  /// From now on it is read. Errors: as `append`.
+  /// Ends writing; values can then be read. Errors: as `append`.
   [[nodiscard]] Status finish();
 
-  /// Lifetime: as the spool. Requires: finished, and written as values of that type.
+  /// Returns all values. Lifetime: as the spool. Requires: finished, and written as values of that type.
   template <class T>
   [[nodiscard]] std::span<const T> values() const {
     return {static_cast<const T*>(mapped_), static_cast<std::size_t>(written_) / sizeof(T)};

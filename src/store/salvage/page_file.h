@@ -13,7 +13,7 @@
 
 namespace quoin::store {
 
-/// A file that is read at places. Owns its descriptor.
+/// A file with random access. Owns its descriptor.
 class RandomFile {
  public:
   /// Returns nullopt if there is no such file. Errors: CannotRead.
@@ -45,7 +45,7 @@ struct PageLayout {
 
 /// The state of the pages: the file alone, or with the log's frames up to a given one.
 struct PageView {
-  std::size_t frames = 0;  ///< of the log that count
+  std::size_t frames = 0;  ///< number of log frames in this state
 };
 
 /// The pages of a database and of its log. Log pages are numbered by frame: several frames may hold one page.
@@ -54,7 +54,7 @@ class PageFile {
   /// Errors: CannotRead.
   [[nodiscard]] static Result<PageFile> open(const std::filesystem::path& database);
 
-  /// Layouts that it may have, the likeliest first.
+  /// Returns the possible layouts, most likely first.
   [[nodiscard]] std::vector<PageLayout> layouts() const;
   void set_layout(const PageLayout& layout);
   [[nodiscard]] const PageLayout& layout() const { return layout_; }
@@ -64,9 +64,9 @@ class PageFile {
   [[nodiscard]] std::uint64_t bytes() const { return file_.size() + (log_ ? log_->size() : 0); }
   /// Requires: index < page_count(); `page` holds a page.
   void read(std::size_t index, std::span<std::byte> page) const;
-  /// The states in which a page may have been written that lead from it to others, the likeliest first.
+  /// Returns the states in which references from a page to other pages may be valid, most likely first.
   [[nodiscard]] std::vector<PageView> views(std::size_t index) const;
-  /// A page by its number, 1 or more, in a state. False where there is none.
+  /// Reads a page by its number, 1 or more, in a state. Returns false if there is none.
   [[nodiscard]] bool read(std::uint32_t number, PageView view, std::span<std::byte> page) const;
 
  private:

@@ -15,18 +15,18 @@
 namespace quoin::store {
 namespace {
 
-// Longer records count as bytes that look like one by chance.
+// Longer records are assumed to be bytes that look like a record by chance.
 constexpr std::uint64_t kMaxPayload = std::uint64_t{128} << 20;
 // Limit of overflow page reads relative to the file's size: a sound page is read once or twice.
 constexpr std::uint64_t kMaxReadsOfByte = 64;
-// Of a file that is searched for how it is cut into pages.
+// Number of bytes of a file scanned to find its page size.
 constexpr std::uint64_t kSampledBytes = std::uint64_t{1} << 30;
 constexpr std::size_t kMaxColumns = 64;
 
-/// A varint of SQLite's: seven bits a byte, highest first, eight in the ninth byte.
+/// A SQLite varint: seven bits per byte, highest first, eight in the ninth byte.
 struct Varint {
   std::uint64_t value = 0;
-  std::size_t bytes = 0;  ///< 0: cut off
+  std::size_t bytes = 0;  ///< 0: incomplete
 };
 
 Varint varint_at(std::span<const std::byte> from, std::size_t at) {
@@ -40,7 +40,7 @@ Varint varint_at(std::span<const std::byte> from, std::size_t at) {
   return {};
 }
 
-/// The number that ends before `end` and takes just `bytes`.
+/// Returns the varint that ends before `end` and has exactly `bytes` bytes.
 std::optional<std::uint64_t> varint_before(std::span<const std::byte> from, std::size_t end, std::size_t bytes) {
   if (end < bytes) return std::nullopt;
   const Varint found = varint_at(from.first(end), end - bytes);
@@ -62,7 +62,7 @@ std::size_t local_bytes(std::uint64_t payload, std::size_t usable) {
   return local <= usable - 35 ? local : least;
 }
 
-/// A payload whose beginning was found in a page.
+/// A payload that begins in a page.
 struct Payload {
   std::size_t at = 0;  ///< in the page
   std::uint64_t bytes = 0;
@@ -90,7 +90,7 @@ class Scan {
     const std::size_t end = payload.at + local + (local < payload.bytes ? 4 : 0);
     return payload.at <= usable() && end <= usable();
   }
-  /// Calls `is_it(payload)` for each state that the pages of a payload have, until that returns true.
+  /// Calls `is_it(payload)` for each possible state of a payload's pages, until it returns true.
   /// Requires: fits(payload).
   template <class IsIt>
   void each_state(std::span<const std::byte> page, std::size_t index, const Payload& payload, IsIt&& is_it) {
@@ -113,8 +113,8 @@ class Scan {
   }
   [[nodiscard]] bool is_too_slow() const { return is_too_slow_; }
 
-  /// Finds out how the file is cut into pages: so that a body that lies on several has a right checksum, or where none
-  /// does, so that most bodies have.
+  /// Determines the page layout: the layout for which a body that spans several pages has a correct checksum, or if
+  /// there is none, the layout with the most correct bodies.
   void find_layout();
 
  private:
@@ -149,7 +149,7 @@ struct FoundBody {
   std::size_t header_bytes = 0;  ///< of the record
 };
 
-/// Before a body stands the record's header: its length, NULL, and a blob's length as 2 n + 12.
+/// Parses the record header before a body: its length, NULL, and the blob's length as 2 n + 12.
 std::optional<FoundBody> row_of_body(std::span<const std::byte> page, std::size_t body_at) {
   for (std::size_t bytes = 1; bytes <= 5; ++bytes) {
     const std::size_t header = bytes + 2;
@@ -164,7 +164,7 @@ std::optional<FoundBody> row_of_body(std::span<const std::byte> page, std::size_
   return std::nullopt;
 }
 
-/// The row's number, which stands before the payload, behind the payload's length.
+/// Returns the row's key, which lies between the payload's length and the payload.
 std::int64_t key_before(std::span<const std::byte> page, const Payload& payload) {
   for (std::size_t bytes = 1; bytes <= 9 && bytes < payload.at; ++bytes) {
     const auto key = varint_before(page, payload.at, bytes);
@@ -176,8 +176,7 @@ std::int64_t key_before(std::span<const std::byte> page, const Payload& payload)
   return kLostKey;
 }
 
-/// Calls `visit(key, body, whether it lies on several pages)` for the bodies that begin in a page, until it returns
-/// false.
+/// Calls `visit(key, body, spans_pages)` for the bodies that begin in a page, until it returns false.
 template <class Visit>
 bool bodies_of_page(Scan& scan, std::span<const std::byte> page, std::size_t index, Visit&& visit) {
   constexpr std::size_t kMagicInBody = 8;
@@ -226,7 +225,7 @@ void Scan::find_layout() {
   file_.set_layout(best);
 }
 
-/// The header of a record, if its lengths agree with the payload's.
+/// Reads the header of a record. Returns false if its lengths disagree with the payload's.
 bool read_types(std::span<const std::byte> page, const Payload& payload, std::vector<std::uint64_t>& types) {
   const std::size_t local = std::min<std::uint64_t>(payload.bytes, page.size() - payload.at);
   const auto record = page.subspan(payload.at, local);

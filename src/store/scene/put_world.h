@@ -6,7 +6,7 @@
 
 namespace quoin::store {
 
-/// Gives a closed world the name of another file, in place of a world or a file that had it, whole after any power cut.
+/// Renames a closed world and replaces any file with that name. After a power cut the file is complete, old or new.
 /// Errors: CannotWrite.
 [[nodiscard]] Status put_world_in_place(const std::filesystem::path& from, const std::filesystem::path& to);
 

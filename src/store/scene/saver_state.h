@@ -13,19 +13,19 @@
 
 namespace quoin::store {
 
-/// The numbers under which a world has the elements of a scene.
+/// The numbers of a scene's elements in a world.
 template <class T>
 struct Numbers {
   std::map<Handle<T>, std::int64_t> numbers;
   std::int64_t next = 0;
 
-  /// A new one where it has none.
+  /// Returns an element's number; assigns a new number if it has none.
   std::int64_t of(Handle<T> handle) {
     const auto [found, is_new] = numbers.try_emplace(handle, next);
     if (is_new) ++next;
     return found->second;
   }
-  /// Forgets it.
+  /// Removes an element and returns its number.
   std::optional<std::int64_t> take(Handle<T> handle) {
     const auto found = numbers.find(handle);
     if (found == numbers.end()) return std::nullopt;
@@ -45,8 +45,8 @@ struct SavedGrid {
   ChangeCursor voxels;
   ChangeCursor data;
   ChangeCursor densities;
-  std::vector<IVec3> unread;    ///< chunks that are damaged: the scene lacks them, and they stay
-  bool is_partly_read = false;  ///< there may be others that the scene lacks
+  std::vector<IVec3> unread;    ///< damaged chunks: missing in the scene, and kept in the world
+  bool is_partly_read = false;  ///< the scene may lack other chunks
 };
 
 /// The part of a scene that a world has stored.
@@ -58,13 +58,13 @@ struct SaverState {
   Numbers<SceneGroup> groups;
   Numbers<SceneLayer> layers;
   std::vector<Lamp> lamps;
-  std::vector<std::int64_t> lamp_numbers;  ///< that the world has
+  std::vector<std::int64_t> lamp_numbers;  ///< numbers of the lamps in the world
   WorldView view;
   std::size_t saved_cameras = 0;
   bool is_view_new = false;
   bool is_begun = false;    ///< the world has a state of this scene
-  bool owes_lamps = false;  ///< they lie under other numbers than in the scene
-  bool owes_all = false;    ///< a save was refused: the next one is to hold everything
+  bool owes_lamps = false;  ///< lamp numbers differ from the scene's order
+  bool owes_all = false;    ///< a save was refused: the next save must contain everything
   std::vector<PartKey> owed_removals;
 };
 

@@ -28,11 +28,11 @@ namespace {
 
 using Json = nlohmann::json;
 
-/// Under which an unfinished world keeps how far it came; a finished one has no such value.
+/// Name of the value that stores an unfinished import's progress; finished worlds do not have it.
 constexpr const char* kProgressValue = "quoin.import";
-/// Lines of damage that are kept; the others are counted.
+/// Maximum number of stored damage lines; further lines are only counted.
 constexpr std::size_t kMaxLines = 1'000;
-/// Saves that may wait to be written.
+/// Maximum number of pending saves.
 constexpr std::size_t kMaxSaves = 2;
 
 /// Returns an identity that differs between sources, and changes when files of a source are added or removed.
@@ -150,7 +150,7 @@ class Import {
     const auto known = world_->value(kProgressValue);
     if (!known) return known.error();
     if (!*known && is_there) {
-      // Made, and ended before the first save; or something else.
+      // Created but interrupted before the first save, or not an import.
       const auto grids = world_->grids();
       if (!grids) return grids.error();
       if (!grids->empty()) {
@@ -199,7 +199,7 @@ class Import {
     return {};
   }
 
-  // Reads the next parts at once, numbers their types in order and saves them.
+  // Reads the next parts in parallel, numbers their types in order and saves them.
   Status read_parts(std::size_t count) {
     std::vector<std::optional<Result<SourcePart>>> read(count);
     parallel_for(count, threads_, [&](std::size_t i) { read[i] = source_.read_part(done_.parts + i); });

@@ -216,7 +216,7 @@ class Load {
   std::map<std::int64_t, GridHandle> handles_;
   std::map<std::int64_t, LayerHandle> layers_;
   std::map<std::int64_t, GroupHandle> groups_;
-  std::map<std::string, std::int64_t> last_;  // of each kind's numbers
+  std::map<std::string, std::int64_t> last_;  // greatest number of each kind
   std::vector<std::int64_t> lamp_numbers_;
   std::size_t lines_ = 0;
   std::size_t chunks_ = 0;
@@ -233,7 +233,7 @@ Result<LoadedWorld> load(const WorldStore& world, Load::Chunks chunks, LoadedWor
 
 }  // namespace
 
-// The saver's state stays where it is when the saver is moved.
+// The address of the saver's state is stable when the saver is moved.
 Result<LoadedWorld> load_world(const WorldStore& world, const LoadOptions& options, Threads threads,
                                const Progress& progress) {
   LoadedWorld result;

@@ -58,7 +58,7 @@ class Save {
   }
 
  private:
-  // Numbers stay.
+  // Existing numbers are kept.
   void start_anew() {
     state_.scene = {};
     state_.types = {};
@@ -93,7 +93,7 @@ class Save {
     return {};
   }
 
-  // A scene that the world has is not to be mixed with this one.
+  // The world's existing scene must not be mixed with this scene.
   Status check_empty() const {
     bool is_empty = true;
     for (const char* const kind : {part::kGrid, part::kInstance, part::kGroup, part::kLayer, part::kLamp}) {
@@ -104,7 +104,7 @@ class Save {
     return make_error(ErrorCode::InvalidArgument, "the world already holds a scene; load it with load_world");
   }
 
-  // All that there is, and all that there was.
+  // Lists all current and all saved elements.
   void name_everything(SceneChanges& changed) const {
     const auto add = [](auto& list, const auto& map, const auto& known) {
       list = map.handles();
@@ -224,7 +224,7 @@ class Save {
       }
     }
     for (const IVec3 chunk : changed) {
-      if (!grid.grid.is_loaded(chunk) || !grid.field.is_loaded(chunk)) continue;  // it is as it was stored
+      if (!grid.grid.is_loaded(chunk) || !grid.field.is_loaded(chunk)) continue;  // unloaded chunks are unchanged
       StoredChunk stored;
       if (const Chunk* const voxels = grid.grid.find_chunk(chunk)) stored.voxels = *voxels;
       if (const DensityChunk* const densities = grid.field.find_chunk(chunk)) stored.densities = *densities;

@@ -28,7 +28,7 @@ Status clear_log(const std::filesystem::path& path) {
   if (is_world_format(*beginning)) {
     auto connection = Connection::open(path.string(), Connection::Mode::Write);
     if (!connection) return connection.error();
-    // A world that is damaged beyond reading has a log that is of no use either.
+    // If a world is damaged beyond reading, its log is useless too.
     Status sound = check_schema(*connection);
     if (!sound && sound.error().code != ErrorCode::BadFormat) return sound;
     if (sound) {

@@ -13,7 +13,7 @@
 namespace quoin::store {
 namespace {
 
-// The keys of chunks without their bodies.
+// Adds an index that holds the chunks' keys without their bodies.
 Status add_key_index(Connection& database) {
   return database.run("CREATE INDEX chunk_keys ON chunks(key)");
 }

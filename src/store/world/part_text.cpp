@@ -98,7 +98,7 @@ DVec3 read(const Json& json, const Place& place, Faults& faults, DVec3*) {
   return vector;
 }
 
-// A number that is not finite has no JSON.
+// JSON cannot represent numbers that are not finite.
 template <class T>
 std::string dumped(const T& part) {
   PartWriter writer;

@@ -10,25 +10,25 @@
 
 #include "store/database/schema.h"
 
-// Parts of a world as texts of JSON, each as it stands in scene files (docs/scene-files.md); where that has a place in
-// a list, the number of the part stands here.
+// Parts of a world as JSON texts, in the form of scene files (docs/scene-files.md). Part numbers replace the list
+// indices of scene files.
 
 namespace quoin::store {
 
 [[nodiscard]] std::string text_of(const VoxelProperties& type);
-/// Name, pivot and canvas as in scene files, and `band`.
+/// Returns name, pivot and canvas as in scene files, and `band`.
 [[nodiscard]] std::string text_of(const WorldGrid& grid);
 [[nodiscard]] std::string text_of(const SceneFile::Placement& instance);
 [[nodiscard]] std::string text_of(const SceneFile::Group& group);
 [[nodiscard]] std::string text_of(const SceneLayer& layer);
 [[nodiscard]] std::string text_of(const Lamp& lamp);
 [[nodiscard]] std::string text_of(const Camera& camera);
-/// A camera, with `number` and `focus_distance`.
+/// Returns a camera, with `number` and `focus_distance`.
 [[nodiscard]] std::string text_of(const FileCamera& camera);
-/// A list of three numbers.
+/// Returns a list of three numbers.
 [[nodiscard]] std::string text_of(DVec3 vector);
 
-/// Reads a part. `name`: of it, for errors. Errors: BadFormat.
+/// Reads a part. `name`: its name for error messages. Errors: BadFormat.
 template <class T>
 [[nodiscard]] Result<T> part_from(std::span<const std::byte> text, const std::string& name);
 

@@ -26,13 +26,13 @@ struct ChunkPlaceHash {
 using PartBody = std::vector<std::byte>;
 
 struct ChangeSet {
-  std::set<std::uint32_t> removed_grids;  ///< before all else
+  std::set<std::uint32_t> removed_grids;  ///< applied first
   std::unordered_map<ChunkPlace, std::optional<StoredChunk>, ChunkPlaceHash> chunks;
   std::map<PartKey, std::optional<PartBody>> parts;
 
   [[nodiscard]] bool empty() const { return removed_grids.empty() && chunks.empty() && parts.empty(); }
   void remove_grid(std::uint32_t number);
-  /// Adds changes that were made later. Where memory runs out both are as they were.
+  /// Adds later changes. If memory runs out, both sets are unchanged.
   void add(ChangeSet&& later);
 };
 
@@ -44,14 +44,13 @@ using store::PartBody;
 
 /// Changes by the store's own modules, in addition to chunks and values.
 struct WorldParts {
-  /// nullopt for `body` removes the part.
+  /// Sets a part's body; nullopt removes the part.
   static void put(WorldChanges& changes, store::PartKey key, std::optional<PartBody> body);
   static void put(WorldChanges& changes, const char* kind, std::int64_t id, std::string_view text);
   static void remove(WorldChanges& changes, const char* kind, std::int64_t id);
-  /// The part's body, saved or about to be. Errors: BadFormat where it is damaged; CannotRead.
+  /// Returns the part's body, saved or pending. Errors: BadFormat if it is damaged; CannotRead.
   [[nodiscard]] static Result<std::optional<PartBody>> find(const WorldStore& world, const store::PartKey& key);
-  /// Calls `visit` for the parts of a kind that are saved or about to be, by their ids, with whether each is as it was
-  /// written. Errors: CannotRead.
+  /// Calls `visit(part, is_sound)` for the saved or pending parts of a kind, in id order. Errors: CannotRead.
   [[nodiscard]] static Status each(const WorldStore& world, const char* kind,
                                    FunctionRef<void(const store::Part& part, bool is_sound)> visit);
   /// Calls `visit`, on the caller's thread, for the chunks of a grid and level on disk in key order, until it returns
@@ -62,13 +61,13 @@ struct WorldParts {
   /// Returns a line for each damaged type or grid found on opening.
   [[nodiscard]] static std::vector<std::string> damage(const WorldStore& world);
 
-  /// `vfs`: a file system of SQLite's, for tests; null: the usual one, with a lock.
+  /// `vfs`: a SQLite file system, for tests; null: the default, with a lock.
   [[nodiscard]] static Result<WorldStore> create(const std::filesystem::path& path, Threads threads, const char* vfs);
   [[nodiscard]] static Result<WorldStore> open(const std::filesystem::path& path, WorldAccess access, Threads threads,
                                                const char* vfs);
   /// Creates a world without crash safety: it is synced only when it is closed.
   [[nodiscard]] static Result<WorldStore> create_unsynced(const std::filesystem::path& path, Threads threads);
-  /// A world in memory, to be read.
+  /// Opens a world in memory for reading.
   [[nodiscard]] static Result<WorldStore> open(std::span<const std::byte> bytes);
 
  private:

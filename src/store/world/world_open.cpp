@@ -69,7 +69,7 @@ Status begin_writing(Connection& connection, bool is_network) {
   // also be synced after the journal is deleted. The same holds at the switch to the log: a journal that reappears
   // after a power cut would hide the log from the database.
   if (auto done = connection.run("PRAGMA synchronous=EXTRA"); !done) return done;
-  if (is_network) {  // of another machine it may still have one
+  if (is_network) {  // another machine may have left the database in WAL mode
     const auto mode = connection.text("PRAGMA journal_mode=DELETE");
     if (!mode) return mode.error();
     return *mode == "delete" ? Status() : Status(make_error(ErrorCode::CannotWrite, "another program is reading it"));
@@ -136,7 +136,7 @@ Status move_in_place(const std::filesystem::path& from, const std::filesystem::p
       return make_error(ErrorCode::CannotWrite, "file already exists");
     }
     if (number != EINVAL && number != ENOSYS) return failed(number);
-    std::filesystem::rename(from, to, error);  // a file system without such flags; the lock keeps others away
+    std::filesystem::rename(from, to, error);  // the file system lacks such flags; the lock excludes others
     if (error) return failed(error.value());
   }
   sync_folder(to.parent_path());

@@ -7,9 +7,9 @@
 
 namespace quoin::store {
 
-/// A reader of the world in a file; also of one in a folder that may not be written.
+/// Opens a world file for reading, also in a read-only folder.
 [[nodiscard]] Result<WorldReader> open_reader(const std::filesystem::path& path, const char* vfs = nullptr);
-/// Has commits of a connection that writes last once they return: from here on by a write-ahead log, but on networks.
+/// Makes commits of a writing connection durable when they return. Uses a write-ahead log, except on networks.
 [[nodiscard]] Status begin_writing(Connection& connection, bool is_network);
 /// Empties and disables the log, so that the world is a single file that works on any medium. Returns false if the log
 /// is in use: it then stays for the next writer.

@@ -10,7 +10,7 @@ namespace quoin::store {
 
 namespace {
 
-// There is always a number after it.
+// Leaves one number above it.
 constexpr std::int64_t kMaxGrid = 0xFFFF'FFFE;
 constexpr std::size_t kMaxValueBytes = std::size_t{64} << 20;
 

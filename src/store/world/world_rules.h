@@ -20,7 +20,7 @@ struct WorldRules {
   std::map<std::uint32_t, WorldGrid> grids;
   std::vector<std::string> damage;  ///< a line for each item replaced by a visible placeholder
 
-  /// Rules after changes. Errors: InvalidArgument, as WorldStore::save.
+  /// Returns the rules after changes. Errors: InvalidArgument, as WorldStore::save.
   [[nodiscard]] Result<WorldRules> after(const ChangeSet& changes) const;
   /// Returns true if changes include types or grids.
   [[nodiscard]] static bool concern(const ChangeSet& changes);
@@ -31,7 +31,7 @@ struct WorldRules {
 [[nodiscard]] Result<WorldRules> read_rules(WorldReader& reader);
 /// Returns the placeholder of a lost type: magenta, so that it is visible.
 [[nodiscard]] VoxelProperties lost_type(std::int64_t number);
-/// "chunk (1, 2, 3) of grid 0".
+/// Returns a text such as "chunk (1, 2, 3) of grid 0".
 [[nodiscard]] std::string about(const ChunkPlace& place);
 /// Checks changes as documented for WorldStore::save.
 [[nodiscard]] Status check_changes(const ChangeSet& changes, const WorldRules& rules);

@@ -45,7 +45,7 @@ struct FileIdentity {
   }
 };
 
-/// The objects that one thread reads with.
+/// The reading objects of one thread.
 struct ReadKit {
   WorldReader reader;
   ChunkDecoder decoder;
@@ -87,7 +87,7 @@ struct WorldStore::Impl {
 
   std::filesystem::path path;
   HeldFile held;                         // ends after all connections
-  std::optional<FileIdentity> identity;  // of the file that was opened
+  std::optional<FileIdentity> identity;  // of the opened file
   const char* vfs = nullptr;
   WorldLock lock;
   mutable std::mutex mutex;  // guards the members below
@@ -95,8 +95,8 @@ struct WorldStore::Impl {
   mutable std::shared_ptr<const WorldRules> rules;
   std::uint32_t next_grid = 0;
   std::uint32_t saved_next_grid = 0;
-  std::unique_ptr<WorldWriter> writer;  // null where it is only read
-  std::vector<std::byte> in_memory;     // the database itself, where it is no file
+  std::unique_ptr<WorldWriter> writer;  // null if opened for reading
+  std::vector<std::byte> in_memory;     // the database, if it is not a file
 
   void hold() {
     held = HeldFile(path);
@@ -150,7 +150,7 @@ struct WorldStore::Impl {
   Result<StoredChunk> decode(ReadKit& kit, const ChunkPlace& place, std::span<const std::byte> body) const {
     auto chunk = decode_with(kit.decoder, place, body, *current_rules());
     if (chunk || writer != nullptr) return chunk;
-    // Another process may have put types and grids since.
+    // Another process may have added types and grids since.
     auto now = read_rules(kit.reader);
     if (!now) return chunk;
     set_rules(std::move(*now));

@@ -15,9 +15,9 @@ namespace {
 // Maximum number of chunks per commit, unless a single save has more. A commit's syncs cost as much as tens of chunks,
 // and later saves wait for the whole commit.
 constexpr std::size_t kGroupChunks = 256;
-// Of a save with more chunks so many are encoded at once, so that memory stays bounded.
+// Number of chunks encoded at once in larger saves; bounds memory.
 constexpr std::size_t kSliceChunks = 256;
-// The log is moved into the database at 16 MiB: left alone it grows, and so does the time of moving it.
+// The log is checkpointed at 16 MiB. Otherwise it would keep growing, and so would the time of a checkpoint.
 constexpr int kMaxLogPages = (16 << 20) / kPageBytes;
 
 constexpr const char* kPutChunk = "REPLACE INTO chunks(key, body) VALUES(?, ?)";
@@ -52,7 +52,7 @@ WorldWriter::~WorldWriter() {
   {
     const std::scoped_lock lock(mutex_);
     is_ending_ = true;
-    failed_through_ = 0;  // once more
+    failed_through_ = 0;  // retries
   }
   work_.notify_all();
   thread_.join();
@@ -167,7 +167,7 @@ std::vector<std::pair<PartKey, std::optional<PartBody>>> WorldWriter::pending_pa
   return found;
 }
 
-// One save, in a list's node, so that it can be put back without memory; none: it ends.
+// Returns saves as list nodes, so that they can be put back without allocation; empty if the writer ends.
 std::list<WorldWriter::Save> WorldWriter::next_group(std::unique_lock<std::mutex>& lock) {
   work_.wait(lock, [&] { return is_ending_ || (!queue_.empty() && failed_through_ == 0); });
   std::list<Save> group;
@@ -180,7 +180,7 @@ std::list<WorldWriter::Save> WorldWriter::next_group(std::unique_lock<std::mutex
       first.on_saved.reserve(first.on_saved.size() + next.on_saved.size());
       first.changes.add(std::move(next.changes));
     } catch (const std::bad_alloc&) {
-      break;  // in a commit of its own
+      break;  // gets its own commit
     }
     first.last = next.last;
     std::ranges::move(next.on_saved, std::back_inserter(first.on_saved));
@@ -242,7 +242,7 @@ void WorldWriter::roll_back() {
   regions_.clear();
   try {
     if (connection_.is_in_transaction()) static_cast<void>(connection_.run("ROLLBACK"));
-  } catch (const std::bad_alloc&) {  // the next one begins with it
+  } catch (const std::bad_alloc&) {  // the next write starts with the rollback
   }
 }
 

@@ -24,7 +24,7 @@ namespace quoin::store {
 ///
 ///   save -> queue -> group (merged) -> encoded, by key -> one transaction -> commit, synced -> acknowledged
 ///
-/// The `pending_*` functions find changes that are not on disk yet. Threads: any function from any thread.
+/// The `pending_*` functions find changes that are not on disk yet. Threads: all functions may run on any thread.
 class WorldWriter {
  public:
   using OnSaved = std::function<void(const Status&)>;
@@ -57,7 +57,7 @@ class WorldWriter {
 
  private:
   struct Save {
-    std::uint64_t last = 0;  ///< its ticket, or of several the last
+    std::uint64_t last = 0;  ///< its ticket; for several saves the last ticket
     ChangeSet changes;
     std::vector<OnSaved> on_saved;
   };
@@ -69,7 +69,7 @@ class WorldWriter {
   struct Encoded {
     std::int64_t key = 0;
     const ChunkPlace* place = nullptr;
-    const StoredChunk* chunk = nullptr;  ///< null: the row goes
+    const StoredChunk* chunk = nullptr;  ///< null: the row is removed
     std::vector<std::byte> body;
     Status outcome;
   };
@@ -82,7 +82,7 @@ class WorldWriter {
   void roll_back();
   void forget_pending(const Save& group);
 
-  // On the writer's thread.
+  // Runs on the writer's thread.
   [[nodiscard]] Status write(const ChangeSet& changes);
   [[nodiscard]] Status write_all(const ChangeSet& changes);
   [[nodiscard]] Status remove_grid(std::uint32_t number);
