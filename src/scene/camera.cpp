@@ -18,7 +18,7 @@ namespace quoin {
 
 namespace {
 
-constexpr double kFramingFov = 30.0 * std::numbers::pi / 180.0;  // little enough to keep towers upright
+constexpr double kFramingFov = 30.0 * std::numbers::pi / 180.0;  // narrow enough to keep towers upright
 constexpr double kMargin = 0.04;                                 // share of the image's width (height), on each side
 
 struct NamedView {
@@ -44,7 +44,7 @@ void turn(Camera& camera, DVec3 forward) {
   camera.up = glm::cross(camera.right, camera.forward);
 }
 
-/// The box to frame: one that has an inside.
+/// Returns the box to frame, with a positive volume.
 DBox box_to_frame(const DBox& bounds) {
   if (bounds.empty()) return {DVec3{0.0}, DVec3{1.0}};
   return bounds.min == bounds.max ? DBox{bounds.min - 0.5, bounds.max + 0.5} : bounds;
@@ -85,7 +85,7 @@ Result<Camera> look_along(DVec3 position, DVec3 direction, double vertical_fov_r
 Result<Camera> look_at(DVec3 position, DVec3 target, double vertical_fov_radians) {
   if (!is_finite(target)) return make_error(ErrorCode::InvalidArgument, "camera: target must be finite");
   if (position == target) return make_error(ErrorCode::InvalidArgument, "camera: position and target must differ");
-  // Halved so that the difference of the greatest numbers is one.
+  // Halved so that the difference of the largest numbers stays finite.
   return look_along(position, 0.5 * target - 0.5 * position, vertical_fov_radians);
 }
 

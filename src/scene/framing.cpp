@@ -26,7 +26,7 @@ struct Functional {
   double offset = 0.0;
   DVec3 slope{0.0};
 
-  /// The greatest within a box.
+  /// Returns the maximum within a box.
   [[nodiscard]] double over(IVec3 min, IVec3 max) const {
     const DVec3 corner{slope.x > 0.0 ? max.x : min.x, slope.y > 0.0 ? max.y : min.y, slope.z > 0.0 ? max.z : min.z};
     return offset + glm::dot(slope, corner);
@@ -117,7 +117,7 @@ Camera frame_scene(const Scene& scene, View view, double aspect, InstanceFilter 
 
 namespace {
 
-/// Turned to the right, seen from the front: +Z towards +X.
+/// Rotates to the right as seen from the front: +Z towards +X.
 DVec3 turned(DVec3 v, int turn, int turns) {
   const double angle = 2.0 * std::numbers::pi * turn / turns;
   const double c = std::cos(angle);

@@ -16,7 +16,7 @@ using Reach = std::function<double(DVec3 direction)>;
 /// Requires: the object has an inside; everything is finite.
 [[nodiscard]] Camera frame(DVec3 middle, const Reach& reach, View view, double aspect);
 
-/// The same for a camera that looks along `forward`, a unit vector.
+/// As above, for a camera that looks along `forward`, a unit vector.
 [[nodiscard]] Camera frame(DVec3 middle, const Reach& reach, DVec3 forward, double aspect);
 
 /// Returns the four directions that `frame` passes to `reach`, in order.

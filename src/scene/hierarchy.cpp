@@ -22,7 +22,7 @@ bool is_visible_layer(const Scene& scene, LayerHandle handle) {
   return layer == nullptr || layer->visible;
 }
 
-/// Returns true if all groups above show it; nothing if the groups form a cycle.
+/// Returns true if all groups above show it; nullopt if the groups form a cycle.
 std::optional<bool> is_shown_without_circles(const Scene& scene, GroupHandle from) {
   bool shown = true;
   std::size_t left = scene.groups().size();

@@ -19,7 +19,7 @@ namespace {
 // Returns the number of halvings that keep a cell within `policy.cell_pixels`.
 int halvings_for(double voxel_pixels, const DetailPolicy& policy) {
   static_assert(kMaxGridLevel == 4);
-  // Halves and doubles are exact: 16 sizes within the limit are one within its sixteenth.
+  // Halving and doubling are exact: 16 times a size is within the limit if the size is within its sixteenth.
   const double cell = policy.cell_pixels;
   return static_cast<int>(voxel_pixels <= 0.5 * cell) + static_cast<int>(voxel_pixels <= 0.25 * cell) +
          static_cast<int>(voxel_pixels <= 0.125 * cell) + static_cast<int>(voxel_pixels <= 0.0625 * cell);
@@ -81,7 +81,7 @@ struct Measure {
   }
 };
 
-// The last choice stays while a measure within the hysteresis of this one would give it.
+// Keeps the last choice while a measure within the hysteresis of the current measure would give it.
 Choice chosen(const Measure& measure, const DetailPolicy& policy, const Choice* last) {
   const bool has_room = last != nullptr && policy.hysteresis > 0.0;
   const double room = has_room ? 1.0 + policy.hysteresis : 1.0;

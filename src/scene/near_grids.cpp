@@ -41,7 +41,7 @@ bool is_near(const std::vector<IVec3>& chunks) {
   });
 }
 
-/// Finds chunks that touch. Blocks of two chunks a side that touch are one set, so sets are two chunks apart at least.
+/// Finds sets of touching chunks. Blocks of 2^3 chunks that touch are one set, so sets are at least two chunks apart.
 class TouchingChunks {
  public:
   explicit TouchingChunks(const std::vector<IVec3>& chunks) {
@@ -75,7 +75,7 @@ IVec3 least_of(const std::vector<IVec3>& chunks) {
   return least;
 }
 
-/// Sets of chunks that begin in one cell of kNearVoxels a side move together.
+/// Sets of chunks that begin in the same cell of kNearVoxels per side move together.
 std::vector<Piece> pieces_of(const std::vector<IVec3>& chunks) {
   int bits = 0;
   while (1 << bits < kNearChunks) ++bits;

@@ -1,4 +1,4 @@
-// Between an instance's grid and the world.
+// Transforms between an instance's grid and the world.
 
 #include <cmath>
 #include <limits>
@@ -23,7 +23,8 @@ glm::dmat4 world_from_grid(const Instance& instance, const SceneGrid& grid) {
   return matrix;
 }
 
-// The inverse rather than the transpose: a quaternion may be a little longer than 1, and far from the pivot that shows.
+// Uses the inverse instead of the transpose: a quaternion may be slightly longer than 1, which matters far from the
+// pivot.
 DVec3 grid_from_world(const Instance& instance, const SceneGrid& grid, DVec3 point_in_world) {
   if (!has_place(instance)) return kNowhere;
   // The difference of two far positions is taken first: it is small, and mostly exact.
@@ -49,7 +50,7 @@ DVec3 carried_point(const Instance& before, const Instance& after, DVec3 point_i
 std::optional<IVec3> voxel_from_world(const Instance& instance, const SceneGrid& grid, DVec3 point_in_world) {
   const DVec3 voxel = glm::floor(grid_from_world(instance, grid, point_in_world));
   for (int axis = 0; axis < 3; ++axis) {
-    // NaN is in no range.
+    // Rejects NaN.
     if (!(voxel[axis] >= std::numeric_limits<int>::min() && voxel[axis] <= std::numeric_limits<int>::max())) {
       return std::nullopt;
     }

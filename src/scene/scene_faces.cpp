@@ -88,7 +88,7 @@ std::vector<GridHandle> SceneFaces::Impl::touched_by(const Scene& scene, const S
   return touched;
 }
 
-// Grids with voxels of types that are opaque or transparent, and were not before, are counted from the beginning.
+// Grids with voxels of types that became opaque or transparent are counted from scratch.
 void SceneFaces::Impl::forget_those_with(const TypeChanges& types, const Scene& scene,
                                          std::vector<GridHandle>& touched) {
   for (auto& [handle, faces] : grids) {
@@ -99,7 +99,7 @@ void SceneFaces::Impl::forget_those_with(const TypeChanges& types, const Scene& 
   }
 }
 
-// Notes which grid an instance places now, if it is drawn, and adds that and the one it placed before to `touched`.
+// Records the grid that an instance places, if it is drawn, and adds that grid and the previous one to `touched`.
 void SceneFaces::Impl::look_at(const Scene& scene, InstanceHandle handle, std::vector<GridHandle>& touched) {
   if (const auto before = drawn.find(handle); before != drawn.end()) {
     --grids[before->second].placements;
@@ -113,7 +113,7 @@ void SceneFaces::Impl::look_at(const Scene& scene, InstanceHandle handle, std::v
   touched.push_back(instance->grid);
 }
 
-// Adds the chunks of a grid that are to be counted again.
+// Adds the chunks of a grid that must be counted again.
 void SceneFaces::Impl::follow(const Scene& scene, GridHandle handle, std::vector<ChunkCount>& chunks) {
   const SceneGrid* entry = scene.grids().find(handle);
   const auto found = grids.find(handle);
@@ -176,7 +176,7 @@ const FaceCounts& SceneFaces::update(const Scene& scene, Threads threads) {
   const SceneChanges changes = scene.changes_since(scene_read);
   const TypeChanges types = scene.types.changes_since(types_read);
   if (changes.empty() && types.empty()) return content_of(impl_).counts;
-  content_of(impl_).scene_read = content_of(impl_).types_read = {};  // stays so when memory runs out
+  content_of(impl_).scene_read = content_of(impl_).types_read = {};  // stays empty if memory runs out
   std::vector<GridHandle> touched = content_of(impl_).touched_by(scene, changes);
   if (has_other_visibility(types)) content_of(impl_).forget_those_with(types, scene, touched);
   std::sort(touched.begin(), touched.end());

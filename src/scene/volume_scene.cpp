@@ -116,7 +116,7 @@ Result<Volume> with_even_spacing(const Volume& volume, const Lattice& lattice, d
   return even;
 }
 
-/// The field of a volume at equal distances.
+/// Returns the field of a volume with equal spacings.
 Result<DensityGrid> field_of(const Volume& volume, const Lattice& lattice, double step,
                              const VolumeFieldOptions& options, Threads threads, const Progress& progress) {
   const auto samples = static_cast<std::size_t>(std::max(volume.size.x, 0)) *

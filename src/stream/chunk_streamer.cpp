@@ -18,7 +18,7 @@ namespace {
 // Workers stop making chunks while more bytes than this wait to be written.
 constexpr std::uint64_t kMaxPendingBytes = std::uint64_t{128} << 20;
 constexpr std::size_t kMaxProblems = 1000;
-// After so many bytes of chunks that went memory is given back to the system.
+// After this many bytes of unloaded chunks, memory is returned to the system.
 constexpr std::size_t kTrimBytes = std::size_t{16} << 20;
 
 std::string name_of(const ChunkPlace& place) {
@@ -129,7 +129,7 @@ void ChunkStreamer::wait() {
   came_.wait(lock, [&] { return !outbox_.arrivals.empty() || (working_ == 0 && !has_more_ && told_posts_ >= posted); });
 }
 
-// Requires: the plan's lock is held. If memory runs out, the next call continues there.
+// Processes the inbox. Requires: the plan's lock is held. If memory runs out, the next call continues there.
 void ChunkStreamer::read_inbox() {
   if (read_events_ == reading_.events.size() && !reading_.wishes) {
     Note done;
@@ -158,7 +158,7 @@ void ChunkStreamer::read_inbox() {
 
 // Publishes the state for the caller. Requires: the plan's lock is held.
 void ChunkStreamer::tell() {
-  // Not under the lock that the caller takes.
+  // Computed outside the lock that the caller takes.
   const std::size_t missing = plan_.missing();
   const double complete_radius = plan_.complete_radius();
   {
@@ -236,7 +236,7 @@ bool ChunkStreamer::work_once() {
 
 namespace {
 
-// Makes room for one more. Returns false if memory runs out.
+// Reserves room for one more arrival. Returns false if memory runs out.
 bool has_place(std::vector<Arrival>& arrivals) {
   constexpr std::size_t kLeast = 16;
   try {
@@ -280,7 +280,7 @@ Arrival ChunkStreamer::fetch(const ChunkPlace& place) {
   } catch (const std::bad_alloc&) {
     arrival.chunk = {};
     arrival.outcome = Arrival::Outcome::OutOfMemory;
-  } catch (const std::exception& thrown) {  // by a generator that breaks its word
+  } catch (const std::exception& thrown) {  // a generator that throws breaks its contract
     arrival.chunk = {};
     add_problem(place, make_error(ErrorCode::InvalidArgument, thrown.what()));
   }

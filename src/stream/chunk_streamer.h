@@ -19,13 +19,13 @@
 
 namespace quoin::stream {
 
-/// A chunk that was read or made.
+/// A chunk that was read or generated.
 struct Arrival {
   ChunkPlace place;
   StoredChunk chunk{};
   enum class Outcome : std::uint8_t {
     Came,
-    Broken,       ///< it is damaged in the world's file, and stays away
+    Broken,       ///< it is damaged in the world's file and will not arrive
     OutOfMemory,  ///< to be tried again
   };
   Outcome outcome = Outcome::Came;
@@ -46,38 +46,38 @@ class ChunkStreamer {
   struct Event {
     enum class What : std::uint8_t {
       Here,    ///< it was put in place
-      Broken,  ///< it will not come
-      Gone,    ///< it was taken away, or dropped
+      Broken,  ///< it will not arrive
+      Gone,    ///< it was unloaded or dropped
     };
     ChunkPlace place;
     What what = What::Here;
   };
   struct Note {
-    std::optional<Wishes> wishes{};     ///< where they are others than before
-    std::vector<Event> events;          ///< in their order
+    std::optional<Wishes> wishes{};     ///< set if they changed
+    std::vector<Event> events;          ///< in order
     std::vector<StoredChunk> let_go{};  ///< destroyed on a worker thread, off the caller's thread
     void add(const ChunkPlace& place, Event::What what) { events.push_back({place, what}); }
     [[nodiscard]] bool empty() const { return !wishes && events.empty() && let_go.empty(); }
   };
   struct Outbox {
     std::vector<Arrival> arrivals;
-    std::vector<ChunkPlace> leaving;  ///< of the last plan
+    std::vector<ChunkPlace> leaving;  ///< chunks to unload by the last plan
     bool has_leaving = false;         ///< there was a plan
     std::vector<std::string> problems;
     std::size_t wanted = 0;
     std::size_t missing = 0;
     double complete_radius = 0.0;
-    std::uint64_t plans = 0;  ///< the number of the wishes that were planned for last
-    std::uint64_t read = 0;   ///< chunks, in all
+    std::uint64_t plans = 0;  ///< the number of the last planned wishes
+    std::uint64_t read = 0;   ///< total number of chunks
     std::uint64_t made = 0;
-    std::size_t begun = 0;  ///< chunks that workers are at
+    std::size_t begun = 0;  ///< chunks that workers are processing
   };
 
   /// Lifetime: the store must outlive it.
   ChunkStreamer(WorldStore& store, Options options);
   ChunkStreamer(const ChunkStreamer&) = delete;
   ChunkStreamer& operator=(const ChunkStreamer&) = delete;
-  /// Waits for the chunks that workers are at.
+  /// Waits for the chunks that workers are processing.
   ~ChunkStreamer();
 
   /// Sets the generator of a grid. Null: chunks that the world does not store are air.
@@ -118,21 +118,21 @@ class ChunkStreamer {
   mutable std::mutex plan_mutex_;  ///< guards the members below
   StreamPlan plan_;
   std::map<std::uint32_t, std::shared_ptr<const ChunkGenerator>> generators_;
-  Note reading_;  ///< of it the first events have been read
+  Note reading_;  ///< its first events have already been processed
   std::size_t read_events_ = 0;
   std::uint64_t read_posts_ = 0;
   std::uint64_t plans_ = 0;
-  std::size_t let_go_bytes_ = 0;  ///< since memory was given back
+  std::size_t let_go_bytes_ = 0;  ///< since memory was last returned
   std::atomic<bool> is_ending_{false};
   std::atomic<std::int64_t> room_{0};  ///< bytes
   std::atomic<std::int64_t> each_{0};
-  std::atomic<std::uint32_t> signal_{0};  ///< raised when there may be something to do
+  std::atomic<std::uint32_t> signal_{0};  ///< incremented when there may be work
 
   std::mutex outbox_mutex_;
   Outbox outbox_;
   std::condition_variable came_;
   std::size_t working_ = 0;
-  bool is_short_ = false;  ///< short of memory, since the last report to the caller
+  bool is_short_ = false;  ///< memory ran short since the last report to the caller
   std::uint64_t told_posts_ = 0;
   bool has_more_ = false;
 

@@ -13,15 +13,15 @@
 
 namespace quoin::stream {
 
-/// Errors: InvalidArgument for types that the world does not have.
+/// Checks an edit's types. Errors: InvalidArgument for types that the world does not have.
 [[nodiscard]] Status check_types(const WorldEdit& edit, const VoxelRegistry& types);
 /// Applies an edit as `apply_edit`, but drops data that a voxel's type cannot hold, equally on every machine.
 std::int64_t apply_fitting(const WorldEdit& edit, Grid& grid, DensityGrid& field, const VoxelRegistry& types);
 
-/// Edits that wait for chunks, in their order.
+/// Edits that wait for chunks, in order.
 using WaitingEdits = std::unordered_map<IVec3, std::vector<std::shared_ptr<const WorldEdit>>, CoordinateHash>;
 
-/// Keeps an edit for chunks that are not loaded; of many voxels for each its own.
+/// Keeps an edit for chunks that are not loaded; splits an edit of many voxels by chunk.
 void keep_for(const WorldEdit& edit, const std::vector<IVec3>& chunks, WaitingEdits& waiting);
 
 }  // namespace quoin::stream

@@ -31,7 +31,7 @@ std::uint32_t checksum_of(std::span<const std::byte> bytes) {
       crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));  // NOLINT: zlib's bytes
 }
 
-/// Content as bytes: one description of each kind, for both ways.
+/// Writes an edit's content as bytes. `visit_fields` describes each kind for reading and writing.
 class Writer {
  public:
   explicit Writer(std::vector<std::byte>& out) : out_(out) {}
@@ -113,7 +113,7 @@ class Reader {
   ContentReader& in_;
 };
 
-// The fields of each kind, in the order of the file. `Edit` is const where they are written.
+// The fields of each kind, in file order. `Edit` is const for writing.
 template <class Edit, class Each>
 bool visit_fields(Edit& edit, Each& each) {
   using Kind = std::remove_const_t<Edit>;
@@ -133,7 +133,7 @@ bool visit_fields(Edit& edit, Each& each) {
   }
 }
 
-// An empty edit of the kind with that number; false where there is none.
+// Creates an empty edit of a kind by its number. Returns false if there is no such kind.
 template <std::size_t Kind = 0>
 bool begin_kind(std::uint32_t number, WorldEdit::Content& content) {
   if constexpr (Kind < std::variant_size_v<WorldEdit::Content>) {

@@ -11,7 +11,7 @@ namespace {
 
 // World units: placements farther away are ignored.
 constexpr double kMaxRadius = 1e12;
-// Beyond the nearest, in one look.
+// Number of other placements checked per update.
 constexpr std::size_t kSlice = 256;
 
 void add_eyes(const Instance& instance, const SceneGrid& grid, std::span<const Viewer> viewers,

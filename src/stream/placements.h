@@ -13,7 +13,7 @@
 
 namespace quoin::stream {
 
-/// The placements of one grid in a scene, the nearest first: chunks that these need serve the others too.
+/// The placements of one grid in a scene, nearest first: chunks loaded for these also serve the others.
 ///
 ///   [ the nearest kNearest, checked each time | the others, checked a few at a time ]
 ///
@@ -24,20 +24,20 @@ class Placements {
   static constexpr std::size_t kNearest = 64;
 
   void clear();
-  /// An instance that is new or elsewhere, or of this grid no more.
+  /// Adds or moves an instance, or removes it if it no longer places this grid.
   void put(InstanceHandle instance);
   void remove(InstanceHandle instance);
   [[nodiscard]] bool contains(InstanceHandle instance) const { return index_.contains(instance); }
   [[nodiscard]] std::vector<InstanceHandle> instances() const;
-  /// Viewers in the grid's space, at most kNearest, nearest first where there are so many.
+  /// Returns viewers in the grid's space, at most kNearest, nearest first if there are that many.
   [[nodiscard]] std::vector<Eye> eyes(const Scene& scene, const SceneGrid& grid, std::span<const Viewer> viewers);
-  /// The next `eyes` looks at all instances.
+  /// Makes the next `eyes` check all instances.
   void look_at_all() { looked_at_ = false; }
 
  private:
   struct Placed {
     InstanceHandle instance;
-    double distance = std::numeric_limits<double>::infinity();  // of the nearest viewer, as of the last look
+    double distance = std::numeric_limits<double>::infinity();  // to the nearest viewer, at the last check
   };
 
   void swap(std::size_t a, std::size_t b);

@@ -6,7 +6,7 @@
 namespace quoin::stream {
 namespace {
 
-// Before anything is loaded a chunk counts as so many bytes.
+// Assumed bytes per chunk before any is loaded.
 constexpr double kGuessedChunkBytes = 24.0 * 1024.0;
 constexpr std::size_t kGuessBelow = 64;
 constexpr std::size_t kLeastChunks = 8;

@@ -16,7 +16,7 @@ class StreamBudget {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// `has_others`: whether anything is ever made of chunks.
+  /// `has_others`: true if data is derived from chunks.
   StreamBudget(std::size_t bytes, bool has_others);
 
   void add_chunk(std::size_t bytes) {
@@ -28,7 +28,7 @@ class StreamBudget {
     chunk_bytes_ -= bytes;
   }
   void resize_chunk(std::size_t before, std::size_t now) { chunk_bytes_ = chunk_bytes_ - before + now; }
-  /// Chunks that were read and not put in place yet.
+  /// Sets the bytes of chunks that were read but not put in place yet.
   void set_arrived(std::size_t bytes) { arrived_bytes_ = bytes; }
   /// Sets the other memory in use. `is_quiet`: no chunk came or went for some time, so all derived data is complete.
   void set_others(std::size_t reported, std::size_t pending, bool is_quiet, Clock::time_point now);
@@ -38,9 +38,11 @@ class StreamBudget {
   [[nodiscard]] std::size_t reported_bytes() const { return reported_; }
   /// Returns true if the memory in use exceeds the budget.
   [[nodiscard]] bool is_over() const { return used() > static_cast<double>(budget_); }
-  /// Bytes of chunks that may still be read, while workers are at so many; negative: too much is expected already.
+  /// Returns the bytes of chunks that may still be read while workers process `begun` chunks; negative if too many
+  /// bytes
+  /// are already expected.
   [[nodiscard]] std::int64_t room(std::size_t begun) const;
-  /// Bytes of a chunk that is not known yet.
+  /// Returns the expected bytes of an unknown chunk.
   [[nodiscard]] std::int64_t guess() const;
   /// Returns the number of chunks that the budget allows. `planned`: chunks in the last plan. `is_cut`: the budget
   /// limited that plan. `missing`: share of the planned chunks that is not loaded yet.

@@ -36,18 +36,18 @@ bool is_looked_at(const Eye& eye, IVec3 chunk) {
 // Maximum number of chunks in a plan at any budget and radius: a ball with a radius of 40 chunks.
 constexpr std::size_t kMaxPlanned = std::size_t{1} << 18;
 
-// A ball of more chunks than may be loaded would be cut to this anyway.
+// Returns the radius of a ball of `max_chunks` chunks, beyond which the budget cuts any plan.
 double reach_of(std::size_t max_chunks) {
   return (std::cbrt(static_cast<double>(max_chunks) * 0.75 / std::numbers::pi) + 2.0) * kChunkEdge;
 }
 
-// Chunks that a ball meets may be these.
+// Returns a box of chunks around a ball.
 IBox chunks_around(const Eye& eye, double radius) {
   const LongBox box = clipped(box_around(eye.position - radius, eye.position + radius));
   return is_empty(box) ? IBox{} : chunks_of(box);
 }
 
-// Eyes that moved less, voxels, or turned less (cosine) see the same.
+// Viewers that move less (voxels) and turn less (cosine) than this need no new plan.
 constexpr double kMoves = 12.0;
 constexpr double kTurns = 0.94;
 
@@ -142,7 +142,7 @@ void StreamPlan::find_wanted() {
       chunks.erase(std::unique(chunks.begin(), chunks.end()), chunks.end());
     }
     for (const IVec3 chunk : chunks) wanted_.push_back(measured({grid, 0, chunk}, eyes));
-    // Of many grids no more is kept than could be wanted, and one to tell that there was more.
+    // With many grids, keeps as many as could be wanted, plus one that shows that there were more.
     if (wanted_.size() > 2 * wishes_.max_chunks + 1) {
       const auto end = wanted_.begin() + static_cast<std::ptrdiff_t>(wishes_.max_chunks + 1);
       std::nth_element(wanted_.begin(), end, wanted_.end(), is_nearer);

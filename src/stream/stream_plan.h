@@ -15,7 +15,7 @@ namespace quoin::stream {
 /// A viewer in the space of a grid.
 struct Eye {
   DVec3 position{0.0};      ///< voxels
-  DVec3 direction{0.0};     ///< unit; 0: nowhere in particular
+  DVec3 direction{0.0};     ///< unit; 0: no direction
   double radius = 0.0;      ///< voxels
   double voxel_size = 1.0;  ///< world units
 
@@ -25,7 +25,7 @@ struct Eye {
 /// Returns true if a loaded chunk may stay for a viewer: it lies within the radius or slightly beyond.
 [[nodiscard]] bool stays_for(const Eye& eye, IVec3 chunk);
 
-using Eyes = std::map<std::uint32_t, std::vector<Eye>>;  ///< of each grid, by its number in the world
+using Eyes = std::map<std::uint32_t, std::vector<Eye>>;  ///< by grid number in the world
 
 /// Returns true if both sets of viewers want the same chunks: they moved and turned little.
 [[nodiscard]] bool see_alike(const Eyes& a, const Eyes& b);
@@ -33,9 +33,9 @@ using Eyes = std::map<std::uint32_t, std::vector<Eye>>;  ///< of each grid, by i
 /// The chunks that the caller's thread requests.
 struct Wishes {
   Eyes eyes;
-  std::size_t max_chunks = 0;     ///< that the budget suffices for
-  std::vector<ChunkPlace> asked;  ///< for edits: wherever they lie
-  std::uint64_t number = 0;       ///< the caller's own; greater for later ones
+  std::size_t max_chunks = 0;     ///< number of chunks that fit the budget
+  std::vector<ChunkPlace> asked;  ///< chunks that edits need, at any distance
+  std::uint64_t number = 0;       ///< set by the caller; increases with each request
 };
 
 /// Selects the chunks to load, nearest first, and the chunks to unload.
@@ -63,8 +63,8 @@ class StreamPlan {
   [[nodiscard]] std::vector<ChunkPlace> take_leaving();
 
   [[nodiscard]] std::size_t wanted() const { return wanted_.size(); }
-  /// The number of wanted chunks that are not loaded, and the distance of the nearest, world units. Cost: O(wanted)
-  /// after a change.
+  /// Return the number of wanted chunks that are not loaded, and the distance of the nearest in world units. Cost:
+  /// O(wanted) after a change.
   [[nodiscard]] std::size_t missing();
   [[nodiscard]] double complete_radius();
 
@@ -72,7 +72,7 @@ class StreamPlan {
   struct Wanted {
     ChunkPlace place;
     double distance = 0.0;  ///< world units, of its nearest point from the nearest eye
-    double rank = 0.0;      ///< the less the sooner
+    double rank = 0.0;      ///< lower ranks load first
   };
   using States = std::unordered_map<IVec3, State, CoordinateHash>;
 
@@ -87,12 +87,12 @@ class StreamPlan {
   Wishes wishes_;
   std::map<std::uint32_t, States> states_;
   std::vector<Wanted> wanted_;  ///< by distance
-  bool is_cut_ = false;         ///< the budget did not suffice
+  bool is_cut_ = false;         ///< the budget limited the plan
   std::vector<ChunkPlace> queue_;
   std::size_t next_ = 0;
   std::size_t asked_ = 0;
   std::vector<ChunkPlace> leaving_;
-  std::size_t here_ = 0;           ///< of `wanted_`, all before it are here
+  std::size_t here_ = 0;           ///< all entries of `wanted_` before this index are loaded
   std::size_t missing_count_ = 0;  ///< as of the last count
   bool is_counted_ = false;
 };

@@ -37,20 +37,20 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using What = ChunkStreamer::Event::What;
 
-// Chunks that came and were not put in place yet.
+// Maximum number of arrivals that wait to be put in place.
 constexpr std::size_t kMaxArrivals = 128;
-// Chunks that edits wait for, in one plan.
+// Maximum number of chunks that edits wait for, per plan.
 constexpr std::size_t kMaxAsked = 1024;
 // Bytes per loaded chunk in addition to its voxels and densities: marks, sizes and states.
 constexpr std::size_t kChunkBytes = 256;
 // Number of moved chunks that triggers a save; it bounds the journal entries that a save reads.
 constexpr std::size_t kMaxMoved = 48;
 constexpr auto kAskOthers = std::chrono::milliseconds(100);
-// Between plans that the budget alone is the reason of, seconds.
+// Seconds between plans that only the budget causes.
 constexpr double kReplan = 0.2;
 // After this time without moved chunks all derived data is complete, seconds.
 constexpr double kQuiet = 3.0;
-// The generator of a grid's landscape.
+// Prefix of the value that stores a grid's terrain generator.
 constexpr std::string_view kTerrainValue = "quoin.terrain.";
 
 double seconds_since(Clock::time_point start) {
@@ -116,7 +116,7 @@ struct StreamedWorld::Impl {
     const auto found = numbers.find(handle);
     return found == numbers.end() ? nullptr : &found->second;
   }
-  // Null where the game has removed it.
+  // Returns null if the application removed the grid.
   SceneGrid* content_of_grid(const Streamed& grid) {
     return scene().grids().find(grid.handle) == nullptr ? nullptr : &scene().edit(grid.handle);
   }
@@ -168,15 +168,15 @@ struct StreamedWorld::Impl {
 
   std::size_t arrived_bytes = 0;  // of `arrivals`
   Clock::time_point asked_others{};
-  Clock::time_point moved{};         // when a chunk came or went last
+  Clock::time_point moved{};         // when a chunk last arrived or left
   bool is_edited = false;            // since the last save
-  Status handed_over;                // to the store, at the last save; where that failed it is tried again
-  std::size_t moved_since_save = 0;  // chunks that came or went
+  Status handed_over;                // result of the last save; failed saves are retried
+  std::size_t moved_since_save = 0;  // chunks that arrived or left
   ChangeCursor saved_types;
   std::shared_ptr<DiskOutcome> disk = std::make_shared<DiskOutcome>();
   ChunkStreamer::Note unposted;
   Clock::time_point saved{};
-  bool has_moved = false;  // something came or went in the last update
+  bool has_moved = false;  // chunks arrived or left in the last update
   std::vector<std::string> problems;
   ChunkStreamer::Outbox box;
   StreamStats totals;
@@ -428,7 +428,7 @@ void StreamedWorld::Impl::take_away(const ChunkPlace& place, ChunkStreamer::Note
   SceneGrid* const content = grid == nullptr ? nullptr : content_of_grid(*grid);
   if (content == nullptr) return note.add(place, What::Gone);
   if (grid->kept.contains(place.chunk) || !content->grid.is_loaded(place.chunk)) return;
-  StoredChunk last;  // so that it ends on another thread
+  StoredChunk last;  // destroyed on another thread
   if (const Chunk* const voxels = content->grid.find_chunk(place.chunk)) last.voxels = *voxels;
   if (const DensityChunk* const densities = content->field.find_chunk(place.chunk)) last.densities = *densities;
   content->grid.unload_chunk(place.chunk);
@@ -514,7 +514,7 @@ Status StreamedWorld::Impl::update(std::span<const Viewer> viewers, double secon
 void StreamedWorld::Impl::tell_workers() {
   wish(unposted);
   if (has_moved) moved = Clock::now();
-  // No more is brought than the caller takes.
+  // Workers bring no more than the caller takes.
   streamer.set_room(arrivals.size() > kMaxArrivals ? 0 : budget.room(box.begun), budget.guess());
   streamer.post(std::exchange(unposted, {}), !has_chunks_to_move());
 }

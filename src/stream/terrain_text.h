@@ -9,9 +9,9 @@
 
 namespace quoin::stream {
 
-/// A landscape as a world keeps it: JSON.
+/// Returns a terrain as JSON, the form that worlds store.
 [[nodiscard]] std::string text_of(const EndlessTerrain& terrain);
-/// Parses a terrain; nullopt for one that this version cannot generate.
+/// Parses a terrain. Returns nullopt for terrains that this version cannot generate.
 [[nodiscard]] std::optional<EndlessTerrain> terrain_from(std::span<const std::byte> bytes);
 
 }  // namespace quoin::stream

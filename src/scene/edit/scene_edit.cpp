@@ -17,7 +17,7 @@ namespace quoin {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-// The coordinates that a grid may hold: all but the outermost chunks.
+// The valid coordinates of a grid: all except the outermost chunks.
 constexpr double kMinVoxel = double{std::numeric_limits<int>::min()} + kChunkEdge;
 constexpr double kMaxVoxel = double{std::numeric_limits<int>::max()} - kChunkEdge;
 
@@ -27,17 +27,17 @@ struct Span {
   double last = kInfinity;
 };
 
-// A box in a grid's space, as the three slabs that it is the common part of.
+// A box in a grid's space, as the intersection of three slabs.
 class BoxInGrid {
  public:
-  // `edges`: the box's half edges, as columns; `axes`: its unit axes times the world units of a voxel.
+  // `edges`: the box's half edges, as columns; `axes`: its unit axes times the world units per voxel.
   BoxInGrid(DVec3 centre, const glm::dmat3& edges, const glm::dmat3& axes, DVec3 half_size)
       : centre_(centre),
         reach_(glm::abs(edges[0]) + glm::abs(edges[1]) + glm::abs(edges[2])),
         axes_(axes),
         half_size_(half_size) {}
 
-  // Every voxel whose centre may lie in the box.
+  // Returns a box of all voxels whose centre may lie in the box.
   [[nodiscard]] IBox bounds() const {
     IBox box;
     for (int axis = 0; axis < 3; ++axis) {
@@ -72,7 +72,7 @@ class BoxInGrid {
     }
     return false;
   }
-  // The voxels from `first` to `last` of a row whose centres lie in the box.
+  // Returns the voxels from `first` to `last` of a row whose centres lie in the box.
   [[nodiscard]] std::pair<int, int> run(int first, int last, int y, int z) const {
     const DVec3 start = (DVec3(first, y, z) + 0.5 - centre_) * axes_;
     Span span;
@@ -103,7 +103,7 @@ class BoxInGrid {
 
   DVec3 centre_;
   DVec3 reach_;
-  glm::dmat3 axes_;  // columns: the slabs' normals, in world units a voxel
+  glm::dmat3 axes_;  // columns: the slabs' normals, in world units per voxel
   DVec3 half_size_;  // world units
 };
 

@@ -13,10 +13,10 @@
 
 namespace quoin {
 
-/// Errors: InvalidArgument, naming the first drawn instance that has no place.
+/// Checks the drawn instances. Errors: InvalidArgument, naming the first instance with an invalid placement.
 [[nodiscard]] Status check_instances(const Scene& scene, InstanceFilter filter);
 
-/// The grids that drawn instances place, each once, in the order of their handles.
+/// Returns the grids that drawn instances place, each once, in handle order.
 [[nodiscard]] std::vector<GridHandle> drawn_grids(const Scene& scene, InstanceFilter filter);
 
 /// Places instances, and takes the groups above them into the meshes.
@@ -35,7 +35,7 @@ class MeshHierarchy {
   std::map<GroupHandle, std::size_t> groups_;
 };
 
-/// Surfaces of one grid: opaque, then all transparent.
+/// The surfaces of one grid: opaque, then all transparent.
 using SmoothBodies = std::array<SmoothMesh, 2>;
 
 /// Appends the vertices and triangles of a mesh to another. If the other has no triangles, `more` replaces it.

@@ -19,17 +19,17 @@
 namespace quoin {
 namespace {
 
-/// Grids of at most this many chunks are meshed side by side, one thread each; larger ones one after the other, with
-/// all threads on their chunks.
+/// Grids of at most this many chunks are meshed in parallel, one thread each. Larger grids are meshed one after the
+/// other, with all threads on their chunks.
 constexpr std::size_t kSmallGridChunks = 4;
 
-/// Adds up the progress of many grids, each weighted by its chunks, for one listener.
+/// Combines the progress of many grids, weighted by their chunks, for one callback.
 class SharedProgress {
  public:
   SharedProgress(const Progress& listener, std::size_t total)
       : listener_(listener), total_(std::max<std::size_t>(total, 1)) {}
 
-  /// Says that `chunks` more are done; false when the listener wants to stop.
+  /// Reports `chunks` more as done. Returns false if the callback cancels.
   bool advance(double chunks) {
     if (!listener_) return true;
     const std::lock_guard lock(mutex_);
@@ -116,8 +116,8 @@ Status check_atlas(const Scene& scene, const std::vector<GridHandle>& grids, con
   return {};
 }
 
-/// Merges the opaque faces of the meshes across their occlusion, which goes into the atlas of `meshes`. Returns the
-/// texture coordinates of each mesh's.
+/// Merges the opaque faces of the meshes across their occlusion, which is stored in the atlas of `meshes`. Returns the
+/// texture coordinates of each mesh.
 Result<std::vector<Coordinates>> move_into_atlas(const Scene& scene, const std::vector<GridHandle>& grids,
                                                  MeshResults& results, Threads threads, const Progress& progress,
                                                  SceneMeshes& meshes) {
@@ -144,7 +144,7 @@ Result<std::vector<Coordinates>> move_into_atlas(const Scene& scene, const std::
   return coordinates;
 }
 
-/// The part with coordinates for its opaque faces, which it owns from now on.
+/// Returns the part with texture coordinates for its opaque faces. The part owns them.
 MeshPart with_atlas(MeshPart part, Coordinates coordinates) {
   using Owned = std::pair<std::shared_ptr<const void>, Coordinates>;
   const auto owner = std::make_shared<const Owned>(std::move(part.owner), std::move(coordinates));
@@ -202,7 +202,7 @@ MeshPart mesh_part(std::string name, ArraySurface surface, Rgba8 colour, const D
 
 namespace {
 
-// Places the parts of grids where drawn instances do.
+// Places the parts of grids by the drawn instances.
 void place_parts(const Scene& scene, const std::vector<GridHandle>& grids, InstanceFilter filter,
                  MeshHierarchy& hierarchy, SceneMeshes& meshes) {
   for (const InstanceHandle handle : scene.instances().handles()) {

@@ -200,7 +200,7 @@ std::vector<SmoothMesh> divide(const Body& body, const UnitedGrid& united) {
     SmoothMesh& part = parts[body.owners[i]];
     const LatticePlace& back = united.way_back(body.owners[i]);
     places[i] = smooth::append_vertex(part, body.mesh, i);
-    // Samples are half a voxel from the corners that the places speak of.
+    // Samples are half a voxel from the corners that the placements refer to.
     const DVec3 point(body.mesh.positions[i]);
     part.positions.back() = Vec3(back.orientation.apply(point + 0.5) + DVec3(back.offset) - 0.5);
     part.normals.back() = Vec3(back.orientation.apply(DVec3(body.mesh.normals[i])));

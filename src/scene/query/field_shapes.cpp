@@ -122,7 +122,7 @@ bool BoxInField::may_meet_exactly(FieldPiece& piece) const {
   return follow(piece, true);
 }
 
-// 0 where two edges are parallel.
+// 0 if two edges are parallel.
 DVec3 BoxInField::direction(const FieldPiece& piece, int which) const {
   const auto across = [](const DVec3& a, const DVec3& b) {
     const DVec3 product = glm::cross(a, b);
@@ -154,7 +154,7 @@ DVec3 BoxInField::normal(const FieldContact& contact, const DensityGrid& field) 
   if (piece.axis >= kFirstEdge && piece.axis < kFirstOfGrid) return unit_or_zero(parting(piece));
   if (piece.axis >= kFirstCrease && piece.axis < kFirstSide) return across_crease(contact, field);
   if (piece.axis >= 0 && piece.axis < kFirstEdge) return of_face(contact, field);
-  // The grid's own directions only tell where the piece ends; then the gradient about that is most in the way.
+  // The grid's own axes only bound the piece. In that case returns the gradient nearby that opposes the motion most.
   DVec3 normal = unit_or_zero(contact.piece.gradient(contact.point));
   for (const DVec3& gradient : gradients_about(contact, field)) {
     const DVec3 other = unit_or_zero(gradient);

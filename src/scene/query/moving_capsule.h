@@ -29,7 +29,7 @@ struct MovingCapsule {
   double radius = 0.0;
   DVec3 displacement{0.0};
 
-  /// The point of its middle line that is nearest to a point, as the centre is `centre_then`.
+  /// Returns the point of its middle line nearest to a point, with its centre at `centre_then`.
   [[nodiscard]] DVec3 nearest_of_line(const DVec3& centre_then, const DVec3& point) const {
     const double square = glm::dot(half_axis, half_axis);
     if (!(square > 0.0)) return centre_then;
@@ -60,7 +60,8 @@ struct LineGap {
   DVec3 away{0.0};  ///< unit vector from the voxel to the line; 0 if they touch
 };
 
-/// For the line from `middle` - `half_axis` to `middle` + `half_axis`; the voxel is centred at the origin.
+/// Returns the distance of the line from `middle` - `half_axis` to `middle` + `half_axis` from a voxel centred at the
+/// origin.
 inline LineGap gap_of_line(const DVec3& middle, const DVec3& half_axis) {
   const auto apart_at = [&](double t) {
     const DVec3 point = middle + t * half_axis;
@@ -91,7 +92,8 @@ inline LineGap gap_of_line(const DVec3& middle, const DVec3& half_axis) {
   return {distance, distance > 0.0 ? apart / distance : DVec3(0.0)};
 }
 
-/// The direction in which a line that meets a voxel (about the origin) is out of it soonest, with a distance below 0.
+/// Returns the shortest way out of a voxel (centred at the origin) for a line that intersects it, with a negative
+/// distance.
 inline LineGap way_out_of_line(const DVec3& middle, const DVec3& half_axis) {
   LineGap best{-std::numeric_limits<double>::infinity(), {}};
   for (int i = 0; i < 6; ++i) {

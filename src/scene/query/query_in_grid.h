@@ -33,7 +33,7 @@ class SceneQuery {
 // A length below which two shapes touch rather than overlap, in voxels.
 inline constexpr double kTouch = 1e-9;
 
-// Into the space of a placed grid's voxels.
+// Transforms into the space of a placed grid's voxels.
 struct ToGrid {
   explicit ToGrid(const PlacedGrid& placed)
       : axes(glm::transpose(placed.world_axes) / placed.voxel_size), position(placed.position), pivot(placed.pivot) {}
@@ -157,7 +157,7 @@ inline SeparatingAxes separating_axes(const glm::dmat3& half_axes) {
       DVec3 unit(0.0);
       unit[axis] = 1.0;
       const DVec3 product = glm::cross(half_axes[i], unit);
-      // Nearly parallel edges have no direction of their own worth trusting.
+      // The direction of nearly parallel edges is unreliable.
       axes.at(next++) = glm::length(product) > 1e-6 * glm::length(half_axes[i]) ? product : DVec3(0.0);
     }
   }

@@ -142,7 +142,7 @@ class BoxInGrid {
   [[nodiscard]] bool meets(IVec3 voxel) const {
     const DVec3 between = DVec3(voxel) + 0.5 - box_.centre;
     return std::all_of(separators_.begin(), separators_.end(), [&](DVec3 axis) {
-      if (axis == DVec3(0.0)) return true;  // of parallel edges: the other axes decide
+      if (axis == DVec3(0.0)) return true;  // parallel edges: the other axes decide
       return std::abs(glm::dot(between, axis)) < reach_along(axis, box_.half_axes) - kTouch;
     });
   }
@@ -337,7 +337,7 @@ std::optional<SceneHit> pick(const SceneTracer& tracer, const Camera& camera, co
 std::optional<SceneHit> voxel_at_depth(const SceneTracer& tracer, const Camera& camera, const PicturePoint& point,
                                        float depth, const QueryFilter& filter) {
   if (!(depth >= 0.0F) || std::isinf(depth)) return std::nullopt;
-  // Half a unit in a float's last place, twice over.
+  // Twice half a unit in the last place of a float.
   const double room = double{depth} * 0x1p-23 + 1e-6;
   Ray ray = ray_through(camera, point);
   const double begin = std::max(double{depth} - room, 0.0);

@@ -14,10 +14,10 @@ namespace quoin {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-// Fractions that differ by less are of voxels met at once.
+// Voxels whose fractions differ by less are hit simultaneously.
 constexpr double kAtOnce = 1e-9;
 
-// When a moving shape meets a voxel.
+// A moving shape's contact with a voxel.
 struct Contact {
   double fraction = kInfinity;
   DVec3 normal{0.0};  // in the grid
@@ -45,7 +45,7 @@ class BoxAmongVoxels {
   std::array<double, 15> speed_{};
 };
 
-// The contact of a box that overlaps the voxel from the start: the direction in which it is out soonest.
+// Returns the contact of a box that overlaps the voxel at the start: the direction of the shortest way out.
 Contact BoxAmongVoxels::inside_contact(DVec3 between) const {
   Contact contact;
   contact.fraction = 0.0;
@@ -92,7 +92,7 @@ Contact BoxAmongVoxels::meet(IVec3 voxel, double most) const {
   return contact;
 }
 
-// The same for a moving capsule.
+// As above, for a moving capsule.
 class CapsuleAmongVoxels {
  public:
   explicit CapsuleAmongVoxels(const MovingCapsule& capsule) : capsule_(capsule) {}

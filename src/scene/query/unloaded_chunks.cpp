@@ -40,7 +40,7 @@ class ChunkWalk {
     }
     return true;
   }
-  // Into the next chunk; false where the ray leaves the world, or passes `max_t`.
+  // Moves to the next chunk. Returns false if the ray leaves the world or passes `max_t`.
   bool step(double max_t) {
     axis_ = 0;
     for (int axis = 1; axis < 3; ++axis) {
@@ -71,7 +71,7 @@ class ChunkWalk {
 
   const Ray& ray_;
   double t_ = 0.0;
-  int axis_ = -1;  // of the plane that was crossed last
+  int axis_ = -1;  // of the last crossed plane
   IVec3 chunk_{0};
   DVec3 next_{0.0};
 };

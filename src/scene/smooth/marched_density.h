@@ -14,10 +14,10 @@ namespace quoin {
 /// Thin:   faces of features one voxel thick along an axis, solid or gap, unless the feature continues at a slant.
 /// Slabs:  faces in the middle of 3x3 such faces, of features at most four voxels thick. The blur that rounds steps
 ///         has a radius of two voxels and would take up to a quarter of their thickness.
-/// Edges:  two solid voxels that touch by an edge alone are joined there, as in meshes.
+/// Edges:  two solid voxels that touch only by an edge are joined there, as in meshes.
 /// Bodies: faces between solid voxels of different bodies (mesh/surface/bodies.h): water and its bed.
 ///
-/// Cost: that of `density_of_voxels`, and as much again.
+/// Cost: twice that of `density_of_voxels`.
 [[nodiscard]] DensityChunk marched_density(const Neighbourhood& voxels, const VoxelRegistry& types);
 
 }  // namespace quoin

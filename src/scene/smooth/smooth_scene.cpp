@@ -19,16 +19,16 @@ namespace {
 struct GridFields {
   ChangeCursor voxels_read;
   ChangeCursor field_read;
-  DensityGrid made = DensityGrid();  // of the voxels
-  std::vector<IVec3> to_make;        // chunks of it that are out of date
-  bool is_made_new = true;           // to the scene
+  DensityGrid made = DensityGrid();  // field of the voxels
+  std::vector<IVec3> to_make;        // its outdated chunks
+  bool is_made_new = true;           // not in the scene yet
   bool is_field_new = true;          // to the scene
   DVec3 pivot{0.0};
   GridHandle of_voxels;  // in the scene, if they were there
   GridHandle of_field;
 };
 
-// Chunks whose densities the voxels of a box of one of them reach.
+// Returns the chunks whose densities depend on the voxels of a chunk's box.
 void add_reached(const ChunkChange& change, std::vector<IVec3>& chunks) {
   const IBox reached{change.box.min - kVoxelFieldReach, change.box.max + kVoxelFieldReach};
   for (int i = 0; i < 27; ++i) {
@@ -57,8 +57,8 @@ struct SmoothScene::Impl {
   Scene scene;
   ChangeCursor scene_read;
   ChangeCursor types_read;
-  std::map<GridHandle, GridFields> grids;  // that drawn instances place
-  bool is_placed_anew = true;              // instances, or which grids there are
+  std::map<GridHandle, GridFields> grids;  // placed by drawn instances
+  bool is_placed_anew = true;              // the instances or the set of grids changed
   std::size_t bytes = 0;
   std::optional<std::size_t> too_many;  // chunks
 
@@ -170,7 +170,7 @@ Status SmoothScene::Impl::make(const Scene& of, Threads threads, const Progress&
   return {};
 }
 
-// The last of those that are to be made.
+// The last chunk to be made.
 void SmoothScene::Impl::make_some(const Grid& grid, const VoxelRegistry& types, GridFields& fields, std::size_t count,
                                   Threads threads) {
   const std::size_t first = fields.to_make.size() - count;
@@ -186,7 +186,7 @@ void SmoothScene::Impl::make_some(const Grid& grid, const VoxelRegistry& types, 
   fields.to_make.resize(first);
 }
 
-// Lets go of everything.
+// Releases everything.
 Error SmoothScene::Impl::refuse(const Scene& of) {
   grids.clear();
   scene = Scene();

@@ -1,7 +1,7 @@
-// Boxes grow from the lowest voxel that is left: along x, then y, then z.
+// Boxes grow from the lowest remaining voxel: along x, then y, then z.
 //
 //   z = 0   . # # .      z = 1   . # # .      the run 1..2 of the first row, both rows of z = 0 and
-//           . # # #              . # # .      of z = 1: one box of 2 x 2 x 2; the voxel at (3, 1, 0) is left
+//           . # # #              . # # .      and z = 1: one box of 2 x 2 x 2; the voxel at (3, 1, 0) remains
 //
 // Faces are rectangles of a layer, which is 64 words of 64 bits in each direction: layers across x are transposed.
 #include <quoin/scene/solid_shapes.h>
@@ -35,7 +35,7 @@ bool is_solid(const VoxelRegistry& types, VoxelType type) {
   return type != kAir && (type >= types.size() || types[type].collides);
 }
 
-// Null: not solid. Returns false, without setting the rows, if no voxel is solid.
+// Gets a chunk's solid voxels. Returns false, without setting the rows, if the chunk is null or no voxel is solid.
 bool read_solid_rows(const Chunk* chunk, const VoxelRegistry& types, SolidRows& rows) {
   if (chunk == nullptr) return false;
   const auto counts = [&](VoxelType type) { return is_solid(types, type); };
@@ -49,9 +49,9 @@ bool read_solid_rows(const Chunk* chunk, const VoxelRegistry& types, SolidRows& 
   return true;
 }
 
-// The lowest run of ones of a word that is not 0.
+// Returns the lowest run of ones in a non-zero word.
 std::uint64_t lowest_run(std::uint64_t word) {
-  const std::uint64_t above = word + (word & (~word + 1));  // 0 where the run ends at the top
+  const std::uint64_t above = word + (word & (~word + 1));  // 0 if the run ends at the top
   return word & ~above;
 }
 
@@ -84,7 +84,7 @@ void cut_boxes(SolidRows& rows, std::vector<IBox>& out) {
   }
 }
 
-// Bit j of word i becomes bit i of word j.
+// Transposes a layer: bit j of word i becomes bit i of word j.
 void transpose(Layer& words) {
   std::uint64_t mask = kAll >> 32;
   for (std::size_t distance = 32; distance != 0; distance /= 2, mask ^= mask << distance) {
@@ -97,7 +97,7 @@ void transpose(Layer& words) {
   }
 }
 
-// Cuts the faces of a layer into rectangles: along the words first.
+// Cuts the faces of a layer into rectangles, along the words first.
 void cut_faces(Layer& faces, Direction direction, bool is_u_in_word, int layer, QuadBuffer& out) {
   const FaceFrame& frame = frame_of(direction);
   for (std::size_t row = 0; row < kEdge; ++row) {
@@ -148,7 +148,7 @@ class SolidLayers {
   std::array<Layer, kEdge> across_x_;
 };
 
-// The layer of a neighbour that touches the chunk.
+// Returns the layer of a neighbour that touches the chunk.
 Layer layer_beside(const Chunk* neighbour, const VoxelRegistry& types, Direction direction) {
   Layer beside{};
   SolidRows rows;
@@ -223,7 +223,8 @@ struct SolidShapes::Impl {
   std::unordered_map<IVec3, ChunkShapes, CoordinateHash> shapes;
 };
 
-// The chunks that may have other shapes; of another grid, or where other types are solid, all that have or had some.
+// Returns the chunks whose shapes may have changed: for another grid, or after solid types changed, all chunks that
+// have or had shapes.
 std::vector<IVec3> SolidShapes::Impl::chunks_to_make(const Grid& grid, const VoxelRegistry& types) {
   GridChanges changes = grid.changes_since(followed_grid);
   if (types.has_changed_since(followed_types)) {

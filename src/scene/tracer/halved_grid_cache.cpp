@@ -50,7 +50,7 @@ void HalvedGridCache::Entry::make(const SceneGrid& grid, const VoxelRegistry& ty
   ChangeCursor field_now = followed_field;
   const GridChanges changes = grid.grid.changes_since(now);
   const DensityChanges field_changes = grid.field.changes_since(field_now);
-  followed = followed_field = {};  // stay so when memory runs out
+  followed = followed_field = {};  // stay empty if memory runs out
   if (changes.all || field_changes.all) {
     *this = {};
   } else if (!changes.empty() || !field_changes.empty()) {

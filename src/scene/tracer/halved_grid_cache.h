@@ -21,7 +21,7 @@ struct PlacedGrid;
 /// A halved grid, ready to be traced.
 struct CoarseLevel {
   const Grid* voxels = nullptr;        ///< empty if the grid has no voxels
-  const DensityGrid* field = nullptr;  ///< null where the grid has none
+  const DensityGrid* field = nullptr;  ///< null if the grid has none
   IBox tight;                          ///< around both
   int level = 0;
   TreeCache trees;
@@ -31,15 +31,15 @@ struct CoarseLevel {
   void put_in(PlacedGrid& placed) const;
 };
 
-/// Halved grids with their trees, made at the first request and kept. After an edit of a grid, only the chunks that it
-/// can affect are remade.
+/// Halved grids with their trees, created on first request and kept. After an edit of a grid, only the chunks that it
+/// can affect are rebuilt.
 ///
 /// A grid is halved only while the volume of its voxels changes by at most an eighth: thin features, such as a bridge's
 /// deck, would become visibly thicker. A field is halved only while at most an eighth of its surface is one sample
 /// thin: thin features would lose their shape and then get holes. If a grid has both, both are halved equally often. A
 /// field with transparent material is never halved: a halved sample may take a neighbour's material, which would break
 /// up the shore of a lake.
-/// Threads: any number may call.
+/// Threads: all functions may run concurrently.
 class HalvedGridCache {
   struct Entry {
     ChangeCursor followed;
@@ -47,7 +47,7 @@ class HalvedGridCache {
     GridPyramid pyramid;
     DensityPyramid fields;
     Grid no_voxels;
-    std::vector<std::unique_ptr<CoarseLevel>> levels;  // once halved first
+    std::vector<std::unique_ptr<CoarseLevel>> levels;  // the first is halved once
     bool is_coarsest = false;                          // no coarser level is similar to the grid
     void make(const SceneGrid& grid, const VoxelRegistry& types, int halvings, Threads threads);
     void renew(const SceneGrid& grid, const VoxelRegistry& types, Threads threads);
@@ -60,7 +60,7 @@ class HalvedGridCache {
   /// changes.
   class Lock {
    public:
-    /// Returns the grid halved that often, or less often if its volume would change too much. Returns null if it cannot
+    /// Returns the grid at a level, or at a finer level if its volume would change too much. Returns null if it cannot
     /// be halved at all.
     [[nodiscard]] const CoarseLevel* find(GridHandle grid, int halvings) const;
 

@@ -102,7 +102,7 @@ PacketLanes::PacketLanes(const RayPacket& rays, const PacketBounds& bounds)
 
 void PacketLanes::set(Axis& axis, const RayPacket::Lanes<double>& origin, const RayPacket::Lanes<double>& direction,
                       double inverse_scale) {
-  // A ray that goes nowhere along an axis goes as slowly as can be, so that no distance is 0 / 0.
+  // Zero components become the smallest positive number, so that no distance is 0 / 0.
   constexpr float kSlowest = 1e-37F;
   for (std::size_t i = 0; i < kFours; ++i) {
     const Four at = four_of(origin, 4 * i, 1.0);
@@ -166,7 +166,7 @@ class PacketTree::Builder {
     }
   }
 
-  // A leaf as it is, of an inner node both children.
+  // Returns a leaf itself, or both children of an inner node.
   void take_child(std::size_t at, std::size_t child, DBox& around) {
     const InstanceTree::Node& node = tree_.nodes()[child];
     const std::size_t low = node.count != 0 ? child : node.first - 1;

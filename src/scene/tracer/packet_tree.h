@@ -86,7 +86,7 @@ class PacketBounds {
   std::array<Limit, 6> limits_;
 };
 
-/// The rays of a packet one by one.
+/// The single rays of a packet.
 class PacketLanes {
  public:
   PacketLanes(const RayPacket& rays, const PacketBounds& bounds);
@@ -94,7 +94,7 @@ class PacketLanes {
   void set_reach(int lane, double max_t) {
     max_t_[static_cast<std::size_t>(lane)] = static_cast<float>(max_t * double{scale_});
   }
-  /// Bit i is clear only when ray i, active or not, does not meet that one of the boxes.
+  /// Clears bit i only if ray i, active or not, misses the given box.
   [[nodiscard]] std::uint32_t meet(const FourBoxes& boxes, std::size_t box) const;
 
  private:

@@ -25,13 +25,13 @@ struct PlacedGrid {
   const Grid* voxels = nullptr;     ///< the traced grid: its voxels, or the halved grid
   DVec3 pivot{0.0};                 ///< in the coordinates of `voxels`
   const OccupancyTree* opaque = nullptr;
-  const OccupancyTree* transparent = nullptr;  ///< null when the grid has no transparent voxel
-  const DensityTree* field = nullptr;          ///< in the space of `voxels`; null when the field has no solid
+  const OccupancyTree* transparent = nullptr;  ///< null if the grid has no transparent voxel
+  const DensityTree* field = nullptr;          ///< in the space of `voxels`; null if the field has no solid
   const DensityTree* opaque_field = nullptr;   ///< the opaque part of the field: `field` if all is opaque; may be null
   const DensityGlass* glass = nullptr;         ///< the transparent part of the field, or null
   glm::dmat3 world_axes{1.0};  ///< columns: the grid's axes in the world, unit; a mirrored instance's x is negated
   DVec3 position{0.0};         ///< of the grid's pivot, in the world
-  double voxel_size = 1.0;     ///< world units a voxel of `voxels`
+  double voxel_size = 1.0;     ///< world units per voxel of `voxels`
   Detail detail = Detail::Near;
   int level = 0;  ///< of `voxels`: cells of (2^level)^3 voxels of the grid
 

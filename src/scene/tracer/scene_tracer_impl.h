@@ -13,16 +13,16 @@
 
 namespace quoin {
 
-/// A grid of the scene, as it was when it was last looked at.
+/// The last known state of a scene's grid.
 struct TracedGrid {
   GridHandle handle;
   const SceneGrid* grid = nullptr;
   DVec3 pivot{0.0};
   IBox tight;
   bool can_be_placed = false;  ///< it is not empty, and its pivot is finite
-  bool is_placed = false;      ///< by an instance that is traced
+  bool is_placed = false;      ///< by a traced instance
   bool is_partial = false;     ///< its voxels or its field
-  std::uint64_t shape = 0;     ///< another number whenever pivot or bounds have changed, and of every other grid
+  std::uint64_t shape = 0;     ///< unique number; replaced when pivot or bounds change
   TreeCache trees;             ///< up to date while it is placed
 };
 

@@ -53,9 +53,9 @@ bool SceneTracer::Impl::update(Threads threads) {
   ChangeCursor scene_now = followed_scene;
   const TypeChanges types = scene->types.changes_since(types_now);
   SceneChanges changes = scene->changes_since(scene_now);
-  followed_types = followed_scene = {};  // stay so when memory runs out
+  followed_types = followed_scene = {};  // stay empty if memory runs out
   const bool was_unfinished = std::exchange(is_unfinished, true);
-  // Trees that were forgotten are made again wherever they are.
+  // Discarded trees are rebuilt, in all placed grids.
   changes.all |= update_types(types);
   const bool are_shapes_same = look_at_grids(changes);
   const bool moves_all = changes.all || !are_shapes_same;
@@ -83,7 +83,7 @@ bool SceneTracer::Impl::update_types(const TypeChanges& changes) {
   bool has_forgotten = false;
   for (const auto& each : grids) {
     if (each == nullptr) continue;
-    // Edited meanwhile, it may have lost the last voxel of such a type.
+    // An edit may have removed the last voxel of such a type.
     const SceneGrid* grid = scene->grids().find(each->handle);
     if (changes.all || grid == nullptr || grid->grid.has_changed_since(each->trees.followed()) ||
         (each->trees.field() != nullptr && grid->field.has_changed_since(each->trees.followed_field())) ||
@@ -195,7 +195,7 @@ bool SceneTracer::Impl::move_instances(const SceneChanges& changes) {
   return true;
 }
 
-// Does this for all instances. Returns false, with part of it done, if the set of traced instances changed.
+// Updates the placement of all instances. Returns false, partly done, if the set of traced instances changed.
 bool SceneTracer::Impl::move_all_instances() {
   for (const auto& each : grids) {
     if (each != nullptr) each->is_placed = false;
@@ -225,7 +225,7 @@ bool SceneTracer::Impl::move_all_instances() {
   return true;
 }
 
-// Places all that is to be traced.
+// Places all traced grids.
 void SceneTracer::Impl::place_instances() {
   for (const auto& each : grids) {
     if (each != nullptr) each->is_placed = false;

@@ -56,7 +56,7 @@ bool TreeCache::update(const Grid& grid, const VoxelRegistry& types) {
   ChangeCursor now = followed_;
   const GridChanges changes = grid.changes_since(now);
   if (changes.empty()) return false;
-  followed_ = {};  // stays so when memory runs out
+  followed_ = {};  // stays empty if memory runs out
   if (changes.all) transparent_.reset();
   opaque_.update(grid, types, changes);
   update_transparent(grid, types, changes);
@@ -75,7 +75,7 @@ bool TreeCache::update(const DensityGrid& field, const VoxelRegistry& types) {
   DensityChanges changes = field.changes_since(now);
   if (is_known && changes.empty()) return false;
   changes.all |= !is_known;
-  followed_field_ = {};  // stays so when memory runs out
+  followed_field_ = {};  // stays empty if memory runs out
   if (is_known) {
     field_->update(changes);
   } else {

@@ -50,17 +50,17 @@ class TreeCache {
   /// Makes the trees, or updates them with the edits since the last call; rebuilds them for another grid. Returns true
   /// if there was anything to do.
   ///
-  /// Requires: the types' visibility is that of the last time; otherwise `forget` first.
+  /// Requires: the types' visibility is unchanged since the last call; otherwise call `forget` first.
   /// Cost:     that of OccupancyTree::update for the chunks that changed.
   bool update(const Grid& grid, const VoxelRegistry& types);
-  /// The same for a field. Lifetime: as DensityTree. Cost: with transparent materials, also the cost of SplitField.
+  /// As above, for a field. Lifetime: as DensityTree. Cost: with transparent materials, also the cost of SplitField.
   bool update(const DensityGrid& field, const VoxelRegistry& types);
   void forget() { *this = {}; }
   [[nodiscard]] const ChangeCursor& followed() const { return followed_; }
   [[nodiscard]] const ChangeCursor& followed_field() const { return followed_field_; }
 
   [[nodiscard]] const OccupancyTree& opaque() const { return opaque_; }
-  /// Null when the grid has no transparent voxel.
+  /// Returns null if the grid has no transparent voxel.
   [[nodiscard]] const OccupancyTree* transparent() const { return transparent_ ? &*transparent_ : nullptr; }
   /// Returns all solid of the field; null if there is none.
   [[nodiscard]] const DensityTree* field() const { return field_ ? if_any(*field_) : nullptr; }
@@ -81,7 +81,7 @@ class TreeCache {
   std::optional<OccupancyTree> transparent_;
   ChangeCursor followed_field_;
   std::optional<DensityTree> field_;
-  std::unique_ptr<SplitField> split_;  // where the field has anything transparent
+  std::unique_ptr<SplitField> split_;  // null if the field has no transparent part
 };
 
 }  // namespace quoin

@@ -113,7 +113,7 @@ class Scan {
   }
   [[nodiscard]] bool is_too_slow() const { return is_too_slow_; }
 
-  /// Determines the page layout: the layout for which a body that spans several pages has a correct checksum, or if
+  /// Determines the page layout: the layout where a body that spans several pages has a correct checksum, or if
   /// there is none, the layout with the most correct bodies.
   void find_layout();
 
