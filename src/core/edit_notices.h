@@ -11,7 +11,7 @@ namespace quoin {
 
 /// The edit notices of one container: lists which of its items were edited since the last `take`.
 ///
-/// Threads: notices may be given on several threads at once, for different things.
+/// Threads: notices for different items may be given concurrently.
 class EditNotices {
  public:
   EditNotices() = default;
@@ -46,7 +46,7 @@ class EditNotices {
   void give(std::uint32_t index) {
     const std::lock_guard lock(mutex_);
     QUOIN_ASSERT(index < is_given_.size(), "an index of a followed item");
-    // A number is listed once, even if its item was removed and another item has the number now.
+    // A number is listed once, even if its item was removed and another item now has the number.
     if (is_given_[index]) return;
     is_given_[index] = true;
     given_.push_back(index);

@@ -33,7 +33,7 @@ inline constinit std::atomic<std::uint8_t> instruction_set_in_use{0};
   return set <= instruction_set();
 }
 
-/// A table with one kernel per instruction set. An entry repeats where a set has no better kernel.
+/// A table with one kernel per instruction set. An entry repeats if a set has no better kernel.
 template <class Kernel>
 struct KernelTable {
   const Kernel* of[kInstructionSets];

@@ -7,11 +7,11 @@
 
 namespace quoin {
 
-/// Lends objects of a kind to as many threads as ask, and keeps them between loans: memory that only grows.
+/// A pool that lends one object per concurrent caller and keeps objects between loans. Its memory never shrinks.
 template <class T>
 class Lender {
  public:
-  /// Calls `use(T&)` with an object that no other thread has meanwhile.
+  /// Calls `use(T&)` with an object that no other thread uses during the call.
   template <class Use>
   void with(const Use& use) {
     std::unique_ptr<T> lent = take();

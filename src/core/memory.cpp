@@ -13,7 +13,7 @@
 namespace quoin {
 namespace {
 
-// The number behind a word of a file of lines "WORD NUMBER ...".
+// Returns the number after a word in a file of lines "WORD NUMBER ...".
 std::optional<std::uint64_t> number_in(const std::string& path, const std::string& word) {
   std::ifstream file(path);
   for (std::string key; file >> key;) {
@@ -25,7 +25,7 @@ std::optional<std::uint64_t> number_in(const std::string& path, const std::strin
   return std::nullopt;
 }
 
-// Reads the number in a file; nothing for "max".
+// Reads the number in a file; nullopt for "max".
 std::optional<std::uint64_t> number_of(const std::string& path) {
   std::ifstream file(path);
   std::uint64_t number = 0;
@@ -84,7 +84,8 @@ std::optional<std::uint64_t> available_memory() {
 
 bool return_freed_memory() {
 #ifdef __GLIBC__
-  // A size that is set stays: glibc would raise it to the largest block that was freed, and keep all below.
+  // Setting the size keeps it fixed. Otherwise glibc would raise it to the largest freed block and keep all smaller
+  // blocks.
   constexpr int kLargeBlock = 32 * 1024;
   return ::mallopt(M_MMAP_THRESHOLD, kLargeBlock) == 1;
 #else

@@ -34,7 +34,7 @@ void parallel_for(std::size_t count, Threads /*threads*/, FunctionRef<void(std::
 
 unsigned thread_count(Threads threads) {
   if (threads.count != 0) return threads.count;
-  // Read once: glibc opens a file of /sys for it, which takes 7 microseconds.
+  // Read once: glibc opens a file in /sys, which takes 7 microseconds.
   static const unsigned processors = std::max(1U, std::thread::hardware_concurrency());
   return processors;
 }

@@ -8,8 +8,8 @@
 
 namespace quoin {
 
-/// Reports to a progress callback how many of `total` steps are done, and remembers if it cancelled. Threads: any
-/// number.
+/// Reports the fraction of `total` finished steps to a progress callback, and remembers if it cancelled. Threads: all
+/// functions may run concurrently.
 class ProgressSteps {
  public:
   ProgressSteps(const Progress& progress, std::size_t total) : progress_(&progress), total_(total) {}

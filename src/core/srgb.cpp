@@ -6,7 +6,7 @@
 namespace quoin {
 namespace {
 
-// `encoded` as a share of 1. In long double, so that rounding to float is right.
+// `encoded`: 0 to 1. Uses long double, so that rounding to float is correct.
 long double decode(long double encoded) {
   return encoded <= 0.04045L ? encoded / 12.92L : std::pow((encoded + 0.055L) / 1.055L, 2.4L);
 }

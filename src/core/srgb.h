@@ -16,11 +16,11 @@ namespace quoin {
 /// Turns linear light into sRGB bytes, rounded to the nearest: exactly, for every float. Less than 0 and NaN give 0,
 /// more than 1 gives 255.
 ///
-/// Cost: one look-up by the float's highest bits, which leave two bytes to choose from, and one comparison.
+/// Cost: one lookup by the float's highest bits, which leaves two candidate bytes, and one comparison.
 class SrgbEncoder {
  public:
   SrgbEncoder();
-  /// Made once, at the first call.
+  /// Returns the encoder, which is made at the first call.
   static const SrgbEncoder& shared();
 
   [[nodiscard]] std::uint8_t operator()(float linear) const {
@@ -31,14 +31,14 @@ class SrgbEncoder {
   }
 
  private:
-  // Below 2^-13 all is byte 0. 7 bits of mantissa are enough for no two thresholds to share an entry.
+  // Below 2^-13 every value is byte 0. With 7 bits of mantissa no two thresholds share an entry.
   static constexpr unsigned kShift = 23 - 7;
   static constexpr float kLowest = 0x1p-13F;
   static constexpr std::uint32_t kFirst = std::bit_cast<std::uint32_t>(kLowest) >> kShift;
   static constexpr std::uint32_t kEnd = std::bit_cast<std::uint32_t>(1.0F) >> kShift;
 
   std::array<std::uint8_t, kEnd - kFirst> bytes_{};  // of the entry's lowest float
-  std::array<float, 257> thresholds_{};              // [b]: the least float whose byte is b or more
+  std::array<float, 257> thresholds_{};              // [b]: the smallest float whose byte is at least b
 };
 
 }  // namespace quoin

@@ -6,7 +6,7 @@
 
 namespace quoin {
 
-/// Densities of a cell's corners, by x + 2 y + 4 z.
+/// Densities of a cell's corners, indexed by x + 2 y + 4 z.
 using CellCorners = std::array<double, 8>;
 
 [[nodiscard]] inline double between(double a, double b, double t) {
@@ -17,7 +17,7 @@ using CellCorners = std::array<double, 8>;
   return between(between(v00, v10, u), between(v01, v11, u), v);
 }
 
-/// The field in a cell; `f` from its least corner, 0 to 1 on each axis.
+/// Returns the field in a cell. `f`: position from its lowest corner, 0 to 1 on each axis.
 [[nodiscard]] inline double trilinear(const CellCorners& d, const DVec3& f) {
   const double low = bilinear(d[0], d[1], d[2], d[3], f.x, f.y);
   const double high = bilinear(d[4], d[5], d[6], d[7], f.x, f.y);

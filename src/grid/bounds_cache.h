@@ -20,7 +20,7 @@ namespace quoin {
 ///
 /// `Entries` are the grid's chunks and `Record` is the record type of its journal. `BoxOfEntry::of(entry)` returns the
 /// box of the counted voxels in one chunk, in the chunk's coordinates.
-/// Threads: any number may ask at once.
+/// Threads: queries may run concurrently.
 template <class Record, class Entries, class BoxOfEntry>
 class BoundsCache {
  public:
@@ -91,7 +91,7 @@ class BoundsCache {
     return true;
   }
 
-  std::shared_ptr<std::atomic<bool>> is_wanted_;  // of this grid or of a copy
+  std::shared_ptr<std::atomic<bool>> is_wanted_;  // shared with copies
   mutable std::mutex mutex_;
   ChangeCursor cursor_;
   IBox box_;

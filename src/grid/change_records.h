@@ -11,7 +11,7 @@
 
 namespace quoin {
 
-/// A box of voxels of one chunk in eight bytes: the least x, y, z, and 255 minus the greatest. A bytewise minimum
+/// A box of voxels of one chunk in eight bytes: the minimum x, y, z, and 255 minus the maximum. A bytewise minimum
 /// unites two boxes.
 class PackedBox {
  public:
@@ -93,7 +93,7 @@ struct VoxelRecord {
     box.unite(PackedBox::of(all.max.x - 1, all.max.y - 1, all.max.z - 1));
     slabs.add(ChunkSlabs::of(all));
   }
-  /// For an interrupted edit: anything may have changed.
+  /// Marks everything as possibly changed, for an interrupted edit.
   void add_all() {
     neighbours = kEverywhere;
     box = PackedBox::of_chunk();
@@ -156,7 +156,7 @@ class ChangeReach {
     box_.unite(PackedBox::of_row(y, z, changed));
   }
 
-  /// For an interrupted edit: anything may have changed.
+  /// Marks everything as possibly changed, for an interrupted edit.
   void add_all() {
     samples = kChunkVoxels;
     for (std::size_t i = 0; i < least_.size(); ++i) least_[i] = i == 13 ? 0 : 1;

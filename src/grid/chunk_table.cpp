@@ -120,7 +120,7 @@ ChunkTable::ChunkTable(const ChunkTable& other)
   other.epoch_.fetch_add(1, std::memory_order_relaxed);
 }
 
-// The entries of a leaf lie elsewhere than before.
+// Updates the window after a leaf's entries moved in memory.
 void ChunkTable::put_leaf(Leaf& leaf) {
   ChunkTrie<ChunkEntry>::for_each_of(leaf, [&](IVec3 at, ChunkEntry& entry) {
     const std::uint32_t cell = window_.cell(at.x, at.y, at.z);
@@ -230,7 +230,7 @@ bool ChunkTable::slide_to(const IVec3& chunk) {
 void ChunkTable::take_in(const IBox& chunks) {
   trie_.for_each_in(chunks, [&](IVec3 at, const ChunkEntry& entry) {
     const std::uint32_t cell = window_.cell(at.x, at.y, at.z);
-    if (window_.entry(cell) != nullptr) return;  // by another axis
+    if (window_.entry(cell) != nullptr) return;  // already added by another axis
     window_.put(cell, const_cast<ChunkEntry*>(&entry), 0);
     --outside_;
   });
@@ -291,7 +291,7 @@ void ChunkTable::move_to(const ChunkWindow::Box& box) {
   trie_.for_each([&](IVec3 at, const ChunkEntry& entry) {
     const std::uint32_t cell = window_.cell(at.x, at.y, at.z);
     if (cell != ChunkWindow::kOutside) {
-      // An entry that may be shared is not changed before its way was looked at, its epoch says.
+      // The entry's epoch ensures that its path is checked before a shared entry is changed.
       window_.put(cell, const_cast<ChunkEntry*>(&entry), known);
     } else {
       ++outside_;

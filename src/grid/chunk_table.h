@@ -53,7 +53,7 @@ class ChunkWindow {
     return (static_cast<std::uint32_t>(x) & mask_x_) + ((static_cast<std::uint32_t>(y) & mask_y_) << shift_y_) +
            ((static_cast<std::uint32_t>(z) & mask_z_) << shift_z_);
   }
-  /// Null if there is no chunk.
+  /// Returns null if there is no chunk.
   [[nodiscard]] ChunkEntry* entry(std::uint32_t cell) const { return entries_[cell]; }
   /// Returns the last epoch in which the entry was known to be unshared.
   [[nodiscard]] std::uint32_t epoch(std::uint32_t cell) const { return epochs_[cell]; }
@@ -112,7 +112,7 @@ class ChunkWindow {
 /// Threads: any number may read and copy at once; a change needs exclusive access.
 class ChunkTable {
  public:
-  /// An entry to be changed; `entry` is null if there is none.
+  /// Returns an entry to change; `entry` is null if there is none.
   struct Slot {
     ChunkEntry* entry = nullptr;
     std::uint32_t cell = ChunkWindow::kOutside;
@@ -158,11 +158,11 @@ class ChunkTable {
 
   [[nodiscard]] std::size_t size() const { return trie_.size(); }
   [[nodiscard]] bool empty() const { return trie_.size() == 0; }
-  /// Bytes held, the chunks' voxels excluded.
+  /// Returns the bytes held, excluding the chunks' voxels.
   [[nodiscard]] std::size_t bytes() const { return trie_.bytes() + window_.bytes(); }
-  /// Places of the window.
+  /// Returns the number of the window's cells.
   [[nodiscard]] std::size_t window_cells() const { return window_.cells(); }
-  /// Number of chunks outside of the window.
+  /// Returns the number of chunks outside of the window.
   [[nodiscard]] std::size_t outside() const { return outside_; }
 
   /// Calls `visit(chunk, entry)` for each entry. The order depends only on the coordinates.
@@ -197,7 +197,7 @@ class ChunkTable {
   std::size_t outside_ = 0;
   std::size_t outside_since_plan_ = 0;
   bool is_planned_ = true;  // false: a copy that was not changed yet
-  // Raised by every copy: an entry that is known not to be shared since is of this epoch. 0 is of none.
+  // Incremented by every copy. An entry known to be unshared since then has this epoch; 0 is never used.
   mutable std::atomic<std::uint32_t> epoch_{1};
 };
 

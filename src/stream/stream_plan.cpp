@@ -36,7 +36,7 @@ bool is_looked_at(const Eye& eye, IVec3 chunk) {
 // Maximum number of chunks in a plan at any budget and radius: a ball with a radius of 40 chunks.
 constexpr std::size_t kMaxPlanned = std::size_t{1} << 18;
 
-// Returns the radius of a ball of `max_chunks` chunks, beyond which the budget cuts any plan.
+// Returns the radius of a ball of `max_chunks` chunks; the budget cuts any larger plan.
 double reach_of(std::size_t max_chunks) {
   return (std::cbrt(static_cast<double>(max_chunks) * 0.75 / std::numbers::pi) + 2.0) * kChunkEdge;
 }

@@ -52,12 +52,12 @@ class Landform {
   [[nodiscard]] int sea() const { return sea_; }
   [[nodiscard]] int snow_line() const { return snow_line_; }
   [[nodiscard]] std::uint32_t seed() const { return seed_; }
-  /// Voxels that the world is high.
+  /// Returns the world's height in voxels.
   [[nodiscard]] int top() const { return top_; }
 
  private:
   [[nodiscard]] double elevation(double x, double z) const;
-  // Of the ground's top above the lowest layer.
+  // Returns the height of the ground's top above the lowest layer.
   [[nodiscard]] double rise(int x, int z) const;
   // `heights` is 3x3, x fastest.
   [[nodiscard]] Column describe(int x, int z, const int* heights, std::size_t stride) const;

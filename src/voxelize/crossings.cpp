@@ -36,8 +36,8 @@ struct Passing {
   bool rises = false;  ///< in v, along the triangle's sense of rotation
 };
 
-/// Requires: the edge begins at or below `v` and ends above it, or the other way round. From the lower end always, so
-/// that two triangles find the same bits on the edge that they share.
+/// Returns the point where an edge passes `v`. Always computes from the lower end, so that two triangles get the same
+/// bits on their shared edge. Requires: one end is at or below `v`, the other above it.
 Passing passing(const Seen& from, const Seen& to, double v) {
   const bool rises = from.v < to.v;
   const Seen& low = rises ? from : to;

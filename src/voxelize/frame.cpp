@@ -15,7 +15,7 @@ namespace quoin {
 namespace {
 
 constexpr int kMostVoxels = 1 << 14;
-// Of a voxel, that the mesh stays clear of the lattice's sides.
+// Clearance between the mesh and the lattice's sides, in voxels.
 constexpr double kClear = 1e-3;
 
 Error nothing_there() {

@@ -8,7 +8,7 @@ namespace quoin::voxelizing {
 
 namespace {
 
-// Of six rays: more than half of them.
+// Majority of six rays.
 constexpr int kHalf = 3;
 // Keeps the sum of six votes within int16; real meshes stay below it.
 constexpr int kMostTurns = 4'000;

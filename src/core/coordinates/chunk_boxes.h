@@ -34,8 +34,8 @@ class ChunkBoxes {
     }
   }
 
-  /// Returns the box around all. Cost: O(chunks) the first time, O(chunks log chunks) the second. Counting starts with
-  /// the second call, so that containers that never change do not pay for it.
+  /// Returns the box around all boxes. Cost: O(chunks) the first time, O(chunks log chunks) the second time. Counting
+  /// starts with the second call, so that containers that never change do not pay for it.
   [[nodiscard]] IBox bounds() {
     IBox around;
     if (!was_asked_) {
@@ -84,8 +84,8 @@ class ChunkBoxes {
   tsl::robin_map<IVec3, IBox, CoordinateHash> boxes_;
   bool was_asked_ = false;
   bool is_counted_ = false;
-  std::array<std::map<int, int>, 3> mins_;  // chunks whose boxes begin there
-  std::array<std::map<int, int>, 3> maxs_;  // and end
+  std::array<std::map<int, int>, 3> mins_;  // number of chunk boxes that begin at a coordinate
+  std::array<std::map<int, int>, 3> maxs_;  // number that end there
 };
 
 }  // namespace quoin

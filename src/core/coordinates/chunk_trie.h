@@ -118,9 +118,10 @@ class ChunkTrie {
   [[nodiscard]] std::size_t bytes() const { return root_ == nullptr ? 0 : bytes_of(*root_); }
 
  private:
-  static constexpr int kLog = 2;  // places along an edge
+  static constexpr int kLog = 2;  // log2 of the slots along an edge
   static constexpr unsigned kEdge = 1U << kLog;
-  static constexpr std::uint32_t kOrigin = std::uint32_t{1} << 25;  // so that chunks of the world count from 0
+  static constexpr std::uint32_t kOrigin = std::uint32_t{1}
+                                           << 25;  // shifts the world's chunk coordinates to start at 0
 
   using Place = std::array<std::uint32_t, 3>;
 
@@ -160,7 +161,7 @@ class ChunkTrie {
     const int shift = kLog * (level + 1);
     return {at[0] >> shift, at[1] >> shift, at[2] >> shift};
   }
-  // Number by number: arrays that were just made of numbers are not compared at once without waiting for these.
+  // Component by component: comparing a freshly written array as a whole waits for its writes.
   static bool covers(const Node& node, const Place& at) {
     const int shift = kLog * (node.level + 1);
     return ((at[0] >> shift ^ node.prefix[0]) | (at[1] >> shift ^ node.prefix[1]) |
@@ -171,7 +172,7 @@ class ChunkTrie {
     return (at[0] >> shift & (kEdge - 1)) | (at[1] >> shift & (kEdge - 1)) << kLog |
            (at[2] >> shift & (kEdge - 1)) << (2 * kLog);
   }
-  // The first chunk below a place of a node.
+  // Returns the lowest chunk of a node's slot.
   static IVec3 chunk_at(const Node& node, unsigned slot) {
     const int shift = kLog * node.level;
     const auto along = [&](std::size_t axis, unsigned digit) {

@@ -1,6 +1,6 @@
 // Eight lanes in AVX2 registers.
 //
-//   F, I, Mask   | 0 | 1 | 2 | 3 | 4 | 5 | 6 | 7 |    32 bits each; of a mask all are set, or none
+//   F, I, Mask   | 0 | 1 | 2 | 3 | 4 | 5 | 6 | 7 |    32 bits each; in a mask all or none are set
 
 #pragma once
 
@@ -131,7 +131,7 @@ inline Mask test(I a, I b) {
   const __m256i none = _mm256_cmpeq_epi32(_mm256_and_si256(a.v, b.v), _mm256_setzero_si256());
   return {_mm256_castsi256_ps(_mm256_xor_si256(none, _mm256_set1_epi32(-1)))};
 }
-// Bit `at % 32` of each lane: moved to the sign.
+// Tests bit `at % 32` of each lane by moving it to the sign.
 inline Mask test_bit(I a, I at) {
   const __m256i up = _mm256_sub_epi32(_mm256_set1_epi32(31), _mm256_and_si256(at.v, _mm256_set1_epi32(31)));
   return {_mm256_castsi256_ps(_mm256_srai_epi32(_mm256_sllv_epi32(a.v, up), 31))};
@@ -173,7 +173,7 @@ inline I operator^(I a, I b) {
 inline F sqrt(F a) {
   return {_mm256_sqrt_ps(a.v)};
 }
-// Four numbers from `base + at[lane]` on.
+// Loads four numbers per lane from `base + at[lane]`.
 inline void load_four(const float* base, const std::int32_t (&at)[kWidth], F& a, F& b, F& c, F& d) {
   // Each 128-bit part of a register holds the values of four neighbouring lanes.
   const auto rows = [&](int i) {
@@ -192,7 +192,7 @@ inline void load_four(const float* base, const std::int32_t (&at)[kWidth], F& a,
   c.v = _mm256_castpd_ps(_mm256_unpacklo_pd(high01, high23));
   d.v = _mm256_castpd_ps(_mm256_unpackhi_pd(high01, high23));
 }
-// `a` where `which` has bits, else `b`.
+// Selects `a` where `which` has bits, otherwise `b`.
 inline I merge(I which, I a, I b) {
   return {_mm256_or_si256(_mm256_and_si256(which.v, a.v), _mm256_andnot_si256(which.v, b.v))};
 }

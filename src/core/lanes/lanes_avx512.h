@@ -129,12 +129,12 @@ inline I add_if(Mask m, I a, I b) {
 inline Mask test(I a, I b) {
   return {_mm512_test_epi32_mask(a.v, b.v)};
 }
-// Bit `at % 32` of each lane.
+// Tests bit `at % 32` of each lane.
 inline Mask test_bit(I a, I at) {
   return test(I{_mm512_rorv_epi32(a.v, at.v)}, I{_mm512_set1_epi32(1)});
 }
-// A mask of all lanes that compilers cannot recognise as full. With a known full mask they gather into an arbitrary
-// register, and the processor waits for its content, often that of the last gather.
+// Returns a mask of all lanes that compilers cannot recognise as full. With a known full mask they gather into an
+// arbitrary register, and the processor waits for its content, often that of the last gather.
 inline __mmask16 each_lane() {
   __mmask16 each = 0xFFFF;
   __asm__("" : "+Yk"(each));
@@ -177,7 +177,7 @@ inline I operator^(I a, I b) {
 inline F sqrt(F a) {
   return {_mm512_sqrt_ps(a.v)};
 }
-// Four numbers from `base + at[lane]` on.
+// Loads four numbers per lane from `base + at[lane]`.
 inline void load_four(const float* base, const std::int32_t (&at)[kWidth], F& a, F& b, F& c, F& d) {
   // Each 128-bit part of a register holds the values of four neighbouring lanes.
   const auto rows = [&](int i) {
@@ -199,7 +199,7 @@ inline void load_four(const float* base, const std::int32_t (&at)[kWidth], F& a,
   c.v = _mm512_castpd_ps(_mm512_unpacklo_pd(high01, high23));
   d.v = _mm512_castpd_ps(_mm512_unpackhi_pd(high01, high23));
 }
-// `a` where `which` has bits, else `b`.
+// Selects `a` where `which` has bits, otherwise `b`.
 inline I merge(I which, I a, I b) {
   return {_mm512_ternarylogic_epi32(which.v, a.v, b.v, 0xCA)};
 }

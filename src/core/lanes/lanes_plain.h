@@ -157,7 +157,7 @@ inline Mask test(I a, I b) {
 inline I to_int(F a) {
   return each<I>([&](int i) { return static_cast<std::int32_t>(a.v[i]); });
 }
-// Four numbers from `base + at[lane]` on.
+// Loads four numbers per lane from `base + at[lane]`.
 inline void load_four(const float* base, const std::int32_t (&at)[kWidth], F& a, F& b, F& c, F& d) {
   for (int i = 0; i < kWidth; ++i) {
     a.v[i] = base[at[i]];

@@ -14,7 +14,7 @@ namespace quoin::packed_row {
 // A row is 64 voxels of `bits` bits each (1, 2, 4, 8 or 16), in `bits` words, lowest bits first. Everything here works
 // on whole words.
 
-/// Every second bit of `w`, packed: bit i is bit 2i of `w`.
+/// Returns every second bit of `w`, packed: bit i is bit 2i of `w`.
 constexpr std::uint64_t gather_even_bits(std::uint64_t w) {
   w &= 0x5555'5555'5555'5555U;
   w = (w | (w >> 1)) & 0x3333'3333'3333'3333U;
@@ -24,7 +24,7 @@ constexpr std::uint64_t gather_even_bits(std::uint64_t w) {
   return (w | (w >> 16)) & 0x0000'0000'FFFF'FFFFU;
 }
 
-/// The even bits of `w`, packed, in the lower half, and the odd ones in the upper.
+/// Returns the even bits of `w`, packed, in the lower half, and the odd bits in the upper half.
 constexpr std::uint64_t split_pairs(std::uint64_t w) {
   const auto swap = [&w](int distance, std::uint64_t lower) {
     const std::uint64_t changed = (w ^ (w >> distance)) & lower;
@@ -38,7 +38,7 @@ constexpr std::uint64_t split_pairs(std::uint64_t w) {
   return w;
 }
 
-/// The lowest bit of each of the 16 nibbles of `w`, packed.
+/// Returns the lowest bit of each of the 16 nibbles of `w`, packed.
 constexpr std::uint64_t gather_nibble_bits(std::uint64_t w) {
   w &= 0x1111'1111'1111'1111U;
   w = (w | (w >> 3)) & 0x0303'0303'0303'0303U;
@@ -47,17 +47,17 @@ constexpr std::uint64_t gather_nibble_bits(std::uint64_t w) {
   return (w | (w >> 24)) & 0xFFFFU;
 }
 
-/// The lowest bit of each of the 8 bytes of `w`, packed.
+/// Returns the lowest bit of each of the 8 bytes of `w`, packed.
 constexpr std::uint64_t gather_byte_bits(std::uint64_t w) {
   return ((w & 0x0101'0101'0101'0101U) * 0x0102'0408'1020'4080U) >> 56;
 }
 
-/// The lowest bit of each of the 4 halfwords of `w`, packed.
+/// Returns the lowest bit of each of the 4 halfwords of `w`, packed.
 constexpr std::uint64_t gather_half_bits(std::uint64_t w) {
   return ((w & 0x0001'0001'0001'0001U) * 0x0001'0002'0004'0008U) >> 48;
 }
 
-/// Bit i of the lowest 32 in bits 2i and 2i + 1.
+/// Copies bit i of the lowest 32 to bits 2i and 2i + 1.
 constexpr std::uint64_t spread_to_pairs(std::uint64_t w) {
   w &= 0x0000'0000'FFFF'FFFFU;
   w = (w | (w << 16)) & 0x0000'FFFF'0000'FFFFU;
@@ -67,7 +67,7 @@ constexpr std::uint64_t spread_to_pairs(std::uint64_t w) {
   return ((w | (w << 1)) & 0x5555'5555'5555'5555U) * 3;
 }
 
-/// Bit i of the lowest 16 in all bits of nibble i.
+/// Copies bit i of the lowest 16 to all bits of nibble i.
 constexpr std::uint64_t spread_to_nibbles(std::uint64_t w) {
   w &= 0xFFFFU;
   w = (w | (w << 24)) & 0x0000'00FF'0000'00FFU;
@@ -76,18 +76,18 @@ constexpr std::uint64_t spread_to_nibbles(std::uint64_t w) {
   return ((w | (w << 3)) & 0x1111'1111'1111'1111U) * 15;
 }
 
-/// Bit i of the lowest 8 in all bits of byte i.
+/// Copies bit i of the lowest 8 to all bits of byte i.
 constexpr std::uint64_t spread_to_bytes(std::uint64_t w) {
   w = ((w & 0xFFU) * 0x0101'0101'0101'0101U) & 0x8040'2010'0804'0201U;
   return (((w + 0x7F7F'7F7F'7F7F'7F7FU) | w) >> 7 & 0x0101'0101'0101'0101U) * 0xFF;
 }
 
-/// Bit i of the lowest 4 in all bits of halfword i.
+/// Copies bit i of the lowest 4 to all bits of halfword i.
 constexpr std::uint64_t spread_to_halves(std::uint64_t w) {
   return ((w & 1U) | (w & 2U) << 15 | (w & 4U) << 30 | (w & 8U) << 45) * 0xFFFF;
 }
 
-/// `index` repeated over a word.
+/// Returns `index` repeated over a word.
 constexpr std::uint64_t repeat(int bits, std::uint32_t index) {
   constexpr std::uint64_t kOnes[] = {~std::uint64_t{0}, 0x5555'5555'5555'5555U, 0x1111'1111'1111'1111U,
                                      0x0101'0101'0101'0101U, 0x0001'0001'0001'0001U};
@@ -95,7 +95,7 @@ constexpr std::uint64_t repeat(int bits, std::uint32_t index) {
 }
 
 #ifdef __SSE2__
-/// The top bits of 16 bytes, packed.
+/// Returns the top bits of 16 bytes, packed.
 inline std::uint64_t top_bits(__m128i bytes) {
   return static_cast<std::uint32_t>(_mm_movemask_epi8(bytes));
 }
@@ -222,7 +222,7 @@ inline bool all_equal(const std::uint64_t* row, int bits, int rows, std::uint32_
   return true;
 }
 
-/// The 64 indices of a row, each through `value_of`.
+/// Calls `value_of` for the 64 indices of a row.
 template <int Bits, class Out, class ValueOf>
 void unpack_as(const std::uint64_t* row, Out* out, ValueOf&& value_of) {
   constexpr int kPerWord = 64 / Bits;
@@ -248,7 +248,7 @@ void unpack_bits(std::uint64_t word, Value zero, Value one, Value* out) {
   }
 }
 
-/// The 64 values of a row, `bits` wide, by a palette; at 16 bits they are the indices themselves.
+/// Looks up the 64 values of a row, `bits` wide, in a palette; at 16 bits the values are the indices themselves.
 template <class Value>
 void unpack(const std::uint64_t* row, int bits, const Value* palette, std::size_t palette_size, Value* out) {
   const auto type_of = [palette](std::uint32_t index) { return palette[index]; };

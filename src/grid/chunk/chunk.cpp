@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::uint64_t kAllVoxels = ~std::uint64_t{0};
 
-// A one in each of four counts whose bit is set.
+// Returns 1 in each of four counts whose bit is set.
 constexpr auto kFourOnes = [] {
   std::array<std::uint64_t, 16> ones{};
   for (unsigned bits = 0; bits < ones.size(); ++bits) {
@@ -29,7 +29,7 @@ constexpr auto kFourOnes = [] {
   return ones;
 }();
 
-// Adds 1 or -1 to the counts whose bits are set, four at once: none leaves 0 to 4,096, so that none carries.
+// Adds 1 or -1 to the counts whose bits are set, four at once. Counts stay within 0 to 4,096, so there is no carry.
 void add_columns(std::array<std::uint16_t, kChunkEdge>& counts, std::uint64_t mask, int delta) {
   if (mask == 0) return;
   if (mask == kAllVoxels) {
@@ -67,7 +67,7 @@ void for_each_run(std::span<const VoxelType, kChunkEdge> row, Visit&& visit) {
   }
 }
 
-// The rows of a slab, in the order in which they are stored.
+// The rows of a slab, in storage order.
 template <class Visit>
 void for_each_row_of_slab(std::size_t slab, Visit&& visit) {
   const int first_y = static_cast<int>(slab % 16) * 4;
@@ -486,7 +486,7 @@ bool Chunk::operator==(const Chunk& other) const {
 std::uint64_t Chunk::content_hash() const {
   std::uint64_t hash = kHashSeed;
   std::array<VoxelType, kChunkEdge> row{};
-  std::optional<VoxelType> hashed;  // the one type of the row that was hashed last
+  std::optional<VoxelType> hashed;  // the type of the last hashed row, if uniform
   std::uint64_t row_hash = 0;
   for (int z = 0; z < kChunkEdge; ++z) {
     for (int y = 0; y < kChunkEdge; ++y) {

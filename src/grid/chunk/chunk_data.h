@@ -18,8 +18,8 @@ namespace quoin {
 /// The data of a slab's voxels.
 ///
 ///   stateful [z % 4][y % 4]   bit x: that voxel's state is not 0
-///   states                    of these, in that order, x ascending
-///   bytes                     of the voxels that have some, by their place: (row in the slab) * 64 + x
+///   states                    of these voxels, in that order, x ascending
+///   bytes                     of voxels with bytes, by position: (row in the slab) * 64 + x
 class SlabData : public RefCounted {
  public:
   [[nodiscard]] bool empty() const { return states_.empty() && bytes_.empty(); }
@@ -54,7 +54,7 @@ class SlabData : public RefCounted {
 /// The data of a chunk's voxels, by slabs. A copy shares them until one is written.
 class ChunkData : public RefCounted {
  public:
-  /// Voxels that have some.
+  /// Returns the number of voxels with data.
   [[nodiscard]] int count() const { return count_; }
   /// Returns the data of a slab; null if no voxel of it has any.
   [[nodiscard]] const SlabData* slab(std::size_t index) const { return slabs_[index].get(); }
@@ -66,7 +66,7 @@ class ChunkData : public RefCounted {
     const SlabData* const slab = slabs_[ChunkStorage::slab_index(y, z)].get();
     return slab == nullptr ? VoxelData{} : slab->get(ChunkStorage::row_in_slab(y, z), x);
   }
-  /// Requires: it is not empty.
+  /// Sets a slab's data. Requires: it is not empty.
   void put(int x, int y, int z, const VoxelData& data);
   void clear(int y, int z, std::uint64_t mask);
   [[nodiscard]] bool operator==(const ChunkData& other) const;
@@ -76,18 +76,18 @@ class ChunkData : public RefCounted {
   [[nodiscard]] static const ChunkData* of(const Chunk& chunk) { return chunk.data_.get(); }
 
  private:
-  std::array<Ref<SlabData>, 256> slabs_;  // as ChunkStorage::slabs
+  std::array<Ref<SlabData>, 256> slabs_;  // indexed as ChunkStorage::slabs
   int count_ = 0;
 };
 
-/// Chunk::data_count, where a call would be a good part of its cost.
+/// Chunk::data_count, inline, for callers where the call would dominate the cost.
 [[nodiscard]] inline int data_count(const Chunk& chunk) {
   const ChunkData* const data = ChunkData::of(chunk);
   return data == nullptr ? 0 : data->count();
 }
 
 /// Calls `visit(local voxel, data before, data after)` for the voxels whose data differs between two states of a chunk,
-/// by z, y, x; null is a chunk of air.
+/// by z, y, x; null means a chunk of air.
 void visit_other_data(const Chunk* before, const Chunk* after,
                       FunctionRef<void(IVec3 local, const VoxelData& before, const VoxelData& after)> visit);
 

@@ -11,7 +11,7 @@
 namespace quoin {
 namespace {
 
-// Returns true if equal indices of two chunks mean the same type. Entries that only one of them has do not matter.
+// Returns true if equal indices of two chunks mean the same type. Ignores entries that only one chunk has.
 bool share_palette(const ChunkStorage* a, const ChunkStorage* b) {
   if (a == nullptr || b == nullptr || a->bits != b->bits) return false;
   const std::size_t both = std::min(a->palette.size(), b->palette.size());

@@ -6,7 +6,7 @@
 
 namespace quoin {
 
-/// The differences between two states of a chunk; null is all air.
+/// The differences between two states of a chunk; null means all air.
 struct ChunkDifference {
   ChangeReach solid;  ///< voxels that are air in only one state
   ChangeReach types;  ///< voxels of different types, including `solid`
@@ -15,7 +15,7 @@ struct ChunkDifference {
 /// Records in `edit` the voxels whose type changes. Ignores data.
 void difference_of_types(const Chunk& before, const Chunk& after, VoxelEdit& edit);
 
-/// Calls `visit` for the rows that differ between two states of a chunk, by z, then y; null is all air.
+/// Calls `visit` for the rows that differ between two states of a chunk, by z, then y; null means all air.
 /// Requires: the states are equal outside of the box `within` and of `slabs`. `chunk`: the chunk's coordinates.
 void visit_other_rows(const Chunk* before, const Chunk* after, IVec3 chunk, const IBox& within, const ChunkSlabs& slabs,
                       FunctionRef<void(const RowChange&)> visit);

@@ -14,7 +14,7 @@
 namespace quoin {
 namespace {
 
-// The cost of repacking a slab's voxels or scanning them, in changes of single voxels.
+// The cost of repacking or scanning a slab's voxels, in units of single-voxel changes.
 constexpr std::uint32_t kCreditOfSlot = 4;
 constexpr std::uint32_t kMaxCredit = 1U << 30;
 constexpr std::size_t kAllTypes = std::size_t{1} << 16;
@@ -35,14 +35,14 @@ void for_each_type(const ChunkStorage& m, Visit&& visit) {
   }
 }
 
-// A palette without unused entries, and the new index of each old one.
+// A palette without unused entries, and the new index of each old entry.
 struct Numbering {
   std::vector<VoxelType> palette;
   std::vector<std::uint32_t> counts;
   std::vector<std::uint32_t> new_index;
 };
 
-// Voxels by type.
+// Counts voxels by type.
 std::vector<std::uint32_t> count_types(const ChunkStorage& m) {
   std::vector<std::uint32_t> voxels(kAllTypes);
   for_each_type(m, [&](std::uint32_t type, int count) { voxels[type] += static_cast<std::uint32_t>(count); });
@@ -68,7 +68,7 @@ Numbering numbering_of_palette(const ChunkStorage& m, int bits) {
   return to;
 }
 
-// Requires: the voxels are types themselves, and `bits` are enough for these.
+// Requires: the words hold types themselves, and `bits` suffice for them.
 Numbering numbering_of_types(const ChunkStorage& m, int bits) {
   Numbering to;
   to.new_index.resize(kAllTypes);
@@ -132,7 +132,7 @@ std::uint32_t Chunk::find_or_add(VoxelType type) {
   }
   if (m.palette.size() == std::size_t{1} << m.bits) repack(m.bits * 2);
   if (m.direct()) return 0;
-  m.counts.reserve(m.counts.size() + 1);  // so that both grow or neither
+  m.counts.reserve(m.counts.size() + 1);  // so that both vectors grow, or neither
   m.palette.push_back(type);
   m.counts.push_back(0);
   return static_cast<std::uint32_t>(m.palette.size() - 1);
@@ -207,13 +207,13 @@ void Chunk::tidy() {
   const auto types = static_cast<std::uint32_t>(may_narrow ? used_types() : kAllTypes);
   const int bits = std::min(bits_for(types), m.bits);
   if (may_narrow) m.credit -= std::min(m.credit, kCreditOfSlot * m.slot_count);
-  // A change makes away with one type at most.
+  // A change removes at most one type.
   if (may_narrow && bits == 16) m.count_at = m.credit + std::max(kSoon, types - 256);
   if (bits == m.bits && m.free_count <= m.slot_count / 4) return;
   try {
     repack(bits);
   } catch (const std::bad_alloc&) {
-    // Then it stays as large as it was; the write is done.
+    // The storage then keeps its size; the write is complete.
   }
 }
 

@@ -14,7 +14,7 @@
 
 namespace quoin {
 
-/// The rows of a slab, and the bits per voxel for a palette of this many types.
+/// The number of rows of a slab, and the bits per voxel for a palette size.
 inline constexpr int kSlabRows = 16;
 [[nodiscard]] inline int bits_for(std::size_t types) {
   if (types <= 2) return 1;
@@ -37,7 +37,7 @@ struct ChunkStorage : RefCounted {
   /// Number of remainders that types are counted by at 16 bits: small enough for a table per chunk, large enough to
   /// detect 256 types or fewer.
   static constexpr std::uint32_t kRemainders = 1'024;
-  int bits = 1;                            ///< a voxel: 1, 2, 4, 8 or 16
+  int bits = 1;                            ///< per voxel: 1, 2, 4, 8 or 16
   std::vector<VoxelType> palette;          ///< type of each index; unused at 16 bits, where the index is the type
   std::vector<std::uint32_t> counts;       ///< voxels of each index; at 16 bits of each remainder by kRemainders
   std::array<std::uint32_t, 256> slabs{};  ///< [z / 4][y / 4]: kUniformSlab | index, or a slot in `words`
@@ -50,7 +50,7 @@ struct ChunkStorage : RefCounted {
   std::uint32_t count_at = 0;          ///< at 16 bits: credit required before types are counted
   std::uint32_t first_free = kNoSlot;  ///< a slot that no slab uses; its first word holds the next one
   std::uint32_t free_count = 0;
-  std::uint32_t slot_count = 0;  ///< free ones included
+  std::uint32_t slot_count = 0;  ///< includes free slots
 
   /// Returns the storage of a chunk; null if it is uniform.
   [[nodiscard]] static const ChunkStorage* of(const Chunk& chunk) { return chunk.storage_.get(); }
@@ -68,9 +68,9 @@ struct ChunkStorage : RefCounted {
   [[nodiscard]] static int row_in_slab(int y, int z) { return ((z & 3) << 2) | (y & 3); }
 
   [[nodiscard]] bool direct() const { return bits == 16; }
-  /// The entry of `counts` for an index.
+  /// Returns the entry of `counts` for an index.
   [[nodiscard]] std::uint32_t counted_at(std::uint32_t index) const { return direct() ? index % kRemainders : index; }
-  /// Books voxels that change from one index to another.
+  /// Counts voxels that change from one index to another.
   void move_counts(std::uint32_t from_index, std::uint32_t to_index, std::uint32_t voxels) {
     const std::uint32_t from = counted_at(from_index);
     const std::uint32_t to = counted_at(to_index);
@@ -80,7 +80,7 @@ struct ChunkStorage : RefCounted {
     counts[from] -= voxels;
     if (counts[from] == 0) --used;
   }
-  /// Books that a voxel became air, or was: -1 or 1.
+  /// Counts a voxel that becomes air (-1) or was air (1).
   void count_voxel(int x, int y, int z, int delta) {
     non_air += delta;
     QUOIN_ASSERT(non_air >= 0 && non_air <= static_cast<int>(kChunkVoxels), "0 <= voxels <= voxels per chunk");
@@ -116,7 +116,7 @@ struct ChunkStorage : RefCounted {
   }
 };
 
-/// Chunk::non_air_count, where a call would be a good part of its cost.
+/// Chunk::non_air_count, inline, for callers where the call would dominate the cost.
 [[nodiscard]] inline int non_air_count(const Chunk& chunk) {
   const ChunkStorage* const mixed = ChunkStorage::of(chunk);
   return mixed != nullptr ? mixed->non_air : chunk.non_air_count();

@@ -86,7 +86,7 @@ class PagedWords {
   [[nodiscard]] std::size_t allocated() const;
 
  private:
-  // The words follow it in memory.
+  // The words follow this object in memory.
   class alignas(16) Page : public RefCounted {
    public:
     // Words with unspecified values.

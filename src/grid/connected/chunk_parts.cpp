@@ -6,7 +6,7 @@ namespace quoin {
 namespace {
 
 constexpr std::size_t kRows = std::size_t{kChunkEdge} * kChunkEdge;
-// Up to this many types are searched for one by one, in words.
+// Up to this many types are searched one by one, in words.
 constexpr std::size_t kFewTypes = 4;
 
 constexpr std::uint32_t kNoPart = 0xFFFF'FFFFU;
@@ -105,7 +105,7 @@ void ChunkParts::find_parts(Scratch& scratch, Connectivity connectivity) {
   keep_runs(scratch);
 }
 
-// Numbers the parts by their first voxels: the least run of a set is the first.
+// Numbers the parts by their first voxels: a set's lowest run is its first.
 void ChunkParts::keep_runs(Scratch& scratch) {
   const std::size_t run_count = scratch.runs.size();
   scratch.part_of_root.assign(run_count, kNoPart);

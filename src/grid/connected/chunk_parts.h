@@ -16,7 +16,7 @@ namespace quoin {
 
 // A row of 64 voxels is a word; a run is a stretch of ones in it. Runs are counted from the lowest bit.
 
-/// The lowest voxel of each run.
+/// Returns the lowest voxel of each run.
 inline std::uint64_t run_starts(std::uint64_t row) {
   return row & ~(row << 1);
 }
@@ -34,7 +34,7 @@ inline std::uint32_t run_of(std::uint64_t row, int x) {
   const std::uint64_t up_to_x = (std::uint64_t{2} << x) - 1;
   return count_ones(run_starts(row) & up_to_x) - 1;
 }
-/// The row without its lowest run.
+/// Returns the row without its lowest run.
 inline std::uint64_t without_lowest_run(std::uint64_t row) {
   return row & (row + (row & (~row + 1)));
 }
@@ -89,7 +89,7 @@ class UnionFind {
 /// A connected component within one chunk; in the chunk's coordinates.
 struct ChunkPart {
   std::array<std::uint8_t, 3> min{};
-  std::array<std::uint8_t, 3> last{};  ///< included
+  std::array<std::uint8_t, 3> last{};  ///< inclusive
   std::uint32_t voxels = 0;
   std::uint32_t first = 0;  ///< (z * 64 + y) * 64 + x of the first voxel
 
@@ -118,7 +118,7 @@ class ChunkParts {
 
   [[nodiscard]] std::span<const ChunkPart> parts() const { return parts_; }
   [[nodiscard]] const Chunk& chunk() const { return chunk_; }
-  /// Replaces the chunk by one with the same types and other data.
+  /// Replaces the chunk by a chunk with the same types and other data.
   void take_data(const Chunk& chunk) { chunk_ = chunk; }
   /// Returns the voxels of a row that belong to parts.
   [[nodiscard]] std::uint64_t row(int y, int z) const;

@@ -19,7 +19,7 @@
 namespace quoin {
 namespace {
 
-// Chunks that follow a chunk; with their opposites all that it can touch. Faces: the first three.
+// The offsets of following chunks; with their opposites these are all neighbours. The first three share faces.
 constexpr std::array<std::array<int, 3>, 13> kNextChunks = {{{1, 0, 0},
                                                              {0, 1, 0},
                                                              {0, 0, 1},
@@ -38,11 +38,11 @@ IVec3 next_chunk(std::size_t i) {
   return {kNextChunks[i][0], kNextChunks[i][1], kNextChunks[i][2]};
 }
 
-// Two parts that touch: one of a chunk, the other of a later chunk.
+// Two parts that touch: one in a chunk, the other in a later chunk.
 struct Link {
   std::uint32_t part = 0;
   std::uint32_t other = 0;
-  std::uint8_t next = 0;  // which that is
+  std::uint8_t next = 0;  // index of the later chunk's offset
 
   auto operator<=>(const Link&) const = default;
 };
@@ -51,8 +51,8 @@ struct Entry {
   IVec3 at{0};
   ChunkParts parts;
   std::vector<Link> links;
-  std::vector<std::uint32_t> open_parts;  // ascending: that touch a chunk that is not loaded
-  std::size_t first_node = 0;             // its parts are nodes from here on
+  std::vector<std::uint32_t> open_parts;  // ascending: parts that touch an unloaded chunk
+  std::size_t first_node = 0;             // node of its first part
 };
 
 using Entries = std::map<IVec3, Entry, ByZyx>;
@@ -74,7 +74,7 @@ class Linker {
         for (int z = first_z; z < end_z; ++z) {
           for (int y = first_y; y < end_y; ++y) {
             join_rows(y, z, y + dy - offset.y * kChunkEdge, z + dz - offset.z * kChunkEdge, offset.x);
-            // Between two parts there is but one link to be found.
+            // Two parts need only one link.
             if (!links_.empty() && a_.parts().size() == 1 && b_.parts().size() == 1) return std::move(links_);
           }
         }
@@ -147,7 +147,7 @@ bool holds(const IBox& box, const IBox& inner) {
   return intersect(box, inner) == inner;
 }
 
-// The voxels of a row whose x, in the chunk, lies within.
+// Returns a mask of the voxels of a row within an x range.
 std::uint64_t columns(int first, int end) {
   const std::uint64_t up_to_end = end == kChunkEdge ? ~std::uint64_t{0} : (std::uint64_t{1} << end) - 1;
   return up_to_end & ~std::uint64_t{0} << first;
@@ -227,7 +227,7 @@ void ConnectedPieces::Impl::find_parts(const Grid& grid, const std::vector<IVec3
   }
 }
 
-// Finds again how these chunks are linked to all around them.
+// Recomputes the links of these chunks to their neighbours.
 void ConnectedPieces::Impl::find_links(const std::vector<IVec3>& chunks, Threads threads) {
   struct Pair {
     IVec3 at;

@@ -33,7 +33,7 @@ LongBox box_of_chunk(IVec3 chunk) {
   return box;
 }
 
-// Requires: it lies in the int32 range.
+// Requires: the box lies in the int32 range.
 IBox narrowed(const LongBox& box) {
   IBox narrow;
   for (int axis = 0; axis < 3; ++axis) {
@@ -143,7 +143,7 @@ class BoxCopy {
     const std::vector<VoxelType> types = chunk.types();
     return std::all_of(types.begin(), types.end(), [this](VoxelType type) { return mapped(type) == type; });
   }
-  // The type of all voxels of a part of the box, where its chunks are of one type each.
+  // Returns the type of all voxels of a part of the box, if its chunks are uniform.
   [[nodiscard]] std::optional<VoxelType> one_type(const IBox& chunks) const {
     std::optional<VoxelType> all;
     for (int z = chunks.min.z; z < chunks.max.z; ++z) {
@@ -159,7 +159,7 @@ class BoxCopy {
     return mapped(*all);
   }
 
-  // Voxel by voxel, where types are already.
+  // Copies data voxel by voxel; types are already copied.
   void copy_data(IVec3 at, const LongBox& source, const IBox& chunks, const IBox& place) {
     std::vector<IVec3> gone;
     if (const Chunk* const present = to_.find_chunk(at); present != nullptr && present->data_count() != 0) {
@@ -209,7 +209,7 @@ class BoxCopy {
     }
   }
 
-  // Copies each loaded chunk of a source that is only partly loaded.
+  // Copies the loaded chunks of a partly loaded source.
   void copy_loaded(const LongBox& source, const IBox& chunks) {
     for (int z = chunks.min.z; z < chunks.max.z; ++z) {
       for (int y = chunks.min.y; y < chunks.max.y; ++y) {

@@ -75,7 +75,7 @@ void TurnedBlock::put_columns(const Chunk& chunk, const IBox& part, IVec3 offset
       IVec3 at = part.min;
       at[across] += i;
       at[along] += k;
-      // Backwards, so that columns need not be.
+      // Reversed here, so that columns need no reversal.
       const int line = strides_[along] > 0 ? k : size[along] - 1 - k;
       chunk.read_row(at.y, at.z,
                      std::span<VoxelType, kChunkEdge>(plane.data() + std::ptrdiff_t{line} * kChunkEdge, kChunkEdge));

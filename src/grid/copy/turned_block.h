@@ -8,20 +8,20 @@
 
 namespace quoin {
 
-/// The voxels of one chunk in a plain array, put there from chunks in another orientation.
+/// The voxels of one chunk in a plain array, copied from chunks in another orientation.
 ///
 ///   types()[(z * 64 + y) * 64 + x]    x, y, z in the chunk
 ///
-/// A row of a chunk lies along the block's x, y or z. Along x it is copied, forwards or backwards; else the rows of a
-/// plane are read one below the other, and the block's rows are the columns of that.
+/// A row of a chunk lies along the block's x, y or z. Along x it is copied, forwards or backwards. Otherwise a
+/// plane's rows are read one below the other, and the block's rows are its columns.
 class TurnedBlock {
  public:
-  // Every voxel that is read is written before.
+  // Not initialised: every voxel is written before it is read.
   TurnedBlock() : types_(new VoxelType[kChunkVoxels]) {}
 
   /// Starts a box that, once turned, fills `part` of the chunk.
   void begin(AxisOrientation orientation, const IBox& part);
-  /// Makes all of the chunk air.
+  /// Sets the whole chunk to air.
   void clear();
   /// Puts the voxels of a part of a chunk (null: air) at their turned positions. `offset`: the part's least corner in
   /// the box, before it is turned.
@@ -52,8 +52,8 @@ class TurnedBlock {
   void fill(VoxelType type, IVec3 offset, IVec3 size);
 
   AxisOrientation orientation_;
-  IBox part_;         // of the chunk, that the turned box fills
-  int first_ = 0;     // index of the box's least voxel
+  IBox part_;         // part of the chunk that the turned box fills
+  int first_ = 0;     // index of the box's lowest voxel
   IVec3 strides_{0};  // from a voxel to the next along each of the box's axes
   std::unique_ptr<VoxelType[]> types_;
 };

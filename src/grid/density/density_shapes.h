@@ -63,7 +63,7 @@ class RoundedBox {
 
 class Plane {
  public:
-  /// `normal`: of any length but 0.
+  /// `normal`: of any length except 0.
   Plane(DVec3 point, DVec3 normal) : point_(point) {
     const double largest = std::max({std::abs(normal.x), std::abs(normal.y), std::abs(normal.z)});
     is_sound_ = is_finite(point) && is_finite(normal) && largest > 0.0;
@@ -86,7 +86,7 @@ class Plane {
   bool is_sound_ = false;
 };
 
-/// A sphere within which an edit acts less and less towards its rim.
+/// A sphere whose effect on an edit fades towards its rim.
 class Brush {
  public:
   /// `strength`: at the centre; more than 1 counts as 1.
@@ -95,7 +95,7 @@ class Brush {
 
   [[nodiscard]] bool is_sound() const { return sphere_.is_sound() && radius_ > 0.0 && strength_ > 0.0; }
   [[nodiscard]] const Sphere& sphere() const { return sphere_; }
-  /// strength * (1 - (distance / radius)^2)^2 inside, 0 outside.
+  /// Returns strength * (1 - (distance / radius)^2)^2 inside, 0 outside.
   [[nodiscard]] double weight(DVec3 point) const {
     const DVec3 d = (point - centre_) / radius_;
     const double left = 1.0 - (d.x * d.x + d.y * d.y + d.z * d.z);

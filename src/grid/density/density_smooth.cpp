@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kSide = kChunkEdge + 2;
 
-/// New values of a part of a chunk, worked out before any sample changes.
+/// New values of a part of a chunk, computed before any sample changes.
 struct Smoothed {
   ChunkPart part;
   std::vector<float> densities;                         // x fastest, of the part
@@ -69,7 +69,7 @@ class Window {
   Buffer<double> row_sums_;
 };
 
-// The most frequent material of the solid samples among the 26 neighbours; the least of equally frequent ones.
+// Returns the most frequent material of the solid samples among the 26 neighbours; at ties the lowest.
 VoxelType prevailing_material(const DensityStore& store, IVec3 sample) {
   std::map<VoxelType, int> counts;
   for (int i = 0; i < 27; ++i) {
@@ -141,7 +141,7 @@ std::int64_t DensityGrid::smooth(DVec3 centre, double radius, double strength) {
     news.push_back(smoothed(store, brush, part, window));
     parts.push_back(part);
   }
-  // Parts, and their rows, come in the order in which they were worked out.
+  // Parts and their rows come in the order of computation.
   auto current = news.begin();
   std::size_t next = 0;
   std::size_t next_solid = 0;

@@ -25,7 +25,7 @@ struct DensityStorage : RefCounted {
     return chunk;
   }
 
-  /// Makes solid samples as far out as they were in. `rows`: [z][y]: which; of solid ones only.
+  /// Negates the density of solid samples. `rows`: [z][y] masks of these samples; all must be solid.
   static void turn_outward(DensityChunk& chunk, const std::array<std::uint64_t, kChunkEdge * kChunkEdge>& rows);
 
   std::array<std::uint32_t, 256> slabs{};  ///< [z / 4][y / 4]: ChunkStorage::kUniformSlab | half, or a slot in `values`

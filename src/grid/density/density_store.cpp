@@ -29,7 +29,7 @@ void read_densities(const DensityChunk* samples, Half far, int y, int z, std::ar
   }
 }
 
-// Both rows of densities, and of materials, are of one value and equal.
+// Returns true if both rows of densities, and of materials, are uniform and equal.
 bool are_one_value(const DensityChunk& a, const DensityChunk& b, int y, int z) {
   if (a.row(y, z) != nullptr || b.row(y, z) != nullptr || a.get(0, y, z) != b.get(0, y, z)) return false;
   const auto material = a.materials().uniform();
@@ -159,7 +159,7 @@ std::int64_t DensityStore::put(IVec3 chunk, DensityChunk samples) {
   return changes.samples;
 }
 
-// Samples that were, or now are, not loaded.
+// Records samples that were, or now are, not loaded.
 void DensityStore::replace(IVec3 chunk, DensityChunk samples) {
   journal_.begin_change();
   Entry& entry = find_or_create(chunk);

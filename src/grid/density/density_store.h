@@ -19,7 +19,7 @@
 
 namespace quoin {
 
-/// The samples of one row as edits see and change them.
+/// The samples of one row, as edits read and change them.
 struct SampleRow {
   std::array<float, kChunkEdge> densities{};
   std::array<VoxelType, kChunkEdge> materials{};  ///< air where the density is far air
@@ -52,7 +52,7 @@ class DensityStore {
   [[nodiscard]] float band() const { return float_from_half(far_); }
   [[nodiscard]] const ChunkTrie<Entry>& entries() const { return entries_; }
   [[nodiscard]] const ChangeJournal<DensityRecord>& journal() const { return journal_; }
-  /// A number that grows with every change of a chunk.
+  /// Returns a number that increases with every change of a chunk.
   [[nodiscard]] std::uint64_t edits() const { return edits_; }
   [[nodiscard]] const Entry* find(IVec3 chunk) const { return entries_.find(chunk.x, chunk.y, chunk.z); }
   [[nodiscard]] Half get(IVec3 sample) const {

@@ -15,7 +15,7 @@ inline Half largest_within(float band) {
   return std::max<Half>(half, 1);
 }
 
-/// The density of samples whose value equals iso, as many do in files of whole numbers. With 0, all cells around such a
+/// The density of samples whose value equals iso, which is common in files of integers. With 0, all cells around such a
 /// sample would have their vertices at one point, and triangles between them would have no area.
 inline constexpr float kDensityAtSurface = 1.0F / 256.0F;
 

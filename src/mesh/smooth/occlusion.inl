@@ -3,7 +3,7 @@
 // slices, interpolated along z, y and x in turn.
 //
 //   slices z, z + 1 -> one; rows y, y + 1 -> one: nine rows of eight points     | . . . . . . . . |
-//   of two rows the points 0, s, 2 s each, s the spread                          | a a a b b b - - |
+//   points 0, s, 2 s of two rows each, s is the spread                           | a a a b b b - - |
 
 #pragma once
 

@@ -34,7 +34,7 @@ struct SurfaceRequest {
 std::vector<std::uint32_t> finish_surface(Surface& surface, const VoxelRegistry& types,
                                           const SmoothMeshOptions& options, std::span<const std::uint32_t> groups = {});
 
-/// Appends vertex `i` of `from`, which may be `to` itself, with all its attributes. Returns its index. Requires: both
+/// Appends vertex `i` of `from` with all its attributes. `from` may be `to` itself. Returns its index. Requires: both
 /// have occlusion, or neither, or `to` has no vertex yet.
 std::uint32_t append_vertex(SmoothMesh& to, const SmoothMesh& from, std::size_t i);
 

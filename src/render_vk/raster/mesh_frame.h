@@ -107,8 +107,8 @@ constexpr std::size_t kMaxOrdered = std::size_t{1} << 20;
 /// Makes all positions relative to the camera, in double precision. Each instance then uses a chunk corner near the
 /// camera as its origin, so that a corner shared by chunks has the same coordinates in each of them.
 ///
-/// Depth: reversed, 1 at the near plane. The near plane lies at the nearest chunk in the image, but not nearer than
-///        1/1024 of the smallest voxel. Perspective has no far plane; the orthographic far plane lies behind the last
+/// Depth: reversed, 1 at the near plane. The near plane lies at the nearest chunk in the image, but at least 1/1024 of
+///        the smallest voxel away. Perspective has no far plane; the orthographic far plane lies behind the last
 ///        chunk.
 /// `subpixels`: the device's subpixel positions per pixel and axis.
 /// `glass_by_rays`: as in the result; if values are shown, glass is drawn like opaque surfaces.
