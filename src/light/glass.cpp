@@ -13,7 +13,8 @@
 namespace quoin {
 namespace {
 
-// ln of the share of light below which a body counts as opaque: a sixteenth of the least step of an 8-bit image.
+// Natural logarithm of the transmittance where a body starts to count as opaque: a sixteenth of the smallest step of an
+// 8-bit image.
 constexpr double kClosed = -11.0;
 
 constexpr double kDiagonal = 1.7320508075688774;  // of a cube of 1
@@ -23,7 +24,7 @@ bool continues(const GlassBody& body, VoxelType type, double t_enter) {
   return type == body.type && reaches(body, t_enter);
 }
 
-// The bodies of one placed grid along a ray, in their order.
+// The bodies of one placed grid along a ray, in order.
 class BodiesOfGrid {
  public:
   BodiesOfGrid(const SceneView& view, const Surfaces& surfaces, std::int32_t index, const Ray& ray_in_grid,
@@ -48,7 +49,7 @@ class BodiesOfGrid {
       const double voxels = voxels_between(span.t_enter, t_exit);
       if (!(voxels > 0.0)) return true;  // an edge that it only touches
       if (out_.size() > first_ && continues(out_.back(), type, span.t_enter)) {
-        // Most voxels of water are inside of it.
+        // Most water voxels are inside the water.
         lengthen(t_exit, span.exit_face, voxels);
       } else {
         GlassBody& next = out_.emplace_back(body_of(span.voxel, type, span.t_enter, t_exit, span.starts_inside));
@@ -76,7 +77,8 @@ class BodiesOfGrid {
     clarity_ = 0.0;
   }
 
-  // Blocks along whose diagonal it does not close: it closes at the same voxel as by single ones.
+  // Uses blocks only if the body does not close along their diagonal; it then closes at the same voxel as voxel by
+  // voxel.
   [[nodiscard]] double largest_block(VoxelType type) const {
     const double closing = -static_cast<double>(surfaces_[type].log_clarity) * voxels_per_cell_ * kDiagonal;
     return (clarity_ - kClosed) / std::max(closing, kLeastClosing);
@@ -171,7 +173,7 @@ void find_glass(const SceneView& view, const Surfaces& surfaces, const Ray& ray_
 
 GlassLook look_of(const Surface& surface, const GlassBody& body) {
   const auto length = static_cast<float>(std::max(body.voxels, body.starts_inside || body.in_field ? 0.0 : 1.0));
-  // No length, no matter how dark the material: minus infinity times 0 is not a number.
+  // A length of 0 is handled separately: minus infinity times 0 is NaN.
   const auto through = [&](float logarithm) { return length > 0.0F ? std::exp(logarithm * length) : 1.0F; };
   GlassLook look;
   for (int channel = 0; channel < 3; ++channel) look.passed[channel] = through(surface.log_transmittance[channel]);
@@ -210,7 +212,7 @@ Mirror mirror_at(const SceneView& view, const Ray& ray_in_view, std::int32_t pla
   const float inside = std::sqrt(1.0F - (1.0F - cosine * cosine) / (denser * denser));
   const float across = (cosine - denser * inside) / (cosine + denser * inside);
   const float in_plane = (denser * cosine - inside) / (denser * cosine + inside);
-  // Along a surface between equals both are 0 / 0.
+  // Along a surface between equal media both are 0 / 0.
   const float share = denser > 1.0F ? 0.5F * (across * across + in_plane * in_plane) : 0.0F;
   return {share, direction.y - 2.0F * along * normal.y};
 }

@@ -25,7 +25,7 @@ double largest(Vec3 light) {
   return std::max({light.x, light.y, light.z});
 }
 
-// The light of the direction into which it shines most, times the distance's square.
+// Returns the maximum light over all directions, times the squared distance.
 double most_power(const PlacedLamp& lamp) {
   if (lamp.is_point) return largest(lamp.power[0]);
   double sum = 0.0;
@@ -36,7 +36,7 @@ double most_power(const PlacedLamp& lamp) {
   return std::sqrt(sum);
 }
 
-// Never so bright that sums and squares are no numbers.
+// Limited so that sums and squares stay finite.
 constexpr double kMostPower = 1e30;
 Vec3 capped(DVec3 power) {
   return Vec3(glm::clamp(power, DVec3(0.0), DVec3(kMostPower)));
@@ -265,7 +265,7 @@ LampRay lamp_ray(const PlacedLamp& lamp, DVec3 to_lamp, DVec3 normal) {
     ray.light += lamp.power[face] * static_cast<float>(std::abs(along) * factor);
     if (along != 0.0) inside = std::min(inside, (along > 0.0 ? lamp.high : lamp.low)[axis] / along);
   }
-  // A little before the box, for rounding.
+  // Slightly in front of the box, because of rounding.
   ray.distance = distance - inside * (1.0 + 1e-6) - 1e-3 * (lamp.high.x - lamp.low.x);
   return ray;
 }

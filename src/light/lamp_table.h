@@ -33,7 +33,7 @@ struct PlacedLamp {
   double spread_squared = 0.0;  ///< world units: added to the distance's square
   DVec3 low{0.0};               ///< its box, from `position` along its axes, in world units: shadow rays end there
   DVec3 high{0.0};
-  double reach = 0.0;  ///< world units: it fades away towards there
+  double reach = 0.0;  ///< world units: its light fades to 0 there
   bool is_point = false;
   DVec3 direction{0.0};  ///< a spot's, unit
   double cos_inner = -2.0;
@@ -47,7 +47,7 @@ struct PlacedLamp {
 struct LampRay {
   Vec3 light{0.0F};        ///< on a white surface, if unoccluded; 0: none
   DVec3 direction{0.0};    ///< towards the lamp, unit, in the world
-  double distance = -1.0;  ///< world units up to where the lamp begins; not positive: the point lies in it
+  double distance = -1.0;  ///< world units to the lamp's surface; not positive: the point is inside
 };
 
 /// Requires: `normal` is unit. `to_lamp`: from the point to the lamp's position. Both in the world.
@@ -96,7 +96,8 @@ struct LampPlace {
   const OccupancyTree* cells = nullptr;        ///< of the field; may be null
 };
 
-/// A placed grid's, which is traced as it is. Requires: `placed` is of `scene`; its pointers are not looked at.
+/// Returns the lamp data of a placed grid at full detail. Requires: `placed` belongs to `scene`; does not use its
+/// pointers.
 [[nodiscard]] LampPlace lamp_place(const Scene& scene, const PlacedGrid& placed, const OccupancyTree& opaque,
                                    const OccupancyTree* transparent, const DensityTree* field);
 

@@ -34,12 +34,12 @@ constexpr float kLeastOfAll = 0.25F;  ///< remaining light at full occlusion if 
   return glm::normalize(options.sun / std::max({size.x, size.y, size.z}));
 }
 
-/// Never infinite: that times black is not a number.
+/// Returns the exposure, limited to be finite: infinity times black would be NaN.
 [[nodiscard]] inline float exposure_of(const LightOptions& options) {
   return static_cast<float>(std::min<double>(options.exposure, std::numeric_limits<float>::max()));
 }
 
-/// Returns the linear colour that stands for a level of detail.
+/// Returns the linear colour that represents a level of detail.
 [[nodiscard]] inline Vec3 colour_of_detail(Detail detail, int halvings) {
   if (detail == Detail::Near) return {0.10F, 0.55F, 0.12F};
   if (detail == Detail::Far) return {0.08F, 0.20F, 0.75F};

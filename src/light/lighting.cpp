@@ -138,7 +138,7 @@ bool Lighting::needs_openness() const {
 std::int64_t Lighting::light(std::span<const SurfacePoint> points, std::span<Vec3> colours, int sample) const {
   QUOIN_ASSERT(colours.size() >= points.size(), "a colour for every point");
   if (options_.shading == Shading::Unlit) {
-    // No call a point: half of all that is left to do.
+    // Inlined: a call per point would take half of the remaining time.
     for (std::size_t i = 0; i < points.size(); ++i) {
       colours[i] = points[i].kind == PointKind::Glow ? Vec3(0.0F) : surface_at(points[i]).colour;
     }
@@ -406,7 +406,7 @@ float Lighting::smooth_openness(const SurfacePoint& point) const {
   const PlacedGrid& placed = placed_in(view_->tracer())[static_cast<std::size_t>(point.placed)];
   if (placed.opaque_field == nullptr) return 1.0F;  // transparent material casts no occlusion
   SmoothOcclusionOptions options = options_.smooth_occlusion;
-  options.spread /= static_cast<float>(placed.voxels_per_cell());  // as far as in the full field
+  options.spread /= static_cast<float>(placed.voxels_per_cell());  // the same distance as in the full field
   return 1.0F - smooth_occlusion(placed.opaque_field->field(), point.position, point.normal, options);
 }
 

@@ -25,7 +25,7 @@ enum class PointKind : std::uint8_t {
   Glow,     ///< emission only
 };
 
-/// A point of a voxel's face, or of a field's surface, that is to be lit.
+/// A point of a voxel's face, or of a field's surface, to be lit.
 struct SurfacePoint {
   DVec3 position{0.0};  ///< in its grid, on the face or surface
   IVec3 voxel{0};
@@ -35,13 +35,13 @@ struct SurfacePoint {
   bool in_field = false;
   bool is_blended = false;  ///< fields: a blend of the materials around, as Surfaces::blend_of_field
   Vec3 normal{0.0F};        ///< of a field, in its grid, of unit length or 0
-  float lift = 0.0F;        ///< of a field: how far above the surface the position lies, along the normal
+  float lift = 0.0F;        ///< of a field: height of the position above the surface, along the normal
   PointKind kind = PointKind::Surface;
   std::uint32_t pixel = 0;  ///< seed for random numbers: combines pixel and sample
   float openness = -1.0F;   ///< 0 to 1 if already known, independent of the occlusion options; less than 0: unknown
 };
 
-/// The reference model of light: a sun with shadows, an ambient term with occlusion, and what voxels emit.
+/// The reference lighting model: a sun with shadows, an ambient term with occlusion, and emission.
 ///
 ///   colour * (0.15 * openness + diffuse + lamplight) + emitted, times the exposure,
 ///
@@ -62,7 +62,7 @@ class Lighting {
   /// Computes the linear light of each point, not clamped. Returns the number of rays traced.
   ///
   /// Requires: as many places in `colours` as points. The result for a point does not depend on the others; neighbours
-  /// should lie side by side, since sixteen are traced together. `sample`: of each pixel, which they are of.
+  /// should lie side by side, since sixteen are traced together. `sample`: the number of their sample in each pixel.
   std::int64_t light(std::span<const SurfacePoint> points, std::span<Vec3> colours, int sample = 0) const;
 
   [[nodiscard]] const Surfaces& surfaces() const { return *surfaces_; }

@@ -29,7 +29,7 @@ void cut(int first, int size, int edge, Visit&& visit) {
   }
 }
 
-// Four at a time: each waits for its own last product only.
+// Four chains at a time: each waits only for its own last product.
 void mix_into(std::array<std::uint64_t, 4>& lanes, std::span<const Quad> quads) {
   std::size_t i = 0;
   for (; i + 4 <= quads.size(); i += 4) {
@@ -144,7 +144,7 @@ void sort_into_many(const LitQuads& lit, const VoxelRegistry& types, int edge, C
   }
 }
 
-// The quads in the order of ChunkSurface.
+// Returns the quads in the order of ChunkSurface.
 void sort_into_regions(const LitQuads& lit, const VoxelRegistry& types, int edge, ChunkSurface& surface) {
   if (edge == kChunkEdge) {
     sort_into_one(lit, types, surface);
@@ -154,7 +154,7 @@ void sort_into_regions(const LitQuads& lit, const VoxelRegistry& types, int edge
   for (SurfaceRegion& region : surface.regions) region.hash = hash_of(region, surface);
 }
 
-// Quads become several where one would not have the light of its faces.
+// Splits quads whose faces differ in light.
 LitQuads lit_by(const LiveJob& job, const QuadBuffer& quads, LightMerging merging, LiveWorkspace& workspace) {
   if (workspace.lit != job.light || workspace.lit_types != job.types) {
     workspace.surface_light.reset();
@@ -166,8 +166,7 @@ LitQuads lit_by(const LiveJob& job, const QuadBuffer& quads, LightMerging mergin
   return {workspace.lit_quads, workspace.face_light};
 }
 
-// Quads that reach over the border of a region become several of the same faces: where faces were merged all of them
-// are alike.
+// Splits quads that cross the border of a region. Merged faces are all alike, so the parts have the same faces.
 void cut_at_regions(const QuadBuffer& quads, int edge, QuadBuffer& out) {
   out.clear();
   for (const Quad quad : quads) {
@@ -210,7 +209,7 @@ void append(const SmoothChunkMesh& from, SmoothChunkMesh& to) {
   for (std::size_t i = begin; i < to.indices.size(); ++i) to.indices[i] += first;
 }
 
-// Each face in the colour of its sample.
+// Gives each face the colour of its sample.
 void append_by_faces(const DensityNeighbourhood& chunks, const SmoothOptions& options,
                      const SurfaceMaterials& materials, SmoothChunkMesh& mesh, ChunkSurface& surface) {
   std::vector<smooth::TriangleFace> faces;
@@ -265,7 +264,7 @@ DensityNeighbourhood make_densities(const LiveDensities& densities) {
   return chunks;
 }
 
-// Adds the surface of one body. `whole`: as smooth::Shape has it.
+// Adds the surface of one body. `whole`: as in smooth::Shape.
 void mesh_body(const LiveMeshOptions& options, const DensityNeighbourhood& chunks, const DensityNeighbourhood* whole,
                const LiveJob& job, LiveWorkspace& workspace, ChunkSurface& surface) {
   if (!workspace.smooth) workspace.smooth.emplace();

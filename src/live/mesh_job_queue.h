@@ -25,7 +25,7 @@ namespace quoin {
 
 using LiveClock = std::chrono::steady_clock;
 
-/// A field as it was at one moment.
+/// The state of a field at one moment.
 using FieldSnapshot = std::shared_ptr<const DensityGrid>;
 
 /// The densities of single bodies, per chunk of a field; empty if nothing is transparent.
@@ -38,7 +38,7 @@ struct LitVoxels {
 };
 using LightSnapshot = std::shared_ptr<const LitVoxels>;
 
-/// Whose surfaces: the voxels or the field of a grid.
+/// The source of surfaces: the voxels or the field of a grid.
 struct LiveKey {
   GridHandle grid;
   SurfaceContent content = SurfaceContent::Voxels;
@@ -49,13 +49,13 @@ struct LiveKey {
   }
 };
 
-/// A chunk that is to be meshed, with all that takes, and later its surface.
+/// A chunk to be meshed, with all inputs, and later its surface.
 struct LiveJob {
   LiveKey source;
   IVec3 chunk{0};
   std::uint64_t serial = 0;
-  double distance = 0.0;       ///< from the eye; the nearest comes first
-  LiveClock::time_point seen;  ///< when the edit was
+  double distance = 0.0;       ///< from the eye; the nearest job comes first
+  LiveClock::time_point seen;  ///< time of the edit
 
   GridSnapshot voxels;  ///< blocky
   LightSnapshot light;  ///< blocky; null if no light is used
@@ -94,7 +94,7 @@ struct LiveWorkspace {
 /// Threads: all calls come from one thread at a time.
 class MeshJobQueue {
  public:
-  /// Sets a job's outcome and surface. That it throws bad_alloc counts as OutOfMemory; other exceptions are kept.
+  /// Sets a job's outcome and surface. A bad_alloc counts as OutOfMemory; other exceptions are kept.
   using Work = std::function<void(LiveJob&, LiveWorkspace&)>;
 
   /// `on_ready`, if any, is called by a worker after each job that did not run out of memory.
@@ -115,7 +115,7 @@ class MeshJobQueue {
   /// Calls `renew` for the waiting jobs, so that blocky ones can get newer snapshots in which their chunks are
   /// unchanged. An old snapshot keeps all memory that was released since. Workers free the old snapshots.
   void renew(const std::function<void(LiveJob&)>& renew);
-  /// The jobs that were done since the last call, in the order in which they were.
+  /// Returns the jobs completed since the last call, in order of completion.
   [[nodiscard]] std::vector<std::unique_ptr<LiveJob>> collect();
   /// Returns once at most `waiting` jobs wait for workers; with 0, once all jobs are done.
   void wait(std::size_t waiting);
@@ -136,7 +136,7 @@ class MeshJobQueue {
   bool is_stopping_ = false;
   std::size_t running_ = 0;
   std::vector<std::unique_ptr<LiveJob>> queue_;
-  std::vector<std::unique_ptr<LiveJob>> done_;  // with room for all that wait and run
+  std::vector<std::unique_ptr<LiveJob>> done_;  // with capacity for all waiting and running jobs
   std::vector<std::pair<GridSnapshot, LightSnapshot>> spent_;
   LiveMeshes::Stats stats_;
   std::exception_ptr failure_;

@@ -122,7 +122,7 @@ void MeshScheduler::choose_levels(const Scene& scene, LiveClock::time_point now)
   are_places_new_ = false;
 }
 
-// The drawn grids that may have changed.
+// Returns the drawn grids that may have changed.
 std::vector<GridHandle> MeshScheduler::follow_scene(const Scene& scene) {
   ChangeCursor now = followed_scene_;
   const SceneChanges changes = scene.changes_since(now);
@@ -226,7 +226,7 @@ bool MeshScheduler::has_waiting() const {
                      [](const auto& each) { return !each.second->waiting().empty(); });
 }
 
-// The chunks that wait for jobs, as many as may get one, the nearest first.
+// Returns the chunks that may get a job now, nearest first.
 std::vector<MeshScheduler::Candidate> MeshScheduler::candidates(const std::map<GridHandle, ChunkDistances>& distances) {
   std::vector<Candidate> all;
   for (auto& [key, live] : sources_) {
@@ -266,7 +266,7 @@ void MeshScheduler::hand_over(const Scene& scene) {
   std::map<GridHandle, LiveInputs> inputs;
   std::vector<double> queued =
       queue_.measure([&](const LiveJob& job) { return distances.at(job.source.grid).to(job.chunk); });
-  double farthest = kNone;  // of those that came and have to go
+  double farthest = kNone;  // waiting jobs from this distance on are withdrawn
   for (const Candidate& each : candidates(distances)) {
     if (queued.size() >= max_ahead_) {
       if (queued.back() <= each.distance) break;
@@ -320,9 +320,9 @@ void MeshScheduler::finish(const Scene& scene, DVec3 eye, std::span<const DVec3>
     std::unique_lock lock(mutex_);
     const bool is_done = totals_.unfinished == 0;
     const std::size_t left = !is_done && has_waiting() ? max_ahead_ / 2 : 0;
-    // A worker that is done may take.
+    // A free worker may take a job.
     lock.unlock();
-    queue_.wait(left);  // once all is done: waits for jobs of removed grids
+    queue_.wait(left);  // finally waits for jobs of removed grids
     if (is_done) return throw_failure();
     const LiveMeshes::Stats after = stats();
     // If all jobs failed, throws instead of retrying without end.

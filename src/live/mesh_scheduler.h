@@ -17,7 +17,7 @@
 
 namespace quoin {
 
-/// LiveMeshes, with the workers' work to be chosen.
+/// The implementation of LiveMeshes, with a choice of the workers' function.
 class MeshScheduler {
  public:
   /// Calls of `work` come from several threads at once.
@@ -75,7 +75,7 @@ class MeshScheduler {
   std::vector<GridHandle> drawn_;  // sorted
   Sources sources_;
   std::vector<DVec3> eyes_;
-  bool are_places_new_ = true;  // eyes or instances, since levels were chosen last
+  bool are_places_new_ = true;  // eyes or instances moved since levels were last chosen
   MeshJobQueue queue_;          // last: its threads end first
 };
 

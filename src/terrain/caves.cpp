@@ -12,7 +12,7 @@ constexpr int kStep = 4;
 constexpr int kPoints = kChunkEdge / kStep + 1;
 constexpr double kAcross = 1.0 / 34.0;  // tunnels lie flatter than they are wide
 constexpr double kUp = 1.0 / 21.0;
-constexpr double kReach = 0.115;  // how near zero
+constexpr double kReach = 0.115;  // maximum absolute value in a cave
 
 struct Samples {
   std::array<std::array<double, 2>, static_cast<std::size_t>(kPoints) * kPoints * kPoints> at;
@@ -39,7 +39,7 @@ void sample(std::uint32_t seed, IVec3 chunk, int layers, Samples& samples) {
 
 using Corners = std::array<std::array<double, 8>, 2>;
 
-// The eight samples round a cell; false when neither interpolation can come near zero together.
+// Gets the eight samples around a cell. Returns false if the two interpolations cannot both be near zero.
 bool corners_of(const Samples& samples, IVec3 cell, Corners& corners) {
   for (std::size_t i = 0; i < 8; ++i) {
     const int corner = static_cast<int>(i);

@@ -8,7 +8,7 @@
 namespace quoin::terrain {
 namespace {
 
-/// For each layer of a chunk, one bit a column: does something reach this high?
+/// For each layer of a chunk, one bit per column, set if something reaches this high.
 class Profile {
  public:
   /// `height` is the topmost layer that column x fills; negative is none.
@@ -67,7 +67,7 @@ std::uint64_t bits_between(int first, int end) {
   return (~std::uint64_t{0} >> (kChunkEdge - (end - first))) << first;
 }
 
-/// The columns in whose bare rock layer `y` of the world is dark.
+/// Returns the columns whose bare rock is dark in layer `y` of the world.
 std::uint64_t dark_columns(const Slice& slice, int y) {
   constexpr int kDarkLayers = 3;
   std::uint64_t dark = 0;
@@ -153,7 +153,7 @@ Chunk make_ground(const Landform& land, const std::vector<Column>& columns, cons
   for (int first_z = part.min.z; first_z < part.max.z; first_z += 4) {
     const std::span band(columns.data() + first_z * kChunkEdge, 4 * std::size_t{kChunkEdge});
     const Extent extent = extent_of(band);
-    // Whole slabs at a time, where they are of one kind: they stay uniform, which is quick and small.
+    // Fills whole slabs at a time if they are uniform: they stay uniform, which is fast and small.
     const Layers layers{std::clamp((extent.all_stone - floor) & ~3, part.min.y, part.max.y),
                         std::clamp((extent.highest + 4 - floor) & ~3, part.min.y, part.max.y)};
     fill(chunk, {{part.min.x, part.min.y, first_z}, {part.max.x, layers.from, first_z + 4}}, types.stone);

@@ -51,7 +51,7 @@ double Landform::elevation(double x, double z) const {
   const double ridges = ridged2(seed_ + kRidges, 0.95 * wx, 0.95 * wz, 4);
   const double mountains = smooth_step(-0.35, 0.45, region);
   const double land = 0.39 + 0.11 * region + 0.08 * hills + (0.16 + 0.60 * mountains) * ridges;
-  // Rivers run where a slow noise is zero, and cut the land down to just below the sea's level.
+  // Rivers run where a low-frequency noise is zero, and cut the land to just below sea level.
   const double flow = fractal2(seed_ + kRivers, 0.55 * wx, 0.55 * wz, 2);
   const double away = flow < 0.0 ? -flow : flow;
   const double valley = smooth_step(0.015, 0.24, away);

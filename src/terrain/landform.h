@@ -11,10 +11,10 @@ namespace quoin::terrain {
 /// The cover of a ground column.
 enum class Surface : std::uint8_t { Grass, Meadow, Earth, Stone, Sand, Gravel, Snow };
 inline constexpr int kSurfaces = 7;
-/// Bare rock shows a band of darker stone once in so many layers.
+/// Number of layers between bands of darker stone in bare rock.
 inline constexpr int kStrata = 11;
 
-/// 0 up to `low`, 1 from `high` on, and a smooth cubic between.
+/// Returns 0 up to `low`, 1 from `high` on, and a smooth cubic in between.
 inline double smooth_step(double low, double high, double x) {
   const double t = std::clamp((x - low) * (1.0 / (high - low)), 0.0, 1.0);
   return t * t * (3.0 - 2.0 * t);
@@ -24,30 +24,30 @@ inline double smooth_step(double low, double high, double x) {
 struct Column {
   int height = 0;   ///< y of the topmost voxel of ground
   int soil = 0;     ///< voxels of earth or sand between it and the stone
-  int lowest = 0;   ///< the least height of the column and its eight neighbours
-  int stratum = 0;  ///< how far the bands of stone are shifted here, 0 to kStrata - 1
+  int lowest = 0;   ///< the minimum height of the column and its eight neighbours
+  int stratum = 0;  ///< shift of the stone bands, 0 to kStrata - 1
   Surface surface = Surface::Grass;
   bool is_sandy = false;  ///< the soil is sand
   bool is_steep = false;
 };
 
-/// The lie of the land: a function of seed, height of the world, x and z.
+/// The terrain's shape: a function of seed, world height, x and z.
 class Landform {
  public:
   explicit Landform(const TerrainOptions& options);
 
-  /// y of the topmost voxel of ground. Cost: 18 evaluations of noise, about half a microsecond.
+  /// Returns y of the topmost voxel of ground. Cost: 18 evaluations of noise, about half a microsecond.
   [[nodiscard]] int height(int x, int z) const;
-  /// The same before it is rounded down, of a smooth ground.
+  /// As `height`, before rounding down, for smooth ground.
   [[nodiscard]] double exact_height(int x, int z) const { return 1.0 + rise(x, z); }
   /// Cost: nine times `height`.
   [[nodiscard]] Column column(int x, int z) const;
-  /// The columns of a square, x fastest, for little more than one `height` each.
+  /// Returns the columns of a square, x fastest. Cost: little more than one `height` each.
   [[nodiscard]] std::vector<Column> columns(int first_x, int first_z, int edge) const;
   /// Returns the forest density: below 0 is bare, 1 is a dense forest.
   [[nodiscard]] double forest(int x, int z) const;
 
-  /// y of the water's topmost voxel; -1 in a dry world.
+  /// Returns y of the water's topmost voxel; -1 in a dry world.
   [[nodiscard]] int water_level() const { return has_water_ ? sea_ : -1; }
   [[nodiscard]] int sea() const { return sea_; }
   [[nodiscard]] int snow_line() const { return snow_line_; }

@@ -11,7 +11,7 @@
 
 namespace quoin::terrain {
 
-/// A slow noise is taken at every fourth sample and interpolated.
+/// Low-frequency noise is evaluated at every fourth sample and interpolated.
 inline constexpr int kLatticeStep = 4;
 /// From -4 to 68 in samples of a chunk.
 inline constexpr int kLatticeEdge = kChunkEdge / kLatticeStep + 3;
@@ -36,7 +36,7 @@ class Lattice {
       }
     }
   }
-  /// False when no interpolated value can be as near to 0.
+  /// Returns false if no interpolated value can be that close to 0.
   [[nodiscard]] bool comes_within(double reach) const {
     const auto [least, greatest] = std::minmax_element(values_.begin(), values_.end());
     return *least<reach&& * greatest> - reach;
@@ -47,7 +47,7 @@ class Lattice {
   std::vector<float> values_;
 };
 
-/// The gradient of a field at a sample.
+/// Returns the gradient of a field at a sample.
 struct Slope {
   float length = 0.0F;
   float up = 0.0F;

@@ -9,7 +9,7 @@
 namespace quoin {
 namespace {
 
-// A coordinate as a cell of the lattice and a place in it.
+// A coordinate as a lattice cell and a position in it.
 struct Lattice {
   std::int32_t cell;
   double in_cell;
@@ -104,7 +104,7 @@ double noise2(std::uint32_t seed, double x, double y) {
 
 double noise3(std::uint32_t seed, double x, double y, double z) {
   QUOIN_ASSERT(std::abs(x) < kWidest && std::abs(y) < kWidest && std::abs(z) < kWidest, "|x|, |y|, |z| < 2^30");
-  // A turn by 60 degrees about (1, 1, 1): all nine entries are thirds.
+  // A rotation by 60 degrees about (1, 1, 1): all nine entries are thirds.
   constexpr double kThird = 1.0 / 3.0;
   const Lattice lx((2.0 * x - y + 2.0 * z) * kThird);
   const Lattice ly((2.0 * x + 2.0 * y - z) * kThird);
@@ -122,14 +122,14 @@ double noise3(std::uint32_t seed, double x, double y, double z) {
 
 namespace {
 
-// Twice as fine, and turned by the angle of the 3-4-5 triangle.
+// Twice the frequency, and rotated by the angle of the 3-4-5 triangle.
 void next_octave(double& x, double& y) {
   const double turned_x = 1.6 * x - 1.2 * y;
   y = 1.2 * x + 1.6 * y;
   x = turned_x;
 }
 
-// Each octave is twice as fine, and the last one's coordinates are noise2's.
+// Each octave has twice the frequency; the last octave uses noise2's coordinates.
 [[maybe_unused]] bool are_within(double x, double y, int octaves) {
   return octaves >= 0 && octaves <= 29 && std::abs(x) < std::ldexp(1.0, 29 - octaves) &&
          std::abs(y) < std::ldexp(1.0, 29 - octaves);

@@ -13,7 +13,7 @@ constexpr std::uint32_t kRockStream = 0xD00;
 constexpr int kTreeSpacing = 6;
 constexpr int kRockSpacing = 13;
 
-// A number from 0 to `choices` - 1 out of four bits or more of a hash.
+// Returns a number from 0 to `choices` - 1 from at least four bits of a hash.
 int pick(std::uint32_t hash, int shift, int choices) {
   return static_cast<int>((hash >> shift & 0xFFU) * static_cast<std::uint32_t>(choices) >> 8);
 }

@@ -22,7 +22,7 @@ constexpr std::uint32_t kCaveB = 0xF00;
 constexpr std::uint32_t kMeadow = 0x1000;
 
 constexpr float kBand = 8.0F;
-// A density is the height above the ground over the steepness of its field, which counts as this at most.
+// Maximum steepness: a density is the height above the ground divided by the steepness of its field.
 constexpr float kSteepest = 4.0F;
 constexpr float kFarHeight = kBand * kSteepest;
 
@@ -107,7 +107,7 @@ void SmoothColumn::Impl::measure_columns() {
   }
 }
 
-// Overhangs grow where a slow noise is high, and never through the floor or the top of the world.
+// Overhangs grow where a low-frequency noise is high, and never through the floor or the top of the world.
 void SmoothColumn::Impl::measure_overhangs() {
   if (!has_overhangs) return;
   const double top = land.top();
@@ -126,7 +126,7 @@ void SmoothColumn::Impl::measure_overhangs() {
   }
 }
 
-// Returns false where all is so far above or below the ground that caves alone can matter.
+// Returns false if everything is so far above or below the ground that only caves matter.
 bool SmoothColumn::Impl::fill_ground(IVec3 corner) {
   const auto most = static_cast<float>(largest_amplitude * kMaxNoise);
   const auto first = static_cast<float>(corner.y - 1);
@@ -155,7 +155,7 @@ bool SmoothColumn::Impl::fill_ground(IVec3 corner) {
   return true;
 }
 
-// Returns whether a cave comes near the chunk.
+// Returns true if a cave comes near the chunk.
 bool SmoothColumn::Impl::fill_caves(IVec3 corner) {
   if (!has_caves ||
       static_cast<float>(corner.y) > highest + kFarHeight + static_cast<float>(largest_amplitude * kMaxNoise))
@@ -170,7 +170,7 @@ bool SmoothColumn::Impl::fill_caves(IVec3 corner) {
   return true;
 }
 
-// The density that a cave leaves: positive inside it. Caves end above the floor.
+// Returns the density of a cave: positive inside it. Caves end above the floor.
 float SmoothColumn::Impl::cave(int x, int y, int z, int world_y) const {
   const float a = cave_a.at(x, y, z);
   const float b = cave_b.at(x, y, z);
@@ -178,7 +178,7 @@ float SmoothColumn::Impl::cave(int x, int y, int z, int world_y) const {
   return (kCaveWidth - sealed - std::sqrt(a * a + b * b)) * kCaveSamples;
 }
 
-// Positive outside the block that the world is.
+// Returns a positive value outside the world's box.
 float SmoothColumn::Impl::outside_of_world(IVec3 sample) const {
   int least = sample.x - world.min.x;
   for (int axis = 0; axis < 3; ++axis) {

@@ -10,10 +10,10 @@
 
 namespace quoin::terrain {
 
-/// The heights of one column of chunks, and other data that its chunks share. Makes the chunks one after the other.
+/// The heights of one column of chunks, and other data that its chunks share. Generates the chunks one by one.
 class SmoothColumn {
  public:
-  /// `world`: the samples that the world has.
+  /// `world`: the samples of the world.
   SmoothColumn(const Landform& land, const SmoothTerrainOptions& options, const IBox& world, int chunk_x, int chunk_z);
   ~SmoothColumn();
 

@@ -41,10 +41,10 @@ struct Plant {
   IVec3 foot{0};  ///< the voxel of ground under its middle
   Growth growth = Growth::Rock;
   int height = 0;           ///< voxels above the ground
-  std::uint32_t shape = 0;  ///< random bits for its looks
+  std::uint32_t shape = 0;  ///< random bits for its appearance
 };
 
-/// No plant reaches further than this from its foot, sideways.
+/// Maximum horizontal reach of a plant from its foot.
 inline constexpr int kPlantReach = 4;
 
 /// Returns the plants that can reach into the square of columns, sorted by z, then x, of their sites. Only plants that
@@ -52,8 +52,8 @@ inline constexpr int kPlantReach = 4;
 [[nodiscard]] std::vector<Plant> plants_near(const Landform& land, const TerrainOptions& options, const IBox& world,
                                              int first_x, int first_z, int edge);
 
-/// Draws the parts that lie in a chunk. Rocks first, then leaves, which only replace air, then trunks, so that the
-/// outcome does not depend on the chunk's borders.
+/// Draws the parts of plants that lie in a chunk: rocks first, then leaves, which only replace air, then trunks. The
+/// result does not depend on the chunk's borders.
 void draw_plants(const std::vector<Plant>& plants, const TerrainTypes& types, IVec3 chunk, Chunk& out);
 
 }  // namespace quoin::terrain

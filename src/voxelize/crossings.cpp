@@ -16,10 +16,10 @@ namespace quoin::voxelizing {
 
 namespace {
 
-// 4 bytes each.
+// Limit of stored crossings, 4 bytes each.
 constexpr double kMostCrossings = 0x1p30;
 
-/// A corner as lines along an axis see it.
+/// A corner, projected along an axis.
 struct Seen {
   double u, v, w;
 };
@@ -46,7 +46,7 @@ Passing passing(const Seen& from, const Seen& to, double v) {
   return {low.u + share * (high.u - low.u), low.w + share * (high.w - low.w), rises};
 }
 
-/// Returns true for a place at the centre of a voxel.
+/// Returns true for a position at the centre of a voxel.
 bool is_centre(double place) {
   return place - 0.5 == std::floor(place - 0.5);
 }
@@ -114,7 +114,7 @@ std::array<Seen, 3> seen_along(int axis, const Corners& corners) {
   return seen;
 }
 
-/// The triangles that the lines of each column may meet.
+/// Lists the triangles that the lines of each column may meet.
 struct ColumnTriangles {
   std::vector<std::uint64_t> begin;
   std::vector<std::uint32_t> triangles;
@@ -151,7 +151,7 @@ ColumnTriangles triangles_of_columns(const Frame& frame, int axis) {
   return found;
 }
 
-/// A place of a line that meets the surface, or touches a triangle's border.
+/// A point where a line meets the surface, or touches a triangle's border.
 struct Met {
   std::uint16_t line = 0;
   bool enters = false;
@@ -159,7 +159,7 @@ struct Met {
   double w = 0.0;
 };
 
-/// For triangles that lie between voxels and are touched: true if their inner side is the one behind them.
+/// For triangles that lie between voxels and are touched: returns true if their inner side is behind them.
 using Sides = std::map<std::uint32_t, bool>;
 
 /// Moves crossings that rounding moved off the border between two voxels back onto it.
@@ -169,11 +169,11 @@ double snapped(double w) {
   return std::abs(w - border) < kRounding ? border : w;
 }
 
-/// Depth within the mesh along a line: the inner side of the surface is the deeper one.
+/// Tracks the depth within the mesh along a line: the inner side of the surface is the deeper side.
 class Depth {
  public:
   explicit Depth(SolidVoxels rule) : rule_(rule) {}
-  /// Passes a crossing. Returns true where its inner side is the one behind it.
+  /// Passes a crossing. Returns true if its inner side is behind it.
   bool is_deeper_behind(bool enters) {
     const int before = depth();
     turns_ += enters ? 1 : -1;
@@ -202,7 +202,7 @@ bool is_between_voxels(double w) {
   return w == std::floor(w);
 }
 
-/// The crossings of a line. Requires: sorted by w.
+/// Adds the crossings of a line. Requires: sorted by w.
 void add_crossings(std::span<const Met> line, SolidVoxels rule, std::vector<Crossing>& crossings, Sides& sides) {
   const std::size_t first = crossings.size();
   Depth depth(rule);
@@ -248,7 +248,7 @@ Column column_of(std::span<const Met> met, std::vector<std::uint32_t> begin, Sol
   return column;
 }
 
-/// Twice the area of a triangle as lines along an axis see it, positive where it turns from u to v.
+/// Returns twice the area of a triangle projected along an axis, positive if it turns from u to v.
 double seen_area(const std::array<Seen, 3>& c) {
   return (c[1].u - c[0].u) * (c[2].v - c[0].v) - (c[1].v - c[0].v) * (c[2].u - c[0].u);
 }
@@ -262,7 +262,7 @@ Column find_column(const Frame& frame, int axis, SolidVoxels rule, std::span<con
   };
   for (const std::uint32_t triangle : triangles) {
     const std::array<Seen, 3> seen = seen_along(axis, frame.corners(triangle));
-    const bool is_mirrored = axis == 1;  // of the three planes (x, z) alone is seen from behind
+    const bool is_mirrored = axis == 1;  // only the plane (x, z) is seen from behind
     const auto visit = [&](int u, int v, double w, bool enters) {
       met.push_back({line_of(u, v), enters, triangle, snapped(w)});
     };
@@ -297,7 +297,7 @@ Column find_column(const Frame& frame, int axis, SolidVoxels rule, std::span<con
   return column;
 }
 
-/// Lines that triangles hide, along all axes: about as many crossings as there will be.
+/// Returns the projected area of all triangles along all axes, an estimate of the number of crossings.
 double expected_crossings(const Frame& frame) {
   double area = 0.0;
   for (std::size_t i = 0; i < frame.triangle_count(); ++i) {

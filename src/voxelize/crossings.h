@@ -2,7 +2,7 @@
 
 // The crossings of a mesh with lines through the voxel centres, along each axis.
 //
-//  axis 0 (x): lines of (y, z)     a column is 64 x 64 lines: all that cross the chunks one behind the other
+//  axis 0 (x): lines of (y, z)     a column is 64 x 64 lines: all lines through a row of chunks
 //  axis 1 (y): lines of (x, z)     its lines' crossings are stored line by line, each sorted along the line
 //  axis 2 (z): lines of (x, y)
 
@@ -21,18 +21,18 @@
 
 namespace quoin::voxelizing {
 
-/// One crossing: the first voxel whose centre lies at or behind it, whether it lies in the previous voxel, and the hit
-/// side. A crossing between two voxels belongs to the voxel on the inner side of the surface.
+/// One crossing: the first voxel whose centre lies at or behind it, a flag if it lies in the previous voxel, and the
+/// hit side. A crossing between two voxels belongs to the voxel on the inner side of the surface.
 class Crossing {
  public:
   Crossing() = default;
   Crossing(int first_centre_behind, bool is_in_previous, bool enters)
       : bits_(first_centre_behind * 4 + (is_in_previous ? 0 : 2) + (enters ? 1 : 0)) {}
-  /// The first voxel that is behind.
+  /// Returns the first voxel behind the crossing.
   [[nodiscard]] int behind() const { return bits_ >> 2; }
-  /// The voxel in which it lies.
+  /// Returns the voxel that contains the crossing.
   [[nodiscard]] int voxel() const { return (bits_ >> 2) - ((bits_ & 2) != 0 ? 0 : 1); }
-  /// +1 into the mesh, -1 out of it.
+  /// Returns +1 into the mesh, -1 out of it.
   [[nodiscard]] int step() const { return (bits_ & 1) != 0 ? 1 : -1; }
   bool operator<(const Crossing& other) const { return bits_ < other.bits_; }
 
@@ -44,9 +44,9 @@ inline constexpr std::size_t kLines = static_cast<std::size_t>(kChunkEdge) * kCh
 
 /// 64 x 64 lines.
 struct Column {
-  std::vector<std::uint32_t> begin;  ///< of line u + 64 v in `crossings`, and one more; empty where there are none
+  std::vector<std::uint32_t> begin;  ///< of line u + 64 v in `crossings`, and one more; empty if there are no crossings
   std::vector<Crossing> crossings;
-  /// Voxels of lines that touch the border of a triangle without crossing it, by line: of the surface, and no crossing.
+  /// By line: surface voxels where lines touch the border of a triangle without crossing it.
   std::vector<std::pair<std::uint16_t, int>> touched;
 
   [[nodiscard]] std::span<const Crossing> line(std::size_t index) const {
@@ -60,12 +60,12 @@ inline constexpr std::array<std::array<int, 2>, 3> kPlane = {{{1, 2}, {0, 2}, {0
 
 class Crossings {
  public:
-  /// `rule`: which side of the surface is the inner one; None as Winding.
+  /// `rule`: determines the inner side of the surface; None counts as Winding.
   /// Errors: LimitExceeded, before anything is found; Cancelled.
   [[nodiscard]] static Result<Crossings> find(const Frame& frame, SolidVoxels rule, Threads threads,
                                               const Progress& progress);
 
-  /// All columns along `axis`.
+  /// Returns the number of columns along `axis`.
   [[nodiscard]] std::span<const Column> columns(int axis) const { return columns_[static_cast<std::size_t>(axis)]; }
   /// Returns the index of the column along `axis` through a chunk of the frame.
   [[nodiscard]] std::size_t column_index(int axis, IVec3 chunk) const {
@@ -74,7 +74,7 @@ class Crossings {
            static_cast<std::size_t>(chunks_[u]) * static_cast<std::size_t>(chunk[v]);
   }
   [[nodiscard]] const Column& column(int axis, IVec3 chunk) const { return columns(axis)[column_index(axis, chunk)]; }
-  /// Chunks of the frame along each axis.
+  /// Returns the number of chunks of the frame along each axis.
   [[nodiscard]] IVec3 chunks() const { return chunks_; }
 
  private:
@@ -82,7 +82,7 @@ class Crossings {
   IVec3 chunks_{0};
 };
 
-/// Marks the voxels of a chunk in which a crossing lies, or that are touched: its 6-separating surface.
+/// Marks the voxels of a chunk that contain a crossing or are touched: the 6-separating surface.
 void mark_crossed(const Crossings& crossings, IVec3 chunk, ChunkBits& bits);
 
 }  // namespace quoin::voxelizing

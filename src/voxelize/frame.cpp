@@ -104,9 +104,9 @@ Result<VoxelLattice> lattice_of_size(const TriangleMesh& mesh, int voxels) {
   if (box.empty()) return nothing_there();
   const double side = longest_side(box);
   VoxelLattice lattice;
-  // A mesh that is a single point gets one voxel.
+  // A single point gets one voxel.
   lattice.voxel_size = side > 0.0 ? side / (voxels - 2.0 * kClear) : 1.0;
-  // In the middle of as many voxels along each axis as hold it.
+  // Centred in the smallest number of voxels along each axis that contain it.
   const DVec3 size = (box.max - box.min) / lattice.voxel_size;
   const DVec3 voxels_around = glm::max(glm::ceil(size - kClear), DVec3(1.0));
   lattice.origin = 0.5 * (box.min + box.max) - 0.5 * lattice.voxel_size * voxels_around;
@@ -128,7 +128,7 @@ namespace voxelizing {
 
 namespace {
 
-/// Moves a position that rounding put next to a side or a centre of voxels onto it, so that the rules for these hold.
+/// Snaps a position that rounding moved slightly off a voxel's side or centre back onto it, so that their rules apply.
 DVec3 snapped(const DVec3& position) {
   constexpr double kRounding = 1e-7;
   DVec3 result = position;
@@ -173,7 +173,7 @@ Result<Frame> Frame::make(const TriangleMesh& mesh, const VoxelLattice& lattice,
 
 namespace {
 
-/// The chunks of a frame that a triangle's box, grown, meets, half open.
+/// Returns the chunks of a frame that a triangle's grown box overlaps, half open.
 IBox chunk_box(const Frame& frame, const Corners& corners, double margin) {
   const DVec3 low = glm::min(glm::min(corners[0], corners[1]), corners[2]) - margin;
   const DVec3 high = glm::max(glm::max(corners[0], corners[1]), corners[2]) + margin;

@@ -14,10 +14,10 @@ namespace quoin::voxelizing {
 
 using Corners = std::array<DVec3, 3>;
 
-/// A mesh in voxels, relative to the corner of the first chunk of the box of chunks that is asked.
+/// A mesh in voxels, relative to the corner of the first queried chunk.
 class Frame {
  public:
-  /// `margin`: voxels around the mesh that are asked too. Errors: as check_mesh and voxelize.
+  /// `margin`: voxels around the mesh to include. Errors: as check_mesh and voxelize.
   [[nodiscard]] static Result<Frame> make(const TriangleMesh& mesh, const VoxelLattice& lattice, double margin);
 
   [[nodiscard]] const TriangleMesh& mesh() const { return *mesh_; }
@@ -26,7 +26,7 @@ class Frame {
     const auto& t = mesh_->triangles[triangle];
     return {positions_[t[0]], positions_[t[1]], positions_[t[2]]};
   }
-  /// Chunks along each axis.
+  /// Returns the number of chunks along each axis.
   [[nodiscard]] IVec3 chunks() const { return chunks_; }
   [[nodiscard]] std::size_t chunk_count() const {
     return static_cast<std::size_t>(chunks_.x) * static_cast<std::size_t>(chunks_.y) *
@@ -44,7 +44,7 @@ class Frame {
     const auto y = static_cast<std::size_t>(chunks_.y);
     return {static_cast<int>(index % x), static_cast<int>(index / x % y), static_cast<int>(index / x / y)};
   }
-  /// The grid's chunk that chunk 0 of the frame is.
+  /// Returns the grid coordinates of the frame's chunk 0.
   [[nodiscard]] IVec3 first_chunk() const { return first_chunk_; }
 
  private:
@@ -54,7 +54,7 @@ class Frame {
   IVec3 first_chunk_{0};
 };
 
-/// Lists the triangles near a chunk: their plane and their box, grown by `margin`, meet it.
+/// Lists the triangles near a chunk: those whose plane and box, grown by `margin`, overlap it.
 class ChunkTriangles {
  public:
   ChunkTriangles(const Frame& frame, double margin);
@@ -67,14 +67,14 @@ class ChunkTriangles {
   std::vector<std::uint32_t> triangles_;
 };
 
-/// The bits of a chunk's voxels: a word a row along x, y faster than z.
+/// The bits of a chunk's voxels: one word per row along x, y faster than z.
 using ChunkBits = std::array<std::uint64_t, static_cast<std::size_t>(kChunkEdge) * kChunkEdge>;
 
 inline std::size_t row_of(int y, int z) {
   return static_cast<std::size_t>(z) * kChunkEdge + static_cast<std::size_t>(y);
 }
 
-/// Bits from `first` to before `end`. Requires: 0 <= first < end <= 64.
+/// Returns the bits from `first` up to, but not including, `end`. Requires: 0 <= first < end <= 64.
 inline std::uint64_t bits_between(int first, int end) {
   return (~std::uint64_t{0} << static_cast<unsigned>(first)) & (~std::uint64_t{0} >> static_cast<unsigned>(64 - end));
 }

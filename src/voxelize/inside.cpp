@@ -29,7 +29,7 @@ class LineVotes {
     for (const Crossing& crossing : line) all_ += crossing.step();
     while (next_ < line.size() && line[next_].behind() <= first) before_ += line[next_++].step();
   }
-  /// Returns the votes at the line's current position; at first where it enters the chunk.
+  /// Returns the votes at the line's current position, initially its entry to the chunk.
   [[nodiscard]] int votes() const {
     return votes_of(rule_, before_, all_, static_cast<int>(next_), static_cast<int>(line_.size()));
   }
@@ -52,7 +52,7 @@ class LineVotes {
 
 using Plane = std::array<std::int16_t, kLines>;
 
-/// The votes of the lines where they enter a chunk.
+/// The votes of the lines at their entry to a chunk.
 void entering_votes(const Column& column, SolidVoxels rule, int first, Plane& votes) {
   votes.fill(0);
   if (column.begin.empty()) return;

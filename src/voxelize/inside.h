@@ -7,12 +7,12 @@ namespace quoin::voxelizing {
 /// The part of a chunk within a mesh.
 enum class Filled : std::uint8_t { None, All, Some };
 
-/// Room that a thread uses again.
+/// Memory that a thread reuses.
 struct InsideScratch {
   std::vector<std::int16_t> votes;  ///< of every voxel, x fastest
 };
 
-/// The least and the most votes of the lines along an axis, anywhere in a chunk.
+/// The minimum and maximum votes of the lines along an axis in a chunk.
 struct VoteRange {
   std::int16_t least = 0;
   std::int16_t most = 0;
@@ -20,10 +20,10 @@ struct VoteRange {
 
 /// Finds the voxels within a mesh.
 ///
-/// Votes: with Winding, each of the six axis rays from a centre counts how often more it leaves the mesh than it enters
-/// it; the sum is six times the winding number. With Parity, each ray votes if it has an odd number of crossings.
-/// The minimum and maximum votes of the lines of all axes decide most chunks, also in open meshes: `find` tests single
-/// voxels only in the other chunks.
+/// Votes: with Winding, each of the six axis rays from a centre counts its exits from the mesh minus its entries; the
+/// sum is six times the winding number. With Parity, each ray votes if it has an odd number of crossings. The minimum
+/// and maximum votes of the lines of all axes decide most chunks, also in open meshes: `find` tests single voxels only
+/// in the other chunks.
 class Inside {
  public:
   /// Requires: `rule` is not None; `crossings` outlives it.

@@ -18,13 +18,13 @@ struct Edge {
   Vec3 from{0.0F};
   Vec3 along{0.0F};
   Vec3 inwards{0.0F};
-  float per_square = 0.0F;  // of its length; 0 of an edge without one
+  float per_square = 0.0F;  // 1 / squared length; 0 for an edge of length 0
 };
 
 /// A triangle relative to a chunk.
 struct Solid {
   std::array<Edge, 3> edges;
-  Vec3 normal{0.0F};  // of length 1, or 0 of a flat one
+  Vec3 normal{0.0F};  // unit, or 0 for a triangle without area
   Vec3 low{0.0F};
   Vec3 high{0.0F};
 
@@ -69,7 +69,7 @@ TriangleInRow in_row(const Solid& solid, float y, float z, std::uint32_t number)
   return row;
 }
 
-/// From where to where along x the plane comes within reach of a row, cut to [first, end).
+/// Returns the range along x in which the plane is within reach of a row, clipped to [first, end).
 void cut_by_plane(const Solid& solid, float y, float z, float reach, int& first, int& end) {
   const Vec3 n = solid.normal;
   const float rest =
@@ -87,7 +87,7 @@ void cut_by_plane(const Solid& solid, float y, float z, float reach, int& first,
   end = std::min(end, static_cast<int>(std::ceil(high)));
 }
 
-/// The same as a kernel's, where there is a surface.
+/// As the kernel's function, only at points with a surface.
 template <class HasSurface>
 void update_with_holes(const TriangleInRow& row, int first, int end, float* squared, std::int32_t* numbers,
                        const HasSurface& has_surface) {
@@ -155,7 +155,7 @@ void find_nearest(const Frame& frame, IVec3 chunk, std::span<const std::uint32_t
     const Corners placed = frame.corners(triangle);
     const Solid solid({placed[0] - origin, placed[1] - origin, placed[2] - origin});
     const bool has_holes = holes.may_have_holes(triangle);
-    // Centres, half a voxel further than voxels.
+    // Centres are half a voxel beyond the voxels' corners.
     const IVec3 least = glm::max(voxel_of(DVec3(solid.low - reach - 0.5F)), IVec3(0));
     const IVec3 end = glm::min(voxel_of(DVec3(solid.high + reach - 0.5F)) + 1, IVec3(kChunkEdge));
     for (int z = least.z; z < end.z; ++z) {

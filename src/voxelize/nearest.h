@@ -10,8 +10,8 @@ inline constexpr std::int32_t kNoTriangle = -1;
 
 /// The nearest triangle and its distance for each voxel centre of a chunk, x fastest. Reused by its thread.
 struct Nearest {
-  std::vector<float> squared;           ///< of the distance in voxels; `reach` squared where there is none
-  std::vector<std::int32_t> triangles;  ///< kNoTriangle where none is within reach
+  std::vector<float> squared;           ///< squared distances in voxels; `reach` squared without a triangle
+  std::vector<std::int32_t> triangles;  ///< kNoTriangle if none is within reach
 };
 
 /// The centres to query.
@@ -20,12 +20,12 @@ struct Wanted {
   float reach = 0.0F;                 ///< triangles at this distance or beyond are ignored
 };
 
-/// The point of a triangle that is nearest to another, as shares of its corners.
+/// Returns the nearest point of a triangle to a point, in barycentric coordinates.
 ///
 /// Source: C. Ericson, "Real-Time Collision Detection" (2005), 5.1.5: the regions of the plane.
 [[nodiscard]] DVec3 nearest_shares(const Corners& corners, DVec3 point);
 
-/// Finds the nearest triangles. The first wins among equally near ones.
+/// Finds the nearest triangles. At ties the first wins.
 ///
 /// `has_surface`: called if the nearest triangle may have holes; returns true if it has a surface there.
 /// Space of `corners`: the frame.

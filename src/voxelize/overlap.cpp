@@ -20,7 +20,7 @@ struct HalfPlane {
   [[nodiscard]] double at(double a, double b) const { return slope_a * a + slope_b * b + offset; }
 };
 
-/// `turn`: 1 where the projection is counter-clockwise, else -1.
+/// `turn`: 1 if the projection is counter-clockwise, otherwise -1.
 HalfPlane inner_side(double from_a, double from_b, double to_a, double to_b, double turn) {
   HalfPlane side;
   side.slope_a = -(to_b - from_b) * turn;
@@ -30,11 +30,11 @@ HalfPlane inner_side(double from_a, double from_b, double to_a, double to_b, dou
   return side;
 }
 
-/// All that the test of a triangle needs.
+/// The precomputed data for testing a triangle.
 struct Triangle {
   DVec3 normal{0.0};
-  double nearer = 0.0;   // of the plane, for the cube's corner that lies farthest along the normal
-  double farther = 0.0;  // and for the opposite one
+  double nearer = 0.0;                            // plane offset for the cube's farthest corner along the normal
+  double farther = 0.0;                           // and for the opposite corner
   std::array<std::array<HalfPlane, 3>, 3> sides;  // of the projections along each axis
 
   explicit Triangle(const Corners& corners) {

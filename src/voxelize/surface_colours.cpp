@@ -14,7 +14,7 @@ namespace quoin::voxelizing {
 
 namespace {
 
-// Emission within a texture has steps of a 16th of the material's.
+// Emission within a texture is quantised to 16ths of the material's.
 constexpr std::uint32_t kEmissionSteps = 16;
 
 // The colour of a mesh without materials: a light grey that shows its shape, sRGB 200.
@@ -31,7 +31,7 @@ Rgba8 encoded(glm::vec4 light) {
   return colour;
 }
 
-/// linear_from_srgb of every byte, which takes long to compute.
+/// A table of linear_from_srgb for every byte, which is slow to compute.
 const std::array<float, 256>& linear_of_bytes() {
   static const std::array<float, 256> all = [] {
     std::array<float, 256> made{};
@@ -145,7 +145,7 @@ void SurfaceColours::make_halves(std::size_t texture) {
     std::uint16_t* out = level.pixels.data();
     for (int y = 0; y < level.height; ++y) {
       for (int x = 0; x < level.width; ++x) {
-        // All pixels of odd sizes count: from where this one begins to where it ends.
+        // With odd sizes all pixels count: uses the full extent of this pixel.
         const int end_x = (x + 1) * finer.width / level.width;
         const int end_y = (y + 1) * finer.height / level.height;
         glm::vec4 sum(0.0F);
@@ -247,7 +247,7 @@ Rgba8 SurfaceColours::colour(std::uint32_t triangle, DVec3 shares) const {
 }
 
 void SurfaceColours::find_mean() {
-  // Several materials have a core that is opaque, one of glass is glass throughout.
+  // With several materials the core is opaque; a single glass material is glass throughout.
   const auto one = only_material();
   const bool has_alpha = one && materials_[*one].alpha_mode == AlphaMode::Blend;
   glm::dvec4 sum(0.0);

@@ -31,7 +31,7 @@ class SurfaceColours {
     const auto& of = frame_->mesh().material_of;
     return of.empty() ? 0 : of[triangle];
   }
-  /// The index into `looks` of a point: of its material, with the emission that its texture has there.
+  /// Returns the index into `looks` of a point: its material with the emission of its texture there.
   [[nodiscard]] std::uint32_t look_index(std::uint32_t triangle, DVec3 shares) const;
   /// Returns the look of the single material of all triangles, with its mean emission; nullopt if there are several.
   [[nodiscard]] std::optional<std::uint32_t> deep_look() const;
@@ -56,9 +56,9 @@ class SurfaceColours {
   }
   /// Returns the single material of all triangles; nullopt if there are several.
   [[nodiscard]] std::optional<std::uint32_t> only_material() const;
-  /// The look of a material with this share of its emission.
+  /// Returns the look of a material with a share of its emission.
   [[nodiscard]] std::uint32_t look_of(std::uint32_t material, float share) const;
-  /// The share of its material's emission, 0 to 1.
+  /// Returns the share of its material's emission, 0 to 1.
   [[nodiscard]] float emission_share(std::uint32_t triangle, DVec3 shares) const;
   /// Returns the texture's colour at a point of a triangle; `places` are its corners' texture coordinates.
   [[nodiscard]] glm::vec4 colour_in(std::size_t texture, std::uint32_t triangle, const glm::vec2* places,

@@ -241,7 +241,7 @@ Result<Types> find_types(const SurfaceColours& colours, AllFound& found, VoxelRe
     has_deep |= count_of(*chunk) > chunk->coloured.size();
   }
   std::uint32_t deep = 0;
-  // A model of few colours keeps these: the mean would be one more.
+  // A model with few colours keeps them: the mean would add another.
   constexpr std::size_t kFewLooks = 256;
   const bool has_few = colours.deep_look() && looks.size() <= kFewLooks;
   const Rgba8 deep_colour = has_few ? looks.nearest(colours.mean(), deep_material) : colours.mean();
@@ -251,7 +251,7 @@ Result<Types> find_types(const SurfaceColours& colours, AllFound& found, VoxelRe
   return Types{has_deep ? (*types)[deep] : kAir, std::move(*types)};
 }
 
-/// The types of a chunk's voxels.
+/// Returns the types of a chunk's voxels.
 Chunk types_of(const Found& found, const Types& types) {
   if (found.filled != Filled::Some && found.coloured.empty()) {
     return Chunk(found.filled == Filled::All ? types.deep : kAir);
@@ -276,7 +276,7 @@ Chunk types_of(const Found& found, const Types& types) {
   return chunk;
 }
 
-/// Turns the results of chunks into voxels of grids, a batch of chunks at a time: `make(i)` runs on any thread, `put(i,
+/// Converts the results of chunks to grid voxels, a batch of chunks at a time: `make(i)` runs on any thread, `put(i,
 /// made)` in order. Frees the results.
 template <class Make, class Put>
 void put_all(AllFound& found, Threads threads, const Make& make, const Put& put) {

@@ -120,8 +120,7 @@ class ChunkTrie {
  private:
   static constexpr int kLog = 2;  // log2 of the slots along an edge
   static constexpr unsigned kEdge = 1U << kLog;
-  static constexpr std::uint32_t kOrigin = std::uint32_t{1}
-                                           << 25;  // shifts the world's chunk coordinates to start at 0
+  static constexpr std::uint32_t kOrigin = std::uint32_t{1} << 25;  // offset that makes coordinates not negative
 
   using Place = std::array<std::uint32_t, 3>;
 

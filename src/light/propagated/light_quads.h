@@ -9,7 +9,7 @@
 
 namespace quoin::propagated {
 
-/// As PropagatedLight::split.
+/// See PropagatedLight::split.
 void split_quads(const LightReader& reader, const QuadBuffer& quads, IVec3 chunk, QuadBuffer& out,
                  std::vector<std::uint16_t>& light);
 

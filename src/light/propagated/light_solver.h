@@ -27,10 +27,10 @@ struct ChunkAround {
   IBox unknown;                       ///< box of the chunk whose light is not valid
 };
 
-/// Voxels whose light is to be found.
+/// The voxels to compute light for.
 struct LightRegion {
   struct Box {
-    IBox voxels;  ///< all that are looked at
+    IBox voxels;  ///< all visited voxels
     IBox wanted;  ///< some of these
 
     bool operator==(const Box&) const = default;
@@ -114,17 +114,17 @@ class LightSolver {
   void read_slab(const Part& part, int y, int z, SlabPlanes& now) const;
 
   const LightRegion* region_ = nullptr;
-  LightRegion::Box box_;   // that is looked at
+  LightRegion::Box box_;   // the visited box
   unsigned channels_ = 0;  // bit c: channel c is
   IVec3 size_{0};          // of the box
-  IVec3 origin_{0};        // its rim's least voxel
+  IVec3 origin_{0};        // its rim's lowest voxel
   std::size_t columns_ = 0;
   std::size_t blocks_ = 0;  // of a column
   std::size_t column_ = 0;  // words
   std::size_t layer_ = 0;
   std::array<std::array<std::vector<Source>, 16>, kChannels> sources_;  // [channel][level]
   std::vector<std::unique_ptr<ChunkMasks>> own_masks_;
-  bool has_sky_ = false;  // there is sky that does not come by sources
+  bool has_sky_ = false;  // there is sky light that is not in `sources_`
   std::vector<std::uint64_t> pass_;
   std::vector<std::uint64_t> rest_;   // dark voxels of pass_, in touched blocks
   std::vector<std::uint64_t> front_;  // voxels of the current level; all 0 between regions

@@ -50,14 +50,14 @@ class LightStore {
     journal_.note(entry.serial, change.record, entries_.size());
     if (entry.light.is_dark()) entries_.erase(change.chunk, [](auto&) {});
   }
-  /// There may be lamps in some slabs of a chunk now.
+  /// Marks slabs of a chunk that may now contain lamps.
   void add_lamps(IVec3 chunk, const ChunkSlabs& slabs) {
     Entry* entry = entries_.find_to_edit(chunk, [](auto&) {});
     for (int z = 0; entry != nullptr && z < kChunkEdge; z += 4) {
       entry->light.lamp_slabs[static_cast<std::size_t>(z / 4)] |= static_cast<std::uint16_t>(slabs.along_y(z));
     }
   }
-  /// Makes a chunk dark and reports all of it as changed: the chunk comes or goes.
+  /// Makes a chunk dark and reports all of it as changed: for a chunk that is added or removed.
   void begin(IVec3 chunk) {
     journal_.begin_change();
     note_all(chunk);

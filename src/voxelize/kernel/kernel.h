@@ -10,19 +10,19 @@
 
 namespace quoin::voxelizing {
 
-/// An edge as a row of points along x sees it. The row's point 0 is where offsets begin; others lie a voxel apart.
+/// An edge relative to a row of points along x. Offsets start at the row's point 0; points are one voxel apart.
 struct EdgeInRow {
   float at_x, at_y, at_z;        ///< from the edge's beginning to point 0
   float edge_x, edge_y, edge_z;  ///< the edge
-  float per_square;              ///< of its length; 0 of an edge without one
-  float along;                   ///< dot product of both of these
-  float inwards, inwards_x;      ///< how far point 0 lies within the triangle, as seen from the edge, and its slope
+  float per_square;              ///< 1 / squared length; 0 for an edge of length 0
+  float along;                   ///< dot product of the two vectors above
+  float inwards, inwards_x;      ///< distance of point 0 inwards from the edge, and its slope
 };
 
 struct TriangleInRow {
   EdgeInRow edges[3];
   float plane, plane_x;  ///< distance of point 0 from the plane, and its slope
-  float flat;            ///< 1 of a triangle without an area, else 0
+  float flat;            ///< 1 for a triangle without area, otherwise 0
   std::int32_t number;
 };
 

@@ -1,4 +1,4 @@
-// The kernel for x86-64 processors with AVX2, BMI and BMI2; called only where all were found.
+// The kernel for x86-64 processors with AVX2, BMI and BMI2; called only if the CPU has all of them.
 
 #ifdef QUOIN_X86_KERNELS
 

@@ -1,4 +1,4 @@
-// The kernel for x86-64 processors with AVX-512; called only where all were found.
+// The kernel for x86-64 processors with AVX-512; called only if the CPU has all of them.
 
 #ifdef QUOIN_X86_KERNELS
 
