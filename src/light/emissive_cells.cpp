@@ -55,7 +55,7 @@ struct Sum {
   }
 };
 
-// In the order of the cells' numbers.
+// Sorted by cell number.
 std::vector<EmissiveCell> cells_of(const std::map<int, Sum>& sums) {
   std::vector<EmissiveCell> cells;
   for (const auto& [number, sum] : sums) {

@@ -183,7 +183,7 @@ void LiveGrid::mark(IVec3 chunk, LiveChunk& state, LiveClock::time_point now) {
   const Change change(totals_, state);
   // Jobs of a chunk that was here before may still be running.
   if (state.oldest == 0) state.oldest = totals_.serial + 1;
-  // Its removal no longer has to be reported.
+  // The chunk's removal need not be reported any more.
   if (state.is_gone) state.is_ready = false;
   state.is_gone = false;
   state.is_waiting = true;

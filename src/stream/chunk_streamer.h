@@ -67,7 +67,7 @@ class ChunkStreamer {
     std::size_t wanted = 0;
     std::size_t missing = 0;
     double complete_radius = 0.0;
-    std::uint64_t plans = 0;  ///< the number of the last planned wishes
+    std::uint64_t plans = 0;  ///< the number of the last planned requests
     std::uint64_t read = 0;   ///< total number of chunks
     std::uint64_t made = 0;
     std::size_t begun = 0;  ///< chunks that workers are processing

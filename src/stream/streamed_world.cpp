@@ -157,9 +157,9 @@ struct StreamedWorld::Impl {
   ChangeCursor followed_scene;
 
   Eyes eyes;          // now
-  Eyes planned_eyes;  // of the last wishes
+  Eyes planned_eyes;  // eyes of the last requests
   std::size_t planned_chunks = 0;
-  std::size_t asked_left = 0;  // of the chunks that edits wait for, as of the last wishes
+  std::size_t asked_left = 0;  // chunks that edits wait for, as of the last requests
   std::uint64_t posted_plans = 0;
   bool must_plan = true;
   Clock::time_point planned{};

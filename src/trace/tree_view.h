@@ -177,9 +177,10 @@ struct TreeView {
 class TreeNodes {
  public:
   explicit TreeNodes(const OccupancyTree& tree);
-  /// Null where a region of 1,024^3 voxels is empty. Region coordinates are voxel coordinates / 1,024, rounded down.
+  /// Returns null if a region of 1,024^3 voxels is empty. Region coordinates are voxel coordinates / 1,024, rounded
+  /// down.
   [[nodiscard]] const RegionNode* find_region(IVec3 region) const;
-  /// Null where a chunk is empty. Chunk coordinates are voxel coordinates / 64, rounded down.
+  /// Returns null if a chunk is empty. Chunk coordinates are voxel coordinates / 64, rounded down.
   [[nodiscard]] const ChunkNode* find_chunk(IVec3 chunk) const;
   [[nodiscard]] const ChunkNode& chunk(std::uint32_t index) const { return chunks_[index]; }
   [[nodiscard]] BrickWords brick(BrickCode code) const { return {lines_, code}; }

@@ -26,7 +26,7 @@ constexpr int kFarSquared = (kReach + 1) * (kReach + 1);
 constexpr int kBlur = 2;
 constexpr int kSmoothed = kChunkEdge + 2 * kBlur;  // samples per edge with a wanted distance
 constexpr int kMargin = kReach + kBlur;
-constexpr int kRegion = kChunkEdge + 2 * kMargin;  // voxels that are looked at, along an edge
+constexpr int kRegion = kChunkEdge + 2 * kMargin;  // number of voxels read along an edge
 constexpr int kPitch = 80;                         // kSmoothed, rounded up to whole vectors
 // Solid voxels keep more of their distance of 0.5 than air does; otherwise features one voxel thick would shrink to a
 // wire.

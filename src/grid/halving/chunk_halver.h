@@ -15,7 +15,7 @@ namespace quoin {
 /// Makes one chunk of a halved grid.
 ///
 /// The four rows of voxels that make a row of cells are masks of 64 bits, one a type; only the cells that hold several
-/// types are looked at one by one.
+/// types are examined one by one.
 class ChunkHalver {
  public:
   ChunkHalver(const Grid& grid, const VoxelRegistry& types, IVec3 chunk) : masks_(grid, chunk), types_(&types) {}

@@ -14,7 +14,7 @@ namespace quoin::propagated {
 
 /// The light properties of a voxel type.
 struct TypeLight {
-  std::uint16_t lamp = 0;    ///< packed levels that it gives off
+  std::uint16_t lamp = 0;    ///< packed levels that it emits
   std::uint8_t passes = 15;  ///< bit c: channel c
 
   bool operator==(const TypeLight&) const = default;

@@ -184,7 +184,7 @@ void LightSolver::read_rim() {
       for_each_part(side, [&](const Part& part) { read_light(part); });
     }
   }
-  // Both ends of rows at once.
+  // Handles both ends of rows together.
   const IVec3 along_x{1, 0, 0};
   for_each_part({voxels.min - along_x, voxels.max + along_x}, [&](Part part) {
     const int low = voxels.min.x - 1 - part.chunk.x * kChunkEdge;

@@ -140,7 +140,7 @@ struct PropagatedLight::Impl {
   ChangeCursor followed_grid;
   ChangeCursor followed_types;
   std::shared_ptr<const std::vector<TypeLight>> shared_lights = std::make_shared<const std::vector<TypeLight>>();
-  unsigned lamp_channels = 0;  // that any type gives off
+  unsigned lamp_channels = 0;  // channels that any type emits
   Ref<SharedDomain> shared_domain = make_ref<SharedDomain>();
   LightStore store;          // of the chunks of the domain
   std::vector<Dirty> dirty;  // boxes that are to be solved by themselves
@@ -369,7 +369,7 @@ void PropagatedLight::Impl::solve(std::vector<LightRegion>& regions, Threads thr
   }
 }
 
-// Solves each box at once.
+// Solves each box as a whole.
 void PropagatedLight::Impl::solve_dirty(const Grid& grid, Threads threads) {
   std::vector<LightRegion> regions;
   for (const Dirty& each : dirty) {

@@ -124,7 +124,7 @@ struct Kernel {
   /// at this slice.
   std::uint32_t* (*quads)(const CellSlice& slice, const std::uint64_t* solid, const RankedRows& ranked,
                           const QuadRules& rules, std::uint32_t* out);
-  /// The same for labels, by their sizes in bytes: counts quads in the interfaces' slots, ...
+  /// As above for labels, by their sizes in bytes: counts quads in the interfaces' slots, ...
   void (*count_interfaces[4])(const CellSlice& slice, const LabelRows& labels, std::int64_t z, InterfaceTable& table);
   /// ... and writes them to the positions in the interfaces' slots.
   void (*label_quads[4])(const CellSlice& slice, const LabelRows& labels, std::int64_t z, const RankedRows& ranked,

@@ -102,7 +102,7 @@ Result<Lattice> lattice_of(const ArrayView& array) {
     if (lattice.spacing[own] < 0.0) lattice.is_mirrored = !lattice.is_mirrored;
   }
   if (lattice.stride[0] < 0) {
-    // From the other end of the row.
+    // Starts at the other end of the row.
     const std::int64_t steps = lattice.size[0] - 1;
     lattice.data += steps * lattice.stride[0];
     lattice.stride[0] = -lattice.stride[0];

@@ -9,12 +9,12 @@
 
 namespace quoin::smooth {
 
-/// No face; faces are 2 * axis + (1 for the upper side).
+/// Value for no face; faces are 2 * axis + (1 for the upper side).
 inline constexpr int kNoFace = 6;
 
 /// The sheets of the surface in a cell: for each of the twelve edges, the sheet that crosses it.
 struct Sheets {
-  /// By 4 * axis + du + 2 dv of the edge's start, u and v the next two axes; kUncrossed for edges that are not crossed.
+  /// Indexed by 4 * axis + du + 2 dv of the edge's start, u and v the next two axes; kUncrossed for uncrossed edges.
   std::array<std::uint8_t, 12> of_edge{};
   int count = 0;
   static constexpr std::uint8_t kUncrossed = 15;

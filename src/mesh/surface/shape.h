@@ -27,8 +27,8 @@ struct Shape {
 ///             Vertices of level-0 cells with a corner that is thin along an axis keep a third of that way along it.
 /// Bodies:     in a level-0 cell with samples of several bodies and one sheet, the vertex is the mean of the
 ///             crossings of all edges between different bodies or air, in the middle if both ends are solid. It is kept
-///             as if thin. The normal is the normal of the whole field, if that is crossed. Quads with such a vertex are
-///             split again, so that two bodies choose the same diagonal.
+///             as if thin. The normal is the normal of the whole field, if that is crossed. Quads with such a vertex
+///             are split again, so that two bodies choose the same diagonal.
 /// Cost:       up to 0.5 ms per chunk for thin features.
 void shape_vertices(const DensityNeighbourhood& chunks, const SmoothOptions& options, const Shape& shape,
                     SmoothChunkMesh& mesh);

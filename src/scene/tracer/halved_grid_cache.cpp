@@ -22,7 +22,7 @@ bool has_volume_of(const Grid& coarse, int halvings, const Grid& full) {
   return std::abs(cells - voxels) <= 0.125 * voxels;
 }
 
-// The same for a field; also false if so much of its surface is thin that the next halving would make holes.
+// As above, for a field. Also returns false if so much of its surface is thin that the next halving would make holes.
 bool has_shape_of(const DensityPyramid& fields, int halvings) {
   const DownsampledDensityCounts& now = fields.counts(halvings);
   const auto cells = std::ldexp(static_cast<double>(now.solid), 3 * halvings);

@@ -40,7 +40,7 @@ struct SceneHits {
 /// Spaces: view, the world's axes and units with `origin` in the middle, so that rays are as exact 10^9 away from the
 ///         world's origin as near it; and grid, PlacedGrid::voxels of a placed grid. A ray's t is the same number in
 ///         both.
-/// Threads: any number may trace at once.
+/// Threads: any number may trace concurrently.
 class SceneView {
  public:
   /// `tracer` must outlive it. Cost: O(instances).

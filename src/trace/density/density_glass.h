@@ -50,7 +50,7 @@ struct GlassSpan {
 /// `largest` returns the maximum edge length of a block of one type that is crossed in one step.
 ///
 /// Precision: as first_hit of a DensityTree. Cost: about 100 ns per cell at a surface, 20 ns per block inside.
-/// Same bits: with any instruction set.
+/// Bits: identical with any instruction set.
 void visit_glass(const DensityGlass& glass, const Ray& ray, double max_t, FunctionRef<double(VoxelType)> largest,
                  FunctionRef<bool(const GlassSpan&)> visit);
 

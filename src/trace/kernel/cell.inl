@@ -143,7 +143,7 @@ inline double root_between(const CellCubic<double>& f, double low, double high) 
     }
     if (!(high - low > 1e-15)) break;
     double next = s - value / f.slope(s);
-    // Also if the slope is 0.
+    // This also covers a slope of 0.
     if (!(next > low && next < high)) next = 0.5 * (low + high);
     if (std::abs(next - s) <= 1e-13) return next;
     s = next;

@@ -81,7 +81,7 @@ class SurfaceWalk {
     span_ = span_in(in_cells_, at_);
   }
 
-  // Into the next cell, through the plane that is crossed first; false when that lies beyond the end.
+  // Moves to the next cell through the plane that is crossed first. Returns false if that is beyond the end.
   bool step() {
     if (span_.t_out > in_cells_.max_t) return false;
     int axis = -1;
@@ -100,7 +100,7 @@ class SurfaceWalk {
     return true;
   }
 
-  // From a cell that touches no solid to the next that does.
+  // Moves from a cell that touches no solid to the next cell that does.
   std::optional<RayHit> find_next_cell() {
     for (int steps = 0;; ++steps) {
       look();
