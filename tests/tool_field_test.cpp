@@ -71,7 +71,7 @@ TEST_F(ToolField, BecomesVoxelsAtTheSurfaceValue) {
     const Json made = said("convert ball.nrrd a." + ending + " --iso 60");
     EXPECT_EQ(made["voxels"], count_above(60)) << ending;
     EXPECT_EQ(made["iso"], 60.0) << ending;
-    EXPECT_NE(made["warnings"].dump().find("fields became voxels"), std::string::npos) << ending;
+    EXPECT_NE(made["warnings"].dump().find("fields converted to voxels"), std::string::npos) << ending;
   }
   EXPECT_EQ(said("info a.vox")["voxels"], count_above(60));
   EXPECT_EQ(said("info a.qb")["voxels"], count_above(60));
@@ -91,7 +91,7 @@ TEST_F(ToolField, StaysAFieldInFormatsThatHoldFieldsUnlessSolidIsAskedFor) {
 TEST_F(ToolField, IsTurnedToQuarterTurnsForVoxels) {
   const Json made = said("convert turned.nrrd a.vox --iso 60");
   EXPECT_EQ(made["voxels"], count_above(60));
-  EXPECT_NE(made["warnings"].dump().find("turned by up to 10"), std::string::npos) << made["warnings"];
+  EXPECT_NE(made["warnings"].dump().find("rotated by up to 10"), std::string::npos) << made["warnings"];
   EXPECT_EQ(made["warnings"].dump().find("between voxels"), std::string::npos) << made["warnings"];
 }
 

@@ -96,7 +96,7 @@ TEST_F(ToolGenerate, SmoothTerrainIsSceneThatAllElseReads) {
   EXPECT_EQ(run("generate smooth-terrain a.json --chunks 513x1x1").status, 2);
   const ToolRun voxels = run("convert cliffs.json cliffs.vox");
   EXPECT_EQ(voxels.status, 0) << voxels.err;
-  EXPECT_NE(voxels.err.find("fields became voxels"), std::string::npos) << voxels.err;
+  EXPECT_NE(voxels.err.find("fields converted to voxels"), std::string::npos) << voxels.err;
 }
 
 TEST_F(ToolGenerate, WorldsBeyond256VoxelsKeepEveryVoxel) {

@@ -70,7 +70,7 @@ TEST_F(ToolMesh, OptionsOfTrianglesAreChecked) {
 TEST_F(ToolMesh, IsAFileOfVoxAtUnitSizeWithFewColours) {
   const ToolRun result = run("convert box.stl box.vox --size 20");
   EXPECT_EQ(result.status, 0) << result.err;
-  EXPECT_NE(result.err.find("keeps no size"), std::string::npos);
+  EXPECT_NE(result.err.find("stores no voxel size"), std::string::npos);
   EXPECT_EQ(Json::parse(run("info box.vox --json").out)["voxels"], 20 * 10 * 10);
 }
 

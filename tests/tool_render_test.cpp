@@ -62,7 +62,7 @@ TEST_F(ToolRender, ItWritesAPictureOfTheSizeAskedForAndSaysSo) {
   EXPECT_EQ(picture->height, 48);
   const ToolRun text = run("render tiny.vox -o out.png");
   EXPECT_EQ(text.status, 0) << text.err;
-  EXPECT_NE(text.out.find("Picture: 1280 x 720, "), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find("Image: 1280 x 720, "), std::string::npos) << text.out;
   EXPECT_NE(text.out.find("\nFaces: 18 visible of 24 total\n"), std::string::npos) << text.out;
   EXPECT_NE(text.out.find("\nWrote out.png, "), std::string::npos) << text.out;
 }
@@ -147,7 +147,7 @@ TEST_F(ToolRender, ACameraOfTheFileIsNamedByItsNumber) {
     expect_one_error_line(none);
     EXPECT_NE(none.err.find("the file has cameras 2, 5"), std::string::npos) << none.err;
   }
-  EXPECT_NE(run("render tiny.vox -o out.png --camera file:0").err.find("no camera that was set"), std::string::npos);
+  EXPECT_NE(run("render tiny.vox -o out.png --camera file:0").err.find("no saved cameras"), std::string::npos);
   for (const std::string wrong : {"file:", "file:-1", "file:x", "file:2147483648", "file:2 --look-at 0,0,0",
                                   "file:2 --fov 30", "file:2 --view front"}) {
     const ToolRun refused = run("render " + size + wrong);
@@ -309,7 +309,7 @@ TEST_F(ToolRender, FileSettingsApplyWithoutOptions) {
   };
   const Json said = drawn(base);
   EXPECT_EQ(corner(), (std::array{188, 0, 0})) << "the file's sky";
-  EXPECT_EQ(said["warnings"], Json({"render settings of the file that are not drawn: _setting _grid 1"}));
+  EXPECT_EQ(said["warnings"], Json({"unsupported render settings of the file: _setting _grid 1"}));
   drawn(base + " --sky-brightness 1");
   EXPECT_EQ(corner(), (std::array{255, 0, 0}));
   drawn(base + " --sky uniform --tone clamp");
@@ -338,7 +338,7 @@ TEST_F(ToolRender, FilmsInOneFileAreMadeOfPictures) {
   const std::string film = "render many.vox -o film.mp4 --size 31x21 --turntable 3 --json";
   const ToolRun without = shell("PATH=/nowhere '" QUOIN_TOOL "' " + film);
   EXPECT_EQ(without.status, 1);
-  EXPECT_NE(without.err.find("ffmpeg, which is not installed"), std::string::npos) << without.err;
+  EXPECT_NE(without.err.find("ffmpeg is not installed"), std::string::npos) << without.err;
   if (std::system("ffmpeg -version > /dev/null 2>&1") != 0) GTEST_SKIP() << "ffmpeg is not installed";
   const ToolRun made = run(film);
   ASSERT_EQ(made.status, 0) << made.err;
@@ -520,10 +520,10 @@ TEST_F(ToolRender, FieldsShowTheirDensitiesAndTheOcclusionOfTheirMeshes) {
 
 TEST_F(ToolRender, APictureOfTheSkyComesWithAWarning) {
   std::ofstream(folder_.file("none.vox"), std::ios::binary) << vox_file({1, 1, 1}, "");
-  EXPECT_EQ(drawn("none.vox -o a.png --size 9x9")["warnings"], Json({"nothing to draw: a picture of the sky"}));
+  EXPECT_EQ(drawn("none.vox -o a.png --size 9x9")["warnings"], Json({"nothing visible; the image shows only sky"}));
   EXPECT_TRUE(exists("a.png"));
   EXPECT_EQ(drawn("tiny.vox -o b.png --size 9x9 --camera 0,90,0 --look-at 0,99,0")["warnings"],
-            Json({"no voxel in sight of this camera: a picture of the sky"}));
+            Json({"no voxel is in view of this camera; the image shows only sky"}));
 }
 
 TEST_F(ToolRender, HiddenInstancesAreDrawnAndFramedOnlyWhenAskedFor) {
@@ -546,12 +546,12 @@ TEST_F(ToolRender, WrongUsageIsOneLineAndStatus2) {
   const std::string out = "tiny.vox -o out.png ";
   const std::vector<std::pair<std::string, std::string>> errors = {
       {"tiny.vox", "-o OUT is required"},
-      {"tiny.vox -o out.gif", "-o: the picture's name must end in .png, .jpg, .webp or .exr, not \"out.gif\""},
-      {"tiny.vox -o ''", "--output: must be the name of a file"},
+      {"tiny.vox -o out.gif", "-o: the image name must end in .png, .jpg, .webp or .exr, not \"out.gif\""},
+      {"tiny.vox -o ''", "--output: must be a file name"},
       {"vox.png -o vox.png", "-o: vox.png is the input"},
       {"tiny.vox -o link.png", "-o: link.png is the input"},
       {out + "--depth link.pfm", "--depth: link.pfm is the input"},
-      {out + "--depth ahead.pfm", "--depth: ahead.pfm is the picture itself"},
+      {out + "--depth ahead.pfm", "--depth: ahead.pfm is the same file as -o"},
       {out + "--depth depth.png", "--depth: the name must end in .pfm"},
       {out + "--size 0x9", "--size: must be"},
       {out + "--size 9x-9", "--size: must be"},
@@ -559,14 +559,14 @@ TEST_F(ToolRender, WrongUsageIsOneLineAndStatus2) {
       {out + "--size 9x9x9", "--size: must be"},
       {out + "--size 9.5x9", "--size: must be"},
       {out + "--size 99999999999x1", "--size: must be"},
-      {out + "--size 1000001x1", "--size: must be WIDTHxHEIGHT of at most 2^28 pixels and 1000000 a side"},
+      {out + "--size 1000001x1", "--size: must be WIDTHxHEIGHT of at most 2^28 pixels and 1000000 per side"},
       {out + "--size 1x1000001", "--size: must be"},
       {out + "--size 40000x25000", "--size: must be WIDTHxHEIGHT of at most 2^28 pixels"},
       {out + "--view side", "--view: "},
       {out + "--camera 1,2,3", "--camera needs --look-at"},
       {out + "--look-at 1,2,3", "--look-at needs --camera"},
       {out + "--fov 30", "--fov needs --camera"},
-      {out + "--view top --camera 1,2,3 --look-at 0,0,0", "--view and --camera exclude each other"},
+      {out + "--view top --camera 1,2,3 --look-at 0,0,0", "--view and --camera cannot be used together"},
       {out + "--camera 1,2 --look-at 0,0,0", "--camera: must be three numbers"},
       {out + "--camera 1,2,3x --look-at 0,0,0", "--camera: must be three numbers"},
       {out + "--camera 1,2,3,4 --look-at 0,0,0", "--camera: must be three numbers"},
@@ -602,24 +602,24 @@ TEST_F(ToolRender, WrongUsageIsOneLineAndStatus2) {
       {out + "--ao smooth --ao-form deep", "--ao-form: must be none, soft-share, share, weighted or"},
       {out + "--ao smooth --ao-spread 5", "--ao-spread: must be 0.0625 to 4, not \"5\""},
       {out + "--ao smooth --ao-power 3", "--ao-power needs --ao-form weighted"},
-      {out + "--ao smooth --backend vulkan", "--ao smooth: the backend vulkan has none"},
+      {out + "--ao smooth --backend vulkan", "--ao smooth and --backend vulkan cannot be used together"},
       {out + "--preset no-ao --ao-spread 1", "--ao-spread: the preset no-ao has no ambient occlusion"},
       {out + "--light baked", "--light: "},
       {out + "--least-light 0.1", "--least-light needs --light propagated"},
       {out + "--light propagated --least-light -1", "--least-light: must be a number of at least 0"},
-      {out + "--light propagated --preset unlit", "--light propagated: the preset unlit does not have it"},
-      {out + "--light propagated --preset no-shadows", "--light propagated: the preset no-shadows does not have it"},
-      {out + "--light propagated --lamps 3", "--lamps: --light propagated has none to choose"},
-      {out + "--light propagated --shadow-distance 3", "--shadow-distance: --light propagated has none to choose"},
-      {out + "--preset density --light rays", "--light: the preset density is a flat slice"},
+      {out + "--light propagated --preset unlit", "--light propagated and --preset unlit cannot be used together"},
+      {out + "--light propagated --preset no-shadows", "--light propagated and --preset no-shadows cannot be"},
+      {out + "--light propagated --lamps 3", "--lamps and --light propagated cannot be used together"},
+      {out + "--light propagated --shadow-distance 3", "--shadow-distance and --light propagated cannot be"},
+      {out + "--preset density --light rays", "--light and --preset density cannot be used together"},
       {out + "--slice y:0.5", "--slice needs --preset density"},
-      {out + "--preset density --slice y:2", "--slice: must be x, y or z, and a place from 0 to 1"},
+      {out + "--preset density --slice y:2", "--slice: must be x, y or z, and a position from 0 to 1"},
       {out + "--preset density --slice w:0.5", "--slice: must be"},
       {out + "--preset density --slice 0.5", "--slice: must be"},
       {out + "--preset unlit --fixed-sky", "--fixed-sky: the preset unlit has no light"},
       {out + "--preset unlit --plain-glass", "--plain-glass: the preset unlit has no light"},
-      {out + "--preset density --fixed-sky", "--fixed-sky: the preset density is a flat slice"},
-      {out + "--preset density --samples 4", "--samples: the preset density is a flat slice"},
+      {out + "--preset density --fixed-sky", "--fixed-sky and --preset density cannot be used together"},
+      {out + "--preset density --samples 4", "--samples and --preset density cannot be used together"},
       {out + "--backend gpu", "--backend: "},
       {out + "--device 0", "--device needs --backend vulkan"},
       {out + "--backend vulkan --device ''", "--device: must be a number or a name"}};

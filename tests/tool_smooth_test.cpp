@@ -199,10 +199,10 @@ TEST_F(ToolSmooth, WrongWishesForOcclusionAreStatus2) {
       {"out.glb --mesher smooth --ao-form weighted --ao-offset 1", "--ao-offset: must be 0 to 0.99, not \"1\""},
       {"out.glb --mesher smooth --ao-form weighted --ao-power 65", "--ao-power: must be 0.0625 to 64"},
       {"out.glb --mesher smooth --ao-offset 0.2", "--ao-offset needs --ao-form weighted"},
-      {"out.glb --mesher smooth --ao-form none --ao-spread 1", "--ao-spread: the form none has no samples"},
-      {"out.glb --mesher smooth --no-ao --ao-form share", "--ao-form: --no-ao leaves occlusion out"},
-      {"out.glb --no-ao --ao-attribute", "--ao-attribute: --no-ao leaves occlusion out"},
-      {"out.obj --ao-attribute", "--ao-attribute: .obj has no place for it"},
+      {"out.glb --mesher smooth --ao-form none --ao-spread 1", "--ao-spread and --ao-form none cannot be used"},
+      {"out.glb --mesher smooth --no-ao --ao-form share", "--ao-form and --no-ao cannot be used together"},
+      {"out.glb --no-ao --ao-attribute", "--ao-attribute and --no-ao cannot be used together"},
+      {"out.obj --ao-attribute", "cannot write --ao-attribute to .obj"},
       {"out.vox --ao-attribute", "--mesher, --no-ao, --ao-..., --watertight, --smoothness, --colours, --no-unite"}};
   for (const auto& [arguments, error] : errors) {
     const ToolRun result = run("convert tiny.vox " + arguments);
@@ -215,7 +215,7 @@ TEST_F(ToolSmooth, WrongWishesForOcclusionAreStatus2) {
 TEST_F(ToolSmooth, HiddenInstancesAndNothingToDrawAreSaid) {
   std::ofstream(folder_.file("two.vox"), std::ios::binary) << vox_with_hidden(2);
   const Json said = converted("two.vox out.glb --mesher smooth");
-  EXPECT_EQ(said["warnings"], Json({"2 hidden instances left out; --hidden includes them", "nothing to draw"}));
+  EXPECT_EQ(said["warnings"], Json({"2 hidden instances left out; --hidden includes them", "the mesh is empty"}));
   EXPECT_EQ(parse_glb(read_file(folder_.file("out.glb")).value()).document["asset"]["version"], "2.0");
   EXPECT_EQ(converted("two.vox out.glb --mesher smooth --hidden")["warnings"], Json::array());
   EXPECT_EQ(parse_glb(read_file(folder_.file("out.glb")).value()).document["nodes"].size(), 2U);
@@ -256,7 +256,7 @@ TEST_F(ToolSmooth, TheSurfaceValueIsFoundAndSaid) {
   EXPECT_NEAR(said["iso"].get<double>(), 120.0, 1.0);
   const ToolRun text = run("convert ball.raw out.ply --raw-size 24x24x24");
   EXPECT_NE(text.out.find("\nIso: "), std::string::npos) << text.out;
-  EXPECT_NE(text.out.find("--iso sets another"), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find("set another with --iso"), std::string::npos) << text.out;
   EXPECT_NE(text.out.find("Solid samples: "), std::string::npos) << text.out;
 }
 
@@ -292,7 +292,7 @@ TEST_F(ToolSmooth, VolumesWithoutASurfaceAreEmptyFiles) {
   for (const double value : {0.0, 255.0}) {
     write("flat.raw", volume_test::encode(std::vector<double>(1000, value), ScalarType::UInt8));
     const Json said = converted("flat.raw out.glb --raw-size 10x10x10");
-    EXPECT_EQ(said["warnings"], Json({"nothing to draw"}));
+    EXPECT_EQ(said["warnings"], Json({"the mesh is empty"}));
     EXPECT_EQ(said["triangles"], 0);
     EXPECT_FALSE(parse_glb(read_file(folder_.file("out.glb")).value()).document.contains("meshes"));
     const std::string text = run("convert flat.raw out.glb --raw-size 10x10x10").out;
@@ -405,23 +405,23 @@ TEST_F(ToolSmooth, VolumesBecomeMeshesVoxelsAndPictures) {
   write("ball.raw", volume_test::encode(ball({8, 8, 8}, DVec3(4.0), 3.0), ScalarType::Int8));
   const ToolRun voxels = run("convert ball.raw out.vox --raw-size 8x8x8 --raw-type int8");
   EXPECT_EQ(voxels.status, 0) << voxels.err;
-  EXPECT_NE(voxels.err.find("fields became voxels"), std::string::npos) << voxels.err;
+  EXPECT_NE(voxels.err.find("fields converted to voxels"), std::string::npos) << voxels.err;
   std::ofstream(folder_.file("a.nrrd"), std::ios::binary)
       << "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 2 3 1\nencoding: raw\n\nabcdef";
   const ToolRun greedy = run("convert a.nrrd out.glb --mesher greedy");
   EXPECT_EQ(greedy.status, 2);
-  EXPECT_NE(greedy.err.find("smooth meshes it"), std::string::npos) << greedy.err;
+  EXPECT_NE(greedy.err.find("use --mesher smooth"), std::string::npos) << greedy.err;
   EXPECT_FALSE(exists("out.glb"));
   const ToolRun picture = run("render a.nrrd -o out.png --size 32x32 --iso 98.5 --json");
   EXPECT_EQ(picture.status, 0) << picture.err;
   EXPECT_GT(Json::parse(picture.out)["pixels_hit"], 10);
   EXPECT_TRUE(exists("out.png"));
   // No value reaches this threshold; the tool warns of an empty image.
-  EXPECT_NE(run("render a.nrrd -o out.png --size 32x32 --iso 1000").err.find("a picture of the sky"),
+  EXPECT_NE(run("render a.nrrd -o out.png --size 32x32 --iso 1000").err.find("the image shows only sky"),
             std::string::npos);
   EXPECT_EQ(run("render a.nrrd -o out.png --iso much").status, 2);
   std::ofstream(folder_.file("tiny2.vox"), std::ios::binary) << vox_file({1, 1, 1}, std::string("\0\0\0\1", 4));
-  EXPECT_NE(run("render tiny2.vox -o out.png --iso 3").err.find("--iso is for volumes"), std::string::npos);
+  EXPECT_NE(run("render tiny2.vox -o out.png --iso 3").err.find("cannot use --iso"), std::string::npos);
   EXPECT_EQ(run("convert a.nrrd out.glb").status, 0);
 }
 

@@ -62,7 +62,7 @@ TEST_F(Tool, DataOfVoxelsIsCountedAndNamedWhereItIsLost) {
   const Json object = Json::parse(run("info data.json --json").out);
   EXPECT_EQ(object["voxels_with_data"], 1);
   EXPECT_EQ(object["grids"][0]["voxels_with_data"], 1);
-  EXPECT_NE(run("convert data.json out.glb").err.find("data of voxels left out, which meshes do not hold: 1"),
+  EXPECT_NE(run("convert data.json out.glb").err.find("voxel data left out (meshes cannot hold it): 1"),
             std::string::npos);
   EXPECT_NE(run("convert data.json out.vox").err.find("voxels whose data is left out"), std::string::npos);
   EXPECT_EQ(run("convert data.json again.json").err, "");
@@ -201,7 +201,7 @@ TEST_F(Tool, FramesBecomeAnAnimation) {
   EXPECT_NE(text_of(folder_.file("smooth.gltf")).find("\"animations\""), std::string::npos);
   const ToolRun still = run("convert tiny.vox still.glb --animate");
   EXPECT_EQ(still.status, 0);
-  EXPECT_NE(still.err.find("warning: nothing moves in it"), std::string::npos) << still.err;
+  EXPECT_NE(still.err.find("warning: --animate has no effect"), std::string::npos) << still.err;
   for (const std::string arguments : {"out.obj --animate", "out.vox --animate", "out.glb --fps 3",
                                       "out.glb --animate --fps 0", "out.glb --animate --frame 1"}) {
     const ToolRun refused = run("convert film.vox " + arguments);
@@ -219,7 +219,7 @@ TEST_F(Tool, InfoTellsOfHiddenLayersWithoutAName) {
   file.layer(0, {{"_hidden", "1"}}).layer(1, {{"_name", "people"}});
   ASSERT_TRUE(write_file(file.file(), folder_.file("hidden.vox")));
   const ToolRun text = run("info hidden.vox");
-  EXPECT_NE(text.out.find("Layers: 2: \"people\", 1 without a name hidden\n"), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find("Layers: 2: \"people\", 1 unnamed and hidden\n"), std::string::npos) << text.out;
 }
 
 // .vox to .vox keeps everything in an artist's file, including content other than voxels; other formats warn of losses.
@@ -242,7 +242,7 @@ TEST_F(Tool, FromVoxToVoxEverythingIsKept) {
   EXPECT_EQ(read_file(folder_.file("same.vox")).value(), bytes);
   const ToolRun still = run("convert crew.vox still.vox --frame 3");
   EXPECT_EQ(still.status, 0);
-  EXPECT_NE(still.err.find("left out, since --frame takes one: animation: frames 0 to 3"), std::string::npos);
+  EXPECT_NE(still.err.find("left out because of --frame: animation: frames 0 to 3"), std::string::npos);
   EXPECT_EQ(Json::parse(run("info still.vox --json").out)["voxels"], 2) << "models stay, placed or not";
   const ToolRun scene = run("convert crew.vox crew.json");
   EXPECT_NE(scene.err.find("left out, only .vox stores it: cameras: 1"), std::string::npos);
@@ -426,7 +426,7 @@ TEST_F(Tool, HiddenInstancesAreMissedOnlyWhereTheyAreLeftOut) {
   EXPECT_EQ(warnings("convert one.vox out.glb --hidden"), Json::array());
   EXPECT_EQ(warnings("convert one.vox out.glb"), Json({"1 hidden instance left out; --hidden includes it"}));
   EXPECT_EQ(warnings("convert two.vox out.obj"),
-            Json({"2 hidden instances left out; --hidden includes them", "nothing to draw"}));
+            Json({"2 hidden instances left out; --hidden includes them", "the mesh is empty"}));
   EXPECT_EQ(warnings("convert two.vox none.gltf"), warnings("convert two.vox out.obj"));
   EXPECT_FALSE(exists("none.bin"));
   EXPECT_EQ(run("convert one.vox out.glb").err, "quoin: warning: 1 hidden instance left out; --hidden includes it\n");
@@ -455,7 +455,7 @@ TEST_F(Tool, NeverReplacesInputs) {
                                       "tiny.vox other.vox --to vox", "tiny.vox --to vox --out-dir . --force"}) {
     const ToolRun result = run("convert " + arguments);
     EXPECT_EQ(result.status, 1) << arguments;
-    EXPECT_NE(result.err.find("an input is never replaced"), std::string::npos) << result.err;
+    EXPECT_NE(result.err.find(": it is an input file"), std::string::npos) << result.err;
     EXPECT_EQ(text_of(folder_.file("tiny.vox")), tiny_vox()) << arguments;
   }
 }
@@ -470,7 +470,7 @@ TEST_F(Tool, ReplacesModelsOnlyWithForce) {
     if (command.ends_with(".")) std::ofstream(folder_.file("tiny.glb"), std::ios::binary) << large;
     const ToolRun result = run(command);
     EXPECT_EQ(result.status, 1) << command;
-    EXPECT_NE(result.err.find("there already, a vox file; --force replaces it"), std::string::npos) << result.err;
+    EXPECT_NE(result.err.find(": the file exists; use --force to overwrite it"), std::string::npos) << result.err;
     EXPECT_EQ(text_of(folder_.file("other.vox")), large);
     EXPECT_EQ(text_of(folder_.file("misnamed.glb")), large);
   }
@@ -520,14 +520,14 @@ TEST_F(Tool, ManyFilesAreNotMixedUp) {
   std::ofstream(folder_.file("a/tiny.vox"), std::ios::binary) << tiny_vox();
   const ToolRun both = run("convert tiny.vox a/tiny.vox --to glb --out-dir out");
   EXPECT_EQ(both.status, 2);
-  EXPECT_EQ(both.err, "quoin: tiny.vox and a/tiny.vox would both become out/tiny.glb\n");
+  EXPECT_EQ(both.err, "quoin: tiny.vox and a/tiny.vox would both be written to out/tiny.glb\n");
   EXPECT_FALSE(exists("out"));
   // The names of the input folders make no difference.
   std::filesystem::create_symlink("a", folder_.file("b"));
   std::ofstream(folder_.file("a/tiny.json")) << "{}";
   const ToolRun apart = run("convert a/tiny.vox b/tiny.json --to glb");
   EXPECT_EQ(apart.status, 2);
-  EXPECT_EQ(apart.err, "quoin: a/tiny.vox and b/tiny.json would both become b/tiny.glb\n");
+  EXPECT_EQ(apart.err, "quoin: a/tiny.vox and b/tiny.json would both be written to b/tiny.glb\n");
   std::filesystem::remove(folder_.file("a/tiny.json"));
   // Output of an earlier run below a folder is not an input of the next run.
   for (int i = 0; i < 2; ++i) {
@@ -536,9 +536,9 @@ TEST_F(Tool, ManyFilesAreNotMixedUp) {
   }
   // A file named twice counts once.
   EXPECT_EQ(run("convert tiny.vox ./tiny.vox --to glb --out-dir out").status, 0);
-  EXPECT_EQ(run("convert a --to glb").err, "quoin: a: a folder; --recursive converts what is in it\n");
+  EXPECT_EQ(run("convert a --to glb").err, "quoin: a: is a folder; use --recursive to convert the files in it\n");
   std::filesystem::create_directories(folder_.file("empty"));
-  EXPECT_EQ(run("convert empty --to glb --recursive").err, "quoin: empty: no file in it can be read\n");
+  EXPECT_EQ(run("convert empty --to glb --recursive").err, "quoin: empty: the folder has no readable files\n");
 }
 
 TEST_F(Tool, InfoAndRenderReadStandardInput) {
@@ -565,7 +565,7 @@ TEST_F(Tool, DimensionsAreListedAndChosen) {
   EXPECT_EQ(all["dimension"], "minecraft:overworld");
   EXPECT_EQ(all["dimensions"], Json({"minecraft:overworld", "minecraft:the_nether"}));
   const ToolRun text = run("info '" + world + "' --dimension nether");
-  EXPECT_NE(text.out.find("Dimension: minecraft:the_nether (--dimension chooses another: minecraft:overworld)\n"),
+  EXPECT_NE(text.out.find("Dimension: minecraft:the_nether (select another with --dimension: minecraft:overworld)\n"),
             std::string::npos)
       << text.out;
   for (const char* command : {"convert 'W' nether.glb", "convert 'W' nether.quoin",
@@ -581,7 +581,7 @@ TEST_F(Tool, DimensionsAreListedAndChosen) {
   const ToolRun none = run("info tiny.vox --dimension nether");
   EXPECT_EQ(none.status, 1);
   EXPECT_EQ(Json::parse(run("info tiny.vox --json").out)["dimension"], Json());
-  EXPECT_NE(none.err.find("tiny.vox: cannot choose a dimension"), std::string::npos) << none.err;
+  EXPECT_NE(none.err.find("tiny.vox: cannot select a dimension"), std::string::npos) << none.err;
 }
 
 TEST_F(Tool, AFileOfTrianglesThatIsNotRecognisedIsNoMisuseOfVoxel) {
@@ -593,7 +593,7 @@ TEST_F(Tool, AFileOfTrianglesThatIsNotRecognisedIsNoMisuseOfVoxel) {
       << result.err;
   const ToolRun misuse = run("convert tiny.vox out.qb --voxel 1");
   EXPECT_EQ(misuse.status, 2);
-  EXPECT_NE(misuse.err.find("--voxel is for files of triangles, and the input is vox"), std::string::npos);
+  EXPECT_NE(misuse.err.find("cannot use --voxel: it needs a triangle mesh, and the input is vox"), std::string::npos);
 }
 
 TEST_F(Tool, ConvertReadsAndWritesStandardStreams) {
@@ -613,12 +613,12 @@ TEST_F(Tool, ConvertReadsAndWritesStandardStreams) {
   EXPECT_FALSE(node_in("streamed.glb").contains("name"));
   EXPECT_EQ(shell("'" QUOIN_TOOL "' convert - named.glb --from vox < tiny.vox").status, 0);
   for (const auto& [arguments, error] : std::vector<std::array<std::string, 2>>{
-           {"convert - x.glb --from nifti < tiny.vox", "quoin: standard input: is vox, not nifti\n"},
-           {"convert - x.glb < nothing.txt", "quoin: standard input: unknown file format"},
-           {"convert tiny.vox -", "quoin: OUT is standard output: --to says as what"},
-           {"convert tiny.vox - --to obj", "quoin: .obj is several files, and standard output is one\n"},
-           {"convert tiny.vox - --to glb --json", "quoin: --json prints on standard output, where OUT goes\n"},
-           {"convert - --to glb", "quoin: - is standard input: it is converted alone"},
+           {"convert - x.glb --from nifti < tiny.vox", "quoin: standard input: the format is vox, not nifti\n"},
+           {"convert - x.glb < nothing.txt", "quoin: standard input: not a file of any format that Quoin reads"},
+           {"convert tiny.vox -", "quoin: cannot write standard output without --to FORMAT"},
+           {"convert tiny.vox - --to obj", "quoin: cannot write .obj to standard output: it is several files\n"},
+           {"convert tiny.vox - --to glb --json", "quoin: cannot use --json: OUT is standard output\n"},
+           {"convert - --to glb", "quoin: standard input (-) must be the only input"},
            {"convert tiny.vox - --to glb > /dev/full", "quoin: standard output: No space left on device\n"}}) {
     const ToolRun result = shell("'" QUOIN_TOOL "' " + arguments);
     EXPECT_NE(result.status, 0) << arguments;
@@ -727,27 +727,28 @@ TEST_F(Tool, WrongUsageNamesTheArgument) {
       {"convert tiny.vox out.glb --simplify nan", "quoin: --simplify: must be 0 or more, not \"nan\""},
       {"convert tiny.vox out.glb --iso nan", "quoin: --iso: must be a number, not \"nan\""},
       {"convert tiny.vox out.glb --iso 1e39", "quoin: --iso: must be from -3.4e38"},
-      {"convert tiny.vox out.glb --iso 1", "quoin: --iso is for volumes, and the input holds voxels"},
-      {"convert tiny.vox out.glb --raw-size 1x2", "quoin: --raw-size: must be like 256x256x128, not \"1x2\""},
-      {"convert tiny.vox out.glb --raw-size 0x2x2", "quoin: --raw-size: must be like 256x256x128, not \"0x2x2\""},
+      {"convert tiny.vox out.glb --iso 1", "quoin: cannot use --iso: the input holds voxels"},
+      {"convert tiny.vox out.glb --raw-size 1x2", "quoin: --raw-size: must be XxYxZ, as in 256x256x128, not \"1x2\""},
+      {"convert tiny.vox out.glb --raw-size 0x2x2",
+       "quoin: --raw-size: must be XxYxZ, as in 256x256x128, not \"0x2x2\""},
       {"convert tiny.vox out.glb --raw-size 1x2x2 --raw-type half", "quoin: --raw-type: must be uint8, int8"},
-      {"convert tiny.vox out.glb --raw-size 1x1x1 --frame 2", "quoin: --hidden and --frame are for voxels"},
+      {"convert tiny.vox out.glb --raw-size 1x1x1 --frame 2", "quoin: cannot use --hidden or --frame: the input"},
       {"convert tiny.vox out.glb --raw-order big", "quoin: --raw-type and --raw-order need --raw-size"},
-      {"convert tiny.vox out.glb --raw-size 1x1x1 --mesher greedy", "quoin: --mesher greedy is for voxels"},
+      {"convert tiny.vox out.glb --raw-size 1x1x1 --mesher greedy", "quoin: cannot use --mesher greedy: the input"},
       {"convert tiny.vox", "quoin: OUT is required"},
-      {"convert tiny.vox a.vox b.vox", "quoin: 3 files; several are converted by --to FORMAT, --out-dir DIR"},
+      {"convert tiny.vox a.vox b.vox", "quoin: cannot convert 3 files: several inputs need --to FORMAT"},
       {"convert tiny.vox a.glb --out-dir x", "quoin: --out-dir needs --to"},
       {"convert tiny.vox --to xyz", "quoin: --to: unknown extension; use one of .3mf"},
       {"convert tiny.vox --to vox --no-ao", "quoin: --mesher, --no-ao"},
-      {"", "quoin: no command; there are info, convert"},
-      {"bogus", "quoin: no command \"bogus\"; there are info, convert"},
-      {"bogus tiny.vox", "quoin: no command \"bogus\"; there are info, convert"},
-      {"info -dash.vox", "quoin: no option \"-dash.vox\"; a file of that name is ./-dash.vox"},
-      {"convert -dash.vox out.glb", "quoin: no option \"-dash.vox\"; a file of that name is ./-dash.vox"},
-      {"info tiny.vox --unknown", "quoin: no option \"--unknown\""},
-      {"--unknown", "quoin: no option \"--unknown\""},
-      {"info ''", "quoin: IN: must be the name of a file, not \"\""},
-      {"convert tiny.vox ''", "quoin: OUT: must be the name of a file, not \"\""}};
+      {"", "quoin: missing command; use one of: info, convert"},
+      {"bogus", "quoin: unknown command \"bogus\"; use one of: info, convert"},
+      {"bogus tiny.vox", "quoin: unknown command \"bogus\"; use one of: info, convert"},
+      {"info -dash.vox", "quoin: unknown option \"-dash.vox\"; for a file with this name use ./-dash.vox"},
+      {"convert -dash.vox out.glb", "quoin: unknown option \"-dash.vox\"; for a file with this name use ./-dash.vox"},
+      {"info tiny.vox --unknown", "quoin: unknown option \"--unknown\""},
+      {"--unknown", "quoin: unknown option \"--unknown\""},
+      {"info ''", "quoin: IN: must be a file name, not \"\""},
+      {"convert tiny.vox ''", "quoin: OUT: must be a file name, not \"\""}};
   for (const auto& [arguments, error] : errors) {
     const ToolRun result = run(arguments);
     EXPECT_EQ(result.status, 2) << arguments;

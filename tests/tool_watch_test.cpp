@@ -37,7 +37,7 @@ TEST_F(ToolWatch, AChangedInputIsConvertedAgain) {
   EXPECT_EQ(bytes("seen.ply"), bytes("first.ply"));
   EXPECT_EQ(bytes("out.ply"), bytes("second.ply"));
   EXPECT_NE(result.out.find("status 130"), std::string::npos) << result.out;
-  EXPECT_NE(result.err.find("quoin: watching tiny.vox; Ctrl-C ends"), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find("quoin: watching tiny.vox; press Ctrl-C to stop"), std::string::npos) << result.err;
 }
 
 TEST_F(ToolWatch, ABrokenStateIsToldOfAndTheNextOneTaken) {

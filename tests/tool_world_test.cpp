@@ -100,7 +100,7 @@ TEST_F(ToolWorld, ShowsItselfByAThumbnail) {
   ASSERT_TRUE(WorldStore::create(folder_.file("bare.quoin")));
   const ToolRun none = run("world thumbnail bare.quoin none.png");
   EXPECT_EQ(none.status, 1);
-  EXPECT_NE(none.err.find("it has no thumbnail"), std::string::npos) << none.err;
+  EXPECT_NE(none.err.find("the world has no thumbnail"), std::string::npos) << none.err;
   EXPECT_FALSE(std::filesystem::exists(folder_.file("none.png")));
   EXPECT_EQ(run("world thumbnail hills.quoin hills.quoin").status, 1);
 }

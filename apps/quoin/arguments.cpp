@@ -45,13 +45,12 @@ CLI::Validator positive() {
 }
 
 CLI::Validator file_name() {
-  return {[](std::string& text) { return std::string(text.empty() ? "must be the name of a file, not \"\"" : ""); },
-          ""};
+  return {[](std::string& text) { return std::string(text.empty() ? "must be a file name, not \"\"" : ""); }, ""};
 }
 
 void add_quiet_option(CLI::App& command) {
   command.add_flag_callback(
-      "-q,--quiet", [] { be_quiet(); }, "Print only errors and the object of --json: no progress, no warnings");
+      "-q,--quiet", [] { be_quiet(); }, "Print only errors and --json output: no progress, no warnings");
 }
 
 void add_outside_files_option(CLI::App& command, LoadOptions& options) {
@@ -84,7 +83,7 @@ void add_height_options(CLI::App& command, std::optional<HeightOptions>& heights
       ->check(CLI::IsMember({"grey", "mapbox", "terrarium"}));
   number("--metres-per-level", "Height of one grey level in metres (default 1)",
          [](HeightOptions& options, double value) { options.metres_per_level = value; });
-  number("--metres-per-pixel", "Distance of neighbouring heights in metres (default 1; for .hgt from the file)",
+  number("--metres-per-pixel", "Distance between neighbouring heights in metres (default 1; .hgt: from the file)",
          [](HeightOptions& options, double value) { options.metres_per_pixel = value; });
   number("--metres-per-voxel", "Edge of a voxel in metres (default: --metres-per-pixel)",
          [](HeightOptions& options, double value) { options.metres_per_voxel = value; });
@@ -118,9 +117,9 @@ Status check_dimension(const std::filesystem::path& path, const LoadOptions& loa
   if (!format) return format.error();
   const bool is_heeded = *format == FileFormat::Minecraft || *format == FileFormat::Scene;
   if (is_heeded) return {};
-  const std::string found = *format ? std::string(format_info(**format).name) : "of no format that is known";
+  const std::string found = *format ? std::string(format_info(**format).name) : "unknown";
   return make_error(ErrorCode::InvalidArgument,
-                    "cannot choose a dimension: --dimension is for worlds of Minecraft, and this is " + found,
+                    "cannot select a dimension: --dimension needs a Minecraft world, and the file format is " + found,
                     path.string());
 }
 

@@ -86,7 +86,7 @@ std::string read_field_occlusion(const CLI::App& command, SmoothOcclusionOptions
     if (std::string fault = read_number(command, option, options); !fault.empty()) return fault;
   }
   if (options.method == SmoothOcclusion::None && command.count("--ao-spread") > 0) {
-    return "--ao-spread: the form none has no samples";
+    return "--ao-spread and --ao-form none cannot be used together";
   }
   const bool is_weighted =
       options.method == SmoothOcclusion::Weighted || options.method == SmoothOcclusion::WeightedPublished;

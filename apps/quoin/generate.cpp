@@ -62,7 +62,7 @@ std::string read_options(GenerateOptions& options) {
   if (!seed) return "--seed: must be a whole number from 0 to 18446744073709551615, not \"" + options.seed + "\"";
   const std::string got = ", not \"" + options.chunks + "\"";
   const auto parsed = parse_box_size(options.chunks);
-  if (!parsed) return "--chunks: must be like 4x2x4" + got;
+  if (!parsed) return "--chunks: must be XxYxZ, as in 4x2x4" + got;
   const IVec3 size = *parsed;
   const IVec3 most = options.is_smooth ? IVec3{512, 16, 512} : IVec3{1'024, 32, 1'024};
   if (glm::any(glm::lessThan(size, IVec3{1})) || glm::any(glm::greaterThan(size, most))) {
@@ -139,8 +139,8 @@ Result<Outcome> generate_endless(const GenerateOptions& options) {
   Stopwatch watch;
   std::error_code error;
   if (std::filesystem::exists(std::filesystem::symlink_status(options.output, error))) {
-    return make_error(ErrorCode::CannotWrite, "there already; a world without an end is made as a new file",
-                      options.output.string());
+    return make_error(ErrorCode::CannotWrite,
+                      "cannot write " + options.output.string() + ": the file exists; --endless needs a new file");
   }
   if (auto writable = check_outputs({options.output}); !writable) return writable.error();
   catch_interrupts();
@@ -203,7 +203,7 @@ Json outcome_json(const GenerateOptions& options, const Outcome& outcome) {
 
 std::string outcome_text(const GenerateOptions& options, const Outcome& outcome) {
   const IVec3 size = options.terrain.size * edge_of_unit(options);
-  return std::string(options.is_endless ? "Terrain without an end: seed " : "Terrain: seed ") +
+  return std::string(options.is_endless ? "Endless terrain: seed " : "Terrain: seed ") +
          std::to_string(options.terrain.seed) + ", " + std::to_string(size.x) + " x " + std::to_string(size.y) + " x " +
          std::to_string(size.z) + (options.is_smooth ? "\nSolid samples: " : "\nVoxels: ") +
          with_thousands(outcome.voxels) + " of " + std::to_string(outcome.types) + " types\n" +
@@ -216,13 +216,13 @@ int run_generate(GenerateOptions& options) {
   const auto format = format_for_writing(options.output);
   const bool is_wrong = !format || format->is_mesh || (options.is_smooth && format->format == FileFormat::Vox);
   if (is_wrong) {
-    print_error(options.output.string() + ": a " + (options.is_smooth ? "smooth terrain" : "terrain") +
+    print_error("cannot write " + options.output.string() + ": " + (options.is_smooth ? "smooth terrain" : "terrain") +
                 " is written as .quoin" + (options.is_smooth ? " or " : ", .vox or ") +
-                ".json; `quoin convert` turns that into other formats");
+                ".json; use `quoin convert` for other formats");
     return kWrongUsage;
   }
   if (options.is_endless && format->format != FileFormat::World) {
-    print_error(options.output.string() + ": only a .quoin can be without an end (--endless)");
+    print_error("cannot write " + options.output.string() + ": --endless needs a .quoin file");
     return kWrongUsage;
   }
   if (const std::string fault = read_options(options); !fault.empty()) {
@@ -247,8 +247,8 @@ std::shared_ptr<GenerateOptions> add_world(CLI::App& command, const char* files,
   command.add_option("--seed", options->seed, "Seed, a whole number (default 42)");
   command.add_option("--chunks", options->chunks, chunks)->type_name("XxYxZ");
   command.add_flag("--endless", options->is_endless,
-                   "Write a .quoin without bounds, which programs with StreamedWorld extend; generates a square of the "
-                   "width of --chunks around the origin now");
+                   "Write an unbounded .quoin, which programs extend with StreamedWorld; now generates a square of the "
+                   "width of --chunks around the origin");
   command.add_flag("--force", options->force, kForceHelp);
   set_heading(command, heading::kGeneral);
   command.add_flag("--json", options->json, "Print one JSON object instead of text");

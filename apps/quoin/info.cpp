@@ -208,7 +208,8 @@ std::string count_of(std::int64_t count, const std::string& singular) {
 std::string instance_text(const Scene& scene, const Instance& instance) {
   std::string line = "    at " + three(instance.position, ", ");
   const DQuat& q = instance.rotation;
-  if (q != DQuat(1, 0, 0, 0)) line += "  turned (" + three({q.x, q.y, q.z}, ", ") + "; " + number_for_people(q.w) + ")";
+  if (q != DQuat(1, 0, 0, 0))
+    line += "  rotated (" + three({q.x, q.y, q.z}, ", ") + "; " + number_for_people(q.w) + ")";
   if (instance.voxel_size != 1.0) line += "  scale " + number_for_people(instance.voxel_size);
   if (instance.mirrored) line += "  mirrored";
   if (!is_shown(scene, instance)) line += "  hidden";
@@ -242,7 +243,7 @@ std::string names_text(const char* what, const SlotMap<T>& all) {
       ++hidden;
     }
   }
-  if (hidden > 0) names += (names.empty() ? ": " : ", ") + std::to_string(hidden) + " without a name hidden";
+  if (hidden > 0) names += (names.empty() ? ": " : ", ") + std::to_string(hidden) + " unnamed and hidden";
   return std::string(what) + ": " + std::to_string(all.size()) + names + "\n";
 }
 
@@ -260,7 +261,7 @@ std::string dimension_text(const LoadedScene& loaded) {
     if (name != loaded.dimension) others += (others.empty() ? "" : ", ") + on_one_line(name);
   }
   return "Dimension: " + on_one_line(loaded.dimension) +
-         (others.empty() ? "" : " (--dimension chooses another: " + others + ")") + "\n";
+         (others.empty() ? "" : " (select another with --dimension: " + others + ")") + "\n";
 }
 
 std::string info_text(const CommonOptions& options, const std::string& name, const LoadedScene& loaded,

@@ -49,16 +49,17 @@ const CLI::App& innermost(CLI::App& command) {
 std::string usage_error(CLI::App& app, const CLI::ParseError& error, const Arguments& arguments) {
   const std::string hint = " (try --help)";
   const auto chosen = app.get_subcommands();
-  if (chosen.empty() && arguments.empty()) return "no command; there are " + command_names(app) + hint;
+  if (chosen.empty() && arguments.empty()) return "missing command; use one of: " + command_names(app) + hint;
   if (chosen.empty() && !arguments[0].starts_with('-')) {
-    return "no command \"" + arguments[0] + "\"; there are " + command_names(app) + hint;
+    return "unknown command \"" + arguments[0] + "\"; use one of: " + command_names(app) + hint;
   }
   const auto code = static_cast<CLI::ExitCodes>(error.get_exit_code());
   if (code == CLI::ExitCodes::ExtrasError || code == CLI::ExitCodes::RequiredError) {
     const std::string unknown = unknown_option(chosen.empty() ? app : innermost(*chosen[0]), arguments);
     if (unknown.starts_with("--") || (chosen.empty() && !unknown.empty()))
-      return "no option \"" + unknown + "\"" + hint;
-    if (!unknown.empty()) return "no option \"" + unknown + "\"; a file of that name is ./" + unknown + hint;
+      return "unknown option \"" + unknown + "\"" + hint;
+    if (!unknown.empty())
+      return "unknown option \"" + unknown + "\"; for a file with this name use ./" + unknown + hint;
   }
   if (!chosen.empty()) {
     const CLI::App& command = innermost(*chosen[0]);

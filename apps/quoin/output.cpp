@@ -84,7 +84,7 @@ int print(std::string_view text) {
   if (written && std::fflush(stdout) == 0) return kDone;
   // Whoever reads may have seen enough.
   if (errno == EPIPE) return kFailed;
-  print_error("standard output cannot be written");
+  print_error("cannot write standard output");
   return kFailed;
 }
 

@@ -49,18 +49,21 @@ Status make_folder_of(const std::filesystem::path& file) {
 
 Status check_replaced(const std::filesystem::path& output, const FileSet& inputs, bool force) {
   if (inputs.contains(output)) {
-    return make_error(ErrorCode::InvalidArgument, "an input is never replaced; write to another name", output.string());
+    return make_error(ErrorCode::InvalidArgument,
+                      "cannot write " + output.string() + ": it is an input file; choose another name");
   }
   std::error_code unknown;
   if (force || !std::filesystem::is_regular_file(output, unknown)) return {};
   const auto format = detect_format(output);
   // What cannot be read may be a model, too.
-  if (!format) return make_error(ErrorCode::CannotWrite, "there already, and cannot be read", output.string());
+  if (!format) {
+    return make_error(ErrorCode::CannotWrite, "cannot write " + output.string() +
+                                                  ": the file exists and cannot be read; use --force to overwrite it");
+  }
   // Meshes are products, made anew, also where they can be read.
   if (!*format || format_info(**format).is_mesh) return {};
   return make_error(ErrorCode::InvalidArgument,
-                    "there already, a " + std::string(format_info(**format).name) + " file; --force replaces it",
-                    output.string());
+                    "cannot write " + output.string() + ": the file exists; use --force to overwrite it");
 }
 
 }  // namespace quoin::tool

@@ -27,17 +27,17 @@ std::string content_text(const SceneContent& content) {
 
 void warn_of_lamps(const Scene& scene, std::vector<std::string>& warnings) {
   if (scene.lamps.empty()) return;
-  warnings.push_back("lamps left out, which meshes do not hold: " + std::to_string(scene.lamps.size()));
+  warnings.push_back("lamps left out (meshes cannot hold them): " + std::to_string(scene.lamps.size()));
 }
 
 void warn_of_values(std::size_t values, std::vector<std::string>& warnings) {
   if (values == 0) return;
-  warnings.push_back("a game keeps " + std::to_string(values) + (values == 1 ? " value" : " values") +
-                     " in it, which no other file holds (quoin world backup copies all)");
+  warnings.push_back("left out " + std::to_string(values) + (values == 1 ? " value" : " values") +
+                     " that a game stores in the world (quoin world backup copies them)");
 }
 
 void warn_of_data(std::int64_t voxels, std::vector<std::string>& warnings) {
-  if (voxels != 0) warnings.push_back("data of voxels left out, which meshes do not hold: " + std::to_string(voxels));
+  if (voxels != 0) warnings.push_back("voxel data left out (meshes cannot hold it): " + std::to_string(voxels));
 }
 
 void warn_of_left_out(const Scene& scene, InstanceFilter filter, std::vector<std::string>& warnings) {

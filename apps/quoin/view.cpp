@@ -43,7 +43,7 @@ Status check_input(const std::filesystem::path& path, bool is_raw) {
   const auto format = detect_format(path);
   if (!format) return format.error();
   if (!*format && !is_raw) {
-    return make_error(ErrorCode::Unsupported, "of no format that is known; there are " + readable_extensions(),
+    return make_error(ErrorCode::Unsupported, "unknown format; supported formats are " + readable_extensions(),
                       path.string());
   }
   return {};
@@ -91,8 +91,8 @@ int run_view(const ViewArguments& arguments) {
 #else
 
 int run_view(const ViewArguments&) {
-  print_error("view: this build has no viewer; it needs the packages " QUOIN_VIEWER_MISSING
-              " (`quoin render` draws pictures without them)");
+  print_error("cannot open a window: this build has no viewer; it needs the packages " QUOIN_VIEWER_MISSING
+              " (`quoin render` works without them)");
   return kFailed;
 }
 
@@ -108,7 +108,7 @@ std::string settle(const CLI::App& command, ViewArguments& arguments) {
     const bool fits = size && size->width >= kSmallest.width && size->height >= kSmallest.height &&
                       size->width <= kLongestSide && size->height <= kLongestSide;
     if (!fits) {
-      return "--size: must be WIDTHxHEIGHT of at least 320x240 and at most 16384 a side, as in 1280x720, not \"" +
+      return "--size: must be WIDTHxHEIGHT of at least 320x240 and at most 16384 per side, as in 1280x720, not \"" +
              text + "\"";
     }
     arguments.size = *size;
@@ -119,7 +119,7 @@ std::string settle(const CLI::App& command, ViewArguments& arguments) {
   if (volume.iso) arguments.load.iso = static_cast<float>(*volume.iso);
   if (volume.raw && arguments.input.empty()) return "--raw-size needs a file to show";
   if (!arguments.screenshot.empty() && arguments.screenshot.extension() != ".png") {
-    return "--screenshot: the picture's name must end in .png, not \"" + arguments.screenshot.string() + "\"";
+    return "--screenshot: the image name must end in .png, not \"" + arguments.screenshot.string() + "\"";
   }
   if (!arguments.screenshot.empty() && arguments.input.empty()) return "--screenshot needs a file to show";
   return "";

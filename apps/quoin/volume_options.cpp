@@ -23,7 +23,7 @@ std::string read_iso(const std::string& text, std::optional<double>& iso) {
   iso = parse_number(text);
   if (!iso) return "--iso: must be a number, not \"" + text + "\"";
   if (std::isfinite(static_cast<float>(*iso))) return "";
-  return "--iso: must be from -3.4e38 to 3.4e38, as the values are that are read, not \"" + text + "\"";
+  return "--iso: must be from -3.4e38 to 3.4e38, the range of 32-bit floats, not \"" + text + "\"";
 }
 
 }  // namespace
@@ -32,7 +32,7 @@ void add_raw_options(CLI::App& command, VolumeTexts& texts) {
   set_heading(command, heading::kVolumes);
   command
       .add_option("--raw-size", texts.raw_size,
-                  "Read IN as raw values without a header, x fastest: their number along each axis")
+                  "Read IN as raw values without a header: number of values along each axis, x fastest")
       ->type_name("XxYxZ");
   command.add_option("--raw-type", texts.raw_type,
                      "Type of raw values: uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32 or float64 "
@@ -61,7 +61,7 @@ std::string read_volume_options(const CLI::App& command, const VolumeTexts& text
   }
   const auto size = parse_box_size(texts.raw_size);
   if (!size || size->x < 1 || size->y < 1 || size->z < 1) {
-    return "--raw-size: must be like 256x256x128, not \"" + texts.raw_size + "\"";
+    return "--raw-size: must be XxYxZ, as in 256x256x128, not \"" + texts.raw_size + "\"";
   }
   const auto type = scalar_type(texts.raw_type);
   if (!type) {

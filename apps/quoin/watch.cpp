@@ -47,7 +47,7 @@ void wait_for_change(const WatchedWork& work, const Stamps& known) {
 void tell_of_watching(const WatchedWork& work) {
   if (is_quiet()) return;
   const std::string more = work.read.size() > 1 ? " and " + std::to_string(work.read.size() - 1) + " more" : "";
-  std::fprintf(stderr, "quoin: watching %s%s; Ctrl-C ends\n", on_one_line(work.read.front().string()).c_str(),
+  std::fprintf(stderr, "quoin: watching %s%s; press Ctrl-C to stop\n", on_one_line(work.read.front().string()).c_str(),
                more.c_str());
 }
 

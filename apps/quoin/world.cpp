@@ -84,7 +84,7 @@ Json damage_of(const WorldCheck& check) {
 }
 
 std::string counts_of(const WorldCheck& check) {
-  return with_thousands(check.chunks) + " chunks and " + with_thousands(check.parts) + " other parts are sound";
+  return with_thousands(check.chunks) + " chunks and " + with_thousands(check.parts) + " other parts are intact";
 }
 
 int run_check(const WorldOptions& options) {
@@ -97,10 +97,10 @@ int run_check(const WorldOptions& options) {
     return printed == kDone ? status : printed;
   }
   for (const WorldDamage& each : check->damage) print_error(options.world.string() + ": " + each.what);
-  const int printed = print_summary(
-      options.world.filename().string() + ": " + counts_of(*check) +
-      (check->damage.empty() ? "\n"
-                             : ", " + with_thousands(check->damage.size()) + " things are not (quoin world repair)\n"));
+  const int printed = print_summary(options.world.filename().string() + ": " + counts_of(*check) +
+                                    (check->damage.empty() ? "\n"
+                                                           : ", " + with_thousands(check->damage.size()) +
+                                                                 " are damaged (run quoin world repair)\n"));
   return printed == kDone ? status : printed;
 }
 
@@ -147,7 +147,7 @@ int run_thumbnail(const WorldOptions& options) {
   if (!png) return fail(png.error());
   if (!*png) {
     return fail(make_error(ErrorCode::InvalidArgument,
-                           "it has no thumbnail; `quoin thumbnail` draws a picture of any world",
+                           "the world has no thumbnail; `quoin thumbnail` renders an image of any world",
                            options.world.string()));
   }
   if (auto written = write_file(**png, options.output); !written) {
@@ -180,8 +180,8 @@ void add_world_command(CLI::App& app, int& status) {
   CLI::App* added = nullptr;
   add(*command, added, "info", "Print the contents of a world", run_info, status);
   added->footer("Example: quoin world info home.quoin");
-  add(*command, added, "check",
-      "Read all of a world. Prints a line for each damaged part and exits with 1 if there is one", run_check, status);
+  add(*command, added, "check", "Read all of a world; print a line per damaged part and exit with 1 if there is one",
+      run_check, status);
   added->footer("Example: quoin world check home.quoin");
   const auto repaired = add(*command, added, "repair", "Keep the intact parts of a damaged world", run_repair, status);
   added
@@ -195,9 +195,9 @@ void add_world_command(CLI::App& app, int& status) {
   added->footer("Example: quoin world backup home.quoin monday.quoin");
   const auto shown = add(*command, added, "thumbnail", "Write the preview image of a world", run_thumbnail, status);
   added->add_option("OUT", shown->output, "Image to write: .png")->required()->check(file_name());
-  added->add_flag("--force", shown->force, kForceHelp);
+  added->add_flag("--force", shown->force, "Overwrite OUT even if it holds a model or a world, not an image");
   added->footer("Example: quoin world thumbnail home.quoin home.png");
-  add(*command, added, "compact", "Shrink a world file by the space that edits left unused", run_compact, status);
+  add(*command, added, "compact", "Remove unused space from a world file", run_compact, status);
   added->footer("Example: quoin world compact home.quoin");
 }
 

@@ -97,7 +97,7 @@ void keep_what_is_asked_for(const ConvertOptions& options, const FormatInfo& for
     return;
   }
   for (const std::string& line : only_in_source(*loaded.source)) {
-    warnings.push_back("left out, since --frame takes one: " + line);
+    warnings.push_back("left out because of --frame: " + line);
   }
   loaded.source = nullptr;
 }
@@ -106,8 +106,10 @@ void keep_what_is_asked_for(const ConvertOptions& options, const FormatInfo& for
 Status read_frames(const LoadedScene& first, const ConvertOptions& options, SceneAnimation& animation) {
   constexpr std::int64_t kMaxFrames = 100'000;
   if (first.last_frame >= kMaxFrames) {
-    return make_error(ErrorCode::LimitExceeded, std::to_string(first.last_frame + 1) + " frames are too many",
-                      options.common.input.string());
+    return make_error(
+        ErrorCode::LimitExceeded,
+        std::to_string(first.last_frame + 1) + " frames exceed the limit of " + std::to_string(kMaxFrames),
+        options.common.input.string());
   }
   const InstanceFilter filter = options.common.instances();
   if (auto added = animation.add(first.scene, filter); !added) return added;
@@ -127,9 +129,10 @@ Status read_frames(const LoadedScene& first, const ConvertOptions& options, Scen
 /// What its animation shows of a file, with warnings of what that is not.
 Status animate(const LoadedScene& loaded, const ConvertOptions& options, SceneAnimation& animation, Outcome& outcome) {
   if (loaded.last_frame == 0) {
-    outcome.warnings.emplace_back(loaded.named_files.empty()
-                                      ? "nothing moves in it: a single frame"
-                                      : "only a .vox file itself is animated, not what a scene names");
+    outcome.warnings.emplace_back(
+        loaded.named_files.empty()
+            ? "--animate has no effect: the file has one frame"
+            : "--animate has no effect: only a .vox input is animated, not the .vox files of a scene");
   }
   // The animation has no instance that is never shown.
   warn_of_left_out(loaded.scene, options.common.instances(), outcome.warnings);
@@ -294,7 +297,7 @@ Result<Outcome> convert_by_chunks(const ConvertOptions& options) {
   if (!imported->guessed.empty()) {
     std::string names;
     for (const std::string& name : imported->guessed) names += (names.empty() ? "" : ", ") + name;
-    outcome.warnings.push_back("blocks that Quoin does not know, whose looks are guesses by their names: " + names);
+    outcome.warnings.push_back("unknown blocks, shown with a look guessed from their names: " + names);
   }
   outcome.seconds.write = watch.lap();
   if (Status counted = count_faces_of_output(options, outcome); !counted) return counted.error();
@@ -318,11 +321,11 @@ std::string outcome_text(const Outcome& outcome) {
     text += "Faces: " + with_thousands(outcome.meshes.triangles) + " triangles\n";
   if (outcome.iso) {
     text += "Iso: " + digits_for_people(*outcome.iso) +
-            (outcome.is_iso_found ? " (between the two groups of values; --iso sets another)\n" : "\n");
+            (outcome.is_iso_found ? " (between the two groups of values; set another with --iso)\n" : "\n");
   }
   if (!outcome.mesher.empty()) text += mesh_text(outcome);
   if (outcome.meshes.simplify_error > 0)
-    text += "Simplified: off by " + digits_for_people(outcome.meshes.simplify_error) + " voxels\n";
+    text += "Simplified: error up to " + digits_for_people(outcome.meshes.simplify_error) + " voxels\n";
   const double seconds = outcome.seconds.read + outcome.seconds.mesh + outcome.seconds.write;
   text += "Wrote ";
   for (const auto& file : outcome.files) text += file.string() + ", ";
@@ -332,19 +335,23 @@ std::string outcome_text(const Outcome& outcome) {
 /// What contradicts an atlas; empty when nothing does.
 std::string fault_of_atlas(const ConvertOptions& options) {
   if (options.texture != "atlas") return "";
-  const std::string what = "--texture atlas holds the occlusion of merged faces: ";
-  if (options.mesher == "smooth" || options.mesher == "culled") return what + "not with --mesher " + options.mesher;
-  if (options.occlusion_off) return what + "not with --no-ao";
-  if (options.occlusion_apart) return what + "not with --ao-attribute";
-  return options.watertight ? what + "not with --watertight" : "";
+  const std::string reason = ": the atlas holds the occlusion of merged faces";
+  const std::string refused = "cannot use --texture atlas with ";
+  if (options.mesher == "smooth" || options.mesher == "culled") {
+    return refused + "--mesher " + options.mesher + reason;
+  }
+  if (options.occlusion_off) return refused + "--no-ao" + reason;
+  if (options.occlusion_apart) return refused + "--ao-attribute" + reason;
+  return options.watertight ? refused + "--watertight" + reason : "";
 }
 
 /// What contradicts light at vertices; empty when nothing does.
 std::string fault_of_light(const ConvertOptions& options) {
   if (!options.light) return "";
-  const std::string what = "--light propagated is at the corners of faces: ";
-  if (options.texture == "atlas") return what + "not with --texture atlas";
-  return options.watertight && options.mesher != "smooth" ? what + "not with --watertight" : "";
+  const std::string reason = ": light is stored at the corners of faces";
+  const std::string refused = "cannot use --light propagated with ";
+  if (options.texture == "atlas") return refused + "--texture atlas" + reason;
+  return options.watertight && options.mesher != "smooth" ? refused + "--watertight" + reason : "";
 }
 
 /// Returns true if any content of the input is meshed as blocks: known before it is read, which may take long.
@@ -360,25 +367,25 @@ bool is_surely_blocks(const ConvertOptions& options, bool is_volume) {
 /// What contradicts the kind of input; empty when nothing does.
 std::string fault_of_usage(const ConvertOptions& options, bool is_volume) {
   if (options.simplify && !can_simplify()) {
-    return "--simplify: this build was made without meshoptimizer (libmeshoptimizer-dev in Debian)";
+    return "cannot use --simplify: this build has no meshoptimizer (libmeshoptimizer-dev in Debian)";
   }
   if (options.mesh_only && is_surely_blocks(options, is_volume)) {
     if (std::string fault = fault_of_blocks(options); !fault.empty()) return fault;
   }
   if (is_volume && !options.mesher.empty() && options.mesher != "smooth") {
-    return "--mesher " + options.mesher + " is for voxels, and the input is a volume of values; smooth meshes it";
+    return "cannot use --mesher " + options.mesher + ": the input is a volume; use --mesher smooth";
   }
-  if (is_volume && options.light) return "--light is for voxels and fields, and the input is a volume of values";
-  if (is_volume && options.texture == "atlas")
-    return "--texture atlas is for voxels, and the input is a volume of values";
-  if (is_volume && options.animate) return "--animate is for .vox files, and the input is a volume of values";
+  if (is_volume && options.light) return "cannot use --light: the input is a volume, not voxels or a field";
+  if (is_volume && options.texture == "atlas") return "cannot use --texture atlas: the input is a volume, not voxels";
+  if (is_volume && options.animate) return "cannot use --animate: the input is a volume, not a .vox file";
   if (is_volume && (options.smoothness || options.colours || options.apart)) {
-    return "--smoothness, --colours and --no-unite are for voxels, and the input is a volume of values";
+    return "cannot use --smoothness, --colours or --no-unite: the input is a volume, not voxels";
   }
   const LoadOptions& load = options.common.load;
   if (is_volume)
-    return load.show_hidden || load.frame != 0 ? "--hidden and --frame are for voxels, not for volumes" : "";
-  return options.iso && !heeds_iso(options.common) ? "--iso is for volumes, and the input holds voxels" : "";
+    return load.show_hidden || load.frame != 0 ? "cannot use --hidden or --frame: the input is a volume, not voxels"
+                                               : "";
+  return options.iso && !heeds_iso(options.common) ? "cannot use --iso: the input holds voxels, not a volume" : "";
 }
 
 /// What contradicts an input that holds no triangles; empty when nothing does.
@@ -389,9 +396,12 @@ std::string fault_of_mesh_input(const ConvertOptions& options, const FormatInfo&
   if (!format || !*format || format_info(**format).is_mesh) return "";
   const bool may_have_field = heeds_iso(options.common) || *format == FileFormat::Scene || *format == FileFormat::World;
   if (options.mesh_input == "--solid" && may_have_field) {
-    return to.is_mesh ? "--solid makes voxels of fields, and " + std::string(to.extension) + " holds a mesh" : "";
+    return to.is_mesh
+               ? "cannot use --solid: it converts fields to voxels, and " + std::string(to.extension) + " holds a mesh"
+               : "";
   }
-  return options.mesh_input + " is for files of triangles, and the input is " + std::string(format_info(**format).name);
+  return "cannot use " + options.mesh_input + ": it needs a triangle mesh, and the input is " +
+         std::string(format_info(**format).name);
 }
 
 Result<Outcome> convert(const ConvertOptions& options, const FormatInfo& format, bool is_volume, std::string& fault) {
@@ -403,11 +413,12 @@ Result<Outcome> convert(const ConvertOptions& options, const FormatInfo& format,
 Result<std::string> open_streams(ConvertOptions& options, const ManyOptions& many, StandardStreams& streams) {
   if (options.output == kStandardStream) {
     const auto format = format_for_writing("file." + many.to);
-    if (many.to.empty() || !format) return "OUT is standard output: --to says as what, " + writable_extensions();
+    if (many.to.empty() || !format)
+      return "cannot write standard output without --to FORMAT: one of " + writable_extensions();
     if (format->format == FileFormat::Gltf || format->format == FileFormat::Obj) {
-      return std::string(format->extension) + " is several files, and standard output is one";
+      return "cannot write " + std::string(format->extension) + " to standard output: it is several files";
     }
-    if (options.common.json) return std::string("--json prints on standard output, where OUT goes");
+    if (options.common.json) return std::string("cannot use --json: OUT is standard output");
     auto file = streams.output(std::string(format->extension));
     if (!file) return file.error();
     options.output = *file;
@@ -421,9 +432,10 @@ Status check_input(const ConvertOptions& options) {
   if (options.from.empty()) return {};
   const auto found = detect_format(options.common.input);
   if (!found) return found.error();
-  const std::string name = *found ? std::string(format_info(**found).name) : "of no format that is read";
+  const std::string name = *found ? std::string(format_info(**found).name) : "unknown";
   if (name == options.from) return {};
-  return make_error(ErrorCode::BadFormat, "is " + name + ", not " + options.from, options.common.input.string());
+  return make_error(ErrorCode::BadFormat, "the format is " + name + ", not " + options.from,
+                    options.common.input.string());
 }
 
 WatchedWork run_one(ConvertOptions& options, const ManyOptions& many) {
@@ -470,13 +482,13 @@ WatchedWork run_one(ConvertOptions& options, const ManyOptions& many) {
 /// What keeps the command from going on by itself; empty when nothing does.
 std::string fault_of_watching(const ConvertOptions& options, const ManyOptions& many) {
   if (!options.watch) return "";
-  if (options.common.json) return "--watch: --json prints one object, and ends";
+  if (options.common.json) return "--watch and --json cannot be used together";
   if (options.common.input == kStandardStream || options.output == kStandardStream) {
-    return "--watch is for files, not for standard input and output";
+    return "cannot use --watch with standard input or output";
   }
   const auto format = format_for_writing(many.inputs.empty() ? options.output : std::filesystem::path("f." + many.to));
   const bool is_kept = format && !format->is_mesh && !options.force;
-  return is_kept ? "--watch replaces OUT again and again, which holds a model: that needs --force" : "";
+  return is_kept ? "--watch needs --force: it overwrites OUT, a model, after each change" : "";
 }
 
 int run(ConvertOptions& options, const ManyOptions& many) {
@@ -495,7 +507,7 @@ void add_meshing_options(CLI::App& command, ConvertOptions& options) {
           "Mesher: greedy or culled for blocks, smooth for rounded surfaces (default greedy; volumes and fields "
           "always smooth)")
       ->check(CLI::IsMember({"culled", "greedy", "smooth"}));
-  command.add_option("--scale", options.scale, "Mesh units per voxel (default 1; 0.1 makes ten voxels a metre)")
+  command.add_option("--scale", options.scale, "Mesh units per voxel (default 1; 0.1: ten voxels per metre)")
       ->check(positive());
   command.add_option("--up", options.up, "Up axis of the mesh: y or z (default y; z for .ply, .stl and .3mf)")
       ->check(CLI::IsMember({"y", "z"}));
@@ -553,12 +565,12 @@ void add_mesh_file_options(CLI::App& command, ConvertOptions& options) {
 std::string read_occlusion(const CLI::App& command, ConvertOptions& options) {
   if (options.occlusion_off) {
     const char* const given = options.occlusion_apart ? "--ao-attribute" : given_field_occlusion(command);
-    if (given != nullptr) return std::string(given) + ": --no-ao leaves occlusion out";
+    if (given != nullptr) return std::string(given) + " and --no-ao cannot be used together";
   }
   std::string fault = read_field_occlusion(command, options.field_occlusion);
   const bool has_none = options.has_field_occlusion && options.field_occlusion.method == SmoothOcclusion::None;
   if (fault.empty() && has_none && options.occlusion_apart)
-    fault = "--ao-attribute: --ao-form none leaves occlusion out";
+    fault = "--ao-attribute and --ao-form none cannot be used together";
   return fault;
 }
 
@@ -578,15 +590,15 @@ std::string read_files(const std::vector<std::filesystem::path>& rest, ConvertOp
     many.inputs = {options.common.input};
     many.inputs.insert(many.inputs.end(), rest.begin(), rest.end());
     const bool has_stream = std::find(many.inputs.begin(), many.inputs.end(), kStandardStream) != many.inputs.end();
-    return has_stream ? "- is standard input: it is converted alone, with a name for OUT" : "";
+    return has_stream ? "standard input (-) must be the only input and needs OUT" : "";
   }
-  if (many.folder) return is_to_stream ? "--out-dir: OUT is standard output" : "--out-dir needs --to: the format";
+  if (many.folder) return is_to_stream ? "cannot use --out-dir: OUT is standard output" : "--out-dir needs --to FORMAT";
   if (many.recursive) {
-    return is_to_stream ? "--recursive: OUT is standard output" : "--recursive needs --to: the format";
+    return is_to_stream ? "cannot use --recursive: OUT is standard output" : "--recursive needs --to FORMAT";
   }
   if (rest.empty()) return "OUT is required";
   if (rest.size() > 1) {
-    return std::to_string(rest.size() + 1) + " files; several are converted by --to FORMAT, --out-dir DIR";
+    return "cannot convert " + std::to_string(rest.size() + 1) + " files: several inputs need --to FORMAT";
   }
   options.output = rest.front();
   return "";
@@ -634,34 +646,36 @@ Json outcome_json(const Outcome& outcome) {
 std::string fault_of_format(const ConvertOptions& options, const FormatInfo& format) {
   if (!format.is_mesh && options.mesh_only) {
     return "--mesher, --no-ao, --ao-..., --watertight, --smoothness, --colours, --no-unite, --simplify, "
-           "--scale, --up, --texture, --light, --lights, --animate, --compress and --quantize are for mesh formats; " +
-           (options.output.empty() ? std::string(format.extension) : options.output.string()) + " is none";
+           "--scale, --up, --texture, --light, --lights, --animate, --compress and --quantize need a mesh format; " +
+           (options.output.empty() ? std::string(format.extension) : options.output.string()) + " is not one";
   }
   if (options.occlusion_apart && format.format == FileFormat::Obj) {
-    return "--ao-attribute: .obj has no place for it; .glb, .gltf and .ply have";
+    return "cannot write --ao-attribute to .obj; use .glb, .gltf or .ply";
   }
   if (options.texture == "atlas" && format.format == FileFormat::Ply) {
-    return "--texture atlas: .ply has no textures; .glb, .gltf and .obj have";
+    return "cannot write --texture atlas to .ply: it has no textures; use .glb, .gltf or .obj";
   }
   if (options.voxel_mm && !is_for_printing(format.format))
-    return "--voxel-mm is for .stl and .3mf; --scale is for others";
-  if (options.voxel_mm && options.scale) return "--voxel-mm and --scale exclude each other";
+    return "--voxel-mm needs .stl or .3mf; use --scale for other formats";
+  if (options.voxel_mm && options.scale) return "--voxel-mm and --scale cannot be used together";
   if (is_for_printing(format.format) && (options.texture == "atlas" || options.occlusion_apart)) {
-    return std::string(options.occlusion_apart ? "--ao-attribute" : "--texture atlas") + ": " +
-           std::string(format.extension) + " has no place for it; .glb, .gltf and .obj have";
+    return std::string("cannot write ") + (options.occlusion_apart ? "--ao-attribute" : "--texture atlas") + " to " +
+           std::string(format.extension) + "; use .glb or .gltf";
   }
   const bool is_gltf = format.format == FileFormat::Glb || format.format == FileFormat::Gltf;
   if (options.lights && !is_gltf) {
-    return "--lights: " + std::string(format.extension) + " has no lamps and cameras; .glb and .gltf have";
+    return "cannot write --lights to " + std::string(format.extension) +
+           ": it has no lamps and cameras; use .glb or .gltf";
   }
   if (options.light && !is_gltf) {
-    return "--light: " + std::string(format.extension) + " has no materials without light; .glb and .gltf have";
+    return "cannot write --light to " + std::string(format.extension) +
+           ": it has no unlit materials; use .glb or .gltf";
   }
   if (options.animate && !is_gltf) {
-    return "--animate: " + std::string(format.extension) + " has no animation; .glb and .gltf have";
+    return "cannot write --animate to " + std::string(format.extension) + ": it has no animation; use .glb or .gltf";
   }
   if ((options.compress || options.quantize) && !is_gltf) {
-    return std::string(options.compress ? "--compress" : "--quantize") + " is for .glb and .gltf, not " +
+    return std::string(options.compress ? "--compress" : "--quantize") + " needs .glb or .gltf, not " +
            std::string(format.extension);
   }
   return "";
@@ -701,7 +715,8 @@ void add_lights(const Scene& scene, const ConvertOptions& options, SceneMeshes& 
   const bool has_wide_spot = std::ranges::any_of(scene.lamps, [](const Lamp& lamp) {
     return lamp.kind == Lamp::Kind::Spot && lamp.outer_angle_radians > std::numbers::pi / 2.0;
   });
-  if (has_wide_spot) warnings.emplace_back("cones of lamps that are wider than glTF's half circle end there");
+  if (has_wide_spot)
+    warnings.emplace_back("lamp cones wider than 180 degrees are limited to 180 degrees, the maximum of glTF");
 }
 
 namespace {
@@ -723,13 +738,13 @@ void warn_of_meshes(const SceneMeshes& meshes, FileFormat format, const MeshFile
   if (is_for_printing(format)) {
     if (const std::uint64_t open = count_open_edges(meshes); open > 0) {
       warnings.push_back(with_thousands(static_cast<std::int64_t>(open)) +
-                         " edges are not between two triangles: the mesh is not closed for printing");
+                         " open edges: the mesh is not closed for printing");
     }
   }
   if (const DVec3 offset = mesh_file_offset(meshes, format, file); offset != DVec3(0.0)) {
     warnings.push_back("coordinates in the file are relative to (" + number_for_people(offset.x) + ", " +
                        number_for_people(offset.y) + ", " + number_for_people(offset.z) +
-                       "): floats do not tell voxels apart that far from the origin");
+                       "): floats cannot separate voxels this far from the origin");
   }
 }
 
@@ -744,10 +759,10 @@ Status write_meshes(SceneMeshes& meshes, const ConvertOptions& options, Progress
   if (options.simplify && outcome.meshes.triangles > 0 && outcome.meshes.simplified_away == 0) {
     outcome.warnings.push_back(
         "--simplify " + digits_for_people(*options.simplify) +
-        " removes no triangle: by a sample of the mesh, at most about 1 % could go without moving the "
-        "surface farther");
+        " removes no triangles: in a sample of the mesh, at most about 1 % could be removed within this "
+        "error");
   }
-  if (outcome.meshes.triangles == 0) outcome.warnings.emplace_back("nothing to draw");
+  if (outcome.meshes.triangles == 0) outcome.warnings.emplace_back("the mesh is empty");
   const auto files = mesh_files(meshes, options.output);
   if (!files) return files.error();
   outcome.files = *files;
@@ -770,7 +785,7 @@ namespace {
 
 void add_file_options(CLI::App& command, ConvertOptions& options, ManyOptions& many,
                       std::vector<std::filesystem::path>& rest) {
-  command.add_option("OUT", rest, "File to write, or - for standard output; with --to more files to read")
+  command.add_option("OUT", rest, "File to write, or - for standard output; with --to, more input files")
       ->check(file_name());
   set_heading(command, heading::kOutput);
   command.add_flag("--force", options.force, kForceHelp);
@@ -778,15 +793,15 @@ void add_file_options(CLI::App& command, ConvertOptions& options, ManyOptions& m
   set_heading(command, heading::kManyFiles);
   command
       .add_option("--to", many.to,
-                  "Convert every named file to this format, as in glb; or the format of OUT if it is -")
+                  "Convert each input to this format, for example glb; also the format of OUT if OUT is -")
       ->type_name("FORMAT")
       ->check(file_name());
-  command.add_option("--out-dir", many.folder, "Folder of the written files (default: the folder of each input)")
+  command.add_option("--out-dir", many.folder, "Output folder (default: the folder of each input)")
       ->type_name("FOLDER")
       ->check(file_name());
   command.add_flag("--recursive", many.recursive, "Convert all readable files in folders and their subfolders");
   set_heading(command, heading::kInput);
-  command.add_option("--from", options.from, "Reject input of any other format than this: " + readable_names())
+  command.add_option("--from", options.from, "Reject input that is not in this format: " + readable_names())
       ->type_name("FORMAT")
       ->check(file_name());
 }
@@ -800,7 +815,7 @@ std::string footer() {
          "vertices and need none of them.\n"
          ".json and .quoin keep all grids, types, rotations and scales. Only .vox keeps animation and notes; from .vox "
          "to .vox nothing is lost, and --frame writes one frame.\n"
-         "Triangles become voxels first, at their own size in the world, also on the way to a mesh.\n"
+         "Triangle meshes are converted to voxels first, at their own size in the world, even if OUT is a mesh.\n"
          ".stl and .3mf are closed manifold meshes in millimetres, for 3D printing. Volumes in millimetres become "
          "metres in glTF and keep their unit in other formats.\n"
          "Example: quoin convert castle.vox castle.glb\n"
@@ -837,7 +852,7 @@ std::string read_options(const CLI::App& command, const VolumeTexts& texts, cons
   if (fault.empty()) fault = fault_of_light(options);
   if (fault.empty() && command.count("--fps") > 0 && !options.animate) fault = "--fps needs --animate";
   if (fault.empty() && options.animate && options.common.takes_frame)
-    fault = "--frame and --animate exclude each other";
+    fault = "--frame and --animate cannot be used together";
   if (fault.empty()) fault = read_files(rest, options, many);
   if (fault.empty()) fault = fault_of_watching(options, many);
   return fault;

@@ -82,7 +82,7 @@ void make_voxels_of_fields(Scene& scene, Threads threads, std::vector<std::strin
       place_voxels(scene, handle, std::move(voxels));
     }
   }
-  if (count > 0) warnings.push_back("fields became voxels, one for each solid sample: " + with_thousands(count));
+  if (count > 0) warnings.push_back("fields converted to voxels, one per solid sample: " + with_thousands(count));
 }
 
 void turn_by_quarters(Scene& scene, std::vector<std::string>& warnings) {
@@ -96,8 +96,8 @@ void turn_by_quarters(Scene& scene, std::vector<std::string>& warnings) {
     most = std::max(most, 2.0 * std::acos(cosine));
   }
   if (most <= kSame) return;
-  warnings.push_back("turned by up to " + number_for_people(glm::degrees(most)) +
-                     " degrees to the nearest quarter turns, which voxels need");
+  warnings.push_back("rotated by up to " + number_for_people(glm::degrees(most)) +
+                     " degrees to the nearest quarter turns: voxel formats have no other rotations");
 }
 
 void stand_at_unit_size(Scene& scene, const FormatInfo& format, std::vector<std::string>& warnings) {
@@ -105,8 +105,8 @@ void stand_at_unit_size(Scene& scene, const FormatInfo& format, std::vector<std:
   if (handles.empty()) return;
   const Instance first = scene.instances()[handles.front()];
   if (!(first.voxel_size > 0.0)) return;
-  warnings.push_back(std::string(format.extension) + " keeps no size of voxels: they are " +
-                     digits_for_people(first.voxel_size) + " of the file's units");
+  warnings.push_back(std::string(format.extension) + " stores no voxel size: a voxel is " +
+                     digits_for_people(first.voxel_size) + " units of the input");
   for (const InstanceHandle handle : handles) {
     Instance& placed = scene.edit(handle);
     placed.position = (placed.position - first.position) / first.voxel_size;

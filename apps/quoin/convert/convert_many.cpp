@@ -88,7 +88,7 @@ std::vector<Task> plan(const ManyOptions& many, const std::string& extension, st
     }
     if (!many.recursive) {
       errors.push_back(
-          make_error(ErrorCode::CannotRead, "a folder; --recursive converts what is in it", input.string()));
+          make_error(ErrorCode::CannotRead, "is a folder; use --recursive to convert the files in it", input.string()));
       continue;
     }
     const auto files = files_below(input, many.folder, errors);
@@ -97,7 +97,7 @@ std::vector<Task> plan(const ManyOptions& many, const std::string& extension, st
       continue;
     }
     if (files->empty())
-      errors.push_back(make_error(ErrorCode::CannotRead, "no file in it can be read", input.string()));
+      errors.push_back(make_error(ErrorCode::CannotRead, "the folder has no readable files", input.string()));
     for (const fs::path& file : *files) {
       const bool is_product = !many.folder && file.extension() == extension;
       if (!is_product) add(file, file.parent_path(), file.parent_path().lexically_relative(input));
@@ -122,7 +122,7 @@ std::string fault_of_plan(std::vector<Task>& tasks) {
     if (is_new) {
       kept.push_back(std::move(task));
     } else if (at->second != task.input && !is_same_file(at->second, task.input)) {
-      return at->second.string() + " and " + task.input.string() + " would both become " + task.output.string();
+      return at->second.string() + " and " + task.input.string() + " would both be written to " + task.output.string();
     }
   }
   tasks = std::move(kept);

@@ -19,7 +19,7 @@ constexpr std::size_t kMaxLines = 20;
 void tell_lost(const std::vector<std::string>& lines, std::vector<std::string>& warnings) {
   for (std::size_t i = 0; i < std::min(lines.size(), kMaxLines); ++i) warnings.push_back(lines[i]);
   if (lines.size() > kMaxLines) {
-    warnings.push_back("and " + std::to_string(lines.size() - kMaxLines) + " more (quoin world check)");
+    warnings.push_back("and " + std::to_string(lines.size() - kMaxLines) + " more; run quoin world check for all");
   }
 }
 

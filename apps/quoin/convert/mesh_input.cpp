@@ -17,10 +17,11 @@ void add_mesh_input_options(CLI::App& command, MeshInputTexts& texts, MeshLoadOp
       ->check(CLI::Range(1, 16'384));
   command.add_option("--voxel", options.voxel_size, "Edge of a voxel in the unit of the mesh, instead of --size")
       ->check(positive());
-  command.add_flag("--solid", texts.is_solid,
-                   "Only voxels with a centre inside the mesh. Converts fields to voxels, also for .json and .quoin");
-  command.add_flag("--surface", texts.is_surface, "Only voxels on the surface (default: surface and inside)");
-  command.add_flag("--field", texts.is_field, "A distance field, smooth and editable, instead of voxels");
+  command.add_flag(
+      "--solid", texts.is_solid,
+      "Create only voxels with a centre inside the mesh. Converts fields to voxels, also for .json and .quoin");
+  command.add_flag("--surface", texts.is_surface, "Create only voxels on the surface (default: surface and inside)");
+  command.add_flag("--field", texts.is_field, "Create a smooth, editable distance field instead of voxels");
   command
       .add_option("--separating", texts.separating,
                   "Thickness of the surface (default 6). 6: thin, no path through faces. 26: every voxel that the mesh "
@@ -40,15 +41,15 @@ void add_mesh_input_options(CLI::App& command, MeshInputTexts& texts, MeshLoadOp
 }
 
 std::string read_mesh_input_options(const CLI::App& command, const MeshInputTexts& texts, MeshLoadOptions& options) {
-  if (options.size && options.voxel_size) return "--size and --voxel exclude each other";
-  if (texts.is_solid && texts.is_surface) return "--solid and --surface together are what is made without them";
+  if (options.size && options.voxel_size) return "--size and --voxel cannot be used together";
+  if (texts.is_solid && texts.is_surface) return "--solid and --surface cannot be used together; the default is both";
   if (texts.is_field && (texts.is_surface || command.count("--separating") > 0)) {
-    return "--field has no voxels of a surface: not with --surface and --separating";
+    return "--field cannot be used with --surface or --separating";
   }
   if (command.count("--band") > 0 && !texts.is_field) return "--band needs --field";
-  if (texts.is_surface && texts.by_parity) return "--parity is of what is solid, and --surface leaves that out";
+  if (texts.is_surface && texts.by_parity) return "--parity and --surface cannot be used together";
   if (texts.is_solid && command.count("--separating") > 0) {
-    return "--separating is of the surface, and --solid leaves that out";
+    return "--separating and --solid cannot be used together";
   }
   options.surface = texts.separating == 26 ? SurfaceVoxels::Separating26 : SurfaceVoxels::Separating6;
   options.solid = texts.by_parity ? SolidVoxels::Parity : SolidVoxels::Winding;

@@ -32,21 +32,21 @@ std::optional<DVec3> triple_of(const Object& camera, const char* key) {
 
 // What is wrong with it, or "".
 std::string camera_from_json(const Object& object, Camera& out) {
-  if (!object.is_object()) return "is no object";
+  if (!object.is_object()) return "is not an object";
   for (const auto& [key, value] : object.items()) {
     if (key != "position" && key != "forward" && key != "look_at" && key != "up" && key != "fov" &&
         key != "view_height") {
-      return "has \"" + key + "\", which no camera has";
+      return "has the unknown key \"" + key + "\"";
     }
   }
   const auto position = triple_of(object, "position");
-  if (!position) return "has no position of three numbers";
+  if (!position) return "needs a position of three numbers";
   if (object.contains("forward") == object.contains("look_at")) return "needs either forward or look_at";
   const auto forward = triple_of(object, "forward");
   const auto target = forward ? std::optional(*position + *forward) : triple_of(object, "look_at");
-  if (!target) return "looks nowhere: forward and look_at are three numbers";
+  if (!target) return "needs three numbers for forward or look_at";
   for (const char* key : {"fov", "view_height"}) {
-    if (object.contains(key) && !object[key].is_number()) return std::string(key) + " is no number";
+    if (object.contains(key) && !object[key].is_number()) return "needs a number for " + std::string(key);
   }
   const double fov = object.value("fov", kUsualFov);
   const auto camera = look_at(*position, *target, fov * std::numbers::pi / 180.0);
@@ -56,14 +56,14 @@ std::string camera_from_json(const Object& object, Camera& out) {
     const auto up = triple_of(object, "up");
     const DVec3 right = up ? glm::cross(out.forward, *up) : DVec3(0.0);
     const double length = glm::length(right);
-    if (!(length > 1e-9)) return "has an up that is not three numbers aside of where it looks";
+    if (!(length > 1e-9)) return "needs three numbers for up, not parallel to the view direction";
     out.right = right / length;
     out.up = glm::cross(out.right, out.forward);
   }
   if (!object.contains("view_height")) return "";
   out.projection = Camera::Projection::Orthographic;
   out.view_height = object["view_height"].get<double>();
-  return std::isfinite(out.view_height) && out.view_height > 0.0 ? "" : "has a view_height that is not above 0";
+  return std::isfinite(out.view_height) && out.view_height > 0.0 ? "" : "needs a view_height above 0";
 }
 
 }  // namespace
@@ -74,8 +74,8 @@ Result<std::vector<Camera>> read_camera_path(const std::filesystem::path& path) 
   const auto bad = [&](const std::string& message) { return make_error(ErrorCode::BadFormat, message, path.string()); };
   const auto* const text = reinterpret_cast<const char*>(bytes->data());
   const Object all = Object::parse(text, text + bytes->size(), nullptr, false);
-  if (!all.is_array()) return bad("is no JSON array of cameras");
-  if (all.empty() || all.size() > kMaxCameras) return bad("holds no camera, or more than a million");
+  if (!all.is_array()) return bad("not a JSON array of cameras");
+  if (all.empty() || all.size() > kMaxCameras) return bad("must hold 1 to 1,000,000 cameras");
   std::vector<Camera> cameras(all.size());
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (const std::string fault = camera_from_json(all[i], cameras[i]); !fault.empty()) {

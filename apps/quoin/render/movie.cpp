@@ -50,7 +50,7 @@ Result<int> run(const fs::path& program, std::vector<std::string> words) {
   if (fault != 0) return make_error(ErrorCode::CannotWrite, std::generic_category().message(fault), program.string());
   int status = 0;
   while (::waitpid(child, &status, 0) < 0) {
-    if (errno != EINTR) return make_error(ErrorCode::CannotWrite, "lost", program.string());
+    if (errno != EINTR) return make_error(ErrorCode::CannotWrite, "cannot wait for the process", program.string());
   }
   return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
@@ -85,8 +85,8 @@ fs::path Movie::picture() const {
 Status Movie::begin(bool resume) const {
   if (!find_program("ffmpeg")) {
     return make_error(ErrorCode::Unsupported,
-                      "films in one file are made by the program ffmpeg, which is not installed; numbered pictures "
-                      "need none (-o film.png)",
+                      "cannot encode a video: ffmpeg is not installed; numbered images do not need it "
+                      "(-o film.png)",
                       output_.string());
   }
   std::error_code code;
@@ -97,7 +97,8 @@ Status Movie::begin(bool resume) const {
 
 Result<std::uint64_t> Movie::write(const std::vector<fs::path>& pictures, double frames_per_second) const {
   const auto ffmpeg = find_program("ffmpeg");
-  if (!ffmpeg) return make_error(ErrorCode::Unsupported, "ffmpeg is gone", output_.string());
+  if (!ffmpeg)
+    return make_error(ErrorCode::Unsupported, "cannot encode a video: ffmpeg is no longer installed", output_.string());
   const std::string first = number_in(pictures.front());
   const std::string pattern = (folder() / ("picture-%0" + std::to_string(first.size()) + "d.png")).filename().string();
   const fs::path whole = folder() / ("film" + output_.extension().string());
@@ -120,7 +121,7 @@ Result<std::uint64_t> Movie::write(const std::vector<fs::path>& pictures, double
   if (*status != 0) {
     return make_error(
         ErrorCode::CannotWrite,
-        "ffmpeg failed with status " + std::to_string(*status) + "; its pictures stay in " + folder().string(),
+        "ffmpeg failed with status " + std::to_string(*status) + "; the images are kept in " + folder().string(),
         output_.string());
   }
   const std::uint64_t bytes = fs::file_size(whole, code);

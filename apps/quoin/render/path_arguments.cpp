@@ -117,7 +117,7 @@ void take_file_look(const FileLook& file, PathPlan& plan) {
   if (!file.not_drawn.empty()) {
     std::string all;
     for (const std::string& each : file.not_drawn) all += (all.empty() ? "" : ", ") + each;
-    plan.warnings.push_back("render settings of the file that are not drawn: " + all);
+    plan.warnings.push_back("unsupported render settings of the file: " + all);
   }
 }
 
@@ -147,7 +147,7 @@ Status take_sky(const PathArguments& arguments, const LoadedScene& loaded, const
     if (image) {
       options.environment = std::make_shared<const RadianceImage>(std::move(*image));
     } else {
-      plan.warnings.push_back("uniform sky instead of the file's sky \"" + loaded.look->environment +
+      plan.warnings.push_back("using a uniform sky instead of the file's sky \"" + loaded.look->environment +
                               "\": " + image.error().message);
       options.sky = SkyModel::Uniform;
     }
@@ -185,19 +185,19 @@ void add_path_options(CLI::App& command, PathArguments& arguments) {
                   "Radius of the lens in world units; more than 0 gives depth of field (default 0)");
   add_text_option(command, "--focus", "X", "Focus distance in world units (default: the middle of the scene)");
   add_text_option(command, "--fog", "DENSITY[,TOP]",
-                  "Fog: scattering events per world unit, and its upper end (default: the top of the scene)");
+                  "Fog: density in scattering events per world unit, and upper end (default: the top of the scene)");
   add_text_option(command, "--fog-colour", "R,G,B", "Linear colour of the fog, 0 to 1 each (default 1,1,1)");
   command
       .add_option("--tone", arguments.tone,
                   "Tone curve: clamp, neutral (Khronos PBR), agx or aces (default neutral; clamp with --sky uniform)")
       ->check(CLI::IsMember({"clamp", "neutral", "agx", "aces"}));
   add_text_option(command, "--bloom", "MIX[,RADIUS[,THRESHOLD]]",
-                  "Bloom: share of the light that spreads, radius as a share of the image height, least brightness "
+                  "Bloom: share of the light that spreads, radius as a share of the image height, minimum brightness "
                   "(default 0,0.02,0)");
   add_text_option(command, "--vignette", "X", "Darkening of the corners, 0 to 1 (default 0)");
   command
       .add_option("--look", arguments.look,
-                  "Settings without an option: file (render settings and focus of the file) or plain (defaults) "
+                  "Settings that no option gives: file (render settings and focus of the file) or plain (defaults) "
                   "(default file)")
       ->check(CLI::IsMember({"file", "plain"}));
   command.add_flag("--denoise", arguments.denoise, "Remove noise within surfaces and keep their edges");
@@ -212,10 +212,11 @@ std::string given_path_option(const CLI::App& command) {
 
 std::string fault_of_path_options(const CLI::App& command) {
   for (const char* option : kOtherLight) {
-    if (command.count(option) > 0) return std::string(option) + ": --light path has none to choose";
+    if (command.count(option) > 0) return std::string(option) + " and --light path cannot be used together";
   }
   if (command.count("--fog-colour") > 0 && command.count("--fog") == 0) return "--fog-colour needs --fog";
-  if (command.count("--sun-time") > 0 && command.count("--sun") > 0) return "--sun and --sun-time exclude each other";
+  if (command.count("--sun-time") > 0 && command.count("--sun") > 0)
+    return "--sun and --sun-time cannot be used together";
   return "";
 }
 
@@ -241,10 +242,10 @@ std::string read_path_options(const CLI::App& command, PathArguments& arguments)
   };
   std::ranges::for_each(kPathOptions, note);
   std::ranges::for_each(kCommonOptions, note);
-  if (command.count("--sky-turn") > 0 && !is_sky_file(arguments)) return "--sky-turn needs a --sky that is a file";
+  if (command.count("--sky-turn") > 0 && !is_sky_file(arguments)) return "--sky-turn needs an image file for --sky";
   const std::string ending = CLI::detail::to_lower(std::filesystem::path(arguments.sky).extension().string());
   if (is_sky_file(arguments) && ending != ".hdr" && ending != ".exr") {
-    return "--sky: must be physical, gradient, uniform, or the name of an .hdr or .exr, not \"" + arguments.sky + "\"";
+    return "--sky: must be physical, gradient, uniform, or an .hdr or .exr file, not \"" + arguments.sky + "\"";
   }
   return "";
 }
@@ -306,7 +307,7 @@ Result<PathPlan> plan_paths(const PathArguments& arguments, const RenderOptions&
   fit_look(loaded.scene.bounds(filter), options);
   if (arguments.fog && arguments.fog->top) options.fog->top = *arguments.fog->top;
   if (arguments.focus && !(options.lens_radius > 0.0)) {
-    plan.warnings.emplace_back("--focus changes nothing: neither --lens-radius nor the file gives the lens a size");
+    plan.warnings.emplace_back("--focus has no effect: the lens radius is 0; set --lens-radius");
   }
   return plan;
 }

@@ -13,12 +13,12 @@ bool has_ending(const std::filesystem::path& path, const std::string& ending) {
 std::string fault_of_picture_name(const std::filesystem::path& path) {
   if (has_ending(path, ".png")) return "";
   const auto lacks = [&](const char* ending, const char* library) {
-    return std::string("this build of quoin has no ") + library + ", and writes no " + ending;
+    return std::string("cannot write ") + ending + ": this build has no " + library;
   };
   if (has_ending(path, ".jpg")) return has_jpeg() ? "" : lacks(".jpg", "libjpeg");
   if (has_ending(path, ".webp")) return has_webp() ? "" : lacks(".webp", "libwebp");
   if (has_ending(path, ".exr")) return has_exr() ? "" : lacks(".exr", "OpenEXR");
-  return "the picture's name must end in .png, .jpg, .webp or .exr, not \"" + path.string() + "\"";
+  return "the image name must end in .png, .jpg, .webp or .exr, not \"" + path.string() + "\"";
 }
 
 Result<std::uint64_t> write_picture(const Image& picture, const std::filesystem::path& path) {

@@ -97,8 +97,9 @@ Result<Camera> camera_of_file(const LoadedScene& loaded, int number) {
     if (each.number == number) return each.camera;
     all += (all.empty() ? "" : ", ") + std::to_string(each.number);
   }
-  return make_error(ErrorCode::InvalidArgument, "--camera file:" + std::to_string(number) + ": the file has " +
-                                                    (all.empty() ? "no camera that was set" : "cameras " + all));
+  return make_error(ErrorCode::InvalidArgument, "cannot use --camera file:" + std::to_string(number) +
+                                                    ": the file has " +
+                                                    (all.empty() ? "no saved cameras" : "cameras " + all));
 }
 
 Result<Camera> camera_for(const LoadedScene& loaded, const RenderArguments& arguments) {
@@ -118,9 +119,9 @@ Result<Camera> camera_for(const LoadedScene& loaded, const RenderArguments& argu
 void warn_of_empty_pictures(const Scene& scene, InstanceFilter filter, const Picture& picture,
                             std::vector<std::string>& warnings) {
   if (scene.bounds(filter).empty()) {
-    warnings.emplace_back("nothing to draw: a picture of the sky");
+    warnings.emplace_back("nothing visible; the image shows only sky");
   } else if (picture.pixels_hit == 0) {
-    warnings.emplace_back("no voxel in sight of this camera: a picture of the sky");
+    warnings.emplace_back("no voxel is in view of this camera; the image shows only sky");
   }
 }
 
@@ -160,7 +161,7 @@ Result<LoadedScene> load(const RenderArguments& arguments, bool is_volume, int f
   if (Status sound = check_dimension(arguments.common.input, options); !sound) return sound.error();
   auto loaded = load_scene(arguments.common.input, options, arguments.common.threads, bar.listener("reading"));
   if (loaded && arguments.volume.iso && !is_volume && !heeds_iso(arguments.common)) {
-    return make_error(ErrorCode::InvalidArgument, "--iso is for volumes, and the input holds voxels");
+    return make_error(ErrorCode::InvalidArgument, "cannot use --iso: the input holds voxels, not a volume");
   }
   if (loaded) scale_emission(loaded->scene, arguments.emission_scale);
   return loaded;
@@ -349,7 +350,7 @@ Result<Outcome> render(const RenderArguments& arguments) {
   if (auto writable = check_outputs(outputs); !writable) return writable.error();
   const bool is_volume = holds_volume(arguments.common).value_or(false);
   if (is_volume && arguments.frames) {
-    return make_error(ErrorCode::InvalidArgument, "--frames is for voxels, and the input is a volume");
+    return make_error(ErrorCode::InvalidArgument, "cannot use --frames: the input is a volume, not voxels");
   }
   const int frame = arguments.frames ? arguments.frames->first : arguments.common.load.frame;
   auto loaded = load(arguments, is_volume, frame);
@@ -369,7 +370,7 @@ Result<Outcome> render(const RenderArguments& arguments) {
   if (!drawn) return drawn.error();
   warn_of_left_out(scene, filter, outcome.warnings);
   if (arguments.render.light.model == LightModel::Propagated && !scene.lamps.empty()) {
-    outcome.warnings.push_back("--light propagated is of voxels: lamps left out: " +
+    outcome.warnings.push_back("--light propagated supports no lamps; lamps left out: " +
                                std::to_string(scene.lamps.size()));
   }
   if (!is_slice && !outcome.files.empty()) warn_of_empty_pictures(scene, filter, outcome.picture, outcome.warnings);
@@ -409,24 +410,24 @@ Json outcome_json(const RenderArguments& arguments, const Outcome& outcome) {
 }
 
 std::string outcome_text(const Outcome& outcome) {
-  std::string kept = outcome.kept == 0 ? "" : "Kept " + std::to_string(outcome.kept) + " that were there\n";
+  std::string kept = outcome.kept == 0 ? "" : "Kept " + std::to_string(outcome.kept) + " existing images\n";
   if (outcome.files.empty()) return kept;
   const Picture& picture = outcome.picture;
   const double per_second = static_cast<double>(outcome.rays) / std::max(outcome.trace, 1e-9);
-  std::string text = "Picture: " + std::to_string(picture.colour.width) + " x " +
-                     std::to_string(picture.colour.height) + ", " + with_thousands(picture.pixels_hit) +
-                     (outcome.slice       ? " pixels lie in the solid\n"
-                      : outcome.is_volume ? " pixels show its surface\n"
+  std::string text = "Image: " + std::to_string(picture.colour.width) + " x " + std::to_string(picture.colour.height) +
+                     ", " + with_thousands(picture.pixels_hit) +
+                     (outcome.slice       ? " pixels are solid\n"
+                      : outcome.is_volume ? " pixels show the surface\n"
                                           : " pixels show voxels\n");
   if (!outcome.is_volume && !outcome.slice) text += to_string(outcome.faces) + "\n";
   if (!outcome.slice)
     text += "Rays: " + with_thousands(outcome.rays) + " in " + number_for_people(outcome.trace) + " s, " +
-            with_thousands(std::llround(per_second)) + " a second\n";
-  if (!outcome.device.empty()) text += "Drawn by " + outcome.device + "\n";
+            with_thousands(std::llround(per_second)) + " per second\n";
+  if (!outcome.device.empty()) text += "Rendered by " + outcome.device + "\n";
   text += "Wrote ";
   constexpr std::size_t kNamed = 3;
   if (outcome.files.size() > kNamed) {
-    text += std::to_string(outcome.files.size()) + " pictures, " + outcome.files.front().string() + " to " +
+    text += std::to_string(outcome.files.size()) + " images, " + outcome.files.front().string() + " to " +
             outcome.files.back().string() + ", ";
   } else {
     for (const auto& file : outcome.files) text += file.string() + ", ";

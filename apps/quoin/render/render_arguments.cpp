@@ -95,18 +95,19 @@ void add_light_options(CLI::App& command, RenderArguments& arguments) {
       "keeps the sky");
   command.add_flag("--fixed-sky", arguments.has_fixed_sky,
                    "Keep the sky and the light colour of a clear day for every sun direction");
-  add_text_option(command, "--sky-brightness", "X", "Factor of the light of the sky (default 1)");
+  add_text_option(command, "--sky-brightness", "X", "Brightness factor of the sky (default 1)");
   command
       .add_option(
           "--lamps", arguments.render.light.max_lamps,
           "Maximum number of lamps and glowing voxels that light a surface, 0 to 1024 (default 64). With 0 they "
           "only glow themselves")
       ->check(CLI::Range(0, 1024));
-  add_text_option(command, "--lamp-brightness", "X", "Factor of the light that lamps cast (default 1)");
-  add_text_option(command, "--emission-scale", "X", "Factor of the light that voxels emit (default 1)");
-  add_text_option(command, "--exposure", "X|auto",
-                  "Factor of all light (default 1; 1.3 with --light path, 2 with --sky physical), or auto with --light "
-                  "path, as the first image needs");
+  add_text_option(command, "--lamp-brightness", "X", "Brightness factor of the lamps (default 1)");
+  add_text_option(command, "--emission-scale", "X", "Brightness factor of glowing voxels (default 1)");
+  add_text_option(
+      command, "--exposure", "X|auto",
+      "Brightness factor of all light (default 1; 1.3 with --light path, 2 with --sky physical), or auto with --light "
+      "path, measured on the first image");
   add_text_option(command, "--shadow-distance", "VOXELS", "Maximum length of shadows (default: unlimited)");
   add_text_option(command, "--least-light", "X",
                   "Minimum light of --light propagated; with 0 closed rooms are black (default 0)");
@@ -157,7 +158,8 @@ void add_backend_options(CLI::App& command, RenderArguments& arguments) {
 std::string fault_of_backend(const CLI::App& command, const RenderArguments& arguments) {
   const bool is_vulkan = arguments.backend == "vulkan";
   if (command.count("--device") > 0 && !is_vulkan) return "--device needs --backend vulkan";
-  if (is_vulkan && arguments.occlusion == "smooth") return "--ao smooth: the backend vulkan has none; cpu has";
+  if (is_vulkan && arguments.occlusion == "smooth")
+    return "--ao smooth and --backend vulkan cannot be used together; use --backend cpu";
   if (command.count("--device") > 0 && arguments.device.empty()) return "--device: must be a number or a name";
   return "";
 }
@@ -166,19 +168,19 @@ std::string fault_of_files(const RenderArguments& arguments) {
   const std::string out = arguments.output.string();
   const std::string depth = arguments.depth.string();
   if (is_movie(arguments.output)) {
-    if (!arguments.is_film()) return "-o: " + out + " is a film, which needs --turntable, --frames or --path";
-    if (arguments.path.is_transparent) return "-o: films have no alpha";
+    if (!arguments.is_film()) return "-o: the video " + out + " needs --turntable, --frames or --path";
+    if (arguments.path.is_transparent) return "-o: videos have no alpha channel";
   } else if (const std::string fault = fault_of_picture_name(arguments.output); !fault.empty()) {
     return "-o: " + fault;
   }
   const bool is_path = arguments.light_model == "path";
-  if (has_ending(arguments.output, ".exr") && !is_path) return "-o: .exr, which is linear light, needs --light path";
-  if (has_ending(arguments.output, ".jpg") && arguments.path.is_transparent) return "-o: .jpg has no alpha";
+  if (has_ending(arguments.output, ".exr") && !is_path) return "-o: .exr needs --light path";
+  if (has_ending(arguments.output, ".jpg") && arguments.path.is_transparent) return "-o: .jpg has no alpha channel";
   if (is_same_file(arguments.output, arguments.common.input)) return "-o: " + out + " is the input";
   if (depth.empty()) return "";
   if (!has_ending(arguments.depth, ".pfm")) return "--depth: the name must end in .pfm, not \"" + depth + "\"";
   if (is_same_file(arguments.depth, arguments.common.input)) return "--depth: " + depth + " is the input";
-  if (is_same_file(arguments.depth, arguments.output)) return "--depth: " + depth + " is the picture itself";
+  if (is_same_file(arguments.depth, arguments.output)) return "--depth: " + depth + " is the same file as -o";
   return "";
 }
 
@@ -227,29 +229,29 @@ std::optional<double> read_rate(const std::string& text) {
 std::string fault_of_films(const CLI::App& command, const RenderArguments& arguments) {
   const auto has = [&](const char* option) { return command.count(option) > 0; };
   for (const char* option : {"--azimuth", "--elevation"}) {
-    if (has(option) && has("--view")) return std::string("--view and ") + option + " exclude each other";
-    if (has(option) && has("--camera")) return std::string("--camera and ") + option + " exclude each other";
+    if (has(option) && has("--view")) return std::string("--view and ") + option + " cannot be used together";
+    if (has(option) && has("--camera")) return std::string("--camera and ") + option + " cannot be used together";
   }
-  if (has("--turntable") && has("--camera")) return "--turntable goes round by itself: no --camera";
-  if (has("--turntable") && has("--frames")) return "--turntable and --frames exclude each other";
-  if (has("--frames") && has("--frame")) return "--frame and --frames exclude each other";
+  if (has("--turntable") && has("--camera")) return "--turntable and --camera cannot be used together";
+  if (has("--turntable") && has("--frames")) return "--turntable and --frames cannot be used together";
+  if (has("--frames") && has("--frame")) return "--frame and --frames cannot be used together";
   for (const char* option : {"--view", "--azimuth", "--elevation", "--camera", "--turntable", "--frames"}) {
-    if (has("--path") && has(option)) return std::string("--path and ") + option + " exclude each other";
+    if (has("--path") && has(option)) return std::string("--path and ") + option + " cannot be used together";
   }
-  if (has("--fps") && !is_movie(arguments.output)) return "--fps is for films in one file: .mp4 or .webm";
+  if (has("--fps") && !is_movie(arguments.output)) return "--fps needs a video: .mp4 or .webm";
   if (has("--resume") && !has("--turntable") && !has("--frames") && !has("--path")) {
-    return "--resume is for films: --turntable, --frames or --path";
+    return "--resume needs an image series: --turntable, --frames or --path";
   }
   for (const char* option : {"--turntable", "--frames", "--path"}) {
-    if (has(option) && has("--depth")) return std::string(option) + ": --depth is for one picture";
+    if (has(option) && has("--depth")) return std::string(option) + " and --depth cannot be used together";
   }
   return "";
 }
 
 std::string fault_of_watching(const RenderArguments& arguments) {
   if (!arguments.watch) return "";
-  if (arguments.common.json) return "--watch: --json prints one object, and ends";
-  return arguments.common.input == kStandardStream ? "--watch is for files, not for standard input" : "";
+  if (arguments.common.json) return "--watch and --json cannot be used together";
+  return arguments.common.input == kStandardStream ? "cannot use --watch with standard input" : "";
 }
 
 std::string fault_of_camera(const CLI::App& command, const RenderArguments& arguments) {
@@ -257,7 +259,8 @@ std::string fault_of_camera(const CLI::App& command, const RenderArguments& argu
   const bool has_target = command.count("--look-at") > 0;
   if (has_position && !has_target) return "--camera needs --look-at";
   if (has_target && !has_position) return "--look-at needs --camera X,Y,Z";
-  if (command.count("--camera") > 0 && command.count("--view") > 0) return "--view and --camera exclude each other";
+  if (command.count("--camera") > 0 && command.count("--view") > 0)
+    return "--view and --camera cannot be used together";
   if (command.count("--fov") > 0 && !has_position) return "--fov needs --camera and --look-at; views frame the scene";
   if (!arguments.position || !arguments.target) return "";
   const auto camera = look_at(*arguments.position, *arguments.target, 1.0);
@@ -293,7 +296,7 @@ std::string fault_of_light(const CLI::App& command, const RenderArguments& argum
     return "--shadow-distance: the preset " + preset + " has no shadows";
   }
   if (command.count("--lamp-brightness") > 0 && arguments.render.light.max_lamps == 0) {
-    return "--lamp-brightness: --lamps 0 has no lamps shine";
+    return "--lamp-brightness has no effect with --lamps 0";
   }
   return "";
 }
@@ -306,10 +309,10 @@ std::string fault_of_light_model(const CLI::App& command, const RenderArguments&
   if (command.count("--least-light") > 0 && !is_propagated) return "--least-light needs --light propagated";
   if (!is_propagated) return "";
   if (arguments.preset != "full" && arguments.preset != "no-ao") {
-    return "--light propagated: the preset " + arguments.preset + " does not have it";
+    return "--light propagated and --preset " + arguments.preset + " cannot be used together";
   }
   for (const char* option : {"--lamps", "--ao-affects", "--shadow-distance"}) {
-    if (command.count(option) > 0) return std::string(option) + ": --light propagated has none to choose";
+    if (command.count(option) > 0) return std::string(option) + " and --light propagated cannot be used together";
   }
   return "";
 }
@@ -370,7 +373,7 @@ std::string fault_of_slice(const CLI::App& command, const RenderArguments& argum
                              "--vignette",
                              "--look",
                              "--denoise"}) {
-    if (command.count(option) > 0) return std::string(option) + ": the preset density is a flat slice (--slice)";
+    if (command.count(option) > 0) return std::string(option) + " and --preset density cannot be used together";
   }
   return "";
 }
@@ -408,7 +411,7 @@ std::string read_texts(const CLI::App& command, RenderArguments& arguments) {
   CameraPlace camera;
   const std::array faults = {
       read_option(command, "--size", read_size,
-                  "WIDTHxHEIGHT of at most 2^28 pixels and 1000000 a side, as in 1280x720", size),
+                  "WIDTHxHEIGHT of at most 2^28 pixels and 1000000 per side, as in 1280x720", size),
       read_option(command, "--camera", read_camera, three + ", or a camera of the file, as in file:0", camera),
       read_option(command, "--look-at", parse_triple, three, arguments.target),
       read_option(command, "--fov", read_angle, "more than 0 and less than 180", arguments.fov_degrees),
@@ -429,7 +432,7 @@ std::string read_texts(const CLI::App& command, RenderArguments& arguments) {
       read_option(command, "--elevation", read_elevation, "from -90 to 90", arguments.elevation),
       read_option(command, "--frames", read_frames, "two frames, as in 0:24", arguments.frames),
       read_option(command, "--fps", read_rate, "more than 0 and at most 1000", arguments.frames_per_second),
-      read_option(command, "--slice", read_slice, "x, y or z, and a place from 0 to 1, as in y:0.5", slice),
+      read_option(command, "--slice", read_slice, "x, y or z, and a position from 0 to 1, as in y:0.5", slice),
       read_field_occlusion(command, light.smooth_occlusion),
       read_volume_options(command, arguments.volume_texts, arguments.volume)};
   arguments.path.is_exposure_automatic = is_exposure_automatic(command);

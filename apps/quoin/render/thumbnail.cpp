@@ -48,7 +48,7 @@ Result<Thumbnail> draw(const ThumbnailArguments& arguments) {
   Thumbnail made;
   made.warnings = std::move(loaded->warnings);
   made.is_empty = drawn->is_empty;
-  if (made.is_empty) made.warnings.emplace_back("nothing to draw: an empty picture");
+  if (made.is_empty) made.warnings.emplace_back("nothing visible; the image is empty");
   const auto written = write_png(drawn->image, arguments.output);
   if (!written) return written.error();
   made.bytes = *written;
@@ -94,7 +94,7 @@ void add_thumbnail_command(CLI::App& app, int& status) {
   command->footer("Example: quoin thumbnail castle.vox castle.png --size 128");
   command->callback([arguments, &status] {
     if (CLI::detail::to_lower(arguments->output.extension().string()) != ".png") {
-      print_error("OUT: the picture's name must end in .png, not \"" + arguments->output.string() + "\" (try --help)");
+      print_error("OUT: the image name must end in .png, not \"" + arguments->output.string() + "\" (try --help)");
       status = kWrongUsage;
       return;
     }

@@ -280,9 +280,9 @@ std::string man_page(const CommandOfTool& tool, const std::string& version) {
     if (!command.footer.empty()) text += ".PP\n.nf\n" + roff(command.footer) + "\n.fi\n";
   });
   return text +
-         ".SH EXIT STATUS\n.TP\n0\nAll was done.\n.TP\n1\nSomething could not be read, written or drawn; standard "
+         ".SH EXIT STATUS\n.TP\n0\nSuccess.\n.TP\n1\nFailure: a file could not be read, written or rendered. Standard "
          "error "
-         "says what.\n.TP\n2\nThe command line is wrong.\n";
+         "gives the reason.\n.TP\n2\nThe command line is invalid.\n";
 }
 
 }  // namespace quoin::tool
