@@ -14,7 +14,7 @@ namespace quoin::tool {
 
 namespace {
 
-/// What is wrong with `text` as a number of at least 0; empty when nothing is.
+/// Returns an error message if `text` is not a number of at least 0, else "".
 template <class Number>
 std::string fault_of_number(const std::string& text) {
   Number value{};

@@ -13,7 +13,7 @@ inline constexpr int kDone = 0;
 inline constexpr int kFailed = 1;
 inline constexpr int kWrongUsage = 2;
 
-/// What every command takes.
+/// Options of all commands that read a file.
 struct CommonOptions {
   std::filesystem::path input;
   LoadOptions load;
@@ -28,27 +28,28 @@ struct CommonOptions {
 
 /// Adds --dimension.
 void add_dimension_option(CLI::App& command, LoadOptions& load);
-/// Refuses --dimension for a file that has no dimensions.
+/// Fails if --dimension was given and the file has no dimensions.
 [[nodiscard]] Status check_dimension(const std::filesystem::path& path, const LoadOptions& load);
 
-/// Adds IN, --json, --threads, --hidden, --dimension and --frame to a command.
+/// Adds IN and the options of CommonOptions to a command.
 void add_common_options(CLI::App& command, CommonOptions& options);
 
 /// Adds --allow-outside-files.
 void add_outside_files_option(CLI::App& command, LoadOptions& options);
 
-/// What --force is for.
+/// Help of --force.
 inline constexpr const char* kForceHelp = "Overwrite OUT even if it is a model or a world";
 
-/// Refuses what is not a number of at least 0 (a whole one), in words for a person.
+/// Accepts a number of at least 0.
 [[nodiscard]] CLI::Validator not_negative();
+/// Accepts a whole number of at least 0.
 [[nodiscard]] CLI::Validator not_negative_whole();
-/// Refuses what is not a number above 0.
+/// Accepts a number above 0.
 [[nodiscard]] CLI::Validator positive();
-/// Refuses an empty name of a file.
+/// Accepts a file name that is not empty.
 [[nodiscard]] CLI::Validator file_name();
 
-/// Each adds one command; once it has been parsed, `status` becomes what the command ends with.
+/// Each function adds one command. When the command is parsed it runs, and sets `status` to its exit status.
 void add_info_command(CLI::App& app, int& status);
 void add_convert_command(CLI::App& app, int& status);
 void add_render_command(CLI::App& app, int& status);
@@ -56,10 +57,10 @@ void add_thumbnail_command(CLI::App& app, int& status);
 void add_generate_command(CLI::App& app, int& status);
 void add_view_command(CLI::App& app, int& status);
 void add_world_command(CLI::App& app, int& status);
-/// `completions` and `man`, which tell of all commands.
+/// Adds `completions` and `man`, which describe all commands.
 void add_shell_commands(CLI::App& app, int& status);
 
-/// Adds -q.
+/// Adds --quiet.
 void add_quiet_option(CLI::App& command);
 
 }  // namespace quoin::tool

@@ -17,7 +17,7 @@ constexpr std::array<std::pair<const char*, SmoothOcclusion>, 5> kForms = {
      {"weighted", SmoothOcclusion::Weighted},
      {"weighted-published", SmoothOcclusion::WeightedPublished}}};
 
-/// A number within a range, written as people write it.
+/// An option with a number in a range; `range` is the text for messages.
 struct NumberOption {
   const char* name;
   const char* range;

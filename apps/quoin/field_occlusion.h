@@ -7,13 +7,13 @@
 
 namespace quoin::tool {
 
-/// Adds --ao-form, --ao-spread, --ao-offset and --ao-power, whose texts `read_field_occlusion` reads.
+/// Adds --ao-form, --ao-spread, --ao-offset and --ao-power. `read_field_occlusion` parses them.
 void add_field_occlusion_options(CLI::App& command);
 
-/// The first of these that was given; null when none was.
+/// Returns the first of these options that was given, or null.
 [[nodiscard]] const char* given_field_occlusion(const CLI::App& command);
 
-/// Reads those that were given into `options`; returns what is wrong with them, or "".
+/// Parses the given options into `options`. Returns a usage error, or "".
 [[nodiscard]] std::string read_field_occlusion(const CLI::App& command, SmoothOcclusionOptions& options);
 
 }  // namespace quoin::tool

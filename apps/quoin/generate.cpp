@@ -20,7 +20,7 @@ namespace quoin::tool {
 
 namespace {
 
-/// More than this many voxels would not fit into a .vox file.
+/// The most voxels that fit into a .vox file.
 constexpr std::int64_t kMaxVoxels = std::int64_t{1} << 31;
 
 struct GenerateOptions {
@@ -28,10 +28,10 @@ struct GenerateOptions {
   std::string seed = "42";
   std::string chunks = "4x2x4";
   bool is_smooth = false;
-  bool is_endless = false;  ///< a world that goes on where one flies; made so far around the origin
+  bool is_endless = false;  ///< an unbounded world, generated around the origin
   bool force = false;
   TerrainOptions terrain;
-  SmoothTerrainOptions smooth;  ///< what of it the other has not
+  SmoothTerrainOptions smooth;  ///< additional options of smooth terrain
   Threads threads;
   bool json = false;
 };
@@ -46,17 +46,17 @@ struct Outcome {
   std::vector<std::string> warnings;
 };
 
-/// How many voxels, or samples, a unit of the world's size has along each axis.
+/// Returns the voxels or samples along each axis of one unit of --chunks.
 int edge_of_unit(const GenerateOptions& options) {
   return options.is_smooth ? kChunkEdge : kTerrainUnit;
 }
 
-/// Of a world without an end, in chunks.
+/// Returns the height of an endless world in chunks.
 int endless_height(const GenerateOptions& options) {
   return (options.terrain.size.y * edge_of_unit(options) + kChunkEdge - 1) / kChunkEdge;
 }
 
-/// What is wrong with the options, which are read into `options.terrain`; empty when nothing is.
+/// Reads the options into `options.terrain` and `options.smooth`. Returns a usage error, or "".
 std::string read_options(GenerateOptions& options) {
   const auto seed = parse_unsigned(options.seed);
   if (!seed) return "--seed: must be a whole number from 0 to 18446744073709551615, not \"" + options.seed + "\"";
@@ -78,7 +78,7 @@ std::string read_options(GenerateOptions& options) {
   return "";
 }
 
-/// The world's voxels, or its field. Errors: Cancelled.
+/// Generates the voxels or the field of the world. Errors: Cancelled.
 Status make_content(const GenerateOptions& options, const TerrainTypes& types, const Progress& progress,
                     SceneGrid& content) {
   if (options.is_smooth) {
@@ -134,7 +134,7 @@ Result<Outcome> generate(const GenerateOptions& options) {
   return outcome;
 }
 
-/// A world that is made as one comes by: so far around the origin it is there.
+/// Creates an endless world and generates the area around the origin.
 Result<Outcome> generate_endless(const GenerateOptions& options) {
   Stopwatch watch;
   std::error_code error;
@@ -179,7 +179,7 @@ Result<Outcome> generate_endless(const GenerateOptions& options) {
   return outcome;
 }
 
-// A field has none, and of a world without an end nobody counts them.
+// Fields have no faces, and the faces of endless worlds are not counted.
 bool has_faces(const GenerateOptions& options) {
   return !options.is_smooth && !options.is_endless;
 }

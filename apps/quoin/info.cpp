@@ -41,7 +41,7 @@ std::vector<GridReport> report_grids(const Scene& scene) {
   return list;
 }
 
-/// The materials of what is solid.
+/// Returns the types of all solid samples.
 std::set<VoxelType> solid_types(const DensityGrid& field) {
   std::set<VoxelType> used;
   for (const IVec3 place : field.chunks()) {
@@ -59,7 +59,7 @@ std::set<VoxelType> solid_types(const DensityGrid& field) {
   return used;
 }
 
-/// Of voxels, and of what is solid of fields.
+/// Returns the number of distinct types of voxels and solid samples.
 std::size_t distinct_types(const Scene& scene) {
   std::set<VoxelType> used;
   for (const GridHandle handle : scene.grids().handles()) {
@@ -71,7 +71,7 @@ std::size_t distinct_types(const Scene& scene) {
   return used.size();
 }
 
-/// Nothing has no box; zeros keep the keys' types.
+/// Returns zeros for empty bounds, so that the types of the keys stay the same.
 Json box(const DBox& bounds) {
   const DBox shown = bounds.empty() ? DBox{DVec3(0.0), DVec3(0.0)} : bounds;
   return {{"min", list_of(shown.min)}, {"max", list_of(shown.max)}};
@@ -83,7 +83,7 @@ DVec3 signed_scale(const Instance& instance) {
   return scale;
 }
 
-/// Which entry of the lists of groups and layers a handle is; null for none.
+/// Returns the index of a handle in the list of groups or layers, or null.
 template <class T>
 Json place_in(const std::map<Handle<T>, std::size_t>& places, Handle<T> handle) {
   const auto found = places.find(handle);
@@ -156,7 +156,7 @@ Json grid_json(const GridReport& report, const Hierarchy& hierarchy) {
   return entry;
 }
 
-/// What --camera file:N of render can name.
+/// Lists the cameras that --camera file:N of `quoin render` can select.
 Json cameras_json(const LoadedScene& loaded) {
   Json list = Json::array();
   for (const FileCamera& each : loaded.cameras) {
@@ -229,7 +229,7 @@ std::string grid_text(const Scene& scene, const GridReport& report) {
   return text;
 }
 
-/// Names that say something, and what is hidden without one; how many there are, where neither is.
+/// Returns a line with the number of entries, their names, and the number of hidden entries without a name.
 template <class T>
 std::string names_text(const char* what, const SlotMap<T>& all) {
   if (all.empty()) return {};

@@ -16,7 +16,7 @@ extern "C" void note_signal(int signal) {
   std::signal(signal, SIG_DFL);
 }
 
-/// Whoever started the program may have it ignore a signal: nohup does so with SIGHUP, a shell's `&` with SIGINT.
+/// Returns true if the parent process set the signal to be ignored, as nohup does with SIGHUP and `&` with SIGINT.
 bool is_ignored(int signal) {
   struct sigaction current {};
   return ::sigaction(signal, nullptr, &current) == 0 && current.sa_handler == SIG_IGN;

@@ -2,21 +2,20 @@
 
 namespace quoin::tool {
 
-/// From now on a closed pipe and a limit on the size of files make writing fail, which is then reported like any other
-/// failure; by default they end the program and leave half-written files behind.
+/// Makes writes to a closed pipe or beyond the file size limit fail with an error. By default SIGPIPE and SIGXFSZ
+/// end the program and leave incomplete files.
 void let_writes_fail();
 
-/// From now on the first Ctrl-C (or SIGTERM, or SIGHUP from a closed terminal) only asks the work to stop, so that
-/// files under way are taken back; a second one ends the program at once. Signals that are ignored stay so.
+/// Makes the first Ctrl-C (or SIGTERM, or SIGHUP from a closed terminal) only request a stop, so that incomplete files
+/// are removed. A second one ends the program at once. Ignored signals stay ignored.
 void catch_interrupts();
 
-/// After `catch_interrupts`: a signal that is caught also ends a read that waits, which then fails with EINTR.
+/// Makes caught signals also end a blocking read, which then fails with EINTR. Call after `catch_interrupts`.
 void let_interrupts_end_reads();
 
 [[nodiscard]] bool was_interrupted();
 
-/// Ends the program as the caught signal would have, so that shells and scripts see what happened. Returns when none
-/// was caught.
+/// Ends the program with the caught signal, so that shells and scripts see the cause. Returns if no signal was caught.
 void die_if_interrupted();
 
 }  // namespace quoin::tool

@@ -26,7 +26,7 @@ std::string command_names(const CLI::App& app) {
   return names;
 }
 
-/// The first argument that begins with a dash but is neither an option of `command` nor a number; or "".
+/// Returns the first argument that starts with a dash but is neither an option of `command` nor a number, or "".
 std::string unknown_option(const CLI::App& command, const Arguments& arguments) {
   for (const std::string& argument : arguments) {
     if (argument == "--") break;
@@ -39,13 +39,13 @@ std::string unknown_option(const CLI::App& command, const Arguments& arguments) 
   return "";
 }
 
-/// The command that was chosen within a command, if it has any.
+/// Returns the innermost parsed subcommand.
 const CLI::App& innermost(CLI::App& command) {
   const auto chosen = command.get_subcommands();
   return chosen.empty() ? command : innermost(*chosen[0]);
 }
 
-/// What is wrong with the arguments, where CLI11's own words would not help.
+/// Returns the message of a usage error; replaces unclear messages of CLI11.
 std::string usage_error(CLI::App& app, const CLI::ParseError& error, const Arguments& arguments) {
   const std::string hint = " (try --help)";
   const auto chosen = app.get_subcommands();
@@ -72,7 +72,7 @@ std::string usage_error(CLI::App& app, const CLI::ParseError& error, const Argum
   return error.what() + hint;
 }
 
-/// The arguments, with negative numbers in the only form that CLI11 does not take for options: "-0.5", not "-.5".
+/// Returns the arguments with "-.5" written as "-0.5", because CLI11 takes "-.5" for an option.
 Arguments readable_arguments(int argc, char** argv) {
   Arguments arguments(argv + std::min(argc, 1), argv + argc);
   for (std::string& argument : arguments) {
@@ -83,7 +83,7 @@ Arguments readable_arguments(int argc, char** argv) {
   return arguments;
 }
 
-/// Prints what --help or --version asked for.
+/// Prints the text of --help or --version.
 int print_answer(const CLI::App& app, const CLI::ParseError& request) {
   std::ostringstream text;
   app.exit(request, text, text);

@@ -82,7 +82,7 @@ void print_warnings(const std::vector<std::string>& warnings) {
 int print(std::string_view text) {
   const bool written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size();
   if (written && std::fflush(stdout) == 0) return kDone;
-  // Whoever reads may have seen enough.
+  // The reader closed the pipe, which is not an error to report.
   if (errno == EPIPE) return kFailed;
   print_error("cannot write standard output");
   return kFailed;

@@ -14,36 +14,35 @@ namespace quoin::tool {
 
 using Json = nlohmann::ordered_json;
 
-/// A list of three numbers, without -0.
+/// Returns a JSON array of three numbers, with 0 for -0.
 [[nodiscard]] Json list_of(const DVec3& v);
 [[nodiscard]] Json list_of(const IVec3& v);
 
-/// Text for a terminal: control characters become question marks.
+/// Replaces control characters by question marks.
 [[nodiscard]] std::string on_one_line(std::string_view text);
 
-/// "1.5 MB"; decimal units, up to three digits.
+/// Formats a size in decimal units with up to three digits, as in "1.5 MB".
 [[nodiscard]] std::string bytes_for_people(std::uint64_t bytes);
 
-/// At most four digits after the point, none when they are zeros.
+/// Formats a number with up to four decimals, without trailing zeros.
 [[nodiscard]] std::string number_for_people(double value);
 
-/// Six digits, however large or small.
+/// Formats a number with six significant digits.
 [[nodiscard]] std::string digits_for_people(double value);
 
-/// Prints "quoin: MESSAGE" on standard error, as one line whatever the message holds.
+/// Prints "quoin: MESSAGE" on standard error as one line.
 void print_error(std::string_view message);
 void print_error(const Error& error);
 void print_warnings(const std::vector<std::string>& warnings);
 
-/// From now on summaries, warnings and progress are not shown.
+/// Suppresses summaries, warnings and progress from now on.
 void be_quiet();
 [[nodiscard]] bool is_quiet();
 
-/// Prints what a command did, unless it is to be quiet; returns the exit status as `print` does.
+/// Prints the result of a command unless --quiet was given. Returns the exit status, as `print` does.
 [[nodiscard]] int print_summary(std::string_view text);
 
-/// Prints text, or one JSON object and a line end, on standard output; returns the exit status: kFailed when that
-/// cannot be written.
+/// Prints text, or a JSON object and a line end, on standard output. Returns the exit status: kFailed if writing fails.
 [[nodiscard]] int print(std::string_view text);
 [[nodiscard]] int print_json(const Json& object);
 

@@ -55,12 +55,12 @@ Status check_replaced(const std::filesystem::path& output, const FileSet& inputs
   std::error_code unknown;
   if (force || !std::filesystem::is_regular_file(output, unknown)) return {};
   const auto format = detect_format(output);
-  // What cannot be read may be a model, too.
+  // A file that cannot be read may be a model.
   if (!format) {
     return make_error(ErrorCode::CannotWrite, "cannot write " + output.string() +
                                                   ": the file exists and cannot be read; use --force to overwrite it");
   }
-  // Meshes are products, made anew, also where they can be read.
+  // Meshes are results that can be made again, so they are overwritten even if they are readable.
   if (!*format || format_info(**format).is_mesh) return {};
   return make_error(ErrorCode::InvalidArgument,
                     "cannot write " + output.string() + ": the file exists; use --force to overwrite it");

@@ -17,7 +17,7 @@ std::optional<Number> parse_all(std::string_view text) {
   return value;
 }
 
-/// Three values between two separators, each read by `read`.
+/// Parses three values with separators between them. `read` parses one value.
 template <class Triple, class Read>
 std::optional<Triple> parse_three(std::string_view text, char separator, Read read) {
   Triple triple{0};

@@ -8,25 +8,25 @@
 
 namespace quoin::tool {
 
-/// The finite number that all of `text` spells, whatever the locale; nothing when it is none.
+/// Parses all of `text` as a finite number, independent of the locale. Returns nullopt if it is not one.
 [[nodiscard]] std::optional<double> parse_number(std::string_view text);
 
-/// The whole number of at least 0 that all of `text` spells.
+/// Parses all of `text` as a whole number of at least 0.
 [[nodiscard]] std::optional<std::uint64_t> parse_unsigned(std::string_view text);
 
-/// "x,y,z": three finite numbers.
+/// Parses three finite numbers: "x,y,z".
 [[nodiscard]] std::optional<DVec3> parse_triple(std::string_view text);
 
-/// Width and height of a picture.
+/// Width and height of an image.
 struct PictureSize {
   int width = 0;
   int height = 0;
 };
 
-/// "1280x720": two positive whole numbers.
+/// Parses two positive whole numbers: "1280x720".
 [[nodiscard]] std::optional<PictureSize> parse_size(std::string_view text);
 
-/// "4x2x4": three whole numbers.
+/// Parses three whole numbers: "4x2x4".
 [[nodiscard]] std::optional<IVec3> parse_box_size(std::string_view text);
 
 }  // namespace quoin::tool

@@ -7,17 +7,17 @@
 
 namespace quoin::tool {
 
-/// A bar on standard error for work that lasts longer than a second; nothing when standard error is no terminal.
+/// A progress bar on standard error for work that takes more than 1 s. Shown only if standard error is a terminal.
 class ProgressBar {
  public:
-  /// `shows`: false for work that is part of another that has a bar.
+  /// `shows`: false if the work is a part of other work that has a bar.
   explicit ProgressBar(bool shows = true);
-  /// Wipes the bar.
+  /// Removes the bar.
   ~ProgressBar();
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
 
-  /// A listener for one piece of work, called `label` in the bar, which returns false once the user has interrupted.
+  /// Returns a progress callback that shows `label` in the bar and returns false after an interrupt.
   /// Requires: this outlives it.
   [[nodiscard]] Progress listener(std::string label);
 

@@ -7,10 +7,10 @@
 
 namespace quoin::tool {
 
-/// What stands for standard input and output among the names of files.
+/// The file name that stands for standard input or output.
 inline constexpr const char* kStandardStream = "-";
 
-/// Standard input and output as files, for what reads and writes files: in a folder of their own that goes with this.
+/// Makes standard input and output available as files in a temporary folder, which the destructor removes.
 class StandardStreams {
  public:
   StandardStreams() = default;
@@ -18,19 +18,19 @@ class StandardStreams {
   StandardStreams& operator=(const StandardStreams&) = delete;
   ~StandardStreams();
 
-  /// Reads standard input to its end; the name of the file that has it. Errors: CannotRead, CannotWrite.
+  /// Copies standard input to a file. Returns its name. Errors: CannotRead, CannotWrite.
   [[nodiscard]] Result<std::filesystem::path> input();
-  /// Where the name is "-", does so and gives it the file's; from then on interrupts are heard of. Errors: those.
+  /// If `name` is "-", calls catch_interrupts() and replaces `name` by that of input(). Errors: those of input().
   [[nodiscard]] Status take_input(std::filesystem::path& name);
-  /// The name of a file with this ending, for `write_output`. Errors: CannotWrite.
+  /// Returns the name of a file with this extension, for `write_output`. Errors: CannotWrite.
   [[nodiscard]] Result<std::filesystem::path> output(const std::string& extension);
-  /// Copies that file to standard output. Errors: CannotRead, CannotWrite.
+  /// Copies the file of output() to standard output. Errors: CannotRead, CannotWrite.
   [[nodiscard]] Status write_output() const;
-  /// A file's name for people, without its folder.
+  /// Returns the display name of a file, without its folder.
   [[nodiscard]] std::string name_of(const std::filesystem::path& path) const;
-  /// The error in words of the streams, instead of the files' names.
+  /// Replaces the names of the temporary files in an error by "standard input" and "standard output".
   [[nodiscard]] Error named(Error error) const;
-  /// Removes the folder.
+  /// Removes the temporary folder.
   void remove();
 
  private:

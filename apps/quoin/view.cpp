@@ -37,7 +37,7 @@ struct ViewArguments {
 
 #ifdef QUOIN_HAVE_VIEWER
 
-/// Fails before a window opens where it is clear that the file cannot be shown.
+/// Fails before a window opens if the file format is unknown.
 Status check_input(const std::filesystem::path& path, bool is_raw) {
   if (path.empty()) return {};
   const auto format = detect_format(path);
@@ -98,7 +98,7 @@ int run_view(const ViewArguments&) {
 
 #endif
 
-/// Returns what is wrong with the usage, or "".
+/// Reads the remaining options. Returns a usage error, or "".
 std::string settle(const CLI::App& command, ViewArguments& arguments) {
   constexpr PictureSize kSmallest{320, 240};
   constexpr int kLongestSide = 16'384;

@@ -10,7 +10,7 @@ namespace quoin::tool {
 
 namespace {
 
-/// The box of all samples in Quoin's axes.
+/// Returns the bounds of all samples in Quoin's axes.
 DBox bounds_of(const Volume& volume) {
   DBox bounds;
   const DVec3 last = DVec3(volume.size - 1);

@@ -5,7 +5,7 @@
 
 namespace quoin::tool {
 
-/// `quoin info` of a file that holds a volume; the error of its reader, or the exit status.
+/// Runs `quoin info` on a volume. Returns the exit status, or the error of the reader.
 [[nodiscard]] Result<int> run_volume_info(const CommonOptions& options, const StandardStreams& streams);
 
 }  // namespace quoin::tool

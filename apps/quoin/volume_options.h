@@ -10,7 +10,7 @@
 
 namespace quoin::tool {
 
-/// The texts of options that are of volumes, which `read_volume_options` reads.
+/// Unparsed volume options; `read_volume_options` parses them.
 struct VolumeTexts {
   std::string iso;
   std::string raw_size;
@@ -20,26 +20,26 @@ struct VolumeTexts {
 
 /// Adds --raw-size, --raw-type and --raw-order.
 void add_raw_options(CLI::App& command, VolumeTexts& texts);
-/// These and --iso.
+/// Adds --iso and the raw options.
 void add_volume_options(CLI::App& command, VolumeTexts& texts);
 
-/// What these options say.
+/// Parsed volume options.
 struct VolumeArguments {
-  std::optional<double> iso;  ///< as it was written; a float holds it
+  std::optional<double> iso;  ///< the given value; within the range of float
   std::optional<RawVolume> raw;
 };
 
-/// Reads those that were given; returns what is wrong with them, or "".
+/// Parses the volume options. Returns a usage error, or "".
 [[nodiscard]] std::string read_volume_options(const CLI::App& command, const VolumeTexts& texts,
                                               VolumeArguments& arguments);
 
-/// Whether a command's input is a volume, by what the options say or by what it holds. Errors: CannotRead.
+/// Returns true if the input is a volume, by --raw-size or by its content. Errors: CannotRead.
 [[nodiscard]] Result<bool> holds_volume(const CommonOptions& options);
 
-/// Whether --iso means something to a command's input: a volume, or what may hold fog (.vdb).
+/// Returns true if --iso applies to the input: a volume, or a .vdb, which may have fog grids.
 [[nodiscard]] bool heeds_iso(const CommonOptions& options);
 
-/// Reads it as one. Errors: those of read_volume and read_raw_volume.
+/// Reads the input as a volume. Errors: those of read_volume and read_raw_volume.
 [[nodiscard]] Result<Volume> read_input_volume(const CommonOptions& options, const Progress& progress);
 
 }  // namespace quoin::tool

@@ -33,7 +33,7 @@ Stamps stamps_of(const WatchedWork& work) {
   return stamps;
 }
 
-/// Until the files are others than `known`, and have been so for an interval: who writes one may not be done yet.
+/// Waits until the files differ from `known` and did not change for one interval, because a writer may be unfinished.
 void wait_for_change(const WatchedWork& work, const Stamps& known) {
   Stamps last = known;
   while (!was_interrupted()) {
@@ -78,7 +78,7 @@ int watch(const std::vector<fs::path>& read, const std::function<WatchedWork()>&
   WatchedWork done;
   done.read = read;
   while (!was_interrupted()) {
-    // What changes while the work goes on has changed since: of files that were read before, too.
+    // Taken before the run, so that changes during the run count, also for files that were read before.
     const Stamps before = stamps_of(done);
     done = work();
     if (is_first && done.status == kWrongUsage) return done.status;

@@ -10,23 +10,23 @@
 
 namespace quoin::tool {
 
-/// What a piece of work came to. Of files `watch` alone needs to know.
+/// The result of one run of watched work. Only `watch` uses the files.
 struct WatchedWork {
   int status = 0;
-  std::vector<std::filesystem::path> read;     ///< files, and folders for all that is in them
-  std::vector<std::filesystem::path> written;  ///< whose changes count for nothing
+  std::vector<std::filesystem::path> read;     ///< files, and folders with all their files
+  std::vector<std::filesystem::path> written;  ///< changes to these files are ignored
 };
 
-/// What files are, by their names; of folders all that is in them.
+/// File stamps by path; folders include all files in them.
 using Stamps = std::map<std::filesystem::path, std::optional<FileStamp>>;
 [[nodiscard]] Stamps stamps_of(const std::vector<std::filesystem::path>& paths);
 
-/// A file, and all that is read beside it, as far as can be known before.
+/// Returns a file and its sidecar files, as far as they are known before reading.
 [[nodiscard]] std::vector<std::filesystem::path> files_read(const std::filesystem::path& input, SidecarFiles allowed);
 
-/// Does a piece of work, and again whenever what it read has changed and rests, until the program is interrupted, which
-/// ends it. `read`: what it will read, as far as is known. Returns only where the first time was wrong usage. Files are
-/// looked at, not listened to, so that any file system will do: four times a second.
+/// Runs `work`, and again each time its input files have changed and are stable, until an interrupt ends the program.
+/// `read`: the files it will read, as far as known. Returns only if the first run fails with wrong usage. Polls the
+/// files four times per second, which works on any file system.
 [[nodiscard]] int watch(const std::vector<std::filesystem::path>& read, const std::function<WatchedWork()>& work);
 
 }  // namespace quoin::tool

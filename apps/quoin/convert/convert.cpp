@@ -36,7 +36,7 @@ namespace quoin::tool {
 
 namespace {
 
-/// The surface of a grid as printers want it.
+/// Meshes a grid as a closed surface for 3D printing.
 Result<MeshPart> part_for_printing(const Scene& scene, GridHandle grid, MeshStats& stats) {
   auto surface = closed_surface(scene.grids()[grid].grid);
   if (!surface) return surface.error();
@@ -51,7 +51,7 @@ Result<MeshPart> part_for_printing(const Scene& scene, GridHandle grid, MeshStat
   return mesh_part({}, std::move(mesh));
 }
 
-/// How many units of the file a unit of the world has, so that the smallest voxels have a size in it.
+/// Returns the file units per world unit that make the smallest voxels `voxel` file units long.
 double scale_for_voxels(const Scene& scene, double voxel) {
   double least = std::numeric_limits<double>::infinity();
   for (const InstanceHandle handle : scene.instances().handles()) {
@@ -60,7 +60,7 @@ double scale_for_voxels(const Scene& scene, double voxel) {
   return std::isfinite(least) ? voxel / least : voxel;
 }
 
-/// Meshes the scene blockily and writes it, filling in `outcome`.
+/// Meshes the scene as blocks, writes it and fills in `outcome`.
 Status convert_blockily(const Scene& scene, const SceneAnimation& animation, const ConvertOptions& options,
                         Outcome& outcome) {
   Stopwatch watch;
@@ -87,8 +87,8 @@ Status convert_blockily(const Scene& scene, const SceneAnimation& animation, con
   return write_meshes(*meshes, options, bar, outcome);
 }
 
-/// From .vox to .vox all is kept, so what reading skipped is not lost; unless one frame is asked for, which then is
-/// all.
+/// From .vox to .vox all content is kept, so the warnings of the reader do not apply. With --frame only that frame is
+/// written, and the warnings name the content that is left out.
 void keep_what_is_asked_for(const ConvertOptions& options, const FormatInfo& format, LoadedScene& loaded,
                             std::vector<std::string>& warnings) {
   if (loaded.source == nullptr || format.format != FileFormat::Vox) return;
@@ -102,7 +102,7 @@ void keep_what_is_asked_for(const ConvertOptions& options, const FormatInfo& for
   loaded.source = nullptr;
 }
 
-/// All frames of a file, of which the first is there.
+/// Reads all frames of a file; `first` holds frame 0.
 Status read_frames(const LoadedScene& first, const ConvertOptions& options, SceneAnimation& animation) {
   constexpr std::int64_t kMaxFrames = 100'000;
   if (first.last_frame >= kMaxFrames) {
@@ -126,7 +126,7 @@ Status read_frames(const LoadedScene& first, const ConvertOptions& options, Scen
   return {};
 }
 
-/// What its animation shows of a file, with warnings of what that is not.
+/// Reads all frames of a file into `animation` and adds warnings about content it cannot show.
 Status animate(const LoadedScene& loaded, const ConvertOptions& options, SceneAnimation& animation, Outcome& outcome) {
   if (loaded.last_frame == 0) {
     outcome.warnings.emplace_back(
@@ -134,7 +134,7 @@ Status animate(const LoadedScene& loaded, const ConvertOptions& options, SceneAn
             ? "--animate has no effect: the file has one frame"
             : "--animate has no effect: only a .vox input is animated, not the .vox files of a scene");
   }
-  // The animation has no instance that is never shown.
+  // Hidden instances are not part of the animation.
   warn_of_left_out(loaded.scene, options.common.instances(), outcome.warnings);
   if (auto read = read_frames(loaded, options, animation); !read) return read;
   std::erase_if(outcome.warnings, [](const auto& each) { return each.starts_with("animated"); });
@@ -148,12 +148,12 @@ Status convert_to_meshes(const LoadedScene& loaded, const ConvertOptions& option
     outcome.seconds.read += watch.lap();
   }
   const auto convert = options.mesher == "smooth" ? convert_smoothly : convert_blockily;
-  // Models of .vox files, which alone are animated, never lie far from their origins.
+  // Only .vox files are animated, and their models are always near their origins.
   if (options.animate) return convert(animation.scene(), animation, options, outcome);
   return convert(near_grids(loaded.scene), animation, options, outcome);
 }
 
-/// What contradicts meshing blocks; empty when nothing does.
+/// Returns an error message if an option needs the smooth mesher, else "".
 std::string fault_of_blocks(const ConvertOptions& options) {
   if (options.has_field_occlusion) return "--ao-form, --ao-spread, --ao-offset and --ao-power need --mesher smooth";
   if (options.simplify) return "--simplify needs --mesher smooth";
@@ -161,13 +161,13 @@ std::string fault_of_blocks(const ConvertOptions& options) {
   return is_of_smooth ? "--smoothness, --colours and --no-unite need --mesher smooth" : "";
 }
 
-/// Whether it is the name of a format of triangles.
+/// Returns true if this is the name of a mesh format.
 bool format_is_mesh(const std::string& name) {
   const auto all = file_formats();
   return std::any_of(all.begin(), all.end(), [&](const FormatInfo& info) { return info.is_mesh && info.name == name; });
 }
 
-/// How the scene is meshed where nobody said it: as blocks, but for fields alone, which are smooth in any case.
+/// Returns the given mesher, or the default: smooth if the scene has only fields and there is no atlas, else greedy.
 std::string mesher_for(const Scene& scene, const ConvertOptions& options) {
   if (!options.mesher.empty()) return options.mesher;
   const bool is_smooth = scene.voxel_count() == 0 && solid_samples(scene) > 0 && options.texture != "atlas";
@@ -184,7 +184,7 @@ Result<SavedScene> save(const LoadedScene& loaded, const FormatInfo& format, con
   return write_world(loaded, options.output, threads, progress, std::move(more));
 }
 
-/// Reads a scene; a volume becomes a field at its surface value, which the outcome then has.
+/// Reads a scene. A volume becomes a field; its surface value is stored in the outcome.
 Result<LoadedScene> read_scene(const ConvertOptions& options, const LoadOptions& load, bool is_volume,
                                Outcome& outcome) {
   ProgressBar bar(!options.is_one_of_many);
@@ -207,7 +207,7 @@ Result<LoadedScene> read_scene(const ConvertOptions& options, const LoadOptions&
   return loaded;
 }
 
-/// Makes a scene fit a format of voxels.
+/// Converts a scene to the features of a voxel format.
 void fit_voxels(const ConvertOptions& options, const FormatInfo& format, bool is_volume, LoadedScene& loaded,
                 std::vector<std::string>& warnings) {
   const bool is_scan = is_volume || loaded.format == "vdb";
@@ -260,7 +260,7 @@ Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& f
   return outcome;
 }
 
-/// Draws what lies around a source's spawn, and puts that into the world that was made of it.
+/// Renders the area around the spawn of a source as the thumbnail of the converted world.
 Status add_thumbnail(const ChunkSource& source, const ConvertOptions& options) {
   constexpr int kRadius = 4;
   const Threads threads = options.common.threads;
@@ -276,7 +276,7 @@ Status add_thumbnail(const ChunkSource& source, const ConvertOptions& options) {
   return world->flush();
 }
 
-/// Puts a world that is read by chunks into one of Quoin's, whatever its size.
+/// Converts a world of any size chunk by chunk to a .quoin file.
 Result<Outcome> convert_by_chunks(const ConvertOptions& options) {
   Stopwatch watch;
   const auto source = open_chunk_source(options.common.input, options.common.load.dimension);
@@ -332,7 +332,7 @@ std::string outcome_text(const Outcome& outcome) {
   return text + bytes_for_people(outcome.bytes) + " in " + number_for_people(seconds) + " s\n";
 }
 
-/// What contradicts an atlas; empty when nothing does.
+/// Returns an error message if another option contradicts --texture atlas, else "".
 std::string fault_of_atlas(const ConvertOptions& options) {
   if (options.texture != "atlas") return "";
   const std::string reason = ": the atlas holds the occlusion of merged faces";
@@ -345,7 +345,7 @@ std::string fault_of_atlas(const ConvertOptions& options) {
   return options.watertight ? refused + "--watertight" + reason : "";
 }
 
-/// What contradicts light at vertices; empty when nothing does.
+/// Returns an error message if another option contradicts light at vertices, else "".
 std::string fault_of_light(const ConvertOptions& options) {
   if (!options.light) return "";
   const std::string reason = ": light is stored at the corners of faces";
@@ -354,7 +354,7 @@ std::string fault_of_light(const ConvertOptions& options) {
   return options.watertight && options.mesher != "smooth" ? refused + "--watertight" + reason : "";
 }
 
-/// Returns true if any content of the input is meshed as blocks: known before it is read, which may take long.
+/// Returns true if the input is certainly meshed as blocks. Does not read its content, which may take long.
 bool is_surely_blocks(const ConvertOptions& options, bool is_volume) {
   if (!options.mesher.empty()) return options.mesher != "smooth";
   const LoadOptions& load = options.common.load;
@@ -364,7 +364,7 @@ bool is_surely_blocks(const ConvertOptions& options, bool is_volume) {
          *format != FileFormat::Vdb;
 }
 
-/// What contradicts the kind of input; empty when nothing does.
+/// Returns an error message if an option does not fit the kind of input, else "".
 std::string fault_of_usage(const ConvertOptions& options, bool is_volume) {
   if (options.simplify && !can_simplify()) {
     return "cannot use --simplify: this build has no meshoptimizer (libmeshoptimizer-dev in Debian)";
@@ -388,11 +388,11 @@ std::string fault_of_usage(const ConvertOptions& options, bool is_volume) {
   return options.iso && !heeds_iso(options.common) ? "cannot use --iso: the input holds voxels, not a volume" : "";
 }
 
-/// What contradicts an input that holds no triangles; empty when nothing does.
+/// Returns an error message if an option needs triangles and the input has none, else "".
 std::string fault_of_mesh_input(const ConvertOptions& options, const FormatInfo& to) {
   if (options.mesh_input.empty()) return "";
   const auto format = detect_format(options.common.input);
-  // Reading says why nothing recognises a file, which may be one of triangles.
+  // An unrecognized file may be a triangle mesh. The reader reports why it is not recognized.
   if (!format || !*format || format_info(**format).is_mesh) return "";
   const bool may_have_field = heeds_iso(options.common) || *format == FileFormat::Scene || *format == FileFormat::World;
   if (options.mesh_input == "--solid" && may_have_field) {
@@ -409,7 +409,7 @@ Result<Outcome> convert(const ConvertOptions& options, const FormatInfo& format,
                                      : convert_scene(options, format, is_volume, fault);
 }
 
-/// Makes files of what is named "-". Returns what is wrong with that, or "".
+/// Replaces standard streams ("-") by temporary files. Returns a usage error, or "".
 Result<std::string> open_streams(ConvertOptions& options, const ManyOptions& many, StandardStreams& streams) {
   if (options.output == kStandardStream) {
     const auto format = format_for_writing("file." + many.to);
@@ -427,7 +427,7 @@ Result<std::string> open_streams(ConvertOptions& options, const ManyOptions& man
   return std::string();
 }
 
-/// Refuses an input that is not of the format that was named.
+/// Fails if the input is not in the format of --from.
 Status check_input(const ConvertOptions& options) {
   if (options.from.empty()) return {};
   const auto found = detect_format(options.common.input);
@@ -479,7 +479,7 @@ WatchedWork run_one(ConvertOptions& options, const ManyOptions& many) {
   return ended(kDone);
 }
 
-/// What keeps the command from going on by itself; empty when nothing does.
+/// Returns an error message if another option contradicts --watch, else "".
 std::string fault_of_watching(const ConvertOptions& options, const ManyOptions& many) {
   if (!options.watch) return "";
   if (options.common.json) return "--watch and --json cannot be used together";
@@ -561,7 +561,7 @@ void add_mesh_file_options(CLI::App& command, ConvertOptions& options) {
       ->check(positive());
 }
 
-/// Reads the options of smooth occlusion; returns what is wrong with them, or with others beside them, or "".
+/// Reads the options of smooth occlusion. Returns a usage error, or "".
 std::string read_occlusion(const CLI::App& command, ConvertOptions& options) {
   if (options.occlusion_off) {
     const char* const given = options.occlusion_apart ? "--ao-attribute" : given_field_occlusion(command);
@@ -583,7 +583,7 @@ std::string readable_names() {
   return names;
 }
 
-/// Tells OUT from further inputs; returns what is wrong with the names of files, or "".
+/// Separates OUT from further inputs. Returns a usage error, or "".
 std::string read_files(const std::vector<std::filesystem::path>& rest, ConvertOptions& options, ManyOptions& many) {
   const bool is_to_stream = rest.size() == 1 && rest.front() == kStandardStream;
   if (!many.to.empty() && !is_to_stream) {
@@ -604,7 +604,7 @@ std::string read_files(const std::vector<std::filesystem::path>& rest, ConvertOp
   return "";
 }
 
-/// Reads the options of volumes; returns what is wrong with them, or "".
+/// Reads the volume options. Returns a usage error, or "".
 std::string read_texts(const CLI::App& command, const VolumeTexts& texts, ConvertOptions& options) {
   VolumeArguments volume;
   std::string fault = read_volume_options(command, texts, volume);
@@ -616,7 +616,7 @@ std::string read_texts(const CLI::App& command, const VolumeTexts& texts, Conver
 
 }  // namespace
 
-/// Faces of blocks. A field that is meshed has triangles instead; one that is not has no faces that could be counted.
+/// Returns the number of block faces. For fields returns the number of triangles, or null without a mesh.
 Json faces_json(const Outcome& outcome, std::int64_t of_blocks) {
   const bool is_field = outcome.content.voxels == 0 && outcome.content.solid_samples > 0;
   if (!is_field) return of_blocks;
@@ -732,7 +732,7 @@ MeshFileOptions mesh_file_options(const ConvertOptions& options, FileFormat form
   return file;
 }
 
-/// Warns of open edges in files for printers, and of coordinates that are relative to a point.
+/// Warns of open edges in 3D printing files and of coordinates relative to an offset.
 void warn_of_meshes(const SceneMeshes& meshes, FileFormat format, const MeshFileOptions& file,
                     std::vector<std::string>& warnings) {
   if (is_for_printing(format)) {
@@ -766,7 +766,7 @@ Status write_meshes(SceneMeshes& meshes, const ConvertOptions& options, Progress
   const auto files = mesh_files(meshes, options.output);
   if (!files) return files.error();
   outcome.files = *files;
-  // Of OUT's companions, which the user did not name, nobody has heard yet.
+  // The earlier check covers only OUT, not the files written next to it.
   for (const auto& file : *files) {
     if (auto kept = check_replaced(file, options.inputs, options.force); !kept) return kept;
   }
@@ -829,7 +829,7 @@ std::string footer() {
          "Example: quoin convert scan.nii.gz scan.ply --ao-form weighted --ao-spread 4 --ao-attribute";
 }
 
-/// Reads what CLI11 left as text, and what only all options together say; returns what is wrong, or "".
+/// Reads options that CLI11 leaves as text and checks combinations of options. Returns a usage error, or "".
 std::string read_options(const CLI::App& command, const VolumeTexts& texts, const MeshInputTexts& triangles,
                          const std::vector<std::filesystem::path>& rest, ConvertOptions& options, ManyOptions& many) {
   std::size_t given = 0;

@@ -23,41 +23,41 @@
 
 namespace quoin::tool {
 
-/// What `quoin convert` was asked for.
+/// The options of `quoin convert`.
 struct ConvertOptions {
   CommonOptions common;
   std::filesystem::path output;
-  FileSet inputs;    ///< what is never replaced: all that are read
-  std::string from;  ///< the only format that is read; empty: any
+  FileSet inputs;    ///< all input files, which are never overwritten
+  std::string from;  ///< the required input format; empty: any
   bool force = false;
-  bool is_from_stream = false;  ///< IN is standard input, which has no name
-  bool is_one_of_many = false;  ///< shows no progress of its own
-  std::string mesher;           ///< empty: greedy for voxels, smooth for volumes
+  bool is_from_stream = false;  ///< IN is standard input and has no name
+  bool is_one_of_many = false;  ///< shows no progress bar
+  std::string mesher;           ///< empty: greedy for voxels, smooth for volumes and fields
   bool occlusion_off = false;
-  bool occlusion_apart = false;  ///< as an attribute, not in the colours
+  bool occlusion_apart = false;  ///< writes occlusion as an attribute, not in the colours
   SmoothOcclusionOptions field_occlusion;
-  bool has_field_occlusion = false;  ///< one of its options was given
+  bool has_field_occlusion = false;  ///< an option of `field_occlusion` was given
   bool watertight = false;
   std::optional<double> iso;
   std::optional<double> simplify;
-  std::optional<double> smoothness;  ///< of smooth surfaces around voxels
+  std::optional<double> smoothness;  ///< for smooth surfaces around voxels
   std::optional<std::string> colours;
-  std::string texture = "palette";    ///< or "atlas"
-  std::optional<LightOptions> light;  ///< propagated, at vertices
-  bool animate = false;               ///< all frames, as an animation of glTF
-  double frames_per_second = 10.0;    ///< of `animate`
-  bool apart = false;                 ///< instances are not united
+  std::string texture = "palette";    ///< "palette" or "atlas"
+  std::optional<LightOptions> light;  ///< propagated light, stored at vertices
+  bool animate = false;               ///< writes all frames as a glTF animation
+  double frames_per_second = 10.0;    ///< for `animate`
+  bool apart = false;                 ///< meshes touching instances separately
   std::optional<double> scale;
-  std::optional<double> voxel_mm;     ///< millimetres a voxel, of files for printing
+  std::optional<double> voxel_mm;     ///< millimetres per voxel in .stl and .3mf
   std::string up;                     ///< "y", "z"; empty: z for .ply, .stl and .3mf, else y
-  bool compress = false;              ///< of glTF, as MeshFileOptions has it
-  bool quantize = false;              ///< of glTF, as MeshFileOptions has it
-  bool mesh_only = false;             ///< any option that only meshes heed was given
-  std::string mesh_input;             ///< an option that is of triangles alone, if one was given
-  bool lights = false;                ///< of glTF: lamps and cameras too
-  std::vector<FileCamera> cameras{};  ///< of the file, where `lights` wants them
-  bool as_voxels = false;             ///< --solid: fields become voxels in formats that hold fields too
-  bool watch = false;                 ///< goes on whenever the input changes
+  bool compress = false;              ///< see MeshFileOptions, glTF only
+  bool quantize = false;              ///< see MeshFileOptions, glTF only
+  bool mesh_only = false;             ///< an option that only applies to meshes was given
+  std::string mesh_input;             ///< a given option that only applies to triangle meshes, or ""
+  bool lights = false;                ///< writes lamps and cameras, glTF only
+  std::vector<FileCamera> cameras{};  ///< the cameras of the input, for `lights`
+  bool as_voxels = false;             ///< --solid: converts fields to voxels even if OUT can hold fields
+  bool watch = false;                 ///< converts again when the input changes
 };
 
 struct Seconds {
@@ -66,22 +66,22 @@ struct Seconds {
   double write = 0;
 };
 
-/// What came of it.
+/// The result of a conversion.
 struct Outcome {
   bool is_volume = false;
-  SceneContent content;  ///< of a volume its solid samples alone
+  SceneContent content;  ///< for a volume only the solid samples
   std::string mesher;    ///< empty: nothing was meshed
   MeshStats meshes;
-  FaceCounts faces;           ///< of blocks
-  std::optional<double> iso;  ///< of volumes
-  bool is_iso_found = false;  ///< between two groups of values rather than given, or all there is
+  FaceCounts faces;           ///< block faces
+  std::optional<double> iso;  ///< for volumes
+  bool is_iso_found = false;  ///< chosen between two groups of values, not given
   std::uint64_t bytes = 0;
-  std::vector<std::filesystem::path> files;  ///< all that were written, OUT first
+  std::vector<std::filesystem::path> files;  ///< all written files, OUT first
   Seconds seconds;
   std::vector<std::string> warnings;
 };
 
-/// Converts one file. Where the options contradict what the file holds, `fault` says how, as the error does.
+/// Converts one file. If the options do not fit the content of the file, `fault` gets the message of the error.
 [[nodiscard]] Result<Outcome> convert_file(const ConvertOptions& options, const FormatInfo& format, std::string& fault);
 
 /// Returns true for formats that hold voxels and no fields.
@@ -90,65 +90,65 @@ struct Outcome {
          format.format != FileFormat::World && format.format != FileFormat::Vdb;
 }
 
-/// Puts voxels in place of all fields of a scene: one for each solid sample.
+/// Replaces all fields of a scene by voxels, one per solid sample.
 void make_voxels_of_fields(Scene& scene, Threads threads, std::vector<std::string>& warnings);
 
-/// Turns instances that no quarter turns place to the nearest ones.
+/// Rotates each instance to the nearest rotation by quarter turns.
 void turn_by_quarters(Scene& scene, std::vector<std::string>& warnings);
 
 /// Makes voxels one unit long, for formats whose voxels have no size. The first instance moves to the origin, the
 /// others stay where they are relative to it.
 void stand_at_unit_size(Scene& scene, const FormatInfo& format, std::vector<std::string>& warnings);
 
-/// Adds lamps and cameras where they are wanted; else warns of lamps.
+/// Adds lamps and cameras if `options.lights` is set, else warns of lamps that are left out.
 void add_lights(const Scene& scene, const ConvertOptions& options, SceneMeshes& meshes,
                 std::vector<std::string>& warnings);
 
-/// Whether a format is for printers: meshes are to be closed.
+/// Returns true for 3D printing formats, whose meshes must be closed.
 [[nodiscard]] inline bool is_for_printing(FileFormat format) {
   return format == FileFormat::Stl || format == FileFormat::ThreeMf;
 }
 
-/// What is wrong with the options for files of a format; empty when nothing is.
+/// Returns an error message if the options do not fit the output format, else "".
 [[nodiscard]] std::string fault_of_format(const ConvertOptions& options, const FormatInfo& format);
 
 [[nodiscard]] Json outcome_json(const Outcome& outcome);
 
-/// What makes many files of many.
+/// Options for converting several files.
 struct ManyOptions {
   std::vector<std::filesystem::path> inputs;  ///< files and folders
   std::optional<std::filesystem::path> folder;
-  std::string to;  ///< an ending, with its dot or without
+  std::string to;  ///< an extension, with or without its dot
   bool recursive = false;
 };
 
-/// By input, what it and all that is read beside it were when it was converted.
+/// For each converted input, the stamps of its files at that time.
 using Converted = std::map<std::filesystem::path, Stamps>;
 
-/// Converts each of the inputs, several at once; those that fail are named last. `done`: for `options.watch`, those
-/// that are in it are left out until they change; gets what is converted now.
+/// Converts all inputs in parallel and prints the failures last. With `options.watch`, skips the inputs in `done` that
+/// have not changed, and adds those converted now.
 [[nodiscard]] WatchedWork run_many(const ConvertOptions& options, const ManyOptions& many, Converted& done);
 
-/// Writes what has been meshed, filling in `outcome`.
+/// Writes meshes and fills in `outcome`.
 [[nodiscard]] Status write_meshes(SceneMeshes& meshes, const ConvertOptions& options, ProgressBar& bar,
                                   Outcome& outcome);
 
-/// Meshes a scene smoothly and writes it, filling in `outcome`. With `options.animate` it is that of the animation.
+/// Meshes a scene smoothly, writes it and fills in `outcome`. With `options.animate`, the scene is that of `animation`.
 [[nodiscard]] Status convert_smoothly(const Scene& scene, const SceneAnimation& animation,
                                       const ConvertOptions& options, Outcome& outcome);
 
-/// Copies a world (.quoin) to another, row by row.
+/// Copies a world (.quoin) to another file, row by row.
 [[nodiscard]] Result<Outcome> copy_world_file(const ConvertOptions& options);
 
-/// Counts the faces of the world OUT, for --json: it takes a second reading of the world.
+/// Counts the faces of the world OUT for --json. Reads the world again.
 [[nodiscard]] Status count_faces_of_output(const ConvertOptions& options, Outcome& outcome);
 
-/// Whether what is asked for is made of a world chunk by chunk.
+/// Returns true if the options allow meshing a world chunk by chunk.
 [[nodiscard]] bool meshes_by_chunks(const ConvertOptions& options);
-/// Meshes a world (.quoin) chunk by chunk and writes it; nothing, and nothing is written, where it holds densities.
+/// Meshes a world (.quoin) chunk by chunk and writes it. Returns nullopt and writes no file if it holds densities.
 [[nodiscard]] Result<std::optional<Outcome>> mesh_world_file(const ConvertOptions& options);
 
-/// Reads a volume, meshes it and writes it.
+/// Reads a volume, meshes it and writes the mesh.
 [[nodiscard]] Result<Outcome> convert_volume(const ConvertOptions& options, const FormatInfo& format);
 
 }  // namespace quoin::tool

@@ -15,7 +15,7 @@ namespace quoin::tool {
 
 namespace {
 
-/// The type of samples without a material.
+/// Returns the type for samples without a material: plain white.
 VoxelType type_without_name(Scene& scene) {
   VoxelProperties white;
   white.colour = {255, 255, 255, 255};
@@ -23,7 +23,7 @@ VoxelType type_without_name(Scene& scene) {
   return type ? *type : VoxelType{1};
 }
 
-/// Places the voxels of a field wherever its grid is placed.
+/// Adds an instance of `voxels` for each instance of the grid `of_field`.
 void place_voxels(Scene& scene, GridHandle of_field, SceneGrid voxels) {
   const GridHandle added = scene.add_grid(std::move(voxels));
   for (const InstanceHandle handle : scene.instances().handles()) {
@@ -34,7 +34,7 @@ void place_voxels(Scene& scene, GridHandle of_field, SceneGrid voxels) {
   }
 }
 
-/// The rotation by quarter turns that is nearest to another.
+/// Returns the nearest rotation by quarter turns.
 DQuat nearest_quarters(const DQuat& rotation) {
   const glm::dmat3 axes = glm::mat3_cast(glm::normalize(rotation));
   std::array<int, 3> row_of = {0, 1, 2};
@@ -52,7 +52,7 @@ DQuat nearest_quarters(const DQuat& rotation) {
     const int row = best[static_cast<std::size_t>(column)];
     quarters[column][row] = axes[column][row] < 0.0 ? -1.0 : 1.0;
   }
-  // Rounding may mirror what is turned by 45 degrees: then the axis that is farthest off points the other way.
+  // For angles near 45 degrees, rounding can produce a mirror image: flip the axis with the largest error.
   if (glm::determinant(quarters) < 0.0) {
     int weakest = 0;
     const auto length = [&](int column) { return std::abs(glm::dot(axes[column], quarters[column])); };
@@ -112,7 +112,7 @@ void stand_at_unit_size(Scene& scene, const FormatInfo& format, std::vector<std:
     placed.position = (placed.position - first.position) / first.voxel_size;
     placed.voxel_size /= first.voxel_size;
   }
-  // The pivot of a field's voxels lies between them.
+  // The pivot of voxels made from a field is between voxels: move all instances to whole coordinates.
   const DVec3 corner = world_from_grid(scene.instances()[handles.front()], scene.grids()[first.grid], DVec3(0.0));
   const DVec3 moved = glm::round(corner) - corner;
   for (const InstanceHandle handle : handles) scene.edit(handle).position += moved;

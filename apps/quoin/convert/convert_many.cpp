@@ -19,20 +19,20 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// One file of many, and what came of it.
+/// One of several files, and the result of its conversion.
 struct Task {
   fs::path input;
   fs::path output;
   std::optional<Outcome> outcome;
   std::optional<Error> error;
-  Stamps stamps{};  ///< of the input and what is read beside it, before it is read
+  Stamps stamps{};  ///< of the input and its sidecar files, taken before reading
 };
 
 Error error_of(const fs::path& path, const std::error_code& code) {
   return make_error(ErrorCode::CannotRead, code.message(), path.string());
 }
 
-/// Whether a file of this name is meant to be read, whatever it holds. A .json may be anything.
+/// Returns true if the extension is that of a readable format. A .json file does not count: it can be anything.
 bool is_named_to_be_read(const fs::path& file) {
   const auto formats = file_formats();
   return std::any_of(formats.begin(), formats.end(), [&](const FormatInfo& format) {
@@ -40,8 +40,9 @@ bool is_named_to_be_read(const fs::path& file) {
   });
 }
 
-/// Files in a folder and below that can be read, or should be, in the order of their names; not those below `without`,
-/// nor meshes beside models of their name, which were made of them. `errors` gets the folders that cannot be read.
+/// Returns the files in a folder and its subfolders that are readable or have a readable extension, sorted by name.
+/// Skips files below `without`, and meshes next to a model of the same name, which were made from it. Adds unreadable
+/// folders to `errors`.
 Result<std::vector<fs::path>> files_below(const fs::path& folder, const std::optional<fs::path>& without,
                                           std::vector<Error>& errors) {
   std::vector<fs::path> found;
@@ -54,13 +55,13 @@ Result<std::vector<fs::path>> files_below(const fs::path& folder, const std::opt
     if (at->is_directory(is_broken)) {
       const fs::directory_iterator opened(at->path(), is_broken);
       if (is_broken) errors.push_back(error_of(at->path(), is_broken));
-      // Of what was written there before, more is not to be made.
+      // Do not convert the results of earlier runs.
       if (is_broken || (without && is_same_file(*without, at->path()))) at.disable_recursion_pending();
       continue;
     }
     if (!at->is_regular_file(is_broken)) continue;
     const auto format = detect_format(at->path());
-    // What cannot be opened is to be heard of; what is no format of ours is not meant.
+    // Keep files that cannot be opened, to report them. Skip files in unknown formats.
     if (format && !*format && !is_named_to_be_read(at->path())) continue;
     const bool is_mesh = format && *format && format_info(**format).is_mesh;
     (is_mesh ? meshes : found).push_back(at->path());
@@ -73,7 +74,7 @@ Result<std::vector<fs::path>> files_below(const fs::path& folder, const std::opt
   return found;
 }
 
-/// All that is to be done. `errors` gets what cannot be looked at.
+/// Returns one task per input file. Adds inputs that cannot be listed to `errors`.
 std::vector<Task> plan(const ManyOptions& many, const std::string& extension, std::vector<Error>& errors) {
   std::vector<Task> tasks;
   const auto add = [&](const fs::path& input, const fs::path& beside, const fs::path& below) {
@@ -106,14 +107,14 @@ std::vector<Task> plan(const ManyOptions& many, const std::string& extension, st
   return tasks;
 }
 
-/// One name for each file, however its folder is named.
+/// Returns a path that is the same for all names of the same folder.
 fs::path real_name(const fs::path& file) {
   std::error_code unknown;
   const fs::path folder = fs::weakly_canonical(fs::absolute(file, unknown).parent_path(), unknown);
   return unknown ? file.lexically_normal() : folder / file.filename();
 }
 
-/// Two files that would become one; empty where there are none. Files that are named twice are one task.
+/// Returns an error message if two inputs have the same output, else "". Merges tasks with the same input.
 std::string fault_of_plan(std::vector<Task>& tasks) {
   std::map<fs::path, fs::path> made;
   std::vector<Task> kept;
@@ -147,7 +148,7 @@ void run_task(const ConvertOptions& wanted, const FormatInfo& format, Task& task
   if (task.error && task.error->path.empty()) task.error->path = task.input.string();
 }
 
-/// What would come of what has not changed is there already.
+/// Removes tasks whose inputs have not changed since their conversion.
 void leave_out(const Converted& done, SidecarFiles allowed, std::vector<Task>& tasks, WatchedWork& work) {
   for (Task& task : tasks) {
     work.written.push_back(task.output);
@@ -161,7 +162,7 @@ void leave_out(const Converted& done, SidecarFiles allowed, std::vector<Task>& t
   });
 }
 
-/// What failed is tried again only once it has changed, too.
+/// Records the stamps of all tasks. Failed tasks also run again only after a change.
 void note(const std::vector<Task>& tasks, Converted& done, WatchedWork& work) {
   for (const Task& task : tasks) {
     done[task.input] = task.stamps;
@@ -170,7 +171,7 @@ void note(const std::vector<Task>& tasks, Converted& done, WatchedWork& work) {
   }
 }
 
-/// Several at once; where there are fewer files than threads, each has its share of these.
+/// Runs the tasks in parallel. If there are fewer files than threads, each file gets an equal share of the threads.
 void run_tasks(ConvertOptions options, const FormatInfo& format, std::vector<Task>& tasks) {
   const unsigned threads = thread_count(options.common.threads);
   const auto files = static_cast<unsigned>(std::max<std::size_t>(tasks.size(), 1));
@@ -194,7 +195,7 @@ struct Totals {
   double seconds = 0;
 };
 
-/// `errors`: of what could not be looked at, beside those of the tasks.
+/// `errors`: inputs that could not be listed; the tasks hold their own errors.
 Json json_of(const std::vector<Task>& tasks, const std::vector<Error>& errors, const Totals& totals) {
   Json converted = Json::array();
   Json failed = Json::array();
@@ -211,7 +212,7 @@ Json json_of(const std::vector<Task>& tasks, const std::vector<Error>& errors, c
   return {{"converted", converted}, {"failed", failed}, {"bytes", totals.bytes}, {"seconds", totals.seconds}};
 }
 
-/// What failed comes last. Returns as `print`.
+/// Prints the errors last. Returns the exit status, as `print` does.
 int print_text(const std::vector<Task>& tasks, const std::vector<Error>& errors, const Totals& totals) {
   std::string text;
   for (const Task& task : tasks) {

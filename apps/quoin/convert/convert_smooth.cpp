@@ -40,7 +40,8 @@ SmoothSceneOptions scene_options(const ConvertOptions& options) {
   return wanted;
 }
 
-/// The colours of vertices in formats other than glTF have neither light nor alpha.
+/// Warns if the output loses glow or transparency: outside glTF, vertex colours have no emission, and .obj and .ply
+/// have no alpha.
 void warn_of_looks(const Scene& scene, const ConvertOptions& options, std::vector<std::string>& warnings) {
   const InstanceFilter filter = options.common.instances();
   std::set<GridHandle> drawn;
@@ -64,7 +65,7 @@ void warn_of_looks(const Scene& scene, const ConvertOptions& options, std::vecto
   if (is_lost && (!is_gltf || options.light)) warnings.emplace_back("glowing voxels become surfaces that do not glow");
 }
 
-/// Puts a volume into the file's unit: glTF's is the metre, the others have none.
+/// Scales a volume to metres for glTF. The other formats have no unit.
 void scale_to(const FormatInfo& format, const std::string& unit, SceneMeshes& meshes) {
   if (format.format != FileFormat::Glb && format.format != FileFormat::Gltf) return;
   const double metres = metres_of_unit(unit).value_or(1.0);

@@ -9,7 +9,7 @@
 
 namespace quoin::tool {
 
-/// The texts of options that say how triangles become voxels.
+/// Given options for converting triangles to voxels.
 struct MeshInputTexts {
   bool is_solid = false;
   bool is_surface = false;
@@ -22,11 +22,11 @@ struct MeshInputTexts {
 /// Adds --size, --voxel, --solid, --surface, --field, --separating, --parity, --band, --max-colours and --input-up.
 void add_mesh_input_options(CLI::App& command, MeshInputTexts& texts, MeshLoadOptions& options);
 
-/// Reads those that were given; returns what is wrong with them, or "".
+/// Reads these options. Returns a usage error, or "".
 [[nodiscard]] std::string read_mesh_input_options(const CLI::App& command, const MeshInputTexts& texts,
                                                   MeshLoadOptions& options);
 
-/// The first of these options that was given; null without any.
+/// Returns the first of these options that was given, or null.
 [[nodiscard]] const char* given_mesh_input(const CLI::App& command);
 
 }  // namespace quoin::tool

@@ -30,7 +30,7 @@ std::optional<DVec3> triple_of(const Object& camera, const char* key) {
   return is_finite(triple) ? std::optional(triple) : std::nullopt;
 }
 
-// What is wrong with it, or "".
+// Returns an error message, or "".
 std::string camera_from_json(const Object& object, Camera& out) {
   if (!object.is_object()) return "is not an object";
   for (const auto& [key, value] : object.items()) {

@@ -7,12 +7,12 @@
 
 namespace quoin::tool {
 
-/// The cameras of a film: a JSON array of objects as `quoin render --json` prints them under "camera", with `position`;
-/// `forward` or `look_at`; and, where they are not the usual ones, `up`, `fov` (degrees) and `view_height`, which makes
-/// one orthographic.
+/// Reads the cameras of an image series from a JSON array of objects, as `quoin render --json` prints under "camera".
+/// Each object has `position` and either `forward` or `look_at`. Optional: `up`, `fov` (degrees) and, for
+/// orthographic cameras, `view_height`.
 ///
-/// Errors: CannotRead; BadFormat, which names the camera, for what is no such array, empty ones, more than a million
-///         cameras, and cameras that cannot be.
+/// Errors: CannotRead; BadFormat if the file is not such an array, is empty or has more than a million cameras; for an
+///         invalid camera, the message has its index.
 [[nodiscard]] Result<std::vector<Camera>> read_camera_path(const std::filesystem::path& path);
 
 }  // namespace quoin::tool

@@ -33,7 +33,7 @@ std::optional<fs::path> find_program(const std::string& name) {
   return std::nullopt;
 }
 
-// Its exit status; what it prints goes to standard error, and it reads nothing.
+// Runs a program and returns its exit status. Its output goes to standard error, and its input is empty.
 Result<int> run(const fs::path& program, std::vector<std::string> words) {
   words.insert(words.begin(), program.string());
   std::vector<char*> arguments;
@@ -55,13 +55,13 @@ Result<int> run(const fs::path& program, std::vector<std::string> words) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
-// The number in OUT-007.png, as text.
+// Returns the number in OUT-007.png as text: "007".
 std::string number_in(const fs::path& picture) {
   const std::string stem = picture.stem().string();
   return stem.substr(stem.rfind('-') + 1);
 }
 
-// A name in which ffmpeg sees nothing but a name.
+// Escapes a name so that ffmpeg sees no number pattern in it.
 std::string escaped(const std::string& name) {
   std::string out;
   for (const char letter : name) out += letter == '%' ? std::string("%%") : std::string(1, letter);
@@ -106,7 +106,7 @@ Result<std::uint64_t> Movie::write(const std::vector<fs::path>& pictures, double
       "-nostdin", "-hide_banner", "-loglevel", "error", "-y", "-framerate", std::to_string(frames_per_second),
       "-start_number", std::to_string(std::stol(first)), "-i", escaped(folder().string()) + "/" + pattern, "-frames:v",
       std::to_string(pictures.size()),
-      // Even sides, as chroma of half size needs; colours of BT.709, and said so.
+      // Even width and height, as half-size chroma needs; BT.709 colours, with matching metadata.
       "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv", "-pix_fmt", "yuv420p",
       "-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv"};
   const std::vector<std::string> codec =

@@ -10,24 +10,24 @@
 
 namespace quoin::tool {
 
-/// Whether a name is that of a film in one file: .mp4 or .webm.
+/// Returns true for the file name of a video: .mp4 or .webm.
 [[nodiscard]] bool is_movie(const std::filesystem::path& path);
 
-/// A film in one file, which the program ffmpeg makes of numbered pictures. These lie in a folder beside it until it is
-/// done, so that one that was interrupted can be gone on with.
+/// A video that ffmpeg encodes from numbered images. The images are in a folder next to the video until it is complete,
+/// so that an interrupted render can resume.
 class Movie {
  public:
   explicit Movie(std::filesystem::path output) : output_(std::move(output)) {}
 
-  /// The folder of the pictures, and OUT.png in it, of which their numbered names are made.
+  /// The folder of the images, and the name in it that the numbered names extend.
   [[nodiscard]] std::filesystem::path folder() const;
   [[nodiscard]] std::filesystem::path picture() const;
 
-  /// Makes the folder; unless `resume` an empty one. Errors: Unsupported where there is no ffmpeg; CannotWrite.
+  /// Creates the folder, and empties it unless `resume`. Errors: Unsupported without ffmpeg; CannotWrite.
   [[nodiscard]] Status begin(bool resume) const;
-  /// Makes the film, which appears whole or not at all, and removes the pictures. Returns its size.
-  /// `pictures`: numbered one after the other.
-  /// Errors: CannotWrite, with the exit status of ffmpeg, which says the rest.
+  /// Encodes the video, complete or not at all, and removes the images. Returns the file size.
+  /// `pictures`: files with consecutive numbers.
+  /// Errors: CannotWrite, with the exit status of ffmpeg, which prints its own messages.
   [[nodiscard]] Result<std::uint64_t> write(const std::vector<std::filesystem::path>& pictures,
                                             double frames_per_second) const;
 

@@ -21,7 +21,7 @@ constexpr double kRadians = std::numbers::pi / 180.0;
 constexpr std::array kPathOptions = {
     "--bounces",     "--sky",   "--sky-turn", "--tone",       "--sun-angle", "--sun-time", "--ground", "--transparent",
     "--lens-radius", "--focus", "--fog",      "--fog-colour", "--bloom",     "--vignette", "--look",   "--denoise"};
-// What all light has, and a file may say too.
+// Options of all light models that a scene file can also set.
 constexpr std::array kCommonOptions = {"--sun", "--sky-brightness", "--exposure"};
 constexpr std::array kOtherLight = {"--preset",      "--ao",          "--ao-rays",         "--ao-affects",
                                     "--ao-distance", "--ao-form",     "--ao-spread",       "--ao-offset",
@@ -33,7 +33,7 @@ std::optional<double> read_sun_angle(const std::string& text) {
   return degrees && *degrees >= 0.0 && *degrees <= 170.0 ? degrees : std::nullopt;
 }
 
-// Numbers with commas between them, from `least` to `most` of them.
+// Parses `least` to `most` numbers with commas between them.
 std::optional<std::vector<double>> read_numbers(const std::string& text, std::size_t least, std::size_t most) {
   std::vector<double> numbers;
   for (std::size_t from = 0; from <= text.size();) {
@@ -46,7 +46,7 @@ std::optional<std::vector<double>> read_numbers(const std::string& text, std::si
   return numbers.size() >= least && numbers.size() <= most ? std::optional(numbers) : std::nullopt;
 }
 
-// "06-21,18.5,52".
+// Parses month, day, hour and latitude: "06-21,18.5,52".
 std::optional<SunTime> read_sun_time(const std::string& text) {
   const std::size_t dash = text.find('-');
   const std::size_t comma = text.find(',');
@@ -100,7 +100,7 @@ ToneCurve tone_of(const std::string& name) {
   return name == "aces" ? ToneCurve::Aces : ToneCurve::Neutral;
 }
 
-// The image of a .vox file's sky, if it lies in the file's folder: MagicaVoxel has it in a folder of its own.
+// Reads the sky image of a .vox file from the folder of that file. MagicaVoxel keeps it in its own folder.
 Result<RadianceImage> environment_beside(const CommonOptions& common, const std::string& name) {
   const std::string file = name.substr(name.find_last_of("/\\") + 1);
   const auto path = sidecar_path(common.input, file, common.load.sidecar_files);

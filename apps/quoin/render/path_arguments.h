@@ -15,17 +15,17 @@
 
 namespace quoin::tool {
 
-/// "0.05,20": how dense fog is, and up to which height.
+/// Fog density and upper end: "0.05,20".
 struct FogPlace {
   double density = 0.0;
   std::optional<double> top;
 };
 
-/// What `quoin render --light path` was asked for besides what all light has.
+/// The options of `quoin render --light path` that other light models do not have.
 struct PathArguments {
-  std::set<std::string> given;  ///< the names of the options that were; what was not says the file, or the default
+  std::set<std::string> given;  ///< names of the given options; others use the file's settings or the defaults
   int bounces = 8;
-  std::string sky = "gradient";  ///< or the name of a file
+  std::string sky = "gradient";  ///< or a file name
   std::string tone = "neutral";
   std::string look = "file";
   double sun_angle_degrees = 0.53;
@@ -42,35 +42,36 @@ struct PathArguments {
   double vignette = 0.0;
   bool denoise = false;
 
-  /// Whether an option was given.
+  /// Returns true if the option was given.
   [[nodiscard]] bool has(const std::string& option) const { return given.contains(option); }
 };
 
-/// How pictures by paths of a scene are taken.
+/// Settings for path-traced images of a scene.
 struct PathPlan {
   PathOptions options;
   DevelopOptions develop;
   bool is_exposure_automatic = false;
   bool is_transparent = false;
   bool denoise = false;
-  std::optional<double> focus;  ///< none: the scene's middle
+  std::optional<double> focus;  ///< nullopt: the centre of the scene
   std::vector<std::string> warnings;
 };
 
 void add_path_options(CLI::App& command, PathArguments& arguments);
 
-/// The options that only --light path has.
+/// Returns the first given option that only --light path has, or "".
 [[nodiscard]] std::string given_path_option(const CLI::App& command);
-/// What --light path does not have, of the options that were given; "": nothing.
+/// Returns an error message if a given option cannot be used with --light path, else "".
 [[nodiscard]] std::string fault_of_path_options(const CLI::App& command);
-/// Reads those that are texts; returns what is wrong, or "".
+/// Reads the options that CLI11 leaves as text. Returns a usage error, or "".
 [[nodiscard]] std::string read_path_options(const CLI::App& command, PathArguments& arguments);
 
-/// Whether the sky is a file, which is then read when the picture is taken.
+/// Returns true if the sky is an image file, which `plan_paths` reads.
 [[nodiscard]] bool is_sky_file(const PathArguments& arguments);
 
-/// Takes the options, else the settings of the scene's file (IN), else the defaults. `file_camera`: the number of
-/// its camera that looks. Errors: of the sky's file where an option names it; the file's own is named in a warning.
+/// Takes each setting from the options, else from the scene file (IN), else the default. `file_camera`: the number of
+/// the camera of the file that is used. Errors: those of reading the sky image of --sky. An unreadable sky image of the
+/// scene file only gives a warning.
 [[nodiscard]] Result<PathPlan> plan_paths(const PathArguments& arguments, const RenderOptions& render,
                                           const LoadedScene& loaded, InstanceFilter filter, const CommonOptions& common,
                                           std::optional<int> file_camera);

@@ -27,7 +27,7 @@ void add_colour(std::vector<ExrChannel>& channels, const std::string& prefix, co
   }
 }
 
-// Light times the exposure, not clamped; and what compositing wants to know.
+// Writes light times the exposure, not clamped, and layers for compositing.
 Result<std::uint64_t> write_layers(const PathPicture& picture, bool is_transparent, float exposure,
                                    const std::filesystem::path& path) {
   std::vector<ExrChannel> channels;

@@ -12,33 +12,32 @@
 
 namespace quoin::tool {
 
-/// Takes pictures by paths where others take them of CpuRenderer, and keeps what files of linear light hold besides.
+/// Renders path-traced images with the interface of CpuRenderer, and keeps the layers for .exr files.
 class PathPictures {
  public:
-  /// `with_layers`: whether what .exr files hold besides light is kept.
+  /// `with_layers`: keeps the additional layers of .exr files.
   PathPictures(const Scene& scene, InstanceFilter filter, Threads threads, PathPlan plan, bool with_layers);
 
-  /// By a device, which has the scene and must outlive it.
+  /// Renders on a Vulkan device, which has the scene. Requires: `device` outlives this.
   PathPictures(VulkanRenderer& device, const Scene& scene, InstanceFilter filter, PathPlan plan, bool with_layers);
 
-  /// With the plan's exposure, or that of the first picture where it is automatic: those of a film
-  /// have one.
+  /// Uses the exposure of the plan. An automatic exposure is computed from the first image and used for all images.
   [[nodiscard]] Result<Picture> render(const Camera& camera, const RenderOptions& options, Threads threads,
                                        const Progress& progress);
 
-  /// The last picture as .exr, or with alpha. Returns the file's size.
+  /// Writes the last image as .exr, or with alpha. Returns the file size.
   [[nodiscard]] Result<std::uint64_t> write(const std::filesystem::path& path) const;
-  /// That of the pictures. To be set before the first of them where others were taken before.
+  /// The exposure of the images. To continue a series, call set_exposure before the first image.
   [[nodiscard]] double exposure() const { return exposure_.value_or(1.0); }
   [[nodiscard]] bool is_transparent() const { return plan_.is_transparent; }
   void set_exposure(std::optional<double> exposure) { exposure_ = exposure; }
 
  private:
-  std::optional<PathTracer> tracer_;  // none: a device draws
+  std::optional<PathTracer> tracer_;  // nullopt: `device_` renders
   VulkanRenderer* device_ = nullptr;
   PathPlan plan_;
   bool with_layers_;
-  DVec3 middle_{0.0};  // of the scene
+  DVec3 middle_{0.0};  // centre of the scene
   std::optional<double> exposure_;
   PathPicture last_;
 };

@@ -9,14 +9,14 @@
 
 namespace quoin::tool {
 
-/// Whether a file's name has that ending, in any case of letters: ".png".
+/// Returns true if the file name has this extension (".png"), ignoring case.
 [[nodiscard]] bool has_ending(const std::filesystem::path& path, const std::string& ending);
 
-/// What is wrong with a picture's name, or "": it must have the ending of a kind that this build can write.
+/// Returns an error message unless the extension is that of an image format this build can write, else "".
 [[nodiscard]] std::string fault_of_picture_name(const std::filesystem::path& path);
 
-/// Writes a picture as its name says: .png, .jpg or .webp. Returns the file's size.
-/// Requires: `fault_of_picture_name` finds nothing; with alpha no .jpg.
+/// Writes an image in the format of its extension: .png, .jpg or .webp. Returns the file size.
+/// Requires: `fault_of_picture_name` returns ""; an image with alpha is not .jpg.
 [[nodiscard]] Result<std::uint64_t> write_picture(const Image& picture, const std::filesystem::path& path);
 [[nodiscard]] Result<std::uint64_t> write_picture(const AlphaImage& picture, const std::filesystem::path& path);
 

@@ -30,29 +30,29 @@ namespace quoin::tool {
 namespace {
 
 struct Outcome {
-  Picture picture;              ///< the last one
-  Camera camera;                ///< likewise
-  std::optional<double> slice;  ///< where it lies on its axis, instead of a camera
+  Picture picture;              ///< the last image
+  Camera camera;                ///< the camera of the last image
+  std::optional<double> slice;  ///< position on the axis of a slice; nullopt: an image of `camera`
   FaceCounts faces;
   bool is_volume = false;
   std::uint64_t bytes = 0;
-  std::vector<std::filesystem::path> files;  ///< all that were written, OUT first
+  std::vector<std::filesystem::path> files;  ///< all written files, OUT first
   double read = 0, build = 0, trace = 0, write = 0;
-  std::string device;  ///< that drew; empty: the processor
+  std::string device;  ///< the Vulkan device; empty: rendered on the CPU
   std::vector<std::string> warnings;
-  std::int64_t rays = 0;                    ///< of all pictures
-  std::optional<double> exposure;           ///< of pictures by paths: that of the first
-  std::int64_t kept = 0;                    ///< pictures that were there already
-  std::vector<std::filesystem::path> film;  ///< all pictures, in their order
+  std::int64_t rays = 0;                    ///< of all images
+  std::optional<double> exposure;           ///< of path-traced images
+  std::int64_t kept = 0;                    ///< existing images that were kept
+  std::vector<std::filesystem::path> film;  ///< all images in order
 };
 
-/// A picture to take.
+/// An image to render.
 struct Shot {
   Camera camera;
   std::filesystem::path output;
 };
 
-/// OUT.png as OUT-007.png: with as many digits as the last of them has.
+/// Inserts a number into a file name, OUT.png to OUT-007.png, with as many digits as `last`, at least two.
 std::filesystem::path numbered(const std::filesystem::path& output, int number, int last) {
   std::string digits = std::to_string(number);
   const std::size_t width = std::max<std::size_t>(std::to_string(last).size(), 2);
@@ -60,7 +60,7 @@ std::filesystem::path numbered(const std::filesystem::path& output, int number, 
   return output.parent_path() / (output.stem().string() + "-" + digits + output.extension().string());
 }
 
-/// The pictures that will be written. `cameras`: of --path.
+/// Returns the names of the images to write. `cameras`: number of cameras of --path.
 std::vector<std::filesystem::path> pictures_of(const RenderArguments& arguments, std::size_t cameras) {
   std::vector<std::filesystem::path> pictures;
   const int last = static_cast<int>(cameras) - 1;
@@ -79,8 +79,8 @@ std::vector<std::filesystem::path> pictures_of(const RenderArguments& arguments,
   return pictures;
 }
 
-/// Whether a picture of a film is there already. Pictures appear whole or not at all. The first one says the exposure
-/// where that is automatic.
+/// Returns true if --resume keeps this existing image. Existing images are complete. An automatic exposure needs the
+/// first image, which is then rendered again.
 bool is_kept(const RenderArguments& arguments, const std::filesystem::path& picture, const Outcome& outcome) {
   if (!arguments.resume || (arguments.path.is_exposure_automatic && !outcome.exposure)) return false;
   std::error_code none;
@@ -125,7 +125,7 @@ void warn_of_empty_pictures(const Scene& scene, InstanceFilter filter, const Pic
   }
 }
 
-// `paths`: took the picture; null: another renderer.
+// `paths`: the renderer of the image if it is the path tracer, else null.
 Status write_outputs(const RenderArguments& arguments, const std::filesystem::path& output, const PathPictures* paths,
                      Outcome& outcome) {
   if (was_interrupted()) return make_error(ErrorCode::Cancelled, "cancelled", output.string());
@@ -143,7 +143,7 @@ Status write_outputs(const RenderArguments& arguments, const std::filesystem::pa
   return {};
 }
 
-// Times what types emit.
+// Multiplies the emission of all types.
 void scale_emission(Scene& scene, double scale) {
   for (std::size_t type = 1; scale != 1.0 && type < scene.types.size(); ++type) {
     VoxelProperties properties = scene.types[static_cast<VoxelType>(type)];
@@ -167,8 +167,7 @@ Result<LoadedScene> load(const RenderArguments& arguments, bool is_volume, int f
   return loaded;
 }
 
-// Takes the pictures and writes them, with the times into the outcome.
-// Whether a renderer is that by paths.
+// Returns the renderer if it is the path tracer, else null.
 const PathPictures* paths_of(const PathPictures& renderer) {
   return &renderer;
 }
@@ -177,6 +176,7 @@ const PathPictures* paths_of(const Renderer&) {
   return nullptr;
 }
 
+// Renders the images, writes them and adds the times to the outcome.
 template <class Renderer>
 Status take_pictures(Renderer& renderer, const RenderArguments& arguments, const RenderOptions& options,
                      const std::vector<Shot>& shots, Stopwatch& watch, Outcome& outcome) {
@@ -211,7 +211,7 @@ Status draw_by_cpu(const Scene& scene, const RenderArguments& arguments, const R
   return take_pictures(renderer, arguments, options, shots, watch, outcome);
 }
 
-// A device that has the scene.
+// Creates a Vulkan renderer and uploads the scene.
 Result<VulkanRenderer> device_for(const Scene& scene, const RenderArguments& arguments, Outcome& outcome) {
   VulkanOptions vulkan;
   vulkan.device = arguments.device;
@@ -264,7 +264,7 @@ Status draw_shots(const LoadedScene& loaded, const RenderArguments& arguments, c
   return (is_vulkan ? draw_by_vulkan : draw_by_cpu)(loaded.scene, arguments, options, shots, watch, outcome);
 }
 
-/// Draws what the camera sees, or all that it sees once round the scene.
+/// Renders one image, or a turntable around the scene.
 Status draw_view(const LoadedScene& loaded, const RenderArguments& arguments, Stopwatch& watch, Outcome& outcome) {
   std::vector<Shot> shots;
   if (arguments.turns > 1) {
@@ -282,7 +282,7 @@ Status draw_view(const LoadedScene& loaded, const RenderArguments& arguments, St
   return draw_shots(loaded, arguments, shots, watch, outcome);
 }
 
-/// Draws what each of these cameras sees.
+/// Renders an image for each camera.
 Status draw_path(const LoadedScene& loaded, const std::vector<Camera>& cameras, const RenderArguments& arguments,
                  Stopwatch& watch, Outcome& outcome) {
   const std::vector<std::filesystem::path> pictures = pictures_of(arguments, cameras.size());
@@ -291,14 +291,14 @@ Status draw_path(const LoadedScene& loaded, const std::vector<Camera>& cameras, 
   return draw_shots(loaded, arguments, shots, watch, outcome);
 }
 
-/// Draws the frames after the first one, which is loaded, and that; all from where the whole film is in the picture.
+/// Renders all frames with one framing that fits the whole animation. `first` holds the first frame.
 Status draw_frames(const LoadedScene& first, const RenderArguments& arguments, Stopwatch& watch, Outcome& outcome) {
   const FrameRange& frames = *arguments.frames;
   const InstanceFilter filter = arguments.common.instances();
   const bool has_camera = arguments.position || arguments.file_camera || (first.camera && !arguments.has_view);
   SceneFraming framing(arguments.forward(), aspect_of(arguments));
   framing.add(first.scene, filter);
-  // The last one first: it says whether all are there.
+  // Start with the last frame: if it does not exist, fail before rendering.
   for (int frame = frames.last; frame > frames.first && (!has_camera || frame == frames.last); --frame) {
     const auto loaded = load(arguments, false, frame);
     if (!loaded) return loaded.error();
@@ -436,7 +436,7 @@ std::string outcome_text(const Outcome& outcome) {
   return kept + text + bytes_for_people(outcome.bytes) + " in " + number_for_people(seconds) + " s\n";
 }
 
-/// Draws a film's pictures, and has one file made of them.
+/// Renders the images of a video and encodes them with ffmpeg.
 Result<Outcome> render_movie(const RenderArguments& arguments) {
   if (auto writable = check_outputs({arguments.output}); !writable) return writable.error();
   const Movie movie(arguments.output);
@@ -454,7 +454,7 @@ Result<Outcome> render_movie(const RenderArguments& arguments) {
   return outcome;
 }
 
-/// Draws, with standard input as a file where IN is "-".
+/// Renders an image or a video. Reads standard input if IN is "-".
 Result<Outcome> render_from(RenderArguments& arguments, StandardStreams& streams) {
   if (Status read = streams.take_input(arguments.common.input); !read) return read.error();
   return is_movie(arguments.output) ? render_movie(arguments) : render(arguments);

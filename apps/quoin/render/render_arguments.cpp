@@ -24,12 +24,12 @@ namespace {
 
 constexpr int kMaxSamples = 4'096;
 constexpr std::int64_t kMaxPixels = std::int64_t{1} << 28;
-constexpr int kLongestSide = 1'000'000;  // what readers and writers of PNG take
+constexpr int kLongestSide = 1'000'000;  // the limit of PNG readers and writers
 
 std::optional<DVec3> read_direction(const std::string& text) {
   const auto direction = parse_triple(text);
   if (!direction) return std::nullopt;
-  // Scaled, so that the length of any direction is a number.
+  // Scaled so that the length is finite.
   const double largest = std::max({std::abs(direction->x), std::abs(direction->y), std::abs(direction->z)});
   return largest > 0.0 ? std::optional(*direction / largest) : std::nullopt;
 }
@@ -184,13 +184,13 @@ std::string fault_of_files(const RenderArguments& arguments) {
   return "";
 }
 
-/// What --camera says.
+/// The value of --camera.
 struct CameraPlace {
   std::optional<DVec3> position;
   std::optional<int> number;
 };
 
-/// "1,2,3", or "file:4".
+/// Parses "1,2,3" or "file:4".
 std::optional<CameraPlace> read_camera(const std::string& text) {
   const std::string prefix = "file:";
   if (!text.starts_with(prefix)) {
@@ -203,7 +203,7 @@ std::optional<CameraPlace> read_camera(const std::string& text) {
   return CameraPlace{std::nullopt, static_cast<int>(*number)};
 }
 
-/// "0:24".
+/// Parses "0:24".
 std::optional<FrameRange> read_frames(const std::string& text) {
   const std::size_t colon = text.find(':');
   if (colon == std::string::npos) return std::nullopt;
@@ -317,7 +317,7 @@ std::string fault_of_light_model(const CLI::App& command, const RenderArguments&
   return "";
 }
 
-/// A slice has no camera, no light and no rays.
+/// Returns an error message if an option does not fit a slice, which has no camera, light or rays, else "".
 std::string fault_of_slice(const CLI::App& command, const RenderArguments& arguments) {
   if (arguments.preset != "density") {
     return command.count("--slice") > 0 ? "--slice needs --preset density" : "";
@@ -391,7 +391,7 @@ struct SlicePlace {
   double at = 0.5;
 };
 
-/// "y:0.5".
+/// Parses "y:0.5".
 std::optional<SlicePlace> read_slice(const std::string& text) {
   const std::size_t colon = text.find(':');
   const std::size_t axis = std::string("xyz").find(text.substr(0, colon));
@@ -401,7 +401,7 @@ std::optional<SlicePlace> read_slice(const std::string& text) {
   return SlicePlace{static_cast<int>(axis), *at};
 }
 
-/// Reads the options that are texts to CLI11; returns what is wrong with the first wrong one, or "".
+/// Reads the options that CLI11 leaves as text. Returns the first usage error, or "".
 std::string read_texts(const CLI::App& command, RenderArguments& arguments) {
   const std::string three = "three numbers, as in 1,-2.5,3";
   const std::string at_least_0 = "a number of at least 0";
@@ -447,8 +447,8 @@ std::string read_texts(const CLI::App& command, RenderArguments& arguments) {
   return wrong == faults.end() ? "" : *wrong;
 }
 
-// A distance that the user gives is that of fields too. Fixed directions, which all pixels share, show bands where they
-// reach far: more rays, turned from pixel to pixel, do not.
+// A given --ao-distance also applies to fields. Long rays show bands if all pixels share the same directions: use more
+// rays, which are rotated from pixel to pixel.
 void settle_occlusion_rays(const CLI::App& command, LightOptions& light) {
   constexpr double kFar = 12.0;
   constexpr int kRaysOfFar = 16;

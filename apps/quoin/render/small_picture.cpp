@@ -14,7 +14,7 @@
 namespace quoin::tool {
 namespace {
 
-constexpr int kFiner = 2;  // times as fine is it drawn, along each side
+constexpr int kFiner = 2;  // samples per pixel along each side
 
 float light_of(std::uint8_t encoded) {
   const float value = static_cast<float>(encoded) / 255.0F;
@@ -26,7 +26,7 @@ std::uint8_t encoded(float light) {
   return static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0F, 1.0F) * 255.0F));
 }
 
-/// Means of squares of pixels; where nothing was hit it is clear.
+/// Shrinks an image by averaging blocks of pixels in linear light. Pixels without a hit are transparent.
 AlphaImage shrunk(const Picture& picture, int size) {
   std::array<float, 256> light{};
   for (std::size_t i = 0; i < light.size(); ++i) light[i] = light_of(static_cast<std::uint8_t>(i));

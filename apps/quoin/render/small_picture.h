@@ -9,20 +9,20 @@
 
 namespace quoin::tool {
 
-/// Pixels along each side of what is drawn where nobody asks for a size.
+/// Default width and height in pixels.
 inline constexpr int kThumbnailSize = 256;
 
 struct SmallPicture {
-  AlphaImage image;  ///< clear where nothing is
+  AlphaImage image;  ///< transparent background
   bool is_empty = false;
 };
 
-/// A square picture of a scene that is drawn at once: occlusion without rays, and few lamps.
+/// Renders a small square image quickly: with vertex occlusion and at most 4 lamps.
 [[nodiscard]] Result<SmallPicture> draw_small(const Scene& scene, int size, InstanceFilter filter, Threads threads,
                                               const Progress& progress);
 
-/// Puts the picture with which a world shows itself in lists into changes; nothing where nothing is to be seen.
-/// Errors: Cancelled, once the user wants to end.
+/// Renders the thumbnail of a world and adds it to `changes`, unless nothing is visible.
+/// Errors: Cancelled, after an interrupt.
 [[nodiscard]] Status put_thumbnail(const Scene& scene, Threads threads, WorldChanges& changes);
 
 }  // namespace quoin::tool

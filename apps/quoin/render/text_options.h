@@ -8,13 +8,13 @@
 
 namespace quoin::tool {
 
-/// An option whose text is read once all are parsed.
+/// Adds an option whose text is read after all options are parsed.
 inline CLI::Option* add_text_option(CLI::App& command, const std::string& name, const std::string& type,
                                     const std::string& description) {
   return command.add_option(name, description)->type_name(type);
 }
 
-/// Reads the text of such an option, if it was given, into `value`; returns what is wrong with it, or "".
+/// Parses the text of an option into `value` if the option was given. Returns a usage error, or "".
 template <class Read, class Value>
 std::string read_option(const CLI::App& command, const std::string& name, Read read, const std::string& must_be,
                         Value& value) {

@@ -4,7 +4,7 @@ namespace quoin::tool {
 
 namespace {
 
-/// "TEXT:{front,back}" as {"front", "back"}.
+/// Returns the choices in a type: {"front", "back"} for "TEXT:{front,back}".
 std::vector<std::string> choices_in(const std::string& type) {
   const std::size_t begin = type.find('{');
   const std::size_t end = type.find('}', begin);
@@ -47,7 +47,7 @@ std::string replaced(std::string text, const std::string& what, const std::strin
   return text;
 }
 
-/// "quoin generate terrain" as "_quoin_generate_terrain".
+/// Returns "_quoin_generate_terrain" for "quoin generate terrain".
 std::string function_name(const CommandOfTool& command) {
   return "_" + replaced(command.path, " ", "_");
 }
@@ -67,7 +67,7 @@ std::vector<std::string> names_of_commands(const CommandOfTool& command) {
   return names;
 }
 
-/// Calls `use` for a command and all below it.
+/// Calls `use` for a command and all its subcommands.
 template <class Use>
 void for_each_command(const CommandOfTool& command, const Use& use) {
   use(command);
@@ -93,11 +93,11 @@ CommandOfTool describe(const CLI::App& app, const std::string& above) {
 
 namespace {
 
-/// The lines of the script's three case statements.
+/// The lines of the three case statements in the script.
 struct BashCases {
-  std::string walk;    // which command the words before lead to
-  std::string values;  // what follows an option
-  std::string words;   // what a command takes
+  std::string walk;    // selects the command from the preceding words
+  std::string values;  // completes the value of an option
+  std::string words;   // lists the options and subcommands of a command
 };
 
 BashCases bash_cases(const CommandOfTool& tool) {
@@ -151,7 +151,7 @@ std::string bash_completion(const CommandOfTool& tool) {
 
 namespace {
 
-/// Within single quotes and brackets of _arguments.
+/// Escapes text for single quotes and brackets in _arguments.
 std::string zsh_text(const std::string& text) {
   std::string out;
   for (const char c : text) {
@@ -238,7 +238,7 @@ std::string fish_completion(const CommandOfTool& tool) {
 
 namespace {
 
-/// Text of a man page: no line of it is taken for a request.
+/// Escapes text so that roff takes no line for a request.
 std::string roff(const std::string& text) {
   std::string out = replaced(replaced(text, "\\", "\\e"), "-", "\\-");
   if (out.starts_with('.') || out.starts_with('\'')) out.insert(0, "\\&");

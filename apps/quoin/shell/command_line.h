@@ -6,15 +6,15 @@
 
 namespace quoin::tool {
 
-/// An option of a command, as its help has it.
+/// An option or positional argument of a command.
 struct OptionOfCommand {
-  std::vector<std::string> names;  ///< with their dashes; of what is no option its name
+  std::vector<std::string> names;  ///< with their dashes; for a positional argument its name
   std::string description;
-  std::string value;                 ///< what follows: "TEXT", "WIDTHxHEIGHT"; empty for a flag
-  std::vector<std::string> choices;  ///< all that may follow; empty: anything
+  std::string value;                 ///< type of the value: "TEXT", "WIDTHxHEIGHT"; empty for a flag
+  std::vector<std::string> choices;  ///< all allowed values; empty: any value
 };
 
-/// A command and what can be said with it.
+/// A command with its options and subcommands.
 struct CommandOfTool {
   std::string path;  ///< "quoin generate terrain"
   std::string name;
@@ -25,15 +25,15 @@ struct CommandOfTool {
   std::vector<CommandOfTool> commands;
 };
 
-/// All that `app` takes.
+/// Describes `app` and its subcommands. `above`: path of the parent command.
 [[nodiscard]] CommandOfTool describe(const CLI::App& app, const std::string& above = "");
 
-/// Scripts that complete the tool's command lines.
+/// Return scripts that complete command lines in a shell.
 [[nodiscard]] std::string bash_completion(const CommandOfTool& tool);
 [[nodiscard]] std::string zsh_completion(const CommandOfTool& tool);
 [[nodiscard]] std::string fish_completion(const CommandOfTool& tool);
 
-/// A page for `man`, in roff.
+/// Returns the manual page in roff format.
 [[nodiscard]] std::string man_page(const CommandOfTool& tool, const std::string& version);
 
 }  // namespace quoin::tool

@@ -20,7 +20,7 @@ bool is_always_shown(const std::string& group) {
   return std::ranges::find(kAlwaysShown, group) != kAlwaysShown.end();
 }
 
-/// The heading of an option; those that CLI11 adds itself are general.
+/// Returns the heading of an option: General for options that CLI11 adds.
 std::string group_of(const CLI::Option& option) {
   return option.get_group() == "Options" ? heading::kGeneral : option.get_group();
 }
@@ -46,7 +46,7 @@ std::string wrapped(const std::string& text, std::size_t indent) {
   return out;
 }
 
-/// A name at the left and its description in the second column.
+/// Formats a name and, in the second column, its description.
 std::string entry(const std::string& name, const std::string& description) {
   std::string line = "  " + name;
   if (description.empty()) return line + "\n";
@@ -54,7 +54,7 @@ std::string entry(const std::string& name, const std::string& description) {
   return line + wrapped(description, kIndent) + "\n";
 }
 
-/// "-o,--output FILE" from an option; without the choices and ranges that CLI11 appends to the type.
+/// Returns the names and type of an option, as in "-o,--output FILE", without the choices and ranges from CLI11.
 std::string name_of(const CLI::Option& option) {
   std::string name = option.get_positional() ? option.get_name(true, false) : option.get_name(false, true);
   std::ranges::replace(name, '{', ' ');
@@ -124,7 +124,7 @@ class HelpFormatter : public CLI::FormatterBase {
       const std::string group = group_of(*option);
       if (std::ranges::find(groups, group) == groups.end()) groups.push_back(group);
     }
-    // The common ones come last.
+    // General options come last.
     std::ranges::stable_partition(groups, [](const std::string& group) { return group != heading::kGeneral; });
     std::string hidden;
     for (const std::string& group : groups) {

@@ -13,7 +13,7 @@ inline constexpr const char* kGeneral = "General";
 inline constexpr const char* kCamera = "Camera";
 inline constexpr const char* kLight = "Light";
 inline constexpr const char* kMesh = "Meshes";
-// In --help-all alone.
+// Only in --help-all.
 inline constexpr const char* kSeries = "Image series and videos";
 inline constexpr const char* kOcclusion = "Ambient occlusion";
 inline constexpr const char* kPathTracing = "Path tracing (--light path)";
@@ -27,7 +27,7 @@ inline constexpr const char* kTriangles = "Triangle meshes as input (.obj, .glb,
 inline constexpr const char* kHeights = "Heights";
 }  // namespace heading
 
-/// Options that are added to the command from now on stand under this heading.
+/// Sets the heading of all options added to the command from now on.
 inline void set_heading(CLI::App& command, const char* name) {
   command.option_defaults()->group(name);
 }
