@@ -40,7 +40,7 @@ int run_info(const WorldOptions& options) {
   if (!summary) return fail(summary.error());
   Json grids = Json::array();
   std::string text =
-      options.world.filename().string() + ": a world of version " + std::to_string(summary->version) + ", " +
+      options.world.filename().string() + ": world version " + std::to_string(summary->version) + ", " +
       bytes_for_people(summary->bytes) + ", " + with_thousands(summary->saves) +
       " saves\nTypes: " + with_thousands(summary->types) + "\nInstances: " + with_thousands(summary->instances) +
       "\nValues: " + with_thousands(summary->values) +

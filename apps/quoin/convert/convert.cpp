@@ -297,7 +297,7 @@ Result<Outcome> convert_by_chunks(const ConvertOptions& options) {
   if (!imported->guessed.empty()) {
     std::string names;
     for (const std::string& name : imported->guessed) names += (names.empty() ? "" : ", ") + name;
-    outcome.warnings.push_back("unknown blocks, shown with a look guessed from their names: " + names);
+    outcome.warnings.push_back("unknown blocks, with an appearance guessed from their names: " + names);
   }
   outcome.seconds.write = watch.lap();
   if (Status counted = count_faces_of_output(options, outcome); !counted) return counted.error();
