@@ -11,16 +11,16 @@
 
 namespace quoin::viewer {
 
-/// What a brush does to the voxels that it covers.
+/// The effect of a brush on the voxels that it covers.
 enum class BrushAction : std::uint8_t {
   Place,    ///< air becomes the brush's type
   Remove,   ///< everything becomes air
-  Paint,    ///< what is not air becomes the brush's type
-  Smooth,   ///< of fields only
-  Flatten,  ///< likewise: towards the plane of the first touch, with what is there
+  Paint,    ///< solid voxels become the brush's type
+  Smooth,   ///< smooths the surface; fields only
+  Flatten,  ///< levels to the plane of the first touch, filling with its material; fields only
 };
 
-/// Whether a stroke follows the surface, rather than the layer or plane of its first touch.
+/// Returns true if a stroke follows the surface rather than the layer or plane of its first touch.
 [[nodiscard]] constexpr bool follows_surface(BrushAction action) {
   return action != BrushAction::Place && action != BrushAction::Remove;
 }
@@ -36,25 +36,26 @@ struct Brush {
   VoxelType type = 1;
 };
 
-/// The box of voxels that a brush can change about a voxel; cut off where coordinates end.
+/// Returns the box of voxels that a brush at `centre` can change, clipped to the coordinate range.
 [[nodiscard]] IBox reach_of(const Brush& brush, IVec3 centre);
 
-/// Applies a brush. Returns how many voxels changed.
+/// Applies a brush. Returns the number of voxels changed.
 std::int64_t apply(const Brush& brush, IVec3 centre, Grid& grid);
 
-/// Where the first touch of a stroke lands: beside the voxel that was hit for placing, in it otherwise.
+/// Returns the voxel of a stroke's first touch: for Place the one in front of the hit face, otherwise the hit voxel.
 [[nodiscard]] IVec3 target_of(BrushAction action, IVec3 voxel, Direction face);
 
-/// A ray of the world in an instance's grid, in voxels. Nothing when the instance has no place (numbers that are not
-/// finite, a size that is not positive).
+/// Transforms a ray from the world to an instance's grid, in voxels. Empty if the instance's transform is invalid
+/// (non-finite numbers or a non-positive size).
 [[nodiscard]] std::optional<Ray> ray_in_grid(const Instance& instance, const SceneGrid& grid, const Ray& ray_in_world);
 
-/// The layer of voxels in which a stroke goes on, so that dragging neither digs nor piles up.
+/// The layer of voxels that a stroke stays in, so that dragging neither digs nor piles up.
 struct StrokeLayer {
-  IVec3 voxel{0};                    ///< of the first touch
-  Direction face = Direction::PosY;  ///< that was hit
+  IVec3 voxel{0};                    ///< the first touch
+  Direction face = Direction::PosY;  ///< the hit face
 
-  /// The voxel of the layer that a ray in the grid meets; nothing when it runs along it, away from it, or too far.
+  /// Returns the voxel where a ray in the grid meets the layer. Empty if the ray is parallel to the layer, points away
+  /// from it or meets it too far away.
   [[nodiscard]] std::optional<IVec3> at(const Ray& ray_in_grid) const;
 };
 

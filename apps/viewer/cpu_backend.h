@@ -12,32 +12,32 @@ namespace quoin::viewer {
 struct CpuBackendOptions {
   InstanceFilter instances = InstanceFilter::Visible;
   Threads threads;
-  /// How long the first picture after a change of the camera may take, by the time that pixels have taken so far: it
-  /// is as large as that allows, of a quarter of the width and height at least. 0: always that.
+  /// Time limit for the first image after the camera changed. Its size follows from the measured time per pixel, but
+  /// is at least a quarter of the width and height; 0: always a quarter.
   double first_frame_seconds = 0.05;
-  /// Of the densities that stand for voxels in pictures of smooth surfaces.
+  /// Limit for the densities made from voxels to draw smooth surfaces.
   std::size_t max_density_bytes = std::size_t{1} << 30;
 };
 
-/// Pictures by CpuRenderer on a thread of its own: a quarter of the size, or a third, half, whole; then of 4, 16 ...
-/// samples a pixel up to what was asked for. A settled frame is CpuRenderer's picture to the byte. Where full light
-/// would make the first picture smaller than a half it is a draft: with few lamps, and the occlusion of vertices.
+/// Renders with CpuRenderer on its own thread: at a quarter of the size, a third, half, full size; then with 4, 16 ...
+/// samples per pixel up to the requested number. A settled frame equals CpuRenderer's image byte for byte. If full
+/// light would make the first image smaller than a half, it is a draft with few lamps and vertex occlusion.
 ///
-/// A new request ends the image under way, except the coarsest one of the same mode: however fast requests come, some
-/// are seen.
+/// A new request cancels the image in progress, except the coarsest one of the same mode, so that some images are shown
+/// however fast requests come.
 ///
-/// DrawMode::Paths goes the same way, without noise within surfaces (PathOptions::denoise), up to 256 samples; what it
-/// needs is made before the first such picture, and let go of likewise. After an edit what it did not change stays as
-/// it was while the rest converges anew (PathHistory).
+/// DrawMode::Paths works the same way, denoised within surfaces (PathOptions::denoise), up to 256 samples. Its data is
+/// built before the first path-traced image and freed with the first image of another mode. After an edit, unchanged
+/// parts keep their samples while the rest converges again (PathHistory).
 ///
-/// DrawMode::Smooth is marched as well, through the fields of a SmoothScene: these are made before the first such
-/// picture, follow edits, and are let go of with the first picture of another mode.
+/// DrawMode::Smooth is also ray-marched, through the fields of a SmoothScene. These are built before the first smooth
+/// image, follow edits, and are freed with the first image of another mode.
 class CpuBackend final : public ViewBackend {
  public:
-  /// `scene` must outlive it in its place. `on_frame` is called from the backend's thread when there is a frame to take
-  /// or something went wrong; it may be empty. Cost: that of a CpuRenderer.
+  /// `scene` must outlive the backend and not move. The backend's thread calls `on_frame` when there is a frame to take
+  /// or an error; it may be empty. Cost: that of a CpuRenderer.
   CpuBackend(const Scene& scene, const CpuBackendOptions& options, std::function<void()> on_frame);
-  /// Waits for the end of what is under way, which is stopped.
+  /// Stops the image in progress and waits for the thread.
   ~CpuBackend() override;
 
   [[nodiscard]] std::string name() const override;
@@ -46,8 +46,8 @@ class CpuBackend final : public ViewBackend {
   [[nodiscard]] std::size_t bytes() const override;
   [[nodiscard]] std::string activity() const override;
   [[nodiscard]] std::optional<Error> fault() override;
-  /// Why the scene cannot be marched as DrawMode::Smooth, if that was tried since the last edit: its densities take
-  /// too much memory.
+  /// Returns the error if drawing as DrawMode::Smooth failed since the last edit because the densities take too much
+  /// memory.
   [[nodiscard]] std::optional<Error> smooth_refusal() const;
   double pause() override;
   void resume(bool changed) override;

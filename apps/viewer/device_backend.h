@@ -9,33 +9,32 @@
 
 namespace quoin::viewer {
 
-/// The graphics device that draws, opened when it is first needed.
+/// Opens the graphics device that draws; called when it is first needed.
 using OpenDevice = std::function<Result<std::shared_ptr<VulkanRenderer>>()>;
 
 struct DeviceBackendOptions {
   CpuBackendOptions cpu;
-  /// Whether rays are marched on the device, which is then the one that shows the window: `take` draws, and pictures
-  /// stay there. Else the processor marches them, which is faster than a device that is a processor in truth; meshes
-  /// are drawn on a thread of their own, and come back as bytes.
+  /// Marches rays on the device, which must also show the window: `take` draws, and images stay on the device.
+  /// Otherwise the processor marches rays, which is faster than a software device; meshes are drawn on their own thread
+  /// and copied back.
   bool rays_on_device = false;
-  /// How long a picture may take when the camera has moved: it is as fine as that allows, and of meshes a quarter of
-  /// the size at least.
+  /// Time limit for an image after the camera moved: it is as fine as that allows, meshes at least at a quarter of the
+  /// size.
   double frame_seconds = 0.025;
-  double slow_seconds = 0.1;  ///< pictures that take longer though they are that small make their mode a slow one
+  double slow_seconds = 0.1;  ///< a mode is slow if its smallest images take longer
 };
 
-/// Pictures by a graphics device: ray-marched ones get better sample by sample, meshes follow edits as workers finish
-/// them. What is pointed at is found by the processor, which also draws where the device cannot, and rays until the
-/// device has drawn the first meshed chunks. Where a processor acts as the device, meshes have no light that takes
-/// rays; once the view rests the processor draws them by rays: blocks, fields, and smooth meshes of voxels through the
-/// fields that these are made from. Where the latter take too much memory their picture stays the device's, and
-/// `activity` says so.
+/// Renders on a graphics device. Ray-marched images improve sample by sample; meshes follow edits as workers finish
+/// them. The processor does picking, draws modes that the device cannot draw, and marches rays until the device has
+/// drawn the first meshed chunks. On a software device meshes have no ray-traced light; once the view is still, the
+/// processor ray-marches the same image: blocks, fields, and smooth meshes of voxels through the fields they are made
+/// from. If those fields take too much memory, the device's image stays and `activity` reports it.
 ///
-/// After a fault of the device it is not used again.
+/// A device is not used again after a fault.
 class DeviceBackend final : public ViewBackend {
  public:
-  /// `scene` must outlive it in its place. `on_frame` as CpuBackend's. Cost: that of a CpuBackend: the device gets the
-  /// scene with the first picture that it draws.
+  /// `scene` must outlive the backend and not move. `on_frame` is as for CpuBackend. Cost: that of a CpuBackend; the
+  /// scene is uploaded with the first image that the device draws.
   DeviceBackend(const Scene& scene, const DeviceBackendOptions& options, OpenDevice open_device,
                 std::function<void()> on_frame);
   ~DeviceBackend() override;
@@ -60,7 +59,7 @@ class DeviceBackend final : public ViewBackend {
   [[nodiscard]] std::optional<SceneHit> pick(const Camera& camera, double x, double y, int width, int height) override;
   [[nodiscard]] bool is_up_to_date() override;
 
-  /// The processor stands in for it from now on.
+  /// Releases the device; the processor draws from now on.
   void forget_device() override;
 
  private:

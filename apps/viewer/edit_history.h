@@ -11,45 +11,44 @@
 
 namespace quoin::viewer {
 
-/// Something of a scene that can be shown and hidden.
+/// A part of a scene that can be shown and hidden.
 using SceneNode = std::variant<InstanceHandle, GroupHandle, LayerHandle>;
 
-/// Its own switch; nothing when it is not there.
+/// Returns the node's own visibility, regardless of its parents; empty if the node does not exist.
 [[nodiscard]] std::optional<bool> visibility_of(const Scene& scene, const SceneNode& node);
 
-/// What edits to the grids of a scene replaced, a step a stroke of the brush, and what was shown and
-/// hidden, so that they can be undone and redone.
+/// Undo history of a scene: grid edits, one step per brush stroke, and changes of visibility.
 ///
-/// Kept are the chunks that a step changed, before and after; the oldest steps go when they take more than the limit.
+/// A step stores the changed chunks before and after. The oldest steps are dropped when they exceed the memory limit.
 class EditHistory {
  public:
   explicit EditHistory(std::size_t max_bytes = std::size_t{256} << 20) : max_bytes_(max_bytes) {}
 
-  /// Begins a step, ending the one under way.
+  /// Begins a step and ends the one under way.
   void begin(std::string name);
-  /// Says that voxels of a box are about to be changed. Requires: a step is under way, `grid` is the scene's `handle`.
+  /// Announces changes to the voxels of a box. Requires: a step is under way; `grid` is the scene's `handle`.
   void touch(GridHandle handle, const Grid& grid, const IBox& box);
-  /// The same of samples of the grid's field.
+  /// Announces changes to samples of the grid's field.
   void touch(GridHandle handle, const DensityGrid& field, const IBox& box);
-  /// Ends the step; one that changed nothing leaves no trace. Steps that were undone before are forgotten otherwise.
+  /// Ends the step. Drops it if it changed nothing; otherwise drops the steps that could be redone.
   void end(const Scene& scene);
-  /// Shows or hides it: a step of its own. Requires: no step is under way, it is there.
+  /// Shows or hides a node as a step. Requires: no step is under way; the node exists.
   void show(Scene& scene, const SceneNode& node, bool is_visible);
 
   [[nodiscard]] bool can_undo() const { return done_ > 0; }
   [[nodiscard]] bool can_redo() const { return done_ < steps_.size(); }
-  /// The names of what would be undone or redone; empty when nothing would.
+  /// Return the name of the step to undo or redo; empty if there is none.
   [[nodiscard]] std::string undo_name() const;
   [[nodiscard]] std::string redo_name() const;
-  /// False when there is nothing to undo (redo), or where chunks that it would change are not loaded: then nothing is
-  /// changed. Requires: no step is under way.
+  /// Return false, and change nothing, if there is no step to undo (redo) or chunks that it changes are not loaded.
+  /// Requires: no step is under way.
   bool undo(Scene& scene);
   bool redo(Scene& scene);
   void clear();
 
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
   [[nodiscard]] std::size_t steps() const { return steps_.size(); }
-  /// Tells the states of the scene apart: the same number after an undo as before what was undone.
+  /// Returns a number that identifies the scene's state: undoing a step restores the number from before the step.
   [[nodiscard]] std::uint64_t state() const { return done_ == 0 ? base_state_ : steps_[done_ - 1].state; }
 
  private:
@@ -82,7 +81,7 @@ class EditHistory {
 
   std::size_t max_bytes_;
   std::deque<Step> steps_;
-  std::size_t done_ = 0;  // steps that are in force; those from here on can be redone
+  std::size_t done_ = 0;  // applied steps; the others can be redone
   std::size_t bytes_ = 0;
   std::uint64_t base_state_ = 0;
   std::uint64_t last_state_ = 0;

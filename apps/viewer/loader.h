@@ -12,39 +12,38 @@
 
 namespace quoin::viewer {
 
-/// A document and what draws it.
+/// A document and its backend.
 struct OpenDocument {
   std::unique_ptr<Document> document;
-  std::unique_ptr<ViewBackend> backend;            // goes before the document, which it reads
-  std::shared_ptr<const FileLook> look = nullptr;  // how the file wants to be drawn, where it says it
+  std::unique_ptr<ViewBackend> backend;            // reads the document, so it is destroyed first
+  std::shared_ptr<const FileLook> look = nullptr;  // the file's render settings, if any
 };
 
-/// Makes the backend of a document that was read, on the loading thread.
+/// Makes the backend of a loaded document, on the loading thread.
 using MakeBackend = std::function<std::unique_ptr<ViewBackend>(const Document&)>;
 
-/// Reads a file and builds what draws it, on a thread of its own.
+/// Reads a file and builds its backend on a separate thread.
 class Loader {
  public:
-  /// `on_done` is called from the loading thread, unless the loader is destroyed first.
+  /// The loading thread calls `on_done`, unless the loader is destroyed first.
   Loader(std::filesystem::path path, const LoadOptions& options, const WorldOptions& world, MakeBackend make_backend,
          std::function<void()> on_done);
   Loader(const Loader&) = delete;
   Loader& operator=(const Loader&) = delete;
-  /// Cancels, and waits for the end of the model that is being read; to stop looking at it sooner, keep the loader
-  /// aside.
+  /// Cancels, and waits until the current model has been read. Keep a cancelled loader alive to avoid the wait.
   ~Loader();
 
   void cancel() { is_abandoned_ = true; }
 
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
   [[nodiscard]] bool is_done() const { return is_done_; }
-  /// For people: what is being done now.
+  /// Returns the current step, to show.
   [[nodiscard]] std::string stage() const { return is_read_ ? "building" : "reading"; }
-  /// How much of the file has been read, 0 to 1; nothing while it is not known, and while there is building to do.
+  /// Returns the fraction of the file read, in [0, 1]; empty while it is unknown and while the backend is built.
   [[nodiscard]] std::optional<double> fraction() const;
-  /// Seconds since the beginning.
+  /// Returns the seconds since the start.
   [[nodiscard]] double seconds() const;
-  /// Requires: is_done(), and it has not been taken yet.
+  /// Requires: is_done(), and the result has not been taken yet.
   [[nodiscard]] Result<OpenDocument> take();
 
  private:
@@ -60,10 +59,10 @@ class Loader {
   std::thread thread_;
 };
 
-/// Writes a document on a thread of its own. The document must not be edited meanwhile.
+/// Writes a document on a separate thread. The document must not be edited meanwhile.
 class Saver {
  public:
-  /// Where something would be lost and `accepts_losses` is false, nothing is written: `losses` tells.
+  /// If saving would lose something and `accepts_losses` is false, writes nothing and reports it in `losses`.
   Saver(const Document& document, std::filesystem::path path, bool accepts_losses, std::function<void()> on_done);
   Saver(const Saver&) = delete;
   Saver& operator=(const Saver&) = delete;
@@ -74,12 +73,12 @@ class Saver {
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
   [[nodiscard]] bool is_done() const { return is_done_; }
   [[nodiscard]] double fraction() const { return fraction_; }
-  /// The document's state that was written.
+  /// Returns the document's state that was written.
   [[nodiscard]] std::uint64_t state() const { return state_; }
   /// Requires: is_done().
   [[nodiscard]] const Status& status() const { return status_; }
   [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_; }
-  /// What saving would lose, where that was not accepted: then nothing was written. Requires: is_done().
+  /// Returns the losses that kept the document from being written, if any. Requires: is_done().
   [[nodiscard]] const std::vector<std::string>& losses() const { return losses_; }
 
  private:

@@ -5,23 +5,24 @@
 
 namespace quoin::viewer {
 
-/// Where the sun stands, in degrees: 0 is south (+Z), positive towards the east (+X); elevation above the horizon.
+/// The sun's position in degrees. Azimuth 0 is south (+Z), positive towards the east (+X); elevation is above the
+/// horizon.
 struct SunAngles {
   double azimuth = 0.0;    ///< -180 to 180
   double elevation = 0.0;  ///< -90 to 90
 };
 
-/// Of a direction towards the sun, of any length but 0.
+/// Returns the angles of a direction towards the sun. Requires: `sun` is not zero.
 [[nodiscard]] SunAngles sun_angles(DVec3 sun);
-/// The unit vector towards the sun.
+/// Returns the unit vector towards the sun.
 [[nodiscard]] DVec3 sun_direction(const SunAngles& angles);
 
-/// How low the sun can be put, in degrees of elevation: to where it is night, if the sky follows it, else as low as it
-/// still lights something from above.
+/// Returns the lowest elevation that can be set, in degrees: night if the sky follows the sun, else just high enough to
+/// light surfaces from above.
 [[nodiscard]] double lowest_sun(const LightOptions& light);
 
-/// The sun after a drag by that many pixels: it goes round with dx and up with a drag upwards, never beyond straight up
-/// or `lowest_sun`.
+/// Returns the sun after a drag in pixels: dx turns it, an upward drag raises it, limited to the zenith and
+/// `lowest_sun`.
 [[nodiscard]] DVec3 drag_sun(const LightOptions& light, double dx, double dy);
 
 }  // namespace quoin::viewer

@@ -28,24 +28,25 @@ inline double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// Lowers the priority of the calling thread and of the threads that it starts, so that threads that draw do not delay
-/// the window's thread, nor the display's process. Does nothing where the system has no priority for a thread. The
-/// workers of parallel loops are shared: they keep the priority of the thread that ran the first such loop.
+/// Lowers the priority of the calling thread and of threads that it starts, so that rendering does not delay the
+/// window's thread or the display server. Does nothing on systems without thread priorities. The workers of parallel
+/// loops are shared and keep the priority of the thread that ran the first such loop.
 void yield_to_window();
 
-/// Times as long as a picture in motion should take is what lets its size be as it was: it does not go to and fro.
+/// Hysteresis of the image size in motion: the size of the last image is kept up to this factor of the target time,
+/// so that it does not oscillate.
 inline constexpr double kConstancy = 1.3;
-/// What is known of a time, in seconds, after one more measurement of it; 0: nothing was known. One measurement says
-/// little where other programs take their share.
+/// Returns the running average of a time, in seconds, after one more measurement. `known` is 0 before the first one.
+/// Averaging evens out the load of other programs.
 [[nodiscard]] double seconds_known(double known, double measured);
 
-/// What the scene is drawn as.
+/// A way to draw the scene.
 enum class DrawMode : std::uint8_t {
-  Rays,     ///< a ray-marched picture
+  Rays,     ///< ray marching
   Blocks,   ///< blocky meshes of its chunks
   Smooth,   ///< smooth meshes of its chunks
-  Density,  ///< the densities of its fields on a plane, from the positive end of an axis: draw_density_slice
-  Paths,    ///< paths of light, which converge while one looks: PathTracer
+  Density,  ///< a slice of its fields' densities, seen from the positive end of an axis: draw_density_slice
+  Paths,    ///< path tracing, which converges while the view stays the same: PathTracer
 };
 
 inline constexpr std::size_t kDrawModes = 5;
@@ -54,78 +55,78 @@ inline constexpr std::size_t kDrawModes = 5;
   return mode == DrawMode::Blocks || mode == DrawMode::Smooth;
 }
 
-/// Where densities are cut, as DensitySliceOptions has it.
+/// The plane of a density slice, as in DensitySliceOptions.
 struct SlicePlace {
   int axis = 1;
   double at = 0.5;
   bool operator==(const SlicePlace&) const = default;
 };
 
-/// What the window wants to show.
+/// The image that the window wants to show.
 struct ViewRequest {
   Camera camera;
   int width = 0;  ///< pixels; nothing is drawn unless both are positive
   int height = 0;
-  LightOptions light;             ///< `smooth` is of meshes of fields and smooth ones too
-  bool detail_by_pixels = false;  ///< far models in coarser cells
-  bool detail_colours = false;    ///< rays: instances in colours that tell their detail
-  int samples = 16;               ///< a pixel, once the picture has settled; meshes: 4, or 1 if that is wanted
+  LightOptions light;             ///< `smooth` also applies to smooth meshes and to meshes of fields
+  bool detail_by_pixels = false;  ///< draws far models with coarser cells
+  bool detail_colours = false;    ///< rays: colours instances by their level of detail
+  int samples = 16;               ///< per pixel of the settled image; meshes use 4, or 1 if 1 is requested
   DrawMode mode = DrawMode::Rays;
-  Wireframe wireframe = Wireframe::Off;  ///< of meshes
-  std::shared_ptr<const FileLook> look;  ///< of paths: what the file says of them; null: nothing
-  SlicePlace slice;                      ///< of densities, which know no camera and no light
-  bool whole_only = false;               ///< smaller pictures are of no use in the meantime
+  Wireframe wireframe = Wireframe::Off;  ///< meshes only
+  std::shared_ptr<const FileLook> look;  ///< paths only: the file's render settings; null if it has none
+  SlicePlace slice;                      ///< densities only; these use neither camera nor light
+  bool whole_only = false;               ///< skips smaller images in the meantime
 };
 
-/// Whether both want the same picture.
+/// Returns true if both request the same image.
 [[nodiscard]] bool is_same(const ViewRequest& a, const ViewRequest& b);
 
-constexpr int kPathSamples = 256;  ///< of a settled picture by paths
+constexpr int kPathSamples = 256;  ///< per pixel of a settled path-traced image
 
-/// How a picture by paths is taken: what the file says, in the light of the window's panel, without noise within
-/// surfaces. `bounds`: of the scene.
+/// Returns the path tracing options: the file's settings with the light of the window's panel, denoised within
+/// surfaces. `bounds` are the scene's.
 [[nodiscard]] PathOptions path_options(const ViewRequest& request, int width, int height, int samples,
                                        const DBox& bounds);
-/// And how it is developed.
+/// Returns the matching tone mapping options.
 [[nodiscard]] DevelopOptions develop_options(const ViewRequest& request);
 
-/// What the pictures by paths of one request know of each other, across edits of the scene.
+/// The history that the path-traced images of one request share, across edits of the scene.
 class PathMemory {
  public:
-  /// Forgets what it knows of another request.
+  /// Returns the history of a request. Clears it first if it belongs to another request.
   PathHistory& of(const ViewRequest& request);
   void note_edit() { history_.note_edit(); }
   void clear();
-  /// Whether a request may begin with a picture that so many of its pixels along each axis are one of.
+  /// Returns true if a request may begin with an image of 1 / `divisor` of its width and height.
   [[nodiscard]] bool may_begin(const ViewRequest& request, int divisor) const;
-  /// The first of these that it may begin with; of all that are none, the first.
+  /// Returns the first of `divisors` that the request may begin with, or the first one if there is none.
   [[nodiscard]] int first_divisor(const ViewRequest& request, std::span<const int> divisors) const;
   [[nodiscard]] std::size_t bytes() const { return history_.bytes(); }
 
  private:
   [[nodiscard]] bool is_of(const ViewRequest& request) const;
 
-  std::optional<ViewRequest> request_;  // with the samples of a settled picture
+  std::optional<ViewRequest> request_;  // with the samples of a settled image
   PathHistory history_;
 };
 
 /// An image for the last request, or for a request shortly before it.
 struct ViewFrame {
-  Image colour;  ///< perhaps smaller than was asked for: to be stretched
-  /// Instead of `colour` where the picture stays on a graphics device. The next frame may be drawn into it.
+  Image colour;  ///< may be smaller than requested; the window stretches it
+  /// Replaces `colour` where the image stays on a graphics device. The next frame may be drawn into it.
   std::shared_ptr<const VulkanPicture> on_device;
   DrawMode mode = DrawMode::Rays;  ///< the mode that it shows; a stand-in shows another mode than the request
-  int samples = 0;                 ///< a pixel
-  bool is_whole = false;           ///< as large as was asked for
-  bool is_settled = false;         ///< nothing better will come of this request
+  int samples = 0;                 ///< per pixel
+  bool is_whole = false;           ///< has the requested size
+  bool is_settled = false;         ///< is the final image of this request
   double seconds = 0.0;
   std::int64_t rays = 0;
 };
 
-/// What makes the picture of a scene: the processor here, a graphics card elsewhere.
+/// Renders a scene for the window, on the processor or on a graphics device.
 ///
-/// Threads: all calls come from one thread, the window's. None but `pause` ever waits for the processor's pictures;
-/// those of the device that shows the window are drawn in `take`.
+/// Threads: all calls come from the window's thread. Only `pause` waits for images that the processor renders; the
+/// device that shows the window draws in `take`.
 class ViewBackend {
  public:
   ViewBackend() = default;
@@ -133,69 +134,68 @@ class ViewBackend {
   ViewBackend& operator=(const ViewBackend&) = delete;
   virtual ~ViewBackend() = default;
 
-  /// For people: "processor".
+  /// Returns the name to show, such as "processor".
   [[nodiscard]] virtual std::string name() const = 0;
 
-  /// Whether there is a way to draw that; asked again after a fault.
+  /// Returns true if the backend can draw the mode. The answer may change after a fault.
   [[nodiscard]] virtual bool can_draw(DrawMode mode) const { return !has_meshes(mode); }
 
-  /// Whether what is drawn so has shadows and the light of lamps.
+  /// Returns true if the mode draws shadows and the light of lamps.
   [[nodiscard]] virtual bool traces_light(DrawMode mode) const {
     return mode == DrawMode::Rays || mode == DrawMode::Paths;
   }
 
-  /// From now on this is wanted. The same request again changes nothing.
+  /// Sets the request to draw. Repeating the same request does nothing.
   virtual void show(const ViewRequest& request) = 0;
 
-  /// The newest frame, if it has not been taken yet. After a change of mode no frame shows the mode before, except
-  /// marched rays that stand in for meshes.
+  /// Returns the newest frame if it has not been taken yet. After a change of mode no frame shows the previous mode,
+  /// except marched rays that stand in for meshes.
   [[nodiscard]] virtual std::optional<ViewFrame> take() = 0;
 
-  /// Whether `take` would have something to draw, so that it should be called soon. Other frames are told of.
+  /// Returns true if `take` has something to draw and should be called soon. Other frames are announced by `on_frame`.
   [[nodiscard]] virtual bool wants_frames() const { return false; }
 
-  /// What people may want to know of it: names and values.
+  /// Returns statistics to show, as names and values.
   [[nodiscard]] virtual std::vector<std::pair<std::string, std::string>> stats() const { return {}; }
 
-  /// Bytes that are held because of the scene, on whatever device, as of the last picture; not counted are tables of a
-  /// fixed size.
+  /// Returns the bytes held for the scene on all devices, as of the last image. Tables of a fixed size do not count.
   [[nodiscard]] virtual std::size_t bytes() const { return 0; }
 
-  /// For people, the work that an image waits for: "meshing 120/480". Empty: the image is being drawn.
+  /// Returns the work that the image waits for, such as "meshing 120/480". Empty while the image is being drawn.
   [[nodiscard]] virtual std::string activity() const { return {}; }
 
-  /// The completed fraction of meshing, in [0, 1]; nothing while nothing is meshed.
+  /// Returns the completed fraction of meshing, in [0, 1]; empty if no meshing is under way.
   [[nodiscard]] virtual std::optional<double> progress() const { return std::nullopt; }
 
-  /// Whether pictures of the mode turned out to take too long for anybody to want to start with them.
+  /// Returns true if images of the mode proved too slow for the viewer to start with.
   [[nodiscard]] virtual bool is_slow(DrawMode /*mode*/) const { return false; }
 
-  /// Whether its end would wait for what cannot be stopped: a device that is being opened, or that draws.
+  /// Returns true if the destructor would wait for a device that is being opened or that draws; neither can be stopped.
   [[nodiscard]] virtual bool ends_late() const { return false; }
 
-  /// What went wrong with the last request, if anything.
+  /// Returns the error of the last request, if it failed.
   [[nodiscard]] virtual std::optional<Error> fault() = 0;
 
-  /// Stops what is under way and returns once nothing reads the scene any more, which may then be edited. Returns how
-  /// many seconds that took.
+  /// Stops work in progress and waits until the scene is no longer read; it may then be edited. Returns the seconds
+  /// waited.
   virtual double pause() = 0;
-  /// The scene is left alone again, until the next `pause`; everything is drawn anew if it `changed`.
+  /// Continues after `pause`; the scene must not be edited until the next `pause`. Redraws everything if it `changed`.
   virtual void resume(bool changed) = 0;
 
-  /// What is seen at a point of the picture that `request` asks for. Nothing where there is sky or densities are shown,
-  /// and nothing while an edit is being taken over: `is_up_to_date` tells that apart.
+  /// Returns the hit at a point of an image of that size. Empty for sky and for densities, and also while an edit is
+  /// being applied: then `is_up_to_date` returns false.
   [[nodiscard]] virtual std::optional<SceneHit> pick(const Camera& camera, double x, double y, int width,
                                                      int height) = 0;
   [[nodiscard]] virtual bool is_up_to_date() = 0;
-  /// `move_and_slide` in the scene; nothing while an edit is being taken over.
+  /// Calls `move_and_slide` in the scene. Empty while an edit is being applied.
   [[nodiscard]] virtual std::optional<SlideResult> slide(const OrientedBox& box, DVec3 displacement,
                                                          const SlideOptions& options) = 0;
 
-  /// Lets go of its graphics device, if it has one: for one that was lost.
+  /// Releases the graphics device, if there is one, after it was lost.
   virtual void forget_device() {}
 };
 
-/// Edits the scene of a backend: pauses it now, and lets it go on at the end of the scope.
+/// Pauses a backend for an edit of its scene, and resumes it at the end of the scope.
 class ScenePause {
  public:
   explicit ScenePause(ViewBackend& backend) : backend_(&backend), waited_(backend.pause()) {}

@@ -1,6 +1,6 @@
 #pragma once
 
-// What the tests of the viewer share.
+// Shared by the viewer's tests.
 
 #include <unistd.h>
 
@@ -15,7 +15,7 @@
 
 namespace quoin::viewer {
 
-/// A hill with a glass block and a second instance that is mirrored and turned.
+/// A hill with a glass block, and a second instance of it that is mirrored and rotated.
 inline LoadedScene small_scene() {
   LoadedScene loaded;
   Scene& scene = loaded.scene;
@@ -45,7 +45,7 @@ inline LoadedScene small_scene() {
   return loaded;
 }
 
-/// The share of pixels that differ by more than `most` in a channel.
+/// Returns the fraction of pixels that differ by more than `most` in a channel.
 inline double differing(const Image& a, const Image& b, int most) {
   EXPECT_EQ(a.rgb.size(), b.rgb.size());
   if (a.rgb.size() != b.rgb.size() || a.rgb.empty()) return 1.0;
@@ -62,7 +62,7 @@ inline Document small_document() {
   return {small_scene(), "hill.vox"};
 }
 
-/// A folder that goes when the test ends.
+/// A folder that is removed when the test ends.
 class ScratchFolder {
  public:
   explicit ScratchFolder(const std::string& name)

@@ -18,49 +18,48 @@ struct WorldOptions {
   std::size_t memory_bytes = 0;  ///< for its chunks and what is made of them; 0: a quarter of `available_memory`
   /// World units around the camera within which all is loaded, where memory suffices; 0: 640 of the smallest voxels.
   double distance = 0.0;
-  bool may_write = true;  ///< what is edited, and what generators make, is saved
+  bool may_write = true;  ///< saves edits and generated chunks
 };
 
-/// A world on disk (`.quoin`) of which what lies around the camera is in memory; a small one is there as a whole.
+/// A world on disk (`.quoin`). The surroundings of the camera are in memory; a small world is loaded as a whole.
 ///
-/// Edits are saved as they are made. A world that another program writes, or that may not be written, is opened to be
-/// looked at.
-/// Threads: one at a time; `plan` only reads the scene, which others may read meanwhile.
+/// Edits are saved as they are made. A world that another program writes, or that is not writable, opens read-only.
+/// Threads: one at a time; `plan` only reads the scene, and other threads may read it meanwhile.
 class WorldWindow {
  public:
-  /// Nothing of it is loaded yet. Errors: as StreamedWorld::open.
+  /// Opens a world without loading chunks. Errors: those of StreamedWorld::open.
   [[nodiscard]] static Result<WorldWindow> open(const std::filesystem::path& path, const WorldOptions& options);
 
   [[nodiscard]] Scene& scene() { return world_.scene(); }
   [[nodiscard]] const Scene& scene() const { return world_.scene(); }
   [[nodiscard]] const LoadedScene& opened() const { return world_.opened(); }
-  /// Empty where edits are saved; else why not, for people.
+  /// Returns the reason to show if edits are not saved, else an empty string.
   [[nodiscard]] const std::string& why_not_written() const { return why_not_written_; }
-  /// Where one stands at first: what the world says, else above the middle of what is stored, or of the landscape.
+  /// Returns the world's own camera, or one above the middle of the stored chunks or of the landscape.
   [[nodiscard]] Camera first_camera(double aspect) const;
-  /// Whether all of it is in memory once it is complete, wherever the camera is.
+  /// Returns true if all of the world is in memory once it is complete, wherever the camera is.
   [[nodiscard]] bool is_whole() const { return all_.has_value(); }
-  /// Of what there is to be seen from a place: for speeds and distances.
+  /// Returns bounds of the visible parts around a point, the scale of speeds and distances.
   [[nodiscard]] DBox bounds(DVec3 from) const;
 
-  /// Bytes that whoever draws the scene holds because of it; they count as the world's.
+  /// Sets the bytes that the renderer holds for the scene; they count towards the world's memory.
   void set_other_bytes(std::size_t bytes) { *other_bytes_ = bytes; }
-  /// Says where the camera is, and saves what was edited a second ago. Errors: those of saving: it is tried again.
+  /// Requests the chunks around the camera, and saves edits after a second. Errors: those of saving, which is retried.
   Status plan(const Camera& camera);
-  /// Whether `move` would change the scene.
+  /// Returns true if `move` would change the scene.
   [[nodiscard]] bool has_chunks_to_move() const { return world_.has_chunks_to_move(); }
-  /// Puts chunks in place and takes others away, for some milliseconds. Errors: as plan.
+  /// Inserts loaded chunks and removes others, for some milliseconds. Errors: those of plan.
   Status move(const Camera& camera);
-  /// Whether all that is wanted from where the camera is is in place.
+  /// Returns true if all chunks requested for the camera are in place.
   [[nodiscard]] bool is_complete() const;
-  /// Whether the ground around a point of the world, and below it, is in memory, as far as it will ever be.
+  /// Returns true if the ground around and below a point of the world is loaded, as far as it can be.
   [[nodiscard]] bool is_loaded_at(DVec3 point) const;
-  /// Saves all that was edited, and returns once it is on disk. Errors: as StreamedWorld::flush.
+  /// Saves all edits and returns once they are on disk. Errors: those of StreamedWorld::flush.
   Status flush() { return world_.flush(); }
-  /// Saves all, and copies the world, in place of what is there. Errors: as flush and copy_world.
+  /// Saves all edits and copies the world, replacing an existing file. Errors: those of flush and copy_world.
   Result<WorldCopy> copy_to(const std::filesystem::path& path, const Progress& progress = {});
 
-  /// For people: "1204 chunks, 96 MB, all within 420".
+  /// Returns the state to show, such as "1204 chunks, 96 MB, all within 420".
   [[nodiscard]] std::string text() const;
   [[nodiscard]] const StreamStats& stats() const { return stats_; }
   [[nodiscard]] std::vector<std::string> take_problems() { return world_.take_problems(); }
@@ -75,7 +74,7 @@ class WorldWindow {
   std::shared_ptr<std::size_t> other_bytes_;
   std::string why_not_written_;
   WorldExtent extent_;
-  std::optional<Viewer> all_;  ///< of a small world
+  std::optional<Viewer> all_;  ///< covers all of a small world
   StreamStats stats_;
 };
 

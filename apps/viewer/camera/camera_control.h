@@ -7,14 +7,14 @@
 
 namespace quoin::viewer {
 
-/// What dragging does.
+/// The effect of dragging.
 enum class CameraMode : std::uint8_t {
   Fly,    ///< turns the head
   Orbit,  ///< turns about the pivot
   Walk,   ///< turns the head; a Walker moves the camera
 };
 
-/// Where the keys push, in the camera's own axes, each -1 to 1: right, up (of the world) and forward.
+/// The direction of the pressed keys in the camera's axes, each -1 to 1: right, up (the world's) and forward.
 struct CameraPush {
   double right = 0.0;
   double up = 0.0;
@@ -24,46 +24,47 @@ struct CameraPush {
   bool operator==(const CameraPush&) const = default;
 };
 
-/// A camera under the hands of a user: flies and orbits, upright always, never beyond straight up or down.
+/// A camera controlled by the user: flies and orbits, always upright, with the pitch limited to straight up and down.
 ///
-/// Numbers that are not finite change nothing. Time goes by only in `advance`, and how it is cut into steps makes no
-/// difference beyond rounding.
+/// Non-finite numbers change nothing. Time passes only in `advance`; the number of steps makes no difference except
+/// rounding.
 class CameraControl {
  public:
   CameraControl();
 
-  /// Takes over a camera (its roll is lost), what is to be seen for the bounds of speed and distance, and a pivot: the
-  /// point before the camera that is nearest to the middle of `bounds`. Whatever moved stops.
+  /// Sets the camera without its roll, stops all motion, and sets the pivot to the point in front of the camera that is
+  /// nearest to the middle of `bounds`. `bounds` is the visible scene, which limits speed and distance.
   void set(const Camera& camera, const DBox& bounds);
   [[nodiscard]] const Camera& camera() const { return camera_; }
 
   CameraMode mode = CameraMode::Orbit;
 
   [[nodiscard]] DVec3 pivot() const { return pivot_; }
-  /// The point that orbiting and zooming keep in its place in the picture.
+  /// Sets the point that orbiting and zooming keep at its position in the image.
   void set_pivot(DVec3 pivot);
 
-  /// Looks to the horizon, in perspective, through an angle of view (radians).
+  /// Looks at the horizon, in perspective, with a vertical field of view in radians.
   void look_level(double vertical_fov_radians);
   void set_vertical_fov(double radians);
-  /// Moves the camera, and the pivot as far. It glides no further.
+  /// Moves the camera and the pivot by the same distance, and stops gliding.
   void move_to(DVec3 position);
-  /// Turns the head to a point, which becomes the pivot.
+  /// Turns the camera to a point, which becomes the pivot.
   void face(DVec3 point);
 
-  /// Turns the head, or about the pivot, as `mode` says; in pixels of dragging, in a picture of that height.
+  /// Turns the camera in place or around the pivot, depending on `mode`, by a drag in pixels of an image of that
+  /// height.
   void turn(double dx, double dy, int picture_height);
-  /// Moves the camera so that what lies at the pivot's distance follows the mouse.
+  /// Moves the camera so that points at the pivot's distance follow the mouse.
   void pan(double dx, double dy, int picture_height);
-  /// Towards `target` (the pivot without one) for positive notches; glides there during `advance`.
+  /// Zooms towards `target` (by default the pivot) for positive notches; glides there during `advance`.
   void zoom(double notches, std::optional<DVec3> target = std::nullopt);
-  /// Faster flight for positive notches.
+  /// Changes the flight speed; positive notches are faster.
   void change_speed(double notches);
-  [[nodiscard]] double speed() const { return speed_; }  ///< world units a second
+  [[nodiscard]] double speed() const { return speed_; }  ///< world units per second
 
-  /// Lets that much time go by, with the keys held as `push` says, `boost` times as fast. At most a second counts.
+  /// Advances time by at most one second, with the keys in `push` held, `boost` times as fast.
   void advance(double seconds, const CameraPush& push, double boost = 1.0);
-  /// Whether time would still change the picture when no key is held.
+  /// Returns true if the camera still moves although no key is held.
   [[nodiscard]] bool is_gliding() const;
 
  private:
@@ -76,10 +77,10 @@ class CameraControl {
   double pitch_ = 0.0;  // positive looks up
   DVec3 pivot_{0.0, 0.0, -10.0};
   DVec3 zoom_target_{0.0, 0.0, -10.0};
-  double zoom_left_ = 0.0;  // logarithm of the distance's factor that is still to be applied
+  double zoom_left_ = 0.0;  // logarithm of the distance factor still to apply
   DVec3 velocity_{0.0};
   double speed_ = 10.0;
-  double size_ = 10.0;  // of what there is to be seen: scale for bounds
+  double size_ = 10.0;  // of the visible scene: scale for limits
 };
 
 }  // namespace quoin::viewer

@@ -14,7 +14,7 @@
 
 namespace quoin::viewer {
 
-/// The viewer in its window: events in, a frame out.
+/// The viewer's main loop: handles events and draws frames.
 class App {
  public:
   App(const ViewerOptions& options, Settings settings, std::unique_ptr<Screen> screen);
@@ -22,21 +22,21 @@ class App {
   App(const App&) = delete;
   App& operator=(const App&) = delete;
 
-  /// Until the user quits, or `is_interrupted`.
+  /// Runs until the user quits or `is_interrupted` returns true.
   [[nodiscard]] Status run(const std::function<bool()>& is_interrupted);
   [[nodiscard]] const Settings& settings() const { return state_.settings; }
-  /// Closes the window. Whether the destructor would wait for what cannot be stopped: a device that draws, or a file
-  /// that is read.
+  /// Closes the window. Returns true if the destructor would wait for work that cannot be stopped: a drawing device or
+  /// a file being read.
   [[nodiscard]] bool ends_late();
 
  private:
   void close();
 
   using Clock = std::chrono::steady_clock;
-  /// What to do once unsaved changes are saved or given up.
+  /// The action to take once unsaved changes are saved or discarded.
   struct Leaving {
     bool is_quit = false;
-    std::filesystem::path open;  ///< empty: ask which
+    std::filesystem::path open;  ///< empty: ask for the file
   };
 
   // Events and frames.
@@ -50,7 +50,7 @@ class App {
   [[nodiscard]] ViewRequest request_now() const;
   void ask_for_picture();
   void take_picture();
-  /// Whether what is shown is all that was asked for last.
+  /// Returns true if the settled image of the last request is shown.
   [[nodiscard]] bool is_settled() const;
   void take_frame(ViewFrame frame);
   void take_fault();
@@ -74,12 +74,12 @@ class App {
   void stream_world();
   void tell_of_world(const Status& saving);
   void frame_world();
-  /// Saves what was edited in a world on disk, and returns once that is done. What goes wrong is told.
+  /// Saves the edits of a world on disk and returns once that is done. Shows errors.
   Status save_world();
   [[nodiscard]] bool is_streaming() const;
   [[nodiscard]] bool has_ground() const;
 
-  // What commands do.
+  // Commands.
   void run_command(Command command);
   bool run_draw_command(Command command);
   void draw_as(DrawMode mode);
@@ -105,21 +105,21 @@ class App {
   void save_picture(const Result<Image>& picture);
   void write_screenshot(const std::filesystem::path& path);
 
-  /// A save that was not done, since it would lose something: the user is asked.
+  /// A save that waits for the user's consent because it would lose something.
   struct LossySave {
     std::filesystem::path path;
     std::vector<std::string> losses;
   };
 
-  /// An image to be saved once its request has settled. If the view changes before that, `shown` is saved: the image on
-  /// the screen when the user pressed the key, or the first one of the request's mode if the mode had just changed.
+  /// An image to save once its request has settled. If the view changes before that, `shown` is saved: the image on the
+  /// screen when the user pressed the key, or the first one of the request's mode if the mode had just changed.
   struct WantedPicture {
     ViewRequest request;
     ChangeCursor scene;
     std::optional<Result<Image>> shown;
   };
 
-  /// What a look at the levels of detail changed.
+  /// Settings to restore after showing the levels of detail.
   struct BeforeDetail {
     DrawMode mode;
     bool by_pixels;
@@ -128,7 +128,7 @@ class App {
   ViewerOptions options_;
   std::unique_ptr<Screen> screen_;
   std::unique_ptr<Gui> gui_;
-  std::shared_ptr<VulkanRenderer> renderer_;  // for meshes, where the screen has none; opened when it is needed
+  std::shared_ptr<VulkanRenderer> renderer_;  // for meshes if the screen has none; opened on demand
   ViewState state_;
   Input input_;
   FileChooser chooser_;
@@ -139,10 +139,10 @@ class App {
   bool is_running_ = true;
   std::vector<WantedPicture> wanted_;
   std::optional<ViewRequest> asked_;
-  bool has_seen_chunks_ = true;     // a picture came since chunks of the world were moved last
-  std::optional<Camera> unframed_;  // a small world is looked through this until all of it is there
-  std::string told_saving_;         // of the world, what went wrong as long as it lasts
-  std::string told_fault_;          // of the backend, as long as it lasts; empty: none
+  bool has_seen_chunks_ = true;     // an image arrived since chunks of the world were last moved
+  std::optional<Camera> unframed_;  // the camera of a small world until all of it is loaded
+  std::string told_saving_;         // the current error of saving the world, already shown
+  std::string told_fault_;          // the current error of the backend, already shown; empty: none
   std::optional<SDL_Event> postponed_;
   int frames_left_ = 3;
   Clock::time_point last_frame_ = Clock::now();

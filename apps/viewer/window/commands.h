@@ -8,7 +8,7 @@
 
 namespace quoin::viewer {
 
-/// What keys and menus can ask for.
+/// The commands of keys and menus.
 enum class Command : std::uint8_t {
   Open,
   Save,
@@ -49,18 +49,18 @@ enum class Command : std::uint8_t {
 
 struct CommandInfo {
   Command command;
-  const char* name;  ///< as menus say it
-  const char* keys;  ///< as people read them
+  const char* name;  ///< label in menus
+  const char* keys;  ///< key names to show
   SDL_Keycode key;
   bool with_control;
   bool with_shift;
 };
 
-/// All of them, in the order of the help.
+/// Returns all commands in the order of the help.
 [[nodiscard]] std::span<const CommandInfo> commands();
 [[nodiscard]] const CommandInfo& info_of(Command command);
 
-/// What a key asks for, if anything.
+/// Returns the command of a key, if it has one.
 [[nodiscard]] std::optional<Command> command_of(const SDL_Keysym& key);
 
 }  // namespace quoin::viewer

@@ -4,7 +4,7 @@
 
 namespace quoin::viewer {
 
-/// Turns presses and moves of the mouse into strokes, once a frame and only when the picture's rays are up to date.
+/// Turns mouse presses and moves into strokes, once per frame and only when picking is up to date.
 class Editing {
  public:
   void press(const MousePlace& mouse);
@@ -12,9 +12,9 @@ class Editing {
   void release() { is_released_ = true; }
   [[nodiscard]] bool is_busy() const { return is_pressed_; }
 
-  /// Does what can be done of what was asked for.
+  /// Applies the mouse input since the last call as far as possible.
   void advance(ViewState& state);
-  /// Ends a stroke, as far as it has come.
+  /// Ends the stroke and keeps its edits so far.
   void abandon(ViewState& state);
 
  private:
@@ -29,7 +29,7 @@ class Editing {
   MousePlace to_;
 };
 
-/// One step back or forward.
+/// Undo or redo one step.
 void undo(ViewState& state);
 void redo(ViewState& state);
 

@@ -7,17 +7,17 @@
 
 namespace quoin::viewer {
 
-/// A dialogue in the window that asks for a file to open or to write.
+/// A dialogue in the window to choose a file to open or save.
 class FileChooser {
  public:
   enum class Purpose : std::uint8_t { Open, Save };
 
-  /// Shows it, in the folder of `start`, whose name it proposes.
+  /// Shows the dialogue in the folder of `start`, with its file name filled in.
   void show(Purpose purpose, const std::filesystem::path& start);
   [[nodiscard]] bool is_shown() const { return is_shown_; }
   [[nodiscard]] Purpose purpose() const { return purpose_; }
 
-  /// Draws it, if shown. Returns the file once the user has chosen.
+  /// Draws the dialogue if it is shown. Returns the file once the user has chosen.
   [[nodiscard]] std::optional<std::filesystem::path> draw(float scale);
 
  private:
@@ -29,7 +29,7 @@ class FileChooser {
 
   void enter(const std::filesystem::path& folder);
   void draw_folder_line();
-  /// Returns true when an entry was chosen for good.
+  /// Returns true when the user has confirmed an entry.
   [[nodiscard]] bool draw_entries(float height);
   [[nodiscard]] std::optional<std::filesystem::path> accept();
   [[nodiscard]] bool is_listed(const Entry& entry) const;
@@ -41,8 +41,8 @@ class FileChooser {
   std::filesystem::path folder_;
   std::string name_;
   std::string problem_;
-  std::string default_extension_;  // of a name without one, in saving
-  std::string asked_about_;        // the file whose replacement was warned of
+  std::string default_extension_;  // added when saving to a name without one
+  std::string asked_about_;        // the file whose replacement the user was asked about
   std::vector<Entry> entries_;
 };
 

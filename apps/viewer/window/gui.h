@@ -9,7 +9,7 @@
 
 namespace quoin::viewer {
 
-/// Dear ImGui on a screen, which draws it.
+/// Dear ImGui for a screen, which draws it.
 class Gui {
  public:
   /// `scale` enlarges everything; `screen` must outlive it.
@@ -20,10 +20,10 @@ class Gui {
 
   void process(const SDL_Event& event);
   void begin_frame();
-  /// What was asked for since `begin_frame`; it holds until the next one.
+  /// Returns the drawing commands since `begin_frame`, valid until the next `begin_frame`.
   const ImDrawData& end_frame();
 
-  /// Whether there are letters. Errors: those of Screen::set_font.
+  /// Returns the outcome of loading the font. Errors: those of Screen::set_font.
   [[nodiscard]] const Status& status() const { return status_; }
   [[nodiscard]] double scale() const { return scale_; }
   [[nodiscard]] bool wants_mouse() const { return ImGui::GetIO().WantCaptureMouse; }
@@ -37,11 +37,11 @@ class Gui {
   double scale_;
   Status status_;
   ImVec2 mouse_{-1e6F, -1e6F};
-  std::array<bool, 3> is_down_{};  // left, right, middle, by the events so far
-  std::array<int, 3> clicks_{};    // of the buttons pressed since the last frame, as SDL counts them
+  std::array<bool, 3> is_down_{};  // left, right, middle, after the events so far
+  std::array<int, 3> clicks_{};    // SDL's click counts of the buttons pressed since the last frame
 };
 
-/// How large things should be on the display that shows the screen's window: 1 where it has some 96 dots an inch.
+/// Returns the GUI scale for the display that shows the screen's window: 1 at about 96 dots per inch.
 [[nodiscard]] double scale_of_display(const Screen& screen);
 
 }  // namespace quoin::viewer

@@ -11,20 +11,20 @@
 
 namespace quoin::viewer {
 
-/// Turns what keyboard and mouse do into movements of the camera, strokes and commands.
+/// Turns keyboard and mouse input into camera movements, strokes and commands.
 class Input {
  public:
-  /// `gui_has_mouse` and `gui_has_keys`: something else than the picture takes them. Commands are added to `asked`.
+  /// Handles an event; the GUI takes mouse or keys if `gui_has_mouse` or `gui_has_keys`. Adds commands to `asked`.
   void process(const SDL_Event& event, ViewState& state, bool gui_has_mouse, bool gui_has_keys,
                std::vector<Command>& asked);
 
-  /// Once a frame, when the GUI knows what the mouse is over: whether that is the picture.
+  /// Updates whether the mouse is over the image. Called once per frame, after the GUI has found the part under it.
   void find_mouse(ViewState& state, bool gui_has_mouse) const;
 
-  /// Where the keys that are held push, and how hard.
+  /// Returns the direction of the held keys.
   [[nodiscard]] CameraPush push() const;
   [[nodiscard]] double boost() const;
-  /// As if all keys and buttons were let go.
+  /// Releases all keys and buttons.
   void release_all();
 
   Editing editing;

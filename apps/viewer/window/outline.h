@@ -4,7 +4,7 @@
 
 namespace quoin::viewer {
 
-/// Draws what the brush would reach about the voxel under the mouse, as lines over the picture.
+/// Draws the outline of the brush at the voxel under the mouse, as lines over the image.
 void draw_outline(const ViewState& state);
 
 }  // namespace quoin::viewer

@@ -1,6 +1,6 @@
 #pragma once
 
-// What tests ask of their own process, to find what is left behind.
+// Resources of the test process, to find leaks.
 
 #include <chrono>
 #include <cstddef>
@@ -24,8 +24,8 @@ inline std::size_t threads() {
   return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator("/proc/self/task"), {}));
 }
 
-/// The memory that this process holds, in 10^6 bytes. Under the address sanitizer what is allocated: it keeps what is
-/// freed, and notes of every place that was ever in use, so that what is in RAM grows with all that was done.
+/// Returns the memory of this process, in 10^6 bytes. Under the address sanitizer only allocated bytes count: it keeps
+/// freed memory and records of every address ever used, so resident memory keeps growing.
 inline double held_megabytes() {
 #ifdef __SANITIZE_ADDRESS__
   return static_cast<double>(__sanitizer_get_current_allocated_bytes()) / 1e6;
@@ -34,8 +34,8 @@ inline double held_megabytes() {
 #endif
 }
 
-/// Threads left when those that were joined are gone: the kernel lists a thread for a moment after its join returns.
-/// Waits at most five seconds for there to be no more than `expected`.
+/// Returns the number of threads after joined ones have disappeared: the kernel lists a thread for a moment after its
+/// join returns. Waits at most 5 s for the number to fall to `expected`.
 inline std::size_t threads_after_joining(std::size_t expected) {
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(5);
   std::size_t count = threads();

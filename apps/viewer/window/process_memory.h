@@ -1,6 +1,6 @@
 #pragma once
 
-// For the panel, and for tests of what is left behind.
+// For the panel, and for tests that find leaks.
 
 #include <fstream>
 
@@ -8,7 +8,7 @@
 
 namespace quoin::viewer {
 
-/// The memory of this process that is in RAM, in 10^6 bytes; 0 where the system does not say.
+/// Returns the resident memory of this process, in 10^6 bytes; 0 if the system does not report it.
 inline double resident_megabytes() {
   std::ifstream in("/proc/self/statm");
   long long total = 0;

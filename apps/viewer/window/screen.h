@@ -26,10 +26,10 @@ struct SdlDelete {
 template <class T>
 using SdlPointer = std::unique_ptr<T, SdlDelete>;
 
-/// SDL's video system, from here to the end of its life.
+/// Owns SDL's video system.
 class SdlVideo {
  public:
-  /// Errors: Unsupported where there is no display.
+  /// Errors: Unsupported if there is no display.
   [[nodiscard]] static Result<std::unique_ptr<SdlVideo>> start();
   SdlVideo(const SdlVideo&) = delete;
   SdlVideo& operator=(const SdlVideo&) = delete;
@@ -39,10 +39,10 @@ class SdlVideo {
   SdlVideo() = default;
 };
 
-/// What SDL says of its last failure, on one line.
+/// Returns SDL's last error message on one line.
 [[nodiscard]] std::string sdl_says();
 
-/// A window and how pictures get into it. Sizes are in pixels of the output.
+/// A window that shows images and the GUI. Sizes are in output pixels.
 class Screen {
  public:
   Screen() = default;
@@ -52,42 +52,41 @@ class Screen {
 
   [[nodiscard]] SDL_Window* window() const { return window_.get(); }
   [[nodiscard]] bool is_minimised() const;
-  /// Pixels of the output for each of the window's units, in which mice are measured.
+  /// Returns the output pixels per window unit, the unit of mouse positions.
   [[nodiscard]] double pixels_per_unit() const;
   void set_title(const std::string& title);
 
-  /// Width and height of the output; 0 where there is none.
+  /// Returns the width and height of the output; 0 if there is none.
   [[nodiscard]] virtual SDL_Point output_size() const = 0;
-  /// Whether `show` waits for the display.
+  /// Returns true if `show` waits for the display.
   [[nodiscard]] virtual bool has_vsync() const = 0;
-  /// The device that shows the window and can draw for it; null where none does.
+  /// Returns the device that shows the window and can draw for it, or null.
   [[nodiscard]] virtual std::shared_ptr<VulkanRenderer> renderer() const { return nullptr; }
 
-  /// The font's picture, a byte of opacity a pixel.
+  /// Sets the font image, one byte of opacity per pixel.
   virtual Status set_font(int width, int height, std::span<const std::uint8_t> opacity) = 0;
-  /// Takes over a picture, of either kind.
+  /// Sets the image, in memory or on the device.
   virtual Status set_picture(const ViewFrame& frame) = 0;
   virtual void forget_picture() = 0;
-  /// Shows the picture, stretched smoothly where its size is another, or a plain backdrop where there is none, and the
-  /// GUI over it.
+  /// Shows the image with the GUI over it. Scales the image smoothly to `place`; shows a plain background without one.
   virtual Status show(const SDL_Rect& place, const ImDrawData& gui) = 0;
 
  protected:
-  /// Errors: Unsupported, with SDL's words.
+  /// Errors: Unsupported, with SDL's message.
   Status open_window(int width, int height, Uint32 flags);
 
  private:
   SdlPointer<SDL_Window> window_;
 };
 
-/// Returns true if an OpenGL renderer of that name (GL_RENDERER) draws by the processor.
+/// Returns true if an OpenGL renderer of that name (GL_RENDERER) is a software renderer.
 [[nodiscard]] bool is_software_opengl(std::string_view name);
 
-/// Opens a window that SDL draws in, by its software renderer where OpenGL would draw by the processor as well. `width`
-/// and `height` are in the display's units. Errors: Unsupported.
+/// Opens a window drawn by SDL, with its software renderer if OpenGL is rendered in software too. `width` and `height`
+/// are in display units. Errors: Unsupported.
 [[nodiscard]] Result<std::unique_ptr<Screen>> open_sdl_screen(int width, int height);
 
-/// A window that a graphics device draws in and shows. `device` as VulkanOptions::device. Errors: Unsupported.
+/// Opens a window drawn by a graphics device. `device` is as in VulkanOptions::device. Errors: Unsupported.
 [[nodiscard]] Result<std::unique_ptr<Screen>> open_vulkan_screen(int width, int height, const std::string& device);
 
 }  // namespace quoin::viewer

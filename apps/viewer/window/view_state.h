@@ -16,10 +16,10 @@
 
 namespace quoin::viewer {
 
-/// What the left mouse button does.
+/// The action of the left mouse button.
 enum class Tool : std::uint8_t { Look, Place, Remove, Paint, Smooth, Flatten };
 
-/// One line that tells the user something, for a while.
+/// A line of text shown to the user for some seconds.
 struct Message {
   std::string text;
   bool is_error = false;
@@ -31,7 +31,7 @@ struct Message {
   }
 };
 
-/// Stats about the picture that is shown.
+/// Statistics of the shown image.
 struct FrameStats {
   int width = 0;
   int height = 0;
@@ -41,38 +41,38 @@ struct FrameStats {
   std::int64_t rays = 0;
 };
 
-/// Where the mouse is, in pixels of the picture from its upper left corner.
+/// The mouse position in image pixels, from the upper left corner.
 struct MousePlace {
   double x = 0.0;
   double y = 0.0;
-  bool is_over = false;  ///< the picture, with nothing before it
+  bool is_over = false;  ///< over the image, and no part of the GUI covers it
 };
 
-/// All that the window knows; its parts read and change it.
+/// The state shared by the parts of the window.
 struct ViewState {
   Settings settings;
   CameraControl camera;
-  Walker walker;  ///< whose eyes the camera is while its mode says so
+  Walker walker;  ///< moves the camera in CameraMode::Walk
   double fov_before_walk = 0.0;
   Tool tool = Tool::Look;
   Brush brush;
   VoxelType palette_shows = kAir;                            ///< the type that the palette has scrolled to
   OpenDocument open{std::make_unique<Document>(), nullptr};  ///< there is always a document
-  SceneTree scene_tree;                                      ///< as the panel shows it
+  SceneTree scene_tree;                                      ///< the tree shown in the panel
 
-  SDL_Rect picture_place{0, 0, 0, 0};  ///< in pixels of the output
+  SDL_Rect picture_place{0, 0, 0, 0};  ///< in output pixels
   double pixels_per_unit = 1.0;
   MousePlace mouse;
-  std::optional<SceneHit> hover;  ///< what is under the mouse
+  std::optional<SceneHit> hover;  ///< the hit under the mouse
 
-  ViewFrame picture;  ///< the last that arrived
+  ViewFrame picture;  ///< the last frame that arrived
   FrameStats stats;
-  double frame_seconds = 0.0;         ///< the work of a frame of the window, smoothed
-  double longest_wait_seconds = 0.0;  ///< of an edit for the picture to stop
+  double frame_seconds = 0.0;         ///< processing time of a window frame, smoothed
+  double longest_wait_seconds = 0.0;  ///< longest time that an edit waited for rendering to stop
   double last_wait_seconds = 0.0;
-  std::chrono::steady_clock::time_point edited_at{};  ///< the document, last
+  std::chrono::steady_clock::time_point edited_at{};  ///< last edit of the document
 
-  /// Since when the image shows another mode than the settings, or chunks remain to be meshed.
+  /// Time since the image shows another mode than the settings, or chunks remain to be meshed.
   std::optional<std::chrono::steady_clock::time_point> waiting_since;
   std::optional<Message> message;
   bool is_help_shown = false;
@@ -81,17 +81,17 @@ struct ViewState {
 
   [[nodiscard]] const Scene& scene() const { return open.document->scene(); }
   [[nodiscard]] double aspect() const { return static_cast<double>(picture_place.w) / std::max(picture_place.h, 1); }
-  /// Of what speeds and distances at a place go by.
+  /// Returns the bounds that set the scale of speeds and distances at a point.
   [[nodiscard]] DBox bounds(DVec3 from, InstanceFilter filter = InstanceFilter::Visible) const {
     return open.document->world() ? open.document->world()->bounds(from) : scene().bounds(filter);
   }
   [[nodiscard]] bool has_picture_place() const { return picture_place.w > 0 && picture_place.h > 0; }
-  /// Whether the document may be changed now.
+  /// Returns true if the document can be changed now.
   [[nodiscard]] bool can_edit() const { return open.backend != nullptr && !saver && !loader; }
-  /// Why the scene cannot be drawn as that; null where it can.
+  /// Returns the reason to show if the scene cannot be drawn in that mode, else null.
   [[nodiscard]] const char* why_not_drawn_as(DrawMode mode) const;
-  /// Changes what dragging does. One walks from the place under the mouse, or from the middle of the scene, and sees
-  /// with the angle of view of a person meanwhile.
+  /// Changes the camera mode. Walking starts at the point under the mouse or the middle of the scene, with a person's
+  /// field of view until the mode changes.
   void set_camera_mode(CameraMode mode);
   void tell(std::string text) { message = Message{std::move(text), false}; }
   void tell(const Error& error) { message = Message{to_string(error), true}; }

@@ -14,11 +14,11 @@
 
 namespace quoin::viewer {
 
-/// What marches rays and shows the window.
+/// The renderer that marches rays and shows the window.
 enum class ViewerBackend : std::uint8_t {
-  Auto,       ///< a graphics card where there is one, else the processor
-  Processor,  ///< meshes are still drawn by a device
-  Vulkan,     ///< whatever device there is, processors that act as one too
+  Auto,       ///< a graphics card if there is one, else the processor
+  Processor,  ///< the processor; meshes are still drawn by a device
+  Vulkan,     ///< any Vulkan device, including software devices
 };
 
 struct ViewerOptions {
@@ -27,15 +27,15 @@ struct ViewerOptions {
   WorldOptions world;  ///< of worlds on disk
   Threads threads;
   ViewerBackend backend = ViewerBackend::Auto;
-  std::string device;               ///< of Vulkan, as VulkanOptions::device
-  std::optional<DrawMode> mode;     ///< what the scene is drawn as at first; without, as it was last
-  std::optional<LightModel> light;  ///< likewise
-  int width = 0;                    ///< of the window; 0: as it was last
+  std::string device;               ///< as VulkanOptions::device
+  std::optional<DrawMode> mode;     ///< initial draw mode; by default the last one used
+  std::optional<LightModel> light;  ///< initial light model; by default the last one used
+  int width = 0;                    ///< window size; 0: the last one used
   int height = 0;
-  bool is_bare = false;              ///< the picture alone, neither panels nor bars, and nothing remembered
-  std::filesystem::path screenshot;  ///< not empty: written once the picture has settled, which ends the viewer
-  /// Called instead of coming back where that would take long, since something draws that cannot be stopped: all is
-  /// written, and the window is gone. It should end the process, without destructors. Empty: that is waited for.
+  bool is_bare = false;              ///< shows only the image, without panels and bars, and saves no settings
+  std::filesystem::path screenshot;  ///< if not empty: written once the image has settled; then the viewer ends
+  /// Called instead of returning if work that cannot be stopped would delay the return: all files are written and the
+  /// window is closed. Should end the process without destructors. If empty, run_viewer waits for the work.
   std::function<void()> leave_at_once;
 
   [[nodiscard]] InstanceFilter instances() const {
@@ -43,11 +43,11 @@ struct ViewerOptions {
   }
 };
 
-/// Opens a window on a file and comes back when the user closes it.
+/// Opens a window for a file and returns when the user closes it.
 ///
-/// `is_interrupted` is asked some times a second whether to end at once.
-/// Errors: Unsupported without a display, or without a device that was asked for; those of reading `file` and of
-/// writing `screenshot`. Whatever goes wrong later is shown in the window.
+/// `is_interrupted` is polled some times per second; the viewer ends once it returns true.
+/// Errors: Unsupported without a display or the requested device; those of reading `file` and writing `screenshot`.
+/// Later errors are shown in the window.
 [[nodiscard]] Status run_viewer(const ViewerOptions& options, const std::function<bool()>& is_interrupted = {});
 
 }  // namespace quoin::viewer

@@ -4,9 +4,9 @@
 
 namespace quoin::viewer {
 
-/// Wakes the window's loop; may be called from any thread while SDL runs.
+/// Wakes the window's loop. Can be called from any thread while SDL runs.
 void wake_window();
-/// Whether an event is of that kind.
+/// Returns true if an event comes from `wake_window`.
 [[nodiscard]] bool is_wake(const SDL_Event& event);
 
 }  // namespace quoin::viewer

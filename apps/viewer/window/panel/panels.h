@@ -7,30 +7,30 @@
 
 namespace quoin::viewer {
 
-/// What the colours of levels of detail mean.
+/// The legend of the level-of-detail colours.
 inline constexpr const char* kDetailLegend = "green: in full; yellow to red: in coarser cells; blue: impostors";
 
-/// What the menus ask for beyond commands.
+/// The user's choices in menus and panels.
 struct MenuChoice {
   std::vector<Command> commands;
-  std::optional<std::string> recent;  ///< a file to open
-  std::optional<Camera> camera;       ///< one of the file's, to look through
+  std::optional<std::string> recent;  ///< recent file to open
+  std::optional<Camera> camera;       ///< camera of the file to look through
 };
 
-/// The bar at the top. Returns its height, in the window's units.
+/// Draws the menu bar at the top. Returns its height in window units.
 float draw_menu(ViewState& state, MenuChoice& choice);
-/// The line at the bottom. Returns its height.
+/// Draws the status line at the bottom. Returns its height.
 float draw_status(const ViewState& state);
-/// What stands at the right, `top` and `bottom` units off the edges. Returns its width.
+/// Draws the panel on the right, `top` and `bottom` units from the edges. Returns its width.
 float draw_panel(ViewState& state, float scale, float top, float bottom, MenuChoice& choice);
-/// Keys and mouse, if shown.
+/// Draws the help on keys and mouse, if it is shown.
 void draw_help(ViewState& state, float scale);
-/// A note over the picture: errors, what was saved. Requires: `state.message`.
+/// Draws the message over the image. Requires: `state.message`.
 void draw_message(ViewState& state, float bottom);
-/// A note over the image while it does not show the mode of the settings, or not all of it: the work that is left, how
-/// far it has come, and the mode that is shown meanwhile.
+/// Draws a note over the image while it does not fully show the mode of the settings: the remaining work, its progress,
+/// and the mode that is shown meanwhile.
 void draw_progress(ViewState& state, float scale, float top);
-/// What an empty window says.
+/// Draws the welcome text of an empty window.
 void draw_welcome(const ViewState& state, MenuChoice& choice);
 
 }  // namespace quoin::viewer

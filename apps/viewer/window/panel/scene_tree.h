@@ -7,15 +7,15 @@
 
 namespace quoin::viewer {
 
-/// How much of a scene is not seen.
+/// The number of hidden parts of a scene.
 struct HiddenParts {
-  std::size_t layers = 0;     ///< that are switched off
-  std::size_t instances = 0;  ///< whatever hides them
+  std::size_t layers = 0;     ///< layers switched off
+  std::size_t instances = 0;  ///< instances hidden by themselves, a group or a layer
 };
 
 [[nodiscard]] HiddenParts hidden_parts(const Scene& scene);
 
-/// A scene's groups and instances by what they belong to; the default handle stands for the top.
+/// A scene's groups and instances by parent group; the default handle is the top level.
 class SceneTree {
  public:
   struct Below {
@@ -23,11 +23,11 @@ class SceneTree {
     std::vector<InstanceHandle> instances;
   };
 
-  /// Follows the scene. Cost: O(instances + groups * depth) when any of them has changed or another scene is given;
-  /// else what asking costs.
+  /// Updates the tree. Cost: O(instances + groups * depth) if any of them has changed or the scene is another one;
+  /// otherwise only the check.
   void update(const Scene& scene);
   [[nodiscard]] const HiddenParts& hidden() const { return hidden_; }
-  /// Null where nothing is below.
+  /// Returns the children of a group; null if it has none.
   [[nodiscard]] const Below* find(GroupHandle group) const {
     const auto found = below_.find(group);
     return found == below_.end() ? nullptr : &found->second;

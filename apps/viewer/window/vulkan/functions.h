@@ -5,7 +5,7 @@
 
 namespace quoin::viewer {
 
-// Vulkan is not linked but found by SDL, so that the tool starts where there is none.
+// Vulkan is loaded by SDL, not linked, so that the program starts without it.
 #define QUOIN_VIEWER_VULKAN_OF_LOADER(X) \
   X(vkCreateInstance)                    \
   X(vkEnumerateInstanceLayerProperties)
@@ -90,7 +90,7 @@ namespace quoin::viewer {
   X(vkUpdateDescriptorSets)              \
   X(vkWaitForFences)
 
-/// One of Vulkan's many structures that begin by saying which they are.
+/// Returns a Vulkan structure with its `sType` set.
 template <class T>
 [[nodiscard]] T info_of(VkStructureType type) {
   T info{};
@@ -98,7 +98,7 @@ template <class T>
   return info;
 }
 
-/// Vulkan's functions, as far as windows need them. Each of the three returns whether all were found.
+/// The Vulkan functions that windows need. Each of the three load functions returns true if all were found.
 struct VulkanFunctions {
   // NOLINTBEGIN(readability-identifier-naming): Vulkan's own names
   PFN_vkGetInstanceProcAddr vkGetInstanceProcAddr = nullptr;

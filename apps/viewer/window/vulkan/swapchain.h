@@ -7,11 +7,11 @@
 
 namespace quoin::viewer {
 
-/// The images of a window, of one size, to be drawn by a render pass and then shown.
+/// The swapchain of a window at one size, with a framebuffer per image.
 class Swapchain {
  public:
-  /// `old` may be null and is retired, whatever comes of it. `pass`: of `format_of`. Null while the window has no
-  /// pixels. Requires: width and height are positive.
+  /// `old` may be null; it is retired even if this fails. `pass` has the format of `format_of`. Returns null while the
+  /// window has no pixels. Requires: width and height are positive.
   [[nodiscard]] static Result<std::unique_ptr<Swapchain>> create(const WindowDevice& device, VkRenderPass pass,
                                                                  int width, int height, bool vsync,
                                                                  const Swapchain* old);
@@ -19,13 +19,13 @@ class Swapchain {
   Swapchain(const Swapchain&) = delete;
   Swapchain& operator=(const Swapchain&) = delete;
 
-  /// How images of the device's window store colours: bytes that are shown as they are. Errors: Unsupported.
+  /// Returns a surface format that shows bytes unchanged. Errors: Unsupported.
   [[nodiscard]] static Result<VkSurfaceFormatKHR> format_of(const WindowDevice& device);
 
   [[nodiscard]] VkSwapchainKHR handle() const { return handle_; }
   [[nodiscard]] VkExtent2D extent() const { return extent_; }
   [[nodiscard]] VkFramebuffer framebuffer(std::uint32_t image) const { return images_[image].framebuffer; }
-  /// Signalled when an image has been drawn. One an image: whoever shows it may still wait for the last one.
+  /// Signalled when an image has been drawn. One per image, because presentation may still wait for the previous one.
   [[nodiscard]] VkSemaphore drawn(std::uint32_t image) const { return images_[image].drawn; }
 
  private:

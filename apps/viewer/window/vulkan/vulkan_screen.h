@@ -10,10 +10,10 @@ struct SDL_Window;
 
 namespace quoin::viewer {
 
-/// What SDL wants of a device for a window of SDL_WINDOW_VULKAN, which must outlive the device. Errors: Unsupported.
+/// Returns the device options for a window with SDL_WINDOW_VULKAN, which must outlive the device. Errors: Unsupported.
 [[nodiscard]] Result<WindowDeviceOptions> device_options(SDL_Window* window);
 
-/// A renderer on a device, which lives as long. Errors: those of VulkanRenderer::create.
+/// Creates a renderer that keeps the device alive. Errors: those of VulkanRenderer::create.
 [[nodiscard]] Result<std::shared_ptr<VulkanRenderer>> make_renderer(std::shared_ptr<WindowDevice> device);
 
 }  // namespace quoin::viewer

@@ -11,7 +11,7 @@
 
 namespace quoin::viewer {
 
-/// In pixels of a window, from its upper left corner.
+/// A rectangle in window pixels, from the upper left corner.
 struct PixelRect {
   int x = 0;
   int y = 0;
@@ -19,51 +19,52 @@ struct PixelRect {
   int height = 0;
 };
 
-/// A corner of a triangle that is drawn over the picture.
+/// A vertex of a triangle over the image.
 struct OverlayVertex {
-  float x = 0.0F;  ///< pixels of the window, from its upper left corner
+  float x = 0.0F;  ///< window pixels, from the upper left corner
   float y = 0.0F;
-  float u = 0.0F;  ///< of the font's picture, 0 to 1
+  float u = 0.0F;  ///< font image coordinates, 0 to 1
   float v = 0.0F;
   std::uint32_t colour = 0;  ///< sRGB bytes, red the lowest, alpha the highest; alpha is multiplied with the font's
 };
 
-/// Some triangles of an overlay.
+/// A draw call of an overlay.
 struct OverlayDraw {
   PixelRect clip;
   std::uint32_t first_index = 0;
   std::uint32_t index_count = 0;
-  std::uint32_t first_vertex = 0;  ///< is added to the indices
+  std::uint32_t first_vertex = 0;  ///< added to the indices
 };
 
-/// Flat triangles over a picture: what user interfaces are made of. Blended in sRGB, as these expect.
+/// Triangles over an image, such as a GUI's. Blended in sRGB, as GUIs expect.
 struct Overlay {
   std::span<const OverlayVertex> vertices;
   std::span<const std::uint16_t> indices;
   std::span<const OverlayDraw> draws;
 };
 
-/// Shows pictures in a device's window: those of a renderer on that device.
+/// Shows images of a renderer in the window of the same device.
 ///
-/// Colours: a picture's bytes are the window's.
+/// Colours: the bytes of an image are shown unchanged.
 /// Threads: the renderer's. Errors: DeviceLost; Unsupported when the window was lost; LimitExceeded.
 class VulkanWindow {
  public:
-  /// `vsync`: pictures wait for the display; without, where the device can, they do not. Shares `device`.
+  /// `vsync` waits for the display; without it images are shown at once if the device can. Shares `device`.
   [[nodiscard]] static Result<VulkanWindow> create(std::shared_ptr<WindowDevice> device, bool vsync = true);
   VulkanWindow(VulkanWindow&&) noexcept;
   VulkanWindow& operator=(VulkanWindow&&) noexcept;
   ~VulkanWindow();
 
-  /// The font's picture, a byte of opacity a pixel. Requires: that many bytes.
+  /// Sets the font image, one byte of opacity per pixel. Requires: `opacity` has width * height bytes.
   [[nodiscard]] Status set_font(int width, int height, std::span<const std::uint8_t> opacity);
 
-  /// Shows a picture, stretched over `place`, on a dark ground, and the overlay over all. `width` and `height`: of the
-  /// window now, in pixels; where one is 0, as in minimised windows, nothing is done. `picture` may be null, or empty.
+  /// Shows an image, stretched over `place`, on a dark background, and the overlay over it. `width` and `height` are
+  /// the window's current size in pixels; does nothing if one is 0, as in minimised windows. `picture` may be null or
+  /// empty.
   ///
-  /// What belongs to the window's size is made anew where that has changed. Waits for the display, and until the window
-  /// is drawn: `picture` may go afterwards.
-  /// Requires: draws name indices, and these name vertices, that are there.
+  /// Rebuilds the swapchain if the window's size has changed. Waits for the display and until the window is drawn;
+  /// `picture` may be freed afterwards.
+  /// Requires: the indices and vertices of all draw calls exist.
   [[nodiscard]] Status present(int width, int height, const VulkanPicture* picture, const PixelRect& place,
                                const Overlay& overlay);
 

@@ -13,30 +13,30 @@
 
 namespace quoin::viewer {
 
-/// What a window and its user want of a device.
+/// Requirements of a window for its device.
 struct WindowDeviceOptions {
   std::string device;  ///< as VulkanOptions::device
   PFN_vkGetInstanceProcAddr get_instance_proc_addr = nullptr;
-  std::vector<std::string> instance_extensions;  ///< that windows take
-  /// Makes the window's surface, which the device destroys; null where that fails.
+  std::vector<std::string> instance_extensions;  ///< required by windows
+  /// Makes the window's surface, which the device destroys. Returns null on failure.
   std::function<VkSurfaceKHR(VkInstance instance)> make_surface;
-  /// Told what the validation layer says, which is then loaded.
+  /// If set, the validation layer is loaded and its messages are passed here.
   std::function<void(const std::string& message)> on_validation_message;
 };
 
-/// An instance, a window's surface, and a device with one queue that computes, draws and shows pictures there: all of
-/// it the viewer's own, and as Quoin's renderers need it.
+/// An instance, a window's surface, and a device with one queue that computes, draws and presents. The viewer owns
+/// them; they fulfil the requirements of Quoin's renderers.
 ///
 /// Threads: one at a time.
 class WindowDevice {
  public:
-  /// Errors: Unsupported, saying what is missing.
+  /// Errors: Unsupported, with the missing feature.
   [[nodiscard]] static Result<std::shared_ptr<WindowDevice>> create(const WindowDeviceOptions& options);
   ~WindowDevice();
   WindowDevice(const WindowDevice&) = delete;
   WindowDevice& operator=(const WindowDevice&) = delete;
 
-  /// For VulkanRenderer::create; this must outlive the renderer.
+  /// Returns the device for VulkanRenderer::create; `this` must outlive the renderer.
   [[nodiscard]] BorrowedVulkanDevice lent() const;
 
   [[nodiscard]] const VulkanFunctions& api() const { return api_; }
@@ -46,10 +46,10 @@ class WindowDevice {
   [[nodiscard]] std::uint32_t queue_family() const { return queue_family_; }
   [[nodiscard]] VkSurfaceKHR surface() const { return surface_; }
   [[nodiscard]] const std::string& name() const { return name_; }
-  /// A kind of memory that is among the `allowed` ones and has all that is wanted; else any of the allowed ones.
+  /// Returns an `allowed` memory type with all `wanted` properties, or else any allowed one.
   [[nodiscard]] std::uint32_t memory_type(std::uint32_t allowed, VkMemoryPropertyFlags wanted) const;
 
-  /// What a call comes to. `doing`: as in "showing a picture".
+  /// Converts the result of a Vulkan call. `doing` names the call in the error, as in "showing a picture".
   [[nodiscard]] Status check(VkResult result, const std::string& doing) const;
 
  private:

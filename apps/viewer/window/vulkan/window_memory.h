@@ -9,7 +9,7 @@
 
 namespace quoin::viewer {
 
-/// Bytes that the processor writes and shaders read by address.
+/// A buffer that the processor writes and shaders read by address.
 class WindowBuffer {
  public:
   explicit WindowBuffer(const WindowDevice& device) : device_(&device) {}
@@ -17,7 +17,8 @@ class WindowBuffer {
   WindowBuffer(const WindowBuffer&) = delete;
   WindowBuffer& operator=(const WindowBuffer&) = delete;
 
-  /// Grows where they do not fit. Requires: no commands that read it run. Errors: LimitExceeded.
+  /// Writes the bytes; grows the buffer if they do not fit. Requires: no commands that read it are running. Errors:
+  /// LimitExceeded.
   [[nodiscard]] Status put(std::span<const std::byte> bytes);
 
   [[nodiscard]] VkBuffer handle() const { return handle_; }
@@ -35,22 +36,22 @@ class WindowBuffer {
   std::byte* mapped_ = nullptr;
 };
 
-/// An image that Quoin's pictures are put into and shaders read from.
+/// A Vulkan image that Quoin's images are copied into and shaders read.
 class PictureImage {
  public:
-  static constexpr VkFormat kFormat = VK_FORMAT_R8G8B8A8_UNORM;  // bytes as they are
+  static constexpr VkFormat kFormat = VK_FORMAT_R8G8B8A8_UNORM;  // unchanged bytes
 
   explicit PictureImage(const WindowDevice& device) : device_(&device) {}
   ~PictureImage() { free(); }
   PictureImage(const PictureImage&) = delete;
   PictureImage& operator=(const PictureImage&) = delete;
 
-  /// Becomes another image where the size is another; its pixels mean nothing then. Returns whether it did.
-  /// Requires: no commands that read it run. Errors: LimitExceeded.
+  /// Recreates the image, with undefined pixels, if its size differs. Returns true if it did.
+  /// Requires: no commands that read it are running. Errors: LimitExceeded.
   [[nodiscard]] Result<bool> fit(int width, int height);
 
   [[nodiscard]] VkImageView view() const { return view_; }
-  /// For VulkanPicture::record_copy: leaves it to be read by shaders.
+  /// Returns the target for VulkanPicture::record_copy, which leaves the image readable by shaders.
   [[nodiscard]] VulkanImageTarget target() const;
 
  private:

@@ -9,7 +9,7 @@
 
 namespace quoin::viewer {
 
-// What shaders/window.glsl declares, field by field.
+// Mirrors the declaration in shaders/window.glsl, field by field.
 struct WindowPush {
   std::uint64_t corners = 0;
   std::uint64_t font = 0;
@@ -20,7 +20,7 @@ struct WindowPush {
 };
 static_assert(sizeof(WindowPush) == 48);
 
-/// How a window is drawn: a picture, and triangles over it.
+/// The pipelines that draw a window: an image, and triangles over it.
 class WindowPipelines {
  public:
   /// Errors: those of Swapchain::format_of, LimitExceeded.
@@ -29,9 +29,9 @@ class WindowPipelines {
   WindowPipelines(const WindowPipelines&) = delete;
   WindowPipelines& operator=(const WindowPipelines&) = delete;
 
-  /// Clears, and leaves images ready to be shown.
+  /// Clears the image and leaves it ready to present.
   [[nodiscard]] VkRenderPass pass() const { return pass_; }
-  /// What `bind_picture` draws from now on. Requires: no commands that draw another run.
+  /// Sets the image that `bind_picture` draws. Requires: no commands that draw another image are running.
   void set_picture(VkImageView view) const;
   void bind_picture(VkCommandBuffer commands, const WindowPush& push) const;
   void bind_overlay(VkCommandBuffer commands, const WindowPush& push) const { bind(commands, overlay_, push); }
@@ -48,7 +48,7 @@ class WindowPipelines {
   VkSampler sampler_ = VK_NULL_HANDLE;
   VkDescriptorSetLayout set_layout_ = VK_NULL_HANDLE;
   VkDescriptorPool sets_ = VK_NULL_HANDLE;
-  VkDescriptorSet set_ = VK_NULL_HANDLE;  // one picture
+  VkDescriptorSet set_ = VK_NULL_HANDLE;  // one image
   VkPipelineLayout layout_ = VK_NULL_HANDLE;
   VkPipeline picture_ = VK_NULL_HANDLE;
   VkPipeline overlay_ = VK_NULL_HANDLE;
