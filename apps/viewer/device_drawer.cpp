@@ -373,12 +373,12 @@ std::vector<std::pair<std::string, std::string>> DeviceDrawer::stats() const {
   if (!meshes_ || !request_ || !has_meshes(request_->mode)) return {};
   const VulkanMeshRenderer::Stats drawn = meshes_->renderer.stats();
   const LiveMeshes::Stats live = meshes_->live->stats();
-  return {{"triangles, each once", text("%.0f", static_cast<double>(drawn.triangles))},
+  return {{"triangles", text("%.0f", static_cast<double>(drawn.triangles))},
           {"triangles drawn", text("%.0f", static_cast<double>(drawn.drawn_triangles))},
           {"chunks", text("%.0f", static_cast<double>(drawn.chunks))},
-          {"still to mesh", text("%.0f", static_cast<double>(meshes_->live->pending()))},
+          {"chunks to mesh", text("%.0f", static_cast<double>(meshes_->live->pending()))},
           {"meshes", text("%.1f MB", static_cast<double>(drawn.bytes) / 1e6)},
-          {"last chunk took", text("%.2f ms", live.last_mesh_seconds * 1e3)},
+          {"last chunk meshed", text("%.2f ms", live.last_mesh_seconds * 1e3)},
           {"edit to mesh", text("%.2f ms", live.last_latency_seconds * 1e3)}};
 }
 

@@ -45,12 +45,14 @@ Status write_as_glb(const Scene& scene, const std::filesystem::path& path, const
 }
 
 Result<FileFormat> format_to_write(const std::filesystem::path& path) {
-  // Not what is for other programs alone: such a file holds more than what was read of it.
+  // Formats without a writer here are refused, because such files hold more than load_scene reads.
   constexpr std::array kFormats = {FileFormat::World, FileFormat::Vox, FileFormat::Scene, FileFormat::Glb};
   const auto format = format_for_writing(path);
   if (format && std::ranges::find(kFormats, format->format) != kFormats.end()) return format->format;
-  return make_error(ErrorCode::Unsupported,
-                    "the viewer saves .quoin, .vox, .json and .glb; `quoin convert` writes the others", path.string());
+  return make_error(
+      ErrorCode::Unsupported,
+      "cannot save this format: the viewer saves .quoin, .vox, .json and .glb; `quoin convert` writes the others",
+      path.string());
 }
 
 }  // namespace
@@ -77,7 +79,7 @@ Result<std::unique_ptr<Document>> Document::open(const std::filesystem::path& pa
   }
   LoadOptions as_saved = options;
   as_saved.show_hidden = false;
-  // Before it is read: what is written meanwhile is not what was read.
+  // Taken before reading, so that a write during the read counts as a change.
   const auto stamp = FileStamp::of(path);
   auto loaded = load_scene(path, as_saved, {}, progress);
   if (!loaded) return loaded.error();
@@ -157,7 +159,7 @@ std::int64_t Document::drag_surface(const Ray& ray_in_world, const std::optional
   const DVec3 from = stroke_->last_point;
   const double length = glm::length(*target - from);
   const double stride = 0.5 * sculpt_radius(stroke_->brush);
-  constexpr double kLongestWay = 512.0;  // a leap beyond that is no drag of a hand
+  constexpr double kLongestWay = 512.0;  // longer leaps are not drags by hand
   if (!(length >= 0.5 * stride) || length > kLongestWay) return 0;
   std::int64_t changed = 0;
   const int steps = std::max(1, static_cast<int>(std::ceil(length / stride)));
@@ -186,7 +188,7 @@ std::int64_t Document::drag_to(const Ray& ray_in_world, const std::optional<Scen
   const IVec3 target = target_of(stroke_->brush.action, *met, stroke_->layer.face);
   const IVec3 way = target - stroke_->last;
   const int steps = std::max({std::abs(way.x), std::abs(way.y), std::abs(way.z)});
-  constexpr int kLongestWay = 512;  // a leap beyond that is no drag of a hand
+  constexpr int kLongestWay = 512;  // longer leaps are not drags by hand
   if (steps > kLongestWay) return 0;
   std::int64_t changed = 0;
   const IVec3 from = stroke_->last;
@@ -236,7 +238,7 @@ Result<std::vector<std::string>> Document::losses(const std::filesystem::path& p
   const auto format = format_to_write(path);
   if (!format) return format.error();
   std::vector<std::string> all;
-  if (world_) return all;                      // itself, or a copy
+  if (world_) return all;                      // the world itself, or a copy
   if (*format == FileFormat::Glb) return all;  // a copy
   auto of_format = losses_of_saving(loaded_, path);
   if (!of_format) return of_format.error();
@@ -244,7 +246,7 @@ Result<std::vector<std::string>> Document::losses(const std::filesystem::path& p
   std::error_code ignored;
   const bool is_own = is_same_file(path, path_);
   if (is_own && FileStamp::of(path) != stamp_ && std::filesystem::exists(path, ignored)) {
-    all.emplace_back("what another program put into the file since it was opened (kept as " +
+    all.emplace_back("changes that another program made to the file since it was opened (kept as " +
                      kept_as(path).filename().string() + ")");
   }
   std::erase_if(all, [&](const std::string& line) { return accepted_losses_.contains(line); });
@@ -267,7 +269,7 @@ Status Document::write(const std::filesystem::path& path, std::vector<std::strin
   const auto saved = save_scene(loaded_, path, {}, progress);
   if (!saved) return saved.error();
   warnings.insert(warnings.end(), saved->warnings.begin(), saved->warnings.end());
-  // The file is what it should be; that the one before has another name than it should is not a failure.
+  // The file is written correctly, so a backup with the wrong name is only a warning.
   if (Status kept = backup ? backup->keep() : Status(); !kept) warnings.push_back(to_string(kept.error()));
   return {};
 }
@@ -278,14 +280,16 @@ Status Document::write_world(const std::filesystem::path& path, std::vector<std:
   const auto format = format_to_write(path);
   if (!format || *format != FileFormat::World) {
     return make_error(ErrorCode::Unsupported,
-                      "only a part of a world is in memory here: it is copied as .quoin; `quoin convert` writes others",
+                      "cannot save a world in this format: only a part of it is loaded; copy it as .quoin, or use "
+                      "`quoin convert`",
                       path.string());
   }
-  // Saves beside a world that are not in it yet would be lost with the name.
+  // Replacing the world would lose the changes in its write-ahead log.
   std::error_code none;
   const auto waiting = std::filesystem::file_size(path.string() + "-wal", none);
   if (!none && waiting > 0) {
-    return make_error(ErrorCode::CannotWrite, "the world there was not closed: open it once, or choose another name",
+    return make_error(ErrorCode::CannotWrite,
+                      "cannot replace the world: it was not closed; open it once, or choose another name",
                       path.string());
   }
   auto backup = FileBackup::of(path);
@@ -293,7 +297,7 @@ Status Document::write_world(const std::filesystem::path& path, std::vector<std:
   const auto copied = world_->copy_to(path, progress);
   if (!copied) return copied.error();
   if (!copied->lost.empty()) {
-    warnings.push_back(std::to_string(copied->lost.size()) + " chunks are damaged, and not in the copy");
+    warnings.push_back(std::to_string(copied->lost.size()) + " damaged chunks are missing in the copy");
   }
   if (Status kept = backup->keep(); !kept) warnings.push_back(to_string(kept.error()));
   return {};

@@ -17,13 +17,13 @@ namespace {
 constexpr double kUpdateSeconds = 0.004;
 constexpr double kUsualDistance = 640.0;
 constexpr double kFov = 1.0;
-// What a small world's chunks take at most with all that is made of them, for the guess whether it fits.
+// Upper bound for a chunk of a small world with all derived data, to estimate whether the world fits.
 constexpr std::size_t kBytesOfChunk = 96 * 1024;
-// A plan of more is slow, and mostly air, which takes some bytes, too.
+// Planning more chunks is slow. Most of them are air, which also takes some bytes.
 constexpr double kMostPlanned = 1 << 17;
 constexpr double kBytesOfAir = 300.0;
 constexpr double kAround = 2.0 * kChunkEdge;
-// Below the feet, voxels.
+// Voxels below the feet.
 constexpr double kGround = 8.0;
 
 std::size_t quarter_of_memory() {
@@ -47,7 +47,7 @@ double smallest_voxel(const Scene& scene) {
   return smallest;
 }
 
-/// From above the middle of a box, into the distance.
+/// Returns a camera above the middle of a box that looks into the distance.
 Camera above(const DBox& box, DVec3 place) {
   const DVec3 position{place.x, box.max.y + 0.05 * (box.max.y - box.min.y), place.z};
   const auto camera = look_along(position, {1.0, -0.45, -1.0}, kFov);
@@ -66,7 +66,7 @@ Result<WorldWindow> WorldWindow::open(const std::filesystem::path& path, const W
   stream.budget_bytes = options.memory_bytes == 0 ? quarter_of_memory() : options.memory_bytes;
   stream.other_bytes = [other_bytes] { return *other_bytes; };
   stream.update_seconds = kUpdateSeconds;
-  std::string why_not_written = options.may_write ? "" : "it is only looked at";
+  std::string why_not_written = options.may_write ? "" : "it was opened for a screenshot";
   auto opened = StreamedWorld::open(path, options.may_write ? WorldAccess::Write : WorldAccess::Read, stream);
   if (!opened && options.may_write && opened.error().code == ErrorCode::CannotWrite) {
     why_not_written = opened.error().message;
@@ -89,7 +89,7 @@ Result<WorldWindow> WorldWindow::open(const std::filesystem::path& path, const W
   return window;
 }
 
-// Of all grids that are loaded by chunks, within a ball.
+// Returns the number of chunks within a ball, over all grids that are loaded by chunks.
 double WorldWindow::chunks_around(double radius) const {
   constexpr double kBall = 4.19;
   double sum = 0.0;
@@ -108,7 +108,7 @@ Camera WorldWindow::first_camera(double aspect) const {
   if (all_) return frame_view(extent_.stored, View::Iso, aspect);
   const DBox& land = extent_.generated.empty() ? extent_.stored : extent_.generated;
   if (land.empty()) return frame_view({DVec3(-kAround), DVec3(kAround)}, View::Iso, aspect);
-  // A landscape without an end begins around the origin.
+  // An endless landscape begins around the origin.
   return above(land, extent_.generated.empty() ? middle_of(land) : DVec3(0.5));
 }
 
@@ -145,7 +145,7 @@ bool WorldWindow::is_complete() const {
   return stats_.is_complete && !has_chunks_to_move();
 }
 
-// What is wanted and does not come, since it is damaged, is waited for by nobody.
+// Damaged chunks never arrive and are not waited for.
 bool WorldWindow::is_loaded_at(DVec3 point) const {
   if (is_complete()) return true;
   const Scene& scene = world_.scene();

@@ -1,4 +1,4 @@
-// A small game on Quoin, in a window; or it plays itself for some frames and says what they took.
+// A small game on Quoin, in a window; with --frames it plays itself and prints the frame times.
 #include <malloc.h>
 
 #include <algorithm>
@@ -17,7 +17,7 @@
 
 namespace {
 
-// Walks in a wide circle, jumps now and then, digs and lights.
+// Walks in a wide circle, jumps now and then, digs and places torches.
 miner::Input played(int frame) {
   miner::Input input;
   input.yaw = 0.004 * frame;
@@ -35,7 +35,7 @@ nlohmann::ordered_json percentiles(std::vector<double> all) {
   return {{"median", at(0.5)}, {"p99", at(0.99)}, {"max", at(1.0)}};
 }
 
-// Of the whole process, as glibc has it, without what was freed.
+// Returns the resident bytes of the process, after glibc has returned freed memory.
 double resident_bytes() {
   malloc_trim(0);
   double all = 0.0, resident = 0.0;
@@ -75,7 +75,7 @@ quoin::Status play(miner::Game& game, int frames, bool paced, bool as_json) {
 
 #ifndef MINER_HAS_WINDOW
 quoin::Status miner::play_in_window(Game&, const std::string&) {
-  return quoin::make_error(quoin::ErrorCode::Unsupported, "built without SDL2: no window; see --frames");
+  return quoin::make_error(quoin::ErrorCode::Unsupported, "cannot open a window: built without SDL2; use --frames");
 }
 #endif
 
@@ -85,16 +85,18 @@ int main(int argc, char** argv) {
   int frames = 0;
   bool paced = true, as_json = false;
   std::string device;
-  app.add_option("--frames", frames, "play itself for so many, without a window")->check(CLI::PositiveNumber);
-  app.add_option("--device", device, "Vulkan device to draw with, by name or number; cpu: none");
-  app.add_option("--units", options.units, "of 32 voxels: how wide the world is")->check(CLI::Range(4, 128));
-  app.add_option("--ships", options.ships, "how many fly about")->check(CLI::Range(0, 10'000));
-  app.add_option("--edits", options.edits, "a frame, all over the land")->check(CLI::Range(0, 10'000));
-  app.add_option("--landslides", options.slide_chunks, "a frame, in chunks")->check(CLI::Range(0, 10'000));
-  app.add_option("--world", options.world, "NAME.quoin: keeps the land, what was built, where the player is");
-  app.add_option("--seed", options.seed, "of the land");
-  app.add_flag("!--unpaced", paced, "without waiting for a sixtieth of a second a frame");
-  app.add_flag("--json", as_json, "all figures");
+  app.add_option("--frames", frames, "Play this many frames automatically, without a window")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--device", device, "Vulkan device to draw with, by name or number; cpu for none");
+  app.add_option("--units", options.units, "Width of the world (units of 32 voxels)")->check(CLI::Range(4, 128));
+  app.add_option("--ships", options.ships, "Number of flying ships")->check(CLI::Range(0, 10'000));
+  app.add_option("--edits", options.edits, "Edits per frame, scattered over the land")->check(CLI::Range(0, 10'000));
+  app.add_option("--landslides", options.slide_chunks, "Landslide size per frame (chunks)")
+      ->check(CLI::Range(0, 10'000));
+  app.add_option("--world", options.world, "World file (.quoin) that stores the land and the player's position");
+  app.add_option("--seed", options.seed, "Seed of the land");
+  app.add_flag("!--unpaced", paced, "Do not wait for 1/60 s per frame");
+  app.add_flag("--json", as_json, "Print all figures as JSON");
   CLI11_PARSE(app, argc, argv);
   options.meshes = frames > 0;
   const auto game = miner::Game::create(options);

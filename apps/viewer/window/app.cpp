@@ -13,8 +13,8 @@ namespace quoin::viewer {
 
 namespace {
 
-constexpr int kFramesAfterEvents = 3;  // what the GUI needs to come to rest
-constexpr int kPatience = 250;         // milliseconds: how soon an interrupt is noticed
+constexpr int kFramesAfterEvents = 3;  // frames that the GUI needs to settle
+constexpr int kPatience = 250;         // milliseconds until an interrupt is noticed
 constexpr int kPatienceOfBars = 60;
 constexpr double kFrameSeconds = 1.0 / 60.0;
 
@@ -79,7 +79,7 @@ App::App(const ViewerOptions& options, Settings settings, std::unique_ptr<Screen
   if (options_.mode) state_.settings.mode = *options_.mode;
   if (options_.light) state_.settings.light.model = *options_.light;
   if (const auto renderer = screen_->renderer(); renderer && renderer->device().kind == "cpu" && !options_.is_bare) {
-    state_.tell(renderer->device().name + " is the processor in truth, and slow; --backend auto is faster");
+    state_.tell(renderer->device().name + " is a slow software device; --backend auto is faster");
   }
   if (!options_.file.empty()) load(options_.file);
 }
@@ -88,7 +88,7 @@ App::~App() {
   close();
 }
 
-// The window goes first to the user's eye; threads may take a moment to end.
+// Closes the window first, because threads may take a moment to end.
 void App::close() {
   SDL_HideWindow(screen_->window());
   state_.saver.reset();
@@ -112,13 +112,13 @@ Status App::run(const std::function<bool()>& is_interrupted) {
   note_size();
   show_detail(false);
   forget_slow_mode();
-  // Whatever ends the process now does so without destructors, perhaps.
+  // The process may end without destructors from here on.
   state_.saver.reset();
   if (Status saved = save_world(); !saved && status_) status_ = saved;
   return status_;
 }
 
-// Nobody should have to wait for the first picture of the next file since this one was looked at in a slow mode.
+// Resets a slow mode, so that the next file does not start in it.
 void App::forget_slow_mode() {
   if (state_.open.backend && state_.open.backend->is_slow(state_.settings.mode)) state_.settings.mode = DrawMode::Rays;
 }
@@ -130,7 +130,7 @@ void App::note_size() {
   SDL_GetWindowSize(screen_->window(), &state_.settings.width, &state_.settings.height);
 }
 
-// Whether the next frame cannot come too soon.
+// Returns true if the next frame should follow at once.
 bool App::is_moving() const {
   const bool is_drawing = state_.open.backend && state_.open.backend->wants_frames();
   const bool is_falling = state_.camera.mode == CameraMode::Walk && state_.walker.is_moving();
@@ -181,7 +181,7 @@ void App::wait_and_process() {
 
 void App::process(const SDL_Event& event) {
   frames_left_ = std::max(frames_left_, is_wake(event) ? 1 : kFramesAfterEvents);
-  // With Tab the GUI would take the keyboard for the first number in the panel, and flight would end.
+  // Tab would give the keyboard to the first number field of the panel and stop the flight.
   const bool is_tab = event.type == SDL_KEYDOWN && event.key.keysym.sym == SDLK_TAB;
   if (!is_tab || gui_->wants_keys()) gui_->process(event);
   if (event.type == SDL_QUIT) leave({true, {}});
@@ -200,7 +200,7 @@ void App::frame() {
   const Clock::time_point now = Clock::now();
   const double elapsed = seconds_between(last_frame_, now);
   last_frame_ = now;
-  // After a rest the first step is a usual one, however long the rest was.
+  // After an idle period the first time step has the usual length.
   const double step = was_idle_ ? kFrameSeconds : std::min(elapsed, 0.1);
   take_loaded();
   take_saved();
@@ -260,7 +260,7 @@ ViewRequest App::request_now() const {
 void App::ask_for_picture() {
   if (!state_.open.backend || !state_.has_picture_place()) return;
   const ViewRequest request = request_now();
-  // What was drawn before is another picture, however good.
+  // The image drawn before belongs to another request, even if it had settled.
   if (!asked_ || !is_same(*asked_, request)) state_.stats.is_settled = false;
   asked_ = request;
   state_.open.backend->show(request);
@@ -292,12 +292,12 @@ void App::take_frame(ViewFrame frame) {
     screen_->forget_picture();
     state_.tell(taken.error());
   }
-  // The status line of this frame was drawn before; where nothing better comes, nothing would draw it again.
+  // This frame's status line is already drawn. If the image is final, it would not be drawn again.
   if (frame.is_settled) frames_left_ = std::max(frames_left_, 2);
   state_.picture = std::move(frame);
 }
 
-// A fault lasts until something else is asked for, and is told once.
+// A fault lasts until the next request and is shown once.
 void App::take_fault() {
   const auto fault = state_.open.backend->fault();
   const std::string text = fault ? to_string(*fault) : "";
@@ -318,7 +318,7 @@ Result<std::shared_ptr<VulkanRenderer>> App::open_device() {
   return renderer_;
 }
 
-// The device that shows the window has failed: SDL shows it from now on, and the processor draws.
+// After the device that shows the window has failed, SDL shows the window and the processor draws.
 void App::stand_in(const Error& why) {
   if (!screen_->renderer()) return end_with(why);
   const SDL_Point size = [this] {

@@ -4,11 +4,11 @@ namespace quoin::viewer {
 
 const char* ViewState::why_not_drawn_as(DrawMode mode) const {
   if (!open.backend) return nullptr;
-  if (!open.backend->can_draw(mode)) return "there is no device to draw meshes";
+  if (!open.backend->can_draw(mode)) return "cannot draw meshes: no graphics device";
   if (mode != DrawMode::Density) return nullptr;
   bool has_field = false;
   scene().grids().for_each([&](GridHandle, const SceneGrid& grid) { has_field |= grid.field.chunk_count() != 0; });
-  return has_field ? nullptr : "there is no field of densities to cut";
+  return has_field ? nullptr : "cannot draw a density slice: the scene has no density field";
 }
 
 void App::draw_as(DrawMode mode) {
@@ -16,7 +16,7 @@ void App::draw_as(DrawMode mode) {
   state_.settings.mode = mode;
 }
 
-// A look at the levels of detail, after which all is as it was before.
+// Shows the levels of detail in colours, and restores the settings afterwards.
 void App::show_detail(bool is_shown) {
   Settings& settings = state_.settings;
   if (is_shown) {
@@ -66,7 +66,7 @@ bool App::run_draw_command(Command command) {
       return false;
   }
   if (!has_meshes(settings.mode)) {
-    state_.tell("drawn as blocks: only meshes have edges");
+    state_.tell("switched to blocky meshes: only meshes have triangle edges");
     draw_as(DrawMode::Blocks);
   }
   return true;

@@ -13,7 +13,7 @@ namespace quoin::viewer {
 
 namespace {
 
-/// The first name of that pattern in the working folder that no file has.
+/// Returns the first unused name of the form STEM-NUMBER.png in the working folder.
 std::filesystem::path free_name(const std::string& stem) {
   std::error_code ignored;
   for (int number = 1; number < 10'000; ++number) {
@@ -52,7 +52,7 @@ void App::leave(Leaving leaving) {
   if (leaving_ || state_.saver) return;
   input_.editing.abandon(state_);
   leaving_ = std::move(leaving);
-  (void)save_world();  // where that fails it is asked whether to lose it
+  (void)save_world();  // if that fails, the user is asked whether to discard the changes
   if (!state_.open.document->is_dirty()) go_on_leaving();
 }
 
@@ -78,19 +78,19 @@ void App::load(const std::filesystem::path& path) {
     abandoned_.push_back(std::move(state_.loader));
   }
   const Document& now = *state_.open.document;
-  // It would be held against who opens it again.
+  // An open world would block opening the same file again.
   if (now.world() != nullptr && is_same_file(path, now.path()) && save_world()) close_document();
   DeviceBackendOptions backend;
   backend.cpu = {options_.instances(), options_.threads, CpuBackendOptions{}.first_frame_seconds};
   backend.rays_on_device = screen_->renderer() != nullptr;
-  // Where pictures come from another thread the window need not wait for them.
+  // If another thread renders, the window need not wait for it.
   if (!backend.rays_on_device) backend.frame_seconds = backend.cpu.first_frame_seconds;
   const auto make = [this, backend](const Document& document) -> std::unique_ptr<ViewBackend> {
     return std::make_unique<DeviceBackend>(
         document.scene(), backend, [this] { return open_device(); }, wake_window);
   };
   LoadOptions wanted = options_.load;
-  // It says what that one file holds.
+  // The raw-volume options describe only the file that the viewer was started with.
   if (path != options_.file) wanted.raw.reset();
   WorldOptions world = options_.world;
   if (!options_.screenshot.empty()) world.may_write = false;
@@ -110,13 +110,13 @@ void App::take_loaded() {
   if (!options_.screenshot.empty()) end_with(opened.error());
 }
 
-// An empty one takes its place.
+// Replaces the document by an empty one.
 void App::close_document() {
   asked_.reset();
   save_wanted_pictures();
   input_.editing = {};
   state_.hover.reset();
-  state_.open.backend.reset();  // before the document that it reads
+  state_.open.backend.reset();  // reads the document, so it is destroyed first
   state_.open.document = std::make_unique<Document>();
   state_.open.look.reset();
   has_seen_chunks_ = true;
@@ -146,7 +146,7 @@ void App::adopt(OpenDocument opened) {
     look_through(world->first_camera(state_.aspect()));
     if (world->is_whole() && !loaded.camera) unframed_ = state_.camera.camera();
     if (!world->why_not_written().empty() && options_.screenshot.empty()) {
-      state_.tell("this world is only looked at: " + world->why_not_written());
+      state_.tell("this world is read-only: " + world->why_not_written());
     }
   } else if (loaded.camera) {
     look_through(*loaded.camera);
@@ -157,7 +157,7 @@ void App::adopt(OpenDocument opened) {
   const std::size_t instances = state_.scene().instances().size();
   if (!has_fault && options_.instances() == InstanceFilter::Visible && instances > 0 &&
       hidden_parts(state_.scene()).instances == instances) {
-    return state_.tell("all of it is hidden: the panel (F2) has switches under Scene");
+    return state_.tell("the whole scene is hidden: the panel (F2) has switches under Scene");
   }
   if (!loaded.warnings.empty() && !has_fault) {
     const std::size_t more = loaded.warnings.size() - 1;
@@ -182,7 +182,7 @@ void App::take_saved() {
   if (!saver->status()) {
     leaving_.reset();
     state_.tell(saver->status().error());
-    // With the name still there, to be mended.
+    // Keeps the name, so that the user can correct it.
     if (saver->status().error().code != ErrorCode::Cancelled) chooser_.show(FileChooser::Purpose::Save, saver->path());
     return;
   }
@@ -196,20 +196,20 @@ void App::take_saved() {
   if (leaving_ && !state_.open.document->is_dirty()) go_on_leaving();
 }
 
-// Saves the view of this moment: finished if it stays that long, else as it is shown now. The keys before this one may
-// have changed the view since it was last drawn.
+// Saves the current view: finished if the view does not change before that, else as it is shown now. Keys pressed
+// before this one may have changed the view since it was last drawn.
 void App::want_picture() {
   if (!state_.open.backend || !state_.has_picture_place()) return;
   const ViewRequest request = request_now();
   if (asked_ && is_same(*asked_, request) && is_settled()) return save_picture(image_of(state_.picture));
-  // A key that is held down asks for one image.
+  // A held key saves one image.
   const bool is_wanted = !wanted_.empty() && is_same(wanted_.back().request, request) &&
                          !state_.scene().has_changed_since(wanted_.back().scene);
   if (!is_wanted) wanted_.push_back({request, state_.scene().cursor(), image_in_mode(request.mode)});
-  state_.tell("the image is saved once it is done");
+  state_.tell("saving the image when it is finished");
 }
 
-// The image on the screen if it shows that mode.
+// Returns the image on the screen if it shows that mode.
 std::optional<Result<Image>> App::image_in_mode(DrawMode mode) const {
   if (state_.stats.width == 0 || state_.picture.mode != mode) return std::nullopt;
   return image_of(state_.picture);
@@ -244,8 +244,8 @@ void App::save_picture(const Result<Image>& picture) {
   const bool is_whole = picture->width >= state_.picture_place.w;
   state_.tell("saved " + std::filesystem::absolute(path, ignored).string() +
               (is_whole ? ""
-                        : ", as it was shown: " + std::to_string(picture->width) + " x " +
-                              std::to_string(picture->height) + " pixels"));
+                        : ", unfinished: " + std::to_string(picture->width) + " x " + std::to_string(picture->height) +
+                              " pixels"));
 }
 
 void App::write_screenshot(const std::filesystem::path& path) {

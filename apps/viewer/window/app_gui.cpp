@@ -30,7 +30,7 @@ void end_box() {
   ImGui::PopStyleVar();
 }
 
-/// Begins a question in the middle of the window, which has to be answered before anything else.
+/// Begins a modal question in the middle of the window.
 bool begin_question(const char* title) {
   if (!ImGui::IsPopupOpen(title)) ImGui::OpenPopup(title);
   const ImVec2 room = ImGui::GetIO().DisplaySize;
@@ -38,7 +38,7 @@ bool begin_question(const char* title) {
   return ImGui::BeginPopupModal(title, nullptr, ImGuiWindowFlags_AlwaysAutoResize);
 }
 
-/// A bar for work that does not say how far it has come.
+/// Draws a bar for work of unknown progress.
 void waiting_bar(double seconds, float width) {
   const ImVec2 at = ImGui::GetCursorScreenPos();
   const float height = 6.0F;
@@ -71,7 +71,7 @@ void App::draw_gui() {
   }
 }
 
-// Nothing but what went wrong stands before the picture.
+// Draws only progress and errors over the image.
 void App::draw_bare() {
   place_picture(0.0F, 0.0F, 0.0F);
   draw_progress(state_, static_cast<float>(gui_->scale()), 0.0F);
@@ -128,17 +128,17 @@ void App::draw_saving() {
 void App::draw_losses() {
   if (!lossy_save_ || state_.saver) return;
   const LossySave lossy = *lossy_save_;
-  if (!begin_question("Saving would lose something")) return;
-  ImGui::Text("%s would not keep:", lossy.path.filename().string().c_str());
+  if (!begin_question("Saving loses data")) return;
+  ImGui::Text("Saving %s loses:", lossy.path.filename().string().c_str());
   for (const std::string& line : lossy.losses) ImGui::BulletText("%s", line.c_str());
   ImGui::Spacing();
   const std::string kept = state_.open.document->kept_as(lossy.path).filename().string();
-  if (!kept.empty()) ImGui::TextDisabled("The file that is there now is kept as %s.", kept.c_str());
+  if (!kept.empty()) ImGui::TextDisabled("The existing file is kept as %s.", kept.c_str());
   ImGui::Spacing();
   enum class Answer { None, SaveAs, Save, Stay } answer = Answer::None;
   if (ImGui::Button("Save as...")) answer = Answer::SaveAs;
   ImGui::SameLine();
-  if (ImGui::Button("Save all the same")) answer = Answer::Save;
+  if (ImGui::Button("Save anyway")) answer = Answer::Save;
   ImGui::SameLine();
   if (ImGui::Button("Cancel") || ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape))) answer = Answer::Stay;
   if (answer != Answer::None) {
@@ -156,7 +156,7 @@ void App::draw_losses() {
 
 void App::draw_leaving() {
   if (!leaving_ || state_.saver || lossy_save_ || chooser_.is_shown()) return;
-  // Again, too, when the user thought better of saving.
+  // Asks again if the user cancelled saving.
   if (!begin_question("Unsaved changes")) return;
   ImGui::Text("%s has changes that are not saved.", state_.open.document->name().c_str());
   ImGui::Spacing();

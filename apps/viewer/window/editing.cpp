@@ -7,7 +7,7 @@ namespace quoin::viewer {
 
 namespace {
 
-constexpr double kPixelsPerTouch = 4.0;  // of a brush that paints: fine enough to leave no gaps at usual distances
+constexpr double kPixelsPerTouch = 4.0;  // when painting: leaves no gaps at usual distances
 constexpr int kMaxTouches = 128;
 
 std::optional<SceneHit> pick_at(ViewState& state, double x, double y) {
@@ -32,7 +32,7 @@ std::optional<BrushAction> action_of(Tool tool) {
   return std::nullopt;
 }
 
-/// Where a model stands several times, all of them change: that is worth a word.
+/// Notes that an edit changes all instances of the model, if it has several.
 void tell_of_copies(ViewState& state, const SceneHit& hit) {
   const Instance* touched = state.scene().instances().find(hit.instance);
   if (touched == nullptr) return;
@@ -40,13 +40,12 @@ void tell_of_copies(ViewState& state, const SceneHit& hit) {
   state.scene().instances().for_each([&](InstanceHandle, const Instance& instance) {
     if (instance.grid == touched->grid) ++copies;
   });
-  if (copies > 1) state.tell("this model stands at " + std::to_string(copies) + " places: all of them change");
+  if (copies > 1) state.tell("this model has " + std::to_string(copies) + " instances: all of them change");
 }
 
-constexpr const char* kNotInMemory = "that was done elsewhere in this world: go back there first";
+constexpr const char* kNotInMemory = "the edited chunks are not loaded: go back there first";
 
-/// Runs `edit` on the document while nothing draws it. `edit` returns whether it changed anything.
-/// Returns the same.
+/// Runs `edit` on the document while rendering is paused. `edit` returns true if it changed anything; so does this.
 template <class Edit>
 bool edit_paused(ViewState& state, Edit edit) {
   ScenePause pause(*state.open.backend);
@@ -95,7 +94,7 @@ void Editing::begin(ViewState& state) {
   const auto hit = action ? pick_at(state, from_.x, from_.y) : std::nullopt;
   if (!hit) return;
   if (const char* const why = state.open.document->why_not_edited()) {
-    return state.tell("this world is only looked at: " + std::string(why));
+    return state.tell("cannot edit this world: " + std::string(why));
   }
   tell_of_copies(state, *hit);
   Brush brush = state.brush;
@@ -103,8 +102,8 @@ void Editing::begin(ViewState& state) {
   edit_paused(state, [&](Document& document) {
     if (!document.begin_stroke(brush, *hit)) {
       const bool is_of_fields = *action == BrushAction::Smooth || *action == BrushAction::Flatten;
-      state.tell(is_of_fields && !hit->in_field ? "these are blocks: only smooth ground can be smoothed or flattened"
-                                                : "there is no type to place yet: choose a colour");
+      state.tell(is_of_fields && !hit->in_field ? "cannot smooth or flatten blocks: only smooth ground"
+                                                : "no voxel type to place: choose a colour");
     }
     return true;
   });
@@ -148,7 +147,7 @@ void redo(ViewState& state) {
   if (!state.open.document->history().can_redo()) return state.tell("nothing to redo");
   const std::string name = state.open.document->history().redo_name();
   if (!edit_paused(state, [](Document& document) { return document.redo(); })) return state.tell(kNotInMemory);
-  state.tell("done again: " + name);
+  state.tell("redone: " + name);
 }
 
 }  // namespace quoin::viewer

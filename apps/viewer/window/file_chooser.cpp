@@ -14,7 +14,7 @@ namespace quoin::viewer {
 
 namespace {
 
-// What imgui_stdlib does, which Debian compiles for one standard library only.
+// Replaces imgui_stdlib, which Debian compiles for one standard library only.
 int resize_text(ImGuiInputTextCallbackData* data) {
   if (data->EventFlag != ImGuiInputTextFlags_CallbackResize) return 0;
   auto* text = static_cast<std::string*>(data->UserData);
@@ -37,7 +37,7 @@ std::string lower(std::string text) {
   return text;
 }
 
-// Packed volumes too: NAME.nii.gz.
+// Includes compressed volumes: NAME.nii.gz.
 bool is_readable_name(const std::string& name) {
   std::filesystem::path file = lower(name);
   const bool is_packed = file.extension() == ".gz";
@@ -130,7 +130,7 @@ bool FileChooser::draw_entries(float height) {
     ImGui::TextDisabled("%s", size.c_str());
   }
   if (shown == 0)
-    ImGui::TextDisabled("nothing here that the viewer %s", purpose_ == Purpose::Open ? "reads" : "writes");
+    ImGui::TextDisabled("no files here that the viewer %s", purpose_ == Purpose::Open ? "reads" : "writes");
   ImGui::EndChild();
   if (next) enter(*next);
   return is_chosen;
@@ -138,7 +138,7 @@ bool FileChooser::draw_entries(float height) {
 
 std::optional<std::filesystem::path> FileChooser::accept() {
   if (name_.empty()) return std::nullopt;
-  std::filesystem::path path = folder_ / name_;  // a name that is a whole path replaces the folder
+  std::filesystem::path path = folder_ / name_;  // an absolute name replaces the folder
   std::error_code error;
   if (std::filesystem::is_directory(path, error)) {
     enter(path);
@@ -186,7 +186,7 @@ std::optional<std::filesystem::path> FileChooser::draw(float scale) {
   ImGui::SameLine();
   ImGui::Checkbox("all files", &shows_all_);
   if (is_accepted) chosen = accept();
-  // So that Enter answers again.
+  // Keeps the focus, so that Enter works again.
   if (is_accepted && !chosen) is_new_ = true;
   if (chosen) is_shown_ = false;
   if (!is_shown_) ImGui::CloseCurrentPopup();

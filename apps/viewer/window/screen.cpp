@@ -11,31 +11,31 @@ std::string sdl_says() {
 }
 
 Result<std::unique_ptr<SdlVideo>> SdlVideo::start() {
-  // Interrupts are the caller's to handle; the screen may go dark when nobody is there.
+  // The caller handles interrupts, and the screen saver stays enabled.
   SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1");
   SDL_SetHint(SDL_HINT_VIDEO_ALLOW_SCREENSAVER, "1");
   SDL_SetHint(SDL_HINT_VIDEO_X11_NET_WM_BYPASS_COMPOSITOR, "0");
   SDL_SetHint(SDL_HINT_MOUSE_FOCUS_CLICKTHROUGH, "1");
   const auto no_display = [](const std::string& why) {
     return make_error(ErrorCode::Unsupported,
-                      "no display to open a window on (" + why + "); `quoin render` draws pictures without one");
+                      "cannot open a window: no display (" + why + "); `quoin render` needs none");
   };
   const auto is_set = [](const char* name) {
     const char* value = SDL_getenv(name);
     return value != nullptr && *value != '\0';
   };
 #ifdef __linux__
-  // Asked first, since libraries below SDL print their own complaints.
+  // Checked first, because libraries below SDL print their own errors.
   if (!is_set("DISPLAY") && !is_set("WAYLAND_DISPLAY") && !is_set("SDL_VIDEODRIVER")) {
     return no_display("neither DISPLAY nor WAYLAND_DISPLAY is set");
   }
 #endif
   if (SDL_Init(SDL_INIT_VIDEO) != 0) return no_display(sdl_says());
   auto video = std::unique_ptr<SdlVideo>(new SdlVideo());
-  // Where there is nothing else, SDL opens windows that nobody sees. Tests ask for these by name.
+  // Without a display SDL falls back to invisible windows. Tests request these by name.
   const std::string driver = SDL_GetCurrentVideoDriver();
   const bool is_unseen = driver == "offscreen" || driver == "dummy";
-  if (is_unseen && !is_set("SDL_VIDEODRIVER")) return no_display("neither X nor Wayland answers");
+  if (is_unseen && !is_set("SDL_VIDEODRIVER")) return no_display("neither X nor Wayland responds");
   return video;
 }
 

@@ -85,7 +85,7 @@ SDL_Point SdlScreen::output_size() const {
 
 Status SdlScreen::set_font(int width, int height, std::span<const std::uint8_t> opacity) {
   font_.reset(SDL_CreateTexture(renderer_.get(), SDL_PIXELFORMAT_ABGR8888, SDL_TEXTUREACCESS_STATIC, width, height));
-  if (!font_) return cannot("keep a font");
+  if (!font_) return cannot("store the font");
   std::vector<std::uint32_t> pixels;
   for (const std::uint8_t one : opacity) pixels.push_back(std::uint32_t{one} << 24 | 0x00FF'FFFFU);
   SDL_UpdateTexture(font_.get(), nullptr, pixels.data(), 4 * width);
@@ -106,12 +106,12 @@ Status SdlScreen::set_image(const Image& image) {
   if (!picture_ || picture_size_.x != image.width || picture_size_.y != image.height) {
     picture_.reset(SDL_CreateTexture(renderer_.get(), SDL_PIXELFORMAT_RGB24, SDL_TEXTUREACCESS_STREAMING, image.width,
                                      image.height));
-    if (!picture_) return cannot("keep a picture");
+    if (!picture_) return cannot("store an image");
     picture_size_ = {image.width, image.height};
     SDL_SetTextureScaleMode(picture_.get(), SDL_ScaleModeLinear);
   }
   if (SDL_UpdateTexture(picture_.get(), nullptr, image.rgb.data(), 3 * image.width) != 0)
-    return cannot("show a picture");
+    return cannot("show an image");
   return {};
 }
 

@@ -60,7 +60,7 @@ void draw_palette(ViewState& state) {
     if (ImGui::ColorButton("type", colour_of(scene.types[type]), flags, {edge, edge})) state.brush.type = type;
     if (ImGui::IsItemHovered()) describe_type(scene, type);
     if (type == state.brush.type) {
-      // Whoever chose it elsewhere wants to see it.
+      // Scrolls to a type that was chosen elsewhere.
       if (state.palette_shows != type) ImGui::SetScrollHereY();
       state.palette_shows = type;
       ImGui::GetWindowDrawList()->AddRect(ImGui::GetItemRectMin(), ImGui::GetItemRectMax(), IM_COL32_WHITE, 3.0F, 0,
@@ -72,19 +72,18 @@ void draw_palette(ViewState& state) {
   ImGui::PopStyleVar();
 }
 
-/// Chooses a type of that colour for the brush. The registry is part of the scene: it changes only while nothing is
-/// drawn.
+/// Selects a type of that colour for the brush. Pauses rendering, because the type registry is part of the scene.
 void choose_new_type(ViewState& state, Rgba8 colour, float emission) {
   const ScenePause pause(*state.open.backend);
   state.stats.is_settled = false;
   const auto type = state.open.document->type_of_colour(colour, emission);
   if (!type) return state.tell(type.error());
   state.brush.type = *type;
-  const char* what = emission > 0.0F ? "the lamp is type " : "the colour is type ";
-  state.tell(what + std::to_string(*type) + ", and chosen");
+  const char* what = emission > 0.0F ? "selected lamp type " : "selected colour type ";
+  state.tell(what + std::to_string(*type));
 }
 
-/// A colour that the palette lacks, or a lamp.
+/// Draws the buttons that add a colour or a lamp to the palette.
 void draw_new_colour(ViewState& state) {
   static constexpr const char* kPopup = "new colour";
   static std::array<float, 3> colour{0.8F, 0.5F, 0.3F};
@@ -94,7 +93,7 @@ void draw_new_colour(ViewState& state) {
   constexpr Rgba8 kTorch{255, 178, 90, 255};
   constexpr float kTorchEmission = 24.0F;
   if (ImGui::Button("Torch") && state.can_edit()) choose_new_type(state, kTorch, kTorchEmission);
-  if (ImGui::IsItemHovered()) ImGui::SetTooltip("a voxel that lights what is around it");
+  if (ImGui::IsItemHovered()) ImGui::SetTooltip("a voxel that lights its surroundings");
   if (!ImGui::BeginPopup(kPopup)) return;
   ImGui::ColorPicker3("##colour", colour.data(), ImGuiColorEditFlags_NoSidePreview);
   ImGui::SliderFloat("emits", &emission, 0.0F, 64.0F, emission > 0.0F ? "%.1f" : "nothing",
@@ -123,21 +122,21 @@ void draw_sun(LightOptions& light, bool has_rays) {
   const bool is_raised = ImGui::SliderFloat("elevation", &elevation, static_cast<float>(lowest), 90.0F, "%.0f°",
                                             ImGuiSliderFlags_AlwaysClamp);
   if (is_turned || is_raised) {
-    // Straight up there is no azimuth to come back to.
+    // At the zenith the azimuth would be lost.
     light.sun = sun_direction({azimuth, std::clamp(static_cast<double>(elevation), lowest, 89.5)});
   }
   ImGui::Checkbox("sky follows the sun", &light.sky_follows_sun);
   ImGui::Checkbox("glass mirrors the sky", &light.glass_surfaces);
   if (!has_rays && ImGui::IsItemHovered()) {
     ImGui::SetTooltip(
-        "without a graphics card glass of meshes is one voxel thick, and only smooth meshes mirror, until the view\n"
-        "rests; marched rays show all of it (F5)");
+        "without a graphics card, glass in meshes is one voxel thick, and only smooth meshes mirror, until the view\n"
+        "is still; ray marching (F5) shows all of it");
   }
 }
 
 void draw_file_cameras(const std::vector<FileCamera>& cameras, MenuChoice& choice) {
   if (cameras.empty()) return;
-  ImGui::TextUnformatted("of the file:");
+  ImGui::TextUnformatted("from the file:");
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     if (i % 5 != 0) ImGui::SameLine();
     ImGui::PushID(static_cast<int>(i));
@@ -146,13 +145,12 @@ void draw_file_cameras(const std::vector<FileCamera>& cameras, MenuChoice& choic
   }
 }
 
-// Pictures that lack something say so. Before the device has drawn nothing is known of it.
+// Notes the missing light in images of meshes. Before the device has drawn, its abilities are unknown.
 void tell_of_plain_light(const ViewState& state) {
   if (!state.open.backend || state.open.backend->stats().empty()) return;
   if (state.open.backend->traces_light(state.settings.mode)) return;
   ImGui::TextWrapped(
-      "Without a graphics card so large a scene has no shadows, lamps and depth of glass in smooth meshes. F5 and F6 "
-      "have them.");
+      "Without a graphics card, smooth meshes of so large a scene lack shadows, lamps and glass depth. Use F5 or F6.");
 }
 
 }  // namespace
@@ -213,15 +211,15 @@ void draw_camera_part(ViewState& state, MenuChoice& choice) {
 }
 
 void draw_slice_place(SlicePlace& slice) {
-  ImGui::Combo("square to", &slice.axis, "x\0y\0z\0");
+  ImGui::Combo("axis", &slice.axis, "x\0y\0z\0");
   auto at = static_cast<float>(slice.at);
-  if (ImGui::SliderFloat("cut at", &at, 0.0F, 1.0F, "%.3f of the fields", ImGuiSliderFlags_AlwaysClamp)) {
+  if (ImGui::SliderFloat("position", &at, 0.0F, 1.0F, "%.3f of the fields", ImGuiSliderFlags_AlwaysClamp)) {
     slice.at = static_cast<double>(at);
   }
 }
 
 void draw_picture_part(ViewState& state) {
-  if (!heading("Picture")) return;
+  if (!heading("Image")) return;
   Settings& settings = state.settings;
   int mode = static_cast<int>(settings.mode);
   if (ImGui::Combo("drawn as", &mode, "rays\0blocks\0smooth\0densities\0paths\0")) {
@@ -239,7 +237,7 @@ void draw_picture_part(ViewState& state) {
   if (has_meshes(settings.mode)) {
     tell_of_plain_light(state);
     int edges = static_cast<int>(settings.wireframe);
-    if (ImGui::Combo("edges", &edges, "none\0over surfaces\0alone\0")) {
+    if (ImGui::Combo("edges", &edges, "none\0over surfaces\0edges only\0")) {
       settings.wireframe = static_cast<Wireframe>(edges);
     }
   }
@@ -251,10 +249,10 @@ void draw_picture_part(ViewState& state) {
   }
 }
 
-// Of smooth surfaces: 27 samples of the densities around a place.
+// Occlusion of smooth surfaces: from 27 density samples around a point.
 void draw_smooth_occlusion(SmoothOcclusionOptions& options) {
   int form = static_cast<int>(options.method);
-  if (ImGui::Combo("smooth form", &form, "none\0share\0weighted\0weighted, published\0soft share\0")) {
+  if (ImGui::Combo("method", &form, "none\0share\0weighted\0weighted, published\0soft share\0")) {
     options.method = static_cast<SmoothOcclusion>(form);
   }
   ImGui::BeginDisabled(options.method == SmoothOcclusion::None);
@@ -271,12 +269,12 @@ void draw_smooth_occlusion(SmoothOcclusionOptions& options) {
 
 void draw_occlusion(LightOptions& light, bool has_rays) {
   int mode = static_cast<int>(light.occlusion_mode);
-  if (ImGui::Combo("occlusion", &mode, "off\0by rays\0of vertices\0of smooth surfaces\0"))
+  if (ImGui::Combo("occlusion", &mode, "off\0ray-traced\0vertex\0smooth surfaces\0"))
     light.occlusion_mode = static_cast<OcclusionMode>(mode);
-  if (!has_rays && ImGui::IsItemHovered()) ImGui::SetTooltip("meshes carry that of their vertices");
+  if (!has_rays && ImGui::IsItemHovered()) ImGui::SetTooltip("meshes use vertex occlusion");
   ImGui::BeginDisabled(!has_rays || light.occlusion_mode != OcclusionMode::Rays);
   auto reach = static_cast<float>(light.occlusion_distance_voxels);
-  if (ImGui::SliderFloat("its rays reach", &reach, 0.5F, 64.0F, "%.1f voxels",
+  if (ImGui::SliderFloat("ray length", &reach, 0.5F, 64.0F, "%.1f voxels",
                          ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_Logarithmic)) {
     light.occlusion_distance_voxels = reach;
   }
@@ -287,12 +285,12 @@ void draw_occlusion(LightOptions& light, bool has_rays) {
   ImGui::EndDisabled();
 }
 
-// The slider's end stands for any distance.
+// The end of the slider means any distance.
 void draw_shadow_distance(LightOptions& light) {
   constexpr float kEnd = 4096.0F;
   const bool is_any = !(light.shadow_distance_voxels < static_cast<double>(kEnd));
   float reach = is_any ? kEnd : static_cast<float>(light.shadow_distance_voxels);
-  if (ImGui::SliderFloat("shadows reach", &reach, 1.0F, kEnd, is_any ? "any distance" : "%.0f voxels",
+  if (ImGui::SliderFloat("shadow range", &reach, 1.0F, kEnd, is_any ? "any distance" : "%.0f voxels",
                          ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_Logarithmic)) {
     light.shadow_distance_voxels = reach < kEnd ? static_cast<double>(reach) : LightOptions{}.shadow_distance_voxels;
   }
@@ -307,16 +305,16 @@ void draw_brightness(const char* name, double& value, float most) {
 }
 
 void draw_lamps(LightOptions& light, bool has_rays) {
-  draw_brightness("the sun", light.sun_brightness, 4.0F);
-  draw_brightness("the sky", light.sky_brightness, 4.0F);
+  draw_brightness("sun", light.sun_brightness, 4.0F);
+  draw_brightness("sky", light.sky_brightness, 4.0F);
   if (light.model == LightModel::Propagated) {
     draw_brightness("lamps", light.lamp_brightness, 64.0F);
-    draw_brightness("everywhere", light.least_light, 1.0F);
+    draw_brightness("minimum", light.least_light, 1.0F);
     return;
   }
   ImGui::BeginDisabled(!has_rays);
   bool has_lamps = light.max_lamps > 0;
-  if (ImGui::Checkbox("lamps light others", &has_lamps)) light.max_lamps = has_lamps ? natural_light().max_lamps : 0;
+  if (ImGui::Checkbox("lamp light", &has_lamps)) light.max_lamps = has_lamps ? natural_light().max_lamps : 0;
   ImGui::BeginDisabled(light.max_lamps == 0);
   draw_brightness("lamps", light.lamp_brightness, 64.0F);
   ImGui::EndDisabled();
@@ -327,7 +325,7 @@ void draw_light_part(ViewState& state) {
   if (!heading("Light")) return;
   LightOptions& light = state.settings.light;
   int shading = static_cast<int>(light.shading);
-  if (ImGui::Combo("shading", &shading, "lit\0unlit\0unlit + occlusion\0occlusion alone\0normals\0")) {
+  if (ImGui::Combo("shading", &shading, "lit\0unlit\0unlit + occlusion\0occlusion only\0normals\0")) {
     light.shading = static_cast<Shading>(shading);
   }
   ImGui::BeginDisabled(light.shading == Shading::Unlit || light.shading == Shading::Normals);
@@ -335,7 +333,7 @@ void draw_light_part(ViewState& state) {
   ImGui::EndDisabled();
   ImGui::BeginDisabled(light.shading != Shading::Lit);
   int model = static_cast<int>(light.model);
-  if (ImGui::Combo("light", &model, "by rays\0propagated\0")) light.model = static_cast<LightModel>(model);
+  if (ImGui::Combo("light", &model, "ray-traced\0propagated\0")) light.model = static_cast<LightModel>(model);
   const bool is_by_rays = light.model == LightModel::Rays;
   const bool has_shadows = is_by_rays && state.open.backend && state.open.backend->traces_light(state.settings.mode);
   ImGui::BeginDisabled(!has_shadows);
@@ -344,12 +342,12 @@ void draw_light_part(ViewState& state) {
   ImGui::EndDisabled();
   if (is_by_rays && !has_shadows && ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled)) {
     ImGui::SetTooltip(
-        "smooth meshes of so large a scene have shadows where there is a graphics card; marched rays (F5) and blocks\n"
-        "(F6) have them everywhere");
+        "smooth meshes of so large a scene need a graphics card for shadows; ray marching (F5) and blocks (F6)\n"
+        "always have them");
   }
   ImGui::BeginDisabled(!is_by_rays);
   bool is_all = light.occlusion_affects == OcclusionAffects::All;
-  if (ImGui::Checkbox("occlusion of all light", &is_all)) {
+  if (ImGui::Checkbox("occlude all light", &is_all)) {
     light.occlusion_affects = is_all ? OcclusionAffects::All : OcclusionAffects::Ambient;
   }
   ImGui::EndDisabled();
@@ -373,12 +371,12 @@ void draw_world_rows(const WorldWindow* world) {
   if (world == nullptr) return;
   const StreamStats& stats = world->stats();
   row("chunks in memory", "%.0f", static_cast<double>(stats.loaded_chunks));
-  row("on their way", "%.0f", static_cast<double>(stats.missing_chunks));
+  row("chunks loading", "%.0f", static_cast<double>(stats.missing_chunks));
   row("complete within", "%.0f voxels", stats.complete_radius);
-  row("read so far", "%.0f", static_cast<double>(stats.chunks_read));
-  row("made so far", "%.0f", static_cast<double>(stats.chunks_made));
-  row("let go so far", "%.0f", static_cast<double>(stats.chunks_unloaded));
-  row("world's memory", "%.0f MB", static_cast<double>(stats.loaded_bytes + stats.other_bytes) / 1e6);
+  row("chunks read", "%.0f", static_cast<double>(stats.chunks_read));
+  row("chunks generated", "%.0f", static_cast<double>(stats.chunks_made));
+  row("chunks unloaded", "%.0f", static_cast<double>(stats.chunks_unloaded));
+  row("world memory", "%.0f MB", static_cast<double>(stats.loaded_bytes + stats.other_bytes) / 1e6);
 }
 
 }  // namespace
@@ -387,15 +385,15 @@ void draw_statistics_part(const ViewState& state) {
   if (!heading("Statistics")) return;
   const FrameStats& stats = state.stats;
   row("frame", "%.1f ms", state.frame_seconds * 1e3);
-  row("picture", "%.1f ms", stats.seconds * 1e3);
-  row("rays a second", "%.1f million",
+  row("image", "%.1f ms", stats.seconds * 1e3);
+  row("rays per second", "%.1f million",
       stats.seconds > 0.0 ? static_cast<double>(stats.rays) / stats.seconds / 1e6 : 0.0);
-  row("samples a pixel", "%.0f", stats.samples);
-  row("flight a second", "%.3g voxels", state.camera.speed());
+  row("samples per pixel", "%.0f", stats.samples);
+  row("flight speed", "%.3g voxels/s", state.camera.speed());
   row("memory", "%.0f MB", resident_megabytes());
   row("history", "%.1f MB", static_cast<double>(state.open.document->history().bytes()) / 1e6);
-  row("last edit waited", "%.2f ms", state.last_wait_seconds * 1e3);
-  row("longest so far", "%.2f ms", state.longest_wait_seconds * 1e3);
+  row("last edit wait", "%.2f ms", state.last_wait_seconds * 1e3);
+  row("longest edit wait", "%.2f ms", state.longest_wait_seconds * 1e3);
   draw_world_rows(state.open.document->world());
   if (state.open.backend) {
     for (const auto& [what, value] : state.open.backend->stats()) {
@@ -404,24 +402,24 @@ void draw_statistics_part(const ViewState& state) {
       ImGui::TextUnformatted(value.c_str());
     }
   }
-  // A device's name is long.
+  // Wrapped, because device names are long.
   ImGui::TextDisabled("drawn by");
   ImGui::TextWrapped("%s", state.open.backend ? state.open.backend->name().c_str() : "-");
 }
 
 void draw_help_table(float scale) {
   constexpr std::array<std::pair<const char*, const char*>, 11> kMouse = {
-      {{"Left button", "the tool; with Look, and with Alt, turns"},
-       {"Right button", "turns: about what is under the mouse, or the head"},
+      {{"Left button", "uses the tool; turns with Look or Alt"},
+       {"Right button", "turns: around the point under the mouse, or in place"},
        {"Middle button", "moves sideways"},
        {"Shift + right button", "moves the sun"},
-       {"Wheel", "orbit: nearer and farther; fly: faster and slower; walk: larger and smaller"},
+       {"Wheel", "orbit: distance; fly: speed; walk: body size"},
        {"W A S D or arrows", "forward, left, back, right"},
-       {"Q E, space", "down, up; walking, space jumps"},
+       {"Q E, space", "down, up; space jumps when walking"},
        {"Shift", "four times as fast"},
        {"Drop a file", "opens it"},
-       {"Torch (F2)", "chooses a voxel that lights what is around it"},
-       {"Light (F2)", "sun, sky, lamps; how far occlusion and shadows reach"}}};
+       {"Torch (F2)", "selects a voxel type that lights its surroundings"},
+       {"Light (F2)", "sun, sky, lamps; range of occlusion and shadows"}}};
   const float column = 170.0F * scale;
   for (const auto& [what, does] : kMouse) {
     ImGui::TextUnformatted(what);

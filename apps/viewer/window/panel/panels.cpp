@@ -18,7 +18,7 @@ void menu_item(Command command, MenuChoice& choice, bool is_enabled = true, bool
   if (ImGui::MenuItem(info.name, info.keys, is_checked, is_enabled)) choice.commands.push_back(command);
 }
 
-/// Of the menu that is being drawn.
+/// Closes the current menu on Escape.
 void close_on_escape() {
   if (ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape))) ImGui::CloseCurrentPopup();
 }
@@ -27,7 +27,7 @@ void draw_file_menu(const ViewState& state, MenuChoice& choice) {
   if (!ImGui::BeginMenu("File")) return;
   close_on_escape();
   menu_item(Command::Open, choice);
-  if (ImGui::BeginMenu("Open again", !state.settings.recent.empty())) {
+  if (ImGui::BeginMenu("Open recent", !state.settings.recent.empty())) {
     for (const std::string& file : state.settings.recent) {
       if (ImGui::MenuItem(file.c_str())) choice.recent = file;
     }
@@ -85,7 +85,7 @@ void draw_view_menu(const ViewState& state, MenuChoice& choice) {
   ImGui::EndMenu();
 }
 
-/// As the menu has it.
+/// Returns the mode's label in the menu.
 const char* mode_name(DrawMode mode) {
   return info_of(static_cast<Command>(static_cast<int>(Command::DrawRays) + static_cast<int>(mode))).name;
 }
@@ -158,7 +158,7 @@ float draw_status(const ViewState& state) {
   std::string right = picture_text(state) + "   orbit";
   if (state.camera.mode == CameraMode::Fly) {
     std::array<char, 64> speed{};
-    std::snprintf(speed.data(), speed.size(), "   fly, %.3g voxels a second", state.camera.speed());
+    std::snprintf(speed.data(), speed.size(), "   fly, %.3g voxels per second", state.camera.speed());
     right = picture_text(state) + speed.data();
   }
   if (state.camera.mode == CameraMode::Walk) {
@@ -166,7 +166,7 @@ float draw_status(const ViewState& state) {
     std::snprintf(body.data(), body.size(), "   walk, %.3g voxels tall", state.walker.height());
     right = picture_text(state) + body.data();
   }
-  // Faces of a world would be those of what is in memory at the moment.
+  // Face counts of a world would cover only the loaded chunks.
   const WorldWindow* const world = state.open.document->world();
   const std::string faces = (world ? world->text() : to_string(state.open.document->faces())) + "   ";
   const auto width = [](const std::string& text) { return ImGui::CalcTextSize(text.c_str()).x; };
@@ -232,7 +232,7 @@ void draw_message(ViewState& state, float bottom) {
 }
 
 void draw_progress(ViewState& state, float scale, float top) {
-  constexpr std::chrono::milliseconds kShort{250};  // a note that soon goes again is only in the way
+  constexpr std::chrono::milliseconds kShort{250};  // shorter notes would only flicker
   const bool has_image = state.open.backend != nullptr && state.stats.width > 0;
   const bool is_stand_in = has_image && state.picture.mode != state.settings.mode;
   const auto progress = has_image ? state.open.backend->progress() : std::nullopt;
@@ -255,7 +255,7 @@ void draw_progress(ViewState& state, float scale, float top) {
   const std::string activity = state.open.backend->activity();
   ImGui::Text("%s: %s", mode_name(state.settings.mode), activity.empty() ? "drawing" : activity.c_str());
   if (progress) ImGui::ProgressBar(static_cast<float>(*progress), {220.0F * scale, 6.0F * scale}, "");
-  if (is_stand_in) ImGui::TextDisabled("shown until then: %s", mode_name(state.picture.mode));
+  if (is_stand_in) ImGui::TextDisabled("shown meanwhile: %s", mode_name(state.picture.mode));
   ImGui::End();
   ImGui::PopStyleVar();
 }

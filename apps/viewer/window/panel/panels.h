@@ -8,7 +8,7 @@
 namespace quoin::viewer {
 
 /// The legend of the level-of-detail colours.
-inline constexpr const char* kDetailLegend = "green: in full; yellow to red: in coarser cells; blue: impostors";
+inline constexpr const char* kDetailLegend = "green: full detail; yellow to red: coarser cells; blue: impostors";
 
 /// The user's choices in menus and panels.
 struct MenuChoice {

@@ -11,7 +11,7 @@ namespace quoin::viewer {
 
 namespace {
 
-/// What the user switched, if anything: done once the list is drawn.
+/// A switch that the user clicked; applied once the list is drawn.
 struct Switched {
   SceneNode node;
   bool is_visible = false;
@@ -24,7 +24,7 @@ class SceneList {
   void draw_layers() {
     if (scene_.layers().empty()) return;
     const HiddenParts& hidden = tree_.hidden();
-    // What is not seen is looked for here.
+    // Unfolded, because users look here for hidden parts.
     if (hidden.layers > 0) ImGui::SetNextItemOpen(true, ImGuiCond_Once);
     const auto all = static_cast<int>(scene_.layers().size());
     const bool is_open = hidden.layers > 0
@@ -61,16 +61,16 @@ class SceneList {
   [[nodiscard]] const std::optional<Switched>& switched() const { return switched_; }
 
  private:
-  /// `is_reached`: nothing above hides it.
+  /// `is_reached`: no parent hides the node.
   void draw_switch(const SceneNode& node, bool is_visible, bool is_reached) {
     bool is_on = is_visible;
     if (!is_reached) ImGui::PushStyleVar(ImGuiStyleVar_Alpha, 0.5F);
     if (ImGui::Checkbox("##shown", &is_on)) switched_ = Switched{node, is_on};
     if (!is_reached) ImGui::PopStyleVar();
-    if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", is_reached ? "shown" : "hidden by what it belongs to");
+    if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", is_reached ? "shown" : "hidden by a group or layer");
   }
 
-  /// The name, or in grey what stands for it: whole in a tooltip where there is no room for it.
+  /// Draws the name, or a substitute in grey. A tooltip shows names that are cut off.
   static void draw_name(const std::string& name, const std::string& stands_for_it) {
     if (name.empty()) {
       ImGui::TextDisabled("%s", stands_for_it.c_str());
@@ -90,7 +90,7 @@ class SceneList {
   void draw_group(GroupHandle handle) {
     const SceneGroup& group = scene_.groups()[handle];
     ImGui::PushID(static_cast<int>(handle.index));
-    // There may be thousands: those that are folded and out of sight only take their room.
+    // There may be thousands: groups that are folded and out of sight only reserve their space.
     const ImVec2 row{1.0F, ImGui::GetFrameHeight()};
     const bool is_folded = ImGui::GetStateStorage()->GetInt(ImGui::GetID("group")) == 0;
     if (is_folded && !ImGui::IsRectVisible(row)) {
@@ -140,7 +140,7 @@ void draw_scene_part(ViewState& state) {
   const std::size_t layers = scene.layers().empty() ? 1 : 2 + (hidden.layers > 0 ? scene.layers().size() : 0);
   const std::size_t entries = scene.instances().size() + scene.groups().size() + layers;
   const auto rows = static_cast<float>(std::clamp<std::size_t>(entries, 4, 10));
-  // Names may be long, and groups deep.
+  // Scrolls, because names can be long and groups deeply nested.
   ImGui::BeginChild("scene", {0.0F, rows * ImGui::GetFrameHeightWithSpacing()}, true,
                     ImGuiWindowFlags_HorizontalScrollbar);
   list.draw_layers();

@@ -6,7 +6,7 @@
 namespace quoin::viewer {
 namespace {
 
-const char* const kDoing = "making a window's images";
+const char* const kDoing = "creating the window's images";
 
 VkExtent2D extent_within(const VkSurfaceCapabilitiesKHR& can, VkExtent2D wanted) {
   // Most windows say their size; elsewhere it is ours to choose.
@@ -35,7 +35,7 @@ Result<VkSurfaceFormatKHR> Swapchain::format_of(const WindowDevice& device) {
     const bool has_bytes = format.format == VK_FORMAT_B8G8R8A8_UNORM || format.format == VK_FORMAT_R8G8B8A8_UNORM;
     if (has_bytes && format.colorSpace == VK_COLOR_SPACE_SRGB_NONLINEAR_KHR) return format;
   }
-  return make_error(ErrorCode::Unsupported, "vulkan: " + device.name() + ": the window takes no bytes of sRGB");
+  return make_error(ErrorCode::Unsupported, "vulkan: " + device.name() + ": the window has no 8-bit sRGB format");
 }
 
 Result<std::unique_ptr<Swapchain>> Swapchain::create(const WindowDevice& device, VkRenderPass pass, int width,

@@ -16,7 +16,7 @@ namespace quoin::viewer {
 Result<WindowDeviceOptions> device_options(SDL_Window* window) {
   unsigned count = 0;
   if (SDL_Vulkan_GetInstanceExtensions(window, &count, nullptr) == SDL_FALSE) {
-    return make_error(ErrorCode::Unsupported, "cannot draw in a window by Vulkan: " + sdl_says());
+    return make_error(ErrorCode::Unsupported, "cannot draw in a window with Vulkan: " + sdl_says());
   }
   std::vector<const char*> names(count);
   SDL_Vulkan_GetInstanceExtensions(window, &count, names.data());

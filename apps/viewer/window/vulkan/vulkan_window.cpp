@@ -14,9 +14,9 @@ namespace quoin::viewer {
 
 namespace {
 
-static_assert(sizeof(OverlayVertex) == 20, "what window_overlay.vert reads");
+static_assert(sizeof(OverlayVertex) == 20, "layout read by window_overlay.vert");
 
-const char* const kShowing = "showing a picture";
+const char* const kShowing = "showing an image";
 constexpr VkClearColorValue kGround = {{0.07F, 0.075F, 0.09F, 1.0F}};
 
 VkRect2D within(const PixelRect& rect, VkExtent2D window) {
@@ -261,7 +261,7 @@ Result<VulkanWindow> VulkanWindow::create(std::shared_ptr<WindowDevice> device, 
 Status VulkanWindow::set_font(int width, int height, std::span<const std::uint8_t> opacity) {
   QUOIN_ASSERT(
       width > 0 && height > 0 && opacity.size() == static_cast<std::size_t>(width) * static_cast<std::size_t>(height),
-      "a byte of opacity a pixel");
+      "one byte of opacity per pixel");
   Status put = impl_->font.put(std::as_bytes(opacity));
   impl_->font_size = put ? glm::ivec2(width, height) : glm::ivec2(0);
   return put;
@@ -269,7 +269,7 @@ Status VulkanWindow::set_font(int width, int height, std::span<const std::uint8_
 
 Status VulkanWindow::present(int width, int height, const VulkanPicture* picture, const PixelRect& place,
                              const Overlay& overlay) {
-  QUOIN_ASSERT(are_there(overlay), "draws name indices, and these vertices, that are there");
+  QUOIN_ASSERT(are_there(overlay), "the indices and vertices of all draw calls exist");
   if (width <= 0 || height <= 0) return {};
   Impl& window = *impl_;
   const VulkanFunctions& api = window.device->api();

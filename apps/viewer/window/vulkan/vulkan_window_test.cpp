@@ -192,10 +192,10 @@ TEST_F(VulkanWindowTest, ReportsUnsupportedDevices) {
   };
   WindowDeviceOptions wrong = options(false);
   wrong.instance_extensions = {"VK_QUOIN_no_such_thing"};
-  expect_refusal(wrong, "no driver here shows pictures in windows");
+  expect_refusal(wrong, "no driver can show images in windows");
   wrong = options(false);
   wrong.make_surface = [](VkInstance) { return VkSurfaceKHR{VK_NULL_HANDLE}; };
-  expect_refusal(wrong, "the window cannot show pictures");
+  expect_refusal(wrong, "the window cannot show images");
   wrong = options(false);
   wrong.device = "no such device";
   expect_refusal(wrong, "no device \"no such device\"; available: 0 ");

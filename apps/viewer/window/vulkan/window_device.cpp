@@ -66,12 +66,12 @@ WindowDevice::~WindowDevice() {
 }
 
 Status WindowDevice::open(const WindowDeviceOptions& options) {
-  if (!api_.load(options.get_instance_proc_addr)) return refuse("there is no loader that is complete here");
+  if (!api_.load(options.get_instance_proc_addr)) return refuse("the Vulkan loader is missing or incomplete");
   if (Status made = make_instance(options); !made) return made;
   surface_ = options.make_surface(instance_);
-  if (surface_ == VK_NULL_HANDLE) return refuse("the window cannot show pictures");
+  if (surface_ == VK_NULL_HANDLE) return refuse("the window cannot show images");
   const std::vector<Candidate> all = candidates();
-  if (all.empty()) return refuse("there is no driver for any graphics device here");
+  if (all.empty()) return refuse("no driver for a graphics device found");
   std::vector<VulkanDeviceInfo> descriptions;
   descriptions.reserve(all.size());
   for (const Candidate& one : all) descriptions.push_back(one.description);
@@ -81,7 +81,7 @@ Status WindowDevice::open(const WindowDeviceOptions& options) {
 }
 
 Status WindowDevice::make_instance(const WindowDeviceOptions& options) {
-  if (listener_ && !has_validation(api_)) return refuse(std::string("there is no ") + kValidationLayer + " here");
+  if (listener_ && !has_validation(api_)) return refuse(std::string(kValidationLayer) + " is not installed");
   const VulkanRequirements needs = vulkan_requirements();
   auto application = info_of<VkApplicationInfo>(VK_STRUCTURE_TYPE_APPLICATION_INFO);
   application.pApplicationName = "quoin view";
@@ -100,11 +100,11 @@ Status WindowDevice::make_instance(const WindowDeviceOptions& options) {
   info.enabledExtensionCount = static_cast<std::uint32_t>(extensions.size());
   info.ppEnabledExtensionNames = extensions.data();
   if (const VkResult result = api_.vkCreateInstance(&info, nullptr, &instance_); result != VK_SUCCESS) {
-    if (result == VK_ERROR_INCOMPATIBLE_DRIVER) return refuse("there is no driver for any graphics device here");
-    if (result == VK_ERROR_EXTENSION_NOT_PRESENT) return refuse("no driver here shows pictures in windows");
-    return refuse("no instance can be made (VkResult " + std::to_string(result) + ")");
+    if (result == VK_ERROR_INCOMPATIBLE_DRIVER) return refuse("no driver for a graphics device found");
+    if (result == VK_ERROR_EXTENSION_NOT_PRESENT) return refuse("no driver can show images in windows");
+    return refuse("cannot create an instance (VkResult " + std::to_string(result) + ")");
   }
-  if (!api_.load_instance(instance_)) return refuse("the instance is not complete");
+  if (!api_.load_instance(instance_)) return refuse("the instance lacks functions");
   return listen();
 }
 
@@ -113,7 +113,8 @@ Status WindowDevice::listen() {
   const VkDebugUtilsMessengerCreateInfoEXT messenger = messenger_info(listener_);
   const auto create = reinterpret_cast<PFN_vkCreateDebugUtilsMessengerEXT>(
       api_.vkGetInstanceProcAddr(instance_, "vkCreateDebugUtilsMessengerEXT"));
-  if (create(instance_, &messenger, nullptr, &messenger_) != VK_SUCCESS) return refuse("validation cannot be heard");
+  if (create(instance_, &messenger, nullptr, &messenger_) != VK_SUCCESS)
+    return refuse("cannot receive validation messages");
   return {};
 }
 
@@ -131,14 +132,14 @@ std::vector<WindowDevice::Candidate> WindowDevice::candidates() const {
     if (!description) continue;
     Candidate one{handle, 0, *description};
     if (one.description.missing.empty() && !find_queue_family(one)) {
-      one.description.missing = "a way to show pictures in this window";
+      one.description.missing = "a way to show images in this window";
     }
     found.push_back(std::move(one));
   }
   return found;
 }
 
-// One whose queues compute, draw, and show pictures in the window.
+// Finds a queue family that computes, draws, and presents to the window.
 bool WindowDevice::find_queue_family(Candidate& candidate) const {
   std::uint32_t count = 0;
   api_.vkEnumerateDeviceExtensionProperties(candidate.handle, nullptr, &count, nullptr);
@@ -190,7 +191,7 @@ Status WindowDevice::make_device(const Candidate& chosen) {
   if (Status enabled = enable_vulkan_features(info, storage); !enabled) return enabled;
   const VkResult result = api_.vkCreateDevice(physical_, &info, nullptr, &handle_);
   if (result != VK_SUCCESS) return check(result, "starting");
-  if (!api_.load_device(handle_)) return refuse(name_ + ": the device is not complete");
+  if (!api_.load_device(handle_)) return refuse(name_ + ": the device lacks functions");
   api_.vkGetDeviceQueue(handle_, queue_family_, 0, &queue_);
   return {};
 }

@@ -49,7 +49,7 @@ class WindowDevice {
   /// Returns an `allowed` memory type with all `wanted` properties, or else any allowed one.
   [[nodiscard]] std::uint32_t memory_type(std::uint32_t allowed, VkMemoryPropertyFlags wanted) const;
 
-  /// Converts the result of a Vulkan call. `doing` names the call in the error, as in "showing a picture".
+  /// Converts the result of a Vulkan call. `doing` names the call in the error, as in "showing an image".
   [[nodiscard]] Status check(VkResult result, const std::string& doing) const;
 
  private:

@@ -6,7 +6,7 @@ namespace quoin::viewer {
 
 namespace {
 
-const char* const kMakingRoom = "making room for a window";
+const char* const kMakingRoom = "allocating memory for a window";
 
 }  // namespace
 
