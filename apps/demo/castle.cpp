@@ -15,9 +15,9 @@ using quoin::VoxelType;
 
 constexpr int kCentre = kIslandEdge / 2;
 constexpr int kCourt = 24;     // height of the castle's court
-constexpr int kHalfWall = 30;  // from the middle to a curtain wall
+constexpr int kHalfWall = 30;  // distance from the middle to a curtain wall
 
-// A small hash of whole numbers: the same everywhere, for speckles of colour.
+// A small integer hash for speckles of colour, the same on all platforms.
 unsigned speckle(int x, int y, int z) {
   unsigned h = static_cast<unsigned>(x) * 374'761'393U + static_cast<unsigned>(y) * 668'265'263U +
                static_cast<unsigned>(z) * 2'147'483'647U;

@@ -1,5 +1,5 @@
-// Makes a fleet of voxel ships over a generated terrain, writes it as a scene file, and draws what it reads from that:
-// one picture in its own colours and one in those of its levels of detail. The files are named on the command line.
+// Makes a fleet of voxel ships over a generated terrain, writes it as a scene file, reads that file and renders it
+// twice: in its own colours, and coloured by level of detail. The command line names the files.
 
 #include <cstdio>
 #include <vector>

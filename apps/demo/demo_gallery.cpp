@@ -133,7 +133,7 @@ void furnish(Grid& grid, const RoomTypes& types) {
   column(grid, {57, 11, 38}, 4, 13, types.glass);
 }
 
-// A picture, a plant and a lamp.
+// A painting, a plant and a lamp.
 void decorate(Grid& grid, const RoomTypes& types) {
   grid.fill_box({{36, 28, 0}, {64, 48, 1}}, types.dark);
   for (int y = 30; y < 46; ++y) {
@@ -155,7 +155,7 @@ void decorate(Grid& grid, const RoomTypes& types) {
   grid.fill_box({{9, 32, 9}, {17, 39, 17}}, types.glow);
 }
 
-// Open towards +z: a red wall and a green one throw their colours over all that is white.
+// Open towards +z: a red and a green wall reflect their colours onto white surfaces.
 Scene living_room() {
   Scene scene;
   const RoomTypes types(scene);
@@ -167,7 +167,7 @@ Scene living_room() {
   return scene;
 }
 
-// A basin of water with things of glass and metal in it.
+// A basin of water with glass and metal objects in it.
 Scene basin() {
   Scene scene;
   const VoxelType tile = add(scene, "tile", {226, 232, 232, 255}, {0.35F});
@@ -219,7 +219,7 @@ Scene basin() {
   return scene;
 }
 
-// The box of Cornell University's graphics laboratory, as far as voxels have it: tests/blender/check_light.py builds
+// The box of Cornell University's graphics laboratory, as closely as voxels allow; tests/blender/check_light.py builds
 // the same.
 Scene cornell_box() {
   Scene scene;
@@ -239,7 +239,7 @@ Scene cornell_box() {
   return scene;
 }
 
-// A number from 0 to less than 1.
+// Returns a number in [0, 1).
 double drawn(unsigned& random) {
   random = random * 1'664'525U + 1'013'904'223U;
   return (random >> 8U) / 16'777'216.0;
@@ -318,14 +318,14 @@ void raise_island(Grid& grid, const IslandTypes& types) {
   }
 }
 
-// The first air above the island's ground, from its middle.
+// Returns the first air voxel above the island's ground, relative to its middle.
 int top_at(const Grid& grid, int x, int z) {
   int y = 20;
   while (y > -20 && grid.get(kIslandMiddle + IVec3{x, y, z}) == quoin::kAir) --y;
   return y + 1;
 }
 
-// With a path to its door.
+// A house with a path to its door.
 void build_house(Grid& grid, const IslandTypes& types) {
   const IVec3 house = kIslandMiddle + IVec3{0, top_at(grid, 6, 0), -6};
   grid.fill_box({house - IVec3{0, 6, 0}, house + IVec3{18, 12, 13}}, types.wall);

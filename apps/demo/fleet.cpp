@@ -17,7 +17,7 @@ namespace demo {
 
 namespace {
 
-// The same numbers on every machine.
+// Gives the same numbers on every machine.
 class Random {
  public:
   double between(double low, double high) {
@@ -46,7 +46,7 @@ quoin::Status add_terrain(quoin::Scene& scene) {
   return {};
 }
 
-// In rows that lie further and further back, wider and wider, all under way in about one direction.
+// Places the ships in rows, each further back and wider, all flying in about the same direction.
 void add_fleet(quoin::Scene& scene, const std::vector<quoin::GridHandle>& ships) {
   Random random;
   for (int row = 0; row < 16; ++row) {
@@ -54,7 +54,7 @@ void add_fleet(quoin::Scene& scene, const std::vector<quoin::GridHandle>& ships)
     for (int column = 0; column < 12; ++column) {
       const double across = (column - 5.5 + random.between(-0.3, 0.3)) / 5.5;
       const double share = random.between(0.0, 1.0);
-      // The large ones keep back: there is no room for them among the first rows.
+      // Large ships stay at the back, because the first rows have no room for them.
       const std::size_t largest = row < 1 ? 1 : row < 4 ? 2 : 3;
       const std::size_t design = std::min<std::size_t>(share < 0.5    ? 0
                                                        : share < 0.8  ? 1

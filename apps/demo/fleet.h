@@ -8,7 +8,7 @@ namespace demo {
 /// A fleet of voxel ships over a generated terrain, with a camera and a sun.
 [[nodiscard]] quoin::Result<quoin::LoadedScene> make_fleet();
 
-/// How it is drawn, under its own sun.
+/// Returns the render options of the fleet, with its own sun.
 [[nodiscard]] quoin::RenderOptions fleet_options(const quoin::LoadedScene& fleet);
 
 }  // namespace demo

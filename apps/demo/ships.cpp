@@ -41,7 +41,7 @@ quoin::Result<Paint> add_paint(quoin::Scene& scene, Rgba8 stripe) {
   return paint;
 }
 
-// A hull along z, round in section, pointed at the bow and blunt at the stern.
+// A hull along z with a round cross-section, pointed at the bow and blunt at the stern.
 void add_hull(Grid& grid, const Paint& paint, IVec3 bow, int length, double half_width, double half_height) {
   for (int z = 0; z < length; ++z) {
     const double share = static_cast<double>(z) / length;

@@ -59,7 +59,7 @@ IVec3 target_of(BrushAction action, IVec3 voxel, Direction face) {
 
 std::optional<Ray> ray_in_grid(const Instance& instance, const SceneGrid& grid, const Ray& ray_in_world) {
   if (!std::isfinite(instance.voxel_size) || !(instance.voxel_size > 0.0)) return std::nullopt;
-  // The images of the grid's axes say all there is to know of the transform; taken at the origin, where they are exact.
+  // The transformed axes define the transform; taken at the origin, where they are exact.
   Instance at_origin = instance;
   at_origin.position = DVec3{0.0};
   const DVec3 from_pivot = ray_in_world.origin - instance.position;
@@ -79,7 +79,7 @@ std::optional<Ray> ray_in_grid(const Instance& instance, const SceneGrid& grid, 
 
 std::optional<IVec3> StrokeLayer::at(const Ray& ray_in_grid) const {
   const int axis = frame_of(face).axis;
-  // The layer's surface on the side from which it was touched: where the mouse seems to be.
+  // The layer's surface on the touched side, where the mouse appears to be.
   const double plane = voxel[axis] + (frame_of(face).sign > 0 ? 1.0 : 0.0);
   const double slope = ray_in_grid.direction[axis];
   const double length = glm::length(ray_in_grid.direction);

@@ -24,15 +24,16 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::array kDivisors = {4, 3, 2, 1};
 constexpr int kSampleFactor = 4;
-constexpr double kPatienceAfterEdits = 4.0;  // times as long: the view stays, and need not become coarse again
-// Of drafts. The castle at a quarter, two cores: 73 ms in full light; without lamps 23, with 2 of them 28, with 4 33.
+constexpr double kPatienceAfterEdits = 4.0;  // factor for the first image if the camera stayed, to keep it fine
+// Lamps of a draft. The castle at a quarter, two cores: 73 ms in full light; without lamps 23, with 2 of them 28, with
+// 4 33.
 constexpr int kDraftLamps = 2;
 
-/// One of the pictures that lead to the settled one.
+/// One of the images that lead to the settled one.
 struct Stage {
   int divisor = 1;
   int samples = 1;
-  bool is_draft = false;  ///< in less light than was asked for
+  bool is_draft = false;  ///< with simpler light than requested
 
   [[nodiscard]] int width(const ViewRequest& request) const { return (request.width + divisor - 1) / divisor; }
   [[nodiscard]] int height(const ViewRequest& request) const { return (request.height + divisor - 1) / divisor; }
@@ -48,7 +49,8 @@ struct Stage {
   }
 };
 
-// What is cheap of that light. Where values are shown instead of colours they stay what they are.
+// Returns the light of a draft: few lamps, vertex occlusion. Shadings that show values instead of colours stay as they
+// are.
 LightOptions draft_of(LightOptions light) {
   if (light.shading != Shading::Lit) return light;
   if (light.model == LightModel::Rays) light.max_lamps = std::min(light.max_lamps, kDraftLamps);
@@ -67,14 +69,14 @@ RenderOptions options_for(const ViewRequest& request, const Stage& stage) {
   options.height = stage.height(request);
   options.samples = stage.samples;
   options.light = stage.is_draft ? draft_of(request.light) : request.light;
-  // What is shown for a moment does not wait for impostors.
+  // Short-lived images do not wait for impostors.
   if (stage.divisor > 1) options.detail.impostor_seconds = 0.0;
   options.detail.colours = request.detail_colours;
   if (request.detail_by_pixels) options.detail.policy.emplace().rule = DetailPolicy::Rule::ByPixels;
   return options;
 }
 
-// A picture of densities, which is whole with the first sample.
+// Draws a density slice, which is final after the first sample.
 Result<Picture> draw_densities(const Scene& scene, const ViewRequest& request, const Stage& stage,
                                const CpuBackendOptions& options) {
   DensitySliceOptions slice;
@@ -90,7 +92,7 @@ Result<Picture> draw_densities(const Scene& scene, const ViewRequest& request, c
   return picture;
 }
 
-/// What pictures by paths need.
+/// The data for path tracing.
 struct PathPart {
   PathPart(const Scene& scene, const CpuBackendOptions& options)
       : tracer(scene, options.instances, options.threads), bounds(scene.bounds(options.instances)) {}
@@ -100,7 +102,7 @@ struct PathPart {
   PathMemory memory;
 };
 
-/// What pictures of smooth surfaces are marched through.
+/// The data for ray-marching smooth surfaces.
 struct SmoothPart {
   explicit SmoothPart(const CpuBackendOptions& options) : fields({options.instances, options.max_density_bytes}) {}
 
@@ -154,32 +156,32 @@ struct CpuBackend::Impl {
   CpuBackendOptions options;
   std::function<void()> on_frame;
   CpuRenderer renderer;
-  std::map<int, DetailSelector> selectors;  // by divisor: pictures of another size are another view
-  std::unique_ptr<SmoothPart> smooth;       // the worker's
-  std::unique_ptr<PathPart> paths;          // likewise
+  std::map<int, DetailSelector> selectors;  // by divisor: images of another size are another view
+  std::unique_ptr<SmoothPart> smooth;       // used by the worker
+  std::unique_ptr<PathPart> paths;          // used by the worker
   std::atomic<bool> is_smooth_stale{true};
   std::atomic<bool> are_paths_stale{true};
-  std::atomic<std::size_t> held{0};     // bytes of what is made of the scene
-  std::atomic<int> smooth_percent{-1};  // of what is made for it; -1: nothing is
+  std::atomic<std::size_t> held{0};     // bytes of the data made from the scene
+  std::atomic<int> smooth_percent{-1};  // progress of making `smooth`; -1: idle
   std::atomic<bool> is_preparing_paths{false};
 
-  mutable std::mutex mutex;  // guards what follows, but for the atomic ones
+  mutable std::mutex mutex;  // guards the members below, except the atomic ones
   std::condition_variable wake;
   std::condition_variable idle;
   std::optional<ViewRequest> request;
-  std::optional<Stage> stage;  // the next one; none where the first has not been chosen
+  std::optional<Stage> stage;  // the next one; empty until the first has been chosen
   bool is_done = false;
   bool is_camera_new = true;
   bool is_paused = false;
   bool is_stale = false;
-  bool is_busy = false;  // reads the scene
+  bool is_busy = false;  // the worker reads the scene
   bool is_stopped = false;
-  bool is_broken = false;  // there was not memory enough: nothing is done until the scene has changed again
+  bool is_broken = false;  // out of memory: the worker waits for the next change of the scene
   std::optional<ViewFrame> frame;
   std::optional<Error> error;
-  std::optional<Error> refusal;               // of smooth pictures
-  std::array<double, 2> seconds_per_pixel{};  // in full light and of drafts; 0: not known
-  Stage first{kDivisors.front()};             // what the last request began with
+  std::optional<Error> refusal;               // of smooth images
+  std::array<double, 2> seconds_per_pixel{};  // in full light and for drafts; 0: not known
+  Stage first{kDivisors.front()};             // first stage of the last request
 
   std::atomic<std::uint64_t> request_number{0};
   std::atomic<std::uint64_t> mode_number{0};  // of the last request that changed the mode
@@ -219,7 +221,7 @@ void CpuBackend::Impl::update(std::unique_lock<std::mutex>& lock) {
   is_stale = false;
 }
 
-// Paths are taken through structures of their own, as large as the others.
+// The path tracer has its own structures, as large as the ray marcher's.
 void CpuBackend::Impl::count_bytes() {
   const std::size_t structures = renderer.tracer().bytes();
   std::size_t all = structures;
@@ -241,12 +243,12 @@ std::optional<Stage> CpuBackend::Impl::finest(bool is_draft, double patience) co
   return chosen;
 }
 
-// After an edit pictures by paths go on from such as there were before it.
+// After an edit, path-traced images continue at a size that the history has.
 bool CpuBackend::Impl::may_begin(int divisor) const {
   return !paths || paths->memory.may_begin(*request, divisor);
 }
 
-// As large as there is time for; a draft where a picture in full light would be smaller than a half.
+// As fine as time allows; a draft if an image in full light would be smaller than a half.
 Stage CpuBackend::Impl::first_stage() const {
   if (request->whole_only) return {};
   const double patience = options.first_frame_seconds * (is_camera_new ? 1.0 : kPatienceAfterEdits);
@@ -330,7 +332,7 @@ void CpuBackend::Impl::prepare_paths() {
   if (!are_paths_stale) return;
   struct Preparing {
     explicit Preparing(std::atomic<bool>& is_preparing) : flag(is_preparing) { flag = true; }
-    ~Preparing() { flag = false; }  // when memory runs out too
+    ~Preparing() { flag = false; }  // also if memory runs out
     Preparing(const Preparing&) = delete;
     Preparing& operator=(const Preparing&) = delete;
     std::atomic<bool>& flag;
@@ -346,7 +348,7 @@ void CpuBackend::Impl::prepare_paths() {
   count_bytes();
 }
 
-// Makes the fields, or what of them changed.
+// Makes the fields, or updates their changed parts.
 Status CpuBackend::Impl::prepare_smooth(const Progress& goes_on) {
   if (!is_smooth_stale) return {};
   const auto tell_how_far = [&](double share) {
@@ -484,7 +486,7 @@ void CpuBackend::resume(bool changed) {
 }
 
 std::optional<SceneHit> CpuBackend::pick(const Camera& camera, double x, double y, int width, int height) {
-  // Only `resume`, on this thread, asks for an update of the tracer: without one under way it stays as it is.
+  // Only `resume`, on this thread, requests an update of the tracer, so it cannot change here without one under way.
   if (width <= 0 || height <= 0 || !is_up_to_date()) return std::nullopt;
   {
     const std::lock_guard lock(impl_->mutex);

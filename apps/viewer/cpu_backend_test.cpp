@@ -32,7 +32,7 @@ class Bell {
     ++rings_;
     rung_.notify_all();
   }
-  /// False when none came for a minute.
+  /// Returns false if no call came for a minute.
   bool wait() {
     std::unique_lock lock(mutex_);
     const bool came = rung_.wait_for(lock, std::chrono::seconds(60), [this] { return rings_ > 0; });
@@ -64,12 +64,12 @@ Image expected(const Scene& scene, const ViewRequest& request) {
   return CpuRenderer(scene).render(request.camera, options).value().colour;
 }
 
-/// Everything about a backend that a test needs.
+/// A backend with counted frames.
 struct Watched {
   explicit Watched(const Scene& scene, double first_frame_seconds = 0.0)
       : backend(scene, {InstanceFilter::Visible, {2}, first_frame_seconds}, [this] { bell.ring(); }) {}
 
-  /// The frames until the picture has settled; empty when it did not.
+  /// Returns the frames until the image has settled; empty if it did not.
   std::vector<ViewFrame> settle() {
     std::vector<ViewFrame> frames;
     while (bell.wait()) {
@@ -91,7 +91,7 @@ TEST(CpuBackend, NoPictureOfAnEarlierRequestIsSettled) {
   ViewRequest request = request_for(loaded.scene, View::Iso);
   request.samples = 1;
   watched.backend.show(request);
-  ASSERT_FALSE(watched.settle().empty()) << "now it is known how fast it is, and the next picture is the last one";
+  ASSERT_FALSE(watched.settle().empty()) << "the speed is known now, and the next image is the last one";
   request.camera.position.x += 1.0;
   watched.backend.show(request);
   ASSERT_TRUE(watched.bell.wait());
@@ -128,7 +128,7 @@ TEST(CpuBackend, PathsConvergeToThePathTracersPicture) {
   const auto picture = PathTracer(loaded.scene).render(request.camera, options);
   ASSERT_TRUE(picture.has_value());
   EXPECT_EQ(frames.back().colour.rgb, develop(*picture, {1.5, ToneCurve::Aces}).value().rgb);
-  // Another mode, and back.
+  // Switches to another mode and back.
   request.mode = DrawMode::Rays;
   watched.backend.show(request);
   EXPECT_FALSE(watched.settle().empty());
@@ -155,7 +155,7 @@ TEST(CpuBackend, PathsGoOnAcrossEditsAndBeginAgainWithTheView) {
   const IBox corner{{61, 0, 31}, {71, 4, 41}};  // of the hill's ground, all of one type
   const auto after = edited(corner, kAir);
   ASSERT_FALSE(after.empty());
-  ASSERT_EQ(after.front().colour.width, request.width) << "as large as the one of before, however coarse what is new";
+  ASSERT_EQ(after.front().colour.width, request.width) << "as large as the image before, however coarse the new parts";
   EXPECT_TRUE(after.front().is_whole);
   EXPECT_FALSE(after.front().is_settled);
   EXPECT_LT(differing(after.front().colour, before, 8), 0.25) << "most of it stays";
@@ -165,12 +165,12 @@ TEST(CpuBackend, PathsGoOnAcrossEditsAndBeginAgainWithTheView) {
   const auto picture = PathTracer(loaded.scene).render(request.camera, options, {2});
   ASSERT_TRUE(picture.has_value());
   EXPECT_EQ(after.back().colour.rgb, develop(*picture, develop_options(request)).value().rgb);
-  // What was taken back as well.
+  // The same after undoing the edit.
   const auto again = edited(corner, 1);
   ASSERT_FALSE(again.empty());
   EXPECT_LT(differing(again.front().colour, before, 8), 0.25);
   EXPECT_EQ(again.back().colour.rgb, before.rgb);
-  // Of another view nothing is known.
+  // Another view starts without history.
   request.camera.position.x += 1.0;
   watched.backend.show(request);
   const auto elsewhere = watched.settle();
@@ -223,7 +223,7 @@ TEST(CpuBackend, ShowsNoFrameOfTheModeBefore) {
   ViewRequest request = request_for(loaded.scene, View::Iso);
   watched.backend.show(request);
   for (const DrawMode mode : {DrawMode::Paths, DrawMode::Rays, DrawMode::Paths}) {
-    // A frame of the mode before may be ready, or under way.
+    // A frame of the previous mode may be ready or in progress.
     ASSERT_TRUE(watched.bell.wait());
     request.mode = mode;
     watched.backend.show(request);
@@ -271,7 +271,7 @@ TEST(CpuBackend, PicturesBecomeFiner) {
 
 TEST(CpuBackend, MovingPicturesAreNeverUnderAQuarterOfTheSizeHoweverSlow) {
   const LoadedScene loaded = small_scene();
-  // No picture is that fast.
+  // No image is that fast.
   Watched watched(loaded.scene, 1e-9);
   ViewRequest request = request_for(loaded.scene, View::Iso, 403, 299);
   for (int i = 0; i < 40; ++i) {
@@ -328,7 +328,7 @@ TEST(CpuBackend, DraftsMovingImagesInReducedLightWhenTimeIsShort) {
       first.light.occlusion_mode = OcclusionMode::Vertex;
       first.light.max_lamps = std::min(first.light.max_lamps, 2);
     }
-    // A frame that nobody took in time is replaced by the next.
+    // A frame that is not taken in time is replaced by the next.
     if (frames.front().colour.width == first.width) {
       EXPECT_EQ(frames.front().colour.rgb, expected(loaded.scene, first).rgb);
     }

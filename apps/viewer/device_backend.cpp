@@ -14,12 +14,12 @@ namespace quoin::viewer {
 
 namespace {
 
-constexpr int kSamplesAtRest = 4;  // as meshes have them
+constexpr int kSamplesAtRest = 4;  // the same as meshes
 
 }  // namespace
 
 struct DeviceBackend::Impl {
-  /// What a thread that draws says of itself, since nobody else may look at what it draws with.
+  /// The state that the drawing thread publishes, because only it can access the drawer.
   struct Told {
     std::string name;
     std::string activity;
@@ -28,7 +28,7 @@ struct DeviceBackend::Impl {
     std::size_t picture_bytes = 0;
     bool has_scene = false;
     bool traces_light = false;
-    bool is_processor = false;  // that acts as a device
+    bool is_processor = false;  // a software device
     std::array<bool, kDrawModes> is_slow{};
   };
 
@@ -40,7 +40,7 @@ struct DeviceBackend::Impl {
   }
   ~Impl() {
     stop();
-    // Its workers tell by what is declared below, and so are to end before that.
+    // Its workers notify through members declared below, so they must end first.
     drawer.reset();
   }
   Impl(const Impl&) = delete;
@@ -50,21 +50,21 @@ struct DeviceBackend::Impl {
   [[nodiscard]] bool uses_device() const {
     if (!request || request->mode == DrawMode::Density) return false;
     if (has_meshes(request->mode)) return true;
-    // Smooth occlusion of fields is the processor's.
+    // Only the processor draws smooth occlusion of fields.
     return options.rays_on_device && !is_device_gone && request->light.occlusion_mode != OcclusionMode::Smooth;
   }
   [[nodiscard]] bool can_draw_now() const {
     return uses_device() && !is_paused && !is_device_gone && request->width > 0 && request->height > 0;
   }
-  // Whether marched rays can show what meshes do.
+  // Returns true if ray marching can show the same image as the meshes.
   [[nodiscard]] bool is_marched_alike(DrawMode mode) const {
     return mode == DrawMode::Blocks || (mode == DrawMode::Smooth && (is_all_fields || !is_refused));
   }
-  // As what the processor marches it, at rest.
+  // The mode in which the processor ray-marches the view at rest.
   [[nodiscard]] DrawMode marched_mode() const {
     return request->mode == DrawMode::Smooth && !is_all_fields ? DrawMode::Smooth : DrawMode::Rays;
   }
-  // Whether light by rays is added at rest, which a processor that acts as a device has no time for.
+  // Returns true if ray-traced light is added at rest, because the software device is too slow for it.
   [[nodiscard]] bool is_lit_at_rest() const {
     const LightOptions& light = request->light;
     const bool has_shadows = light.model == LightModel::Rays && (light.shadows || light.max_lamps > 0);
@@ -79,7 +79,7 @@ struct DeviceBackend::Impl {
   void give_up_device();
   [[nodiscard]] Told tell() const;
 
-  // The thread.
+  // The drawing thread.
   void start();
   void stop();
   void note_surfaces();
@@ -94,26 +94,26 @@ struct DeviceBackend::Impl {
   DeviceBackendOptions options;
   std::function<void()> on_frame;
   CpuBackend cpu;
-  std::unique_ptr<DeviceDrawer> drawer;  // the thread's, where there is one
+  std::unique_ptr<DeviceDrawer> drawer;  // used by the thread, if there is one
   std::thread worker;
 
-  mutable std::mutex mutex;  // where there is a thread: guards what follows
+  mutable std::mutex mutex;  // guards the members below, if there is a thread
   std::condition_variable wake;
   std::condition_variable idle;
   std::optional<ViewRequest> request;  // only the window's thread changes it
   std::uint64_t request_number = 0;
-  bool is_request_new = false;  // to the thread
+  bool is_request_new = false;  // not yet seen by the thread
   bool is_edited = false;
   bool has_surfaces = false;
   bool is_paused = false;
-  bool is_reading = false;  // the scene
-  bool is_busy = false;     // the device opens, takes over what is new, or draws
+  bool is_reading = false;  // the thread reads the scene
+  bool is_busy = false;     // the device opens, updates or draws
   bool is_stopped = false;
   bool is_device_gone = false;
-  bool is_drawn = false;  // something of the mode that is wanted
-  bool rests = false;     // the device has drawn all that it draws of it
+  bool is_drawn = false;  // the device has drawn an image in the requested mode
+  bool rests = false;     // the device has drawn its final image
   bool is_all_fields = false;
-  bool is_refused = false;  // by the processor: smooth surfaces of voxels
+  bool is_refused = false;  // the processor refused smooth surfaces of voxels
   std::optional<ViewFrame> frame;
   std::optional<Error> error;
   Told told;
@@ -199,14 +199,14 @@ void DeviceBackend::Impl::step(std::unique_lock<std::mutex>& lock) {
   idle.notify_all();
 }
 
-// The scene is read for moments only: whoever wants to edit it does not wait for the device.
+// Reads the scene only briefly, so that edits do not wait for the device.
 Result<std::optional<ViewFrame>> DeviceBackend::Impl::draw_apart(std::unique_lock<std::mutex>& lock) {
   if (drawer->renderer() == nullptr) told.activity = "opening a device";
   lock.unlock();
   if (Status opened = drawer->open(); !opened) return opened.error();
   lock.lock();
   if (is_paused || is_stopped) {
-    has_surfaces = true;  // perhaps: nobody has looked
+    has_surfaces = true;  // possibly: not checked yet
     return std::optional<ViewFrame>();
   }
   is_reading = true;
@@ -214,7 +214,7 @@ Result<std::optional<ViewFrame>> DeviceBackend::Impl::draw_apart(std::unique_loc
   if (Status read = drawer->read_scene(); !read) return read.error();
   lock.lock();
   told = tell();
-  // Whoever ends does not wait for shaders to be compiled and a picture that nobody sees.
+  // When stopping, skips compiling shaders and drawing an image that would not be shown.
   if (is_stopped) return std::optional<ViewFrame>();
   is_reading = drawer->draws_from_scene();
   idle.notify_all();
@@ -236,7 +236,7 @@ void DeviceBackend::Impl::publish(Result<std::optional<ViewFrame>> drawn, DrawMo
     return;
   }
   told = tell();
-  // What was wanted meanwhile may be something else altogether.
+  // The request may have changed meanwhile.
   if (!*drawn || request->mode != mode) return;
   frame = std::move(**drawn);
   if (request_number != number) frame->is_settled = false;
@@ -264,17 +264,18 @@ DeviceBackend::Impl::Told DeviceBackend::Impl::tell() const {
   return now;
 }
 
-// The same picture by rays, in all its light, with the occlusion that meshes have.
+// The ray-marched version of the image, in full light, with the occlusion of meshes.
 ViewRequest DeviceBackend::Impl::request_of_light() const {
   ViewRequest of_cpu = *request;
   of_cpu.mode = marched_mode();
-  of_cpu.whole_only = true;  // coarser than what the device has drawn it would not be shown
+  of_cpu.whole_only = true;  // the device's image is whole, so coarser ones would not be shown
   of_cpu.samples = std::min(request->samples, kSamplesAtRest);
   if (of_cpu.light.occlusion_mode != OcclusionMode::Off) of_cpu.light.occlusion_mode = OcclusionMode::Smooth;
   return of_cpu;
 }
 
-// It rests while the device draws, but for the time until that has something to show, and the light that it has not.
+// The processor idles while the device draws, except until the device's first image and for light that the device
+// lacks.
 void DeviceBackend::Impl::show_by_processor() {
   ViewRequest of_cpu = *request;
   if (uses_device() && !is_device_gone && rests) {
@@ -288,7 +289,8 @@ void DeviceBackend::Impl::show_by_processor() {
   cpu.show(of_cpu);
 }
 
-// What the processor has drawn of the picture at rest. Where it refuses, the device draws once more what remains.
+// Returns the processor's image of the view at rest. If the processor refuses, the device's image remains and is drawn
+// again.
 std::optional<ViewFrame> DeviceBackend::Impl::take_light() {
   if (request->mode == DrawMode::Smooth && cpu.smooth_refusal()) {
     is_refused = true;
@@ -396,7 +398,7 @@ std::vector<std::pair<std::string, std::string>> DeviceBackend::stats() const {
   return me.has_thread() ? me.told.stats : me.drawer->stats();
 }
 
-// What rays meet is as large on a device as it is here.
+// The ray tracing structures are as large on a device as in memory here.
 std::size_t DeviceBackend::bytes() const {
   const Impl& me = *impl_;
   const std::lock_guard lock(me.mutex);

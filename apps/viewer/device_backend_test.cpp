@@ -16,8 +16,7 @@
 namespace quoin::viewer {
 namespace {
 
-/// Skipped where there is no device; fails on every message of the validation layer. One renderer draws for all that
-/// run in one process.
+/// Skipped without a device; fails on every message of the validation layer. All tests of one process share a renderer.
 class DeviceBackendTest : public ::testing::Test {
  protected:
   static void TearDownTestSuite() { shared_.reset(); }
@@ -60,7 +59,7 @@ class DeviceBackendTest : public ::testing::Test {
     return request;
   }
 
-  /// The frames until the picture has settled, as a window would ask for them; empty when it did not within a minute.
+  /// Returns the frames until the image has settled, requested as a window does; empty if it did not within a minute.
   static std::vector<Image> settle(DeviceBackend& backend) {
     std::vector<Image> pictures;
     const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
@@ -79,7 +78,7 @@ class DeviceBackendTest : public ::testing::Test {
     return {};
   }
 
-  /// Whether it is one that acts as a device.
+  /// Returns true if the device is a software device.
   [[nodiscard]] bool is_processor() const { return renderer_->device().kind == "cpu"; }
 
   std::shared_ptr<VulkanRenderer> renderer_;
@@ -117,7 +116,7 @@ void edit(Document& document, DeviceBackend& backend, IVec3 voxel) {
   document.end_stroke();
 }
 
-/// Whether that becomes true within a minute.
+/// Returns true if the condition becomes true within a minute.
 bool comes(const std::function<bool()>& condition) {
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
   while (!condition()) {
@@ -180,7 +179,7 @@ TEST_F(DeviceBackendTest, EveryModeAndShadingDraws) {
   for (const DrawMode mode : {DrawMode::Rays, DrawMode::Blocks, DrawMode::Smooth}) {
     for (const Shading shading : {Shading::Lit, Shading::Occlusion, Shading::Normals}) {
       for (const Wireframe wireframe : {Wireframe::Off, Wireframe::Over, Wireframe::Only}) {
-        // Rays have no edges, and lines alone no shading.
+        // Rays have no edges, and edges alone have no shading.
         if (mode == DrawMode::Rays && wireframe != Wireframe::Off) continue;
         if (wireframe == Wireframe::Only && shading != Shading::Lit) continue;
         ViewRequest request = request_for(document, mode);
@@ -197,7 +196,7 @@ TEST_F(DeviceBackendTest, EveryModeAndShadingDraws) {
   EXPECT_EQ(all.size(), 17U);
 }
 
-// By the device, and as the processor would; they converge, and go on across edits.
+// The device's path-traced images match the processor's, converge, and continue across edits.
 TEST_F(DeviceBackendTest, PathsConvergeAndFollowEdits) {
   Document document = small_document();
   const auto backend = backend_of(document);
@@ -230,7 +229,7 @@ TEST_F(DeviceBackendTest, PathsConvergeAndFollowEdits) {
     if (frame) first = frame->on_device ? frame->on_device->read().value_or(Image{}) : frame->colour;
     return frame.has_value();
   }));
-  EXPECT_EQ(first.width, request.width) << "as large as the one of before";
+  EXPECT_EQ(first.width, request.width) << "as large as the image before";
   EXPECT_LT(differing(first, before, 8), 0.3) << "most of it stays";
   const Image after = picture_of(4);
   EXPECT_GT(differing(before, after, 4), 0.001);
@@ -239,7 +238,7 @@ TEST_F(DeviceBackendTest, PathsConvergeAndFollowEdits) {
 }
 
 // How fine the first picture may be follows from what others like it took.
-TEST_F(DeviceBackendTest, PathTimesDoNotSizeRayImages) {
+TEST_F(DeviceBackendTest, WhatPathsTakeSaysNothingOfRays) {
   const Document document = small_document();
   DeviceBackendOptions options;
   options.cpu.threads = {2};
@@ -252,7 +251,7 @@ TEST_F(DeviceBackendTest, PathTimesDoNotSizeRayImages) {
     const std::vector<Image> pictures = settle(*backend);
     return pictures.empty() ? 0 : pictures.front().width;
   };
-  EXPECT_EQ(width_of_first(), 20) << "nothing is known yet";
+  EXPECT_EQ(width_of_first(), 20) << "no time is known yet";
   request.camera.position.y += 1.0;
   EXPECT_EQ(width_of_first(), 160);
   ViewRequest of_paths = request;
@@ -286,7 +285,7 @@ TEST_F(DeviceBackendTest, SmoothMeshesTakeTheOcclusionThatIsWanted) {
   const Image weighted = shown({SmoothOcclusion::Weighted, 3.0F, 0.4F, 2.0F});
   EXPECT_GT(differing(plain, weighted, 6), 0.005);
   EXPECT_EQ(shown({}).rgb, plain.rgb);
-  // Several changes in a row, and an edit among them: the last counts.
+  // After several changes in a row, with an edit among them, the last one counts.
   request.light.smooth_occlusion.spread = 1.0F;
   backend->show(request);
   (void)backend->take();
@@ -378,7 +377,7 @@ TEST_F(DeviceBackendTest, WithoutADeviceThereAreRays) {
   EXPECT_EQ(backend.fault()->message, "vulkan: nothing here");
   EXPECT_EQ(backend.activity(), "");
   EXPECT_FALSE(backend.can_draw(DrawMode::Blocks));
-  EXPECT_FALSE(backend.wants_frames()) << "what cannot be drawn keeps nobody busy";
+  EXPECT_FALSE(backend.wants_frames()) << "modes that cannot be drawn request no frames";
   EXPECT_TRUE(backend.can_draw(DrawMode::Rays));
   backend.show(request_for(document, DrawMode::Rays));
   EXPECT_FALSE(settle(backend).empty());
@@ -387,7 +386,7 @@ TEST_F(DeviceBackendTest, WithoutADeviceThereAreRays) {
 TEST_F(DeviceBackendTest, DrawsTheSameOnAThreadAndFollowsEdits) {
   Document document = small_document();
   const auto at_once = backend_of(document, true);
-  // Its thread has a device of its own.
+  // The drawing thread has its own device.
   auto made = VulkanRenderer::create();
   ASSERT_TRUE(made);
   renderer_ = std::make_shared<VulkanRenderer>(std::move(*made));
@@ -406,13 +405,13 @@ TEST_F(DeviceBackendTest, DrawsTheSameOnAThreadAndFollowsEdits) {
       const auto same = settle(*at_once);
       ASSERT_FALSE(pictures.empty());
       ASSERT_FALSE(same.empty());
-      // Light by rays is what the processor adds in the end, where it acts as a device.
+      // On a software device the processor adds ray-traced light in the end.
       const bool is_lit_after = is_processor();
       const auto drawn = is_lit_after ? std::ranges::find(pictures, same.back().rgb, &Image::rgb) : pictures.end() - 1;
       ASSERT_NE(drawn, pictures.end());
       EXPECT_EQ(drawn->rgb, same.back().rgb);
       EXPECT_EQ(drawn + 1 == pictures.end(), !is_lit_after);
-      EXPECT_FALSE(apart->wants_frames()) << "they come by themselves";
+      EXPECT_FALSE(apart->wants_frames()) << "the thread announces its frames";
       EXPECT_EQ(apart->activity(), "");
       EXPECT_EQ(apart->name(), renderer_->device().name);
       EXPECT_FALSE(apart->stats().empty());
@@ -451,12 +450,12 @@ TEST_P(DeviceBackendLight, IsAllThereAtRestWhereAProcessorActsAsTheDevice) {
     EXPECT_EQ(pictures.back().rgb, wanted().rgb);
     const auto whole = std::ranges::find(pictures, request.width, &Image::width);
     ASSERT_NE(whole, pictures.end());
-    EXPECT_GT(differing(*whole, pictures.back(), 8), 0.02) << "the device's is without shadows";
+    EXPECT_GT(differing(*whole, pictures.back(), 8), 0.02) << "the device's image has no shadows";
     EXPECT_TRUE(backend->traces_light(GetParam()));
     EXPECT_EQ(backend->activity(), "");
     EXPECT_FALSE(backend->take());
   }
-  // What has nothing of it stays the device's: values, and edges.
+  // Images without ray-traced light (values, edges) stay the device's.
   request.light.shading = Shading::Normals;
   backend->show(request);
   ASSERT_FALSE(settle(*backend).empty());
@@ -519,7 +518,7 @@ TEST_F(DeviceBackendTest, WhileADeviceOpensThereAreRaysAndEdits) {
       return frame && !frame->is_settled && !frame->on_device;
     })) << "rays stand in";
     EXPECT_EQ(backend.name(), "processor");
-    // Without waiting for the device, or this would never end.
+    // Must not wait for the device, or this would never end.
     edit(document, backend, {20 + 4 * i, 12, 20});
   }
   go_on.set_value();
@@ -559,7 +558,7 @@ TEST_F(DeviceBackendTest, ModesThatTakeTooLongAreToldOf) {
     DeviceBackendOptions options;
     options.cpu.threads = {2};
     options.slow_seconds = seconds;
-    // Coarse pictures alone tell.
+    // Only coarse images count.
     options.frame_seconds = 1e-9;
     const auto backend = backend_of(document, options);
     ViewRequest request = request_for(document, DrawMode::Blocks);
@@ -575,7 +574,7 @@ TEST_F(DeviceBackendTest, ModesThatTakeTooLongAreToldOf) {
   }
 }
 
-// Of 441 chunks and a small one.
+// A scene of 441 chunks and a small one.
 Document wide_document() {
   SceneGrid wide;
   wide.grid.fill_box({{0, 0, 0}, {1'300, 3, 1'300}}, 1);
@@ -686,7 +685,7 @@ TEST_F(DeviceBackendTest, TheFirstPictureIsSoonThereHoweverSlowTheDevice) {
     const auto first = backend->take();
     ASSERT_TRUE(first);
     if (width == 160) {
-      EXPECT_LT(first->on_device->width(), width) << "how long it takes is not known yet";
+      EXPECT_LT(first->on_device->width(), width) << "its time is not known yet";
     }
     if (first->is_settled) continue;
     const auto pictures = settle(*backend);
@@ -704,7 +703,7 @@ TEST_F(DeviceBackendTest, ADeviceThatIsForgottenIsStoodInFor) {
   ASSERT_FALSE(settle(*backend).empty());
   backend->forget_device();
   const auto pictures = settle(*backend);
-  ASSERT_FALSE(pictures.empty()) << "without another request too";
+  ASSERT_FALSE(pictures.empty()) << "also without another request";
   EXPECT_EQ(pictures.back().rgb, by_processor(document, request).rgb);
 }
 

@@ -18,7 +18,7 @@ constexpr std::array kMeshDivisors = {4, 3, 2, 1};
 constexpr int kMeshSamples = 4;
 constexpr double kDetailDistance = 256.0;  // samples of fields
 constexpr std::chrono::milliseconds kRest{150};
-constexpr double kSlowStart = 10.0;  // times as long as a slow picture is a slow first one
+constexpr double kSlowStart = 10.0;  // a first image is slow if it takes this many times `slow_seconds`
 
 std::string text(const char* format, double value) {
   std::array<char, 64> buffer{};
@@ -92,7 +92,7 @@ bool DeviceDrawer::needs_voxels() const {
   return request_->detail_by_pixels || !is_processor() || request_->light.model == LightModel::Propagated;
 }
 
-// Without these a picture of meshes is one of what was put into the device's memory.
+// Meshes without voxels are drawn from device memory alone.
 bool DeviceDrawer::draws_from_scene() const {
   return !has_meshes(request_->mode) || needs_voxels();
 }
@@ -152,8 +152,8 @@ std::unique_ptr<LiveMeshes> DeviceDrawer::live_meshes(SurfaceStyle style,
   return std::make_unique<LiveMeshes>(live);
 }
 
-// Has all chunks meshed with another occlusion, once those that are under way are done: surfaces stay until the new
-// ones come, and none is left of a chunk that an edit emptied.
+// Meshes all chunks again with another occlusion, once meshing under way is done. Surfaces stay until the new ones
+// arrive, and no surface is left of a chunk that an edit emptied.
 void DeviceDrawer::renew_occlusion() {
   if (meshes_->occlusion == request_->light.smooth_occlusion || meshes_->is_scene_new) return;
   meshes_->live->update(*scene_, request_->camera.position);
@@ -163,7 +163,7 @@ void DeviceDrawer::renew_occlusion() {
   is_request_new_ = true;
 }
 
-// Has the renderer know the scene.
+// Uploads the scene to the renderer, or its changes.
 Status DeviceDrawer::update_renderer() {
   if (!std::exchange(is_scene_new_, false)) return {};
   is_request_new_ = true;
@@ -171,7 +171,7 @@ Status DeviceDrawer::update_renderer() {
   return renderer_->update(*scene_, options_.cpu.instances, options_.cpu.threads);
 }
 
-// Takes over what was edited and what workers made of it.
+// Applies edits and finished meshes.
 Status DeviceDrawer::take_surfaces() {
   if (needs_voxels()) {
     if (Status updated = update_renderer(); !updated) return updated;
@@ -181,7 +181,7 @@ Status DeviceDrawer::take_surfaces() {
     is_request_new_ = true;
     if (Status taken = meshes_->renderer.update(*scene_, options_.cpu.instances); !taken) return taken;
   }
-  // The levels of detail of fields follow the camera.
+  // The levels of detail of fields depend on the camera.
   if (is_request_new_ || meshes_->live->pending() > 0) meshes_->live->update(*scene_, request_->camera.position);
   count_pending();
   const std::vector<SurfaceUpdate> surfaces = meshes_->live->take();
@@ -212,7 +212,7 @@ MeshPictureOptions DeviceDrawer::mesh_picture() const {
   wanted.detail.colours = request_->detail_colours;
   if (request_->detail_by_pixels) wanted.detail.policy.emplace().rule = DetailPolicy::Rule::ByPixels;
   if (!waits_) wanted.detail.impostor_seconds = 0.0;
-  // Without a graphics card meshes have no light that takes rays, nor glass: such a picture would take seconds.
+  // Without a graphics card, ray-traced light and glass would take seconds per image.
   if (is_processor()) {
     wanted.light.shadows = false;
     wanted.light.max_lamps = 0;
@@ -221,7 +221,8 @@ MeshPictureOptions DeviceDrawer::mesh_picture() const {
   return wanted;
 }
 
-// Of a moving picture: as it took before, and not more than its pixels say by what coarser ones took. 0: not known.
+// Estimates the time of an image in motion: its measured time, or less if coarser images scaled by pixels took less.
+// 0: not known.
 double DeviceDrawer::foreseen_seconds(int divisor) const {
   double least = 0.0;
   for (const auto& [known, seconds] : mesh_seconds_) {
@@ -244,7 +245,7 @@ int DeviceDrawer::moving_divisor() const {
 
 void DeviceDrawer::note_mesh_seconds(double seconds, bool is_moving) {
   if (!is_moving) return;
-  // The first of a kind compiles shaders: it says nothing.
+  // The first image compiles shaders, so its time does not count.
   if (!std::exchange(has_shaders_, true)) return;
   double& known = mesh_seconds_[divisor_];
   known = seconds_known(known, seconds);
@@ -256,13 +257,13 @@ Result<bool> DeviceDrawer::draw_meshes() {
   const bool is_moving = std::exchange(is_request_new_, false);
   if (is_moving) is_settled_ = false;
   if (is_settled_ || (!is_moving && (meshes_->live->pending() > 0 || rests_until()))) return false;
-  // Marched rays stand in for meshes until there are some: an image of the sky alone would be worse.
+  // Ray marching stands in until there are meshes: an image of the sky alone would be worse.
   const bool has_stand_in = !options_.rays_on_device;
   const bool is_empty = meshes_->renderer.stats().triangles == 0 && meshes_->live->pending() > 0;
   if (has_stand_in && !is_mode_drawn_ && is_empty) return false;
   divisor_ = is_moving ? moving_divisor() : 1;
   samples_ = is_moving && is_processor() ? 1 : std::min(request_->samples, kMeshSamples);
-  // What is shown for a moment does not wait for impostors: what has none is shown halved till then.
+  // Short-lived images do not wait for impostors; instances without one use halved grids.
   waits_ = !is_moving;
   MeshPictureOptions wanted = mesh_picture();
   wanted.detail.selector = &selectors_[divisor_];
@@ -272,12 +273,12 @@ Result<bool> DeviceDrawer::draw_meshes() {
   note_mesh_seconds(seconds_since(start), is_moving);
   const bool is_best =
       divisor_ == 1 && samples_ == std::min(request_->samples, kMeshSamples) && (waits_ || !request_->detail_by_pixels);
-  // Otherwise the next picture is a better one.
+  // Otherwise the next image is better.
   is_settled_ = is_best && meshes_->live->pending() == 0 && meshes_->occlusion == request_->light.smooth_occlusion;
   return true;
 }
 
-// After an edit pictures by paths go on from such as there were before it.
+// After an edit, path-traced images continue at a size that the history has.
 int DeviceDrawer::first_divisor() const {
   const double pixels = static_cast<double>(request_->width) * request_->height;
   int chosen = path_memory_.first_divisor(*request_, kRayDivisors);
@@ -289,7 +290,7 @@ int DeviceDrawer::first_divisor() const {
   return chosen;
 }
 
-// A picture is coarse at first, then ever finer, then of more samples.
+// Images start coarse, become finer, then get more samples.
 DeviceDrawer::Stage DeviceDrawer::next_stage() {
   const bool is_first = std::exchange(is_request_new_, false);
   const bool is_new = is_first || divisor_ > 1;
@@ -298,7 +299,7 @@ DeviceDrawer::Stage DeviceDrawer::next_stage() {
           is_new ? Accumulation::Restart : Accumulation::Continue};
 }
 
-// As many as the time of a frame allows, so that fast devices settle soon.
+// As many samples as the frame time allows, so that fast devices settle soon.
 int DeviceDrawer::samples_now(const Stage& stage, int before, int wanted) const {
   if (stage.accumulation == Accumulation::Restart) return 1;
   const double seconds = stage.pixels() * seconds_per_sample_;
@@ -316,7 +317,7 @@ Status DeviceDrawer::draw_stage() {
   wanted.detail.colours = request_->detail_colours;
   if (request_->detail_by_pixels) wanted.detail.policy.emplace().rule = DetailPolicy::Rule::ByPixels;
   wanted.detail.selector = &selectors_[divisor_];
-  // What is shown for a moment does not wait for impostors.
+  // Short-lived images do not wait for impostors.
   if (divisor_ > 1) wanted.detail.impostor_seconds = 0.0;
   const Clock::time_point start = Clock::now();
   if (Status drawn = renderer_->draw(*picture_, request_->camera, wanted, stage.accumulation); !drawn) return drawn;
@@ -333,8 +334,8 @@ Result<bool> DeviceDrawer::draw_rays() {
   return true;
 }
 
-// Samples of paths are added as the time of a frame allows; they are read, freed of noise and shown whenever there are
-// twice as many as were shown before.
+// Adds path tracing samples as the frame time allows. Reads, denoises and shows the image whenever the number of
+// samples has doubled.
 Result<bool> DeviceDrawer::draw_path_stage() {
   const Stage stage = next_stage();
   const int to_show = stage.accumulation == Accumulation::Restart ? 1 : std::min(2 * shown_samples_, kPathSamples);

@@ -114,7 +114,7 @@ TEST(Document, ASceneFileIsItsOwnOnceItHoldsItsModels) {
       "instances": [{"file": "a", "rotation": {"axis": [1, 2, 3], "degrees": 40}, "scale": 0.3}]})";
   const auto hills = Document::open(folder.file("hills.json"));
   ASSERT_TRUE(hills);
-  EXPECT_FALSE((*hills)->can_save_in_place()) << "it would be another file";
+  EXPECT_FALSE((*hills)->can_save_in_place()) << "models would be written into the scene file";
   EXPECT_FALSE((*hills)->write(folder.file("hills.vox"), warnings)) << "turned";
   const Brush brush{BrushAction::Place, BrushShape::Sphere, 2, 3};
   ASSERT_TRUE((*hills)->begin_stroke(brush, hit_at(**hills, {63, 3, 20}, Direction::PosY)));
@@ -196,7 +196,7 @@ TEST(Document, UndoAllAndRedoAllGiveTheSameBytes) {
   }
   EXPECT_EQ(vox_bytes(document.scene()), states[0]);
   EXPECT_FALSE(document.undo());
-  EXPECT_FALSE(document.is_dirty()) << "back where it was saved";
+  EXPECT_FALSE(document.is_dirty()) << "back in the saved state";
   for (std::size_t i = 1; i < states.size(); ++i) {
     ASSERT_TRUE(document.redo());
     ASSERT_EQ(vox_bytes(document.scene()), states[i]) << i;
@@ -244,7 +244,7 @@ TEST(Document, FieldsAreSculptedPaintedAndUndone) {
   stroke(BrushAction::Paint, hit.position + DVec3(0.0, 0.0, 9.0));
   EXPECT_EQ(field().material({60, 18, 77}), 2);
   stroke(BrushAction::Smooth, hit.position);
-  // What was dug is filled with the ground's material, not the brush's.
+  // Flattening fills the hole with the ground's material, not the brush's.
   for (int i = 0; i < 12; ++i) stroke(BrushAction::Flatten, hit.position + DVec3(3.0, 0.0, 0.0));
   EXPECT_LT(field().density_at({60.0, 19.0, 60.0}), 0.0F);
   const DVec3 filled{60.0, 18.0, 54.0};
@@ -391,7 +391,7 @@ TEST(Document, ASavedStrokeKeepsEverythingElseAndTheFileBefore) {
   const ScratchFolder folder("keeping");
   const auto path = write_layered(folder);
   const auto before = read_file(path).value();
-  // What is hidden is looked at, and stays hidden.
+  // Opening with hidden parts shown keeps them hidden in the file.
   const auto document = Document::open(path, {.show_hidden = true});
   ASSERT_TRUE(document);
   const InstanceHandle walker = (*document)->scene().instances().handles().front();
@@ -412,7 +412,7 @@ TEST(Document, ASavedStrokeKeepsEverythingElseAndTheFileBefore) {
   for (std::size_t i = 0; i < before.size(); ++i) different += before[i] != after[i] ? 1 : 0;
   EXPECT_EQ(different, 1);
   EXPECT_EQ(read_file(folder.file("layered.vox~")).value(), before);
-  EXPECT_TRUE((*document)->losses(path).value().empty()) << "it was written by this one";
+  EXPECT_TRUE((*document)->losses(path).value().empty()) << "written by this document";
 }
 
 TEST(Document, ReportsLossesOfSavingOnce) {
@@ -434,7 +434,7 @@ TEST(Document, ReportsLossesOfSavingOnce) {
   (*document)->accept_losses(*losses);
   EXPECT_TRUE((*document)->losses(folder.file("as.json")).value().empty());
   EXPECT_TRUE((*document)->losses(folder.file("mesh.glb")).value().empty()) << "a copy";
-  // Another program's work.
+  // Another program changes the file.
   ASSERT_TRUE(write_file(std::as_bytes(std::span(std::string_view("VOX another"))), path));
   const auto of_others = (*document)->losses(path);
   ASSERT_TRUE(of_others);
@@ -482,7 +482,7 @@ TEST(Document, UndoesAndSavesVisibility) {
   ASSERT_TRUE(document);
   const GroupHandle group = (*document)->scene().groups().handles().front();
   const LayerHandle layer = (*document)->scene().layers().handles()[1];
-  EXPECT_FALSE((*document)->show(layer, false)) << "it is hidden";
+  EXPECT_FALSE((*document)->show(layer, false)) << "already hidden";
   EXPECT_TRUE((*document)->show(layer, true));
   EXPECT_TRUE((*document)->show(group, false));
   EXPECT_TRUE((*document)->is_dirty());
@@ -497,7 +497,7 @@ TEST(Document, UndoesAndSavesVisibility) {
   const Scene& saved = (*again)->scene();
   EXPECT_FALSE(saved.groups()[saved.groups().handles().front()].visible);
   EXPECT_TRUE(saved.layers()[saved.layers().handles()[1]].visible);
-  EXPECT_FALSE((*document)->show(GroupHandle{9, 9}, true)) << "there is none";
+  EXPECT_FALSE((*document)->show(GroupHandle{9, 9}, true)) << "no such group";
 }
 
 TEST(Document, ReportsErrors) {

@@ -95,7 +95,7 @@ void EditHistory::touch_chunks(std::vector<Changed<Content>>& known, GridHandle 
   }
 }
 
-// What was touched and not changed goes.
+// Drops chunks that were touched but not changed.
 template <class Content>
 void EditHistory::finish(const Scene& scene, std::vector<Changed<Content>>& changed, std::size_t& bytes) {
   std::erase_if(changed, [&](Changed<Content>& chunk) {

@@ -12,7 +12,7 @@ namespace quoin::viewer {
 namespace {
 
 constexpr double kFarthest = 1e5;  // samples along the ray
-constexpr double kStrength = 0.5;  // of a touch that smooths or flattens
+constexpr double kStrength = 0.5;  // of a smooth or flatten touch
 // The outermost chunks stay air.
 constexpr double kGreatest = std::numeric_limits<int>::max() - 4.0 * kChunkEdge;
 

@@ -62,7 +62,7 @@ constexpr std::array kModes = {"rays", "blocks", "smooth", "density", "paths"};
 static_assert(kModes.size() == kDrawModes);
 constexpr std::array kAxes = {"x", "y", "z"};
 
-// One of an enumeration's names, in their order.
+// Reads an enumerator by its name; `names` is in the order of the enumeration.
 template <class Names, class Value>
 void read_name(const Json& object, const char* key, const Names& names, Value& value) {
   const Json* found = find(object, key);
@@ -87,10 +87,10 @@ void read_smooth_occlusion(const Json& object, SmoothOcclusionOptions& options) 
 void read_light(const Json& object, LightOptions& light) {
   read_sun(object, light.sun);
   bool is_lit = true;
-  read_flag(object, "lit", is_lit);  // what earlier versions wrote
+  read_flag(object, "lit", is_lit);  // written by earlier versions
   if (!is_lit) light.shading = Shading::Unlit;
   read_name(object, "shading", kShadings, light.shading);
-  // Shadings for debugging are not kept: the next start would look broken.
+  // Debug shadings are not restored, because the next start would look broken.
   if (light.shading == Shading::Occlusion || light.shading == Shading::Normals) light.shading = Shading::Lit;
   read_name(object, "model", kLightModels, light.model);
   read_number(object, "least_light", 0.0, 100.0, light.least_light);
@@ -103,7 +103,7 @@ void read_light(const Json& object, LightOptions& light) {
   read_whole(object, "lamps", 0, 1024, light.max_lamps);
   read_number(object, "lamp_brightness", 0.0, 1000.0, light.lamp_brightness);
   bool has_occlusion = true;
-  read_flag(object, "occlusion", has_occlusion);  // what earlier versions wrote
+  read_flag(object, "occlusion", has_occlusion);  // written by earlier versions
   if (!has_occlusion) light.occlusion_mode = OcclusionMode::Off;
   read_name(object, "occlusion", kOcclusionModes, light.occlusion_mode);
   if (const Json* smooth = find(object, "smooth_occlusion"); smooth != nullptr && smooth->is_object()) {
@@ -141,7 +141,7 @@ void Settings::note_recent(const std::filesystem::path& file) {
 }
 
 std::filesystem::path settings_path() {
-  // The specification says that a relative path there counts for nothing.
+  // The XDG specification ignores relative paths.
   const std::filesystem::path config = environment("XDG_CONFIG_HOME");
   if (config.is_absolute()) return config / "quoin" / "viewer.json";
   const std::filesystem::path home = environment("HOME");
@@ -219,7 +219,7 @@ Settings read_settings(const std::filesystem::path& path) {
 Status write_settings(const Settings& settings, const std::filesystem::path& path) {
   std::error_code error;
   std::filesystem::create_directories(path.parent_path(), error);
-  if (error) return make_error(ErrorCode::CannotWrite, "cannot make the folder: " + error.message(), path.string());
+  if (error) return make_error(ErrorCode::CannotWrite, "cannot create the folder: " + error.message(), path.string());
   const std::string text = to_json(settings);
   return write_file(std::as_bytes(std::span(text)), path);
 }

@@ -101,7 +101,7 @@ TEST(Settings, NonsenseIsLeftOut) {
                            "{\"ui_scale\": 0}"}) {
     EXPECT_EQ(to_json(parse_settings(text)), defaults) << text;
   }
-  EXPECT_EQ(parse_settings("{\"height\": false, \"width\": 800}").width, 800) << "the rest counts";
+  EXPECT_EQ(parse_settings("{\"height\": false, \"width\": 800}").width, 800) << "other values are kept";
 }
 
 TEST(Settings, RecentFilesAreFewAndNewestFirst) {

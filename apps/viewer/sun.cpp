@@ -12,7 +12,7 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kDegreesPerPixel = 0.4;
 constexpr double kLowest = 2.0;  // a sun at the horizon lights nothing from above
 constexpr double kNight = -20.0;
-constexpr double kHighest = 89.0;  // where the azimuth still means something
+constexpr double kHighest = 89.0;  // the azimuth is still defined
 
 }  // namespace
 

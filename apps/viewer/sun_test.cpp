@@ -36,7 +36,7 @@ TEST(Sun, DraggingKeepsItInTheSky) {
 TEST(Sun, ItGoesDownWhereTheSkyFollowsIt) {
   LightOptions light = natural_light();
   for (int i = 0; i < 10; ++i) light.sun = drag_sun(light, 0.0, 100.0);
-  EXPECT_LT(sun_angles(light.sun).elevation, -18.0) << "to where it is night";
+  EXPECT_LT(sun_angles(light.sun).elevation, -18.0) << "down to night";
   EXPECT_NEAR(sun_angles(light.sun).elevation, lowest_sun(light), 1e-9);
   EXPECT_NEAR(sun_angles(light.sun).azimuth, sun_angles(natural_light().sun).azimuth, 1e-9);
 }

@@ -11,14 +11,14 @@ namespace quoin::viewer {
 
 void yield_to_window() {
 #ifdef __linux__
-  constexpr int kNice = 5;  // a third of the processor time of a thread at 0, where both want all of it
+  constexpr int kNice = 5;  // a third of the processor time of a thread at 0, if both are busy
   const auto thread = static_cast<id_t>(::gettid());
   if (::getpriority(PRIO_PROCESS, thread) < kNice) ::setpriority(PRIO_PROCESS, thread, kNice);
 #endif
 }
 
 double seconds_known(double known, double measured) {
-  constexpr double kNews = 0.3;  // the share of what is new
+  constexpr double kNews = 0.3;  // weight of the new measurement
   return known > 0.0 ? known + kNews * (measured - known) : measured;
 }
 
@@ -32,7 +32,8 @@ bool is_same(const ViewRequest& a, const ViewRequest& b) {
 PathOptions path_options(const ViewRequest& request, int width, int height, int samples, const DBox& bounds) {
   PathOptions options;
   static_cast<Look&>(options) = request.look ? request.look->look : natural_look().look;
-  if (options.sky == SkyModel::Environment) options.sky = SkyModel::Uniform;  // its picture is not loaded here
+  if (options.sky == SkyModel::Environment)
+    options.sky = SkyModel::Uniform;  // the viewer does not load environment images
   options.lens_radius = 0.0;
   options.width = width;
   options.height = height;

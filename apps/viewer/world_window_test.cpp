@@ -43,7 +43,7 @@ class WorldWindowTest : public ::testing::Test {
     }
     return std::move(*document);
   }
-  // As the window does it from frame to frame.
+  // Does the same as the window does per frame.
   static void settle(WorldWindow& world, const Camera& camera) {
     const auto start = std::chrono::steady_clock::now();
     do {
@@ -156,7 +156,7 @@ TEST_F(WorldWindowTest, UndoesDistantEditsOnlyThere) {
   EXPECT_FALSE(document->undo());
   EXPECT_TRUE(document->history().can_undo());
   settle(*document->world(), here);
-  EXPECT_EQ(type_there(), kAir) << "the edit came back from the disk";
+  EXPECT_EQ(type_there(), kAir) << "the edit was read back from disk";
   EXPECT_TRUE(document->undo());
   EXPECT_EQ(type_there(), before);
   settle(*document->world(), there);
@@ -196,7 +196,7 @@ TEST_F(WorldWindowTest, IsCopiedAsAWorldAndAsNothingElse) {
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::Unsupported);
   EXPECT_FALSE(std::filesystem::exists(other("copy.vox")));
-  EXPECT_TRUE(document->write(path(), warnings)) << "itself";
+  EXPECT_TRUE(document->write(path(), warnings)) << "the world itself";
   EXPECT_TRUE(warnings.empty());
 }
 
@@ -215,13 +215,13 @@ TEST_F(WorldWindowTest, ACopyTakesThePlaceOfAWorldThatIsKept) {
   const auto kept = load_scene(other("copy.quoin~"));
   ASSERT_TRUE(kept) << to_string(kept.error());
   EXPECT_EQ(kept->scene.voxel_count(), small_scene().scene.voxel_count());
-  // One that somebody has open, or that was left with saves beside it, stays.
+  // A world that is open elsewhere, or that has a write-ahead log, is not replaced.
   const auto game = WorldStore::open(other("copy.quoin"), WorldAccess::Write);
   ASSERT_TRUE(game);
   EXPECT_EQ(document->write(other("copy.quoin"), warnings).error().code, ErrorCode::CannotWrite);
 }
 
-// Pictures of a flight are those of a world that is in memory as a whole, as far as all is loaded.
+// Images of a flight match those of a fully loaded world, as far as chunks are loaded.
 TEST_F(WorldWindowTest, AFlightShowsWhatTheWholeWorldShows) {
   make_endless();
   WorldOptions options = near_by();

@@ -17,7 +17,7 @@ using quoin::IVec3;
 using quoin::kAir;
 
 constexpr DVec3 kUp{0.0, 1.0, 0.0};
-constexpr std::uint32_t kLand = 1;  // of instances
+constexpr std::uint32_t kLand = 1;  // instance category
 const quoin::QueryFilter kOnLand{.categories = kLand};
 constexpr quoin::Rgba8 kTorchColours[]{{255, 170, 60, 255}, {70, 130, 255, 255}, {90, 255, 110, 255}};
 
@@ -45,7 +45,7 @@ quoin::Result<std::unique_ptr<Game>> Game::create(const GameOptions& options) {
   return game;
 }
 
-// Ships are no part of the land: they start anew.
+// Ships are not saved with the land: they start again.
 quoin::Status Game::open_world() {
   if (options_.world.empty()) return {};
   auto world = quoin::WorldStore::open_or_create(options_.world);
@@ -62,7 +62,7 @@ quoin::Status Game::open_world() {
   return {};
 }
 
-// What changed since the last time; the world's own thread writes it.
+// Saves the changes since the last call; the world's own thread writes them.
 void Game::save() {
   if (!world_) return;
   quoin::WorldChanges more;
@@ -153,17 +153,17 @@ FrameTimes Game::step(const Input& input) {
   walk(input);
   done("player");
   if (options_.meshes) meshes_.update(scene_, eye());
-  (void)meshes_.take();  // a renderer would upload them
+  (void)meshes_.take();  // a renderer would upload these
   done("meshes");
   light_.update(scene_);
   light_.take();
   done("light");
-  if (++frame_ % 300 == 0) save();  // every five seconds
+  if (++frame_ % 300 == 0) save();  // every 5 s
   done("saving");
   return times;
 }
 
-// Half of them dig, half build; and a few voxels of sand over each of some chunks.
+// Applies random edits, half digging and half building, and drops a few voxels of sand over some chunks.
 void Game::edit_elsewhere() {
   for (int i = 0; i < options_.edits; ++i) {
     const int x = int(random(0.0, size_.x)), z = int(random(0.0, size_.z));
@@ -182,7 +182,7 @@ void Game::edit_elsewhere() {
 
 void Game::drop_sand() {
   quoin::Grid& grid = land();
-  // What others than the sand changed since the last frame: the sand above and in it is loose.
+  // Sand in and above changes since the last frame, except the sand's own, is loose.
   visit_changes(known_, grid, grid.changes_since(changes_), [&](const quoin::RowChange& row) {
     row.for_each([&](IVec3 voxel, quoin::VoxelType, quoin::VoxelType now) {
       if (now == kAir) loose_.push_back(voxel + IVec3{0, 1, 0});
@@ -200,7 +200,7 @@ void Game::drop_sand() {
     ++sand_fallen_;
   }
   grid.set(moves);
-  (void)grid.changes_since(changes_);  // its own are known
+  (void)grid.changes_since(changes_);  // skips the sand's own changes
   known_ = grid.snapshot();
 }
 
@@ -216,7 +216,7 @@ void Game::act(const Input& input) {
   if (input.slides) land().fill_sphere(eye() + std::max(hit->t, 14.0) * gaze_ + 14.0 * kUp, 5.0, sand_);
 }
 
-// Off whatever they meet, but for themselves, and off the ends of the world.
+// Ships bounce off obstacles, except themselves, and off the ends of the world.
 void Game::fly() {
   for (Ship& ship : ships_) {
     DVec3 way = ship.velocity * kFrame;
@@ -239,7 +239,7 @@ void Game::fly() {
 }
 
 void Game::walk(const Input& input) {
-  // What it stood on may have moved meanwhile.
+  // The floor under the player may have moved meanwhile.
   const quoin::Instance* floor = moved_.is_on_floor ? scene_.instances().find(moved_.floor.instance) : nullptr;
   if (floor != nullptr) player_.centre = carried_point(floor_, *floor, player_.centre);
   falling_ -= kUp * (9.81 * 2.0 * kFrame);

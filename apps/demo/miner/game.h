@@ -15,36 +15,36 @@ namespace miner {
 inline constexpr double kFrame = 1.0 / 60.0;
 
 struct GameOptions {
-  int units = 32;          ///< of 32 voxels along x and z; the world is 8 high
-  int ships = 200;         ///< that fly about and bounce off what they meet
-  int edits = 20;          ///< a frame, scattered over the land: what other players do
-  int slide_chunks = 0;    ///< chunks that a landslide touches in a frame; 0: none
-  bool meshes = true;      ///< whether they are made, for a renderer that would draw them
-  std::uint64_t seed = 7;  ///< of the land, the ships and the edits
-  std::string world;       ///< the file that keeps the land, a .quoin; empty: none
+  int units = 32;          ///< world size along x and z, in units of 32 voxels; the world is 8 units high
+  int ships = 200;         ///< ships that fly about and bounce off obstacles
+  int edits = 20;          ///< edits per frame, scattered over the land like those of other players
+  int slide_chunks = 0;    ///< chunks that a landslide touches per frame; 0: none
+  bool meshes = true;      ///< makes meshes for a renderer
+  std::uint64_t seed = 7;  ///< for the land, the ships and the edits
+  std::string world;       ///< the .quoin file that stores the land; empty: none
 };
 
-/// What the player wants in a frame.
+/// The player's input of a frame.
 struct Input {
   double ahead = 0.0, aside = 0.0;  ///< -1 to 1
-  double yaw = 0.0, pitch = 0.0;    ///< of the eye, in radians: 0 looks along -z; above the horizon
+  double yaw = 0.0, pitch = 0.0;    ///< view direction in radians: yaw 0 looks along -z; pitch is above the horizon
   bool jumps = false;
-  bool digs = false, places = false, slides = false;  ///< out of what is looked at, a stone onto it, sand over it
-  int torch = -1;                                     ///< one of that colour, 0 to 2, onto it; -1: none
+  bool digs = false, places = false, slides = false;  ///< at the targeted voxel: dig, place a stone, drop sand
+  int torch = -1;                                     ///< colour, 0 to 2, of a torch to place there; -1: none
 };
 
-/// What a frame took of the caller's thread, and each part of it, in milliseconds.
+/// The time that a frame and its parts took on the caller's thread, in milliseconds.
 using FrameTimes = std::map<std::string, double>;
 
-/// A landscape of blocks with caves, a player who walks and digs in it, sand that falls, ships, and others' edits.
+/// A block landscape with caves, a player who walks and digs, falling sand, ships, and edits by other players.
 class Game {
  public:
-  /// Goes on with the world that there is. Errors: as generate_terrain, and of that world.
+  /// Continues an existing world. Errors: those of generate_terrain and of the world file.
   [[nodiscard]] static quoin::Result<std::unique_ptr<Game>> create(const GameOptions& options);
 
-  /// A sixtieth of a second.
+  /// Advances the game by 1/60 s.
   FrameTimes step(const Input& input);
-  /// Returns once all of the world is on disk; what could not be saved is an error.
+  /// Returns once all of the world is on disk. Errors: those of saving.
   [[nodiscard]] quoin::Status finish();
 
   [[nodiscard]] const quoin::Scene& scene() const { return scene_; }
@@ -55,7 +55,7 @@ class Game {
   [[nodiscard]] quoin::Camera camera() const { return quoin::look_along(eye(), gaze_, 1.2).value(); }
   [[nodiscard]] const quoin::SlideResult& player() const { return moved_; }
   [[nodiscard]] std::int64_t sand_fallen() const { return sand_fallen_; }
-  /// Where the player is and how light it is there, sky and lamps.
+  /// Returns the player's position and the light levels there, of sky and lamps.
   [[nodiscard]] std::string status() const;
   [[nodiscard]] std::size_t voxel_bytes() const { return known_.bytes(); }
 
@@ -102,12 +102,12 @@ class Game {
   quoin::Instance floor_;  // as it was in the last frame
   quoin::ChangeCursor changes_;
   quoin::Grid known_;                // the land when `changes_` was read
-  std::vector<quoin::IVec3> loose_;  // voxels whose support has to be looked at
+  std::vector<quoin::IVec3> loose_;  // voxels whose support must be checked
   std::int64_t sand_fallen_ = 0;
 };
 
-/// Plays in a window until it is closed, drawn by the Vulkan device of that name or number (empty: a graphics card) or,
-/// where there is none or it is `cpu`, by the processor. Errors: Unsupported without a display or such a device.
+/// Plays in a window until it is closed. `device` is the name or number of a Vulkan device; empty: a graphics card.
+/// The processor draws if there is none or `device` is `cpu`. Errors: Unsupported without a display or such a device.
 [[nodiscard]] quoin::Status play_in_window(Game& game, const std::string& device);
 
 }  // namespace miner

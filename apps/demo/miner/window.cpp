@@ -14,7 +14,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using Draw = std::function<quoin::Result<quoin::Picture>(const quoin::Camera&, const quoin::RenderOptions&)>;
 
-// By a graphics card or by the processor.
+// Renders with a graphics card or the processor.
 quoin::Result<Draw> drawn_by(Game& game, const std::string& name) {
   const auto devices = quoin::vulkan_devices();
   const auto best = devices ? quoin::choose_vulkan_device(*devices, name) : devices.error();
@@ -47,7 +47,7 @@ void show(SDL_Window* window, quoin::Image& image) {
   SDL_UpdateWindowSurface(window);
 }
 
-// What was pressed since the last frame; false: to end.
+// Reads the input since the last frame. Returns false to quit.
 bool take_events(Input& input) {
   for (SDL_Event event; SDL_PollEvent(&event) != 0;) {
     const SDL_Keycode key = event.type == SDL_KEYDOWN ? event.key.keysym.sym : 0;
@@ -86,11 +86,11 @@ quoin::Status play_in_window(Game& game, const std::string& device) {
   options.light.occlusion_mode = quoin::OcclusionMode::Vertex;
   options.light.least_light = 0.002;
   Input input;
-  int coarse = 2;  // pixels of the window for one of the picture
+  int coarse = 2;  // window pixels per image pixel
   const auto step = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(kFrame));
   auto last = Clock::now();
   while (take_events(input)) {
-    // As many steps as time has gone by, but for what would never be caught up.
+    // Steps for the elapsed time, at most six, because more would never be caught up.
     last = std::max(last, Clock::now() - 6 * step);
     for (int i = 0; i < 6 && Clock::now() - last > step; ++i, last += step) {
       game.step(input);

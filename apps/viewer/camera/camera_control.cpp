@@ -10,10 +10,10 @@ namespace quoin::viewer {
 
 namespace {
 
-constexpr double kTurnPerPicture = 2.2;  // radians for a drag over the picture's height
-constexpr double kZoomPerNotch = 0.16;   // of the distance's logarithm
-constexpr double kZoomRate = 14.0;       // a second: how fast a zoom is used up
-constexpr double kFlightRate = 9.0;      // a second: how fast the velocity becomes what the keys say
+constexpr double kTurnPerPicture = 2.2;  // radians for a drag over the image height
+constexpr double kZoomPerNotch = 0.16;   // change of the distance's logarithm
+constexpr double kZoomRate = 14.0;       // decay of a zoom, per second
+constexpr double kFlightRate = 9.0;      // approach of the velocity to the keys' velocity, per second
 constexpr double kSpeedPerNotch = 0.2;
 constexpr double kStraightUp = std::numbers::pi / 2.0;
 constexpr double kLongestStep = 1.0;
@@ -133,7 +133,7 @@ void CameraControl::zoom_by(double log_factor) {
   const DVec3 offset = camera_.position - zoom_target_;
   const double distance = glm::length(offset);
   if (!(distance > 0.0) || !std::isfinite(distance)) return;
-  // A camera that is already beyond a bound may come back, but not go further.
+  // A camera already beyond a bound can come back, but not go further.
   factor = std::clamp(factor, std::min(1.0, nearest / distance), std::max(1.0, farthest / distance));
   camera_.position = zoom_target_ + offset * factor;
   pivot_ = zoom_target_ + (pivot_ - zoom_target_) * factor;
@@ -152,7 +152,7 @@ void CameraControl::advance(double seconds, const CameraPush& push, double boost
   const double length = glm::length(wanted);
   if (length > 1.0) wanted /= length;
   wanted *= speed_ * boost;
-  // The exact solution of velocity' = rate (wanted - velocity), so that the frame rate does not matter.
+  // The exact solution of velocity' = rate (wanted - velocity), independent of the frame rate.
   const double kept = std::exp(-kFlightRate * seconds);
   const DVec3 move = wanted * seconds + (velocity_ - wanted) * ((1.0 - kept) / kFlightRate);
   velocity_ = wanted + (velocity_ - wanted) * kept;

@@ -68,7 +68,7 @@ TEST(CameraControl, TheFrameRateMakesNoDifference) {
   }
   const double moved = glm::length(coarse.camera().position - framed().camera().position);
   EXPECT_GT(moved, 10.0);
-  // The zoom is about a point that moves along, and what is left of glides is cut off: not exact to the bit.
+  // Not exact to the bit: the zoom target moves along, and the ends of glides are cut off.
   EXPECT_LT(glm::length(coarse.camera().position - fine.camera().position), 0.02 * moved);
 }
 

@@ -9,10 +9,10 @@ namespace quoin::viewer {
 
 namespace {
 
-// In heights of the body, a person's of 1.8 m.
+// In body heights, for a person of 1.8 m.
 constexpr double kWidth = 0.33;
 constexpr double kGravity = 9.81 / 1.8;
-constexpr double kWalk = 2.4;  // a second
+constexpr double kWalk = 2.4;  // per second
 constexpr double kJump = 0.75;
 constexpr double kStep = 0.6;
 
@@ -47,7 +47,7 @@ OrientedBox Walker::box() const {
   return box;
 }
 
-// False where the scene is not to be asked.
+// Returns false if the scene cannot be queried now.
 bool Walker::step(DVec3 wanted, bool jumps, const Slide& slide) {
   if (jumps && is_on_floor_) fall_ = std::sqrt(2.0 * kGravity * kJump) * height_;
   const double upwards = fall_ - kGravity * height_ * kSeconds;
@@ -69,7 +69,7 @@ bool Walker::step(DVec3 wanted, bool jumps, const Slide& slide) {
 void Walker::advance(double seconds, const CameraPush& push, double boost, CameraControl& camera, const Slide& slide) {
   if (!(seconds > 0.0) || !std::isfinite(boost)) return;
   const Camera& eyes_now = camera.camera();
-  // Level: `right` always is, and what is ahead of it is square to it.
+  // Horizontal: `right` is always horizontal, and the direction ahead is perpendicular to it.
   const DVec3 ahead = glm::cross(DVec3{0.0, 1.0, 0.0}, eyes_now.right);
   DVec3 wanted = eyes_now.right * push.right + ahead * push.forward;
   const double length = glm::length(wanted);

@@ -7,7 +7,7 @@
 namespace quoin::viewer {
 namespace {
 
-/// Level ground to y = 0, steps of one voxel from x = 10 on, a wall at x = 20; a hill of densities about z = -20.
+/// Level ground up to y = 0, steps of one voxel from x = 10 on, a wall at x = 20, and a hill of densities at z = -20.
 Scene steps_and_hill() {
   Scene scene;
   EXPECT_TRUE(scene.types.add({}).has_value());

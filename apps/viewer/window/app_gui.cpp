@@ -15,7 +15,7 @@ constexpr ImGuiWindowFlags kBox = ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags
                                   ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_AlwaysAutoResize |
                                   ImGuiWindowFlags_NoScrollbar;
 
-/// Begins a box in the middle of the window.
+/// Begins a box in the middle of the window. Paired with end_box.
 void begin_box(const char* name) {
   const ImVec2 room = ImGui::GetIO().DisplaySize;
   ImGui::SetNextWindowPos({room.x * 0.5F, room.y * 0.5F}, ImGuiCond_Always, {0.5F, 0.5F});

@@ -4,9 +4,9 @@
 
 namespace quoin::viewer {
 
-// The chunks of a world on disk follow the camera. Where pictures come from another thread, chunks are moved only once
-// one of them has been seen since the last time: else none would ever be finished. Nothing moves within a stroke, which
-// is one step to undo.
+// Moves the chunks of a world on disk with the camera. If another thread renders, chunks move only after an image has
+// arrived since the last move; otherwise no image would ever be finished. Nothing moves during a stroke, because it is
+// one undo step.
 void App::stream_world() {
   WorldWindow* const world = state_.open.document->world();
   if (world == nullptr || state_.saver || !state_.open.backend) return;
@@ -26,7 +26,7 @@ void App::stream_world() {
   state_.stats.is_settled = false;
 }
 
-// As any other scene is, now that its voxels are known, unless the user has moved on.
+// Frames a small world like any other scene once it is loaded, unless the user has moved the camera.
 void App::frame_world() {
   if (state_.camera.camera() == *unframed_) show_from(View::Iso);
   unframed_.reset();
@@ -54,7 +54,7 @@ Status App::save_world() {
   return saved;
 }
 
-// Whether chunks are on their way, or an edit is to be saved, so that time must go on.
+// Returns true while chunks are loading or an edit waits to be saved, so that frames must continue.
 bool App::is_streaming() const {
   constexpr std::chrono::seconds kUntilSaved{3};
   const WorldWindow* const world = state_.open.document->world();
@@ -62,7 +62,7 @@ bool App::is_streaming() const {
   return !world->is_complete() || Clock::now() - state_.edited_at < kUntilSaved;
 }
 
-// Whoever walks waits for the ground below.
+// Returns false if the walker must wait for the ground below.
 bool App::has_ground() const {
   const WorldWindow* const world = state_.open.document->world();
   return world == nullptr || world->is_loaded_at(state_.walker.feet());

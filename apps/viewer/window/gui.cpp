@@ -14,7 +14,7 @@ namespace {
 
 constexpr float kFontSize = 15.0F;
 
-// Debian, Fedora and Arch keep fonts in different places; without any of these ImGui has a small one of its own.
+// Debian, Fedora and Arch keep fonts in different folders. Without any of these, ImGui uses its small built-in font.
 constexpr std::array kFonts = {
     "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf", "/usr/share/fonts/dejavu-sans-fonts/DejaVuSans.ttf",
     "/usr/share/fonts/TTF/DejaVuSans.ttf", "/usr/share/fonts/truetype/noto/NotoSans-Regular.ttf",
@@ -62,13 +62,13 @@ void set_style(float scale) {
 }  // namespace
 
 double scale_of_display(const Screen& screen) {
-  // Where the output has more pixels than the window has units, the display's scale is in that ratio already.
+  // If the output has more pixels than the window has units, that ratio already includes the display's scale.
   float dots_per_inch = 96.0F;
   const int display = SDL_GetWindowDisplayIndex(screen.window());
   if (screen.pixels_per_unit() > 1.01 || display < 0) return 1.0;
   if (SDL_GetDisplayDPI(display, nullptr, &dots_per_inch, nullptr) != 0) return 1.0;
   const double scale = std::round(dots_per_inch / 96.0 * 4.0) / 4.0;
-  // Displays lie about their size; what looks right nearly everywhere is left alone.
+  // Displays often report a wrong size, so moderate values keep the default scale.
   return scale < 1.5 ? 1.0 : std::min(scale, 3.0);
 }
 
@@ -92,7 +92,7 @@ Gui::~Gui() {
 
 Status Gui::load_font() {
   ImGuiIO& io = ImGui::GetIO();
-  // Drawn in pixels, so that letters are sharp, and placed in the window's units.
+  // The font is rasterised in pixels, to be sharp, and placed in window units.
   const auto pixels_per_unit = static_cast<float>(screen_->pixels_per_unit());
   const float size = std::round(kFontSize * static_cast<float>(scale_) * pixels_per_unit);
   static const std::array<ImWchar, 7> ranges = {0x20, 0x17F, 0x370, 0x52F, 0x2010, 0x2193, 0};
@@ -134,15 +134,15 @@ void Gui::note_button(const SDL_MouseButtonEvent& button) {
 
 void Gui::begin_frame() {
   ImGui_ImplSDL2_NewFrame();
-  // The backend asks OpenGL for the output's size, which the renderer need not be.
+  // The backend gets the output size from OpenGL, which may not be the renderer.
   const auto ratio = static_cast<float>(screen_->pixels_per_unit());
   ImGui::GetIO().DisplayFramebufferScale = {ratio, ratio};
-  // It also asks the display for the mouse, whose state may be newer than the events of this frame.
+  // It also reads the mouse from the display, whose state may be newer than the events of this frame.
   ImGuiIO& io = ImGui::GetIO();
   io.MousePos = mouse_;
   for (std::size_t i = 0; i < is_down_.size(); ++i) io.MouseDown[i] = is_down_.at(i);
   ImGui::NewFrame();
-  // ImGui counts clicks by the times of frames, which are late while a frame takes long. The events know better.
+  // ImGui counts clicks by frame times, which are late during long frames. The events have the exact times.
   for (std::size_t i = 0; i < clicks_.size(); ++i) {
     const int clicks = std::exchange(clicks_.at(i), 0);
     if (clicks == 0 || !io.MouseClicked[i]) continue;

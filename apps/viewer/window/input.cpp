@@ -16,7 +16,7 @@ struct PushKey {
   CameraPush push;
 };
 
-// By their place on the keyboard, whatever the letters are.
+// By scancode, independent of the keyboard layout.
 constexpr std::array kPushKeys = {PushKey{SDL_SCANCODE_W, {0, 0, 1}},     PushKey{SDL_SCANCODE_S, {0, 0, -1}},
                                   PushKey{SDL_SCANCODE_D, {1, 0, 0}},     PushKey{SDL_SCANCODE_A, {-1, 0, 0}},
                                   PushKey{SDL_SCANCODE_E, {0, 1, 0}},     PushKey{SDL_SCANCODE_Q, {0, -1, 0}},
@@ -111,7 +111,7 @@ void Input::button_down(const SDL_MouseButtonEvent& button, ViewState& state) {
   if (button.button == SDL_BUTTON_RIGHT && has_shift) drag_ = Drag::Sun;
   if (is_left && state.tool != Tool::Look && !has_alt) drag_ = Drag::Stroke;
   if (drag_ == Drag::Stroke) editing.press(state.mouse);
-  // To turn about what one took hold of is what hands expect.
+  // Turning around the grabbed point feels natural.
   const bool turns_about = state.camera.mode == CameraMode::Orbit || drag_ == Drag::Pan;
   if ((drag_ == Drag::Turn || drag_ == Drag::Pan) && turns_about && state.hover) {
     state.camera.set_pivot(state.hover->position);

@@ -12,7 +12,7 @@ namespace quoin::viewer {
 
 namespace {
 
-/// Draws lines of the world over the picture.
+/// Draws world-space lines over the image.
 class WorldLines {
  public:
   WorldLines(const ViewState& state, ImDrawList& list) : state_(&state), list_(&list) {}
@@ -21,7 +21,7 @@ class WorldLines {
     const auto a = project(from);
     const auto b = project(to);
     if (!a || !b) return;
-    // Dark below light: to be seen before anything.
+    // A light line on a dark one is visible on any background.
     list_->AddLine(*a, *b, IM_COL32(0, 0, 0, 130), 3.0F);
     list_->AddLine(*a, *b, colour, 1.5F);
   }

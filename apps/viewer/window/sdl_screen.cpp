@@ -40,7 +40,7 @@ Error cannot(const std::string& what) {
   return make_error(ErrorCode::Unsupported, "cannot " + what + ": " + sdl_says());
 }
 
-// GL_RENDERER of a renderer that draws through OpenGL; else empty.
+// Returns GL_RENDERER if the renderer uses OpenGL, else an empty string.
 std::string opengl_name(SDL_Renderer* renderer) {
   using GetString = const unsigned char* (*)(unsigned);
   constexpr unsigned kRenderer = 0x1F01;

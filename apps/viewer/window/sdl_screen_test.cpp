@@ -19,7 +19,7 @@ TEST(SdlScreen, KnowsOpenGlThatDrawsByTheProcessor) {
   }
 }
 
-// On a display whose OpenGL is Mesa's on the processor, as Xvfb has it.
+// On a display with Mesa's software OpenGL, such as Xvfb.
 TEST(SdlWindow, IsDrawnBySdlWhereOpenGlIsTheProcessors) {
   ::setenv("LIBGL_ALWAYS_SOFTWARE", "1", 1);
   for (const char* const name : {"SDL_VIDEODRIVER", "SDL_RENDER_DRIVER", "SDL_FRAMEBUFFER_ACCELERATION"}) {
@@ -32,7 +32,7 @@ TEST(SdlWindow, IsDrawnBySdlWhereOpenGlIsTheProcessors) {
   SDL_RendererInfo info{};
   ASSERT_EQ(SDL_GetRendererInfo(SDL_GetRenderer((*screen)->window()), &info), 0) << sdl_says();
   EXPECT_STREQ(info.name, "software");
-  EXPECT_STREQ(SDL_GetHint(SDL_HINT_FRAMEBUFFER_ACCELERATION), "0") << "else SDL shows its image by OpenGL";
+  EXPECT_STREQ(SDL_GetHint(SDL_HINT_FRAMEBUFFER_ACCELERATION), "0") << "otherwise SDL shows its image through OpenGL";
 }
 
 }  // namespace

@@ -8,7 +8,7 @@ namespace quoin::viewer {
 
 namespace {
 
-/// Whether there is a device that is no processor in truth.
+/// Returns true if there is a device other than software devices.
 bool has_graphics_card() {
   const auto devices = vulkan_devices();
   return devices && std::any_of(devices->begin(), devices->end(), [](const VulkanDeviceInfo& device) {
@@ -16,7 +16,7 @@ bool has_graphics_card() {
          });
 }
 
-/// Whether the device that was asked for is there, where it is not needed yet.
+/// Returns an error if the requested device is missing, before it is needed.
 Status check_device(const std::string& device) {
   if (device.empty()) return {};
   VulkanOptions options;
@@ -29,7 +29,8 @@ Result<std::unique_ptr<Screen>> open_screen(const ViewerOptions& options, int wi
   if (options.backend == ViewerBackend::Vulkan) return open_vulkan_screen(width, height, options.device);
   if (options.backend == ViewerBackend::Auto && has_graphics_card()) {
     auto screen = open_vulkan_screen(width, height, options.device);
-    // A card that does not reach this display is no reason not to start; a device of that name is the user's wish.
+    // If a graphics card cannot present to this display, the viewer starts without it; a device requested by name is
+    // required.
     if (screen || !options.device.empty()) return screen;
   }
   if (Status there = check_device(options.device); !there) return there.error();

@@ -19,7 +19,7 @@
 namespace quoin::viewer {
 namespace {
 
-/// Changes the working folder for a while, where the viewer saves images and starts to look for files.
+/// Changes the working folder, in which the viewer saves images and opens its file dialogue, and restores it.
 class WorkingFolder {
  public:
   explicit WorkingFolder(const std::filesystem::path& folder) : before_(std::filesystem::current_path()) {
@@ -36,7 +36,7 @@ class WorkingFolder {
   std::filesystem::path before_;
 };
 
-/// A viewer whose window nobody sees.
+/// A viewer with an invisible window.
 class ViewerTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -91,9 +91,9 @@ TEST_F(ViewerTest, ManyStartsLeaveNothingBehind) {
     ASSERT_TRUE(std::filesystem::exists(given.screenshot));
   }
   EXPECT_EQ(open_files(), files);
-  EXPECT_LE(threads_after_joining(threads_before), threads_before) << "a thread of a window that is closed still runs";
-  // A window's fonts and pictures alone take more than 1 MB: sixteen of them would show. The thread sanitizer notes
-  // take some too.
+  EXPECT_LE(threads_after_joining(threads_before), threads_before) << "a thread of a closed window still runs";
+  // The fonts and images of a window take more than 1 MB, so a leak of sixteen would show. The records of the thread
+  // sanitizer take some memory too.
 #if defined(__SANITIZE_THREAD__)
   constexpr double kMegabytes = 15.0;
 #else
@@ -111,7 +111,7 @@ TEST_F(ViewerTest, PanelsAreDrawnInWindowsOfAnySize) {
     ASSERT_TRUE(status) << to_string(status.error());
     const auto shot = read_png(given.screenshot);
     ASSERT_TRUE(shot);
-    EXPECT_LT(shot->width, width) << "the panel stands beside the picture";
+    EXPECT_LT(shot->width, width) << "the panel is next to the image";
     EXPECT_GT(shot->width, 0);
   }
   EXPECT_TRUE(std::filesystem::exists(folder_.file("config/quoin/viewer.json")));
@@ -186,7 +186,7 @@ bool is_open(const std::string& file) {
   return false;
 }
 
-/// Ends a viewer that never comes to the state that a test waits for.
+/// Ends a viewer that never reaches the state that a test waits for.
 class Deadline {
  public:
   [[nodiscard]] bool is_over() const { return std::chrono::steady_clock::now() > end_; }
@@ -195,7 +195,7 @@ class Deadline {
   std::chrono::steady_clock::time_point end_ = std::chrono::steady_clock::now() + std::chrono::seconds(200);
 };
 
-// The key for the mode and the one for the image come within one frame.
+// The keys for the mode and for saving the image arrive within one frame.
 TEST_F(ViewerTest, SavesAnImageOfTheModeThatWasJustChosen) {
   ViewerOptions given = options(320, 240);
   given.screenshot.clear();
@@ -229,7 +229,7 @@ TEST_F(ViewerTest, SavesAnImageOfTheModeThatWasJustChosen) {
   EXPECT_EQ(shot->rgb, develop(*picture, develop_options(request)).value().rgb);
 }
 
-// However long frames take, SDL says which click is a double one.
+// SDL detects double clicks, however long frames take.
 TEST_F(ViewerTest, OpensTheFileThatIsDoubleClicked) {
   using std::chrono::milliseconds;
   const WorkingFolder inside(folder_.file(""));
@@ -237,14 +237,14 @@ TEST_F(ViewerTest, OpensTheFileThatIsDoubleClicked) {
   ViewerOptions given = options(480, 320);
   given.file.clear();
   given.is_bare = false;
-  // Within one frame; and further apart than ImGui allows, but not SDL.
+  // Clicks within one frame, and clicks further apart than ImGui allows but SDL accepts.
   for (const milliseconds apart : {milliseconds(0), milliseconds(400)}) {
     std::filesystem::remove(given.screenshot);
     const auto start = std::chrono::steady_clock::now();
     int clicks = 0;
     const Status status = run_viewer(given, [&] {
       constexpr milliseconds kPause(800);
-      constexpr int kRows = 10;  // tried upwards for the line of the file, to below the button above the list
+      constexpr int kRows = 10;  // rows tried from the bottom up; the last is just below the button
       const int row = clicks / 2;
       const int y = 129 - 7 * row;
       if (clicks == 0) press(SDLK_o, KMOD_CTRL);

@@ -14,7 +14,7 @@ Uint32 wake_type() {
 void wake_window() {
   SDL_Event event{};
   event.type = wake_type();
-  // A full queue holds events enough to wake whoever sleeps.
+  // A full queue wakes the loop anyway.
   SDL_PushEvent(&event);
 }
 

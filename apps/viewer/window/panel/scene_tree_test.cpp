@@ -7,7 +7,7 @@
 namespace quoin::viewer {
 namespace {
 
-// A layer without a name that is switched off leaves an empty picture, for which the panel has to have a reason.
+// A hidden layer without a name leaves an empty image, so the panel must list it as the reason.
 TEST(SceneTree, KnowsWhatIsHiddenAndFollowsSwitches) {
   LoadedScene loaded = small_scene();
   Scene& scene = loaded.scene;

@@ -9,7 +9,7 @@ namespace {
 const char* const kDoing = "creating the window's images";
 
 VkExtent2D extent_within(const VkSurfaceCapabilitiesKHR& can, VkExtent2D wanted) {
-  // Most windows say their size; elsewhere it is ours to choose.
+  // Most windows report their size; otherwise the swapchain chooses it.
   if (can.currentExtent.width != 0xFFFF'FFFFU) return can.currentExtent;
   return {std::clamp(wanted.width, can.minImageExtent.width, can.maxImageExtent.width),
           std::clamp(wanted.height, can.minImageExtent.height, can.maxImageExtent.height)};
@@ -67,7 +67,7 @@ VkPresentModeKHR Swapchain::mode(bool vsync) const {
   for (const VkPresentModeKHR one : {VK_PRESENT_MODE_MAILBOX_KHR, VK_PRESENT_MODE_IMMEDIATE_KHR}) {
     if (!vsync && std::find(modes.begin(), modes.end(), one) != modes.end()) return one;
   }
-  return VK_PRESENT_MODE_FIFO_KHR;  // there always is
+  return VK_PRESENT_MODE_FIFO_KHR;  // always supported
 }
 
 VkResult Swapchain::open(VkRenderPass pass, VkExtent2D wanted, bool vsync, VkSwapchainKHR old) {

@@ -8,7 +8,7 @@
 #include "viewer/window/screen.h"
 #include "vulkan_window.h"
 
-// After Vulkan's own headers, whose types it would declare else.
+// Included after Vulkan's headers, because it would otherwise declare their types itself.
 #include <SDL_vulkan.h>
 
 namespace quoin::viewer {
@@ -33,7 +33,7 @@ Result<WindowDeviceOptions> device_options(SDL_Window* window) {
 Result<std::shared_ptr<VulkanRenderer>> make_renderer(std::shared_ptr<WindowDevice> device) {
   struct Both {
     std::shared_ptr<WindowDevice> device;
-    VulkanRenderer renderer;  // goes first
+    VulkanRenderer renderer;  // destroyed first
   };
   auto renderer = VulkanRenderer::create(device->lent());
   if (!renderer) return renderer.error();
@@ -62,7 +62,7 @@ class VulkanScreen final : public Screen {
   std::shared_ptr<VulkanRenderer> renderer_;
   std::unique_ptr<VulkanWindow> shown_in_;
   std::shared_ptr<const VulkanPicture> picture_;
-  std::shared_ptr<VulkanPicture> uploaded_;  // pictures of the processor
+  std::shared_ptr<VulkanPicture> uploaded_;  // images rendered by the processor
   std::vector<OverlayVertex> vertices_;
   std::vector<std::uint16_t> indices_;
   std::vector<OverlayDraw> draws_;
@@ -145,7 +145,7 @@ Status VulkanScreen::show(const SDL_Rect& place, const ImDrawData& gui) {
 }  // namespace
 
 Result<std::unique_ptr<Screen>> open_vulkan_screen(int width, int height, const std::string& device) {
-  // SDL says less clearly that there is no driver.
+  // Checked first, because SDL's error for a missing driver is less clear.
   if (const auto devices = vulkan_devices(); !devices) return devices.error();
   auto screen = std::make_unique<VulkanScreen>();
   if (Status opened = screen->open(width, height, device); !opened) return opened.error();

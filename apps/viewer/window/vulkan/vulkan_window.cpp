@@ -103,8 +103,8 @@ VkResult VulkanWindow::Impl::make_objects() {
   return api.vkCreateSemaphore(device->handle(), &semaphore, nullptr, &handed);
 }
 
-// After an image was handed out that is not drawn: nobody waits for its semaphore, and the swapchain lacks the image.
-// Both are made anew.
+// Abandons an acquired image that is not drawn: its semaphore stays signalled and the swapchain lacks the image, so
+// both are created again.
 void VulkanWindow::Impl::give_up_image() {
   const VulkanFunctions& api = device->api();
   api.vkDeviceWaitIdle(device->handle());
@@ -124,7 +124,7 @@ VulkanWindow::Impl::~Impl() {
   if (pool != VK_NULL_HANDLE) api.vkDestroyCommandPool(device->handle(), pool, nullptr);
 }
 
-// Until the last frame is drawn.
+// Waits until the last frame is drawn.
 VkResult VulkanWindow::Impl::wait() {
   const VulkanFunctions& api = device->api();
   const VkResult result =
@@ -137,7 +137,7 @@ Status VulkanWindow::Impl::fit(int width, int height) {
   if (!is_stale && now.width == static_cast<std::uint32_t>(width) && now.height == static_cast<std::uint32_t>(height)) {
     return {};
   }
-  // What is still being shown must not go; resizing is rare enough to wait for all.
+  // Images still being presented must not be destroyed; resizing is rare enough to wait for the whole device.
   device->api().vkDeviceWaitIdle(device->handle());
   const std::unique_ptr<Swapchain> old = std::move(swapchain);
   auto made = Swapchain::create(*device, pipelines->pass(), width, height, vsync, old.get());
@@ -180,7 +180,7 @@ void VulkanWindow::Impl::draw_overlay(const Overlay& overlay) const {
   }
 }
 
-// Commands, and the picture's way into an image that shaders read.
+// Begins the command buffer and copies the image into one that shaders read.
 Status VulkanWindow::Impl::begin(const VulkanPicture* picture) {
   const VulkanFunctions& api = device->api();
   if (picture != nullptr) {
@@ -239,7 +239,7 @@ VkResult VulkanWindow::Impl::show(std::uint32_t shown) {
   present.pSwapchains = &chain;
   present.pImageIndices = &shown;
   const VkResult presented = device->api().vkQueuePresentKHR(device->queue(), &present);
-  // Nobody else knows of these commands: what they read could be given back while they run.
+  // Waits here, because memory that these commands read could otherwise be freed while they run.
   const VkResult waited = wait();
   return waited == VK_SUCCESS ? presented : waited;
 }
@@ -274,7 +274,7 @@ Status VulkanWindow::present(int width, int height, const VulkanPicture* picture
   Impl& window = *impl_;
   const VulkanFunctions& api = window.device->api();
   if (Status written = window.write(overlay); !written) return written;
-  constexpr int kTries = 3;  // the size may change under one's hands
+  constexpr int kTries = 3;  // the size may change meanwhile
   for (int attempt = 0; attempt < kTries; ++attempt) {
     if (Status fits = window.fit(width, height); !fits || !window.swapchain) return fits;
     std::uint32_t shown = 0;
@@ -292,7 +292,7 @@ Status VulkanWindow::present(int width, int height, const VulkanPicture* picture
     window.is_stale = result == VK_ERROR_OUT_OF_DATE_KHR || result == VK_SUBOPTIMAL_KHR;
     return window.is_stale ? Status{} : window.device->check(result, kShowing);
   }
-  return {};  // another frame will fit
+  return {};  // a later frame will succeed
 }
 
 }  // namespace quoin::viewer

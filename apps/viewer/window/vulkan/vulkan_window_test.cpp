@@ -1,5 +1,5 @@
-// Windows of Vulkan on a display, small and short-lived; tests/viewer/window.sh looks at a large one. The validation
-// layer watches where it is installed.
+// Small, short-lived Vulkan windows on a display; tests/viewer/window.sh checks a large one. Uses the validation layer
+// if it is installed.
 
 #include "vulkan_window.h"
 
@@ -19,7 +19,7 @@
 namespace quoin::viewer {
 namespace {
 
-/// Skipped without a display or a device that reaches it.
+/// Skipped without a display or a device that can present to it.
 class VulkanWindowTest : public ::testing::Test {
  protected:
   void SetUp() override {

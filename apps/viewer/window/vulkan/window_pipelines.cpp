@@ -23,7 +23,7 @@ constexpr std::uint32_t kOverlayFragment[] = {
 };
 constexpr VkShaderStageFlags kStages = VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_FRAGMENT_BIT;
 
-/// A shader, as long as pipelines are made of it.
+/// A shader module, needed only while pipelines are created.
 class Shader {
  public:
   Shader(const WindowDevice& device, VkShaderStageFlagBits stage, std::span<const std::uint32_t> code)
@@ -55,7 +55,7 @@ class Shader {
   VkResult result_ = VK_SUCCESS;
 };
 
-/// What differs between the two pipelines.
+/// The differences between the two pipelines.
 struct PipelineParts {
   VkRenderPass pass = VK_NULL_HANDLE;
   VkPipelineLayout layout = VK_NULL_HANDLE;
@@ -75,7 +75,7 @@ VkPipelineColorBlendAttachmentState blending(bool is_blended) {
   return blend;
 }
 
-// Triangles whose corners shaders find; viewport and scissor are set when that is recorded.
+// Creates a triangle pipeline without vertex input; viewport and scissor are dynamic.
 VkResult make_pipeline(const WindowDevice& device, const PipelineParts& parts, VkPipeline& pipeline) {
   const Shader vertex(device, VK_SHADER_STAGE_VERTEX_BIT, parts.vertex);
   const Shader fragment(device, VK_SHADER_STAGE_FRAGMENT_BIT, parts.fragment);
@@ -162,7 +162,7 @@ VkResult WindowPipelines::make_pass(VkFormat format) {
   subpass.pipelineBindPoint = VK_PIPELINE_BIND_POINT_GRAPHICS;
   subpass.colorAttachmentCount = 1;
   subpass.pColorAttachments = &colour;
-  // The image must have been handed over before it is written.
+  // The image must be acquired before it is written.
   VkSubpassDependency handed{};
   handed.srcSubpass = VK_SUBPASS_EXTERNAL;
   handed.srcStageMask = handed.dstStageMask = VK_PIPELINE_STAGE_COLOR_ATTACHMENT_OUTPUT_BIT;
@@ -177,7 +177,7 @@ VkResult WindowPipelines::make_pass(VkFormat format) {
   return device_->api().vkCreateRenderPass(device_->handle(), &info, nullptr, &pass_);
 }
 
-// What is pushed, and one image to read single pixels of.
+// The push constants, and one image whose pixels are read directly.
 VkResult WindowPipelines::make_layout() {
   const VulkanFunctions& api = device_->api();
   const auto nearest = info_of<VkSamplerCreateInfo>(VK_STRUCTURE_TYPE_SAMPLER_CREATE_INFO);

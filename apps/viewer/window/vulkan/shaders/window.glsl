@@ -1,4 +1,4 @@
-// What the shaders of a window read: window_pipelines.h says the same.
+// Data read by the window's shaders; window_pipelines.h mirrors it.
 #extension GL_EXT_buffer_reference : require
 #extension GL_EXT_buffer_reference_uvec2 : require
 
@@ -8,14 +8,14 @@ layout(buffer_reference, std430, buffer_reference_align = 4) readonly buffer Wor
 
 layout(push_constant) uniform Push {
   uvec2 corners; // the overlay's
-  uvec2 font;    // its opacity, four pixels a word
-  ivec2 source;  // the size of the picture, or of the font's
-  vec2 origin;   // of the picture in the window
-  vec2 scale;    // pixels of the picture a pixel of the window
+  uvec2 font;    // its opacity, four pixels per word
+  ivec2 source;  // the size of the image, or of the font image
+  vec2 origin;   // of the image in the window
+  vec2 scale;    // image pixels per window pixel
   vec2 window;   // its size
 } push;
 
-// Bytes as they are, red the lowest.
+// Unpacks unchanged bytes, red the lowest.
 vec4 unpacked(uint word) {
   return unpackUnorm4x8(word);
 }

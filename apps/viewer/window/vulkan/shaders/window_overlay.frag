@@ -1,5 +1,5 @@
 #version 460
-// Colour times the font's opacity, between whose pixels it is interpolated.
+// Colour times the font's opacity, interpolated between font pixels.
 #include "window.glsl"
 
 layout(location = 0) in vec2 place;

@@ -1,5 +1,5 @@
 #version 460
-// The corners of an overlay: five words each.
+// The vertices of an overlay, five words each.
 #include "window.glsl"
 
 layout(location = 0) out vec2 place;

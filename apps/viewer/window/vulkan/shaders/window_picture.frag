@@ -1,5 +1,5 @@
 #version 460
-// A picture's bytes as they are, or stretched.
+// The bytes of an image, unchanged or stretched.
 #include "window.glsl"
 
 layout(binding = 0) uniform sampler2D picture;
