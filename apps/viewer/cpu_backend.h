@@ -27,11 +27,11 @@ struct CpuBackendOptions {
 /// however fast requests come.
 ///
 /// DrawMode::Paths works the same way, denoised within surfaces (PathOptions::denoise), up to 256 samples. Its data is
-/// built before the first path-traced image and freed with the first image of another mode. After an edit, unchanged
-/// parts keep their samples while the rest converges again (PathHistory).
+/// built before the first path-traced image and freed with the first image of another mode except Density. After an
+/// edit, unchanged parts keep their samples while the rest converges again (PathHistory).
 ///
 /// DrawMode::Smooth is also ray-marched, through the fields of a SmoothScene. These are built before the first smooth
-/// image, follow edits, and are freed with the first image of another mode.
+/// image, follow edits, and are freed with the first image of another mode except Density.
 class CpuBackend final : public ViewBackend {
  public:
   /// `scene` must outlive the backend and not move. The backend's thread calls `on_frame` when there is a frame to take

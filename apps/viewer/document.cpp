@@ -45,7 +45,7 @@ Status write_as_glb(const Scene& scene, const std::filesystem::path& path, const
 }
 
 Result<FileFormat> format_to_write(const std::filesystem::path& path) {
-  // Formats without a writer here are refused, because such files hold more than load_scene reads.
+  // Other programs' formats are refused, because their files hold more than load_scene reads.
   constexpr std::array kFormats = {FileFormat::World, FileFormat::Vox, FileFormat::Scene, FileFormat::Glb};
   const auto format = format_for_writing(path);
   if (format && std::ranges::find(kFormats, format->format) != kFormats.end()) return format->format;

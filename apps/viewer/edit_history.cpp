@@ -48,7 +48,7 @@ std::optional<bool> visibility_of(const Scene& scene, const SceneNode& node) {
 }
 
 void EditHistory::show(Scene& scene, const SceneNode& node, bool is_visible) {
-  QUOIN_ASSERT(!open_ && visibility_of(scene, node), "no step is under way, and it is there");
+  QUOIN_ASSERT(!open_ && visibility_of(scene, node), "no step is under way, and the node exists");
   Step step;
   step.name = is_visible ? "show" : "hide";
   step.switched = node;
@@ -59,7 +59,7 @@ void EditHistory::show(Scene& scene, const SceneNode& node, bool is_visible) {
 }
 
 void EditHistory::begin(std::string name) {
-  QUOIN_ASSERT(!open_, "the step before has ended");
+  QUOIN_ASSERT(!open_, "no step is under way");
   open_ = Step{};
   open_->name = std::move(name);
 }

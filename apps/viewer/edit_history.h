@@ -24,7 +24,7 @@ class EditHistory {
  public:
   explicit EditHistory(std::size_t max_bytes = std::size_t{256} << 20) : max_bytes_(max_bytes) {}
 
-  /// Begins a step and ends the one under way.
+  /// Begins a step. Requires: no step is under way.
   void begin(std::string name);
   /// Announces changes to the voxels of a box. Requires: a step is under way; `grid` is the scene's `handle`.
   void touch(GridHandle handle, const Grid& grid, const IBox& box);

@@ -32,8 +32,7 @@ bool is_same(const ViewRequest& a, const ViewRequest& b) {
 PathOptions path_options(const ViewRequest& request, int width, int height, int samples, const DBox& bounds) {
   PathOptions options;
   static_cast<Look&>(options) = request.look ? request.look->look : natural_look().look;
-  if (options.sky == SkyModel::Environment)
-    options.sky = SkyModel::Uniform;  // the viewer does not load environment images
+  if (options.sky == SkyModel::Environment) options.sky = SkyModel::Uniform;  // the environment image is not loaded
   options.lens_radius = 0.0;
   options.width = width;
   options.height = height;

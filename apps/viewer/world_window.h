@@ -13,10 +13,10 @@
 
 namespace quoin::viewer {
 
-/// How a world on disk is opened.
+/// Options for opening a world on disk.
 struct WorldOptions {
-  std::size_t memory_bytes = 0;  ///< for its chunks and what is made of them; 0: a quarter of `available_memory`
-  /// World units around the camera within which all is loaded, where memory suffices; 0: 640 of the smallest voxels.
+  std::size_t memory_bytes = 0;  ///< for chunks and derived data; 0: a quarter of `available_memory`
+  /// Load distance around the camera in world units, if memory suffices; 0: 640 of the smallest voxels.
   double distance = 0.0;
   bool may_write = true;  ///< saves edits and generated chunks
 };
