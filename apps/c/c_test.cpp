@@ -1,4 +1,4 @@
-// The door for C: what it makes, and that bad input is an error and never a crash.
+// Tests the C interface: its results, and that bad input gives an error and never a crash.
 
 #include <algorithm>
 #include <array>
@@ -31,7 +31,7 @@ quoin_array array_of(const std::vector<T>& values, quoin_scalar scalar, int edge
   return array;
 }
 
-// A scene of one grid: types 1 and 2 by turns in a box of kEdge.
+// A scene of one grid: a box of kEdge with alternating types 1 and 2.
 quoin_scene made_scene(std::vector<std::uint16_t>& voxels) {
   quoin_scene scene = 0;
   EXPECT_EQ(quoin_scene_create(&scene), QUOIN_OK);
@@ -167,7 +167,7 @@ TEST(C, LabelsAndGridsAreMeshed) {
   EXPECT_EQ(quoin_free(scene), QUOIN_OK);
 }
 
-// Vertices that lie inside an edge of a triangle: a plate, on whose middle a pillar of another type stands.
+// Finds vertices inside triangle edges: a plate with a pillar of another type on its middle.
 std::size_t corners_in_edges(std::int32_t watertight) {
   std::vector<std::uint16_t> voxels(std::size_t{kEdge} * kEdge * kEdge);
   for (std::size_t i = 0; i < voxels.size(); ++i) {
@@ -200,7 +200,7 @@ std::size_t corners_in_edges(std::int32_t watertight) {
         from_b += std::pow(at(vertex, axis) - at(b, axis), 2);
         whole += std::pow(at(b, axis) - at(a, axis), 2);
       }
-      // Corners lie on whole numbers: what is between both is as far from them as they are from each other.
+      // Corners have integer coordinates: distances of a point between two corners add up to the edge's length.
       const bool is_between = std::abs(std::sqrt(from_a) + std::sqrt(from_b) - std::sqrt(whole)) < 1e-9;
       if (is_between && from_a > 0.0 && from_b > 0.0) ++found;
     }
@@ -240,7 +240,7 @@ TEST(C, PicturesHaveTheSunThatIsAskedFor) {
     options.sun[0] = 0.9;
     options.sun[1] = 0.2;
     EXPECT_NE(taken(), without);
-    options.size = offsetof(quoin_render_options, has_sun);  // as programs of before have it
+    options.size = offsetof(quoin_render_options, has_sun);  // as in older programs
     EXPECT_EQ(taken(), without);
     options.size = sizeof options;
   }

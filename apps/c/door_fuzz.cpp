@@ -1,6 +1,6 @@
-// Programs of calls, made of any bytes: whatever is called with whatever, the door returns a status and goes on.
+// Turns any bytes into a program of calls. Every call must return a status and leave the library usable.
 //
-// What the header asks of callers is kept: memory is as large as shapes and strides say, and paths name no file.
+// The calls keep the header's contract: memory is as large as shapes and strides require. Paths name no file.
 
 #include <algorithm>
 #include <array>
@@ -18,9 +18,9 @@
 
 namespace {
 
-constexpr std::size_t kRoom = 1 << 14;  // bytes that arrays may lie in
+constexpr std::size_t kRoom = 1 << 14;  // bytes of memory for arrays
 constexpr int kMostCalls = 48;
-constexpr int kMostLongCalls = 1;  // of those that take most of the time: smooth voxels, images by path tracing
+constexpr int kMostLongCalls = 1;  // the slowest calls: smooth voxels, path-traced images
 
 class Program {
  public:
@@ -40,7 +40,7 @@ class Program {
   }
 
  private:
-  // Something to work with: a scene of two types and a grid.
+  // Creates a scene of two types and a grid for later calls.
   void begin() {
     quoin_scene scene = 0;
     took(quoin_scene_create(&scene), &scene);
@@ -62,7 +62,7 @@ class Program {
   std::uint8_t byte() { return next_ == end_ ? std::uint8_t{0} : *next_++; }
   bool bit() { return (byte() & 1U) != 0; }
   std::int32_t small() { return static_cast<std::int8_t>(byte()); }
-  // Mostly what there is, sometimes any number.
+  // Mostly a small index, sometimes any number.
   std::size_t index() {
     const std::uint8_t b = byte();
     return b < 240 ? b % 16 / 8 * (b % 8) : std::numeric_limits<std::size_t>::max() - (b - 240);
@@ -85,7 +85,7 @@ class Program {
     const double one = number();
     return std::isfinite(one) ? static_cast<float>(std::clamp(one, -3e38, 3e38)) : std::nanf("");
   }
-  // Many would only take long to start.
+  // Few, since starting many threads is slow.
   std::int32_t threads() { return small() % 4; }
   bool may_take_long() { return long_calls_++ < kMostLongCalls; }
   std::uint64_t handle() {
@@ -108,15 +108,15 @@ class Program {
     if (status == QUOIN_OK) return;
     if (status > QUOIN_OK && status <= QUOIN_OUT_OF_MEMORY && quoin_last_error()[0] != '\0') return;
     std::fprintf(stderr, "status %d: %s\n", static_cast<int>(status), quoin_last_error());
-    std::abort();  // also for what is QUOIN_INTERNAL
+    std::abort();  // also for QUOIN_INTERNAL
   }
-  // Arguments have no order: a number that the call itself writes is looked at within.
+  // Takes a pointer, since argument evaluation has no order: the call writes the handle.
   void took(quoin_status status, const std::uint64_t* made) {
     took(status);
     if (status == QUOIN_OK) handles_.push_back(*made);
   }
 
-  // An array within the room, or one without memory and of any shape.
+  // An array inside room_, or one of any shape without memory.
   quoin_array array() {
     auto one = made<quoin_array>();
     one.scalar = bit() ? QUOIN_UINT8 : byte() % 11;
@@ -131,7 +131,7 @@ class Program {
       one.spacing[axis] = bit() ? 0.0 : number();
       one.origin[axis] = bit() ? 0.0 : number();
     }
-    // Without strides an array has no gaps.
+    // Strides of 0: the array is contiguous.
     if (one.strides[0] == 0 && one.strides[1] == 0 && one.strides[2] == 0 && is_there)
       last = std::int64_t{8} * one.shape[0] * one.shape[1] * one.shape[2];
     if (is_there && last - first < static_cast<std::int64_t>(kRoom)) one.data = room_.data() - first;
@@ -235,7 +235,7 @@ class Program {
     took(quoin_sun_get(handle(), perhaps(&sun)));
   }
 
-  // What came later, of bytes that meant little before, so that programs that were found stay nearly what they are.
+  // Calls added later. They use byte values that meant little before, so that programs of the corpus hardly change.
   void step_of_later(std::uint8_t which) {
     if (which % 4 == 0) return layers_and_groups();
     if (which % 4 == 1) return views();
@@ -261,7 +261,7 @@ class Program {
     one.type_count = byte() % 3;
     auto options = made<quoin_voxelize_options>();
     options.voxel_size = bit() ? 2.0 : std::max(number(), -1.0);
-    // What is small would only take long.
+    // Small voxels would be slow.
     if (options.voxel_size > 0.0 && options.voxel_size < 1.0) options.voxel_size = 1e-30;
     options.fill = small() % 4;
     options.max_types = small();
@@ -312,7 +312,7 @@ class Program {
     for (double& each : options.camera) each = number();
     for (double& each : options.look_at) each = number();
     options.fov_degrees = number();
-    // Of no bytes of their own, so that programs that were found stay what they are.
+    // Reads no further bytes, so that programs of the corpus stay the same.
     options.has_sun = options.has_camera;
     std::copy(std::begin(options.look_at), std::end(options.look_at), options.sun);
     if (options.width == 0) options.width = 4;
@@ -349,7 +349,7 @@ class Program {
     options.iso = single();
     options.voxel_size = number();
     took(quoin_scene_load_with("", perhaps(&options), &scene), &scene);
-    // Of the same bytes, so that inputs of the corpus stay what they are.
+    // Reuses bytes, so that inputs of the corpus stay the same.
     for (std::int32_t& length : options.raw_shape) length = options.frame % 8;
     options.raw_scalar = options.radius % 10;
     options.heights = options.radius % 4;

@@ -1,4 +1,4 @@
-/* Makes a hill of two types of voxels, meshes it, draws it, sends a ray at it and saves it. */
+/* Makes a hill of two voxel types, meshes it, renders it, casts a ray at it and saves it. */
 #include <stdio.h>
 #include <stdlib.h>
 

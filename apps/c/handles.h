@@ -28,19 +28,19 @@
 
 #include "quoin.h"
 
-/// What the functions of quoin.h share: handles, and how they fail.
+/// Shared by the functions of quoin.h: handles, error reporting and struct conversion.
 namespace quoin::c {
 
-/// What things of a scene are called by outside, and inside.
+/// Maps the numbers of quoin.h to a scene's handles, and back.
 struct SceneNumbers {
   std::vector<GridHandle> grids;
   std::vector<InstanceHandle> instances;
-  std::vector<GroupHandle> groups;  // from the top; the first has the number 1
+  std::vector<GroupHandle> groups;  // parents first; numbered from 1
   std::unordered_map<std::uint32_t, std::size_t> grid_of_slot;
   std::unordered_map<std::uint32_t, std::size_t> group_of_slot;  // from 1
 };
 
-/// What rays go through, brought up to date by the first who asks after a change.
+/// The scene's ray tracer. The first query after a change updates it.
 struct KeptTracer {
   std::mutex mutex;
   std::optional<SceneTracer> tracer;
@@ -49,7 +49,7 @@ struct KeptTracer {
 };
 
 struct SceneBody {
-  std::shared_mutex mutex;  // shared by those who read
+  std::shared_mutex mutex;  // readers share it
   LoadedScene loaded;
   std::vector<std::string> save_warnings;  // of the last save
   SceneNumbers numbers;
@@ -62,7 +62,7 @@ struct GridMesh {
   std::vector<Vec3> normals;
   std::vector<Rgba8> colours;
   std::vector<float> occlusion;
-  std::vector<VoxelType> types;  // none where it is smooth
+  std::vector<VoxelType> types;  // empty for smooth meshes
   std::vector<std::uint32_t> indices;
 };
 struct LabelMesh {
@@ -71,8 +71,8 @@ struct LabelMesh {
 };
 using MeshBody = std::variant<GridMesh, ArraySurface, LabelMesh>;
 
-/// What handles stand for. Numbers are never given twice, so what was freed is known as such. Whoever found a thing
-/// keeps it alive while he uses it, also when another thread frees it.
+/// Maps handles to objects. Handles are never reused, so freed ones are detected. find() returns shared ownership: the
+/// object stays alive while in use, even if another thread frees its handle.
 class Handles {
  public:
   using Thing = std::variant<std::shared_ptr<SceneBody>, std::shared_ptr<MeshBody>>;
@@ -83,7 +83,7 @@ class Handles {
     return next_++;
   }
   bool remove(std::uint64_t handle) {
-    Thing last;  // ends outside the lock
+    Thing last;  // destroyed outside the lock
     const std::lock_guard lock(mutex_);
     const auto found = things_.find(handle);
     if (found == things_.end()) return false;
@@ -91,7 +91,7 @@ class Handles {
     things_.erase(found);
     return true;
   }
-  /// Null where the handle is of nothing, or of something else.
+  /// Returns null if the handle is unknown or refers to another kind of object.
   template <class Body>
   std::shared_ptr<Body> find(std::uint64_t handle) {
     const std::lock_guard lock(mutex_);
@@ -111,7 +111,7 @@ Handles& handles();
 quoin_status fail(quoin_status status, const char* why) noexcept;
 quoin_status fail(const Error& error);
 
-/// Runs what a function does, and turns what it throws into a status.
+/// Runs `work`; turns exceptions into a status.
 template <class Work>
 quoin_status guarded(Work&& work) noexcept {
   try {
@@ -127,7 +127,7 @@ quoin_status guarded(Work&& work) noexcept {
 
 enum class Use : std::uint8_t { Read, Change };
 
-/// The same with a scene, for as long as `work` takes.
+/// Runs `work` with a scene, locked for reading or for changes.
 template <class Work>
 quoin_status with_scene(quoin_scene handle, Use use, Work&& work) noexcept {
   return guarded([&] {
@@ -142,7 +142,7 @@ quoin_status with_scene(quoin_scene handle, Use use, Work&& work) noexcept {
   });
 }
 
-/// Writes a number that a scene has.
+/// Writes a count of a scene's objects.
 template <class Count>
 quoin_status tell_count(quoin_scene handle, std::size_t* out, Count&& count) noexcept {
   return with_scene(handle, Use::Read, [&](SceneBody& scene) {
@@ -152,7 +152,7 @@ quoin_status tell_count(quoin_scene handle, std::size_t* out, Count&& count) noe
   });
 }
 
-// Structs have grown at their ends: how large each was at first.
+// Structs have grown at their ends. This is the size of each struct's first version.
 template <class Struct>
 inline constexpr std::size_t kFirstSize = sizeof(Struct);
 template <>
@@ -173,7 +173,8 @@ bool has_fit_size(const Struct* given) {
   return given != nullptr && given->size >= kFirstSize<Struct> && given->size <= sizeof(Struct);
 }
 
-/// A struct as this version has it, of one that may be shorter; nothing where it is null, or its size is of no version.
+/// Copies a caller's struct, which may be shorter, into one of this version. Returns nothing if it is null or its size
+/// is invalid.
 template <class Struct>
 std::optional<Struct> taken(const Struct* given) {
   if (!has_fit_size(given)) return std::nullopt;
@@ -181,15 +182,15 @@ std::optional<Struct> taken(const Struct* given) {
   std::memcpy(&whole, given, given->size);
   return whole;
 }
-/// The same of an array, with strides: where it has none its numbers lie without gaps, z fastest and x slowest.
+/// Copies an array struct. Strides of 0 become those of a contiguous array, z fastest and x slowest.
 std::optional<quoin_array> taken_array(const quoin_array* given);
-/// The same of options, which may be left out.
+/// Copies options; null gives the defaults.
 template <class Struct>
 std::optional<Struct> taken_or_default(const Struct* given) {
   return given == nullptr ? Struct{} : taken(given);
 }
 
-/// Fills in as much of a struct as there is room for.
+/// Writes as much of `whole` as the caller's struct has room for.
 template <class Struct>
 quoin_status tell(Struct whole, Struct* out) {
   if (!has_fit_size(out)) return fail(QUOIN_INVALID_ARGUMENT, "out is null, or its size");
@@ -198,7 +199,7 @@ quoin_status tell(Struct whole, Struct* out) {
   return QUOIN_OK;
 }
 
-/// Writes a struct about the index-th of `count` things of a scene.
+/// Writes a struct that describes a scene's object number `index`.
 template <class Struct, class Count, class Describe>
 quoin_status tell_of(quoin_scene handle, std::size_t index, Struct* out, Count&& count, Describe&& describe) noexcept {
   return with_scene(handle, Use::Read, [&](SceneBody& scene) {
@@ -209,39 +210,39 @@ quoin_status tell_of(quoin_scene handle, std::size_t index, Struct* out, Count&&
   });
 }
 
-/// What this thread has set.
+/// Returns this thread's progress callback.
 Progress progress();
 
-/// As many threads as the caller says; none less than 0, and not more than there may be.
+/// Returns the caller's thread count, clamped to the valid range.
 Threads threads_of(std::int32_t count);
 
-/// Numbers what is in a scene that was read.
+/// Assigns numbers to the grids, instances and groups of a loaded scene.
 void number(SceneBody& scene);
 
-/// Shows a new grid unturned, its least corner at a point of the world; its number is told in `out`, if that is any.
+/// Places a new grid without rotation, its minimum corner at `position`. `out` receives the grid's number if not null.
 void place(SceneBody& scene, SceneGrid grid, DVec3 position, std::size_t* out);
 
-/// What a file is read with. Errors: InvalidArgument for what no file is, or where the size is none of the struct's.
+/// Converts load options. Errors: InvalidArgument for invalid values or an invalid struct size.
 Result<LoadOptions> load_options_of(const quoin_load_options* given);
 
 VoxelProperties properties_of(const quoin_type& type);
-/// What is wrong with a type; null where nothing is.
+/// Returns the reason that a type is invalid; null if it is valid.
 const char* what_is_wrong(const quoin_type& type);
 
-/// What a picture by rays is taken with. Errors: InvalidArgument for what no picture has.
+/// The camera and the options of a render. Errors: InvalidArgument for invalid values.
 struct PictureTaking {
   Camera camera;
   RenderOptions options;
 };
 Result<PictureTaking> taking_of(const Scene& scene, const quoin_render_options& options);
 
-/// Copies a text with its end into room for `capacity` bytes; cut off between characters.
+/// Copies a text, with its terminator, into `capacity` bytes; truncates between characters.
 void copy_text(std::string_view text, char* to, std::size_t capacity);
 template <std::size_t Size>
 void copy_text(std::string_view text, char (&to)[Size]) {
   copy_text(text, to, Size);
 }
-/// The text in such room, whether it has an end or not.
+/// Returns the text of a fixed-size field, which may lack a terminator.
 template <std::size_t Size>
 std::string text_in(const char (&from)[Size]) {
   return {from, strnlen(from, Size)};

@@ -1,4 +1,4 @@
-// Calls that no caller would make, in any order: the fuzz target's programs, replayed and by chance.
+// Invalid calls in any order: replays the fuzz target's programs, then runs random ones.
 
 #include <cstddef>
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Meshes of grids and arrays; pictures; rays.
+// Meshes of grids and arrays; images; rays.
 
 #include <algorithm>
 #include <array>
@@ -18,7 +18,7 @@
 namespace quoin::c {
 namespace {
 
-// Meshes an array, whose scalars have a number that there is.
+// Meshes an array after checking its scalar type.
 template <class Mesh>
 quoin_status mesh_array(const quoin_array* array, quoin_mesh* out, Mesh&& mesh) noexcept {
   return guarded([&] {
@@ -43,7 +43,7 @@ ArrayView view_of(const quoin_array& array) {
   return view;
 }
 
-// Colours, of linear light in 16 bits, of smooth vertices, which come in rows of few.
+// Converts 16-bit linear light to the colours of smooth vertices. Neighbouring vertices often share a colour.
 class ColourEncoder {
  public:
   Rgba8 operator()(const LinearRgba16& colour) {
@@ -100,7 +100,7 @@ Result<GridMesh> put_together(const SceneMeshes& meshes) {
     }
   }
   if (vertices > std::numeric_limits<std::uint32_t>::max())
-    return make_error(ErrorCode::LimitExceeded, "a mesh of more than 2^32 vertices");
+    return make_error(ErrorCode::LimitExceeded, "the mesh has more than 2^32 vertices");
   GridMesh mesh;
   mesh.positions.reserve(vertices);
   mesh.indices.resize(indices);
@@ -185,7 +185,7 @@ Result<Camera> camera_of(const Scene& scene, const quoin_render_options& options
     return frame_scene(scene, View::Iso, static_cast<double>(width) / static_cast<double>(height));
   const double degrees = options.fov_degrees == 0.0 ? 45.0 : options.fov_degrees;
   if (!is_finite(options.camera) || !is_finite(options.look_at) || !(degrees > 0.0 && degrees < 180.0))
-    return make_error(ErrorCode::InvalidArgument, "a camera that cannot be");
+    return make_error(ErrorCode::InvalidArgument, "invalid camera");
   return look_at({options.camera[0], options.camera[1], options.camera[2]},
                  {options.look_at[0], options.look_at[1], options.look_at[2]}, degrees * std::numbers::pi / 180.0);
 }
@@ -214,7 +214,7 @@ quoin_status render(const Scene& scene, const quoin_render_options& options, std
   if (!taking) return fail(taking.error());
   const auto width = static_cast<std::size_t>(taking->options.width);
   if (capacity / 3 / width < static_cast<std::size_t>(taking->options.height))
-    return fail(QUOIN_INVALID_ARGUMENT, "the array has no room for the picture");
+    return fail(QUOIN_INVALID_ARGUMENT, "the array is too small for the image");
   const auto picture = picture_of(scene, options, *taking);
   if (!picture) return fail(picture.error());
   std::memcpy(rgb, picture->rgb.data(), picture->rgb.size());
@@ -231,7 +231,7 @@ void put_hit(const std::optional<SceneHit>& hit, std::size_t i, const quoin_hits
   }
 }
 
-// The scene's tracer, of the scene as it is now: nobody changes it while readers hold its lock.
+// Returns the scene's tracer, updated to the current scene. The caller's lock keeps the scene unchanged.
 const SceneTracer& current_tracer(SceneBody& body) {
   KeptTracer& kept = body.kept;
   const Scene& scene = body.loaded.scene;
@@ -250,7 +250,7 @@ const SceneTracer& current_tracer(SceneBody& body) {
 
 Result<PictureTaking> taking_of(const Scene& scene, const quoin_render_options& options) {
   if (options.width < 0 || options.height < 0 || options.samples < 0)
-    return make_error(ErrorCode::InvalidArgument, "a size or a number of samples below 0");
+    return make_error(ErrorCode::InvalidArgument, "width, height or samples is negative");
   PictureTaking taking;
   RenderOptions& wanted = taking.options;
   wanted.width = options.width == 0 ? 1280 : options.width;
@@ -336,7 +336,8 @@ quoin_status quoin_scene_rays(quoin_scene scene, std::size_t count, const double
     const auto hits = taken(out);
     if (!hits) return fail(QUOIN_INVALID_ARGUMENT, "out is null, or its size");
     if (count == 0) return QUOIN_OK;
-    if (origins == nullptr || directions == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "there are no rays");
+    if (origins == nullptr || directions == nullptr)
+      return fail(QUOIN_INVALID_ARGUMENT, "origins or directions is null");
     const SceneTracer& tracer = current_tracer(body);
     constexpr std::size_t kAtOnce = 1024;
     parallel_for((count - 1) / kAtOnce + 1, {}, [&](std::size_t batch) {

@@ -1,4 +1,4 @@
-// What stands where in a scene, what else its file holds or is to hold, and what files there are.
+// Instances, groups, layers, cameras, lamps and the sun of a scene; file formats.
 
 #include <cmath>
 #include <numbers>
@@ -15,7 +15,7 @@ namespace quoin::c {
 namespace {
 
 constexpr double kDegrees = 180.0 / std::numbers::pi;
-constexpr double kRoughly = 1e-4;  // what turns, axes and sizes that came through floats may be off by
+constexpr double kRoughly = 1e-4;  // tolerance of rotations, axes and sizes that were stored as floats
 
 void copy(const DVec3& from, double (&to)[3]) {
   for (int axis = 0; axis < 3; ++axis) to[axis] = from[axis];
@@ -26,7 +26,7 @@ std::string layer_of(const Scene& scene, LayerHandle handle) {
   return layer == nullptr ? std::string() : layer->name;
 }
 
-// The number of a group from 1, or 0.
+// Returns the group's number, counted from 1; 0: none.
 std::size_t number_of(const SceneBody& body, GroupHandle group) {
   if (body.loaded.scene.groups().find(group) == nullptr) return 0;
   return body.numbers.group_of_slot.at(group.index);
@@ -38,7 +38,7 @@ void describe(const SceneBody& body, const Instance& instance, quoin_instance& o
   const bool has_grid = scene.grids().find(instance.grid) != nullptr;
   out.grid = has_grid ? body.numbers.grid_of_slot.at(instance.grid.index) : body.numbers.grids.size();
   out.visible = instance.visible ? 1 : 0;
-  // What places nothing shows nothing.
+  // Without a grid it shows nothing.
   out.shown = is_drawn(scene, instance, InstanceFilter::Visible) && has_place(instance) ? 1 : 0;
   out.group = number_of(body, instance.group);
   copy_text(layer_of(scene, instance.layer), out.layer);
@@ -49,7 +49,7 @@ void describe(const SceneBody& body, const Instance& instance, quoin_instance& o
   }
 }
 
-// The turn of three unit columns: whole numbers where they are off those by less than floats are.
+// The rotation of three unit columns; entries within float error of an integer are rounded.
 DQuat turn_of(glm::dmat3 columns) {
   for (int column = 0; column < 3; ++column) {
     for (int row = 0; row < 3; ++row) {
@@ -60,7 +60,7 @@ DQuat turn_of(glm::dmat3 columns) {
   return glm::normalize(glm::quat_cast(columns));
 }
 
-// Whether three columns are perpendicular and of one length, which is then `length`.
+// Returns true if three columns are perpendicular and equally long; sets `length`.
 bool is_similar(const glm::dmat3& columns, double& length) {
   length = std::cbrt(std::abs(glm::determinant(columns)));
   if (!(length > 0.0) || !std::isfinite(length)) return false;
@@ -73,7 +73,7 @@ bool is_similar(const glm::dmat3& columns, double& length) {
   return true;
 }
 
-/// Puts an instance where a struct says. Returns what is wrong with that; null: nothing.
+/// Applies a caller's struct to an instance. Returns an error text; null: success.
 const char* put(const SceneBody& body, const quoin_instance& given, Instance& instance) {
   if (given.grid >= body.numbers.grids.size()) return "no grid has this number";
   if (given.group > body.numbers.groups.size()) return "no group has this number";
@@ -82,13 +82,13 @@ const char* put(const SceneBody& body, const quoin_instance& given, Instance& in
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 4; ++column) {
       const double entry = given.world_from_grid[4 * row + column];
-      if (!std::isfinite(entry)) return "a place that is not finite";
+      if (!std::isfinite(entry)) return "world_from_grid is not finite";
       (column == 3 ? moved[row] : columns[column][row]) = entry;
     }
   }
   double length = 0.0;
-  if (!is_similar(columns, length)) return "world_from_grid does not turn and scale alike along all axes";
-  // A name that is told back as it was told, cut off, stays whole.
+  if (!is_similar(columns, length)) return "world_from_grid shears or scales non-uniformly";
+  // A caller that writes back the truncated name does not truncate the stored one.
   char told[sizeof given.name];
   copy_text(instance.name, told);
   if (std::string name = text_in(given.name); name != told) instance.name = std::move(name);
@@ -114,7 +114,7 @@ void describe(const Camera& camera, quoin_camera& out) {
   out.view_height = camera.view_height;
 }
 
-// All of the file, and before them that to look through at first where it is none of these.
+// Returns the file's cameras. If the initial camera is not one of them, it comes first.
 std::vector<quoin_camera> cameras_of(const LoadedScene& loaded) {
   std::vector<quoin_camera> all;
   bool is_there = !loaded.camera;
@@ -134,7 +134,7 @@ std::vector<quoin_camera> cameras_of(const LoadedScene& loaded) {
   return all;
 }
 
-constexpr double kFurthest = 1e9;  // of cameras and lamps, so that floats of files hold them
+constexpr double kFurthest = 1e9;  // of cameras and lamps, so that they fit a file's floats
 
 DVec3 point_of(const double (&given)[3]) {
   return {given[0], given[1], given[2]};
@@ -153,11 +153,11 @@ bool is_colour(const float (&colour)[3]) {
          is_amount(static_cast<double>(colour[2]));
 }
 
-// The layer of a name, and of an empty one none; nothing where the scene has no such layer.
+// Finds a layer by name; an empty name is no layer. Returns nothing if the scene lacks it.
 std::optional<LayerHandle> layer_named(const Scene& scene, std::string_view name) {
   if (name.empty()) return LayerHandle{};
   for (const LayerHandle handle : scene.layers().handles()) {
-    // Names are told cut off, and are to be known so.
+    // Callers may have received truncated names: match these too.
     char told[sizeof quoin_layer::name];
     copy_text(scene.layers()[handle].name, told);
     if (name == told || name == scene.layers()[handle].name) return handle;
@@ -167,9 +167,9 @@ std::optional<LayerHandle> layer_named(const Scene& scene, std::string_view name
 
 constexpr const char* kNoLayer = "the scene has no layer of this name";
 
-/// Takes a camera; returns what is wrong with it, or null.
+/// Converts a camera. Returns an error text; null: success.
 const char* take(const quoin_camera& given, const LoadedScene& loaded, FileCamera& out) {
-  if (given.number < 0) return "a camera's number is less than 0";
+  if (given.number < 0) return "the camera's number is negative";
   for (const FileCamera& one : loaded.cameras) {
     if (one.number == given.number) return "another camera has this number";
   }
@@ -178,33 +178,33 @@ const char* take(const quoin_camera& given, const LoadedScene& loaded, FileCamer
   camera.right = point_of(given.right);
   camera.up = point_of(given.up);
   camera.forward = point_of(given.forward);
-  if (!is_within(camera.position, kFurthest)) return "a camera too far away";
+  if (!is_within(camera.position, kFurthest)) return "the camera's position is out of range";
   const auto is = [](double value, double wanted) { return std::abs(value - wanted) <= kRoughly; };
   for (const DVec3& axis : {camera.right, camera.up, camera.forward}) {
-    if (!is(glm::dot(axis, axis), 1.0)) return "right, up and forward are to be unit";
+    if (!is(glm::dot(axis, axis), 1.0)) return "right, up and forward must be unit vectors";
   }
   const DVec3 right = glm::cross(camera.forward, camera.up);
   if (!is(right.x, camera.right.x) || !is(right.y, camera.right.y) || !is(right.z, camera.right.z))
-    return "right is to be forward x up";
+    return "right must be forward x up";
   if (given.is_orthographic != 0) {
-    if (!(given.view_height > 0.0 && given.view_height <= kFurthest)) return "a view_height that cannot be";
+    if (!(given.view_height > 0.0 && given.view_height <= kFurthest)) return "view_height is out of range";
     camera.projection = Camera::Projection::Orthographic;
     camera.view_height = given.view_height;
   } else {
     if (!(given.vertical_fov_degrees > 0.0 && given.vertical_fov_degrees < 180.0))
-      return "a field of view that is not between 0 and 180 degrees";
+      return "the field of view must be between 0 and 180 degrees";
     camera.vertical_fov_radians = given.vertical_fov_degrees / kDegrees;
   }
-  if (!(given.focus_distance >= 0.0 && given.focus_distance <= kFurthest)) return "a focus that cannot be";
+  if (!(given.focus_distance >= 0.0 && given.focus_distance <= kFurthest)) return "focus_distance is out of range";
   out.number = given.number;
   out.focus_distance = given.focus_distance;
   return nullptr;
 }
 
 const char* take(const quoin_lamp& given, Lamp& lamp) {
-  if (!is_within(point_of(given.position), kFurthest)) return "a lamp too far away";
-  if (!is_colour(given.colour) || !is_amount(given.intensity)) return "light that cannot be";
-  if (!(given.range >= 0.0)) return "a range that is less than 0";
+  if (!is_within(point_of(given.position), kFurthest)) return "the lamp's position is out of range";
+  if (!is_colour(given.colour) || !is_amount(given.intensity)) return "the lamp's colour or intensity is out of range";
+  if (!(given.range >= 0.0)) return "the lamp's range is negative";
   lamp.name = text_in(given.name);
   lamp.position = point_of(given.position);
   lamp.colour = {given.colour[0], given.colour[1], given.colour[2]};
@@ -214,24 +214,24 @@ const char* take(const quoin_lamp& given, Lamp& lamp) {
   lamp.kind = Lamp::Kind::Spot;
   lamp.direction = point_of(given.direction);
   const double length = glm::length(lamp.direction);
-  if (!(length > 0.0) || !std::isfinite(length)) return "a spot needs a direction";
+  if (!(length > 0.0) || !std::isfinite(length)) return "a spot needs a finite, non-zero direction";
   lamp.direction /= length;
   const double outer = given.outer_angle_degrees == 0.0 ? 45.0 : given.outer_angle_degrees;
   if (!(outer > 0.0 && outer <= 180.0) || !(given.inner_angle_degrees >= 0.0 && given.inner_angle_degrees <= outer))
-    return "angles of a spot that cannot be";
+    return "the spot's angles are out of range";
   lamp.outer_angle_radians = outer / kDegrees;
   lamp.inner_angle_radians = given.inner_angle_degrees / kDegrees;
   return nullptr;
 }
 
-/// The same of a sun, in what is to be drawn.
+/// Sets the sun. Returns an error text; null: success.
 const char* take(const quoin_sun& given, Look& look) {
   const DVec3 direction = point_of(given.direction);
   const double length = glm::length(direction);
-  if (!(length > 0.0) || !std::isfinite(length)) return "a sun needs a direction";
-  if (!is_amount(given.brightness) || !is_colour(given.colour)) return "light that cannot be";
+  if (!(length > 0.0) || !std::isfinite(length)) return "the sun needs a finite, non-zero direction";
+  if (!is_amount(given.brightness) || !is_colour(given.colour)) return "the sun's brightness or colour is out of range";
   if (!(given.angle_degrees >= 0.0 && given.angle_degrees / kDegrees <= kMaxSunAngleRadians))
-    return "an angle of the sun's disc that cannot be";
+    return "the sun's angle is out of range";
   look.sun = direction / length;
   look.sun_brightness = given.brightness;
   look.sun_colour = {given.colour[0], given.colour[1], given.colour[2]};
@@ -239,7 +239,7 @@ const char* take(const quoin_sun& given, Look& look) {
   return nullptr;
 }
 
-/// What the scene's sun is; nothing where nothing says it.
+/// Returns the scene's sun; nothing if the scene has none.
 std::optional<Look> sun_of(const LoadedScene& loaded) {
   if (loaded.look) return loaded.look->look;
   if (!loaded.sun) return std::nullopt;
@@ -481,7 +481,7 @@ quoin_status quoin_sun_set(quoin_scene scene, const quoin_sun* sun) {
     if (!given) return fail(QUOIN_INVALID_ARGUMENT, "sun is null, or its size");
     LoadedScene& loaded = body.loaded;
     FileLook look;
-    // As of a .vox file that says nothing but its sun.
+    // The defaults of a .vox file that stores only the sun's direction.
     look.look.sky = SkyModel::Uniform;
     look.develop.tone = ToneCurve::Aces;
     if (loaded.look) look = *loaded.look;

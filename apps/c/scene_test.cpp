@@ -1,4 +1,4 @@
-// What the door tells of scenes: places, groups, cameras, lamps, types; and what it makes of triangles.
+// Tests scenes of the C interface: instances, groups, cameras, lamps, types; and voxelising triangles.
 
 #include <algorithm>
 #include <array>
@@ -22,7 +22,7 @@
 
 namespace {
 
-// All that a scene file may hold but voxels.
+// A scene file with everything except voxels.
 constexpr const char* kSceneFile = R"({
   "quoin_scene": 4,
   "grids": [{"name": "nothing", "voxels": []}],
@@ -59,7 +59,7 @@ class SceneOfARow : public testing::Test {
   }
   void TearDown() override { EXPECT_EQ(quoin_free(scene_), QUOIN_OK); }
 
-  // What a ray straight down at (x, z) meets first.
+  // Returns the first hit of a ray straight down at (x, z).
   double t_below(double x, double z) const {
     const std::array<double, 3> origin = {x, 100.0, z};
     const std::array<double, 3> down = {0.0, -1.0, 0.0};
@@ -92,7 +92,7 @@ TEST_F(SceneOfARow, InstancesAreToldAddedAndMoved) {
   auto again = sized<quoin_instance>();
   ASSERT_EQ(quoin_instance_get(scene_, 1, &again), QUOIN_OK);
   for (std::size_t i = 0; i < turned.size(); ++i) EXPECT_NEAR(again.world_from_grid[i], turned[i], 1e-12) << i;
-  EXPECT_EQ(t_below(11.0, 25.0), 98.0);  // the kept tree knows of it
+  EXPECT_EQ(t_below(11.0, 25.0), 98.0);  // the kept tree is updated
 
   place.visible = 0;
   ASSERT_EQ(quoin_instance_set(scene_, 1, &place), QUOIN_OK);
@@ -138,7 +138,7 @@ TEST_F(SceneOfARow, BlocksSayTheirTypes) {
   EXPECT_EQ(quoin_free(mesh), QUOIN_OK);
 }
 
-// As programs do that were made with the first header.
+// As programs compiled with the first header do.
 TEST_F(SceneOfARow, ShorterStructsStayAsTheyAre) {
   std::array<std::byte, sizeof(quoin_type)> room;
   room.fill(std::byte{0xA5});
@@ -360,7 +360,7 @@ TEST(CFormats, SayWhatCanBeRead) {
   EXPECT_EQ(quoin_format_get(count, &format), QUOIN_INVALID_ARGUMENT);
 }
 
-// A cube of 4 units, red but for its top, whose corners are at -2 and 2: its sides lie between voxels.
+// A cube of 4 units, red except for its top, with corners at -2 and 2: its sides lie between voxels.
 TEST(CTriangles, BecomeVoxelsWhereTheyAre) {
   std::vector<float> positions;
   for (int corner = 0; corner < 8; ++corner) {
@@ -452,7 +452,7 @@ class TwoSheets : public testing::Test {
   }
   void TearDown() override { EXPECT_EQ(quoin_free(scene_), QUOIN_OK); }
 
-  // The types that are added.
+  // The added types.
   std::vector<quoin_type> added(int max_types = 0) {
     auto options = sized<quoin_voxelize_options>();
     options.fill = QUOIN_FILL_SURFACE;
@@ -505,7 +505,7 @@ TEST_F(TwoSheets, MergeTypesThatDifferInColourAlone) {
   std::size_t warnings = 0;
   ASSERT_EQ(quoin_scene_warning_count(scene_, &warnings), QUOIN_OK);
   EXPECT_EQ(warnings, 1U);
-  // A save does not take away what was said before it, nor say it twice.
+  // A save keeps earlier warnings and does not repeat them.
   ASSERT_EQ(quoin_scene_save(scene_, test_file("c_test_sheets.json").c_str()), QUOIN_OK) << quoin_last_error();
   ASSERT_EQ(quoin_scene_save(scene_, test_file("c_test_sheets.glb").c_str()), QUOIN_OK) << quoin_last_error();
   ASSERT_EQ(quoin_scene_warning_count(scene_, &warnings), QUOIN_OK);
@@ -567,7 +567,7 @@ TEST_F(SceneOfARow, ProgressIsToldAndMayEndAWork) {
   EXPECT_EQ(quoin_scene_render(scene_, &options, picture.data(), picture.size()), QUOIN_OK);
   const int calls = listener.calls;
   EXPECT_GT(calls, 2);
-  std::thread([&] {  // whose calls tell nobody
+  std::thread([&] {  // a thread without a callback
     EXPECT_EQ(quoin_scene_render(scene_, &options, picture.data(), picture.size()), QUOIN_OK);
   })
       .join();
@@ -607,7 +607,7 @@ TEST_F(SceneOfARow, ProgressOfSavingAndAddingNeverFalls) {
   EXPECT_EQ(quoin_set_progress(nullptr, nullptr), QUOIN_OK);
 }
 
-// What the header says of threads: those that read, and one that changes, need no lock of their own.
+// As the header says, concurrent readers and a writer need no lock of their own.
 TEST_F(SceneOfARow, ThreadsShareIt) {
   std::vector<std::thread> readers;
   readers.reserve(4);
@@ -711,7 +711,7 @@ TEST(CLoading, TakesValuesAlone) {
   options.raw_scalar = QUOIN_UINT16;
   options.heights = QUOIN_HEIGHTS_GREY;
   EXPECT_EQ(load(), QUOIN_INVALID_ARGUMENT);
-  // A program of before has no such fields, and bytes are then of no known format.
+  // A program compiled with an older header lacks these fields: the bytes then have no known format.
   options.size = offsetof(quoin_load_options, raw_shape);
   EXPECT_EQ(load(), QUOIN_BAD_FORMAT);
   EXPECT_EQ(quoin_scene_load_bytes_with(nullptr, 3, nullptr, &scene), QUOIN_INVALID_ARGUMENT);

@@ -51,17 +51,19 @@ VoxelType type_at(const quoin_array& array, std::int64_t x, std::int64_t y, std:
 
 const char* what_is_wrong(const quoin_array& array) {
   if (array.data == nullptr) return "the array's data is null";
-  if (array.scalar != QUOIN_UINT8 && array.scalar != QUOIN_UINT16) return "types are QUOIN_UINT8 or QUOIN_UINT16";
+  if (array.scalar != QUOIN_UINT8 && array.scalar != QUOIN_UINT16)
+    return "an array of types must be QUOIN_UINT8 or QUOIN_UINT16";
   for (int axis = 0; axis < 3; ++axis) {
-    if (array.shape[axis] <= 0 || array.shape[axis] > kFurthest) return "a shape that cannot be";
-    if (!(std::abs(array.origin[axis]) < static_cast<double>(kFurthest) / 2.0)) return "an origin too far away";
+    if (array.shape[axis] <= 0 || array.shape[axis] > kFurthest) return "the array's shape is out of range";
+    if (!(std::abs(array.origin[axis]) < static_cast<double>(kFurthest) / 2.0))
+      return "the array's origin is out of range";
     if (std::abs(array.origin[axis]) + static_cast<double>(array.shape[axis]) > static_cast<double>(kFurthest))
-      return "an array that reaches too far";
+      return "the array extends out of range";
   }
   return nullptr;
 }
 
-// Why an array of types is none of a scene.
+// Reports an array that contains a type which the scene lacks.
 quoin_status fail_of_type(VoxelType type, std::size_t types) {
   return fail(QUOIN_INVALID_ARGUMENT, ("the array has the type " + std::to_string(type) +
                                        "; those of the scene are 0 to " + std::to_string(types - 1))
@@ -95,7 +97,7 @@ quoin_status add_grid(SceneBody& scene, const quoin_array& array, const char* na
   return QUOIN_OK;
 }
 
-// Nothing is changed where a type is not the scene's.
+// Check all types first: if the scene lacks one, nothing changes.
 quoin_status write_grid(SceneBody& scene, GridHandle grid, const quoin_array& array) {
   const DVec3 origin = floor(DVec3(array.origin[0], array.origin[1], array.origin[2]));
   const IVec3 min(origin);
@@ -170,25 +172,28 @@ LoadOptions options_of(const quoin_load_options& given) {
 
 const char* what_is_wrong_with_landscape(const quoin_load_options& options) {
   if (options.heights < QUOIN_HEIGHTS_NONE || options.heights > QUOIN_HEIGHTS_TERRARIUM)
-    return "heights are said in none of these ways";
-  // What they are in sum, and how deep the ground may be, the reader knows.
+    return "heights is not a quoin_heights value";
+  // The reader checks their combination and the ground's depth.
   for (const double amount :
        {options.metres_per_level, options.metres_per_pixel, options.metres_per_voxel, options.exaggeration}) {
-    if (!std::isfinite(amount)) return "an amount of heights that is not finite";
-    if (amount != 0.0 && options.heights == QUOIN_HEIGHTS_NONE) return "an amount of heights where there are none";
+    if (!std::isfinite(amount)) return "a height map value is not finite";
+    if (amount != 0.0 && options.heights == QUOIN_HEIGHTS_NONE)
+      return "a height map value is set, but heights is QUOIN_HEIGHTS_NONE";
   }
   const bool has_ground = options.ground_depth != 0 || options.smooth_ground != 0;
-  return has_ground && options.heights == QUOIN_HEIGHTS_NONE ? "a ground of heights where there are none" : nullptr;
+  return has_ground && options.heights == QUOIN_HEIGHTS_NONE
+             ? "ground_depth or smooth_ground is set, but heights is QUOIN_HEIGHTS_NONE"
+             : nullptr;
 }
 
 const char* what_is_wrong(const quoin_load_options& options) {
-  if (options.frame < 0 || options.radius < 0 || options.radius > 1'024) return "a frame or a radius that cannot be";
+  if (options.frame < 0 || options.radius < 0 || options.radius > 1'024) return "frame or radius is out of range";
   if (options.has_iso != 0 && !std::isfinite(options.iso)) return "iso is not finite";
   if (options.mesh_voxels < 0 || !(options.voxel_size >= 0.0) || !std::isfinite(options.voxel_size))
-    return "a size of voxels that cannot be";
-  if (options.mesh_voxels != 0 && options.voxel_size != 0.0) return "both sizes of voxels";
+    return "mesh_voxels or voxel_size is out of range";
+  if (options.mesh_voxels != 0 && options.voxel_size != 0.0) return "both mesh_voxels and voxel_size are set";
   if (options.raw_scalar < QUOIN_UINT8 || options.raw_scalar > QUOIN_FLOAT64) return "no scalar has this number";
-  if (is_raw(options) && options.heights != QUOIN_HEIGHTS_NONE) return "a file of both values alone and heights";
+  if (is_raw(options) && options.heights != QUOIN_HEIGHTS_NONE) return "both raw_shape and heights are set";
   return what_is_wrong_with_landscape(options);
 }
 
@@ -219,7 +224,7 @@ std::optional<quoin_array> taken_array(const quoin_array* given) {
   auto stride = static_cast<std::int64_t>(size_of(static_cast<ScalarType>(array->scalar)));
   for (int axis = 2; axis >= 0; --axis) {
     array->strides[axis] = stride;
-    // What is wrong with the shape is told by who reads it.
+    // The reader checks the shape.
     if (array->shape[axis] <= 0 || stride > std::numeric_limits<std::int64_t>::max() / array->shape[axis]) break;
     stride *= array->shape[axis];
   }
@@ -308,7 +313,8 @@ const char* quoin_last_error(void) {
 
 quoin_status quoin_free(std::uint64_t handle) {
   return guarded([&] {
-    return handle == 0 || handles().remove(handle) ? QUOIN_OK : fail(QUOIN_BAD_HANDLE, "nothing has this handle");
+    return handle == 0 || handles().remove(handle) ? QUOIN_OK
+                                                   : fail(QUOIN_BAD_HANDLE, "no scene or mesh has this handle");
   });
 }
 
@@ -367,7 +373,7 @@ quoin_status quoin_scene_warning_count(quoin_scene scene, std::size_t* out) {
 
 quoin_status quoin_scene_warning(quoin_scene scene, std::size_t index, char* text, std::size_t capacity) {
   return with_scene(scene, Use::Read, [&](SceneBody& body) {
-    if (text == nullptr || capacity == 0) return fail(QUOIN_INVALID_ARGUMENT, "there is no room for a text");
+    if (text == nullptr || capacity == 0) return fail(QUOIN_INVALID_ARGUMENT, "text is null, or capacity is 0");
     const std::size_t made = body.loaded.warnings.size();
     if (index >= made + body.save_warnings.size()) return fail(QUOIN_INVALID_ARGUMENT, "no warning has this number");
     copy_text(index < made ? body.loaded.warnings[index] : body.save_warnings[index - made], text, capacity);
@@ -435,14 +441,14 @@ quoin_status quoin_grid_read(quoin_scene scene, std::size_t grid, const std::int
   return with_scene(scene, Use::Read, [&](SceneBody& body) {
     if (min == nullptr || shape == nullptr || out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "an array is null");
     if (grid >= body.numbers.grids.size()) return fail(QUOIN_INVALID_ARGUMENT, "no grid has this number");
-    if (!is_in_range(min, shape)) return fail(QUOIN_INVALID_ARGUMENT, "a box that cannot be");
+    if (!is_in_range(min, shape)) return fail(QUOIN_INVALID_ARGUMENT, "the box is out of range");
     std::size_t left = capacity;
     for (int axis = 0; axis < 3; ++axis) {
       if (shape[axis] == 0) return QUOIN_OK;
       left /= static_cast<std::size_t>(shape[axis]);
     }
-    if (left == 0) return fail(QUOIN_INVALID_ARGUMENT, "the array has no room for the box");
-    // x is the slowest axis of the array, and the fastest of a grid: whole runs along x are read.
+    if (left == 0) return fail(QUOIN_INVALID_ARGUMENT, "the array is too small for the box");
+    // x is the array's slowest axis but the grid's fastest: read whole runs along x.
     GridReader reader(body.loaded.scene.grids()[body.numbers.grids[grid]].grid);
     const auto plane = static_cast<std::size_t>(shape[1]) * static_cast<std::size_t>(shape[2]);
     for (std::int32_t z = 0; z < shape[2]; ++z) {

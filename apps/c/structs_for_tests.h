@@ -7,7 +7,7 @@
 
 #include "quoin.h"
 
-/// What QUOIN_INIT is in C.
+/// The C++ counterpart of QUOIN_INIT.
 template <class T>
 T sized() {
   T made{};
@@ -15,7 +15,7 @@ T sized() {
   return made;
 }
 
-/// The path of a file of that name in a folder that ends with the process.
+/// Returns the path of a file in a temporary folder, which is removed with the process.
 inline std::string test_file(const std::string& name) {
   struct Folder {
     Folder() { std::filesystem::create_directories(path); }

@@ -1,4 +1,4 @@
-// Triangles that become voxels.
+// Voxelises triangles.
 
 #include <bit>
 #include <cmath>
@@ -17,13 +17,13 @@ glm::vec4 light_of(const VoxelProperties& type) {
   return {linear_colour(type.colour), static_cast<float>(type.colour.a) / 255.0F};
 }
 
-// Types that are given, those that differ in colour alone as one look: so that near colours of it can be merged.
+// The caller's types. Types that differ only in colour share a look, so that similar colours can be merged.
 struct Given {
-  std::vector<VoxelProperties> looks;  // their colour, and whether that is transparent, are of the first
-  std::vector<std::size_t> look_of;    // of each type
-  std::vector<glm::vec4> light;        // of each type
-  std::vector<bool> is_clear;          // of each look: transparent whatever the alpha
-  std::unordered_map<std::string, std::size_t> by_key;  // looks, by all that is told of them
+  std::vector<VoxelProperties> looks;                   // with the colour and visibility of the first type
+  std::vector<std::size_t> look_of;                     // of each type
+  std::vector<glm::vec4> light;                         // of each type
+  std::vector<bool> is_clear;                           // of each look: transparent at any alpha
+  std::unordered_map<std::string, std::size_t> by_key;  // looks, by all properties except colour
 
   [[nodiscard]] bool has_shared_looks() const { return looks.size() < look_of.size(); }
 };
@@ -44,7 +44,7 @@ void add(Given& given, const quoin_type& type) {
   given.look_of.push_back(known->second);
 }
 
-// What is told of a material's look goes through voxelization by its number, as its name.
+// The material's name is the number of its look, which finish_types reads after voxelisation.
 MeshMaterial material_of(const VoxelProperties& look, std::size_t number, glm::vec4 light, bool is_blended) {
   MeshMaterial material;
   material.name = std::to_string(number);
@@ -56,12 +56,12 @@ MeshMaterial material_of(const VoxelProperties& look, std::size_t number, glm::v
   return material;
 }
 
-// Types that were added, from `first` on, become what their look says beyond materials.
+// Gives the added types, from `first` on, the properties of their looks that materials cannot store.
 void finish_types(VoxelRegistry& types, std::size_t first, const Given& given) {
   for (std::size_t i = first; i < types.size(); ++i) {
     const auto number = static_cast<VoxelType>(i);
     const VoxelProperties& made = types[number];
-    if (made.name.empty()) continue;  // of what is deep within, of no material
+    if (made.name.empty()) continue;  // inner voxels, without a material
     const std::size_t look = std::stoull(made.name);
     VoxelProperties whole = given.looks[look];
     whole.colour = made.colour;
@@ -73,20 +73,20 @@ void finish_types(VoxelRegistry& types, std::size_t first, const Given& given) {
 const char* wrong_triangles(const quoin_triangles& given) {
   constexpr std::size_t kMost = std::numeric_limits<std::uint32_t>::max();
   if (given.vertex_count > kMost || given.triangle_count > kMost) return "more than 2^32 vertices or triangles";
-  if (given.triangle_count == 0 || given.vertex_count == 0) return "there are no triangles";
+  if (given.triangle_count == 0 || given.vertex_count == 0) return "the mesh has no triangles";
   if (given.positions == nullptr || given.indices == nullptr) return "positions or indices are null";
   if (given.types == nullptr && given.type_count > 0) return "types are null";
   if (given.type_count > kMaxVoxelTypes) return "too many types";
   return nullptr;
 }
 
-// The types, each with a size of its own, which says where the next one lies.
+// Reads the types. The `size` of each one gives the position of the next.
 Result<Given> types_of(const quoin_triangles& triangles) {
   Given given;
   const auto* at = reinterpret_cast<const std::byte*>(triangles.types);
   for (std::size_t i = 0; i < triangles.type_count; ++i) {
     const auto type = taken(reinterpret_cast<const quoin_type*>(at));
-    if (!type) return make_error(ErrorCode::InvalidArgument, "the size of a type");
+    if (!type) return make_error(ErrorCode::InvalidArgument, "invalid size of a type");
     if (const char* wrong = what_is_wrong(*type)) return make_error(ErrorCode::InvalidArgument, wrong);
     add(given, *type);
     at += type->size;
@@ -94,11 +94,11 @@ Result<Given> types_of(const quoin_triangles& triangles) {
   return given;
 }
 
-// Gives each corner a vertex, and that the colour of its triangle's type.
+// Gives each triangle corner its own vertex, coloured by the triangle's type.
 Result<TriangleMesh> with_coloured_corners(const TriangleMesh& mesh, const Given& given) {
   TriangleMesh apart;
   if (mesh.triangles.size() > std::numeric_limits<std::uint32_t>::max() / 3)
-    return make_error(ErrorCode::LimitExceeded, "more than 2^32 corners, which types have colours for");
+    return make_error(ErrorCode::LimitExceeded, "more than 2^32 triangle corners with colours");
   apart.positions.reserve(3 * mesh.triangles.size());
   apart.colours.reserve(3 * mesh.triangles.size());
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
@@ -113,8 +113,8 @@ Result<TriangleMesh> with_coloured_corners(const TriangleMesh& mesh, const Given
   return apart;
 }
 
-// Positions in units of a voxel, so that those of the scene and of the lattice are the same. Materials are those of
-// types; `with_materials` makes them those of looks.
+// Converts positions to voxel units, which the scene and the lattice share. Material indices refer to types;
+// `with_materials` maps them to looks.
 Result<TriangleMesh> mesh_of(const quoin_triangles& given, double voxel_size) {
   TriangleMesh mesh;
   mesh.positions.reserve(given.vertex_count);
@@ -134,7 +134,7 @@ Result<TriangleMesh> mesh_of(const quoin_triangles& given, double voxel_size) {
   const std::size_t materials = std::max(given.type_count, std::size_t{1});
   mesh.material_of.assign(given.materials, given.materials + given.triangle_count);
   for (const std::uint32_t material : mesh.material_of) {
-    if (material >= materials) return make_error(ErrorCode::InvalidArgument, "a material that is not there");
+    if (material >= materials) return make_error(ErrorCode::InvalidArgument, "material index out of range");
   }
   return mesh;
 }
@@ -152,7 +152,7 @@ Result<TriangleMesh> with_materials(TriangleMesh mesh, const Given& given) {
   }
   std::vector<MeshMaterial> materials;
   for (std::size_t i = 0; i < given.looks.size(); ++i) {
-    // Where looks are shared the corners have the colours; else there is a look a type, in the same order.
+    // With shared looks, the corners have the colours; else each type has its own look, in the same order.
     const glm::vec4 light = is_shared ? glm::vec4(1.0F) : given.light[i];
     materials.push_back(material_of(given.looks[i], i, light, has_alpha[i]));
   }
@@ -173,7 +173,7 @@ quoin_status voxelize_into(SceneBody& scene, const quoin_triangles& given, const
   if (!looks) return fail(looks.error());
   auto soup = mesh_of(given, options.voxel_size == 0.0 ? 1.0 : options.voxel_size);
   if (!soup) return fail(soup.error());
-  if (given.type_count > 0) soup->materials.resize(given.type_count);  // to be checked as they were given
+  if (given.type_count > 0) soup->materials.resize(given.type_count);  // check_mesh checks the caller's indices
   if (const Status sound = check_mesh(*soup); !sound) return fail(sound.error());
   soup->materials.clear();
   const auto mesh = with_materials(std::move(*soup), *looks);
@@ -185,7 +185,7 @@ quoin_status voxelize_into(SceneBody& scene, const quoin_triangles& given, const
   if (options.fill == QUOIN_FILL_SURFACE) wanted.solid = SolidVoxels::None;
   if (options.fill == QUOIN_FILL_SOLID) wanted.surface = SurfaceVoxels::None;
   if (options.max_types != 0) wanted.max_types = static_cast<std::size_t>(options.max_types);
-  VoxelRegistry types = scene.loaded.scene.types;  // which stay as they are where this fails
+  VoxelRegistry types = scene.loaded.scene.types;  // a copy: the scene keeps its own on failure
   auto made = voxelize(*mesh, wanted, types, threads_of(options.threads), progress());
   if (!made) return fail(made.error());
   finish_types(types, scene.loaded.scene.types.size(), *looks);
@@ -214,7 +214,7 @@ quoin_status quoin_grid_voxelize(quoin_scene scene, const quoin_triangles* trian
     if (!wanted) return fail(QUOIN_INVALID_ARGUMENT, "the size of the options");
     if (!(wanted->voxel_size >= 0.0) || !std::isfinite(wanted->voxel_size) || wanted->max_types < 0 ||
         wanted->fill < QUOIN_FILL_ALL || wanted->fill > QUOIN_FILL_SURFACE)
-      return fail(QUOIN_INVALID_ARGUMENT, "a size of voxels, a fill or a number of types that cannot be");
+      return fail(QUOIN_INVALID_ARGUMENT, "voxel_size, fill or max_types is out of range");
     return voxelize_into(body, *given, *wanted, name, out);
   });
 }

@@ -107,7 +107,7 @@ async function compare(what, file, options, args, without = {}) {
                                  ['meshVoxels', '20'], ['voxelSize', 0], ['voxelSize', NaN], ['voxelSize', -1],
                                  ['voxelSize', 'small']])
     await refuses(`${option}: ${value}`, () => load(bytes, { [option]: value }));
-  await refuses('both sizes of voxels', () => load(bytes, { meshVoxels: 20, voxelSize: 1 }));
+  await refuses('both meshVoxels and voxelSize', () => load(bytes, { meshVoxels: 20, voxelSize: 1 }));
   // glTF whose arrays meshoptimizer coded.
   const packed = join(scratch, 'packed.glb');
   execFileSync(tool, ['convert', castle, packed, '--compress', '-q']);
