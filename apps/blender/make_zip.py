@@ -1,6 +1,6 @@
-"""Puts the add-on for Blender into a zip, with the package for Python and its library. Usage: make_zip.py WHEEL FOLDER
+"""Packs the Blender add-on with the Python package and its library. Usage: make_zip.py WHEEL FOLDER
 
-It is for Linux on x86-64, as the wheel is. Both are of one version.
+Like the wheel, the zip is for Linux on x86-64. Both must have the same version.
 """
 
 import os
@@ -12,12 +12,12 @@ NAME = "quoin_voxels"
 
 
 def require_version(version):
-    """What Blender is told of the version is that of the package."""
+    """Checks that the add-on's files state the package's version."""
     for name, wanted in (("__init__.py", f'"version": ({version.replace(".", ", ")}),'),
                          ("blender_manifest.toml", f'\nversion = "{version}"\n')):
         with open(os.path.join(HERE, NAME, name)) as file:
             if wanted not in file.read():
-                raise SystemExit(f"make_zip: {name} is of another version than {version}")
+                raise SystemExit(f"make_zip: {name} does not have the version {version}")
 
 
 def main():
@@ -28,8 +28,8 @@ def main():
     path = os.path.join(folder, f"{NAME}-{version}.zip")
     when = (2026, 1, 1, 0, 0, 0)
     with zipfile.ZipFile(path + ".new", "w", zipfile.ZIP_DEFLATED) as out:
-        # By its folder Blender knows what to remove first when it is installed over another version: else it would write
-        # into the library that it has loaded.
+        # With a folder entry, Blender removes an older version before it installs this one. Otherwise it would
+        # overwrite the loaded library.
         folder_entry = zipfile.ZipInfo(f"{NAME}/", when)
         folder_entry.external_attr = 0o40755 << 16 | 0x10
         out.writestr(folder_entry, b"")
@@ -39,7 +39,7 @@ def main():
                     out.writestr(zipfile.ZipInfo(f"{NAME}/{name}", when), file.read(), zipfile.ZIP_DEFLATED)
         with zipfile.ZipFile(wheel) as package:
             for name in sorted(package.namelist()):
-                # Of what pip needs to know only the licences are of use here.
+                # Of the pip metadata, keep only the licences.
                 kept = name if name.startswith("quoin/") else name[name.index("/") + 1:]
                 if name.startswith("quoin/") or "/licenses/" in name:
                     out.writestr(zipfile.ZipInfo(f"{NAME}/{kept}", when), package.read(name), zipfile.ZIP_DEFLATED)

@@ -1,4 +1,4 @@
-"""Installs the add-on's zip into a fresh profile and uses it: import, export, what goes wrong.
+"""Installs the add-on's zip into a fresh profile and tests import, export and errors.
 
 Run: blender -b --factory-startup -P check_addon.py -- ADDON.zip CASTLE.vox FOLDER
 with BLENDER_USER_CONFIG and BLENDER_USER_SCRIPTS in an empty folder. FOLDER is for what is written.
@@ -46,7 +46,7 @@ def run(operator, **options):
 
 
 def refused(operator, words, **options):
-    """Whether it is told what is wrong; in the background Blender raises what an operator reports."""
+    """Checks that an operator fails with these words. Blender in the background raises reported errors."""
     try:
         operator(**options)
     except RuntimeError as error:
@@ -56,7 +56,7 @@ def refused(operator, words, **options):
 
 
 def points_of(scene):
-    """All voxels that a scene shows, as rows of place and colour, in order."""
+    """Returns all visible voxels of a scene as sorted rows of position and colour."""
     rows = []
     grids = [(one.to_numpy(), one.origin) for one in scene.grids]
     for one in scene.instances:
@@ -97,12 +97,12 @@ def check_castle(quoin, path, folder):
         require(len(again.instances) == len(placed) and len(again.grids) == len({one.grid for one in placed}),
                 f"{name}: {len(again.grids)} grids, {len(again.instances)} instances")
         require({one.name for one in again.instances} == {one.name for one in placed}, f"{name}: names")
-        # Looks, whatever the types' numbers.
+        # Compares properties, since type numbers may differ.
         looks = lambda of: {tuple(round(float(v), 4) for v in (*one.rgba, one.emission, one.metalness, one.roughness))
                             for one in of.types[1:] }
         require(looks(again) <= looks(scene), f"{name}: types {looks(again) - looks(scene)}")
 
-    # In the .blend the voxels stay.
+    # The voxels survive saving the .blend.
     bpy.ops.wm.save_as_mainfile(filepath=os.path.join(folder, "castle.blend"))
     bpy.ops.wm.open_mainfile(filepath=os.path.join(folder, "castle.blend"))
     run(bpy.ops.export_scene.quoin, filepath=os.path.join(folder, "again.vox"))
@@ -110,8 +110,7 @@ def check_castle(quoin, path, folder):
 
 
 def check_mesh(mesh, wanted):
-    """Faces are whole voxels, look outwards and have their types' colours and their occlusion, as the library has
-    them."""
+    """Faces cover whole voxels, face outwards and have their types' colours and occlusion, as in the library."""
     values = np.empty(len(mesh.vertices) * 4, np.float32)
     mesh.color_attributes["Occlusion"].data.foreach_get("color", values)
     found = np.unique(values)
@@ -140,7 +139,7 @@ def check_mesh(mesh, wanted):
 
 
 def check_file(quoin, folder):
-    """Groups, layers, lamps, cameras; materials of metal, glass and light; what is turned."""
+    """Groups, layers, lamps, cameras; metal, glass and emissive materials; rotated instances."""
     array = np.zeros((6, 3, 4), np.uint8)
     array[:, 0], array[1, 1, 1], array[4, 1, 2], array[0, 2, 0] = 1, 2, 3, 1
     made = quoin.from_numpy(array, [(1, 1, 1), (2, 2, 2), (3, 3, 3)], "box")
@@ -167,7 +166,7 @@ def check_file(quoin, folder):
         require(lamp.data.type == "SPOT" and np.allclose(lamp.matrix_world.translation, (0.5, -1.5, 1)),
                 "a lamp's place")
         require(abs(lamp.data.energy - 5 * 4 * math.pi**2 * 0.25) < 1e-3, "a lamp's power")
-        # Two that stand at right angles keep their voxels, the third is voxelized.
+        # Two instances with quarter turns keep their voxels; the third is voxelized.
         run(bpy.ops.export_scene.quoin, filepath=os.path.join(folder, "turned.vox"), scale=0.5, fill="solid")
         again = quoin.load(os.path.join(folder, "turned.vox"))
         require(len(again.instances) == 4, f"{len(again.instances)} instances")
@@ -193,7 +192,7 @@ def check_file(quoin, folder):
     require(value("lamp", "Emission Strength") == 8, "a lamp shines")
     require(abs(bpy.data.materials["gold"].diffuse_color[0] - ((250 / 255 + 0.055) / 1.055) ** 2.4) < 1e-5,
             "gold's colour")
-    # What is edited in Blender is what is written.
+    # Export writes edits made in Blender.
     group = next(n for n in bpy.data.materials["gold"].node_tree.nodes if n.type == "GROUP")
     group.inputs[0].default_value = (0, 0, 1, 1)
     run(bpy.ops.export_scene.quoin, filepath=os.path.join(folder, "blue.json"))
@@ -202,7 +201,7 @@ def check_file(quoin, folder):
 
 
 def arrangement(quoin, path):
-    """What belongs where in a file, by names."""
+    """Returns a file's groups, layers and visibility by name."""
     scene = quoin.load(path)
     name = lambda number: "" if number is None else scene.groups[number].name
     return {
@@ -222,7 +221,7 @@ def same_cameras(found, wanted):
 
 
 def check_round_trip(quoin, folder):
-    """Groups, layers, what is hidden, cameras and the sun: from a file to Blender to a file."""
+    """Groups, layers, hidden objects, cameras and the sun survive import and export."""
     box = np.ones((3, 4, 5), np.uint8)
     scene = quoin.from_numpy(box, [(200, 30, 30)], "free")
     scene.set_layer("ground")
@@ -250,7 +249,7 @@ def check_round_trip(quoin, folder):
         place = 5.0 + number - 200.0 * -axes[:, 2]
         wanted.append(quoin.Camera(tuple(place), tuple(axes[:, 0]), tuple(axes[:, 1]), tuple(-axes[:, 2]),
                                    45.0 if height else 25.0 + 10 * number, height, 81.0 if height else 30.0, 2 * number))
-        if height:  # the file's radius says how high it sees
+        if height:  # from the file's radius
             wanted[-1] = wanted[-1]._replace(focus_distance=height / (2 * math.tan(math.radians(22.5))))
         scene.add_camera(wanted[-1])
     scene.set_sun(quoin.Sun((0.3, 0.5, -0.8), 2.0, (1.0, 0.6, 0.3), 4.0))
@@ -276,7 +275,7 @@ def check_round_trip(quoin, folder):
         require(np.allclose(sun.direction, first.direction, atol=1e-5), f"the sun's direction {sun}")
         require(np.allclose([sun.brightness, sun.angle], [2.0, 4.0], atol=1e-4), f"the sun {sun}")
         require(np.allclose(sun.colour, (1.0, 0.6, 0.3), atol=5e-3), f"the sun's colour {sun}")
-    # What is shown in Blender is shown in the file, with its layer.
+    # Objects visible in Blender are visible in the file, with their layer.
     bpy.data.objects["bird"].hide_render = bpy.data.objects["bird"].hide_viewport = False
     bpy.data.collections["cellar"].hide_render = bpy.data.collections["cellar"].hide_viewport = False
     run(bpy.ops.export_scene.quoin, filepath=path, scale=1.0)
@@ -290,7 +289,7 @@ def check_round_trip(quoin, folder):
 
 
 def reported(operator, **options):
-    """What it warns of, as its own module tells it."""
+    """Returns the warnings of an export."""
     from quoin_voxels import exporter
     told, write = [], exporter.export_file
 
@@ -308,7 +307,7 @@ def reported(operator, **options):
 
 
 def check_own_scene(quoin, folder):
-    """What an artist made in Blender: collections as groups or layers, cameras as renders see, lights by name."""
+    """Exports a scene made in Blender: collections as groups or layers, render cameras, lights by name."""
     empty()
     scene = bpy.context.scene
     scene.render.resolution_x, scene.render.resolution_y = 300, 400
@@ -395,7 +394,7 @@ def check_voxelized(quoin, folder):
     cube.modifiers.new("array", "ARRAY").count = 3
     run(bpy.ops.export_scene.quoin, filepath=path, fill="solid")
     require(len(points_of(quoin.load(path))) == 24000, "modifiers count")
-    # What was imported and then edited is voxelized as it is now.
+    # Imported meshes that were edited are voxelized.
     empty()
     quoin.from_numpy(np.ones((4, 4, 4), np.uint8), [(9, 9, 9)]).save(path)
     run(bpy.ops.import_scene.quoin, filepath=path, lights=False)
@@ -418,7 +417,7 @@ def imported_box(quoin, folder, **options):
 
 
 def check_edits(quoin, folder):
-    """Whatever is edited is what is written."""
+    """Export writes every edit."""
     path = os.path.join(folder, "edited.json")
 
     def exported(**options):
@@ -461,14 +460,14 @@ def check_edits(quoin, folder):
     mesh.loops[0].vertex_index = corners[1]
     require(kept.fingerprint(mesh) != before, "a face with other corners")
 
-    # Materials that become clear.
+    # Materials that become transparent.
     imported_box(quoin, folder)
     shader = next(n for n in bpy.data.materials["red"].node_tree.nodes if n.type == "BSDF_PRINCIPLED")
     shader.inputs["Alpha"].default_value = 0.4
     shader.inputs["IOR"].default_value = 1.25
     red = next(one for one in exported().types if one.name == "red")
     require(red.rgba == (200, 0, 0, 102) and red.transparent and abs(red.ior - 1.25) < 1e-6, f"clear red: {red}")
-    # A palette's images are not read, which is said where they were edited.
+    # Export ignores a palette's images and warns if they were edited.
     one = imported_box(quoin, folder, materials="PALETTE")
     from quoin_voxels import materials
     require(not materials.is_edited_palette(one.data.materials[0]), "the palette as it was")
@@ -480,7 +479,7 @@ def check_edits(quoin, folder):
     image.pixels[4] = 0.1
     require(materials.is_edited_palette(material), "an edited palette")
 
-    # Places that a format has not are voxelized.
+    # Objects whose rotation or scale the format does not support are voxelized.
     one = imported_box(quoin, folder)
     one.rotation_euler = (0, 0, math.radians(30))
     for ending in (".qb", ".gox", ".vxl", ".binvox", ".schem", ".vox"):
@@ -498,7 +497,7 @@ def check_edits(quoin, folder):
 
 
 def check_many_types(quoin, folder):
-    """More types than a .vox holds: near colours are merged, what differs in more than colour is not."""
+    """More types than .vox supports: merges similar colours, but not types that differ in more than colour."""
     empty()
     array = np.arange(1, 1001, dtype=np.uint16).reshape(10, 10, 10)
     colours = [((i * 7) % 256, (i * 13) % 256, i // 4) for i in range(999)]
@@ -506,12 +505,12 @@ def check_many_types(quoin, folder):
     quoin.from_numpy(array, colours + [quoin.VoxelType((9, 9, 9, 255), "lamp", emission=5.0)]).save(path)
     run(bpy.ops.import_scene.quoin, filepath=path)
     for ending, wanted in ((".vox", 255), (".json", 1000)):
-        told = reported(bpy.ops.export_scene.quoin, filepath=os.path.join(folder, "fewer" + ending))
+        warnings = reported(bpy.ops.export_scene.quoin, filepath=os.path.join(folder, "fewer" + ending))
         made = quoin.load(os.path.join(folder, "fewer" + ending))
         types = made.grids[0].to_numpy()
         used = np.unique(types)
         require(len(used) == wanted and types.size == 1000, f"{ending}: {len(used)} types")
-        require(any("of 1000 those" in one for one in told) == (ending == ".vox"), f"{ending}: {told}")
+        require(any("of 1000 types" in one for one in warnings) == (ending == ".vox"), f"{ending}: {warnings}")
         lamp = made.types[int(types[-1, -1, -1])]
         require(lamp.emission == 5.0 and lamp.rgba[:3] == (9, 9, 9), f"{ending}: {lamp}")
         found = made.palette[types][..., :3].reshape(-1, 3)[:999].astype(int)
@@ -520,7 +519,7 @@ def check_many_types(quoin, folder):
 
 
 def plane(faces):
-    """A square of faces x faces quads at z = 0.05, whose places on a texture are its own."""
+    """Creates a square of faces x faces quads at z = 0.05, each with its own texture coordinates."""
     x, y = np.meshgrid(np.arange(faces + 1), np.arange(faces + 1))
     points = np.stack([x.ravel() * 0.1, y.ravel() * 0.1, np.full(x.size, 0.05)], axis=1)
     first = (np.arange(faces)[:, None] * (faces + 1) + np.arange(faces)).ravel()
@@ -550,7 +549,7 @@ def check_colours(quoin, folder):
     """Textures and colours of vertices."""
     path = os.path.join(folder, "painted.json")
     colours = lambda: {tuple(row) for row in points_of(quoin.load(path))[:, 3:6]}
-    for edge in (8, 264):  # of the larger one there are more colours than types
+    for edge in (8, 264):  # the larger square has more colours than there are types
         empty()
         mesh, layer, places = plane(edge)
         material, node = painted("picture", "ShaderNodeTexImage")
@@ -577,7 +576,7 @@ def check_colours(quoin, folder):
     run(bpy.ops.export_scene.quoin, filepath=path, fill="surface")
     require(len(points_of(quoin.load(path))) == 64, "places just below 0, and none")
 
-    # Colours of vertices are those of one material alone.
+    # Vertex colours apply to only one material.
     empty()
     mesh, layer, places = plane(8)
     layer = mesh.color_attributes.new("Colour", "FLOAT_COLOR", "POINT")
@@ -603,7 +602,7 @@ def check_refusals(folder):
     with open(bad, "wb") as file:
         file.write(b"VOX \x96\0\0\0MAIN")
     refused(bpy.ops.import_scene.quoin, "bad.vox", filepath=bad)
-    refused(bpy.ops.export_scene.quoin, "nothing to export", filepath=os.path.join(folder, "x.vox"))
+    refused(bpy.ops.export_scene.quoin, "cannot export: nothing is", filepath=os.path.join(folder, "x.vox"))
     bpy.ops.mesh.primitive_cube_add()
     refused(bpy.ops.export_scene.quoin, "x.unknown", filepath=os.path.join(folder, "x.unknown"))
     refused(bpy.ops.export_scene.quoin, "16384", filepath=os.path.join(folder, "x.vox"), scale=1e-6)
@@ -632,7 +631,7 @@ def main():
     require(quoin_voxels.quoin.__file__.startswith(scripts), "with its own package")
     menus = (bpy.types.TOPBAR_MT_file_import, bpy.types.TOPBAR_MT_file_export)
     require(all(any("quoin_voxels" in one.__module__ for one in menu._dyn_ui_initialize()) for menu in menus), "menus")
-    # Installed over itself, as a newer version is, with its library in use.
+    # Installed over itself while its library is loaded, as an update does.
     before = quoin_voxels.quoin
     kept = before.load(castle)
     for stays in range(2):

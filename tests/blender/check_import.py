@@ -1,4 +1,4 @@
-"""Imports GLB files into Blender and compares with what the files say.
+"""Imports GLB files into Blender and compares the result with the files.
 
 Run: blender -b --factory-startup -P check_import.py -- FILE.glb...
 
@@ -47,7 +47,7 @@ class Glb:
         return numpy.frombuffer(self.binary, kind, count, offset).reshape(-1, width)
 
     def world(self, number):
-        """The transform of a node and of all above it."""
+        """Returns a node's transform, including its ancestors'."""
         matrix = self.matrix(self.json["nodes"][number])
         above = self.above.get(number)
         return matrix if above is None else self.world(above) @ matrix
@@ -69,7 +69,7 @@ def rounded(points):
 
 
 def expected_triangles(glb, number):
-    """Corners of all triangles in Blender's world."""
+    """Returns all triangle corners in Blender's world space."""
     node = glb.json["nodes"][number]
     matrix = BLENDER_FROM_GLTF @ glb.world(number)
     points = []
@@ -86,7 +86,7 @@ def imported_triangles(imported):
 
 
 def check_outward(glb, node, imported):
-    """Face normals as Blender computes them from the winding agree with those of the file."""
+    """Blender's face normals, computed from the winding, agree with the file's."""
     mesh = imported.data
     expected = set()
     for primitive in glb.json["meshes"][node["mesh"]]["primitives"]:
@@ -104,7 +104,7 @@ def check_outward(glb, node, imported):
 
 
 def check_texels(glb, node, imported):
-    """Every triangle has the material and points at the texel that the file says."""
+    """Every triangle has the file's material and texel."""
     mesh = imported.data
     layer = mesh.uv_layers.active.data
     counts = {}
@@ -139,7 +139,7 @@ def check_occlusion(glb, node, imported):
     # Blender keeps colours as sRGB bytes, which costs the mid greys up to one step.
     for primitive in primitives:
         colours = primitive["attributes"].get("COLOR_0")
-        # What has its occlusion in a texture is white beside those that have it in their vertices.
+        # Meshes with occlusion in a texture are white, next to others with occlusion in vertices.
         expected |= {255} if colours is None else {int(c) for c in numpy.unique(glb.accessor(colours)[:, 0])}
     values = numpy.empty(len(attributes[0].data) * 4, "f4")
     attributes[0].data.foreach_get("color", values)
@@ -149,7 +149,7 @@ def check_occlusion(glb, node, imported):
 
 
 def decoded_png(data):
-    """8-bit RGB or RGBA without row filters, as Quoin writes it: bytes by row and column."""
+    """Reads 8-bit RGB or RGBA without row filters, as Quoin writes it: bytes by row and column."""
     width, height, _, kind = struct.unpack_from(">IIBB", data, 16)
     packed, at = b"", 8
     while at < len(data):

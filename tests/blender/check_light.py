@@ -1,4 +1,4 @@
-"""Builds the box of `quoin_demo_gallery cornell` in Blender, draws it with Cycles and compares with Quoin's picture.
+"""Builds the box of `quoin_demo_gallery cornell` in Blender, renders it with Cycles and compares with Quoin's image.
 
 Run: blender -b --factory-startup -P check_light.py -- QUOIN.exr SIZE SAMPLES [CYCLES.exr]
 
@@ -42,7 +42,7 @@ def material(name, colour, emission=0.0):
     shader = nodes.new("ShaderNodeBsdfDiffuse")
     shader.inputs["Roughness"].default_value = 0.0
     shader.inputs["Color"].default_value = (*[linear(byte) for byte in colour], 1.0)
-    if emission > 0.0:  # it is lit by others besides
+    if emission > 0.0:  # other lights also light it
         matte, glow, shader = shader, nodes.new("ShaderNodeEmission"), nodes.new("ShaderNodeAddShader")
         glow.inputs["Color"].default_value = matte.inputs["Color"].default_value
         glow.inputs["Strength"].default_value = emission
@@ -53,7 +53,7 @@ def material(name, colour, emission=0.0):
 
 
 def box(low, high, of):
-    """A box in Quoin's axes: +y is up there, +z here."""
+    """Adds a box given in Quoin's axes: +y is up there, +z in Blender."""
     (x0, y0, z0), (x1, y1, z1) = low, high
     corners = [(x, -z, y) for x in (x0, x1) for y in (y0, y1) for z in (z0, z1)]
     faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
@@ -72,7 +72,7 @@ def build():
     box((32, -1, -1), (33, 33, 32), green)
     box((0, -1, -1), (32, 0, 32), white)
     box((0, 0, -1), (32, 33, 0), white)
-    box((0, 32, 0), (12, 33, 32), white)  # the ceiling, about the lamp
+    box((0, 32, 0), (12, 33, 32), white)  # the ceiling, around the lamp
     box((20, 32, 0), (32, 33, 32), white)
     box((12, 32, 0), (20, 33, 12), white)
     box((12, 32, 20), (20, 33, 32), white)
@@ -124,8 +124,7 @@ def read(path, size):
 
 
 def read_quoin(path, size):
-    """Blender gives scripts no pixels of files with layers. Scan lines of OpenEXR in blocks of 16, compressed by
-    zlib."""
+    """Reads OpenEXR scan lines in blocks of 16, compressed by zlib. Blender gives scripts no pixels of layered files."""
     with open(path, "rb") as file:
         data = file.read()
     at, channels, compression = 8, [], None

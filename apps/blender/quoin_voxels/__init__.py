@@ -1,6 +1,6 @@
 """Voxels in Blender: File > Import > Voxels (Quoin) and File > Export > Voxels (Quoin).
 
-Written for Blender 3.4 and for 4; `versions.py` has what differs between them.
+Supports Blender 3.4 and 4; `versions.py` handles their differences.
 """
 
 bl_info = {
@@ -9,7 +9,7 @@ bl_info = {
     "version": (0, 1, 0),
     "blender": (3, 4, 0),
     "location": "File > Import, File > Export",
-    "description": "Reads and writes voxels: .vox, .qb, .gox, worlds of Minecraft's, .vdb and many more",
+    "description": "Imports and exports voxels: .vox, .qb, .gox, Minecraft worlds, .vdb and many more",
     "category": "Import-Export",
 }
 
@@ -17,7 +17,7 @@ import os
 import sys
 import time
 
-if "bpy" in locals():  # reloaded, since another version was installed over this one: so is what belongs to it
+if "bpy" in locals():  # reloaded after another version was installed: reload the submodules too
     for _name in [one for one in sys.modules if one.startswith(__name__ + ".")]:
         globals().pop(_name[len(__name__) + 1:], None)
         del sys.modules[_name]
@@ -26,12 +26,12 @@ import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
-# What the library cannot do here is told by whoever uses it, and leaves the add-on itself in order.
+# Without the library the add-on still registers; its operators report the error.
 try:
     from . import quoin
 except (ImportError, OSError) as error:
     quoin = None
-    _missing = f"Quoin's library cannot be loaded here: {error}"
+    _missing = f"cannot load the Quoin library: {error}"
 
 
 def _pattern(is_wanted):
@@ -41,7 +41,7 @@ def _pattern(is_wanted):
 
 
 def _run(operator, work):
-    """Does it, and says what went wrong as Blender does."""
+    """Runs `work` and reports its errors and warnings to Blender."""
     if quoin is None:
         operator.report({"ERROR"}, _missing)
         return {"CANCELLED"}
@@ -51,7 +51,7 @@ def _run(operator, work):
         operator.report({"ERROR"}, str(error))
         return {"CANCELLED"}
     except MemoryError:
-        operator.report({"ERROR"}, "There is not enough memory for that")
+        operator.report({"ERROR"}, "out of memory")
         return {"CANCELLED"}
     for warning in warnings:
         operator.report({"WARNING"}, warning)
@@ -60,7 +60,7 @@ def _run(operator, work):
 
 
 class QUOIN_OT_import(bpy.types.Operator, ImportHelper):
-    """Read voxels: models, scenes, worlds, volumes"""
+    """Import voxel models, scenes, worlds and volumes"""
 
     bl_idname = "import_scene.quoin"
     bl_label = "Import Voxels"
@@ -70,30 +70,29 @@ class QUOIN_OT_import(bpy.types.Operator, ImportHelper):
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"})
     directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
 
-    scale: FloatProperty(name="Voxel Size", description="Of a voxel, in Blender's units", default=0.1, min=1e-6,
-                         soft_max=10.0, subtype="DISTANCE")
+    scale: FloatProperty(name="Voxel Size", description="Edge length of a voxel, in Blender units", default=0.1,
+                         min=1e-6, soft_max=10.0, subtype="DISTANCE")
     surface: EnumProperty(name="Surface", default="BLOCKS", items=[
-        ("BLOCKS", "Blocks", "Cubes, whose faces are merged"),
-        ("SMOOTH", "Smooth", "A smooth surface around the voxels, of triangles")])
+        ("BLOCKS", "Blocks", "Cubes with merged faces"),
+        ("SMOOTH", "Smooth", "A smooth triangle mesh around the voxels")])
     materials: EnumProperty(name="Materials", default="AUTO", items=[
-        ("AUTO", "Automatic", "One a type of voxel, as far as a file has 256 types; beyond that a palette"),
-        ("TYPES", "One a Type", "A material for each type of voxel"),
-        ("PALETTE", "Palette", "One material, whose colours and surfaces are in two small images")])
+        ("AUTO", "Automatic", "One material per voxel type for files of up to 256 types; otherwise a palette"),
+        ("TYPES", "Per Type", "One material per voxel type"),
+        ("PALETTE", "Palette", "One material that stores colours and surface properties in two small images")])
     occlusion: FloatProperty(name="Occlusion", default=0.0, min=0.0, max=1.0, subtype="FACTOR",
-                             description="How much of the occlusion that is kept in the attribute Occlusion the "
-                                         "materials show. It can be turned later: the node group Quoin Occlusion "
-                                         "has it")
-    keep_voxels: BoolProperty(name="Keep Voxels", default=True, description="Keep the voxels themselves in the .blend, "
-                              "so that export writes them as they were, with those inside")
-    lights: BoolProperty(name="Cameras and Lights", default=True, description="Of the file: cameras, lamps, the sun")
-    show_hidden: BoolProperty(name="Show Hidden", default=False, description="Show what the file hides")
-    frame: IntProperty(name="Frame", default=0, min=0, description="Of an animation in the file")
+                             description="Strength of the attribute Occlusion in the materials. To change it later, "
+                                         "edit the node group Quoin Occlusion")
+    keep_voxels: BoolProperty(name="Keep Voxels", default=True, description="Store the voxels in the .blend, so that "
+                              "export writes them unchanged, including inner voxels")
+    lights: BoolProperty(name="Cameras and Lights", default=True, description="Import cameras, lamps and the sun")
+    show_hidden: BoolProperty(name="Show Hidden", default=False, description="Show objects that the file hides")
+    frame: IntProperty(name="Frame", default=0, min=0, description="Animation frame to import")
     radius: IntProperty(name="Radius", default=4, min=1, soft_max=32,
-                        description="Of a world: how far around its spawn, in chunks of 64 voxels")
+                        description="Worlds: distance to import around the spawn point, in chunks of 64 voxels")
     size: IntProperty(name="Size", default=128, min=1, max=16384,
-                      description="Of a file of triangles or a print: voxels along its longest side")
-    set_iso: BoolProperty(name="Threshold", default=False, description="Of a volume: what is above is solid; else a "
-                          "value between its two groups is found")
+                      description="Triangle and print files: voxels along the longest side")
+    set_iso: BoolProperty(name="Threshold", default=False, description="Volumes: values above it are solid. Default: "
+                          "a value between the two groups of values")
     iso: FloatProperty(name="Value", default=0.0)
 
     def draw(self, context):
@@ -102,7 +101,7 @@ class QUOIN_OT_import(bpy.types.Operator, ImportHelper):
         for name in ("scale", "surface", "materials", "occlusion", "keep_voxels", "lights", "show_hidden"):
             layout.prop(self, name)
         box = layout.box()
-        box.label(text="Of files that have them")
+        box.label(text="For some file types")
         for name in ("frame", "radius", "size", "set_iso"):
             box.prop(self, name)
         row = box.row()
@@ -126,7 +125,7 @@ class QUOIN_OT_import(bpy.types.Operator, ImportHelper):
 
 
 class QUOIN_OT_export(bpy.types.Operator, ExportHelper):
-    """Write objects as voxels: those that were imported as they were, others by what they enclose"""
+    """Export objects as voxels: imported voxels unchanged, other objects voxelized"""
 
     bl_idname = "export_scene.quoin"
     bl_label = "Export Voxels"
@@ -136,21 +135,22 @@ class QUOIN_OT_export(bpy.types.Operator, ExportHelper):
     check_extension = None
     filter_glob: StringProperty(default=_pattern(lambda one: one.writable and not one.is_mesh), options={"HIDDEN"})
 
-    scale: FloatProperty(name="Voxel Size", description="Of a voxel, in Blender's units", default=0.1, min=1e-6,
-                         soft_max=10.0, subtype="DISTANCE")
-    use_selection: BoolProperty(name="Selected Only", default=False, description="Else all that renders show")
+    scale: FloatProperty(name="Voxel Size", description="Edge length of a voxel, in Blender units", default=0.1,
+                         min=1e-6, soft_max=10.0, subtype="DISTANCE")
+    use_selection: BoolProperty(name="Selected Only", default=False,
+                                description="Export only selected objects. Default: all objects visible in renders")
     collections: EnumProperty(name="Collections", default="GROUPS", items=[
-        ("GROUPS", "As Groups", "A group for each collection with objects in it; layers are the property `layer`"),
-        ("LAYERS", "As Layers", "A layer for each collection of the scene's, and groups for those in them"),
-        ("NONE", "Not Written", "Objects alone; layers are the property `layer`")])
-    hidden: BoolProperty(name="Hidden Voxels", default=True, description="Write objects that were imported and are "
-                         "hidden too, hidden, where the format can say that")
-    lights: BoolProperty(name="Cameras and Lights", default=True, description="Those that the format holds; a sun, "
-                         "cameras, lamps. What it does not hold is said")
+        ("GROUPS", "As Groups", "A group for each collection with objects; the property `layer` assigns layers"),
+        ("LAYERS", "As Layers", "A layer for each top-level collection, and groups for the collections in it"),
+        ("NONE", "Not Written", "Only objects; the property `layer` assigns layers")])
+    hidden: BoolProperty(name="Hidden Voxels", default=True, description="Also export hidden imported objects, as "
+                         "hidden, if the format supports it")
+    lights: BoolProperty(name="Cameras and Lights", default=True, description="Export the sun, cameras and lamps that "
+                         "the format supports, with a warning about the others")
     fill: EnumProperty(name="Fill", default="all", items=[
-        ("all", "All", "What a mesh encloses, and what it passes through: thin parts stay"),
-        ("solid", "Solid", "Voxels whose centre it encloses"),
-        ("surface", "Hollow", "Voxels that it passes through")])
+        ("all", "All", "Enclosed voxels and voxels that the mesh touches: keeps thin parts"),
+        ("solid", "Solid", "Voxels whose centre is enclosed"),
+        ("surface", "Hollow", "Voxels that the mesh touches")])
 
     def execute(self, context):
         path = self.filepath
@@ -160,7 +160,7 @@ class QUOIN_OT_export(bpy.types.Operator, ExportHelper):
         def work():
             from . import exporter
             made = exporter.export_file(context, path, self)
-            return made.warnings, f"{made.kept} objects as they were imported, {made.voxelized} voxelized"
+            return made.warnings, f"{made.kept} objects unchanged since import, {made.voxelized} voxelized"
 
         return _run(self, work)
 
@@ -174,7 +174,7 @@ def _export_entry(self, context):
 
 
 _classes = [QUOIN_OT_import, QUOIN_OT_export]
-if hasattr(bpy.types, "FileHandler"):  # Blender 4.1: files that are dropped
+if hasattr(bpy.types, "FileHandler"):  # Blender 4.1: drag and drop
 
     class QUOIN_FH_voxels(bpy.types.FileHandler):
         bl_idname = "QUOIN_FH_voxels"

@@ -1,4 +1,4 @@
-"""Blender's objects as files of voxels: those that were imported as they were, others voxelized."""
+"""Exports Blender objects to voxel files: imported voxels unchanged, other objects voxelized."""
 
 import os
 
@@ -8,7 +8,7 @@ from . import axes, kept, materials, merging, places, quoin, views
 
 
 class Exported:
-    """What an export wrote, and what it left out."""
+    """Counts the exported objects; lists warnings."""
 
     def __init__(self):
         self.kept = 0
@@ -16,11 +16,11 @@ class Exported:
         self.warnings = []
 
 
-# Formats with grids of any turn, place and size; others have quarter turns and whole places.
+# Formats with any rotation, position and scale. Others have quarter turns and integer positions.
 _ANY_PLACE = {".json", ".quoin"}
 
 
-# Formats with groups and layers, and what is hidden.
+# Formats with groups, layers and hidden objects.
 _GROUPS = {".json", ".quoin", ".vox"}
 
 
@@ -42,7 +42,7 @@ class _Writer:
         return self._types[key]
 
     def can_place(self, matrix):
-        """Whether the format has a place for a grid that stands so; others are voxelized where they are."""
+        """Returns true if the format supports this placement. Otherwise the object is voxelized in place."""
         linear = matrix[:3, :3]
         if self.ending not in _ANY_PLACE:
             return bool((np.abs(linear).sum(0) == 1.0).all() and (np.abs(linear).sum(1) == 1.0).all()
@@ -51,14 +51,13 @@ class _Writer:
         return size > 0.0 and np.allclose(linear.T @ linear, size * size * np.eye(3), atol=1e-5 * size * size)
 
     def _belong(self, owner, is_hidden=False):
-        """Puts the next instance where it belongs: into the groups and onto the layer of its owner. Returns whether
-        its own switch is to be on."""
+        """Assigns the next instance to its owner's groups and layer. Returns the instance's own visibility flag."""
         number = self._places
         self._places += 1
         return self.belonging is None or self.belonging.add(number, owner, is_hidden)
 
     def add_kept(self, source, matrix, name, owner, is_hidden=False):
-        """Places the voxels that a mesh carries."""
+        """Adds an instance of the voxels stored in a mesh."""
         mesh = source.data
         slots = [slot.material for slot in source.material_slots]
         key = (mesh.name_full, tuple(one.name_full if one else "" for one in slots))
@@ -69,7 +68,7 @@ class _Writer:
             self._warn_of_images(slots, {slot for slot in found.slots if slot >= 0}, name)
             numbers = np.array([0] + [self.type_number(one) for one in types], np.uint16)
             grid = self.scene.add(numbers[found.voxels], name=mesh.name)
-            # It stands where its array begins; grids begin at 0.
+            # The array starts at `origin`; grids start at 0.
             moved = np.eye(4)
             moved[:3, 3] = found.origin
             self._grids[key] = (grid, moved)
@@ -82,19 +81,19 @@ class _Writer:
         self.made.kept += 1
 
     def _warn_of_images(self, slots, own, name):
-        # `own`: slots of one type each.
+        # `own`: slots with one type each.
         for slot, material in enumerate(slots):
             if material is None:
                 continue
             if slot in own and materials.seen(material)[1] is not None:
-                self.made.warnings.append(f"{name}: what colours {material.name} is not read; its type stays as it was "
-                                          "imported")
+                self.made.warnings.append(f"{name}: the colour texture of {material.name} is ignored; its type stays "
+                                          "as imported")
             elif materials.is_edited_palette(material):
-                self.made.warnings.append(f"{name}: the images of {material.name} were edited and are not read; its "
-                                          "types stay as they were imported")
+                self.made.warnings.append(f"{name}: the edited images of {material.name} are ignored; its types stay "
+                                          "as imported")
 
     def add_voxelized(self, evaluated, world, name, owner):
-        """Voxelizes what an object looks like."""
+        """Voxelizes an object as evaluated, with its modifiers."""
         mesh = evaluated.to_mesh()
         if mesh is None:
             return
@@ -133,8 +132,8 @@ class _Writer:
         self.made.voxelized += 1
 
     def _colour(self, mesh, slots, looks, numbers, name):
-        """The types of slots, and what the corners of triangles multiply them with, (n, 3, 4) in linear light; None
-        where that is nothing."""
+        """Returns the types of slots, and the colours that multiply them at triangle corners: (n, 3, 4) in linear
+        light, or None."""
         types, colours = [one for one, _ in looks], None
         for slot, (one, node) in enumerate(looks):
             own = np.flatnonzero(numbers == slot)
@@ -147,20 +146,20 @@ class _Writer:
                 found = _texels_of(mesh, node, own)
                 found = None if found is None else materials.opaque(found)[:, None]
             if found is None:
-                self.made.warnings.append(f"{name}: what colours {slots[slot].name} is left out; its viewport colour "
-                                          "stands for it")
+                self.made.warnings.append(f"{name}: cannot export the colours of {slots[slot].name}; its viewport "
+                                          "colour is used")
                 continue
             if colours is None:
                 colours = np.ones((len(numbers), 3, 4), np.float32)
             colours[own] = found
             types[slot] = one._replace(rgba=(255, 255, 255, one.rgba[3]))
             if not materials.has_attribute(node) and node.interpolation != "Closest":
-                self.made.warnings.append(f"{name}: of the texture of {slots[slot].name} a triangle has one colour")
+                self.made.warnings.append(f"{name}: the texture of {slots[slot].name} is sampled once per triangle")
         return types, colours
 
 
 def _colours_of(mesh, node):
-    """The colours of its triangles' corners that a node shows, (n, 3, 4) in linear light; None where it has none."""
+    """Returns the colours that a node gives the triangle corners, (n, 3, 4) in linear light, or None."""
     named = node.attribute_name if node.type == "ATTRIBUTE" else node.layer_name
     found = mesh.color_attributes
     layer = found.get(named) or found.get(materials.COLOUR) or found.active_color
@@ -168,20 +167,19 @@ def _colours_of(mesh, node):
         return None
     values = np.empty((len(layer.data), 4), np.float32)
     layer.data.foreach_get("color", values.ravel())
-    values[:, 3] = 1.0  # the alpha of materials is what counts
+    values[:, 3] = 1.0  # alpha comes from the material
     corners = np.empty((len(mesh.loop_triangles), 3), np.int32)
     mesh.loop_triangles.foreach_get("vertices" if layer.domain == "POINT" else "loops", corners.ravel())
     return values[corners]
 
 
 def _place_in(share, size):
-    """The pixels of a row or a column that shares of it lie in."""
+    """Converts coordinates in [0, 1) to pixel indices of a row or column."""
     return np.minimum((np.nan_to_num(share) * size).astype(int), size - 1)
 
 
 def _texels_of(mesh, node, triangles):
-    """The colours, sRGB bytes (n, 3), that a texture has in the middle of triangles; None where there is no such
-    texture."""
+    """Samples a texture at triangle centres: sRGB bytes (n, 3), or None without a texture."""
     layer = mesh.uv_layers.active
     image = node.image if node.type == "TEX_IMAGE" else None
     if image is None or layer is None or not image.size[0]:
@@ -190,7 +188,7 @@ def _texels_of(mesh, node, triangles):
     mesh.loop_triangles.foreach_get("loops", corners.ravel())
     places = np.empty((len(mesh.loops), 2), np.float32)
     layer.data.foreach_get("uv", places.ravel())
-    with np.errstate(invalid="ignore"):  # coordinates that are no numbers are those of the first pixel
+    with np.errstate(invalid="ignore"):  # NaN coordinates use the first pixel
         middle = places[corners[triangles]].mean(1) % 1.0
     width, height = image.size
     pixels = np.empty(width * height * image.channels, np.float32)
@@ -205,7 +203,7 @@ _SOLID = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 
 
 def _owner(one):
-    """The object that stands in the scene for what is seen."""
+    """Returns the scene object that an evaluated instance belongs to."""
     return one.parent.original if one.is_instance else one.object.original
 
 
@@ -220,12 +218,12 @@ def _is_wanted(one, options, tree):
 
 
 def _is_changed(source):
-    """Whether what an object shows is not its mesh."""
+    """Returns true if modifiers or shape keys change the object's mesh."""
     return bool(source.modifiers) or source.data.shape_keys is not None
 
 
 def _hidden(context, options, tree):
-    """Objects with kept voxels that are not seen."""
+    """Returns the hidden objects with stored voxels."""
     if options.use_selection or not options.hidden:
         return []
     return [one for one in context.scene.objects
@@ -239,8 +237,8 @@ def _add_hidden(writer, hidden, options):
         if writer.can_place(matrix):
             writer.add_kept(source, matrix, source.name, source, True)
         else:
-            writer.made.warnings.append(f"{source.name}: it is hidden, and {writer.ending} has no place for voxels that "
-                                        "are turned or scaled so; it is left out")
+            writer.made.warnings.append(f"{source.name}: the hidden object is left out, because {writer.ending} does "
+                                        "not support its rotation or scale")
 
 
 def _add_seen(writer, one, options):
@@ -252,13 +250,13 @@ def _add_seen(writer, one, options):
         if writer.can_place(matrix):
             writer.add_kept(source, matrix, name, owner)
             return
-        writer.made.warnings.append(f"{name}: {writer.ending} has no place for voxels that are turned or scaled "
-                                    "so; it is voxelized")
+        writer.made.warnings.append(f"{name}: voxelized, because {writer.ending} does not support its rotation or "
+                                    "scale")
     writer.add_voxelized(evaluated, world, name, owner)
 
 
 def export_file(context, path, options):
-    """Writes what the scene shows as a file, in the format of its name's ending."""
+    """Writes the visible scene to a file, in the format of its extension."""
     for one in context.scene.objects:
         if one.type == "MESH" and one.mode == "EDIT":
             one.update_from_editmode()
@@ -275,12 +273,12 @@ def export_file(context, path, options):
             _add_seen(writer, one, options)
     _add_hidden(writer, hidden, options)
     if writer.made.kept + writer.made.voxelized == 0:
-        raise ValueError("There is nothing to export" + (": nothing is selected" if options.use_selection else ""))
+        raise ValueError("cannot export: " + ("nothing is selected" if options.use_selection else "nothing is visible"))
     if options.lights:
         writer.made.warnings += views.write(context, writer.scene, writer.ending, tree, options)
     if merged := merging.merge(writer.scene, writer.ending):
-        writer.made.warnings.append(f"{writer.ending} holds {merging.MOST_TYPES[writer.ending]} types: of {merged} those "
-                                    "whose colours are alike were merged")
+        writer.made.warnings.append(f"{writer.ending} supports at most {merging.MOST_TYPES[writer.ending]} types; "
+                                    f"merged similar colours of {merged} types")
     writer.scene.save(path)
     writer.made.warnings += writer.scene.warnings
     return writer.made

@@ -1,4 +1,4 @@
-"""Files of voxels as Blender's objects: a mesh a grid, an object a place."""
+"""Imports voxel files: a mesh per grid, an object per instance."""
 
 import math
 import os
@@ -10,12 +10,12 @@ from mathutils import Matrix, Vector
 from . import axes, kept, materials, places, quoin, versions
 
 
-# Formats of Quoin's own, whose sizes are meant.
+# Quoin's own formats, which store intended sizes.
 _OUR_OWN = {"scene", "world"}
 
 
 class Imported:
-    """What an import made, and what it left out."""
+    """Counts the imported objects; lists warnings."""
 
     def __init__(self):
         self.objects = 0
@@ -23,7 +23,7 @@ class Imported:
 
 
 class _Looks:
-    """The materials of one import, made when they are needed."""
+    """The materials of one import, created on first use."""
 
     def __init__(self, name, types, options):
         self.name, self.types, self.scale = name, types, options.scale
@@ -35,7 +35,7 @@ class _Looks:
         self._smooth = None
 
     def of(self, number):
-        """The material of a type."""
+        """Returns a type's material."""
         one = self.types[number]
         if self.palette is not None and not one.transparent:
             return self.palette.material
@@ -53,9 +53,9 @@ class _Looks:
 
 
 def _quads(triangles):
-    """Four corners of each face of blocks, from its two triangles: so that Blender cuts it along the same diagonal.
+    """Returns the four corners of each block face, ordered so that Blender splits it along the same diagonal.
 
-    Quoin has the corners 0 1 2 3 of each face together, and the triangles 0 1 2, 0 2 3 or 1 2 3, 0 1 3."""
+    Quoin stores the corners 0 1 2 3 of a face consecutively, with the triangles 0 1 2, 0 2 3 or 1 2 3, 0 1 3."""
     pairs = triangles.reshape(-1, 6)
     first = pairs[:, 0].astype(np.int32)
     base = first & ~3
@@ -63,7 +63,7 @@ def _quads(triangles):
 
 
 def _edges_of_quads(mesh, quads):
-    """Four edges a face: no two faces share a corner, so that nothing has to be looked for."""
+    """Adds four edges per face. Faces share no corners, so no search is needed."""
     edges = np.empty((len(quads), 4, 2), np.int32)
     edges[:, :, 0] = quads
     edges[:, :3, 1] = quads[:, 1:]
@@ -75,7 +75,7 @@ def _edges_of_quads(mesh, quads):
 
 
 def _open(found, blocks):
-    """What light arrives at vertices, as glTF and PLY files have it: of blocks a quarter at least."""
+    """Returns the light that reaches vertices, as in glTF and PLY files: at least 0.25 for blocks."""
     open_ = np.ones(len(found.positions), np.float32)
     if found.occlusion is not None:
         open_ -= found.occlusion
@@ -89,7 +89,7 @@ def _colours(mesh, name, values):
 
 
 def _slots(mesh, looks, face_types, faces):
-    """Gives the mesh its materials, and its faces theirs. Returns the slots of types with materials of their own."""
+    """Assigns materials to the mesh and its faces. Returns the slots of types that have their own material."""
     occurs = np.flatnonzero(np.bincount(face_types, minlength=1))
     occurs = occurs[occurs > 0]
     slot_of = np.zeros(int(occurs.max(initial=0)) + 1, np.int32)
@@ -111,8 +111,8 @@ def _slots(mesh, looks, face_types, faces):
 
 
 def mesh_of(grid, name, looks, options):
-    """A mesh in Blender of one grid, with its attributes and materials, None where nothing is to be seen; and which
-    types have which slot of materials to themselves."""
+    """Creates the Blender mesh of a grid, with attributes and materials. Returns it, or None if the grid has no
+    surface; and the slots of types that have their own material."""
     found = grid.mesh(smooth=options.surface == "SMOOTH")
     if not len(found.triangles):
         return None, {}
@@ -163,12 +163,12 @@ def _keep(mesh, grid, looks, slots, options, made):
     if not options.keep_voxels or not grid.voxels:
         return
     if not kept.keep(mesh, grid, looks.types, options.scale, slots):
-        made.warnings.append(f"{mesh.name}: its voxels are too many, or too scattered, to be kept in the .blend; "
-                             "export will voxelize it")
+        made.warnings.append(f"{mesh.name}: cannot keep the voxels in the .blend: too many or too scattered; export "
+                             "will voxelize the mesh")
 
 
 def _collections(scene, top):
-    """A collection for each group, within that of its parent, hidden where the group's own switch hides it."""
+    """Creates a collection per group, nested like the groups, hidden if the group's own flag hides it."""
     found = []
     groups = scene.groups
     hidden = {one.name for one in scene.layers if not one.visible}
@@ -185,7 +185,7 @@ def _collections(scene, top):
 
 
 def _hidden_groups(scene, collections):
-    """The numbers of groups that their collections, or those above, hide."""
+    """Returns the numbers of groups hidden by their collection or one above it."""
     hidden = set()
     for i, group in enumerate(scene.groups):
         if collections[i].hide_render or group.parent in hidden:
@@ -205,7 +205,7 @@ def _camera(one, name, options, reach):
     matrix = np.eye(4)
     matrix[:3, 0], matrix[:3, 1], matrix[:3, 2] = one.right, one.up, -np.array(one.forward)
     matrix[:3, 3] = one.position
-    # The camera's own axes are the same in both.
+    # Camera axes are the same in both.
     matrix = axes.BLENDER_FROM_QUOIN @ matrix
     matrix[:3, 3] *= options.scale
     data.clip_end = max(data.clip_end, 2.0 * (np.linalg.norm(matrix[:3, 3]) + reach))
@@ -216,7 +216,7 @@ def _camera(one, name, options, reach):
 
 
 def _towards(direction):
-    """The turn of a light, which shines along its -z."""
+    """Returns the rotation of a light, which shines along its -z."""
     along = axes.BLENDER_FROM_QUOIN[:3, :3] @ np.asarray(direction, float)
     return Vector(along).to_track_quat("-Z", "Y").to_matrix().to_4x4()
 
@@ -224,7 +224,8 @@ def _towards(direction):
 def _lamp(one, name, options):
     data = bpy.data.lights.new(one.name or name, "POINT" if one.direction is None else "SPOT")
     data.color = one.colour
-    # White that faces it at 1 shows `intensity`; in Blender, of a power P, P / (4 pi^2).
+    # A white surface facing the lamp at distance 1 receives `intensity`; in Blender a lamp of power P gives
+    # P / (4 pi^2).
     data.energy = one.intensity * 4.0 * math.pi ** 2 * options.scale ** 2
     data.shadow_soft_size = 0.0
     made = bpy.data.objects.new(data.name, data)
@@ -240,7 +241,7 @@ def _lamp(one, name, options):
 
 def _sun(sun):
     data = bpy.data.lights.new("Sun", "SUN")
-    data.energy = math.pi * sun.brightness  # white that faces it shows the brightness
+    data.energy = math.pi * sun.brightness  # a white surface facing the sun has this brightness
     data.color = sun.colour
     data.angle = math.radians(sun.angle)
     made = bpy.data.objects.new("Sun", data)
@@ -267,8 +268,8 @@ def _lights(context, scene, top, name, options, made):
 
 
 def _on_lattice(scene, matrix):
-    """A place whose voxels are as large as they are to be, on the lattice: of the one grid of a file in a unit of its
-    own, such as one of triangles. Others stay as they are."""
+    """Scales and snaps the only instance of a file with its own unit, such as a triangle file, to the voxel lattice.
+    Returns other matrices unchanged."""
     size = np.cbrt(abs(np.linalg.det(matrix[:3, :3])))
     if abs(size - 1.0) < 1e-6 or scene.format in _OUR_OWN or len(scene.instances) != 1 or not scene.grids[0].voxels:
         return matrix
@@ -297,20 +298,20 @@ def _place(scene, top, name, looks, options, made, progress):
             continue
         made_object = bpy.data.objects.new(one.name or mesh.name, mesh)
         made_object.matrix_world = Matrix(axes.matrix_to_blender(_on_lattice(scene, one.matrix), options.scale))
-        is_shown = one.shown or one.group in hidden_groups  # which their collections hide
+        is_shown = one.shown or one.group in hidden_groups  # their collections hide these
         made_object.hide_render = made_object.hide_viewport = not (one.visible and is_shown)
         if one.layer:
             made_object[places.LAYER] = one.layer
         (top if one.group is None else groups[one.group]).objects.link(made_object)
         made.objects += 1
     if empty:
-        made.warnings.append(f"{name}: {empty} places of grids without a voxel are left out")
+        made.warnings.append(f"{name}: {empty} instances of empty grids are left out")
     if unplaced := len(grids) - len(meshes):
-        made.warnings.append(f"{name}: {unplaced} grids that stand nowhere are left out")
+        made.warnings.append(f"{name}: {unplaced} grids without instances are left out")
 
 
 def import_file(context, path, options):
-    """Reads a file and puts what it holds into a collection of its own, as `options` (the operator's) say."""
+    """Imports a file into a new collection. `options` is the import operator."""
     scene = quoin.load(path, frame=options.frame, show_hidden=options.show_hidden, radius=options.radius,
                        iso=options.iso if options.set_iso else None, size=options.size)
     made = Imported()
@@ -321,8 +322,8 @@ def import_file(context, path, options):
     context.scene.collection.children.link(top)
     looks = _Looks(name, scene.types, options)
     if options.surface == "SMOOTH" and any(one.transparent or one.emission > 0.0 for one in looks.types):
-        made.warnings.append(f"{name}: smooth surfaces are opaque and do not shine; types of it are transparent, or "
-                             "lamps")
+        made.warnings.append(f"{name}: smooth surfaces are opaque and do not emit light; the file has transparent or "
+                             "emissive types")
     window = context.window_manager
     window.progress_begin(0.0, 1.0)
     try:

@@ -1,4 +1,4 @@
-"""Voxels that meshes carry in the .blend, so that what was imported can be written as it was."""
+"""Stores voxels with their meshes in the .blend, so that export can write them unchanged."""
 
 import json
 import zlib
@@ -9,7 +9,8 @@ from . import quoin
 
 _VOXELS, _ABOUT = "quoin_voxels", "quoin_about"
 MOST_CELLS = 1 << 29
-# A box takes room by its cells: one of more than this is to have a voxel for so many of them.
+# Memory grows with the cells of the bounding box. Boxes with more than FREE_CELLS must have at least one voxel per
+# MOST_CELLS_A_VOXEL cells.
 FREE_CELLS, MOST_CELLS_A_VOXEL = 1 << 24, 256
 _SLICE = 1 << 22  # cells at once
 
@@ -21,7 +22,7 @@ def _read(items, name, width, dtype):
 
 
 def fingerprint(mesh):
-    """Of a mesh's shape: other when its points, its faces' corners or their materials are edited."""
+    """Returns a hash of a mesh's shape. It changes if vertices, face corners or face materials are edited."""
     parts = [_read(mesh.vertices, "co", 3, np.float32), _read(mesh.loops, "vertex_index", 1, np.int32),
              _read(mesh.polygons, "loop_total", 1, np.int32), _read(mesh.polygons, "material_index", 1, np.int32)]
     return f"{len(mesh.polygons)} " + " ".join(f"{zlib.crc32(one):08x}" for one in parts)
@@ -33,8 +34,8 @@ def _slices(voxels):
 
 
 def keep(mesh, grid, types, scale, slots):
-    """Puts a grid's voxels into its mesh. `slots`: of types that have a material of their own, which. Returns False,
-    and does nothing, where the voxels are too many, or too scattered."""
+    """Stores a grid's voxels in its mesh. `slots` maps types with their own material to its slot. Returns False and
+    does nothing if there are too many voxels or they are too scattered."""
     cells = int(np.prod(grid.shape, dtype=np.int64))
     if cells > min(MOST_CELLS, max(FREE_CELLS, MOST_CELLS_A_VOXEL * grid.voxels)):
         return False
@@ -54,22 +55,22 @@ def keep(mesh, grid, types, scale, slots):
 
 
 def scale_of(mesh):
-    """Blender's units a voxel of it."""
+    """Returns the voxel size of a mesh, in Blender units."""
     return json.loads(mesh[_ABOUT])["scale"]
 
 
 class Kept:
-    """The voxels [x, y, z] of a mesh, by numbers of `types` from 1 on."""
+    """The voxels [x, y, z] stored in a mesh: 0 is air; others number `types` from 1."""
 
     def __init__(self, mesh):
         about = json.loads(mesh[_ABOUT])
         data = np.frombuffer(zlib.decompress(mesh[_VOXELS]), np.uint8 if about["bytes"] == 1 else np.uint16)
         self.voxels = data.reshape(about["shape"])
         self.origin = tuple(about["origin"])
-        self.slots = about["slots"]  # of materials, a type each; -1 where it has none
+        self.slots = about["slots"]  # material slot of each type; -1: none of its own
         self.types = [quoin.VoxelType(tuple(one[0]), *one[1:]) for one in about["types"]]
 
 
 def is_kept(mesh):
-    """Whether a mesh has voxels, and still their shape."""
+    """Returns true if a mesh has stored voxels and its shape is unedited."""
     return _VOXELS in mesh and _ABOUT in mesh and json.loads(mesh[_ABOUT])["fingerprint"] == fingerprint(mesh)

@@ -1,4 +1,4 @@
-"""Types of voxels as materials, and materials as types."""
+"""Converts voxel types to materials, and materials to voxel types."""
 
 import zlib
 
@@ -7,33 +7,33 @@ import numpy as np
 
 from . import quoin, versions
 
-OCCLUSION = "Occlusion"  # of what light arrives: 1 where it is open
+OCCLUSION = "Occlusion"  # the light that reaches a vertex; 1: open
 COLOUR = "Colour"
 MOST_MATERIALS = 256
 _PALETTE, _MADE = "quoin_palette", "quoin_made"
 
 
 def linear(srgb):
-    """sRGB bytes as linear light."""
+    """Converts sRGB bytes to linear light."""
     x = np.asarray(srgb, np.float64) / 255.0
     return np.where(x <= 0.04045, x / 12.92, ((x + 0.055) / 1.055) ** 2.4)
 
 
 def opaque(srgb):
-    """sRGB bytes (n, 3) as linear light and alpha, float32 (n, 4)."""
+    """Converts sRGB bytes (n, 3) to linear light with alpha 1, float32 (n, 4)."""
     out = np.ones((len(srgb), 4), np.float32)
     out[:, :3] = linear(srgb)
     return out
 
 
 def srgb(light):
-    """Linear light as sRGB bytes."""
+    """Converts linear light to sRGB bytes."""
     x = np.clip(np.asarray(light, np.float64), 0.0, 1.0)
     return np.rint(255.0 * np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)).astype(int)
 
 
 def occlusion_group(strength):
-    """The node group that darkens a colour by the attribute; its node Strength says how much, for all materials."""
+    """Creates the node group that darkens a colour by the attribute. Its node Strength applies to all materials."""
     tree = bpy.data.node_groups.new("Quoin Occlusion", "ShaderNodeTree")
     versions.group_socket(tree, "Color", "NodeSocketColor", True)
     versions.group_socket(tree, "Color", "NodeSocketColor", False)
@@ -67,7 +67,7 @@ def occlusion_group(strength):
 
 
 def _new(name, group):
-    """A material with the Principled shader, whose colour goes through the occlusion's group: both are returned."""
+    """Creates a material whose colour passes through the occlusion group. Returns it, its shader and the group node."""
     material = bpy.data.materials.new(name)
     material.use_nodes = True
     nodes = material.node_tree.nodes
@@ -80,7 +80,7 @@ def _new(name, group):
 
 
 def _scatter(material, one, scale):
-    # A cloud: no surface, and light that is scattered within.
+    # A cloud: no surface, only volume scattering.
     nodes = material.node_tree.nodes
     volume = nodes.new("ShaderNodeVolumeScatter")
     volume.inputs["Color"].default_value = (*linear(one.rgba[:3]), 1.0)
@@ -93,7 +93,7 @@ def _scatter(material, one, scale):
 
 
 def of_type(one, number, group, scale):
-    """The material of a type."""
+    """Creates the material of a type."""
     material, shader, occlusion = _new(one.name or f"voxel {number}", group)
     colour = linear(one.rgba[:3])
     occlusion.inputs[0].default_value = (*colour, 1.0)
@@ -112,7 +112,7 @@ def of_type(one, number, group, scale):
             material.use_screen_refraction = True
     if one.scattering > 0.0:
         _scatter(material, one, scale)
-    material.diffuse_color = (*colour, max(alpha, 0.2))  # what the solid viewport shows
+    material.diffuse_color = (*colour, max(alpha, 0.2))  # the colour in the solid viewport
     material.metallic, material.roughness = one.metalness, one.roughness
     return material
 
@@ -128,7 +128,7 @@ def _image(name, values, is_colour):
 
 
 class Palette:
-    """One material for all opaque types, which looks colours and surfaces up in two images."""
+    """One material for all opaque types, with colours and surface properties in two images."""
 
     def __init__(self, name, types, group):
         rows = (len(types) + 255) // 256
@@ -163,7 +163,7 @@ class Palette:
         self.material.diffuse_color = (*linear(np.array([one.rgba[:3] for one in types[1:]] or [[0] * 3])).mean(0), 1.0)
 
     def places(self, types):
-        """Texture coordinates of types, float32 (n, 2)."""
+        """Returns the texture coordinates of types, float32 (n, 2)."""
         return np.stack([(types % 256 + 0.5) / 256.0, (types // 256 + 0.5) / self.rows], axis=1).astype(np.float32)
 
 
@@ -174,7 +174,7 @@ def _pixels(image):
 
 
 def is_edited_palette(material):
-    """Whether a palette's images are not those that it was made with."""
+    """Returns true if a palette's images were edited or removed."""
     if material.get(_PALETTE) is None:
         return False
     images = [node.image for node in material.node_tree.nodes if node.type == "TEX_IMAGE" and node.image]
@@ -183,14 +183,14 @@ def is_edited_palette(material):
         return True
     for image in made:
         wanted, found = np.frombuffer(zlib.decompress(image[_MADE]), np.float32), _pixels(image)
-        # A .blend keeps them less precisely.
+        # A .blend stores pixels with less precision.
         if wanted.shape != found.shape or not np.allclose(found, wanted, rtol=4e-3, atol=2e-3):
             return True
     return False
 
 
 def smooth(name, group):
-    """The material of smooth surfaces: their colour is an attribute."""
+    """Creates the material of smooth surfaces, whose colour is an attribute."""
     material, shader, occlusion = _new(f"{name} smooth", group)
     attribute = material.node_tree.nodes.new("ShaderNodeAttribute")
     attribute.attribute_name = COLOUR
@@ -201,7 +201,7 @@ def smooth(name, group):
 
 
 def _followed(socket):
-    """Where a colour comes from: a socket that is not linked, or the node behind it."""
+    """Follows a colour socket through groups. Returns the value of an unlinked socket, or the node that sets it."""
     while socket.is_linked:
         node = socket.links[0].from_node
         if node.type != "GROUP" or not node.inputs or node.inputs[0].type != "RGBA":
@@ -211,7 +211,7 @@ def _followed(socket):
 
 
 def seen(material):
-    """What of a material voxels can have: a type without a name, and the node that its colour comes from, if any."""
+    """Converts a material to an unnamed type. Also returns the node that sets its colour, if any."""
     shader = None
     if material is not None and material.use_nodes:
         shader = next((node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED"), None)
@@ -235,13 +235,13 @@ _ATTRIBUTES = {"ATTRIBUTE", "VERTEX_COLOR"}
 
 
 def has_attribute(node):
-    """Whether a colour comes from the mesh's own."""
+    """Returns true if the node reads a colour attribute of the mesh."""
     return node is not None and node.type in _ATTRIBUTES
 
 
 def edited(one, material):
-    """A type as its material is now: what nobody changed stays to the last bit. One that is coloured by a texture, or
-    was a cloud, stays as it was."""
+    """Applies a material's edits to a type. Unedited values stay bit-exact. Types coloured by a node, and clouds, stay
+    unchanged."""
     now, node = seen(material)
     if node is not None or one.scattering > 0.0:
         return one

@@ -1,12 +1,12 @@
-"""Fewer types: colours that are alike become one, where a format holds no more."""
+"""Merges similar colours if a format limits the number of types."""
 
 import numpy as np
 
-MOST_TYPES = {".vox": 255}  # by the name's ending
+MOST_TYPES = {".vox": 255}  # by extension
 
 
 class _Box:
-    """Types that differ in colour alone."""
+    """Types that differ only in colour."""
 
     def __init__(self, numbers, colours, counts):
         self.numbers, self._colours, self._counts = numbers, colours, counts
@@ -21,7 +21,7 @@ class _Box:
         return [_Box(self.numbers[side], self._colours[side], self._counts[side]) for side in (high, ~high)]
 
     def middle(self):
-        """The type of it that is nearest to the mean."""
+        """Returns the type nearest to the mean colour."""
         return self.numbers[((self._colours - self._mean) ** 2).sum(1).argmin()]
 
 
@@ -30,9 +30,9 @@ def _boxes(types, used, counts, most):
     for number in used:
         one = types[number]
         kinds.setdefault((one.rgba[3], *one[2:]), []).append(number)
-    if len(kinds) > most:  # more than colours tell them apart: the library says that it cannot
+    if len(kinds) > most:  # they differ in more than colour; the library then reports the error
         return None
-    # As the eye weighs them.
+    # Weighted by perceived brightness.
     colours = np.array([one.rgba[:3] for one in types], float) * np.sqrt([0.3, 0.59, 0.11])
     boxes = [_Box(np.array(one), colours[one], counts[one].astype(float)) for one in kinds.values()]
     while len(boxes) < most:
@@ -44,7 +44,7 @@ def _boxes(types, used, counts, most):
 
 
 def merge(scene, ending):
-    """Merges types of a scene of Quoin's where its format holds fewer. Returns how many there were, 0 where all stay."""
+    """Merges a Quoin scene's types down to the format's limit. Returns the number of types before; 0: not merged."""
     types = scene.types
     most = MOST_TYPES.get(ending, len(types))
     if len(types) - 1 <= most:

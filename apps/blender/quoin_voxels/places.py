@@ -1,21 +1,21 @@
-"""Where things belong: Blender's collections as groups and layers, and who is hidden."""
+"""Converts Blender's collections to groups and layers, and finds hidden objects."""
 
 import json
 
 LAYER = "layer"  # the property of objects and collections that names their layer
-FILE = "quoin_file"  # of the collection of an import, which is no group of the file
-CAMERA = "quoin_camera"  # the number that a camera has in its file
-_LAYERS = "quoin_layers"  # of the collection of an import: the file's layers
+FILE = "quoin_file"  # marks the collection of an import, which is not a group of the file
+CAMERA = "quoin_camera"  # a camera's number in its file
+_LAYERS = "quoin_layers"  # on the collection of an import: the file's layers
 
 
 def set_layers(collection, layers):
-    """Keeps what layers a file has, and which of them it shows."""
+    """Stores a file's layers and their visibility."""
     if layers:
         collection[_LAYERS] = json.dumps([[one.name, one.visible] for one in layers])
 
 
 def layers_of(scene):
-    """The layers of what was imported, by name: whether their files show them."""
+    """Returns the visibility of all imported layers, by name."""
     found = {}
     for collection in scene.collection.children_recursive:
         if _LAYERS in collection:
@@ -25,22 +25,22 @@ def layers_of(scene):
 
 
 def layer_of(thing):
-    """The name of an object's or a collection's layer; empty: none."""
+    """Returns the layer name of an object or collection; empty: none."""
     found = thing.get(LAYER)
     return found if isinstance(found, str) else ""
 
 
 def hides_itself(source):
-    """Whether an object's own switches hide it."""
+    """Returns true if an object's own flags hide it."""
     return source.hide_render or source.hide_viewport or source.hide_get()
 
 
 class Tree:
-    """The collections of a scene: where each object lies, and what hides it."""
+    """The collections of a scene: each object's path and visibility."""
 
     def __init__(self, view_layer):
-        self.path_of = {}  # of objects: their collections from the top, without the scene's own
-        self._hides = {}  # of collections, by name: whether they hide what is in them
+        self.path_of = {}  # collections of each object, from the top, without the scene collection
+        self._hides = {}  # by collection name: true if it hides its contents
         self._walk(view_layer.layer_collection, ())
 
     def _walk(self, layer, path):
@@ -48,7 +48,7 @@ class Tree:
         hides = layer.exclude or collection.hide_render or collection.hide_viewport or layer.hide_viewport
         self._hides[collection.name_full] = hides
         for one in collection.objects:
-            # Of several collections the first that shows it counts.
+            # If an object is in several collections, use the first visible one.
             known = self.path_of.get(one.name_full)
             if known is None or (self.is_hidden(known) and not self.is_hidden(path)):
                 self.path_of[one.name_full] = path
@@ -56,24 +56,24 @@ class Tree:
             self._walk(child, path + (child.collection,))
 
     def hides(self, collection):
-        """Whether its own switches hide what is in it."""
+        """Returns true if the collection's own flags hide its contents."""
         return self._hides.get(collection.name_full, False)
 
     def is_hidden(self, path):
-        """Whether any collection of a path hides what is in it."""
+        """Returns true if any collection of a path hides its contents."""
         return any(self.hides(one) for one in path)
 
     def is_hidden_object(self, source):
-        """Whether nobody sees an object: its own switches, or its collections, hide it."""
+        """Returns true if an object's own flags or its collections hide it."""
         return hides_itself(source) or self.is_hidden(self.path(source))
 
     def path(self, source):
-        """The collections that an object lies in, from the top; of what is in none, or the scene's own: none."""
+        """Returns the collections of an object, from the top; empty for objects of the scene collection."""
         return self.path_of.get(source.name_full, ())
 
 
 class Belonging:
-    """Makes groups and layers of a scene of Quoin's as they are needed."""
+    """Creates groups and layers of a Quoin scene on first use."""
 
     def __init__(self, scene, blender_scene, tree, how, shown):
         self._scene = scene
@@ -81,14 +81,14 @@ class Belonging:
         self._how = how  # "GROUPS", "LAYERS" or "NONE"
         self._groups = {}
         self._made_layers = set()
-        self._layers = layers_of(blender_scene)  # whether they are shown
-        # A layer with anything that is shown is shown itself.
+        self._layers = layers_of(blender_scene)  # visibility by name
+        # A layer with visible objects is visible.
         for one in shown:
             for name in [self._layer(one), *map(layer_of, self._path(one))]:
                 self._layers[name] = True
 
     def _path(self, source):
-        # What stands for a file, or makes a layer, is no group.
+        # Collections that represent a file or a layer are not groups.
         path = [one for one in self._tree.path(source) if FILE not in one]
         if self._how == "LAYERS":
             path = path[1:]
@@ -125,7 +125,7 @@ class Belonging:
         return parent
 
     def add(self, number, source, is_hidden):
-        """Gives an instance the group and the layer of an object. Returns whether its own switch is to be on."""
+        """Assigns an instance to an object's group and layer. Returns the instance's own visibility flag."""
         path, layer = self._path(source), self._layer(source)
         if path or layer:
             self._scene.assign(number, self._group(path), self._need_layer(layer))

@@ -1,10 +1,10 @@
-"""What differs between versions of Blender."""
+"""Hides differences between Blender versions."""
 
 import bpy
 
 
 def input_of(principled, name):
-    """A socket of the Principled shader, by its name in Blender 3."""
+    """Returns a socket of the Principled shader by its Blender 3 name."""
     later = {"Emission": "Emission Color", "Transmission": "Transmission Weight", "Specular": "Specular IOR Level"}
     found = principled.inputs.get(name)
     return found if found is not None else principled.inputs[later[name]]
@@ -18,13 +18,13 @@ def group_socket(tree, name, kind, is_input):
 
 
 def set_faces(mesh, starts, corners_of_each):
-    """Where each face's corners begin; later versions know from that how many it has."""
+    """Sets each face's first corner, and its corner count, which Blender 3.6 and later derive."""
     mesh.polygons.foreach_set("loop_start", starts)
     if bpy.app.version < (3, 6, 0):
         mesh.polygons.foreach_set("loop_total", corners_of_each)
 
 
 def shade_flat(mesh):
-    """Faces are flat unless told otherwise, but for those of Blender 4.1 on."""
+    """Shades faces flat, which is not the default from Blender 4.1 on."""
     if hasattr(mesh, "shade_flat"):
         mesh.shade_flat()

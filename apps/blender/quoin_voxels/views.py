@@ -1,4 +1,4 @@
-"""Cameras and lights of Blender's, as files of voxels have them."""
+"""Exports Blender's cameras and lights."""
 
 import math
 
@@ -19,7 +19,7 @@ def _is_seen(one, tree, options):
 
 
 def _axes_of(one):
-    """An object's right, up and backward in Quoin's axes, unit and perpendicular, and its place in Blender's units."""
+    """Returns an object's right, up and backward unit vectors in Quoin's axes, and its position in Blender units."""
     matrix = axes.QUOIN_FROM_BLENDER @ np.array(one.matrix_world)
     back = matrix[:3, 2] / (np.linalg.norm(matrix[:3, 2]) or 1.0)
     right = matrix[:3, 0] - back * np.dot(matrix[:3, 0], back)
@@ -45,7 +45,7 @@ def _camera(one, number, is_first, blender_scene, options):
 def _cameras(context, scene, ending, tree, options, left_out):
     active = context.scene.camera
     found = [one for one in context.scene.objects if one.type == "CAMERA" and _is_seen(one, tree, options)]
-    found.sort(key=lambda one: one != active)  # that of the renders is the first
+    found.sort(key=lambda one: one != active)  # the render camera comes first
     warnings, numbers = [], set()
     wanted = {one.get(places.CAMERA) for one in found}
     for one in found:
@@ -60,7 +60,7 @@ def _cameras(context, scene, ending, tree, options, left_out):
             number = next(i for i in range(len(found) + len(wanted) + 1) if i not in numbers and i not in wanted)
         numbers.add(number)
         if one.data.shift_x or one.data.shift_y:
-            warnings.append(f"camera {one.name}: that its lens is shifted is left out")
+            warnings.append(f"camera {one.name}: the shifted lens is not supported and is left out")
         scene.add_camera(_camera(one, number, one == found[0], context.scene, options))
     return warnings
 
@@ -72,7 +72,8 @@ def _lamp(one, options):
     is_spot = data.type == "SPOT"
     outer = math.degrees(data.spot_size) / 2.0 if is_spot else 45.0
     inner = outer * (1.0 - data.spot_blend) if is_spot else 0.0
-    # White that faces it at 1 shows `intensity`; in Blender, of a power P, P / (4 pi^2).
+    # A white surface facing the lamp at distance 1 receives `intensity`; in Blender a lamp of power P gives
+    # P / (4 pi^2).
     intensity = max(data.energy, 0.0) / (4.0 * math.pi ** 2 * options.scale ** 2)
     return quoin.Lamp(one.name, tuple(place / options.scale), tuple(-back) if is_spot else None, tuple(colour),
                       intensity, inner_angle=inner, outer_angle=outer)
@@ -97,14 +98,14 @@ def _lights(context, scene, ending, tree, options, left_out):
                 soft.append(one.name)
         else:
             left_out.append(f"{kind.lower()} light {one.name}")
-    return ["lights become points: " + ", ".join(soft)] if soft else []
+    return ["lights lose their size and become points: " + ", ".join(soft)] if soft else []
 
 
 def write(context, scene, ending, tree, options):
-    """Gives a scene of Quoin's the cameras and lights that are seen. Returns what the format leaves out, by name."""
+    """Adds the visible cameras and lights to a Quoin scene. Returns warnings that name those left out."""
     left_out = []
     warnings = _cameras(context, scene, ending, tree, options, left_out)
     warnings += _lights(context, scene, ending, tree, options, left_out)
     if left_out:
-        warnings.append(f"{ending} does not hold, and leaves out: " + ", ".join(left_out))
+        warnings.append(f"{ending} does not support, and leaves out: " + ", ".join(left_out))
     return warnings
