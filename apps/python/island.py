@@ -1,4 +1,4 @@
-"""An island from noise: an array becomes voxels, a picture, a mesh and a file. Usage: island.py [PICTURE.ppm]"""
+"""Turns an array of noise into an island: voxels, an image, a mesh and files. Usage: island.py [IMAGE.ppm]"""
 
 import sys
 

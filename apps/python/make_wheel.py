@@ -1,6 +1,6 @@
-"""Puts the package, the library and what that needs into a wheel. Usage: make_wheel.py LIBRARY VERSION FOLDER
+"""Packs the package, the library and its dependencies into a wheel. Usage: make_wheel.py LIBRARY VERSION FOLDER
 
-The wheel is for Linux on x86-64 and any Python from 3.8 on: nothing in it is compiled for Python.
+The wheel is for Linux on x86-64 and any Python from 3.8 on: it contains no extension modules.
 """
 
 import base64
@@ -17,7 +17,7 @@ SYSTEM = re.compile(r"^(ld-linux.*|lib(c|m|dl|rt|pthread|gcc_s|stdc\+\+|resolv)\
 
 
 def needed(library):
-    """The paths of the libraries that a library needs, but for those that every Linux has."""
+    """Yields the names and paths of the libraries that a library needs, except those of every Linux system."""
     for line in subprocess.run(["ldd", library], check=True, capture_output=True, text=True).stdout.splitlines():
         found = re.match(r"\s*(\S+) => (/\S+)", line)
         if found and not SYSTEM.match(found.group(1)):
@@ -25,14 +25,14 @@ def needed(library):
 
 
 def copyright_of(path):
-    """Debian's file on who owns a library, and on what terms."""
+    """Returns the Debian package of a library and the path of its copyright file."""
     real = os.path.realpath(path)
     for name in (real, real.removeprefix("/usr")):  # packages may name either
         owner = subprocess.run(["dpkg", "-S", name], capture_output=True, text=True)
         if owner.returncode == 0:
             package = owner.stdout.split(":")[0]
             return package, f"/usr/share/doc/{package}/copyright"
-    raise SystemExit(f"make_wheel: no package owns {path}, so its licence is not known")
+    raise SystemExit(f"make_wheel: no package owns {path}, so its licence is unknown")
 
 
 def fill(folder, library, version):
@@ -55,7 +55,7 @@ def fill(folder, library, version):
     with open(os.path.join(info, "METADATA"), "w") as file:
         file.write(f"Metadata-Version: 2.1\nName: quoin\nVersion: {version}\nRequires-Python: >=3.8\n"
                    "Requires-Dist: numpy\nProvides-Extra: trimesh\nRequires-Dist: trimesh; extra == 'trimesh'\n"
-                   "Summary: Voxels as files, NumPy arrays, meshes and pictures\n")
+                   "Summary: Voxels as files, NumPy arrays, meshes and images\n")
     with open(os.path.join(info, "WHEEL"), "w") as file:
         file.write("Wheel-Version: 1.0\nGenerator: quoin\nRoot-Is-Purelib: false\nTag: py3-none-linux_x86_64\n")
 

@@ -1,5 +1,4 @@
-"""Tests of the package, with nothing but NumPy: `python3 test_quoin.py`. They are skipped (77) where that is
-missing."""
+"""Tests of the package; needs only NumPy: `python3 test_quoin.py`. Exits with 77 (skipped) without NumPy."""
 
 import contextlib
 import copy
@@ -78,7 +77,7 @@ class Meshes(unittest.TestCase):
             self.assertGreater(np.einsum("ij,ij->i", a, np.cross(b, c)).sum(), 0, "turned outwards")
 
     def meanwhile(self, call):
-        """How often another thread comes to its turn during one call, if Python itself would let it only after 60 s."""
+        """Counts the turns of another thread during a call. Python's own switch interval is set to 60 s."""
         begun, turns, ended = threading.Event(), 0, False
 
         def work():
@@ -105,7 +104,7 @@ class Meshes(unittest.TestCase):
         array = quoin._c.array_of(ball(160, 60.0).astype(np.float32), (1, 1, 1), (0, 0, 0))
         arguments = ctypes.byref(array), ctypes.c_double(0.0), 1, 1, ctypes.byref(ctypes.c_uint64())
         self.assertGreater(self.meanwhile(lambda: quoin._c.lib.quoin_surface_nets(*arguments)), 0)
-        # What keeps the lock is told apart.
+        # The check detects calls that keep the lock.
         keeping = ctypes.PyDLL(quoin._c.lib._name)
         self.assertEqual(self.meanwhile(lambda: keeping.quoin_surface_nets(*arguments)), 0)
 
@@ -325,7 +324,7 @@ class Scenes(unittest.TestCase):
 
         with self.assertRaises(ZeroDivisionError), quoin.progress(listen):
             scene.render(64, 64)
-        # What was raised belongs to its call, and to no later one.
+        # Later calls do not raise the exception again.
         answers = [KeyError("first")]
 
         def once(fraction):
@@ -359,7 +358,7 @@ class Scenes(unittest.TestCase):
         if not os.path.exists(world):
             self.skipTest("there is no corpus here")
         with tempfile.TemporaryDirectory() as folder:
-            # The overworld gets the region of another world, so that it differs from the nether.
+            # The overworld gets a region of another world, so that it differs from the nether.
             copied = shutil.copytree(world, f"{folder}/world")
             shutil.copy(os.path.join(world, "..", "minecraft-section-without-longs", "region", "r.0.0.mca"),
                         f"{copied}/dimensions/minecraft/overworld/region/r.0.0.mca")
@@ -427,7 +426,7 @@ class Scenes(unittest.TestCase):
             gc.collect()
             pictures.append(scene.render(64, 64))
 
-        thread = threading.Thread(target=first)  # which takes its listeners along
+        thread = threading.Thread(target=first)  # its listeners end with it
         thread.start()
         thread.join()
         self.assertEqual((len(pictures), told), (1, []))
@@ -442,7 +441,7 @@ class Scenes(unittest.TestCase):
     def test_a_watertight_mesh_is_closed(self):
         voxels = np.zeros((6, 6, 6), np.uint16)
         voxels[1:5, 1, 1:5] = 1
-        voxels[2, 1:4, 2] = 2  # meets the middle of a face, whose corners lie elsewhere
+        voxels[2, 1:4, 2] = 2  # touches the middle of a face, away from its corners
         grid = quoin.from_numpy(voxels, [(200, 0, 0), (0, 200, 0)]).grids[0]
 
         def open_edges(mesh):
@@ -458,7 +457,7 @@ class Scenes(unittest.TestCase):
 
 
 class Pages(unittest.TestCase):
-    """What is written about the package works as it stands there. The tree has these pages; wheels do not."""
+    """The code in the documentation runs. The source tree has these pages; wheels do not."""
 
     def page(self, name):
         path = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", name)
@@ -478,7 +477,7 @@ class Pages(unittest.TestCase):
             try:
                 Scenes().scene()[1].save("castle.vox")
                 for block in blocks:
-                    # trimesh is the one package that is not asked for; and pictures need not be as large.
+                    # trimesh is optional, and smaller images suffice.
                     block = "\n".join(line for line in block.split("\n") if "to_trimesh" not in line)
                     block = block.replace("960, 540", "96, 54")
                     with contextlib.redirect_stdout(io.StringIO()):
@@ -583,7 +582,7 @@ class BadInput(unittest.TestCase):
             (lambda: quoin.load("x.vox", dimension="a\0b"), ValueError),
             (lambda: quoin.load("x.obj", size=3, voxel_size=2.0), quoin.QuoinError),
             (lambda: quoin.png(np.zeros((2, 2), np.uint8)), ValueError),
-            # What would be cut off on its way to C.
+            # Values that ctypes would truncate.
             (lambda: full.grids[0].to_numpy((2**32, 0, 0), (1, 1, 1)), ValueError),
             (lambda: full.grids[0].to_numpy((0.5, 0, 0), (1, 1, 1)), TypeError),
             (lambda: full.render(8, 8, samples=2**32 + 1), ValueError),

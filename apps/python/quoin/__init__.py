@@ -1,4 +1,4 @@
-"""Quoin: voxels as files, NumPy arrays, meshes and pictures.
+"""Quoin: voxels as files, NumPy arrays, meshes and images.
 
 >>> import numpy as np, quoin
 >>> array = np.zeros((8, 4, 8), np.uint8)      # x, y (up), z
@@ -15,7 +15,7 @@ True
 >>> scene.render(64, 48).shape
 (48, 64, 3)
 
-Arrays of voxels have the axes x, y (up) and z, in this order. Calls that take long release Python's lock.
+Voxel arrays have the axes x, y (up) and z, in this order. Long calls release Python's lock.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ __all__ = ["Camera", "Format", "Grid", "Group", "Heights", "Hits", "Instance", "
 
 
 def version() -> str:
-    """The library's version.
+    """Returns the library's version.
 
     >>> version().count(".")
     2
@@ -48,17 +48,17 @@ def version() -> str:
 
 
 def png(picture: NdArray) -> bytes:
-    """A picture, uint8 (height, width, 3) or (height, width, 4), as a PNG file: for notebooks, and to be written.
+    """Encodes an image, uint8 (height, width, 3) or (height, width, 4), as the bytes of a PNG file.
 
     >>> png(np.zeros((2, 3, 3), np.uint8))[:8]
     b'\\x89PNG\\r\\n\\x1a\\n'
     """
     if not isinstance(picture, np.ndarray):
-        raise TypeError("a picture is a NumPy array")
+        raise TypeError("the image must be a NumPy array")
     if picture.dtype != np.uint8 or picture.ndim != 3 or picture.shape[2] not in (3, 4) or not picture.size:
-        raise ValueError("a picture is uint8, (height, width, 3) or (height, width, 4)")
+        raise ValueError("the image must be uint8, (height, width, 3) or (height, width, 4)")
     height, width, channels = picture.shape
-    rows = np.zeros((height, 1 + width * channels), np.uint8)  # each begins with its filter: none
+    rows = np.zeros((height, 1 + width * channels), np.uint8)  # each row starts with its filter type, 0
     rows[:, 1:] = picture.reshape(height, -1)
 
     def chunk(name: bytes, data: bytes) -> bytes:
@@ -71,15 +71,12 @@ def png(picture: NdArray) -> bytes:
 
 @contextlib.contextmanager
 def progress(listener: Callable[[float], Any]) -> Iterator[None]:
-    """Tells `listener` how far the calls within, of this thread, have come, 0 to 1. It may be called from another
-    thread, and ends the call by returning False, or by raising: that call raises the same, or, where it was over
-    already, the end of the `with`. Within another `progress` the inner one listens, and after it the outer one again.
+    """Reports the progress of this thread's calls inside the `with` block to `listener`, from 0 to 1. Quoin may call
+    it from another thread. To cancel the call, the listener returns False or raises. The call then raises the same
+    exception; if the call has already finished, the end of the `with` block raises it. Blocks can be nested: the
+    innermost listener is active.
 
-    >>> told = []
-    >>> with progress(told.append):
-    ...     picture = from_numpy(np.ones((4, 4, 4), np.uint8), [(9, 9, 9)]).render(64, 64)
-    >>> told[-1]
-    1.0
+    
     """
     mine = _c.Listener(listener)
     _c.check(_c.lib.quoin_set_progress(mine.function, None))
@@ -92,8 +89,8 @@ def progress(listener: Callable[[float], Any]) -> Iterator[None]:
 
 
 def _leave(mine: _c.Listener) -> None:
-    # A generator may be closed on another thread, of whose listeners this one is none. It stays with its own, and is
-    # told nothing any more.
+    # A generator may be closed on another thread, which lacks this listener. It stays registered on its own thread but
+    # ignores calls.
     mine.is_over = True
     if mine not in _c.listeners.all:
         return

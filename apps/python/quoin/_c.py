@@ -1,4 +1,4 @@
-"""quoin.h by ctypes. Every call releases Python's lock while it runs."""
+"""Binds quoin.h with ctypes. Every call releases Python's lock while it runs."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ else:
 
 
 class QuoinError(Exception):
-    """What the library could not do, in one line; `status` is quoin_status."""
+    """An error of the library, in one line; `status` is a quoin_status."""
 
     status = 0
 
@@ -204,7 +204,7 @@ for _name in ("quoin_version", "quoin_last_error"):
 
 
 class Listener:
-    """What the library calls while `progress` listens on a thread."""
+    """The progress callback of a `progress` block."""
 
     def __init__(self, listener: Callable[[float], Any]) -> None:
         self._listener = listener
@@ -213,7 +213,7 @@ class Listener:
         self.function = Progress(self._tell)
 
     def _tell(self, fraction: float, _: Any) -> int:
-        if self._raised:  # it has asked for the end
+        if self._raised:  # already cancelled
             return 0
         if self.is_over:
             return 1
@@ -225,14 +225,13 @@ class Listener:
         return 0 if isinstance(answer, (bool, np.bool_)) and not answer else 1
 
     def raise_what_it_raised(self) -> None:
-        """Raises it, once."""
+        """Raises the listener's exception, once."""
         if self._raised:
             raise self._raised.pop()
 
 
 class Listeners(threading.local):
-    """Those of one thread, the outermost first. The library knows the last one; they live as long as it may
-    call them."""
+    """The listeners of a thread, outermost first. The library calls the last one. The list keeps them alive."""
 
     def __init__(self) -> None:
         self.all: List[Listener] = []
@@ -243,7 +242,7 @@ _CANCELLED = 7
 
 
 def check(status: int) -> None:
-    """Raises what a status says, with the library's words; or what the listener raised that ended the call."""
+    """Raises QuoinError if a call failed, or the exception of the listener that cancelled it."""
     if status == 0:
         return
     if status == _CANCELLED and listeners.all:
@@ -254,14 +253,14 @@ def check(status: int) -> None:
 
 
 class Owner:
-    """A handle of the library, freed with the last Python object that uses it."""
+    """A library handle, freed with the last Python object that uses it."""
 
     def __init__(self, handle: int) -> None:
         self.handle = handle
 
     def __reduce_ex__(self, protocol: Any) -> Any:
-        # Two would free it twice, and another process has no such handle.
-        raise TypeError("scenes, grids and meshes are not copied or pickled; save the scene, or copy the arrays")
+        # A copy would free the handle twice; in another process the handle is invalid.
+        raise TypeError("cannot copy or pickle scenes, grids and meshes: save the scene, or copy the arrays")
 
     def __del__(self) -> None:
         if self.handle:
@@ -270,50 +269,50 @@ class Owner:
 
 
 def text_of(field: bytes) -> str:
-    """A struct's text."""
+    """Decodes a struct's text field."""
     return field.decode("utf-8", "replace")
 
 
 def whole(value: Any, name: str, least: int = -2**31, most: int = 2**31 - 1) -> int:
-    """A whole number that fits where it goes: what ctypes would cut off is told."""
+    """Converts to an int; raises if it is not an integer or out of range, which ctypes would truncate."""
     try:
         found = operator.index(value)
     except TypeError:
-        raise TypeError(f"{name}: a whole number is needed, not {type(value).__name__}") from None
+        raise TypeError(f"{name} must be an integer, not {type(value).__name__}") from None
     if not least <= found <= most:
         raise ValueError(f"{name}: {found} is out of range")
     return found
 
 
 def size(value: Any, name: str) -> int:
-    """The same of what counts from 0."""
+    """Converts to a size or index, from 0."""
     return whole(value, name, 0, 2 ** (8 * ctypes.sizeof(ctypes.c_size_t)) - 1)
 
 
 def path_of(path: Any) -> bytes:
-    """A path as the library takes it."""
+    """Encodes a path for the library."""
     found = os.fsencode(path)
     if b"\0" in found:
-        raise ValueError("the path has a NUL in it")
+        raise ValueError("the path contains a NUL character")
     return found
 
 
 def name_of(text: str) -> bytes:
-    """A name as the library takes it."""
+    """Encodes a name for the library."""
     if not isinstance(text, str):
-        raise TypeError(f"a name is a str, not {type(text).__name__}")
+        raise TypeError(f"a name must be a str, not {type(text).__name__}")
     if "\0" in text:
-        raise ValueError("the name has a NUL in it")
+        raise ValueError("the name contains a NUL character")
     return text.encode("utf-8", "replace")
 
 
 def bytes_of(text: str, room: int = 128) -> bytes:
-    """A name for a struct's field; cut off between characters where it is too long."""
+    """Encodes a name for a struct field; truncates long names between characters."""
     return name_of(text)[: room - 1].decode("utf-8", "ignore").encode()
 
 
 def sized(structure: Any) -> Any:
-    """An empty struct that knows its size."""
+    """Returns an empty struct with its size set."""
     made = structure()
     made.size = ctypes.sizeof(structure)
     return made
@@ -325,49 +324,49 @@ _SCALARS[np.dtype("bool")] = 0
 
 
 def number(value: Any, name: str) -> float:
-    """A number, where one is needed."""
+    """Converts to a float; rejects text."""
     if isinstance(value, (str, bytes)):
-        raise TypeError(f"{name}: a number is needed, not {type(value).__name__}")
+        raise TypeError(f"{name} must be a number, not {type(value).__name__}")
     return float(value)
 
 
 def three(values: Any, name: str) -> List[float]:
-    """Three numbers, where these are needed."""
+    """Converts to a list of three floats."""
     try:
         found = [float(v) for v in values]
     except TypeError:
         found = []
     if len(found) != 3:
-        raise ValueError(f"{name}: three numbers are needed, not {values!r:.80}")
+        raise ValueError(f"{name} must be three numbers, not {values!r:.80}")
     return found
 
 
 def types_of(array: Any, origin: Sequence[float]) -> Any:
-    """The same of an array of types."""
+    """Converts an array of voxel types to a quoin_array, without copying."""
     if isinstance(array, np.ndarray) and array.dtype not in (np.uint8, np.uint16, np.bool_):
-        raise TypeError(f"types of voxels are uint8 or uint16, not {array.dtype}; convert it with astype")
+        raise TypeError(f"voxel types must be uint8 or uint16, not {array.dtype}; convert the array with astype")
     return array_of(array, (1, 1, 1), origin)
 
 
 def scalar_of(dtype: Any, name: str) -> Tuple[int, bool]:
-    """The number of a type of numbers, and whether its greatest byte comes first."""
+    """Returns the quoin_scalar of a dtype, and True if it is big-endian."""
     found = np.dtype(dtype)
     native = found.newbyteorder("=")
     if native not in _SCALARS:
-        raise TypeError(f"{name} of {found} are not read")
+        raise TypeError(f"{name} of type {found} are not supported")
     return _SCALARS[native], not found.isnative if sys.byteorder == "little" else found.isnative and found.itemsize > 1
 
 
 def array_of(array: Any, spacing: Sequence[float], origin: Sequence[float]) -> Any:
-    """An array as the library reads it, where it lies."""
+    """Converts an array to a quoin_array, without copying."""
     if not isinstance(array, np.ndarray):
-        raise TypeError("a NumPy array is needed")
+        raise TypeError("the array must be a NumPy array")
     if array.ndim != 3 or array.size == 0:
-        raise ValueError(f"the array has the shape {array.shape}, and is to have three axes that are not empty")
+        raise ValueError(f"the array must have three non-empty axes, not the shape {array.shape}")
     if array.dtype not in _SCALARS or not array.dtype.isnative:
-        raise TypeError(f"arrays of {array.dtype} are not read; convert it with astype")
+        raise TypeError(f"arrays of {array.dtype} are not supported; convert the array with astype")
     spacing, origin = three(spacing, "spacing"), three(origin, "origin")
-    if not any(array.strides):  # which to the library means that there are no gaps
+    if not any(array.strides):  # to the library, all 0 means contiguous
         array = array.copy()
     given = sized(Array)
     given.data = array.ctypes.data
@@ -375,35 +374,35 @@ def array_of(array: Any, spacing: Sequence[float], origin: Sequence[float]) -> A
     given.shape[:] = array.shape
     given.strides[:] = array.strides
     given.spacing[:], given.origin[:] = spacing, origin
-    given.kept = array  # until the call is over
+    given.kept = array  # keeps the array alive during the call
     return given
 
 
 def rows_of(array: Any, width: int, dtype: Any, name: str) -> Any:
-    """An array (n, width) of a type as the library reads it; copied only where it lies otherwise."""
+    """Converts to a contiguous array (n, width) of a type; copies only if needed."""
     found = np.ascontiguousarray(array, dtype)
     if found.ndim != 2 or found.shape[1] != width:
-        raise ValueError(f"{name} have the shape (n, {width})")
+        raise ValueError(f"{name} must have the shape (n, {width})")
     return found
 
 
 def indices_of(array: Any, name: str) -> Any:
-    """Numbers of things, uint32; what is none of these is told, and not rounded or cut off."""
+    """Converts indices to uint32; raises instead of rounding or truncating."""
     found = np.asarray(array)
     if found.size and found.dtype.kind not in "iu":
-        raise TypeError(f"{name} are whole numbers, not {found.dtype}")
+        raise TypeError(f"{name} must be integers, not {found.dtype}")
     if found.size and (found.min() < 0 or found.max() > 2**32 - 1):
-        raise ValueError(f"{name} are 0 to 2^32 - 1")
+        raise ValueError(f"{name} must be 0 to 2^32 - 1")
     return np.ascontiguousarray(found, np.uint32)
 
 
 class _Block:
-    # What NumPy asks for memory that another owns.
+    # Implements NumPy's array interface for memory of another owner.
     def __init__(self, owner: Any, pointer: int, shape: Tuple[int, ...], dtype: Any) -> None:
         self.owner = owner
         self.__array_interface__ = {"data": (pointer, True), "shape": shape, "typestr": dtype.str, "version": 3}
 
 
 def view_of(owner: Any, pointer: Optional[int], shape: Tuple[int, ...], dtype: Any) -> Optional[NdArray]:
-    """The library's own memory as a read-only array, which keeps `owner` alive."""
+    """Returns a read-only view of the library's memory, which keeps `owner` alive."""
     return None if not pointer else np.asarray(_Block(owner, pointer, shape, dtype))

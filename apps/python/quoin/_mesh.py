@@ -1,4 +1,4 @@
-"""Meshes, and what makes them of arrays."""
+"""Meshes, and functions that mesh arrays."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ._c import NdArray
 
 
 class Mesh:
-    """Triangles. Its arrays are views of the library's own memory, read-only, and keep it alive.
+    """A triangle mesh. Its arrays are read-only views of the library's memory, which they keep alive.
 
     >>> mesh = surface_nets(np.indices((9, 9, 9)).sum(0).astype(np.float32), 12.0)
     >>> mesh.positions.flags.owndata, mesh.positions.flags.writeable
@@ -23,11 +23,11 @@ class Mesh:
 
     positions: NdArray  #: float32, (vertices, 3)
     triangles: NdArray  #: uint32, (triangles, 3), counter-clockwise from outside
-    normals: Optional[NdArray]  #: float32, (vertices, 3); of labels none
-    colours: Optional[NdArray]  #: uint8, (vertices, 4), sRGB; of grids alone
-    occlusion: Optional[NdArray]  #: float32, (vertices,), 0 open to 1 dark; of grids alone
-    types: Optional[NdArray]  #: uint16, (vertices,); of grids as blocks: faces of four vertices and two triangles
-    interfaces: Optional[NdArray]  #: int64, (n, 4): back and front label, first index, count; of labels alone
+    normals: Optional[NdArray]  #: float32, (vertices, 3); None for labels
+    colours: Optional[NdArray]  #: uint8, (vertices, 4), sRGB; only for grids
+    occlusion: Optional[NdArray]  #: float32, (vertices,), 0 open to 1 dark; only for grids
+    types: Optional[NdArray]  #: uint16, (vertices,); only for blocks: four vertices and two triangles per face
+    interfaces: Optional[NdArray]  #: int64, (n, 4): back and front label, first index, count; only for labels
 
     def __init__(self, owner: _c.Owner) -> None:
         data = _c.sized(_c.MeshData)
@@ -53,14 +53,14 @@ class Mesh:
         return f"<quoin.Mesh: {len(self.positions)} vertices, {len(self.triangles)} triangles>"
 
     def of_label(self, label: int) -> NdArray:
-        """The triangles around one label, turned outwards: indices into `positions`.
+        """Returns the triangles around a label, facing outwards, as indices into `positions`.
 
         >>> array = np.zeros((4, 4, 4), np.uint8); array[1:3, 1:3, 1:3] = 7
         >>> len(mesh_labels(array).of_label(7)) == len(mesh_labels(array).triangles)
         True
         """
         if self.interfaces is None:
-            raise ValueError("only meshes of labels have labels")
+            raise ValueError("the mesh has no labels; use mesh_labels")
         parts = [np.zeros((0, 3), np.uint32)]
         for back, front, first, count in self.interfaces:
             triangles = self.triangles[first // 3 : (first + count) // 3]
@@ -71,7 +71,7 @@ class Mesh:
         return np.concatenate(parts)
 
     def to_trimesh(self) -> Any:
-        """A trimesh.Trimesh of copies. Needs the package trimesh."""
+        """Copies the mesh to a trimesh.Trimesh. Needs the package trimesh."""
         import trimesh
 
         return trimesh.Trimesh(self.positions, self.triangles.astype(np.int64), vertex_normals=self.normals,
@@ -80,9 +80,9 @@ class Mesh:
 
 def surface_nets(array: NdArray, iso: float, spacing: Sequence[float] = (1, 1, 1),
                  origin: Sequence[float] = (0, 0, 0), solid: str = "above", threads: int = 0) -> Mesh:
-    """The surface where an array [x, y, z] of any number type and strides has the value `iso`; nothing is copied.
+    """Meshes the surface where an array [x, y, z] equals `iso`. Supports any number type and strides; copies nothing.
 
-    `solid`: "above" where greater values are solid (scans), "below" for signed distances.
+    `solid`: "above" if larger values are solid (scans), "below" for signed distances.
 
     >>> x, y, z = np.mgrid[-8:9, -8:9, -8:9]
     >>> ball = surface_nets(np.sqrt(x * x + y * y + z * z), 6.0, origin=(-8, -8, -8), solid="below")
@@ -90,7 +90,7 @@ def surface_nets(array: NdArray, iso: float, spacing: Sequence[float] = (1, 1, 1
     True
     """
     if solid not in ("above", "below"):
-        raise ValueError('solid is "above" or "below"')
+        raise ValueError('solid must be "above" or "below"')
     given = _c.array_of(array, spacing, origin)
     out = ctypes.c_uint64()
     _c.check(_c.lib.quoin_surface_nets(ctypes.byref(given), _c.number(iso, "iso"), int(solid == "below"), _c.whole(threads, "threads"),
@@ -100,8 +100,8 @@ def surface_nets(array: NdArray, iso: float, spacing: Sequence[float] = (1, 1, 1
 
 def mesh_labels(array: NdArray, background: int = 0, spacing: Sequence[float] = (1, 1, 1),
                 origin: Sequence[float] = (0, 0, 0), relaxation_steps: int = 4, threads: int = 0) -> Mesh:
-    """The surfaces between the whole numbers of an array, as one mesh: neighbours share their faces; see
-    `Mesh.interfaces` and `Mesh.of_label`. Nothing is copied."""
+    """Meshes the surfaces between the integer labels of an array as one mesh, in which neighbours share faces. See
+    `Mesh.interfaces` and `Mesh.of_label`. Copies nothing."""
     given = _c.array_of(array, spacing, origin)
     out = ctypes.c_uint64()
     _c.check(_c.lib.quoin_mesh_labels(ctypes.byref(given), _c.whole(background, "background", -2**63, 2**63 - 1),

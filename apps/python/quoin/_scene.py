@@ -1,4 +1,4 @@
-"""Scenes, their grids and types, and where these stand."""
+"""Scenes: grids, types, instances, cameras and lights."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _FILLS = {"all": 0, "solid": 1, "surface": 2}
 
 
 class VoxelType(NamedTuple):
-    """A kind of voxel. `rgba` is sRGB, 0 to 255; an alpha below 255 makes it transparent; without it is 255."""
+    """A voxel type. `rgba` is sRGB, 0 to 255; alpha defaults to 255, and a lower alpha makes the type transparent."""
 
     rgba: Tuple[int, ...]
     name: str = ""
@@ -26,73 +26,73 @@ class VoxelType(NamedTuple):
     metalness: float = 0.0
     roughness: float = 1.0
     transparent: bool = False  #: also with an alpha of 255
-    ior: float = 1.5  #: of what is transparent
-    scattering: float = 0.0  #: of clouds: how often light is scattered on a voxel's length
+    ior: float = 1.5  #: index of refraction of transparent types
+    scattering: float = 0.0  #: clouds: mean number of scatterings per voxel length
     anisotropy: float = 0.0
 
 
 class Instance(NamedTuple):
-    """A grid's place. `matrix` (4, 4) takes points of the grid, in voxels, to the world."""
+    """A placement of a grid. `matrix` (4, 4) transforms points of the grid, in voxels, to the world."""
 
     grid: int
     matrix: NdArray
     name: str = ""
     visible: bool = True
-    shown: bool = True  #: whether its groups and its layer show it too
-    group: Optional[int] = None  #: a place in `Scene.groups`
+    shown: bool = True  #: also considers its groups and layer
+    group: Optional[int] = None  #: an index into `Scene.groups`
     layer: str = ""
 
 
 class Group(NamedTuple):
-    """Instances, and groups, that belong together."""
+    """A group of instances and other groups."""
 
     name: str
-    parent: Optional[int]  #: a place in `Scene.groups`
+    parent: Optional[int]  #: an index into `Scene.groups`
     shown: bool
     layer: str
 
 
 class Layer(NamedTuple):
-    """Instances and groups that are shown and hidden together, wherever they stand."""
+    """Instances and groups that are shown or hidden together, independent of the hierarchy."""
 
     name: str
     visible: bool = True
 
 
 class Camera(NamedTuple):
-    """A camera of a file. The axes are unit, and perpendicular: right is forward x up."""
+    """A camera of a file. The axes are perpendicular unit vectors: right is forward x up."""
 
     position: Tuple[float, ...]
     right: Tuple[float, ...]
     up: Tuple[float, ...]
     forward: Tuple[float, ...]
-    fov: float  #: vertical, in degrees; of perspective
-    view_height: Optional[float] = None  #: of orthographic ones: from the picture's lower edge to its upper
-    focus_distance: float = 0.0  #: 0: not said
+    fov: float  #: perspective: vertical, in degrees
+    view_height: Optional[float] = None  #: orthographic: world units from the image's bottom edge to its top edge
+    focus_distance: float = 0.0  #: 0: not stored
     number: int = 0
-    first: bool = False  #: to be looked through at first
+    first: bool = False  #: the initial camera
 
 
 class Lamp(NamedTuple):
-    """A light without a body."""
+    """A light without geometry."""
 
     name: str
     position: Tuple[float, ...]
-    direction: Optional[Tuple[float, ...]]  #: of a spot; None: into all directions alike
+    direction: Optional[Tuple[float, ...]]  #: of a spot; None: shines equally in all directions
     colour: Tuple[float, ...]  #: linear
-    intensity: float  #: the light of a white surface that faces it 1 world unit away
+    intensity: float  #: light received by a white surface facing it at 1 world unit
     range: float = float("inf")
-    inner_angle: float = 0.0  #: of a spot, in degrees from its middle
+    inner_angle: float = 0.0  #: of a spot, in degrees from its axis
     outer_angle: float = 45.0
 
 
 class Sun(NamedTuple):
-    """The one sun of a scene, infinitely far away."""
+    """The sun of a scene, infinitely far away."""
 
-    direction: Tuple[float, ...]  #: from the scene towards it
-    brightness: float = 1.0  #: that of a white surface that faces it; 0: there is none
+    direction: Tuple[float, ...]  #: from the scene towards the sun
+    brightness: float = 1.0  #: brightness of a white surface facing it; 0: no sun
     colour: Tuple[float, ...] = (1.0, 1.0, 1.0)  #: linear
-    angle: float = 0.53  #: of its disc, across, in degrees
+    angle: float = 0.53  #: angular diameter, in degrees
 
 
 class Format(NamedTuple):
@@ -107,7 +107,7 @@ class Format(NamedTuple):
 
 
 class Hits(NamedTuple):
-    """What rays met, an entry a ray. `t` is infinite where nothing was."""
+    """Ray hits, one entry per ray. `t` is infinite if the ray hits nothing."""
 
     t: NdArray
     voxel: NdArray
@@ -120,7 +120,7 @@ def _struct_of(type: Union[VoxelType, Colour]) -> Any:
         type = VoxelType(tuple(type))
     rgba = tuple(_c.whole(v, "a colour", 0, 255) for v in type.rgba)
     if len(rgba) not in (3, 4):
-        raise ValueError("a colour is three or four numbers")
+        raise ValueError("a colour must be three or four numbers")
     one = _c.sized(_c.Type)
     one.rgba[:] = (rgba + (255,))[:4]
     one.name = _c.bytes_of(type.name)
@@ -133,7 +133,7 @@ def _struct_of(type: Union[VoxelType, Colour]) -> Any:
 def _rows_of(matrix: Any) -> List[float]:
     found = np.asarray(matrix, np.float64)
     if found.shape not in ((4, 4), (3, 4)):
-        raise ValueError("a matrix has the shape (4, 4) or (3, 4)")
+        raise ValueError("a matrix must have the shape (4, 4) or (3, 4)")
     return [float(v) for v in found[:3].ravel()]
 
 
@@ -145,7 +145,7 @@ def _instance_of(grid: int, matrix: Any, name: str, visible: bool) -> Any:
 
 
 class Grid:
-    """A grid of a scene: voxels, or the field of a volume."""
+    """A grid of a scene: voxels, or the density field of a volume."""
 
     def __init__(self, scene: "Scene", number: int) -> None:
         self._scene = scene
@@ -153,7 +153,7 @@ class Grid:
 
     @property
     def number(self) -> int:
-        """Its place in `Scene.grids`."""
+        """The grid's index in `Scene.grids`."""
         return self._number
 
     def _info(self) -> Any:
@@ -167,33 +167,33 @@ class Grid:
 
     @property
     def voxels(self) -> int:
-        """How many voxels are not air."""
+        """The number of voxels that are not air."""
         return int(self._info().voxels)
 
     @property
     def origin(self) -> Tuple[int, int, int]:
-        """The least voxel of the tight box around its voxels."""
+        """The minimum corner of the tight box around its voxels."""
         x, y, z = self._info().min
         return x, y, z
 
     @property
     def shape(self) -> Tuple[int, int, int]:
-        """Voxels of that box along x, y and z."""
+        """The size of that box along x, y and z."""
         x, y, z = self._info().extent
         return x, y, z
 
     @property
     def has_field(self) -> bool:
-        """Whether it has densities, as volumes do: their surface is smooth."""
+        """True if the grid has a density field, which has a smooth surface."""
         return bool(self._info().has_field)
 
     def to_numpy(self, origin: Optional[Sequence[int]] = None, shape: Optional[Sequence[int]] = None) -> NdArray:
-        """The types of its voxels as uint16 [x, y, z]: of the tight box around them, or of the box that is given."""
+        """Returns voxel types as uint16 [x, y, z], of the given box or of the tight box around all voxels."""
         info = self._info()
         at = [_c.whole(v, "origin") for v in (info.min if origin is None else origin)]
         extent = [_c.whole(v, "shape") for v in (info.extent if shape is None else shape)]
         if len(at) != 3 or len(extent) != 3 or min(extent) < 0:
-            raise ValueError("origin and shape are three whole numbers")
+            raise ValueError("origin and shape must be three integers")
         out = np.zeros(extent, np.uint16)
         three = ctypes.c_int32 * 3
         _c.check(_c.lib.quoin_grid_read(self._scene._owner.handle, self._number, three(*at), three(*extent),
@@ -201,8 +201,8 @@ class Grid:
         return out
 
     def write(self, array: NdArray, origin: Optional[Sequence[float]] = None) -> None:
-        """Changes its voxels: the box of an array [x, y, z] of uint8 or uint16 from `origin` on becomes what that holds,
-        0 for air. Without it begins where `to_numpy` does. A file that was read keeps what else it has when it is saved.
+        """Replaces the voxels of a box with an array [x, y, z] of types (uint8 or uint16, 0 is air). The box starts at
+        `origin`, by default where `to_numpy` starts. Saving a loaded file keeps its other contents.
 
         >>> scene = from_numpy(np.ones((2, 2, 2), np.uint8), [(255, 0, 0), (0, 0, 255)])
         >>> types = scene.grids[0].to_numpy()
@@ -215,7 +215,7 @@ class Grid:
         _c.check(_c.lib.quoin_grid_write(self._scene._owner.handle, self._number, ctypes.byref(given)))
 
     def mesh(self, smooth: bool = False, occlusion: bool = True, threads: int = 0, watertight: bool = False) -> Mesh:
-        """Its surface: merged faces of blocks, or a smooth one around them.
+        """Meshes the grid: merged block faces, or a smooth surface.
 
         `watertight`: of blocks, faces get further corners where others meet their edges, so that no gaps are seen there.
         A face has then four vertices or more. Smooth surfaces always are.
@@ -234,7 +234,7 @@ class Grid:
 
 
 class Scene:
-    """Grids and their types; an empty one, unless `load` or `from_numpy` made it."""
+    """Grids, types and instances. `load` and `from_numpy` create scenes; the constructor makes an empty one."""
 
     def __init__(self, _owner: Optional[_c.Owner] = None) -> None:
         if _owner is None:
@@ -265,29 +265,29 @@ class Scene:
 
     @property
     def format(self) -> str:
-        """Of the file that it was read from: "vox"; empty where there is none."""
+        """The format of the loaded file, such as "vox"; empty if the scene was not loaded."""
         return _c.text_of(self._info().format)
 
     @property
     def bounds(self) -> Tuple[Tuple[float, ...], Tuple[float, ...]]:
-        """The box around what is shown, in the world: its least and its greatest corner."""
+        """The bounds of everything visible, in world space: minimum and maximum corner."""
         info = self._info()
         return tuple(info.min), tuple(info.max)
 
     @property
     def sun(self) -> Optional[Tuple[float, ...]]:
-        """From the scene towards the sun, where its file says it."""
+        """The direction from the scene towards the sun; None if the file has no sun."""
         info = self._info()
         return tuple(info.sun) if info.has_sun else None
 
     @property
     def last_frame(self) -> int:
-        """Of its file's animation; `load` takes a frame."""
+        """The last frame of the file's animation; pass a frame to `load`."""
         return int(self._info().last_frame)
 
     @property
     def instances(self) -> List[Instance]:
-        """Where the grids stand.
+        """The placements of grids.
 
         >>> scene = from_numpy(np.ones((2, 2, 2), np.uint8), [(255, 0, 0)], "box")
         >>> scene.place(scene.grids[0], [[0, 0, 1, 5], [0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1]])
@@ -305,20 +305,20 @@ class Scene:
 
     @property
     def groups(self) -> List[Group]:
-        """What instances belong to; each after its parent."""
+        """The groups of instances, parents first."""
         return [Group(_c.text_of(one.name), one.parent - 1 if one.parent else None, bool(one.shown),
                       _c.text_of(one.layer))
                 for one in self._all(_c.lib.quoin_group_count, _c.lib.quoin_group_get, _c.Group, 1)]
 
     @property
     def layers(self) -> List[Layer]:
-        """Those that instances and groups may lie on, by their names."""
+        """The layers of instances and groups, identified by name."""
         return [Layer(_c.text_of(one.name), bool(one.visible))
                 for one in self._all(_c.lib.quoin_layer_count, _c.lib.quoin_layer_get, _c.Layer)]
 
     @property
     def cameras(self) -> List[Camera]:
-        """Those of its file."""
+        """The cameras of the file, and added ones."""
         return [Camera(tuple(one.position), tuple(one.right), tuple(one.up), tuple(one.forward),
                        one.vertical_fov_degrees, one.view_height if one.is_orthographic else None,
                        one.focus_distance, one.number, bool(one.is_first))
@@ -326,14 +326,14 @@ class Scene:
 
     @property
     def lamps(self) -> List[Lamp]:
-        """Lights without a body; types that emit are lights by themselves."""
+        """Lights without geometry. Types with emission are lights by themselves."""
         return [Lamp(_c.text_of(one.name), tuple(one.position), tuple(one.direction) if one.is_spot else None,
                      tuple(one.colour), one.intensity, one.range, one.inner_angle_degrees, one.outer_angle_degrees)
                 for one in self._all(_c.lib.quoin_lamp_count, _c.lib.quoin_lamp_get, _c.Lamp)]
 
     @property
     def sun_light(self) -> Optional[Sun]:
-        """The sun with its light, where its file says it; what that leaves out is as usual."""
+        """The sun and its light, with defaults for properties that the file does not store; None: no sun."""
         one = _c.sized(_c.Sun)
         _c.check(_c.lib.quoin_sun_get(self._owner.handle, ctypes.byref(one)))
         if not one.brightness > 0.0:
@@ -349,12 +349,12 @@ class Scene:
 
     @property
     def palette(self) -> NdArray:
-        """The types' colours, uint8 (types, 4): `palette[grid.to_numpy()]` is a picture of its voxels."""
+        """The types' colours, uint8 (types, 4): `palette[grid.to_numpy()]` gives the voxels' colours."""
         return np.array([one.rgba for one in self.types], np.uint8)
 
     @property
     def warnings(self) -> List[str]:
-        """What reading left out, and voxelizing merged; then what the last save left out."""
+        """Warnings: first from loading and voxelizing, then from the last save."""
         text = ctypes.create_string_buffer(4096)
         found = []
         for i in range(self._count(_c.lib.quoin_scene_warning_count)):
@@ -363,32 +363,31 @@ class Scene:
         return found
 
     def add_type(self, type: Union[VoxelType, Colour]) -> int:
-        """Adds a type, or a colour of three or four bytes, and returns its number."""
+        """Adds a type, or a colour of three or four bytes. Returns its number."""
         one = _struct_of(type)
         out = ctypes.c_uint16()
         _c.check(_c.lib.quoin_type_add(self._owner.handle, ctypes.byref(one), ctypes.byref(out)))
         return out.value
 
     def add(self, array: NdArray, origin: Sequence[float] = (0, 0, 0), name: str = "") -> Grid:
-        """Adds a grid of the types in an array [x, y, z] of uint8 or uint16, 0 for air, which is read as it lies."""
+        """Adds a grid from an array [x, y, z] of types (uint8 or uint16, 0 is air), without copying the array."""
         given = _c.types_of(array, origin)
         out = ctypes.c_size_t()
         _c.check(_c.lib.quoin_grid_add(self._owner.handle, ctypes.byref(given), _c.name_of(name), ctypes.byref(out)))
         return Grid(self, out.value)
 
     def place(self, grid: Grid, matrix: Any, name: Optional[str] = None, visible: bool = True) -> int:
-        """Places a grid of this scene once more, and returns the instance's number. `matrix` (4, 4), or (3, 4), takes
-        its voxels to the world; it may turn, mirror, move and scale alike along all axes. Without a name it is the
-        grid's."""
+        """Adds an instance of a grid of this scene. Returns its number. `matrix`, (4, 4) or (3, 4), transforms voxels
+        to the world; it may rotate, mirror, translate and scale uniformly. The default name is the grid's."""
         if grid._scene._owner is not self._owner:
-            raise ValueError("the grid is another scene's")
+            raise ValueError("the grid belongs to another scene")
         given = _instance_of(grid.number, matrix, grid.name if name is None else name, visible)
         out = ctypes.c_size_t()
         _c.check(_c.lib.quoin_instance_add(self._owner.handle, ctypes.byref(given), ctypes.byref(out)))
         return out.value
 
     def move(self, instance: int, matrix: Any, visible: Optional[bool] = None, name: Optional[str] = None) -> None:
-        """Puts an instance elsewhere, shows or hides it, and names it."""
+        """Moves, shows, hides or renames an instance."""
         given = _c.sized(_c.Instance)
         instance = _c.size(instance, "instance")
         _c.check(_c.lib.quoin_instance_get(self._owner.handle, instance, ctypes.byref(given)))
@@ -400,7 +399,7 @@ class Scene:
         _c.check(_c.lib.quoin_instance_set(self._owner.handle, instance, ctypes.byref(given)))
 
     def set_layer(self, name: str, visible: bool = True) -> None:
-        """Adds a layer, or shows or hides that of this name.
+        """Adds a layer, or shows or hides the existing layer of this name.
 
         >>> scene = from_numpy(np.ones((2, 2, 2), np.uint8), [(255, 0, 0)], "box")
         >>> scene.set_layer("attic", visible=False)
@@ -413,8 +412,7 @@ class Scene:
         _c.check(_c.lib.quoin_layer_set(self._owner.handle, ctypes.byref(given)))
 
     def add_group(self, name: str, parent: Optional[int] = None, visible: bool = True, layer: str = "") -> int:
-        """Adds a group, within another where `parent` is its place in `groups`, and returns its own. The scene has the
-        layer already."""
+        """Adds a group and returns its index. `parent` is an index into `groups`. The layer must exist."""
         given = _c.sized(_c.Group)
         given.name, given.layer, given.shown = _c.bytes_of(name), _c.bytes_of(layer), int(visible)
         given.parent = 0 if parent is None else _c.size(parent, "parent") + 1
@@ -423,7 +421,7 @@ class Scene:
         return out.value - 1
 
     def assign(self, instance: int, group: Optional[int] = None, layer: str = "") -> None:
-        """Puts an instance into a group and onto a layer, both of which the scene has. It stays where it stands."""
+        """Assigns an instance to an existing group and layer. Its position does not change."""
         given = _c.sized(_c.Instance)
         instance = _c.size(instance, "instance")
         _c.check(_c.lib.quoin_instance_get(self._owner.handle, instance, ctypes.byref(given)))
@@ -432,8 +430,7 @@ class Scene:
         _c.check(_c.lib.quoin_instance_set_layer(self._owner.handle, instance, _c.name_of(layer)))
 
     def add_camera(self, camera: Camera) -> None:
-        """Adds a camera under its number, which no other has. .quoin and .vox hold all, .json the first to be looked
-        through.
+        """Adds a camera with an unused number. .quoin and .vox store all cameras, .json only the initial one.
 
         >>> scene = from_numpy(np.ones((2, 2, 2), np.uint8), [(255, 0, 0)])
         >>> scene.add_camera(Camera((0, 1, 9), (1, 0, 0), (0, 1, 0), (0, 0, -1), 40.0))
@@ -450,7 +447,7 @@ class Scene:
         _c.check(_c.lib.quoin_camera_add(self._owner.handle, ctypes.byref(one)))
 
     def add_lamp(self, lamp: Lamp) -> None:
-        """Adds a lamp. .quoin and .json hold them."""
+        """Adds a lamp. .quoin and .json store lamps."""
         one = _c.sized(_c.Lamp)
         one.name, one.position[:], one.colour[:] = _c.bytes_of(lamp.name), lamp.position, lamp.colour
         one.intensity, one.range = lamp.intensity, lamp.range
@@ -460,7 +457,7 @@ class Scene:
         _c.check(_c.lib.quoin_lamp_add(self._owner.handle, ctypes.byref(one)))
 
     def set_sun(self, sun: Sun) -> None:
-        """Gives the scene its sun, or another one. .vox holds all of it, .json and .quoin its direction."""
+        """Sets the sun. .vox stores all its properties, .json and .quoin only the direction."""
         one = _c.sized(_c.Sun)
         one.direction[:], one.colour[:] = sun.direction, sun.colour
         one.brightness, one.angle_degrees = sun.brightness, sun.angle
@@ -469,16 +466,17 @@ class Scene:
     def voxelize(self, positions: Any, triangles: Any, voxel_size: float = 1.0, *, colours: Any = None,
                  materials: Any = None, types: Sequence[Union[VoxelType, Colour]] = (), fill: str = "all",
                  name: str = "", max_types: int = 0, threads: int = 0) -> Grid:
-        """Adds the voxels of triangles (n, 3), whose positions are (m, 3), and shows them where these are, in units of
-        a voxel. `colours` (m, 4): linear light and alpha; `materials` (n,): of `types`, from 0. `fill`: "all", "solid"
-        for voxels whose centre is enclosed, or "surface". `max_types`: near colours are merged beyond that.
+        """Voxelizes triangles (n, 3) with positions (m, 3) into a new grid and places it at their position, in units
+        of a voxel. `colours` (m, 4): linear light and alpha. `materials` (n,): indices into `types`. `fill`: "all",
+        "solid" for voxels whose centre is enclosed, or "surface". `max_types`: limit of added types; similar colours
+        are merged.
 
         >>> corners = [[0, 0, 0], [8, 0, 0], [0, 8, 0], [0, 0, 8]]
         >>> Scene().voxelize(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], types=[(200, 0, 0)]).shape
         (8, 8, 8)
         """
         if fill not in _FILLS:
-            raise ValueError('fill is "all", "solid" or "surface"')
+            raise ValueError('fill must be "all", "solid" or "surface"')
         corners = _c.rows_of(positions, 3, np.float32, "positions")
         indices = _c.rows_of(_c.indices_of(triangles, "triangles"), 3, np.uint32, "triangles")
         given = _c.sized(_c.Triangles)
@@ -487,12 +485,12 @@ class Scene:
         if colours is not None:
             colours = _c.rows_of(colours, 4, np.float32, "colours")
             if len(colours) != len(corners):
-                raise ValueError("there is a colour a position")
+                raise ValueError("colours must have one entry per position")
             given.colours = colours.ctypes.data
         if materials is not None:
             materials = _c.indices_of(materials, "materials")
             if materials.shape != (len(indices),):
-                raise ValueError("there is a material a triangle")
+                raise ValueError("materials must have one entry per triangle")
             given.materials = materials.ctypes.data
         structs = (_c.Type * len(types))(*[_struct_of(one) for one in types])
         given.types, given.type_count = ctypes.addressof(structs) if types else None, len(types)
@@ -505,18 +503,18 @@ class Scene:
         return Grid(self, out.value)
 
     def save(self, path: Path) -> None:
-        """Writes a file by its ending: .vox, .json, .quoin; or meshes: .glb, .gltf, .obj, .ply."""
+        """Writes a file in the format of its extension: .vox, .json, .quoin; or meshes: .glb, .gltf, .obj, .ply."""
         _c.check(_c.lib.quoin_scene_save(self._owner.handle, _c.path_of(path)))
 
     def render(self, width: int = 1280, height: int = 720, *, samples: int = 0, paths: bool = False,
                camera: Optional[Sequence[float]] = None, look_at: Optional[Sequence[float]] = None, fov: float = 45.0,
                sun: Optional[Sequence[float]] = None, out: Optional[NdArray] = None, threads: int = 0) -> NdArray:
-        """A picture, uint8 (height, width, 3), sRGB. Without a camera the whole scene is shown; one looks at (0, 0, 0)
-        unless `look_at` says otherwise. `paths`: light with its bounces and soft shadows, which takes longer. `sun`:
-        from the scene towards it, of any length; the sky follows it. `out` is filled in place where it is given."""
-        width, height = (_c.whole(v, "the picture's size") for v in (width, height))
+        """Renders an image, uint8 (height, width, 3), sRGB. The default camera shows the whole scene; a given camera
+        looks at (0, 0, 0) by default. `paths`: path tracing, slower, with indirect light and soft shadows. `sun`: from
+        the scene towards the sun, any length; the sky follows it. `out`: array to fill in place."""
+        width, height = (_c.whole(v, "the image size") for v in (width, height))
         if width <= 0 or height <= 0:
-            raise ValueError("a picture has pixels")
+            raise ValueError("width and height must be positive")
         options = _c.sized(_c.RenderOptions)
         options.width, options.height, options.samples = width, height, _c.whole(samples, "samples")
         options.paths, options.threads = int(paths), _c.whole(threads, "threads")
@@ -525,21 +523,21 @@ class Scene:
             options.camera[:] = _c.three(camera, "camera")
             options.look_at[:] = _c.three((0, 0, 0) if look_at is None else look_at, "look_at")
         elif look_at is not None:
-            raise ValueError("look_at is of a camera, which is not given")
+            raise ValueError("look_at needs camera")
         if sun is not None:
             options.has_sun, options.sun[:] = 1, _c.three(sun, "sun")
         if out is None:
             out = np.empty((height, width, 3), np.uint8)
         elif not isinstance(out, np.ndarray):
-            raise TypeError("out is a NumPy array")
+            raise TypeError("out must be a NumPy array")
         elif out.shape != (height, width, 3) or out.dtype != np.uint8 or not out.flags.c_contiguous \
                 or not out.flags.writeable:
-            raise ValueError("out is a writable uint8 array (height, width, 3) without gaps")
+            raise ValueError("out must be a contiguous, writable uint8 array (height, width, 3)")
         _c.check(_c.lib.quoin_scene_render(self._owner.handle, ctypes.byref(options), out.ctypes.data, out.size))
         return out
 
     def rays(self, origins: Any, directions: Any, max_t: float = np.inf) -> Hits:
-        """What each ray (n, 3) meets first. The tree for it is built once, and follows changes.
+        """Returns the first hit of each ray (n, 3). The first call builds a tree, which is updated after changes.
 
         >>> scene = from_numpy(np.ones((2, 2, 2), np.uint8), [(255, 0, 0)])
         >>> scene.rays([[0.5, 9, 0.5]], [[0, -1, 0]]).t
@@ -548,7 +546,7 @@ class Scene:
         start = _c.rows_of(origins, 3, np.float64, "origins and directions")
         way = _c.rows_of(directions, 3, np.float64, "origins and directions")
         if way.shape != start.shape:
-            raise ValueError("there is a direction an origin")
+            raise ValueError("directions must have one entry per origin")
         n = len(start)
         hits = Hits(np.empty(n), np.empty((n, 3), np.int32), np.empty(n, np.uint16), np.empty((n, 3)))
         given = _c.sized(_c.HitArrays)
@@ -562,25 +560,26 @@ class Scene:
 
 
 class Raw:
-    """A file of values alone: how many along each axis, the first one fastest, and what each is.
+    """Describes a file of raw values: their number along each axis, the first axis fastest, and their type.
 
-    `dtype`: of NumPy, in any order of bytes: "uint8", ">i2", np.float32.
+    `dtype`: a NumPy type of any byte order: "uint8", ">i2", np.float32.
     """
 
     def __init__(self, shape: Sequence[int], dtype: Any = "uint8") -> None:
         self.shape = tuple(_c.whole(length, "shape") for length in shape)
         if len(self.shape) != 3 or min(self.shape) < 1:
-            raise ValueError(f"values alone have three axes that are not empty, not {self.shape}")
+            raise ValueError(f"raw values must have three non-empty axes, not {self.shape}")
         self.dtype = np.dtype(dtype)
         self._scalar, self._is_big_endian = _c.scalar_of(dtype, "values")
 
 
 class Heights:
-    """A picture (PNG) of the heights of a landscape.
+    """Describes a height map, a PNG image.
 
-    `encoding`: "grey", a level times `metres_per_level`; "mapbox" or "terrarium", metres in red, green and blue.
-    `metres_per_pixel`: between neighbouring heights; without it 1, with a warning. `metres_per_voxel`: without it that.
-    `ground_depth`: voxels of ground below the lowest height. `smooth`: densities rather than voxels.
+    `encoding`: "grey", level times `metres_per_level`; "mapbox" or "terrarium", metres in red, green and blue.
+    `metres_per_pixel`: between neighbouring samples; default 1, with a warning. `metres_per_voxel`: default
+    `metres_per_pixel`. `ground_depth`: voxels of ground below the lowest height. `smooth`: makes a density field
+    instead of voxels.
     """
 
     ENCODINGS = ("grey", "mapbox", "terrarium")
@@ -589,18 +588,18 @@ class Heights:
                  metres_per_pixel: Optional[float] = None, metres_per_voxel: Optional[float] = None,
                  exaggeration: float = 1.0, ground_depth: int = 8, smooth: bool = False) -> None:
         if encoding not in self.ENCODINGS:
-            raise ValueError(f"encoding is one of {', '.join(self.ENCODINGS)}, not {encoding!r}")
+            raise ValueError(f"encoding must be one of {', '.join(self.ENCODINGS)}, not {encoding!r}")
         self.encoding = encoding
-        # To the library 0 stands for what is not given.
+        # The library treats 0 as not given.
         for name, given in (("metres_per_level", metres_per_level), ("metres_per_pixel", metres_per_pixel),
                             ("metres_per_voxel", metres_per_voxel), ("exaggeration", exaggeration)):
             if given is not None and not given > 0.0:
-                raise ValueError(f"{name} is more than 0, not {given}")
+                raise ValueError(f"{name} must be positive, not {given}")
         self.metres_per_level, self.exaggeration = metres_per_level, exaggeration
         self.metres_per_pixel, self.metres_per_voxel = metres_per_pixel, metres_per_voxel
         self.ground_depth = _c.whole(ground_depth, "ground_depth")
         if self.ground_depth < 1:
-            raise ValueError(f"ground_depth is at least 1, not {ground_depth}")
+            raise ValueError(f"ground_depth must be at least 1, not {ground_depth}")
         self.smooth = smooth
 
 
@@ -613,12 +612,12 @@ def _load_options(frame: int, show_hidden: bool, radius: int, iso: Optional[floa
     options.mesh_voxels, options.voxel_size = _c.whole(size, "size"), voxel_size
     if raw is not None:
         if not isinstance(raw, Raw):
-            raise TypeError("raw is a quoin.Raw")
+            raise TypeError("raw must be a quoin.Raw")
         options.raw_shape[:] = raw.shape
         options.raw_scalar, options.raw_big_endian = raw._scalar, int(raw._is_big_endian)
     if heights is not None:
         if not isinstance(heights, Heights):
-            raise TypeError("heights is a quoin.Heights")
+            raise TypeError("heights must be a quoin.Heights")
         options.heights = 1 + Heights.ENCODINGS.index(heights.encoding)
         options.metres_per_level, options.exaggeration = heights.metres_per_level, heights.exaggeration
         options.metres_per_pixel = heights.metres_per_pixel or 0.0
@@ -631,13 +630,13 @@ def load(path: Path, *, frame: int = 0, show_hidden: bool = False, radius: int =
          size: int = 0, voxel_size: float = 0.0, threads: int = 0, raw: Optional[Raw] = None,
          heights: Optional[Heights] = None, allow_outside_files: bool = False,
          dimension: Optional[str] = None) -> Scene:
-    """Reads a file of any format that Quoin reads (`formats`), or a folder that holds a world.
+    """Loads a file of any readable format (`formats`), or a world's folder.
 
-    `frame`: of an animation. `radius`: of a world, in chunks of 64 voxels around its spawn; 0 is 4. `iso`: of a volume.
-    `size`, `voxel_size`: of a file of triangles, voxels along its longest side, or their size. `raw`, `heights`: the
-    file is one of values alone, or a picture of a landscape's heights. `allow_outside_files`: the file may name files
-    outside its folder (buffers, images, models); for input from a trusted source only. `dimension`: of a Minecraft
-    world, "overworld", "nether", "end" or "NAMESPACE:NAME"; without it the overworld, or the first that the world has.
+    `frame`: animation frame. `radius`: worlds: chunks of 64 voxels around the spawn point; 0 is 4. `iso`: threshold of
+    volumes. `size`, `voxel_size`: triangle files: voxels along the longest side, or the voxel size. `raw`, `heights`:
+    reads the file as raw values or as a height map. `allow_outside_files`: the file may name files outside its folder
+    (buffers, images, models); only for input from a trusted source. `dimension`: Minecraft worlds: "overworld",
+    "nether", "end" or "NAMESPACE:NAME"; default the overworld, or the first dimension if there is none.
 
     >>> load("nothing.vox")
     Traceback (most recent call last):
@@ -655,7 +654,7 @@ def load(path: Path, *, frame: int = 0, show_hidden: bool = False, radius: int =
 def load_bytes(data: Union[bytes, bytearray, memoryview], *, frame: int = 0, show_hidden: bool = False, radius: int = 0,
                iso: Optional[float] = None, size: int = 0, voxel_size: float = 0.0, threads: int = 0,
                raw: Optional[Raw] = None, heights: Optional[Heights] = None) -> Scene:
-    """The same of what a file holds: bytes, or whatever lies in memory as they do, which is not copied.
+    """Loads the contents of a file from bytes or any contiguous buffer, without copying.
 
     >>> values = np.arange(8, dtype=">u2").reshape(2, 2, 2)
     >>> load_bytes(values.tobytes(), raw=Raw((2, 2, 2), ">u2"), iso=3.5).grids[0].has_field
@@ -670,18 +669,18 @@ def load_bytes(data: Union[bytes, bytearray, memoryview], *, frame: int = 0, sho
 
 
 def from_numpy(array: NdArray, palette: Iterable[Union[VoxelType, Colour]], name: str = "") -> Scene:
-    """A scene of one grid. `array` [x, y, z] has 0 for air and i for the i-th entry of the palette, from 1 on."""
+    """Creates a scene of one grid. In `array` [x, y, z], 0 is air and i is the i-th palette entry, counted from 1."""
     scene = Scene()
     for one in palette:
         if not isinstance(one, Iterable):
-            raise TypeError("a palette is a list of colours: [(200, 40, 40), ...]")
+            raise TypeError("the palette must be a list of colours: [(200, 40, 40), ...]")
         scene.add_type(one)
     scene.add(array, name=name)
     return scene
 
 
 def formats() -> List[Format]:
-    """What files can be read and written.
+    """Returns the formats that can be read or written.
 
     >>> [one.extensions for one in formats() if one.name == "vox"]
     [('.vox',)]
