@@ -14,7 +14,7 @@ extern "C" __attribute__((import_module("quoin"), import_name("told"))) std::int
 namespace quoin::c {
 namespace {
 
-// The last file that was written, which JavaScript copies from where it is.
+// The last file written. JavaScript copies it from here.
 std::vector<std::byte> file;
 
 quoin_status give(std::vector<std::byte> bytes, const std::uint8_t** out, std::size_t* count) {

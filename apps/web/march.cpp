@@ -1,4 +1,4 @@
-// A scene as shaders of the browser march it, which page/march.js runs.
+// Prepares scenes for the browser's ray-marching shaders, which page/march.js runs.
 
 #include <cstring>
 #include <memory>
@@ -13,7 +13,7 @@
 #include "render_vk/march/shader_scene.h"
 
 struct quoin_web_march {
-  std::shared_ptr<quoin::c::SceneBody> scene;  // stays while this is there
+  std::shared_ptr<quoin::c::SceneBody> scene;  // kept alive
   std::unique_ptr<quoin::vulkan::ShaderScene> shaders;
   std::vector<std::byte> frame;
 };
@@ -23,7 +23,7 @@ using namespace quoin::c;
 
 namespace {
 
-// As shaders have it: bit 0, transparent voxels; 1, fields; 2, transparent fields.
+// Returns the shaders' flags: bit 0, transparent voxels; 1, fields; 2, transparent fields.
 std::int32_t what_it_has(const vulkan::Placement& placement) {
   return (placement.has_transparent ? 1 : 0) | (placement.has_fields ? 2 : 0) | (placement.has_field_glass ? 4 : 0);
 }
@@ -63,7 +63,7 @@ quoin_status quoin_web_march_frame(quoin_web_march* march, const quoin_render_op
   return guarded([&] {
     const auto given = taken_or_default(options);
     if (march == nullptr || !given || out == nullptr || bytes == nullptr)
-      return fail(QUOIN_INVALID_ARGUMENT, "march, out or bytes is null, or the size of the options");
+      return fail(QUOIN_INVALID_ARGUMENT, "march, out or bytes is null, or invalid size of the options");
     const auto taking = taking_of(march->scene->loaded.scene, *given);
     if (!taking) return fail(taking.error());
     auto frame = march->shaders->frame(taking->camera, taking->options);
@@ -78,7 +78,7 @@ quoin_status quoin_web_march_sample(std::int32_t sample, std::uint8_t* out, std:
   return guarded([&] {
     vulkan::ShaderPush push;
     if (sample < 0 || out == nullptr || bytes != sizeof push)
-      return fail(QUOIN_INVALID_ARGUMENT, "a sample below 0, or no room for one");
+      return fail(QUOIN_INVALID_ARGUMENT, "the sample number is negative, or out is null or has the wrong size");
     vulkan::set_sample(sample, natural_light().occlusion_rays, push);
     std::memcpy(out, &push, sizeof push);
     return QUOIN_OK;

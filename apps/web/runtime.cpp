@@ -1,8 +1,8 @@
-// What the C and C++ libraries for WebAssembly lack: exceptions, and what a process knows of its memory.
+// Functions missing from the C and C++ libraries for WebAssembly: exceptions and memory information.
 //
-// They are built without exceptions, so nothing can be caught there. What throws ends the instance: JavaScript throws
-// an Error with the exception's text through it, and the package starts a fresh one. Quoin throws only where memory
-// runs out, or a library that it uses does: for text that is no JSON.
+// These libraries are built without exceptions, so nothing can be caught. An exception ends the instance: JavaScript
+// throws an Error with the exception's text through it, and the package starts a fresh instance. Exceptions occur only
+// if memory runs out or a library throws, for example for invalid JSON.
 
 #include <cstddef>
 #include <cstdint>
@@ -30,7 +30,7 @@ struct SingleBase {
 bool is_exception(const std::type_info& type) {
   class Derived : public std::exception {};
   if (type == typeid(std::exception)) return true;
-  // All of one kind have the same table of virtual functions.
+  // All type_infos of one kind share a virtual table.
   const void* const table_of_single = *reinterpret_cast<const void* const*>(&typeid(Derived));
   const auto& layout = reinterpret_cast<const SingleBase&>(type);
   return layout.table == table_of_single && is_exception(*layout.base);
@@ -50,7 +50,7 @@ void* allocate(std::size_t bytes, std::size_t alignment) {
 
 extern "C" {
 
-// wasi-libc's goes byte by byte.
+// The version in wasi-libc compares single bytes.
 int memcmp(const void* left, const void* right, std::size_t bytes) {
   const auto* a = static_cast<const unsigned char*>(left);
   const auto* b = static_cast<const unsigned char*>(right);
@@ -85,7 +85,7 @@ void __cxa_free_exception(void* thrown) noexcept {
   std::abort();
 }
 
-// An instance is thrown away whole, with what its one thread holds.
+// The instance, with its only thread, is discarded as a whole, so destructors need not run.
 int __cxa_thread_atexit(void (* /*end*/)(void*), void* /*object*/, void* /*library*/) {
   return 0;
 }

@@ -1,5 +1,4 @@
-// quoin-small.wasm: what reads .vox alone, for pages that show blocks soon. All else is that of quoin.wasm, and has its
-// names.
+// quoin-small.wasm reads only .vox, for pages that show blocks quickly. Its other functions are those of quoin.wasm.
 
 #include <quoin/io/formats.h>
 #include <quoin/io/vox.h>
@@ -10,7 +9,7 @@
 
 namespace quoin::c {
 
-// Whether this module reads a file of these bytes; quoin.wasm, which has no such function, reads all that there are.
+// Returns 1 if this module can read these bytes. quoin.wasm lacks this function, since it reads all formats.
 QUOIN_EXPORT("quoin_web_reads") std::int32_t reads(const std::byte* data, std::size_t bytes) {
   return detect_format(std::span(data, bytes)) == FileFormat::Vox ? 1 : 0;
 }

@@ -10,6 +10,6 @@ set(CMAKE_C_COMPILER_TARGET wasm32-wasip1)
 set(CMAKE_CXX_COMPILER_TARGET wasm32-wasip1)
 set(quoin_web_headers "-isystem ${QUOIN_WEB_ROOT}/sysroot/include/wasm32-wasip1 -isystem ${QUOIN_WEB_ROOT}/headers")
 set(CMAKE_C_FLAGS_INIT "-nostdlibinc ${quoin_web_headers} -msimd128")
-# What throws ends the instance, with the exception's text: no code for unwinding is there.
+# An exception ends the instance with its text, so unwinding code is not needed.
 string(CONCAT CMAKE_CXX_FLAGS_INIT "-nostdinc++ -nostdlibinc -isystem ${QUOIN_WEB_ROOT}/sysroot/include/c++/v1 "
   "${quoin_web_headers} -msimd128 -fexceptions -fignore-exceptions")

@@ -1,7 +1,7 @@
-// tinygltf and tinyobjloader, whose headers hold their code: here they are compiled, for quoin.wasm, as gltf.cpp and
-// obj.cpp use them. Files and pictures are read by Quoin.
+// Compiles the header-only libraries tinygltf and tinyobjloader for quoin.wasm, with the settings of gltf.cpp and
+// obj.cpp. Quoin itself reads files and images.
 
-// tinygltf takes what writes files without asking for it, and libc++ wants paths before streams of files.
+// tinygltf uses file streams without including them, and libc++ needs <filesystem> first.
 #include <filesystem>
 #include <fstream>
 

@@ -217,8 +217,8 @@ class Grid:
     def mesh(self, smooth: bool = False, occlusion: bool = True, threads: int = 0, watertight: bool = False) -> Mesh:
         """Meshes the grid: merged block faces, or a smooth surface.
 
-        `watertight`: of blocks, faces get further corners where others meet their edges, so that no gaps are seen there.
-        A face has then four vertices or more. Smooth surfaces always are.
+        `watertight`: blocks only: adds corners to faces whose edges meet other faces' corners, which avoids visible
+        gaps. Faces may then have more than four vertices. Smooth surfaces are always watertight.
         """
         options = _c.sized(_c.MeshOptions)
         options.smooth, options.no_occlusion = int(smooth), int(not occlusion)

@@ -1,4 +1,4 @@
-// Quoin's WebAssembly module as a module of JavaScript: docs/web.md, quoin.d.ts.
+// JavaScript binding of Quoin's WebAssembly module. See docs/web.md and quoin.d.ts.
 
 const codes = ['ok', 'invalid_argument', 'cannot_read', 'cannot_write', 'bad_format', 'unsupported', 'limit_exceeded',
                'cancelled', 'device_lost', 'bad_handle', 'out_of_memory', 'internal'];
@@ -11,13 +11,13 @@ export class QuoinError extends Error {
   }
 }
 
-// What quoin_web_struct calls its structs, and where their fields are: pointers and size_t have 4 bytes.
+// Struct numbers of quoin_web_struct. In the field offsets below, pointers and size_t have 4 bytes.
 const structs = { array: 0, gridInfo: 1, type: 2, meshData: 3, meshOptions: 4, renderOptions: 5, hits: 6,
                   loadOptions: 7 };
 const scalars = [Uint8Array, Int8Array, Uint16Array, Int16Array, Uint32Array, Int32Array, BigUint64Array, BigInt64Array,
                  Float32Array, Float64Array];
 
-/** One instance of the module. What ends it is thrown as a QuoinError, and it is never called again. */
+/** An instance of the module. If a call ends it, the call throws a QuoinError and later calls are refused. */
 class Instance {
   constructor(module) {
     this.dead = false;
@@ -28,7 +28,7 @@ class Instance {
 
   imports(module) {
     const imports = {};
-    // A system without files: calls fail as they do where something is not supported.
+    // WASI without files: all calls return ENOSYS (52).
     for (const { module: from, name } of WebAssembly.Module.imports(module)) (imports[from] ??= {})[name] = () => 52;
     const system = (imports.wasi_snapshot_preview1 ??= {});
     system.clock_time_get = (clock, precision, out) => {
@@ -59,12 +59,12 @@ class Instance {
     return imports;
   }
 
-  /** Calls an export. What is thrown through it leaves it in no state to go on. */
+  /** Calls an export. An exception leaves the instance in an undefined state and ends it. */
   run(name, ...values) {
-    if (this.dead) throw new QuoinError('bad_handle', 'the instance that this belongs to has ended');
-    if (this.isTelling) throw new QuoinError('invalid_argument', 'progress is to call nothing of the package');
+    if (this.dead) throw new QuoinError('bad_handle', 'the WebAssembly instance of this object has ended');
+    if (this.isTelling) throw new QuoinError('invalid_argument', 'the progress callback must not call the package');
     if (this.exports[name] === undefined)
-      throw new QuoinError('unsupported', 'the small module has none of this: load without { small: true }');
+      throw new QuoinError('unsupported', 'the small module does not support this: load without { small: true }');
     try {
       return this.exports[name](...values);
     } catch (error) {
@@ -74,7 +74,7 @@ class Instance {
     }
   }
 
-  /** Asks the one who listens whether to go on. What he throws is not thrown through the module, but after it. */
+  /** Calls the progress listener. Its exception is kept and rethrown after the module has returned. */
   told(fraction) {
     const { listener } = this;
     if (listener.threw !== undefined) return 0;
@@ -89,10 +89,10 @@ class Instance {
     }
   }
 
-  /** Runs work that tells `tell`, where there is one, how far it has come. */
+  /** Runs work that reports its progress to `tell`, if given. */
   listened(tell, work) {
     if (tell === undefined) return work();
-    if (typeof tell !== 'function') throw new QuoinError('invalid_argument', 'progress is no function');
+    if (typeof tell !== 'function') throw new QuoinError('invalid_argument', 'progress must be a function');
     const listener = { tell };
     this.run('quoin_web_listen', 1);
     this.listener = listener;
@@ -106,7 +106,7 @@ class Instance {
     }
   }
 
-  /** Calls one of quoin.h's functions. */
+  /** Calls a function of quoin.h. */
   call(name, ...values) {
     const status = this.run(name, ...values);
     if (status !== 0) throw new QuoinError(codes[status] ?? 'internal', this.text(this.run('quoin_last_error')));
@@ -122,14 +122,14 @@ class Instance {
     return new TextDecoder().decode(bytes.slice(0, end));
   }
 
-  /** A copy of count numbers; null where the address is. */
+  /** Copies `count` numbers; returns null for a null address. */
   numbers(Kind, at, count) {
     return at === 0 ? null : new Kind(this.exports.memory.buffer, at, count).slice();
   }
 
-  /** Calls use(address, view of it) with `bytes` of memory. */
+  /** Calls use(address) with `bytes` of memory, and frees it. */
   with(bytes, use) {
-    // Its malloc gives less than half of the address space, and takes a size modulo 2^32.
+    // malloc takes a size modulo 2^32, and never returns half of the address space or more.
     const at = bytes < 2 ** 31 ? this.run('malloc', Math.max(bytes, 1)) >>> 0 : 0;
     if (at === 0) throw new QuoinError('out_of_memory', `no memory for ${bytes} bytes`);
     try {
@@ -139,7 +139,7 @@ class Instance {
     }
   }
 
-  /** Copies an ArrayBuffer or a typed array in. */
+  /** Copies an ArrayBuffer or a typed array to an address. */
   put(array, at) {
     const { buffer = array, byteOffset = 0, byteLength } = array;
     const bytes = new Uint8Array(buffer, byteOffset, byteLength);
@@ -181,7 +181,7 @@ class Instance {
     });
   }
 
-  /** Calls use(field of quoin_mesh_data by its number) with what a mesh has, and frees it. */
+  /** Calls `use` with a function that reads the fields of quoin_mesh_data by number, and frees the mesh. */
   withMesh(mesh, use) {
     try {
       return this.withStruct('meshData', (at) => {
@@ -206,7 +206,7 @@ class Instance {
     });
   }
 
-  /** `label`: what a label of 64 bits is called. */
+  /** `label`: converts a 64-bit label to the caller's type. */
   takeLabels(mesh, label) {
     return this.withMesh(mesh, (field) => {
       const numbers = this.numbers(BigInt64Array, field(9), 4 * field(3)) ?? [];
@@ -225,38 +225,39 @@ class Instance {
 
 const isBytes = (given) => given instanceof ArrayBuffer || ArrayBuffer.isView(given);
 
-/** The WebAssembly.Module of `given`: its bytes, or where they are. Errors: QuoinError. */
+/** Compiles a WebAssembly.Module from its bytes or address. Errors: QuoinError. */
 async function compile(given) {
   try {
     return await compiled(given);
   } catch (error) {
     if (error instanceof QuoinError) throw error;
-    // A module that is none is told of as a file that is none; all else is that it cannot be had.
+    // Invalid modules are format errors. All other errors mean that the module is not available.
     const code = error instanceof WebAssembly.CompileError ? 'bad_format' : 'cannot_read';
-    throw new QuoinError(code, `the WebAssembly module${isBytes(given) ? '' : ` ${given}`}: ${error.message}`);
+    const name = isBytes(given) ? '' : ` ${given}`;
+    throw new QuoinError(code, `cannot compile the WebAssembly module${name}: ${error.message}`);
   }
 }
 
 async function compiled(given) {
   if (isBytes(given)) return WebAssembly.compile(given);
   if (String(given).startsWith('file:')) {
-    // Written so that those who bundle for browsers do not look for it.
+    // Written so that bundlers for browsers do not resolve the module.
     const name = ['node:fs', 'promises'].join('/');
     const { readFile } = await import(/* webpackIgnore: true */ /* @vite-ignore */ name);
     return WebAssembly.compile(await readFile(new URL(given)));
   }
   const response = await fetch(given);
   if (!response.ok) throw new QuoinError('cannot_read', `${given}: ${response.status} ${response.statusText}`);
-  // Compiled while it arrives, where the server says that it is WebAssembly.
+  // Compiles while downloading if the server sends the MIME type.
   if (response.headers.get('Content-Type') === 'application/wasm') return WebAssembly.compileStreaming(response);
   return WebAssembly.compile(await response.arrayBuffer());
 }
 
-/** One of the two modules, and the instance of it that lives. */
+/** One of the two modules and its live instance. */
 class Engine {
-  #usual;     // where it is
+  #usual;     // returns the default address
   #compiled;  // a promise of the WebAssembly.Module
-  #instance;  // a promise of the Instance that lives; undefined where there is none
+  #instance;  // a promise of the live Instance, or undefined
 
   constructor(usual) {
     this.#usual = usual;
@@ -272,7 +273,7 @@ class Engine {
     return this.alive();
   }
 
-  /** The instance for new work: where the last one ended, a fresh one. All who wait at once get the same. */
+  /** Returns the instance for new work, a fresh one if the last one has ended. Concurrent callers share it. */
   async alive() {
     if (this.#compiled === undefined) return this.start();
     const promise = (this.#instance ??= this.#fresh());
@@ -289,7 +290,7 @@ class Engine {
   }
 }
 
-// Bundlers know these expressions.
+// Bundlers recognise these expressions.
 const whole = new Engine(() => new URL('./quoin.wasm', import.meta.url));
 const small = new Engine(() => new URL('./quoin-small.wasm', import.meta.url));
 
@@ -353,7 +354,7 @@ export class Scene {
     }));
   }
 
-  /** Calls use(the address of a quoin_mesh_options). */
+  /** Calls `use` with the address of a quoin_mesh_options. */
   #withMeshOptions(options, use) {
     const { smooth, watertight } = known(options, ['smooth', 'watertight', 'progress']);
     const of = this.#instance;
@@ -374,7 +375,8 @@ export class Scene {
     const { progress } = known(options, ['smooth', 'watertight', 'progress']);
     const kinds = ['.glb', '.ply', '.stl', '.3mf', '.vox'];
     if (!kinds.some((kind) => typeof extension === 'string' && extension.toLowerCase().endsWith(kind)))
-      throw new QuoinError('unsupported', `${String(extension)} is none of ${kinds.join(', ')}`);
+      throw new QuoinError('unsupported',
+                           `cannot write ${String(extension)}: the extension must be one of ${kinds.join(', ')}`);
     const write = (wanted, name, out) => {
       of.call('quoin_web_write', this.#handle, name, wanted, out, out + 4);
       const at = of.view().getUint32(out, true);
@@ -397,7 +399,7 @@ export class Scene {
     const of = this.#instance;
     const numbers = [...three(min, 'min'), ...three(shape, 'shape')].map((value) => int32(value, 'min or shape'));
     const count = numbers[3] * numbers[4] * numbers[5];
-    if (!(count >= 0 && count <= 2 ** 30)) throw new QuoinError('invalid_argument', 'a box that cannot be');
+    if (!(count >= 0 && count <= 2 ** 30)) throw new QuoinError('invalid_argument', 'the box is out of range');
     return of.withBytes(Int32Array.from(numbers), (box) => of.with(2 * count, (out) => {
       of.call('quoin_grid_read', this.#handle, index(grid), box, box + 12, out, count);
       return of.numbers(Uint16Array, out, count);
@@ -426,11 +428,13 @@ export class Scene {
     const { maxT = Infinity } = known(options, ['maxT']);
     const [from, along] = [origins, directions].map(doubles);
     const count = from.length / 3;
-    if (typeof maxT !== 'number' || Number.isNaN(maxT)) throw new QuoinError('invalid_argument', 'maxT is no number');
+    if (typeof maxT !== 'number' || Number.isNaN(maxT))
+      throw new QuoinError('invalid_argument', 'maxT must be a number');
     if (!Number.isInteger(count) || along.length !== from.length)
-      throw new QuoinError('invalid_argument', `${from.length} and ${along.length} numbers are no rays of three each`);
+      throw new QuoinError('invalid_argument', 'origins and directions need three numbers per ray, ' +
+                           `not ${from.length} and ${along.length} numbers`);
     const of = this.#instance;
-    // Of a ray: where it begins and goes, t and the normal are doubles, the voxel whole numbers, then the type.
+    // Per ray: origin, direction, t and normal are doubles; then the voxel's integers and the type.
     const at = [0, 24, 48, 56, 80, 92].map((bytes) => bytes * count);
     return of.withStruct('hits', (hits) => of.with(94 * count, (memory) => {
       of.put(from, memory);
@@ -458,7 +462,7 @@ const renderNames = ['width', 'height', 'samples', 'camera', 'sun', 'progress'];
 
 function pixelsOf(width, height) {
   if (!(Number.isInteger(width) && Number.isInteger(height) && width > 0 && height > 0 && width * height <= 2 ** 28))
-    throw new QuoinError('invalid_argument', 'a size of a picture is two whole numbers, at most 2^28 pixels');
+    throw new QuoinError('invalid_argument', 'width and height must be integers with at most 2^28 pixels in total');
   return width * height;
 }
 
@@ -471,13 +475,13 @@ function putRenderOptions(view, at, { width, height, samples = 4, camera, sun })
   };
   if (camera !== undefined) {
     const { fovDegrees = 45 } = known(camera, ['position', 'lookAt', 'fovDegrees'], 'camera');
-    if (typeof fovDegrees !== 'number') throw new QuoinError('invalid_argument', 'camera.fovDegrees is no number');
+    if (typeof fovDegrees !== 'number') throw new QuoinError('invalid_argument', 'camera.fovDegrees must be a number');
     put(24, 32, [...three(camera.position, 'camera.position'), ...three(camera.lookAt, 'camera.lookAt'), fovDegrees]);
   }
   if (sun !== undefined) put(88, 96, three(sun, 'sun'));
 }
 
-/** What shaders march a scene by. */
+/** A scene's data for ray-marching shaders. */
 export class ShaderScene {
   #instance;
   #march;
@@ -532,57 +536,57 @@ export class ShaderScene {
   }
 }
 
-/** `options`, whose names are all to be among `names`: one that is misspelt would do nothing. */
+/** Returns `options`; throws for names not in `names`, since a misspelt option would have no effect. */
 function known(options, names, what = 'options') {
   if (typeof options !== 'object' || options === null)
-    throw new QuoinError('invalid_argument', `${what} is to be an object of ${names.join(', ')}`);
+    throw new QuoinError('invalid_argument', `${what} must be an object with the properties ${names.join(', ')}`);
   const other = Object.keys(options).find((name) => !names.includes(name));
   if (other !== undefined)
-    throw new QuoinError('invalid_argument', `${what}: ${other} is none of ${names.join(', ')}`);
+    throw new QuoinError('invalid_argument', `${what}: unknown option ${other}; known: ${names.join(', ')}`);
   return options;
 }
 
-/** A number of a grid, or of a sample; -1, which none has, for what is no number of one. */
+/** Returns the index of a grid or sample; -1, which is never valid, for other values. */
 function index(number) {
   return Number.isInteger(number) && number >= 0 && number < 2 ** 31 ? number : -1;
 }
 
-/** `value`, which is to be a whole number of 32 bits. */
+/** Returns `value`; throws unless it is a 32-bit integer. */
 function int32(value, what) {
   if (!Number.isInteger(value) || (value | 0) !== value)
-    throw new QuoinError('invalid_argument', `${what}: no whole number of 32 bits`);
+    throw new QuoinError('invalid_argument', `${what} must be a 32-bit integer`);
   return value;
 }
 
-/** The numbers of a list of three. Whether they are finite, quoin.h's functions say. */
+/** Returns a list of three numbers. The functions of quoin.h check that they are finite. */
 function three(list, what) {
   const numbers = list?.length === 3 ? Array.from(list) : [];
   if (numbers.length !== 3 || numbers.some((value) => typeof value !== 'number'))
-    throw new QuoinError('invalid_argument', `${what} is to be a list of three numbers`);
+    throw new QuoinError('invalid_argument', `${what} must be a list of three numbers`);
   return numbers;
 }
 
 function doubles(list) {
-  if (typeof list?.length !== 'number') throw new QuoinError('invalid_argument', 'rays are lists of numbers');
+  if (typeof list?.length !== 'number') throw new QuoinError('invalid_argument', 'rays must be lists of numbers');
   if (list.length >= 2 ** 28) throw new QuoinError('out_of_memory', `no memory for ${list.length} numbers of rays`);
   return Float64Array.from(list, (number) => {
-    if (typeof number !== 'number') throw new QuoinError('invalid_argument', 'rays are lists of numbers');
+    if (typeof number !== 'number') throw new QuoinError('invalid_argument', 'rays must be lists of numbers');
     return number;
   });
 }
 
-/** Throws where `given` is no bytes, and says how they are had of what others give. */
+/** Throws unless `given` is bytes. The message says how to get bytes from common other objects. */
 function checkBytes(given) {
   if (!isBytes(given)) {
     const kind = given === null || given === undefined ? String(given) : given.constructor?.name ?? typeof given;
     const how = typeof given?.arrayBuffer === 'function' ? ': await its arrayBuffer()' :
       typeof given?.then === 'function' ? ': await it' : '';
-    throw new QuoinError('invalid_argument', `bytes are an ArrayBuffer or a typed array, not ${kind}${how}`);
+    throw new QuoinError('invalid_argument', `bytes must be an ArrayBuffer or a typed array, not ${kind}${how}`);
   }
   try {
     new Uint8Array(given.buffer ?? given, 0, 0);
   } catch {
-    throw new QuoinError('invalid_argument', 'these bytes are gone: their ArrayBuffer was transferred');
+    throw new QuoinError('invalid_argument', 'the ArrayBuffer of these bytes was transferred');
   }
 }
 
@@ -592,18 +596,18 @@ const loadNames = ['showHidden', 'frame', 'radius', 'iso', 'meshVoxels', 'voxelS
 export async function load(bytes, options = {}) {
   checkBytes(bytes);
   known(options, loadNames);
-  // What is said of the file itself, and not by it, the small module does not read.
+  // The small module does not support raw values and height maps.
   if (options.small && options.raw === undefined && options.heights === undefined) {
     const scene = loaded(await small.alive(), bytes, options);
     if (scene !== undefined) return scene;
   }
   const scene = loaded(await whole.alive(), bytes, options);
   if (scene === undefined)
-    throw new QuoinError('unsupported', 'the small module was started without { small: true }, and reads .vox alone');
+    throw new QuoinError('unsupported', 'the small module, which reads only .vox, was started without { small: true }');
   return scene;
 }
 
-/** The scene that a module reads; undefined where it does not read such files. */
+/** Loads a scene; returns undefined if the module cannot read such files. */
 function loaded(of, bytes, { progress, ...options }) {
   return of.withBytes(bytes, (at) => {
     if (of.isSmall && of.run('quoin_web_reads', at, bytes.byteLength) === 0) return undefined;
@@ -618,24 +622,25 @@ function loaded(of, bytes, { progress, ...options }) {
 const scalarNames = ['uint8', 'int8', 'uint16', 'int16', 'uint32', 'int32', 'uint64', 'int64', 'float32', 'float64'];
 const heightEncodings = ['none', 'grey', 'mapbox', 'terrarium'];
 
-/** The place of a name among others, of which the first `skipped` cannot be asked for. */
+/** Returns the index of a name in `names`, without the first `skipped`. */
 function numberOf(name, names, what, skipped = 0) {
   const found = names.indexOf(name);
-  if (found < skipped) throw new QuoinError('invalid_argument', `${what} is ${names.slice(skipped).join(', ')}`);
+  if (found < skipped)
+    throw new QuoinError('invalid_argument', `${what} must be one of ${names.slice(skipped).join(', ')}`);
   return found;
 }
 
-/** `value`, or 0, which stands for its default, where it is not given. */
+/** Returns `value`; 0, the default, if it is not given. */
 function amount(value, what) {
   if (value === undefined) return 0;
   if (typeof value !== 'number' || !(value > 0 && value < Infinity))
-    throw new QuoinError('invalid_argument', `${what} is to be a number above 0`);
+    throw new QuoinError('invalid_argument', `${what} must be a positive number`);
   return value;
 }
 
 function whole32(value, what, least) {
   if (value === undefined) return 0;
-  if (int32(value, what) < least) throw new QuoinError('invalid_argument', `${what} is ${least} or more`);
+  if (int32(value, what) < least) throw new QuoinError('invalid_argument', `${what} must be at least ${least}`);
   return value;
 }
 
@@ -644,7 +649,7 @@ function putLoadOptions(view, at, { showHidden, frame, radius, iso, meshVoxels, 
   const ints = (from, ...values) => values.forEach((value, i) => view.setInt32(at + from + 4 * i, value, true));
   const doubles = (from, ...values) => values.forEach((value, i) => view.setFloat64(at + from + 8 * i, value, true));
   if (iso !== undefined && (typeof iso !== 'number' || !Number.isFinite(iso)))
-    throw new QuoinError('invalid_argument', 'iso is no number');
+    throw new QuoinError('invalid_argument', 'iso must be a finite number');
   ints(8, showHidden ? 1 : 0, whole32(frame, 'frame', 0), whole32(radius, 'radius', 1), iso === undefined ? 0 : 1);
   view.setFloat32(at + 24, iso ?? 0, true);
   ints(28, whole32(meshVoxels, 'meshVoxels', 1));
@@ -665,13 +670,13 @@ function putLoadOptions(view, at, { showHidden, frame, radius, iso, meshVoxels, 
   }
 }
 
-/** Calls use(instance, the address of the array's description). */
+/** Calls `use` with the instance and the address of a quoin_array. */
 async function withArray(array, shape, { spacing = [1, 1, 1], origin = [0, 0, 0], progress }, use) {
   const scalar = scalars.findIndex((Kind) => Kind !== null && array instanceof Kind);
-  if (scalar < 0) throw new QuoinError('invalid_argument', 'the array is none of the typed arrays that are read');
+  if (scalar < 0) throw new QuoinError('invalid_argument', 'the array must be a typed array of numbers');
   const [nx, ny, nz] = three(shape, 'shape');
   if ([nx, ny, nz].some((n) => !Number.isSafeInteger(n) || n < 0) || nx * ny * nz !== array.length)
-    throw new QuoinError('invalid_argument', `a shape of ${[nx, ny, nz]} does not fit ${array.length} samples`);
+    throw new QuoinError('invalid_argument', `the shape ${[nx, ny, nz]} does not match ${array.length} samples`);
   const placed = [...three(spacing, 'spacing'), ...three(origin, 'origin')];
   const of = await whole.alive();
   return of.listened(progress, () => of.withBytes(array, (data) => of.withStruct('array', (at) => {
@@ -688,7 +693,7 @@ async function withArray(array, shape, { spacing = [1, 1, 1], origin = [0, 0, 0]
 
 export async function surfaceNets(array, shape, iso, options = {}) {
   known(options, ['spacing', 'origin', 'solidBelow', 'progress']);
-  if (typeof iso !== 'number') throw new QuoinError('invalid_argument', 'iso is no number');
+  if (typeof iso !== 'number') throw new QuoinError('invalid_argument', 'iso must be a number');
   return withArray(array, shape, options, (of, at) =>
     of.takeMesh(of.handle('quoin_surface_nets', at, iso, options.solidBelow ? 1 : 0, 0)));
 }
@@ -700,7 +705,7 @@ export async function meshLabels(array, shape, options = {}) {
   const bits = isUnsigned ? BigInt.asUintN : BigInt.asIntN;
   const isWhole = typeof background === 'bigint' || Number.isSafeInteger(background);
   if (!isWhole || bits(64, BigInt(background)) !== BigInt(background))
-    throw new QuoinError('invalid_argument', `${background} is no label`);
+    throw new QuoinError('invalid_argument', `background must be an integer label, not ${background}`);
   int32(relaxationSteps, 'relaxationSteps');
   const label = isUnsigned || array instanceof BigInt64Array ? (number) => bits(64, number) : Number;
   return withArray(array, shape, options, (of, at) =>
@@ -708,9 +713,9 @@ export async function meshLabels(array, shape, options = {}) {
 }
 
 export async function toThree(scene, GLTFLoader, options = {}) {
-  if (!(scene instanceof Scene)) throw new QuoinError('invalid_argument', 'scene is none that load gave');
+  if (!(scene instanceof Scene)) throw new QuoinError('invalid_argument', 'scene must be a Scene from load()');
   if (typeof GLTFLoader?.prototype?.parseAsync !== 'function')
-    throw new QuoinError('invalid_argument', 'GLTFLoader is to be the class in three/addons/loaders/GLTFLoader.js');
+    throw new QuoinError('invalid_argument', 'GLTFLoader must be the class of three/addons/loaders/GLTFLoader.js');
   return (await new GLTFLoader().parseAsync(scene.glb(options).buffer, '')).scene;
 }
 

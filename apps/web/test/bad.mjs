@@ -1,4 +1,4 @@
-// What is no file, or a broken one, is an Error, and the next file is read.
+// Invalid and broken files give an error, and the next file can be loaded.
 //   node bad.mjs PACKAGE GOOD_FILE
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -12,7 +12,7 @@ const good = new Uint8Array(readFileSync(goodFile));
 const before = (await load(good)).glb();
 const refuses = refusing(QuoinError);
 
-/** That it ends, with a scene or a QuoinError. */
+/** Checks that loading ends with a scene or a QuoinError. */
 async function survives(what, bytes) {
   try {
     (await load(bytes)).free();
@@ -30,7 +30,7 @@ await refuses('a module that is nowhere', () => start('file:///nowhere/quoin.was
 await refuses('a module of no address', () => start('quoin://nowhere'), 'cannot_read');
 await refuses('nothing', () => load(new Uint8Array(0)));
 await refuses('a string', () => load('castle.vox'), 'invalid_argument');
-/** That the message says what helps. */
+/** Checks that the error message contains helpful words. */
 async function tells(what, work, words) {
   try {
     await work();
@@ -56,7 +56,7 @@ for (let i = 0; i < 60; ++i) {
   for (let n = 0; n < 8; ++n) bytes[Math.floor(bytes.length * (n < 4 ? random() * 0.01 : random()))] = 256 * random();
   await survives(`damage ${i}`, bytes);
 }
-// Triangles: broken files, and damaged ones.
+// Triangles: broken and damaged files.
 const text = (string) => new TextEncoder().encode(string);
 await refuses('a GLB without an end', () => load(text('glTF\x02\0\0\0\xff\xff\0\0')));
 await refuses('a glTF whose meshes are a number', () => load(text('{"asset": {"version": "2.0"}, "meshes": 5}')));
@@ -70,12 +70,12 @@ for (const [kind, whole] of Object.entries(triangles)) {
     await survives(`${kind}, damage ${i}`, bytes);
   }
 }
-// A volume whose header claims two gigabytes, and one that claims more than there is address space.
+// A volume whose header claims 2 GB, and one that claims more than the address space.
 for (const size of ['1024 1024 512', '4096 4096 4096']) {
   const header = `NRRD0004\ntype: float\ndimension: 3\nsizes: ${size}\nencoding: raw\nendian: little\n\n`;
   await refuses(`a header of ${size}`, () => load(new TextEncoder().encode(header)));
 }
-// Samples that take all of the memory: the instance ends, the page does not.
+// Samples that exhaust the memory end the instance but not the page.
 const many = new Uint8Array(600 * 600 * 600);
 for (let i = 0; i < many.length; ++i) many[i] = (i * 2654435761) >>> 31;
 await refuses('more triangles than memory', () => surfaceNets(many, [600, 600, 600], 0.5),
@@ -91,7 +91,7 @@ await refuses('a picture without a size', () => scene.render({ width: 0 }), 'inv
 await refuses('a camera nowhere', () => scene.render({ camera: { position: [NaN, 0, 0], lookAt: [0, 0, 0] } }));
 for (const extension of [undefined, null, 3, '', 'glb', '.obj', '.json', '.quoin'])
   await refuses(`files of the kind ${extension}`, () => scene.file(extension), 'unsupported');
-// Options that are misspelt, or none.
+// Misspelt and missing options.
 const eight = new Uint8Array(8);
 const cube = [2, 2, 2];
 const takesOptions = {
@@ -104,15 +104,15 @@ const takesOptions = {
   surfaceNets: (options) => surfaceNets(eight, cube, 0, options),
   meshLabels: (options) => meshLabels(eight, cube, options),
 };
-// What is written into the module is of the length and kind that it has there.
+// Values written into the module must have the length and type that it expects.
 const small = { width: 16, height: 8 };
 const picture = () => Buffer.from(scene.render(small).rgba);
 const pictureBefore = picture();
 const shaders = scene.forShaders();
 const [here, there] = [[0, 9, 9], [0, 0, 0]];
 for (const [what, call] of Object.entries(takesOptions)) {
-  await tells(`${what}, misspelt`, async () => call({ watertigt: true }), /watertigt is none of \w+/);
-  if (what === 'raw') continue;  // of which these would be spread into an object
+  await tells(`${what}, misspelt`, async () => call({ watertigt: true }), /unknown option watertigt; known: \w+/);
+  if (what === 'raw') continue;  // these values would be spread into an object
   for (const none of [null, 3, 'small'])
     await tells(`${what}: ${none}`, async () => call(none), /is to be an object of/);
 }
@@ -156,7 +156,7 @@ for (const number of [-1, 2 ** 31, 2 ** 32, '0']) {
 await refuses('a corner beyond 32 bits', () => scene.read(0, [2 ** 32, 0, 0], [1, 1, 1]), 'invalid_argument');
 await refuses('a shape beyond 32 bits', () => scene.read(0, [0, 0, 0], [2 ** 32, 1, 0]), 'invalid_argument');
 await refuses('half a voxel', () => scene.read(0, [0, 0, 0], [0.5, 2, 1]), 'invalid_argument');
-// More than the module can address; nobody touches these bytes.
+// More than the module can address; these bytes are never accessed.
 for (const bytes of [2 ** 31, 2 ** 32 + 64])
   await refuses(`a file of ${bytes} bytes`, () => load(new ArrayBuffer(bytes)), 'out_of_memory');
 for (const rays of ['abc', ['0', '0', '0'], [0, 0, undefined]])
