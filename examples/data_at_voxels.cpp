@@ -1,4 +1,4 @@
-// Stairs that face somewhere and a chest that holds something, in a house that is copied, turned and saved.
+// Voxel data: stairs with a direction and a chest with contents, in a house that is copied, rotated and saved.
 
 #include <cstdint>
 #include <cstdio>
@@ -9,7 +9,7 @@
 
 namespace {
 
-constexpr std::uint32_t kNorth = 1;  // of four directions, in two bits
+constexpr std::uint32_t kNorth = 1;  // one of four directions, in two bits
 
 quoin::Result<int> run(const std::string& path) {
   quoin::Scene scene;
@@ -33,7 +33,7 @@ quoin::Result<int> run(const std::string& path) {
   turned.map_state = [](quoin::VoxelType, std::uint32_t state) { return (state + 1) % 4; };
   quoin::copy_box(world, house, world, {40, 0, 0}, quoin::AxisOrientation::quarter_turns(1, 1), turned);
 
-  // Whoever draws is told of voxels; whoever keeps chests of data as well, also where no voxel changed.
+  // Renderers follow voxel changes. Code that manages chests also follows data changes, even if no voxel changed.
   world.set_data(box, {});
   for (const quoin::DataChange& change : world.data_changes_since(seen).items) {
     std::printf("data changed in chunk %d %d %d\n", change.chunk.x, change.chunk.y, change.chunk.z);

@@ -1,4 +1,4 @@
-// A grid edited by hand, and the merged quads of one of its chunks.
+// Edits a grid and meshes one of its chunks as merged quads.
 
 #include <cstdio>
 

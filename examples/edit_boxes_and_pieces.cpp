@@ -1,5 +1,5 @@
-// Copies of a box of voxels, turned and mirrored; what comes loose when voxels are removed; and triangles in the
-// caller's own vertex layout.
+// Copies a box of voxels, rotated and mirrored; finds pieces that come loose when voxels are removed; and writes
+// triangles in the caller's own vertex layout.
 
 #include <array>
 #include <cstddef>
@@ -17,7 +17,7 @@ namespace {
 
 using quoin::AxisOrientation;
 
-// What this program's graphics card would read.
+// The vertex layout of this program's graphics card.
 struct Vertex {
   quoin::Vec3 position;
   std::array<std::uint8_t, 4> colour;
@@ -37,8 +37,8 @@ std::size_t write_mesh(const quoin::Grid& grid, const quoin::VoxelRegistry& type
   const quoin::VertexWriter writer(layout, types);
   quoin::BlockyMesher mesher;
   quoin::QuadBuffer quads;
-  std::vector<std::byte> vertices;     // or mapped memory of a device, of the sizes that are asked for here
-  std::vector<std::uint32_t> indices;  // of each chunk its own, from 0
+  std::vector<std::byte> vertices;     // or mapped device memory of the sizes that are requested here
+  std::vector<std::uint32_t> indices;  // per chunk, counted from 0
   std::size_t triangles = 0;
   for (const quoin::IVec3 chunk : grid.chunks()) {
     mesher.mesh(grid.neighbourhood(chunk), types, {}, quads);
@@ -60,7 +60,7 @@ int main() {
   const auto type = types.add(stone);
   if (!type) return 1;
 
-  // Half an arch; its mirror image beside it; both once more, turned by a quarter about y.
+  // Half an arch; its mirror image next to it; then a copy of both, rotated by 90 degrees about y.
   quoin::Grid world;
   world.fill_box({{-60, 0, -60}, {61, 2, 61}}, *type);
   world.fill_box({{0, 2, 0}, {4, 21, 4}}, *type);
@@ -72,7 +72,7 @@ int main() {
   const quoin::IBox arch{{0, 2, 0}, {20, 24, 4}};
   quoin::copy_box(world, arch, world, {30, 2, 30}, AxisOrientation::quarter_turns(1, 1), solid_only);
 
-  // One foot of an arch is shot away, then the other: it falls.
+  // Removes one foot of an arch, then the other: the arch falls.
   quoin::ConnectedPieces pieces;
   const quoin::IBox ground{{-60, 0, -60}, {61, 1, 61}};
   std::size_t loose = 0;
@@ -81,13 +81,13 @@ int main() {
     pieces.update(world);
     loose = 0;
     for (const std::size_t piece : pieces.apart_from(ground)) {
-      const quoin::Grid body = pieces.extract(piece);  // a grid of its own, for an instance that falls
+      const quoin::Grid body = pieces.extract(piece);  // a separate grid for a falling instance
       std::printf("%lld voxels come loose\n", static_cast<long long>(body.voxel_count()));
       pieces.remove_from(world, piece);
       ++loose;
     }
   }
   const std::size_t triangles = write_mesh(world, types);
-  std::printf("%zu piece fell, %zu triangles of %zu bytes a vertex\n", loose, triangles, sizeof(Vertex));
+  std::printf("%zu piece fell, %zu triangles of %zu bytes per vertex\n", loose, triangles, sizeof(Vertex));
   return loose == 1 && triangles > 0 ? 0 : 1;
 }

@@ -1,5 +1,5 @@
-// Sand and water poured into a jar: rules that follow edits. Only what touches a voxel that changed is looked at, so a
-// jar at rest costs nothing. How high water stands in a voxel, in eighths, is its state.
+// Pours sand and water into a jar. The rules follow edits and check only voxels next to changed ones, so a jar at rest
+// costs nothing. A voxel's state is its water level, in eighths.
 
 #include <algorithm>
 #include <array>
@@ -25,12 +25,12 @@ struct Jar {
   VoxelType sand = kAir;
   VoxelType water = kAir;
   quoin::Grid grid{};
-  quoin::Grid before = grid.snapshot();  // as the rules saw it last
-  quoin::ChangeCursor types{};           // how far they have followed the grid's types
-  quoin::ChangeCursor levels{};          // and its data
-  std::vector<IVec3> moved{};            // by the rules: a stream is the same before and after, and goes on
+  quoin::Grid before = grid.snapshot();  // the grid at the last step
+  quoin::ChangeCursor types{};           // position in the grid's type changes
+  quoin::ChangeCursor levels{};          // position in its data changes
+  std::vector<IVec3> moved{};            // by the rules: a stream looks the same before and after, but keeps moving
 
-  // Whatever changed since the last time or moves, and what is beside and above it; the lowest first.
+  // Returns the voxels that changed since the last step or move, and their side and upper neighbours; lowest first.
   std::vector<IVec3> restless() {
     std::vector<IVec3> found;
     const auto add = [&](IVec3 at) {
@@ -54,7 +54,7 @@ struct Jar {
   std::uint32_t level(IVec3 at) const { return grid.get(at) == kAir ? 0 : grid.data(at).state; }
   void set_level(IVec3 at, std::uint32_t level) { grid.set(at, level == 0 ? kAir : water, {.state = level}); }
 
-  // Straight down, or down a slope; water makes room for it.
+  // Falls straight down or down a slope, and displaces water.
   void fall(IVec3 at) {
     IVec3 to = at + kDown;
     for (std::size_t i = 0; i < kBeside.size() && !is_open(to); ++i) {

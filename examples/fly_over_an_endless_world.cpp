@@ -1,5 +1,5 @@
-// A game's loop in a world without an end, of which only what is around the player is in memory: it is made, dug into,
-// saved and let go of on the way, and drawn at the end. Run again, what was dug is there.
+// A game loop in an endless world. Only chunks around the player are in memory: they are generated, edited, saved and
+// released on the way, and rendered at the end. The next run loads the edits.
 
 #include <cstdio>
 #include <string>
@@ -35,7 +35,7 @@ quoin::Status run(const std::string& path, const std::string& picture) {
   player.position = {0.5, 110.0, 0.5};
   player.direction = {1.0, -0.35, 0.3};
   player.radius = 320.0;
-  // The first frame is to show a world.
+  // Loads the chunks around the player before the first frame.
   if (auto loaded = world->load_all({&player, 1}); !loaded) return loaded;
 
   std::int64_t dug = 0;
@@ -46,15 +46,15 @@ quoin::Status run(const std::string& path, const std::string& picture) {
       quoin::Grid& land = scene.edit(scene.grids().handles().front()).grid;
       dug += land.fill_sphere(player.position + quoin::DVec3(30.0, -60.0, 10.0), 9.0, quoin::kAir);
     }
-    if (auto saved = world->update({&player, 1}); !saved) return saved;  // nothing is lost: it is tried again
-    // Here a game draws: LiveMeshes, VulkanRenderer and the others follow world->scene() as any scene.
+    if (auto saved = world->update({&player, 1}); !saved) return saved;  // edits are kept: the next update retries
+    // A game renders here: LiveMeshes, VulkanRenderer and others follow world->scene() like any scene.
   }
   for (const std::string& problem : world->take_problems()) std::fprintf(stderr, "%s\n", problem.c_str());
   if (auto loaded = world->load_all({&player, 1}); !loaded) return loaded;
   if (auto drawn = draw(world->scene(), player, picture); !drawn) return drawn;
   if (auto safe = world->flush(); !safe) return safe;
   const quoin::StreamStats stats = world->stats();
-  std::printf("%lld voxels dug; %llu chunks made, %llu read, %llu let go; %zu in memory, %.1f MB\n",
+  std::printf("%lld voxels dug; %llu chunks generated, %llu loaded, %llu released; %zu in memory, %.1f MB\n",
               static_cast<long long>(dug), static_cast<unsigned long long>(stats.chunks_made),
               static_cast<unsigned long long>(stats.chunks_read),
               static_cast<unsigned long long>(stats.chunks_unloaded), stats.loaded_chunks,
@@ -68,7 +68,7 @@ int main(int argc, char** argv) {
   const std::string path = argc > 1 ? argv[1] : "endless.quoin";
   const std::string picture = argc > 2 ? argv[2] : "endless.png";
   if (argc <= 1) std::remove(path.c_str());
-  quoin::return_freed_memory();  // what is resident keeps to the budget, too
+  quoin::return_freed_memory();  // so that resident memory also stays within the budget
   for (int day = 1; day <= 2; ++day) {
     if (const auto flown = run(path, picture); !flown) {
       std::fprintf(stderr, "%s\n", quoin::to_string(flown.error()).c_str());

@@ -1,5 +1,5 @@
-// Impostors: the 26 views of a model as one sheet of pictures, and what a game's frame does with them while the model
-// is edited: OUT.png, or impostors.png.
+// Impostors: writes the 26 views of a model as one sheet of images, and uses impostors in a game loop while the model
+// is edited. Writes OUT.png (default impostors.png).
 
 #include <algorithm>
 #include <chrono>
@@ -42,7 +42,7 @@ quoin::Result<quoin::GridHandle> add_rocket(quoin::Scene& scene) {
   return scene.add_grid(std::move(rocket));
 }
 
-// Nine pictures in a row; where nothing is covered the sheet stays grey.
+// Nine images per row; uncovered pixels stay grey.
 quoin::Image sheet_of(const std::vector<quoin::ImpostorPicture>& pictures) {
   constexpr int kAcross = 9;
   const int rows = (static_cast<int>(pictures.size()) + kAcross - 1) / kAcross;
@@ -60,23 +60,23 @@ quoin::Image sheet_of(const std::vector<quoin::ImpostorPicture>& pictures) {
   return sheet;
 }
 
-// Twenty frames with an edit each. No frame waits: workers build, and until they are done the old impostor is there.
+// Twenty frames with one edit each. No frame waits: workers build, and the old impostor is used until they finish.
 bool play(quoin::Scene& scene, quoin::GridHandle rocket) {
   quoin::ImpostorCache cache;
   int without = 0;
   for (int frame = 0; frame < 20; ++frame) {
     scene.edit(rocket).grid.set({7, frame, 0}, quoin::kAir);
     const auto impostor = cache.find(scene, rocket);
-    without += static_cast<int>(impostor == nullptr);  // the rocket is traced or meshed
+    without += static_cast<int>(impostor == nullptr);  // render the rocket by rays or as a mesh
     cache.wait(scene, 0.0);
     std::this_thread::sleep_for(std::chrono::milliseconds(10));  // the rest of the frame
   }
-  // A program that has the time, as before a screenshot, waits.
+  // Programs that need the current impostor, for example for a screenshot, can wait.
   static_cast<void>(cache.find(scene, rocket));
   cache.wait(scene);
   const auto newest = cache.find(scene, rocket);
   const quoin::ImpostorCache::Stats stats = cache.stats();
-  std::printf("%d frames without; built %llu times, %llu of them from the one before; %zu kB\n", without,
+  std::printf("%d frames without an impostor; built %llu times, %llu of them from the previous one; %zu kB\n", without,
               static_cast<unsigned long long>(stats.built), static_cast<unsigned long long>(stats.rebuilt),
               newest == nullptr ? 0 : newest->bytes() / 1000);
   return newest != nullptr && stats.waiting == 0;

@@ -1,4 +1,4 @@
-// A game that goes on where it ended: a loop with edits and saves; run again, it loads what it left.
+// A game that resumes where it stopped: a loop with edits and saves. The next run loads the saved world.
 
 #include <cstdio>
 #include <cstring>
@@ -14,7 +14,7 @@ struct Player {
   int voxels_dug = 0;
 };
 
-// Of the first run: a landscape.
+// Creates the landscape of the first run.
 quoin::Status make_land(quoin::Scene& scene) {
   const auto types = quoin::add_terrain_types(scene.types);
   if (!types) return types.error();
@@ -27,7 +27,7 @@ quoin::Status make_land(quoin::Scene& scene) {
   return {};
 }
 
-// A save of what changed since the last one, with the player: both are there after a crash, or neither is.
+// Saves the changes since the last save together with the player: a crash keeps both or neither.
 quoin::Status save(quoin::WorldStore& world, quoin::WorldSaver& saver, const quoin::Scene& scene,
                    const Player& player) {
   quoin::WorldChanges more;
@@ -35,12 +35,12 @@ quoin::Status save(quoin::WorldStore& world, quoin::WorldSaver& saver, const quo
   std::memcpy(bytes.data(), &player, sizeof(Player));
   more.put_value("player", std::move(bytes));
   const auto begun = saver.save(world, scene, std::move(more), [](const quoin::Status& saved) {
-    if (!saved) std::fprintf(stderr, "not saved: %s\n", quoin::to_string(saved.error()).c_str());
+    if (!saved) std::fprintf(stderr, "cannot save: %s\n", quoin::to_string(saved.error()).c_str());
   });
   return begun ? quoin::Status() : quoin::Status(begun.error());
 }
 
-// What the player does in a frame: digs on, deeper and deeper.
+// The player's action per frame: dig deeper.
 void play(quoin::Scene& scene, Player& player) {
   quoin::Grid& land = scene.edit(scene.grids().handles().front()).grid;
   player.voxels_dug += static_cast<int>(land.fill_sphere(player.position, 2.5, quoin::kAir));
@@ -63,7 +63,7 @@ quoin::Status run(const std::string& path) {
 
   for (int frame = 1; frame <= 120; ++frame) {
     play(scene, player);
-    if (frame % 30 == 0) {  // the disk is another thread's
+    if (frame % 30 == 0) {  // another thread writes to disk
       if (auto saved = save(*world, loaded->saver, scene, player); !saved) return saved;
     }
   }

@@ -1,5 +1,5 @@
-// A cave by the light of its lamps: glowing voxels, a point and a spot, each with shadows, and neither sun nor sky:
-// OUT.png, or cave.png.
+// A cave lit only by lamps: glowing voxels, a point and a spot, all with shadows, without sun and sky. Writes OUT.png
+// (default cave.png).
 
 #include <array>
 #include <cstdio>
@@ -23,7 +23,7 @@ quoin::Result<Types> add_types(quoin::Scene& scene) {
                                                {&types.crystal, {90, 220, 200, 255}, 9.0F}}) {
     quoin::VoxelProperties properties;
     properties.colour = colour;
-    properties.emission = emission;  // radiance, as a multiple of the colour: what it lights others with
+    properties.emission = emission;  // radiance, as a multiple of the colour; lights other voxels
     const auto added = scene.types.add(properties);
     if (!added) return added.error();
     *type = *added;
@@ -52,7 +52,7 @@ void hang_lamps(quoin::Scene& scene) {
   quoin::Lamp lantern;
   lantern.position = {62.5, 19.5, 37.5};
   lantern.colour = {1.0F, 0.62F, 0.30F};
-  lantern.intensity = 60.0;  // the light of a white surface that faces it one unit away
+  lantern.intensity = 60.0;  // light received by a white surface facing it at 1 unit
   lantern.range = 50.0;
   scene.lamps.push_back(lantern);
   quoin::Lamp spot;
@@ -79,7 +79,7 @@ int main(int argc, char** argv) {
   options.width = 480;
   options.height = 270;
   options.samples = 4;
-  options.light.max_lamps = 64;  // 0, the library's default: they light nothing
+  options.light.max_lamps = 64;  // the library's default is 0: lamps light nothing
   options.light.lamp_brightness = 2.0;
   options.light.sun_brightness = 0.0;
   options.light.sky_brightness = 0.2;

@@ -1,6 +1,6 @@
-// Levels of detail: a road of houses that ends far away. Near ones are drawn voxel by voxel, those further off in
-// coarser cells, the last from impostors; green, yellow to orange, and blue tell which. OUT.png, or
-// levels_of_detail.png, below the picture as players see it.
+// Levels of detail: a long road of houses. Near houses are rendered voxel by voxel (green), further ones in coarser
+// cells (yellow to orange), the furthest from impostors (blue). Writes OUT.png (default levels_of_detail.png), with the
+// normal image above.
 
 #include <algorithm>
 #include <array>
@@ -63,12 +63,12 @@ int main(int argc, char** argv) {
   const auto camera = quoin::look_at({0.0, 46.0, 130.0}, {0.0, 8.0, -260.0}, 0.9);
   if (!camera) return 1;
 
-  quoin::DetailSelector view;  // one for each view: it remembers, so that nothing trembles at a threshold
+  quoin::DetailSelector view;  // one per view; its hysteresis avoids flicker at thresholds
   quoin::RenderOptions options;
   options.width = 640;
   options.height = 240;
   options.samples = 4;
-  options.detail.policy.emplace().far_pixels = 24;  // for so small models; 128 where impostors are to be had early
+  options.detail.policy.emplace().far_pixels = 24;  // for small models; 128 uses impostors earlier
   options.detail.selector = &view;
   const quoin::CpuRenderer renderer(scene);
   quoin::Image both{options.width, 2 * options.height, {}};
@@ -85,7 +85,7 @@ int main(int argc, char** argv) {
   view.select(scene, *camera, options.width, options.height, *options.detail.policy, selected);
   std::array<int, 3> count{};
   for (const quoin::SelectedInstance& each : selected) ++count[static_cast<std::size_t>(each.detail)];
-  std::printf("of %zu houses in sight %d near, %d in coarser cells, %d from impostors\n", selected.size(), count[0],
+  std::printf("%zu houses in sight: %d near, %d in coarser cells, %d from impostors\n", selected.size(), count[0],
               count[1], count[2]);
   return size && count[0] > 0 && count[1] > 0 && count[2] > 0 ? 0 : 1;
 }

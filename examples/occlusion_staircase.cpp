@@ -1,6 +1,6 @@
-// What ambient occlusion does to corners: a staircase between walls in which every value from 0 to 3 occurs, in the
-// classic block look (own colours times occlusion, no light at all), and occlusion alone in grey: OUT.png, or
-// occlusion_staircase.png, and the same with _grey.
+// Ambient occlusion at corners: a staircase between walls with every occlusion value from 0 to 3. Writes OUT.png
+// (default occlusion_staircase.png) in the classic block style (colours times occlusion, without lighting), and a file
+// with the suffix _grey that shows only occlusion.
 
 #include <array>
 #include <cstdio>
@@ -28,7 +28,7 @@ quoin::Result<quoin::Scene> make_staircase() {
   grid.fill_box({{0, 0, 0}, {22, 1, 26}}, marble[0]);
   grid.fill_box({{0, 1, 0}, {22, 15, 1}}, marble[0]);  // two walls
   grid.fill_box({{0, 1, 0}, {1, 15, 26}}, marble[0]);
-  for (int step = 0; step < 9; ++step) {  // where steps meet the wall two edges come together, and a corner
+  for (int step = 0; step < 9; ++step) {  // two edges and a corner meet where steps touch the wall
     grid.fill_box({{1, 1, 1}, {11, 2 + step, 20 - 2 * step}}, marble[step % 2 == 0 ? 1 : 0]);
   }
   for (const int z : {4, 12, 20}) {
@@ -40,7 +40,7 @@ quoin::Result<quoin::Scene> make_staircase() {
   return scene;
 }
 
-// How often each value occurs at the corners of quads.
+// Counts the occlusion values at quad corners.
 std::array<int, 4> count_occlusion(const quoin::Scene& scene) {
   std::array<int, 4> count{};
   quoin::BlockyMesher mesher;

@@ -1,4 +1,4 @@
-// What lies under the cursor, and what sixteen rays at a time are for: a world, its traversal structure, and an edit.
+// Picks the voxel under the cursor, traces packets of sixteen rays, and updates the traversal structure after an edit.
 
 #include <cstdio>
 #include <limits>
@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kEndless = std::numeric_limits<double>::infinity();
 
-// How many of a 4x4 block of pixels see a voxel.
+// Counts the pixels of a 4x4 block that see a voxel.
 int count_hits(const quoin::OccupancyTree& tree, const quoin::Camera& camera) {
   quoin::RayPacket rays;
   for (int lane = 0; lane < quoin::RayPacket::kSize; ++lane) {
@@ -27,7 +27,7 @@ int count_hits(const quoin::OccupancyTree& tree, const quoin::Camera& camera) {
   return count;
 }
 
-// What the middle of a picture of 320x240 pixels shows.
+// Prints the voxel in the middle of a 320x240 image.
 std::optional<quoin::RayHit> look(const quoin::OccupancyTree& tree, const quoin::Camera& camera) {
   const quoin::Ray ray = quoin::ray_through(camera, {160.5, 120.5, 320, 240});
   const auto hit = quoin::first_hit(tree, ray);
@@ -52,7 +52,7 @@ int main() {
   const auto before = look(tree, *camera);
   if (!before) return 1;
   grid.set(before->voxel, quoin::kAir);
-  // The same changes say which meshes to make anew.
+  // The same changes list the chunks to mesh again.
   tree.update(grid, types, grid.changes_since(followed));
   const auto after = look(tree, *camera);
   std::printf("%d of 16 rays hit\n", count_hits(tree, *camera));

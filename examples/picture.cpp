@@ -1,4 +1,4 @@
-// A picture of a scene, with sun, shadows and ambient occlusion: OUT.png, or staircase.png.
+// Renders a scene with sun, shadows and ambient occlusion. Writes OUT.png (default staircase.png).
 
 #include <cstdio>
 #include <string>

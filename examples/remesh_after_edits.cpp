@@ -1,4 +1,4 @@
-// A game's loop: edit the world, then mesh again only the chunks whose mesh can have changed.
+// A game loop: edits the world, then meshes only the chunks whose mesh may have changed.
 
 #include <cstdio>
 #include <map>
@@ -11,7 +11,7 @@ namespace {
 
 using ChunkKey = std::tuple<int, int, int>;
 
-// Meshes kept by their owner, keyed by chunk.
+// The caller's meshes, keyed by chunk.
 class MeshCache {
  public:
   int update(const quoin::Grid& grid, const quoin::VoxelRegistry& types) {
@@ -32,7 +32,7 @@ class MeshCache {
 
  private:
   quoin::BlockyMesher mesher_;
-  quoin::ChangeCursor followed_;  // how far this has read the grid's journal
+  quoin::ChangeCursor followed_;  // position in the grid's journal
   std::map<ChunkKey, quoin::QuadBuffer> quads_;
 };
 

@@ -1,4 +1,4 @@
-// Smooth terrain whose far chunks are coarser, as one closed mesh with occlusion: smooth_terrain.glb.
+// Meshes smooth terrain with coarser far chunks as one closed mesh with occlusion. Writes smooth_terrain.glb.
 
 #include <algorithm>
 #include <cstdio>
@@ -26,7 +26,7 @@ int main() {
   const auto field = quoin::generate_smooth_terrain(terrain, *types);
   if (!field) return fail(field.error());
 
-  // Cells of one sample in the chunks at a corner, of twice as many in every further ring.
+  // Cells of one sample in the chunks at a corner; the cell size doubles with every further ring.
   quoin::SmoothMeshOptions options;
   options.level_of = [](quoin::IVec3 chunk) {
     return std::clamp(std::max(chunk.x, chunk.z) - 1, 0, quoin::kMaxSmoothLevel);

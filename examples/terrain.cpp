@@ -1,4 +1,4 @@
-// A world from a seed, and how deep it would be to swim there.
+// Generates a world from a seed, and measures the depth of its water.
 
 #include <algorithm>
 #include <cstdio>

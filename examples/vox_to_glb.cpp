@@ -1,4 +1,4 @@
-// Reads a MagicaVoxel file and writes it as GLB: vox_to_glb IN.vox OUT.glb. Without arguments it makes its own input.
+// Reads a MagicaVoxel file and writes it as GLB: vox_to_glb IN.vox OUT.glb. Without arguments it creates its own input.
 
 #include <cstdio>
 #include <string>

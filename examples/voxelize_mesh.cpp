@@ -1,4 +1,4 @@
-// Triangles become voxels, a smooth field that is edited, and a file for a printer.
+// Converts triangles to voxels, to a smooth field that is edited, and to a file for 3D printing.
 
 #include <cmath>
 #include <cstdio>
@@ -7,7 +7,7 @@
 #include <quoin/quoin.h>
 
 namespace {
-// A ring, as a program may have made or loaded one. Of files: read_mesh, or load_scene, which does all of the below.
+// Makes a ring. To load a file instead, use read_mesh, or load_scene, which does all of the steps below.
 quoin::TriangleMesh make_ring() {
   constexpr std::uint32_t kAround = 96;
   constexpr std::uint32_t kAcross = 32;
@@ -37,7 +37,7 @@ quoin::Status run(const char* output) {
   if (!field) return field.error();
   const std::int64_t bite = field->field.remove_sphere({112.0, 16.0, 64.0}, 20.0, 4.0);
   std::printf("a bite out of the field changed %lld samples\n", static_cast<long long>(bite));
-  // For printing: each edge between two triangles, half a millimetre a voxel, +Z up.
+  // For printing: every edge between two triangles, 0.5 mm per voxel, +Z up.
   auto surface = quoin::closed_surface(voxels->grid);
   if (!surface) return surface.error();
   quoin::BlockyMesh blocks;

@@ -1,6 +1,5 @@
-// A program that draws by Vulkan itself: Quoin's picture goes into the program's own image on the program's own device,
-// between the program's own commands. What the image has is then written as OUT.png, or own_device.png.
-// Exits with 77 where there is no device.
+// A program with its own Vulkan device: Quoin renders into the program's image on this device, between the program's
+// own commands. Writes the image to OUT.png (default own_device.png). Exits with 77 if there is no device.
 
 #include <cstdio>
 #include <cstdlib>
@@ -20,7 +19,7 @@ constexpr int kWidth = 320;
 constexpr int kHeight = 240;
 constexpr int kNoDevice = 77;
 
-/// What a program that draws by Vulkan has anyway. The end of the program frees it.
+/// The Vulkan objects that such a program already has. Freed when the program ends.
 struct Program {
   VkInstance instance = VK_NULL_HANDLE;
   VkPhysicalDevice physical = VK_NULL_HANDLE;
@@ -125,7 +124,7 @@ void make_buffer(Program& program) {
   program.pixels = static_cast<const unsigned char*>(mapped);
 }
 
-// The program's own commands: here the picture, and what reads the image afterwards.
+// Records the program's own commands: renders the image, then reads it.
 quoin::Status record(const Program& program, const quoin::VulkanPicture& picture, VkCommandBuffer commands) {
   quoin::VulkanImageTarget target;
   target.image = program.image;
@@ -219,7 +218,7 @@ quoin::Status run(const Program& program, const std::string& path) {
 int main(int argc, char** argv) {
   Program program;
   if (!make_instance(program) || !choose_device(program)) {
-    std::fprintf(stderr, "own_device: there is no device\n");
+    std::fprintf(stderr, "own_device: no Vulkan device\n");
     return kNoDevice;
   }
   make_device(program);

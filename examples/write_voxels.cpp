@@ -1,5 +1,5 @@
-// Many voxels from one's own data: GridWriter for voxels that come one by one, Grid::edit for what depends on what is
-// there. A vase, and glaze that runs down it: OUT.png, or vase.png.
+// Writes many voxels from the caller's data: GridWriter for single voxels, Grid::edit for changes that depend on
+// existing voxels. Makes a vase with running glaze. Writes OUT.png (default vase.png).
 
 #include <algorithm>
 #include <array>
@@ -21,7 +21,7 @@ double radius_at(int y) {
   return 9.0 + 15.0 * std::sin(3.0 * t) * (1.0 - 0.45 * t) + 9.0 * t * t * t * t;
 }
 
-// Rows along x are collected and set at once: a tenth of the time of Grid::set.
+// GridWriter collects rows along x and sets them at once: a tenth of the time of Grid::set.
 void turn_on_the_wheel(quoin::Grid& grid, quoin::VoxelType clay) {
   quoin::GridWriter writer(grid);
   for (int y = 0; y < kHeight; ++y) {
@@ -36,7 +36,7 @@ void turn_on_the_wheel(quoin::Grid& grid, quoin::VoxelType clay) {
   }
 }
 
-// Each voxel of the box is asked for its new type, given its old one; air stays air. Returns how many changed.
+// The callback receives each voxel's type and returns the new one; air stays air. Returns the number of changes.
 std::int64_t glaze(quoin::Grid& grid, const std::array<quoin::VoxelType, 2>& colours) {
   const quoin::IBox box{{-kReach, 22, -kReach}, {kReach + 1, kHeight, kReach + 1}};
   return grid.edit(box, [&](quoin::IVec3 v, quoin::VoxelType before) {
