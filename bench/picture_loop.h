@@ -11,7 +11,7 @@
 
 namespace quoin::workloads {
 
-/// Times the picture of the benchmarks as `render(camera, options)` takes it, and counts its rays.
+/// Times the benchmarks' image, rendered by `render(camera, options)`, and counts its rays.
 template <class Render>
 void time_pictures(benchmark::State& state, const RenderOptions& options, Render&& render) {
   std::int64_t rays = 0;

@@ -13,7 +13,7 @@
 
 #include "bench/workloads.h"
 
-/// The picture of the benchmarks: the 256x128x256 terrain, 1280x720 pixels.
+/// The benchmarks' image: the 256x128x256 terrain at 1280x720 pixels.
 namespace quoin::workloads {
 
 inline constexpr std::int64_t kPictureVoxels = 2'062'206;

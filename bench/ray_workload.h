@@ -1,6 +1,6 @@
 #pragma once
 
-// The rays that benchmarks trace, Quoin's and its peers' alike. All mathematics in double.
+// The rays of all benchmarks, of Quoin and its peers. All mathematics in double.
 
 #include <cmath>
 #include <cstddef>
@@ -22,17 +22,17 @@ struct RayQuery {
   double max_t = std::numeric_limits<double>::infinity();
 };
 
-/// Hits that the workload is known by, and how far off a count may be: a plain tracer in double precision counts
-/// 118,583, 86,210 and 242,778.
+/// The workload's expected hits and their tolerance: a plain tracer in double precision counts 118,583, 86,210 and
+/// 242,778.
 inline constexpr int kPrimaryHits = 118'582;
 inline constexpr int kShadowHits = 86'217;
 inline constexpr int kOcclusionHits = 242'773;
-/// Of rays/random600, by a dense tracer in double.
+/// Expected hits of rays/random600, counted by a dense tracer in double.
 inline constexpr int kRandomHits = 11'153;
 inline constexpr int kHitTolerance = 30;
 
-/// rays/{primary,shadow,ao}: a picture of the 256x128x256 terrain and what shading it asks for. Sixteen rays that lie
-/// next to each other in `primary` are a tile of 4x4 pixels.
+/// rays/{primary,shadow,ao}: an image of the 256x128x256 terrain, and its shading rays. Each 16 consecutive rays of
+/// `primary` are a tile of 4x4 pixels.
 struct RayWorkload {
   Grid grid;
   VoxelRegistry types = three_types();
@@ -42,7 +42,7 @@ struct RayWorkload {
   std::vector<RayQuery> occlusion;
 };
 
-/// The terrain of one type, as wide and deep as asked.
+/// Terrain of one type with the given width and depth.
 inline Grid terrain_grid(int width, int depth) {
   std::vector<int> heights;
   for (int z = 0; z < depth; ++z) {
@@ -79,10 +79,10 @@ inline std::vector<RayQuery> camera_rays() {
   return rays;
 }
 
-/// A shadow ray and six occlusion rays of a pixel of `camera_rays` from where it hit a surface.
+/// A shadow ray and six occlusion rays from the surface point of a pixel of `camera_rays`.
 inline void add_rays_from(const Ray& ray, double t, const DVec3& n, std::size_t index, std::vector<RayQuery>& shadow,
                           std::vector<RayQuery>& occlusion) {
-  // The normal's greatest axis, and the two after it made upright to it.
+  // The normal's largest axis, and the next two made perpendicular to the normal.
   int axis = std::abs(n.y) > std::abs(n.x) ? 1 : 0;
   if (std::abs(n.z) > std::abs(n[axis])) axis = 2;
   DVec3 tangent{0};
@@ -107,7 +107,7 @@ inline void add_rays_from(const Ray& ray, double t, const DVec3& n, std::size_t 
 
 }  // namespace detail
 
-/// Made at the first call, then shared.
+/// Created on the first call, then shared.
 inline const RayWorkload& ray_workload() {
   static const RayWorkload shared = [] {
     RayWorkload w;
@@ -124,14 +124,14 @@ inline const RayWorkload& ray_workload() {
   return shared;
 }
 
-/// The rays of `ray_workload` in an order in which neighbours have nothing in common. Made at the first call.
+/// The rays of `ray_workload`, shuffled so that neighbours are unrelated. Created on the first call.
 struct ShuffledRays {
   std::vector<RayQuery> primary;
   std::vector<RayQuery> shadow;
   std::vector<RayQuery> occlusion;
 };
 
-/// rays/random600: the same terrain over 2048x2048 columns, and rays from just above it into every direction.
+/// rays/random600: the same terrain with 2048x2048 columns, and rays from just above it in all directions.
 struct RandomRayWorkload {
   static constexpr int kWidth = 2'048;
   Grid grid = terrain_grid(kWidth, kWidth);
@@ -142,7 +142,7 @@ struct RandomRayWorkload {
 
 namespace detail {
 
-/// xorshift64, as whole numbers and as doubles from 0 to 1.
+/// xorshift64: integers, and doubles from 0 to 1.
 class FixedRandom {
  public:
   double next() {
@@ -156,7 +156,7 @@ class FixedRandom {
   std::uint64_t state_ = 42;
 };
 
-/// A direction of unit length: the first of the cube's points that lies in the ball.
+/// Returns a random unit vector: the first point of the cube that lies in the ball, normalised.
 inline DVec3 random_direction(FixedRandom& random) {
   for (;;) {
     const double x = 2 * random.next() - 1;
@@ -184,7 +184,7 @@ inline const ShuffledRays& shuffled_rays() {
   return shared;
 }
 
-/// 20,000 rays from 1 to 20 units above the surface, up to 600 units long. Made at the first call, then shared.
+/// 20,000 rays from 1 to 20 units above the surface, up to 600 units long. Created on the first call, then shared.
 inline const RandomRayWorkload& random_ray_workload() {
   static const RandomRayWorkload shared = [] {
     RandomRayWorkload w;
@@ -201,7 +201,7 @@ inline const RandomRayWorkload& random_ray_workload() {
   return shared;
 }
 
-/// Packets of 16 in the order of the rays.
+/// Splits the rays into packets of 16, in order.
 inline std::vector<RayPacket> ray_packets(const std::vector<RayQuery>& rays) {
   std::vector<RayPacket> packets((rays.size() + 15) / 16);
   for (std::size_t i = 0; i < rays.size(); ++i) {

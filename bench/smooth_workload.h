@@ -15,12 +15,12 @@ namespace quoin::workloads {
 
 enum class Smooth { S4, S1 };
 
-/// What `SmoothBorder::Open` makes of them. S1 is of the first of its chunks.
+/// Expected results of `SmoothBorder::Open`. S1 counts only its first chunk.
 inline constexpr std::int64_t kSphereTriangles = 29'388;
 inline constexpr std::int64_t kSphereVertices = 14'696;
 inline constexpr std::int64_t kTerrainTriangles = 20'172;
 
-/// Values beyond these are clamped in Quoin's own storage; the peers get them as they are.
+/// Quoin's storage clamps values to this range; the peers get them unclamped.
 inline constexpr float kSmoothBand = 8.0F;
 
 /// 64^3 values, x fastest, then y, then z: a sphere, or a piece of the terrain without steps.
@@ -41,7 +41,7 @@ inline std::vector<float> smooth_field(Smooth which, int column_x = 0, int colum
   return field;
 }
 
-/// A field in Quoin's storage.
+/// Converts a field to Quoin's storage.
 inline DensityChunk density_chunk(const std::vector<float>& field) {
   DensityChunk chunk(stored_density(kSmoothBand, kSmoothBand));
   std::array<Half, kChunkEdge> row{};

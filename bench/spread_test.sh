@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Tests bench/spread on a program that takes other times in each process.
+# Tests bench/spread on a program whose times differ between processes.
 set -euo pipefail
 spread="$(dirname "$(realpath "$0")")/spread"
 work="$(mktemp -d)"
@@ -9,7 +9,7 @@ fail() { echo "FAILED: $*"; exit 1; }
 
 cat >program <<'TEXT'
 #!/usr/bin/env bash
-# Three benchmarks; those of rays take 10, 11, 12 ... ms, by the number of processes before this one.
+# Three benchmarks; the ray benchmarks take 10, 11, 12 ... ms, depending on the number of earlier processes.
 out=
 filter=.
 for argument in "$@"; do

@@ -1,6 +1,6 @@
 #pragma once
 
-// The fixed worlds that benchmarks and their check values speak of. All mathematics in double.
+// The fixed worlds of the benchmarks and their check values. All mathematics in double.
 
 #include <cmath>
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace quoin::workloads {
 
-/// Height of the terrain at a column, without steps and with them.
+/// Terrain height of a column, without and with steps.
 inline double smooth_height(double x, double z) {
   return 31.0 + 12.0 * std::sin(0.11 * x + 0.3) * std::cos(0.07 * z) + 6.0 * std::sin(0.31 * x) * std::sin(0.23 * z);
 }
@@ -26,17 +26,17 @@ inline VoxelType terrain_type(double y, double h) {
   return y >= h - 3 ? 2 : 3;
 }
 
-/// Glass is W1 with the top voxel of every tenth column made of glass, GlassColumns with all of the column.
+/// Glass is W1 with glass as the top voxel of every tenth column; in GlassColumns the whole column is glass.
 enum class Blocky { W1, W2, W3a, W3b, W3c, W4, Empty, Full, Glass, GlassColumns };
 
 inline constexpr VoxelType kGlass = 4;
 
-/// The part that is meshed: padded coordinates 1 to 62, one row of border all round.
+/// The meshed part: padded coordinates 1 to 62, with a border of one voxel on all sides.
 inline constexpr IBox kInterior = {IVec3{1}, IVec3{63}};
 
 namespace detail {
 
-/// The two bits of the noise worlds are drawn in this order: y, then x, then z.
+/// The noise worlds draw their two bits per voxel in this order: y, then x, then z.
 inline std::vector<VoxelType> noise(bool typed) {
   std::vector<VoxelType> dense(kChunkVoxels, kAir);
   std::uint64_t s = 42;
@@ -83,7 +83,7 @@ std::vector<VoxelType> filled(Pick&& pick) {
 
 }  // namespace detail
 
-/// A padded 64^3 chunk; terrain is taken 62 voxels further along x and z for each column.
+/// A padded 64^3 chunk; each chunk column shifts the terrain by 62 voxels along x and z.
 inline Chunk blocky_chunk(Blocky which, int column_x = 0, int column_z = 0) {
   const auto make = [&]() -> std::vector<VoxelType> {
     switch (which) {
@@ -115,7 +115,7 @@ inline Chunk blocky_chunk(Blocky which, int column_x = 0, int column_z = 0) {
   return Chunk::from_dense(std::span<const VoxelType, kChunkVoxels>(dense));
 }
 
-/// The visible unit faces that the specification states.
+/// The number of visible unit faces stated in the specification.
 inline std::int64_t expected_faces(Blocky which) {
   switch (which) {
     case Blocky::W1:
@@ -149,7 +149,7 @@ inline VoxelRegistry three_types() {
   return types;
 }
 
-/// The same and glass.
+/// The same registry with glass added.
 inline VoxelRegistry glass_types() {
   VoxelRegistry types = three_types();
   VoxelProperties properties;
@@ -159,12 +159,12 @@ inline VoxelRegistry glass_types() {
   return types;
 }
 
-/// Whether caves are at a voxel of `cave_terrain`.
+/// Returns true if a voxel of `cave_terrain` is in a cave.
 inline bool is_cave(IVec3 v) {
   return std::sin(0.2 * v.x) * std::sin(0.19 * v.z) * std::sin(0.21 * v.y) < -0.35;
 }
 
-/// A 512x128x512 terrain full of caves, of 128 chunks; its voxel as it is without these.
+/// A 512x128x512 terrain of 128 chunks full of caves, and its voxels without them.
 inline constexpr IBox kCaveTerrain{{0, 0, 0}, {512, 128, 512}};
 inline VoxelType cave_terrain_rock(IVec3 v) {
   return terrain_type(v.y, 30.0 + height(v.x, v.z));

@@ -6,13 +6,13 @@
 
 namespace quoin::counts {
 
-/// Work of which the instructions are counted. It is small, for valgrind runs programs fifty times slower.
+/// A workload for counting instructions. It is small, since valgrind runs programs 50 times slower.
 struct Counted {
   std::string name;
-  std::function<void()> work;  ///< the same whenever it is called; run once beforehand, uncounted
+  std::function<void()> work;  ///< does the same on each call; run once beforehand, uncounted
 };
 
-/// All of it, made at the first call.
+/// Returns all workloads, created on the first call.
 [[nodiscard]] std::vector<Counted> mesh_work();
 [[nodiscard]] std::vector<Counted> ray_work();
 [[nodiscard]] std::vector<Counted> file_work();

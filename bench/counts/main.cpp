@@ -1,5 +1,5 @@
-// Runs small fixed workloads, each between two marks that callgrind sees: `./dev bench --check` compares how many
-// instructions they took with those that bench/counts/counts.txt keeps.
+// Runs small fixed workloads, each between two callgrind marks. `./dev bench --check` compares their instruction counts
+// with bench/counts/counts.txt.
 
 #include <cstdio>
 #include <string_view>

@@ -14,7 +14,7 @@ using workloads::RayQuery;
 
 constexpr std::size_t kRays = 8'192;
 
-// Every so many of the workload's tiles of sixteen, so that all of the picture takes part.
+// Takes evenly spaced tiles of sixteen rays, so that the whole image is covered.
 std::vector<RayQuery> some_of(const std::vector<RayQuery>& rays) {
   std::vector<RayQuery> some;
   const std::size_t step = std::max<std::size_t>(rays.size() / kRays, 1) * 16;

@@ -35,7 +35,7 @@ void take(const World& world, bool lit) {
 
 std::vector<Counted> scene_work() {
   const auto world = std::make_shared<World>();
-  Grid* const grid = &world->scene.edit(world->scene.grids().handles().front()).grid;  // it stays where it is
+  Grid* const grid = &world->scene.edit(world->scene.grids().handles().front()).grid;  // its address is stable
   return {{"picture/lit", [=] { take(*world, true); }},
           {"picture/unlit", [=] { take(*world, false); }},
           {"grid/get",

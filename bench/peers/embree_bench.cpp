@@ -94,13 +94,13 @@ RTCScene world() {
   return shared.get();
 }
 
-// 11 million triangles: of medium quality, since the best takes 20 seconds to build and gains nothing here.
+// 11 million triangles, at medium build quality: the best takes 20 seconds and gains nothing here.
 RTCScene random_world() {
   static const EmbreeScene shared(triangles_of(workloads::random_ray_workload().grid), RTC_BUILD_QUALITY_MEDIUM);
   return shared.get();
 }
 
-// Denormal numbers count as zero while this lives, as Embree's manual advises.
+// Treats denormal numbers as zero during its lifetime, as Embree's manual advises.
 class FlushDenormals {
  public:
   FlushDenormals() : before_(_mm_getcsr()) {
@@ -163,7 +163,7 @@ struct Packet {
   alignas(64) int valid[16] = {};
 };
 
-// Made before the clock runs, as Quoin's are.
+// Built outside the timing, like Quoin's.
 std::vector<Packet> packets_of(const std::vector<RayQuery>& rays) {
   std::vector<Packet> packets((rays.size() + 15) / 16);
   for (std::size_t i = 0; i < rays.size(); ++i) {
@@ -179,7 +179,7 @@ std::vector<Packet> packets_of(const std::vector<RayQuery>& rays) {
   return packets;
 }
 
-// Remembers the packets of the last rays asked for.
+// Caches the packets of the last rays.
 const std::vector<Packet>& shared_packets(const std::vector<RayQuery>& rays) {
   static const RayQuery* known = nullptr;
   static std::vector<Packet> packets;
@@ -220,7 +220,7 @@ int any_in_packets(RTCScene scene, const std::vector<RayQuery>& rays, RTCInterse
   return hits;
 }
 
-// PathTracer's paths, number for number, on what Embree finds: of matte surfaces under the sun and the sky.
+// Traces the same paths as PathTracer, number for number, with Embree's hits: matte surfaces under sun and sky.
 class EmbreePaths {
  public:
   EmbreePaths(const Grid& grid, const VoxelRegistry& types)
@@ -234,7 +234,7 @@ class EmbreePaths {
     }
   }
 
-  // The mean of all pixels.
+  // Returns the mean of all pixels.
   Vec3 picture(const Camera& camera, const PathOptions& options, const path::SkyLight& sky) {
     const FlushDenormals flush;
     const CameraRays view(camera, options.width, options.height);
@@ -323,7 +323,7 @@ class EmbreePaths {
   std::int64_t rays_ = 0;
 };
 
-// As path/terrain/640x360.
+// The same workload as path/terrain/640x360.
 void paths(benchmark::State& state) {
   static const Scene scene = workloads::picture_scene();
   const SceneGrid& grid = *scene.grids().find(scene.grids().handles().front());
@@ -342,7 +342,7 @@ void paths(benchmark::State& state) {
   for (auto _ : state) {
     const Vec3 mean = tracer.picture(camera, options, sky);
     const double apart = glm::length(DVec3(mean) - expected) / glm::length(expected);
-    // Some rays slip through where merged faces meet in a T.
+    // Some rays slip through T-junctions of merged faces.
     workloads::fail_unless(apart < 5e-3, "the difference of pictures, in millionths,", std::llround(apart * 1e6));
     rays = tracer.rays();
   }
@@ -364,7 +364,7 @@ void build(benchmark::State& state, RTCBuildQuality quality) {
   const auto first = [](Rays rays) { return first_one_by_one(world(), rays); };
   const auto any = [](Rays rays) { return any_one_by_one(world(), rays); };
   add_workload(prefix, "single", first, any, any);
-  // Each with the flag that is the faster: for occlusion rays by half, for primary ones by a factor of two.
+  // Each uses its faster flag: by half for occlusion rays, by a factor of two for primary rays.
   const auto first_16 = [](Rays rays) { return first_in_packets(world(), rays); };
   const auto shadow_16 = [](Rays rays) { return any_in_packets(world(), rays, RTC_INTERSECT_CONTEXT_FLAG_COHERENT); };
   const auto ao_16 = [](Rays rays) { return any_in_packets(world(), rays, RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT); };

@@ -1,5 +1,5 @@
 // peer/nanovdb/*: NanoVDB's hierarchical DDA on a mask grid. Its own `firstActive` leaps a whole voxel past each
-// crossing and loses corners; the loop here uses the same HDDA and finds the first voxel exactly.
+// crossing and misses corners; the loop here uses the same HDDA and finds the first voxel exactly.
 
 #include <algorithm>
 
@@ -19,7 +19,7 @@ using NanoCoord = nanovdb::Coord;
 using NanoGrid = nanovdb::NanoGrid<nanovdb::ValueMask>;
 using Handle = nanovdb::GridHandle<nanovdb::HostBuffer>;
 
-// How far beyond a node's side to look for the next one, so as to be in it for certain.
+// Distance beyond a node's face at which the ray is certainly inside the next node.
 constexpr float kInto = 1e-3F;
 
 Handle nano_from_grid(const Grid& grid) {
@@ -66,7 +66,7 @@ int count_hits(const Handle& handle, const std::vector<RayQuery>& rays) {
   return count;
 }
 
-// From an OpenVDB grid that is there already, as NanoVDB's own tools do it.
+// Converts an existing OpenVDB grid, like NanoVDB's own tools.
 void build(benchmark::State& state) {
   const auto mask = vdb_from_grid<openvdb::MaskGrid>(workloads::ray_workload().grid);
   const OneThread limit;

@@ -74,7 +74,7 @@ void get_sequential(benchmark::State& state) {
     std::int64_t sum = 0;
     for (int x = 0; x < kWidth; ++x) {
       for (int y = 0; y < kHeight; ++y) {
-        for (int z = 0; z < kWidth; ++z) sum += reader.getValue({x, y, z});  // z is next to z in OpenVDB's leaves
+        for (int z = 0; z < kWidth; ++z) sum += reader.getValue({x, y, z});  // z is contiguous in OpenVDB's leaves
       }
     }
     if (sum != solid) std::exit(1);

@@ -10,7 +10,7 @@
 namespace quoin::peers {
 namespace {
 
-// It closes the sides and the bottom of the terrain, where its background begins; nobody else does.
+// Unlike the others, it closes the sides and the bottom of the terrain, where its background begins.
 constexpr std::int64_t kTerrainTriangles = 45'656;
 
 struct Prepared {

@@ -1,6 +1,6 @@
 #pragma once
 
-// What the benchmarks of peers share: names as Quoin's own behind "peer/", hits checked before timing, the same
+// Shared by the peers' benchmarks: the same names as Quoin's after "peer/", hit checks before timing, and the same
 // counters.
 
 #include <cstdio>
@@ -14,15 +14,14 @@
 
 namespace quoin::peers {
 
-/// Ends the run unless the count is that of the workload, within the tolerance that Quoin's own tracer has.
+/// Ends the run unless the count matches the workload's, within the tolerance of Quoin's own tracer.
 inline void check_hits(const std::string& name, int hits, int expected) {
   if (std::abs(hits - expected) <= workloads::kHitTolerance) return;
   std::fprintf(stderr, "%s: %d hits, expected %d\n", name.c_str(), hits, expected);
   std::exit(1);
 }
 
-/// Registers `count_hits(rays)`, which traces them all and returns how many hit. It is called once, and checked, before
-/// it is timed.
+/// Registers `count_hits(rays)`, which traces all rays and returns the number of hits. One call is checked before timing.
 template <class CountHits>
 void add_rays(const std::string& name, const std::vector<workloads::RayQuery>& (*rays)(), int (*expected)(),
               CountHits count_hits) {

@@ -1,6 +1,6 @@
 #pragma once
 
-// The smooth workloads for peers: names as Quoin's own behind "peer/", vertices checked before timing, the same
+// The smooth workloads for peers: the same names as Quoin's after "peer/", vertex checks before timing, and the same
 // counters.
 
 #include <cmath>
@@ -23,7 +23,7 @@ struct PeerMesh {
   std::int64_t triangles = 0;
 };
 
-/// Ends the run unless every vertex of the sphere lies on it, and there are about as many triangles as there should be.
+/// Ends the run unless every vertex lies on the sphere and the triangle count is about as expected.
 inline void check_mesh(const std::string& name, workloads::Smooth which, std::int64_t terrain_triangles,
                        const PeerMesh& mesh) {
   const bool is_sphere = which == workloads::Smooth::S4;
@@ -38,8 +38,8 @@ inline void check_mesh(const std::string& name, workloads::Smooth which, std::in
   std::exit(1);
 }
 
-/// Registers a mesher. `prepare(fields)` gives what is meshed, before the clock runs; `mesh(prepared, i)` meshes field
-/// i of them; `take(prepared)` is what the last call made. `terrain_triangles`: what the peer makes of S1, about.
+/// Registers a mesher. `prepare(fields)` converts the input, untimed; `mesh(prepared, i)` meshes field i;
+/// `take(prepared)` returns the last mesh. `terrain_triangles`: the peer's approximate triangle count for S1.
 template <class Prepare, class Mesh, class Take>
 void add_smooth(const std::string& prefix, const std::string& kind, std::int64_t terrain_triangles, Prepare prepare,
                 Mesh mesh, Take take) {

@@ -1,6 +1,6 @@
-// store/*, by other stores: LMDB, and SQLite in Luanti's schema (three columns of coordinates, its own pragmas but for
-// synchronous, which is FULL here as there). The bodies are Quoin's in all of them, made and read again in the loop, so
-// that what differs is the store.
+// store/* with other stores: LMDB, and SQLite in Luanti's schema (three coordinate columns, its own pragmas except for
+// synchronous, which is FULL in both). All store Quoin's chunk bodies, which the loop encodes and decodes, so that only
+// the store differs.
 
 #include <array>
 #include <cstddef>
@@ -35,7 +35,7 @@ const TerrainChunks& terrain() {
   return chunks;
 }
 
-// LMDB's keys are bytes in order; 21 bits a coordinate are enough here.
+// LMDB sorts keys as bytes; 21 bits per coordinate are enough here.
 std::array<unsigned char, 8> key_of(IVec3 chunk) {
   std::uint64_t number = 0;
   for (int axis = 2; axis >= 0; --axis) number = number << 21 | static_cast<std::uint32_t>(chunk[axis] + (1 << 20));

@@ -10,17 +10,17 @@
 
 namespace quoin::peers {
 
-/// One byte a voxel, its type, in OpenVDB's usual tree.
+/// One byte per voxel, its type, in OpenVDB's default tree.
 using ByteTree = openvdb::tree::Tree4<std::uint8_t, 5, 4, 3>::Type;
 using ByteGrid = openvdb::Grid<ByteTree>;
 
-/// OpenVDB's and NanoVDB's own parallel loops run on one thread while one of these lives.
+/// Limits OpenVDB's and NanoVDB's parallel loops to one thread during its lifetime.
 class OneThread {
  private:
   tbb::global_control limit_{tbb::global_control::max_allowed_parallelism, 1};
 };
 
-/// Every voxel that is not air becomes an active value; equal regions become tiles.
+/// Converts every voxel that is not air to an active value, and uniform regions to tiles.
 template <class VdbGrid>
 typename VdbGrid::Ptr vdb_from_grid(const Grid& grid) {
   openvdb::initialize();

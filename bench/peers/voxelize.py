@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Voxels of a mesh by Quoin and by trimesh, side by side: counts and seconds.
+"""Compares voxelizing a mesh with Quoin and with trimesh: voxel counts and seconds.
 
     bench/peers/voxelize.py QUOIN MESH [VOXELS]
 
@@ -14,7 +14,7 @@ import time
 
 
 def quoin(tool, path, pitch, *options):
-    """Voxels and seconds of one run of the tool, which reads the mesh and writes a file."""
+    """Runs the tool, which reads the mesh and writes a file. Returns voxels and seconds."""
     with tempfile.TemporaryDirectory() as folder:
         out = os.path.join(folder, "out.binvox")
         started = time.perf_counter()

@@ -22,7 +22,7 @@ struct Prepared {
 };
 
 Prepared prepare(const std::vector<std::vector<float>>& fields) {
-  // Its header is not C++20; VTK reads this when it first works.
+  // Its header is not valid C++20; VTK reads this variable on first use.
   setenv("VTK_SMP_BACKEND_IN_USE", "Sequential", 1);
   setenv("VTK_SMP_MAX_THREADS", "1", 1);
   Prepared prepared;

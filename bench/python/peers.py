@@ -1,4 +1,4 @@
-"""Quoin beside what else Python programmers use, in one process. Usage: peers.py [FILE.vox] [--edge N] [--turns N]
+"""Compares Quoin with other Python packages in one process. Usage: peers.py [FILE.vox] [--edge N] [--turns N]
 
 Runs what is installed of scikit-image, zmesh, trimesh and py-vox-io, and says what is not. Each pair is checked to do
 the same before it is timed: times are the least of some turns, by turns. `numpy`, and `quoin` on the path, are needed.
@@ -21,7 +21,7 @@ import quoin
 
 
 class Pair:
-    """One task, done by Quoin and by a peer."""
+    """A task for Quoin and a peer."""
 
     def __init__(self, task, package, ours, theirs, check):
         self.task, self.package, self.ours, self.theirs, self.check = task, package, ours, theirs, check
@@ -103,7 +103,7 @@ def files(path):
         return [grid.to_numpy() for grid in quoin.load(path).grids]
     try:
         theirs()
-    except Exception as error:  # of theirs, whatever it is
+    except Exception as error:  # any error of the peer
         print(f"py-vox-io does not read {os.path.basename(path)}: {error}")
         return
     def check():
@@ -167,7 +167,7 @@ def main():
     for pair in pairs:
         pair.check()
         ours, theirs = [], []
-        for _ in range(given.turns):  # by turns, since other programs come and go
+        for _ in range(given.turns):  # alternating, to average out other processes
             ours += least(pair.ours, 1)
             theirs += least(pair.theirs, 1)
         print(f"| {pair.task} | {1000 * min(ours):.1f} | {1000 * min(theirs):.1f} | {min(theirs) / min(ours):.1f} "

@@ -1,4 +1,4 @@
-"""Executes a notebook's cells as plain Python and puts what they show into it. Usage: run_notebook.py NOTEBOOK.ipynb
+"""Runs a notebook's cells as plain Python and stores their output in it. Usage: run_notebook.py NOTEBOOK.ipynb
 
 For notebooks of few means: what is printed, and the value of a cell's last line, as text or as its picture. The same
 cells give the same file, with nothing about the machine in it.
