@@ -7,12 +7,12 @@ set(CMAKE_CXX_EXTENSIONS OFF)
 
 find_program(QUOIN_CCACHE ccache)
 if(QUOIN_CCACHE AND PROJECT_IS_TOP_LEVEL)
-  # Else it would keep nothing that was compiled with precompiled headers.
+  # Needed for ccache to cache sources with precompiled headers.
   set(CMAKE_CXX_COMPILER_LAUNCHER "${CMAKE_COMMAND}" -E env CCACHE_SLOPPINESS=pch_defines,time_macros "${QUOIN_CCACHE}")
 endif()
 
-# What almost every source includes, parsed once a target: half of what compiling takes. `./dev nightly` builds without,
-# so that headers go on standing by themselves. Sources with flags of their own are left out.
+# Precompiles the headers that almost every source includes, once per target: this halves compile time. `./dev nightly`
+# builds without, to check that headers are self-contained. Sources with their own flags are excluded.
 option(QUOIN_PRECOMPILED_HEADERS "Parse common headers once" ${PROJECT_IS_TOP_LEVEL})
 function(quoin_precompile target)
   if(QUOIN_PRECOMPILED_HEADERS)
@@ -25,10 +25,11 @@ function(quoin_precompile target)
   endif()
 endfunction()
 
-# Sources of one folder are compiled together, at most nine at a time: most of what tests, the tool and the viewer take is
-# templates that each would instantiate for itself. So names in a folder's anonymous namespaces have to differ. Not for the library,
-# which would gain a fifth and be optimised otherwise. Sources with definitions or flags of their own are left out.
-# Usage: quoin_compile_together(TARGET [FOLDER...]), without sources of these folders, whose names are the same
+# Compiles the sources of a folder together, at most nine at a time: tests, the tool and the viewer spend most time on
+# templates that each source would instantiate separately. Names in a folder's anonymous namespaces must therefore
+# differ. Not for the library, which would gain a fifth and be optimised differently. Sources with their own definitions
+# or flags are excluded.
+# Usage: quoin_compile_together(TARGET [FOLDER...]), except sources of these folders, whose names clash
 option(QUOIN_COMPILE_TOGETHER "Compile sources of tests, of the tool and of the viewer together, by folder" ${PROJECT_IS_TOP_LEVEL})
 function(quoin_compile_together target)
   if(NOT QUOIN_COMPILE_TOGETHER)
@@ -66,7 +67,7 @@ function(quoin_compile_options target)
   # No contraction: the same bytes from every instruction set.
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Wold-style-cast
     -ffp-contract=off)
-  # Under sanitizers GCC 12 warns of its own standard library: of regular expressions, of strings.
+  # Under sanitizers GCC 12 warns about its own standard library: regular expressions and strings.
   if(QUOIN_WARNINGS_AS_ERRORS AND NOT QUOIN_SANITIZE)
     target_compile_options(${target} PRIVATE -Werror)
   endif()

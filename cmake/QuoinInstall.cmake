@@ -1,4 +1,4 @@
-# What `cmake --install` puts in place, and the package that find_package(quoin) finds.
+# Installs Quoin with `cmake --install`, including the package for find_package(quoin).
 
 include(CMakePackageConfigHelpers)
 set(quoin_package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/quoin")
@@ -13,7 +13,7 @@ configure_package_config_file(cmake/quoin-config.cmake.in "${CMAKE_CURRENT_BINAR
 write_basic_package_version_file("${CMAKE_CURRENT_BINARY_DIR}/quoin-config-version.cmake" COMPATIBILITY SameMinorVersion)
 install(FILES "${CMAKE_CURRENT_BINARY_DIR}/quoin-config.cmake" "${CMAKE_CURRENT_BINARY_DIR}/quoin-config-version.cmake"
   DESTINATION "${quoin_package_dir}")
-# For builds without CMake. The static library needs what it is made of; the shared one brings it along.
+# For builds without CMake. The static library needs its dependencies; the shared one includes them.
 file(RELATIVE_PATH quoin_pc_prefix "${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig" "${CMAKE_INSTALL_PREFIX}")
 string(REGEX REPLACE "/$" "" quoin_pc_prefix "${quoin_pc_prefix}")
 foreach(folder LIBDIR INCLUDEDIR)  # absolute in some distributions

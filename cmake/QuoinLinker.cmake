@@ -1,4 +1,4 @@
-# The fastest linker there is, for Quoin's own builds: of some twenty programs that all hold the library.
+# Selects the fastest available linker for Quoin's own builds, which link the library into some 20 programs.
 
 include(CheckLinkerFlag)
 
@@ -18,6 +18,6 @@ foreach(linker ${quoin_linkers})
     add_link_options("-fuse-ld=${linker}")
     break()
   elseif(NOT QUOIN_LINKER STREQUAL "auto")
-    message(FATAL_ERROR "QUOIN_LINKER is ${linker}, with which the compiler cannot link")
+    message(FATAL_ERROR "the compiler cannot link with QUOIN_LINKER ${linker}")
   endif()
 endforeach()

@@ -1,4 +1,4 @@
-# Worlds on disk: SQLite and zstd keep them, xxHash (headers alone) says whether what is read is what was written.
+# Worlds on disk: stored with SQLite and zstd; xxHash (header-only) detects corrupted data.
 
 find_package(SQLite3 3.35 QUIET)
 find_package(zstd CONFIG QUIET)
@@ -15,10 +15,10 @@ if(NOT QUOIN_XXHASH_INCLUDE)
 endif()
 list(JOIN quoin_store_missing " and " quoin_store_missing)
 if(quoin_store_missing)
-  message(STATUS "Building without worlds on disk: there was no ${quoin_store_missing}")
+  message(STATUS "Building without worlds on disk: ${quoin_store_missing} not found")
 endif()
 
-# Leaves in the list the sources for what there is: what lies in rooms of src/store needs all three.
+# Removes sources whose libraries are missing: those in the folders of src/store need all three.
 function(quoin_choose_store_sources sources)
   set(all ${${sources}})
   if(quoin_store_missing)

@@ -1,5 +1,5 @@
-# The Vulkan renderer: its headers and glslc are needed to build it. The loader is looked up when a program runs, so
-# that the same program starts where there is none.
+# The Vulkan renderer: building it needs the headers and glslc. The loader is opened at run time, so programs also start
+# without Vulkan.
 
 find_path(QUOIN_VULKAN_INCLUDE vulkan/vulkan.h)
 find_program(QUOIN_GLSLC glslc)
@@ -12,10 +12,10 @@ if(NOT QUOIN_GLSLC)
 endif()
 list(JOIN quoin_vulkan_missing " and " quoin_vulkan_missing)
 if(quoin_vulkan_missing)
-  message(STATUS "Building without Vulkan: there was no ${quoin_vulkan_missing}")
+  message(STATUS "Building without Vulkan: ${quoin_vulkan_missing} not found")
 endif()
 
-# Leaves in the list the sources for what there is: what lies in rooms of src/render_vk needs Vulkan.
+# Removes sources that cannot be built: those in the folders of src/render_vk need Vulkan.
 function(quoin_choose_vulkan_sources sources)
   set(all ${${sources}})
   if(quoin_vulkan_missing)
@@ -26,7 +26,8 @@ function(quoin_choose_vulkan_sources sources)
   set(${sources} ${all} PARENT_SCOPE)
 endfunction()
 
-# Compiles the shaders in a folder and its rooms into lists of numbers that sources of the target include: those named after `USERS`.
+# Compiles the shaders of a folder and its subfolders into number lists, which the target's sources named after `USERS`
+# include.
 function(quoin_add_shaders target folder)
   cmake_parse_arguments(PARSE_ARGV 2 shaders "" "" "USERS")
   set(outputs)

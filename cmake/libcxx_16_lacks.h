@@ -1,7 +1,7 @@
 #pragma once
 
-// What the sources use of C++20 that libc++ 16 does not have yet, for the preset "clang", which checks all the rest
-// with it: std::jthread (libc++ 18 has it) and std::from_chars of floating-point numbers (libc++ 20).
+// C++20 features used by the sources but missing from libc++ 16, for the preset "clang", which uses that library:
+// std::jthread (added in libc++ 18) and std::from_chars of floating-point numbers (libc++ 20).
 
 #include <version>
 
@@ -46,7 +46,7 @@ class jthread {
 };
 #endif
 
-/// As the standard's, for chars_format::general: no leading space, no "+", no "0x", and no locale.
+/// Same as the standard's for chars_format::general: no leading space, "+" or "0x", and no locale.
 template <floating_point Number>
 from_chars_result from_chars(const char* first, const char* last, Number& value) {
   string text(first, last);

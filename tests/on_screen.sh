@@ -1,7 +1,7 @@
-# Sourced by tests that use a program as a person does: in a real window under Xvfb, with real keys and a real mouse by xdotool.
+# Sourced by tests of windowed programs: a real window under Xvfb, with keys and mouse events from xdotool.
 
-# Starts the script anew on a screen of its own, or exits with 77, and says so, where a program is not installed.
-# Usage: on_screen WIDTHxHEIGHT "PROGRAM..." "$0" "$@", with the programs that it needs besides
+# Restarts the script on its own screen. Exits with 77 and a message if a program is not installed.
+# Usage: on_screen WIDTHxHEIGHT "PROGRAM..." "$0" "$@", with the other programs that the script needs
 on_screen() {
   local size="$1" program
   for program in xvfb-run xauth xdotool $2; do
@@ -23,7 +23,7 @@ finish() {
   rm -rf "$work"
 }
 
-# Starts a program whose window's title has NAME in it, with its output in $work/log; $window is then that window.
+# Starts a program with output to $work/log, and sets $window to the window whose title contains NAME.
 # Usage: launch NAME PROGRAM [ARGUMENT...]
 launch() {
   local name="$1"
@@ -33,7 +33,7 @@ launch() {
   window="$(timeout 60 xdotool search --sync --onlyvisible --name "$name" 2>/dev/null | head -n 1)" || true
   [ -n "$window" ] || fail "no window"
 }
-# Usage: quit KEY: the key ends the program that was launched, without an error
+# Ends the program with a key, and checks that it ends without an error. Usage: quit KEY
 quit() {
   xdotool key --delay 80 "$1"
   until_true 30 gone || fail "$1 does not end it"

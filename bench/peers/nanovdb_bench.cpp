@@ -19,7 +19,7 @@ using NanoCoord = nanovdb::Coord;
 using NanoGrid = nanovdb::NanoGrid<nanovdb::ValueMask>;
 using Handle = nanovdb::GridHandle<nanovdb::HostBuffer>;
 
-// Distance beyond a node's face at which the ray is certainly inside the next node.
+// Distance beyond a node's face that is certainly inside the next node.
 constexpr float kInto = 1e-3F;
 
 Handle nano_from_grid(const Grid& grid) {

@@ -1,8 +1,8 @@
-// Writes small valid files for the fuzz targets to start from, by Quoin's own writers.
+// Writes small valid files as seeds for the fuzz targets, with Quoin's own writers.
 //
 // Usage: fuzz_seeds OUT CASES
-// OUT/TARGET gets a file of each format that a target reads and Quoin writes, and a copy of each file of the folder
-// CASES (tests/corpus/cases) that is of a format the target reads. Fails if a written file cannot be read again.
+// OUT/TARGET gets a file of each format that the target reads and Quoin writes, and a copy of each file in CASES
+// (tests/corpus/cases) whose format the target reads. Fails if a written file cannot be read again.
 
 #include <cstddef>
 #include <cstdint>
@@ -28,10 +28,10 @@ namespace {
 namespace fs = std::filesystem;
 using namespace quoin;
 
-/// Larger files make every input that is made of them slow.
+/// Larger seeds make all inputs derived from them slow.
 constexpr std::uintmax_t kMostBytes = std::uintmax_t{1} << 16;
 
-/// The target that reads a format.
+/// Returns the target that reads a format.
 const char* target_of(FileFormat format) {
   switch (format) {
     case FileFormat::Vox:
@@ -71,7 +71,7 @@ const char* target_of(FileFormat format) {
   return nullptr;
 }
 
-/// A grid of three types, placed twice, once turned.
+/// A grid of three types with two instances, one of them rotated.
 Scene voxels() {
   Scene scene;
   const auto add = [&](Rgba8 colour, const char* name) {
@@ -113,7 +113,7 @@ Scene field() {
   return scene;
 }
 
-/// Ends the program if a file could not be written or read.
+/// Ends the program if a file cannot be written or read.
 void require(bool holds, const fs::path& path, const std::string& reason) {
   if (holds) return;
   std::fprintf(stderr, "fuzz_seeds: %s: %s\n", path.c_str(), reason.c_str());
@@ -133,7 +133,7 @@ class Seeds {
     const auto written = write_file(bytes, path);
     require(written.has_value(), path, written ? "" : to_string(written.error()));
   }
-  /// Writes the scene in every format that holds it; formats of voxels need not hold fields.
+  /// Writes the scene in every format that supports it; voxel formats need not support fields.
   void put_scene(const Scene& scene, const std::string& name, bool is_field) const {
     for (const FormatInfo& format : file_formats()) {
       if (!format.writable) continue;
@@ -188,7 +188,7 @@ void put_pictures(const Seeds& seeds) {
   seeds.put("pfm", "seed.pfm", *pfm);
 }
 
-/// The first byte says how many blocks of 256 bytes are the database rather than its log.
+/// The first byte gives the number of 256-byte blocks that belong to the database; the rest is its log.
 void put_pages(const Seeds& seeds) {
   std::vector<std::byte> world = read(seeds.file("world", "voxels.quoin"));
   world.insert(world.begin(), std::byte{255});

@@ -1,4 +1,4 @@
-# Installs Quoin into an empty folder, then configures, builds and runs a project that finds it there.
+# Installs Quoin into an empty folder, then configures, builds and runs a project that uses it.
 # Called with -DBUILD_DIR, -DSOURCE_DIR, -DWORK_DIR.
 
 function(step)

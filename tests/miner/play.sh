@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# Plays apps/demo/miner as a player does, in a real window under Xvfb, with real keys and a real mouse by xdotool: walks,
-# digs a shaft and a tunnel, lights it with torches, starts a landslide, watches ships.
-# Usage: play.sh QUOIN_MINER [FOLDER [DEVICE]]: pictures are kept in FOLDER; DEVICE is the game's --device. Exits with 77, and says so, where a program is not installed.
+# Plays apps/demo/miner in a real window under Xvfb, with keys and mouse events from xdotool: walks, digs a shaft and a
+# tunnel, lights it with torches, starts a landslide, watches ships.
+# Usage: play.sh QUOIN_MINER [FOLDER [DEVICE]]. Keeps images in FOLDER; DEVICE is the game's --device. Exits with 77 and
+# a message if a program is not installed.
 set -euo pipefail
 miner="$(realpath "$1")"
 . "$(dirname "$(realpath "$0")")/../on_screen.sh"
@@ -10,31 +11,31 @@ pictures="${2:-$work}"
 device="${3:-}"
 mkdir -p "$pictures"
 
-# What the window's title says of the player: x, y, z, sky, lamps or fallen
+# Prints a value from the window title: x, y, z, sky, lamps or fallen
 said() {
   title | sed -n 's/^Miner at \(-\?[0-9]*\) \(-\?[0-9]*\) \(-\?[0-9]*\), sky \([0-9]*\), lamps \([0-9]*\), fallen \([0-9]*\)$/\1 \2 \3 \4 \5 \6/p' |
     awk -v what="$1" '{ split("x y z sky lamps fallen", names); for (i in names) if (names[i] == what) print $i }'
 }
 is() { local now; now="$(said "$1")"; [ -n "$now" ] && [ "$now" "$2" "$3" ]; }
-# Usage: look DOWN: by so many hundredths of a radian
+# Usage: look DOWN, in hundredths of a radian
 look() { xdotool mousemove_relative --sync -- 0 "$(($1 * 10 / 3))" || true; sleep 0.3; }
 hold() { xdotool keydown "$1"; sleep "$2"; xdotool keyup "$1"; }
 shot() { sleep 0.5; import -window root "$pictures/$1.png"; }
-# Usage: mean NAME CHANNEL: of a picture, 0 to 255
+# Prints the mean of an image channel, 0 to 255. Usage: mean NAME CHANNEL
 mean() { convert "$pictures/$1.png" -format "%[fx:round(255*mean.$2)]" info:; }
 
-# How many pixels two pictures differ in
+# Counts the pixels that differ between two images.
 other() { convert "$pictures/$1.png" "$pictures/$2.png" -compose difference -composite -colorspace gray -threshold 8% -format '%[fx:round(mean*w*h)]' info:; }
 
 start() {
   launch Miner "$miner" --units 4 --edits 0 ${device:+--device "$device"} "$@"
   until_true 60 is y -gt 0 || fail "the game does not begin"
   xdotool windowfocus "$window" 2>/dev/null || true
-  # Until it has landed.
+  # Waits until the player has landed.
   local before
   until before="$(said y)"; sleep 1; [ "$before" = "$(said y)" ]; do :; done
 }
-# Usage: torch KEY: onto what is ahead, nearer to it where that is out of reach
+# Places a torch ahead, walking with KEY if that is out of reach. Usage: torch KEY
 torch() {
   local tries
   for tries in 1 2 3 4 5 6 7 8; do

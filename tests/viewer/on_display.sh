@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Runs tests that open windows on a display of their own. Exits with 77, and says so, where xvfb-run is not installed.
+# Runs tests that open windows on a separate display. Exits with 77 and a message if xvfb-run is not installed.
 # Usage: on_display.sh PROGRAM [ARGUMENT...]
 set -euo pipefail
 for program in xvfb-run xauth; do

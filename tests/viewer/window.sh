@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Uses the viewer as a user does: a real window under Xvfb, real keys and a real mouse by xdotool.
-# Usage: window.sh QUOIN QUOIN_DEMO_WORLD [vulkan]: by Vulkan where that is said, with the validation layer. Exits with 77, and says so, where xvfb-run or xdotool is not installed.
+# Tests the viewer in a real window under Xvfb, with keys and mouse events from xdotool.
+# Usage: window.sh QUOIN QUOIN_DEMO_WORLD [vulkan]. With vulkan, uses Vulkan and its validation layer. Exits with 77 and
+# a message if xvfb-run or xdotool is not installed.
 set -euo pipefail
 quoin="$(realpath "$1")" demo_world="$(realpath "$2")" backend="${3:-cpu}"
 
@@ -24,15 +25,15 @@ stop() {
   quit ctrl+q
   ! grep -qi 'validation' log || fail "the validation layer has complaints"
 }
-# Usage: picture NAME: saves the finished picture as NAME
+# Saves the finished image as NAME. Usage: picture NAME
 picture() {
   rm -f world-*.png
   xdotool key --delay 80 F12
   until_true 120 test -s world-1.png || fail "F12 gives no picture ($1)"
   mv world-1.png "$1"
 }
-# Usage: picture_becomes NAME LIKE [KEY]: pictures until one is that one; presses the key again in between, since on a
-# busy machine what was pressed before may still be on its way
+# Saves images as NAME until one equals LIKE. Presses the key again in between, since on a busy machine earlier key
+# presses may be delayed. Usage: picture_becomes NAME LIKE [KEY]
 picture_becomes() {
   local tries
   for tries in 1 2 3 4 5 6 7 8; do
@@ -61,9 +62,9 @@ mkdir -p config/quoin
 samples=16
 if [ "$backend" = vulkan ]; then
   export VK_INSTANCE_LAYERS=VK_LAYER_KHRONOS_validation
-  samples=1 # devices that are processors in truth take their time
+  samples=1 # software devices are slow
   "$quoin" render castle.vox --size 32x32 --backend vulkan -o probe.png >probe.log 2>&1 || {
-    # Without the layer, which is no part of Vulkan itself.
+    # Runs without the layer, which is not part of Vulkan itself.
     unset VK_INSTANCE_LAYERS
     "$quoin" render castle.vox --size 32x32 --backend vulkan -o probe.png >probe.log 2>&1 ||
       { echo "skipped: $(cat probe.log)"; exit 77; }
@@ -123,7 +124,7 @@ picture_becomes redone.png edited.png || fail "redo does not bring back the edit
 xdotool key --delay 80 ctrl+z
 until_true 20 title_is "world.vox - Quoin" || fail "undo does not bring back the saved state again"
 
-# Where there is no device a message says so, and rays go on.
+# Without a device, the viewer shows a message and continues with the CPU renderer.
 if "$quoin" render castle.vox --size 32x32 --backend vulkan -o probe.png >/dev/null 2>&1; then
   echo "meshes follow edits"
   xdotool key --delay 80 F6
@@ -138,7 +139,7 @@ if "$quoin" render castle.vox --size 32x32 --backend vulkan -o probe.png >/dev/n
   xdotool key --delay 80 ctrl+z
   picture_becomes blocks_undone.png blocks.png || fail "the meshes do not follow the undo"
   if [ "$backend" = vulkan ] && [ -z "${QUOIN_NIGHTLY:-}" ]; then
-    # A processor that acts as a device takes minutes for the rest, which the other backend's run goes through too.
+    # A software device would take minutes for the rest, which the run of the other backend also covers.
     until_true 20 title_is "world.vox - Quoin" || fail "undo among meshes does not bring back the saved state"
     stop
     echo "short of the rest, which ./dev nightly runs"
@@ -208,7 +209,7 @@ xdotool click 1
 until_true 20 title_is "* sc.json - Quoin" || fail "no edit in a scene file"
 xdotool key --delay 80 ctrl+q
 sleep 1
-# Scene files are not written: Save asks for a name.
+# The viewer does not write scene files: Save asks for a name.
 xdotool mousemove 214 224
 sleep 0.5
 xdotool click 1
