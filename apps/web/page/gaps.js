@@ -1,18 +1,18 @@
-// Where merged faces of several sizes meet, some have a corner inside the edge of another. Corners are rounded to parts
-// of a pixel before triangles are filled, so such edges do not quite touch, and here and there a pixel shows what is
-// behind. Each face is drawn a little beyond its edges: that takes no triangle more, as watertight ones do.
+// Closes gaps between merged faces of different sizes. Where a face's corner lies inside another face's edge (a
+// T-junction), rounding corners to subpixels leaves gaps, so single pixels show the background. Each face is therefore
+// drawn slightly beyond its edges, without the additional triangles of watertight meshes.
 
-const wideningOfView = { value: 0 };  // as a part of half the view's height; a uniform of all materials
+const wideningOfView = { value: 0 };  // as a fraction of half the view's height; a uniform of all materials
 
-/** Says of how many pixels the renderer's picture is. */
+/** Sets the height of the renderer's image, in pixels. */
 export function setPictureHeight(renderer, pixels) {
   const gl = renderer.getContext();
-  const parts = 2 ** gl.getParameter(gl.SUBPIXEL_BITS);  // of a pixel, to which corners are rounded
+  const parts = 2 ** gl.getParameter(gl.SUBPIXEL_BITS);  // subpixels per pixel; corners are rounded to these
   wideningOfView.value = 2 * (1.5 / parts) / pixels;
 }
 
-/** Whether its triangles are faces as Quoin writes them: four vertices each, counter-clockwise along u and v, six
- *  indices. */
+/** Returns true if all triangles form faces as Quoin writes them: four vertices each, counter-clockwise along u and v,
+ *  and six indices. */
 function isOfFaces({ index, attributes: { position, normal } }) {
   if (!index || !normal || index.count * 4 !== position.count * 6) return false;
   const { array } = index;
@@ -23,8 +23,8 @@ function isOfFaces({ index, attributes: { position, normal } }) {
   return true;
 }
 
-// Along a face's u and v, whose product is its normal, which has one part that is not 0: quoin/core/direction.h. The
-// numbers of an index are those of vertices.
+// Moves vertices along a face's u and v. Their cross product is the normal, which has one non-zero component:
+// quoin/core/direction.h. The shader's vertex numbers are the indices.
 const wider = /* glsl */`
   {
     bool isPositive = normal.x + normal.y + normal.z > 0.0;
@@ -37,7 +37,7 @@ const wider = /* glsl */`
     gl_Position = projectionMatrix * mvPosition;
   }`;
 
-/** Has a material of three.js, of faces alone, draw them so. */
+/** Makes a three.js material, used only for faces, draw them wider. */
 export function closeGaps(material) {
   material.onBeforeCompile = (shader) => {
     Object.assign(shader.uniforms, { wideningOfView });
@@ -48,7 +48,7 @@ export function closeGaps(material) {
   material.userData.hasClosedGaps = true;
 }
 
-/** The same with all of a model's that can be. Clear glass would be blended twice where its faces overlap. */
+/** Applies this to all suitable materials of a model. Excludes glass, which would blend twice where faces overlap. */
 export function closeGapsOf(model) {
   const materials = new Map();
   model.traverse(({ isMesh, material, geometry }) => {

@@ -1,4 +1,5 @@
-// Marches a scene by WebGPU in Quoin's own light: the shaders in march/, on the tables of the package's ShaderScene.
+// Ray-marches a scene by WebGPU with Quoin's lighting: the shaders in march/ read the tables of the package's
+// ShaderScene.
 import data from './march/data.wgsl';
 import walk from './march/walk.wgsl';
 import field from './march/field.wgsl';
@@ -12,17 +13,17 @@ import light from './march/light.wgsl';
 import resolve from './march/resolve.wgsl';
 import show from './march/show.wgsl';
 
-const frameBytes = 608;  // a Frame; the picture's tables lie behind it
+const frameBytes = 608;  // a Frame, followed by the image's tables
 const flagsAt = 536;
-// A perspective, lit, with shadows, rays of occlusion in fixed directions; lamps and surfaces of glass there may be.
+// Supported flags: perspective, lighting, shadows, occlusion rays in fixed directions; optionally lamps and glass.
 const neededFlags = 1 | 2 | 4 | 8 | 64;
 const knownFlags = neededFlags | 2048 | 4096;
 const tileEdge = 128;
-const patience = 50;  // milliseconds of work that nothing can end
-const pushBytes = 256;  // what a dynamic offset is a multiple of; a Push has 96
+const patience = 50;  // milliseconds of work that cannot be cancelled
+const pushBytes = 256;  // alignment of dynamic offsets; a Push has 96
 const pointBytes = 48;
 
-/** The device of the best adapter there is. Rejects with what is missing. */
+/** Returns a device of the best adapter. Rejects if WebGPU or an adapter is missing. */
 export async function openDevice() {
   if (navigator.gpu === undefined) throw new Error('this browser has no WebGPU');
   const adapter = await navigator.gpu.requestAdapter({ powerPreference: 'high-performance' });
@@ -35,25 +36,25 @@ export async function openDevice() {
 
 const sizeOf = (bytes) => (bytes < 2 ** 20 ? `${Math.ceil(bytes / 1024)} KiB` : `${Math.ceil(bytes / 2 ** 20)} MiB`);
 
-/** One scene on a device, and the picture that is made of it, sample by sample. */
+/** A scene on a device, and its image, which is rendered sample by sample. */
 export class Marcher {
   #device;
   #layouts;
   #pipelines;
   #scene;    // a GPUBuffer
-  #samples;  // what shaders are pushed for each
+  #samples;  // push constants of each sample
   #size = [0, 0];
-  #picture;  // buffers of that size
+  #picture;  // buffers of the current size
   #tables;
   #uniform;
   #pushes;
   #groups;
   #shown;
   #atOnce = 1;  // tiles
-  /** Of the picture so far. */
+  /** Samples of the image so far. */
   samples = 0;
 
-  /** `scene`: { bytes, has, samples } as a worker gives them. Rejects where the device has no room for it. */
+  /** `scene`: { bytes, has, samples } from a worker. Rejects if the scene exceeds the device's limits. */
   static async open(device, scene) {
     const marcher = new Marcher();
     marcher.#device = device;
@@ -86,7 +87,7 @@ export class Marcher {
     await this.#compile(scene.has);
   }
 
-  /** Frees what the device keeps of it. */
+  /** Frees its device memory. */
   close() {
     for (const buffer of [this.#scene, this.#uniform, this.#tables, this.#pushes, this.#shown,
                           ...Object.values(this.#picture ?? {})]) buffer?.destroy();
@@ -129,7 +130,7 @@ export class Marcher {
     this.#pipelines = { points, lights, resolves, shows };
   }
 
-  /** Begins a picture: `frame` is the package's, of this size. */
+  /** Begins an image: `frame` is the package's Frame for this size. */
   begin(frame, width, height) {
     const words = new DataView(frame.buffer, frame.byteOffset, frame.byteLength);
     const flags = words.getUint32(flagsAt, true);
@@ -185,8 +186,8 @@ export class Marcher {
     ];
   }
 
-  /** Takes one more sample of every pixel. Resolves when the device is done; with false where `isWanted()` was no
-   *  more, and the picture is of no use. */
+  /** Adds a sample to every pixel. Resolves when the device has finished; with false if `isWanted()` became false, and
+   *  the image is incomplete. */
   async addSample(isWanted = () => true) {
     const tiles = this.#tiles();
     const pushes = new Uint8Array(tiles.length * pushBytes);
@@ -198,7 +199,7 @@ export class Marcher {
       [sample, place, pitch].forEach((value, k) => view.setUint32(68 + 4 * k, value, true));
     });
     this.#device.queue.writeBuffer(this.#pushes, 0, pushes);
-    // As many at a time as keep the device busy; so nothing thinks that it hangs, and what nobody wants ends.
+    // Submits enough tiles at a time to keep the device busy, but few enough to avoid timeouts and to cancel quickly.
     for (let next = 0; next < tiles.length;) {
       const began = performance.now();
       const end = Math.min(next + this.#atOnce, tiles.length);
@@ -229,12 +230,12 @@ export class Marcher {
     this.#device.queue.submit([commands.finish()]);
   }
 
-  /** Whether there is one more. */
+  /** True if there are more samples. */
   get isFinished() {
     return this.samples >= this.#samples.length;
   }
 
-  /** Puts the picture on a canvas that has a context of the device. */
+  /** Draws the image to a canvas with a context of the device. */
   show(context) {
     const texture = context.getCurrentTexture();
     this.#shown ??= this.#buffer(16, GPUBufferUsage.UNIFORM);
@@ -251,7 +252,7 @@ export class Marcher {
     this.#device.queue.submit([commands.finish()]);
   }
 
-  /** The picture as an ImageData has it. */
+  /** Returns the pixels in the layout of ImageData. */
   async read() {
     const { colours } = this.#picture;
     const [width, height] = this.#size;

@@ -1,14 +1,14 @@
-// The mode in which the page's view is marched: by WebGPU where there is an adapter with room for the scene, else by
-// the module in the worker, once the view rests.
+// The page's ray-marching mode: by WebGPU if an adapter supports the scene; otherwise by the module in the worker, when
+// the view rests.
 import { Marcher, openDevice } from './march.js';
 
 const rest = 250;           // milliseconds without a change
-const movingFrame = 60;     // milliseconds that a picture of a moving view may take
-const factors = [1, 2, 3, 4, 6, 8, 12];  // by which such a picture is coarser
+const movingFrame = 60;     // maximum milliseconds per image while the view moves
+const factors = [1, 2, 3, 4, 6, 8, 12];  // reductions of these images' resolution
 
-let opening;  // a promise of the device, which all scenes share
+let opening;  // a promise of the shared device
 
-/** On the device. `lost` is called when that is gone. */
+/** Renders on the device. Calls `lost` if the device is lost. */
 class ByDevice {
   static async open(ask, canvas, lost) {
     opening ??= openDevice();
@@ -30,14 +30,14 @@ class ByDevice {
     return by;
   }
 
-  /** How much coarser pictures are while the view moves. */
+  /** Returns the reduction of the resolution while the view moves. */
   factor(pixels) {
     const most = this.pixelsPerMillisecond * movingFrame;
     return factors.find((factor) => pixels / factor ** 2 <= most) ?? factors.at(this.pixelsPerMillisecond ? -1 : 5);
   }
 
-  /** Draws the first sample while `wanted.first()` is true, and where the picture is not coarse more of them while
-   *  `wanted.isSame()` is. Calls `shown` after each. */
+  /** Renders the first sample while `wanted.first()` is true. At full resolution, adds more samples while
+   *  `wanted.isSame()` is true. Calls `shown` after each sample. */
   async draw(view, factor, wanted, shown) {
     const [width, height] = [view.width, view.height].map((edge) => Math.max(Math.round(edge / factor), 1));
     const { frame } = await this.ask('frame', { ...view, width, height });
@@ -63,7 +63,7 @@ class ByDevice {
   }
 }
 
-/** By the module: one picture, and nothing while the view moves. */
+/** Renders by the module: one image, and none while the view moves. */
 class ByModule {
   constructor(ask, canvas, name) {
     this.ask = ask;
@@ -93,14 +93,14 @@ class ByModule {
 
 export class MarchedView {
   #page;
-  #by;       // one of the above; undefined: the mode is off
+  #by;       // one of the classes above; undefined: the mode is off
   #canvas;
   #changes = 0;
   #changed = 0;  // when
   #wake = () => {};
   #generation = 0;
-  #finished = -1;  // the change of which a whole picture is there
-  #failed;         // { change, error } where there will be none
+  #finished = -1;  // the change that has a finished image
+  #failed;         // { change, error } if rendering failed
 
   /** `page`: { ask, below (an element), view() => what the worker's `frame` takes, shown(facts), said(text) }. */
   constructor(page) {
@@ -111,12 +111,12 @@ export class MarchedView {
     return this.#by !== undefined;
   }
 
-  /** Whether what is on the screen is of the view as it is; without, others draw it. */
+  /** Returns true if the canvas shows the current view. Otherwise three.js renders it. */
   get isShown() {
     return this.isOn && this.#canvas.dataset.shown === 'true';
   }
 
-  /** Begins with the scene that the worker has. */
+  /** Starts with the worker's scene. */
   async start() {
     this.stop();
     const generation = ++this.#generation;
@@ -128,7 +128,7 @@ export class MarchedView {
     this.#run(isCurrent);
   }
 
-  // Undefined where that is of no use any more.
+  // Undefined if no longer needed.
   async #open(isCurrent) {
     this.#newCanvas();
     try {
@@ -139,7 +139,7 @@ export class MarchedView {
   }
 
   #byModule(why) {
-    this.#page.said(`${why}: the processor draws, where the view rests.`);
+    this.#page.said(`${why}: the processor draws when the view rests.`);
     this.#newCanvas();
     return new ByModule(this.#page.ask, this.#canvas, 'the processor');
   }
@@ -151,7 +151,7 @@ export class MarchedView {
     this.change();
   }
 
-  // A canvas has one kind of context for good.
+  // A canvas keeps its kind of context.
   #newCanvas() {
     this.#canvas?.remove();
     this.#canvas = document.createElement('canvas');
@@ -169,7 +169,7 @@ export class MarchedView {
     this.#wake();
   }
 
-  /** The view is another one, or the sun. */
+  /** Call when the view or the sun has changed. */
   change() {
     if (!this.isOn) return;
     ++this.#changes;
@@ -178,8 +178,8 @@ export class MarchedView {
     this.#wake();
   }
 
-  /** The picture of the view as it is, once it is there; undefined where the mode ends before. Rejects where it cannot
-   *  be drawn. */
+  /** Resolves with the finished image of the current view; undefined if the mode ends before. Rejects if rendering
+   *  fails. */
   async read() {
     while (this.isOn && this.#finished !== this.#changes) {
       if (this.#failed?.change === this.#changes) throw this.#failed.error;
@@ -193,9 +193,9 @@ export class MarchedView {
     this.#canvas.dataset.shown = isShown;
   }
 
-  // Every change is shown at once, coarsely; and finer and finer where no other follows.
+  // Shows every change at once at low resolution, and refines the image while no other change follows.
   async #run(isCurrent) {
-    let drawn = 0;  // as of which change, and how coarsely
+    let drawn = 0;  // the change and resolution of the last image
     let factor = 1;
     while (isCurrent()) {
       const isNew = drawn !== this.#changes;

@@ -1,4 +1,4 @@
-// The page: drop a file, see it, turn it, measure it, take it away.
+// The page: opens dropped files, shows, rotates and measures them, and saves GLB files and images.
 import * as THREE from 'three';
 import { GLTFLoader } from 'three/examples/jsm/loaders/GLTFLoader.js';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
@@ -10,7 +10,7 @@ const degrees = Math.PI / 180;
 const canvas = $('view');
 const isSlow = isDrawnByProgram();
 const renderer = new THREE.WebGLRenderer({ canvas, antialias: !isSlow, alpha: true, preserveDrawingBuffer: true });
-renderer.debug.checkShaderErrors = false;  // asking for them waits
+renderer.debug.checkShaderErrors = false;  // checking waits for the compiler
 renderer.shadowMap.enabled = true;
 renderer.toneMapping = THREE.NoToneMapping;
 const stage = new THREE.Scene();
@@ -28,12 +28,12 @@ tape.visible = false;
 stage.add(sky, sun, sun.target, tape);
 
 let file;      // { name, bytes, heights }
-let model;     // what is shown of it
-let plain;     // the same, plainly; where a program draws
+let model;     // the displayed model
+let plain;     // the same with plain materials, for software renderers
 let glb;       // its bytes
 let radius = 1;
 let centre = new THREE.Vector3();
-let measured;  // the points that were clicked
+let measured;  // clicked points
 let frame = 0;
 
 function say(text, isError = false) {
@@ -43,7 +43,7 @@ function say(text, isError = false) {
 
 const percent = (fraction) => `${Math.round(100 * fraction)} %`;
 
-// ---- The worker. One that is busy with what nobody waits for is replaced.
+// ---- The worker. A worker that is busy with an abandoned task is replaced.
 let worker;
 let jobs = new Map();
 let lastJob = 0;
@@ -52,7 +52,7 @@ function newWorker() {
   worker?.terminate();
   for (const { reject } of jobs.values()) reject(new Error('it was stopped'));
   jobs = new Map();
-  // The first one was begun by start.js.
+  // start.js starts the first worker.
   worker = globalThis.quoinWorker ?? new Worker(new URL('./worker.js', import.meta.url), { type: 'module' });
   globalThis.quoinWorker = undefined;
   worker.onmessage = ({ data: { id, fraction, answer, error } }) => {
@@ -68,10 +68,10 @@ function newWorker() {
     for (const { reject } of jobs.values()) reject(new Error(text));
     jobs = new Map();
   };
-  if (file) ask('keep', { bytes: file.bytes, heights: file.heights }).catch(() => {});  // `load` says why
+  if (file) ask('keep', { bytes: file.bytes, heights: file.heights }).catch(() => {});  // `load` reports the error
 }
 
-/** tell: told how far it has come, where that takes long. */
+/** `tell`: progress callback of long tasks. */
 function ask(name, options, tell) {
   const id = ++lastJob;
   return new Promise((resolve, reject) => {
@@ -80,8 +80,8 @@ function ask(name, options, tell) {
   });
 }
 
-// ---- Drawing, only when something changed.
-let rest;  // the timer after which what was drawn plainly is drawn well
+// ---- Rendering, only after changes.
+let rest;  // the timer for the full-quality image
 
 function draw() {
   forgetFrame();
@@ -89,17 +89,17 @@ function draw() {
   rest = undefined;
   plain?.show(false);
   sun.castShadow = true;
-  // What is marched lies below.
+  // The marched canvas lies below.
   renderer.render(marched?.isShown ? tape : stage, camera);
 }
 
-/** Who draws now need not once more with the next frame. */
+/** Cancels the scheduled frame, which is no longer needed. */
 function forgetFrame() {
   cancelAnimationFrame(frame);
   frame = 0;
 }
 
-/** Draws at once, on a program plainly until nothing has changed for a while. */
+/** Renders now; software renderers use plain materials until the view has rested. */
 function drawSoon() {
   if (!isSlow || marched?.isShown) return draw();
   forgetFrame();
@@ -109,7 +109,7 @@ function drawSoon() {
   if (plain) drawWellLater();
 }
 
-/** Draws well where nothing changes for a while after the plain picture is there, however long that takes. */
+/** Renders at full quality if the view rests for a while after the plain image is finished. */
 async function drawWellLater() {
   clearTimeout(rest);
   const wanted = rest = setTimeout(() => {}, 0);
@@ -121,7 +121,7 @@ function redraw() {
   frame ||= requestAnimationFrame(drawSoon);
 }
 
-/** Resolves when what was drawn is there. */
+/** Resolves when rendering has finished. */
 function pictureIsThere() {
   const gl = renderer.getContext();
   const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
@@ -142,13 +142,13 @@ const toSun = () => {
   return new THREE.Vector3(Math.cos(height) * Math.sin(around), Math.sin(height), Math.cos(height) * Math.cos(around));
 };
 
-/** What the worker draws the view by. */
+/** Returns the worker's render options for the view. */
 const viewOf = (width, height) => ({
   width, height, sun: toSun().toArray(),
   camera: { position: camera.position.toArray(), lookAt: controls.target.toArray(), fovDegrees: camera.fov },
 });
 
-let marched;  // the mode in which rays draw the view; loaded when it is first wanted
+let marched;  // the ray-marching mode; loaded on first use
 
 async function marchedView() {
   if (marched) return marched;
@@ -161,7 +161,7 @@ async function marchedView() {
     },
     shown: (facts) => {
       const { by, width, height, milliseconds, samples } = facts;
-      const pace = `${milliseconds.toFixed(0)} ms a sample, ${samples} a pixel`;
+      const pace = `${milliseconds.toFixed(0)} ms per sample, ${samples} per pixel`;
       $('marching').textContent = `${by}: ${width} x ${height}, ${pace}`;
       window.quoinMarched = facts;
       redraw();
@@ -202,7 +202,7 @@ function home() {
   changed();
 }
 
-// ---- A link has the view in it: #camera=...&at=...&sun=...
+// ---- Links contain the view: #camera=...&at=...&sun=...
 const rounded = (...numbers) => numbers.map((n) => Number(n.toPrecision(6))).join(',');
 const spaced = (...numbers) => rounded(...numbers).replaceAll(',', ', ');
 
@@ -231,15 +231,15 @@ function viewFromText(text) {
 }
 
 // ---- Files.
-let openings = 0;  // files that were chosen so far: only the last one is shown
+let openings = 0;  // number of files chosen so far: only the last one is shown
 
-/** A function that says whether none was chosen since. */
+/** Returns a function that returns true if no other file was chosen since. */
 function untilTheNext() {
   const now = openings;
   return () => now === openings;
 }
 
-/** For GLTFLoader, which would fetch the pictures that lie in the file it was given. */
+/** Loads embedded images for GLTFLoader, which would otherwise fetch them. */
 function picturesFromMemory(parser) {
   const picture = async ({ bufferView, mimeType }) => {
     const blob = new Blob([await parser.getDependency('bufferView', bufferView)], { type: mimeType });
@@ -255,7 +255,7 @@ function picturesFromMemory(parser) {
   };
 }
 
-/** False where another file was chosen meanwhile, and nothing was done. */
+/** Returns false and does nothing if another file was chosen meanwhile. */
 async function show(bytes, isCurrent) {
   const { scene } = await new GLTFLoader().register(picturesFromMemory).parseAsync(bytes.buffer, '');
   if (!isCurrent()) return false;
@@ -288,7 +288,7 @@ async function show(bytes, isCurrent) {
 
 const isPng = (bytes) => bytes.byteLength >= 8 && new DataView(bytes).getUint32(0) === 0x89504e47;
 
-/** How a picture has heights, which it does not say itself; undefined where nobody wants to say it. */
+/** Asks for the height encoding of an image; undefined if the user cancels. */
 async function heightsOf(name) {
   const dialog = $('heights');
   dialog.querySelector('h2').textContent = name;
@@ -352,7 +352,7 @@ function describe(name, { grids, types, warnings }) {
     counted(grids.length, 'grid', 'grids'), counted(types, 'colour', 'colours')].join(', ');
   $('smooth').checked = fields > 0;
   $('warnings').hidden = warnings.length === 0;
-  $('warnings').open = isEmpty({ grids });  // they say why
+  $('warnings').open = isEmpty({ grids });  // they explain why
   $('warnings').querySelector('summary').textContent = counted(warnings.length, 'note', 'notes');
   $('warnings').querySelector('ul').replaceChildren(...warnings.map((text) => {
     const line = document.createElement('li');
@@ -361,7 +361,7 @@ function describe(name, { grids, types, warnings }) {
   }));
 }
 
-// The module's memory holds less in one piece, and browsers give no more.
+// Neither the module nor browsers can allocate more at once.
 const tooManyBytes = 2 ** 31;
 
 async function openFile(chosen) {
@@ -383,7 +383,7 @@ async function openFile(chosen) {
 async function openAddress(address) {
   const url = new URL(address, location.href);
   if (url.origin !== location.origin)
-    return say('The link names a file of another site, which is not asked for.', true);
+    return say('The link names a file on another site; such files are not loaded.', true);
   ++openings;
   const isCurrent = untilTheNext();
   try {
@@ -410,13 +410,13 @@ async function givePicture({ width, height, rgba }) {
   give(await picture.convertToBlob({ type: 'image/png' }), '.png');
 }
 
-// ---- Measuring: two points of surfaces.
+// ---- Measuring between two surface points.
 function measure(x, y) {
   const pointer = new THREE.Vector2(2 * x / canvas.clientWidth - 1, 1 - 2 * y / canvas.clientHeight);
   const ray = new THREE.Raycaster();
   ray.setFromCamera(pointer, camera);
   const hit = ray.intersectObject(model, true)[0];
-  if (hit === undefined) return say('There is nothing to measure here.');
+  if (hit === undefined) return say('No surface to measure here.');
   measured = measured?.length === 1 ? [measured[0], hit.point] : [hit.point];
   tape.visible = measured.length === 2;
   if (measured.length === 1) {
@@ -439,7 +439,7 @@ canvas.addEventListener('pointerup', (event) => {
   if (model && isMeasuring() && moved < 5) measure(event.clientX, event.clientY);
 });
 
-// ---- What the page's parts do.
+// ---- Event handlers.
 function turn(around, up) {
   const offset = new THREE.Spherical().setFromVector3(camera.position.clone().sub(controls.target));
   offset.theta += around;
@@ -466,7 +466,7 @@ const keys = {
 };
 addEventListener('keydown', (event) => {
   if ($('heights').open || event.ctrlKey || event.metaKey || event.altKey) return;
-  // Sliders have arrows of their own; no input takes letters.
+  // Sliders handle arrow keys themselves; no input takes letters.
   if (event.target.tagName === 'INPUT' && event.key.startsWith('Arrow')) return;
   const act = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
   if (!act || !model) return;
@@ -494,7 +494,7 @@ addEventListener('drop', (event) => {
   const { files, items } = event.dataTransfer;
   if (files.length !== 1) return say(`Drop one file; here are ${files.length || 'none'}.`, true);
   if (items[0]?.webkitGetAsEntry?.()?.isDirectory)
-    return say(`${files[0].name} is a folder. Worlds in folders are not read here; drop one file.`, true);
+    return say(`${files[0].name} is a folder. The page cannot read world folders; drop one file.`, true);
   openFile(files[0]);
 });
 $('measure').addEventListener('click', () => {
@@ -504,7 +504,7 @@ $('measure').addEventListener('click', () => {
   say(isMeasuring() ? 'Click two points.' : '');
   redraw();
 });
-/** Has the view marched, or no more, as the button says. */
+/** Turns the ray-marching mode on or off, according to the button. */
 async function march() {
   $('marching').textContent = '';
   window.quoinMarched = undefined;
@@ -558,12 +558,12 @@ $('picture').addEventListener('click', async () => {
   canvas.toBlob((blob) => give(blob, '.png'), 'image/png');
 });
 $('march').addEventListener('click', async () => {
-  say('Drawing by rays, on one thread ...');
+  say('Rendering by rays, on one thread ...');
   const began = performance.now();
   try {
-    const tell = (fraction) => say(`Drawing by rays, on one thread: ${percent(fraction)} ...`);
+    const tell = (fraction) => say(`Rendering by rays, on one thread: ${percent(fraction)} ...`);
     await givePicture(await ask('march', { ...viewOf(canvas.clientWidth, canvas.clientHeight), samples: 4 }, tell));
-    say(`Drawn in ${((performance.now() - began) / 1000).toFixed(1)} s.`);
+    say(`Rendered in ${((performance.now() - began) / 1000).toFixed(1)} s.`);
   } catch (error) {
     say(error.message, true);
   }
@@ -572,7 +572,7 @@ $('share').addEventListener('click', async () => {
   history.replaceState(null, '', `#${viewAsText()}`);
   try {
     await navigator.clipboard.writeText(location.href);
-    say('The link is copied. Who opens it sees this view of the same file.');
+    say('Link copied. It opens this view of the same file.');
   } catch {
     say('The link is in the address bar.');
   }
@@ -583,6 +583,6 @@ newWorker();
 resize();
 const asked = new URLSearchParams(location.search).get('file');
 if (location.hash.includes('camera='))
-  $('invitation').textContent = 'This link has a view of a file: drop the same file here. It stays on this machine.';
+  $('invitation').textContent = 'This link shows a view of a file: drop the same file here. It stays on this machine.';
 if (asked) openAddress(asked);
 if (isSlow) prepare(renderer, stage, camera);

@@ -1,9 +1,8 @@
-// Plain pictures, for where a program draws in place of a graphics card: without shadows, gloss and what is behind
-// glass they take it a tenth of the time.
+// Plain images for software renderers: without shadows, gloss and transmission they take a tenth of the time.
 import * as THREE from 'three';
 import { closeGaps } from './gaps.js';
 
-/** Whether a program draws. */
+/** Returns true for software renderers. */
 export function isDrawnByProgram() {
   const gl = new OffscreenCanvas(1, 1).getContext('webgl2');
   const info = gl?.getExtension('WEBGL_debug_renderer_info');
@@ -14,7 +13,7 @@ export function isDrawnByProgram() {
 
 function plainOf(material) {
   const { map, color, vertexColors, alphaTest, depthWrite, side, emissive, emissiveMap, emissiveIntensity } = material;
-  const through = material.transmission ?? 0;  // of the light; half of it counts, by eye
+  const through = material.transmission ?? 0;  // fraction of light; half of it is used, by eye
   const plain = new THREE.MeshLambertMaterial({
     map, color, vertexColors, alphaTest, depthWrite, side, emissive, emissiveMap, emissiveIntensity,
     transparent: material.transparent || through > 0, opacity: material.opacity * (1 - through / 2),
@@ -23,7 +22,7 @@ function plainOf(material) {
   return plain;
 }
 
-/** A model that is drawn plainly or as it is. Materials that parts share stay shared. */
+/** Switches a model between plain and original materials. Shared materials stay shared. */
 export class PlainModel {
   #parts = [];
   #plain = new Map();
@@ -47,7 +46,7 @@ export class PlainModel {
   }
 }
 
-/** Draws what plain pictures of Quoin's GLB files take, so that it is compiled before there is one. */
+/** Compiles the shaders for plain images of Quoin's GLB files in advance. */
 export function prepare(renderer, stage, camera) {
   const geometry = new THREE.BufferGeometry();
   const attribute = (Kind, size, normalized) => new THREE.BufferAttribute(new Kind(3 * size), size, normalized);
@@ -68,5 +67,5 @@ export function prepare(renderer, stage, camera) {
   stage.remove(...triangles);
   geometry.dispose();
   map.dispose();
-  // The materials stay: programs of those that are disposed of are forgotten.
+  // The materials are kept: disposing them would discard their programs.
 }

@@ -1,4 +1,4 @@
-// Before three.js is read the worker, which compiles its module, is on its way.
+// Starts the worker, which compiles its module, before three.js is loaded.
 const worker = new Worker(new URL('./worker.js', import.meta.url), { type: 'module' });
 worker.onerror = () => { worker.hasFailed = true; };  // until the page listens
 globalThis.quoinWorker = worker;

@@ -1,4 +1,4 @@
-// Reads files and draws pictures beside the page, which goes on meanwhile.
+// Loads files and renders images in the background, so that the page stays responsive.
 import { load, start } from '../package/quoin.js';
 
 /** A .vox file of a block of two colours. */
@@ -11,28 +11,28 @@ function block() {
                         id('XYZI'), 4 + voxels.byteLength, 0, voxels.length, ...voxels);
 }
 
-/** Compiles the small module before there is a file, and what a first file takes of it: functions are compiled when
- *  they are first called. */
+/** Compiles the small module and the functions for a first file in advance: functions are compiled on their first
+ *  call. */
 async function prepare() {
   await start(undefined, { small: true });
   const small = await load(block(), { small: true });
   small.glb();
   small.free();
 }
-prepare().catch(() => {});  // `load` says why
+prepare().catch(() => {});  // `load` reports the error
 
-let file;     // the bytes of what is shown
-let heights;  // how it has heights, where it is a picture
-let scene;    // of them; undefined where its instance ended, or a later file could not be read
-let shaders;  // of it, in the module that does everything; what WebGPU marches it by
+let file;     // the bytes of the current file
+let heights;  // its height encoding, if it is an image
+let scene;    // its scene; undefined if its instance has ended or a later file could not be read
+let shaders;  // its ShaderScene for WebGPU, from the whole module
 
 async function current() {
-  if (file === undefined) throw new Error('there is no file yet');
+  if (file === undefined) throw new Error('no file is loaded');
   scene ??= await load(file, { small: true, heights });
   return scene;
 }
 
-/** The same in the module that does everything. */
+/** Returns the scene in the whole module. */
 async function wholeScene() {
   const now = await current();
   if (!now.isSmall) return now;
@@ -51,7 +51,7 @@ function forget() {
 const samplesOfAPixel = 16;
 
 const work = {
-  /** What the page shows, for a worker that comes in place of another. */
+  /** Receives the current file, if this worker replaces another. */
   async keep(kept) {
     ({ bytes: file, heights } = kept);
     return {};
@@ -90,12 +90,12 @@ const work = {
     return { bytes, has, samples: Array.from({ length: samplesOfAPixel }, (_, i) => shaders.sample(i)) };
   },
   async frame(options) {
-    if (shaders === undefined) throw new Error('what was marched is gone');
+    if (shaders === undefined) throw new Error('the marched scene has been freed');
     return { frame: shaders.frame(options) };
   },
 };
 
-const endings = ['trap', 'out_of_memory', 'internal'];  // of an instance, with all that lived in it
+const endings = ['trap', 'out_of_memory', 'internal'];  // these errors end the instance and all its scenes
 
 async function answerTo({ id, name, options }) {
   let told = performance.now();
@@ -114,6 +114,6 @@ async function answerTo({ id, name, options }) {
   }
 }
 
-// One after the other: what one awaits no other changes.
+// Runs tasks one after another, so that none changes the state during another's await.
 let last = Promise.resolve();
 onmessage = ({ data }) => { last = last.then(() => answerTo(data)); };
