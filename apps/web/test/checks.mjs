@@ -1,4 +1,4 @@
-// What the tests of the package and of the page count, and how they say it.
+// Counts and reports the checks of the package and page tests.
 export const found = { checked: 0, failed: 0 };
 
 export function check(isRight, what) {
@@ -8,13 +8,13 @@ export function check(isRight, what) {
   console.log(`WRONG: ${what}`);
 }
 
-/** Says what is right, too. */
+/** Also reports passed checks. */
 export function checkAloud(isRight, what) {
   if (isRight) console.log(`right: ${what}`);
   check(isRight, what);
 }
 
-/** A function that checks that `work` throws a QuoinError, of one of the codes where any are given. */
+/** Returns a function that checks that `work` throws a QuoinError, with one of the codes if any are given. */
 export const refusing = (QuoinError) => async (what, work, ...codes) => {
   try {
     await work();

@@ -1,4 +1,4 @@
-// The real files: what the module reads and writes is what the native tool does.
+// Real files: the module reads and writes the same as the native tool.
 //   node corpus.mjs PACKAGE TOOL FOLDER...
 import { execFileSync } from 'node:child_process';
 import { mkdtempSync, readdirSync, readFileSync, rmSync, statSync } from 'node:fs';
@@ -11,7 +11,7 @@ const [packageFolder, tool, ...folders] = process.argv.slice(2);
 const { load } = await import(pathToFileURL(join(packageFolder, 'quoin.js')));
 const scratch = mkdtempSync(join(tmpdir(), 'quoin-web-'));
 
-/** What the module says that it lacks, as its libraries or the files beside the one that was given; else undefined. */
+/** Returns what the module reports as missing, such as libraries or sidecar files; else undefined. */
 function lacks(message) {
   if (/only from a path|beside it/.test(message)) return 'files beside them';
   return /LZ4|without (tinyobjloader|tinygltf)/.exec(message)?.[0].replace('without ', '');
@@ -31,7 +31,7 @@ function native(...args) {
   }
 }
 
-/** The pixels of a PNG of 8-bit RGB, as the tool writes them. */
+/** Returns the pixels of an 8-bit RGB PNG, as written by the tool. */
 function pixelsOf(png) {
   const view = new DataView(png.buffer, png.byteOffset, png.byteLength);
   const [width, height] = [view.getUint32(16), view.getUint32(20)];
@@ -63,7 +63,7 @@ function pixelsOf(png) {
 const isVolume = /\.(nii|nrrd|gz)$/;
 const jsonOf = (glb) => JSON.parse(glb.toString('utf8', 20, 20 + glb.readUInt32LE(12)));
 
-/** How much of two GLBs is the same: all, all but names, or the arrays; undefined where the arrays differ. */
+/** Returns how much of two GLBs is equal: all, all but names, or the arrays; undefined if the arrays differ. */
 function sameness(expected, glb) {
   if (expected.equals(glb)) return 'all';
   const arrays = (bytes) => bytes.subarray(20 + bytes.readUInt32LE(12));
@@ -72,15 +72,15 @@ function sameness(expected, glb) {
   return nameless(expected) === nameless(glb) ? 'all but names' : 'arrays';
 }
 
-/** How much of it has to be. Bytes do not tell the file's name, which the tool gives volumes and voxelised triangles,
- *  nor the tool's metres of volumes. */
+/** Returns true if enough is equal. Bytes lack the file name, which the tool gives to volumes and voxelised triangles,
+ *  and the tool's metres of volumes. */
 function isEnough(same, file, scene) {
   if (isVolume.test(file)) return same !== undefined;
   return same === 'all' || (same === 'all but names' && scene.warnings.some((text) => text.startsWith('voxelised')));
 }
 
-/** Whether the tool places a volume's vertices by a matrix or stretches its mesh, since its voxels are long or askew,
- *  where reading it as a scene resamples it: then they are two surfaces. */
+/** Returns true if a volume has non-cubic or sheared voxels. The tool then transforms its mesh, while loading it as a
+ *  scene resamples it, so the surfaces differ. */
 function isStretched(file, glb) {
   if (!isVolume.test(file)) return false;
   const { nodes } = jsonOf(glb);

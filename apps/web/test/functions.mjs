@@ -1,4 +1,4 @@
-// What the package does beside reading and writing: rays, labels, progress, groups of three.js.
+// Other functions of the package: rays, labels, progress, three.js groups.
 //   node functions.mjs PACKAGE THREE FILE.vox
 import { readFileSync } from 'node:fs';
 import { join, resolve } from 'node:path';
@@ -12,7 +12,7 @@ const { load, meshLabels, start, surfaceNets, toThree, QuoinError } = await impo
   pathToFileURL(join(packageFolder, 'quoin.js')));
 const THREE = await import(pathToFileURL(resolve(three, 'build/three.module.js')));
 const { GLTFLoader } = await import(pathToFileURL(resolve(three, 'examples/jsm/loaders/GLTFLoader.js')));
-// What three.js' loader takes of a browser: pictures of known size.
+// The browser features that three.js' loader needs: images of known size.
 globalThis.self = globalThis;
 globalThis.createImageBitmap = async (blob) => {
   const png = new DataView(await blob.arrayBuffer());
@@ -26,7 +26,7 @@ const random = () => (seed = (Math.imul(seed, 1664525) + 1013904223) >>> 0) / 2 
 const bytes = readFileSync(file);
 const scene = await load(bytes);
 
-// ---- Rays at voxels meet what three.js' rays meet of the scene's triangles.
+// ---- Rays hit the same surfaces as three.js' rays hit of the scene's triangles.
 {
   const group = await toThree(scene, GLTFLoader);
   group.updateMatrixWorld(true);
@@ -73,7 +73,7 @@ const scene = await load(bytes);
     console.log(`ray ${i}: ${t} by three.js, ${hits.t[i]} here`);
   }
   check(met > count / 2, `only ${met} rays of ${count} met something`);
-  // Through edges and corners, and the seams of merged faces, both may choose otherwise.
+  // At edges, corners and seams of merged faces the results may differ.
   check(different <= count / 50, `${different} rays of ${count} met something else`);
   const short = scene.rays(origins, directions, { maxT: 1e-3 });
   check(short.t.every((t) => t === Infinity) && short.type.every((type) => type === 0), 'short rays meet nothing');
@@ -86,7 +86,7 @@ const scene = await load(bytes);
   check(nowhere.t[0] === Infinity && nowhere.type[0] === 0, 'a ray from nowhere meets nothing');
 }
 
-// ---- Labels: each has a closed surface, of its size.
+// ---- Labels: each has a closed surface of the right size.
 function labelsOf(Kind, one, two) {
   const labels = new Kind(20 * 12 * 12);
   for (let i = 0; i < labels.length; ++i) {
@@ -147,7 +147,7 @@ await refuses('half a step', () => meshLabels(few, [2, 2, 2], { relaxationSteps:
 await refuses('too many steps', () => meshLabels(few, [2, 2, 2], { relaxationSteps: 1001 }));
 await refuses('a shape that does not fit', () => meshLabels(few, [2, 2, 3]));
 
-// ---- Progress: told in order, it ends a call, and what it throws comes out.
+// ---- Progress: fractions are in order, it cancels a call, and its exceptions propagate.
 const ball = Float32Array.from({ length: 64 ** 3 }, (_, i) =>
   20 - Math.hypot(Math.floor(i / 4096) - 31.5, Math.floor(i / 64) % 64 - 31.5, i % 64 - 31.5));
 const segments = Uint8Array.from(ball, (value) => value > 0 ? 1 : 0);
@@ -186,10 +186,10 @@ const other = await load(bytes);
 check(Buffer.from(whole).equals(Buffer.from(other.glb())), 'after all that the GLB is the same');
 await refuses('rays at a scene that was freed', () => scene.rays([0, 0, 0], [0, 0, 1]), 'bad_handle');
 
-// What an async function resolves to is not waited for.
+// The promise of an async function is not awaited.
 check(Buffer.from(whole).equals(Buffer.from(other.glb({ progress: async () => false }))), 'an async progress');
 
-// ---- Instances: how many are started, and what of theirs is freed, is counted.
+// ---- Instances: counts started instances and their freed objects.
 const RealInstance = WebAssembly.Instance;
 const counts = { instances: 0, quoin_free: 0, quoin_web_march_free: 0 };
 const fails = { start: false, copy: false };
@@ -215,7 +215,7 @@ const atOnce = await Promise.all([load(bytes), load(bytes), load(bytes)]);
 check(counts.instances === 1, `three loads at once start ${counts.instances} instances`);
 check(atOnce.every((one) => Buffer.from(whole).equals(Buffer.from(one.glb()))), 'what was loaded at once is the same');
 
-// A scene that progress tries to free lives on; it is freed when nobody has it, as are shaders' scenes.
+// A scene that progress tries to free survives. Unreferenced scenes and shader scenes are freed.
 const [kept] = atOnce;
 await refuses('freed in progress', () => atOnce[1].glb({ progress: () => kept.free() }));
 check(Buffer.from(whole).equals(Buffer.from(kept.glb())), 'it lives on');
@@ -243,7 +243,7 @@ await (async () => {
 })();
 await collected('quoin_free', 1);
 
-// The small module where the whole one is expected reads what it can, and refuses the rest.
+// The small module in place of the whole one reads .vox and rejects other formats.
 await start(moduleOf('quoin-small'));
 check((await load(bytes)).isSmall, 'the small module in place of the whole one');
 await refuses('a file that it does not read', () => load(new TextEncoder().encode('v 0 0 0\n')), 'unsupported');

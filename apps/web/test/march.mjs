@@ -1,5 +1,5 @@
-// Pictures by WebGPU against those of the module, in headless Chromium with a processor for a graphics card: the same
-// scene, camera, sun and samples. And the mode of the page that shows them.
+// Compares WebGPU images with those of the module, in headless Chromium with a software device: the same scene, camera,
+// sun and samples. Also tests the page's ray-marching mode.
 //   node march.mjs PAGE ESBUILD OUT_FOLDER FILE...
 import { mkdtemp, readFile, rm, writeFile } from 'node:fs/promises';
 import { spawnSync } from 'node:child_process';
@@ -12,7 +12,7 @@ import { scenes } from './march_scenes.mjs';
 const [page, esbuild, out, ...files] = process.argv.slice(2);
 const { chromium, launcher } = await requirements('skipped, what is marched in the browser');
 
-// ---- The site: the page, the harness in which pictures are compared, and the files.
+// ---- The site: the page, the harness that compares images, and the files.
 const work = await mkdtemp(join(tmpdir(), 'quoin-march-'));
 const harness = join(work, 'marched.js');
 const bundled = spawnSync(esbuild, [new URL('./marched.js', import.meta.url).pathname, '--bundle', '--format=esm',
@@ -33,12 +33,12 @@ const launch = (...args) => launcher.launch({
 const withWebGpu = ['--enable-unsafe-webgpu', '--ignore-gpu-blocklist', '--enable-features=Vulkan,WebGPU',
                     '--use-vulkan=swiftshader', '--use-webgpu-adapter=swiftshader'];
 
-// What is asked of every picture; the shares are those of Quoin's Vulkan backend against its processor's.
+// Limits for every image; the fractions are those of Quoin's Vulkan backend against its CPU renderer.
 const leastClose = 0.999;  // within 2 of 255
 const width = 128;
 const height = 72;
 const suns = [undefined, [-0.2, 0.15, 0.9]];
-const inPage = 'stones.json';  // by which the page is tried: a scene that a processor draws soon
+const inPage = 'stones.json';  // for testing the page: a scene that software renders quickly
 
 async function comparePictures(tab) {
   let worst = 1;
@@ -71,7 +71,7 @@ async function comparePictures(tab) {
 
 function watch(tab, errors) {
   tab.on('pageerror', (error) => errors.push(String(error)));
-  // Of WebGL's driver there are remarks about speed.
+  // The WebGL driver prints remarks about speed.
   tab.on('console', (message) => ['error', 'warning'].includes(message.type()) &&
     !message.text().startsWith('[.WebGL') && errors.push(message.text()));
 }
@@ -100,7 +100,7 @@ async function download(tab, button) {
   return [...await readFile(await got.path())];
 }
 
-// Of two PNGs: the mean difference of their bytes.
+// Returns the mean byte difference of two PNGs.
 const meanDifference = (tab, one, other) => tab.evaluate(async (both) => {
   const pixels = await Promise.all(both.map(async (bytes) => {
     const bitmap = await createImageBitmap(new Blob([new Uint8Array(bytes)]));

@@ -1,4 +1,4 @@
-// Scenes that have what marching has to know, as scene files (docs/scene-files.md).
+// Scenes with all features of ray marching, as scene files (docs/scene-files.md).
 import { gzipSync } from 'node:zlib';
 
 const edge = 64;
@@ -69,7 +69,7 @@ function yard(x, y, z) {
 
 const turn = (axis, degrees) => ({ axis, degrees });
 
-/** By the names of files. */
+/** Scenes by file name. */
 export function scenes() {
   const voxels = [chunk(yard)];
   const stones = [chunk((...at) => [0, 1, 2, 6, 1, 2, 6][yard(...at)])];

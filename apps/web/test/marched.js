@@ -1,10 +1,10 @@
-// In the browser, for march.mjs: pictures of a scene by WebGPU and by the module, and what they differ in.
+// In the browser, for march.mjs: renders a scene by WebGPU and by the module, and compares the images.
 import { load } from '../package/quoin.js';
 import { Marcher, openDevice } from '../page/march.js';
 
 let opened;
 
-/** A scene's pictures, for as long as it is wanted: `render(options)` gives both. */
+/** Renders a scene's images: `render(options)` returns both. */
 async function both(scene, samples) {
   opened ??= await openDevice();
   const shaders = scene.forShaders();
@@ -53,7 +53,7 @@ async function png({ width, height, rgba }) {
   return [...new Uint8Array(await (await canvas.convertToBlob({ type: 'image/png' })).arrayBuffer())];
 }
 
-/** What pictures of a file differ in, for each view of a list. `keeps`: whether they are given too, as PNG. */
+/** Returns the differences between a file's images for a list of views. `keeps`: also returns the images as PNG. */
 window.compare = async (address, views, { samples, keeps }) => {
   const scene = await load(await (await fetch(address)).arrayBuffer());
   const pictures = await both(scene, samples);
@@ -68,7 +68,7 @@ window.compare = async (address, views, { samples, keeps }) => {
   return { has: pictures.has, bytes: pictures.bytes, opening: pictures.opening, name: opened.name, found };
 };
 
-/** The codes of what goes wrong with a scene's tables. */
+/** Returns the error codes of invalid calls to a scene's tables. */
 window.misuse = async (address) => {
   const scene = await load(await (await fetch(address)).arrayBuffer());
   const shaders = scene.forShaders();
@@ -88,7 +88,7 @@ window.misuse = async (address) => {
   return codes;
 };
 
-/** What a device says that binds less than a scene takes. */
+/** Returns the error of a device whose binding limit is too small for a scene. */
 window.openOnSmallDevice = async (address, most) => {
   const scene = await load(await (await fetch(address)).arrayBuffer());
   const shaders = scene.forShaders();

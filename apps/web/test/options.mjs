@@ -1,4 +1,4 @@
-// What files are read with, and meshes made with: the tool, given the same, writes the same. Bad values are errors.
+// Load and mesh options: the tool with the same options writes the same. Invalid values give errors.
 //   node options.mjs PACKAGE TOOL CORPUS THREE FILE.vox
 import { execFileSync } from 'node:child_process';
 import { mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
@@ -19,7 +19,7 @@ function native(file, ...args) {
   return readFileSync(out);
 }
 
-// Bytes do not tell the file's name, which the tool gives what it makes of volumes, heights and triangles.
+// Bytes lack the file's name, which the tool gives to volumes, height maps and voxelised triangles.
 const jsonOf = (glb) => JSON.parse(glb.toString('utf8', 20, 20 + glb.readUInt32LE(12)));
 const arraysOf = (glb) => glb.subarray(20 + glb.readUInt32LE(12));
 const areSame = (one, other) => arraysOf(one).equals(arraysOf(other)) && jsonOf(one).nodes.length > 0;
@@ -31,7 +31,7 @@ async function glbOf(bytes, options, meshing) {
   return glb;
 }
 
-/** That a file is read as by the tool, given the same, and otherwise than without. */
+/** Checks that a file is read the same as by the tool with the same options, and differently without them. */
 async function compare(what, file, options, args, without = {}) {
   const bytes = readFileSync(file);
   const glb = await glbOf(bytes, options);
@@ -40,7 +40,7 @@ async function compare(what, file, options, args, without = {}) {
   check(!areSame(glb, await glbOf(bytes, without)), `${what}: the same without ${JSON.stringify(options)}`);
 }
 
-// ---- Values alone: a ball of 16-bit numbers, the most significant byte first.
+// ---- Raw values: a ball of big-endian 16-bit numbers.
 {
   const [nx, ny, nz] = [24, 20, 16];
   const values = new DataView(new ArrayBuffer(2 * nx * ny * nz));
@@ -108,7 +108,7 @@ async function compare(what, file, options, args, without = {}) {
                                  ['voxelSize', 'small']])
     await refuses(`${option}: ${value}`, () => load(bytes, { [option]: value }));
   await refuses('both meshVoxels and voxelSize', () => load(bytes, { meshVoxels: 20, voxelSize: 1 }));
-  // glTF whose arrays meshoptimizer coded.
+  // glTF with arrays compressed by meshoptimizer.
   const packed = join(scratch, 'packed.glb');
   execFileSync(tool, ['convert', castle, packed, '--compress', '-q']);
   const coded = readFileSync(packed);
@@ -119,7 +119,7 @@ async function compare(what, file, options, args, without = {}) {
   await refuses('compressed glTF that is damaged', () => load(damaged), 'bad_format');
 }
 
-// ---- Animations and what is hidden, by both modules.
+// ---- Animations and hidden objects, in both modules.
 {
   const chunk = (name, content) => {
     const head = Buffer.alloc(12);
@@ -132,7 +132,7 @@ async function compare(what, file, options, args, without = {}) {
     ([key, value]) => [ints(key.length), Buffer.from(key), ints(value.length), Buffer.from(value)])]);
   const model = (...xs) => [chunk('SIZE', ints(8, 1, 1)), chunk('XYZI', Buffer.concat([ints(xs.length), ...xs.map(
     (x) => Buffer.from([x, 0, 0, 1]))]))];
-  // A model in its first frame, another from frame 5 on; beside them one that is hidden.
+  // A model in its first frame, another from frame 5 on; and a hidden one.
   const nodes = [
     chunk('nTRN', Buffer.concat([ints(0), dict({}), ints(1, -1, -1, 1), dict({})])),
     chunk('nGRP', Buffer.concat([ints(1), dict({}), ints(2, 2, 4)])),
@@ -170,7 +170,7 @@ async function compare(what, file, options, args, without = {}) {
   };
   const [plain, tight] = [await toThree(scene, GLTFLoader), await toThree(scene, GLTFLoader, { watertight: true })];
   check(count(tight) > count(plain), `${count(tight)} triangles that are watertight, ${count(plain)} that are not`);
-  /** Corners that lie inside an edge along an axis. They lie on whole numbers. */
+  /** Counts corners inside axis-parallel edges. All corners have integer coordinates. */
   const cornersInEdges = ({ positions, indices }) => {
     const place = (i) => positions.subarray(3 * i, 3 * i + 3);
     const corners = new Set(Array.from({ length: positions.length / 3 }, (_, i) => place(i).join()));

@@ -1,4 +1,4 @@
-// The npm package as a user gets it: installed in an empty folder, compiled with strict types, run, bundled.
+// Tests the npm package: installs it in an empty folder, compiles with strict types, runs and bundles.
 //   node package.mjs QUOIN.tgz TSC FILE ESBUILD
 import { execFileSync } from 'node:child_process';
 import { cpSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
@@ -42,14 +42,14 @@ export async function use(bytes: Uint8Array): Promise<number> {
 }
 // @ts-expect-error: bytes, not a path
 void load('castle.vox');
-// @ts-expect-error: no type of numbers
+// @ts-expect-error: not a value type
 void load(new Uint8Array(8), { raw: { shape: [2, 2, 2], type: 'int12' } });
-// @ts-expect-error: labels are whole numbers
+// @ts-expect-error: labels are integers
 void meshLabels(new Float32Array(8), [2, 2, 2]);
 `);
 run(process.execPath, tsc, '--strict', '--noEmit', '--exactOptionalPropertyTypes', '--noUncheckedIndexedAccess',
     '--target', 'es2022', '--module', 'nodenext', 'use.ts', 'node_modules/quoin/quoin.d.ts');
-// Where there is no browser, whose types a project for Node.js does not have.
+// Without the browser's types, which Node.js projects lack.
 writeFileSync(join(folder, 'node.d.ts'), 'declare class URL { constructor(text: string); }\n');
 run(process.execPath, tsc, '--strict', '--noEmit', '--target', 'es2022', '--lib', 'es2022', '--module', 'nodenext',
     'node.d.ts', 'node_modules/quoin/quoin.d.ts');
@@ -61,7 +61,7 @@ if (scene.glb().length < 1000 || scene.grids.length === 0) process.exit(1);
 console.log(\`package: \${scene.grids.length} grids, a GLB of \${scene.glb().length} bytes\`);
 `);
 process.stdout.write(run(process.execPath, 'use.mjs', file));
-// Bundled for browsers, where there is nothing of Node.js, with the modules beside what is made.
+// Bundles for browsers, without Node.js, with the modules next to the bundle.
 writeFileSync(join(folder, 'page.mjs'), `
 import { load } from 'quoin';
 export const lengthOfGlb = async (bytes) => (await load(bytes)).glb().length;

@@ -1,4 +1,4 @@
-// The page in a headless Chromium, on a server of static files, as a user handles it.
+// Tests the page in headless Chromium on a static file server.
 //   node page.mjs PAGE FILE.vox NATIVE.glb PICTURE.png CORPUS
 import { readFile, writeFile } from 'node:fs/promises';
 import { basename, join } from 'node:path';
@@ -16,7 +16,7 @@ function oneVoxel() {
                                     id('XYZI'), 8, 0, 1, 1 << 24).buffer);
 }
 
-/** A volume: a ball, or nothing but `value`. */
+/** Returns a volume: a ball, or a constant `value`. */
 function ball(value) {
   const n = 16;
   const samples = Buffer.from(Uint8Array.from({ length: n ** 3 }, (_, i) =>
@@ -40,7 +40,7 @@ try {
   const shown = (name) => tab.waitForFunction(
     (text) => document.querySelector('#status').textContent.startsWith(`${text}: `), name, { timeout: 60_000 });
 
-  // Drops them, as a hand does.
+  // Drops files on the page.
   const drop = async (...files) => {
     const contents = files.map(({ name, bytes }) => ({ name, text: bytes.toString('base64') }));
     const dropped = await tab.evaluateHandle((given) => {
@@ -75,7 +75,7 @@ try {
   check(first.counted > 100, `the picture has ${first.counted} colours`);
   if (picture) await writeFile(picture, first.shot);
 
-  // Pixels unlike all their neighbours: what is behind shows there between faces of several sizes.
+  // Counts pixels that differ from all neighbours: the background shows through gaps between faces of different sizes.
   const lonely = (shot) => tab.evaluate(async (bytes) => {
     const bitmap = await createImageBitmap(new Blob([new Uint8Array(bytes)]));
     const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
@@ -170,7 +170,7 @@ try {
     delete document.querySelector('#other').files;
   });
   check(/large.vox: a file of 5.0 GB/.test(await status()), `a file without end: ${await status()}`);
-  // A picture is asked how it has heights.
+  // The page asks for the height encoding of an image.
   const picture8 = await readFile(join(corpus, 'heights/grey_8_bits.png'));
   await drop({ name: 'hill.png', bytes: picture8 });
   await tab.waitForSelector('#heights[open]');

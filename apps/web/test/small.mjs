@@ -1,4 +1,4 @@
-// The small module: what it writes is what the whole one does, and what it lacks it says.
+// The small module writes the same as the whole one, and reports missing functions.
 //   node small.mjs PACKAGE FOLDER...
 import { readdirSync, readFileSync, statSync } from 'node:fs';
 import { join } from 'node:path';
@@ -28,7 +28,7 @@ async function tried(bytes, options) {
   }
 }
 
-/** Whether a scene is the small module's, and has no rays. */
+/** Returns true if a scene is from the small module and has no rays. */
 function isSmall(scene) {
   try {
     scene.rays([], []);

@@ -1,4 +1,4 @@
-// How long reading and meshing takes: the module, the native tool on one thread, three.js' VOXLoader. By turns.
+// Times reading and meshing: the module, the native tool on one thread, and three.js' VOXLoader, alternating.
 //   node speed.mjs PACKAGE TOOL THREE FILE.vox [TURNS]
 import { execFileSync } from 'node:child_process';
 import { readFileSync, rmSync } from 'node:fs';

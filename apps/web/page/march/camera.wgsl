@@ -1,5 +1,5 @@
-// Numbers as sums of two, some 48 bits in all, three at a time: src/render_vk/shaders/pairs.glsl. A compiler that takes
-// sums apart leaves the first ones, which are as exact as numbers are otherwise.
+// Numbers as sums of two floats, about 48 bits in total, three at a time: src/render_vk/shaders/pairs.glsl. If a
+// compiler reorders the sums, the first parts remain, with the precision of single floats.
 //
 // Source: T. J. Dekker, "A floating-point technique for extending the available precision" (1971).
 
@@ -8,7 +8,7 @@ struct Pair {
   low: vec3f,
 }
 
-// Of a sum whose first part is the larger.
+// For a sum whose first part is the larger.
 fn renewed(high: vec3f, low: vec3f) -> Pair {
   let sum = high + low;
   return Pair(sum, low - (sum - high));
@@ -42,7 +42,7 @@ fn quotient_of(a: Pair, b: Pair) -> Pair {
   let left = sum_of(a, Pair(-back.high, -back.low));
   return renewed(first, left.high / b.high);
 }
-// One component, in all three.
+// Copies one component to all three.
 fn component(a: Pair, axis: i32) -> Pair {
   return Pair(vec3f(a.high[axis]), vec3f(a.low[axis]));
 }
@@ -55,7 +55,7 @@ fn negated(a: Pair) -> Pair {
 fn unit_of(a: Pair) -> Pair {
   let squares = product_of(a, a);
   let length_squared = sum_of(sum_of(component(squares, 0), component(squares, 1)), component(squares, 2));
-  // One step of Newton's towards the inverse root.
+  // One Newton step towards the inverse root.
   let rough = 1.0 / sqrt(length_squared.high);
   let root = whole(rough);
   let off = product_of(length_squared, product_of(root, root));
@@ -63,11 +63,11 @@ fn unit_of(a: Pair) -> Pair {
   return product_of(a, renewed(rough, error));
 }
 
-// The camera's rays, one an invocation; in view, and in the grids of instances: src/render_vk/shaders/camera.glsl.
+// The camera's rays, one per invocation, in view space and in instances' grids: src/render_vk/shaders/camera.glsl.
 
-var<private> pixel: vec2i;  // of the invocation, in the picture
+var<private> pixel: vec2i;  // of the invocation, in the image
 
-// Where the invocation's ray crosses the picture, in pixels.
+// The point where the invocation's ray crosses the image, in pixels.
 fn picture_point() -> vec2f {
   return vec2f(pixel) + push.point;
 }
@@ -75,7 +75,7 @@ fn picture_direction() -> vec3f {
   let point = picture_point();
   return frame.corner.xyz + frame.right.xyz * point.x + frame.down.xyz * point.y + frame.forward.xyz;
 }
-// It starts where view space has its origin, at frame.view_depth times length_a_depth.
+// The ray starts at the origin of view space, at frame.view_depth times length_a_depth.
 fn camera_ray() -> ViewRay {
   let point = picture_point();
   let start = frame.start.xyz + frame.start_x.xyz * point.x + frame.start_y.xyz * point.y;
@@ -87,7 +87,7 @@ fn length_a_depth() -> f32 {
   return length(picture_direction());
 }
 
-// How far behind where view space has its origin the point lies on its ray; what shows nothing lies nowhere.
+// The distance of the point on its ray from the origin of view space; without a hit, infinitely far.
 fn t_of(point: Point) -> f32 {
   if (point.voxel.w < 0) {
     return kInfinity;
@@ -96,23 +96,23 @@ fn t_of(point: Point) -> f32 {
   return ahead * length_a_depth() + bitcast<f32>(point.what.w);
 }
 
-// A coordinate of the picture, in all three.
+// Copies an image coordinate to all three components.
 fn pixel_pair(axis: i32) -> Pair {
   let sum = exact_sum(vec3f(f32(pixel[axis])), vec3f(push.point[axis]));
   return renewed(sum.high, sum.low + push.point_low[axis]);
 }
-// origin + x right + y down at the invocation's point of the picture.
+// origin + x right + y down at the invocation's point of the image.
 fn across(origin: Pair, right: Pair, down: Pair) -> Pair {
   return sum_of(sum_of(origin, product_of(right, pixel_pair(0))), product_of(down, pixel_pair(1)));
 }
 
-// A camera's ray in an instance's grid, as exact as in double. It starts near the grid, so that distance costs nothing.
+// A camera ray in an instance's grid, as exact as in double. It starts near the grid, so distance costs no precision.
 struct ExactRay {
   start: Pair,  // from start_base
   direction: Pair,
 }
 
-// Of the invocation's ray, in view; a unit vector.
+// The direction of the invocation's ray in view space; a unit vector.
 fn exact_direction() -> Pair {
   let in_picture = across(Pair(frame.corner.xyz, frame.corner_low.xyz), Pair(frame.right.xyz, frame.right_low.xyz),
                           Pair(frame.down.xyz, frame.down_low.xyz));
@@ -138,12 +138,11 @@ fn is_before(t: Pair, one: i32, other: i32) -> bool {
 struct Moved {
   ray: ExactRay,
   t: f32,
-  axis: i32,  // of the plane through which it enters; -1 where it is left as it is
+  axis: i32,  // of the plane that the ray enters through; -1 if it is not moved
   is_hit: bool,
 }
 
-// Moves a ray that starts more than 64 voxels from a tree's bounds to where it enters them, as the processor does
-// before it rounds.
+// Moves a ray that starts more than 64 voxels from a tree's bounds to its entry point, as the CPU does before rounding.
 fn moved_to_bounds(tree: Tree, i: i32, ray: ExactRay) -> Moved {
   let base = placed_whole(i, kStartBase).xyz;
   let low = vec3f(tree.low.xyz - base);
@@ -177,12 +176,12 @@ fn moved_to_bounds(tree: Tree, i: i32, ray: ExactRay) -> Moved {
   start.high[moved.axis] = planes[moved.axis];
   start.low[moved.axis] = 0.0;
   moved.ray.start = start;
-  // The others are inside by now, or never will be.
+  // The other axes are inside by now, or never will be.
   moved.is_hit = all(start.high >= low - 1e-3) && all(start.high <= high + 1e-3);
   return moved;
 }
 
-// From the multiple of 64 voxels next to its start, and then rounded.
+// Relative to the multiple of 64 voxels nearest to its start, then rounded.
 fn rounded(i: i32, ray: ExactRay, t: f32) -> GridRay {
   let below = clamp(floor(ray.start.high), vec3f(-1e9), vec3f(1e9));
   let shift = vec3i(below) & vec3i(~63);
@@ -190,7 +189,7 @@ fn rounded(i: i32, ray: ExactRay, t: f32) -> GridRay {
   return GridRay(placed_whole(i, kStartBase).xyz + shift, start.high, ray.direction.high, t);
 }
 
-// How far along such a ray, from the instance's start, the plane of a voxel's face is.
+// The distance along such a ray, from the instance's start, to the plane of a voxel face.
 fn distance_to_face(ray: ExactRay, from_voxel: Pair, face: u32) -> Pair {
   let axis = axis_of(face);
   let plane = select(0.0, 1.0, (face & 1u) == 0u);
@@ -201,7 +200,7 @@ fn distance_to_face(ray: ExactRay, from_voxel: Pair, face: u32) -> Pair {
 fn start_from(ray: ExactRay, i: i32, voxel: vec3i) -> Pair {
   return sum_of(ray.start, whole(-vec3f(voxel - placed_whole(i, kStartBase).xyz)));
 }
-// Where such a ray meets the face through which it enters a voxel, from the voxel's lower corner.
+// The point where such a ray enters a voxel, relative to the voxel's lower corner.
 fn exact_place(i: i32, d: Pair, voxel: vec3i, face: u32) -> vec3f {
   let ray = exact_ray_in(i, d);
   let start = start_from(ray, i, voxel);

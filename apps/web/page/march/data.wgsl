@@ -1,9 +1,9 @@
-// What the shaders read and write: src/render_vk/shaders/data.glsl in WebGPU's language, which has no addresses of
-// memory. The scene is one array of words, the picture's own tables another; addresses are bytes in them, below 2^32,
-// and only the lower word of each is looked at. Of light there is what Quoin draws in by itself: rays, nine of
-// occlusion, lamps and surfaces of glass; march.js refuses pictures in another one.
+// The shaders' data: src/render_vk/shaders/data.glsl in WGSL, which has no memory addresses. The scene is one array of
+// words, the image's own tables another. Addresses are byte offsets below 2^32 in them, so only their lower word is
+// used. Supports only Quoin's default lighting: rays, nine occlusion rays, lamps and glass surfaces; march.js rejects
+// all else.
 
-// What the scene has; without, shaders are made without.
+// Features of the scene; shaders are compiled without missing ones.
 override kHasGlass: bool = false;
 override kHasFields: bool = false;
 override kHasFieldGlass: bool = false;
@@ -11,11 +11,11 @@ override kHasFieldGlass: bool = false;
 const kLamps = 2048u;
 const kGlassSurfaces = 4096u;
 
-// Infinities need not be there; every number compared with it is far less.
+// Replaces infinity, which WGSL need not support; all compared numbers are far smaller.
 const kInfinity = 3.0e38;
 const kNever = 1.0e37;
 
-// A sparse tree whose nodes each have 4^3 places; a node of level l spans 4^(l + 1) voxels. Level 0 is a word of
+// A sparse tree whose nodes have 4^3 slots each; a node of level l spans 4^(l + 1) voxels. Level 0 is a word of
 // voxels, level 1 a brick of 16^3, level 2 a chunk.
 struct Tree {
   root: vec4u,
@@ -23,18 +23,18 @@ struct Tree {
   high: vec4i,
 }
 
-// What a pixel shows: a voxel, or a cell of a field.
+// A pixel's hit: a voxel, or a cell of a field.
 struct Point {
   voxel: vec4i,   // w: the instance; -1: none
-  inside: vec4f,  // where in the voxel; w: t
-  what: vec4u,    // type, face (of a field its normal), kind; w: as a float, how far behind the instance's start
+  inside: vec4f,  // position in the voxel; w: t
+  what: vec4u,    // type, face (field: normal), kind; w: distance from the instance's start, as a float
 }
 
-// A run of transparent voxels, or of what is transparent of a field, of one type.
+// A run of transparent voxels, or of a transparent part of a field, of one type.
 struct Body {
   voxel: vec4i,    // w: the instance
   lengths: vec4f,  // t of enter and exit, voxels, and t of enter from the start of the instance's ray
-  what: vec4u,     // type, face or normal, how; and where it leaves: 8 times the instance, and the face
+  what: vec4u,     // type, face or normal, flags; exit: 8 times the instance, plus the face
 }
 const kStartsInside = 1u;
 const kBeginsInField = 2u;
@@ -47,7 +47,7 @@ const kUnlit = 1u;
 const kGlow = 2u;
 const kIsField = 8u;
 
-// A pixel on the way: what is still seen past the glass so far, where to go on, and the sample's colour so far.
+// A pixel in progress: the transmittance of the glass so far, where to continue, and the sample's colour so far.
 struct State {
   weight: vec4f,
   colour: vec4f,
@@ -127,20 +127,20 @@ struct Push {
   size: vec2i,    // of the tile
   point: vec2f,   // of the sample, within pixels
   point_low: vec2f,
-  turn: vec2f,     // of the sample: what turns nine fixed directions of occlusion
-  upright: vec3f,  // and where the first of these points, along u, v and the normal
+  turn: vec2f,     // of the sample: rotation of the nine fixed occlusion directions
+  upright: vec3f,  // the first of these directions, along u, v and the normal
   seed: u32,
-  first: u32,  // 1: of the pixel's samples
+  first: u32,  // 1: the pixel's first sample
   round: u32,
-  base: u32,   // of the tile's first pixel in the picture, and from one row there to the next
+  base: u32,   // index of the tile's first pixel in the image, and the row stride
   pitch: u32,
   far: vec3u,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> words: array<u32>;       // of the scene
-@group(0) @binding(2) var<storage, read> nodes: array<vec4u>;     // the same ones
-@group(0) @binding(3) var<storage, read> tables: array<vec4u>;    // of the picture
+@group(0) @binding(2) var<storage, read> nodes: array<vec4u>;     // the same data
+@group(0) @binding(3) var<storage, read> tables: array<vec4u>;    // of the image
 @group(0) @binding(4) var<storage, read_write> points: array<Point>;  // of the tile
 @group(0) @binding(5) var<storage, read_write> sums: array<vec4f>;
 @group(0) @binding(6) var<storage, read_write> colours: array<u32>;
@@ -153,24 +153,24 @@ fn vector_at(table: u32, i: u32) -> vec4f {
   return bitcast<vec4f>(tables[(table >> 4u) + i]);
 }
 
-// Fields of an instance, which are read one by one: src/render_vk/trees/shader_data.h, ShaderPlaced. View space has the
-// world's axes and units; its origin is the camera, or a point before it where everything is far.
+// Fields of an instance, read one by one: src/render_vk/trees/shader_data.h, ShaderPlaced. View space has the world's
+// axes and units; its origin is the camera, or a point in front of it if everything is far.
 const kGridAxes = 0u;     // columns: grid from view
 const kViewAxes = 3u;     // columns: view from grid
-const kRefBase = 6u;      // of the tree's coordinates; w: the grid
-const kRefInside = 7u;    // from there; w: world units a voxel
-const kRefView = 8u;      // the same point in view; w: voxels of the full grid a voxel
-const kStartBase = 9u;    // of the picture's rays, which start at start + x start_x + y start_y for pixel (x, y)
-const kStart = 10u;       // w: how far along the rays that is, in lengths of their forward component
+const kRefBase = 6u;      // in the tree's coordinates; w: the grid
+const kRefInside = 7u;    // from there; w: world units per voxel
+const kRefView = 8u;      // the same point in view space; w: voxels of the full grid per voxel
+const kStartBase = 9u;    // of the image's rays, which start at start + x start_x + y start_y for pixel (x, y)
+const kStart = 10u;       // w: its distance along the rays, in lengths of their forward component
 const kStartX = 11u;
 const kStartY = 12u;
 const kToSun = 13u;       // w: its brightness
 const kDiffuse = 14u;     // by face
-const kGridAxesLow = 17u; // what is left of numbers above when they are rounded
+const kGridAxesLow = 17u; // rounding remainders of the numbers above
 const kStartLow = 20u;
 const kStartXLow = 21u;
 const kStartYLow = 22u;
-const kOrigin = 23u;      // of the tree's coordinates, in the grid; w: how often that is halved
+const kOrigin = 23u;      // origin of the tree's coordinates in the grid; w: number of halvings
 
 fn placed_vector(i: i32, field: u32) -> vec4f {
   return vector_at(frame.placed.x, 24u * u32(i) + field);
@@ -181,24 +181,24 @@ fn placed_whole(i: i32, field: u32) -> vec4i {
 fn voxel_size(i: i32) -> f32 {
   return placed_vector(i, kRefInside).w;
 }
-// `v` in another space: `axes` is kGridAxes or kViewAxes.
+// Transforms `v` to another space: `axes` is kGridAxes or kViewAxes.
 fn turned(i: i32, axes: u32, v: vec3f) -> vec3f {
   return placed_vector(i, axes).xyz * v.x + placed_vector(i, axes + 1u).xyz * v.y +
          placed_vector(i, axes + 2u).xyz * v.z;
 }
 
-// What a grid's trees hold.
+// Contents of a grid's trees.
 const kOpaque = 0u;
 const kTransparent = 1u;
-const kField = 2u;  // the cells that touch what is opaque of it
-const kGlass = 3u;  // those that touch what is transparent of it
+const kField = 2u;  // cells that touch the opaque part of the field
+const kGlass = 3u;  // cells that touch its transparent part
 
 fn tree_of(instance: i32, content: u32) -> Tree {
   let at = (frame.grids.x >> 4u) + 12u * u32(placed_whole(instance, kRefBase).w) + 3u * content;
   return Tree(nodes[at], bitcast<vec4i>(nodes[at + 1u]), bitcast<vec4i>(nodes[at + 2u]));
 }
 
-// Faces of voxels, as core/direction.h numbers them: the axes of a face's edges.
+// Voxel faces, numbered as in core/direction.h: the axes of a face's edges.
 const kFaceU = array<i32, 6>(1, 2, 2, 0, 0, 1);
 const kFaceV = array<i32, 6>(2, 1, 0, 2, 1, 0);
 
@@ -222,7 +222,7 @@ fn is_of_field(point: Point) -> bool {
   return kHasFields && (point.what.z & kIsField) != 0u;
 }
 
-// A direction kept in a word: the octahedron's faces folded into a square.
+// A direction packed into a word: the octahedron's faces folded into a square.
 fn unit_vector(word: u32) -> vec3f {
   let e = unpack2x16snorm(word);
   var v = vec3f(e, 1.0 - abs(e.x) - abs(e.y));
@@ -231,7 +231,7 @@ fn unit_vector(word: u32) -> vec3f {
   }
   return normalize(v);
 }
-const kNoNormal = 0x80008000u;  // no unit vector's word
+const kNoNormal = 0x80008000u;  // not the word of any unit vector
 
 fn packed_normal(n: vec3f) -> u32 {
   let size = abs(n.x) + abs(n.y) + abs(n.z);
@@ -251,7 +251,7 @@ fn normal_of(word: u32) -> vec3f {
   return unit_vector(word);
 }
 
-// The picture's pixel of an invocation, and its place among the tile's.
+// The image pixel of an invocation, and its index in the tile.
 fn is_in_tile(id: vec3u) -> bool {
   return all(vec2i(id.xy) < push.size);
 }

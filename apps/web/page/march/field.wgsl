@@ -1,16 +1,16 @@
-// Fields of densities: src/render_vk/shaders/walk.glsl. Their trees hold the cells that touch the solid; in a cell the
-// field along a ray is a cubic, whose first root is found.
+// Density fields: src/render_vk/shaders/walk.glsl. Their trees contain the cells that touch the solid. In a cell, the
+// field along a ray is a cubic; the hit is its first root.
 
 const kBlockEdge = 7;
 
-// The samples around the cells of a word, from the one before its first corner on. `block`: where they lie, in words.
+// The samples around the cells of a word, starting one before its first corner. `block`: their address in words.
 fn sample_of(block: u32, at: vec3i) -> f32 {
   let i = u32((at.z * kBlockEdge + at.y) * kBlockEdge + at.x);
   let two = unpack2x16float(words[block + (i >> 1u)]);
   return select(two.y, two.x, (i & 1u) == 0u);
 }
 
-// What a brick has for the word of cells that was found: a number.
+// The brick's number for the found word of cells.
 fn number_found() -> u32 {
   let brick = walk_stack[1];
   let child = child_of(brick, index_in(walk_voxel, 1));
@@ -19,7 +19,7 @@ fn number_found() -> u32 {
 }
 
 const kNoBlock = 0u;
-// The samples of the cell that was found; kNoBlock where all of them are solid, as those around it are.
+// The samples of the found cell; kNoBlock if they and their neighbours are all solid.
 fn block_found() -> u32 {
   if (walk_level > 0) {
     return kNoBlock;
@@ -33,7 +33,7 @@ fn value_at(f: vec4f, s: f32) -> f32 {
   return ((f.w * s + f.z) * s + f.y) * s + f.x;
 }
 
-// The root between `from_s`, where it is not negative, and `to_s`, where it is.
+// The root between `from_s`, with a non-negative value, and `to_s`, with a negative one.
 fn root_between(f: vec4f, from_s: f32, to_s: f32) -> f32 {
   var low = from_s;
   var high = to_s;
@@ -62,7 +62,7 @@ fn root_between(f: vec4f, from_s: f32, to_s: f32) -> f32 {
   return s;
 }
 
-// Where a cubic has its extremes, in order; -1 where it has none.
+// The positions of a cubic's extremes, in order; -1: none.
 fn extremes_of(f: vec4f) -> vec2f {
   let a = 3.0 * f.w;
   let b = 2.0 * f.z;
@@ -82,7 +82,7 @@ fn extremes_of(f: vec4f) -> vec2f {
   return vec2f(min(one, other), max(one, other));
 }
 
-// Where it first becomes negative for 0 <= s <= 1; a negative number where it never does.
+// The first s in [0, 1] where the cubic becomes negative; a negative number if it never does.
 fn first_negative(f: vec4f) -> f32 {
   if (f.x < 0.0) {
     return 0.0;
@@ -97,7 +97,7 @@ fn first_negative(f: vec4f) -> f32 {
   var high = 1.0;
   var is_found = b3 < 0.0;
   if (!(b3 < 0.0 && !(b1 < 0.0 && b2 >= 0.0))) {
-    // Between its extremes the curve only falls or only rises.
+    // The curve is monotonic between its extremes.
     let extremes = extremes_of(f);
     for (var i = 0; i < 2; i++) {
       let extreme = extremes[i];
@@ -135,8 +135,8 @@ fn mixed_corners(corners: Corners, at: vec3f) -> f32 {
   return y.x + (y.y - y.x) * at.x;
 }
 
-// The field of a cell along a ray, in powers of s. `entry` is a point in the cell, 0 to 1 on each axis, and `way` leads
-// from it to where s is 1.
+// The field of a cell along a ray, in powers of s. `entry` is a point in the cell, 0 to 1 on each axis; `way` is the
+// vector from it to the point with s = 1.
 fn cubic_of(corners: Corners, entry: vec3f, way: vec3f) -> vec4f {
   let rise = corners.high - corners.low;
   let z0 = corners.low + rise * entry.z;
@@ -152,14 +152,14 @@ fn cubic_of(corners: Corners, entry: vec3f, way: vec3f) -> vec4f {
   return vec4f(y0.x + x0 * entry.x, y1.x + x1 * entry.x + x0 * way.x, y2.x + x2 * entry.x + x1 * way.x, x2 * way.x);
 }
 
-// What was found of a field.
+// A hit of a field.
 struct FieldHit {
   t: f32,
-  inside: vec3f,  // where in the cell
+  inside: vec3f,  // position in the cell
   starts_inside: bool,
 }
 
-// The ray in the cell that was found, up to `max_t`.
+// Intersects the ray with the field in the found cell, up to `max_t`.
 fn meet_cell(max_t: f32, hit: ptr<function, FieldHit>) -> bool {
   (*hit).t = walk_t;
   (*hit).starts_inside = walk_axis < 0;
@@ -189,7 +189,7 @@ fn meet_cell(max_t: f32, hit: ptr<function, FieldHit>) -> bool {
   return true;
 }
 
-// As find_voxel; in the tree of a field to the first point at which it is negative.
+// Same as find_voxel, but in a field's tree to the first point where the field is negative.
 fn find_content(is_field: bool, max_t: f32, hit: ptr<function, FieldHit>) -> bool {
   while (find_voxel(max_t)) {
     (*hit).t = walk_t;
@@ -221,10 +221,10 @@ fn gradient_of(corners: Corners, inside: vec3f) -> vec3f {
   return vec3f(y.y - y.x, mix(along_y.x, along_y.y, inside.x), mix(z_y.x, z_y.y, inside.x));
 }
 
-// The normal with which a field is lit in a cell, whose least corner is `first` of a block. Unit, or 0.
+// The shading normal of a field in a cell with minimum corner `first` of a block. Unit, or 0.
 fn normal_in(block: u32, first: vec3i, inside: vec3f) -> vec3f {
   let at = vec3f(first) + inside;
-  // Of the cell itself.
+  // From the cell itself.
   var own = gradient_of(corners_of(block, first), inside);
   let own_size = length(own);
   if (own_size > 0.0) {
@@ -253,7 +253,7 @@ fn normal_found(inside: vec3f) -> vec3f {
   return normal_in(block, (walk_voxel & vec3i(3)) + 1, inside);
 }
 
-// The material of the solid sample that is nearest to the hit.
+// The material of the solid sample nearest to the hit.
 fn material_found(field: Tree, inside: vec3f) -> u32 {
   var nearest = vec3i(inside > vec3f(0.5));
   let block = block_found();
@@ -274,7 +274,7 @@ fn material_found(field: Tree, inside: vec3f) -> u32 {
   if (all(((at ^ walk_voxel) & vec3i(~63)) == vec3i())) {
     return type_in(record_found(), at & vec3i(63));
   }
-  // Of the next chunk, whose own cell there touches the sample.
+  // From the next chunk, whose own cell there touches the sample.
   if (any(at >= field.high.xyz)) {
     return 0u;
   }

@@ -1,27 +1,27 @@
-// Bodies of glass along a ray: src/render_vk/shaders/glass.glsl and see_through.glsl. An invocation has two lists,
-// nearest first: of what it sees, and of what a ray of light passes.
+// Glass bodies along a ray: src/render_vk/shaders/glass.glsl and see_through.glsl. An invocation has two lists, nearest
+// first: the visible bodies, and the bodies on a light ray.
 
-// ln of the share of light below which a body counts as closed.
+// ln of the transmittance below which a body counts as opaque.
 const kClosed = -11.0;
 const kDiagonal = 1.7320508;  // of a cube of 1
-// Lengths of t within which two bodies touch: the rounding of single precision.
+// Two bodies within this distance of t touch: the rounding of single precision.
 const kTouching = 4e-6;
 
 const kHeldBodies = 8u;
-const kSeen = 0u;         // where a list begins
+const kSeen = 0u;         // the start of a list
 const kOnWay = 8u;
 var<private> held_bodies: array<Body, 16>;
 
 struct BodyList {
   first: u32,
   count: u32,
-  dropped_t: f32,  // where the first begins for which there was no room
+  dropped_t: f32,  // start of the first body that did not fit
 }
 
 fn reaches(body: Body, t: f32) -> bool {
   return t <= body.lengths.y + kTouching * max(1.0, body.lengths.y);
 }
-// No body of a field counts as longer than it is, nor one from within.
+// Bodies of fields, and bodies that contain the ray's start, count only with their actual length.
 fn has_own_length(body: Body) -> bool {
   return (body.what.z & kHowItBegins) != 0u;
 }
@@ -29,7 +29,7 @@ fn continues(body: Body, next: Body) -> bool {
   return next.what.x == body.what.x && reaches(body, next.lengths.x);
 }
 
-// Puts a body in its place; when the list is full the furthest gives way, and what passes it is in `passed`.
+// Inserts a body in order. If the list is full, drops the furthest and records its transmittance in `passed`.
 fn keep_body(list: ptr<function, BodyList>, body: Body, from_t: f32, passed: ptr<function, vec3f>) {
   if (body.lengths.x < from_t) {
     return;
@@ -65,7 +65,7 @@ fn keep_body(list: ptr<function, BodyList>, body: Body, from_t: f32, passed: ptr
   }
 }
 
-// The bodies of one instance that are found along a ray, in its order.
+// The bodies of one instance found along a ray, in order.
 struct BodyRun {
   body: Body,  // the last one
   has_body: bool,
@@ -100,8 +100,8 @@ fn add_to_run(run: ptr<function, BodyRun>, next: Body, from_t: f32, list: ptr<fu
   (*run).has_body = true;
 }
 
-// The bodies of an instance's voxels, or of its field, along a ray whose walk has been started. `voxels_a_t`: of the
-// full grid.
+// The bodies of an instance's voxels or field along a ray whose walk has started. `voxels_a_t`: voxels of the full grid
+// per t.
 fn find_bodies_in(i: i32, is_of_field: bool, ray: GridRay, voxels_a_t: f32, max_t: f32, from_t: f32,
                   list: ptr<function, BodyList>, passed: ptr<function, vec3f>) {
   let room = max_t - ray.t;
@@ -122,7 +122,7 @@ fn find_bodies_in(i: i32, is_of_field: bool, ray: GridRay, voxels_a_t: f32, max_
       is_mixed = (number & kIsUniform) == 0u;
       let kind = number & 0xFFFFu;
       next.what = vec4u(kind, kNoNormal, inside | kBeginsInField | kEndsInField, 8u * u32(i));
-      // A whole word, along whose diagonal it does not close: it closes at the same cell as by single ones.
+      // A whole word whose diagonal does not make the body opaque: single cells would make it opaque at the same cell.
       let closing = -surface_of(kind).log_clarity * voxels_a_t / length(ray_direction) * kDiagonal;
       if (is_mixed) {
         cell = glass_cell((record_found() >> 2u) + number, walk_voxel);
@@ -149,7 +149,7 @@ fn find_bodies_in(i: i32, is_of_field: bool, ray: GridRay, voxels_a_t: f32, max_
   }
 }
 
-// All bodies of one instance along a ray.
+// Finds all bodies of one instance along a ray.
 fn find_bodies(i: i32, ray: GridRay, voxels_a_t: f32, max_t: f32, from_t: f32, list: ptr<function, BodyList>,
                passed: ptr<function, vec3f>) {
   for (var content = 0; content < select(1, 2, kHasFieldGlass); content++) {
@@ -161,7 +161,7 @@ fn find_bodies(i: i32, ray: GridRay, voxels_a_t: f32, max_t: f32, from_t: f32, l
   }
 }
 
-// The next body of a list, as one with those that it touches; false at the list's end.
+// Takes the next body of a list, merged with those it touches; false at the list's end.
 fn next_body(list: BodyList, i: ptr<function, u32>, out: ptr<function, Body>) -> bool {
   if (*i >= list.count) {
     return false;
@@ -184,7 +184,7 @@ fn next_body(list: BodyList, i: ptr<function, u32>, out: ptr<function, Body>) ->
   return true;
 }
 
-// What a surface between media of two indices of refraction mirrors of a ray, and the y of the mirrored direction.
+// The reflectance of a surface between media with two indices of refraction, and the y of the mirrored direction.
 fn mirror_at(direction: vec3f, normal: vec3f, ior: f32, other_ior: f32) -> vec2f {
   let along = dot(direction, normal);
   let cosine = min(abs(along), 1.0);
@@ -199,7 +199,7 @@ fn mirror_at(direction: vec3f, normal: vec3f, ior: f32, other_ior: f32) -> vec2f
   return vec2f(0.5 * (s * s + p * p), up);
 }
 
-// The upright of the surface through which a ray enters a body, or leaves it; unit, in the world.
+// The normal of the surface where a ray enters or leaves a body; unit, in world space.
 fn normal_of_side(body: Body, is_entered: bool) -> vec3f {
   let instance = select(i32(body.what.w >> 3u), body.voxel.w, is_entered);
   let size = voxel_size(instance);
@@ -214,8 +214,8 @@ fn normal_of_side(body: Body, is_entered: bool) -> vec3f {
   return sign_of(face) * placed_vector(instance, kViewAxes + (face >> 1u)).xyz / size;
 }
 
-// Where a ray leaves one body for the next, or for air, and where it enters that: the sky is mirrored there. What is
-// mirrored in a body's end passes it once more.
+// The sky's reflection where a ray leaves a body and enters the next or air. Light mirrored at a body's end passes
+// through the body again.
 fn meet_surfaces(one: Body, has_one: bool, other: Body, has_other: bool, state: ptr<function, State>) {
   let direction = camera_ray().direction;
   let touches = has_one && has_other && reaches(one, other.lengths.x);
@@ -245,24 +245,24 @@ fn meet_surfaces(one: Body, has_one: bool, other: Body, has_other: bool, state: 
   }
 }
 
-// Whether something opaque leaves no air behind a body.
+// Returns true if an opaque surface follows a body without air between.
 fn lies_on_opaque(body: Body, opaque_t: f32) -> bool {
   return opaque_t <= body.lengths.y + frame.lift * voxel_size(i32(body.what.w >> 3u));
 }
 
-// A ray's way through the bodies of a list, nearest first.
+// A ray's progress through the bodies of a list, nearest first.
 struct Passage {
   list: BodyList,
   next: u32,
-  body: Body,  // the last one that it came to
+  body: Body,  // the last one reached
   has_body: bool,
   is_entered: bool,  // the first was entered before
-  is_last: bool,     // there was room for all; else it stops before the last one, which may go on among the others
+  is_last: bool,     // all bodies fitted; else it stops before the last one, which may continue between others
 }
 
-// Goes on into the next body, with what its surfaces show; false when there is none left. Then the ray has come out,
-// unless what is opaque, `opaque_t` away, follows at once; or where not all had room, state.weight.w says from where to
-// go on.
+// Continues into the next body and adds its surfaces' reflections; false if there is none left. The ray has then left
+// the glass, unless an opaque surface at `opaque_t` follows at once. If not all bodies fitted, state.weight.w is the
+// position to continue from.
 fn enter_next(way: ptr<function, Passage>, opaque_t: f32, state: ptr<function, State>) -> bool {
   var body: Body;
   var next = (*way).next;
@@ -285,7 +285,7 @@ fn enter_next(way: ptr<function, Passage>, opaque_t: f32, state: ptr<function, S
   return true;
 }
 
-// Goes through the body, and returns with what weight its own light is seen.
+// Passes through the body and returns the weight of its own light.
 fn pass_body(body: Body, state: ptr<function, State>) -> vec3f {
   let surface = surface_of(body.what.x);
   let weight = (*state).weight;

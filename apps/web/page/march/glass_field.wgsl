@@ -1,8 +1,7 @@
-// What is transparent of a field: src/render_vk/shaders/glass.glsl. Its tree holds the cells with a transparent corner;
-// a word of 4^3 cells is of one material throughout, or has the samples around it and what bodies these of its corners
-// belong to.
+// Transparent parts of fields: src/render_vk/shaders/glass.glsl. The tree contains the cells with a transparent corner.
+// A word of 4^3 cells either has one material throughout, or has the samples around it and the bodies of its corners.
 
-const kOpaqueBody = 0xFFFFu;  // no type's number
+const kOpaqueBody = 0xFFFFu;  // not the number of any type
 const kBodiesEdge = 5;
 const kBodiesBegin = 172u;  // in a block, after its densities
 const kIsUniform = 0x80000000u;
@@ -10,7 +9,7 @@ const kIsUniform = 0x80000000u;
 // A cell and its corners, by x + 2 y, of z and z + 1: densities, and 0 for air, kOpaqueBody, or a transparent type.
 struct GlassCell {
   block: u32,
-  first: vec3i,  // its least corner in the block
+  first: vec3i,  // its minimum corner in the block
   corners: Corners,
   bodies: array<u32, 8>,
 }
@@ -32,7 +31,7 @@ fn is_transparent(body: u32) -> bool {
   return body != 0u && body != kOpaqueBody;
 }
 
-// The field of one body: what is solid of others is as far out as it is in.
+// The field of one body: densities of other solid bodies are negated, so that they are outside.
 fn corners_of_body(cell: GlassCell, body: u32) -> Corners {
   let b = cell.bodies;
   let own_low = vec4u(b[0], b[1], b[2], b[3]) == vec4u(body);
@@ -41,7 +40,7 @@ fn corners_of_body(cell: GlassCell, body: u32) -> Corners {
                  select(abs(cell.corners.high), cell.corners.high, own_high));
 }
 
-// A ray in a cell, and the cubics that say what it comes to.
+// A ray in a cell, and the cubics that determine its next body.
 struct RayInGlass {
   entry: vec3f,
   way: vec3f,
@@ -73,7 +72,7 @@ fn ray_in_glass(cell: GlassCell, entry: vec3f, way: vec3f) -> RayInGlass {
   return ray;
 }
 
-// The first place beyond `after` at which a cubic changes its sign; 1 where there is none before.
+// The first position after `after` where a cubic changes its sign; 1 if there is none before.
 fn change_after(f: vec4f, after: f32) -> f32 {
   let extremes = extremes_of(f);
   var low = 0.0;
@@ -97,8 +96,8 @@ fn change_after(f: vec4f, after: f32) -> f32 {
   return 1.0;
 }
 
-// Where a ray next comes from one body, or air, into another. One loop over the cubics that say so: what is solid, what
-// is opaque, and which of two transparent types is nearer.
+// The next position where a ray passes from one body, or air, into another. One loop over the cubics: solid, opaque,
+// and the nearer of two transparent types.
 fn next_change(cell: GlassCell, ray: RayInGlass, after: f32) -> f32 {
   var bodies = cell.bodies;
   var next = 1.0;
@@ -130,7 +129,7 @@ fn next_change(cell: GlassCell, ray: RayInGlass, after: f32) -> f32 {
   return next;
 }
 
-// The transparent type there; 0 where there is none.
+// The transparent type at a position; 0: none.
 fn glass_at(cell: GlassCell, ray: RayInGlass, s: f32) -> u32 {
   if (!(value_at(ray.solid, s) < 0.0) || value_at(ray.opaque, s) < 0.0) {
     return 0u;
@@ -171,7 +170,7 @@ fn glass_normal(cell: GlassCell, inside: vec3f, kind: u32, other: u32) -> vec3f 
   return vec3f();
 }
 
-// A unit vector, or 0, in 28 bits: as unit_vector's word, but rougher.
+// A unit vector, or 0, in 28 bits: like unit_vector's word, but less precise.
 const kNormalSteps = 8191.0;
 fn packed_in_28(n: vec3f) -> u32 {
   let word = packed_normal(n);
@@ -189,7 +188,7 @@ fn normal_from_28(word: u32) -> vec3f {
   return unit_vector(pack2x16snorm(at));
 }
 
-// The normals with which a body of a cell begins and ends, from `begin` to `end` of a ray's way in it.
+// The normals at the start and end of a body in a cell, at `begin` and `end` of the ray's path in it.
 fn put_normals(cell: GlassCell, ray: RayInGlass, begin: f32, end: f32, run: BodyRun, body: ptr<function, Body>) {
   let touches = run.has_body && reaches(run.body, (*body).lengths.x);
   let is_entered = !touches || run.body.what.x != (*body).what.x;
@@ -208,8 +207,7 @@ fn put_normals(cell: GlassCell, ray: RayInGlass, begin: f32, end: f32, run: Body
   }
 }
 
-// The bodies of a cell that is not all of one type, from `enter_t` to `exit_t`. `whole_body`: with what is the same for
-// all of it.
+// The bodies of a cell with several types, from `enter_t` to `exit_t`. `whole_body`: the values shared by all of them.
 fn add_bodies_of_cell(cell: GlassCell, whole_body: Body, enter_t: f32, exit_t: f32, ray_t: f32, voxels_a_t: f32,
                       from_t: f32, run: ptr<function, BodyRun>, list: ptr<function, BodyList>,
                       passed: ptr<function, vec3f>) {

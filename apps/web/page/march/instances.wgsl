@@ -22,7 +22,7 @@ var<private> visit_direction: vec3f;
 var<private> visit_inverse: vec3f;
 var<private> visit_still: vec3<bool>;
 
-// Begins to list the instances whose boxes a ray in view may meet.
+// Begins to list the instances whose boxes a ray in view space may hit.
 fn start_visit(ray: ViewRay) {
   visit_stack[0] = 0u;
   visit_height = select(0, 1, frame.placed_count > 0u);
@@ -44,11 +44,11 @@ fn may_meet(low: vec3f, high: vec3f, max_t: f32) -> bool {
   let end = select(max(a, b), vec3f(kNever), visit_still);
   let enter_t = max(max(begin.x, begin.y), max(begin.z, 0.0));
   let exit_t = min(min(end.x, end.y), min(end.z, max_t));
-  // The boxes have room for rounding; their distances need it too.
+  // The boxes include a margin for rounding; their distances need one too.
   return enter_t <= min(exit_t, kNever) * 1.00001 + 1e-5;
 }
 
-// The next of them up to max_t, nearer ones mostly first; -1 when there is none left.
+// Returns the next instance up to max_t, mostly nearest first; -1: none left.
 fn next_instance(max_t: f32) -> i32 {
   loop {
     while (visit_next < visit_end) {
@@ -95,7 +95,7 @@ fn view_from_grid(i: i32, ray: GridRay) -> ViewRay {
                  turned(i, kViewAxes, ray.direction));
 }
 
-// What an instance's grid holds goes by number: its voxels, then its field.
+// Numbers the contents of an instance's grid: its voxels, then its field.
 fn content_count() -> i32 {
   return select(1, 2, kHasFields);
 }

@@ -1,7 +1,7 @@
-// The light of what each pixel of a tile shows: src/render_vk/shaders/light.comp and rays.glsl. Compilers copy a
-// function to each place that calls it, and a walk is long: rays are traced in one loop over all that needs them.
+// Lights each pixel of a tile: src/render_vk/shaders/light.comp and rays.glsl. Compilers inline a function at each
+// call, and a walk is long: one loop therefore traces all rays.
 
-// Whether a ray in the space of instance `home`, which is asked first, meets what is opaque of any instance.
+// Returns true if a ray in the space of instance `home`, which is tested first, hits an opaque part of any instance.
 fn is_blocked(home: i32, home_ray: GridRay, max_t: f32) -> bool {
   let in_view = view_from_grid(home, home_ray);
   start_visit(in_view);
@@ -30,7 +30,7 @@ fn is_blocked(home: i32, home_ray: GridRay, max_t: f32) -> bool {
   return false;
 }
 
-// What of each channel of light passes what is transparent on the way.
+// The transmittance, per channel, of the transparent bodies along a ray.
 fn light_passed(home: i32, home_ray: GridRay, max_t: f32) -> vec3f {
   var list = BodyList(kOnWay, 0u, kInfinity);
   var passed = vec3f(1.0);
@@ -56,7 +56,7 @@ fn light_passed(home: i32, home_ray: GridRay, max_t: f32) -> vec3f {
   return passed;
 }
 
-// The bodies before what the pixel shows, from `from_t` on.
+// Lists the bodies in front of the pixel's hit, from `from_t` on.
 fn find_seen_bodies(list: ptr<function, BodyList>, max_t: f32, from_t: f32) {
   let direction = exact_direction();
   let scale = length_a_depth();
@@ -89,7 +89,7 @@ fn occlusion_direction(face: u32, ray: i32) -> vec3f {
   return direction;
 }
 
-// A direction that stands to (0, 1, 0) as the result stands to a unit `normal`.
+// Rotates a direction relative to (0, 1, 0) so that it is relative to a unit `normal`.
 fn turned_from_up(direction: vec3f, normal: vec3f) -> vec3f {
   if (normal.y < -1.0 + 1e-6) {
     return vec3f(-direction.xy, direction.z);
@@ -99,7 +99,7 @@ fn turned_from_up(direction: vec3f, normal: vec3f) -> vec3f {
   return direction + once + cross(axis, once) / (1.0 + normal.y);
 }
 
-// The upright of a surface point, in its grid.
+// The normal of a surface point, in its grid.
 fn grid_normal(point: Point) -> vec3f {
   if (is_of_field(point)) {
     return normal_of(point.what.y);
@@ -112,8 +112,8 @@ struct Lit {
   openness: f32,
 }
 
-// What reaches a surface point. Rays have numbers: -1 is that to the sun, then come those of occlusion, then those to
-// lamps.
+// The light that reaches a surface point. Ray numbers: -1 is the ray to the sun, followed by the occlusion rays and the
+// rays to lamps.
 fn trace_light(point: Point) -> Lit {
   const kUp = 2u;
   let i = point.voxel.w;
@@ -196,7 +196,7 @@ fn light_of(point: Point) -> vec3f {
   return colour_in_light(surface, lit.light, lit.openness);
 }
 
-// What a body shows where it begins.
+// The light of a body at its start.
 fn point_of(body: Body) -> Point {
   let i = body.voxel.w;
   let begins_in_field = kHasFieldGlass && (body.what.z & kBeginsInField) != 0u;
@@ -211,14 +211,14 @@ fn point_of(body: Body) -> Point {
                vec4u(body.what.xy, kind | select(0u, kIsField, begins_in_field), 0u));
 }
 
-// Where a ray meets a face: put onto it, and a little inside its edges.
+// The point where a ray hits a face: moved onto it, and slightly inside its edges.
 fn on_face(inside: vec3f, face: u32) -> vec3f {
   var at = clamp(inside, vec3f(1e-6), vec3f(1.0 - 1e-6));
   at[axis_of(face)] = select(0.0, 1.0, (face & 1u) == 0u);
   return at;
 }
 
-// The light of a sample. One loop over all that shows there: bodies, a list at a time, and what is opaque.
+// The light of a sample. One loop over all visible surfaces: bodies, a list at a time, and the opaque hit.
 fn colour_of_pixel(opaque_point: Point) -> vec3f {
   let opaque_t = t_of(opaque_point);
   var state = State(vec4f(1.0, 1.0, 1.0, -kNever), vec4f());
@@ -229,7 +229,7 @@ fn colour_of_pixel(opaque_point: Point) -> vec3f {
     if (begins_list) {
       var list = BodyList(kSeen, 0u, kInfinity);
       find_seen_bodies(&list, opaque_t, state.weight.w);
-      // The first of a later list was entered in the one before.
+      // The first body of a later list was entered in the previous list.
       way.is_entered = state.weight.w > -kNever;
       way.list = list;
       way.next = 0u;

@@ -1,5 +1,4 @@
-// What types look like, the sky, and the light of lamps: src/render_vk/shaders/lit.glsl, sky.glsl, hash.glsl and
-// lamps.glsl.
+// Materials, the sky, and lamps: src/render_vk/shaders/lit.glsl, sky.glsl, hash.glsl and lamps.glsl.
 
 struct Surface {
   colour: vec3f,
@@ -16,7 +15,7 @@ fn surface_of(kind: u32) -> Surface {
   return Surface(colour.xyz, colour.w, emitted.xyz, emitted.w, bitcast<vec4f>(nodes[at + 2u]).xyz);
 }
 
-// `has_own_length`: else it counts as one voxel long at least.
+// `has_own_length`: if false, it counts as at least one voxel long.
 fn counted_length(voxels: f32, has_own_length: bool) -> f32 {
   return max(voxels, select(1.0, 0.0, has_own_length));
 }
@@ -47,7 +46,7 @@ fn sky_colour(up: f32) -> vec3f {
   return horizon + (frame.sky_ground.xyz - horizon) * (s * s * (3.0 - 2.0 * s));
 }
 
-// A well-mixed number of one, and of two.
+// Hashes of one and of two numbers.
 fn mixed(number: u32) -> u32 {
   var x = (number ^ (number >> 16u)) * 0x7FEB352Du;
   x = (x ^ (x >> 15u)) * 0x846CA68Bu;
@@ -57,7 +56,7 @@ fn hash_of(a: u32, b: u32) -> u32 {
   return mixed(a * 0x9E3779B9u + b * 0x85EBCA6Bu + 0x27D4EB2Fu);
 }
 
-// The lamps that may reach a voxel of an instance's tree: the first in the lists, and how many.
+// The lamps that may reach a voxel of an instance's tree: the index of the first in the lists, and their number.
 fn lamps_around(voxel: vec4i) -> vec2u {
   let origin = placed_whole(voxel.w, kOrigin);
   let brick = ((voxel.xyz + origin.xyz) << vec3u(u32(origin.w))) >> vec3u(4u);
@@ -76,17 +75,16 @@ fn lamps_around(voxel: vec4i) -> vec2u {
   }
 }
 
-// Of a lamp, which has thirteen vectors: position (w: its reach), three axes (w: what is added to the distance's
-// square, cosines of a spot's angles), six powers, low (w: 1 where it is a point, 2 where it is a spot), high and
-// direction.
+// Evaluates a lamp, which has thirteen vectors: position (w: its reach), three axes (w: the addend to the squared
+// distance, cosines of a spot's angles), six powers, low (w: 1 for a point, 2 for a spot), high and direction.
 fn lamp_vector(lamp: u32, field: u32) -> vec4f {
   return vector_at(frame.lamps.x, 13u * lamp + field);
 }
 
 struct LampRay {
-  light: vec3f,  // of a white surface, if nothing is in between
+  light: vec3f,  // on a white surface, if unoccluded
   direction: vec3f,
-  reach: f32,    // how far away the lamp begins
+  reach: f32,    // distance to the lamp's surface
 }
 
 fn lamp_ray(lamp: u32, in_view: vec3f, normal: vec3f) -> LampRay {

@@ -1,13 +1,13 @@
 // The nearest opaque voxel of each pixel of a tile: src/render_vk/shaders/primary.comp.
 
-// Every instance has a start of its own; that of the nearest hit so far lies at this depth, and the hit `t` behind it.
+// Every instance has its own start. The start of the nearest hit so far is at this depth, and the hit is `t` behind it.
 struct Nearest {
   depth: f32,
   t: f32,
 }
 
-// Takes over what the pixel's ray meets of what a grid holds if that is nearer than all before. `scale`: the length of
-// a depth.
+// Intersects the pixel's ray with a grid's contents and keeps the hit if it is the nearest so far. `scale`: ray length
+// per depth.
 fn meet_content(content: i32, i: i32, direction: Pair, scale: f32, nearest: ptr<function, Nearest>,
                 point: ptr<function, Point>) {
   let is_field = is_field_content(content);
@@ -32,7 +32,7 @@ fn meet_content(content: i32, i: i32, direction: Pair, scale: f32, nearest: ptr<
     return;
   }
   let found_t = moved.t + hit.t;
-  // Of equally near ones the instance that comes first; equal but for the rounding of each grid's own space.
+  // At equal distance, within the rounding of each grid's space, the first instance wins.
   let is_equal = (*point).voxel.w >= 0 && abs(found_t - limit) <= rounding;
   if (select(found_t > limit, i + content > (*point).voxel.w, is_equal)) {
     return;
@@ -64,7 +64,7 @@ fn first_hit() -> Point {
       meet_content(content, i, direction, scale, &nearest, &point);
     }
   }
-  // Inside a voxel the place does not count.
+  // If the ray starts inside a voxel, the position does not matter.
   if (point.voxel.w >= 0 && kind_of(point) == kSurface && !is_of_field(point)) {
     let place = exact_place(point.voxel.w, direction, point.voxel.xyz, point.what.y);
     point.inside = vec4f(place, point.inside.w);

@@ -17,6 +17,6 @@ fn resolve(@builtin(global_invocation_id) id: vec3u) {
     return;
   }
   let place = place_of(id);
-  let mean = sums[place].xyz / f32(push.round + 1u);  // of so many samples so far
+  let mean = sums[place].xyz / f32(push.round + 1u);  // the number of samples so far
   colours[place] = encoded(mean.x) | (encoded(mean.y) << 8u) | (encoded(mean.z) << 16u) | 0xFF000000u;
 }

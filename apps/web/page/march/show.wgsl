@@ -1,4 +1,4 @@
-// A picture on the screen, which may have more pixels: the nearest one of each.
+// Draws an image to the screen, which may have more pixels, with nearest sampling.
 
 struct Shown {
   picture: vec2u,

@@ -1,5 +1,5 @@
-// One ray's way through one tree, in a single loop: src/render_vk/shaders/walk.glsl, whose words say what each part is
-// for. Crossings are ordered by t, at ties by axis, so that the processor's kernels meet the same voxels.
+// Walks a ray through a tree in a single loop: src/render_vk/shaders/walk.glsl documents each part. Crossings are
+// ordered by t, ties by axis, so that the CPU kernels visit the same voxels.
 
 const kLevels = 15;
 const kAxes = vec3i(0, 1, 2);
@@ -15,7 +15,7 @@ var<private> ray_is_moved: bool;
 var<private> walk_low: vec3i;  // the tree's bounds
 var<private> walk_high: vec3i;
 var<private> walk_exit_t: f32;
-// Where it stands: the voxel, when it came there, and through which axis; -1 where it started.
+// The current voxel, its entry t, and the entry axis; -1 at the start.
 var<private> walk_voxel: vec3i;
 var<private> walk_t: f32;
 var<private> walk_axis: i32;
@@ -23,12 +23,12 @@ var<private> walk_node: vec4u;
 var<private> walk_level: i32;
 var<private> walk_stack: array<vec4u, kLevels>;
 
-// Where a voxel lies in the node of a level that holds it.
+// The slot of a voxel in its node of a level.
 fn index_in(voxel: vec3i, level: i32) -> u32 {
   let place = (voxel >> vec3u(2u * u32(level))) & vec3i(3);
   return u32(place.x + 4 * place.y + 16 * place.z);
 }
-// Whether a place of a node holds something, and which of its children that is.
+// Returns whether a node's slot is occupied, and the number of its child.
 fn has_child(node: vec4u, index: u32) -> bool {
   return (select(node.y, node.x, index < 32u) & (1u << (index & 31u))) != 0u;
 }
@@ -40,8 +40,8 @@ fn child_of(node: vec4u, index: u32) -> u32 {
   return countOneBits(node.x) + countOneBits(node.y & before);
 }
 
-// The coordinates, from ray_base, just after the crossing of `axis` at `t`, within `low` to `high`; that of `axis`
-// itself means nothing.
+// The coordinates, relative to ray_base, just after the crossing of `axis` at `t`, within `low` to `high`. The
+// coordinate of `axis` itself is meaningless.
 fn coordinates_after(t: f32, axis: i32, low: vec3i, high: vec3i) -> vec3i {
   let position = ray_origin + t * ray_direction;
   var at = clamp(floor(position), vec3f(low), vec3f(high));
@@ -67,7 +67,7 @@ fn coordinates_after(t: f32, axis: i32, low: vec3i, high: vec3i) -> vec3i {
   return clamp(vec3i(at), low, high);
 }
 
-// What the walk keeps of its ray, from the 64 voxels about the ray's origin.
+// The walk's ray, relative to the block of 64 voxels around the ray's origin.
 fn set_ray(base: vec3i, origin: vec3f, direction: vec3f) {
   let whole = vec3i(clamp(floor(origin), vec3f(-1e9), vec3f(1e9)));
   let shift = whole & vec3i(~63);
@@ -80,8 +80,8 @@ fn set_ray(base: vec3i, origin: vec3f, direction: vec3f) {
   ray_sign = select(vec3f(-1.0), vec3f(1.0), ray_forward);
 }
 
-// Puts a ray at its start, or where it enters the tree's bounds; false when it misses them. `moved`: the axis of the
-// bounds' plane to which it was moved before; -1 for a ray that starts where it is.
+// Starts a walk at the ray's start or its entry into the tree's bounds; false if it misses them. `moved`: the axis of
+// the bounds' plane that the ray was moved to before; -1 for an unmoved ray.
 fn start_walk(tree: Tree, base: vec3i, origin: vec3f, direction: vec3f, max_t: f32, moved: i32) -> bool {
   if (any(tree.low.xyz >= tree.high.xyz)) {
     return false;
@@ -106,7 +106,7 @@ fn start_walk(tree: Tree, base: vec3i, origin: vec3f, direction: vec3f, max_t: f
   walk_t = max(max(near_t.x, near_t.y), near_t.z);
   walk_axis = select(select(select(0, 1, near_t.y == walk_t), 2, near_t.z == walk_t), -1, walk_t < 0.0);
   walk_t = max(walk_t, 0.0);
-  // Through an edge: it has left before it enters if the axis on which it leaves goes first.
+  // Through an edge: the ray leaves before it enters if the exit axis comes first.
   let first = (far_t == vec3f(walk_t)) & (kAxes < vec3i(walk_axis));
   if (any((far_t < vec3f(walk_t)) | first) || walk_t > max_t) {
     return false;
@@ -122,7 +122,7 @@ fn start_walk(tree: Tree, base: vec3i, origin: vec3f, direction: vec3f, max_t: f
   return true;
 }
 
-// Leaves the aligned block of edge 2^shift around the voxel; false when the ray then has left the bounds or is past
+// Leaves the aligned block of edge 2^shift around the voxel; false if the ray has then left the bounds or is past
 // max_t.
 fn leave_block(shift: u32, max_t: f32) -> bool {
   let before = walk_voxel;
@@ -152,7 +152,7 @@ fn leave_block(shift: u32, max_t: f32) -> bool {
   return true;
 }
 
-// Goes on, from where the walk stands, to the first occupied voxel; false when there is none up to max_t.
+// Continues the walk to the first occupied voxel; false if there is none up to max_t.
 fn find_voxel(max_t: f32) -> bool {
   loop {
     let index = index_in(walk_voxel, walk_level);
@@ -162,7 +162,7 @@ fn find_voxel(max_t: f32) -> bool {
       }
       continue;
     }
-    // Words of voxels and what is full have no children.
+    // Words of voxels and full nodes have no children.
     if ((walk_node.z & 1u) != 0u) {
       return true;
     }
@@ -179,7 +179,7 @@ fn find_voxel(max_t: f32) -> bool {
   }
 }
 
-// Where the record of a chunk begins: types, storage, then the tree's bricks.
+// The address of a chunk's record: types, storage, then the tree's bricks.
 fn record_of(chunk: vec4u) -> u32 {
   return chunk.z & ~31u;
 }
@@ -190,7 +190,7 @@ fn record_found() -> u32 {
   return record_of(walk_stack[2]);
 }
 
-// The type of a voxel, or of a sample, of a chunk.
+// The type of a chunk's voxel or sample.
 fn type_in(address: u32, at: vec3i) -> u32 {
   let record = nodes[address >> 4u];
   let bits = record.z;
@@ -214,7 +214,7 @@ fn type_found() -> u32 {
   return type_in(record_found(), walk_voxel & vec3i(63));
 }
 
-// The face through which the ray entered the voxel; where it starts inside, the one that looks most against it.
+// The voxel face that the ray entered through; if it starts inside, the face most opposed to its direction.
 fn face_found() -> u32 {
   var axis = walk_axis;
   if (axis < 0) {
