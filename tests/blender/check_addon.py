@@ -284,7 +284,7 @@ def check_round_trip(quoin, folder):
             f"shown: {shown}")
     run(bpy.ops.export_scene.quoin, filepath=path, scale=1.0, hidden=False, lights=False, collections="NONE")
     again = quoin.load(path)
-    require({one.name for one in again.instances} == {"free", "chair", "barrel", "bird"}, "without what is hidden")
+    require({one.name for one in again.instances} == {"free", "chair", "barrel", "bird"}, "without hidden objects")
     require(not again.groups and not again.cameras and again.sun_light is None, "without all else")
 
 
@@ -640,7 +640,7 @@ def main():
         os.utime(quoin_voxels.__file__, (1e9, 1e9 + stays))
         bpy.ops.preferences.addon_install(filepath=addon)
         bpy.ops.preferences.addon_enable(module="quoin_voxels")
-        require(not os.path.exists(os.path.join(os.path.dirname(quoin_voxels.__file__), "stale.py")), "what was there goes")
+        require(not os.path.exists(os.path.join(os.path.dirname(quoin_voxels.__file__), "stale.py")), "old files go")
     require(quoin_voxels.quoin is not before and len(quoin_voxels.quoin.load(castle).grids) == len(kept.grids),
             "the new library is loaded, and the old one still works")
     quoin = quoin_voxels.quoin

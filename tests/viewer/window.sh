@@ -100,7 +100,7 @@ xdotool key --delay 80 Home
 xdotool mousemove 180 220
 sleep 0.5
 
-echo "a picture of what was shown when it was asked for"
+echo "the image shows the view at the time of the request"
 picture_becomes before.png home.png Home || fail "Home does not come back"
 xdotool key --delay 1 F12 shift+5
 until_true 120 test -s world-1.png || fail "F12 gives no picture (before another view)"
@@ -243,7 +243,7 @@ if "$quoin" generate terrain world.quoin --endless >/dev/null 2>no_worlds; then
   [ ! -e world.quoin-wal ] || fail "the world's log was left behind"
   "$quoin" view world.quoin --bare --size 320x240 --distance 200 --screenshot again.png --backend "$backend" >log 2>&1
   "$quoin" view before.quoin --bare --size 320x240 --distance 200 --screenshot untouched.png --backend "$backend" >>log 2>&1
-  ! cmp -s again.png untouched.png || fail "what was removed came back"
+  ! cmp -s again.png untouched.png || fail "removed voxels came back"
 else
   cat no_worlds
 fi

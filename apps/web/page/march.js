@@ -71,7 +71,7 @@ export class Marcher {
 
   #checkSize(what, bytes) {
     const most = this.#device.limits.maxStorageBufferBindingSize;
-    if (bytes > most) throw new Error(`${what} takes ${sizeOf(bytes)} there, and the adapter binds ${sizeOf(most)}`);
+    if (bytes > most) throw new Error(`${what} needs ${sizeOf(bytes)}, but the adapter binds at most ${sizeOf(most)}`);
   }
 
   async #put(scene) {
@@ -135,10 +135,10 @@ export class Marcher {
     const words = new DataView(frame.buffer, frame.byteOffset, frame.byteLength);
     const flags = words.getUint32(flagsAt, true);
     if ((flags & neededFlags) !== neededFlags || (flags & ~knownFlags) !== 0)
-      throw new Error(`these shaders do not draw in a light of the flags ${flags}`);
+      throw new Error(`cannot render with the lighting flags ${flags}`);
     this.#resize(width, height);
     if (this.#tables === undefined || this.#tables.size < frame.byteLength) {
-      this.#checkSize('what stands in the scene', frame.byteLength);
+      this.#checkSize('the image data', frame.byteLength);
       this.#tables?.destroy();
       const most = Math.floor(this.#device.limits.maxStorageBufferBindingSize / 32) * 32;
       this.#tables = this.#buffer(Math.min(frame.byteLength * 1.25, most), GPUBufferUsage.STORAGE);
@@ -152,7 +152,7 @@ export class Marcher {
 
   #resize(width, height) {
     if (this.#size[0] === width && this.#size[1] === height) return;
-    this.#checkSize('the picture', width * height * 16);
+    this.#checkSize('the image', width * height * 16);
     for (const buffer of Object.values(this.#picture ?? {})) buffer.destroy();
     this.#size = [width, height];
     const { STORAGE, COPY_SRC } = GPUBufferUsage;

@@ -165,7 +165,7 @@ class Mine extends Error {}
 for (const [name, work] of Object.entries(long)) {
   const told = [];
   await work({ progress: (fraction) => { told.push(fraction); } });
-  check(told.length > 0 && told.every((f, i) => f >= (told[i - 1] ?? 0) && f <= 1), `${name} tells ${told.join()}`);
+  check(told.length > 0 && told.every((f, i) => f >= (told[i - 1] ?? 0) && f <= 1), `${name}: got ${told.join()}`);
   await refuses(`${name} that is stopped`, () => work({ progress: () => false }), 'cancelled');
   await refuses(`${name} that calls`, () => work({ progress: () => scene.read(0, [0, 0, 0], [1, 1, 1]) }));
   await refuses(`${name} without a function`, () => work({ progress: 'loud' }));
@@ -178,7 +178,7 @@ for (const [name, work] of Object.entries(long)) {
   const again = [];
   await work({});
   await work({ progress: (fraction) => { again.push(fraction); } });
-  check(again.length === told.length, `${name} is told again`);
+  check(again.length === told.length, `${name} reports again`);
 }
 const whole = scene.glb();
 scene.free();
@@ -213,7 +213,7 @@ fails.start = false;
 counts.instances = 0;
 const atOnce = await Promise.all([load(bytes), load(bytes), load(bytes)]);
 check(counts.instances === 1, `three loads at once start ${counts.instances} instances`);
-check(atOnce.every((one) => Buffer.from(whole).equals(Buffer.from(one.glb()))), 'what was loaded at once is the same');
+check(atOnce.every((one) => Buffer.from(whole).equals(Buffer.from(one.glb()))), 'scenes loaded concurrently are equal');
 
 // A scene that progress tries to free survives. Unreferenced scenes and shader scenes are freed.
 const [kept] = atOnce;

@@ -10,7 +10,7 @@ import { checkAloud as check, found as counts } from './checks.mjs';
 import { scenes } from './march_scenes.mjs';
 
 const [page, esbuild, out, ...files] = process.argv.slice(2);
-const { chromium, launcher } = await requirements('skipped, what is marched in the browser');
+const { chromium, launcher } = await requirements('skipped, ray marching in the browser');
 
 // ---- The site: the page, the harness that compares images, and the files.
 const work = await mkdtemp(join(tmpdir(), 'quoin-march-'));
@@ -165,15 +165,15 @@ try {
   await tab.goto(`${site}compare.html`);
   await tab.waitForFunction(() => window.compare !== undefined);
   if (await tab.evaluate(async () => await navigator.gpu?.requestAdapter() ?? null) === null) {
-    console.log('skipped, what is marched in the browser: this Chromium has no WebGPU on a processor');
+    console.log('skipped, ray marching in the browser: this Chromium has no software WebGPU');
     process.exitCode = 77;
   } else {
     await comparePictures(tab);
     const small = await tab.evaluate(([from]) => window.openOnSmallDevice(from, 1024), [[...given.keys()][0].slice(1)]);
-    check(/scene takes .* there, and the adapter binds 1 KiB/.test(small), `a device without room says so: ${small}`);
+    check(/scene needs .*, but the adapter binds at most 1 KiB/.test(small), `a device without room says so: ${small}`);
     const codes = await tab.evaluate((from) => window.misuse(from), inPage);
     const isRefused = codes.slice(0, -1).every((code) => code === 'invalid_argument') && codes.at(-1) === 'bad_handle';
-    check(isRefused, `what cannot be is refused: ${codes.join(', ')}`);
+    check(isRefused, `invalid calls are refused: ${codes.join(', ')}`);
     await tab.close();
     await usePage(browser, errors);
     check(errors.length === 0, `no error of shaders or page${errors.map((text) => ` ${text}`).join('')}`);

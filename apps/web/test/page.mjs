@@ -143,7 +143,7 @@ try {
   await tab.waitForSelector('#status.error');
   check(/^noise.vox: /.test(await status()), `a broken file says so: ${await status()}`);
   const still = await download('#march', 300_000);
-  check(still.bytes.toString('latin1', 1, 4) === 'PNG', `and what is shown can still be drawn: ${await status()}`);
+  check(still.bytes.toString('latin1', 1, 4) === 'PNG', `the current scene can still be rendered: ${await status()}`);
   await tab.setInputFiles('#other', file);
   await shown(basename(file));
   check(!(await tab.isVisible('#status.error')), `and the next one is shown: ${await status()}`);
@@ -175,7 +175,7 @@ try {
   await drop({ name: 'hill.png', bytes: picture8 });
   await tab.waitForSelector('#heights[open]');
   await tab.keyboard.press('Escape');
-  check(await tab.textContent('#name') === basename(file), 'of a picture that nobody tells of nothing is shown');
+  check(await tab.textContent('#name') === basename(file), 'without an encoding the image is not loaded');
   await drop({ name: 'hill.png', bytes: picture8 });
   await tab.waitForSelector('#heights[open]');
   await tab.fill('#metres', '2');
@@ -212,9 +212,9 @@ try {
   check(view.height > 400 && view.y + view.height <= panel.y + 1, 'on a phone the view lies above the panel');
   await tab.setViewportSize({ width: 800, height: 390 });
   const [wide, beside] = [await tab.locator('#view').boundingBox(), await tab.locator('#panel').boundingBox()];
-  check(wide.width > 500 && wide.x + wide.width <= beside.x + 1, 'in a small window it lies beside it');
+  check(wide.width > 500 && wide.x + wide.width <= beside.x + 1, 'in a small window the view is next to the panel');
   for (const name of ['LICENSE', 'LICENSES', 'LICENSE.three', 'NOTICE'])
-    check((await tab.request.get(site + name)).ok(), `${name} lies beside the page`);
+    check((await tab.request.get(site + name)).ok(), `${name} is next to the page`);
   check(elsewhere.length === 0, `no request to anywhere else${elsewhere.map((url) => ` ${url}`)}`);
   check(errors.length === 0, `no error in the page${errors.map((text) => ` ${text}`)}`);
 } finally {

@@ -82,7 +82,7 @@ fn camera_ray() -> ViewRay {
   let d = picture_direction();
   return ViewRay(start, d * (1.0 / sqrt(dot(d, d))));
 }
-// The ray's length by which its forward component grows by 1.
+// The ray length per unit of its forward component.
 fn length_a_depth() -> f32 {
   return length(picture_direction());
 }
