@@ -114,13 +114,13 @@ for (const [what, call] of Object.entries(takesOptions)) {
   await tells(`${what}, misspelt`, async () => call({ watertigt: true }), /unknown option watertigt; known: \w+/);
   if (what === 'raw') continue;  // these values would be spread into an object
   for (const none of [null, 3, 'small'])
-    await tells(`${what}: ${none}`, async () => call(none), /is to be an object of/);
+    await tells(`${what}: ${none}`, async () => call(none), /must be an object with the properties/);
 }
-await tells('no loader', () => toThree(scene), /GLTFLoader is to be the class/);
-await tells('a loader that is an object', () => toThree(scene, { parseAsync() {} }), /GLTFLoader is to be the class/);
-await tells('no scene', () => toThree(undefined, class { async parseAsync() {} }), /scene is none/);
+await tells('no loader', () => toThree(scene), /GLTFLoader must be the class/);
+await tells('a loader that is an object', () => toThree(scene, { parseAsync() {} }), /GLTFLoader must be the class/);
+await tells('no scene', () => toThree(undefined, class { async parseAsync() {} }), /scene must be a Scene/);
 for (const iso of [null, '0', 1n, undefined, {}])
-  await tells(`an iso of ${iso}`, () => surfaceNets(eight, cube, iso), /iso is no number/);
+  await tells(`an iso of ${iso}`, () => surfaceNets(eight, cube, iso), /iso must be a number/);
 const noThree = { 'nothing': null, 'a number': 3, 'an object': { x: 1, y: 1, z: 1 }, 'one number': [1],
                   'two numbers': [1, 2], 'four numbers': [1, 1, 1, 1], '64 numbers': Array(64).fill(1),
                   'two million numbers': Array(2e6).fill(1), 'texts': ['a', 'b', 'c'], 'a text': 'abc',
@@ -128,7 +128,7 @@ const noThree = { 'nothing': null, 'a number': 3, 'an object': { x: 1, y: 1, z: 
 for (const [what, list] of Object.entries(noThree)) {
   for (const [where, options] of Object.entries({
     'the sun': { sun: list }, 'the position': { camera: { position: list, lookAt: there } },
-    'what is looked at': { camera: { position: here, lookAt: list } } })) {
+    'the target': { camera: { position: here, lookAt: list } } })) {
     await refuses(`${what} for ${where}`, () => scene.render({ ...small, ...options }), 'invalid_argument');
     await refuses(`${what} for ${where} of shaders`, () => shaders.frame({ ...small, ...options }), 'invalid_argument');
   }
