@@ -271,7 +271,7 @@ TEST(GoxelCases, ReadsShapeLayers) {
 TEST(LuantiCases, RefusesNamesThatAreCutOff) {
   const auto loaded = load_scene(case_file("mts-names-cut-off.mts"));
   ASSERT_FALSE(loaded);
-  EXPECT_EQ(loaded.error().message, "unexpected end of file while reading nodes");
+  EXPECT_EQ(loaded.error().message, "the file ends before its nodes");
   EXPECT_EQ(loaded.error().byte_offset, 15U);
 }
 

@@ -48,9 +48,8 @@ Result<LoadedScene> read_mts(std::span<const std::byte> bytes) {
   const std::size_t count = read_u16(reader);
   std::vector<std::string_view> names(count <= reader.remaining() / 2 ? count : 0);
   for (std::string_view& name : names) name = reader.text(read_u16(reader));
-  if (reader.failed() || names.size() < count)
-    return bad_at(bytes.size(), "unexpected end of file while reading nodes");
-  std::vector<std::optional<VoxelProperties>> nodes(count);  // nothing: air
+  if (reader.failed() || names.size() < count) return bad_at(bytes.size(), "the file ends before its nodes");
+  std::vector<std::optional<VoxelProperties>> nodes(count);  // nullopt: air
   std::ranges::transform(names, nodes.begin(), node_properties);
   const std::size_t begin = reader.position();
   const std::uint64_t volume =
@@ -66,7 +65,7 @@ Result<LoadedScene> read_mts(std::span<const std::byte> bytes) {
   std::vector<std::byte> content(volume * 4);
   const auto read = stream.read(content);
   if (!read) return read.error();
-  if (*read < volume * 3) return bad_at(bytes.size(), "unexpected end of file while reading nodes");
+  if (*read < volume * 3) return bad_at(bytes.size(), "the file ends before its nodes");
   ModelBuilder builder;
   Model model;
   model.canvas = {IVec3(0), {size_x, size_y, size_z}};

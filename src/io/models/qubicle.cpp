@@ -106,9 +106,7 @@ class QbReader {
   Status read_slices(const Matrix& matrix);
   Status read_run(const Matrix& matrix, int z, std::uint64_t& at, std::uint64_t count, std::uint32_t data);
   Status read_slice(const Matrix& matrix, int z);
-  [[nodiscard]] Error too_short() const {
-    return bad_at(bytes_.size(), "unexpected end of file while reading matrices");
-  }
+  [[nodiscard]] Error too_short() const { return bad_at(bytes_.size(), "the file ends before its matrices"); }
 
   std::span<const std::byte> bytes_;
   ByteReader reader_;
@@ -327,9 +325,7 @@ class QbclReader {
   }
 
  private:
-  [[nodiscard]] Error too_short() const {
-    return bad_at(reader_.position(), "unexpected end of file while reading nodes");
-  }
+  [[nodiscard]] Error too_short() const { return bad_at(reader_.position(), "the file ends before its nodes"); }
   Status read_node(int depth, bool is_used, bool is_shown);
   Status read_matrix(std::string name, bool is_used, bool is_shown);
   Status put_columns(const Matrix& matrix, std::span<const std::byte> packed, std::size_t at);

@@ -99,7 +99,7 @@ Result<LoadedScene> read_binvox(std::span<const std::byte> bytes) {
   builder.begin(std::move(model));
   std::uint64_t at = 0;
   for (std::size_t byte = header->data_at; at < volume; byte += 2) {
-    if (byte + 2 > bytes.size()) return bad_at(bytes.size(), "unexpected end of file while reading voxels");
+    if (byte + 2 > bytes.size()) return bad_at(bytes.size(), "the file ends before its voxels");
     const auto value = std::to_integer<unsigned>(bytes[byte]);
     std::uint64_t count = std::to_integer<unsigned>(bytes[byte + 1]);
     if (count > volume - at) return bad_at(byte, "more voxels than the size allows");

@@ -76,7 +76,7 @@ Result<LoadedScene> read_kv6(std::span<const std::byte> bytes) {
   ByteReader voxel = reader;
   static_cast<void>(reader.take(voxels * 8));
   static_cast<void>(reader.take(std::size_t{4} * static_cast<std::size_t>(sizes->x)));  // voxels of each x
-  if (reader.failed()) return bad_at(bytes.size(), "unexpected end of file while reading voxels");
+  if (reader.failed()) return bad_at(bytes.size(), "the file ends before its voxels");
   ModelBuilder builder;
   builder.begin(model_of(*sizes, DVec3(pivot_x, pivot_y, pivot_z)));
   std::size_t read = 0;
@@ -84,7 +84,7 @@ Result<LoadedScene> read_kv6(std::span<const std::byte> bytes) {
     for (int y = 0; y < sizes->y; ++y) {
       const std::size_t at = reader.position();
       const std::size_t count = reader.u16();
-      if (reader.failed()) return bad_at(bytes.size(), "unexpected end of file while reading columns");
+      if (reader.failed()) return bad_at(bytes.size(), "the file ends before its columns");
       read += count;
       if (read > voxels) return bad_at(at, "the columns have more voxels than the file");
       for (std::size_t i = 0; i < count; ++i) {

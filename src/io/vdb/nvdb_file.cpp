@@ -297,7 +297,7 @@ Result<File> read_nvdb_file(std::span<const std::byte> bytes) {
       const std::size_t name = metadata.u32();
       static_cast<void>(reader.take(kMetadata));
       entry.name = reader.text(name);
-      if (reader.failed()) return bad_at(reader.position(), "unexpected end of file while reading grids");
+      if (reader.failed()) return bad_at(reader.position(), "the file ends before its grids");
       entries.push_back(std::move(entry));
     }
     for (const Entry& entry : entries) {

@@ -144,9 +144,7 @@ class TreeReader {
   [[nodiscard]] std::size_t value_bytes() const {
     return scalar_ == Scalar::Float ? 4 : scalar_ == Scalar::Double ? 8 : 1;
   }
-  [[nodiscard]] Error too_short() const {
-    return bad_at(reader_.position(), "unexpected end of file while reading trees");
-  }
+  [[nodiscard]] Error too_short() const { return bad_at(reader_.position(), "the file ends before its trees"); }
 
   float read_value() {
     if (scalar_ == Scalar::Float) return reader_.f32();
@@ -386,7 +384,7 @@ class FileReader {
     static_cast<void>(reader_.take(36));
     static_cast<void>(read_metadata(reader_));
     const std::size_t count = reader_.count(12 + 24);
-    if (reader_.failed()) return bad_at(bytes_.size(), "unexpected end of file while reading grids");
+    if (reader_.failed()) return bad_at(bytes_.size(), "the file ends before its grids");
     if (!has_offsets) {
       return make_error(ErrorCode::Unsupported, "a streamed .vdb file without grid offsets is not supported", {},
                         offsets_at);

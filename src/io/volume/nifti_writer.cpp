@@ -160,7 +160,7 @@ Result<models::ModelBytes> write_densities(const Instance& instance, const Scene
   });
   if (!done) return done.error();
   file.bytes = out.take();
-  file.warnings.emplace_back("left out (.nii cannot hold them): materials, colours, hidden instances and lamps");
+  file.warnings.emplace_back("materials, colours, hidden instances and lamps left out, not supported by .nii");
   file.warnings.push_back("values are densities within " + std::to_string(around.x) +
                           " samples of the surface, without a unit, not the values of the input file");
   return file;
