@@ -743,8 +743,12 @@ std::size_t OccupancyTree::bytes() const {
          (impl_->flat.cells.capacity() + impl_->flat.bricks.capacity()) * sizeof(std::uint32_t);
 }
 
+const OccupancyTree::Impl& OccupancyTree::impl() const {
+  return content_of(impl_);
+}
+
 trace::TreeNodes::TreeNodes(const OccupancyTree& tree)
-    : tree_((QUOIN_ASSERT(tree.impl_ != nullptr, "a tree that was not moved from"), tree.impl_.get())),
+    : tree_(&tree.impl()),
       chunks_(tree_->chunk_nodes.data()),
       lines_(tree_->bricks.middle()),
       uniform_(tree_->uniform.data()) {}

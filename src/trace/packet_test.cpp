@@ -320,7 +320,7 @@ TEST_P(Packets, RaysInTheSameDirectionThroughALongWorldAgree) {
     grid.fill_box({corner, corner + IVec3{whole(1, 4) + 1, whole(1, 4) + 1, whole(1, 4) + 1}}, VoxelType{1});
   }
   const OccupancyTree tree = OccupancyTree::build(grid, oracle::mixed_types());
-  ASSERT_NE(trace::TreeView::of(tree), nullptr);
+  ASSERT_NE(tree.view(), nullptr);
   int hits = 0;
   for (int i = 0; i < 3'000; ++i) {
     RayPacket rays = beam();
@@ -385,7 +385,7 @@ TEST(PacketsOf, AcrossALongWorldAndBetweenIslandsAgreeWithTheDenseTracer) {
     grid.fill_box({{0, 0, 0}, {9, 41, 41}}, 1);
     grid.fill_sphere({gap, 20, 20}, 15.0, 2);
     const OccupancyTree tree = OccupancyTree::build(grid, types);
-    EXPECT_EQ(trace::TreeView::of(tree) == nullptr, gap == 1'000'000);
+    EXPECT_EQ(tree.view() == nullptr, gap == 1'000'000);
     std::mt19937 random(7);
     std::uniform_real_distribution<double> uniform(0.0, 40.0);
     int hits = 0;

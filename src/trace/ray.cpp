@@ -25,7 +25,7 @@ std::optional<RayHit> walk_to_first_hit(const OccupancyTree& tree, const Ray& ra
 }  // namespace
 
 std::optional<RayHit> first_hit(const OccupancyTree& tree, const Ray& ray, double max_t) {
-  const trace::TreeView* view = trace::TreeView::of(tree);
+  const trace::TreeView* view = tree.view();
   if (view == nullptr) return walk_to_first_hit(tree, ray, max_t);
   RayHit hit;
   bool is_unfinished = false;
@@ -39,7 +39,7 @@ std::optional<RayHit> first_hit(const OccupancyTree& tree, const Ray& ray, doubl
 }
 
 bool any_hit(const OccupancyTree& tree, const Ray& ray, double max_t) {
-  const trace::TreeView* view = trace::TreeView::of(tree);
+  const trace::TreeView* view = tree.view();
   if (view == nullptr) return walk_to_first_hit(tree, ray, max_t).has_value();
   bool is_unfinished = false;
   const bool is_hit = trace::kernel().any_hit(*view, ray, max_t, is_unfinished);
@@ -49,7 +49,7 @@ bool any_hit(const OccupancyTree& tree, const Ray& ray, double max_t) {
 void first_hits(const OccupancyTree& tree, const RayPacket& rays, PacketHits& hits) {
   hits.hit = hits.starts_inside = 0;
   std::uint32_t unfinished = rays.active;
-  if (const trace::TreeView* view = trace::TreeView::of(tree)) {
+  if (const trace::TreeView* view = tree.view()) {
     trace::kernel().first_hits(*view, rays, hits, unfinished);
   }
   for (std::uint32_t inside = hits.starts_inside; inside != 0; inside &= inside - 1) {
@@ -66,7 +66,7 @@ void first_hits(const OccupancyTree& tree, const RayPacket& rays, PacketHits& hi
 std::uint32_t any_hits(const OccupancyTree& tree, const RayPacket& rays) {
   std::uint32_t unfinished = rays.active;
   std::uint32_t blocked = 0;
-  if (const trace::TreeView* view = trace::TreeView::of(tree)) {
+  if (const trace::TreeView* view = tree.view()) {
     blocked = trace::kernel().any_hits(*view, rays, unfinished);
   }
   for (; unfinished != 0; unfinished &= unfinished - 1) {

@@ -40,7 +40,7 @@ struct Random {
 // Compares all queries of a tree that followed edits and of a tree that was built from scratch.
 void expect_equal(const OccupancyTree& followed, const OccupancyTree& built, Random& random, bool has_blocks) {
   ASSERT_EQ(followed.bounds(), built.bounds());
-  ASSERT_EQ(trace::TreeView::of(followed) == nullptr, trace::TreeView::of(built) == nullptr);
+  ASSERT_EQ(followed.view() == nullptr, built.view() == nullptr);
   const trace::TreeNodes a(followed);
   const trace::TreeNodes b(built);
   const IBox box = built.bounds();

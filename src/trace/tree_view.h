@@ -146,10 +146,6 @@ struct FlatChunk {
 
 /// The part of a tree with flat tables that the kernels read.
 struct TreeView {
-  /// Returns the view of a tree; null if the world is so sparse (distant islands) that its tables would be larger than
-  /// the rest of the tree.
-  [[nodiscard]] static const TreeView* of(const OccupancyTree& tree) { return tree.view_; }
-
   // `origin`, `box` and the strides of chunks, in the layout of registers.
   alignas(32) double corner[4];
   alignas(16) float low[4];

@@ -110,8 +110,10 @@ class Impostor {
   /// Returns the bytes held, including bytes shared with copies.
   [[nodiscard]] std::size_t bytes() const;
 
+  // For Quoin's own sources.
+  [[nodiscard]] const ImpostorFaces& faces() const { return *faces_; }
+
  private:
-  friend struct ImpostorFaces;
   static Impostor build(const Grid& grid, const VoxelRegistry& types, const OccupancyTree& opaque,
                         const DensityTree* field, const IBox& whole, const ImpostorOptions& options);
 

@@ -33,9 +33,6 @@ struct VulkanImageTarget {
 };
 
 class VulkanRenderer;
-namespace vulkan {
-struct Access;
-}
 
 /// An image in device memory. A renderer and its VulkanMeshRenderers draw into it. It can be copied to the images of a
 /// Vulkan application, or read.
@@ -84,9 +81,11 @@ class VulkanPicture {
   /// Errors:   as record_copy and as VulkanRenderer.
   [[nodiscard]] Status copy_to(const VulkanImageTarget& target) const;
 
- private:
-  friend struct vulkan::Access;
+  // For Quoin's own sources.
   struct Impl;
+  [[nodiscard]] Impl& impl() const { return *impl_; }
+
+ private:
   std::unique_ptr<Impl> impl_;
 };
 
@@ -115,9 +114,11 @@ class VulkanPathPicture {
   /// Errors: InvalidArgument if the image is empty; otherwise as VulkanRenderer.
   [[nodiscard]] Result<PathPicture> read(Threads threads = {}) const;
 
- private:
-  friend struct vulkan::Access;
+  // For Quoin's own sources.
   struct Impl;
+  [[nodiscard]] Impl& impl() const { return *impl_; }
+
+ private:
   std::unique_ptr<Impl> impl_;
 };
 

@@ -123,9 +123,11 @@ class VulkanRenderer {
   [[nodiscard]] Status draw_paths(VulkanPathPicture& picture, const Camera& camera, const PathOptions& options,
                                   Accumulation accumulation, const Progress& progress = {});
 
- private:
-  friend struct vulkan::Access;
+  // For Quoin's own sources.
   struct Impl;
+  [[nodiscard]] Impl& impl() const { return *impl_; }
+
+ private:
   explicit VulkanRenderer(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };

@@ -61,11 +61,11 @@ class SceneTracer {
   /// Returns the bytes of all traced voxel and field trees; shared trees count once.
   [[nodiscard]] std::size_t bytes() const;
 
- private:
-  friend class SceneView;
-  friend class SceneQuery;
-  friend const std::vector<PlacedGrid>& placed_in(const SceneTracer& tracer);
+  // For Quoin's own sources.
   struct Impl;
+  [[nodiscard]] const Impl& impl() const;
+
+ private:
   explicit SceneTracer(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };

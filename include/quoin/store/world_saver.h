@@ -69,11 +69,11 @@ class WorldSaver {
   /// grids).
   [[nodiscard]] std::optional<std::uint32_t> number_of(GridHandle grid) const;
 
- private:
-  friend Result<LoadedWorld> load_partial_world(const WorldStore& world, const LoadOptions& options);
-  friend Result<LoadedWorld> load_world(const WorldStore& world, const LoadOptions& options, Threads threads,
-                                        const Progress& progress);
+  // For Quoin's own sources.
   struct Impl;
+  [[nodiscard]] Impl& impl() { return *impl_; }
+
+ private:
   std::unique_ptr<Impl> impl_;
 };
 

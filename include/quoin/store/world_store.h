@@ -67,9 +67,10 @@ class WorldChanges {
   [[nodiscard]] bool empty() const;
   [[nodiscard]] std::size_t chunk_count() const;
 
+  // For Quoin's own sources.
+  [[nodiscard]] store::ChangeSet& content() { return *content_; }
+
  private:
-  friend class WorldStore;
-  friend struct WorldParts;
   std::unique_ptr<store::ChangeSet> content_;
 };
 
@@ -163,10 +164,12 @@ class WorldStore {
   [[nodiscard]] const std::filesystem::path& path() const;
   [[nodiscard]] bool is_writable() const;
 
- private:
-  friend struct WorldParts;
+  // For Quoin's own sources.
   struct Impl;
   explicit WorldStore(std::unique_ptr<Impl> impl);
+  [[nodiscard]] const Impl& impl() const { return *impl_; }
+
+ private:
   std::unique_ptr<Impl> impl_;
 };
 

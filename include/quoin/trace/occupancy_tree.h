@@ -82,10 +82,14 @@ class OccupancyTree {
   /// Returns the memory in use, in bytes.
   [[nodiscard]] std::size_t bytes() const;
 
- private:
-  friend struct trace::TreeView;
-  friend class trace::TreeNodes;
+  // For Quoin's own sources.
   struct Impl;
+  [[nodiscard]] const Impl& impl() const;
+  /// Returns the tables that kernels read; null if the world is so sparse (distant islands) that they would be larger
+  /// than the rest of the tree.
+  [[nodiscard]] const trace::TreeView* view() const { return view_; }
+
+ private:
   void finish_build();
   void finish_update(std::span<const trace::ChunkBricks> changed);
 

@@ -30,7 +30,7 @@ struct CacheWorld {
 };
 
 bool shows(const Impostor& impostor, VoxelType type) {
-  const std::vector<ImpostorFaces::Face>& faces = ImpostorFaces::of(impostor).faces;
+  const std::vector<ImpostorFaces::Face>& faces = impostor.faces().faces;
   return std::any_of(faces.begin(), faces.end(), [&](const ImpostorFaces::Face& face) { return face.type == type; });
 }
 
@@ -209,9 +209,9 @@ TEST(ImpostorCache, AnEditRebuildsFromTheOneBefore) {
   const auto found = cache.find(world.scene, world.grids[0]);
   const Impostor fresh = Impostor::build(world.scene.grids()[world.grids[0]].grid, world.scene.types);
   ASSERT_NE(found, nullptr);
-  ASSERT_EQ(ImpostorFaces::of(*found).faces.size(), ImpostorFaces::of(fresh).faces.size());
-  for (std::size_t level = 0; level < ImpostorFaces::of(fresh).levels.size(); ++level) {
-    EXPECT_EQ(ImpostorFaces::of(*found).levels[level].views, ImpostorFaces::of(fresh).levels[level].views);
+  ASSERT_EQ(found->faces().faces.size(), fresh.faces().faces.size());
+  for (std::size_t level = 0; level < fresh.faces().levels.size(); ++level) {
+    EXPECT_EQ(found->faces().levels[level].views, fresh.faces().levels[level].views);
   }
   EXPECT_GE(cache.stats().rebuilt, 10U);
   EXPECT_EQ(cache.stats().waiting, 0U);
@@ -225,8 +225,8 @@ TEST(ImpostorCache, OtherOptionsAskForAnotherOne) {
     cache.wait(world.scene);
     return cache.find(world.scene, world.grids[0], {edge});
   };
-  EXPECT_EQ(ImpostorFaces::of(*ready(64)).edge, 64);
-  EXPECT_EQ(ImpostorFaces::of(*ready(256)).edge, 256);
+  EXPECT_EQ(ready(64)->faces().edge, 64);
+  EXPECT_EQ(ready(256)->faces().edge, 256);
   EXPECT_EQ(cache.stats().built, 2U);
 }
 

@@ -214,8 +214,8 @@ void expect_same(const Impostor& a, const Impostor& b) {
   EXPECT_EQ(a.bounds().min, b.bounds().min);
   EXPECT_EQ(a.bounds().max, b.bounds().max);
   EXPECT_EQ(a.content().centre, b.content().centre);
-  const ImpostorFaces& x = ImpostorFaces::of(a);
-  const ImpostorFaces& y = ImpostorFaces::of(b);
+  const ImpostorFaces& x = a.faces();
+  const ImpostorFaces& y = b.faces();
   EXPECT_EQ(x.edge, y.edge);
   ASSERT_EQ(x.faces.size(), y.faces.size());
   int different = 0;
@@ -301,7 +301,7 @@ TEST(Impostor, MoreTexelsSeeSmallerFaces) {
   for (int x = 0; x < 200; x += 2) grid.fill_box({{x, 0, 0}, {x + 1, 200, 3}}, 2);
   grid.fill_box({{0, 0, 0}, {200, 200, 1}}, 1);
   const auto unseen = [&](int edge) {
-    return ImpostorFaces::of(Impostor::build(grid, types, ImpostorOptions{edge})).unseen.count();
+    return Impostor::build(grid, types, ImpostorOptions{edge}).faces().unseen.count();
   };
   EXPECT_GT(unseen(64), unseen(512));
   // With 32 texels per side there are too many faces to store them one by one.

@@ -138,7 +138,7 @@ std::optional<DrawnImpostor> ImpostorScreen::drawn(const PlacedGrid& placed, std
   DrawnImpostor drawn;
   drawn.area = *area;
   drawn.placed = index;
-  drawn.faces = &ImpostorFaces::of(impostor);
+  drawn.faces = &impostor.faces();
   drawn.near = near_views(axes * (is_perspective_ ? -centre : -camera_.forward));
   choose_level((is_perspective_ ? sphere.seen.z : 1.0) / (focal_ * size), drawn);
   drawn.nearest = sphere.seen.z - sphere.radius * kRoom;

@@ -48,7 +48,7 @@ Worst worst_of(ImpostorWorld& world, int pixels, int count) {
 TEST(Surfels, LookLikeTheTracedField) {
   for (const Model model : kSurfelModels) {
     ImpostorWorld world(model);
-    EXPECT_GT(ImpostorFaces::of(world.impostor).surfels.size(), 1'000U);
+    EXPECT_GT(world.impostor.faces().surfels.size(), 1'000U);
     for (const int pixels : {128, 64}) {
       const Worst found = worst_of(world, pixels, 12);
       std::printf("model %d, %d pixels: overlap %.4f, difference %.2f, mean %.2f\n", static_cast<int>(model), pixels,
@@ -132,13 +132,13 @@ TEST(Surfels, AnEditMakesThemAnew) {
   (void)cache.find(world.scene, grid);
   EXPECT_EQ(cache.wait(world.scene), 0U);
   const auto after = cache.find(world.scene, grid);
-  EXPECT_NE(ImpostorFaces::of(*before).surfels.size(), ImpostorFaces::of(*after).surfels.size());
-  EXPECT_EQ(ImpostorFaces::of(*after).surfels.size(),
-            ImpostorFaces::of(Impostor::build(world.scene.grids()[grid], world.scene.types)).surfels.size());
+  EXPECT_NE(before->faces().surfels.size(), after->faces().surfels.size());
+  EXPECT_EQ(after->faces().surfels.size(),
+            Impostor::build(world.scene.grids()[grid], world.scene.types).faces().surfels.size());
   world.scene.edit(grid).field.clear();
   (void)cache.find(world.scene, grid);
   EXPECT_EQ(cache.wait(world.scene), 0U);
-  EXPECT_TRUE(ImpostorFaces::of(*cache.find(world.scene, grid)).surfels.empty());
+  EXPECT_TRUE(cache.find(world.scene, grid)->faces().surfels.empty());
   EXPECT_FALSE(cache.find(world.scene, grid)->empty());
 }
 

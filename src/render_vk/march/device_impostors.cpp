@@ -159,7 +159,7 @@ void DeviceImpostors::follow(const Scene& scene) {
 Status DeviceImpostors::begin(const std::shared_ptr<const Impostor>& impostor, Sent& sent) {
   memory_->release(sent.place);
   sent = {};
-  const ImpostorFaces& from = ImpostorFaces::of(*impostor);
+  const ImpostorFaces& from = impostor->faces();
   std::uint64_t bytes = 0;
   for (std::size_t i = 0; i < sent.levels.size(); ++i) {
     const std::size_t count = from.level(i).count();
@@ -183,7 +183,7 @@ Status DeviceImpostors::begin(const std::shared_ptr<const Impostor>& impostor, S
 }
 
 Status DeviceImpostors::send_some(Sent& sent, std::size_t& faces_left) {
-  const ImpostorFaces& from = ImpostorFaces::of(*sent.impostor);
+  const ImpostorFaces& from = sent.impostor->faces();
   Status done;
   while (done && sent.part < kParts && faces_left > 0) {
     constexpr std::size_t kLevels = ImpostorFaces::kLevels + 1;

@@ -14,7 +14,7 @@ const char* const kDoing = "allocating an image";
 }  // namespace
 
 VulkanPicture::VulkanPicture(VulkanRenderer& renderer)
-    : impl_(std::make_unique<Impl>(*vulkan::Access::of(renderer).device, *vulkan::Access::of(renderer).pipelines)) {}
+    : impl_(std::make_unique<Impl>(*renderer.impl().device, *renderer.impl().pipelines)) {}
 VulkanPicture::VulkanPicture(VulkanPicture&&) noexcept = default;
 VulkanPicture& VulkanPicture::operator=(VulkanPicture&&) noexcept = default;
 VulkanPicture::~VulkanPicture() = default;

@@ -23,8 +23,8 @@ class VulkanDetailTest : public VulkanTest {
     ASSERT_TRUE(expected) << to_string(expected.error());
     expect_equal(taken_as_is(camera, options), *expected, name);
   }
-  [[nodiscard]] std::uint64_t impostor_bytes() const { return vulkan::Access::of(*renderer_).detail.impostor_bytes(); }
-  [[nodiscard]] std::uint64_t halved_bytes() const { return vulkan::Access::of(*renderer_).detail.halved_bytes(); }
+  [[nodiscard]] std::uint64_t impostor_bytes() const { return renderer_->impl().detail.impostor_bytes(); }
+  [[nodiscard]] std::uint64_t halved_bytes() const { return renderer_->impl().detail.halved_bytes(); }
 
   Scene scene_;
 };

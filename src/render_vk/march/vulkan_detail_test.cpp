@@ -108,7 +108,7 @@ TEST_F(VulkanDetail, AnEditSendsWhatItChanged) {
   const Camera camera = towards({-300, 420, -500}, {0, 0, 0}, 0.6);
   const RenderOptions options = always_mid(4.0);
   compare(camera, options, "before_the_edit");
-  vulkan::DeviceMemory& memory = vulkan::Access::of(*renderer_).memory;
+  vulkan::DeviceMemory& memory = renderer_->impl().memory;
   const std::uint64_t before = memory.written();
   static_cast<void>(taken_as_is(camera, options));
   const std::uint64_t of_a_picture = memory.written() - before;
@@ -196,13 +196,13 @@ TEST_F(VulkanDetail, EvictsImpostorsThatNoPictureUses) {
   const std::vector<GridHandle> grids = {add_blobs(scene_, 31), add_blobs(scene_, 32)};
   add_crowd(scene_, grids, 2, 260.0);
   ASSERT_TRUE(renderer_->update(scene_));
-  vulkan::DeviceDetail& detail = vulkan::Access::of(*renderer_).detail;
+  vulkan::DeviceDetail& detail = renderer_->impl().detail;
   const auto place = [&](GridHandle wanted, std::uint64_t max_bytes) {
     std::vector<SelectedInstance> selected;
     for (const InstanceHandle handle : scene_.instances().handles()) {
       if (scene_.instances()[handle].grid == wanted) selected.push_back({handle, Detail::Mid, 1});
     }
-    ASSERT_TRUE(detail.place(vulkan::Access::of(*renderer_).scene, scene_, {selected, {}}, {}, {}, {}, max_bytes));
+    ASSERT_TRUE(detail.place(renderer_->impl().scene, scene_, {selected, {}}, {}, {}, {}, max_bytes));
   };
   place(grids[0], vulkan::DeviceDetail::kMaxBytes);
   const std::uint64_t first = detail.halved_bytes();

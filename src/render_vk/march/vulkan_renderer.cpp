@@ -100,7 +100,7 @@ Status VulkanRenderer::draw(VulkanPicture& picture, const Camera& camera, const 
                             Accumulation accumulation, Threads threads, const Progress& progress) {
   constexpr int kMaxSamples = 4096;
   if (Status status = check_request(camera, options); !status) return status;
-  vulkan::PictureImpl& target = vulkan::Access::of(picture);
+  vulkan::PictureImpl& target = picture.impl();
   if (target.device != impl_->device.get()) {
     return make_error(ErrorCode::InvalidArgument, "vulkan: the image belongs to another renderer");
   }

@@ -51,7 +51,7 @@ path::PixelSums sums_of(const Vec4* from, bool has_layers) {
 }  // namespace
 
 VulkanPathPicture::VulkanPathPicture(VulkanRenderer& renderer)
-    : impl_(std::make_unique<Impl>(*vulkan::Access::of(renderer).device)) {}
+    : impl_(std::make_unique<Impl>(*renderer.impl().device)) {}
 VulkanPathPicture::VulkanPathPicture(VulkanPathPicture&&) noexcept = default;
 VulkanPathPicture& VulkanPathPicture::operator=(VulkanPathPicture&&) noexcept = default;
 VulkanPathPicture::~VulkanPathPicture() = default;

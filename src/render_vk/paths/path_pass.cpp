@@ -217,7 +217,7 @@ Status PathPass::draw(int samples, const Progress& progress) {
 Status VulkanRenderer::draw_paths(VulkanPathPicture& picture, const Camera& camera, const PathOptions& options,
                                   Accumulation accumulation, const Progress& progress) {
   if (Status status = path::check(camera, options); !status) return status;
-  vulkan::PathPictureImpl& target = vulkan::Access::of(picture);
+  vulkan::PathPictureImpl& target = picture.impl();
   if (target.device != impl_->device.get()) {
     return make_error(ErrorCode::InvalidArgument, "vulkan: the image belongs to another renderer");
   }

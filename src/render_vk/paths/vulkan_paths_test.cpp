@@ -295,7 +295,7 @@ TEST_F(VulkanPaths, FollowEdits) {
 
 TEST_F(VulkanPaths, KeepTheFacesThatGlowUntilTheyAreOthers) {
   Scene scene = town();
-  const vulkan::DeviceMemory& memory = vulkan::Access::of(*renderer_).memory;
+  const vulkan::DeviceMemory& memory = renderer_->impl().memory;
   const auto sent = [&] {
     EXPECT_TRUE(renderer_->update(scene));
     const std::uint64_t before = memory.written();

@@ -120,7 +120,7 @@ VulkanMeshRenderer& VulkanMeshRenderer::operator=(VulkanMeshRenderer&&) noexcept
 VulkanMeshRenderer::~VulkanMeshRenderer() = default;
 
 Result<VulkanMeshRenderer> VulkanMeshRenderer::create(VulkanRenderer& renderer) {
-  vulkan::RendererImpl& shared = vulkan::Access::of(renderer);
+  vulkan::RendererImpl& shared = renderer.impl();
   auto pass = vulkan::MeshPass::create(*shared.device, shared.memory);
   if (!pass) return pass.error();
   return VulkanMeshRenderer(std::make_unique<Impl>(shared, std::move(*pass)));
@@ -300,7 +300,7 @@ Result<vulkan::MeshFrameData> VulkanMeshRenderer::Impl::make_frame(const Camera&
 
 Status VulkanMeshRenderer::draw(VulkanPicture& picture, const Camera& camera, const MeshPictureOptions& options,
                                 Threads threads) {
-  vulkan::PictureImpl& target = vulkan::Access::of(picture);
+  vulkan::PictureImpl& target = picture.impl();
   if (Status right = impl_->check_request(target, camera, options); !right) return right;
   auto light = vulkan::MeshLight::Plain;
   auto data = impl_->make_frame(camera, options, light, threads);

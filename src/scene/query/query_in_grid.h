@@ -24,10 +24,8 @@ namespace quoin {
 // The parts of a tracer that queries may access.
 class SceneQuery {
  public:
-  static const InstanceTree& instances(const SceneTracer& tracer) { return content_of(tracer.impl_).instances; }
-  static const std::vector<PlacedGrid>& unloaded(const SceneTracer& tracer) {
-    return content_of(tracer.impl_).unloaded;
-  }
+  static const InstanceTree& instances(const SceneTracer& tracer) { return tracer.impl().instances; }
+  static const std::vector<PlacedGrid>& unloaded(const SceneTracer& tracer) { return tracer.impl().unloaded; }
 };
 
 // A length below which two shapes touch rather than overlap, in voxels.

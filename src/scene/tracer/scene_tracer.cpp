@@ -56,8 +56,12 @@ SceneTracer::~SceneTracer() = default;
 const Scene& SceneTracer::scene() const {
   return *content_of(impl_).scene;
 }
+const SceneTracer::Impl& SceneTracer::impl() const {
+  return content_of(impl_);
+}
+
 const std::vector<PlacedGrid>& placed_in(const SceneTracer& tracer) {
-  return content_of(tracer.impl_).placed;
+  return tracer.impl().placed;
 }
 bool SceneTracer::has_transparent() const {
   return content_of(impl_).has_transparent;

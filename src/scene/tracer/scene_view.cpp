@@ -115,7 +115,7 @@ struct SceneView::Impl {
       left_out[i] = !has_transparent(placed[i]);
       if (!left_out[i]) glass.push_back(i);
     }
-    if (glass.size() > 1) with_glass = PacketTree(tracer->impl_->instances, origin, left_out);
+    if (glass.size() > 1) with_glass = PacketTree(tracer->impl().instances, origin, left_out);
   }
 
   // Returns the rays in view space that hit a transparent voxel or field of the instance.
@@ -235,7 +235,7 @@ SceneView::SceneView(const SceneTracer& tracer, DVec3 origin) : impl_(std::make_
     impl_->view_from_grid.push_back({view_axes, position - view_axes * placed.pivot});
   }
   impl_->origin = origin;
-  impl_->instances = PacketTree(tracer.impl_->instances, origin);
+  impl_->instances = PacketTree(tracer.impl().instances, origin);
   impl_->is_alone = placed_in(tracer).size() == 1;
   impl_->find_glass_instances();
 }
@@ -252,7 +252,7 @@ void SceneView::leave_to_impostors(std::span<const std::int32_t> placed) {
   if (placed.empty()) return;
   impl_->left_to_impostors.resize(placed_in(*impl_->tracer).size());
   for (const std::int32_t i : placed) impl_->left_to_impostors[static_cast<std::size_t>(i)] = true;
-  impl_->seen = PacketTree(impl_->tracer->impl_->instances, impl_->origin, impl_->left_to_impostors);
+  impl_->seen = PacketTree(impl_->tracer->impl().instances, impl_->origin, impl_->left_to_impostors);
 }
 
 void SceneView::first_hits(const RayPacket& rays_in_view, SceneHits& hits) const {

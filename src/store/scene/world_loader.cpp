@@ -237,13 +237,13 @@ Result<LoadedWorld> load(const WorldStore& world, Load::Chunks chunks, LoadedWor
 Result<LoadedWorld> load_world(const WorldStore& world, const LoadOptions& options, Threads threads,
                                const Progress& progress) {
   LoadedWorld result;
-  SaverState& state = result.saver.impl_->state;
+  SaverState& state = result.saver.impl().state;
   return load(world, Load::Chunks::All, std::move(result), state, options, threads, progress);
 }
 
 Result<LoadedWorld> load_partial_world(const WorldStore& world, const LoadOptions& options) {
   LoadedWorld result;
-  SaverState& state = result.saver.impl_->state;
+  SaverState& state = result.saver.impl().state;
   return load(world, Load::Chunks::None, std::move(result), state, options, {}, {});
 }
 

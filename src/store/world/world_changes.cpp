@@ -96,7 +96,7 @@ std::size_t WorldChanges::chunk_count() const {
 }
 
 void WorldParts::put(WorldChanges& changes, store::PartKey key, std::optional<PartBody> body) {
-  changes.content_->parts.insert_or_assign(std::move(key), std::move(body));
+  changes.content().parts.insert_or_assign(std::move(key), std::move(body));
 }
 
 void WorldParts::put(WorldChanges& changes, const char* kind, std::int64_t id, std::string_view text) {

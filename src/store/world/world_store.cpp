@@ -347,7 +347,7 @@ Result<std::optional<std::vector<std::byte>>> WorldStore::thumbnail() const {
 }
 
 Result<std::optional<PartBody>> WorldParts::find(const WorldStore& world, const PartKey& key) {
-  const WorldStore::Impl& impl = *world.impl_;
+  const WorldStore::Impl& impl = world.impl();
   if (impl.writer != nullptr) {
     if (auto pending = impl.writer->pending_part(key)) return std::move(*pending);
   }
@@ -364,7 +364,7 @@ Result<std::vector<std::string>> WorldStore::value_names() const {
 }
 
 Status WorldParts::each(const WorldStore& world, const char* kind, FunctionRef<void(const Part&, bool)> visit) {
-  const WorldStore::Impl& impl = *world.impl_;
+  const WorldStore::Impl& impl = world.impl();
   std::map<PartKey, PartBody> parts;
   std::set<PartKey> damaged;
   std::vector<std::pair<PartKey, std::optional<PartBody>>> pending;
@@ -395,7 +395,7 @@ Status WorldParts::each_chunk(const WorldStore& world, std::uint32_t grid, std::
     std::vector<std::byte> body;
     Result<StoredChunk> chunk = StoredChunk{};
   };
-  const WorldStore::Impl& impl = *world.impl_;
+  const WorldStore::Impl& impl = world.impl();
   const std::shared_ptr<const WorldRules> rules = impl.current_rules();
   const unsigned workers = thread_count(threads);
   auto kit = impl.take();
@@ -424,12 +424,12 @@ Status WorldParts::each_chunk(const WorldStore& world, std::uint32_t grid, std::
 }
 
 std::vector<std::string> WorldParts::damage(const WorldStore& world) {
-  return world.impl_->current_rules()->damage;
+  return world.impl().current_rules()->damage;
 }
 
 Result<SaveTicket> WorldStore::save(WorldChanges changes, std::function<void(const Status&)> on_saved) {
   QUOIN_ASSERT(impl_->writer != nullptr, "a world opened for writing");
-  ChangeSet& content = *changes.content_;
+  ChangeSet& content = changes.content();
   if (content.empty() && !on_saved) return SaveTicket{};
   // Under the lock: two threads that put types must not overtake each other.
   const std::scoped_lock guard(impl_->mutex);

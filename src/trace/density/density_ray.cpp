@@ -25,7 +25,7 @@ void read_corners(const DensityGrid& field, int x, int y, int z, float* corners)
 }
 
 trace::FieldView view_of(const DensityTree& tree) {
-  return {trace::TreeView::of(tree.cells()), &tree.field(), find_storage, read_corners};
+  return {tree.cells().view(), &tree.field(), find_storage, read_corners};
 }
 
 template <bool kAsksWhere>

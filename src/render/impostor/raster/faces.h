@@ -19,8 +19,6 @@ namespace quoin {
 
 /// The faces of an impostor.
 struct ImpostorFaces {
-  [[nodiscard]] static const ImpostorFaces& of(const Impostor& impostor) { return *impostor.faces_; }
-
   static constexpr int kLevels = 6;          ///< the faces themselves, then cells of 2, 4, 8, 16, 32 voxels
   static constexpr std::size_t kGroup = 16;  ///< faces projected at once
   static constexpr std::size_t kSides = 12;  ///< the six directions of voxels' faces, then those of surfels
