@@ -11,6 +11,7 @@
 
 #include "core/coordinates/chunk_boxes.h"
 #include "core/coordinates/chunk_order.h"
+#include "core/moved_from.h"
 #include "trace/brick_store.h"
 #include "trace/cell_rows.h"
 #include "trace/chunk_rows.h"
