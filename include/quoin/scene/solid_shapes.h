@@ -17,22 +17,6 @@ namespace quoin {
 // types are solid. Boxes have an inside, so fast bodies do not tunnel through them. Triangles do not, so fast bodies
 // need the engine's continuous collision detection.
 
-/// Appends boxes that cover each solid voxel of a chunk exactly once. Half of a box's size is the half extent that Jolt
-/// (StaticCompoundShapeSettings) and Bullet (btCompoundShape) take.
-///
-/// Space: voxels, origin at the chunk's minimum corner.
-/// Order: by each box's lowest voxel: z, then y, then x.
-/// Cost:  O(rows of 64 voxels + boxes * rows of each). 0.15 ms for cave terrain with 1,800 boxes per chunk.
-void append_solid_boxes(const Chunk& chunk, const VoxelRegistry& types, std::vector<IBox>& out);
-
-/// Appends the faces between a chunk's solid voxels and non-solid voxels, also across chunk borders, as rectangles.
-/// Each face is covered once; rectangles merge different types. Quads have type 0, no occlusion, and the usual corners.
-///
-/// Border: a missing chunk is not solid.
-/// Order:  by direction and layer; the same for the same voxels.
-/// Cost:   0.35 ms for the same chunk, 6,800 quads.
-void append_solid_faces(const Grid& grid, IVec3 chunk, const VoxelRegistry& types, QuadBuffer& out);
-
 /// Triangles in the layout of physics engines. `positions` has three floats per vertex (Jolt's Float3, Bullet's vertex
 /// base with a stride of 12 bytes). `indices` has three per triangle, counter-clockwise seen from outside.
 struct SolidMesh {
@@ -56,8 +40,16 @@ struct SolidShapesOptions {
 ///   }
 ///
 /// To find pieces that lose their support, use ConnectedPieces. An extracted piece is a grid with its own shapes.
-/// Cost:    an update costs `append_solid_boxes` and `append_solid_faces` for the changed chunks; O(chunks) if a type's
-///          `collides` changed.
+/// Space:   voxels, origin at the chunk's minimum corner.
+/// Boxes:   cover each solid voxel of a chunk exactly once. Half of a box's size is the half extent that Jolt
+///          (StaticCompoundShapeSettings) and Bullet (btCompoundShape) take.
+/// Faces:   lie between a chunk's solid voxels and non-solid voxels, also across chunk borders; a missing chunk is not
+///          solid. Each face is covered once; rectangles merge different types. Quads have type 0, no occlusion, and
+///          the usual corners.
+/// Order:   boxes by their lowest voxel (z, then y, then x); faces by direction and layer. The same voxels have the
+///          same shapes.
+/// Cost:    an update processes the changed chunks: 0.15 ms for the 1,800 boxes of a chunk of cave terrain, 0.35 ms for
+///          its 6,800 quads. O(chunks) if a type's `collides` changed.
 /// Threads: any number of threads may read at once; an update needs exclusive access.
 class SolidShapes {
  public:
