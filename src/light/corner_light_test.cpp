@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include "mesh/blocky/face_occlusion.h"
+
 namespace quoin {
 namespace {
 

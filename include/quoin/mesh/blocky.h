@@ -62,12 +62,10 @@ class BlockyMesher {
   std::unique_ptr<Scratch> scratch_;
 };
 
-/// Material class of a triangle. Each class becomes a separate primitive in mesh files.
+/// Material class of a triangle, from its type's visibility and emission. Each class becomes a separate primitive in
+/// mesh files.
 enum class SurfaceClass : std::uint8_t { Opaque, Transparent, Emissive, EmissiveTransparent };
 inline constexpr std::size_t kSurfaceClasses = 4;
-
-/// Returns the class of a type, from its visibility and emission.
-[[nodiscard]] SurfaceClass surface_class(const VoxelProperties& properties);
 
 /// Triangles of one surface class. The vertex arrays have one entry per vertex; faces share no vertices.
 struct BlockyTriangles {

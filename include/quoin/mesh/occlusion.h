@@ -6,8 +6,6 @@
 
 #include <quoin/core/direction.h>
 #include <quoin/core/vec.h>
-#include <quoin/grid/chunk.h>
-#include <quoin/grid/voxel_registry.h>
 
 namespace quoin {
 
@@ -56,7 +54,8 @@ inline constexpr std::array<std::array<CornerNeighbours, 4>, 6> kCornerNeighbour
 
 /// Returns the occlusion of one vertex from the three voxels that touch it in the layer in front of the face.
 ///
-/// The result is 3 if both sides are occluders; otherwise the number of occluders among the three voxels.
+/// The result is 3 if both sides are occluders; otherwise the number of occluders among the three voxels. Quoin's
+/// meshers treat only opaque voxels as occluders: glass and water do not darken.
 [[nodiscard]] constexpr std::uint8_t vertex_occlusion(bool side1, bool side2, bool corner) {
   if (side1 && side2) return 3;
   return static_cast<std::uint8_t>(static_cast<int>(side1) + static_cast<int>(side2) + static_cast<int>(corner));
@@ -66,13 +65,6 @@ inline constexpr std::array<std::array<CornerNeighbours, 4>, 6> kCornerNeighbour
 [[nodiscard]] constexpr float occlusion_brightness(std::uint8_t occlusion) {
   return 1.0F - 0.25F * static_cast<float>(occlusion);
 }
-
-/// Returns the occlusion of the four corners of a face of `voxel` (coordinates in the centre chunk). Only opaque voxels
-/// are occluders: glass and water do not darken.
-///
-/// Cost: 12 voxel look-ups; meshers do 64 faces at once instead.
-[[nodiscard]] FaceOcclusion face_occlusion(const Neighbourhood& chunks, const VoxelRegistry& types, IVec3 voxel,
-                                           Direction direction);
 
 /// Returns true if a quad must be split along corners 1-3 into triangles (1,2,3) (0,1,3), instead of (0,1,2) (0,2,3).
 ///

@@ -12,13 +12,8 @@
 
 namespace quoin {
 
-/// Returns true if the face of a voxel of type `a` towards a voxel of type `b` is visible: `a` is not air, and `b` is
-/// air or a transparent type other than `a`.
-[[nodiscard]] inline bool face_is_visible(const VoxelRegistry& types, VoxelType a, VoxelType b) {
-  if (a == kAir) return false;
-  if (b == kAir) return true;
-  return types.is_transparent(b) && a != b;
-}
+// The face of a voxel of type `a` towards a voxel of type `b` is visible if `a` is not air, and `b` is air or a
+// transparent type other than `a`.
 
 /// Visible faces of a chunk as bit masks, filled by BlockyMesher::find_faces.
 struct FaceRows {

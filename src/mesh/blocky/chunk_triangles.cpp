@@ -50,6 +50,12 @@ void append_outline(const Quad& quad, IVec3 origin, const std::vector<OutlinePoi
 
 }  // namespace
 
+SurfaceClass surface_class(const VoxelProperties& properties) {
+  const bool is_transparent = properties.visibility == Visibility::Transparent;
+  if (properties.emission > 0.0F) return is_transparent ? SurfaceClass::EmissiveTransparent : SurfaceClass::Emissive;
+  return is_transparent ? SurfaceClass::Transparent : SurfaceClass::Opaque;
+}
+
 ChunkTriangles::ChunkTriangles(const VoxelRegistry& types, bool watertight)
     : classes_(types.size()), watertight_(watertight) {
   for (std::size_t i = 0; i < classes_.size(); ++i) classes_[i] = surface_class(types[static_cast<VoxelType>(i)]);

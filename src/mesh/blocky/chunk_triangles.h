@@ -8,6 +8,9 @@
 
 namespace quoin {
 
+/// Returns the class of a type, from its visibility and emission.
+[[nodiscard]] SurfaceClass surface_class(const VoxelProperties& properties);
+
 /// Converts the quads of consecutive chunks to triangles.
 class ChunkTriangles {
  public:

@@ -6,11 +6,6 @@
 #include "mesh/blocky/chunk_triangles.h"
 
 namespace quoin {
-SurfaceClass surface_class(const VoxelProperties& properties) {
-  const bool is_transparent = properties.visibility == Visibility::Transparent;
-  if (properties.emission > 0.0F) return is_transparent ? SurfaceClass::EmissiveTransparent : SurfaceClass::Emissive;
-  return is_transparent ? SurfaceClass::Transparent : SurfaceClass::Opaque;
-}
 
 std::int64_t BlockyMesh::triangle_count() const {
   std::size_t total = 0;

@@ -12,6 +12,7 @@
 #include "core/instruction_set.h"
 #include "core/moved_from.h"
 #include "grid/chunk/chunk_storage.h"
+#include "mesh/blocky/face_occlusion.h"
 #include "mesh/blocky/scratch.h"
 
 namespace quoin {
@@ -146,6 +147,13 @@ void hide_faces_at_border(const Job& job, Scratch& s) {
 }  // namespace blocky
 
 namespace {
+
+// Returns true if the face of a voxel of type `a` towards a voxel of type `b` is visible.
+bool face_is_visible(const VoxelRegistry& types, VoxelType a, VoxelType b) {
+  if (a == kAir) return false;
+  if (b == kAir) return true;
+  return types.is_transparent(b) && a != b;
+}
 
 // Returns true for a chunk of one type that its six neighbours hide completely. No voxel is read then.
 bool is_buried(const Neighbourhood& chunks, const VoxelRegistry& types) {

@@ -6,6 +6,7 @@
 
 #include <quoin/mesh/visible_faces.h>
 
+#include "mesh/blocky/face_occlusion.h"
 #include "mesh/mesh_oracle.h"
 
 namespace quoin {
