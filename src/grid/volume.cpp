@@ -64,16 +64,7 @@ std::array<double, kBins> variance_between(const Histogram& counts) {
   return variance;
 }
 
-}  // namespace
-
-std::string_view name_of(ScalarType type) {
-  return kTypes[static_cast<std::size_t>(type)].name;
-}
-
-std::size_t size_of(ScalarType type) {
-  return kTypes[static_cast<std::size_t>(type)].bytes;
-}
-
+// Returns the value that best separates the finite values into two groups, as surface_value describes.
 float volume_threshold(const Volume& volume) {
   if (!(volume.min < volume.max)) return volume.min;
   const auto variance = variance_between(histogram_of(volume));
@@ -88,6 +79,16 @@ float volume_threshold(const Volume& volume) {
   const auto threshold = static_cast<float>(min + (bins + 1.0) * ((static_cast<double>(volume.max) - min) / kBins));
   // There is no float between two consecutive values, and no value is above the greater one.
   return std::min(threshold, std::nextafter(volume.max, volume.min));
+}
+
+}  // namespace
+
+std::string_view name_of(ScalarType type) {
+  return kTypes[static_cast<std::size_t>(type)].name;
+}
+
+std::size_t size_of(ScalarType type) {
+  return kTypes[static_cast<std::size_t>(type)].bytes;
 }
 
 Result<float> surface_value(const Volume& volume, std::optional<float> iso) {

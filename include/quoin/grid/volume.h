@@ -66,15 +66,11 @@ struct Volume {
 /// "um" and "nm", also spelt out.
 [[nodiscard]] std::optional<double> metres_of_unit(std::string_view unit);
 
-/// Returns the threshold that best separates the finite values into two groups: the least variance within the groups,
-/// from a histogram of 1,024 bins. If there is a gap between the groups, the threshold lies in its middle. If all
-/// values are equal, returns that value.
+/// Returns the value of the surface to extract: `iso` if given, otherwise the threshold that best separates the finite
+/// values into two groups. It has the least variance within the groups, from a histogram of 1,024 bins. If there is a
+/// gap between the groups, the threshold lies in its middle. If all values are equal, returns that value.
 ///
 /// Source: N. Otsu, "A Threshold Selection Method from Gray-Level Histograms" (1979).
-[[nodiscard]] float volume_threshold(const Volume& volume);
-
-/// Returns the value of the surface to extract: `iso` if given, otherwise volume_threshold.
-///
 /// Errors: InvalidArgument if every value is NaN, or if `iso` is not given and no value is finite. Uses the counts
 ///         stored in the volume.
 [[nodiscard]] Result<float> surface_value(const Volume& volume, std::optional<float> iso = {});

@@ -67,7 +67,7 @@ struct LoadOptions {
   /// file's size and for the original state of chunks that are edited later.
   bool keep_source = true;
   /// Threshold of a volume, or of the fog of a .vdb: values above are solid. Default: a threshold between the two
-  /// groups of values (volume_threshold).
+  /// groups of values (surface_value).
   std::optional<float> iso = std::nullopt;
   /// For worlds read by chunks (ChunkSource): the distance around the spawn, in chunks of 64 voxels to each side.
   int radius = 4;
