@@ -38,14 +38,10 @@ struct LightLevels {
           static_cast<std::uint8_t>(word >> 8 & 15), static_cast<std::uint8_t>(word >> 12)};
 }
 
-/// Returns the lamp light that a type emits; 0 for most types. An `emission` of 1 or more gives level 15 in the
-/// brightest channel of the type's colour, and the other channels in proportion to their sRGB values. A lower emission
-/// scales the levels. `sky` is 0.
-[[nodiscard]] LightLevels lamp_levels(const VoxelProperties& properties);
-
 struct PropagatedLightOptions {
-  /// Returns the lamp light that a type emits, for games with their own levels. Empty: `lamp_levels`. `sky` is ignored,
-  /// and levels above 15 count as 15.
+  /// Returns the lamp light that a type emits, for games with their own levels. `sky` is ignored, and levels above 15
+  /// count as 15. If empty, an `emission` of 1 or more gives level 15 in the brightest channel of the type's colour, and
+  /// the other channels in proportion to their sRGB values. A lower emission scales the levels.
   std::function<LightLevels(VoxelType, const VoxelProperties&)> lamp{};
 };
 

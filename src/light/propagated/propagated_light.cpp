@@ -16,6 +16,7 @@
 
 #include "core/coordinates/chunk_order.h"
 #include "core/moved_from.h"
+#include "light/propagated/lamp_levels.h"
 #include "light/propagated/light_domain.h"
 #include "light/propagated/light_quads.h"
 #include "light/propagated/light_reader.h"

@@ -12,6 +12,7 @@
 #include <quoin/mesh/blocky.h>
 
 #include "core/instruction_sets_for_tests.h"
+#include "light/propagated/lamp_levels.h"
 
 namespace quoin {
 namespace {
