@@ -3,8 +3,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <optional>
-#include <span>
 #include <vector>
 
 #include <quoin/core/image.h>
@@ -13,11 +11,9 @@
 #include <quoin/grid/changes.h>
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
-#include <quoin/render/cpu_renderer.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>
-#include <quoin/scene/scene_tracer.h>
 #include <quoin/trace/occupancy_tree.h>
 
 namespace quoin {
@@ -28,14 +24,6 @@ namespace quoin {
 /// Edges:   for a in {-1, 1}, for b in {-1, 1}: (a,b,0), (a,0,b), (0,a,b).
 /// Corners: x outermost, then y, then z; each -1, then 1.
 inline constexpr int kImpostorViews = 26;
-
-/// Returns the unit vector from the content's centre towards a view's camera, in grid coordinates.
-/// Requires: 0 <= index < kImpostorViews.
-[[nodiscard]] DVec3 impostor_view(int index);
-
-/// Returns the view with the largest dot product with `direction` (any length); the first on ties. It is at most about
-/// 27.57 degrees away. Empty if `direction` is zero or not finite.
-[[nodiscard]] std::optional<int> nearest_impostor_view(DVec3 direction);
 
 class DensityTree;
 struct ImpostorFaces;
@@ -141,30 +129,5 @@ struct ImpostorPicture {
 /// Cost: about 0.15 microseconds per texel that the content's box covers, on several threads.
 [[nodiscard]] std::vector<ImpostorPicture> impostor_pictures(const Grid& grid, const VoxelRegistry& types,
                                                              const ImpostorOptions& options = {}, Threads threads = {});
-
-/// An instance drawn as its grid's impostor. Lifetime: the impostor must outlive it.
-struct FarInstance {
-  InstanceHandle instance;
-  const Impostor* impostor = nullptr;
-};
-
-/// Draws far instances into an image that was rendered without them.
-///
-/// Chooses the views nearest to the camera's direction in the instance's own frame, and intersects each pixel's ray
-/// with the faces of these views. Silhouettes, depth and roll are therefore correct between views. Light is as in
-/// CpuRenderer, with shadows traced through all of `scene`. Exceptions: with OcclusionMode::Rays, occlusion is the
-/// unoccluded share of nine rays of 6 voxels from the face's centre against the grid only; lamps and propagated light
-/// add no light.
-///
-/// Depth:    the nearer surface wins against the image; among far instances at equal depth the lower handle wins.
-///           Pixels without any part of an instance keep colour and depth.
-/// Left out: instances whose content's centre is behind the camera's plane, on it or not finite; instances whose
-///           content's radius spans less than a pixel; instances that `scene` does not hold or holds halved;
-///           transparent parts of voxels and fields.
-///
-/// Requires: CpuRenderer accepts the camera and the options; the light model is LightModel::Rays; `picture` has the
-///           size of the options, and depth. Takes one sample per pixel, at its centre.
-void draw_impostors(const SceneTracer& scene, std::span<const FarInstance> far, const Camera& camera,
-                    const RenderOptions& options, Picture& picture, Threads threads = {});
 
 }  // namespace quoin

@@ -12,6 +12,12 @@
 
 namespace quoin {
 
+/// An instance drawn as its grid's impostor. Lifetime: the impostor must outlive it.
+struct FarInstance {
+  InstanceHandle instance;
+  const Impostor* impostor = nullptr;
+};
+
 /// The far instances of one image that have impostors.
 struct FarImpostors {
   static constexpr std::size_t kMaxBytes = std::size_t{1} << 30;  ///< of all grids; grids beyond the limit have none

@@ -14,6 +14,7 @@
 #include <benchmark/benchmark.h>
 #include <glm/geometric.hpp>
 
+#include <quoin/render/cpu_renderer.h>
 #include <quoin/render/impostor_cache.h>
 #include <quoin/terrain/terrain.h>
 

@@ -5,9 +5,14 @@
 #include <span>
 #include <vector>
 
+#include <quoin/core/parallel.h>
+#include <quoin/render/cpu_renderer.h>
 #include <quoin/render/impostor.h>
+#include <quoin/scene/camera.h>
+#include <quoin/scene/scene_tracer.h>
 
 #include "render/camera_rays.h"
+#include "render/impostor/far.h"
 #include "render/impostor/raster/raster.h"
 #include "render/impostor/screen.h"
 #include "scene/tracer/scene_view.h"
@@ -66,6 +71,25 @@ class ImpostorPass {
   std::vector<DrawnImpostor> drawn_;              // in the order of `placed`
   std::vector<std::vector<std::uint32_t>> bins_;  // by tile: indices into `drawn_`, nearest first
 };
+
+/// Draws far instances into an image that was rendered without them.
+///
+/// Chooses the views nearest to the camera's direction in the instance's own frame, and intersects each pixel's ray
+/// with the faces of these views. Silhouettes, depth and roll are therefore correct between views. Light is as in
+/// CpuRenderer, with shadows traced through all of `scene`. Exceptions: with OcclusionMode::Rays, occlusion is the
+/// unoccluded share of nine rays of 6 voxels from the face's centre against the grid only; lamps and propagated light
+/// add no light.
+///
+/// Depth:    the nearer surface wins against the image; among far instances at equal depth the lower handle wins.
+///           Pixels without any part of an instance keep colour and depth.
+/// Left out: instances whose content's centre is behind the camera's plane, on it or not finite; instances whose
+///           content's radius spans less than a pixel; instances that `scene` does not hold or holds halved;
+///           transparent parts of voxels and fields.
+///
+/// Requires: CpuRenderer accepts the camera and the options; the light model is LightModel::Rays; `picture` has the
+///           size of the options, and depth. Takes one sample per pixel, at its centre.
+void draw_impostors(const SceneTracer& scene, std::span<const FarInstance> far, const Camera& camera,
+                    const RenderOptions& options, Picture& picture, Threads threads = {});
 
 /// Returns the indices in SceneTracer::placed of the far instances in a tracer.
 [[nodiscard]] std::vector<std::int32_t> placed_of(const SceneTracer& tracer, std::span<const FarInstance> far);

@@ -15,7 +15,15 @@
 
 namespace quoin {
 
-/// The camera of a snapshot, in the grid's frame: a pinhole at `position` that looks at the content's centre.
+/// Returns the unit vector from the content's centre towards a view's camera, in grid coordinates.
+/// Requires: 0 <= index < kImpostorViews.
+[[nodiscard]] DVec3 impostor_view(int index);
+
+/// Returns the view with the largest dot product with `direction` (any length); the first on ties. It is at most about
+/// 27.57 degrees away. Empty if `direction` is zero or not finite.
+[[nodiscard]] std::optional<int> nearest_impostor_view(DVec3 direction);
+
+/// From where a snapshot is taken, in the grid's frame: a pinhole at `position` that looks at the content's centre.
 struct SnapshotCamera {
   DVec3 position{0.0};
   DVec3 right{1.0, 0.0, 0.0};
