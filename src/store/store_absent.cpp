@@ -160,9 +160,6 @@ Result<WorldMeshes> mesh_world(const WorldStore&, const LoadedWorld&, const Worl
                                const Progress&) {
   return absent();
 }
-std::optional<std::uint64_t> memory_of_world(const WorldStore&) {
-  return std::nullopt;
-}
 Result<std::uint64_t> compact_world(const std::filesystem::path& path) {
   return absent(path);
 }

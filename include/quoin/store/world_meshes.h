@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -56,9 +55,5 @@ struct WorldMeshes {
 [[nodiscard]] Result<FaceCounts> count_world_faces(const WorldStore& world, const LoadedWorld& loaded,
                                                    InstanceFilter filter = InstanceFilter::Visible,
                                                    Threads threads = {}, const Progress& progress = {});
-
-/// Estimates the bytes of memory that load_world needs for a world, from a sample of its chunks. Returns nullopt if
-/// they cannot be read.
-[[nodiscard]] std::optional<std::uint64_t> memory_of_world(const WorldStore& world);
 
 }  // namespace quoin

@@ -2,10 +2,10 @@
 #include <utility>
 
 #include <quoin/core/memory.h>
-#include <quoin/store/world_meshes.h>
 #include <quoin/store/world_saver.h>
 
 #include "io/world_format.h"
+#include "store/scene/world_memory.h"
 #include "store/world/world_changes.h"
 
 namespace quoin {
