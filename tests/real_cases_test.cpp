@@ -15,6 +15,7 @@
 #include <quoin/scene/scene.h>
 
 #include "io/byte_stream.h"
+#include "io/vox/write/write.h"
 
 namespace quoin {
 

@@ -17,6 +17,7 @@
 #include "io/minecraft/schematic.h"
 #include "io/models/models.h"
 #include "io/models/write/write_models.h"
+#include "io/scene_file/scene_file.h"
 #include "io/source/detect_world.h"
 #include "io/source/luanti_map.h"
 #include "io/triangles/triangles.h"
@@ -24,6 +25,7 @@
 #include "io/vdb/vdb_tree.h"
 #include "io/volume/header.h"
 #include "io/volume/write.h"
+#include "io/vox/write/write.h"
 #include "io/whole_file.h"
 #include "io/world_format.h"
 

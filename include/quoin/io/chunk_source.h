@@ -124,8 +124,6 @@ class SourceTypes {
   std::vector<VoxelType> numbers_{0};  // indexed by source type; kAir: not assigned yet
 };
 
-/// Returns true if the path is a world folder, which open_chunk_source can read.
-[[nodiscard]] bool is_world_folder(const std::filesystem::path& path);
 /// Returns true if open_chunk_source reads files of this format (from detect_format).
 [[nodiscard]] bool is_read_by_chunks(std::optional<FileFormat> format);
 

@@ -40,13 +40,6 @@ namespace quoin {
 [[nodiscard]] Result<std::uint64_t> write_pfm(const FloatImage& picture, const std::filesystem::path& path);
 [[nodiscard]] Result<std::vector<std::byte>> write_pfm(const FloatImage& picture);
 
-/// Reads a greyscale PFM of either byte order. Ignores the magnitude of the scale.
-///
-/// Errors: CannotRead; BadFormat with the byte offset; Unsupported for colour ("PF"). Memory stays within the input's
-///         size.
-[[nodiscard]] Result<FloatImage> read_pfm(const std::filesystem::path& path);
-[[nodiscard]] Result<FloatImage> read_pfm(std::span<const std::byte> bytes);
-
 /// Writes a JPEG without chroma subsampling, atomically. The same image gives the same bytes on every machine.
 /// `quality`: 1 to 100.
 ///

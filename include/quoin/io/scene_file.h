@@ -13,13 +13,13 @@
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/voxel_registry.h>
-#include <quoin/io/loaded_scene.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/scene.h>
 
 namespace quoin {
 
-/// The content of a scene file, before the files that it names are read. The format: docs/scene-files.md.
+/// The content of a scene file, before the files that it names are read; load_scene reads these too. The format:
+/// docs/scene-files.md.
 ///
 /// A scene file may contain models (`types` and `grids`), name model files (`sources`), or both. Types from named files
 /// are appended to its own types.
@@ -92,21 +92,5 @@ struct SceneFile {
 /// Writes a scene file atomically and returns its size. Errors: also CannotWrite; errors name the file.
 [[nodiscard]] Result<std::uint64_t> write_scene_file(const SceneFile& scene, const std::filesystem::path& path,
                                                      Threads threads = {}, const Progress& progress = {});
-
-/// Reads a scene file and all files that it names. Each file is read once, however often it is placed. The instances of
-/// a named file are placed as one body; several instances become a group. Types that equal an existing type in every
-/// property are merged with it.
-///
-/// Errors: those of `parse_scene_file` and of reading the named files (with their paths); Unsupported if a named file
-///         is a scene file that names files itself; LimitExceeded if all files together have more types than a registry
-///         holds.
-[[nodiscard]] Result<LoadedScene> read_scene_file(const std::filesystem::path& path, const LoadOptions& options = {},
-                                                  Threads threads = {}, const Progress& progress = {});
-/// Reads a scene file from bytes. Errors: also Unsupported if it names other files, which need a path.
-[[nodiscard]] Result<LoadedScene> read_scene_file(std::span<const std::byte> text, const LoadOptions& options = {},
-                                                  Threads threads = {}, const Progress& progress = {});
-
-/// Returns true if the bytes look like the start of a scene file: a JSON object with its version near the beginning.
-[[nodiscard]] bool is_scene_file(std::span<const std::byte> beginning);
 
 }  // namespace quoin

@@ -96,8 +96,4 @@ struct VoxBytes {
 [[nodiscard]] Result<SavedScene> write_vox(const LoadedScene& loaded, const std::filesystem::path& path,
                                            const Progress& progress = {});
 
-/// Returns the warnings that write_vox would give. Errors: those of write_vox, except for files of more than 4 GiB.
-[[nodiscard]] Result<std::vector<std::string>> losses_of_vox(const Scene& scene);
-[[nodiscard]] Result<std::vector<std::string>> losses_of_vox(const LoadedScene& loaded);
-
 }  // namespace quoin

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
 #include <span>
 
 #include <quoin/core/image.h>
@@ -17,6 +18,13 @@ namespace quoin {
 /// Errors: as decode_picture.
 [[nodiscard]] Result<AlphaImage> decode_jpeg(std::span<const std::byte> bytes);
 [[nodiscard]] Result<AlphaImage> decode_webp(std::span<const std::byte> bytes);
+
+/// Reads a greyscale PFM of either byte order. Ignores the magnitude of the scale.
+///
+/// Errors: CannotRead; BadFormat with the byte offset; Unsupported for colour ("PF"). Memory stays within the input's
+///         size.
+[[nodiscard]] Result<FloatImage> read_pfm(const std::filesystem::path& path);
+[[nodiscard]] Result<FloatImage> read_pfm(std::span<const std::byte> bytes);
 
 inline constexpr std::size_t kMostPicturePixels = std::size_t{1} << 28;
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "io/image/decode.h"
 #include "io/text.h"
 #include "io/whole_file.h"
 

@@ -1,4 +1,4 @@
-#include <quoin/io/picture_files.h>
+#include "io/image/decode.h"
 
 #include <cstdlib>
 

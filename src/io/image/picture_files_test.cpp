@@ -12,6 +12,7 @@
 
 #include "core/death_for_tests.h"
 #include "io/gltf/glb_for_tests.h"
+#include "io/image/decode.h"
 #include "io/image/png.h"
 
 namespace quoin {

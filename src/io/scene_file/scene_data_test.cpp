@@ -12,7 +12,9 @@
 #include "io/base64.h"
 #include "io/byte_stream.h"
 #include "io/gltf/glb_for_tests.h"
+#include "io/scene_file/scene_file.h"
 #include "io/scene_file/voxel_data.h"
+#include "io/vox/write/write.h"
 
 // Voxel data in scene files.
 

@@ -1,4 +1,4 @@
-#include <quoin/io/scene_file.h>
+#include "io/scene_file/scene_file.h"
 
 #include <array>
 #include <map>

@@ -6,6 +6,7 @@
 
 #include "io/scene_file/grids_parse.h"
 #include "io/scene_file/json_reader.h"
+#include "io/scene_file/scene_file.h"
 #include "io/scene_file/scene_parts.h"
 #include "io/scene_file/voxel_data.h"
 #include "io/whole_file.h"

@@ -14,6 +14,8 @@
 #include <quoin/io/formats.h>
 #include <quoin/io/vox.h>
 
+#include "io/scene_file/scene_file.h"
+
 namespace quoin {
 namespace {
 

@@ -10,6 +10,7 @@
 #include <quoin/store/world_import.h>
 #include <quoin/store/world_saver.h>
 
+#include "io/source/detect_world.h"
 #include "io/source/luanti_map.h"
 #include "store/luanti/luanti_for_tests.h"
 #include "store/luanti/map_block.h"

@@ -13,6 +13,7 @@
 
 #include "io/vox/source.h"
 #include "io/vox/vox_for_tests.h"
+#include "io/vox/write/write.h"
 
 namespace quoin {
 namespace {

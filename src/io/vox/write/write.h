@@ -5,9 +5,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
+#include <quoin/core/result.h>
 #include <quoin/grid/grid.h>
+#include <quoin/io/loaded_scene.h>
 #include <quoin/scene/scene.h>
 
 #include "io/vox/chunks.h"
@@ -66,6 +69,10 @@ void write_voxels(const Grid& grid, const std::vector<std::uint8_t>& index_of_ty
 }  // namespace quoin::vox
 
 namespace quoin {
+
+/// Returns the warnings that write_vox would give. Errors: those of write_vox, except for files of more than 4 GiB.
+[[nodiscard]] Result<std::vector<std::string>> losses_of_vox(const Scene& scene);
+[[nodiscard]] Result<std::vector<std::string>> losses_of_vox(const LoadedScene& loaded);
 
 /// Calls `visit(voxel, type)` for every non-air voxel of a chunk with minimum corner `origin`, by z, then y, then x.
 ///
