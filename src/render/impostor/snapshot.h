@@ -23,7 +23,7 @@ namespace quoin {
 /// 27.57 degrees away. Empty if `direction` is zero or not finite.
 [[nodiscard]] std::optional<int> nearest_impostor_view(DVec3 direction);
 
-/// From where a snapshot is taken, in the grid's frame: a pinhole at `position` that looks at the content's centre.
+/// The camera of a snapshot, in the grid's frame: a pinhole at `position` that looks at the content's centre.
 struct SnapshotCamera {
   DVec3 position{0.0};
   DVec3 right{1.0, 0.0, 0.0};
