@@ -79,7 +79,7 @@ void edit_somewhere(DensityGrid& grid, std::mt19937& random) {
 }
 
 // Edits report every chunk whose mesh they changed, with any meshed occlusion.
-TEST(DensityEdits, NoMeshChangesUntold) {
+TEST(DensityEdits, ReportsEveryMeshChange) {
   constexpr unsigned kSeed = 41;
   SCOPED_TRACE(kSeed);
   std::mt19937 random(kSeed);

@@ -224,7 +224,7 @@ TEST(TriangleCases, PolygonsAreCutAsTheyAre) {
   EXPECT_EQ(voxels_of("ply-concave-polygon.ply", 0.02, SolidVoxels::None), 11'758);
 }
 
-TEST(TriangleCases, ReadsWhatOtherProgramsWrite) {
+TEST(TriangleCases, ReadsFilesOfOtherPrograms) {
   for (const char* name : {"obj-bom.obj", "obj-continued-line.obj", "obj-empty-indices.obj", "ply-cr-lines.ply"}) {
     const auto mesh = read_mesh(case_file(name));
     ASSERT_TRUE(mesh) << name << ": " << to_string(mesh.error());

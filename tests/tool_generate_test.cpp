@@ -44,7 +44,7 @@ TEST_F(ToolGenerate, WritesTheSameWorldAsTheLibrary) {
   EXPECT_EQ(loaded.scene.types[1].colour, (Rgba8{77, 179, 51, 255}));
 }
 
-TEST_F(ToolGenerate, IsSeed42And4x2x4UnlessTold) {
+TEST_F(ToolGenerate, DefaultsToSeed42And4x2x4) {
   EXPECT_EQ(run("generate terrain a.vox").status, 0);
   EXPECT_EQ(run("generate terrain b.vox --seed 42 --chunks 4x2x4 --threads 3").status, 0);
   EXPECT_EQ(run("generate terrain c.vox --seed 43").status, 0);
@@ -54,7 +54,7 @@ TEST_F(ToolGenerate, IsSeed42And4x2x4UnlessTold) {
   EXPECT_FALSE(a == text_of(folder_.file("c.vox")));
 }
 
-TEST_F(ToolGenerate, SaysWhatItMade) {
+TEST_F(ToolGenerate, ReportsTheResult) {
   const ToolRun result = run("generate terrain hills.vox --chunks 1x1x1");
   ASSERT_EQ(result.status, 0) << result.err;
   EXPECT_NE(result.out.find("seed 42, 32 x 32 x 32"), std::string::npos) << result.out;

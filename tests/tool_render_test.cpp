@@ -390,7 +390,7 @@ TEST_F(ToolRender, TheNameSaysWhatKindOfPictureItIs) {
   if (!has_jpeg() || !has_webp()) GTEST_SKIP() << "built without libjpeg or libwebp";
 }
 
-TEST_F(ToolRender, PathsRefuseWhatIsNotTheirs) {
+TEST_F(ToolRender, PathTracingRejectsOtherOptions) {
   std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(2);
   for (const std::string flags : {"--light path --lamps 4",
                                   "--light path --preset ao",

@@ -248,7 +248,7 @@ TEST_F(ToolSmooth, ARawVolumeBecomesItsSurface) {
   EXPECT_EQ(run("convert ball.raw out.ply --raw-size 40x36x39 --raw-type float64").status, 1);
 }
 
-TEST_F(ToolSmooth, TheSurfaceValueIsFoundAndSaid) {
+TEST_F(ToolSmooth, FindsAndReportsTheSurfaceValue) {
   std::vector<double> values = ball({24, 24, 24}, DVec3(11.5), 8.0);
   for (double& value : values) value = value > 0.0 ? 200.0 : 40.0;
   write("ball.raw", volume_test::encode(values, ScalarType::UInt8));
@@ -327,7 +327,7 @@ TEST_F(ToolSmooth, VolumesWithoutAFiniteValueAreErrors) {
   }
 }
 
-TEST_F(ToolSmooth, RawVolumesAreToldDrawnAndKeptAsFields) {
+TEST_F(ToolSmooth, RawVolumesAreReportedRenderedAndKeptAsFields) {
   write("ball.raw", volume_test::encode(ball({20, 18, 16}, DVec3(9.0), 6.0), ScalarType::Float32));
   const std::string raw = " --raw-size 20x18x16 --raw-type float32";
   const ToolRun told = run("info ball.raw --json" + raw);

@@ -22,7 +22,7 @@ using Json = nlohmann::json;
 
 class Tool : public ToolTest {};
 
-TEST_F(Tool, InfoSaysWhatIsInAFile) {
+TEST_F(Tool, InfoDescribesAFile) {
   const ToolRun text = run("info tiny.vox");
   EXPECT_EQ(text.status, 0) << text.err;
   EXPECT_NE(text.out.find("Voxels: 4 of 2 types\nFaces: 18 visible of 24 total\n"), std::string::npos) << text.out;
@@ -69,7 +69,7 @@ TEST_F(Tool, DataOfVoxelsIsCountedAndNamedWhereItIsLost) {
   EXPECT_EQ(read_file(folder_.file("again.json")).value(), read_file(folder_.file("data.json")).value());
 }
 
-TEST_F(Tool, InfoSaysWhatIsInAVolume) {
+TEST_F(Tool, InfoDescribesAVolume) {
   std::ofstream(folder_.file("a.nrrd"), std::ios::binary)
       << "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 2 3 1\nencoding: raw\nspacings: 0.5 1 2\n\nabcdef";
   const ToolRun text = run("info a.nrrd");
@@ -211,7 +211,7 @@ TEST_F(Tool, FramesBecomeAnAnimation) {
 }
 
 // Such a file shows no voxels; `info` should give the reason.
-TEST_F(Tool, InfoTellsOfHiddenLayersWithoutAName) {
+TEST_F(Tool, InfoReportsHiddenUnnamedLayers) {
   vox_test::FileBuilder file;
   file.model(2, 2, 2, {{0, 0, 0, 1}});
   file.transform(0, 1, {{}}, {}, -1).group(1, {2});

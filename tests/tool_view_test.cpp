@@ -19,7 +19,7 @@ class ToolView : public ToolTest {
   static constexpr const char* kNoDisplay = "unset DISPLAY WAYLAND_DISPLAY SDL_VIDEODRIVER; '" QUOIN_TOOL "' ";
 };
 
-TEST_F(ToolView, WithoutADisplayItSaysSo) {
+TEST_F(ToolView, ReportsAMissingDisplay) {
   const ToolRun result = without_display("view tiny.vox");
   EXPECT_EQ(result.status, 1);
   expect_one_error_line(result);
@@ -50,7 +50,7 @@ TEST_F(ToolView, WrongUsageIsRefused) {
   }
 }
 
-TEST_F(ToolView, AWindowThatNobodySeesShowsTheRenderersPicture) {
+TEST_F(ToolView, AHiddenWindowShowsTheRenderersImage) {
   if (!is_built()) GTEST_SKIP() << "the viewer is not built";
   const ToolRun shown = shell("SDL_VIDEODRIVER=dummy SDL_RENDER_DRIVER=software '" QUOIN_TOOL
                               "' view tiny.vox --bare --size 320x240 --screenshot a.png");

@@ -40,7 +40,7 @@ TEST_F(ToolWatch, AChangedInputIsConvertedAgain) {
   EXPECT_NE(result.err.find("quoin: watching tiny.vox; press Ctrl-C to stop"), std::string::npos) << result.err;
 }
 
-TEST_F(ToolWatch, ABrokenStateIsToldOfAndTheNextOneTaken) {
+TEST_F(ToolWatch, ReportsABrokenFileAndConvertsTheNextVersion) {
   ASSERT_EQ(run("convert other.vox second.ply").status, 0);
   const ToolRun result = script(
       "start convert tiny.vox out.ply --watch\n"

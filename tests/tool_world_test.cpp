@@ -47,7 +47,7 @@ TEST_F(ToolWorld, AWorldIsAFileLikeAnyOther) {
   EXPECT_EQ(run("convert hills.json again.quoin --force -q").status, 0);
 }
 
-TEST_F(ToolWorld, InfoSaysWhatThereIs) {
+TEST_F(ToolWorld, InfoDescribesAWorld) {
   const ToolRun text = run("world info hills.quoin");
   EXPECT_EQ(text.status, 0) << text.err;
   EXPECT_NE(text.out.find(": world version 2"), std::string::npos) << text.out;
@@ -58,7 +58,7 @@ TEST_F(ToolWorld, InfoSaysWhatThereIs) {
   EXPECT_EQ(json["grids"][0]["chunk_bounds"]["max"], Json({2, 2, 2}));
 }
 
-TEST_F(ToolWorld, DamageIsToldAndRepaired) {
+TEST_F(ToolWorld, ReportsAndRepairsDamage) {
   EXPECT_EQ(run("world check hills.quoin").status, 0);
   damage("hills.quoin");
   const ToolRun check = run("world check hills.quoin");

@@ -73,7 +73,7 @@ class SceneOfARow : public testing::Test {
   quoin_scene scene_ = 0;
 };
 
-TEST_F(SceneOfARow, InstancesAreToldAddedAndMoved) {
+TEST_F(SceneOfARow, ReportsAddsAndMovesInstances) {
   auto place = sized<quoin_instance>();
   ASSERT_EQ(quoin_instance_get(scene_, 0, &place), QUOIN_OK);
   EXPECT_STREQ(place.name, "row");
@@ -156,7 +156,7 @@ TEST_F(SceneOfARow, ShorterStructsStayAsTheyAre) {
   }
 }
 
-TEST(CFile, GroupsLayersLampsAndCamerasAreTold) {
+TEST(CFile, ReportsGroupsLayersLampsAndCameras) {
   quoin_scene scene = 0;
   ASSERT_EQ(quoin_scene_load_bytes(kSceneFile, std::strlen(kSceneFile), &scene), QUOIN_OK) << quoin_last_error();
   auto info = sized<quoin_scene_info>();
@@ -346,7 +346,7 @@ TEST(CArrays, WithoutStridesHaveNoGaps) {
   EXPECT_EQ(quoin_free(scene), QUOIN_OK);
 }
 
-TEST(CFormats, SayWhatCanBeRead) {
+TEST(CFormats, ListReadableFormats) {
   std::size_t count = 0;
   ASSERT_EQ(quoin_format_count(&count), QUOIN_OK);
   std::string readable;
@@ -557,7 +557,7 @@ std::int32_t listen(double fraction, void* user) {
   return ++listener->calls == listener->stop_at ? 0 : 1;
 }
 
-TEST_F(SceneOfARow, ProgressIsToldAndMayEndAWork) {
+TEST_F(SceneOfARow, ReportsProgressAndCanBeCancelled) {
   Listener listener;
   ASSERT_EQ(quoin_set_progress(listen, &listener), QUOIN_OK);
   auto options = sized<quoin_render_options>();

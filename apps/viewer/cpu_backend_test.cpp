@@ -533,7 +533,7 @@ TEST(Loader, ErrorsArriveToo) {
   EXPECT_EQ(loader.take().error().code, ErrorCode::CannotRead);
 }
 
-TEST(Saver, WritesWhatTheDocumentHolds) {
+TEST(Saver, WritesTheDocument) {
   const ScratchFolder folder("saver");
   const Document document = small_document();
   Bell bell;

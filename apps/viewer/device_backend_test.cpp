@@ -238,7 +238,7 @@ TEST_F(DeviceBackendTest, PathsConvergeAndFollowEdits) {
 }
 
 // How fine the first picture may be follows from what others like it took.
-TEST_F(DeviceBackendTest, WhatPathsTakeSaysNothingOfRays) {
+TEST_F(DeviceBackendTest, PathTracingTimesDoNotAffectRays) {
   const Document document = small_document();
   DeviceBackendOptions options;
   options.cpu.threads = {2};
@@ -552,7 +552,7 @@ TEST_F(DeviceBackendTest, MeshPicturesAreNeverUnderAQuarterOfTheSizeHoweverSlow)
   EXPECT_EQ(pictures.back().width, request.width);
 }
 
-TEST_F(DeviceBackendTest, ModesThatTakeTooLongAreToldOf) {
+TEST_F(DeviceBackendTest, ReportsModesThatTakeTooLong) {
   const Document document = small_document();
   for (const double seconds : {1e-9, 1e9}) {
     DeviceBackendOptions options;

@@ -62,7 +62,7 @@ TEST(Brush, CoversWhatItsShapeSays) {
   }
 }
 
-TEST(Brush, ActionsTouchWhatTheyName) {
+TEST(Brush, ActionsTouchOnlyTheirTargets) {
   Grid grid;
   grid.set({0, 0, 0}, 1);
   EXPECT_EQ(apply({BrushAction::Paint, BrushShape::Box, 1, 2}, {0, 0, 0}, grid), 1);
@@ -268,7 +268,7 @@ TEST(Document, FieldsAreSculptedPaintedAndUndone) {
   EXPECT_FALSE(document.begin_stroke(brush, hit)) << "blocks are not smoothed";
 }
 
-TEST(Document, AnEditAfterAnUndoForgetsWhatWasUndone) {
+TEST(Document, AnEditAfterAnUndoClearsRedo) {
   Document document = small_document();
   const Brush brush{BrushAction::Place, BrushShape::Box, 0, 3};
   for (const int x : {5, 9}) {

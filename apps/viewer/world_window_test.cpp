@@ -167,7 +167,7 @@ TEST_F(WorldWindowTest, UndoesDistantEditsOnlyThere) {
   EXPECT_EQ(type_there(), kAir);
 }
 
-TEST_F(WorldWindowTest, AWorldThatOthersWriteIsLookedAt) {
+TEST_F(WorldWindowTest, OpensAWorldWithAnotherWriter) {
   make_small();
   const auto before = std::filesystem::file_size(path());
   {

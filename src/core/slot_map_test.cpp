@@ -48,7 +48,7 @@ TEST(SlotMap, HandlesAreKeys) {
   EXPECT_FALSE(names.contains(map.insert(3))) << "another, in the same slot";
 }
 
-TEST(SlotMap, AHandleOfARemovedElementNamesNothingForEver) {
+TEST(SlotMap, AHandleOfARemovedElementStaysInvalid) {
   SlotMap<int> map;
   const auto old = map.insert(1);
   EXPECT_EQ(map.next_index(), 1U);

@@ -49,7 +49,7 @@ TEST(Srgb, RoundsToTheNearestByteNextToEveryThreshold) {
   }
 }
 
-TEST(Srgb, ClampsWhatIsOutOfRange) {
+TEST(Srgb, ClampsValuesOutOfRange) {
   const SrgbEncoder& encode = SrgbEncoder::shared();
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   for (const float low : {-1.0F, -0.0F, 0.0F, -kInfinity, std::numeric_limits<float>::quiet_NaN(), 1e-30F}) {

@@ -112,7 +112,7 @@ std::vector<IVec3> random_edit(std::mt19937& random, Grid& grid) {
   return changed;
 }
 
-TEST(Changes, EveryConsumerIsToldExactlyWhatChangedSinceItsOwnLastTime) {
+TEST(Changes, EveryConsumerReceivesChangesSinceItsCursor) {
   for (unsigned seed = 1; seed <= 6; ++seed) {
     SCOPED_TRACE(seed);
     std::mt19937 random(seed);
@@ -139,7 +139,7 @@ TEST(Changes, EveryConsumerIsToldExactlyWhatChangedSinceItsOwnLastTime) {
   }
 }
 
-TEST(Changes, WhoReadsOnlySnapshotsMissesNothing) {
+TEST(Changes, ReadersOfSnapshotsMissNoChanges) {
   Grid grid;
   ChangeCursor cursor;
   EXPECT_TRUE(grid.snapshot().changes_since(cursor).all);
@@ -167,7 +167,7 @@ TEST(Changes, ASnapshotThatIsEditedIsAnotherGrid) {
   EXPECT_EQ(grid.get({1, 2, 3}), 4);
 }
 
-TEST(Changes, ACursorOfAnotherKindOfContainerIsToldAll) {
+TEST(Changes, ACursorOfAnotherContainerReceivesAllChunks) {
   const Grid grid;
   const DensityGrid densities;
   const VoxelRegistry types;
@@ -204,7 +204,7 @@ TEST(Changes, ManyEditsOfOneChunkAreOneChange) {
   EXPECT_EQ(changes.items[0].neighbours, 1U << 13U);
 }
 
-TEST(Changes, WhoLagsTooFarIsToldAll) {
+TEST(Changes, ACursorThatLagsTooFarReceivesAllChunks) {
   Grid grid;
   ChangeCursor late = grid.cursor();
   ChangeCursor early = late;

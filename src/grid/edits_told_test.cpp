@@ -83,7 +83,7 @@ void edit(Grid& grid, Random& random) {
   }
 }
 
-TEST(VisitChanges, TellsOfEveryVoxelAndWhatItWas) {
+TEST(VisitChanges, ReportsEveryVoxelAndItsOldType) {
   Random random;
   Grid grid;
   for (int i = 0; i < 30; ++i) edit(grid, random);

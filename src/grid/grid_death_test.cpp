@@ -136,7 +136,7 @@ TEST(RegistryDeathTest, AnotherAirIsAMistake) {
 }
 
 // NOLINTBEGIN(bugprone-use-after-move): tested here
-TEST(RegistryDeathTest, OneThatWasMovedFromIsNotToBeUsed) {
+TEST(RegistryDeathTest, RejectsUseAfterMove) {
   VoxelRegistry types;
   const VoxelRegistry moved = std::move(types);
   const ChangeCursor cursor = moved.cursor();
@@ -150,7 +150,7 @@ TEST(RegistryDeathTest, OneThatWasMovedFromIsNotToBeUsed) {
   QUOIN_EXPECT_MISTAKE((void)VoxelRegistry(types), "a registry that was not moved from");
 }
 
-TEST(GridDeathTest, OneThatWasMovedFromIsNotToBeUsed) {
+TEST(GridDeathTest, RejectsUseAfterMove) {
   Grid grid;
   const Grid moved = std::move(grid);
   ChangeCursor cursor;
@@ -164,7 +164,7 @@ TEST(GridDeathTest, OneThatWasMovedFromIsNotToBeUsed) {
   QUOIN_EXPECT_MISTAKE((void)grid.changes_since(cursor), "a grid that was not moved from");
 }
 
-TEST(DensityDeathTest, OneThatWasMovedFromIsNotToBeUsed) {
+TEST(DensityDeathTest, RejectsUseAfterMove) {
   DensityGrid field;
   const DensityGrid moved = std::move(field);
   ChangeCursor cursor;

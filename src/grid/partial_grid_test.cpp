@@ -48,7 +48,7 @@ TEST(PartialGrid, RefusesEditsInUnloadedChunks) {
   EXPECT_EQ(grid.fill_box({{-5, 0, 0}, {5, 1, 1}}, 1), 5);
 }
 
-TEST(PartialGrid, LoadingIsToldOfAndIsNoEdit) {
+TEST(PartialGrid, LoadingIsReportedAndIsNoEdit) {
   Grid grid = partial();
   ChangeCursor cursor = grid.cursor();
   Chunk chunk(kAir);

@@ -112,7 +112,7 @@ TEST(Snapshot, SharesChunksUntilTheyAreEdited) {
   }
 }
 
-TEST(Snapshot, AChunkThatNobodySharesAnyMoreIsEditedInPlace) {
+TEST(Snapshot, AnUnsharedChunkIsEditedInPlace) {
   Grid grid;
   grid.fill_sphere({32, 32, 32}, 20.0, 1);
   { const Grid copy = grid.snapshot(); }

@@ -396,7 +396,7 @@ TEST(VoxelDataCopies, CopiesOfWholeChunksShareData) {
   EXPECT_EQ(to.data_count(), 3);
 }
 
-TEST(VoxelDataPieces, GoWithWhatFallsOff) {
+TEST(VoxelDataPieces, MoveWithDetachedPieces) {
   Grid world;
   world.fill_box({{0, 0, 0}, {100, 1, 100}}, kStone);
   world.fill_box({{60, 10, 10}, {70, 12, 12}}, kStone);

@@ -42,7 +42,7 @@ class FileTest : public testing::Test {
   fs::path folder_;
 };
 
-TEST_F(FileTest, WritesWhatItReads) {
+TEST_F(FileTest, RoundTrips) {
   const fs::path path = folder_ / "a";
   ASSERT_TRUE(write_file(bytes_in("hello"), path));
   EXPECT_EQ(content(path), "hello");

@@ -23,7 +23,7 @@ Error error_of(const TestFolder& folder, const std::string& name, const std::str
   return loaded ? Error{} : loaded.error();
 }
 
-TEST(Formats, ContentDecidesWhatAFileIs) {
+TEST(Formats, ContentDecidesTheInputFormat) {
   EXPECT_EQ(detect_format(bytes_of("VOX \x96")), FileFormat::Vox);
   EXPECT_EQ(detect_format(bytes_of("VOX")), std::nullopt);
   EXPECT_EQ(detect_format(bytes_of("glTF")), FileFormat::Glb);
@@ -47,7 +47,7 @@ TEST(Formats, BytesOfSceneFilesAreReadAsTheirFilesAre) {
   }
 }
 
-TEST(Formats, NamesDecideWhatIsWritten) {
+TEST(Formats, NamesDecideTheOutputFormat) {
   EXPECT_EQ(format_for_writing("a/b.GLB")->format, FileFormat::Glb);
   EXPECT_EQ(format_for_writing("b.gltf")->format, FileFormat::Gltf);
   EXPECT_EQ(format_for_writing("b.obj")->format, FileFormat::Obj);

@@ -268,7 +268,7 @@ TEST(MeshScheduler, NothingOlderIsGivenAfterSomethingNewer) {
 }
 
 // Unchanged chunks deliver no surface, but callers that wait for `pending` to be 0 still finish.
-TEST(MeshScheduler, WhoActsOnlyWhenCalledComesToTheEnd) {
+TEST(MeshScheduler, CallerDrivenMeshingFinishes) {
   OneGrid one;
   constexpr int kEdited = 40;
   for (int row = 0; row < 2; ++row) {

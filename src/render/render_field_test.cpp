@@ -63,7 +63,7 @@ TEST(RenderField, ABallHasTheLightOfItsNormals) {
   EXPECT_GT(compared, 1200);
 }
 
-TEST(RenderField, ItAndBlocksShadeEachOther) {
+TEST(RenderField, FieldsAndBlocksShadeEachOther) {
   Scene scene;
   const VoxelType grey = add_type(scene, {188, 188, 188, 255});
   Grid floor;

@@ -88,7 +88,7 @@ TEST(RenderLamps, ASpotLightsItsCone) {
   }
 }
 
-TEST(RenderLamps, ThingsCastShadowsUnlessToldNotTo) {
+TEST(RenderLamps, CastShadowsUnlessDisabled) {
   Scene scene = floor_by_night();
   Grid& grid = scene.edit(scene.grids().handles()[0]).grid;
   grid.fill_box({{4, 0, -10}, {5, 4, 10}}, 1);
@@ -385,7 +385,7 @@ TEST(EmissiveCells, EmissiveFieldsShineIntoGlassAroundThem) {
   EXPECT_EQ(power_in(stone), 0.0);
 }
 
-TEST(EmissiveCells, FollowEditsAsIfMadeAnew) {
+TEST(EmissiveCells, MatchARebuildAfterEdits) {
   Scene scene;
   const VoxelType stone = add_type(scene, kWhite);
   const VoxelType torch = add_type(scene, {255, 120, 30, 255}, Visibility::Opaque, 3.0F);

@@ -168,7 +168,7 @@ TEST(RenderPropagated, FieldsAreLitWhereTheySeeTheSky) {
   EXPECT_GT(pixel_at(shade, 16, 16)[0], 0);
 }
 
-TEST(RenderPropagated, RefusesLeastLightThatIsNone) {
+TEST(RenderPropagated, RejectsInvalidLeastLight) {
   Cave cave;
   RenderOptions options = propagated(8, 8);
   options.light.least_light = -1.0;

@@ -25,7 +25,7 @@ std::set<Handle<T>> as_set(const std::vector<Handle<T>>& handles) {
   return {handles.begin(), handles.end()};
 }
 
-TEST(SceneChanges, EveryConsumerIsToldWhatChangedSinceItsOwnLastTime) {
+TEST(SceneChanges, EveryConsumerReceivesChangesSinceItsCursor) {
   std::mt19937 random(2);
   Scene scene;
   std::vector<GridHandle> grids;
@@ -103,7 +103,7 @@ TEST(SceneChanges, EveryConsumerIsToldWhatChangedSinceItsOwnLastTime) {
   }
 }
 
-TEST(SceneChanges, ABusySceneIsToldWhatChangedFrameByFrame) {
+TEST(SceneChanges, ABusySceneReportsChangesPerFrame) {
   Scene scene;
   std::vector<GridHandle> grids;
   for (int i = 0; i < 50; ++i) grids.push_back(scene.add_grid({}));
@@ -124,7 +124,7 @@ TEST(SceneChanges, ABusySceneIsToldWhatChangedFrameByFrame) {
   }
 }
 
-TEST(SceneChanges, EditsThroughAReferenceThatWasKeptAreTold) {
+TEST(SceneChanges, ReportsEditsThroughAKeptReference) {
   Scene scene;
   const GridHandle first = scene.add_grid({});
   Grid& kept = scene.edit(first).grid;
@@ -149,7 +149,7 @@ TEST(SceneChanges, EditsThroughAReferenceThatWasKeptAreTold) {
   EXPECT_EQ(moved.changes_since(cursor).grids, std::vector<GridHandle>{first});
 }
 
-TEST(SceneChanges, AnEditThatThrowsIsTold) {
+TEST(SceneChanges, ReportsAnEditThatThrows) {
   Scene scene;
   const GridHandle handle = scene.add_grid({});
   Grid& grid = scene.edit(handle).grid;
@@ -166,7 +166,7 @@ TEST(SceneChanges, AnEditThatThrowsIsTold) {
 }
 
 // A consumer that reads during an edit's callback reads the rest of the edit later.
-TEST(SceneChanges, AnEditThatIsLookedAtHalfwayIsToldToItsEnd) {
+TEST(SceneChanges, ReportsTheRestOfAnEditReadHalfway) {
   Scene scene;
   const GridHandle handle = scene.add_grid({});
   Grid& grid = scene.edit(handle).grid;

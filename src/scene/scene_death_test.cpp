@@ -194,7 +194,7 @@ TEST(CameraDeathTest, BoundsAndAspectsThatAreNoneAreMistakes) {
   QUOIN_EXPECT_MISTAKE((void)frame_scene(Scene(), View::Top, infinity), "a positive, finite aspect");
 }
 
-TEST(CameraDeathTest, FramingByWhatIsNoneIsAMistake) {
+TEST(CameraDeathTest, RejectsFramingByInvalidInput) {
   const DVec3 forward = direction_of(View::Iso);
   QUOIN_EXPECT_MISTAKE(SceneFraming(2.0 * forward, 1.0), "a unit direction");
   QUOIN_EXPECT_MISTAKE(SceneFraming(DVec3(0.0), 1.0), "a unit direction");

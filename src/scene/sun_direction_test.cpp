@@ -34,7 +34,7 @@ TEST(SunDirection, RisesInTheEastAndStandsInTheSouthAtNoon) {
   EXPECT_NEAR(glm::length(morning), 1.0, 1e-12);
 }
 
-TEST(SunDirection, RefusesWhatThereIsNot) {
+TEST(SunDirection, RejectsInvalidDirections) {
   EXPECT_FALSE(sun_direction({0, 1, 12.0, 0.0}).has_value());
   EXPECT_FALSE(sun_direction({13, 1, 12.0, 0.0}).has_value());
   EXPECT_FALSE(sun_direction({4, 31, 12.0, 0.0}).has_value());

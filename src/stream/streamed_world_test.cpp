@@ -201,7 +201,7 @@ TEST_F(StreamedWorldTest, TheBudgetHoldsAndTheNearestStay) {
   EXPECT_TRUE(world.is_loaded(only_grid(world), chunk_of(IVec3(viewer.position))));
 }
 
-TEST_F(StreamedWorldTest, EditsReachWhatIsNotLoaded) {
+TEST_F(StreamedWorldTest, EditsReachUnloadedChunks) {
   auto generator = std::make_shared<PatternGround>();
   StreamedWorld world = ground(path(), generator);
   const Viewer viewer{.radius = 100.0};

@@ -73,7 +73,7 @@ TEST(Terrain, ChunkByChunkIsTheWorld) {
   EXPECT_EQ(hash_of_voxels(pieces), hash_of_voxels(whole));
 }
 
-TEST(Terrain, StaysInItsBoxWhateverItsSize) {
+TEST(Terrain, StaysInItsBoxAtAnySize) {
   for (const IVec3 size : {IVec3{1, 1, 1}, IVec3{3, 1, 2}, IVec3{4, 2, 4}, IVec3{1, 8, 3}, IVec3{2, 32, 1}}) {
     const IBox box = make(options_of(42, size, -1, -2)).bounds();
     EXPECT_EQ(box.min, IVec3(-32, 0, -64));
@@ -177,7 +177,7 @@ TEST(Terrain, GrassEarthAndStoneComeFirst) {
   EXPECT_EQ(add_terrain_types(world.registry).value().rock, world.types.rock) << "found again, not added twice";
 }
 
-TEST(Terrain, RefusesWhatCannotBe) {
+TEST(Terrain, RejectsInvalidInput) {
   const World world;
   const int least = std::numeric_limits<int>::min();
   const int most = std::numeric_limits<int>::max();

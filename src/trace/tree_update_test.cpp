@@ -102,7 +102,7 @@ void edit(Grid& grid, Random& random, int chunks) {
   }
 }
 
-TEST(TreeUpdate, EqualsATreeBuiltAnew) {
+TEST(TreeUpdate, EqualsARebuiltTree) {
   const VoxelRegistry types = two_of_each();
   for (unsigned seed = 1; seed <= 6; ++seed) {
     Random random(seed);

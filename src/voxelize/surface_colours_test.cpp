@@ -57,7 +57,7 @@ Made surface_of(const TriangleMesh& mesh) {
   return made;
 }
 
-TEST(SurfaceColours, are_those_of_a_texture_of_one_pixel_a_voxel) {
+TEST(SurfaceColours, MatchATextureWithOnePixelPerVoxel) {
   TriangleMesh mesh = square();
   const auto of = [](int x, int y) {
     return Rgba8{static_cast<std::uint8_t>(x * 16), static_cast<std::uint8_t>(y * 16), 7, 255};
@@ -76,7 +76,7 @@ TEST(SurfaceColours, are_those_of_a_texture_of_one_pixel_a_voxel) {
   }
 }
 
-TEST(SurfaceColours, are_means_in_linear_light_where_a_voxel_covers_many_pixels) {
+TEST(SurfaceColours, AverageManyPixelsInLinearLight) {
   TriangleMesh mesh = square();
   mesh.textures.push_back(texture(8 * kSide, [](int x, int y) {
     const auto grey = static_cast<std::uint8_t>((x + y) % 2 * 255);
@@ -88,7 +88,7 @@ TEST(SurfaceColours, are_means_in_linear_light_where_a_voxel_covers_many_pixels)
   EXPECT_EQ(made.at(3, 5).colour, (Rgba8{188, 188, 188, 255}));
 }
 
-TEST(SurfaceColours, coarse_textures_blend_or_stay_sharp) {
+TEST(SurfaceColours, CoarseTexturesBlendOrStaySharp) {
   TriangleMesh mesh = square();
   const auto of = [](int x, int) { return x == 0 ? Rgba8{0, 0, 0, 255} : Rgba8{255, 255, 255, 255}; };
   mesh.textures.push_back(texture(2, of));
@@ -102,7 +102,7 @@ TEST(SurfaceColours, coarse_textures_blend_or_stay_sharp) {
   EXPECT_EQ(sharp.at(8, 3).colour, (Rgba8{255, 255, 255, 255}));
 }
 
-TEST(SurfaceColours, beyond_a_texture_are_as_its_sides_say) {
+TEST(SurfaceColours, FollowTheWrapModeBeyondATexture) {
   TriangleMesh mesh = square();
   for (glm::vec2& place : mesh.texture_places) place.x = 4.0F * place.x - 1.0F;
   mesh.textures.push_back(texture(2, [](int x, int) { return Rgba8{static_cast<std::uint8_t>(x * 255), 0, 0, 255}; }));
@@ -119,7 +119,7 @@ TEST(SurfaceColours, beyond_a_texture_are_as_its_sides_say) {
   EXPECT_EQ(row(TextureWrap::Clamp), "00011111");
 }
 
-TEST(SurfaceColours, cut_out_what_alpha_masks) {
+TEST(SurfaceColours, AlphaMaskCutsOutVoxels) {
   TriangleMesh mesh = square();
   mesh.materials[0].alpha_mode = AlphaMode::Mask;
   mesh.textures.push_back(texture(kSide, [](int x, int) {
@@ -140,7 +140,7 @@ TEST(SurfaceColours, cut_out_what_alpha_masks) {
   EXPECT_EQ(voxelize(box, {}, types)->grid.voxel_count(), 216);
 }
 
-TEST(SurfaceColours, blend_where_alpha_blends) {
+TEST(SurfaceColours, AlphaBlendModeBlends) {
   TriangleMesh mesh = square();
   mesh.materials[0].alpha_mode = AlphaMode::Blend;
   mesh.materials[0].texture.reset();
@@ -150,7 +150,7 @@ TEST(SurfaceColours, blend_where_alpha_blends) {
   EXPECT_EQ(made.at(1, 1).visibility, Visibility::Transparent);
 }
 
-TEST(SurfaceColours, are_multiplied_by_those_of_vertices_and_have_their_material) {
+TEST(SurfaceColours, CombineVertexColoursAndMaterials) {
   TriangleMesh mesh = square();
   mesh.materials[0] = {};
   mesh.materials[0].name = "brass";
@@ -168,7 +168,7 @@ TEST(SurfaceColours, are_multiplied_by_those_of_vertices_and_have_their_material
   EXPECT_NEAR(made.at(8, 0).colour.r, 193, 1);
 }
 
-TEST(SurfaceColours, within_a_solid_are_their_mean) {
+TEST(SurfaceColours, InsideASolidIsTheMeanColour) {
   TriangleMesh mesh = shapes::box(DVec3(0.0), DVec3(20.0));
   mesh.materials.resize(2);
   mesh.materials[0].colour = {1.0F, 0.0F, 0.0F, 1.0F};
@@ -185,7 +185,7 @@ TEST(SurfaceColours, within_a_solid_are_their_mean) {
   EXPECT_EQ(types[made->grid.get({10, 10, 0})].colour, (Rgba8{0, 0, 255, 255}));
 }
 
-TEST(SurfaceColours, one_material_fills_the_inside_too) {
+TEST(SurfaceColours, OneMaterialAlsoFillsTheInside) {
   TriangleMesh mesh = shapes::box({0.25, 0.25, 0.25}, {9.75, 9.75, 9.75});
   MeshMaterial glass;
   glass.name = "glass";
@@ -203,7 +203,7 @@ TEST(SurfaceColours, one_material_fills_the_inside_too) {
   EXPECT_EQ(deep.visibility, Visibility::Transparent);
 }
 
-TEST(SurfaceColours, are_rounded_where_there_are_too_many) {
+TEST(SurfaceColours, RoundsColoursWhenThereAreTooMany) {
   TriangleMesh mesh = square();
   constexpr int kWide = 300;
   constexpr int kTimes = kWide / kSide;
@@ -221,7 +221,7 @@ TEST(SurfaceColours, are_rounded_where_there_are_too_many) {
   EXPECT_NE(made.warnings[0].find("reduced"), std::string::npos);
 }
 
-TEST(SurfaceColours, are_as_few_as_is_asked) {
+TEST(SurfaceColours, RespectsTheColourLimit) {
   TriangleMesh mesh = square();
   mesh.textures.push_back(texture(kSide, [](int x, int y) {
     return Rgba8{static_cast<std::uint8_t>(x < 8 ? x : 200 + x), static_cast<std::uint8_t>(y * 2), 0, 255};

@@ -42,7 +42,7 @@ std::vector<TriangleMesh> closed_meshes() {
           shapes::rotated(shapes::torus(kOdd, 9.2, 3.4, 17, 9), {1.0, 0.4, 0.2}, 0.5)};
 }
 
-TEST(VoxelizeSolid, is_what_the_winding_number_says_of_closed_meshes) {
+TEST(VoxelizeSolid, MatchesTheWindingNumberOfClosedMeshes) {
   for (const TriangleMesh& mesh : closed_meshes()) {
     const Voxels expected = shapes::solid_by_winding(mesh);
     EXPECT_GT(expected.size(), 100U);
@@ -51,7 +51,7 @@ TEST(VoxelizeSolid, is_what_the_winding_number_says_of_closed_meshes) {
   }
 }
 
-TEST(VoxelizeSolid, has_as_many_voxels_as_shapes_that_can_be_counted) {
+TEST(VoxelizeSolid, MatchesTheVoxelCountsOfKnownShapes) {
   EXPECT_EQ(solid_of(shapes::box(DVec3(-3.0, 0.0, 2.0), DVec3(7.0, 5.0, 4.0))).size(), 10U * 5U * 2U);
   // Centres lie on the sides of the box: those on lower sides count, those on upper sides do not.
   EXPECT_EQ(solid_of(shapes::box(DVec3(0.5), DVec3(4.5))).size(), 64U);
@@ -64,7 +64,7 @@ TEST(VoxelizeSolid, has_as_many_voxels_as_shapes_that_can_be_counted) {
   EXPECT_TRUE(solid_of(ball) == expected);
 }
 
-TEST(VoxelizeSolid, has_no_leak_where_edges_run_through_centres) {
+TEST(VoxelizeSolid, DoesNotLeakIfEdgesCrossVoxelCentres) {
   // Corners, edges and faces on centres and sides of voxels. Voxels on the surface itself may be either.
   constexpr double kOn = 1e-6;
   for (const TriangleMesh& mesh :
@@ -85,7 +85,7 @@ TEST(VoxelizeSolid, has_no_leak_where_edges_run_through_centres) {
   }
 }
 
-TEST(VoxelizeSolid, takes_what_crosses_itself_as_one) {
+TEST(VoxelizeSolid, MergesSelfIntersectingParts) {
   TriangleMesh mesh = shapes::sphere(kOdd, 7.1, 20, 12);
   shapes::append(mesh, shapes::box(DVec3(2.0) + kOdd, DVec3(9.0) + kOdd));
   Voxels both = solid_of(shapes::sphere(kOdd, 7.1, 20, 12));
@@ -94,7 +94,7 @@ TEST(VoxelizeSolid, takes_what_crosses_itself_as_one) {
   EXPECT_LT(solid_of(mesh, SolidVoxels::Parity).size(), both.size());
 }
 
-TEST(VoxelizeSolid, does_not_care_which_way_a_part_is_turned) {
+TEST(VoxelizeSolid, IgnoresTheOrientationOfParts) {
   for (TriangleMesh mesh : closed_meshes()) {
     const Voxels expected = solid_of(mesh);
     std::mt19937 random(7);
@@ -109,7 +109,7 @@ TEST(VoxelizeSolid, does_not_care_which_way_a_part_is_turned) {
   }
 }
 
-TEST(VoxelizeSolid, leaves_cavities_open) {
+TEST(VoxelizeSolid, LeavesCavitiesOpen) {
   TriangleMesh mesh = shapes::box(DVec3(0.0), DVec3(10.0));
   TriangleMesh hole = shapes::box(DVec3(3.0), DVec3(6.0));
   for (auto& triangle : hole.triangles) std::swap(triangle[0], triangle[1]);
@@ -118,7 +118,7 @@ TEST(VoxelizeSolid, leaves_cavities_open) {
   EXPECT_EQ(solid_of(mesh, SolidVoxels::Parity).size(), 1000U - 27U);
 }
 
-TEST(VoxelizeSolid, bridges_holes) {
+TEST(VoxelizeSolid, BridgesHoles) {
   TriangleMesh mesh = shapes::sphere(kOdd, 12.0, 32, 24);
   const Voxels whole = solid_of(mesh);
   std::mt19937 random(11);
@@ -164,7 +164,7 @@ int votes_of(const TriangleMesh& mesh, SolidVoxels rule, DVec3 centre) {
 }
 
 // Random triangles, open on all sides, over several chunks: most chunks are decided without looking at voxels.
-TEST(VoxelizeSolid, open_triangles_match_votes_of_six_rays) {
+TEST(VoxelizeSolid, OpenTrianglesMatchVotesOfSixRays) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> place(0.0, 150.0);
   for (const int count : {1, 4, 13, 34}) {
@@ -193,7 +193,7 @@ TEST(VoxelizeSolid, open_triangles_match_votes_of_six_rays) {
   }
 }
 
-TEST(VoxelizeSurface, thick_is_every_cube_that_the_mesh_meets) {
+TEST(VoxelizeSurface, ThickCoversEveryCubeThatTheMeshMeets) {
   for (const TriangleMesh& mesh : closed_meshes()) {
     const Voxels expected = shapes::surface_by_boxes(mesh);
     EXPECT_TRUE(voxelized(mesh, SurfaceVoxels::Separating26, SolidVoxels::None) == expected) << expected.size();
@@ -204,14 +204,14 @@ TEST(VoxelizeSurface, thick_is_every_cube_that_the_mesh_meets) {
   EXPECT_TRUE(voxelized(box, SurfaceVoxels::Separating26, SolidVoxels::None) == shapes::surface_by_boxes(box));
 }
 
-TEST(VoxelizeSurface, thin_is_every_voxel_whose_centre_lines_the_mesh_meets) {
+TEST(VoxelizeSurface, ThinCoversVoxelsWhoseCentreLinesMeetTheMesh) {
   for (const TriangleMesh& mesh : closed_meshes()) {
     const Voxels expected = shapes::surface_by_lines(mesh);
     EXPECT_TRUE(voxelized(mesh, SurfaceVoxels::Separating6, SolidVoxels::None) == expected) << expected.size();
   }
 }
 
-TEST(VoxelizeSurface, between_voxels_belongs_to_its_inner_side) {
+TEST(VoxelizeSurface, BetweenVoxelsBelongsToItsInnerSide) {
   TriangleMesh box = shapes::box(DVec3(0.0), DVec3(4.0));
   constexpr std::size_t kShell = 4U * 4U * 4U - 2U * 2U * 2U;
   EXPECT_EQ(voxelized(box, SurfaceVoxels::Separating6, SolidVoxels::None).size(), kShell);
@@ -245,7 +245,7 @@ TEST(VoxelizeSurface, KeepsTipsOnTheLatticeWithinBounds) {
   }
 }
 
-TEST(VoxelizeSurface, on_centres_takes_all_that_it_passes_on_every_side) {
+TEST(VoxelizeSurface, OnCentresCoversVoxelsOnEverySide) {
   const TriangleMesh box = shapes::box(DVec3(0.5), DVec3(3.5));
   EXPECT_EQ(voxelized(box, SurfaceVoxels::Separating6, SolidVoxels::Winding).size(), 64U);
   EXPECT_EQ(voxelized(box, SurfaceVoxels::Separating6, SolidVoxels::None).size(), 56U);
@@ -254,7 +254,7 @@ TEST(VoxelizeSurface, on_centres_takes_all_that_it_passes_on_every_side) {
   EXPECT_EQ(voxelized(long_box, SurfaceVoxels::Separating6, SolidVoxels::Winding).size(), 4U * 4U * 11U);
 }
 
-TEST(VoxelizeSurface, rounding_next_to_a_side_counts_as_on_it) {
+TEST(VoxelizeSurface, RoundingNextToASideCountsAsOnIt) {
   for (const double size : {0.1, 0.02, 1.0 / 3.0, 0.7}) {
     const TriangleMesh box = shapes::box(DVec3(3.0 * size, -7.0 * size, 11.0 * size), DVec3(17.0 * size));
     VoxelRegistry types;
@@ -266,7 +266,7 @@ TEST(VoxelizeSurface, rounding_next_to_a_side_counts_as_on_it) {
   }
 }
 
-TEST(VoxelizeSurface, slanted_plane_is_one_layer) {
+TEST(VoxelizeSurface, SlantedPlaneIsOneLayer) {
   // y = 0.3 x + 0.45 z + 10.1, over 40 x 40 columns.
   TriangleMesh mesh;
   const auto at = [](double x, double z) { return DVec3(x, 0.3 * x + 0.45 * z + 10.1, z); };
@@ -347,7 +347,7 @@ TEST(VoxelizeSurface, WarnsOfTipsThatAreThinnerThanAVoxel) {
   EXPECT_GE(thick->grid.bounds().max.y, 20);
 }
 
-TEST(VoxelizeField, has_the_distances_of_the_mesh) {
+TEST(VoxelizeField, HasTheDistancesOfTheMesh) {
   for (const TriangleMesh& mesh : closed_meshes()) {
     VoxelRegistry types;
     DistanceFieldOptions options;
@@ -367,7 +367,7 @@ TEST(VoxelizeField, has_the_distances_of_the_mesh) {
   }
 }
 
-TEST(VoxelizeField, goes_across_chunks_and_deep_inside) {
+TEST(VoxelizeField, CrossesChunksAndReachesDeepInside) {
   const TriangleMesh mesh = shapes::box(DVec3(-70.0), DVec3(150.0, 60.0, 64.0));
   VoxelRegistry types;
   const auto made = distance_field(mesh, {}, types);
@@ -380,7 +380,7 @@ TEST(VoxelizeField, goes_across_chunks_and_deep_inside) {
   EXPECT_EQ(made->field.material({0, 0, 0}), 1);
 }
 
-TEST(Voxelize, is_the_same_on_any_number_of_threads) {
+TEST(Voxelize, IsTheSameAtAnyThreadCount) {
   TriangleMesh mesh = shapes::sphere(DVec3(20.0), 90.0, 40, 30);
   for (const DVec3& p : mesh.positions) mesh.colours.emplace_back(glm::fract(glm::vec3(p * 0.37)), 1.0F);
   VoxelRegistry one_types;
@@ -395,7 +395,7 @@ TEST(Voxelize, is_the_same_on_any_number_of_threads) {
     EXPECT_TRUE(*one->grid.find_chunk(chunk) == *many->grid.find_chunk(chunk));
 }
 
-TEST(Voxelize, refuses_what_is_no_mesh) {
+TEST(Voxelize, RejectsInvalidMeshes) {
   VoxelRegistry types;
   TriangleMesh mesh = shapes::box(DVec3(0.0), DVec3(1.0));
   mesh.triangles[3][1] = 8;
@@ -416,7 +416,7 @@ TEST(Voxelize, refuses_what_is_no_mesh) {
   EXPECT_EQ(empty->grid.voxel_count(), 0);
 }
 
-TEST(Voxelize, stops_when_asked_to) {
+TEST(Voxelize, CanBeCancelled) {
   const TriangleMesh mesh = shapes::sphere(DVec3(0.0), 100.0, 40, 30);
   VoxelRegistry types;
   int calls = 0;
@@ -433,7 +433,7 @@ TEST(Voxelize, stops_when_asked_to) {
   EXPECT_EQ(last, 1.0);
 }
 
-TEST(VoxelLattice, has_as_many_voxels_as_asked) {
+TEST(VoxelLattice, HasTheRequestedNumberOfVoxels) {
   const TriangleMesh mesh = shapes::box(DVec3(-1.0, 2.0, 5.0), DVec3(3.0, 3.0, 7.0));
   VoxelRegistry types;
   VoxelizeOptions options;

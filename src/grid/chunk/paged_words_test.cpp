@@ -25,7 +25,7 @@ std::vector<std::uint64_t> all_of(const PagedWords& words) {
   return all;
 }
 
-TEST(PagedWords, HoldWhatTheyWereMadeOf) {
+TEST(PagedWords, HoldTheirInitialWords) {
   for (const std::size_t size :
        {std::size_t{0}, std::size_t{1}, std::size_t{1'024}, std::size_t{1'025}, std::size_t{65'536}}) {
     const std::vector<std::uint64_t> wanted = numbers(size, 7);

@@ -155,7 +155,7 @@ TEST(CopyBox, TurningFourTimesIsNoTurn) {
   }
 }
 
-TEST(CopyBox, TheJournalTellsExactlyWhatChanged) {
+TEST(CopyBox, TheJournalHoldsExactlyTheChanges) {
   Random random(11);
   Grid grid = random.grid();
   ChangeCursor cursor = grid.cursor();
@@ -187,7 +187,7 @@ TEST(CopyBox, VisitsOnlyExistingChunksOfAlmostEmptyWorlds) {
   EXPECT_EQ(mirrored.get(-1'000'001, -2'000'000, 5), 3);
 }
 
-TEST(CopyBox, LeavesOutWhatWouldLieOutsideTheWorld) {
+TEST(CopyBox, SkipsVoxelsOutsideTheWorld) {
   Grid from;
   from.fill_box({{0, 0, 0}, {10, 10, 10}}, 1);
   Grid to;

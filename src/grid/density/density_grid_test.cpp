@@ -144,7 +144,7 @@ TEST(DensityGrid, ChangesThatNobodyTakesDoNotPileUp) {
   EXPECT_EQ(grid.bytes(), bytes);
 }
 
-TEST(DensityGrid, ClearTellsOfAllThatWasThere) {
+TEST(DensityGrid, ClearReportsAllChunks) {
   DensityGrid grid;
   grid.add_sphere({0, 0, 0}, 70.0, 3);
   grid.set({300, 0, 0}, {1.0F, 0});
@@ -212,7 +212,7 @@ TEST(DensityGrid, EditVisitsEverySampleOnceInOrder) {
   EXPECT_EQ(grid.chunk_count(), 0U);
 }
 
-TEST(DensityGrid, PuttingAChunkTellsHowManySamplesChanged) {
+TEST(DensityGrid, PuttingAChunkCountsChangedSamples) {
   DensityGrid grid;
   DensityChunk chunk(stored_density(grid.band(), grid.band()));
   EXPECT_EQ(grid.put_chunk(IVec3(0), chunk), 0) << "far air";

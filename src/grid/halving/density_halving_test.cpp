@@ -73,7 +73,7 @@ bool are_equal(const DensityGrid& a, const DensityGrid& b) {
   return true;
 }
 
-TEST(DensityHalving, EverySampleIsWhatTheRulesSay) {
+TEST(DensityHalving, EverySampleFollowsTheRules) {
   for (unsigned seed = 1; seed <= 4; ++seed) {
     std::mt19937 random(seed);
     const DensityGrid field = random_field(random, seed == 4 ? 3.1F : 8.0F);
@@ -205,7 +205,7 @@ TEST(DensityHalving, CountsAreOfTheSurfaceAndOfWhatIsThin) {
   EXPECT_EQ(plate.thin, plate.surface);
 }
 
-TEST(DensityHalving, AnEditMakesAnewOnlyTheChunksThatReadIt) {
+TEST(DensityHalving, AnEditRebuildsOnlyTheChunksThatReadIt) {
   DensityGrid field;
   for (const int x : {-40, 40}) {
     for (const int y : {-40, 40}) {

@@ -104,7 +104,7 @@ bool are_equal(const Grid& a, const Grid& b) {
   return equal;
 }
 
-TEST(Downsample, EveryCellIsWhatTheRulesSay) {
+TEST(Downsample, EveryCellFollowsTheRules) {
   const VoxelRegistry types = some_types();
   for (unsigned seed = 1; seed <= 6; ++seed) {
     std::mt19937 random(seed);
@@ -234,7 +234,7 @@ TEST(Downsample, AnUpdateLeavesUntouchedChunksAlone) {
   EXPECT_EQ(changes.items[0].chunk, IVec3(0));
 }
 
-TEST(Downsample, AnEditMakesAnewOnlyTheChunksThatReadIt) {
+TEST(Downsample, AnEditRebuildsOnlyTheChunksThatReadIt) {
   const VoxelRegistry types = some_types();
   Grid grid;
   grid.fill_box({{-150, -150, -150}, {151, 151, 151}}, 3);

@@ -53,7 +53,7 @@ TEST(Radiance, TakesTheExposureBack) {
   EXPECT_EQ(image->rgb[0], 128.5F / 128 / 4);
 }
 
-TEST(Radiance, RefusesWhatIsBroken) {
+TEST(Radiance, RejectsBrokenFiles) {
   const std::string good = kHeader + "-Y 1 +X 2\n" + std::string("\x80\x40\x00\x81\x00\x00\x00\x00", 8);
   for (std::size_t size = 0; size < good.size(); ++size) EXPECT_FALSE(read(good.substr(0, size)).has_value()) << size;
   for (const std::string size :
@@ -84,7 +84,7 @@ std::vector<ExrChannel> three_channels(const std::vector<float>& values, ExrChan
   return channels;
 }
 
-TEST(Exr, ReadsWhatItWrote) {
+TEST(Exr, RoundTrips) {
   if (!has_exr()) GTEST_SKIP() << "built without OpenEXR";
   const std::vector<float> values{0.0F, 1.0F, 0.123456F, 1000.5F, -2.0F, 65504.0F};
   for (const auto type : {ExrChannel::Type::Float16, ExrChannel::Type::Float32}) {
@@ -116,7 +116,7 @@ TEST(Exr, ClampsValuesTooBrightForHalf) {
   EXPECT_EQ(image->rgb[0], 65504.0F);
 }
 
-TEST(Exr, RefusesWhatCannotBe) {
+TEST(Exr, RejectsInvalidInput) {
   const std::vector<float> one{1.0F};
   EXPECT_FALSE(write_exr(0, 1, three_channels(one, ExrChannel::Type::Float16)).has_value());
   EXPECT_FALSE(write_exr(2, 1, three_channels(one, ExrChannel::Type::Float16)).has_value());

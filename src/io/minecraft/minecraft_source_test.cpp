@@ -236,7 +236,7 @@ TEST(MinecraftSource, FilesOfTheCorpusGiveWorldsOrErrors) {
   EXPECT_EQ(broken, 5U);
 }
 
-TEST(LevelFile, TellsNameAndSpawn) {
+TEST(LevelFile, ReadsNameAndSpawn) {
   const auto bytes = read_file(fs::path(QUOIN_SOURCE_DIR) / "tests" / "corpus" / "minecraft" / "level_dat");
   ASSERT_TRUE(bytes);
   const auto level = minecraft::parse_level_file(*bytes);

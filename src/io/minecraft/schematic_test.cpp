@@ -382,7 +382,7 @@ TEST(PagedBytes, PagesOfFewValuesArePacked) {
   }
 }
 
-TEST(PagedBytes, HoldWhatWasAppended) {
+TEST(PagedBytes, HoldAppendedBytes) {
   PagedBytes pages;
   std::vector<std::byte> bytes(3 * PagedBytes::kPageBytes + 100, std::byte{7});
   bytes[PagedBytes::kPageBytes + 5] = std::byte{8};

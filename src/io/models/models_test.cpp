@@ -280,7 +280,7 @@ TEST(Models, AModelOfWidth10IsNoNbt) {
   EXPECT_EQ(detect_format(empty.bytes), std::nullopt);
 }
 
-TEST(Models, ASizeThatIsNoneIsTold) {
+TEST(Models, ReportsInvalidSizes) {
   Writer tiny;
   tiny.text("#binvox 1\ndim 1 1 1\ntranslate 0 0 0\nscale 1e-323\ndata\n").number(1, 1).number(1, 1);
   const auto loaded = read_binvox(tiny.bytes);

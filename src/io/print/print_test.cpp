@@ -93,7 +93,7 @@ std::size_t count_of(const std::string& text, const std::string& what) {
   return count;
 }
 
-TEST(Print, meshes_are_closed_and_others_are_not) {
+TEST(Print, PrintMeshesAreClosedAndOthersAreNot) {
   const Scene scene = touching_voxels();
   EXPECT_EQ(count_open_edges(for_printing(scene)), 0U);
   EXPECT_GT(count_open_edges(*mesh_scene(scene)), 100U);
@@ -102,7 +102,7 @@ TEST(Print, meshes_are_closed_and_others_are_not) {
   EXPECT_EQ(count_open_edges(*smooth), 0U);
 }
 
-TEST(Print, stl_is_read_again_as_it_was) {
+TEST(Print, StlRoundTrips) {
   const Scene scene = touching_voxels();
   const SceneMeshes meshes = for_printing(scene);
   MeshFileOptions options;
@@ -138,7 +138,7 @@ TEST(Print, stl_is_read_again_as_it_was) {
   EXPECT_EQ(bad, 0U);
 }
 
-TEST(Print, three_mf_is_a_package_with_a_model_in_colours) {
+TEST(Print, ThreeMfHasAColouredModel) {
   const Scene scene = touching_voxels();
   const SceneMeshes meshes = for_printing(scene);
   const auto bytes = write_mesh(meshes, FileFormat::ThreeMf);

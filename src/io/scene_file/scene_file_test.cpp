@@ -190,7 +190,7 @@ TEST(SceneFile, WritesNothingThatTheReaderRefuses) {
       << "a left-handed one";
 }
 
-TEST(SceneFile, NamesThePlaceOfWhatIsWrong) {
+TEST(SceneFile, ErrorsHaveAPosition) {
   EXPECT_EQ(fault_of("{"), "byte 1: not valid JSON");
   EXPECT_EQ(fault_of(file_with(R"({"file": "a", "rotation": [1, 2, 3]})")),
             "instances[0].rotation: must be a list of 4 numbers");
@@ -230,7 +230,7 @@ TEST(SceneFile, NamesThePlaceOfWhatIsWrong) {
       "files[1].id: \"a\" is a duplicate");
 }
 
-TEST(SceneFile, RefusesWhatWouldHurt) {
+TEST(SceneFile, RejectsHarmfulInput) {
   EXPECT_NE(fault_of(std::string(100'000, '[')), "none");
   EXPECT_NE(fault_of(file_with(R"({"file": "a", "scale": 1e400})")), "none");
   EXPECT_NE(fault_of(file_with(R"({"file": "a", "position": [NaN, 0, 0]})")), "none");
@@ -351,7 +351,7 @@ TEST_F(SceneFiles, PlaceSceneFilesThatHoldAllThemselves) {
   EXPECT_EQ(scene.lamps[0].range, 20.0);
 }
 
-TEST_F(SceneFiles, SayWhichFileIsWrong) {
+TEST_F(SceneFiles, ErrorsNameTheFile) {
   const auto with_path = [&](const std::string& name) {
     const auto loaded = load_scene(write_text(R"({"quoin_scene": 1, "files": [{"id": "a", "path": ")" + name +
                                               R"("}], "instances": [{"file": "a"}]})"));

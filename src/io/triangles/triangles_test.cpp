@@ -155,7 +155,7 @@ std::string tetrahedron_gltf(const std::string& nodes, const std::string& materi
                   materials + R"("nodes":)" + nodes);
 }
 
-TEST(Triangles, all_formats_give_the_same_triangles) {
+TEST(Triangles, AllFormatsGiveTheSameTriangles) {
   std::vector<std::string> files = {ply_bytes(false), ply_bytes(true), stl_bytes(), stl_text()};
   std::string text = ply_header("ascii");
   for (const auto& c : kCorners) {
@@ -175,13 +175,13 @@ TEST(Triangles, all_formats_give_the_same_triangles) {
   }
 }
 
-TEST(Triangles, are_turned_where_z_points_up) {
+TEST(Triangles, RotatesFilesWithZUp) {
   EXPECT_EQ(mesh_of(stl_bytes(), std::nullopt).mesh.bounds().min.z, -1.0);
   EXPECT_EQ(mesh_of(stl_bytes(), UpAxis::Y).mesh.bounds().min.z, 0.0);
   EXPECT_NEAR(volume_of(mesh_of(stl_bytes(), UpAxis::Z).mesh), 1.0 / 6.0, 1e-12);
 }
 
-TEST(Triangles, have_the_colours_of_vertices) {
+TEST(Triangles, ReadsVertexColours) {
   const LoadedMesh ply = mesh_of(ply_bytes(true));
   ASSERT_EQ(ply.mesh.colours.size(), 4U);
   EXPECT_NEAR(ply.mesh.colours[0].r, 0.2158F, 1e-3F);
@@ -196,7 +196,7 @@ TEST(Triangles, have_the_colours_of_vertices) {
   EXPECT_EQ(obj.mesh.colours[1], glm::vec4(0, 1, 0, 1));
 }
 
-TEST(Triangles, ply_strips_are_read) {
+TEST(Triangles, ReadsPlyStrips) {
   const std::string text =
       "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
       "element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
@@ -206,7 +206,7 @@ TEST(Triangles, ply_strips_are_read) {
   EXPECT_EQ(loaded.mesh.triangles[1], (std::array<std::uint32_t, 3>{1, 3, 2}));
 }
 
-TEST(Triangles, polygons_are_cut_and_bad_corners_left_out) {
+TEST(Triangles, SplitsPolygonsAndSkipsBadCorners) {
   if (!reads(FileFormat::Obj)) return;
   const LoadedMesh loaded = mesh_of("v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nv nan 0 0\nf 1 2 3 4\nf 1 2 900\nl 1 2\n");
   EXPECT_EQ(loaded.mesh.triangles.size(), 2U);
@@ -214,7 +214,7 @@ TEST(Triangles, polygons_are_cut_and_bad_corners_left_out) {
   EXPECT_NE(loaded.warnings.front().find("not finite numbers"), std::string::npos);
 }
 
-TEST(GltfTriangles, has_the_transforms_of_nodes) {
+TEST(GltfTriangles, AppliesNodeTransforms) {
   if (!reads(FileFormat::Gltf)) return;
   const LoadedMesh loaded = mesh_of(tetrahedron_gltf(
       R"([{"children":[1,2],"translation":[10,0,0]},{"mesh":0,"scale":[2,2,2]},{"mesh":0,"scale":[-1,1,1]}])"));
@@ -225,7 +225,7 @@ TEST(GltfTriangles, has_the_transforms_of_nodes) {
   EXPECT_NEAR(volume_of(loaded.mesh), 9.0 / 6.0, 1e-9);
 }
 
-TEST(GltfTriangles, has_base_colours_textures_and_cut_outs) {
+TEST(GltfTriangles, ReadsBaseColoursTexturesAndCutOuts) {
   if (!reads(FileFormat::Gltf)) return;
   const LoadedMesh loaded = mesh_of(tetrahedron_gltf(
       R"([{"mesh":0}])",
@@ -243,7 +243,7 @@ TEST(GltfTriangles, has_base_colours_textures_and_cut_outs) {
   EXPECT_EQ(leaf.emission, 2.0F);
 }
 
-TEST(GltfTriangles, reads_sparse_strips_and_fans) {
+TEST(GltfTriangles, ReadsSparseStripsAndFans) {
   if (!reads(FileFormat::Gltf)) return;
   std::string bytes;
   for (const float at : {0.0F, 0.0F, 0.0F, 1.0F, 0.0F, 0.0F, 0.0F, 1.0F, 0.0F, 1.0F, 1.0F, 0.0F}) put(bytes, at);
@@ -269,7 +269,7 @@ TEST(GltfTriangles, reads_sparse_strips_and_fans) {
   }
 }
 
-TEST(GltfTriangles, refuses_what_contradicts_itself) {
+TEST(GltfTriangles, RejectsContradictoryFiles) {
   if (!reads(FileFormat::Gltf)) return;
   EXPECT_EQ(error_of(tetrahedron_gltf(R"([{"mesh":0}])", "", 5)).code, ErrorCode::BadFormat);
   EXPECT_EQ(error_of(tetrahedron_gltf(R"([{"mesh":0}])", "", 2'147'483'647)).code, ErrorCode::BadFormat);
@@ -285,7 +285,7 @@ TEST(GltfTriangles, refuses_what_contradicts_itself) {
   EXPECT_EQ(error_of(cut).code, ErrorCode::BadFormat);
 }
 
-TEST(Triangles, inconsistent_files_are_refused_with_a_position) {
+TEST(Triangles, RejectsInconsistentFilesWithAPosition) {
   std::string stl = stl_bytes();
   put(stl, 0);
   std::string claims = stl_bytes().substr(0, 80);
@@ -306,7 +306,7 @@ TEST(Triangles, inconsistent_files_are_refused_with_a_position) {
   EXPECT_EQ(error_of("ply\nformat ascii 1.0\nelement vertex 1\n").code, ErrorCode::BadFormat);
 }
 
-TEST(Triangles, are_recognised_by_what_they_hold) {
+TEST(Triangles, RecognisesFormatsByContent) {
   EXPECT_EQ(detect_format(bytes_of(stl_bytes(0, "solid binary"))), FileFormat::Stl);
   EXPECT_EQ(detect_format(bytes_of(stl_text())), FileFormat::Stl);
   EXPECT_EQ(detect_format(bytes_of(ply_bytes(true))), FileFormat::Ply);
@@ -328,7 +328,7 @@ struct Folder {
   }
 };
 
-TEST(Triangles, look_for_files_below_their_folder_alone) {
+TEST(Triangles, FindsFilesOnlyBelowTheirFolder) {
   if (!reads(FileFormat::Obj)) return;
   const Folder folder;
   Image red;
@@ -365,7 +365,7 @@ TEST(Triangles, look_for_files_below_their_folder_alone) {
   EXPECT_EQ(scene->scene.grids()[scene->scene.grids().handles().front()].name, "one");
 }
 
-TEST(Triangles, become_scenes_at_their_own_size) {
+TEST(Triangles, BecomeScenesAtTheirOwnSize) {
   LoadOptions options;
   options.mesh.up = UpAxis::Y;
   auto scene = load_scene(bytes_of(stl_bytes()), options);
@@ -389,7 +389,7 @@ TEST(Triangles, become_scenes_at_their_own_size) {
   EXPECT_FALSE(load_scene(bytes_of("solid nothing\nendsolid nothing\n")));
 }
 
-TEST(Triangles, corpus_files_are_read_as_scenes) {
+TEST(Triangles, ReadsCorpusFilesAsScenes) {
   std::size_t read = 0;
   for (const auto& entry : fs::directory_iterator(fs::path(QUOIN_SOURCE_DIR) / "tests" / "corpus" / "triangles")) {
     const auto loaded = load_scene(entry.path());
@@ -403,7 +403,7 @@ TEST(Triangles, corpus_files_are_read_as_scenes) {
   EXPECT_GE(read, 6U);
 }
 
-TEST(Triangles, real_files_have_their_counts) {
+TEST(Triangles, RealFilesHaveTheExpectedCounts) {
   const fs::path folder = fs::path(QUOIN_SOURCE_DIR).parent_path() / "shared" / "data" / "mesh";
   if (!fs::exists(folder)) GTEST_SKIP() << "the files are not here";
   const fs::path models = folder / "alecjacobson+common-3d-test-models";

@@ -342,7 +342,7 @@ TEST(ArraySurface, IsTheSameAtAnyScaleOfItsValues) {
   }
 }
 
-TEST(ArraySurface, TellsDoublesApartThatAreOneFloat) {
+TEST(ArraySurface, DistinguishesDoublesThatRoundToOneFloat) {
   const TestArray<double> samples({3, 3, 50}, [](DVec3 p) { return 1.0 + (p.z < 20.0 ? 1e-12 : -1e-12); });
   const ArraySurface surface = surface_of(samples.view(), {1.0, SolidSide::Above, ArrayBorder::Closed, false});
   float most = 0.0F;

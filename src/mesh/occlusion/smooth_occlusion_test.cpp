@@ -43,7 +43,7 @@ std::vector<float> occlusion_of(const DensityGrid& field, const SmoothPlaces& pl
   return out;
 }
 
-TEST(SmoothOcclusionOfPlaces, IsToTheBitWhatTheMesherStores) {
+TEST(SmoothOcclusionOfPlaces, MatchesTheMeshersOcclusionExactly) {
   const DensityGrid field = hilly_field();
   for (const SmoothOcclusion form : kForms) {
     for (const float spread : {0.0625F, 0.4F, 1.0F, 1.7F, 2.0F, 4.0F}) {

@@ -88,7 +88,7 @@ void expect_sound(const Grid& grid, double volume_error = 0.0) {
   EXPECT_NEAR(found.volume, static_cast<double>(grid.voxel_count()), 1e-3 + volume_error);
 }
 
-TEST(ClosedSurface, one_voxel_is_a_cube) {
+TEST(ClosedSurface, OneVoxelIsACube) {
   Grid grid;
   grid.set({5, -3, 7}, 2);
   const BlockyTriangles mesh = surface_of(grid);
@@ -98,7 +98,7 @@ TEST(ClosedSurface, one_voxel_is_a_cube) {
   expect_sound(grid);
 }
 
-TEST(ClosedSurface, goes_across_chunks_without_a_seam) {
+TEST(ClosedSurface, CrossesChunksWithoutASeam) {
   Grid grid;
   grid.fill_box({IVec3(-3), IVec3(70, 66, 5)}, 1);
   grid.fill_box({IVec3(0, 70, 0), IVec3(3, 72, 2)}, 2);
@@ -107,7 +107,7 @@ TEST(ClosedSurface, goes_across_chunks_without_a_seam) {
             6U * static_cast<std::size_t>(2 * (73 * 69 + 73 * 8 + 69 * 8) + 2 * (6 + 6 + 4)));
 }
 
-TEST(ClosedSurface, is_parted_where_voxels_touch_by_an_edge_or_a_corner) {
+TEST(ClosedSurface, SeparatesVoxelsThatShareOnlyAnEdgeOrCorner) {
   Grid edge;
   edge.set({0, 0, 0}, 1);
   edge.set({1, 1, 0}, 1);
@@ -124,7 +124,7 @@ TEST(ClosedSurface, is_parted_where_voxels_touch_by_an_edge_or_a_corner) {
   expect_sound(joined, 0.1);
 }
 
-TEST(ClosedSurface, is_manifold_whatever_eight_voxels_there_are) {
+TEST(ClosedSurface, IsManifoldForAllSetsOfEightVoxels) {
   for (unsigned solid = 1; solid < 256; ++solid) {
     Grid grid;
     // The same as hollows in a block.
@@ -146,7 +146,7 @@ TEST(ClosedSurface, is_manifold_whatever_eight_voxels_there_are) {
   }
 }
 
-TEST(ClosedSurface, is_manifold_of_any_voxels) {
+TEST(ClosedSurface, IsManifoldForRandomVoxels) {
   for (const unsigned percent : {10U, 30U, 50U, 70U, 90U}) {
     std::mt19937 random(percent);
     Grid grid;
@@ -159,7 +159,7 @@ TEST(ClosedSurface, is_manifold_of_any_voxels) {
   }
 }
 
-TEST(ClosedSurface, moves_only_what_touches) {
+TEST(ClosedSurface, MovesOnlyTouchingVertices) {
   const auto& offsets = print::corner_offsets();
   for (unsigned solid : {0b1U, 0b11U, 0b1111U, 0b111U, 0b10111U, 0b11111110U}) {
     for (const Vec3& offset : offsets[solid]) EXPECT_EQ(offset, Vec3(0.0F)) << solid;
@@ -170,7 +170,7 @@ TEST(ClosedSurface, moves_only_what_touches) {
   EXPECT_LT(into.x, 0.0F);
 }
 
-TEST(ClosedSurface, refuses_what_is_too_far) {
+TEST(ClosedSurface, RejectsDistantVoxels) {
   Grid grid;
   grid.set({70'000, 0, 0}, 1);
   EXPECT_EQ(closed_surface(grid).error().code, ErrorCode::LimitExceeded);

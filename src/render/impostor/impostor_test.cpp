@@ -245,7 +245,7 @@ void edit_a_little(Grid& grid, VoxelType types, std::mt19937& random) {
   grid.fill_box({at, at + size}, type);
 }
 
-TEST(Impostor, RebuiltAfterAnEditIsBuiltAnewToTheBit) {
+TEST(Impostor, RebuildAfterAnEditEqualsANewImpostor) {
   for (unsigned seed = 1; seed <= 24; ++seed) {
     SCOPED_TRACE(seed);
     std::mt19937 random(seed);

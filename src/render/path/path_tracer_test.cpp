@@ -374,7 +374,7 @@ TEST(PathTracer, FollowsEditsOfVoxelsTypesAndInstances) {
   EXPECT_EQ(followed->radiance, path_picture(scene, of_town(), quick()).radiance);
 }
 
-TEST(PathTracer, LayersSayWhatPixelsShow) {
+TEST(PathTracer, LayersDescribePixels) {
   const Scene scene = cube_of(kGrey);
   PathOptions options = under_even_sky(16, 16, 4);
   options.layers = true;
@@ -491,7 +491,7 @@ TEST(PathTracer, LearnedLampSharesDarkenNothing) {
   EXPECT_NEAR(remembering / forgetful, 1.0, 0.02);
 }
 
-TEST(PathTracer, RefusesWhatCannotBe) {
+TEST(PathTracer, RejectsInvalidInput) {
   const Scene scene = cube_of(kGrey);
   const PathTracer tracer(scene);
   const Camera camera = from_above(4.0, 20.0, 4.0, 6.0);

@@ -75,13 +75,13 @@ TEST_F(VulkanMemory, AFullMemoryIsAnErrorAndNoMore) {
   EXPECT_TRUE(memory.allocate(100, "testing"));
 }
 
-TEST_F(VulkanMemory, ALostDeviceIsSaidToBe) {
+TEST_F(VulkanMemory, ReportsALostDevice) {
   const Error lost = device_->error_of(VK_ERROR_DEVICE_LOST, "drawing");
   EXPECT_EQ(lost.code, ErrorCode::DeviceLost);
   EXPECT_EQ(lost.message, "vulkan: " + device_->description().name + ": the device was lost while drawing");
 }
 
-TEST(VulkanValidation, AMistakeIsHeard) {
+TEST(VulkanValidation, ReportsMistakes) {
   std::vector<std::string> messages;
   VulkanOptions options;
   options.on_validation_message = [&](const std::string& message) { messages.push_back(message); };

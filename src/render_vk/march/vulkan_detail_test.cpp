@@ -102,7 +102,7 @@ TEST_F(VulkanDetail, EditsReachHalvedGrids) {
   }
 }
 
-TEST_F(VulkanDetail, AnEditSendsWhatItChanged) {
+TEST_F(VulkanDetail, AnEditUploadsItsChanges) {
   const GridHandle edited = add_blobs(scene_, 31);
   add_crowd(scene_, {edited}, 1, 1.0);
   const Camera camera = towards({-300, 420, -500}, {0, 0, 0}, 0.6);

@@ -51,7 +51,7 @@ TEST_F(VulkanPictures, SamplesAddUpToTheRenderedPicture) {
   EXPECT_EQ(picture.rays(), whole.rays);
 }
 
-TEST_F(VulkanPictures, BeginAnewWhenAskedAndForAnotherSize) {
+TEST_F(VulkanPictures, RestartOnRequestAndOnResize) {
   VulkanPicture picture(*renderer_);
   add(picture, 2, Accumulation::Restart);
   add(picture, 1, Accumulation::Restart);
@@ -77,7 +77,7 @@ TEST_F(VulkanPictures, AddNothingToWhatIsNoSumOfSamples) {
   }
 }
 
-TEST_F(VulkanPictures, SayWhatCannotBe) {
+TEST_F(VulkanPictures, RejectInvalidInput) {
   VulkanPicture picture(*renderer_);
   EXPECT_EQ(picture.read().error().code, ErrorCode::InvalidArgument);
   add(picture, 1, Accumulation::Restart);

@@ -42,7 +42,7 @@ Grid hills(VoxelType ground, VoxelType stone, int edge) {
   return grid;
 }
 
-TEST_F(VulkanUpdate, AnEditSendsWhatItChangedAndNoMore) {
+TEST_F(VulkanUpdate, AnEditUploadsOnlyItsChanges) {
   Scene scene;
   const VoxelType ground = add_type(scene, {90, 160, 70});
   const VoxelType stone = add_type(scene, {140, 140, 150});

@@ -170,7 +170,7 @@ TEST_F(VulkanPaths, TakeOutTheProcessorsNoise) {
 }
 
 // From the fifth sample on, paths on the CPU use the learned shares of lamps.
-TEST_F(VulkanPaths, ConvergeToWhatTheProcessorShows) {
+TEST_F(VulkanPaths, ConvergeToTheCpuImage) {
   const PathOptions options = small(48);
   const Scene scene = town();
   const PathPicture device = drawn(scene, of_town(), options);
@@ -320,7 +320,7 @@ TEST_F(VulkanPaths, KeepTheFacesThatGlowUntilTheyAreOthers) {
   expect_same_light(scene, of_town(), small(), "glowing");
 }
 
-TEST_F(VulkanPaths, RefuseWhatTheProcessorRefuses) {
+TEST_F(VulkanPaths, RejectTheSameInputAsTheCpu) {
   const Scene scene = town();
   ASSERT_TRUE(renderer_->update(scene));
   PathOptions options = small();

@@ -195,7 +195,7 @@ TEST(SceneEdit, AVoxelIsSetAtAPoint) {
   }
 }
 
-TEST(SceneEdit, TheJournalsTellOfIt) {
+TEST(SceneEdit, EditsAreInTheJournals) {
   Random random(1);
   Placed placed = random_placement(random, 10.0);
   const DVec3 point = world_from_grid(placed.instance(), placed.grid(), {200.5, 0.5, 0.5});

@@ -168,7 +168,7 @@ TEST(Capsule, SweepsMeetVoxelsWhenTheirDistanceIsTheRadius) {
   EXPECT_GT(inside, 30);
 }
 
-TEST(Capsule, NothingIsMetByWhatIsNoCapsule) {
+TEST(Capsule, InvalidCapsulesHitNothing) {
   SceneGrid content;
   content.grid.fill_box({IVec3{-3}, IVec3{3}}, kStone);
   const Scene scene = scene_of(std::move(content), {});

@@ -144,7 +144,7 @@ TEST(FreePlace, ABoxOnAHumpStandsOnItAndStaysThere) {
   }
 }
 
-TEST(FreePlace, WhoWasMovedOutStaysOut) {
+TEST(FreePlace, AMovedBoxStaysOut) {
   Random random(7);
   for (int round = 0; round < 40; ++round) {
     Instance instance;

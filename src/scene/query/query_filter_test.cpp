@@ -86,7 +86,7 @@ struct Filtered {
   std::array<InstanceHandle, 2> ignored;
 };
 
-TEST(QueryFilter, RaysMeetWhatIsLeft) {
+TEST(QueryFilter, RaysHitOnlyUnfilteredInstances) {
   int differing = 0;
   for (unsigned seed = 1; seed <= 4; ++seed) {
     Filtered all(seed);
@@ -116,7 +116,7 @@ TEST(QueryFilter, RaysMeetWhatIsLeft) {
   EXPECT_GT(differing, 50);
 }
 
-TEST(QueryFilter, ShapesMeetWhatIsLeft) {
+TEST(QueryFilter, ShapesHitOnlyUnfilteredInstances) {
   int differing = 0;
   for (unsigned seed = 1; seed <= 4; ++seed) {
     Filtered all(seed);
@@ -206,7 +206,7 @@ TEST(QueryFilter, ABodyThatMovesIgnoresItself) {
   EXPECT_EQ(moved.contacts[0].hit.voxel.x, 0);
 }
 
-TEST(SlideContact, SaysWhatWasMet) {
+TEST(SlideContact, ReportsTheHit) {
   Scene scene;
   ASSERT_TRUE(scene.types.add({}).has_value());
   VoxelProperties wood;

@@ -124,7 +124,7 @@ TEST(SceneQuery, FirstHitIsTheNearestVoxelOfAllHereAndFarAway) {
   }
 }
 
-TEST(SceneQuery, RefusesWhatIsNoRay) {
+TEST(SceneQuery, RejectsInvalidRays) {
   Random random(1);
   const Scene scene = random_scene(random, DVec3(0.0));
   const SceneTracer tracer(scene);

@@ -235,7 +235,7 @@ TEST(UnloadedSweeps, ABodyDoesNotFallThroughGroundThatHasNotCome) {
   EXPECT_NEAR(stands.centre.y, 0.9, 0.01);
 }
 
-TEST(UnloadedSweeps, WhoStartsInWhatIsNotLoadedStaysThere) {
+TEST(UnloadedSweeps, ABoxThatStartsInUnloadedChunksStaysThere) {
   PartialScene world;
   world.load_around(1);
   SceneTracer tracer(world.scene);
@@ -252,7 +252,7 @@ TEST(UnloadedSweeps, WhoStartsInWhatIsNotLoadedStaysThere) {
   EXPECT_EQ(displacement_to_free_place(tracer, outside, 2.0, passed()), DVec3(0.0));
 }
 
-TEST(UnloadedSweeps, WhoIsPushedOutOfVoxelsIsNotPushedIntoWhatIsNotLoaded) {
+TEST(UnloadedSweeps, BoxesAreNotPushedIntoUnloadedChunks) {
   PartialScene world;
   world.load_around(1);
   // In the ground, one voxel from the border of the unloaded area.

@@ -147,7 +147,7 @@ TEST(SmoothScene, GoesOnWhereItWasCancelled) {
   EXPECT_EQ(content_of(smooth.scene()), made_anew(made.scene));
 }
 
-TEST(SmoothScene, RefusesWhatIsTooLargeUntilItIsSmaller) {
+TEST(SmoothScene, RejectsLargeContentUntilItShrinks) {
   Made made = small_scene();
   SmoothFieldOptions options;
   options.max_bytes = 1'500'000;

@@ -91,7 +91,7 @@ TEST(InstanceTree, LeavesOutMostOfWhatIsFarFromTheRay) {
   EXPECT_LT(visited(tree, {{-200, 0, 0}, {1, 0, 0}}, kInfinity).size(), 40U);
 }
 
-TEST(InstanceTree, StopsWhenToldAndIgnoresEmptyBoxes) {
+TEST(InstanceTree, StopsOnRequestAndIgnoresEmptyBoxes) {
   const DBox unit{DVec3(0.0), DVec3(1.0)};
   const InstanceTree tree({unit, DBox{}, unit, unit});
   const Ray ray{DVec3(-1.0), DVec3(1.0)};

@@ -119,7 +119,7 @@ TEST(PacketTree, IgnoresNonFiniteAndDirectionlessRays) {
   for (const auto& [i, lanes] : found) EXPECT_NE(lanes & 4U, 0U);
 }
 
-TEST(PacketTree, LeavesOutWhatItIsToldTo) {
+TEST(PacketTree, SkipsExcludedInstances) {
   RandomBoxes world(6);
   const std::vector<DBox> boxes = world.boxes(40);
   for (const std::size_t kept : {std::size_t{0}, std::size_t{3}, std::size_t{40}}) {

@@ -39,7 +39,7 @@ DVec3 random_direction(std::mt19937& random) {
   return glm::normalize(DVec3{any(random), any(random), any(random)});
 }
 
-TEST(SceneFields, ChangesAreTold) {
+TEST(SceneFields, ReportsChanges) {
   BallScene s;
   ChangeCursor cursor = s.scene.cursor();
   DensityGrid& field = s.scene.edit(s.grid).field;
@@ -163,7 +163,7 @@ TEST(SceneFields, TheNearestCountsBesideBlocks) {
   }
 }
 
-TEST(SceneFields, ATracerThatFollowsIsAsOneMadeAnew) {
+TEST(SceneFields, AnUpdatedTracerMatchesANewOne) {
   BallScene s;
   SceneTracer followed(s.scene);
   std::mt19937 random(3);

@@ -231,7 +231,7 @@ std::vector<SelectedInstance> random_details(const SceneTracer& tracer, Changing
   return selected;
 }
 
-TEST(SceneUpdate, IsAsATracerMadeAnewWhateverHappenedToTheScene) {
+TEST(SceneUpdate, AnUpdatedTracerMatchesANewOne) {
   Counts counts;
   for (unsigned seed = 0; seed < 60; ++seed) {
     SCOPED_TRACE(seed);
@@ -309,7 +309,7 @@ TEST(SceneUpdate, AGridThatIsShownForTheFirstTimeHasItsTrees) {
   EXPECT_EQ(placed_in(tracer)[1].opaque->bounds(), world.scene.grids()[other].grid.bounds());
 }
 
-TEST(SceneUpdate, OthersWhoFollowTheGridMissNothing) {
+TEST(SceneUpdate, OtherConsumersOfTheGridMissNoChanges) {
   TwoCubes world;
   SceneTracer tracer(world.scene);
   Grid& grid = world.scene.edit(world.grid).grid;

@@ -150,7 +150,7 @@ TEST(ChunkBody, ChunksThatWereReadCanBeEdited) {
   }
 }
 
-TEST(ChunkBody, SameVoxelsAreTheSameBytesWhateverLedToThem) {
+TEST(ChunkBody, EqualVoxelsGiveEqualBytes) {
   std::mt19937 random(4);
   for (const Kind& kind : kKinds) {
     const Chunk chunk = chunk_of_boxes(random, kind.types, kind.boxes, kind.noise / 10);

@@ -163,7 +163,7 @@ TEST(WorldMeshes, DensitiesAreMeshedAsAWhole) {
   EXPECT_EQ(made.error().code, ErrorCode::Unsupported);
 }
 
-TEST(WorldMeshes, AFolderThatIsNotThereIsToldOf) {
+TEST(WorldMeshes, ReportsAMissingFolder) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   ASSERT_TRUE(write_world(landscape(), path));

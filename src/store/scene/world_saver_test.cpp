@@ -141,7 +141,7 @@ class KeptWorld {
   std::uint64_t counted_ = 0;
 };
 
-TEST(WorldSaver, SavesWhatChangedAndNoMore) {
+TEST(WorldSaver, SavesOnlyChanges) {
   const WorldFolder folder;
   KeptWorld kept(folder / "w.quoin");
   Scene scene = rich_scene();

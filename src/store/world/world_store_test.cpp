@@ -161,7 +161,7 @@ TEST(WorldStore, ASecondWriterIsRefusedAndReadersAreNot) {
   EXPECT_EQ((*chunk)->voxels.uniform(), VoxelType{10}) << "of a type that was put after the reader had opened it";
 }
 
-TEST(WorldStore, RefusesWhatCouldNotBeReadAgain) {
+TEST(WorldStore, RejectsUnreadableInput) {
   const WorldFolder folder;
   WorldStore world = made(folder / "w.quoin");
   const auto refused = [&](auto&& put) {
@@ -184,7 +184,7 @@ TEST(WorldStore, RefusesWhatCouldNotBeReadAgain) {
   EXPECT_EQ(world.grids()->size(), 1U);
 }
 
-TEST(WorldStore, SaysWhatIsWrongWithFiles) {
+TEST(WorldStore, ErrorsDescribeFileFaults) {
   const WorldFolder folder;
   const auto text_of = [](const Result<WorldStore>& world) { return world ? "" : to_string(world.error()); };
   EXPECT_NE(text_of(WorldStore::open(folder / "none", WorldAccess::Read)).find("No such file"), std::string::npos);
