@@ -38,7 +38,7 @@ chmod +x program
 ./program --benchmark_out=all.json
 "$spread" ./program --benchmark_out=all.json --benchmark_out_format=json >said
 [ "$(wc -l <processes)" = 6 ] || fail "not five more processes"
-grep -qE '^rays/a/single +13\.000 ms +36\.4 %$' said || fail "the spread of 11 to 15 ms is not told: $(cat said)"
+grep -qE '^rays/a/single +13\.000 ms +36\.4 %$' said || fail "the spread of 11 to 15 ms is not reported: $(cat said)"
 ! grep -q '^other' said || fail "a benchmark without rays ran again"
 python3 - <<'TEXT' || fail "the file lacks the processes: $(cat all.json)"
 import json

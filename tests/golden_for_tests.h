@@ -49,7 +49,7 @@ inline GoldenFolders golden_folders() {
 }
 
 /// Returns success if an image equals the golden image of its name in every pixel. Otherwise writes NAME.actual.png and
-/// (where the sizes agree) NAME.difference.png into the failures folder. Removes such files of earlier failures.
+/// (if the sizes agree) NAME.difference.png into the failures folder. Removes such files of earlier failures.
 inline ::testing::AssertionResult is_golden(const Image& actual, const std::string& name,
                                             const GoldenFolders& folders) {
   const auto path = folders.golden / (name + ".png");

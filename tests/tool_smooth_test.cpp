@@ -321,7 +321,7 @@ TEST_F(ToolSmooth, VolumesWithoutAFiniteValueAreErrors) {
     }
     EXPECT_FALSE(exists("out.glb") || exists("out.json") || exists("out.png"));
     const ToolRun told = run("info none.raw" + raw);
-    EXPECT_EQ(told.status, 0) << "what is in it can still be told";
+    EXPECT_EQ(told.status, 0) << "info still describes it";
     EXPECT_NE(told.out.find("Range: none"), std::string::npos) << told.out;
     EXPECT_EQ(run("convert none.raw out.glb --iso 3" + raw).status, std::isnan(value) ? 1 : 0);
   }
@@ -343,7 +343,7 @@ TEST_F(ToolSmooth, RawVolumesAreReportedRenderedAndKeptAsFields) {
   ASSERT_EQ(run("render ball.json -o again.png --size 64x64").status, 0);
   EXPECT_EQ(text_of(folder_.file("out.png")), text_of(folder_.file("again.png"))) << "the field is the volume's";
   for (const std::string command : {"info ball.raw", "render ball.raw -o no.png"}) {
-    EXPECT_EQ(run(command).status, 1) << "nothing says what is in it: " << command;
+    EXPECT_EQ(run(command).status, 1) << "the layout is unknown: " << command;
     EXPECT_EQ(run(command + " --raw-type int8").status, 2) << command;
     EXPECT_EQ(run(command + " --raw-size 20x18").status, 2) << command;
     EXPECT_EQ(run(command + " --raw-size 20x18x15 --raw-type float32").status, 1) << command;
@@ -370,7 +370,7 @@ TEST_F(ToolSmooth, FieldsAreToldByTheirSamplesAndAreSmoothInAnyCase) {
   const Json info = Json::parse(run("info cliffs.json --json").out);
   EXPECT_EQ(info["voxels"], 0);
   EXPECT_GT(info["solid_samples"], 1000);
-  EXPECT_GT(info["types"], 1) << "materials of what is solid";
+  EXPECT_GT(info["types"], 1) << "materials of solid samples";
   const std::string text = run("info cliffs.json").out;
   EXPECT_NE(text.find("Solid samples: "), std::string::npos) << text;
   EXPECT_EQ(text.find("Voxels: "), std::string::npos) << text;

@@ -303,8 +303,8 @@ TEST_F(Tool, QuietLeavesErrorsAndJson) {
   EXPECT_EQ(run("generate terrain t.vox --chunks 1x1x1 -q").out, "");
   EXPECT_TRUE(std::filesystem::exists(folder_.file("t.vox")));
   EXPECT_EQ(Json::parse(run("convert tiny.vox b.glb -q --json").out)["voxels"], 4);
-  EXPECT_NE(run("convert none.vox b.glb -q").err, "") << "errors are told";
-  EXPECT_NE(run("info tiny.vox -q").out, "") << "which is what it is for";
+  EXPECT_NE(run("convert none.vox b.glb -q").err, "") << "errors are printed";
+  EXPECT_NE(run("info tiny.vox -q").out, "") << "info prints even with -q";
 }
 
 // Completions follow the help; the test runs the available shells.
@@ -410,7 +410,7 @@ TEST_F(Tool, TheInputIsNotReplacedByACompanion) {
   EXPECT_FALSE(exists("foo.obj"));
   std::ofstream(folder_.file("castle.png")) << "a picture";
   ASSERT_EQ(run("convert tiny.vox castle.obj").status, 0);
-  EXPECT_EQ(text_of(folder_.file("castle.png")), "a picture") << "a picture of the same name is nobody's business";
+  EXPECT_EQ(text_of(folder_.file("castle.png")), "a picture") << "an unrelated image of the same name is kept";
 }
 
 TEST_F(Tool, HiddenInstancesAreMissedOnlyWhereTheyAreLeftOut) {

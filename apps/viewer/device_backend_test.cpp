@@ -237,7 +237,7 @@ TEST_F(DeviceBackendTest, PathsConvergeAndFollowEdits) {
   EXPECT_EQ(backend->name(), renderer_->device().name);
 }
 
-// How fine the first picture may be follows from what others like it took.
+// The resolution of the first image follows from the times of earlier images of the same kind.
 TEST_F(DeviceBackendTest, PathTracingTimesDoNotAffectRays) {
   const Document document = small_document();
   DeviceBackendOptions options;

@@ -1,7 +1,8 @@
 """Compares Quoin with other Python packages in one process. Usage: peers.py [FILE.vox] [--edge N] [--turns N]
 
-Runs what is installed of scikit-image, zmesh, trimesh and py-vox-io, and says what is not. Each pair is checked to do
-the same before it is timed: times are the least of some turns, by turns. `numpy`, and `quoin` on the path, are needed.
+Runs the installed ones of scikit-image, zmesh, trimesh and py-vox-io, and lists the missing ones. Each pair is checked
+to do the same before it is timed: times are the least of some turns, by turns. `numpy`, and `quoin` on the path, are
+needed.
 """
 
 import argparse

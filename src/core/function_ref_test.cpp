@@ -30,7 +30,7 @@ TEST(FunctionRef, CallsTheCallableItselfAndNoCopy) {
   const FunctionRef<int(int)> function = counting;
   EXPECT_EQ(function(1), 1);
   EXPECT_EQ(function(2), 3);
-  EXPECT_EQ(counting(0), 3) << "what it counts is its own";
+  EXPECT_EQ(counting(0), 3) << "the reference called this object";
   EXPECT_EQ(calls, 3);
 }
 

@@ -242,7 +242,7 @@ TEST(Chunk, ItsHashIsOfWhatItHoldsHoweverItCameToHoldIt) {
   for (auto it = undo.rbegin(); it != undo.rend(); ++it) chunk.set(std::get<0>(*it), std::get<1>(*it));
   EXPECT_EQ(chunk.content_hash(), uniform);
   EXPECT_TRUE(chunk == Chunk(3));
-  EXPECT_EQ(other.content_hash(), edited) << "a copy keeps what it held";
+  EXPECT_EQ(other.content_hash(), edited) << "a copy keeps its contents";
   EXPECT_FALSE(other == chunk);
 }
 

@@ -120,7 +120,7 @@ TEST_F(FileTest, ABackupKeepsWhatWasReplaced) {
     const auto unused = FileBackup::of(path);
     ASSERT_TRUE(unused);
   }
-  EXPECT_EQ(content(beside), "second") << "what was not written replaces no backup";
+  EXPECT_EQ(content(beside), "second") << "a file that was not written replaces no backup";
   EXPECT_EQ(entries(), 2U);
 }
 

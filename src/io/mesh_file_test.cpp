@@ -158,7 +158,7 @@ TEST_F(SmoothMeshFiles, PlacementsShareAMeshAndMirroredOnesAnother) {
   ASSERT_EQ(glb.document["nodes"].size(), 4U);
   EXPECT_EQ(glb.document["meshes"].size(), 2U);
   const auto& nodes = glb.document["nodes"];
-  EXPECT_EQ(nodes[0], nlohmann::json({{"name", "first"}, {"mesh", 0}})) << "nothing but what is needed";
+  EXPECT_EQ(nodes[0], nlohmann::json({{"name", "first"}, {"mesh", 0}})) << "only required keys";
   EXPECT_EQ(nodes[1], nlohmann::json({{"name", "thing"}, {"mesh", 0}, {"translation", {0.0, 9.0, 0.0}}}));
   EXPECT_EQ(nodes[2]["mesh"], 1);
   EXPECT_EQ(nodes[3]["mesh"], 1);

@@ -93,7 +93,7 @@ void find_in_grid(benchmark::State& state) {
   ChangeCursor cursor = grid.cursor();
   after_edits(state, world, [&] {
     const GridChanges changes = grid.changes_since(cursor);
-    fail_unless(chunks_to_mesh(grid, changes).size() == 1, "one chunk was to be told of");
+    fail_unless(chunks_to_mesh(grid, changes).size() == 1, "one chunk should be reported");
   });
 }
 
@@ -110,7 +110,8 @@ void find_in_scene(benchmark::State& state) {
   after_edits(state, world, [&] {
     world.scene.edit(moved).position.y += 1.0;
     const SceneChanges changes = world.scene.changes_since(cursor);
-    fail_unless(changes.grids.size() == 1 && changes.instances.size() == 1, "what was edited was to be told");
+    fail_unless(changes.grids.size() == 1 && changes.instances.size() == 1,
+                "the edited grid and instance should be reported");
   });
 }
 
@@ -123,7 +124,7 @@ void find_in_types(benchmark::State& state) {
     properties.colour.r = static_cast<std::uint8_t>(properties.colour.r + 1);
     types.replace(1, properties);
     const auto start = std::chrono::steady_clock::now();
-    fail_unless(types.changes_since(cursor).items.size() == 1, "one type was to be told of");
+    fail_unless(types.changes_since(cursor).items.size() == 1, "one type should be reported");
     state.SetIterationTime(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
   }
 }
@@ -137,7 +138,7 @@ void find_in_densities(benchmark::State& state) {
     density = density == -2.0F ? -3.0F : -2.0F;
     grid.set({94, 30, 30}, {density, 1});
     const auto start = std::chrono::steady_clock::now();
-    fail_unless(chunks_to_mesh(grid, grid.changes_since(cursor), 12).size() == 1, "one chunk was to be told of");
+    fail_unless(chunks_to_mesh(grid, grid.changes_since(cursor), 12).size() == 1, "one chunk should be reported");
     state.SetIterationTime(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
   }
 }

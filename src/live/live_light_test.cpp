@@ -224,7 +224,7 @@ TEST(LiveLight, DataAtVoxelsAndNamesAreNoWork) {
   ChangeCursor scene = world.scene.cursor();
   ASSERT_TRUE(world.grid().set_data({0, 0, 0}, {.state = 1}));
   world.scene.edit(world.handle).name = "another";
-  EXPECT_EQ(world.scene.changes_since(scene).grids.size(), 1U) << "the scene tells of it";
+  EXPECT_EQ(world.scene.changes_since(scene).grids.size(), 1U) << "the scene reports it";
   light.update(world.scene);
   EXPECT_FALSE(light.is_late());
 

@@ -125,13 +125,13 @@ TEST(MeshScheduler, SnapshotsAreLetGoOnceNoWorkerNeedsThem) {
   gated.wait_for_started(1);
   const ChunkStorage* before = storage(90);
   one.grid().set({64 * 90 + 5, 40, 40}, 1);
-  EXPECT_NE(storage(90), before) << "workers are to see what was there";
+  EXPECT_NE(storage(90), before) << "workers must see the earlier voxels";
   gated.open();
   scheduler.finish(one.scene, {});
   EXPECT_EQ(scheduler.take().size(), 100U);
   before = storage(91);
   one.grid().set({64 * 91 + 5, 40, 40}, 1);
-  EXPECT_EQ(storage(91), before) << "nobody shares it any more";
+  EXPECT_EQ(storage(91), before) << "no longer shared";
 }
 
 TEST(MeshScheduler, DeliversAllChunksOfOneFieldEditTogether) {
@@ -268,7 +268,7 @@ TEST(MeshScheduler, NothingOlderIsGivenAfterSomethingNewer) {
 }
 
 // Unchanged chunks deliver no surface, but callers that wait for `pending` to be 0 still finish.
-TEST(MeshScheduler, CallerDrivenMeshingFinishes) {
+TEST(MeshScheduler, AConsumerDrivenByOnReadyReceivesAllMeshes) {
   OneGrid one;
   constexpr int kEdited = 40;
   for (int row = 0; row < 2; ++row) {

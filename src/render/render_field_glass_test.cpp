@@ -183,7 +183,7 @@ TEST(RenderFieldGlass, OverlappingBlocksAreSeenThroughIt) {
   options.light.shading = Shading::Unlit;
   const Picture picture = taken(s.scene, from_above(0, 20, 0, 8), options);
   expect_near(pixel_at(picture, 4, 4), encoded(linear(kRed) * through(3.0F) + own(3.0F)), 1);
-  EXPECT_GT(std::abs(pixel_at(picture, 0, 0)[2] - pixel_at(picture, 4, 4)[2]), 20) << "beside them it is deeper";
+  EXPECT_GT(std::abs(pixel_at(picture, 0, 0)[2] - pixel_at(picture, 4, 4)[2]), 20) << "it is deeper next to them";
 }
 
 // A ball of clear glass in front of the sky: its two surfaces reflect by the field's normals.

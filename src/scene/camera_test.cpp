@@ -73,7 +73,7 @@ TEST(Camera, LooksAtItsTargetUpright) {
   EXPECT_NEAR(target.x, 0.0, 1e-12);
   EXPECT_NEAR(target.y, 0.0, 1e-12);
   EXPECT_NEAR(target.depth, std::sqrt(16 + 9 + 56.25), 1e-12);
-  EXPECT_GT(project(*camera, 1.5, {-1, 3, 0.5}).y, 0.0) << "what is higher is higher in the picture";
+  EXPECT_GT(project(*camera, 1.5, {-1, 3, 0.5}).y, 0.0) << "higher points are higher in the image";
   EXPECT_GT(project(*look_at({0, 0, 5}, {0, 0, 0}, 1.0), 1.0, {1, 0, 0}).x, 0.0) << "not mirrored";
 }
 

@@ -192,7 +192,7 @@ TEST(LevelOfDetail, NothingVisibleIsCulled) {
     culled += static_cast<int>(!is_kept);
   }
   EXPECT_GT(seen, 50);
-  EXPECT_GT(culled, 100) << "what lies behind and beside is left out";
+  EXPECT_GT(culled, 100) << "instances outside the view are culled";
 }
 
 TEST(LevelOfDetail, ACameraThatTremblesAtAThresholdChangesNothing) {

@@ -76,7 +76,7 @@ TEST(SceneDeathTest, AHandleOfWhatCameAfterASnapshotIsAMistakeInTheOther) {
   Built other{.scene = ours.scene.snapshot()};
   ASSERT_EQ(ours.scene.grids().size(), 1U);
   ASSERT_EQ(other.grid.index, 1U);
-  EXPECT_EQ(other.scene.edit(ours.grid).name, "grid") << "what was there before is named by the same handle";
+  EXPECT_EQ(other.scene.edit(ours.grid).name, "grid") << "handles from before the snapshot stay valid";
   (void)ours.scene.add_grid({});
   (void)ours.scene.add_instance({});
   (void)ours.scene.add_group({});

@@ -49,7 +49,7 @@ TEST(StreamBudget, RoomIsKeptForWhatIsMadeOfChunksLater) {
     program.load(10);
   }
   EXPECT_LT(program.most, static_cast<double>(kBudget));
-  EXPECT_GT(program.most, 0.8 * static_cast<double>(kBudget)) << "what was kept for nothing is used in the end";
+  EXPECT_GT(program.most, 0.8 * static_cast<double>(kBudget)) << "unused reserves are used in the end";
   // The loaded chunks do not decrease during an hour of flight.
   const std::size_t before = program.budget.loaded_chunks();
   std::size_t planned = before;

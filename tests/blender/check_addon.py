@@ -1,7 +1,7 @@
 """Installs the add-on's zip into a fresh profile and tests import, export and errors.
 
 Run: blender -b --factory-startup -P check_addon.py -- ADDON.zip CASTLE.vox FOLDER
-with BLENDER_USER_CONFIG and BLENDER_USER_SCRIPTS in an empty folder. FOLDER is for what is written.
+with BLENDER_USER_CONFIG and BLENDER_USER_SCRIPTS in an empty folder. Output goes to FOLDER.
 Exit status: 0 all right, 1 not.
 """
 
@@ -171,7 +171,7 @@ def check_file(quoin, folder):
         again = quoin.load(os.path.join(folder, "turned.vox"))
         require(len(again.instances) == 4, f"{len(again.instances)} instances")
         away = next(one for one in again.instances if one.name == "away")
-        require(away.layer == "attic" and away.visible and not away.shown, f"what a layer hides: {away}")
+        require(away.layer == "attic" and away.visible and not away.shown, f"instance in a hidden layer: {away}")
         first = next(one for one in again.instances if one.name == "first")
         require([one.name for one in again.groups] == ["house", "room"] and again.groups[first.group].name == "room",
                 f"groups: {again.groups}")
@@ -262,7 +262,7 @@ def check_round_trip(quoin, folder):
         bpy.context.view_layer.update()
         require(bpy.data.collections["cellar"].hide_render and not bpy.data.objects["barrel"].hide_render,
                 "a hidden group is a hidden collection")
-        require(bpy.data.objects["trunk"].hide_render, "what a hidden layer hides is hidden")
+        require(bpy.data.objects["trunk"].hide_render, "objects in a hidden layer are hidden")
         require(bpy.context.scene.camera.name == "before camera", "the first camera is looked through")
         run(bpy.ops.export_scene.quoin, filepath=path, scale=scale)
         a, b = arrangement(quoin, before), arrangement(quoin, path)
@@ -344,9 +344,9 @@ def check_own_scene(quoin, folder):
     line = next(one for one in told if "leaves out" in one)
     for name in ("point light my POINT", "spot light my SPOT", "area light my AREA", "sun my SUN",
                  "panoramic camera PANO AUTO"):
-        require(name in line, f"{name} is not told: {told}")
+        require(name in line, f"{name} is not reported: {line}")
     require(line.count("my SUN") == 1, f"one sun stays: {line}")
-    require(any("PERSP HORIZONTAL" in one and "shifted" in one for one in told), f"the shift is not told: {told}")
+    require(any("PERSP HORIZONTAL" in one and "shifted" in one for one in told), f"the shift is not reported: {told}")
     made = quoin.load(path)
     require({one.name for one in made.instances} ==
             {f"cube of {name}" for name in ("garden", "trees", scene.collection.name)}, "what renders show")

@@ -4,8 +4,8 @@ Run: blender -b --factory-startup -P check_light.py -- QUOIN.exr SIZE SAMPLES [C
 
 QUOIN.exr: `quoin render cornell.vox --light path --sky uniform --sky-brightness 0 --sun off --bounces 8
 --camera 16,16,78 --look-at 16,16,16 --fov 38`, square, of linear light.
-Compares the mean light of the picture within 1 %, and that of each of 8 x 8 blocks within 4 %, of which Cycles' own
-noise is a part. Exit status: 0 all right, 1 not.
+Compares the mean light of the image within 1 %, and the mean of each of 8 x 8 blocks within 4 %, which includes Cycles'
+own noise. Exit status: 0 all right, 1 not.
 """
 
 import math

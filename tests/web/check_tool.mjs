@@ -52,9 +52,9 @@ function check() {
   const sources = readdirSync(folder, { recursive: true }).filter((name) => endings.test(name)).sort();
   const [written, faults] = convertAll(sources.map((name) => join(folder, name)));
   const statuses = [faults.length === 0 && written.length > 0 ? 0 : 1];
-  // The validator tells of compression that it does not know.
+  // The validator reports compression that it does not know.
   statuses.push(script('validate.mjs', ...(values.packed ? [] : ['--strict']), ...written.map(([, glb]) => glb)));
-  // Finding what lies under a pixel tries every triangle.
+  // Finding the surface under a pixel tries every triangle.
   const small = written.filter(([, glb]) => statSync(glb).size < 1e6);
   const step = Math.max(1, Math.floor(small.length / Math.max(1, Number(values.pixels))));
   // Voxels tell what blocks look like, not what smooth surfaces do.

@@ -1,4 +1,4 @@
-// Reads what the checks need from a GLB, by the specification and without any client's loader (browser only).
+// Reads the parts of a GLB that the checks need, by the specification and without any client's loader (browser only).
 import { MeshoptDecoder } from 'three/addons/libs/meshopt_decoder.module.js';
 
 async function decodePng(bytes) {
@@ -33,7 +33,7 @@ export async function parseGlb(buffer) {
     MeshoptDecoder.decodeGltfBuffer(decoded, packed.count, packed.byteStride, source, packed.mode, packed.filter);
     return decoded;
   };
-  /** Without what lies between elements; floats where the file has them or shares of one. */
+  /** Returns tightly packed elements; floats if the file has floats or normalized integers. */
   const accessor = (index) => {
     if (index === undefined) return undefined;
     const { bufferView, componentType, count, type, normalized } = json.accessors[index];

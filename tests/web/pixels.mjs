@@ -2,8 +2,8 @@
 // times the vertices' (the occlusion of blocks; the whole colour of smooth surfaces, which have no palette):
 // node pixels.mjs [--occluded] FILE.glb[=FILE.vox]...
 //
-// Where a .vox file is named that is a single plain model, the GLB is compared with colours and occlusion computed anew
-// from those voxels, instead of with what it says itself.
+// If a .vox file with a single plain model is named, the GLB is compared with colours and occlusion computed from
+// those voxels, instead of with its own data.
 // With --occluded it is a failure when no sampled pixel is darkened by occlusion.
 // Exit status: 0 all right, 1 not, 77 when the browser or the packages are not installed.
 import { parseArgs } from 'node:util';

@@ -75,7 +75,7 @@ function unlit() {
   });
 }
 
-/** `unit`: how many pixels a voxel must span at least; what does not fit then lies outside the picture. */
+/** `unit`: minimum pixels per voxel; parts that do not fit then lie outside the image. */
 function look(view, zoom = 1, unit = 0) {
   const direction = new THREE.Vector3(...(directions[view] ?? view)).normalize();
   const box = new THREE.Box3().setFromObject(models);
@@ -113,7 +113,7 @@ function stand(from, to, fov) {
 const linear = (byte) => (byte / 255 <= 0.04045 ? byte / 255 / 12.92 : ((byte / 255 + 0.055) / 1.055) ** 2.4);
 const encoded = (value) => Math.round(255 * (value <= 0.0031308 ? value * 12.92 : 1.055 * value ** (1 / 2.4) - 0.055));
 
-/** What the file says about the point that a ray through a pixel meets: its texel and the brightness there. */
+/** Returns the file's texel and brightness at the point where a ray through a pixel hits. */
 function hitAt(raycaster, x, y) {
   const ndc = new THREE.Vector2((x / window.innerWidth) * 2 - 1, 1 - (y / window.innerHeight) * 2);
   raycaster.setFromCamera(ndc, camera);

@@ -1,4 +1,4 @@
-// What a .vox file of one model says about a point of its surface, computed anew from the voxels: the truth that
+// Computes the colour and occlusion of surface points of a one-model .vox file from its voxels: the reference that
 // pixels.mjs compares with. Axes: MagicaVoxel's (x, y, z) is (x, z, -y) here; the model turns about floor(size / 2).
 
 /** {type(voxel), colour(type)} in coordinates of the file's world; null when the file is not that simple. */

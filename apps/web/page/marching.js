@@ -102,7 +102,7 @@ export class MarchedView {
   #finished = -1;  // the change that has a finished image
   #failed;         // { change, error } if rendering failed
 
-  /** `page`: { ask, below (an element), view() => what the worker's `frame` takes, shown(facts), said(text) }. */
+  /** `page`: { ask, below (an element), view() => arguments of the worker's `frame`, shown(facts), said(text) }. */
   constructor(page) {
     this.#page = page;
   }

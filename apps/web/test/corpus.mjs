@@ -11,7 +11,7 @@ const [packageFolder, tool, ...folders] = process.argv.slice(2);
 const { load } = await import(pathToFileURL(join(packageFolder, 'quoin.js')));
 const scratch = mkdtempSync(join(tmpdir(), 'quoin-web-'));
 
-/** Returns what the module reports as missing, such as libraries or sidecar files; else undefined. */
+/** Returns the missing libraries or sidecar files that the module reports; else undefined. */
 function lacks(message) {
   if (/only from a path|beside it/.test(message)) return 'files beside them';
   return /LZ4|without (tinyobjloader|tinygltf)/.exec(message)?.[0].replace('without ', '');

@@ -119,7 +119,7 @@ TEST(DensityChunk, AgreesWithAPlainArrayUnderRandomWrites) {
   EXPECT_EQ(copy.materials().uniform(), std::optional<VoxelType>(4));
 }
 
-TEST(DensityChunk, FreesUniformStorage) {
+TEST(DensityChunk, UniteAndCompactFreeUniformStorage) {
   DensityChunk chunk(kFar, 2);
   const std::size_t empty = chunk.bytes();
   EXPECT_EQ(chunk.uniform(), std::optional<Half>(kFar));

@@ -161,7 +161,7 @@ TEST(SceneData, NamesDataThatVoxCannotHold) {
   const auto again = load_scene(written->bytes);
   ASSERT_TRUE(again) << to_string(again.error());
   const VoxelType type = only_grid(again->scene).types().at(0);
-  EXPECT_EQ(again->scene.types[type].state_bits, 2) << "what a type says of itself is kept";
+  EXPECT_EQ(again->scene.types[type].state_bits, 2) << "keeps the properties of a type";
 }
 
 // A data record as stored in a file.

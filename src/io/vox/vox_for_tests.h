@@ -201,7 +201,7 @@ inline std::string wrong_with(std::span<const std::byte> bytes, const LoadOption
     return written.error().code == ErrorCode::LimitExceeded ? "" : "cannot write: " + to_string(written.error());
   }
   const Result<LoadedScene> again = read_vox(written->bytes, {.show_hidden = false, .frame = 0});
-  if (!again) return "cannot read what was written: " + to_string(again.error());
+  if (!again) return "cannot read the written file: " + to_string(again.error());
   return difference(loaded->scene, again->scene);
 }
 

@@ -460,7 +460,7 @@ TEST(PropagatedLight, GamesHaveLevelsOfTheirOwn) {
   light.update(grid, types);
   EXPECT_EQ(light.at({5, 5, 5}), (LightLevels{0, 3, 2, 1}));
   EXPECT_EQ(light.at({6, 5, 5}), (LightLevels{15, 2, 1, 0}));
-  EXPECT_EQ(light.at({5, 4, 5}), (LightLevels{14, 2, 1, 0})) << "beside columns of sky";
+  EXPECT_EQ(light.at({5, 4, 5}), (LightLevels{14, 2, 1, 0})) << "next to columns of sky";
 }
 
 TEST(PropagatedLight, SnapshotsKeepTheirLightAndGoOnByThemselves) {

@@ -96,7 +96,7 @@ TEST(BlockyMesh, StopsWhenProgressSaysSo) {
     const auto mesh = build_blocky_mesh(ten_chunks(), oracle::mixed_types(), {}, {1}, go_on);
     ASSERT_FALSE(mesh.has_value()) << last;
     EXPECT_EQ(mesh.error().code, ErrorCode::Cancelled);
-    EXPECT_EQ(calls, last) << "nobody is asked again after a no";
+    EXPECT_EQ(calls, last) << "no calls after the callback returns false";
   }
 }
 

@@ -61,7 +61,7 @@ TEST(ImpostorCache, KeepsTheOldOneUntilTheEditedGridsIsReady) {
   ASSERT_NE(renewed, nullptr);
   EXPECT_NE(renewed, old);
   EXPECT_TRUE(shows(*renewed, 2));
-  EXPECT_FALSE(shows(*old, 2)) << "whoever holds it still has it";
+  EXPECT_FALSE(shows(*old, 2)) << "a held impostor does not change";
   EXPECT_EQ(cache.stats().held, 1U);
   EXPECT_EQ(cache.stats().bytes, renewed->bytes());
 }

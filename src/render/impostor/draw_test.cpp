@@ -175,7 +175,7 @@ TEST(DrawImpostors, EmptyPixelsKeepWhatTheyHad) {
   std::fill(nearer.depth.values.begin(), nearer.depth.values.end(), 1.0F);
   const std::array far{FarInstance{world.instance, &world.impostor}};
   draw_impostors(SceneTracer(world.scene), far, camera, options, nearer);
-  EXPECT_EQ(nearer.colour.rgb, before.colour.rgb) << "what is nearer hides it";
+  EXPECT_EQ(nearer.colour.rgb, before.colour.rgb) << "nearer voxels hide it";
 }
 
 TEST(DrawImpostors, OrderDoesNotMatterAndTheLowerHandleWinsAtEqualDepth) {
@@ -222,7 +222,7 @@ TEST(DrawImpostors, HostilePlacesNeitherHangNorCrash) {
   const double infinity = std::numeric_limits<double>::infinity();
   EXPECT_GT(pixels_at({0, 0, -200}), 100);
   EXPECT_EQ(pixels_at({0, 0, 200}), 0) << "behind";
-  EXPECT_EQ(pixels_at({100, 0, 0}), 0) << "beside, at the camera's plane";
+  EXPECT_EQ(pixels_at({100, 0, 0}), 0) << "to the side, at the camera's plane";
   EXPECT_EQ(pixels_at({std::numeric_limits<double>::quiet_NaN(), 0, -200}), 0);
   EXPECT_EQ(pixels_at({0, infinity, -200}), 0);
   EXPECT_EQ(pixels_at({0, 0, -1e7}), 0) << "under a pixel";

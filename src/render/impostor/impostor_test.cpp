@@ -332,7 +332,7 @@ TEST(Impostor, PicturesAreThoseOfTheRenderer) {
       different += truth.colour.rgb[3 * i] != picture.colour.rgb[3 * i];
     }
     EXPECT_GT(covered, 500);
-    EXPECT_LE(different, 4) << view << ": but for rounding at edges";
+    EXPECT_LE(different, 4) << view << ": only rounding at edges may differ";
   }
   const std::vector<ImpostorPicture> none = impostor_pictures(Grid(), scene.types, ImpostorOptions{16});
   ASSERT_EQ(none.size(), 26U);

@@ -81,7 +81,7 @@ TEST(WorldSaver, ASceneIsTheSameAgain) {
   EXPECT_EQ(saved->bytes, std::filesystem::file_size(folder / "w.quoin"));
   EXPECT_TRUE(saved->warnings.empty());
   EXPECT_EQ(text_of(loaded_from(folder / "w.quoin")), text_of(scene));
-  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1) << "nothing lies beside it";
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1) << "no other files in the folder";
 }
 
 TEST(WorldSaver, TheSameSceneGivesTheSameBytes) {

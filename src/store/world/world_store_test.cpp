@@ -161,7 +161,7 @@ TEST(WorldStore, ASecondWriterIsRefusedAndReadersAreNot) {
   EXPECT_EQ((*chunk)->voxels.uniform(), VoxelType{10}) << "of a type that was put after the reader had opened it";
 }
 
-TEST(WorldStore, RejectsUnreadableInput) {
+TEST(WorldStore, SaveRejectsUnreadableChanges) {
   const WorldFolder folder;
   WorldStore world = made(folder / "w.quoin");
   const auto refused = [&](auto&& put) {
