@@ -177,7 +177,7 @@ TEST(Changes, ACursorOfAnotherContainerReceivesAllChunks) {
     ChangeCursor three = cursor;
     const int told =
         int{grid.changes_since(one).all} + int{densities.changes_since(two).all} + int{types.changes_since(three).all};
-    EXPECT_EQ(told, 2) << "but for the container itself";
+    EXPECT_EQ(told, 2) << "all containers except the cursor's own";
   }
 }
 

@@ -137,7 +137,7 @@ TEST(ChunkTable, AFewFarAwayDoNotKeepTheOthersOutOfTheWindow) {
     if (far_first) add_far();
     for (int i = 0; i < 4'096; ++i) add(table, {i % 16, i / 16 % 16, i / 256}, 1);
     if (!far_first) add_far();
-    EXPECT_LE(table.outside(), 8U + 1'024U) << "but for those that came last";
+    EXPECT_LE(table.outside(), 8U + 1'024U) << "only the chunks added last are outside";
     EXPECT_GE(table.window_cells(), 2'048U);
     EXPECT_EQ(table.voxel(1, 2, 3), 1);
     EXPECT_EQ(table.voxel(20'000 * 64 + 1, 20'000 * 64 + 2, -20'000 * 64 + 3), 1);

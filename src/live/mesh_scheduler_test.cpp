@@ -144,7 +144,7 @@ TEST(MeshScheduler, DeliversAllChunksOfOneFieldEditTogether) {
   gated.wait_for_started(1);
   gated.let_through(1);
   gated.wait_for_started(2);
-  EXPECT_EQ(scheduler.take().size(), 1U) << "what was never seen waits for nobody";
+  EXPECT_EQ(scheduler.take().size(), 1U) << "first meshes do not wait for other chunks";
   gated.let_through(7);
   while (scheduler.pending() != 0) {
     scheduler.update(one.scene, {});

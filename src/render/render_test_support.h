@@ -118,7 +118,7 @@ inline Camera sixth_ray_blocked(Scene& scene, Direction face) {
   return camera;
 }
 
-/// The pixels in which two pictures of one size differ by more than `tolerance` in a channel.
+/// Returns the number of pixels in which two images of equal size differ by more than `tolerance` in a channel.
 inline int count_different(const Picture& a, const Picture& b, int tolerance) {
   EXPECT_EQ(a.colour.rgb.size(), b.colour.rgb.size());
   int different = 0;

@@ -49,7 +49,7 @@ class NbtWriter {
   }
 };
 
-/// A region file with one chunk of these bytes, as they are (compression 3), at (x, z).
+/// Creates a region file with one chunk of these bytes at (x, z), by default uncompressed (compression 3).
 inline std::vector<std::byte> region_with(const std::vector<std::byte>& chunk, int x = 0, int z = 0,
                                           int compression = 3) {
   const std::size_t sectors = (chunk.size() + 5 + 4095) / 4096;

@@ -80,7 +80,7 @@ TEST(LightSlab, TakesNoMoreThanItsPlanesDiffer) {
   for (std::size_t i = 0; i < kPlanes; ++i) {
     for (std::size_t row = 0; row < kSlabWords; ++row) planes.plane(i)[row] = row < 8 ? 0 : std::uint64_t{1} << 40;
   }
-  EXPECT_EQ(bytes(), 28 + 4U) << "one unit: what is below it is like it";
+  EXPECT_EQ(bytes(), 28 + 4U) << "one unit: the planes below equal it";
 }
 
 TEST(LightSlabKernel, PacksAndReadsAlikeWithEveryInstructionSet) {

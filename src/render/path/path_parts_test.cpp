@@ -262,7 +262,7 @@ TEST(PathLampMemory, LeadsAwayFromLampsBehindWalls) {
   for (int sample = 0; sample < 400; ++sample) {
     const auto lamp = static_cast<std::int32_t>(static_cast<std::size_t>(sample) % lamps.size());
     memory.note(tree, place, lamp, 1.0F, 2 * static_cast<std::size_t>(lamp) >= lamps.size());
-    EXPECT_EQ(chance(0), before) << "what is noted counts later";
+    EXPECT_EQ(chance(0), before) << "notes take effect later";
   }
   memory.learn();
   float seen = 0.0F;

@@ -24,7 +24,7 @@ using vulkan::info_of;
 /// An instance with the validation layer if installed, the first suitable device, and a queue.
 class OwnDevice {
  public:
-  /// Null, with the reason why, where there is none.
+  /// Returns null and sets `why` if there is no suitable device.
   static std::unique_ptr<OwnDevice> create(std::string& why) {
     auto api = Api::load();
     if (!api) return why = api.error().message, nullptr;

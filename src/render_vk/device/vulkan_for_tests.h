@@ -131,7 +131,7 @@ inline Differences differences(const Picture& a, const Picture& b) {
   return found;
 }
 
-/// The promise of VulkanRenderer. On a failure both pictures are written, for people.
+/// Checks the differences that VulkanRenderer permits. Writes both images on failure.
 inline void expect_equal(const Picture& vulkan, const Picture& cpu, const std::string& name) {
   const Differences found = differences(vulkan, cpu);
   EXPECT_LE(found.pixels * 1000, found.total) << name;

@@ -213,7 +213,7 @@ TEST_F(VulkanDetail, EvictsImpostorsThatNoPictureUses) {
   place(grids[0], both - 1);
   EXPECT_EQ(detail.halved_bytes(), first) << "the other one was not asked for";
   place(grids[0], 0);
-  EXPECT_EQ(detail.halved_bytes(), first) << "what a picture needs stays";
+  EXPECT_EQ(detail.halved_bytes(), first) << "levels that the image needs are kept";
   const Camera camera = towards({-300, 420, -500}, {150, 0, 150}, 0.6);
   compare(camera, always_mid(4.0), "after_giving_way");
 }

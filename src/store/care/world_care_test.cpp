@@ -147,7 +147,7 @@ TEST(WorldCare, AnyDamageIsSeenAndWhatIsSoundIsKept) {
     const auto check = check_world(path);
     const std::size_t readable = sound_chunks(path);
     if (check && check->damage.empty()) {
-      ASSERT_EQ(readable, std::size_t{kChunks}) << "what the check does not see is not there";
+      ASSERT_EQ(readable, std::size_t{kChunks}) << "the check finds all damage";
     }
     const auto repair = repair_world(path, mended);
     ASSERT_TRUE(repair) << to_string(repair.error());

@@ -164,7 +164,7 @@ TEST_F(PathHistoryTest, EndsWithThePictureOfANewTracer) {
   PathPicture shown;
   for (const int samples : kSamples) shown = refined(kEdge, samples);
   EXPECT_EQ(shown.radiance, take(kEdge, kSamples.back()).radiance);
-  EXPECT_FALSE(history_.has_earlier()) << "what is new is as good as what was before";
+  EXPECT_FALSE(history_.has_earlier()) << "the new image has as many samples as the earlier one";
 }
 
 TEST_F(PathHistoryTest, AnEditTakenBackHasThePictureOfBeforeWithTheFirstSample) {
@@ -238,7 +238,7 @@ TEST_F(PathHistoryTest, SmallPicturesAreShownInTheLargeOnesPlace) {
   for (const int edge : {kEdge / 4, kEdge / 2, kEdge}) static_cast<void>(refined(edge, 1));
   converge();
   const PathPicture before = take(kEdge, kSamples.back());
-  EXPECT_FALSE(history_.knows(kEdge / 4, kEdge / 4, 1)) << "known is what is of earlier scenes";
+  EXPECT_FALSE(history_.knows(kEdge / 4, kEdge / 4, 1)) << "only images of earlier scenes are known";
   edit(2);
   ASSERT_TRUE(history_.knows(kEdge / 4, kEdge / 4, 1));
   EXPECT_FALSE(history_.knows(kEdge / 3, kEdge / 3, 1));
