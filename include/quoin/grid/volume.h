@@ -87,7 +87,7 @@ struct VolumeFieldOptions {
 /// Density:   (iso - value) / slope, within a band of 8. `slope` is the median steepness of the volume at the lattice
 ///            edges that cross the surface, so densities approximate distances in samples. If no edge crosses, `slope`
 ///            maps the range of the volume to 8; it is 1 if that range is 0. The value `iso` itself is air with a
-///            density of 1/256, which avoids triangles without area.
+///            density of 1/256; this avoids triangles without area.
 /// Values:    NaN is air. Infinities are far air and deep solid.
 /// Order:     the densities are the same at any thread count.
 /// Errors:    InvalidArgument if `iso` is NaN, a size is not positive, or the number of values does not match the size;

@@ -18,7 +18,7 @@
 namespace quoin {
 
 /// Light at the four corners of a face, in the order of FaceOcclusion, one word per corner: sky in the lowest byte,
-/// then red, green and blue. Units are twelfths of a level, 0 to 180, which represent means of up to four levels
+/// then red, green and blue. Units are twelfths of a level, 0 to 180; they represent means of up to four levels
 /// exactly.
 using FaceLight = std::array<std::uint32_t, 4>;
 

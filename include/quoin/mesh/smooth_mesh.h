@@ -80,7 +80,7 @@ struct SmoothMeshOptions {
 ///           Vertices of equal position that differ in these attributes count as one, so colour borders move by at most
 ///           the error. A closed mesh stays closed.
 /// Manifold: every edge of a closed mesh keeps two triangles; if the error is above 0, also after welding by position.
-///           Where removal brings parts of the surface together, their vertices are moved a thousandth of a sample
+///           If removal brings parts of the surface together, their vertices are moved a thousandth of a sample
 ///           apart.
 /// Order:    the same bytes on every run.
 /// Requires: vertex arrays of equal length (occlusion can be empty), valid indices, finite positions.

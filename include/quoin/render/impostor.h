@@ -121,7 +121,7 @@ struct ImpostorPicture {
   Image colour;  ///< the types' own colours, unlit; black where no voxel is visible
   /// Distance from the camera in voxels; +infinity where no voxel is visible.
   FloatImage depth;
-  /// 255 where a voxel is visible, else 0. Distinguishes black voxels from holes.
+  /// 255 if a voxel is visible, else 0. Distinguishes black voxels from holes.
   std::vector<std::uint8_t> coverage;
 };
 

@@ -78,7 +78,7 @@ struct SelectedInstance {
   double distance = 0.0;  ///< from the camera to the content's centre, in world units
 };
 
-/// The coarsest level at which grids are traced.
+/// The coarsest level of traced grids.
 inline constexpr int kMaxGridLevel = 4;
 
 class DetailSelector;

@@ -155,7 +155,7 @@ void LightSolver::add_word(std::size_t channel, unsigned level, int column, IVec
                                       static_cast<std::uint16_t>(in_layer / kBlockRows), where});
 }
 
-// `where`: a mask of the chunk row that starts at `first`.
+// A mask (`where`) of the chunk row that starts at `first`.
 void LightSolver::add_source(std::size_t channel, unsigned level, IVec3 first, std::uint64_t where) {
   const int shift = first.x - origin_.x;
   const int bit = shift & 63;
