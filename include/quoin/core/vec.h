@@ -31,7 +31,7 @@ static_assert(sizeof(IVec3) == 12 && sizeof(Vec3) == 12 && sizeof(DVec3) == 24 &
               "Quoin needs glm's types packed, without GLM_FORCE_DEFAULT_ALIGNED_GENTYPES");
 
 /// A floating-point position, as opposed to a voxel. Functions that take a voxel or a chunk reject it at compile time;
-/// convert it with `voxel_of`. The members of IBox and PlacedVoxel cannot reject it: see `box_around`.
+/// convert it with `voxel_of`. Initialising an IBox or a PlacedVoxel does not reject it; for boxes, use `box_around`.
 template <std::floating_point T>
 using Point = glm::vec<3, T, glm::defaultp>;
 

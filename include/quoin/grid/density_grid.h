@@ -27,7 +27,7 @@ struct DensitySample {
 struct FlattenOptions {
   DVec3 point{0.0};             ///< a point on the plane, in samples
   DVec3 normal{0.0, 1.0, 0.0};  ///< points into the air; any length except 0
-  double strength = 1.0;        ///< as in `smooth`: the share of the way to the plane
+  double strength = 1.0;        ///< fraction of the way to the plane at the centre; falls off as in `smooth`
   VoxelType material = 1;       ///< for samples that become solid
 };
 

@@ -82,8 +82,8 @@ class Grid {
   std::int64_t write_row(Point<T> row, std::uint64_t mask, std::span<const VoxelType, kChunkEdge> types) = delete;
   /// Sets all voxels of a box (half-open: `max` excluded; an empty box changes nothing). Returns the number of changed
   /// voxels.
-  /// Cost: O(chunks of the box + rows of 64 voxels at its rim). A uniform chunk takes some hundred bytes and no memory
-  /// per voxel. If users choose the box, cancel oversized edits with `progress`.
+  /// Cost: O(chunks of the box + rows of 64 voxels at its rim). A uniform chunk takes a few hundred bytes and no
+  /// memory per voxel. If users choose the box, cancel oversized edits with `progress`.
   std::int64_t fill_box(const IBox& box, VoxelType type, const Progress& progress = {});
   /// Sets the voxels whose centre (i + 0.5) lies within `radius` of `centre`. Returns the number of changed voxels. A
   /// negative or non-finite radius, or a non-finite centre, changes nothing.
@@ -110,8 +110,8 @@ class Grid {
   /// one chunk, starting at `first`, and changes them in place. Returns the number of changed voxels.
   std::int64_t edit_rows(const IBox& box, FunctionRef<void(IVec3 first, std::span<VoxelType> types)> change,
                          const Progress& progress = {});
-  /// Replaces a whole chunk and its data, as an edit of each voxel that differs. Returns the number of voxels that
-  /// changed type. The outermost chunks are ignored.
+  /// Replaces the types and data of a whole chunk. Recorded as an edit of the voxels that differ. Returns the number of
+  /// voxels that changed type. Does nothing for an outermost chunk.
   std::int64_t put_chunk(IVec3 chunk, Chunk voxels);
   /// Sets all voxels to air, as an edit. In a partial grid, this applies to the loaded chunks.
   void clear();

@@ -29,7 +29,7 @@ inline constexpr std::uint8_t kMaxStateBits = 32;
 /// The role of a voxel in visibility, occlusion and light.
 enum class Visibility : std::uint8_t { Air, Opaque, Transparent };
 
-/// A colour with 8 bits per channel, encoded as sRGB, and an alpha channel with linear coverage.
+/// An sRGB colour with 8 bits per channel. Alpha is linear: 0 is fully transparent, 255 fully opaque.
 struct Rgba8 {
   std::uint8_t r = 0;
   std::uint8_t g = 0;
@@ -77,8 +77,8 @@ struct TypeChange {
 };
 using TypeChanges = Changes<TypeChange>;
 
-/// Returns true if the visibility of any type changed or may have changed. Changed chunks are then not enough:
-/// everything must be meshed and traced again.
+/// Returns true if the visibility of any type changed or may have changed. It is then not enough to
+/// update changed chunks: rebuild all meshes and ray-tracing trees.
 [[nodiscard]] bool has_other_visibility(const TypeChanges& changes);
 
 /// The voxel types of a scene. Meshing, tracing and lighting look up type visibility here.

@@ -34,7 +34,7 @@ struct SurfaceRegion {
   /// quads are [transparent[d], transparent[d + 1]). A renderer can skip directions that face away from the camera.
   std::array<std::uint32_t, 7> opaque{};
   std::array<std::uint32_t, 7> transparent{};
-  std::uint64_t hash = 0;  ///< of the region's quads and their light
+  std::uint64_t hash = 0;  ///< hash of the region's quads and light
 };
 
 /// The renderable surface of one chunk. Immutable.
@@ -120,8 +120,8 @@ class LiveMeshes {
 
   /// Applies the scene's changes since the last update: voxels, grids, visibility of types (smooth: also colour), and
   /// instances that show a grid for the first time or no longer show it. Chunks nearest to an eye (world coordinates)
-  /// come first. Call it after edits, and once per frame while `pending` is not 0, because it hands out only as many
-  /// chunks as keep the workers busy.
+  /// come first. Call it after edits, and once per frame while `pending` is not 0: each call queues only enough chunks
+  /// to keep the workers busy.
   ///
   /// Cost:   O(changes), independent of the size of the world. O(instances) more if instances were added, removed or
   ///         changed. O(instances + waiting chunks) more while chunks wait for workers.

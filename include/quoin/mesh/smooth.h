@@ -129,9 +129,9 @@ class SmoothMesher {
 
   /// Replaces `out` with the surface of the centre chunk.
   ///
-  /// Owned:   quads around the crossed lattice edges that start at a sample of the chunk. Vertices belong to cells -1
-  ///          to 63, so that neighbouring meshes repeat the vertices of their common cells bit for bit, but no
-  ///          triangle.
+  /// Owned:   the quads around each lattice edge that starts at a sample of the chunk and crosses the surface. Vertices
+  ///          belong to cells -1 to 63. Meshes of neighbouring chunks repeat the vertices of their common cells bit for
+  ///          bit. No triangle occurs in two meshes.
   /// Quads:   split along the shorter diagonal (to 1/64 of a cell).
   /// Normals: the gradient of the trilinear field at the vertex; (0, 1, 0) where the gradient is 0.
   /// Order:   z, then the quads across x, y and z edges; the same bytes on every machine and instruction set.

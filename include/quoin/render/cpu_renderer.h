@@ -31,7 +31,7 @@ struct Picture {
   /// through each pixel's centre. 0 inside a voxel or field; +infinity where the ray hits nothing. Empty unless
   /// RenderOptions::depth is set.
   FloatImage depth;
-  std::int64_t rays = 0;        ///< of every kind
+  std::int64_t rays = 0;        ///< number of rays traced, of all kinds
   std::int64_t pixels_hit = 0;  ///< pixels whose centre shows a voxel or a field
 };
 
@@ -45,7 +45,7 @@ struct Picture {
 ///              transmits (1 - a) (1 - a (1 - c)). A body of voxels counts as at least one voxel long. It shows its own
 ///              lit colour in proportion to its coverage, tints sunlight and does not occlude. Seen from inside, it
 ///              only tints and emits.
-/// Solid:       from inside an opaque voxel, the whole view has that voxel's own colour, unlit.
+/// Solid:       if the camera is inside an opaque voxel, the whole image has the voxel's unlit colour.
 ///
 /// Holds the acceleration structures of the scene's grids: build it once and render any number of images.
 /// Lifetime: the scene must outlive the renderer and must not move. After an edit of the scene, call `update` before

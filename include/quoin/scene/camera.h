@@ -60,7 +60,7 @@ struct PicturePoint {
 [[nodiscard]] Ray ray_through(const Camera& camera, const PicturePoint& point);
 
 /// Returns the image position of a world point: the inverse of `ray_through`, for labels and marks. The result may lie
-/// outside the image. Returns nullopt if the point is not finite, or is behind or level with a perspective camera.
+/// outside the image. Returns nullopt if the point is not finite, or is not in front of a perspective camera.
 /// Requires: width and height are positive.
 [[nodiscard]] std::optional<PicturePoint> picture_point(const Camera& camera, DVec3 point_in_world, int width,
                                                         int height);

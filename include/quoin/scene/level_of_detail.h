@@ -44,8 +44,7 @@ struct DetailPolicy {
   double mid_radii = 10.0;    ///< ByRadius: Mid up to and including this distance
   double voxel_pixels = 1.0;  ///< ByPixels: Mid if a voxel projects to less than this
   /// For Mid, the grid is halved while its cells project to at most this many pixels. Tuned on a ship and a terrain
-  /// with
-  /// 64 samples: images differ by up to 6.0 / 255 at 0.5, and by up to 9 / 255 at 1 (docs/decisions/archive/026).
+  /// with 64 samples: images differ by up to 6.0 / 255 at 0.5, and by up to 9 / 255 at 1 (docs/decisions/archive/026).
   double cell_pixels = 0.4;
   /// ByPixels: Far if the grid's diameter projects to at most this; also the impostor image size.
   int far_pixels = 128;

@@ -12,7 +12,7 @@
 
 namespace quoin {
 
-// Upper limits of a look's settings.
+// Upper limits of the settings in Look, AirOptions and Fog.
 inline constexpr double kMaxBrightness = 1e9;  ///< also the limit of light colours
 inline constexpr double kMaxAir = 100.0;       ///< multiples of the Earth's air
 inline constexpr double kMaxAnisotropy = 0.99;
@@ -73,7 +73,7 @@ struct Look {
   double sky_brightness = 1.0;  ///< factor on the sky's light
   Vec3 sky_colour{1.0F};        ///< for SkyModel::Uniform, linear
   AirOptions air{};             ///< for SkyModel::Physical
-  /// For SkyModel::Environment: longitude by latitude; +y is up, the middle is -z, the right half is +x; must not
+  /// For SkyModel::Environment: an equirectangular image. Its top is +y, its middle -z, and its right half +x. Must not
   /// change after rendering starts.
   std::shared_ptr<const RadianceImage> environment{};
   double environment_turn_radians = 0.0;  ///< rotation about the vertical axis, from -z towards +x

@@ -23,7 +23,8 @@ namespace quoin {
 ///
 /// Intensity falls off with the squared distance, times 1 - (distance / range)^4, as glTF's KHR_lights_punctual
 /// recommends. A lamp also ends, with the same smooth cut-off, at the distance where it would add less than 1/4096. A
-/// lamp gives no light if its intensity is not positive or a number other than `range` is not finite.
+/// lamp gives no light if its intensity or range is not positive, if its position, colour or intensity is not finite,
+/// or, for a spot, if its direction is zero or its direction or angles are not finite.
 struct Lamp {
   enum class Kind : std::uint8_t {
     Point,  ///< shines equally in all directions
@@ -192,7 +193,8 @@ class Scene {
   /// Cost: O(changed grids and instances), at any scene size; O(all instances) after a change of a group or a layer.
   ///       See ChangeCursor.
   [[nodiscard]] SceneChanges changes_since(ChangeCursor& cursor) const;
-  /// Returns true if anything has changed since the cursor. Ask `types` for changes of types. Cost: as `changes_since`.
+  /// Returns true if `changes_since` would report a change. It does not report changes of `types`, which have their own
+  /// journal, or of `lamps`. Cost: as `changes_since`.
   [[nodiscard]] bool has_changed_since(const ChangeCursor& cursor) const;
   /// Returns a cursor that reports all changes from now on.
   [[nodiscard]] ChangeCursor cursor() const;

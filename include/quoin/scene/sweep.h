@@ -45,7 +45,7 @@ struct SweepHit {
 ///          of that field's solid around the box. If the gradient does not lead out within about the box's size, the
 ///          grid axis with the shortest way out replaces it. If no axis does, `depth` is one voxel.
 /// Cost:    per instance on the way: the voxels around the box, for each step of the box's size. In a field: the cells
-///          with solid, in more parts the closer the box lies along the surface.
+///          with solid, which are divided into more parts if the box is nearly parallel to the surface.
 /// Source:  the separating axes of two boxes (S. Gottschalk, M. Lin, D. Manocha, "OBBTree", 1996), each with the time
 ///          interval in which it separates them. In a field: the separation of the box from the space below planes
 ///          under the trilinear field, subdivided until the planes are close enough to it.
@@ -135,9 +135,8 @@ struct SlideResult {
 /// crease of two faces, only the displacement along the crease remains; in a corner, none does.
 ///
 /// With `SlideOptions::floor`, a body on a floor keeps the horizontal part of its displacement and follows the ground
-/// up
-/// and down. Its downward part is dropped, so the body stands still on a slope, and the resulting displacement is
-/// horizontal. Steeper surfaces are walls to a standing body, which does not climb them; a falling body slides down
+/// up and down. Its downward part is dropped, so the body stands still on a slope, and the resulting displacement is
+/// horizontal. A standing body treats steeper surfaces as walls and does not climb them; a falling body slides down
 /// along them. An upward displacement leaves the floor. Add gravity to the displacement every frame.
 ///
 /// Requires: `max_contacts` is at least 1.

@@ -57,13 +57,13 @@ class WorldSaver {
   /// Saves all changes as one atomic commit, in the background. Chunks are shared with the scene, not copied. `more` is
   /// saved in the same commit: game values or a thumbnail, for example.
   /// Errors:   InvalidArgument, and nothing is saved, for unregistered voxel types, numbers that are not finite, or an
-  ///           instance whose grid does not exist; on the first save, also for a world that already holds a scene or
-  ///           other types. For write errors, see WorldStore::save.
+  ///           instance whose grid does not exist. With a default-constructed saver, also if the world already holds a
+  ///           scene or other types. For write errors, see WorldStore::save.
   /// Cost:     O(changes); O(chunks) the first time.
   /// Requires: the same world and scene (or a snapshot of it) in every call; the world is open for writing.
   Result<SaveTicket> save(WorldStore& world, const Scene& scene, WorldChanges more = {},
                           std::function<void(const Status&)> on_saved = {});
-  /// Sets the sun and cameras to store with the next `save`. Until then, the values from load_world apply.
+  /// Sets the sun and cameras to store with the next `save`. If not called, `save` keeps the values from load_world.
   void set_view(WorldView view);
   /// Returns the number of a grid in the world (ChunkPlace::grid), or nullopt before its first save. Cost: O(log
   /// grids).

@@ -26,7 +26,8 @@ class ChunkGenerator {
   /// Returns the box of chunks (half open) that `make` can fill. Everything outside is air. The box must not
   /// change.
   [[nodiscard]] virtual IBox chunks() const = 0;
-  /// Makes one chunk, with types of the world's registry, and densities within the band of the grid's field.
+  /// Makes one chunk. It may contain only types of the world's registry, and densities within the band of the grid's
+  /// field.
   /// Errors: any. The chunk is then air until the world is opened again, and StreamedWorld::take_problems reports the
   ///         error. Throws only bad_alloc.
   [[nodiscard]] virtual Result<StoredChunk> make(IVec3 chunk) const = 0;
@@ -35,7 +36,7 @@ class ChunkGenerator {
 /// An endless landscape. The worlds of `generate_terrain` and `generate_smooth_terrain` are pieces of it.
 struct EndlessTerrain {
   std::uint64_t seed = 42;
-  int height = 4;          ///< in chunks, from 0 upwards: 1 to 16
+  int height = 4;          ///< in chunks of 64 voxels, upwards from y = 0: 1 to 16
   bool is_smooth = false;  ///< makes a density field instead of voxels
 
   bool operator==(const EndlessTerrain&) const = default;

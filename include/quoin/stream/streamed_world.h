@@ -64,7 +64,7 @@ struct StreamStats {
   double longest_update_seconds = 0.0;  ///< since the last call of `stats`
 };
 
-/// The maximum extent of a world, loaded or not, in world space as its instances place it.
+/// World-space bounds of everything that a world can contain, loaded or not. Instances place the grids.
 struct WorldExtent {
   DBox stored;                    ///< bounds of the stored chunks; empty if there are none
   DBox generated;                 ///< bounds of the chunks that generators can make; empty without generators
@@ -118,23 +118,23 @@ class StreamedWorld {
   [[nodiscard]] Result<WorldExtent> extent() const;
 
   /// Adds an empty grid whose chunks are loaded, or made by the generator, around viewers. It is visible only where an
-  /// instance places it. Requires: neither voxels nor densities. Errors: CannotWrite; as WorldSaver::save.
+  /// instance places it. Requires: `grid` has no voxels and no densities. Errors: CannotWrite; as WorldSaver::save.
   Result<GridHandle> add_grid(SceneGrid grid, std::shared_ptr<const ChunkGenerator> generator = nullptr);
   /// Sets the generator for a grid's chunks that are not in the file. Call it before the first `update`.
   /// Requires: the grid came from the file or from `add_grid`.
   void use_generator(GridHandle grid, std::shared_ptr<const ChunkGenerator> generator);
   /// Adds a grid of generated landscape, placed at the origin. The file stores its parameters, so that it continues
   /// when the world is opened again.
-  /// Errors: as make_terrain_generator; those of saving.
+  /// Errors: as make_terrain_generator and WorldSaver::save.
   Result<GridHandle> add_terrain(const EndlessTerrain& terrain);
 
   /// Adds the chunks that workers have loaded or generated, unloads far chunks and requests new ones. Call it once per
   /// frame.
   /// Cost:   StreamOptions::update_seconds; plus WorldSaver::save for the edits when a save is due.
-  /// Errors: those of saving; nothing is lost, and the save is retried. bad_alloc.
+  /// Errors: as WorldSaver::save; unsaved edits stay in memory and the save is retried. bad_alloc.
   Status update(std::span<const Viewer> viewers);
-  /// Does the work of `update` that only reads the scene, for programs that draw the scene on another thread: drawing
-  /// need not stop for it. Errors: as update.
+  /// Does the part of `update` that only reads the scene. Another thread can draw the scene during the call.
+  /// Errors: as `update`.
   Status plan(std::span<const Viewer> viewers);
   /// Returns true if the next `update` has chunks to add or unload, as of the last `plan`.
   [[nodiscard]] bool has_chunks_to_move() const;

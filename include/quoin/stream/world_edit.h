@@ -71,8 +71,8 @@ struct WorldEdit {
 /// Maximum number of chunks that one edit may touch.
 inline constexpr std::size_t kMaxEditChunks = 1U << 16;
 
-/// Returns the chunks that an edit may change, without duplicates, sorted by z, then y, then x. `band`: of the grid's
-/// field.
+/// Returns the chunks that an edit may change, without duplicates, sorted by z, then y, then x. `band` is the
+/// DensityGrid::band of the grid's field.
 /// Errors: LimitExceeded for more than kMaxEditChunks; InvalidArgument for sizes, positions and blends that are not
 ///         finite, or sizes and blends that are negative.
 [[nodiscard]] Result<std::vector<IVec3>> chunks_of_edit(const WorldEdit& edit, float band = 8.0F);
