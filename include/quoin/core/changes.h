@@ -22,14 +22,15 @@ namespace quoin {
 /// Unknown:    a cursor may also be used with an unrelated container, or with a replacement for its container. The
 ///             container then reports that everything changed (`Changes::all`).
 /// Capacity:   a journal keeps up to 8,192 changes plus twice the number of chunks (types, instances). A cursor that is
-///             further behind gets `Changes::all`. No journal is kept, and edits pay nothing, until the first cursor
-///             reads.
+///             further behind gets `Changes::all`. Recording starts when the first cursor reads; until then, edits
+///             have no journal cost.
 /// Cost:       proportional to the number of changes, independent of the container's size.
 /// Failure:    a consumer that fails halfway can retry with a copy of the cursor from before the read.
 class ChangeCursor {
  public:
   bool operator==(const ChangeCursor&) const = default;
-  /// Returns true if both cursors read the same container, at any position. Returns false if a cursor is unused.
+  /// Returns true if both cursors were last used with the same container, at any position. Returns false if either is
+  /// unused.
   [[nodiscard]] bool is_beside(const ChangeCursor& other) const {
     return container_ != 0 && container_ == other.container_;
   }

@@ -16,7 +16,7 @@ struct Threads {
 
 /// Calls `body(i)` once for every i in [0, count) on several threads, and returns when all calls are done.
 ///
-/// Order:   unspecified. Write each result to slot i to get the same outcome at any thread count.
+/// Order:   unspecified. If call i writes only result i, the output is the same at any thread count.
 /// Errors:  an exception from `body` (only bad_alloc is expected) is rethrown to the caller after the other threads
 ///          stop.
 void parallel_for(std::size_t count, Threads threads, FunctionRef<void(std::size_t i)> body);

@@ -45,8 +45,8 @@ inline constexpr std::size_t kMaxVoxelDataBytes = std::size_t{1} << 16;
 ///   world.set_data(chest, {.bytes = inventory});            // copied
 ///
 /// Use the state word for small properties of many voxels; the type declares its bits (VoxelProperties::state_bits).
-/// Use bytes for larger properties of few voxels. The engine does not interpret either. Empty data takes no memory, and
-/// data uses up no voxel types.
+/// Use bytes for larger properties of few voxels. The engine does not interpret either. Empty data takes no memory.
+/// Data does not need additional voxel types.
 struct VoxelData {
   std::uint32_t state = 0;             ///< 0 by default
   std::span<const std::byte> bytes{};  ///< at most kMaxVoxelDataBytes; from a grid: valid until its next edit
@@ -67,8 +67,8 @@ inline constexpr IBox kWholeChunk = {IVec3{0}, IVec3{kChunkEdge}};
 ///
 /// Layout:   voxels lie in rows of 64 along x, so a bit plane of a row is one word. A slab is 4x4 rows (64x4x4 voxels).
 ///           A slab of a single type stores no bit planes, and a chunk of a single type stores only the type.
-/// Memory:   a write detects slabs or chunks that became uniform or need fewer bits. Edits that are undone therefore
-///           leave about the memory of a new chunk; `compact` frees the rest.
+/// Memory:   a write detects slabs or chunks that became uniform or need fewer bits. After edits
+///           that are undone, a chunk therefore takes about as much memory as a new one; `compact` frees the rest.
 /// Counts:   every write updates the number of voxels per type and per layer (64 layers on each axis). Counts and tight
 ///           bounds are therefore cheap to query.
 /// Data:     voxels other than air can have data (VoxelData). A write that changes a voxel's type removes its data. A

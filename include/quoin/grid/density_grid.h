@@ -37,8 +37,8 @@ struct FlattenOptions {
 /// Space:     sample (i, j, k) lies at the point (i, j, k). Between samples the field is trilinear. All int32
 ///            coordinates are valid, except that the outermost chunk on each side stays air.
 /// Precision: half floats within `band` of 0, clamped beyond, so rock and sky far from the surface cost nothing.
-///            Ambient occlusion needs densities that are distances in samples. The sign of a density is kept, however
-///            small the value. NaN counts as far air, infinities as +-band.
+///            Ambient occlusion needs densities that are distances in samples. Rounding never changes the sign of a
+///            density. NaN counts as far air, infinities as +-band.
 /// Materials: the material of an air sample does not affect any mesh. Far air has no material: it reads as kAir.
 /// Edits:     a chunk that is all far air is removed. If an edit throws (bad_alloc or an exception from a callback), or
 ///            `progress` cancels it, the changes made so far stay and are recorded. `changes_since` reports changes to

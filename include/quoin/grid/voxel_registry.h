@@ -56,7 +56,7 @@ struct VoxelProperties {
   float emission = 0.0F;   ///< radiance emitted, as a multiple of `colour` in linear light; 0 is none
   float ior = 1.5F;        ///< index of refraction, used by transparent types
   /// Mean number of scattering events per voxel length in path tracing, for transparent media such as clouds. `colour`
-  /// is then the albedo, the share of light that continues. 0: glass.
+  /// is then the albedo: the fraction of light that each event keeps. 0: glass.
   float scattering = 0.0F;
   float anisotropy = 0.0F;  ///< mean cosine of the scattering angle, -1 to 1
   /// Additional properties of a file format ("_spec" -> "0.3"), kept so that writing the format again loses nothing.
@@ -73,7 +73,7 @@ struct VoxelProperties {
 struct TypeChange {
   VoxelType type = kAir;
   bool visibility_changed = false;  ///< an unregistered type counts as opaque
-  bool colour_changed = false;      ///< always true if the type was added
+  bool colour_changed = false;      ///< also true if the type was added
 };
 using TypeChanges = Changes<TypeChange>;
 

@@ -105,8 +105,9 @@ struct LiveMeshOptions {
 /// removed in the meantime are dropped.
 /// Seams:     surfaces of a field always fit each other. Changes of neighbouring chunks, by an edit or by a level of
 ///            detail, are returned together by one `take` when all are complete.
-/// Callbacks: the first exception of `on_ready` or `convert` is rethrown by the next `update` or `finish`; the surface
-///            exists without `converted`. A bad_alloc of `convert` counts as the worker's own.
+/// Callbacks: the next `update` or `finish` rethrows the first exception of `on_ready` or `convert`. If `convert`
+///            throws, the surface is still returned, with a null `converted`. A bad_alloc from `convert` counts as the
+///            worker running out of memory (Stats::out_of_memory).
 /// Lifetime:  the scene is read only during calls; callers share ownership of the surfaces they take.
 /// Threads:   `update` and `finish` must not overlap; any thread can call the other members.
 class LiveMeshes {

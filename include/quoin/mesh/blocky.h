@@ -40,8 +40,8 @@ class BlockyMesher {
   /// Border:   reads one voxel past each side; the chunk that owns the voxel emits the face. A null centre chunk is air
   ///           and gives no quads.
   /// Lossless: exactly one quad of the right type covers each visible unit face of the region, and its interpolated
-  ///           occlusion equals the face's own. Faces merge only if type and occlusion agree at all four corners, and
-  ///           only along directions in which the occlusion is constant.
+  ///           occlusion equals the face's own. Faces merge only if they have the same type and the same occlusion at
+  ///           all four corners, and only along directions in which the occlusion is constant.
   /// Order:    direction, layer, row, column; the same bytes on every machine.
   /// Cost:     O(rows of 64 voxels + visible faces); no allocation once `out` has grown.
   void mesh(const Neighbourhood& chunks, const VoxelRegistry& types, const QuadOptions& options, QuadBuffer& out);
@@ -91,7 +91,8 @@ struct BlockyMeshOptions {
   bool merge = true;           ///< as QuadOptions::merge
   bool bake_occlusion = true;  ///< as QuadOptions::bake_occlusion
   bool watertight = false;     ///< subdivide outlines so that no vertex lies inside another triangle's edge
-  /// Cuts the quads of a chunk further before they become triangles. Optional. Called from several threads at once.
+  /// Called with the quads of each chunk before they become triangles; may replace a quad with parts of it
+  /// (`quad_part`). Optional. Called from several threads at once.
   std::function<void(IVec3 chunk, QuadBuffer& quads)> cut{};
 };
 

@@ -23,7 +23,7 @@ enum class VertexAttribute : std::uint8_t {
   Face,      ///< number of the Direction, 0 to 5
   /// Colour of the type, or albedo of a smooth mesh, without occlusion. White for unregistered types.
   Colour,
-  Occlusion,  ///< of blocks, 0 (open) to 3 (dark)
+  Occlusion,  ///< occlusion level of a block face's corner, 0 (open) to 3 (dark)
   /// Brightness after occlusion: 1 - occlusion / 4 for blocks, 1 - occlusion for smooth meshes, 1 without occlusion.
   Brightness,
   Type,

@@ -130,7 +130,8 @@ struct SceneChanges {
   }
 };
 
-/// A set of grids with a shared type registry. Each grid may be placed any number of times.
+/// Grids, the instances that place them in the world, and the voxel types that all grids share. Each grid may be placed
+/// any number of times.
 ///
 /// Axes:      right-handed, +Y up; one world unit per voxel unless an instance sets another size.
 /// Addresses: a grid keeps its address until it is removed, even when the scene is moved, so references stay valid.

@@ -88,14 +88,15 @@ struct SceneHit {
 [[nodiscard]] std::optional<SceneHit> pick(const SceneTracer& tracer, const Camera& camera, const PicturePoint& point,
                                            const QueryFilter& filter = {});
 
-/// Returns the voxel that a pixel of a depth image shows: the first voxel no nearer than `depth`, which may be off by
-/// the rounding of a float. Returns nullopt if there is none at that distance.
+/// Returns the voxel or field surface that a pixel of a depth image (Picture::depth) shows: the first hit of the ray at
+/// distance `depth` (world units), to the rounding of a float. Returns nullopt if there is none at that distance, or
+/// `depth` is negative, infinite or NaN. Requires: width and height are positive.
 [[nodiscard]] std::optional<SceneHit> voxel_at_depth(const SceneTracer& tracer, const Camera& camera,
                                                      const PicturePoint& point, float depth,
                                                      const QueryFilter& filter = {});
 
 /// An overlap of a shape with a voxel or with a field cell whose solid touches it. QueryFilter selects the types; by
-/// default, the ones that collide.
+/// default, types that collide.
 struct SceneOverlap {
   InstanceHandle instance;
   IVec3 voxel{0};         ///< for a field, the cell as in DensityHit

@@ -68,7 +68,8 @@ struct SweepHit {
 ///         the box. Among equally near positions, any may be returned.
 /// Others: among rotated grids, in fields, and for a capsule, a position at most max_distance / 32 farther than the
 ///         nearest. One is always found if there is that much room.
-/// Cost:   an overlap query per nearer candidate: a few hundred for a voxel-sized box and a distance of twice its size.
+/// Cost:   one overlap query for each candidate position that is nearer than the result: a few hundred queries for a
+///         voxel-sized box and a distance of twice its size.
 /// Errors: returns nullopt for sizes, positions and distances that are negative or not finite.
 [[nodiscard]] std::optional<DVec3> displacement_to_free_place(const SceneTracer& tracer, const OrientedBox& box,
                                                               double max_distance, const QueryFilter& filter = {});
@@ -97,7 +98,7 @@ struct SlideOptions {
   bool pushes_out = true;
   /// Limit of that push, in world units; default: the longest edge of the box plus the way out of the obstacle.
   std::optional<double> max_push_out = std::nullopt;
-  std::optional<FloorOptions> floor = std::nullopt;  ///< nullopt: a body that slides on every surface
+  std::optional<FloorOptions> floor = std::nullopt;  ///< nullopt: no floors; the body slides on every surface
   QueryFilter filter{};                              ///< the obstacles to consider
 };
 

@@ -57,7 +57,7 @@ struct WorldCheck {
 [[nodiscard]] Result<WorldCheck> check_world(const std::filesystem::path& path, const Progress& progress = {});
 
 struct WorldRepair {
-  WorldCheck check;            ///< the kept and the lost content
+  WorldCheck check;            ///< counts of the copied items, and the damaged items
   std::filesystem::path kept;  ///< path of the damaged world, if the repaired world replaced it
 };
 

@@ -97,7 +97,7 @@ struct LoadedWorld {
 /// Writes a scene as a new world, replacing an existing file atomically. Returns its size. `more`: see
 /// WorldSaver::save.
 ///
-/// Errors: those of WorldSaver::save; CannotWrite, also if another process writes the existing world.
+/// Errors: as WorldSaver::save; CannotWrite, also if another process writes the existing world.
 [[nodiscard]] Result<SavedScene> write_world(const Scene& scene, const std::filesystem::path& path,
                                              Threads threads = {}, const Progress& progress = {},
                                              WorldChanges more = {});

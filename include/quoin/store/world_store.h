@@ -99,13 +99,13 @@ struct WorldStats {
 ///           that, a crash leaves either the whole save or none of it.
 /// Writers:  one at a time among all processes on the machine. Any number of readers; each sees a save entirely or not
 ///           at all.
-/// Threads:  any function may be called from any thread, also at once. `load_chunk` sees earlier saves, on disk or
-///           pending.
+/// Threads:  any function may be called from any thread, also from several at once. `load_chunk` sees all earlier
+///           saves, including pending ones.
 /// Files:    while NAME is written, NAME-wal, NAME-shm and NAME-lock exist next to it. NAME-wal is part of the world:
 ///           after a crash it holds the latest saves. On network file systems there is no -wal, and readers wait for
 ///           writers.
-/// Requires: while the world is open, only Quoin opens and closes the file in this process; any other close would
-///           release its locks.
+/// Requires: while the world is open, no other code in this process opens and closes the file: on POSIX systems,
+///           closing it would release Quoin's locks.
 /// Lifetime: moving it is cheap. The destructor waits for pending saves.
 class WorldStore {
  public:

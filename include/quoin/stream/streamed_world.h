@@ -52,9 +52,9 @@ struct StreamStats {
   std::size_t other_bytes = 0;     ///< last value from StreamOptions::other_bytes
   std::size_t wanted_chunks = 0;   ///< within the viewers' radius and the budget
   std::size_t missing_chunks = 0;  ///< wanted chunks that are not loaded yet
-  bool is_complete = false;        ///< everything wanted in the last `update` or `plan` is loaded
+  bool is_complete = false;        ///< all chunks wanted in the last `update` or `plan` are loaded
   std::size_t waiting_edits = 0;   ///< chunks with waiting edits
-  /// Radius in world units around every viewer within which everything is loaded. Meshes may end up to one chunk (64
+  /// Radius in world units within which every viewer has all chunks loaded. Meshes may end up to one chunk (64
   /// voxels) earlier.
   double complete_radius = 0.0;
   std::uint64_t chunks_read = 0;  ///< from the world's file, since it was opened
@@ -78,7 +78,7 @@ struct WorldExtent {
 ///     if (const auto land = world->add_terrain({.seed = 7}); !land) complain(land.error());
 ///   }
 ///   while (play(world->scene())) {             // edits its grids like any scene's
-///     const quoin::Viewer eye{.position = player, .direction = looks};
+///     const quoin::Viewer eye{.position = player, .direction = view_direction};
 ///     if (const auto saved = world->update({&eye, 1}); !saved) complain(saved.error());
 ///     meshes.update(world->scene(), player);   // then update everything else that depends on the scene
 ///   }
@@ -111,7 +111,8 @@ class StreamedWorld {
   [[nodiscard]] const Scene& scene() const;
   /// Returns true if `open_or_create` created the world.
   [[nodiscard]] bool is_new() const;
-  /// Returns the warnings, sun and cameras from opening the world, as `load_world` does. The scene itself is `scene()`.
+  /// Returns the warnings, sun and cameras read when the world was opened, as `load_world` does. For the scene, call
+  /// `scene()`.
   [[nodiscard]] const LoadedScene& opened() const;
   void set_view(WorldView view);
   /// Returns the extent of the file's chunks and of the generators. Cost: O(stored chunks). Errors: CannotRead.
@@ -138,7 +139,7 @@ class StreamedWorld {
   Status plan(std::span<const Viewer> viewers);
   /// Returns true if the next `update` has chunks to add or unload, as of the last `plan`.
   [[nodiscard]] bool has_chunks_to_move() const;
-  /// Calls `update` until everything that these viewers want is loaded: for tools and tests.
+  /// Calls `update` until all chunks that these viewers want are loaded. For tools and tests. Errors: as `update`.
   Status load_all(std::span<const Viewer> viewers);
 
   /// Returns true if a chunk of a grid is in memory.
@@ -146,8 +147,8 @@ class StreamedWorld {
   /// Applies an edit: to loaded chunks at once, and to unloaded chunks after loading them for the edit. The result is
   /// saved. Edits of one chunk are applied in call order. Per-voxel data on air, or with more state bits than the
   /// voxel's type, is ignored without an error.
-  /// Errors: InvalidArgument, and nothing changes, if the grid does not exist, is not from the file or `add_grid`, or a
-  ///         type is not registered; those of chunks_of_edit.
+  /// Errors: InvalidArgument, without any change, if the grid does not exist or is not streamed (see `number_of`), or
+  ///         if a type is not registered; errors of chunks_of_edit.
   Status apply(const WorldEdit& edit);
   /// Returns the number that identifies a grid in edits (WorldEdit::grid) and in the store (ChunkPlace::grid); nullopt
   /// for grids that are not streamed. Cost: O(log grids).
