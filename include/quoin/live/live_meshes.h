@@ -91,7 +91,8 @@ struct LiveMeshOptions {
   InstanceFilter instances = InstanceFilter::Visible;  ///< instances whose grids are meshed
   Threads workers{};  ///< 0: one less than the hardware threads, at least 1 (different from other options)
   /// Converts a new surface before it can be taken, for example to vertices in a custom format. The result becomes
-  /// ChunkSurface::converted. Called by several workers at once. Optional.
+  /// ChunkSurface::converted. `changed_regions` of its argument has all bits set. Called by several workers at once.
+  /// Optional.
   std::function<std::shared_ptr<const void>(const SurfaceUpdate&)> convert{};
   /// Called by a worker after each completed chunk: there may be a surface to take, `pending` has decreased, and there
   /// is room for more chunks. Optional. It may call `take`, `pending` and `stats`, but no other member of LiveMeshes.

@@ -48,7 +48,8 @@ struct DetailPolicy {
   double cell_pixels = 0.4;
   /// ByPixels: Far if the grid's diameter projects to at most this; also the impostor image size.
   int far_pixels = 128;
-  /// The detail or level changes only when the measure passes its threshold by this fraction. 0 disables hysteresis.
+  /// The detail or level changes only when the distance or size passes its threshold by this fraction of it. 0 disables
+  /// hysteresis.
   double hysteresis = 0.1;
   InstanceFilter instances = InstanceFilter::Visible;  ///< the instances to select from
 };
