@@ -28,9 +28,9 @@ voxels = np.where(y < top - 2, ROCK, np.where(y < top, land, np.where(y < 14, WA
 scene = quoin.from_numpy(voxels, [
     quoin.VoxelType((60, 130, 190, 90), "water"), (220, 200, 150), (95, 150, 70), (125, 120, 115), (240, 245, 250)])
 print(scene.grids[0], scene.grids[0].mesh())
-picture = scene.render(960, 540, samples=4)
+image = scene.render(960, 540, samples=4)
 if len(sys.argv) > 1:
     with open(sys.argv[1], "wb") as file:
-        file.write(b"P6 960 540 255\n" + picture.tobytes())
+        file.write(b"P6 960 540 255\n" + image.tobytes())
 scene.save("island.vox")
 scene.save("island.glb")

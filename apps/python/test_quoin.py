@@ -299,13 +299,13 @@ class Scenes(unittest.TestCase):
             with self.assertRaises(ValueError):
                 scene.voxelize(corners, cube, **wrong)
 
-    def test_progress_is_told_and_ends_a_call(self):
+    def test_progress_is_reported_and_cancels_a_call(self):
         _, scene = self.scene()
-        told = []
-        with quoin.progress(told.append):
+        reported = []
+        with quoin.progress(reported.append):
             scene.render(64, 64)
-        self.assertEqual(told, sorted(told))
-        self.assertEqual(told[-1], 1)
+        self.assertEqual(reported, sorted(reported))
+        self.assertEqual(reported[-1], 1)
         with self.assertRaises(quoin.QuoinError) as ended, quoin.progress(lambda fraction: fraction < 0.5):
             scene.render(64, 64)
         self.assertEqual(ended.exception.status, 7)
@@ -381,16 +381,16 @@ class Scenes(unittest.TestCase):
     def test_pictures_of_heights(self):
         metres = np.array([[3, 5], [4, 9]])
         code = (metres + 10_000) * 10
-        picture = np.stack([code >> 16, code >> 8 & 255, code & 255], axis=2).astype(np.uint8)
+        image = np.stack([code >> 16, code >> 8 & 255, code & 255], axis=2).astype(np.uint8)
         heights = quoin.Heights("mapbox", metres_per_pixel=1.0, ground_depth=2)
-        scene = quoin.load_bytes(quoin.png(picture), heights=heights)
+        scene = quoin.load_bytes(quoin.png(image), heights=heights)
         self.assertEqual(scene.warnings, [])
         filled = (scene.grids[0].to_numpy() > 0).sum(axis=1)
         self.assertEqual(sorted(np.diff(sorted(filled.ravel())).tolist()), [1, 1, 4])
-        twice = quoin.load_bytes(quoin.png(picture), heights=quoin.Heights("mapbox", metres_per_pixel=1.0,
+        twice = quoin.load_bytes(quoin.png(image), heights=quoin.Heights("mapbox", metres_per_pixel=1.0,
                                                                            exaggeration=2.0, ground_depth=2))
         self.assertGreater(twice.grids[0].shape[1], scene.grids[0].shape[1])
-        larger = np.repeat(np.repeat(picture, 4, axis=0), 4, axis=1)
+        larger = np.repeat(np.repeat(image, 4, axis=0), 4, axis=1)
         smooth = quoin.load_bytes(quoin.png(larger), heights=quoin.Heights("mapbox", smooth=True))
         self.assertTrue(smooth.grids[0].has_field)
         self.assertIn("metres", " ".join(smooth.warnings))
@@ -410,10 +410,10 @@ class Scenes(unittest.TestCase):
 
     def test_a_listener_may_be_left_on_another_thread(self):
         _, scene = self.scene()
-        told, pictures = [], []
+        reported, images = [], []
 
         def listening():
-            with quoin.progress(told.append):
+            with quoin.progress(reported.append):
                 yield
 
         def first():
@@ -424,12 +424,12 @@ class Scenes(unittest.TestCase):
             thread.join()
             del generator
             gc.collect()
-            pictures.append(scene.render(64, 64))
+            images.append(scene.render(64, 64))
 
         thread = threading.Thread(target=first)  # its listeners end with it
         thread.start()
         thread.join()
-        self.assertEqual((len(pictures), told), (1, []))
+        self.assertEqual((len(images), reported), (1, []))
 
     def test_a_mesh_of_blocks_says_its_types(self):
         _, scene = self.scene()
@@ -616,13 +616,33 @@ class BadInput(unittest.TestCase):
             (lambda: quoin.Heights(metres_per_pixel=0.0), ValueError),
             (lambda: quoin.Heights(exaggeration=nan), ValueError),
             (lambda: quoin.Heights(ground_depth=0), ValueError),
-            (lambda: quoin.load_bytes(b"no picture", heights=quoin.Heights()), quoin.QuoinError),
+            (lambda: quoin.load_bytes(b"not an image", heights=quoin.Heights()), quoin.QuoinError),
             (lambda: quoin.load_bytes(quoin.png(np.zeros((2, 2, 3), np.uint8)), heights="mapbox"), TypeError),
         ]:
             with self.assertRaises(error):
                 wrong()
         self.assertEqual(len(quoin.surface_nets(np.full((4, 4, 4), nan), 0.5).triangles), 0)
         self.assertTrue(np.isinf(scene.rays([[nan, 0, 0]], [[0, 0, 0]]).t).all())
+
+
+class Package(unittest.TestCase):
+    def test_version_matches_the_library(self):
+        self.assertIsInstance(quoin.__version__, str)
+        self.assertEqual(quoin.__version__, quoin.version())
+
+    def test_all_is_sorted_and_complete(self):
+        self.assertEqual(quoin.__all__, sorted(set(quoin.__all__)))
+        own = {name for name, value in vars(quoin).items() if not name.startswith("_")
+               and getattr(value, "__module__", "").partition(".")[0] == "quoin"}
+        self.assertEqual(set(quoin.__all__), own | {"__version__"})
+
+    def test_dir_lists_only_public_names(self):
+        listed = dir(quoin)
+        plain = {name for name in listed if not (name.startswith("__") and name.endswith("__"))}
+        self.assertEqual(plain, set(quoin.__all__) - {"__version__"})
+        self.assertTrue({"__all__", "__doc__", "__name__", "__version__"} <= set(listed))
+        for name in listed:
+            self.assertTrue(hasattr(quoin, name), name)
 
 
 def load_tests(loader, tests, pattern):

@@ -152,14 +152,14 @@ class Palette:
         surface = texture("surfaces", surfaces, False, 0)
         colour = texture("colours", colours, True, 300)
         tree.nodes.active = colour
-        apart = tree.nodes.new("ShaderNodeSeparateColor")
-        apart.location = (shader.location.x - 450, 0)
-        tree.links.new(surface.outputs["Color"], apart.inputs[0])
+        separate = tree.nodes.new("ShaderNodeSeparateColor")
+        separate.location = (shader.location.x - 450, 0)
+        tree.links.new(surface.outputs["Color"], separate.inputs[0])
         tree.links.new(colour.outputs["Color"], occlusion.inputs[0])
         tree.links.new(colour.outputs["Color"], versions.input_of(shader, "Emission"))
-        tree.links.new(apart.outputs[0], shader.inputs["Emission Strength"])
-        tree.links.new(apart.outputs[1], shader.inputs["Roughness"])
-        tree.links.new(apart.outputs[2], shader.inputs["Metallic"])
+        tree.links.new(separate.outputs[0], shader.inputs["Emission Strength"])
+        tree.links.new(separate.outputs[1], shader.inputs["Roughness"])
+        tree.links.new(separate.outputs[2], shader.inputs["Metallic"])
         self.material.diffuse_color = (*linear(np.array([one.rgba[:3] for one in types[1:]] or [[0] * 3])).mean(0), 1.0)
 
     def places(self, types):

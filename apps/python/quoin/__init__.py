@@ -20,12 +20,12 @@ Voxel arrays have the axes x, y (up) and z, in this order. Long calls release Py
 
 from __future__ import annotations
 
-import contextlib
-import struct
-import zlib
-from typing import Any, Callable, Iterator
+import contextlib as _contextlib
+import struct as _struct
+import zlib as _zlib
+from typing import Any, Callable, Iterator, List
 
-import numpy as np
+import numpy as _np
 
 from . import _c
 from ._c import NdArray, QuoinError
@@ -33,13 +33,18 @@ from ._mesh import Mesh, mesh_labels, surface_nets
 from ._scene import (Camera, Format, Grid, Group, Heights, Hits, Instance, Lamp, Layer, Raw, Scene, Sun, VoxelType,
                      formats, from_numpy, load, load_bytes)
 
-__all__ = ["Camera", "Format", "Grid", "Group", "Heights", "Hits", "Instance", "Lamp", "Layer", "Mesh", "QuoinError", "Raw",
-           "Scene", "Sun", "VoxelType", "formats", "from_numpy", "load", "load_bytes", "mesh_labels", "png", "progress", "surface_nets",
-           "version"]
+__all__ = ["Camera", "Format", "Grid", "Group", "Heights", "Hits", "Instance", "Lamp", "Layer", "Mesh", "QuoinError",
+           "Raw", "Scene", "Sun", "VoxelType", "__version__", "formats", "from_numpy", "load", "load_bytes",
+           "mesh_labels", "png", "progress", "surface_nets", "version"]
+
+
+def __dir__() -> List[str]:
+    # Hides imported modules and private names.
+    return sorted({*__all__, *(name for name in globals() if name.startswith("__") and name.endswith("__"))})
 
 
 def version() -> str:
-    """Returns the library's version.
+    """Returns the version of the C library, such as "1.2.3". `quoin.__version__` is the same string.
 
     >>> version().count(".")
     2
@@ -47,36 +52,42 @@ def version() -> str:
     return _c.text_of(_c.lib.quoin_version())
 
 
+__version__ = version()
+
+
 def png(picture: NdArray) -> bytes:
-    """Encodes an image, uint8 (height, width, 3) or (height, width, 4), as the bytes of a PNG file.
+    """Encodes an image as a PNG file and returns its bytes.
+
+    `picture`: uint8, (height, width, 3) for RGB or (height, width, 4) for RGBA. Raises TypeError if it is not a NumPy
+    array, and ValueError for any other dtype or shape and for empty images.
 
     >>> png(np.zeros((2, 3, 3), np.uint8))[:8]
     b'\\x89PNG\\r\\n\\x1a\\n'
     """
-    if not isinstance(picture, np.ndarray):
+    if not isinstance(picture, _np.ndarray):
         raise TypeError("the image must be a NumPy array")
-    if picture.dtype != np.uint8 or picture.ndim != 3 or picture.shape[2] not in (3, 4) or not picture.size:
+    if picture.dtype != _np.uint8 or picture.ndim != 3 or picture.shape[2] not in (3, 4) or not picture.size:
         raise ValueError("the image must be uint8, (height, width, 3) or (height, width, 4)")
     height, width, channels = picture.shape
-    rows = np.zeros((height, 1 + width * channels), np.uint8)  # each row starts with its filter type, 0
+    rows = _np.zeros((height, 1 + width * channels), _np.uint8)  # each row starts with its filter type, 0
     rows[:, 1:] = picture.reshape(height, -1)
 
     def chunk(name: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+        return _struct.pack(">I", len(data)) + name + data + _struct.pack(">I", _zlib.crc32(name + data))
 
-    header = struct.pack(">IIBBBBB", width, height, 8, 2 if channels == 3 else 6, 0, 0, 0)
-    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows.tobytes(), 9))
+    header = _struct.pack(">IIBBBBB", width, height, 8, 2 if channels == 3 else 6, 0, 0, 0)
+    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", _zlib.compress(rows.tobytes(), 9))
             + chunk(b"IEND", b""))
 
 
-@contextlib.contextmanager
+@_contextlib.contextmanager
 def progress(listener: Callable[[float], Any]) -> Iterator[None]:
-    """Reports the progress of this thread's calls inside the `with` block to `listener`, from 0 to 1. Quoin may call
-    it from another thread. To cancel the call, the listener returns False or raises. The call then raises the same
-    exception; if the call has already finished, the end of the `with` block raises it. Blocks can be nested: the
-    innermost listener is active.
+    """Reports the progress of calls that this thread makes inside the `with` block.
 
-    
+    `listener` receives the finished fraction of the current call, 0 to 1. Quoin may call it from another thread. To
+    cancel the current call, return False, which raises QuoinError with status 7, or raise an exception, which the call
+    raises too. If the call has already finished, the end of the `with` block raises the exception. Blocks can be
+    nested: only the innermost listener is called.
     """
     mine = _c.Listener(listener)
     _c.check(_c.lib.quoin_set_progress(mine.function, None))

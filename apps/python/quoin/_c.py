@@ -24,8 +24,8 @@ class QuoinError(Exception):
 
 
 def _find() -> ctypes.CDLL:
-    beside = os.path.join(os.path.dirname(__file__), "libquoin_c.so.0")
-    return ctypes.CDLL(os.environ.get("QUOIN_LIBRARY") or (beside if os.path.exists(beside) else "libquoin_c.so.0"))
+    sidecar = os.path.join(os.path.dirname(__file__), "libquoin_c.so.0")
+    return ctypes.CDLL(os.environ.get("QUOIN_LIBRARY") or (sidecar if os.path.exists(sidecar) else "libquoin_c.so.0"))
 
 
 lib = _find()

@@ -54,7 +54,7 @@ class Instance {
         const what = this.text(text);
         throw new QuoinError(what === 'out of memory' ? 'out_of_memory' : 'internal', what);
       },
-      told: (fraction) => this.told(fraction),
+      told: (fraction) => this.report(fraction),
     };
     return imports;
   }
@@ -75,7 +75,7 @@ class Instance {
   }
 
   /** Calls the progress listener. Its exception is kept and rethrown after the module has returned. */
-  told(fraction) {
+  report(fraction) {
     const { listener } = this;
     if (listener.threw !== undefined) return 0;
     this.isTelling = true;

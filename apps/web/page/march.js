@@ -44,7 +44,7 @@ export class Marcher {
   #scene;    // a GPUBuffer
   #samples;  // push constants of each sample
   #size = [0, 0];
-  #picture;  // buffers of the current size
+  #image;    // buffers of the current size
   #tables;
   #uniform;
   #pushes;
@@ -90,7 +90,7 @@ export class Marcher {
   /** Frees its device memory. */
   close() {
     for (const buffer of [this.#scene, this.#uniform, this.#tables, this.#pushes, this.#shown,
-                          ...Object.values(this.#picture ?? {})]) buffer?.destroy();
+                          ...Object.values(this.#image ?? {})]) buffer?.destroy();
   }
 
   #buffer(size, usage, bytes) {
@@ -153,13 +153,13 @@ export class Marcher {
   #resize(width, height) {
     if (this.#size[0] === width && this.#size[1] === height) return;
     this.#checkSize('the image', width * height * 16);
-    for (const buffer of Object.values(this.#picture ?? {})) buffer.destroy();
+    for (const buffer of Object.values(this.#image ?? {})) buffer.destroy();
     this.#size = [width, height];
     const { STORAGE, COPY_SRC } = GPUBufferUsage;
     const ofTile = Math.min(tileEdge, width) * Math.min(tileEdge, height);
-    this.#picture = { points: this.#buffer(ofTile * pointBytes, STORAGE),
-                      sums: this.#buffer(width * height * 16, STORAGE),
-                      colours: this.#buffer(width * height * 4, STORAGE | COPY_SRC) };
+    this.#image = { points: this.#buffer(ofTile * pointBytes, STORAGE),
+                    sums: this.#buffer(width * height * 16, STORAGE),
+                    colours: this.#buffer(width * height * 4, STORAGE | COPY_SRC) };
     this.#pushes?.destroy();
     this.#pushes = this.#buffer(this.#tiles().length * pushBytes, GPUBufferUsage.UNIFORM);
     this.#groups = undefined;
@@ -176,7 +176,7 @@ export class Marcher {
   }
 
   #bound() {
-    const { points, sums, colours } = this.#picture;
+    const { points, sums, colours } = this.#image;
     const buffers = [this.#uniform, this.#scene, this.#scene, this.#tables, points, sums, colours];
     return [
       this.#device.createBindGroup({ layout: this.#layouts.common,
@@ -240,7 +240,7 @@ export class Marcher {
     const texture = context.getCurrentTexture();
     this.#shown ??= this.#buffer(16, GPUBufferUsage.UNIFORM);
     this.#device.queue.writeBuffer(this.#shown, 0, new Uint32Array([...this.#size, texture.width, texture.height]));
-    const entries = [this.#picture.colours, this.#shown].map((buffer, binding) => ({ binding, resource: { buffer } }));
+    const entries = [this.#image.colours, this.#shown].map((buffer, binding) => ({ binding, resource: { buffer } }));
     const group = this.#device.createBindGroup({ layout: this.#pipelines.shows.getBindGroupLayout(0), entries });
     const commands = this.#device.createCommandEncoder();
     const pass = commands.beginRenderPass({ colorAttachments: [
@@ -254,7 +254,7 @@ export class Marcher {
 
   /** Returns the pixels in the layout of ImageData. */
   async read() {
-    const { colours } = this.#picture;
+    const { colours } = this.#image;
     const [width, height] = this.#size;
     const bytes = width * height * 4;
     const landing = this.#device.createBuffer({ size: colours.size,

@@ -79,13 +79,13 @@ class ByModule {
     const began = performance.now();
     const { width, height, rgba } = await this.ask('march', { ...view, samples: 1 });
     if (!wanted.isSame()) return;
-    this.picture = { width, height, rgba };
+    this.image = { width, height, rgba };
     this.context.putImageData(new ImageData(rgba, width, height), 0, 0);
     shown({ by: this.name, milliseconds: performance.now() - began, width, height, samples: 1 });
   }
 
   async read() {
-    return this.picture;
+    return this.image;
   }
 
   close() {}

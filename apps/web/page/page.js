@@ -240,24 +240,24 @@ function untilTheNext() {
 }
 
 /** Loads embedded images for GLTFLoader, which would otherwise fetch them. */
-function picturesFromMemory(parser) {
-  const picture = async ({ bufferView, mimeType }) => {
+function imagesFromMemory(parser) {
+  const decoded = async ({ bufferView, mimeType }) => {
     const blob = new Blob([await parser.getDependency('bufferView', bufferView)], { type: mimeType });
     const texture = new THREE.Texture(await createImageBitmap(blob, { premultiplyAlpha: 'none' }));
     texture.needsUpdate = true;
     return texture;
   };
   return {
-    name: 'pictures from memory',
+    name: 'images from memory',
     async beforeRoot() {
-      (parser.json.images ?? []).forEach((image, i) => { parser.sourceCache[i] = picture(image); });
+      (parser.json.images ?? []).forEach((image, i) => { parser.sourceCache[i] = decoded(image); });
     },
   };
 }
 
 /** Returns false and does nothing if another file was chosen meanwhile. */
 async function show(bytes, isCurrent) {
-  const { scene } = await new GLTFLoader().register(picturesFromMemory).parseAsync(bytes.buffer, '');
+  const { scene } = await new GLTFLoader().register(imagesFromMemory).parseAsync(bytes.buffer, '');
   if (!isCurrent()) return false;
   plain?.dispose();
   model?.removeFromParent();
@@ -404,10 +404,10 @@ function give(blob, extension) {
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }
 
-async function givePicture({ width, height, rgba }) {
-  const picture = new OffscreenCanvas(width, height);
-  picture.getContext('2d').putImageData(new ImageData(rgba, width, height), 0, 0);
-  give(await picture.convertToBlob({ type: 'image/png' }), '.png');
+async function giveImage({ width, height, rgba }) {
+  const image = new OffscreenCanvas(width, height);
+  image.getContext('2d').putImageData(new ImageData(rgba, width, height), 0, 0);
+  give(await image.convertToBlob({ type: 'image/png' }), '.png');
 }
 
 // ---- Measuring between two surface points.
@@ -547,8 +547,8 @@ $('glb').addEventListener('click', () => give(new Blob([glb], { type: 'model/glt
 $('picture').addEventListener('click', async () => {
   if (marched?.isOn) {
     try {
-      const picture = await marched.read();
-      if (picture) await givePicture(picture);
+      const image = await marched.read();
+      if (image) await giveImage(image);
     } catch (error) {
       say(error.message, true);
     }
@@ -562,7 +562,7 @@ $('march').addEventListener('click', async () => {
   const began = performance.now();
   try {
     const tell = (fraction) => say(`Rendering by rays, on one thread: ${percent(fraction)} ...`);
-    await givePicture(await ask('march', { ...viewOf(canvas.clientWidth, canvas.clientHeight), samples: 4 }, tell));
+    await giveImage(await ask('march', { ...viewOf(canvas.clientWidth, canvas.clientHeight), samples: 4 }, tell));
     say(`Rendered in ${((performance.now() - began) / 1000).toFixed(1)} s.`);
   } catch (error) {
     say(error.message, true);

@@ -98,10 +98,10 @@ const work = {
 const endings = ['trap', 'out_of_memory', 'internal'];  // these errors end the instance and all its scenes
 
 async function answerTo({ id, name, options }) {
-  let told = performance.now();
+  let reported = performance.now();
   const tell = (fraction) => {
-    if (performance.now() - told < 100) return;
-    told = performance.now();
+    if (performance.now() - reported < 100) return;
+    reported = performance.now();
     postMessage({ id, fraction });
   };
   try {

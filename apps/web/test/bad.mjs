@@ -87,7 +87,7 @@ const scene = await load(good);
 await refuses('no grid', () => scene.mesh(99_999), 'invalid_argument');
 await refuses('a fraction of a grid', () => scene.mesh(0.5), 'invalid_argument');
 await refuses('no extension', () => scene.file('.xyz'), 'unsupported');
-await refuses('a picture without a size', () => scene.render({ width: 0 }), 'invalid_argument');
+await refuses('an image without a size', () => scene.render({ width: 0 }), 'invalid_argument');
 await refuses('a camera nowhere', () => scene.render({ camera: { position: [NaN, 0, 0], lookAt: [0, 0, 0] } }));
 for (const extension of [undefined, null, 3, '', 'glb', '.obj', '.json', '.quoin'])
   await refuses(`files of the kind ${extension}`, () => scene.file(extension), 'unsupported');
@@ -106,8 +106,8 @@ const takesOptions = {
 };
 // Values written into the module must have the length and type that it expects.
 const small = { width: 16, height: 8 };
-const picture = () => Buffer.from(scene.render(small).rgba);
-const pictureBefore = picture();
+const image = () => Buffer.from(scene.render(small).rgba);
+const imageBefore = image();
 const shaders = scene.forShaders();
 const [here, there] = [[0, 9, 9], [0, 0, 0]];
 for (const [what, call] of Object.entries(takesOptions)) {
@@ -163,7 +163,7 @@ for (const rays of ['abc', ['0', '0', '0'], [0, 0, undefined]])
   await refuses(`rays of ${rays}`, () => scene.rays(rays, [0, 0, 1]), 'invalid_argument');
 await refuses('more rays than memory', () => scene.rays({ length: 3 * 2 ** 33 }, { length: 3 * 2 ** 33 }),
               'out_of_memory');
-check(picture().equals(pictureBefore), 'refused calls do not change the image');
+check(image().equals(imageBefore), 'refused calls do not change the image');
 shaders.free();
 await refuses('shaders that were freed', () => shaders.frame(small), 'invalid_argument');
 scene.free();

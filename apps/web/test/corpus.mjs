@@ -121,14 +121,14 @@ for (const file of folders.flatMap(filesBelow)) {
   } else {
     ++counts.compared;
     ++counts.same[same];
-    const picture = join(scratch, 'out.png');
+    const image = join(scratch, 'out.png');
     if (extname(file) === '.vox' && counts.compared % 8 === 0 &&
-        native('render', file, '-o', picture, '--size', '96x64', '--samples', '4')) {
+        native('render', file, '-o', image, '--size', '96x64', '--samples', '4')) {
       const { rgba } = scene.render({ width: 96, height: 64, samples: 4 });
-      const pixels = pixelsOf(readFileSync(picture));
+      const pixels = pixelsOf(readFileSync(image));
       let different = 0;
       for (let i = 0; i < 96 * 64 * 3; ++i) different += pixels[i] !== rgba[4 * Math.floor(i / 3) + (i % 3)] ? 1 : 0;
-      if (different > 0) wrong(file, `${different} channels of the picture differ`);
+      if (different > 0) wrong(file, `${different} channels of the image differ`);
       else ++counts.pictures;
     }
   }

@@ -163,9 +163,10 @@ const long = {
 };
 class Mine extends Error {}
 for (const [name, work] of Object.entries(long)) {
-  const told = [];
-  await work({ progress: (fraction) => { told.push(fraction); } });
-  check(told.length > 0 && told.every((f, i) => f >= (told[i - 1] ?? 0) && f <= 1), `${name}: got ${told.join()}`);
+  const reported = [];
+  await work({ progress: (fraction) => { reported.push(fraction); } });
+  check(reported.length > 0 && reported.every((f, i) => f >= (reported[i - 1] ?? 0) && f <= 1),
+        `${name}: got ${reported.join()}`);
   await refuses(`${name} that is stopped`, () => work({ progress: () => false }), 'cancelled');
   await refuses(`${name} that calls`, () => work({ progress: () => scene.read(0, [0, 0, 0], [1, 1, 1]) }));
   await refuses(`${name} without a function`, () => work({ progress: 'loud' }));
@@ -178,7 +179,7 @@ for (const [name, work] of Object.entries(long)) {
   const again = [];
   await work({});
   await work({ progress: (fraction) => { again.push(fraction); } });
-  check(again.length === told.length, `${name} reports again`);
+  check(again.length === reported.length, `${name} reports again`);
 }
 const whole = scene.glb();
 scene.free();

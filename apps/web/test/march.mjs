@@ -60,12 +60,12 @@ async function comparePictures(tab) {
       check(share >= leastClose && one.colours > 20, `${address} ${i}: ${(100 * share).toFixed(3)} % within 2, ${
         (100 * one.equal / one.pixels).toFixed(3)} % equal, at most ${off}; ${milliseconds.toFixed(0)} ms a sample, ${
         byModule.toFixed(0)} by the module; has ${has}, ${bytes} bytes, opened in ${opening.toFixed(0)} ms on ${name}`);
-      for (const [k, picture] of one.pictures.entries())
+      for (const [k, image] of one.pictures.entries())
         await writeFile(join(out, `marched${address.replaceAll('/', '-')}-${i}-${k === 0 ? 'device' : 'module'}.png`),
-                        Buffer.from(picture));
+                        Buffer.from(image));
     }
   }
-  console.log(`all: ${(100 * equal / all).toFixed(3)} % of ${all} pixels equal, the worst picture ${
+  console.log(`all: ${(100 * equal / all).toFixed(3)} % of ${all} pixels equal, the worst image ${
     (100 * worst).toFixed(3)} % within 2, the largest difference ${largest}`);
 }
 
@@ -123,7 +123,7 @@ async function usePage(browser, errors) {
   await writeFile(join(out, 'marched-page.png'), await tab.screenshot({ timeout: 120_000 }));
   const before = await download(tab, '#march');
   const same = await meanDifference(tab, await download(tab, '#picture'), before);
-  check(same < 2, `by WebGPU the page has the module's picture but for its samples: ${same.toFixed(2)} off`);
+  check(same < 2, `by WebGPU the page has the module's image except for its samples: ${same.toFixed(2)} off`);
   for (let i = 0; i < 12; ++i) await tab.keyboard.press('a');
   for (let i = 0; i < 4; ++i) await tab.keyboard.press('s');
   const later = await download(tab, '#march');

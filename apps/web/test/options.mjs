@@ -86,8 +86,8 @@ async function compare(what, file, options, args, without = {}) {
                   ['--heights', other, '--metres-per-pixel', '4000', '--exaggeration', '0.5'], null);
   }
   const bytes = readFileSync(grey);
-  await refuses('a picture that is not said to be heights', () => load(bytes), 'bad_format');
-  await refuses('heights that are no picture', () => load(new Uint8Array(64), { heights }), 'bad_format');
+  await refuses('an image loaded without a height encoding', () => load(bytes), 'bad_format');
+  await refuses('heights that are not an image', () => load(new Uint8Array(64), { heights }), 'bad_format');
   for (const [name, value] of [['encoding', 'red'], ['encoding', 'none'], ['encoding', undefined],
                                ['metresPerLevel', 0], ['metresPerPixel', -1], ['metresPerVoxel', NaN],
                                ['exaggeration', '2'], ['exaggeration', 1e9], ['groundDepth', 0], ['groundDepth', 5000],

@@ -24,7 +24,7 @@ export async function use(bytes: Uint8Array): Promise<number> {
   const options: LoadOptions = bytes.length === 8 ? { raw: { shape: [2, 2, 2], type: 'uint8' }, iso: 3 } : { heights };
   await load(bytes, options);
   const mesh: Mesh = await surfaceNets(new Float32Array(8), [2, 2, 2], 0.5, { spacing: [1, 1, 2] });
-  const picture = scene.render({ width: 8, height: 8, camera: { position: [1, 2, 3], lookAt: [0, 0, 0] } });
+  const image = scene.render({ width: 8, height: 8, camera: { position: [1, 2, 3], lookAt: [0, 0, 0] } });
   const hits: Hits = scene.rays([0, 9, 0], new Float32Array([0, -1, 0]), { maxT: 20 });
   const labels: LabelMesh<number> = await meshLabels(new Uint8Array(8), [2, 2, 2], { background: 1 });
   const large: LabelMesh<bigint> = await meshLabels(new BigInt64Array(8), [2, 2, 2], { relaxationSteps: 0 });
@@ -38,7 +38,7 @@ export async function use(bytes: Uint8Array): Promise<number> {
     if (error instanceof QuoinError) { const code: ErrorCode = error.code; console.log(code); }
   }
   scene.free();
-  return glb.length + mesh.indices.length + picture.rgba.length + group.name.length + (mesh.colours?.length ?? 0);
+  return glb.length + mesh.indices.length + image.rgba.length + group.name.length + (mesh.colours?.length ?? 0);
 }
 // @ts-expect-error: bytes, not a path
 void load('castle.vox');

@@ -5,7 +5,7 @@ import { basename, join } from 'node:path';
 import { headless, requirements, serve } from '../../../tests/web/browser.mjs';
 import { checkAloud as check, found } from './checks.mjs';
 
-const [page, file, nativeGlb, picture, corpus] = process.argv.slice(2);
+const [page, file, nativeGlb, image, corpus] = process.argv.slice(2);
 const { chromium, launcher } = await requirements('skipped, the page only');
 const server = await serve((path) => (path === '/castle.vox' ? file : join(page, path === '/' ? 'index.html' : path)));
 const site = `http://127.0.0.1:${server.address().port}/`;
@@ -72,8 +72,8 @@ try {
     return { shot, counted };
   };
   const first = await colours();
-  check(first.counted > 100, `the picture has ${first.counted} colours`);
-  if (picture) await writeFile(picture, first.shot);
+  check(first.counted > 100, `the image has ${first.counted} colours`);
+  if (image) await writeFile(image, first.shot);
 
   // Counts pixels that differ from all neighbours: the background shows through gaps between faces of different sizes.
   const lonely = (shot) => tab.evaluate(async (bytes) => {
@@ -113,7 +113,7 @@ try {
   check(png.bytes.toString('latin1', 1, 4) === 'PNG', `${png.name} is a PNG of ${png.bytes.length} bytes`);
   const marched = await download('#march', 300_000);
   check(marched.bytes.toString('latin1', 1, 4) === 'PNG', `${marched.name}, marched: ${await status()}`);
-  if (picture) await writeFile(picture.replace(/\.png$/, '-marched.png'), marched.bytes);
+  if (image) await writeFile(image.replace(/\.png$/, '-marched.png'), marched.bytes);
 
   await tab.focus('#view');
   await tab.keyboard.press('ArrowLeft');
@@ -207,12 +207,12 @@ try {
   await tab.emulateMedia({ colorScheme: 'dark' });
   await tab.setViewportSize({ width: 390, height: 800 });
   await tab.waitForTimeout(300);
-  if (picture) await writeFile(picture.replace(/\.png$/, '-phone.png'), await tab.screenshot());
+  if (image) await writeFile(image.replace(/\.png$/, '-phone.png'), await tab.screenshot());
   const [view, panel] = [await tab.locator('#view').boundingBox(), await tab.locator('#panel').boundingBox()];
   check(view.height > 400 && view.y + view.height <= panel.y + 1, 'on a phone the view lies above the panel');
   await tab.setViewportSize({ width: 800, height: 390 });
-  const [wide, beside] = [await tab.locator('#view').boundingBox(), await tab.locator('#panel').boundingBox()];
-  check(wide.width > 500 && wide.x + wide.width <= beside.x + 1, 'in a small window the view is next to the panel');
+  const [wide, panelBox] = [await tab.locator('#view').boundingBox(), await tab.locator('#panel').boundingBox()];
+  check(wide.width > 500 && wide.x + wide.width <= panelBox.x + 1, 'in a small window the view is next to the panel');
   for (const name of ['LICENSE', 'LICENSES', 'LICENSE.three', 'NOTICE'])
     check((await tab.request.get(site + name)).ok(), `${name} is next to the page`);
   check(elsewhere.length === 0, `no request to anywhere else${elsewhere.map((url) => ` ${url}`)}`);

@@ -11,7 +11,7 @@ const { load } = await import(pathToFileURL(join(packageFolder, 'quoin.js')));
 const { VOXLoader } = await import(pathToFileURL(resolve(three, 'examples/jsm/loaders/VOXLoader.js')));
 const bytes = readFileSync(file);
 const out = join(tmpdir(), `quoin-speed-${process.pid}.glb`);
-const times = { 'module: load': [], 'module: meshes': [], 'module: glb': [], 'module: picture': [],
+const times = { 'module: load': [], 'module: meshes': [], 'module: glb': [], 'module: image': [],
                 'three.js VOXLoader': [], 'tool: convert': [] };
 const timed = async (name, work) => {
   const began = performance.now();
@@ -25,7 +25,7 @@ for (let turn = 0; turn < Number(turns); ++turn) {
   await timed('module: glb', () => scene.glb());
   scene.free();
   const whole = await load(bytes);
-  await timed('module: picture', () => whole.render({ width: 640, height: 360, samples: 4 }));
+  await timed('module: image', () => whole.render({ width: 640, height: 360, samples: 4 }));
   whole.free();
   await timed('three.js VOXLoader', () => {
     const copy = bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length);
