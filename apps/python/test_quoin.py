@@ -506,12 +506,12 @@ class Pages(unittest.TestCase):
             finally:
                 os.chdir(home)
         self.assertTrue(all(cell["execution_count"] for cell in cells), "it was executed")
-        pictures = [output for cell in cells for output in cell["outputs"] if "image/png" in output.get("data", {})]
-        self.assertGreaterEqual(len(pictures), 3)
+        images = [output for cell in cells for output in cell["outputs"] if "image/png" in output.get("data", {})]
+        self.assertGreaterEqual(len(images), 3)
 
 
 class BadInput(unittest.TestCase):
-    def test_is_told_and_never_a_crash(self):
+    def test_raises_and_never_crashes(self):
         array, nan = np.zeros((4, 4, 4), np.uint8), float("nan")
         scene, full = quoin.Scene(), quoin.from_numpy(array + 1, [(1, 2, 3)])
         for wrong, error in [

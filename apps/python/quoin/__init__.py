@@ -15,7 +15,11 @@ True
 >>> scene.render(64, 48).shape
 (48, 64, 3)
 
-Voxel arrays have the axes x, y (up) and z, in this order. Long calls release Python's lock.
+Voxel arrays have the axes x, y (up) and z, in this order. Coordinates are right-handed. Sizes and positions are in
+voxels unless a docstring gives another unit. Colours are sRGB unless marked as linear. `threads=0` uses all processors.
+
+Errors of the library raise QuoinError. Arguments of the wrong type raise TypeError; arrays of the wrong shape and
+integers out of range raise ValueError. Calls release Python's global lock while they work.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Binds quoin.h with ctypes. Every call releases Python's lock while it runs."""
+"""Binds quoin.h with ctypes. Every call releases Python's global lock while it runs."""
 
 from __future__ import annotations
 
@@ -18,7 +18,11 @@ else:
 
 
 class QuoinError(Exception):
-    """An error of the library, in one line; `status` is a quoin_status."""
+    """An error reported by the library. The message is one line.
+
+    `status`: int, a quoin_status of quoin.h: 1 invalid argument, 2 cannot read, 3 cannot write, 4 bad format,
+    5 unsupported, 6 limit exceeded, 7 cancelled, 8 device lost, 9 bad handle, 10 out of memory, 11 internal error.
+    """
 
     status = 0
 
@@ -231,7 +235,7 @@ class Listener:
 
 
 class Listeners(threading.local):
-    """The listeners of a thread, outermost first. The library calls the last one. The list keeps them alive."""
+    """The active listeners of a thread, outermost first. The library calls only the last. The list keeps all alive."""
 
     def __init__(self) -> None:
         self.all: List[Listener] = []
@@ -242,7 +246,7 @@ _CANCELLED = 7
 
 
 def check(status: int) -> None:
-    """Raises QuoinError if a call failed, or the exception of the listener that cancelled it."""
+    """Raises QuoinError if a call failed. If a listener raised an exception to cancel the call, raises that instead."""
     if status == 0:
         return
     if status == _CANCELLED and listeners.all:
@@ -253,7 +257,7 @@ def check(status: int) -> None:
 
 
 class Owner:
-    """A library handle, freed with the last Python object that uses it."""
+    """Owns a library handle. Frees it when no Python object refers to this owner any more."""
 
     def __init__(self, handle: int) -> None:
         self.handle = handle
@@ -274,7 +278,7 @@ def text_of(field: bytes) -> str:
 
 
 def whole(value: Any, name: str, least: int = -2**31, most: int = 2**31 - 1) -> int:
-    """Converts to an int; raises if it is not an integer or out of range, which ctypes would truncate."""
+    """Converts to an int. Raises TypeError or ValueError for values that ctypes would silently truncate."""
     try:
         found = operator.index(value)
     except TypeError:
@@ -312,7 +316,7 @@ def bytes_of(text: str, room: int = 128) -> bytes:
 
 
 def sized(structure: Any) -> Any:
-    """Returns an empty struct with its size set."""
+    """Creates a struct with all fields 0, except `size`."""
     made = structure()
     made.size = ctypes.sizeof(structure)
     return made
@@ -349,7 +353,7 @@ def types_of(array: Any, origin: Sequence[float]) -> Any:
 
 
 def scalar_of(dtype: Any, name: str) -> Tuple[int, bool]:
-    """Returns the quoin_scalar of a dtype, and True if it is big-endian."""
+    """Returns a dtype's quoin_scalar, and True if the dtype is big-endian."""
     found = np.dtype(dtype)
     native = found.newbyteorder("=")
     if native not in _SCALARS:
@@ -387,7 +391,7 @@ def rows_of(array: Any, width: int, dtype: Any, name: str) -> Any:
 
 
 def indices_of(array: Any, name: str) -> Any:
-    """Converts indices to uint32; raises instead of rounding or truncating."""
+    """Converts indices to a contiguous uint32 array. Raises TypeError for other numbers, ValueError if out of range."""
     found = np.asarray(array)
     if found.size and found.dtype.kind not in "iu":
         raise TypeError(f"{name} must be integers, not {found.dtype}")
@@ -404,5 +408,5 @@ class _Block:
 
 
 def view_of(owner: Any, pointer: Optional[int], shape: Tuple[int, ...], dtype: Any) -> Optional[NdArray]:
-    """Returns a read-only view of the library's memory, which keeps `owner` alive."""
+    """Returns a read-only view of the library's memory, or None for a null pointer. The view keeps `owner` alive."""
     return None if not pointer else np.asarray(_Block(owner, pointer, shape, dtype))

@@ -12,7 +12,9 @@ from ._c import NdArray
 
 
 class Mesh:
-    """A triangle mesh. Its arrays are read-only views of the library's memory, which they keep alive.
+    """A triangle mesh. Its arrays are read-only views of the library's memory. An array stays valid without the mesh.
+
+    Positions of a grid's mesh are in the grid's voxels. Positions of an array's mesh use its `spacing` and `origin`.
 
     >>> mesh = surface_nets(np.indices((9, 9, 9)).sum(0).astype(np.float32), 12.0)
     >>> mesh.positions.flags.owndata, mesh.positions.flags.writeable
@@ -22,12 +24,12 @@ class Mesh:
     """
 
     positions: NdArray  #: float32, (vertices, 3)
-    triangles: NdArray  #: uint32, (triangles, 3), counter-clockwise from outside
-    normals: Optional[NdArray]  #: float32, (vertices, 3); None for labels
-    colours: Optional[NdArray]  #: uint8, (vertices, 4), sRGB; only for grids
+    triangles: NdArray  #: uint32, (triangles, 3): rows of `positions`, counter-clockwise seen from outside
+    normals: Optional[NdArray]  #: float32, (vertices, 3), of unit length; None for labels
+    colours: Optional[NdArray]  #: uint8, (vertices, 4), sRGB without occlusion; only for grids
     occlusion: Optional[NdArray]  #: float32, (vertices,), 0 open to 1 dark; only for grids
-    types: Optional[NdArray]  #: uint16, (vertices,); only for blocks: four vertices and two triangles per face
-    interfaces: Optional[NdArray]  #: int64, (n, 4): back and front label, first index, count; only for labels
+    types: Optional[NdArray]  #: uint16, (vertices,), voxel types; only for blocks; 0: a field's surface
+    interfaces: Optional[NdArray]  #: int64, (n, 4); only for labels; see `mesh_labels`
 
     def __init__(self, owner: _c.Owner) -> None:
         data = _c.sized(_c.MeshData)
@@ -53,7 +55,8 @@ class Mesh:
         return f"<quoin.Mesh: {len(self.positions)} vertices, {len(self.triangles)} triangles>"
 
     def of_label(self, label: int) -> NdArray:
-        """Returns the triangles around a label, facing outwards, as indices into `positions`.
+        """Returns the closed surface of a label: uint32, (n, 3), rows of `positions`, facing outwards. It has no
+        triangles if the label is absent. Raises ValueError for meshes that `mesh_labels` did not make.
 
         >>> array = np.zeros((4, 4, 4), np.uint8); array[1:3, 1:3, 1:3] = 7
         >>> len(mesh_labels(array).of_label(7)) == len(mesh_labels(array).triangles)
@@ -71,7 +74,7 @@ class Mesh:
         return np.concatenate(parts)
 
     def to_trimesh(self) -> Any:
-        """Copies the mesh to a trimesh.Trimesh. Needs the package trimesh."""
+        """Copies the mesh to a trimesh.Trimesh. Raises ImportError if the package trimesh is missing."""
         import trimesh
 
         return trimesh.Trimesh(self.positions, self.triangles.astype(np.int64), vertex_normals=self.normals,
@@ -80,9 +83,14 @@ class Mesh:
 
 def surface_nets(array: NdArray, iso: float, spacing: Sequence[float] = (1, 1, 1),
                  origin: Sequence[float] = (0, 0, 0), solid: str = "above", threads: int = 0) -> Mesh:
-    """Meshes the surface where an array [x, y, z] equals `iso`. Supports any number type and strides; copies nothing.
+    """Meshes the surface where the values of an array equal `iso`.
 
-    `solid`: "above" if larger values are solid (scans), "below" for signed distances.
+    `array`: (nx, ny, nz), integers up to 64 bits, float32, float64 or bool, in native byte order. It may have any
+    strides and is read in place. `spacing`: distance between samples along each axis. `origin`: position of sample
+    [0, 0, 0]. `solid`: "above" if values above `iso` are solid (scans), "below" if values below are (signed distances).
+
+    Raises TypeError for an unsupported dtype, ValueError for a wrong shape or an empty axis, and
+    QuoinError if `iso` is NaN or the spacing or origin is invalid.
 
     >>> x, y, z = np.mgrid[-8:9, -8:9, -8:9]
     >>> ball = surface_nets(np.sqrt(x * x + y * y + z * z), 6.0, origin=(-8, -8, -8), solid="below")
@@ -93,15 +101,23 @@ def surface_nets(array: NdArray, iso: float, spacing: Sequence[float] = (1, 1, 1
         raise ValueError('solid must be "above" or "below"')
     given = _c.array_of(array, spacing, origin)
     out = ctypes.c_uint64()
-    _c.check(_c.lib.quoin_surface_nets(ctypes.byref(given), _c.number(iso, "iso"), int(solid == "below"), _c.whole(threads, "threads"),
-                                       ctypes.byref(out)))
+    _c.check(_c.lib.quoin_surface_nets(ctypes.byref(given), _c.number(iso, "iso"), int(solid == "below"),
+                                       _c.whole(threads, "threads"), ctypes.byref(out)))
     return Mesh(_c.Owner(out.value))
 
 
 def mesh_labels(array: NdArray, background: int = 0, spacing: Sequence[float] = (1, 1, 1),
                 origin: Sequence[float] = (0, 0, 0), relaxation_steps: int = 4, threads: int = 0) -> Mesh:
-    """Meshes the surfaces between the integer labels of an array as one mesh, in which neighbours share faces. See
-    `Mesh.interfaces` and `Mesh.of_label`. Copies nothing."""
+    """Meshes the surfaces between the labels of a segmentation, as one mesh. Neighbouring labels share triangles.
+
+    `array`: (nx, ny, nz), integers or bool, in native byte order. It may have any strides and is read in place.
+    `background`: label of empty space, also outside the array. `spacing`, `origin`: as in `surface_nets`.
+    `relaxation_steps`: smoothing steps, 0 to 1,000.
+
+    Each row of `Mesh.interfaces` describes the triangles between two labels: back label, front label, first index and
+    index count, in `mesh.triangles.ravel()`. The background is never the back label. `Mesh.of_label` returns the
+    triangles of one label. Raises errors like `surface_nets`, and QuoinError for arrays of floats.
+    """
     given = _c.array_of(array, spacing, origin)
     out = ctypes.c_uint64()
     _c.check(_c.lib.quoin_mesh_labels(ctypes.byref(given), _c.whole(background, "background", -2**63, 2**63 - 1),

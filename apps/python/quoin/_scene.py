@@ -18,38 +18,38 @@ _FILLS = {"all": 0, "solid": 1, "surface": 2}
 
 
 class VoxelType(NamedTuple):
-    """A voxel type. `rgba` is sRGB, 0 to 255; alpha defaults to 255, and a lower alpha makes the type transparent."""
+    """The material of voxels. A type is transparent if its alpha is below 255 or `transparent` is true."""
 
-    rgba: Tuple[int, ...]
+    rgba: Tuple[int, ...]  #: sRGB, three or four integers, 0 to 255; default alpha 255
     name: str = ""
-    emission: float = 0.0
-    metalness: float = 0.0
-    roughness: float = 1.0
-    transparent: bool = False  #: also with an alpha of 255
+    emission: float = 0.0  #: 0: none
+    metalness: float = 0.0  #: 0 to 1
+    roughness: float = 1.0  #: 0 (a mirror) to 1
+    transparent: bool = False  #: makes the type transparent even with an alpha of 255
     ior: float = 1.5  #: index of refraction of transparent types
-    scattering: float = 0.0  #: clouds: mean number of scatterings per voxel length
-    anisotropy: float = 0.0
+    scattering: float = 0.0  #: clouds: mean number of scatterings per voxel length; 0: glass
+    anisotropy: float = 0.0  #: clouds: mean cosine of the scattering angle, -1 to 1
 
 
 class Instance(NamedTuple):
-    """A placement of a grid. `matrix` (4, 4) transforms points of the grid, in voxels, to the world."""
+    """A placement of a grid in the world. Several instances can share a grid."""
 
-    grid: int
-    matrix: NdArray
+    grid: int  #: an index into `Scene.grids`; equal to their number if the instance has no grid
+    matrix: NdArray  #: float64, (4, 4): transforms points of the grid, in voxels, to the world
     name: str = ""
-    visible: bool = True
-    shown: bool = True  #: also considers its groups and layer
-    group: Optional[int] = None  #: an index into `Scene.groups`
-    layer: str = ""
+    visible: bool = True  #: the instance's own flag
+    shown: bool = True  #: false if the instance, one of its groups or a layer is hidden
+    group: Optional[int] = None  #: an index into `Scene.groups`; None: no group
+    layer: str = ""  #: the layer's name; empty: no layer
 
 
 class Group(NamedTuple):
     """A group of instances and other groups."""
 
     name: str
-    parent: Optional[int]  #: an index into `Scene.groups`
+    parent: Optional[int]  #: an index into `Scene.groups`; None: no parent
     shown: bool
-    layer: str
+    layer: str  #: the layer's name; empty: no layer
 
 
 class Layer(NamedTuple):
@@ -60,38 +60,38 @@ class Layer(NamedTuple):
 
 
 class Camera(NamedTuple):
-    """A camera of a file. The axes are perpendicular unit vectors: right is forward x up."""
+    """A camera of a scene. `right`, `up` and `forward` are perpendicular unit vectors; right is forward x up."""
 
-    position: Tuple[float, ...]
+    position: Tuple[float, ...]  #: x, y, z, in world units
     right: Tuple[float, ...]
     up: Tuple[float, ...]
     forward: Tuple[float, ...]
-    fov: float  #: perspective: vertical, in degrees
-    view_height: Optional[float] = None  #: orthographic: world units from the image's bottom edge to its top edge
-    focus_distance: float = 0.0  #: 0: not stored
-    number: int = 0
+    fov: float  #: vertical field of view of a perspective camera, in degrees
+    view_height: Optional[float] = None  #: image height of an orthographic camera, in world units; None: perspective
+    focus_distance: float = 0.0  #: in world units; 0: not stored
+    number: int = 0  #: number in the file
     first: bool = False  #: the initial camera
 
 
 class Lamp(NamedTuple):
-    """A light without geometry."""
+    """A light without geometry: a spot light if it has a direction, else a point light."""
 
     name: str
-    position: Tuple[float, ...]
-    direction: Optional[Tuple[float, ...]]  #: of a spot; None: shines equally in all directions
-    colour: Tuple[float, ...]  #: linear
-    intensity: float  #: light received by a white surface facing it at 1 world unit
-    range: float = float("inf")
-    inner_angle: float = 0.0  #: of a spot, in degrees from its axis
-    outer_angle: float = 45.0
+    position: Tuple[float, ...]  #: x, y, z, in world units
+    direction: Optional[Tuple[float, ...]]  #: axis of a spot light; None: a point light
+    colour: Tuple[float, ...]  #: linear RGB
+    intensity: float  #: light received by a white surface facing the lamp at a distance of 1 world unit
+    range: float = float("inf")  #: in world units
+    inner_angle: float = 0.0  #: of a spot light, in degrees from its axis
+    outer_angle: float = 45.0  #: of a spot light, in degrees from its axis
 
 
 class Sun(NamedTuple):
     """The sun of a scene, infinitely far away."""
 
-    direction: Tuple[float, ...]  #: from the scene towards the sun
-    brightness: float = 1.0  #: brightness of a white surface facing it; 0: no sun
-    colour: Tuple[float, ...] = (1.0, 1.0, 1.0)  #: linear
+    direction: Tuple[float, ...]  #: from the scene towards the sun; any non-zero length
+    brightness: float = 1.0  #: brightness of a white surface facing the sun; 0: no sun
+    colour: Tuple[float, ...] = (1.0, 1.0, 1.0)  #: linear RGB
     angle: float = 0.53  #: angular diameter, in degrees
 
 
@@ -99,20 +99,20 @@ class Format(NamedTuple):
     """A file format."""
 
     name: str
-    extensions: Tuple[str, ...]
+    extensions: Tuple[str, ...]  #: such as (".kv6", ".kvx")
     description: str
     readable: bool
     writable: bool
-    is_mesh: bool
+    is_mesh: bool  #: contains triangles
 
 
 class Hits(NamedTuple):
-    """Ray hits, one entry per ray. `t` is infinite if the ray hits nothing."""
+    """Ray hits, one entry per ray."""
 
-    t: NdArray
-    voxel: NdArray
-    type: NdArray
-    normal: NdArray
+    t: NdArray  #: float64, (n,): distance in multiples of the direction's length; infinity: no hit
+    voxel: NdArray  #: int32, (n, 3): the voxel, in its grid
+    type: NdArray  #: uint16, (n,): the voxel's type; 0: no hit
+    normal: NdArray  #: float64, (n, 3): in world space; 0: no hit
 
 
 def _struct_of(type: Union[VoxelType, Colour]) -> Any:
@@ -163,6 +163,7 @@ class Grid:
 
     @property
     def name(self) -> str:
+        """The grid's name."""
         return _c.text_of(self._info().name)
 
     @property
@@ -172,23 +173,27 @@ class Grid:
 
     @property
     def origin(self) -> Tuple[int, int, int]:
-        """The minimum corner of the tight box around its voxels."""
+        """The minimum corner of the tight box around the grid's voxels, or around its field's solid."""
         x, y, z = self._info().min
         return x, y, z
 
     @property
     def shape(self) -> Tuple[int, int, int]:
-        """The size of that box along x, y and z."""
+        """The size of the tight box along x, y and z, in voxels."""
         x, y, z = self._info().extent
         return x, y, z
 
     @property
     def has_field(self) -> bool:
-        """True if the grid has a density field, which has a smooth surface."""
+        """True if the grid has a density field: the smooth surface of a volume."""
         return bool(self._info().has_field)
 
     def to_numpy(self, origin: Optional[Sequence[int]] = None, shape: Optional[Sequence[int]] = None) -> NdArray:
-        """Returns voxel types as uint16 [x, y, z], of the given box or of the tight box around all voxels."""
+        """Copies the voxel types of a box to a new array: uint16, (nx, ny, nz), 0 is air.
+
+        `origin`, `shape`: three integers each, in the grid's voxels; default: the grid's `origin` and `shape`. Raises
+        TypeError if they are not integers, and ValueError if they are not three or a size is negative.
+        """
         info = self._info()
         at = [_c.whole(v, "origin") for v in (info.min if origin is None else origin)]
         extent = [_c.whole(v, "shape") for v in (info.extent if shape is None else shape)]
@@ -201,8 +206,11 @@ class Grid:
         return out
 
     def write(self, array: NdArray, origin: Optional[Sequence[float]] = None) -> None:
-        """Replaces the voxels of a box with an array [x, y, z] of types (uint8 or uint16, 0 is air). The box starts at
-        `origin`, by default where `to_numpy` starts. Saving a loaded file keeps its other contents.
+        """Replaces the voxels of a box. Saving a loaded file keeps its other contents.
+
+        `array`: uint8, uint16 or bool, (nx, ny, nz): types of the scene, 0 is air. `origin`: minimum corner of the
+        box, rounded down; default: the grid's `origin`. Raises TypeError for any other dtype, ValueError for a wrong
+        shape, and QuoinError if the scene lacks a type; then nothing changes.
 
         >>> scene = from_numpy(np.ones((2, 2, 2), np.uint8), [(255, 0, 0), (0, 0, 255)])
         >>> types = scene.grids[0].to_numpy()
@@ -215,10 +223,13 @@ class Grid:
         _c.check(_c.lib.quoin_grid_write(self._scene._owner.handle, self._number, ctypes.byref(given)))
 
     def mesh(self, smooth: bool = False, occlusion: bool = True, threads: int = 0, watertight: bool = False) -> Mesh:
-        """Meshes the grid: merged block faces, or a smooth surface.
+        """Meshes the grid as blocks with merged faces, or as a smooth surface. Positions are in the grid's voxels.
 
-        `watertight`: blocks only: adds corners to faces whose edges meet other faces' corners, which avoids visible
-        gaps. Faces may then have more than four vertices. Smooth surfaces are always watertight.
+        A block face has four vertices and two triangles; its vertices are consecutive in the mesh's arrays.
+
+        `smooth`: makes a smooth surface. `occlusion`: computes `Mesh.occlusion` of blocks. `watertight`: adds a vertex
+        where an edge of a block face meets a corner of another face. This avoids visible gaps, but faces may then have
+        more than four vertices. Smooth surfaces are always watertight.
         """
         options = _c.sized(_c.MeshOptions)
         options.smooth, options.no_occlusion = int(smooth), int(not occlusion)
@@ -234,7 +245,7 @@ class Grid:
 
 
 class Scene:
-    """Grids, types and instances. `load` and `from_numpy` create scenes; the constructor makes an empty one."""
+    """Grids, voxel types, instances, cameras and lights. `Scene()` is empty; `load` and `from_numpy` fill a scene."""
 
     def __init__(self, _owner: Optional[_c.Owner] = None) -> None:
         if _owner is None:
@@ -250,6 +261,7 @@ class Scene:
 
     @property
     def grids(self) -> List[Grid]:
+        """The grids, in order of their numbers."""
         return [Grid(self, i) for i in range(self._count(_c.lib.quoin_grid_count))]
 
     def _all(self, count: Any, get: Any, structure: Any, first: int = 0) -> Iterator[Any]:
@@ -270,24 +282,24 @@ class Scene:
 
     @property
     def bounds(self) -> Tuple[Tuple[float, ...], Tuple[float, ...]]:
-        """The bounds of everything visible, in world space: minimum and maximum corner."""
+        """The minimum and maximum corner of everything visible, in world space; all 0 if the scene is empty."""
         info = self._info()
         return tuple(info.min), tuple(info.max)
 
     @property
     def sun(self) -> Optional[Tuple[float, ...]]:
-        """The direction from the scene towards the sun; None if the file has no sun."""
+        """The direction from the scene towards the sun; None if the scene has no sun."""
         info = self._info()
         return tuple(info.sun) if info.has_sun else None
 
     @property
     def last_frame(self) -> int:
-        """The last frame of the file's animation; pass a frame to `load`."""
+        """The number of the animation's last frame. `load` shows the frame given as `frame`."""
         return int(self._info().last_frame)
 
     @property
     def instances(self) -> List[Instance]:
-        """The placements of grids.
+        """The placements of grids, in order of their numbers.
 
         >>> scene = from_numpy(np.ones((2, 2, 2), np.uint8), [(255, 0, 0)], "box")
         >>> scene.place(scene.grids[0], [[0, 0, 1, 5], [0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1]])
@@ -318,7 +330,7 @@ class Scene:
 
     @property
     def cameras(self) -> List[Camera]:
-        """The cameras of the file, and added ones."""
+        """The cameras of the loaded file and of `add_camera`."""
         return [Camera(tuple(one.position), tuple(one.right), tuple(one.up), tuple(one.forward),
                        one.vertical_fov_degrees, one.view_height if one.is_orthographic else None,
                        one.focus_distance, one.number, bool(one.is_first))
@@ -326,14 +338,14 @@ class Scene:
 
     @property
     def lamps(self) -> List[Lamp]:
-        """Lights without geometry. Types with emission are lights by themselves."""
+        """The lights without geometry. Voxel types with emission also emit light but are not listed here."""
         return [Lamp(_c.text_of(one.name), tuple(one.position), tuple(one.direction) if one.is_spot else None,
                      tuple(one.colour), one.intensity, one.range, one.inner_angle_degrees, one.outer_angle_degrees)
                 for one in self._all(_c.lib.quoin_lamp_count, _c.lib.quoin_lamp_get, _c.Lamp)]
 
     @property
     def sun_light(self) -> Optional[Sun]:
-        """The sun and its light, with defaults for properties that the file does not store; None: no sun."""
+        """The sun and its light; None if the scene has no sun. Properties that the file lacks have defaults."""
         one = _c.sized(_c.Sun)
         _c.check(_c.lib.quoin_sun_get(self._owner.handle, ctypes.byref(one)))
         if not one.brightness > 0.0:
@@ -342,19 +354,19 @@ class Scene:
 
     @property
     def types(self) -> List[VoxelType]:
-        """All types; the first is air."""
+        """All voxel types. Entry 0 is air."""
         return [VoxelType(tuple(one.rgba), _c.text_of(one.name), one.emission, one.metalness, one.roughness,
                           bool(one.transparent), one.ior, one.scattering, one.anisotropy)
                 for one in self._all(_c.lib.quoin_type_count, _c.lib.quoin_type_get, _c.Type)]
 
     @property
     def palette(self) -> NdArray:
-        """The types' colours, uint8 (types, 4): `palette[grid.to_numpy()]` gives the voxels' colours."""
+        """The types' sRGB colours: uint8, (types, 4). `palette[grid.to_numpy()]` is the colour of each voxel."""
         return np.array([one.rgba for one in self.types], np.uint8)
 
     @property
     def warnings(self) -> List[str]:
-        """Warnings: first from loading and voxelizing, then from the last save."""
+        """Warnings, one line each: first those of loading and voxelizing, then those of the last save."""
         text = ctypes.create_string_buffer(4096)
         found = []
         for i in range(self._count(_c.lib.quoin_scene_warning_count)):
@@ -363,22 +375,33 @@ class Scene:
         return found
 
     def add_type(self, type: Union[VoxelType, Colour]) -> int:
-        """Adds a type, or a colour of three or four bytes. Returns its number."""
+        """Adds a type, or a type with an sRGB colour of three or four integers, 0 to 255. Returns the type's number.
+
+        Raises ValueError or TypeError for an invalid colour, and QuoinError for other properties out of range.
+        """
         one = _struct_of(type)
         out = ctypes.c_uint16()
         _c.check(_c.lib.quoin_type_add(self._owner.handle, ctypes.byref(one), ctypes.byref(out)))
         return out.value
 
     def add(self, array: NdArray, origin: Sequence[float] = (0, 0, 0), name: str = "") -> Grid:
-        """Adds a grid from an array [x, y, z] of types (uint8 or uint16, 0 is air), without copying the array."""
+        """Adds a grid and places it at `origin`, rounded down to whole voxels. Returns the grid.
+
+        `array`: uint8, uint16 or bool, (nx, ny, nz): types of the scene, 0 is air. It may have any strides. Raises
+        TypeError for any other dtype, ValueError for a wrong shape, and QuoinError if the scene lacks a type.
+        """
         given = _c.types_of(array, origin)
         out = ctypes.c_size_t()
         _c.check(_c.lib.quoin_grid_add(self._owner.handle, ctypes.byref(given), _c.name_of(name), ctypes.byref(out)))
         return Grid(self, out.value)
 
     def place(self, grid: Grid, matrix: Any, name: Optional[str] = None, visible: bool = True) -> int:
-        """Adds an instance of a grid of this scene. Returns its number. `matrix`, (4, 4) or (3, 4), transforms voxels
-        to the world; it may rotate, mirror, translate and scale uniformly. The default name is the grid's."""
+        """Adds an instance of a grid and returns the instance's number.
+
+        `matrix`: (4, 4) or (3, 4), transforms points of the grid, in voxels, to the world. It may rotate, mirror,
+        translate and scale uniformly. `name`: default: the grid's name. Raises ValueError if the grid belongs to
+        another scene or the matrix has another shape, and QuoinError for any other transform.
+        """
         if grid._scene._owner is not self._owner:
             raise ValueError("the grid belongs to another scene")
         given = _instance_of(grid.number, matrix, grid.name if name is None else name, visible)
@@ -387,7 +410,8 @@ class Scene:
         return out.value
 
     def move(self, instance: int, matrix: Any, visible: Optional[bool] = None, name: Optional[str] = None) -> None:
-        """Moves, shows, hides or renames an instance."""
+        """Moves an instance. `instance`: an index into `instances`. `matrix`: as in `place`. `visible`, `name`: None
+        keeps the present value. Raises QuoinError if there is no such instance."""
         given = _c.sized(_c.Instance)
         instance = _c.size(instance, "instance")
         _c.check(_c.lib.quoin_instance_get(self._owner.handle, instance, ctypes.byref(given)))
@@ -412,7 +436,8 @@ class Scene:
         _c.check(_c.lib.quoin_layer_set(self._owner.handle, ctypes.byref(given)))
 
     def add_group(self, name: str, parent: Optional[int] = None, visible: bool = True, layer: str = "") -> int:
-        """Adds a group and returns its index. `parent` is an index into `groups`. The layer must exist."""
+        """Adds a group and returns its index in `groups`. `parent`: an index into `groups`; None: no parent. `layer`:
+        the name of an existing layer; empty: no layer."""
         given = _c.sized(_c.Group)
         given.name, given.layer, given.shown = _c.bytes_of(name), _c.bytes_of(layer), int(visible)
         given.parent = 0 if parent is None else _c.size(parent, "parent") + 1
@@ -421,7 +446,8 @@ class Scene:
         return out.value - 1
 
     def assign(self, instance: int, group: Optional[int] = None, layer: str = "") -> None:
-        """Assigns an instance to an existing group and layer. Its position does not change."""
+        """Assigns an instance to an existing group and layer; the defaults remove it from both. The instance does not
+        move. `instance`, `group`: indices into `instances` and `groups`."""
         given = _c.sized(_c.Instance)
         instance = _c.size(instance, "instance")
         _c.check(_c.lib.quoin_instance_get(self._owner.handle, instance, ctypes.byref(given)))
@@ -430,7 +456,9 @@ class Scene:
         _c.check(_c.lib.quoin_instance_set_layer(self._owner.handle, instance, _c.name_of(layer)))
 
     def add_camera(self, camera: Camera) -> None:
-        """Adds a camera with an unused number. .quoin and .vox store all cameras, .json only the initial one.
+        """Adds a camera. Raises QuoinError if its number is in use or its axes are invalid.
+
+        .quoin and .vox files store all cameras, .json files only the initial one.
 
         >>> scene = from_numpy(np.ones((2, 2, 2), np.uint8), [(255, 0, 0)])
         >>> scene.add_camera(Camera((0, 1, 9), (1, 0, 0), (0, 1, 0), (0, 0, -1), 40.0))
@@ -447,7 +475,7 @@ class Scene:
         _c.check(_c.lib.quoin_camera_add(self._owner.handle, ctypes.byref(one)))
 
     def add_lamp(self, lamp: Lamp) -> None:
-        """Adds a lamp. .quoin and .json store lamps."""
+        """Adds a lamp. Only .quoin and .json files store lamps. Raises QuoinError for values out of range."""
         one = _c.sized(_c.Lamp)
         one.name, one.position[:], one.colour[:] = _c.bytes_of(lamp.name), lamp.position, lamp.colour
         one.intensity, one.range = lamp.intensity, lamp.range
@@ -457,7 +485,8 @@ class Scene:
         _c.check(_c.lib.quoin_lamp_add(self._owner.handle, ctypes.byref(one)))
 
     def set_sun(self, sun: Sun) -> None:
-        """Sets the sun. .vox stores all its properties, .json and .quoin only the direction."""
+        """Sets the sun of the scene. .vox files store all its properties, .json and .quoin files only the direction.
+        `render` does not use it: pass `sun`. Raises QuoinError for values out of range."""
         one = _c.sized(_c.Sun)
         one.direction[:], one.colour[:] = sun.direction, sun.colour
         one.brightness, one.angle_degrees = sun.brightness, sun.angle
@@ -466,10 +495,17 @@ class Scene:
     def voxelize(self, positions: Any, triangles: Any, voxel_size: float = 1.0, *, colours: Any = None,
                  materials: Any = None, types: Sequence[Union[VoxelType, Colour]] = (), fill: str = "all",
                  name: str = "", max_types: int = 0, threads: int = 0) -> Grid:
-        """Voxelizes triangles (n, 3) with positions (m, 3) into a new grid and places it at their position, in units
-        of a voxel. `colours` (m, 4): linear light and alpha. `materials` (n,): indices into `types`. `fill`: "all",
-        "solid" for voxels whose centre is enclosed, or "surface". `max_types`: limit of added types; similar colours
-        are merged.
+        """Voxelizes triangles into a new grid and returns it. The cube with minimum corner `voxel_size` * (x, y, z)
+        becomes the world's voxel (x, y, z).
+
+        `positions`: (m, 3), converted to float32. `triangles`: (n, 3), rows of `positions`. `voxel_size`: edge length
+        of a voxel, in the unit of `positions`. `colours`: (m, 4), linear RGB and alpha; default white. `materials`:
+        (n,), indices into `types`; default 0. `types`: default one light grey type. `fill`: "all" for voxels that are
+        enclosed or touched by triangles, "solid" for voxels whose centre is enclosed, "surface" for touched voxels
+        only. `max_types`: maximum number of added types, by merging similar colours; 0: no limit.
+
+        Raises ValueError for wrong shapes or an unknown fill, TypeError if indices are not integers, and QuoinError for
+        invalid positions or indices.
 
         >>> corners = [[0, 0, 0], [8, 0, 0], [0, 8, 0], [0, 0, 8]]
         >>> Scene().voxelize(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], types=[(200, 0, 0)]).shape
@@ -503,15 +539,29 @@ class Scene:
         return Grid(self, out.value)
 
     def save(self, path: Path) -> None:
-        """Writes a file in the format of its extension: .vox, .json, .quoin; or meshes: .glb, .gltf, .obj, .ply."""
+        """Saves the scene in the format of the path's extension. Overwrites existing files, except .quoin.
+
+        .vox, .json, .quoin and others store voxels; .glb, .gltf, .obj, .ply, .stl and .3mf store blocky meshes.
+        `formats` lists all. Afterwards `warnings` names the features that the format does not support. Raises
+        QuoinError if the format is unknown or read-only, or if the file cannot be written.
+        """
         _c.check(_c.lib.quoin_scene_save(self._owner.handle, _c.path_of(path)))
 
     def render(self, width: int = 1280, height: int = 720, *, samples: int = 0, paths: bool = False,
                camera: Optional[Sequence[float]] = None, look_at: Optional[Sequence[float]] = None, fov: float = 45.0,
                sun: Optional[Sequence[float]] = None, out: Optional[NdArray] = None, threads: int = 0) -> NdArray:
-        """Renders an image, uint8 (height, width, 3), sRGB. The default camera shows the whole scene; a given camera
-        looks at (0, 0, 0) by default. `paths`: path tracing, slower, with indirect light and soft shadows. `sun`: from
-        the scene towards the sun, any length; the sky follows it. `out`: array to fill in place."""
+        """Renders an sRGB image and returns it: uint8, (height, width, 3), rows from the top.
+
+        `samples`: per pixel; 0: 4, or 64 for path tracing. `paths`: traces paths, which is slower and adds indirect
+        light and soft shadows. `camera`: position in the world; default: a camera that shows the whole scene.
+        `look_at`: point at the image's centre, default (0, 0, 0); needs `camera`. `fov`: vertical field of view of
+        `camera`, in degrees. `sun`: direction from the scene towards the sun, of any non-zero length; default
+        (-0.48, 0.72, 0.5). The sky follows the sun. `out`: a contiguous, writable array of the image's shape and dtype,
+        which is filled and returned.
+
+        Raises ValueError for a size that is not positive or an unsuitable `out`, and QuoinError for an invalid camera,
+        sun or number of samples.
+        """
         width, height = (_c.whole(v, "the image size") for v in (width, height))
         if width <= 0 or height <= 0:
             raise ValueError("width and height must be positive")
@@ -537,7 +587,11 @@ class Scene:
         return out
 
     def rays(self, origins: Any, directions: Any, max_t: float = np.inf) -> Hits:
-        """Returns the first hit of each ray (n, 3). The first call builds a tree, which is updated after changes.
+        """Finds the nearest voxel or surface along each ray.
+
+        `origins`, `directions`: (n, 3), in world space; directions of any length. `max_t`: maximum distance, in
+        multiples of the direction's length. The first call builds a tree, which the scene keeps and updates after
+        changes. Raises ValueError for wrong shapes. Rays with NaN hit nothing.
 
         >>> scene = from_numpy(np.ones((2, 2, 2), np.uint8), [(255, 0, 0)])
         >>> scene.rays([[0.5, 9, 0.5]], [[0, -1, 0]]).t
@@ -560,9 +614,10 @@ class Scene:
 
 
 class Raw:
-    """Describes a file of raw values: their number along each axis, the first axis fastest, and their type.
+    """Describes a file that contains only values, for `load`.
 
-    `dtype`: a NumPy type of any byte order: "uint8", ">i2", np.float32.
+    `shape`: number of values along each of three axes; the first axis varies fastest. `dtype`: a NumPy dtype of any
+    byte order: "uint8", ">i2", np.float32. Raises ValueError for other shapes, TypeError for unsupported dtypes.
     """
 
     def __init__(self, shape: Sequence[int], dtype: Any = "uint8") -> None:
@@ -574,12 +629,13 @@ class Raw:
 
 
 class Heights:
-    """Describes a height map, a PNG image.
+    """Describes a PNG image of heights, for `load`.
 
-    `encoding`: "grey", level times `metres_per_level`; "mapbox" or "terrarium", metres in red, green and blue.
-    `metres_per_pixel`: between neighbouring samples; default 1, with a warning. `metres_per_voxel`: default
-    `metres_per_pixel`. `ground_depth`: voxels of ground below the lowest height. `smooth`: makes a density field
-    instead of voxels.
+    `encoding`: "grey": the height is the grey level times `metres_per_level`; "mapbox": (65,536 R + 256 G + B) / 10 -
+    10,000 metres; "terrarium": 256 R + G + B / 256 - 32,768 metres. `metres_per_pixel`: distance between neighbouring
+    samples; default 1, with a warning. `metres_per_voxel`: edge length of a voxel; default `metres_per_pixel`.
+    `exaggeration`: factor on heights. `ground_depth`: voxels of ground below the lowest height. `smooth`: makes a
+    density field with a smooth surface instead of voxels. Raises ValueError for values out of range.
     """
 
     ENCODINGS = ("grey", "mapbox", "terrarium")
@@ -630,13 +686,21 @@ def load(path: Path, *, frame: int = 0, show_hidden: bool = False, radius: int =
          size: int = 0, voxel_size: float = 0.0, threads: int = 0, raw: Optional[Raw] = None,
          heights: Optional[Heights] = None, allow_outside_files: bool = False,
          dimension: Optional[str] = None) -> Scene:
-    """Loads a file of any readable format (`formats`), or a world's folder.
+    """Loads a file of any readable format (see `formats`), or the folder of a world.
 
-    `frame`: animation frame. `radius`: worlds: chunks of 64 voxels around the spawn point; 0 is 4. `iso`: threshold of
-    volumes. `size`, `voxel_size`: triangle files: voxels along the longest side, or the voxel size. `raw`, `heights`:
-    reads the file as raw values or as a height map. `allow_outside_files`: the file may name files outside its folder
-    (buffers, images, models); only for input from a trusted source. `dimension`: Minecraft worlds: "overworld",
-    "nether", "end" or "NAMESPACE:NAME"; default the overworld, or the first dimension if there is none.
+    Any file: `frame`: animation frame. `show_hidden`: shows hidden instances, groups and layers. `raw`: reads the file
+    as raw values. `heights`: reads the file as a height map. `allow_outside_files`: also opens files that the file
+    names outside its folder (buffers, images, models); only for input from a trusted source.
+
+    Worlds: `radius`: chunks of 64 voxels to load on each side of the spawn point; 0: 4. `dimension` (Minecraft):
+    "overworld", "nether", "end" or "NAMESPACE:NAME"; default: the overworld, or the first dimension if there is none.
+
+    Volumes: `iso`: values above it are solid; default: a threshold between the two groups of values.
+
+    Triangle files: `size`: voxels along the longest side; 0: 128. `voxel_size`: edge length of a voxel, in the file's
+    unit; replaces `size`.
+
+    Raises QuoinError if the file cannot be read.
 
     >>> load("nothing.vox")
     Traceback (most recent call last):
@@ -654,7 +718,9 @@ def load(path: Path, *, frame: int = 0, show_hidden: bool = False, radius: int =
 def load_bytes(data: Union[bytes, bytearray, memoryview], *, frame: int = 0, show_hidden: bool = False, radius: int = 0,
                iso: Optional[float] = None, size: int = 0, voxel_size: float = 0.0, threads: int = 0,
                raw: Optional[Raw] = None, heights: Optional[Heights] = None) -> Scene:
-    """Loads the contents of a file from bytes or any contiguous buffer, without copying.
+    """Loads the contents of a file from bytes or any contiguous buffer, which is read in place. Options: see `load`.
+
+    Raises QuoinError if the contents cannot be read, and TypeError if `data` is not a buffer.
 
     >>> values = np.arange(8, dtype=">u2").reshape(2, 2, 2)
     >>> load_bytes(values.tobytes(), raw=Raw((2, 2, 2), ">u2"), iso=3.5).grids[0].has_field
@@ -669,7 +735,12 @@ def load_bytes(data: Union[bytes, bytearray, memoryview], *, frame: int = 0, sho
 
 
 def from_numpy(array: NdArray, palette: Iterable[Union[VoxelType, Colour]], name: str = "") -> Scene:
-    """Creates a scene of one grid. In `array` [x, y, z], 0 is air and i is the i-th palette entry, counted from 1."""
+    """Creates a scene with one grid at the origin.
+
+    `array`: uint8, uint16 or bool, (nx, ny, nz): 0 is air, i is the i-th entry of the palette, counted from 1.
+    `palette`: voxel types, or sRGB colours of three or four integers, 0 to 255. Raises TypeError for any other dtype or
+    palette, ValueError for a wrong shape, and QuoinError if the palette is too short.
+    """
     scene = Scene()
     for one in palette:
         if not isinstance(one, Iterable):
@@ -680,7 +751,7 @@ def from_numpy(array: NdArray, palette: Iterable[Union[VoxelType, Colour]], name
 
 
 def formats() -> List[Format]:
-    """Returns the formats that can be read or written.
+    """Lists the formats that can be read or written.
 
     >>> [one.extensions for one in formats() if one.name == "vox"]
     [('.vox',)]
