@@ -1,7 +1,7 @@
 """Runs a notebook's cells as plain Python and stores their output in it. Usage: run_notebook.py NOTEBOOK.ipynb
 
-For notebooks of few means: what is printed, and the value of a cell's last line, as text or as its picture. The same
-cells give the same file, with nothing about the machine in it.
+Stores printed text and the value of each cell's last expression, as text or as a PNG image. Needs no Jupyter. The file
+depends only on the cells and their output, not on the machine.
 """
 
 import ast
@@ -13,7 +13,7 @@ import sys
 
 
 def outputs_of(source, names, count):
-    """Runs one cell."""
+    """Runs one cell and returns its outputs in notebook format."""
     tree = ast.parse(source)
     last = None
     if tree.body and isinstance(tree.body[-1], ast.Expr):
@@ -28,7 +28,7 @@ def outputs_of(source, names, count):
     if value is not None:
         data = {"text/plain": repr(value).splitlines(True)}
         if hasattr(value, "_repr_png_"):
-            data = {"image/png": base64.b64encode(value._repr_png_()).decode(), "text/plain": ["<a picture>"]}
+            data = {"image/png": base64.b64encode(value._repr_png_()).decode(), "text/plain": ["<an image>"]}
         outputs.append({"data": data, "execution_count": count, "metadata": {}, "output_type": "execute_result"})
     return outputs
 

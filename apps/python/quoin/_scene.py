@@ -539,7 +539,7 @@ class Scene:
         return Grid(self, out.value)
 
     def save(self, path: Path) -> None:
-        """Saves the scene in the format of the path's extension. Overwrites existing files, except .quoin.
+        """Saves the scene in the format of the path's extension. Replaces an existing file.
 
         .vox, .json, .quoin and others store voxels; .glb, .gltf, .obj, .ply, .stl and .3mf store blocky meshes.
         `formats` lists all. Afterwards `warnings` names the features that the format does not support. Raises
