@@ -1,15 +1,15 @@
 /* Quoin's C99 interface, for C and languages that call C: voxel files, arrays, meshes, images and rays.
  *
- * Status:   every function that can fail returns QUOIN_OK or an error code; quoin_last_error() then returns the reason,
- *           in one line. No call ends the process or throws an exception.
- * Handles:  scenes and meshes are numbers. A freed or unknown handle gives QUOIN_BAD_HANDLE. 0 is no object.
+ * Status:   every function that can fail returns QUOIN_OK or an error code. After an error, quoin_last_error() returns
+ *           the reason in one line. No call ends the process or throws an exception.
+ * Handles:  scenes and meshes are numbers, never 0. A freed or unknown handle gives QUOIN_BAD_HANDLE.
  * Arrays:   the caller owns its input and output arrays. Arrays from quoin_mesh_view belong to the mesh and are valid
  *           until it is freed.
  * Structs:  set `size` to sizeof the struct (QUOIN_INIT does). Later versions add fields at the end; programs compiled
  *           with an older header, whose structs are shorter, keep working.
- * Axes:     right-handed, +Y up; voxel (x, y, z) fills the cube from there to (x + 1, y + 1, z + 1).
- * Threads:  any thread may call. Any number of threads read a scene at once; a change or a save has exclusive access,
- *           and other calls wait. */
+ * Axes:     right-handed, +Y up. Voxel (x, y, z) is the cube from (x, y, z) to (x + 1, y + 1, z + 1).
+ * Threads:  any thread may call any function. Any number of threads can read a scene at the same time. A change or a
+ *           save has exclusive access: it waits for running calls, and later calls wait for it. */
 #ifndef QUOIN_C_H
 #define QUOIN_C_H
 /* NOLINTBEGIN(readability-*,modernize-*,performance-*,cppcoreguidelines-*): this is C */
@@ -27,8 +27,8 @@ extern "C" {
 #define QUOIN_API
 #endif
 
-/* An empty struct of `type`. Every number is 0, which means its default, with three exceptions: quoin_type alpha (0:
- * invisible), quoin_type roughness (0: a mirror) and quoin_instance visible (0: hidden). */
+/* Initialises a struct of `type`: sets `size`, and all other fields to 0, which means the default. Set three fields
+ * yourself: quoin_type alpha (0: invisible), quoin_type roughness (0: a mirror), quoin_instance visible (0: hidden). */
 #define QUOIN_INIT(type) \
   { .size = sizeof(type) }
 
@@ -78,7 +78,7 @@ typedef struct quoin_grid_info {
   size_t size;
   char name[128]; /* UTF-8, truncated if longer */
   int64_t voxels;
-  int32_t min[3]; /* of the tight box around its voxels or its field's solid */
+  int32_t min[3]; /* minimum corner of the tight box around the grid's voxels or its field's solid */
   int32_t extent[3];
   int32_t has_field; /* has a density field: the surface of a volume */
   double pivot[3];   /* centre of rotation for instances, in voxels */
@@ -91,7 +91,7 @@ typedef struct quoin_type {
   float metalness; /* 0 to 1 */
   float roughness; /* 0 to 1; QUOIN_INIT's 0 is a mirror */
   char name[128];
-  int32_t transparent; /* input 0: derived from rgba's alpha */
+  int32_t transparent; /* 1: transparent even if alpha is 255; input 0: transparent if alpha is below 255 */
   float ior;           /* index of refraction of transparent types; input 0: 1.5 */
   float scattering;    /* clouds: mean number of scatterings per voxel length; 0: glass */
   float anisotropy;    /* clouds: mean cosine of the scattering angle, -1 to 1 */
@@ -101,7 +101,7 @@ typedef struct quoin_type {
 typedef struct quoin_instance {
   size_t size;
   char name[128]; /* UTF-8, truncated if longer */
-  size_t grid;    /* grid number; equal to the grid count if it has no grid */
+  size_t grid;    /* grid number; equal to the grid count if the instance has no grid */
   /* Three rows of four: transforms a point (x, y, z, 1) from the grid, in voxels, to the world. */
   double world_from_grid[12];
   int32_t visible; /* the instance's own flag */
@@ -119,7 +119,7 @@ typedef struct quoin_group {
   char layer[128];
 } quoin_group;
 
-/* A camera of a file. right, up and forward are perpendicular unit vectors. */
+/* A camera of a scene. right, up and forward are perpendicular unit vectors. */
 typedef struct quoin_camera {
   size_t size;
   int32_t number;   /* number in the file */
@@ -132,15 +132,15 @@ typedef struct quoin_camera {
   double focus_distance;       /* 0: not stored */
 } quoin_camera;
 
-/* A light without geometry. Types with emission are lights by themselves. */
+/* A light without geometry. Voxel types with emission also emit light but are not lamps. */
 typedef struct quoin_lamp {
   size_t size;
   char name[128];
   int32_t is_spot; /* 0: shines equally in all directions */
   double position[3], direction[3];
-  float colour[3];                                 /* linear */
-  double intensity;                                /* light received by a white surface facing it at 1 world unit */
-  double range;                                    /* infinity: unlimited */
+  float colour[3];  /* linear */
+  double intensity; /* light received by a white surface facing the lamp, 1 world unit away */
+  double range;     /* infinity: unlimited */
   double inner_angle_degrees, outer_angle_degrees; /* of a spot, from its axis */
 } quoin_lamp;
 
@@ -187,7 +187,7 @@ typedef struct quoin_mesh_options {
   int32_t smooth;       /* 0: blocks; else smooth surfaces */
   int32_t no_occlusion; /* blocks only */
   int32_t threads;      /* 0: all */
-  int32_t reserved;     /* not read: padding of earlier versions */
+  int32_t reserved;     /* ignored; was padding in earlier versions */
   /* Blocks only: keeps face corners off the inside of other faces' edges. This avoids visible gaps but makes more
    * triangles. Smooth surfaces are always watertight. */
   int32_t watertight;
@@ -208,22 +208,22 @@ typedef struct quoin_load_options {
   int32_t frame;       /* animation frame */
   /* For worlds read by chunks: chunks (64 voxels) to load on each side of the spawn point; 0: 4. */
   int32_t radius;
-  int32_t has_iso; /* volumes: values above `iso` are solid; 0: automatic threshold */
+  int32_t has_iso; /* volumes: 1: values above `iso` are solid; 0: automatic threshold */
   float iso;
   int32_t mesh_voxels; /* triangle files: voxels along the longest side; 0: 128 */
   double voxel_size;   /* overrides mesh_voxels; in the file's unit */
-  /* Reads the file as raw values: their number along each axis, the first axis fastest. All 0: any other format. */
+  /* Number of raw values along each axis, the first axis fastest. All 0: the file is not a volume of raw values. */
   int32_t raw_shape[3];
   int32_t raw_scalar; /* quoin_scalar of the raw values */
   int32_t raw_big_endian;
-  int32_t heights;         /* quoin_heights: the file is a height map image (PNG) */
+  int32_t heights;         /* quoin_heights: encoding of a height map (PNG) */
   double metres_per_level; /* 0: 1 */
   double metres_per_pixel; /* between neighbouring samples; 0: 1, with a warning */
   double metres_per_voxel; /* 0: metres_per_pixel */
   double exaggeration;     /* factor on heights; 0: 1 */
   int32_t ground_depth;    /* voxels of ground below the lowest height, up to 4,096; 0: 8 */
   int32_t smooth_ground;   /* makes a density field with a smooth surface instead of voxels */
-  /* The file may name files outside its folder: only for input from a trusted source. */
+  /* 1: also opens files outside the file's folder that the file names. Only for input from a trusted source. */
   int32_t allow_outside_files;
   /* For Minecraft worlds: "overworld", "nether", "end" or "NAMESPACE:NAME". Null or "": the overworld, or the first
    * dimension if there is none. Other files ignore it. */
@@ -231,19 +231,19 @@ typedef struct quoin_load_options {
 } quoin_load_options;
 
 typedef enum quoin_fill {
-  QUOIN_FILL_ALL = 0,    /* enclosed voxels and voxels that triangles touch: keeps thin parts */
+  QUOIN_FILL_ALL = 0,    /* voxels that are enclosed or touched by triangles; keeps thin parts */
   QUOIN_FILL_SOLID = 1,  /* voxels whose centre is enclosed */
-  QUOIN_FILL_SURFACE = 2 /* voxels that triangles touch; hollow */
+  QUOIN_FILL_SURFACE = 2 /* voxels touched by triangles; the inside stays empty */
 } quoin_fill;
 
-/* Triangles to voxelise. Any triangle soup is valid. */
+/* Triangles to voxelise. They may be open, intersect each other or overlap. */
 typedef struct quoin_triangles {
   size_t size;
   size_t vertex_count, triangle_count;
   const float* positions;  /* [vertex_count][3] */
   const uint32_t* indices; /* [triangle_count][3], counter-clockwise seen from outside */
-  /* [vertex_count][4], linear light and alpha, multiplied by the material's; null: white. Alpha 0 is no surface; alpha
-   * below 1 makes transparent voxels. */
+  /* [vertex_count][4], linear light and alpha, multiplied by the material's; null: white. Alpha 0 makes no
+   * voxels; other alpha below 1 makes transparent voxels. */
   const float* colours;
   const uint32_t* materials; /* [triangle_count], indices into `types`; null: 0 */
   /* [type_count]; `size` is set in each element. Null: a single light grey type. */
@@ -255,8 +255,8 @@ typedef struct quoin_voxelize_options {
   size_t size;
   double voxel_size; /* in the unit of positions; 0: 1 */
   int32_t fill;      /* quoin_fill */
-  /* Maximum number of added types. Similar colours are merged, also between types that differ only in colour; 0: no
-   * limit. */
+  /* Maximum number of added types; 0: no limit. To meet it, similar colours are merged, also between types that differ
+   * only in colour. */
   int32_t max_types;
   int32_t threads;
 } quoin_voxelize_options;
@@ -265,7 +265,7 @@ typedef struct quoin_render_options {
   size_t size;
   int32_t width, height; /* 0: 1280 x 720 */
   int32_t samples;       /* per pixel; 0: 4, or 64 for path tracing */
-  int32_t paths;         /* 0: ray-cast lighting; else path tracing */
+  int32_t paths;         /* 0: ray casting; 1: path tracing */
   int32_t threads;       /* 0: all */
   int32_t has_camera;    /* 0: shows the whole scene from the front, right and above */
   double camera[3], look_at[3];
@@ -284,15 +284,15 @@ typedef struct quoin_hits {
   double* normal; /* [count][3], in world space */
 } quoin_hits;
 
-/* Progress callback, called with the finished fraction of a long call, 0 to 1. Return 0 to cancel the call with
- * QUOIN_CANCELLED. Quoin may call it from any thread, but never from
- * two at once. The callback must not call Quoin functions. */
+/* Progress callback: receives the finished fraction of a long call, 0 to 1. Return 0 to cancel the call, which then
+ * returns QUOIN_CANCELLED. Quoin may call it from any thread, but never from two threads at once. The callback must not
+ * call Quoin functions. */
 typedef int32_t (*quoin_progress)(double fraction, void* user);
 
 QUOIN_API const char* quoin_version(void);
 /* Returns the error of this thread's last failed call. Valid until this thread's next call. Never null. */
 QUOIN_API const char* quoin_last_error(void);
-/* Sets the progress callback for later calls of this thread; null removes it. `user` is passed through. */
+/* Sets the progress callback for later calls of this thread; null removes it. `user` is passed to the callback. */
 QUOIN_API quoin_status quoin_set_progress(quoin_progress progress, void* user);
 /* Frees a scene or a mesh; ignores 0. */
 QUOIN_API quoin_status quoin_free(uint64_t handle);
@@ -332,9 +332,8 @@ QUOIN_API quoin_status quoin_grid_read(quoin_scene scene, size_t grid, const int
  * array->origin, rounded down to whole voxels. `name` may be null. `out` receives the grid's number and may be null. */
 QUOIN_API quoin_status quoin_grid_add(quoin_scene scene, const quoin_array* array, const char* name, size_t* out);
 
-/* Voxelises triangles into a new grid and places it at their position, in units of a voxel: the cube with minimum
- * corner voxel_size * (x, y, z) becomes the world's voxel (x, y, z). Adds the types that it needs. `options`, `name`
- * and `out` may be null. */
+/* Voxelises triangles into a new grid and adds the required types to the scene. The cube with minimum corner
+ * voxel_size * (x, y, z) becomes the world's voxel (x, y, z). `options`, `name` and `out` may be null. */
 QUOIN_API quoin_status quoin_grid_voxelize(quoin_scene scene, const quoin_triangles* triangles,
                                            const quoin_voxelize_options* options, const char* name, size_t* out);
 
@@ -352,7 +351,7 @@ QUOIN_API quoin_status quoin_camera_get(quoin_scene scene, size_t index, quoin_c
 QUOIN_API quoin_status quoin_lamp_count(quoin_scene scene, size_t* out);
 QUOIN_API quoin_status quoin_lamp_get(quoin_scene scene, size_t index, quoin_lamp* out);
 
-/* Meshes; `options` may be null. Array functions do not copy their input. */
+/* Meshes. `options` may be null. quoin_surface_nets and quoin_mesh_labels read arrays in place. */
 QUOIN_API quoin_status quoin_grid_mesh(quoin_scene scene, size_t grid, const quoin_mesh_options* options,
                                        quoin_mesh* out);
 /* Meshes the surface where the array equals `iso`. solid_below: values below iso are solid, as in signed distances. */
@@ -376,11 +375,10 @@ QUOIN_API quoin_status quoin_scene_rays(quoin_scene scene, size_t count, const d
  * the types, nothing changes. */
 QUOIN_API quoin_status quoin_grid_write(quoin_scene scene, size_t grid, const quoin_array* array);
 
-/* Layers, cameras, lamps and the sun of a scene. The warnings of a save list content that the format does not support.
- */
+/* Layers, cameras, lamps and the sun of a scene. If a format does not support some of them, saving adds warnings. */
 
 /* A layer: instances and groups that are shown or hidden together, independent of the hierarchy. Layers are identified
- *          by name; of several with one name, the first is used. */
+ * by name. If several layers have the same name, the first is used. */
 typedef struct quoin_layer {
   size_t size;
   char name[128];
@@ -391,7 +389,7 @@ typedef struct quoin_layer {
 typedef struct quoin_sun {
   size_t size;
   double direction[3];  /* from the scene towards the sun; any non-zero length */
-  double brightness;    /* brightness of a white surface facing it; 0: no sun */
+  double brightness;    /* brightness of a white surface facing the sun; 0: no sun */
   float colour[3];      /* linear */
   double angle_degrees; /* angular diameter; 0: a point */
 } quoin_sun;
@@ -402,10 +400,10 @@ QUOIN_API quoin_status quoin_layer_get(quoin_scene scene, size_t index, quoin_la
 QUOIN_API quoin_status quoin_layer_set(quoin_scene scene, const quoin_layer* layer);
 /* Moves an instance to an existing layer; null or empty: no layer. */
 QUOIN_API quoin_status quoin_instance_set_layer(quoin_scene scene, size_t index, const char* layer);
-/* Adds a group; quoin_instance_set and _add assign instances to it. Here `shown` is the group's own flag, and
- * `layer` is an existing layer's name or empty. `out` receives the group's number and may be null. */
+/* Adds a group. Use quoin_instance_add or quoin_instance_set to put instances in it. `shown` is the group's own flag;
+ * `layer` is empty or the name of an existing layer. `out` receives the group's number and may be null. */
 QUOIN_API quoin_status quoin_group_add(quoin_scene scene, const quoin_group* group, size_t* out);
-/* Adds a camera with an unused number. right is forward x up. */
+/* Adds a camera. Its number must be unused, and `right` must be forward x up. */
 QUOIN_API quoin_status quoin_camera_add(quoin_scene scene, const quoin_camera* camera);
 /* Adds a lamp. A range of 0 is unlimited; an outer angle of 0 is 45 degrees. */
 QUOIN_API quoin_status quoin_lamp_add(quoin_scene scene, const quoin_lamp* lamp);

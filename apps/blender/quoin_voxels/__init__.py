@@ -1,6 +1,6 @@
 """Voxels in Blender: File > Import > Voxels (Quoin) and File > Export > Voxels (Quoin).
 
-Supports Blender 3.4 and 4; `versions.py` handles their differences.
+Supports Blender 3.4 and 4. `versions.py` handles their differences.
 """
 
 bl_info = {
@@ -76,24 +76,24 @@ class QUOIN_OT_import(bpy.types.Operator, ImportHelper):
         ("BLOCKS", "Blocks", "Cubes with merged faces"),
         ("SMOOTH", "Smooth", "A smooth triangle mesh around the voxels")])
     materials: EnumProperty(name="Materials", default="AUTO", items=[
-        ("AUTO", "Automatic", "One material per voxel type for files of up to 256 types; otherwise a palette"),
+        ("AUTO", "Automatic", "One material per voxel type for up to 256 types; otherwise a palette"),
         ("TYPES", "Per Type", "One material per voxel type"),
         ("PALETTE", "Palette", "One material that stores colours and surface properties in two small images")])
     occlusion: FloatProperty(name="Occlusion", default=0.0, min=0.0, max=1.0, subtype="FACTOR",
-                             description="Strength of the attribute Occlusion in the materials. To change it later, "
-                                         "edit the node group Quoin Occlusion")
-    keep_voxels: BoolProperty(name="Keep Voxels", default=True, description="Store the voxels in the .blend, so that "
-                              "export writes them unchanged, including inner voxels")
+                             description="How much the attribute Occlusion darkens the materials (0 to 1). To change it "
+                                         "later, edit the node group Quoin Occlusion")
+    keep_voxels: BoolProperty(name="Keep Voxels", default=True, description="Store the voxels in the .blend file, so "
+                              "that export writes them unchanged, including inner voxels")
     lights: BoolProperty(name="Cameras and Lights", default=True, description="Import cameras, lamps and the sun")
-    show_hidden: BoolProperty(name="Show Hidden", default=False, description="Show objects that the file hides")
+    show_hidden: BoolProperty(name="Show Hidden", default=False, description="Show objects that are hidden in the file")
     frame: IntProperty(name="Frame", default=0, min=0, description="Animation frame to import")
     radius: IntProperty(name="Radius", default=4, min=1, soft_max=32,
-                        description="Worlds: distance to import around the spawn point, in chunks of 64 voxels")
+                        description="Worlds: chunks of 64 voxels to import on each side of the spawn point")
     size: IntProperty(name="Size", default=128, min=1, max=16384,
-                      description="Triangle and print files: voxels along the longest side")
-    set_iso: BoolProperty(name="Threshold", default=False, description="Volumes: values above it are solid. Default: "
-                          "a value between the two groups of values")
-    iso: FloatProperty(name="Value", default=0.0)
+                      description="Triangle files: voxels along the longest side")
+    set_iso: BoolProperty(name="Threshold", default=False, description="Volumes: set the threshold. Default: "
+                          "a threshold between the two groups of values")
+    iso: FloatProperty(name="Value", default=0.0, description="Volumes: values above it are solid")
 
     def draw(self, context):
         layout = self.layout
@@ -140,17 +140,17 @@ class QUOIN_OT_export(bpy.types.Operator, ExportHelper):
     use_selection: BoolProperty(name="Selected Only", default=False,
                                 description="Export only selected objects. Default: all objects visible in renders")
     collections: EnumProperty(name="Collections", default="GROUPS", items=[
-        ("GROUPS", "As Groups", "A group for each collection with objects; the property `layer` assigns layers"),
+        ("GROUPS", "As Groups", "A group for each collection with objects. The custom property `layer` assigns layers"),
         ("LAYERS", "As Layers", "A layer for each top-level collection, and groups for the collections in it"),
-        ("NONE", "Not Written", "Only objects; the property `layer` assigns layers")])
-    hidden: BoolProperty(name="Hidden Voxels", default=True, description="Also export hidden imported objects, as "
-                         "hidden, if the format supports it")
-    lights: BoolProperty(name="Cameras and Lights", default=True, description="Export the sun, cameras and lamps that "
-                         "the format supports, with a warning about the others")
+        ("NONE", "Not Written", "No groups. The custom property `layer` assigns layers")])
+    hidden: BoolProperty(name="Hidden Voxels", default=True, description="Also export imported objects that are "
+                         "hidden, and keep them hidden if the format supports it")
+    lights: BoolProperty(name="Cameras and Lights", default=True, description="Export the sun, cameras and lamps. A "
+                         "warning lists those that the format does not support")
     fill: EnumProperty(name="Fill", default="all", items=[
-        ("all", "All", "Enclosed voxels and voxels that the mesh touches: keeps thin parts"),
+        ("all", "All", "Voxels that are enclosed or touched by the mesh; keeps thin parts"),
         ("solid", "Solid", "Voxels whose centre is enclosed"),
-        ("surface", "Hollow", "Voxels that the mesh touches")])
+        ("surface", "Hollow", "Voxels touched by the mesh; the inside stays empty")])
 
     def execute(self, context):
         path = self.filepath
