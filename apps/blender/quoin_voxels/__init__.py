@@ -80,8 +80,8 @@ class QUOIN_OT_import(bpy.types.Operator, ImportHelper):
         ("TYPES", "Per Type", "One material per voxel type"),
         ("PALETTE", "Palette", "One material that stores colours and surface properties in two small images")])
     occlusion: FloatProperty(name="Occlusion", default=0.0, min=0.0, max=1.0, subtype="FACTOR",
-                             description="How much the attribute Occlusion darkens the materials (0 to 1). To change it "
-                                         "later, edit the node group Quoin Occlusion")
+                             description="How much the attribute Occlusion darkens the materials (0 to 1). To change "
+                                         "it later, edit the node group Quoin Occlusion")
     keep_voxels: BoolProperty(name="Keep Voxels", default=True, description="Store the voxels in the .blend file, so "
                               "that export writes them unchanged, including inner voxels")
     lights: BoolProperty(name="Cameras and Lights", default=True, description="Import cameras, lamps and the sun")
