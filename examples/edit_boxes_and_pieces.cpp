@@ -80,7 +80,7 @@ int main() {
     world.fill_sphere({x, 5.0, 2.0}, 4.0, quoin::kAir);
     pieces.update(world);
     loose = 0;
-    for (const std::size_t piece : pieces.apart_from(ground)) {
+    for (const std::size_t piece : pieces.not_touching(ground)) {
       const quoin::Grid body = pieces.extract(piece);  // a separate grid for a falling instance
       std::printf("%lld voxels come loose\n", static_cast<long long>(body.voxel_count()));
       pieces.remove_from(world, piece);

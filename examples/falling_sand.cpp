@@ -35,7 +35,7 @@ struct Jar {
     std::vector<IVec3> found;
     const auto add = [&](IVec3 at) {
       found.push_back(at);
-      for (const IVec3 beside : kBeside) found.insert(found.end(), {at + beside, at + beside - kDown});
+      for (const IVec3 adjacent : kBeside) found.insert(found.end(), {at + adjacent, at + adjacent - kDown});
       found.push_back(at - kDown);
     };
     visit_changes(before, grid, grid.changes_since(types),
@@ -67,8 +67,8 @@ struct Jar {
   }
   void flow(IVec3 at) {
     pour(at, at + kDown, level(at));
-    for (const IVec3 beside : kBeside) {
-      if (level(at) > level(at + beside)) pour(at, at + beside, (level(at) - level(at + beside)) / 2);
+    for (const IVec3 adjacent : kBeside) {
+      if (level(at) > level(at + adjacent)) pour(at, at + adjacent, (level(at) - level(at + adjacent)) / 2);
     }
   }
   void pour(IVec3 from, IVec3 to, std::uint32_t wanted) {
@@ -114,7 +114,7 @@ int main(int argc, char** argv) {
   std::printf("at rest after %d steps, %u eighths of water\n", steps, eighths);
   scene.add_instance({.name = "jar", .grid = scene.add_grid({.name = "jar", .grid = std::move(jar.grid)})});
   const quoin::CpuRenderer renderer(scene);
-  const auto picture = renderer.render(quoin::frame_scene(scene, quoin::View::Iso, 4.0 / 3.0), {});
-  const bool is_written = picture && quoin::write_png(picture->colour, argc > 1 ? argv[1] : "falling_sand.png");
+  const auto image = renderer.render(quoin::frame_scene(scene, quoin::View::Iso, 4.0 / 3.0), {});
+  const bool is_written = image && quoin::write_png(image->colour, argc > 1 ? argv[1] : "falling_sand.png");
   return is_written && eighths == poured ? 0 : 1;
 }

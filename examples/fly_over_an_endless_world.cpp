@@ -17,13 +17,13 @@ quoin::Status draw(const quoin::Scene& scene, const quoin::Viewer& viewer, const
   const auto camera = quoin::look_along(viewer.position, viewer.direction, 1.1);
   if (!camera) return camera.error();
   const quoin::CpuRenderer renderer(scene);
-  const auto picture = renderer.render(*camera, options);
-  if (!picture) return picture.error();
-  const auto written = quoin::write_png(picture->colour, path);
+  const auto image = renderer.render(*camera, options);
+  if (!image) return image.error();
+  const auto written = quoin::write_png(image->colour, path);
   return written ? quoin::Status() : quoin::Status(written.error());
 }
 
-quoin::Status run(const std::string& path, const std::string& picture) {
+quoin::Status run(const std::string& path, const std::string& image) {
   quoin::StreamOptions options;
   options.budget_bytes = std::size_t{128} << 20;
   auto world = quoin::StreamedWorld::open_or_create(path, options);
@@ -51,7 +51,7 @@ quoin::Status run(const std::string& path, const std::string& picture) {
   }
   for (const std::string& problem : world->take_problems()) std::fprintf(stderr, "%s\n", problem.c_str());
   if (auto loaded = world->load_all({&player, 1}); !loaded) return loaded;
-  if (auto drawn = draw(world->scene(), player, picture); !drawn) return drawn;
+  if (auto drawn = draw(world->scene(), player, image); !drawn) return drawn;
   if (auto safe = world->flush(); !safe) return safe;
   const quoin::StreamStats stats = world->stats();
   std::printf("%lld voxels dug; %llu chunks generated, %llu loaded, %llu released; %zu in memory, %.1f MB\n",
@@ -66,11 +66,11 @@ quoin::Status run(const std::string& path, const std::string& picture) {
 
 int main(int argc, char** argv) {
   const std::string path = argc > 1 ? argv[1] : "endless.quoin";
-  const std::string picture = argc > 2 ? argv[2] : "endless.png";
+  const std::string image = argc > 2 ? argv[2] : "endless.png";
   if (argc <= 1) std::remove(path.c_str());
   quoin::return_freed_memory();  // so that resident memory also stays within the budget
   for (int day = 1; day <= 2; ++day) {
-    if (const auto flown = run(path, picture); !flown) {
+    if (const auto flown = run(path, image); !flown) {
       std::fprintf(stderr, "%s\n", quoin::to_string(flown.error()).c_str());
       return 1;
     }

@@ -8,7 +8,7 @@
 #include <thread>
 #include <vector>
 
-#include <quoin/io/picture_files.h>
+#include <quoin/io/image_files.h>
 #include <quoin/render/impostor_cache.h>
 
 namespace {
@@ -43,18 +43,18 @@ quoin::Result<quoin::GridHandle> add_rocket(quoin::Scene& scene) {
 }
 
 // Nine images per row; uncovered pixels stay grey.
-quoin::Image sheet_of(const std::vector<quoin::ImpostorPicture>& pictures) {
+quoin::Image sheet_of(const std::vector<quoin::ImpostorImage>& images) {
   constexpr int kAcross = 9;
-  const int rows = (static_cast<int>(pictures.size()) + kAcross - 1) / kAcross;
+  const int rows = (static_cast<int>(images.size()) + kAcross - 1) / kAcross;
   quoin::Image sheet{kAcross * kEdge, rows * kEdge, {}};
   sheet.rgb.assign(std::size_t{3} * static_cast<std::size_t>(sheet.width * sheet.height), 150);
-  for (int i = 0; i < static_cast<int>(pictures.size()); ++i) {
-    const quoin::ImpostorPicture& picture = pictures[static_cast<std::size_t>(i)];
+  for (int i = 0; i < static_cast<int>(images.size()); ++i) {
+    const quoin::ImpostorImage& image = images[static_cast<std::size_t>(i)];
     for (int texel = 0; texel < kEdge * kEdge; ++texel) {
-      if (picture.coverage[static_cast<std::size_t>(texel)] == 0) continue;
+      if (image.coverage[static_cast<std::size_t>(texel)] == 0) continue;
       const int x = i % kAcross * kEdge + texel % kEdge;
       const int y = i / kAcross * kEdge + texel / kEdge;
-      std::copy_n(picture.colour.rgb.begin() + 3 * texel, 3, sheet.rgb.begin() + 3 * (y * sheet.width + x));
+      std::copy_n(image.colour.rgb.begin() + 3 * texel, 3, sheet.rgb.begin() + 3 * (y * sheet.width + x));
     }
   }
   return sheet;
@@ -89,8 +89,8 @@ int main(int argc, char** argv) {
   const auto rocket = add_rocket(scene);
   if (!rocket) return 1;
   const quoin::ImpostorOptions options{kEdge};
-  const auto pictures = quoin::impostor_pictures(scene.grids()[*rocket].grid, scene.types, options);
-  const auto size = quoin::write_png(sheet_of(pictures), argc > 1 ? argv[1] : "impostors.png");
+  const auto images = quoin::impostor_images(scene.grids()[*rocket].grid, scene.types, options);
+  const auto size = quoin::write_png(sheet_of(images), argc > 1 ? argv[1] : "impostors.png");
   if (!size) std::fprintf(stderr, "impostors: %s\n", quoin::to_string(size.error()).c_str());
   return size && play(scene, *rocket) ? 0 : 1;
 }

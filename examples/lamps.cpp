@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <string>
 
-#include <quoin/io/picture_files.h>
+#include <quoin/io/image_files.h>
 #include <quoin/render/cpu_renderer.h>
 
 namespace {
@@ -85,10 +85,10 @@ int main(int argc, char** argv) {
   options.light.sky_brightness = 0.2;
   const auto camera = quoin::look_at({93.0, 24.0, 33.0}, {20.0, 17.0, 40.0}, 1.0);
   if (!camera) return 1;
-  const auto picture = quoin::CpuRenderer(scene).render(*camera, options);
-  if (!picture) return 1;
-  const auto size = quoin::write_png(picture->colour, argc > 1 ? argv[1] : "cave.png");
+  const auto image = quoin::CpuRenderer(scene).render(*camera, options);
+  if (!image) return 1;
+  const auto size = quoin::write_png(image->colour, argc > 1 ? argv[1] : "cave.png");
   if (!size) std::fprintf(stderr, "lamps: %s\n", quoin::to_string(size.error()).c_str());
-  std::printf("%lld rays, most of them to lamps\n", static_cast<long long>(picture->rays));
+  std::printf("%lld rays, most of them to lamps\n", static_cast<long long>(image->rays));
   return size ? 0 : 1;
 }

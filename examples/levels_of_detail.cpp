@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include <quoin/io/picture_files.h>
+#include <quoin/io/image_files.h>
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/scene/level_of_detail.h>
 
@@ -74,9 +74,9 @@ int main(int argc, char** argv) {
   quoin::Image both{options.width, 2 * options.height, {}};
   for (const bool in_colours : {false, true}) {
     options.detail.colours = in_colours;
-    const auto picture = renderer.render(*camera, options);
-    if (!picture) return 1;
-    both.rgb.insert(both.rgb.end(), picture->colour.rgb.begin(), picture->colour.rgb.end());
+    const auto image = renderer.render(*camera, options);
+    if (!image) return 1;
+    both.rgb.insert(both.rgb.end(), image->colour.rgb.begin(), image->colour.rgb.end());
   }
   const auto size = quoin::write_png(both, argc > 1 ? argv[1] : "levels_of_detail.png");
   if (!size) std::fprintf(stderr, "levels_of_detail: %s\n", quoin::to_string(size.error()).c_str());

@@ -7,7 +7,7 @@
 #include <string>
 #include <tuple>
 
-#include <quoin/io/picture_files.h>
+#include <quoin/io/image_files.h>
 #include <quoin/live/live_meshes.h>
 #include <quoin/render/cpu_renderer.h>
 
@@ -54,9 +54,9 @@ quoin::Status draw(const quoin::Scene& scene, const std::string& path) {
   options.height = 270;
   options.samples = 4;
   const quoin::Camera camera = quoin::frame_scene(scene, quoin::View::Iso, 480.0 / 270.0);
-  const auto picture = quoin::CpuRenderer(scene).render(camera, options);
-  if (!picture) return picture.error();
-  const auto size = quoin::write_png(picture->colour, path);
+  const auto image = quoin::CpuRenderer(scene).render(camera, options);
+  if (!image) return image.error();
+  const auto size = quoin::write_png(image->colour, path);
   return size ? quoin::Status() : size.error();
 }
 

@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <string>
 
-#include <quoin/io/picture_files.h>
+#include <quoin/io/image_files.h>
 #include <quoin/mesh/blocky.h>
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/scene/camera.h>
@@ -65,9 +65,9 @@ quoin::Status draw(const quoin::Scene& scene, quoin::Shading shading, const std:
   options.light.occlusion_mode = quoin::OcclusionMode::Vertex;
   const auto camera = quoin::look_at({44.0, 34.0, 50.0}, {9.0, 4.5, 10.5}, 0.42);
   if (!camera) return camera.error();
-  const auto picture = quoin::CpuRenderer(scene).render(*camera, options);
-  if (!picture) return picture.error();
-  const auto size = quoin::write_png(picture->colour, path);
+  const auto image = quoin::CpuRenderer(scene).render(*camera, options);
+  if (!image) return image.error();
+  const auto size = quoin::write_png(image->colour, path);
   return size ? quoin::Status() : size.error();
 }
 

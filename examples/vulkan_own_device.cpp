@@ -8,7 +8,7 @@
 
 #include <vulkan/vulkan.h>
 
-#include <quoin/io/picture_files.h>
+#include <quoin/io/image_files.h>
 #include <quoin/render_vk/vulkan_renderer.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/scene.h>
@@ -125,7 +125,7 @@ void make_buffer(Program& program) {
 }
 
 // Records the program's own commands: renders the image, then reads it.
-quoin::Status record(const Program& program, const quoin::VulkanPicture& picture, VkCommandBuffer commands) {
+quoin::Status record(const Program& program, const quoin::VulkanImage& rendered, VkCommandBuffer commands) {
   quoin::VulkanImageTarget target;
   target.image = program.image;
   target.format = VK_FORMAT_R8G8B8A8_SRGB;
@@ -133,7 +133,7 @@ quoin::Status record(const Program& program, const quoin::VulkanPicture& picture
   target.height = kHeight;
   target.layout_before = VK_IMAGE_LAYOUT_UNDEFINED;
   target.layout_after = VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL;
-  if (quoin::Status recorded = picture.record_copy(commands, target); !recorded) return recorded;
+  if (quoin::Status recorded = rendered.record_copy(commands, target); !recorded) return recorded;
   VkBufferImageCopy all{};
   all.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1};
   all.imageExtent = {kWidth, kHeight, 1};
@@ -145,7 +145,7 @@ quoin::Status record(const Program& program, const quoin::VulkanPicture& picture
   return {};
 }
 
-quoin::Status draw_frame(const Program& program, const quoin::VulkanPicture& picture) {
+quoin::Status draw_frame(const Program& program, const quoin::VulkanImage& image) {
   VkCommandPoolCreateInfo pool_info{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO, nullptr, 0, program.family};
   VkCommandPool pool = VK_NULL_HANDLE;
   require(vkCreateCommandPool(program.device, &pool_info, nullptr, &pool), "a command pool");
@@ -156,7 +156,7 @@ quoin::Status draw_frame(const Program& program, const quoin::VulkanPicture& pic
   VkCommandBufferBeginInfo begin{};
   begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
   require(vkBeginCommandBuffer(commands, &begin), "commands");
-  if (quoin::Status recorded = record(program, picture, commands); !recorded) return recorded;
+  if (quoin::Status recorded = record(program, image, commands); !recorded) return recorded;
   require(vkEndCommandBuffer(commands), "commands");
   VkSubmitInfo submit{};
   submit.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO;
@@ -196,14 +196,14 @@ quoin::Status run(const Program& program, const std::string& path) {
   const auto scene = make_tower();
   if (!scene) return scene.error();
   if (quoin::Status updated = renderer->update(*scene); !updated) return updated;
-  quoin::VulkanPicture picture(*renderer);
+  quoin::VulkanImage rendered(*renderer);
   quoin::RenderOptions options;
   options.width = kWidth;
   options.height = kHeight;
   options.samples = 4;
   const quoin::Camera camera = quoin::frame_scene(*scene, quoin::View::Iso, double{kWidth} / kHeight);
-  quoin::Status done = renderer->draw(picture, camera, options, quoin::Accumulation::Restart);
-  if (done) done = draw_frame(program, picture);
+  quoin::Status done = renderer->draw(rendered, camera, options, quoin::Accumulation::Restart);
+  if (done) done = draw_frame(program, rendered);
   if (!done) return done;
   quoin::Image image{kWidth, kHeight, {}};
   for (int i = 0; i < kWidth * kHeight; ++i) {

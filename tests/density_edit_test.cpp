@@ -97,15 +97,15 @@ TEST(DensityEdits, ReportsEveryMeshChange) {
     int changed = 0;
     for (int round = 0; round < 8; ++round) {
       edit_somewhere(grid, random);
-      std::set<Place> told;
-      for (const IVec3 at : follower.take(grid, reach_of(options.occlusion))) told.emplace(at.x, at.y, at.z);
+      std::set<Place> reported;
+      for (const IVec3 at : follower.take(grid, reach_of(options.occlusion))) reported.emplace(at.x, at.y, at.z);
       std::map<Place, std::string> after = meshes.all(grid);
       for (const auto& [at, bytes] : after) before.try_emplace(at);
       for (const auto& [at, bytes] : before) {
         const auto now = after.find(at);
         if ((now == after.end() ? std::string() : now->second) == bytes) continue;
         ++changed;
-        EXPECT_TRUE(told.contains(at)) << std::get<0>(at) << ' ' << std::get<1>(at) << ' ' << std::get<2>(at);
+        EXPECT_TRUE(reported.contains(at)) << std::get<0>(at) << ' ' << std::get<1>(at) << ' ' << std::get<2>(at);
       }
       before = std::move(after);
     }

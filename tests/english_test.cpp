@@ -125,7 +125,7 @@ class Prose {
 };
 
 /// Returns the reason why a line is hard to read, or "".
-std::string fault_of(const std::string& line, Prose& prose) {
+std::string find_error(const std::string& line, Prose& prose) {
   const std::string text = prose.of_line(line);
   if (const std::string phrase = hard_phrase(words_of(text)); !phrase.empty()) return phrase;
   const std::size_t begin = line.find_first_not_of(' ');
@@ -181,7 +181,7 @@ Counted count_all() {
     int number = 0;
     for (std::string line; std::getline(file, line);) {
       ++number;
-      const std::string fault = fault_of(line, prose);
+      const std::string fault = find_error(line, prose);
       if (fault.empty()) continue;
       if (out.lines[name]++ == 0) out.example[name] = "line " + std::to_string(number) + " (" + fault + "): " + line;
     }
@@ -230,7 +230,7 @@ TEST(English, NoFileHasMoreHardPhrasesThanBefore) {
 TEST(English, FindsHardPhrases) {
   const auto found = [](Kind kind, const std::string& line) {
     Prose prose(kind);
-    return fault_of(line, prose);
+    return find_error(line, prose);
   };
   EXPECT_EQ(found(Kind::Code, "  /// Whether the grid is empty."), "comment opens with whether");
   EXPECT_EQ(found(Kind::Code, "  // Keeps what is there."), "what is");

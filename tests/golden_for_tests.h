@@ -9,12 +9,12 @@
 #include <string>
 
 #include <quoin/core/image.h>
-#include <quoin/io/picture_files.h>
+#include <quoin/io/image_files.h>
 
 /// Compares images with golden images.
 namespace quoin {
 
-struct PictureDifference {
+struct ImageDifference {
   std::int64_t pixels = 0;  /// pixels that differ in any channel
   int greatest = 0;         /// the greatest difference of any channel
   /// Black where the images agree; elsewhere the difference of each channel, from a quarter of full brightness upwards
@@ -23,8 +23,8 @@ struct PictureDifference {
 };
 
 /// Requires: both images have the same size.
-inline PictureDifference difference_of(const Image& a, const Image& b) {
-  PictureDifference difference{0, 0, {a.width, a.height, std::vector<std::uint8_t>(a.rgb.size())}};
+inline ImageDifference difference_of(const Image& a, const Image& b) {
+  ImageDifference difference{0, 0, {a.width, a.height, std::vector<std::uint8_t>(a.rgb.size())}};
   for (std::size_t pixel = 0; pixel < a.rgb.size(); pixel += 3) {
     int most = 0;
     for (std::size_t i = pixel; i < pixel + 3; ++i) {
@@ -65,7 +65,7 @@ inline ::testing::AssertionResult is_golden(const Image& actual, const std::stri
   if (golden->width != actual.width || golden->height != actual.height) {
     return ::testing::AssertionFailure() << name << " has another size\nactual: " << actual_path << hint;
   }
-  const PictureDifference difference = difference_of(actual, *golden);
+  const ImageDifference difference = difference_of(actual, *golden);
   const bool written = write_png(difference.image, difference_path).has_value();
   return ::testing::AssertionFailure() << name << ": " << difference.pixels << " of " << actual.rgb.size() / 3
                                        << " pixels differ, by up to " << difference.greatest << "\ngolden:     " << path

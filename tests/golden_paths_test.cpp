@@ -46,8 +46,8 @@ PathOptions options_of(const PathView& view) {
 Image taken(const PathView& view, const PathOptions& options, Threads threads = {}) {
   const Scene scene = view.is_town ? render_test::town() : terrain_scene();
   const Camera camera = view.is_town ? render_test::of_town() : camera_for(kViews[1]);
-  const auto picture = PathTracer(scene).render(camera, options, threads);
-  return develop(picture.value(), {view.exposure, ToneCurve::Neutral}).value();
+  const auto image = PathTracer(scene).render(camera, options, threads);
+  return develop(image.value(), {view.exposure, ToneCurve::Neutral}).value();
 }
 
 class GoldenPaths : public ::testing::TestWithParam<PathView> {};

@@ -35,12 +35,12 @@ Scene scene_without_neighbours() {
   return scene_of(std::move(types), std::move(grid));
 }
 
-Picture render(const Scene& scene, const GoldenView& view, const RenderOptions& options, Threads threads = {}) {
+RenderedImage render(const Scene& scene, const GoldenView& view, const RenderOptions& options, Threads threads = {}) {
   return CpuRenderer(scene).render(camera_for(view), options, threads).value();
 }
 
 /// Returns the number of pixels in which the twin differs from the golden image.
-std::int64_t wrong_pixels(const Picture& twin, const GoldenView& view) {
+std::int64_t wrong_pixels(const RenderedImage& twin, const GoldenView& view) {
   const auto golden = read_png(golden_folders().golden / (std::string(view.name) + ".png"));
   if (!golden || golden->rgb.size() != twin.colour.rgb.size()) {
     ADD_FAILURE() << "no golden picture of this size";
@@ -51,23 +51,23 @@ std::int64_t wrong_pixels(const Picture& twin, const GoldenView& view) {
 
 class Golden : public ::testing::TestWithParam<GoldenView> {};
 
-TEST_P(Golden, PictureIsTheGoldenOne) {
+TEST_P(Golden, ImageIsTheGoldenOne) {
   const GoldenView& view = GetParam();
-  const Picture picture = render(terrain_scene(), view, options_for(view));
+  const RenderedImage image = render(terrain_scene(), view, options_for(view));
   if (const char* accept = std::getenv("QUOIN_ACCEPT_GOLDEN"); accept != nullptr && std::string(accept) == "1") {
     const auto path = golden_folders().golden / (std::string(view.name) + ".png");
-    ASSERT_TRUE(write_png(picture.colour, path)) << path;
+    ASSERT_TRUE(write_png(image.colour, path)) << path;
   }
-  EXPECT_TRUE(is_golden(picture.colour, view.name, golden_folders()));
+  EXPECT_TRUE(is_golden(image.colour, view.name, golden_folders()));
 }
 
 TEST_P(Golden, PictureIsTheSameWithPlainInstructionsAndOneThread) {
   const GoldenView& view = GetParam();
   const Scene scene = terrain_scene();
   const RenderOptions options = options_for(view);
-  const Picture usual = render(scene, view, options);
+  const RenderedImage usual = render(scene, view, options);
   const InstructionSetOverride over(InstructionSet::Plain);
-  const Picture plain = render(scene, view, options, {1});
+  const RenderedImage plain = render(scene, view, options, {1});
   EXPECT_EQ(difference_of(plain.colour, usual.colour).pixels, 0);
   EXPECT_TRUE(plain.depth.values == usual.depth.values);
 }
@@ -94,8 +94,8 @@ TEST(GoldenTwin, AoViewFailsWithoutOcclusion) {
 TEST(GoldenTwin, BoundaryViewFailsWithoutTheNeighbour) {
   const GoldenView& view = view_called("boundary");
   const RenderOptions options = options_for(view);
-  const Picture whole = render(terrain_scene(), view, options);
-  const Picture halved = render(scene_without_neighbours(), view, options);
+  const RenderedImage whole = render(terrain_scene(), view, options);
+  const RenderedImage halved = render(scene_without_neighbours(), view, options);
   EXPECT_GT(wrong_pixels(halved, view), kPixels / 3) << "of " << kPixels;
   // The remaining half changes too: the missing half no longer blocks light across the border.
   int same_place = 0;
@@ -135,11 +135,11 @@ TEST(GoldenComparer, NothingToCompareWithIsAFailure) {
   const TestFolder folder("golden_nothing");
   const GoldenFolders folders{folder.file("golden"), folder.file("failures")};
   std::filesystem::create_directories(folders.golden);
-  const Image picture{2, 1, {10, 20, 30, 40, 50, 60}};
-  EXPECT_FALSE(is_golden(picture, "a", folders)) << "no golden picture";
+  const Image image{2, 1, {10, 20, 30, 40, 50, 60}};
+  EXPECT_FALSE(is_golden(image, "a", folders)) << "no golden picture";
   EXPECT_TRUE(std::filesystem::exists(folders.failures / "a.actual.png"));
-  ASSERT_TRUE(write_png(Image{1, 2, picture.rgb}, folders.golden / "a.png"));
-  EXPECT_FALSE(is_golden(picture, "a", folders)) << "as many pixels, but another size";
+  ASSERT_TRUE(write_png(Image{1, 2, image.rgb}, folders.golden / "a.png"));
+  EXPECT_FALSE(is_golden(image, "a", folders)) << "as many pixels, but another size";
 }
 
 }  // namespace

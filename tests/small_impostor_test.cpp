@@ -148,9 +148,9 @@ Camera camera_at(const SmallModel& model, DVec3 direction, double pixels, int si
 }
 
 Image taken_by(const CpuRenderer& renderer, const Camera& camera, const RenderOptions& options) {
-  auto picture = renderer.render(camera, options);
-  EXPECT_TRUE(picture.has_value());
-  return picture ? std::move(picture->colour) : Image{};
+  auto image = renderer.render(camera, options);
+  EXPECT_TRUE(image.has_value());
+  return image ? std::move(image->colour) : Image{};
 }
 
 RenderOptions all_far(RenderOptions options) {

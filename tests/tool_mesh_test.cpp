@@ -44,9 +44,9 @@ TEST_F(ToolMesh, BecomesVoxelsOfAnySize) {
   EXPECT_EQ(converted("a.json --size 40 --solid")["voxels"], 40 * 20 * 20);
   EXPECT_EQ(converted("b.json --voxel 0.1 --solid")["voxels"], 20 * 10 * 10);
   EXPECT_EQ(converted("c.json --size 40")["warnings"].size(), 0U);
-  const Json told = converted("d.json");
-  ASSERT_EQ(told["warnings"].size(), 1U);
-  EXPECT_NE(told["warnings"][0].get<std::string>().find("128 voxels"), std::string::npos);
+  const Json reported = converted("d.json");
+  ASSERT_EQ(reported["warnings"].size(), 1U);
+  EXPECT_NE(reported["warnings"][0].get<std::string>().find("128 voxels"), std::string::npos);
   const Json thin = converted("e.json --size 40 --surface");
   const Json thick = converted("f.json --size 40 --surface --separating 26");
   EXPECT_LE(thin["voxels"], thick["voxels"]);

@@ -77,9 +77,9 @@ TEST_F(ToolMinecraft, CountsAThousandMillionBlocksInLittleMemory) {
   GTEST_SKIP() << "sanitizers take more addresses than the limit";
 #endif
   write_large_schematic(folder_.file("large.schem"));
-  const ToolRun told = shell("ulimit -v 400000; '" QUOIN_TOOL "' info large.schem --json --threads 1");
-  ASSERT_EQ(told.status, 0) << told.err;
-  const auto info = nlohmann::json::parse(told.out);
+  const ToolRun reported = shell("ulimit -v 400000; '" QUOIN_TOOL "' info large.schem --json --threads 1");
+  ASSERT_EQ(reported.status, 0) << reported.err;
+  const auto info = nlohmann::json::parse(reported.out);
   EXPECT_EQ(info["voxels"], std::int64_t{kEdge} * kEdge * (kStoneLayers + kMixedLayers));
   EXPECT_EQ(info["types"], kMixedTypes);
   EXPECT_EQ(info["grids"][0]["size"], nlohmann::json({kEdge, kEdge, kEdge}));

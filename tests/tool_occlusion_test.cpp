@@ -6,7 +6,7 @@
 #include <utility>
 
 #include <quoin/io/formats.h>
-#include <quoin/io/picture_files.h>
+#include <quoin/io/image_files.h>
 
 #include "io/image/png.h"
 #include "tests/tool_for_tests.h"

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include <quoin/io/file.h>
-#include <quoin/io/picture_files.h>
+#include <quoin/io/image_files.h>
 #include <quoin/render_vk/vulkan_renderer.h>
 
 #include "io/image/decode.h"
@@ -43,7 +43,7 @@ DVec3 triple(const Json& json) {
   return {json[0].get<double>(), json[1].get<double>(), json[2].get<double>()};
 }
 
-TEST_F(ToolRender, ItWritesAPictureOfTheSizeAskedForAndSaysSo) {
+TEST_F(ToolRender, ItWritesAImageOfTheSizeAskedForAndSaysSo) {
   const Json said = drawn("tiny.vox -o out.png --size 64x48 --threads 2");
   EXPECT_EQ(said["size"], Json({64, 48}));
   EXPECT_GT(said["rays"], 64 * 48);
@@ -57,10 +57,10 @@ TEST_F(ToolRender, ItWritesAPictureOfTheSizeAskedForAndSaysSo) {
   EXPECT_EQ(said["bytes"], std::filesystem::file_size(folder_.file("out.png")));
   for (const char* key : {"read", "build", "trace"}) EXPECT_GE(said["seconds"][key], 0.0);
   EXPECT_EQ(said["warnings"], Json::array());
-  const auto picture = read_png(folder_.file("out.png"));
-  ASSERT_TRUE(picture);
-  EXPECT_EQ(picture->width, 64);
-  EXPECT_EQ(picture->height, 48);
+  const auto image = read_png(folder_.file("out.png"));
+  ASSERT_TRUE(image);
+  EXPECT_EQ(image->width, 64);
+  EXPECT_EQ(image->height, 48);
   const ToolRun text = run("render tiny.vox -o out.png");
   EXPECT_EQ(text.status, 0) << text.err;
   EXPECT_NE(text.out.find("Image: 1280 x 720, "), std::string::npos) << text.out;
@@ -167,7 +167,7 @@ TEST_F(ToolRender, NegativeNumbersAreNoOptions) {
   EXPECT_EQ(camera["fov"], 45.0);
 }
 
-TEST_F(ToolRender, EveryOptionChangesThePicture) {
+TEST_F(ToolRender, EveryOptionChangesTheImage) {
   std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(8);
   const std::string base = "many.vox -o out.png --size 64x48";
   drawn(base);
@@ -217,7 +217,7 @@ TEST_F(ToolRender, EveryOptionChangesThePicture) {
   EXPECT_EQ(bytes("out.png"), plain) << "these are the defaults";
 }
 
-TEST_F(ToolRender, EveryOptionOfPathsChangesThePicture) {
+TEST_F(ToolRender, EveryOptionOfPathsChangesTheImage) {
   std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(8);
   const std::string base = "many.vox -o out.png --size 64x48 --light path --samples 4";
   drawn(base);
@@ -329,7 +329,7 @@ TEST_F(ToolRender, FileSettingsApplyWithoutOptions) {
   EXPECT_GT(corner()[1], 150);
 }
 
-TEST_F(ToolRender, FilmsInOneFileAreMadeOfPictures) {
+TEST_F(ToolRender, FilmsInOneFileAreMadeOfImages) {
   std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(2);
   for (const std::string wrong :
        {"-o film.mp4", "-o film.mp4 --turntable 2 --light path --transparent", "-o film.png --turntable 2 --fps 12",
@@ -374,7 +374,7 @@ TEST_F(ToolRender, PathsTakeASkyFromAFileAndGiveLinearLight) {
   drawn("many.vox -o again.png --size 32x24 --light path --samples 2 --sky out.exr --sky-turn 90");
 }
 
-TEST_F(ToolRender, TheNameSaysWhatKindOfPictureItIs) {
+TEST_F(ToolRender, TheNameSaysWhatKindOfImageItIs) {
   std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(4);
   if (has_jpeg()) {
     drawn("many.vox -o out.JPG --size 64x48");
@@ -493,22 +493,22 @@ TEST_F(ToolRender, ThumbnailsAreSmallAndClearWhereNothingIs) {
 TEST_F(ToolRender, FieldsShowTheirDensitiesAndTheOcclusionOfTheirMeshes) {
   ASSERT_EQ(run("generate smooth-terrain hills.json --chunks 2x1x2").status, 0);
   const std::string base = "hills.json -o out.png --size 64x48 --preset ";
-  const auto picture = [&](const std::string& flags) {
+  const auto image = [&](const std::string& flags) {
     drawn(base + flags);
     return bytes("out.png");
   };
-  const std::string smooth = picture("ao --ao smooth");
-  EXPECT_NE(smooth, picture("ao"));
-  EXPECT_EQ(smooth, picture("ao --ao smooth --ao-form soft-share --ao-spread 2"));
+  const std::string smooth = image("ao --ao smooth");
+  EXPECT_NE(smooth, image("ao"));
+  EXPECT_EQ(smooth, image("ao --ao smooth --ao-form soft-share --ao-spread 2"));
   for (const std::string flags : {"--ao-form none", "--ao-form share", "--ao-spread 4", "--ao-form weighted",
                                   "--ao-form weighted-published --ao-offset 0.2", "--ao-form weighted --ao-power 5"}) {
-    EXPECT_NE(picture("ao --ao smooth " + flags), smooth) << flags;
+    EXPECT_NE(image("ao --ao smooth " + flags), smooth) << flags;
   }
-  EXPECT_NE(picture("full --ao smooth"), picture("full"));
-  const std::string middle = picture("density");
-  EXPECT_EQ(picture("density --slice y:0.5 --threads 2"), middle);
-  EXPECT_NE(picture("density --slice y:0.9"), middle);
-  EXPECT_NE(picture("density --slice x:0.5"), picture("density --slice z:0.5"));
+  EXPECT_NE(image("full --ao smooth"), image("full"));
+  const std::string middle = image("density");
+  EXPECT_EQ(image("density --slice y:0.5 --threads 2"), middle);
+  EXPECT_NE(image("density --slice y:0.9"), middle);
+  EXPECT_NE(image("density --slice x:0.5"), image("density --slice z:0.5"));
   const Json said = drawn(base + "density --slice z:0.25");
   EXPECT_EQ(said["camera"], nullptr);
   EXPECT_EQ(said["slice"]["axis"], "z");
@@ -519,7 +519,7 @@ TEST_F(ToolRender, FieldsShowTheirDensitiesAndTheOcclusionOfTheirMeshes) {
   EXPECT_FALSE(exists("out2.png"));
 }
 
-TEST_F(ToolRender, APictureOfTheSkyComesWithAWarning) {
+TEST_F(ToolRender, AImageOfTheSkyComesWithAWarning) {
   std::ofstream(folder_.file("none.vox"), std::ios::binary) << vox_file({1, 1, 1}, "");
   EXPECT_EQ(drawn("none.vox -o a.png --size 9x9")["warnings"], Json({"nothing visible; the image shows only sky"}));
   EXPECT_TRUE(exists("a.png"));
@@ -686,7 +686,7 @@ TEST_F(ToolRender, AFullDiskLeavesNoFile) {
 /// A separate suite, since drivers keep memory that sanitizers report as leaks.
 class VulkanTool : public ToolRender {};
 
-TEST_F(VulkanTool, ADeviceDrawsTheSamePicture) {
+TEST_F(VulkanTool, ADeviceDrawsTheSameImage) {
   const auto devices = vulkan_devices();
   const ToolRun result = run("render tiny.vox -o device.png --size 160x120 --backend vulkan --json --depth d.pfm");
   if (!devices) {

@@ -179,11 +179,11 @@ TEST_F(ToolSmooth, OcclusionHasTheFormAndThePlaceThatAreAskedFor) {
         "--ao-form weighted --ao-offset 0.1", "--ao-form weighted --ao-power 4"}) {
     EXPECT_NE(glb(flags), plain) << flags;
   }
-  const ParsedGlb apart = parse_glb(glb("--ao-attribute"));
-  const auto& attributes = apart.document["meshes"][0]["primitives"][0]["attributes"];
-  const auto open = apart.array<float>(attributes["_AO"]);
+  const ParsedGlb separate = parse_glb(glb("--ao-attribute"));
+  const auto& attributes = separate.document["meshes"][0]["primitives"][0]["attributes"];
+  const auto open = separate.array<float>(attributes["_AO"]);
   EXPECT_LT(*std::ranges::min_element(open), 0.8F);
-  for (const auto& colour : apart.array<LinearRgba16>(attributes["COLOR_0"])) {
+  for (const auto& colour : separate.array<LinearRgba16>(attributes["COLOR_0"])) {
     ASSERT_NEAR(colour[0] / 65535.0, 0.6038, 1e-3) << "albedo alone";
   }
   EXPECT_EQ(run("convert corner.vox out.ply --ao-attribute").status, 0) << "of blocks too";
@@ -320,9 +320,9 @@ TEST_F(ToolSmooth, VolumesWithoutAFiniteValueAreErrors) {
       EXPECT_NE(result.err.find("none.raw"), std::string::npos) << result.err;
     }
     EXPECT_FALSE(exists("out.glb") || exists("out.json") || exists("out.png"));
-    const ToolRun told = run("info none.raw" + raw);
-    EXPECT_EQ(told.status, 0) << "info still describes it";
-    EXPECT_NE(told.out.find("Range: none"), std::string::npos) << told.out;
+    const ToolRun reported = run("info none.raw" + raw);
+    EXPECT_EQ(reported.status, 0) << "info still describes it";
+    EXPECT_NE(reported.out.find("Range: none"), std::string::npos) << reported.out;
     EXPECT_EQ(run("convert none.raw out.glb --iso 3" + raw).status, std::isnan(value) ? 1 : 0);
   }
 }
@@ -330,9 +330,9 @@ TEST_F(ToolSmooth, VolumesWithoutAFiniteValueAreErrors) {
 TEST_F(ToolSmooth, RawVolumesAreReportedRenderedAndKeptAsFields) {
   write("ball.raw", volume_test::encode(ball({20, 18, 16}, DVec3(9.0), 6.0), ScalarType::Float32));
   const std::string raw = " --raw-size 20x18x16 --raw-type float32";
-  const ToolRun told = run("info ball.raw --json" + raw);
-  ASSERT_EQ(told.status, 0) << told.err;
-  const Json info = Json::parse(told.out);
+  const ToolRun reported = run("info ball.raw --json" + raw);
+  ASSERT_EQ(reported.status, 0) << reported.err;
+  const Json info = Json::parse(reported.out);
   EXPECT_EQ(info["format"], "raw");
   EXPECT_EQ(info["size"], Json({20, 18, 16}));
   EXPECT_EQ(info["name"], "ball");
@@ -401,7 +401,7 @@ TEST_F(ToolSmooth, SimplifyingSaysHowFarItWent) {
   EXPECT_NE(run("convert " + arguments + " --simplify 0.1").out.find("Simplified: "), std::string::npos);
 }
 
-TEST_F(ToolSmooth, VolumesBecomeMeshesVoxelsAndPictures) {
+TEST_F(ToolSmooth, VolumesBecomeMeshesVoxelsAndImages) {
   write("ball.raw", volume_test::encode(ball({8, 8, 8}, DVec3(4.0), 3.0), ScalarType::Int8));
   const ToolRun voxels = run("convert ball.raw out.vox --raw-size 8x8x8 --raw-type int8");
   EXPECT_EQ(voxels.status, 0) << voxels.err;
@@ -412,9 +412,9 @@ TEST_F(ToolSmooth, VolumesBecomeMeshesVoxelsAndPictures) {
   EXPECT_EQ(greedy.status, 2);
   EXPECT_NE(greedy.err.find("use --mesher smooth"), std::string::npos) << greedy.err;
   EXPECT_FALSE(exists("out.glb"));
-  const ToolRun picture = run("render a.nrrd -o out.png --size 32x32 --iso 98.5 --json");
-  EXPECT_EQ(picture.status, 0) << picture.err;
-  EXPECT_GT(Json::parse(picture.out)["pixels_hit"], 10);
+  const ToolRun image = run("render a.nrrd -o out.png --size 32x32 --iso 98.5 --json");
+  EXPECT_EQ(image.status, 0) << image.err;
+  EXPECT_GT(Json::parse(image.out)["pixels_hit"], 10);
   EXPECT_TRUE(exists("out.png"));
   // No value reaches this threshold; the tool warns of an empty image.
   EXPECT_NE(run("render a.nrrd -o out.png --size 32x32 --iso 1000").err.find("the image shows only sky"),

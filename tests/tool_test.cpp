@@ -525,9 +525,9 @@ TEST_F(Tool, ManyFilesAreNotMixedUp) {
   // The names of the input folders make no difference.
   std::filesystem::create_symlink("a", folder_.file("b"));
   std::ofstream(folder_.file("a/tiny.json")) << "{}";
-  const ToolRun apart = run("convert a/tiny.vox b/tiny.json --to glb");
-  EXPECT_EQ(apart.status, 2);
-  EXPECT_EQ(apart.err, "quoin: a/tiny.vox and b/tiny.json would both be written to b/tiny.glb\n");
+  const ToolRun separate = run("convert a/tiny.vox b/tiny.json --to glb");
+  EXPECT_EQ(separate.status, 2);
+  EXPECT_EQ(separate.err, "quoin: a/tiny.vox and b/tiny.json would both be written to b/tiny.glb\n");
   std::filesystem::remove(folder_.file("a/tiny.json"));
   // Output of an earlier run below a folder is not an input of the next run.
   for (int i = 0; i < 2; ++i) {

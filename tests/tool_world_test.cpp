@@ -180,18 +180,18 @@ TEST_F(ToolWorld, ReportsInsufficientMemoryBeforeLoading) {
 }
 
 TEST_F(ToolWorld, IsMadeOfHeightsWhereTheyAreSaidToBeHeights) {
-  const std::string picture = "'" QUOIN_SOURCE_DIR "/tests/corpus/heights/grey_8_bits.png'";
-  const ToolRun refused = run("convert " + picture + " fuji.quoin");
+  const std::string image = "'" QUOIN_SOURCE_DIR "/tests/corpus/heights/grey_8_bits.png'";
+  const ToolRun refused = run("convert " + image + " fuji.quoin");
   EXPECT_EQ(refused.status, 1);
   EXPECT_NE(refused.err.find("--heights grey, mapbox or terrarium"), std::string::npos) << refused.err;
-  EXPECT_EQ(run("convert " + picture + " fuji.quoin --heights blue").status, 2);
-  EXPECT_EQ(run("convert " + picture + " fuji.quoin --heights grey --metres-per-pixel 0").status, 2);
+  EXPECT_EQ(run("convert " + image + " fuji.quoin --heights blue").status, 2);
+  EXPECT_EQ(run("convert " + image + " fuji.quoin --heights grey --metres-per-pixel 0").status, 2);
   const ToolRun made =
-      run("convert " + picture + " fuji.quoin --heights grey --metres-per-level 0.1 --metres-per-pixel 2 -q --json");
+      run("convert " + image + " fuji.quoin --heights grey --metres-per-level 0.1 --metres-per-pixel 2 -q --json");
   ASSERT_EQ(made.status, 0) << made.err;
   // Levels of 0, 100, 255, 7, 8 and 9 tenths of a metre, in voxels of two metres, above eight voxels of ground.
   EXPECT_EQ(Json::parse(made.out)["voxels"], 6 * 8 + 5 + 13);
-  const ToolRun smooth = run("info " + picture + " --heights grey --metres-per-pixel 2 --smooth-ground --json");
+  const ToolRun smooth = run("info " + image + " --heights grey --metres-per-pixel 2 --smooth-ground --json");
   ASSERT_EQ(smooth.status, 0) << smooth.err;
   EXPECT_EQ(Json::parse(smooth.out)["voxels"], 0);
 }

@@ -215,7 +215,7 @@ TEST(C, WatertightMeshesHaveNoCornerInsideAnEdge) {
   EXPECT_EQ(corners_in_edges(1), 0U);
 }
 
-TEST(C, PicturesHaveTheSunThatIsAskedFor) {
+TEST(C, ImagesHaveTheSunThatIsAskedFor) {
   std::vector<std::uint16_t> voxels;
   const quoin_scene scene = made_scene(voxels);
   auto options = sized<quoin_render_options>();
@@ -223,9 +223,9 @@ TEST(C, PicturesHaveTheSunThatIsAskedFor) {
   options.height = 24;
   options.samples = 1;
   const auto taken = [&] {
-    std::vector<std::uint8_t> picture(std::size_t{3} * 32 * 24);
-    EXPECT_EQ(quoin_scene_render(scene, &options, picture.data(), picture.size()), QUOIN_OK) << quoin_last_error();
-    return picture;
+    std::vector<std::uint8_t> image(std::size_t{3} * 32 * 24);
+    EXPECT_EQ(quoin_scene_render(scene, &options, image.data(), image.size()), QUOIN_OK) << quoin_last_error();
+    return image;
   };
   for (const int paths : {0, 1}) {
     options.paths = paths;
@@ -244,32 +244,32 @@ TEST(C, PicturesHaveTheSunThatIsAskedFor) {
     EXPECT_EQ(taken(), without);
     options.size = sizeof options;
   }
-  std::vector<std::uint8_t> picture(std::size_t{3} * 32 * 24);
+  std::vector<std::uint8_t> image(std::size_t{3} * 32 * 24);
   for (const double wrong : {0.0, std::nan("")}) {
     options.sun[0] = options.sun[1] = options.sun[2] = wrong;
-    EXPECT_EQ(quoin_scene_render(scene, &options, picture.data(), picture.size()), QUOIN_INVALID_ARGUMENT);
+    EXPECT_EQ(quoin_scene_render(scene, &options, image.data(), image.size()), QUOIN_INVALID_ARGUMENT);
     EXPECT_NE(std::string(quoin_last_error()).find("sun"), std::string::npos);
   }
   EXPECT_EQ(quoin_free(scene), QUOIN_OK);
 }
 
-TEST(C, PicturesAndRaysSeeTheScene) {
+TEST(C, ImagesAndRaysSeeTheScene) {
   std::vector<std::uint16_t> voxels;
   const quoin_scene scene = made_scene(voxels);
   auto options = sized<quoin_render_options>();
   options.width = 32;
   options.height = 24;
-  std::vector<std::uint8_t> picture(std::size_t{3} * 32 * 24, 1);
+  std::vector<std::uint8_t> image(std::size_t{3} * 32 * 24, 1);
   for (const int paths : {0, 1}) {
     options.paths = paths;
     options.samples = 1;
-    ASSERT_EQ(quoin_scene_render(scene, &options, picture.data(), picture.size()), QUOIN_OK) << quoin_last_error();
-    EXPECT_NE(picture, std::vector<std::uint8_t>(picture.size(), picture[0]));
+    ASSERT_EQ(quoin_scene_render(scene, &options, image.data(), image.size()), QUOIN_OK) << quoin_last_error();
+    EXPECT_NE(image, std::vector<std::uint8_t>(image.size(), image[0]));
   }
-  EXPECT_EQ(quoin_scene_render(scene, &options, picture.data(), picture.size() - 1), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_scene_render(scene, &options, image.data(), image.size() - 1), QUOIN_INVALID_ARGUMENT);
   options.has_camera = 1;
   options.camera[0] = std::nan("");
-  EXPECT_EQ(quoin_scene_render(scene, &options, picture.data(), picture.size()), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_scene_render(scene, &options, image.data(), image.size()), QUOIN_INVALID_ARGUMENT);
   const std::vector<double> origins = {2.5, 50.0, 2.5, -9.0, -9.0, -9.0, std::nan(""), 0.0, 0.0};
   const std::vector<double> directions = {0.0, -1.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.0, 0.0};
   std::array<double, 3> t{};

@@ -13,7 +13,7 @@ static void must(quoin_status status) {
 int main(void) {
   enum { EDGE = 32, WIDTH = 160, HEIGHT = 120 };
   static uint8_t voxels[EDGE][EDGE][EDGE]; /* x, y, z */
-  static uint8_t picture[HEIGHT][WIDTH][3];
+  static uint8_t image[HEIGHT][WIDTH][3];
   for (int x = 0; x < EDGE; ++x) {
     for (int z = 0; z < EDGE; ++z) {
       const int dx = x - EDGE / 2, dz = z - EDGE / 2;
@@ -47,7 +47,7 @@ int main(void) {
   quoin_render_options options = QUOIN_INIT(quoin_render_options);
   options.width = WIDTH;
   options.height = HEIGHT;
-  must(quoin_scene_render(scene, &options, &picture[0][0][0], sizeof picture));
+  must(quoin_scene_render(scene, &options, &image[0][0][0], sizeof image));
 
   const double origin[3] = {EDGE / 2 + 0.5, 100.0, EDGE / 2 + 0.5}, down[3] = {0.0, -1.0, 0.0};
   double t = 0.0;

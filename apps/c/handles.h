@@ -144,7 +144,7 @@ quoin_status with_scene(quoin_scene handle, Use use, Work&& work) noexcept {
 
 /// Writes a count of a scene's objects.
 template <class Count>
-quoin_status tell_count(quoin_scene handle, std::size_t* out, Count&& count) noexcept {
+quoin_status report_count(quoin_scene handle, std::size_t* out, Count&& count) noexcept {
   return with_scene(handle, Use::Read, [&](SceneBody& scene) {
     if (out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "out is null");
     *out = count(scene);
@@ -192,7 +192,7 @@ std::optional<Struct> taken_or_default(const Struct* given) {
 
 /// Writes as much of `whole` as the caller's struct has room for.
 template <class Struct>
-quoin_status tell(Struct whole, Struct* out) {
+quoin_status report(Struct whole, Struct* out) {
   if (!has_fit_size(out)) return fail(QUOIN_INVALID_ARGUMENT, "out is null, or its size");
   whole.size = out->size;
   std::memcpy(out, &whole, out->size);
@@ -201,12 +201,13 @@ quoin_status tell(Struct whole, Struct* out) {
 
 /// Writes a struct that describes a scene's object number `index`.
 template <class Struct, class Count, class Describe>
-quoin_status tell_of(quoin_scene handle, std::size_t index, Struct* out, Count&& count, Describe&& describe) noexcept {
+quoin_status report_item(quoin_scene handle, std::size_t index, Struct* out, Count&& count,
+                         Describe&& describe) noexcept {
   return with_scene(handle, Use::Read, [&](SceneBody& scene) {
     if (index >= count(scene)) return fail(QUOIN_INVALID_ARGUMENT, "nothing of the scene has this number");
     Struct whole{};
     describe(scene, whole);
-    return tell(whole, out);
+    return report(whole, out);
   });
 }
 
@@ -230,11 +231,11 @@ VoxelProperties properties_of(const quoin_type& type);
 const char* what_is_wrong(const quoin_type& type);
 
 /// The camera and the options of a render. Errors: InvalidArgument for invalid values.
-struct PictureTaking {
+struct ImageTaking {
   Camera camera;
   RenderOptions options;
 };
-Result<PictureTaking> taking_of(const Scene& scene, const quoin_render_options& options);
+Result<ImageTaking> taking_of(const Scene& scene, const quoin_render_options& options);
 
 /// Copies a text, with its terminator, into `capacity` bytes; truncates between characters.
 void copy_text(std::string_view text, char* to, std::size_t capacity);

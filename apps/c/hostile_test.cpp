@@ -16,7 +16,7 @@ namespace {
 
 TEST(CHostile, TheCorpusIsReplayed) {
   std::size_t programs = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(QUOIN_SOURCE_DIR "/tests/corpus/door")) {
+  for (const auto& entry : std::filesystem::directory_iterator(QUOIN_SOURCE_DIR "/tests/corpus/c_api")) {
     SCOPED_TRACE(entry.path().filename());
     std::ifstream in(entry.path(), std::ios::binary);
     const std::vector<char> bytes{std::istreambuf_iterator<char>(in), {}};

@@ -190,7 +190,7 @@ Result<Camera> camera_of(const Scene& scene, const quoin_render_options& options
                  {options.look_at[0], options.look_at[1], options.look_at[2]}, degrees * std::numbers::pi / 180.0);
 }
 
-Result<Image> picture_of(const Scene& scene, const quoin_render_options& options, const PictureTaking& taking) {
+Result<Image> rendered_of(const Scene& scene, const quoin_render_options& options, const ImageTaking& taking) {
   const Threads threads = threads_of(options.threads);
   if (options.paths != 0) {
     PathOptions wanted;
@@ -198,15 +198,15 @@ Result<Image> picture_of(const Scene& scene, const quoin_render_options& options
     wanted.height = taking.options.height;
     wanted.sun = taking.options.light.sun;
     if (options.samples != 0) wanted.samples = options.samples;
-    const auto picture =
+    const auto image =
         PathTracer(scene, InstanceFilter::Visible, threads).render(taking.camera, wanted, threads, progress());
-    if (!picture) return picture.error();
-    return develop(*picture);
+    if (!image) return image.error();
+    return develop(*image);
   }
-  auto picture =
+  auto image =
       CpuRenderer(scene, InstanceFilter::Visible, threads).render(taking.camera, taking.options, threads, progress());
-  if (!picture) return picture.error();
-  return std::move(picture->colour);
+  if (!image) return image.error();
+  return std::move(image->colour);
 }
 
 quoin_status render(const Scene& scene, const quoin_render_options& options, std::uint8_t* rgb, std::size_t capacity) {
@@ -215,9 +215,9 @@ quoin_status render(const Scene& scene, const quoin_render_options& options, std
   const auto width = static_cast<std::size_t>(taking->options.width);
   if (capacity / 3 / width < static_cast<std::size_t>(taking->options.height))
     return fail(QUOIN_INVALID_ARGUMENT, "the array is too small for the image");
-  const auto picture = picture_of(scene, options, *taking);
-  if (!picture) return fail(picture.error());
-  std::memcpy(rgb, picture->rgb.data(), picture->rgb.size());
+  const auto image = rendered_of(scene, options, *taking);
+  if (!image) return fail(image.error());
+  std::memcpy(rgb, image->rgb.data(), image->rgb.size());
   return QUOIN_OK;
 }
 
@@ -248,10 +248,10 @@ const SceneTracer& current_tracer(SceneBody& body) {
 
 }  // namespace
 
-Result<PictureTaking> taking_of(const Scene& scene, const quoin_render_options& options) {
+Result<ImageTaking> taking_of(const Scene& scene, const quoin_render_options& options) {
   if (options.width < 0 || options.height < 0 || options.samples < 0)
     return make_error(ErrorCode::InvalidArgument, "width, height or samples is negative");
-  PictureTaking taking;
+  ImageTaking taking;
   RenderOptions& wanted = taking.options;
   wanted.width = options.width == 0 ? 1280 : options.width;
   wanted.height = options.height == 0 ? 720 : options.height;
@@ -316,7 +316,7 @@ quoin_status quoin_mesh_view(quoin_mesh mesh, quoin_mesh_data* out) {
     if (body == nullptr) return fail(QUOIN_BAD_HANDLE, "no mesh has this handle");
     quoin_mesh_data data{};
     std::visit([&](const auto& one) { show(one, data); }, *body);
-    return tell(data, out);
+    return report(data, out);
   });
 }
 

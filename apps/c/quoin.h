@@ -27,7 +27,7 @@ extern "C" {
 #define QUOIN_API
 #endif
 
-/* Initialises a struct of `type`: sets `size`, and all other fields to 0, which means the default. Set three fields
+/* Initialises a struct of `type`: sets `size`, and all other fields to 0: their default. Set three fields
  * yourself: quoin_type alpha (0: invisible), quoin_type roughness (0: a mirror), quoin_instance visible (0: hidden). */
 #define QUOIN_INIT(type) \
   { .size = sizeof(type) }

@@ -250,9 +250,9 @@ TEST_F(SceneOfARow, IsGivenCamerasLampsAndASun) {
   camera.is_first = 1;
   ASSERT_EQ(quoin_camera_add(scene_, &camera), QUOIN_OK) << quoin_last_error();
   EXPECT_EQ(quoin_camera_add(scene_, &camera), QUOIN_INVALID_ARGUMENT);  // the number is taken
-  auto told = sized<quoin_camera>();
-  ASSERT_EQ(quoin_camera_get(scene_, 0, &told), QUOIN_OK);
-  EXPECT_TRUE(told.number == 4 && told.is_first == 1 && told.position[2] == 50.0);
+  auto reported = sized<quoin_camera>();
+  ASSERT_EQ(quoin_camera_get(scene_, 0, &reported), QUOIN_OK);
+  EXPECT_TRUE(reported.number == 4 && reported.is_first == 1 && reported.position[2] == 50.0);
   quoin_camera wrong = camera_ahead(5);
   wrong.up[1] = 2.0;
   EXPECT_EQ(quoin_camera_add(scene_, &wrong), QUOIN_INVALID_ARGUMENT);
@@ -563,20 +563,20 @@ TEST_F(SceneOfARow, ReportsProgressAndCanBeCancelled) {
   auto options = sized<quoin_render_options>();
   options.width = options.height = 64;
   options.samples = 1;
-  std::vector<std::uint8_t> picture(std::size_t{3} * 64 * 64);
-  EXPECT_EQ(quoin_scene_render(scene_, &options, picture.data(), picture.size()), QUOIN_OK);
+  std::vector<std::uint8_t> image(std::size_t{3} * 64 * 64);
+  EXPECT_EQ(quoin_scene_render(scene_, &options, image.data(), image.size()), QUOIN_OK);
   const int calls = listener.calls;
   EXPECT_GT(calls, 2);
   std::thread([&] {  // a thread without a callback
-    EXPECT_EQ(quoin_scene_render(scene_, &options, picture.data(), picture.size()), QUOIN_OK);
+    EXPECT_EQ(quoin_scene_render(scene_, &options, image.data(), image.size()), QUOIN_OK);
   })
       .join();
   EXPECT_EQ(listener.calls, calls);
   listener.last = 0.0;
   listener.stop_at = calls + 2;
-  EXPECT_EQ(quoin_scene_render(scene_, &options, picture.data(), picture.size()), QUOIN_CANCELLED);
+  EXPECT_EQ(quoin_scene_render(scene_, &options, image.data(), image.size()), QUOIN_CANCELLED);
   ASSERT_EQ(quoin_set_progress(nullptr, nullptr), QUOIN_OK);
-  EXPECT_EQ(quoin_scene_render(scene_, &options, picture.data(), picture.size()), QUOIN_OK);
+  EXPECT_EQ(quoin_scene_render(scene_, &options, image.data(), image.size()), QUOIN_OK);
   EXPECT_EQ(listener.calls, calls + 2);
 }
 

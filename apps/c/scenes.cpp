@@ -77,7 +77,7 @@ quoin_status add_grid(SceneBody& scene, const quoin_array& array, const char* na
   bool is_wanted = true;
   SceneGrid placed;
   placed.name = name == nullptr ? "" : name;
-  const Progress told = progress();
+  const Progress reported = progress();
   placed.grid.edit_rows(
       {IVec3(0), size},
       [&](IVec3 first, std::span<VoxelType> row) {
@@ -88,7 +88,7 @@ quoin_status add_grid(SceneBody& scene, const quoin_array& array, const char* na
         }
       },
       [&](double fraction) {
-        is_wanted = is_wanted && (!told || told(fraction));
+        is_wanted = is_wanted && (!reported || reported(fraction));
         return is_wanted && greatest < types;
       });
   if (!is_wanted) return fail(QUOIN_CANCELLED, "cancelled");
@@ -367,8 +367,8 @@ quoin_status quoin_scene_save(quoin_scene scene, const char* path) {
 }
 
 quoin_status quoin_scene_warning_count(quoin_scene scene, std::size_t* out) {
-  return tell_count(scene, out,
-                    [](SceneBody& body) { return body.loaded.warnings.size() + body.save_warnings.size(); });
+  return report_count(scene, out,
+                      [](SceneBody& body) { return body.loaded.warnings.size() + body.save_warnings.size(); });
 }
 
 quoin_status quoin_scene_warning(quoin_scene scene, std::size_t index, char* text, std::size_t capacity) {
@@ -382,12 +382,12 @@ quoin_status quoin_scene_warning(quoin_scene scene, std::size_t index, char* tex
 }
 
 quoin_status quoin_type_count(quoin_scene scene, std::size_t* out) {
-  return tell_count(scene, out, [](SceneBody& body) { return body.loaded.scene.types.size(); });
+  return report_count(scene, out, [](SceneBody& body) { return body.loaded.scene.types.size(); });
 }
 
 quoin_status quoin_type_get(quoin_scene scene, std::size_t index, quoin_type* out) {
   const auto count = [](SceneBody& body) { return body.loaded.scene.types.size(); };
-  return tell_of(scene, index, out, count, [&](SceneBody& body, quoin_type& type) {
+  return report_item(scene, index, out, count, [&](SceneBody& body, quoin_type& type) {
     const VoxelProperties& found = body.loaded.scene.types[static_cast<VoxelType>(index)];
     const bool is_opaque = found.visibility == Visibility::Opaque;
     const std::uint8_t alpha = index == kAir ? 0 : is_opaque ? 255 : found.colour.a;
@@ -417,12 +417,12 @@ quoin_status quoin_type_add(quoin_scene scene, const quoin_type* type, std::uint
 }
 
 quoin_status quoin_grid_count(quoin_scene scene, std::size_t* out) {
-  return tell_count(scene, out, [](SceneBody& body) { return body.numbers.grids.size(); });
+  return report_count(scene, out, [](SceneBody& body) { return body.numbers.grids.size(); });
 }
 
 quoin_status quoin_grid_get_info(quoin_scene scene, std::size_t grid, quoin_grid_info* out) {
   const auto count = [](SceneBody& body) { return body.numbers.grids.size(); };
-  return tell_of(scene, grid, out, count, [&](SceneBody& body, quoin_grid_info& info) {
+  return report_item(scene, grid, out, count, [&](SceneBody& body, quoin_grid_info& info) {
     const SceneGrid& found = body.loaded.scene.grids()[body.numbers.grids[grid]];
     const IBox box = found.bounds();
     copy_text(found.name, info.name);

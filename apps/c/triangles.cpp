@@ -96,21 +96,21 @@ Result<Given> types_of(const quoin_triangles& triangles) {
 
 // Gives each triangle corner its own vertex, coloured by the triangle's type.
 Result<TriangleMesh> with_coloured_corners(const TriangleMesh& mesh, const Given& given) {
-  TriangleMesh apart;
+  TriangleMesh separate;
   if (mesh.triangles.size() > std::numeric_limits<std::uint32_t>::max() / 3)
     return make_error(ErrorCode::LimitExceeded, "more than 2^32 triangle corners with colours");
-  apart.positions.reserve(3 * mesh.triangles.size());
-  apart.colours.reserve(3 * mesh.triangles.size());
+  separate.positions.reserve(3 * mesh.triangles.size());
+  separate.colours.reserve(3 * mesh.triangles.size());
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
     const std::size_t type = mesh.material_of.empty() ? 0 : mesh.material_of[i];
     for (const std::uint32_t corner : mesh.triangles[i]) {
-      apart.positions.push_back(mesh.positions[corner]);
-      apart.colours.push_back(given.light[type] * (mesh.colours.empty() ? glm::vec4(1.0F) : mesh.colours[corner]));
+      separate.positions.push_back(mesh.positions[corner]);
+      separate.colours.push_back(given.light[type] * (mesh.colours.empty() ? glm::vec4(1.0F) : mesh.colours[corner]));
     }
     const auto first = static_cast<std::uint32_t>(3 * i);
-    apart.triangles.push_back({first, first + 1, first + 2});
+    separate.triangles.push_back({first, first + 1, first + 2});
   }
-  return apart;
+  return separate;
 }
 
 // Converts positions to voxel units, which the scene and the lattice share. Material indices refer to types;
@@ -157,10 +157,10 @@ Result<TriangleMesh> with_materials(TriangleMesh mesh, const Given& given) {
     materials.push_back(material_of(given.looks[i], i, light, has_alpha[i]));
   }
   if (is_shared) {
-    auto apart = with_coloured_corners(mesh, given);
-    if (!apart) return apart.error();
-    apart->material_of = std::move(mesh.material_of);
-    mesh = std::move(*apart);
+    auto separate = with_coloured_corners(mesh, given);
+    if (!separate) return separate.error();
+    separate->material_of = std::move(mesh.material_of);
+    mesh = std::move(*separate);
     for (std::uint32_t& material : mesh.material_of) material = static_cast<std::uint32_t>(given.look_of[material]);
   }
   mesh.materials = std::move(materials);

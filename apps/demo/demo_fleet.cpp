@@ -5,7 +5,7 @@
 #include <vector>
 
 #include <quoin/io/formats.h>
-#include <quoin/io/picture_files.h>
+#include <quoin/io/image_files.h>
 #include <quoin/render/cpu_renderer.h>
 
 #include "fleet.h"
@@ -20,15 +20,15 @@ quoin::Result<quoin::LoadedScene> written_and_read(const char* file) {
   return quoin::load_scene(file);
 }
 
-quoin::Status draw(const char* scene_file, const std::vector<const char*>& pictures) {
+quoin::Status draw(const char* scene_file, const std::vector<const char*>& images) {
   const auto fleet = written_and_read(scene_file);
   if (!fleet) return fleet.error();
   const quoin::CpuRenderer renderer(fleet->scene);
   quoin::RenderOptions options = demo::fleet_options(*fleet);
-  for (const char* file : pictures) {
-    const auto picture = renderer.render(*fleet->camera, options);
-    if (!picture) return picture.error();
-    const auto written = quoin::write_png(picture->colour, file);
+  for (const char* file : images) {
+    const auto image = renderer.render(*fleet->camera, options);
+    if (!image) return image.error();
+    const auto written = quoin::write_png(image->colour, file);
     if (!written) return written.error();
     options.detail.colours = true;
   }

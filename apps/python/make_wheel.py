@@ -44,8 +44,8 @@ def fill(folder, library, version):
     os.makedirs(os.path.join(package, "libs"))
     for name in ("__init__.py", "_c.py", "_mesh.py", "_scene.py", "py.typed"):
         shutil.copyfile(os.path.join(here, "quoin", name), os.path.join(package, name))
-    door = os.path.join(package, "libquoin_c.so.0")
-    subprocess.run(["strip", "-o", door, library], check=True)
+    interface = os.path.join(package, "libquoin_c.so.0")
+    subprocess.run(["strip", "-o", interface, library], check=True)
     for name, path in needed(library):
         shutil.copyfile(path, os.path.join(package, "libs", name))
         owner, text = copyright_of(path)

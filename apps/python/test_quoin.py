@@ -146,7 +146,7 @@ class Scenes(unittest.TestCase):
         for one in (data, bytearray(data), memoryview(data), np.frombuffer(data, np.uint8)):
             self.assertTrue((quoin.load_bytes(one).grids[0].to_numpy() == array[:, :5]).all())
 
-    def test_pictures_are_put_into_arrays(self):
+    def test_images_are_put_into_arrays(self):
         _, scene = self.scene()
         out = np.zeros((40, 60, 3), np.uint8)
         self.assertIs(scene.render(60, 40, out=out), out)
@@ -378,7 +378,7 @@ class Scenes(unittest.TestCase):
             areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
             self.assertGreater(areas.min(), 0.0)
 
-    def test_pictures_of_heights(self):
+    def test_images_of_heights(self):
         metres = np.array([[3, 5], [4, 9]])
         code = (metres + 10_000) * 10
         image = np.stack([code >> 16, code >> 8 & 255, code & 255], axis=2).astype(np.uint8)

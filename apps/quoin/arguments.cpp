@@ -16,7 +16,7 @@ namespace {
 
 /// Returns an error message if `text` is not a number of at least 0, else "".
 template <class Number>
-std::string fault_of_number(const std::string& text) {
+std::string find_number_error(const std::string& text) {
   Number value{};
   const char* end = text.data() + text.size();
   const auto [stop, error] = std::from_chars(text.data(), end, value);
@@ -29,11 +29,11 @@ std::string fault_of_number(const std::string& text) {
 }  // namespace
 
 CLI::Validator not_negative() {
-  return {[](std::string& text) { return fault_of_number<double>(text); }, ""};
+  return {[](std::string& text) { return find_number_error<double>(text); }, ""};
 }
 
 CLI::Validator not_negative_whole() {
-  return {[](std::string& text) { return fault_of_number<int>(text); }, ""};
+  return {[](std::string& text) { return find_number_error<int>(text); }, ""};
 }
 
 CLI::Validator positive() {

@@ -12,7 +12,7 @@
 #include "output_files.h"
 #include "parse.h"
 #include "progress_bar.h"
-#include "render/small_picture.h"
+#include "render/small_image.h"
 #include "shell/help.h"
 #include "stopwatch.h"
 

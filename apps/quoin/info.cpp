@@ -140,7 +140,7 @@ class Hierarchy {
 };
 
 std::vector<std::string> kept_by(const LoadedScene& loaded) {
-  return loaded.source == nullptr ? std::vector<std::string>{} : only_in_source(*loaded.source);
+  return loaded.source == nullptr ? std::vector<std::string>{} : source_only_features(*loaded.source);
 }
 
 Json grid_json(const GridReport& report, const Hierarchy& hierarchy) {

@@ -47,13 +47,13 @@ std::optional<DVec3> parse_triple(std::string_view text) {
   return parse_three<DVec3>(text, ',', parse_number);
 }
 
-std::optional<PictureSize> parse_size(std::string_view text) {
+std::optional<ImageSize> parse_size(std::string_view text) {
   const std::size_t cross = text.find('x');
   if (cross == std::string_view::npos) return std::nullopt;
   const auto width = parse_all<int>(text.substr(0, cross));
   const auto height = parse_all<int>(text.substr(cross + 1));
   if (!width || !height || *width <= 0 || *height <= 0) return std::nullopt;
-  return PictureSize{*width, *height};
+  return ImageSize{*width, *height};
 }
 
 std::optional<IVec3> parse_box_size(std::string_view text) {

@@ -18,13 +18,13 @@ namespace quoin::tool {
 [[nodiscard]] std::optional<DVec3> parse_triple(std::string_view text);
 
 /// Width and height of an image.
-struct PictureSize {
+struct ImageSize {
   int width = 0;
   int height = 0;
 };
 
 /// Parses two positive whole numbers: "1280x720".
-[[nodiscard]] std::optional<PictureSize> parse_size(std::string_view text);
+[[nodiscard]] std::optional<ImageSize> parse_size(std::string_view text);
 
 /// Parses three whole numbers: "4x2x4".
 [[nodiscard]] std::optional<IVec3> parse_box_size(std::string_view text);

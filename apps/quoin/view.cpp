@@ -23,7 +23,7 @@ struct ViewArguments {
   std::filesystem::path input;
   LoadOptions load;
   Threads threads;
-  PictureSize size;
+  ImageSize size;
   std::filesystem::path screenshot;
   bool is_bare = false;
   std::string backend = "auto";
@@ -100,7 +100,7 @@ int run_view(const ViewArguments&) {
 
 /// Reads the remaining options. Returns a usage error, or "".
 std::string settle(const CLI::App& command, ViewArguments& arguments) {
-  constexpr PictureSize kSmallest{320, 240};
+  constexpr ImageSize kSmallest{320, 240};
   constexpr int kLongestSide = 16'384;
   if (command.count("--size") > 0) {
     const std::string text = command.get_option("--size")->results().back();

@@ -44,7 +44,7 @@ void wait_for_change(const WatchedWork& work, const Stamps& known) {
   }
 }
 
-void tell_of_watching(const WatchedWork& work) {
+void report_watching(const WatchedWork& work) {
   if (is_quiet()) return;
   const std::string more = work.read.size() > 1 ? " and " + std::to_string(work.read.size() - 1) + " more" : "";
   std::fprintf(stderr, "quoin: watching %s%s; press Ctrl-C to stop\n", on_one_line(work.read.front().string()).c_str(),
@@ -67,7 +67,7 @@ Stamps stamps_of(const std::vector<fs::path>& paths) {
 }
 
 std::vector<fs::path> files_read(const fs::path& input, SidecarFiles allowed) {
-  std::vector<fs::path> files = files_read_beside(input, allowed);
+  std::vector<fs::path> files = sidecar_files_of(input, allowed);
   files.insert(files.begin(), input);
   return files;
 }
@@ -82,7 +82,7 @@ int watch(const std::vector<fs::path>& read, const std::function<WatchedWork()>&
     const Stamps before = stamps_of(done);
     done = work();
     if (is_first && done.status == kWrongUsage) return done.status;
-    if (is_first) tell_of_watching(done);
+    if (is_first) report_watching(done);
     is_first = false;
     Stamps known = stamps_of(done);
     for (auto& [path, stamp] : known) {

@@ -4,7 +4,7 @@
 #include <utility>
 
 #include <quoin/io/file.h>
-#include <quoin/store/world_care.h>
+#include <quoin/store/world_maintenance.h>
 #include <quoin/store/world_store.h>
 
 #include "commands.h"

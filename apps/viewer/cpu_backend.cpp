@@ -77,8 +77,8 @@ RenderOptions options_for(const ViewRequest& request, const Stage& stage) {
 }
 
 // Draws a density slice, which is final after the first sample.
-Result<Picture> draw_densities(const Scene& scene, const ViewRequest& request, const Stage& stage,
-                               const CpuBackendOptions& options) {
+Result<RenderedImage> draw_densities(const Scene& scene, const ViewRequest& request, const Stage& stage,
+                                     const CpuBackendOptions& options) {
   DensitySliceOptions slice;
   slice.width = stage.width(request);
   slice.height = stage.height(request);
@@ -87,9 +87,9 @@ Result<Picture> draw_densities(const Scene& scene, const ViewRequest& request, c
   slice.instances = options.instances;
   auto drawn = draw_density_slice(scene, slice, options.threads);
   if (!drawn) return drawn.error();
-  Picture picture;
-  picture.colour = std::move(drawn->colour);
-  return picture;
+  RenderedImage image;
+  image.colour = std::move(drawn->colour);
+  return image;
 }
 
 /// The data for path tracing.
@@ -137,18 +137,18 @@ struct CpuBackend::Impl {
   }
   void update(std::unique_lock<std::mutex>& lock);
   void draw(std::unique_lock<std::mutex>& lock);
-  [[nodiscard]] Result<Picture> picture_of(const ViewRequest& wanted, const Stage& now, const Progress& goes_on);
-  [[nodiscard]] Result<Picture> path_picture(const ViewRequest& wanted, const Stage& now, const Progress& goes_on);
+  [[nodiscard]] Result<RenderedImage> rendered_of(const ViewRequest& wanted, const Stage& now, const Progress& goes_on);
+  [[nodiscard]] Result<RenderedImage> path_image(const ViewRequest& wanted, const Stage& now, const Progress& goes_on);
   void prepare_paths();
   void count_bytes();
   [[nodiscard]] Status prepare_smooth(const Progress& goes_on);
   void refuse_smooth(Error why);
-  void publish(Result<Picture> picture, const ViewRequest& of, const Stage& stage, double seconds);
+  void publish(Result<RenderedImage> image, const ViewRequest& of, const Stage& stage, double seconds);
   [[nodiscard]] Stage first_stage() const;
   [[nodiscard]] std::optional<Stage> finest(bool is_draft, double patience) const;
   [[nodiscard]] bool may_begin(int divisor) const;
   void note_speed(const Stage& drawn, const ViewRequest& of, double seconds);
-  void tell() const {
+  void report() const {
     if (on_frame) on_frame();
   }
 
@@ -207,7 +207,7 @@ void CpuBackend::Impl::work() {
     is_busy = false;
     idle.notify_all();
     lock.unlock();
-    tell();
+    report();
     lock.lock();
   }
 }
@@ -274,16 +274,16 @@ void CpuBackend::Impl::draw(std::unique_lock<std::mutex>& lock) {
   const std::uint64_t mode = mode_number;
   lock.unlock();
   const Clock::time_point start = Clock::now();
-  auto picture = picture_of(
+  auto image = rendered_of(
       wanted, now, [&](double) { return !halt && mode_number == mode && (is_kept_on || request_number == number); });
   const double seconds = seconds_since(start);
   lock.lock();
-  if (mode_number != mode || (!picture && picture.error().code == ErrorCode::Cancelled)) return;
+  if (mode_number != mode || (!image && image.error().code == ErrorCode::Cancelled)) return;
   if (refusal && wanted.mode == DrawMode::Smooth) {
     is_done = request_number == number;
     return;
   }
-  publish(std::move(picture), wanted, now, seconds);
+  publish(std::move(image), wanted, now, seconds);
   if (request_number != number) {
     if (frame) frame->is_settled = false;
     return;
@@ -293,9 +293,10 @@ void CpuBackend::Impl::draw(std::unique_lock<std::mutex>& lock) {
   stage = now.next(wanted);
 }
 
-Result<Picture> CpuBackend::Impl::picture_of(const ViewRequest& wanted, const Stage& now, const Progress& goes_on) {
+Result<RenderedImage> CpuBackend::Impl::rendered_of(const ViewRequest& wanted, const Stage& now,
+                                                    const Progress& goes_on) {
   if (wanted.mode == DrawMode::Density) return draw_densities(scene, wanted, now, options);
-  if (wanted.mode == DrawMode::Paths) return path_picture(wanted, now, goes_on);
+  if (wanted.mode == DrawMode::Paths) return path_image(wanted, now, goes_on);
   paths.reset();
   are_paths_stale = true;
   RenderOptions render = options_for(wanted, now);
@@ -310,7 +311,8 @@ Result<Picture> CpuBackend::Impl::picture_of(const ViewRequest& wanted, const St
   return smooth->renderer->render(wanted.camera, render, options.threads, goes_on);
 }
 
-Result<Picture> CpuBackend::Impl::path_picture(const ViewRequest& wanted, const Stage& now, const Progress& goes_on) {
+Result<RenderedImage> CpuBackend::Impl::path_image(const ViewRequest& wanted, const Stage& now,
+                                                   const Progress& goes_on) {
   smooth.reset();
   is_smooth_stale = true;
   prepare_paths();
@@ -322,10 +324,10 @@ Result<Picture> CpuBackend::Impl::path_picture(const ViewRequest& wanted, const 
   count_bytes();
   auto colour = develop(*taken, develop_options(wanted));
   if (!colour) return colour.error();
-  Picture picture;
-  picture.colour = std::move(*colour);
-  picture.rays = taken->rays;
-  return picture;
+  RenderedImage image;
+  image.colour = std::move(*colour);
+  image.rays = taken->rays;
+  return image;
 }
 
 void CpuBackend::Impl::prepare_paths() {
@@ -337,7 +339,7 @@ void CpuBackend::Impl::prepare_paths() {
     Preparing& operator=(const Preparing&) = delete;
     std::atomic<bool>& flag;
   } const preparing(is_preparing_paths);
-  tell();
+  report();
   if (paths) {
     paths->tracer.update(options.threads);
     paths->bounds = scene.bounds(options.instances);
@@ -351,15 +353,15 @@ void CpuBackend::Impl::prepare_paths() {
 // Makes the fields, or updates their changed parts.
 Status CpuBackend::Impl::prepare_smooth(const Progress& goes_on) {
   if (!is_smooth_stale) return {};
-  const auto tell_how_far = [&](double share) {
+  const auto report_progress = [&](double share) {
     const int percent = static_cast<int>(share * 100.0);
-    if (smooth_percent.exchange(percent) != percent) tell();
+    if (smooth_percent.exchange(percent) != percent) report();
     return goes_on(share);
   };
   Status made = [&]() -> Status {
     try {
       if (!smooth) smooth = std::make_unique<SmoothPart>(options);
-      if (Status updated = smooth->fields.update(scene, options.threads, tell_how_far); !updated) return updated;
+      if (Status updated = smooth->fields.update(scene, options.threads, report_progress); !updated) return updated;
       if (smooth->renderer) {
         smooth->renderer->update(options.threads);
       } else {
@@ -386,14 +388,14 @@ void CpuBackend::Impl::refuse_smooth(Error why) {
   refusal = std::move(why);
 }
 
-void CpuBackend::Impl::publish(Result<Picture> picture, const ViewRequest& of, const Stage& drawn, double seconds) {
-  if (!picture) {
-    error = picture.error();
+void CpuBackend::Impl::publish(Result<RenderedImage> image, const ViewRequest& of, const Stage& drawn, double seconds) {
+  if (!image) {
+    error = image.error();
     return;
   }
-  const bool is_whole = picture->colour.width == of.width && picture->colour.height == of.height;
-  frame = ViewFrame{std::move(picture->colour), nullptr, of.mode,      drawn.samples, is_whole,
-                    drawn.is_last(of),          seconds, picture->rays};
+  const bool is_whole = image->colour.width == of.width && image->colour.height == of.height;
+  frame = ViewFrame{std::move(image->colour), nullptr, of.mode,    drawn.samples, is_whole,
+                    drawn.is_last(of),        seconds, image->rays};
   if (drawn.samples == 1) note_speed(drawn, of, seconds);
 }
 

@@ -85,7 +85,7 @@ struct Watched {
   CpuBackend backend;
 };
 
-TEST(CpuBackend, NoPictureOfAnEarlierRequestIsSettled) {
+TEST(CpuBackend, NoImageOfAnEarlierRequestIsSettled) {
   const LoadedScene loaded = small_scene();
   Watched watched(loaded.scene, 10.0);
   ViewRequest request = request_for(loaded.scene, View::Iso);
@@ -102,7 +102,7 @@ TEST(CpuBackend, NoPictureOfAnEarlierRequestIsSettled) {
   EXPECT_FALSE(frame->colour.width == request.width && frame->is_settled);
 }
 
-TEST(CpuBackend, PathsConvergeToThePathTracersPicture) {
+TEST(CpuBackend, PathsConvergeToThePathTracersImage) {
   const LoadedScene loaded = small_scene();
   Watched watched(loaded.scene);
   ViewRequest request = request_for(loaded.scene, View::Iso, 48, 32);
@@ -125,9 +125,9 @@ TEST(CpuBackend, PathsConvergeToThePathTracersPicture) {
   options.samples = frames.back().samples;
   options.denoise = true;
   options.sun = request.light.sun;
-  const auto picture = PathTracer(loaded.scene).render(request.camera, options);
-  ASSERT_TRUE(picture.has_value());
-  EXPECT_EQ(frames.back().colour.rgb, develop(*picture, {1.5, ToneCurve::Aces}).value().rgb);
+  const auto image = PathTracer(loaded.scene).render(request.camera, options);
+  ASSERT_TRUE(image.has_value());
+  EXPECT_EQ(frames.back().colour.rgb, develop(*image, {1.5, ToneCurve::Aces}).value().rgb);
   // Switches to another mode and back.
   request.mode = DrawMode::Rays;
   watched.backend.show(request);
@@ -162,9 +162,9 @@ TEST(CpuBackend, PathsGoOnAcrossEditsAndBeginAgainWithTheView) {
   EXPECT_GT(differing(after.back().colour, before, 8), 0.001);
   EXPECT_EQ(after.back().samples, kPathSamples);
   PathOptions options = path_options(request, request.width, request.height, kPathSamples, loaded.scene.bounds());
-  const auto picture = PathTracer(loaded.scene).render(request.camera, options, {2});
-  ASSERT_TRUE(picture.has_value());
-  EXPECT_EQ(after.back().colour.rgb, develop(*picture, develop_options(request)).value().rgb);
+  const auto image = PathTracer(loaded.scene).render(request.camera, options, {2});
+  ASSERT_TRUE(image.has_value());
+  EXPECT_EQ(after.back().colour.rgb, develop(*image, develop_options(request)).value().rgb);
   // The same after undoing the edit.
   const auto again = edited(corner, 1);
   ASSERT_FALSE(again.empty());
@@ -178,7 +178,7 @@ TEST(CpuBackend, PathsGoOnAcrossEditsAndBeginAgainWithTheView) {
   EXPECT_LT(elsewhere.front().colour.width, request.width);
 }
 
-TEST(CpuBackend, TheSettledPictureIsTheRenderersToTheByte) {
+TEST(CpuBackend, TheSettledImageIsTheRenderersToTheByte) {
   const LoadedScene loaded = small_scene();
   Watched watched(loaded.scene);
   for (const View view : {View::Iso, View::Top}) {
@@ -209,9 +209,9 @@ TEST(CpuBackend, PathsShowTheNightAsRaysDo) {
     request.light.sun = {0.0, std::sin(radians), std::cos(radians)};
     const double marched = mean(expected(loaded.scene, request));
     const auto options = path_options(request, 48, 32, 16, loaded.scene.bounds());
-    const auto picture = PathTracer(loaded.scene).render(request.camera, options, {2});
-    ASSERT_TRUE(picture.has_value());
-    const double traced = mean(develop(*picture, develop_options(request)).value());
+    const auto rendered = PathTracer(loaded.scene).render(request.camera, options, {2});
+    ASSERT_TRUE(rendered.has_value());
+    const double traced = mean(develop(*rendered, develop_options(request)).value());
     EXPECT_GT(traced, 0.5 * marched) << degrees;
     EXPECT_LT(traced, 2.0 * marched) << degrees;
   }
@@ -256,7 +256,7 @@ TEST(CpuBackend, DrawsAtALowerPriorityThanTheWindow) {
 }
 #endif
 
-TEST(CpuBackend, PicturesBecomeFiner) {
+TEST(CpuBackend, ImagesBecomeFiner) {
   const LoadedScene loaded = small_scene();
   Watched watched(loaded.scene);
   watched.backend.show(request_for(loaded.scene, View::Iso, 400, 300));
@@ -291,7 +291,7 @@ TEST(CpuBackend, MovingPicturesAreNeverUnderAQuarterOfTheSizeHoweverSlow) {
   EXPECT_EQ(frames.back().colour.rgb, expected(loaded.scene, request).rgb);
 }
 
-TEST(CpuBackend, MovingPicturesAreWholeWhereThereIsTime) {
+TEST(CpuBackend, MovingImagesAreWholeWhereThereIsTime) {
   const LoadedScene loaded = small_scene();
   Watched watched(loaded.scene, 1e9);
   ViewRequest request = request_for(loaded.scene, View::Iso);

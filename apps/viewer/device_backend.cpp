@@ -20,12 +20,12 @@ constexpr int kSamplesAtRest = 4;  // the same as meshes
 
 struct DeviceBackend::Impl {
   /// The state that the drawing thread publishes, because only it can access the drawer.
-  struct Told {
+  struct Reported {
     std::string name;
     std::string activity;
     std::optional<double> progress;  // of `activity`
     std::vector<std::pair<std::string, std::string>> stats;
-    std::size_t picture_bytes = 0;
+    std::size_t image_bytes = 0;
     bool has_scene = false;
     bool traces_light = false;
     bool is_processor = false;  // a software device
@@ -69,7 +69,7 @@ struct DeviceBackend::Impl {
     const LightOptions& light = request->light;
     const bool has_shadows = light.model == LightModel::Rays && (light.shadows || light.max_lamps > 0);
     const bool wants_rays = has_shadows || light.glass_surfaces;
-    return told.is_processor && is_marched_alike(request->mode) && request->wireframe == Wireframe::Off &&
+    return reported.is_processor && is_marched_alike(request->mode) && request->wireframe == Wireframe::Off &&
            light.shading == Shading::Lit && wants_rays;
   }
   [[nodiscard]] ViewRequest request_of_light() const;
@@ -77,7 +77,7 @@ struct DeviceBackend::Impl {
   [[nodiscard]] std::optional<ViewFrame> draw_here();
   void show_by_processor();
   void give_up_device();
-  [[nodiscard]] Told tell() const;
+  [[nodiscard]] Reported report() const;
 
   // The drawing thread.
   void start();
@@ -116,7 +116,7 @@ struct DeviceBackend::Impl {
   bool is_refused = false;  // the processor refused smooth surfaces of voxels
   std::optional<ViewFrame> frame;
   std::optional<Error> error;
-  Told told;
+  Reported reported;
 };
 
 DeviceBackend::DeviceBackend(const Scene& scene, const DeviceBackendOptions& options, OpenDevice open_device,
@@ -201,7 +201,7 @@ void DeviceBackend::Impl::step(std::unique_lock<std::mutex>& lock) {
 
 // Reads the scene only briefly, so that edits do not wait for the device.
 Result<std::optional<ViewFrame>> DeviceBackend::Impl::draw_apart(std::unique_lock<std::mutex>& lock) {
-  if (drawer->renderer() == nullptr) told.activity = "opening a device";
+  if (drawer->renderer() == nullptr) reported.activity = "opening a device";
   lock.unlock();
   if (Status opened = drawer->open(); !opened) return opened.error();
   lock.lock();
@@ -213,7 +213,7 @@ Result<std::optional<ViewFrame>> DeviceBackend::Impl::draw_apart(std::unique_loc
   lock.unlock();
   if (Status read = drawer->read_scene(); !read) return read.error();
   lock.lock();
-  told = tell();
+  reported = report();
   // When stopping, skips compiling shaders and drawing an image that would not be shown.
   if (is_stopped) return std::optional<ViewFrame>();
   is_reading = drawer->draws_from_scene();
@@ -232,10 +232,10 @@ void DeviceBackend::Impl::publish(Result<std::optional<ViewFrame>> drawn, DrawMo
   if (!drawn) {
     error = drawn.error();
     is_device_gone = true;
-    told = {};
+    reported = {};
     return;
   }
-  told = tell();
+  reported = report();
   // The request may have changed meanwhile.
   if (!*drawn || request->mode != mode) return;
   frame = std::move(**drawn);
@@ -245,11 +245,11 @@ void DeviceBackend::Impl::publish(Result<std::optional<ViewFrame>> drawn, DrawMo
   if (rests) frame->is_settled = false;
 }
 
-DeviceBackend::Impl::Told DeviceBackend::Impl::tell() const {
-  Told now;
+DeviceBackend::Impl::Reported DeviceBackend::Impl::report() const {
+  Reported now;
   if (drawer->renderer() != nullptr) now.name = drawer->renderer()->device().name;
   now.stats = drawer->stats();
-  now.picture_bytes = drawer->picture_bytes();
+  now.image_bytes = drawer->image_bytes();
   now.has_scene = drawer->has_scene();
   now.is_processor = drawer->is_processor();
   now.traces_light = drawer->renderer() != nullptr && !now.is_processor;
@@ -328,7 +328,7 @@ void DeviceBackend::forget_device() {
 std::string DeviceBackend::name() const {
   const Impl& me = *impl_;
   const std::lock_guard lock(me.mutex);
-  const std::string device = me.has_thread() || !me.drawer ? me.told.name : me.tell().name;
+  const std::string device = me.has_thread() || !me.drawer ? me.reported.name : me.report().name;
   return me.uses_device() && !device.empty() ? device : me.cpu.name();
 }
 
@@ -336,8 +336,8 @@ bool DeviceBackend::traces_light(DrawMode mode) const {
   if (!has_meshes(mode)) return ViewBackend::traces_light(mode);
   const Impl& me = *impl_;
   const std::lock_guard lock(me.mutex);
-  if (!me.has_thread() && me.drawer) return me.tell().traces_light;
-  return me.told.traces_light || (me.told.is_processor && me.is_marched_alike(mode));
+  if (!me.has_thread() && me.drawer) return me.report().traces_light;
+  return me.reported.traces_light || (me.reported.is_processor && me.is_marched_alike(mode));
 }
 
 bool DeviceBackend::can_draw(DrawMode mode) const {
@@ -395,7 +395,7 @@ std::vector<std::pair<std::string, std::string>> DeviceBackend::stats() const {
   const Impl& me = *impl_;
   const std::lock_guard lock(me.mutex);
   if (!me.uses_device() || !me.drawer) return {};
-  return me.has_thread() ? me.told.stats : me.drawer->stats();
+  return me.has_thread() ? me.reported.stats : me.drawer->stats();
 }
 
 // The ray tracing structures are as large on a device as in memory here.
@@ -403,17 +403,17 @@ std::size_t DeviceBackend::bytes() const {
   const Impl& me = *impl_;
   const std::lock_guard lock(me.mutex);
   const bool is_here = !me.has_thread() && me.drawer;
-  const bool has_scene = is_here ? me.drawer->has_scene() : me.told.has_scene;
-  const std::size_t picture_bytes = is_here ? me.drawer->picture_bytes() : me.told.picture_bytes;
-  return me.cpu.bytes() * (has_scene ? 2 : 1) + picture_bytes;
+  const bool has_scene = is_here ? me.drawer->has_scene() : me.reported.has_scene;
+  const std::size_t image_bytes = is_here ? me.drawer->image_bytes() : me.reported.image_bytes;
+  return me.cpu.bytes() * (has_scene ? 2 : 1) + image_bytes;
 }
 
 std::string DeviceBackend::activity() const {
   const Impl& me = *impl_;
   const std::lock_guard lock(me.mutex);
   if (!me.uses_device() || !me.drawer) return me.cpu.activity();
-  if (!me.has_thread()) return me.tell().activity;
-  if (!me.told.activity.empty()) return me.told.activity;
+  if (!me.has_thread()) return me.report().activity;
+  if (!me.reported.activity.empty()) return me.reported.activity;
   if (me.is_refused && me.request->mode == DrawMode::Smooth) return "too large for shadows";
   return me.rests ? me.cpu.activity() : "";
 }
@@ -422,14 +422,14 @@ std::optional<double> DeviceBackend::progress() const {
   const Impl& me = *impl_;
   const std::lock_guard lock(me.mutex);
   if (!me.uses_device() || !me.drawer) return std::nullopt;
-  return me.has_thread() ? me.told.progress : me.tell().progress;
+  return me.has_thread() ? me.reported.progress : me.report().progress;
 }
 
 bool DeviceBackend::is_slow(DrawMode mode) const {
   const Impl& me = *impl_;
   const std::lock_guard lock(me.mutex);
   if (!me.drawer) return false;
-  return me.has_thread() ? me.told.is_slow.at(static_cast<std::size_t>(mode)) : me.drawer->is_slow(mode);
+  return me.has_thread() ? me.reported.is_slow.at(static_cast<std::size_t>(mode)) : me.drawer->is_slow(mode);
 }
 
 bool DeviceBackend::ends_late() const {

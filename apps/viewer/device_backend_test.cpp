@@ -61,7 +61,7 @@ class DeviceBackendTest : public ::testing::Test {
 
   /// Returns the frames until the image has settled, requested as a window does; empty if it did not within a minute.
   static std::vector<Image> settle(DeviceBackend& backend) {
-    std::vector<Image> pictures;
+    std::vector<Image> images;
     const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
     while (std::chrono::steady_clock::now() < end) {
       const auto frame = backend.take();
@@ -72,8 +72,8 @@ class DeviceBackendTest : public ::testing::Test {
       }
       auto image = frame->on_device ? frame->on_device->read() : Result<Image>(frame->colour);
       EXPECT_TRUE(image) << to_string(image.error());
-      pictures.push_back(std::move(*image));
-      if (frame->is_settled) return pictures;
+      images.push_back(std::move(*image));
+      if (frame->is_settled) return images;
     }
     return {};
   }
@@ -132,16 +132,16 @@ TEST_F(DeviceBackendTest, RaysSettleOnTheProcessorsPictureAndFollowEdits) {
   const ViewRequest request = request_for(document, DrawMode::Rays);
   backend->show(request);
   EXPECT_TRUE(backend->wants_frames());
-  auto pictures = settle(*backend);
-  ASSERT_FALSE(pictures.empty());
-  EXPECT_LT(differing(pictures.back(), by_processor(document, request), 2), 0.001);
+  auto images = settle(*backend);
+  ASSERT_FALSE(images.empty());
+  EXPECT_LT(differing(images.back(), by_processor(document, request), 2), 0.001);
   EXPECT_FALSE(backend->wants_frames());
   EXPECT_FALSE(backend->take());
   edit(document, *backend, {30, 12, 20});
   EXPECT_TRUE(backend->wants_frames());
-  pictures = settle(*backend);
-  ASSERT_FALSE(pictures.empty());
-  EXPECT_LT(differing(pictures.back(), by_processor(document, request), 2), 0.001);
+  images = settle(*backend);
+  ASSERT_FALSE(images.empty());
+  EXPECT_LT(differing(images.back(), by_processor(document, request), 2), 0.001);
 }
 
 TEST_F(DeviceBackendTest, MeshesShowTheScenePromptlyAndFollowEditsAndUndo) {
@@ -152,23 +152,23 @@ TEST_F(DeviceBackendTest, MeshesShowTheScenePromptlyAndFollowEditsAndUndo) {
   request.light.occlusion_mode = OcclusionMode::Vertex;
   request.light.shadows = false;
   backend->show(request);
-  auto pictures = settle(*backend);
-  ASSERT_FALSE(pictures.empty());
-  const Image before = pictures.back();
+  auto images = settle(*backend);
+  ASSERT_FALSE(images.empty());
+  const Image before = images.back();
   // Glass and silhouettes differ a little; see VulkanMeshRenderer.
   EXPECT_LT(differing(before, by_processor(document, request), 6), 0.05);
   edit(document, *backend, {30, 12, 20});
-  pictures = settle(*backend);
-  ASSERT_FALSE(pictures.empty());
-  EXPECT_GT(differing(before, pictures.back(), 6), 0.003) << "the edit is seen";
-  EXPECT_LT(differing(pictures.back(), by_processor(document, request), 6), 0.05);
+  images = settle(*backend);
+  ASSERT_FALSE(images.empty());
+  EXPECT_GT(differing(before, images.back(), 6), 0.003) << "the edit is seen";
+  EXPECT_LT(differing(images.back(), by_processor(document, request), 6), 0.05);
   {
     const ScenePause pause(*backend);
     ASSERT_TRUE(document.undo());
   }
-  pictures = settle(*backend);
-  ASSERT_FALSE(pictures.empty());
-  EXPECT_EQ(pictures.back().rgb, before.rgb);
+  images = settle(*backend);
+  ASSERT_FALSE(images.empty());
+  EXPECT_EQ(images.back().rgb, before.rgb);
   EXPECT_FALSE(backend->stats().empty());
 }
 
@@ -186,10 +186,10 @@ TEST_F(DeviceBackendTest, EveryModeAndShadingDraws) {
         request.light.shading = shading;
         request.wireframe = wireframe;
         backend->show(request);
-        const auto pictures = settle(*backend);
-        ASSERT_FALSE(pictures.empty());
-        for (const Image& other : all) EXPECT_GT(differing(other, pictures.back(), 6), 0.001);
-        all.push_back(pictures.back());
+        const auto images = settle(*backend);
+        ASSERT_FALSE(images.empty());
+        for (const Image& other : all) EXPECT_GT(differing(other, images.back(), 6), 0.001);
+        all.push_back(images.back());
       }
     }
   }
@@ -204,7 +204,7 @@ TEST_F(DeviceBackendTest, PathsConvergeAndFollowEdits) {
   request.width = 48;
   request.height = 32;
   backend->show(request);
-  const auto picture_of = [&](int samples) {
+  const auto rendered_of = [&](int samples) {
     Image image;
     const bool came = comes([&] {
       const auto frame = backend->take();
@@ -220,7 +220,7 @@ TEST_F(DeviceBackendTest, PathsConvergeAndFollowEdits) {
     const PathOptions options = path_options(request, request.width, request.height, 4, scene.bounds());
     return develop(PathTracer(scene).render(request.camera, options).value(), develop_options(request)).value();
   };
-  const Image before = picture_of(4);
+  const Image before = rendered_of(4);
   EXPECT_LT(differing(before, by_paths(), 4), 0.02);
   edit(document, *backend, {30, 12, 20});
   Image first;
@@ -231,7 +231,7 @@ TEST_F(DeviceBackendTest, PathsConvergeAndFollowEdits) {
   }));
   EXPECT_EQ(first.width, request.width) << "as large as the image before";
   EXPECT_LT(differing(first, before, 8), 0.3) << "most of it stays";
-  const Image after = picture_of(4);
+  const Image after = rendered_of(4);
   EXPECT_GT(differing(before, after, 4), 0.001);
   EXPECT_LT(differing(after, by_paths(), 4), 0.02);
   EXPECT_EQ(backend->name(), renderer_->device().name);
@@ -248,8 +248,8 @@ TEST_F(DeviceBackendTest, PathTracingTimesDoNotAffectRays) {
   ViewRequest request = request_for(document, DrawMode::Rays);
   const auto width_of_first = [&] {
     backend->show(request);
-    const std::vector<Image> pictures = settle(*backend);
-    return pictures.empty() ? 0 : pictures.front().width;
+    const std::vector<Image> images = settle(*backend);
+    return images.empty() ? 0 : images.front().width;
   };
   EXPECT_EQ(width_of_first(), 20) << "no time is known yet";
   request.camera.position.y += 1.0;
@@ -277,8 +277,8 @@ TEST_F(DeviceBackendTest, SmoothMeshesTakeTheOcclusionThatIsWanted) {
   const auto shown = [&](const SmoothOcclusionOptions& smooth) {
     request.light.smooth_occlusion = smooth;
     backend->show(request);
-    const auto pictures = settle(*backend);
-    return pictures.empty() ? Image{} : pictures.back();
+    const auto images = settle(*backend);
+    return images.empty() ? Image{} : images.back();
   };
   const Image plain = shown({});
   ASSERT_FALSE(plain.rgb.empty());
@@ -296,9 +296,9 @@ TEST_F(DeviceBackendTest, SmoothMeshesTakeTheOcclusionThatIsWanted) {
   const Image edited = shown({SmoothOcclusion::Weighted, 3.0F, 0.4F, 2.0F});
   const auto fresh = backend_of(document);
   fresh->show(request);
-  const auto pictures = settle(*fresh);
-  ASSERT_FALSE(pictures.empty());
-  EXPECT_EQ(edited.rgb, pictures.back().rgb);
+  const auto images = settle(*fresh);
+  ASSERT_FALSE(images.empty());
+  EXPECT_EQ(edited.rgb, images.back().rgb);
 }
 
 TEST_F(DeviceBackendTest, TheProcessorMarchesRaysWithSmoothOcclusion) {
@@ -309,9 +309,9 @@ TEST_F(DeviceBackendTest, TheProcessorMarchesRaysWithSmoothOcclusion) {
   ASSERT_FALSE(settle(*backend).empty());
   request.light.occlusion_mode = OcclusionMode::Smooth;
   backend->show(request);
-  const auto pictures = settle(*backend);
-  ASSERT_FALSE(pictures.empty());
-  EXPECT_EQ(pictures.back().rgb, by_processor(document, request).rgb);
+  const auto images = settle(*backend);
+  ASSERT_FALSE(images.empty());
+  EXPECT_EQ(images.back().rgb, by_processor(document, request).rgb);
 }
 
 TEST_F(DeviceBackendTest, TheProcessorMarchesRaysWhereThatIsFaster) {
@@ -319,9 +319,9 @@ TEST_F(DeviceBackendTest, TheProcessorMarchesRaysWhereThatIsFaster) {
   const auto backend = backend_of(document, false);
   const ViewRequest request = request_for(document, DrawMode::Rays);
   backend->show(request);
-  const auto pictures = settle(*backend);
-  ASSERT_FALSE(pictures.empty());
-  EXPECT_EQ(pictures.back().rgb, by_processor(document, request).rgb);
+  const auto images = settle(*backend);
+  ASSERT_FALSE(images.empty());
+  EXPECT_EQ(images.back().rgb, by_processor(document, request).rgb);
   EXPECT_EQ(backend->name(), "processor");
 }
 
@@ -335,9 +335,9 @@ TEST_F(DeviceBackendTest, TheDeviceDrawsLevelsOfDetail) {
   for (const double times : {1.0, 6.0}) {
     request.camera.position *= times;
     backend->show(request);
-    const auto pictures = settle(*backend);
-    ASSERT_FALSE(pictures.empty());
-    EXPECT_LT(differing(pictures.back(), by_processor(document, request), 2), 0.001) << times;
+    const auto images = settle(*backend);
+    ASSERT_FALSE(images.empty());
+    EXPECT_LT(differing(images.back(), by_processor(document, request), 2), 0.001) << times;
     EXPECT_EQ(backend->name(), renderer_->device().name);
   }
 }
@@ -356,9 +356,9 @@ TEST_F(DeviceBackendTest, MeshesHaveLevelsOfDetail) {
   for (const double times : {1.1, 6.0}) {
     request.camera.position *= times;
     backend->show(request);
-    const auto pictures = settle(*backend);
-    ASSERT_FALSE(pictures.empty());
-    EXPECT_LT(differing(pictures.back(), by_processor(document, request), 6), 0.05) << times;
+    const auto images = settle(*backend);
+    ASSERT_FALSE(images.empty());
+    EXPECT_LT(differing(images.back(), by_processor(document, request), 6), 0.05) << times;
     EXPECT_FALSE(backend->wants_frames());
   }
 }
@@ -390,33 +390,33 @@ TEST_F(DeviceBackendTest, DrawsTheSameOnAThreadAndFollowsEdits) {
   auto made = VulkanRenderer::create();
   ASSERT_TRUE(made);
   renderer_ = std::make_shared<VulkanRenderer>(std::move(*made));
-  const auto apart = backend_of(document, false);
+  const auto separate = backend_of(document, false);
   for (const DrawMode mode : {DrawMode::Blocks, DrawMode::Smooth, DrawMode::Blocks}) {
     const ViewRequest request = request_for(document, mode);
     for (const bool is_edited : {false, true}) {
       SCOPED_TRACE(is_edited);
       if (is_edited) {
         const ScenePause pause(*at_once);
-        edit(document, *apart, {30, 12, 20});
+        edit(document, *separate, {30, 12, 20});
       }
-      apart->show(request);
+      separate->show(request);
       at_once->show(request);
-      const auto pictures = settle(*apart);
+      const auto images = settle(*separate);
       const auto same = settle(*at_once);
-      ASSERT_FALSE(pictures.empty());
+      ASSERT_FALSE(images.empty());
       ASSERT_FALSE(same.empty());
       // On a software device the processor adds ray-traced light in the end.
       const bool is_lit_after = is_processor();
-      const auto drawn = is_lit_after ? std::ranges::find(pictures, same.back().rgb, &Image::rgb) : pictures.end() - 1;
-      ASSERT_NE(drawn, pictures.end());
+      const auto drawn = is_lit_after ? std::ranges::find(images, same.back().rgb, &Image::rgb) : images.end() - 1;
+      ASSERT_NE(drawn, images.end());
       EXPECT_EQ(drawn->rgb, same.back().rgb);
-      EXPECT_EQ(drawn + 1 == pictures.end(), !is_lit_after);
-      EXPECT_FALSE(apart->wants_frames()) << "the thread announces its frames";
-      EXPECT_EQ(apart->activity(), "");
-      EXPECT_EQ(apart->name(), renderer_->device().name);
-      EXPECT_FALSE(apart->stats().empty());
+      EXPECT_EQ(drawn + 1 == images.end(), !is_lit_after);
+      EXPECT_FALSE(separate->wants_frames()) << "the thread announces its frames";
+      EXPECT_EQ(separate->activity(), "");
+      EXPECT_EQ(separate->name(), renderer_->device().name);
+      EXPECT_FALSE(separate->stats().empty());
     }
-    const ScenePause pause_apart(*apart);
+    const ScenePause pause_apart(*separate);
     const ScenePause pause_at_once(*at_once);
     ASSERT_TRUE(document.undo());
   }
@@ -445,12 +445,12 @@ TEST_P(DeviceBackendLight, IsAllThereAtRestWhereAProcessorActsAsTheDevice) {
     if (round == 1) edit(document, *backend, {30, 12, 20});
     if (round == 2) request.camera.position.x += 3.0;
     backend->show(request);
-    const auto pictures = settle(*backend);
-    ASSERT_GE(pictures.size(), 2U);
-    EXPECT_EQ(pictures.back().rgb, wanted().rgb);
-    const auto whole = std::ranges::find(pictures, request.width, &Image::width);
-    ASSERT_NE(whole, pictures.end());
-    EXPECT_GT(differing(*whole, pictures.back(), 8), 0.02) << "the device's image has no shadows";
+    const auto images = settle(*backend);
+    ASSERT_GE(images.size(), 2U);
+    EXPECT_EQ(images.back().rgb, wanted().rgb);
+    const auto whole = std::ranges::find(images, request.width, &Image::width);
+    ASSERT_NE(whole, images.end());
+    EXPECT_GT(differing(*whole, images.back(), 8), 0.02) << "the device's image has no shadows";
     EXPECT_TRUE(backend->traces_light(GetParam()));
     EXPECT_EQ(backend->activity(), "");
     EXPECT_FALSE(backend->take());
@@ -481,9 +481,9 @@ TEST_F(DeviceBackendTest, SmoothScenesThatAreTooLargeForLightSaySoAndStayTheDevi
     if (round == 1) request.camera.position.x += 3.0;
     if (round == 2) edit(document, *backend, {30, 12, 20});
     backend->show(request);
-    const auto pictures = settle(*backend);
-    ASSERT_FALSE(pictures.empty());
-    EXPECT_EQ(pictures.back().width, request.width);
+    const auto images = settle(*backend);
+    ASSERT_FALSE(images.empty());
+    EXPECT_EQ(images.back().width, request.width);
     EXPECT_EQ(backend->activity(), "too large for shadows");
     EXPECT_FALSE(backend->traces_light(DrawMode::Smooth));
     EXPECT_TRUE(backend->traces_light(DrawMode::Blocks));
@@ -522,14 +522,14 @@ TEST_F(DeviceBackendTest, WhileADeviceOpensThereAreRaysAndEdits) {
     edit(document, backend, {20 + 4 * i, 12, 20});
   }
   go_on.set_value();
-  const auto pictures = settle(backend);
-  ASSERT_FALSE(pictures.empty());
+  const auto images = settle(backend);
+  ASSERT_FALSE(images.empty());
   EXPECT_TRUE(comes([&] { return !backend.ends_late(); }));
   const auto fresh = backend_of(document);
   fresh->show(request);
   const auto same = settle(*fresh);
   ASSERT_FALSE(same.empty());
-  EXPECT_EQ(pictures.back().rgb, same.back().rgb);
+  EXPECT_EQ(images.back().rgb, same.back().rgb);
 }
 
 TEST_F(DeviceBackendTest, MeshPicturesAreNeverUnderAQuarterOfTheSizeHoweverSlow) {
@@ -547,9 +547,9 @@ TEST_F(DeviceBackendTest, MeshPicturesAreNeverUnderAQuarterOfTheSizeHoweverSlow)
     EXPECT_GE(frame->colour.width, 40);
     EXPECT_GE(frame->colour.height, 25);
   }
-  const auto pictures = settle(*backend);
-  ASSERT_FALSE(pictures.empty());
-  EXPECT_EQ(pictures.back().width, request.width);
+  const auto images = settle(*backend);
+  ASSERT_FALSE(images.empty());
+  EXPECT_EQ(images.back().width, request.width);
 }
 
 TEST_F(DeviceBackendTest, ReportsModesThatTakeTooLong) {
@@ -587,11 +587,11 @@ TEST_F(DeviceBackendTest, ChunksStillToMeshAreCounted) {
   const Document document = wide_document();
   const auto backend = backend_of(document, false);
   backend->show(request_for(document, DrawMode::Blocks));
-  std::vector<std::string> told;
+  std::vector<std::string> reported;
   double furthest = -1.0;
   ASSERT_TRUE(comes([&] {
     const std::string now = backend->activity();
-    if (told.empty() || told.back() != now) told.push_back(now);
+    if (reported.empty() || reported.back() != now) reported.push_back(now);
     if (const auto progress = backend->progress()) {
       EXPECT_GE(*progress, 0.0);
       EXPECT_LT(*progress, 1.0);
@@ -600,9 +600,9 @@ TEST_F(DeviceBackendTest, ChunksStillToMeshAreCounted) {
     const auto frame = backend->take();
     return frame && frame->is_settled;
   }));
-  EXPECT_NE(
-      std::find_if(told.begin(), told.end(), [](const std::string& text) { return text.starts_with("meshing "); }),
-      told.end());
+  EXPECT_NE(std::find_if(reported.begin(), reported.end(),
+                         [](const std::string& text) { return text.starts_with("meshing "); }),
+            reported.end());
   EXPECT_EQ(backend->activity(), "");
   EXPECT_GT(furthest, 0.0);
   EXPECT_FALSE(backend->progress());
@@ -688,10 +688,10 @@ TEST_F(DeviceBackendTest, TheFirstPictureIsSoonThereHoweverSlowTheDevice) {
       EXPECT_LT(first->on_device->width(), width) << "its time is not known yet";
     }
     if (first->is_settled) continue;
-    const auto pictures = settle(*backend);
-    ASSERT_FALSE(pictures.empty());
-    EXPECT_EQ(pictures.back().width, width);
-    EXPECT_EQ(pictures.back().height, height);
+    const auto images = settle(*backend);
+    ASSERT_FALSE(images.empty());
+    EXPECT_EQ(images.back().width, width);
+    EXPECT_EQ(images.back().height, height);
   }
 }
 
@@ -702,9 +702,9 @@ TEST_F(DeviceBackendTest, ADeviceThatIsForgottenIsStoodInFor) {
   backend->show(request);
   ASSERT_FALSE(settle(*backend).empty());
   backend->forget_device();
-  const auto pictures = settle(*backend);
-  ASSERT_FALSE(pictures.empty()) << "also without another request";
-  EXPECT_EQ(pictures.back().rgb, by_processor(document, request).rgb);
+  const auto images = settle(*backend);
+  ASSERT_FALSE(images.empty()) << "also without another request";
+  EXPECT_EQ(images.back().rgb, by_processor(document, request).rgb);
 }
 
 TEST_F(DeviceBackendTest, ManyRequestsEndWithTheLast) {
@@ -719,9 +719,9 @@ TEST_F(DeviceBackendTest, ManyRequestsEndWithTheLast) {
   }
   request.mode = DrawMode::Rays;
   backend->show(request);
-  const auto pictures = settle(*backend);
-  ASSERT_FALSE(pictures.empty());
-  EXPECT_LT(differing(pictures.back(), by_processor(document, request), 2), 0.001);
+  const auto images = settle(*backend);
+  ASSERT_FALSE(images.empty());
+  EXPECT_LT(differing(images.back(), by_processor(document, request), 2), 0.001);
 }
 
 }  // namespace

@@ -75,7 +75,7 @@ Status DeviceDrawer::open() {
   auto opened = open_device_();
   if (!opened) return opened.error();
   renderer_ = std::move(*opened);
-  picture_ = std::make_shared<VulkanPicture>(*renderer_);
+  image_ = std::make_shared<VulkanImage>(*renderer_);
   is_scene_new_ = true;
   return {};
 }
@@ -112,7 +112,7 @@ Result<std::optional<ViewFrame>> DeviceDrawer::read_and_draw() {
 Result<std::optional<ViewFrame>> DeviceDrawer::draw() {
   const Clock::time_point start = Clock::now();
   if ((request_->mode == DrawMode::Paths) != (paths_ != nullptr)) {
-    paths_ = paths_ ? nullptr : std::make_unique<VulkanPathPicture>(*renderer_);
+    paths_ = paths_ ? nullptr : std::make_unique<VulkanPathImage>(*renderer_);
     path_memory_.clear();
     seconds_per_sample_ = 0.0;
   }
@@ -202,8 +202,8 @@ std::pair<std::size_t, std::size_t> DeviceDrawer::meshing() const {
   return left == 0 ? std::pair{left, left} : std::pair{all - left, all};
 }
 
-MeshPictureOptions DeviceDrawer::mesh_picture() const {
-  MeshPictureOptions wanted;
+MeshImageOptions DeviceDrawer::mesh_image() const {
+  MeshImageOptions wanted;
   wanted.width = (request_->width + divisor_ - 1) / divisor_;
   wanted.height = (request_->height + divisor_ - 1) / divisor_;
   wanted.samples = samples_;
@@ -265,10 +265,10 @@ Result<bool> DeviceDrawer::draw_meshes() {
   samples_ = is_moving && is_processor() ? 1 : std::min(request_->samples, kMeshSamples);
   // Short-lived images do not wait for impostors; instances without one use halved grids.
   waits_ = !is_moving;
-  MeshPictureOptions wanted = mesh_picture();
+  MeshImageOptions wanted = mesh_image();
   wanted.detail.selector = &selectors_[divisor_];
   const Clock::time_point start = Clock::now();
-  if (Status drawn = meshes_->renderer.draw(*picture_, request_->camera, wanted, options_.cpu.threads); !drawn)
+  if (Status drawn = meshes_->renderer.draw(*image_, request_->camera, wanted, options_.cpu.threads); !drawn)
     return drawn.error();
   note_mesh_seconds(seconds_since(start), is_moving);
   const bool is_best =
@@ -312,7 +312,7 @@ Status DeviceDrawer::draw_stage() {
   RenderOptions wanted;
   wanted.width = stage.width;
   wanted.height = stage.height;
-  wanted.samples = samples_now(stage, picture_->samples(), request_->samples);
+  wanted.samples = samples_now(stage, image_->samples(), request_->samples);
   wanted.light = request_->light;
   wanted.detail.colours = request_->detail_colours;
   if (request_->detail_by_pixels) wanted.detail.policy.emplace().rule = DetailPolicy::Rule::ByPixels;
@@ -320,9 +320,9 @@ Status DeviceDrawer::draw_stage() {
   // Short-lived images do not wait for impostors.
   if (divisor_ > 1) wanted.detail.impostor_seconds = 0.0;
   const Clock::time_point start = Clock::now();
-  if (Status drawn = renderer_->draw(*picture_, request_->camera, wanted, stage.accumulation); !drawn) return drawn;
+  if (Status drawn = renderer_->draw(*image_, request_->camera, wanted, stage.accumulation); !drawn) return drawn;
   seconds_per_sample_ = seconds_since(start) / (stage.pixels() * wanted.samples);
-  is_settled_ = divisor_ == 1 && picture_->samples() >= request_->samples;
+  is_settled_ = divisor_ == 1 && image_->samples() >= request_->samples;
   return {};
 }
 
@@ -353,20 +353,20 @@ Result<bool> DeviceDrawer::draw_path_stage() {
   path_memory_.of(*request_).refine(*taken, paths_->samples(), options_.cpu.threads);
   const auto colour = develop(*taken, develop_options(*request_));
   if (!colour) return colour.error();
-  if (Status written = picture_->write(*colour); !written) return written.error();
+  if (Status written = image_->write(*colour); !written) return written.error();
   shown_samples_ = paths_->samples();
   return true;
 }
 
 ViewFrame DeviceDrawer::frame(double seconds) const {
   ViewFrame made;
-  made.on_device = picture_;
+  made.on_device = image_;
   made.mode = request_->mode;
-  made.samples = paths_ ? shown_samples_ : picture_->samples();
-  made.is_whole = picture_->width() == request_->width && picture_->height() == request_->height;
+  made.samples = paths_ ? shown_samples_ : image_->samples();
+  made.is_whole = image_->width() == request_->width && image_->height() == request_->height;
   made.is_settled = is_settled_;
   made.seconds = seconds;
-  made.rays = picture_->rays();
+  made.rays = image_->rays();
   return made;
 }
 

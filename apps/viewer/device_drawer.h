@@ -53,7 +53,7 @@ class DeviceDrawer {
   [[nodiscard]] std::pair<std::size_t, std::size_t> meshing() const;
   [[nodiscard]] std::vector<std::pair<std::string, std::string>> stats() const;
   /// Returns the bytes of meshes on the device and of the path tracing history.
-  [[nodiscard]] std::size_t picture_bytes() const {
+  [[nodiscard]] std::size_t image_bytes() const {
     return path_memory_.bytes() + (meshes_ ? meshes_->renderer.stats().bytes : 0);
   }
   /// Returns true if the device has the scene's voxels.
@@ -90,7 +90,7 @@ class DeviceDrawer {
   Status update_renderer();
   Status take_surfaces();
   void count_pending();
-  [[nodiscard]] MeshPictureOptions mesh_picture() const;
+  [[nodiscard]] MeshImageOptions mesh_image() const;
   Result<bool> draw_meshes();
   void note_mesh_seconds(double seconds, bool is_moving);
   [[nodiscard]] int moving_divisor() const;
@@ -118,8 +118,8 @@ class DeviceDrawer {
 
   std::shared_ptr<VulkanRenderer> renderer_;
   bool is_scene_new_ = true;  // not yet uploaded to the renderer
-  std::shared_ptr<VulkanPicture> picture_;
-  std::unique_ptr<VulkanPathPicture> paths_;  // null in other modes
+  std::shared_ptr<VulkanImage> image_;
+  std::unique_ptr<VulkanPathImage> paths_;  // null in other modes
   PathMemory path_memory_;
   int shown_samples_ = 0;  // of `paths_`
   std::unique_ptr<Meshes> meshes_;

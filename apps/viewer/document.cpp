@@ -240,7 +240,7 @@ Result<std::vector<std::string>> Document::losses(const std::filesystem::path& p
   std::vector<std::string> all;
   if (world_) return all;                      // the world itself, or a copy
   if (*format == FileFormat::Glb) return all;  // a copy
-  auto of_format = losses_of_saving(loaded_, path);
+  auto of_format = unsupported_features(loaded_, path);
   if (!of_format) return of_format.error();
   all = std::move(*of_format);
   std::error_code ignored;
@@ -249,7 +249,7 @@ Result<std::vector<std::string>> Document::losses(const std::filesystem::path& p
     all.emplace_back("changes that another program made to the file since it was opened (kept as " +
                      kept_as(path).filename().string() + ")");
   }
-  std::erase_if(all, [&](const std::string& line) { return accepted_losses_.contains(line); });
+  std::erase_if(all, [&](const std::string& line) { return accepted_unsupported_.contains(line); });
   return all;
 }
 

@@ -90,11 +90,11 @@ class Document {
 
   /// Returns the losses of saving to that path, a line each, except accepted ones: content that the format does not
   /// hold, and changes by another program to the document's own file since it was read. Errors: those of
-  /// losses_of_saving.
+  /// unsupported_features.
   [[nodiscard]] Result<std::vector<std::string>> losses(const std::filesystem::path& path) const;
   /// Records that the user accepts these losses; later saves do not ask about them again.
-  void accept_losses(const std::vector<std::string>& losses) {
-    accepted_losses_.insert(losses.begin(), losses.end());
+  void accept_unsupported(const std::vector<std::string>& losses) {
+    accepted_unsupported_.insert(losses.begin(), losses.end());
     has_newly_accepted_ = true;
   }
   /// Returns the path of the backup that `write` makes of an existing file; empty if it makes none.
@@ -138,7 +138,7 @@ class Document {
   EditHistory history_;
   std::uint64_t saved_state_ = 0;
   std::optional<FileStamp> stamp_;  ///< stamp of `path_` when it was read or written
-  std::set<std::string> accepted_losses_;
+  std::set<std::string> accepted_unsupported_;
   bool has_newly_accepted_ = false;            ///< since the last write
   std::set<std::filesystem::path> originals_;  ///< files whose backup holds content that saving lost
   std::optional<Stroke> stroke_;

@@ -431,7 +431,7 @@ TEST(Document, ReportsLossesOfSavingOnce) {
     EXPECT_EQ(saver.losses(), *losses);
   }
   EXPECT_FALSE(std::filesystem::exists(folder.file("as.json"))) << "the user is asked first";
-  (*document)->accept_losses(*losses);
+  (*document)->accept_unsupported(*losses);
   EXPECT_TRUE((*document)->losses(folder.file("as.json")).value().empty());
   EXPECT_TRUE((*document)->losses(folder.file("mesh.glb")).value().empty()) << "a copy";
   // Another program changes the file.
@@ -452,7 +452,7 @@ TEST(Document, KeepsBackupOfOriginalAfterLossySave) {
     EXPECT_TRUE((*document)->write(path, warnings));
     (*document)->note_written(path, (*document)->history().state());
   };
-  const auto accept = [&](const char* loss) { (*document)->accept_losses({loss}); };
+  const auto accept = [&](const char* loss) { (*document)->accept_unsupported({loss}); };
   const auto content = [&](const char* name) {
     return read_file(folder.file(name)).value_or(std::vector<std::byte>{});
   };

@@ -35,11 +35,11 @@ Loader::~Loader() {
 }
 
 void Loader::work(const LoadOptions& options, const WorldOptions& world, const MakeBackend& make_backend) {
-  const auto tell = [this](double share) {
+  const auto report = [this](double share) {
     fraction_ = share;
     return !is_abandoned_;
   };
-  auto document = Document::open(path_, options, tell, world);
+  auto document = Document::open(path_, options, report, world);
   if (!document) {
     result_ = document.error();
     return;
@@ -70,12 +70,13 @@ Result<OpenDocument> Loader::take() {
   return taken;
 }
 
-Saver::Saver(const Document& document, std::filesystem::path path, bool accepts_losses, std::function<void()> on_done)
+Saver::Saver(const Document& document, std::filesystem::path path, bool accepts_unsupported,
+             std::function<void()> on_done)
     : path_(std::move(path)), state_(document.history().state()) {
-  thread_ = std::thread([this, &document, accepts_losses, done = std::move(on_done)] {
+  thread_ = std::thread([this, &document, accepts_unsupported, done = std::move(on_done)] {
     yield_to_window();
     try {
-      status_ = work(document, accepts_losses);
+      status_ = work(document, accepts_unsupported);
     } catch (const std::bad_alloc&) {
       status_ = out_of_memory(path_);
     }
@@ -84,8 +85,8 @@ Saver::Saver(const Document& document, std::filesystem::path path, bool accepts_
   });
 }
 
-Status Saver::work(const Document& document, bool accepts_losses) {
-  if (!accepts_losses) {
+Status Saver::work(const Document& document, bool accepts_unsupported) {
+  if (!accepts_unsupported) {
     auto losses = document.losses(path_);
     if (!losses) return losses.error();
     losses_ = std::move(*losses);

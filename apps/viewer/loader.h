@@ -62,8 +62,8 @@ class Loader {
 /// Writes a document on a separate thread. The document must not be edited meanwhile.
 class Saver {
  public:
-  /// If saving would lose something and `accepts_losses` is false, writes nothing and reports it in `losses`.
-  Saver(const Document& document, std::filesystem::path path, bool accepts_losses, std::function<void()> on_done);
+  /// If saving would lose something and `accepts_unsupported` is false, writes nothing and reports it in `losses`.
+  Saver(const Document& document, std::filesystem::path path, bool accepts_unsupported, std::function<void()> on_done);
   Saver(const Saver&) = delete;
   Saver& operator=(const Saver&) = delete;
   /// Cancels, and waits.
@@ -82,7 +82,7 @@ class Saver {
   [[nodiscard]] const std::vector<std::string>& losses() const { return losses_; }
 
  private:
-  [[nodiscard]] Status work(const Document& document, bool accepts_losses);
+  [[nodiscard]] Status work(const Document& document, bool accepts_unsupported);
 
   std::filesystem::path path_;
   std::uint64_t state_;

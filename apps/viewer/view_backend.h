@@ -14,8 +14,8 @@
 #include <quoin/light/light_options.h>
 #include <quoin/render/path_history.h>
 #include <quoin/render/path_tracer.h>
+#include <quoin/render_vk/vulkan_image.h>
 #include <quoin/render_vk/vulkan_mesh_renderer.h>
-#include <quoin/render_vk/vulkan_picture.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/look.h>
 #include <quoin/scene/scene.h>
@@ -114,7 +114,7 @@ class PathMemory {
 struct ViewFrame {
   Image colour;  ///< may be smaller than requested; the window stretches it
   /// Replaces `colour` where the image stays on a graphics device. The next frame may be drawn into it.
-  std::shared_ptr<const VulkanPicture> on_device;
+  std::shared_ptr<const VulkanImage> on_device;
   DrawMode mode = DrawMode::Rays;  ///< the mode that it shows; a stand-in shows another mode than the request
   int samples = 0;                 ///< per pixel
   bool is_whole = false;           ///< has the requested size

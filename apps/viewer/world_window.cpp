@@ -41,7 +41,7 @@ double smallest_voxel(const Scene& scene) {
   bool is_first = true;
   for (const InstanceHandle handle : scene.instances().handles()) {
     const Instance& instance = scene.instances()[handle];
-    if (!has_place(instance)) continue;
+    if (!has_valid_transform(instance)) continue;
     smallest = std::exchange(is_first, false) ? instance.voxel_size : std::min(smallest, instance.voxel_size);
   }
   return smallest;
@@ -96,7 +96,7 @@ double WorldWindow::chunks_around(double radius) const {
   for (const InstanceHandle handle : scene().instances().handles()) {
     const Instance& instance = scene().instances()[handle];
     const SceneGrid* const grid = scene().grids().find(instance.grid);
-    if (grid == nullptr || !grid->grid.is_partial() || !has_place(instance)) continue;
+    if (grid == nullptr || !grid->grid.is_partial() || !has_valid_transform(instance)) continue;
     const double chunks = radius / (instance.voxel_size * kChunkEdge) + 1.0;
     sum += kBall * chunks * chunks * chunks;
   }
@@ -152,7 +152,7 @@ bool WorldWindow::is_loaded_at(DVec3 point) const {
   return std::ranges::all_of(scene.instances().handles(), [&](InstanceHandle handle) {
     const Instance& instance = scene.instances()[handle];
     const SceneGrid* const grid = scene.grids().find(instance.grid);
-    if (grid == nullptr || !grid->grid.is_partial() || !has_place(instance)) return true;
+    if (grid == nullptr || !grid->grid.is_partial() || !has_valid_transform(instance)) return true;
     const DVec3 at = grid_from_world(instance, *grid, point);
     if (!(glm::length(at) < 1e9)) return true;
     const DVec3 below = at - DVec3(0.0, kGround, 0.0);

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include <quoin/scene/camera.h>
-#include <quoin/store/world_care.h>
+#include <quoin/store/world_maintenance.h>
 #include <quoin/stream/streamed_world.h>
 
 namespace quoin::viewer {

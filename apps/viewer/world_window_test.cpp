@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 #include <quoin/io/formats.h>
 #include <quoin/render/cpu_renderer.h>
-#include <quoin/store/world_care.h>
+#include <quoin/store/world_maintenance.h>
 #include <quoin/terrain/terrain.h>
 
 #include "cpu_backend.h"

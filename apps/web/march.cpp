@@ -7,7 +7,7 @@
 
 #include <quoin/light/light_options.h>
 
-#include "door.h"
+#include "bindings.h"
 #include "handles.h"
 #include "render_vk/march/frame.h"
 #include "render_vk/march/shader_scene.h"

@@ -5,8 +5,8 @@
 
 #include <unistd.h>
 
+#include <quoin/io/image_files.h>
 #include <quoin/io/mesh_file.h>
-#include <quoin/io/picture_files.h>
 #include <quoin/io/vox.h>
 #include <quoin/terrain/terrain.h>
 
@@ -52,7 +52,7 @@ std::vector<Counted> file_work() {
   if (!written || !meshes) give_up("preparing files");
   const auto file = std::make_shared<std::vector<std::byte>>(written->bytes);
   const auto meshed = std::make_shared<SceneMeshes>(*meshes);
-  const auto picture = std::make_shared<Image>(gradient());
+  const auto image = std::make_shared<Image>(gradient());
   return {{"files/terrain", [] { (void)small_terrain(); }},
           {"files/read_vox",
            [=] {
@@ -75,7 +75,7 @@ std::vector<Counted> file_work() {
            }},
           {"files/write_png", [=] {
              const auto path = folder / (stem + ".png");
-             const bool is_written = write_png(*picture, path).has_value();
+             const bool is_written = write_png(*image, path).has_value();
              std::filesystem::remove(path);
              if (!is_written) give_up("writing .png");
            }}};

@@ -6,18 +6,18 @@
 #include <quoin/render/impostor.h>
 #include <quoin/scene/level_of_detail.h>
 
-#include "bench/picture_workload.h"
+#include "bench/image_workload.h"
 #include "counted.h"
 
 namespace quoin::counts {
 namespace {
 
 struct World {
-  Scene scene = workloads::picture_scene();
+  Scene scene = workloads::image_scene();
   CpuRenderer renderer{scene, InstanceFilter::Visible, {1}};
 };
 
-RenderOptions small_picture(bool lit) {
+RenderOptions small_image(bool lit) {
   RenderOptions options;
   options.width = 128;
   options.height = 72;
@@ -26,7 +26,7 @@ RenderOptions small_picture(bool lit) {
 }
 
 void take(const World& world, bool lit) {
-  if (world.renderer.render(workloads::over_the_terrain(), small_picture(lit), {1})) return;
+  if (world.renderer.render(workloads::over_the_terrain(), small_image(lit), {1})) return;
   std::fprintf(stderr, "counts: a picture failed\n");
   std::exit(1);
 }

@@ -15,8 +15,8 @@
 #include <quoin/mesh/blocky.h>
 #include <quoin/render/path_tracer.h>
 
+#include "bench/image_workload.h"
 #include "bench/peers/peer_report.h"
-#include "bench/picture_workload.h"
 #include "light/light_model.h"
 #include "light/occlusion_directions.h"
 #include "render/camera_rays.h"
@@ -235,7 +235,7 @@ class EmbreePaths {
   }
 
   // Returns the mean of all pixels.
-  Vec3 picture(const Camera& camera, const PathOptions& options, const path::SkyLight& sky) {
+  Vec3 image(const Camera& camera, const PathOptions& options, const path::SkyLight& sky) {
     const FlushDenormals flush;
     const CameraRays view(camera, options.width, options.height);
     Vec3 sum(0.0F);
@@ -325,7 +325,7 @@ class EmbreePaths {
 
 // The same workload as path/terrain/640x360.
 void paths(benchmark::State& state) {
-  static const Scene scene = workloads::picture_scene();
+  static const Scene scene = workloads::image_scene();
   const SceneGrid& grid = *scene.grids().find(scene.grids().handles().front());
   EmbreePaths tracer(grid.grid, scene.types);
   PathOptions options;
@@ -334,16 +334,16 @@ void paths(benchmark::State& state) {
   options.samples = 4;
   options.max_bounces = 4;
   const Camera camera = frame_view(scene.bounds(), View::Iso, 16.0 / 9.0);
-  const PathPicture ours = PathTracer(scene, InstanceFilter::Visible, {1}).render(camera, options, {1}).value();
+  const PathImage ours = PathTracer(scene, InstanceFilter::Visible, {1}).render(camera, options, {1}).value();
   DVec3 expected(0.0);
   for (const Vec3& each : ours.radiance) expected += DVec3(each) / static_cast<double>(ours.radiance.size());
   const path::SkyLight sky(options);  // as a tracer keeps it
   std::int64_t rays = 0;
   for (auto _ : state) {
-    const Vec3 mean = tracer.picture(camera, options, sky);
-    const double apart = glm::length(DVec3(mean) - expected) / glm::length(expected);
+    const Vec3 mean = tracer.image(camera, options, sky);
+    const double separate = glm::length(DVec3(mean) - expected) / glm::length(expected);
     // Some rays slip through T-junctions of merged faces.
-    workloads::fail_unless(apart < 5e-3, "the difference of pictures, in millionths,", std::llround(apart * 1e6));
+    workloads::fail_unless(separate < 5e-3, "the difference of pictures, in millionths,", std::llround(separate * 1e6));
     rays = tracer.rays();
   }
   state.counters["rays"] = benchmark::Counter(static_cast<double>(rays), benchmark::Counter::kIsRate);

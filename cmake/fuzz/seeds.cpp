@@ -18,8 +18,8 @@
 
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
+#include <quoin/io/image_files.h>
 #include <quoin/io/mesh_file.h>
-#include <quoin/io/picture_files.h>
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_meshes.h>
 
@@ -171,12 +171,12 @@ std::vector<std::byte> read(const fs::path& path) {
   return std::move(*bytes);
 }
 
-void put_pictures(const Seeds& seeds) {
-  Image picture;
-  picture.width = 3;
-  picture.height = 2;
-  picture.rgb.assign(18, 90);
-  const auto png = write_png(picture);
+void put_images(const Seeds& seeds) {
+  Image image;
+  image.width = 3;
+  image.height = 2;
+  image.rgb.assign(18, 90);
+  const auto png = write_png(image);
   require(png.has_value(), "seed.png", png ? "" : to_string(png.error()));
   for (const char* target : {"png", "heights"}) seeds.put(target, "seed.png", *png);
   FloatImage depths;
@@ -214,7 +214,7 @@ int main(int count, char** arguments) {
   const Seeds seeds(arguments[1]);
   seeds.put_scene(voxels(), "voxels", false);
   seeds.put_scene(field(), "field", true);
-  put_pictures(seeds);
+  put_images(seeds);
   put_pages(seeds);
   put_cases(seeds, arguments[2]);
   return 0;

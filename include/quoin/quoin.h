@@ -48,9 +48,9 @@
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 #include <quoin/io/heights.h>
+#include <quoin/io/image_files.h>
 #include <quoin/io/loaded_scene.h>
 #include <quoin/io/mesh_file.h>
-#include <quoin/io/picture_files.h>
 #include <quoin/io/scene_file.h>
 #include <quoin/io/sidecar_file.h>
 #include <quoin/io/volume.h>
@@ -83,8 +83,8 @@
 #include <quoin/render/path_history.h>
 #include <quoin/render/path_tracer.h>
 #include <quoin/render_vk/vulkan_device.h>
+#include <quoin/render_vk/vulkan_image.h>
 #include <quoin/render_vk/vulkan_mesh_renderer.h>
-#include <quoin/render_vk/vulkan_picture.h>
 #include <quoin/render_vk/vulkan_renderer.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/level_of_detail.h>
@@ -102,8 +102,8 @@
 #include <quoin/scene/sweep.h>
 #include <quoin/scene/volume_scene.h>
 #include <quoin/store/stored_chunk.h>
-#include <quoin/store/world_care.h>
 #include <quoin/store/world_import.h>
+#include <quoin/store/world_maintenance.h>
 #include <quoin/store/world_meshes.h>
 #include <quoin/store/world_saver.h>
 #include <quoin/store/world_store.h>

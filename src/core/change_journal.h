@@ -55,7 +55,7 @@ class ChangeJournal {
     const std::uint64_t seen = seen_.load(std::memory_order_relaxed);
     if (serial > seen) {
       at(serial).merge(record);
-    } else if (seen != kNobody) {
+    } else if (seen != kNoConsumer) {
       append(serial, record, keys);
     }
   }
@@ -82,8 +82,8 @@ class ChangeJournal {
         cursor, less, [](const Record& record, std::vector<Change>& items) { items.push_back(record.change()); });
   }
   /// Returns the changes of one aspect: `tell(record, items)` appends the changes of this aspect in a record, if any.
-  template <class Change, class Less, class Tell>
-  [[nodiscard]] Changes<Change> changes_since(ChangeCursor& cursor, Less&& less, Tell&& tell) const {
+  template <class Change, class Less, class Report>
+  [[nodiscard]] Changes<Change> changes_since(ChangeCursor& cursor, Less&& less, Report&& report) const {
     std::vector<Record> records;
     Changes<Change> changes;
     changes.all = !visit_since(cursor, [&](const Record& record) { records.push_back(record); });
@@ -91,7 +91,7 @@ class ChangeJournal {
     for (std::size_t i = 0; i < records.size();) {
       Record united = records[i];
       for (++i; i < records.size() && !less(united, records[i]); ++i) united.merge(records[i]);
-      tell(united, changes.items);
+      report(united, changes.items);
     }
     return changes;
   }
@@ -114,7 +114,7 @@ class ChangeJournal {
   [[nodiscard]] std::size_t bytes() const { return blocks_.size() * (sizeof(Block) + sizeof(blocks_[0])); }
 
  private:
-  static constexpr std::uint64_t kNobody = ~std::uint64_t{0};
+  static constexpr std::uint64_t kNoConsumer = ~std::uint64_t{0};
   static constexpr std::size_t kBlock = 256;
   static constexpr std::size_t kLeast = 8192;  // minimum number of records kept, even for a small container
   using Block = std::array<Record, kBlock>;
@@ -136,7 +136,7 @@ class ChangeJournal {
   }
 
   void append(std::uint64_t& serial, const Record& record, std::size_t keys) {
-    if (end_ - first_ >= kLeast + 2 * keys) let_go();
+    if (end_ - first_ >= kLeast + 2 * keys) trim();
     if (blocks_.empty() || end_ % kBlock == 0) {
       try {
         blocks_.push_back(std::make_shared<Block>());
@@ -149,7 +149,7 @@ class ChangeJournal {
   }
 
   // Drops the oldest block. Records up to its end count as read, so that no change merges into them.
-  void let_go() {
+  void trim() {
     QUOIN_ASSERT(end_ - first_ > kBlock && blocks_.size() > 1, "more blocks than are removed");
     first_ = (first_ / kBlock + 1) * kBlock;
     blocks_.erase(blocks_.begin());
@@ -161,7 +161,7 @@ class ChangeJournal {
     container_ = next_serial();
     blocks_.clear();
     first_ = end_;
-    seen_.store(kNobody, std::memory_order_relaxed);
+    seen_.store(kNoConsumer, std::memory_order_relaxed);
   }
 
   std::uint64_t container_;
@@ -169,7 +169,7 @@ class ChangeJournal {
   std::uint64_t first_ = 1;
   std::uint64_t end_ = 1;
   mutable std::atomic<std::uint64_t> seen_{
-      kNobody};  // the last serial that a cursor may have read; kNobody: no cursor exists
+      kNoConsumer};  // the last serial that a cursor may have read; kNoConsumer: no cursor exists
   std::vector<std::shared_ptr<Block>> blocks_;  // [serial / kBlock - first_ / kBlock]
 };
 

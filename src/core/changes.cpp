@@ -12,9 +12,9 @@ std::uint64_t next_serial() {
   return count.fetch_add(1, std::memory_order_relaxed) + 1;
 }
 
-void EditNotice::give_first() {
-  to_->give(index_);
-  is_given_ = true;
+void EditNotice::notify_first() {
+  to_->notify(index_);
+  is_notified_ = true;
 }
 
 }  // namespace quoin

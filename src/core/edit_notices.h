@@ -21,9 +21,9 @@ class EditNotices {
   /// Reserves memory for the number, so that neither following it nor giving its notice allocates.
   void make_room(std::uint32_t index) {
     const std::lock_guard lock(mutex_);
-    if (index < is_given_.size()) return;
+    if (index < is_notified_.size()) return;
     given_.reserve(std::size_t{2} * index + 1);
-    is_given_.resize(std::size_t{2} * index + 1);
+    is_notified_.resize(std::size_t{2} * index + 1);
   }
   /// Makes the notice report to this object under a number. Requires: this object outlives the notice.
   void follow(EditNotice& notice, std::uint32_t index) {
@@ -31,30 +31,30 @@ class EditNotices {
     const std::lock_guard lock(mutex_);
     notice.to_ = this;
     notice.index_ = index;
-    notice.is_given_ = false;
+    notice.is_notified_ = false;
   }
   /// Appends the numbers of the edited items. Each is reported again only after it is followed again.
   void take(std::vector<std::uint32_t>& taken) {
     const std::lock_guard lock(mutex_);
     taken.insert(taken.end(), given_.begin(), given_.end());
-    for (const std::uint32_t index : given_) is_given_[index] = false;
+    for (const std::uint32_t index : given_) is_notified_[index] = false;
     given_.clear();
   }
 
  private:
   friend class EditNotice;
-  void give(std::uint32_t index) {
+  void notify(std::uint32_t index) {
     const std::lock_guard lock(mutex_);
-    QUOIN_ASSERT(index < is_given_.size(), "an index of a followed item");
+    QUOIN_ASSERT(index < is_notified_.size(), "an index of a followed item");
     // A number is listed once, even if its item was removed and another item now has the number.
-    if (is_given_[index]) return;
-    is_given_[index] = true;
+    if (is_notified_[index]) return;
+    is_notified_[index] = true;
     given_.push_back(index);
   }
 
   std::mutex mutex_;
   std::vector<std::uint32_t> given_;  // with room for every number
-  std::vector<bool> is_given_;        // by number
+  std::vector<bool> is_notified_;     // by number
 };
 
 }  // namespace quoin

@@ -14,18 +14,18 @@ TEST(EditNotices, AreTakenOnceAndGivenAgainOnceFollowedAnew) {
   EditNotice b;
   notices.follow(a, 4);
   notices.follow(b, 2);
-  a.give();
-  b.give();
-  a.give();
+  a.notify();
+  b.notify();
+  a.notify();
   std::vector<std::uint32_t> taken;
   notices.take(taken);
   EXPECT_EQ(taken, (std::vector<std::uint32_t>{4, 2}));
   taken.clear();
-  a.give();
+  a.notify();
   notices.take(taken);
   EXPECT_TRUE(taken.empty()) << "not followed since";
   notices.follow(a, 4);
-  a.give();
+  a.notify();
   notices.take(taken);
   EXPECT_EQ(taken, (std::vector<std::uint32_t>{4}));
 }
@@ -35,7 +35,7 @@ TEST(EditNotices, ANumberThatOthersTookOverStandsThereOnce) {
   for (int i = 0; i < 1'000; ++i) {
     EditNotice notice;
     notices.follow(notice, 7);
-    notice.give();
+    notice.notify();
   }
   std::vector<std::uint32_t> taken;
   notices.take(taken);

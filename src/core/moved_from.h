@@ -8,7 +8,7 @@ namespace quoin {
 
 /// Returns the implementation of an object. Requires: the object was not moved from.
 template <class Content>
-[[nodiscard]] Content& content_of(const std::unique_ptr<Content>& content) {
+[[nodiscard]] Content& impl_of(const std::unique_ptr<Content>& content) {
   QUOIN_ASSERT(content != nullptr, "an object that was not moved from");
   return *content;
 }

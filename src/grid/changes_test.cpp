@@ -42,7 +42,7 @@ struct Consumer {
   Expected expected;
 };
 
-void expect_told(Consumer& consumer, const Grid& grid) {
+void expect_reported(Consumer& consumer, const Grid& grid) {
   const GridChanges changes = grid.changes_since(consumer.cursor);
   ASSERT_FALSE(changes.all);
   ASSERT_EQ(changes.items.size(), consumer.expected.boxes.size());
@@ -130,9 +130,9 @@ TEST(Changes, EveryConsumerReceivesChangesSinceItsCursor) {
         // Each consumer reads at its own rate, some through a snapshot.
         if (random() % (1U << (2 * i)) != 0) continue;
         if (random() % 3 == 0) {
-          ASSERT_NO_FATAL_FAILURE(expect_told(consumers[i], grid.snapshot()));
+          ASSERT_NO_FATAL_FAILURE(expect_reported(consumers[i], grid.snapshot()));
         } else {
-          ASSERT_NO_FATAL_FAILURE(expect_told(consumers[i], grid));
+          ASSERT_NO_FATAL_FAILURE(expect_reported(consumers[i], grid));
         }
       }
     }
@@ -175,9 +175,9 @@ TEST(Changes, ACursorOfAnotherContainerReceivesAllChunks) {
     ChangeCursor one = cursor;
     ChangeCursor two = cursor;
     ChangeCursor three = cursor;
-    const int told =
+    const int reported =
         int{grid.changes_since(one).all} + int{densities.changes_since(two).all} + int{types.changes_since(three).all};
-    EXPECT_EQ(told, 2) << "all containers except the cursor's own";
+    EXPECT_EQ(reported, 2) << "all containers except the cursor's own";
   }
 }
 

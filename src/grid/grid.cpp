@@ -58,7 +58,7 @@ struct Grid::Impl {
       journal.begin_change();
       edit.record.chunk = chunk;
       note(slot.entry->serial, edit.record);
-      notice.give();
+      notice.notify();
     }
     const int voxels = non_air_count(slot.entry->chunk);
     voxel_count += voxels - slot.entry->counted;
@@ -77,7 +77,7 @@ struct Grid::Impl {
       journal.begin_change();
       std::uint64_t serial = 0;
       note(serial, record);
-      return notice.give();
+      return notice.notify();
     }
     const ChunkTable::Slot slot = entries.find_or_create(chunk);
     VoxelEdit edit{.data_before = quoin::data_count(slot.entry->chunk)};
@@ -410,7 +410,7 @@ void Grid::clear() {
   impl().entries.clear();
   impl().voxel_count = 0;
   impl().data_count = 0;
-  notice_.give();
+  notice_.notify();
 }
 
 const Chunk* Grid::find_chunk(int x, int y, int z) const {
@@ -441,10 +441,10 @@ Neighbourhood Grid::neighbourhood(IVec3 chunk) const {
 }
 
 GridChanges Grid::changes_since(ChangeCursor& cursor) const {
-  const auto tell = [](const VoxelRecord& record, std::vector<ChunkChange>& items) {
+  const auto report = [](const VoxelRecord& record, std::vector<ChunkChange>& items) {
     if (record.has_types()) items.push_back(record.change());
   };
-  return impl().journal.changes_since<ChunkChange>(cursor, by_chunk, tell);
+  return impl().journal.changes_since<ChunkChange>(cursor, by_chunk, report);
 }
 
 bool Grid::has_changed_since(const ChangeCursor& cursor) const {
@@ -452,10 +452,10 @@ bool Grid::has_changed_since(const ChangeCursor& cursor) const {
 }
 
 DataChanges Grid::data_changes_since(ChangeCursor& cursor) const {
-  const auto tell = [](const VoxelRecord& record, std::vector<DataChange>& items) {
+  const auto report = [](const VoxelRecord& record, std::vector<DataChange>& items) {
     if (record.has_data()) items.push_back({record.chunk, record.data.box(), record.is_edit});
   };
-  return impl().journal.changes_since<DataChange>(cursor, by_chunk, tell);
+  return impl().journal.changes_since<DataChange>(cursor, by_chunk, report);
 }
 
 bool Grid::has_data_changed_since(const ChangeCursor& cursor) const {

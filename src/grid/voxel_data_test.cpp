@@ -263,10 +263,10 @@ TEST(VoxelDataChanges, AreToldApartFromThoseOfTypes) {
   EXPECT_FALSE(grid.has_changed_since(types));
   EXPECT_TRUE(grid.has_data_changed_since(data));
   EXPECT_TRUE(grid.changes_since(types).empty());
-  const DataChanges told = grid.data_changes_since(data);
-  ASSERT_EQ(told.items.size(), 1U);
-  EXPECT_EQ(told.items[0].chunk, IVec3(1, 0, 0));
-  EXPECT_EQ(told.items[0].box, (IBox{{6, 1, 2}, {7, 2, 3}}));
+  const DataChanges reported = grid.data_changes_since(data);
+  ASSERT_EQ(reported.items.size(), 1U);
+  EXPECT_EQ(reported.items[0].chunk, IVec3(1, 0, 0));
+  EXPECT_EQ(reported.items[0].box, (IBox{{6, 1, 2}, {7, 2, 3}}));
   EXPECT_FALSE(grid.has_data_changed_since(data));
 
   grid.set({1, 1, 1}, kChest);
@@ -308,9 +308,9 @@ TEST(VoxelDataChanges, TellOfEveryVoxelThatDiffers) {
           if (old_held.state != new_held.state || old_held.bytes != new_held.bytes) expected[key] = new_held.state;
         }
       }
-      const bool is_told = twin.grid.has_data_changed_since(consumer.data);
+      const bool is_reported = twin.grid.has_data_changed_since(consumer.data);
       const DataChanges changes = twin.grid.data_changes_since(consumer.data);
-      ASSERT_EQ(is_told, !changes.empty());
+      ASSERT_EQ(is_reported, !changes.empty());
       std::map<Key, std::uint32_t> found;
       visit_data_changes(consumer.before, twin.grid, changes, [&](IVec3 at, const VoxelData& a, const VoxelData& b) {
         ASSERT_NE(a, b);
@@ -334,9 +334,9 @@ TEST(VoxelDataChanges, ReportsDataOfAClearedGrid) {
   grid.set({100, 1, 1}, kStone);
   ChangeCursor data = grid.cursor();
   grid.clear();
-  const DataChanges told = grid.data_changes_since(data);
-  ASSERT_EQ(told.items.size(), 1U);
-  EXPECT_EQ(told.items[0].chunk, IVec3(0));
+  const DataChanges reported = grid.data_changes_since(data);
+  ASSERT_EQ(reported.items.size(), 1U);
+  EXPECT_EQ(reported.items[0].chunk, IVec3(0));
   EXPECT_EQ(grid.data_count(), 0);
 }
 
@@ -406,7 +406,7 @@ TEST(VoxelDataPieces, MoveWithDetachedPieces) {
   pieces.update(world);
   world.set_data({66, 11, 11}, {.state = 3});  // same type: pieces stay, their data changes
   pieces.update(world);
-  const std::vector<std::size_t> fallen = pieces.apart_from({{0, 0, 0}, {100, 1, 100}});
+  const std::vector<std::size_t> fallen = pieces.not_touching({{0, 0, 0}, {100, 1, 100}});
   ASSERT_EQ(fallen.size(), 1U);
   const Grid body = pieces.extract(fallen[0]);
   EXPECT_EQ(body.data_count(), 2);

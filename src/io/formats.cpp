@@ -289,18 +289,18 @@ struct Saved {
 /// Lists the data that only another .vox file can store.
 std::vector<std::string> lost_with_source(const Saved& saved) {
   if (saved.loaded == nullptr || saved.loaded->source == nullptr) return {};
-  std::vector<std::string> lines = only_in_source(*saved.loaded->source);
+  std::vector<std::string> lines = source_only_features(*saved.loaded->source);
   for (std::string& line : lines) line.insert(0, "left out, only .vox stores it: ");
   return lines;
 }
 
 /// Lists the cameras and sun that a format other than .vox leaves out, except items of `lost_with_source`.
-std::vector<std::string> lost_beside(const Saved& saved, FileFormat format) {
+std::vector<std::string> lost_without_sidecars(const Saved& saved, FileFormat format) {
   std::vector<std::string> lines;
   if (saved.loaded == nullptr) return lines;
   const LoadedScene& loaded = *saved.loaded;
   // `lost_with_source` already lists the file's own items.
-  const auto is_told = [said = lost_with_source(saved)](std::string_view what) {
+  const auto is_reported = [said = lost_with_source(saved)](std::string_view what) {
     return std::ranges::any_of(said, [&](const std::string& line) { return line.find(what) != std::string::npos; });
   };
   const bool holds_sun = format == FileFormat::Scene || format == FileFormat::World;
@@ -310,9 +310,9 @@ std::vector<std::string> lost_beside(const Saved& saved, FileFormat format) {
     cameras =
         std::ranges::count_if(loaded.cameras, [&](const FileCamera& one) { return one.camera != *loaded.camera; });
   }
-  if (cameras > 0 && !is_told("cameras: ")) lines.push_back("cameras left out: " + std::to_string(cameras));
+  if (cameras > 0 && !is_reported("cameras: ")) lines.push_back("cameras left out: " + std::to_string(cameras));
   const Look usual;
-  if (is_told("render settings: ")) return lines;
+  if (is_reported("render settings: ")) return lines;
   if (!holds_sun && loaded.sun) lines.emplace_back("the sun is left out");
   if (holds_sun && loaded.sun && loaded.look &&
       (loaded.look->look.sun_brightness != usual.sun_brightness || loaded.look->look.sun_colour != usual.sun_colour)) {
@@ -343,7 +343,7 @@ WriteModel model_writer(FileFormat format) {
 
 std::vector<std::string> all_lost(std::vector<std::string> lines, const Saved& saved, FileFormat format) {
   std::ranges::move(lost_with_source(saved), std::back_inserter(lines));
-  std::ranges::move(lost_beside(saved, format), std::back_inserter(lines));
+  std::ranges::move(lost_without_sidecars(saved, format), std::back_inserter(lines));
   return lines;
 }
 
@@ -373,7 +373,7 @@ Result<SavedScene> save(const Saved& saved, const std::filesystem::path& path, T
   if (*format == FileFormat::Vdb) {
     const auto written = write_whole(path, vdb::write_vdb(saved.scene));
     if (!written) return written.error();
-    return SavedScene{*written, all_lost(vdb::losses_of_vdb(saved.scene), saved, *format)};
+    return SavedScene{*written, all_lost(vdb::vdb_unsupported_features(saved.scene), saved, *format)};
   }
   auto file = with_path(scene_file_of(saved.scene), path);
   if (!file) return file.error();
@@ -394,9 +394,10 @@ Result<std::vector<std::string>> losses(const Saved& saved, const std::filesyste
     if (!file) return file.error();
     return all_lost(std::move(file->warnings), saved, *format);
   }
-  if (*format == FileFormat::Vdb) return all_lost(vdb::losses_of_vdb(saved.scene), saved, *format);
+  if (*format == FileFormat::Vdb) return all_lost(vdb::vdb_unsupported_features(saved.scene), saved, *format);
   if (*format != FileFormat::Vox) return all_lost({}, saved, *format);
-  return with_path(saved.loaded != nullptr ? losses_of_vox(*saved.loaded) : losses_of_vox(saved.scene), path);
+  return with_path(
+      saved.loaded != nullptr ? vox_unsupported_features(*saved.loaded) : vox_unsupported_features(saved.scene), path);
 }
 
 }  // namespace
@@ -494,11 +495,11 @@ Result<SavedScene> save_scene(const LoadedScene& loaded, const std::filesystem::
   return save({loaded.scene, &loaded}, path, threads, progress);
 }
 
-Result<std::vector<std::string>> losses_of_saving(const Scene& scene, const std::filesystem::path& path) {
+Result<std::vector<std::string>> unsupported_features(const Scene& scene, const std::filesystem::path& path) {
   return losses({scene}, path);
 }
 
-Result<std::vector<std::string>> losses_of_saving(const LoadedScene& loaded, const std::filesystem::path& path) {
+Result<std::vector<std::string>> unsupported_features(const LoadedScene& loaded, const std::filesystem::path& path) {
   return losses({loaded.scene, &loaded}, path);
 }
 
@@ -509,14 +510,14 @@ Result<LoadedScene> load_scene(std::span<const std::byte> bytes, const LoadOptio
   return read_bytes({}, bytes, detect_format(bytes), options, threads, progress);
 }
 
-std::vector<std::filesystem::path> files_read_beside(const std::filesystem::path& path, SidecarFiles allowed) {
+std::vector<std::filesystem::path> sidecar_files_of(const std::filesystem::path& path, SidecarFiles allowed) {
   const auto format = detect_format(path);
   if (!format || !*format) return {};
   if (**format == FileFormat::Scene) return files_named_in_scene(path);
   if (**format == FileFormat::World) return {path.string() + "-wal"};
   if (is_triangles(*format)) {
     const auto mesh = read_mesh(path, {}, allowed);
-    return mesh ? mesh->beside : std::vector<std::filesystem::path>();
+    return mesh ? mesh->sidecars : std::vector<std::filesystem::path>();
   }
   return is_volume(*format) ? files_of_pair(path) : std::vector<std::filesystem::path>();
 }

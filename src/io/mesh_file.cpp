@@ -152,11 +152,11 @@ Result<SceneMeshes> as_written(const SceneMeshes& meshes, const MeshFileOptions&
   return in_axes_of_file(options.write_occlusion ? meshes : without_occlusion(meshes), options);
 }
 
-const Progress kNobody;
+const Progress kNoProgress;
 
 /// Calls `file.write` with a writer to `sink`. Returns the number of bytes.
 Result<std::uint64_t> write_to(BlockWriter::Sink sink, const MeshFile& file, const Progress& progress) {
-  BlockWriter out(std::move(sink), file.expected_bytes > 0 ? progress : kNobody, file.expected_bytes);
+  BlockWriter out(std::move(sink), file.expected_bytes > 0 ? progress : kNoProgress, file.expected_bytes);
   file.write(out);
   if (auto written = out.finish(); !written) return written.error();
   return out.bytes();
@@ -230,10 +230,10 @@ Result<std::vector<std::filesystem::path>> mesh_files(const SceneMeshes& meshes,
   if (!format) return format.error();
   if (!format_info(*format).is_mesh) return make_error(ErrorCode::Unsupported, "not a mesh format", path.string());
   std::vector<std::filesystem::path> files = {path};
-  const auto beside = *format == FileFormat::Gltf  ? gltf_companions(meshes, path)
-                      : *format == FileFormat::Obj ? obj_companions(meshes, path)
-                                                   : std::vector<std::filesystem::path>();
-  files.insert(files.end(), beside.begin(), beside.end());
+  const auto adjacent = *format == FileFormat::Gltf  ? gltf_companions(meshes, path)
+                        : *format == FileFormat::Obj ? obj_companions(meshes, path)
+                                                     : std::vector<std::filesystem::path>();
+  files.insert(files.end(), adjacent.begin(), adjacent.end());
   return files;
 }
 

@@ -41,7 +41,7 @@ bool all_finite(std::span<const Vec3> points) {
   return zero == Vec3(0.0F);
 }
 
-const char* fault_of_blocks(const MeshView& view, std::size_t types) {
+const char* find_blocks_error(const MeshView& view, std::size_t types) {
   const bool has_all = is_one_a_vertex(view.directions, view) && is_one_a_vertex(view.types, view) &&
                        is_none_or_one_a_vertex(view.block_occlusion, view) && is_none_or_one_a_vertex(view.atlas, view);
   if (!has_all) return "arrays of different lengths";
@@ -50,7 +50,7 @@ const char* fault_of_blocks(const MeshView& view, std::size_t types) {
   return largest_of(view.block_occlusion) > 3 ? "an occlusion above 3" : nullptr;
 }
 
-const char* fault_of_smooth(const MeshView& view, std::size_t types) {
+const char* find_smooth_error(const MeshView& view, std::size_t types) {
   const bool has_all = is_one_a_vertex(view.normals, view) && is_one_a_vertex(view.albedo, view) &&
                        is_none_or_one_a_vertex(view.occlusion, view) && is_none_or_one_a_vertex(view.types, view);
   if (!has_all) return "arrays of different lengths";
@@ -61,8 +61,9 @@ const char* fault_of_smooth(const MeshView& view, std::size_t types) {
 }
 
 /// Returns a description of a mesh's first fault; null if it is valid.
-const char* fault_of(const MeshView& view, std::size_t types) {
-  if (const char* fault = view.has_albedo() ? fault_of_smooth(view, types) : fault_of_blocks(view, types)) return fault;
+const char* find_error(const MeshView& view, std::size_t types) {
+  if (const char* fault = view.has_albedo() ? find_smooth_error(view, types) : find_blocks_error(view, types))
+    return fault;
   if (!is_none_or_one_a_vertex(view.light, view)) return "arrays of different lengths";
   if (!view.light.empty() && !view.atlas.empty()) return "both light and an atlas";
   if (view.indices.size() % 3 != 0) return "an index count that is not a multiple of 3";
@@ -70,7 +71,7 @@ const char* fault_of(const MeshView& view, std::size_t types) {
   return all_finite(view.positions) ? nullptr : "a position that is not finite";
 }
 
-const char* fault_of(const glm::dmat4& matrix) {
+const char* find_error(const glm::dmat4& matrix) {
   for (int column = 0; column < 4; ++column) {
     if (!is_finite(DVec3(matrix[column]))) return "a transform that is not finite";
     if (matrix[column].w != (column == 3 ? 1.0 : 0.0)) return "a transform that is not affine";
@@ -96,8 +97,8 @@ bool stays_within_floats(const DBox& box, const glm::dmat4& moved_from_box) {
 }
 
 /// Returns a description of a fault in a part's position; null if it is valid.
-const char* fault_of_place(const DBox& bounds, const DVec3& pivot, const glm::dmat4& world_from_part) {
-  if (const char* fault = fault_of(world_from_part)) return fault;
+const char* find_place_error(const DBox& bounds, const DVec3& pivot, const glm::dmat4& world_from_part) {
+  if (const char* fault = find_error(world_from_part)) return fault;
   const DBox from_pivot{bounds.min - pivot, bounds.max - pivot};
   const bool is_within = bounds.empty() || (stays_within_floats(from_pivot, glm::dmat4(1.0)) &&
                                             stays_within_floats(from_pivot, world_from_part));
@@ -105,7 +106,7 @@ const char* fault_of_place(const DBox& bounds, const DVec3& pivot, const glm::dm
 }
 
 /// Returns a description of a fault in a placement's keys; null if they are valid.
-const char* fault_of_keys(const DBox& bounds, const DVec3& pivot, const MeshPlacement& placement) {
+const char* find_keys_error(const DBox& bounds, const DVec3& pivot, const MeshPlacement& placement) {
   const bool mirrors = glm::determinant(glm::dmat3(placement.matrix())) < 0.0;
   // Files store times as floats.
   float last = 0.0F;
@@ -119,13 +120,13 @@ const char* fault_of_keys(const DBox& bounds, const DVec3& pivot, const MeshPlac
     if (key.world_from_part.mirrored != mirrors) return "a key whose mirroring differs from its placement's";
     MeshPlacement at;
     at.world_from_part = key.world_from_part;
-    if (const char* fault = fault_of_place(bounds, pivot, at.matrix())) return fault;
+    if (const char* fault = find_place_error(bounds, pivot, at.matrix())) return fault;
   }
   return nullptr;
 }
 
 /// Returns a contradiction to the atlas: if some opaque blocks of a scene use it, all must. Null if there is none.
-const char* fault_of_atlas(const MeshView& view, const Image& atlas) {
+const char* find_atlas_error(const MeshView& view, const Image& atlas) {
   const auto is_outside = [](const std::array<float, 2>& uv) {
     return !(uv[0] >= 0.0F && uv[0] <= 1.0F && uv[1] >= 0.0F && uv[1] <= 1.0F);
   };
@@ -148,8 +149,8 @@ Status check_part(const MeshPart& part, const SceneMeshes& meshes, std::vector<D
   for (const MeshView& view : part.surfaces) {
     if (view.has_albedo() != part.surfaces.front().has_albedo())
       return unsound(part, "surfaces with and without their own colours");
-    if (const char* fault = fault_of(view, meshes.types.size())) return unsound(part, fault);
-    if (const char* fault = fault_of_atlas(view, meshes.atlas)) return unsound(part, fault);
+    if (const char* fault = find_error(view, meshes.types.size())) return unsound(part, fault);
+    if (const char* fault = find_atlas_error(view, meshes.atlas)) return unsound(part, fault);
     if (view.positions.empty()) continue;
     const DBox more = bounds_of(view);
     box.extend(more.min);
@@ -208,8 +209,8 @@ Status check_meshes(const SceneMeshes& meshes) {
                         "placement \"" + placement.name + "\" has a part that does not exist");
     }
     const MeshPart& part = meshes.parts[placement.part];
-    const char* fault = fault_of_place(bounds[placement.part], part.pivot, placement.matrix());
-    if (fault == nullptr) fault = fault_of_keys(bounds[placement.part], part.pivot, placement);
+    const char* fault = find_place_error(bounds[placement.part], part.pivot, placement.matrix());
+    if (fault == nullptr) fault = find_keys_error(bounds[placement.part], part.pivot, placement);
     if (fault != nullptr) return unsound(part, fault);
     if (placement.group && *placement.group >= meshes.groups.size()) {
       return make_error(ErrorCode::InvalidArgument,

@@ -129,7 +129,7 @@ TEST_F(SidecarFile, LeavesOutObjReferencesOutsideTheFolder) {
     ASSERT_TRUE(loaded) << to_string(loaded.error());
     ASSERT_FALSE(loaded->warnings.empty());
     EXPECT_NE(loaded->warnings.front().find(name), std::string::npos) << loaded->warnings.front();
-    EXPECT_TRUE(loaded->beside.empty());
+    EXPECT_TRUE(loaded->sidecars.empty());
     const auto trusted = read_mesh(folder_ / "in" / "main.obj", {}, SidecarFiles::Anywhere);
     ASSERT_TRUE(trusted);
     EXPECT_EQ(trusted->mesh.materials.front().name, "a");

@@ -172,10 +172,10 @@ void LiveField::set_level(IVec3 chunk, FieldChunk& state, int level, LiveClock::
   state.level = static_cast<std::uint8_t>(level);
   bool is_seen = !state.is_new();
   for (int i = 0; i < 27; ++i) {
-    const IVec3 beside = chunk + Neighbourhood::offset(i);
-    const auto found = chunks_.find(beside);
+    const IVec3 adjacent = chunk + Neighbourhood::offset(i);
+    const auto found = chunks_.find(adjacent);
     if (i == 13 || found == chunks_.end() || found->second.is_new()) continue;
-    mark(beside, true, now);
+    mark(adjacent, true, now);
     is_seen = true;
   }
   if (is_seen) mark(chunk, true, now);
@@ -186,12 +186,12 @@ void LiveField::choose_levels(const ChunkDistances& distances, LiveClock::time_p
     const auto found = chunks_.find(chunk);
     return found == chunks_.end() || !found->second.is_unfinished();
   });
-  struct Wish {
+  struct LevelRequest {
     double distance;
     IVec3 chunk;
     int level;
   };
-  std::vector<Wish> wishes;
+  std::vector<LevelRequest> requests;
   for (auto& [chunk, state] : chunks_) {
     if (state.is_gone) continue;
     const double distance = distances.in_voxels(chunk);
@@ -200,20 +200,20 @@ void LiveField::choose_levels(const ChunkDistances& distances, LiveClock::time_p
     if (state.is_new()) {
       set_level(chunk, state, level, now);
     } else {
-      wishes.push_back({distance, chunk, level});
+      requests.push_back({distance, chunk, level});
     }
   }
-  wants_levels_ = !wishes.empty();
-  if (wishes.empty() || !changing_levels_.empty()) return;
-  const std::size_t count = std::min(wishes.size(), kMaxLevelChanges);
-  std::partial_sort(wishes.begin(), wishes.begin() + static_cast<std::ptrdiff_t>(count), wishes.end(),
-                    [](const Wish& a, const Wish& b) {
+  wants_levels_ = !requests.empty();
+  if (requests.empty() || !changing_levels_.empty()) return;
+  const std::size_t count = std::min(requests.size(), kMaxLevelChanges);
+  std::partial_sort(requests.begin(), requests.begin() + static_cast<std::ptrdiff_t>(count), requests.end(),
+                    [](const LevelRequest& a, const LevelRequest& b) {
                       return a.distance != b.distance ? a.distance < b.distance : by_zyx(a.chunk, b.chunk);
                     });
-  wishes.resize(count);
-  for (const Wish& wish : wishes) {
-    set_level(wish.chunk, chunks_.at(wish.chunk), wish.level, now);
-    changing_levels_.push_back(wish.chunk);
+  requests.resize(count);
+  for (const LevelRequest& request : requests) {
+    set_level(request.chunk, chunks_.at(request.chunk), request.level, now);
+    changing_levels_.push_back(request.chunk);
   }
 }
 
@@ -242,9 +242,9 @@ void LiveField::mark_types(const SceneGrid& content, const ChangedTypes& changed
     const bool is_other_surface = has_any(changed.visibility);
     if (!is_other_surface && !has_any(changed.colour)) continue;
     for (int i = 0; i < 27; ++i) {
-      const auto beside = chunks_.find(chunk + Neighbourhood::offset(i));
-      if (beside == chunks_.end()) continue;
-      mark(beside->first, is_other_surface && !beside->second.is_new(), now);
+      const auto adjacent = chunks_.find(chunk + Neighbourhood::offset(i));
+      if (adjacent == chunks_.end()) continue;
+      mark(adjacent->first, is_other_surface && !adjacent->second.is_new(), now);
     }
   }
 }
@@ -256,9 +256,9 @@ LiveField::Members LiveField::members_with(IVec3 chunk) const {
   ChunkSet seen{chunk};
   for (std::size_t next = 0; next < members.size(); ++next) {
     for (int i = 0; i < 27; ++i) {
-      const IVec3 beside = members[next] + Neighbourhood::offset(i);
-      if (!stale_.contains(beside) || !chunks_.at(beside).is_bound || !seen.insert(beside).second) continue;
-      members.push_back(beside);
+      const IVec3 adjacent = members[next] + Neighbourhood::offset(i);
+      if (!stale_.contains(adjacent) || !chunks_.at(adjacent).is_bound || !seen.insert(adjacent).second) continue;
+      members.push_back(adjacent);
     }
   }
   return members;

@@ -139,7 +139,7 @@ TEST(LiveLight, TellsWhereLightChanged) {
   std::map<std::array<int, 3>, std::vector<std::uint16_t>> copy;  // by chunk row
   ChangeCursor cursor;
   std::mt19937 random(6);
-  int told = 0;
+  int reported = 0;
   const auto follow = [&](bool is_first) {
     const PropagatedLight& now = *light.shown().of(world.handle).light;
     const GridChanges changes = now.changes_since(cursor);
@@ -150,7 +150,7 @@ TEST(LiveLight, TellsWhereLightChanged) {
       const IVec3 low = change.chunk * kChunkEdge;
       boxes.push_back({change.box.min + low, change.box.max + low});
     }
-    told += static_cast<int>(changes.items.size());
+    reported += static_cast<int>(changes.items.size());
     for (const IBox& box : boxes) {
       for_each_row(now, box, [&](IVec3 voxel, const auto& row) {
         copy[{voxel.x, voxel.y, voxel.z}] = {row.begin(), row.end()};
@@ -168,7 +168,7 @@ TEST(LiveLight, TellsWhereLightChanged) {
   }
   light.finish(world.scene);
   follow(false);
-  EXPECT_GT(told, 20);
+  EXPECT_GT(reported, 20);
   for_each_row(*light.shown().of(world.handle).light, kAround, [&](IVec3 voxel, const auto& row) {
     ASSERT_EQ((copy.at({voxel.x, voxel.y, voxel.z})), (std::vector<std::uint16_t>(row.begin(), row.end())));
   });

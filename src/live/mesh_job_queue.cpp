@@ -155,9 +155,9 @@ void MeshJobQueue::run() {
     });
     drop_inputs(*job);
     // Failures are not reported to the callback: an immediate retry would fail again.
-    const bool is_told = job->outcome != LiveJob::Outcome::OutOfMemory;
+    const bool is_reported = job->outcome != LiveJob::Outcome::OutOfMemory;
     finish(std::move(job), start);
-    if (is_told && on_ready_) guard(on_ready_);
+    if (is_reported && on_ready_) guard(on_ready_);
     lock.lock();
   }
 }

@@ -22,7 +22,7 @@ std::size_t jobs_ahead(SurfaceStyle style, unsigned workers) {
 }
 
 bool is_placed(const Scene& scene, const Instance& instance, InstanceFilter filter) {
-  return is_drawn(scene, instance, filter) && has_place(instance);
+  return is_drawn(scene, instance, filter) && has_valid_transform(instance);
 }
 
 }  // namespace

@@ -26,12 +26,11 @@ CameraRays::CameraRays(const Camera& camera, int width, int height)
       height_(height),
       is_perspective_(camera.projection == Camera::Projection::Perspective),
       forward_(camera.forward) {
-  const double picture_height =
-      is_perspective_ ? 2.0 * std::tan(camera.vertical_fov_radians / 2.0) : camera.view_height;
-  const double pixel = picture_height / height;
+  const double image_height = is_perspective_ ? 2.0 * std::tan(camera.vertical_fov_radians / 2.0) : camera.view_height;
+  const double pixel = image_height / height;
   right_ = camera.right * pixel;
   down_ = camera.up * -pixel;
-  if (!is_perspective_) sky_scale_ = 2.0 * std::tan(kSkyFov / 2.0) / picture_height;
+  if (!is_perspective_) sky_scale_ = 2.0 * std::tan(kSkyFov / 2.0) / image_height;
   corner_ = right_ * (-0.5 * width) + down_ * (-0.5 * height);
 }
 

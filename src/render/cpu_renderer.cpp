@@ -15,9 +15,9 @@
 #include "core/moved_from.h"
 #include "light/light_model.h"
 #include "light/surface/light_bricks.h"
+#include "render/image_detail.h"
+#include "render/image_request.h"
 #include "render/impostor/pass.h"
-#include "render/picture_detail.h"
-#include "render/picture_request.h"
 #include "render/tile.h"
 #include "render/tile_progress.h"
 #include "scene/tracer/placed_grid.h"
@@ -84,44 +84,43 @@ CpuRenderer& CpuRenderer::operator=(CpuRenderer&&) noexcept = default;
 CpuRenderer::~CpuRenderer() = default;
 
 const SceneTracer& CpuRenderer::tracer() const {
-  return content_of(impl_).tracer;
+  return impl_of(impl_).tracer;
 }
 
 void CpuRenderer::update(Threads threads) {
-  content_of(impl_).tracer.update(threads);
-  content_of(impl_).surfaces.update(content_of(impl_).scene->types);
-  content_of(impl_).detail.update_types(content_of(impl_).scene->types);
-  content_of(impl_).lamps.update();
-  content_of(impl_).levels.update();
+  impl_of(impl_).tracer.update(threads);
+  impl_of(impl_).surfaces.update(impl_of(impl_).scene->types);
+  impl_of(impl_).detail.update_types(impl_of(impl_).scene->types);
+  impl_of(impl_).lamps.update();
+  impl_of(impl_).levels.update();
 }
 
 void CpuRenderer::use_light(const SceneLight* light) {
-  content_of(impl_).levels.use(light);
+  impl_of(impl_).levels.use(light);
 }
 
-Result<Picture> CpuRenderer::render(const Camera& camera, const RenderOptions& options, Threads threads,
-                                    const Progress& progress) const {
+Result<RenderedImage> CpuRenderer::render(const Camera& camera, const RenderOptions& options, Threads threads,
+                                          const Progress& progress) const {
   if (const Status status = check(camera, options); !status) return status.error();
   QUOIN_ASSERT(std::abs(glm::dot(camera.right, camera.up)) < 1e-3 &&
                    std::abs(glm::dot(camera.right, camera.forward)) < 1e-3 &&
                    std::abs(glm::dot(camera.up, camera.forward)) < 1e-3,
                "the camera's axes are perpendicular");
-  PictureDetail detail =
-      content_of(impl_).detail.choose(*content_of(impl_).scene, content_of(impl_).instances, camera, options);
+  ImageDetail detail = impl_of(impl_).detail.choose(*impl_of(impl_).scene, impl_of(impl_).instances, camera, options);
   keep_whole(detail.far.instances, detail.selected);
   Subject subject;
-  if (options.detail.policy) subject.detailed.emplace(content_of(impl_).tracer.with_detail(detail.selected, threads));
-  subject.view.emplace(subject.detailed ? *subject.detailed : content_of(impl_).tracer, camera.position);
+  if (options.detail.policy) subject.detailed.emplace(impl_of(impl_).tracer.with_detail(detail.selected, threads));
+  subject.view.emplace(subject.detailed ? *subject.detailed : impl_of(impl_).tracer, camera.position);
   subject.leave_to_impostors(detail.far.instances, camera, options);
   const SceneView& view = *subject.view;
   const CameraRays rays(camera, options.width, options.height);
-  const std::shared_ptr<const LampTable> lamps = content_of(impl_).lamp_table(options.light, threads);
-  const Lighting lighting(view, content_of(impl_).scene->types, content_of(impl_).surfaces, options.light, lamps.get(),
-                          options.detail.colours, content_of(impl_).levels_of(view.tracer(), options.light, threads));
+  const std::shared_ptr<const LampTable> lamps = impl_of(impl_).lamp_table(options.light, threads);
+  const Lighting lighting(view, impl_of(impl_).scene->types, impl_of(impl_).surfaces, options.light, lamps.get(),
+                          options.detail.colours, impl_of(impl_).levels_of(view.tracer(), options.light, threads));
   const TileContext context{&view, &rays, &lighting, &options, subject.impostors ? &*subject.impostors : nullptr};
-  Picture picture = empty_picture(options);
-  if (Status drawn = draw_tiles<Tile>(context, options, threads, progress, picture); !drawn) return drawn.error();
-  return picture;
+  RenderedImage image = empty_image(options);
+  if (Status drawn = draw_tiles<Tile>(context, options, threads, progress, image); !drawn) return drawn.error();
+  return image;
 }
 
 }  // namespace quoin

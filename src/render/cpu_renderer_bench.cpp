@@ -4,40 +4,40 @@
 
 #include <quoin/render/cpu_renderer.h>
 
-#include "bench/picture_loop.h"
+#include "bench/image_loop.h"
 
 namespace quoin {
 namespace {
 
 using workloads::fail_unless;
 
-void picture(benchmark::State& state, const LightOptions& light, Threads threads = {1}) {
-  static const Scene scene = workloads::picture_scene();
-  fail_unless(scene.voxel_count() == workloads::kPictureVoxels, "the number of voxels", scene.voxel_count());
+void image(benchmark::State& state, const LightOptions& light, Threads threads = {1}) {
+  static const Scene scene = workloads::image_scene();
+  fail_unless(scene.voxel_count() == workloads::kImageVoxels, "the number of voxels", scene.voxel_count());
   const CpuRenderer renderer(scene, InstanceFilter::Visible, {1});
   RenderOptions options;
   options.light = light;
-  workloads::time_pictures(state, options, [&](const Camera& camera, const RenderOptions& wanted) {
+  workloads::time_images(state, options, [&](const Camera& camera, const RenderOptions& wanted) {
     return renderer.render(camera, wanted, threads);
   });
 }
 
 void full(benchmark::State& state) {
-  picture(state, {});
+  image(state, {});
 }
 void all_threads(benchmark::State& state) {
-  picture(state, {}, {});
+  image(state, {}, {});
   state.counters["threads"] = thread_count(Threads{});
 }
 void unlit(benchmark::State& state) {
   LightOptions light;
   light.shading = Shading::Unlit;
-  picture(state, light);
+  image(state, light);
 }
 void vertex(benchmark::State& state) {
   LightOptions light;
   light.occlusion_mode = OcclusionMode::Vertex;
-  picture(state, light);
+  image(state, light);
 }
 BENCHMARK(full)->Name("render/terrain/1280x720")->Unit(benchmark::kMillisecond)->Iterations(5);
 BENCHMARK(all_threads)

@@ -54,12 +54,12 @@ TEST(CpuRenderer, GivesTheSameBytesForAnyThreadsAndInstructions) {
     for (const unsigned threads : {2U, 0U}) {
       for (const InstructionSet set : sets_of_this_machine()) {
         const InstructionSetOverride over(set);
-        const auto picture = renderer.render(camera, options, {threads});
-        ASSERT_TRUE(picture.has_value());
-        EXPECT_EQ(picture->colour.rgb, reference->colour.rgb);
-        EXPECT_EQ(picture->depth.values, reference->depth.values);
-        EXPECT_EQ(picture->rays, reference->rays);
-        EXPECT_EQ(picture->pixels_hit, reference->pixels_hit);
+        const auto image = renderer.render(camera, options, {threads});
+        ASSERT_TRUE(image.has_value());
+        EXPECT_EQ(image->colour.rgb, reference->colour.rgb);
+        EXPECT_EQ(image->depth.values, reference->depth.values);
+        EXPECT_EQ(image->rays, reference->rays);
+        EXPECT_EQ(image->pixels_hit, reference->pixels_hit);
       }
     }
   }
@@ -70,14 +70,13 @@ TEST(CpuRenderer, ProgressNeverFallsAndReachesOne) {
   double last = 0.0;
   std::atomic<int> inside{0};
   bool is_fine = true;
-  const auto picture =
-      CpuRenderer(scene).render(towards({25, 18, 30}, {0, 2, 0}), sized(200, 100), {}, [&](double done) {
-        is_fine &= ++inside == 1 && done >= last;
-        last = done;
-        --inside;
-        return true;
-      });
-  ASSERT_TRUE(picture.has_value());
+  const auto image = CpuRenderer(scene).render(towards({25, 18, 30}, {0, 2, 0}), sized(200, 100), {}, [&](double done) {
+    is_fine &= ++inside == 1 && done >= last;
+    last = done;
+    --inside;
+    return true;
+  });
+  ASSERT_TRUE(image.has_value());
   EXPECT_TRUE(is_fine);
   EXPECT_EQ(last, 1.0);
 }
@@ -85,10 +84,10 @@ TEST(CpuRenderer, ProgressNeverFallsAndReachesOne) {
 TEST(CpuRenderer, StopsWhenTold) {
   const Scene scene = lively_scene();
   int calls = 0;
-  const auto picture = CpuRenderer(scene).render(towards({25, 18, 30}, {0, 2, 0}), sized(300, 300), {},
-                                                 [&](double) { return ++calls < 3; });
-  ASSERT_FALSE(picture.has_value());
-  EXPECT_EQ(picture.error().code, ErrorCode::Cancelled);
+  const auto image = CpuRenderer(scene).render(towards({25, 18, 30}, {0, 2, 0}), sized(300, 300), {},
+                                               [&](double) { return ++calls < 3; });
+  ASSERT_FALSE(image.has_value());
+  EXPECT_EQ(image.error().code, ErrorCode::Cancelled);
   EXPECT_EQ(calls, 3);
 }
 
@@ -113,10 +112,10 @@ TEST(CpuRenderer, RefusesWhatCannotBe) {
     Camera camera = towards({25, 18, 30}, {0, 2, 0});
     RenderOptions options = sized(8, 8);
     change(camera, options);
-    const auto picture = renderer.render(camera, options);
-    ASSERT_FALSE(picture.has_value()) << name;
-    EXPECT_EQ(picture.error().code, ErrorCode::InvalidArgument) << name;
-    EXPECT_EQ(picture.error().message.rfind(name, 0), 0U) << picture.error().message;
+    const auto image = renderer.render(camera, options);
+    ASSERT_FALSE(image.has_value()) << name;
+    EXPECT_EQ(image.error().code, ErrorCode::InvalidArgument) << name;
+    EXPECT_EQ(image.error().message.rfind(name, 0), 0U) << image.error().message;
   };
   expect_refused("size", [](Camera&, RenderOptions& o) { o.width = 0; });
   expect_refused("size", [](Camera&, RenderOptions& o) { o.height = -1; });
@@ -139,13 +138,13 @@ TEST(CpuRenderer, RefusesWhatCannotBe) {
 
 TEST(CpuRenderer, AnEmptySceneIsSky) {
   const Scene scene;
-  const Picture picture = taken(scene, towards({0, 0, 0}, {0, 0, -1}), sized(9, 9));
-  EXPECT_EQ(picture.pixels_hit, 0);
-  EXPECT_EQ(picture.rays, 81);
-  for (const float depth : picture.depth.values) EXPECT_EQ(depth, static_cast<float>(kInfinity));
-  EXPECT_EQ(pixel_at(picture, 4, 4), encoded(sky_colour(0.0F)));
-  const Pixel top = pixel_at(picture, 4, 0);
-  const Pixel horizon = pixel_at(picture, 4, 4);
+  const RenderedImage image = taken(scene, towards({0, 0, 0}, {0, 0, -1}), sized(9, 9));
+  EXPECT_EQ(image.pixels_hit, 0);
+  EXPECT_EQ(image.rays, 81);
+  for (const float depth : image.depth.values) EXPECT_EQ(depth, static_cast<float>(kInfinity));
+  EXPECT_EQ(pixel_at(image, 4, 4), encoded(sky_colour(0.0F)));
+  const Pixel top = pixel_at(image, 4, 0);
+  const Pixel horizon = pixel_at(image, 4, 4);
   EXPECT_LT(top[0], horizon[0]) << "the sky is paler towards the horizon";
 }
 
@@ -165,17 +164,17 @@ TEST(CpuRenderer, OneVoxelIsSeenUprightAndNotMirrored) {
   place(scene, std::move(grid));
   RenderOptions options = sized(80, 80);
   options.light.shading = Shading::Unlit;
-  const Picture picture = taken(scene, towards({0, 0, 10}, {0, 0, 0}, 2.0 * std::atan(0.4)), options);
+  const RenderedImage image = taken(scene, towards({0, 0, 10}, {0, 0, 0}, 2.0 * std::atan(0.4)), options);
   // At distance 9 the image extends 3.6 up from the centre: 11.1 pixels per voxel.
-  EXPECT_EQ(pixel_at(picture, 40 + 27, 40 - 16), encoded(linear(red)));
-  EXPECT_FLOAT_EQ(depth_at(picture, 40 + 27, 40 - 16),
+  EXPECT_EQ(pixel_at(image, 40 + 27, 40 - 16), encoded(linear(red)));
+  EXPECT_FLOAT_EQ(depth_at(image, 40 + 27, 40 - 16),
                   9.0F * static_cast<float>(glm::length(DVec3(27.5 / 100, 15.5 / 100, 1.0))));
   for (const auto& [x, y] : {std::pair(-28, -16), {27, 16}, {-28, 16}}) {
-    EXPECT_EQ(depth_at(picture, 40 + x, 40 + y), static_cast<float>(kInfinity));
+    EXPECT_EQ(depth_at(image, 40 + x, 40 + y), static_cast<float>(kInfinity));
   }
   // The front, and narrow parts of its left and lower sides.
-  EXPECT_GT(picture.pixels_hit, 123);
-  EXPECT_LT(picture.pixels_hit, 165);
+  EXPECT_GT(image.pixels_hit, 123);
+  EXPECT_LT(image.pixels_hit, 165);
 }
 
 TEST(CpuRenderer, UnlitColoursAreThoseOfThePalette) {
@@ -190,10 +189,10 @@ TEST(CpuRenderer, UnlitColoursAreThoseOfThePalette) {
   options.light.shading = Shading::Unlit;
   options.light.exposure = 3.0;
   options.samples = 3;
-  const Picture picture = taken(scene, from_above(8, 5, 8, 16), options);
+  const RenderedImage image = taken(scene, from_above(8, 5, 8, 16), options);
   for (int i = 0; i < 256; ++i) {
     const Pixel expected{static_cast<std::uint8_t>(i), static_cast<std::uint8_t>(255 - i), 77};
-    EXPECT_EQ(pixel_at(picture, i % 16, i / 16), expected);
+    EXPECT_EQ(pixel_at(image, i % 16, i / 16), expected);
   }
 }
 
@@ -205,9 +204,9 @@ TEST(CpuRenderer, SamplesSoftenEdgesOnly) {
   RenderOptions options = sized(64, 64);
   options.light.shading = Shading::Unlit;
   const Camera camera = towards({9, 7, 11}, {2, 2, 2});
-  const Picture one = taken(scene, camera, options);
+  const RenderedImage one = taken(scene, camera, options);
   options.samples = 16;
-  const Picture many = taken(scene, camera, options);
+  const RenderedImage many = taken(scene, camera, options);
   EXPECT_EQ(one.depth.values, many.depth.values) << "depth is that of the centre";
   EXPECT_EQ(one.pixels_hit, many.pixels_hit);
   int between = 0;
@@ -261,7 +260,7 @@ class UpdatedRenderer {
       // All instances are far: drawn from impostors.
       if (detail) options.detail.policy.emplace().far_pixels = 1000;
       const auto updated = renderer_.render(camera, options);
-      const Picture fresh = taken(scene_, camera, options);
+      const RenderedImage fresh = taken(scene_, camera, options);
       ASSERT_TRUE(updated.has_value());
       EXPECT_EQ(updated->colour.rgb, fresh.colour.rgb);
       EXPECT_EQ(updated->depth.values, fresh.depth.values);
@@ -273,11 +272,11 @@ class UpdatedRenderer {
  private:
   const Scene& scene_;
   CpuRenderer renderer_;
-  Picture last_;
+  RenderedImage last_;
 };
 
 // Applies changes of all kinds between images of all kinds.
-TEST(CpuRenderer, UpdatedItTakesThePicturesOfANewOne) {
+TEST(CpuRenderer, UpdatedItTakesTheImagesOfANewOne) {
   Scene scene = lively_scene();
   UpdatedRenderer renderer(scene);
   renderer.expect_as_new("nothing");

@@ -127,7 +127,7 @@ struct Closeness {
   double overlap = 0.0;  // intersection over union of the silhouettes
 };
 
-Closeness closeness(const Picture& a, const Picture& b) {
+Closeness closeness(const RenderedImage& a, const RenderedImage& b) {
   double sum = 0.0;
   int both = 0;
   int either = 0;
@@ -167,7 +167,7 @@ Closeness closeness_at(const Model& model, const Camera& camera, const DetailPol
   RenderOptions options = sized(kEdge, kEdge);
   options.samples = 64;
   const CpuRenderer renderer(model.scene);
-  const Picture near = renderer.render(camera, options).value();
+  const RenderedImage near = renderer.render(camera, options).value();
   options.detail.policy = policy;
   return closeness(near, renderer.render(camera, options).value());
 }
@@ -287,14 +287,14 @@ TEST(RenderDetail, MidIsTheHalvedGridWithTheFullOnesLight) {
   coarse.add_instance(instance);
   RenderOptions options = always_mid();
   options.light.shadow_distance_voxels = 8.0;
-  const Picture mid = taken(model.scene, camera, options);
+  const RenderedImage mid = taken(model.scene, camera, options);
   RenderOptions expected = sized(64, 64);
   expected.light.occlusion_distance_voxels /= 2.0;
   expected.light.shadow_distance_voxels = 4.0;
-  const Picture other = taken(coarse, camera, expected);
+  const RenderedImage other = taken(coarse, camera, expected);
   EXPECT_EQ(mid.depth.values, other.depth.values);
   EXPECT_GT(mid.pixels_hit, 300);
-  const Picture near = taken(model.scene, camera, sized(64, 64));
+  const RenderedImage near = taken(model.scene, camera, sized(64, 64));
   EXPECT_NE(mid.depth.values, near.depth.values);
 }
 
@@ -321,8 +321,8 @@ TEST(RenderDetail, MidOfAFieldIsTheHalvedFieldWithTheFullOnesLight) {
     expected.light = options.light;
     expected.light.occlusion_distance_voxels /= 2.0;
     expected.light.smooth_occlusion.spread /= 2.0F;
-    const Picture mid = taken(model.scene, camera, options);
-    const Picture other = taken(coarse, camera, expected);
+    const RenderedImage mid = taken(model.scene, camera, options);
+    const RenderedImage other = taken(coarse, camera, expected);
     EXPECT_EQ(mid.depth.values, other.depth.values);
     // Rays start a lift of the full samples, not of the halved ones, before the surface.
     EXPECT_LE(count_different(mid, other, 8), 64);
@@ -335,7 +335,7 @@ TEST(RenderDetail, LevelsFollowEditsOfAField) {
   Model model = village(false);
   CpuRenderer renderer(model.scene);
   const Camera camera = towards({160, 150, 200}, {0, 0, 0}, 0.9);
-  const Picture before = renderer.render(camera, always_mid()).value();
+  const RenderedImage before = renderer.render(camera, always_mid()).value();
   DensityGrid& field = model.scene.edit(model.scene.instances()[model.instance].grid).field;
   for (int step = 0; step < 4; ++step) {
     if (step == 3) {
@@ -345,7 +345,7 @@ TEST(RenderDetail, LevelsFollowEditsOfAField) {
       field.add_box({-63.0, 20.0, 60.0}, {1.0, 40.0 + step, 66.0}, 1);
     }
     renderer.update();
-    const Picture after = renderer.render(camera, always_mid()).value();
+    const RenderedImage after = renderer.render(camera, always_mid()).value();
     EXPECT_NE(before.colour.rgb, after.colour.rgb);
     EXPECT_EQ(taken(model.scene, camera, always_mid()).colour.rgb, after.colour.rgb) << step;
   }
@@ -373,13 +373,13 @@ TEST(RenderDetail, OpaqueMidIsTheHalvedGridToTheByteButForRounding) {
   EXPECT_LE(count_different(taken(model.scene, camera, always_mid()), taken(coarse, camera, expected), 2), 8);
 }
 
-TEST(RenderDetail, NearIsThePictureWithoutDetailToTheByte) {
+TEST(RenderDetail, NearIsTheImageWithoutDetailToTheByte) {
   const Model model = blobs();
   const Camera camera = towards({30, 25, 40}, {0, 0, 0}, 0.9);
   RenderOptions options = sized(64, 64);
-  const Picture plain = taken(model.scene, camera, options);
+  const RenderedImage plain = taken(model.scene, camera, options);
   options.detail.policy.emplace().far_pixels = 0;
-  const Picture detailed = taken(model.scene, camera, options);
+  const RenderedImage detailed = taken(model.scene, camera, options);
   EXPECT_EQ(plain.colour.rgb, detailed.colour.rgb);
   EXPECT_EQ(plain.depth.values, detailed.depth.values);
 }
@@ -390,7 +390,7 @@ TEST(RenderDetail, TheSameBytesAtAnyNumberOfThreadsAndAgain) {
   const Camera camera = towards({300, 250, 400}, {0, 0, 0}, 0.2);
   RenderOptions options = sized(64, 64);
   options.detail.policy.emplace();
-  const Picture one = renderer.render(camera, options, {1}).value();
+  const RenderedImage one = renderer.render(camera, options, {1}).value();
   EXPECT_EQ(renderer.render(camera, options, {4}).value().colour.rgb, one.colour.rgb);
   EXPECT_EQ(CpuRenderer(model.scene).render(camera, options).value().colour.rgb, one.colour.rgb);
 }

@@ -74,10 +74,10 @@ TEST(RenderFieldGlass, ASlabTintsByItsThicknessAndShowsItsOwnColour) {
       place_field(s.scene, std::move(slab));
       RenderOptions options = sized(4, 4);
       options.light.shading = Shading::Unlit;
-      const Picture picture = taken(s.scene, from_above(0, 20, 0, 4), options);
+      const RenderedImage image = taken(s.scene, from_above(0, 20, 0, 4), options);
       const Vec3 expected = is_glass ? linear(kRed) * through(thickness) + own(thickness) : linear(kWhite);
-      expect_near(pixel_at(picture, 1, 2), encoded(expected), 1);
-      EXPECT_NEAR(depth_at(picture, 1, 2), 20.0 - low - static_cast<double>(thickness), 1e-5) << "it counts as hit";
+      expect_near(pixel_at(image, 1, 2), encoded(expected), 1);
+      EXPECT_NEAR(depth_at(image, 1, 2), 20.0 - low - static_cast<double>(thickness), 1e-5) << "it counts as hit";
     }
   }
 }
@@ -92,8 +92,8 @@ TEST(RenderFieldGlass, LengthsAreInVoxelsWhateverTheirSize) {
   s.scene.edit(place_field(s.scene, std::move(slab))).voxel_size = 0.5;
   RenderOptions options = sized(4, 4);
   options.light.shading = Shading::Unlit;
-  const Picture picture = taken(s.scene, from_above(0, 20, 0, 2), options);
-  expect_near(pixel_at(picture, 1, 2), encoded(linear(kRed) * through(4.0F) + own(4.0F)), 1);
+  const RenderedImage image = taken(s.scene, from_above(0, 20, 0, 2), options);
+  expect_near(pixel_at(image, 1, 2), encoded(linear(kRed) * through(4.0F) + own(4.0F)), 1);
 }
 
 // The floor of a lake in the same field: at the same position below water and below air.
@@ -110,10 +110,10 @@ TEST(RenderFieldGlass, TheFloorOfALakeIsWhereItsSamplesSay) {
   RenderOptions options = sized(4, 4);
   options.light.sun = {0, 1, 0};
   options.light.occlusion_mode = OcclusionMode::Off;
-  const Picture picture = taken(s.scene, from_above(0, 20, 0, 4), options);
+  const RenderedImage image = taken(s.scene, from_above(0, 20, 0, 4), options);
   // The sun's light passes the water, and the view does too; the surface itself blocks no light.
   const Vec3 behind = linear(kRed) * (0.1F + through(6.74F));
-  expect_near(pixel_at(picture, 1, 1), encoded(behind * through(6.75F) + own(6.75F) * 1.1F), 1);
+  expect_near(pixel_at(image, 1, 1), encoded(behind * through(6.75F) + own(6.75F) * 1.1F), 1);
 }
 
 TEST(RenderFieldGlass, TintsTheSunAndDoesNotOcclude) {
@@ -160,7 +160,7 @@ TEST(RenderFieldGlass, BesideGlassOfBlocksItLooksTheSame) {
   RenderOptions options = sized(16, 16);
   options.light.sun = {0, 1, 0};
   options.light.glass_surfaces = true;
-  const Picture above = taken(s.scene, from_above(0, 30, 0, 12), options);
+  const RenderedImage above = taken(s.scene, from_above(0, 30, 0, 12), options);
   for (int y = 2; y < 14; ++y) expect_near(pixel_at(above, 2, y), pixel_at(above, 13, y), 1);
   // Along both, as one body of 16 voxels.
   options.light.shading = Shading::Unlit;
@@ -181,9 +181,9 @@ TEST(RenderFieldGlass, OverlappingBlocksAreSeenThroughIt) {
   s.scene.add_instance({"", s.scene.add_grid(std::move(both)), DVec3(0.0)});
   RenderOptions options = sized(8, 8);
   options.light.shading = Shading::Unlit;
-  const Picture picture = taken(s.scene, from_above(0, 20, 0, 8), options);
-  expect_near(pixel_at(picture, 4, 4), encoded(linear(kRed) * through(3.0F) + own(3.0F)), 1);
-  EXPECT_GT(std::abs(pixel_at(picture, 0, 0)[2] - pixel_at(picture, 4, 4)[2]), 20) << "it is deeper next to them";
+  const RenderedImage image = taken(s.scene, from_above(0, 20, 0, 8), options);
+  expect_near(pixel_at(image, 4, 4), encoded(linear(kRed) * through(3.0F) + own(3.0F)), 1);
+  EXPECT_GT(std::abs(pixel_at(image, 0, 0)[2] - pixel_at(image, 4, 4)[2]), 20) << "it is deeper next to them";
 }
 
 // A ball of clear glass in front of the sky: its two surfaces reflect by the field's normals.
@@ -201,7 +201,7 @@ TEST(RenderFieldGlass, SurfacesMirrorByTheGradient) {
   Camera camera = towards({0, 0, 100}, {0, 0, 0});
   camera.projection = Camera::Projection::Orthographic;
   camera.view_height = 61.0;
-  const Picture picture = taken(scene, camera, options);
+  const RenderedImage image = taken(scene, camera, options);
   const auto fresnel = [](double cosine) {
     const double inside = std::sqrt(1.0 - (1.0 - cosine * cosine) / 2.25);
     const double across = (cosine - 1.5 * inside) / (cosine + 1.5 * inside);
@@ -209,7 +209,7 @@ TEST(RenderFieldGlass, SurfacesMirrorByTheGradient) {
     return 0.5 * (across * across + in_plane * in_plane);
   };
   // Straight through: the sky in the camera's own ray directions.
-  const Picture empty = taken(Scene(), camera, options);
+  const RenderedImage empty = taken(Scene(), camera, options);
   int compared = 0;
   for (int y = 4; y < 57; y += 4) {
     for (int x = 4; x < 57; x += 4) {
@@ -223,7 +223,7 @@ TEST(RenderFieldGlass, SurfacesMirrorByTheGradient) {
       const Vec3 mirrored = share * (sky_colour(up) + (1.0F - share) * sky_colour(up));
       const Pixel plain = pixel_at(empty, x, y);
       const Vec3 behind = linear({plain[0], plain[1], plain[2], 255});
-      expect_near(pixel_at(picture, x, y), encoded(mirrored + (1.0F - share) * (1.0F - share) * behind), 5);
+      expect_near(pixel_at(image, x, y), encoded(mirrored + (1.0F - share) * (1.0F - share) * behind), 5);
       ++compared;
     }
   }
@@ -259,7 +259,7 @@ TEST(RenderFieldGlass, TheSameBytesWhateverComputesThem) {
   RenderOptions options = sized(80, 60);
   options.light.glass_surfaces = true;
   const Camera camera = towards({70, 40, 80}, {0, 0, 0});
-  const Picture one = taken(s.scene, camera, options, {1});
+  const RenderedImage one = taken(s.scene, camera, options, {1});
   EXPECT_EQ(taken(s.scene, camera, options, {3}).colour.rgb, one.colour.rgb);
   for (const InstructionSet set : sets_of_this_machine()) {
     const InstructionSetOverride over(set);
@@ -280,12 +280,12 @@ TEST(RenderFieldGlass, ARendererFollowsEditsAndTypes) {
   options.light.glass_surfaces = true;
   const Camera camera = towards({50, 60, 60}, {0, 0, 0});
   CpuRenderer kept(s.scene);
-  Picture last = taken(s.scene, camera, options);
+  RenderedImage last = taken(s.scene, camera, options);
   const auto expect_followed = [&](const char* what) {
     kept.update();
     const auto followed = kept.render(camera, options);
     ASSERT_TRUE(followed.has_value());
-    const Picture anew = taken(s.scene, camera, options);
+    const RenderedImage anew = taken(s.scene, camera, options);
     EXPECT_EQ(followed->colour.rgb, anew.colour.rgb) << what;
     EXPECT_GT(count_different(anew, last, 3), 20) << what;
     last = anew;
@@ -327,9 +327,9 @@ TEST(RenderFieldGlass, SeenFromInsideTintsOnly) {
   place_field(s.scene, std::move(sea));
   RenderOptions options = sized(3, 3);
   options.light.shading = Shading::Unlit;
-  const Picture picture = taken(s.scene, from_above(0, 2.5, 0, 2), options);
-  expect_near(pixel_at(picture, 1, 1), encoded(linear(kWhite) * through(2.5F)), 1);
-  EXPECT_EQ(depth_at(picture, 1, 1), 0.0F);
+  const RenderedImage image = taken(s.scene, from_above(0, 2.5, 0, 2), options);
+  expect_near(pixel_at(image, 1, 1), encoded(linear(kWhite) * through(2.5F)), 1);
+  EXPECT_EQ(depth_at(image, 1, 1), 0.0F);
 }
 
 // The opaque part comes from an impostor, the glass from rays; neither is halved.
@@ -337,12 +337,12 @@ TEST(RenderFieldGlass, FromAfarItIsSeenThrough) {
   PondScene s;
   RenderOptions options = sized(96, 72);
   const Camera camera = towards({170, 120, 190}, {0, 0, 0});
-  const Picture whole = taken(s.scene, camera, options);
+  const RenderedImage whole = taken(s.scene, camera, options);
   options.detail.policy.emplace().far_pixels = 0;
   options.detail.policy->cell_pixels = 3.0;
   EXPECT_EQ(taken(s.scene, camera, options).colour.rgb, whole.colour.rgb);
   options.detail.policy->far_pixels = 1000;
-  const Picture far = taken(s.scene, camera, options);
+  const RenderedImage far = taken(s.scene, camera, options);
   EXPECT_NE(far.colour.rgb, whole.colour.rgb);
   EXPECT_LT(count_different(whole, far, 24), 250) << "edges";
   for (const VoxelType type : {s.glass, s.green}) {

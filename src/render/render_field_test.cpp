@@ -40,7 +40,7 @@ TEST(RenderField, ABallHasTheLightOfItsNormals) {
   constexpr double kRadius = 24.0;
   field.add_sphere(DVec3(32.0), kRadius, add_type(scene, colour));
   place_field(scene, std::move(field), DVec3(-32.0));
-  const Picture picture = taken(scene, from_above(0, 100, 0, 60), lit_by_the_sun(61));
+  const RenderedImage image = taken(scene, from_above(0, 100, 0, 60), lit_by_the_sun(61));
   int compared = 0;
   for (int y = 0; y < 61; ++y) {
     for (int x = 0; x < 61; ++x) {
@@ -54,9 +54,9 @@ TEST(RenderField, ABallHasTheLightOfItsNormals) {
       // At grazing light the own cells of the ball may or may not block it.
       if (std::abs(glm::dot(normal, kSun)) < 0.1) continue;
       const Pixel expected = encoded(linear(colour) * static_cast<float>(0.1 + cosine));
-      const Pixel found = pixel_at(picture, x, y);
+      const Pixel found = pixel_at(image, x, y);
       for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(found[c], expected[c], 5) << x << ' ' << y;
-      EXPECT_NEAR(depth_at(picture, x, y), 100.0 - std::sqrt(square), 0.05);
+      EXPECT_NEAR(depth_at(image, x, y), 100.0 - std::sqrt(square), 0.05);
       ++compared;
     }
   }
@@ -74,12 +74,12 @@ TEST(RenderField, FieldsAndBlocksShadeEachOther) {
   place_field(scene, std::move(ball), {-16, 0, -16});
   RenderOptions options = lit_by_the_sun(81);
   options.light.sun = {0, 1, 0};
-  const Picture picture = taken(scene, from_above(0, 100, 0, 81), options);
+  const RenderedImage image = taken(scene, from_above(0, 100, 0, 81), options);
   // No pixel below the ball's outline is visible; next to it the floor is lit.
-  EXPECT_EQ(pixel_at(picture, 40 + 10, 40), encoded(linear({188, 188, 188, 255}) * 1.1F));
+  EXPECT_EQ(pixel_at(image, 40 + 10, 40), encoded(linear({188, 188, 188, 255}) * 1.1F));
   // With a slanted sun the ball's shadow lies at the projection of its centre onto the floor.
   options.light.sun = {1, 1, 0};
-  const Picture aslant = taken(scene, from_above(0, 100, 0, 81), options);
+  const RenderedImage aslant = taken(scene, from_above(0, 100, 0, 81), options);
   const Pixel in_shadow = encoded(linear({188, 188, 188, 255}) * 0.1F);
   EXPECT_EQ(pixel_at(aslant, 40 - 16, 40), in_shadow);
   EXPECT_EQ(pixel_at(aslant, 40 - 22, 40), in_shadow);
@@ -90,7 +90,7 @@ TEST(RenderField, FieldsAndBlocksShadeEachOther) {
   roof.fill_box({{-3, 30, -3}, {4, 31, 4}}, grey);
   place(scene, std::move(roof));
   options.light.sun = {0, 1, 0};
-  const Picture under = taken(scene, from_above(0, 28, 0, 81), options);
+  const RenderedImage under = taken(scene, from_above(0, 28, 0, 81), options);
   EXPECT_EQ(pixel_at(under, 40, 40), in_shadow);
   EXPECT_NE(pixel_at(under, 40 + 6, 40), in_shadow);
 }
@@ -121,8 +121,8 @@ TEST(RenderField, AFlatFloorIsLitAsOneOfBlocks) {
     RenderOptions options = sized(40, 40);
     options.samples = 4;
     options.light.occlusion_rays = rays;
-    const Picture blocks = taken(floor(true), from_above(20, 60, 20, 40), options);
-    const Picture field = taken(floor(false), from_above(20, 60, 20, 40), options);
+    const RenderedImage blocks = taken(floor(true), from_above(20, 60, 20, 40), options);
+    const RenderedImage field = taken(floor(false), from_above(20, 60, 20, 40), options);
     // Away from the edges, which a trilinear field rounds off.
     for (int y = 4; y < 36; ++y) {
       for (const int x : {4, 8, 12, 15, 24, 30, 35}) {
@@ -147,22 +147,22 @@ TEST(RenderField, SmoothOcclusionIsThatOfItsMeshAtEveryPoint) {
   options.light.smooth_occlusion.method = SmoothOcclusion::Weighted;
   options.depth = true;
   const Camera camera = from_above(20, 60, 20, 40);
-  const Picture picture = taken(scene, camera, options);
+  const RenderedImage image = taken(scene, camera, options);
   int darker = 0;
   for (int y = 4; y < 36; ++y) {
     for (int x = 4; x < 36; ++x) {
-      const float depth = picture.depth.values[static_cast<std::size_t>(40 * y + x)];
+      const float depth = image.depth.values[static_cast<std::size_t>(40 * y + x)];
       const DVec3 point(x + 0.5, 60.0 - static_cast<double>(depth), y + 0.5);
       const DVec3 up = glm::normalize(same.gradient_at(point));
       const float open = 1.0F - smooth_occlusion(same, point, Vec3(up), options.light.smooth_occlusion);
       darker += open < 0.9F ? 1 : 0;
       // The image uses the lighting normals, which are smoother than the exact ones.
-      EXPECT_NEAR(pixel_at(picture, x, y)[0], 255.0 * open, 30.0) << x << ' ' << y;
+      EXPECT_NEAR(pixel_at(image, x, y)[0], 255.0 * open, 30.0) << x << ' ' << y;
     }
   }
   EXPECT_GT(darker, 30);
-  EXPECT_EQ(pixel_at(picture, 6, 6), (Pixel{255, 255, 255})) << "flat";
-  EXPECT_EQ(pixel_at(picture, 20, 20), (Pixel{255, 255, 255})) << "convex";
+  EXPECT_EQ(pixel_at(image, 6, 6), (Pixel{255, 255, 255})) << "flat";
+  EXPECT_EQ(pixel_at(image, 20, 20), (Pixel{255, 255, 255})) << "convex";
 }
 
 TEST(RenderField, MaterialsColourIt) {
@@ -176,7 +176,7 @@ TEST(RenderField, MaterialsColourIt) {
   place_field(scene, std::move(field));
   RenderOptions options = sized(60, 20);
   options.light.shading = Shading::Unlit;
-  const Picture unlit = taken(scene, from_above(25, 50, 5, 20), options);
+  const RenderedImage unlit = taken(scene, from_above(25, 50, 5, 20), options);
   EXPECT_EQ(pixel_at(unlit, 10, 10), (Pixel{200, 30, 30}));
   EXPECT_EQ(pixel_at(unlit, 30, 10), (Pixel{30, 200, 30}));
   EXPECT_EQ(pixel_at(unlit, 50, 10), (Pixel{255, 255, 255}));
@@ -184,7 +184,7 @@ TEST(RenderField, MaterialsColourIt) {
   EXPECT_EQ(pixel_at(taken(scene, from_above(25, 50, 5, 20), options), 10, 10), (Pixel{128, 255, 128}));
   options.light.shading = Shading::Lit;
   options.light.sun_brightness = options.light.sky_brightness = 0.0;
-  const Picture night = taken(scene, from_above(25, 50, 5, 20), options);
+  const RenderedImage night = taken(scene, from_above(25, 50, 5, 20), options);
   EXPECT_EQ(pixel_at(night, 10, 10), (Pixel{0, 0, 0}));
   EXPECT_GT(pixel_at(night, 30, 10)[1], 200);
 }
@@ -221,7 +221,7 @@ TEST(RenderField, MaterialsBlendAsThoseOfItsMesh) {
   RenderOptions options = sized(4 * kCells, 4 * kCells);
   options.light.shading = Shading::Unlit;
   constexpr double kMiddle = kFirst + 0.5 + 0.5 * kCells;
-  const Picture picture = taken(scene, from_above(kMiddle, 50, kMiddle, kCells), options);
+  const RenderedImage image = taken(scene, from_above(kMiddle, 50, kMiddle, kCells), options);
   int blended = 0;
   for (int y = 0; y < 4 * kCells; ++y) {
     for (int x = 0; x < 4 * kCells; ++x) {
@@ -232,7 +232,7 @@ TEST(RenderField, MaterialsBlendAsThoseOfItsMesh) {
       const Vec3 above = glm::mix(colours[row][column], colours[row][column + 1], part.x);
       const Vec3 below = glm::mix(colours[row + 1][column], colours[row + 1][column + 1], part.x);
       const Pixel expected = encoded(glm::mix(above, below, part.z));
-      const Pixel found = pixel_at(picture, x, y);
+      const Pixel found = pixel_at(image, x, y);
       for (std::size_t c = 0; c < 3; ++c) ASSERT_NEAR(found[c], expected[c], 1) << x << ' ' << y;
       blended += std::abs(above.x - below.x) > 0.01F ? 1 : 0;
     }
@@ -253,15 +253,15 @@ TEST(RenderField, BlendsEmissionToo) {
   RenderOptions options = sized(40, 40);
   options.light.sun_brightness = options.light.sky_brightness = 0.0;
   const Camera camera = from_above(19.5, 50, 20, 4);
-  const Picture picture = taken(scene, camera, options);
+  const RenderedImage image = taken(scene, camera, options);
   PathOptions paths = under_even_sky(40, 40, 16);
   paths.sky_brightness = 0.0;
   paths.max_bounces = 0;
-  const PathPicture traced = path_picture(scene, camera, paths);
+  const PathImage traced = path_image(scene, camera, paths);
   for (int x = 0; x < 40; ++x) {
     // 0 from 1 before the middle between both materials, 1 from 1 beyond it.
     const float share = std::clamp(0.5F * (1.0F + (static_cast<float>(x) + 0.5F - 20.0F) / 10.0F), 0.0F, 1.0F);
-    EXPECT_NEAR(pixel_at(picture, x, 20)[0], encoded(Vec3(0.5F * share))[0], 1) << x;
+    EXPECT_NEAR(pixel_at(image, x, 20)[0], encoded(Vec3(0.5F * share))[0], 1) << x;
     EXPECT_NEAR(traced.radiance[static_cast<std::size_t>(20 * 40 + x)].x, 0.5F * share, 0.01F) << x;
   }
 }

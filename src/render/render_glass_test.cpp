@@ -49,12 +49,12 @@ TEST(RenderGlass, PanesTintByTheirThicknessAndShowTheirOwnColour) {
     place(s.scene, std::move(grid));
     RenderOptions options = sized(4, 4);
     options.light.shading = Shading::Unlit;
-    const Picture picture = taken(s.scene, from_above(0, 20, 0, 4), options);
+    const RenderedImage image = taken(s.scene, from_above(0, 20, 0, 4), options);
     const auto length = static_cast<float>(thickness);
     const Vec3 expected =
         linear(kWhite) * power(through_one(), length) + linear(kGlass) * (1.0F - std::pow(1.0F - kAlpha, length));
-    expect_near(pixel_at(picture, 1, 2), encoded(expected), 1);
-    EXPECT_FLOAT_EQ(depth_at(picture, 1, 2), static_cast<float>(20 - 3 - thickness)) << "glass counts as hit";
+    expect_near(pixel_at(image, 1, 2), encoded(expected), 1);
+    EXPECT_FLOAT_EQ(depth_at(image, 1, 2), static_cast<float>(20 - 3 - thickness)) << "glass counts as hit";
   }
 }
 
@@ -64,15 +64,15 @@ TEST(RenderGlass, IsVisibleOnADarkGroundAndAgainstTheSky) {
   grid.fill_box({{-5, 0, -5}, {6, 1, 6}}, s.glass);
   place(s.scene, std::move(grid));
   RenderOptions options = sized(2, 2);
-  const Picture picture = taken(s.scene, from_above(0, 20, 0, 4), options);
-  EXPECT_EQ(picture.pixels_hit, 4);
+  const RenderedImage image = taken(s.scene, from_above(0, 20, 0, 4), options);
+  EXPECT_EQ(image.pixels_hit, 4);
   Scene empty;
-  EXPECT_GT(count_different(picture, taken(empty, from_above(0, 20, 0, 4), options), 10), 3);
+  EXPECT_GT(count_different(image, taken(empty, from_above(0, 20, 0, 4), options), 10), 3);
 }
 
 // The same glass in one grid, across a chunk border, and in two grids that touch.
 TEST(RenderGlass, HasNoSeamsBetweenEqualNeighbours) {
-  const auto picture_of = [](int shift, bool is_split) {
+  const auto rendered_of = [](int shift, bool is_split) {
     GlassScene s;
     Grid grid;
     grid.fill_box({{shift - 9, -1, -9}, {shift + 10, 0, 10}}, s.stone);
@@ -83,9 +83,9 @@ TEST(RenderGlass, HasNoSeamsBetweenEqualNeighbours) {
     if (is_split) place(s.scene, std::move(other), {-shift, 0, 0});
     return taken(s.scene, towards({9, 8, 11}, {0, 1, 0}), sized(90, 70));
   };
-  const Picture whole = picture_of(20, false);
-  EXPECT_EQ(count_different(whole, picture_of(64, false), 1), 0) << "a chunk's border";
-  EXPECT_EQ(count_different(whole, picture_of(64, true), 1), 0) << "two grids";
+  const RenderedImage whole = rendered_of(20, false);
+  EXPECT_EQ(count_different(whole, rendered_of(64, false), 1), 0) << "a chunk's border";
+  EXPECT_EQ(count_different(whole, rendered_of(64, true), 1), 0) << "two grids";
 }
 
 TEST(RenderGlass, DifferentGlassesAreTwoBodies) {
@@ -128,8 +128,8 @@ TEST(RenderGlass, TintsTheSunAndDoesNotOcclude) {
   place(s.scene, std::move(grid));
   RenderOptions options = sized(3, 3);
   options.light.sun = {0, 1, 0};
-  const Picture picture = taken(s.scene, from_above(0, 2, 0, 4), options);
-  expect_near(pixel_at(picture, 1, 1), encoded(linear(kWhite) * (0.15F + power(through_one(), 2.0F))), 1);
+  const RenderedImage image = taken(s.scene, from_above(0, 2, 0, 4), options);
+  expect_near(pixel_at(image, 1, 1), encoded(linear(kWhite) * (0.15F + power(through_one(), 2.0F))), 1);
   // Floor at 0, glass from 3 to 5.
   options.light.shadow_distance_voxels = 2.5;
   expect_near(pixel_at(taken(s.scene, from_above(0, 2, 0, 4), options), 1, 1), encoded(linear(kWhite) * 1.15F), 1);
@@ -148,9 +148,9 @@ TEST(RenderGlass, SeenFromInsideTintsOnly) {
   place(s.scene, std::move(grid));
   RenderOptions options = sized(3, 3);
   options.light.shading = Shading::Unlit;
-  const Picture picture = taken(s.scene, from_above(0, 2.5, 0, 2), options);
-  expect_near(pixel_at(picture, 1, 1), encoded(linear(kWhite) * power(through_one(), 2.5F)), 1);
-  EXPECT_EQ(depth_at(picture, 1, 1), 0.0F);
+  const RenderedImage image = taken(s.scene, from_above(0, 2.5, 0, 2), options);
+  expect_near(pixel_at(image, 1, 1), encoded(linear(kWhite) * power(through_one(), 2.5F)), 1);
+  EXPECT_EQ(depth_at(image, 1, 1), 0.0F);
 }
 
 TEST(RenderGlass, EmissiveGlassShinesInTheDarkFromOutsideAndInside) {
@@ -214,7 +214,7 @@ TEST(RenderGlass, SurfacesShowTheSkyAndDimWhatLiesBehind) {
     options.light.shadows = false;
     options.light.occlusion_mode = OcclusionMode::Off;
     options.light.glass_surfaces = true;
-    const Picture picture = taken(s.scene, from_above(0, 20, 0, 4), options);
+    const RenderedImage image = taken(s.scene, from_above(0, 20, 0, 4), options);
     const Vec3 light(1.0F + 0.1F);
     const Vec3 zenith = sky_colour(1.0F);
     const Vec3 passed = power(through_one(), 2.0F);
@@ -222,7 +222,7 @@ TEST(RenderGlass, SurfacesShowTheSkyAndDimWhatLiesBehind) {
     // Light that the lower surface reflects passes the pane a second time.
     if (gap != 0) behind = 0.96F * behind + 0.04F * passed * zenith;
     const float own = 1.0F - (1.0F - kAlpha) * (1.0F - kAlpha);
-    expect_near(pixel_at(picture, 1, 2),
+    expect_near(pixel_at(image, 1, 2),
                 encoded(0.04F * zenith + 0.96F * (own * linear(kGlass) * light + passed * behind)), 1);
   }
 }
@@ -274,12 +274,12 @@ TEST(RenderGlass, DarkAndDeepGlassIsNeverNotANumber) {
   grid.fill_box({{-50, -50, 1}, {51, 1, 51}}, clear);
   place(scene, std::move(grid));
   RenderOptions options = sized(64, 48);
-  const Picture picture = taken(scene, towards({0, 1.0, 60}, {0, 0, 0}, 1.5), options);
+  const RenderedImage image = taken(scene, towards({0, 1.0, 60}, {0, 0, 0}, 1.5), options);
   Scene empty;
-  const Picture sky = taken(empty, towards({0, 1.0, 60}, {0, 0, 0}, 1.5), options);
-  EXPECT_EQ(pixel_at(picture, 32, 0), pixel_at(sky, 32, 0));
-  EXPECT_GT(count_different(picture, sky, 10), 100);
-  const Picture inside = taken(scene, towards({0, -5, -5}, {1, -6, -9}), sized(8, 8));
+  const RenderedImage sky = taken(empty, towards({0, 1.0, 60}, {0, 0, 0}, 1.5), options);
+  EXPECT_EQ(pixel_at(image, 32, 0), pixel_at(sky, 32, 0));
+  EXPECT_GT(count_different(image, sky, 10), 100);
+  const RenderedImage inside = taken(scene, towards({0, -5, -5}, {1, -6, -9}), sized(8, 8));
   for (const std::uint8_t byte : inside.colour.rgb) EXPECT_EQ(byte, 0);
 }
 

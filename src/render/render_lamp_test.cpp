@@ -39,8 +39,8 @@ double fading(double distance, double reach) {
   return 1.0 - std::pow(distance / reach, 4.0);
 }
 
-void expect_grey(const Picture& picture, int x, int y, double light) {
-  const Pixel found = pixel_at(picture, x, y);
+void expect_grey(const RenderedImage& image, int x, int y, double light) {
+  const Pixel found = pixel_at(image, x, y);
   const Pixel expected = encoded(Vec3(static_cast<float>(light)));
   for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(found[c], expected[c], 1) << x << ", " << y;
 }
@@ -57,16 +57,16 @@ TEST(RenderLamps, APointFallsOffWithTheSquareOfTheDistance) {
   lamp.intensity = 20.0;
   lamp.range = 30.0;
   scene.lamps.push_back(lamp);
-  const Picture picture = taken(scene, from_above(0, 20, 0, 40), by_night(40, 40));
+  const RenderedImage image = taken(scene, from_above(0, 20, 0, 40), by_night(40, 40));
   for (int y = 1; y < 40; y += 6) {
     for (int x = 1; x < 40; x += 6) {
       const DVec3 to = lamp.position - floor_at(x, y, 40, 40) - DVec3(0.0, 0.01, 0.0);
       const double d = glm::length(to);
-      expect_grey(picture, x, y, d < 30.0 ? 20.0 * (to.y / d) / (d * d) * fading(d, 30.0) : 0.0);
+      expect_grey(image, x, y, d < 30.0 ? 20.0 * (to.y / d) / (d * d) * fading(d, 30.0) : 0.0);
     }
   }
-  EXPECT_EQ(picture.pixels_hit, 1600);
-  EXPECT_EQ(pixel_at(picture, 0, 39), (Pixel{0, 0, 0})) << "beyond its range";
+  EXPECT_EQ(image.pixels_hit, 1600);
+  EXPECT_EQ(pixel_at(image, 0, 39), (Pixel{0, 0, 0})) << "beyond its range";
 }
 
 TEST(RenderLamps, ASpotLightsItsCone) {
@@ -79,12 +79,12 @@ TEST(RenderLamps, ASpotLightsItsCone) {
   lamp.inner_angle_radians = 0.2;
   lamp.outer_angle_radians = 0.5;
   scene.lamps.push_back(lamp);
-  const Picture picture = taken(scene, from_above(0, 20, 0, 40), by_night(80, 80));
+  const RenderedImage image = taken(scene, from_above(0, 20, 0, 40), by_night(80, 80));
   for (int x = 0; x < 80; ++x) {
     const DVec3 to = lamp.position - floor_at(x, 40, 80, 40) - DVec3(0.0, 0.01, 0.0);
     const double d = glm::length(to);
     const double cone = std::clamp((to.y / d - std::cos(0.5)) / (std::cos(0.2) - std::cos(0.5)), 0.0, 1.0);
-    expect_grey(picture, x, 40, cone * cone * 50.0 * (to.y / d) / (d * d));
+    expect_grey(image, x, 40, cone * cone * 50.0 * (to.y / d) / (d * d));
   }
 }
 
@@ -110,7 +110,7 @@ TEST(RenderLamps, AVoxelThatEmitsLightsAsItsFacesDo) {
   const VoxelType torch = add_type(scene, kWhite, Visibility::Opaque, 6.0F);
   Grid& grid = scene.edit(scene.grids().handles()[0]).grid;
   grid.set({0, 6, 0}, torch);
-  const Picture picture = taken(scene, from_above(0.5, 4, 0.5, 40), by_night(80, 80));
+  const RenderedImage image = taken(scene, from_above(0.5, 4, 0.5, 40), by_night(80, 80));
   const double reach = std::sqrt(4096.0 * std::sqrt(3.0) * 6.0 / std::numbers::pi);
   for (int x = 2; x < 80; x += 7) {
     const DVec3 at = floor_at(x, 30, 80, 40) + DVec3(0.5, 0.0, 0.5);
@@ -131,7 +131,7 @@ TEST(RenderLamps, AVoxelThatEmitsLightsAsItsFacesDo) {
       }
     }
     const double d = glm::length(DVec3(0.5, 6.5, 0.5) - at);
-    const Pixel found = pixel_at(picture, x, 30);
+    const Pixel found = pixel_at(image, x, 30);
     const Pixel expected = encoded(Vec3(static_cast<float>(sum * fading(d, reach))));
     EXPECT_NEAR(found[0], expected[0], 3) << x;
   }
@@ -154,7 +154,7 @@ TEST(RenderLamps, AFieldThatEmitsLightsAsItsSurfaceDoes) {
   EXPECT_NEAR(area, 4.0 * std::numbers::pi * kRadius * kRadius, 6.0);
   scene.add_instance({"", scene.add_grid(std::move(ball)), DVec3(0.0)});
   Camera camera = from_above(0.0, 5, 0.0, 60);
-  const Picture picture = taken(scene, camera, by_night(60, 60));
+  const RenderedImage image = taken(scene, camera, by_night(60, 60));
   double sum = 0.0;
   int count = 0;
   for (int x = 2; x < 60; x += 3) {
@@ -162,7 +162,7 @@ TEST(RenderLamps, AFieldThatEmitsLightsAsItsSurfaceDoes) {
       const DVec3 to = middle - floor_at(x, y, 60, 60);
       const double d = glm::length(to);
       const double expected = 1.5 * kRadius * kRadius / (d * d) * (to.y / d);
-      const double found = linear({pixel_at(picture, x, y)[0], 0, 0, 255}).x;
+      const double found = linear({pixel_at(image, x, y)[0], 0, 0, 255}).x;
       EXPECT_NEAR(found / expected, 1.0, 0.4) << x << ' ' << y;
       sum += found / expected;
       ++count;
@@ -180,11 +180,11 @@ TEST(RenderLamps, FieldsAreLitAndCastShadows) {
   lamp.position = {20.0, 6.0, 0.0};
   lamp.intensity = 60.0;
   scene.lamps.push_back(lamp);
-  const Picture picture = taken(scene, from_above(0, 30, 0, 60), by_night(60, 60));
-  EXPECT_GT(pixel_at(picture, 34, 30)[0], 40) << "the hill's side that looks at the lamp";
-  EXPECT_EQ(pixel_at(picture, 24, 30), (Pixel{0, 0, 0})) << "its other side";
-  EXPECT_EQ(pixel_at(picture, 16, 30), (Pixel{0, 0, 0})) << "its shadow";
-  EXPECT_GT(pixel_at(picture, 30, 8)[0], 10) << "beside it";
+  const RenderedImage image = taken(scene, from_above(0, 30, 0, 60), by_night(60, 60));
+  EXPECT_GT(pixel_at(image, 34, 30)[0], 40) << "the hill's side that looks at the lamp";
+  EXPECT_EQ(pixel_at(image, 24, 30), (Pixel{0, 0, 0})) << "its other side";
+  EXPECT_EQ(pixel_at(image, 16, 30), (Pixel{0, 0, 0})) << "its shadow";
+  EXPECT_GT(pixel_at(image, 30, 8)[0], 10) << "beside it";
 }
 
 TEST(RenderLamps, AClosedLanternLightsNothing) {
@@ -195,10 +195,10 @@ TEST(RenderLamps, AClosedLanternLightsNothing) {
   grid.fill_box({{-1, 4, -1}, {2, 7, 2}}, kAir);
   grid.set({0, 5, 0}, torch);
   const RenderOptions options = by_night(40, 40);
-  const Picture picture = taken(scene, towards({0, 2, 30}, {0, 0, 0}, 1.0), options);
-  EXPECT_TRUE(std::all_of(picture.colour.rgb.begin(), picture.colour.rgb.end(), [](auto byte) { return byte == 0; }));
+  const RenderedImage image = taken(scene, towards({0, 2, 30}, {0, 0, 0}, 1.0), options);
+  EXPECT_TRUE(std::all_of(image.colour.rgb.begin(), image.colour.rgb.end(), [](auto byte) { return byte == 0; }));
   scene.edit(scene.grids().handles()[0]).grid.fill_box({{-2, 5, -1}, {-1, 6, 2}}, kAir);
-  const Picture open = taken(scene, towards({-30, 12, 0}, {0, 0, 0}, 1.0), options);
+  const RenderedImage open = taken(scene, towards({-30, 12, 0}, {0, 0, 0}, 1.0), options);
   EXPECT_GT(*std::max_element(open.colour.rgb.begin(), open.colour.rgb.end()), 100);
 }
 
@@ -254,9 +254,9 @@ TEST(RenderLamps, WhichLampsLightAPlaceDependsOnThePlaceAlone) {
   }
   RenderOptions options = by_night(96, 96);
   options.light.max_lamps = 6;
-  const Picture whole = taken(scene, from_above(0, 50, 0, 48), options);
+  const RenderedImage whole = taken(scene, from_above(0, 50, 0, 48), options);
   options.width = options.height = 32;
-  const Picture part = taken(scene, from_above(8, 50, -8, 16), options);
+  const RenderedImage part = taken(scene, from_above(8, 50, -8, 16), options);
   int different = 0;
   for (int y = 0; y < 32; ++y) {
     for (int x = 0; x < 32; ++x) different += pixel_at(part, x, y) != pixel_at(whole, x + 48, y + 16);
@@ -272,7 +272,7 @@ TEST(RenderLamps, AreOffUnlessAskedFor) {
   const Camera camera = towards({0, 20, 30}, {0, 0, 0}, 0.8);
   RenderOptions options = sized(32, 32);
   options.light.exposure = 0.3;
-  const Picture before = taken(scene, camera, options);
+  const RenderedImage before = taken(scene, camera, options);
   scene.lamps.push_back({"", Lamp::Kind::Point, {0, 4, 0}});
   EXPECT_EQ(taken(scene, camera, options).colour.rgb, before.colour.rgb);
   options.light.max_lamps = 64;
@@ -299,8 +299,8 @@ TEST(RenderLamps, BadOnesLightNothing) {
     if (i == 7) lamp.outer_angle_radians = nan;
     scene.lamps.push_back(lamp);
   }
-  const Picture picture = taken(scene, from_above(0, 20, 0, 40), by_night(16, 16));
-  EXPECT_TRUE(std::all_of(picture.colour.rgb.begin(), picture.colour.rgb.end(), [](auto byte) { return byte == 0; }));
+  const RenderedImage image = taken(scene, from_above(0, 20, 0, 40), by_night(16, 16));
+  EXPECT_TRUE(std::all_of(image.colour.rgb.begin(), image.colour.rgb.end(), [](auto byte) { return byte == 0; }));
 }
 
 // Returns the same numbers on every machine, each below a limit.
@@ -404,7 +404,7 @@ TEST(EmissiveCells, MatchARebuildAfterEdits) {
   }
 }
 
-TEST(RenderLamps, PicturesOfFewLampsAndOfManyMayTakeTurns) {
+TEST(RenderLamps, ImagesOfFewLampsAndOfManyMayTakeTurns) {
   Scene scene = floor_by_night();
   for (int i = 0; i < 6; ++i) {
     Lamp lamp;
@@ -418,8 +418,8 @@ TEST(RenderLamps, PicturesOfFewLampsAndOfManyMayTakeTurns) {
   const auto check = [&](int lamps) {
     SCOPED_TRACE(lamps);
     options.light.max_lamps = lamps;
-    const Picture picture = renderer.render(from_above(0, 20, 0, 40), options).value();
-    EXPECT_EQ(picture.colour.rgb, taken(scene, from_above(0, 20, 0, 40), options).colour.rgb);
+    const RenderedImage image = renderer.render(from_above(0, 20, 0, 40), options).value();
+    EXPECT_EQ(image.colour.rgb, taken(scene, from_above(0, 20, 0, 40), options).colour.rgb);
   };
   // Three kinds are one more than the cache holds.
   for (const int lamps : {64, 2, 64, 2, 1, 2, 64}) check(lamps);

@@ -36,10 +36,10 @@ TEST(RenderLight, AnOpenFloorHasTheAmbientAndTheSunsShareExactly) {
   for (const int rays : {1, 6, 9, 32}) {
     RenderOptions options = sized(16, 16);
     options.light.occlusion_rays = rays;
-    const Picture picture = taken(scene, from_above(0, 30, 0, 20), options);
+    const RenderedImage image = taken(scene, from_above(0, 30, 0, 20), options);
     const Pixel expected = encoded(linear(kGrey) * (0.15F + sun));
-    for (int i = 0; i < 256; ++i) ASSERT_EQ(pixel_at(picture, i % 16, i / 16), expected);
-    EXPECT_EQ(picture.rays, 256 * (2 + rays));
+    for (int i = 0; i < 256; ++i) ASSERT_EQ(pixel_at(image, i % 16, i / 16), expected);
+    EXPECT_EQ(image.rays, 256 * (2 + rays));
   }
 }
 
@@ -63,9 +63,9 @@ TEST(RenderLight, ASmallClosedBoxIsBlackInside) {
   for (const int rays : {6, 9, 17}) {
     RenderOptions options = sized(24, 24);
     options.light.occlusion_rays = rays;
-    const Picture picture = taken(scene, towards({0.5, 0.5, 1.5}, {0.3, 0.4, -5}, 2.0), options);
-    for (const std::uint8_t byte : picture.colour.rgb) ASSERT_EQ(byte, 0);
-    EXPECT_EQ(picture.pixels_hit, 24 * 24);
+    const RenderedImage image = taken(scene, towards({0.5, 0.5, 1.5}, {0.3, 0.4, -5}, 2.0), options);
+    for (const std::uint8_t byte : image.colour.rgb) ASSERT_EQ(byte, 0);
+    EXPECT_EQ(image.pixels_hit, 24 * 24);
     options.light.occlusion_affects = OcclusionAffects::All;
     options.light.exposure = 4.0;
     EXPECT_EQ(pixel_at(taken(scene, towards({0.5, 0.5, 1.5}, {0.3, 0.4, -5}, 2.0), options), 3, 3),
@@ -84,7 +84,7 @@ TEST(RenderLight, ALoneCubesShadowIsRightToThePixel) {
   RenderOptions options = sized(160, 160);
   options.light.occlusion_mode = OcclusionMode::Off;
   const DVec3 sun = options.light.sun;
-  const Picture picture = taken(scene, from_above(0, 30, 0, 32), options);
+  const RenderedImage image = taken(scene, from_above(0, 30, 0, 32), options);
   const Pixel lit = encoded(linear(kGrey) * (0.1F + cosines(sun).y));
   const Pixel dark = encoded(linear(kGrey) * 0.1F);
   int shadow = 0;
@@ -98,7 +98,7 @@ TEST(RenderLight, ALoneCubesShadowIsRightToThePixel) {
       const DVec3 enter = glm::min(a, b);
       const DVec3 leave = glm::max(a, b);
       const bool is_dark = std::max({enter.x, enter.y, enter.z}) < std::min({leave.x, leave.y, leave.z});
-      ASSERT_EQ(pixel_at(picture, column, row), is_dark ? dark : lit) << column << ", " << row;
+      ASSERT_EQ(pixel_at(image, column, row), is_dark ? dark : lit) << column << ", " << row;
       shadow += is_dark;
     }
   }
@@ -200,13 +200,13 @@ TEST(RenderLight, VertexOcclusionIsWhatTheMeshCarries) {
     options.light.occlusion_affects = affects;
     // One column of voxels fills the image: x from 3 to 4.
     Camera camera = from_above(3.5, 3, 0.5, 1.0 / 40);
-    const Picture picture = taken(scene, camera, options);
+    const RenderedImage image = taken(scene, camera, options);
     for (int column = 0; column < 40; ++column) {
       const float level = 2.0F * ((static_cast<float>(column) + 0.5F) / 40.0F);
       const float light = affects == OcclusionAffects::Ambient ? 0.15F * (1.0F - level / 3.0F) + sun
                                                                : (0.15F + sun) * (1.0F - 0.25F * level);
       const Pixel expected = encoded(linear(kGrey) * light);
-      EXPECT_NEAR(pixel_at(picture, column, 0)[0], expected[0], 1) << column;
+      EXPECT_NEAR(pixel_at(image, column, 0)[0], expected[0], 1) << column;
     }
   }
 }
@@ -214,12 +214,12 @@ TEST(RenderLight, VertexOcclusionIsWhatTheMeshCarries) {
 TEST(RenderLight, ASolidSeenFromInsideIsItsOwnColour) {
   Scene scene;
   place(scene, floor_of(add_type(scene, kGrey)));
-  const Picture picture = taken(scene, towards({0.5, -0.5, 0.5}, {0, -0.7, -4}), sized(5, 5));
+  const RenderedImage image = taken(scene, towards({0.5, -0.5, 0.5}, {0, -0.7, -4}), sized(5, 5));
   for (int i = 0; i < 25; ++i) {
-    EXPECT_EQ(pixel_at(picture, i % 5, i / 5), encoded(linear(kGrey)));
-    EXPECT_EQ(depth_at(picture, i % 5, i / 5), 0.0F);
+    EXPECT_EQ(pixel_at(image, i % 5, i / 5), encoded(linear(kGrey)));
+    EXPECT_EQ(depth_at(image, i % 5, i / 5), 0.0F);
   }
-  EXPECT_EQ(picture.rays, 25) << "there is nothing to light";
+  EXPECT_EQ(image.rays, 25) << "there is nothing to light";
 }
 
 TEST(RenderLight, UnregisteredTypesShow) {
@@ -262,11 +262,11 @@ TEST(RenderLight, OcclusionAloneIsGreyAndDarkensOwnColours) {
   options.light.occlusion_mode = OcclusionMode::Vertex;
   options.light.exposure = 3.0;  // exposure has no effect
   options.light.shading = Shading::Occlusion;
-  const Picture grey = taken(scene, camera, options);
+  const RenderedImage grey = taken(scene, camera, options);
   options.light.shading = Shading::UnlitWithOcclusion;
-  const Picture classic = taken(scene, camera, options);
+  const RenderedImage classic = taken(scene, camera, options);
   options.light.shading = Shading::Unlit;
-  const Picture unlit = taken(scene, camera, options);
+  const RenderedImage unlit = taken(scene, camera, options);
   EXPECT_EQ(pixel_at(unlit, 101, 100), (Pixel{colour.r, colour.g, colour.b}));
   EXPECT_EQ(classic.rays, unlit.rays) << "one to each pixel";
   for (const int x : {101, 105, 110, 118, 150}) {
@@ -288,15 +288,15 @@ TEST(RenderLight, OcclusionAloneByRaysIsTheShareThatIsOpen) {
   const Scene scene = with_step({200, 120, 40, 255});
   RenderOptions options = sized(100, 1);
   options.light.shading = Shading::Occlusion;
-  const Picture picture = taken(scene, from_above(6, 30, 5, 0.04), options);
+  const RenderedImage image = taken(scene, from_above(6, 30, 5, 0.04), options);
   std::set<int> levels;
-  for (int x = 0; x < 100; ++x) levels.insert(pixel_at(picture, x, 0)[0]);
+  for (int x = 0; x < 100; ++x) levels.insert(pixel_at(image, x, 0)[0]);
   for (const int level : levels) {
     EXPECT_LT(std::abs(std::remainder(level * 9.0 / 255.0, 1.0)), 0.02) << level;
   }
   EXPECT_GT(levels.size(), 1U);
   options.light.occlusion_distance_voxels = 0.0;
-  const Picture open = taken(scene, from_above(6, 30, 5, 0.04), options);
+  const RenderedImage open = taken(scene, from_above(6, 30, 5, 0.04), options);
   EXPECT_EQ(pixel_at(open, 45, 0)[0], 255) << "rays of no length";
 }
 
@@ -312,10 +312,10 @@ TEST(RenderLight, ManySamplesLeaveNoBandsBesideAWall) {
   const Camera camera = from_above(4.3, 20, 0.37, 0.05);
   const auto largest_step = [&](int samples) {
     options.samples = samples;
-    const Picture picture = taken(scene, camera, options);
+    const RenderedImage image = taken(scene, camera, options);
     int largest = 0;
     for (int x = 1; x < 160; ++x) {
-      largest = std::max(largest, std::abs(pixel_at(picture, x, 0)[0] - pixel_at(picture, x - 1, 0)[0]));
+      largest = std::max(largest, std::abs(pixel_at(image, x, 0)[0] - pixel_at(image, x - 1, 0)[0]));
     }
     return largest;
   };
@@ -336,10 +336,10 @@ TEST(RenderLight, ManySamplesLeaveNoBandBelowASlab) {
   Camera camera = from_above(0, 2.5, 0.37, 0.025);
   const auto largest_step = [&](int samples) {
     options.samples = samples;
-    const Picture picture = taken(scene, camera, options);
+    const RenderedImage image = taken(scene, camera, options);
     int largest = 0;
     for (int x = 1; x < 160; ++x) {
-      largest = std::max(largest, std::abs(pixel_at(picture, x, 0)[0] - pixel_at(picture, x - 1, 0)[0]));
+      largest = std::max(largest, std::abs(pixel_at(image, x, 0)[0] - pixel_at(image, x - 1, 0)[0]));
     }
     return largest;
   };

@@ -16,8 +16,8 @@ namespace {
 
 using namespace render_test;
 
-int brightest(const Picture& picture) {
-  return *std::max_element(picture.colour.rgb.begin(), picture.colour.rgb.end());
+int brightest(const RenderedImage& image) {
+  return *std::max_element(image.colour.rgb.begin(), image.colour.rgb.end());
 }
 
 // Interpolates the light between the corners of a face by the definition.
@@ -40,8 +40,8 @@ TEST(RenderPropagated, ShowsTheLightBetweenTheCornersOfFaces) {
   options.light.sun = {0.4, 0.2, 0.1};
   options.light.lamp_brightness = 0.7;
   const CpuRenderer renderer(cave.scene);
-  const auto picture = renderer.render(Cave::inside(), options);
-  ASSERT_TRUE(picture);
+  const auto image = renderer.render(Cave::inside(), options);
+  ASSERT_TRUE(image);
   SceneLight light;
   light.update(cave.scene);
   const GridLight of = light.of(cave.grid_handle);
@@ -50,7 +50,7 @@ TEST(RenderPropagated, ShowsTheLightBetweenTheCornersOfFaces) {
   int compared = 0;
   for (int y = 0; y < options.height; ++y) {
     for (int x = 0; x < options.width; ++x) {
-      const PicturePoint point{x + 0.5, y + 0.5, options.width, options.height};
+      const ImagePoint point{x + 0.5, y + 0.5, options.width, options.height};
       const Ray ray = ray_through(Cave::inside(), point);
       const auto hit = first_hit(renderer.tracer(), ray);
       ASSERT_TRUE(hit);
@@ -61,7 +61,7 @@ TEST(RenderPropagated, ShowsTheLightBetweenTheCornersOfFaces) {
       const DVec3 inside = hit->position - DVec3(hit->voxel);
       const MeanLevels levels = between(surface.face(hit->voxel, hit->face), inside[frame.u], inside[frame.v]);
       const Pixel wanted = encoded(linear(type.colour) * light_colour(levels, Vec3(normal_of(hit->face)), look));
-      const Pixel shown = pixel_at(*picture, x, y);
+      const Pixel shown = pixel_at(*image, x, y);
       for (std::size_t c = 0; c < 3; ++c) ASSERT_NEAR(shown[c], wanted[c], 1) << x << " " << y;
       ++compared;
     }
@@ -115,9 +115,9 @@ TEST(RenderPropagated, AClosedRoomIsBlackAndOpensWithAnEdit) {
 TEST(RenderPropagated, OcclusionDarkensAllOfIt) {
   Cave cave;
   RenderOptions options = propagated(64, 48);
-  const Picture open = taken(cave.scene, Cave::inside(), options);
+  const RenderedImage open = taken(cave.scene, Cave::inside(), options);
   options.light.occlusion_mode = OcclusionMode::Vertex;
-  const Picture occluded = taken(cave.scene, Cave::inside(), options);
+  const RenderedImage occluded = taken(cave.scene, Cave::inside(), options);
   int darker = 0;
   for (std::size_t i = 0; i < open.colour.rgb.size(); ++i) {
     ASSERT_LE(occluded.colour.rgb[i], open.colour.rgb[i]);
@@ -129,8 +129,8 @@ TEST(RenderPropagated, OcclusionDarkensAllOfIt) {
 TEST(RenderPropagated, TheSameBytesWithAnyThreadsAndNoRaysForLight) {
   Cave cave;
   const RenderOptions options = propagated(64, 48);
-  const Picture one = taken(cave.scene, Cave::inside(), options, {1});
-  const Picture four = taken(cave.scene, Cave::inside(), options, {4});
+  const RenderedImage one = taken(cave.scene, Cave::inside(), options, {1});
+  const RenderedImage four = taken(cave.scene, Cave::inside(), options, {4});
   EXPECT_EQ(one.colour.rgb, four.colour.rgb);
   EXPECT_EQ(one.rays, 64 * 48);
 }
@@ -139,12 +139,12 @@ TEST(RenderPropagated, HalvedGridsKeepTheirLight) {
   Cave cave;
   RenderOptions options = propagated(96, 64);
   const Camera camera = towards({60.0, 90.0, 80.0}, {0.0, 10.0, 0.0});
-  const Picture whole = taken(cave.scene, camera, options);
+  const RenderedImage whole = taken(cave.scene, camera, options);
   options.detail.policy = DetailPolicy{};
   options.detail.policy->voxel_pixels = 100.0;
   options.detail.policy->cell_pixels = 3.0;
   options.detail.policy->far_pixels = 0;
-  const Picture halved = taken(cave.scene, camera, options);
+  const RenderedImage halved = taken(cave.scene, camera, options);
   // The top is in full sky light at any voxel size.
   EXPECT_EQ(pixel_at(halved, 40, 36), pixel_at(whole, 40, 36));
   EXPECT_GT(brightest(halved), 150);
@@ -159,11 +159,11 @@ TEST(RenderPropagated, FieldsAreLitWhereTheySeeTheSky) {
   }
   scene.add_instance({"", scene.add_grid(std::move(made))});
   const RenderOptions options = propagated(33, 33);
-  const Picture picture = taken(scene, from_above(0.25, 60, 0.25, 50), options);
-  EXPECT_EQ(pixel_at(picture, 16, 16), encoded(Vec3(1.0F))) << "the roof";
-  EXPECT_EQ(pixel_at(picture, 1, 1), encoded(Vec3(1.0F))) << "the ground";
+  const RenderedImage image = taken(scene, from_above(0.25, 60, 0.25, 50), options);
+  EXPECT_EQ(pixel_at(image, 16, 16), encoded(Vec3(1.0F))) << "the roof";
+  EXPECT_EQ(pixel_at(image, 1, 1), encoded(Vec3(1.0F))) << "the ground";
   Camera below = from_above(0.25, 4, 0.25, 20);
-  const Picture shade = taken(scene, below, options);
+  const RenderedImage shade = taken(scene, below, options);
   EXPECT_LT(pixel_at(shade, 16, 16)[0], pixel_at(shade, 0, 16)[0]) << "under the roof, from its middle to its edge";
   EXPECT_GT(pixel_at(shade, 16, 16)[0], 0);
 }

@@ -76,8 +76,8 @@ TEST(RenderScene, TurnedAndMirroredInstancesLookLikeTurnedAndMirroredVoxels) {
     RenderOptions options = sized(48, 48);
     for (const auto mode : {OcclusionMode::Rays, OcclusionMode::Vertex}) {
       options.light.occlusion_mode = mode;
-      const Picture a = taken(placed.scene, kCamera, options);
-      const Picture b = taken(moved.scene, kCamera, options);
+      const RenderedImage a = taken(placed.scene, kCamera, options);
+      const RenderedImage b = taken(moved.scene, kCamera, options);
       // The triangles of a face do not turn with it where all four levels count.
       EXPECT_LE(count_different(a, b, 1), mode == OcclusionMode::Rays ? 3 : 40) << i;
     }
@@ -87,22 +87,22 @@ TEST(RenderScene, TurnedAndMirroredInstancesLookLikeTurnedAndMirroredVoxels) {
 TEST(RenderScene, MovingEverythingByWholeNumbersChangesNoByte) {
   World world;
   place(world.scene, blobs(world, 7));
-  const Picture reference = taken(world.scene, kCamera, sized(64, 64));
+  const RenderedImage reference = taken(world.scene, kCamera, sized(64, 64));
   for (const DVec3 by : {DVec3(3, -200, 77), DVec3(1e9, -1e9, 1e9)}) {
     World moved;
     place(moved.scene, blobs(moved, 7), by);
     Camera camera = kCamera;
     camera.position += by;
-    const Picture picture = taken(moved.scene, camera, sized(64, 64));
-    EXPECT_EQ(picture.colour.rgb, reference.colour.rgb);
-    EXPECT_EQ(picture.depth.values, reference.depth.values);
+    const RenderedImage image = taken(moved.scene, camera, sized(64, 64));
+    EXPECT_EQ(image.colour.rgb, reference.colour.rgb);
+    EXPECT_EQ(image.depth.values, reference.depth.values);
   }
 }
 
 TEST(RenderScene, VoxelsFarFromTheirGridsOriginLookTheSame) {
   World world;
   place(world.scene, blobs(world, 7));
-  const Picture reference = taken(world.scene, kCamera, sized(64, 64));
+  const RenderedImage reference = taken(world.scene, kCamera, sized(64, 64));
   const IVec3 shift{1'000'000'000, -1'000'000'000, 1'000'000'000};
   World moved;
   place(moved.scene, blobs(moved, 7, shift), -DVec3(shift));
@@ -119,15 +119,15 @@ TEST(RenderScene, APartedWorldLooksLikeTheWhole) {
   });
   place(whole.scene, std::move(voxels));
   for (Grid& part : parts) place(parted.scene, std::move(part));
-  const Picture a = taken(whole.scene, kCamera, sized(80, 80));
-  const Picture b = taken(parted.scene, kCamera, sized(80, 80));
+  const RenderedImage a = taken(whole.scene, kCamera, sized(80, 80));
+  const RenderedImage b = taken(parted.scene, kCamera, sized(80, 80));
   EXPECT_EQ(count_different(a, b, 1), 0);
   EXPECT_EQ(a.depth.values, b.depth.values);
   EXPECT_EQ(a.pixels_hit, b.pixels_hit);
 }
 
 TEST(RenderScene, TheOrderOfInstancesDoesNotMatter) {
-  std::array<Picture, 2> pictures;
+  std::array<RenderedImage, 2> images;
   for (const bool is_reversed : {false, true}) {
     World world;
     std::mt19937 random(3);
@@ -144,11 +144,11 @@ TEST(RenderScene, TheOrderOfInstancesDoesNotMatter) {
     }
     if (is_reversed) std::reverse(instances.begin(), instances.end());
     for (const Instance& instance : instances) world.scene.add_instance(instance);
-    pictures.at(is_reversed) = taken(world.scene, kCamera, sized(96, 96));
+    images.at(is_reversed) = taken(world.scene, kCamera, sized(96, 96));
   }
-  EXPECT_EQ(pictures[0].colour.rgb, pictures[1].colour.rgb);
-  EXPECT_EQ(pictures[0].depth.values, pictures[1].depth.values);
-  EXPECT_GT(pictures[0].pixels_hit, 500);
+  EXPECT_EQ(images[0].colour.rgb, images[1].colour.rgb);
+  EXPECT_EQ(images[0].depth.values, images[1].depth.values);
+  EXPECT_GT(images[0].pixels_hit, 500);
 }
 
 TEST(RenderScene, AmongOthersOutOfSightAGridHasTheBytesOfTheGridAlone) {
@@ -157,8 +157,8 @@ TEST(RenderScene, AmongOthersOutOfSightAGridHasTheBytesOfTheGridAlone) {
   World among;
   place(among.scene, blobs(among, 9), {0, 0, 900});
   place(among.scene, blobs(among, 7));
-  const Picture a = taken(alone.scene, kCamera, sized(64, 64));
-  const Picture b = taken(among.scene, kCamera, sized(64, 64));
+  const RenderedImage a = taken(alone.scene, kCamera, sized(64, 64));
+  const RenderedImage b = taken(among.scene, kCamera, sized(64, 64));
   EXPECT_EQ(a.colour.rgb, b.colour.rgb);
   EXPECT_EQ(a.depth.values, b.depth.values);
 }
@@ -174,9 +174,9 @@ TEST(RenderScene, AtEqualDepthTheLowerHandleWins) {
     }
     RenderOptions options = sized(8, 8);
     options.light.shading = Shading::Unlit;
-    const Picture picture = taken(world.scene, from_above(0.5, 9, 0.5, 4), options);
-    for (int i = 0; i < 64; ++i) EXPECT_EQ(pixel_at(picture, i % 8, i / 8), pixel_at(picture, 0, 0));
-    seen.at(is_reversed) = pixel_at(picture, 0, 0);
+    const RenderedImage image = taken(world.scene, from_above(0.5, 9, 0.5, 4), options);
+    for (int i = 0; i < 64; ++i) EXPECT_EQ(pixel_at(image, i % 8, i / 8), pixel_at(image, 0, 0));
+    seen.at(is_reversed) = pixel_at(image, 0, 0);
   }
   EXPECT_EQ(seen[0], (Pixel{200, 90, 60}));
   EXPECT_EQ(seen[1], (Pixel{60, 160, 90}));
@@ -189,8 +189,8 @@ TEST(RenderScene, SmallVoxelsSeenFromNearLookLikeLargeOnesFromFar) {
   small.scene.edit(place(small.scene, blobs(small, 7))).voxel_size = 0.125;
   Camera camera = kCamera;
   camera.position *= 0.125;
-  const Picture a = taken(large.scene, kCamera, sized(64, 64));
-  const Picture b = taken(small.scene, camera, sized(64, 64));
+  const RenderedImage a = taken(large.scene, kCamera, sized(64, 64));
+  const RenderedImage b = taken(small.scene, camera, sized(64, 64));
   EXPECT_EQ(a.colour.rgb, b.colour.rgb) << "distances of light are in voxels";
   for (std::size_t i = 0; i < a.depth.values.size(); ++i) EXPECT_EQ(a.depth.values[i] * 0.125F, b.depth.values[i]);
 }
@@ -210,14 +210,14 @@ TEST(RenderScene, ShadowsFallFromOneInstanceOntoAnother) {
   EXPECT_LT(pixel_at(taken(world.scene, camera, options), 1, 1)[0], lit[0] / 2);
 }
 
-TEST(RenderScene, OrthographicPicturesHaveASkyToo) {
+TEST(RenderScene, OrthographicImagesHaveASkyToo) {
   const Scene empty;
   Camera camera = towards({0, 0, 0}, {0, 0, -1});
   camera.projection = Camera::Projection::Orthographic;
   camera.view_height = 1000.0;
-  const Picture picture = taken(empty, camera, sized(2, 101));
-  EXPECT_LT(pixel_at(picture, 0, 0)[0], pixel_at(picture, 0, 50)[0]);
-  EXPECT_LT(pixel_at(picture, 0, 100)[0], pixel_at(picture, 0, 50)[0]);
+  const RenderedImage image = taken(empty, camera, sized(2, 101));
+  EXPECT_LT(pixel_at(image, 0, 0)[0], pixel_at(image, 0, 50)[0]);
+  EXPECT_LT(pixel_at(image, 0, 100)[0], pixel_at(image, 0, 50)[0]);
 }
 
 TEST(RenderScene, LooksStraightUpAndDownAndFromFarAway) {

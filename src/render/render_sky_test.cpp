@@ -43,7 +43,7 @@ TEST(RenderSky, SurfacesAndTheBackdropAreInTheLightOfTheSunsHeight) {
     const Vec3 expected = linear(kGrey) * (0.15F * light.ambient + diffuse * light.sun);
     const Pixel seen = pixel_at(taken(scene, from_above(0, 5, 0, 2), options), 4, 4);
     for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(seen.at(i), encoded(expected).at(i), 1);
-    const Picture sky = taken(Scene{}, towards({0, 0, 0}, {0, 0, -1}), options);
+    const RenderedImage sky = taken(Scene{}, towards({0, 0, 0}, {0, 0, -1}), options);
     EXPECT_EQ(pixel_at(sky, 4, 4), encoded(light.sky.horizon));
   }
 }
@@ -54,7 +54,7 @@ TEST(RenderSky, ASunBelowTheHorizonLightsNothingFromBelow) {
   camera.forward = {0, 1, 0};
   camera.right = {-1, 0, 0};
   RenderOptions options = follows({0.2, -1, 0});
-  const Picture night = taken(scene, camera, options);
+  const RenderedImage night = taken(scene, camera, options);
   const Vec3 ambient = 0.15F * linear(kGrey) * daylight_of(options.light).ambient;
   EXPECT_EQ(pixel_at(night, 4, 4), encoded(ambient));
   options.light.sky_follows_sun = false;

@@ -46,8 +46,8 @@ TEST(RenderSmoothScene, FlatGlassOfAnyThicknessIsThatOfBlocks) {
     const double x = 20 * depth - 10;
     for (const Camera& camera :
          {towards({x + 3, 60, 14}, {x, 12, 12}, 0.06), towards({x + 2, 26, -40}, {x, 22, 30}, 0.05)}) {
-      const Picture blocks = of_blocks.render(camera, options).value();
-      const Picture fields = of_fields.render(camera, options).value();
+      const RenderedImage blocks = of_blocks.render(camera, options).value();
+      const RenderedImage fields = of_fields.render(camera, options).value();
       EXPECT_EQ(render_test::count_different(blocks, fields, 4), 0) << "of thickness " << depth;
     }
   }

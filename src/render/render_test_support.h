@@ -67,21 +67,22 @@ inline RenderOptions sized(int width, int height) {
   return options;
 }
 
-inline Picture taken(const Scene& scene, const Camera& camera, const RenderOptions& options, Threads threads = {}) {
-  auto picture = CpuRenderer(scene).render(camera, options, threads);
-  EXPECT_TRUE(picture.has_value());
-  return picture ? std::move(*picture) : Picture{};
+inline RenderedImage taken(const Scene& scene, const Camera& camera, const RenderOptions& options,
+                           Threads threads = {}) {
+  auto image = CpuRenderer(scene).render(camera, options, threads);
+  EXPECT_TRUE(image.has_value());
+  return image ? std::move(*image) : RenderedImage{};
 }
 
-inline Pixel pixel_at(const Picture& picture, int x, int y) {
+inline Pixel pixel_at(const RenderedImage& image, int x, int y) {
   const auto at =
-      3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(picture.colour.width) + static_cast<std::size_t>(x));
-  return {picture.colour.rgb.at(at), picture.colour.rgb.at(at + 1), picture.colour.rgb.at(at + 2)};
+      3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(image.colour.width) + static_cast<std::size_t>(x));
+  return {image.colour.rgb.at(at), image.colour.rgb.at(at + 1), image.colour.rgb.at(at + 2)};
 }
 
-inline float depth_at(const Picture& picture, int x, int y) {
-  return picture.depth.values.at(static_cast<std::size_t>(y) * static_cast<std::size_t>(picture.depth.width) +
-                                 static_cast<std::size_t>(x));
+inline float depth_at(const RenderedImage& image, int x, int y) {
+  return image.depth.values.at(static_cast<std::size_t>(y) * static_cast<std::size_t>(image.depth.width) +
+                               static_cast<std::size_t>(x));
 }
 
 inline Vec3 linear(Rgba8 colour) {
@@ -119,7 +120,7 @@ inline Camera sixth_ray_blocked(Scene& scene, Direction face) {
 }
 
 /// Returns the number of pixels in which two images of equal size differ by more than `tolerance` in a channel.
-inline int count_different(const Picture& a, const Picture& b, int tolerance) {
+inline int count_different(const RenderedImage& a, const RenderedImage& b, int tolerance) {
   EXPECT_EQ(a.colour.rgb.size(), b.colour.rgb.size());
   int different = 0;
   for (std::size_t i = 0; i + 2 < a.colour.rgb.size() && i + 2 < b.colour.rgb.size(); i += 3) {

@@ -211,24 +211,24 @@ void Tile::light_points() {
   for (std::size_t i = 0; i < points_.size(); ++i) sample_[targets_[i].pixel] += targets_[i].weight * lit_[i];
 }
 
-void Tile::write_to(Picture& picture) const {
+void Tile::write_to(RenderedImage& image) const {
   const SrgbEncoder& encode = SrgbEncoder::shared();
-  const int width = picture.colour.width;
+  const int width = image.colour.width;
   const int columns = std::min(kEdge, width - column_);
-  const int rows = std::min(kEdge, picture.colour.height - row_);
+  const int rows = std::min(kEdge, image.colour.height - row_);
   const auto samples = static_cast<float>(context_->options->samples);
   for (int y = 0; y < rows; ++y) {
     const std::size_t from = static_cast<std::size_t>(y) * kEdge;
     const std::size_t to =
         static_cast<std::size_t>(row_ + y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(column_);
-    std::uint8_t* rgb = picture.colour.rgb.data() + 3 * to;
+    std::uint8_t* rgb = image.colour.rgb.data() + 3 * to;
     for (int x = 0; x < columns; ++x) {
       const Vec3 mean = sum_[from + static_cast<std::size_t>(x)] / samples;
       for (int channel = 0; channel < 3; ++channel) *rgb++ = encode(mean[channel]);
     }
-    if (picture.depth.values.empty()) continue;
+    if (image.depth.values.empty()) continue;
     std::copy_n(depth_.begin() + static_cast<std::ptrdiff_t>(from), columns,
-                picture.depth.values.begin() + static_cast<std::ptrdiff_t>(to));
+                image.depth.values.begin() + static_cast<std::ptrdiff_t>(to));
   }
 }
 

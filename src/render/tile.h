@@ -40,7 +40,7 @@ class Tile {
   /// Calls `goes_on(1)` after each sample. If that returns false, this returns false and the tile must not be used.
   [[nodiscard]] bool render(const std::function<bool(std::size_t)>& goes_on);
   /// Writes the pixels within the image.
-  void write_to(Picture& picture) const;
+  void write_to(RenderedImage& image) const;
 
   [[nodiscard]] std::int64_t rays() const { return rays_; }
   [[nodiscard]] std::int64_t pixels_hit() const { return pixels_hit_; }

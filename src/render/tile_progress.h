@@ -50,7 +50,7 @@ class TileProgress {
 /// samples and writes them to the image. Errors: Cancelled.
 template <class Tile, class Context, class Options, class Drawn>
 [[nodiscard]] Status draw_tiles(const Context& context, const Options& options, Threads threads,
-                                const Progress& progress, Drawn& picture) {
+                                const Progress& progress, Drawn& image) {
   const auto across = static_cast<std::size_t>((options.width + Tile::kEdge - 1) / Tile::kEdge);
   const auto down = static_cast<std::size_t>((options.height + Tile::kEdge - 1) / Tile::kEdge);
   TileProgress done(progress, across * down * static_cast<std::size_t>(options.samples));
@@ -58,12 +58,12 @@ template <class Tile, class Context, class Options, class Drawn>
     if (done.is_cancelled()) return;
     Tile tile(context, static_cast<int>(i % across) * Tile::kEdge, static_cast<int>(i / across) * Tile::kEdge);
     if (!tile.render([&](std::size_t samples) { return done.add_samples(samples); })) return;
-    tile.write_to(picture);
+    tile.write_to(image);
     done.add_counts(tile.rays(), tile.pixels_hit());
   });
   if (done.is_cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
-  picture.rays = done.rays();
-  picture.pixels_hit = done.pixels_hit();
+  image.rays = done.rays();
+  image.pixels_hit = done.pixels_hit();
   return {};
 }
 

@@ -1,8 +1,8 @@
 // In place of all that lies in this folder's rooms where the library is built without Vulkan.
 
 #include <quoin/render_vk/vulkan_device.h>
+#include <quoin/render_vk/vulkan_image.h>
 #include <quoin/render_vk/vulkan_mesh_renderer.h>
-#include <quoin/render_vk/vulkan_picture.h>
 #include <quoin/render_vk/vulkan_renderer.h>
 
 namespace quoin {
@@ -49,78 +49,76 @@ void VulkanRenderer::use_light(const SceneLight*) {}
 std::uint64_t VulkanRenderer::uploaded_bytes() const {
   return 0;
 }
-Result<Picture> VulkanRenderer::render(const Camera&, const RenderOptions&, Threads, const Progress&) {
+Result<RenderedImage> VulkanRenderer::render(const Camera&, const RenderOptions&, Threads, const Progress&) {
   return refusal();
 }
-Status VulkanRenderer::draw(VulkanPicture&, const Camera&, const RenderOptions&, Accumulation, Threads,
-                            const Progress&) {
+Status VulkanRenderer::draw(VulkanImage&, const Camera&, const RenderOptions&, Accumulation, Threads, const Progress&) {
   return refusal();
 }
 
-Result<PathPicture> VulkanRenderer::render_paths(const Camera&, const PathOptions&, Threads, const Progress&) {
+Result<PathImage> VulkanRenderer::render_paths(const Camera&, const PathOptions&, Threads, const Progress&) {
   return refusal();
 }
-Status VulkanRenderer::draw_paths(VulkanPathPicture&, const Camera&, const PathOptions&, Accumulation,
-                                  const Progress&) {
+Status VulkanRenderer::draw_paths(VulkanPathImage&, const Camera&, const PathOptions&, Accumulation, const Progress&) {
   return refusal();
 }
 
 // A renderer to make these for cannot be had.
-struct VulkanPicture::Impl {};
+struct VulkanImage::Impl {};
 
-VulkanPicture::VulkanPicture(VulkanRenderer&) {}
-VulkanPicture::VulkanPicture(VulkanPicture&&) noexcept = default;
-VulkanPicture& VulkanPicture::operator=(VulkanPicture&&) noexcept = default;
-VulkanPicture::~VulkanPicture() = default;
+VulkanImage::VulkanImage(VulkanRenderer&) {}
+VulkanImage::VulkanImage(VulkanImage&&) noexcept = default;
+VulkanImage& VulkanImage::operator=(VulkanImage&&) noexcept = default;
+VulkanImage::~VulkanImage() = default;
 
-int VulkanPicture::width() const {
+int VulkanImage::width() const {
   return 0;
 }
-int VulkanPicture::height() const {
+int VulkanImage::height() const {
   return 0;
 }
-int VulkanPicture::samples() const {
+int VulkanImage::samples() const {
   return 0;
 }
-std::int64_t VulkanPicture::rays() const {
+std::int64_t VulkanImage::rays() const {
   return 0;
 }
-std::size_t VulkanPicture::bytes() const {
+std::size_t VulkanImage::bytes() const {
   return 0;
 }
-Result<Image> VulkanPicture::read() const {
+Result<Image> VulkanImage::read() const {
   return refusal();
 }
-Status VulkanPicture::write(const Image&) {
+Status VulkanImage::write(const Image&) {
   return refusal();
 }
-Status VulkanPicture::record_copy(VkCommandBuffer_T*, const VulkanImageTarget&) const {
+Status VulkanImage::record_copy(VkCommandBuffer_T*, const VulkanImageTarget&) const {
   return refusal();
 }
-Status VulkanPicture::copy_to(const VulkanImageTarget&) const {
+Status VulkanImage::copy_to(const VulkanImageTarget&) const {
   return refusal();
 }
 
-struct VulkanPathPicture::Impl {};
+struct VulkanPathImage::Impl {};
 
-VulkanPathPicture::VulkanPathPicture(VulkanRenderer&) {}
-VulkanPathPicture::VulkanPathPicture(VulkanPathPicture&&) noexcept = default;
-VulkanPathPicture& VulkanPathPicture::operator=(VulkanPathPicture&&) noexcept = default;
-VulkanPathPicture::~VulkanPathPicture() = default;
+VulkanPathImage::VulkanPathImage(VulkanRenderer&) {}
+VulkanPathImage::VulkanPathImage(VulkanPathImage&&) noexcept = default;
+VulkanPathImage& VulkanPathImage::operator=(VulkanPathImage&&) noexcept = default;
+VulkanPathImage::~VulkanPathImage() = default;
 
-int VulkanPathPicture::width() const {
+int VulkanPathImage::width() const {
   return 0;
 }
-int VulkanPathPicture::height() const {
+int VulkanPathImage::height() const {
   return 0;
 }
-int VulkanPathPicture::samples() const {
+int VulkanPathImage::samples() const {
   return 0;
 }
-std::size_t VulkanPathPicture::bytes() const {
+std::size_t VulkanPathImage::bytes() const {
   return 0;
 }
-Result<PathPicture> VulkanPathPicture::read(Threads) const {
+Result<PathImage> VulkanPathImage::read(Threads) const {
   return refusal();
 }
 
@@ -141,7 +139,7 @@ Status VulkanMeshRenderer::put(std::span<const SurfaceUpdate>) {
   return refusal();
 }
 void VulkanMeshRenderer::clear() {}
-Status VulkanMeshRenderer::draw(VulkanPicture&, const Camera&, const MeshPictureOptions&, Threads) {
+Status VulkanMeshRenderer::draw(VulkanImage&, const Camera&, const MeshImageOptions&, Threads) {
   return refusal();
 }
 VulkanMeshRenderer::Stats VulkanMeshRenderer::stats() const {

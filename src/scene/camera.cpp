@@ -102,13 +102,13 @@ namespace {
 /// in world units.
 double pixel_size(const Camera& camera, int height) {
   const bool is_perspective = camera.projection == Camera::Projection::Perspective;
-  const double picture_height = is_perspective ? 2.0 * std::tan(camera.vertical_fov_radians / 2.0) : camera.view_height;
-  return picture_height / height;
+  const double image_height = is_perspective ? 2.0 * std::tan(camera.vertical_fov_radians / 2.0) : camera.view_height;
+  return image_height / height;
 }
 
 }  // namespace
 
-std::optional<PicturePoint> picture_point(const Camera& camera, DVec3 point_in_world, int width, int height) {
+std::optional<ImagePoint> image_point(const Camera& camera, DVec3 point_in_world, int width, int height) {
   QUOIN_ASSERT(width > 0 && height > 0, "a positive image size");
   const DVec3 from_camera = point_in_world - camera.position;
   double pixel = pixel_size(camera, height);
@@ -117,13 +117,13 @@ std::optional<PicturePoint> picture_point(const Camera& camera, DVec3 point_in_w
     if (!(ahead > 0.0)) return std::nullopt;
     pixel *= ahead;
   }
-  const PicturePoint point{0.5 * width + glm::dot(from_camera, camera.right) / pixel,
-                           0.5 * height - glm::dot(from_camera, camera.up) / pixel, width, height};
+  const ImagePoint point{0.5 * width + glm::dot(from_camera, camera.right) / pixel,
+                         0.5 * height - glm::dot(from_camera, camera.up) / pixel, width, height};
   if (!std::isfinite(point.x) || !std::isfinite(point.y)) return std::nullopt;
   return point;
 }
 
-Ray ray_through(const Camera& camera, const PicturePoint& point) {
+Ray ray_through(const Camera& camera, const ImagePoint& point) {
   const auto [x, y, width, height] = point;
   QUOIN_ASSERT(width > 0 && height > 0, "a positive image size");
   const bool is_perspective = camera.projection == Camera::Projection::Perspective;

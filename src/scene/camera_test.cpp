@@ -29,11 +29,11 @@ void expect_orthonormal(const Camera& camera) {
 }
 
 /// The position of a point in the image: -1 to 1 from left to right and from bottom to top.
-struct InPicture {
+struct InImage {
   double x, y, depth;
 };
 
-InPicture project(const Camera& camera, double aspect, DVec3 point) {
+InImage project(const Camera& camera, double aspect, DVec3 point) {
   const DVec3 offset = point - camera.position;
   const double depth = glm::dot(offset, camera.forward);
   const double half = camera.projection == Camera::Projection::Perspective
@@ -52,7 +52,7 @@ Extent extent_of(const Camera& camera, double aspect, const DBox& box) {
   for (unsigned i = 0; i < 8; ++i) {
     const DVec3 corner{(i & 1U) != 0 ? box.max.x : box.min.x, (i & 2U) != 0 ? box.max.y : box.min.y,
                        (i & 4U) != 0 ? box.max.z : box.min.z};
-    const InPicture p = project(camera, aspect, corner);
+    const InImage p = project(camera, aspect, corner);
     extent.left = std::max(extent.left, -p.x);
     extent.right = std::max(extent.right, p.x);
     extent.low = std::max(extent.low, -p.y);
@@ -69,7 +69,7 @@ TEST(Camera, LooksAtItsTargetUpright) {
   EXPECT_EQ(camera->right.y, 0.0);
   EXPECT_GT(camera->up.y, 0.0);
   EXPECT_EQ(camera->vertical_fov_radians, 1.0);
-  const InPicture target = project(*camera, 1.5, {-1, 2, 0.5});
+  const InImage target = project(*camera, 1.5, {-1, 2, 0.5});
   EXPECT_NEAR(target.x, 0.0, 1e-12);
   EXPECT_NEAR(target.y, 0.0, 1e-12);
   EXPECT_NEAR(target.depth, std::sqrt(16 + 9 + 56.25), 1e-12);
@@ -195,7 +195,7 @@ void expect_framed(const DBox& box, View view, double aspect) {
   EXPECT_TRUE(is_wide || is_high) << extent.left << " " << extent.right << " " << extent.low << " " << extent.high;
 }
 
-TEST(Camera, FramedBoxesLieWithinThePictureAndFillIt) {
+TEST(Camera, FramedBoxesLieWithinTheImageAndFillIt) {
   std::mt19937_64 random(2024);
   const auto between = [&](double low, double high) { return std::uniform_real_distribution(low, high)(random); };
   for (int i = 0; i < 2'000; ++i) {
@@ -248,7 +248,7 @@ Extent extent_of(const Camera& camera, double aspect, const Scene& scene, Instan
     grid.grid.for_each([&](IVec3 voxel, VoxelType) {
       for (unsigned i = 0; i < 8; ++i) {
         const DVec3 corner = DVec3(voxel) + DVec3{i & 1U, i >> 1U & 1U, i >> 2U & 1U};
-        const InPicture p = project(camera, aspect, world_from_grid(instance, grid, corner));
+        const InImage p = project(camera, aspect, world_from_grid(instance, grid, corner));
         all.left = std::max(all.left, -p.x);
         all.right = std::max(all.right, p.x);
         all.low = std::max(all.low, -p.y);
@@ -267,19 +267,19 @@ TEST(Camera, APointIsSeenWhereItsRayGoes) {
     camera.view_height = 20.0;
     for (const auto& [x, y] : {std::pair{0.5, 0.5}, {640.0, 360.0}, {1279.5, 12.25}, {-40.0, 900.0}}) {
       const Ray ray = ray_through(camera, {x, y, 1280, 720});
-      const auto seen = picture_point(camera, ray.origin + 37.0 * ray.direction, 1280, 720);
+      const auto seen = image_point(camera, ray.origin + 37.0 * ray.direction, 1280, 720);
       ASSERT_TRUE(seen);
       EXPECT_NEAR(seen->x, x, 1e-9);
       EXPECT_NEAR(seen->y, y, 1e-9);
     }
     const bool is_perspective = projection == Camera::Projection::Perspective;
-    EXPECT_EQ(picture_point(camera, camera.position - camera.forward, 64, 64).has_value(), !is_perspective);
-    EXPECT_EQ(picture_point(camera, camera.position, 64, 64).has_value(), !is_perspective);
-    EXPECT_FALSE(picture_point(camera, DVec3(std::nan("")), 64, 64));
+    EXPECT_EQ(image_point(camera, camera.position - camera.forward, 64, 64).has_value(), !is_perspective);
+    EXPECT_EQ(image_point(camera, camera.position, 64, 64).has_value(), !is_perspective);
+    EXPECT_FALSE(image_point(camera, DVec3(std::nan("")), 64, 64));
   }
 }
 
-TEST(Camera, FramedScenesFillThePictureWithTheirVoxels) {
+TEST(Camera, FramedScenesFillTheImageWithTheirVoxels) {
   std::mt19937_64 random(7);
   for (int i = 0; i < 30; ++i) {
     const Scene scene = scattered_scene(random);

@@ -92,7 +92,7 @@ double reach_of(const Scene& scene, InstanceFilter filter, DVec3 direction, DVec
   for (const InstanceHandle handle : scene.instances().handles()) {
     const Instance& instance = scene.instances()[handle];
     const SceneGrid* grid = scene.grids().find(instance.grid);
-    if (grid == nullptr || !passes(filter, scene, instance) || !has_place(instance)) continue;
+    if (grid == nullptr || !passes(filter, scene, instance) || !has_valid_transform(instance)) continue;
     add_candidates(instance, *grid, direction, middle, candidates);
   }
   std::sort(candidates.begin(), candidates.end(),

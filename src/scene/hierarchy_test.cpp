@@ -192,12 +192,13 @@ TEST(Hierarchy, ReportsInstancesThatAppearOrDisappear) {
     const SceneChanges changes =
         random() % 2 == 0 ? scene.changes_since(cursor) : scene.snapshot().changes_since(cursor);
     ASSERT_FALSE(changes.all);
-    const std::set<InstanceHandle> told(changes.instances.begin(), changes.instances.end());
+    const std::set<InstanceHandle> reported(changes.instances.begin(), changes.instances.end());
     for (std::size_t i = 0; i < instances.size(); ++i) {
       const bool now = slowly_shown(scene, scene.instances()[instances[i]]);
       ASSERT_EQ(is_shown(scene, scene.instances()[instances[i]]), now)
           << "seed " << kHierarchySeed << " round " << round;
-      ASSERT_TRUE(now == before[i] || told.contains(instances[i])) << "seed " << kHierarchySeed << " round " << round;
+      ASSERT_TRUE(now == before[i] || reported.contains(instances[i]))
+          << "seed " << kHierarchySeed << " round " << round;
     }
   }
 }

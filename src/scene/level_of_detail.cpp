@@ -223,14 +223,13 @@ void DetailSelector::select(const Scene& scene, const Camera& camera, int width,
                             std::vector<SelectedInstance>& out) {
   QUOIN_ASSERT(width > 0 && height > 0, "a positive image size");
   out.clear();
-  content_of(impl_).look_at_grids(scene);
+  impl_of(impl_).look_at_grids(scene);
   const Frustum frustum(camera, width, height);
   const PixelScale pixels(camera, height);
-  for (const Impl::Seen& seen :
-       content_of(impl_).look_at_instances(scene, camera.position, frustum, policy.instances)) {
+  for (const Impl::Seen& seen : impl_of(impl_).look_at_instances(scene, camera.position, frustum, policy.instances)) {
     const double distance = glm::length(seen.centre);
     const Measure measure{pixels.of(distance, seen.radius, seen.voxel_size), distance, seen.radius};
-    const Choice choice = content_of(impl_).choose(seen.instance, measure, policy);
+    const Choice choice = impl_of(impl_).choose(seen.instance, measure, policy);
     out.push_back({seen.instance, choice.detail, choice.level, distance});
   }
 }

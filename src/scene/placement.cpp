@@ -26,7 +26,7 @@ glm::dmat4 world_from_grid(const Instance& instance, const SceneGrid& grid) {
 // Uses the inverse instead of the transpose: a quaternion may be slightly longer than 1, which matters far from the
 // pivot.
 DVec3 grid_from_world(const Instance& instance, const SceneGrid& grid, DVec3 point_in_world) {
-  if (!has_place(instance)) return kNowhere;
+  if (!has_valid_transform(instance)) return kNowhere;
   // The difference of two far positions is taken first: it is small, and mostly exact.
   const DVec3 offset = glm::inverse(world_axes(instance)) * (point_in_world - instance.position);
   return offset / instance.voxel_size + grid.pivot;
@@ -37,12 +37,12 @@ DVec3 world_from_grid_direction(const Instance& instance, DVec3 direction_in_gri
 }
 
 DVec3 grid_from_world_direction(const Instance& instance, DVec3 direction_in_world) {
-  if (!has_place(instance)) return kNowhere;
+  if (!has_valid_transform(instance)) return kNowhere;
   return glm::inverse(world_axes(instance)) * direction_in_world / instance.voxel_size;
 }
 
-DVec3 carried_point(const Instance& before, const Instance& after, DVec3 point_in_world) {
-  if (!has_place(before) || !has_place(after)) return point_in_world;
+DVec3 transformed_point(const Instance& before, const Instance& after, DVec3 point_in_world) {
+  if (!has_valid_transform(before) || !has_valid_transform(after)) return point_in_world;
   const DVec3 in_grid = glm::inverse(world_axes(before)) * (point_in_world - before.position) / before.voxel_size;
   return after.position + world_axes(after) * (in_grid * after.voxel_size);
 }

@@ -46,7 +46,7 @@ glm::dmat3 world_axes(const Instance& instance) {
   return axes;
 }
 
-bool has_place(const Instance& instance) {
+bool has_valid_transform(const Instance& instance) {
   const DQuat& q = instance.rotation;
   return is_finite(instance.position) && is_finite({q.x, q.y, q.z}) && std::isfinite(q.w) &&
          std::isfinite(instance.voxel_size) && instance.voxel_size > 0.0;
@@ -294,7 +294,7 @@ DBox Scene::bounds(InstanceFilter filter) const {
   for (const InstanceHandle handle : instances_.handles()) {
     const Instance& instance = instances_[handle];
     const SceneGrid* grid = grids_.find(instance.grid);
-    if (grid == nullptr || !passes(filter, *this, instance) || !has_place(instance)) continue;
+    if (grid == nullptr || !passes(filter, *this, instance) || !has_valid_transform(instance)) continue;
     const IBox tight = grid->bounds();
     if (tight.empty()) continue;
     for (int i = 0; i < 8; ++i) box.extend(world_from_grid(instance, *grid, box_corner(tight, i)));

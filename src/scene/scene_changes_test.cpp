@@ -32,29 +32,29 @@ TEST(SceneChanges, EveryConsumerReceivesChangesSinceItsCursor) {
   std::vector<InstanceHandle> instances;
   std::array<Consumer, 4> consumers;
   for (Consumer& each : consumers) EXPECT_TRUE(scene.changes_since(each.cursor).all);
-  const auto told_of = [&](GridHandle grid) {
+  const auto reported_change = [&](GridHandle grid) {
     for (Consumer& each : consumers) each.grids.insert(grid);
   };
-  const auto told_of_instance = [&](InstanceHandle instance) {
+  const auto reported_instance = [&](InstanceHandle instance) {
     for (Consumer& each : consumers) each.instances.insert(instance);
   };
   for (int round = 0; round < 600; ++round) {
     const auto any = [&](auto& all) -> auto& { return all[random() % all.size()]; };
     switch (random() % 8) {
       case 0:
-        told_of(grids.emplace_back(scene.add_grid({})));
+        reported_change(grids.emplace_back(scene.add_grid({})));
         break;
       case 1:
         if (!grids.empty()) {
           Instance instance;
           instance.grid = any(grids);
-          told_of_instance(instances.emplace_back(scene.add_instance(instance)));
+          reported_instance(instances.emplace_back(scene.add_instance(instance)));
         }
         break;
       case 2:
         if (instances.size() > 2) {
           std::swap(any(instances), instances.back());
-          told_of_instance(instances.back());
+          reported_instance(instances.back());
           EXPECT_TRUE(scene.remove_instance(instances.back()));
           instances.pop_back();
         }
@@ -62,10 +62,10 @@ TEST(SceneChanges, EveryConsumerReceivesChangesSinceItsCursor) {
       case 3:
         if (grids.size() > 2) {
           std::swap(any(grids), grids.back());
-          told_of(grids.back());
+          reported_change(grids.back());
           std::erase_if(instances, [&](InstanceHandle each) {
             if (scene.instances()[each].grid != grids.back()) return false;
-            told_of_instance(each);
+            reported_instance(each);
             return true;
           });
           EXPECT_TRUE(scene.remove_grid(grids.back()));
@@ -74,9 +74,9 @@ TEST(SceneChanges, EveryConsumerReceivesChangesSinceItsCursor) {
         break;
       case 4:
         if (!instances.empty()) {
-          told_of_instance(any(instances));
+          reported_instance(any(instances));
           scene.edit(instances.front()).position.x += 1.0;
-          told_of_instance(instances.front());
+          reported_instance(instances.front());
           scene.edit(any(instances)).visible = true;
           for (Consumer& each : consumers) each.instances.insert(instances.begin(), instances.end());
           for (const InstanceHandle each : instances) scene.edit(each).voxel_size = 2.0;
@@ -86,7 +86,7 @@ TEST(SceneChanges, EveryConsumerReceivesChangesSinceItsCursor) {
         if (!grids.empty()) {
           const GridHandle grid = any(grids);
           scene.edit(grid).grid.set({round, 0, 0}, 1);
-          told_of(grid);
+          reported_change(grid);
         }
     }
     for (std::size_t i = 0; i < consumers.size(); ++i) {

@@ -160,35 +160,35 @@ void SceneFaces::Impl::count_in(const Scene& scene, GridHandle handle) {
 }
 
 SceneFaces::SceneFaces(InstanceFilter filter) : impl_(std::make_unique<Impl>()) {
-  content_of(impl_).filter = filter;
+  impl_of(impl_).filter = filter;
 }
 SceneFaces::SceneFaces(SceneFaces&&) noexcept = default;
 SceneFaces& SceneFaces::operator=(SceneFaces&&) noexcept = default;
 SceneFaces::~SceneFaces() = default;
 
 const FaceCounts& SceneFaces::counts() const {
-  return content_of(impl_).counts;
+  return impl_of(impl_).counts;
 }
 
 const FaceCounts& SceneFaces::update(const Scene& scene, Threads threads) {
-  ChangeCursor scene_read = content_of(impl_).scene_read;
-  ChangeCursor types_read = content_of(impl_).types_read;
+  ChangeCursor scene_read = impl_of(impl_).scene_read;
+  ChangeCursor types_read = impl_of(impl_).types_read;
   const SceneChanges changes = scene.changes_since(scene_read);
   const TypeChanges types = scene.types.changes_since(types_read);
-  if (changes.empty() && types.empty()) return content_of(impl_).counts;
-  content_of(impl_).scene_read = content_of(impl_).types_read = {};  // stays empty if memory runs out
-  std::vector<GridHandle> touched = content_of(impl_).touched_by(scene, changes);
-  if (has_other_visibility(types)) content_of(impl_).forget_those_with(types, scene, touched);
+  if (changes.empty() && types.empty()) return impl_of(impl_).counts;
+  impl_of(impl_).scene_read = impl_of(impl_).types_read = {};  // stays empty if memory runs out
+  std::vector<GridHandle> touched = impl_of(impl_).touched_by(scene, changes);
+  if (has_other_visibility(types)) impl_of(impl_).forget_those_with(types, scene, touched);
   std::sort(touched.begin(), touched.end());
   touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
   std::vector<ChunkCount> chunks;
-  for (const GridHandle handle : touched) content_of(impl_).follow(scene, handle, chunks);
-  content_of(impl_).count(chunks, scene.types, threads);
+  for (const GridHandle handle : touched) impl_of(impl_).follow(scene, handle, chunks);
+  impl_of(impl_).count(chunks, scene.types, threads);
   for (const ChunkCount& counted : chunks) counted.faces->put(counted.chunk, counted.visible);
-  for (const GridHandle handle : touched) content_of(impl_).count_in(scene, handle);
-  content_of(impl_).scene_read = scene_read;
-  content_of(impl_).types_read = types_read;
-  return content_of(impl_).counts;
+  for (const GridHandle handle : touched) impl_of(impl_).count_in(scene, handle);
+  impl_of(impl_).scene_read = scene_read;
+  impl_of(impl_).types_read = types_read;
+  return impl_of(impl_).counts;
 }
 
 FaceCounts count_faces(const Scene& scene, InstanceFilter filter, Threads threads) {

@@ -1,5 +1,5 @@
-#include <quoin/store/world_care.h>
 #include <quoin/store/world_import.h>
+#include <quoin/store/world_maintenance.h>
 #include <quoin/store/world_meshes.h>
 #include <quoin/store/world_saver.h>
 #include <quoin/store/world_store.h>
@@ -35,8 +35,8 @@ WorldChanges::WorldChanges() = default;
 WorldChanges::WorldChanges(WorldChanges&&) noexcept = default;
 WorldChanges& WorldChanges::operator=(WorldChanges&&) noexcept = default;
 WorldChanges::~WorldChanges() = default;
-void WorldChanges::put_chunk(const ChunkPlace&, StoredChunk) {}
-void WorldChanges::remove_chunk(const ChunkPlace&) {}
+void WorldChanges::put_chunk(const ChunkAddress&, StoredChunk) {}
+void WorldChanges::remove_chunk(const ChunkAddress&) {}
 void WorldChanges::put_types(const VoxelRegistry&, VoxelType) {}
 void WorldChanges::put_type(VoxelType, const VoxelProperties&) {}
 void WorldChanges::put_grid(std::uint32_t, const WorldGrid&) {}
@@ -65,7 +65,7 @@ Result<WorldStore> WorldStore::open(const std::filesystem::path& path, WorldAcce
 Result<WorldStore> WorldStore::open_or_create(const std::filesystem::path& path, Threads) {
   return absent(path);
 }
-Result<std::optional<StoredChunk>> WorldStore::load_chunk(const ChunkPlace&) const {
+Result<std::optional<StoredChunk>> WorldStore::load_chunk(const ChunkAddress&) const {
   return absent();
 }
 Result<std::vector<IVec3>> WorldStore::chunks(std::uint32_t, std::uint8_t, const IBox&) const {

@@ -21,7 +21,7 @@ constexpr std::size_t kMaxProblems = 1000;
 // After this many bytes of unloaded chunks, memory is returned to the system.
 constexpr std::size_t kTrimBytes = std::size_t{16} << 20;
 
-std::string name_of(const ChunkPlace& place) {
+std::string name_of(const ChunkAddress& place) {
   return "chunk (" + std::to_string(place.chunk.x) + ", " + std::to_string(place.chunk.y) + ", " +
          std::to_string(place.chunk.z) + ") of grid " + std::to_string(place.grid);
 }
@@ -76,18 +76,18 @@ std::shared_ptr<const ChunkGenerator> ChunkStreamer::generator_of(std::uint32_t 
   return found == generators_.end() ? nullptr : found->second;
 }
 
-void ChunkStreamer::post(Note note, bool hurries) {
+void ChunkStreamer::post(Note note, bool is_urgent) {
   if (note.empty()) return;
-  hurries |= note.wishes.has_value();
+  is_urgent |= note.requests.has_value();
   {
     const std::scoped_lock lock(inbox_mutex_);
-    if (note.wishes) inbox_.wishes = std::move(note.wishes);
+    if (note.requests) inbox_.requests = std::move(note.requests);
     append(inbox_.events, note.events);
-    append(inbox_.let_go, note.let_go);
+    append(inbox_.released, note.released);
     ++posted_;
   }
   ++signal_;
-  if (hurries) signal_.notify_one();  // the planning worker wakes the others
+  if (is_urgent) signal_.notify_one();  // the planning worker wakes the others
 }
 
 void ChunkStreamer::set_room(std::int64_t bytes, std::int64_t each) {
@@ -98,11 +98,11 @@ void ChunkStreamer::set_room(std::int64_t bytes, std::int64_t each) {
 }
 
 void ChunkStreamer::take(Outbox& out) {
-  out.arrivals.clear();
+  out.completed_loads.clear();
   out.problems.clear();
   out.leaving.clear();
   const std::scoped_lock lock(outbox_mutex_);
-  std::swap(out.arrivals, outbox_.arrivals);
+  std::swap(out.completed_loads, outbox_.completed_loads);
   std::swap(out.problems, outbox_.problems);
   out.has_leaving = std::exchange(outbox_.has_leaving, false);
   if (out.has_leaving) std::swap(out.leaving, outbox_.leaving);
@@ -126,21 +126,23 @@ void ChunkStreamer::wait() {
   // Only the caller can make room.
   if (room_ <= 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   std::unique_lock lock(outbox_mutex_);
-  came_.wait(lock, [&] { return !outbox_.arrivals.empty() || (working_ == 0 && !has_more_ && told_posts_ >= posted); });
+  came_.wait(lock, [&] {
+    return !outbox_.completed_loads.empty() || (working_ == 0 && !has_more_ && reported_posts_ >= posted);
+  });
 }
 
 // Processes the inbox. Requires: the plan's lock is held. If memory runs out, the next call continues there.
 void ChunkStreamer::read_inbox() {
-  if (read_events_ == reading_.events.size() && !reading_.wishes) {
+  if (read_events_ == reading_.events.size() && !reading_.requests) {
     Note done;
     std::swap(done, reading_);
     read_events_ = 0;
     const std::scoped_lock lock(inbox_mutex_);
     std::swap(reading_, inbox_);
     read_posts_ = posted_;
-    for (const StoredChunk& chunk : reading_.let_go) let_go_bytes_ += bytes_of(chunk);
+    for (const StoredChunk& chunk : reading_.released) released_bytes_ += bytes_of(chunk);
   }
-  reading_.let_go.clear();
+  reading_.released.clear();
   for (; read_events_ < reading_.events.size(); ++read_events_) {
     const Event& event = reading_.events[read_events_];
     if (event.what == Event::What::Gone) {
@@ -150,14 +152,14 @@ void ChunkStreamer::read_inbox() {
                       event.what == Event::What::Here ? StreamPlan::State::Here : StreamPlan::State::Broken);
     }
   }
-  if (!reading_.wishes) return;
-  plan_.plan(*reading_.wishes);
-  plans_ = reading_.wishes->number;
-  reading_.wishes.reset();
+  if (!reading_.requests) return;
+  plan_.plan(*reading_.requests);
+  plans_ = reading_.requests->number;
+  reading_.requests.reset();
 }
 
 // Publishes the state for the caller. Requires: the plan's lock is held.
-void ChunkStreamer::tell() {
+void ChunkStreamer::report() {
   // Computed outside the lock that the caller takes.
   const std::size_t missing = plan_.missing();
   const double complete_radius = plan_.complete_radius();
@@ -172,7 +174,7 @@ void ChunkStreamer::tell() {
     outbox_.missing = missing;
     outbox_.complete_radius = complete_radius;
     has_more_ = plan_.has_next(has_room());
-    told_posts_ = read_posts_;
+    reported_posts_ = read_posts_;
   }
   came_.notify_all();
 }
@@ -201,18 +203,18 @@ bool ChunkStreamer::work_once() {
   std::unique_lock lock(plan_mutex_);
   const auto has_post = [&] {
     const std::scoped_lock inbox(inbox_mutex_);
-    return read_posts_ != posted_ || read_events_ != reading_.events.size() || reading_.wishes;
+    return read_posts_ != posted_ || read_events_ != reading_.events.size() || reading_.requests;
   };
   if (is_ending_) return false;
   const std::uint32_t seen = signal_;
   const bool is_new = has_post();
   if (is_new) {
     read_inbox();
-    tell();
+    report();
   }
-  ChunkPlace place;
+  ChunkAddress place;
   if (!plan_.next(place, has_room())) {
-    tell();
+    report();
     lock.unlock();
     signal_.wait(seen);
     return true;
@@ -222,25 +224,26 @@ bool ChunkStreamer::work_once() {
     ++working_;
   }
   if (is_new && plan_.has_next(has_room())) signal();
-  const bool must_trim = let_go_bytes_ > kTrimBytes;
-  if (must_trim) let_go_bytes_ = 0;
+  const bool must_trim = released_bytes_ > kTrimBytes;
+  if (must_trim) released_bytes_ = 0;
   lock.unlock();
   if (must_trim) trim_heaps();
   const std::int64_t reserved = each_;
   room_ -= reserved;
-  Arrival arrival = fetch(place);
-  room_ += reserved - static_cast<std::int64_t>(bytes_of(arrival.chunk));
-  hand_over(std::move(arrival));
+  CompletedLoad completed = fetch(place);
+  room_ += reserved - static_cast<std::int64_t>(bytes_of(completed.chunk));
+  hand_over(std::move(completed));
   return true;
 }
 
 namespace {
 
 // Reserves room for one more arrival. Returns false if memory runs out.
-bool has_place(std::vector<Arrival>& arrivals) {
+bool has_valid_transform(std::vector<CompletedLoad>& completed_loads) {
   constexpr std::size_t kLeast = 16;
   try {
-    if (arrivals.size() == arrivals.capacity()) arrivals.reserve(std::max(kLeast, 2 * arrivals.capacity()));
+    if (completed_loads.size() == completed_loads.capacity())
+      completed_loads.reserve(std::max(kLeast, 2 * completed_loads.capacity()));
     return true;
   } catch (const std::bad_alloc&) {
     return false;
@@ -250,12 +253,12 @@ bool has_place(std::vector<Arrival>& arrivals) {
 }  // namespace
 
 // Retries until there is memory for the list entry, so that no arrival is lost.
-void ChunkStreamer::hand_over(Arrival arrival) {
+void ChunkStreamer::hand_over(CompletedLoad completed) {
   for (;;) {
     {
       const std::scoped_lock outbox(outbox_mutex_);
-      if (has_place(outbox_.arrivals)) {
-        outbox_.arrivals.push_back(std::move(arrival));
+      if (has_valid_transform(outbox_.completed_loads)) {
+        outbox_.completed_loads.push_back(std::move(completed));
         --working_;
         break;
       }
@@ -272,30 +275,30 @@ void ChunkStreamer::note_shortage() {
   is_short_ = true;
 }
 
-Arrival ChunkStreamer::fetch(const ChunkPlace& place) {
-  Arrival arrival;
-  arrival.place = place;
+CompletedLoad ChunkStreamer::fetch(const ChunkAddress& place) {
+  CompletedLoad completed;
+  completed.place = place;
   try {
-    read_or_make(arrival);
+    read_or_make(completed);
   } catch (const std::bad_alloc&) {
-    arrival.chunk = {};
-    arrival.outcome = Arrival::Outcome::OutOfMemory;
+    completed.chunk = {};
+    completed.outcome = CompletedLoad::Outcome::OutOfMemory;
   } catch (const std::exception& thrown) {  // a generator that throws breaks its contract
-    arrival.chunk = {};
+    completed.chunk = {};
     add_problem(place, make_error(ErrorCode::InvalidArgument, thrown.what()));
   }
-  return arrival;
+  return completed;
 }
 
-void ChunkStreamer::read_or_make(Arrival& arrival) {
-  const ChunkPlace& place = arrival.place;
+void ChunkStreamer::read_or_make(CompletedLoad& completed) {
+  const ChunkAddress& place = completed.place;
   auto kept = store_.load_chunk(place);
   if (!kept) {
-    arrival.outcome = Arrival::Outcome::Broken;
+    completed.outcome = CompletedLoad::Outcome::Broken;
     return add_problem(place, kept.error());
   }
   if (*kept) {
-    arrival.chunk = std::move(**kept);
+    completed.chunk = std::move(**kept);
     const std::scoped_lock lock(outbox_mutex_);
     ++outbox_.read;
     return;
@@ -306,7 +309,7 @@ void ChunkStreamer::read_or_make(Arrival& arrival) {
     const auto found = generators_.find(place.grid);
     if (found != generators_.end()) generator = found->second;
   }
-  if (generator != nullptr && generator->chunks().contains(place.chunk)) make(*generator, arrival);
+  if (generator != nullptr && generator->chunks().contains(place.chunk)) make(*generator, completed);
 }
 
 // Waits for a limited time: a full disk must not stop the streamer.
@@ -316,23 +319,23 @@ void ChunkStreamer::wait_for_disk() {
   }
 }
 
-void ChunkStreamer::make(const ChunkGenerator& generator, Arrival& arrival) {
+void ChunkStreamer::make(const ChunkGenerator& generator, CompletedLoad& completed) {
   if (options_.keeps_made) wait_for_disk();
-  auto made = generator.make(arrival.place.chunk);
-  if (!made) return add_problem(arrival.place, made.error());
-  arrival.chunk = std::move(*made);
+  auto made = generator.make(completed.place.chunk);
+  if (!made) return add_problem(completed.place, made.error());
+  completed.chunk = std::move(*made);
   {
     const std::scoped_lock lock(outbox_mutex_);
     ++outbox_.made;
   }
   if (!options_.keeps_made) return;
   WorldChanges changes;
-  changes.put_chunk(arrival.place, arrival.chunk);
+  changes.put_chunk(completed.place, completed.chunk);
   // The store keeps failed changes and retries them.
-  if (const auto saved = store_.save(std::move(changes)); !saved) add_problem(arrival.place, saved.error());
+  if (const auto saved = store_.save(std::move(changes)); !saved) add_problem(completed.place, saved.error());
 }
 
-void ChunkStreamer::add_problem(const ChunkPlace& place, const Error& error) {
+void ChunkStreamer::add_problem(const ChunkAddress& place, const Error& error) {
   const std::scoped_lock lock(outbox_mutex_);
   if (outbox_.problems.size() < kMaxProblems) outbox_.problems.push_back(name_of(place) + ": " + to_string(error));
 }

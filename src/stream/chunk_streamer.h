@@ -20,8 +20,8 @@
 namespace quoin::stream {
 
 /// A chunk that was read or generated.
-struct Arrival {
-  ChunkPlace place;
+struct CompletedLoad {
+  ChunkAddress place;
   StoredChunk chunk{};
   enum class Outcome : std::uint8_t {
     Came,
@@ -49,20 +49,20 @@ class ChunkStreamer {
       Broken,  ///< it will not arrive
       Gone,    ///< it was unloaded or dropped
     };
-    ChunkPlace place;
+    ChunkAddress place;
     What what = What::Here;
   };
   struct Note {
-    std::optional<Wishes> wishes{};     ///< set if they changed
-    std::vector<Event> events;          ///< in order
-    std::vector<StoredChunk> let_go{};  ///< destroyed on a worker thread, off the caller's thread
-    void add(const ChunkPlace& place, Event::What what) { events.push_back({place, what}); }
-    [[nodiscard]] bool empty() const { return !wishes && events.empty() && let_go.empty(); }
+    std::optional<StreamRequests> requests{};  ///< set if they changed
+    std::vector<Event> events;                 ///< in order
+    std::vector<StoredChunk> released{};       ///< destroyed on a worker thread, off the caller's thread
+    void add(const ChunkAddress& place, Event::What what) { events.push_back({place, what}); }
+    [[nodiscard]] bool empty() const { return !requests && events.empty() && released.empty(); }
   };
   struct Outbox {
-    std::vector<Arrival> arrivals;
-    std::vector<ChunkPlace> leaving;  ///< chunks to unload by the last plan
-    bool has_leaving = false;         ///< there was a plan
+    std::vector<CompletedLoad> completed_loads;
+    std::vector<ChunkAddress> leaving;  ///< chunks to unload by the last plan
+    bool has_leaving = false;           ///< there was a plan
     std::vector<std::string> problems;
     std::size_t wanted = 0;
     std::size_t missing = 0;
@@ -84,7 +84,7 @@ class ChunkStreamer {
   void set_generator(std::uint32_t grid, std::shared_ptr<const ChunkGenerator> generator);
   [[nodiscard]] std::shared_ptr<const ChunkGenerator> generator_of(std::uint32_t grid) const;
   /// Queues a note. Without `hurries` sleeping workers are not woken: a wake-up costs the caller more than the rest.
-  void post(Note note, bool hurries = true);
+  void post(Note note, bool is_urgent = true);
   /// Sets the bytes of chunks that may be read or made in addition to those in progress, and the expected bytes per
   /// chunk. Chunks that edits wait for are always loaded.
   void set_room(std::int64_t bytes, std::int64_t each);
@@ -97,15 +97,15 @@ class ChunkStreamer {
   void run();
   bool work_once();
   void read_inbox();
-  void hand_over(Arrival arrival);
+  void hand_over(CompletedLoad completed);
   void note_shortage();
   [[nodiscard]] bool has_room() const;
-  [[nodiscard]] Arrival fetch(const ChunkPlace& place);
-  void read_or_make(Arrival& arrival);
-  void make(const ChunkGenerator& generator, Arrival& arrival);
+  [[nodiscard]] CompletedLoad fetch(const ChunkAddress& place);
+  void read_or_make(CompletedLoad& completed);
+  void make(const ChunkGenerator& generator, CompletedLoad& completed);
   void wait_for_disk();
-  void add_problem(const ChunkPlace& place, const Error& error);
-  void tell();
+  void add_problem(const ChunkAddress& place, const Error& error);
+  void report();
   void signal();
 
   WorldStore& store_;
@@ -122,7 +122,7 @@ class ChunkStreamer {
   std::size_t read_events_ = 0;
   std::uint64_t read_posts_ = 0;
   std::uint64_t plans_ = 0;
-  std::size_t let_go_bytes_ = 0;  ///< since memory was last returned
+  std::size_t released_bytes_ = 0;  ///< since memory was last returned
   std::atomic<bool> is_ending_{false};
   std::atomic<std::int64_t> room_{0};  ///< bytes
   std::atomic<std::int64_t> each_{0};
@@ -133,7 +133,7 @@ class ChunkStreamer {
   std::condition_variable came_;
   std::size_t working_ = 0;
   bool is_short_ = false;  ///< memory ran short since the last report to the caller
-  std::uint64_t told_posts_ = 0;
+  std::uint64_t reported_posts_ = 0;
   bool has_more_ = false;
 
   std::vector<std::jthread> workers_;  ///< last: they end first

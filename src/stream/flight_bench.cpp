@@ -112,7 +112,7 @@ class FlightLog {
     }
     slowest_ = 0.0;
   }
-  void tell(benchmark::State& state) const {
+  void report(benchmark::State& state) const {
     const auto put = [&](const std::string& name, const std::vector<double>& all, double factor) {
       for (const auto& [end, share] : {std::pair("_p50", 0.5), {"_p99", 0.99}, {"_p999", 0.999}, {"_max", 1.0}}) {
         state.counters[name + end] = factor * quantile(all, share);
@@ -210,7 +210,7 @@ Status fly_through(Flight& flight, benchmark::State& state) {
   const StreamStats after = flight.world.stats();
   if (auto saved = flight.world.flush(); !saved) return saved;
   const auto rate = [&](double count) { return benchmark::Counter(count / seconds); };
-  log.tell(state);
+  log.report(state);
   state.counters["made_a_second"] = rate(static_cast<double>(after.chunks_made - before.chunks_made));
   state.counters["meshed_a_second"] = rate(static_cast<double>(flight.meshes.stats().chunks_meshed));
   state.counters["unloaded_a_second"] = rate(static_cast<double>(after.chunks_unloaded - before.chunks_unloaded));

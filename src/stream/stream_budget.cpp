@@ -28,22 +28,22 @@ StreamBudget::StreamBudget(std::size_t bytes, bool has_others)
     : budget_(bytes), ratio_(has_others ? kGuessedRatio : 0.0) {}
 
 void StreamBudget::set_others(std::size_t reported, std::size_t pending, bool is_quiet, Clock::time_point now) {
-  const double seconds = is_told_ ? std::chrono::duration<double>(now - told_).count() : 0.0;
-  const bool is_other = !is_told_ || reported != reported_;
-  if (!is_told_ || chunks_ == 0) {
+  const double seconds = is_reported_ ? std::chrono::duration<double>(now - announced_).count() : 0.0;
+  const bool is_other = !is_reported_ || reported != reported_;
+  if (!is_reported_ || chunks_ == 0) {
     fixed_ = reported;
   } else {
     fixed_ = std::min(fixed_, reported);
   }
-  if (is_told_ && (is_other || is_quiet) && chunks_ >= kGuessBelow) {
+  if (is_reported_ && (is_other || is_quiet) && chunks_ >= kGuessBelow) {
     const double found =
         static_cast<double>(reported - fixed_) / static_cast<double>(std::max(chunk_bytes_, std::size_t{1}));
     ratio_ += (found - ratio_) * (1.0 - std::exp(-seconds / (found > ratio_ ? kRises : kFalls)));
   }
   reported_ = reported;
   pending_ = pending;
-  told_ = now;
-  is_told_ = true;
+  announced_ = now;
+  is_reported_ = true;
 }
 
 double StreamBudget::limit() const {

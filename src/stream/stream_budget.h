@@ -61,8 +61,8 @@ class StreamBudget {
   std::size_t pending_ = 0;
   std::size_t fixed_ = 0;  // reported bytes that do not depend on chunks
   double ratio_ = 0.0;     // bytes of derived data per byte of chunks
-  bool is_told_ = false;
-  Clock::time_point told_{};
+  bool is_reported_ = false;
+  Clock::time_point announced_{};
 };
 
 }  // namespace quoin::stream

@@ -20,7 +20,7 @@ class Program {
   void load(std::size_t chunks) {
     for (std::size_t i = 0; i < chunks && budget.room(0) > 0; ++i) budget.add_chunk(kChunk);
   }
-  void let_go(std::size_t chunks) {
+  void released(std::size_t chunks) {
     for (std::size_t i = 0; i < chunks; ++i) budget.remove_chunk(kChunk);
   }
   // Waits a tenth of a second, in which meshes appear.
@@ -54,7 +54,7 @@ TEST(StreamBudget, RoomIsKeptForWhatIsMadeOfChunksLater) {
   const std::size_t before = program.budget.loaded_chunks();
   std::size_t planned = before;
   for (int i = 0; i < 6000; ++i) {
-    program.let_go(10);
+    program.released(10);
     program.wait();
     program.load(10);
     planned = program.budget.chunks(planned, true, 0.05);

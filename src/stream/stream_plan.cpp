@@ -78,37 +78,37 @@ bool StreamPlan::is_nearer(const Wanted& a, const Wanted& b) {
   return key(a) < key(b);
 }
 
-const StreamPlan::State* StreamPlan::state_of(const ChunkPlace& place) const {
+const StreamPlan::State* StreamPlan::state_of(const ChunkAddress& place) const {
   const auto grid = states_.find(place.grid);
   if (grid == states_.end()) return nullptr;
   const auto found = grid->second.find(place.chunk);
   return found == grid->second.end() ? nullptr : &found->second;
 }
 
-void StreamPlan::set_state(const ChunkPlace& place, State state) {
+void StreamPlan::set_state(const ChunkAddress& place, State state) {
   states_[place.grid][place.chunk] = state;
   is_counted_ = false;
 }
 
-void StreamPlan::forget(const ChunkPlace& place) {
+void StreamPlan::forget(const ChunkAddress& place) {
   states_[place.grid].erase(place.chunk);
   is_counted_ = false;
 }
 
-void StreamPlan::plan(Wishes wishes) {
+void StreamPlan::plan(StreamRequests requests) {
   queue_.clear();  // leaves no stale entries if memory runs out
   leaving_.clear();
   next_ = asked_ = here_ = 0;
   is_counted_ = false;
-  wishes_ = std::move(wishes);
-  wishes_.max_chunks = std::min(wishes_.max_chunks, kMaxPlanned);
+  requests_ = std::move(requests);
+  requests_.max_chunks = std::min(requests_.max_chunks, kMaxPlanned);
   find_wanted();
   cut_to_budget();
   find_queue();
   find_leaving();
 }
 
-StreamPlan::Wanted StreamPlan::measured(const ChunkPlace& place, const std::vector<Eye>& eyes) const {
+StreamPlan::Wanted StreamPlan::measured(const ChunkAddress& place, const std::vector<Eye>& eyes) const {
   constexpr double kFar = std::numeric_limits<double>::infinity();
   Wanted all{place, kFar, kFar};
   for (const Eye& eye : eyes) {
@@ -121,8 +121,8 @@ StreamPlan::Wanted StreamPlan::measured(const ChunkPlace& place, const std::vect
 
 void StreamPlan::find_wanted() {
   wanted_.clear();
-  const double reach = reach_of(wishes_.max_chunks);
-  for (const auto& [grid, eyes] : wishes_.eyes) {
+  const double reach = reach_of(requests_.max_chunks);
+  for (const auto& [grid, eyes] : requests_.eyes) {
     std::vector<IVec3> chunks;
     for (const Eye& eye : eyes) {
       const double radius = std::min(eye.radius, reach);
@@ -143,8 +143,8 @@ void StreamPlan::find_wanted() {
     }
     for (const IVec3 chunk : chunks) wanted_.push_back(measured({grid, 0, chunk}, eyes));
     // With many grids, keeps as many as could be wanted, plus one that shows that there were more.
-    if (wanted_.size() > 2 * wishes_.max_chunks + 1) {
-      const auto end = wanted_.begin() + static_cast<std::ptrdiff_t>(wishes_.max_chunks + 1);
+    if (wanted_.size() > 2 * requests_.max_chunks + 1) {
+      const auto end = wanted_.begin() + static_cast<std::ptrdiff_t>(requests_.max_chunks + 1);
       std::nth_element(wanted_.begin(), end, wanted_.end(), is_nearer);
       wanted_.erase(end, wanted_.end());
     }
@@ -153,9 +153,9 @@ void StreamPlan::find_wanted() {
 }
 
 void StreamPlan::cut_to_budget() {
-  is_cut_ = wanted_.size() > wishes_.max_chunks;
+  is_cut_ = wanted_.size() > requests_.max_chunks;
   if (!is_cut_) return;
-  const auto fits = static_cast<std::size_t>(static_cast<double>(wishes_.max_chunks) * kShareOfWanted);
+  const auto fits = static_cast<std::size_t>(static_cast<double>(requests_.max_chunks) * kShareOfWanted);
   wanted_.resize(std::min(wanted_.size(), fits));
 }
 
@@ -178,18 +178,18 @@ void StreamPlan::find_leaving() {
   std::vector<Wanted> others;
   const std::vector<Eye> nobody;
   for (const auto& [grid, states] : states_) {
-    const auto eyes = wishes_.eyes.find(grid);
+    const auto eyes = requests_.eyes.find(grid);
     const auto& of_grid = is_wanted[grid];
     for (const auto& [chunk, state] : states) {
       if (state != State::Here || of_grid.contains(chunk)) continue;
-      others.push_back(measured({grid, 0, chunk}, eyes == wishes_.eyes.end() ? nobody : eyes->second));
+      others.push_back(measured({grid, 0, chunk}, eyes == requests_.eyes.end() ? nobody : eyes->second));
     }
   }
   std::ranges::sort(others, is_nearer);
-  std::size_t room = wishes_.max_chunks > wanted_.size() ? wishes_.max_chunks - wanted_.size() : 0;
+  std::size_t room = requests_.max_chunks > wanted_.size() ? requests_.max_chunks - wanted_.size() : 0;
   const auto is_near = [&](const Wanted& each) {
-    const auto eyes = wishes_.eyes.find(each.place.grid);
-    return eyes != wishes_.eyes.end() &&
+    const auto eyes = requests_.eyes.find(each.place.grid);
+    return eyes != requests_.eyes.end() &&
            std::ranges::any_of(eyes->second, [&](const Eye& eye) { return stays_for(eye, each.place.chunk); });
   };
   for (const Wanted& each : others) {
@@ -202,8 +202,8 @@ void StreamPlan::find_leaving() {
   std::ranges::reverse(leaving_);
 }
 
-bool StreamPlan::next(ChunkPlace& place, bool has_room) {
-  const auto take_from = [&](const std::vector<ChunkPlace>& places, std::size_t& at) {
+bool StreamPlan::next(ChunkAddress& place, bool has_room) {
+  const auto take_from = [&](const std::vector<ChunkAddress>& places, std::size_t& at) {
     while (at < places.size()) {
       place = places[at];
       const bool is_new = state_of(place) == nullptr;
@@ -213,10 +213,10 @@ bool StreamPlan::next(ChunkPlace& place, bool has_room) {
     }
     return false;
   };
-  return take_from(wishes_.asked, asked_) || (has_room && take_from(queue_, next_));
+  return take_from(requests_.asked, asked_) || (has_room && take_from(queue_, next_));
 }
 
-std::vector<ChunkPlace> StreamPlan::take_leaving() {
+std::vector<ChunkAddress> StreamPlan::take_leaving() {
   return std::exchange(leaving_, {});
 }
 
@@ -238,7 +238,7 @@ double StreamPlan::complete_radius() {
   if (here_ < wanted_.size()) return wanted_[here_].distance;
   if (is_cut_) return wanted_.empty() ? 0.0 : wanted_.back().distance;
   double least = std::numeric_limits<double>::infinity();
-  for (const auto& [grid, eyes] : wishes_.eyes) {
+  for (const auto& [grid, eyes] : requests_.eyes) {
     for (const Eye& eye : eyes) least = std::min(least, eye.radius * eye.voxel_size);
   }
   return std::isfinite(least) ? least : 0.0;

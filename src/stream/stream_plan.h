@@ -31,11 +31,11 @@ using Eyes = std::map<std::uint32_t, std::vector<Eye>>;  ///< by grid number in 
 [[nodiscard]] bool see_alike(const Eyes& a, const Eyes& b);
 
 /// The chunks that the caller's thread requests.
-struct Wishes {
+struct StreamRequests {
   Eyes eyes;
-  std::size_t max_chunks = 0;     ///< number of chunks that fit the budget
-  std::vector<ChunkPlace> asked;  ///< chunks that edits need, at any distance
-  std::uint64_t number = 0;       ///< set by the caller; increases with each request
+  std::size_t max_chunks = 0;       ///< number of chunks that fit the budget
+  std::vector<ChunkAddress> asked;  ///< chunks that edits need, at any distance
+  std::uint64_t number = 0;         ///< set by the caller; increases with each request
 };
 
 /// Selects the chunks to load, nearest first, and the chunks to unload.
@@ -47,20 +47,20 @@ class StreamPlan {
  public:
   enum class State : std::uint8_t { Begun, Here, Broken };
 
-  void set_state(const ChunkPlace& place, State state);
-  void forget(const ChunkPlace& place);
+  void set_state(const ChunkAddress& place, State state);
+  void forget(const ChunkAddress& place);
 
   /// Replaces the requests and computes the chunks to load from scratch.
-  void plan(Wishes wishes);
+  void plan(StreamRequests requests);
   /// Gets the next chunk to load and marks it as begun. Returns false if there is none. Without `has_room` this
   /// considers only chunks that edits wait for.
-  bool next(ChunkPlace& place, bool has_room);
+  bool next(ChunkAddress& place, bool has_room);
   [[nodiscard]] bool has_next(bool has_room) const {
-    return asked_ < wishes_.asked.size() || (has_room && next_ < queue_.size());
+    return asked_ < requests_.asked.size() || (has_room && next_ < queue_.size());
   }
-  [[nodiscard]] std::size_t max_chunks() const { return wishes_.max_chunks; }
+  [[nodiscard]] std::size_t max_chunks() const { return requests_.max_chunks; }
   /// Takes the chunks to unload since the last call, farthest first.
-  [[nodiscard]] std::vector<ChunkPlace> take_leaving();
+  [[nodiscard]] std::vector<ChunkAddress> take_leaving();
 
   [[nodiscard]] std::size_t wanted() const { return wanted_.size(); }
   /// Return the number of wanted chunks that are not loaded, and the distance of the nearest in world units. Cost:
@@ -70,7 +70,7 @@ class StreamPlan {
 
  private:
   struct Wanted {
-    ChunkPlace place;
+    ChunkAddress place;
     double distance = 0.0;  ///< world units, of its nearest point from the nearest eye
     double rank = 0.0;      ///< lower ranks load first
   };
@@ -80,18 +80,18 @@ class StreamPlan {
   void cut_to_budget();
   void find_queue();
   void find_leaving();
-  [[nodiscard]] const State* state_of(const ChunkPlace& place) const;
+  [[nodiscard]] const State* state_of(const ChunkAddress& place) const;
   [[nodiscard]] static bool is_nearer(const Wanted& a, const Wanted& b);
-  [[nodiscard]] Wanted measured(const ChunkPlace& place, const std::vector<Eye>& eyes) const;
+  [[nodiscard]] Wanted measured(const ChunkAddress& place, const std::vector<Eye>& eyes) const;
 
-  Wishes wishes_;
+  StreamRequests requests_;
   std::map<std::uint32_t, States> states_;
   std::vector<Wanted> wanted_;  ///< by distance
   bool is_cut_ = false;         ///< the budget limited the plan
-  std::vector<ChunkPlace> queue_;
+  std::vector<ChunkAddress> queue_;
   std::size_t next_ = 0;
   std::size_t asked_ = 0;
-  std::vector<ChunkPlace> leaving_;
+  std::vector<ChunkAddress> leaving_;
   std::size_t here_ = 0;           ///< all entries of `wanted_` before this index are loaded
   std::size_t missing_count_ = 0;  ///< as of the last count
   bool is_counted_ = false;

@@ -38,7 +38,7 @@ using Clock = std::chrono::steady_clock;
 using What = ChunkStreamer::Event::What;
 
 // Maximum number of arrivals that wait to be put in place.
-constexpr std::size_t kMaxArrivals = 128;
+constexpr std::size_t kMaxCompletedLoads = 128;
 // Maximum number of chunks that edits wait for, per plan.
 constexpr std::size_t kMaxAsked = 1024;
 // Bytes per loaded chunk in addition to its voxels and densities: marks, sizes and states.
@@ -123,23 +123,24 @@ struct StreamedWorld::Impl {
 
   Status update(std::span<const Viewer> viewers, double seconds);
   Status plan(std::span<const Viewer> viewers);
-  void tell_workers();
-  [[nodiscard]] bool has_chunks_to_move() const { return !arrivals.empty() || (!is_edited && !leaving.empty()); }
+  void notify_workers();
+  [[nodiscard]] bool has_chunks_to_move() const { return !completed_loads.empty() || (!is_edited && !leaving.empty()); }
   void take_in();
   void move_chunks(double seconds, Clock::time_point start, ChunkStreamer::Note& note);
   void follow_instances();
   [[nodiscard]] Eyes eyes_of(std::span<const Viewer> viewers);
-  void wish(ChunkStreamer::Note& note);
+  void request(ChunkStreamer::Note& note);
   [[nodiscard]] bool is_cut() const;
   // Returns true if no requested chunk is on its way.
   [[nodiscard]] bool is_quiet() const {
-    return box.missing == 0 && box.begun == 0 && arrivals.empty() && box.plans == posted_plans;
+    return box.missing == 0 && box.begun == 0 && completed_loads.empty() && box.plans == posted_plans;
   }
   [[nodiscard]] std::size_t chunks_of_budget() const;
-  [[nodiscard]] bool is_near_anyone(const ChunkPlace& place) const;
-  void put(Arrival arrival, ChunkStreamer::Note& note);
-  std::optional<StoredChunk> edited_on_arrival(Streamed& grid, const Arrival& arrival, const SceneGrid& content);
-  void take_away(const ChunkPlace& place, ChunkStreamer::Note& note);
+  [[nodiscard]] bool is_near_anyone(const ChunkAddress& place) const;
+  void put(CompletedLoad completed, ChunkStreamer::Note& note);
+  std::optional<StoredChunk> edited_on_arrival(Streamed& grid, const CompletedLoad& completed,
+                                               const SceneGrid& content);
+  void take_away(const ChunkAddress& place, ChunkStreamer::Note& note);
   void note_edits();
   Status save_now();
   [[nodiscard]] std::size_t waiting_chunks() const;
@@ -163,8 +164,8 @@ struct StreamedWorld::Impl {
   std::uint64_t posted_plans = 0;
   bool must_plan = true;
   Clock::time_point planned{};
-  std::deque<Arrival> arrivals;
-  std::deque<ChunkPlace> leaving;
+  std::deque<CompletedLoad> completed_loads;
+  std::deque<ChunkAddress> leaving;
 
   std::size_t arrived_bytes = 0;  // of `arrivals`
   Clock::time_point asked_others{};
@@ -222,7 +223,8 @@ void StreamedWorld::Impl::follow_instances() {
   const auto follow = [&](InstanceHandle handle) {
     const Instance* const instance = scene().instances().find(handle);
     const auto was = grid_of_instance.find(handle);
-    const auto* const number = instance == nullptr || !has_place(*instance) ? nullptr : number_of(instance->grid);
+    const auto* const number =
+        instance == nullptr || !has_valid_transform(*instance) ? nullptr : number_of(instance->grid);
     if (was != grid_of_instance.end() && (number == nullptr || was->second != *number)) {
       if (Streamed* const grid = streamed(was->second)) grid->placements.remove(handle);
       grid_of_instance.erase(was);
@@ -257,7 +259,7 @@ bool StreamedWorld::Impl::is_cut() const {
 }
 
 std::size_t StreamedWorld::Impl::chunks_of_budget() const {
-  const bool has_all = box.missing == 0 && box.begun == 0 && arrivals.empty();
+  const bool has_all = box.missing == 0 && box.begun == 0 && completed_loads.empty();
   const double missing = static_cast<double>(box.missing) / static_cast<double>(std::max<std::size_t>(box.wanted, 1));
   const std::size_t fit = budget.chunks(planned_chunks, is_cut(), missing);
   // Edited chunks that cannot be saved count too: the plan shrinks until they fit.
@@ -265,7 +267,7 @@ std::size_t StreamedWorld::Impl::chunks_of_budget() const {
   return is_stuck ? std::min(fit, planned_chunks * 9 / 10) : fit;
 }
 
-void StreamedWorld::Impl::wish(ChunkStreamer::Note& note) {
+void StreamedWorld::Impl::request(ChunkStreamer::Note& note) {
   const std::size_t fit = chunks_of_budget();
   const bool is_over = budget.is_over();
   const double change = static_cast<double>(fit) / static_cast<double>(std::max<std::size_t>(planned_chunks, 1));
@@ -274,28 +276,28 @@ void StreamedWorld::Impl::wish(ChunkStreamer::Note& note) {
   const bool is_other_budget = is_limited && (change < 0.99 || change > 1.05) && seconds_since(planned) > kReplan;
   if (asked_left == 0 && waiting_chunks() != 0 && !waits_for_broken_alone()) must_plan = true;
   if (!must_plan && !is_other_budget && see_alike(eyes, planned_eyes)) return;
-  Wishes wishes;
-  wishes.eyes = eyes;
-  wishes.max_chunks = fit;
+  StreamRequests requests;
+  requests.eyes = eyes;
+  requests.max_chunks = fit;
   for (const auto& [number, grid] : grids) {
     for (const auto& [chunk, edits] : grid.waiting) {
-      if (wishes.asked.size() == kMaxAsked) break;
-      if (!grid.broken.contains(chunk)) wishes.asked.push_back({number, 0, chunk});
+      if (requests.asked.size() == kMaxAsked) break;
+      if (!grid.broken.contains(chunk)) requests.asked.push_back({number, 0, chunk});
     }
   }
-  asked_left = wishes.asked.size();
-  std::ranges::sort(wishes.asked, [](const ChunkPlace& a, const ChunkPlace& b) {
+  asked_left = requests.asked.size();
+  std::ranges::sort(requests.asked, [](const ChunkAddress& a, const ChunkAddress& b) {
     return std::tie(a.grid, a.chunk.z, a.chunk.y, a.chunk.x) < std::tie(b.grid, b.chunk.z, b.chunk.y, b.chunk.x);
   });
-  wishes.number = ++posted_plans;
-  note.wishes = std::move(wishes);
+  requests.number = ++posted_plans;
+  note.requests = std::move(requests);
   planned_eyes = eyes;
   planned_chunks = fit;
   must_plan = false;
   planned = Clock::now();
 }
 
-bool StreamedWorld::Impl::is_near_anyone(const ChunkPlace& place) const {
+bool StreamedWorld::Impl::is_near_anyone(const ChunkAddress& place) const {
   const auto found = eyes.find(place.grid);
   if (found == eyes.end()) return false;
   return std::ranges::any_of(found->second, [&](const Eye& eye) { return stays_for(eye, place.chunk); });
@@ -350,20 +352,20 @@ Status StreamedWorld::Impl::save_now() {
 }
 
 // Applies waiting edits to an arriving chunk. Returns nullopt if no edit waited or none changed it.
-std::optional<StoredChunk> StreamedWorld::Impl::edited_on_arrival(Streamed& grid, const Arrival& arrival,
+std::optional<StoredChunk> StreamedWorld::Impl::edited_on_arrival(Streamed& grid, const CompletedLoad& completed,
                                                                   const SceneGrid& content) {
-  const auto waiting = grid.waiting.find(arrival.place.chunk);
+  const auto waiting = grid.waiting.find(completed.place.chunk);
   if (waiting == grid.waiting.end()) return std::nullopt;
   if (asked_left != 0) --asked_left;
   // Uses grids that hold this chunk only: the edit's effects elsewhere are dropped.
-  const IVec3 at = arrival.place.chunk;
+  const IVec3 at = completed.place.chunk;
   Grid voxels;
   voxels.make_partial();
-  voxels.load_chunk(at, arrival.chunk.voxels);
+  voxels.load_chunk(at, completed.chunk.voxels);
   DensityGrid field(content.field.band());
   field.make_partial();
-  if (arrival.chunk.densities) {
-    field.load_chunk(at, *arrival.chunk.densities);
+  if (completed.chunk.densities) {
+    field.load_chunk(at, *completed.chunk.densities);
   } else {
     field.load_air_chunk(at);
   }
@@ -377,34 +379,34 @@ std::optional<StoredChunk> StreamedWorld::Impl::edited_on_arrival(Streamed& grid
   return edited;
 }
 
-void StreamedWorld::Impl::put(Arrival arrival, ChunkStreamer::Note& note) {
-  const ChunkPlace place = arrival.place;
+void StreamedWorld::Impl::put(CompletedLoad completed, ChunkStreamer::Note& note) {
+  const ChunkAddress place = completed.place;
   Streamed* const grid = streamed(place.grid);
   SceneGrid* const content = grid == nullptr ? nullptr : content_of_grid(*grid);
   if (content == nullptr) {
     if (grid != nullptr) grid->waiting.clear();
     return note.add(place, What::Gone);
   }
-  if (arrival.outcome == Arrival::Outcome::Broken) {
+  if (completed.outcome == CompletedLoad::Outcome::Broken) {
     grid->broken.insert(place.chunk);
     if (asked_left != 0 && grid->waiting.contains(place.chunk)) --asked_left;
     return note.add(place, What::Broken);
   }
-  if (arrival.outcome == Arrival::Outcome::OutOfMemory) {
+  if (completed.outcome == CompletedLoad::Outcome::OutOfMemory) {
     must_plan = true;
     return note.add(place, What::Gone);
   }
-  std::optional<StoredChunk> edited = edited_on_arrival(*grid, arrival, *content);
+  std::optional<StoredChunk> edited = edited_on_arrival(*grid, completed, *content);
   const bool is_near = is_near_anyone(place);
   if (!is_near && !edited) {
     ++totals.chunks_dropped;
-    note.let_go.push_back(std::move(arrival.chunk));
+    note.released.push_back(std::move(completed.chunk));
     return note.add(place, What::Gone);
   }
-  const std::size_t size = bytes_of(arrival.chunk);
-  content->grid.load_chunk(place.chunk, std::move(arrival.chunk.voxels));
-  if (arrival.chunk.densities) {
-    content->field.load_chunk(place.chunk, std::move(*arrival.chunk.densities));
+  const std::size_t size = bytes_of(completed.chunk);
+  content->grid.load_chunk(place.chunk, std::move(completed.chunk.voxels));
+  if (completed.chunk.densities) {
+    content->field.load_chunk(place.chunk, std::move(*completed.chunk.densities));
   } else {
     content->field.load_air_chunk(place.chunk);
   }
@@ -423,7 +425,7 @@ void StreamedWorld::Impl::put(Arrival arrival, ChunkStreamer::Note& note) {
   if (!is_near) must_plan = true;
 }
 
-void StreamedWorld::Impl::take_away(const ChunkPlace& place, ChunkStreamer::Note& note) {
+void StreamedWorld::Impl::take_away(const ChunkAddress& place, ChunkStreamer::Note& note) {
   Streamed* const grid = streamed(place.grid);
   SceneGrid* const content = grid == nullptr ? nullptr : content_of_grid(*grid);
   if (content == nullptr) return note.add(place, What::Gone);
@@ -433,7 +435,7 @@ void StreamedWorld::Impl::take_away(const ChunkPlace& place, ChunkStreamer::Note
   if (const DensityChunk* const densities = content->field.find_chunk(place.chunk)) last.densities = *densities;
   content->grid.unload_chunk(place.chunk);
   content->field.unload_chunk(place.chunk);
-  note.let_go.push_back(std::move(last));
+  note.released.push_back(std::move(last));
   note.add(place, What::Gone);
   const auto size = grid->sizes.find(place.chunk);
   QUOIN_ASSERT(size != grid->sizes.end(), "loaded chunks are counted");
@@ -448,19 +450,20 @@ void StreamedWorld::Impl::take_away(const ChunkPlace& place, ChunkStreamer::Note
 void StreamedWorld::Impl::move_chunks(double seconds, Clock::time_point start, ChunkStreamer::Note& note) {
   has_moved = false;
   const bool may_leave = !is_edited;
-  while (!arrivals.empty() || (may_leave && !leaving.empty())) {
+  while (!completed_loads.empty() || (may_leave && !leaving.empty())) {
     if (has_moved && seconds_since(start) >= seconds) break;
     has_moved = true;
     // Unloads chunks first to make room for arrivals.
     const bool is_over = budget.is_over();
-    if (may_leave && !leaving.empty() && (is_over || arrivals.empty() || leaving.size() >= arrivals.size())) {
+    if (may_leave && !leaving.empty() &&
+        (is_over || completed_loads.empty() || leaving.size() >= completed_loads.size())) {
       take_away(leaving.front(), note);
       leaving.pop_front();
-    } else if (!arrivals.empty()) {
-      arrived_bytes -= bytes_of(arrivals.front().chunk);
+    } else if (!completed_loads.empty()) {
+      arrived_bytes -= bytes_of(completed_loads.front().chunk);
       budget.set_arrived(arrived_bytes);
-      put(std::move(arrivals.front()), note);
-      arrivals.pop_front();
+      put(std::move(completed_loads.front()), note);
+      completed_loads.pop_front();
     } else {
       break;
     }
@@ -470,9 +473,9 @@ void StreamedWorld::Impl::move_chunks(double seconds, Clock::time_point start, C
 // Takes the chunks and plans from the workers since the last call.
 void StreamedWorld::Impl::take_in() {
   streamer.take(box);
-  for (Arrival& arrival : box.arrivals) {
-    arrived_bytes += bytes_of(arrival.chunk);
-    arrivals.push_back(std::move(arrival));
+  for (CompletedLoad& completed : box.completed_loads) {
+    arrived_bytes += bytes_of(completed.chunk);
+    completed_loads.push_back(std::move(completed));
   }
   budget.set_arrived(arrived_bytes);
   if (box.has_leaving) leaving.assign(box.leaving.begin(), box.leaving.end());
@@ -506,16 +509,16 @@ Status StreamedWorld::Impl::update(std::span<const Viewer> viewers, double secon
   const Clock::time_point start = Clock::now();
   Status outcome = plan(viewers);
   move_chunks(seconds, start, unposted);
-  tell_workers();
+  notify_workers();
   totals.longest_update_seconds = std::max(totals.longest_update_seconds, seconds_since(start));
   return outcome;
 }
 
-void StreamedWorld::Impl::tell_workers() {
-  wish(unposted);
+void StreamedWorld::Impl::notify_workers() {
+  request(unposted);
   if (has_moved) moved = Clock::now();
   // Workers bring no more than the caller takes.
-  streamer.set_room(arrivals.size() > kMaxArrivals ? 0 : budget.room(box.begun), budget.guess());
+  streamer.set_room(completed_loads.size() > kMaxCompletedLoads ? 0 : budget.room(box.begun), budget.guess());
   streamer.post(std::exchange(unposted, {}), !has_chunks_to_move());
 }
 
@@ -699,7 +702,7 @@ Status StreamedWorld::update(std::span<const Viewer> viewers) {
 
 Status StreamedWorld::plan(std::span<const Viewer> viewers) {
   Status outcome = impl_->plan(viewers);
-  impl_->tell_workers();
+  impl_->notify_workers();
   return outcome;
 }
 
@@ -757,7 +760,7 @@ Status StreamedWorld::flush() {
     }
     impl_->must_plan |= impl_->asked_left == 0;
     impl_->move_chunks(kAsLongAsItTakes, Clock::now(), impl_->unposted);
-    impl_->tell_workers();
+    impl_->notify_workers();
     if (!impl_->waits_for_broken_alone()) impl_->streamer.wait();
   }
   Status waits = impl_->waits_for_broken();

@@ -15,7 +15,7 @@
 
 #include <gtest/gtest.h>
 #include <quoin/live/live_meshes.h>
-#include <quoin/store/world_care.h>
+#include <quoin/store/world_maintenance.h>
 #include <quoin/terrain/terrain.h>
 
 #include "store/world/world_for_tests.h"

@@ -745,7 +745,7 @@ std::size_t OccupancyTree::bytes() const {
 }
 
 const OccupancyTree::Impl& OccupancyTree::impl() const {
-  return content_of(impl_);
+  return impl_of(impl_);
 }
 
 trace::TreeNodes::TreeNodes(const OccupancyTree& tree)

@@ -78,7 +78,7 @@ Status check_mesh(const TriangleMesh& mesh) {
   if (triangles > 0x7FFF'FFFFU) return make_error(ErrorCode::LimitExceeded, "2^31 triangles or more");
   const auto fits = [](std::size_t size, std::size_t wanted) { return size == 0 || size == wanted; };
   if (!fits(mesh.colours.size(), mesh.positions.size()) || !fits(mesh.material_of.size(), triangles) ||
-      !fits(mesh.texture_places.size(), 3 * triangles) || !fits(mesh.emissive_places.size(), 3 * triangles)) {
+      !fits(mesh.uvs.size(), 3 * triangles) || !fits(mesh.emissive_uvs.size(), 3 * triangles)) {
     return make_error(ErrorCode::InvalidArgument, "the mesh's array lengths do not match");
   }
   for (std::size_t i = 0; i < triangles; ++i) {

@@ -67,9 +67,9 @@ SurfaceColours::SurfaceColours(const Frame& frame) : frame_(&frame), materials_(
   }
   bool is_textured = false;
   for (MeshMaterial& material : materials_) {
-    if (mesh.texture_places.empty()) material.texture.reset();
-    if (material.emissive_texture && mesh.emissive_places.empty()) material.emission = 0.0F;
-    if (mesh.emissive_places.empty()) material.emissive_texture.reset();
+    if (mesh.uvs.empty()) material.texture.reset();
+    if (material.emissive_texture && mesh.emissive_uvs.empty()) material.emission = 0.0F;
+    if (mesh.emissive_uvs.empty()) material.emissive_texture.reset();
     is_textured |= material.texture.has_value() || material.emissive_texture.has_value();
     VoxelProperties type;
     type.name = material.name;
@@ -78,10 +78,10 @@ SurfaceColours::SurfaceColours(const Frame& frame) : frame_(&frame), materials_(
     type.emission = material.emission > 0.0F && std::isfinite(material.emission) ? material.emission : 0.0F;
     properties_.push_back(std::move(type));
   }
-  pictures_.resize(mesh.textures.size());
+  images_.resize(mesh.textures.size());
   for (const MeshMaterial& material : materials_) {
     for (const auto& texture : {material.texture, material.emissive_texture}) {
-      if (texture && pictures_[*texture].levels.empty()) make_halves(*texture);
+      if (texture && images_[*texture].levels.empty()) make_halves(*texture);
     }
   }
   for (std::size_t i = 0; i < materials_.size(); ++i) {
@@ -122,7 +122,7 @@ std::optional<std::uint32_t> SurfaceColours::deep_look() const {
 float SurfaceColours::emission_share(std::uint32_t triangle, DVec3 shares) const {
   const MeshMaterial& material = material_of(triangle);
   if (!material.emissive_texture) return 1.0F;
-  const glm::vec2* const places = frame_->mesh().emissive_places.data() + std::size_t{3} * triangle;
+  const glm::vec2* const places = frame_->mesh().emissive_uvs.data() + std::size_t{3} * triangle;
   const glm::vec3 glow =
       glm::vec3(colour_in(*material.emissive_texture, triangle, places, shares)) * material.emissive_tint;
   const float most = std::max({glow.r, glow.g, glow.b});
@@ -135,7 +135,7 @@ float SurfaceColours::emission_share(std::uint32_t triangle, DVec3 shares) const
 
 void SurfaceColours::make_halves(std::size_t texture) {
   const AlphaImage& image = frame_->mesh().textures[texture].image;
-  std::vector<Level>& levels = pictures_[texture].levels;
+  std::vector<Level>& levels = images_[texture].levels;
   levels.push_back({image.width, image.height, {}});
   while (levels.back().width > 1 || levels.back().height > 1) {
     const Level& finer = levels.back();
@@ -165,7 +165,7 @@ void SurfaceColours::make_halves(std::size_t texture) {
 
 /// Linear light times alpha, and alpha.
 glm::vec4 SurfaceColours::texel(std::size_t texture, std::size_t level, int x, int y) const {
-  const Level& of = pictures_[texture].levels[level];
+  const Level& of = images_[texture].levels[level];
   const std::size_t at =
       std::size_t{4} * (static_cast<std::size_t>(y) * static_cast<std::size_t>(of.width) + static_cast<std::size_t>(x));
   if (level > 0) {
@@ -179,7 +179,7 @@ glm::vec4 SurfaceColours::texel(std::size_t texture, std::size_t level, int x, i
 }
 
 glm::vec4 SurfaceColours::sample(std::size_t texture, std::size_t level, DVec3 place) const {
-  const Level& of = pictures_[texture].levels[level];
+  const Level& of = images_[texture].levels[level];
   const MeshTexture& how = frame_->mesh().textures[texture];
   const double u = sound_place(place.x) * of.width;
   const double v = sound_place(place.y) * of.height;
@@ -202,7 +202,7 @@ std::size_t SurfaceColours::level_of(std::uint32_t triangle, const glm::vec2* pl
   const double area = glm::length(glm::cross(corners[1] - corners[0], corners[2] - corners[0]));
   const glm::vec2 a = places[1] - places[0];
   const glm::vec2 b = places[2] - places[0];
-  const std::vector<Level>& levels = pictures_[texture].levels;
+  const std::vector<Level>& levels = images_[texture].levels;
   const double pixels = std::abs(double{a.x} * b.y - double{a.y} * b.x) * levels[0].width * levels[0].height;
   if (!(area > 0.0) || !(pixels > area)) return 0;
   const double level = std::floor(0.5 * std::log2(pixels / area) + 0.5);
@@ -228,7 +228,7 @@ glm::vec4 SurfaceColours::light(std::uint32_t triangle, DVec3 shares) const {
              mesh.colours[corner[2]] * static_cast<float>(shares.z);
   }
   if (material.texture) {
-    light *= colour_in(*material.texture, triangle, mesh.texture_places.data() + std::size_t{3} * triangle, shares);
+    light *= colour_in(*material.texture, triangle, mesh.uvs.data() + std::size_t{3} * triangle, shares);
   }
   return light;
 }

@@ -47,7 +47,7 @@ class SurfaceColours {
     int height = 0;
     std::vector<std::uint16_t> pixels;  // linear light times alpha, and alpha, of 65,535; of the first level none
   };
-  struct Pictures {
+  struct Images {
     std::vector<Level> levels;
   };
 
@@ -75,7 +75,7 @@ class SurfaceColours {
   std::vector<MeshMaterial> materials_;
   std::vector<VoxelProperties> properties_;
   std::vector<std::uint32_t> first_steps_;  ///< of materials: the look with no emission, of those with a texture of it
-  std::vector<Pictures> pictures_;
+  std::vector<Images> images_;
   Rgba8 mean_;
   float mean_emission_ = 1.0F;  ///< share, by area
   bool is_plain_ = false;

@@ -15,7 +15,7 @@ TriangleMesh square() {
   constexpr double kHeight = 0.4;
   mesh.positions = {{0, kHeight, 0}, {0, kHeight, kSide}, {kSide, kHeight, kSide}, {kSide, kHeight, 0}};
   shapes::add_quad(mesh, 0, 1, 2, 3);
-  mesh.texture_places = {{0, 0}, {0, 1}, {1, 1}, {0, 0}, {1, 1}, {1, 0}};
+  mesh.uvs = {{0, 0}, {0, 1}, {1, 1}, {0, 0}, {1, 1}, {1, 0}};
   mesh.materials.emplace_back();
   mesh.materials[0].texture = 0;
   return mesh;
@@ -104,7 +104,7 @@ TEST(SurfaceColours, CoarseTexturesBlendOrStaySharp) {
 
 TEST(SurfaceColours, FollowTheWrapModeBeyondATexture) {
   TriangleMesh mesh = square();
-  for (glm::vec2& place : mesh.texture_places) place.x = 4.0F * place.x - 1.0F;
+  for (glm::vec2& place : mesh.uvs) place.x = 4.0F * place.x - 1.0F;
   mesh.textures.push_back(texture(2, [](int x, int) { return Rgba8{static_cast<std::uint8_t>(x * 255), 0, 0, 255}; }));
   mesh.textures[0].is_smooth = false;
   const auto row = [&](TextureWrap wrap) {

@@ -12,7 +12,7 @@
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/grid.h>
 
-#include "core/lender.h"
+#include "core/object_pool.h"
 #include "core/progress_steps.h"
 #include "grid/looks.h"
 #include "voxelize/crossings.h"
@@ -200,7 +200,7 @@ template <class Find>
 Result<AllFound> find_all(const Frame& frame, Threads threads, const Progress& progress, const Find& find) {
   AllFound found(frame.chunk_count());
   ProgressSteps steps(progress, found.size());
-  Lender<Scratch> scratches;
+  ObjectPool<Scratch> scratches;
   parallel_for(found.size(), threads, [&](std::size_t i) {
     if (steps.cancelled()) return;
     scratches.with([&](Scratch& scratch) {
@@ -370,15 +370,15 @@ Result<VoxelizedMesh> voxelize(const TriangleMesh& mesh, const VoxelizeOptions& 
   return made;
 }
 
-Result<FieldOfMesh> distance_field(const TriangleMesh& mesh, const DistanceFieldOptions& options, VoxelRegistry& types,
-                                   Threads threads, const Progress& progress) {
+Result<MeshDistanceField> distance_field(const TriangleMesh& mesh, const DistanceFieldOptions& options,
+                                         VoxelRegistry& types, Threads threads, const Progress& progress) {
   if (options.solid == SolidVoxels::None) {
     return make_error(ErrorCode::InvalidArgument, "a distance field needs a rule for solid voxels");
   }
   if (!(options.band > 0.0F && options.band <= kMostBand)) {
     return make_error(ErrorCode::InvalidArgument, "band: must be more than 0 and at most 64");
   }
-  FieldOfMesh made{DensityGrid(options.band), {}};
+  MeshDistanceField made{DensityGrid(options.band), {}};
   DistanceFieldOptions own = options;
   own.band = made.field.band();
   auto parts =

@@ -33,8 +33,8 @@ picture() {
   mv world-1.png "$1"
 }
 # Saves images as NAME until one equals LIKE. Presses the key again in between, since on a busy machine earlier key
-# presses may be delayed. Usage: picture_becomes NAME LIKE [KEY]
-picture_becomes() {
+# presses may be delayed. Usage: image_becomes NAME LIKE [KEY]
+image_becomes() {
   local tries
   for tries in 1 2 3 4 5 6 7 8; do
     picture "$1"
@@ -89,7 +89,7 @@ xdotool keydown w; sleep 0.5; xdotool keyup w; sleep 0.7
 picture flown.png
 ! cmp -s opened.png flown.png || fail "W does not move the camera"
 xdotool key --delay 80 Home
-picture_becomes home.png opened.png Home || fail "Home does not come back to the first view"
+image_becomes home.png opened.png Home || fail "Home does not come back to the first view"
 
 echo "orbit"
 xdotool mousemove 180 220
@@ -101,7 +101,7 @@ xdotool mousemove 180 220
 sleep 0.5
 
 echo "the image shows the view at the time of the request"
-picture_becomes before.png home.png Home || fail "Home does not come back"
+image_becomes before.png home.png Home || fail "Home does not come back"
 xdotool key --delay 1 F12 shift+5
 until_true 120 test -s world-1.png || fail "F12 gives no picture (before another view)"
 mv world-1.png pressed.png
@@ -117,9 +117,9 @@ picture edited.png
 ! cmp -s home.png edited.png || fail "the edit is not seen"
 xdotool key --delay 80 ctrl+z
 until_true 20 title_is "world.vox - Quoin" || fail "undo does not bring back the saved state"
-picture_becomes undone.png home.png || fail "undo does not bring back the picture"
+image_becomes undone.png home.png || fail "undo does not bring back the picture"
 xdotool key --delay 80 ctrl+y
-picture_becomes redone.png edited.png || fail "redo does not bring back the edit"
+image_becomes redone.png edited.png || fail "redo does not bring back the edit"
 
 xdotool key --delay 80 ctrl+z
 until_true 20 title_is "world.vox - Quoin" || fail "undo does not bring back the saved state again"
@@ -137,7 +137,7 @@ if "$quoin" render castle.vox --size 32x32 --backend vulkan -o probe.png >/dev/n
   picture blocks_edited.png
   ! cmp -s blocks.png blocks_edited.png || fail "the meshes do not follow the edit"
   xdotool key --delay 80 ctrl+z
-  picture_becomes blocks_undone.png blocks.png || fail "the meshes do not follow the undo"
+  image_becomes blocks_undone.png blocks.png || fail "the meshes do not follow the undo"
   if [ "$backend" = vulkan ] && [ -z "${QUOIN_NIGHTLY:-}" ]; then
     # A software device would take minutes for the rest, which the run of the other backend also covers.
     until_true 20 title_is "world.vox - Quoin" || fail "undo among meshes does not bring back the saved state"
@@ -153,13 +153,13 @@ if "$quoin" render castle.vox --size 32x32 --backend vulkan -o probe.png >/dev/n
     mv next.png blocks.png
   done
   xdotool key --delay 80 F8 F8 F9 F9 F9 F9 F5
-  picture_becomes rays.png home.png F5 || fail "F5 does not bring back the rays"
+  image_becomes rays.png home.png F5 || fail "F5 does not bring back the rays"
   xdotool key --delay 80 F3
   sleep 2
   picture paths.png
   ! cmp -s home.png paths.png || fail "F3 does not draw paths of light"
   xdotool key --delay 80 F5
-  picture_becomes rays.png home.png F5 || fail "F5 does not end the paths"
+  image_becomes rays.png home.png F5 || fail "F5 does not end the paths"
 fi
 
 echo "choose a colour in the panel, paint"

@@ -121,7 +121,7 @@ void Game::place_player() {
     const auto kept = world_->value("player");
     if (kept && *kept && (*kept)->size() == sizeof(DVec3)) std::memcpy(&player_.centre, (*kept)->data(), sizeof(DVec3));
   }
-  if (const auto away = displacement_to_free_place(*tracer_, player_, 16.0)) player_.centre += *away;
+  if (const auto away = depenetration(*tracer_, player_, 16.0)) player_.centre += *away;
 }
 
 double Game::random(double low, double high) {
@@ -241,7 +241,7 @@ void Game::fly() {
 void Game::walk(const Input& input) {
   // The floor under the player may have moved meanwhile.
   const quoin::Instance* floor = moved_.is_on_floor ? scene_.instances().find(moved_.floor.instance) : nullptr;
-  if (floor != nullptr) player_.centre = carried_point(floor_, *floor, player_.centre);
+  if (floor != nullptr) player_.centre = transformed_point(floor_, *floor, player_.centre);
   falling_ -= kUp * (9.81 * 2.0 * kFrame);
   if (input.jumps && moved_.is_on_floor) falling_ = kUp * 8.0;
   const DVec3 ahead(-std::sin(input.yaw), 0.0, -std::cos(input.yaw));

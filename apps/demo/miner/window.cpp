@@ -12,7 +12,7 @@ namespace miner {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-using Draw = std::function<quoin::Result<quoin::Picture>(const quoin::Camera&, const quoin::RenderOptions&)>;
+using Draw = std::function<quoin::Result<quoin::RenderedImage>(const quoin::Camera&, const quoin::RenderOptions&)>;
 
 // Renders with a graphics card or the processor.
 quoin::Result<Draw> drawn_by(Game& game, const std::string& name) {
@@ -38,10 +38,10 @@ quoin::Result<Draw> drawn_by(Game& game, const std::string& name) {
 
 void show(SDL_Window* window, quoin::Image& image) {
   SDL_Surface* const screen = SDL_GetWindowSurface(window);
-  SDL_Surface* const picture = SDL_CreateRGBSurfaceWithFormatFrom(image.rgb.data(), image.width, image.height, 24,
-                                                                  3 * image.width, SDL_PIXELFORMAT_RGB24);
-  SDL_BlitScaled(picture, nullptr, screen, nullptr);
-  SDL_FreeSurface(picture);
+  SDL_Surface* const rendered = SDL_CreateRGBSurfaceWithFormatFrom(image.rgb.data(), image.width, image.height, 24,
+                                                                   3 * image.width, SDL_PIXELFORMAT_RGB24);
+  SDL_BlitScaled(rendered, nullptr, screen, nullptr);
+  SDL_FreeSurface(rendered);
   const SDL_Rect cross{screen->w / 2 - 2, screen->h / 2 - 2, 5, 5};
   SDL_FillRect(screen, &cross, ~Uint32{0});
   SDL_UpdateWindowSurface(window);
@@ -101,11 +101,11 @@ quoin::Status play_in_window(Game& game, const std::string& device) {
     options.width = std::max(options.width / coarse, 1);
     options.height = std::max(options.height / coarse, 1);
     const auto began = Clock::now();
-    auto picture = (*draw)(game.camera(), options);
-    if (!picture) return picture.error();
+    auto image = (*draw)(game.camera(), options);
+    if (!image) return image.error();
     const auto took = Clock::now() - began;
     coarse = std::clamp(coarse + int(took > 4 * step) - int(took < step), 1, 8);
-    show(window, picture->colour);
+    show(window, image->colour);
     SDL_SetWindowTitle(window, game.status().c_str());
   }
   SDL_Quit();

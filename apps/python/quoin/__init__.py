@@ -70,11 +70,11 @@ def png(picture: NdArray) -> bytes:
     """
     if not isinstance(picture, _np.ndarray):
         raise TypeError("the image must be a NumPy array")
-    if picture.dtype != _np.uint8 or picture.ndim != 3 or picture.shape[2] not in (3, 4) or not picture.size:
+    if rendered.dtype != _np.uint8 or rendered.ndim != 3 or rendered.shape[2] not in (3, 4) or not rendered.size:
         raise ValueError("the image must be uint8, (height, width, 3) or (height, width, 4)")
-    height, width, channels = picture.shape
+    height, width, channels = rendered.shape
     rows = _np.zeros((height, 1 + width * channels), _np.uint8)  # each row starts with its filter type, 0
-    rows[:, 1:] = picture.reshape(height, -1)
+    rows[:, 1:] = rendered.reshape(height, -1)
 
     def chunk(name: bytes, data: bytes) -> bytes:
         return _struct.pack(">I", len(data)) + name + data + _struct.pack(">I", _zlib.crc32(name + data))
@@ -112,5 +112,5 @@ def _leave(mine: _c.Listener) -> None:
     was_last = _c.listeners.all[-1] is mine
     _c.listeners.all.remove(mine)
     if was_last:
-        former = _c.listeners.all[-1].function if _c.listeners.all else _c.NOBODY
+        former = _c.listeners.all[-1].function if _c.listeners.all else _c.NO_PROGRESS
         _c.lib.quoin_set_progress(former, None)

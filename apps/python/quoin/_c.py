@@ -148,7 +148,7 @@ class Sun(ctypes.Structure):
 
 
 Progress = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_double, ctypes.c_void_p)
-NOBODY = ctypes.cast(0, Progress)
+NO_PROGRESS = ctypes.cast(0, Progress)
 
 _handle, _p, _n, _i = ctypes.c_uint64, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int32
 _SIGNATURES = {
@@ -214,9 +214,9 @@ class Listener:
         self._listener = listener
         self._raised: List[BaseException] = []
         self.is_over = False
-        self.function = Progress(self._tell)
+        self.function = Progress(self._report)
 
-    def _tell(self, fraction: float, _: Any) -> int:
+    def _report(self, fraction: float, _: Any) -> int:
         if self._raised:  # already cancelled
             return 0
         if self.is_over:

@@ -25,7 +25,7 @@
 #include "output_files.h"
 #include "parse.h"
 #include "progress_bar.h"
-#include "render/small_picture.h"
+#include "render/small_image.h"
 #include "scene_content.h"
 #include "shell/help.h"
 #include "standard_streams.h"
@@ -89,14 +89,14 @@ Status convert_blockily(const Scene& scene, const SceneAnimation& animation, con
 
 /// From .vox to .vox all content is kept, so the warnings of the reader do not apply. With --frame only that frame is
 /// written, and the warnings name the content that is left out.
-void keep_what_is_asked_for(const ConvertOptions& options, const FormatInfo& format, LoadedScene& loaded,
-                            std::vector<std::string>& warnings) {
+void prune_unrequested(const ConvertOptions& options, const FormatInfo& format, LoadedScene& loaded,
+                       std::vector<std::string>& warnings) {
   if (loaded.source == nullptr || format.format != FileFormat::Vox) return;
   if (!options.common.takes_frame) {
     warnings.clear();
     return;
   }
-  for (const std::string& line : only_in_source(*loaded.source)) {
+  for (const std::string& line : source_only_features(*loaded.source)) {
     warnings.push_back("left out because of --frame: " + line);
   }
   loaded.source = nullptr;
@@ -154,10 +154,10 @@ Status convert_to_meshes(const LoadedScene& loaded, const ConvertOptions& option
 }
 
 /// Returns an error message if an option needs the smooth mesher, else "".
-std::string fault_of_blocks(const ConvertOptions& options) {
+std::string find_blocks_error(const ConvertOptions& options) {
   if (options.has_field_occlusion) return "--ao-form, --ao-spread, --ao-offset and --ao-power need --mesher smooth";
   if (options.simplify) return "--simplify needs --mesher smooth";
-  const bool is_of_smooth = options.smoothness || options.colours || options.apart;
+  const bool is_of_smooth = options.smoothness || options.colours || options.separate_models;
   return is_of_smooth ? "--smoothness, --colours and --no-unite need --mesher smooth" : "";
 }
 
@@ -216,7 +216,7 @@ void fit_voxels(const ConvertOptions& options, const FormatInfo& format, bool is
   if (is_scan && only_voxels) turn_by_quarters(loaded.scene, warnings);
   const bool keeps_scale = format.format == FileFormat::Scene || format.format == FileFormat::World;
   const bool may_have_size = format_is_mesh(loaded.format) ? !keeps_scale : is_scan && only_voxels;
-  if (may_have_size) stand_at_unit_size(loaded.scene, format, warnings);
+  if (may_have_size) normalise_scale(loaded.scene, format, warnings);
 }
 
 Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& format, bool is_volume,
@@ -241,12 +241,12 @@ Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& f
     if (options.voxel_mm) settled.scale = scale_for_voxels(loaded->scene, *options.voxel_mm);
     if (settled.light && loaded->sun) settled.light->sun = *loaded->sun;
     settled.cameras = loaded->cameras;
-    fault = settled.mesher == "smooth" ? "" : fault_of_blocks(settled);
+    fault = settled.mesher == "smooth" ? "" : find_blocks_error(settled);
     if (!fault.empty()) return make_error(ErrorCode::InvalidArgument, fault, options.common.input.string());
     if (auto done = convert_to_meshes(*loaded, settled, watch, outcome); !done) return done.error();
     return outcome;
   }
-  keep_what_is_asked_for(options, format, *loaded, outcome.warnings);
+  prune_unrequested(options, format, *loaded, outcome.warnings);
   fit_voxels(options, format, is_volume, *loaded, outcome.warnings);
   outcome.content = {loaded->scene.voxel_count(), solid_samples(loaded->scene)};
   outcome.files = {options.output};
@@ -333,7 +333,7 @@ std::string outcome_text(const Outcome& outcome) {
 }
 
 /// Returns an error message if another option contradicts --texture atlas, else "".
-std::string fault_of_atlas(const ConvertOptions& options) {
+std::string find_atlas_error(const ConvertOptions& options) {
   if (options.texture != "atlas") return "";
   const std::string reason = ": the atlas holds the occlusion of merged faces";
   const std::string refused = "cannot use --texture atlas with ";
@@ -341,12 +341,12 @@ std::string fault_of_atlas(const ConvertOptions& options) {
     return refused + "--mesher " + options.mesher + reason;
   }
   if (options.occlusion_off) return refused + "--no-ao" + reason;
-  if (options.occlusion_apart) return refused + "--ao-attribute" + reason;
+  if (options.ao_as_attribute) return refused + "--ao-attribute" + reason;
   return options.watertight ? refused + "--watertight" + reason : "";
 }
 
 /// Returns an error message if another option contradicts light at vertices, else "".
-std::string fault_of_light(const ConvertOptions& options) {
+std::string find_light_error(const ConvertOptions& options) {
   if (!options.light) return "";
   const std::string reason = ": light is stored at the corners of faces";
   const std::string refused = "cannot use --light propagated with ";
@@ -365,12 +365,12 @@ bool is_surely_blocks(const ConvertOptions& options, bool is_volume) {
 }
 
 /// Returns an error message if an option does not fit the kind of input, else "".
-std::string fault_of_usage(const ConvertOptions& options, bool is_volume) {
+std::string find_usage_error(const ConvertOptions& options, bool is_volume) {
   if (options.simplify && !can_simplify()) {
     return "cannot use --simplify: this build has no meshoptimizer (libmeshoptimizer-dev in Debian)";
   }
   if (options.mesh_only && is_surely_blocks(options, is_volume)) {
-    if (std::string fault = fault_of_blocks(options); !fault.empty()) return fault;
+    if (std::string fault = find_blocks_error(options); !fault.empty()) return fault;
   }
   if (is_volume && !options.mesher.empty() && options.mesher != "smooth") {
     return "cannot use --mesher " + options.mesher + ": the input is a volume; use --mesher smooth";
@@ -378,7 +378,7 @@ std::string fault_of_usage(const ConvertOptions& options, bool is_volume) {
   if (is_volume && options.light) return "cannot use --light: the input is a volume, not voxels or a field";
   if (is_volume && options.texture == "atlas") return "cannot use --texture atlas: the input is a volume, not voxels";
   if (is_volume && options.animate) return "cannot use --animate: the input is a volume, not a .vox file";
-  if (is_volume && (options.smoothness || options.colours || options.apart)) {
+  if (is_volume && (options.smoothness || options.colours || options.separate_models)) {
     return "cannot use --smoothness, --colours or --no-unite: the input is a volume, not voxels";
   }
   const LoadOptions& load = options.common.load;
@@ -389,7 +389,7 @@ std::string fault_of_usage(const ConvertOptions& options, bool is_volume) {
 }
 
 /// Returns an error message if an option needs triangles and the input has none, else "".
-std::string fault_of_mesh_input(const ConvertOptions& options, const FormatInfo& to) {
+std::string find_mesh_input_error(const ConvertOptions& options, const FormatInfo& to) {
   if (options.mesh_input.empty()) return "";
   const auto format = detect_format(options.common.input);
   // An unrecognized file may be a triangle mesh. The reader reports why it is not recognized.
@@ -460,12 +460,12 @@ WatchedWork run_one(ConvertOptions& options, const ManyOptions& many) {
   };
   options.is_from_stream = options.common.input == kStandardStream;
   if (is_to_stream || options.is_from_stream) catch_interrupts();
-  const auto fault_of_streams = open_streams(options, many, streams);
-  if (!fault_of_streams) return failed(fault_of_streams.error());
+  const auto find_streams_error = open_streams(options, many, streams);
+  if (!find_streams_error) return failed(find_streams_error.error());
   const auto format = format_for_writing(options.output);
-  std::string fault = !fault_of_streams->empty() ? *fault_of_streams
-                      : !format                  ? to_string(format.error())
-                                                 : fault_of_format(options, *format);
+  std::string fault = !find_streams_error->empty() ? *find_streams_error
+                      : !format                    ? to_string(format.error())
+                                                   : find_format_error(options, *format);
   if (!fault.empty()) return misused(fault);
   options.inputs = FileSet({&options.common.input, 1});
   const auto outcome = convert_file(options, *format, fault);
@@ -480,7 +480,7 @@ WatchedWork run_one(ConvertOptions& options, const ManyOptions& many) {
 }
 
 /// Returns an error message if another option contradicts --watch, else "".
-std::string fault_of_watching(const ConvertOptions& options, const ManyOptions& many) {
+std::string find_watching_error(const ConvertOptions& options, const ManyOptions& many) {
   if (!options.watch) return "";
   if (options.common.json) return "--watch and --json cannot be used together";
   if (options.common.input == kStandardStream || options.output == kStandardStream) {
@@ -531,10 +531,11 @@ void add_meshing_options(CLI::App& command, ConvertOptions& options) {
   command.add_flag("--no-ao", options.occlusion_off, "Write no ambient occlusion");
   command.add_flag("--watertight", options.watertight,
                    "Write no T-junctions: edges end at the corners of their neighbours. Smooth meshes never have them");
-  command.add_flag("--no-unite", options.apart, "Mesh touching models separately instead of as one body (smooth only)");
+  command.add_flag("--no-unite", options.separate_models,
+                   "Mesh touching models separately instead of as one body (smooth only)");
   set_heading(command, heading::kOcclusion);
   command.add_flag(
-      "--ao-attribute", options.occlusion_apart,
+      "--ao-attribute", options.ao_as_attribute,
       "Write occlusion as a vertex attribute, 1 (open) to 0 (dark), not in the colours: _AO in glTF, ao in "
       "PLY");
   add_field_occlusion_options(command);
@@ -564,12 +565,12 @@ void add_mesh_file_options(CLI::App& command, ConvertOptions& options) {
 /// Reads the options of smooth occlusion. Returns a usage error, or "".
 std::string read_occlusion(const CLI::App& command, ConvertOptions& options) {
   if (options.occlusion_off) {
-    const char* const given = options.occlusion_apart ? "--ao-attribute" : given_field_occlusion(command);
+    const char* const given = options.ao_as_attribute ? "--ao-attribute" : given_field_occlusion(command);
     if (given != nullptr) return std::string(given) + " and --no-ao cannot be used together";
   }
   std::string fault = read_field_occlusion(command, options.field_occlusion);
   const bool has_none = options.has_field_occlusion && options.field_occlusion.method == SmoothOcclusion::None;
-  if (fault.empty() && has_none && options.occlusion_apart)
+  if (fault.empty() && has_none && options.ao_as_attribute)
     fault = "--ao-attribute and --ao-form none cannot be used together";
   return fault;
 }
@@ -643,13 +644,13 @@ Json outcome_json(const Outcome& outcome) {
       {"warnings", outcome.warnings}};
 }
 
-std::string fault_of_format(const ConvertOptions& options, const FormatInfo& format) {
+std::string find_format_error(const ConvertOptions& options, const FormatInfo& format) {
   if (!format.is_mesh && options.mesh_only) {
     return "--mesher, --no-ao, --ao-..., --watertight, --smoothness, --colours, --no-unite, --simplify, "
            "--scale, --up, --texture, --light, --lights, --animate, --compress and --quantize need a mesh format; " +
            (options.output.empty() ? std::string(format.extension) : options.output.string()) + " is not one";
   }
-  if (options.occlusion_apart && format.format == FileFormat::Obj) {
+  if (options.ao_as_attribute && format.format == FileFormat::Obj) {
     return "cannot write --ao-attribute to .obj; use .glb, .gltf or .ply";
   }
   if (options.texture == "atlas" && format.format == FileFormat::Ply) {
@@ -658,8 +659,8 @@ std::string fault_of_format(const ConvertOptions& options, const FormatInfo& for
   if (options.voxel_mm && !is_for_printing(format.format))
     return "--voxel-mm needs .stl or .3mf; use --scale for other formats";
   if (options.voxel_mm && options.scale) return "--voxel-mm and --scale cannot be used together";
-  if (is_for_printing(format.format) && (options.texture == "atlas" || options.occlusion_apart)) {
-    return std::string("cannot write ") + (options.occlusion_apart ? "--ao-attribute" : "--texture atlas") + " to " +
+  if (is_for_printing(format.format) && (options.texture == "atlas" || options.ao_as_attribute)) {
+    return std::string("cannot write ") + (options.ao_as_attribute ? "--ao-attribute" : "--texture atlas") + " to " +
            std::string(format.extension) + "; use .glb or .gltf";
   }
   const bool is_gltf = format.format == FileFormat::Glb || format.format == FileFormat::Gltf;
@@ -686,8 +687,8 @@ Result<Outcome> convert_file(const ConvertOptions& options, const FormatInfo& fo
   if (Status sound = check_dimension(options.common.input, options.common.load); !sound) return sound.error();
   const auto is_volume = holds_volume(options.common);
   if (!is_volume) return is_volume.error();
-  fault = fault_of_usage(options, *is_volume);
-  if (fault.empty() && !options.is_one_of_many) fault = fault_of_mesh_input(options, format);
+  fault = find_usage_error(options, *is_volume);
+  if (fault.empty() && !options.is_one_of_many) fault = find_mesh_input_error(options, format);
   if (!fault.empty()) return make_error(ErrorCode::InvalidArgument, fault, options.common.input.string());
   if (auto kept = check_replaced(options.output, options.inputs, options.force); !kept) return kept.error();
   if (options.is_one_of_many) {
@@ -723,7 +724,7 @@ namespace {
 
 MeshFileOptions mesh_file_options(const ConvertOptions& options, FileFormat format) {
   MeshFileOptions file;
-  if (options.occlusion_apart) file.occlusion_in = OcclusionIn::Attribute;
+  if (options.ao_as_attribute) file.occlusion_in = OcclusionIn::Attribute;
   file.compress = options.compress;
   file.quantize = options.quantize;
   if (options.scale) file.scale = *options.scale;
@@ -848,13 +849,13 @@ std::string read_options(const CLI::App& command, const VolumeTexts& texts, cons
   if (command.count("--light") > 0 && command.get_option("--light")->as<std::string>() == "propagated") {
     options.light = natural_light();
   }
-  if (fault.empty()) fault = fault_of_atlas(options);
-  if (fault.empty()) fault = fault_of_light(options);
+  if (fault.empty()) fault = find_atlas_error(options);
+  if (fault.empty()) fault = find_light_error(options);
   if (fault.empty() && command.count("--fps") > 0 && !options.animate) fault = "--fps needs --animate";
   if (fault.empty() && options.animate && options.common.takes_frame)
     fault = "--frame and --animate cannot be used together";
   if (fault.empty()) fault = read_files(rest, options, many);
-  if (fault.empty()) fault = fault_of_watching(options, many);
+  if (fault.empty()) fault = find_watching_error(options, many);
   return fault;
 }
 

@@ -34,7 +34,7 @@ struct ConvertOptions {
   bool is_one_of_many = false;  ///< shows no progress bar
   std::string mesher;           ///< empty: greedy for voxels, smooth for volumes and fields
   bool occlusion_off = false;
-  bool occlusion_apart = false;  ///< writes occlusion as an attribute, not in the colours
+  bool ao_as_attribute = false;  ///< writes occlusion as an attribute, not in the colours
   SmoothOcclusionOptions field_occlusion;
   bool has_field_occlusion = false;  ///< an option of `field_occlusion` was given
   bool watertight = false;
@@ -46,7 +46,7 @@ struct ConvertOptions {
   std::optional<LightOptions> light;  ///< propagated light, stored at vertices
   bool animate = false;               ///< writes all frames as a glTF animation
   double frames_per_second = 10.0;    ///< for `animate`
-  bool apart = false;                 ///< meshes touching instances separately
+  bool separate_models = false;       ///< meshes touching instances separately
   std::optional<double> scale;
   std::optional<double> voxel_mm;     ///< millimetres per voxel in .stl and .3mf
   std::string up;                     ///< "y", "z"; empty: z for .ply, .stl and .3mf, else y
@@ -98,7 +98,7 @@ void turn_by_quarters(Scene& scene, std::vector<std::string>& warnings);
 
 /// Makes voxels one unit long, for formats whose voxels have no size. The first instance moves to the origin, the
 /// others stay where they are relative to it.
-void stand_at_unit_size(Scene& scene, const FormatInfo& format, std::vector<std::string>& warnings);
+void normalise_scale(Scene& scene, const FormatInfo& format, std::vector<std::string>& warnings);
 
 /// Adds lamps and cameras if `options.lights` is set, else warns of lamps that are left out.
 void add_lights(const Scene& scene, const ConvertOptions& options, SceneMeshes& meshes,
@@ -110,7 +110,7 @@ void add_lights(const Scene& scene, const ConvertOptions& options, SceneMeshes& 
 }
 
 /// Returns an error message if the options do not fit the output format, else "".
-[[nodiscard]] std::string fault_of_format(const ConvertOptions& options, const FormatInfo& format);
+[[nodiscard]] std::string find_format_error(const ConvertOptions& options, const FormatInfo& format);
 
 [[nodiscard]] Json outcome_json(const Outcome& outcome);
 

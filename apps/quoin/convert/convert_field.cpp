@@ -100,7 +100,7 @@ void turn_by_quarters(Scene& scene, std::vector<std::string>& warnings) {
                      " degrees to the nearest quarter turns: voxel formats have no other rotations");
 }
 
-void stand_at_unit_size(Scene& scene, const FormatInfo& format, std::vector<std::string>& warnings) {
+void normalise_scale(Scene& scene, const FormatInfo& format, std::vector<std::string>& warnings) {
   const std::vector<InstanceHandle> handles = scene.instances().handles();
   if (handles.empty()) return;
   const Instance first = scene.instances()[handles.front()];

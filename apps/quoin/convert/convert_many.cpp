@@ -77,8 +77,8 @@ Result<std::vector<fs::path>> files_below(const fs::path& folder, const std::opt
 /// Returns one task per input file. Adds inputs that cannot be listed to `errors`.
 std::vector<Task> plan(const ManyOptions& many, const std::string& extension, std::vector<Error>& errors) {
   std::vector<Task> tasks;
-  const auto add = [&](const fs::path& input, const fs::path& beside, const fs::path& below) {
-    const fs::path folder = !many.folder ? beside : below == "." ? *many.folder : *many.folder / below;
+  const auto add = [&](const fs::path& input, const fs::path& adjacent, const fs::path& below) {
+    const fs::path folder = !many.folder ? adjacent : below == "." ? *many.folder : *many.folder / below;
     tasks.push_back({input, folder / (stem_of_file(input) + extension), {}, {}});
   };
   for (const fs::path& input : many.inputs) {
@@ -115,7 +115,7 @@ fs::path real_name(const fs::path& file) {
 }
 
 /// Returns an error message if two inputs have the same output, else "". Merges tasks with the same input.
-std::string fault_of_plan(std::vector<Task>& tasks) {
+std::string find_plan_error(std::vector<Task>& tasks) {
   std::map<fs::path, fs::path> made;
   std::vector<Task> kept;
   for (Task& task : tasks) {
@@ -268,12 +268,12 @@ WatchedWork run_many(const ConvertOptions& options, const ManyOptions& many, Con
   const std::string extension = (many.to.starts_with('.') ? "" : ".") + many.to;
   const auto format = format_for_writing("file" + extension);
   if (!format) return misused("--to: " + format.error().message + ", not \"" + many.to + "\"");
-  if (const std::string fault = fault_of_format(options, *format); !fault.empty()) return misused(fault);
+  if (const std::string fault = find_format_error(options, *format); !fault.empty()) return misused(fault);
   catch_interrupts();
   Stopwatch watch;
   std::vector<Error> errors;
   std::vector<Task> tasks = plan(many, extension, errors);
-  if (const std::string fault = fault_of_plan(tasks); !fault.empty()) return misused(fault);
+  if (const std::string fault = find_plan_error(tasks); !fault.empty()) return misused(fault);
   ConvertOptions wanted = options;
   wanted.inputs = inputs_of(tasks);
   const bool is_again = !done.empty();

@@ -34,7 +34,7 @@ SmoothSceneOptions scene_options(const ConvertOptions& options) {
   wanted.mesh.occlusion = mesh_options(options).occlusion;
   if (options.smoothness) wanted.mesh.smoothness = static_cast<float>(*options.smoothness);
   if (options.colours == "blended") wanted.mesh.colours = SurfaceColours::Blended;
-  wanted.unite = !options.apart && !options.animate;
+  wanted.unite = !options.separate_models && !options.animate;
   wanted.simplify_error = simplify_error(options);
   wanted.instances = options.common.instances();
   return wanted;

@@ -1,6 +1,6 @@
 #include <algorithm>
 
-#include <quoin/store/world_care.h>
+#include <quoin/store/world_maintenance.h>
 #include <quoin/store/world_meshes.h>
 #include <quoin/store/world_saver.h>
 #include <quoin/store/world_store.h>
@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t kMaxLines = 20;
 
-void tell_lost(const std::vector<std::string>& lines, std::vector<std::string>& warnings) {
+void report_lost(const std::vector<std::string>& lines, std::vector<std::string>& warnings) {
   for (std::size_t i = 0; i < std::min(lines.size(), kMaxLines); ++i) warnings.push_back(lines[i]);
   if (lines.size() > kMaxLines) {
     warnings.push_back("and " + std::to_string(lines.size() - kMaxLines) + " more; run quoin world check for all");
@@ -51,7 +51,7 @@ Result<Outcome> copy_world_file(const ConvertOptions& options) {
   outcome.bytes = copied->bytes;
   std::vector<std::string> lines;
   for (const WorldDamage& lost : copied->lost) lines.push_back("left out: " + lost.what);
-  tell_lost(lines, outcome.warnings);
+  report_lost(lines, outcome.warnings);
   outcome.seconds.write = watch.lap();
   if (Status counted = count_faces_of_output(options, outcome); !counted) return counted.error();
   return outcome;
@@ -62,7 +62,8 @@ bool meshes_by_chunks(const ConvertOptions& options) {
   const auto format = format_for_writing(options.output);
   const bool is_print = format && is_for_printing(format->format);
   return is_blocky && !is_print && options.texture == "palette" && !options.light && !options.animate &&
-         !options.has_field_occlusion && !options.simplify && !options.smoothness && !options.colours && !options.apart;
+         !options.has_field_occlusion && !options.simplify && !options.smoothness && !options.colours &&
+         !options.separate_models;
 }
 
 Result<std::optional<Outcome>> mesh_world_file(const ConvertOptions& options) {
@@ -89,7 +90,7 @@ Result<std::optional<Outcome>> mesh_world_file(const ConvertOptions& options) {
   outcome.content.voxels = made->voxels;
   outcome.faces = {made->meshes.stats.faces_visible, made->meshes.stats.faces_total};
   outcome.seconds.mesh = watch.lap();
-  tell_lost(made->broken, outcome.warnings);
+  report_lost(made->broken, outcome.warnings);
   warn_of_values(values->size(), outcome.warnings);
   const Scene& scene = loaded->loaded.scene;
   warn_of_left_out(scene, wanted.scene.instances, outcome.warnings);

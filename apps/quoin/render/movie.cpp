@@ -14,7 +14,7 @@
 #include <system_error>
 #include <utility>
 
-#include "render/picture_output.h"
+#include "render/image_output.h"
 
 namespace quoin::tool {
 namespace {
@@ -56,8 +56,8 @@ Result<int> run(const fs::path& program, std::vector<std::string> words) {
 }
 
 // Returns the number in OUT-007.png as text: "007".
-std::string number_in(const fs::path& picture) {
-  const std::string stem = picture.stem().string();
+std::string number_in(const fs::path& image) {
+  const std::string stem = image.stem().string();
   return stem.substr(stem.rfind('-') + 1);
 }
 
@@ -78,7 +78,7 @@ fs::path Movie::folder() const {
   return fs::path(output_.string() + ".pictures");
 }
 
-fs::path Movie::picture() const {
+fs::path Movie::image() const {
   return folder() / "picture.png";
 }
 
@@ -95,17 +95,17 @@ Status Movie::begin(bool resume) const {
   return code ? make_error(ErrorCode::CannotWrite, code.message(), folder().string()) : Status();
 }
 
-Result<std::uint64_t> Movie::write(const std::vector<fs::path>& pictures, double frames_per_second) const {
+Result<std::uint64_t> Movie::write(const std::vector<fs::path>& images, double frames_per_second) const {
   const auto ffmpeg = find_program("ffmpeg");
   if (!ffmpeg)
     return make_error(ErrorCode::Unsupported, "cannot encode a video: ffmpeg is no longer installed", output_.string());
-  const std::string first = number_in(pictures.front());
+  const std::string first = number_in(images.front());
   const std::string pattern = (folder() / ("picture-%0" + std::to_string(first.size()) + "d.png")).filename().string();
   const fs::path whole = folder() / ("film" + output_.extension().string());
   std::vector<std::string> words = {
       "-nostdin", "-hide_banner", "-loglevel", "error", "-y", "-framerate", std::to_string(frames_per_second),
       "-start_number", std::to_string(std::stol(first)), "-i", escaped(folder().string()) + "/" + pattern, "-frames:v",
-      std::to_string(pictures.size()),
+      std::to_string(images.size()),
       // Even width and height, as half-size chroma needs; BT.709 colours, with matching metadata.
       "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv", "-pix_fmt", "yuv420p",
       "-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv"};

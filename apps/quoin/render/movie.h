@@ -21,14 +21,14 @@ class Movie {
 
   /// The folder of the images, and the name in it that the numbered names extend.
   [[nodiscard]] std::filesystem::path folder() const;
-  [[nodiscard]] std::filesystem::path picture() const;
+  [[nodiscard]] std::filesystem::path image() const;
 
   /// Creates the folder, and empties it unless `resume`. Errors: Unsupported without ffmpeg; CannotWrite.
   [[nodiscard]] Status begin(bool resume) const;
   /// Encodes the video, complete or not at all, and removes the images. Returns the file size.
-  /// `pictures`: files with consecutive numbers.
+  /// `images`: files with consecutive numbers.
   /// Errors: CannotWrite, with the exit status of ffmpeg, which prints its own messages.
-  [[nodiscard]] Result<std::uint64_t> write(const std::vector<std::filesystem::path>& pictures,
+  [[nodiscard]] Result<std::uint64_t> write(const std::vector<std::filesystem::path>& images,
                                             double frames_per_second) const;
 
  private:

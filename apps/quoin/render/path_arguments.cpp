@@ -7,7 +7,7 @@
 #include <string_view>
 #include <utility>
 
-#include <quoin/io/picture_files.h>
+#include <quoin/io/image_files.h>
 #include <quoin/io/sidecar_file.h>
 
 #include "parse.h"
@@ -210,7 +210,7 @@ std::string given_path_option(const CLI::App& command) {
   return "";
 }
 
-std::string fault_of_path_options(const CLI::App& command) {
+std::string find_path_options_error(const CLI::App& command) {
   for (const char* option : kOtherLight) {
     if (command.count(option) > 0) return std::string(option) + " and --light path cannot be used together";
   }

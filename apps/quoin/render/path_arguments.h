@@ -62,7 +62,7 @@ void add_path_options(CLI::App& command, PathArguments& arguments);
 /// Returns the first given option that only --light path has, or "".
 [[nodiscard]] std::string given_path_option(const CLI::App& command);
 /// Returns an error message if a given option cannot be used with --light path, else "".
-[[nodiscard]] std::string fault_of_path_options(const CLI::App& command);
+[[nodiscard]] std::string find_path_options_error(const CLI::App& command);
 /// Reads the options that CLI11 leaves as text. Returns a usage error, or "".
 [[nodiscard]] std::string read_path_options(const CLI::App& command, PathArguments& arguments);
 

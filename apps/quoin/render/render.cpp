@@ -4,7 +4,7 @@
 #include <numbers>
 
 #include <quoin/io/formats.h>
-#include <quoin/io/picture_files.h>
+#include <quoin/io/image_files.h>
 #include <quoin/io/volume.h>
 #include <quoin/render_vk/vulkan_renderer.h>
 #include <quoin/scene/scene_faces.h>
@@ -15,9 +15,9 @@
 #include "output_files.h"
 #include "progress_bar.h"
 #include "render/camera_path.h"
+#include "render/image_output.h"
 #include "render/movie.h"
-#include "render/path_pictures.h"
-#include "render/picture_output.h"
+#include "render/path_images.h"
 #include "render/render_arguments.h"
 #include "scene_content.h"
 #include "standard_streams.h"
@@ -30,7 +30,7 @@ namespace quoin::tool {
 namespace {
 
 struct Outcome {
-  Picture picture;              ///< the last image
+  RenderedImage image;          ///< the last image
   Camera camera;                ///< the camera of the last image
   std::optional<double> slice;  ///< position on the axis of a slice; nullopt: an image of `camera`
   FaceCounts faces;
@@ -61,30 +61,30 @@ std::filesystem::path numbered(const std::filesystem::path& output, int number, 
 }
 
 /// Returns the names of the images to write. `cameras`: number of cameras of --path.
-std::vector<std::filesystem::path> pictures_of(const RenderArguments& arguments, std::size_t cameras) {
-  std::vector<std::filesystem::path> pictures;
+std::vector<std::filesystem::path> images_of(const RenderArguments& arguments, std::size_t cameras) {
+  std::vector<std::filesystem::path> images;
   const int last = static_cast<int>(cameras) - 1;
-  for (int i = 0; i <= last; ++i) pictures.push_back(numbered(arguments.output, i, last));
-  if (cameras > 0) return pictures;
+  for (int i = 0; i <= last; ++i) images.push_back(numbered(arguments.output, i, last));
+  if (cameras > 0) return images;
   if (arguments.frames) {
     const FrameRange& frames = *arguments.frames;
     for (int frame = frames.first; frame <= frames.last; ++frame)
-      pictures.push_back(numbered(arguments.output, frame, frames.last));
+      images.push_back(numbered(arguments.output, frame, frames.last));
   } else if (arguments.turns > 1) {
     for (int turn = 0; turn < arguments.turns; ++turn)
-      pictures.push_back(numbered(arguments.output, turn, arguments.turns - 1));
+      images.push_back(numbered(arguments.output, turn, arguments.turns - 1));
   } else {
-    pictures.push_back(arguments.output);
+    images.push_back(arguments.output);
   }
-  return pictures;
+  return images;
 }
 
 /// Returns true if --resume keeps this existing image. Existing images are complete. An automatic exposure needs the
 /// first image, which is then rendered again.
-bool is_kept(const RenderArguments& arguments, const std::filesystem::path& picture, const Outcome& outcome) {
+bool is_kept(const RenderArguments& arguments, const std::filesystem::path& image, const Outcome& outcome) {
   if (!arguments.resume || (arguments.path.is_exposure_automatic && !outcome.exposure)) return false;
   std::error_code none;
-  return std::filesystem::is_regular_file(picture, none);
+  return std::filesystem::is_regular_file(image, none);
 }
 
 double aspect_of(const RenderArguments& arguments) {
@@ -116,27 +116,27 @@ Result<Camera> camera_for(const LoadedScene& loaded, const RenderArguments& argu
   return framing.camera();
 }
 
-void warn_of_empty_pictures(const Scene& scene, InstanceFilter filter, const Picture& picture,
-                            std::vector<std::string>& warnings) {
+void warn_of_empty_images(const Scene& scene, InstanceFilter filter, const RenderedImage& image,
+                          std::vector<std::string>& warnings) {
   if (scene.bounds(filter).empty()) {
     warnings.emplace_back("nothing visible; the image shows only sky");
-  } else if (picture.pixels_hit == 0) {
+  } else if (image.pixels_hit == 0) {
     warnings.emplace_back("no voxel is in view of this camera; the image shows only sky");
   }
 }
 
 // `paths`: the renderer of the image if it is the path tracer, else null.
-Status write_outputs(const RenderArguments& arguments, const std::filesystem::path& output, const PathPictures* paths,
+Status write_outputs(const RenderArguments& arguments, const std::filesystem::path& output, const PathImages* paths,
                      Outcome& outcome) {
   if (was_interrupted()) return make_error(ErrorCode::Cancelled, "cancelled", output.string());
   const bool is_plain = paths == nullptr || !(has_ending(output, ".exr") || paths->is_transparent());
-  const auto written = is_plain ? write_picture(outcome.picture.colour, output) : paths->write(output);
+  const auto written = is_plain ? write_image_file(outcome.image.colour, output) : paths->write(output);
   if (!written) return written.error();
   outcome.files.push_back(output);
   outcome.bytes += *written;
   if (arguments.depth.empty()) return {};
   if (was_interrupted()) return make_error(ErrorCode::Cancelled, "cancelled", arguments.depth.string());
-  const auto pfm = write_pfm(outcome.picture.depth, arguments.depth);
+  const auto pfm = write_pfm(outcome.image.depth, arguments.depth);
   if (!pfm) return pfm.error();
   outcome.files.push_back(arguments.depth);
   outcome.bytes += *pfm;
@@ -168,18 +168,18 @@ Result<LoadedScene> load(const RenderArguments& arguments, bool is_volume, int f
 }
 
 // Returns the renderer if it is the path tracer, else null.
-const PathPictures* paths_of(const PathPictures& renderer) {
+const PathImages* paths_of(const PathImages& renderer) {
   return &renderer;
 }
 template <class Renderer>
-const PathPictures* paths_of(const Renderer&) {
+const PathImages* paths_of(const Renderer&) {
   return nullptr;
 }
 
 // Renders the images, writes them and adds the times to the outcome.
 template <class Renderer>
-Status take_pictures(Renderer& renderer, const RenderArguments& arguments, const RenderOptions& options,
-                     const std::vector<Shot>& shots, Stopwatch& watch, Outcome& outcome) {
+Status take_images(Renderer& renderer, const RenderArguments& arguments, const RenderOptions& options,
+                   const std::vector<Shot>& shots, Stopwatch& watch, Outcome& outcome) {
   outcome.build += watch.lap();
   ProgressBar bar;
   for (std::size_t i = 0; i < shots.size(); ++i) {
@@ -191,13 +191,13 @@ Status take_pictures(Renderer& renderer, const RenderArguments& arguments, const
       return (static_cast<double>(i) + fraction) / static_cast<double>(shots.size());
     };
     const Progress listener = bar.listener("tracing");
-    auto picture = renderer.render(shots[i].camera, options, arguments.common.threads,
-                                   [&](double fraction) { return listener(share(fraction)); });
-    if (!picture) return picture.error();
+    auto image = renderer.render(shots[i].camera, options, arguments.common.threads,
+                                 [&](double fraction) { return listener(share(fraction)); });
+    if (!image) return image.error();
     if constexpr (requires { renderer.exposure(); }) outcome.exposure = renderer.exposure();
     outcome.camera = shots[i].camera;
-    outcome.picture = std::move(*picture);
-    outcome.rays += outcome.picture.rays;
+    outcome.image = std::move(*image);
+    outcome.rays += outcome.image.rays;
     outcome.trace += watch.lap();
     if (auto written = write_outputs(arguments, shots[i].output, paths_of(renderer), outcome); !written) return written;
     outcome.write += watch.lap();
@@ -208,7 +208,7 @@ Status take_pictures(Renderer& renderer, const RenderArguments& arguments, const
 Status draw_by_cpu(const Scene& scene, const RenderArguments& arguments, const RenderOptions& options,
                    const std::vector<Shot>& shots, Stopwatch& watch, Outcome& outcome) {
   const CpuRenderer renderer(scene, arguments.common.instances(), arguments.common.threads);
-  return take_pictures(renderer, arguments, options, shots, watch, outcome);
+  return take_images(renderer, arguments, options, shots, watch, outcome);
 }
 
 // Creates a Vulkan renderer and uploads the scene.
@@ -236,23 +236,23 @@ Status draw_by_paths(const LoadedScene& loaded, const RenderArguments& arguments
     }
   }
   const bool with_layers = has_ending(arguments.output, ".exr");
-  const auto take = [&](PathPictures pictures) {
-    pictures.set_exposure(outcome.exposure);
-    return take_pictures(pictures, arguments, options, shots, watch, outcome);
+  const auto take = [&](PathImages images) {
+    images.set_exposure(outcome.exposure);
+    return take_images(images, arguments, options, shots, watch, outcome);
   };
   if (arguments.backend != "vulkan") {
-    return take(PathPictures(loaded.scene, filter, arguments.common.threads, std::move(*plan), with_layers));
+    return take(PathImages(loaded.scene, filter, arguments.common.threads, std::move(*plan), with_layers));
   }
   auto renderer = device_for(loaded.scene, arguments, outcome);
   if (!renderer) return renderer.error();
-  return take(PathPictures(*renderer, loaded.scene, filter, std::move(*plan), with_layers));
+  return take(PathImages(*renderer, loaded.scene, filter, std::move(*plan), with_layers));
 }
 
 Status draw_by_vulkan(const Scene& scene, const RenderArguments& arguments, const RenderOptions& options,
                       const std::vector<Shot>& shots, Stopwatch& watch, Outcome& outcome) {
   auto renderer = device_for(scene, arguments, outcome);
   if (!renderer) return renderer.error();
-  return take_pictures(*renderer, arguments, options, shots, watch, outcome);
+  return take_images(*renderer, arguments, options, shots, watch, outcome);
 }
 
 Status draw_shots(const LoadedScene& loaded, const RenderArguments& arguments, const std::vector<Shot>& shots,
@@ -270,9 +270,9 @@ Status draw_view(const LoadedScene& loaded, const RenderArguments& arguments, St
   if (arguments.turns > 1) {
     SceneFraming framing(arguments.forward(), aspect_of(arguments), arguments.turns);
     framing.add(loaded.scene, arguments.common.instances());
-    const std::vector<std::filesystem::path> pictures = pictures_of(arguments, 0);
+    const std::vector<std::filesystem::path> images = images_of(arguments, 0);
     for (int turn = 0; turn < arguments.turns; ++turn) {
-      shots.push_back({framing.camera(turn), pictures[static_cast<std::size_t>(turn)]});
+      shots.push_back({framing.camera(turn), images[static_cast<std::size_t>(turn)]});
     }
   } else {
     const auto camera = camera_for(loaded, arguments);
@@ -285,9 +285,9 @@ Status draw_view(const LoadedScene& loaded, const RenderArguments& arguments, St
 /// Renders an image for each camera.
 Status draw_path(const LoadedScene& loaded, const std::vector<Camera>& cameras, const RenderArguments& arguments,
                  Stopwatch& watch, Outcome& outcome) {
-  const std::vector<std::filesystem::path> pictures = pictures_of(arguments, cameras.size());
+  const std::vector<std::filesystem::path> images = images_of(arguments, cameras.size());
   std::vector<Shot> shots;
-  for (std::size_t i = 0; i < cameras.size(); ++i) shots.push_back({cameras[i], pictures[i]});
+  for (std::size_t i = 0; i < cameras.size(); ++i) shots.push_back({cameras[i], images[i]});
   return draw_shots(loaded, arguments, shots, watch, outcome);
 }
 
@@ -306,17 +306,17 @@ Status draw_frames(const LoadedScene& first, const RenderArguments& arguments, S
   }
   Result<Camera> camera = has_camera ? camera_for(first, arguments) : framing.camera();
   if (!camera) return camera.error();
-  const std::vector<std::filesystem::path> pictures = pictures_of(arguments, 0);
+  const std::vector<std::filesystem::path> images = images_of(arguments, 0);
   for (int frame = frames.first; frame <= frames.last; ++frame) {
     const bool is_first = frame == frames.first;
-    if (is_kept(arguments, pictures[static_cast<std::size_t>(frame - frames.first)], outcome)) {
+    if (is_kept(arguments, images[static_cast<std::size_t>(frame - frames.first)], outcome)) {
       ++outcome.kept;
       continue;
     }
     const auto later = is_first ? Result<LoadedScene>(LoadedScene{}) : load(arguments, false, frame);
     if (!later) return later.error();
     outcome.read += watch.lap();
-    const std::vector<Shot> shots = {{*camera, pictures[static_cast<std::size_t>(frame - frames.first)]}};
+    const std::vector<Shot> shots = {{*camera, images[static_cast<std::size_t>(frame - frames.first)]}};
     if (auto drawn = draw_shots(is_first ? first : *later, arguments, shots, watch, outcome); !drawn) return drawn;
   }
   return {};
@@ -326,8 +326,8 @@ Status draw_slice(const Scene& scene, const RenderArguments& arguments, Stopwatc
   auto slice = draw_density_slice(scene, arguments.slice, arguments.common.threads);
   if (!slice) return slice.error();
   outcome.slice = slice->place;
-  outcome.picture.colour = std::move(slice->colour);
-  outcome.picture.pixels_hit = slice->pixels_solid;
+  outcome.image.colour = std::move(slice->colour);
+  outcome.image.pixels_hit = slice->pixels_solid;
   outcome.trace = watch.lap();
   auto written = write_outputs(arguments, arguments.output, nullptr, outcome);
   outcome.write = watch.lap();
@@ -343,7 +343,7 @@ Result<Outcome> render(const RenderArguments& arguments) {
     if (!cameras) return cameras.error();
     path = std::move(*cameras);
   }
-  std::vector<std::filesystem::path> outputs = pictures_of(arguments, path.size());
+  std::vector<std::filesystem::path> outputs = images_of(arguments, path.size());
   Outcome outcome;
   outcome.film = outputs;
   outputs.push_back(arguments.depth);
@@ -373,7 +373,7 @@ Result<Outcome> render(const RenderArguments& arguments) {
     outcome.warnings.push_back("--light propagated supports no lamps; lamps left out: " +
                                std::to_string(scene.lamps.size()));
   }
-  if (!is_slice && !outcome.files.empty()) warn_of_empty_pictures(scene, filter, outcome.picture, outcome.warnings);
+  if (!is_slice && !outcome.files.empty()) warn_of_empty_images(scene, filter, outcome.image, outcome.warnings);
   return outcome;
 }
 
@@ -391,7 +391,7 @@ Json outcome_json(const RenderArguments& arguments, const Outcome& outcome) {
   for (const auto& file : outcome.files) files.push_back(file.string());
   Json json = {{"size", {arguments.render.width, arguments.render.height}},
                {"rays", outcome.rays},
-               {"pixels_hit", outcome.picture.pixels_hit},
+               {"pixels_hit", outcome.image.pixels_hit},
                {"faces_visible", outcome.is_volume ? Json() : Json(outcome.faces.visible)},
                {"faces_total", outcome.is_volume ? Json() : Json(outcome.faces.total)},
                {"backend", arguments.backend},
@@ -412,10 +412,10 @@ Json outcome_json(const RenderArguments& arguments, const Outcome& outcome) {
 std::string outcome_text(const Outcome& outcome) {
   std::string kept = outcome.kept == 0 ? "" : "Kept " + std::to_string(outcome.kept) + " existing images\n";
   if (outcome.files.empty()) return kept;
-  const Picture& picture = outcome.picture;
+  const RenderedImage& image = outcome.image;
   const double per_second = static_cast<double>(outcome.rays) / std::max(outcome.trace, 1e-9);
-  std::string text = "Image: " + std::to_string(picture.colour.width) + " x " + std::to_string(picture.colour.height) +
-                     ", " + with_thousands(picture.pixels_hit) +
+  std::string text = "Image: " + std::to_string(image.colour.width) + " x " + std::to_string(image.colour.height) +
+                     ", " + with_thousands(image.pixels_hit) +
                      (outcome.slice       ? " pixels are solid\n"
                       : outcome.is_volume ? " pixels show the surface\n"
                                           : " pixels show voxels\n");
@@ -441,9 +441,9 @@ Result<Outcome> render_movie(const RenderArguments& arguments) {
   if (auto writable = check_outputs({arguments.output}); !writable) return writable.error();
   const Movie movie(arguments.output);
   if (Status begun = movie.begin(arguments.resume); !begun) return begun.error();
-  RenderArguments of_pictures = arguments;
-  of_pictures.output = movie.picture();
-  auto outcome = render(of_pictures);
+  RenderArguments of_images = arguments;
+  of_images.output = movie.image();
+  auto outcome = render(of_images);
   if (!outcome) return outcome.error();
   Stopwatch watch;
   const auto bytes = movie.write(outcome->film, arguments.frames_per_second);

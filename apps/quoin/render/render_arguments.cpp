@@ -11,8 +11,8 @@
 
 #include "field_occlusion.h"
 #include "parse.h"
+#include "render/image_output.h"
 #include "render/movie.h"
-#include "render/picture_output.h"
 #include "render/text_options.h"
 #include "shell/help.h"
 #include "standard_streams.h"
@@ -39,7 +39,7 @@ std::optional<double> read_angle(const std::string& text) {
   return degrees && *degrees > 0.0 && *degrees < 180.0 ? degrees : std::nullopt;
 }
 
-std::optional<PictureSize> read_size(const std::string& text) {
+std::optional<ImageSize> read_size(const std::string& text) {
   const auto size = parse_size(text);
   const bool fits = size && std::max(size->width, size->height) <= kLongestSide &&
                     std::int64_t{size->width} * size->height <= kMaxPixels;
@@ -155,7 +155,7 @@ void add_backend_options(CLI::App& command, RenderArguments& arguments) {
       ->type_name("NAME|N");
 }
 
-std::string fault_of_backend(const CLI::App& command, const RenderArguments& arguments) {
+std::string find_backend_error(const CLI::App& command, const RenderArguments& arguments) {
   const bool is_vulkan = arguments.backend == "vulkan";
   if (command.count("--device") > 0 && !is_vulkan) return "--device needs --backend vulkan";
   if (is_vulkan && arguments.occlusion == "smooth")
@@ -164,13 +164,13 @@ std::string fault_of_backend(const CLI::App& command, const RenderArguments& arg
   return "";
 }
 
-std::string fault_of_files(const RenderArguments& arguments) {
+std::string find_files_error(const RenderArguments& arguments) {
   const std::string out = arguments.output.string();
   const std::string depth = arguments.depth.string();
   if (is_movie(arguments.output)) {
     if (!arguments.is_film()) return "-o: the video " + out + " needs --turntable, --frames or --path";
     if (arguments.path.is_transparent) return "-o: videos have no alpha channel";
-  } else if (const std::string fault = fault_of_picture_name(arguments.output); !fault.empty()) {
+  } else if (const std::string fault = find_image_name_error(arguments.output); !fault.empty()) {
     return "-o: " + fault;
   }
   const bool is_path = arguments.light_model == "path";
@@ -226,7 +226,7 @@ std::optional<double> read_rate(const std::string& text) {
   return rate && *rate > 0.0 && *rate <= 1000.0 ? rate : std::nullopt;
 }
 
-std::string fault_of_films(const CLI::App& command, const RenderArguments& arguments) {
+std::string find_films_error(const CLI::App& command, const RenderArguments& arguments) {
   const auto has = [&](const char* option) { return command.count(option) > 0; };
   for (const char* option : {"--azimuth", "--elevation"}) {
     if (has(option) && has("--view")) return std::string("--view and ") + option + " cannot be used together";
@@ -248,13 +248,13 @@ std::string fault_of_films(const CLI::App& command, const RenderArguments& argum
   return "";
 }
 
-std::string fault_of_watching(const RenderArguments& arguments) {
+std::string find_watching_error(const RenderArguments& arguments) {
   if (!arguments.watch) return "";
   if (arguments.common.json) return "--watch and --json cannot be used together";
   return arguments.common.input == kStandardStream ? "cannot use --watch with standard input" : "";
 }
 
-std::string fault_of_camera(const CLI::App& command, const RenderArguments& arguments) {
+std::string find_camera_error(const CLI::App& command, const RenderArguments& arguments) {
   const bool has_position = arguments.position.has_value();
   const bool has_target = command.count("--look-at") > 0;
   if (has_position && !has_target) return "--camera needs --look-at";
@@ -267,7 +267,7 @@ std::string fault_of_camera(const CLI::App& command, const RenderArguments& argu
   return camera ? "" : camera.error().message;
 }
 
-std::string fault_of_light(const CLI::App& command, const RenderArguments& arguments) {
+std::string find_light_error(const CLI::App& command, const RenderArguments& arguments) {
   const std::string& preset = arguments.preset;
   const bool is_lit = preset == "full" || preset == "no-shadows";
   const bool has_occlusion = is_lit || preset == "ao" || (preset == "unlit" && command.count("--ao") > 0);
@@ -301,8 +301,8 @@ std::string fault_of_light(const CLI::App& command, const RenderArguments& argum
   return "";
 }
 
-std::string fault_of_light_model(const CLI::App& command, const RenderArguments& arguments) {
-  if (arguments.light_model == "path") return fault_of_path_options(command);
+std::string find_light_model_error(const CLI::App& command, const RenderArguments& arguments) {
+  if (arguments.light_model == "path") return find_path_options_error(command);
   if (const std::string option = given_path_option(command); !option.empty()) return option + " needs --light path";
   if (arguments.path.is_exposure_automatic) return "--exposure auto needs --light path";
   const bool is_propagated = arguments.light_model == "propagated";
@@ -318,7 +318,7 @@ std::string fault_of_light_model(const CLI::App& command, const RenderArguments&
 }
 
 /// Returns an error message if an option does not fit a slice, which has no camera, light or rays, else "".
-std::string fault_of_slice(const CLI::App& command, const RenderArguments& arguments) {
+std::string find_slice_error(const CLI::App& command, const RenderArguments& arguments) {
   if (arguments.preset != "density") {
     return command.count("--slice") > 0 ? "--slice needs --preset density" : "";
   }
@@ -406,7 +406,7 @@ std::string read_texts(const CLI::App& command, RenderArguments& arguments) {
   const std::string three = "three numbers, as in 1,-2.5,3";
   const std::string at_least_0 = "a number of at least 0";
   LightOptions& light = arguments.render.light;
-  PictureSize size{arguments.render.width, arguments.render.height};
+  ImageSize size{arguments.render.width, arguments.render.height};
   SlicePlace slice;
   CameraPlace camera;
   const std::array faults = {
@@ -498,9 +498,10 @@ void add_render_options(CLI::App& command, RenderArguments& arguments) {
 
 std::string settle(const CLI::App& command, RenderArguments& arguments) {
   for (const std::string& fault :
-       {read_texts(command, arguments), fault_of_files(arguments), fault_of_films(command, arguments),
-        fault_of_camera(command, arguments), fault_of_slice(command, arguments), fault_of_light(command, arguments),
-        fault_of_light_model(command, arguments), fault_of_backend(command, arguments), fault_of_watching(arguments)}) {
+       {read_texts(command, arguments), find_files_error(arguments), find_films_error(command, arguments),
+        find_camera_error(command, arguments), find_slice_error(command, arguments),
+        find_light_error(command, arguments), find_light_model_error(command, arguments),
+        find_backend_error(command, arguments), find_watching_error(arguments)}) {
     if (!fault.empty()) return fault;
   }
   if (command.count("--detail") == 0 && arguments.render.detail.colours) arguments.detail = "pixels";

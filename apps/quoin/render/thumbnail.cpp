@@ -2,14 +2,14 @@
 
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
-#include <quoin/io/picture_files.h>
+#include <quoin/io/image_files.h>
 
 #include "commands.h"
 #include "interrupt.h"
 #include "output.h"
 #include "output_files.h"
 #include "progress_bar.h"
-#include "render/small_picture.h"
+#include "render/small_image.h"
 #include "render/text_options.h"
 #include "shell/help.h"
 #include "standard_streams.h"

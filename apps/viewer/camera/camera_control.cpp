@@ -10,10 +10,10 @@ namespace quoin::viewer {
 
 namespace {
 
-constexpr double kTurnPerPicture = 2.2;  // radians for a drag over the image height
-constexpr double kZoomPerNotch = 0.16;   // change of the distance's logarithm
-constexpr double kZoomRate = 14.0;       // decay of a zoom, per second
-constexpr double kFlightRate = 9.0;      // approach of the velocity to the keys' velocity, per second
+constexpr double kTurnPerImage = 2.2;   // radians for a drag over the image height
+constexpr double kZoomPerNotch = 0.16;  // change of the distance's logarithm
+constexpr double kZoomRate = 14.0;      // decay of a zoom, per second
+constexpr double kFlightRate = 9.0;     // approach of the velocity to the keys' velocity, per second
 constexpr double kSpeedPerNotch = 0.2;
 constexpr double kStraightUp = std::numbers::pi / 2.0;
 constexpr double kLongestStep = 1.0;
@@ -86,9 +86,9 @@ void CameraControl::apply_angles() {
   camera_.up = glm::cross(camera_.right, camera_.forward);
 }
 
-void CameraControl::turn(double dx, double dy, int picture_height) {
-  if (!are_finite(dx, dy) || picture_height <= 0) return;
-  const double angle = kTurnPerPicture / picture_height;
+void CameraControl::turn(double dx, double dy, int image_height) {
+  if (!are_finite(dx, dy) || image_height <= 0) return;
+  const double angle = kTurnPerImage / image_height;
   const DVec3 to_pivot = pivot_ - camera_.position;
   const DVec3 in_camera{glm::dot(to_pivot, camera_.right), glm::dot(to_pivot, camera_.up),
                         glm::dot(to_pivot, camera_.forward)};
@@ -100,17 +100,17 @@ void CameraControl::turn(double dx, double dy, int picture_height) {
   camera_.position = pivot_ - (camera_.right * in_camera.x + camera_.up * in_camera.y + camera_.forward * in_camera.z);
 }
 
-double CameraControl::units_per_pixel(double distance, int picture_height) const {
+double CameraControl::units_per_pixel(double distance, int image_height) const {
   const bool is_perspective = camera_.projection == Camera::Projection::Perspective;
   const double height =
       is_perspective ? 2.0 * distance * std::tan(camera_.vertical_fov_radians / 2.0) : camera_.view_height;
-  return height / picture_height;
+  return height / image_height;
 }
 
-void CameraControl::pan(double dx, double dy, int picture_height) {
-  if (!are_finite(dx, dy) || picture_height <= 0) return;
+void CameraControl::pan(double dx, double dy, int image_height) {
+  if (!are_finite(dx, dy) || image_height <= 0) return;
   const double distance = std::max(glm::dot(pivot_ - camera_.position, camera_.forward), 0.01 * size_);
-  const double scale = units_per_pixel(distance, picture_height);
+  const double scale = units_per_pixel(distance, image_height);
   const DVec3 move = camera_.up * (dy * scale) - camera_.right * (dx * scale);
   camera_.position += move;
   pivot_ += move;

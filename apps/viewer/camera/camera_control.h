@@ -53,9 +53,9 @@ class CameraControl {
 
   /// Turns the camera in place or around the pivot, depending on `mode`, by a drag in pixels of an image of that
   /// height.
-  void turn(double dx, double dy, int picture_height);
+  void turn(double dx, double dy, int image_height);
   /// Moves the camera so that points at the pivot's distance follow the mouse.
-  void pan(double dx, double dy, int picture_height);
+  void pan(double dx, double dy, int image_height);
   /// Zooms towards `target` (by default the pivot) for positive notches; glides there during `advance`.
   void zoom(double notches, std::optional<DVec3> target = std::nullopt);
   /// Changes the flight speed; positive notches are faster.
@@ -70,7 +70,7 @@ class CameraControl {
  private:
   void apply_angles();
   void zoom_by(double log_factor);
-  [[nodiscard]] double units_per_pixel(double distance, int picture_height) const;
+  [[nodiscard]] double units_per_pixel(double distance, int image_height) const;
 
   Camera camera_;
   double yaw_ = 0.0;    // radians; 0 looks along -Z, positive turns to the right

@@ -79,7 +79,7 @@ App::App(const ViewerOptions& options, Settings settings, std::unique_ptr<Screen
   if (options_.mode) state_.settings.mode = *options_.mode;
   if (options_.light) state_.settings.light.model = *options_.light;
   if (const auto renderer = screen_->renderer(); renderer && renderer->device().kind == "cpu" && !options_.is_bare) {
-    state_.tell(renderer->device().name + " is a slow software device; --backend auto is faster");
+    state_.report(renderer->device().name + " is a slow software device; --backend auto is faster");
   }
   if (!options_.file.empty()) load(options_.file);
 }
@@ -220,9 +220,9 @@ void App::frame() {
   gui_->begin_frame();
   input_.find_mouse(state_, gui_->wants_mouse());
   draw_gui();
-  ask_for_picture();
-  take_picture();
-  if (Status shown = screen_->show(state_.picture_place, gui_->end_frame()); !shown) stand_in(shown.error());
+  ask_for_image();
+  take_image();
+  if (Status shown = screen_->show(state_.image_place, gui_->end_frame()); !shown) stand_in(shown.error());
   update_title();
   state_.frame_seconds += 0.1 * (seconds_between(last_frame_, Clock::now()) - state_.frame_seconds);
   pace();
@@ -234,18 +234,18 @@ void App::pace() {
   if (left > 0.001) std::this_thread::sleep_for(std::chrono::duration<double>(left));
 }
 
-void App::place_picture(float top, float right, float bottom) {
+void App::place_image(float top, float right, float bottom) {
   const SDL_Point output = screen_->output_size();
   const auto pixels = [this](float units) { return static_cast<int>(std::lround(units * state_.pixels_per_unit)); };
-  state_.picture_place = {0, pixels(top), std::max(output.x - pixels(right), 0),
-                          std::max(output.y - pixels(top) - pixels(bottom), 0)};
+  state_.image_place = {0, pixels(top), std::max(output.x - pixels(right), 0),
+                        std::max(output.y - pixels(top) - pixels(bottom), 0)};
 }
 
 ViewRequest App::request_now() const {
   ViewRequest request;
   request.camera = state_.camera.camera();
-  request.width = state_.picture_place.w;
-  request.height = state_.picture_place.h;
+  request.width = state_.image_place.w;
+  request.height = state_.image_place.h;
   request.light = state_.settings.light;
   request.samples = state_.settings.samples;
   request.detail_by_pixels = state_.settings.detail_by_pixels;
@@ -257,8 +257,8 @@ ViewRequest App::request_now() const {
   return request;
 }
 
-void App::ask_for_picture() {
-  if (!state_.open.backend || !state_.has_picture_place()) return;
+void App::ask_for_image() {
+  if (!state_.open.backend || !state_.has_image_place()) return;
   const ViewRequest request = request_now();
   // The image drawn before belongs to another request, even if it had settled.
   if (!asked_ || !is_same(*asked_, request)) state_.stats.is_settled = false;
@@ -266,11 +266,11 @@ void App::ask_for_picture() {
   state_.open.backend->show(request);
 }
 
-void App::take_picture() {
+void App::take_image() {
   if (!state_.open.backend) return;
   if (auto frame = state_.open.backend->take()) take_frame(std::move(*frame));
   take_fault();
-  save_wanted_pictures();
+  save_wanted_images();
   if (!options_.screenshot.empty() && is_settled() && is_running_) {
     is_running_ = false;
     write_screenshot(options_.screenshot);
@@ -280,7 +280,7 @@ void App::take_picture() {
 bool App::is_settled() const {
   const WorldWindow* const world = state_.open.document->world();
   return (world == nullptr || world->is_complete()) && state_.stats.is_settled &&
-         state_.stats.width == state_.picture_place.w && state_.stats.height == state_.picture_place.h;
+         state_.stats.width == state_.image_place.w && state_.stats.height == state_.image_place.h;
 }
 
 void App::take_frame(ViewFrame frame) {
@@ -288,21 +288,21 @@ void App::take_frame(ViewFrame frame) {
   const int height = frame.on_device ? frame.on_device->height() : frame.colour.height;
   state_.stats = {width, height, frame.samples, frame.is_settled, frame.seconds, frame.rays};
   has_seen_chunks_ = true;
-  if (Status taken = screen_->set_picture(frame); !taken) {
-    screen_->forget_picture();
-    state_.tell(taken.error());
+  if (Status taken = screen_->show_image(frame); !taken) {
+    screen_->forget_image();
+    state_.report(taken.error());
   }
   // This frame's status line is already drawn. If the image is final, it would not be drawn again.
   if (frame.is_settled) frames_left_ = std::max(frames_left_, 2);
-  state_.picture = std::move(frame);
+  state_.image = std::move(frame);
 }
 
 // A fault lasts until the next request and is shown once.
 void App::take_fault() {
   const auto fault = state_.open.backend->fault();
   const std::string text = fault ? to_string(*fault) : "";
-  if (text == std::exchange(told_fault_, text) || !fault) return;
-  state_.tell(*fault);
+  if (text == std::exchange(reported_error_, text) || !fault) return;
+  state_.report(*fault);
   if (!options_.screenshot.empty()) end_with(*fault);
   if (state_.why_not_drawn_as(state_.settings.mode) != nullptr) state_.settings.mode = DrawMode::Rays;
 }
@@ -329,7 +329,7 @@ void App::stand_in(const Error& why) {
   auto other = open_sdl_screen(size.x, size.y);
   if (!other) return end_with(other.error());
   const double scale = gui_->scale();
-  state_.picture = {};
+  state_.image = {};
   state_.stats = {};
   if (state_.open.backend) state_.open.backend->forget_device();
   gui_.reset();
@@ -337,7 +337,7 @@ void App::stand_in(const Error& why) {
   gui_ = std::make_unique<Gui>(*screen_, scale);
   if (!gui_->status()) end_with(gui_->status().error());
   state_.settings.mode = DrawMode::Rays;
-  state_.tell(why);
+  state_.report(why);
 }
 
 void App::end_with(const Error& error) {
@@ -352,8 +352,8 @@ void App::update_hover() {
     return;
   }
   if (!state_.open.backend->is_up_to_date()) return;
-  state_.hover = state_.open.backend->pick(state_.camera.camera(), state_.mouse.x, state_.mouse.y,
-                                           state_.picture_place.w, state_.picture_place.h);
+  state_.hover = state_.open.backend->pick(state_.camera.camera(), state_.mouse.x, state_.mouse.y, state_.image_place.w,
+                                           state_.image_place.h);
 }
 
 void App::update_title() {
@@ -404,8 +404,8 @@ void App::run_command(Command command) {
 }
 
 void App::show_from(View view) {
-  if (!state_.open.backend || !state_.has_picture_place()) return;
-  const double aspect = static_cast<double>(state_.picture_place.w) / state_.picture_place.h;
+  if (!state_.open.backend || !state_.has_image_place()) return;
+  const double aspect = static_cast<double>(state_.image_place.w) / state_.image_place.h;
   look_through(frame_scene(state_.scene(), view, aspect, options_.instances()));
 }
 
@@ -415,7 +415,7 @@ void App::look_through(const Camera& camera) {
 }
 
 void App::pick_type() {
-  if (!state_.hover) return state_.tell("no voxel under the mouse");
+  if (!state_.hover) return state_.report("no voxel under the mouse");
   state_.brush.type = state_.hover->type;
 }
 

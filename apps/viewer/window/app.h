@@ -46,10 +46,10 @@ class App {
   [[nodiscard]] bool is_animating() const;
   void process(const SDL_Event& event);
   void frame();
-  void place_picture(float left_top, float right, float bottom);
+  void place_image(float left_top, float right, float bottom);
   [[nodiscard]] ViewRequest request_now() const;
-  void ask_for_picture();
-  void take_picture();
+  void ask_for_image();
+  void take_image();
   /// Returns true if the settled image of the last request is shown.
   [[nodiscard]] bool is_settled() const;
   void take_frame(ViewFrame frame);
@@ -63,7 +63,7 @@ class App {
   void draw_bare();
   void draw_loading();
   void draw_saving();
-  void draw_losses();
+  void draw_unsupported();
   void draw_leaving();
   void update_hover();
   void update_title();
@@ -72,7 +72,7 @@ class App {
 
   // Worlds on disk.
   void stream_world();
-  void tell_of_world(const Status& saving);
+  void report_world(const Status& saving);
   void frame_world();
   /// Saves the edits of a world on disk and returns once that is done. Shows errors.
   Status save_world();
@@ -96,13 +96,13 @@ class App {
   void take_loaded();
   void close_document();
   void adopt(OpenDocument opened);
-  void save(const std::filesystem::path& path, bool accepts_losses = false);
+  void save(const std::filesystem::path& path, bool accepts_unsupported = false);
   void take_saved();
   void ask_where_to_save();
-  void want_picture();
+  void want_image();
   [[nodiscard]] std::optional<Result<Image>> image_in_mode(DrawMode mode) const;
-  void save_wanted_pictures();
-  void save_picture(const Result<Image>& picture);
+  void save_wanted_images();
+  void save_image(const Result<Image>& image);
   void write_screenshot(const std::filesystem::path& path);
 
   /// A save that waits for the user's consent because it would lose something.
@@ -113,7 +113,7 @@ class App {
 
   /// An image to save once its request has settled. If the view changes before that, `shown` is saved: the image on the
   /// screen when the user pressed the key, or the first one of the request's mode if the mode had just changed.
-  struct WantedPicture {
+  struct WantedImage {
     ViewRequest request;
     ChangeCursor scene;
     std::optional<Result<Image>> shown;
@@ -137,12 +137,12 @@ class App {
   std::optional<LossySave> lossy_save_;
   std::vector<std::unique_ptr<Loader>> abandoned_;  // their threads end by themselves
   bool is_running_ = true;
-  std::vector<WantedPicture> wanted_;
+  std::vector<WantedImage> wanted_;
   std::optional<ViewRequest> asked_;
   bool has_seen_chunks_ = true;     // an image arrived since chunks of the world were last moved
   std::optional<Camera> unframed_;  // the camera of a small world until all of it is loaded
-  std::string told_saving_;         // the current error of saving the world, already shown
-  std::string told_fault_;          // the current error of the backend, already shown; empty: none
+  std::string reported_saving_;     // the current error of saving the world, already shown
+  std::string reported_error_;      // the current error of the backend, already shown; empty: none
   std::optional<SDL_Event> postponed_;
   int frames_left_ = 3;
   Clock::time_point last_frame_ = Clock::now();

@@ -12,7 +12,7 @@ const char* ViewState::why_not_drawn_as(DrawMode mode) const {
 }
 
 void App::draw_as(DrawMode mode) {
-  if (const char* const why = state_.why_not_drawn_as(mode)) return state_.tell(why);
+  if (const char* const why = state_.why_not_drawn_as(mode)) return state_.report(why);
   state_.settings.mode = mode;
 }
 
@@ -23,7 +23,7 @@ void App::show_detail(bool is_shown) {
     before_detail_ = BeforeDetail{settings.mode, settings.detail_by_pixels};
     settings.detail_by_pixels = true;
     draw_as(DrawMode::Rays);
-    state_.tell(kDetailLegend);
+    state_.report(kDetailLegend);
   } else if (before_detail_) {
     settings.detail_by_pixels = before_detail_->by_pixels;
     draw_as(before_detail_->mode);
@@ -66,7 +66,7 @@ bool App::run_draw_command(Command command) {
       return false;
   }
   if (!has_meshes(settings.mode)) {
-    state_.tell("switched to blocky meshes: only meshes have triangle edges");
+    state_.report("switched to blocky meshes: only meshes have triangle edges");
     draw_as(DrawMode::Blocks);
   }
   return true;

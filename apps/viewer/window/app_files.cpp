@@ -4,7 +4,7 @@
 #include <utility>
 
 #include <quoin/io/formats.h>
-#include <quoin/io/picture_files.h>
+#include <quoin/io/image_files.h>
 
 #include "viewer/device_backend.h"
 #include "wake.h"
@@ -36,7 +36,7 @@ void App::run_file_command(Command command) {
     case Command::Quit:
       return leave({true, {}});
     case Command::Screenshot:
-      return want_picture();
+      return want_image();
     case Command::Save:
       if (!state_.can_edit()) return;
       if (!state_.open.document->can_save_in_place()) return ask_where_to_save();
@@ -60,7 +60,7 @@ void App::go_on_leaving() {
   const Leaving leaving = *std::exchange(leaving_, std::nullopt);
   if (leaving.is_quit) {
     asked_.reset();
-    save_wanted_pictures();
+    save_wanted_images();
     is_running_ = false;
   } else if (!leaving.open.empty()) {
     load(leaving.open);
@@ -106,14 +106,14 @@ void App::take_loaded() {
     adopt(std::move(*opened));
     return;
   }
-  state_.tell(opened.error());
+  state_.report(opened.error());
   if (!options_.screenshot.empty()) end_with(opened.error());
 }
 
 // Replaces the document by an empty one.
 void App::close_document() {
   asked_.reset();
-  save_wanted_pictures();
+  save_wanted_images();
   input_.editing = {};
   state_.hover.reset();
   state_.open.backend.reset();  // reads the document, so it is destroyed first
@@ -121,12 +121,12 @@ void App::close_document() {
   state_.open.look.reset();
   has_seen_chunks_ = true;
   unframed_.reset();
-  told_saving_.clear();
+  reported_saving_.clear();
   state_.stats = {};
-  state_.picture = {};
-  told_fault_.clear();
+  state_.image = {};
+  reported_error_.clear();
   lossy_save_.reset();
-  screen_->forget_picture();
+  screen_->forget_image();
 }
 
 void App::adopt(OpenDocument opened) {
@@ -141,12 +141,12 @@ void App::adopt(OpenDocument opened) {
   state_.brush.type = 1;
   state_.tool = Tool::Look;  // the first click into a world should not change it
   const SDL_Point output = screen_->output_size();
-  if (!state_.has_picture_place()) state_.picture_place = {0, 0, std::max(output.x, 1), std::max(output.y, 1)};
+  if (!state_.has_image_place()) state_.image_place = {0, 0, std::max(output.x, 1), std::max(output.y, 1)};
   if (const WorldWindow* const world = state_.open.document->world()) {
     look_through(world->first_camera(state_.aspect()));
     if (world->is_whole() && !loaded.camera) unframed_ = state_.camera.camera();
     if (!world->why_not_written().empty() && options_.screenshot.empty()) {
-      state_.tell("this world is read-only: " + world->why_not_written());
+      state_.report("this world is read-only: " + world->why_not_written());
     }
   } else if (loaded.camera) {
     look_through(*loaded.camera);
@@ -157,11 +157,11 @@ void App::adopt(OpenDocument opened) {
   const std::size_t instances = state_.scene().instances().size();
   if (!has_fault && options_.instances() == InstanceFilter::Visible && instances > 0 &&
       hidden_parts(state_.scene()).instances == instances) {
-    return state_.tell("the whole scene is hidden: the panel (F2) has switches under Scene");
+    return state_.report("the whole scene is hidden: the panel (F2) has switches under Scene");
   }
   if (!loaded.warnings.empty() && !has_fault) {
     const std::size_t more = loaded.warnings.size() - 1;
-    state_.tell(loaded.warnings.front() + (more > 0 ? " (and " + std::to_string(more) + " more warnings)" : ""));
+    state_.report(loaded.warnings.front() + (more > 0 ? " (and " + std::to_string(more) + " more warnings)" : ""));
   }
 }
 
@@ -170,10 +170,10 @@ void App::ask_where_to_save() {
   chooser_.show(FileChooser::Purpose::Save, state_.open.document->proposed_path());
 }
 
-void App::save(const std::filesystem::path& path, bool accepts_losses) {
+void App::save(const std::filesystem::path& path, bool accepts_unsupported) {
   if (!state_.can_edit()) return;
   input_.editing.abandon(state_);
-  state_.saver = std::make_unique<Saver>(*state_.open.document, path, accepts_losses, wake_window);
+  state_.saver = std::make_unique<Saver>(*state_.open.document, path, accepts_unsupported, wake_window);
 }
 
 void App::take_saved() {
@@ -181,7 +181,7 @@ void App::take_saved() {
   const std::unique_ptr<Saver> saver = std::move(state_.saver);
   if (!saver->status()) {
     leaving_.reset();
-    state_.tell(saver->status().error());
+    state_.report(saver->status().error());
     // Keeps the name, so that the user can correct it.
     if (saver->status().error().code != ErrorCode::Cancelled) chooser_.show(FileChooser::Purpose::Save, saver->path());
     return;
@@ -192,32 +192,32 @@ void App::take_saved() {
   }
   state_.open.document->note_written(saver->path(), saver->state());
   const std::string warning = saver->warnings().empty() ? "" : " (" + saver->warnings().front() + ")";
-  state_.tell("saved " + saver->path().string() + warning);
+  state_.report("saved " + saver->path().string() + warning);
   if (leaving_ && !state_.open.document->is_dirty()) go_on_leaving();
 }
 
 // Saves the current view: finished if the view does not change before that, else as it is shown now. Keys pressed
 // before this one may have changed the view since it was last drawn.
-void App::want_picture() {
-  if (!state_.open.backend || !state_.has_picture_place()) return;
+void App::want_image() {
+  if (!state_.open.backend || !state_.has_image_place()) return;
   const ViewRequest request = request_now();
-  if (asked_ && is_same(*asked_, request) && is_settled()) return save_picture(image_of(state_.picture));
+  if (asked_ && is_same(*asked_, request) && is_settled()) return save_image(image_of(state_.image));
   // A held key saves one image.
   const bool is_wanted = !wanted_.empty() && is_same(wanted_.back().request, request) &&
                          !state_.scene().has_changed_since(wanted_.back().scene);
   if (!is_wanted) wanted_.push_back({request, state_.scene().cursor(), image_in_mode(request.mode)});
-  state_.tell("saving the image when it is finished");
+  state_.report("saving the image when it is finished");
 }
 
 // Returns the image on the screen if it shows that mode.
 std::optional<Result<Image>> App::image_in_mode(DrawMode mode) const {
-  if (state_.stats.width == 0 || state_.picture.mode != mode) return std::nullopt;
-  return image_of(state_.picture);
+  if (state_.stats.width == 0 || state_.image.mode != mode) return std::nullopt;
+  return image_of(state_.image);
 }
 
-void App::save_wanted_pictures() {
-  std::vector<WantedPicture> waiting;
-  for (WantedPicture& wanted : std::exchange(wanted_, {})) {
+void App::save_wanted_images() {
+  std::vector<WantedImage> waiting;
+  for (WantedImage& wanted : std::exchange(wanted_, {})) {
     const bool is_drawing = state_.open.backend && asked_;
     const bool is_current =
         is_drawing && is_same(*asked_, wanted.request) && !state_.scene().has_changed_since(wanted.scene);
@@ -227,29 +227,29 @@ void App::save_wanted_pictures() {
     if (!is_done && (is_current || (!wanted.shown && may_come))) {
       waiting.push_back(std::move(wanted));
     } else if (wanted.shown) {
-      save_picture(*wanted.shown);
+      save_image(*wanted.shown);
     } else {
-      state_.tell(make_error(ErrorCode::Cancelled, "cannot save the image: the mode changed before it was drawn"));
+      state_.report(make_error(ErrorCode::Cancelled, "cannot save the image: the mode changed before it was drawn"));
     }
   }
   wanted_ = std::move(waiting);
 }
 
-void App::save_picture(const Result<Image>& picture) {
+void App::save_image(const Result<Image>& image) {
   const std::string name = stem_of_file(state_.open.document->path());
   const std::filesystem::path path = free_name(name.empty() ? "quoin" : name);
-  const auto written = picture ? write_png(*picture, path) : picture.error();
-  if (!written) return state_.tell(written.error());
+  const auto written = image ? write_png(*image, path) : image.error();
+  if (!written) return state_.report(written.error());
   std::error_code ignored;
-  const bool is_whole = picture->width >= state_.picture_place.w;
-  state_.tell("saved " + std::filesystem::absolute(path, ignored).string() +
-              (is_whole ? ""
-                        : ", unfinished: " + std::to_string(picture->width) + " x " + std::to_string(picture->height) +
-                              " pixels"));
+  const bool is_whole = image->width >= state_.image_place.w;
+  state_.report(
+      "saved " + std::filesystem::absolute(path, ignored).string() +
+      (is_whole ? ""
+                : ", unfinished: " + std::to_string(image->width) + " x " + std::to_string(image->height) + " pixels"));
 }
 
 void App::write_screenshot(const std::filesystem::path& path) {
-  const Result<Image> image = image_of(state_.picture);
+  const Result<Image> image = image_of(state_.image);
   const auto written = image ? write_png(*image, path) : image.error();
   if (!written) end_with(written.error());
 }

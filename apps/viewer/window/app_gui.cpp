@@ -64,7 +64,7 @@ void App::draw_gui() {
   if (!options_.is_bare && state_.tool != Tool::Look) draw_outline(state_);
   draw_loading();
   draw_saving();
-  draw_losses();
+  draw_unsupported();
   draw_leaving();
   if (const auto path = chooser_.draw(static_cast<float>(gui_->scale()))) {
     chooser_.purpose() == FileChooser::Purpose::Open ? load(*path) : save(*path);
@@ -73,7 +73,7 @@ void App::draw_gui() {
 
 // Draws only progress and errors over the image.
 void App::draw_bare() {
-  place_picture(0.0F, 0.0F, 0.0F);
+  place_image(0.0F, 0.0F, 0.0F);
   draw_progress(state_, static_cast<float>(gui_->scale()), 0.0F);
   if (state_.message && !state_.message->is_error) state_.message.reset();
   if (state_.message) draw_message(state_, 0.0F);
@@ -85,7 +85,7 @@ void App::draw_bars() {
   const float top = draw_menu(state_, choice);
   const float bottom = draw_status(state_);
   const float right = state_.settings.is_panel_shown ? draw_panel(state_, scale, top, bottom, choice) : 0.0F;
-  place_picture(top, right, bottom);
+  place_image(top, right, bottom);
   draw_help(state_, scale);
   if (!state_.open.backend && !state_.loader && !chooser_.is_shown()) draw_welcome(state_, choice);
   draw_progress(state_, scale, top);
@@ -125,7 +125,7 @@ void App::draw_saving() {
   end_box();
 }
 
-void App::draw_losses() {
+void App::draw_unsupported() {
   if (!lossy_save_ || state_.saver) return;
   const LossySave lossy = *lossy_save_;
   if (!begin_question("Saving loses data")) return;
@@ -149,7 +149,7 @@ void App::draw_losses() {
   if (answer == Answer::SaveAs) ask_where_to_save();
   if (answer == Answer::Stay) leaving_.reset();
   if (answer == Answer::Save) {
-    state_.open.document->accept_losses(lossy.losses);
+    state_.open.document->accept_unsupported(lossy.losses);
     save(lossy.path, true);
   }
 }

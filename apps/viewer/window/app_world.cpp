@@ -13,13 +13,13 @@ void App::stream_world() {
   ViewBackend& backend = *state_.open.backend;
   const Camera camera = state_.camera.camera();
   world->set_other_bytes(backend.bytes() + state_.open.document->history().bytes());
-  tell_of_world(world->plan(camera));
+  report_world(world->plan(camera));
   if (unframed_ && world->is_complete()) frame_world();
   const bool may_move = has_seen_chunks_ || !asked_ || backend.fault().has_value();
   if (!world->has_chunks_to_move() || !may_move || state_.open.document->stroke_brush() != nullptr) return;
   const ChangeCursor before = state_.scene().cursor();
   ScenePause pause(backend);
-  tell_of_world(world->move(camera));
+  report_world(world->move(camera));
   pause.changed = state_.scene().has_changed_since(before);
   if (!pause.changed) return;
   has_seen_chunks_ = false;
@@ -32,11 +32,11 @@ void App::frame_world() {
   unframed_.reset();
 }
 
-void App::tell_of_world(const Status& saving) {
+void App::report_world(const Status& saving) {
   state_.open.document->note_saving(saving);
   const std::string text = saving ? "" : to_string(saving.error());
-  if (text != told_saving_ && !saving) state_.tell(saving.error());
-  told_saving_ = text;
+  if (text != reported_saving_ && !saving) state_.report(saving.error());
+  reported_saving_ = text;
   const std::vector<std::string> problems = state_.open.document->world()->take_problems();
   if (problems.empty()) return;
   if (!options_.screenshot.empty()) {
@@ -50,7 +50,7 @@ Status App::save_world() {
   WorldWindow* const world = state_.open.document->world();
   if (world == nullptr || !world->why_not_written().empty()) return {};
   Status saved = world->flush();
-  tell_of_world(saved);
+  report_world(saved);
   return saved;
 }
 

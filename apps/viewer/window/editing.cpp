@@ -11,7 +11,7 @@ constexpr double kPixelsPerTouch = 4.0;  // when painting: leaves no gaps at usu
 constexpr int kMaxTouches = 128;
 
 std::optional<SceneHit> pick_at(ViewState& state, double x, double y) {
-  return state.open.backend->pick(state.camera.camera(), x, y, state.picture_place.w, state.picture_place.h);
+  return state.open.backend->pick(state.camera.camera(), x, y, state.image_place.w, state.image_place.h);
 }
 
 std::optional<BrushAction> action_of(Tool tool) {
@@ -33,14 +33,14 @@ std::optional<BrushAction> action_of(Tool tool) {
 }
 
 /// Notes that an edit changes all instances of the model, if it has several.
-void tell_of_copies(ViewState& state, const SceneHit& hit) {
+void report_copies(ViewState& state, const SceneHit& hit) {
   const Instance* touched = state.scene().instances().find(hit.instance);
   if (touched == nullptr) return;
   int copies = 0;
   state.scene().instances().for_each([&](InstanceHandle, const Instance& instance) {
     if (instance.grid == touched->grid) ++copies;
   });
-  if (copies > 1) state.tell("this model has " + std::to_string(copies) + " instances: all of them change");
+  if (copies > 1) state.report("this model has " + std::to_string(copies) + " instances: all of them change");
 }
 
 constexpr const char* kNotInMemory = "the edited chunks are not loaded: go back there first";
@@ -74,7 +74,7 @@ void Editing::move(const MousePlace& mouse) {
 }
 
 void Editing::advance(ViewState& state) {
-  if (!is_pressed_ || !state.can_edit() || !state.has_picture_place()) return;
+  if (!is_pressed_ || !state.can_edit() || !state.has_image_place()) return;
   if (!is_begun_) {
     if (!state.open.backend->is_up_to_date()) return;
     begin(state);
@@ -94,16 +94,16 @@ void Editing::begin(ViewState& state) {
   const auto hit = action ? pick_at(state, from_.x, from_.y) : std::nullopt;
   if (!hit) return;
   if (const char* const why = state.open.document->why_not_edited()) {
-    return state.tell("cannot edit this world: " + std::string(why));
+    return state.report("cannot edit this world: " + std::string(why));
   }
-  tell_of_copies(state, *hit);
+  report_copies(state, *hit);
   Brush brush = state.brush;
   brush.action = *action;
   edit_paused(state, [&](Document& document) {
     if (!document.begin_stroke(brush, *hit)) {
       const bool is_of_fields = *action == BrushAction::Smooth || *action == BrushAction::Flatten;
-      state.tell(is_of_fields && !hit->in_field ? "cannot smooth or flatten blocks: only smooth ground"
-                                                : "no voxel type to place: choose a colour");
+      state.report(is_of_fields && !hit->in_field ? "cannot smooth or flatten blocks: only smooth ground"
+                                                  : "no voxel type to place: choose a colour");
     }
     return true;
   });
@@ -118,7 +118,7 @@ void Editing::go_on(ViewState& state) {
     const double share = static_cast<double>(touch) / touches;
     hits.push_back(pick_at(state, from_.x + share * (to_.x - from_.x), from_.y + share * (to_.y - from_.y)));
   }
-  const Ray ray = ray_through(state.camera.camera(), {to_.x, to_.y, state.picture_place.w, state.picture_place.h});
+  const Ray ray = ray_through(state.camera.camera(), {to_.x, to_.y, state.image_place.w, state.image_place.h});
   edit_paused(state, [&](Document& document) {
     std::int64_t changed = 0;
     if (!is_painting) return document.drag_to(ray, std::nullopt) > 0;
@@ -136,18 +136,18 @@ void Editing::abandon(ViewState& state) {
 
 void undo(ViewState& state) {
   if (!state.can_edit()) return;
-  if (!state.open.document->history().can_undo()) return state.tell("nothing to undo");
+  if (!state.open.document->history().can_undo()) return state.report("nothing to undo");
   const std::string name = state.open.document->history().undo_name();
-  if (!edit_paused(state, [](Document& document) { return document.undo(); })) return state.tell(kNotInMemory);
-  state.tell("undone: " + name);
+  if (!edit_paused(state, [](Document& document) { return document.undo(); })) return state.report(kNotInMemory);
+  state.report("undone: " + name);
 }
 
 void redo(ViewState& state) {
   if (!state.can_edit()) return;
-  if (!state.open.document->history().can_redo()) return state.tell("nothing to redo");
+  if (!state.open.document->history().can_redo()) return state.report("nothing to redo");
   const std::string name = state.open.document->history().redo_name();
-  if (!edit_paused(state, [](Document& document) { return document.redo(); })) return state.tell(kNotInMemory);
-  state.tell("redone: " + name);
+  if (!edit_paused(state, [](Document& document) { return document.redo(); })) return state.report(kNotInMemory);
+  state.report("redone: " + name);
 }
 
 }  // namespace quoin::viewer

@@ -55,10 +55,9 @@ void Input::note_mouse(int x, int y, ViewState& state, bool gui_has_mouse) {
 void Input::find_mouse(ViewState& state, bool gui_has_mouse) const {
   MousePlace& place = state.mouse;
   // The middle of the pixel.
-  place.x = (mouse_.x + 0.5) * state.pixels_per_unit - state.picture_place.x;
-  place.y = (mouse_.y + 0.5) * state.pixels_per_unit - state.picture_place.y;
-  const bool is_inside =
-      place.x >= 0 && place.y >= 0 && place.x < state.picture_place.w && place.y < state.picture_place.h;
+  place.x = (mouse_.x + 0.5) * state.pixels_per_unit - state.image_place.x;
+  place.y = (mouse_.y + 0.5) * state.pixels_per_unit - state.image_place.y;
+  const bool is_inside = place.x >= 0 && place.y >= 0 && place.x < state.image_place.w && place.y < state.image_place.h;
   place.is_over = is_in_window_ && is_inside && (!gui_has_mouse || drag_ != Drag::None);
 }
 
@@ -126,10 +125,10 @@ void Input::motion(const SDL_MouseMotionEvent& motion, ViewState& state) {
     case Drag::None:
       break;
     case Drag::Turn:
-      state.camera.turn(dx, dy, state.picture_place.h);
+      state.camera.turn(dx, dy, state.image_place.h);
       break;
     case Drag::Pan:
-      state.camera.pan(dx, dy, state.picture_place.h);
+      state.camera.pan(dx, dy, state.image_place.h);
       break;
     case Drag::Sun:
       state.settings.light.sun = drag_sun(state.settings.light, dx, dy);

@@ -29,7 +29,7 @@ class WorldLines {
  private:
   [[nodiscard]] std::optional<ImVec2> project(DVec3 point) const {
     const Camera& camera = state_->camera.camera();
-    const SDL_Rect& place = state_->picture_place;
+    const SDL_Rect& place = state_->image_place;
     const DVec3 offset = point - camera.position;
     const double ahead = glm::dot(offset, camera.forward);
     const bool is_perspective = camera.projection == Camera::Projection::Perspective;
@@ -102,7 +102,7 @@ void draw_outline(const ViewState& state) {
   if (grid == nullptr) return;
   ImDrawList& list = *ImGui::GetBackgroundDrawList();
   const auto unit = static_cast<float>(1.0 / state.pixels_per_unit);
-  const SDL_Rect& place = state.picture_place;
+  const SDL_Rect& place = state.image_place;
   list.PushClipRect({place.x * unit, place.y * unit}, {(place.x + place.w) * unit, (place.y + place.h) * unit});
   const WorldLines lines(state, list);
   const ImU32 colour = colour_of(state.tool);

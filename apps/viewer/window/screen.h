@@ -66,8 +66,8 @@ class Screen {
   /// Sets the font image, one byte of opacity per pixel.
   virtual Status set_font(int width, int height, std::span<const std::uint8_t> opacity) = 0;
   /// Sets the image, in memory or on the device.
-  virtual Status set_picture(const ViewFrame& frame) = 0;
-  virtual void forget_picture() = 0;
+  virtual Status show_image(const ViewFrame& frame) = 0;
+  virtual void forget_image() = 0;
   /// Shows the image with the GUI over it. Scales the image smoothly to `place`; shows a plain background without one.
   virtual Status show(const SDL_Rect& place, const ImDrawData& gui) = 0;
 

@@ -19,8 +19,8 @@ class SdlScreen final : public Screen {
   [[nodiscard]] SDL_Point output_size() const override;
   [[nodiscard]] bool has_vsync() const override { return has_vsync_; }
   Status set_font(int width, int height, std::span<const std::uint8_t> opacity) override;
-  Status set_picture(const ViewFrame& frame) override;
-  void forget_picture() override { picture_.reset(); }
+  Status show_image(const ViewFrame& frame) override;
+  void forget_image() override { image_.reset(); }
   Status show(const SDL_Rect& place, const ImDrawData& gui) override;
 
  private:
@@ -30,9 +30,9 @@ class SdlScreen final : public Screen {
   void draw(const ImDrawList& list, const ImDrawCmd& command, const ImDrawData& data);
 
   SdlPointer<SDL_Renderer> renderer_;
-  SdlPointer<SDL_Texture> picture_;
+  SdlPointer<SDL_Texture> image_;
   SdlPointer<SDL_Texture> font_;
-  SDL_Point picture_size_{0, 0};
+  SDL_Point image_size_{0, 0};
   bool has_vsync_ = false;
 };
 
@@ -94,7 +94,7 @@ Status SdlScreen::set_font(int width, int height, std::span<const std::uint8_t> 
   return {};
 }
 
-Status SdlScreen::set_picture(const ViewFrame& frame) {
+Status SdlScreen::show_image(const ViewFrame& frame) {
   if (!frame.on_device) return set_image(frame.colour);
   const auto read = frame.on_device->read();
   if (!read) return read.error();
@@ -103,22 +103,21 @@ Status SdlScreen::set_picture(const ViewFrame& frame) {
 
 Status SdlScreen::set_image(const Image& image) {
   if (image.width <= 0 || image.height <= 0) return {};
-  if (!picture_ || picture_size_.x != image.width || picture_size_.y != image.height) {
-    picture_.reset(SDL_CreateTexture(renderer_.get(), SDL_PIXELFORMAT_RGB24, SDL_TEXTUREACCESS_STREAMING, image.width,
-                                     image.height));
-    if (!picture_) return cannot("store an image");
-    picture_size_ = {image.width, image.height};
-    SDL_SetTextureScaleMode(picture_.get(), SDL_ScaleModeLinear);
+  if (!image_ || image_size_.x != image.width || image_size_.y != image.height) {
+    image_.reset(SDL_CreateTexture(renderer_.get(), SDL_PIXELFORMAT_RGB24, SDL_TEXTUREACCESS_STREAMING, image.width,
+                                   image.height));
+    if (!image_) return cannot("store an image");
+    image_size_ = {image.width, image.height};
+    SDL_SetTextureScaleMode(image_.get(), SDL_ScaleModeLinear);
   }
-  if (SDL_UpdateTexture(picture_.get(), nullptr, image.rgb.data(), 3 * image.width) != 0)
-    return cannot("show an image");
+  if (SDL_UpdateTexture(image_.get(), nullptr, image.rgb.data(), 3 * image.width) != 0) return cannot("show an image");
   return {};
 }
 
 Status SdlScreen::show(const SDL_Rect& place, const ImDrawData& gui) {
   SDL_SetRenderDrawColor(renderer_.get(), 24, 26, 30, 255);
   SDL_RenderClear(renderer_.get());
-  if (picture_ && place.w > 0 && place.h > 0) SDL_RenderCopy(renderer_.get(), picture_.get(), nullptr, &place);
+  if (image_ && place.w > 0 && place.h > 0) SDL_RenderCopy(renderer_.get(), image_.get(), nullptr, &place);
   draw(gui);
   SDL_RenderPresent(renderer_.get());
   return {};

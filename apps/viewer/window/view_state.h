@@ -60,12 +60,12 @@ struct ViewState {
   OpenDocument open{std::make_unique<Document>(), nullptr};  ///< there is always a document
   SceneTree scene_tree;                                      ///< the tree shown in the panel
 
-  SDL_Rect picture_place{0, 0, 0, 0};  ///< in output pixels
+  SDL_Rect image_place{0, 0, 0, 0};  ///< in output pixels
   double pixels_per_unit = 1.0;
   MousePlace mouse;
   std::optional<SceneHit> hover;  ///< the hit under the mouse
 
-  ViewFrame picture;  ///< the last frame that arrived
+  ViewFrame image;  ///< the last frame that arrived
   FrameStats stats;
   double frame_seconds = 0.0;         ///< processing time of a window frame, smoothed
   double longest_wait_seconds = 0.0;  ///< longest time that an edit waited for rendering to stop
@@ -80,12 +80,12 @@ struct ViewState {
   std::unique_ptr<Saver> saver;
 
   [[nodiscard]] const Scene& scene() const { return open.document->scene(); }
-  [[nodiscard]] double aspect() const { return static_cast<double>(picture_place.w) / std::max(picture_place.h, 1); }
+  [[nodiscard]] double aspect() const { return static_cast<double>(image_place.w) / std::max(image_place.h, 1); }
   /// Returns the bounds that set the scale of speeds and distances at a point.
   [[nodiscard]] DBox bounds(DVec3 from, InstanceFilter filter = InstanceFilter::Visible) const {
     return open.document->world() ? open.document->world()->bounds(from) : scene().bounds(filter);
   }
-  [[nodiscard]] bool has_picture_place() const { return picture_place.w > 0 && picture_place.h > 0; }
+  [[nodiscard]] bool has_image_place() const { return image_place.w > 0 && image_place.h > 0; }
   /// Returns true if the document can be changed now.
   [[nodiscard]] bool can_edit() const { return open.backend != nullptr && !saver && !loader; }
   /// Returns the reason to show if the scene cannot be drawn in that mode, else null.
@@ -93,8 +93,8 @@ struct ViewState {
   /// Changes the camera mode. Walking starts at the point under the mouse or the middle of the scene, with a person's
   /// field of view until the mode changes.
   void set_camera_mode(CameraMode mode);
-  void tell(std::string text) { message = Message{std::move(text), false}; }
-  void tell(const Error& error) { message = Message{to_string(error), true}; }
+  void report(std::string text) { message = Message{std::move(text), false}; }
+  void report(const Error& error) { message = Message{to_string(error), true}; }
 };
 
 }  // namespace quoin::viewer

@@ -9,7 +9,7 @@
 #include <unistd.h>
 
 #include <gtest/gtest.h>
-#include <quoin/io/picture_files.h>
+#include <quoin/io/image_files.h>
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/render/path_tracer.h>
 
@@ -59,7 +59,7 @@ class ViewerTest : public ::testing::Test {
   ScratchFolder folder_{"window"};
 };
 
-TEST_F(ViewerTest, TheScreenshotIsTheRenderersPicture) {
+TEST_F(ViewerTest, TheScreenshotIsTheRenderersImage) {
   const ViewerOptions given = options(333, 250);
   const Status status = run_viewer(given);
   ASSERT_TRUE(status) << to_string(status.error());
@@ -71,11 +71,11 @@ TEST_F(ViewerTest, TheScreenshotIsTheRenderersPicture) {
   render.height = 250;
   render.samples = 16;
   render.light = natural_light();
-  const auto picture = CpuRenderer(scene).render(frame_scene(scene, View::Iso, 333.0 / 250.0), render);
-  ASSERT_TRUE(picture);
+  const auto image = CpuRenderer(scene).render(frame_scene(scene, View::Iso, 333.0 / 250.0), render);
+  ASSERT_TRUE(image);
   const auto shot = read_png(given.screenshot);
   ASSERT_TRUE(shot) << to_string(shot.error());
-  EXPECT_EQ(shot->rgb, picture->colour.rgb);
+  EXPECT_EQ(shot->rgb, image->colour.rgb);
 }
 
 TEST_F(ViewerTest, ManyStartsLeaveNothingBehind) {
@@ -223,10 +223,10 @@ TEST_F(ViewerTest, SavesAnImageOfTheModeThatWasJustChosen) {
   ViewRequest request;
   request.mode = DrawMode::Paths;
   request.light = natural_light();
-  const auto picture = PathTracer(scene).render(frame_scene(scene, View::Iso, 320.0 / 240.0),
-                                                path_options(request, 320, 240, kPathSamples, scene.bounds()));
-  ASSERT_TRUE(picture);
-  EXPECT_EQ(shot->rgb, develop(*picture, develop_options(request)).value().rgb);
+  const auto image = PathTracer(scene).render(frame_scene(scene, View::Iso, 320.0 / 240.0),
+                                              path_options(request, 320, 240, kPathSamples, scene.bounds()));
+  ASSERT_TRUE(image);
+  EXPECT_EQ(shot->rgb, develop(*image, develop_options(request)).value().rgb);
 }
 
 // SDL detects double clicks, however long frames take.
@@ -238,7 +238,7 @@ TEST_F(ViewerTest, OpensTheFileThatIsDoubleClicked) {
   given.file.clear();
   given.is_bare = false;
   // Clicks within one frame, and clicks further apart than ImGui allows but SDL accepts.
-  for (const milliseconds apart : {milliseconds(0), milliseconds(400)}) {
+  for (const milliseconds separate : {milliseconds(0), milliseconds(400)}) {
     std::filesystem::remove(given.screenshot);
     const auto start = std::chrono::steady_clock::now();
     int clicks = 0;
@@ -249,14 +249,14 @@ TEST_F(ViewerTest, OpensTheFileThatIsDoubleClicked) {
       const int y = 129 - 7 * row;
       if (clicks == 0) press(SDLK_o, KMOD_CTRL);
       if (is_open("hill.vox")) return std::chrono::steady_clock::now() - start > std::chrono::seconds(60);
-      const auto due = (row + 1) * kPause + (clicks % 2) * apart;
+      const auto due = (row + 1) * kPause + (clicks % 2) * separate;
       if (std::chrono::steady_clock::now() - start < due) return false;
       click(240, y, 1 + clicks++ % 2);
-      if (clicks % 2 == 1 && apart == milliseconds(0)) click(240, y, 1 + clicks++ % 2);
+      if (clicks % 2 == 1 && separate == milliseconds(0)) click(240, y, 1 + clicks++ % 2);
       return row >= kRows;
     });
     ASSERT_TRUE(status) << to_string(status.error());
-    EXPECT_TRUE(std::filesystem::exists(given.screenshot)) << "clicks " << apart.count() << " ms apart open nothing";
+    EXPECT_TRUE(std::filesystem::exists(given.screenshot)) << "clicks " << separate.count() << " ms apart open nothing";
   }
 }
 

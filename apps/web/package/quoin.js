@@ -54,7 +54,7 @@ class Instance {
         const what = this.text(text);
         throw new QuoinError(what === 'out of memory' ? 'out_of_memory' : 'internal', what);
       },
-      told: (fraction) => this.report(fraction),
+      report: (fraction) => this.report(fraction),
     };
     return imports;
   }

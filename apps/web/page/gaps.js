@@ -5,7 +5,7 @@
 const wideningOfView = { value: 0 };  // as a fraction of half the view's height; a uniform of all materials
 
 /** Sets the height of the renderer's image, in pixels. */
-export function setPictureHeight(renderer, pixels) {
+export function setImageHeight(renderer, pixels) {
   const gl = renderer.getContext();
   const parts = 2 ** gl.getParameter(gl.SUBPIXEL_BITS);  // subpixels per pixel; corners are rounded to these
   wideningOfView.value = 2 * (1.5 / parts) / pixels;

@@ -2,7 +2,7 @@
 import * as THREE from 'three';
 import { GLTFLoader } from 'three/examples/jsm/loaders/GLTFLoader.js';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
-import { closeGapsOf, setPictureHeight } from './gaps.js';
+import { closeGapsOf, setImageHeight } from './gaps.js';
 import { isDrawnByProgram, PlainModel, prepare } from './plain.js';
 
 const $ = (id) => document.getElementById(id);
@@ -113,7 +113,7 @@ function drawSoon() {
 async function drawWellLater() {
   clearTimeout(rest);
   const wanted = rest = setTimeout(() => {}, 0);
-  await pictureIsThere();
+  await imageIsThere();
   if (rest === wanted) rest = setTimeout(draw, 600);
 }
 
@@ -122,7 +122,7 @@ function redraw() {
 }
 
 /** Resolves when rendering has finished. */
-function pictureIsThere() {
+function imageIsThere() {
   const gl = renderer.getContext();
   const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
   gl.flush();
@@ -179,7 +179,7 @@ function changed() {
 function resize() {
   renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
   renderer.setSize(canvas.clientWidth, canvas.clientHeight, false);
-  setPictureHeight(renderer, canvas.height);
+  setImageHeight(renderer, canvas.height);
   camera.aspect = canvas.clientWidth / canvas.clientHeight;
   camera.updateProjectionMatrix();
   changed();
@@ -318,7 +318,7 @@ async function open(name, bytes, isCurrent) {
     home();
     viewFromText(location.hash);
     drawSoon();
-    await pictureIsThere();
+    await imageIsThere();
     if (!isCurrent()) return;
     const total = performance.now() - began;
     if (isPressed('rays')) march();
@@ -544,7 +544,7 @@ $('smooth').addEventListener('change', async () => {
   }
 });
 $('glb').addEventListener('click', () => give(new Blob([glb], { type: 'model/gltf-binary' }), '.glb'));
-$('picture').addEventListener('click', async () => {
+$('rendered').addEventListener('click', async () => {
   if (marched?.isOn) {
     try {
       const image = await marched.read();

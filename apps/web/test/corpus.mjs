@@ -87,7 +87,7 @@ function isStretched(file, glb) {
   return nodes.some(({ scale }) => !scale || scale[0] !== scale[1] || scale[0] !== scale[2]);
 }
 
-const counts = { same: { all: 0, 'all but names': 0, arrays: 0 }, compared: 0, stretched: 0, pictures: 0, refused: 0,
+const counts = { same: { all: 0, 'all but names': 0, arrays: 0 }, compared: 0, stretched: 0, images: 0, refused: 0,
                  lacking: {}, wrong: 0 };
 function wrong(file, why) {
   ++counts.wrong;
@@ -129,7 +129,7 @@ for (const file of folders.flatMap(filesBelow)) {
       let different = 0;
       for (let i = 0; i < 96 * 64 * 3; ++i) different += pixels[i] !== rgba[4 * Math.floor(i / 3) + (i % 3)] ? 1 : 0;
       if (different > 0) wrong(file, `${different} channels of the image differ`);
-      else ++counts.pictures;
+      else ++counts.images;
     }
   }
   scene.free();
@@ -138,7 +138,7 @@ rmSync(scratch, { recursive: true });
 const lacking = Object.entries(counts.lacking).map(([what, count]) => `${count} for ${what}`).join(', ') || 'none';
 console.log(`GLBs that are the tool's: ${counts.same.all}; but for names, where triangles were voxelised: ${
   counts.same['all but names']}; only their arrays, of volumes: ${counts.same.arrays}`);
-console.log(`pictures that are the tool's: ${counts.pictures}; files that both refuse: ${counts.refused}`);
+console.log(`images that are the tool's: ${counts.images}; files that both refuse: ${counts.refused}`);
 console.log(`not compared: volumes that the tool stretches and the module resamples: ${
   counts.stretched}; what the module lacks and the tool reads: ${lacking}`);
 if (counts.wrong > 0) console.log(`WRONG: ${counts.wrong}`);

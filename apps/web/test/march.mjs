@@ -40,7 +40,7 @@ const height = 72;
 const suns = [undefined, [-0.2, 0.15, 0.9]];
 const inPage = 'stones.json';  // for testing the page: a scene that software renders quickly
 
-async function comparePictures(tab) {
+async function compareImages(tab) {
   let worst = 1;
   let all = 0;
   let equal = 0;
@@ -60,7 +60,7 @@ async function comparePictures(tab) {
       check(share >= leastClose && one.colours > 20, `${address} ${i}: ${(100 * share).toFixed(3)} % within 2, ${
         (100 * one.equal / one.pixels).toFixed(3)} % equal, at most ${off}; ${milliseconds.toFixed(0)} ms a sample, ${
         byModule.toFixed(0)} by the module; has ${has}, ${bytes} bytes, opened in ${opening.toFixed(0)} ms on ${name}`);
-      for (const [k, image] of one.pictures.entries())
+      for (const [k, image] of one.images.entries())
         await writeFile(join(out, `marched${address.replaceAll('/', '-')}-${i}-${k === 0 ? 'device' : 'module'}.png`),
                         Buffer.from(image));
     }
@@ -122,13 +122,13 @@ async function usePage(browser, errors) {
   check(await tab.isVisible('canvas.marched'), `the page marches: ${await note()}`);
   await writeFile(join(out, 'marched-page.png'), await tab.screenshot({ timeout: 120_000 }));
   const before = await download(tab, '#march');
-  const same = await meanDifference(tab, await download(tab, '#picture'), before);
+  const same = await meanDifference(tab, await download(tab, '#rendered'), before);
   check(same < 2, `by WebGPU the page has the module's image except for its samples: ${same.toFixed(2)} off`);
   for (let i = 0; i < 12; ++i) await tab.keyboard.press('a');
   for (let i = 0; i < 4; ++i) await tab.keyboard.press('s');
   const later = await download(tab, '#march');
   const other = await meanDifference(tab, before, later);
-  const again = await meanDifference(tab, await download(tab, '#picture'), later);
+  const again = await meanDifference(tab, await download(tab, '#rendered'), later);
   check(other > 4 && again < 2, `the page's sun is that of both: ${again.toFixed(2)} off, ${
     other.toFixed(2)} from before`);
   await tab.keyboard.press('ArrowLeft');
@@ -168,7 +168,7 @@ try {
     console.log('skipped, ray marching in the browser: this Chromium has no software WebGPU');
     process.exitCode = 77;
   } else {
-    await comparePictures(tab);
+    await compareImages(tab);
     const small = await tab.evaluate(([from]) => window.openOnSmallDevice(from, 1024), [[...given.keys()][0].slice(1)]);
     check(/scene needs .*, but the adapter binds at most 1 KiB/.test(small), `a device without room says so: ${small}`);
     const codes = await tab.evaluate((from) => window.misuse(from), inPage);

@@ -56,16 +56,16 @@ async function png({ width, height, rgba }) {
 /** Returns the differences between a file's images for a list of views. `keeps`: also returns the images as PNG. */
 window.compare = async (address, views, { samples, keeps }) => {
   const scene = await load(await (await fetch(address)).arrayBuffer());
-  const pictures = await both(scene, samples);
+  const images = await both(scene, samples);
   const found = [];
   for (const view of views) {
-    const { device, module, milliseconds, byModule } = await pictures.render(view);
+    const { device, module, milliseconds, byModule } = await images.render(view);
     found.push({ ...differences(device.rgba, module.rgba), milliseconds, byModule,
-                 pictures: keeps ? [await png(device), await png(module)] : [] });
+                 images: keeps ? [await png(device), await png(module)] : [] });
   }
-  pictures.free();
+  images.free();
   scene.free();
-  return { has: pictures.has, bytes: pictures.bytes, opening: pictures.opening, name: opened.name, found };
+  return { has: images.has, bytes: images.bytes, opening: images.opening, name: opened.name, found };
 };
 
 /** Returns the error codes of invalid calls to a scene's tables. */

@@ -109,7 +109,7 @@ try {
   };
   const glb = await download('#glb');
   check(glb.bytes.equals(await readFile(nativeGlb)), `${glb.name} is the native tool's, ${glb.bytes.length} bytes`);
-  const png = await download('#picture');
+  const png = await download('#rendered');
   check(png.bytes.toString('latin1', 1, 4) === 'PNG', `${png.name} is a PNG of ${png.bytes.length} bytes`);
   const marched = await download('#march', 300_000);
   check(marched.bytes.toString('latin1', 1, 4) === 'PNG', `${marched.name}, marched: ${await status()}`);
@@ -171,12 +171,12 @@ try {
   });
   check(/large.vox: a file of 5.0 GB/.test(await status()), `a file without end: ${await status()}`);
   // The page asks for the height encoding of an image.
-  const picture8 = await readFile(join(corpus, 'heights/grey_8_bits.png'));
-  await drop({ name: 'hill.png', bytes: picture8 });
+  const image8 = await readFile(join(corpus, 'heights/grey_8_bits.png'));
+  await drop({ name: 'hill.png', bytes: image8 });
   await tab.waitForSelector('#heights[open]');
   await tab.keyboard.press('Escape');
   check(await tab.textContent('#name') === basename(file), 'without an encoding the image is not loaded');
-  await drop({ name: 'hill.png', bytes: picture8 });
+  await drop({ name: 'hill.png', bytes: image8 });
   await tab.waitForSelector('#heights[open]');
   await tab.fill('#metres', '2');
   await tab.click('#heights button[value=read]');

@@ -31,7 +31,7 @@ class ChangeCursor {
   bool operator==(const ChangeCursor&) const = default;
   /// Returns true if both cursors were last used with the same container, at any position. Returns false if either is
   /// unused.
-  [[nodiscard]] bool is_beside(const ChangeCursor& other) const {
+  [[nodiscard]] bool shares_container_with(const ChangeCursor& other) const {
     return container_ != 0 && container_ == other.container_;
   }
 
@@ -62,24 +62,24 @@ class EditNotice {
   EditNotice() = default;
   EditNotice(const EditNotice&) {}
   EditNotice& operator=(const EditNotice& other) {
-    if (this != &other) give();
+    if (this != &other) notify();
     return *this;
   }
   ~EditNotice() = default;
 
   /// Notifies the owner; call it after every edit. Only the first call since the owner last read the notice does work.
-  void give() {
-    if (!is_given_) [[unlikely]]
-      give_first();
+  void notify() {
+    if (!is_notified_) [[unlikely]]
+      notify_first();
   }
 
  private:
   friend class EditNotices;
-  void give_first();
+  void notify_first();
 
   EditNotices* to_ = nullptr;
   std::uint32_t index_ = 0;
-  bool is_given_ = true;
+  bool is_notified_ = true;
 };
 
 }  // namespace quoin

@@ -67,8 +67,8 @@ inline constexpr IBox kWholeChunk = {IVec3{0}, IVec3{kChunkEdge}};
 ///
 /// Layout:   voxels lie in rows of 64 along x, so a bit plane of a row is one word. A slab is 4x4 rows (64x4x4 voxels).
 ///           A slab of a single type stores no bit planes, and a chunk of a single type stores only the type.
-/// Memory:   a write detects slabs or chunks that became uniform or need fewer bits. After edits
-///           that are undone, a chunk therefore takes about as much memory as a new one; `compact` frees the rest.
+/// Memory:   a write detects slabs or chunks that became uniform or need fewer bits. If edits are
+///           undone, a chunk therefore takes about as much memory as a new one; `compact` frees the rest.
 /// Counts:   every write updates the number of voxels per type and per layer (64 layers on each axis). Counts and tight
 ///           bounds are therefore cheap to query.
 /// Data:     voxels other than air can have data (VoxelData). A write that changes a voxel's type removes its data. A

@@ -40,7 +40,7 @@ struct ConnectedPiece {
 /// Tracks the connected pieces of a grid across edits, for example to find the parts that an explosion broke off.
 ///
 ///   pieces.update(world);                                  // once, and after each edit
-///   for (std::size_t i : pieces.apart_from(ground)) {
+///   for (std::size_t i : pieces.not_touching(ground)) {
 ///     Grid fallen = pieces.extract(i);                      // as a separate body
 ///     pieces.remove_from(world, i);
 ///   }
@@ -81,7 +81,7 @@ class ConnectedPieces {
   /// Returns the pieces without a voxel in the box, ascending, except those that touch an unloaded chunk. With the
   /// ground as the box, these are the unsupported pieces. For ground at y = 0, the box is {{INT_MIN, 0, INT_MIN},
   /// {INT_MAX, 1, INT_MAX}}. Cost: same as `touching`, plus O(pieces).
-  [[nodiscard]] std::vector<std::size_t> apart_from(const IBox& box) const;
+  [[nodiscard]] std::vector<std::size_t> not_touching(const IBox& box) const;
 
   /// Calls `visit(row, voxels)` for each row of 64 voxels that contains voxels of a piece. `row` is the first voxel of
   /// the row; its x is a multiple of 64. Bit i of `voxels` is voxel i of the row.

@@ -105,8 +105,8 @@ struct FormatInfo {
 /// Returns the files that load_scene reads in addition to `path`: files named by a scene file (which need not exist),
 /// the values of a NIfTI pair, a world's -wal file, and a mesh's materials, buffers and images. Empty if the file
 /// cannot be read. Cost: for a mesh, as read_mesh. `allowed`: see LoadOptions::sidecar_files.
-[[nodiscard]] std::vector<std::filesystem::path> files_read_beside(const std::filesystem::path& path,
-                                                                   SidecarFiles allowed = SidecarFiles::WithinFolder);
+[[nodiscard]] std::vector<std::filesystem::path> sidecar_files_of(const std::filesystem::path& path,
+                                                                  SidecarFiles allowed = SidecarFiles::WithinFolder);
 
 /// Writes a scene's voxels to a file, atomically. The extension selects the format: .quoin (write_world) and .json
 /// (write_scene_file) are lossless; .vox (write_vox), .qb, .gox, .vxl, .binvox, .schem, .vdb and .nii are formats of
@@ -124,8 +124,9 @@ struct FormatInfo {
 /// Returns the warnings that `save_scene` would give, for asking the user first; empty if the format keeps everything.
 /// Cost: small compared with saving, except that formats of other programs build the file in memory.
 /// Errors: those of `save_scene` that are detected before writing.
-[[nodiscard]] Result<std::vector<std::string>> losses_of_saving(const Scene& scene, const std::filesystem::path& path);
-[[nodiscard]] Result<std::vector<std::string>> losses_of_saving(const LoadedScene& loaded,
-                                                                const std::filesystem::path& path);
+[[nodiscard]] Result<std::vector<std::string>> unsupported_features(const Scene& scene,
+                                                                    const std::filesystem::path& path);
+[[nodiscard]] Result<std::vector<std::string>> unsupported_features(const LoadedScene& loaded,
+                                                                    const std::filesystem::path& path);
 
 }  // namespace quoin

@@ -144,7 +144,7 @@ struct LoadedMesh {
   std::string format;                 ///< "obj", "gltf", "glb", "ply" or "stl"
   std::vector<std::string> warnings;  ///< one line per skipped item, with the reason
   /// Other files that were read.
-  std::vector<std::filesystem::path> beside;
+  std::vector<std::filesystem::path> sidecars;
 };
 
 /// Reads the triangles of a file into one mesh with colours, in Quoin's axes. All nodes of a file's scene are merged.

@@ -33,8 +33,8 @@ namespace quoin {
 /// Cameras: all that the user set, with the file's numbers; panoramas are skipped with a warning.
 /// Look:    the render settings are in LoadedScene::look, if the file has them.
 /// Skipped: with a warning, voxels outside their model's box or of colour 0. Other frames, notes and unknown chunks are
-///          only in LoadedScene::source. `only_in_source` lists these and everything else that a Scene cannot hold:
-///          cameras and render settings.
+///          only in LoadedScene::source. `source_only_features` lists these and everything else that a Scene cannot
+///          hold: cameras and render settings.
 /// Progress: called after each model.
 /// Errors:  BadFormat with the byte offset; Unsupported for SLAB6's format of the same name and git-LFS pointers;
 ///          InvalidArgument for a missing frame; Cancelled; LimitExceeded if a scene graph or scattered voxels would
@@ -52,7 +52,7 @@ namespace quoin {
 
 /// Lists the content of a file that its scene does not hold, one line each, for display: "animation of 24 frames", "10
 /// cameras". Files from write_vox keep it; all other formats lose it.
-[[nodiscard]] std::vector<std::string> only_in_source(const VoxSource& source);
+[[nodiscard]] std::vector<std::string> source_only_features(const VoxSource& source);
 
 /// A scene encoded as a .vox file.
 struct VoxBytes {

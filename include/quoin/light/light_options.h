@@ -81,7 +81,7 @@ struct LightOptions {
   double least_light = 0.0;
   /// Draws reflections on glass and water. Where a ray enters, leaves or crosses between transparent bodies, the
   /// surface reflects the sky, weighted by the Fresnel term of the types' `ior`. Rays are not refracted. Requires
-  /// Shading::Lit; for rasterised meshes see MeshPictureOptions::glass_by_rays.
+  /// Shading::Lit; for rasterised meshes see MeshImageOptions::glass_by_rays.
   bool glass_surfaces = false;
 
   bool operator==(const LightOptions&) const = default;

@@ -73,7 +73,7 @@ class SurfaceLight {
 
   /// Writes the light of vertices, or of any positions at a surface. Sample (i, j, k) is the centre of voxel (i, j, k).
   /// Requires: as many unit normals as positions; `out` has at least as many elements.
-  void read(const SmoothPlaces& places, std::span<MeanLevels> out);
+  void read(const SmoothSamples& samples, std::span<MeanLevels> out);
 
  private:
   struct Rows;

@@ -17,7 +17,7 @@ namespace quoin {
 ///
 /// Normals point into the air. A normal whose length differs from 1 by more than about 0.0005 is normalised; a normal
 /// without direction (0, NaN, infinite) counts as (0, 1, 0).
-struct SmoothPlaces {
+struct SmoothSamples {
   std::span<const Vec3> positions;  ///< in samples of level 0, relative to `origin`
   std::span<const Vec3> normals;    ///< as many as positions
   IVec3 origin{0};                  ///< in samples; floats resolve 1/65,536 of a sample up to 256 samples from here
@@ -45,7 +45,7 @@ struct SmoothPlaces {
 /// Memory:   8 bytes per position and 2 MiB per thread.
 /// Requires: as many normals as positions; `out` has at least as many elements; fewer than 2^32 positions.
 /// Errors:   Cancelled; `out` is then partly written.
-[[nodiscard]] Status smooth_occlusion(const DensityGrid& field, const SmoothPlaces& places,
+[[nodiscard]] Status smooth_occlusion(const DensityGrid& field, const SmoothSamples& samples,
                                       const SmoothOcclusionOptions& options, std::span<float> out, Threads threads = {},
                                       const Progress& progress = {});
 
@@ -63,7 +63,7 @@ class SmoothOccluder {
   /// air.
   /// Requires: as smooth_occlusion.
   /// Cost:     no allocation once the scratch memory has grown.
-  void occlude(const DensityNeighbourhood& chunks, const SmoothPlaces& places, const SmoothOcclusionOptions& options,
+  void occlude(const DensityNeighbourhood& chunks, const SmoothSamples& samples, const SmoothOcclusionOptions& options,
                std::span<float> out);
 
  private:

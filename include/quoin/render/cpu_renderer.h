@@ -25,7 +25,7 @@ struct RenderOptions {
   DetailOptions detail{};
 };
 
-struct Picture {
+struct RenderedImage {
   Image colour;
   /// Distance in world units from the camera to the first voxel (also transparent) or field surface, along the ray
   /// through each pixel's centre. 0 inside a voxel or field; +infinity where the ray hits nothing. Empty unless
@@ -83,8 +83,8 @@ class CpuRenderer {
   ///           the camera's position is not finite, its axes are not of unit length, its field of view or view height
   ///           is out of range, the impostor edge is not 16 to 1,024, the impostor time is NaN, or `check` rejects the
   ///           light. Cancelled if `progress` returns false; it is called after every sample of a tile.
-  [[nodiscard]] Result<Picture> render(const Camera& camera, const RenderOptions& options = {}, Threads threads = {},
-                                       const Progress& progress = {}) const;
+  [[nodiscard]] Result<RenderedImage> render(const Camera& camera, const RenderOptions& options = {},
+                                             Threads threads = {}, const Progress& progress = {}) const;
 
   /// Returns the ray tracer of the renderer, for queries (first_hit, pick) that match its images. It is out of date
   /// between an edit and `update`, and must not be used during `update`.

@@ -113,7 +113,7 @@ class Impostor {
 };
 
 /// One of the 26 views of a grid's opaque voxels, for custom textures and images. Rows start at the top.
-struct ImpostorPicture {
+struct ImpostorImage {
   /// Camera in grid coordinates, in voxels: 8 radii (radius of at least 1 voxel) from the content's centre, which it
   /// looks at. The content's sphere exactly fits the image. The image's up direction is the grid's +Y, or +X in the
   /// views from directly above and below.
@@ -127,7 +127,7 @@ struct ImpostorPicture {
 
 /// Renders all 26 views, `options.edge` texels per side. For a grid without opaque voxels the images are empty.
 /// Cost: about 0.15 microseconds per texel that the content's box covers, on several threads.
-[[nodiscard]] std::vector<ImpostorPicture> impostor_pictures(const Grid& grid, const VoxelRegistry& types,
-                                                             const ImpostorOptions& options = {}, Threads threads = {});
+[[nodiscard]] std::vector<ImpostorImage> impostor_images(const Grid& grid, const VoxelRegistry& types,
+                                                         const ImpostorOptions& options = {}, Threads threads = {});
 
 }  // namespace quoin

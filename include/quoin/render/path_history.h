@@ -27,8 +27,8 @@ namespace quoin {
 ///   PathHistory history;
 ///   for (const int samples : {1, 4, 16, 64}) {
 ///     options.samples = samples;
-///     Result<PathPicture> picture = tracer.render(camera, options);
-///     history.refine(*picture, samples);          // and show it
+///     Result<PathImage> image = tracer.render(camera, options);
+///     history.refine(*image, samples);          // and show it
 ///   }
 ///   grid.set({1, 2, 3}, kAir);
 ///   tracer.update();
@@ -56,9 +56,9 @@ class PathHistory {
   /// Stores the light of an image and replaces it with the light to show: at the best earlier image's size, combined as
   /// above. Keeps the image's layers, rays and counts, but drops layers of another size.
   ///
-  /// Requires: picture.radiance, scene and alpha have one value per pixel; all images since `clear` show the same view
+  /// Requires: image.radiance, scene and alpha have one value per pixel; all images since `clear` show the same view
   ///           with the same options except size and samples.
-  void refine(PathPicture& picture, int samples, Threads threads = {});
+  void refine(PathImage& image, int samples, Threads threads = {});
 
   /// Returns the bytes held: 4 per pixel of each image since the edit, and of each image that led to the best image
   /// before the edit.
@@ -78,7 +78,7 @@ class PathHistory {
   [[nodiscard]] static std::vector<float> shares(const Taken& now, const Taken& before, const Taken& best,
                                                  Threads threads);
   static void combine(const Taken& before, const Taken& best, const std::vector<float>& shares, Threads threads,
-                      PathPicture& picture);
+                      PathImage& image);
 
   std::vector<Taken> earlier_;  // in order of increasing quality; of one scene
   std::vector<Taken> now_;      // in order of increasing quality; of the current scene

@@ -26,7 +26,7 @@ struct PathOptions : Look {
   int max_bounces = 8;       ///< 0 to 1,024: maximum number of bounces between surfaces on a path
   int max_scatterings = 64;  ///< 0 to 1,024: maximum number of additional scattering events in fog and clouds on a path
   std::uint32_t seed = 0;
-  bool layers = false;   ///< fill PathPicture's layers
+  bool layers = false;   ///< fill PathImage's layers
   bool denoise = false;  ///< remove noise within surfaces; keeps edges of objects, shadows and colours
 
   bool operator==(const PathOptions&) const = default;
@@ -34,7 +34,7 @@ struct PathOptions : Look {
 
 /// A path-traced image in linear light, with data for compositing. Each array has one value per pixel, rows from the
 /// top.
-struct PathPicture {
+struct PathImage {
   int width = 0;
   int height = 0;
   std::vector<Vec3> radiance;  ///< means of the samples, including the background
@@ -90,8 +90,8 @@ class PathTracer {
   ///           every few samples of a tile.
   /// Memory:   28 bytes per pixel, 62 with layers, about 300 more during `denoise`; 2 MB per thread. The tracer keeps
   ///           the sky between calls.
-  [[nodiscard]] Result<PathPicture> render(const Camera& camera, const PathOptions& options = {}, Threads threads = {},
-                                           const Progress& progress = {}) const;
+  [[nodiscard]] Result<PathImage> render(const Camera& camera, const PathOptions& options = {}, Threads threads = {},
+                                         const Progress& progress = {}) const;
 
  private:
   struct Impl;
@@ -103,15 +103,15 @@ class PathTracer {
 /// Neutral: the log-average luminance becomes 0.18, and the brightest 1 % stays within 4 times white. Pixels with an
 ///          alpha above 0.5 count without the background, others with it; black pixels do not count.
 /// Others:  the developed image, including the background, has the same mean byte as under the neutral curve.
-[[nodiscard]] double find_exposure(const PathPicture& picture, ToneCurve tone = ToneCurve::Neutral);
+[[nodiscard]] double find_exposure(const PathImage& image, ToneCurve tone = ToneCurve::Neutral);
 
 /// Converts the image to sRGB bytes, including the background.
 /// Errors: InvalidArgument, with the option's name, if a DevelopOptions value is out of range.
 /// Memory: with bloom, two additional copies of the light.
-[[nodiscard]] Result<Image> develop(const PathPicture& picture, const DevelopOptions& options = {});
+[[nodiscard]] Result<Image> develop(const PathImage& image, const DevelopOptions& options = {});
 
 /// Converts the scene without the background to sRGB bytes, with the coverage of each pixel as alpha.
 /// Errors: as `develop`.
-[[nodiscard]] Result<AlphaImage> develop_with_alpha(const PathPicture& picture, const DevelopOptions& options = {});
+[[nodiscard]] Result<AlphaImage> develop_with_alpha(const PathImage& image, const DevelopOptions& options = {});
 
 }  // namespace quoin

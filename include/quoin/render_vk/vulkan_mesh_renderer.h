@@ -9,7 +9,7 @@
 #include <quoin/core/result.h>
 #include <quoin/light/light_options.h>
 #include <quoin/live/live_meshes.h>
-#include <quoin/render_vk/vulkan_picture.h>
+#include <quoin/render_vk/vulkan_image.h>
 #include <quoin/render_vk/vulkan_renderer.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/level_of_detail.h>
@@ -24,7 +24,7 @@ enum class Wireframe : std::uint8_t {
   Only,  ///< edges only, including hidden edges
 };
 
-struct MeshPictureOptions {
+struct MeshImageOptions {
   int width = 1280;
   int height = 720;
   /// Coverage samples per pixel: 1, 2, 4 or 8; rounded down to a number that the device supports.
@@ -94,7 +94,7 @@ class VulkanMeshRenderer {
   ///           shadows, lamps, propagated light, levels of detail or glass by rays are used, if the VulkanRenderer's
   ///           last update had another scene or filter. Unsupported for wireframes on a device without line drawing.
   ///           After a drawing error the image has no samples.
-  [[nodiscard]] Status draw(VulkanPicture& picture, const Camera& camera, const MeshPictureOptions& options = {},
+  [[nodiscard]] Status draw(VulkanImage& image, const Camera& camera, const MeshImageOptions& options = {},
                             Threads threads = {});
 
   struct Stats {

@@ -10,7 +10,7 @@
 #include <quoin/core/result.h>
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/render_vk/vulkan_device.h>
-#include <quoin/render_vk/vulkan_picture.h>
+#include <quoin/render_vk/vulkan_image.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/scene.h>
 
@@ -89,8 +89,8 @@ class VulkanRenderer {
   [[nodiscard]] std::uint64_t uploaded_bytes() const;
 
   /// Renders one image, as CpuRenderer::render; `threads` compute levels of detail.
-  [[nodiscard]] Result<Picture> render(const Camera& camera, const RenderOptions& options = {}, Threads threads = {},
-                                       const Progress& progress = {});
+  [[nodiscard]] Result<RenderedImage> render(const Camera& camera, const RenderOptions& options = {},
+                                             Threads threads = {}, const Progress& progress = {});
 
   /// Draws into an image on the device: adds `options.samples` samples per pixel. Starts from scratch with
   /// Accumulation::Restart, if the size changes, or if another function drew or wrote the image. The accumulated image
@@ -100,7 +100,7 @@ class VulkanRenderer {
   ///           scene is not checked.
   /// Errors:   as `render`. LimitExceeded for more than 4,096 samples in total. InvalidArgument for an image of another
   ///           renderer. `options.depth` has no effect.
-  [[nodiscard]] Status draw(VulkanPicture& picture, const Camera& camera, const RenderOptions& options,
+  [[nodiscard]] Status draw(VulkanImage& image, const Camera& camera, const RenderOptions& options,
                             Accumulation accumulation, Threads threads = {}, const Progress& progress = {});
 
   /// Path-traces one image, as PathTracer::render. Reads emissive faces from the scene of the last `update`, which must
@@ -109,9 +109,9 @@ class VulkanRenderer {
   /// Equal:  uses the same random numbers as PathTracer, so the image has the same light and the same noise. Paths
   ///         differ only where single precision takes a ray past another voxel.
   /// Errors: as PathTracer::render and as the class.
-  /// Memory: as VulkanPathPicture.
-  [[nodiscard]] Result<PathPicture> render_paths(const Camera& camera, const PathOptions& options = {},
-                                                 Threads threads = {}, const Progress& progress = {});
+  /// Memory: as VulkanPathImage.
+  [[nodiscard]] Result<PathImage> render_paths(const Camera& camera, const PathOptions& options = {},
+                                               Threads threads = {}, const Progress& progress = {});
 
   /// Adds `options.samples` samples per pixel to a path-traced image. Starts from scratch with Accumulation::Restart,
   /// if the size changes, or after an error, including Cancelled.
@@ -120,7 +120,7 @@ class VulkanRenderer {
   ///           the existing samples; the scene is not checked.
   /// Errors:   as `render_paths`. LimitExceeded for more than 65,536 samples in total. InvalidArgument for an image of
   ///           another renderer.
-  [[nodiscard]] Status draw_paths(VulkanPathPicture& picture, const Camera& camera, const PathOptions& options,
+  [[nodiscard]] Status draw_paths(VulkanPathImage& image, const Camera& camera, const PathOptions& options,
                                   Accumulation accumulation, const Progress& progress = {});
 
   // For Quoin's own sources.

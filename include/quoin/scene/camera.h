@@ -47,7 +47,7 @@ struct Camera {
 [[nodiscard]] glm::dmat4 camera_from_world(const Camera& camera);
 
 /// A point in an image of `width` by `height` pixels.
-struct PicturePoint {
+struct ImagePoint {
   double x = 0.0;  ///< pixels from the image's upper left corner; pixel centres are at + 0.5
   double y = 0.0;
   int width = 1;
@@ -57,13 +57,12 @@ struct PicturePoint {
 /// Returns the ray through a point of the image, in world space. It starts at a perspective camera's position, or in
 /// the image plane of an orthographic camera. `direction` is a unit vector, so distances along the ray are world units.
 /// Requires: width and height are positive.
-[[nodiscard]] Ray ray_through(const Camera& camera, const PicturePoint& point);
+[[nodiscard]] Ray ray_through(const Camera& camera, const ImagePoint& point);
 
 /// Returns the image position of a world point: the inverse of `ray_through`, for labels and marks. The result may lie
 /// outside the image. Returns nullopt if the point is not finite, or is not in front of a perspective camera.
 /// Requires: width and height are positive.
-[[nodiscard]] std::optional<PicturePoint> picture_point(const Camera& camera, DVec3 point_in_world, int width,
-                                                        int height);
+[[nodiscard]] std::optional<ImagePoint> image_point(const Camera& camera, DVec3 point_in_world, int width, int height);
 
 /// Standard views that frame a whole scene. Front looks along -Z and shows faces that point towards +Z.
 enum class View : std::uint8_t { Front, Back, Left, Right, Top, Iso };

@@ -73,7 +73,7 @@ using GroupHandle = Handle<SceneGroup>;
 using LayerHandle = Handle<SceneLayer>;
 
 /// One placement of a grid in the world. Moving an instance changes no voxels and no meshes. An instance with an
-/// invalid transform (see `has_place`) is left out of images, queries and bounds.
+/// invalid transform (see `has_valid_transform`) is left out of images, queries and bounds.
 struct Instance {
   std::string name{};
   GridHandle grid{};
@@ -245,7 +245,7 @@ class Scene {
 void move_group(Scene& scene, GroupHandle group, DVec3 position, const DQuat& rotation);
 
 /// Returns true if an instance has a valid transform: all numbers are finite and the voxel size is positive.
-[[nodiscard]] bool has_place(const Instance& instance);
+[[nodiscard]] bool has_valid_transform(const Instance& instance);
 
 /// Returns true if an instance's grid exists and `filter` accepts the instance. Does not check the transform.
 [[nodiscard]] bool is_drawn(const Scene& scene, const Instance& instance, InstanceFilter filter);
@@ -257,7 +257,7 @@ void move_group(Scene& scene, GroupHandle group, DVec3 position, const DQuat& ro
 /// from the last column in double: far from the origin, floats cannot separate neighbouring voxels.
 [[nodiscard]] glm::dmat4 world_from_grid(const Instance& instance, const SceneGrid& grid);
 /// Transforms a point from the world to the instance's grid (voxels): the inverse of `world_from_grid`, to rounding.
-/// Returns NaN in every component if the instance has no valid transform (`has_place`).
+/// Returns NaN in every component if the instance has no valid transform (`has_valid_transform`).
 [[nodiscard]] DVec3 grid_from_world(const Instance& instance, const SceneGrid& grid, DVec3 point_in_world);
 /// Transforms a displacement between the instance's grid (voxels) and the world (world units). Rotation, mirroring and
 /// scale apply; translation does not. grid_from_world_direction returns NaN if the instance has no valid transform.
@@ -265,7 +265,7 @@ void move_group(Scene& scene, GroupHandle group, DVec3 position, const DQuat& ro
 [[nodiscard]] DVec3 grid_from_world_direction(const Instance& instance, DVec3 direction_in_world);
 /// Returns the new world position of a point fixed to an instance that moves from `before` to `after`. Call it each
 /// frame to carry bodies on a lift or a turning ship. Returns the point unchanged if either transform is invalid.
-[[nodiscard]] DVec3 carried_point(const Instance& before, const Instance& after, DVec3 point_in_world);
+[[nodiscard]] DVec3 transformed_point(const Instance& before, const Instance& after, DVec3 point_in_world);
 /// Returns the voxel (air included) that contains a world point. A point on a border belongs to the voxel with the
 /// greater coordinate on that axis. Returns nullopt if the instance has no valid transform, the point is not finite, or
 /// the voxel's coordinates do not fit in int32.

@@ -14,8 +14,8 @@ namespace quoin {
 // edit of a grid shows in all its instances.
 //
 // Requires: the handle names an instance of the scene, and the scene contains the instance's grid.
-// Invalid:  does nothing and returns false or 0 if the instance has no valid transform (`has_place`), or a number of
-//           the shape is negative or not finite.
+// Invalid:  does nothing and returns false or 0 if the instance has no valid transform (`has_valid_transform`), or a
+//           number of the shape is negative or not finite.
 
 /// Sets the voxel that contains a world point (see `voxel_from_world`). Returns true if its type changed.
 bool set_voxel(Scene& scene, InstanceHandle instance, DVec3 point_in_world, VoxelType type);

@@ -85,14 +85,14 @@ struct SceneHit {
                            double max_t = std::numeric_limits<double>::infinity(), const QueryFilter& filter = {});
 
 /// Returns the hit at a point of an image. Requires: width and height are positive.
-[[nodiscard]] std::optional<SceneHit> pick(const SceneTracer& tracer, const Camera& camera, const PicturePoint& point,
+[[nodiscard]] std::optional<SceneHit> pick(const SceneTracer& tracer, const Camera& camera, const ImagePoint& point,
                                            const QueryFilter& filter = {});
 
 /// Returns the voxel or field surface that a pixel of a depth image (Picture::depth) shows: the first hit of the ray at
 /// distance `depth` (world units), to the rounding of a float. Returns nullopt if there is none at that distance, or
 /// `depth` is negative, infinite or NaN. Requires: width and height are positive.
 [[nodiscard]] std::optional<SceneHit> voxel_at_depth(const SceneTracer& tracer, const Camera& camera,
-                                                     const PicturePoint& point, float depth,
+                                                     const ImagePoint& point, float depth,
                                                      const QueryFilter& filter = {});
 
 /// An overlap of a shape with a voxel or with a field cell whose solid touches it. QueryFilter selects the types; by

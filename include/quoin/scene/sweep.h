@@ -71,10 +71,10 @@ struct SweepHit {
 /// Cost:   one overlap query for each candidate position that is nearer than the result: a few hundred queries for a
 ///         voxel-sized box and a distance of twice its size.
 /// Errors: returns nullopt for sizes, positions and distances that are negative or not finite.
-[[nodiscard]] std::optional<DVec3> displacement_to_free_place(const SceneTracer& tracer, const OrientedBox& box,
-                                                              double max_distance, const QueryFilter& filter = {});
-[[nodiscard]] std::optional<DVec3> displacement_to_free_place(const SceneTracer& tracer, const Capsule& capsule,
-                                                              double max_distance, const QueryFilter& filter = {});
+[[nodiscard]] std::optional<DVec3> depenetration(const SceneTracer& tracer, const OrientedBox& box, double max_distance,
+                                                 const QueryFilter& filter = {});
+[[nodiscard]] std::optional<DVec3> depenetration(const SceneTracer& tracer, const Capsule& capsule, double max_distance,
+                                                 const QueryFilter& filter = {});
 
 /// Floor settings of a walking body. A floor is a surface no steeper than `max_slope_degrees`.
 struct FloorOptions {
@@ -93,7 +93,7 @@ struct SlideOptions {
   double skin = 1e-3;
   int max_contacts = 5;  ///< the remaining displacement is dropped after this many contacts
   /// Moves a body that starts inside an obstacle out of it first. In a field's solid it moves along the gradient
-  /// if that leads out; otherwise it uses `displacement_to_free_place`. If this is false or there is no free position,
+  /// if that leads out; otherwise it uses `depenetration`. If this is false or there is no free position,
   /// the body stays in place with `is_blocked` set and its displacement unchanged.
   bool pushes_out = true;
   /// Limit of that push, in world units; default: the longest edge of the box plus the way out of the obstacle.
@@ -126,7 +126,7 @@ struct SlideResult {
   bool is_waiting = false;
   bool is_on_floor = false;  ///< at the end, with `SlideOptions::floor`
   DVec3 floor_normal{0.0};   ///< normal of that floor
-  /// The contact with that floor: the voxel, and the instance, which may carry the body (`carried_point`).
+  /// The contact with that floor: the voxel, and the instance, which may carry the body (`transformed_point`).
   SweepHit floor;
   /// All contacts in order, except a floor that supports the body from start to end.
   std::vector<SlideContact> contacts;

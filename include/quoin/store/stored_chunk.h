@@ -10,12 +10,12 @@
 namespace quoin {
 
 /// The address of a chunk in a world.
-struct ChunkPlace {
+struct ChunkAddress {
   std::uint32_t grid = 0;  ///< the grid's number in the world; never reused
   std::uint8_t level = 0;  ///< level of detail: voxels have edges of 2^level
   IVec3 chunk{0};          ///< chunk coordinates, as in Grid::find_chunk
 
-  bool operator==(const ChunkPlace&) const = default;
+  bool operator==(const ChunkAddress&) const = default;
 };
 
 /// The stored content of a chunk. A chunk stored as air was generated and is empty; a chunk that is not stored was

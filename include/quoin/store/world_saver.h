@@ -65,7 +65,7 @@ class WorldSaver {
                           std::function<void(const Status&)> on_saved = {});
   /// Sets the sun and cameras to store with the next `save`. If not called, `save` keeps the values from load_world.
   void set_view(WorldView view);
-  /// Returns the number of a grid in the world (ChunkPlace::grid), or nullopt before its first save. Cost: O(log
+  /// Returns the number of a grid in the world (ChunkAddress::grid), or nullopt before its first save. Cost: O(log
   /// grids).
   [[nodiscard]] std::optional<std::uint32_t> number_of(GridHandle grid) const;
 

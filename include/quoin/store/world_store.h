@@ -47,9 +47,9 @@ class WorldChanges {
 
   /// Stores a chunk. Cost: copies a few pointers; chunks share storage with their grids, which may be edited
   /// afterwards.
-  void put_chunk(const ChunkPlace& place, StoredChunk chunk);
+  void put_chunk(const ChunkAddress& address, StoredChunk chunk);
   /// Removes a chunk, as if it had never been generated.
-  void remove_chunk(const ChunkPlace& place);
+  void remove_chunk(const ChunkAddress& address);
   /// Stores the types of a registry, from `first` on. Types in use can be changed but not removed.
   void put_types(const VoxelRegistry& types, VoxelType first = 1);
   /// Stores one type. Requires: not air.
@@ -125,7 +125,7 @@ class WorldStore {
 
   /// Loads a chunk. Returns nullopt if it is not stored, which differs from air.
   /// Errors: BadFormat if it is damaged; CannotRead.
-  [[nodiscard]] Result<std::optional<StoredChunk>> load_chunk(const ChunkPlace& place) const;
+  [[nodiscard]] Result<std::optional<StoredChunk>> load_chunk(const ChunkAddress& address) const;
   /// Returns the coordinates of all stored chunks of a grid and level in a box of chunk coordinates (half open), sorted
   /// by z, then y, then x. Cost: the lesser of O(box volume) and O(chunks in the regions of 32^3 chunks that the box
   /// touches).

@@ -150,8 +150,8 @@ class StreamedWorld {
   /// Errors: InvalidArgument, without any change, if the grid does not exist or is not streamed (see `number_of`), or
   ///         if a type is not registered; errors of chunks_of_edit.
   Status apply(const WorldEdit& edit);
-  /// Returns the number that identifies a grid in edits (WorldEdit::grid) and in the store (ChunkPlace::grid); nullopt
-  /// for grids that are not streamed. Cost: O(log grids).
+  /// Returns the number that identifies a grid in edits (WorldEdit::grid) and in the store (ChunkAddress::grid);
+  /// nullopt for grids that are not streamed. Cost: O(log grids).
   [[nodiscard]] std::optional<std::uint32_t> number_of(GridHandle grid) const;
 
   /// Saves all edits, including edits that wait for chunks, and returns when they are on disk.

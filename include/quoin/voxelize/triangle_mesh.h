@@ -61,9 +61,9 @@ struct TriangleMesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< indices into positions
   std::vector<glm::vec4> colours;                       ///< linear light and alpha, one per position; empty: white
   /// Texture coordinates, three per triangle; (0, 0) is the image's top left corner; may be empty.
-  std::vector<glm::vec2> texture_places;
+  std::vector<glm::vec2> uvs;
   /// Coordinates in the emissive texture; empty: materials with an emissive texture emit no light.
-  std::vector<glm::vec2> emissive_places;
+  std::vector<glm::vec2> emissive_uvs;
   std::vector<std::uint32_t> material_of;  ///< one per triangle; empty: all use material 0
   std::vector<MeshMaterial> materials;     ///< empty: a single light grey material
   std::vector<MeshTexture> textures;

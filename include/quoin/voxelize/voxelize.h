@@ -111,7 +111,7 @@ struct DistanceFieldOptions {
 };
 
 /// The distance field of a mesh, with warnings.
-struct FieldOfMesh {
+struct MeshDistanceField {
   DensityGrid field;
   std::vector<std::string> warnings;  ///< one line each
 };
@@ -125,8 +125,8 @@ struct FieldOfMesh {
 /// Cost:      about 5 s for 70,000 triangles in 512^3 on one thread; a third of that with a band of 3.
 /// Otherwise: as `voxelize`.
 /// Errors:    also InvalidArgument for SolidVoxels::None, or a band outside (0, 64].
-[[nodiscard]] Result<FieldOfMesh> distance_field(const TriangleMesh& mesh, const DistanceFieldOptions& options,
-                                                 VoxelRegistry& types, Threads threads = {},
-                                                 const Progress& progress = {});
+[[nodiscard]] Result<MeshDistanceField> distance_field(const TriangleMesh& mesh, const DistanceFieldOptions& options,
+                                                       VoxelRegistry& types, Threads threads = {},
+                                                       const Progress& progress = {});
 
 }  // namespace quoin

@@ -434,7 +434,7 @@ std::vector<std::size_t> ConnectedPieces::Impl::listed(const IBox& box, bool tou
 }
 
 ConnectedPieces::ConnectedPieces(ConnectedOptions options) : impl_(std::make_unique<Impl>()) {
-  content_of(impl_).options = std::move(options);
+  impl_of(impl_).options = std::move(options);
 }
 ConnectedPieces::ConnectedPieces(ConnectedPieces&&) noexcept = default;
 ConnectedPieces& ConnectedPieces::operator=(ConnectedPieces&&) noexcept = default;
@@ -446,56 +446,56 @@ void ConnectedPieces::Impl::take_data(IVec3 at, const Chunk* chunk) {
 }
 
 void ConnectedPieces::update(const Grid& grid, Threads threads) {
-  ChangeCursor now = content_of(impl_).followed;
+  ChangeCursor now = impl_of(impl_).followed;
   ChangeCursor of_data = now;
   const GridChanges changes = grid.changes_since(now);
   // Voxels that also changed their type are handled below.
   for (const DataChange& change : grid.data_changes_since(of_data).items) {
-    content_of(impl_).take_data(change.chunk, grid.find_chunk(change.chunk));
+    impl_of(impl_).take_data(change.chunk, grid.find_chunk(change.chunk));
   }
   if (changes.empty()) {
-    content_of(impl_).followed = now;
+    impl_of(impl_).followed = now;
     return;
   }
   std::vector<IVec3> chunks;
   if (changes.all) {
-    content_of(impl_).entries.clear();
+    impl_of(impl_).entries.clear();
     chunks = grid.chunks();
   }
   for (const ChunkChange& change : changes.items) chunks.push_back(change.chunk);
-  content_of(impl_).find_parts(grid, chunks, threads);
-  content_of(impl_).find_links(chunks, threads);
-  content_of(impl_).find_open_parts(grid, chunks);
-  content_of(impl_).make_pieces();
-  content_of(impl_).followed = now;
+  impl_of(impl_).find_parts(grid, chunks, threads);
+  impl_of(impl_).find_links(chunks, threads);
+  impl_of(impl_).find_open_parts(grid, chunks);
+  impl_of(impl_).make_pieces();
+  impl_of(impl_).followed = now;
 }
 
 std::span<const ConnectedPiece> ConnectedPieces::pieces() const {
-  return content_of(impl_).pieces;
+  return impl_of(impl_).pieces;
 }
 
 std::optional<std::size_t> ConnectedPieces::piece_at(IVec3 voxel) const {
-  const auto found = content_of(impl_).entries.find(chunk_of(voxel));
-  if (found == content_of(impl_).entries.end()) return std::nullopt;
+  const auto found = impl_of(impl_).entries.find(chunk_of(voxel));
+  if (found == impl_of(impl_).entries.end()) return std::nullopt;
   const Entry& entry = found->second;
   const IVec3 local = local_of(voxel);
   const std::uint64_t row = entry.parts.row(local.y, local.z);
   if ((row >> local.x & 1U) == 0) return std::nullopt;
-  return content_of(impl_).piece_of_node[entry.first_node + entry.parts.part_at(row, local.x, local.y, local.z)];
+  return impl_of(impl_).piece_of_node[entry.first_node + entry.parts.part_at(row, local.x, local.y, local.z)];
 }
 
 std::vector<std::size_t> ConnectedPieces::touching(const IBox& box) const {
-  return content_of(impl_).listed(box, true);
+  return impl_of(impl_).listed(box, true);
 }
 
-std::vector<std::size_t> ConnectedPieces::apart_from(const IBox& box) const {
-  std::vector<std::size_t> apart = content_of(impl_).listed(box, false);
-  std::erase_if(apart, [&](std::size_t piece) { return content_of(impl_).pieces[piece].touches_unloaded; });
-  return apart;
+std::vector<std::size_t> ConnectedPieces::not_touching(const IBox& box) const {
+  std::vector<std::size_t> separate = impl_of(impl_).listed(box, false);
+  std::erase_if(separate, [&](std::size_t piece) { return impl_of(impl_).pieces[piece].touches_unloaded; });
+  return separate;
 }
 
 void ConnectedPieces::for_each_row(std::size_t piece, FunctionRef<void(IVec3 row, std::uint64_t voxels)> visit) const {
-  content_of(impl_).for_each_chunk(piece, [&](const Entry& entry, std::span<const std::size_t> of_piece) {
+  impl_of(impl_).for_each_chunk(piece, [&](const Entry& entry, std::span<const std::size_t> of_piece) {
     Impl::for_each_row(entry, of_piece,
                        [&](IVec3 row, std::uint64_t voxels) { visit(entry.at * kChunkEdge + row, voxels); });
   });
@@ -504,7 +504,7 @@ void ConnectedPieces::for_each_row(std::size_t piece, FunctionRef<void(IVec3 row
 Grid ConnectedPieces::extract(std::size_t piece) const {
   Grid grid;
   std::array<VoxelType, kChunkEdge> types{};
-  content_of(impl_).for_each_chunk(piece, [&](const Entry& entry, std::span<const std::size_t> of_piece) {
+  impl_of(impl_).for_each_chunk(piece, [&](const Entry& entry, std::span<const std::size_t> of_piece) {
     if (Impl::are_all(entry, of_piece)) {
       grid.put_chunk(entry.at, entry.parts.chunk());
       return;
@@ -524,7 +524,7 @@ Grid ConnectedPieces::extract(std::size_t piece) const {
 std::int64_t ConnectedPieces::remove_from(Grid& grid, std::size_t piece) const {
   static constexpr std::array<VoxelType, kChunkEdge> kAirRow{};
   std::int64_t changed = 0;
-  content_of(impl_).for_each_chunk(piece, [&](const Entry& entry, std::span<const std::size_t> of_piece) {
+  impl_of(impl_).for_each_chunk(piece, [&](const Entry& entry, std::span<const std::size_t> of_piece) {
     const Chunk* present = grid.find_chunk(entry.at);
     if (present == nullptr) return;
     if (present->shares_storage_with(entry.parts.chunk()) && Impl::are_all(entry, of_piece)) {
@@ -539,12 +539,12 @@ std::int64_t ConnectedPieces::remove_from(Grid& grid, std::size_t piece) const {
 }
 
 std::size_t ConnectedPieces::bytes() const {
-  std::size_t total = sizeof(*this) + sizeof(Impl) + content_of(impl_).pieces.capacity() * sizeof(ConnectedPiece);
-  total += (content_of(impl_).piece_of_node.capacity() + content_of(impl_).nodes.capacity() +
-            content_of(impl_).first_nodes.capacity()) *
+  std::size_t total = sizeof(*this) + sizeof(Impl) + impl_of(impl_).pieces.capacity() * sizeof(ConnectedPiece);
+  total += (impl_of(impl_).piece_of_node.capacity() + impl_of(impl_).nodes.capacity() +
+            impl_of(impl_).first_nodes.capacity()) *
                sizeof(std::size_t) +
-           content_of(impl_).in_order.capacity() * sizeof(const Entry*);
-  for (const auto& [at, entry] : content_of(impl_).entries) {
+           impl_of(impl_).in_order.capacity() * sizeof(const Entry*);
+  for (const auto& [at, entry] : impl_of(impl_).entries) {
     constexpr std::size_t kMapNode = 4 * sizeof(void*);
     total += kMapNode + sizeof(std::pair<IVec3, Entry>) - sizeof(ChunkParts) + entry.parts.bytes() +
              entry.links.capacity() * sizeof(Link) + entry.open_parts.capacity() * sizeof(std::uint32_t);

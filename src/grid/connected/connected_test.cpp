@@ -251,9 +251,9 @@ TEST(ConnectedPieces, TouchABoxWhereTheyHaveAVoxelInIt) {
       std::sort(touching.begin(), touching.end());
       touching.erase(std::unique(touching.begin(), touching.end()), touching.end());
       EXPECT_EQ(pieces.touching(box), touching);
-      const std::vector<std::size_t> apart = pieces.apart_from(box);
-      EXPECT_EQ(apart.size() + touching.size(), pieces.size());
-      for (const std::size_t piece : apart) {
+      const std::vector<std::size_t> separate = pieces.not_touching(box);
+      EXPECT_EQ(separate.size() + touching.size(), pieces.size());
+      for (const std::size_t piece : separate) {
         EXPECT_FALSE(std::binary_search(touching.begin(), touching.end(), piece));
       }
     }
@@ -270,10 +270,10 @@ TEST(ConnectedPieces, FindsPiecesCutFromTheGround) {
   world.fill_box({{10, 4, 10}, {13, 151, 13}}, 2);  // a tower of three chunks
   ConnectedPieces pieces;
   pieces.update(world);
-  EXPECT_TRUE(pieces.apart_from(ground).empty());
+  EXPECT_TRUE(pieces.not_touching(ground).empty());
   world.fill_box({{0, 40, 0}, {21, 41, 21}}, kAir);
   pieces.update(world);
-  const std::vector<std::size_t> loose = pieces.apart_from(ground);
+  const std::vector<std::size_t> loose = pieces.not_touching(ground);
   ASSERT_EQ(loose.size(), 1U);
   EXPECT_EQ(pieces.pieces()[loose[0]].voxels, 9 * 110);
   EXPECT_EQ(pieces.pieces()[loose[0]].box, (IBox{{10, 41, 10}, {13, 151, 13}}));
@@ -354,12 +354,12 @@ TEST(ConnectedPieces, HoldsPiecesThatTouchUnloadedChunks) {
   EXPECT_TRUE(pieces.pieces()[0].touches_unloaded);
   EXPECT_FALSE(pieces.pieces()[1].touches_unloaded);
   const IBox ground{{0, 0, 0}, {64, 1, 64}};
-  EXPECT_EQ(pieces.apart_from(ground), (std::vector<std::size_t>{1}));
+  EXPECT_EQ(pieces.not_touching(ground), (std::vector<std::size_t>{1}));
 
   grid.load_chunk({1, 0, 0}, Chunk(kAir));  // it does not
   pieces.update(grid);
   EXPECT_FALSE(pieces.pieces()[0].touches_unloaded);
-  EXPECT_EQ(pieces.apart_from(ground), (std::vector<std::size_t>{0, 1}));
+  EXPECT_EQ(pieces.not_touching(ground), (std::vector<std::size_t>{0, 1}));
   grid.unload_chunk({1, 0, 0});
   pieces.update(grid);
   EXPECT_TRUE(pieces.pieces()[0].touches_unloaded);
@@ -369,7 +369,7 @@ TEST(ConnectedPieces, HoldsPiecesThatTouchUnloadedChunks) {
   whole.set(30, 30, 30, 1);
   ConnectedPieces of_whole;
   of_whole.update(whole);
-  EXPECT_EQ(of_whole.apart_from(ground), (std::vector<std::size_t>{0, 1}));
+  EXPECT_EQ(of_whole.not_touching(ground), (std::vector<std::size_t>{0, 1}));
 }
 
 TEST(ConnectedPieces, EdgesAndCornersOfChunksCountWhereVoxelsConnectByThem) {

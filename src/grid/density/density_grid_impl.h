@@ -47,7 +47,7 @@ class NoticeOfEdits {
   NoticeOfEdits(const NoticeOfEdits&) = delete;
   NoticeOfEdits& operator=(const NoticeOfEdits&) = delete;
   ~NoticeOfEdits() {
-    if (store_.edits() != before_) notice_.give();
+    if (store_.edits() != before_) notice_.notify();
   }
 
  private:

@@ -156,9 +156,9 @@ std::int64_t DensityStore::edit(const LongBox& wanted, bool creates, VoxelType m
   journal_.begin_change();
   std::int64_t changed = 0;
   const auto visit = [&](IVec3 chunk) {
-    const ChunkEdit wish = chunk_edit(chunk);
-    if (wish == ChunkEdit::Nothing) return;
-    if (wish == ChunkEdit::Solid && find(chunk) == nullptr) {
+    const ChunkEdit request = chunk_edit(chunk);
+    if (request == ChunkEdit::Nothing) return;
+    if (request == ChunkEdit::Solid && find(chunk) == nullptr) {
       changed += make_solid(chunk, material);
     } else {
       changed += edit_rows(chunk, part_of(box, chunk), change);

@@ -181,15 +181,15 @@ GridPyramid& GridPyramid::operator=(GridPyramid&&) noexcept = default;
 GridPyramid::~GridPyramid() = default;
 
 void GridPyramid::update(const Grid& grid, const VoxelRegistry& types, int levels, Threads threads) {
-  content_of(impl_).update(grid, {&types}, levels, threads);
+  impl_of(impl_).update(grid, {&types}, levels, threads);
 }
 
 int GridPyramid::levels() const {
-  return content_of(impl_).count();
+  return impl_of(impl_).count();
 }
 
 const Grid& GridPyramid::level(int level) const {
-  return content_of(impl_).at(level).content;
+  return impl_of(impl_).at(level).content;
 }
 
 struct DensityPyramid::Impl : Levels<DensityHalving, DensityLevel> {};
@@ -200,19 +200,19 @@ DensityPyramid& DensityPyramid::operator=(DensityPyramid&&) noexcept = default;
 DensityPyramid::~DensityPyramid() = default;
 
 void DensityPyramid::update(const DensityGrid& field, int levels, Threads threads) {
-  content_of(impl_).update(field, {}, levels, threads);
+  impl_of(impl_).update(field, {}, levels, threads);
 }
 
 int DensityPyramid::levels() const {
-  return content_of(impl_).count();
+  return impl_of(impl_).count();
 }
 
 const DensityGrid& DensityPyramid::level(int level) const {
-  return content_of(impl_).at(level).content;
+  return impl_of(impl_).at(level).content;
 }
 
 const DownsampledDensityCounts& DensityPyramid::counts(int level) const {
-  return content_of(impl_).at(level).counts;
+  return impl_of(impl_).at(level).counts;
 }
 
 }  // namespace quoin

@@ -69,31 +69,31 @@ float metres_of(HeightEncoding encoding, const std::byte* rgb) {
   return static_cast<float>(encoding == HeightEncoding::Mapbox ? number / 10.0 - 10'000.0 : number / 256.0 - 32'768.0);
 }
 
-Result<HeightMap> read_picture(std::span<const std::byte> bytes, HeightEncoding encoding, double metres_per_level) {
-  const auto picture = decode_png_samples(bytes);
-  if (!picture) return picture.error();
+Result<HeightMap> read_image(std::span<const std::byte> bytes, HeightEncoding encoding, double metres_per_level) {
+  const auto image = decode_png_samples(bytes);
+  if (!image) return image.error();
   const bool is_grey = encoding == HeightEncoding::Grey;
-  if (is_grey && picture->channels != 1) {
+  if (is_grey && image->channels != 1) {
     return make_error(ErrorCode::BadFormat,
                       "the image has colours, and grey heights need a greyscale image (colours: mapbox or terrarium)");
   }
-  if (!is_grey && (picture->channels != 3 || picture->bits != 8)) {
+  if (!is_grey && (image->channels != 3 || image->bits != 8)) {
     return make_error(ErrorCode::BadFormat,
                       std::string(name_of(encoding)) + " heights need an RGB image with 8 bits per channel");
   }
   HeightMap map;
   map.format = name_of(encoding);
-  map.width = static_cast<int>(picture->width);
-  map.height = static_cast<int>(picture->height);
-  map.metres.resize(std::size_t{picture->width} * picture->height);
-  const std::byte* const samples = picture->bytes.data();
+  map.width = static_cast<int>(image->width);
+  map.height = static_cast<int>(image->height);
+  map.metres.resize(std::size_t{image->width} * image->height);
+  const std::byte* const samples = image->bytes.data();
   for (std::size_t i = 0; i < map.metres.size(); ++i) {
     if (!is_grey) {
       map.metres[i] = metres_of(encoding, samples + 3 * i);
       continue;
     }
-    const unsigned level = picture->bits == 16 ? load<std::uint16_t>(samples + 2 * i, std::endian::big)
-                                               : std::to_integer<unsigned>(samples[i]);
+    const unsigned level = image->bits == 16 ? load<std::uint16_t>(samples + 2 * i, std::endian::big)
+                                             : std::to_integer<unsigned>(samples[i]);
     map.metres[i] = static_cast<float>(level * metres_per_level);
   }
   return map;
@@ -144,7 +144,7 @@ Result<HeightMap> read_height_map(std::span<const std::byte> bytes, const Height
                           : "not an .hgt file, which has 1201 x 1201 or 3601 x 3601 values of 2 bytes");
   }
   if (!heights::is_png(bytes)) return bad_at(0, "not a PNG, which height-map images must be");
-  auto map = read_picture(bytes, *options.encoding, options.metres_per_level);
+  auto map = read_image(bytes, *options.encoding, options.metres_per_level);
   if (!map) return map.error();
   if (options.metres_per_pixel) {
     map->metres_per_pixel = *options.metres_per_pixel;

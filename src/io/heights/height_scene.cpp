@@ -223,12 +223,12 @@ class ColumnMaker {
     // The ground ends halfway between a ground sample and an air sample.
     constexpr float kHalf = 0.5F;
     float highest = -std::numeric_limits<float>::infinity();
-    bool is_beside_void = false;
+    bool is_next_to_void = false;
     for (int i = 0; i < 9; ++i) {
       const int near_x = world_x + i % 3 - 1;
       const int near_z = world_z + i / 3 - 1;
       if (surface_.has(near_x, near_z)) highest = std::max(highest, surface_.at(near_x, near_z));
-      is_beside_void |= !surface_.has(near_x, near_z);
+      is_next_to_void |= !surface_.has(near_x, near_z);
     }
     const auto height = static_cast<float>(y);
     if (!surface_.has(world_x, world_z)) {
@@ -238,7 +238,7 @@ class ColumnMaker {
     density = std::max(density, static_cast<float>(surface_.base - y) + kHalf);
     const int inside = std::min({world_x, world_z, surface_.width - 1 - world_x, surface_.depth - 1 - world_z});
     density = std::max(density, kHalf - static_cast<float>(inside));
-    return is_beside_void && inside > 0 ? std::max(density, -kHalf) : density;
+    return is_next_to_void && inside > 0 ? std::max(density, -kHalf) : density;
   }
 
   const Surface& surface_;

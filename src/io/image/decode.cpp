@@ -8,7 +8,7 @@
 
 namespace quoin {
 
-Result<AlphaImage> decode_picture(std::span<const std::byte> bytes) {
+Result<AlphaImage> decode_image(std::span<const std::byte> bytes) {
   const std::string_view text = text_of(bytes);
   if (text.starts_with("\x89PNG")) {
     auto decoded = decode_png(bytes);

@@ -13,9 +13,9 @@ namespace quoin {
 ///
 /// Errors: BadFormat; Unsupported for other formats and for formats missing from the build; LimitExceeded beyond 2^28
 /// pixels.
-[[nodiscard]] Result<AlphaImage> decode_picture(std::span<const std::byte> bytes);
+[[nodiscard]] Result<AlphaImage> decode_image(std::span<const std::byte> bytes);
 
-/// Errors: as decode_picture.
+/// Errors: as decode_image.
 [[nodiscard]] Result<AlphaImage> decode_jpeg(std::span<const std::byte> bytes);
 [[nodiscard]] Result<AlphaImage> decode_webp(std::span<const std::byte> bytes);
 
@@ -26,6 +26,6 @@ namespace quoin {
 [[nodiscard]] Result<FloatImage> read_pfm(const std::filesystem::path& path);
 [[nodiscard]] Result<FloatImage> read_pfm(std::span<const std::byte> bytes);
 
-inline constexpr std::size_t kMostPicturePixels = std::size_t{1} << 28;
+inline constexpr std::size_t kMostImagePixels = std::size_t{1} << 28;
 
 }  // namespace quoin

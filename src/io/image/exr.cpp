@@ -5,7 +5,7 @@
 #include <set>
 #include <string>
 
-#include <quoin/io/picture_files.h>
+#include <quoin/io/image_files.h>
 
 #include "io/whole_file.h"
 

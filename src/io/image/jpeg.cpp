@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <string>
 
-#include <quoin/io/picture_files.h>
+#include <quoin/io/image_files.h>
 
 #include "io/image/decode.h"
 #include "io/whole_file.h"
@@ -16,12 +16,12 @@
 namespace quoin {
 namespace {
 
-Status check(const Image& picture, int quality) {
+Status check(const Image& image, int quality) {
   const auto refuse = [](const char* message) { return make_error(ErrorCode::InvalidArgument, message); };
   if (quality < 1 || quality > 100) return refuse("the quality must be 1 to 100");
-  const bool fits = picture.width > 0 && picture.height > 0 &&
-                    picture.rgb.size() == std::size_t{3} * static_cast<std::size_t>(picture.width) *
-                                              static_cast<std::size_t>(picture.height);
+  const bool fits = image.width > 0 && image.height > 0 &&
+                    image.rgb.size() ==
+                        std::size_t{3} * static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
   return fits ? Status() : refuse("the number of pixels is not width x height");
 }
 
@@ -40,7 +40,7 @@ struct Failure {
 void stay_silent(j_common_ptr) {}
 
 // Contains everything that libjpeg may jump out of. Nothing here needs a destructor.
-bool encode(const Image& picture, int quality, jpeg_compress_struct& info, Failure& failure, unsigned char** bytes,
+bool encode(const Image& image, int quality, jpeg_compress_struct& info, Failure& failure, unsigned char** bytes,
             unsigned long* size) {
   info.err = jpeg_std_error(&failure.errors);
   failure.errors.error_exit = jump_back;
@@ -48,8 +48,8 @@ bool encode(const Image& picture, int quality, jpeg_compress_struct& info, Failu
   if (setjmp(failure.back) != 0) return false;
   jpeg_create_compress(&info);
   jpeg_mem_dest(&info, bytes, size);
-  info.image_width = static_cast<JDIMENSION>(picture.width);
-  info.image_height = static_cast<JDIMENSION>(picture.height);
+  info.image_width = static_cast<JDIMENSION>(image.width);
+  info.image_height = static_cast<JDIMENSION>(image.height);
   info.input_components = 3;
   info.in_color_space = JCS_RGB;
   jpeg_set_defaults(&info);
@@ -60,7 +60,7 @@ bool encode(const Image& picture, int quality, jpeg_compress_struct& info, Failu
   jpeg_start_compress(&info, TRUE);
   while (info.next_scanline < info.image_height) {
     const auto at = std::size_t{3} * info.image_width * info.next_scanline;
-    auto* row = const_cast<JSAMPLE*>(picture.rgb.data() + at);  // NOLINT: it is only read
+    auto* row = const_cast<JSAMPLE*>(image.rgb.data() + at);  // NOLINT: it is only read
     jpeg_write_scanlines(&info, &row, 1);
   }
   jpeg_finish_compress(&info);
@@ -77,16 +77,16 @@ bool has_jpeg() {
   return true;
 }
 
-Result<std::vector<std::byte>> write_jpeg(const Image& picture, int quality) {
-  if (Status status = check(picture, quality); !status) return status.error();
-  if (picture.width > JPEG_MAX_DIMENSION || picture.height > JPEG_MAX_DIMENSION) {
+Result<std::vector<std::byte>> write_jpeg(const Image& image, int quality) {
+  if (Status status = check(image, quality); !status) return status.error();
+  if (image.width > JPEG_MAX_DIMENSION || image.height > JPEG_MAX_DIMENSION) {
     return make_error(ErrorCode::LimitExceeded, "the image is larger than the 65,500 pixels per side of a JPEG");
   }
   jpeg_compress_struct info{};
   Failure failure{};
   unsigned char* bytes = nullptr;
   unsigned long size = 0;
-  const bool done = encode(picture, quality, info, failure, &bytes, &size);
+  const bool done = encode(image, quality, info, failure, &bytes, &size);
   std::vector<std::byte> out;
   if (done) {
     const auto* const first = reinterpret_cast<const std::byte*>(bytes);
@@ -104,8 +104,8 @@ bool has_jpeg() {
   return false;
 }
 
-Result<std::vector<std::byte>> write_jpeg(const Image& picture, int quality) {
-  if (Status status = check(picture, quality); !status) return status.error();
+Result<std::vector<std::byte>> write_jpeg(const Image& image, int quality) {
+  if (Status status = check(image, quality); !status) return status.error();
   return make_error(ErrorCode::Unsupported, "cannot write JPEG: Quoin was built without libjpeg");
 }
 
@@ -149,7 +149,7 @@ Result<AlphaImage> decode_jpeg(std::span<const std::byte> bytes) {
   bool done = read_header(bytes, info, failure);
   const std::size_t pixels = std::size_t{info.image_width} * info.image_height;
   // A block takes at least half a bit, which limits the number of pixels by the file size.
-  const bool is_small = pixels <= kMostPicturePixels && pixels / 1024 <= bytes.size();
+  const bool is_small = pixels <= kMostImagePixels && pixels / 1024 <= bytes.size();
   if (done && is_small) {
     image = {static_cast<int>(info.image_width), static_cast<int>(info.image_height), {}};
     image.rgba.resize(4 * pixels);
@@ -169,8 +169,8 @@ Result<AlphaImage> decode_jpeg(std::span<const std::byte>) {
 
 #endif
 
-Result<std::uint64_t> write_jpeg(const Image& picture, const std::filesystem::path& path, int quality) {
-  return write_whole(path, write_jpeg(picture, quality));
+Result<std::uint64_t> write_jpeg(const Image& image, const std::filesystem::path& path, int quality) {
+  return write_whole(path, write_jpeg(image, quality));
 }
 
 }  // namespace quoin

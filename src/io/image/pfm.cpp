@@ -1,4 +1,4 @@
-#include <quoin/io/picture_files.h>
+#include <quoin/io/image_files.h>
 
 #include <bit>
 #include <cmath>
@@ -104,41 +104,41 @@ Result<FloatImage> read_pfm(std::span<const std::byte> bytes) {
                    std::to_string(held),
                header->data_at);
   }
-  FloatImage picture{header->width, header->height, std::vector<float>(width * height)};
+  FloatImage image{header->width, header->height, std::vector<float>(width * height)};
   for (std::size_t y = 0; y < height; ++y) {
     const auto row = bytes.subspan(header->data_at + 4 * width * (height - 1 - y), 4 * width);
     for (std::size_t x = 0; x < width; ++x) {
-      picture.values[y * width + x] = float_at(row.subspan(4 * x, 4), header->is_little_endian);
+      image.values[y * width + x] = float_at(row.subspan(4 * x, 4), header->is_little_endian);
     }
   }
-  return picture;
+  return image;
 }
 
 Result<FloatImage> read_pfm(const std::filesystem::path& path) {
   return read_whole(path, [](std::span<const std::byte> bytes) { return read_pfm(bytes); });
 }
 
-Result<std::vector<std::byte>> write_pfm(const FloatImage& picture) {
-  const auto width = static_cast<std::size_t>(picture.width);
-  const auto height = static_cast<std::size_t>(picture.height);
-  if (picture.width <= 0 || picture.height <= 0 || picture.values.size() != width * height) {
+Result<std::vector<std::byte>> write_pfm(const FloatImage& image) {
+  const auto width = static_cast<std::size_t>(image.width);
+  const auto height = static_cast<std::size_t>(image.height);
+  if (image.width <= 0 || image.height <= 0 || image.values.size() != width * height) {
     return make_error(ErrorCode::InvalidArgument, "the number of values is not width x height");
   }
   const std::string header = "Pf\n" + std::to_string(width) + " " + std::to_string(height) + "\n-1.0\n";
   const auto head = std::as_bytes(std::span(header));
   std::vector<std::byte> bytes(head.begin(), head.end());
-  bytes.reserve(bytes.size() + 4 * picture.values.size());
+  bytes.reserve(bytes.size() + 4 * image.values.size());
   for (std::size_t y = height; y-- > 0;) {
     for (std::size_t x = 0; x < width; ++x) {
-      const auto bits = std::bit_cast<std::uint32_t>(picture.values[y * width + x]);
+      const auto bits = std::bit_cast<std::uint32_t>(image.values[y * width + x]);
       for (unsigned shift = 0; shift < 32; shift += 8) bytes.push_back(static_cast<std::byte>(bits >> shift & 0xFFU));
     }
   }
   return bytes;
 }
 
-Result<std::uint64_t> write_pfm(const FloatImage& picture, const std::filesystem::path& path) {
-  return write_whole(path, write_pfm(picture));
+Result<std::uint64_t> write_pfm(const FloatImage& image, const std::filesystem::path& path) {
+  return write_whole(path, write_pfm(image));
 }
 
 }  // namespace quoin

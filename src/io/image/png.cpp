@@ -9,7 +9,7 @@
 #include <string>
 
 #include <quoin/core/assert.h>
-#include <quoin/io/picture_files.h>
+#include <quoin/io/image_files.h>
 
 #include "io/whole_file.h"
 
@@ -209,32 +209,32 @@ Result<std::vector<std::byte>> write_pixels(int width, int height, std::uint32_t
 
 }  // namespace
 
-Result<std::vector<std::byte>> write_png(const Image& picture) {
-  return write_pixels(picture.width, picture.height, 3, picture.rgb);
+Result<std::vector<std::byte>> write_png(const Image& image) {
+  return write_pixels(image.width, image.height, 3, image.rgb);
 }
 
-Result<std::vector<std::byte>> write_png(const AlphaImage& picture) {
-  return write_pixels(picture.width, picture.height, 4, picture.rgba);
+Result<std::vector<std::byte>> write_png(const AlphaImage& image) {
+  return write_pixels(image.width, image.height, 4, image.rgba);
 }
 
-Result<std::uint64_t> write_png(const AlphaImage& picture, const std::filesystem::path& path) {
-  return write_whole(path, write_png(picture));
+Result<std::uint64_t> write_png(const AlphaImage& image, const std::filesystem::path& path) {
+  return write_whole(path, write_png(image));
 }
 
-Result<std::uint64_t> write_png(const Image& picture, const std::filesystem::path& path) {
-  return write_whole(path, write_png(picture));
+Result<std::uint64_t> write_png(const Image& image, const std::filesystem::path& path) {
+  return write_whole(path, write_png(image));
 }
 
 Result<Image> read_png(std::span<const std::byte> bytes) {
   const auto decoded = decode_png(bytes);
   if (!decoded) return decoded.error();
   const std::size_t pixels = decoded->pixels.size() / 4;
-  Image picture{static_cast<int>(decoded->width), static_cast<int>(decoded->height), {}};
-  picture.rgb.resize(3 * pixels);
+  Image image{static_cast<int>(decoded->width), static_cast<int>(decoded->height), {}};
+  image.rgb.resize(3 * pixels);
   for (std::size_t i = 0; i < pixels; ++i) {
-    for (std::size_t c = 0; c < 3; ++c) picture.rgb[3 * i + c] = decoded->pixels[4 * i + c];
+    for (std::size_t c = 0; c < 3; ++c) image.rgb[3 * i + c] = decoded->pixels[4 * i + c];
   }
-  return picture;
+  return image;
 }
 
 Result<Image> read_png(const std::filesystem::path& path) {

@@ -18,8 +18,8 @@ struct PngImage {
   std::vector<std::uint8_t> pixels;
 };
 
-[[nodiscard]] inline PngImage png_of(const Image& picture) {
-  return {static_cast<std::uint32_t>(picture.width), static_cast<std::uint32_t>(picture.height), 3, picture.rgb};
+[[nodiscard]] inline PngImage png_of(const Image& image) {
+  return {static_cast<std::uint32_t>(image.width), static_cast<std::uint32_t>(image.height), 3, image.rgb};
 }
 
 /// The compression effort for a small file.

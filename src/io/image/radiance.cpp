@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include <quoin/io/picture_files.h>
+#include <quoin/io/image_files.h>
 
 #include "io/image/exr.h"
 #include "io/text.h"

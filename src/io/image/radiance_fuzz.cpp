@@ -1,4 +1,4 @@
-#include <quoin/io/picture_files.h>
+#include <quoin/io/image_files.h>
 
 #include <cstdlib>
 

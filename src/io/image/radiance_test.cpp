@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include <quoin/io/picture_files.h>
+#include <quoin/io/image_files.h>
 
 namespace quoin {
 namespace {
@@ -135,7 +135,7 @@ Image stripes() {
   return image;
 }
 
-TEST(LossyAndSmallPictures, AreTheSameEveryTimeAndRefuseWhatCannotBe) {
+TEST(LossyAndSmallImages, AreTheSameEveryTimeAndRefuseWhatCannotBe) {
   if (!has_jpeg() || !has_webp()) GTEST_SKIP() << "built without libjpeg or libwebp";
   const Image image = stripes();
   const auto jpeg = write_jpeg(image);

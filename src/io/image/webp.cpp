@@ -1,6 +1,6 @@
 #include <cstddef>
 
-#include <quoin/io/picture_files.h>
+#include <quoin/io/image_files.h>
 
 #include "io/image/decode.h"
 #include "io/whole_file.h"
@@ -50,19 +50,19 @@ bool has_webp() {
 #endif
 }
 
-Result<std::vector<std::byte>> write_webp(const Image& picture) {
-  if (Status status = check(picture.width, picture.height, picture.rgb.size(), 3); !status) return status.error();
+Result<std::vector<std::byte>> write_webp(const Image& image) {
+  if (Status status = check(image.width, image.height, image.rgb.size(), 3); !status) return status.error();
 #ifdef QUOIN_HAVE_WEBP
-  return encoded(picture.rgb, picture.width, picture.height, 3, WebPEncodeLosslessRGB);
+  return encoded(image.rgb, image.width, image.height, 3, WebPEncodeLosslessRGB);
 #else
   return make_error(ErrorCode::Unsupported, "cannot write WebP: Quoin was built without libwebp");
 #endif
 }
 
-Result<std::vector<std::byte>> write_webp(const AlphaImage& picture) {
-  if (Status status = check(picture.width, picture.height, picture.rgba.size(), 4); !status) return status.error();
+Result<std::vector<std::byte>> write_webp(const AlphaImage& image) {
+  if (Status status = check(image.width, image.height, image.rgba.size(), 4); !status) return status.error();
 #ifdef QUOIN_HAVE_WEBP
-  return encoded(picture.rgba, picture.width, picture.height, 4, WebPEncodeLosslessRGBA);
+  return encoded(image.rgba, image.width, image.height, 4, WebPEncodeLosslessRGBA);
 #else
   return make_error(ErrorCode::Unsupported, "cannot write WebP: Quoin was built without libwebp");
 #endif
@@ -77,7 +77,7 @@ Result<AlphaImage> decode_webp(std::span<const std::byte> bytes) {
   }
   const std::size_t size =
       std::size_t{4} * static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
-  if (size / 4 > kMostPicturePixels) return make_error(ErrorCode::LimitExceeded, "the WebP has more than 2^28 pixels");
+  if (size / 4 > kMostImagePixels) return make_error(ErrorCode::LimitExceeded, "the WebP has more than 2^28 pixels");
   image.rgba.resize(size);
   if (WebPDecodeRGBAInto(data, bytes.size(), image.rgba.data(), size, 4 * image.width) == nullptr) {
     return make_error(ErrorCode::BadFormat, "the WebP cannot be decoded");
@@ -89,11 +89,11 @@ Result<AlphaImage> decode_webp(std::span<const std::byte> bytes) {
 #endif
 }
 
-Result<std::uint64_t> write_webp(const Image& picture, const std::filesystem::path& path) {
-  return write_whole(path, write_webp(picture));
+Result<std::uint64_t> write_webp(const Image& image, const std::filesystem::path& path) {
+  return write_whole(path, write_webp(image));
 }
-Result<std::uint64_t> write_webp(const AlphaImage& picture, const std::filesystem::path& path) {
-  return write_whole(path, write_webp(picture));
+Result<std::uint64_t> write_webp(const AlphaImage& image, const std::filesystem::path& path) {
+  return write_whole(path, write_webp(image));
 }
 
 }  // namespace quoin

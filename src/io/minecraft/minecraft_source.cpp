@@ -166,7 +166,7 @@ class MinecraftSource final : public ChunkSource {
   Status read_chunk(const RegionFile& file, RegionName name, IVec3 chunk, SectionReader& reader, ColumnBuilder& builder,
                     std::vector<Error>& broken) const {
     const IVec3 place{name.x * kRegionEdge + chunk.x, 0, name.z * kRegionEdge + chunk.z};
-    const auto tell = [&](const Error& error) {
+    const auto report = [&](const Error& error) {
       Error located = error;
       const std::string where = "chunk (" + std::to_string(place.x) + ", " + std::to_string(place.z) + "): ";
       located.message = where + located.message;
@@ -184,7 +184,7 @@ class MinecraftSource final : public ChunkSource {
     constexpr std::size_t kMaxValues = std::size_t{1} << 20;
     const auto document = nbt::Document::parse(*bytes, {.depth = 512, .nodes = kMaxValues});
     if (!document) {
-      tell(document.error());
+      report(document.error());
       return {};
     }
     Status put;
@@ -194,10 +194,10 @@ class MinecraftSource final : public ChunkSource {
           const IVec3 corner{place.x * kSectionEdge, section.y * kSectionEdge, place.z * kSectionEdge};
           if (put) put = builder.put(section, corner);
         },
-        tell);
+        report);
     if (!put) return put;
     if (!read && read.error().code == ErrorCode::BadFormat) {
-      tell(read.error());
+      report(read.error());
       return {};
     }
     return read;

@@ -140,7 +140,7 @@ TEST_F(Obj, TextureCoordinatesMeetThePalette) {
   EXPECT_EQ(seen, (std::set<std::array<int, 3>>{{90, 80, 70}, {10, 200, 220}, {250, 240, 10}}));
 }
 
-TEST_F(Obj, AnAtlasIsThePictureOfOpaqueBlocks) {
+TEST_F(Obj, AnAtlasIsTheImageOfOpaqueBlocks) {
   place({0, 0, 0});
   place({50, 0, 0});
   meshes_ = mesh_scene(scene_, {.atlas = true}).value();

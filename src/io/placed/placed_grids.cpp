@@ -155,7 +155,7 @@ class Placer {
   Status place(const Instance& instance) {
     const SceneGrid* const grid = scene_.grids().find(instance.grid);
     if (grid == nullptr) return {};
-    if (!has_place(instance)) {
+    if (!has_valid_transform(instance)) {
       ++losses_.without_place;
       return {};
     }

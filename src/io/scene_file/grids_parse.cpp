@@ -92,7 +92,7 @@ std::string put(const DataPiece& piece, Grid& grid, const VoxelRegistry& types) 
       fault = about(chunk_of(voxel), "has data for an air voxel");
     } else if (!grid.data(voxel).empty()) {
       fault = about(chunk_of(voxel), "has data twice for one voxel");
-    } else if (fault = fault_of_state(voxel, data, types[type]); fault.empty()) {
+    } else if (fault = find_state_error(voxel, data, types[type]); fault.empty()) {
       grid.set_data(voxel, data);
     }
     return fault.empty();

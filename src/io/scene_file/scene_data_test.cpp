@@ -152,7 +152,7 @@ TEST(SceneData, NamesDataThatVoxCannotHold) {
   Grid grid;
   grid.set({1, 2, 3}, kTurned, {.state = 3});
   const Scene scene = scene_of(std::move(grid));
-  const auto losses = losses_of_vox(scene);
+  const auto losses = vox_unsupported_features(scene);
   ASSERT_TRUE(losses);
   ASSERT_EQ(losses->size(), 1U);
   EXPECT_EQ((*losses)[0], "voxels whose data is left out, not supported by .vox (.json stores it): 1");
@@ -196,7 +196,7 @@ std::vector<std::byte> bytes_of(const std::vector<Record>& records) {
 }
 
 // Returns the error for such data in a grid with stairs at (1, 0, 0) and stone at (2, 0, 0).
-std::string fault_of_bytes(const std::vector<std::byte>& data, const std::string& further = "") {
+std::string find_bytes_error(const std::vector<std::byte>& data, const std::string& further = "") {
   Grid grid;
   grid.set({1, 0, 0}, kTurned);
   grid.set({2, 0, 0}, kPlain);
@@ -208,38 +208,38 @@ std::string fault_of_bytes(const std::vector<std::byte>& data, const std::string
   EXPECT_EQ(loaded.error().code, ErrorCode::BadFormat);
   return loaded.error().message;
 }
-std::string fault_of(const std::vector<Record>& records) {
-  return fault_of_bytes(bytes_of(records));
+std::string find_error(const std::vector<Record>& records) {
+  return find_bytes_error(bytes_of(records));
 }
 
 TEST(SceneData, RefusesInvalidDataWithItsPosition) {
   const std::string piece = "grids[0].data[0]: ";
   const std::string at = piece + "byte 16 of the voxel data: ";
-  EXPECT_EQ(fault_of({{.voxels = {{.place = 1}}}}), "");
-  EXPECT_EQ(fault_of({{.voxels = {{.place = 2}}}}),
+  EXPECT_EQ(find_error({{.voxels = {{.place = 1}}}}), "");
+  EXPECT_EQ(find_error({{.voxels = {{.place = 2}}}}),
             piece + "state 1 of voxel (2, 0, 0) has more than the 0 bits of its type");
-  EXPECT_EQ(fault_of({{.voxels = {{.place = 3}}}}), piece + "chunk (0, 0, 0) has data for an air voxel");
-  EXPECT_EQ(fault_of({{.chunk = {7, 0, 0}, .voxels = {{.place = 1}}}}),
+  EXPECT_EQ(find_error({{.voxels = {{.place = 3}}}}), piece + "chunk (0, 0, 0) has data for an air voxel");
+  EXPECT_EQ(find_error({{.chunk = {7, 0, 0}, .voxels = {{.place = 1}}}}),
             piece + "chunk (7, 0, 0) has data for an air voxel");
-  EXPECT_EQ(fault_of({{.voxels = {{.place = 1}}}, {.voxels = {{.place = 1}}}}),
+  EXPECT_EQ(find_error({{.voxels = {{.place = 1}}}, {.voxels = {{.place = 1}}}}),
             piece + "chunk (0, 0, 0) has data twice for one voxel");
-  EXPECT_EQ(fault_of({{.voxels = {{.place = 262'144}}}}), at + "a voxel is outside its chunk");
-  EXPECT_EQ(fault_of({{.count = 2, .voxels = {{.place = 1}, {.place = 1}}}}),
+  EXPECT_EQ(find_error({{.voxels = {{.place = 262'144}}}}), at + "a voxel is outside its chunk");
+  EXPECT_EQ(find_error({{.count = 2, .voxels = {{.place = 1}, {.place = 1}}}}),
             piece + "byte 28 of the voxel data: voxels with data are not in ascending order");
-  EXPECT_EQ(fault_of({{.voxels = {{.place = 1, .state = 0}}}}), at + "a voxel has no data");
-  EXPECT_EQ(fault_of({{.voxels = {{.place = 1, .length = 65'537, .bytes = 65'537}}}}),
+  EXPECT_EQ(find_error({{.voxels = {{.place = 1, .state = 0}}}}), at + "a voxel has no data");
+  EXPECT_EQ(find_error({{.voxels = {{.place = 1, .length = 65'537, .bytes = 65'537}}}}),
             piece + "byte 24 of the voxel data: invalid data length: 65537 bytes for one voxel");
-  EXPECT_EQ(fault_of({{.voxels = {{.place = 1, .length = 9, .bytes = 8}}}}),
+  EXPECT_EQ(find_error({{.voxels = {{.place = 1, .length = 9, .bytes = 8}}}}),
             piece + "byte 36 of the voxel data: cut off");
-  EXPECT_EQ(fault_of({{.count = 0, .voxels = {}}}),
+  EXPECT_EQ(find_error({{.count = 0, .voxels = {}}}),
             piece + "byte 12 of the voxel data: invalid number of voxels with data: 0");
-  EXPECT_EQ(fault_of({{.count = 262'145, .voxels = {}}}),
+  EXPECT_EQ(find_error({{.count = 262'145, .voxels = {}}}),
             piece + "byte 12 of the voxel data: invalid number of voxels with data: 262145");
-  EXPECT_EQ(fault_of({{.count = 200'000, .voxels = {{.place = 1}}}}), piece + "byte 28 of the voxel data: cut off");
-  EXPECT_EQ(fault_of({{.chunk = {1 << 30, 0, 0}, .voxels = {{.place = 1}}}}),
+  EXPECT_EQ(find_error({{.count = 200'000, .voxels = {{.place = 1}}}}), piece + "byte 28 of the voxel data: cut off");
+  EXPECT_EQ(find_error({{.chunk = {1 << 30, 0, 0}, .voxels = {{.place = 1}}}}),
             piece + "byte 0 of the voxel data: a chunk position is out of range");
-  EXPECT_EQ(fault_of_bytes(std::vector<std::byte>(5)), piece + "byte 5 of the voxel data: cut off");
-  EXPECT_EQ(fault_of_bytes(bytes_of({{.voxels = {{.place = 1}}}}), ", 5"), "grids[0].data[1]: must be a string");
+  EXPECT_EQ(find_bytes_error(std::vector<std::byte>(5)), piece + "byte 5 of the voxel data: cut off");
+  EXPECT_EQ(find_bytes_error(bytes_of({{.voxels = {{.place = 1}}}}), ", 5"), "grids[0].data[1]: must be a string");
 }
 
 TEST(SceneData, StateBitsAreAtMostThirtyTwo) {

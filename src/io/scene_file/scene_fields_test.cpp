@@ -83,15 +83,15 @@ TEST(SceneFields, WritingThemTellsOfOneWholeThatNeverFalls) {
     const auto file = scene_file_of(scene);
     ASSERT_TRUE(file);
     double last = 0.0;
-    int told = 0;
+    int reported = 0;
     ASSERT_TRUE(write_scene_file(*file, {}, [&](double fraction) {
       EXPECT_GE(fraction, last);
       last = fraction;
-      ++told;
+      ++reported;
       return true;
     }));
     EXPECT_EQ(last, 1.0);
-    EXPECT_GT(told, 2);
+    EXPECT_GT(reported, 2);
     const auto cancelled = write_scene_file(*file, {}, [](double) { return false; });
     ASSERT_FALSE(cancelled);
     EXPECT_EQ(cancelled.error().code, ErrorCode::Cancelled);
@@ -118,7 +118,7 @@ TEST(SceneFields, MaterialsThatAreNotRegisteredAreRefused) {
   EXPECT_EQ(to_string(refused.error()), "grids[0] has voxels of type 9, which is not registered");
 }
 
-std::string fault_of_grid(const std::string& grid) {
+std::string find_grid_error(const std::string& grid) {
   const std::string text = R"({"quoin_scene": 3, "types": [{"colour": [1, 2, 3, 255]}], "grids": [{"voxels": [], )" +
                            grid + R"(}], "instances": [{"grid": 0}]})";
   const auto read = load_scene(std::as_bytes(std::span(text)));
@@ -126,45 +126,47 @@ std::string fault_of_grid(const std::string& grid) {
 }
 
 /// Returns the error for a piece with these numbers, 16 bits each.
-std::string fault_of_densities(const std::vector<std::uint16_t>& words, std::size_t cut = 0) {
+std::string find_densities_error(const std::vector<std::uint16_t>& words, std::size_t cut = 0) {
   std::vector<std::byte> bytes;
   for (const std::uint16_t word : words) {
     bytes.push_back(static_cast<std::byte>(word));
     bytes.push_back(static_cast<std::byte>(word >> 8));
   }
   bytes.resize(bytes.size() - cut);
-  return fault_of_grid(R"("densities": [")" + to_base64(gzipped(bytes, 9)) + "\"]");
+  return find_grid_error(R"("densities": [")" + to_base64(gzipped(bytes, 9)) + "\"]");
 }
 
 TEST(SceneFields, DamagedOnesAreRefusedWithTheirPlace) {
   const std::string at = "grids[0].densities[0]: ";
   const Half solid = half_from_float(-8.0F);
   const Half beyond = half_from_float(-9.0F);
-  EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, solid, 0}), "none");
-  EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, solid, 0}, 1), at + "byte 21 of the voxel data: cut off");
-  EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, beyond, 0}),
+  EXPECT_EQ(find_densities_error({1, 0, 2, 0, 3, 0, 1, 0, 1, solid, 0}), "none");
+  EXPECT_EQ(find_densities_error({1, 0, 2, 0, 3, 0, 1, 0, 1, solid, 0}, 1), at + "byte 21 of the voxel data: cut off");
+  EXPECT_EQ(find_densities_error({1, 0, 2, 0, 3, 0, 1, 0, 1, beyond, 0}),
             at + "byte 18 of the voxel data: a density is outside the band");
-  EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, 0x7E00, 0}),
+  EXPECT_EQ(find_densities_error({1, 0, 2, 0, 3, 0, 1, 0, 1, 0x7E00, 0}),
             at + "byte 18 of the voxel data: a density is outside the band");
   for (const std::uint16_t none : {0x8000, 0x0001, 0x83FF}) {
-    EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, none, 0}),
+    EXPECT_EQ(find_densities_error({1, 0, 2, 0, 3, 0, 1, 0, 1, none, 0}),
               at + "byte 18 of the voxel data: a density is -0 or closer to 0 than 2^-14");
   }
-  EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, solid, 1}),
+  EXPECT_EQ(find_densities_error({1, 0, 2, 0, 3, 0, 1, 0, 1, solid, 1}),
             at + "byte 18 of the voxel data: a density is outside the band");
-  EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, 0xFFFF, 0xFFFF, beyond, 0}),
+  EXPECT_EQ(find_densities_error({1, 0, 2, 0, 3, 0, 1, 0, 1, 0xFFFF, 0xFFFF, beyond, 0}),
             at + "byte 22 of the voxel data: a density is outside the band");
-  EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, 0xFFFF, 0xFFFF, 0xFFFF, 0xFFFF, 1}),
+  EXPECT_EQ(find_densities_error({1, 0, 2, 0, 3, 0, 1, 0, 1, 0xFFFF, 0xFFFF, 0xFFFF, 0xFFFF, 1}),
             at + "byte 28 of the voxel data: cut off");
   std::vector<std::uint16_t> differences = {1, 0, 2, 0, 3, 0, 1, 0, 1, 0xFFFF, 0xFFFF, 0xFFFF, 0xFFFF};
   differences.resize(differences.size() + 1'024, 0x7F7F);
-  EXPECT_EQ(fault_of_densities(differences), at + "byte 26 of the voxel data: a density is outside the band");
-  EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, half_from_float(8.0F), 0}), at + "chunk (1, 2, 3) is empty");
-  EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, solid, 0, 1, 0, 2, 0, 3, 0, 1, 0, 1, solid, 0}),
+  EXPECT_EQ(find_densities_error(differences), at + "byte 26 of the voxel data: a density is outside the band");
+  EXPECT_EQ(find_densities_error({1, 0, 2, 0, 3, 0, 1, 0, 1, half_from_float(8.0F), 0}),
+            at + "chunk (1, 2, 3) is empty");
+  EXPECT_EQ(find_densities_error({1, 0, 2, 0, 3, 0, 1, 0, 1, solid, 0, 1, 0, 2, 0, 3, 0, 1, 0, 1, solid, 0}),
             at + "chunk (1, 2, 3) is a duplicate");
-  EXPECT_EQ(fault_of_grid(R"("band": 0, "densities": [])"), "grids[0].band: must be more than 0 and at most 65504");
-  EXPECT_EQ(fault_of_grid(R"("band": 70000, "densities": [])"), "grids[0].band: must be more than 0 and at most 65504");
-  EXPECT_EQ(fault_of_grid(R"("densities": [3])"), "grids[0].densities[0]: must be a string");
+  EXPECT_EQ(find_grid_error(R"("band": 0, "densities": [])"), "grids[0].band: must be more than 0 and at most 65504");
+  EXPECT_EQ(find_grid_error(R"("band": 70000, "densities": [])"),
+            "grids[0].band: must be more than 0 and at most 65504");
+  EXPECT_EQ(find_grid_error(R"("densities": [3])"), "grids[0].densities[0]: must be a string");
 }
 
 }  // namespace

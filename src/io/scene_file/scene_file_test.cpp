@@ -29,7 +29,7 @@ std::string file_with(const std::string& instance) {
   return R"({"quoin_scene": 1, "files": [{"id": "a", "path": "a.vox"}], "instances": [)" + instance + "]}";
 }
 
-std::string fault_of(const std::string& text) {
+std::string find_error(const std::string& text) {
   const auto parsed = parse(text);
   return parsed ? "none" : to_string(parsed.error());
 }
@@ -191,57 +191,58 @@ TEST(SceneFile, WritesNothingThatTheReaderRefuses) {
 }
 
 TEST(SceneFile, ErrorsHaveAPosition) {
-  EXPECT_EQ(fault_of("{"), "byte 1: not valid JSON");
-  EXPECT_EQ(fault_of(file_with(R"({"file": "a", "rotation": [1, 2, 3]})")),
+  EXPECT_EQ(find_error("{"), "byte 1: not valid JSON");
+  EXPECT_EQ(find_error(file_with(R"({"file": "a", "rotation": [1, 2, 3]})")),
             "instances[0].rotation: must be a list of 4 numbers");
-  EXPECT_EQ(fault_of(file_with(R"({"file": "a", "rotation": [0, 0, 0, 0]})")),
+  EXPECT_EQ(find_error(file_with(R"({"file": "a", "rotation": [0, 0, 0, 0]})")),
             "instances[0].rotation: must not be all 0");
-  EXPECT_EQ(fault_of(file_with(R"({"file": "a"}, {"file": "b"})")), "instances[1].file: no file has the id \"b\"");
-  EXPECT_EQ(fault_of(file_with(R"({"file": "a", "colour": 3})")), "instances[0]: \"colour\" is unknown here");
-  EXPECT_EQ(fault_of(file_with(R"({"position": [1, 2, 3]})")), "instances[0]: \"file\" is missing");
-  EXPECT_EQ(fault_of(file_with(R"({"file": "a", "scale": 0})")), "instances[0].scale: must be more than 0");
-  EXPECT_EQ(fault_of(file_with(R"({"file": "a", "position": [1, "2", 3]})")),
+  EXPECT_EQ(find_error(file_with(R"({"file": "a"}, {"file": "b"})")), "instances[1].file: no file has the id \"b\"");
+  EXPECT_EQ(find_error(file_with(R"({"file": "a", "colour": 3})")), "instances[0]: \"colour\" is unknown here");
+  EXPECT_EQ(find_error(file_with(R"({"position": [1, 2, 3]})")), "instances[0]: \"file\" is missing");
+  EXPECT_EQ(find_error(file_with(R"({"file": "a", "scale": 0})")), "instances[0].scale: must be more than 0");
+  EXPECT_EQ(find_error(file_with(R"({"file": "a", "position": [1, "2", 3]})")),
             "instances[0].position[1]: must be a number");
   for (const char* wrong : {"-1", "4294967296", "1.5", "\"1\""}) {
-    EXPECT_EQ(fault_of(file_with(std::string(R"({"file": "a", "categories": )") + wrong + "}")),
+    EXPECT_EQ(find_error(file_with(std::string(R"({"file": "a", "categories": )") + wrong + "}")),
               "instances[0].categories: must be a whole number from 0 to 4294967295");
   }
-  EXPECT_EQ(fault_of(file_with(R"({"file": "a", "visible": 1})")), "instances[0].visible: must be true or false");
-  EXPECT_EQ(fault_of(file_with("7")), "instances[0]: must be an object");
-  EXPECT_EQ(fault_of(R"({"quoin_scene": 6, "files": [], "instances": []})"),
+  EXPECT_EQ(find_error(file_with(R"({"file": "a", "visible": 1})")), "instances[0].visible: must be true or false");
+  EXPECT_EQ(find_error(file_with("7")), "instances[0]: must be an object");
+  EXPECT_EQ(find_error(R"({"quoin_scene": 6, "files": [], "instances": []})"),
             "quoin_scene: version 6 is not supported (1 to 5 are)");
-  EXPECT_EQ(fault_of(R"({"quoin_scene": 0, "files": [], "instances": []})"),
+  EXPECT_EQ(find_error(R"({"quoin_scene": 0, "files": [], "instances": []})"),
             "quoin_scene: version 0 is not supported (1 to 5 are)");
-  EXPECT_EQ(fault_of(R"({"quoin_scene": 1, "files": []})"), "\"instances\" is missing");
+  EXPECT_EQ(find_error(R"({"quoin_scene": 1, "files": []})"), "\"instances\" is missing");
   const auto hierarchy = [](const std::string& lists, const std::string& instance) {
     return R"({"quoin_scene": 4, "files": [{"id": "a", "path": "x"}], )" + lists + R"("instances": [{"file": "a")" +
            instance + "}]}";
   };
-  EXPECT_EQ(fault_of(hierarchy(R"("groups": [{"parent": 0}], )", "")),
+  EXPECT_EQ(find_error(hierarchy(R"("groups": [{"parent": 0}], )", "")),
             "groups[0].parent: group 0 does not come before it");
-  EXPECT_EQ(fault_of(hierarchy(R"("groups": [{"layer": 1}], "layers": [{}], )", "")),
+  EXPECT_EQ(find_error(hierarchy(R"("groups": [{"layer": 1}], "layers": [{}], )", "")),
             "groups[0].layer: layer 1 does not exist");
-  EXPECT_EQ(fault_of(hierarchy("", R"(, "group": 0)")), "instances[0].group: group 0 does not exist");
-  EXPECT_EQ(fault_of(hierarchy("", R"(, "layer": -1)")), "instances[0].layer: must be an index into layers, from 0");
-  EXPECT_EQ(fault_of(R"({"quoin_scene": 1, "files": [{"id": "a", "path": ""}], "instances": []})"),
+  EXPECT_EQ(find_error(hierarchy("", R"(, "group": 0)")), "instances[0].group: group 0 does not exist");
+  EXPECT_EQ(find_error(hierarchy("", R"(, "layer": -1)")), "instances[0].layer: must be an index into layers, from 0");
+  EXPECT_EQ(find_error(R"({"quoin_scene": 1, "files": [{"id": "a", "path": ""}], "instances": []})"),
             "files[0].path: must name a file");
   EXPECT_EQ(
-      fault_of(R"({"quoin_scene": 1, "files": [{"id": "a", "path": "x"}, {"id": "a", "path": "y"}], "instances": []})"),
+      find_error(
+          R"({"quoin_scene": 1, "files": [{"id": "a", "path": "x"}, {"id": "a", "path": "y"}], "instances": []})"),
       "files[1].id: \"a\" is a duplicate");
 }
 
 TEST(SceneFile, RejectsHarmfulInput) {
-  EXPECT_NE(fault_of(std::string(100'000, '[')), "none");
-  EXPECT_NE(fault_of(file_with(R"({"file": "a", "scale": 1e400})")), "none");
-  EXPECT_NE(fault_of(file_with(R"({"file": "a", "position": [NaN, 0, 0]})")), "none");
-  EXPECT_NE(fault_of(R"({"quoin_scene": 1, "files": [], "instances": [], "sun": [0, 0, 0]})"), "none");
+  EXPECT_NE(find_error(std::string(100'000, '[')), "none");
+  EXPECT_NE(find_error(file_with(R"({"file": "a", "scale": 1e400})")), "none");
+  EXPECT_NE(find_error(file_with(R"({"file": "a", "position": [NaN, 0, 0]})")), "none");
+  EXPECT_NE(find_error(R"({"quoin_scene": 1, "files": [], "instances": [], "sun": [0, 0, 0]})"), "none");
   EXPECT_NE(
-      fault_of(
+      find_error(
           R"({"quoin_scene": 1, "files": [], "instances": [], "camera": {"position": [1,1,1], "look_at": [1,1,1]}})"),
       "none");
   // Very small and very large numbers.
-  EXPECT_EQ(fault_of(file_with(R"({"file": "a", "rotation": [1e-300, 0, 1e-308, 0]})")), "none");
-  EXPECT_EQ(fault_of(file_with(R"({"file": "a", "rotation": [1e300, 1e300, 0, 0]})")), "none");
+  EXPECT_EQ(find_error(file_with(R"({"file": "a", "rotation": [1e-300, 0, 1e-308, 0]})")), "none");
+  EXPECT_EQ(find_error(file_with(R"({"file": "a", "rotation": [1e300, 1e300, 0, 0]})")), "none");
 }
 
 /// A folder with two .vox files that is removed at the end.

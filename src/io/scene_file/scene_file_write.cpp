@@ -130,7 +130,7 @@ Status check_data(const SceneFile& scene) {
   for (std::size_t i = 0; i < scene.grids.size(); ++i) {
     std::string fault;
     scene.grids[i].grid.for_each_data([&](IVec3 voxel, VoxelType type, const VoxelData& data) {
-      if (fault.empty()) fault = fault_of_state(voxel, data, scene.types[type]);
+      if (fault.empty()) fault = find_state_error(voxel, data, scene.types[type]);
     });
     if (!fault.empty()) return make_error(ErrorCode::InvalidArgument, "grids[" + std::to_string(i) + "]: " + fault);
   }

@@ -348,46 +348,46 @@ std::string file_with_voxels(const std::string& voxels) {
          R"(]}], "instances": [{"grid": 0}]})";
 }
 
-std::string fault_of_scene(const std::string& text) {
+std::string find_scene_error(const std::string& text) {
   const auto read = load_scene(std::as_bytes(std::span(text)));
   return read ? "none" : to_string(read.error());
 }
 
 /// Returns the error for a file whose only voxel piece has these numbers, 16 bits each.
-std::string fault_of_piece(std::vector<std::uint16_t> words, std::size_t cut = 0) {
+std::string find_piece_error(std::vector<std::uint16_t> words, std::size_t cut = 0) {
   std::vector<std::byte> bytes;
   for (const std::uint16_t word : words) {
     bytes.push_back(static_cast<std::byte>(word));
     bytes.push_back(static_cast<std::byte>(word >> 8));
   }
   bytes.resize(bytes.size() - cut);
-  return fault_of_scene(file_with_voxels("\"" + to_base64(gzipped(bytes, 9)) + "\""));
+  return find_scene_error(file_with_voxels("\"" + to_base64(gzipped(bytes, 9)) + "\""));
 }
 
 TEST(SceneModels, DamagedVoxelsAreRefusedWithTheirPlace) {
   const std::string at = "grids[0].voxels[0]: ";
-  EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 1, 0, 1}), "none");
-  EXPECT_EQ(fault_of_piece({}), "none");
-  EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 1, 0, 1}, 1), at + "byte 17 of the voxel data: cut off");
-  EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3}), at + "byte 10 of the voxel data: cut off");
-  EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 1, 0, 2}),
+  EXPECT_EQ(find_piece_error({1, 0, 2, 0, 3, 0, 1, 0, 1}), "none");
+  EXPECT_EQ(find_piece_error({}), "none");
+  EXPECT_EQ(find_piece_error({1, 0, 2, 0, 3, 0, 1, 0, 1}, 1), at + "byte 17 of the voxel data: cut off");
+  EXPECT_EQ(find_piece_error({1, 0, 2, 0, 3}), at + "byte 10 of the voxel data: cut off");
+  EXPECT_EQ(find_piece_error({1, 0, 2, 0, 3, 0, 1, 0, 2}),
             at + "byte 16 of the voxel data: type 2 is beyond the file's 1");
-  EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 0, 0}), at + "byte 12 of the voxel data: invalid palette size 0");
-  EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 1, 1}), at + "byte 12 of the voxel data: invalid palette size 65537");
-  EXPECT_EQ(fault_of_piece({0xFFFF, 0x7FFF, 2, 0, 3, 0, 1, 0, 1}),
+  EXPECT_EQ(find_piece_error({1, 0, 2, 0, 3, 0, 0, 0}), at + "byte 12 of the voxel data: invalid palette size 0");
+  EXPECT_EQ(find_piece_error({1, 0, 2, 0, 3, 0, 1, 1}), at + "byte 12 of the voxel data: invalid palette size 65537");
+  EXPECT_EQ(find_piece_error({0xFFFF, 0x7FFF, 2, 0, 3, 0, 1, 0, 1}),
             at + "byte 0 of the voxel data: a chunk position is out of range");
-  EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 1, 0, 0}), at + "chunk (1, 2, 3) is empty");
-  EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 1, 0, 1, 1, 0, 2, 0, 3, 0, 1, 0, 1}),
+  EXPECT_EQ(find_piece_error({1, 0, 2, 0, 3, 0, 1, 0, 0}), at + "chunk (1, 2, 3) is empty");
+  EXPECT_EQ(find_piece_error({1, 0, 2, 0, 3, 0, 1, 0, 1, 1, 0, 2, 0, 3, 0, 1, 0, 1}),
             at + "chunk (1, 2, 3) is a duplicate");
-  EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 2, 0, 0, 1, 2, 0}),
+  EXPECT_EQ(find_piece_error({1, 0, 2, 0, 3, 0, 2, 0, 0, 1, 2, 0}),
             at + "byte 20 of the voxel data: index 2 is beyond the palette of 2");
-  EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 2, 0, 0, 1, 0xFFFF, 0xFFFF, 1, 2, 3}),
+  EXPECT_EQ(find_piece_error({1, 0, 2, 0, 3, 0, 2, 0, 0, 1, 0xFFFF, 0xFFFF, 1, 2, 3}),
             at + "byte 30 of the voxel data: cut off");
 }
 
 TEST(SceneModels, LampsAreRefusedWithTheirPlace) {
   const auto fault = [](const std::string& lamp) {
-    return fault_of_scene(R"({"quoin_scene": 2, "grids": [], "instances": [], "lamps": [)" + lamp + "]}");
+    return find_scene_error(R"({"quoin_scene": 2, "grids": [], "instances": [], "lamps": [)" + lamp + "]}");
   };
   EXPECT_EQ(fault(R"({"position": [1, 2, 3]})"), "none");
   EXPECT_EQ(fault("{}"), "lamps[0]: \"position\" is missing");
@@ -398,13 +398,13 @@ TEST(SceneModels, LampsAreRefusedWithTheirPlace) {
 
 TEST(SceneModels, DamagedTextIsRefusedWithItsPlace) {
   const std::string at = "grids[0].voxels[0]: ";
-  EXPECT_EQ(fault_of_scene(file_with_voxels("")), "none");
-  EXPECT_EQ(fault_of_scene(file_with_voxels("7")), at + "must be a string");
-  EXPECT_EQ(fault_of_scene(file_with_voxels("\"A*==\"")), at + "character 1: not a base64 character");
-  EXPECT_EQ(fault_of_scene(file_with_voxels("\"\"")), at + "not a gzip stream");
-  EXPECT_EQ(fault_of_scene(file_with_voxels("\"AAAA\"")), at + "not a gzip stream");
+  EXPECT_EQ(find_scene_error(file_with_voxels("")), "none");
+  EXPECT_EQ(find_scene_error(file_with_voxels("7")), at + "must be a string");
+  EXPECT_EQ(find_scene_error(file_with_voxels("\"A*==\"")), at + "character 1: not a base64 character");
+  EXPECT_EQ(find_scene_error(file_with_voxels("\"\"")), at + "not a gzip stream");
+  EXPECT_EQ(find_scene_error(file_with_voxels("\"AAAA\"")), at + "not a gzip stream");
   std::vector<std::byte> piece = gzipped(std::vector<std::byte>(100), 9);
-  const auto fault = [&] { return fault_of_scene(file_with_voxels("\"" + to_base64(piece) + "\"")); };
+  const auto fault = [&] { return find_scene_error(file_with_voxels("\"" + to_base64(piece) + "\"")); };
   piece.push_back({});
   EXPECT_EQ(fault(), at + "bytes follow the compressed data");
   piece.resize(piece.size() - 3);
@@ -412,28 +412,29 @@ TEST(SceneModels, DamagedTextIsRefusedWithItsPlace) {
   piece[12] ^= std::byte{0xFF};
   EXPECT_NE(fault().find(at + "byte "), std::string::npos) << fault();
   EXPECT_NE(fault().find("the compressed data is damaged"), std::string::npos) << fault();
-  EXPECT_EQ(fault_of_scene(R"({"quoin_scene": 2, "grids": [], "instances": [{"grid": 0}]})"),
+  EXPECT_EQ(find_scene_error(R"({"quoin_scene": 2, "grids": [], "instances": [{"grid": 0}]})"),
             "instances[0].grid: grid 0 does not exist");
-  EXPECT_EQ(fault_of_scene(R"({"quoin_scene": 2, "grids": [], "instances": [{"grid": -1}]})"),
+  EXPECT_EQ(find_scene_error(R"({"quoin_scene": 2, "grids": [], "instances": [{"grid": -1}]})"),
             "instances[0].grid: must be an index into grids, from 0");
   EXPECT_EQ(
-      fault_of_scene(R"({"quoin_scene": 2, "types": [{"colour": [1, 2, 3, 256]}], "grids": [], "instances": []})"),
+      find_scene_error(R"({"quoin_scene": 2, "types": [{"colour": [1, 2, 3, 256]}], "grids": [], "instances": []})"),
       "types[0].colour: must be whole numbers from 0 to 255");
-  EXPECT_EQ(fault_of_scene(R"({"quoin_scene": 2, "types": [{"colour": [1, 2, 3, 4], "visibility": "air"}], "grids": [],
+  EXPECT_EQ(
+      find_scene_error(R"({"quoin_scene": 2, "types": [{"colour": [1, 2, 3, 4], "visibility": "air"}], "grids": [],
                          "instances": []})"),
-            "types[0].visibility: must be \"opaque\" or \"transparent\"");
-  EXPECT_EQ(fault_of_scene(R"({"quoin_scene": 2, "types": [{"colour": [1, 2, 3, 4], "ior": 1e39}], "grids": [],
+      "types[0].visibility: must be \"opaque\" or \"transparent\"");
+  EXPECT_EQ(find_scene_error(R"({"quoin_scene": 2, "types": [{"colour": [1, 2, 3, 4], "ior": 1e39}], "grids": [],
                          "instances": []})"),
             "types[0].ior: is too large");
   EXPECT_EQ(
-      fault_of_scene(R"({"quoin_scene": 2, "grids": [{"name": {"base64": "*"}, "voxels": []}], "instances": []})"),
+      find_scene_error(R"({"quoin_scene": 2, "grids": [{"name": {"base64": "*"}, "voxels": []}], "instances": []})"),
       "grids[0].name: must be a string, or {\"base64\": \"...\"} if it is not UTF-8");
 }
 
 // Deflate can expand data to about a thousand times its size.
 TEST(SceneModels, BombsAreRefusedBeforeTheyExpand) {
   const std::vector<std::byte> zeros(std::size_t{64} << 20);
-  EXPECT_EQ(fault_of_scene(file_with_voxels("\"" + to_base64(gzipped(zeros, 9)) + "\"")),
+  EXPECT_EQ(find_scene_error(file_with_voxels("\"" + to_base64(gzipped(zeros, 9)) + "\"")),
             "grids[0].voxels[0]: expands to more than 32 MiB");
   std::vector<std::byte> chunks;
   for (int i = 0; i < 100'000; ++i) {
@@ -443,7 +444,7 @@ TEST(SceneModels, BombsAreRefusedBeforeTheyExpand) {
     chunks.push_back(std::byte{1});
     chunks.push_back(std::byte{0});
   }
-  EXPECT_EQ(fault_of_scene(file_with_voxels("\"" + to_base64(gzipped(chunks, 9)) + "\"")),
+  EXPECT_EQ(find_scene_error(file_with_voxels("\"" + to_base64(gzipped(chunks, 9)) + "\"")),
             "grids: the voxels need far more memory than the file has bytes");
 }
 

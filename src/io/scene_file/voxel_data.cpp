@@ -569,7 +569,7 @@ Result<std::vector<std::vector<std::string>>> encode_data(std::span<const Grid* 
   return of_grids;
 }
 
-std::string fault_of_state(IVec3 voxel, const VoxelData& data, const VoxelProperties& type) {
+std::string find_state_error(IVec3 voxel, const VoxelData& data, const VoxelProperties& type) {
   if (static_cast<int>(std::bit_width(data.state)) <= type.state_bits) return "";
   return "state " + std::to_string(data.state) + " of voxel (" + std::to_string(voxel.x) + ", " +
          std::to_string(voxel.y) + ", " + std::to_string(voxel.z) + ") has more than the " +

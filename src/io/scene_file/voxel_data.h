@@ -97,7 +97,7 @@ struct DataPiece {
   std::size_t memory = 0;  ///< minimum memory in a grid
 };
 /// Returns the fault of a voxel's state, or "": more bits than its type allows.
-[[nodiscard]] std::string fault_of_state(IVec3 voxel, const VoxelData& data, const VoxelProperties& type);
+[[nodiscard]] std::string find_state_error(IVec3 voxel, const VoxelData& data, const VoxelProperties& type);
 /// Errors: as `decode_voxels`.
 [[nodiscard]] Result<DataPiece> decode_data(std::string_view piece);
 /// Calls `visit` for each voxel of a piece in order, until it returns false.

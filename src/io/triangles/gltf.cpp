@@ -74,18 +74,18 @@ bool is_too_deep(std::string_view json) {
 
 /// The data for tinygltf's callbacks, and the bytes of the images by number.
 struct Asked {
-  Beside* beside = nullptr;
-  std::vector<std::vector<std::byte>> pictures{};
+  SidecarReader* sidecars = nullptr;
+  std::vector<std::vector<std::byte>> images{};
 };
 
 // GltfReader finds images in buffer views: tinygltf passes them on without checking the end of the buffer.
-bool keep_picture(tinygltf::Image* image, const int index, std::string*, std::string*, int, int,
-                  const unsigned char* bytes, int size, void* user) {
-  auto& pictures = static_cast<Asked*>(user)->pictures;
+bool keep_image(tinygltf::Image* image, const int index, std::string*, std::string*, int, int,
+                const unsigned char* bytes, int size, void* user) {
+  auto& images = static_cast<Asked*>(user)->images;
   if (image->bufferView >= 0 || index < 0 || size < 0) return true;
-  if (pictures.size() <= static_cast<std::size_t>(index)) pictures.resize(static_cast<std::size_t>(index) + 1);
+  if (images.size() <= static_cast<std::size_t>(index)) images.resize(static_cast<std::size_t>(index) + 1);
   const auto* const first = reinterpret_cast<const std::byte*>(bytes);
-  pictures[static_cast<std::size_t>(index)].assign(first, first + size);
+  images[static_cast<std::size_t>(index)].assign(first, first + size);
   return true;
 }
 
@@ -99,7 +99,7 @@ std::string as_it_is(const std::string& path, void*) {
 
 bool read_beside(std::vector<unsigned char>* out, std::string* error, const std::string& path, void* user) {
   const std::string_view name = path.starts_with("./") ? std::string_view(path).substr(2) : std::string_view(path);
-  const auto bytes = static_cast<Asked*>(user)->beside->read(std::string(name));
+  const auto bytes = static_cast<Asked*>(user)->sidecars->read(std::string(name));
   if (!bytes) {
     if (error != nullptr) *error += bytes.error().message;
     return false;
@@ -471,13 +471,13 @@ class GltfReader {
                              : !image->uri.empty() ? image->uri
                              : image->name.empty() ? "image " + std::to_string(source)
                                                    : image->name;
-    const std::span<const std::byte> picture =
-        image == nullptr ? std::span<const std::byte>() : picture_of(*image, static_cast<std::size_t>(source));
-    if (picture.empty()) {
+    const std::span<const std::byte> rendered =
+        image == nullptr ? std::span<const std::byte>() : rendered_of(*image, static_cast<std::size_t>(source));
+    if (rendered.empty()) {
       loaded_.warnings.push_back("left out the texture " + name + ": its image does not exist");
       return std::nullopt;
     }
-    known_textures_[at] = add_texture(picture, name, loaded_);
+    known_textures_[at] = add_texture(rendered, name, loaded_);
     const tinygltf::Sampler* const sampler = entry(model_.samplers, texture->sampler);
     if (known_textures_[at] && sampler != nullptr) {
       MeshTexture& made = loaded_.mesh.textures[*known_textures_[at]];
@@ -489,9 +489,9 @@ class GltfReader {
   }
 
   /// Returns the file of an image; nullopt if it does not exist or extends past its buffer.
-  [[nodiscard]] std::span<const std::byte> picture_of(const tinygltf::Image& image, std::size_t index) const {
+  [[nodiscard]] std::span<const std::byte> rendered_of(const tinygltf::Image& image, std::size_t index) const {
     if (image.bufferView < 0) {
-      return index < asked_.pictures.size() ? asked_.pictures[index] : std::span<const std::byte>();
+      return index < asked_.images.size() ? asked_.images[index] : std::span<const std::byte>();
     }
     const tinygltf::BufferView* const view = entry(model_.bufferViews, image.bufferView);
     const tinygltf::Buffer* const buffer = view != nullptr ? entry(model_.buffers, view->buffer) : nullptr;
@@ -586,9 +586,9 @@ class GltfReader {
     const MeshMaterial& look = loaded_.mesh.materials[material];
     const PlaceTransform& colour_place = places_[material];
     const PlaceTransform& glow_place = glow_places_[material];
-    const auto places = texture_places(primitive, look.texture.has_value(), colour_place, positions->count());
+    const auto places = uvs(primitive, look.texture.has_value(), colour_place, positions->count());
     if (!places) return places.error();
-    const auto glows = texture_places(primitive, look.emissive_texture.has_value(), glow_place, positions->count());
+    const auto glows = uvs(primitive, look.emissive_texture.has_value(), glow_place, positions->count());
     if (!glows) return glows.error();
     has_textures_ |= places->has_value();
     has_glows_ |= glows->has_value();
@@ -605,8 +605,8 @@ class GltfReader {
       if (!*added) return {};
       loaded_.mesh.material_of.push_back(static_cast<std::uint32_t>(material));
       for (const std::size_t vertex : {a, b, c}) {
-        loaded_.mesh.texture_places.push_back(place_at(*places, colour_place, vertex));
-        loaded_.mesh.emissive_places.push_back(place_at(*glows, glow_place, vertex));
+        loaded_.mesh.uvs.push_back(place_at(*places, colour_place, vertex));
+        loaded_.mesh.emissive_uvs.push_back(place_at(*glows, glow_place, vertex));
       }
       return {};
     };
@@ -621,8 +621,8 @@ class GltfReader {
         [&](std::size_t i) { return static_cast<std::size_t>(std::max(indices->at(i, 0), 0.0)); }, add);
   }
   /// Returns the texture coordinates of the vertices; nullopt without a texture or coordinates.
-  Result<std::optional<Accessor>> texture_places(const tinygltf::Primitive& primitive, bool has_texture,
-                                                 const PlaceTransform& transform, std::size_t vertices) const {
+  Result<std::optional<Accessor>> uvs(const tinygltf::Primitive& primitive, bool has_texture,
+                                      const PlaceTransform& transform, std::size_t vertices) const {
     const int place = attribute(primitive, "TEXCOORD_" + std::to_string(transform.set));
     if (!has_texture || place < 0) return std::optional<Accessor>();
     auto opened = Accessor::open(model_, place, 2);
@@ -689,8 +689,8 @@ class GltfReader {
     return {};
   }
   void finish() {
-    if (!has_textures_) loaded_.mesh.texture_places.clear();
-    if (!has_glows_) loaded_.mesh.emissive_places.clear();
+    if (!has_textures_) loaded_.mesh.uvs.clear();
+    if (!has_glows_) loaded_.mesh.emissive_uvs.clear();
     if (has_others_) loaded_.warnings.emplace_back("left out points and lines");
     if (has_skins_) loaded_.warnings.emplace_back("left out skins: the mesh keeps its bind pose");
     if (!model_.animations.empty()) loaded_.warnings.emplace_back("left out animations: the mesh keeps its rest pose");
@@ -745,7 +745,7 @@ Result<tinygltf::Model> parse(std::span<const std::byte> bytes, Asked& asked) {
     return make_error(ErrorCode::LimitExceeded, "the glTF file has more than 4 GiB");
   }
   tinygltf::TinyGLTF loader;
-  loader.SetImageLoader(keep_picture, &asked);
+  loader.SetImageLoader(keep_image, &asked);
   loader.SetFsCallbacks({is_there, as_it_is, read_beside, write_nothing, &asked});
   tinygltf::Model model;
   std::string error;
@@ -768,13 +768,13 @@ Result<tinygltf::Model> parse(std::span<const std::byte> bytes, Asked& asked) {
 
 }  // namespace
 
-Result<LoadedMesh> read_gltf(std::span<const std::byte> bytes, Beside& beside) {
-  Asked asked{&beside};
+Result<LoadedMesh> read_gltf(std::span<const std::byte> bytes, SidecarReader& sidecars) {
+  Asked asked{&sidecars};
   const std::string_view json = json_of(bytes);
   if (is_too_deep(json)) return make_error(ErrorCode::BadFormat, "the JSON is nested too deeply");
   const auto rewritten = readable_by_tinygltf(bytes, json);
   auto model = parse(rewritten.empty() ? bytes : rewritten, asked);
-  if (beside.refused()) return *beside.refused();
+  if (sidecars.refused()) return *sidecars.refused();
   if (!model || !model->asset.version.starts_with("2")) {
     if (const auto version = other_version(bytes, json)) {
       return make_error(ErrorCode::Unsupported, "glTF " + *version + " is not supported (version 2 is)");
@@ -794,7 +794,7 @@ bool has_gltf() {
   return false;
 }
 
-Result<LoadedMesh> read_gltf(std::span<const std::byte>, Beside&) {
+Result<LoadedMesh> read_gltf(std::span<const std::byte>, SidecarReader&) {
   return make_error(ErrorCode::Unsupported, "cannot read glTF: Quoin was built without tinygltf");
 }
 

@@ -98,11 +98,11 @@ class Bytes : public std::streambuf {
 
 class MaterialFiles : public tinyobj::MaterialReader {
  public:
-  MaterialFiles(Beside& beside, LoadedMesh& loaded) : beside_(beside), loaded_(loaded) {}
+  MaterialFiles(SidecarReader& sidecars, LoadedMesh& loaded) : sidecars_(sidecars), loaded_(loaded) {}
 
   bool operator()(const std::string& name, std::vector<tinyobj::material_t>* materials,
                   std::map<std::string, int>* numbers, std::string* warnings, std::string* errors) override {
-    const auto bytes = beside_.read_or_same_name(name);
+    const auto bytes = sidecars_.read_or_same_name(name);
     if (!bytes) {
       loaded_.warnings.push_back("left out the materials " + name + ": " + bytes.error().message);
       return false;
@@ -114,7 +114,7 @@ class MaterialFiles : public tinyobj::MaterialReader {
   }
 
  private:
-  Beside& beside_;
+  SidecarReader& sidecars_;
   LoadedMesh& loaded_;
 };
 
@@ -230,7 +230,7 @@ float channel_of(double srgb) {
 
 class ObjReader {
  public:
-  explicit ObjReader(Beside& beside) : beside_(beside) {}
+  explicit ObjReader(SidecarReader& sidecars) : sidecars_(sidecars) {}
 
   Result<LoadedMesh> read(std::span<const std::byte> file) {
     std::string text = prepared(text_of(file));
@@ -242,7 +242,7 @@ class ObjReader {
     }
     Bytes buffer(bytes);
     std::istream stream(&buffer);
-    MaterialFiles files(beside_, loaded_);
+    MaterialFiles files(sidecars_, loaded_);
     std::string warnings;
     std::string errors;
     if (!tinyobj::LoadObj(&attributes_, &shapes_, &materials_, &warnings, &errors, &stream, &files, false, false)) {
@@ -258,8 +258,8 @@ class ObjReader {
     }
     if (has_others_) loaded_.warnings.emplace_back("left out points and lines");
     show_what_is_all_invisible();
-    if (has_glows_) loaded_.mesh.emissive_places = loaded_.mesh.texture_places;
-    if (!has_textures_) loaded_.mesh.texture_places.clear();
+    if (has_glows_) loaded_.mesh.emissive_uvs = loaded_.mesh.uvs;
+    if (!has_textures_) loaded_.mesh.uvs.clear();
     builder_.finish();
     return std::move(loaded_);
   }
@@ -324,7 +324,7 @@ class ObjReader {
   std::optional<std::size_t> texture_of(const std::string& name) {
     const auto [known, is_new] = textures_.try_emplace(name);
     if (is_new) {
-      const auto bytes = beside_.read_or_same_name(name);
+      const auto bytes = sidecars_.read_or_same_name(name);
       if (!bytes) loaded_.warnings.push_back("left out the texture " + name + ": " + bytes.error().message);
       if (bytes) known->second = add_texture(*bytes, name, loaded_);
     }
@@ -370,7 +370,7 @@ class ObjReader {
       const bool is_there = material >= 0 && static_cast<std::size_t>(material) < no_material_;
       Status added = builder_.add_polygon(polygon_, [&](const std::array<std::uint32_t, 3>& corners) {
         for (const std::uint32_t k : corners) {
-          loaded_.mesh.texture_places.push_back(place_of(face[k].texcoord_index));
+          loaded_.mesh.uvs.push_back(place_of(face[k].texcoord_index));
         }
         loaded_.mesh.material_of.push_back(static_cast<std::uint32_t>(is_there ? material : no_material_));
       });
@@ -398,7 +398,7 @@ class ObjReader {
     return {static_cast<float>(t[at]), static_cast<float>(1.0 - t[at + 1])};
   }
 
-  Beside& beside_;
+  SidecarReader& sidecars_;
   LoadedMesh loaded_;
   MeshBuilder builder_{loaded_};
   tinyobj::attrib_t attributes_;
@@ -414,8 +414,8 @@ class ObjReader {
 
 }  // namespace
 
-Result<LoadedMesh> read_obj(std::span<const std::byte> bytes, Beside& beside) {
-  return ObjReader(beside).read(bytes);
+Result<LoadedMesh> read_obj(std::span<const std::byte> bytes, SidecarReader& sidecars) {
+  return ObjReader(sidecars).read(bytes);
 }
 
 #else
@@ -424,7 +424,7 @@ bool has_obj() {
   return false;
 }
 
-Result<LoadedMesh> read_obj(std::span<const std::byte>, Beside&) {
+Result<LoadedMesh> read_obj(std::span<const std::byte>, SidecarReader&) {
   return make_error(ErrorCode::Unsupported, "cannot read OBJ: Quoin was built without tinyobjloader");
 }
 

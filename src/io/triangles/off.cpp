@@ -240,7 +240,7 @@ bool is_off(std::span<const std::byte> beginning) {
   return layout_of(words.next().value_or("")).has_value();
 }
 
-Result<LoadedMesh> read_off(std::span<const std::byte> bytes, Beside&) {
+Result<LoadedMesh> read_off(std::span<const std::byte> bytes, SidecarReader&) {
   return OffReader(bytes).read();
 }
 

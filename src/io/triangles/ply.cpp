@@ -358,7 +358,7 @@ bool is_ply(std::span<const std::byte> beginning) {
   return text.starts_with("ply\n") || text.starts_with("ply\r");
 }
 
-Result<LoadedMesh> read_ply(std::span<const std::byte> bytes, Beside&) {
+Result<LoadedMesh> read_ply(std::span<const std::byte> bytes, SidecarReader&) {
   const auto header = read_header(text_of(bytes));
   if (!header) return header.error();
   return PlyReader(bytes, *header).read();

@@ -129,7 +129,7 @@ bool is_stl(std::span<const std::byte> whole) {
   return count > 0 && whole.size() == kHeader + 4 + count * kRecord;
 }
 
-Result<LoadedMesh> read_stl(std::span<const std::byte> bytes, Beside&) {
+Result<LoadedMesh> read_stl(std::span<const std::byte> bytes, SidecarReader&) {
   // Some programs also begin binary files with "solid".
   return is_stl(bytes) || !is_stl_text(bytes) ? read_bytes(bytes) : read_text(bytes);
 }

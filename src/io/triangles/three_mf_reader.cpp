@@ -410,7 +410,7 @@ class Package {
 
 }  // namespace
 
-Result<LoadedMesh> read_three_mf(std::span<const std::byte> bytes, Beside&) {
+Result<LoadedMesh> read_three_mf(std::span<const std::byte> bytes, SidecarReader&) {
   auto zip = ZipParts::open(bytes);
   if (!zip) return zip.error();
   return Package(std::move(*zip)).read();
@@ -422,7 +422,7 @@ bool has_three_mf() {
   return false;
 }
 
-Result<LoadedMesh> read_three_mf(std::span<const std::byte>, Beside&) {
+Result<LoadedMesh> read_three_mf(std::span<const std::byte>, SidecarReader&) {
   return make_error(ErrorCode::Unsupported, "cannot read 3MF: Quoin was built without expat (Debian: libexpat1-dev)");
 }
 

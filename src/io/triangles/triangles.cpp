@@ -21,9 +21,9 @@ void turn_up(TriangleMesh& mesh) {
   for (DVec3& p : mesh.positions) p = {p.x, p.z, -p.y};
 }
 
-using Read = Result<LoadedMesh> (*)(std::span<const std::byte>, Beside&);
+using Read = Result<LoadedMesh> (*)(std::span<const std::byte>, SidecarReader&);
 
-Result<LoadedMesh> read_any(std::span<const std::byte> bytes, std::optional<FileFormat> format, Beside& beside,
+Result<LoadedMesh> read_any(std::span<const std::byte> bytes, std::optional<FileFormat> format, SidecarReader& sidecars,
                             std::optional<UpAxis> up) {
   Read read = nullptr;
   if (format == FileFormat::Obj) read = read_obj;
@@ -36,26 +36,26 @@ Result<LoadedMesh> read_any(std::span<const std::byte> bytes, std::optional<File
     return make_error(ErrorCode::Unsupported,
                       format ? std::string(format_info(*format).name) + " holds no triangles" : "unknown mesh format");
   }
-  auto loaded = read(bytes, beside);
+  auto loaded = read(bytes, sidecars);
   if (!loaded) return loaded;
   loaded->format = format_info(*format).name;
   const bool is_z = format == FileFormat::Stl || format == FileFormat::Ply || format == FileFormat::ThreeMf;
   const UpAxis own = is_z ? UpAxis::Z : UpAxis::Y;
   if (up.value_or(own) == UpAxis::Z) turn_up(loaded->mesh);
-  loaded->beside = std::move(beside.files());
+  loaded->sidecars = std::move(sidecars.files());
   return loaded;
 }
 
 }  // namespace
 
-Result<std::vector<std::byte>> Beside::read_path(const std::filesystem::path& path) {
+Result<std::vector<std::byte>> SidecarReader::read_path(const std::filesystem::path& path) {
   auto bytes = read_file(path);
   if (!bytes) return make_error(bytes.error().code, bytes.error().message);
   if (std::find(files_.begin(), files_.end(), path) == files_.end()) files_.push_back(path);
   return bytes;
 }
 
-Result<std::vector<std::byte>> Beside::read(const std::string& name) {
+Result<std::vector<std::byte>> SidecarReader::read(const std::string& name) {
   if (file_.empty()) return make_error(ErrorCode::CannotRead, "a mesh read from bytes has no folder for other files");
   const auto path = sidecar_path(file_, name, allowed_);
   if (path) return read_path(*path);
@@ -63,7 +63,7 @@ Result<std::vector<std::byte>> Beside::read(const std::string& name) {
   return path.error();
 }
 
-Result<std::vector<std::byte>> Beside::read_or_same_name(const std::string& name) {
+Result<std::vector<std::byte>> SidecarReader::read_or_same_name(const std::string& name) {
   if (file_.empty()) return make_error(ErrorCode::CannotRead, "a mesh read from bytes has no folder for other files");
   const auto path = sidecar_path(file_, name, allowed_);
   if (path) return read_path(*path);
@@ -131,9 +131,9 @@ bool is_occlusion_grey(double linear) {
   return quarters >= 1.0 && quarters <= 4.0 && std::abs(linear - quarters / 4.0) <= kHalfByte;
 }
 
-std::optional<std::size_t> add_texture(std::span<const std::byte> picture, const std::string& name,
+std::optional<std::size_t> add_texture(std::span<const std::byte> rendered, const std::string& name,
                                        LoadedMesh& loaded) {
-  auto image = decode_picture(picture);
+  auto image = decode_image(rendered);
   if (!image) {
     loaded.warnings.push_back("left out the texture " + name + ": " + image.error().message);
     return std::nullopt;
@@ -223,16 +223,16 @@ Result<LoadedScene> scene_from_mesh(LoadedMesh loaded, const MeshLoadOptions& op
 }  // namespace triangles
 
 Result<LoadedMesh> read_mesh(std::span<const std::byte> bytes, std::optional<UpAxis> up) {
-  triangles::Beside nothing;
+  triangles::SidecarReader nothing;
   return triangles::read_any(bytes, detect_format(bytes), nothing, up);
 }
 
 Result<LoadedMesh> read_mesh(const std::filesystem::path& path, std::optional<UpAxis> up, SidecarFiles sidecar_files) {
   return read_whole(path, [&](std::span<const std::byte> bytes) {
-    triangles::Beside beside(path, sidecar_files);
+    triangles::SidecarReader sidecars(path, sidecar_files);
     auto format = detect_format(bytes);
     if (!format) format = triangles::detect_by_name(path, bytes);
-    return triangles::read_any(bytes, format, beside, up);
+    return triangles::read_any(bytes, format, sidecars, up);
   });
 }
 

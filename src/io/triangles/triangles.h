@@ -26,10 +26,10 @@ namespace quoin::triangles {
 inline constexpr std::size_t kMostTriangles = std::size_t{1} << 27;
 
 /// Sidecar files that a file refers to. Bytes without a path have none.
-class Beside {
+class SidecarReader {
  public:
-  Beside() = default;
-  Beside(std::filesystem::path file, SidecarFiles allowed) : file_(std::move(file)), allowed_(allowed) {}
+  SidecarReader() = default;
+  SidecarReader(std::filesystem::path file, SidecarFiles allowed) : file_(std::move(file)), allowed_(allowed) {}
 
   /// Reads a file that sidecar_path allows. Errors: CannotRead; the caller adds `name`. A refusal includes the name,
   /// and is also stored in `refused`.
@@ -77,33 +77,33 @@ class MeshBuilder {
 [[nodiscard]] bool is_occlusion_grey(double linear);
 
 /// Adds an image as a texture; returns nullopt, with a warning, if it cannot be decoded.
-[[nodiscard]] std::optional<std::size_t> add_texture(std::span<const std::byte> picture, const std::string& name,
+[[nodiscard]] std::optional<std::size_t> add_texture(std::span<const std::byte> image, const std::string& name,
                                                      LoadedMesh& loaded);
 
 // Readers return the mesh in the file's own axes.
 
 [[nodiscard]] bool is_stl_text(std::span<const std::byte> beginning);
 [[nodiscard]] bool is_stl(std::span<const std::byte> whole);
-[[nodiscard]] Result<LoadedMesh> read_stl(std::span<const std::byte> bytes, Beside& beside);
+[[nodiscard]] Result<LoadedMesh> read_stl(std::span<const std::byte> bytes, SidecarReader& sidecars);
 
 [[nodiscard]] bool is_ply(std::span<const std::byte> beginning);
-[[nodiscard]] Result<LoadedMesh> read_ply(std::span<const std::byte> bytes, Beside& beside);
+[[nodiscard]] Result<LoadedMesh> read_ply(std::span<const std::byte> bytes, SidecarReader& sidecars);
 
 [[nodiscard]] bool is_obj(std::span<const std::byte> beginning);
 [[nodiscard]] bool has_obj();
-[[nodiscard]] Result<LoadedMesh> read_obj(std::span<const std::byte> bytes, Beside& beside);
+[[nodiscard]] Result<LoadedMesh> read_obj(std::span<const std::byte> bytes, SidecarReader& sidecars);
 
 [[nodiscard]] bool is_glb(std::span<const std::byte> beginning);
 [[nodiscard]] bool is_gltf(std::span<const std::byte> beginning);
 [[nodiscard]] bool has_gltf();
-[[nodiscard]] Result<LoadedMesh> read_gltf(std::span<const std::byte> bytes, Beside& beside);
+[[nodiscard]] Result<LoadedMesh> read_gltf(std::span<const std::byte> bytes, SidecarReader& sidecars);
 
 [[nodiscard]] bool is_off(std::span<const std::byte> beginning);
-[[nodiscard]] Result<LoadedMesh> read_off(std::span<const std::byte> bytes, Beside& beside);
+[[nodiscard]] Result<LoadedMesh> read_off(std::span<const std::byte> bytes, SidecarReader& sidecars);
 
 [[nodiscard]] bool is_three_mf(std::span<const std::byte> beginning);
 [[nodiscard]] bool has_three_mf();
-[[nodiscard]] Result<LoadedMesh> read_three_mf(std::span<const std::byte> bytes, Beside& beside);
+[[nodiscard]] Result<LoadedMesh> read_three_mf(std::span<const std::byte> bytes, SidecarReader& sidecars);
 
 /// Detects formats that a beginning identifies.
 [[nodiscard]] std::optional<FileFormat> detect(std::span<const std::byte> beginning);

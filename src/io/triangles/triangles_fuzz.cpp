@@ -8,11 +8,11 @@
 
 namespace {
 
-using Read = quoin::Result<quoin::LoadedMesh> (*)(std::span<const std::byte>, quoin::triangles::Beside&);
+using Read = quoin::Result<quoin::LoadedMesh> (*)(std::span<const std::byte>, quoin::triangles::SidecarReader&);
 
 /// Any bytes must give a mesh that can be voxelised, or an error.
 void check(Read read, std::span<const std::byte> bytes) {
-  quoin::triangles::Beside nothing;
+  quoin::triangles::SidecarReader nothing;
   auto loaded = read(bytes, nothing);
   if (!loaded) return;
   if (!quoin::check_mesh(loaded->mesh)) {

@@ -10,8 +10,8 @@
 
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
+#include <quoin/io/image_files.h>
 #include <quoin/io/mesh_file.h>
-#include <quoin/io/picture_files.h>
 #include <quoin/scene/scene_meshes.h>
 
 #include "io/base64.h"
@@ -292,7 +292,7 @@ TEST(Triangles, RejectsInconsistentFilesWithAPosition) {
   put(claims, std::uint32_t{0x7FFF'FFFF});
   claims += stl_bytes().substr(84);
   // Its length matches no STL file, so only the reader reports the reason.
-  triangles::Beside nothing;
+  triangles::SidecarReader nothing;
   const auto refused = triangles::read_stl(bytes_of(claims), nothing);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().byte_offset, 80U);
@@ -353,12 +353,12 @@ TEST(Triangles, FindsFilesOnlyBelowTheirFolder) {
   ASSERT_EQ(loaded->warnings.size(), 1U) << loaded->warnings.back();
   EXPECT_NE(loaded->warnings[0].find("gone.png"), std::string::npos);
   EXPECT_EQ(loaded->mesh.textures.size(), 3U);
-  EXPECT_EQ(loaded->beside.size(), 4U);
+  EXPECT_EQ(loaded->sidecars.size(), 4U);
   for (const MeshTexture& texture : loaded->mesh.textures) {
     EXPECT_NEAR(texture.image.rgba[0], 255, 2);
     EXPECT_NEAR(texture.image.rgba[1], 0, 2);
   }
-  EXPECT_EQ(files_read_beside(folder.path / "one.obj").size(), 4U);
+  EXPECT_EQ(sidecar_files_of(folder.path / "one.obj").size(), 4U);
   const auto scene = load_scene(folder.path / "one.obj");
   ASSERT_TRUE(scene) << to_string(scene.error());
   EXPECT_GT(scene->scene.voxel_count(), 4'000);

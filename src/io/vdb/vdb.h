@@ -25,6 +25,6 @@ namespace quoin::vdb {
 /// grid. Instances of one grid share its tree. Equal scenes give equal bytes.
 [[nodiscard]] Result<std::vector<std::byte>> write_vdb(const Scene& scene);
 /// Returns the parts of a scene that a VDB file cannot store, one line each.
-[[nodiscard]] std::vector<std::string> losses_of_vdb(const Scene& scene);
+[[nodiscard]] std::vector<std::string> vdb_unsupported_features(const Scene& scene);
 
 }  // namespace quoin::vdb

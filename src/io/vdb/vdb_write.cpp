@@ -410,7 +410,7 @@ Result<std::vector<std::byte>> write_vdb(const Scene& scene) {
   return SceneWriter(scene).write();
 }
 
-std::vector<std::string> losses_of_vdb(const Scene& scene) {
+std::vector<std::string> vdb_unsupported_features(const Scene& scene) {
   std::vector<std::string> lines;
   std::int64_t with_data = 0;
   for (const GridHandle handle : scene.grids().handles()) with_data += scene.grids()[handle].grid.data_count();

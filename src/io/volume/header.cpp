@@ -166,7 +166,7 @@ struct Survey {
   }
 };
 
-void tell(const Survey& survey, Volume& volume) {
+void report(const Survey& survey, Volume& volume) {
   if (survey.min <= survey.max) {
     volume.min = survey.min;
     volume.max = survey.max;
@@ -230,7 +230,7 @@ Status read_values(ByteStream& stream, VolumeHeader& header, std::uint64_t offse
       return make_error(ErrorCode::Cancelled, "cancelled");
     }
   }
-  tell(survey, volume);
+  report(survey, volume);
   return {};
 }
 

@@ -174,7 +174,7 @@ Result<models::ModelBytes> write_nifti(const Scene& scene, const Progress& progr
   const Instance* shown = nullptr;
   scene.instances().for_each([&](InstanceHandle, const Instance& instance) {
     const SceneGrid* const grid = scene.grids().find(instance.grid);
-    if (grid == nullptr || !has_place(instance) || !is_shown(scene, instance)) return;
+    if (grid == nullptr || !has_valid_transform(instance) || !is_shown(scene, instance)) return;
     const bool is_field = grid->field.chunk_count() != 0;
     if (is_field) shown = &instance;
     fields += is_field ? 1 : 0;

@@ -194,7 +194,7 @@ TEST(Nrrd, ReadsValuesOfTheFileNextToADetachedHeader) {
     ASSERT_TRUE(volume) << to_string(volume.error());
     EXPECT_EQ(volume->values, kTwelveFloats) << name;
   }
-  EXPECT_EQ(files_read_beside(folder / "b.nhdr"), std::vector<std::filesystem::path>{folder / "b.raw.gz"});
+  EXPECT_EQ(sidecar_files_of(folder / "b.nhdr"), std::vector<std::filesystem::path>{folder / "b.raw.gz"});
   write("c.nhdr", file_of(header + "encoding: raw\ndata file: c.raw\n", {}));
   const auto missing = read_volume(folder / "c.nhdr");
   ASSERT_FALSE(missing);

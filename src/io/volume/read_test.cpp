@@ -75,12 +75,12 @@ TEST(VolumeFiles, TheContentDecidesAndErrorsNameTheFile) {
 }
 
 TEST(VolumeFiles, ReadingEndsWhenItsListenerSaysSo) {
-  int told = 0;
+  int reported = 0;
   const Bytes values(std::size_t{1} << 16);
   const RawVolume raw{{64, 32, 32}, ScalarType::UInt8, std::endian::little};
-  const auto cancelled = read_raw_volume(values, raw, {}, [&](double) { return ++told < 2; });
+  const auto cancelled = read_raw_volume(values, raw, {}, [&](double) { return ++reported < 2; });
   EXPECT_EQ(cancelled.error().code, ErrorCode::Cancelled);
-  EXPECT_EQ(told, 2);
+  EXPECT_EQ(reported, 2);
 }
 
 }  // namespace

@@ -59,7 +59,7 @@ bool was_never_set(const Keys& keys) {
   return is_near && keys.focus == DVec3(0.0) && keys.angle == DVec3(0.0);
 }
 
-std::string fault_of(const Keys& keys) {
+std::string find_error(const Keys& keys) {
   const bool is_known = keys.mode == "pers" || keys.mode == "free" || is_orthographic(keys);
   if (!is_known) return "_mode \"" + printable(keys.mode) + "\" is not supported";
   if (!(keys.fov > 0.0 && keys.fov < 180.0)) return "_fov is not between 0 and 180";
@@ -108,7 +108,7 @@ std::vector<FileCamera> cameras_of(const Document& document, const DBox& bounds,
     std::string fault;
     const Keys keys = read_keys(chunk.attributes, fault);
     if (fault.empty() && was_never_set(keys)) continue;
-    if (fault.empty()) fault = fault_of(keys);
+    if (fault.empty()) fault = find_error(keys);
     if (fault.empty() && chunk.id < 0) fault = "its id is below 0";
     if (fault.empty() && std::ranges::find(cameras, chunk.id, &FileCamera::number) != cameras.end()) {
       fault = "its id is a duplicate";

@@ -180,8 +180,8 @@ struct ModelState {
 
 /// Classifies a chunk by its id and the chunks before it. Requires: `out` holds the chunks before it, not the chunk
 /// itself.
-ChunkPlace place_of(const ChunkHeader& header, const ModelState& state, const Document& out) {
-  ChunkPlace place;
+ChunkSpan place_of(const ChunkHeader& header, const ModelState& state, const Document& out) {
+  ChunkSpan place;
   place.begin = header.offset;
   place.content_bytes = header.content_bytes;
   place.children_bytes = header.children_bytes;

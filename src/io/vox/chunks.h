@@ -93,7 +93,7 @@ struct SettingChunk {
 /// The type of a chunk within MAIN.
 enum class ChunkKind : std::uint8_t { Other, ModelCount, Size, Voxels, PackedVoxels, Palette, Material, Node, Layer };
 
-struct ChunkPlace {
+struct ChunkSpan {
   ChunkKind kind = ChunkKind::Other;
   std::size_t begin = 0;  ///< offset of its header
   std::size_t content_bytes = 0;
@@ -121,7 +121,7 @@ struct Document {
   std::int32_t last_frame = 0;       ///< over the keys and META's range
   std::int64_t stray_materials = 0;  ///< MATL and MATT chunks whose id is not a colour index
   std::vector<std::string> warnings;
-  std::vector<ChunkPlace> chunks;
+  std::vector<ChunkSpan> chunks;
   std::size_t main_content = 0;  ///< bytes of a MAIN with content of its own
   std::size_t chunks_begin = 0;  ///< offset of the first chunk within MAIN
   std::size_t chunks_end = 0;    ///< end of the last one

@@ -94,7 +94,7 @@ TEST(VoxLook, HasNoneForAFileWithoutSettings) {
   EXPECT_FALSE(file_with_settings({}).look.has_value());
 }
 
-TEST(VoxLook, AirAndPicturesOfTheSky) {
+TEST(VoxLook, AirAndImagesOfTheSky) {
   const FileLook air = look_with({{{"_type", "_env"}, {"_mode", "1"}},
                                   {{"_type", "_atm"}, {"_ray_d", "0.8"}, {"_ray_k", "90 104 255"}, {"_mie_g", "5"}},
                                   {{"_type", "_inf"}, {"_i", "2"}}});

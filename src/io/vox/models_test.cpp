@@ -26,7 +26,7 @@ RandomModel random_model(std::mt19937& random, IVec3 size, std::size_t count) {
 }
 
 /// The simple version: one voxel after the other.
-Grid one_by_one(const RandomModel& model, const std::array<std::uint8_t, kColours>& type_of, ModelLosses& losses) {
+Grid one_by_one(const RandomModel& model, const std::array<std::uint8_t, kColours>& type_of, ModelOmissions& losses) {
   Grid grid;
   for (std::size_t i = 0; i < model.voxels.size(); i += 4) {
     const auto byte = [&](std::size_t at) { return std::to_integer<int>(model.voxels[i + at]); };
@@ -48,7 +48,7 @@ TEST(VoxModels, GridsAreThoseOfSettingOneVoxelAfterTheOther) {
   std::array<std::uint8_t, kColours> type_of{};
   for (std::size_t i = 1; i < type_of.size(); ++i) type_of[i] = static_cast<std::uint8_t>(1 + i % 3);
   ModelBuilder builder(type_of);
-  ModelLosses losses;
+  ModelOmissions losses;
   for (const IVec3 size :
        {IVec3{1}, IVec3{64}, IVec3{65, 3, 64}, IVec3{130, 64, 20}, IVec3{7, 200, 66}, IVec3{256, 256, 2}}) {
     for (const std::size_t count : {1U, 100U, 10'000U, 70'000U, 500'000U}) {

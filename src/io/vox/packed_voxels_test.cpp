@@ -67,7 +67,7 @@ RandomModel random_model(std::mt19937& random, int most) {
   return model;
 }
 
-std::string fault_of(FileBuilder& file) {
+std::string find_error(FileBuilder& file) {
   const auto loaded = read_vox(file.file());
   return loaded ? "none" : to_string(loaded.error());
 }
@@ -98,7 +98,7 @@ TEST(PackedVoxels, RefusesDamageWithItsPosition) {
   const auto fault = [&](IVec3 size, std::vector<std::byte> stream) {
     FileBuilder file;
     add_packed(file, size, stream);
-    return fault_of(file);
+    return find_error(file);
   };
   const std::vector<std::byte> sound = deflated(box, End::Proper);
   EXPECT_EQ(fault({3, 3, 3}, sound), "none");
@@ -119,11 +119,11 @@ TEST(PackedVoxels, RefusesDamageWithItsPosition) {
   FileBuilder other;
   other.size(3, 3, 4);
   add_packed(other, {3, 3, 3}, sound);
-  EXPECT_EQ(fault_of(other), "byte 44: chunk TDCZ has a different size than the SIZE before it");
+  EXPECT_EQ(find_error(other), "byte 44: chunk TDCZ has a different size than the SIZE before it");
   FileBuilder both;
   add_packed(both, {3, 3, 3}, sound);
   both.voxels({});
-  EXPECT_NE(fault_of(both).find("chunk XYZI has no SIZE before it"), std::string::npos);
+  EXPECT_NE(find_error(both).find("chunk XYZI has no SIZE before it"), std::string::npos);
 }
 
 // A stream expands to at most 1,032 times its own length, and a model has at most 256 voxels per side.

@@ -328,9 +328,9 @@ Result<Placements> GraphWalk::run() {
   is_open_.assign(document_.nodes.size(), false);
   is_seen_.assign(document_.nodes.size(), false);
   if (Status status = walk(find_root()); !status) return status.error();
-  const auto apart = std::ranges::count(is_seen_, false);
-  out_.nodes_apart = static_cast<std::size_t>(apart);
-  if (apart > 0) out_.warnings.push_back("nodes outside the scene graph skipped: " + std::to_string(apart));
+  const auto separate = std::ranges::count(is_seen_, false);
+  out_.nodes_apart = static_cast<std::size_t>(separate);
+  if (separate > 0) out_.warnings.push_back("nodes outside the scene graph skipped: " + std::to_string(separate));
   return std::move(out_);
 }
 

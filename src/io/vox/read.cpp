@@ -128,7 +128,7 @@ void warn(const std::string& of_what, std::int64_t count, std::vector<std::strin
   if (count > 0) warnings.push_back(of_what + ": " + std::to_string(count));
 }
 
-void add_warnings(const vox::Placements& placements, const vox::ModelLosses& losses,
+void add_warnings(const vox::Placements& placements, const vox::ModelOmissions& losses,
                   std::vector<std::string>& warnings) {
   warnings.insert(warnings.end(), placements.warnings.begin(), placements.warnings.end());
   warn("voxels outside their model's size skipped", losses.outside, warnings);

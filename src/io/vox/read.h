@@ -68,7 +68,7 @@ struct Placements {
 [[nodiscard]] Result<Placements> place_models(const Document& document, int frame, std::size_t file_bytes);
 
 /// Counts of dropped voxels, over all models.
-struct ModelLosses {
+struct ModelOmissions {
   std::int64_t outside = 0;     ///< voxels beyond their model's size
   std::int64_t colourless = 0;  ///< voxels of colour index 0, which is air
 };
@@ -84,7 +84,7 @@ class ModelBuilder {
   /// Cost: O(voxels), independent of the model's size.
   [[nodiscard]] SceneGrid build(const Model& model);
 
-  [[nodiscard]] const ModelLosses& losses() const { return losses_; }
+  [[nodiscard]] const ModelOmissions& losses() const { return losses_; }
 
  private:
   void build_densely(const Model& model, Grid& grid);
@@ -92,7 +92,7 @@ class ModelBuilder {
   void fill_chunk(IVec3 chunk, std::size_t first, std::size_t count, Grid& grid);
 
   std::array<std::uint8_t, kColours> type_of_;
-  ModelLosses losses_;
+  ModelOmissions losses_;
   std::array<std::size_t, 65> chunk_begins_{};
   std::vector<std::uint32_t> sorted_;  ///< by chunk: place in the chunk in bits 0-17, type above
   std::vector<VoxelType> dense_;       ///< chunks, one after the other

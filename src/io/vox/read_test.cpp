@@ -79,14 +79,14 @@ TEST(VoxRead, TellsHowFarItHasComeAndStopsWhenAsked) {
   FileBuilder builder;
   for (int i = 0; i < 5; ++i) builder.model(1, 1, 1, {{0, 0, 0, 1}});
   const auto bytes = builder.file();
-  std::vector<double> told;
+  std::vector<double> reported;
   ASSERT_TRUE(read_vox(bytes, {}, [&](double share) {
-    told.push_back(share);
+    reported.push_back(share);
     return true;
   }));
-  ASSERT_EQ(told.size(), 5U);
-  EXPECT_TRUE(std::ranges::is_sorted(told));
-  EXPECT_EQ(told.back(), 1.0);
+  ASSERT_EQ(reported.size(), 5U);
+  EXPECT_TRUE(std::ranges::is_sorted(reported));
+  EXPECT_EQ(reported.back(), 1.0);
   const auto stopped = read_vox(bytes, {}, [](double share) { return share < 0.5; });
   ASSERT_FALSE(stopped);
   EXPECT_EQ(stopped.error().code, ErrorCode::Cancelled);

@@ -23,13 +23,13 @@ std::string kept_as(std::string_view id) {
 
 }  // namespace
 
-std::vector<std::string> only_in_source(const VoxSource& source) {
+std::vector<std::string> source_only_features(const VoxSource& source) {
   std::vector<std::string> lines;
   if (vox::is_animated(source.document)) {
     lines.push_back("animation: frames 0 to " + std::to_string(vox::last_frame(source.document)));
   }
   std::map<std::string, int> counts;
-  for (const vox::ChunkPlace& place : source.document.chunks) {
+  for (const vox::ChunkSpan& place : source.document.chunks) {
     if (place.kind != vox::ChunkKind::Other) continue;
     const std::string_view id(reinterpret_cast<const char*>(source.bytes.data()) + place.begin, 4);
     std::string kept = kept_as(id);

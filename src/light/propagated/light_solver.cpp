@@ -344,9 +344,9 @@ void LightSolver::activate(unsigned level) {
   for (std::size_t z = 1; z <= static_cast<std::size_t>(size_.z); ++z) {
     const bool is_near = static_cast<int>(z) >= low && static_cast<int>(z) < high;
     const std::uint64_t own = in_front_[z];
-    std::uint64_t beside = own | own << 1 | own >> 1 | in_front_[z - 1] | in_front_[z + 1];
-    if (columns_ > 1) beside |= own << blocks_ | own >> blocks_;
-    active_[z] = is_near ? beside & open_[z] & near : 0;
+    std::uint64_t adjacent = own | own << 1 | own >> 1 | in_front_[z - 1] | in_front_[z + 1];
+    if (columns_ > 1) adjacent |= own << blocks_ | own >> blocks_;
+    active_[z] = is_near ? adjacent & open_[z] & near : 0;
   }
 }
 

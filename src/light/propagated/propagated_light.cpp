@@ -217,10 +217,10 @@ std::array<unsigned, kChannels> PropagatedLight::Impl::highest_levels(const Grid
     return highest;
   }
   LightReader words = reader();
-  const IBox beside = grown(voxels, 1);
-  for (int z = beside.min.z; z < beside.max.z; ++z) {
-    for (int y = beside.min.y; y < beside.max.y; ++y) {
-      for (int x = beside.min.x; x < beside.max.x; ++x) {
+  const IBox adjacent = grown(voxels, 1);
+  for (int z = adjacent.min.z; z < adjacent.max.z; ++z) {
+    for (int y = adjacent.min.y; y < adjacent.max.y; ++y) {
+      for (int x = adjacent.min.x; x < adjacent.max.x; ++x) {
         add(words.at({x, y, z}));
         if (!voxels.contains({x, y, z})) continue;
         const VoxelType type = grid.get(x, y, z);
@@ -477,7 +477,7 @@ void PropagatedLight::Impl::solve_queue(const Grid& grid, Threads threads) {
 }
 
 PropagatedLight::PropagatedLight(PropagatedLightOptions options) : impl_(std::make_unique<Impl>()) {
-  content_of(impl_).options = std::move(options);
+  impl_of(impl_).options = std::move(options);
 }
 PropagatedLight::PropagatedLight(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 PropagatedLight::PropagatedLight(PropagatedLight&&) noexcept = default;
@@ -485,7 +485,7 @@ PropagatedLight& PropagatedLight::operator=(PropagatedLight&&) noexcept = defaul
 PropagatedLight::~PropagatedLight() = default;
 
 void PropagatedLight::update(const Grid& grid, const VoxelRegistry& types, Threads threads) {
-  Impl& me = content_of(impl_);
+  Impl& me = impl_of(impl_);
   try {
     GridChanges changes = grid.changes_since(me.followed_grid);
     if (me.lights().empty() || types.has_changed_since(me.followed_types)) {
@@ -506,28 +506,28 @@ void PropagatedLight::update(const Grid& grid, const VoxelRegistry& types, Threa
 }
 
 PropagatedLight PropagatedLight::snapshot() const {
-  return PropagatedLight(std::make_unique<Impl>(content_of(impl_)));
+  return PropagatedLight(std::make_unique<Impl>(impl_of(impl_)));
 }
 
 LightLevels PropagatedLight::at(IVec3 voxel) const {
-  return unpacked_light(content_of(impl_).reader().at(voxel));
+  return unpacked_light(impl_of(impl_).reader().at(voxel));
 }
 
 void PropagatedLight::read_row(IVec3 voxel, std::span<std::uint16_t, kChunkEdge> out) const {
-  content_of(impl_).reader().read_row(voxel, out);
+  impl_of(impl_).reader().read_row(voxel, out);
 }
 
 GridChanges PropagatedLight::changes_since(ChangeCursor& cursor) const {
-  return content_of(impl_).store.changes_since(cursor);
+  return impl_of(impl_).store.changes_since(cursor);
 }
 
 void PropagatedLight::split(const QuadBuffer& quads, IVec3 chunk, QuadBuffer& out,
                             std::vector<std::uint16_t>& light) const {
-  propagated::split_quads(content_of(impl_).reader(), quads, chunk, out, light);
+  propagated::split_quads(impl_of(impl_).reader(), quads, chunk, out, light);
 }
 
 std::size_t PropagatedLight::bytes() const {
-  return content_of(impl_).store.bytes() + content_of(impl_).lights().capacity() * sizeof(TypeLight);
+  return impl_of(impl_).store.bytes() + impl_of(impl_).lights().capacity() * sizeof(TypeLight);
 }
 
 }  // namespace quoin

@@ -377,12 +377,14 @@ TEST(PropagatedLight, TellsWhereItChanged) {
         for (int x = all.min.x; x < all.max.x; ++x, ++i) {
           if (before[i] == now[i]) continue;
           const IVec3 voxel{x, y, z};
-          const bool is_told = std::any_of(changes.items.begin(), changes.items.end(), [&](const ChunkChange& change) {
-            const IVec3 local = local_of(voxel);
-            return change.chunk == chunk_of(voxel) && change.box.contains(local) && change.slabs.has(local.y, local.z);
-          });
+          const bool is_reported =
+              std::any_of(changes.items.begin(), changes.items.end(), [&](const ChunkChange& change) {
+                const IVec3 local = local_of(voxel);
+                return change.chunk == chunk_of(voxel) && change.box.contains(local) &&
+                       change.slabs.has(local.y, local.z);
+              });
           // Light above all chunks is not stored.
-          ASSERT_TRUE(is_told || changes.all) << x << " " << y << " " << z;
+          ASSERT_TRUE(is_reported || changes.all) << x << " " << y << " " << z;
         }
       }
     }
@@ -399,7 +401,7 @@ TEST(PropagatedLight, TellsOfChunksThatComeAndGoInTheOpenSky) {
   ChangeCursor cursor;
   static_cast<void>(light.changes_since(cursor));
   const IVec3 voxel{200, 200, 5};
-  const auto is_told = [&] {
+  const auto is_reported = [&] {
     const GridChanges changes = light.changes_since(cursor);
     return std::any_of(changes.items.begin(), changes.items.end(), [&](const ChunkChange& change) {
       return change.chunk == chunk_of(voxel) && change.box.contains(local_of(voxel));
@@ -409,11 +411,11 @@ TEST(PropagatedLight, TellsOfChunksThatComeAndGoInTheOpenSky) {
   grid.fill_box({{192, 192, 0}, {256, 256, 64}}, kStone);
   light.update(grid, types);
   EXPECT_EQ(light.at(voxel).sky, 0);
-  EXPECT_TRUE(is_told());
+  EXPECT_TRUE(is_reported());
   grid.put_chunk(chunk_of(voxel), Chunk());
   light.update(grid, types);
   EXPECT_EQ(light.at(voxel).sky, 15);
-  EXPECT_TRUE(is_told());
+  EXPECT_TRUE(is_reported());
 }
 
 TEST(PropagatedLight, SplitsQuadsWhereItChanges) {

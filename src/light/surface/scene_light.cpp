@@ -122,7 +122,7 @@ std::size_t SceneLight::bytes() const {
 
 GridLight SceneLight::of(GridHandle grid) const {
   const auto found = grids_.find(grid);
-  const Entry& entry = found == grids_.end() ? content_of(unknown_) : *found->second;
+  const Entry& entry = found == grids_.end() ? impl_of(unknown_) : *found->second;
   return {&entry.light, entry.voxels};
 }
 

@@ -26,7 +26,7 @@ SurfaceLight& SurfaceLight::operator=(SurfaceLight&&) noexcept = default;
 SurfaceLight::~SurfaceLight() = default;
 
 FaceLight SurfaceLight::face(IVec3 voxel, Direction direction) {
-  return face_light(content_of(rows_).voxels, voxel + normal_of(direction), direction);
+  return face_light(impl_of(rows_).voxels, voxel + normal_of(direction), direction);
 }
 
 namespace {
@@ -107,7 +107,7 @@ void SurfaceLight::split(const QuadBuffer& quads, IVec3 chunk, LightMerging merg
                          std::vector<FaceLight>& corners) {
   out.clear();
   corners.clear();
-  Rows& rows = content_of(rows_);
+  Rows& rows = impl_of(rows_);
   for (const Quad quad : quads) {
     const FaceFrame& frame = frame_of(quad.direction());
     const IVec3 step_u(frame.u == 0, frame.u == 1, frame.u == 2);
@@ -138,7 +138,7 @@ void SurfaceLight::split(const QuadBuffer& quads, IVec3 chunk, LightMerging merg
   }
 }
 
-void SurfaceLight::read(const SmoothPlaces& places, std::span<MeanLevels> out) {
+void SurfaceLight::read(const SmoothSamples& places, std::span<MeanLevels> out) {
   QUOIN_ASSERT(places.normals.size() == places.positions.size() && out.size() >= places.positions.size(),
                "a normal for every position, and room for its light");
   const int step = 1 << std::clamp(places.level, 0, kMaxSmoothLevel);

@@ -487,12 +487,12 @@ TEST(ArraySurface, RefusesWhatCannotBe) {
 TEST(ArraySurface, TellsItsProgressAndStops) {
   const TestArray<float> samples = noise({40, 10, 50}, 9);
   double last = 0.0;
-  const auto told = surface_from_array(samples.view(), {}, {1}, [&](double fraction) {
+  const auto reported = surface_from_array(samples.view(), {}, {1}, [&](double fraction) {
     EXPECT_GE(fraction, last);
     last = fraction;
     return true;
   });
-  EXPECT_TRUE(told.has_value());
+  EXPECT_TRUE(reported.has_value());
   EXPECT_EQ(last, 1.0);
   for (const double end : {0.0, 0.3, 0.6, 0.9}) {
     const auto stopped = surface_from_array(samples.view(), {}, {2}, [&](double fraction) { return fraction < end; });

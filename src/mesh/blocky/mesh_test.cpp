@@ -101,14 +101,14 @@ TEST(BlockyMesh, StopsWhenProgressSaysSo) {
 }
 
 TEST(BlockyMesh, ProgressRisesToOneThroughBothHalves) {
-  std::vector<double> told;
+  std::vector<double> reported;
   const auto listen = [&](double fraction) {
-    told.push_back(fraction);
+    reported.push_back(fraction);
     return true;
   };
   ASSERT_TRUE(build_blocky_mesh(ten_chunks(), oracle::mixed_types(), {}, {4}, listen).has_value());
-  ASSERT_EQ(told.size(), 20U);
-  for (std::size_t i = 0; i < told.size(); ++i) EXPECT_DOUBLE_EQ(told[i], static_cast<double>(i + 1) / 20.0);
+  ASSERT_EQ(reported.size(), 20U);
+  for (std::size_t i = 0; i < reported.size(); ++i) EXPECT_DOUBLE_EQ(reported[i], static_cast<double>(i + 1) / 20.0);
 }
 
 }  // namespace

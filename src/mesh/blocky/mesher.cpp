@@ -204,8 +204,8 @@ struct BlockyMesher::Scratch : blocky::Scratch {
 };
 
 BlockyMesher::BlockyMesher() : scratch_(new Scratch()) {
-  content_of(scratch_).occlusion = blocky::make_occlusion_tables();
-  content_of(scratch_).kernel = pick_kernel();
+  impl_of(scratch_).occlusion = blocky::make_occlusion_tables();
+  impl_of(scratch_).kernel = pick_kernel();
 }
 BlockyMesher::BlockyMesher(BlockyMesher&&) noexcept = default;
 BlockyMesher& BlockyMesher::operator=(BlockyMesher&&) noexcept = default;
@@ -213,7 +213,7 @@ BlockyMesher::~BlockyMesher() = default;
 
 void BlockyMesher::mesh(const Neighbourhood& chunks, const VoxelRegistry& types, const QuadOptions& options,
                         QuadBuffer& out) {
-  content_of(scratch_).quads = 0;
+  impl_of(scratch_).quads = 0;
   const Chunk* centre = chunks.centre();
   if (centre != nullptr && !is_buried(chunks, types)) {
     const IBox region = intersect(intersect(options.region, kWholeChunk), centre->bounds());
@@ -225,10 +225,10 @@ void BlockyMesher::mesh(const Neighbourhood& chunks, const VoxelRegistry& types,
                             .occlusion = options.bake_occlusion,
                             .has_transparent = blocky::holds_transparent(*centre, types),
                             .one_type = false};
-      content_of(scratch_).kernel.mesh(job, content_of(scratch_), out);
+      impl_of(scratch_).kernel.mesh(job, impl_of(scratch_), out);
     }
   }
-  out.resize(content_of(scratch_).quads);
+  out.resize(impl_of(scratch_).quads);
 }
 
 Quad quad_part(Quad quad, int u, int v, int size_u, int size_v) {
@@ -260,8 +260,8 @@ void BlockyMesher::find_faces(const Neighbourhood& chunks, const VoxelRegistry& 
   if (centre == nullptr || is_buried(chunks, types)) return;
   const IBox region = intersect(intersect(wanted, kWholeChunk), centre->bounds());
   if (region.empty()) return;
-  blocky::Scratch& s = content_of(scratch_);
-  content_of(scratch_).kernel.find_faces(job_of_faces(chunks, types, region), s);
+  blocky::Scratch& s = impl_of(scratch_);
+  impl_of(scratch_).kernel.find_faces(job_of_faces(chunks, types, region), s);
   const std::array<const blocky::Layer*, 6> layers = {&s.sides[0], &s.sides[1],   &s.sides[2],
                                                       &s.sides[3], &s.z.faces[0], &s.z.faces[1]};
   const int width = region.max.x - region.min.x;
@@ -280,7 +280,7 @@ std::int64_t BlockyMesher::count_faces(const Neighbourhood& chunks, const VoxelR
   if (centre == nullptr || is_buried(chunks, types)) return 0;
   const IBox region = centre->bounds();
   if (region.empty()) return 0;
-  return content_of(scratch_).kernel.count_faces(job_of_faces(chunks, types, region), content_of(scratch_));
+  return impl_of(scratch_).kernel.count_faces(job_of_faces(chunks, types, region), impl_of(scratch_));
 }
 
 std::string to_string(const FaceCounts& faces) {

@@ -39,7 +39,7 @@ Sampling::Sampling(const SmoothOcclusionOptions& wanted, int wanted_level)
     : occlusion(within_limits(wanted, std::clamp(wanted_level, 0, kMaxSmoothLevel))),
       level(std::clamp(wanted_level, 0, kMaxSmoothLevel)) {}
 
-float occlusion_of_place(const DensityNeighbourhood& chunks, const CellPlace& place, Vec3 normal,
+float occlusion_of_place(const DensityNeighbourhood& chunks, const CellSample& place, Vec3 normal,
                          const Sampling& sampling) {
   const float unit = depth_unit(sampling.level);
   const int size = 1 << sampling.level;
@@ -48,10 +48,10 @@ float occlusion_of_place(const DensityNeighbourhood& chunks, const CellPlace& pl
   });
 }
 
-PlaceKernel::PlaceKernel() : kernel_(pick_kernel()) {}
+SampleKernel::SampleKernel() : kernel_(pick_kernel()) {}
 
 // Finds the cells of the samples. Samples out of reach are open.
-void PlaceKernel::sort_by_slice(const ChunkPlaces& wanted, const Sampling& sampling, std::span<float> out) {
+void SampleKernel::sort_by_slice(const ChunkSamples& wanted, const Sampling& sampling, std::span<float> out) {
   const DVec3 origin = DVec3(wanted.places.origin) - DVec3(wanted.chunk) * static_cast<double>(kChunkEdge);
   entries_.clear();
   first_of_slice_.fill(0);
@@ -73,8 +73,8 @@ void PlaceKernel::sort_by_slice(const ChunkPlaces& wanted, const Sampling& sampl
   for (const Entry& entry : entries_) sorted_[next[static_cast<std::size_t>(entry.z + 1)]++] = entry;
 }
 
-void PlaceKernel::occlude_some(const SmoothPlaces& places, int z, std::size_t first, std::size_t count,
-                               std::span<float> out) {
+void SampleKernel::occlude_some(const SmoothSamples& places, int z, std::size_t first, std::size_t count,
+                                std::span<float> out) {
   // Kernels read whole registers, so the last place is repeated.
   constexpr std::size_t kOverrun = 16;
   for (std::size_t i = 0; i < count + kOverrun; ++i) {
@@ -90,8 +90,8 @@ void PlaceKernel::occlude_some(const SmoothPlaces& places, int z, std::size_t fi
   for (std::size_t i = 0; i < count; ++i) out[sorted_[first + i].number] = occlusion_[i];
 }
 
-void PlaceKernel::occlude(const DensityNeighbourhood& chunks, const ChunkPlaces& wanted, const Sampling& sampling,
-                          std::span<float> out) {
+void SampleKernel::occlude(const DensityNeighbourhood& chunks, const ChunkSamples& wanted, const Sampling& sampling,
+                           std::span<float> out) {
   work_.level = sampling.level;
   work_.n = kChunkEdge >> sampling.level;
   work_.cells = {-1, work_.n + 1};

@@ -17,7 +17,7 @@
 namespace quoin::smooth {
 
 /// A position in the form of a vertex: a cell, and a multiple of 1/65,536 within it.
-struct CellPlace {
+struct CellSample {
   IVec3 cell;    ///< in the whole field, at the level
   Vec3 snapped;  ///< 0 to 1 within it
 };
@@ -37,10 +37,10 @@ inline bool is_in_int32(DVec3 position) {
 }
 
 /// Returns the cell of a position in samples of level 0; empty if the position is NaN or outside the int32 range.
-inline std::optional<CellPlace> place_at(DVec3 position, int level) {
+inline std::optional<CellSample> place_at(DVec3 position, int level) {
   if (!is_in_int32(position)) return std::nullopt;
   const DVec3 at = position * double{depth_unit(level)};
-  CellPlace place{};
+  CellSample place{};
   for (int axis = 0; axis < 3; ++axis) {
     const std::int64_t whole = whole_below(at[axis]);
     place.cell[axis] = static_cast<int>(whole);
@@ -71,29 +71,29 @@ struct Sampling {
 
 /// Returns the occlusion of one sample position, without kernels. `place.cell` is relative to the centre chunk's first
 /// cell.
-[[nodiscard]] float occlusion_of_place(const DensityNeighbourhood& chunks, const CellPlace& place, Vec3 normal,
+[[nodiscard]] float occlusion_of_place(const DensityNeighbourhood& chunks, const CellSample& place, Vec3 normal,
                                        const Sampling& sampling);
 
 /// The sample positions of one chunk.
-struct ChunkPlaces {
-  const SmoothPlaces& places;
+struct ChunkSamples {
+  const SmoothSamples& places;
   IVec3 chunk{0};                          ///< its coordinates, if `places` is relative to the field
   std::span<const std::uint32_t> numbers;  ///< samples in the chunk or a cell around it; other samples are far air
 };
 
 /// Computes occlusion with the mesher's kernels, including the rows that the samples of a chunk read.
-class PlaceKernel {
+class SampleKernel {
  public:
-  PlaceKernel();
+  SampleKernel();
 
-  void occlude(const DensityNeighbourhood& chunks, const ChunkPlaces& places, const Sampling& sampling,
+  void occlude(const DensityNeighbourhood& chunks, const ChunkSamples& places, const Sampling& sampling,
                std::span<float> out);
 
  private:
   using Kernel = void (*)(Work&, int z, std::size_t count, float* occlusion);
 
-  void sort_by_slice(const ChunkPlaces& places, const Sampling& sampling, std::span<float> out);
-  void occlude_some(const SmoothPlaces& places, int z, std::size_t first, std::size_t count, std::span<float> out);
+  void sort_by_slice(const ChunkSamples& places, const Sampling& sampling, std::span<float> out);
+  void occlude_some(const SmoothSamples& places, int z, std::size_t first, std::size_t count, std::span<float> out);
 
   struct Entry {
     std::uint32_t number;

@@ -9,8 +9,8 @@
 
 #include <tsl/robin_map.h>
 
-#include "core/lender.h"
 #include "core/moved_from.h"
+#include "core/object_pool.h"
 #include "core/progress_steps.h"
 #include "mesh/occlusion/places.h"
 
@@ -18,14 +18,14 @@ namespace quoin {
 
 namespace {
 
-using smooth::CellPlace;
-using smooth::PlaceKernel;
+using smooth::CellSample;
+using smooth::SampleKernel;
 using smooth::Sampling;
 
 // Chunks with fewer samples than this are computed sample by sample: gathering the kernels' rows would cost more.
 constexpr std::size_t kFewPlaces = 24;
 
-void check_places(const SmoothPlaces& places, std::span<float> out) {
+void check_places(const SmoothSamples& places, std::span<float> out) {
   QUOIN_ASSERT(places.normals.size() == places.positions.size(), "as many normals as positions");
   QUOIN_ASSERT(out.size() >= places.positions.size(), "room for every place");
   QUOIN_ASSERT(places.positions.size() < std::numeric_limits<std::uint32_t>::max(), "less than 2^32 places");
@@ -38,14 +38,14 @@ IVec3 chunk_at(DVec3 position) {
 }
 
 // Converts a cell to be relative to the first cell of its chunk.
-CellPlace in_chunk(const CellPlace& place, IVec3 chunk, int level) {
+CellSample in_chunk(const CellSample& place, IVec3 chunk, int level) {
   return {place.cell - chunk * (kChunkEdge >> level), place.snapped};
 }
 
 // The positions of a field, grouped by chunk.
 class PlacesByChunk {
  public:
-  PlacesByChunk(const SmoothPlaces& places, const Sampling& sampling, std::span<float> out) {
+  PlacesByChunk(const SmoothSamples& places, const Sampling& sampling, std::span<float> out) {
     const std::size_t count = places.positions.size();
     const float open = smooth::open_occlusion(sampling.occlusion);
     constexpr std::uint32_t kNowhere = std::numeric_limits<std::uint32_t>::max();
@@ -109,7 +109,7 @@ float smooth_occlusion(const DensityGrid& field, DVec3 position, Vec3 normal, co
                                     sampling);
 }
 
-Status smooth_occlusion(const DensityGrid& field, const SmoothPlaces& places, const SmoothOcclusionOptions& options,
+Status smooth_occlusion(const DensityGrid& field, const SmoothSamples& places, const SmoothOcclusionOptions& options,
                         std::span<float> out, Threads threads, const Progress& progress) {
   check_places(places, out);
   const Sampling sampling(options, places.level);
@@ -118,7 +118,7 @@ Status smooth_occlusion(const DensityGrid& field, const SmoothPlaces& places, co
     return {};
   }
   const PlacesByChunk chunks(places, sampling, out);
-  Lender<PlaceKernel> kernels;
+  ObjectPool<SampleKernel> kernels;
   ProgressSteps steps(progress, chunks.size());
   parallel_for(chunks.size(), threads, [&](std::size_t i) {
     if (steps.cancelled()) return;
@@ -126,7 +126,7 @@ Status smooth_occlusion(const DensityGrid& field, const SmoothPlaces& places, co
     const DensityNeighbourhood neighbourhood = field.neighbourhood(chunk);
     const auto numbers = chunks.numbers(i);
     if (numbers.size() >= kFewPlaces) {
-      kernels.with([&](PlaceKernel& kernel) {
+      kernels.with([&](SampleKernel& kernel) {
         kernel.occlude(neighbourhood, {places, chunk, numbers}, sampling, out);
       });
       return steps.step();
@@ -143,7 +143,7 @@ Status smooth_occlusion(const DensityGrid& field, const SmoothPlaces& places, co
 }
 
 struct SmoothOccluder::Scratch {
-  PlaceKernel kernel;
+  SampleKernel kernel;
   std::vector<std::uint32_t> numbers;
 };
 
@@ -152,17 +152,17 @@ SmoothOccluder::SmoothOccluder(SmoothOccluder&&) noexcept = default;
 SmoothOccluder& SmoothOccluder::operator=(SmoothOccluder&&) noexcept = default;
 SmoothOccluder::~SmoothOccluder() = default;
 
-void SmoothOccluder::occlude(const DensityNeighbourhood& chunks, const SmoothPlaces& places,
+void SmoothOccluder::occlude(const DensityNeighbourhood& chunks, const SmoothSamples& places,
                              const SmoothOcclusionOptions& options, std::span<float> out) {
   check_places(places, out);
   const Sampling sampling(options, places.level);
   const std::size_t count = places.positions.size();
   if (sampling.occlusion.method == SmoothOcclusion::None) return void(std::fill_n(out.begin(), count, 0.0F));
-  for (std::size_t i = content_of(scratch_).numbers.size(); i < count; ++i) {
-    content_of(scratch_).numbers.push_back(static_cast<std::uint32_t>(i));
+  for (std::size_t i = impl_of(scratch_).numbers.size(); i < count; ++i) {
+    impl_of(scratch_).numbers.push_back(static_cast<std::uint32_t>(i));
   }
-  content_of(scratch_).kernel.occlude(chunks, {places, IVec3{0}, std::span(content_of(scratch_).numbers).first(count)},
-                                      sampling, out);
+  impl_of(scratch_).kernel.occlude(chunks, {places, IVec3{0}, std::span(impl_of(scratch_).numbers).first(count)},
+                                   sampling, out);
 }
 
 }  // namespace quoin

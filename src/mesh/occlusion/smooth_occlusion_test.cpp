@@ -36,7 +36,7 @@ DensityGrid hilly_field() {
   return grid;
 }
 
-std::vector<float> occlusion_of(const DensityGrid& field, const SmoothPlaces& places,
+std::vector<float> occlusion_of(const DensityGrid& field, const SmoothSamples& places,
                                 const SmoothOcclusionOptions& options, Threads threads = {}) {
   std::vector<float> out(places.positions.size(), -1.0F);
   EXPECT_TRUE(smooth_occlusion(field, places, options, out, threads).has_value());
@@ -74,7 +74,8 @@ TEST(SmoothOcclusionOfPlaces, IsThatOfTheChunksMeshWithAnyInstructionsAtAnyLevel
         SmoothChunkMesh mesh;
         mesher.mesh(field.neighbourhood(chunk), options, mesh);
         ASSERT_GT(mesh.positions.size(), 60U);
-        SmoothPlaces places{{mesh.positions.data(), mesh.positions.size()}, {mesh.normals.data(), mesh.normals.size()}};
+        SmoothSamples places{{mesh.positions.data(), mesh.positions.size()},
+                             {mesh.normals.data(), mesh.normals.size()}};
         places.level = level;
         const std::vector<float> expected(mesh.occlusion.begin(), mesh.occlusion.end());
         std::vector<float> found(expected.size());
@@ -100,7 +101,7 @@ TEST(SmoothOcclusionOfPlaces, IsTheSameFarFromTheOrigin) {
   SmoothMesher mesher;
   SmoothChunkMesh mesh;
   mesher.mesh(near.neighbourhood(IVec3(0)), with(SmoothOcclusion::Weighted), mesh);
-  const SmoothPlaces places{
+  const SmoothSamples places{
       {mesh.positions.data(), mesh.positions.size()}, {mesh.normals.data(), mesh.normals.size()}, far_chunk * 64, 0};
   const std::vector<float> expected(mesh.occlusion.begin(), mesh.occlusion.end());
   EXPECT_EQ(occlusion_of(far, places, with(SmoothOcclusion::Weighted).occlusion), expected);
@@ -189,7 +190,7 @@ TEST(SmoothOcclusionOfPlaces, CancelsWhereProgressSaysSo) {
   const std::vector<Vec3> positions = {{-7, -4, -11}, {70, -4, -11}, {-7, -4, 80}};
   const std::vector<Vec3> normals(positions.size(), Vec3(0, 1, 0));
   std::vector<float> out(positions.size());
-  const SmoothPlaces places{positions, normals};
+  const SmoothSamples places{positions, normals};
   double last = 0.0;
   const auto listen = [&](double fraction) { return (last = fraction) < 2.0; };
   EXPECT_TRUE(smooth_occlusion(field, places, {}, out, Threads{1}, listen).has_value());

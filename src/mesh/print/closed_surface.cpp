@@ -115,7 +115,7 @@ CornerOffsets offsets_of(unsigned solid) {
     if (of.solid == 0) continue;
     // Moves the sheets apart, each towards the voxels that belong to it alone.
     const Vec3 away = mean_of(shares_solid ? of.open : of.solid);
-    offsets[face] = glm::length(away) > 0.0F ? glm::normalize(away) * kApart : Vec3(0.0F);
+    offsets[face] = glm::length(away) > 0.0F ? glm::normalize(away) * kSheetOffset : Vec3(0.0F);
   }
   return offsets;
 }
@@ -228,7 +228,7 @@ class SurfaceMaker {
         if (axis != face.axis && corner[axis] == next[axis]) side[axis] = 2 * corner[axis] - 1;
       }
       if (around.is_solid(side) || !around.is_solid(side + out)) continue;
-      put(0.5F * Vec3(2 * voxel + corner + next) - glm::normalize(Vec3(side + out)) * kApart);
+      put(0.5F * Vec3(2 * voxel + corner + next) - glm::normalize(Vec3(side + out)) * kSheetOffset);
     }
     if (count == 4) {
       for (const std::uint32_t i : {0U, 1U, 2U, 0U, 2U, 3U}) made_.indices.push_back(first + i);

@@ -166,7 +166,7 @@ TEST(ClosedSurface, MovesOnlyTouchingVertices) {
   }
   // Two voxels that touch at a corner: each vertex moves a hundredth into its own voxel.
   const Vec3 into = offsets[0b10000001][print::corner_face(0, 0)];
-  EXPECT_NEAR(glm::length(into), kApart, 1e-6F);
+  EXPECT_NEAR(glm::length(into), kSheetOffset, 1e-6F);
   EXPECT_LT(into.x, 0.0F);
 }
 

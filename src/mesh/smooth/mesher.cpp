@@ -51,10 +51,10 @@ void SmoothMesher::mesh(const DensityNeighbourhood& chunks, const SmoothOptions&
   const int n = kChunkEdge >> options.levels[13];
   const bool is_open = options.border == SmoothBorder::Open;
   if (!is_open && !smooth::ChunkLevels(options.levels).all_same()) {
-    const auto own_cells = [&](SmoothChunkMesh& mesh) { content_of(scratch_).mesh(chunks, options, {0, n}, mesh); };
+    const auto own_cells = [&](SmoothChunkMesh& mesh) { impl_of(scratch_).mesh(chunks, options, {0, n}, mesh); };
     return smooth::mesh_with_transitions(chunks, options, own_cells, out);
   }
-  content_of(scratch_).mesh(chunks, options, is_open ? smooth::CellRange{0, n - 1} : smooth::CellRange{-1, n}, out);
+  impl_of(scratch_).mesh(chunks, options, is_open ? smooth::CellRange{0, n - 1} : smooth::CellRange{-1, n}, out);
   if (options.split_sheets) smooth::split_sheets(chunks, options, out.indices.size(), out);
 }
 

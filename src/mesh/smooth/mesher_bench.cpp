@@ -84,7 +84,7 @@ void places(benchmark::State& state) {
   SmoothChunkMesh mesh;
   mesher.mesh(field.neighbourhood(IVec3{0}), options, mesh);
   const std::vector<float> expected(mesh.occlusion.begin(), mesh.occlusion.end());
-  const SmoothPlaces all{{mesh.positions.data(), mesh.positions.size()}, {mesh.normals.data(), mesh.normals.size()}};
+  const SmoothSamples all{{mesh.positions.data(), mesh.positions.size()}, {mesh.normals.data(), mesh.normals.size()}};
   std::vector<float> found(expected.size());
   SmoothOccluder occluder;
   const std::int64_t how = state.range(0);

@@ -8,7 +8,7 @@
 #include <quoin/core/assert.h>
 
 #include "core/coordinates/chunk_order.h"
-#include "core/lender.h"
+#include "core/object_pool.h"
 #include "core/progress_steps.h"
 #include "mesh/smooth/levels.h"
 #include "mesh/surface/build.h"
@@ -156,7 +156,7 @@ class Builder {
     types_ = &types;
     if (Status levels = levels_.ask(chunks_, options_.level_of); !levels) return levels.error();
     const SurfaceMaterials materials(types);
-    Lender<Workspace> workspaces;
+    ObjectPool<Workspace> workspaces;
     parallel_for(chunks_.size(), threads_, [&](std::size_t i) {
       if (steps_.cancelled()) return;
       workspaces.with([&](Workspace& workspace) { mesh_chunk(i, materials, workspace); });

@@ -47,7 +47,7 @@ bool has_finite_positions(const SmoothMesh& mesh) {
 #endif
 
 /// The distance between vertices at one position that must stay separate.
-constexpr float kApart = 1.0F / 1024.0F;
+constexpr float kCopyDistance = 1.0F / 1024.0F;
 /// The share of the error that the library may use. The library bounds a mean of squares, and single vertices of smooth
 /// surfaces deviate up to twice as far.
 constexpr float kMeanShare = 0.8F;
@@ -317,7 +317,7 @@ class Search {
     attempt.removes_hardly_any = left.size() + mesh_.indices.size() / kHardlyAny >= mesh_.indices.size();
     attempt.simple = triangulation_of(mesh_, std::move(left), place_);
     // A neck of three edges, for example, may collapse to one edge.
-    make_manifold(attempt.simple, std::min(kApart, 0.25F * error_));
+    make_manifold(attempt.simple, std::min(kCopyDistance, 0.25F * error_));
     attempt.deviation = deviation_of(mesh_, place_, attempt.simple, error_);
     return attempt;
   }

@@ -113,9 +113,9 @@ TEST(SmoothVoxels, EachVisibleFaceOfAVoxelIsAQuadOfItsColour) {
       EXPECT_GE(quads[type], count);
       EXPECT_LE(quads[type], count + count / 4);
     }
-    SmoothMeshOptions apart = voxels();
-    apart.keep_thin = false;
-    const SmoothMesh beads = mesh_of(grid, apart);
+    SmoothMeshOptions separate = voxels();
+    separate.keep_thin = false;
+    const SmoothMesh beads = mesh_of(grid, separate);
     quads.clear();
     for (std::size_t i = 0; i < beads.indices.size(); i += 3) ++quads[beads.types[beads.indices[i]]];
     EXPECT_EQ(quads, faces) << "two triangles a face";

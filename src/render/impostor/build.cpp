@@ -161,7 +161,7 @@ struct Subject {
 
 void put_faces(const Subject& subject, const std::vector<SeenFace>& seen, KnownFaces known, ImpostorFaces& out) {
   GridReader reader(*subject.grid);
-  GridReader beside(*subject.grid);
+  GridReader adjacent(*subject.grid);
   std::vector<std::uint32_t> fresh;
   out.surfels = subject.surfels.surfels;
   out.faces.reserve(seen.size());
@@ -181,7 +181,7 @@ void put_faces(const Subject& subject, const std::vector<SeenFace>& seen, KnownF
     }
     face.type = reader.get(face.voxel);
     face.occlusion = packed(
-        corner_occlusion([&](IVec3 voxel) { return subject.is_opaque(voxel, beside); }, face.voxel, face.direction));
+        corner_occlusion([&](IVec3 voxel) { return subject.is_opaque(voxel, adjacent); }, face.voxel, face.direction));
   }
   count_open_rays(*subject.opaque, subject.field, fresh, out);
 }

@@ -320,20 +320,20 @@ std::shared_ptr<const Impostor> ImpostorCache::find(const Scene& scene, GridHand
                                                     const ImpostorOptions& options) {
   const SceneGrid* named = scene.grids().find(grid);
   if (named == nullptr) return nullptr;
-  const std::lock_guard lock(content_of(impl_).mutex);
-  content_of(impl_).look_at(scene.types);
-  Entry& entry = content_of(impl_).entries[grid];
-  entry.last_use = content_of(impl_).round;
+  const std::lock_guard lock(impl_of(impl_).mutex);
+  impl_of(impl_).look_at(scene.types);
+  Entry& entry = impl_of(impl_).entries[grid];
+  entry.last_use = impl_of(impl_).round;
   const Origin* newest = entry.newest();
-  const bool is_current = newest != nullptr && newest->types == content_of(impl_).types_changed &&
+  const bool is_current = newest != nullptr && newest->types == impl_of(impl_).types_changed &&
                           newest->edge == options.edge && !named->grid.has_changed_since(newest->grid) &&
                           !named->field.has_changed_since(newest->field);
-  if (!is_current) content_of(impl_).ask(entry, grid, *named, options.edge);
+  if (!is_current) impl_of(impl_).ask(entry, grid, *named, options.edge);
   return entry.impostor;
 }
 
 std::size_t ImpostorCache::wait(const Scene& scene, double seconds) {
-  Impl& me = content_of(impl_);
+  Impl& me = impl_of(impl_);
   std::unique_lock lock(me.mutex);
   const auto is_ready = [&] { return me.queue.empty() && me.building == 0; };
   if (seconds == std::numeric_limits<double>::infinity()) {
@@ -351,14 +351,14 @@ std::size_t ImpostorCache::wait(const Scene& scene, double seconds) {
 }
 
 void ImpostorCache::update_types(const VoxelRegistry& types) {
-  const std::lock_guard lock(content_of(impl_).mutex);
-  content_of(impl_).look_at(types);
+  const std::lock_guard lock(impl_of(impl_).mutex);
+  impl_of(impl_).look_at(types);
 }
 
 ImpostorCache::Stats ImpostorCache::stats() const {
-  const std::lock_guard lock(content_of(impl_).mutex);
-  Stats stats = content_of(impl_).stats;
-  stats.waiting = content_of(impl_).queue.size() + content_of(impl_).building;
+  const std::lock_guard lock(impl_of(impl_).mutex);
+  Stats stats = impl_of(impl_).stats;
+  stats.waiting = impl_of(impl_).queue.size() + impl_of(impl_).building;
   return stats;
 }
 

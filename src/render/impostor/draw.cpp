@@ -10,9 +10,9 @@
 #include "core/srgb.h"
 #include "light/lighting.h"
 #include "render/camera_rays.h"
+#include "render/image_request.h"
 #include "render/impostor/pass.h"
 #include "render/on_face.h"
-#include "render/picture_request.h"
 
 namespace quoin {
 namespace {
@@ -24,8 +24,8 @@ constexpr int kBlock = CameraRays::kBlock;
 class FarTile {
  public:
   FarTile(const ImpostorPass& pass, const SceneView& view, const CameraRays& rays, const Lighting& lighting,
-          OcclusionMode mode, Picture& picture)
-      : pass_(&pass), view_(&view), rays_(&rays), lighting_(&lighting), mode_(mode), picture_(&picture) {}
+          OcclusionMode mode, RenderedImage& image)
+      : pass_(&pass), view_(&view), rays_(&rays), lighting_(&lighting), mode_(mode), image_(&image) {}
 
   void draw(int column, int row) {
     pass_->draw(column, row, 0, *far_);
@@ -43,7 +43,7 @@ class FarTile {
       // The minimum comes second, so that NaN becomes 0.
       const Vec3 colour = glm::min(glm::max(Vec3(0.0F), lit[i]), Vec3(1.0F));
       for (int channel = 0; channel < 3; ++channel) {
-        picture_->colour.rgb[3 * pixels_[i] + static_cast<std::size_t>(channel)] = encode(colour[channel]);
+        image_->colour.rgb[3 * pixels_[i] + static_cast<std::size_t>(channel)] = encode(colour[channel]);
       }
     }
   }
@@ -57,12 +57,11 @@ class FarTile {
     for (std::uint32_t left = faces.found; left != 0; left &= left - 1) {
       const int lane = std::countr_zero(left);
       const auto i = static_cast<std::size_t>(lane);
-      const auto pixel =
-          static_cast<std::size_t>(row + lane / kBlock) * static_cast<std::size_t>(picture_->depth.width) +
-          static_cast<std::size_t>(column + lane % kBlock);
+      const auto pixel = static_cast<std::size_t>(row + lane / kBlock) * static_cast<std::size_t>(image_->depth.width) +
+                         static_cast<std::size_t>(column + lane % kBlock);
       const auto depth = static_cast<float>(hits.grids.t[i]);
-      if (!(depth < picture_->depth.values[pixel])) continue;
-      picture_->depth.values[pixel] = depth;
+      if (!(depth < image_->depth.values[pixel])) continue;
+      image_->depth.values[pixel] = depth;
       const Ray ray = rays.ray(lane);
       SurfacePoint& point = points_.emplace_back();
       point.voxel = {hits.grids.x[i], hits.grids.y[i], hits.grids.z[i]};
@@ -89,7 +88,7 @@ class FarTile {
   const CameraRays* rays_;
   const Lighting* lighting_;
   OcclusionMode mode_;
-  Picture* picture_;
+  RenderedImage* image_;
   std::unique_ptr<raster::Canvas> far_ = std::make_unique<raster::Canvas>();
   std::vector<SurfacePoint> points_;
   std::vector<std::size_t> pixels_;
@@ -98,11 +97,11 @@ class FarTile {
 }  // namespace
 
 void draw_impostors(const SceneTracer& scene, std::span<const FarInstance> far, const Camera& camera,
-                    const RenderOptions& options, Picture& picture, Threads threads) {
+                    const RenderOptions& options, RenderedImage& image, Threads threads) {
   QUOIN_ASSERT(check(camera, options).has_value(), "a camera and options that CpuRenderer accepts");
   QUOIN_ASSERT(options.light.model == LightModel::Rays, "ray-traced light");
-  QUOIN_ASSERT(picture.colour.width == options.width && picture.colour.height == options.height &&
-                   picture.depth.width == options.width && picture.depth.height == options.height,
+  QUOIN_ASSERT(image.colour.width == options.width && image.colour.height == options.height &&
+                   image.depth.width == options.width && image.depth.height == options.height,
                "an image of the options' size, with depth");
   const SceneView view(scene, camera.position);
   const VoxelRegistry& types = scene.scene().types;
@@ -116,7 +115,7 @@ void draw_impostors(const SceneTracer& scene, std::span<const FarInstance> far, 
     const int column = static_cast<int>(i) % across * kTile;
     const int row = static_cast<int>(i) / across * kTile;
     if (pass.may_show(column, row))
-      FarTile(pass, view, rays, lighting, options.light.occlusion_mode, picture).draw(column, row);
+      FarTile(pass, view, rays, lighting, options.light.occlusion_mode, image).draw(column, row);
   });
 }
 

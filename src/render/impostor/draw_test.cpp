@@ -41,7 +41,7 @@ std::vector<Likeness> likenesses(World& world, int pixels, int count) {
 
 // The specification requires 0.97 and 6; the worst measured values are 0.997 and 3.8 (the terrain), 0.9986 and 1.2 (all
 // others).
-TEST(DrawImpostors, LooksLikeTheTracedPictureAtTheThreshold) {
+TEST(DrawImpostors, LooksLikeTheTracedImageAtTheThreshold) {
   for (const Model model : kModels) {
     World world(model);
     for (const int pixels : {128, 64}) {
@@ -85,18 +85,18 @@ TEST(DrawImpostors, DoesNotJumpWhileOrbiting) {
     const World world(model);
     const RenderOptions options = sized(148, 148);
     double largest_step = 0.0;
-    Picture last;
-    Picture last_truth;
+    RenderedImage last;
+    RenderedImage last_truth;
     for (int degree = 0; degree < 360; ++degree) {
       const Camera camera = orbiting(world, degree * kDegree, 0.5, 0.0, 128.0, 148);
-      Picture truth = taken(world.scene, camera, options);
-      Picture picture = world.drawn(camera, options);
-      EXPECT_LE(likeness(truth, picture).difference, 6.0) << degree;
+      RenderedImage truth = taken(world.scene, camera, options);
+      RenderedImage image = world.drawn(camera, options);
+      EXPECT_LE(likeness(truth, image).difference, 6.0) << degree;
       if (degree > 0) {
-        const double step = likeness(last, picture).difference - likeness(last_truth, truth).difference;
+        const double step = likeness(last, image).difference - likeness(last_truth, truth).difference;
         largest_step = std::max(largest_step, step);
       }
-      last = std::move(picture);
+      last = std::move(image);
       last_truth = std::move(truth);
     }
     std::printf("model %d: %.3f of 255 beyond the traced step\n", static_cast<int>(model), largest_step);
@@ -117,23 +117,23 @@ TEST(DrawImpostors, TurnsMirrorsAndScalesWithTheInstance) {
     Camera camera = orbiting(world, i, 0.3, i, 128.0, 148);
     camera.position = placed.position + camera.position * placed.voxel_size;
     const RenderOptions options = sized(148, 148);
-    const Picture truth = taken(world.scene, camera, options);
-    const Picture picture = world.drawn(camera, options);
-    const Likeness found = likeness(truth, picture);
+    const RenderedImage truth = taken(world.scene, camera, options);
+    const RenderedImage image = world.drawn(camera, options);
+    const Likeness found = likeness(truth, image);
     EXPECT_GE(found.overlap, 0.97) << i;
     EXPECT_LE(found.difference, 6.0) << i;
     std::int64_t close = 0;
     std::int64_t both = 0;
     for (std::size_t p = 0; p < truth.depth.values.size(); ++p) {
-      if (!std::isfinite(truth.depth.values[p]) || !std::isfinite(picture.depth.values[p])) continue;
+      if (!std::isfinite(truth.depth.values[p]) || !std::isfinite(image.depth.values[p])) continue;
       ++both;
-      close += std::abs(truth.depth.values[p] - picture.depth.values[p]) <= 0.05 * placed.voxel_size;
+      close += std::abs(truth.depth.values[p] - image.depth.values[p]) <= 0.05 * placed.voxel_size;
     }
     EXPECT_GE(static_cast<double>(close), 0.95 * static_cast<double>(both)) << i;
   }
 }
 
-TEST(DrawImpostors, OrthographicPicturesToo) {
+TEST(DrawImpostors, OrthographicImagesToo) {
   const World world(Model::Castle);
   Camera camera = orbiting(world, 0.7, 0.4, 0.2, 128.0, 148);
   camera.projection = Camera::Projection::Orthographic;
@@ -153,25 +153,25 @@ TEST(DrawImpostors, ShowsThePaletteOfTheDay) {
     black.colour = {0, 0, 0, 255};
     world.scene.types.replace(type, black);
   }
-  const Picture picture = world.drawn(camera, options);
-  EXPECT_TRUE(std::isfinite(depth_at(picture, 35, 35)));
-  EXPECT_EQ(pixel_at(picture, 35, 35), (Pixel{0, 0, 0})) << "and black is no hole";
+  const RenderedImage image = world.drawn(camera, options);
+  EXPECT_TRUE(std::isfinite(depth_at(image, 35, 35)));
+  EXPECT_EQ(pixel_at(image, 35, 35), (Pixel{0, 0, 0})) << "and black is no hole";
 }
 
 TEST(DrawImpostors, EmptyPixelsKeepWhatTheyHad) {
   const World world(Model::Ball);
   const RenderOptions options = sized(80, 80);
   const Camera camera = orbiting(world, 0.7, 0.4, 0.0, 60.0, 80);
-  const Picture before = taken(Scene(), camera, options);
-  const Picture picture = world.drawn(camera, options);
+  const RenderedImage before = taken(Scene(), camera, options);
+  const RenderedImage image = world.drawn(camera, options);
   int kept = 0;
-  for (std::size_t i = 0; i < picture.depth.values.size(); ++i) {
-    if (std::isfinite(picture.depth.values[i])) continue;
+  for (std::size_t i = 0; i < image.depth.values.size(); ++i) {
+    if (std::isfinite(image.depth.values[i])) continue;
     ++kept;
-    for (std::size_t c = 3 * i; c < 3 * i + 3; ++c) ASSERT_EQ(picture.colour.rgb[c], before.colour.rgb[c]);
+    for (std::size_t c = 3 * i; c < 3 * i + 3; ++c) ASSERT_EQ(image.colour.rgb[c], before.colour.rgb[c]);
   }
   EXPECT_GT(kept, 80 * 80 / 2);
-  Picture nearer = before;
+  RenderedImage nearer = before;
   std::fill(nearer.depth.values.begin(), nearer.depth.values.end(), 1.0F);
   const std::array far{FarInstance{world.instance, &world.impostor}};
   draw_impostors(SceneTracer(world.scene), far, camera, options, nearer);
@@ -190,20 +190,20 @@ TEST(DrawImpostors, OrderDoesNotMatterAndTheLowerHandleWinsAtEqualDepth) {
   const InstanceHandle twin = world.scene.add_instance(other);
   other.position = {25, 3, 7};
   other.rotation = glm::angleAxis(0.7, DVec3(0, 0, 1));
-  const InstanceHandle beside = world.scene.add_instance(other);
-  std::vector<FarInstance> far = {{world.instance, &world.impostor}, {twin, &grey}, {beside, &grey}};
+  const InstanceHandle adjacent = world.scene.add_instance(other);
+  std::vector<FarInstance> far = {{world.instance, &world.impostor}, {twin, &grey}, {adjacent, &grey}};
   const RenderOptions options = sized(120, 120);
   const Camera camera = orbiting(world, 0.7, 0.4, 0.0, 60.0, 120);
   const SceneTracer tracer(world.scene);
-  std::array<Picture, 2> pictures;
-  for (Picture& picture : pictures) {
-    picture = taken(Scene(), camera, options);
-    draw_impostors(tracer, far, camera, options, picture);
+  std::array<RenderedImage, 2> images;
+  for (RenderedImage& image : images) {
+    image = taken(Scene(), camera, options);
+    draw_impostors(tracer, far, camera, options, image);
     std::reverse(far.begin(), far.end());
   }
-  EXPECT_EQ(pictures[0].colour.rgb, pictures[1].colour.rgb);
-  EXPECT_EQ(pictures[0].depth.values, pictures[1].depth.values);
-  const Likeness found = likeness(taken(world.scene, camera, options), pictures[0]);
+  EXPECT_EQ(images[0].colour.rgb, images[1].colour.rgb);
+  EXPECT_EQ(images[0].depth.values, images[1].depth.values);
+  const Likeness found = likeness(taken(world.scene, camera, options), images[0]);
   EXPECT_GE(found.overlap, 0.99);
   EXPECT_LE(found.difference, 2.0) << "the traced picture shows the lower handle's colours";
 }
@@ -215,8 +215,8 @@ TEST(DrawImpostors, HostilePlacesNeitherHangNorCrash) {
   const auto pixels_at = [&](DVec3 position, double size = 1.0) {
     world.placed().position = position;
     world.placed().voxel_size = size;
-    const Picture picture = world.drawn(camera, options);
-    return std::count_if(picture.depth.values.begin(), picture.depth.values.end(),
+    const RenderedImage image = world.drawn(camera, options);
+    return std::count_if(image.depth.values.begin(), image.depth.values.end(),
                          [](float depth) { return std::isfinite(depth); });
   };
   const double infinity = std::numeric_limits<double>::infinity();
@@ -239,20 +239,20 @@ TEST(DrawImpostors, ThreadsAndInstructionsChangeNoByte) {
   const World world(Model::Castle);
   const Camera camera = orbiting(world, 0.7, 0.4, 0.2, 128.0, 148);
   const RenderOptions options = sized(148, 148);
-  const Picture one = world.drawn(camera, options, {1});
+  const RenderedImage one = world.drawn(camera, options, {1});
   const InstructionSetOverride over(InstructionSet::Plain);
-  const Picture four = world.drawn(camera, options, {4});
+  const RenderedImage four = world.drawn(camera, options, {4});
   EXPECT_EQ(one.colour.rgb, four.colour.rgb);
   EXPECT_EQ(one.depth.values, four.depth.values);
 }
 
-TEST(DrawImpostorsDeathTest, WantsAPictureOfTheSizeThatIsAskedFor) {
+TEST(DrawImpostorsDeathTest, WantsAImageOfTheSizeThatIsAskedFor) {
   const World world(Model::Castle);
   const Camera camera = orbiting(world, 0.7, 0.4, 0.2, 128.0, 32);
   [[maybe_unused]] const auto draw = [&](const RenderOptions& options) {
-    Picture picture;
+    RenderedImage image;
     const Scene empty;
-    draw_impostors(SceneTracer(empty), {}, camera, options, picture);
+    draw_impostors(SceneTracer(empty), {}, camera, options, image);
   };
   QUOIN_EXPECT_MISTAKE(draw(sized(32, 32)), "an image of the options' size");
   QUOIN_EXPECT_MISTAKE(draw(sized(0, 32)), "that CpuRenderer accepts");

@@ -22,7 +22,7 @@ TEST(RenderFar, TracesImpostorsThatAreNotReadyInTime) {
   RenderOptions options = sized(148, 148);
   const Camera camera = orbiting(world, 0.7, 0.6, 0.0, 100.0, 148);
   const CpuRenderer renderer(world.scene);
-  const Picture truth = renderer.render(camera, options).value();
+  const RenderedImage truth = renderer.render(camera, options).value();
   options.detail.policy = DetailPolicy{};
   options.detail.impostor_seconds = 0.0;
   EXPECT_EQ(renderer.render(camera, options)->colour.rgb, truth.colour.rgb);
@@ -42,11 +42,11 @@ TEST(RenderFar, TheRendererDrawsFarInstancesFromImpostors) {
   world.scene.add_instance(ground);
   RenderOptions options = sized(148, 148);
   const Camera camera = orbiting(world, 0.7, 0.6, 0.0, 100.0, 148);
-  const Picture truth = taken(world.scene, camera, options);
+  const RenderedImage truth = taken(world.scene, camera, options);
   options.detail.policy = DetailPolicy{};
-  const Picture picture = taken(world.scene, camera, options);
-  EXPECT_NE(truth.colour.rgb, picture.colour.rgb);
-  const Likeness found = likeness(truth, picture);
+  const RenderedImage image = taken(world.scene, camera, options);
+  EXPECT_NE(truth.colour.rgb, image.colour.rgb);
+  const Likeness found = likeness(truth, image);
   EXPECT_EQ(found.overlap, 1.0);
   EXPECT_LE(found.difference, 2.0) << "with the castle's shadow on the ground";
   options.detail.colours = true;
@@ -56,7 +56,7 @@ TEST(RenderFar, TheRendererDrawsFarInstancesFromImpostors) {
 }
 
 // Without this, some renderers would find impostors still being built by another one, and trace those grids.
-TEST(RenderFar, PicturesTakenAtOnceAreThoseTakenAlone) {
+TEST(RenderFar, ImagesTakenAtOnceAreThoseTakenAlone) {
   ImpostorWorld world(Model::Castle);
   for (int i = 1; i < 4; ++i) {
     Instance other = world.placed();
@@ -70,17 +70,17 @@ TEST(RenderFar, PicturesTakenAtOnceAreThoseTakenAlone) {
   RenderOptions options = sized(120, 120);
   options.detail.policy = DetailPolicy{};
   const Camera camera = orbiting(world, 0.7, 0.6, 0.0, 40.0, 120);
-  const Picture alone = taken(world.scene, camera, options);
+  const RenderedImage alone = taken(world.scene, camera, options);
   for (int round = 0; round < 4; ++round) {
     const CpuRenderer renderer(world.scene);
-    std::array<Picture, 3> pictures;
+    std::array<RenderedImage, 3> images;
     {
       std::vector<std::jthread> threads;
-      for (Picture& picture : pictures) {
-        threads.emplace_back([&] { picture = renderer.render(camera, options, {1}).value(); });
+      for (RenderedImage& image : images) {
+        threads.emplace_back([&] { image = renderer.render(camera, options, {1}).value(); });
       }
     }
-    for (const Picture& picture : pictures) EXPECT_EQ(picture.colour.rgb, alone.colour.rgb) << round;
+    for (const RenderedImage& image : images) EXPECT_EQ(image.colour.rgb, alone.colour.rgb) << round;
   }
 }
 

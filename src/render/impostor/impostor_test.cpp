@@ -309,35 +309,35 @@ TEST(Impostor, MoreTexelsSeeSmallerFaces) {
   EXPECT_LT(bytes(16), bytes(64));
 }
 
-TEST(Impostor, PicturesAreThoseOfTheRenderer) {
+TEST(Impostor, ImagesAreThoseOfTheRenderer) {
   Scene scene;
   scene.types = two_types();
   place(scene, blobs(5));
   const Grid& grid = scene.grids()[scene.grids().handles()[0]].grid;
-  const std::vector<ImpostorPicture> pictures = impostor_pictures(grid, scene.types, ImpostorOptions{96});
-  ASSERT_EQ(pictures.size(), 26U);
+  const std::vector<ImpostorImage> images = impostor_images(grid, scene.types, ImpostorOptions{96});
+  ASSERT_EQ(images.size(), 26U);
   RenderOptions options = sized(96, 96);
   options.light.shading = Shading::Unlit;
-  for (std::size_t view = 0; view < pictures.size(); ++view) {
-    const ImpostorPicture& picture = pictures[view];
-    const Picture truth = taken(scene, picture.camera, options);
+  for (std::size_t view = 0; view < images.size(); ++view) {
+    const ImpostorImage& image = images[view];
+    const RenderedImage truth = taken(scene, image.camera, options);
     int different = 0;
     int covered = 0;
-    for (std::size_t i = 0; i < picture.coverage.size(); ++i) {
-      covered += picture.coverage[i] == 255;
-      ASSERT_EQ(picture.coverage[i] == 255, std::isfinite(picture.depth.values[i]));
-      different += std::isfinite(truth.depth.values[i]) != (picture.coverage[i] == 255);
-      if (picture.coverage[i] == 0 || !std::isfinite(truth.depth.values[i])) continue;
-      different += std::abs(truth.depth.values[i] - picture.depth.values[i]) > 1e-3F;
-      different += truth.colour.rgb[3 * i] != picture.colour.rgb[3 * i];
+    for (std::size_t i = 0; i < image.coverage.size(); ++i) {
+      covered += image.coverage[i] == 255;
+      ASSERT_EQ(image.coverage[i] == 255, std::isfinite(image.depth.values[i]));
+      different += std::isfinite(truth.depth.values[i]) != (image.coverage[i] == 255);
+      if (image.coverage[i] == 0 || !std::isfinite(truth.depth.values[i])) continue;
+      different += std::abs(truth.depth.values[i] - image.depth.values[i]) > 1e-3F;
+      different += truth.colour.rgb[3 * i] != image.colour.rgb[3 * i];
     }
     EXPECT_GT(covered, 500);
     EXPECT_LE(different, 4) << view << ": only rounding at edges may differ";
   }
-  const std::vector<ImpostorPicture> none = impostor_pictures(Grid(), scene.types, ImpostorOptions{16});
+  const std::vector<ImpostorImage> none = impostor_images(Grid(), scene.types, ImpostorOptions{16});
   ASSERT_EQ(none.size(), 26U);
-  for (const ImpostorPicture& picture : none) {
-    EXPECT_EQ(picture.coverage, std::vector<std::uint8_t>(256, 0));
+  for (const ImpostorImage& image : none) {
+    EXPECT_EQ(image.coverage, std::vector<std::uint8_t>(256, 0));
   }
 }
 

@@ -86,10 +86,10 @@ class ImpostorPass {
 ///           content's radius spans less than a pixel; instances that `scene` does not hold or holds halved;
 ///           transparent parts of voxels and fields.
 ///
-/// Requires: CpuRenderer accepts the camera and the options; the light model is LightModel::Rays; `picture` has the
+/// Requires: CpuRenderer accepts the camera and the options; the light model is LightModel::Rays; `image` has the
 ///           size of the options, and depth. Takes one sample per pixel, at its centre.
 void draw_impostors(const SceneTracer& scene, std::span<const FarInstance> far, const Camera& camera,
-                    const RenderOptions& options, Picture& picture, Threads threads = {});
+                    const RenderOptions& options, RenderedImage& image, Threads threads = {});
 
 /// Returns the indices in SceneTracer::placed of the far instances in a tracer.
 [[nodiscard]] std::vector<std::int32_t> placed_of(const SceneTracer& tracer, std::span<const FarInstance> far);

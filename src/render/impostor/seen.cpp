@@ -129,12 +129,12 @@ std::vector<SeenFace> seen_of(const ImpostorFaces& faces) {
 
 // Returns the adjacent face across the edge towards `sign` along `axis`: in the same plane, or around the edge.
 VoxelFace face_beside(const VoxelFace& face, int axis, int sign, const OccupancyTree& opaque) {
-  IVec3 beside = face.voxel;
-  beside[axis] += sign;
-  const IVec3 front = beside + normal_of(face.direction);
+  IVec3 adjacent = face.voxel;
+  adjacent[axis] += sign;
+  const IVec3 front = adjacent + normal_of(face.direction);
   const auto towards = [&](int along) { return static_cast<Direction>(2 * axis + (along > 0 ? 0 : 1)); };
   if (opaque.is_occupied(front)) return {front, towards(-sign)};
-  if (opaque.is_occupied(beside)) return {beside, face.direction};
+  if (opaque.is_occupied(adjacent)) return {adjacent, face.direction};
   return {face.voxel, towards(sign)};
 }
 

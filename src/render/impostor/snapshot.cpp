@@ -107,35 +107,35 @@ Camera camera_of(const SnapshotCamera& from, int edge) {
   return camera;
 }
 
-ImpostorPicture picture_of(const Snapshot& snapshot, const VoxelRegistry& types) {
+ImpostorImage rendered_of(const Snapshot& snapshot, const VoxelRegistry& types) {
   const Rgba8 unknown{255, 0, 255, 255};
   const std::size_t texels = snapshot.types.size();
-  ImpostorPicture picture;
-  picture.camera = camera_of(snapshot.camera, snapshot.edge);
-  picture.colour = {snapshot.edge, snapshot.edge, std::vector<std::uint8_t>(3 * texels)};
-  picture.depth = {snapshot.edge, snapshot.edge, snapshot.depth};
-  picture.coverage.resize(texels);
+  ImpostorImage image;
+  image.camera = camera_of(snapshot.camera, snapshot.edge);
+  image.colour = {snapshot.edge, snapshot.edge, std::vector<std::uint8_t>(3 * texels)};
+  image.depth = {snapshot.edge, snapshot.edge, snapshot.depth};
+  image.coverage.resize(texels);
   for (std::size_t i = 0; i < texels; ++i) {
     const VoxelType type = snapshot.types[i];
     if (type == kAir) continue;
     const Rgba8 colour = type < types.size() ? types[type].colour : unknown;
-    picture.coverage[i] = 255;
-    picture.colour.rgb[3 * i] = colour.r, picture.colour.rgb[3 * i + 1] = colour.g;
-    picture.colour.rgb[3 * i + 2] = colour.b;
+    image.coverage[i] = 255;
+    image.colour.rgb[3 * i] = colour.r, image.colour.rgb[3 * i + 1] = colour.g;
+    image.colour.rgb[3 * i + 2] = colour.b;
   }
-  return picture;
+  return image;
 }
 
 }  // namespace
 
-std::vector<ImpostorPicture> impostor_pictures(const Grid& grid, const VoxelRegistry& types,
-                                               const ImpostorOptions& options, Threads threads) {
+std::vector<ImpostorImage> impostor_images(const Grid& grid, const VoxelRegistry& types, const ImpostorOptions& options,
+                                           Threads threads) {
   const OccupancyTree opaque = OccupancyTree::build(grid, types, Occupancy::Opaque);
-  std::vector<ImpostorPicture> pictures(kImpostorViews);
-  parallel_for(pictures.size(), threads, [&](std::size_t view) {
-    pictures[view] = picture_of(take_snapshot(grid, types, opaque, static_cast<int>(view), options.edge), types);
+  std::vector<ImpostorImage> images(kImpostorViews);
+  parallel_for(images.size(), threads, [&](std::size_t view) {
+    images[view] = rendered_of(take_snapshot(grid, types, opaque, static_cast<int>(view), options.edge), types);
   });
-  return pictures;
+  return images;
 }
 
 }  // namespace quoin

@@ -116,21 +116,21 @@ class SurfelMaker {
     double slope = 0.0;
   };
   [[nodiscard]] Side side_of(IVec3 sample, int axis, int along, bool is_solid_below, double offset) const {
-    std::array<std::optional<double>, 2> beside;
+    std::array<std::optional<double>, 2> adjacent;
     Side side;
     for (int i = 0; i < 2; ++i) {
       IVec3 step{0};
       step[along] = i == 0 ? -1 : 1;
-      auto& found = beside[static_cast<std::size_t>(i)];
+      auto& found = adjacent[static_cast<std::size_t>(i)];
       found = height_near(sample + step, axis, is_solid_below);
       if (!found) (i == 0 ? side.low : side.high) = reach_to(sample, step, axis, is_solid_below);
     }
-    if (beside[0] && beside[1]) {
-      side.slope = 0.5 * (*beside[1] - *beside[0]);
-    } else if (beside[0]) {
-      side.slope = offset - *beside[0];
-    } else if (beside[1]) {
-      side.slope = *beside[1] - offset;
+    if (adjacent[0] && adjacent[1]) {
+      side.slope = 0.5 * (*adjacent[1] - *adjacent[0]);
+    } else if (adjacent[0]) {
+      side.slope = offset - *adjacent[0];
+    } else if (adjacent[1]) {
+      side.slope = *adjacent[1] - offset;
     }
     return side;
   }

@@ -62,13 +62,13 @@ TEST(Surfels, LookLikeTheTracedField) {
 TEST(Surfels, DepthsAndNormalsAreThoseOfTheSurface) {
   ImpostorWorld world(Model::SmoothBall);
   const Camera camera = orbiting(world, 0.7, 0.4, 0.2, 128.0, 148);
-  const Picture truth = taken(world.scene, camera, sized(148, 148));
-  const Picture picture = world.drawn(camera, sized(148, 148));
+  const RenderedImage truth = taken(world.scene, camera, sized(148, 148));
+  const RenderedImage image = world.drawn(camera, sized(148, 148));
   int both = 0;
   double sum = 0.0;
   for (std::size_t i = 0; i < truth.depth.values.size(); ++i) {
-    if (!std::isfinite(truth.depth.values[i]) || !std::isfinite(picture.depth.values[i])) continue;
-    const double off = std::abs(truth.depth.values[i] - picture.depth.values[i]);
+    if (!std::isfinite(truth.depth.values[i]) || !std::isfinite(image.depth.values[i])) continue;
+    const double off = std::abs(truth.depth.values[i] - image.depth.values[i]);
     ++both;
     sum += off;
     // At the outline, one pixel further is much deeper.
@@ -89,14 +89,14 @@ TEST(Surfels, TheSameBitsWithAnyInstructions) {
   for (const Model model : {Model::SmoothHills, Model::Village}) {
     const ImpostorWorld world(model);
     const Camera camera = orbiting(world, 0.7, 0.4, 0.2, 100.0, 120);
-    std::vector<Picture> pictures;
+    std::vector<RenderedImage> images;
     for (const InstructionSet set : sets_of_this_machine()) {
       const InstructionSetOverride only(set);
-      pictures.push_back(world.drawn(camera, sized(120, 120)));
+      images.push_back(world.drawn(camera, sized(120, 120)));
     }
-    for (const Picture& picture : pictures) {
-      EXPECT_EQ(picture.colour.rgb, pictures[0].colour.rgb);
-      EXPECT_EQ(picture.depth.values, pictures[0].depth.values);
+    for (const RenderedImage& image : images) {
+      EXPECT_EQ(image.colour.rgb, images[0].colour.rgb);
+      EXPECT_EQ(image.depth.values, images[0].depth.values);
     }
   }
 }
@@ -105,9 +105,9 @@ TEST(Surfels, RenderersDrawFarFieldsFromThem) {
   ImpostorWorld world(Model::Village);
   const Camera camera = orbiting(world, 0.7, 0.4, 0.2, 100.0, 120);
   RenderOptions options = sized(120, 120);
-  const Picture traced = taken(world.scene, camera, options);
+  const RenderedImage traced = taken(world.scene, camera, options);
   options.detail.policy.emplace().far_pixels = 128;
-  const Picture far = taken(world.scene, camera, options);
+  const RenderedImage far = taken(world.scene, camera, options);
   EXPECT_LT(far.rays, traced.rays / 2) << "no rays of occlusion";
   const Likeness found = likeness(traced, far);
   EXPECT_GE(found.overlap, 0.975);
@@ -116,7 +116,7 @@ TEST(Surfels, RenderersDrawFarFieldsFromThem) {
   SceneGrid ground;
   ground.field.add_box({-300, -90, -300}, {300, -60, 300}, 3);
   world.scene.add_instance({"", world.scene.add_grid(std::move(ground))});
-  const Picture near = taken(world.scene, camera, sized(120, 120));
+  const RenderedImage near = taken(world.scene, camera, sized(120, 120));
   EXPECT_LE(likeness(near, taken(world.scene, camera, options)).difference, 6.0);
 }
 
@@ -148,7 +148,7 @@ TEST(Surfels, TracesModelsThatAreTooLargeOrThin) {
   EXPECT_TRUE(rods.impostor.is_left_to_rays());
   const Camera near = orbiting(rods, 0.7, 0.4, 0.2, 100.0, 120);
   RenderOptions in_detail = sized(120, 120);
-  const Picture traced = taken(rods.scene, near, in_detail);
+  const RenderedImage traced = taken(rods.scene, near, in_detail);
   in_detail.detail.policy.emplace().far_pixels = 128;
   EXPECT_EQ(taken(rods.scene, near, in_detail).depth.values, traced.depth.values);
   Scene scene;

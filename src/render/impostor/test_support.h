@@ -27,17 +27,17 @@ struct Likeness {
   std::int64_t pixels = 0;
 };
 
-inline Likeness likeness(const Picture& truth, const Picture& picture) {
+inline Likeness likeness(const RenderedImage& truth, const RenderedImage& image) {
   std::int64_t both = 0;
   Likeness found;
   for (std::size_t i = 0; i < truth.depth.values.size(); ++i) {
     const bool in_truth = std::isfinite(truth.depth.values[i]);
-    const bool in_picture = std::isfinite(picture.depth.values[i]);
-    if (!in_truth && !in_picture) continue;
+    const bool in_image = std::isfinite(image.depth.values[i]);
+    if (!in_truth && !in_image) continue;
     ++found.pixels;
-    both += in_truth && in_picture;
+    both += in_truth && in_image;
     for (std::size_t c = 3 * i; c < 3 * i + 3; ++c) {
-      found.difference += std::abs(truth.colour.rgb[c] - picture.colour.rgb[c]) / 3.0;
+      found.difference += std::abs(truth.colour.rgb[c] - image.colour.rgb[c]) / 3.0;
     }
   }
   if (found.pixels == 0) return found;
@@ -157,10 +157,10 @@ struct ImpostorWorld {
   }
   Instance& placed() { return scene.edit(instance); }
 
-  [[nodiscard]] Picture drawn(const Camera& camera, const RenderOptions& options, Threads threads = {}) const {
-    Picture picture = taken(Scene(), camera, options);
-    draw_impostors(SceneTracer(scene), std::array{FarInstance{instance, &impostor}}, camera, options, picture, threads);
-    return picture;
+  [[nodiscard]] RenderedImage drawn(const Camera& camera, const RenderOptions& options, Threads threads = {}) const {
+    RenderedImage image = taken(Scene(), camera, options);
+    draw_impostors(SceneTracer(scene), std::array{FarInstance{instance, &impostor}}, camera, options, image, threads);
+    return image;
   }
 };
 

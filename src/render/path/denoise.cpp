@@ -134,10 +134,10 @@ class Denoiser {
     float variances = 0.0F;
     float weights = 0.0F;
     around(x, y, slot, 2, step, [&](const SurfacePart& part, const Light& light, float likeness, int dx, int dy) {
-      const float apart = luminance(light.mean) - own_light;
+      const float separate = luminance(light.mean) - own_light;
       const float noise = kAllowed * kAllowed * (own.variance + light.variance) + 1e-8F;
       const float near = kKernel[static_cast<std::size_t>(dx + 2)] * kKernel[static_cast<std::size_t>(dy + 2)];
-      const float weight = near * likeness * part.samples * exponential(-apart * apart / noise);
+      const float weight = near * likeness * part.samples * exponential(-separate * separate / noise);
       const Vec3 albedo = albedo_of(part);
       sum += light.mean * albedo * weight;
       whole += albedo * weight;
@@ -157,11 +157,11 @@ class Denoiser {
 
 }  // namespace
 
-void denoise(const SurfaceParts& parts, int samples, Threads threads, PathPicture& picture) {
+void denoise(const SurfaceParts& parts, int samples, Threads threads, PathImage& image) {
   Denoiser denoiser(parts, threads);
   denoiser.smooth();
   const auto count = static_cast<float>(samples);
-  for (std::size_t pixel = 0; pixel < picture.scene.size(); ++pixel) {
+  for (std::size_t pixel = 0; pixel < image.scene.size(); ++pixel) {
     Vec3 change(0.0F);
     Vec3 of_sky(0.0F);  // not part of the scene
     for (std::size_t slot = 0; slot < SurfaceParts::kOfPixel; ++slot) {
@@ -170,9 +170,9 @@ void denoise(const SurfaceParts& parts, int samples, Threads threads, PathPictur
       (part.surface == SurfaceParts::kSky ? of_sky : change) +=
           (denoiser.light(pixel, slot) * part.samples - part.light) / count;
     }
-    const Vec3 before = picture.scene[pixel];
-    picture.scene[pixel] = glm::max(before + change, Vec3(0.0F));
-    picture.radiance[pixel] = glm::max(picture.radiance[pixel] + picture.scene[pixel] - before + of_sky, Vec3(0.0F));
+    const Vec3 before = image.scene[pixel];
+    image.scene[pixel] = glm::max(before + change, Vec3(0.0F));
+    image.radiance[pixel] = glm::max(image.radiance[pixel] + image.scene[pixel] - before + of_sky, Vec3(0.0F));
   }
 }
 

@@ -52,6 +52,6 @@ class SurfaceParts {
 ///
 /// Source: the a-trous wavelets of H. Dammertz et al. (2010), guided by variance as in C. Schied et al. (2017); over
 /// the exact parts of pixels instead of whole pixels.
-void denoise(const SurfaceParts& parts, int samples, Threads threads, PathPicture& picture);
+void denoise(const SurfaceParts& parts, int samples, Threads threads, PathImage& image);
 
 }  // namespace quoin::path

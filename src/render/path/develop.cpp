@@ -227,14 +227,14 @@ class Developer {
 };
 
 // Returns the exposure of the neutral curve; nullopt for a black image.
-std::optional<double> neutral_exposure(const PathPicture& picture) {
+std::optional<double> neutral_exposure(const PathImage& image) {
   constexpr double kMiddle = 0.18;
   constexpr double kBrightest = 4.0;
   constexpr double kBrightShare = 0.99;
   std::vector<float> lights;
   double sum = 0.0;
-  for (std::size_t i = 0; i < picture.radiance.size(); ++i) {
-    const float light = luminance(picture.alpha[i] > 0.5F ? picture.scene[i] : picture.radiance[i]);
+  for (std::size_t i = 0; i < image.radiance.size(); ++i) {
+    const float light = luminance(image.alpha[i] > 0.5F ? image.scene[i] : image.radiance[i]);
     if (!(light > 1e-9F)) continue;
     lights.push_back(light);
     sum += static_cast<double>(log_of_two(light));
@@ -265,45 +265,45 @@ double mean_byte(const std::vector<Vec3>& light, double exposure, ToneCurve tone
 
 }  // namespace
 
-double find_exposure(const PathPicture& picture, ToneCurve tone) {
+double find_exposure(const PathImage& image, ToneCurve tone) {
   constexpr double kWidest = 256.0;  // maximum ratio between the exposures of two curves
   constexpr int kHalvings = 24;
-  const std::optional<double> neutral = neutral_exposure(picture);
+  const std::optional<double> neutral = neutral_exposure(image);
   if (!neutral || tone == ToneCurve::Neutral) return neutral.value_or(1.0);
-  const double wanted = mean_byte(picture.radiance, *neutral, ToneCurve::Neutral);
+  const double wanted = mean_byte(image.radiance, *neutral, ToneCurve::Neutral);
   double low = *neutral / kWidest;
   double high = *neutral * kWidest;
   for (int i = 0; i < kHalvings; ++i) {
     const double middle = std::sqrt(low * high);
-    (mean_byte(picture.radiance, middle, tone) < wanted ? low : high) = middle;
+    (mean_byte(image.radiance, middle, tone) < wanted ? low : high) = middle;
   }
   return std::sqrt(low * high);
 }
 
-Result<Image> develop(const PathPicture& picture, const DevelopOptions& options) {
+Result<Image> develop(const PathImage& rendered, const DevelopOptions& options) {
   if (Status status = check(options); !status) return status.error();
-  Developer developer(options, picture.width, picture.height);
+  Developer developer(options, rendered.width, rendered.height);
   std::vector<Vec3> spread;
-  if (developer.has_bloom()) spread = developer.spread(picture.radiance, picture.width, picture.height);
-  const std::vector<Vec3>& light = spread.empty() ? picture.radiance : spread;
-  Image image{picture.width, picture.height, {}};
+  if (developer.has_bloom()) spread = developer.spread(rendered.radiance, rendered.width, rendered.height);
+  const std::vector<Vec3>& light = spread.empty() ? rendered.radiance : spread;
+  Image image{rendered.width, rendered.height, {}};
   image.rgb.reserve(3 * light.size());
-  const auto width = static_cast<std::size_t>(picture.width);
+  const auto width = static_cast<std::size_t>(rendered.width);
   for (std::size_t i = 0; i < light.size(); ++i) developer.put(light[i], i % width, i / width, image.rgb);
   return image;
 }
 
-Result<AlphaImage> develop_with_alpha(const PathPicture& picture, const DevelopOptions& options) {
+Result<AlphaImage> develop_with_alpha(const PathImage& rendered, const DevelopOptions& options) {
   if (Status status = check(options); !status) return status.error();
-  Developer developer(options, picture.width, picture.height);
+  Developer developer(options, rendered.width, rendered.height);
   std::vector<Vec3> spread;
-  if (developer.has_bloom()) spread = developer.spread(picture.scene, picture.width, picture.height);
-  const std::vector<Vec3>& light = spread.empty() ? picture.scene : spread;
-  AlphaImage image{picture.width, picture.height, {}};
+  if (developer.has_bloom()) spread = developer.spread(rendered.scene, rendered.width, rendered.height);
+  const std::vector<Vec3>& light = spread.empty() ? rendered.scene : spread;
+  AlphaImage image{rendered.width, rendered.height, {}};
   image.rgba.reserve(4 * light.size());
-  const auto width = static_cast<std::size_t>(picture.width);
+  const auto width = static_cast<std::size_t>(rendered.width);
   for (std::size_t i = 0; i < light.size(); ++i) {
-    const float alpha = picture.alpha[i];
+    const float alpha = rendered.alpha[i];
     developer.put(alpha > 0.0F ? light[i] / alpha : Vec3(0.0F), i % width, i / width, image.rgba);
     image.rgba.push_back(static_cast<std::uint8_t>(std::lround(std::clamp(alpha, 0.0F, 1.0F) * 255.0F)));
   }

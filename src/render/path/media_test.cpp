@@ -23,7 +23,7 @@ namespace {
 using render_test::add_type;
 using render_test::from_above;
 using render_test::of_town;
-using render_test::path_picture;
+using render_test::path_image;
 using render_test::place;
 using render_test::towards;
 using render_test::town;
@@ -45,10 +45,10 @@ Camera straight_at_the_front() {
   return camera;
 }
 
-double mean_red(const PathPicture& picture) {
+double mean_red(const PathImage& image) {
   const auto add = [](double sum, Vec3 light) { return sum + static_cast<double>(light.x); };
-  return std::accumulate(picture.radiance.begin(), picture.radiance.end(), 0.0, add) /
-         static_cast<double>(picture.radiance.size());
+  return std::accumulate(image.radiance.begin(), image.radiance.end(), 0.0, add) /
+         static_cast<double>(image.radiance.size());
 }
 
 Scene box_of(VoxelProperties properties, IBox box) {
@@ -92,14 +92,14 @@ TEST(PathMedia, ThePhaseFunctionsSamplesHaveItsDensityAndMean) {
 // White furnace: white fog over white ground, and a white cloud, cannot be seen in a white sky.
 TEST(PathMedia, WhiteFogAndCloudsCannotBeSeen) {
   const Scene cube = box_of(cloud_of({255, 255, 255, 255}, 0.4F, 0.5F), {IVec3(0), IVec3(8)});
-  const PathPicture cloud = path_picture(cube, towards({4.0, 10.0, 24.0}, DVec3(4.0), 0.5), even_sky(16, 64));
+  const PathImage cloud = path_image(cube, towards({4.0, 10.0, 24.0}, DVec3(4.0), 0.5), even_sky(16, 64));
   EXPECT_NEAR(mean_red(cloud), 1.0, 0.005);
   Scene scene;
   PathOptions options = even_sky(16, 64);
   options.ground.emplace();
   options.ground->colour = Vec3(1.0F);
   options.fog = Fog{0.2, Vec3(1.0F), 0.3, 8.0};
-  const PathPicture fog = path_picture(scene, towards({0.0, 3.0, 10.0}, {0.0, 0.0, 0.0}, 0.5), options);
+  const PathImage fog = path_image(scene, towards({0.0, 3.0, 10.0}, {0.0, 0.0, 0.0}, 0.5), options);
   EXPECT_NEAR(mean_red(fog), 1.0, 0.005);
 }
 
@@ -114,7 +114,7 @@ TEST(PathMedia, TransmissionFallsExponentiallyWithLength) {
   options.max_bounces = 0;
   options.fog = Fog{0.1, Vec3(0.0F), 0.0, 100.0};
   const Camera camera = straight_at_the_front();
-  EXPECT_NEAR(mean_red(path_picture(wall, camera, options)), std::exp(-1.2), 0.003);
+  EXPECT_NEAR(mean_red(path_image(wall, camera, options)), std::exp(-1.2), 0.003);
 
   // The sun is above: its light passes through 10 of fog downwards, and 10 upwards to the camera above.
   const Scene floor = box_of({.name = "", .colour = {255, 255, 255, 255}}, {{-20, -1, -20}, {20, 0, 20}});
@@ -124,7 +124,7 @@ TEST(PathMedia, TransmissionFallsExponentiallyWithLength) {
   options.sun_brightness = 1.0;
   options.sun_angle_radians = 0.0;
   options.fog = Fog{0.05, Vec3(0.0F), 0.0, 10.0};
-  EXPECT_NEAR(mean_red(path_picture(floor, from_above(0.0, 30.0, 0.0, 4.0), options)), std::exp(-1.0), 0.004);
+  EXPECT_NEAR(mean_red(path_image(floor, from_above(0.0, 30.0, 0.0, 4.0), options)), std::exp(-1.0), 0.004);
 }
 
 // Black clouds also transmit e^-length. Glass with edges counts as at least one voxel; clouds do not.
@@ -132,9 +132,9 @@ TEST(PathMedia, ABlackCloudOnlyTakesAway) {
   for (const int depth : {1, 6}) {
     const Scene scene = box_of(cloud_of({0, 0, 0, 255}, 0.25F), {{-20, -20, -depth}, {20, 20, 0}});
     const Camera camera = straight_at_the_front();
-    const PathPicture picture = path_picture(scene, camera, even_sky(16, 256));
-    EXPECT_NEAR(mean_red(picture), std::exp(-0.25 * depth), 0.004);
-    const double alpha = std::accumulate(picture.alpha.begin(), picture.alpha.end(), 0.0) / 256.0;
+    const PathImage image = path_image(scene, camera, even_sky(16, 256));
+    EXPECT_NEAR(mean_red(image), std::exp(-0.25 * depth), 0.004);
+    const double alpha = std::accumulate(image.alpha.begin(), image.alpha.end(), 0.0) / 256.0;
     EXPECT_NEAR(alpha, 1.0 - std::exp(-0.25 * depth), 0.004);
   }
 }
@@ -152,7 +152,7 @@ TEST(PathMedia, CloudsStandBesideGlass) {
   grid.fill_box({{0, 0, 6}, {8, 8, 8}}, glass);
   place(scene, std::move(grid));
   for (const DVec3& from : {DVec3(4.0, 9.0, 30.0), DVec3(3.0, 2.0, -20.0)}) {
-    EXPECT_NEAR(mean_red(path_picture(scene, towards(from, DVec3(4.0), 0.4), even_sky(16, 128))), 1.0, 0.01);
+    EXPECT_NEAR(mean_red(path_image(scene, towards(from, DVec3(4.0), 0.4), even_sky(16, 128))), 1.0, 0.01);
   }
 }
 
@@ -165,8 +165,8 @@ TEST(PathMedia, ALampShinesInFog) {
   PathOptions options = even_sky(24, 64);
   options.sky_brightness = 0.0;
   options.fog = Fog{0.05, Vec3(1.0F), 0.0, 100.0};
-  const PathPicture picture = path_picture(scene, towards({1.0, 1.0, 20.0}, DVec3(1.0), 1.2), options);
-  const auto at = [&](std::size_t x, std::size_t y) { return picture.radiance[y * 24 + x].x; };
+  const PathImage image = path_image(scene, towards({1.0, 1.0, 20.0}, DVec3(1.0), 1.2), options);
+  const auto at = [&](std::size_t x, std::size_t y) { return image.radiance[y * 24 + x].x; };
   EXPECT_GT(at(9, 12), 0.02F);
   EXPECT_GT(at(9, 12), 2.0F * at(0, 0));
   EXPECT_GT(at(0, 0), 0.0F);
@@ -202,8 +202,8 @@ TEST(PathLens, BladesShapeWhatIsOutOfFocus) {
   options.lens_blades = 4;
   const Camera camera = towards({0.5, 0.5, 60.0}, DVec3(0.5), 0.3);
   const auto lit = [&](const PathOptions& by) {
-    const PathPicture picture = path_picture(scene, camera, by);
-    return std::ranges::count_if(picture.radiance, [](Vec3 light) { return light.x > 0.0F; });
+    const PathImage image = path_image(scene, camera, by);
+    return std::ranges::count_if(image.radiance, [](Vec3 light) { return light.x > 0.0F; });
   };
   const auto square = lit(options);
   options.lens_blades = 0;
@@ -211,14 +211,14 @@ TEST(PathLens, BladesShapeWhatIsOutOfFocus) {
   EXPECT_NEAR(static_cast<double>(square) / static_cast<double>(disc), 2.0 / std::acos(-1.0), 0.12);
 }
 
-double error_of(const PathPicture& picture, const PathPicture& truth) {
+double error_of(const PathImage& image, const PathImage& truth) {
   double sum = 0.0;
-  for (std::size_t i = 0; i < picture.radiance.size(); ++i) {
-    const DVec3 apart =
-        glm::min(DVec3(picture.radiance[i]), DVec3(2.0)) - glm::min(DVec3(truth.radiance[i]), DVec3(2.0));
-    sum += glm::dot(apart, apart);
+  for (std::size_t i = 0; i < image.radiance.size(); ++i) {
+    const DVec3 separate =
+        glm::min(DVec3(image.radiance[i]), DVec3(2.0)) - glm::min(DVec3(truth.radiance[i]), DVec3(2.0));
+    sum += glm::dot(separate, separate);
   }
-  return std::sqrt(sum / static_cast<double>(picture.radiance.size()));
+  return std::sqrt(sum / static_cast<double>(image.radiance.size()));
 }
 
 TEST(PathDenoise, HalvesTheErrorAtLeast) {
@@ -227,11 +227,11 @@ TEST(PathDenoise, HalvesTheErrorAtLeast) {
   options.width = 240;
   options.height = 160;
   options.samples = 192;
-  const PathPicture truth = path_picture(scene, of_town(), options);
+  const PathImage truth = path_image(scene, of_town(), options);
   options.samples = 8;
-  const double before = error_of(path_picture(scene, of_town(), options), truth);
+  const double before = error_of(path_image(scene, of_town(), options), truth);
   options.denoise = true;
-  const double after = error_of(path_picture(scene, of_town(), options), truth);
+  const double after = error_of(path_image(scene, of_town(), options), truth);
   EXPECT_LT(after, 0.6 * before) << before << " " << after;
 }
 
@@ -251,9 +251,9 @@ TEST(PathDenoise, KeepsEdges) {
   options.sun_brightness = 1.0;
   options.sun_angle_radians = 0.0;
   const Camera camera = towards({15.0, 20.0, 25.0}, DVec3(0.0), 0.8);
-  const PathPicture plain = path_picture(scene, camera, options);
+  const PathImage plain = path_image(scene, camera, options);
   options.denoise = true;
-  const PathPicture smooth = path_picture(scene, camera, options);
+  const PathImage smooth = path_image(scene, camera, options);
   int different = 0;
   for (std::size_t i = 0; i < plain.radiance.size(); ++i) {
     if (glm::length(plain.radiance[i] - smooth.radiance[i]) > 0.02F) ++different;

@@ -36,8 +36,8 @@ Image natural_image(DVec3 from, SkyModel sky, bool has_ground, DVec3 sun = natur
   options.samples = 32;
   if (has_ground) options.ground.emplace().colour = natural.ground_colour;
   const DVec3 middle(4.0);
-  const PathPicture picture = path_picture(scene, towards(middle + from * 24.0, middle, 0.9), options);
-  auto image = develop(picture, natural.develop);
+  const PathImage rendered = path_image(scene, towards(middle + from * 24.0, middle, 0.9), options);
+  auto image = develop(rendered, natural.develop);
   EXPECT_TRUE(image.has_value());
   return image ? std::move(*image) : Image{};
 }

@@ -8,8 +8,8 @@
 
 #include <quoin/core/assert.h>
 
+#include "render/image_request.h"
 #include "render/path/numbers/path_math.h"
-#include "render/picture_request.h"
 
 namespace quoin::path {
 namespace {
@@ -103,7 +103,7 @@ Status check(const Camera& camera, const PathOptions& options) {
                    std::abs(glm::dot(camera.right, camera.forward)) < 1e-3 &&
                    std::abs(glm::dot(camera.up, camera.forward)) < 1e-3,
                "the camera's axes are perpendicular");
-  if (Status picture = check_picture(camera, options.width, options.height); !picture) return picture;
+  if (Status image = check_image(camera, options.width, options.height); !image) return image;
   if (options.samples < 1 || options.samples > kMaxPathSamples) return refuse("samples: must be 1 to 65536");
   if (options.max_bounces < 0 || options.max_bounces > kMaxBounces) return refuse("max_bounces: must be 0 to 1024");
   if (options.max_scatterings < 0 || options.max_scatterings > kMaxBounces) {
@@ -115,38 +115,38 @@ Status check(const Camera& camera, const PathOptions& options) {
   return check_sky(options);
 }
 
-PathPicture empty_picture(const PathOptions& options) {
+PathImage empty_image(const PathOptions& options) {
   const auto pixels = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
-  PathPicture picture;
-  picture.width = options.width;
-  picture.height = options.height;
-  picture.radiance.resize(pixels);
-  picture.scene.resize(pixels);
-  picture.alpha.resize(pixels);
-  if (!options.layers) return picture;
-  picture.albedo.resize(pixels);
-  picture.normal.resize(pixels);
-  picture.depth = {options.width, options.height, std::vector<float>(pixels)};
-  picture.types.resize(pixels);
-  picture.instances.resize(pixels);
-  return picture;
+  PathImage image;
+  image.width = options.width;
+  image.height = options.height;
+  image.radiance.resize(pixels);
+  image.scene.resize(pixels);
+  image.alpha.resize(pixels);
+  if (!options.layers) return image;
+  image.albedo.resize(pixels);
+  image.normal.resize(pixels);
+  image.depth = {options.width, options.height, std::vector<float>(pixels)};
+  image.types.resize(pixels);
+  image.instances.resize(pixels);
+  return image;
 }
 
-void PixelSums::write_to(PathPicture& picture, std::size_t pixel, int samples) const {
+void PixelSums::write_to(PathImage& image, std::size_t pixel, int samples) const {
   const auto count = static_cast<float>(samples);
   Vec3 passed(1.0F);
   for (int channel = 0; channel < 3; ++channel) {
     if (open[channel] > 0.0F) passed[channel] = std::min(lit[channel] / open[channel], 1.0F);
   }
-  picture.scene[pixel] = scene / count;
-  picture.radiance[pixel] = (scene + background + caught * passed) / count;
-  picture.alpha[pixel] = std::min((scene_share + caught_share * (1.0F - luminance(passed))) / count, 1.0F);
-  if (picture.depth.values.empty()) return;
-  picture.albedo[pixel] = albedo / count;
-  picture.normal[pixel] = normal / count;
-  picture.depth.values[pixel] = depth;
-  picture.types[pixel] = type;
-  picture.instances[pixel] = instance;
+  image.scene[pixel] = scene / count;
+  image.radiance[pixel] = (scene + background + caught * passed) / count;
+  image.alpha[pixel] = std::min((scene_share + caught_share * (1.0F - luminance(passed))) / count, 1.0F);
+  if (image.depth.values.empty()) return;
+  image.albedo[pixel] = albedo / count;
+  image.normal[pixel] = normal / count;
+  image.depth.values[pixel] = depth;
+  image.types[pixel] = type;
+  image.instances[pixel] = instance;
 }
 
 }  // namespace quoin::path

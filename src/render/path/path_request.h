@@ -18,7 +18,7 @@ inline constexpr int kMaxPathSamples = 65'536;
 [[nodiscard]] Status check(const Camera& camera, const PathOptions& options);
 
 /// Returns an image with buffers for all requested outputs.
-[[nodiscard]] PathPicture empty_picture(const PathOptions& options);
+[[nodiscard]] PathImage empty_image(const PathOptions& options);
 
 /// The sums over a pixel's samples.
 struct PixelSums {
@@ -36,7 +36,7 @@ struct PixelSums {
   std::uint32_t instance = 0;
 
   /// Writes the means to the image.
-  void write_to(PathPicture& picture, std::size_t pixel, int samples) const;
+  void write_to(PathImage& image, std::size_t pixel, int samples) const;
 };
 
 }  // namespace quoin::path

@@ -715,12 +715,12 @@ std::int64_t PathTile::pixels_hit() const {
   return std::count_if(sums_.begin(), sums_.end(), [](const PixelSums& sums) { return sums.scene_share > 0.0F; });
 }
 
-void PathTile::write_to(PathPicture& picture) const {
-  for (int y = 0; y < std::min(kEdge, picture.height - row_); ++y) {
-    for (int x = 0; x < std::min(kEdge, picture.width - column_); ++x) {
-      const std::size_t to = static_cast<std::size_t>(row_ + y) * static_cast<std::size_t>(picture.width) +
+void PathTile::write_to(PathImage& image) const {
+  for (int y = 0; y < std::min(kEdge, image.height - row_); ++y) {
+    for (int x = 0; x < std::min(kEdge, image.width - column_); ++x) {
+      const std::size_t to = static_cast<std::size_t>(row_ + y) * static_cast<std::size_t>(image.width) +
                              static_cast<std::size_t>(column_ + x);
-      sums_[static_cast<std::size_t>(y * kEdge + x)].write_to(picture, to, context_->options->samples);
+      sums_[static_cast<std::size_t>(y * kEdge + x)].write_to(image, to, context_->options->samples);
     }
   }
 }

@@ -61,7 +61,7 @@ class PathTile {
   /// returns false and the tile must not be used.
   [[nodiscard]] bool render(const std::function<bool(std::size_t samples)>& goes_on);
   /// Writes the pixels within the image.
-  void write_to(PathPicture& picture) const;
+  void write_to(PathImage& image) const;
 
   [[nodiscard]] std::int64_t rays() const { return rays_; }
   [[nodiscard]] std::int64_t pixels_hit() const;

@@ -60,16 +60,16 @@ PathTracer& PathTracer::operator=(PathTracer&&) noexcept = default;
 PathTracer::~PathTracer() = default;
 
 void PathTracer::update(Threads threads) {
-  Impl& impl = content_of(impl_);
+  Impl& impl = impl_of(impl_);
   impl.tracer.update(threads);
   impl.surfaces.update(impl.scene->types);
   impl.forget_lamps();
 }
 
-Result<PathPicture> PathTracer::render(const Camera& camera, const PathOptions& options, Threads threads,
-                                       const Progress& progress) const {
+Result<PathImage> PathTracer::render(const Camera& camera, const PathOptions& options, Threads threads,
+                                     const Progress& progress) const {
   if (const Status status = path::check(camera, options); !status) return status.error();
-  Impl& impl = content_of(impl_);
+  Impl& impl = impl_of(impl_);
   const SceneView view(impl.tracer, camera.position);
   const std::shared_ptr<const path::PathLamps> lamps = impl.lamps(options.lamp_brightness);
   const std::shared_ptr<const path::SkyLight> sky = impl.sky(options);
@@ -89,11 +89,11 @@ Result<PathPicture> PathTracer::render(const Camera& camera, const PathOptions& 
                                   &options,
                                   parts ? &*parts : nullptr,
                                   options.fog.has_value() || impl.surfaces.has_clouds()};
-  PathPicture picture = path::empty_picture(options);
-  if (Status drawn = draw_tiles<path::PathTile>(context, options, threads, progress, picture); !drawn)
+  PathImage image = path::empty_image(options);
+  if (Status drawn = draw_tiles<path::PathTile>(context, options, threads, progress, image); !drawn)
     return drawn.error();
-  if (parts) path::denoise(*parts, options.samples, threads, picture);
-  return picture;
+  if (parts) path::denoise(*parts, options.samples, threads, image);
+  return image;
 }
 
 }  // namespace quoin

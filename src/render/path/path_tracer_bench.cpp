@@ -6,7 +6,7 @@
 #include <quoin/core/hash.h>
 #include <quoin/render/path_tracer.h>
 
-#include "bench/picture_workload.h"
+#include "bench/image_workload.h"
 
 namespace quoin {
 namespace {
@@ -23,22 +23,22 @@ void time_paths(benchmark::State& state, const Scene& scene, PathOptions options
   std::int64_t rays = 0;
   fail_unless(tracer.render(camera, options, {1}).has_value(), "a picture", 0);  // builds the sky once
   for (auto _ : state) {
-    const auto picture = tracer.render(camera, options, {1});
-    fail_unless(picture.has_value() && picture->rays > 0, "a picture", 0);
-    rays += picture->rays;
+    const auto image = tracer.render(camera, options, {1});
+    fail_unless(image.has_value() && image->rays > 0, "a picture", 0);
+    rays += image->rays;
   }
   state.counters["rays"] = benchmark::Counter(static_cast<double>(rays), benchmark::Counter::kIsRate);
 }
 
 void terrain(benchmark::State& state) {
-  static const Scene scene = workloads::picture_scene();
-  fail_unless(scene.voxel_count() == workloads::kPictureVoxels, "the number of voxels", scene.voxel_count());
+  static const Scene scene = workloads::image_scene();
+  fail_unless(scene.voxel_count() == workloads::kImageVoxels, "the number of voxels", scene.voxel_count());
   time_paths(state, scene, {});
 }
 
 void lamps(benchmark::State& state) {
   static const Scene scene = [] {
-    Scene made = workloads::picture_scene();
+    Scene made = workloads::image_scene();
     VoxelProperties glow;
     glow.colour = {255, 190, 110, 255};
     glow.emission = 20.0F;

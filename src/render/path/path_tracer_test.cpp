@@ -23,7 +23,7 @@ namespace {
 using render_test::add_type;
 using render_test::from_above;
 using render_test::of_town;
-using render_test::path_picture;
+using render_test::path_image;
 using render_test::place;
 using render_test::towards;
 using render_test::town;
@@ -33,10 +33,10 @@ constexpr Rgba8 kWhite{255, 255, 255, 255};
 constexpr Rgba8 kGrey{188, 188, 188, 255};
 constexpr double kPi = std::numbers::pi;
 
-Vec3 mean(const PathPicture& picture) {
+Vec3 mean(const PathImage& image) {
   DVec3 sum(0.0);
-  for (const Vec3& light : picture.radiance) sum += DVec3(light);
-  return Vec3(sum / static_cast<double>(picture.radiance.size()));
+  for (const Vec3& light : image.radiance) sum += DVec3(light);
+  return Vec3(sum / static_cast<double>(image.radiance.size()));
 }
 
 Scene cube_of(Rgba8 colour, int edge = 8, float emission = 0.0F) {
@@ -81,9 +81,9 @@ Camera looking(DVec3 position, DVec3 forward, DVec3 up, double view_height) {
 
 TEST(PathTracer, AConvexBodyUnderAUniformSkyShowsItsAlbedo) {
   const Scene scene = cube_of(kGrey);
-  const PathPicture picture = path_picture(scene, from_above(4.0, 20.0, 4.0, 6.0), under_even_sky(16, 16, 4));
-  for (const Vec3& light : picture.radiance) EXPECT_NEAR(light.x, linear_from_srgb(std::uint8_t{188}), 1e-6F);
-  EXPECT_EQ(picture.pixels_hit, 256);
+  const PathImage image = path_image(scene, from_above(4.0, 20.0, 4.0, 6.0), under_even_sky(16, 16, 4));
+  for (const Vec3& light : image.radiance) EXPECT_NEAR(light.x, linear_from_srgb(std::uint8_t{188}), 1e-6F);
+  EXPECT_EQ(image.pixels_hit, 256);
 }
 
 // E (1 - a^(n+1)) / (1 - a) after n bounces.
@@ -93,7 +93,7 @@ TEST(PathTracer, AClosedBoxThatEmitsFillsWithLight) {
   for (const int bounces : {0, 1, 2, 5, 40}) {
     PathOptions options = under_even_sky(16, 16, 64);
     options.max_bounces = bounces;
-    const float light = mean(path_picture(scene, towards({3.0, 3.0, 3.0}, {3.0, 2.0, 0.0}), options)).x;
+    const float light = mean(path_image(scene, towards({3.0, 3.0, 3.0}, {3.0, 2.0, 0.0}), options)).x;
     const float expected = albedo * (1.0F - std::pow(albedo, static_cast<float>(bounces + 1))) / (1.0F - albedo);
     EXPECT_NEAR(light / expected, 1.0F, 0.01F) << bounces;
   }
@@ -106,9 +106,9 @@ TEST(PathTracer, FormFactorsOfACubesWalls) {
   const float albedo = linear_from_srgb(std::uint8_t{188});
   PathOptions options = under_even_sky(32, 32, 256);
   options.max_bounces = 1;
-  const PathPicture opposite = path_picture(scene, looking(DVec3(4.0), {0, -1, 0}, {0, 0, -1}, kEdge), options);
+  const PathImage opposite = path_image(scene, looking(DVec3(4.0), {0, -1, 0}, {0, 0, -1}, kEdge), options);
   EXPECT_NEAR(mean(opposite).x / albedo, 0.199825F, 0.001F);
-  const PathPicture adjacent = path_picture(scene, looking(DVec3(4.0), {1, 0, 0}, {0, 1, 0}, kEdge), options);
+  const PathImage adjacent = path_image(scene, looking(DVec3(4.0), {1, 0, 0}, {0, 1, 0}, kEdge), options);
   EXPECT_NEAR(mean(adjacent).x / albedo, 0.200044F, 0.001F);
 }
 
@@ -128,7 +128,7 @@ TEST(PathTracer, ASlopeSeesTheSkyAboveIt) {
     options.ground->colour = Vec3(0.0F);
     options.ground->height = -1000.0;
     const Camera camera = looking(middle + normal * 3.0, -normal, moved.rotation * DVec3(0, 0, -1), 2.0);
-    const float light = mean(path_picture(scene, camera, options)).x / linear_from_srgb(std::uint8_t{188});
+    const float light = mean(path_image(scene, camera, options)).x / linear_from_srgb(std::uint8_t{188});
     EXPECT_NEAR(light, 0.5 * (1.0 + std::cos(angle)), 0.01) << degrees;
   }
 }
@@ -162,7 +162,7 @@ TEST(PathTracer, ASquareLampLightsAPlateAsLambertSays) {
     }
     const double expected = linear_from_srgb(std::uint8_t{188}) / kPi * std::abs(sum) * 0.5 * 3.0;
     const Camera camera = looking(point + DVec3(0, 2, 0), {0, -1, 0}, {0, 0, -1}, 0.05);
-    EXPECT_NEAR(mean(path_picture(scene, camera, options)).x / expected, 1.0, 0.01) << x;
+    EXPECT_NEAR(mean(path_image(scene, camera, options)).x / expected, 1.0, 0.01) << x;
   }
 }
 
@@ -174,7 +174,7 @@ TEST(PathTracer, TheSunLightsWhatFacesIt) {
   options.sun = {0.0, 1.0, 1.0};
   for (const double angle : {0.0, 0.0093}) {
     options.sun_angle_radians = angle;
-    const float light = mean(path_picture(scene, from_above(4.0, 20.0, 4.0, 6.0), options)).x;
+    const float light = mean(path_image(scene, from_above(4.0, 20.0, 4.0, 6.0), options)).x;
     EXPECT_NEAR(light, linear_from_srgb(std::uint8_t{188}) * std::sqrt(0.5F), 1e-3F);
   }
 }
@@ -194,8 +194,8 @@ TEST(PathTracer, APenumbraGrowsWithTheDistance) {
   options.max_bounces = 1;
   // 256 pixels across 5.12 voxels; the plate above ends at x = 0.
   const Camera camera = looking({0.0, 50.0, 0.0}, {0, -1, 0}, {0, 0, -1}, 5.12 / 256.0);
-  const PathPicture picture = path_picture(scene, camera, options);
-  const auto share = [&](double x) { return picture.radiance[static_cast<std::size_t>(x / 5.12 * 256.0 + 128.0)].x; };
+  const PathImage image = path_image(scene, camera, options);
+  const auto share = [&](double x) { return image.radiance[static_cast<std::size_t>(x / 5.12 * 256.0 + 128.0)].x; };
   const double width = 0.0093 * 100.0;
   EXPECT_NEAR(share(-0.6 * width), 0.0F, 1e-3F);
   EXPECT_NEAR(share(0.0), 0.5F, 0.05F);
@@ -226,9 +226,9 @@ TEST(PathTracer, AWhiteBallInAWhiteSkyCannotBeSeen) {
     place(scene, voxel_sphere(6, scene.types.add(properties).value_or(kAir)));
     PathOptions options = under_even_sky(32, 32, 256);
     options.max_bounces = 1024;
-    const PathPicture picture = path_picture(scene, towards({0.5, 8.0, 25.0}, DVec3(0.5), 0.6), options);
-    EXPECT_NEAR(mean(picture).x, 1.0F, 0.01F) << rough << " " << metal;
-    for (const Vec3& light : picture.radiance) EXPECT_NEAR(light.x, 1.0F, 0.15F);
+    const PathImage image = path_image(scene, towards({0.5, 8.0, 25.0}, DVec3(0.5), 0.6), options);
+    EXPECT_NEAR(mean(image).x, 1.0F, 0.01F) << rough << " " << metal;
+    for (const Vec3& light : image.radiance) EXPECT_NEAR(light.x, 1.0F, 0.15F);
   }
 }
 
@@ -240,13 +240,13 @@ TEST(PathTracer, ClearGlassInAWhiteSkyCannotBeSeen) {
   properties.ior = 1.5F;
   place(scene, voxel_sphere(6, scene.types.add(properties).value_or(kAir)));
   PathOptions options = under_even_sky(32, 32, 64);
-  const PathPicture picture = path_picture(scene, towards({0.5, 8.0, 25.0}, DVec3(0.5), 0.6), options);
-  EXPECT_NEAR(mean(picture).x, 1.0F, 0.003F);
+  const PathImage image = path_image(scene, towards({0.5, 8.0, 25.0}, DVec3(0.5), 0.6), options);
+  EXPECT_NEAR(mean(image).x, 1.0F, 0.003F);
 }
 
 TEST(PathTracer, GlassShowsWhatLiesBehindItWhereItIsBent) {
   // A thick pane in front of a wall that is black on one half: seen at an angle, the edge is displaced.
-  const auto picture_of = [](float ior) {
+  const auto rendered_of = [](float ior) {
     Scene scene;
     const VoxelType black = add_type(scene, {0, 0, 0, 255});
     const VoxelType white = add_type(scene, kWhite, Visibility::Opaque, 1.0F);
@@ -262,15 +262,15 @@ TEST(PathTracer, GlassShowsWhatLiesBehindItWhereItIsBent) {
     PathOptions options = under_even_sky(200, 1, 64);
     options.sky_colour = Vec3(0.0F);
     const DVec3 forward = glm::normalize(DVec3(1, 0, -1));
-    return path_picture(scene, looking(DVec3(0, 0, 0) - forward * 40.0, forward, {0, 1, 0}, 20.0 / 200.0), options);
+    return path_image(scene, looking(DVec3(0, 0, 0) - forward * 40.0, forward, {0, 1, 0}, 20.0 / 200.0), options);
   };
-  const auto edge_of = [](const PathPicture& picture) {
+  const auto edge_of = [](const PathImage& image) {
     float sum = 0.0F;
-    for (const Vec3& light : picture.radiance) sum += std::min(light.x / 0.9F, 1.0F);
+    for (const Vec3& light : image.radiance) sum += std::min(light.x / 0.9F, 1.0F);
     return 200.0F - sum;  // white lies to the right
   };
-  const PathPicture plain = picture_of(1.0F);
-  const PathPicture bent = picture_of(1.5F);
+  const PathImage plain = rendered_of(1.0F);
+  const PathImage bent = rendered_of(1.5F);
   // The displacement of a ray at 45 degrees by glass of thickness 10 and index 1.5, seen across: in pixels of 0.1.
   const double inside = std::asin(std::sin(kPi / 4.0) / 1.5);
   const double moved = 10.0 * std::sin(kPi / 4.0 - inside) / std::cos(inside) / 0.1;
@@ -282,21 +282,20 @@ TEST(PathTracer, AClosedRoomWithoutLampsIsBlack) {
   PathOptions options = under_even_sky(16, 16, 16);
   options.sun_brightness = 1.0;
   options.max_bounces = 16;
-  for (const Vec3& light : path_picture(scene, towards({3.0, 3.0, 3.0}, {3.0, 2.0, 0.0}), options).radiance) {
+  for (const Vec3& light : path_image(scene, towards({3.0, 3.0, 3.0}, {3.0, 2.0, 0.0}), options).radiance) {
     EXPECT_EQ(light.x, 0.0F);
   }
 }
 
 TEST(PathTracer, ALampOfABillionIsANumberAndNoPixelIsBrighterThanIt) {
   const Scene scene = room(6, of_colour(kGrey), of_colour(kWhite, 1e9F));
-  const PathPicture picture =
-      path_picture(scene, towards({3.0, 3.0, 3.0}, {3.0, 5.0, 0.0}), under_even_sky(16, 16, 32));
-  for (const Vec3& light : picture.radiance) {
+  const PathImage image = path_image(scene, towards({3.0, 3.0, 3.0}, {3.0, 5.0, 0.0}), under_even_sky(16, 16, 32));
+  for (const Vec3& light : image.radiance) {
     EXPECT_TRUE(std::isfinite(light.x));
     EXPECT_GE(light.x, 0.0F);
     EXPECT_LE(light.x, 1e9F * 4.0F);
   }
-  EXPECT_TRUE(develop(picture).has_value());
+  EXPECT_TRUE(develop(image).has_value());
 }
 
 // Light from lamp hits and from lamp samples agrees: here a lamp without gloss next to mirrors.
@@ -309,11 +308,11 @@ TEST(PathTracer, AimedAndFoundLightAgreeOnGloss) {
     Scene scene = room(8, walls, of_colour(kWhite, 1.0F));
     PathOptions options = under_even_sky(16, 16, 256);
     options.max_bounces = 1;
-    const float by_both = mean(path_picture(scene, towards({4.0, 4.0, 4.0}, {4.5, 0.0, 4.2}), options)).x;
+    const float by_both = mean(path_image(scene, towards({4.0, 4.0, 4.0}, {4.5, 0.0, 4.2}), options)).x;
     // The same light from an environment: with the ceiling removed and a sky of 1, only chance finds it.
     Scene open = room(8, walls, of_colour(kWhite));
     open.edit(open.grids().handles().front()).grid.fill_box({{-1, 8, -1}, {9, 9, 9}}, kAir);
-    const float by_chance = mean(path_picture(open, towards({4.0, 4.0, 4.0}, {4.5, 0.0, 4.2}), options)).x;
+    const float by_chance = mean(path_image(open, towards({4.0, 4.0, 4.0}, {4.5, 0.0, 4.2}), options)).x;
     EXPECT_NEAR(by_both / by_chance, 1.0F, 0.03F) << rough;
   }
 }
@@ -329,19 +328,19 @@ PathOptions quick() {
 
 TEST(PathTracer, TheSameBitsForAnyThreadsAndInstructionSets) {
   const Scene scene = town();
-  const PathPicture expected = path_picture(scene, of_town(), quick(), {1});
+  const PathImage expected = path_image(scene, of_town(), quick(), {1});
   for (const InstructionSet set : sets_of_this_machine()) {
     const InstructionSetOverride over(set);
-    const PathPicture picture = path_picture(scene, of_town(), quick(), {3});
-    EXPECT_EQ(picture.radiance, expected.radiance) << name_in_tests(set);
-    EXPECT_EQ(picture.alpha, expected.alpha);
-    EXPECT_EQ(picture.normal, expected.normal);
-    EXPECT_EQ(picture.depth.values, expected.depth.values);
-    EXPECT_EQ(picture.rays, expected.rays);
+    const PathImage image = path_image(scene, of_town(), quick(), {3});
+    EXPECT_EQ(image.radiance, expected.radiance) << name_in_tests(set);
+    EXPECT_EQ(image.alpha, expected.alpha);
+    EXPECT_EQ(image.normal, expected.normal);
+    EXPECT_EQ(image.depth.values, expected.depth.values);
+    EXPECT_EQ(image.rays, expected.rays);
   }
 }
 
-TEST(PathTracer, APictureFarFromTheOriginIsTheSame) {
+TEST(PathTracer, AImageFarFromTheOriginIsTheSame) {
   const Scene near = town();
   Scene far = town();
   const DVec3 there{3e6, -1e6, 7e6};
@@ -351,9 +350,9 @@ TEST(PathTracer, APictureFarFromTheOriginIsTheSame) {
   }
   for (Lamp& lamp : far.lamps) lamp.position += there;
   Camera camera = of_town();
-  const Vec3 expected = mean(path_picture(near, camera, quick()));
+  const Vec3 expected = mean(path_image(near, camera, quick()));
   camera.position += there;
-  const Vec3 light = mean(path_picture(far, camera, quick()));
+  const Vec3 light = mean(path_image(far, camera, quick()));
   EXPECT_NEAR(light.x / expected.x, 1.0F, 0.02F);
 }
 
@@ -371,26 +370,26 @@ TEST(PathTracer, FollowsEditsOfVoxelsTypesAndInstances) {
   tracer.update();
   const auto followed = tracer.render(of_town(), quick());
   ASSERT_TRUE(followed.has_value());
-  EXPECT_EQ(followed->radiance, path_picture(scene, of_town(), quick()).radiance);
+  EXPECT_EQ(followed->radiance, path_image(scene, of_town(), quick()).radiance);
 }
 
 TEST(PathTracer, LayersDescribePixels) {
   const Scene scene = cube_of(kGrey);
   PathOptions options = under_even_sky(16, 16, 4);
   options.layers = true;
-  const PathPicture picture = path_picture(scene, from_above(4.0, 20.0, 4.0, 16.0), options);
+  const PathImage image = path_image(scene, from_above(4.0, 20.0, 4.0, 16.0), options);
   const std::size_t middle = 8 * 16 + 8;
-  EXPECT_NEAR(picture.albedo[middle].x, linear_from_srgb(std::uint8_t{188}), 1e-6F);
-  EXPECT_NEAR(picture.normal[middle].y, 1.0F, 1e-6F);
-  EXPECT_NEAR(picture.depth.values[middle], 12.0F, 1e-4F);
-  EXPECT_EQ(picture.types[middle], 1);
-  EXPECT_EQ(picture.instances[middle], 1U + scene.instances().handles().front().index);
-  EXPECT_EQ(picture.alpha[middle], 1.0F);
-  EXPECT_EQ(picture.alpha[0], 0.0F);
-  EXPECT_EQ(picture.types[0], kAir);
-  EXPECT_EQ(picture.depth.values[0], std::numeric_limits<float>::infinity());
-  EXPECT_EQ(picture.scene[0], Vec3(0.0F));
-  EXPECT_EQ(picture.radiance[0], Vec3(1.0F));
+  EXPECT_NEAR(image.albedo[middle].x, linear_from_srgb(std::uint8_t{188}), 1e-6F);
+  EXPECT_NEAR(image.normal[middle].y, 1.0F, 1e-6F);
+  EXPECT_NEAR(image.depth.values[middle], 12.0F, 1e-4F);
+  EXPECT_EQ(image.types[middle], 1);
+  EXPECT_EQ(image.instances[middle], 1U + scene.instances().handles().front().index);
+  EXPECT_EQ(image.alpha[middle], 1.0F);
+  EXPECT_EQ(image.alpha[0], 0.0F);
+  EXPECT_EQ(image.types[0], kAir);
+  EXPECT_EQ(image.depth.values[0], std::numeric_limits<float>::infinity());
+  EXPECT_EQ(image.scene[0], Vec3(0.0F));
+  EXPECT_EQ(image.radiance[0], Vec3(1.0F));
 }
 
 TEST(PathTracer, GroundCatchesShadowsAndIsNotSeenItself) {
@@ -400,15 +399,15 @@ TEST(PathTracer, GroundCatchesShadowsAndIsNotSeenItself) {
   options.sun = {1.0, 1.0, 0.0};
   options.ground.emplace();
   options.ground->only_shadows = true;
-  const PathPicture picture = path_picture(scene, from_above(4.0, 30.0, 4.0, 64.0), options);
+  const PathImage image = path_image(scene, from_above(4.0, 30.0, 4.0, 64.0), options);
   const auto at = [](int x, int y) { return static_cast<std::size_t>(y * 64 + x); };
   // Far away the image shows only the background.
-  EXPECT_NEAR(picture.radiance[at(60, 4)].x, 1.0F, 0.03F);
-  EXPECT_NEAR(picture.alpha[at(60, 4)], 0.0F, 0.03F);
+  EXPECT_NEAR(image.radiance[at(60, 4)].x, 1.0F, 0.03F);
+  EXPECT_NEAR(image.alpha[at(60, 4)], 0.0F, 0.03F);
   // The cube's shadow lies to the left of the cube: the pixel's right is +x.
-  EXPECT_LT(picture.radiance[at(25, 32)].x, 0.7F);
-  EXPECT_GT(picture.alpha[at(25, 32)], 0.3F);
-  EXPECT_EQ(picture.alpha[at(32, 32)], 1.0F);
+  EXPECT_LT(image.radiance[at(25, 32)].x, 0.7F);
+  EXPECT_GT(image.alpha[at(25, 32)], 0.3F);
+  EXPECT_EQ(image.alpha[at(32, 32)], 1.0F);
 }
 
 TEST(PathTracer, FocusedObjectsStaySharp) {
@@ -425,7 +424,7 @@ TEST(PathTracer, FocusedObjectsStaySharp) {
   const auto grey_pixels = [&](double focus) {
     options.focus_distance = focus;
     int grey = 0;
-    for (const Vec3& light : path_picture(scene, towards({0.013, 0.0, 21.0}, {0.013, 0.0, 0.0}, 0.02), options).scene) {
+    for (const Vec3& light : path_image(scene, towards({0.013, 0.0, 21.0}, {0.013, 0.0, 0.0}, 0.02), options).scene) {
       grey += light.x > 0.05F && light.x < 0.95F;
     }
     return grey;
@@ -439,7 +438,7 @@ TEST(PathTracer, AnEnvironmentOfOnePixelIsAUniformSky) {
   PathOptions options = under_even_sky(8, 8, 256);
   options.sky = SkyModel::Environment;
   options.environment = std::make_shared<const RadianceImage>(RadianceImage{1, 1, {0.5F, 0.5F, 0.5F}});
-  const float light = mean(path_picture(scene, from_above(4.0, 20.0, 4.0, 6.0), options)).x;
+  const float light = mean(path_image(scene, from_above(4.0, 20.0, 4.0, 6.0), options)).x;
   EXPECT_NEAR(light, 0.5F * linear_from_srgb(std::uint8_t{188}), 0.01F);
 }
 
@@ -483,9 +482,9 @@ TEST(PathTracer, LearnedLampSharesDarkenNothing) {
   for (options.seed = 0; options.seed < 100; ++options.seed) {
     for (const int samples : {4, 8}) {
       options.samples = samples;
-      const auto picture = tracer.render(from_above(128.0, 100.0, 128.0, 256.0), options);
-      ASSERT_TRUE(picture.has_value());
-      (samples == 4 ? forgetful : remembering) += static_cast<double>(mean(*picture).x);
+      const auto image = tracer.render(from_above(128.0, 100.0, 128.0, 256.0), options);
+      ASSERT_TRUE(image.has_value());
+      (samples == 4 ? forgetful : remembering) += static_cast<double>(mean(*image).x);
     }
   }
   EXPECT_NEAR(remembering / forgetful, 1.0, 0.02);
@@ -499,8 +498,8 @@ TEST(PathTracer, RejectsInvalidInput) {
   const auto refused = [&](auto change) {
     PathOptions options = under_even_sky(4, 4, 1);
     change(options);
-    const auto picture = tracer.render(camera, options);
-    return !picture && picture.error().code == ErrorCode::InvalidArgument;
+    const auto image = tracer.render(camera, options);
+    return !image && image.error().code == ErrorCode::InvalidArgument;
   };
   EXPECT_FALSE(refused([](PathOptions&) {}));
   EXPECT_TRUE(refused([](PathOptions& o) { o.width = 0; }));
@@ -527,9 +526,9 @@ TEST(PathTracer, RejectsInvalidInput) {
 TEST(PathTracer, StopsHalfway) {
   const Scene scene = town();
   int calls = 0;
-  const auto picture = PathTracer(scene).render(of_town(), quick(), {2}, [&](double) { return ++calls < 3; });
-  ASSERT_FALSE(picture.has_value());
-  EXPECT_EQ(picture.error().code, ErrorCode::Cancelled);
+  const auto image = PathTracer(scene).render(of_town(), quick(), {2}, [&](double) { return ++calls < 3; });
+  ASSERT_FALSE(image.has_value());
+  EXPECT_EQ(image.error().code, ErrorCode::Cancelled);
   EXPECT_LE(calls, 4);
 }
 
@@ -537,9 +536,9 @@ TEST(PathTracer, AnEmptySceneIsSky) {
   const Scene scene;
   PathOptions options = under_even_sky(8, 8, 2);
   options.ground.emplace();
-  const PathPicture picture = path_picture(scene, towards({0.0, 5.0, 10.0}, {0.0, 5.0, 0.0}), options);
-  EXPECT_EQ(picture.radiance.front(), Vec3(1.0F));
-  EXPECT_NEAR(picture.radiance.back().x, 0.5F, 1e-6F);
+  const PathImage image = path_image(scene, towards({0.0, 5.0, 10.0}, {0.0, 5.0, 0.0}), options);
+  EXPECT_EQ(image.radiance.front(), Vec3(1.0F));
+  EXPECT_NEAR(image.radiance.back().x, 0.5F, 1e-6F);
 }
 
 }  // namespace

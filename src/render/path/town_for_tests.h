@@ -58,11 +58,11 @@ inline PathOptions under_even_sky(int width, int height, int samples) {
 }
 
 /// Renders an image; fails the test on an error.
-inline PathPicture path_picture(const Scene& scene, const Camera& camera, const PathOptions& options,
-                                Threads threads = {}) {
-  auto picture = PathTracer(scene).render(camera, options, threads);
-  EXPECT_TRUE(picture.has_value()) << (picture ? "" : picture.error().message);
-  return picture ? std::move(*picture) : PathPicture{};
+inline PathImage path_image(const Scene& scene, const Camera& camera, const PathOptions& options,
+                            Threads threads = {}) {
+  auto image = PathTracer(scene).render(camera, options, threads);
+  EXPECT_TRUE(image.has_value()) << (image ? "" : image.error().message);
+  return image ? std::move(*image) : PathImage{};
 }
 
 inline Camera of_town() {

@@ -98,9 +98,9 @@ TEST(ImpostorShellDeathTest, KnowsVoxelsInItsBoxAndBesideIt) {
   const World world(3);
   const auto shell = ImpostorShell::build(world.tree, kPlenty, kPlenty);
   ASSERT_TRUE(shell.has_value());
-  const IVec3 beside = world.tree.bounds().max;
-  EXPECT_FALSE(shell->is_occupied(beside));
-  QUOIN_EXPECT_MISTAKE(static_cast<void>(shell->is_occupied(beside + 20)), "a position in the box or next to it");
+  const IVec3 adjacent = world.tree.bounds().max;
+  EXPECT_FALSE(shell->is_occupied(adjacent));
+  QUOIN_EXPECT_MISTAKE(static_cast<void>(shell->is_occupied(adjacent + 20)), "a position in the box or next to it");
 }
 
 }  // namespace

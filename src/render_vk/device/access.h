@@ -1,12 +1,12 @@
 #pragma once
 
-#include <quoin/render_vk/vulkan_picture.h>
+#include <quoin/render_vk/vulkan_image.h>
 #include <quoin/render_vk/vulkan_renderer.h>
 
 namespace quoin::vulkan {
 
 using RendererImpl = VulkanRenderer::Impl;
-using PictureImpl = VulkanPicture::Impl;
-using PathPictureImpl = VulkanPathPicture::Impl;
+using ImageImpl = VulkanImage::Impl;
+using PathImageImpl = VulkanPathImage::Impl;
 
 }  // namespace quoin::vulkan

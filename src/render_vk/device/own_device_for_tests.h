@@ -12,7 +12,7 @@
 #include <gtest/gtest.h>
 
 #include <quoin/render_vk/vulkan_device.h>
-#include <quoin/render_vk/vulkan_picture.h>
+#include <quoin/render_vk/vulkan_image.h>
 
 #include "render_vk/device/api.h"
 

@@ -33,9 +33,9 @@ class VulkanBorrowed : public ::testing::Test {
   }
   [[nodiscard]] Image drawn(VulkanRenderer& renderer, const Scene& scene) const {
     EXPECT_TRUE(renderer.update(scene));
-    VulkanPicture picture(renderer);
-    EXPECT_TRUE(renderer.draw(picture, camera_, options_, Accumulation::Restart));
-    return picture.read().value();
+    VulkanImage image(renderer);
+    EXPECT_TRUE(renderer.draw(image, camera_, options_, Accumulation::Restart));
+    return image.read().value();
   }
   void expect_error(const BorrowedVulkanDevice& lent, ErrorCode code, const std::string& message) {
     const auto made = VulkanRenderer::create(lent);
@@ -49,7 +49,7 @@ class VulkanBorrowed : public ::testing::Test {
   RenderOptions options_;
 };
 
-TEST_F(VulkanBorrowed, DrawsThePicturesOfAnOwnDevice) {
+TEST_F(VulkanBorrowed, DrawsTheImagesOfAnOwnDevice) {
   const Scene scene = golden::terrain_scene();
   VulkanRenderer borrowing = renderer();
   EXPECT_EQ(borrowing.device().name, describe_vulkan_device(own_->instance, own_->physical)->name);
@@ -67,9 +67,9 @@ TEST_F(VulkanBorrowed, DeviceAndImageOutliveTheRenderer) {
   for (int round = 0; round < 3; ++round) {
     VulkanRenderer shortlived = renderer();
     right = drawn(shortlived, scene);
-    VulkanPicture picture(shortlived);
-    ASSERT_TRUE(picture.write(right));
-    ASSERT_TRUE(picture.copy_to(image.target()));
+    VulkanImage rendered(shortlived);
+    ASSERT_TRUE(rendered.write(right));
+    ASSERT_TRUE(rendered.copy_to(image.target()));
   }
   const std::vector<std::uint8_t> bytes = image.read(image.target());
   for (std::size_t i = 0; i < right.rgb.size(); ++i) ASSERT_EQ(bytes[i / 3 * 4 + i % 3], right.rgb[i]);
@@ -81,8 +81,8 @@ TEST_F(VulkanBorrowed, TwoRenderersShareADevice) {
   VulkanRenderer first = renderer();
   VulkanRenderer second = renderer();
   const Image right = drawn(first, scene);
-  VulkanPicture picture(first);
-  const Status refused = second.draw(picture, camera_, options_, Accumulation::Restart);
+  VulkanImage image(first);
+  const Status refused = second.draw(image, camera_, options_, Accumulation::Restart);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().message, "vulkan: the image belongs to another renderer");
   // Each renderer runs on its own thread, with the queue guarded.
@@ -169,21 +169,21 @@ TEST_F(VulkanBorrowed, ChecksPreconditions) {
   const Scene scene = golden::terrain_scene();
   VulkanRenderer one = renderer();
   ASSERT_TRUE(one.update(scene));
-  VulkanPicture picture(one);
-  ASSERT_TRUE(one.draw(picture, camera_, options_, Accumulation::Restart));
+  VulkanImage image(one);
+  ASSERT_TRUE(one.draw(image, camera_, options_, Accumulation::Restart));
   Camera other = camera_;
   other.position.x += 1.0;
-  QUOIN_EXPECT_MISTAKE((void)one.draw(picture, other, options_, Accumulation::Continue), "have the same camera");
+  QUOIN_EXPECT_MISTAKE((void)one.draw(image, other, options_, Accumulation::Continue), "have the same camera");
   RenderOptions darker = options_;
   darker.light.exposure = 0.5;
-  QUOIN_EXPECT_MISTAKE((void)one.draw(picture, camera_, darker, Accumulation::Continue), "have the same light");
-  EXPECT_TRUE(one.draw(picture, other, darker, Accumulation::Restart));
+  QUOIN_EXPECT_MISTAKE((void)one.draw(image, camera_, darker, Accumulation::Continue), "have the same light");
+  EXPECT_TRUE(one.draw(image, other, darker, Accumulation::Restart));
   BorrowedVulkanDevice lent = own_->lent();
   QUOIN_EXPECT_MISTAKE((void)VulkanRenderer::create(lent, 1000), "at least 64 KiB");
   lent.with_queue = [](const std::function<void()>&) {};
   auto unguarded = VulkanRenderer::create(lent);
   ASSERT_TRUE(unguarded);
-  VulkanPicture never(*unguarded);
+  VulkanImage never(*unguarded);
   QUOIN_EXPECT_MISTAKE((void)never.write({1, 1, {1, 2, 3}}), "must call its argument");
 }
 

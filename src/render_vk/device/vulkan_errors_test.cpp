@@ -87,7 +87,7 @@ TEST_F(VulkanErrors, DetailOfNothingIsTheSky) {
   const Camera camera = towards({20, 20, 40}, {0, 0, 0});
   RenderOptions options = sized(16, 12);
   options.detail.policy.emplace();
-  const Picture sky = render_test::taken(Scene(), camera, options);
+  const RenderedImage sky = render_test::taken(Scene(), camera, options);
   EXPECT_EQ(render_test::count_different(taken_as_is(camera, options), sky, 2), 0);
   Scene scene;
   const VoxelType stone = add_type(scene, {140, 140, 150});
@@ -111,22 +111,22 @@ TEST_F(VulkanErrors, AListenerCanStopIt) {
   const Camera camera = towards({30, 20, 30}, {5, 5, 5});
   RenderOptions options = sized(32, 32);
   options.samples = 6;
-  std::vector<double> told;
+  std::vector<double> reported;
   const auto stopped = renderer_->render(camera, options, {}, [&](double fraction) {
-    told.push_back(fraction);
-    return told.size() < 3;
+    reported.push_back(fraction);
+    return reported.size() < 3;
   });
   ASSERT_FALSE(stopped);
   EXPECT_EQ(stopped.error().code, ErrorCode::Cancelled);
   EXPECT_EQ(stopped.error().message, "cancelled");
-  EXPECT_EQ(told.size(), 3U);
-  told.clear();
+  EXPECT_EQ(reported.size(), 3U);
+  reported.clear();
   ASSERT_TRUE(renderer_->render(camera, options, {}, [&](double fraction) {
-    told.push_back(fraction);
+    reported.push_back(fraction);
     return true;
   }));
-  EXPECT_TRUE(std::is_sorted(told.begin(), told.end()));
-  EXPECT_EQ(told.back(), 1.0);
+  EXPECT_TRUE(std::is_sorted(reported.begin(), reported.end()));
+  EXPECT_EQ(reported.back(), 1.0);
 }
 
 }  // namespace

@@ -12,7 +12,7 @@
 
 #include <gtest/gtest.h>
 
-#include <quoin/io/picture_files.h>
+#include <quoin/io/image_files.h>
 #include <quoin/render_vk/vulkan_renderer.h>
 
 #include "render/render_test_support.h"
@@ -55,15 +55,15 @@ class VulkanTest : public ::testing::Test {
     return options;
   }
 
-  Picture taken(const Scene& scene, const Camera& camera, const RenderOptions& options) {
+  RenderedImage taken(const Scene& scene, const Camera& camera, const RenderOptions& options) {
     const Status updated = renderer_->update(scene);
     EXPECT_TRUE(updated) << to_string(updated.error());
     return taken_as_is(camera, options);
   }
-  Picture taken_as_is(const Camera& camera, const RenderOptions& options) {
-    auto picture = renderer_->render(camera, options);
-    EXPECT_TRUE(picture) << to_string(picture.error());
-    return picture ? std::move(*picture) : Picture{};
+  RenderedImage taken_as_is(const Camera& camera, const RenderOptions& options) {
+    auto image = renderer_->render(camera, options);
+    EXPECT_TRUE(image) << to_string(image.error());
+    return image ? std::move(*image) : RenderedImage{};
   }
 
   VulkanRenderer* renderer_ = nullptr;
@@ -103,7 +103,7 @@ struct Differences {
   int total = 0;
 };
 
-inline Differences differences(const Picture& a, const Picture& b) {
+inline Differences differences(const RenderedImage& a, const RenderedImage& b) {
   Differences found;
   EXPECT_EQ(a.colour.rgb.size(), b.colour.rgb.size());
   EXPECT_EQ(a.depth.values.size(), b.depth.values.size());
@@ -132,7 +132,7 @@ inline Differences differences(const Picture& a, const Picture& b) {
 }
 
 /// Checks the differences that VulkanRenderer permits. Writes both images on failure.
-inline void expect_equal(const Picture& vulkan, const Picture& cpu, const std::string& name) {
+inline void expect_equal(const RenderedImage& vulkan, const RenderedImage& cpu, const std::string& name) {
   const Differences found = differences(vulkan, cpu);
   EXPECT_LE(found.pixels * 1000, found.total) << name;
   EXPECT_LE(found.depths * 1000, found.total) << name;

@@ -49,10 +49,10 @@ void DeviceDetail::look_at(const Scene& scene) {
   }
 }
 
-Result<Placement> DeviceDetail::place(const DeviceScene& device, const Scene& scene, const PictureDetail& detail,
+Result<Placement> DeviceDetail::place(const DeviceScene& device, const Scene& scene, const ImageDetail& detail,
                                       const Camera& camera, const RenderOptions& options, Threads threads,
                                       std::uint64_t max_bytes) {
-  ++picture_;
+  ++image_;
   Placement placement = device.placement();
   const ImpostorScreen screen(camera, options.width, options.height);
   const auto put = [&]() -> Status {
@@ -114,11 +114,11 @@ Status DeviceDetail::put_level(const CoarseLevel& coarse, GridHandle grid, std::
                                const Level*& level) {
   Level& known = levels_[{grid, coarse.level}];
   level = &known;
-  if (known.last_use == picture_) return {};
+  if (known.last_use == image_) return {};
   const TreeCache& trees = coarse.trees;
   Status done = known.voxels.update(
       *memory_, {coarse.voxels, &trees.opaque(), trees.transparent(), trees.opaque_field(), trees.glass()});
-  known.last_use = picture_;
+  known.last_use = image_;
   known.index = static_cast<std::int32_t>(table.size());
   table.push_back(known.voxels.shader_grid());
   return done;
@@ -126,7 +126,7 @@ Status DeviceDetail::put_level(const CoarseLevel& coarse, GridHandle grid, std::
 
 void DeviceDetail::drop_unused(std::uint64_t max_bytes) {
   drop_oldest(
-      levels_, picture_, max_bytes, [](const auto& entry) { return entry.second.voxels.bytes(); },
+      levels_, image_, max_bytes, [](const auto& entry) { return entry.second.voxels.bytes(); },
       [&](auto& entry) { entry.second.voxels.release(*memory_); });
 }
 

@@ -8,7 +8,7 @@
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>
 
-#include "render/picture_detail.h"
+#include "render/image_detail.h"
 #include "render_vk/march/device_impostors.h"
 #include "render_vk/march/device_scene.h"
 #include "render_vk/trees/device_grid.h"
@@ -35,7 +35,7 @@ class DeviceDetail {
   ///
   /// Requires: `device` was updated with `scene`, which has not changed since; no commands run.
   /// Errors:   as DeviceImpostors::draw; it is then empty.
-  [[nodiscard]] Result<Placement> place(const DeviceScene& device, const Scene& scene, const PictureDetail& detail,
+  [[nodiscard]] Result<Placement> place(const DeviceScene& device, const Scene& scene, const ImageDetail& detail,
                                         const Camera& camera, const RenderOptions& options, Threads threads,
                                         std::uint64_t max_bytes = kMaxBytes);
 
@@ -65,7 +65,7 @@ class DeviceDetail {
   std::map<Key, Level> levels_;
   ChangeCursor followed_scene_;
   ChangeCursor followed_types_;
-  std::uint64_t picture_ = 0;
+  std::uint64_t image_ = 0;
   Place table_place_;
   std::vector<ShaderGrid> table_;
 };

@@ -216,8 +216,8 @@ Status DeviceImpostors::send_some(Sent& sent, std::size_t& faces_left) {
 }
 
 Status DeviceImpostors::put(const std::shared_ptr<const Impostor>& impostor, Entry& entry, std::size_t& faces_left) {
-  const bool is_known = entry.last_use == picture_;
-  entry.last_use = picture_;
+  const bool is_known = entry.last_use == image_;
+  entry.last_use = image_;
   if (is_known || entry.whole.impostor == impostor) return {};
   // Finishes a started transfer first: otherwise one edit per frame would keep it from ever completing. A caller that
   // waits gets the latest impostor.
@@ -240,8 +240,8 @@ Status DeviceImpostors::put(const std::shared_ptr<const Impostor>& impostor, Ent
 }
 
 Result<std::vector<FarInstance>> DeviceImpostors::send(const Scene& scene, const FarImpostors& far, bool waits) {
-  ++picture_;
-  std::size_t faces_left = waits ? std::numeric_limits<std::size_t>::max() : kFacesAPicture;
+  ++image_;
+  std::size_t faces_left = waits ? std::numeric_limits<std::size_t>::max() : kFacesAImage;
   // Missing impostors come first: a constantly edited impostor would delay them forever.
   for (const bool is_first : {true, false}) {
     for (const auto& [grid, impostor] : far.kept) {
@@ -310,7 +310,7 @@ ShaderFar DeviceImpostors::shader_far(const Sent& sent, const DrawnImpostor& dra
 
 void DeviceImpostors::drop_unused(std::uint64_t max_bytes) {
   drop_oldest(
-      entries_, picture_, max_bytes,
+      entries_, image_, max_bytes,
       [](const auto& entry) { return entry.second.whole.place.size + entry.second.next.place.size; },
       [&](auto& entry) { release(entry.second); });
 }

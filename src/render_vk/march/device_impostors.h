@@ -21,11 +21,11 @@ struct Placement;
 
 /// Impostors in device memory, sent when an image first shows them and kept for later images.
 ///
-/// Without waiting, each image sends at most `kFacesAPicture` faces, a fraction of a millisecond. Until a new impostor
+/// Without waiting, each image sends at most `kFacesAImage` faces, a fraction of a millisecond. Until a new impostor
 /// is complete, the previous one is drawn; instances without any are traced.
 class DeviceImpostors {
  public:
-  static constexpr std::size_t kFacesAPicture = std::size_t{1} << 16;
+  static constexpr std::size_t kFacesAImage = std::size_t{1} << 16;
 
   explicit DeviceImpostors(DeviceMemory& memory) : memory_(&memory) {}
 
@@ -77,7 +77,7 @@ class DeviceImpostors {
 
   DeviceMemory* memory_;
   std::map<GridHandle, Entry> entries_;
-  std::uint64_t picture_ = 0;
+  std::uint64_t image_ = 0;
 };
 
 /// The impostors visible in each tile of an image.

@@ -33,8 +33,8 @@ IBox content_bounds(const SceneGrid& grid) {
 }
 
 bool can_be_traced(const Scene& scene, const Instance& instance, const SceneGrid* grid, InstanceFilter filter) {
-  return grid != nullptr && passes(filter, scene, instance) && has_place(instance) && is_finite(grid->pivot) &&
-         !content_bounds(*grid).empty();
+  return grid != nullptr && passes(filter, scene, instance) && has_valid_transform(instance) &&
+         is_finite(grid->pivot) && !content_bounds(*grid).empty();
 }
 
 PlacedGrid placed_as(const Instance& instance, const SceneGrid& grid, InstanceHandle handle) {

@@ -250,8 +250,8 @@ void set_light(const RenderOptions& options, ShaderFrame& frame) {
 
 FrameData make_frame(const Placement& scene, const Camera& camera, const RenderOptions& options) {
   FrameData data;
-  const CameraRays picture(camera, options.width, options.height);
-  const Rays rays{picture.is_perspective(), picture.right(), picture.down(), picture.corner(), picture.forward()};
+  const CameraRays image(camera, options.width, options.height);
+  const Rays rays{image.is_perspective(), image.right(), image.down(), image.corner(), image.forward()};
   ShaderFrame& frame = data.frame;
   frame.flags = flags_of(camera, options);
   frame.right = to_vec4(rays.right);
@@ -262,7 +262,7 @@ FrameData make_frame(const Placement& scene, const Camera& camera, const RenderO
   frame.down_low = low_vec4(rays.down);
   frame.corner_low = low_vec4(rays.corner);
   frame.forward_low = low_vec4(rays.forward);
-  frame.sky_scale = static_cast<float>(picture.sky_scale());
+  frame.sky_scale = static_cast<float>(image.sky_scale());
   frame.width = options.width;
   frame.height = options.height;
   frame.samples = static_cast<float>(options.samples);
@@ -285,10 +285,10 @@ std::vector<ShaderLamp> shader_lamps(const LampTable& table, DVec3 camera, DVec3
   for (const PlacedLamp& from : table.lamps) {
     ShaderLamp& lamp = lamps.emplace_back();
     lamp.position = to_vec4(from.position - camera - view_origin, from.reach);
-    const std::array<double, 3> beside = {from.spread_squared, from.cos_inner, from.cos_outer};
+    const std::array<double, 3> adjacent = {from.spread_squared, from.cos_inner, from.cos_outer};
     for (int axis = 0; axis < 3; ++axis) {
       const auto i = static_cast<std::size_t>(axis);
-      lamp.axes[i] = to_vec4(from.axes[axis], beside[i]);
+      lamp.axes[i] = to_vec4(from.axes[axis], adjacent[i]);
     }
     for (std::size_t face = 0; face < 6; ++face) lamp.power[face] = {from.power[face], 0.0F};
     lamp.low = to_vec4(from.low, !from.is_point ? 0.0 : from.cos_inner > -2.0 ? 2.0 : 1.0);

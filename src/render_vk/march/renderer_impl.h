@@ -9,7 +9,7 @@
 
 #include "light/light_model.h"
 #include "light/surface/light_bricks.h"
-#include "render/picture_detail.h"
+#include "render/image_detail.h"
 #include "render_vk/device/access.h"
 #include "render_vk/device/device.h"
 #include "render_vk/device/memory.h"
@@ -42,7 +42,7 @@ struct VulkanRenderer::Impl {
   /// Sets the current scene; null: none.
   void look_at(const Scene* updated, InstanceFilter filter) {
     const ChangeCursor before = std::exchange(at_update, updated != nullptr ? updated->cursor() : ChangeCursor{});
-    const bool is_same = updated == voxels && before.is_beside(at_update);
+    const bool is_same = updated == voxels && before.shares_container_with(at_update);
     if (chooser == nullptr || !is_same) chooser = std::make_unique<DetailChooser>();
     voxels = updated;
     instances = filter;

@@ -2,7 +2,7 @@
 
 #include <cstring>
 
-#include "render/picture_request.h"
+#include "render/image_request.h"
 #include "render_vk/march/frame.h"
 
 namespace quoin::vulkan {

@@ -163,7 +163,7 @@ TEST(ShaderScene, AFrameHasItsTablesBehindIt) {
   EXPECT_EQ(words.read<float>(frame.thresholds + 4 * 255), words.read<float>(bytes->size() - 4));
 }
 
-TEST(ShaderScene, PicturesThatCannotBeAreRefused) {
+TEST(ShaderScene, ImagesThatCannotBeAreRefused) {
   Scattered made;
   const auto shaders = vulkan::ShaderScene::of(made.scene, InstanceFilter::Visible, natural_light(), {});
   ASSERT_TRUE(shaders);

@@ -12,7 +12,7 @@
 #include <quoin/render_vk/vulkan_renderer.h>
 #include <quoin/terrain/terrain.h>
 
-#include "bench/picture_workload.h"
+#include "bench/image_workload.h"
 
 namespace quoin {
 namespace {
@@ -25,7 +25,7 @@ struct World {
 };
 
 const World& small_world() {
-  static const World world{workloads::picture_scene(), workloads::over_the_terrain()};
+  static const World world{workloads::image_scene(), workloads::over_the_terrain()};
   return world;
 }
 
@@ -71,22 +71,22 @@ void on_device(benchmark::State& state, const World& world, const RenderOptions&
   auto renderer = VulkanRenderer::create();
   if (!renderer) return state.SkipWithError(renderer.error().message.c_str());
   fail_unless(renderer->update(world.scene).has_value(), "the update's success", 0);
-  VulkanPicture picture(*renderer);
+  VulkanImage image(*renderer);
   for (auto _ : state) {
-    fail_unless(renderer->draw(picture, world.camera, options, Accumulation::Restart).has_value(),
+    fail_unless(renderer->draw(image, world.camera, options, Accumulation::Restart).has_value(),
                 "the picture's success", 0);
   }
   state.SetLabel(renderer->device().name);
-  count(state, picture.rays());
+  count(state, image.rays());
 }
 
 void on_processor(benchmark::State& state, const World& world, const RenderOptions& options) {
   const CpuRenderer renderer(world.scene);
   std::int64_t rays = 0;
   for (auto _ : state) {
-    const auto picture = renderer.render(world.camera, options);
-    fail_unless(picture.has_value(), "the picture's success", 0);
-    rays = picture->rays;
+    const auto image = renderer.render(world.camera, options);
+    fail_unless(image.has_value(), "the picture's success", 0);
+    rays = image->rays;
   }
   state.SetLabel(std::to_string(thread_count(Threads{})) + " threads");
   count(state, rays);

@@ -5,42 +5,42 @@
 
 #include <quoin/render_vk/vulkan_renderer.h>
 
-#include "bench/picture_loop.h"
+#include "bench/image_loop.h"
 
 namespace quoin {
 namespace {
 
 using workloads::fail_unless;
 
-void picture(benchmark::State& state, const LightOptions& light) {
-  const Scene scene = workloads::picture_scene();
+void image(benchmark::State& state, const LightOptions& light) {
+  const Scene scene = workloads::image_scene();
   auto renderer = VulkanRenderer::create();
   if (!renderer) return state.SkipWithError(renderer.error().message.c_str());
   fail_unless(renderer->update(scene).has_value(), "the update's success", 0);
   RenderOptions options;
   options.light = light;
-  workloads::time_pictures(state, options, [&](const Camera& camera, const RenderOptions& wanted) {
+  workloads::time_images(state, options, [&](const Camera& camera, const RenderOptions& wanted) {
     return renderer->render(camera, wanted);
   });
   state.SetLabel(renderer->device().name);
 }
 
 void full(benchmark::State& state) {
-  picture(state, {});
+  image(state, {});
 }
 void unlit(benchmark::State& state) {
   LightOptions light;
   light.shading = Shading::Unlit;
-  picture(state, light);
+  image(state, light);
 }
 void vertex(benchmark::State& state) {
   LightOptions light;
   light.occlusion_mode = OcclusionMode::Vertex;
-  picture(state, light);
+  image(state, light);
 }
 
 void update(benchmark::State& state) {
-  Scene scene = workloads::picture_scene();
+  Scene scene = workloads::image_scene();
   auto renderer = VulkanRenderer::create();
   if (!renderer) return state.SkipWithError(renderer.error().message.c_str());
   fail_unless(renderer->update(scene).has_value(), "the update's success", 0);

@@ -51,7 +51,7 @@ TEST_F(VulkanDetail, HalvedGridsAreTheProcessors) {
   }
   EXPECT_EQ(halvings, (std::set<int>{1, 2, 3, 4}));
   const RenderOptions plain = sized(128, 96);
-  const Picture near = taken_as_is(camera, plain);
+  const RenderedImage near = taken_as_is(camera, plain);
   expect_equal(near, render_test::taken(scene_, camera, plain), "near_after_mid");
   EXPECT_NE(near.depth.values, taken_as_is(camera, always_mid(6.0)).depth.values);
 }
@@ -72,15 +72,15 @@ TEST_F(VulkanDetail, EveryKindOfLightOnHalvedGrids) {
   with("samples", [](RenderOptions& o) { o.samples = 3; });
 }
 
-TEST_F(VulkanDetail, NearIsThePictureWithoutDetailToTheByte) {
+TEST_F(VulkanDetail, NearIsTheImageWithoutDetailToTheByte) {
   add_crowd(scene_, {add_blobs(scene_, 31)}, 2, 260.0);
   ASSERT_TRUE(renderer_->update(scene_));
   const Camera camera = towards({-100, 220, -200}, {150, 0, 150}, 0.6);
   RenderOptions options = sized(96, 64);
-  const Picture plain = taken_as_is(camera, options);
+  const RenderedImage plain = taken_as_is(camera, options);
   options.detail.policy.emplace().rule = DetailPolicy::Rule::ByRadius;
   options.detail.policy->near_radii = 1e9;
-  const Picture detailed = taken_as_is(camera, options);
+  const RenderedImage detailed = taken_as_is(camera, options);
   EXPECT_EQ(plain.colour.rgb, detailed.colour.rgb);
   EXPECT_EQ(plain.depth.values, detailed.depth.values);
   EXPECT_EQ(halved_bytes(), 0U);
@@ -111,13 +111,13 @@ TEST_F(VulkanDetail, AnEditUploadsItsChanges) {
   vulkan::DeviceMemory& memory = renderer_->impl().memory;
   const std::uint64_t before = memory.written();
   static_cast<void>(taken_as_is(camera, options));
-  const std::uint64_t of_a_picture = memory.written() - before;
+  const std::uint64_t of_a_image = memory.written() - before;
   Grid& grid = scene_.edit(edited).grid;
   grid.fill_box({{0, 0, 0}, {16, 16, 16}}, grid.get({0, 0, 0}) == 1 ? VoxelType{2} : VoxelType{1});
   ASSERT_TRUE(renderer_->update(scene_));
   const std::uint64_t after = memory.written();
   static_cast<void>(taken_as_is(camera, options));
-  const std::uint64_t sent = memory.written() - after - of_a_picture;
+  const std::uint64_t sent = memory.written() - after - of_a_image;
   EXPECT_GT(sent, 0U);
   EXPECT_LT(sent, halved_bytes()) << "not all levels' chunks";
   compare(camera, options, "after_the_edit");
@@ -192,7 +192,7 @@ TEST_F(VulkanDetail, GridsThatAreGoneLeaveNothing) {
   EXPECT_EQ(halved_bytes(), 0U);
 }
 
-TEST_F(VulkanDetail, EvictsImpostorsThatNoPictureUses) {
+TEST_F(VulkanDetail, EvictsImpostorsThatNoImageUses) {
   const std::vector<GridHandle> grids = {add_blobs(scene_, 31), add_blobs(scene_, 32)};
   add_crowd(scene_, grids, 2, 260.0);
   ASSERT_TRUE(renderer_->update(scene_));
@@ -218,19 +218,18 @@ TEST_F(VulkanDetail, EvictsImpostorsThatNoPictureUses) {
   compare(camera, always_mid(4.0), "after_giving_way");
 }
 
-TEST_F(VulkanDetail, SamplesAddUpToTheRenderedPicture) {
+TEST_F(VulkanDetail, SamplesAddUpToTheRenderedImage) {
   add_crowd(scene_, {add_blobs(scene_, 31)}, 2, 260.0);
   ASSERT_TRUE(renderer_->update(scene_));
   const Camera camera = towards({-300, 420, -500}, {150, 0, 150}, 0.6);
   RenderOptions options = always_mid(4.0);
-  VulkanPicture picture(*renderer_);
+  VulkanImage image(*renderer_);
   for (int sample = 0; sample < 3; ++sample)
-    ASSERT_TRUE(
-        renderer_->draw(picture, camera, options, sample == 0 ? Accumulation::Restart : Accumulation::Continue));
+    ASSERT_TRUE(renderer_->draw(image, camera, options, sample == 0 ? Accumulation::Restart : Accumulation::Continue));
   options.samples = 3;
-  const Picture whole = taken_as_is(camera, options);
-  EXPECT_EQ(picture.read()->rgb, whole.colour.rgb);
-  EXPECT_EQ(picture.rays(), whole.rays);
+  const RenderedImage whole = taken_as_is(camera, options);
+  EXPECT_EQ(image.read()->rgb, whole.colour.rgb);
+  EXPECT_EQ(image.rays(), whole.rays);
 }
 
 TEST_F(VulkanDetail, ColoursTellTheDetail) {

@@ -97,7 +97,7 @@ TEST_F(VulkanField, EmissiveSamplesLightTheirSurroundings) {
   options.light.sky_brightness = 0.1;
   const Camera camera = towards({90, 60, 110}, {10, 5, 20});
   compare(scene, camera, options, "field_glow");
-  const Picture with = render_test::taken(scene, camera, options);
+  const RenderedImage with = render_test::taken(scene, camera, options);
   options.light.max_lamps = 0;
   EXPECT_GT(render_test::count_different(with, render_test::taken(scene, camera, options), 8), 800);
   options.light.max_lamps = 24;
@@ -182,7 +182,7 @@ TEST_F(VulkanField, ALakeAndBallsOfGlass) {
   place_grid(scene, lakeside(types, add_water(scene)));
   const Camera camera = towards({110, 70, 130}, {10, 0, 10});
   RenderOptions options = sized(160, 120);
-  const Picture plain = render_test::taken(scene, camera, options);
+  const RenderedImage plain = render_test::taken(scene, camera, options);
   compare(scene, camera, options, "field_lake");
   options.light.glass_surfaces = true;
   compare(scene, camera, options, "field_lake_surfaces");

@@ -30,7 +30,7 @@ class VulkanImages : public ::testing::Test {
     auto made = VulkanRenderer::create(own_->lent());
     ASSERT_TRUE(made) << to_string(made.error());
     renderer_ = std::make_unique<VulkanRenderer>(std::move(*made));
-    picture_ = std::make_unique<VulkanPicture>(*renderer_);
+    image_ = std::make_unique<VulkanImage>(*renderer_);
   }
 
   void draw(int width, int height) {
@@ -38,31 +38,31 @@ class VulkanImages : public ::testing::Test {
     options.width = width;
     options.height = height;
     const Status drawn =
-        renderer_->draw(*picture_, golden::camera_for(golden::kViews[0]), options, Accumulation::Restart);
+        renderer_->draw(*image_, golden::camera_for(golden::kViews[0]), options, Accumulation::Restart);
     ASSERT_TRUE(drawn) << to_string(drawn.error());
   }
   void draw_noise(int width, int height, std::mt19937& random) {
     Image image{width, height, {}};
     image.rgb.resize(std::size_t{3} * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
     for (std::uint8_t& byte : image.rgb) byte = static_cast<std::uint8_t>(random());
-    ASSERT_TRUE(picture_->write(image));
+    ASSERT_TRUE(image_->write(image));
   }
 
   void put(const VulkanImageTarget& target, bool is_recorded = true) {
     if (!is_recorded) {
-      const Status copied = picture_->copy_to(target);
+      const Status copied = image_->copy_to(target);
       ASSERT_TRUE(copied) << to_string(copied.error());
       return;
     }
     own_->run([&](VkCommandBuffer commands) {
-      const Status recorded = picture_->record_copy(commands, target);
+      const Status recorded = image_->record_copy(commands, target);
       ASSERT_TRUE(recorded) << to_string(recorded.error());
     });
   }
 
   /// Returns the image's bytes in the target's format.
   [[nodiscard]] std::vector<std::uint8_t> bytes() const {
-    const Image image = picture_->read().value();
+    const Image image = image_->read().value();
     std::vector<std::uint8_t> all;
     for (std::size_t i = 0; i < image.rgb.size(); i += 3) {
       all.insert(all.end(), {image.rgb[i], image.rgb[i + 1], image.rgb[i + 2], 255});
@@ -71,12 +71,12 @@ class VulkanImages : public ::testing::Test {
   }
 
   void expect_error(const VulkanImageTarget& target, ErrorCode code, const std::string& message) {
-    const Status copied = picture_->copy_to(target);
+    const Status copied = image_->copy_to(target);
     ASSERT_FALSE(copied) << message;
     EXPECT_EQ(copied.error().code, code);
     EXPECT_NE(copied.error().message.find(message), std::string::npos) << copied.error().message;
     own_->run([&](VkCommandBuffer commands) {
-      const Status recorded = picture_->record_copy(commands, target);
+      const Status recorded = image_->record_copy(commands, target);
       ASSERT_FALSE(recorded);
       EXPECT_EQ(recorded.error().message, copied.error().message);
     });
@@ -84,17 +84,17 @@ class VulkanImages : public ::testing::Test {
 
   std::unique_ptr<OwnDevice> own_;
   std::unique_ptr<VulkanRenderer> renderer_;
-  std::unique_ptr<VulkanPicture> picture_;
+  std::unique_ptr<VulkanImage> image_;
 };
 
-TEST_F(VulkanImages, HaveThePicturesBytesInEveryFormat) {
+TEST_F(VulkanImages, HaveTheImagesBytesInEveryFormat) {
   const Scene scene = golden::terrain_scene();
   ASSERT_TRUE(renderer_->update(scene));
   draw(130, 90);
   RenderOptions options;
   options.width = 130;
   options.height = 90;
-  const Picture cpu = CpuRenderer(scene).render(golden::camera_for(golden::kViews[0]), options).value();
+  const RenderedImage cpu = CpuRenderer(scene).render(golden::camera_for(golden::kViews[0]), options).value();
   const std::vector<std::uint8_t> right = bytes();
   for (const VkFormat format : kFormats) {
     for (const bool is_recorded : {true, false}) {
@@ -112,7 +112,7 @@ TEST_F(VulkanImages, HaveThePicturesBytesInEveryFormat) {
   }
 }
 
-TEST_F(VulkanImages, KeepWhatLiesBesideThePicture) {
+TEST_F(VulkanImages, KeepWhatLiesBesideTheImage) {
   constexpr unsigned kSeed = 61;
   std::mt19937 random(kSeed);
   const auto below = [&](int end) { return static_cast<int>(random() % static_cast<unsigned>(end)); };
@@ -123,18 +123,18 @@ TEST_F(VulkanImages, KeepWhatLiesBesideThePicture) {
     OwnImage image(*own_, format, width, height);
     VulkanImageTarget target = image.target(static_cast<std::uint32_t>(below(2)), static_cast<std::uint32_t>(below(2)));
     draw_noise(1 + below(target.width), 1 + below(target.height), random);
-    target.x = below(target.width - picture_->width() + 1);
-    target.y = below(target.height - picture_->height() + 1);
+    target.x = below(target.width - image_->width() + 1);
+    target.y = below(target.height - image_->height() + 1);
     target.layout_before = VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL;
     std::vector<std::uint8_t> right(std::size_t{4} * static_cast<std::size_t>(target.width) *
                                     static_cast<std::size_t>(target.height));
     for (std::uint8_t& byte : right) byte = static_cast<std::uint8_t>(random());
     image.write(target, right);
     put(target, round % 2 == 0);
-    const std::vector<std::uint8_t> picture = bytes();
-    for (int y = 0; y < picture_->height(); ++y) {
-      const auto from = picture.begin() + std::ptrdiff_t{4} * y * picture_->width();
-      std::copy_n(from, 4 * picture_->width(),
+    const std::vector<std::uint8_t> rendered = bytes();
+    for (int y = 0; y < image_->height(); ++y) {
+      const auto from = rendered.begin() + std::ptrdiff_t{4} * y * image_->width();
+      std::copy_n(from, 4 * image_->width(),
                   right.begin() + std::ptrdiff_t{4} * ((target.y + y) * target.width + target.x));
     }
     ASSERT_EQ(image.read(target), right) << "seed " << kSeed << ", round " << round;
@@ -145,14 +145,14 @@ TEST_F(VulkanImages, KeepWhatLiesBesideThePicture) {
 TEST_F(VulkanImages, OneCommandBufferFillsMany) {
   std::mt19937 random(5);
   draw_noise(70, 50, random);
-  VulkanPicture other(*renderer_);
+  VulkanImage other(*renderer_);
   const Image grey{3, 2, std::vector<std::uint8_t>(18, 99)};
   ASSERT_TRUE(other.write(grey));
   std::vector<std::unique_ptr<OwnImage>> images;
   for (const VkFormat format : kFormats) images.push_back(std::make_unique<OwnImage>(*own_, format, 70, 50));
   own_->run([&](VkCommandBuffer commands) {
     for (const auto& image : images) {
-      ASSERT_TRUE(picture_->record_copy(commands, image->target()));
+      ASSERT_TRUE(image_->record_copy(commands, image->target()));
       VulkanImageTarget corner = image->target();
       corner.layout_before = corner.layout_after;
       ASSERT_TRUE(other.record_copy(commands, corner));
@@ -183,10 +183,10 @@ TEST_F(VulkanImages, HaveMeshesToo) {
     live.update(scene, {});
   }
   ASSERT_TRUE(meshes->put(live.take()));
-  MeshPictureOptions wanted;
+  MeshImageOptions wanted;
   wanted.width = 64;
   wanted.height = 48;
-  ASSERT_TRUE(meshes->draw(*picture_, golden::camera_for(golden::kViews[0]), wanted));
+  ASSERT_TRUE(meshes->draw(*image_, golden::camera_for(golden::kViews[0]), wanted));
   for (const VkFormat format : kFormats) {
     OwnImage image(*own_, format, 64, 48);
     put(image.target());
@@ -196,7 +196,7 @@ TEST_F(VulkanImages, HaveMeshesToo) {
     for (std::size_t i = 0; i < got.size(); ++i) ASSERT_EQ(int{got[i]}, int{right[i]}) << "byte " << i;
   }
   wanted.wireframe = Wireframe::Over;
-  const Status refused = meshes->draw(*picture_, golden::camera_for(golden::kViews[0]), wanted);
+  const Status refused = meshes->draw(*image_, golden::camera_for(golden::kViews[0]), wanted);
   ASSERT_FALSE(refused) << "that feature was not enabled";
   EXPECT_EQ(refused.error().code, ErrorCode::Unsupported);
 }
@@ -233,10 +233,10 @@ TEST_F(VulkanImages, RefusesInvalidTargets) {
     wrong.layout_after = layout;
     expect_error(wrong, ErrorCode::InvalidArgument, "cannot be left in VkImageLayout");
   }
-  const Status nowhere = picture_->record_copy(nullptr, right);
+  const Status nowhere = image_->record_copy(nullptr, right);
   ASSERT_FALSE(nowhere);
   EXPECT_EQ(nowhere.error().message, "vulkan: the command buffer is null");
-  EXPECT_TRUE(picture_->copy_to(right));
+  EXPECT_TRUE(image_->copy_to(right));
 }
 
 }  // namespace

@@ -74,7 +74,7 @@ TEST_F(VulkanImpostors, EveryKindOfLight) {
     with("no_shadows", [](RenderOptions& o) { o.light.shadows = false; });
     with("samples", [](RenderOptions& o) { o.samples = 5; });
     with("colours", [](RenderOptions& o) { o.detail.colours = true; });
-    const Picture far = taken_as_is(camera, far_options(148));
+    const RenderedImage far = taken_as_is(camera, far_options(148));
     EXPECT_NE(far.colour.rgb, taken_as_is(camera, sized(148, 148)).colour.rgb) << "occlusion is that of whole faces";
   }
 }
@@ -113,24 +113,24 @@ TEST_F(VulkanImpostors, FramesSendALittleAtATime) {
   frames.detail.impostor_seconds = 0.0;
   RenderOptions waiting = frames;
   waiting.detail.impostor_seconds = std::numeric_limits<double>::infinity();
-  const auto frames_until = [&](const Picture& wanted) {
+  const auto frames_until = [&](const RenderedImage& wanted) {
     for (int frame = 1; frame < 2000; ++frame) {
       if (taken_as_is(camera, frames).colour.rgb == wanted.colour.rgb) return frame;
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
     }
     return -1;
   };
-  const Picture wanted = render_test::taken(scene_, camera, waiting);
+  const RenderedImage wanted = render_test::taken(scene_, camera, waiting);
   ASSERT_TRUE(renderer_->update(scene_));
-  const Picture traced = taken_as_is(camera, sized(96, 96));
+  const RenderedImage traced = taken_as_is(camera, sized(96, 96));
   EXPECT_EQ(taken_as_is(camera, frames).colour.rgb, traced.colour.rgb) << "nothing is there yet";
   EXPECT_GT(frames_until(taken(scene_, camera, waiting)), 0);
   // After an edit, the old impostor is drawn until the whole new one is uploaded.
   scene_.edit(instance.grid).grid.fill_box({{60, 100, 100}, {90, 150, 150}}, kAir);
   ASSERT_TRUE(renderer_->update(scene_));
-  const Picture first = taken_as_is(camera, frames);
+  const RenderedImage first = taken_as_is(camera, frames);
   EXPECT_LT(render_test::count_different(first, wanted, 40), 800);
-  const Picture edited = render_test::taken(scene_, camera, waiting);
+  const RenderedImage edited = render_test::taken(scene_, camera, waiting);
   int frame = 0;
   while (frame < 2000 && render_test::count_different(taken_as_is(camera, frames), edited, 2) > 40) {
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
@@ -290,34 +290,33 @@ TEST_F(VulkanImpostors, ThoseOfAnotherSceneWithTheSameHandlesAreNotShown) {
   scene_ = Scene();
   add_crowd(scene_, {add_blobs(scene_, 77, 9)}, 3, 300.0);
   // Each frame shows the second scene, traced until its impostors are completely uploaded.
-  const Picture far = render_test::taken(scene_, camera, options);
-  const Picture near = render_test::taken(scene_, camera, render_test::sized(128, 96));
+  const RenderedImage far = render_test::taken(scene_, camera, options);
+  const RenderedImage near = render_test::taken(scene_, camera, render_test::sized(128, 96));
   options.detail.impostor_seconds = 0.0;
   ASSERT_TRUE(renderer_->update(scene_));
-  const auto like = [](const Picture& a, const Picture& b) {
+  const auto like = [](const RenderedImage& a, const RenderedImage& b) {
     return vulkan_test::differences(a, b).pixels * 1000 <= 128 * 96;
   };
   ASSERT_FALSE(like(near, far)) << "else this tests nothing";
   for (int frame = 0; frame < 20; ++frame) {
-    const Picture shown = taken_as_is(camera, options);
+    const RenderedImage shown = taken_as_is(camera, options);
     EXPECT_TRUE(like(shown, near) || like(shown, far)) << frame;
   }
 }
 
-TEST_F(VulkanImpostors, SamplesAddUpToTheRenderedPicture) {
+TEST_F(VulkanImpostors, SamplesAddUpToTheRenderedImage) {
   add_crowd(scene_, {add_blobs(scene_, 31, 12)}, 3, 300.0);
   ASSERT_TRUE(renderer_->update(scene_));
   const Camera camera = towards({-900, 1200, -1500}, {300, 0, 300}, 0.7);
   // More than one tile.
   RenderOptions options = in_detail(300, 100, 128);
-  VulkanPicture picture(*renderer_);
+  VulkanImage image(*renderer_);
   for (int sample = 0; sample < 3; ++sample)
-    ASSERT_TRUE(
-        renderer_->draw(picture, camera, options, sample == 0 ? Accumulation::Restart : Accumulation::Continue));
+    ASSERT_TRUE(renderer_->draw(image, camera, options, sample == 0 ? Accumulation::Restart : Accumulation::Continue));
   options.samples = 3;
-  const Picture whole = taken_as_is(camera, options);
-  EXPECT_EQ(picture.read()->rgb, whole.colour.rgb);
-  EXPECT_EQ(picture.rays(), whole.rays);
+  const RenderedImage whole = taken_as_is(camera, options);
+  EXPECT_EQ(image.read()->rgb, whole.colour.rgb);
+  EXPECT_EQ(image.rays(), whole.rays);
   EXPECT_GT(impostor_bytes(), 0U);
 }
 

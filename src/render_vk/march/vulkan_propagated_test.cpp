@@ -41,10 +41,10 @@ TEST_F(VulkanPropagated, AClosedRoomIsBlackAndOpensWithAnEdit) {
   Cave cave;
   const Camera camera = towards(DVec3(Cave::kRoom.min) + 0.9, DVec3(Cave::kRoom.max) - 0.9, 1.4);
   const RenderOptions options = propagated(64, 48);
-  const Picture dark = taken(cave.scene, camera, options);
+  const RenderedImage dark = taken(cave.scene, camera, options);
   EXPECT_EQ(*std::max_element(dark.colour.rgb.begin(), dark.colour.rgb.end()), 0);
   cave.scene.edit(cave.grid_handle).grid.fill_box({{18, -8, -14}, {19, -7, -9}}, kAir);
-  const Picture lit = taken(cave.scene, camera, options);
+  const RenderedImage lit = taken(cave.scene, camera, options);
   EXPECT_GT(*std::max_element(lit.colour.rgb.begin(), lit.colour.rgb.end()), 0);
   expect_equal(lit, render_test::taken(cave.scene, camera, options), "opened_room");
 }
@@ -54,9 +54,9 @@ TEST_F(VulkanPropagated, ShowsTheLightThatItIsGiven) {
   const RenderOptions options = propagated(64, 48);
   SceneLight light;
   renderer_->use_light(&light);
-  const Picture open = taken(cave.scene, Cave::inside(), options);
+  const RenderedImage open = taken(cave.scene, Cave::inside(), options);
   light.update(cave.scene);
-  const Picture lit = taken(cave.scene, Cave::inside(), options);
+  const RenderedImage lit = taken(cave.scene, Cave::inside(), options);
   EXPECT_NE(open.colour.rgb, lit.colour.rgb);
   expect_equal(lit, render_test::taken(cave.scene, Cave::inside(), options), "lent_light");
   renderer_->use_light(nullptr);
@@ -86,7 +86,7 @@ TEST_F(VulkanPropagated, EveryLevelHasTheColourThatTheProcessorGivesIt) {
   place(scene, std::move(grid));
   const RenderOptions options = propagated(192, 192);
   Camera camera = from_above(9.0, 3.9, 7.0, 20.0);
-  const Picture cpu = render_test::taken(scene, camera, options);
+  const RenderedImage cpu = render_test::taken(scene, camera, options);
   expect_equal(taken(scene, camera, options), cpu, "levels");
   std::array<std::set<int>, 3> seen;
   for (std::size_t i = 0; i < cpu.colour.rgb.size(); ++i) seen.at(i % 3).insert(cpu.colour.rgb[i]);

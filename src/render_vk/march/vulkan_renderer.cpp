@@ -3,8 +3,8 @@
 
 #include <utility>
 
-#include "render/picture_request.h"
-#include "render_vk/march/picture_pass.h"
+#include "render/image_request.h"
+#include "render_vk/march/image_pass.h"
 #include "render_vk/march/renderer_impl.h"
 
 namespace quoin {
@@ -24,7 +24,7 @@ Result<vulkan::Subject> vulkan::Subject::of(RendererImpl& impl, const Camera& ca
                                             Threads threads) {
   Subject subject(impl.scene.placement());
   if (!options.detail.policy || impl.voxels == nullptr) return subject;
-  const PictureDetail detail = impl.chooser->choose(*impl.voxels, impl.instances, camera, options);
+  const ImageDetail detail = impl.chooser->choose(*impl.voxels, impl.instances, camera, options);
   auto placed = impl.detail.place(impl.scene, *impl.voxels, detail, camera, options, threads);
   if (!placed) return placed.error();
   subject.detailed_ = std::move(*placed);
@@ -84,23 +84,23 @@ std::uint64_t VulkanRenderer::uploaded_bytes() const {
   return impl_->uploaded;
 }
 
-Result<Picture> VulkanRenderer::render(const Camera& camera, const RenderOptions& options, Threads threads,
-                                       const Progress& progress) {
+Result<RenderedImage> VulkanRenderer::render(const Camera& camera, const RenderOptions& options, Threads threads,
+                                             const Progress& progress) {
   if (const Status status = check_request(camera, options); !status) return status.error();
   const auto subject = vulkan::Subject::of(*impl_, camera, options, threads);
   if (!subject) return subject.error();
   auto light = impl_->light_tables(options.light, threads);
   if (!light) return light.error();
-  vulkan::PicturePass pass(*impl_->device, impl_->memory, *impl_->pipelines, impl_->scene, subject->placement(),
-                           std::move(*light), impl_->voxels);
+  vulkan::ImagePass pass(*impl_->device, impl_->memory, *impl_->pipelines, impl_->scene, subject->placement(),
+                         std::move(*light), impl_->voxels);
   return pass.render(camera, options, progress);
 }
 
-Status VulkanRenderer::draw(VulkanPicture& picture, const Camera& camera, const RenderOptions& options,
+Status VulkanRenderer::draw(VulkanImage& image, const Camera& camera, const RenderOptions& options,
                             Accumulation accumulation, Threads threads, const Progress& progress) {
   constexpr int kMaxSamples = 4096;
   if (Status status = check_request(camera, options); !status) return status;
-  vulkan::PictureImpl& target = picture.impl();
+  vulkan::ImageImpl& target = image.impl();
   if (target.device != impl_->device.get()) {
     return make_error(ErrorCode::InvalidArgument, "vulkan: the image belongs to another renderer");
   }
@@ -119,8 +119,8 @@ Status VulkanRenderer::draw(VulkanPicture& picture, const Camera& camera, const 
   if (!subject) return subject.error();
   auto light = impl_->light_tables(options.light, threads);
   if (!light) return light.error();
-  vulkan::PicturePass pass(*impl_->device, impl_->memory, *impl_->pipelines, impl_->scene, subject->placement(),
-                           std::move(*light), impl_->voxels);
+  vulkan::ImagePass pass(*impl_->device, impl_->memory, *impl_->pipelines, impl_->scene, subject->placement(),
+                         std::move(*light), impl_->voxels);
   return pass.draw(target, camera, options, progress);
 }
 

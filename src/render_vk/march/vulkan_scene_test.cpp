@@ -260,9 +260,9 @@ TEST_F(VulkanScene, MorePanesThanThereIsRoomFor) {
   for (int x = 4; x < 78; x += 2) grid.fill_box({{x, 1, 2}, {x + 1, 15, 19}}, x % 4 == 0 ? clear : other);
   place(scene, std::move(grid));
   // A second grid whose panes touch the first grid's panes.
-  Grid beside;
-  for (int x = 4; x < 40; x += 2) beside.fill_box({{x + 1, 1, 2}, {x + 2, 8, 19}}, x % 4 == 0 ? clear : other);
-  place(scene, std::move(beside));
+  Grid adjacent;
+  for (int x = 4; x < 40; x += 2) adjacent.fill_box({{x + 1, 1, 2}, {x + 2, 8, 19}}, x % 4 == 0 ? clear : other);
+  place(scene, std::move(adjacent));
   RenderOptions options = sized(96, 72);
   options.light.sun = {1.0, 0.25, 0.1};
   compare(scene, towards({95, 9, 12}, {0, 7, 10}), options, "panes");

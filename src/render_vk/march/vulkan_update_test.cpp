@@ -19,12 +19,12 @@ class VulkanUpdate : public vulkan_test::VulkanTest {
   /// Expects the updated image to match the CPU renderer's, and to equal a fresh renderer's image byte for byte.
   void expect_current(const Scene& scene, const Camera& camera, const std::string& name) {
     const RenderOptions options = sized(64, 48);
-    const Picture updated = taken_as_is(camera, options);
+    const RenderedImage updated = taken_as_is(camera, options);
     expect_equal(updated, render_test::taken(scene, camera, options), name);
     auto fresh = VulkanRenderer::create(test_options());
     if (!fresh) return;
     ASSERT_TRUE(fresh->update(scene));
-    const Picture anew = fresh->render(camera, options).value();
+    const RenderedImage anew = fresh->render(camera, options).value();
     EXPECT_EQ(updated.colour.rgb, anew.colour.rgb) << name;
     EXPECT_EQ(updated.depth.values, anew.depth.values) << name;
   }

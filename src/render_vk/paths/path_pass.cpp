@@ -72,8 +72,8 @@ int tile_edge(const Device& device, int samples, bool has_glass) {
 
 }  // namespace
 
-PathPass::PathPass(RendererImpl& renderer, PathPictureImpl& picture)
-    : renderer_(&renderer), picture_(&picture), places_(renderer.memory, kDoing) {}
+PathPass::PathPass(RendererImpl& renderer, PathImageImpl& image)
+    : renderer_(&renderer), image_(&image), places_(renderer.memory, kDoing) {}
 
 Status PathPass::put_lamps(DVec3 view_origin, ShaderPathFrame& paths) {
   const path::PathLamps* const lamps = renderer_->paths->tables.lamps();
@@ -86,7 +86,7 @@ Status PathPass::put_lamps(DVec3 view_origin, ShaderPathFrame& paths) {
 }
 
 Status PathPass::put_tile_buffers(int samples, ShaderFrame& frame, ShaderPathFrame& paths) {
-  const PathOptions& options = picture_->options;
+  const PathOptions& options = image_->options;
   const bool has_glass = renderer_->scene.placement().has_transparent;
   tile_edge_ = tile_edge(*renderer_->device, samples, has_glass);
   const auto pixels = static_cast<std::size_t>(std::min(tile_edge_, options.width)) *
@@ -98,16 +98,16 @@ Status PathPass::put_tile_buffers(int samples, ShaderFrame& frame, ShaderPathFra
     *buffer = std::move(*made);
   }
   frame.counters = counters_.address();
-  paths.sums = picture_->sums.address();
-  if (picture_->parts.size() > 0) paths.parts = picture_->parts.address();
+  paths.sums = image_->sums.address();
+  if (image_->parts.size() > 0) paths.parts = image_->parts.address();
   Status done = places_.reserve(pixels * kPathStateBytes, paths.states);
   if (done && has_glass) done = places_.reserve(pixels * kBodies * kBodyBytes, frame.bodies);
   return done;
 }
 
 Status PathPass::put_frame(int samples) {
-  const PathOptions& options = picture_->options;
-  const Camera& camera = picture_->camera;
+  const PathOptions& options = image_->options;
+  const Camera& camera = image_->camera;
   RenderOptions plain;
   plain.width = options.width;
   plain.height = options.height;
@@ -148,7 +148,7 @@ Status PathPass::take(const Tile& tile, int first, int count, const Progress& pr
   push.size_y = tile.height;
   push.first = static_cast<std::uint32_t>(first);
   push.count = static_cast<std::uint32_t>(count);
-  push.width = static_cast<std::uint32_t>(picture_->options.width);
+  push.width = static_cast<std::uint32_t>(image_->options.width);
   push.begins = 1;
   const Api& api = renderer_->device->api();
   for (;;) {
@@ -171,7 +171,7 @@ Status PathPass::take(const Tile& tile, int first, int count, const Progress& pr
 }
 
 Status PathPass::add_samples(int samples, const Progress& progress) {
-  const PathOptions& options = picture_->options;
+  const PathOptions& options = image_->options;
   std::vector<Tile> tiles;
   for (std::int32_t y = 0; y < options.height; y += tile_edge_) {
     for (std::int32_t x = 0; x < options.width; x += tile_edge_) {
@@ -183,7 +183,7 @@ Status PathPass::add_samples(int samples, const Progress& progress) {
   for (const Tile& tile : tiles) {
     for (int first = 0; first < samples; first += kSamplesAtOnce) {
       const int some = std::min(kSamplesAtOnce, samples - first);
-      if (Status done = take(tile, picture_->samples + first, some, progress, count / all); !done) return done;
+      if (Status done = take(tile, image_->samples + first, some, progress, count / all); !done) return done;
       count += some;
     }
   }
@@ -202,22 +202,22 @@ Status PathPass::draw(int samples, const Progress& progress) {
   if (done) done = add_samples(samples, progress);
   // Incomplete sums, with tiles missing, are discarded.
   if (!done) {
-    picture_->samples = 0;
+    image_->samples = 0;
     return done;
   }
   ShaderCounters counters;
   std::memcpy(&counters, results_.mapped(), sizeof counters);
-  picture_->samples += samples;
-  picture_->rays += counters.rays();
+  image_->samples += samples;
+  image_->rays += counters.rays();
   return done;
 }
 
 }  // namespace vulkan
 
-Status VulkanRenderer::draw_paths(VulkanPathPicture& picture, const Camera& camera, const PathOptions& options,
+Status VulkanRenderer::draw_paths(VulkanPathImage& image, const Camera& camera, const PathOptions& options,
                                   Accumulation accumulation, const Progress& progress) {
   if (Status status = path::check(camera, options); !status) return status;
-  vulkan::PathPictureImpl& target = picture.impl();
+  vulkan::PathImageImpl& target = image.impl();
   if (target.device != impl_->device.get()) {
     return make_error(ErrorCode::InvalidArgument, "vulkan: the image belongs to another renderer");
   }
@@ -245,13 +245,13 @@ Status VulkanRenderer::draw_paths(VulkanPathPicture& picture, const Camera& came
   return pass.draw(options.samples, progress);
 }
 
-Result<PathPicture> VulkanRenderer::render_paths(const Camera& camera, const PathOptions& options, Threads threads,
-                                                 const Progress& progress) {
-  VulkanPathPicture picture(*this);
-  if (Status done = draw_paths(picture, camera, options, Accumulation::Restart, progress); !done) {
+Result<PathImage> VulkanRenderer::render_paths(const Camera& camera, const PathOptions& options, Threads threads,
+                                               const Progress& progress) {
+  VulkanPathImage image(*this);
+  if (Status done = draw_paths(image, camera, options, Accumulation::Restart, progress); !done) {
     return done.error();
   }
-  return picture.read(threads);
+  return image.read(threads);
 }
 
 }  // namespace quoin

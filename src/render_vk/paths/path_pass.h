@@ -8,7 +8,7 @@
 #include <quoin/core/progress.h>
 
 #include "render_vk/march/renderer_impl.h"
-#include "render_vk/paths/device_path_picture.h"
+#include "render_vk/paths/device_path_image.h"
 #include "render_vk/paths/device_paths.h"
 #include "render_vk/paths/path_pipelines.h"
 
@@ -28,7 +28,7 @@ struct PathScene {
 ///   tile: begin -> [ some steps of every pixel's path; the next sample's path starts when one ends ] until all end
 class PathPass {
  public:
-  PathPass(RendererImpl& renderer, PathPictureImpl& picture);
+  PathPass(RendererImpl& renderer, PathImageImpl& image);
   PathPass(const PathPass&) = delete;
   PathPass& operator=(const PathPass&) = delete;
 
@@ -46,7 +46,7 @@ class PathPass {
   Status take(const Tile& tile, int first, int count, const Progress& progress, double done_before);
 
   RendererImpl* renderer_;
-  PathPictureImpl* picture_;
+  PathImageImpl* image_;
   Places places_;
   std::uint64_t frame_address_ = 0;
   std::int32_t tile_edge_ = 0;

@@ -8,7 +8,7 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include <quoin/io/picture_files.h>
+#include <quoin/io/image_files.h>
 #include <quoin/render/path_tracer.h>
 
 #include "render/path/town_for_tests.h"
@@ -47,7 +47,7 @@ bool is_near(float a, float b, float relative, float absolute) {
   return a == b || std::abs(a - b) <= relative * std::max(std::abs(a), std::abs(b)) + absolute;
 }
 
-PathDifferences path_differences(const PathPicture& a, const PathPicture& b) {
+PathDifferences path_differences(const PathImage& a, const PathImage& b) {
   PathDifferences found;
   EXPECT_EQ(a.radiance.size(), b.radiance.size());
   if (a.radiance.size() != b.radiance.size()) return found;
@@ -73,18 +73,18 @@ PathDifferences path_differences(const PathPicture& a, const PathPicture& b) {
 
 class VulkanPaths : public VulkanTest {
  protected:
-  PathPicture drawn(const Scene& scene, const Camera& camera, const PathOptions& options) {
+  PathImage drawn(const Scene& scene, const Camera& camera, const PathOptions& options) {
     const Status updated = renderer_->update(scene);
     EXPECT_TRUE(updated) << to_string(updated.error());
-    auto picture = renderer_->render_paths(camera, options);
-    EXPECT_TRUE(picture) << to_string(picture.error());
-    return picture ? std::move(*picture) : PathPicture{};
+    auto image = renderer_->render_paths(camera, options);
+    EXPECT_TRUE(image) << to_string(image.error());
+    return image ? std::move(*image) : PathImage{};
   }
 
   // `share`: the share of pixels in which single precision may change paths.
   void expect_same_light(const Scene& scene, const Camera& camera, const PathOptions& options, const std::string& name,
                          double share = 0.002) {
-    const PathPicture device = drawn(scene, camera, options);
+    const PathImage device = drawn(scene, camera, options);
     auto cpu = PathTracer(scene).render(camera, options);
     ASSERT_TRUE(cpu);
     const PathDifferences found = path_differences(device, *cpu);
@@ -173,7 +173,7 @@ TEST_F(VulkanPaths, TakeOutTheProcessorsNoise) {
 TEST_F(VulkanPaths, ConvergeToTheCpuImage) {
   const PathOptions options = small(48);
   const Scene scene = town();
-  const PathPicture device = drawn(scene, of_town(), options);
+  const PathImage device = drawn(scene, of_town(), options);
   const auto cpu = PathTracer(scene).render(of_town(), options);
   ASSERT_TRUE(cpu);
   EXPECT_NEAR(path_differences(device, *cpu).light, 1.0, 0.005);
@@ -189,9 +189,9 @@ TEST_F(VulkanPaths, ConvergeToTheCpuImage) {
         of_device += DVec3(device.radiance[at]);
         of_cpu += DVec3(cpu->radiance[at]);
       }
-      const double apart = glm::length(of_device - of_cpu) / glm::length(of_cpu);
-      EXPECT_LT(apart, 0.15) << x << ' ' << y;
-      sum += apart * apart;
+      const double separate = glm::length(of_device - of_cpu) / glm::length(of_cpu);
+      EXPECT_LT(separate, 0.15) << x << ' ' << y;
+      sum += separate * separate;
       ++blocks;
     }
   }
@@ -257,26 +257,26 @@ TEST_F(VulkanPaths, EmptySceneShowsTheSky) {
   expect_same_light(Scene(), of_town(), small(), "nothing", 0.0);
 }
 
-TEST_F(VulkanPaths, AddSamplesToAPicture) {
+TEST_F(VulkanPaths, AddSamplesToAImage) {
   const Scene scene = town();
   ASSERT_TRUE(renderer_->update(scene));
-  VulkanPathPicture picture(*renderer_);
-  EXPECT_EQ(picture.samples(), 0);
-  EXPECT_EQ(picture.read().error().code, ErrorCode::InvalidArgument);
+  VulkanPathImage image(*renderer_);
+  EXPECT_EQ(image.samples(), 0);
+  EXPECT_EQ(image.read().error().code, ErrorCode::InvalidArgument);
   PathOptions options = small(3);
-  ASSERT_TRUE(renderer_->draw_paths(picture, of_town(), options, Accumulation::Restart));
+  ASSERT_TRUE(renderer_->draw_paths(image, of_town(), options, Accumulation::Restart));
   options.samples = 5;
-  ASSERT_TRUE(renderer_->draw_paths(picture, of_town(), options, Accumulation::Continue));
-  EXPECT_EQ(picture.samples(), 8);
-  EXPECT_EQ(picture.width(), 64);
-  EXPECT_GE(picture.bytes(), std::size_t{64} * 48 * 112);
-  const auto in_parts = picture.read();
+  ASSERT_TRUE(renderer_->draw_paths(image, of_town(), options, Accumulation::Continue));
+  EXPECT_EQ(image.samples(), 8);
+  EXPECT_EQ(image.width(), 64);
+  EXPECT_GE(image.bytes(), std::size_t{64} * 48 * 112);
+  const auto in_parts = image.read();
   const auto at_once = renderer_->render_paths(of_town(), small(8));
   ASSERT_TRUE(in_parts && at_once);
   EXPECT_EQ(in_parts->radiance, at_once->radiance);
   EXPECT_EQ(in_parts->rays, at_once->rays);
-  ASSERT_TRUE(renderer_->draw_paths(picture, of_town(), small(1), Accumulation::Restart));
-  EXPECT_EQ(picture.samples(), 1);
+  ASSERT_TRUE(renderer_->draw_paths(image, of_town(), small(1), Accumulation::Restart));
+  EXPECT_EQ(image.samples(), 1);
 }
 
 TEST_F(VulkanPaths, FollowEdits) {
@@ -332,15 +332,15 @@ TEST_F(VulkanPaths, RejectTheSameInputAsTheCpu) {
   options = small();
   options.sun = DVec3(NAN);
   EXPECT_EQ(renderer_->render_paths(of_town(), options).error().code, ErrorCode::InvalidArgument);
-  VulkanPathPicture picture(*renderer_);
-  ASSERT_TRUE(renderer_->draw_paths(picture, of_town(), small(1), Accumulation::Restart));
+  VulkanPathImage image(*renderer_);
+  ASSERT_TRUE(renderer_->draw_paths(image, of_town(), small(1), Accumulation::Restart));
   options = small(65'536);
-  EXPECT_EQ(renderer_->draw_paths(picture, of_town(), options, Accumulation::Continue).error().code,
+  EXPECT_EQ(renderer_->draw_paths(image, of_town(), options, Accumulation::Continue).error().code,
             ErrorCode::LimitExceeded);
   const auto stop = [](double) { return false; };
-  EXPECT_EQ(renderer_->draw_paths(picture, of_town(), small(1), Accumulation::Continue, stop).error().code,
+  EXPECT_EQ(renderer_->draw_paths(image, of_town(), small(1), Accumulation::Continue, stop).error().code,
             ErrorCode::Cancelled);
-  EXPECT_EQ(picture.samples(), 0);
+  EXPECT_EQ(image.samples(), 0);
 }
 
 }  // namespace

@@ -45,8 +45,8 @@ Status LevelMeshes::put(MeshKey key, const PlacedGrid& placed, const VoxelRegist
   if (known == levels_.end()) {
     known = levels_.emplace(key, Level{std::make_unique<GridSurfaces>(key.grid, key.content, style), 0}).first;
   }
-  if (known->second.last_use == picture_) return {};
-  known->second.last_use = picture_;
+  if (known->second.last_use == image_) return {};
+  known->second.last_use = image_;
   try {
     Status done = put_updates(key, known->second, placed, types, threads);
     if (!done) drop(known);
@@ -71,7 +71,7 @@ void LevelMeshes::drop_unused(std::uint64_t max_bytes) {
     const MeshStore::StoredGrid* stored = store_->find(entry.first);
     return stored == nullptr ? 0 : stored->bytes;
   };
-  drop_oldest(levels_, picture_, max_bytes, bytes_of, [&](const auto& entry) { store_->drop(entry.first); });
+  drop_oldest(levels_, image_, max_bytes, bytes_of, [&](const auto& entry) { store_->drop(entry.first); });
 }
 
 }  // namespace quoin::vulkan

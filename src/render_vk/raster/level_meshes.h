@@ -26,7 +26,7 @@ class LevelMeshes {
   void clear();
 
   /// Begins an image.
-  void begin() { ++picture_; }
+  void begin() { ++image_; }
   /// Puts the meshes of a grid halved `key.level` times into the store, placed as `placed`. Called once per image.
   /// Errors: as MeshStore::put; also throws bad_alloc. The level is then empty.
   [[nodiscard]] Status put(MeshKey key, const PlacedGrid& placed, const VoxelRegistry& types, Threads threads);
@@ -45,7 +45,7 @@ class LevelMeshes {
   MeshStore* store_;
   std::map<MeshKey, Level> levels_;
   ChangeCursor followed_types_;
-  std::uint64_t picture_ = 0;
+  std::uint64_t image_ = 0;
 };
 
 }  // namespace quoin::vulkan

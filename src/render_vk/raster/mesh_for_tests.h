@@ -10,8 +10,8 @@
 #include <quoin/grid/density_grid.h>
 #include <quoin/mesh/blocky.h>
 #include <quoin/mesh/smooth.h>
+#include <quoin/render_vk/vulkan_image.h>
 #include <quoin/render_vk/vulkan_mesh_renderer.h>
-#include <quoin/render_vk/vulkan_picture.h>
 
 #include "core/coordinates/chunk_order.h"
 #include "mesh/surface/material.h"
@@ -81,8 +81,8 @@ inline std::vector<SurfaceUpdate> live_surfaces(const Scene& scene, SurfaceStyle
   return live.take();
 }
 
-inline MeshPictureOptions mesh_options(const RenderOptions& options) {
-  MeshPictureOptions mesh;
+inline MeshImageOptions mesh_options(const RenderOptions& options) {
+  MeshImageOptions mesh;
   mesh.width = options.width;
   mesh.height = options.height;
   mesh.samples = 1;
@@ -128,24 +128,24 @@ class VulkanMeshTest : public VulkanTest {
     const Status done = meshes_->put(surfaces);
     EXPECT_TRUE(done) << to_string(done.error());
   }
-  Image drawn(const Camera& camera, const MeshPictureOptions& options) {
-    VulkanPicture picture(*renderer_);
-    const Status done = meshes_->draw(picture, camera, options);
+  Image drawn(const Camera& camera, const MeshImageOptions& options) {
+    VulkanImage rendered(*renderer_);
+    const Status done = meshes_->draw(rendered, camera, options);
     EXPECT_TRUE(done) << to_string(done.error());
-    auto image = picture.read();
+    auto image = rendered.read();
     EXPECT_TRUE(image) << to_string(image.error());
     return image ? std::move(*image) : Image{};
   }
 
-  /// Compares the scene's blocky meshes with the processor's picture.
+  /// Compares the scene's blocky meshes with the processor's rendered.
   void compare(const Scene& scene, const Camera& camera, const RenderOptions& options, const std::string& name) {
     meshes_->clear();
     put(scene, blocky_surfaces(scene));
     expect_like(drawn(camera, mesh_options(options)), render_test::taken(scene, camera, options), name);
   }
   /// `per_mille`: of the pixels that may differ elsewhere than at silhouettes.
-  void expect_like(Image image, const Picture& cpu, const std::string& name, int per_mille = 1) {
-    Picture mesh;
+  void expect_like(Image image, const RenderedImage& cpu, const std::string& name, int per_mille = 1) {
+    RenderedImage mesh;
     mesh.colour = std::move(image);
     mesh.depth = cpu.depth;
     const Differences found = differences(mesh, cpu);

@@ -80,7 +80,7 @@ struct FarDraw {
 
 /// The data for drawing one image, without memory addresses.
 struct MeshFrameData {
-  FrameData picture;  ///< the rays' content, and light
+  FrameData image;  ///< the rays' content, and light
   ShaderMeshFrame frame;
   ShaderMeshPush push;  ///< the constants shared by all draws
   ShaderMeshPush sky;
@@ -97,7 +97,7 @@ struct MeshFrameData {
   bool has_fields = false;     ///< among the placed content
   bool glass_by_rays = false;  ///< only the nearest glass of a pixel is drawn, including everything visible through it
 
-  [[nodiscard]] bool has(std::uint32_t flag) const { return (picture.frame.flags & flag) != 0; }
+  [[nodiscard]] bool has(std::uint32_t flag) const { return (image.frame.flags & flag) != 0; }
   /// Returns the number of triangles drawn.
   [[nodiscard]] std::int64_t triangles() const;
 };

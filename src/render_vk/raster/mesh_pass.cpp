@@ -127,16 +127,16 @@ Status MeshPass::put_frame(MeshFrameData& data) {
     std::size_t bytes;
     std::uint64_t* address;
   };
-  ShaderFrame& picture = data.picture.frame;
+  ShaderFrame& image = data.image.frame;
   const std::array<Part, 9> parts{{{&data.frame, sizeof data.frame, &data.push.frame},
                                    {data.instances.data(), bytes_of(data.instances), nullptr},
-                                   {&picture, sizeof picture, &data.frame.frame},
+                                   {&image, sizeof image, &data.frame.frame},
                                    {data.glass.data(), bytes_of(data.glass), &data.frame.draws},
                                    {data.order.data(), bytes_of(data.order), &data.frame.order},
-                                   {data.picture.placed.data(), bytes_of(data.picture.placed), &picture.placed},
-                                   {data.picture.tree.data(), bytes_of(data.picture.tree), &picture.tree},
-                                   {data.picture.leaves.data(), bytes_of(data.picture.leaves), &picture.leaves},
-                                   {data.lamps.data(), bytes_of(data.lamps), &picture.lamps}}};
+                                   {data.image.placed.data(), bytes_of(data.image.placed), &image.placed},
+                                   {data.image.tree.data(), bytes_of(data.image.tree), &image.tree},
+                                   {data.image.leaves.data(), bytes_of(data.image.leaves), &image.leaves},
+                                   {data.lamps.data(), bytes_of(data.lamps), &image.lamps}}};
   static_assert(sizeof(ShaderMeshFrame) % 16 == 0);
   std::array<std::uint64_t, parts.size()> offsets{};
   frame_bytes_ = 0;
@@ -281,7 +281,7 @@ void MeshPass::record(VkCommandBuffer commands, const MeshFrameData& data, const
   api.vkCmdSetScissor(commands, 0, 1, &all);
   for (const Step& step : steps) record_step(commands, data, step);
   api.vkCmdEndRenderPass(commands);
-  copy_picture(commands, colours);
+  copy_image(commands, colours);
 }
 
 void MeshPass::record_step(VkCommandBuffer commands, const MeshFrameData& data, const Step& step) const {
@@ -391,11 +391,11 @@ void MeshPass::push(VkCommandBuffer commands, const ShaderMeshPush& values) cons
                                     &values);
 }
 
-void MeshPass::copy_picture(VkCommandBuffer commands, const Buffer& colours) const {
+void MeshPass::copy_image(VkCommandBuffer commands, const Buffer& colours) const {
   VkBufferImageCopy region{};
   region.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1};
   region.imageExtent = {target_.size().width, target_.size().height, 1};
-  device_->api().vkCmdCopyImageToBuffer(commands, target_.picture(), VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL,
+  device_->api().vkCmdCopyImageToBuffer(commands, target_.image(), VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL,
                                         colours.handle(), 1, &region);
 }
 

@@ -50,7 +50,7 @@ class MeshPass {
   void bind_corners(VkCommandBuffer commands) const;
   void push(VkCommandBuffer commands, const ShaderMeshPush& values) const;
   void copy_frame(VkCommandBuffer commands) const;
-  void copy_picture(VkCommandBuffer commands, const Buffer& colours) const;
+  void copy_image(VkCommandBuffer commands, const Buffer& colours) const;
 
   Device* device_;
   DeviceMemory* memory_;

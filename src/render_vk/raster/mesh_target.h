@@ -58,7 +58,7 @@ class MeshTarget {
   [[nodiscard]] std::uint32_t samples() const { return samples_; }
   [[nodiscard]] VkFramebuffer framebuffer() const { return framebuffer_; }
   /// Returns the drawn image, with one sample per pixel.
-  [[nodiscard]] VkImage picture() const { return samples_ > 1 ? resolved_.image() : colour_.image(); }
+  [[nodiscard]] VkImage image() const { return samples_ > 1 ? resolved_.image() : colour_.image(); }
 
  private:
   void swap(MeshTarget& other) noexcept;

@@ -139,7 +139,7 @@ TEST_F(VulkanMeshDetail, SmallImpostorsHaveNoHoles) {
   }
 }
 
-TEST_F(VulkanMeshDetail, AllThreeInOnePicture) {
+TEST_F(VulkanMeshDetail, AllThreeInOneImage) {
   add_crowd(scene_, {add_blobs(scene_, 31), add_blobs(scene_, 32)}, 8, 260.0);
   make_opaque();
   RenderOptions options = in_detail(480, 270, 60);

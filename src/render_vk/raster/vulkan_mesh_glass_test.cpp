@@ -22,10 +22,10 @@ class VulkanMeshGlass : public vulkan_test::VulkanMeshTest {
  protected:
   /// Compares glass as single faces and glass by rays with the CPU's image: for panes of one voxel they are equal.
   void compare_both(const Scene& scene, const Camera& camera, const RenderOptions& options, const std::string& name) {
-    const Picture cpu = render_test::taken(scene, camera, options);
+    const RenderedImage cpu = render_test::taken(scene, camera, options);
     meshes_->clear();
     put(scene, blocky_surfaces(scene));
-    MeshPictureOptions meshes = mesh_options(options);
+    MeshImageOptions meshes = mesh_options(options);
     expect_like(drawn(camera, meshes), cpu, name + "_by_rays");
     meshes.glass_by_rays = false;
     expect_like(drawn(camera, meshes), cpu, name);
@@ -120,10 +120,10 @@ TEST_F(VulkanMeshGlass, MatchesTheCpuExceptThroughGlass) {
   const Camera camera = golden::camera_for(view);
   const RenderOptions options = without_shadows(golden::options_for(view));
   put(scene, blocky_surfaces(scene));
-  MeshPictureOptions by_faces = mesh_options(options);
+  MeshImageOptions by_faces = mesh_options(options);
   by_faces.glass_by_rays = false;
   const Image image = drawn(camera, by_faces);
-  const Picture cpu = render_test::taken(scene, camera, options);
+  const RenderedImage cpu = render_test::taken(scene, camera, options);
   // Gives water another colour to identify it.
   for (std::size_t type = 1; type < scene.types.size(); ++type) {
     VoxelProperties properties = scene.types[static_cast<VoxelType>(type)];
@@ -131,14 +131,14 @@ TEST_F(VulkanMeshGlass, MatchesTheCpuExceptThroughGlass) {
     properties.colour = {255, 0, 255, properties.colour.a};
     scene.types.replace(static_cast<VoxelType>(type), properties);
   }
-  const Picture marked = render_test::taken(scene, camera, options);
+  const RenderedImage marked = render_test::taken(scene, camera, options);
   int waters = 0;
-  Picture mesh;
+  RenderedImage mesh;
   mesh.colour = image;
   mesh.depth = cpu.depth;
   for (std::size_t i = 0; i < cpu.colour.rgb.size(); i += 3) {
-    const auto at = [&](const Picture& picture) {
-      return std::vector(&picture.colour.rgb[i], &picture.colour.rgb[i] + 3);
+    const auto at = [&](const RenderedImage& rendered) {
+      return std::vector(&rendered.colour.rgb[i], &rendered.colour.rgb[i] + 3);
     };
     if (at(cpu) == at(marked)) continue;
     ++waters;
@@ -153,7 +153,7 @@ TEST_F(VulkanMeshGlass, MatchesTheCpuExceptThroughGlass) {
 
 TEST_F(VulkanMeshGlass, MoreQuadsThanAreSortedAreDrawnByChunk) {
   const Scene shown = panes({&Types::red, &Types::blue, &Types::glowing});
-  MeshPictureOptions options = mesh_options(without_shadows(sized(120, 120)));
+  MeshImageOptions options = mesh_options(without_shadows(sized(120, 120)));
   options.glass_by_rays = false;
   const Camera camera = straight({20.03, 20.02, 500}, 44);
   std::vector<SurfaceUpdate> surfaces = blocky_surfaces(shown);

@@ -88,7 +88,7 @@ TEST_F(VulkanMeshLight, FarFromTheCameraTheyAreTheSame) {
   compare(huts({0, 0, 0}), towards(eye, {0, 4, 0}, 80.0 / 780'000), options, "huts_telephoto");
 }
 
-TEST_F(VulkanMeshLight, OrthographicPicturesAreTheSame) {
+TEST_F(VulkanMeshLight, OrthographicImagesAreTheSame) {
   const RenderOptions options = without_shadows(sized(160, 160));
   compare(huts({0, 0, 0}), from_above(0.013, 60, 0.017, 90), options, "huts_above");
   Camera camera = towards({50, 40, 60}, {0, 4, 0});
@@ -149,7 +149,7 @@ TEST_F(VulkanMeshLight, SmoothSurfacesHaveTheReferenceLight) {
   put(scene, vulkan_test::smooth_surfaces(grid, field, scene.types));
   // Looks at the middle of a flat face, which is fully open.
   const Camera camera = from_above(30, 50, 30, 8);
-  MeshPictureOptions options = mesh_options(without_shadows(sized(8, 8)));
+  MeshImageOptions options = mesh_options(without_shadows(sized(8, 8)));
   const Vec3 colour = render_test::linear({200, 120, 60});
   const auto up = static_cast<float>(glm::normalize(options.light.sun).y);
   const auto expect = [&](Vec3 light, const char* what) {
@@ -172,7 +172,7 @@ TEST_F(VulkanMeshLight, SmoothSurfacesHaveTheReferenceLight) {
 TEST_F(VulkanMeshLight, MergedQuadsLookLikeSingleFaces) {
   const Scene scene = huts({0, 0, 0});
   const Camera camera = towards({10, 40, 70}, {0, 4, 0});
-  const MeshPictureOptions options = mesh_options(without_shadows(sized(320, 180)));
+  const MeshImageOptions options = mesh_options(without_shadows(sized(320, 180)));
   put(scene, blocky_surfaces(scene, false));
   const std::int64_t faces = meshes_->stats().triangles;
   const Image single = drawn(camera, options);
@@ -191,9 +191,9 @@ TEST_F(VulkanMeshLight, ScenesWithNothingShowTheSky) {
   for (const auto projection : {Camera::Projection::Perspective, Camera::Projection::Orthographic}) {
     camera.projection = projection;
     camera.view_height = 30;
-    Picture mesh;
+    RenderedImage mesh;
     mesh.colour = drawn(camera, mesh_options(options));
-    const Picture cpu = render_test::taken(scene, camera, options);
+    const RenderedImage cpu = render_test::taken(scene, camera, options);
     mesh.depth = cpu.depth;
     EXPECT_EQ(vulkan_test::differences(mesh, cpu).pixels, 0);
   }
@@ -209,7 +209,7 @@ TEST_F(VulkanMeshLight, ValuesAreShownAsTheyAre) {
   put(scene, blocky_surfaces(scene));
   // From above, 20 pixels per voxel; x = 5 to 6 is one step lower and dark along its left side.
   const Camera camera = from_above(5, 10, 5, 10);
-  MeshPictureOptions options = mesh_options(sized(200, 200));
+  MeshImageOptions options = mesh_options(sized(200, 200));
   options.light.shading = Shading::Normals;
   EXPECT_LE(glm::length(byte_at(drawn(camera, options), 150, 100) - Vec3(127.5F, 255.0F, 127.5F)), 2.0F);
   options.light.shading = Shading::Occlusion;

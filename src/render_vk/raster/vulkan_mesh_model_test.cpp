@@ -17,7 +17,7 @@ using vulkan_test::smooth_surfaces;
 
 class VulkanMeshModel : public vulkan_test::VulkanMeshTest {
  protected:
-  Image shown(const Camera& camera, const MeshPictureOptions& options, const std::string& name) {
+  Image shown(const Camera& camera, const MeshImageOptions& options, const std::string& name) {
     Image image = drawn(camera, options);
     if (std::getenv("QUOIN_WRITE_VULKAN") != nullptr) {
       EXPECT_TRUE(write_png(image, QUOIN_BINARY_DIR "/mesh_model_" + name + ".png"));
@@ -25,7 +25,7 @@ class VulkanMeshModel : public vulkan_test::VulkanMeshTest {
     return image;
   }
   /// Each method gives a different image.
-  void show_all(const Camera& camera, MeshPictureOptions options, const std::string& name) {
+  void show_all(const Camera& camera, MeshImageOptions options, const std::string& name) {
     std::vector<Image> images = {shown(camera, options, name + "_lit")};
     options.wireframe = Wireframe::Over;
     images.push_back(shown(camera, options, name + "_edges_over"));
@@ -55,7 +55,7 @@ TEST_F(VulkanMeshModel, IsDrawnInEveryWay) {
   const Camera camera = frame_scene(scene, View::Iso, 640.0 / 400.0);
   compare(scene, camera, options, "model");
 
-  MeshPictureOptions ways = mesh_options(options);
+  MeshImageOptions ways = mesh_options(options);
   ways.samples = 4;
   show_all(camera, ways, "blocky");
   meshes_->clear();

@@ -66,7 +66,7 @@ TEST_F(VulkanMeshPropagated, SmoothSurfacesAreLitAsTheFieldsThatTheyAreOf) {
   RenderOptions options = propagated(160, 120, OcclusionMode::Vertex);
   options.light.occlusion_mode = OcclusionMode::Off;
   const Image mesh = drawn(camera, mesh_options(options));
-  const Picture cpu = render_test::taken(scene, camera, options);
+  const RenderedImage cpu = render_test::taken(scene, camera, options);
   int different = 0;
   for (std::size_t i = 0; i < mesh.rgb.size(); ++i) different += std::abs(mesh.rgb[i] - cpu.colour.rgb[i]) > 24;
   EXPECT_LE(different, static_cast<int>(mesh.rgb.size()) / 50);

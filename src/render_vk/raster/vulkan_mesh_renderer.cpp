@@ -9,8 +9,8 @@
 
 #include "light/daylight.h"
 #include "light/light_model.h"
-#include "render/picture_request.h"
-#include "render_vk/march/device_picture.h"
+#include "render/image_request.h"
+#include "render_vk/march/device_image.h"
 #include "render_vk/march/renderer_impl.h"
 #include "render_vk/raster/level_meshes.h"
 #include "render_vk/raster/mesh_pass.h"
@@ -26,7 +26,7 @@ namespace {
 // Beyond this, the least recently drawn meshes of halved grids are dropped.
 constexpr std::size_t kMaxLevelBytes = std::size_t{256} << 20;
 
-RenderOptions request_of(const MeshPictureOptions& options) {
+RenderOptions request_of(const MeshImageOptions& options) {
   RenderOptions request;
   request.width = options.width;
   request.height = options.height;
@@ -35,7 +35,7 @@ RenderOptions request_of(const MeshPictureOptions& options) {
   return request;
 }
 
-Status check(const Camera& camera, const MeshPictureOptions& options) {
+Status check(const Camera& camera, const MeshImageOptions& options) {
   constexpr std::array kSamples = {1, 2, 4, 8};
   if (Status right = check(camera, request_of(options)); !right) return right;
   if (std::find(kSamples.begin(), kSamples.end(), options.samples) == kSamples.end()) {
@@ -90,13 +90,13 @@ struct VulkanMeshRenderer::Impl {
 
   void place(const Scene& of_scene, InstanceFilter filter);
   Status put_surfaces(const VoxelRegistry& types);
-  [[nodiscard]] Status check_request(const vulkan::PictureImpl& target, const Camera& camera,
-                                     const MeshPictureOptions& options) const;
+  [[nodiscard]] Status check_request(const vulkan::ImageImpl& target, const Camera& camera,
+                                     const MeshImageOptions& options) const;
   [[nodiscard]] Result<std::vector<vulkan::MeshInstance>> detailed(const vulkan::Placement& placement, Threads threads);
-  Status put_picture(const vulkan::Placement& placement, const Camera& camera, const RenderOptions& request,
-                     Threads threads, vulkan::MeshFrameData& data);
-  [[nodiscard]] bool has_glass_by_rays(const MeshPictureOptions& options) const;
-  [[nodiscard]] Result<vulkan::MeshFrameData> make_frame(const Camera& camera, const MeshPictureOptions& options,
+  Status put_image(const vulkan::Placement& placement, const Camera& camera, const RenderOptions& request,
+                   Threads threads, vulkan::MeshFrameData& data);
+  [[nodiscard]] bool has_glass_by_rays(const MeshImageOptions& options) const;
+  [[nodiscard]] Result<vulkan::MeshFrameData> make_frame(const Camera& camera, const MeshImageOptions& options,
                                                          vulkan::MeshLight& light, Threads threads);
 
   vulkan::RendererImpl* renderer;
@@ -134,13 +134,14 @@ Status VulkanMeshRenderer::update(const Scene& scene, InstanceFilter filter) {
 
 void VulkanMeshRenderer::Impl::place(const Scene& of_scene, InstanceFilter filter) {
   const ChangeCursor before = std::exchange(at_update, of_scene.cursor());
-  if (scene != &of_scene || !before.is_beside(at_update)) levels.clear();
+  if (scene != &of_scene || !before.shares_container_with(at_update)) levels.clear();
   scene = &of_scene;
   shown = filter;
   instances.clear();
   scene->instances().for_each([&](InstanceHandle handle, const Instance& instance) {
     const SceneGrid* grid = scene->grids().find(instance.grid);
-    if (grid == nullptr || !passes(filter, of_scene, instance) || !has_place(instance) || !is_finite(grid->pivot))
+    if (grid == nullptr || !passes(filter, of_scene, instance) || !has_valid_transform(instance) ||
+        !is_finite(grid->pivot))
       return;
     vulkan::MeshInstance placed;
     placed.handle = handle;
@@ -180,8 +181,8 @@ void VulkanMeshRenderer::clear() {
   impl_->store.clear();
 }
 
-Status VulkanMeshRenderer::Impl::check_request(const vulkan::PictureImpl& target, const Camera& camera,
-                                               const MeshPictureOptions& options) const {
+Status VulkanMeshRenderer::Impl::check_request(const vulkan::ImageImpl& target, const Camera& camera,
+                                               const MeshImageOptions& options) const {
   const std::string who = "vulkan: " + device->description().name;
   if (Status right = check(camera, options); !right) return right;
   const auto refuse = [](const std::string& message) { return make_error(ErrorCode::InvalidArgument, message); };
@@ -197,7 +198,7 @@ Status VulkanMeshRenderer::Impl::check_request(const vulkan::PictureImpl& target
   const bool needs_voxels =
       options.detail.policy.has_value() || traces_light(options.light) || has_glass_by_rays(options);
   const bool has_voxels =
-      renderer->voxels == scene && renderer->at_update.is_beside(at_update) && renderer->instances == shown;
+      renderer->voxels == scene && renderer->at_update.shares_container_with(at_update) && renderer->instances == shown;
   if (needs_voxels && scene != nullptr && !has_voxels) {
     return refuse(
         "vulkan: shadows, lamps, ray-traced glass and levels of detail need VulkanRenderer::update with the meshes' "
@@ -206,7 +207,7 @@ Status VulkanMeshRenderer::Impl::check_request(const vulkan::PictureImpl& target
   return {};
 }
 
-bool VulkanMeshRenderer::Impl::has_glass_by_rays(const MeshPictureOptions& options) const {
+bool VulkanMeshRenderer::Impl::has_glass_by_rays(const MeshImageOptions& options) const {
   const bool shows_glass = !shows_values(options.light.shading) && options.wireframe != Wireframe::Only;
   return options.glass_by_rays && shows_glass && store.has_glass() && scene != nullptr;
 }
@@ -252,12 +253,11 @@ Result<std::vector<vulkan::MeshInstance>> VulkanMeshRenderer::Impl::detailed(con
 }
 
 // Writes the rays' content and the light.
-Status VulkanMeshRenderer::Impl::put_picture(const vulkan::Placement& placement, const Camera& camera,
-                                             const RenderOptions& request, Threads threads,
-                                             vulkan::MeshFrameData& data) {
-  data.picture = vulkan::make_frame(placement, camera, request);
+Status VulkanMeshRenderer::Impl::put_image(const vulkan::Placement& placement, const Camera& camera,
+                                           const RenderOptions& request, Threads threads, vulkan::MeshFrameData& data) {
+  data.image = vulkan::make_frame(placement, camera, request);
   data.has_fields = placement.has_fields;
-  vulkan::ShaderFrame& frame = data.picture.frame;
+  vulkan::ShaderFrame& frame = data.image.frame;
   frame.grids = placement.grids;
   frame.surfaces = surfaces.address;
   frame.last_surface = static_cast<std::uint32_t>(std::max<std::size_t>(surface_table.size() / 3, 1) - 1);
@@ -265,16 +265,16 @@ Status VulkanMeshRenderer::Impl::put_picture(const vulkan::Placement& placement,
   const auto lamps = renderer->lamp_table(request.light, threads);
   if (!lamps) return lamps.error();
   if (lamps->table != nullptr) {
-    data.lamps = vulkan::put_lamps(*lamps, camera, data.picture);
+    data.lamps = vulkan::put_lamps(*lamps, camera, data.image);
   }
   const auto light = renderer->level_table(request.light, threads);
   if (!light) return light.error();
-  if (light->table != nullptr) vulkan::put_levels(*light, *scene, placement, request.light, data.picture);
+  if (light->table != nullptr) vulkan::put_levels(*light, *scene, placement, request.light, data.image);
   return {};
 }
 
 Result<vulkan::MeshFrameData> VulkanMeshRenderer::Impl::make_frame(const Camera& camera,
-                                                                   const MeshPictureOptions& options,
+                                                                   const MeshImageOptions& options,
                                                                    vulkan::MeshLight& light, Threads threads) {
   const RenderOptions request = request_of(options);
   const bool traces = traces_light(request.light) && scene != nullptr;
@@ -293,14 +293,14 @@ Result<vulkan::MeshFrameData> VulkanMeshRenderer::Impl::make_frame(const Camera&
   if (!shown_as) return shown_as.error();
   auto data = vulkan::make_mesh_frame(store, *shown_as, camera, request, pass->subpixels(), glass_by_rays);
   if (!data) return data.error();
-  if (Status done = put_picture(placement, camera, request, threads, *data); !done) return done.error();
+  if (Status done = put_image(placement, camera, request, threads, *data); !done) return done.error();
   if (traces) light = placement.has_transparent ? vulkan::MeshLight::TracedThroughGlass : vulkan::MeshLight::Traced;
   return data;
 }
 
-Status VulkanMeshRenderer::draw(VulkanPicture& picture, const Camera& camera, const MeshPictureOptions& options,
+Status VulkanMeshRenderer::draw(VulkanImage& image, const Camera& camera, const MeshImageOptions& options,
                                 Threads threads) {
-  vulkan::PictureImpl& target = picture.impl();
+  vulkan::ImageImpl& target = image.impl();
   if (Status right = impl_->check_request(target, camera, options); !right) return right;
   auto light = vulkan::MeshLight::Plain;
   auto data = impl_->make_frame(camera, options, light, threads);

@@ -50,7 +50,7 @@ TEST_F(VulkanMeshSeeThrough, SurfacesAndDepthAreSeen) {
   const Scene scene = glass_yard();
   RenderOptions options = glass_yard_options(160, 120);
   put(scene, blocky_surfaces(scene));
-  MeshPictureOptions meshes = mesh_options(options);
+  MeshImageOptions meshes = mesh_options(options);
   const Image right = drawn(over_glass_yard(), meshes);
   meshes.light.glass_surfaces = false;
   EXPECT_GT(bytes_that_differ(right, drawn(over_glass_yard(), meshes), 4), 700) << "surfaces";
@@ -130,36 +130,36 @@ TEST_F(VulkanMeshSeeThrough, ItTellsScenesApartThatStandInTheSamePlace) {
   ASSERT_TRUE(renderer_->update(*scene));
   ASSERT_TRUE(meshes_->update(*scene));
   ASSERT_TRUE(meshes_->put(blocky_surfaces(*scene)));
-  VulkanPicture picture(*renderer_);
-  const MeshPictureOptions options = mesh_options(glass_yard_options(32, 32));
-  EXPECT_TRUE(meshes_->draw(picture, over_glass_yard(), options));
+  VulkanImage image(*renderer_);
+  const MeshImageOptions options = mesh_options(glass_yard_options(32, 32));
+  EXPECT_TRUE(meshes_->draw(image, over_glass_yard(), options));
   scene.emplace(glass_yard());
   ASSERT_TRUE(meshes_->update(*scene));
   ASSERT_TRUE(meshes_->put(blocky_surfaces(*scene)));
-  EXPECT_EQ(meshes_->draw(picture, over_glass_yard(), options).error().code, ErrorCode::InvalidArgument);
+  EXPECT_EQ(meshes_->draw(image, over_glass_yard(), options).error().code, ErrorCode::InvalidArgument);
   meshes_->clear();
 }
 
 TEST_F(VulkanMeshSeeThrough, ItNeedsTheVoxelsOfTheSceneWhereThereIsGlass) {
   const Scene scene = glass_yard();
   ASSERT_TRUE(meshes_->update(scene));
-  VulkanPicture picture(*renderer_);
-  MeshPictureOptions options = mesh_options(glass_yard_options(32, 32));
+  VulkanImage image(*renderer_);
+  MeshImageOptions options = mesh_options(glass_yard_options(32, 32));
   options.light.shadows = false;
   options.light.max_lamps = 0;
-  EXPECT_TRUE(meshes_->draw(picture, over_glass_yard(), options)) << "nothing of glass is there";
+  EXPECT_TRUE(meshes_->draw(image, over_glass_yard(), options)) << "nothing of glass is there";
   ASSERT_TRUE(meshes_->put(blocky_surfaces(scene)));
-  const Status refused = meshes_->draw(picture, over_glass_yard(), options);
+  const Status refused = meshes_->draw(image, over_glass_yard(), options);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::InvalidArgument);
   options.light.shading = Shading::Normals;
-  EXPECT_TRUE(meshes_->draw(picture, over_glass_yard(), options)) << "values are not seen through";
+  EXPECT_TRUE(meshes_->draw(image, over_glass_yard(), options)) << "values are not seen through";
   options.light.shading = Shading::Lit;
   options.glass_by_rays = false;
-  EXPECT_TRUE(meshes_->draw(picture, over_glass_yard(), options));
+  EXPECT_TRUE(meshes_->draw(image, over_glass_yard(), options));
   ASSERT_TRUE(renderer_->update(scene));
   options.glass_by_rays = true;
-  EXPECT_TRUE(meshes_->draw(picture, over_glass_yard(), options));
+  EXPECT_TRUE(meshes_->draw(image, over_glass_yard(), options));
   meshes_->clear();
 }
 
@@ -173,7 +173,7 @@ TEST_F(VulkanMeshSeeThrough, EdgesAreSeenThroughGlass) {
   grid.fill_box({{2, 2, 6}, {18, 18, 8}}, glass);
   place(scene, std::move(grid));
   put(scene, blocky_surfaces(scene, false));
-  MeshPictureOptions options = mesh_options(glass_yard_options(200, 200));
+  MeshImageOptions options = mesh_options(glass_yard_options(200, 200));
   options.light.shadows = false;
   Camera camera = from_above(10, 0, 0, 14);
   camera.position = {10.03, 10.02, 40};
@@ -198,8 +198,8 @@ std::vector<Camera> onto_walls() {
 int different_walls(const std::vector<Image>& images, const std::vector<Image>& marched) {
   int different = 0;
   for (std::size_t view = 0; view < images.size(); ++view) {
-    Picture a;
-    Picture b;
+    RenderedImage a;
+    RenderedImage b;
     a.colour = images[view];
     b.colour = marched[view];
     different += render_test::count_different(a, b, 4);
@@ -220,12 +220,12 @@ TEST_F(VulkanMeshSeeThrough, WallsAreTheSameMarchedAndFromBlocksAndSmooth) {
     const std::string name = style == SurfaceStyle::Blocky ? "blocky" : "smooth";
     meshes_->clear();
     put(scene, vulkan_test::live_surfaces(scene, style));
-    const auto views = [&](const MeshPictureOptions& meshes) {
+    const auto views = [&](const MeshImageOptions& meshes) {
       std::vector<Image> images;
       for (const Camera& camera : onto_walls()) images.push_back(drawn(camera, meshes));
       return images;
     };
-    MeshPictureOptions meshes = mesh_options(options);
+    MeshImageOptions meshes = mesh_options(options);
     const std::vector<Image> right = views(meshes);
     EXPECT_EQ(different_walls(right, marched), 0) << name;
     for (std::size_t i = 0; i < right.size() && ::testing::Test::HasFailure(); ++i) {
@@ -251,9 +251,9 @@ TEST_F(VulkanMeshSeeThrough, LakesAndBallsOfFieldsAreThoseOfTheProcessor) {
   options.light.occlusion_mode = OcclusionMode::Off;
   put(scene, vulkan_test::live_surfaces(scene, SurfaceStyle::Smooth));
   const Camera camera = towards({110, 70, 130}, {10, 0, 10});
-  const Picture marched = render_test::taken(scene, camera, options);
+  const RenderedImage marched = render_test::taken(scene, camera, options);
   const auto differing = [&](int by) {
-    Picture shown;
+    RenderedImage shown;
     shown.colour = drawn(camera, mesh_options(options));
     return render_test::count_different(shown, marched, by);
   };

@@ -199,11 +199,11 @@ TEST_F(VulkanMeshShadow, TheyNeedTheVoxelsOfTheSameScene) {
   const Scene other = yard();
   ASSERT_TRUE(meshes_->update(scene));
   ASSERT_TRUE(meshes_->put(blocky_surfaces(scene)));
-  VulkanPicture picture(*renderer_);
+  VulkanImage image(*renderer_);
   const Camera camera = towards({40, 45, 60}, {0, 4, 5});
-  MeshPictureOptions options = mesh_options(with_mesh_light(sized(32, 32)));
+  MeshImageOptions options = mesh_options(with_mesh_light(sized(32, 32)));
   const auto refused = [&] {
-    const Status done = meshes_->draw(picture, camera, options);
+    const Status done = meshes_->draw(image, camera, options);
     return !done && done.error().code == ErrorCode::InvalidArgument;
   };
   EXPECT_TRUE(refused()) << "nothing was updated";
@@ -217,7 +217,7 @@ TEST_F(VulkanMeshShadow, TheyNeedTheVoxelsOfTheSameScene) {
   EXPECT_TRUE(refused()) << "levels do";
   ASSERT_TRUE(renderer_->update(scene));
   options.light.shadows = true;
-  EXPECT_TRUE(meshes_->draw(picture, camera, options));
+  EXPECT_TRUE(meshes_->draw(image, camera, options));
 }
 
 TEST_F(VulkanMeshShadow, EdgesAndValuesHaveNone) {
@@ -226,7 +226,7 @@ TEST_F(VulkanMeshShadow, EdgesAndValuesHaveNone) {
   const Camera camera = towards({40, 45, 60}, {0, 4, 5});
   for (const Shading shading :
        {Shading::Unlit, Shading::UnlitWithOcclusion, Shading::Normals, Shading::Occlusion, Shading::Lit}) {
-    MeshPictureOptions options = mesh_options(with_mesh_light(sized(160, 90)));
+    MeshImageOptions options = mesh_options(with_mesh_light(sized(160, 90)));
     options.light.shading = shading;
     if (shading == Shading::Lit) options.wireframe = Wireframe::Only;
     const Image with = drawn(camera, options);

@@ -57,7 +57,7 @@ TEST_F(VulkanMeshShape, MergedFacesHaveNoHolesBetweenThem) {
   std::mt19937 random(seed);
   const Scene scene = white_room(random);
   put(scene, blocky_surfaces(scene));
-  MeshPictureOptions options = mesh_options(sized(320, 180));
+  MeshImageOptions options = mesh_options(sized(320, 180));
   options.light.shading = Shading::Unlit;
   std::uniform_real_distribution<double> anywhere(-36, 36);
   int holes = 0;
@@ -75,9 +75,9 @@ std::optional<DVec3> normal_at(const Camera& camera, int x, int y, DVec3 centre,
   const Ray ray = ray_through(camera, {x + 0.5, y + 0.5, 160, 160});
   const DVec3 to_centre = centre - ray.origin;
   const double along = glm::dot(to_centre, ray.direction);
-  const double beside = glm::dot(to_centre, to_centre) - along * along;
-  if (beside > radius * radius * 0.97) return std::nullopt;
-  const DVec3 at = ray.origin + ray.direction * (along - std::sqrt(radius * radius - beside));
+  const double adjacent = glm::dot(to_centre, to_centre) - along * along;
+  if (adjacent > radius * radius * 0.97) return std::nullopt;
+  const DVec3 at = ray.origin + ray.direction * (along - std::sqrt(radius * radius - adjacent));
   return (at - centre) / radius;
 }
 
@@ -92,7 +92,7 @@ TEST_F(VulkanMeshShape, SmoothSpheresHaveTheNormalsOfSpheres) {
   Instance instance{"", handle, {5, 6, 7}, glm::angleAxis(0.7, glm::normalize(DVec3(1, 2, 0.5)))};
   instance.voxel_size = 0.5;
   const InstanceHandle placed = scene.add_instance(instance);
-  MeshPictureOptions options = mesh_options(sized(160, 160));
+  MeshImageOptions options = mesh_options(sized(160, 160));
   options.light.shading = Shading::Normals;
   const Camera camera = towards({40, 30, 50}, {5, 6, 7}, 0.6);
   for (const bool mirrored : {false, true}) {
@@ -127,7 +127,7 @@ TEST_F(VulkanMeshShape, FieldsStandWhereTheirSamplesAre) {
   instance.voxel_size = 0.75;
   scene.add_instance(instance);
   put(scene, vulkan_test::live_surfaces(scene, SurfaceStyle::Smooth));
-  MeshPictureOptions options = mesh_options(sized(160, 160));
+  MeshImageOptions options = mesh_options(sized(160, 160));
   options.light.shading = Shading::Normals;
   const Camera camera = towards({40, 30, 50}, {5, 6, 7}, 0.6);
   const Image image = drawn(camera, options);
@@ -157,7 +157,7 @@ TEST_F(VulkanMeshShape, SmoothSurfacesAreClosed) {
   const GridHandle handle = scene.add_grid({});
   scene.add_instance({"", handle});
   put(scene, smooth_surfaces(handle, field, scene.types));
-  MeshPictureOptions options = mesh_options(sized(320, 180));
+  MeshImageOptions options = mesh_options(sized(320, 180));
   options.light.shading = Shading::Unlit;
   const unsigned seed = 6;
   std::mt19937 random(seed);
@@ -184,7 +184,7 @@ TEST_F(VulkanMeshShape, WireframesShowEdgesWhereTheyAre) {
   put(scene, blocky_surfaces(scene));
   // Shifted by a quarter of a pixel, so that no edge runs between two pixels.
   const Camera camera = from_above(5.05, 30, 5.05, 20);
-  MeshPictureOptions options = mesh_options(sized(100, 100));
+  MeshImageOptions options = mesh_options(sized(100, 100));
   options.light.shading = Shading::Unlit;
   options.wireframe = Wireframe::Only;
   const auto is_dark = [](const Image& image, int x, int y) { return byte_at(image, x, y).x < 60.0F; };
@@ -226,7 +226,7 @@ TEST_F(VulkanMeshShape, EdgesWinOverTheirSurfaces) {
   }
   floor->opaque_quads = floor->quads.size();
   put(scene, {{slab.grid, slab.chunk, floor}});
-  MeshPictureOptions options = mesh_options(sized(400, 300));
+  MeshImageOptions options = mesh_options(sized(400, 300));
   options.light.shading = Shading::Unlit;
   // From above, at a flat angle, and from far away; also orthographic.
   for (const DVec3 eye : {DVec3(9, 30, 21), DVec3(9, 3, 26), DVec3(5000, 3000, 8000)}) {
@@ -256,16 +256,16 @@ TEST_F(VulkanMeshShape, SamplesAreResolvedInLinearLight) {
   put(scene, blocky_surfaces(scene));
   // The cube's edges run through pixel centres.
   const Camera camera = from_above(5.1, 30, 5.1, 20);
-  MeshPictureOptions options = mesh_options(sized(100, 100));
+  MeshImageOptions options = mesh_options(sized(100, 100));
   options.light.shading = Shading::Unlit;
-  VulkanPicture picture(*renderer_);
+  VulkanImage rendered(*renderer_);
   for (const int samples : {1, 2, 4, 8}) {
     options.samples = samples;
-    ASSERT_TRUE(meshes_->draw(picture, camera, options));
-    EXPECT_LE(picture.samples(), samples);
-    EXPECT_GE(picture.samples(), samples >= 4 ? 4 : 1) << "every device has 4";
-    if (picture.samples() == 1) continue;
-    const Image image = picture.read().value();
+    ASSERT_TRUE(meshes_->draw(rendered, camera, options));
+    EXPECT_LE(rendered.samples(), samples);
+    EXPECT_GE(rendered.samples(), samples >= 4 ? 4 : 1) << "every device has 4";
+    if (rendered.samples() == 1) continue;
+    const Image image = rendered.read().value();
     // The background straight down is nearly uniform.
     const Vec3 sky = byte_at(image, 10, 50);
     const SrgbEncoder& encode = SrgbEncoder::shared();

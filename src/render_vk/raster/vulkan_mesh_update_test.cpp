@@ -122,7 +122,7 @@ TEST_F(VulkanMeshUpdate, InstancesAtTheEndOfNumbersDisturbNoOthers) {
   Instance no_place{"", grid, {0, NAN, 0}};
   scene.add_instance(no_place);
   Camera camera = before_boxes();
-  const MeshPictureOptions options = mesh_options(without_shadows(sized(160, 90)));
+  const MeshImageOptions options = mesh_options(without_shadows(sized(160, 90)));
   const Scene alone = boxes();
   for (const auto projection : {Camera::Projection::Perspective, Camera::Projection::Orthographic}) {
     camera.projection = projection;
@@ -138,21 +138,21 @@ TEST_F(VulkanMeshUpdate, InstancesAtTheEndOfNumbersDisturbNoOthers) {
   }
 }
 
-TEST_F(VulkanMeshUpdate, PicturesTakeTheSizeOfEachDrawing) {
+TEST_F(VulkanMeshUpdate, ImagesTakeTheSizeOfEachDrawing) {
   const Scene scene = boxes();
   put(scene, blocky_surfaces(scene));
-  VulkanPicture picture(*renderer_);
-  EXPECT_FALSE(picture.read());
+  VulkanImage rendered(*renderer_);
+  EXPECT_FALSE(rendered.read());
   for (const glm::ivec2 size : {glm::ivec2(33, 7), glm::ivec2(200, 100), glm::ivec2(1, 1), glm::ivec2(64, 64)}) {
     const RenderOptions options = without_shadows(sized(size.x, size.y));
-    MeshPictureOptions mesh = mesh_options(options);
+    MeshImageOptions mesh = mesh_options(options);
     mesh.samples = size.x % 2 == 0 ? 4 : 1;
-    ASSERT_TRUE(meshes_->draw(picture, before_boxes(), mesh));
-    EXPECT_EQ(picture.width(), size.x);
-    EXPECT_EQ(picture.height(), size.y);
-    EXPECT_EQ(picture.samples(), mesh.samples);
-    EXPECT_EQ(picture.rays(), 0);
-    const Image image = picture.read().value();
+    ASSERT_TRUE(meshes_->draw(rendered, before_boxes(), mesh));
+    EXPECT_EQ(rendered.width(), size.x);
+    EXPECT_EQ(rendered.height(), size.y);
+    EXPECT_EQ(rendered.samples(), mesh.samples);
+    EXPECT_EQ(rendered.rays(), 0);
+    const Image image = rendered.read().value();
     EXPECT_EQ(image.rgb.size(), 3U * static_cast<std::size_t>(size.x * size.y));
     const Vec3 middle = byte_at(image, size.x / 2, 0);
     EXPECT_GT(middle.z, 100.0F) << "sky";
@@ -162,7 +162,7 @@ TEST_F(VulkanMeshUpdate, PicturesTakeTheSizeOfEachDrawing) {
 TEST_F(VulkanMeshUpdate, CamerasInsideOfThingsSeeWhatIsBehindThem) {
   const Scene scene = boxes();
   put(scene, blocky_surfaces(scene));
-  const MeshPictureOptions options = mesh_options(without_shadows(sized(32, 32)));
+  const MeshImageOptions options = mesh_options(without_shadows(sized(32, 32)));
   drawn(towards({20, 20, 20}, {21, 20, 20}), options);
   // Two thousandths of a voxel in front of a face are not too near.
   const Image near = drawn(towards({20, 30.002, 20}, {20.001, 20, 20}), options);
@@ -225,16 +225,16 @@ TEST_F(VulkanMeshUpdate, WrongSurfacesAreRefusedAndChangeNothing) {
   EXPECT_TRUE(meshes_->put(surfaces));
 }
 
-TEST_F(VulkanMeshUpdate, WrongPicturesAreRefused) {
+TEST_F(VulkanMeshUpdate, WrongImagesAreRefused) {
   const Scene scene = boxes();
   put(scene, blocky_surfaces(scene));
-  VulkanPicture picture(*renderer_);
-  const MeshPictureOptions right = mesh_options(without_shadows(sized(16, 16)));
-  const auto expect_refused = [&](const Camera& camera, const MeshPictureOptions& options, const std::string& message) {
-    expect_error(meshes_->draw(picture, camera, options), ErrorCode::InvalidArgument, message);
+  VulkanImage image(*renderer_);
+  const MeshImageOptions right = mesh_options(without_shadows(sized(16, 16)));
+  const auto expect_refused = [&](const Camera& camera, const MeshImageOptions& options, const std::string& message) {
+    expect_error(meshes_->draw(image, camera, options), ErrorCode::InvalidArgument, message);
   };
   const auto with = [&](auto change) {
-    MeshPictureOptions options = right;
+    MeshImageOptions options = right;
     change(options);
     return options;
   };
@@ -254,9 +254,9 @@ TEST_F(VulkanMeshUpdate, WrongPicturesAreRefused) {
   expect_refused(wrong, right, "camera: directions must not lie in one plane");
   auto other = VulkanRenderer::create();
   ASSERT_TRUE(other);
-  VulkanPicture elsewhere(*other);
+  VulkanImage elsewhere(*other);
   expect_error(meshes_->draw(elsewhere, camera, right), ErrorCode::InvalidArgument, "belongs to another renderer");
-  EXPECT_TRUE(meshes_->draw(picture, camera, right));
+  EXPECT_TRUE(meshes_->draw(image, camera, right));
 }
 
 }  // namespace

@@ -1,8 +1,8 @@
 // The camera's rays, one per invocation, in view space and in the grids of instances.
-#include "picture_rays.glsl"
+#include "image_rays.glsl"
 
 // Returns the image position of the invocation's ray, in pixels.
-vec2 picture_point() {
+vec2 image_point() {
   return vec2(push.corner + tile_pixel()) + push.point;
 }
 
@@ -36,9 +36,9 @@ Pair exact_direction() {
   Frame f = frame();
   Pair forward = Pair(f.forward.xyz, f.forward_low.xyz);
   if (!has(kPerspective)) return forward;
-  Pair in_picture = across(Pair(f.corner.xyz, f.corner_low.xyz), Pair(f.right.xyz, f.right_low.xyz),
+  Pair in_image = across(Pair(f.corner.xyz, f.corner_low.xyz), Pair(f.right.xyz, f.right_low.xyz),
                            Pair(f.down.xyz, f.down_low.xyz));
-  return unit_of(sum_of(in_picture, forward));
+  return unit_of(sum_of(in_image, forward));
 }
 
 // `d`: `exact_direction`.

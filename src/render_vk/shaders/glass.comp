@@ -12,7 +12,7 @@
 
 // Distances are measured from the origin of view space, except `first_t`.
 void find_glass(uint slot, inout State state, out float first_t, out bool has_hit) {
-  vec2 point = picture_point();
+  vec2 point = image_point();
   ViewRay ray = camera_ray(point);
   Pair direction = exact_direction();
   Point hit = Points(frame().points).at[slot];

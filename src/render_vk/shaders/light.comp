@@ -25,7 +25,7 @@ const uint kTurns = 1024;
 
 float sky_up(vec2 point) {
   if (has(kPerspective)) return camera_ray(point).direction.y;
-  vec3 d = frame().forward.xyz + picture_vector(point) * frame().sky_scale;
+  vec3 d = frame().forward.xyz + image_vector(point) * frame().sky_scale;
   return d.y / length(d);
 }
 
@@ -250,7 +250,7 @@ Point point_of(Body body) {
 }
 
 vec3 seen_direction() {
-  return camera_ray(picture_point()).direction;
+  return camera_ray(image_point()).direction;
 }
 vec3 normal_met(int instance, uint face, float t) {
   return face_normal(placed_at(instance), face);
@@ -259,7 +259,7 @@ vec3 normal_met(int instance, uint face, float t) {
 // Lights this round's points of a pixel; returns true if that completes it. One loop over all points; rays.glsl gives
 // the reason.
 bool light_pixel(uint slot, inout State state) {
-  vec2 at = picture_point();
+  vec2 at = image_point();
   Point opaque = Points(frame().points).at[slot];
   float opaque_t = t_of(opaque, at);
   // The first of a later round was entered in the one before.

@@ -210,7 +210,7 @@ void main() {
   bool is_active = is_in_tile();
   bool is_hit = false;
   if (is_active) {
-    Point point = first_hit(picture_point());
+    Point point = first_hit(image_point());
     is_hit = point.voxel.w >= 0;
     uint slot = slot_of_pixel();
     Points(frame().points).at[slot] = point;

@@ -61,7 +61,7 @@ class BoxInGrid {
   }
   // Returns true if one of the box's own axes separates it from the voxel centres. The grid's axes are tested by
   // `bounds`.
-  [[nodiscard]] bool is_apart_from(const IBox& voxels) const {
+  [[nodiscard]] bool does_not_touch(const IBox& voxels) const {
     const DVec3 half = (DVec3(voxels.max) - DVec3(voxels.min) - 1.0) * 0.5;
     const DVec3 middle = DVec3(voxels.min) + 0.5 + half;
     const DVec3 between = middle - centre_;
@@ -129,7 +129,7 @@ class BoxFiller {
  private:
   // `voxels` is cut along its longest axis, at a chunk's side, until it lies in one chunk.
   void fill_part(const IBox& voxels) {
-    if (voxels.empty() || box_.is_apart_from(voxels)) return;
+    if (voxels.empty() || box_.does_not_touch(voxels)) return;
     if (box_.holds_all(voxels)) {
       changed_ += grid_.fill_box(voxels, type_);
       return;

@@ -178,9 +178,9 @@ TEST(UnitedInstances, LookAsIfTheyWereOneGrid) {
     }
     EXPECT_EQ(united->stats.triangles, expected->stats.triangles);
     EXPECT_EQ(triangles_of(*united), triangles_of(*expected));
-    const auto apart = mesh_scene_smoothly(pieces, {.unite = false});
-    ASSERT_TRUE(apart);
-    EXPECT_GT(apart->stats.triangles, expected->stats.triangles) << "walls where the pieces meet";
+    const auto separate = mesh_scene_smoothly(pieces, {.unite = false});
+    ASSERT_TRUE(separate);
+    EXPECT_GT(separate->stats.triangles, expected->stats.triangles) << "walls where the pieces meet";
   }
 }
 
@@ -193,10 +193,10 @@ TEST(UnitedInstances, ThoseThatStandAloneShareAPart) {
     instance.position = DVec3(10.0 * i, 0, 0);
     scene.add_instance(instance);
   }
-  Instance beside;
-  beside.grid = cube;
-  beside.position = DVec3(43.0, 0, 0);
-  scene.add_instance(beside);
+  Instance adjacent;
+  adjacent.grid = cube;
+  adjacent.position = DVec3(43.0, 0, 0);
+  scene.add_instance(adjacent);
   const auto meshes = mesh_scene_smoothly(scene);
   ASSERT_TRUE(meshes);
   EXPECT_EQ(meshes->parts.size(), 3U) << "the lone ones' and two of the pair";

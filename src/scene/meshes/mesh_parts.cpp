@@ -14,7 +14,7 @@ Status check_instances(const Scene& scene, InstanceFilter filter) {
   for (const InstanceHandle handle : scene.instances().handles()) {
     const Instance& instance = scene.instances()[handle];
     if (!is_drawn(scene, instance, filter)) continue;
-    if (has_place(instance)) continue;
+    if (has_valid_transform(instance)) continue;
     return make_error(ErrorCode::InvalidArgument,
                       "instance \"" + instance.name + "\" needs a finite transform with a positive scale");
   }

@@ -52,13 +52,13 @@ Result<BlockyMesh> mesh_grid(const Scene& scene, GridHandle handle, const Blocky
   if (of_scene.cut) options.cut = [&](IVec3 chunk, QuadBuffer& quads) { of_scene.cut(handle, chunk, quads); };
   const Grid& grid = scene.grids()[handle].grid;
   const auto chunks = static_cast<double>(grid.chunk_count());
-  double told = 0;
+  double reported = 0;
   auto mesh = build_blocky_mesh(grid, scene.types, options, threads, [&](double fraction) {
-    const double more = (fraction - told) * chunks;
-    told = fraction;
+    const double more = (fraction - reported) * chunks;
+    reported = fraction;
     return progress.advance(more);
   });
-  if (mesh && !progress.advance((1.0 - told) * chunks)) return make_error(ErrorCode::Cancelled, "cancelled");
+  if (mesh && !progress.advance((1.0 - reported) * chunks)) return make_error(ErrorCode::Cancelled, "cancelled");
   return mesh;
 }
 

@@ -139,15 +139,15 @@ TEST(SceneMeshes, InstancesOfGridsThatAreGoneArePassedOver) {
 TEST(SceneMeshes, ProgressNeverFallsAndEndsAtOne) {
   Scene scene;
   for (const int length : {3, 700, 30, 1000}) place(scene, add_grid(scene, length));
-  std::vector<double> told;
+  std::vector<double> reported;
   const auto meshes = mesh_scene(scene, {}, Threads{4}, [&](double fraction) {
-    told.push_back(fraction);
+    reported.push_back(fraction);
     return true;
   });
   ASSERT_TRUE(meshes);
-  ASSERT_FALSE(told.empty());
-  EXPECT_TRUE(std::is_sorted(told.begin(), told.end()));
-  EXPECT_NEAR(told.back(), 1.0, 1e-9);
+  ASSERT_FALSE(reported.empty());
+  EXPECT_TRUE(std::is_sorted(reported.begin(), reported.end()));
+  EXPECT_NEAR(reported.back(), 1.0, 1e-9);
 }
 
 TEST(SceneMeshes, AListenerCanStopTheWork) {
@@ -173,7 +173,7 @@ TEST(SceneMeshes, InstancesWithoutAPlaceAreRefused) {
   EXPECT_TRUE(refuses([](Instance& i) { i.rotation.y = std::numeric_limits<double>::infinity(); }));
 }
 
-TEST(SceneMeshes, RotationsOfAnyLengthTurnAsTheyDoInPictures) {
+TEST(SceneMeshes, RotationsOfAnyLengthTurnAsTheyDoInImages) {
   const DQuat turn = glm::angleAxis(0.9, glm::normalize(DVec3(1, 2, -1)));
   const std::array<std::pair<DQuat, DQuat>, 4> cases = {
       {{DQuat(0, 0, 0, 0), DQuat(1, 0, 0, 0)}, {turn * 1e200, turn}, {turn * 1e-200, turn}, {turn * -3.0, -turn}}};

@@ -178,7 +178,7 @@ TEST(Capsule, InvalidCapsulesHitNothing) {
                              Capsule{0.0}, Capsule{-1.0}, Capsule{kInfinity}}) {
     EXPECT_FALSE(sweep_capsule(tracer, bad, {1, 0, 0}));
     EXPECT_TRUE(overlaps(tracer, bad).empty());
-    EXPECT_FALSE(displacement_to_free_place(tracer, bad, 1.0));
+    EXPECT_FALSE(depenetration(tracer, bad, 1.0));
   }
   EXPECT_FALSE(sweep_capsule(tracer, Capsule{}, {nan, 0, 0}));
   const auto hit = sweep_capsule(tracer, Capsule{0.5, {0, 1e7, 0}}, {0, -2e7, 0});
@@ -299,12 +299,12 @@ TEST(Capsule, IsPushedOutToANearFreePlace) {
   const Scene scene = scene_of(std::move(content), {});
   const SceneTracer tracer(scene);
   const Capsule player{0.4, {50.5, 20.95, 50.5}, {0.0, 0.5, 0.0}};
-  const auto away = displacement_to_free_place(tracer, player, 2.0);
+  const auto away = depenetration(tracer, player, 2.0);
   ASSERT_TRUE(away);
   EXPECT_TRUE(overlaps(tracer, moved(player, *away)).empty());
   EXPECT_NEAR(away->y, 0.95, 2.0 / 32.0);
   EXPECT_LT(std::hypot(away->x, away->z), 0.4);
-  EXPECT_FALSE(displacement_to_free_place(tracer, player, 0.5));
+  EXPECT_FALSE(depenetration(tracer, player, 0.5));
   // Random heaps: the result is free, and none of many other positions is much nearer.
   for (int i = 0; i < 25; ++i) {
     SceneGrid heap;
@@ -312,7 +312,7 @@ TEST(Capsule, IsPushedOutToANearFreePlace) {
     const Scene heaps = scene_of(std::move(heap), {});
     const SceneTracer among(heaps);
     const Capsule capsule = random_capsule(random, 2.0);
-    const auto found = displacement_to_free_place(among, capsule, 4.0);
+    const auto found = depenetration(among, capsule, 4.0);
     if (found) {
       EXPECT_TRUE(overlaps(among, moved(capsule, *found)).empty());
     }

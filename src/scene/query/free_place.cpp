@@ -216,14 +216,14 @@ class FreePlace {
 
 }  // namespace
 
-std::optional<DVec3> displacement_to_free_place(const SceneTracer& tracer, const OrientedBox& box, double max_distance,
-                                                const QueryFilter& filter) {
+std::optional<DVec3> depenetration(const SceneTracer& tracer, const OrientedBox& box, double max_distance,
+                                   const QueryFilter& filter) {
   if (!is_box(box) || !std::isfinite(max_distance) || max_distance < 0.0) return std::nullopt;
   return FreePlace(tracer, box, max_distance, filter).find();
 }
 
-std::optional<DVec3> displacement_to_free_place(const SceneTracer& tracer, const Capsule& capsule, double max_distance,
-                                                const QueryFilter& filter) {
+std::optional<DVec3> depenetration(const SceneTracer& tracer, const Capsule& capsule, double max_distance,
+                                   const QueryFilter& filter) {
   if (!is_capsule(capsule) || !std::isfinite(max_distance) || max_distance < 0.0) return std::nullopt;
   return FreePlace(tracer, capsule, max_distance, filter).find();
 }

@@ -56,7 +56,7 @@ TEST(FreePlace, AmongHeapsOfBlocksItIsTheNearest) {
     const DVec3 half = glm::abs(random.vector()) * 1.2 * instance.voxel_size;
     const OrientedBox box{instance.position + random.vector() * 2.0, half, {1, 0, 0, 0}};
     const double reach = 2.5 * instance.voxel_size;
-    const auto away = displacement_to_free_place(tracer, box, reach);
+    const auto away = depenetration(tracer, box, reach);
     const double least = least_of_samples(tracer, box, reach, random);
     if (!away) {
       ++none;
@@ -81,7 +81,7 @@ TEST(FreePlace, AmongTurnedBlocksAndFieldsItIsNearTheNearest) {
     const SceneTracer tracer(scene);
     const OrientedBox box{random.vector() * 3.0, 0.2 + glm::abs(random.vector()) * 0.6, random.rotation()};
     constexpr double kReach = 2.0;
-    const auto away = displacement_to_free_place(tracer, box, kReach);
+    const auto away = depenetration(tracer, box, kReach);
     const double least = least_of_samples(tracer, box, kReach, random);
     if (!away) {
       // Any free space is narrower than 1/32.
@@ -101,7 +101,7 @@ TEST(FreePlace, AShaftAsWideAsTheBoxIsFound) {
   grid.fill_box({{1, -4, 0}, {2, 5, 1}}, kAir);
   const Scene scene = scene_of(std::move(grid));
   const SceneTracer tracer(scene);
-  const auto away = displacement_to_free_place(tracer, {{0.7, 0.3, 0.6}, DVec3(0.5), {1, 0, 0, 0}}, 2.0);
+  const auto away = depenetration(tracer, {{0.7, 0.3, 0.6}, DVec3(0.5), {1, 0, 0, 0}}, 2.0);
   ASSERT_TRUE(away.has_value());
   EXPECT_NEAR(glm::distance(*away, DVec3(0.8, 0.0, -0.1)), 0.0, 1e-9);
 }
@@ -112,17 +112,17 @@ TEST(FreePlace, ThereIsNoneBeyondTheDistance) {
   const Scene scene = scene_of(std::move(grid));
   const SceneTracer tracer(scene);
   const OrientedBox box{{0.5, 8.6, 0.5}, DVec3(0.5), {1, 0, 0, 0}};
-  EXPECT_FALSE(displacement_to_free_place(tracer, box, 1.89).has_value());
-  EXPECT_NEAR(displacement_to_free_place(tracer, box, 1.91)->y, 1.9, 1e-9);
-  EXPECT_FALSE(displacement_to_free_place(tracer, box, 0.0).has_value());
-  EXPECT_EQ(*displacement_to_free_place(tracer, moved(box, {0, 2, 0}), 0.0), DVec3(0.0));
+  EXPECT_FALSE(depenetration(tracer, box, 1.89).has_value());
+  EXPECT_NEAR(depenetration(tracer, box, 1.91)->y, 1.9, 1e-9);
+  EXPECT_FALSE(depenetration(tracer, box, 0.0).has_value());
+  EXPECT_EQ(*depenetration(tracer, moved(box, {0, 2, 0}), 0.0), DVec3(0.0));
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (const double bad : {-1.0, nan, kInfinity}) {
-    EXPECT_FALSE(displacement_to_free_place(tracer, box, bad).has_value());
+    EXPECT_FALSE(depenetration(tracer, box, bad).has_value());
   }
-  EXPECT_FALSE(displacement_to_free_place(tracer, {{nan, 0, 0}, DVec3(0.5), {1, 0, 0, 0}}, 1.0).has_value());
+  EXPECT_FALSE(depenetration(tracer, {{nan, 0, 0}, DVec3(0.5), {1, 0, 0, 0}}, 1.0).has_value());
   // A point.
-  EXPECT_NEAR(displacement_to_free_place(tracer, {{0.5, 9.8, 0.5}, DVec3(0.0), {1, 0, 0, 0}}, 1.0)->y, 0.2, 1e-9);
+  EXPECT_NEAR(depenetration(tracer, {{0.5, 9.8, 0.5}, DVec3(0.0), {1, 0, 0, 0}}, 1.0)->y, 0.2, 1e-9);
 }
 
 TEST(FreePlace, ABoxOnAHumpStandsOnItAndStaysThere) {

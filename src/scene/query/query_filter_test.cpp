@@ -147,8 +147,8 @@ TEST(QueryFilter, ShapesHitOnlyUnfilteredInstances) {
         EXPECT_EQ(overlaps(all.tracer, box.centre, 2.0, filter).size(),
                   overlaps(tracer, box.centre, 2.0, every).size());
         if (shape % 5 != 0) continue;
-        EXPECT_EQ(displacement_to_free_place(all.tracer, box, 3.0, filter).has_value(),
-                  displacement_to_free_place(tracer, box, 3.0, every).has_value());
+        EXPECT_EQ(depenetration(all.tracer, box, 3.0, filter).has_value(),
+                  depenetration(tracer, box, 3.0, every).has_value());
       }
     }
   }
@@ -276,7 +276,7 @@ TEST(SlideContact, FloorsThatMoveCarryWhatStandsOnThem) {
     raft_now.position += DVec3(0.03, 0.02 * std::sin(0.1 * frame), 0.0);
     raft_now.rotation = glm::angleAxis(0.01 * frame, DVec3(0.0, 1.0, 0.0));
     tracer.update();
-    box.centre = carried_point(before, scene.instances()[handle], box.centre);
+    box.centre = transformed_point(before, scene.instances()[handle], box.centre);
     moved = move_and_slide(tracer, box, {0.0, -0.01, 0.0}, options);
     ASSERT_TRUE(moved.is_on_floor) << frame;
     box.centre = moved.centre;
@@ -286,7 +286,7 @@ TEST(SlideContact, FloorsThatMoveCarryWhatStandsOnThem) {
   // An invalid placement moves nothing.
   Instance nowhere;
   nowhere.voxel_size = 0.0;
-  EXPECT_EQ(carried_point(nowhere, instance, {1.0, 2.0, 3.0}), DVec3(1.0, 2.0, 3.0));
+  EXPECT_EQ(transformed_point(nowhere, instance, {1.0, 2.0, 3.0}), DVec3(1.0, 2.0, 3.0));
 }
 
 // A point, a rod and a plate stop in the same way as boxes, also between two voxels, and slide along a wall.

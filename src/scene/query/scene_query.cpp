@@ -329,12 +329,12 @@ bool any_hit(const SceneTracer& tracer, const Ray& ray, double max_t, const Quer
   return is_hit || (seen.meets_unloaded && first_unloaded_of(seen, ray, max_t));
 }
 
-std::optional<SceneHit> pick(const SceneTracer& tracer, const Camera& camera, const PicturePoint& point,
+std::optional<SceneHit> pick(const SceneTracer& tracer, const Camera& camera, const ImagePoint& point,
                              const QueryFilter& filter) {
   return first_hit(tracer, ray_through(camera, point), std::numeric_limits<double>::infinity(), filter);
 }
 
-std::optional<SceneHit> voxel_at_depth(const SceneTracer& tracer, const Camera& camera, const PicturePoint& point,
+std::optional<SceneHit> voxel_at_depth(const SceneTracer& tracer, const Camera& camera, const ImagePoint& point,
                                        float depth, const QueryFilter& filter) {
   if (!(depth >= 0.0F) || std::isinf(depth)) return std::nullopt;
   // Twice half a unit in the last place of a float.

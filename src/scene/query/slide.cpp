@@ -96,7 +96,7 @@ struct Body {
         return true;
       }
     }
-    const auto away = displacement_to_free_place(tracer, shape, furthest, options.filter);
+    const auto away = depenetration(tracer, shape, furthest, options.filter);
     if (!away) return false;
     shape.centre += *away;
     // Adds the skin if there is space for it.

@@ -148,7 +148,7 @@ void free_places(benchmark::State& state, const World& (*world_of)(), Turn turn,
   int found = 0;
   for (auto _ : state) {
     const Query& query = all[next++ % all.size()];
-    const auto away = displacement_to_free_place(world.tracer, query.box, 2.0);
+    const auto away = depenetration(world.tracer, query.box, 2.0);
     found += away.has_value();
     benchmark::DoNotOptimize(away);
   }

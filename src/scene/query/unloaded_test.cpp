@@ -248,8 +248,8 @@ TEST(UnloadedSweeps, ABoxThatStartsInUnloadedChunksStaysThere) {
     EXPECT_EQ(result.displacement, DVec3(0.0));
     EXPECT_TRUE(result.is_waiting);
   }
-  EXPECT_FALSE(displacement_to_free_place(tracer, outside, 2.0));
-  EXPECT_EQ(displacement_to_free_place(tracer, outside, 2.0, passed()), DVec3(0.0));
+  EXPECT_FALSE(depenetration(tracer, outside, 2.0));
+  EXPECT_EQ(depenetration(tracer, outside, 2.0, passed()), DVec3(0.0));
 }
 
 TEST(UnloadedSweeps, BoxesAreNotPushedIntoUnloadedChunks) {
@@ -260,10 +260,10 @@ TEST(UnloadedSweeps, BoxesAreNotPushedIntoUnloadedChunks) {
   world.scene.edit(world.grid).grid.fill_box({{50, 0, 0}, {56, 64, 64}}, kAir);
   const SceneTracer tracer(world.scene);
   const OrientedBox body{{63.0, 32.5, 32.5}, DVec3(0.4)};
-  const auto out = displacement_to_free_place(tracer, body, 10.0);
+  const auto out = depenetration(tracer, body, 10.0);
   ASSERT_TRUE(out);
   EXPECT_LT(out->x, -6.9);
-  const auto wrong = displacement_to_free_place(tracer, body, 10.0, passed());
+  const auto wrong = depenetration(tracer, body, 10.0, passed());
   ASSERT_TRUE(wrong);
   EXPECT_GT(wrong->x, 1.0);
 }

@@ -72,18 +72,18 @@ struct SmoothScene::Impl {
 };
 
 SmoothScene::SmoothScene(const SmoothFieldOptions& options) : impl_(std::make_unique<Impl>()) {
-  content_of(impl_).options = options;
+  impl_of(impl_).options = options;
 }
 SmoothScene::SmoothScene(SmoothScene&&) noexcept = default;
 SmoothScene& SmoothScene::operator=(SmoothScene&&) noexcept = default;
 SmoothScene::~SmoothScene() = default;
 
 const Scene& SmoothScene::scene() const {
-  return content_of(impl_).scene;
+  return impl_of(impl_).scene;
 }
 
 std::size_t SmoothScene::bytes() const {
-  return content_of(impl_).bytes;
+  return impl_of(impl_).bytes;
 }
 
 // Records the outdated chunks. Makes nothing yet.
@@ -128,7 +128,7 @@ void SmoothScene::Impl::follow_grid(const SceneGrid& grid, GridFields& fields) {
 }
 
 Status SmoothScene::update(const Scene& of, Threads threads, const Progress& progress) {
-  Impl& me = content_of(impl_);
+  Impl& me = impl_of(impl_);
   if (me.too_many && chunk_count(of) >= *me.too_many) return me.refuse(of);
   me.too_many.reset();
   me.follow(of);

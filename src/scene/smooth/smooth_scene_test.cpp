@@ -47,7 +47,7 @@ Made small_scene() {
 }
 
 /// Returns the field chunks that rays can hit, for each instance in order.
-std::vector<std::uint64_t> content_of(const Scene& scene) {
+std::vector<std::uint64_t> impl_of(const Scene& scene) {
   std::vector<std::uint64_t> content;
   for (const InstanceHandle handle : scene.instances().handles()) {
     const Instance& instance = scene.instances()[handle];
@@ -68,7 +68,7 @@ std::vector<std::uint64_t> content_of(const Scene& scene) {
 std::vector<std::uint64_t> made_anew(const Scene& scene) {
   SmoothScene smooth;
   EXPECT_TRUE(smooth.update(scene, {2}));
-  return content_of(smooth.scene());
+  return impl_of(smooth.scene());
 }
 
 TEST(SmoothScene, HoldsFieldsInThePlacesOfVoxels) {
@@ -111,7 +111,7 @@ TEST(SmoothScene, FollowsEdits) {
     }
     if (round == 7) made.scene.edit(made.scene.instances().handles().back()).visible = false;
     ASSERT_TRUE(smooth.update(made.scene, {2}));
-    EXPECT_EQ(content_of(smooth.scene()), made_anew(made.scene));
+    EXPECT_EQ(impl_of(smooth.scene()), made_anew(made.scene));
   }
 }
 
@@ -144,7 +144,7 @@ TEST(SmoothScene, GoesOnWhereItWasCancelled) {
     EXPECT_TRUE(smooth.scene().instances().handles().empty());
   }
   EXPECT_GT(rounds, 3);
-  EXPECT_EQ(content_of(smooth.scene()), made_anew(made.scene));
+  EXPECT_EQ(impl_of(smooth.scene()), made_anew(made.scene));
 }
 
 TEST(SmoothScene, RejectsLargeContentUntilItShrinks) {
@@ -161,7 +161,7 @@ TEST(SmoothScene, RejectsLargeContentUntilItShrinks) {
   }
   made.scene.edit(made.hill).grid.clear();
   ASSERT_TRUE(smooth.update(made.scene, {2}));
-  EXPECT_EQ(content_of(smooth.scene()), made_anew(made.scene));
+  EXPECT_EQ(impl_of(smooth.scene()), made_anew(made.scene));
 }
 
 }  // namespace

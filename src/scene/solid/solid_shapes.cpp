@@ -150,9 +150,9 @@ class SolidLayers {
 
 // Returns the layer of a neighbour that touches the chunk.
 Layer layer_beside(const Chunk* neighbour, const VoxelRegistry& types, Direction direction) {
-  Layer beside{};
+  Layer adjacent{};
   SolidRows rows;
-  if (!read_solid_rows(neighbour, types, rows)) return beside;
+  if (!read_solid_rows(neighbour, types, rows)) return adjacent;
   const FaceFrame& frame = frame_of(direction);
   return SolidLayers(rows, frame.axis).at(frame.sign > 0 ? 0 : kEdge - 1);
 }
@@ -252,14 +252,14 @@ void SolidShapes::Impl::make(const Grid& grid, IVec3 chunk, const VoxelRegistry&
 }
 
 SolidShapes::SolidShapes(const SolidShapesOptions& options) : impl_(std::make_unique<Impl>()) {
-  content_of(impl_).options = options;
+  impl_of(impl_).options = options;
 }
 SolidShapes::SolidShapes(SolidShapes&&) noexcept = default;
 SolidShapes& SolidShapes::operator=(SolidShapes&&) noexcept = default;
 SolidShapes::~SolidShapes() = default;
 
 std::vector<IVec3> SolidShapes::update(const Grid& grid, const VoxelRegistry& types, Threads threads) {
-  Impl& me = content_of(impl_);
+  Impl& me = impl_of(impl_);
   try {
     std::vector<IVec3> chunks = me.chunks_to_make(grid, types);
     std::vector<ChunkShapes> made(chunks.size());
@@ -285,19 +285,19 @@ std::vector<IVec3> SolidShapes::update(const Grid& grid, const VoxelRegistry& ty
 
 const std::vector<IBox>& SolidShapes::boxes(IVec3 chunk) const {
   static const std::vector<IBox> none;
-  const auto found = content_of(impl_).shapes.find(chunk);
-  return found == content_of(impl_).shapes.end() ? none : found->second.boxes;
+  const auto found = impl_of(impl_).shapes.find(chunk);
+  return found == impl_of(impl_).shapes.end() ? none : found->second.boxes;
 }
 
 const QuadBuffer& SolidShapes::faces(IVec3 chunk) const {
   static const QuadBuffer none;
-  const auto found = content_of(impl_).shapes.find(chunk);
-  return found == content_of(impl_).shapes.end() ? none : found->second.faces;
+  const auto found = impl_of(impl_).shapes.find(chunk);
+  return found == impl_of(impl_).shapes.end() ? none : found->second.faces;
 }
 
 std::size_t SolidShapes::bytes() const {
-  std::size_t sum = content_of(impl_).shapes.size() * sizeof(ChunkShapes);
-  for (const auto& [chunk, shape] : content_of(impl_).shapes) {
+  std::size_t sum = impl_of(impl_).shapes.size() * sizeof(ChunkShapes);
+  for (const auto& [chunk, shape] : impl_of(impl_).shapes) {
     sum += shape.boxes.capacity() * sizeof(IBox) + shape.faces.capacity() * sizeof(Quad);
   }
   return sum;

@@ -175,7 +175,7 @@ bool SceneTracer::Impl::move_instance(InstanceHandle handle, std::vector<Instanc
   const bool was_placed = found != sources.end() && found->instance == handle;
   const Instance* instance = scene->instances().find(handle);
   TracedGrid* grid = instance == nullptr ? nullptr : grid_to_place(*instance);
-  const bool is_placed = grid != nullptr && has_place(*instance);
+  const bool is_placed = grid != nullptr && has_valid_transform(*instance);
   if (is_placed != was_placed) return false;
   if (!is_placed || found->is_of(*instance, *grid)) return true;
   // With another grid, the trees of that grid may be missing.
@@ -209,7 +209,7 @@ bool SceneTracer::Impl::move_all_instances() {
     if (grid == nullptr) return;
     const bool is_next = next < sources.size() && sources[next].instance == handle;
     const bool has_moved = !is_next || !sources[next].is_of(instance, *grid);
-    if (has_moved && !has_place(instance)) return;
+    if (has_moved && !has_valid_transform(instance)) return;
     // With another grid, the trees of that grid may be missing.
     is_same = is_next && (!has_moved || sources[next].grid == grid);
     if (!is_same) return;
@@ -235,7 +235,7 @@ void SceneTracer::Impl::place_instances() {
   sources.clear();
   scene->instances().for_each([&](InstanceHandle handle, const Instance& instance) {
     TracedGrid* grid = grid_to_place(instance);
-    if (grid == nullptr || !has_place(instance)) return;
+    if (grid == nullptr || !has_valid_transform(instance)) return;
     grid->is_placed = true;
     placed.emplace_back();
     sources.emplace_back();
@@ -268,7 +268,7 @@ void SceneTracer::Impl::place_unloaded(InstanceHandle handle, const Instance* in
   const TracedGrid* const grid =
       instance == nullptr || instance->grid.index >= grids.size() ? nullptr : grids[instance->grid.index].get();
   const bool is_wanted = grid != nullptr && grid->handle == instance->grid && grid->is_partial &&
-                         is_finite(grid->pivot) && passes(filter, *scene, *instance) && has_place(*instance);
+                         is_finite(grid->pivot) && passes(filter, *scene, *instance) && has_valid_transform(*instance);
   if (!is_wanted) {
     if (is_there) unloaded.erase(at);
     return;

@@ -33,7 +33,7 @@ Error fault(const std::string& what, std::size_t at) {
   return make_error(ErrorCode::BadFormat, what, {}, at);
 }
 
-std::string text_of(const ChunkPlace& place) {
+std::string text_of(const ChunkAddress& place) {
   return "chunk (" + std::to_string(place.chunk.x) + ", " + std::to_string(place.chunk.y) + ", " +
          std::to_string(place.chunk.z) + ") of level " + std::to_string(place.level) + " of grid " +
          std::to_string(place.grid);
@@ -113,7 +113,7 @@ ChunkEncoder::ChunkEncoder(ChunkEncoder&&) noexcept = default;
 ChunkEncoder& ChunkEncoder::operator=(ChunkEncoder&&) noexcept = default;
 ChunkEncoder::~ChunkEncoder() = default;
 
-Status ChunkEncoder::encode(const ChunkPlace& place, std::uint64_t revision, const Chunk& voxels,
+Status ChunkEncoder::encode(const ChunkAddress& place, std::uint64_t revision, const Chunk& voxels,
                             const DensityChunk* densities, std::vector<std::byte>& out) {
   out.clear();
   content_.clear();
@@ -180,8 +180,8 @@ ChunkDecoder::ChunkDecoder(ChunkDecoder&&) noexcept = default;
 ChunkDecoder& ChunkDecoder::operator=(ChunkDecoder&&) noexcept = default;
 ChunkDecoder::~ChunkDecoder() = default;
 
-Result<std::span<const std::byte>> ChunkDecoder::content_of(const ChunkBodyHeader& header,
-                                                            std::span<const std::byte> body) {
+Result<std::span<const std::byte>> ChunkDecoder::impl_of(const ChunkBodyHeader& header,
+                                                         std::span<const std::byte> body) {
   const auto stored = body.subspan(kChunkBodyHeader);
   if ((header.sections & chunk_sections::kCompressed) == 0) return stored;
   // Checked before memory is allocated; the encoder always stores the size in the frame.
@@ -220,7 +220,7 @@ Result<StoredChunk> ChunkDecoder::read_sections(const ChunkBodyHeader& header, s
   return chunk;
 }
 
-Result<StoredChunk> ChunkDecoder::decode(const ChunkPlace& expected, std::span<const std::byte> body,
+Result<StoredChunk> ChunkDecoder::decode(const ChunkAddress& expected, std::span<const std::byte> body,
                                          const ChunkLimits& limits) {
   QUOIN_ASSERT(limits.types != nullptr && limits.band > 0.0F, "types, and a positive band");
   const auto header = read_header(body);
@@ -228,7 +228,7 @@ Result<StoredChunk> ChunkDecoder::decode(const ChunkPlace& expected, std::span<c
   if (header->place != expected) {
     return fault("it is " + text_of(header->place) + ", not " + text_of(expected), kSectionsAt);
   }
-  const auto content = content_of(*header, body);
+  const auto content = impl_of(*header, body);
   if (!content) return content.error();
   auto chunk = read_sections(*header, *content, limits);
   if (content_.capacity() > kKeptBytes) content_ = {};

@@ -48,7 +48,7 @@ inline constexpr std::uint8_t kCompressed = 128;
 }  // namespace chunk_sections
 
 struct ChunkBodyHeader {
-  ChunkPlace place;
+  ChunkAddress place;
   std::uint64_t revision = 0;
   std::uint8_t sections = 0;  ///< chunk_sections
   std::uint32_t content_bytes = 0;
@@ -74,7 +74,7 @@ class ChunkEncoder {
   /// storage (with one version of zstd). `densities` may be null. Data attached to density materials is omitted, since
   /// fields have none.
   /// Errors: LimitExceeded: data of more than kMaxChunkDataBytes; `out` is then empty.
-  [[nodiscard]] Status encode(const ChunkPlace& place, std::uint64_t revision, const Chunk& voxels,
+  [[nodiscard]] Status encode(const ChunkAddress& place, std::uint64_t revision, const Chunk& voxels,
                               const DensityChunk* densities, std::vector<std::byte>& out);
 
  private:
@@ -107,13 +107,13 @@ class ChunkDecoder {
   /// Returns the chunk of a body, whose address must be the expected one.
   /// Errors: BadFormat, with the offset in the body (for a compressed content the message has the offset in the
   /// decompressed bytes); Unsupported for a body of a later version.
-  [[nodiscard]] Result<StoredChunk> decode(const ChunkPlace& expected, std::span<const std::byte> body,
+  [[nodiscard]] Result<StoredChunk> decode(const ChunkAddress& expected, std::span<const std::byte> body,
                                            const ChunkLimits& limits);
 
  private:
   struct Expander;
-  [[nodiscard]] Result<std::span<const std::byte>> content_of(const ChunkBodyHeader& header,
-                                                              std::span<const std::byte> body);
+  [[nodiscard]] Result<std::span<const std::byte>> impl_of(const ChunkBodyHeader& header,
+                                                           std::span<const std::byte> body);
   [[nodiscard]] Result<StoredChunk> read_sections(const ChunkBodyHeader& header, std::span<const std::byte> content,
                                                   const ChunkLimits& limits);
 

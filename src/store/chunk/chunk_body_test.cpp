@@ -20,7 +20,7 @@
 namespace quoin::store {
 namespace {
 
-constexpr ChunkPlace kPlace{7, 3, {-5, 1 << 20, -(1 << 24)}};
+constexpr ChunkAddress kPlace{7, 3, {-5, 1 << 20, -(1 << 24)}};
 
 std::vector<std::byte> encoded(const Chunk& voxels, const DensityChunk* densities = nullptr,
                                std::uint64_t revision = 11) {
@@ -262,8 +262,8 @@ TEST(ChunkBody, SaysWhatItIs) {
   EXPECT_EQ(header->sections & chunk_sections::kVoxels, chunk_sections::kVoxels);
 
   ChunkDecoder decoder;
-  for (const ChunkPlace& other : {ChunkPlace{8, 3, kPlace.chunk}, ChunkPlace{7, 2, kPlace.chunk},
-                                  ChunkPlace{7, 3, kPlace.chunk + IVec3{0, 0, 1}}}) {
+  for (const ChunkAddress& other : {ChunkAddress{8, 3, kPlace.chunk}, ChunkAddress{7, 2, kPlace.chunk},
+                                    ChunkAddress{7, 3, kPlace.chunk + IVec3{0, 0, 1}}}) {
     const auto back = decoder.decode(other, body, {&many_types(), 8.0F});
     ASSERT_FALSE(back.has_value());
     EXPECT_EQ(back.error().code, ErrorCode::BadFormat);
@@ -321,7 +321,7 @@ std::vector<std::byte> stored_raw(const std::vector<std::byte>& content, std::ui
   return body;
 }
 
-std::vector<std::byte> content_of(const Chunk& chunk) {
+std::vector<std::byte> impl_of(const Chunk& chunk) {
   VoxelRunWriter writer;
   std::vector<std::byte> content;
   writer.write(chunk, content);
@@ -337,7 +337,7 @@ TEST(ChunkBody, LiesBehindARightChecksumAreErrorsOrChunks) {
   for (int i = 0; i < 3'000; ++i) {
     const int kind = i % 3;
     Chunk chunk = chunk_of_boxes(random, kind == 0 ? 2 : 31, 4, 20);
-    std::vector<std::byte> content = content_of(chunk);
+    std::vector<std::byte> content = impl_of(chunk);
     std::uint8_t sections = chunk_sections::kVoxels;
     if (kind == 2) {
       put_some_data(random, types, 10, chunk);
@@ -368,7 +368,7 @@ TEST(ChunkBody, LiesAreNamed) {
   const VoxelRegistry types = types_for_tests(3);
   Chunk chunk(VoxelType{1});
   chunk.set(5, 0, 0, VoxelType{2});
-  const auto good = content_of(chunk);  // form, 1, types 1 and 2, 3 runs, 5 bytes: 4, 0, 262,137
+  const auto good = impl_of(chunk);  // form, 1, types 1 and 2, 3 runs, 5 bytes: 4, 0, 262,137
   ASSERT_TRUE(decoded(stored_raw(good, 1), types).has_value());
   const auto message = [&](std::size_t at, std::uint8_t byte) {
     auto content = good;

@@ -84,7 +84,7 @@ Status check_schema(Connection& database) {
   return {};
 }
 
-RegionPlace region_of(const ChunkPlace& place) {
+RegionPlace region_of(const ChunkAddress& place) {
   const IVec3 c = place.chunk;
   return {place.grid, place.level, {c.x >> kRegionShift, c.y >> kRegionShift, c.z >> kRegionShift}};
 }

@@ -54,7 +54,7 @@ struct RegionPlace {
 /// The range of possible chunks.
 inline constexpr IBox kAllChunks{{-(1 << 26), -(1 << 26), -(1 << 26)}, {1 << 26, 1 << 26, 1 << 26}};
 
-[[nodiscard]] RegionPlace region_of(const ChunkPlace& place);
+[[nodiscard]] RegionPlace region_of(const ChunkAddress& place);
 [[nodiscard]] std::int64_t key_of(std::int64_t region, IVec3 chunk);
 /// Returns the chunk of a key in a region. Ignores the upper bits of the key.
 [[nodiscard]] IVec3 chunk_of_key(const RegionPlace& region, std::int64_t key);

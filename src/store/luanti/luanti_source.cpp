@@ -65,7 +65,7 @@ std::string to_string(IVec3 place) {
 }
 
 /// Returns a database error without advice that only applies to Quoin's worlds.
-Error fault_of_database(Error error, const fs::path& path) {
+Error database_error(Error error, const fs::path& path) {
   if (error.code == ErrorCode::BadFormat) error.message = "the database is damaged";
   error.path = path.string();
   return error;
@@ -149,11 +149,11 @@ class Readers {
 
   Result<std::unique_ptr<Reader>> open() const {
     auto connection = connect();
-    if (!connection) return fault_of_database(connection.error(), path_);
+    if (!connection) return database_error(connection.error(), path_);
     auto row =
         connection->prepare(places_ == Places::Number ? "SELECT data FROM blocks WHERE pos = ?"
                                                       : "SELECT data FROM blocks WHERE x = ? AND y = ? AND z = ?");
-    if (!row) return fault_of_database(row.error(), path_);
+    if (!row) return database_error(row.error(), path_);
     return std::unique_ptr<Reader>(new Reader{std::move(*connection), std::move(*row)});
   }
 
@@ -283,29 +283,30 @@ class LuantiSource final : public ChunkSource {
     } else {
       for (int axis = 0; axis < 3; ++axis) reader.row.bind(axis, std::int64_t{place[axis]});
     }
-    const auto tell = [&](const Error& error) {
+    const auto report = [&](const Error& error) {
       std::string what = "block " + to_string(place) + ": ";
       if (error.byte_offset) what += "byte " + std::to_string(*error.byte_offset) + " of its row: ";
       broken.push_back(make_error(error.code, what + error.message, readers_->path().string()));
     };
     const auto found = reader.row.step();
     if (!found && found.error().code == ErrorCode::BadFormat) {
-      tell(fault_of_database(found.error(), {}));
+      report(database_error(found.error(), {}));
       return {};
     }
     if (!found && found.error().code == ErrorCode::LimitExceeded) {
-      tell(found.error());
+      report(found.error());
       return {};
     }
-    if (!found) return fault_of_database(found.error(), readers_->path());
+    if (!found) return database_error(found.error(), readers_->path());
     if (!*found) return {};
     const std::span<const std::byte> row = reader.row.bytes(0);
     if (!reader.row.is_bytes(0) || row.size() > kMaxRow) {
-      tell(make_error(ErrorCode::BadFormat, reader.row.is_bytes(0) ? "the row exceeds 16 MiB" : "the row has no data"));
+      report(
+          make_error(ErrorCode::BadFormat, reader.row.is_bytes(0) ? "the row exceeds 16 MiB" : "the row has no data"));
       return {};
     }
     if (const auto read = reader.blocks.read(row, reader.block); !read) {
-      tell(read.error());
+      report(read.error());
       return {};
     }
     return builder.put(reader.block, inside * kBlockEdge);
@@ -351,15 +352,15 @@ struct Extent {
 
 Result<Extent> find_extent(Readers& readers) {
   auto connection = readers.connect();
-  if (!connection) return fault_of_database(connection.error(), readers.path());
+  if (!connection) return database_error(connection.error(), readers.path());
   if (auto chosen = readers.choose(*connection); !chosen) return chosen.error();
   const bool is_number = readers.places() == Places::Number;
   auto rows = connection->prepare(is_number ? "SELECT pos FROM blocks" : "SELECT x, y, z FROM blocks");
-  if (!rows) return fault_of_database(rows.error(), readers.path());
+  if (!rows) return database_error(rows.error(), readers.path());
   Extent extent;
   for (;;) {
     const auto row = rows->step();
-    if (!row) return fault_of_database(row.error(), readers.path());
+    if (!row) return database_error(row.error(), readers.path());
     if (!*row) return extent;
     if (is_number) {
       extent.add(rows->is_integer(0) ? block_of(rows->integer(0)) : std::nullopt);

@@ -62,10 +62,10 @@ struct SaverState {
   WorldView view;
   std::size_t saved_cameras = 0;
   bool is_view_new = false;
-  bool is_begun = false;    ///< the world has a state of this scene
-  bool owes_lamps = false;  ///< lamp numbers differ from the scene's order
-  bool owes_all = false;    ///< a save was refused: the next save must contain everything
-  std::vector<PartKey> owed_removals;
+  bool is_begun = false;         ///< the world has a state of this scene
+  bool needs_lamp_save = false;  ///< lamp numbers differ from the scene's order
+  bool needs_full_save = false;  ///< a save was refused: the next save must contain everything
+  std::vector<PartKey> pending_removals;
 };
 
 }  // namespace quoin::store

@@ -47,7 +47,7 @@ class Load {
       ++done;
     }
     if (auto read = read_parts(); !read) return read;
-    tell_rest();
+    report_rest();
     remember();
     return {};
   }
@@ -56,7 +56,7 @@ class Load {
   void add_line(std::string line) {
     if (lines_++ < kMaxLines) loaded_.warnings.push_back(std::move(line));
   }
-  void tell_rest() {
+  void report_rest() {
     if (lines_ > kMaxLines) {
       loaded_.warnings.push_back("and " + std::to_string(lines_ - kMaxLines) + " more (quoin world check)");
     }
@@ -80,7 +80,7 @@ class Load {
     }
     bool is_cancelled = false;
     Status read =
-        WorldParts::each_chunk(world_, number, 0, threads, [&](const ChunkPlace& place, Result<StoredChunk> chunk) {
+        WorldParts::each_chunk(world_, number, 0, threads, [&](const ChunkAddress& place, Result<StoredChunk> chunk) {
           if (!chunk) {
             add_line(chunk.error().message);
             saved.unread.push_back(place.chunk);
@@ -199,9 +199,9 @@ class Load {
     state_.layers.next = after(part::kLayer);
     state_.lamps = scene_.lamps;
     for (std::size_t i = 0; i < lamp_numbers_.size(); ++i) {
-      state_.owes_lamps |= lamp_numbers_[i] != static_cast<std::int64_t>(i);
+      state_.needs_lamp_save |= lamp_numbers_[i] != static_cast<std::int64_t>(i);
     }
-    state_.owes_lamps |= lamp_numbers_.size() != scene_.lamps.size();
+    state_.needs_lamp_save |= lamp_numbers_.size() != scene_.lamps.size();
     state_.lamp_numbers = std::move(lamp_numbers_);
     state_.view = {loaded_.sun, loaded_.camera, loaded_.cameras};
     state_.saved_cameras = loaded_.cameras.size();

@@ -29,9 +29,9 @@ class Save {
       : world_(world), scene_(scene), state_(state), changes_(changes) {}
 
   Status run() {
-    for (const PartKey& key : std::exchange(state_.owed_removals, {}))
+    for (const PartKey& key : std::exchange(state_.pending_removals, {}))
       remove(key.kind.c_str(), std::get<std::int64_t>(key.id));
-    if (state_.owes_all) start_anew();
+    if (state_.needs_full_save) start_anew();
     if (auto done = put_types(); !done) return done;
     SceneChanges changed = scene_.changes_since(state_.scene);
     if (changed.all) name_everything(changed);
@@ -47,14 +47,14 @@ class Save {
     put_lamps();
     put_view();
     state_.is_begun = true;
-    state_.owes_all = false;
+    state_.needs_full_save = false;
     return {};
   }
   /// Restores the unsaved state after the store refused the changes.
   void give_back() {
-    state_.owes_all = true;
+    state_.needs_full_save = true;
     state_.is_view_new |= had_view_;
-    std::ranges::move(removed_, std::back_inserter(state_.owed_removals));
+    std::ranges::move(removed_, std::back_inserter(state_.pending_removals));
   }
 
  private:
@@ -195,7 +195,7 @@ class Save {
     SavedGrid& saved = is_new ? state_.grids[handle] : known->second;
     if (is_new) saved.number = world_.next_grid();
     const WorldGrid header{grid->name, grid->pivot, grid->canvas, grid->field.band()};
-    if (is_new || state_.owes_all || header != saved.header) changes_.put_grid(saved.number, header);
+    if (is_new || state_.needs_full_save || header != saved.header) changes_.put_grid(saved.number, header);
     saved.header = header;
     return put_chunks(*grid, saved, is_new);
   }
@@ -236,7 +236,8 @@ class Save {
   void put_lamps() {
     const std::vector<Lamp>& now = scene_.lamps;
     for (std::size_t i = 0; i < now.size(); ++i) {
-      if (!state_.owes_all && !state_.owes_lamps && i < state_.lamps.size() && state_.lamps[i] == now[i]) continue;
+      if (!state_.needs_full_save && !state_.needs_lamp_save && i < state_.lamps.size() && state_.lamps[i] == now[i])
+        continue;
       WorldParts::put(changes_, part::kLamp, static_cast<std::int64_t>(i), text_of(now[i]));
     }
     for (const std::int64_t number : state_.lamp_numbers) {
@@ -245,7 +246,7 @@ class Save {
     state_.lamp_numbers.resize(now.size());
     std::iota(state_.lamp_numbers.begin(), state_.lamp_numbers.end(), 0);
     state_.lamps = now;
-    state_.owes_lamps = false;
+    state_.needs_lamp_save = false;
   }
 
   void put_view() {

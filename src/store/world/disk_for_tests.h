@@ -127,7 +127,7 @@ class TestDisk {
     return found == names_.end() ? 0 : found->second->content.size();
   }
   /// To damage it.
-  [[nodiscard]] Bytes* content_of(const std::string& name) {
+  [[nodiscard]] Bytes* impl_of(const std::string& name) {
     const auto found = names_.find(name);
     return found == names_.end() ? nullptr : &found->second->content;
   }

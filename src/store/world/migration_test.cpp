@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 #include <quoin/io/file.h>
-#include <quoin/store/world_care.h>
+#include <quoin/store/world_maintenance.h>
 
 #include "store/database/schema.h"
 #include "store/world/world_for_tests.h"

@@ -51,12 +51,12 @@ inline void apply(Expected& expected, int i) {
   expected.saves = i;
 }
 
-inline ChunkPlace place_of(int place) {
+inline ChunkAddress place_of(int place) {
   return {0, 0, {place % 5 - 2, place / 5, 31 + place % 3}};
 }
 
 // Returns a content of several rows, identified by its type.
-inline Chunk content_of(VoxelType type) {
+inline Chunk impl_of(VoxelType type) {
   Chunk chunk(type);
   for (int i = 0; i < 40; ++i) chunk.set(i, (i * type) % 64, (i * 5) % 64, kAir);
   return chunk;
@@ -68,7 +68,7 @@ inline WorldChanges changes_of(int i) {
   const auto bytes = std::as_bytes(std::span(number));
   changes.put_value("saves", {bytes.begin(), bytes.end()});
   each_of_save(
-      i, [&](int place, VoxelType type) { changes.put_chunk(place_of(place), {content_of(type)}); },
+      i, [&](int place, VoxelType type) { changes.put_chunk(place_of(place), {impl_of(type)}); },
       [&](int place) { changes.remove_chunk(place_of(place)); });
   return changes;
 }
@@ -109,7 +109,7 @@ inline Found look_at(const std::string& file, const char* vfs) {
     const auto chunk = world->load_chunk(place_of(place));
     if (!chunk) return {-1, chunk.error().message};
     const VoxelType type = expected.types[static_cast<std::size_t>(place)];
-    const bool is_right = chunk->has_value() ? type != kAir && (*chunk)->voxels == content_of(type) : type == kAir;
+    const bool is_right = chunk->has_value() ? type != kAir && (*chunk)->voxels == impl_of(type) : type == kAir;
     if (!is_right) return {-1, "after " + std::to_string(saves) + " saves place " + std::to_string(place)};
   }
   return {saves, ""};

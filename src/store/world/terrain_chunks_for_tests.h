@@ -11,7 +11,7 @@ namespace quoin {
 /// Mixed chunks of generated terrain, in their places, a fifth of them edited as players do; the same on every machine.
 struct TerrainChunks {
   VoxelRegistry types;
-  std::vector<ChunkPlace> places;
+  std::vector<ChunkAddress> places;
   std::vector<StoredChunk> chunks;
 
   /// `units`: of 32 voxels along x and z.

@@ -44,12 +44,12 @@ WorldChanges::WorldChanges(WorldChanges&&) noexcept = default;
 WorldChanges& WorldChanges::operator=(WorldChanges&&) noexcept = default;
 WorldChanges::~WorldChanges() = default;
 
-void WorldChanges::put_chunk(const ChunkPlace& place, StoredChunk chunk) {
-  content_->chunks.insert_or_assign(place, std::move(chunk));
+void WorldChanges::put_chunk(const ChunkAddress& address, StoredChunk chunk) {
+  content_->chunks.insert_or_assign(address, std::move(chunk));
 }
 
-void WorldChanges::remove_chunk(const ChunkPlace& place) {
-  content_->chunks.insert_or_assign(place, std::nullopt);
+void WorldChanges::remove_chunk(const ChunkAddress& address) {
+  content_->chunks.insert_or_assign(address, std::nullopt);
 }
 
 void WorldChanges::put_types(const VoxelRegistry& types, VoxelType first) {

@@ -15,8 +15,8 @@
 
 namespace quoin::store {
 
-struct ChunkPlaceHash {
-  std::size_t operator()(const ChunkPlace& place) const {
+struct ChunkAddressHash {
+  std::size_t operator()(const ChunkAddress& place) const {
     std::uint32_t hash = mix_bits(place.grid ^ std::uint32_t{place.level} << 24);
     for (int axis = 0; axis < 3; ++axis) hash = mix_bits(hash ^ static_cast<std::uint32_t>(place.chunk[axis]));
     return hash;
@@ -27,7 +27,7 @@ using PartBody = std::vector<std::byte>;
 
 struct ChangeSet {
   std::set<std::uint32_t> removed_grids;  ///< applied first
-  std::unordered_map<ChunkPlace, std::optional<StoredChunk>, ChunkPlaceHash> chunks;
+  std::unordered_map<ChunkAddress, std::optional<StoredChunk>, ChunkAddressHash> chunks;
   std::map<PartKey, std::optional<PartBody>> parts;
 
   [[nodiscard]] bool empty() const { return removed_grids.empty() && chunks.empty() && parts.empty(); }
@@ -57,7 +57,7 @@ struct WorldParts {
   /// false. Damaged chunks are passed as errors. Decodes on several threads, in bounded memory.
   [[nodiscard]] static Status each_chunk(const WorldStore& world, std::uint32_t grid, std::uint8_t level,
                                          Threads threads,
-                                         FunctionRef<bool(const ChunkPlace& place, Result<StoredChunk> chunk)> visit);
+                                         FunctionRef<bool(const ChunkAddress& place, Result<StoredChunk> chunk)> visit);
   /// Returns a line for each damaged type or grid found on opening.
   [[nodiscard]] static std::vector<std::string> damage(const WorldStore& world);
 

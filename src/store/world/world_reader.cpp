@@ -78,7 +78,7 @@ Result<std::optional<std::int64_t>> WorldReader::region_id(const RegionPlace& pl
   return id;
 }
 
-Result<std::optional<std::vector<std::byte>>> WorldReader::chunk_body(const ChunkPlace& place) {
+Result<std::optional<std::vector<std::byte>>> WorldReader::chunk_body(const ChunkAddress& place) {
   const RegionPlace wanted = region_of(place);
   const auto known = known_regions_.find(wanted);
   const bool was_known = known != known_regions_.end();
@@ -172,7 +172,7 @@ Status WorldReader::find_chunks(std::uint32_t grid, std::uint8_t level, const IB
 }
 
 Status WorldReader::each_body(std::uint32_t grid, std::uint8_t level,
-                              FunctionRef<bool(const ChunkPlace&, std::span<const std::byte>)> visit) {
+                              FunctionRef<bool(const ChunkAddress&, std::span<const std::byte>)> visit) {
   const auto regions = find_regions(grid, level, kAllChunks);
   if (!regions) return regions.error();
   const auto statement = ready(bodies_, kSelectBodies);
@@ -193,7 +193,7 @@ Status WorldReader::each_body(std::uint32_t grid, std::uint8_t level,
   return {};
 }
 
-Status WorldReader::each_place(FunctionRef<bool(const ChunkPlace&)> visit) {
+Status WorldReader::each_place(FunctionRef<bool(const ChunkAddress&)> visit) {
   std::map<std::int64_t, RegionPlace> places;
   auto regions = connection_.prepare("SELECT id, grid, level, x, y, z FROM regions");
   if (!regions) return regions.error();

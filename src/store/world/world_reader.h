@@ -20,15 +20,15 @@ class WorldReader {
   explicit WorldReader(Connection connection) : connection_(std::move(connection)) {}
 
   /// Returns the chunk's row; nullopt if there is none.
-  [[nodiscard]] Result<std::optional<std::vector<std::byte>>> chunk_body(const ChunkPlace& place);
+  [[nodiscard]] Result<std::optional<std::vector<std::byte>>> chunk_body(const ChunkAddress& place);
   /// Adds the addresses of a grid's and level's chunks in a box of chunks to `out`, in no order.
   [[nodiscard]] Status find_chunks(std::uint32_t grid, std::uint8_t level, const IBox& box, std::vector<IVec3>& out);
   /// Calls `visit` for the chunks' rows in the order of their keys, until it returns false.
   [[nodiscard]] Status each_body(std::uint32_t grid, std::uint8_t level,
-                                 FunctionRef<bool(const ChunkPlace& place, std::span<const std::byte> body)> visit);
+                                 FunctionRef<bool(const ChunkAddress& place, std::span<const std::byte> body)> visit);
   /// Calls `visit` for the addresses of all chunks of all grids and levels, in no order, until it returns false. Does
   /// not read their bodies. Skips chunks in missing regions.
-  [[nodiscard]] Status each_place(FunctionRef<bool(const ChunkPlace& place)> visit);
+  [[nodiscard]] Status each_place(FunctionRef<bool(const ChunkAddress& place)> visit);
   [[nodiscard]] Result<std::vector<RegionPlace>> regions();
 
   /// Returns the part's body. Errors: BadFormat if its checksum is wrong.

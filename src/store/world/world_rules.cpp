@@ -33,7 +33,7 @@ Status put_type(VoxelRegistry& types, std::int64_t number, const VoxelProperties
   return {};
 }
 
-Status check_data(const ChunkPlace& place, const Chunk& chunk, const VoxelRegistry& types) {
+Status check_data(const ChunkAddress& place, const Chunk& chunk, const VoxelRegistry& types) {
   if (chunk.data_count() == 0) return {};
   std::string fault;
   std::size_t bytes = 0;
@@ -48,7 +48,7 @@ Status check_data(const ChunkPlace& place, const Chunk& chunk, const VoxelRegist
   return {};
 }
 
-Status check_types(const ChunkPlace& place, const Chunk& chunk, const VoxelRegistry& types) {
+Status check_types(const ChunkAddress& place, const Chunk& chunk, const VoxelRegistry& types) {
   for (const VoxelType type : chunk.types()) {
     if (type < types.size()) continue;
     return make_error(ErrorCode::InvalidArgument,
@@ -67,7 +67,7 @@ VoxelProperties lost_type(std::int64_t number) {
   return properties;
 }
 
-std::string about(const ChunkPlace& place) {
+std::string about(const ChunkAddress& place) {
   std::string text = "chunk (";
   for (int axis = 0; axis < 3; ++axis) text += std::to_string(place.chunk[axis]) + (axis < 2 ? ", " : ") of grid ");
   return text + std::to_string(place.grid);

@@ -32,7 +32,7 @@ struct WorldRules {
 /// Returns the placeholder of a lost type: magenta, so that it is visible.
 [[nodiscard]] VoxelProperties lost_type(std::int64_t number);
 /// Returns a text such as "chunk (1, 2, 3) of grid 0".
-[[nodiscard]] std::string about(const ChunkPlace& place);
+[[nodiscard]] std::string about(const ChunkAddress& place);
 /// Checks changes as documented for WorldStore::save.
 [[nodiscard]] Status check_changes(const ChangeSet& changes, const WorldRules& rules);
 

@@ -147,7 +147,7 @@ struct WorldStore::Impl {
     const std::scoped_lock guard(mutex);
     rules = std::move(shared);
   }
-  Result<StoredChunk> decode(ReadKit& kit, const ChunkPlace& place, std::span<const std::byte> body) const {
+  Result<StoredChunk> decode(ReadKit& kit, const ChunkAddress& place, std::span<const std::byte> body) const {
     auto chunk = decode_with(kit.decoder, place, body, *current_rules());
     if (chunk || writer != nullptr) return chunk;
     // Another process may have added types and grids since.
@@ -156,7 +156,7 @@ struct WorldStore::Impl {
     set_rules(std::move(*now));
     return decode_with(kit.decoder, place, body, *current_rules());
   }
-  static Result<StoredChunk> decode_with(ChunkDecoder& decoder, const ChunkPlace& place,
+  static Result<StoredChunk> decode_with(ChunkDecoder& decoder, const ChunkAddress& place,
                                          std::span<const std::byte> body, const WorldRules& rules) {
     const auto grid = rules.grids.find(place.grid);
     const float band = grid == rules.grids.end() ? WorldGrid{}.band : grid->second.band;
@@ -280,7 +280,7 @@ Result<WorldStore> WorldParts::begin(std::unique_ptr<WorldStore::Impl> impl, std
   return WorldStore(std::move(impl));
 }
 
-Result<std::optional<StoredChunk>> WorldStore::load_chunk(const ChunkPlace& place) const {
+Result<std::optional<StoredChunk>> WorldStore::load_chunk(const ChunkAddress& place) const {
   if (impl_->writer != nullptr) {
     if (auto pending = impl_->writer->pending_chunk(place)) return std::move(*pending);
   }
@@ -389,9 +389,9 @@ Status WorldParts::each(const WorldStore& world, const char* kind, FunctionRef<v
 }
 
 Status WorldParts::each_chunk(const WorldStore& world, std::uint32_t grid, std::uint8_t level, Threads threads,
-                              FunctionRef<bool(const ChunkPlace&, Result<StoredChunk>)> visit) {
+                              FunctionRef<bool(const ChunkAddress&, Result<StoredChunk>)> visit) {
   struct Row {
-    ChunkPlace place;
+    ChunkAddress place;
     std::vector<std::byte> body;
     Result<StoredChunk> chunk = StoredChunk{};
   };
@@ -414,7 +414,7 @@ Status WorldParts::each_chunk(const WorldStore& world, std::uint32_t grid, std::
     return is_wanted;
   };
   const std::size_t slice = std::size_t{64} * workers;
-  const Status done = (*kit)->reader.each_body(grid, level, [&](const ChunkPlace& place, auto body) {
+  const Status done = (*kit)->reader.each_body(grid, level, [&](const ChunkAddress& place, auto body) {
     rows.push_back({place, {body.begin(), body.end()}});
     return rows.size() < slice || pass_on();
   });

@@ -206,7 +206,7 @@ TEST(WorldStore, ThreadsReadAndWriteAtOnce) {
   for (int t = 0; t < 4; ++t) {
     threads.emplace_back([&, t] {
       for (std::uint32_t i = 0; i < 60; ++i) {
-        const ChunkPlace place{0, 0, {t, static_cast<int>(i % 5), 0}};
+        const ChunkAddress place{0, 0, {t, static_cast<int>(i % 5), 0}};
         WorldChanges changes;
         changes.put_chunk(place, {random_chunk(i, 9)});
         const auto ticket = world.save(std::move(changes));

@@ -132,7 +132,7 @@ WorldStats WorldWriter::stats() const {
   return stats_;
 }
 
-std::optional<std::optional<StoredChunk>> WorldWriter::pending_chunk(const ChunkPlace& place) const {
+std::optional<std::optional<StoredChunk>> WorldWriter::pending_chunk(const ChunkAddress& place) const {
   const std::scoped_lock lock(mutex_);
   const auto found = pending_chunks_.find(place);
   if (found != pending_chunks_.end()) return found->second.content;
@@ -209,12 +209,12 @@ void WorldWriter::run() {
 
 void WorldWriter::finish(std::list<Save> group, const Status& outcome) {
   Save& save = group.front();
-  std::vector<OnSaved> told;
+  std::vector<OnSaved> reported;
   if (outcome) {
-    told = std::move(save.on_saved);
+    reported = std::move(save.on_saved);
   } else {
     try {
-      told = save.on_saved;
+      reported = save.on_saved;
     } catch (const std::bad_alloc&) {  // callers are notified after the retry
     }
   }
@@ -234,7 +234,7 @@ void WorldWriter::finish(std::list<Save> group, const Status& outcome) {
     }
   }
   done_.notify_all();
-  for (const OnSaved& on_saved : told) on_saved(outcome);
+  for (const OnSaved& on_saved : reported) on_saved(outcome);
 }
 
 // Rolls back an unfinished commit.

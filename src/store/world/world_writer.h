@@ -42,7 +42,7 @@ class WorldWriter {
   [[nodiscard]] WorldStats stats() const;
 
   /// Returns the chunk to be saved, or an inner nullopt if it is to be removed; nullopt if it has no pending change.
-  [[nodiscard]] std::optional<std::optional<StoredChunk>> pending_chunk(const ChunkPlace& place) const;
+  [[nodiscard]] std::optional<std::optional<StoredChunk>> pending_chunk(const ChunkAddress& place) const;
   /// As `pending_chunk`.
   [[nodiscard]] std::optional<std::optional<PartBody>> pending_part(const PartKey& key) const;
   /// The pending changes to the chunks of a grid and level in a box: each chunk with true if it will exist, false if it
@@ -68,7 +68,7 @@ class WorldWriter {
   };
   struct Encoded {
     std::int64_t key = 0;
-    const ChunkPlace* place = nullptr;
+    const ChunkAddress* place = nullptr;
     const StoredChunk* chunk = nullptr;  ///< null: the row is removed
     std::vector<std::byte> body;
     Status outcome;
@@ -106,7 +106,7 @@ class WorldWriter {
   std::condition_variable work_;
   std::condition_variable done_;
   std::list<Save> queue_;
-  std::unordered_map<ChunkPlace, Pending<StoredChunk>, ChunkPlaceHash> pending_chunks_;
+  std::unordered_map<ChunkAddress, Pending<StoredChunk>, ChunkAddressHash> pending_chunks_;
   std::map<PartKey, Pending<PartBody>> pending_parts_;
   std::map<std::uint32_t, std::uint64_t> pending_removed_;  // grids, with their tickets
   std::uint64_t last_ticket_ = 0;

@@ -182,7 +182,8 @@ template <int kLanes>
     is_within &= cell[axis] < 63;
   }
   std::uint32_t left = bits_of(is_within);
-  std::uint32_t apart = bits_of(wanted) & ~left;  // cells with corners in several chunks, or in a chunk without storage
+  std::uint32_t separate =
+      bits_of(wanted) & ~left;  // cells with corners in several chunks, or in a chunk without storage
   Places pairs[4] = {};
   // Returns the lanes in the chunk of `lane`.
   const auto read_chunk_of = [&](int lane) {
@@ -191,7 +192,7 @@ template <int kLanes>
     const std::uint32_t those = bits_of(here);
     const DensityStorage* const storage = last.find(field, chunk[0][lane], chunk[1][lane], chunk[2][lane]);
     if (storage == nullptr) {
-      apart |= those;
+      separate |= those;
       return those;
     }
     for (int row = 0; row < 4; ++row) {
@@ -206,11 +207,11 @@ template <int kLanes>
     corners[2 * row] = floats_from_halves<kLanes>(pairs[row] << 16);
     corners[2 * row + 1] = floats_from_halves<kLanes>(pairs[row]);
   }
-  if (apart == 0) return;
+  if (separate == 0) return;
   alignas(64) float numbers[8][kLanes];  // a copy in memory, so that `corners` stays in registers
   std::memcpy(numbers, corners, sizeof numbers);
-  for (; apart != 0; apart &= apart - 1) {
-    const int lane = std::countr_zero(apart);
+  for (; separate != 0; separate &= separate - 1) {
+    const int lane = std::countr_zero(separate);
     float its[8];
     field.read(*field.grid, at[0][lane], at[1][lane], at[2][lane], its);
     for (int i = 0; i < 8; ++i) numbers[i][lane] = its[i];

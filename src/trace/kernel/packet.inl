@@ -138,12 +138,12 @@ inline Beam beam_of(const BeamLanes& lanes, F exit_t) {
 // Returns true if all rays start and end near the first one.
 inline bool is_narrow(const Lanes& lanes) {
   const int first = std::countr_zero(bits(lanes.live) | 1U << (kWidth - 1));
-  const auto apart = [first](F a) {
+  const auto separate = [first](F a) {
     alignas(64) float each[kWidth];
     store(each, a);
     return abs(a - all(each[first]));
   };
-  const auto width = [&](const Axis& axis) { return apart(axis.origin) + apart(axis.direction) * lanes.exit_t; };
+  const auto width = [&](const Axis& axis) { return separate(axis.origin) + separate(axis.direction) * lanes.exit_t; };
   const F widest = max(max(width(lanes.x), width(lanes.y)), width(lanes.z));
   return !any(lanes.live & (all(kBeamWidth) < widest));
 }

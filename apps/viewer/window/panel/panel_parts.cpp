@@ -77,10 +77,10 @@ void choose_new_type(ViewState& state, Rgba8 colour, float emission) {
   const ScenePause pause(*state.open.backend);
   state.stats.is_settled = false;
   const auto type = state.open.document->type_of_colour(colour, emission);
-  if (!type) return state.tell(type.error());
+  if (!type) return state.report(type.error());
   state.brush.type = *type;
   const char* what = emission > 0.0F ? "selected lamp type " : "selected colour type ";
-  state.tell(what + std::to_string(*type));
+  state.report(what + std::to_string(*type));
 }
 
 /// Draws the buttons that add a colour or a lamp to the palette.
@@ -146,7 +146,7 @@ void draw_file_cameras(const std::vector<FileCamera>& cameras, MenuChoice& choic
 }
 
 // Notes the missing light in images of meshes. Before the device has drawn, its abilities are unknown.
-void tell_of_plain_light(const ViewState& state) {
+void report_plain_light(const ViewState& state) {
   if (!state.open.backend || state.open.backend->stats().empty()) return;
   if (state.open.backend->traces_light(state.settings.mode)) return;
   ImGui::TextWrapped(
@@ -218,14 +218,14 @@ void draw_slice_place(SlicePlace& slice) {
   }
 }
 
-void draw_picture_part(ViewState& state) {
+void draw_image_part(ViewState& state) {
   if (!heading("Image")) return;
   Settings& settings = state.settings;
   int mode = static_cast<int>(settings.mode);
   if (ImGui::Combo("drawn as", &mode, "rays\0blocks\0smooth\0densities\0paths\0")) {
     const auto wanted = static_cast<DrawMode>(mode);
     const char* const why = state.why_not_drawn_as(wanted);
-    why == nullptr ? void(settings.mode = wanted) : state.tell(why);
+    why == nullptr ? void(settings.mode = wanted) : state.report(why);
   }
   if (settings.mode == DrawMode::Density) draw_slice_place(settings.slice);
   ImGui::Checkbox("coarser far away", &settings.detail_by_pixels);
@@ -235,7 +235,7 @@ void draw_picture_part(ViewState& state) {
   ImGui::EndDisabled();
   if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", kDetailLegend);
   if (has_meshes(settings.mode)) {
-    tell_of_plain_light(state);
+    report_plain_light(state);
     int edges = static_cast<int>(settings.wireframe);
     if (ImGui::Combo("edges", &edges, "none\0over surfaces\0edges only\0")) {
       settings.wireframe = static_cast<Wireframe>(edges);

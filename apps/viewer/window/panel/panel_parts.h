@@ -11,7 +11,7 @@ bool heading(const char* name, bool is_open = true);
 void draw_tool_part(ViewState& state, MenuChoice& choice);
 /// Layers, groups and instances, with switches to show and hide them.
 void draw_scene_part(ViewState& state);
-void draw_picture_part(ViewState& state);
+void draw_image_part(ViewState& state);
 void draw_camera_part(ViewState& state, MenuChoice& choice);
 void draw_light_part(ViewState& state);
 void draw_statistics_part(const ViewState& state);

@@ -114,12 +114,12 @@ std::string hover_text(const ViewState& state) {
   return name.empty() ? line : line + "   in " + name;
 }
 
-std::string picture_text(const ViewState& state) {
+std::string image_text(const ViewState& state) {
   if (!state.open.backend) return "";
   if (std::string activity = state.open.backend->activity(); !activity.empty()) return activity;
   const FrameStats& stats = state.stats;
   if (stats.is_settled) return "done";
-  if (stats.width < state.picture_place.w) return "drawing";
+  if (stats.width < state.image_place.w) return "drawing";
   return "refining (" + std::to_string(stats.samples) + ")";
 }
 
@@ -155,16 +155,16 @@ float draw_status(const ViewState& state) {
   ImGui::PushStyleColor(ImGuiCol_WindowBg, ImGui::GetStyleColorVec4(ImGuiCol_MenuBarBg));
   ImGui::Begin("status", nullptr, bar_flags());
   ImGui::TextUnformatted(hover_text(state).c_str());
-  std::string right = picture_text(state) + "   orbit";
+  std::string right = image_text(state) + "   orbit";
   if (state.camera.mode == CameraMode::Fly) {
     std::array<char, 64> speed{};
     std::snprintf(speed.data(), speed.size(), "   fly, %.3g voxels per second", state.camera.speed());
-    right = picture_text(state) + speed.data();
+    right = image_text(state) + speed.data();
   }
   if (state.camera.mode == CameraMode::Walk) {
     std::array<char, 64> body{};
     std::snprintf(body.data(), body.size(), "   walk, %.3g voxels tall", state.walker.height());
-    right = picture_text(state) + body.data();
+    right = image_text(state) + body.data();
   }
   // Face counts of a world would cover only the loaded chunks.
   const WorldWindow* const world = state.open.document->world();
@@ -188,7 +188,7 @@ float draw_panel(ViewState& state, float scale, float top, float bottom, MenuCho
   ImGui::PushItemWidth(-0.36F * width);
   draw_tool_part(state, choice);
   draw_scene_part(state);
-  draw_picture_part(state);
+  draw_image_part(state);
   draw_camera_part(state, choice);
   draw_light_part(state);
   draw_statistics_part(state);
@@ -212,7 +212,7 @@ void draw_help(ViewState& state, float scale) {
 void draw_message(ViewState& state, float bottom) {
   const Message& message = *state.message;
   const float unit = static_cast<float>(1.0 / state.pixels_per_unit);
-  const SDL_Rect& place = state.picture_place;
+  const SDL_Rect& place = state.image_place;
   const float middle = (static_cast<float>(place.x) + 0.5F * static_cast<float>(place.w)) * unit;
   ImGui::SetNextWindowPos({middle, ImGui::GetIO().DisplaySize.y - bottom - 12.0F}, ImGuiCond_Always, {0.5F, 1.0F});
   ImGui::SetNextWindowBgAlpha(0.92F);
@@ -234,7 +234,7 @@ void draw_message(ViewState& state, float bottom) {
 void draw_progress(ViewState& state, float scale, float top) {
   constexpr std::chrono::milliseconds kShort{250};  // shorter notes would only flicker
   const bool has_image = state.open.backend != nullptr && state.stats.width > 0;
-  const bool is_stand_in = has_image && state.picture.mode != state.settings.mode;
+  const bool is_stand_in = has_image && state.image.mode != state.settings.mode;
   const auto progress = has_image ? state.open.backend->progress() : std::nullopt;
   if (!is_stand_in && !progress) {
     state.waiting_since.reset();
@@ -244,7 +244,7 @@ void draw_progress(ViewState& state, float scale, float top) {
   if (!state.waiting_since) state.waiting_since = now;
   if (now - *state.waiting_since < kShort) return;
   const auto unit = static_cast<float>(1.0 / state.pixels_per_unit);
-  const SDL_Rect& place = state.picture_place;
+  const SDL_Rect& place = state.image_place;
   const float middle = (static_cast<float>(place.x) + 0.5F * static_cast<float>(place.w)) * unit;
   ImGui::SetNextWindowPos({middle, top + 12.0F}, ImGuiCond_Always, {0.5F, 0.0F});
   ImGui::SetNextWindowBgAlpha(0.92F);
@@ -255,14 +255,14 @@ void draw_progress(ViewState& state, float scale, float top) {
   const std::string activity = state.open.backend->activity();
   ImGui::Text("%s: %s", mode_name(state.settings.mode), activity.empty() ? "drawing" : activity.c_str());
   if (progress) ImGui::ProgressBar(static_cast<float>(*progress), {220.0F * scale, 6.0F * scale}, "");
-  if (is_stand_in) ImGui::TextDisabled("shown meanwhile: %s", mode_name(state.picture.mode));
+  if (is_stand_in) ImGui::TextDisabled("shown meanwhile: %s", mode_name(state.image.mode));
   ImGui::End();
   ImGui::PopStyleVar();
 }
 
 void draw_welcome(const ViewState& state, MenuChoice& choice) {
   const float unit = static_cast<float>(1.0 / state.pixels_per_unit);
-  const SDL_Rect& place = state.picture_place;
+  const SDL_Rect& place = state.image_place;
   ImGui::SetNextWindowPos({(static_cast<float>(place.x) + 0.5F * static_cast<float>(place.w)) * unit,
                            (static_cast<float>(place.y) + 0.5F * static_cast<float>(place.h)) * unit},
                           ImGuiCond_Always, {0.5F, 0.5F});

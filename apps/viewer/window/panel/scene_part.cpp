@@ -77,10 +77,10 @@ class SceneList {
     } else {
       ImGui::TextUnformatted(name.c_str());
     }
-    tell_if_cut(name);
+    report_cut(name);
   }
 
-  static void tell_if_cut(const std::string& name) {
+  static void report_cut(const std::string& name) {
     const ImVec2 size = ImGui::CalcTextSize(name.c_str());
     const float end = ImGui::GetItemRectMax().x;
     const float room = ImGui::GetWindowPos().x + ImGui::GetWindowContentRegionMax().x;
@@ -100,7 +100,7 @@ class SceneList {
       ImGui::SameLine();
       const char* name = group.name.empty() ? "group" : group.name.c_str();
       const bool is_open = ImGui::TreeNode("group", "%s", name);
-      tell_if_cut(group.name);
+      report_cut(group.name);
       if (is_open) {
         draw_below(handle);
         ImGui::TreePop();

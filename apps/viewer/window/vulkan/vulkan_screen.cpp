@@ -52,8 +52,8 @@ class VulkanScreen final : public Screen {
   [[nodiscard]] bool has_vsync() const override { return true; }
   [[nodiscard]] std::shared_ptr<VulkanRenderer> renderer() const override { return renderer_; }
   Status set_font(int width, int height, std::span<const std::uint8_t> opacity) override;
-  Status set_picture(const ViewFrame& frame) override;
-  void forget_picture() override { picture_.reset(); }
+  Status show_image(const ViewFrame& frame) override;
+  void forget_image() override { image_.reset(); }
   Status show(const SDL_Rect& place, const ImDrawData& gui) override;
 
  private:
@@ -61,8 +61,8 @@ class VulkanScreen final : public Screen {
 
   std::shared_ptr<VulkanRenderer> renderer_;
   std::unique_ptr<VulkanWindow> shown_in_;
-  std::shared_ptr<const VulkanPicture> picture_;
-  std::shared_ptr<VulkanPicture> uploaded_;  // images rendered by the processor
+  std::shared_ptr<const VulkanImage> image_;
+  std::shared_ptr<VulkanImage> uploaded_;  // images rendered by the processor
   std::vector<OverlayVertex> vertices_;
   std::vector<std::uint16_t> indices_;
   std::vector<OverlayDraw> draws_;
@@ -94,14 +94,14 @@ Status VulkanScreen::set_font(int width, int height, std::span<const std::uint8_
   return shown_in_->set_font(width, height, opacity);
 }
 
-Status VulkanScreen::set_picture(const ViewFrame& frame) {
+Status VulkanScreen::show_image(const ViewFrame& frame) {
   if (frame.on_device) {
-    picture_ = frame.on_device;
+    image_ = frame.on_device;
     return {};
   }
-  if (!uploaded_) uploaded_ = std::make_shared<VulkanPicture>(*renderer_);
+  if (!uploaded_) uploaded_ = std::make_shared<VulkanImage>(*renderer_);
   if (Status written = uploaded_->write(frame.colour); !written) return written;
-  picture_ = uploaded_;
+  image_ = uploaded_;
   return {};
 }
 
@@ -138,7 +138,7 @@ void VulkanScreen::collect(const ImDrawData& gui) {
 Status VulkanScreen::show(const SDL_Rect& place, const ImDrawData& gui) {
   collect(gui);
   const SDL_Point size = output_size();
-  return shown_in_->present(size.x, size.y, picture_.get(), {place.x, place.y, place.w, place.h},
+  return shown_in_->present(size.x, size.y, image_.get(), {place.x, place.y, place.w, place.h},
                             {vertices_, indices_, draws_});
 }
 

@@ -61,9 +61,9 @@ struct VulkanWindow::Impl {
   VkResult make_objects();
   Status fit(int width, int height);
   Status write(const Overlay& overlay);
-  Status begin(const VulkanPicture* picture);
-  Status record(std::uint32_t shown, const VulkanPicture* picture, const PixelRect& place, const Overlay& overlay);
-  void draw_picture(const VulkanPicture& picture, const PixelRect& place) const;
+  Status begin(const VulkanImage* rendered);
+  Status record(std::uint32_t shown, const VulkanImage* rendered, const PixelRect& place, const Overlay& overlay);
+  void draw_image(const VulkanImage& rendered, const PixelRect& place) const;
   void draw_overlay(const Overlay& overlay) const;
   VkResult show(std::uint32_t shown);
   VkResult wait();
@@ -78,7 +78,7 @@ struct VulkanWindow::Impl {
   VkCommandBuffer commands = VK_NULL_HANDLE;
   VkFence done = VK_NULL_HANDLE;
   VkSemaphore handed = VK_NULL_HANDLE;
-  PictureImage image;
+  ImageImage image;
   WindowBuffer vertices;
   WindowBuffer indices;
   WindowBuffer font;
@@ -152,12 +152,12 @@ Status VulkanWindow::Impl::write(const Overlay& overlay) {
   return written ? indices.put(std::as_bytes(overlay.indices)) : written;
 }
 
-void VulkanWindow::Impl::draw_picture(const VulkanPicture& picture, const PixelRect& place) const {
+void VulkanWindow::Impl::draw_image(const VulkanImage& image, const PixelRect& place) const {
   WindowPush push;
-  push.source = {picture.width(), picture.height()};
+  push.source = {image.width(), image.height()};
   push.origin = {static_cast<float>(place.x), static_cast<float>(place.y)};
   push.scale = glm::vec2(push.source) / glm::vec2(static_cast<float>(place.width), static_cast<float>(place.height));
-  pipelines->bind_picture(commands, push);
+  pipelines->bind_image(commands, push);
   const VkRect2D scissor = within(place, swapchain->extent());
   device->api().vkCmdSetScissor(commands, 0, 1, &scissor);
   device->api().vkCmdDraw(commands, 3, 1, 0, 0);
@@ -181,26 +181,26 @@ void VulkanWindow::Impl::draw_overlay(const Overlay& overlay) const {
 }
 
 // Begins the command buffer and copies the image into one that shaders read.
-Status VulkanWindow::Impl::begin(const VulkanPicture* picture) {
+Status VulkanWindow::Impl::begin(const VulkanImage* rendered) {
   const VulkanFunctions& api = device->api();
-  if (picture != nullptr) {
-    const auto is_another = image.fit(picture->width(), picture->height());
+  if (rendered != nullptr) {
+    const auto is_another = image.fit(rendered->width(), rendered->height());
     if (!is_another) return is_another.error();
-    if (*is_another) pipelines->set_picture(image.view());
+    if (*is_another) pipelines->show_image(image.view());
   }
   auto info = info_of<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
   info.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
   VkResult result = api.vkResetCommandPool(device->handle(), pool, 0);
   if (result == VK_SUCCESS) result = api.vkBeginCommandBuffer(commands, &info);
   if (result != VK_SUCCESS) return device->check(result, kShowing);
-  return picture == nullptr ? Status{} : picture->record_copy(commands, image.target());
+  return rendered == nullptr ? Status{} : rendered->record_copy(commands, image.target());
 }
 
-Status VulkanWindow::Impl::record(std::uint32_t shown, const VulkanPicture* picture, const PixelRect& place,
+Status VulkanWindow::Impl::record(std::uint32_t shown, const VulkanImage* image, const PixelRect& place,
                                   const Overlay& overlay) {
   const VulkanFunctions& api = device->api();
-  const bool is_seen = picture != nullptr && picture->samples() > 0 && place.width > 0 && place.height > 0;
-  if (Status begun = begin(is_seen ? picture : nullptr); !begun) return begun;
+  const bool is_seen = image != nullptr && image->samples() > 0 && place.width > 0 && place.height > 0;
+  if (Status begun = begin(is_seen ? image : nullptr); !begun) return begun;
   const VkExtent2D size = swapchain->extent();
   auto pass = info_of<VkRenderPassBeginInfo>(VK_STRUCTURE_TYPE_RENDER_PASS_BEGIN_INFO);
   const VkClearValue ground{kGround};
@@ -213,7 +213,7 @@ Status VulkanWindow::Impl::record(std::uint32_t shown, const VulkanPicture* pict
   const glm::vec2 all = as_vector(size);
   const VkViewport viewport{0.0F, 0.0F, all.x, all.y, 0.0F, 1.0F};
   api.vkCmdSetViewport(commands, 0, 1, &viewport);
-  if (is_seen) draw_picture(*picture, place);
+  if (is_seen) draw_image(*image, place);
   const bool has_overlay = !overlay.draws.empty() && !overlay.indices.empty() && font_size.x > 0;
   if (has_overlay) draw_overlay(overlay);
   api.vkCmdEndRenderPass(commands);
@@ -267,7 +267,7 @@ Status VulkanWindow::set_font(int width, int height, std::span<const std::uint8_
   return put;
 }
 
-Status VulkanWindow::present(int width, int height, const VulkanPicture* picture, const PixelRect& place,
+Status VulkanWindow::present(int width, int height, const VulkanImage* image, const PixelRect& place,
                              const Overlay& overlay) {
   QUOIN_ASSERT(are_there(overlay), "the indices and vertices of all draw calls exist");
   if (width <= 0 || height <= 0) return {};
@@ -284,7 +284,7 @@ Status VulkanWindow::present(int width, int height, const VulkanPicture* picture
     window.is_stale = result == VK_ERROR_OUT_OF_DATE_KHR;
     if (window.is_stale) continue;
     if (result != VK_SUCCESS && result != VK_SUBOPTIMAL_KHR) return window.device->check(result, kShowing);
-    if (Status recorded = window.record(shown, picture, place, overlay); !recorded) {
+    if (Status recorded = window.record(shown, image, place, overlay); !recorded) {
       window.give_up_image();
       return recorded;
     }

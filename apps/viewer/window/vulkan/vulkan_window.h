@@ -5,7 +5,7 @@
 #include <span>
 
 #include <quoin/core/result.h>
-#include <quoin/render_vk/vulkan_picture.h>
+#include <quoin/render_vk/vulkan_image.h>
 
 #include "window_device.h"
 
@@ -59,13 +59,13 @@ class VulkanWindow {
   [[nodiscard]] Status set_font(int width, int height, std::span<const std::uint8_t> opacity);
 
   /// Shows an image, stretched over `place`, on a dark background, and the overlay over it. `width` and `height` are
-  /// the window's current size in pixels; does nothing if one is 0, as in minimised windows. `picture` may be null or
+  /// the window's current size in pixels; does nothing if one is 0, as in minimised windows. `image` may be null or
   /// empty.
   ///
   /// Rebuilds the swapchain if the window's size has changed. Waits for the display and until the window is drawn;
-  /// `picture` may be freed afterwards.
+  /// `image` may be freed afterwards.
   /// Requires: the indices and vertices of all draw calls exist.
-  [[nodiscard]] Status present(int width, int height, const VulkanPicture* picture, const PixelRect& place,
+  [[nodiscard]] Status present(int width, int height, const VulkanImage* image, const PixelRect& place,
                                const Overlay& overlay);
 
  private:

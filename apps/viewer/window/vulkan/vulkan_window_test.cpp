@@ -54,15 +54,15 @@ class VulkanWindowTest : public ::testing::Test {
     return *options;
   }
 
-  [[nodiscard]] VulkanPicture drawn(int width, int height) {
-    VulkanPicture picture(*renderer_);
+  [[nodiscard]] VulkanImage drawn(int width, int height) {
+    VulkanImage image(*renderer_);
     RenderOptions wanted;
     wanted.width = width;
     wanted.height = height;
     const Camera camera = frame_scene(scene_.scene, View::Iso, 16.0 / 9.0);
-    const Status status = renderer_->draw(picture, camera, wanted, Accumulation::Restart);
+    const Status status = renderer_->draw(image, camera, wanted, Accumulation::Restart);
     EXPECT_TRUE(status) << to_string(status.error());
-    return picture;
+    return image;
   }
 
   std::unique_ptr<SdlVideo> video_;
@@ -78,7 +78,7 @@ constexpr std::array kCorners = {OverlayVertex{0, 0, 0, 0, 0xFF0000FFU}, Overlay
                                  OverlayVertex{0, 50, 0, 1, 0x80FF0000U}};
 constexpr std::array<std::uint16_t, 3> kIndices = {0, 1, 2};
 
-TEST_F(VulkanWindowTest, ShowsPicturesOfEverySizeAndOverlays) {
+TEST_F(VulkanWindowTest, ShowsImagesOfEverySizeAndOverlays) {
   auto window = VulkanWindow::create(device_);
   ASSERT_TRUE(window) << to_string(window.error());
   const std::array draws = {OverlayDraw{{0, 0, 40, 40}, 0, 3, 0}, OverlayDraw{{-50, -50, 10, 10}, 0, 3, 0},
@@ -86,29 +86,29 @@ TEST_F(VulkanWindowTest, ShowsPicturesOfEverySizeAndOverlays) {
   const Overlay overlay{kCorners, kIndices, draws};
   EXPECT_TRUE(window->present(160, 90, nullptr, {}, overlay)) << "an overlay without a font is not drawn";
   ASSERT_TRUE(window->set_font(2, 2, kFont));
-  const VulkanPicture whole = drawn(160, 90);
-  const VulkanPicture coarse = drawn(20, 12);
-  const VulkanPicture never_drawn(*renderer_);
-  for (const VulkanPicture* picture : {&whole, &coarse, &never_drawn, static_cast<const VulkanPicture*>(nullptr)}) {
+  const VulkanImage whole = drawn(160, 90);
+  const VulkanImage coarse = drawn(20, 12);
+  const VulkanImage never_drawn(*renderer_);
+  for (const VulkanImage* image : {&whole, &coarse, &never_drawn, static_cast<const VulkanImage*>(nullptr)}) {
     for (const PixelRect place : {PixelRect{0, 0, 160, 90}, {-20, 30, 70, 500}, {10, 10, 0, 0}, {500, 500, 10, 10}}) {
-      const Status shown = window->present(160, 90, picture, place, overlay);
+      const Status shown = window->present(160, 90, image, place, overlay);
       ASSERT_TRUE(shown) << to_string(shown.error());
     }
   }
 }
 
-TEST_F(VulkanWindowTest, PicturesMayGoOnceTheyAreShown) {
+TEST_F(VulkanWindowTest, ImagesMayGoOnceTheyAreShown) {
   auto window = VulkanWindow::create(device_);
   ASSERT_TRUE(window) << to_string(window.error());
   for (int i = 0; i < 40; ++i) {
-    VulkanPicture picture(*renderer_);
+    VulkanImage image(*renderer_);
     const int edge = 1500 + 10 * (i % 7);
     const auto bytes = std::size_t{3} * static_cast<std::size_t>(edge) * static_cast<std::size_t>(edge);
-    ASSERT_TRUE(picture.write({edge, edge, std::vector<std::uint8_t>(bytes, 90)}));
-    const Status shown = window->present(160, 90, &picture, {0, 0, 160, 90}, {});
+    ASSERT_TRUE(image.write({edge, edge, std::vector<std::uint8_t>(bytes, 90)}));
+    const Status shown = window->present(160, 90, &image, {0, 0, 160, 90}, {});
     ASSERT_TRUE(shown) << to_string(shown.error());
     if (i % 2 == 0) {
-      ASSERT_TRUE(picture.write({2, 1, {10, 20, 30, 250, 240, 230}}));
+      ASSERT_TRUE(image.write({2, 1, {10, 20, 30, 250, 240, 230}}));
     }
   }
 }
@@ -116,23 +116,23 @@ TEST_F(VulkanWindowTest, PicturesMayGoOnceTheyAreShown) {
 TEST_F(VulkanWindowTest, FollowsTheWindowsSizeAndRestsWhileMinimised) {
   auto window = VulkanWindow::create(device_, false);
   ASSERT_TRUE(window) << to_string(window.error());
-  const VulkanPicture picture = drawn(64, 64);
+  const VulkanImage image = drawn(64, 64);
   for (const auto& [width, height] : {std::pair{64, 64}, {300, 20}, {0, 0}, {640, 480}, {64, 0}, {64, 64}}) {
     if (width > 0 && height > 0) SDL_SetWindowSize(window_.get(), width, height);
     for (int frame = 0; frame < 3; ++frame) {
       SDL_PumpEvents();
-      const Status shown = window->present(width, height, &picture, {0, 0, width, height}, {});
+      const Status shown = window->present(width, height, &image, {0, 0, width, height}, {});
       ASSERT_TRUE(shown) << width << " x " << height << ": " << to_string(shown.error());
     }
   }
 }
 
 TEST_F(VulkanWindowTest, OpensAndClosesFiftyTimes) {
-  const VulkanPicture picture = drawn(32, 32);
+  const VulkanImage image = drawn(32, 32);
   for (int i = 0; i < 50; ++i) {
     auto window = VulkanWindow::create(device_);
     ASSERT_TRUE(window) << to_string(window.error());
-    ASSERT_TRUE(window->present(160, 90, &picture, {0, 0, 32, 32}, {}));
+    ASSERT_TRUE(window->present(160, 90, &image, {0, 0, 32, 32}, {}));
   }
 }
 
@@ -170,17 +170,17 @@ TEST_F(VulkanWindowTest, FiftyStartsOfTheViewerLeaveNothingBehind) {
   EXPECT_LT(held_megabytes() - memory, 25.0);
 }
 
-TEST_F(VulkanWindowTest, PicturesOfTheProcessorAreShownToo) {
-  VulkanPicture picture(*renderer_);
-  EXPECT_EQ(picture.write({}).error().code, ErrorCode::InvalidArgument);
+TEST_F(VulkanWindowTest, ImagesOfTheProcessorAreShownToo) {
+  VulkanImage rendered(*renderer_);
+  EXPECT_EQ(rendered.write({}).error().code, ErrorCode::InvalidArgument);
   const Image image{2, 1, {10, 20, 30, 250, 240, 230}};
-  ASSERT_TRUE(picture.write(image));
-  const auto read = picture.read();
+  ASSERT_TRUE(rendered.write(image));
+  const auto read = rendered.read();
   ASSERT_TRUE(read);
   EXPECT_EQ(read->rgb, image.rgb);
   auto window = VulkanWindow::create(device_);
   ASSERT_TRUE(window) << to_string(window.error());
-  EXPECT_TRUE(window->present(160, 90, &picture, {0, 0, 160, 90}, {}));
+  EXPECT_TRUE(window->present(160, 90, &rendered, {0, 0, 160, 90}, {}));
 }
 
 TEST_F(VulkanWindowTest, ReportsUnsupportedDevices) {

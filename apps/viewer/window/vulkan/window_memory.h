@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <span>
 
-#include <quoin/render_vk/vulkan_picture.h>
+#include <quoin/render_vk/vulkan_image.h>
 
 #include "window_device.h"
 
@@ -37,21 +37,21 @@ class WindowBuffer {
 };
 
 /// A Vulkan image that Quoin's images are copied into and shaders read.
-class PictureImage {
+class ImageImage {
  public:
   static constexpr VkFormat kFormat = VK_FORMAT_R8G8B8A8_UNORM;  // unchanged bytes
 
-  explicit PictureImage(const WindowDevice& device) : device_(&device) {}
-  ~PictureImage() { free(); }
-  PictureImage(const PictureImage&) = delete;
-  PictureImage& operator=(const PictureImage&) = delete;
+  explicit ImageImage(const WindowDevice& device) : device_(&device) {}
+  ~ImageImage() { free(); }
+  ImageImage(const ImageImage&) = delete;
+  ImageImage& operator=(const ImageImage&) = delete;
 
   /// Recreates the image, with undefined pixels, if its size differs. Returns true if it did.
   /// Requires: no commands that read it are running. Errors: LimitExceeded.
   [[nodiscard]] Result<bool> fit(int width, int height);
 
   [[nodiscard]] VkImageView view() const { return view_; }
-  /// Returns the target for VulkanPicture::record_copy, which leaves the image readable by shaders.
+  /// Returns the target for VulkanImage::record_copy, which leaves the image readable by shaders.
   [[nodiscard]] VulkanImageTarget target() const;
 
  private:

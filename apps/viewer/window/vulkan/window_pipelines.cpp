@@ -9,11 +9,11 @@ namespace quoin::viewer {
 
 namespace {
 
-constexpr std::uint32_t kPictureVertex[] = {
-#include "window_picture.vert.inc"
+constexpr std::uint32_t kImageVertex[] = {
+#include "window_image.vert.inc"
 };
-constexpr std::uint32_t kPictureFragment[] = {
-#include "window_picture.frag.inc"
+constexpr std::uint32_t kImageFragment[] = {
+#include "window_image.frag.inc"
 };
 constexpr std::uint32_t kOverlayVertex[] = {
 #include "window_overlay.vert.inc"
@@ -127,8 +127,8 @@ Result<std::unique_ptr<WindowPipelines>> WindowPipelines::create(const WindowDev
   VkResult result = made->make_pass(format->format);
   if (result == VK_SUCCESS) result = made->make_layout();
   if (result == VK_SUCCESS) result = made->make_set();
-  PipelineParts parts{made->pass_, made->layout_, kPictureVertex, kPictureFragment, false};
-  if (result == VK_SUCCESS) result = make_pipeline(device, parts, made->picture_);
+  PipelineParts parts{made->pass_, made->layout_, kImageVertex, kImageFragment, false};
+  if (result == VK_SUCCESS) result = make_pipeline(device, parts, made->image_);
   parts = {made->pass_, made->layout_, kOverlayVertex, kOverlayFragment, true};
   if (result == VK_SUCCESS) result = make_pipeline(device, parts, made->overlay_);
   if (Status status = device.check(result, "compiling shaders"); !status) return status.error();
@@ -137,7 +137,7 @@ Result<std::unique_ptr<WindowPipelines>> WindowPipelines::create(const WindowDev
 
 WindowPipelines::~WindowPipelines() {
   const VulkanFunctions& api = device_->api();
-  for (const VkPipeline pipeline : {picture_, overlay_}) {
+  for (const VkPipeline pipeline : {image_, overlay_}) {
     if (pipeline != VK_NULL_HANDLE) api.vkDestroyPipeline(device_->handle(), pipeline, nullptr);
   }
   if (layout_ != VK_NULL_HANDLE) api.vkDestroyPipelineLayout(device_->handle(), layout_, nullptr);
@@ -217,7 +217,7 @@ VkResult WindowPipelines::make_set() {
   return device_->api().vkAllocateDescriptorSets(device_->handle(), &info, &set_);
 }
 
-void WindowPipelines::set_picture(VkImageView view) const {
+void WindowPipelines::show_image(VkImageView view) const {
   VkDescriptorImageInfo image{};
   image.imageView = view;
   image.imageLayout = VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL;
@@ -229,8 +229,8 @@ void WindowPipelines::set_picture(VkImageView view) const {
   device_->api().vkUpdateDescriptorSets(device_->handle(), 1, &write, 0, nullptr);
 }
 
-void WindowPipelines::bind_picture(VkCommandBuffer commands, const WindowPush& push) const {
-  bind(commands, picture_, push);
+void WindowPipelines::bind_image(VkCommandBuffer commands, const WindowPush& push) const {
+  bind(commands, image_, push);
   device_->api().vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, layout_, 0, 1, &set_, 0, nullptr);
 }
 

@@ -31,9 +31,9 @@ class WindowPipelines {
 
   /// Clears the image and leaves it ready to present.
   [[nodiscard]] VkRenderPass pass() const { return pass_; }
-  /// Sets the image that `bind_picture` draws. Requires: no commands that draw another image are running.
-  void set_picture(VkImageView view) const;
-  void bind_picture(VkCommandBuffer commands, const WindowPush& push) const;
+  /// Sets the image that `bind_image` draws. Requires: no commands that draw another image are running.
+  void show_image(VkImageView view) const;
+  void bind_image(VkCommandBuffer commands, const WindowPush& push) const;
   void bind_overlay(VkCommandBuffer commands, const WindowPush& push) const { bind(commands, overlay_, push); }
 
  private:
@@ -50,7 +50,7 @@ class WindowPipelines {
   VkDescriptorPool sets_ = VK_NULL_HANDLE;
   VkDescriptorSet set_ = VK_NULL_HANDLE;  // one image
   VkPipelineLayout layout_ = VK_NULL_HANDLE;
-  VkPipeline picture_ = VK_NULL_HANDLE;
+  VkPipeline image_ = VK_NULL_HANDLE;
   VkPipeline overlay_ = VK_NULL_HANDLE;
 };
 

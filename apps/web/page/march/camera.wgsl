@@ -68,23 +68,23 @@ fn unit_of(a: Pair) -> Pair {
 var<private> pixel: vec2i;  // of the invocation, in the image
 
 // The point where the invocation's ray crosses the image, in pixels.
-fn picture_point() -> vec2f {
+fn image_point() -> vec2f {
   return vec2f(pixel) + push.point;
 }
-fn picture_direction() -> vec3f {
-  let point = picture_point();
+fn image_direction() -> vec3f {
+  let point = image_point();
   return frame.corner.xyz + frame.right.xyz * point.x + frame.down.xyz * point.y + frame.forward.xyz;
 }
 // The ray starts at the origin of view space, at frame.view_depth times length_a_depth.
 fn camera_ray() -> ViewRay {
-  let point = picture_point();
+  let point = image_point();
   let start = frame.start.xyz + frame.start_x.xyz * point.x + frame.start_y.xyz * point.y;
-  let d = picture_direction();
+  let d = image_direction();
   return ViewRay(start, d * (1.0 / sqrt(dot(d, d))));
 }
 // The ray length per unit of its forward component.
 fn length_a_depth() -> f32 {
-  return length(picture_direction());
+  return length(image_direction());
 }
 
 // The distance of the point on its ray from the origin of view space; without a hit, infinitely far.
@@ -114,9 +114,9 @@ struct ExactRay {
 
 // The direction of the invocation's ray in view space; a unit vector.
 fn exact_direction() -> Pair {
-  let in_picture = across(Pair(frame.corner.xyz, frame.corner_low.xyz), Pair(frame.right.xyz, frame.right_low.xyz),
+  let in_image = across(Pair(frame.corner.xyz, frame.corner_low.xyz), Pair(frame.right.xyz, frame.right_low.xyz),
                           Pair(frame.down.xyz, frame.down_low.xyz));
-  return unit_of(sum_of(in_picture, Pair(frame.forward.xyz, frame.forward_low.xyz)));
+  return unit_of(sum_of(in_image, Pair(frame.forward.xyz, frame.forward_low.xyz)));
 }
 fn placed_pair(i: i32, field: u32, low: u32) -> Pair {
   return Pair(placed_vector(i, field).xyz, placed_vector(i, low).xyz);

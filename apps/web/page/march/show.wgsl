@@ -1,7 +1,7 @@
 // Draws an image to the screen, which may have more pixels, with nearest sampling.
 
 struct Shown {
-  picture: vec2u,
+  image: vec2u,
   screen: vec2u,
 }
 @group(0) @binding(0) var<storage, read> colours: array<u32>;
@@ -14,6 +14,6 @@ fn corner(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
 
 @fragment
 fn pixel_of(@builtin(position) at: vec4f) -> @location(0) vec4f {
-  let place = min(vec2u(at.xy) * shown.picture / shown.screen, shown.picture - 1u);
-  return vec4f(unpack4x8unorm(colours[place.y * shown.picture.x + place.x]).xyz, 1.0);
+  let place = min(vec2u(at.xy) * shown.image / shown.screen, shown.image - 1u);
+  return vec4f(unpack4x8unorm(colours[place.y * shown.image.x + place.x]).xyz, 1.0);
 }

@@ -37,7 +37,7 @@ struct Material {
 };
 
 struct Block {
-  std::uint32_t picture = 0;
+  std::uint32_t image = 0;
   IVec3 place{0};  ///< in the file's axes
 };
 
@@ -65,7 +65,7 @@ class GoxelWriter {
   void numbers(std::string_view key, std::span<const float> values);
   void end_entries() { out_.u32(0); }
   Status add_blocks(IVec3 chunk, const Chunk& voxels, std::map<std::uint32_t, std::vector<Block>>& layers);
-  Result<std::uint32_t> picture_of(const std::vector<std::uint8_t>& pixels);
+  Result<std::uint32_t> rendered_of(const std::vector<std::uint8_t>& pixels);
   void write_materials();
   void write_layer(const PlacedGrid& grid, const Layer& layer, std::uint32_t id);
 
@@ -73,8 +73,8 @@ class GoxelWriter {
   std::vector<Rgba8> colours_;
   std::map<Material, std::uint32_t> numbers_;
   std::vector<Material> materials_;
-  std::vector<std::uint32_t> material_of_;                   // materials by type
-  std::unordered_map<std::string, std::uint32_t> pictures_;  // blocks by their pixels
+  std::vector<std::uint32_t> material_of_;                 // materials by type
+  std::unordered_map<std::string, std::uint32_t> images_;  // blocks by their pixels
   ByteWriter out_;
 };
 
@@ -103,18 +103,18 @@ void GoxelWriter::numbers(std::string_view key, std::span<const float> values) {
   entry(key, bytes.bytes());
 }
 
-Result<std::uint32_t> GoxelWriter::picture_of(const std::vector<std::uint8_t>& pixels) {
+Result<std::uint32_t> GoxelWriter::rendered_of(const std::vector<std::uint8_t>& pixels) {
   std::string key(pixels.begin(), pixels.end());
-  const auto found = pictures_.find(key);
-  if (found != pictures_.end()) return found->second;
+  const auto found = images_.find(key);
+  if (found != images_.end()) return found->second;
   constexpr std::uint32_t kEdge = 64;
   const auto png = encode_png({kEdge, kEdge, 4, pixels}, PngEffort::Quick);
   if (!png) return png.error();
   const std::size_t begin = begin_chunk("BL16");
   out_.raw(*png);
   end_chunk(begin);
-  const auto number = static_cast<std::uint32_t>(pictures_.size());
-  pictures_.emplace(std::move(key), number);
+  const auto number = static_cast<std::uint32_t>(images_.size());
+  images_.emplace(std::move(key), number);
   return number;
 }
 
@@ -143,10 +143,10 @@ Status GoxelWriter::add_blocks(IVec3 chunk, const Chunk& voxels, std::map<std::u
       }
       for (std::size_t bx = 0; bx < blocks.size(); ++bx) {
         for (const auto& [material, pixels] : blocks.at(bx)) {
-          const auto picture = picture_of(pixels);
-          if (!picture) return picture.error();
+          const auto image = rendered_of(pixels);
+          if (!image) return image.error();
           const IVec3 place = origin + IVec3(static_cast<int>(bx) * kBlockEdge, by, bz);
-          layers[material].push_back({*picture, {place.x, -place.z - kBlockEdge, place.y}});
+          layers[material].push_back({*image, {place.x, -place.z - kBlockEdge, place.y}});
         }
       }
     }
@@ -174,7 +174,7 @@ void GoxelWriter::write_layer(const PlacedGrid& grid, const Layer& layer, std::u
   const std::size_t begin = begin_chunk("LAYR");
   out_.u32(static_cast<std::uint32_t>(layer.second.size()));
   for (const Block& block : layer.second) {
-    out_.u32(block.picture);
+    out_.u32(block.image);
     for (int axis = 0; axis < 3; ++axis) out_.i32(block.place[axis]);
     out_.u32(0);
   }

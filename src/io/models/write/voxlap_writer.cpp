@@ -87,9 +87,9 @@ void MapWriter::write_column(int x, ByteWriter& out) {
   column_.resize(static_cast<std::size_t>(depth));
   has_colour_.assign(static_cast<std::size_t>(depth), false);
   // The outside of the map counts as solid.
-  const auto is_air = [&](std::size_t slice, int beside, int z) {
-    if (beside < 0 || beside >= size_.x) return false;
-    return at(slices_.at(slice), beside, z) == kAir;
+  const auto is_air = [&](std::size_t slice, int adjacent, int z) {
+    if (adjacent < 0 || adjacent >= size_.x) return false;
+    return at(slices_.at(slice), adjacent, z) == kAir;
   };
   const auto is_open = [&](int z) { return z >= 0 && z < depth && at(slices_[1], x, z) == kAir; };
   const bool has_before = !slices_[0].empty();

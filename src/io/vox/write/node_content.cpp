@@ -117,7 +117,7 @@ std::string_view chunk_id(NodeKind kind) {
 NodeContent node_of(const VoxSource& source, std::size_t node) {
   const vox::Node& known = source.document.nodes[node];
   const auto& chunks = source.document.chunks;
-  const auto at = std::ranges::lower_bound(chunks, known.offset, {}, &ChunkPlace::begin);
+  const auto at = std::ranges::lower_bound(chunks, known.offset, {}, &ChunkSpan::begin);
   QUOIN_ASSERT(at != chunks.end() && at->kind == ChunkKind::Node, "every node has its chunk");
   const std::span<const std::byte> file = source.bytes;
   return read_node(known.kind, file.subspan(at->begin + kChunkHeaderBytes, at->content_bytes));

@@ -47,7 +47,7 @@ std::vector<FileChunk> chunks_of(const std::vector<std::byte>& file) {
   EXPECT_TRUE(document) << to_string(document.error());
   std::vector<FileChunk> chunks;
   if (!document) return chunks;
-  for (const vox::ChunkPlace& place : document->chunks) {
+  for (const vox::ChunkSpan& place : document->chunks) {
     const auto begin = file.begin() + static_cast<std::ptrdiff_t>(place.begin);
     const auto size = static_cast<std::ptrdiff_t>(vox::kChunkHeaderBytes + place.content_bytes + place.children_bytes);
     FileChunk chunk{{}, {begin, begin + size}};
@@ -435,7 +435,7 @@ TEST(VoxRevision, FramesThatGoAreSaidToBeLost) {
   Instance other;
   other.grid = loaded.scene.grids().handles()[1];
   loaded.scene.add_instance(other);
-  const auto losses = losses_of_vox(loaded).value();
+  const auto losses = vox_unsupported_features(loaded).value();
   ASSERT_EQ(losses.size(), 1U);
   EXPECT_EQ(losses[0], "animation frames left out, since their model was removed: 3");
 }
@@ -447,7 +447,7 @@ TEST(VoxRevision, AModelOfAnotherFrameThatOutgrows256IsSaidToStay) {
     if (loaded.scene.instances()[handle].name == "bench") loaded.scene.remove_instance(handle);
   }
   loaded.scene.edit(loaded.scene.grids().handles()[2]).grid.set({400, 0, 0}, 4);
-  const auto losses = losses_of_vox(loaded).value();
+  const auto losses = vox_unsupported_features(loaded).value();
   ASSERT_EQ(losses.size(), 1U);
   EXPECT_EQ(losses[0], "models of other frames left unchanged, since they exceed 256 voxels: 1");
 }
@@ -469,20 +469,20 @@ TEST(VoxRevision, SharedNodesAreWrittenAnewAndThatIsSaid) {
   EXPECT_EQ(text_of(said_by(load(saved).scene)), text_of(said_by(loaded.scene)));
   ASSERT_EQ(warnings.size(), 1U);
   EXPECT_NE(warnings[0].find("animation is left out"), std::string::npos);
-  EXPECT_EQ(losses_of_vox(loaded).value(), warnings) << "said before it is written";
+  EXPECT_EQ(vox_unsupported_features(loaded).value(), warnings) << "said before it is written";
 }
 
 TEST(VoxRevision, CategoriesOfInstancesAreSaidToBeLost) {
   FileBuilder file;
   file.model(2, 2, 2, {{0, 0, 0, 1}});
   LoadedScene loaded = load(file.file());
-  EXPECT_TRUE(losses_of_vox(loaded).value().empty());
+  EXPECT_TRUE(vox_unsupported_features(loaded).value().empty());
   loaded.scene.edit(loaded.scene.instances().handles()[0]).categories = 6;
   std::vector<std::string> warnings;
   (void)save(loaded, &warnings);
   ASSERT_EQ(warnings.size(), 1U);
   EXPECT_NE(warnings[0].find("categories are left out"), std::string::npos);
-  EXPECT_EQ(losses_of_vox(loaded).value(), warnings);
+  EXPECT_EQ(vox_unsupported_features(loaded).value(), warnings);
 }
 
 /// Returns a walk of three frames whose topmost node follows the arguments, with unknown attributes on every node.
@@ -581,7 +581,7 @@ TEST(VoxRevision, SavesHiddenModelsAsShownWhenTheyWereShown) {
 }
 
 TEST(VoxRevision, NamesContentThatASceneCannotHold) {
-  const auto lines = only_in_source(*load(house()).source);
+  const auto lines = source_only_features(*load(house()).source);
   const std::vector<std::string> expected = {
       "animation: frames 0 to 24", "cameras: 10", "chunks QQQQ: 1", "chunks xxxx: 1", "notes: 1", "render settings: 1"};
   EXPECT_EQ(lines, expected);

@@ -140,7 +140,7 @@ TEST(VoxViewWriting, TheSunComesBack) {
 
   loaded.look->look.fog = Fog{};
   EXPECT_EQ(write_vox(loaded).value().warnings, std::vector<std::string>{"render settings left out, except the sun's"});
-  EXPECT_EQ(losses_of_vox(loaded).value().size(), 1U);
+  EXPECT_EQ(vox_unsupported_features(loaded).value().size(), 1U);
 }
 
 // Returns a file with two configured cameras, one unused camera, and a sun; other keys are kept.

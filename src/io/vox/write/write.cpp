@@ -127,19 +127,19 @@ class Writer {
   [[nodiscard]] std::size_t bytes_of_new_models() const;
   void write_chunks();
   void write_after(std::size_t chunk);
-  void write_chunk(const vox::ChunkPlace& place);
-  [[nodiscard]] std::optional<Chunk> revised(const vox::ChunkPlace& place);
-  [[nodiscard]] std::optional<Chunk> revised_count(const vox::ChunkPlace& place) const;
-  [[nodiscard]] std::optional<Chunk> revised_size(const vox::ChunkPlace& place) const;
-  [[nodiscard]] std::optional<Chunk> revised_model(const vox::ChunkPlace& place);
-  [[nodiscard]] std::optional<Chunk> revised_node(const vox::ChunkPlace& place) const;
-  [[nodiscard]] std::optional<Chunk> revised_layer(const vox::ChunkPlace& place) const;
-  [[nodiscard]] std::optional<Chunk> revised_material(const vox::ChunkPlace& place) const;
-  [[nodiscard]] std::optional<Chunk> revised_palette(const vox::ChunkPlace& place) const;
-  [[nodiscard]] std::optional<Chunk> revised_view(const vox::ChunkPlace& place);
-  [[nodiscard]] bool is_removed(const vox::ChunkPlace& place) const;
-  [[nodiscard]] std::string_view id_of(const vox::ChunkPlace& place) const;
-  [[nodiscard]] std::span<const std::byte> content_of(const vox::ChunkPlace& place) const;
+  void write_chunk(const vox::ChunkSpan& place);
+  [[nodiscard]] std::optional<Chunk> revised(const vox::ChunkSpan& place);
+  [[nodiscard]] std::optional<Chunk> revised_count(const vox::ChunkSpan& place) const;
+  [[nodiscard]] std::optional<Chunk> revised_size(const vox::ChunkSpan& place) const;
+  [[nodiscard]] std::optional<Chunk> revised_model(const vox::ChunkSpan& place);
+  [[nodiscard]] std::optional<Chunk> revised_node(const vox::ChunkSpan& place) const;
+  [[nodiscard]] std::optional<Chunk> revised_layer(const vox::ChunkSpan& place) const;
+  [[nodiscard]] std::optional<Chunk> revised_material(const vox::ChunkSpan& place) const;
+  [[nodiscard]] std::optional<Chunk> revised_palette(const vox::ChunkSpan& place) const;
+  [[nodiscard]] std::optional<Chunk> revised_view(const vox::ChunkSpan& place);
+  [[nodiscard]] bool is_removed(const vox::ChunkSpan& place) const;
+  [[nodiscard]] std::string_view id_of(const vox::ChunkSpan& place) const;
+  [[nodiscard]] std::span<const std::byte> impl_of(const vox::ChunkSpan& place) const;
   [[nodiscard]] const SceneLayer* layer_of(std::size_t number) const;
   [[nodiscard]] vox::Attributes material(std::size_t index) const;
   [[nodiscard]] bool has_changed_material(std::size_t index) const;
@@ -272,7 +272,7 @@ Status Writer::plan() {
   anchors_ = anchors_of(source_.document);
   material_chunk_.fill(vox::kNone);
   for (std::size_t i = 0; i < source_.document.chunks.size(); ++i) {
-    const vox::ChunkPlace& place = source_.document.chunks[i];
+    const vox::ChunkSpan& place = source_.document.chunks[i];
     if (place.kind == vox::ChunkKind::Material) material_chunk_[place.number] = i;
     if (place.kind == vox::ChunkKind::Palette) palette_chunk_ = i;
   }
@@ -327,11 +327,11 @@ std::vector<std::string> Writer::lost_with_graph() const {
   return lost;
 }
 
-std::string_view Writer::id_of(const vox::ChunkPlace& place) const {
+std::string_view Writer::id_of(const vox::ChunkSpan& place) const {
   return {reinterpret_cast<const char*>(source_.bytes.data()) + place.begin, 4};
 }
 
-std::span<const std::byte> Writer::content_of(const vox::ChunkPlace& place) const {
+std::span<const std::byte> Writer::impl_of(const vox::ChunkSpan& place) const {
   return std::span(source_.bytes).subspan(place.begin + vox::kChunkHeaderBytes, place.content_bytes);
 }
 
@@ -341,7 +341,7 @@ const SceneLayer* Writer::layer_of(std::size_t number) const {
   return slot == vox::kNone ? nullptr : scene_.layers().find(handle_read(source_.scene.layers(), slot));
 }
 
-bool Writer::is_removed(const vox::ChunkPlace& place) const {
+bool Writer::is_removed(const vox::ChunkSpan& place) const {
   switch (place.kind) {
     case vox::ChunkKind::Size:
     case vox::ChunkKind::Voxels:
@@ -352,7 +352,7 @@ bool Writer::is_removed(const vox::ChunkPlace& place) const {
     case vox::ChunkKind::Layer:
       return source_.layer_of[place.number] != vox::kNone && layer_of(place.number) == nullptr;
     case vox::ChunkKind::Other: {
-      const auto camera = vox::camera_number(id_of(place), content_of(place));
+      const auto camera = vox::camera_number(id_of(place), impl_of(place));
       return camera && std::ranges::find(view_.removed, *camera) != view_.removed.end();
     }
     default:
@@ -360,25 +360,25 @@ bool Writer::is_removed(const vox::ChunkPlace& place) const {
   }
 }
 
-std::optional<Chunk> Writer::revised_count(const vox::ChunkPlace& place) const {
+std::optional<Chunk> Writer::revised_count(const vox::ChunkSpan& place) const {
   if (place.content_bytes < 4 || model_count_ == source_.document.models.size()) return std::nullopt;
   vox::ChunkWriter content;
   content.u32(model_count_);
-  content.raw(content_of(place).subspan(4));
+  content.raw(impl_of(place).subspan(4));
   return Chunk{"PACK", content.take()};
 }
 
-std::optional<Chunk> Writer::revised_size(const vox::ChunkPlace& place) const {
+std::optional<Chunk> Writer::revised_size(const vox::ChunkSpan& place) const {
   const vox::GridPlan* plan = plan_of_[place.number];
   if (plan == nullptr || !plan->is_resized) return std::nullopt;
   vox::ChunkWriter content;
   const IVec3 size = plan->pieces.front().size;
   for (const int edge : {size.x, size.z, size.y}) content.i32(edge);
-  content.raw(content_of(place).subspan(12));
+  content.raw(impl_of(place).subspan(12));
   return Chunk{"SIZE", content.take()};
 }
 
-std::optional<Chunk> Writer::revised_model(const vox::ChunkPlace& place) {
+std::optional<Chunk> Writer::revised_model(const vox::ChunkSpan& place) {
   const vox::GridPlan* plan = plan_of_[place.number];
   if (plan == nullptr || !plan->is_changed) return std::nullopt;
   auto content = vox::revised_voxels(scene_.grids()[plan->grid].grid, *plan, source_, types_.table.index_of_type);
@@ -389,13 +389,13 @@ std::optional<Chunk> Writer::revised_model(const vox::ChunkPlace& place) {
   if (place.kind == vox::ChunkKind::Voxels) {
     // Bytes after the voxels in their chunk are kept.
     const std::size_t voxel_bytes = source_.document.models[place.number].voxels.size();
-    const std::span<const std::byte> tail = content_of(place).subspan(4 + voxel_bytes);
+    const std::span<const std::byte> tail = impl_of(place).subspan(4 + voxel_bytes);
     content->insert(content->end(), tail.begin(), tail.end());
   }
   return Chunk{place.kind == vox::ChunkKind::Voxels ? "XYZI" : "TDCZ", std::move(*content)};
 }
 
-std::optional<Chunk> Writer::revised_node(const vox::ChunkPlace& place) const {
+std::optional<Chunk> Writer::revised_node(const vox::ChunkSpan& place) const {
   const auto changed = graph_.changed.find(place.number);
   if (changed == graph_.changed.end()) return std::nullopt;
   vox::ChunkWriter content;
@@ -403,12 +403,12 @@ std::optional<Chunk> Writer::revised_node(const vox::ChunkPlace& place) const {
   return Chunk{vox::chunk_id(changed->second.kind), content.take()};
 }
 
-std::optional<Chunk> Writer::revised_layer(const vox::ChunkPlace& place) const {
+std::optional<Chunk> Writer::revised_layer(const vox::ChunkSpan& place) const {
   const SceneLayer* layer = layer_of(place.number);
   if (layer == nullptr) return std::nullopt;
   const vox::Layer& before = source_.document.layers[place.number];
   if (layer->name == printable(before.name) && layer->visible == !before.hidden) return std::nullopt;
-  const std::span<const std::byte> bytes = content_of(place);
+  const std::span<const std::byte> bytes = impl_of(place);
   vox::ChunkReader reader(bytes, "LAYR", 0, 0, bytes.size());
   vox::ChunkWriter content;
   content.i32(reader.i32());
@@ -431,11 +431,11 @@ bool Writer::has_changed_material(std::size_t index) const {
   return now != before && material(index) != before.attributes;
 }
 
-std::optional<Chunk> Writer::revised_material(const vox::ChunkPlace& place) const {
+std::optional<Chunk> Writer::revised_material(const vox::ChunkSpan& place) const {
   const std::size_t index = place.number;
   const auto chunk = static_cast<std::size_t>(&place - source_.document.chunks.data());
   if (index == 0 || material_chunk_[index] != chunk || !has_changed_material(index)) return std::nullopt;
-  const std::span<const std::byte> bytes = content_of(place);
+  const std::span<const std::byte> bytes = impl_of(place);
   vox::ChunkReader reader(bytes, "MATL", 0, 0, bytes.size());
   vox::ChunkWriter content;
   content.i32(reader.i32());
@@ -466,10 +466,10 @@ bool Writer::has_changed_colour() const {
   return false;
 }
 
-std::optional<Chunk> Writer::revised_palette(const vox::ChunkPlace& place) const {
+std::optional<Chunk> Writer::revised_palette(const vox::ChunkSpan& place) const {
   const auto chunk = static_cast<std::size_t>(&place - source_.document.chunks.data());
   if (chunk != palette_chunk_ || !has_changed_colour()) return std::nullopt;
-  const std::span<const std::byte> bytes = content_of(place);
+  const std::span<const std::byte> bytes = impl_of(place);
   std::vector<std::byte> content(bytes.begin(), bytes.end());
   content.resize(std::max(content.size(), vox::kColours * 4), std::byte{255});
   for (std::size_t index = 1; index < vox::kColours; ++index) {
@@ -483,8 +483,8 @@ std::optional<Chunk> Writer::revised_palette(const vox::ChunkPlace& place) const
 }
 
 /// Returns the revised chunk of a camera or of the sun; nullopt if it is unchanged.
-std::optional<Chunk> Writer::revised_view(const vox::ChunkPlace& place) {
-  const std::span<const std::byte> bytes = content_of(place);
+std::optional<Chunk> Writer::revised_view(const vox::ChunkSpan& place) {
+  const std::span<const std::byte> bytes = impl_of(place);
   const auto number = vox::camera_number(id_of(place), bytes);
   const auto camera = number ? view_.cameras.find(*number) : view_.cameras.end();
   const bool is_sun = view_.sun && vox::is_sun(id_of(place), bytes);
@@ -506,7 +506,7 @@ std::optional<Chunk> Writer::revised_view(const vox::ChunkPlace& place) {
 }
 
 /// Returns the revised chunk; nullopt if it is unchanged.
-std::optional<Chunk> Writer::revised(const vox::ChunkPlace& place) {
+std::optional<Chunk> Writer::revised(const vox::ChunkSpan& place) {
   switch (place.kind) {
     case vox::ChunkKind::ModelCount:
       return revised_count(place);
@@ -529,7 +529,7 @@ std::optional<Chunk> Writer::revised(const vox::ChunkPlace& place) {
   return std::nullopt;
 }
 
-void Writer::write_chunk(const vox::ChunkPlace& place) {
+void Writer::write_chunk(const vox::ChunkSpan& place) {
   if (is_removed(place)) return;
   const std::optional<Chunk> now = revised(place);
   const bool has_voxels = place.kind == vox::ChunkKind::Voxels || place.kind == vox::ChunkKind::PackedVoxels;
@@ -750,7 +750,7 @@ Result<VoxBytes> write_any(const Given& given, const Progress& progress) {
 }
 
 template <class Given>
-Result<std::vector<std::string>> losses_of_any(const Given& given) {
+Result<std::vector<std::string>> unsupported_features_of(const Given& given) {
   const auto voxel_size = vox::common_voxel_size(scene_in(given));
   if (!voxel_size) return Writer(given, source_of(given)).losses();
   const Given unit = vox::divided(given, *voxel_size);
@@ -777,12 +777,12 @@ Result<SavedScene> write_vox(const LoadedScene& loaded, const std::filesystem::p
   return save(write_vox(loaded, progress), path);
 }
 
-Result<std::vector<std::string>> losses_of_vox(const Scene& scene) {
-  return losses_of_any(scene);
+Result<std::vector<std::string>> vox_unsupported_features(const Scene& scene) {
+  return unsupported_features_of(scene);
 }
 
-Result<std::vector<std::string>> losses_of_vox(const LoadedScene& loaded) {
-  return losses_of_any(loaded);
+Result<std::vector<std::string>> vox_unsupported_features(const LoadedScene& loaded) {
+  return unsupported_features_of(loaded);
 }
 
 }  // namespace quoin

@@ -71,8 +71,8 @@ void write_voxels(const Grid& grid, const std::vector<std::uint8_t>& index_of_ty
 namespace quoin {
 
 /// Returns the warnings that write_vox would give. Errors: those of write_vox, except for files of more than 4 GiB.
-[[nodiscard]] Result<std::vector<std::string>> losses_of_vox(const Scene& scene);
-[[nodiscard]] Result<std::vector<std::string>> losses_of_vox(const LoadedScene& loaded);
+[[nodiscard]] Result<std::vector<std::string>> vox_unsupported_features(const Scene& scene);
+[[nodiscard]] Result<std::vector<std::string>> vox_unsupported_features(const LoadedScene& loaded);
 
 /// Calls `visit(voxel, type)` for every non-air voxel of a chunk with minimum corner `origin`, by z, then y, then x.
 ///

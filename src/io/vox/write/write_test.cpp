@@ -349,26 +349,28 @@ TEST(VoxWrite, TellsHowFarItIsAndCanBeCancelled) {
     instance.grid = scene.add_grid(std::move(grid));
     scene.add_instance(instance);
   }
-  std::vector<double> told;
-  const auto written = write_vox(scene, [&](double share) { return told.push_back(share), true; });
+  std::vector<double> reported;
+  const auto written = write_vox(scene, [&](double share) { return reported.push_back(share), true; });
   ASSERT_TRUE(written);
-  EXPECT_EQ(told, (std::vector<double>{0.2, 0.4, 0.6, 0.8, 1.0}));
+  EXPECT_EQ(reported, (std::vector<double>{0.2, 0.4, 0.6, 0.8, 1.0}));
   auto loaded = read_vox(written->bytes);
   ASSERT_TRUE(loaded);
   loaded->scene.edit(loaded->scene.grids().handles()[2]).grid.set({0, 0, 0}, kAir);
-  told.clear();
-  ASSERT_TRUE(write_vox(*loaded, [&](double share) { return told.push_back(share), true; }));
-  EXPECT_EQ(told.size(), 5U);
+  reported.clear();
+  ASSERT_TRUE(write_vox(*loaded, [&](double share) { return reported.push_back(share), true; }));
+  EXPECT_EQ(reported.size(), 5U);
   for (const std::size_t last : {1, 3}) {
-    const Progress until = [&told, last](double share) { return told.push_back(share), told.size() < last; };
-    told.clear();
+    const Progress until = [&reported, last](double share) {
+      return reported.push_back(share), reported.size() < last;
+    };
+    reported.clear();
     const auto anew = write_vox(scene, until);
     ASSERT_FALSE(anew);
     EXPECT_EQ(anew.error().code, ErrorCode::Cancelled);
-    EXPECT_EQ(told.size(), last);
-    told.clear();
+    EXPECT_EQ(reported.size(), last);
+    reported.clear();
     EXPECT_EQ(write_vox(*loaded, until).error().code, ErrorCode::Cancelled);
-    EXPECT_EQ(told.size(), last);
+    EXPECT_EQ(reported.size(), last);
   }
 }
 

@@ -126,21 +126,21 @@ const PathHistory::Taken* PathHistory::find_earlier(int width, int height, int s
 std::size_t PathHistory::bytes() const {
   std::size_t all = 0;
   for (const std::vector<Taken>* taken : {&earlier_, &now_})
-    for (const Taken& picture : *taken) all += picture.light.capacity() * sizeof(std::uint32_t);
+    for (const Taken& image : *taken) all += image.light.capacity() * sizeof(std::uint32_t);
   return all;
 }
 
-void PathHistory::refine(PathPicture& picture, int samples, Threads threads) {
-  Taken taken{picture.width, picture.height, samples, std::vector<std::uint32_t>(picture.radiance.size())};
-  std::transform(picture.radiance.begin(), picture.radiance.end(), taken.light.begin(), pack_light);
+void PathHistory::refine(PathImage& image, int samples, Threads threads) {
+  Taken taken{image.width, image.height, samples, std::vector<std::uint32_t>(image.radiance.size())};
+  std::transform(image.radiance.begin(), image.radiance.end(), taken.light.begin(), pack_light);
   if (!earlier_.empty() && !is_finer(earlier_.back(), taken)) earlier_.clear();
   // A restart from few samples without an edit continues from these images.
   while (!now_.empty() && !is_finer(taken, now_.back())) now_.pop_back();
   now_.push_back(std::move(taken));
-  const Taken* before = find_earlier(picture.width, picture.height, samples);
+  const Taken* before = find_earlier(image.width, image.height, samples);
   if (before == nullptr) return;
   const Taken& best = earlier_.back();
-  combine(*before, best, shares(now_.back(), *before, best, threads), threads, picture);
+  combine(*before, best, shares(now_.back(), *before, best, threads), threads, image);
 }
 
 // If two images of the same light with equal noise have a share of samples in common, the mean square of their
@@ -170,24 +170,24 @@ std::vector<float> PathHistory::shares(const Taken& now, const Taken& before, co
 }
 
 void PathHistory::combine(const Taken& before, const Taken& best, const std::vector<float>& shares, Threads threads,
-                          PathPicture& picture) {
-  const int of_width = picture.width;
-  const int of_height = picture.height;
+                          PathImage& image) {
+  const int of_width = image.width;
+  const int of_height = image.height;
   // An image of the same size is changed in place: a pixel is read only for itself, before it is written.
-  PathPicture smaller;
+  PathImage smaller;
   const bool is_as_large = of_width == best.width && of_height == best.height;
   if (!is_as_large) {
-    smaller = std::exchange(picture, PathPicture());
+    smaller = std::exchange(image, PathImage());
     const std::size_t count = pixel_count(best.width, best.height);
-    picture.width = best.width;
-    picture.height = best.height;
-    picture.radiance.resize(count);
-    picture.scene.resize(count);
-    picture.alpha.resize(count);
-    picture.rays = smaller.rays;
-    picture.pixels_hit = smaller.pixels_hit;
+    image.width = best.width;
+    image.height = best.height;
+    image.radiance.resize(count);
+    image.scene.resize(count);
+    image.alpha.resize(count);
+    image.rays = smaller.rays;
+    image.pixels_hit = smaller.pixels_hit;
   }
-  const PathPicture& taken = is_as_large ? picture : smaller;
+  const PathImage& taken = is_as_large ? image : smaller;
   parallel_for(static_cast<std::size_t>(best.height), threads, [&](std::size_t row) {
     const Between y = between(static_cast<int>(row), best.height, of_height);
     for (int column = 0; column < best.width; ++column) {
@@ -199,9 +199,9 @@ void PathHistory::combine(const Taken& before, const Taken& best, const std::vec
       const Vec3 known = seen([&](std::size_t of) { return unpack_light(before.light[of]); });
       const float share = seen([&](std::size_t of) { return shares[of]; });
       const Vec3 shown = glm::max(light + share * (unpack_light(best.light[i]) - known), Vec3(0.0F));
-      picture.radiance[i] = shown;
-      picture.scene[i] = glm::max(shown - (light - scene), Vec3(0.0F));
-      picture.alpha[i] = seen([&](std::size_t of) { return taken.alpha[of]; });
+      image.radiance[i] = shown;
+      image.scene[i] = glm::max(shown - (light - scene), Vec3(0.0F));
+      image.alpha[i] = seen([&](std::size_t of) { return taken.alpha[of]; });
     }
   });
 }

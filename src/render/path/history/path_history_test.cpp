@@ -34,7 +34,7 @@ constexpr int kEdge = 48;             // image size in pixels
 constexpr IVec3 kTower{-16, 0, -16};  // the tower built on the meadow
 constexpr std::array kSamples{1, 4, 16, 64};
 
-float greatest_difference(const PathPicture& a, const PathPicture& b, int from_x = 0) {
+float greatest_difference(const PathImage& a, const PathImage& b, int from_x = 0) {
   float most = 0.0F;
   for (std::size_t i = 0; i < a.radiance.size(); ++i) {
     if (static_cast<int>(i) % a.width < from_x) continue;
@@ -43,12 +43,12 @@ float greatest_difference(const PathPicture& a, const PathPicture& b, int from_x
   return most;
 }
 
-double mean_square(const PathPicture& a, const PathPicture& b) {
+double mean_square(const PathImage& a, const PathImage& b) {
   double sum = 0.0;
   for (std::size_t i = 0; i < a.radiance.size(); ++i) {
     for (int axis = 0; axis < 3; ++axis) {
-      const double apart = static_cast<double>(a.radiance[i][axis]) - static_cast<double>(b.radiance[i][axis]);
-      sum += apart * apart;
+      const double separate = static_cast<double>(a.radiance[i][axis]) - static_cast<double>(b.radiance[i][axis]);
+      sum += separate * separate;
     }
   }
   return sum / (3.0 * static_cast<double>(a.radiance.size()));
@@ -75,7 +75,7 @@ class PathHistoryTest : public testing::Test {
     return scene;
   }
 
-  PathPicture take(int edge, int samples, std::uint32_t seed = 0) {
+  PathImage take(int edge, int samples, std::uint32_t seed = 0) {
     options_.width = edge;
     options_.height = edge;
     options_.samples = samples;
@@ -83,10 +83,10 @@ class PathHistoryTest : public testing::Test {
     return tracer_.render(from_above(0.0, 40.0, 0.0, 48.0), options_, {2}).value();
   }
 
-  PathPicture refined(int edge, int samples, std::uint32_t seed = 0) {
-    PathPicture picture = take(edge, samples, seed);
-    history_.refine(picture, samples, {2});
-    return picture;
+  PathImage refined(int edge, int samples, std::uint32_t seed = 0) {
+    PathImage image = take(edge, samples, seed);
+    history_.refine(image, samples, {2});
+    return image;
   }
 
   void converge(std::uint32_t seed = 0) {
@@ -128,10 +128,10 @@ TEST(PackedLight, IsBoundedAndNeverSomethingElse) {
   EXPECT_EQ(unpack_light(pack_light(Vec3(511.9F))), Vec3(512.0F)) << "rounded up into the next exponent";
 }
 
-TEST_F(PathHistoryTest, WithoutAnEditPicturesStayAsTheyAre) {
+TEST_F(PathHistoryTest, WithoutAnEditImagesStayAsTheyAre) {
   for (const int samples : kSamples) {
-    const PathPicture taken = take(kEdge, samples);
-    PathPicture shown = taken;
+    const PathImage taken = take(kEdge, samples);
+    PathImage shown = taken;
     history_.refine(shown, samples);
     EXPECT_EQ(shown.radiance, taken.radiance);
     EXPECT_FALSE(history_.has_earlier());
@@ -141,27 +141,27 @@ TEST_F(PathHistoryTest, WithoutAnEditPicturesStayAsTheyAre) {
 
 TEST_F(PathHistoryTest, KeepsPixelsUnaffectedByAnEdit) {
   converge();
-  const PathPicture before = take(kEdge, kSamples.back());
+  const PathImage before = take(kEdge, kSamples.back());
   edit(2);
   ASSERT_TRUE(history_.has_earlier());
-  const PathPicture plain = take(kEdge, 1);
-  const PathPicture shown = refined(kEdge, 1);
-  const PathPicture converged = take(kEdge, 1'024);
+  const PathImage plain = take(kEdge, 1);
+  const PathImage shown = refined(kEdge, 1);
+  const PathImage converged = take(kEdge, 1'024);
   // Hardly any path behind the wall passes the tower.
   EXPECT_LT(mean_square(shown, converged), 0.5 * mean_square(plain, converged));
   EXPECT_GT(greatest_difference(plain, before, kEdge / 2), 0.2F);
   int same = 0;
   for (std::size_t i = 0; i < shown.radiance.size(); ++i) {
-    const Vec3 apart = shown.radiance[i] - before.radiance[i];
-    same += std::max({std::abs(apart.x), std::abs(apart.y), std::abs(apart.z)}) < 0.01F ? 1 : 0;
+    const Vec3 separate = shown.radiance[i] - before.radiance[i];
+    same += std::max({std::abs(separate.x), std::abs(separate.y), std::abs(separate.z)}) < 0.01F ? 1 : 0;
   }
   EXPECT_GT(same, kEdge * kEdge / 2);
 }
 
-TEST_F(PathHistoryTest, EndsWithThePictureOfANewTracer) {
+TEST_F(PathHistoryTest, EndsWithTheImageOfANewTracer) {
   converge();
   edit(2);
-  PathPicture shown;
+  PathImage shown;
   for (const int samples : kSamples) shown = refined(kEdge, samples);
   EXPECT_EQ(shown.radiance, take(kEdge, kSamples.back()).radiance);
   EXPECT_FALSE(history_.has_earlier()) << "the new image has as many samples as the earlier one";
@@ -169,7 +169,7 @@ TEST_F(PathHistoryTest, EndsWithThePictureOfANewTracer) {
 
 TEST_F(PathHistoryTest, AnEditTakenBackHasThePictureOfBeforeWithTheFirstSample) {
   converge();
-  const PathPicture before = take(kEdge, kSamples.back());
+  const PathImage before = take(kEdge, kSamples.back());
   edit(2);
   for (const int samples : {1, 4}) static_cast<void>(refined(kEdge, samples));
   edit(kAir);
@@ -185,12 +185,12 @@ TEST_F(PathHistoryTest, ShowsWhatTheNewSceneShowsInTheMean) {
     history_.clear();
     converge(seed);
     edit(2);
-    const PathPicture picture = refined(kEdge, 1, seed);
-    for (std::size_t i = 0; i < shown.size(); ++i) shown[i] += DVec3(picture.radiance[i]) / static_cast<double>(kTries);
+    const PathImage image = refined(kEdge, 1, seed);
+    for (std::size_t i = 0; i < shown.size(); ++i) shown[i] += DVec3(image.radiance[i]) / static_cast<double>(kTries);
     edit(kAir);
   }
   edit(2);
-  const PathPicture converged = take(kEdge, 1'024);
+  const PathImage converged = take(kEdge, 1'024);
   DVec3 all(0.0);
   DVec3 right(0.0);
   for (std::size_t i = 0; i < shown.size(); ++i) {
@@ -216,11 +216,11 @@ TEST(PathHistory, ARoomThatIsWalledUpBecomesDarkWithinAFewSamples) {
   PathHistory history;
   const auto mean_shown = [&](int samples) {
     options.samples = samples;
-    PathPicture picture = tracer.render(towards({2, 16, 2}, {20, 6, 18}, 1.1), options, {2}).value();
-    history.refine(picture, samples, {2});
+    PathImage image = tracer.render(towards({2, 16, 2}, {20, 6, 18}, 1.1), options, {2}).value();
+    history.refine(image, samples, {2});
     double sum = 0.0;
-    for (const Vec3& light : picture.radiance) sum += static_cast<double>(light.y);
-    return sum / static_cast<double>(picture.radiance.size());
+    for (const Vec3& light : image.radiance) sum += static_cast<double>(light.y);
+    return sum / static_cast<double>(image.radiance.size());
   };
   double before = 0.0;
   for (const int samples : kSamples) before = mean_shown(samples);
@@ -234,24 +234,24 @@ TEST(PathHistory, ARoomThatIsWalledUpBecomesDarkWithinAFewSamples) {
   EXPECT_EQ(mean_shown(kSamples.back()), 0.0);
 }
 
-TEST_F(PathHistoryTest, SmallPicturesAreShownInTheLargeOnesPlace) {
+TEST_F(PathHistoryTest, SmallImagesAreShownInTheLargeOnesPlace) {
   for (const int edge : {kEdge / 4, kEdge / 2, kEdge}) static_cast<void>(refined(edge, 1));
   converge();
-  const PathPicture before = take(kEdge, kSamples.back());
+  const PathImage before = take(kEdge, kSamples.back());
   EXPECT_FALSE(history_.knows(kEdge / 4, kEdge / 4, 1)) << "only images of earlier scenes are known";
   edit(2);
   ASSERT_TRUE(history_.knows(kEdge / 4, kEdge / 4, 1));
   EXPECT_FALSE(history_.knows(kEdge / 3, kEdge / 3, 1));
-  const PathPicture small = take(kEdge / 4, 1);
-  PathPicture plain = before;
+  const PathImage small = take(kEdge / 4, 1);
+  PathImage plain = before;
   for (int i = 0; i < kEdge * kEdge; ++i)
     plain.radiance[static_cast<std::size_t>(i)] =
         small.radiance[static_cast<std::size_t>(i / kEdge / 4 * (kEdge / 4) + i % kEdge / 4)];
-  const PathPicture shown = refined(kEdge / 4, 1);
+  const PathImage shown = refined(kEdge / 4, 1);
   ASSERT_EQ(shown.width, kEdge);
   ASSERT_EQ(shown.radiance.size(), before.radiance.size());
   ASSERT_EQ(shown.alpha.size(), before.radiance.size());
-  const PathPicture converged = take(kEdge, 1'024);
+  const PathImage converged = take(kEdge, 1'024);
   EXPECT_LT(mean_square(shown, converged), 0.5 * mean_square(plain, converged));
   EXPECT_GT(greatest_difference(shown, before), 0.1F) << "and the tower is there";
 }
@@ -259,21 +259,21 @@ TEST_F(PathHistoryTest, SmallPicturesAreShownInTheLargeOnesPlace) {
 TEST_F(PathHistoryTest, KeepsImagesOfUnknownSampleCounts) {
   converge();
   edit(2);
-  const PathPicture taken = take(kEdge, 2);
+  const PathImage taken = take(kEdge, 2);
   EXPECT_EQ(refined(kEdge, 2).radiance, taken.radiance);
   history_.clear();
   EXPECT_FALSE(history_.has_earlier());
   EXPECT_EQ(history_.bytes(), 0U);
 }
 
-TEST_F(PathHistoryTest, KeepsLayersOfPicturesAsLarge) {
+TEST_F(PathHistoryTest, KeepsLayersOfImagesAsLarge) {
   options_.layers = true;
   for (const int edge : {kEdge / 2, kEdge}) static_cast<void>(refined(edge, 1));
   converge();
   edit(2);
   EXPECT_TRUE(refined(kEdge / 2, 1).albedo.empty());
-  const PathPicture taken = take(kEdge, 1);
-  const PathPicture shown = refined(kEdge, 1);
+  const PathImage taken = take(kEdge, 1);
+  const PathImage shown = refined(kEdge, 1);
   EXPECT_EQ(shown.albedo, taken.albedo);
   EXPECT_EQ(shown.depth.values, taken.depth.values);
   EXPECT_EQ(shown.alpha, taken.alpha);

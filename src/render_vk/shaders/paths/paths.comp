@@ -5,7 +5,7 @@
 #include "paths/path_data.glsl"
 #include "walk.glsl"
 #include "instances.glsl"
-#include "picture_rays.glsl"
+#include "image_rays.glsl"
 #include "hash.glsl"
 #include "paths/path_math.glsl"
 #include "paths/path_surface.glsl"

@@ -1,0 +1,450 @@
+// Turns any bytes into a program of calls. Every call must return a status and leave the library usable.
+//
+// The calls keep the header's contract: memory is as large as shapes and strides require. Paths name no file.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <limits>
+#include <vector>
+
+#include "quoin.h"
+#include "structs_for_tests.h"
+
+namespace {
+
+constexpr std::size_t kRoom = 1 << 14;  // bytes of memory for arrays
+constexpr int kMostCalls = 48;
+constexpr int kMostLongCalls = 1;  // the slowest calls: smooth voxels, path-traced images
+
+class Program {
+ public:
+  Program(const std::uint8_t* data, std::size_t size) : next_(data), end_(data + size) {
+    for (std::size_t i = 0; i < room_.size(); ++i) room_[i] = static_cast<std::uint8_t>((i * 37 >> 5) % 3);
+    begin();
+  }
+  ~Program() {
+    for (const std::uint64_t handle : handles_) quoin_free(handle);
+  }
+  Program(const Program&) = delete;
+  Program& operator=(const Program&) = delete;
+
+  void run() {
+    for (int call = 0; call < kMostCalls && next_ != end_; ++call) step();
+    quoin_set_progress(nullptr, nullptr);
+  }
+
+ private:
+  // Creates a scene of two types and a grid for later calls.
+  void begin() {
+    quoin_scene scene = 0;
+    took(quoin_scene_create(&scene), &scene);
+    auto type = sized<quoin_type>();
+    type.rgba[3] = 255;
+    std::uint16_t number = 0;
+    took(quoin_type_add(scene, &type, &number));
+    type.rgba[3] = 99;
+    took(quoin_type_add(scene, &type, &number));
+    auto box = sized<quoin_array>();
+    box.data = room_.data();
+    for (int axis = 0; axis < 3; ++axis) {
+      box.shape[axis] = 4;
+      box.strides[axis] = 1 + 15 * axis;
+    }
+    took(quoin_grid_add(scene, &box, "box", nullptr));
+  }
+
+  std::uint8_t byte() { return next_ == end_ ? std::uint8_t{0} : *next_++; }
+  bool bit() { return (byte() & 1U) != 0; }
+  std::int32_t small() { return static_cast<std::int8_t>(byte()); }
+  // Mostly a small index, sometimes any number.
+  std::size_t index() {
+    const std::uint8_t b = byte();
+    return b < 240 ? b % 16 / 8 * (b % 8) : std::numeric_limits<std::size_t>::max() - (b - 240);
+  }
+  double number() {
+    constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    constexpr std::array<double, 12> kOdd = {kNan, kInfinity, -kInfinity, 1e308, -1e308, 1e-308,
+                                             0.0,  -0.0,      0.5,        1.0,   1e9,    -1e18};
+    const std::uint8_t b = byte();
+    return b < 200 ? (b - 100) / 4.0 : kOdd.at(b % kOdd.size());
+  }
+  std::int64_t whole() {
+    constexpr std::array<std::int64_t, 4> kFar = {std::numeric_limits<std::int64_t>::max(),
+                                                  std::numeric_limits<std::int64_t>::min(), std::int64_t{1} << 31, -1};
+    const std::uint8_t b = byte();
+    return b < 200 ? b - 20 : kFar.at(b % kFar.size());
+  }
+  float single() {
+    const double one = number();
+    return std::isfinite(one) ? static_cast<float>(std::clamp(one, -3e38, 3e38)) : std::nanf("");
+  }
+  // Few, since starting many threads is slow.
+  std::int32_t threads() { return small() % 4; }
+  bool may_take_long() { return long_calls_++ < kMostLongCalls; }
+  std::uint64_t handle() {
+    const std::uint8_t b = byte();
+    if (handles_.empty() || b > 250) return b;
+    return handles_[b % handles_.size()];
+  }
+  template <class T>
+  T made() {
+    T one = sized<T>();
+    if (byte() > 250) one.size = byte();
+    return one;
+  }
+  template <class T>
+  T* perhaps(T* one) {
+    return byte() > 250 ? nullptr : one;
+  }
+
+  void took(quoin_status status) {
+    if (status == QUOIN_OK) return;
+    if (status > QUOIN_OK && status <= QUOIN_OUT_OF_MEMORY && quoin_last_error()[0] != '\0') return;
+    std::fprintf(stderr, "status %d: %s\n", static_cast<int>(status), quoin_last_error());
+    std::abort();  // also for QUOIN_INTERNAL
+  }
+  // Takes a pointer, since argument evaluation has no order: the call writes the handle.
+  void took(quoin_status status, const std::uint64_t* made) {
+    took(status);
+    if (status == QUOIN_OK) handles_.push_back(*made);
+  }
+
+  // An array inside room_, or one of any shape without memory.
+  quoin_array array() {
+    auto one = made<quoin_array>();
+    one.scalar = bit() ? QUOIN_UINT8 : byte() % 11;
+    const bool is_there = byte() < 240;
+    std::int64_t first = 0;
+    std::int64_t last = 8;
+    for (int axis = 0; axis < 3; ++axis) {
+      one.shape[axis] = is_there ? byte() % 24 : whole();
+      one.strides[axis] = small();
+      const std::int64_t reach = one.strides[axis] * (is_there ? one.shape[axis] : 0);
+      (reach < 0 ? first : last) += reach;
+      one.spacing[axis] = bit() ? 0.0 : number();
+      one.origin[axis] = bit() ? 0.0 : number();
+    }
+    // Strides of 0: the array is contiguous.
+    if (one.strides[0] == 0 && one.strides[1] == 0 && one.strides[2] == 0 && is_there)
+      last = std::int64_t{8} * one.shape[0] * one.shape[1] * one.shape[2];
+    if (is_there && last - first < static_cast<std::int64_t>(kRoom)) one.data = room_.data() - first;
+    return one;
+  }
+
+  void look_at_mesh(quoin_mesh mesh) {
+    auto data = sized<quoin_mesh_data>();
+    if (quoin_mesh_view(mesh, &data) != QUOIN_OK) return;
+    double sum = 0.0;
+    for (std::size_t i = 0; i < data.index_count; ++i) {
+      if (data.indices[i] >= data.vertex_count) std::abort();
+      sum += static_cast<double>(data.positions[3 * data.indices[i] + 2]);
+    }
+    for (std::size_t i = 0; i < data.vertex_count; ++i) {
+      if (data.types != nullptr) sum += data.types[i];
+      if (data.occlusion != nullptr) sum += static_cast<double>(data.occlusion[i]);
+      if (data.colours != nullptr) sum += data.colours[4 * i + 3];
+    }
+    for (std::size_t i = 0; i < 4 * data.interface_count; ++i) sum += static_cast<double>(data.interfaces[i] & 1);
+    sink_ = sum;
+  }
+
+  void type() {
+    auto one = made<quoin_type>();
+    for (std::uint8_t& channel : one.rgba) channel = byte();
+    one.emission = std::abs(single());
+    one.metalness = static_cast<float>(byte()) / 250.0F;
+    one.roughness = static_cast<float>(byte()) / 250.0F;
+    std::memset(one.name, 'x', byte() % 2 == 0 ? 3 : sizeof one.name);
+    one.transparent = byte() % 2;
+    one.ior = bit() ? 0.0F : single();
+    std::uint16_t number = 0;
+    took(quoin_type_add(handle(), perhaps(&one), perhaps(&number)));
+  }
+
+  void instance() {
+    auto one = made<quoin_instance>();
+    one.grid = index();
+    one.visible = byte() % 2;
+    one.group = index();
+    const bool is_plain = bit();
+    for (int i = 0; i < 12; ++i) one.world_from_grid[i] = is_plain && i % 4 != 3 ? (i % 5 == 0 ? 1.0 : 0.0) : number();
+    if (bit())
+      took(quoin_instance_add(handle(), perhaps(&one), nullptr));
+    else
+      took(quoin_instance_set(handle(), index(), perhaps(&one)));
+  }
+
+  template <std::size_t Count>
+  void numbers(double (&out)[Count]) {
+    for (double& each : out) each = number();
+  }
+
+  void layers_and_groups() {
+    constexpr std::array<const char*, 4> kNames = {"", "a", "b", "c"};
+    auto layer = made<quoin_layer>();
+    layer.name[0] = kNames.at(byte() % 4)[0];
+    layer.visible = byte() % 2;
+    took(quoin_layer_set(handle(), perhaps(&layer)));
+    took(quoin_layer_get(handle(), index(), perhaps(&layer)));
+    std::size_t count = 0;
+    took(quoin_layer_count(handle(), perhaps(&count)));
+    took(quoin_instance_set_layer(handle(), index(), perhaps(kNames.at(byte() % 4))));
+    auto group = made<quoin_group>();
+    group.parent = index();
+    group.shown = byte() % 2;
+    group.layer[0] = kNames.at(byte() % 4)[0];
+    took(quoin_group_add(handle(), perhaps(&group), perhaps(&count)));
+  }
+
+  void views() {
+    auto camera = made<quoin_camera>();
+    camera.number = small();
+    camera.is_first = byte() % 2;
+    camera.is_orthographic = byte() % 2;
+    camera.right[0] = camera.up[1] = 1.0;
+    camera.forward[2] = -1.0;
+    numbers(camera.position);
+    if (bit()) numbers(camera.up);
+    camera.vertical_fov_degrees = number();
+    camera.view_height = number();
+    camera.focus_distance = number();
+    took(quoin_camera_add(handle(), perhaps(&camera)));
+    auto lamp = made<quoin_lamp>();
+    lamp.is_spot = byte() % 2;
+    numbers(lamp.position);
+    numbers(lamp.direction);
+    for (float& each : lamp.colour) each = single();
+    lamp.intensity = number();
+    lamp.range = number();
+    lamp.inner_angle_degrees = number();
+    lamp.outer_angle_degrees = number();
+    took(quoin_lamp_add(handle(), perhaps(&lamp)));
+    auto sun = made<quoin_sun>();
+    numbers(sun.direction);
+    sun.brightness = number();
+    for (float& each : sun.colour) each = single();
+    sun.angle_degrees = number();
+    took(quoin_sun_set(handle(), perhaps(&sun)));
+    took(quoin_sun_get(handle(), perhaps(&sun)));
+  }
+
+  // Calls added later. They use byte values that meant little before, so that programs of the corpus hardly change.
+  void step_of_later(std::uint8_t which) {
+    if (which % 4 == 0) return layers_and_groups();
+    if (which % 4 == 1) return views();
+    const quoin_array given = array();
+    took(quoin_grid_write(handle(), index(), perhaps(&given)));
+  }
+
+  void voxelize() {
+    std::array<float, 24> positions{};
+    std::array<std::uint32_t, 12> indices{};
+    std::array<std::uint32_t, 4> materials{};
+    for (float& each : positions) each = byte() > 250 ? std::nanf("") : static_cast<float>(small());
+    for (std::uint32_t& each : indices) each = byte() % 9;
+    for (std::uint32_t& each : materials) each = byte() % 3;
+    std::array<quoin_type, 2> types = {sized<quoin_type>(), sized<quoin_type>()};
+    auto one = made<quoin_triangles>();
+    one.vertex_count = positions.size() / 3;
+    one.triangle_count = byte() % 5;
+    one.positions = perhaps(positions.data());
+    one.indices = perhaps(indices.data());
+    one.materials = bit() ? materials.data() : nullptr;
+    one.types = bit() ? types.data() : nullptr;
+    one.type_count = byte() % 3;
+    auto options = made<quoin_voxelize_options>();
+    options.voxel_size = bit() ? 2.0 : std::max(number(), -1.0);
+    // Small voxels would be slow.
+    if (options.voxel_size > 0.0 && options.voxel_size < 1.0) options.voxel_size = 1e-30;
+    options.fill = small() % 4;
+    options.max_types = small();
+    took(quoin_grid_voxelize(handle(), perhaps(&one), perhaps(&options), nullptr, nullptr));
+  }
+
+  void look() {
+    std::size_t count = 0;
+    took(quoin_grid_count(handle(), &count));
+    took(quoin_instance_count(handle(), perhaps(&count)));
+    auto type = made<quoin_type>();
+    took(quoin_type_get(handle(), index(), &type));
+    auto grid = made<quoin_grid_info>();
+    took(quoin_grid_get_info(handle(), index(), &grid));
+    auto place = made<quoin_instance>();
+    took(quoin_instance_get(handle(), index(), &place));
+    auto group = made<quoin_group>();
+    took(quoin_group_get(handle(), index(), &group));
+    auto camera = made<quoin_camera>();
+    took(quoin_camera_get(handle(), index(), &camera));
+    auto lamp = made<quoin_lamp>();
+    took(quoin_lamp_get(handle(), index(), &lamp));
+    auto info = made<quoin_scene_info>();
+    took(quoin_scene_get_info(handle(), &info));
+    auto format = made<quoin_format>();
+    took(quoin_format_get(index(), &format));
+    std::array<char, 8> text{};
+    took(quoin_scene_warning(handle(), index(), text.data(), byte() % text.size()));
+  }
+
+  void read() {
+    std::array<std::int32_t, 3> min{};
+    std::array<std::int32_t, 3> shape{};
+    for (std::int32_t& each : min) each = byte() < 200 ? small() : static_cast<std::int32_t>(whole());
+    for (std::int32_t& each : shape) each = byte() < 200 ? byte() % 16 : std::numeric_limits<std::int32_t>::max();
+    std::array<std::uint16_t, 1024> types{};
+    took(quoin_grid_read(handle(), index(), perhaps(min.data()), shape.data(), perhaps(types.data()), types.size()));
+  }
+
+  void see() {
+    auto options = made<quoin_render_options>();
+    options.width = small() % 9;
+    options.height = small() % 9;
+    options.samples = byte() < 250 ? 1 : -5;
+    options.paths = byte() % 2 != 0 && may_take_long() ? 1 : 0;
+    options.threads = 1;
+    options.has_camera = byte() % 8 == 0 ? 1 : 0;
+    for (double& each : options.camera) each = number();
+    for (double& each : options.look_at) each = number();
+    options.fov_degrees = number();
+    // Reads no further bytes, so that programs of the corpus stay the same.
+    options.has_sun = options.has_camera;
+    std::copy(std::begin(options.look_at), std::end(options.look_at), options.sun);
+    if (options.width == 0) options.width = 4;
+    if (options.height == 0) options.height = 4;
+    std::array<std::uint8_t, 256> image{};
+    took(quoin_scene_render(handle(), &options, perhaps(image.data()), image.size()));
+  }
+
+  void cast() {
+    std::array<double, 9> origins{};
+    std::array<double, 9> directions{};
+    for (double& each : origins) each = number();
+    for (double& each : directions) each = number();
+    std::array<double, 3> t{};
+    std::array<std::int32_t, 9> voxel{};
+    std::array<std::uint16_t, 3> type{};
+    auto hits = made<quoin_hits>();
+    hits.t = perhaps(t.data());
+    hits.voxel = voxel.data();
+    hits.type = type.data();
+    took(quoin_scene_rays(handle(), byte() % 4, perhaps(origins.data()), directions.data(), number(), &hits));
+  }
+
+  void load() {
+    const std::size_t wanted = std::size_t{4} * byte();
+    const bool is_null = byte() > 250;
+    const std::size_t size = std::min(wanted, static_cast<std::size_t>(end_ - next_));
+    quoin_scene scene = 0;
+    took(quoin_scene_load_bytes(is_null ? nullptr : next_, size, &scene), &scene);
+    next_ += size;
+    auto options = made<quoin_load_options>();
+    options.frame = small();
+    options.radius = small();
+    options.iso = single();
+    options.voxel_size = number();
+    took(quoin_scene_load_with("", perhaps(&options), &scene), &scene);
+    // Reuses bytes, so that inputs of the corpus stay the same.
+    for (std::int32_t& length : options.raw_shape) length = options.frame % 8;
+    options.raw_scalar = options.radius % 10;
+    options.heights = options.radius % 4;
+    options.metres_per_pixel = options.voxel_size;
+    if (options.size == sizeof options && options.frame % 2 != 0) options.dimension = "nether";
+    took(quoin_scene_load_bytes_with(is_null ? nullptr : next_ - size, size, &options, &scene), &scene);
+  }
+
+  void mesh() {
+    quoin_mesh out = 0;
+    auto options = made<quoin_mesh_options>();
+    options.smooth = byte() % 2 != 0 && may_take_long() ? 1 : 0;
+    options.threads = threads();
+    options.watertight = options.threads % 2;
+    const std::uint8_t which = byte() % 3;
+    if (which == 0) {
+      took(quoin_grid_mesh(handle(), index(), perhaps(&options), &out), &out);
+    } else {
+      const quoin_array given = array();
+      if (which == 1)
+        took(quoin_surface_nets(perhaps(&given), number(), byte() % 2, threads(), &out), &out);
+      else
+        took(quoin_mesh_labels(perhaps(&given), small(), small() % 8, threads(), &out), &out);
+    }
+    if (!handles_.empty()) look_at_mesh(handles_.back());
+  }
+
+  static std::int32_t reported(double, void* user) { return --*static_cast<int*>(user) > 0 ? 1 : 0; }
+
+  void step() {
+    quoin_scene scene = 0;
+    constexpr std::uint8_t kLater = 252;
+    const std::uint8_t which = byte();
+    if (which >= kLater) return step_of_later(which);
+    switch (which % 14) {
+      case 0:
+        took(quoin_scene_create(&scene), &scene);
+        break;
+      case 1:
+        type();
+        break;
+      case 2:
+      case 3: {
+        const quoin_array given = array();
+        took(quoin_grid_add(handle(), perhaps(&given), bit() ? "grid" : nullptr, nullptr));
+        break;
+      }
+      case 4:
+        mesh();
+        break;
+      case 5:
+        instance();
+        break;
+      case 6:
+        voxelize();
+        break;
+      case 7:
+        look();
+        break;
+      case 8:
+        read();
+        break;
+      case 9:
+        see();
+        break;
+      case 10:
+        cast();
+        break;
+      case 11:
+        load();
+        break;
+      case 12:
+        left_ = byte();
+        took(quoin_set_progress(bit() ? reported : nullptr, &left_));
+        break;
+      default: {
+        const std::uint64_t one = handle();
+        took(quoin_free(one));
+        if (one != 0 && quoin_free(one) != QUOIN_BAD_HANDLE) std::abort();
+      }
+    }
+  }
+
+  const std::uint8_t* next_;
+  const std::uint8_t* end_;
+  std::array<std::uint8_t, kRoom> room_{};
+  std::vector<std::uint64_t> handles_;
+  int left_ = 0;
+  int long_calls_ = 0;
+  double sink_ = 0.0;
+};
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  Program(data, size).run();
+  return 0;
+}

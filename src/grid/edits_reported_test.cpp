@@ -1,0 +1,244 @@
+// The change records of edits: bricks of 16^3, and voxel by voxel.
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <random>
+#include <tuple>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include <quoin/grid/grid.h>
+
+namespace quoin {
+namespace {
+
+using Place = std::tuple<int, int, int>;
+// Position, old type, new type.
+using Reported = std::vector<std::tuple<int, int, int, VoxelType, VoxelType>>;
+
+Reported reported(const Grid& before, const Grid& now, const GridChanges& changes) {
+  Reported all;
+  IVec3 last{-100'000};
+  visit_changes(before, now, changes, [&](const RowChange& row) {
+    EXPECT_NE(row.changed, 0U);
+    EXPECT_EQ(row.first.x & 63, 0);
+    const IVec3 a = chunk_of(last);
+    const IVec3 b = chunk_of(row.first);
+    EXPECT_TRUE(std::tie(a.z, a.y, a.x, last.z, last.y) < std::tie(b.z, b.y, b.x, row.first.z, row.first.y));
+    last = row.first;
+    row.for_each([&](IVec3 voxel, VoxelType old_type, VoxelType new_type) {
+      EXPECT_NE(old_type, new_type);
+      EXPECT_EQ(before.get(voxel), old_type);
+      EXPECT_EQ(now.get(voxel), new_type);
+      all.emplace_back(voxel.x, voxel.y, voxel.z, old_type, new_type);
+    });
+  });
+  std::sort(all.begin(), all.end());
+  return all;
+}
+
+// Returns all voxels that differ, each once.
+Reported compared(const Grid& before, const Grid& now) {
+  Reported all;
+  before.for_each([&](IVec3 p, VoxelType type) {
+    if (now.get(p) != type) all.emplace_back(p.x, p.y, p.z, type, now.get(p));
+  });
+  now.for_each([&](IVec3 p, VoxelType type) {
+    if (before.get(p) == kAir) all.emplace_back(p.x, p.y, p.z, kAir, type);
+  });
+  std::sort(all.begin(), all.end());
+  return all;
+}
+
+struct Random {
+  std::mt19937 engine{3};
+  int between(int low, int high) { return std::uniform_int_distribution<int>(low, high)(engine); }
+  IVec3 place() { return {between(-70, 70), between(-20, 90), between(-70, 70)}; }
+};
+
+void edit(Grid& grid, Random& random) {
+  const auto type = static_cast<VoxelType>(random.between(0, 40) < 12 ? 0 : random.between(1, 40));
+  const IVec3 at = random.place();
+  switch (random.between(0, 5)) {
+    case 0:
+      grid.fill_box({at, at + IVec3{random.between(1, 70), 3, random.between(1, 20)}}, type);
+      break;
+    case 1:
+      grid.fill_sphere(DVec3(at), random.between(1, 9), type);
+      break;
+    case 2: {
+      std::vector<PlacedVoxel> many;
+      for (int i = 0; i < 50; ++i) many.push_back({random.place(), static_cast<VoxelType>(random.between(0, 3))});
+      grid.set(many);
+      break;
+    }
+    case 3:
+      grid.put_chunk(chunk_of(at), Chunk(type));
+      break;
+    default:
+      grid.set(at, type);
+  }
+}
+
+TEST(VisitChanges, ReportsEveryVoxelAndItsOldType) {
+  Random random;
+  Grid grid;
+  for (int i = 0; i < 30; ++i) edit(grid, random);
+  ChangeCursor cursor = grid.cursor();
+  Grid before = grid.snapshot();
+  for (int step = 0; step < 80; ++step) {
+    for (int i = random.between(0, 4); i >= 0; --i) edit(grid, random);
+    if (step == 50) grid.clear();
+    const GridChanges changes = grid.changes_since(cursor);
+    const Reported expected = compared(before, grid);
+    ASSERT_EQ(reported(before, grid, changes), expected) << step;
+    GridChanges unknown;
+    unknown.all = true;
+    ASSERT_EQ(reported(before, grid, unknown), expected) << step;
+    // Covers the slabs of the changed voxels, and possibly others if an edit was undone.
+    std::map<Place, ChunkSlabs> slabs;
+    for (const ChunkChange& change : changes.items) {
+      slabs[{change.chunk.x, change.chunk.y, change.chunk.z}] = change.slabs;
+    }
+    for (const auto& [x, y, z, was, is] : expected) {
+      const IVec3 voxel{x, y, z};
+      const IVec3 chunk = chunk_of(voxel);
+      const IVec3 at = local_of(voxel);
+      ASSERT_TRUE((slabs[Place(chunk.x, chunk.y, chunk.z)].has(at.y, at.z)));
+    }
+    before = grid.snapshot();
+  }
+}
+
+TEST(GridChanges, SlabsAreThoseThatChanged) {
+  Grid grid;
+  ChangeCursor cursor = grid.cursor();
+  const auto expect = [&](const IBox& box) {
+    const GridChanges changes = grid.changes_since(cursor);
+    ASSERT_EQ(changes.items.size(), 1U);
+    for (int z = 0; z < kChunkEdge; ++z) {
+      for (int y = 0; y < kChunkEdge; ++y) {
+        const bool is_within = y / 4 >= box.min.y / 4 && y / 4 <= (box.max.y - 1) / 4 && z / 4 >= box.min.z / 4 &&
+                               z / 4 <= (box.max.z - 1) / 4;
+        ASSERT_EQ(changes.items[0].slabs.has(y, z), is_within) << y << ' ' << z;
+        const std::uint32_t block = changes.items[0].slabs.block(y & ~15, z & ~15);
+        ASSERT_EQ((block >> ((y >> 2 & 3) + 4 * (z >> 2 & 3)) & 1U) != 0, is_within);
+      }
+    }
+  };
+  const auto edit = [&](const IBox& box, VoxelType type) {
+    grid.fill_box(box, type);
+    expect(box);
+  };
+  edit({{17, 33, 50}, {18, 34, 51}}, 1);  // inside
+  edit({{63, 0, 20}, {64, 1, 21}}, 1);    // on sides
+  edit({{10, 5, 5}, {40, 6, 6}}, 2);
+  edit({{10, 3, 60}, {12, 41, 64}}, 2);
+  edit({{0, 0, 0}, {64, 64, 64}}, 3);
+}
+
+TEST(Grid, SetsManyVoxelsAtOnce) {
+  Random random;
+  Grid one;
+  Grid other;
+  for (int round = 0; round < 20; ++round) {
+    std::vector<PlacedVoxel> voxels;
+    for (int i = 0; i < 200; ++i) {
+      const IVec3 at = random.place();
+      for (int n = random.between(0, 3); n >= 0; --n) {
+        voxels.push_back({at + IVec3{n, 0, 0}, static_cast<VoxelType>(random.between(0, 5))});
+      }
+    }
+    // The outermost chunk stays air.
+    voxels.push_back({IVec3{std::numeric_limits<int>::max()}, 1});
+    std::int64_t changed = 0;
+    for (const PlacedVoxel& each : voxels) changed += other.set(each.voxel, each.type) ? 1 : 0;
+    EXPECT_EQ(one.set(voxels), changed);
+    EXPECT_TRUE(compared(one, other).empty());
+    EXPECT_EQ(one.voxel_count(), other.voxel_count());
+    EXPECT_EQ(one.chunk_count(), other.chunk_count());
+  }
+  EXPECT_EQ(one.set(std::span<const PlacedVoxel>()), 0);
+}
+
+TEST(Grid, EditsCanBeCancelled) {
+  const IBox endless{IVec3{-1'000'000}, IVec3{1'000'000}};
+  for (int kind = 0; kind < 3; ++kind) {
+    Grid grid;
+    double last = 0.0;
+    int calls = 0;
+    const Progress stop = [&](double share) {
+      EXPECT_GE(share, last);
+      last = share;
+      return ++calls < 10;
+    };
+    const std::int64_t changed = kind == 0 ? grid.fill_box(endless, 1, stop)
+                                 : kind == 1
+                                     ? grid.fill_sphere(DVec3(0.0), 1e6, 1, stop)
+                                     : grid.edit(
+                                           endless, [](IVec3 p, VoxelType) { return VoxelType(p.x & 1); }, stop);
+    EXPECT_EQ(calls, 10);
+    EXPECT_EQ(grid.voxel_count(), changed);
+    EXPECT_LE(grid.chunk_count(), 10U);
+  }
+  Grid grid;
+  double last = 0.0;
+  grid.fill_box({{0, 0, 0}, {200, 70, 10}}, 1, [&](double share) {
+    last = share;
+    return true;
+  });
+  EXPECT_EQ(last, 1.0);
+}
+
+// Functions that take a voxel do not accept a point, whose coordinates would be truncated towards 0.
+template <class G, class P>
+concept TakesAPoint = requires(const G& grid, P point) { grid.get(point); };
+static_assert(TakesAPoint<Grid, IVec3>);
+static_assert(!TakesAPoint<Grid, DVec3>);
+static_assert(!TakesAPoint<Grid, Vec3>);
+
+TEST(VoxelOf, IsTheOneAPointLiesIn) {
+  EXPECT_EQ(voxel_of({-0.5, 0.5, 1.0}), IVec3(-1, 0, 1));
+  EXPECT_EQ(voxel_of({1e300, -1e300, std::nan("")}),
+            IVec3(std::numeric_limits<int>::max(), std::numeric_limits<int>::min(), 0));
+}
+
+TEST(Grid, HasNoNeighboursBeyondTheEndOfNumbers) {
+  const Grid grid;
+  for (const int end : {std::numeric_limits<int>::max(), std::numeric_limits<int>::min()}) {
+    for (const Chunk* chunk : grid.neighbourhood(IVec3{end}).chunks) EXPECT_EQ(chunk, nullptr);
+  }
+}
+
+TEST(VoxelRegistry, FindsPropertiesWithNanAgain) {
+  VoxelRegistry types;
+  VoxelProperties odd;
+  odd.emission = std::nanf("");
+  const auto first = types.find_or_add(odd);
+  ASSERT_TRUE(first.has_value());
+  EXPECT_EQ(*types.find_or_add(odd), *first);
+  odd.roughness = 0.25F;
+  EXPECT_NE(*types.find_or_add(odd), *first);
+  EXPECT_EQ(types.size(), 3U);
+}
+
+TEST(VoxelRegistry, KnowsWhetherAnyTypeLetsBodiesPass) {
+  VoxelRegistry types;
+  VoxelProperties properties;
+  const VoxelType stone = *types.add(properties);
+  EXPECT_FALSE(types.has_passable());
+  properties.collides = false;
+  types.replace(stone, properties);
+  EXPECT_TRUE(types.has_passable());
+  const VoxelRegistry copy = types;
+  properties.collides = true;
+  types.replace(stone, properties);
+  EXPECT_FALSE(types.has_passable());
+  EXPECT_TRUE(copy.has_passable());
+}
+
+}  // namespace
+}  // namespace quoin

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+
+#include <quoin/light/light_options.h>
+#include <quoin/render_vk/vulkan_image.h>
+#include <quoin/scene/camera.h>
+
+#include "render_vk/device/access.h"
+#include "render_vk/device/memory.h"
+#include "render_vk/march/pipelines.h"
+
+namespace quoin {
+
+/// The device state of a VulkanImage: one word per pixel, row by row, sRGB bytes with red lowest.
+struct VulkanImage::Impl {
+  Impl(vulkan::Device& of_device, const vulkan::Pipelines& with_pipelines)
+      : device(&of_device), pipelines(&with_pipelines) {}
+
+  /// Allocates that many pixels; their contents are undefined if the size changes. Errors: LimitExceeded.
+  [[nodiscard]] Status resize(int new_width, int new_height);
+  /// Allocates `sums` and starts without samples, for this camera. Errors: LimitExceeded.
+  [[nodiscard]] Status begin_sums(const Camera& of_camera, const LightOptions& in_light);
+  /// Records VulkanImage::record_copy, after `prepare_copy` accepted the target.
+  void record_copy(VkCommandBuffer commands, const VulkanImageTarget& target) const;
+  /// Validates the target. Errors: those of VulkanImage::record_copy.
+  [[nodiscard]] Status prepare_copy(const VulkanImageTarget& target);
+
+  vulkan::Device* device;
+  const vulkan::Pipelines* pipelines;
+  int width = 0;
+  int height = 0;
+  int samples = 0;
+  std::int64_t rays = 0;
+  vulkan::Buffer colours;
+  vulkan::Buffer swapped;  ///< the colours with blue lowest; only if a target image needed them
+  /// the camera of its samples
+  Camera camera;
+  LightOptions light;
+  vulkan::Buffer sums;  ///< sums of the samples' light, four floats per pixel; only if samples accumulate
+};
+
+}  // namespace quoin

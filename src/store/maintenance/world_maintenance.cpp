@@ -1,0 +1,262 @@
+#include <quoin/store/world_maintenance.h>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include <glm/common.hpp>
+#include <quoin/io/file.h>
+
+#include "io/whole_file.h"
+#include "store/chunk/chunk_body.h"
+#include "store/database/world_lock.h"
+#include "store/maintenance/world_rows.h"
+#include "store/world/part_text.h"
+#include "store/world/world_open.h"
+#include "store/world/world_rules.h"
+
+namespace quoin {
+
+using namespace store;
+
+namespace {
+
+constexpr std::array kKinds = {part::kType,  part::kGrid,      part::kInstance, part::kGroup,
+                               part::kLayer, part::kLamp,      part::kCamera,   part::kView,
+                               part::kSun,   part::kThumbnail, part::kValue,    part::kWorld};
+
+std::uint64_t file_bytes(const std::filesystem::path& path) {
+  std::error_code error;
+  const std::uintmax_t bytes = std::filesystem::file_size(path, error);
+  return error ? 0 : bytes;
+}
+
+/// Reports the bytes read as a fraction of a file's size.
+class ReadProgress {
+ public:
+  ReadProgress(const Progress& progress, const std::filesystem::path& path)
+      : progress_(progress), bytes_(static_cast<double>(std::max<std::uint64_t>(file_bytes(path), 1))) {}
+  /// Returns false to cancel.
+  bool add(std::size_t bytes) {
+    read_ += bytes;
+    if (!progress_ || (++calls_ & 255U) != 0) return true;
+    is_cancelled_ = !progress_(std::min(1.0, static_cast<double>(read_) / bytes_));
+    return !is_cancelled_;
+  }
+  [[nodiscard]] Status status() const {
+    return is_cancelled_ ? Status(make_error(ErrorCode::Cancelled, "cancelled")) : Status();
+  }
+
+ private:
+  const Progress& progress_;
+  double bytes_;
+  std::size_t read_ = 0;
+  unsigned calls_ = 0;
+  bool is_cancelled_ = false;
+};
+
+Result<WorldSummary> summarize(const std::filesystem::path& path, const Progress& progress) {
+  auto reader = open_reader(path);
+  if (!reader) return reader.error();
+  // Reads one consistent state.
+  if (auto begun = reader->connection().run("BEGIN"); !begun) return begun.error();
+  const auto rules = read_rules(*reader);
+  if (!rules) return rules.error();
+  WorldSummary summary;
+  const auto version = reader->connection().number("PRAGMA user_version");
+  if (!version) return version.error();
+  summary.version = static_cast<int>(*version);
+  summary.bytes = file_bytes(path) + file_bytes(path.string() + "-wal");
+  summary.types = rules->types.size() - 1;
+  for (const auto& [number, grid] : rules->grids) summary.grids[number].grid = grid;
+  const auto count = [&](const char* kind, std::size_t& counted) {
+    return reader->each_part(kind, [&](const Part&, bool) { ++counted; });
+  };
+  if (auto done = count(part::kInstance, summary.instances); !done) return done.error();
+  if (auto done = count(part::kValue, summary.values); !done) return done.error();
+  if (const auto revision = reader->part({part::kWorld, std::string("revision")}); revision && *revision) {
+    summary.saves = number_in(**revision);
+  }
+  if (const auto thumbnail = reader->part({part::kThumbnail, std::int64_t{0}}); thumbnail && *thumbnail) {
+    summary.thumbnail_bytes = (*thumbnail)->size();
+  }
+  std::uint64_t seen = 0;
+  bool is_cancelled = false;
+  const Status read = reader->each_place([&](const ChunkAddress& place) {
+    auto& grid = summary.grids[place.grid];
+    ++grid.by_level[place.level];
+    if (place.level == 0) {
+      ++grid.chunks;
+      grid.chunk_bounds = unite(grid.chunk_bounds, IBox{place.chunk, place.chunk + IVec3(1)});
+    }
+    is_cancelled = progress && (++seen & 65'535U) == 0 && !progress(0.5);
+    return !is_cancelled;
+  });
+  if (!read) return read.error();
+  if (is_cancelled) return make_error(ErrorCode::Cancelled, "cancelled");
+  return summary;
+}
+
+/// Checks rows one by one.
+class Check {
+ public:
+  Check(WorldReader& reader, const Progress& progress, const std::filesystem::path& path)
+      : reader_(reader), reading_(progress, path) {}
+
+  Result<WorldCheck> run() {
+    // Reads one consistent state, even if others write to the world.
+    if (auto begun = reader_.connection().run("BEGIN"); !begun) return begun.error();
+    auto rules = read_rules(reader_);
+    if (rules) {
+      rules_ = std::move(*rules);
+    } else if (rules.error().code == ErrorCode::BadFormat) {
+      report("types and grids: " + rules.error().message);
+    } else {
+      return rules.error();
+    }
+    for (const char* const kind : kKinds) check_parts(kind);
+    if (auto done = check_chunks(); !done) return done.error();
+    if (auto done = check_tables(); !done) return done.error();
+    return std::move(check_);
+  }
+
+ private:
+  void report(std::string line) { check_.damage.push_back({std::nullopt, std::move(line)}); }
+
+  void check_parts(const char* kind) {
+    const Status read = reader_.each_part(kind, [&](const Part& part, bool is_sound) {
+      if (!is_sound) {
+        report(name_of(part.key) + " is damaged");
+      } else if (const Status sound = check_part(part.key, part.body); !sound) {
+        report(sound.error().message);
+      } else {
+        ++check_.parts;
+      }
+    });
+    if (!read) report(std::string(kind) + ": " + read.error().message);
+  }
+
+  Status check_chunks() {
+    std::vector<std::string> damage;
+    ChunkRows rows(reader_.connection());
+    const std::map<std::int64_t, RegionPlace> regions = rows.regions(damage);
+    for (std::string& line : damage) report(std::move(line));
+    const auto gaps = rows.each([&](std::int64_t key, std::span<const std::byte> body) {
+      if (!reading_.add(body.size())) return RowVerdict::Stop;
+      const auto region = regions.find(key >> kRegionBits);
+      if (region == regions.end()) {
+        report("the chunk with key " + std::to_string(key) + " lies in a missing region");
+        return RowVerdict::Damaged;
+      }
+      const ChunkAddress place{region->second.grid, region->second.level, chunk_of_key(region->second, key)};
+      const auto grid = rules_.grids.find(place.grid);
+      const float band = grid == rules_.grids.end() ? WorldGrid{}.band : grid->second.band;
+      const auto chunk = decoder_.decode(place, body, ChunkLimits{&rules_.types, band});
+      if (chunk) {
+        ++check_.chunks;
+        return RowVerdict::Sound;
+      }
+      check_.damage.push_back({place, about(place) + ": " + chunk.error().message});
+      return RowVerdict::Damaged;
+    });
+    if (!gaps) return gaps.error();
+    for (const KeyGap& gap : *gaps) report(about(gap, regions) + ": " + gap.why);
+    return reading_.status();
+  }
+
+  // Checks structures that rows do not cover: indices, free pages.
+  Status check_tables() {
+    auto select = reader_.connection().prepare("PRAGMA integrity_check(20)");
+    if (!select) return select.error().code == ErrorCode::BadFormat ? Status() : Status(select.error());
+    while (true) {
+      const auto row = select->step();
+      if (!row) {
+        if (row.error().code != ErrorCode::BadFormat) return row.error();
+        report("the tables: " + row.error().message);
+        return {};
+      }
+      if (!*row) return {};
+      std::string line(select->text(0));
+      std::ranges::replace(line, '\n', ' ');
+      if (line != "ok") report("the tables: " + line);
+    }
+  }
+
+  WorldReader& reader_;
+  ReadProgress reading_;
+  ChunkDecoder decoder_;
+  WorldRules rules_;
+  WorldCheck check_;
+};
+
+Result<std::uint64_t> back_up(const std::filesystem::path& from, const std::filesystem::path& to) {
+  std::error_code error;
+  if (std::filesystem::exists(std::filesystem::symlink_status(to, error))) {
+    return make_error(ErrorCode::CannotWrite, "file already exists", to.string());
+  }
+  const auto lock = WorldLock::take(to);
+  if (!lock) return with_path(Result<std::uint64_t>(lock.error()), to);
+  const std::filesystem::path fresh = fresh_name(to);
+  const Status done = [&]() -> Status {
+    auto reader = with_path(open_reader(from), from);
+    if (!reader) return reader.error();
+    // Writing is allowed here because VACUUM INTO writes to another file.
+    if (auto set = reader->connection().run("PRAGMA query_only=OFF"); !set) return set;
+    auto copy = reader->connection().prepare("VACUUM INTO ?");
+    if (!copy) return copy.error();
+    copy->bind(0, std::string_view(fresh.native()));
+    if (auto copied = copy->run(); !copied) {
+      Error fault = copied.error();
+      if (fault.path.empty()) fault.path = (fault.code == ErrorCode::CannotWrite ? to : from).string();
+      return fault;
+    }
+    remove_database_log(to);
+    return move_in_place(fresh, to);
+  }();
+  if (!done) {
+    remove_database(fresh);
+    return done.error();
+  }
+  return file_bytes(to);
+}
+
+Status compact(const std::filesystem::path& named) {
+  const std::filesystem::path path = follow_links(named);
+  const auto lock = WorldLock::take(path);
+  if (!lock) return lock.error();
+  auto connection = Connection::open(path.string(), Connection::Mode::Write);
+  if (!connection) return connection.error();
+  if (auto done = check_schema(*connection); !done) return done;
+  if (!end_writing(*connection)) return make_error(ErrorCode::CannotWrite, "another program is reading it");
+  if (auto done = connection->run("PRAGMA temp_store=FILE; VACUUM"); !done) return done;
+  return connection->close();
+}
+
+}  // namespace
+
+Result<WorldSummary> summarize_world(const std::filesystem::path& path, const Progress& progress) {
+  return with_path(summarize(path, progress), path);
+}
+
+Result<WorldCheck> check_world(const std::filesystem::path& path, const Progress& progress) {
+  auto reader = open_reader(path);
+  if (!reader) return with_path(Result<WorldCheck>(reader.error()), path);
+  return with_path(Check(*reader, progress, path).run(), path);
+}
+
+Result<std::uint64_t> back_up_world(const std::filesystem::path& from, const std::filesystem::path& to) {
+  return back_up(from, to);
+}
+
+Result<std::uint64_t> compact_world(const std::filesystem::path& path) {
+  if (auto done = compact(path); !done) return with_path(Result<std::uint64_t>(done.error()), path);
+  return file_bytes(path);
+}
+
+}  // namespace quoin

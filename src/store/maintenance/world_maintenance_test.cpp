@@ -1,0 +1,326 @@
+#include <quoin/store/world_maintenance.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <set>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <quoin/io/file.h>
+#include <quoin/io/formats.h>
+#include <quoin/store/world_saver.h>
+
+#include "store/database/connection.h"
+#include "store/world/world_for_tests.h"
+
+namespace quoin {
+namespace {
+
+constexpr int kChunks = 120;
+
+ChunkAddress place_of(int i) {
+  return {0, 0, {i % 10, i / 10 % 4, i / 40 - 1}};
+}
+
+Chunk chunk_of(int i) {
+  return random_chunk(static_cast<std::uint32_t>(i), 9);
+}
+
+void make_world(const std::filesystem::path& path) {
+  auto world = WorldStore::create(path);
+  ASSERT_TRUE(world) << to_string(world.error());
+  WorldChanges changes;
+  changes.put_types(coloured_types(9));
+  changes.put_grid(0, {.name = "ground"});
+  for (int i = 0; i < kChunks; ++i) changes.put_chunk(place_of(i), {chunk_of(i)});
+  changes.put_value("inventory", std::vector<std::byte>(3000, std::byte{7}));
+  ASSERT_TRUE(world->save(std::move(changes)));
+  ASSERT_TRUE(world->flush());
+}
+
+std::size_t sound_chunks(const std::filesystem::path& path) {
+  const auto world = WorldStore::open(path, WorldAccess::Read);
+  if (!world) return 0;
+  std::size_t sound = 0;
+  for (int i = 0; i < kChunks; ++i) {
+    const auto chunk = world->load_chunk(place_of(i));
+    sound += chunk && *chunk && (*chunk)->voxels == chunk_of(i) ? 1 : 0;
+  }
+  return sound;
+}
+
+TEST(WorldMaintenance, SummaryAndCheckOfASoundWorld) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  make_world(path);
+  const auto summary = summarize_world(path);
+  ASSERT_TRUE(summary) << to_string(summary.error());
+  EXPECT_EQ(summary->version, 2);
+  EXPECT_EQ(summary->types, 9U);
+  EXPECT_EQ(summary->values, 1U);
+  EXPECT_EQ(summary->saves, 1U);
+  EXPECT_EQ(summary->grids.at(0).grid.name, "ground");
+  EXPECT_EQ(summary->grids.at(0).chunks, std::uint64_t{kChunks});
+  EXPECT_EQ(summary->grids.at(0).chunk_bounds, (IBox{{0, 0, -1}, {10, 4, 2}}));
+  const auto check = check_world(path);
+  ASSERT_TRUE(check) << to_string(check.error());
+  EXPECT_EQ(check->chunks, std::uint64_t{kChunks});
+  EXPECT_TRUE(check->damage.empty()) << check->damage.front().what;
+}
+
+TEST(WorldMaintenance, BackupsAreMadeWhileTheWorldIsWritten) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  make_world(path);
+  auto world = WorldStore::open(path, WorldAccess::Write);
+  WorldChanges changes;
+  changes.put_chunk({0, 0, {50, 0, 0}}, {Chunk(3)});
+  ASSERT_TRUE(world->save(std::move(changes)));
+  ASSERT_TRUE(world->flush());
+  const auto bytes = back_up_world(path, folder / "b.quoin");
+  ASSERT_TRUE(bytes) << to_string(bytes.error());
+  EXPECT_EQ(*bytes, std::filesystem::file_size(folder / "b.quoin"));
+  EXPECT_EQ(sound_chunks(folder / "b.quoin"), std::size_t{kChunks});
+  EXPECT_TRUE(WorldStore::open(folder / "b.quoin", WorldAccess::Read)->load_chunk({0, 0, {50, 0, 0}})->has_value());
+  EXPECT_TRUE(check_world(folder / "b.quoin")->damage.empty());
+  const auto again = back_up_world(path, folder / "b.quoin");
+  ASSERT_FALSE(again);
+  EXPECT_EQ(again.error().code, ErrorCode::CannotWrite);
+  EXPECT_FALSE(back_up_world(folder / "none.quoin", folder / "c.quoin"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "c.quoin-new"));
+  const auto compacted = compact_world(path);
+  ASSERT_FALSE(compacted) << "while it is written";
+  EXPECT_EQ(compacted.error().code, ErrorCode::CannotWrite);
+}
+
+TEST(WorldMaintenance, CompactGivesSpaceBack) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  make_world(path);
+  {
+    auto world = WorldStore::open(path, WorldAccess::Write);
+    WorldChanges changes;
+    for (int i = 20; i < kChunks; ++i) changes.remove_chunk(place_of(i));
+    ASSERT_TRUE(world->save(std::move(changes)));
+    ASSERT_TRUE(world->flush());
+  }
+  const auto before = std::filesystem::file_size(path);
+  const auto bytes = compact_world(path);
+  ASSERT_TRUE(bytes) << to_string(bytes.error());
+  EXPECT_LT(*bytes, before);
+  EXPECT_EQ(sound_chunks(path), 20U);
+}
+
+/// Flips bytes of a file.
+void damage(const std::filesystem::path& path, std::uintmax_t at, std::size_t count) {
+  std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+  file.seekg(static_cast<std::streamoff>(at));
+  std::string bytes(count, '\0');
+  file.read(bytes.data(), static_cast<std::streamsize>(count));
+  file.clear();
+  for (char& byte : bytes) byte = static_cast<char>(~byte);
+  file.seekp(static_cast<std::streamoff>(at));
+  file.write(bytes.data(), static_cast<std::streamsize>(count));
+}
+
+int wanted_damage() {
+  const char* const wanted = std::getenv("QUOIN_DAMAGE");
+  return wanted != nullptr ? std::atoi(wanted) : 60;
+}
+
+// The check names all lost items; the repaired world has all others.
+TEST(WorldMaintenance, AnyDamageIsSeenAndWhatIsSoundIsKept) {
+  const WorldFolder folder;
+  const auto whole = folder / "whole.quoin";
+  make_world(whole);
+  const auto size = std::filesystem::file_size(whole);
+  std::minstd_rand random(5);
+  for (int i = 0; i < wanted_damage(); ++i) {
+    const auto path = folder / "w.quoin";
+    const auto mended = folder / "mended.quoin";
+    std::filesystem::copy_file(whole, path, std::filesystem::copy_options::overwrite_existing);
+    std::filesystem::remove(mended);
+    const bool is_page = i % 3 == 0;
+    const std::uintmax_t at = is_page ? random() % (size / 8192) * 8192 : random() % size;
+    damage(path, at, std::min<std::uintmax_t>(is_page ? 8192 : 1 + random() % 40, size - at));
+    SCOPED_TRACE("damage " + std::to_string(i) + " at " + std::to_string(at));
+    const auto check = check_world(path);
+    const std::size_t readable = sound_chunks(path);
+    if (check && check->damage.empty()) {
+      ASSERT_EQ(readable, std::size_t{kChunks}) << "the check finds all damage";
+    }
+    const auto repair = repair_world(path, mended);
+    ASSERT_TRUE(repair) << to_string(repair.error());
+    const std::size_t kept = sound_chunks(mended);
+    EXPECT_GE(kept, readable);
+    // The flipped bytes may hit two bodies; a page holds about thirty of these small ones.
+    EXPECT_GE(kept, std::size_t{kChunks} - (is_page ? 40 : 2));
+    EXPECT_EQ(repair->check.chunks, kept);
+    const auto sound = check_world(mended);
+    ASSERT_TRUE(sound) << to_string(sound.error());
+    EXPECT_TRUE(sound->damage.empty()) << sound->damage.front().what;
+  }
+}
+
+TEST(WorldMaintenance, ARepairedWorldTakesThePlaceOfTheDamagedOne) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  make_world(path);
+  damage(path, std::filesystem::file_size(path) / 2, 200);
+  const auto before = read_file(path);
+  const auto repair = repair_world(path, path);
+  ASSERT_TRUE(repair) << to_string(repair.error());
+  ASSERT_FALSE(repair->kept.empty());
+  EXPECT_EQ(*read_file(repair->kept), *before) << "the damaged one is as it was";
+  EXPECT_TRUE(check_world(path)->damage.empty());
+  EXPECT_GE(sound_chunks(path), std::size_t{kChunks} - 3);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 2);
+}
+
+TEST(WorldMaintenance, LostTypesShow) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  make_world(path);
+  // All types are lost, since their texts are stored together.
+  const auto bytes = read_file(path);
+  const std::string_view text(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+  for (std::size_t at = text.find("\"type 1\""); at != std::string_view::npos; at = text.find("\"type 1\"", at + 1)) {
+    damage(path, at, 1);
+  }
+  const auto repair = repair_world(path, folder / "m.quoin");
+  ASSERT_TRUE(repair) << to_string(repair.error());
+  EXPECT_FALSE(repair->check.damage.empty());
+  const auto types = WorldStore::open(folder / "m.quoin", WorldAccess::Read)->types();
+  EXPECT_EQ((*types)[1].colour, (Rgba8{255, 0, 255, 255}));
+  EXPECT_EQ((*types)[2], coloured_type(2));
+  EXPECT_EQ(sound_chunks(folder / "m.quoin"), std::size_t{kChunks});
+}
+
+TEST(WorldMaintenance, NothingIsRepairedOfNothing) {
+  const WorldFolder folder;
+  std::ofstream(folder / "text.quoin") << std::string(30'000, 'x');
+  const auto repair = repair_world(folder / "text.quoin", folder / "m.quoin");
+  ASSERT_FALSE(repair);
+  EXPECT_EQ(repair.error().code, ErrorCode::BadFormat);
+  EXPECT_FALSE(std::filesystem::exists(folder / "m.quoin"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "m.quoin-new"));
+  EXPECT_FALSE(repair_world(folder / "none", folder / "m.quoin"));
+}
+
+std::vector<std::byte> png_of(char last) {
+  const std::string text = std::string("\x89PNG\r\n\x1A\n") + last;
+  const auto bytes = std::as_bytes(std::span(text));
+  return {bytes.begin(), bytes.end()};
+}
+
+TEST(WorldThumbnail, IsKeptUntilTheNext) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  make_world(path);
+  EXPECT_EQ(summarize_world(path)->thumbnail_bytes, 0U);
+  {
+    auto world = WorldStore::open(path, WorldAccess::Write);
+    EXPECT_FALSE(world->thumbnail()->has_value());
+    for (const char last : {'a', 'b'}) {
+      WorldChanges changes;
+      changes.put_thumbnail(png_of(last));
+      ASSERT_TRUE(world->save(std::move(changes)));
+      EXPECT_EQ(**world->thumbnail(), png_of(last));
+    }
+    WorldChanges none;
+    none.put_thumbnail(std::vector<std::byte>(100));
+    const auto refused = world->save(std::move(none));
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::InvalidArgument);
+    ASSERT_TRUE(world->flush());
+  }
+  EXPECT_EQ(**WorldStore::open(path, WorldAccess::Read)->thumbnail(), png_of('b'));
+  EXPECT_EQ(summarize_world(path)->thumbnail_bytes, 9U);
+  EXPECT_TRUE(check_world(path)->damage.empty());
+  auto world = WorldStore::open(path, WorldAccess::Write);
+  WorldChanges changes;
+  changes.remove_thumbnail();
+  ASSERT_TRUE(world->save(std::move(changes)));
+  EXPECT_FALSE(world->thumbnail()->has_value());
+}
+
+TEST(WorldCopy, HasAllThatTheWorldHas) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  make_world(path);
+  {
+    auto world = WorldStore::open(path, WorldAccess::Write);
+    WorldChanges changes;
+    changes.put_thumbnail(png_of('a'));
+    changes.put_chunk({0, 3, {1, 2, 3}}, {Chunk(2)});  // another level
+    ASSERT_TRUE(world->save(std::move(changes)));
+    ASSERT_TRUE(world->flush());
+  }
+  const auto copied = copy_world(path, folder / "c.quoin");
+  ASSERT_TRUE(copied) << to_string(copied.error());
+  EXPECT_EQ(copied->chunks, kChunks + 1U);
+  EXPECT_TRUE(copied->lost.empty());
+  EXPECT_EQ(copied->bytes, std::filesystem::file_size(folder / "c.quoin"));
+  std::uint64_t voxels = 0;
+  for (int i = 0; i < kChunks; ++i) voxels += static_cast<std::uint64_t>(chunk_of(i).non_air_count());
+  EXPECT_EQ(copied->voxels, voxels);
+  EXPECT_EQ(sound_chunks(folder / "c.quoin"), std::size_t{kChunks});
+  EXPECT_TRUE(check_world(folder / "c.quoin")->damage.empty());
+  const auto copy = WorldStore::open(folder / "c.quoin", WorldAccess::Read);
+  EXPECT_EQ(**copy->value("inventory"), std::vector<std::byte>(3000, std::byte{7}));
+  EXPECT_EQ(**copy->thumbnail(), png_of('a'));
+  EXPECT_EQ((*copy->load_chunk({0, 3, {1, 2, 3}}))->voxels.uniform(), 2);
+  // The world remains usable: grid and region numbers match it.
+  auto on = WorldStore::open(folder / "c.quoin", WorldAccess::Write);
+  WorldChanges more;
+  more.put_chunk({0, 0, {500, 0, 0}}, {Chunk(1)});
+  ASSERT_TRUE(on->save(std::move(more)));
+  ASSERT_TRUE(on->flush());
+  EXPECT_EQ(on->chunks(0, 0)->size(), kChunks + 1U);
+}
+
+TEST(WorldCopy, LeavesOutChunksThatAreDamagedAndRefusesOtherDamage) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  make_world(path);
+  const auto damage = [&](const char* sql) {
+    auto database = store::Connection::open(path.string(), store::Connection::Mode::Write);
+    ASSERT_TRUE(database->run(sql));
+    ASSERT_TRUE(database->close());
+  };
+  damage("UPDATE chunks SET body = zeroblob(length(body)) WHERE key = (SELECT max(key) FROM chunks)");
+  const auto copied = copy_world(path, folder / "c.quoin");
+  ASSERT_TRUE(copied) << to_string(copied.error());
+  ASSERT_EQ(copied->lost.size(), 1U);
+  EXPECT_TRUE(copied->lost[0].chunk.has_value());
+  EXPECT_EQ(copied->chunks, kChunks - 1U);
+  EXPECT_TRUE(check_world(folder / "c.quoin")->damage.empty());
+  damage("UPDATE parts SET body = zeroblob(length(body)) WHERE kind = 'value'");
+  const auto refused = copy_world(path, folder / "d.quoin");
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::BadFormat);
+  EXPECT_NE(to_string(refused.error()).find("quoin world repair"), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(folder / "d.quoin"));
+}
+
+TEST(WorldCopy, TakesThePlaceOfAWorldUnlessSomebodyWritesThat) {
+  const WorldFolder folder;
+  make_world(folder / "w.quoin");
+  make_world(folder / "c.quoin");
+  {
+    const auto writer = WorldStore::open(folder / "c.quoin", WorldAccess::Write);
+    const auto refused = copy_world(folder / "w.quoin", folder / "c.quoin");
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::CannotWrite);
+  }
+  EXPECT_TRUE(copy_world(folder / "w.quoin", folder / "c.quoin"));
+  EXPECT_EQ(sound_chunks(folder / "c.quoin"), std::size_t{kChunks});
+  EXPECT_EQ(copy_world(folder / "none.quoin", folder / "e.quoin").error().code, ErrorCode::CannotRead);
+  const auto cancelled = copy_world(folder / "w.quoin", folder / "e.quoin", [](double) { return false; });
+  ASSERT_FALSE(cancelled);
+  EXPECT_EQ(cancelled.error().code, ErrorCode::Cancelled);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 2) << "nothing of it is left";
+}
+
+}  // namespace
+}  // namespace quoin
