@@ -247,7 +247,7 @@ TEST(TriangleCases, StlFilesOfOtherLengthsAreReadOrRefusedWithTheReason) {
   ASSERT_TRUE(mesh) << to_string(mesh.error());
   EXPECT_EQ(mesh->mesh.triangles.size(), 1U);
   ASSERT_EQ(mesh->warnings.size(), 1U);
-  EXPECT_EQ(mesh->warnings[0], "left out the last 9 bytes, which follow the triangles");
+  EXPECT_EQ(mesh->warnings[0], "left out: the last 9 bytes, which follow the triangles");
   const auto cut = load_scene(case_file("stl-cut.stl"));
   ASSERT_FALSE(cut);
   EXPECT_EQ(cut.error().message, "the header promises 1 triangles, which need 134 bytes, but the file has 127");

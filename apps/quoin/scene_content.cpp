@@ -27,17 +27,18 @@ std::string content_text(const SceneContent& content) {
 
 void warn_of_lamps(const Scene& scene, std::vector<std::string>& warnings) {
   if (scene.lamps.empty()) return;
-  warnings.push_back("lamps left out (meshes cannot hold them): " + std::to_string(scene.lamps.size()));
+  warnings.push_back("lamps left out: " + std::to_string(scene.lamps.size()) +
+                     " (--lights writes them to .glb and .gltf)");
 }
 
 void warn_of_values(std::size_t values, std::vector<std::string>& warnings) {
   if (values == 0) return;
-  warnings.push_back("left out " + std::to_string(values) + (values == 1 ? " value" : " values") +
-                     " that a game stores in the world (quoin world backup copies them)");
+  warnings.push_back("application values left out: " + std::to_string(values) + " (quoin world backup copies them)");
 }
 
 void warn_of_data(std::int64_t voxels, std::vector<std::string>& warnings) {
-  if (voxels != 0) warnings.push_back("voxel data left out (meshes cannot hold it): " + std::to_string(voxels));
+  if (voxels == 0) return;
+  warnings.push_back("voxels whose data is left out, not supported by meshes: " + std::to_string(voxels));
 }
 
 void warn_of_left_out(const Scene& scene, InstanceFilter filter, std::vector<std::string>& warnings) {

@@ -650,19 +650,15 @@ std::string find_format_error(const ConvertOptions& options, const FormatInfo& f
            "--scale, --up, --texture, --light, --lights, --animate, --compress and --quantize need a mesh format; " +
            (options.output.empty() ? std::string(format.extension) : options.output.string()) + " is not one";
   }
-  if (options.ao_as_attribute && format.format == FileFormat::Obj) {
-    return "cannot write --ao-attribute to .obj; use .glb, .gltf or .ply";
+  const bool is_print = is_for_printing(format.format);
+  if (options.occlusion_apart && (is_print || format.format == FileFormat::Obj)) {
+    return "cannot write --ao-attribute to " + std::string(format.extension) + "; use .glb, .gltf or .ply";
   }
-  if (options.texture == "atlas" && format.format == FileFormat::Ply) {
-    return "cannot write --texture atlas to .ply: it has no textures; use .glb, .gltf or .obj";
+  if (options.texture == "atlas" && (is_print || format.format == FileFormat::Ply)) {
+    return "cannot write --texture atlas to " + std::string(format.extension) + "; use .glb, .gltf or .obj";
   }
-  if (options.voxel_mm && !is_for_printing(format.format))
-    return "--voxel-mm needs .stl or .3mf; use --scale for other formats";
+  if (options.voxel_mm && !is_print) return "--voxel-mm needs .stl or .3mf; use --scale for other mesh formats";
   if (options.voxel_mm && options.scale) return "--voxel-mm and --scale cannot be used together";
-  if (is_for_printing(format.format) && (options.texture == "atlas" || options.ao_as_attribute)) {
-    return std::string("cannot write ") + (options.ao_as_attribute ? "--ao-attribute" : "--texture atlas") + " to " +
-           std::string(format.extension) + "; use .glb or .gltf";
-  }
   const bool is_gltf = format.format == FileFormat::Glb || format.format == FileFormat::Gltf;
   if (options.lights && !is_gltf) {
     return "cannot write --lights to " + std::string(format.extension) +

@@ -457,7 +457,7 @@ class GltfReader {
     }
     const tinygltf::Texture* const texture = entry(model_.textures, index);
     if (texture == nullptr) {
-      loaded_.warnings.push_back("left out texture " + std::to_string(index) + ": it does not exist");
+      loaded_.warnings.push_back("left out: texture " + std::to_string(index) + ", which does not exist");
       return std::nullopt;
     }
     const auto at = static_cast<std::size_t>(index);
@@ -471,10 +471,10 @@ class GltfReader {
                              : !image->uri.empty() ? image->uri
                              : image->name.empty() ? "image " + std::to_string(source)
                                                    : image->name;
-    const std::span<const std::byte> rendered =
-        image == nullptr ? std::span<const std::byte>() : rendered_of(*image, static_cast<std::size_t>(source));
-    if (rendered.empty()) {
-      loaded_.warnings.push_back("left out the texture " + name + ": its image does not exist");
+    const std::span<const std::byte> picture =
+        image == nullptr ? std::span<const std::byte>() : picture_of(*image, static_cast<std::size_t>(source));
+    if (picture.empty()) {
+      loaded_.warnings.push_back("left out: the texture " + name + ", whose image does not exist");
       return std::nullopt;
     }
     known_textures_[at] = add_texture(rendered, name, loaded_);
@@ -689,11 +689,11 @@ class GltfReader {
     return {};
   }
   void finish() {
-    if (!has_textures_) loaded_.mesh.uvs.clear();
-    if (!has_glows_) loaded_.mesh.emissive_uvs.clear();
-    if (has_others_) loaded_.warnings.emplace_back("left out points and lines");
-    if (has_skins_) loaded_.warnings.emplace_back("left out skins: the mesh keeps its bind pose");
-    if (!model_.animations.empty()) loaded_.warnings.emplace_back("left out animations: the mesh keeps its rest pose");
+    if (!has_textures_) loaded_.mesh.texture_places.clear();
+    if (!has_glows_) loaded_.mesh.emissive_places.clear();
+    if (has_others_) loaded_.warnings.emplace_back("left out: points and lines");
+    if (has_skins_) loaded_.warnings.emplace_back("left out: skins; the mesh keeps its bind pose");
+    if (!model_.animations.empty()) loaded_.warnings.emplace_back("left out: animations; the mesh keeps its rest pose");
     builder_.finish();
   }
 

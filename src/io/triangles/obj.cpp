@@ -104,7 +104,7 @@ class MaterialFiles : public tinyobj::MaterialReader {
                   std::map<std::string, int>* numbers, std::string* warnings, std::string* errors) override {
     const auto bytes = sidecars_.read_or_same_name(name);
     if (!bytes) {
-      loaded_.warnings.push_back("left out the materials " + name + ": " + bytes.error().message);
+      loaded_.warnings.push_back("left out: the materials " + name + ": " + bytes.error().message);
       return false;
     }
     Bytes buffer(*bytes);
@@ -256,7 +256,7 @@ class ObjReader {
       if (Status done = take(shape.mesh); !done) return done.error();
       has_others_ |= !shape.lines.indices.empty() || !shape.points.indices.empty();
     }
-    if (has_others_) loaded_.warnings.emplace_back("left out points and lines");
+    if (has_others_) loaded_.warnings.emplace_back("left out: points and lines");
     show_what_is_all_invisible();
     if (has_glows_) loaded_.mesh.emissive_uvs = loaded_.mesh.uvs;
     if (!has_textures_) loaded_.mesh.uvs.clear();
@@ -324,8 +324,8 @@ class ObjReader {
   std::optional<std::size_t> texture_of(const std::string& name) {
     const auto [known, is_new] = textures_.try_emplace(name);
     if (is_new) {
-      const auto bytes = sidecars_.read_or_same_name(name);
-      if (!bytes) loaded_.warnings.push_back("left out the texture " + name + ": " + bytes.error().message);
+      const auto bytes = beside_.read_or_same_name(name);
+      if (!bytes) loaded_.warnings.push_back("left out: the texture " + name + ": " + bytes.error().message);
       if (bytes) known->second = add_texture(*bytes, name, loaded_);
     }
     return known->second;

@@ -213,9 +213,9 @@ class OffReader {
       material.colour = {colour[0], colour[1], colour[2], colour[3]};
       if (colour[3] < 1.0F) material.alpha_mode = AlphaMode::Blend;
     }
-    if (has_map_) loaded_.warnings.emplace_back("left out face colours that index a colour map");
+    if (has_map_) loaded_.warnings.emplace_back("left out: face colours that index a colour map");
     if (has_more_)
-      loaded_.warnings.emplace_back("left out extra numbers after coordinates, not declared in the first line");
+      loaded_.warnings.emplace_back("left out: extra numbers after coordinates, not declared in the first line");
   }
 
   static constexpr std::size_t kNowhere = std::string_view::npos;

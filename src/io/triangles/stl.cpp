@@ -59,7 +59,7 @@ Result<LoadedMesh> read_bytes(std::span<const std::byte> bytes) {
   }
   LoadedMesh loaded;
   if (promised < bytes.size()) {
-    loaded.warnings.push_back("left out the last " + std::to_string(bytes.size() - promised) +
+    loaded.warnings.push_back("left out: the last " + std::to_string(bytes.size() - promised) +
                               " bytes, which follow the triangles");
   }
   MeshBuilder builder(loaded);

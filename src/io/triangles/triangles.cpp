@@ -113,7 +113,7 @@ Status MeshBuilder::add_polygon(std::span<const std::size_t> corners,
 void MeshBuilder::finish() {
   const auto warn = [&](std::size_t count, const char* what) {
     if (count == 0) return;
-    loaded_.warnings.push_back("left out " + with_thousands(static_cast<std::int64_t>(count)) + " triangles with " +
+    loaded_.warnings.push_back("left out: " + with_thousands(static_cast<std::int64_t>(count)) + " triangles with " +
                                what);
   };
   warn(not_there_, "a missing corner");
@@ -135,7 +135,7 @@ std::optional<std::size_t> add_texture(std::span<const std::byte> rendered, cons
                                        LoadedMesh& loaded) {
   auto image = decode_image(rendered);
   if (!image) {
-    loaded.warnings.push_back("left out the texture " + name + ": " + image.error().message);
+    loaded.warnings.push_back("left out: the texture " + name + ": " + image.error().message);
     return std::nullopt;
   }
   MeshTexture texture;

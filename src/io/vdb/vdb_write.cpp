@@ -417,7 +417,9 @@ std::vector<std::string> vdb_unsupported_features(const Scene& scene) {
   if (scene.types.size() > 1) {
     lines.emplace_back("left out: voxel types (.vdb stores only where voxels and densities are)");
   }
-  if (with_data > 0) lines.push_back("left out: data of " + std::to_string(with_data) + " voxels");
+  if (with_data > 0) {
+    lines.push_back("voxels whose data is left out, not supported by .vdb: " + std::to_string(with_data));
+  }
   if (!scene.groups().handles().empty() || !scene.layers().handles().empty()) {
     lines.emplace_back("left out: groups and layers");
   }

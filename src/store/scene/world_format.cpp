@@ -37,9 +37,8 @@ Result<LoadedScene> load(const WorldStore& world, const LoadOptions& options, Th
   const auto values = world.value_names();
   if (!values) return values.error();
   if (!values->empty()) {
-    loaded->loaded.warnings.push_back("it holds " + std::to_string(values->size()) +
-                                      (values->size() == 1 ? " application value" : " application values") +
-                                      ", which other formats cannot store (quoin world backup copies them)");
+    loaded->loaded.warnings.push_back("application values left out: " + std::to_string(values->size()) +
+                                      " (quoin world backup copies them)");
   }
   return std::move(loaded->loaded);
 }
