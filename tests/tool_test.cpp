@@ -616,7 +616,8 @@ TEST_F(Tool, ConvertReadsAndWritesStandardStreams) {
            {"convert - x.glb --from nifti < tiny.vox", "quoin: standard input: the format is vox, not nifti\n"},
            {"convert - x.glb < nothing.txt", "quoin: standard input: not a file of any format that Quoin reads"},
            {"convert tiny.vox -", "quoin: cannot write standard output without --to FORMAT"},
-           {"convert tiny.vox - --to obj", "quoin: cannot write .obj to standard output: it is several files\n"},
+           {"convert tiny.vox - --to obj",
+            "quoin: cannot write .obj to standard output: it consists of several files\n"},
            {"convert tiny.vox - --to glb --json", "quoin: cannot use --json: OUT is standard output\n"},
            {"convert - --to glb", "quoin: standard input (-) must be the only input"},
            {"convert tiny.vox - --to glb > /dev/full", "quoin: standard output: No space left on device\n"}}) {

@@ -68,7 +68,7 @@ void add_field_occlusion_options(CLI::App& command) {
       "soft-share: share of solid samples, without steps. share: count of solid samples. weighted: by their depth in "
       "the solid. weighted-published: by the published curve, which darkens open surfaces slightly. none: no "
       "occlusion");
-  add("--ao-spread", "SAMPLES", "Distance of these samples, 0.0625 to 4 (default 2)");
+  add("--ao-spread", "SAMPLES", "Spacing of the density samples of --ao-form, 0.0625 to 4 (default 2)");
   add("--ao-offset", "X", "Offset of the weights of the weighted forms, 0 to 0.99; greater is darker (default 0.4)");
   add("--ao-power", "X", "Exponent of the weighted forms, 0.0625 to 64 (default 2)");
 }

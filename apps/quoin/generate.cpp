@@ -246,9 +246,10 @@ std::shared_ptr<GenerateOptions> add_world(CLI::App& command, const char* files,
   set_heading(command, heading::kOutput);
   command.add_option("--seed", options->seed, "Seed, a whole number (default 42)");
   command.add_option("--chunks", options->chunks, chunks)->type_name("XxYxZ");
-  command.add_flag("--endless", options->is_endless,
-                   "Write an unbounded .quoin, which programs extend with StreamedWorld; now generates a square of the "
-                   "width of --chunks around the origin");
+  command.add_flag(
+      "--endless", options->is_endless,
+      "Write an unbounded .quoin, which programs extend with StreamedWorld. Generates only a square of the "
+      "width of --chunks around the origin");
   command.add_flag("--force", options->force, kForceHelp);
   set_heading(command, heading::kGeneral);
   command.add_flag("--json", options->json, "Print one JSON object instead of text");
@@ -281,7 +282,8 @@ void add_generate_command(CLI::App& app, int& status) {
   smooth->add_flag("!--no-overhangs", options->smooth.overhangs, "Generate no overhangs and no arches");
   smooth->add_flag("!--no-caves", options->smooth.caves, "Generate no caves");
   smooth->footer(
-      "The same seed gives the same world on every machine, with the heights of generate terrain.\n"
+      "The same seed gives the same world on every machine. With --no-overhangs the ground has the heights of "
+      "generate terrain.\n"
       "Example: quoin generate smooth-terrain hills.json && quoin render hills.json -o hills.png");
 }
 

@@ -396,9 +396,9 @@ std::string find_mesh_input_error(const ConvertOptions& options, const FormatInf
   if (!format || !*format || format_info(**format).is_mesh) return "";
   const bool may_have_field = heeds_iso(options.common) || *format == FileFormat::Scene || *format == FileFormat::World;
   if (options.mesh_input == "--solid" && may_have_field) {
-    return to.is_mesh
-               ? "cannot use --solid: it converts fields to voxels, and " + std::string(to.extension) + " holds a mesh"
-               : "";
+    return to.is_mesh ? "cannot use --solid: it converts fields to voxels, but " + std::string(to.extension) +
+                            " is a mesh format"
+                      : "";
   }
   return "cannot use " + options.mesh_input + ": it needs a triangle mesh, and the input is " +
          std::string(format_info(**format).name);
@@ -416,7 +416,7 @@ Result<std::string> open_streams(ConvertOptions& options, const ManyOptions& man
     if (many.to.empty() || !format)
       return "cannot write standard output without --to FORMAT: one of " + writable_extensions();
     if (format->format == FileFormat::Gltf || format->format == FileFormat::Obj) {
-      return "cannot write " + std::string(format->extension) + " to standard output: it is several files";
+      return "cannot write " + std::string(format->extension) + " to standard output: it consists of several files";
     }
     if (options.common.json) return std::string("cannot use --json: OUT is standard output");
     auto file = streams.output(std::string(format->extension));
@@ -551,7 +551,7 @@ void add_mesh_file_options(CLI::App& command, ConvertOptions& options) {
       ->check(CLI::IsMember({"none", "propagated"}));
   command.add_flag("--lights", options.lights, "Also write lamps (KHR_lights_punctual) and cameras (.glb, .gltf)");
   command.add_flag("--animate", options.animate,
-                   "Write all frames of a .vox as an animation (.glb, .gltf); meshes smooth models separately");
+                   "Write all frames of a .vox as an animation (.glb, .gltf). Smooth models are meshed separately");
   command.add_option("--fps", options.frames_per_second, "Frames per second of --animate, 0.001 to 1000 (default 10)")
       ->check(CLI::Range(0.001, 1000.0));
   command.add_flag("--compress", options.compress,
@@ -813,8 +813,8 @@ std::string footer() {
          ".json and .quoin keep all grids, types, rotations and scales. Only .vox keeps animation and notes; from .vox "
          "to .vox nothing is lost, and --frame writes one frame.\n"
          "Triangle meshes are converted to voxels first, at their own size in the world, even if OUT is a mesh.\n"
-         ".stl and .3mf are closed manifold meshes in millimetres, for 3D printing. Volumes in millimetres become "
-         "metres in glTF and keep their unit in other formats.\n"
+         ".stl and .3mf are closed manifold meshes in millimetres, for 3D printing. Volumes in millimetres are "
+         "written in metres to glTF, in millimetres to other mesh formats.\n"
          "Example: quoin convert castle.vox castle.glb\n"
          "Example: quoin convert models/*.vox --to glb --out-dir meshes\n"
          "Example: quoin convert castle.vox castle.ply --mesher smooth --simplify 0.1\n"

@@ -19,16 +19,19 @@ void add_mesh_input_options(CLI::App& command, MeshInputTexts& texts, MeshLoadOp
       ->check(positive());
   command.add_flag(
       "--solid", texts.is_solid,
-      "Create only voxels with a centre inside the mesh. Converts fields to voxels, also for .json and .quoin");
+      "Create only voxels with a centre inside the mesh. If the input has fields: convert them to voxels, also for "
+      ".json and .quoin");
   command.add_flag("--surface", texts.is_surface, "Create only voxels on the surface (default: surface and inside)");
   command.add_flag("--field", texts.is_field, "Create a smooth, editable distance field instead of voxels");
   command
-      .add_option("--separating", texts.separating,
-                  "Thickness of the surface (default 6). 6: thin, no path through faces. 26: every voxel that the mesh "
-                  "touches, no path through edges and corners either")
+      .add_option(
+          "--separating", texts.separating,
+          "Thickness of the surface (default 6). 6: thin; no path through voxel faces crosses it. 26: every voxel "
+          "that the mesh touches; no path through edges and corners crosses it either")
       ->check(CLI::IsMember({6, 26}));
-  command.add_flag("--parity", texts.by_parity,
-                   "Find the inside by counting triangles, not by winding numbers; ignores their orientation");
+  command.add_flag(
+      "--parity", texts.by_parity,
+      "Find the inside by counting triangles instead of winding numbers, for meshes with inconsistent orientation");
   command.add_option("--band", options.band, "Range of distances of --field in voxels, 1 to 64 (default 8)")
       ->check(CLI::Range(1.0, 64.0));
   command

@@ -192,13 +192,14 @@ void add_path_options(CLI::App& command, PathArguments& arguments) {
                   "Tone curve: clamp, neutral (Khronos PBR), agx or aces (default neutral; clamp with --sky uniform)")
       ->check(CLI::IsMember({"clamp", "neutral", "agx", "aces"}));
   add_text_option(command, "--bloom", "MIX[,RADIUS[,THRESHOLD]]",
-                  "Bloom: share of the light that spreads, radius as a share of the image height, minimum brightness "
+                  "Bloom: share of the light that spreads, radius (share of the image height), minimum brightness "
                   "(default 0,0.02,0)");
   add_text_option(command, "--vignette", "X", "Darkening of the corners, 0 to 1 (default 0)");
   command
-      .add_option("--look", arguments.look,
-                  "Settings that no option gives: file (render settings and focus of the file) or plain (defaults) "
-                  "(default file)")
+      .add_option(
+          "--look", arguments.look,
+          "Source of settings without an option: file (its render settings and focus) or plain (the defaults of "
+          "quoin) (default file)")
       ->check(CLI::IsMember({"file", "plain"}));
   command.add_flag("--denoise", arguments.denoise, "Remove noise within surfaces and keep their edges");
 }

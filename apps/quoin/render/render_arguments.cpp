@@ -53,7 +53,7 @@ void add_camera_options(CLI::App& command, RenderArguments& arguments) {
                   "Frame the whole scene from the front, back, left, right, top or iso (default iso)")
       ->check(CLI::IsMember({"front", "back", "left", "right", "top", "iso"}));
   add_text_option(command, "--azimuth", "DEGREES",
-                  "Frame the whole scene from this angle, to the right of the front (default 45)");
+                  "Camera angle around the whole scene, from the front to the right (default 45)");
   add_text_option(command, "--elevation", "DEGREES", "Camera angle above the horizon (default 35.26)");
   add_text_option(command, "--camera", "X,Y,Z|file:N",
                   "Position of the camera, with --look-at; or camera N of the file, as listed by quoin info");
@@ -84,10 +84,9 @@ void add_light_options(CLI::App& command, RenderArguments& arguments) {
                   "spread from the sky and from glowing voxels, as in block games, without sun shadows")
       ->check(CLI::IsMember({"rays", "path", "propagated"}));
   command
-      .add_option(
-          "--preset", arguments.preset,
-          "Shading (default full): full, no-shadows, no-ao, unlit (colours only; with --ao times occlusion), ao "
-          "(occlusion only, grey), or density (a slice through fields and volumes)")
+      .add_option("--preset", arguments.preset,
+                  "Shading (default full): full, no-shadows, no-ao, unlit (colours, times occlusion with --ao), ao "
+                  "(occlusion only, grey), or density (a slice through fields and volumes)")
       ->check(CLI::IsMember({"full", "no-shadows", "no-ao", "unlit", "ao", "density"}));
   add_text_option(
       command, "--sun", "X,Y,Z|off",
