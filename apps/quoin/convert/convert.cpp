@@ -651,7 +651,7 @@ std::string find_format_error(const ConvertOptions& options, const FormatInfo& f
            (options.output.empty() ? std::string(format.extension) : options.output.string()) + " is not one";
   }
   const bool is_print = is_for_printing(format.format);
-  if (options.occlusion_apart && (is_print || format.format == FileFormat::Obj)) {
+  if (options.ao_as_attribute && (is_print || format.format == FileFormat::Obj)) {
     return "cannot write --ao-attribute to " + std::string(format.extension) + "; use .glb, .gltf or .ply";
   }
   if (options.texture == "atlas" && (is_print || format.format == FileFormat::Ply)) {

@@ -471,13 +471,13 @@ class GltfReader {
                              : !image->uri.empty() ? image->uri
                              : image->name.empty() ? "image " + std::to_string(source)
                                                    : image->name;
-    const std::span<const std::byte> picture =
-        image == nullptr ? std::span<const std::byte>() : picture_of(*image, static_cast<std::size_t>(source));
-    if (picture.empty()) {
+    const std::span<const std::byte> file_bytes =
+        image == nullptr ? std::span<const std::byte>() : file_bytes_of(*image, static_cast<std::size_t>(source));
+    if (file_bytes.empty()) {
       loaded_.warnings.push_back("left out: the texture " + name + ", whose image does not exist");
       return std::nullopt;
     }
-    known_textures_[at] = add_texture(rendered, name, loaded_);
+    known_textures_[at] = add_texture(file_bytes, name, loaded_);
     const tinygltf::Sampler* const sampler = entry(model_.samplers, texture->sampler);
     if (known_textures_[at] && sampler != nullptr) {
       MeshTexture& made = loaded_.mesh.textures[*known_textures_[at]];
@@ -489,7 +489,7 @@ class GltfReader {
   }
 
   /// Returns the file of an image; nullopt if it does not exist or extends past its buffer.
-  [[nodiscard]] std::span<const std::byte> rendered_of(const tinygltf::Image& image, std::size_t index) const {
+  [[nodiscard]] std::span<const std::byte> file_bytes_of(const tinygltf::Image& image, std::size_t index) const {
     if (image.bufferView < 0) {
       return index < asked_.images.size() ? asked_.images[index] : std::span<const std::byte>();
     }
@@ -689,8 +689,8 @@ class GltfReader {
     return {};
   }
   void finish() {
-    if (!has_textures_) loaded_.mesh.texture_places.clear();
-    if (!has_glows_) loaded_.mesh.emissive_places.clear();
+    if (!has_textures_) loaded_.mesh.uvs.clear();
+    if (!has_glows_) loaded_.mesh.emissive_uvs.clear();
     if (has_others_) loaded_.warnings.emplace_back("left out: points and lines");
     if (has_skins_) loaded_.warnings.emplace_back("left out: skins; the mesh keeps its bind pose");
     if (!model_.animations.empty()) loaded_.warnings.emplace_back("left out: animations; the mesh keeps its rest pose");

@@ -324,7 +324,7 @@ class ObjReader {
   std::optional<std::size_t> texture_of(const std::string& name) {
     const auto [known, is_new] = textures_.try_emplace(name);
     if (is_new) {
-      const auto bytes = beside_.read_or_same_name(name);
+      const auto bytes = sidecars_.read_or_same_name(name);
       if (!bytes) loaded_.warnings.push_back("left out: the texture " + name + ": " + bytes.error().message);
       if (bytes) known->second = add_texture(*bytes, name, loaded_);
     }
