@@ -113,7 +113,7 @@ TEST(GltfLook, LeavesOutAImageThatEndsBeyondItsBuffer) {
     gltf.replace(gltf.find(from), from.size(), to);
   };
   const std::string last_view = R"({"buffer":0,"byteOffset":48,"byteLength":32})";
-  replace(R"("uri":"rendered")", R"("name":"rendered","mimeType":"image/png","bufferView":2)");
+  replace(R"("uri":"picture")", R"("name":"picture","mimeType":"image/png","bufferView":2)");
   for (const std::string place : {R"("byteOffset":5616,"byteLength":89)", R"("byteOffset":48,"byteLength":33)",
                                   R"("byteOffset":81,"byteLength":1)", R"("byteOffset":4294967295,"byteLength":9)"}) {
     const std::string before = gltf;

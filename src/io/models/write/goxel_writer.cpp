@@ -65,7 +65,7 @@ class GoxelWriter {
   void numbers(std::string_view key, std::span<const float> values);
   void end_entries() { out_.u32(0); }
   Status add_blocks(IVec3 chunk, const Chunk& voxels, std::map<std::uint32_t, std::vector<Block>>& layers);
-  Result<std::uint32_t> rendered_of(const std::vector<std::uint8_t>& pixels);
+  Result<std::uint32_t> index_of_image(const std::vector<std::uint8_t>& pixels);
   void write_materials();
   void write_layer(const PlacedGrid& grid, const Layer& layer, std::uint32_t id);
 
@@ -103,7 +103,7 @@ void GoxelWriter::numbers(std::string_view key, std::span<const float> values) {
   entry(key, bytes.bytes());
 }
 
-Result<std::uint32_t> GoxelWriter::rendered_of(const std::vector<std::uint8_t>& pixels) {
+Result<std::uint32_t> GoxelWriter::index_of_image(const std::vector<std::uint8_t>& pixels) {
   std::string key(pixels.begin(), pixels.end());
   const auto found = images_.find(key);
   if (found != images_.end()) return found->second;
@@ -143,7 +143,7 @@ Status GoxelWriter::add_blocks(IVec3 chunk, const Chunk& voxels, std::map<std::u
       }
       for (std::size_t bx = 0; bx < blocks.size(); ++bx) {
         for (const auto& [material, pixels] : blocks.at(bx)) {
-          const auto image = rendered_of(pixels);
+          const auto image = index_of_image(pixels);
           if (!image) return image.error();
           const IVec3 place = origin + IVec3(static_cast<int>(bx) * kBlockEdge, by, bz);
           layers[material].push_back({*image, {place.x, -place.z - kBlockEdge, place.y}});
