@@ -72,7 +72,7 @@ TEST(VolumeThreshold, PartsValuesWithNoFloatBetweenThem) {
   float low = 1.0F;
   for (int i = 0; i < 4; ++i) {
     const float high = std::nextafter(low, 2.0F);
-    EXPECT_EQ(volume_threshold(volume_of({2, 1, 1}, {low, high})), low) << "values above the threshold are solid";
+    EXPECT_EQ(threshold_of(volume_of({2, 1, 1}, {low, high})), low) << "values above the threshold are solid";
     low = high;
   }
 }
