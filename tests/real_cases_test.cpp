@@ -236,7 +236,7 @@ TEST(TriangleCases, ReadsFilesOfOtherPrograms) {
 
 TEST(TriangleCases, ModelsThatAreAllInvisibleAreOpaque) {
   const LoadedScene loaded = load_case("obj-tr-1.obj");
-  EXPECT_TRUE(has_warning(loaded, "invisible"));
+  EXPECT_TRUE(has_warning(loaded, "fully transparent"));
   const VoxelProperties& type = type_at(loaded, first_grid(loaded).grid.bounds().min);
   EXPECT_EQ(type.colour, (Rgba8{255, 0, 0, 255}));
   EXPECT_EQ(type.visibility, Visibility::Opaque);

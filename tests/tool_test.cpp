@@ -614,7 +614,7 @@ TEST_F(Tool, ConvertReadsAndWritesStandardStreams) {
   EXPECT_EQ(shell("'" QUOIN_TOOL "' convert - named.glb --from vox < tiny.vox").status, 0);
   for (const auto& [arguments, error] : std::vector<std::array<std::string, 2>>{
            {"convert - x.glb --from nifti < tiny.vox", "quoin: standard input: the format is vox, not nifti\n"},
-           {"convert - x.glb < nothing.txt", "quoin: standard input: not a file of any format that Quoin reads"},
+           {"convert - x.glb < nothing.txt", "quoin: standard input: unknown file format; readable are .3mf"},
            {"convert tiny.vox -", "quoin: cannot write standard output without --to FORMAT"},
            {"convert tiny.vox - --to obj",
             "quoin: cannot write .obj to standard output: it consists of several files\n"},

@@ -291,11 +291,11 @@ def check_round_trip(quoin, folder):
 def reported(operator, **options):
     """Returns the warnings of an export."""
     from quoin_voxels import exporter
-    told, write = [], exporter.export_file
+    warnings, write = [], exporter.export_file
 
     def listen(*arguments):
         made = write(*arguments)
-        told.extend(made.warnings)
+        warnings.extend(made.warnings)
         return made
 
     exporter.export_file = listen
@@ -303,7 +303,7 @@ def reported(operator, **options):
         run(operator, **options)
     finally:
         exporter.export_file = write
-    return told
+    return warnings
 
 
 def check_own_scene(quoin, folder):
@@ -340,13 +340,13 @@ def check_own_scene(quoin, folder):
             data.shift_x = 0.1
     bpy.context.view_layer.update()
     path = os.path.join(folder, "own.vox")
-    told = reported(bpy.ops.export_scene.quoin, filepath=path, fill="solid")
-    line = next(one for one in told if "leaves out" in one)
+    warnings = reported(bpy.ops.export_scene.quoin, filepath=path, fill="solid")
+    line = next(one for one in warnings if "leaves out" in one)
     for name in ("point light my POINT", "spot light my SPOT", "area light my AREA", "sun my SUN",
                  "panoramic camera PANO AUTO"):
         require(name in line, f"{name} is not reported: {line}")
     require(line.count("my SUN") == 1, f"one sun stays: {line}")
-    require(any("PERSP HORIZONTAL" in one and "shifted" in one for one in told), f"the shift is not reported: {told}")
+    require(any("PERSP HORIZONTAL" in one and "shifted" in one for one in warnings), f"the shift is not reported: {warnings}")
     made = quoin.load(path)
     require({one.name for one in made.instances} ==
             {f"cube of {name}" for name in ("garden", "trees", scene.collection.name)}, "what renders show")
@@ -362,12 +362,12 @@ def check_own_scene(quoin, folder):
     for one in made.cameras:
         require(one.view_height is not None or np.allclose(one.position, (40, 30, 90), atol=1e-3), f"a place {one}")
     for ending, lamps in ((".json", 2), (".quoin", 2)):
-        told = reported(bpy.ops.export_scene.quoin, filepath=os.path.join(folder, "own" + ending), fill="solid")
+        warnings = reported(bpy.ops.export_scene.quoin, filepath=os.path.join(folder, "own" + ending), fill="solid")
         made = quoin.load(os.path.join(folder, "own" + ending))
         require(len(made.lamps) == lamps, f"{ending}: {len(made.lamps)} lamps")
-        require(any("area light my AREA" in one for one in told), f"{ending}: {told}")
-    told = reported(bpy.ops.export_scene.quoin, filepath=os.path.join(folder, "own.qb"), fill="solid")
-    require(any("camera PERSP AUTO" in one and "sun my SUN" in one for one in told), f".qb: {told}")
+        require(any("area light my AREA" in one for one in warnings), f"{ending}: {warnings}")
+    warnings = reported(bpy.ops.export_scene.quoin, filepath=os.path.join(folder, "own.qb"), fill="solid")
+    require(any("camera PERSP AUTO" in one and "sun my SUN" in one for one in warnings), f".qb: {warnings}")
     run(bpy.ops.export_scene.quoin, filepath=path, fill="solid", collections="LAYERS")
     made = quoin.load(path)
     require({one.name: one.layer for one in made.instances} == {

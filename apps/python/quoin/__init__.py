@@ -59,22 +59,22 @@ def version() -> str:
 __version__ = version()
 
 
-def png(picture: NdArray) -> bytes:
+def png(image: NdArray) -> bytes:
     """Encodes an image as a PNG file and returns its bytes.
 
-    `picture`: uint8, (height, width, 3) for RGB or (height, width, 4) for RGBA. Raises TypeError if it is not a NumPy
+    `image`: uint8, (height, width, 3) for RGB or (height, width, 4) for RGBA. Raises TypeError if it is not a NumPy
     array, and ValueError for any other dtype or shape and for empty images.
 
     >>> png(np.zeros((2, 3, 3), np.uint8))[:8]
     b'\\x89PNG\\r\\n\\x1a\\n'
     """
-    if not isinstance(picture, _np.ndarray):
+    if not isinstance(image, _np.ndarray):
         raise TypeError("the image must be a NumPy array")
-    if rendered.dtype != _np.uint8 or rendered.ndim != 3 or rendered.shape[2] not in (3, 4) or not rendered.size:
+    if image.dtype != _np.uint8 or image.ndim != 3 or image.shape[2] not in (3, 4) or not image.size:
         raise ValueError("the image must be uint8, (height, width, 3) or (height, width, 4)")
-    height, width, channels = rendered.shape
+    height, width, channels = image.shape
     rows = _np.zeros((height, 1 + width * channels), _np.uint8)  # each row starts with its filter type, 0
-    rows[:, 1:] = rendered.reshape(height, -1)
+    rows[:, 1:] = image.reshape(height, -1)
 
     def chunk(name: bytes, data: bytes) -> bytes:
         return _struct.pack(">I", len(data)) + name + data + _struct.pack(">I", _zlib.crc32(name + data))

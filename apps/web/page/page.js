@@ -544,7 +544,7 @@ $('smooth').addEventListener('change', async () => {
   }
 });
 $('glb').addEventListener('click', () => give(new Blob([glb], { type: 'model/gltf-binary' }), '.glb'));
-$('rendered').addEventListener('click', async () => {
+$('image').addEventListener('click', async () => {
   if (marched?.isOn) {
     try {
       const image = await marched.read();

@@ -122,13 +122,13 @@ async function usePage(browser, errors) {
   check(await tab.isVisible('canvas.marched'), `the page marches: ${await note()}`);
   await writeFile(join(out, 'marched-page.png'), await tab.screenshot({ timeout: 120_000 }));
   const before = await download(tab, '#march');
-  const same = await meanDifference(tab, await download(tab, '#rendered'), before);
+  const same = await meanDifference(tab, await download(tab, '#image'), before);
   check(same < 2, `by WebGPU the page has the module's image except for its samples: ${same.toFixed(2)} off`);
   for (let i = 0; i < 12; ++i) await tab.keyboard.press('a');
   for (let i = 0; i < 4; ++i) await tab.keyboard.press('s');
   const later = await download(tab, '#march');
   const other = await meanDifference(tab, before, later);
-  const again = await meanDifference(tab, await download(tab, '#rendered'), later);
+  const again = await meanDifference(tab, await download(tab, '#image'), later);
   check(other > 4 && again < 2, `the page's sun is that of both: ${again.toFixed(2)} off, ${
     other.toFixed(2)} from before`);
   await tab.keyboard.press('ArrowLeft');

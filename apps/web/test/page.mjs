@@ -109,7 +109,7 @@ try {
   };
   const glb = await download('#glb');
   check(glb.bytes.equals(await readFile(nativeGlb)), `${glb.name} is the native tool's, ${glb.bytes.length} bytes`);
-  const png = await download('#rendered');
+  const png = await download('#image');
   check(png.bytes.toString('latin1', 1, 4) === 'PNG', `${png.name} is a PNG of ${png.bytes.length} bytes`);
   const marched = await download('#march', 300_000);
   check(marched.bytes.toString('latin1', 1, 4) === 'PNG', `${marched.name}, marched: ${await status()}`);

@@ -86,7 +86,7 @@ HeightMap map_of(int width, int height, float metres) {
   return map;
 }
 
-const SceneGrid& impl_of(const Scene& scene) {
+const SceneGrid& first_content(const Scene& scene) {
   return scene.grids()[scene.grids().handles().front()];
 }
 
@@ -146,7 +146,7 @@ TEST(Heights, ReadsHgtMetresWithVoids) {
   coarse.heights->metres_per_voxel = 1'000.0;
   const auto loaded = load_scene(path, coarse);
   ASSERT_TRUE(loaded);
-  EXPECT_EQ(impl_of(loaded->scene).grid.bounds().size().x, 112);
+  EXPECT_EQ(first_content(loaded->scene).grid.bounds().size().x, 112);
   file.pop_back();
   ASSERT_TRUE(write_file(file, path));
   EXPECT_EQ(detect_format(path).value(), std::nullopt);
@@ -162,7 +162,7 @@ TEST(Heights, ColumnsAreAsHighAsTheirHeights) {
   HeightOptions options;
   options.depth = 3;
   const Scene scene = scene_of(map, options);
-  const Grid& grid = impl_of(scene).grid;
+  const Grid& grid = first_content(scene).grid;
   EXPECT_EQ(grid.voxel_count(), 347 * 3 + 5 + 6);
   EXPECT_EQ(grid.bounds(), (IBox{{0, 7, 0}, {70, 13, 5}}));
   EXPECT_EQ(grid.get(3, 11, 0) != kAir, true);
@@ -182,7 +182,7 @@ TEST(Heights, VoxelsAndExaggerationAreOfAnySize) {
   options.vertical_exaggeration = 2.0;
   options.depth = 1;
   const Scene scene = scene_of(map, options);
-  const Grid& grid = impl_of(scene).grid;
+  const Grid& grid = first_content(scene).grid;
   EXPECT_EQ(grid.bounds(), (IBox{{0, 39, 0}, {17, 56, 5}}));
   EXPECT_NE(grid.get(2, 55, 4), kAir);
   EXPECT_NE(grid.get(1, 47, 0), kAir) << "halfway between 40 and 56";
@@ -200,7 +200,7 @@ TEST(Heights, DensitiesAreDistancesToAPlane) {
   options.as_field = true;
   options.depth = 40;
   const Scene scene = scene_of(map, options);
-  const DensityGrid& field = impl_of(scene).field;
+  const DensityGrid& field = first_content(scene).field;
   for (int x = 10; x < 90; x += 7) {
     for (int y = -20; y < 100; ++y) {
       const double distance = (y - 20.0 - 0.75 * x) / 1.25;
@@ -225,8 +225,8 @@ TEST(Heights, AnyNumberOfThreadsGivesTheSame) {
     const auto one = scene_from_heights(map, options, {1});
     const auto four = scene_from_heights(map, options, {4});
     ASSERT_TRUE(one && four);
-    const SceneGrid& a = impl_of(*one);
-    const SceneGrid& b = impl_of(*four);
+    const SceneGrid& a = first_content(*one);
+    const SceneGrid& b = first_content(*four);
     ASSERT_EQ(a.grid.chunks(), b.grid.chunks());
     for (const IVec3 place : a.grid.chunks()) EXPECT_EQ(*a.grid.find_chunk(place), *b.grid.find_chunk(place));
     ASSERT_EQ(a.field.chunks(), b.field.chunks());
@@ -255,7 +255,7 @@ TEST(Heights, RefusesOptionsOutOfRange) {
   steep.metres[0] = 0.0F;
   EXPECT_EQ(scene_from_heights(steep, options).error().code, ErrorCode::LimitExceeded);
   steep.metres.assign(100, std::numeric_limits<float>::quiet_NaN());
-  EXPECT_EQ(impl_of(*scene_from_heights(steep, {})).grid.voxel_count(), 0);
+  EXPECT_EQ(first_content(*scene_from_heights(steep, {})).grid.voxel_count(), 0);
 }
 
 TEST(Heights, RefusesDamagedImages) {

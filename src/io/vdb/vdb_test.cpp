@@ -30,7 +30,7 @@ LoadedScene load(const fs::path& path, const LoadOptions& options = {}) {
   return loaded ? std::move(*loaded) : LoadedScene{};
 }
 
-const SceneGrid& impl_of(const LoadedScene& loaded, std::string_view name) {
+const SceneGrid& grid_named(const LoadedScene& loaded, std::string_view name) {
   for (const GridHandle handle : loaded.scene.grids().handles()) {
     if (loaded.scene.grids()[handle].name == name) return loaded.scene.grids()[handle];
   }
@@ -56,7 +56,7 @@ TEST(Vdb, ALevelSetIsAFieldOfDistancesInSamples) {
   for (const char* name : {"level_set_blosc.vdb", "level_set_blosc.nvdb"}) {
     const LoadedScene loaded = load(kCorpus / name);
     EXPECT_EQ(loaded.format, "vdb");
-    const DensityGrid& field = impl_of(loaded, "sphere").field;
+    const DensityGrid& field = grid_named(loaded, "sphere").field;
     EXPECT_EQ(field.solid_count(), kInSphere) << name;
     EXPECT_EQ(field.band(), 3.0F);
     EXPECT_EQ(field.density({2, 4, 6}), -3.0F);
@@ -65,20 +65,20 @@ TEST(Vdb, ALevelSetIsAFieldOfDistancesInSamples) {
     EXPECT_EQ(field.density({40, 4, 6}), 3.0F);
     const Instance& placed = instance_of(loaded, "sphere");
     EXPECT_EQ(placed.voxel_size, 0.5);
-    expect_near(world_from_grid(placed, impl_of(loaded, "sphere"), {2, 4, 6}), {1, 2, 3});
+    expect_near(world_from_grid(placed, grid_named(loaded, "sphere"), {2, 4, 6}), {1, 2, 3});
   }
 }
 
 TEST(Vdb, DoublesAreReadAsFloats) {
   for (const char* name : {"double_zip.vdb", "double_zip.nvdb"}) {
-    EXPECT_EQ(impl_of(load(kCorpus / name), "double").field.solid_count(), 251) << name;
+    EXPECT_EQ(grid_named(load(kCorpus / name), "double").field.solid_count(), 251) << name;
   }
 }
 
 TEST(Vdb, GridsThatShareATreeAreInstances) {
   const LoadedScene loaded = load(kCorpus / "instances.vdb");
   EXPECT_EQ(loaded.scene.grids().handles().size(), 1U);
-  const SceneGrid& sphere = impl_of(loaded, "sphere");
+  const SceneGrid& sphere = grid_named(loaded, "sphere");
   expect_near(world_from_grid(instance_of(loaded, "moved"), sphere, {2, 4, 6}), {11, 22, 33});
   // A quarter about y takes x to -z.
   expect_near(world_from_grid(instance_of(loaded, "turned"), sphere, {2, 4, 6}), {3, 2, 6});
@@ -90,25 +90,25 @@ TEST(Vdb, MasksAreVoxelsAroundTheirIndices) {
                                           {"bool_zip.nvdb", "bool", 69'005},
                                           {"mask_zip.nvdb", "mask", 2'310}}) {
     const LoadedScene loaded = load(kCorpus / file);
-    EXPECT_EQ(impl_of(loaded, name).grid.voxel_count(), count) << file;
+    EXPECT_EQ(grid_named(loaded, name).grid.voxel_count(), count) << file;
     expect_near(instance_of(loaded, name).position, DVec3(-0.5));
   }
   const LoadedScene loaded = load(kCorpus / "masks.vdb");
-  const quoin::Grid& voxels = impl_of(loaded, "bool").grid;
+  const quoin::Grid& voxels = grid_named(loaded, "bool").grid;
   EXPECT_EQ(voxels.get(1, 2, 3), kAir) << "active, and false";
   EXPECT_NE(voxels.get(4, 4, 4), kAir);
   EXPECT_EQ(voxels.bounds(), (IBox{{-3, -2, -100}, {10, 31, 61}}));
   ASSERT_EQ(loaded.warnings.size(), 1U);
-  EXPECT_NE(loaded.warnings[0].find("\"velocity\", of Tree_vec3s"), std::string::npos);
+  EXPECT_NE(loaded.warnings[0].find("\"velocity\", of type Tree_vec3s"), std::string::npos);
 }
 
 TEST(Vdb, FogIsSolidAboveAValue) {
   LoadOptions options;
   options.iso = 0.5F;
   const LoadedScene loaded = load(kCorpus / "fog_half_zip.vdb", options);
-  EXPECT_EQ(impl_of(loaded, "fog").field.solid_count(), 2'553);
-  expect_near(world_from_grid(instance_of(loaded, "fog"), impl_of(loaded, "fog"), {10, 12, 14}), {1, 2, 3});
-  EXPECT_GT(impl_of(load(kCorpus / "fog_half_zip.vdb"), "fog").field.solid_count(), 2'000);
+  EXPECT_EQ(grid_named(loaded, "fog").field.solid_count(), 2'553);
+  expect_near(world_from_grid(instance_of(loaded, "fog"), grid_named(loaded, "fog"), {10, 12, 14}), {1, 2, 3});
+  EXPECT_GT(grid_named(load(kCorpus / "fog_half_zip.vdb"), "fog").field.solid_count(), 2'000);
 }
 
 /// Returns a scene of a field, of voxels, and of the same field twice, once turned and mirrored.
@@ -254,7 +254,7 @@ TEST(Vdb, RealFilesHoldWhatOpenVdbFindsInThem) {
   }
   EXPECT_EQ(file->grids[0].leaves.size(), 1451U);
   EXPECT_EQ(active, 270'638);
-  EXPECT_EQ(impl_of(load(sphere), "ls_sphere").field.solid_count(), 903'939);
+  EXPECT_EQ(grid_named(load(sphere), "ls_sphere").field.solid_count(), 903'939);
   for (const auto& [name, count] : {std::pair{"data__sphere-div1.vdb", 19}, {"data__sphere-div2.vdb", 33}}) {
     const auto fog = read_vdb_file(read_file(folder / "syoyo+tinyvdbio" / name).value());
     ASSERT_TRUE(fog);

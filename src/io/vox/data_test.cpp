@@ -113,7 +113,7 @@ TEST_F(VoxData, OtherFormatsUnderThisNameGiveOneLine) {
     ASSERT_FALSE(loaded) << file.path;
     const std::string text = to_string(loaded.error());
     const std::string expected = file.path.find("slab6") != std::string::npos ? "SLAB6"
-                                 : file.path.starts_with("bad/")              ? "git-LFS"
+                                 : file.path.starts_with("bad/")              ? "Git LFS"
                                                                               : "starts with";
     EXPECT_NE(text.find(expected), std::string::npos) << file.path << ": " << text;
     EXPECT_EQ(text.find('\n'), std::string::npos);

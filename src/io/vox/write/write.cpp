@@ -139,7 +139,7 @@ class Writer {
   [[nodiscard]] std::optional<Chunk> revised_view(const vox::ChunkSpan& place);
   [[nodiscard]] bool is_removed(const vox::ChunkSpan& place) const;
   [[nodiscard]] std::string_view id_of(const vox::ChunkSpan& place) const;
-  [[nodiscard]] std::span<const std::byte> impl_of(const vox::ChunkSpan& place) const;
+  [[nodiscard]] std::span<const std::byte> payload_of(const vox::ChunkSpan& place) const;
   [[nodiscard]] const SceneLayer* layer_of(std::size_t number) const;
   [[nodiscard]] vox::Attributes material(std::size_t index) const;
   [[nodiscard]] bool has_changed_material(std::size_t index) const;
@@ -331,7 +331,7 @@ std::string_view Writer::id_of(const vox::ChunkSpan& place) const {
   return {reinterpret_cast<const char*>(source_.bytes.data()) + place.begin, 4};
 }
 
-std::span<const std::byte> Writer::impl_of(const vox::ChunkSpan& place) const {
+std::span<const std::byte> Writer::payload_of(const vox::ChunkSpan& place) const {
   return std::span(source_.bytes).subspan(place.begin + vox::kChunkHeaderBytes, place.content_bytes);
 }
 
@@ -352,7 +352,7 @@ bool Writer::is_removed(const vox::ChunkSpan& place) const {
     case vox::ChunkKind::Layer:
       return source_.layer_of[place.number] != vox::kNone && layer_of(place.number) == nullptr;
     case vox::ChunkKind::Other: {
-      const auto camera = vox::camera_number(id_of(place), impl_of(place));
+      const auto camera = vox::camera_number(id_of(place), payload_of(place));
       return camera && std::ranges::find(view_.removed, *camera) != view_.removed.end();
     }
     default:
@@ -364,7 +364,7 @@ std::optional<Chunk> Writer::revised_count(const vox::ChunkSpan& place) const {
   if (place.content_bytes < 4 || model_count_ == source_.document.models.size()) return std::nullopt;
   vox::ChunkWriter content;
   content.u32(model_count_);
-  content.raw(impl_of(place).subspan(4));
+  content.raw(payload_of(place).subspan(4));
   return Chunk{"PACK", content.take()};
 }
 
@@ -374,7 +374,7 @@ std::optional<Chunk> Writer::revised_size(const vox::ChunkSpan& place) const {
   vox::ChunkWriter content;
   const IVec3 size = plan->pieces.front().size;
   for (const int edge : {size.x, size.z, size.y}) content.i32(edge);
-  content.raw(impl_of(place).subspan(12));
+  content.raw(payload_of(place).subspan(12));
   return Chunk{"SIZE", content.take()};
 }
 
@@ -389,7 +389,7 @@ std::optional<Chunk> Writer::revised_model(const vox::ChunkSpan& place) {
   if (place.kind == vox::ChunkKind::Voxels) {
     // Bytes after the voxels in their chunk are kept.
     const std::size_t voxel_bytes = source_.document.models[place.number].voxels.size();
-    const std::span<const std::byte> tail = impl_of(place).subspan(4 + voxel_bytes);
+    const std::span<const std::byte> tail = payload_of(place).subspan(4 + voxel_bytes);
     content->insert(content->end(), tail.begin(), tail.end());
   }
   return Chunk{place.kind == vox::ChunkKind::Voxels ? "XYZI" : "TDCZ", std::move(*content)};
@@ -408,7 +408,7 @@ std::optional<Chunk> Writer::revised_layer(const vox::ChunkSpan& place) const {
   if (layer == nullptr) return std::nullopt;
   const vox::Layer& before = source_.document.layers[place.number];
   if (layer->name == printable(before.name) && layer->visible == !before.hidden) return std::nullopt;
-  const std::span<const std::byte> bytes = impl_of(place);
+  const std::span<const std::byte> bytes = payload_of(place);
   vox::ChunkReader reader(bytes, "LAYR", 0, 0, bytes.size());
   vox::ChunkWriter content;
   content.i32(reader.i32());
@@ -435,7 +435,7 @@ std::optional<Chunk> Writer::revised_material(const vox::ChunkSpan& place) const
   const std::size_t index = place.number;
   const auto chunk = static_cast<std::size_t>(&place - source_.document.chunks.data());
   if (index == 0 || material_chunk_[index] != chunk || !has_changed_material(index)) return std::nullopt;
-  const std::span<const std::byte> bytes = impl_of(place);
+  const std::span<const std::byte> bytes = payload_of(place);
   vox::ChunkReader reader(bytes, "MATL", 0, 0, bytes.size());
   vox::ChunkWriter content;
   content.i32(reader.i32());
@@ -469,7 +469,7 @@ bool Writer::has_changed_colour() const {
 std::optional<Chunk> Writer::revised_palette(const vox::ChunkSpan& place) const {
   const auto chunk = static_cast<std::size_t>(&place - source_.document.chunks.data());
   if (chunk != palette_chunk_ || !has_changed_colour()) return std::nullopt;
-  const std::span<const std::byte> bytes = impl_of(place);
+  const std::span<const std::byte> bytes = payload_of(place);
   std::vector<std::byte> content(bytes.begin(), bytes.end());
   content.resize(std::max(content.size(), vox::kColours * 4), std::byte{255});
   for (std::size_t index = 1; index < vox::kColours; ++index) {
@@ -484,7 +484,7 @@ std::optional<Chunk> Writer::revised_palette(const vox::ChunkSpan& place) const 
 
 /// Returns the revised chunk of a camera or of the sun; nullopt if it is unchanged.
 std::optional<Chunk> Writer::revised_view(const vox::ChunkSpan& place) {
-  const std::span<const std::byte> bytes = impl_of(place);
+  const std::span<const std::byte> bytes = payload_of(place);
   const auto number = vox::camera_number(id_of(place), bytes);
   const auto camera = number ? view_.cameras.find(*number) : view_.cameras.end();
   const bool is_sun = view_.sun && vox::is_sun(id_of(place), bytes);

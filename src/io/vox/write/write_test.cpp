@@ -184,7 +184,7 @@ TEST(VoxWrite, WarnsOfPositionsBeyondTheWorldOfMagicaVoxel) {
     ASSERT_TRUE(written);
     ASSERT_EQ(written->warnings.size(), static_cast<std::size_t>(count));
     if (count > 0) {
-      EXPECT_TRUE(written->warnings[0].ends_with("ends: 1")) << written->warnings[0];
+      EXPECT_TRUE(written->warnings[0].ends_with("world: 1")) << written->warnings[0];
     }
   }
 }
