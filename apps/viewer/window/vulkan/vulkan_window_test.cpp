@@ -201,7 +201,7 @@ TEST_F(VulkanWindowTest, ReportsUnsupportedDevices) {
   expect_refusal(wrong, "no device \"no such device\"; available: 0 ");
   wrong = options(false);
   wrong.get_instance_proc_addr = nullptr;
-  expect_refusal(wrong, "there is no loader");
+  expect_refusal(wrong, "the Vulkan loader is missing");
 }
 
 TEST_F(VulkanWindowTest, RequiresAFontOfItsSizeAndCornersThatAreThere) {
