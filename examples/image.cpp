@@ -47,7 +47,7 @@ int main(int argc, char** argv) {
   const std::string path = argc > 1 ? argv[1] : "staircase.png";
   const quoin::Status status = scene ? draw(*scene, path) : scene.error();
   if (!status) {
-    std::fprintf(stderr, "picture: %s\n", quoin::to_string(status.error()).c_str());
+    std::fprintf(stderr, "image: %s\n", quoin::to_string(status.error()).c_str());
     return 1;
   }
   std::printf("drew %s\n", path.c_str());

@@ -43,7 +43,7 @@ DVec3 triple(const Json& json) {
   return {json[0].get<double>(), json[1].get<double>(), json[2].get<double>()};
 }
 
-TEST_F(ToolRender, ItWritesAImageOfTheSizeAskedForAndSaysSo) {
+TEST_F(ToolRender, WritesAnImageOfTheRequestedSizeAndReportsIt) {
   const Json said = drawn("tiny.vox -o out.png --size 64x48 --threads 2");
   EXPECT_EQ(said["size"], Json({64, 48}));
   EXPECT_GT(said["rays"], 64 * 48);
@@ -519,7 +519,7 @@ TEST_F(ToolRender, FieldsShowTheirDensitiesAndTheOcclusionOfTheirMeshes) {
   EXPECT_FALSE(exists("out2.png"));
 }
 
-TEST_F(ToolRender, AImageOfTheSkyComesWithAWarning) {
+TEST_F(ToolRender, AnImageOfTheSkyHasAWarning) {
   std::ofstream(folder_.file("none.vox"), std::ios::binary) << vox_file({1, 1, 1}, "");
   EXPECT_EQ(drawn("none.vox -o a.png --size 9x9")["warnings"], Json({"nothing visible; the image shows only sky"}));
   EXPECT_TRUE(exists("a.png"));

@@ -525,9 +525,9 @@ TEST_F(Tool, ManyFilesAreNotMixedUp) {
   // The names of the input folders make no difference.
   std::filesystem::create_symlink("a", folder_.file("b"));
   std::ofstream(folder_.file("a/tiny.json")) << "{}";
-  const ToolRun separate = run("convert a/tiny.vox b/tiny.json --to glb");
-  EXPECT_EQ(separate.status, 2);
-  EXPECT_EQ(separate.err, "quoin: a/tiny.vox and b/tiny.json would both be written to b/tiny.glb\n");
+  const ToolRun refused = run("convert a/tiny.vox b/tiny.json --to glb");
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_EQ(refused.err, "quoin: a/tiny.vox and b/tiny.json would both be written to b/tiny.glb\n");
   std::filesystem::remove(folder_.file("a/tiny.json"));
   // Output of an earlier run below a folder is not an input of the next run.
   for (int i = 0; i < 2; ++i) {
@@ -615,7 +615,7 @@ TEST_F(Tool, ConvertReadsAndWritesStandardStreams) {
   for (const auto& [arguments, error] : std::vector<std::array<std::string, 2>>{
            {"convert - x.glb --from nifti < tiny.vox", "quoin: standard input: the format is vox, not nifti\n"},
            {"convert - x.glb < nothing.txt", "quoin: standard input: unknown file format; readable are .3mf"},
-           {"convert tiny.vox -", "quoin: cannot write standard output without --to FORMAT"},
+           {"convert tiny.vox -", "quoin: writing to standard output needs --to FORMAT"},
            {"convert tiny.vox - --to obj",
             "quoin: cannot write .obj to standard output: it consists of several files\n"},
            {"convert tiny.vox - --to glb --json", "quoin: cannot use --json: OUT is standard output\n"},

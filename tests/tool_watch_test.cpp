@@ -57,7 +57,7 @@ TEST_F(ToolWatch, ReportsABrokenFileAndConvertsTheNextVersion) {
 }
 
 // The image of a scene file depends on the files that the scene names.
-TEST_F(ToolWatch, AImageFollowsTheModelsThatASceneNames) {
+TEST_F(ToolWatch, AnImageFollowsTheModelsOfItsScene) {
   std::ofstream(folder_.file("fleet.json")) << R"({"quoin_scene": 1, "files": [{"id": "a", "path": "tiny.vox"}],)"
                                             << R"( "instances": [{"file": "a", "position": [0, 0, 0]}]})";
   const std::string flags = " --size 64x48 --samples 1";

@@ -377,7 +377,7 @@ class Program {
     if (!handles_.empty()) look_at_mesh(handles_.back());
   }
 
-  static std::int32_t reported(double, void* user) { return --*static_cast<int*>(user) > 0 ? 1 : 0; }
+  static std::int32_t report(double, void* user) { return --*static_cast<int*>(user) > 0 ? 1 : 0; }
 
   void step() {
     quoin_scene scene = 0;
@@ -423,7 +423,7 @@ class Program {
         break;
       case 12:
         left_ = byte();
-        took(quoin_set_progress(bit() ? reported : nullptr, &left_));
+        took(quoin_set_progress(bit() ? report : nullptr, &left_));
         break;
       default: {
         const std::uint64_t one = handle();

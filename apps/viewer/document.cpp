@@ -297,7 +297,7 @@ Status Document::write_world(const std::filesystem::path& path, std::vector<std:
   const auto copied = world_->copy_to(path, progress);
   if (!copied) return copied.error();
   if (!copied->lost.empty()) {
-    warnings.push_back(std::to_string(copied->lost.size()) + " damaged chunks are missing in the copy");
+    warnings.push_back("damaged chunks missing in the copy: " + std::to_string(copied->lost.size()));
   }
   if (Status kept = backup->keep(); !kept) warnings.push_back(to_string(kept.error()));
   return {};

@@ -9,7 +9,7 @@
 
 #include "handles.h"
 
-extern "C" __attribute__((import_module("quoin"), import_name("report"))) std::int32_t quoin_web_reported(
+extern "C" __attribute__((import_module("quoin"), import_name("report"))) std::int32_t quoin_web_report(
     double fraction);
 
 namespace quoin::c {
@@ -35,14 +35,14 @@ quoin_status write(SceneBody& body, const char* extension, const quoin_mesh_opti
     body.loaded.warnings = std::move(written->warnings);
     return give(std::move(written->bytes), out, count);
   }
-  const Progress reported = progress();
-  const Progress meshing = part_of(reported, 0.0, 0.5);
+  const Progress listener = progress();
+  const Progress meshing = part_of(listener, 0.0, 0.5);
   BlockySceneOptions blocks;
   blocks.mesh.watertight = options.watertight != 0;
   const auto meshes = options.smooth != 0 ? mesh_scene_smoothly(body.loaded.scene, {}, {}, meshing)
                                           : mesh_scene(body.loaded.scene, blocks, {}, meshing);
   if (!meshes) return fail(meshes.error());
-  auto written = write_mesh(*meshes, format->format, {}, part_of(reported, 0.5, 1.0));
+  auto written = write_mesh(*meshes, format->format, {}, part_of(listener, 0.5, 1.0));
   return written ? give(std::move(*written), out, count) : fail(written.error());
 }
 
@@ -73,7 +73,7 @@ void quoin_web_release() {
 
 void quoin_web_listen(std::int32_t listens) {
   quoin_set_progress(
-      listens == 0 ? nullptr : [](double fraction, void*) { return quoin_web_reported(fraction); }, nullptr);
+      listens == 0 ? nullptr : [](double fraction, void*) { return quoin_web_report(fraction); }, nullptr);
 }
 
 void* quoin_web_struct(std::int32_t kind) {

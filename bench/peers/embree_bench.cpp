@@ -341,9 +341,10 @@ void paths(benchmark::State& state) {
   std::int64_t rays = 0;
   for (auto _ : state) {
     const Vec3 mean = tracer.image(camera, options, sky);
-    const double separate = glm::length(DVec3(mean) - expected) / glm::length(expected);
+    const double difference = glm::length(DVec3(mean) - expected) / glm::length(expected);
     // Some rays slip through T-junctions of merged faces.
-    workloads::fail_unless(separate < 5e-3, "the difference of pictures, in millionths,", std::llround(separate * 1e6));
+    workloads::fail_unless(difference < 5e-3, "the difference of pictures, in millionths,",
+                           std::llround(difference * 1e6));
     rays = tracer.rays();
   }
   state.counters["rays"] = benchmark::Counter(static_cast<double>(rays), benchmark::Counter::kIsRate);

@@ -20,8 +20,8 @@ def quoin(tool, path, pitch, *options):
         started = time.perf_counter()
         subprocess.run([tool, "convert", path, out, "--voxel", repr(pitch), "-q", *options], check=True)
         seconds = time.perf_counter() - started
-        told = subprocess.run([tool, "info", "--json", out], check=True, capture_output=True)
-    return json.loads(told.stdout)["voxels"], seconds
+        printed = subprocess.run([tool, "info", "--json", out], check=True, capture_output=True)
+    return json.loads(printed.stdout)["voxels"], seconds
 
 
 def main():

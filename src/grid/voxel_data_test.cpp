@@ -196,7 +196,7 @@ TEST(VoxelData, GoesWithAnotherTypeAndStaysWithTheSame) {
   grid.set(at, kStone);
   grid.fill_box({at - 2, at + 2}, kStone);
   EXPECT_EQ(grid.data(at).state, 7U);
-  EXPECT_TRUE(grid.set(at, kChest, grid.data(at))) << "told to keep it";
+  EXPECT_TRUE(grid.set(at, kChest, grid.data(at))) << "keeps it on request";
   EXPECT_EQ(grid.data(at).state, 7U);
   grid.set(at, kStone);
   EXPECT_TRUE(grid.data(at).empty());

@@ -252,11 +252,11 @@ Status copy_whole(const std::filesystem::path& from, const std::filesystem::path
 std::filesystem::path FileBackup::name_for(const std::filesystem::path& path, Older older) {
   const std::filesystem::path file = follow_links(path);
   if (!is_there(file)) return {};
-  std::filesystem::path adjacent = file;
-  adjacent += "~";
+  std::filesystem::path backup = file;
+  backup += "~";
   std::optional<mode_t> mode;
-  if (!is_there(adjacent)) return adjacent;
-  if (older == Older::Replaced && check_replaceable(adjacent, mode).has_value()) return adjacent;
+  if (!is_there(backup)) return backup;
+  if (older == Older::Replaced && check_replaceable(backup, mode).has_value()) return backup;
   constexpr int kMost = 99;
   for (int number = 1; number <= kMost; ++number) {
     std::filesystem::path numbered = file;

@@ -126,11 +126,12 @@ std::string extensions_with(bool FormatInfo::*ability) {
 /// Returns the readable format with a path's extension; null if there is none.
 const FormatInfo* format_by_name(const std::filesystem::path& path) {
   const std::string extension = lower_case_extension(path);
-  const auto* const found = std::ranges::find_if(kFormats, [&](const FormatInfo& info) {
+  const FormatInfo* const end = kFormats.data() + kFormats.size();
+  const FormatInfo* const found = std::find_if(kFormats.data(), end, [&](const FormatInfo& info) {
     const std::string all = std::string(info.extension) + " " + std::string(info.also) + " ";
     return info.readable && !extension.empty() && all.find(extension + " ") != std::string::npos;
   });
-  return found == kFormats.end() ? nullptr : found;
+  return found == end ? nullptr : found;
 }
 
 /// Returns the error for a file of unknown format.
@@ -295,7 +296,7 @@ std::vector<std::string> lost_with_source(const Saved& saved) {
 }
 
 /// Lists the cameras and sun that a format other than .vox leaves out, except items of `lost_with_source`.
-std::vector<std::string> lost_without_sidecars(const Saved& saved, FileFormat format) {
+std::vector<std::string> lost_views(const Saved& saved, FileFormat format) {
   std::vector<std::string> lines;
   if (saved.loaded == nullptr) return lines;
   const LoadedScene& loaded = *saved.loaded;
@@ -343,7 +344,7 @@ WriteModel model_writer(FileFormat format) {
 
 std::vector<std::string> all_lost(std::vector<std::string> lines, const Saved& saved, FileFormat format) {
   std::ranges::move(lost_with_source(saved), std::back_inserter(lines));
-  std::ranges::move(lost_without_sidecars(saved, format), std::back_inserter(lines));
+  std::ranges::move(lost_views(saved, format), std::back_inserter(lines));
   return lines;
 }
 

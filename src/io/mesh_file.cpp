@@ -230,10 +230,10 @@ Result<std::vector<std::filesystem::path>> mesh_files(const SceneMeshes& meshes,
   if (!format) return format.error();
   if (!format_info(*format).is_mesh) return make_error(ErrorCode::Unsupported, "not a mesh format", path.string());
   std::vector<std::filesystem::path> files = {path};
-  const auto adjacent = *format == FileFormat::Gltf  ? gltf_companions(meshes, path)
-                        : *format == FileFormat::Obj ? obj_companions(meshes, path)
-                                                     : std::vector<std::filesystem::path>();
-  files.insert(files.end(), adjacent.begin(), adjacent.end());
+  const auto companions = *format == FileFormat::Gltf  ? gltf_companions(meshes, path)
+                          : *format == FileFormat::Obj ? obj_companions(meshes, path)
+                                                       : std::vector<std::filesystem::path>();
+  files.insert(files.end(), companions.begin(), companions.end());
   return files;
 }
 

@@ -178,7 +178,7 @@ TEST(SceneDeathTest, SlidingWithoutContactsIsAMistake) {
   QUOIN_EXPECT_MISTAKE((void)move_and_slide(tracer, OrientedBox(), DVec3(1.0), options), "at least one contact");
 }
 
-TEST(CameraDeathTest, AImageWithoutPixelsIsAMistake) {
+TEST(CameraDeathTest, RequiresAnImageWithPixels) {
   QUOIN_EXPECT_MISTAKE((void)ray_through({}, {0.0, 0.0, 0, 5}), "a positive image size");
   DetailSelector selector;
   std::vector<SelectedInstance> selected;

@@ -238,8 +238,8 @@ bool ChunkStreamer::work_once() {
 
 namespace {
 
-// Reserves room for one more arrival. Returns false if memory runs out.
-bool has_valid_transform(std::vector<CompletedLoad>& completed_loads) {
+// Reserves room for one more completed load. Returns false if memory runs out.
+bool reserve_one(std::vector<CompletedLoad>& completed_loads) {
   constexpr std::size_t kLeast = 16;
   try {
     if (completed_loads.size() == completed_loads.capacity())
@@ -252,12 +252,12 @@ bool has_valid_transform(std::vector<CompletedLoad>& completed_loads) {
 
 }  // namespace
 
-// Retries until there is memory for the list entry, so that no arrival is lost.
+// Retries until there is memory for the list entry, so that no completed load is lost.
 void ChunkStreamer::hand_over(CompletedLoad completed) {
   for (;;) {
     {
       const std::scoped_lock outbox(outbox_mutex_);
-      if (has_valid_transform(outbox_.completed_loads)) {
+      if (reserve_one(outbox_.completed_loads)) {
         outbox_.completed_loads.push_back(std::move(completed));
         --working_;
         break;

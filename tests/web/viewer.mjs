@@ -158,9 +158,9 @@ function checkPixels(count, seed) {
       other.light.every((value, channel) => Math.abs(value - hit.light[channel]) < 0.03);
     if (!around.every(alike)) continue;
     const at = ((height - 1 - y) * width + x) * 4;
-    const told = truth ? truthAt(truth, hit.point.toArray(), hit.normal.toArray()) : { colour: hit.texel.slice(0, 3) };
-    const lightOf = (channel) => told.brightness ?? hit.light[channel];
-    const expected = told ? told.colour.map((byte, channel) => encoded(linear(byte) * lightOf(channel))) : ['air', 'air', 'air'];
+    const known = truth ? truthAt(truth, hit.point.toArray(), hit.normal.toArray()) : { colour: hit.texel.slice(0, 3) };
+    const lightOf = (channel) => known.brightness ?? hit.light[channel];
+    const expected = known ? known.colour.map((byte, channel) => encoded(linear(byte) * lightOf(channel))) : ['air', 'air', 'air'];
     const actual = [...pixels.slice(at, at + 3)];
     ++result.checked;
     if (hit.inside_out) ++result.inside_out;

@@ -4,7 +4,7 @@ import os
 
 import numpy as np
 
-from . import axes, kept, materials, merging, places, quoin, views
+from . import axes, kept, materials, merging, placements, quoin, views
 
 
 class Exported:
@@ -263,11 +263,11 @@ def export_file(context, path, options):
             one.data.update_tag()
     graph = context.evaluated_depsgraph_get()
     writer = _Writer(path, options)
-    tree = places.Tree(context.view_layer)
+    tree = placements.Tree(context.view_layer)
     hidden = _hidden(context, options, tree) if writer.ending in _GROUPS else []
     if writer.ending in _GROUPS:
         owners = [_owner(one) for one in graph.object_instances if _is_wanted(one, options, tree)]
-        writer.belonging = places.Belonging(writer.scene, context.scene, tree, options.collections, owners)
+        writer.belonging = placements.Belonging(writer.scene, context.scene, tree, options.collections, owners)
     for one in graph.object_instances:
         if _is_wanted(one, options, tree):
             _add_seen(writer, one, options)

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
-from . import axes, kept, materials, places, quoin, versions
+from . import axes, kept, materials, placements, quoin, versions
 
 
 # Quoin's own formats, which store intended sizes.
@@ -178,9 +178,9 @@ def _collections(scene, top):
         above = group.parent is None or groups[group.parent].shown
         one.hide_render = one.hide_viewport = above and not group.shown and group.layer not in hidden
         if group.layer:
-            one[places.LAYER] = group.layer
+            one[placements.LAYER] = group.layer
         found.append(one)
-    places.set_layers(top, scene.layers)
+    placements.set_layers(top, scene.layers)
     return found
 
 
@@ -211,7 +211,7 @@ def _camera(one, name, options, reach):
     data.clip_end = max(data.clip_end, 2.0 * (np.linalg.norm(matrix[:3, 3]) + reach))
     made = bpy.data.objects.new(name, data)
     made.matrix_world = Matrix(matrix)
-    made[places.CAMERA] = one.number
+    made[placements.CAMERA] = one.number
     return made
 
 
@@ -301,7 +301,7 @@ def _place(scene, top, name, looks, options, made, progress):
         is_shown = one.shown or one.group in hidden_groups  # their collections hide these
         made_object.hide_render = made_object.hide_viewport = not (one.visible and is_shown)
         if one.layer:
-            made_object[places.LAYER] = one.layer
+            made_object[placements.LAYER] = one.layer
         (top if one.group is None else groups[one.group]).objects.link(made_object)
         made.objects += 1
     if empty:
@@ -318,7 +318,7 @@ def import_file(context, path, options):
     name = os.path.splitext(os.path.basename(os.path.normpath(path)))[0]
     made.warnings += [f"{name}: {line}" for line in scene.warnings]
     top = bpy.data.collections.new(name)
-    top[places.FILE] = name
+    top[placements.FILE] = name
     context.scene.collection.children.link(top)
     looks = _Looks(name, scene.types, options)
     if options.surface == "SMOOTH" and any(one.transparent or one.emission > 0.0 for one in looks.types):

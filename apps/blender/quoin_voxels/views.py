@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from . import axes, places, quoin
+from . import axes, placements, quoin
 
 _CAMERAS = {".quoin", ".vox"}
 _ONE_CAMERA = {".json"}
@@ -47,7 +47,7 @@ def _cameras(context, scene, ending, tree, options, left_out):
     found = [one for one in context.scene.objects if one.type == "CAMERA" and _is_seen(one, tree, options)]
     found.sort(key=lambda one: one != active)  # the render camera comes first
     warnings, numbers = [], set()
-    wanted = {one.get(places.CAMERA) for one in found}
+    wanted = {one.get(placements.CAMERA) for one in found}
     for one in found:
         if ending not in _CAMERAS and not (ending in _ONE_CAMERA and one == found[0]):
             left_out.append(f"camera {one.name}")
@@ -55,7 +55,7 @@ def _cameras(context, scene, ending, tree, options, left_out):
         if one.data.type not in ("PERSP", "ORTHO"):
             left_out.append(f"panoramic camera {one.name}")
             continue
-        number = one.get(places.CAMERA)
+        number = one.get(placements.CAMERA)
         if not isinstance(number, int) or number < 0 or number in numbers:
             number = next(i for i in range(len(found) + len(wanted) + 1) if i not in numbers and i not in wanted)
         numbers.add(number)

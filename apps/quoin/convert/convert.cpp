@@ -414,7 +414,7 @@ Result<std::string> open_streams(ConvertOptions& options, const ManyOptions& man
   if (options.output == kStandardStream) {
     const auto format = format_for_writing("file." + many.to);
     if (many.to.empty() || !format)
-      return "cannot write standard output without --to FORMAT: one of " + writable_extensions();
+      return "writing to standard output needs --to FORMAT, one of " + writable_extensions();
     if (format->format == FileFormat::Gltf || format->format == FileFormat::Obj) {
       return "cannot write " + std::string(format->extension) + " to standard output: it consists of several files";
     }
@@ -460,12 +460,12 @@ WatchedWork run_one(ConvertOptions& options, const ManyOptions& many) {
   };
   options.is_from_stream = options.common.input == kStandardStream;
   if (is_to_stream || options.is_from_stream) catch_interrupts();
-  const auto find_streams_error = open_streams(options, many, streams);
-  if (!find_streams_error) return failed(find_streams_error.error());
+  const auto streams_error = open_streams(options, many, streams);
+  if (!streams_error) return failed(streams_error.error());
   const auto format = format_for_writing(options.output);
-  std::string fault = !find_streams_error->empty() ? *find_streams_error
-                      : !format                    ? to_string(format.error())
-                                                   : find_format_error(options, *format);
+  std::string fault = !streams_error->empty() ? *streams_error
+                      : !format               ? to_string(format.error())
+                                              : find_format_error(options, *format);
   if (!fault.empty()) return misused(fault);
   options.inputs = FileSet({&options.common.input, 1});
   const auto outcome = convert_file(options, *format, fault);

@@ -77,8 +77,8 @@ Result<std::vector<fs::path>> files_below(const fs::path& folder, const std::opt
 /// Returns one task per input file. Adds inputs that cannot be listed to `errors`.
 std::vector<Task> plan(const ManyOptions& many, const std::string& extension, std::vector<Error>& errors) {
   std::vector<Task> tasks;
-  const auto add = [&](const fs::path& input, const fs::path& adjacent, const fs::path& below) {
-    const fs::path folder = !many.folder ? adjacent : below == "." ? *many.folder : *many.folder / below;
+  const auto add = [&](const fs::path& input, const fs::path& input_folder, const fs::path& below) {
+    const fs::path folder = !many.folder ? input_folder : below == "." ? *many.folder : *many.folder / below;
     tasks.push_back({input, folder / (stem_of_file(input) + extension), {}, {}});
   };
   for (const fs::path& input : many.inputs) {

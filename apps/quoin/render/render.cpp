@@ -410,7 +410,7 @@ Json outcome_json(const RenderArguments& arguments, const Outcome& outcome) {
 }
 
 std::string outcome_text(const Outcome& outcome) {
-  std::string kept = outcome.kept == 0 ? "" : "Kept " + std::to_string(outcome.kept) + " existing images\n";
+  std::string kept = outcome.kept == 0 ? "" : "Existing images kept: " + std::to_string(outcome.kept) + "\n";
   if (outcome.files.empty()) return kept;
   const RenderedImage& image = outcome.image;
   const double per_second = static_cast<double>(outcome.rays) / std::max(outcome.trace, 1e-9);

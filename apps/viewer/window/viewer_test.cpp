@@ -238,7 +238,7 @@ TEST_F(ViewerTest, OpensTheFileThatIsDoubleClicked) {
   given.file.clear();
   given.is_bare = false;
   // Clicks within one frame, and clicks further apart than ImGui allows but SDL accepts.
-  for (const milliseconds separate : {milliseconds(0), milliseconds(400)}) {
+  for (const milliseconds pause : {milliseconds(0), milliseconds(400)}) {
     std::filesystem::remove(given.screenshot);
     const auto start = std::chrono::steady_clock::now();
     int clicks = 0;
@@ -249,14 +249,14 @@ TEST_F(ViewerTest, OpensTheFileThatIsDoubleClicked) {
       const int y = 129 - 7 * row;
       if (clicks == 0) press(SDLK_o, KMOD_CTRL);
       if (is_open("hill.vox")) return std::chrono::steady_clock::now() - start > std::chrono::seconds(60);
-      const auto due = (row + 1) * kPause + (clicks % 2) * separate;
+      const auto due = (row + 1) * kPause + (clicks % 2) * pause;
       if (std::chrono::steady_clock::now() - start < due) return false;
       click(240, y, 1 + clicks++ % 2);
-      if (clicks % 2 == 1 && separate == milliseconds(0)) click(240, y, 1 + clicks++ % 2);
+      if (clicks % 2 == 1 && pause == milliseconds(0)) click(240, y, 1 + clicks++ % 2);
       return row >= kRows;
     });
     ASSERT_TRUE(status) << to_string(status.error());
-    EXPECT_TRUE(std::filesystem::exists(given.screenshot)) << "clicks " << separate.count() << " ms apart open nothing";
+    EXPECT_TRUE(std::filesystem::exists(given.screenshot)) << "clicks " << pause.count() << " ms apart open nothing";
   }
 }
 

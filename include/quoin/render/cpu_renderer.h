@@ -20,7 +20,7 @@ struct RenderOptions {
   int width = 1280;
   int height = 720;
   int samples = 1;     ///< per pixel, 1 to 4,096; in a fixed pattern that starts with the pixel's centre
-  bool depth = false;  ///< fill Picture::depth
+  bool depth = false;  ///< fill RenderedImage::depth
   LightOptions light{};
   DetailOptions detail{};
 };

@@ -43,7 +43,7 @@ struct PathImage {
   // Layers: the first surface in each pixel that is not glass; empty unless PathOptions::layers is set.
   std::vector<Vec3> albedo;      ///< means; black where there is no surface
   std::vector<Vec3> normal;      ///< means, in world space; not of unit length
-  FloatImage depth;              ///< of the first sample, as Picture::depth
+  FloatImage depth;              ///< of the first sample, as RenderedImage::depth
   std::vector<VoxelType> types;  ///< of the first sample; kAir: no surface
   /// Instance in the first sample: 1 + InstanceHandle::index (see SlotMap::handle_at); 0: no instance.
   std::vector<std::uint32_t> instances;

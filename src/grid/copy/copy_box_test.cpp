@@ -15,7 +15,7 @@ namespace {
 constexpr int kWorldEdge = std::numeric_limits<int>::max() / kChunkEdge * kChunkEdge;
 
 // Returns the target of a voxel of the box, by definition.
-IVec3 completed(IVec3 voxel, const IBox& box, IVec3 to_min, AxisOrientation orientation) {
+IVec3 target_of(IVec3 voxel, const IBox& box, IVec3 to_min, AxisOrientation orientation) {
   const IVec3 turned = orientation.apply(voxel - box.min);
   const IVec3 far = orientation.apply(box.size() - 1);
   return to_min + turned - glm::min(far, IVec3(0));
@@ -30,7 +30,7 @@ std::int64_t plain_copy(const Grid& from, const IBox& box, Grid& to, IVec3 to_mi
       for (int x = box.min.x; x < box.max.x; ++x) {
         VoxelType type = from.get(x, y, z);
         if (type != kAir && type < options.type_map.size()) type = options.type_map[type];
-        if (type != kAir || options.copy_air) voxels.emplace_back(completed({x, y, z}, box, to_min, orientation), type);
+        if (type != kAir || options.copy_air) voxels.emplace_back(target_of({x, y, z}, box, to_min, orientation), type);
       }
     }
   }

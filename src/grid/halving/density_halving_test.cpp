@@ -103,8 +103,8 @@ TEST(DensityHalving, TheSurfaceStaysWhereItWas) {
   for (int i = 0; i < 200; ++i) {
     const double up = 1.0 - (i + 0.5) / 100.0;
     const double around = 2.4 * i;
-    const double adjacent = std::sqrt(1.0 - up * up);
-    const DVec3 out{adjacent * std::cos(around), up, adjacent * std::sin(around)};
+    const double horizontal = std::sqrt(1.0 - up * up);
+    const DVec3 out{horizontal * std::cos(around), up, horizontal * std::sin(around)};
     EXPECT_NEAR(coarse.density_at(0.5 * (centre + 40.0 * out)), 0.0, 0.03) << "of a coarse sample";
   }
 }

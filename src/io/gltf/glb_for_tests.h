@@ -48,12 +48,12 @@ struct ParsedGlb {
   }
 
   /// The texel that a vertex's texture coordinate points at.
-  [[nodiscard]] std::array<int, 4> texel(const PngImage& rendered, const nlohmann::json& primitive,
+  [[nodiscard]] std::array<int, 4> texel(const PngImage& image, const nlohmann::json& primitive,
                                          std::size_t vertex) const {
     const auto uv = array<std::array<float, 2>>(primitive["attributes"]["TEXCOORD_0"].get<std::size_t>())[vertex];
-    const auto x = static_cast<std::size_t>(uv[0] * static_cast<float>(rendered.width));
-    const auto y = static_cast<std::size_t>(uv[1] * static_cast<float>(rendered.height));
-    const std::uint8_t* at = rendered.pixels.data() + (y * rendered.width + x) * 4;
+    const auto x = static_cast<std::size_t>(uv[0] * static_cast<float>(image.width));
+    const auto y = static_cast<std::size_t>(uv[1] * static_cast<float>(image.height));
+    const std::uint8_t* at = image.pixels.data() + (y * image.width + x) * 4;
     return {at[0], at[1], at[2], at[3]};
   }
 };

@@ -117,12 +117,12 @@ Result<std::vector<MeshFile>> plan_gltf(const SceneMeshes& meshes, const std::fi
   const auto shared = shared_layout(meshes, options);
   if (!shared) return shared.error();
   std::vector<MeshFile> files;
-  const std::filesystem::path adjacent = buffer_path(path);
+  const std::filesystem::path buffer_file = buffer_path(path);
   const std::uint64_t bytes = (*shared)->buffer_bytes;
   if (bytes > 0) {
-    files.push_back({adjacent, bytes, [layout = *shared](BlockWriter& out) { write_buffer(*layout, out); }});
+    files.push_back({buffer_file, bytes, [layout = *shared](BlockWriter& out) { write_buffer(*layout, out); }});
   }
-  std::string json = gltf_json(**shared, percent_encoded(adjacent.filename().string()));
+  std::string json = gltf_json(**shared, percent_encoded(buffer_file.filename().string()));
   files.push_back({path, 0, [json = std::move(json)](BlockWriter& out) { out.put_text(json); }});
   return files;
 }

@@ -109,7 +109,7 @@ TEST(Heights, DecodesEachEncodingByItsFormula) {
             (std::vector<float>{-32'768, 0, 3'776.5F}));
 }
 
-TEST(Heights, AImageIsNoneUnlessItIsSaid) {
+TEST(Heights, ReadsImagesAsHeightsOnlyOnRequest) {
   const Bytes grey = png_of({{0, 7, 255}}, 8, 0);
   EXPECT_EQ(detect_format(grey), std::nullopt);
   const auto refused = load_scene(grey);

@@ -371,7 +371,7 @@ TEST(SceneModels, DamagedVoxelsAreRefusedWithTheirPlace) {
   EXPECT_EQ(find_piece_error({1, 0, 2, 0, 3, 0, 1, 0, 1}, 1), at + "byte 17 of the voxel data: cut off");
   EXPECT_EQ(find_piece_error({1, 0, 2, 0, 3}), at + "byte 10 of the voxel data: cut off");
   EXPECT_EQ(find_piece_error({1, 0, 2, 0, 3, 0, 1, 0, 2}),
-            at + "byte 16 of the voxel data: type 2 is beyond the file's 1");
+            at + "byte 16 of the voxel data: type 2, but the last type of the file is 1");
   EXPECT_EQ(find_piece_error({1, 0, 2, 0, 3, 0, 0, 0}), at + "byte 12 of the voxel data: invalid palette size 0");
   EXPECT_EQ(find_piece_error({1, 0, 2, 0, 3, 0, 1, 1}), at + "byte 12 of the voxel data: invalid palette size 65537");
   EXPECT_EQ(find_piece_error({0xFFFF, 0x7FFF, 2, 0, 3, 0, 1, 0, 1}),

@@ -309,8 +309,9 @@ class PieceReader {
     for (VoxelType& type : palette_) {
       type = take<VoxelType>();
       if (type >= type_count_) {
-        return fault("type " + std::to_string(type) + " is beyond the file's " + std::to_string(type_count_ - 1),
-                     at_ - sizeof(type));
+        return fault(
+            "type " + std::to_string(type) + ", but the last type of the file is " + std::to_string(type_count_ - 1),
+            at_ - sizeof(type));
       }
     }
     return {};

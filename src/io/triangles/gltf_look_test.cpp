@@ -105,7 +105,7 @@ TEST(GltfLook, DoesNotGlowWithoutTheEmissiveImage) {
 }
 
 // tinygltf reads on beyond the buffer.
-TEST(GltfLook, LeavesOutAImageThatEndsBeyondItsBuffer) {
+TEST(GltfLook, LeavesOutImagesThatEndBeyondTheirBuffer) {
   if (!format_info(FileFormat::Gltf).readable) GTEST_SKIP() << "the build reads no glTF";
   std::string gltf = square_gltf(R"({"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}})", {"picture"});
   const auto replace = [&](const std::string& from, const std::string& to) {

@@ -131,9 +131,9 @@ bool is_occlusion_grey(double linear) {
   return quarters >= 1.0 && quarters <= 4.0 && std::abs(linear - quarters / 4.0) <= kHalfByte;
 }
 
-std::optional<std::size_t> add_texture(std::span<const std::byte> rendered, const std::string& name,
+std::optional<std::size_t> add_texture(std::span<const std::byte> file_bytes, const std::string& name,
                                        LoadedMesh& loaded) {
-  auto image = decode_image(rendered);
+  auto image = decode_image(file_bytes);
   if (!image) {
     loaded.warnings.push_back("left out: the texture " + name + ": " + image.error().message);
     return std::nullopt;

@@ -217,10 +217,10 @@ std::array<unsigned, kChannels> PropagatedLight::Impl::highest_levels(const Grid
     return highest;
   }
   LightReader words = reader();
-  const IBox adjacent = grown(voxels, 1);
-  for (int z = adjacent.min.z; z < adjacent.max.z; ++z) {
-    for (int y = adjacent.min.y; y < adjacent.max.y; ++y) {
-      for (int x = adjacent.min.x; x < adjacent.max.x; ++x) {
+  const IBox around = grown(voxels, 1);
+  for (int z = around.min.z; z < around.max.z; ++z) {
+    for (int y = around.min.y; y < around.max.y; ++y) {
+      for (int x = around.min.x; x < around.max.x; ++x) {
         add(words.at({x, y, z}));
         if (!voxels.contains({x, y, z})) continue;
         const VoxelType type = grid.get(x, y, z);

@@ -132,7 +132,7 @@ std::vector<std::uint32_t> rings_of(const std::vector<Arc>& arcs) {
 }
 
 /// Makes one vertex per ring, each moved towards the middle of its neighbours.
-void split(Triangulation& mesh, std::uint32_t vertex, const std::vector<Arc>& arcs, float separate) {
+void split(Triangulation& mesh, std::uint32_t vertex, const std::vector<Arc>& arcs, float distance) {
   const std::vector<std::uint32_t> ring = rings_of(arcs);
   const std::size_t rings = *std::max_element(ring.begin(), ring.end()) + std::size_t{1};
   if (rings == 1) return;
@@ -146,7 +146,7 @@ void split(Triangulation& mesh, std::uint32_t vertex, const std::vector<Arc>& ar
   }
   for (std::size_t i = 0; i < rings; ++i) {
     const float length = glm::length(sum[i]);
-    const Vec3 moved = length > 1e-6F ? place + sum[i] * (separate / length) : place;
+    const Vec3 moved = length > 1e-6F ? place + sum[i] * (distance / length) : place;
     if (i == 0) {
       mesh.positions[vertex] = moved;
       continue;
@@ -162,14 +162,14 @@ void split(Triangulation& mesh, std::uint32_t vertex, const std::vector<Arc>& ar
 
 }  // namespace
 
-void make_manifold(Triangulation& mesh, float separate) {
+void make_manifold(Triangulation& mesh, float distance) {
   remove_back_to_back(mesh);
   const Corners corners(mesh);
   const auto count = static_cast<std::uint32_t>(mesh.positions.size());
   std::vector<Arc> arcs;
   for (std::uint32_t vertex = 0; vertex < count; ++vertex) {
     arcs_around(mesh, corners, vertex, arcs);
-    if (!are_one_ring(arcs)) split(mesh, vertex, arcs, separate);
+    if (!are_one_ring(arcs)) split(mesh, vertex, arcs, distance);
   }
 }
 

@@ -20,6 +20,6 @@ struct Triangulation {
 ///
 /// Triangles that form no ring (the mesh is open there) stay together. Cost: O(triangles), more if many triangles share
 /// a vertex.
-void make_manifold(Triangulation& mesh, float separate);
+void make_manifold(Triangulation& mesh, float distance);
 
 }  // namespace quoin

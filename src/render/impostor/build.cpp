@@ -161,7 +161,7 @@ struct Subject {
 
 void put_faces(const Subject& subject, const std::vector<SeenFace>& seen, KnownFaces known, ImpostorFaces& out) {
   GridReader reader(*subject.grid);
-  GridReader adjacent(*subject.grid);
+  GridReader neighbours(*subject.grid);
   std::vector<std::uint32_t> fresh;
   out.surfels = subject.surfels.surfels;
   out.faces.reserve(seen.size());
@@ -180,8 +180,8 @@ void put_faces(const Subject& subject, const std::vector<SeenFace>& seen, KnownF
       continue;
     }
     face.type = reader.get(face.voxel);
-    face.occlusion = packed(
-        corner_occlusion([&](IVec3 voxel) { return subject.is_opaque(voxel, adjacent); }, face.voxel, face.direction));
+    face.occlusion = packed(corner_occlusion([&](IVec3 voxel) { return subject.is_opaque(voxel, neighbours); },
+                                             face.voxel, face.direction));
   }
   count_open_rays(*subject.opaque, subject.field, fresh, out);
 }

@@ -246,7 +246,7 @@ TEST(DrawImpostors, ThreadsAndInstructionsChangeNoByte) {
   EXPECT_EQ(one.depth.values, four.depth.values);
 }
 
-TEST(DrawImpostorsDeathTest, WantsAImageOfTheSizeThatIsAskedFor) {
+TEST(DrawImpostorsDeathTest, RequiresAnImageOfTheRequestedSize) {
   const World world(Model::Castle);
   const Camera camera = orbiting(world, 0.7, 0.4, 0.2, 128.0, 32);
   [[maybe_unused]] const auto draw = [&](const RenderOptions& options) {

@@ -134,10 +134,10 @@ class Denoiser {
     float variances = 0.0F;
     float weights = 0.0F;
     around(x, y, slot, 2, step, [&](const SurfacePart& part, const Light& light, float likeness, int dx, int dy) {
-      const float separate = luminance(light.mean) - own_light;
+      const float difference = luminance(light.mean) - own_light;
       const float noise = kAllowed * kAllowed * (own.variance + light.variance) + 1e-8F;
       const float near = kKernel[static_cast<std::size_t>(dx + 2)] * kKernel[static_cast<std::size_t>(dy + 2)];
-      const float weight = near * likeness * part.samples * exponential(-separate * separate / noise);
+      const float weight = near * likeness * part.samples * exponential(-difference * difference / noise);
       const Vec3 albedo = albedo_of(part);
       sum += light.mean * albedo * weight;
       whole += albedo * weight;

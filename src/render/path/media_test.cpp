@@ -214,9 +214,9 @@ TEST(PathLens, BladesShapeWhatIsOutOfFocus) {
 double error_of(const PathImage& image, const PathImage& truth) {
   double sum = 0.0;
   for (std::size_t i = 0; i < image.radiance.size(); ++i) {
-    const DVec3 separate =
+    const DVec3 difference =
         glm::min(DVec3(image.radiance[i]), DVec3(2.0)) - glm::min(DVec3(truth.radiance[i]), DVec3(2.0));
-    sum += glm::dot(separate, separate);
+    sum += glm::dot(difference, difference);
   }
   return std::sqrt(sum / static_cast<double>(image.radiance.size()));
 }

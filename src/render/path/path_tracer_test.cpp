@@ -340,7 +340,7 @@ TEST(PathTracer, TheSameBitsForAnyThreadsAndInstructionSets) {
   }
 }
 
-TEST(PathTracer, AImageFarFromTheOriginIsTheSame) {
+TEST(PathTracer, ImagesFarFromTheOriginAreTheSame) {
   const Scene near = town();
   Scene far = town();
   const DVec3 there{3e6, -1e6, 7e6};

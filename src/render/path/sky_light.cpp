@@ -90,8 +90,8 @@ Vec3 SkyLight::sun(Vec3 direction) const {
 float SkyLight::sun_density(Vec3 direction) const {
   if (!(one_less_cos_ > 0.0F) || !has_sun()) return 0.0F;
   // 1 - cos from a squared distance: in single precision a small angle's cosine is 1.
-  const Vec3 separate = direction - to_sun_;
-  return 0.5F * glm::dot(separate, separate) <= one_less_cos_ ? 1.0F / (2.0F * kPi * one_less_cos_) : 0.0F;
+  const Vec3 difference = direction - to_sun_;
+  return 0.5F * glm::dot(difference, difference) <= one_less_cos_ ? 1.0F / (2.0F * kPi * one_less_cos_) : 0.0F;
 }
 
 SkySample SkyLight::sample_sun(Pair u) const {

@@ -13,7 +13,7 @@ namespace {
 constexpr VkDeviceSize kStagingBytes = VkDeviceSize{8} << 20;
 
 // Returns the acceptable kinds of memory, best first.
-std::vector<VkMemoryPropertyFlags> requests(Buffer::Where where) {
+std::vector<VkMemoryPropertyFlags> preferences(Buffer::Where where) {
   constexpr VkMemoryPropertyFlags kShared = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
   switch (where) {
     case Buffer::Where::Device:
@@ -32,7 +32,7 @@ VkResult allocate(const Device& device, VkBuffer buffer, Buffer::Where where, Vk
   const VkMemoryAllocateFlagsInfo flags{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO, nullptr,
                                         VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT, 0};
   VkResult result = VK_ERROR_OUT_OF_DEVICE_MEMORY;
-  for (const VkMemoryPropertyFlags wanted : requests(where)) {
+  for (const VkMemoryPropertyFlags wanted : preferences(where)) {
     const auto type = memory_type(device.memory(), needs.memoryTypeBits, wanted);
     if (!type) continue;
     // Rejects heaps that are too small here: drivers handle such allocations differently.

@@ -241,7 +241,7 @@ Status DeviceImpostors::put(const std::shared_ptr<const Impostor>& impostor, Ent
 
 Result<std::vector<FarInstance>> DeviceImpostors::send(const Scene& scene, const FarImpostors& far, bool waits) {
   ++image_;
-  std::size_t faces_left = waits ? std::numeric_limits<std::size_t>::max() : kFacesAImage;
+  std::size_t faces_left = waits ? std::numeric_limits<std::size_t>::max() : kFacesPerImage;
   // Missing impostors come first: a constantly edited impostor would delay them forever.
   for (const bool is_first : {true, false}) {
     for (const auto& [grid, impostor] : far.kept) {

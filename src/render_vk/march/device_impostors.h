@@ -21,11 +21,11 @@ struct Placement;
 
 /// Impostors in device memory, sent when an image first shows them and kept for later images.
 ///
-/// Without waiting, each image sends at most `kFacesAImage` faces, a fraction of a millisecond. Until a new impostor
+/// Without waiting, each image sends at most `kFacesPerImage` faces, a fraction of a millisecond. Until a new impostor
 /// is complete, the previous one is drawn; instances without any are traced.
 class DeviceImpostors {
  public:
-  static constexpr std::size_t kFacesAImage = std::size_t{1} << 16;
+  static constexpr std::size_t kFacesPerImage = std::size_t{1} << 16;
 
   explicit DeviceImpostors(DeviceMemory& memory) : memory_(&memory) {}
 

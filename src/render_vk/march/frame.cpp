@@ -285,10 +285,10 @@ std::vector<ShaderLamp> shader_lamps(const LampTable& table, DVec3 camera, DVec3
   for (const PlacedLamp& from : table.lamps) {
     ShaderLamp& lamp = lamps.emplace_back();
     lamp.position = to_vec4(from.position - camera - view_origin, from.reach);
-    const std::array<double, 3> adjacent = {from.spread_squared, from.cos_inner, from.cos_outer};
+    const std::array<double, 3> fourth = {from.spread_squared, from.cos_inner, from.cos_outer};
     for (int axis = 0; axis < 3; ++axis) {
       const auto i = static_cast<std::size_t>(axis);
-      lamp.axes[i] = to_vec4(from.axes[axis], adjacent[i]);
+      lamp.axes[i] = to_vec4(from.axes[axis], fourth[i]);
     }
     for (std::size_t face = 0; face < 6; ++face) lamp.power[face] = {from.power[face], 0.0F};
     lamp.low = to_vec4(from.low, !from.is_point ? 0.0 : from.cos_inner > -2.0 ? 2.0 : 1.0);

@@ -111,13 +111,13 @@ TEST_F(VulkanDetail, AnEditUploadsItsChanges) {
   vulkan::DeviceMemory& memory = renderer_->impl().memory;
   const std::uint64_t before = memory.written();
   static_cast<void>(taken_as_is(camera, options));
-  const std::uint64_t of_a_image = memory.written() - before;
+  const std::uint64_t of_an_image = memory.written() - before;
   Grid& grid = scene_.edit(edited).grid;
   grid.fill_box({{0, 0, 0}, {16, 16, 16}}, grid.get({0, 0, 0}) == 1 ? VoxelType{2} : VoxelType{1});
   ASSERT_TRUE(renderer_->update(scene_));
   const std::uint64_t after = memory.written();
   static_cast<void>(taken_as_is(camera, options));
-  const std::uint64_t sent = memory.written() - after - of_a_image;
+  const std::uint64_t sent = memory.written() - after - of_an_image;
   EXPECT_GT(sent, 0U);
   EXPECT_LT(sent, halved_bytes()) << "not all levels' chunks";
   compare(camera, options, "after_the_edit");

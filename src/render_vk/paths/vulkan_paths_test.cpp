@@ -189,9 +189,9 @@ TEST_F(VulkanPaths, ConvergeToTheCpuImage) {
         of_device += DVec3(device.radiance[at]);
         of_cpu += DVec3(cpu->radiance[at]);
       }
-      const double separate = glm::length(of_device - of_cpu) / glm::length(of_cpu);
-      EXPECT_LT(separate, 0.15) << x << ' ' << y;
-      sum += separate * separate;
+      const double difference = glm::length(of_device - of_cpu) / glm::length(of_cpu);
+      EXPECT_LT(difference, 0.15) << x << ' ' << y;
+      sum += difference * difference;
       ++blocks;
     }
   }
@@ -257,7 +257,7 @@ TEST_F(VulkanPaths, EmptySceneShowsTheSky) {
   expect_same_light(Scene(), of_town(), small(), "nothing", 0.0);
 }
 
-TEST_F(VulkanPaths, AddSamplesToAImage) {
+TEST_F(VulkanPaths, AddSamplesToAnImage) {
   const Scene scene = town();
   ASSERT_TRUE(renderer_->update(scene));
   VulkanPathImage image(*renderer_);

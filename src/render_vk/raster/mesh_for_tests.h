@@ -137,7 +137,7 @@ class VulkanMeshTest : public VulkanTest {
     return image ? std::move(*image) : Image{};
   }
 
-  /// Compares the scene's blocky meshes with the processor's rendered.
+  /// Compares the scene's blocky meshes with the CPU renderer's image.
   void compare(const Scene& scene, const Camera& camera, const RenderOptions& options, const std::string& name) {
     meshes_->clear();
     put(scene, blocky_surfaces(scene));

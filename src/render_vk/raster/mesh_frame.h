@@ -112,7 +112,7 @@ constexpr std::size_t kMaxOrdered = std::size_t{1} << 20;
 ///        chunk.
 /// `subpixels`: the device's subpixel positions per pixel and axis.
 /// `glass_by_rays`: as in the result; if values are shown, glass is drawn like opaque surfaces.
-/// The caller fills in `picture`. Requires: `check` accepts the camera and the options.
+/// The caller fills in `image`. Requires: `check` accepts the camera and the options.
 /// Errors: InvalidArgument for a camera whose axes lie in one plane.
 /// Cost: O(chunks of the instances), and sorting the visible chunks and the transparent quads.
 [[nodiscard]] Result<MeshFrameData> make_mesh_frame(MeshStore& store, std::span<const MeshInstance> instances,

@@ -24,7 +24,7 @@ class MeshPass {
   [[nodiscard]] std::uint32_t largest_edge() const { return largest_edge_; }
   [[nodiscard]] int subpixels() const { return subpixels_; }
 
-  /// Writes the pixels of `data` into `colours`. `data.picture` has the addresses of types, trees and lamp tables.
+  /// Writes the pixels of `data` into `colours`. `data.image` has the addresses of types, trees and lamp tables.
   [[nodiscard]] Status draw(MeshFrameData& data, VkExtent2D size, std::uint32_t samples, Wireframe wireframe,
                             MeshLight light, const Buffer& colours);
 

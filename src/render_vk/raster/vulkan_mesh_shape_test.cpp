@@ -75,9 +75,9 @@ std::optional<DVec3> normal_at(const Camera& camera, int x, int y, DVec3 centre,
   const Ray ray = ray_through(camera, {x + 0.5, y + 0.5, 160, 160});
   const DVec3 to_centre = centre - ray.origin;
   const double along = glm::dot(to_centre, ray.direction);
-  const double adjacent = glm::dot(to_centre, to_centre) - along * along;
-  if (adjacent > radius * radius * 0.97) return std::nullopt;
-  const DVec3 at = ray.origin + ray.direction * (along - std::sqrt(radius * radius - adjacent));
+  const double squared = glm::dot(to_centre, to_centre) - along * along;
+  if (squared > radius * radius * 0.97) return std::nullopt;
+  const DVec3 at = ray.origin + ray.direction * (along - std::sqrt(radius * radius - squared));
   return (at - centre) / radius;
 }
 

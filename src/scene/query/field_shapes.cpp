@@ -4,7 +4,7 @@ namespace quoin {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-// Indices of the directions that can separate a box from a piece.
+// Indices of the directions that can offset a box from a piece.
 constexpr int kFirstEdge = 3;
 constexpr int kSlope = 6;
 constexpr int kFirstOfGrid = 7;
@@ -57,19 +57,19 @@ struct BoxInField::Course {
   // Tests a direction of any length. `solid`: the extent of the solid along it from the piece's middle; `apart`: the
   // distance of the box's centre from there; `reach`: the extent of the box; `rate`: its speed. Returns false if they
   // never touch.
-  bool passes(int which, FieldPiece::Extent solid, double separate, double reach, double rate, double length) {
+  bool passes(int which, FieldPiece::Extent solid, double offset, double reach, double rate, double length) {
     if (rate > 0.0) {
       rate = -rate;
-      separate = -separate;
+      offset = -offset;
       std::swap(solid.ahead, solid.behind);
     }
-    const double gap = separate - reach - solid.ahead;
-    const double left = separate + reach + solid.behind;
+    const double gap = offset - reach - solid.ahead;
+    const double left = offset + reach + solid.behind;
     const double touch = kFieldTouch * length;
     if (left <= touch || gap + rate * until >= -touch) return false;
     if (rate == 0.0) return true;
     leave = std::min(leave, left / -rate);
-    // Among directions that separate them for the same time, the first is chosen.
+    // Among directions that offset them for the same time, the first is chosen.
     const double begin = gap / -rate;
     if (gap > -touch && begin > enter + (which < axis ? -at_once : at_once)) {
       enter = std::max(begin, enter);
@@ -82,14 +82,14 @@ struct BoxInField::Course {
 
 bool BoxInField::follow(FieldPiece& piece, bool is_exact) const {
   Course course{until_, at_once_};
-  const DVec3 separate = box_.centre - DVec3(piece.cell) - piece.middle;
+  const DVec3 offset = box_.centre - DVec3(piece.cell) - piece.middle;
   // `length`: the unit of the touch tolerance along this direction.
   const auto passes = [&](int which, const DVec3& along, double length) {
     const DVec3 along_half = along * piece.half;
     const auto extent =
         is_exact ? piece.exact_extent(along_half) : piece.extent(along_half, glm::dot(along, piece.slope));
     const DVec3 reaches = glm::abs(along * box_.axes) * half_size_;
-    return course.passes(which, extent, glm::dot(along, separate), reaches.x + reaches.y + reaches.z,
+    return course.passes(which, extent, glm::dot(along, offset), reaches.x + reaches.y + reaches.z,
                          glm::dot(along, box_.displacement), length);
   };
   // The plane separates most pieces that are not hit, so it is tested first.
@@ -315,9 +315,9 @@ bool CapsuleInField::may_meet(FieldPiece& piece) const {
   for (int turn = 0; turn < kMostTurns; ++turn) {
     const DVec3 centre = capsule_.centre - DVec3(piece.cell) + time * capsule_.displacement;
     const DVec3 away = parting(piece, centre);
-    const double separate = glm::dot(away, centre - piece.middle) - std::abs(glm::dot(away, capsule_.half_axis)) -
-                            piece.exact_extent(away * piece.half).ahead;
-    const double left = separate - radius;
+    const double offset = glm::dot(away, centre - piece.middle) - std::abs(glm::dot(away, capsule_.half_axis)) -
+                          piece.exact_extent(away * piece.half).ahead;
+    const double left = offset - radius;
     if (!(left > 0.0)) break;
     const double speed = -glm::dot(away, capsule_.displacement);
     if (!(speed > 0.0)) return false;
@@ -362,10 +362,10 @@ DVec3 CapsuleInField::normal(const FieldContact& contact, const DensityGrid& fie
 }
 
 void BoxInField::shrink(DBox& part, IVec3 cell, double from, double to) const {
-  const DVec3 separate = box_.centre - DVec3(cell);
+  const DVec3 offset = box_.centre - DVec3(cell);
   for (int i = 0; i < 3 && !is_upright_; ++i) {
     const DVec3& axis = box_.axes[i];
-    const double middle = glm::dot(axis, separate);
+    const double middle = glm::dot(axis, offset);
     const double a = middle + from * glm::dot(axis, box_.displacement);
     const double b = middle + to * glm::dot(axis, box_.displacement);
     const double low = std::min(a, b) - half_size_[i] - kFieldTouch;

@@ -53,11 +53,11 @@ void visit_sides(const MovingBox& box, const Visit& visit) {
     if (box.half_size[axis] < kTouch && along <= 1e-12 * length_of(box.displacement)) thin.at(count++) = axis;
   }
   for (unsigned sides = 0; sides < 1U << count; ++sides) {
-    MovingBox adjacent = box;
+    MovingBox moved = box;
     for (unsigned i = 0; i < count; ++i) {
-      adjacent.centre += box.axes[thin.at(i)] * ((sides >> i & 1U) != 0 ? 2.0 * kTouch : -2.0 * kTouch);
+      moved.centre += box.axes[thin.at(i)] * ((sides >> i & 1U) != 0 ? 2.0 * kTouch : -2.0 * kTouch);
     }
-    if (!visit(adjacent)) return;
+    if (!visit(moved)) return;
   }
 }
 

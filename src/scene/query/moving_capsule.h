@@ -87,9 +87,9 @@ inline LineGap gap_of_line(const DVec3& middle, const DVec3& half_axis) {
     // Linear from here to there.
     low += (high - low) * (below / (below - above));
   }
-  const DVec3 separate = apart_at(low);
-  const double distance = glm::length(separate);
-  return {distance, distance > 0.0 ? separate / distance : DVec3(0.0)};
+  const DVec3 offset = apart_at(low);
+  const double distance = glm::length(offset);
+  return {distance, distance > 0.0 ? offset / distance : DVec3(0.0)};
 }
 
 /// Returns the shortest way out of a voxel (centred at the origin) for a line that intersects it, with a negative

@@ -25,7 +25,7 @@ struct Contact {
   int axis = -1;  // grid axis of the normal; 3 and more: other axes; -1: no contact
 };
 
-// A moving box and the axes that can separate it from voxels.
+// A moving box and the axes that can offset it from voxels.
 class BoxAmongVoxels {
  public:
   explicit BoxAmongVoxels(const MovingBox& box) : centre_(box.centre), axes_(separating_axes(box.half_axes)) {
@@ -52,11 +52,11 @@ Contact BoxAmongVoxels::inside_contact(DVec3 between) const {
   contact.depth = kInfinity;
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     if (axes_[i] == DVec3(0.0)) continue;
-    const double separate = glm::dot(between, axes_[i]);
-    const double depth = reach_[i] - std::abs(separate);
+    const double offset = glm::dot(between, axes_[i]);
+    const double depth = reach_[i] - std::abs(offset);
     if (depth >= contact.depth - 1e-12) continue;
     contact.depth = depth;
-    contact.normal = separate > 0.0 ? -axes_[i] : axes_[i];
+    contact.normal = offset > 0.0 ? -axes_[i] : axes_[i];
     contact.axis = static_cast<int>(i);
   }
   return contact;
@@ -69,15 +69,15 @@ Contact BoxAmongVoxels::meet(IVec3 voxel, double most) const {
   double leave = kInfinity;
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     if (axes_[i] == DVec3(0.0)) continue;
-    const double separate = glm::dot(between, axes_[i]);
+    const double offset = glm::dot(between, axes_[i]);
     const double reach = reach_[i] - kTouch;
     const double speed = speed_[i];
     if (speed == 0.0) {
-      if (std::abs(separate) >= reach) return {};
+      if (std::abs(offset) >= reach) return {};
       continue;
     }
-    const double begin = (speed > 0.0 ? separate - reach : separate + reach) / speed;
-    leave = std::min(leave, (speed > 0.0 ? separate + reach : separate - reach) / speed);
+    const double begin = (speed > 0.0 ? offset - reach : offset + reach) / speed;
+    leave = std::min(leave, (speed > 0.0 ? offset + reach : offset - reach) / speed);
     // The voxel's own axes come first, and are preferred.
     if (begin > enter + 1e-12 || contact.axis < 0) {
       enter = begin;
@@ -115,15 +115,15 @@ Contact CapsuleAmongVoxels::contact_at(double fraction, const LineGap& gap) cons
 Contact CapsuleAmongVoxels::meet(IVec3 voxel, double most) const {
   constexpr int kMostSteps = 64;  // enough to halve a distance to nothing, as for grazing contacts
   constexpr double kMet = 1e-12;
-  const DVec3 separate = capsule_.centre - (DVec3(voxel) + 0.5);
+  const DVec3 offset = capsule_.centre - (DVec3(voxel) + 0.5);
   const double radius = capsule_.radius - kTouch;
   double fraction = 0.0;
   for (int step = 0; step < kMostSteps; ++step) {
-    LineGap gap = gap_of_line(separate + fraction * capsule_.displacement, capsule_.half_axis);
+    LineGap gap = gap_of_line(offset + fraction * capsule_.displacement, capsule_.half_axis);
     const double left = gap.distance - radius;
     if (step == 0 && left < 0.0) {
       // A smaller gap is a rounding error of a line through the voxel.
-      if (gap.distance < kTouch) gap = way_out_of_line(separate, capsule_.half_axis);
+      if (gap.distance < kTouch) gap = way_out_of_line(offset, capsule_.half_axis);
       Contact contact = contact_at(0.0, gap);
       contact.depth = capsule_.radius - gap.distance;
       return contact;

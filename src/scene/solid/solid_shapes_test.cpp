@@ -141,8 +141,8 @@ TEST(SolidShapes, AreThoseOfTheGridAfterAnyEdits) {
     }
     for (int i = 0; i < 64; ++i) {
       const IVec3 chunk = IVec3(i & 3, i >> 2 & 3, i >> 4) - 2;
-      EXPECT_EQ((shown[{chunk.x, chunk.y, chunk.z}].first), shapes.boxes(chunk)) << "told of";
-      EXPECT_EQ((shown[{chunk.x, chunk.y, chunk.z}].second), shapes.faces(chunk)) << "told of";
+      EXPECT_EQ((shown[{chunk.x, chunk.y, chunk.z}].first), shapes.boxes(chunk)) << "reported";
+      EXPECT_EQ((shown[{chunk.x, chunk.y, chunk.z}].second), shapes.faces(chunk)) << "reported";
       expect_boxes(grid, chunk, types, shapes.boxes(chunk));
       expect_faces(grid, chunk, types, shapes.faces(chunk));
       if (HasFatalFailure()) return;

@@ -209,12 +209,12 @@ void WorldWriter::run() {
 
 void WorldWriter::finish(std::list<Save> group, const Status& outcome) {
   Save& save = group.front();
-  std::vector<OnSaved> reported;
+  std::vector<OnSaved> to_notify;
   if (outcome) {
-    reported = std::move(save.on_saved);
+    to_notify = std::move(save.on_saved);
   } else {
     try {
-      reported = save.on_saved;
+      to_notify = save.on_saved;
     } catch (const std::bad_alloc&) {  // callers are notified after the retry
     }
   }
@@ -234,7 +234,7 @@ void WorldWriter::finish(std::list<Save> group, const Status& outcome) {
     }
   }
   done_.notify_all();
-  for (const OnSaved& on_saved : reported) on_saved(outcome);
+  for (const OnSaved& on_saved : to_notify) on_saved(outcome);
 }
 
 // Rolls back an unfinished commit.

@@ -138,12 +138,14 @@ inline Beam beam_of(const BeamLanes& lanes, F exit_t) {
 // Returns true if all rays start and end near the first one.
 inline bool is_narrow(const Lanes& lanes) {
   const int first = std::countr_zero(bits(lanes.live) | 1U << (kWidth - 1));
-  const auto separate = [first](F a) {
+  const auto from_first = [first](F a) {
     alignas(64) float each[kWidth];
     store(each, a);
     return abs(a - all(each[first]));
   };
-  const auto width = [&](const Axis& axis) { return separate(axis.origin) + separate(axis.direction) * lanes.exit_t; };
+  const auto width = [&](const Axis& axis) {
+    return from_first(axis.origin) + from_first(axis.direction) * lanes.exit_t;
+  };
   const F widest = max(max(width(lanes.x), width(lanes.y)), width(lanes.z));
   return !any(lanes.live & (all(kBeamWidth) < widest));
 }

@@ -198,14 +198,15 @@ inline Blocked any_at_once(const TreeView& tree, const Ray& ray, double max_t, d
   const __m512 middle = _mm512_broadcast_f32x4(_mm_add_ps(_mm_mul_ps(own.cell, unit), half));
   const __m512 beyond = _mm512_add_ps(_mm512_mul_ps(plane, _mm512_set1_ps(kPlaceUnit)), _mm512_broadcastss_ps(half));
   const __m512i axis = _mm512_and_si512(lane, _mm512_set1_epi32(3));
-  __mmask16 separate = 0xFFFF;  // lanes with a place that is near no edge
+  __mmask16 clear_of_edges = 0xFFFF;  // lanes with a place that is near no edge
   const auto spread = [&]<int kAxis>() {
     constexpr int kAll = kAxis * 0x55;
     const __m512 start = _mm512_mask_permute_ps(_mm512_permute_ps(from, kAll), 1U << kStartLane, middle, kAll);
     const __m512 along = _mm512_add_ps(_mm512_mul_ps(t, _mm512_permute_ps(speed, kAll)), start);
     const __mmask16 is_crossed = _mm512_cmpeq_epi32_mask(axis, _mm512_set1_epi32(kAxis));
     const __m512i place = _mm512_cvtps_epi32(_mm512_mask_mov_ps(along, is_crossed, beyond));
-    separate = _mm512_mask_test_epi32_mask(separate, place, _mm512_set1_epi32(0xFFFF & ~(2 * kNearEdge - 1)));
+    clear_of_edges =
+        _mm512_mask_test_epi32_mask(clear_of_edges, place, _mm512_set1_epi32(0xFFFF & ~(2 * kNearEdge - 1)));
     return from_32(kShortRay.spread[kAxis], I{_mm512_srli_epi32(place, 16)}).v;
   };
   const __m512i x = spread.template operator()<0>();
@@ -219,8 +220,8 @@ inline Blocked any_at_once(const TreeView& tree, const Ray& ray, double max_t, d
   const I at = (brick & all(~15)) + shift_right_signed<25>(in_run);
   const I word = {_mm512_mask_i32gather_epi32(_mm512_setzero_si512(), maybe, at.v, tree.words, 4)};
   const unsigned met = maybe & bits(test_bit(word, code));
-  const unsigned clean = met & sure & separate;
-  const unsigned doubtful = (met & ~sure) | (maybe & ~separate);
+  const unsigned clean = met & sure & clear_of_edges;
+  const unsigned doubtful = (met & ~sure) | (maybe & ~clear_of_edges);
   // All bits are set if no lane is clean.
   const auto none = static_cast<unsigned>(static_cast<int>(clean - 1) >> 31);
   return {clean != 0, (doubtful & none) != 0};

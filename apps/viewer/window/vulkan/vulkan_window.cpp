@@ -78,7 +78,7 @@ struct VulkanWindow::Impl {
   VkCommandBuffer commands = VK_NULL_HANDLE;
   VkFence done = VK_NULL_HANDLE;
   VkSemaphore handed = VK_NULL_HANDLE;
-  ImageImage image;
+  CopiedImage image;
   WindowBuffer vertices;
   WindowBuffer indices;
   WindowBuffer font;

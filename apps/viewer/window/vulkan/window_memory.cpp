@@ -61,7 +61,7 @@ void WindowBuffer::free() {
   size_ = 0;
 }
 
-Result<bool> ImageImage::fit(int width, int height) {
+Result<bool> CopiedImage::fit(int width, int height) {
   if (width == width_ && height == height_) return false;
   free();
   if (Status made = device_->check(make(width, height), kMakingRoom); !made) {
@@ -73,7 +73,7 @@ Result<bool> ImageImage::fit(int width, int height) {
   return true;
 }
 
-VkResult ImageImage::make(int width, int height) {
+VkResult CopiedImage::make(int width, int height) {
   const VulkanFunctions& api = device_->api();
   auto info = info_of<VkImageCreateInfo>(VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO);
   info.imageType = VK_IMAGE_TYPE_2D;
@@ -100,7 +100,7 @@ VkResult ImageImage::make(int width, int height) {
   return api.vkCreateImageView(device_->handle(), &view, nullptr, &view_);
 }
 
-void ImageImage::free() {
+void CopiedImage::free() {
   const VulkanFunctions& api = device_->api();
   if (view_ != VK_NULL_HANDLE) api.vkDestroyImageView(device_->handle(), view_, nullptr);
   if (image_ != VK_NULL_HANDLE) api.vkDestroyImage(device_->handle(), image_, nullptr);
@@ -111,7 +111,7 @@ void ImageImage::free() {
   width_ = height_ = 0;
 }
 
-VulkanImageTarget ImageImage::target() const {
+VulkanImageTarget CopiedImage::target() const {
   VulkanImageTarget target;
   target.image = image_;
   target.format = kFormat;

@@ -37,14 +37,14 @@ class WindowBuffer {
 };
 
 /// A Vulkan image that Quoin's images are copied into and shaders read.
-class ImageImage {
+class CopiedImage {
  public:
   static constexpr VkFormat kFormat = VK_FORMAT_R8G8B8A8_UNORM;  // unchanged bytes
 
-  explicit ImageImage(const WindowDevice& device) : device_(&device) {}
-  ~ImageImage() { free(); }
-  ImageImage(const ImageImage&) = delete;
-  ImageImage& operator=(const ImageImage&) = delete;
+  explicit CopiedImage(const WindowDevice& device) : device_(&device) {}
+  ~CopiedImage() { free(); }
+  CopiedImage(const CopiedImage&) = delete;
+  CopiedImage& operator=(const CopiedImage&) = delete;
 
   /// Recreates the image, with undefined pixels, if its size differs. Returns true if it did.
   /// Requires: no commands that read it are running. Errors: LimitExceeded.

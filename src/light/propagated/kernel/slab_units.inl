@@ -72,7 +72,7 @@ using Units = __m256i;
 // Permutations that compact a subset of eight units, and their inverses.
 struct Orders {
   std::array<std::array<std::uint8_t, 8>, 256> together{};
-  std::array<std::array<std::uint8_t, 8>, 256> separate{};
+  std::array<std::array<std::uint8_t, 8>, 256> spread{};
 };
 constexpr Orders make_orders() {
   Orders orders;
@@ -81,7 +81,7 @@ constexpr Orders make_orders() {
     for (std::size_t i = 0; i < 8; ++i) {
       if ((which >> i & 1U) == 0) continue;
       orders.together[which][count] = static_cast<std::uint8_t>(i);
-      orders.separate[which][i] = static_cast<std::uint8_t>(count++);
+      orders.spread[which][i] = static_cast<std::uint8_t>(count++);
     }
   }
   return orders;
@@ -124,7 +124,7 @@ inline void store_some(Units units, unsigned which, std::uint32_t* to) {
 inline Units load_some(const std::uint32_t* from, unsigned which) {
   const Units there = lanes((1U << std::popcount(which)) - 1);
   const Units packed = _mm256_maskload_epi32(reinterpret_cast<const int*>(from), there);
-  return _mm256_and_si256(_mm256_permutevar8x32_epi32(packed, order(kOrders.separate[which])), lanes(which));
+  return _mm256_and_si256(_mm256_permutevar8x32_epi32(packed, order(kOrders.spread[which])), lanes(which));
 }
 inline Units last_row(Units rows) {
   return _mm256_permute4x64_epi64(rows, 0xFF);

@@ -93,8 +93,8 @@ Met met_by(const Shape& shape, const raster::Aim& aim, std::uint32_t views, doub
     if (direction[frame.axis] * frame.sign >= 0.0) continue;
     const double along = (middle[frame.axis] - origin[frame.axis]) / direction[frame.axis];
     if (along <= 0.0) continue;
-    const DVec3 adjacent = glm::abs(origin + direction * along - middle);
-    const double rim = 0.5 - std::max(adjacent[frame.u], adjacent[frame.v]);
+    const DVec3 offset = glm::abs(origin + direction * along - middle);
+    const double rim = 0.5 - std::max(offset[frame.u], offset[frame.v]);
     if (rim < 0.0) continue;
     const double depth = along * aim.voxel_size;
     if (depth < met.depth) {

@@ -47,8 +47,8 @@ double mean_square(const PathImage& a, const PathImage& b) {
   double sum = 0.0;
   for (std::size_t i = 0; i < a.radiance.size(); ++i) {
     for (int axis = 0; axis < 3; ++axis) {
-      const double separate = static_cast<double>(a.radiance[i][axis]) - static_cast<double>(b.radiance[i][axis]);
-      sum += separate * separate;
+      const double difference = static_cast<double>(a.radiance[i][axis]) - static_cast<double>(b.radiance[i][axis]);
+      sum += difference * difference;
     }
   }
   return sum / (3.0 * static_cast<double>(a.radiance.size()));
@@ -152,8 +152,8 @@ TEST_F(PathHistoryTest, KeepsPixelsUnaffectedByAnEdit) {
   EXPECT_GT(greatest_difference(plain, before, kEdge / 2), 0.2F);
   int same = 0;
   for (std::size_t i = 0; i < shown.radiance.size(); ++i) {
-    const Vec3 separate = shown.radiance[i] - before.radiance[i];
-    same += std::max({std::abs(separate.x), std::abs(separate.y), std::abs(separate.z)}) < 0.01F ? 1 : 0;
+    const Vec3 difference = shown.radiance[i] - before.radiance[i];
+    same += std::max({std::abs(difference.x), std::abs(difference.y), std::abs(difference.z)}) < 0.01F ? 1 : 0;
   }
   EXPECT_GT(same, kEdge * kEdge / 2);
 }

@@ -109,8 +109,8 @@ float sun_density(vec3 direction) {
   vec4 to_sun = path_frame().to_sun;
   if (!(to_sun.w > 0.0) || !has_path(kPathSun)) return 0.0;
   // 1 - cos from a squared distance: in single precision a small angle's cosine is 1.
-  vec3 separate = direction - to_sun.xyz;
-  return 0.5 * dot(separate, separate) <= to_sun.w ? 1.0 / (2.0 * kPi * to_sun.w) : 0.0;
+  vec3 difference = direction - to_sun.xyz;
+  return 0.5 * dot(difference, difference) <= to_sun.w ? 1.0 / (2.0 * kPi * to_sun.w) : 0.0;
 }
 
 SkySample sample_sun(vec2 u) {
