@@ -135,7 +135,8 @@ TEST_F(ToolGenerate, WrongUsageIsStatus2AndLeavesNoFile) {
   }
   EXPECT_FALSE(exists("out.vox") || exists("out.glb") || exists("out"));
   EXPECT_EQ(run("generate forest out.vox").err, "quoin: generate needs one of: terrain, smooth-terrain (try --help)\n");
-  EXPECT_TRUE(run("generate terrain out.vox --seed 5 --unknown").err.starts_with("quoin: unknown option \"--unknown\""));
+  EXPECT_TRUE(
+      run("generate terrain out.vox --seed 5 --unknown").err.starts_with("quoin: unknown option \"--unknown\""));
 }
 
 // The error comes before the work: this world would take minutes and gigabytes.

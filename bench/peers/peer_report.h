@@ -21,7 +21,8 @@ inline void check_hits(const std::string& name, int hits, int expected) {
   std::exit(1);
 }
 
-/// Registers `count_hits(rays)`, which traces all rays and returns the number of hits. One call is checked before timing.
+/// Registers `count_hits(rays)`, which traces all rays and returns the number of hits. One call is checked before
+/// timing.
 template <class CountHits>
 void add_rays(const std::string& name, const std::vector<workloads::RayQuery>& (*rays)(), int (*expected)(),
               CountHits count_hits) {

@@ -40,8 +40,8 @@ struct LightLevels {
 
 struct PropagatedLightOptions {
   /// Returns the lamp light that a type emits, for games with their own levels. `sky` is ignored, and levels above 15
-  /// count as 15. If empty, an `emission` of 1 or more gives level 15 in the brightest channel of the type's colour, and
-  /// the other channels in proportion to their sRGB values. A lower emission scales the levels.
+  /// count as 15. If empty, an `emission` of 1 or more gives level 15 in the brightest channel of the type's colour,
+  /// and the other channels in proportion to their sRGB values. A lower emission scales the levels.
   std::function<LightLevels(VoxelType, const VoxelProperties&)> lamp{};
 };
 

@@ -89,8 +89,8 @@ struct SceneHit {
                                            const QueryFilter& filter = {});
 
 /// Returns the voxel or field surface that a pixel of a depth image (RenderedImage::depth) shows: the first hit of the
-/// ray at distance `depth` (world units), to the rounding of a float. Returns nullopt if there is none at that distance,
-/// or `depth` is negative, infinite or NaN. Requires: width and height are positive.
+/// ray at distance `depth` (world units), to the rounding of a float. Returns nullopt if there is none at that
+/// distance, or `depth` is negative, infinite or NaN. Requires: width and height are positive.
 [[nodiscard]] std::optional<SceneHit> voxel_at_depth(const SceneTracer& tracer, const Camera& camera,
                                                      const ImagePoint& point, float depth,
                                                      const QueryFilter& filter = {});
