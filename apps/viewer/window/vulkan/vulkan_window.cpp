@@ -50,7 +50,7 @@ struct VulkanWindow::Impl {
   Impl(std::shared_ptr<WindowDevice> of_device, bool with_vsync)
       : device(std::move(of_device)),
         vsync(with_vsync),
-        image(*device),
+        copied(*device),
         vertices(*device),
         indices(*device),
         font(*device) {}
@@ -78,7 +78,7 @@ struct VulkanWindow::Impl {
   VkCommandBuffer commands = VK_NULL_HANDLE;
   VkFence done = VK_NULL_HANDLE;
   VkSemaphore handed = VK_NULL_HANDLE;
-  CopiedImage image;
+  CopiedImage copied;
   WindowBuffer vertices;
   WindowBuffer indices;
   WindowBuffer font;
@@ -184,16 +184,16 @@ void VulkanWindow::Impl::draw_overlay(const Overlay& overlay) const {
 Status VulkanWindow::Impl::begin(const VulkanImage* rendered) {
   const VulkanFunctions& api = device->api();
   if (rendered != nullptr) {
-    const auto is_another = image.fit(rendered->width(), rendered->height());
+    const auto is_another = copied.fit(rendered->width(), rendered->height());
     if (!is_another) return is_another.error();
-    if (*is_another) pipelines->show_image(image.view());
+    if (*is_another) pipelines->show_image(copied.view());
   }
   auto info = info_of<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
   info.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
   VkResult result = api.vkResetCommandPool(device->handle(), pool, 0);
   if (result == VK_SUCCESS) result = api.vkBeginCommandBuffer(commands, &info);
   if (result != VK_SUCCESS) return device->check(result, kShowing);
-  return rendered == nullptr ? Status{} : rendered->record_copy(commands, image.target());
+  return rendered == nullptr ? Status{} : rendered->record_copy(commands, copied.target());
 }
 
 Status VulkanWindow::Impl::record(std::uint32_t shown, const VulkanImage* image, const PixelRect& place,

@@ -95,10 +95,10 @@ std::optional<RegionName> parse_region_name(const std::filesystem::path& path) {
   std::string_view text = name;
   const auto extension = take_last(text);
   if (!extension) return std::nullopt;
-  constexpr std::array<std::pair<std::string_view, RegionKind>, 3> kKinds = {
-      {{"mca", RegionKind::Anvil}, {"linear", RegionKind::Linear}, {"mcr", RegionKind::McRegion}}};
+  constexpr std::pair<std::string_view, RegionKind> kKinds[] = {
+      {"mca", RegionKind::Anvil}, {"linear", RegionKind::Linear}, {"mcr", RegionKind::McRegion}};
   const auto* const kind = std::ranges::find(kKinds, *extension, [](const auto& each) { return each.first; });
-  if (kind == kKinds.end()) return std::nullopt;
+  if (kind == std::end(kKinds)) return std::nullopt;
   const auto z = take_last(text);
   const auto x = z ? take_last(text) : std::nullopt;
   if (!x || !text.ends_with('r')) return std::nullopt;
