@@ -77,7 +77,7 @@ quoin_status add_grid(SceneBody& scene, const quoin_array& array, const char* na
   bool is_wanted = true;
   SceneGrid placed;
   placed.name = name == nullptr ? "" : name;
-  const Progress listener = progress();
+  const Progress on_progress = progress();
   placed.grid.edit_rows(
       {IVec3(0), size},
       [&](IVec3 first, std::span<VoxelType> row) {
@@ -88,7 +88,7 @@ quoin_status add_grid(SceneBody& scene, const quoin_array& array, const char* na
         }
       },
       [&](double fraction) {
-        is_wanted = is_wanted && (!listener || listener(fraction));
+        is_wanted = is_wanted && (!on_progress || on_progress(fraction));
         return is_wanted && greatest < types;
       });
   if (!is_wanted) return fail(QUOIN_CANCELLED, "cancelled");

@@ -440,8 +440,9 @@ Status read_encoding(const Fields& fields, VolumeHeader& header) {
                                             {"text", DataEncoding::Ascii},
                                             {"ascii", DataEncoding::Ascii},
                                             {"hex", DataEncoding::Hex}}};
-  const auto* const known = std::ranges::find(kNames, encoding, &Names::first);
-  if (known == kNames.end()) {
+  const Names* const end = kNames.data() + kNames.size();
+  const Names* const known = std::ranges::find(kNames.data(), end, encoding, &Names::first);
+  if (known == end) {
     return unsupported(
         "unsupported encoding " + quoted(field->text) + " (raw, gzip, bzip2, ascii and hex are supported)", field->at);
   }
