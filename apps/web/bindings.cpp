@@ -35,14 +35,14 @@ quoin_status write(SceneBody& body, const char* extension, const quoin_mesh_opti
     body.loaded.warnings = std::move(written->warnings);
     return give(std::move(written->bytes), out, count);
   }
-  const Progress listener = progress();
-  const Progress meshing = part_of(listener, 0.0, 0.5);
+  const Progress on_progress = progress();
+  const Progress meshing = part_of(on_progress, 0.0, 0.5);
   BlockySceneOptions blocks;
   blocks.mesh.watertight = options.watertight != 0;
   const auto meshes = options.smooth != 0 ? mesh_scene_smoothly(body.loaded.scene, {}, {}, meshing)
                                           : mesh_scene(body.loaded.scene, blocks, {}, meshing);
   if (!meshes) return fail(meshes.error());
-  auto written = write_mesh(*meshes, format->format, {}, part_of(listener, 0.5, 1.0));
+  auto written = write_mesh(*meshes, format->format, {}, part_of(on_progress, 0.5, 1.0));
   return written ? give(std::move(*written), out, count) : fail(written.error());
 }
 
