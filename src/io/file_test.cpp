@@ -98,7 +98,7 @@ TEST_F(FileTest, DoesNotWaitForAFifo) {
 
 TEST_F(FileTest, ABackupKeepsWhatWasReplaced) {
   const fs::path path = folder_ / "world.vox";
-  const fs::path backup = folder_ / "world.vox~";
+  const fs::path backup_path = folder_ / "world.vox~";
   {
     auto nothing = FileBackup::of(path);
     ASSERT_TRUE(nothing);
@@ -113,14 +113,14 @@ TEST_F(FileTest, ABackupKeepsWhatWasReplaced) {
     ASSERT_TRUE(write_file(bytes_in(next), path));
     EXPECT_TRUE(backup->keep());
     EXPECT_EQ(content(path), next);
-    EXPECT_EQ(content(backup), before);
+    EXPECT_EQ(content(backup_path), before);
     EXPECT_EQ(entries(), 2U);
   }
   {
     const auto unused = FileBackup::of(path);
     ASSERT_TRUE(unused);
   }
-  EXPECT_EQ(content(backup), "second") << "a file that was not written replaces no backup";
+  EXPECT_EQ(content(backup_path), "second") << "a file that was not written replaces no backup";
   EXPECT_EQ(entries(), 2U);
 }
 
@@ -129,8 +129,8 @@ TEST_F(FileTest, ABackupReplacesNoFolderAndFollowsLinks) {
   ASSERT_TRUE(write_file(bytes_in("kept"), path));
   fs::create_directory(folder_ / "a~");
   EXPECT_EQ(FileBackup::name_for(path), folder_ / "a.~1~");
-  auto backup = FileBackup::of(path);
-  ASSERT_TRUE(backup && backup->keep());
+  auto first = FileBackup::of(path);
+  ASSERT_TRUE(first && first->keep());
   EXPECT_EQ(content(folder_ / "a.~1~"), "kept");
   EXPECT_TRUE(fs::is_directory(folder_ / "a~"));
   fs::remove(folder_ / "a~");

@@ -86,13 +86,13 @@ class Packets : public testing::TestWithParam<std::tuple<unsigned, InstructionSe
   // Returns rays from one point, or from near it, in about one direction.
   RayPacket beam() {
     const Ray middle = ray();
-    const double spread = whole(0, 1) == 0 ? 0.0 : uniform(0, 8);
+    const double distance = whole(0, 1) == 0 ? 0.0 : uniform(0, 8);
     const double spread = std::exp2(whole(-12, -1));
     RayPacket rays;
     for (int lane = 0; lane < RayPacket::kSize; ++lane) {
       Ray one = middle;
       for (int axis = 0; axis < 3; ++axis) {
-        one.origin[axis] += spread * uniform(-0.5, 0.5);
+        one.origin[axis] += distance * uniform(-0.5, 0.5);
         if (whole(0, 7) != 0) one.direction[axis] *= 1 + spread * uniform(-1, 1);
         if (whole(0, 40) == 0) one.direction[axis] = 0;
         if (whole(0, 9) == 0) one.origin[axis] = std::floor(one.origin[axis]);
