@@ -11,7 +11,6 @@
 
 #include "core/coordinates/chunk_boxes.h"
 #include "core/coordinates/chunk_order.h"
-#include "core/moved_from.h"
 #include "trace/brick_store.h"
 #include "trace/cell_rows.h"
 #include "trace/chunk_rows.h"
@@ -745,7 +744,8 @@ std::size_t OccupancyTree::bytes() const {
 }
 
 const OccupancyTree::Impl& OccupancyTree::impl() const {
-  return impl_of(impl_);
+  QUOIN_ASSERT(impl_ != nullptr, "a tree that was not moved from");
+  return *impl_;
 }
 
 trace::TreeNodes::TreeNodes(const OccupancyTree& tree)
