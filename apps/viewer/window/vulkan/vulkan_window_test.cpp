@@ -208,7 +208,8 @@ TEST_F(VulkanWindowTest, RequiresAFontOfItsSizeAndCornersThatAreThere) {
   auto window = VulkanWindow::create(device_);
   ASSERT_TRUE(window) << to_string(window.error());
   [[maybe_unused]] const std::array draws = {OverlayDraw{{0, 0, 40, 40}, 1, 3, 0}};
-  QUOIN_EXPECT_MISTAKE((void)window->present(160, 90, nullptr, {}, {kCorners, kIndices, draws}), "of all draw calls exist");
+  QUOIN_EXPECT_MISTAKE((void)window->present(160, 90, nullptr, {}, {kCorners, kIndices, draws}),
+                       "of all draw calls exist");
   QUOIN_EXPECT_MISTAKE((void)window->set_font(3, 2, kFont), "one byte of opacity per pixel");
 }
 
