@@ -14,19 +14,11 @@
 #include <quoin/core/vec.h>
 #include <quoin/scene/scene_query.h>
 
-#include "core/moved_from.h"
 #include "scene/instance_axes.h"
 #include "scene/tracer/placed_grid.h"
 #include "scene/tracer/scene_tracer_impl.h"
 
 namespace quoin {
-
-// The parts of a tracer that queries may access.
-class SceneQuery {
- public:
-  static const InstanceTree& instances(const SceneTracer& tracer) { return tracer.impl().instances; }
-  static const std::vector<PlacedGrid>& unloaded(const SceneTracer& tracer) { return tracer.impl().unloaded; }
-};
 
 // A length below which two shapes touch rather than overlap, in voxels.
 inline constexpr double kTouch = 1e-9;
@@ -114,7 +106,7 @@ class Seen {
   template <class Visit>
   void visit_near(const DBox& box, const Visit& visit) const {
     std::vector<std::size_t> near;
-    SceneQuery::instances(tracer_).visit_box(box, [&](std::size_t i) { near.push_back(i); });
+    tracer_.impl().instances.visit_box(box, [&](std::size_t i) { near.push_back(i); });
     std::sort(near.begin(), near.end());
     for (const std::size_t i : near) {
       if (includes(placed_in(tracer_)[i])) visit(placed_in(tracer_)[i]);
@@ -124,7 +116,7 @@ class Seen {
   /// Calls `visit(chunks)` for each instance of a partial grid (SceneTracer::Impl::unloaded), in their order.
   template <class Visit>
   void visit_partial(const Visit& visit) const {
-    for (const PlacedGrid& chunks : SceneQuery::unloaded(tracer_)) {
+    for (const PlacedGrid& chunks : tracer_.impl().unloaded) {
       if (includes(chunks)) visit(chunks);
     }
   }

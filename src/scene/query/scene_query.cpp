@@ -294,7 +294,7 @@ std::optional<SceneHit> first_hit(const SceneTracer& tracer, const Ray& ray, dou
   const Seen seen(tracer, filter, QueryTypes::All);
   std::optional<GridHit> best;
   std::size_t best_placed = 0;
-  SceneQuery::instances(tracer).visit(ray, max_t, [&](std::size_t i) {
+  tracer.impl().instances.visit(ray, max_t, [&](std::size_t i) {
     const PlacedGrid& placed = placed_in(tracer)[i];
     if (!seen.includes(placed)) return true;
     const auto hit = first_of_grid(placed, seen.types, ray_in_grid(placed, ray), max_t);
@@ -313,7 +313,7 @@ std::optional<SceneHit> first_hit(const SceneTracer& tracer, const Ray& ray, dou
                      hit.face,          hit.t,          ray.origin + hit.t * ray.direction,
                      hit.starts_inside, best->in_field, placed.world_axes * best->normal};
   }
-  if (!SceneQuery::unloaded(tracer).empty()) note_unloaded(seen, ray, max_t, found);
+  if (!tracer.impl().unloaded.empty()) note_unloaded(seen, ray, max_t, found);
   return found;
 }
 
@@ -321,7 +321,7 @@ bool any_hit(const SceneTracer& tracer, const Ray& ray, double max_t, const Quer
   if (!can_meet_anything(ray, max_t)) return false;
   const Seen seen(tracer, filter, QueryTypes::All);
   bool is_hit = false;
-  SceneQuery::instances(tracer).visit(ray, max_t, [&](std::size_t i) {
+  tracer.impl().instances.visit(ray, max_t, [&](std::size_t i) {
     const PlacedGrid& placed = placed_in(tracer)[i];
     is_hit = seen.includes(placed) && is_any_in_grid(placed, seen.types, ray_in_grid(placed, ray), max_t);
     return !is_hit;
