@@ -522,7 +522,7 @@ export class ShaderScene {
 
   sample(number) {
     const of = this.#instance;
-    const bytes = 96;
+    const bytes = 104;  // of a ShaderPush
     return of.with(bytes, (out) => {
       of.call('quoin_web_march_sample', index(number), out, bytes);
       return of.numbers(Uint8Array, out, bytes);

@@ -20,7 +20,7 @@ const neededFlags = 1 | 2 | 4 | 8 | 64;
 const knownFlags = neededFlags | 2048 | 4096;
 const tileEdge = 128;
 const patience = 50;  // milliseconds of work that cannot be cancelled
-const pushBytes = 256;  // alignment of dynamic offsets; a Push has 96
+const pushBytes = 256;  // alignment of dynamic offsets; a Push has 104
 const pointBytes = 48;
 
 /** Returns a device of the best adapter. Rejects if WebGPU or an adapter is missing. */

@@ -22,9 +22,9 @@ function filesBelow(path) {
   return readdirSync(path).sort().flatMap((name) => filesBelow(join(path, name)));
 }
 
-function native(...args) {
+function native(args, input) {
   try {
-    execFileSync(tool, args, { stdio: ['ignore', 'ignore', 'pipe'] });
+    execFileSync(tool, args, { stdio: [input ? 'pipe' : 'ignore', 'ignore', 'pipe'], input });
     return true;
   } catch {
     return false;
@@ -97,11 +97,13 @@ function wrong(file, why) {
 for (const file of folders.flatMap(filesBelow)) {
   const out = join(scratch, 'out.glb');
   rmSync(out, { force: true });
-  const isRead = native('convert', file, out);
+  // From standard input, so that the tool has no file name either.
+  const bytes = readFileSync(file);
+  const isRead = native(['convert', '-', out], bytes);
   let scene;
   let glb;
   try {
-    scene = await load(readFileSync(file));
+    scene = await load(bytes);
     glb = Buffer.from(scene.glb().buffer);
   } catch (error) {
     const what = lacks(error.message);
@@ -123,7 +125,7 @@ for (const file of folders.flatMap(filesBelow)) {
     ++counts.same[same];
     const image = join(scratch, 'out.png');
     if (extname(file) === '.vox' && counts.compared % 8 === 0 &&
-        native('render', file, '-o', image, '--size', '96x64', '--samples', '4')) {
+        native(['render', file, '-o', image, '--size', '96x64', '--samples', '4'])) {
       const { rgba } = scene.render({ width: 96, height: 64, samples: 4 });
       const pixels = pixelsOf(readFileSync(image));
       let different = 0;

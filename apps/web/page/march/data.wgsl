@@ -135,6 +135,7 @@ struct Push {
   base: u32,   // index of the tile's first pixel in the image, and the row stride
   pitch: u32,
   far: vec3u,
+  sample_number: u32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;
