@@ -25,7 +25,7 @@ foreach(folder LIBDIR INCLUDEDIR)  # absolute in some distributions
 endforeach()
 set(quoin_pc_libs "")
 if(quoin_library_type STREQUAL "STATIC_LIBRARY")
-  set(quoin_pc_libs " -ltbb -lpng -lz -ldl -pthread")
+  set(quoin_pc_libs " -Wl,-u,quoin_store_formats -ltbb -lpng -lz -ldl -pthread")
   if(meshoptimizer_FOUND)
     string(PREPEND quoin_pc_libs " -lmeshoptimizer")
   endif()

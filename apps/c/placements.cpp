@@ -366,14 +366,14 @@ quoin_status quoin_format_get(std::size_t index, quoin_format* out) {
     if (index >= file_formats().size()) return fail(QUOIN_INVALID_ARGUMENT, "no format has this number");
     const FormatInfo& found = file_formats()[index];
     quoin_format format{};
-    copy_text(found.name, format.name);
+    copy_text(found.name(), format.name);
     std::string extensions(found.extension);
     if (!found.also.empty()) extensions.append(1, ' ').append(found.also);
     copy_text(extensions, format.extensions);
     copy_text(found.description, format.description);
-    format.readable = found.readable ? 1 : 0;
-    format.writable = found.writable ? 1 : 0;
-    format.is_mesh = found.is_mesh ? 1 : 0;
+    format.readable = found.can(FormatCapability::Read) ? 1 : 0;
+    format.writable = found.can(FormatCapability::Write) ? 1 : 0;
+    format.is_mesh = found.can(FormatCapability::Meshes) ? 1 : 0;
     return report(format, out);
   });
 }

@@ -121,7 +121,7 @@ quoin_status save(SceneBody& scene, const char* path) {
   scene.save_warnings.clear();
   const auto format = format_for_writing(path);
   if (!format) return fail(format.error());
-  if (!format->is_mesh) {
+  if (!format->can(FormatCapability::Meshes)) {
     auto saved = save_scene(scene.loaded, path, {}, progress());
     if (!saved) return fail(saved.error());
     scene.save_warnings = std::move(saved->warnings);

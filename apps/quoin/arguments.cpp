@@ -117,7 +117,7 @@ Status check_dimension(const std::filesystem::path& path, const LoadOptions& loa
   if (!format) return format.error();
   const bool is_heeded = *format == FileFormat::Minecraft || *format == FileFormat::Scene;
   if (is_heeded) return {};
-  const std::string found = *format ? std::string(format_info(**format).name) : "unknown";
+  const std::string found = *format ? std::string((*format)->name()) : "unknown";
   return make_error(ErrorCode::InvalidArgument,
                     "cannot select a dimension: --dimension needs a Minecraft world, and the file format is " + found,
                     path.string());

@@ -214,7 +214,8 @@ std::string outcome_text(const GenerateOptions& options, const Outcome& outcome)
 
 int run_generate(GenerateOptions& options) {
   const auto format = format_for_writing(options.output);
-  const bool is_wrong = !format || format->is_mesh || (options.is_smooth && format->format == FileFormat::Vox);
+  const bool is_wrong =
+      !format || format->can(FormatCapability::Meshes) || (options.is_smooth && format->format == FileFormat::Vox);
   if (is_wrong) {
     print_error("cannot write " + options.output.string() + ": " + (options.is_smooth ? "smooth terrain" : "terrain") +
                 " is written as .quoin" + (options.is_smooth ? " or " : ", .vox or ") +

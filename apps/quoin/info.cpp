@@ -324,7 +324,7 @@ void add_info_command(CLI::App& app, int& status) {
   const auto texts = std::make_shared<VolumeTexts>();
   add_common_options(*command, *options);
   add_raw_options(*command, *texts);
-  command->footer("Reads " + readable_extensions() +
+  command->footer("Reads " + extensions_with(FormatCapability::Read) +
                   ".\n"
                   "Faces are counted once per model; only models that are placed and visible count.\n"
                   "Example: quoin info castle.vox\n"

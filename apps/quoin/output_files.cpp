@@ -61,7 +61,7 @@ Status check_replaced(const std::filesystem::path& output, const FileSet& inputs
                                                   ": the file exists and cannot be read; use --force to overwrite it");
   }
   // Meshes are results that can be made again, so they are overwritten even if they are readable.
-  if (!*format || format_info(**format).is_mesh) return {};
+  if (!*format || can(*format, FormatCapability::Meshes)) return {};
   return make_error(ErrorCode::InvalidArgument,
                     "cannot write " + output.string() + ": the file exists; use --force to overwrite it");
 }

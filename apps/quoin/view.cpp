@@ -43,7 +43,8 @@ Status check_input(const std::filesystem::path& path, bool is_raw) {
   const auto format = detect_format(path);
   if (!format) return format.error();
   if (!*format && !is_raw) {
-    return make_error(ErrorCode::Unsupported, "unknown format; supported formats are " + readable_extensions(),
+    return make_error(ErrorCode::Unsupported,
+                      "unknown format; supported formats are " + extensions_with(FormatCapability::Read),
                       path.string());
   }
   return {};

@@ -76,7 +76,7 @@ Result<bool> holds_volume(const CommonOptions& options) {
   if (options.load.raw) return true;
   const auto format = detect_format(options.input);
   if (!format) return format.error();
-  return *format && format_info(**format).is_volume;
+  return can(*format, FormatCapability::Volume);
 }
 
 bool heeds_iso(const CommonOptions& options) {

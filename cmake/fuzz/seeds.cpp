@@ -32,43 +32,18 @@ using namespace quoin;
 constexpr std::uintmax_t kMostBytes = std::uintmax_t{1} << 16;
 
 /// Returns the target that reads a format.
-const char* target_of(FileFormat format) {
-  switch (format) {
-    case FileFormat::Vox:
-      return "vox";
-    case FileFormat::Scene:
-      return "scene_file";
-    case FileFormat::World:
-      return "world";
-    case FileFormat::Minecraft:
-    case FileFormat::Schematic:
-      return "minecraft";
-    case FileFormat::Qubicle:
-    case FileFormat::Goxel:
-    case FileFormat::Voxlap:
-    case FileFormat::Binvox:
-    case FileFormat::CubeWorld:
-    case FileFormat::LuantiSchematic:
-      return "models";
-    case FileFormat::LuantiMap:
-      return "luanti";
-    case FileFormat::Heights:
-      return "heights";
-    case FileFormat::Vdb:
-      return "vdb";
-    case FileFormat::Nifti:
-    case FileFormat::Nrrd:
-      return "volume";
-    case FileFormat::Glb:
-    case FileFormat::Gltf:
-    case FileFormat::Obj:
-    case FileFormat::Ply:
-    case FileFormat::Stl:
-    case FileFormat::ThreeMf:
-    case FileFormat::Off:
-      return "triangles";
+const char* target_of(const FormatInfo& format) {
+  if (format.can(FormatCapability::Meshes)) return "triangles";
+  if (format.can(FormatCapability::Volume)) return "volume";
+  constexpr std::pair<FileFormat, const char*> kTargets[] = {
+      {FileFormat::Vox, "vox"},         {FileFormat::Scene, "scene_file"},    {FileFormat::World, "world"},
+      {FileFormat::Vdb, "vdb"},         {FileFormat::Minecraft, "minecraft"}, {FileFormat::Schematic, "minecraft"},
+      {FileFormat::Heights, "heights"}, {FileFormat::LuantiMap, "luanti"},
+  };
+  for (const auto& [known, target] : kTargets) {
+    if (known == format.format) return target;
   }
-  return nullptr;
+  return "models";
 }
 
 /// A grid of three types with two instances, one of them rotated.
@@ -136,10 +111,11 @@ class Seeds {
   /// Writes the scene in every format that supports it; voxel formats need not support fields.
   void put_scene(const Scene& scene, const std::string& name, bool is_field) const {
     for (const FormatInfo& format : file_formats()) {
-      if (!format.writable) continue;
-      const fs::path path = file(target_of(format.format), name + std::string(format.extension));
-      const std::string error = format.is_mesh ? write_as_mesh(scene, path) : write_as_voxels(scene, path);
-      require(error.empty() || (is_field && !format.is_mesh), path, error);
+      if (!format.can(FormatCapability::Write)) continue;
+      const bool is_mesh = format.can(FormatCapability::Meshes);
+      const fs::path path = file(target_of(format), name + std::string(format.extension));
+      const std::string error = is_mesh ? write_as_mesh(scene, path) : write_as_voxels(scene, path);
+      require(error.empty() || (is_field && !is_mesh), path, error);
       if (!error.empty()) continue;
       if (fs::file_size(path) > kMostBytes) {
         fs::remove(path);

@@ -46,6 +46,7 @@
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/io/chunk_source.h>
 #include <quoin/io/file.h>
+#include <quoin/io/file_format.h>
 #include <quoin/io/formats.h>
 #include <quoin/io/heights.h>
 #include <quoin/io/image_files.h>

@@ -1,10 +1,17 @@
 #include <quoin/io/mesh_file.h>
 
+#include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
+#include <iterator>
 #include <numbers>
+#include <unordered_map>
 #include <utility>
 #include <variant>
+#include <vector>
 
+#include "io/format_driver.h"
 #include "io/mesh_parts.h"
 #include "io/whole_file.h"
 
@@ -19,63 +26,43 @@ Result<FileFormat> format_of(const std::filesystem::path& path, const MeshFileOp
   return format->format;
 }
 
-/// Returns the files of valid meshes. Errors: Unsupported; those of the formats.
+/// Returns the driver of a mesh format. Errors: Unsupported.
+Result<const FormatDriver*> driver_for_meshes(FileFormat format) {
+  const FormatDriver& driver = driver_of(format);
+  if (driver.plan_mesh != nullptr) return &driver;
+  return make_error(ErrorCode::Unsupported, std::string(driver.info.extension) + " is not a mesh format");
+}
+
+/// Returns an error if a format cannot store something in the meshes or options. Errors: Unsupported.
+Status check_format(const SceneMeshes& meshes, FileFormat format, const MeshFileOptions& options) {
+  struct Need {
+    bool is_needed;
+    FormatCapability capability;
+    std::string_view content;
+  };
+  const Need needs[] = {
+      {options.compress, FormatCapability::Compression, "compressed meshes"},
+      {options.quantize, FormatCapability::Compression, "quantized meshes"},
+      {!meshes.atlas.rgb.empty(), FormatCapability::Textures, "an occlusion atlas"},
+      {options.occlusion_in == OcclusionIn::Attribute, FormatCapability::OcclusionAttribute,
+       "occlusion as an attribute"},
+      {has_light(meshes), FormatCapability::VertexLight, "light per vertex"},
+  };
+  for (const Need& need : needs) {
+    if (!need.is_needed) continue;
+    if (Status able = check_capability(format, need.capability, need.content); !able) return able;
+  }
+  return {};
+}
+
+/// Returns the files of meshes. Errors: Unsupported; InvalidArgument; those of the formats.
 Result<std::vector<MeshFile>> plan(const SceneMeshes& meshes, FileFormat format, const std::filesystem::path& path,
                                    const MeshFileOptions& options) {
-  const bool is_gltf = format == FileFormat::Glb || format == FileFormat::Gltf;
-  if ((options.compress || options.quantize) && !is_gltf) {
-    return make_error(ErrorCode::Unsupported,
-                      std::string("only .glb and .gltf can be ") + (options.compress ? "compressed" : "quantized"));
-  }
-  const bool is_print = format == FileFormat::Stl || format == FileFormat::ThreeMf;
-  if (!meshes.atlas.rgb.empty() && (is_print || format == FileFormat::Ply)) {
-    return make_error(ErrorCode::Unsupported,
-                      std::string(format_info(format).extension) + " cannot store textures; use .glb, .gltf or .obj");
-  }
-  if (is_print && options.occlusion_in == OcclusionIn::Attribute) {
-    return make_error(ErrorCode::Unsupported, "files for printing cannot store occlusion");
-  }
-  if (has_light(meshes) && !is_gltf) {
-    return make_error(ErrorCode::Unsupported, "only .glb and .gltf can store light per vertex");
-  }
+  const auto driver = driver_for_meshes(format);
+  if (!driver) return driver.error();
+  if (Status able = check_format(meshes, format, options); !able) return able.error();
   if (auto sound = check_meshes(meshes); !sound) return sound.error();
-  switch (format) {
-    case FileFormat::Glb:
-      return plan_glb(meshes, path, options);
-    case FileFormat::Gltf:
-      return plan_gltf(meshes, path, options);
-    case FileFormat::Obj:
-      if (options.occlusion_in == OcclusionIn::Attribute) {
-        return make_error(ErrorCode::Unsupported,
-                          "OBJ cannot store occlusion in addition to colours; use .glb, .gltf or .ply");
-      }
-      return plan_obj(meshes, path);
-    case FileFormat::Ply:
-      return plan_ply(meshes, path, options);
-    case FileFormat::Stl:
-      return plan_stl(meshes, path);
-    case FileFormat::ThreeMf:
-      return plan_three_mf(meshes, path);
-    case FileFormat::Off:
-    case FileFormat::Vox:
-    case FileFormat::Scene:
-    case FileFormat::World:
-    case FileFormat::Minecraft:
-    case FileFormat::Schematic:
-    case FileFormat::Qubicle:
-    case FileFormat::Goxel:
-    case FileFormat::Voxlap:
-    case FileFormat::Binvox:
-    case FileFormat::CubeWorld:
-    case FileFormat::LuantiSchematic:
-    case FileFormat::LuantiMap:
-    case FileFormat::Heights:
-    case FileFormat::Vdb:
-    case FileFormat::Nifti:
-    case FileFormat::Nrrd:
-      break;
-  }
-  return make_error(ErrorCode::Unsupported, std::string(format_info(format).extension) + " is not a mesh format");
+  return (*driver)->plan_mesh(meshes, path, options);
 }
 
 /// Returns the meshes without occlusion.
@@ -218,23 +205,89 @@ Result<std::vector<std::byte>> write_mesh(const SceneMeshes& meshes, FileFormat 
 }
 
 DVec3 mesh_file_offset(const SceneMeshes& meshes, FileFormat format, const MeshFileOptions& options) {
-  const bool has_offset = format == FileFormat::Ply || format == FileFormat::Stl;
+  const double most_steps = driver_of(format).most_steps;
   const auto written = as_written(meshes, options);
-  if (!has_offset || !written || !check_meshes(*written)) return DVec3(0.0);
-  return file_origin(*written, format == FileFormat::Ply ? kMostStepsOfPly : kMostStepsOfStl);
+  if (most_steps == 0.0 || !written || !check_meshes(*written)) return DVec3(0.0);
+  return file_origin(*written, most_steps);
 }
 
 Result<std::vector<std::filesystem::path>> mesh_files(const SceneMeshes& meshes, const std::filesystem::path& path,
                                                       const MeshFileOptions& options) {
   const auto format = format_of(path, options);
   if (!format) return format.error();
-  if (!format_info(*format).is_mesh) return make_error(ErrorCode::Unsupported, "not a mesh format", path.string());
+  const auto driver = driver_for_meshes(*format);
+  if (!driver) return with_path(Result<std::vector<std::filesystem::path>>(driver.error()), path);
   std::vector<std::filesystem::path> files = {path};
-  const auto companions = *format == FileFormat::Gltf  ? gltf_companions(meshes, path)
-                          : *format == FileFormat::Obj ? obj_companions(meshes, path)
-                                                       : std::vector<std::filesystem::path>();
-  files.insert(files.end(), companions.begin(), companions.end());
+  if ((*driver)->mesh_companions != nullptr) {
+    std::ranges::move((*driver)->mesh_companions(meshes, path), std::back_inserter(files));
+  }
   return files;
+}
+
+namespace {
+
+struct Bits {
+  std::array<std::uint32_t, 3> of;
+  bool operator==(const Bits&) const = default;
+};
+
+std::uint64_t mixed(std::uint64_t hash, std::uint64_t value) {
+  hash = (hash ^ value) * 0x9E37'79B9'7F4A'7C15U;
+  return hash ^ hash >> 29;
+}
+
+struct BitsHash {
+  std::size_t operator()(const Bits& bits) const { return mixed(mixed(bits.of[0], bits.of[1]), bits.of[2]); }
+};
+
+struct KeyHash {
+  std::size_t operator()(std::uint64_t key) const { return mixed(key, key >> 32); }
+};
+
+/// The uses of an edge, by direction.
+struct Uses {
+  std::uint32_t there = 0;
+  std::uint32_t back = 0;
+};
+
+std::uint64_t open_edges_of(const MeshPart& part) {
+  std::unordered_map<Bits, std::uint32_t, BitsHash> numbers;
+  std::unordered_map<std::uint64_t, Uses, KeyHash> edges;
+  const auto number_of = [&](const Vec3& at) {
+    // 0 and -0 are the same position.
+    const Bits bits{{std::bit_cast<std::uint32_t>(at.x + 0.0F), std::bit_cast<std::uint32_t>(at.y + 0.0F),
+                     std::bit_cast<std::uint32_t>(at.z + 0.0F)}};
+    return numbers.try_emplace(bits, static_cast<std::uint32_t>(numbers.size())).first->second;
+  };
+  for (const MeshView& view : part.surfaces) {
+    for (std::size_t i = 0; i + 2 < view.indices.size(); i += 3) {
+      std::array<std::uint32_t, 3> corner{};
+      for (std::size_t k = 0; k < 3; ++k) corner[k] = number_of(view.positions[view.indices[i + k]]);
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::uint32_t from = corner[k];
+        const std::uint32_t to = corner[(k + 1) % 3];
+        Uses& uses = edges[std::uint64_t{std::min(from, to)} << 32 | std::max(from, to)];
+        ++(from < to ? uses.there : uses.back);
+      }
+    }
+  }
+  std::uint64_t open = 0;
+  for (const auto& [edge, uses] : edges) open += uses.there == 1 && uses.back == 1 ? 0 : 1;
+  return open;
+}
+
+}  // namespace
+
+std::uint64_t count_open_edges(const SceneMeshes& meshes) {
+  std::vector<std::uint64_t> of_part(meshes.parts.size());
+  std::vector<bool> is_known(meshes.parts.size());
+  std::uint64_t open = 0;
+  for (const MeshPlacement& placement : meshes.placements) {
+    if (!is_known[placement.part]) of_part[placement.part] = open_edges_of(meshes.parts[placement.part]);
+    is_known[placement.part] = true;
+    open += of_part[placement.part];
+  }
+  return open;
 }
 
 }  // namespace quoin

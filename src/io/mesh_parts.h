@@ -26,25 +26,6 @@ struct MeshFile {
   std::function<void(BlockWriter&)> write;
 };
 
-/// Returns the files of a mesh. Requires: the meshes are valid and outlive the files.
-using PlanMeshFiles = Result<std::vector<MeshFile>>(const SceneMeshes& meshes, const std::filesystem::path& path,
-                                                    const MeshFileOptions& options);
-
-[[nodiscard]] PlanMeshFiles plan_glb;
-[[nodiscard]] PlanMeshFiles plan_gltf;
-[[nodiscard]] PlanMeshFiles plan_ply;
-/// OBJ stores occlusion only in colours.
-[[nodiscard]] Result<std::vector<MeshFile>> plan_obj(const SceneMeshes& meshes, const std::filesystem::path& path);
-/// Formats for 3D printing.
-[[nodiscard]] Result<std::vector<MeshFile>> plan_stl(const SceneMeshes& meshes, const std::filesystem::path& path);
-[[nodiscard]] Result<std::vector<MeshFile>> plan_three_mf(const SceneMeshes& meshes, const std::filesystem::path& path);
-
-/// Returns the files that are written next to `path`.
-[[nodiscard]] std::vector<std::filesystem::path> gltf_companions(const SceneMeshes& meshes,
-                                                                 const std::filesystem::path& path);
-[[nodiscard]] std::vector<std::filesystem::path> obj_companions(const SceneMeshes& meshes,
-                                                                const std::filesystem::path& path);
-
 /// Checks all parts and placements. Errors: InvalidArgument, with the first invalid part (see mesh_file.h).
 [[nodiscard]] Status check_meshes(const SceneMeshes& meshes);
 
@@ -53,11 +34,6 @@ using PlanMeshFiles = Result<std::vector<MeshFile>>(const SceneMeshes& meshes, c
 
 /// Returns the box of all vertices; empty without vertices.
 [[nodiscard]] DBox bounds_of(const MeshView& view);
-
-/// The largest coordinates that floats represent with enough precision, in steps: units of the part.
-inline constexpr double kMostStepsOfPly = 1 << 20;
-/// Surfaces for printers are separated by a hundredth of a voxel.
-inline constexpr double kMostStepsOfStl = 1 << 16;
 
 /// Returns the point that positions of all placements are relative to in a file with floats in world units: 0, unless
 /// vertices lie more than `most_steps` steps from the origin.

@@ -95,7 +95,7 @@ TEST_F(SidecarFile, IsFoundAnywhereOnRequest) {
 }
 
 TEST_F(SidecarFile, RefusesGltfReferencesOutsideTheFolder) {
-  if (!format_info(FileFormat::Gltf).readable) GTEST_SKIP() << "the build reads no glTF";
+  if (!can(FileFormat::Gltf, FormatCapability::Read)) GTEST_SKIP() << "the build reads no glTF";
   const std::string corners("\0\0\0\0\0\0\0\0\0\0\0\0\0\0\x80?\0\0\0\0\0\0\0\0\0\0\0\0\0\0\x80?\0\0\0\0", 36);
   write("corners.bin", corners);
   write("in/corners.bin", corners);
@@ -120,7 +120,7 @@ TEST_F(SidecarFile, RefusesGltfReferencesOutsideTheFolder) {
 }
 
 TEST_F(SidecarFile, LeavesOutObjReferencesOutsideTheFolder) {
-  if (!format_info(FileFormat::Obj).readable) GTEST_SKIP() << "the build reads no OBJ";
+  if (!can(FileFormat::Obj, FormatCapability::Read)) GTEST_SKIP() << "the build reads no OBJ";
   write("outer.mtl", "newmtl a\nKd 1 0 0\n");
   fs::create_symlink("../outer.mtl", folder_ / "in" / "linked.mtl");
   for (const std::string name : {"../outer.mtl", "linked.mtl"}) {

@@ -117,13 +117,13 @@ TEST(NearGrids, KeepShapesInFilesOfMeshes) {
     const auto meshes = is_smooth ? mesh_scene_smoothly(near) : mesh_scene(near);
     ASSERT_TRUE(meshes);
     for (const FileFormat format : {FileFormat::Glb, FileFormat::Ply, FileFormat::Stl}) {
-      if (!format_info(format).readable) continue;
+      if (!can(format, FormatCapability::Read)) continue;
       const TriangleMesh mesh = written_and_read(*meshes, format);
       EXPECT_EQ(mesh.triangles.size(), static_cast<std::size_t>(meshes->stats.triangles));
-      EXPECT_EQ(count_degenerate(mesh), 0U) << format_info(format).name << is_smooth;
+      EXPECT_EQ(count_degenerate(mesh), 0U) << format.name() << is_smooth;
       const DVec3 off = mesh.bounds().min - first;
       const double most = is_smooth ? 0.5 : 1e-9;
-      EXPECT_LE(std::max({std::abs(off.x), std::abs(off.y), std::abs(off.z)}), most) << format_info(format).name;
+      EXPECT_LE(std::max({std::abs(off.x), std::abs(off.y), std::abs(off.z)}), most) << format.name();
     }
   }
 }

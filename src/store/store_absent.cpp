@@ -4,8 +4,7 @@
 #include <quoin/store/world_saver.h>
 #include <quoin/store/world_store.h>
 
-#include "io/source/luanti_map.h"
-#include "io/world_format.h"
+#include "store/store_formats.h"
 
 // Builds without SQLite, zstd or xxHash: all world functions return an error. Parameters are the same as in complete
 // builds.
@@ -170,11 +169,6 @@ Result<LoadedScene> read_world_format(const std::filesystem::path& path, const L
 Result<LoadedScene> read_world_format(std::span<const std::byte>, const LoadOptions&, Threads, const Progress&) {
   return absent();
 }
-Result<SavedScene> write_world_format(const Scene&, const LoadedScene*, const std::filesystem::path& path, Threads,
-                                      const Progress&) {
-  return absent(path);
-}
-
 Result<std::unique_ptr<ChunkSource>> open_luanti(const std::filesystem::path& path) {
   return make_error(ErrorCode::Unsupported,
                     "cannot read Luanti worlds: not supported by this build: " QUOIN_STORE_MISSING, path.string());

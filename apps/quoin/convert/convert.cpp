@@ -5,6 +5,7 @@
 #include <limits>
 #include <memory>
 #include <numbers>
+#include <tuple>
 
 #include <quoin/io/chunk_source.h>
 #include <quoin/io/mesh_file.h>
@@ -71,7 +72,7 @@ Status convert_blockily(const Scene& scene, const SceneAnimation& animation, con
   wanted.mesh = {outcome.mesher == "greedy", !options.occlusion_off, options.watertight};
   wanted.instances = filter;
   wanted.atlas = options.texture == "atlas";
-  if (is_for_printing(format_for_writing(options.output)->format)) {
+  if (format_for_writing(options.output)->can(FormatCapability::Printing)) {
     wanted.part_of = [&scene](GridHandle grid, MeshStats& stats) { return part_for_printing(scene, grid, stats); };
   }
   const Progress progress = bar.listener("meshing");
@@ -161,12 +162,6 @@ std::string find_blocks_error(const ConvertOptions& options) {
   return is_of_smooth ? "--smoothness, --colours and --no-unite need --mesher smooth" : "";
 }
 
-/// Returns true if this is the name of a mesh format.
-bool format_is_mesh(const std::string& name) {
-  const auto all = file_formats();
-  return std::any_of(all.begin(), all.end(), [&](const FormatInfo& info) { return info.is_mesh && info.name == name; });
-}
-
 /// Returns the given mesher, or the default: smooth if the scene has only fields and there is no atlas, else greedy.
 std::string mesher_for(const Scene& scene, const ConvertOptions& options) {
   if (!options.mesher.empty()) return options.mesher;
@@ -215,7 +210,10 @@ void fit_voxels(const ConvertOptions& options, const FormatInfo& format, bool is
   if (only_voxels || options.as_voxels) make_voxels_of_fields(loaded.scene, options.common.threads, warnings);
   if (is_scan && only_voxels) turn_by_quarters(loaded.scene, warnings);
   const bool keeps_scale = format.format == FileFormat::Scene || format.format == FileFormat::World;
-  const bool may_have_size = format_is_mesh(loaded.format) ? !keeps_scale : is_scan && only_voxels;
+  const bool is_from_triangles = std::ranges::any_of(file_formats(), [&](const FormatInfo& info) {
+    return info.name() == loaded.format && info.can(FormatCapability::Meshes);
+  });
+  const bool may_have_size = is_from_triangles ? !keeps_scale : is_scan && only_voxels;
   if (may_have_size) normalise_scale(loaded.scene, format, warnings);
 }
 
@@ -223,7 +221,7 @@ Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& f
                               std::string& fault) {
   Stopwatch watch;
   LoadOptions load = options.common.load;
-  load.keep_source = !format.is_mesh || options.animate;
+  load.keep_source = !format.can(FormatCapability::Meshes) || options.animate;
   constexpr std::size_t kTypesOfVox = 255;
   if (format.format == FileFormat::Vox) {
     load.mesh.max_types = std::min(load.mesh.max_types.value_or(kTypesOfVox), kTypesOfVox);
@@ -235,7 +233,7 @@ Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& f
   outcome.warnings = std::move(loaded->warnings);
   outcome.seconds.read = watch.lap();
   catch_interrupts();
-  if (format.is_mesh) {
+  if (format.can(FormatCapability::Meshes)) {
     ConvertOptions settled = options;
     settled.mesher = mesher_for(loaded->scene, options);
     if (options.voxel_mm) settled.scale = scale_for_voxels(loaded->scene, *options.voxel_mm);
@@ -393,20 +391,20 @@ std::string find_mesh_input_error(const ConvertOptions& options, const FormatInf
   if (options.mesh_input.empty()) return "";
   const auto format = detect_format(options.common.input);
   // An unrecognized file may be a triangle mesh. The reader reports why it is not recognized.
-  if (!format || !*format || format_info(**format).is_mesh) return "";
+  if (!format || !*format || can(*format, FormatCapability::Meshes)) return "";
   const bool may_have_field = heeds_iso(options.common) || *format == FileFormat::Scene || *format == FileFormat::World;
   if (options.mesh_input == "--solid" && may_have_field) {
-    return to.is_mesh ? "cannot use --solid: it converts fields to voxels, but " + std::string(to.extension) +
-                            " is a mesh format"
-                      : "";
+    return to.can(FormatCapability::Meshes) ? "cannot use --solid: it converts fields to voxels, but " +
+                                                  std::string(to.extension) + " is a mesh format"
+                                            : "";
   }
   return "cannot use " + options.mesh_input + ": it needs a triangle mesh, and the input is " +
-         std::string(format_info(**format).name);
+         std::string((*format)->name());
 }
 
 Result<Outcome> convert(const ConvertOptions& options, const FormatInfo& format, bool is_volume, std::string& fault) {
-  return is_volume && format.is_mesh ? convert_volume(options, format)
-                                     : convert_scene(options, format, is_volume, fault);
+  return is_volume && format.can(FormatCapability::Meshes) ? convert_volume(options, format)
+                                                           : convert_scene(options, format, is_volume, fault);
 }
 
 /// Replaces standard streams ("-") by temporary files. Returns a usage error, or "".
@@ -414,7 +412,7 @@ Result<std::string> open_streams(ConvertOptions& options, const ManyOptions& man
   if (options.output == kStandardStream) {
     const auto format = format_for_writing("file." + many.to);
     if (many.to.empty() || !format)
-      return "writing to standard output needs --to FORMAT, one of " + writable_extensions();
+      return "writing to standard output needs --to FORMAT, one of " + extensions_with(FormatCapability::Write);
     if (format->format == FileFormat::Gltf || format->format == FileFormat::Obj) {
       return "cannot write " + std::string(format->extension) + " to standard output: it consists of several files";
     }
@@ -432,7 +430,7 @@ Status check_input(const ConvertOptions& options) {
   if (options.from.empty()) return {};
   const auto found = detect_format(options.common.input);
   if (!found) return found.error();
-  const std::string name = *found ? std::string(format_info(**found).name) : "unknown";
+  const std::string name = *found ? std::string((*found)->name()) : "unknown";
   if (name == options.from) return {};
   return make_error(ErrorCode::BadFormat, "the format is " + name + ", not " + options.from,
                     options.common.input.string());
@@ -487,7 +485,7 @@ std::string find_watching_error(const ConvertOptions& options, const ManyOptions
     return "cannot use --watch with standard input or output";
   }
   const auto format = format_for_writing(many.inputs.empty() ? options.output : std::filesystem::path("f." + many.to));
-  const bool is_kept = format && !format->is_mesh && !options.force;
+  const bool is_kept = format && !format->can(FormatCapability::Meshes) && !options.force;
   return is_kept ? "--watch needs --force: it overwrites OUT, a model, after each change" : "";
 }
 
@@ -579,7 +577,7 @@ std::string read_occlusion(const CLI::App& command, ConvertOptions& options) {
 std::string readable_names() {
   std::string names;
   for (const FormatInfo& format : file_formats()) {
-    if (format.readable) names += (names.empty() ? "" : ", ") + std::string(format.name);
+    if (format.can(FormatCapability::Read)) names += (names.empty() ? "" : ", ") + std::string(format.name());
   }
   return names;
 }
@@ -645,35 +643,28 @@ Json outcome_json(const Outcome& outcome) {
 }
 
 std::string find_format_error(const ConvertOptions& options, const FormatInfo& format) {
-  if (!format.is_mesh && options.mesh_only) {
+  if (!format.can(FormatCapability::Meshes)) {
+    if (!options.mesh_only) return "";
     return "--mesher, --no-ao, --ao-..., --watertight, --smoothness, --colours, --no-unite, --simplify, "
            "--scale, --up, --texture, --light, --lights, --animate, --compress and --quantize need a mesh format; " +
            (options.output.empty() ? std::string(format.extension) : options.output.string()) + " is not one";
   }
-  const bool is_print = is_for_printing(format.format);
-  if (options.ao_as_attribute && (is_print || format.format == FileFormat::Obj)) {
-    return "cannot write --ao-attribute to " + std::string(format.extension) + "; use .glb, .gltf or .ply";
+  if (options.voxel_mm && !format.can(FormatCapability::Printing)) {
+    return "--voxel-mm needs .stl or .3mf; use --scale for other mesh formats";
   }
-  if (options.texture == "atlas" && (is_print || format.format == FileFormat::Ply)) {
-    return "cannot write --texture atlas to " + std::string(format.extension) + "; use .glb, .gltf or .obj";
-  }
-  if (options.voxel_mm && !is_print) return "--voxel-mm needs .stl or .3mf; use --scale for other mesh formats";
   if (options.voxel_mm && options.scale) return "--voxel-mm and --scale cannot be used together";
-  const bool is_gltf = format.format == FileFormat::Glb || format.format == FileFormat::Gltf;
-  if (options.lights && !is_gltf) {
-    return "cannot write --lights to " + std::string(format.extension) +
-           ": it has no lamps and cameras; use .glb or .gltf";
-  }
-  if (options.light && !is_gltf) {
-    return "cannot write --light to " + std::string(format.extension) +
-           ": it has no unlit materials; use .glb or .gltf";
-  }
-  if (options.animate && !is_gltf) {
-    return "cannot write --animate to " + std::string(format.extension) + ": it has no animation; use .glb or .gltf";
-  }
-  if ((options.compress || options.quantize) && !is_gltf) {
-    return std::string(options.compress ? "--compress" : "--quantize") + " needs .glb or .gltf, not " +
-           std::string(format.extension);
+  const std::tuple<bool, FormatCapability, const char*> needs[] = {
+      {options.ao_as_attribute, FormatCapability::OcclusionAttribute, "--ao-attribute"},
+      {options.texture == "atlas", FormatCapability::Textures, "--texture atlas"},
+      {options.lights, FormatCapability::Lamps, "--lights"},
+      {options.light.has_value(), FormatCapability::VertexLight, "--light"},
+      {options.animate, FormatCapability::Animation, "--animate"},
+      {options.compress, FormatCapability::Compression, "--compress"},
+      {options.quantize, FormatCapability::Compression, "--quantize"},
+  };
+  for (const auto& [is_given, capability, option] : needs) {
+    if (!is_given) continue;
+    if (const Status able = check_capability(format.format, capability, option); !able) return able.error().message;
   }
   return "";
 }
@@ -692,9 +683,9 @@ Result<Outcome> convert_file(const ConvertOptions& options, const FormatInfo& fo
   }
   if (auto writable = check_outputs({options.output}); !writable) return writable.error();
   const auto from = detect_format(options.common.input);
-  if (format.format == FileFormat::World && from && is_read_by_chunks(*from)) return convert_by_chunks(options);
+  if (format.format == FileFormat::World && can(*from, FormatCapability::Chunks)) return convert_by_chunks(options);
   if (from == FileFormat::World && format.format == FileFormat::World) return copy_world_file(options);
-  if (from == FileFormat::World && format.is_mesh && meshes_by_chunks(options)) {
+  if (from == FileFormat::World && format.can(FormatCapability::Meshes) && meshes_by_chunks(options)) {
     auto meshed = mesh_world_file(options);
     if (!meshed) return meshed.error();
     if (*meshed) return std::move(**meshed);
@@ -724,15 +715,15 @@ MeshFileOptions mesh_file_options(const ConvertOptions& options, FileFormat form
   file.compress = options.compress;
   file.quantize = options.quantize;
   if (options.scale) file.scale = *options.scale;
-  const bool is_z = is_for_printing(format) || format == FileFormat::Ply;
-  if (options.up == "z" || (options.up.empty() && is_z)) file.up = UpAxis::Z;
+  const UpAxis usual = format_info(format).up;
+  file.up = options.up.empty() ? usual : options.up == "z" ? UpAxis::Z : UpAxis::Y;
   return file;
 }
 
 /// Warns of open edges in 3D printing files and of coordinates relative to an offset.
 void warn_of_meshes(const SceneMeshes& meshes, FileFormat format, const MeshFileOptions& file,
                     std::vector<std::string>& warnings) {
-  if (is_for_printing(format)) {
+  if (can(format, FormatCapability::Printing)) {
     if (const std::uint64_t open = count_open_edges(meshes); open > 0) {
       warnings.push_back(with_thousands(static_cast<std::int64_t>(open)) +
                          " open edges: the mesh is not closed for printing");
@@ -804,7 +795,7 @@ void add_file_options(CLI::App& command, ConvertOptions& options, ManyOptions& m
 }
 
 std::string footer() {
-  return "Reads " + readable_extensions() + ".\nWrites " + writable_extensions() +
+  return "Reads " + extensions_with(FormatCapability::Read) + ".\nWrites " + extensions_with(FormatCapability::Write) +
          ".\n"
          "Existing models and worlds are overwritten only with --force. Inputs are never overwritten.\n"
          "NAME.gltf comes with NAME.bin; NAME.obj with NAME.mtl, NAME_palette.png, and NAME_emissive.png and "

@@ -86,8 +86,8 @@ struct Outcome {
 
 /// Returns true for formats that hold voxels and no fields.
 [[nodiscard]] inline bool holds_only_voxels(const FormatInfo& format) {
-  return !format.is_mesh && !format.is_volume && format.format != FileFormat::Scene &&
-         format.format != FileFormat::World && format.format != FileFormat::Vdb;
+  return !format.can(FormatCapability::Meshes) && !format.can(FormatCapability::Volume) &&
+         !format.can(FormatCapability::Fields);
 }
 
 /// Replaces all fields of a scene by voxels, one per solid sample.
@@ -103,11 +103,6 @@ void normalise_scale(Scene& scene, const FormatInfo& format, std::vector<std::st
 /// Adds lamps and cameras if `options.lights` is set, else warns of lamps that are left out.
 void add_lights(const Scene& scene, const ConvertOptions& options, SceneMeshes& meshes,
                 std::vector<std::string>& warnings);
-
-/// Returns true for 3D printing formats, whose meshes must be closed.
-[[nodiscard]] inline bool is_for_printing(FileFormat format) {
-  return format == FileFormat::Stl || format == FileFormat::ThreeMf;
-}
 
 /// Returns an error message if the options do not fit the output format, else "".
 [[nodiscard]] std::string find_format_error(const ConvertOptions& options, const FormatInfo& format);

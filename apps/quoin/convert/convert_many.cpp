@@ -34,10 +34,8 @@ Error error_of(const fs::path& path, const std::error_code& code) {
 
 /// Returns true if the extension is that of a readable format. A .json file does not count: it can be anything.
 bool is_named_to_be_read(const fs::path& file) {
-  const auto formats = file_formats();
-  return std::any_of(formats.begin(), formats.end(), [&](const FormatInfo& format) {
-    return format.readable && format.format != FileFormat::Scene && file.extension() == format.extension;
-  });
+  const auto format = format_with_extension(file, FormatCapability::Read);
+  return format && format->format != FileFormat::Scene;
 }
 
 /// Returns the files in a folder and its subfolders that are readable or have a readable extension, sorted by name.
@@ -63,7 +61,7 @@ Result<std::vector<fs::path>> files_below(const fs::path& folder, const std::opt
     const auto format = detect_format(at->path());
     // Keep files that cannot be opened, to report them. Skip files in unknown formats.
     if (format && !*format && !is_named_to_be_read(at->path())) continue;
-    const bool is_mesh = format && *format && format_info(**format).is_mesh;
+    const bool is_mesh = format && can(*format, FormatCapability::Meshes);
     (is_mesh ? meshes : found).push_back(at->path());
     if (!is_mesh) models.insert(at->path().parent_path() / stem_of_file(at->path()));
   }

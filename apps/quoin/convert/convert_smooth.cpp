@@ -61,13 +61,13 @@ void warn_of_looks(const Scene& scene, const ConvertOptions& options, std::vecto
   const bool has_alpha = extension != ".obj" && extension != ".ply";
   if (is_transparent && !has_alpha) warnings.push_back("transparent voxels look opaque in " + extension);
   const auto format = format_for_writing(options.output);
-  const bool is_gltf = format && (format->format == FileFormat::Glb || format->format == FileFormat::Gltf);
-  if (is_lost && (!is_gltf || options.light)) warnings.emplace_back("glowing voxels become surfaces that do not glow");
+  const bool keeps_emission = format && format->can(FormatCapability::Lamps) && !options.light;
+  if (is_lost && !keeps_emission) warnings.emplace_back("glowing voxels become surfaces that do not glow");
 }
 
 /// Scales a volume to metres for glTF. The other formats have no unit.
 void scale_to(const FormatInfo& format, const std::string& unit, SceneMeshes& meshes) {
-  if (format.format != FileFormat::Glb && format.format != FileFormat::Gltf) return;
+  if (!format.can(FormatCapability::Metres)) return;
   const double metres = metres_of_unit(unit).value_or(1.0);
   for (MeshPlacement& placement : meshes.placements) {
     placement.world_from_part = glm::scale(glm::dmat4(1.0), DVec3(metres)) * placement.matrix();

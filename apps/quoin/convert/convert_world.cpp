@@ -60,7 +60,7 @@ Result<Outcome> copy_world_file(const ConvertOptions& options) {
 bool meshes_by_chunks(const ConvertOptions& options) {
   const bool is_blocky = options.mesher.empty() || options.mesher == "greedy" || options.mesher == "culled";
   const auto format = format_for_writing(options.output);
-  const bool is_print = format && is_for_printing(format->format);
+  const bool is_print = format && format->can(FormatCapability::Printing);
   return is_blocky && !is_print && options.texture == "palette" && !options.light && !options.animate &&
          !options.has_field_occlusion && !options.simplify && !options.smoothness && !options.colours &&
          !options.separate_models;

@@ -490,7 +490,7 @@ void add_render_command(CLI::App& app, int& status) {
   CLI::App* command = app.add_subcommand("render", "Render an image with sun, shadows and ambient occlusion");
   const auto arguments = std::make_shared<RenderArguments>();
   add_render_options(*command, *arguments);
-  command->footer("Reads " + readable_extensions() +
+  command->footer("Reads " + extensions_with(FormatCapability::Read) +
                   ".\nPositions are in world units, +Y up, as printed by quoin info.\n"
                   "Example: quoin render castle.vox -o castle.png --view iso --samples 16\n"
                   "Example: quoin render castle.vox -o gate.png --camera 30,60,160 --look-at 0,30,0 --fov 40\n"

@@ -42,9 +42,8 @@ bool is_readable_name(const std::string& name) {
   std::filesystem::path file = lower(name);
   const bool is_packed = file.extension() == ".gz";
   if (is_packed) file = file.stem();
-  return std::any_of(file_formats().begin(), file_formats().end(), [&](const FormatInfo& format) {
-    return format.readable && (format.is_volume || !is_packed) && format.extension == file.extension();
-  });
+  const auto format = format_with_extension(file, FormatCapability::Read);
+  return format && (format->can(FormatCapability::Volume) || !is_packed);
 }
 
 std::string size_text(std::uintmax_t bytes) {

@@ -124,9 +124,6 @@ class SourceTypes {
   std::vector<VoxelType> numbers_{0};  // indexed by source type; kAir: not assigned yet
 };
 
-/// Returns true if open_chunk_source reads files of this format (from detect_format).
-[[nodiscard]] bool is_read_by_chunks(std::optional<FileFormat> format);
-
 /// Opens a Minecraft (Java) world folder, its level.dat or one of its region files; or a Luanti world folder or its
 /// map.sqlite. `dimension`: see LoadOptions::dimension.
 ///

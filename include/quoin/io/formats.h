@@ -1,74 +1,24 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include <quoin/core/parallel.h>
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
+#include <quoin/io/file_format.h>
 #include <quoin/io/loaded_scene.h>
 #include <quoin/scene/scene.h>
 
 namespace quoin {
 
-enum class FileFormat : std::uint8_t {
-  Vox,
-  Scene,
-  World,
-  Minecraft,
-  Schematic,
-  Qubicle,
-  Goxel,
-  Voxlap,
-  Binvox,
-  CubeWorld,
-  LuantiSchematic,
-  LuantiMap,
-  Heights,
-  Vdb,
-  Nifti,
-  Nrrd,
-  Glb,
-  Gltf,
-  Obj,
-  Ply,
-  Stl,
-  ThreeMf,
-  Off
-};
-
-/// Properties of a file format.
-struct FormatInfo {
-  FileFormat format;
-  std::string_view name;         ///< short name, as in `quoin info`: "vox"
-  std::string_view extension;    ///< ".vox"
-  std::string_view description;  ///< for display
-  bool readable;
-  bool writable;
-  bool is_mesh;             ///< written from meshes, not voxels
-  bool is_volume;           ///< scalar values: read_volume returns them, load_scene makes a field
-  std::string_view also{};  ///< further extensions of the same or a related format: ".kv6 .kvx"
-};
-
-/// Returns all formats, readable ones first. Lifetime: static.
-[[nodiscard]] std::span<const FormatInfo> file_formats();
-
-/// Returns the extensions of all readable (or writable) formats, for messages: ".glb, .gltf, .obj, .ply, .vox".
-[[nodiscard]] std::string readable_extensions();
-[[nodiscard]] std::string writable_extensions();
-
 /// Returns a file name without folder and extension; also removes the extension inside gzip. NAME.vox and NAME.nii.gz
 /// both give NAME.
 [[nodiscard]] std::string stem_of_file(const std::filesystem::path& path);
-
-/// Returns the properties of a format. Lifetime: static.
-[[nodiscard]] const FormatInfo& format_info(FileFormat format);
 
 /// Detects a readable format from the first bytes of a file, also inside gzip. Returns nullopt if no format matches.
 /// Binary STL, .cub, .kvx, .vxl and SLAB6's .vox are recognised by their total length: pass all bytes.

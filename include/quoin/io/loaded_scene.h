@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <quoin/core/vec.h>
+#include <quoin/io/file_format.h>
 #include <quoin/io/heights.h>
 #include <quoin/io/sidecar_file.h>
 #include <quoin/io/volume.h>
@@ -43,9 +44,6 @@ struct LoadedScene {
   std::string dimension{};                            ///< Minecraft: the dimension that was read
   std::vector<std::string> dimensions{};              ///< Minecraft: all dimensions; LoadOptions::dimension selects one
 };
-
-/// The axis that points up in a file. glTF always uses +Y; other formats depend on the program.
-enum class UpAxis : std::uint8_t { Y, Z };
 
 /// Options for converting triangles to voxels.
 struct MeshLoadOptions {

@@ -169,4 +169,13 @@ void write_gltf_array(const MaterialPalette& palette, const GltfMesh& mesh, cons
 /// Returns the size of a GLB with chunks of these sizes. Errors: LimitExceeded if it does not fit the header's 32 bits.
 [[nodiscard]] Result<std::uint64_t> glb_file_bytes(std::uint64_t json_bytes, std::uint64_t buffer_bytes);
 
+/// Returns the files of valid meshes, which must outlive them. Errors: LimitExceeded beyond 4 GiB of GLB.
+[[nodiscard]] Result<std::vector<MeshFile>> plan_glb(const SceneMeshes& meshes, const std::filesystem::path& path,
+                                                     const MeshFileOptions& options);
+[[nodiscard]] Result<std::vector<MeshFile>> plan_gltf(const SceneMeshes& meshes, const std::filesystem::path& path,
+                                                      const MeshFileOptions& options);
+/// Returns the files that plan_gltf writes next to `path`.
+[[nodiscard]] std::vector<std::filesystem::path> gltf_companions(const SceneMeshes& meshes,
+                                                                 const std::filesystem::path& path);
+
 }  // namespace quoin

@@ -10,6 +10,7 @@
 #include <quoin/io/heights.h>
 #include <quoin/terrain/terrain.h>
 
+#include "io/format_driver.h"
 #include "io/heights/heights.h"
 
 namespace quoin {
@@ -326,5 +327,28 @@ Result<Scene> scene_from_heights(const HeightMap& map, const HeightOptions& opti
   scene.add_instance(std::move(instance));
   return scene;
 }
+
+extern constinit const FormatDriver kHeightsFormat = {
+    .info = {FileFormat::Heights, ".hgt", "SRTM heights; height-map images (.png) with --heights",
+             FormatCapability::Read},
+    .detect_path =
+        [](const std::filesystem::path& path) {
+          std::error_code unknown_size;
+          return lower_case_extension(path) == ".hgt" &&
+                 heights::is_hgt_size(std::filesystem::file_size(path, unknown_size));
+        },
+    .read = [](const FormatInput& input) -> Result<LoadedScene> {
+      const HeightOptions wanted = input.options.heights.value_or(HeightOptions{});
+      auto map = read_height_map(input.bytes, wanted);
+      if (!map) return map.error();
+      auto scene = scene_from_heights(*map, wanted, input.threads, input.progress);
+      if (!scene) return scene.error();
+      LoadedScene loaded;
+      loaded.scene = std::move(*scene);
+      loaded.format = "heights";
+      loaded.warnings = std::move(map->warnings);
+      return loaded;
+    },
+};
 
 }  // namespace quoin

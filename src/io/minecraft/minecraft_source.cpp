@@ -12,6 +12,7 @@
 
 #include <quoin/io/file.h>
 
+#include "io/format_driver.h"
 #include "io/minecraft/block_types.h"
 #include "io/minecraft/column_builder.h"
 #include "io/minecraft/level_file.h"
@@ -342,3 +343,33 @@ Result<std::unique_ptr<ChunkSource>> open_minecraft(std::span<const std::byte> r
 }
 
 }  // namespace quoin::minecraft
+
+namespace quoin {
+
+extern constinit const FormatDriver kMinecraftFormat = {
+    .info = {FileFormat::Minecraft, ".mca", "Minecraft world (Java): its folder or one region file",
+             FormatCapability::Read | FormatCapability::Chunks},
+    .detect_path =
+        [](const std::filesystem::path& path) {
+          std::error_code error;
+          return std::filesystem::is_directory(path, error)
+                     ? minecraft::is_minecraft_folder(path)
+                     : path.filename() == "level.dat" && std::filesystem::is_regular_file(path, error);
+        },
+    .detect = minecraft::is_region_file,
+    // The reader reports the missing regions of a world that has none.
+    .detect_name =
+        [](const std::filesystem::path& path, std::span<const std::byte>) {
+          std::error_code error;
+          return std::filesystem::is_directory(path, error)
+                     ? std::filesystem::is_regular_file(path / "level.dat", error)
+                     : minecraft::parse_region_name(path).has_value();
+        },
+    .reads_path = true,
+    .open_chunks = [](const std::filesystem::path& path, std::span<const std::byte> bytes,
+                      std::string_view dimension) -> Result<std::unique_ptr<ChunkSource>> {
+      return path.empty() ? minecraft::open_minecraft(bytes) : minecraft::open_minecraft(path, dimension);
+    },
+};
+
+}  // namespace quoin

@@ -733,3 +733,19 @@ Result<LoadedScene> read_schematic(std::span<const std::byte> bytes, const Progr
 }
 
 }  // namespace quoin::minecraft
+
+namespace quoin {
+
+extern constinit const FormatDriver kSchematicFormat = {
+    .info = {FileFormat::Schematic, ".schem", "Minecraft schematic, also .schematic, .litematic and structures (.nbt)",
+             FormatCapability::Read | FormatCapability::Write, ".schematic .litematic .nbt"},
+    .detect = minecraft::begins_nbt,
+    .read = [](const FormatInput& input) -> Result<LoadedScene> {
+      return minecraft::read_schematic(input.bytes, input.progress);
+    },
+    .encode = [](const FormatOutput& output) -> Result<EncodedFile> {
+      return minecraft::write_schematic(output.scene, output.progress);
+    },
+};
+
+}  // namespace quoin

@@ -7,7 +7,7 @@
 #include <quoin/core/result.h>
 #include <quoin/io/loaded_scene.h>
 
-#include "io/placed/placed_grids.h"
+#include "io/format_driver.h"
 
 // Pieces of Minecraft worlds, as players and programs share them:
 //   .schem      https://github.com/SpongePowered/Schematic-Specification, versions 1 to 3
@@ -36,6 +36,6 @@ namespace quoin::minecraft {
 /// types, lights for emissive types.
 ///
 /// Errors, warnings: as in placed/placed_grids.h; LimitExceeded beyond 65,535 blocks per side or 2^30 in total.
-[[nodiscard]] Result<models::ModelBytes> write_schematic(const Scene& scene, const Progress& progress = {});
+[[nodiscard]] Result<EncodedFile> write_schematic(const Scene& scene, const Progress& progress = {});
 
 }  // namespace quoin::minecraft

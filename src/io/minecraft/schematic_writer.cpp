@@ -17,6 +17,7 @@
 #include "io/minecraft/block_states.h"
 #include "io/minecraft/nbt_writer.h"
 #include "io/minecraft/schematic.h"
+#include "io/placed/placed_grids.h"
 
 namespace quoin::minecraft {
 
@@ -182,7 +183,7 @@ Result<std::vector<std::byte>> blocks_of(const models::MergedGrid& merged, Palet
 
 }  // namespace
 
-Result<models::ModelBytes> write_schematic(const Scene& scene, const Progress& progress) {
+Result<EncodedFile> write_schematic(const Scene& scene, const Progress& progress) {
   auto merged = models::merge_grids(scene, kHolds);
   if (!merged) return merged.error();
   if (merged->box.empty())
@@ -226,7 +227,7 @@ Result<models::ModelBytes> write_schematic(const Scene& scene, const Progress& p
   constexpr std::size_t kMost = std::size_t{1} << 30;
   if (out.document().size() > kMost) return make_error(ErrorCode::LimitExceeded, "more than 1 GiB of blocks");
   constexpr int kLevel = 6;
-  return models::ModelBytes{gzipped(out.document(), kLevel), std::move(merged->warnings)};
+  return EncodedFile{gzipped(out.document(), kLevel), std::move(merged->warnings)};
 }
 
 }  // namespace quoin::minecraft

@@ -4,15 +4,14 @@
 #include <cstdlib>
 #include <span>
 
-#include "io/models/models.h"
+#include "io/format_driver.h"
 
 namespace {
 
-using Read = quoin::Result<quoin::LoadedScene> (*)(std::span<const std::byte>);
-
 /// Any bytes must give a scene whose voxels are of registered types, or an error.
-void check(Read read, std::span<const std::byte> bytes) {
-  const auto loaded = read(bytes);
+void check(quoin::FileFormat format, std::span<const std::byte> bytes) {
+  const quoin::FormatInput input{{}, bytes, {}, {1}, {}};
+  const auto loaded = quoin::driver_of(format).read(input);
   if (!loaded) return;
   for (const quoin::GridHandle handle : loaded->scene.grids().handles()) {
     loaded->scene.grids()[handle].grid.for_each_row([&](quoin::IVec3, std::span<const quoin::VoxelType> types) {
@@ -29,10 +28,10 @@ void check(Read read, std::span<const std::byte> bytes) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::span bytes(reinterpret_cast<const std::byte*>(data), size);
-  for (const Read read : {quoin::models::read_binvox, quoin::models::read_cub, quoin::models::read_kv6,
-                          quoin::models::read_kvx, quoin::models::read_slab6, quoin::models::read_vxl,
-                          quoin::models::read_qubicle, quoin::models::read_goxel, quoin::models::read_mts}) {
-    check(read, bytes);
+  using quoin::FileFormat;
+  for (const FileFormat format : {FileFormat::Binvox, FileFormat::CubeWorld, FileFormat::Voxlap, FileFormat::Qubicle,
+                                  FileFormat::Goxel, FileFormat::LuantiSchematic}) {
+    check(format, bytes);
   }
   return 0;
 }

@@ -1,5 +1,3 @@
-#include "io/models/models.h"
-
 #include <array>
 #include <filesystem>
 #include <string>
@@ -12,11 +10,16 @@
 #include <quoin/io/formats.h>
 
 #include "io/byte_stream.h"
+#include "io/format_driver.h"
 #include "io/image/png.h"
 #include "io/models/model_builder.h"
 
 namespace quoin::models {
 namespace {
+
+Result<LoadedScene> read_as(FileFormat format, std::span<const std::byte> bytes) {
+  return driver_of(format).read({{}, bytes, {}, {}, {}});
+}
 
 namespace fs = std::filesystem;
 
@@ -261,13 +264,13 @@ TEST(Models, SurvivesTruncationAndFlippedBits) {
 TEST(Models, HeadersThatClaimTooMuchAreRefused) {
   Writer many;
   many.u32s({0x101, 0, 1, 1, 0, 1}).number(0, 1).u32s({16'384, 16'384, 16'384, 0, 0, 0, 2, 0xFFFFFFFF, kRed, 6});
-  EXPECT_EQ(read_qubicle(many.bytes).error().code, ErrorCode::BadFormat);
+  EXPECT_EQ(read_as(FileFormat::Qubicle, many.bytes).error().code, ErrorCode::BadFormat);
   Writer wide;
   wide.text("#binvox 1\ndim 16384 16384 16384\ndata\n");
-  EXPECT_EQ(read_binvox(wide.bytes).error().code, ErrorCode::LimitExceeded);
+  EXPECT_EQ(read_as(FileFormat::Binvox, wide.bytes).error().code, ErrorCode::LimitExceeded);
   Writer nodes;
   nodes.text("MTSM").big(4, 2).big(65'535, 2).big(1, 2).big(65'535, 2).number(1, 1).big(0, 2).number(0x78, 1);
-  EXPECT_EQ(read_mts(nodes.bytes).error().code, ErrorCode::LimitExceeded);
+  EXPECT_EQ(read_as(FileFormat::LuantiSchematic, nodes.bytes).error().code, ErrorCode::LimitExceeded);
 }
 
 TEST(Models, AModelOfWidth10IsNoNbt) {
@@ -283,7 +286,7 @@ TEST(Models, AModelOfWidth10IsNoNbt) {
 TEST(Models, ReportsInvalidSizes) {
   Writer tiny;
   tiny.text("#binvox 1\ndim 1 1 1\ntranslate 0 0 0\nscale 1e-323\ndata\n").number(1, 1).number(1, 1);
-  const auto loaded = read_binvox(tiny.bytes);
+  const auto loaded = read_as(FileFormat::Binvox, tiny.bytes);
   ASSERT_TRUE(loaded) << to_string(loaded.error());
   ASSERT_EQ(loaded->warnings.size(), 1U);
 }
@@ -296,7 +299,7 @@ TEST(Models, NodesThatMayBePlacedAre) {
     writer.text("MTSM").big(static_cast<std::uint64_t>(version), 2).big(2, 2).big(1, 2).big(1, 2);
     if (version >= 3) writer.number(0x7F, 1);
     writer.big(1, 2).big(13, 2).text("default:stone").append(zlib_stored(nodes.bytes));
-    const auto loaded = read_mts(writer.bytes);
+    const auto loaded = read_as(FileFormat::LuantiSchematic, writer.bytes);
     ASSERT_TRUE(loaded) << to_string(loaded.error());
     // Half of 255 before version 4, and the lowest value after it; the highest bit has another meaning there.
     EXPECT_EQ(only_grid(*loaded).grid.get({0, 0, 0}) != kAir, version < 4) << version;
@@ -333,8 +336,8 @@ TEST(Models, AMapOfSpansIsSolidBelowItsSurface) {
     }
     map.number(0, 1).number(60, 1).number(60, 1).number(0, 1).number(0x80FF0000, 4);
   }
-  EXPECT_TRUE(is_vxl(map.bytes));
-  const auto loaded = read_vxl(map.bytes);
+  EXPECT_TRUE(driver_of(FileFormat::Voxlap).detect_whole(map.bytes));
+  const auto loaded = read_as(FileFormat::Voxlap, map.bytes);
   ASSERT_TRUE(loaded) << to_string(loaded.error());
   const Grid& grid = only_grid(*loaded).grid;
   EXPECT_EQ(grid.get({0, 63 - 59, 0}), kAir);
@@ -343,7 +346,7 @@ TEST(Models, AMapOfSpansIsSolidBelowItsSurface) {
   for (const int z : {10, 11, 12, 13, 62, 63}) EXPECT_NE(grid.get({5, 63 - z, 0}), kAir) << z;
   for (const int z : {9, 14, 61}) EXPECT_EQ(grid.get({5, 63 - z, 0}), kAir) << z;
   map.bytes.pop_back();
-  EXPECT_FALSE(is_vxl(map.bytes));
+  EXPECT_FALSE(driver_of(FileFormat::Voxlap).detect_whole(map.bytes));
 }
 
 TEST(Models, RealOnesHaveTheirCounts) {

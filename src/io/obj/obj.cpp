@@ -1,21 +1,439 @@
+// Wavefront OBJ and MTL, by tinyobjloader.
+
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <istream>
+#include <map>
 #include <memory>
 #include <set>
+#include <streambuf>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include <quoin/core/thousands.h>
 #include <quoin/mesh/occlusion.h>
 #include <quoin/version.h>
 
+#include "core/srgb.h"
+#include "io/byte_reader.h"
+#include "io/format_driver.h"
 #include "io/material_palette.h"
 #include "io/mesh_parts.h"
+#include "io/triangles/polygon.h"
+#include "io/triangles/triangles.h"
+#include "io/triangles/words.h"
+
+#ifdef QUOIN_HAVE_TINYOBJLOADER
+#define TINYOBJLOADER_USE_DOUBLE
+#include <tiny_obj_loader.h>
+#endif
+
+namespace quoin::triangles {
+
+namespace {
+
+// The UTF-8 byte order mark, which Windows programs write before a text.
+constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+
+bool is_other_keyword(std::string_view word) {
+  constexpr std::string_view kKnown[] = {"vp", "vw",    "l",   "p",      "o",      "g",        "s",       "t",
+                                         "mg", "bevel", "lod", "usemap", "maplib", "c_interp", "d_interp"};
+  return std::find(std::begin(kKnown), std::end(kKnown), word) != std::end(kKnown);
+}
+
+bool is_obj(std::span<const std::byte> beginning) {
+  constexpr std::size_t kBeginning = 1 << 16;
+  std::string_view text = text_of(beginning);
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
+  std::size_t known = 0;
+  std::size_t unknown = 0;
+  std::size_t geometry = 0;
+  for (std::size_t at = 0; at < text.size() && at < kBeginning;) {
+    const std::size_t end = std::min(text.find_first_of("\r\n", at), text.size());
+    // The last line of a truncated text may be incomplete.
+    if (end == text.size() && text.size() >= kBeginning) break;
+    Words words(text.substr(at, end - at));
+    at = end + 1;
+    const auto key = words.next();
+    if (!key || key->starts_with('#')) continue;
+    const auto first = words.next();
+    const bool is_number =
+        first && !first->empty() && std::string_view("+-.0123456789nN").find((*first)[0]) != std::string_view::npos;
+    const bool is_geometry = is_number && (*key == "v" || *key == "f" || *key == "vt" || *key == "vn");
+    const bool is_material = first && (*key == "mtllib" || *key == "usemtl");
+    geometry += is_geometry || is_material ? 1 : 0;
+    ++(is_geometry || is_material || is_other_keyword(*key) ? known : unknown);
+  }
+  // Programs add keywords of their own.
+  return geometry > 0 && unknown * 4 <= known;
+}
+
+#ifdef QUOIN_HAVE_TINYOBJLOADER
+
+constexpr FormatCapability kReading = FormatCapability::Read;
+
+/// Reads bytes as a stream.
+class Bytes : public std::streambuf {
+ public:
+  explicit Bytes(std::span<const std::byte> bytes) {
+    // The stream is only read, but its API takes no const pointers.
+    char* const first = const_cast<char*>(reinterpret_cast<const char*>(bytes.data()));  // NOLINT
+    setg(first, first, first + bytes.size());
+  }
+
+ protected:
+  // The progress of tinyobjloader.
+  pos_type seekoff(off_type offset, std::ios_base::seekdir from, std::ios_base::openmode) override {
+    const off_type base = from == std::ios_base::beg   ? 0
+                          : from == std::ios_base::cur ? gptr() - eback()
+                                                       : egptr() - eback();
+    const off_type to = base + offset;
+    if (to < 0 || to > egptr() - eback()) return pos_type(off_type(-1));
+    setg(eback(), eback() + to, egptr());
+    return pos_type(to);
+  }
+};
+
+class MaterialFiles : public tinyobj::MaterialReader {
+ public:
+  MaterialFiles(SidecarReader& sidecars, LoadedMesh& loaded) : sidecars_(sidecars), loaded_(loaded) {}
+
+  bool operator()(const std::string& name, std::vector<tinyobj::material_t>* materials,
+                  std::map<std::string, int>* numbers, std::string* warnings, std::string* errors) override {
+    const auto bytes = sidecars_.read_or_same_name(name);
+    if (!bytes) {
+      loaded_.warnings.push_back("left out: the materials " + name + ": " + bytes.error().message);
+      return false;
+    }
+    Bytes buffer(*bytes);
+    std::istream stream(&buffer);
+    tinyobj::LoadMtl(numbers, materials, &stream, warnings, errors);
+    return true;
+  }
+
+ private:
+  SidecarReader& sidecars_;
+  LoadedMesh& loaded_;
+};
+
+/// The text as tinyobjloader reads it, of the same length: without a byte order mark, with lines that a backslash
+/// continues as one, and with indices that end in slashes ("1//") without these.
+std::string prepared(std::string_view text) {
+  std::string out(text);
+  if (text.starts_with(kByteOrderMark)) out.replace(0, kByteOrderMark.size(), kByteOrderMark.size(), ' ');
+  for (std::size_t at = out.find('\\'); at != std::string::npos; at = out.find('\\', at + 1)) {
+    const bool is_long = out.compare(at + 1, 2, "\r\n") == 0;
+    const bool continues = is_long || out.compare(at + 1, 1, "\n") == 0 || out.compare(at + 1, 1, "\r") == 0;
+    if (continues) out.replace(at, is_long ? 3 : 2, is_long ? 3 : 2, ' ');
+  }
+  for (std::size_t at = out.find('/'); at != std::string::npos; at = out.find('/', at + 1)) {
+    const std::size_t end = out.find_first_not_of('/', at);
+    const bool is_last =
+        end == std::string::npos || std::string_view(" \t\r\n").find(out[end]) != std::string_view::npos;
+    const bool follows_number = at > 0 && std::isdigit(static_cast<unsigned char>(out[at - 1])) != 0;
+    if (is_last && follows_number)
+      std::fill(out.begin() + static_cast<std::ptrdiff_t>(at),
+                end == std::string::npos ? out.end() : out.begin() + static_cast<std::ptrdiff_t>(end), ' ');
+  }
+  return out;
+}
+
+/// Returns the corners of a face line as words; empty for other lines.
+std::vector<std::string_view> face_words(std::string_view line) {
+  Words words(line);
+  std::vector<std::string_view> corners;
+  if (words.next() != "f") return corners;
+  while (const auto word = words.next()) corners.push_back(*word);
+  return corners;
+}
+
+/// Returns the vertex number of a corner, from 0; far out of range if it is invalid.
+std::size_t vertex_of(std::string_view corner, std::size_t vertices) {
+  const auto number = number_in(corner.substr(0, corner.find('/')));
+  if (!number || *number == 0.0 || std::abs(*number) > 1e15) return std::string_view::npos;
+  const auto index = static_cast<std::int64_t>(*number);
+  return static_cast<std::size_t>(index > 0 ? index - 1 : static_cast<std::int64_t>(vertices) + index);
+}
+
+/// Cuts faces with more corners than tinyobjloader supports (255) into triangles, in the text.
+std::string without_large_faces(const std::string& text) {
+  constexpr std::size_t kMost = 255;
+  std::string out;
+  std::vector<DVec3> positions;
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find_first_of("\r\n", at), text.size());
+    const std::string_view line = std::string_view(text).substr(at, end - at);
+    at = end + 1;
+    Words words(line);
+    const auto key = words.next();
+    if (key == "v") {
+      const double x = words.next_number().value_or(0.0);
+      const double y = words.next_number().value_or(0.0);
+      positions.emplace_back(x, y, words.next_number().value_or(0.0));
+    }
+    const auto corners = key == "f" && line.size() > 2 * kMost ? face_words(line) : std::vector<std::string_view>();
+    if (corners.size() <= kMost) {
+      out.append(line).append(1, '\n');
+      continue;
+    }
+    std::vector<DVec3> polygon;
+    for (const std::string_view corner : corners) {
+      const std::size_t vertex = vertex_of(corner, positions.size());
+      polygon.push_back(vertex < positions.size() && is_finite(positions[vertex]) ? positions[vertex] : DVec3(0.0));
+    }
+    triangles.clear();
+    (void)cut_polygon(polygon, triangles);
+    for (const auto& [a, b, c] : triangles) {
+      out.append("f ")
+          .append(corners[a])
+          .append(1, ' ')
+          .append(corners[b])
+          .append(1, ' ')
+          .append(corners[c])
+          .append(1, '\n');
+    }
+  }
+  return out;
+}
+
+bool has_large_face(std::string_view text) {
+  constexpr std::size_t kLeastBytes = 2 * 256;
+  for (std::size_t at = text.find("\nf"); at != std::string_view::npos; at = text.find("\nf", at + 1)) {
+    const std::size_t end = std::min(text.find_first_of("\r\n", at + 1), text.size());
+    if (end - at > kLeastBytes && face_words(text.substr(at + 1, end - at - 1)).size() > 255) return true;
+  }
+  return false;
+}
+
+/// Counts invalid coordinates, which tinyobjloader reads as 0.
+std::size_t count_bad_numbers(std::string_view text) {
+  std::size_t bad = 0;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find('\n', at), text.size());
+    Words words(text.substr(at, end - at));
+    at = end + 1;
+    if (words.next() != "v") continue;
+    for (int i = 0; i < 3; ++i) {
+      const auto number = words.next_number();
+      bad += number && std::isfinite(*number) ? 0 : 1;
+    }
+  }
+  return bad;
+}
+
+float channel_of(double srgb) {
+  return linear_from_srgb(static_cast<float>(std::clamp(srgb, 0.0, 1.0)));
+}
+
+class ObjReader {
+ public:
+  explicit ObjReader(SidecarReader& sidecars) : sidecars_(sidecars) {}
+
+  Result<LoadedMesh> read(std::span<const std::byte> file) {
+    std::string text = prepared(text_of(file));
+    if (has_large_face(text)) text = without_large_faces(text);
+    const std::span<const std::byte> bytes = std::as_bytes(std::span(text));
+    if (const std::size_t bad = count_bad_numbers(text); bad > 0) {
+      loaded_.warnings.push_back(with_thousands(static_cast<std::int64_t>(bad)) +
+                                 " coordinates are not finite numbers and are read as 0");
+    }
+    Bytes buffer(bytes);
+    std::istream stream(&buffer);
+    MaterialFiles files(sidecars_, loaded_);
+    std::string warnings;
+    std::string errors;
+    if (!tinyobj::LoadObj(&attributes_, &shapes_, &materials_, &warnings, &errors, &stream, &files, false, false)) {
+      return make_error(ErrorCode::BadFormat, first_line(errors.empty() ? "the file cannot be parsed" : errors));
+    }
+    warn_of(warnings);
+    drop_baked_occlusion(text_of(bytes));
+    take_positions();
+    take_materials();
+    for (const tinyobj::shape_t& shape : shapes_) {
+      if (Status done = take(shape.mesh); !done) return done.error();
+      has_others_ |= !shape.lines.indices.empty() || !shape.points.indices.empty();
+    }
+    if (has_others_) loaded_.warnings.emplace_back("left out: points and lines");
+    show_what_is_all_invisible();
+    if (has_glows_) loaded_.mesh.emissive_uvs = loaded_.mesh.uvs;
+    if (!has_textures_) loaded_.mesh.uvs.clear();
+    builder_.finish();
+    return std::move(loaded_);
+  }
+
+ private:
+  static std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
+
+  void warn_of(const std::string& text) {
+    constexpr std::size_t kMost = 10;
+    std::size_t count = 0;
+    for (std::size_t at = 0; at < text.size();) {
+      const std::size_t end = std::min(text.find('\n', at), text.size());
+      std::string line = text.substr(at, end - at);
+      at = end + 1;
+      // The code that looked for the file has already reported why it is missing.
+      if (line.empty() || line.find("Failed to load material file") != std::string::npos) continue;
+      if (++count <= kMost) loaded_.warnings.push_back(std::move(line));
+    }
+    if (count > kMost) loaded_.warnings.push_back("and " + std::to_string(count - kMost) + " more warnings like these");
+  }
+  /// Drops the vertex colours that Quoin writes for blocks: ambient occlusion, not a surface colour. Keeps colours of
+  /// its smooth meshes, which have no materials.
+  void drop_baked_occlusion(std::string_view text) {
+    const auto& c = attributes_.colors;
+    if (!text.starts_with("# Quoin ") || materials_.empty()) return;
+    for (std::size_t i = 0; i + 2 < c.size(); i += 3) {
+      if (!is_occlusion_grey(c[i]) || c[i + 1] != c[i] || c[i + 2] != c[i]) return;
+    }
+    attributes_.colors.clear();
+  }
+  void take_positions() {
+    const auto& v = attributes_.vertices;
+    TriangleMesh& mesh = loaded_.mesh;
+    for (std::size_t i = 0; i + 2 < v.size(); i += 3) mesh.positions.emplace_back(v[i], v[i + 1], v[i + 2]);
+    const auto& c = attributes_.colors;
+    if (c.size() != v.size()) return;
+    for (std::size_t i = 0; i + 2 < c.size(); i += 3) {
+      mesh.colours.emplace_back(channel_of(c[i]), channel_of(c[i + 1]), channel_of(c[i + 2]), 1.0F);
+    }
+  }
+  void take_materials() {
+    for (const tinyobj::material_t& from : materials_) {
+      MeshMaterial material;
+      material.name = from.name;
+      material.colour = {channel_of(from.diffuse[0]), channel_of(from.diffuse[1]), channel_of(from.diffuse[2]),
+                         static_cast<float>(std::clamp(from.dissolve, 0.0, 1.0))};
+      if (material.colour.a < 1.0F) material.alpha_mode = AlphaMode::Blend;
+      if (from.roughness > 0.0) material.roughness = static_cast<float>(std::min(from.roughness, 1.0));
+      material.metalness = static_cast<float>(std::clamp(from.metallic, 0.0, 1.0));
+      material.emission = static_cast<float>(std::max({from.emission[0], from.emission[1], from.emission[2], 0.0}));
+      if (!from.diffuse_texname.empty()) take_texture(from, material);
+      if (!from.emissive_texname.empty() && material.emission > 0.0F) take_emission(from, material);
+      loaded_.mesh.materials.push_back(std::move(material));
+    }
+    // The material of faces with a missing or unknown material name.
+    no_material_ = loaded_.mesh.materials.size();
+    MeshMaterial plain;
+    const float grey = loaded_.mesh.colours.empty() ? channel_of(200.0 / 255.0) : 1.0F;
+    plain.colour = {grey, grey, grey, 1.0F};
+    loaded_.mesh.materials.push_back(std::move(plain));
+  }
+  std::optional<std::size_t> texture_of(const std::string& name) {
+    const auto [known, is_new] = textures_.try_emplace(name);
+    if (is_new) {
+      const auto bytes = sidecars_.read_or_same_name(name);
+      if (!bytes) loaded_.warnings.push_back("left out: the texture " + name + ": " + bytes.error().message);
+      if (bytes) known->second = add_texture(*bytes, name, loaded_);
+    }
+    return known->second;
+  }
+  /// Takes Ke times map_Ke. If the image cannot be read (which left a warning), nothing glows.
+  void take_emission(const tinyobj::material_t& from, MeshMaterial& material) {
+    material.emissive_texture = texture_of(from.emissive_texname);
+    if (!material.emissive_texture) {
+      material.emission = 0.0F;
+      return;
+    }
+    has_glows_ = true;
+    for (int i = 0; i < 3; ++i) {
+      material.emissive_tint[i] = static_cast<float>(std::max(from.emission[i], 0.0)) / material.emission;
+    }
+  }
+  void take_texture(const tinyobj::material_t& from, MeshMaterial& material) {
+    material.texture = texture_of(from.diffuse_texname);
+    if (!material.texture) return;
+    has_textures_ = true;
+    MeshTexture& texture = loaded_.mesh.textures[*material.texture];
+    if (from.diffuse_texopt.clamp) texture.wrap_u = texture.wrap_v = TextureWrap::Clamp;
+    // The image replaces Kd, as in most programs; d stays.
+    material.colour = {1.0F, 1.0F, 1.0F, material.colour.a};
+    const auto& pixels = texture.image.rgba;
+    bool has_holes = false;
+    for (std::size_t i = 3; i < pixels.size(); i += 4) has_holes |= pixels[i] < 128;
+    if (has_holes && material.alpha_mode == AlphaMode::Opaque) material.alpha_mode = AlphaMode::Mask;
+  }
+  Status take(const tinyobj::mesh_t& from) {
+    std::size_t first = 0;
+    for (std::size_t i = 0; i < from.num_face_vertices.size(); ++i) {
+      const std::size_t count = from.num_face_vertices[i];
+      if (count > from.indices.size() - first) return {};
+      const std::span<const tinyobj::index_t> face = std::span(from.indices).subspan(first, count);
+      first += count;
+      polygon_.clear();
+      for (const tinyobj::index_t& corner : face) {
+        polygon_.push_back(static_cast<std::size_t>(static_cast<std::ptrdiff_t>(corner.vertex_index)));
+      }
+      const int material = i < from.material_ids.size() ? from.material_ids[i] : -1;
+      const bool is_there = material >= 0 && static_cast<std::size_t>(material) < no_material_;
+      Status added = builder_.add_polygon(polygon_, [&](const std::array<std::uint32_t, 3>& corners) {
+        for (const std::uint32_t k : corners) {
+          loaded_.mesh.uvs.push_back(place_of(face[k].texcoord_index));
+        }
+        loaded_.mesh.material_of.push_back(static_cast<std::uint32_t>(is_there ? material : no_material_));
+      });
+      if (!added) return added;
+    }
+    return {};
+  }
+  /// Some programs swap opacity and transparency. A fully invisible model is such a mistake.
+  void show_what_is_all_invisible() {
+    TriangleMesh& mesh = loaded_.mesh;
+    const auto is_invisible = [&](std::uint32_t material) { return mesh.materials[material].colour.a == 0.0F; };
+    if (mesh.material_of.empty() || !std::ranges::all_of(mesh.material_of, is_invisible)) return;
+    for (MeshMaterial& material : mesh.materials) {
+      if (material.colour.a != 0.0F) continue;
+      material.colour.a = 1.0F;
+      if (material.alpha_mode == AlphaMode::Blend) material.alpha_mode = AlphaMode::Opaque;
+    }
+    loaded_.warnings.emplace_back("all materials are fully transparent (Tr 1 or d 0) and are read as opaque");
+  }
+  /// The OBJ origin (0, 0) is the image's bottom left corner.
+  [[nodiscard]] glm::vec2 place_of(int index) const {
+    const auto at = 2 * static_cast<std::size_t>(std::max(index, 0));
+    const auto& t = attributes_.texcoords;
+    if (index < 0 || at + 1 >= t.size()) return {0.0F, 1.0F};
+    return {static_cast<float>(t[at]), static_cast<float>(1.0 - t[at + 1])};
+  }
+
+  SidecarReader& sidecars_;
+  LoadedMesh loaded_;
+  MeshBuilder builder_{loaded_};
+  tinyobj::attrib_t attributes_;
+  std::vector<tinyobj::shape_t> shapes_;
+  std::vector<tinyobj::material_t> materials_;
+  std::map<std::string, std::optional<std::size_t>> textures_;
+  std::vector<std::size_t> polygon_;
+  std::size_t no_material_ = 0;
+  bool has_textures_ = false;
+  bool has_glows_ = false;
+  bool has_others_ = false;
+};
+
+Result<LoadedMesh> read_obj(std::span<const std::byte> bytes, SidecarReader& sidecars) {
+  return ObjReader(sidecars).read(bytes);
+}
+
+#else
+
+constexpr FormatCapability kReading{};
+
+Result<LoadedMesh> read_obj(std::span<const std::byte>, SidecarReader&) {
+  return make_error(ErrorCode::Unsupported, "cannot read OBJ: Quoin was built without tinyobjloader");
+}
+
+#endif
+
+}  // namespace
+
+}  // namespace quoin::triangles
 
 namespace quoin {
 
@@ -328,9 +746,8 @@ Status add_image(const std::filesystem::path& path, const PngImage& image, std::
   return {};
 }
 
-}  // namespace
-
-Result<std::vector<MeshFile>> plan_obj(const SceneMeshes& meshes, const std::filesystem::path& path) {
+Result<std::vector<MeshFile>> plan_obj(const SceneMeshes& meshes, const std::filesystem::path& path,
+                                       const MeshFileOptions& /*options*/) {
   const auto palette = std::make_shared<const MaterialPalette>(meshes);
   const ObjNames names = names_beside(path);
   std::vector<MeshFile> files;
@@ -369,5 +786,16 @@ std::vector<std::filesystem::path> obj_companions(const SceneMeshes& meshes, con
   }
   return files;
 }
+
+}  // namespace
+
+extern constinit const FormatDriver kObjFormat = {
+    .info = {FileFormat::Obj, ".obj", "Wavefront OBJ with .mtl and palette images",
+             triangles::kReading | FormatCapability::Write | FormatCapability::Meshes | FormatCapability::Textures},
+    .detect = triangles::is_obj,
+    .read_mesh = triangles::read_obj,
+    .plan_mesh = plan_obj,
+    .mesh_companions = obj_companions,
+};
 
 }  // namespace quoin

@@ -15,12 +15,6 @@
 
 namespace quoin::models {
 
-/// A file made from a scene, and the content that it lacks: one line each.
-struct ModelBytes {
-  std::vector<std::byte> bytes;
-  std::vector<std::string> warnings;
-};
-
 /// The properties of models that a format can store, except their voxels' colours.
 struct FormatHolds {
   std::string_view extension;   ///< for messages: ".qb"

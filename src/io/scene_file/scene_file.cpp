@@ -7,6 +7,7 @@
 #include <quoin/io/formats.h>
 #include <quoin/io/sidecar_file.h>
 
+#include "io/format_driver.h"
 #include "io/text.h"
 #include "io/whole_file.h"
 #include "scene/hierarchy.h"
@@ -328,5 +329,28 @@ Result<LoadedScene> read_scene_file(std::span<const std::byte> text, const LoadO
   }
   return put_together(*file, {}, options, threads, progress);
 }
+
+extern constinit const FormatDriver kSceneFormat = {
+    .info = {FileFormat::Scene, ".json", "Quoin scene file",
+             FormatCapability::Read | FormatCapability::Write | FormatCapability::Fields | FormatCapability::Sun |
+                 FormatCapability::Camera},
+    .detect = is_scene_file,
+    .read = [](const FormatInput& input) -> Result<LoadedScene> {
+      return input.path.empty() ? read_scene_file(input.bytes, input.options, input.threads, input.progress)
+                                : read_scene_file(input.path, input.options, input.threads, input.progress);
+    },
+    .sidecar_files = files_named_in_scene,
+    .write = [](const FormatOutput& output, const std::filesystem::path& path) -> Result<SavedScene> {
+      auto file = scene_file_of(output.scene);
+      if (!file) return file.error();
+      if (output.loaded != nullptr) {
+        file->sun = output.loaded->sun;
+        file->camera = output.loaded->camera;
+      }
+      const auto bytes = write_scene_file(*file, path, output.threads, output.progress);
+      if (!bytes) return bytes.error();
+      return SavedScene{*bytes, {}};
+    },
+};
 
 }  // namespace quoin

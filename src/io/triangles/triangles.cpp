@@ -6,6 +6,7 @@
 #include <quoin/core/thousands.h>
 #include <quoin/io/file.h>
 
+#include "io/format_driver.h"
 #include "io/image/decode.h"
 #include "io/triangles/polygon.h"
 #include "io/whole_file.h"
@@ -21,27 +22,17 @@ void turn_up(TriangleMesh& mesh) {
   for (DVec3& p : mesh.positions) p = {p.x, p.z, -p.y};
 }
 
-using Read = Result<LoadedMesh> (*)(std::span<const std::byte>, SidecarReader&);
-
-Result<LoadedMesh> read_any(std::span<const std::byte> bytes, std::optional<FileFormat> format, SidecarReader& sidecars,
-                            std::optional<UpAxis> up) {
-  Read read = nullptr;
-  if (format == FileFormat::Obj) read = read_obj;
-  if (format == FileFormat::Ply) read = read_ply;
-  if (format == FileFormat::Stl) read = read_stl;
-  if (format == FileFormat::Off) read = read_off;
-  if (format == FileFormat::ThreeMf) read = read_three_mf;
-  if (format == FileFormat::Glb || format == FileFormat::Gltf) read = read_gltf;
-  if (read == nullptr) {
-    return make_error(ErrorCode::Unsupported,
-                      format ? std::string(format_info(*format).name) + " holds no triangles" : "unknown mesh format");
+Result<LoadedMesh> read_as(std::optional<FileFormat> format, std::span<const std::byte> bytes, SidecarReader& sidecars,
+                           std::optional<UpAxis> up) {
+  if (!format) return make_error(ErrorCode::Unsupported, "unknown mesh format");
+  const FormatDriver& driver = driver_of(*format);
+  if (driver.read_mesh == nullptr) {
+    return make_error(ErrorCode::Unsupported, std::string(format->name()) + " holds no triangles");
   }
-  auto loaded = read(bytes, sidecars);
+  auto loaded = driver.read_mesh(bytes, sidecars);
   if (!loaded) return loaded;
-  loaded->format = format_info(*format).name;
-  const bool is_z = format == FileFormat::Stl || format == FileFormat::Ply || format == FileFormat::ThreeMf;
-  const UpAxis own = is_z ? UpAxis::Z : UpAxis::Y;
-  if (up.value_or(own) == UpAxis::Z) turn_up(loaded->mesh);
+  loaded->format = format->name();
+  if (up.value_or(driver.info.up) == UpAxis::Z) turn_up(loaded->mesh);
   loaded->sidecars = std::move(sidecars.files());
   return loaded;
 }
@@ -144,26 +135,6 @@ std::optional<std::size_t> add_texture(std::span<const std::byte> file_bytes, co
   return loaded.mesh.textures.size() - 1;
 }
 
-std::optional<FileFormat> detect(std::span<const std::byte> beginning) {
-  if (is_glb(beginning)) return FileFormat::Glb;
-  if (is_gltf(beginning)) return FileFormat::Gltf;
-  if (is_ply(beginning)) return FileFormat::Ply;
-  if (is_stl_text(beginning)) return FileFormat::Stl;
-  if (is_three_mf(beginning)) return FileFormat::ThreeMf;
-  if (is_off(beginning)) return FileFormat::Off;
-  if (is_obj(beginning)) return FileFormat::Obj;
-  return std::nullopt;
-}
-
-std::optional<FileFormat> detect_by_name(const std::filesystem::path& path, std::span<const std::byte> bytes) {
-  constexpr std::size_t kStlHeader = 84;
-  std::string extension = path.extension().string();
-  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  if (extension == ".stl" && bytes.size() >= kStlHeader) return FileFormat::Stl;
-  const bool is_zip = bytes.size() >= 2 && bytes[0] == std::byte{'P'} && bytes[1] == std::byte{'K'};
-  return extension == ".3mf" && is_zip ? std::optional(FileFormat::ThreeMf) : std::nullopt;
-}
-
 namespace {
 
 Result<VoxelLattice> lattice_of(const TriangleMesh& mesh, const MeshLoadOptions& options) {
@@ -224,15 +195,14 @@ Result<LoadedScene> scene_from_mesh(LoadedMesh loaded, const MeshLoadOptions& op
 
 Result<LoadedMesh> read_mesh(std::span<const std::byte> bytes, std::optional<UpAxis> up) {
   triangles::SidecarReader nothing;
-  return triangles::read_any(bytes, detect_format(bytes), nothing, up);
+  return triangles::read_as(detect_format(bytes), bytes, nothing, up);
 }
 
 Result<LoadedMesh> read_mesh(const std::filesystem::path& path, std::optional<UpAxis> up, SidecarFiles sidecar_files) {
   return read_whole(path, [&](std::span<const std::byte> bytes) {
     triangles::SidecarReader sidecars(path, sidecar_files);
-    auto format = detect_format(bytes);
-    if (!format) format = triangles::detect_by_name(path, bytes);
-    return triangles::read_any(bytes, format, sidecars, up);
+    const auto format = detect_format(bytes);
+    return triangles::read_as(format ? format : detect_by_name(path, bytes), bytes, sidecars, up);
   });
 }
 

@@ -80,38 +80,6 @@ class MeshBuilder {
 [[nodiscard]] std::optional<std::size_t> add_texture(std::span<const std::byte> image, const std::string& name,
                                                      LoadedMesh& loaded);
 
-// Readers return the mesh in the file's own axes.
-
-[[nodiscard]] bool is_stl_text(std::span<const std::byte> beginning);
-[[nodiscard]] bool is_stl(std::span<const std::byte> whole);
-[[nodiscard]] Result<LoadedMesh> read_stl(std::span<const std::byte> bytes, SidecarReader& sidecars);
-
-[[nodiscard]] bool is_ply(std::span<const std::byte> beginning);
-[[nodiscard]] Result<LoadedMesh> read_ply(std::span<const std::byte> bytes, SidecarReader& sidecars);
-
-[[nodiscard]] bool is_obj(std::span<const std::byte> beginning);
-[[nodiscard]] bool has_obj();
-[[nodiscard]] Result<LoadedMesh> read_obj(std::span<const std::byte> bytes, SidecarReader& sidecars);
-
-[[nodiscard]] bool is_glb(std::span<const std::byte> beginning);
-[[nodiscard]] bool is_gltf(std::span<const std::byte> beginning);
-[[nodiscard]] bool has_gltf();
-[[nodiscard]] Result<LoadedMesh> read_gltf(std::span<const std::byte> bytes, SidecarReader& sidecars);
-
-[[nodiscard]] bool is_off(std::span<const std::byte> beginning);
-[[nodiscard]] Result<LoadedMesh> read_off(std::span<const std::byte> bytes, SidecarReader& sidecars);
-
-[[nodiscard]] bool is_three_mf(std::span<const std::byte> beginning);
-[[nodiscard]] bool has_three_mf();
-[[nodiscard]] Result<LoadedMesh> read_three_mf(std::span<const std::byte> bytes, SidecarReader& sidecars);
-
-/// Detects formats that a beginning identifies.
-[[nodiscard]] std::optional<FileFormat> detect(std::span<const std::byte> beginning);
-/// Returns the format of a file that its beginning does not identify: a truncated binary STL or one with trailing
-/// bytes, and a zip file whose names are not at its beginning.
-[[nodiscard]] std::optional<FileFormat> detect_by_name(const std::filesystem::path& path,
-                                                       std::span<const std::byte> bytes);
-
 /// Converts a mesh to a scene with one grid. `name`: the grid's name.
 [[nodiscard]] Result<LoadedScene> scene_from_mesh(LoadedMesh loaded, const MeshLoadOptions& options,
                                                   const std::string& name, Threads threads, const Progress& progress);

@@ -4,16 +4,15 @@
 #include <cstdlib>
 #include <span>
 
+#include "io/format_driver.h"
 #include "io/triangles/triangles.h"
 
 namespace {
 
-using Read = quoin::Result<quoin::LoadedMesh> (*)(std::span<const std::byte>, quoin::triangles::SidecarReader&);
-
 /// Any bytes must give a mesh that can be voxelised, or an error.
-void check(Read read, std::span<const std::byte> bytes) {
+void check(const quoin::FormatDriver& driver, std::span<const std::byte> bytes) {
   quoin::triangles::SidecarReader nothing;
-  auto loaded = read(bytes, nothing);
+  auto loaded = driver.read_mesh(bytes, nothing);
   if (!loaded) return;
   if (!quoin::check_mesh(loaded->mesh)) {
     std::fprintf(stderr, "an unsound mesh was read\n");
@@ -28,12 +27,13 @@ void check(Read read, std::span<const std::byte> bytes) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::span bytes(reinterpret_cast<const std::byte*>(data), size);
-  for (const Read read : {quoin::triangles::read_stl, quoin::triangles::read_ply, quoin::triangles::read_off,
-                          quoin::triangles::read_three_mf}) {
-    check(read, bytes);
+  using quoin::FileFormat;
+  for (const FileFormat format : {FileFormat::Stl, FileFormat::Ply, FileFormat::Off, FileFormat::ThreeMf}) {
+    check(quoin::driver_of(format), bytes);
   }
   // Readers based on libraries receive only input of their own format.
-  if (quoin::triangles::is_obj(bytes)) check(quoin::triangles::read_obj, bytes);
-  if (quoin::triangles::is_gltf(bytes) || quoin::triangles::is_glb(bytes)) check(quoin::triangles::read_gltf, bytes);
+  for (const FileFormat format : {FileFormat::Obj, FileFormat::Gltf, FileFormat::Glb}) {
+    if (quoin::driver_of(format).detect(bytes)) check(quoin::driver_of(format), bytes);
+  }
   return 0;
 }

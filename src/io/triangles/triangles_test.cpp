@@ -15,6 +15,7 @@
 #include <quoin/scene/scene_meshes.h>
 
 #include "io/base64.h"
+#include "io/format_driver.h"
 #include "io/triangles/triangles.h"
 
 namespace quoin {
@@ -53,7 +54,7 @@ void put(std::string& text, T value, bool big = false) {
 }
 
 bool reads(FileFormat format) {
-  return format_info(format).readable;
+  return can(format, FormatCapability::Read);
 }
 
 /// A tetrahedron of volume 1/6 in the syntax of each format.
@@ -293,7 +294,7 @@ TEST(Triangles, RejectsInconsistentFilesWithAPosition) {
   claims += stl_bytes().substr(84);
   // Its length matches no STL file, so only the reader reports the reason.
   triangles::SidecarReader nothing;
-  const auto refused = triangles::read_stl(bytes_of(claims), nothing);
+  const auto refused = driver_of(FileFormat::Stl).read_mesh(bytes_of(claims), nothing);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().byte_offset, 80U);
   EXPECT_EQ(error_of("solid x\n facet\n vertex 1 2 oops\n").code, ErrorCode::BadFormat);

@@ -14,8 +14,10 @@
 #include <quoin/grid/density_chunk.h>
 #include <quoin/scene/volume_scene.h>
 
+#include "io/format_driver.h"
 #include "io/vdb/vdb.h"
 #include "io/vdb/vdb_tree.h"
+#include "io/whole_file.h"
 
 namespace quoin::vdb {
 
@@ -383,3 +385,24 @@ Result<LoadedScene> read_vdb(std::span<const std::byte> bytes, const LoadOptions
 }
 
 }  // namespace quoin::vdb
+
+namespace quoin {
+
+extern constinit const FormatDriver kVdbFormat = {
+    .info = {FileFormat::Vdb, ".vdb", "OpenVDB grids, also NanoVDB (.nvdb)",
+             FormatCapability::Read | FormatCapability::Write | FormatCapability::Fields, ".nvdb"},
+    .detect = [](std::span<const std::byte> beginning) { return vdb::is_vdb(beginning) || vdb::is_nvdb(beginning); },
+    .read = [](const FormatInput& input) -> Result<LoadedScene> {
+      return vdb::read_vdb(input.bytes, input.options, input.threads, input.progress);
+    },
+    .write = [](const FormatOutput& output, const std::filesystem::path& path) -> Result<SavedScene> {
+      const auto written = write_whole(path, vdb::write_vdb(output.scene));
+      if (!written) return written.error();
+      return SavedScene{*written, vdb::vdb_unsupported_features(output.scene)};
+    },
+    .unsupported_features = [](const FormatOutput& output) -> Result<std::vector<std::string>> {
+      return vdb::vdb_unsupported_features(output.scene);
+    },
+};
+
+}  // namespace quoin

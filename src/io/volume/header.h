@@ -16,6 +16,9 @@
 
 namespace quoin {
 
+struct FormatInput;
+struct LoadedScene;
+
 /// Encodings of the values of a volume, apart from a compression of the whole file.
 enum class DataEncoding : std::uint8_t { Raw, Gzip, Bzip2, Ascii, Hex };
 
@@ -63,6 +66,9 @@ enum class VolumeSpace : std::uint8_t { RightFrontHead, LeftFrontHead, LeftBackH
 /// Requires: `stream` is at the first value. `offset` is reported in errors about its length.
 /// Errors:   BadFormat if there are fewer values than `size` requires.
 [[nodiscard]] Status read_values(ByteStream& stream, VolumeHeader& header, std::uint64_t offset);
+
+/// Reads a volume, or raw values if the options ask for them, and makes a field of it.
+[[nodiscard]] Result<LoadedScene> read_volume_scene(const FormatInput& input);
 
 /// Returns the number of bytes of a header's values, with all components.
 [[nodiscard]] std::uint64_t bytes_of_values(const VolumeHeader& header);

@@ -1,3 +1,4 @@
+#include "io/format_driver.h"
 #include "io/volume/header.h"
 
 #include <algorithm>
@@ -19,6 +20,7 @@
 #include <quoin/core/vec.h>
 
 #include "io/text.h"
+#include "io/whole_file.h"
 
 namespace quoin::nrrd {
 
@@ -542,3 +544,20 @@ Result<VolumeHeader> read_header(std::span<const std::byte> bytes, const VolumeO
 }
 
 }  // namespace quoin::nrrd
+
+namespace quoin {
+
+extern constinit const FormatDriver kNrrdFormat = {
+    .info = {FileFormat::Nrrd, ".nrrd", "NRRD volumes, also .nhdr with a data file",
+             FormatCapability::Read | FormatCapability::Volume, ".nhdr"},
+    .detect =
+        [](std::span<const std::byte> beginning) {
+          const auto first = first_bytes(beginning, nifti::kMaxHeaderBytes);
+          return first && nrrd::is_header(*first);
+        },
+    .reads_path = true,
+    .read = read_volume_scene,
+    .sidecar_files = files_of_pair,
+};
+
+}  // namespace quoin

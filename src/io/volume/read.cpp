@@ -4,7 +4,9 @@
 #include <optional>
 
 #include <quoin/io/formats.h>
+#include <quoin/scene/volume_scene.h>
 
+#include "io/format_driver.h"
 #include "io/text.h"
 #include "io/volume/header.h"
 #include "io/whole_file.h"
@@ -223,6 +225,29 @@ Result<Volume> read_raw_volume(const std::filesystem::path& path, const RawVolum
     if (volume) volume->name = name_from(path);
     return volume;
   });
+}
+
+Result<LoadedScene> read_volume_scene(const FormatInput& input) {
+  const Progress reading = part_of(input.progress, 0.0, 0.5);
+  VolumeOptions allowed;
+  allowed.sidecar_files = input.options.sidecar_files;
+  const auto read = [&](const auto& source) {
+    return input.options.raw ? read_raw_volume(source, *input.options.raw, allowed, reading)
+                             : read_volume(source, allowed, reading);
+  };
+  const auto volume = input.path.empty() ? read(input.bytes) : read(input.path);
+  if (!volume) return volume.error();
+  const auto iso = surface_value(*volume, input.options.iso);
+  if (!iso) return iso.error();
+  VolumeSceneOptions wanted;
+  wanted.iso = *iso;
+  auto scene = scene_from_volume(*volume, wanted, input.threads, part_of(input.progress, 0.5, 1.0));
+  if (!scene) return scene.error();
+  LoadedScene loaded;
+  loaded.scene = std::move(*scene);
+  loaded.format = volume->format;
+  loaded.warnings = volume->warnings;
+  return loaded;
 }
 
 }  // namespace quoin

@@ -6,6 +6,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/io/vox.h>
 
+#include "io/byte_reader.h"
 #include "io/text.h"
 #include "io/vox/cameras.h"
 #include "io/vox/chunks.h"

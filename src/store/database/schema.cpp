@@ -1,4 +1,5 @@
 #include "store/database/schema.h"
+#include "store/store_formats.h"
 
 #include <algorithm>
 #include <array>
@@ -7,7 +8,6 @@
 #include <quoin/core/assert.h>
 
 #include "io/text.h"
-#include "io/world_format.h"
 
 #define XXH_INLINE_ALL
 #include <xxhash.h>

@@ -18,11 +18,11 @@
 #include <quoin/core/assert.h>
 #include <quoin/io/file.h>
 
-#include "io/models/luanti_nodes.h"
-#include "io/source/luanti_map.h"
+#include "io/luanti/luanti_nodes.h"
 #include "io/text.h"
 #include "store/database/connection.h"
 #include "store/luanti/map_block.h"
+#include "store/store_formats.h"
 
 namespace quoin {
 

@@ -10,10 +10,9 @@
 #include <quoin/store/world_import.h>
 #include <quoin/store/world_saver.h>
 
-#include "io/source/detect_world.h"
-#include "io/source/luanti_map.h"
 #include "store/luanti/luanti_for_tests.h"
 #include "store/luanti/map_block.h"
+#include "store/store_formats.h"
 #include "store/world/world_for_tests.h"
 
 namespace quoin {
@@ -77,7 +76,6 @@ TEST(LuantiMap, AFolderHasItsName) {
   const WorldFolder folder;
   Map(folder / "map.sqlite").put({0, 0, 0}, row_of(some_block(), 28));
   ASSERT_TRUE(write_file(Bytes(), folder / "world.mt"));
-  EXPECT_TRUE(is_world_folder(folder.path()));
   EXPECT_EQ(detect_format(folder.path()).value(), FileFormat::LuantiMap);
   EXPECT_EQ(open_chunk_source(folder.path()).value()->info().name, folder.path().filename().string());
   const std::string text = "gameid = minetest\n world_name =  Old town \r\nbackend = sqlite3\n";

@@ -4,8 +4,8 @@
 #include <quoin/core/memory.h>
 #include <quoin/store/world_saver.h>
 
-#include "io/world_format.h"
 #include "store/scene/world_memory.h"
+#include "store/store_formats.h"
 #include "store/world/world_changes.h"
 
 namespace quoin {
@@ -57,12 +57,6 @@ Result<LoadedScene> read_world_format(std::span<const std::byte> bytes, const Lo
   const auto world = WorldParts::open(bytes);
   if (!world) return world.error();
   return load(*world, options, threads, progress);
-}
-
-Result<SavedScene> write_world_format(const Scene& scene, const LoadedScene* loaded, const std::filesystem::path& path,
-                                      Threads threads, const Progress& progress) {
-  return loaded != nullptr ? write_world(*loaded, path, threads, progress)
-                           : write_world(scene, path, threads, progress);
 }
 
 }  // namespace quoin

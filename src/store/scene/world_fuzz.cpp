@@ -5,7 +5,7 @@
 
 #include <quoin/scene/scene.h>
 
-#include "io/world_format.h"
+#include "store/store_formats.h"
 
 // Complete small databases: any bytes must give an error or a scene whose content can be traversed.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -14,7 +14,7 @@
 #include <quoin/store/world_saver.h>
 #include <quoin/store/world_store.h>
 
-#include "io/models/luanti_nodes.h"
+#include "io/luanti/luanti_nodes.h"
 #include "io/whole_file.h"
 #include "store/scene/put_world.h"
 #include "store/world/part_text.h"

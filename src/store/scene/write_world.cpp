@@ -6,11 +6,11 @@
 #include <quoin/store/world_saver.h>
 
 #include "io/whole_file.h"
-#include "io/world_format.h"
 #include "store/database/connection.h"
 #include "store/database/schema.h"
 #include "store/database/world_lock.h"
 #include "store/scene/put_world.h"
+#include "store/store_formats.h"
 #include "store/world/world_changes.h"
 #include "store/world/world_open.h"
 

@@ -16,9 +16,9 @@
 
 #include "io/held_files.h"
 #include "io/whole_file.h"
-#include "io/world_format.h"
 #include "store/chunk/chunk_body.h"
 #include "store/database/world_lock.h"
+#include "store/store_formats.h"
 #include "store/world/migration.h"
 #include "store/world/world_changes.h"
 #include "store/world/world_open.h"

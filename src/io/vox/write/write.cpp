@@ -10,6 +10,8 @@
 
 #include <quoin/io/vox.h>
 
+#include "io/byte_reader.h"
+#include "io/format_driver.h"
 #include "io/text.h"
 #include "io/vox/chunk_reader.h"
 #include "io/vox/materials.h"
@@ -784,5 +786,22 @@ Result<std::vector<std::string>> vox_unsupported_features(const Scene& scene) {
 Result<std::vector<std::string>> vox_unsupported_features(const LoadedScene& loaded) {
   return unsupported_features_of(loaded);
 }
+
+extern constinit const FormatDriver kVoxFormat = {
+    .info = {FileFormat::Vox, ".vox", "MagicaVoxel", FormatCapability::Read | FormatCapability::Write},
+    .detect = [](std::span<const std::byte> beginning) { return text_of(beginning).starts_with("VOX "); },
+    .read = [](const FormatInput& input) -> Result<LoadedScene> {
+      return read_vox(input.bytes, input.options, input.progress);
+    },
+    .write = [](const FormatOutput& output, const std::filesystem::path& path) -> Result<SavedScene> {
+      return output.loaded != nullptr ? write_vox(*output.loaded, path, output.progress)
+                                      : write_vox(output.scene, path, output.progress);
+    },
+    .unsupported_features = [](const FormatOutput& output) -> Result<std::vector<std::string>> {
+      return output.loaded != nullptr ? vox_unsupported_features(*output.loaded)
+                                      : vox_unsupported_features(output.scene);
+    },
+    .reports_loaded_data = true,
+};
 
 }  // namespace quoin

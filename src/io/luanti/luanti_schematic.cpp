@@ -1,0 +1,104 @@
+// Luanti schematics: node names, and three arrays in a zlib stream. The axes are left-handed, so z is reversed.
+
+#include <algorithm>
+#include <bit>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "io/byte_order.h"
+#include "io/byte_reader.h"
+#include "io/byte_stream.h"
+#include "io/format_driver.h"
+#include "io/luanti/luanti_nodes.h"
+#include "io/models/model_builder.h"
+
+namespace quoin::models {
+
+namespace {
+
+constexpr std::string_view kMagic = "MTSM";
+
+std::uint16_t read_u16(ByteReader& reader) {
+  const auto bytes = reader.take(2);
+  return bytes.empty() ? std::uint16_t{0} : load<std::uint16_t>(bytes.data(), std::endian::big);
+}
+
+bool is_mts(std::span<const std::byte> beginning) {
+  return ByteReader(beginning).text(4) == kMagic;
+}
+
+Result<LoadedScene> read_mts(std::span<const std::byte> bytes) {
+  ByteReader reader(bytes);
+  static_cast<void>(reader.take(4));
+  const int version = read_u16(reader);
+  if (version < 1 || version > 4) {
+    return make_error(ErrorCode::Unsupported,
+                      "Luanti schematic version " + std::to_string(version) + " is not supported", {}, 4);
+  }
+  const int size_x = read_u16(reader);
+  const int size_y = read_u16(reader);
+  const int size_z = read_u16(reader);
+  if (version >= 3) static_cast<void>(reader.take(static_cast<std::size_t>(size_y)));  // the probability of each layer
+  // A name has at least two bytes. Nodes of truncated files are not looked up, since that takes longer than reading.
+  const std::size_t count = read_u16(reader);
+  std::vector<std::string_view> names(count <= reader.remaining() / 2 ? count : 0);
+  for (std::string_view& name : names) name = reader.text(read_u16(reader));
+  if (reader.failed() || names.size() < count) return bad_at(bytes.size(), "the file ends before its nodes");
+  std::vector<std::optional<VoxelProperties>> nodes(count);  // nullopt: air
+  std::ranges::transform(names, nodes.begin(), node_properties);
+  const std::size_t begin = reader.position();
+  const std::uint64_t volume =
+      static_cast<std::uint64_t>(size_x) * static_cast<std::uint64_t>(size_y) * static_cast<std::uint64_t>(size_z);
+  if (volume == 0) {
+    return bad_at(6, "invalid size: " + std::to_string(size_x) + " x " + std::to_string(size_y) + " x " +
+                         std::to_string(size_z) + " nodes");
+  }
+  constexpr std::uint64_t kMaxNodes = std::uint64_t{1} << 24;
+  if (volume > kMaxNodes) return make_error(ErrorCode::LimitExceeded, "the schematic has more than 2^24 nodes", {}, 6);
+  ByteStream stream(bytes, begin, Compression::Zlib);
+  if (volume * 4 > stream.max_bytes()) return bad_at(6, "the size claims more nodes than the file can hold");
+  std::vector<std::byte> content(volume * 4);
+  const auto read = stream.read(content);
+  if (!read) return read.error();
+  if (*read < volume * 3) return bad_at(bytes.size(), "the file ends before its nodes");
+  ModelBuilder builder;
+  Model model;
+  model.canvas = {IVec3(0), {size_x, size_y, size_z}};
+  builder.begin(std::move(model));
+  std::vector<std::uint32_t> materials;
+  materials.reserve(nodes.size());
+  for (const auto& node : nodes) materials.push_back(node ? builder.add_material(*node) : 0);
+  std::size_t at = 0;
+  for (int z = 0; z < size_z; ++z) {
+    for (int y = 0; y < size_y; ++y) {
+      for (int x = 0; x < size_x; ++x, ++at) {
+        const auto index = load<std::uint16_t>(content.data() + 2 * at, std::endian::big);
+        if (index >= nodes.size()) return bad_at(begin, "a node index is beyond the names");
+        // The node's probability, out of 127 since version 4 and out of 255 before.
+        const auto chance = std::to_integer<unsigned>(content[2 * volume + at]);
+        if (version >= 2 && (version >= 4 ? chance & 0x7FU : chance >> 1) == 0) continue;
+        if (!nodes[index]) continue;
+        builder.use_material(materials[index]);
+        if (auto put = builder.put({x, y, size_z - 1 - z}, nodes[index]->colour); !put) return put.error();
+      }
+    }
+  }
+  return builder.take("luanti");
+}
+
+}  // namespace
+
+}  // namespace quoin::models
+
+namespace quoin {
+
+extern constinit const FormatDriver kLuantiSchematicFormat = {
+    .info = {FileFormat::LuantiSchematic, ".mts", "Luanti schematic", FormatCapability::Read},
+    .detect = models::is_mts,
+    .read = [](const FormatInput& input) { return models::read_mts(input.bytes); },
+};
+
+}  // namespace quoin

@@ -1,0 +1,142 @@
+// The format of docs/formats/new_format.md, which shows the code between the two marks.
+
+#include <fstream>
+#include <sstream>
+
+#include <gtest/gtest.h>
+
+#include <quoin/io/formats.h>
+
+// docs: begin
+#include <charconv>
+#include <string>
+#include <string_view>
+
+#include "io/byte_reader.h"
+#include "io/format_driver.h"
+#include "io/models/model_builder.h"
+#include "io/placed/placed_grids.h"
+
+// Toy files: the line "toy", then one line "x y z" per voxel. The voxels have no colours: they are grey.
+
+namespace quoin::models {
+
+namespace {
+
+bool is_toy(std::span<const std::byte> beginning) {
+  return text_of(beginning).starts_with("toy\n");
+}
+
+/// Parses the number that begins at `at`, and moves `at` behind it.
+bool parse(std::string_view text, std::size_t& at, int& number) {
+  while (at < text.size() && text[at] == ' ') ++at;
+  const auto [end, error] = std::from_chars(text.data() + at, text.data() + text.size(), number);
+  at = static_cast<std::size_t>(end - text.data());
+  return error == std::errc();
+}
+
+Result<LoadedScene> read_toy(const FormatInput& input) {
+  constexpr int kFarthest = 1 << 20;
+  const std::string_view text = text_of(input.bytes);
+  ModelBuilder builder;
+  builder.begin({});
+  for (std::size_t line = 4; line < text.size();) {
+    std::size_t at = line;
+    IVec3 voxel{0};
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!parse(text, at, voxel[axis])) return bad_at(at, "no coordinate of a voxel");
+      if (std::abs(voxel[axis]) > kFarthest) return bad_at(line, "the voxel is too far away");
+    }
+    if (Status put = builder.put(voxel, {190, 190, 190, 255}); !put) return put.error();
+    line = std::min(text.find('\n', at), text.size() - 1) + 1;
+  }
+  return builder.take("toy");
+}
+
+Result<EncodedFile> write_toy(const FormatOutput& output) {
+  auto merged = merge_grids(output.scene, {.extension = ".toy", .colours = false});
+  if (!merged) return merged.error();
+  std::string text = "toy\n";
+  merged->voxels.for_each([&](IVec3 voxel, VoxelType) {
+    for (int axis = 0; axis < 3; ++axis) text += std::to_string(voxel[axis]) + (axis < 2 ? " " : "\n");
+  });
+  const auto bytes = std::as_bytes(std::span(text));
+  return EncodedFile{{bytes.begin(), bytes.end()}, std::move(merged->warnings)};
+}
+
+}  // namespace
+
+}  // namespace quoin::models
+
+namespace quoin {
+
+extern constinit const FormatDriver kToyFormat = {
+    .info = {FileFormat("toy"), ".toy", "Toy file", FormatCapability::Read | FormatCapability::Write},
+    .detect = models::is_toy,
+    .read = models::read_toy,
+    .encode = models::write_toy,
+};
+
+}  // namespace quoin
+// docs: end
+
+namespace quoin {
+namespace {
+
+/// A row of format_drivers.cpp would register it.
+void register_toy() {
+  static const bool done = register_format(kToyFormat);
+  ASSERT_TRUE(done);
+}
+
+TEST(NewFormat, OneDriverMakesAFormatReadableAndWritable) {
+  register_toy();
+  const std::string text = "toy\n0 0 0\n1 0 0\n-5 70 3";
+  const auto bytes = std::as_bytes(std::span(text));
+  EXPECT_EQ(detect_format(bytes), FileFormat("toy"));
+  const auto loaded = load_scene(bytes);
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  EXPECT_EQ(loaded->scene.voxel_count(), 3);
+  const auto path = std::filesystem::temp_directory_path() / "quoin_new_format.toy";
+  ASSERT_TRUE(save_scene(*loaded, path));
+  const auto again = load_scene(path);
+  std::filesystem::remove(path);
+  ASSERT_TRUE(again) << to_string(again.error());
+  EXPECT_EQ(again->scene.voxel_count(), 3);
+  EXPECT_EQ(again->format, "toy");
+}
+
+TEST(NewFormat, RejectsDamagedFiles) {
+  register_toy();
+  const std::string text = "toy\n0 0\n";
+  const auto refused = load_scene(std::as_bytes(std::span(text)));
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().byte_offset, 7U);
+}
+
+TEST(NewFormat, AppearsInListsAndMessages) {
+  register_toy();
+  EXPECT_NE(extensions_with(FormatCapability::Write).find(".toy"), std::string::npos);
+  EXPECT_EQ(format_with_extension("A.TOY", FormatCapability::Read)->name(), "toy");
+  const Status refused = check_capability(FileFormat("toy"), FormatCapability::Lamps, "--lights");
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().message, "cannot write --lights to .toy: it has no lamps and cameras; use .glb or .gltf");
+}
+
+std::string text_of_file(const std::string& path) {
+  std::ostringstream text;
+  text << std::ifstream(std::string(QUOIN_SOURCE_DIR) + "/" + path).rdbuf();
+  return text.str();
+}
+
+TEST(NewFormat, ThePageShowsThisCode) {
+  const std::string source = text_of_file("src/io/models/new_format_test.cpp");
+  const std::string begin = std::string("// docs: ") + "begin\n";
+  const std::string end = std::string("// docs: ") + "end\n";
+  const std::size_t first = source.find(begin) + begin.size();
+  const std::string code = "```cpp\n" + source.substr(first, source.find(end) - first) + "```\n";
+  EXPECT_NE(text_of_file("docs/formats/new_format.md").find(code), std::string::npos);
+}
+
+}  // namespace
+}  // namespace quoin

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <quoin/core/result.h>
+
+namespace quoin {
+
+/// Writes texts to a zip file one after another, compressed. The bytes are the same on every run.
+///
+/// Source: PKWARE, ".ZIP File Format Specification" 6.3.3. Memory: the compressed bytes.
+class ZipFile {
+ public:
+  ZipFile();
+  ~ZipFile();
+  ZipFile(const ZipFile&) = delete;
+  ZipFile& operator=(const ZipFile&) = delete;
+
+  /// Starts a file; later writes belong to it. Requires: the name is ASCII.
+  void begin(std::string name);
+  void put(std::string_view text);
+  /// Returns the whole file. Errors: LimitExceeded if a file, or the whole, has 4 GiB or more.
+  [[nodiscard]] Result<std::vector<std::byte>> take();
+
+ private:
+  struct Deflater;
+  struct Entry {
+    std::string name;
+    std::uint32_t crc = 0;
+    std::uint64_t size = 0;
+    std::uint64_t at = 0;
+    std::uint64_t packed = 0;
+  };
+  void end();
+
+  std::vector<std::byte> bytes_;
+  std::vector<Entry> entries_;
+  std::unique_ptr<Deflater> deflater_;
+};
+
+/// The files in a zip file, stored or compressed by deflate, found by the directory at its end.
+/// Source: PKWARE, ".ZIP File Format Specification" 6.3.3. Lifetime: the bytes.
+class ZipParts {
+ public:
+  /// Errors: BadFormat, with the offset; Unsupported for zip64 and files in several parts.
+  [[nodiscard]] static Result<ZipParts> open(std::span<const std::byte> zip);
+
+  /// The names as stored in the directory.
+  [[nodiscard]] std::vector<std::string> names() const;
+  [[nodiscard]] bool has(const std::string& name) const { return entries_.contains(name); }
+  /// Returns a file's content. Memory: its size, which is limited by its compressed bytes.
+  /// Errors: BadFormat; Unsupported for other compressions and for encrypted files. Requires: has(name).
+  [[nodiscard]] Result<std::vector<std::byte>> read(const std::string& name) const;
+
+ private:
+  struct Entry {
+    std::uint32_t flags = 0;
+    std::uint32_t method = 0;
+    std::uint32_t packed = 0;
+    std::uint32_t size = 0;
+    std::uint32_t at = 0;
+  };
+  std::span<const std::byte> bytes_;
+  std::map<std::string, Entry> entries_;
+};
+
+}  // namespace quoin
