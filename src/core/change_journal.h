@@ -145,6 +145,7 @@ class ChangeJournal {
       }
     }
     serial = end_++;
+    QUOIN_ASSERT(serial / kBlock - first_ / kBlock + 1 == blocks_.size(), "the last block has the last record");
     at(serial) = record;
   }
 

@@ -2,6 +2,8 @@
 
 #include <atomic>
 
+#include <quoin/core/assert.h>
+
 #include "core/change_journal.h"
 #include "core/edit_notices.h"
 
@@ -13,6 +15,7 @@ std::uint64_t next_serial() {
 }
 
 void EditNotice::notify_first() {
+  QUOIN_ASSERT(to_ != nullptr, "a notice that is followed");
   to_->notify(index_);
   is_notified_ = true;
 }

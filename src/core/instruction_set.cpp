@@ -36,6 +36,7 @@ InstructionSet find_instruction_set() {
 const char* name_of(InstructionSet set) {
   constexpr const char* kNames[kInstructionSets] = {"plain C++", "AVX2, BMI and BMI2", "AVX-512 F, BW, DQ and VL",
                                                     "AVX-512 VBMI, VBMI2 and VPOPCNTDQ, and GFNI"};
+  QUOIN_ASSERT(static_cast<std::size_t>(set) < kInstructionSets, "a known instruction set");
   return kNames[static_cast<std::size_t>(set)];
 }
 

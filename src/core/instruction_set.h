@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include <quoin/core/assert.h>
+
 namespace quoin {
 
 /// The instruction sets of kernels, from the smallest to the largest. Each set includes all earlier ones. All give the
@@ -39,7 +41,11 @@ struct KernelTable {
   const Kernel* of[kInstructionSets];
 
   /// Returns the kernel for the widest instructions of this machine.
-  [[nodiscard]] const Kernel& widest() const { return *of[static_cast<std::size_t>(instruction_set())]; }
+  [[nodiscard]] const Kernel& widest() const {
+    const Kernel* const kernel = of[static_cast<std::size_t>(instruction_set())];
+    QUOIN_ASSERT(kernel != nullptr, "a kernel per instruction set");
+    return *kernel;
+  }
 };
 
 /// Returns a name of the processors that have the set, for messages.

@@ -6,12 +6,14 @@
 #include <type_traits>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 namespace quoin {
 
 /// A growable array of trivially copyable values that leaves new elements uninitialised. Use it for large output that
 /// is rebuilt often. It can be moved but not copied. Pointers and iterators stay valid until the buffer grows beyond
 /// its capacity.
-/// Requires: indices are less than `size()`; this is not checked.
+/// Requires: indices are less than `size()`.
 template <class T>
 class Buffer {
   static_assert(std::is_trivially_copyable_v<T>);
@@ -35,8 +37,14 @@ class Buffer {
   [[nodiscard]] bool empty() const { return size_ == 0; }
   [[nodiscard]] T* data() { return values_.get(); }
   [[nodiscard]] const T* data() const { return values_.get(); }
-  [[nodiscard]] T& operator[](std::size_t i) { return values_[i]; }
-  [[nodiscard]] const T& operator[](std::size_t i) const { return values_[i]; }
+  [[nodiscard]] T& operator[](std::size_t i) {
+    QUOIN_ASSERT(i < size_, "i < size()");
+    return values_[i];
+  }
+  [[nodiscard]] const T& operator[](std::size_t i) const {
+    QUOIN_ASSERT(i < size_, "i < size()");
+    return values_[i];
+  }
   [[nodiscard]] T* begin() { return values_.get(); }
   [[nodiscard]] T* end() { return values_.get() + size_; }
   [[nodiscard]] const T* begin() const { return values_.get(); }

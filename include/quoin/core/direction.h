@@ -9,6 +9,7 @@
 #include <iterator>
 #include <string_view>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
 
 namespace quoin {
@@ -36,6 +37,7 @@ inline constexpr std::array<FaceFrame, 6> kFaceFrames = {FaceFrame{0, +1, 1, 2},
 
 /// Returns the face frame of a direction.
 [[nodiscard]] constexpr const FaceFrame& frame_of(Direction d) {
+  QUOIN_ASSERT(static_cast<std::size_t>(d) < kFaceFrames.size(), "one of the six directions");
   return kFaceFrames[static_cast<std::size_t>(d)];
 }
 
@@ -58,6 +60,7 @@ inline constexpr std::array<FaceFrame, 6> kFaceFrames = {FaceFrame{0, +1, 1, 2},
 /// Returns "+X", "-X", "+Y", "-Y", "+Z" or "-Z".
 [[nodiscard]] constexpr std::string_view name_of(Direction direction) {
   constexpr std::array<std::string_view, 6> kNames = {"+X", "-X", "+Y", "-Y", "+Z", "-Z"};
+  QUOIN_ASSERT(static_cast<std::size_t>(direction) < kNames.size(), "one of the six directions");
   return kNames[static_cast<std::size_t>(direction)];
 }
 
@@ -99,7 +102,10 @@ class DirectionSet {
 
     constexpr Iterator() = default;
     constexpr explicit Iterator(std::uint8_t bits) : bits_(bits) {}
-    constexpr Direction operator*() const { return static_cast<Direction>(std::countr_zero(bits_)); }
+    constexpr Direction operator*() const {
+      QUOIN_ASSERT(bits_ != 0, "an iterator before the end");
+      return static_cast<Direction>(std::countr_zero(bits_));
+    }
     constexpr Iterator& operator++() {
       bits_ = static_cast<std::uint8_t>(bits_ & (bits_ - 1));
       return *this;

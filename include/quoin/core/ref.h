@@ -29,7 +29,7 @@ class RefCounted {
 /// A reference-counted pointer to a T, which derives from RefCounted. The last owner destroys the object. Null by
 /// default.
 ///
-/// Requires: `*` and `->` are used only if the pointer is not null; this is not checked.
+/// Requires: `*` and `->` are used only if the pointer is not null.
 /// Sharing: do not change an object while `is_shared` is true. Call `make_own` first, which replaces it with a copy.
 /// Threads: several threads may add and release owners of one object at once. Use each Ref on one thread at a time.
 template <class T>
@@ -59,8 +59,14 @@ class Ref {
   void swap(Ref& other) noexcept { std::swap(object_, other.object_); }
 
   [[nodiscard]] T* get() const { return object_; }
-  T* operator->() const { return object_; }
-  T& operator*() const { return *object_; }
+  T* operator->() const {
+    QUOIN_ASSERT(object_ != nullptr, "there is an object");
+    return object_;
+  }
+  T& operator*() const {
+    QUOIN_ASSERT(object_ != nullptr, "there is an object");
+    return *object_;
+  }
   bool operator==(const Ref& other) const = default;
   bool operator==(std::nullptr_t) const { return object_ == nullptr; }
 

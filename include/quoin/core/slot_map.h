@@ -59,6 +59,7 @@ class SlotMap {
     const std::uint32_t index = next_index();
     if (index / kPage == pages_.size()) pages_.push_back(std::make_unique<Page>());
     Slot& slot = slot_at(index);
+    QUOIN_ASSERT(!slot.value.has_value(), "a free slot");
     slot.value.emplace(std::move(value));
     slot.generation = next_serial();
     if (index == count_) {
@@ -153,8 +154,11 @@ class SlotMap {
   static constexpr std::size_t kPage = 32;
   using Page = std::array<Slot, kPage>;
 
-  [[nodiscard]] const Slot& slot_at(std::uint32_t index) const { return (*pages_[index / kPage])[index % kPage]; }
-  [[nodiscard]] Slot& slot_at(std::uint32_t index) { return (*pages_[index / kPage])[index % kPage]; }
+  [[nodiscard]] const Slot& slot_at(std::uint32_t index) const {
+    QUOIN_ASSERT(index / kPage < pages_.size(), "a slot of the map");
+    return (*pages_[index / kPage])[index % kPage];
+  }
+  [[nodiscard]] Slot& slot_at(std::uint32_t index) { return const_cast<Slot&>(std::as_const(*this).slot_at(index)); }
 
   std::vector<std::unique_ptr<Page>> pages_;
   std::vector<std::uint32_t> free_;

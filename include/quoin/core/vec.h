@@ -10,6 +10,8 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/vec3.hpp>
 
+#include <quoin/core/assert.h>
+
 // glm types are part of Quoin's interface. Other glm settings would change their memory layout.
 #if defined(GLM_FORCE_QUAT_DATA_WXYZ) || defined(GLM_FORCE_QUAT_CTOR_XYZW)
 #error "Quoin needs glm's quaternions as they are by default: stored as x, y, z, w and made of (w, x, y, z)"
@@ -122,7 +124,9 @@ struct DBox {
 }
 
 /// Returns corner `index` (0 to 7) of a box. Bits 0, 1 and 2 of `index` select the greater x, y and z.
+/// Requires: 0 <= index < 8.
 [[nodiscard]] inline DVec3 box_corner(const DBox& box, int index) {
+  QUOIN_ASSERT(index >= 0 && index < 8, "0 <= index < 8");
   return {((index & 1) != 0 ? box.max : box.min).x, ((index & 2) != 0 ? box.max : box.min).y,
           ((index & 4) != 0 ? box.max : box.min).z};
 }

@@ -120,6 +120,7 @@ class ChunkTrie {
  private:
   static constexpr int kLog = 2;  // log2 of the slots along an edge
   static constexpr unsigned kEdge = 1U << kLog;
+  static constexpr int kLevels = 13;                                // for coordinates of 26 bits
   static constexpr std::uint32_t kOrigin = std::uint32_t{1} << 25;  // offset that makes coordinates not negative
 
   using Place = std::array<std::uint32_t, 3>;
@@ -173,6 +174,7 @@ class ChunkTrie {
   }
   // Returns the lowest chunk of a node's slot.
   static IVec3 chunk_at(const Node& node, unsigned slot) {
+    QUOIN_ASSERT(slot < 64 && (node.present >> slot & 1U) != 0, "a slot in use");
     const int shift = kLog * node.level;
     const auto along = [&](std::size_t axis, unsigned digit) {
       return static_cast<int>(((node.prefix[axis] << kLog | digit) << shift) - kOrigin);
@@ -191,6 +193,7 @@ class ChunkTrie {
     Place other = here->prefix;
     do {
       ++level;
+      QUOIN_ASSERT(level < kLevels, "a node of the top level covers all chunks");
       for (std::uint32_t& coordinate : other) coordinate >>= kLog;
     } while (prefix_of(at, level) != other);
     const int down = kLog * (level - 1 - here->level);

@@ -9,6 +9,8 @@
 #include <emmintrin.h>
 #endif
 
+#include <quoin/core/assert.h>
+
 namespace quoin::packed_row {
 
 // A row is 64 voxels of `bits` bits each (1, 2, 4, 8 or 16), in `bits` words, lowest bits first. Everything here works
@@ -89,6 +91,8 @@ constexpr std::uint64_t spread_to_halves(std::uint64_t w) {
 
 /// Returns `index` repeated over a word.
 constexpr std::uint64_t repeat(int bits, std::uint32_t index) {
+  QUOIN_ASSERT(bits <= 16 && std::has_single_bit(static_cast<unsigned>(bits)), "1, 2, 4, 8 or 16 bits");
+  QUOIN_ASSERT(index >> bits == 0, "an index of that many bits");
   constexpr std::uint64_t kOnes[] = {~std::uint64_t{0}, 0x5555'5555'5555'5555U, 0x1111'1111'1111'1111U,
                                      0x0101'0101'0101'0101U, 0x0001'0001'0001'0001U};
   return index * kOnes[std::countr_zero(static_cast<unsigned>(bits) | 16U)];
@@ -176,11 +180,13 @@ inline std::uint64_t equal_mask(const std::uint64_t* row, int bits, std::uint32_
 }
 
 inline std::uint32_t read(const std::uint64_t* row, int bits, int x) {
+  QUOIN_ASSERT(x >= 0 && x < 64, "0 <= x < 64");
   const auto bit = static_cast<unsigned>(x * bits);
   return static_cast<std::uint32_t>(row[bit >> 6] >> (bit & 63U)) & ((1U << bits) - 1U);
 }
 
 inline void write(std::uint64_t* row, int bits, int x, std::uint32_t index) {
+  QUOIN_ASSERT(x >= 0 && x < 64 && index >> bits == 0, "0 <= x < 64, and an index of that many bits");
   const auto bit = static_cast<unsigned>(x * bits);
   const std::uint64_t field = ((std::uint64_t{1} << bits) - 1) << (bit & 63U);
   std::uint64_t& word = row[bit >> 6];
@@ -251,7 +257,10 @@ void unpack_bits(std::uint64_t word, Value zero, Value one, Value* out) {
 /// Looks up the 64 values of a row, `bits` wide, in a palette; at 16 bits the values are the indices themselves.
 template <class Value>
 void unpack(const std::uint64_t* row, int bits, const Value* palette, std::size_t palette_size, Value* out) {
-  const auto type_of = [palette](std::uint32_t index) { return palette[index]; };
+  const auto type_of = [=](std::uint32_t index) {
+    QUOIN_ASSERT(index < palette_size, "an index of the palette");
+    return palette[index];
+  };
   switch (bits) {
     case 1:
       return unpack_bits(row[0], palette[0], palette[palette_size > 1 ? 1 : 0], out);
