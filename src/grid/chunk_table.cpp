@@ -59,6 +59,7 @@ void ChunkWindow::move_to(const Box& box) {
 }
 
 void ChunkWindow::set_box(const Box& box) {
+  QUOIN_ASSERT(cells() == std::size_t{1} << box.log_cells(), "a cell per chunk of the box");
   box_ = box;
   first_x_ = static_cast<std::uint32_t>(box.first.x);
   first_y_ = static_cast<std::uint32_t>(box.first.y);
@@ -159,6 +160,7 @@ VoxelType ChunkTable::voxel(int x, int y, int z) const {
   }
   if (const ChunkStorage* voxels = window_.voxels(cell)) [[likely]]
     return voxels->type(local_x, local_y, local_z);
+  QUOIN_ASSERT(window_.entry(cell) != nullptr, "missing chunks have the voxels of air");
   return window_.entry(cell)->chunk.get(local_x, local_y, local_z);
 }
 
@@ -232,6 +234,7 @@ void ChunkTable::take_in(const IBox& chunks) {
     const std::uint32_t cell = window_.cell(at.x, at.y, at.z);
     if (window_.entry(cell) != nullptr) return;  // already added by another axis
     window_.put(cell, const_cast<ChunkEntry*>(&entry), 0);
+    QUOIN_ASSERT(outside_ != 0, "entries outside the windows are counted");
     --outside_;
   });
 }
@@ -245,6 +248,7 @@ void ChunkTable::outside_changed() {
 
 // Returns a box of all chunks except `left_out` at either end of each axis.
 ChunkWindow::Box ChunkTable::box_of_most(std::size_t left_out) const {
+  QUOIN_ASSERT(2 * left_out < size(), "a box of at least one chunk");
   std::vector<int> along(size());
   ChunkWindow::Box box;
   for (int axis = 0; axis < 3; ++axis) {

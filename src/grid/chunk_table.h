@@ -54,11 +54,20 @@ class ChunkWindow {
            ((static_cast<std::uint32_t>(z) & mask_z_) << shift_z_);
   }
   /// Returns null if there is no chunk.
-  [[nodiscard]] ChunkEntry* entry(std::uint32_t cell) const { return entries_[cell]; }
+  [[nodiscard]] ChunkEntry* entry(std::uint32_t cell) const {
+    QUOIN_ASSERT(cell < cells(), "a cell of the window");
+    return entries_[cell];
+  }
   /// Returns the last epoch in which the entry was known to be unshared.
-  [[nodiscard]] std::uint32_t epoch(std::uint32_t cell) const { return epochs_[cell]; }
+  [[nodiscard]] std::uint32_t epoch(std::uint32_t cell) const {
+    QUOIN_ASSERT(cell < cells(), "a cell of the window");
+    return epochs_[cell];
+  }
   /// Returns the voxels of a chunk: those of an air chunk if it is missing, null if it is uniform.
-  [[nodiscard]] const ChunkStorage* voxels(std::uint32_t cell) const { return voxels_[cell]; }
+  [[nodiscard]] const ChunkStorage* voxels(std::uint32_t cell) const {
+    QUOIN_ASSERT(cell < cells(), "a cell of the window");
+    return voxels_[cell];
+  }
 
   [[nodiscard]] std::size_t cells() const { return entries_.size(); }
   [[nodiscard]] const Box& box() const { return box_; }
@@ -69,7 +78,10 @@ class ChunkWindow {
   /// Updates the cell of a chunk that came or went, or whose storage may have moved.
   void put(std::uint32_t cell, ChunkEntry* entry, std::uint32_t epoch);
   /// Clears the voxel pointer of an existing chunk. Until the next `put`, its voxels are found through its entry.
-  void forget_voxels(std::uint32_t cell) { voxels_[cell] = nullptr; }
+  void forget_voxels(std::uint32_t cell) {
+    QUOIN_ASSERT(entry(cell) != nullptr, "an existing chunk");
+    voxels_[cell] = nullptr;
+  }
   /// Replaces the box by an empty one of another size or position. If it throws, nothing has changed.
   void move_to(const Box& box);
   /// Moves the box so that a chunk is inside. Returns false without a change if a chunk is in the part that the box

@@ -77,6 +77,8 @@ inline IBox chunks_of(const LongBox& box) {
   IBox chunks;
   for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<std::size_t>(axis);
+    QUOIN_ASSERT(static_cast<int>(box.min[i]) == box.min[i] && static_cast<int>(box.max[i] - 1) == box.max[i] - 1,
+                 "voxels with int32 coordinates");
     chunks.min[axis] = static_cast<int>(box.min[i] >> kChunkShift);
     chunks.max[axis] = static_cast<int>((box.max[i] - 1) >> kChunkShift) + 1;
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -31,6 +32,7 @@ constexpr auto kFourOnes = [] {
 
 // Adds 1 or -1 to the counts whose bits are set, four at once. Counts stay within 0 to 4,096, so there is no carry.
 void add_columns(std::array<std::uint16_t, kChunkEdge>& counts, std::uint64_t mask, int delta) {
+  QUOIN_ASSERT(delta == 1 || delta == -1, "voxels are added or removed");
   if (mask == 0) return;
   if (mask == kAllVoxels) {
     for (std::uint16_t& count : counts) count = static_cast<std::uint16_t>(count + delta);
@@ -121,6 +123,7 @@ void Chunk::fill(VoxelType type) {
 }
 
 void Chunk::count_change(int y, int z, std::uint64_t became_air, std::uint64_t became_solid) {
+  QUOIN_ASSERT((became_air & became_solid) == 0, "each voxel changes once");
   ChunkStorage& m = *storage_;
   const int delta = std::popcount(became_solid) - std::popcount(became_air);
   m.non_air += delta;
@@ -157,6 +160,7 @@ bool Chunk::set_data(IVec3 local, const VoxelData& data) {
 }
 
 void Chunk::clear_data(int y, int z, std::uint64_t voxels) {
+  QUOIN_ASSERT(data_ != nullptr, "a chunk with data");
   if ((data_->voxels(y, z) & voxels) == 0) return;
   data_.make_own();
   data_->clear(y, z, voxels);
@@ -194,6 +198,7 @@ std::uint64_t Chunk::row_mask(int y, int z, VoxelType type) const {
 inline std::uint32_t Chunk::index_for(VoxelType type) {
   ChunkStorage& m = *storage_;
   if (m.direct()) return type;
+  QUOIN_ASSERT(m.recent < m.palette.size(), "an index of the palette");
   if (m.palette[m.recent] != type) m.recent = find_or_add(type);
   return m.direct() ? type : m.recent;
 }
@@ -373,6 +378,7 @@ Chunk Chunk::from_dense(std::span<const VoxelType, kChunkVoxels> types) {
     });
   }
   m.bits = bits_for(m.palette.size());
+  QUOIN_ASSERT(std::accumulate(m.counts.begin(), m.counts.end(), 0U) == kChunkVoxels, "each voxel has one type");
   if (m.direct()) {
     std::vector<std::uint32_t> counts(ChunkStorage::kRemainders);
     for (const VoxelType type : m.palette) {
@@ -384,6 +390,7 @@ Chunk Chunk::from_dense(std::span<const VoxelType, kChunkVoxels> types) {
   }
   m.used = static_cast<std::uint32_t>(m.counts.size() - static_cast<std::size_t>(std::ranges::count(m.counts, 0U)));
   for (std::size_t i = 0; i < m.slabs.size(); ++i) chunk.pack_slab(slab_in_order(i), types, index_of);
+  QUOIN_ASSERT(m.non_air == static_cast<int>(kChunkVoxels) - chunk.count(kAir), "air is counted");
   m.words.shrink_to_fit();
   return chunk;
 }
@@ -400,6 +407,7 @@ void Chunk::pack_slab(std::size_t slab, std::span<const VoxelType, kChunkVoxels>
     const auto row = row_of(y, z);
     is_uniform = is_uniform && row[0] == first && is_one_type(row);
   });
+  QUOIN_ASSERT((index_of[first] & ChunkStorage::kUniformSlab) == 0, "a type of the palette");
   m.slabs[slab] = ChunkStorage::kUniformSlab | index_of[first];
   const std::uint32_t slot = is_uniform ? 0 : slot_for_writing(slab);
   for_each_row_of_slab(slab, [&](int stored, int y, int z) {

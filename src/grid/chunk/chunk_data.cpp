@@ -9,6 +9,7 @@
 namespace quoin {
 
 std::size_t SlabData::rank(int row, int x) const {
+  QUOIN_ASSERT(row >= 0 && row < kSlabRows && x >= 0 && x < kChunkEdge, "a voxel of the slab");
   int before = std::popcount(stateful_[static_cast<std::size_t>(row)] & ((std::uint64_t{1} << x) - 1));
   for (int i = 0; i < row; ++i) before += std::popcount(stateful_[static_cast<std::size_t>(i)]);
   return static_cast<std::size_t>(before);
@@ -20,6 +21,7 @@ std::size_t SlabData::first_from(std::uint32_t place) const {
 }
 
 std::uint64_t SlabData::voxels(int row) const {
+  QUOIN_ASSERT(row >= 0 && row < kSlabRows, "a row of the slab");
   std::uint64_t found = stateful_[static_cast<std::size_t>(row)];
   const std::uint32_t end = place_of(row + 1, 0);
   for (std::size_t i = first_from(place_of(row, 0)); i < bytes_.size() && bytes_[i].place < end; ++i) {
@@ -29,6 +31,7 @@ std::uint64_t SlabData::voxels(int row) const {
 }
 
 VoxelData SlabData::get(int row, int x) const {
+  QUOIN_ASSERT(row >= 0 && row < kSlabRows && x >= 0 && x < kChunkEdge, "a voxel of the slab");
   VoxelData data;
   if ((stateful_[static_cast<std::size_t>(row)] >> x & 1U) != 0) data.state = states_[rank(row, x)];
   const std::size_t at = first_from(place_of(row, x));
@@ -37,6 +40,7 @@ VoxelData SlabData::get(int row, int x) const {
 }
 
 void SlabData::put(int row, int x, const VoxelData& data) {
+  QUOIN_ASSERT(!data.empty() && data.bytes.size() <= kMaxVoxelDataBytes, "data that a voxel can hold");
   Ref<Bytes> bytes;
   if (!data.bytes.empty()) {
     bytes = make_ref<Bytes>();
@@ -89,6 +93,7 @@ void SlabData::clear(int row, std::uint64_t mask) {
     for (std::uint64_t left = voxels; left != 0; left &= left - 1, ++at) {
       if ((left & (~left + 1) & gone) == 0) states_[kept++] = states_[at];
     }
+    QUOIN_ASSERT(at <= states_.size(), "a state for each bit");
     states_.erase(states_.begin() + static_cast<std::ptrdiff_t>(kept),
                   states_.begin() + static_cast<std::ptrdiff_t>(at));
     voxels ^= gone;

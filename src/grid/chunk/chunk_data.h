@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/ref.h>
 #include <quoin/grid/changes.h>
 #include <quoin/grid/chunk.h>
@@ -57,7 +58,10 @@ class ChunkData : public RefCounted {
   /// Returns the number of voxels with data.
   [[nodiscard]] int count() const { return count_; }
   /// Returns the data of a slab; null if no voxel of it has any.
-  [[nodiscard]] const SlabData* slab(std::size_t index) const { return slabs_[index].get(); }
+  [[nodiscard]] const SlabData* slab(std::size_t index) const {
+    QUOIN_ASSERT(index < slabs_.size(), "a slab of the chunk");
+    return slabs_[index].get();
+  }
   [[nodiscard]] std::uint64_t voxels(int y, int z) const {
     const SlabData* const slab = slabs_[ChunkStorage::slab_index(y, z)].get();
     return slab == nullptr ? 0 : slab->voxels(ChunkStorage::row_in_slab(y, z));

@@ -61,6 +61,7 @@ const Chunk& or_air(const Chunk* chunk) {
 template <class Compare>
 void for_each_other_row(const Chunk& before, const Chunk& after, const IBox& within, const ChunkSlabs& slabs,
                         Compare&& compare) {
+  QUOIN_ASSERT(within.empty() || intersect(within, kWholeChunk) == within, "within 0 to 64");
   if (before.shares_storage_with(after)) return;
   const bool share = share_palette(ChunkStorage::of(before), ChunkStorage::of(after));
   std::array<VoxelType, kChunkEdge> old_row;

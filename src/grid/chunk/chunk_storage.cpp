@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bitset>
 #include <new>
+#include <numeric>
 #include <utility>
 
 #include <quoin/core/assert.h>
@@ -107,6 +108,7 @@ void renumber_row(const std::uint64_t* from, int from_bits, const std::vector<st
 }  // namespace
 
 void Chunk::make_mixed() {
+  QUOIN_ASSERT(storage_ == nullptr, "a chunk of one type");
   Ref<ChunkStorage> made = make_ref<ChunkStorage>();
   ChunkStorage& m = *made;
   m.palette.push_back(uniform_);
@@ -122,11 +124,13 @@ void Chunk::make_mixed() {
 
 std::uint32_t Chunk::find_or_add(VoxelType type) {
   ChunkStorage& m = *storage_;
+  QUOIN_ASSERT(!m.direct(), "voxels with a palette");
   const auto found = std::find(m.palette.begin(), m.palette.end(), type);
   if (found != m.palette.end()) return static_cast<std::uint32_t>(found - m.palette.begin());
   if (m.used < m.palette.size()) {
     const auto unused = std::find(m.counts.begin(), m.counts.end(), 0U);
     const auto index = static_cast<std::size_t>(unused - m.counts.begin());
+    QUOIN_ASSERT(index < m.palette.size(), "an unused entry of the palette");
     m.palette[index] = type;
     return static_cast<std::uint32_t>(index);
   }
@@ -178,6 +182,7 @@ void Chunk::after_writing(int y, int z, std::uint32_t index, std::uint32_t chang
   constexpr std::uint32_t kFewFree = 8;
   ChunkStorage& m = *storage_;
   QUOIN_ASSERT(m.used != 0 && (m.direct() || index < m.palette.size()), "an index of the palette");
+  QUOIN_ASSERT(changed != 0 && changed <= kChunkEdge, "changed voxels of a row");
   if (!m.direct() && m.counts[index] == kChunkVoxels) return fill(m.palette[index]);
   m.credit = std::min(m.credit, kMaxCredit) + changed;
   const std::size_t slab = ChunkStorage::slab_index(y, z);
@@ -230,6 +235,7 @@ void Chunk::repack(int bits) {
   ChunkStorage& m = *storage_;
   Numbering to = m.direct() ? numbering_of_types(m, bits) : numbering_of_palette(m, bits);
   QUOIN_ASSERT(bits == 16 || to.palette.size() <= std::size_t{1} << bits, "enough bits for the palette");
+  QUOIN_ASSERT(std::accumulate(to.counts.begin(), to.counts.end(), 0U) == kChunkVoxels, "each voxel is counted once");
   const bool is_same = m.direct() ? bits == 16 : bits == m.bits && to.palette.size() == m.palette.size();
   const auto old_words = static_cast<std::size_t>(kSlabRows * m.bits);
   const auto new_words = static_cast<std::size_t>(kSlabRows * bits);

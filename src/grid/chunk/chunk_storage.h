@@ -17,6 +17,7 @@ namespace quoin {
 /// The number of rows of a slab, and the bits per voxel for a palette size.
 inline constexpr int kSlabRows = 16;
 [[nodiscard]] inline int bits_for(std::size_t types) {
+  QUOIN_ASSERT(types <= std::size_t{1} << 16, "types of 16 bits");
   if (types <= 2) return 1;
   if (types <= 4) return 2;
   if (types <= 16) return 4;
@@ -25,6 +26,7 @@ inline constexpr int kSlabRows = 16;
 
 /// The slabs in storage order: those of one height are adjacent, because edits often are.
 [[nodiscard]] inline std::size_t slab_in_order(std::size_t i) {
+  QUOIN_ASSERT(i < 256, "a slab of the chunk");
   return i % 16 * 16 + i / 16;
 }
 
@@ -57,12 +59,16 @@ struct ChunkStorage : RefCounted {
   /// Creates a chunk from storage. Requires: at least two types; counts, layers and slabs agree with `words`.
   [[nodiscard]] static Chunk chunk_of(Ref<ChunkStorage> storage) {
     QUOIN_ASSERT(storage != nullptr && storage->used >= 2, "voxels of several types");
+    QUOIN_ASSERT(
+        storage->words.size() == std::size_t{storage->slot_count} * static_cast<std::size_t>(kSlabRows * storage->bits),
+        "words of each slot");
     Chunk chunk;
     chunk.storage_ = std::move(storage);
     return chunk;
   }
 
   [[nodiscard]] static std::size_t slab_index(int y, int z) {
+    QUOIN_ASSERT((y | z) >= 0 && (y | z) < kChunkEdge, "0 <= y, z < 64");
     return static_cast<std::size_t>((z >> 2) * 16 + (y >> 2));
   }
   [[nodiscard]] static int row_in_slab(int y, int z) { return ((z & 3) << 2) | (y & 3); }
@@ -82,6 +88,7 @@ struct ChunkStorage : RefCounted {
   }
   /// Counts a voxel that becomes air (-1) or was air (1).
   void count_voxel(int x, int y, int z, int delta) {
+    QUOIN_ASSERT((x | y | z) >= 0 && (x | y | z) < kChunkEdge && delta * delta == 1, "one voxel of the chunk");
     non_air += delta;
     QUOIN_ASSERT(non_air >= 0 && non_air <= static_cast<int>(kChunkVoxels), "0 <= voxels <= voxels per chunk");
     layer_counts[0][static_cast<std::size_t>(x)] += static_cast<std::uint16_t>(delta);
@@ -90,6 +97,7 @@ struct ChunkStorage : RefCounted {
   }
   // Uses shifts, which have less latency than a multiplication. A slab lies in one page.
   [[nodiscard]] std::size_t word_of(std::uint32_t slot, int row_in_slab) const {
+    QUOIN_ASSERT((slot & kUniformSlab) == 0 && row_in_slab >= 0 && row_in_slab < kSlabRows, "a row of a slot");
     const int log = std::countr_zero(static_cast<unsigned>(bits) | 16U);
     return (std::size_t{slot} << (log + 4)) + (static_cast<std::size_t>(row_in_slab) << log);
   }
@@ -103,6 +111,7 @@ struct ChunkStorage : RefCounted {
     return words.own_at(word_of(slot, row_in_slab));
   }
   [[nodiscard]] std::uint32_t read(std::uint32_t slot, int row_in_slab, int x) const {
+    QUOIN_ASSERT(x >= 0 && x < kChunkEdge, "0 <= x < 64");
     const auto bit = static_cast<unsigned>(x * bits);
     const std::uint64_t word = *words.at(word_of(slot, row_in_slab) + (bit >> 6));
     return static_cast<std::uint32_t>(word >> (bit & 63U)) & ((1U << bits) - 1U);

@@ -1,8 +1,11 @@
 #include "grid/chunk/paged_words.h"
 
+#include <quoin/core/assert.h>
+
 namespace quoin {
 
 Ref<PagedWords::Page> PagedWords::Page::make(std::size_t capacity) {
+  QUOIN_ASSERT(capacity != 0 && capacity <= kPageWords, "the words of a page");
   static_assert(alignof(Page) <= __STDCPP_DEFAULT_NEW_ALIGNMENT__);
   void* const memory = ::operator new(sizeof(Page) + capacity * sizeof(std::uint64_t));
   return Ref<Page>(new (memory) Page(capacity));
@@ -33,6 +36,7 @@ void PagedWords::add_page(std::size_t capacity) {
 }
 
 void PagedWords::replace_page(std::size_t page, std::size_t capacity) {
+  QUOIN_ASSERT(used_of(page) <= capacity, "room for the words in use");
   Ref<Page> made = Page::make(capacity);
   std::copy_n(pages_[page]->words(), used_of(page), made->words());
   pages_[page] = std::move(made);
@@ -49,7 +53,7 @@ void PagedWords::make_page_own(std::size_t page) {
 }
 
 void PagedWords::grow(std::size_t size) {
-  QUOIN_ASSERT(size >= size_, "more words");
+  QUOIN_ASSERT(size >= size_ && size <= kMaxWords, "more words, at most kMaxWords");
   while (size_ < size) {
     const std::size_t page = size_ / kPageWords;
     const std::size_t wanted = std::min(size - page * kPageWords, kPageWords);

@@ -54,6 +54,7 @@ class PagedWords {
   }
   /// Returns true if its page is known to be unshared.
   [[nodiscard]] bool owns(std::size_t word) const {
+    QUOIN_ASSERT(word < kMaxWords, "a word of a chunk");
     const std::size_t page = word / kPageWords;
     return (own_[page / 64].load(std::memory_order_relaxed) >> (page % 64) & 1U) != 0;
   }
@@ -117,7 +118,10 @@ class PagedWords {
     std::atomic<std::uint64_t>& bits = own_[page / 64];
     bits.store(bits.load(std::memory_order_relaxed) | std::uint64_t{1} << (page % 64), std::memory_order_relaxed);
   }
-  [[nodiscard]] std::size_t used_of(std::size_t page) const { return std::min(kPageWords, size_ - page * kPageWords); }
+  [[nodiscard]] std::size_t used_of(std::size_t page) const {
+    QUOIN_ASSERT(page * kPageWords < size_, "a page in use");
+    return std::min(kPageWords, size_ - page * kPageWords);
+  }
 
   std::vector<Ref<Page>> pages_;
   std::size_t size_ = 0;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include <quoin/core/assert.h>
+
 namespace quoin {
 namespace {
 
@@ -12,6 +14,7 @@ constexpr std::size_t kFewTypes = 4;
 constexpr std::uint32_t kNoPart = 0xFFFF'FFFFU;
 
 void add_run(ChunkPart& part, int x, int last_x, int y, int z) {
+  QUOIN_ASSERT(x >= 0 && x <= last_x && last_x < kChunkEdge, "0 <= x <= last_x < 64");
   const std::array<int, 3> min = {x, y, z};
   const std::array<int, 3> last = {last_x, y, z};
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -140,9 +143,11 @@ void ChunkParts::keep_runs(Scratch& scratch) {
       left = rest;
     }
   }
+  QUOIN_ASSERT(run == run_count, "each run is in one row");
 }
 
 std::uint64_t ChunkParts::row_of_part(std::uint64_t row, int y, int z, std::uint32_t part) const {
+  QUOIN_ASSERT(part < parts_.size(), "a part of the chunk");
   if (parts_.size() == 1) return row;
   std::uint64_t of_part = 0;
   std::uint32_t run = first_run(y, z);

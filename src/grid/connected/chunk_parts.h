@@ -4,6 +4,7 @@
 #include <bit>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -61,10 +62,12 @@ class UnionFind {
  public:
   /// Each number starts as a separate set.
   void reset(std::size_t count) {
+    QUOIN_ASSERT(count <= std::numeric_limits<Index>::max(), "numbers of that type");
     parents_.resize(count);
     for (std::size_t i = 0; i < count; ++i) parents_[i] = static_cast<Index>(i);
   }
   [[nodiscard]] Index find(Index i) {
+    QUOIN_ASSERT(i < parents_.size(), "a number of the sets");
     while (parents_[i] != i) {
       parents_[i] = parents_[parents_[i]];
       i = parents_[i];
@@ -124,6 +127,7 @@ class ChunkParts {
   [[nodiscard]] std::uint64_t row(int y, int z) const;
   /// Returns the part of a voxel of a row. Requires: `row` is that row and contains the voxel.
   [[nodiscard]] std::uint32_t part_at(std::uint64_t row, int x, int y, int z) const {
+    QUOIN_ASSERT(!parts_.empty(), "a chunk with parts");
     return parts_.size() == 1 ? 0 : part_of_run(first_run(y, z) + run_of(row, x));
   }
   /// Returns the voxels of a row that belong to one part. Requires: as `part_at`.

@@ -35,6 +35,7 @@ constexpr std::array<std::array<int, 3>, 13> kNextChunks = {{{1, 0, 0},
                                                              {0, 1, 1}}};
 
 IVec3 next_chunk(std::size_t i) {
+  QUOIN_ASSERT(i < kNextChunks.size(), "the index of a following chunk");
   return {kNextChunks[i][0], kNextChunks[i][1], kNextChunks[i][2]};
 }
 
@@ -116,6 +117,7 @@ class Linker {
 
 // Returns true if a part has a voxel at the side, edge or corner of its chunk towards a neighbour.
 bool touches(const ChunkParts& parts, std::uint32_t part, IVec3 towards) {
+  QUOIN_ASSERT(part < parts.parts().size() && towards != IVec3(0), "a part and a neighbour");
   const IBox box = parts.parts()[part].box();
   IBox side{IVec3(0), IVec3(kChunkEdge)};
   int fixed = 0;
@@ -149,6 +151,7 @@ bool holds(const IBox& box, const IBox& inner) {
 
 // Returns a mask of the voxels of a row within an x range.
 std::uint64_t columns(int first, int end) {
+  QUOIN_ASSERT(first >= 0 && first < end && end <= kChunkEdge, "0 <= first < end <= 64");
   const std::uint64_t up_to_end = end == kChunkEdge ? ~std::uint64_t{0} : (std::uint64_t{1} << end) - 1;
   return up_to_end & ~std::uint64_t{0} << first;
 }
@@ -354,12 +357,14 @@ void ConnectedPieces::Impl::number_pieces(UnionFind<std::size_t>& sets) {
     ++first_nodes[piece + 1];
   }
   for (std::size_t i = 0; i < pieces.size(); ++i) first_nodes[i + 1] += first_nodes[i];
+  QUOIN_ASSERT(first_nodes.back() == count, "each node is in one piece");
   nodes.resize(count);
   std::vector<std::size_t> next(first_nodes.begin(), first_nodes.end() - 1);
   for (std::size_t node = 0; node < count; ++node) nodes[next[piece_of_node[node]]++] = node;
 }
 
 void ConnectedPieces::Impl::add_node(std::size_t piece, const Entry& entry, std::size_t part) {
+  QUOIN_ASSERT(piece < pieces.size() && part < entry.parts.parts().size(), "a piece and a part of the chunk");
   const ChunkPart& added = entry.parts.parts()[part];
   const IVec3 origin = entry.at * kChunkEdge;
   const IVec3 first = origin + added.first_voxel();

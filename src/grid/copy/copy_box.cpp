@@ -7,6 +7,8 @@
 #include <optional>
 #include <vector>
 
+#include <quoin/core/assert.h>
+
 #include "core/coordinates/chunk_order.h"
 #include "grid/copy/turned_block.h"
 #include "grid/long_box.h"
@@ -156,6 +158,7 @@ class BoxCopy {
         }
       }
     }
+    QUOIN_ASSERT(all.has_value(), "at least one chunk");
     return mapped(*all);
   }
 

@@ -4,9 +4,12 @@
 #include <array>
 #include <cstddef>
 
+#include <quoin/core/assert.h>
+
 namespace quoin {
 
 void TurnedBlock::begin(AxisOrientation orientation, const IBox& part) {
+  QUOIN_ASSERT(!part.empty() && intersect(part, kWholeChunk) == part, "a part of the chunk");
   orientation_ = orientation;
   part_ = part;
   first_ = 0;
@@ -24,10 +27,13 @@ void TurnedBlock::clear() {
 }
 
 VoxelType* TurnedBlock::place(IVec3 in_box) const {
-  return types_.get() + first_ + in_box.x * strides_.x + in_box.y * strides_.y + in_box.z * strides_.z;
+  const int index = first_ + in_box.x * strides_.x + in_box.y * strides_.y + in_box.z * strides_.z;
+  QUOIN_ASSERT(index >= 0 && index < static_cast<int>(kChunkVoxels), "a voxel of the chunk");
+  return types_.get() + index;
 }
 
 void TurnedBlock::put(const Chunk* chunk, const IBox& part, IVec3 offset) {
+  QUOIN_ASSERT(!part.empty() && intersect(part, kWholeChunk) == part, "a part of the chunk");
   if (chunk == nullptr) return fill(kAir, offset, part.size());
   if (const auto type = chunk->uniform()) return fill(*type, offset, part.size());
   if (orientation_.source_axis(0) == 0) return put_rows(*chunk, part, offset);

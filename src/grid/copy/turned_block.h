@@ -3,6 +3,7 @@
 #include <memory>
 #include <span>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/axis_orientation.h>
 #include <quoin/grid/chunk.h>
 
@@ -42,6 +43,7 @@ class TurnedBlock {
     return std::span<const VoxelType, kChunkVoxels>(types_.get(), kChunkVoxels);
   }
   [[nodiscard]] const VoxelType* at(int x, int y, int z) const {
+    QUOIN_ASSERT((x | y | z) >= 0 && (x | y | z) < kChunkEdge, "0 <= x, y, z < 64");
     return types_.get() + (z * kChunkEdge + y) * kChunkEdge + x;
   }
 
