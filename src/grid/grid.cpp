@@ -53,6 +53,7 @@ struct Grid::Impl {
     if (const int data = quoin::data_count(slot.entry->chunk); data != edit.data_before) {
       if (!edit.record.has_data()) edit.record.data = edit.record.box;
       data_count += data - edit.data_before;
+      QUOIN_ASSERT(data_count >= data, "a grid has the data of its chunks");
     }
     if (edit.voxels != 0 || edit.record.has_data()) {
       journal.begin_change();
@@ -101,6 +102,7 @@ struct Grid::Impl {
 template <class Change>
 std::int64_t Grid::Impl::edit_chunk(IVec3 chunk, const ChunkTable::Slot& slot, const IBox& part, EditNotice& notice,
                                     Change& change) {
+  QUOIN_ASSERT(slot.entry != nullptr && !part.empty() && intersect(part, kWholeChunk) == part, "a part of a chunk");
   VoxelEdit edit{.data_before = quoin::data_count(slot.entry->chunk)};
   entries.voxels_will_change(slot);
   try {

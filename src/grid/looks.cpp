@@ -57,6 +57,7 @@ class MedianCut {
 
   /// Splits groups until there are `most`, or no group has two colours.
   void cut(std::size_t most) {
+    QUOIN_ASSERT(!groups_.empty(), "at least one look");
     while (groups_.size() < most && groups_.top().spread > 0) {
       const Group group = groups_.top();
       groups_.pop();
@@ -68,6 +69,7 @@ class MedianCut {
 
   /// Gives each look the mean colour of its group. Removes the groups.
   void take_means(std::vector<Rgba8>& colours) {
+    QUOIN_ASSERT(colours.size() == looks_.size(), "a colour per look");
     for (; !groups_.empty(); groups_.pop()) {
       const Group& group = groups_.top();
       const Rgba8 colour = mean_of(group);
@@ -118,6 +120,7 @@ class MedianCut {
       middle = begin + (end - begin) / 2;
       while (value(*middle) == value(*(middle - 1))) --middle;
     }
+    QUOIN_ASSERT(middle > begin && middle < end, "looks on both sides");
     return static_cast<std::size_t>(middle - order_.begin());
   }
 
@@ -199,6 +202,7 @@ Result<std::vector<VoxelType>> Looks::add_to(VoxelRegistry& types, std::span<con
     const auto [known, is_new] = by_key.try_emplace(key_of((*colours)[i], looks_[i].material), next);
     found.push_back(known->second);
     if (!is_new) continue;
+    QUOIN_ASSERT(looks_[i].material < materials.size(), "one of the materials");
     VoxelProperties type = materials[looks_[i].material];
     type.colour = (*colours)[i];
     type.visibility = type.colour.a < 255 ? Visibility::Transparent : Visibility::Opaque;

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include <quoin/core/assert.h>
+
 namespace quoin {
 
 namespace {
@@ -30,6 +32,7 @@ constexpr std::size_t kBins = 1024;
 using Histogram = std::array<double, kBins>;
 
 Histogram histogram_of(const Volume& volume) {
+  QUOIN_ASSERT(volume.min < volume.max, "a range of values");
   const double min = volume.min;
   const double bins_per_value = kBins / (static_cast<double>(volume.max) - min);
   Histogram counts{};
@@ -84,10 +87,12 @@ float volume_threshold(const Volume& volume) {
 }  // namespace
 
 std::string_view name_of(ScalarType type) {
+  QUOIN_ASSERT(static_cast<std::size_t>(type) < kTypes.size(), "a known type");
   return kTypes[static_cast<std::size_t>(type)].name;
 }
 
 std::size_t size_of(ScalarType type) {
+  QUOIN_ASSERT(static_cast<std::size_t>(type) < kTypes.size(), "a known type");
   return kTypes[static_cast<std::size_t>(type)].bytes;
 }
 

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/hash.h>
 
 #include "grid/density/stored_density.h"
@@ -38,9 +39,13 @@ class Samples {
 
   [[nodiscard]] IVec3 size() const { return volume_.size; }
   [[nodiscard]] const float* row(int y, int z) const {
+    QUOIN_ASSERT(y >= 0 && y < volume_.size.y && z >= 0 && z < volume_.size.z, "a row of the volume");
     return volume_.values.data() + static_cast<std::size_t>(z) * plane_ + static_cast<std::size_t>(y) * row_;
   }
-  [[nodiscard]] float at(IVec3 p) const { return row(p.y, p.z)[p.x]; }
+  [[nodiscard]] float at(IVec3 p) const {
+    QUOIN_ASSERT(p.x >= 0 && p.x < volume_.size.x, "a sample of the volume");
+    return row(p.y, p.z)[p.x];
+  }
   /// Returns the gradient length at the surface between a sample and the next on `axis`.
   [[nodiscard]] double steepness(IVec3 p, int axis) const {
     IVec3 next = p;
@@ -104,6 +109,7 @@ void measure_row(const Samples& samples, float iso, int y, int z, std::vector<st
 
 // Steepness where the surface crosses edges, of about one row in `stride`, spread evenly.
 std::vector<double> steepness_at_surface(const Samples& samples, float iso, std::uint32_t stride, Threads threads) {
+  QUOIN_ASSERT(stride > 0, "a positive stride");
   const IVec3 size = samples.size();
   std::vector<std::vector<double>> found(static_cast<std::size_t>(size.z));
   parallel_for(found.size(), threads, [&](std::size_t i) {

@@ -5,6 +5,8 @@
 #include <functional>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 #include "core/change_journal.h"
 #include "core/srgb.h"
 #include "grid/make_room.h"
@@ -73,6 +75,7 @@ VoxelRegistry& VoxelRegistry::operator=(VoxelRegistry&&) noexcept = default;
 VoxelRegistry::~VoxelRegistry() = default;
 
 void VoxelRegistry::note(TypeChange change) {
+  QUOIN_ASSERT(change.type < content_->serials.size(), "a registered type");
   journal_->note(content_->serials[change.type], {change}, size());
 }
 
@@ -141,8 +144,10 @@ void VoxelRegistry::replace(VoxelType type, VoxelProperties properties) {
   c.by_hash.emplace(hash_of(properties), type);
   if (old != last) c.by_hash.erase(old);
   const Visibility was = std::exchange(c.visibility[type], properties.visibility);
+  QUOIN_ASSERT(was != Visibility::Transparent || c.transparent_count != 0, "transparent types are counted");
   if (was == Visibility::Transparent) --c.transparent_count;
   if (properties.visibility == Visibility::Transparent) ++c.transparent_count;
+  QUOIN_ASSERT(c.properties[type].collides || c.passable_count != 0, "passable types are counted");
   if (!c.properties[type].collides) --c.passable_count;
   if (!properties.collides) ++c.passable_count;
   const TypeChange change{type, was != properties.visibility, !(c.properties[type].colour == properties.colour)};

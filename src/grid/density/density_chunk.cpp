@@ -95,6 +95,7 @@ void DensityChunk::make_mixed() {
 // Returns a slot of a slab for writing. A uniform slab gets a slot filled with its density.
 std::uint32_t DensityChunk::slot_for_writing(std::size_t slab) {
   DensityStorage& m = *storage_;
+  QUOIN_ASSERT(slab < m.slabs.size() && m.values.size() % kSlabValues == 0, "a slab of the chunk, and whole slots");
   const std::uint32_t entry = m.slabs[slab];
   if ((entry & ChunkStorage::kUniformSlab) == 0) return entry;
   std::uint32_t slot = 0;
@@ -142,6 +143,7 @@ void DensityStorage::turn_outward(DensityChunk& chunk, const std::array<std::uin
     std::uint64_t any = 0;
     std::uint64_t all = ~std::uint64_t{0};
     for (std::size_t row = 0; row < kSlabRows; ++row) {
+      QUOIN_ASSERT((rows[number(row)] & ~m.solid[number(row)]) == 0, "solid samples");
       any |= rows[number(row)];
       all &= rows[number(row)];
       m.solid[number(row)] &= ~rows[number(row)];
@@ -196,6 +198,7 @@ void DensityChunk::compact() {
     slab = static_cast<std::uint32_t>(values.size() / kSlabValues);
     values.insert(values.end(), from, from + kSlabValues);
   }
+  QUOIN_ASSERT(values.size() == m.values.size() - m.free_slots.size() * kSlabValues, "each slot is free or in use");
   m.values = std::move(values);
   m.free_slots = {};
 }

@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <quoin/core/assert.h>
+
 #include "grid/density/density_grid_impl.h"
 #include "grid/density/density_shapes.h"
 
@@ -32,6 +34,7 @@ bool is_length(double value) {
 template <class Shape, class Combine>
 void combine_row(const Shape& shape, IVec3 start, int first, int end, VoxelType material, SampleRow& row,
                  Combine&& combine) {
+  QUOIN_ASSERT(first >= 0 && first <= end && end <= kChunkEdge, "0 <= first <= end <= 64");
   for (int x = first; x < end; ++x) {
     const auto i = static_cast<std::size_t>(x);
     const float before = row.densities[i];

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
 
 #include "grid/long_box.h"
@@ -46,6 +47,7 @@ class RoundedBox {
   [[nodiscard]] DVec3 max() const { return max_; }
   /// Negative inside.
   [[nodiscard]] double distance(DVec3 point) const {
+    QUOIN_ASSERT(is_sound_, "a valid box");
     const DVec3 beyond = glm::abs(point - middle_) - (half_size_ - rounding_);
     const DVec3 outside = glm::max(beyond, DVec3(0.0));
     const double inside = std::min(std::max({beyond.x, beyond.y, beyond.z}), 0.0);
@@ -75,6 +77,7 @@ class Plane {
   [[nodiscard]] bool is_sound() const { return is_sound_; }
   /// Positive on the side that the normal points to.
   [[nodiscard]] double distance(DVec3 point) const {
+    QUOIN_ASSERT(is_sound_, "a valid plane");
     // A quarter of each part, so that no sum of finite numbers overflows.
     const DVec3 d = 0.25 * point - 0.25 * point_;
     return 4.0 * (d.x * normal_.x + d.y * normal_.y + d.z * normal_.z);
@@ -97,6 +100,7 @@ class Brush {
   [[nodiscard]] const Sphere& sphere() const { return sphere_; }
   /// Returns strength * (1 - (distance / radius)^2)^2 inside, 0 outside.
   [[nodiscard]] double weight(DVec3 point) const {
+    QUOIN_ASSERT(is_sound(), "a valid brush");
     const DVec3 d = (point - centre_) / radius_;
     const double left = 1.0 - (d.x * d.x + d.y * d.y + d.z * d.z);
     return left > 0.0 ? strength_ * left * left : 0.0;

@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/buffer.h>
 
 #include "grid/density/density_grid_impl.h"
@@ -39,6 +40,7 @@ class Window {
   }
 
   void read(const DensityNeighbourhood& around, const IBox& part) {
+    QUOIN_ASSERT(intersect(part, kWholeChunk) == part, "a part of the chunk");
     part_ = part;
     for (int z = part.min.z - 1; z <= part.max.z; ++z) {
       for (int y = part.min.y - 1; y <= part.max.y; ++y) {
@@ -151,6 +153,7 @@ std::int64_t DensityGrid::smooth(DVec3 centre, double radius, double strength) {
       next = 0;
       next_solid = 0;
     }
+    QUOIN_ASSERT(current != news.end() && next < current->densities.size(), "a row that was computed");
     for (int x = first; x < end; ++x) {
       const auto i = static_cast<std::size_t>(x);
       row.densities[i] = current->densities[next++];

@@ -19,6 +19,7 @@ struct DensityStorage : RefCounted {
   [[nodiscard]] static const DensityStorage* of(const DensityChunk& chunk) { return chunk.storage_.get(); }
   /// Creates a chunk of these densities. Requires: at least two values; each is a `stored_density`, and `solid` agrees.
   [[nodiscard]] static DensityChunk chunk_of(Ref<DensityStorage> storage, Chunk materials) {
+    QUOIN_ASSERT(storage != nullptr, "several densities");
     DensityChunk chunk(Half{0});
     chunk.storage_ = std::move(storage);
     chunk.materials_ = std::move(materials);
@@ -35,6 +36,7 @@ struct DensityStorage : RefCounted {
 
   [[nodiscard]] const Half* row(std::uint32_t slot, int row_in_slab) const {
     QUOIN_ASSERT((std::size_t{slot} + 1) * 16 * kChunkEdge <= values.size(), "a slab with values of its own");
+    QUOIN_ASSERT(row_in_slab >= 0 && row_in_slab < kSlabRows, "a row of the slab");
     return values.data() + (std::size_t{slot} * 16 + static_cast<std::size_t>(row_in_slab)) * kChunkEdge;
   }
   [[nodiscard]] Half* row(std::uint32_t slot, int row_in_slab) {

@@ -75,6 +75,7 @@ void DensityStore::read_row(const DensityChunk& samples, int y, int z, SampleRow
 
 std::uint64_t DensityStore::write_row(DensityChunk& samples, int y, int z, int first, int end,
                                       const SampleRow& row) const {
+  QUOIN_ASSERT(first >= 0 && first < end && end <= kChunkEdge, "0 <= first < end <= 64");
   std::array<Half, kChunkEdge> halves;
   samples.read_row(y, z, halves);
   const std::uint64_t had_material = mask_where_not(halves, far_);

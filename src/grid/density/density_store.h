@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/progress.h>
 #include <quoin/grid/density_grid.h>
 
@@ -117,6 +118,7 @@ class DensityStore {
 
 template <class ChangeRow>
 std::int64_t DensityStore::edit_rows(IVec3 chunk, const IBox& part, ChangeRow& change) {
+  QUOIN_ASSERT(!part.empty() && intersect(part, kWholeChunk) == part, "a part of the chunk");
   Entry& entry = find_or_create(chunk);
   ChangeReach changes;
   SampleRow row;
@@ -143,7 +145,10 @@ template <class ChangeRow>
 std::int64_t DensityStore::edit_parts(const std::vector<ChunkPart>& parts, ChangeRow&& change) {
   journal_.begin_change();
   std::int64_t changed = 0;
-  for (const ChunkPart& part : parts) changed += edit_rows(part.chunk, part.box, change);
+  for (const ChunkPart& part : parts) {
+    QUOIN_ASSERT(loaded_.may_edit(part.chunk), "a loaded chunk within the world");
+    changed += edit_rows(part.chunk, part.box, change);
+  }
   return changed;
 }
 

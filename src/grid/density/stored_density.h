@@ -4,6 +4,7 @@
 #include <bit>
 #include <cstdint>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/half.h>
 
 namespace quoin {
@@ -24,6 +25,7 @@ inline constexpr Half kLeastStored = 0x0400;
 
 /// `stored_density` for a band that is a half.
 inline Half stored_within(float density, Half band) {
+  QUOIN_ASSERT(band != 0 && band <= 0x7C00U, "a positive band");
   const auto bits = std::bit_cast<std::uint32_t>(density);
   if ((bits & 0x7FFF'FFFFU) > 0x7F80'0000U) return band;  // NaN
   if (density == 0.0F) return 0;

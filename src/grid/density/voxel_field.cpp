@@ -71,6 +71,8 @@ struct Window {
 /// Visits (y, z) of a window enlarged by `more_y` and `more_z` at its ends.
 template <class Visit>
 void for_each_row(const Window& window, int more_y, int more_z, Visit visit) {
+  QUOIN_ASSERT(window.first_y >= 0 && window.last_y <= kChunkEdge && window.first_z >= 0 && window.last_z <= kChunkEdge,
+               "rows of the chunk");
   for (int z = window.first_z; z < window.last_z + more_z; ++z) {
     for (int y = window.first_y; y < window.last_y + more_y; ++y) visit(y, z);
   }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <bit>
 
+#include <quoin/core/assert.h>
+
 #include "core/rows/packed_row.h"
 #include "grid/chunk/chunk_storage.h"
 
@@ -14,6 +16,7 @@ constexpr std::uint64_t kHalfRow = 0xFFFF'FFFFU;
 
 // The eight voxels of a cell of four rows, as bits.
 unsigned cell_bits(const std::array<std::uint64_t, 4>& rows, int x) {
+  QUOIN_ASSERT(x >= 0 && x < kHalfEdge, "0 <= x < 32");
   unsigned bits = 0;
   for (std::size_t i = 0; i < rows.size(); ++i) bits |= static_cast<unsigned>(rows[i] >> (2 * x) & 3U) << (2 * i);
   return bits;
@@ -49,6 +52,7 @@ Chunk ChunkHalver::make() {
 }
 
 void ChunkHalver::add(VoxelType type, int half, std::uint64_t cells) {
+  QUOIN_ASSERT((half == 0 || half == 1) && (cells & ~kHalfRow) == 0, "32 cells of half a row");
   if (cells == 0) return;
   const auto found = std::find_if(runs_.begin(), runs_.end(), [type](const Run& run) { return run.type == type; });
   const std::uint64_t shifted = cells << (half * kHalfEdge);
@@ -61,7 +65,9 @@ void ChunkHalver::add(VoxelType type, int half, std::uint64_t cells) {
 
 void ChunkHalver::fill_half(int half, int y, int z, std::uint64_t solid) {
   // Solid cells hold voxels, so there is a chunk.
-  const Chunk& chunk = *masks_.octant({half, y / kHalfEdge, z / kHalfEdge});
+  const Chunk* const octant = masks_.octant({half, y / kHalfEdge, z / kHalfEdge});
+  QUOIN_ASSERT(octant != nullptr, "solid cells hold voxels");
+  const Chunk& chunk = *octant;
   const ChunkStorage* mixed = ChunkStorage::of(chunk);
   if (mixed == nullptr) return add(*chunk.uniform(), half, solid);
   const int fine_y = 2 * (y % kHalfEdge);

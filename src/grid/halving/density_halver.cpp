@@ -5,6 +5,8 @@
 #include <optional>
 #include <span>
 
+#include <quoin/core/assert.h>
+
 #include "grid/density/stored_density.h"
 #include "grid/halving/halving.h"
 
@@ -58,6 +60,7 @@ HalvedDensityChunk DensityHalver::make() const {
 
 // `made` is of one density, which rows that are of that alone keep.
 void DensityHalver::halve_densities(DensityChunk& made) const {
+  QUOIN_ASSERT(made.uniform().has_value(), "a chunk of one density");
   const Half uniform = *made.uniform();
   std::array<Half, kChunkEdge> coarse{};
   for (int z = 0; z < kChunkEdge; ++z) {
@@ -96,6 +99,7 @@ void DensityHalver::copy_materials(Chunk& made) const {
         const std::uint64_t mask = solid & (~std::uint64_t{0} >> kHalf) << (part * static_cast<int>(kHalf));
         if (mask == 0) continue;
         const IVec3 first{part * kChunkEdge, 2 * y, 2 * z};
+        QUOIN_ASSERT(chunk_at(first) != nullptr, "solid samples belong to a chunk");
         const Chunk& materials = chunk_at(first)->materials();
         if (const std::optional<VoxelType> one = materials.uniform()) {
           made.fill_row(y, z, mask, *one);

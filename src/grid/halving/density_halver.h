@@ -1,10 +1,12 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/grid/density_grid.h>
 #include <quoin/grid/downsample.h>
 
@@ -42,6 +44,7 @@ class DensityHalver {
 
   [[nodiscard]] const DensityChunk* chunk_at(IVec3 fine) const {
     const IVec3 at = (fine >> kChunkShift) + 1;
+    QUOIN_ASSERT((IBox{IVec3(0), IVec3(4)}.contains(at)), "-64 <= x, y, z < 192");
     return chunks_[static_cast<std::size_t>(at.x + 4 * at.y + 16 * at.z)];
   }
   [[nodiscard]] Half density(IVec3 fine) const {
@@ -50,6 +53,7 @@ class DensityHalver {
     return chunk == nullptr ? far_ : chunk->get(p.x, p.y, p.z);
   }
   [[nodiscard]] const Signs& signs(int y, int z) const {
+    QUOIN_ASSERT(std::min(y, z) >= -1 && std::max(y, z) <= kChunkEdge, "-1 <= y, z <= 64");
     return signs_[static_cast<std::size_t>((z + 1) * kRows + y + 1)];
   }
   void read_signs(int y, int z);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include <quoin/core/assert.h>
+
 #include "core/rows/packed_row.h"
 #include "grid/chunk/chunk_storage.h"
 
@@ -205,6 +207,7 @@ void HalvingMasks::count_cells(int y, int z) {
 }
 
 std::uint64_t HalvingMasks::kept_rods(int y, int z, int axis) const {
+  QUOIN_ASSERT((y | z) >= 0 && (y | z) < kChunkEdge && axis >= 0 && axis < 3, "a row of the chunk, and an axis");
   const CellRow& here = cells(y, z);
   const auto of = static_cast<std::size_t>(axis);
   std::uint64_t kept = here.rod[of].bits;
@@ -240,6 +243,7 @@ std::uint64_t HalvingMasks::solid_cells(int y, int z) const {
 }
 
 std::array<std::uint64_t, 3> HalvingMasks::exposed_faces(int half, int y, int z) const {
+  QUOIN_ASSERT(half == 0 || half == 1, "one of two halves");
   const auto word = static_cast<std::size_t>(half + 1);
   const FineRow& row = fine(y, z);
   const std::uint64_t lower_x = ~(row[word] << 1 | row[word - 1] >> 63);

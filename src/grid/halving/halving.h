@@ -1,9 +1,12 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/grid/grid.h>
 
 namespace quoin {
@@ -33,6 +36,7 @@ class HalvingMasks {
   [[nodiscard]] std::uint64_t solid_cells(int y, int z) const;
   /// Returns the non-air voxels of half a row, 0 <= y, z < 128; `half` is 0 or 1.
   [[nodiscard]] std::uint64_t voxels(int half, int y, int z) const {
+    QUOIN_ASSERT(half == 0 || half == 1, "one of two halves");
     return fine(y, z)[static_cast<std::size_t>(half + 1)];
   }
   /// Returns the number of exposed faces of each voxel of half a row, as bit planes: [0] ones, [1] twos, [2] fours.
@@ -60,13 +64,16 @@ class HalvingMasks {
   using FineRow = std::array<std::uint64_t, 4>;
 
   [[nodiscard]] static std::size_t slot(IVec3 octant) {
+    QUOIN_ASSERT((IBox{IVec3(-1), IVec3(3)}.contains(octant)), "-1 <= x, y, z <= 2");
     return static_cast<std::size_t>((octant.z + 1) * 16 + (octant.y + 1) * 4 + octant.x + 1);
   }
   [[nodiscard]] const FineRow& fine(int y, int z) const {
+    QUOIN_ASSERT(std::min(y, z) >= -2 && std::max(y, z) < kFineEdge + 2, "-2 <= y, z < 130");
     return fine_[static_cast<std::size_t>((z + 2) * kRows + y + 2)];
   }
-  [[nodiscard]] FineRow& fine(int y, int z) { return fine_[static_cast<std::size_t>((z + 2) * kRows + y + 2)]; }
+  [[nodiscard]] FineRow& fine(int y, int z) { return const_cast<FineRow&>(std::as_const(*this).fine(y, z)); }
   [[nodiscard]] const CellRow& cells(int y, int z) const {
+    QUOIN_ASSERT(std::min(y, z) >= -1 && std::max(y, z) <= kChunkEdge, "-1 <= y, z <= 64");
     return cells_[static_cast<std::size_t>((z + 1) * kCellRows + y + 1)];
   }
   void read_voxels(IVec3 octant);
