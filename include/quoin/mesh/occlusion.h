@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/direction.h>
 #include <quoin/core/vec.h>
 
@@ -61,8 +62,9 @@ inline constexpr std::array<std::array<CornerNeighbours, 4>, 6> kCornerNeighbour
   return static_cast<std::uint8_t>(static_cast<int>(side1) + static_cast<int>(side2) + static_cast<int>(corner));
 }
 
-/// Returns the brightness for an occlusion of 0 to 3: 1, 0.75, 0.5, 0.25.
+/// Returns the brightness for an occlusion of 0 to 3: 1, 0.75, 0.5, 0.25. Requires: occlusion <= 3.
 [[nodiscard]] constexpr float occlusion_brightness(std::uint8_t occlusion) {
+  QUOIN_ASSERT(occlusion <= 3, "0 <= occlusion <= 3");
   return 1.0F - 0.25F * static_cast<float>(occlusion);
 }
 

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 #include "mesh/array/cells.h"
 #include "mesh/array/corners.h"
 #include "mesh/array/sheets.h"
@@ -35,6 +37,7 @@ class VertexMaker {
   }
   void finish() {
     if (count_ == 0) return;
+    QUOIN_ASSERT(first_ + count_ <= out_.positions.size(), "vertices that were counted");
     reader_.convert(raw_, rule_, count_, corners_);
     kernel().vertices(corners_, count_, placement_, batch_, out_.positions.data() + first_,
                       out_.normals.data() + first_);
@@ -93,6 +96,7 @@ Status make_quads(const Lattice& lattice, const Signs& signs, const CellIndex& i
       const std::uint64_t* const solid = slice == 0 ? nullptr : signs.slice(slice - 1);
       to = kernel().quads(window.at(slice), solid, index.rows_of(lattice, slice), rules, to);
     }
+    QUOIN_ASSERT(to == out.indices.data() + 6 * index.quads_before[slab + 1], "the quads that were counted");
   });
 }
 

@@ -98,6 +98,7 @@ struct CellIndex {
   [[nodiscard]] std::uint64_t vertices() const { return vertices_before.back(); }
   [[nodiscard]] std::uint64_t quads() const { return quads_before.back(); }
   [[nodiscard]] RankedRows rows_of(const Lattice& lattice, std::size_t slice) const {
+    QUOIN_ASSERT(slice <= lattice.slices(), "a slice of cells");
     return {active.data() + slice * lattice.cell_slice_words(), first.data() + slice * (lattice.rows() + 1)};
   }
 };
@@ -118,6 +119,7 @@ Status for_each_slab(const Lattice& lattice, Threads threads, ProgressSteps& ste
 // Calls visit(cell) for each cell with a vertex in some slices, in the order of the vertices.
 template <class Visit>
 void for_each_cell(const Lattice& lattice, const CellIndex& index, std::size_t first, std::size_t end, Visit visit) {
+  QUOIN_ASSERT(first <= end && end <= lattice.slices() + 1, "slices of cells");
   for (std::size_t slice = first; slice < end; ++slice) {
     const RankedRows ranked = index.rows_of(lattice, slice);
     for (std::size_t row = 0; row <= lattice.rows(); ++row) {

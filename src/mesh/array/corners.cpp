@@ -5,6 +5,8 @@
 #include <cstring>
 #include <type_traits>
 
+#include <quoin/core/assert.h>
+
 namespace quoin::array {
 namespace {
 
@@ -27,11 +29,13 @@ std::uint8_t corners_beyond(const CornerRows& rows, bool is_low_beyond, bool is_
 template <class T>
 void read_corners(const CornerRows& rows, const std::int32_t* cells, std::size_t count, std::size_t at,
                   RawCorners& out) {
+  QUOIN_ASSERT(at + count <= kBatch, "at most one batch");
   const std::uint8_t inner = corners_beyond(rows, false, false);
   out.has_beyond |= inner != 0;
   std::byte* const to = out.values + at * sizeof(T);
   for (std::size_t i = 0; i < count; ++i) {
     const std::ptrdiff_t cell = cells[i];
+    QUOIN_ASSERT(cell >= 0 && cell <= rows.size, "a cell of the row");
     out.is_beyond[at + i] = inner;
     if (cell > 0 && cell < rows.size) {
       copy_values<T>(rows, (cell - 1) * rows.stride, cell * rows.stride, to + i * sizeof(T));
@@ -98,6 +102,7 @@ void convert_values(const T* values, const SolidRule& rule, std::size_t count, C
 
 template <class T>
 void convert_corners(const RawCorners& raw, const SolidRule& rule, std::size_t count, CornerBatch& out) {
+  QUOIN_ASSERT(count <= kBatch, "at most one batch");
   alignas(64) T values[8 * kBatch];
   std::memcpy(values, raw.values, sizeof(values));
   convert_values(values, rule, count, out);
@@ -140,6 +145,7 @@ auto with_type(ScalarType type, Visit visit) {
     case ScalarType::Float32:
       return visit(float{});
     default:
+      QUOIN_ASSERT(type == ScalarType::Float64, "a known type");
       return visit(double{});
   }
 }
@@ -147,6 +153,7 @@ auto with_type(ScalarType type, Visit visit) {
 }  // namespace
 
 CornerRows corner_rows(const Lattice& lattice, std::int64_t row, std::int64_t slice) {
+  QUOIN_ASSERT(row >= 0 && row <= lattice.size[1] && slice >= 0 && slice <= lattice.size[2], "a row of cells");
   CornerRows corners{{}, {}, nullptr, lattice.stride[0], lattice.size[0]};
   for (std::int64_t i = 0; i < 4; ++i) {
     const std::int64_t y = row - 1 + i % 2;

@@ -6,6 +6,8 @@
 #include <tuple>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 #include "mesh/array/cells.h"
 #include "mesh/array/kernel.h"
 #include "mesh/array/lattice.h"
@@ -26,7 +28,9 @@ bool is_signed(ScalarType type) {
 class LabelCode {
  public:
   explicit LabelCode(ScalarType type)
-      : bits_(8 * static_cast<unsigned>(size_of(type))), sign_(is_signed(type) ? std::uint64_t{1} << (bits_ - 1) : 0) {}
+      : bits_(8 * static_cast<unsigned>(size_of(type))), sign_(is_signed(type) ? std::uint64_t{1} << (bits_ - 1) : 0) {
+    QUOIN_ASSERT(type != ScalarType::Float32 && type != ScalarType::Float64, "labels are integers");
+  }
 
   [[nodiscard]] std::uint64_t sign() const { return sign_; }
   [[nodiscard]] std::uint64_t bits_of(std::int64_t label) const {
@@ -183,6 +187,7 @@ class Builder {
       quads += slot.number;
       out_.interfaces.back().index_count += 6 * slot.number;
     }
+    QUOIN_ASSERT(quads == index_.quads(), "each quad is in one interface");
     out_.background = options_.background;
   }
 
@@ -242,6 +247,7 @@ class Builder {
         if (++count == kBatch) finish();
       });
       finish();
+      QUOIN_ASSERT(to == out_.positions.data() + first_of(end), "the vertices that were counted");
     });
   }
   Status add_quads() {
@@ -305,6 +311,9 @@ Buffer<std::uint32_t> indices_of_label(const LabelSurfaces& surfaces, std::int64
   for (const LabelInterface& interface : surfaces.interfaces) {
     const bool is_front = interface.front == label;
     if (interface.back != label && !is_front) continue;
+    QUOIN_ASSERT(
+        interface.first_index + interface.index_count <= surfaces.indices.size() && interface.index_count % 3 == 0,
+        "whole triangles of the surfaces");
     const std::size_t before = indices.size();
     const std::uint32_t* from = surfaces.indices.data() + interface.first_index;
     indices.resize(before + interface.index_count);

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include <quoin/core/assert.h>
+
 #include "mesh/array/lattice.h"
 
 namespace quoin::array {
@@ -20,6 +22,7 @@ struct Placement {
   Placement placement{};
   const DVec3 s = lattice.spacing;
   const double least = std::min({std::abs(s.x), std::abs(s.y), std::abs(s.z)});
+  QUOIN_ASSERT(least > 0.0 && std::isfinite(least), "a spacing that is finite and not 0");
   for (int i = 0; i < 3; ++i) {
     placement.origin[i] = lattice.origin[i];
     placement.spacing[i] = s[i];

@@ -51,6 +51,7 @@ smooth::CellVertex vertex_of_sheet(const smooth::Corners& d, const smooth::Sheet
     sum += at;
     count += 1.0F;
   }
+  QUOIN_ASSERT(count > 0.0F, "a sheet of the cell");
   smooth::CellVertex vertex;
   vertex.fraction = sum * (1.0F / count);
   const Vec3 g = smooth::trilinear_gradient(d, vertex.fraction);
@@ -148,6 +149,7 @@ std::uint32_t SplitCells::vertex_on_edge(const void* split_cells, std::uint32_t 
   const auto& cells = static_cast<const SplitCells*>(split_cells)->cells_;
   const auto cell =
       std::lower_bound(cells.begin(), cells.end(), vertex, [](const Cell& a, std::uint32_t b) { return a.vertex < b; });
+  QUOIN_ASSERT(cell != cells.end() && cell->vertex == vertex && edge < 12, "an edge of a cell with several sheets");
   const unsigned sheet = smooth::sheets_of(cell->solid, cell->flipped_face).of_edge[edge];
   return sheet == 0 ? vertex : cell->first_extra + sheet - 1;
 }

@@ -36,6 +36,7 @@ Signs::Signs(const Lattice& lattice, const ArraySurfaceOptions& options)
 void Signs::find_row(std::size_t y, std::size_t z, const std::byte* limit, std::vector<std::byte>& packed) {
   const auto row = static_cast<std::int64_t>(y);
   const auto slice = static_cast<std::int64_t>(z);
+  QUOIN_ASSERT(static_cast<std::size_t>(lattice_.type) < kScalarTypes, "a known type");
   if (!packed.empty()) pack_row(lattice_, row, slice, packed.data());
   const auto solid_row = kernel().solid_row[static_cast<std::size_t>(lattice_.type)][rule_.is_below ? 1 : 0];
   solid_row(packed.empty() ? lattice_.row(row, slice) : packed.data(), static_cast<std::size_t>(lattice_.size[0]),

@@ -2,6 +2,7 @@
 
 #include <limits>
 
+#include <quoin/core/assert.h>
 #include <quoin/mesh/quad_triangles.h>
 
 namespace quoin {
@@ -26,6 +27,7 @@ void grow(std::size_t quads, BlockyTriangles& out) {
 // Writes the quad with index `number`.
 void put_quad(const Quad& quad, IVec3 origin, std::size_t number, BlockyTriangles& out) {
   const std::size_t first = 4 * number;
+  QUOIN_ASSERT(first + 4 <= out.positions.size() && 6 * (number + 1) <= out.indices.size(), "a quad that was counted");
   for_each_vertex({&quad, 1}, [&](std::size_t i, const QuadVertex& vertex) {
     out.positions[first + i] = Vec3(origin + vertex.position);
     out.directions[first + i] = vertex.direction;

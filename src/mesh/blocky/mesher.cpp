@@ -77,6 +77,7 @@ namespace {
 
 // Returns the voxels of a row of the centre chunk that are transparent and have the same type as in a neighbour's row.
 std::uint64_t same_transparent(const Job& job, const Chunk& other, int y, int z, int other_y, int other_z) {
+  QUOIN_ASSERT(job.chunks->centre() != nullptr, "a chunk to mesh");
   const Chunk& centre = *job.chunks->centre();
   std::uint64_t mask = 0;
   const ChunkStorage* voxels = ChunkStorage::of(centre);
@@ -328,6 +329,7 @@ void visible_faces(const Neighbourhood& chunks, const VoxelRegistry& types, cons
 
 FaceOcclusion face_occlusion(const Neighbourhood& chunks, const VoxelRegistry& types, IVec3 voxel,
                              Direction direction) {
+  QUOIN_ASSERT(static_cast<std::size_t>(direction) < kCornerNeighbours.size(), "one of the six directions");
   const auto is_occluder = [&](IVec3 offset) { return types.is_opaque(chunks.get(voxel + offset)); };
   FaceOcclusion corners{};
   for (std::size_t i = 0; i < corners.size(); ++i) {

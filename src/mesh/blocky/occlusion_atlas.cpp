@@ -30,6 +30,7 @@ IVec3 voxel_corner(const Vec3& position) {
 }
 
 Face face_of(const BlockyTriangles& mesh, std::size_t first_vertex) {
+  QUOIN_ASSERT(first_vertex % kCorners == 0 && first_vertex < mesh.positions.size(), "the first vertex of a face");
   Face face;
   face.direction = mesh.directions[first_vertex];
   const FaceFrame& frame = frame_of(face.direction);
@@ -51,6 +52,7 @@ std::size_t place_of(const Face& face, int u, int v) {
   const auto layer = static_cast<std::size_t>(face.voxel[frame.axis]);
   const auto row = static_cast<std::size_t>(face.voxel[frame.v] + v);
   const auto column = static_cast<std::size_t>(face.voxel[frame.u] + u);
+  QUOIN_ASSERT(layer < edge && row < edge && column < edge, "a voxel of the chunk");
   return (((static_cast<std::size_t>(face.direction) * edge + layer) * edge + row) * edge + column) * kCorners;
 }
 
@@ -176,6 +178,7 @@ Result<Image> OcclusionAtlas::draw() {
                                                       " texels per side; mesh without an atlas");
     }
   }
+  QUOIN_ASSERT(used <= edge, "patches within the square");
   width_ = edge;
   height_ = static_cast<int>(std::bit_ceil(static_cast<unsigned>(std::max(used, 1))));
   Image image{width_, height_, {}};

@@ -55,6 +55,7 @@ void OutlineFinder::prepare(const QuadBuffer& quads) {
 }
 
 bool OutlineFinder::is_vertex(IVec3 p) const {
+  QUOIN_ASSERT(!corners_.empty(), "quads that were prepared");
   const std::size_t index = lattice_index(p);
   return (corners_[index / 64] >> (index % 64) & 1U) != 0;
 }

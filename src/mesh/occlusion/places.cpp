@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include <quoin/core/assert.h>
+
 #include "core/instruction_set.h"
 #include "mesh/smooth/cell.h"
 
@@ -56,6 +58,7 @@ void SampleKernel::sort_by_slice(const ChunkSamples& wanted, const Sampling& sam
   entries_.clear();
   first_of_slice_.fill(0);
   for (const std::uint32_t number : wanted.numbers) {
+    QUOIN_ASSERT(number < wanted.places.positions.size() && number < out.size(), "one of the samples");
     const auto place = place_at(DVec3(wanted.places.positions[number]) + origin, sampling.level);
     const auto in_reach = [&](int cell) { return cell >= -1 && cell <= work_.n; };
     if (!place || !in_reach(place->cell.x) || !in_reach(place->cell.y) || !in_reach(place->cell.z)) {
@@ -77,6 +80,7 @@ void SampleKernel::occlude_some(const SmoothSamples& places, int z, std::size_t 
                                 std::span<float> out) {
   // Kernels read whole registers, so the last place is repeated.
   constexpr std::size_t kOverrun = 16;
+  QUOIN_ASSERT(count > 0 && count <= kPlacesAtOnce && first + count <= sorted_.size(), "samples of the slice");
   for (std::size_t i = 0; i < count + kOverrun; ++i) {
     const Entry& entry = sorted_[first + std::min(i, count - 1)];
     const Vec3 normal = sound_normal(places.normals[entry.number]);

@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/mesh/smooth_occlusion.h>
 
 #include "mesh/smooth/cell.h"
@@ -25,6 +26,7 @@ struct CellSample {
 /// Returns the largest integer that is not above `at`. Requires: it is in the range of int64. Avoids the library
 /// call of std::floor.
 inline std::int64_t whole_below(double at) {
+  QUOIN_ASSERT(at >= -0x1p63 && at < 0x1p63, "in the range of int64");
   const auto whole = static_cast<std::int64_t>(at);
   return whole - (static_cast<double>(whole) > at ? 1 : 0);
 }

@@ -133,6 +133,7 @@ Status smooth_occlusion(const DensityGrid& field, const SmoothSamples& places, c
     }
     for (const std::uint32_t number : numbers) {
       const auto place = smooth::place_at(DVec3(places.positions[number]) + DVec3(places.origin), sampling.level);
+      QUOIN_ASSERT(place.has_value(), "a position in the range of int32");
       out[number] = smooth::occlusion_of_place(neighbourhood, in_chunk(*place, chunk, sampling.level),
                                                places.normals[number], sampling);
     }

@@ -16,6 +16,8 @@
 
 #include <glm/geometric.hpp>
 
+#include <quoin/core/assert.h>
+
 #include "mesh/print/corner_sheets.h"
 
 namespace quoin {
@@ -148,6 +150,7 @@ class Around {
     }
   }
   [[nodiscard]] bool is_solid(IVec3 from) const {
+    QUOIN_ASSERT((IBox{IVec3(-1), IVec3(2)}.contains(from)), "the voxel or one of its 26 neighbours");
     return (bits_ >> static_cast<unsigned>((from.x + 1) + 3 * (from.y + 1) + 9 * (from.z + 1)) & 1U) != 0;
   }
   /// Returns the eight voxels around a corner of the voxel; the corner is 0 or 1 along each axis.
@@ -179,6 +182,7 @@ constexpr std::array<Face, 6> kFaces = {{{Direction::NegX, 0, 0},
 
 /// Returns corner i of a face, counter-clockwise from outside: 0 or 1 along each axis.
 IVec3 corner_of(const Face& face, int i) {
+  QUOIN_ASSERT(i >= 0 && i < 4, "0 <= i < 4");
   const int u = (face.axis + 1) % 3;
   const int v = (face.axis + 2) % 3;
   const int step = face.side == 1 ? i : 3 - i;

@@ -2,6 +2,7 @@
 
 #include <array>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
 
 namespace quoin::print {
@@ -11,6 +12,7 @@ inline constexpr unsigned kCornerFaces = 12;
 
 /// Returns the face between a corner's voxel `cell` (bits x, y, z) and its neighbour along an axis.
 inline constexpr unsigned corner_face(unsigned cell, unsigned axis) {
+  QUOIN_ASSERT(cell < 8 && axis < 3, "one of eight voxels, and an axis");
   const unsigned low = cell & ((1U << axis) - 1U);
   return axis * 4 + (low | (cell >> (axis + 1) << axis));
 }

@@ -41,6 +41,8 @@ struct Rows {
 
 // Copies the signs of several rows of one chunk column, in storage order.
 void copy_signs(const DensityChunk* chunk, Half outside, int z, Rows rows, std::uint64_t* to) {
+  QUOIN_ASSERT(z >= 0 && z < kChunkEdge && rows.first >= 0 && rows.first + rows.count <= kChunkEdge,
+               "rows of the chunk");
   const DensityStorage* const storage = chunk == nullptr ? nullptr : DensityStorage::of(*chunk);
   if (storage != nullptr) {
     std::copy_n(storage->solid.data() + kChunkEdge * z + rows.first, rows.count, to);
@@ -206,6 +208,7 @@ void gather_row(const Work& work, int y, int z, Half* row) {
 }
 
 void add_occlusion_rows(Work& work, RowSet rows, int z) {
+  QUOIN_ASSERT(z >= work.apron - kWidestApron && z + work.apron + 1 < kApronRows - kWidestApron, "slices within reach");
   for (int i = 0; i < work.apron; ++i) {
     const RowSet raised = rows.raised();
     rows.unite(rows.lowered());
@@ -245,6 +248,7 @@ void find_signs(Work& work, int z) {
 }
 
 void begin_occlusion(Work& work) {
+  QUOIN_ASSERT(work.apron >= 0 && work.apron < kWidestApron, "an apron of the neighbours");
   // The slices from `apron` below a cell to `apron` above its upper points.
   const std::size_t slices = work.apron <= 6 ? 16 : kMostSlices;
   work.ring_mask = static_cast<int>(slices) - 1;

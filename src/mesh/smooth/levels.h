@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <functional>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/density_chunk.h>
@@ -41,6 +42,7 @@ class ChunkLevels {
   explicit ChunkLevels(const std::array<std::uint8_t, 27>& levels) : levels_(levels) {}
 
   [[nodiscard]] int of_chunk(IVec3 chunk) const {
+    QUOIN_ASSERT((IBox{IVec3(-1), IVec3(2)}.contains(chunk)), "the chunk or one of its 26 neighbours");
     return levels_[static_cast<std::size_t>((chunk.z + 1) * 9 + (chunk.y + 1) * 3 + chunk.x + 1)];
   }
   [[nodiscard]] bool all_same() const {

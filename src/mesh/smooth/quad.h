@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/buffer.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/chunk.h>
@@ -14,6 +15,7 @@
 namespace quoin::smooth {
 
 inline IVec3 unit_axis(int axis) {
+  QUOIN_ASSERT(axis >= 0 && axis < 3, "0 <= axis < 3");
   IVec3 unit{0};
   unit[axis] = 1;
   return unit;
@@ -21,11 +23,14 @@ inline IVec3 unit_axis(int axis) {
 
 /// Returns the offset of a cell's corner from its first corner, in cells; corners are numbered by x + 2 y + 4 z.
 inline IVec3 corner_place(int corner) {
+  QUOIN_ASSERT(corner >= 0 && corner < 8, "0 <= corner < 8");
   return {corner & 1, corner >> 1 & 1, corner >> 2};
 }
 
 /// Returns the name of a cell of a chunk at `offset` (0 or -1 on each axis) from the mesh's chunk.
 inline SmoothCell cell_name(IVec3 cell, IVec3 offset) {
+  QUOIN_ASSERT((cell.x | cell.y | cell.z) >= 0 && (cell.x | cell.y | cell.z) < kChunkEdge, "a cell of the chunk");
+  QUOIN_ASSERT((IBox{IVec3(-1), IVec3(1)}.contains(offset)), "0 or -1 on each axis");
   std::uint32_t bits = 0;
   for (int axis = 0; axis < 3; ++axis) {
     bits |= static_cast<std::uint32_t>(cell[axis]) << (kChunkShift * axis);
@@ -43,6 +48,7 @@ struct QuadCorner {
 
 /// Returns a vertex in the cell that starts at the sample `first` and has width 2^level.
 inline QuadCorner quad_corner(std::uint32_t vertex, Vec3 position, IVec3 first, int level) {
+  QUOIN_ASSERT(level >= 0 && level <= kMaxSmoothLevel, "a level of detail");
   const auto size = static_cast<float>(1 << level);
   QuadCorner corner{vertex, level, first * 64};
   for (int axis = 0; axis < 3; ++axis) {

@@ -1,6 +1,7 @@
 #include "mesh/smooth/split.h"
 
 #include <algorithm>
+#include <bit>
 #include <optional>
 #include <unordered_map>
 #include <vector>
@@ -22,6 +23,7 @@ int corner_at(IVec3 place) {
 
 // Returns the start of an edge of a cell, in cells.
 IVec3 edge_start(std::size_t edge) {
+  QUOIN_ASSERT(edge < kEdges, "one of twelve edges");
   const int axis = static_cast<int>(edge / 4);
   IVec3 start{0};
   start[(axis + 1) % 3] = static_cast<int>(edge & 1U);
@@ -31,6 +33,7 @@ IVec3 edge_start(std::size_t edge) {
 
 // Returns the edge between two adjacent corners.
 std::size_t edge_between(int a, int b) {
+  QUOIN_ASSERT(std::has_single_bit(static_cast<unsigned>(a ^ b)), "adjacent corners");
   const IVec3 first = corner_place(a & b);
   const IVec3 step = corner_place(a ^ b);
   const int axis = step.x != 0 ? 0 : step.y != 0 ? 1 : 2;
@@ -39,6 +42,7 @@ std::size_t edge_between(int a, int b) {
 
 // Returns the corners of a face, in order around it.
 std::array<int, 4> face_corners(int face) {
+  QUOIN_ASSERT(face >= 0 && face < kNoFace, "one of six faces");
   const int axis = face / 2;
   const IVec3 base = unit_axis(axis) * (face % 2);
   const IVec3 u = unit_axis((axis + 1) % 3);
@@ -166,6 +170,7 @@ Vec3 mean_of_crossings(const Corners& corners, const Sheets& sheets, int sheet) 
     sum += at;
     count += 1.0F;
   }
+  QUOIN_ASSERT(count > 0.0F, "a sheet of the cell");
   return sum / count;
 }
 
@@ -253,6 +258,7 @@ class Splitter {
                     out_);
       ++side;
     }
+    QUOIN_ASSERT(side == 2, "two air corners");
   }
 
   static std::array<int, 4> sorted(std::array<int, 4> corners) {
@@ -353,7 +359,7 @@ class Splitter {
     const IVec3 place = (start - cell.first) / cell.size();
     const auto edge = static_cast<std::size_t>(4 * axis + place[(axis + 1) % 3] + 2 * place[(axis + 2) % 3]);
     const std::uint8_t sheet = split.sheets.of_edge[edge];
-    QUOIN_ASSERT(sheet != Sheets::kUncrossed);
+    QUOIN_ASSERT(sheet != Sheets::kUncrossed, "an edge that the surface crosses");
     return sheet == 0 ? vertex : split.second + sheet - 1U;
   }
 
@@ -382,6 +388,7 @@ int joined_face(std::uint32_t solid) {
 
 void split_sheets(const DensityNeighbourhood& chunks, const SmoothOptions& options, std::size_t quad_indices,
                   SmoothChunkMesh& out) {
+  QUOIN_ASSERT(quad_indices % 6 == 0 && quad_indices <= out.indices.size(), "whole quads of the mesh");
   Splitter(chunks, options, out).run(quad_indices);
 }
 

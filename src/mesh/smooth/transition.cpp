@@ -156,7 +156,7 @@ class Transitions {
       corners[count++] = corner(vertex, cell);
     }
     if (corners[count - 1].vertex == corners[0].vertex) --count;
-    QUOIN_ASSERT(count >= 3);
+    QUOIN_ASSERT(count >= 3, "at least three cells around an edge");
     if (count == 3) {
       for (std::size_t i = 0; i < 3; ++i) triangles_.push_back(corners[i].vertex);
     } else {
@@ -175,7 +175,7 @@ class Transitions {
     if (const auto found = appended_.find(name.bits); found != appended_.end()) return found->second;
     if (!levels_.touches_finer(cell)) return append(cell, cell_vertex(corners_of(chunks_, cell)));
     const std::optional<CellVertex> vertex = transition_vertex(cell);
-    QUOIN_ASSERT(vertex.has_value());
+    QUOIN_ASSERT(vertex.has_value(), "a cell with a crossed edge");
     return append(cell, *vertex);
   }
 

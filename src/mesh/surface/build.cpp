@@ -113,6 +113,8 @@ void reserve(const SmoothChunkMesh& mesh, Part& part) {
 
 Part make_part(const DensityNeighbourhood& chunks, int level, const SurfaceMaterials* materials, Workspace& workspace) {
   const SmoothChunkMesh& mesh = workspace.mesh;
+  QUOIN_ASSERT(mesh.cells.size() == mesh.positions.size() && mesh.normals.size() == mesh.positions.size(),
+               "a cell and a normal per vertex");
   const int last = (kChunkEdge >> level) - 1;
   Part part;
   reserve(mesh, part);
@@ -245,6 +247,7 @@ class Builder {
   }
 
   void copy_faces(std::size_t i, std::vector<TriangleFace>& faces) const {
+    QUOIN_ASSERT(faces.empty() || parts_[i].faces.size() == parts_[i].indices.size() / 3, "a face per triangle");
     const IVec3 origin = chunks_[i] * kChunkEdge;
     TriangleFace* out = faces.data() + first_index_[i] / 3;
     for (TriangleFace face : parts_[i].faces) {
@@ -303,6 +306,7 @@ Vec3 normal_between(Direction direction, Vec3 normal, float smoothness) {
 }  // namespace
 
 std::uint32_t append_vertex(SmoothMesh& to, const SmoothMesh& from, std::size_t i) {
+  QUOIN_ASSERT(i < from.positions.size(), "a vertex of the mesh");
   const auto index = static_cast<std::uint32_t>(to.positions.size());
   const auto append = [i](auto& values, const auto& source) {
     const auto value = source[i];

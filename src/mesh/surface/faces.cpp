@@ -36,6 +36,7 @@ class Copies {
 
   /// Returns true if the first copy of the vertex has the look. A vertex without copies gets the look first.
   bool is_first(std::uint32_t vertex, LookCode look) {
+    QUOIN_ASSERT(vertex < first_.size() && look.is_set(), "a look of one of the vertices");
     // Without a branch: the first triangle of a vertex is unpredictable.
     const LookCode first = first_[vertex].is_set() ? first_[vertex] : look;
     first_[vertex] = first;
@@ -191,7 +192,8 @@ void find_faces(const DensityNeighbourhood& chunks, const SmoothOptions& options
 
 std::vector<VertexCopy> split_by_faces(std::span<std::uint32_t> indices, std::size_t vertices,
                                        std::span<const TriangleFace> faces, const FaceDifferences& differences) {
-  QUOIN_ASSERT(faces.size() == indices.size() / 3);
+  QUOIN_ASSERT(faces.size() == indices.size() / 3, "a face per triangle");
+  QUOIN_ASSERT(differences.groups.empty() || differences.groups.size() == faces.size(), "a group per triangle");
   Copies copies(vertices);
   struct Exception {
     std::size_t index;

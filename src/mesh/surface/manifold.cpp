@@ -22,7 +22,10 @@ struct Arc {
 class Corners {
  public:
   explicit Corners(const Triangulation& mesh) : first_(mesh.positions.size() + 1), triangles_(mesh.indices.size()) {
-    for (const std::uint32_t index : mesh.indices) ++first_[index + std::size_t{1}];
+    for (const std::uint32_t index : mesh.indices) {
+      QUOIN_ASSERT(index < mesh.positions.size(), "a vertex of the mesh");
+      ++first_[index + std::size_t{1}];
+    }
     std::partial_sum(first_.begin(), first_.end(), first_.begin());
     std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
     for (std::size_t i = 0; i < mesh.indices.size(); ++i) {
@@ -133,6 +136,7 @@ std::vector<std::uint32_t> rings_of(const std::vector<Arc>& arcs) {
 
 /// Makes one vertex per ring, each moved towards the middle of its neighbours.
 void split(Triangulation& mesh, std::uint32_t vertex, const std::vector<Arc>& arcs, float distance) {
+  QUOIN_ASSERT(!arcs.empty(), "a vertex of triangles");
   const std::vector<std::uint32_t> ring = rings_of(arcs);
   const std::size_t rings = *std::max_element(ring.begin(), ring.end()) + std::size_t{1};
   if (rings == 1) return;

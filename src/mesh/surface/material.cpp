@@ -5,6 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 #include "core/srgb.h"
 #include "grid/chunk/chunk_storage.h"
 
@@ -30,6 +32,7 @@ VoxelType material_at(const DensityNeighbourhood& chunks, IVec3 sample) {
 // Reads the materials of the solid corners of a cell within a chunk, row by row.
 std::size_t materials_of_corners(const DensityChunk& chunk, IVec3 first, VoxelType* out) {
   const ChunkStorage* mixed = ChunkStorage::of(chunk.materials());
+  QUOIN_ASSERT(mixed != nullptr, "several materials");
   std::size_t found = 0;
   for (int row = 0; row < 4; ++row) {
     const int y = first.y + (row & 1);
@@ -106,6 +109,7 @@ LinearRgba16 SurfaceMaterials::albedo(VoxelType type) const {
 }
 
 CellMaterial SurfaceMaterials::blend(std::span<VoxelType> solid) const {
+  QUOIN_ASSERT(!solid.empty(), "at least one material");
   if (std::all_of(solid.begin(), solid.end(), [&](VoxelType type) { return type == solid[0]; })) {
     return {albedo(solid[0]), solid[0]};
   }
@@ -130,6 +134,7 @@ CellMaterial SurfaceMaterials::blend(std::span<VoxelType> solid) const {
 }
 
 CellMaterial SurfaceMaterials::of_cell(const DensityNeighbourhood& chunks, IVec3 cell, int level) const {
+  QUOIN_ASSERT(level >= 0 && level <= kMaxSmoothLevel, "a level of detail");
   const int size = 1 << level;
   const IVec3 first = cell * size;
   std::array<VoxelType, 729> solid;

@@ -7,6 +7,8 @@
 #include <optional>
 #include <vector>
 
+#include <quoin/core/assert.h>
+
 #include "mesh/smooth/levels.h"
 #include "mesh/smooth/split.h"
 #include "mesh/smooth/vertex.h"
@@ -42,6 +44,7 @@ WideRow wide_row(int y, int z, const RowOf& row_of) {
 
 /// Returns samples x and x + 1 in the lowest two bits.
 std::uint64_t pair_of(const WideRow& row, int x) {
+  QUOIN_ASSERT(x >= -1 && x < kChunkEdge, "-1 <= x < 64");
   return x < kChunkEdge / 2 ? row.low >> (x + 2) : row.high >> (x - 2);
 }
 
@@ -49,6 +52,7 @@ std::uint64_t pair_of(const WideRow& row, int x) {
 constexpr int kCellRows = kChunkEdge + 2;
 
 std::size_t cell_row(int y, int z) {
+  QUOIN_ASSERT(std::min(y, z) >= -1 && std::max(y, z) <= kChunkEdge, "-1 <= y, z <= 64");
   return static_cast<std::size_t>((z + 1) * kCellRows + y + 1);
 }
 
@@ -159,7 +163,10 @@ class ThinCells {
  private:
   static constexpr int kRead = kChunkEdge + 4;  // rows, starting at -2
 
-  static std::size_t at(int y, int z) { return static_cast<std::size_t>((z + 2) * kRead + y + 2); }
+  static std::size_t at(int y, int z) {
+    QUOIN_ASSERT(std::min(y, z) >= -2 && std::max(y, z) < kRead - 2, "-2 <= y, z < 66");
+    return static_cast<std::size_t>((z + 2) * kRead + y + 2);
+  }
 
   static WideRow read(const DensityNeighbourhood& chunks, int y, int z) {
     return wide_row(y, z, [&](std::size_t i, int local_y, int local_z) -> std::uint64_t {
@@ -260,6 +267,7 @@ void split_quads_again(const ChunkLevels& levels, const std::vector<bool>& is_sh
 
 void shape_vertices(const DensityNeighbourhood& chunks, const SmoothOptions& options, const Shape& shape,
                     SmoothChunkMesh& mesh) {
+  QUOIN_ASSERT(shape.whole == nullptr || shape.types != nullptr, "types of the bodies");
   if (!shape.moves() || mesh.positions.empty()) return;
   const ChunkLevels levels(options.levels);
   std::unique_ptr<const ThinCells> thin;

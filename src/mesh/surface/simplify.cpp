@@ -403,6 +403,7 @@ float simplify_within(SmoothMesh& mesh, float error_in_samples, std::vector<std:
 template <class T>
 void keep_used(std::vector<T>& values, const std::vector<std::uint32_t>& place_of, std::size_t used) {
   if (values.empty()) return;
+  QUOIN_ASSERT(values.size() == place_of.size(), "a value per vertex");
   std::vector<T> kept(used);
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (place_of[i] != ~0U) kept[place_of[i]] = values[i];
@@ -437,6 +438,7 @@ Result<float> simplify_tagged(SmoothMesh& mesh, float error_in_samples, std::vec
   QUOIN_ASSERT(has_arrays_of_one_length(mesh));
   QUOIN_ASSERT(names_vertices(mesh));
   QUOIN_ASSERT(has_finite_positions(mesh));
+  QUOIN_ASSERT(tags.empty() || tags.size() == mesh.positions.size(), "a tag per vertex, or none");
 #endif
   if (mesh.indices.empty()) return 0.0F;
   const float reached = simplify_within(mesh, error_in_samples, tags);

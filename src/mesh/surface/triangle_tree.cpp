@@ -32,6 +32,7 @@ float squared_distance_from_edge(Vec3 point, Vec3 a, Vec3 b) {
 
 TriangleTree::TriangleTree(std::span<const Vec3> positions, std::span<const std::uint32_t> indices)
     : positions_(positions), indices_(indices) {
+  QUOIN_ASSERT(indices.size() % 3 == 0, "whole triangles");
   std::vector<Item> items;
   items.reserve(indices.size() / 3);
   for (std::size_t i = 0; i < indices.size(); i += 3) {

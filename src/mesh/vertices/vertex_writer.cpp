@@ -8,6 +8,8 @@
 #include <cstring>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 #include "core/srgb.h"
 
 namespace quoin {
@@ -224,6 +226,7 @@ std::size_t face_of(Direction direction) {
 // Calls `make(first, count, block)` for blocks of at most `per_block` items with `vertices` vertices each.
 template <class Make>
 void by_blocks(std::size_t count, std::size_t vertices, std::size_t stride, std::byte* out, Make&& make) {
+  QUOIN_ASSERT(stride != 0 && vertices * stride <= kBlockBytes, "at least one item per block");
   alignas(64) std::array<std::byte, kBlockBytes> block{};
   const std::size_t per_block = kBlockBytes / (vertices * stride);
   for (std::size_t first = 0; first < count; first += per_block) {
@@ -321,6 +324,7 @@ void VertexWriter::write(std::span<const Quad> quads, Vec3 origin, std::span<std
 }
 
 void VertexWriter::write_element(std::size_t index, std::span<const Quad> quads, Vec3 origin, std::byte* block) const {
+  QUOIN_ASSERT(index < layout_.elements.size(), "an element of the layout");
   const VertexElement& element = layout_.elements[index];
   const Column column{block + element.offset, layout_.stride};
   const VertexFormat format = element.format;
