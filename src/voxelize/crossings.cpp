@@ -10,6 +10,8 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include <quoin/core/assert.h>
+
 #include "core/progress_steps.h"
 
 namespace quoin::voxelizing {
@@ -39,6 +41,7 @@ struct Passing {
 /// Returns the point where an edge passes `v`. Always computes from the lower end, so that two triangles get the same
 /// bits on their shared edge. Requires: one end is at or below `v`, the other above it.
 Passing passing(const Seen& from, const Seen& to, double v) {
+  QUOIN_ASSERT((from.v <= v) != (to.v <= v), "an edge that passes v");
   const bool rises = from.v < to.v;
   const Seen& low = rises ? from : to;
   const Seen& high = rises ? to : from;
@@ -108,6 +111,7 @@ void for_each_crossing(const std::array<Seen, 3>& corners, bool is_mirrored, int
 }
 
 std::array<Seen, 3> seen_along(int axis, const Corners& corners) {
+  QUOIN_ASSERT(axis >= 0 && axis < 3, "0 <= axis < 3");
   const auto [u, v] = kPlane[static_cast<std::size_t>(axis)];
   std::array<Seen, 3> seen{};
   for (std::size_t i = 0; i < 3; ++i) seen[i] = {corners[i][u], corners[i][v], corners[i][axis]};
@@ -136,7 +140,9 @@ ColumnTriangles triangles_of_columns(const Frame& frame, int axis) {
       if (low_u >= end_u || low_v >= end_v) continue;
       for (int b = low_v >> kChunkShift; b <= (end_v - 1) >> kChunkShift; ++b) {
         for (int a = low_u >> kChunkShift; a <= (end_u - 1) >> kChunkShift; ++a) {
-          at_column(static_cast<std::size_t>(a) + across * static_cast<std::size_t>(b), i);
+          const std::size_t column = static_cast<std::size_t>(a) + across * static_cast<std::size_t>(b);
+          QUOIN_ASSERT(static_cast<std::size_t>(a) < across && column < columns, "a column of the frame");
+          at_column(column, i);
         }
       }
     }
@@ -204,6 +210,7 @@ bool is_between_voxels(double w) {
 
 /// Adds the crossings of a line. Requires: sorted by w.
 void add_crossings(std::span<const Met> line, SolidVoxels rule, std::vector<Crossing>& crossings, Sides& sides) {
+  QUOIN_ASSERT(std::ranges::is_sorted(line, {}, &Met::w), "sorted by w");
   const std::size_t first = crossings.size();
   Depth depth(rule);
   bool is_in_tip = false;
@@ -258,6 +265,8 @@ Column find_column(const Frame& frame, int axis, SolidVoxels rule, std::span<con
   std::vector<Met> met;
   std::vector<Met> touched;
   const auto line_of = [&](int u, int v) {
+    QUOIN_ASSERT(u >= first_u && u < first_u + kChunkEdge && v >= first_v && v < first_v + kChunkEdge,
+                 "one of the lines");
     return static_cast<std::uint16_t>((u - first_u) + kChunkEdge * (v - first_v));
   };
   for (const std::uint32_t triangle : triangles) {

@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/parallel.h>
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
@@ -51,6 +52,7 @@ struct Column {
 
   [[nodiscard]] std::span<const Crossing> line(std::size_t index) const {
     if (begin.empty()) return {};
+    QUOIN_ASSERT(index < kLines && begin.size() == kLines + 1, "a line of the column");
     return {crossings.data() + begin[index], crossings.data() + begin[index + 1]};
   }
 };
@@ -66,9 +68,14 @@ class Crossings {
                                               const Progress& progress);
 
   /// Returns the number of columns along `axis`.
-  [[nodiscard]] std::span<const Column> columns(int axis) const { return columns_[static_cast<std::size_t>(axis)]; }
+  [[nodiscard]] std::span<const Column> columns(int axis) const {
+    QUOIN_ASSERT(axis >= 0 && axis < 3, "0 <= axis < 3");
+    return columns_[static_cast<std::size_t>(axis)];
+  }
   /// Returns the index of the column along `axis` through a chunk of the frame.
   [[nodiscard]] std::size_t column_index(int axis, IVec3 chunk) const {
+    QUOIN_ASSERT(axis >= 0 && axis < 3 && (IBox{IVec3(0), chunks_}.contains(chunk)),
+                 "an axis and a chunk of the frame");
     const auto [u, v] = kPlane[static_cast<std::size_t>(axis)];
     return static_cast<std::size_t>(chunk[u]) +
            static_cast<std::size_t>(chunks_[u]) * static_cast<std::size_t>(chunk[v]);

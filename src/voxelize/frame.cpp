@@ -163,6 +163,7 @@ Result<Frame> Frame::make(const TriangleMesh& mesh, const VoxelLattice& lattice,
   const IVec3 last = voxel_of(high + margin);
   frame.first_chunk_ = chunk_of(first);
   frame.chunks_ = chunk_of(last) - frame.first_chunk_ + 1;
+  QUOIN_ASSERT(std::min({frame.chunks_.x, frame.chunks_.y, frame.chunks_.z}) > 0, "at least one chunk");
   const DVec3 corner = DVec3(frame.first_chunk_) * static_cast<double>(kChunkEdge);
   frame.positions_.reserve(mesh.positions.size());
   for (const DVec3& position : mesh.positions) {

@@ -4,6 +4,8 @@
 #include <cstdlib>
 #include <limits>
 
+#include <quoin/core/assert.h>
+
 namespace quoin::voxelizing {
 
 namespace {
@@ -17,6 +19,7 @@ constexpr int kMostTurns = 4'000;
 /// sum of the whole line. The backward ray counts the steps before the centre; the forward ray counts the steps behind
 /// it, from the other side. In a closed mesh both equal the winding number.
 int votes_of(SolidVoxels rule, int before, int all, int crossed, int crossings) {
+  QUOIN_ASSERT(crossed >= 0 && crossed <= crossings, "crossings of the line");
   if (rule == SolidVoxels::Parity) return (crossed & 1) + ((crossings - crossed) & 1);
   return std::clamp(2 * before - all, -kMostTurns, kMostTurns);
 }
@@ -143,6 +146,7 @@ class RowsOfVotes {
   }
   /// Adds the row at `step` along the lines. Rows must come in order.
   void add(std::size_t step, std::int16_t* sums) {
+    QUOIN_ASSERT(step < kChunkEdge, "a row of the chunk");
     const std::int16_t* change = changes_.data() + step * kChunkEdge;
     for (std::size_t x = 0; x < kChunkEdge; ++x) {
       now_[x] = static_cast<std::int16_t>(now_[x] + change[x]);
@@ -179,6 +183,7 @@ bool is_inside(int votes) {
 }  // namespace
 
 Inside::Inside(const Crossings& crossings, SolidVoxels rule, Threads threads) : crossings_(&crossings), rule_(rule) {
+  QUOIN_ASSERT(rule != SolidVoxels::None, "a rule for solid voxels");
   for (int axis = 0; axis < 3; ++axis) {
     const auto columns = crossings.columns(axis);
     const auto along = static_cast<std::size_t>(crossings.chunks()[axis]);

@@ -7,6 +7,8 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include <quoin/core/assert.h>
+
 #include "voxelize/kernel/kernel.h"
 
 namespace quoin::voxelizing {
@@ -91,6 +93,7 @@ void cut_by_plane(const Solid& solid, float y, float z, float reach, int& first,
 template <class HasSurface>
 void update_with_holes(const TriangleInRow& row, int first, int end, float* squared, std::int32_t* numbers,
                        const HasSurface& has_surface) {
+  QUOIN_ASSERT(first >= 0 && first < end && end <= kChunkEdge, "0 <= first < end <= 64");
   std::array<float, kChunkEdge> own;
   std::array<std::int32_t, kChunkEdge> own_numbers;
   std::copy_n(squared, kChunkEdge, own.begin());
@@ -146,6 +149,7 @@ DVec3 nearest_shares(const Corners& corners, DVec3 point) {
 
 void find_nearest(const Frame& frame, IVec3 chunk, std::span<const std::uint32_t> triangles, const Wanted& wanted,
                   const Holes& holes, Nearest& nearest) {
+  QUOIN_ASSERT(wanted.reach > 0.0F && std::isfinite(wanted.reach), "a positive, finite reach");
   nearest.squared.assign(kChunkVoxels, wanted.reach * wanted.reach);
   nearest.triangles.assign(kChunkVoxels, kNoTriangle);
   const DVec3 origin = DVec3(chunk) * static_cast<double>(kChunkEdge);

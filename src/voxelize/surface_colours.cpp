@@ -8,6 +8,8 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include <quoin/core/assert.h>
+
 #include "core/srgb.h"
 
 namespace quoin::voxelizing {
@@ -43,6 +45,7 @@ const std::array<float, 256>& linear_of_bytes() {
 
 /// Returns a pixel's index within an image.
 int wrapped(int at, int size, TextureWrap wrap) {
+  QUOIN_ASSERT(size > 0, "at least one pixel");
   if (wrap == TextureWrap::Clamp) return std::clamp(at, 0, size - 1);
   const int period = wrap == TextureWrap::Mirror ? 2 * size : size;
   int within = at % period;
@@ -107,6 +110,7 @@ std::optional<std::uint32_t> SurfaceColours::only_material() const {
 
 std::uint32_t SurfaceColours::look_of(std::uint32_t material, float share) const {
   const auto step = static_cast<std::uint32_t>(std::lround(share * static_cast<float>(kEmissionSteps)));
+  QUOIN_ASSERT(material < first_steps_.size(), "one of the materials");
   return step >= kEmissionSteps ? material : first_steps_[material] + step;
 }
 
@@ -165,7 +169,9 @@ void SurfaceColours::make_halves(std::size_t texture) {
 
 /// Linear light times alpha, and alpha.
 glm::vec4 SurfaceColours::texel(std::size_t texture, std::size_t level, int x, int y) const {
+  QUOIN_ASSERT(texture < images_.size() && level < images_[texture].levels.size(), "a level of a used texture");
   const Level& of = images_[texture].levels[level];
+  QUOIN_ASSERT(x >= 0 && x < of.width && y >= 0 && y < of.height, "a pixel of the level");
   const std::size_t at =
       std::size_t{4} * (static_cast<std::size_t>(y) * static_cast<std::size_t>(of.width) + static_cast<std::size_t>(x));
   if (level > 0) {
@@ -203,6 +209,7 @@ std::size_t SurfaceColours::level_of(std::uint32_t triangle, const glm::vec2* pl
   const glm::vec2 a = places[1] - places[0];
   const glm::vec2 b = places[2] - places[0];
   const std::vector<Level>& levels = images_[texture].levels;
+  QUOIN_ASSERT(!levels.empty(), "a used texture");
   const double pixels = std::abs(double{a.x} * b.y - double{a.y} * b.x) * levels[0].width * levels[0].height;
   if (!(area > 0.0) || !(pixels > area)) return 0;
   const double level = std::floor(0.5 * std::log2(pixels / area) + 0.5);

@@ -7,6 +7,7 @@
 
 #include <glm/vec4.hpp>
 
+#include <quoin/core/assert.h>
 #include <quoin/grid/voxel_registry.h>
 
 #include "voxelize/frame.h"
@@ -29,6 +30,7 @@ class SurfaceColours {
   [[nodiscard]] Rgba8 colour(std::uint32_t triangle, DVec3 shares) const;
   [[nodiscard]] std::uint32_t material_index(std::uint32_t triangle) const {
     const auto& of = frame_->mesh().material_of;
+    QUOIN_ASSERT(of.empty() || triangle < of.size(), "a triangle of the mesh");
     return of.empty() ? 0 : of[triangle];
   }
   /// Returns the index into `looks` of a point: its material with the emission of its texture there.

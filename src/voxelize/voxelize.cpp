@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/thousands.h>
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/grid.h>
@@ -96,6 +97,7 @@ void find_nearest_of(const Parts& parts, std::size_t index, const Wanted& wanted
 }
 
 Coloured coloured_voxel(const Parts& parts, IVec3 chunk, std::size_t voxel, std::int32_t nearest) {
+  QUOIN_ASSERT(voxel < kChunkVoxels && nearest != kNoTriangle, "a voxel near a triangle");
   const auto triangle = static_cast<std::uint32_t>(nearest);
   const IVec3 local(static_cast<int>(voxel % kChunkEdge), static_cast<int>(voxel / kChunkEdge % kChunkEdge),
                     static_cast<int>(voxel / kRows));
@@ -107,6 +109,7 @@ Coloured coloured_voxel(const Parts& parts, IVec3 chunk, std::size_t voxel, std:
 
 void mark_surface(const Parts& parts, std::size_t index, SurfaceVoxels which, ChunkBits& surface) {
   const IVec3 chunk = parts.frame.chunk_at(index);
+  QUOIN_ASSERT(which != SurfaceVoxels::Separating6 || parts.crossings != nullptr, "crossings of the lines");
   if (which == SurfaceVoxels::Separating6) mark_crossed(*parts.crossings, chunk, surface);
   if (which != SurfaceVoxels::Separating26) return;
   for (const std::uint32_t triangle : parts.triangles->of(index)) {
@@ -151,6 +154,7 @@ Found find_voxels(const Parts& parts, std::size_t index, const VoxelizeOptions& 
 
 /// Makes signed distances from the nearest triangles and the solid voxels.
 DensityChunk signed_densities(const Nearest& nearest, const ChunkBits& solid, float band) {
+  QUOIN_ASSERT(nearest.squared.size() == kChunkVoxels, "a distance per sample");
   const Half far = stored_density(band, band);
   DensityChunk densities(far);
   std::array<Half, kChunkEdge> halves{};
@@ -215,6 +219,7 @@ Result<AllFound> find_all(const Frame& frame, Threads threads, const Progress& p
 
 std::size_t count_of(const Found& found) {
   if (found.filled != Filled::Some) return found.filled == Filled::All ? kChunkVoxels : 0;
+  QUOIN_ASSERT(found.bits != nullptr, "bits of a chunk with some voxels");
   std::size_t count = 0;
   for (const std::uint64_t row : *found.bits) count += static_cast<std::size_t>(std::popcount(row));
   return count;
@@ -267,12 +272,14 @@ Chunk types_of(const Found& found, const Types& types) {
     std::uint64_t coloured = 0;
     for (; next != found.coloured.end() && next->voxel / kChunkEdge == i; ++next) {
       const std::size_t x = next->voxel % kChunkEdge;
+      QUOIN_ASSERT(next->material < types.by_look.size(), "a look with a type");
       row[x] = types.by_look[next->material];
       coloured |= std::uint64_t{1} << x;
     }
     if (const std::uint64_t deep = bits & ~coloured; deep != 0) chunk.fill_row(y, z, deep, types.deep);
     if (coloured != 0) chunk.write_row(y, z, coloured, row);
   }
+  QUOIN_ASSERT(next == found.coloured.end(), "coloured voxels are in the chunk, in order");
   return chunk;
 }
 
