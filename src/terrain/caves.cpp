@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <memory>
 
+#include <quoin/core/assert.h>
 #include <quoin/terrain/noise.h>
 
 namespace quoin::terrain {
@@ -18,6 +19,7 @@ struct Samples {
   std::array<std::array<double, 2>, static_cast<std::size_t>(kPoints) * kPoints * kPoints> at;
 
   [[nodiscard]] static std::size_t index(int x, int y, int z) {
+    QUOIN_ASSERT(std::min({x, y, z}) >= 0 && std::max({x, y, z}) < kPoints, "a point of the chunk");
     return static_cast<std::size_t>((z * kPoints + y) * kPoints + x);
   }
 };

@@ -5,6 +5,8 @@
 #include <memory>
 #include <span>
 
+#include <quoin/core/assert.h>
+
 namespace quoin::terrain {
 namespace {
 
@@ -13,12 +15,16 @@ class Profile {
  public:
   /// `height` is the topmost layer that column x fills; negative is none.
   void add(int x, int height) {
+    QUOIN_ASSERT(x >= 0 && x < kChunkEdge, "0 <= x < 64");
     if (height >= 0) reach_[static_cast<std::size_t>(std::min(height, kChunkEdge - 1))] |= std::uint64_t{1} << x;
   }
   void finish() {
     for (std::size_t y = kChunkEdge - 1; y > 0; --y) reach_[y - 1] |= reach_[y];
   }
-  [[nodiscard]] std::uint64_t operator[](int y) const { return reach_[static_cast<std::size_t>(y)]; }
+  [[nodiscard]] std::uint64_t operator[](int y) const {
+    QUOIN_ASSERT(y >= 0 && y < kChunkEdge, "0 <= y < 64");
+    return reach_[static_cast<std::size_t>(y)];
+  }
 
  private:
   std::array<std::uint64_t, kChunkEdge> reach_{};
@@ -47,6 +53,8 @@ Slice make_slice(const Column* columns, int floor, int water_level) {
   Slice slice;
   for (int x = 0; x < kChunkEdge; ++x) {
     const Column& column = columns[x];
+    QUOIN_ASSERT(column.stratum >= 0 && column.stratum < kStrata && static_cast<int>(column.surface) < kSurfaces,
+                 "a stratum and a surface");
     slice.solid.add(x, column.height - floor);
     slice.below_cover.add(x, column.height - 1 - floor);
     const bool is_bare = column.surface == Surface::Stone;
@@ -64,11 +72,13 @@ Slice make_slice(const Column* columns, int floor, int water_level) {
 }
 
 std::uint64_t bits_between(int first, int end) {
+  QUOIN_ASSERT(first >= 0 && first < end && end <= kChunkEdge, "0 <= first < end <= 64");
   return (~std::uint64_t{0} >> (kChunkEdge - (end - first))) << first;
 }
 
 /// Returns the columns whose bare rock is dark in layer `y` of the world.
 std::uint64_t dark_columns(const Slice& slice, int y) {
+  QUOIN_ASSERT(y >= 0, "a layer of the world");
   constexpr int kDarkLayers = 3;
   std::uint64_t dark = 0;
   for (int i = 0; i < kDarkLayers; ++i) dark |= slice.shifted[static_cast<std::size_t>((y + i) % kStrata)];
@@ -119,6 +129,7 @@ struct Extent {
 };
 
 Extent extent_of(std::span<const Column> columns) {
+  QUOIN_ASSERT(!columns.empty(), "at least one column");
   Extent extent{columns.front().height, columns.front().height};
   for (const Column& column : columns) {
     extent.all_stone = std::min(extent.all_stone, std::min(column.height - column.soil, column.lowest - 2));
@@ -142,6 +153,8 @@ struct Layers {
 
 Chunk make_ground(const Landform& land, const std::vector<Column>& columns, const TerrainTypes& types, IVec3 at,
                   const IBox& part, bool has_caves) {
+  QUOIN_ASSERT(columns.size() == std::size_t{kChunkEdge} * kChunkEdge, "a column of ground per column of voxels");
+  QUOIN_ASSERT((part.min.z | part.max.z) % 4 == 0, "whole slabs");
   const int floor = at.y * kChunkEdge;
   const int water_end = std::clamp(land.water_level() + 1 - floor, part.min.y, part.max.y);
   const Extent whole = extent_of(columns);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include <quoin/core/assert.h>
 #include <quoin/terrain/noise.h>
 
 namespace quoin::terrain {
@@ -39,7 +40,9 @@ Landform::Landform(const TerrainOptions& options)
       sea_(static_cast<int>(kSea * top_)),
       snow_line_(static_cast<int>(kSnow * top_)),
       has_water_(options.water),
-      frequency_(1.0 / (0.95 * top_)) {}
+      frequency_(1.0 / (0.95 * top_)) {
+  QUOIN_ASSERT(top_ > 0, "a positive height");
+}
 
 double Landform::elevation(double x, double z) const {
   const double px = x * frequency_;
@@ -70,6 +73,7 @@ int Landform::height(int x, int z) const {
 }
 
 Column Landform::describe(int x, int z, const int* heights, std::size_t stride) const {
+  QUOIN_ASSERT(heights != nullptr && stride >= 3, "rows of at least three heights");
   Column column;
   column.height = heights[stride + 1];
   column.lowest = column.height;
@@ -115,6 +119,7 @@ Column Landform::column(int x, int z) const {
 }
 
 std::vector<Column> Landform::columns(int first_x, int first_z, int edge) const {
+  QUOIN_ASSERT(edge > 0, "a positive edge");
   const auto stride = static_cast<std::size_t>(edge) + 2;
   std::vector<int> heights(stride * stride);
   for (std::size_t i = 0; i < heights.size(); ++i) {

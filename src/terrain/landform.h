@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/terrain/terrain.h>
 
 namespace quoin::terrain {
@@ -16,6 +17,7 @@ inline constexpr int kStrata = 11;
 
 /// Returns 0 up to `low`, 1 from `high` on, and a smooth cubic in between.
 inline double smooth_step(double low, double high, double x) {
+  QUOIN_ASSERT(low < high, "low < high");
   const double t = std::clamp((x - low) * (1.0 / (high - low)), 0.0, 1.0);
   return t * t * (3.0 - 2.0 * t);
 }

@@ -41,7 +41,10 @@ class Lattice {
     const auto [least, greatest] = std::minmax_element(values_.begin(), values_.end());
     return *least<reach&& * greatest> - reach;
   }
-  [[nodiscard]] const float* row(int y, int z) const { return values_.data() + (z * kLatticeEdge + y) * kLatticeEdge; }
+  [[nodiscard]] const float* row(int y, int z) const {
+    QUOIN_ASSERT(std::min(y, z) >= 0 && std::max(y, z) < kLatticeEdge, "a row of the lattice");
+    return values_.data() + (z * kLatticeEdge + y) * kLatticeEdge;
+  }
 
  private:
   std::vector<float> values_;
@@ -62,7 +65,10 @@ class Field {
   void upsample(const Lattice& lattice);
 
   /// Returns the row of samples from x = -1; `y` and `z` also start at sample -1.
-  [[nodiscard]] float* row(int y, int z) { return values_.data() + (z * kFieldEdge + y) * kFieldEdge; }
+  [[nodiscard]] float* row(int y, int z) {
+    QUOIN_ASSERT(std::min(y, z) >= 0 && std::max(y, z) < kFieldEdge, "a row of the field");
+    return values_.data() + (z * kFieldEdge + y) * kFieldEdge;
+  }
   /// Requires: 0 <= x, y, z < 64.
   [[nodiscard]] float at(int x, int y, int z) const { return values_[index(x, y, z)]; }
   [[nodiscard]] Slope slope(int x, int y, int z) const {

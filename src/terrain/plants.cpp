@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <optional>
 
+#include <quoin/core/assert.h>
 #include <quoin/terrain/noise.h>
 
 namespace quoin::terrain {
@@ -15,6 +16,7 @@ constexpr int kRockSpacing = 13;
 
 // Returns a number from 0 to `choices` - 1 from at least four bits of a hash.
 int pick(std::uint32_t hash, int shift, int choices) {
+  QUOIN_ASSERT(shift >= 0 && shift <= 28 && choices > 0 && choices <= 256, "at least four bits, and 1 to 256 choices");
   return static_cast<int>((hash >> shift & 0xFFU) * static_cast<std::uint32_t>(choices) >> 8);
 }
 
@@ -62,6 +64,7 @@ std::optional<Plant> rock_in_cell(const Landform& land, int cell_x, int cell_z) 
 }
 
 int cell_of(int voxel, int spacing) {
+  QUOIN_ASSERT(spacing > 0, "a positive spacing");
   return voxel >= 0 ? voxel / spacing : -((spacing - 1 - voxel) / spacing);
 }
 
@@ -89,6 +92,7 @@ class Painter {
 
   /// Fills the voxels whose centre lies in an ellipsoid with a rough border, varied by `shape`.
   void put_ball(IVec3 middle, double across, double up, VoxelType type, std::uint32_t shape, bool only_in_air) {
+    QUOIN_ASSERT(across > 0.0 && up > 0.0, "positive radii");
     const double per_across = 1.0 / (across * across);
     const double per_up = 1.0 / (up * up);
     for (int z = -kPlantReach; z <= kPlantReach; ++z) {

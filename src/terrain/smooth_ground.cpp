@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/terrain/noise.h>
 
 #include "grid/density/stored_density.h"
@@ -226,6 +227,7 @@ SmoothColumn::~SmoothColumn() = default;
 DensityChunk SmoothColumn::make(const TerrainTypes& types, int chunk_y) {
   Impl& impl = *impl_;
   const IVec3 corner = impl.origin + IVec3{0, chunk_y * kChunkEdge, 0};
+  QUOIN_ASSERT(corner.y >= impl.world.min.y && corner.y < impl.world.max.y, "a chunk of the world");
   DensityChunk chunk(stored_density(kBand, kBand));
   const bool is_near_ground = impl.fill_ground(corner);
   const bool is_air = !is_near_ground && impl.above.at(0, 0, 0) > 0.0F;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/chunk.h>
 #include <quoin/terrain/terrain.h>
@@ -19,7 +20,10 @@ namespace quoin::terrain {
 struct CaveMasks {
   std::array<std::uint64_t, kChunkEdge * kChunkEdge> rows{};  ///< [z][y]
 
-  [[nodiscard]] std::uint64_t row(int y, int z) const { return rows[static_cast<std::size_t>(z * kChunkEdge + y)]; }
+  [[nodiscard]] std::uint64_t row(int y, int z) const {
+    QUOIN_ASSERT((y | z) >= 0 && (y | z) < kChunkEdge, "0 <= y, z < 64");
+    return rows[static_cast<std::size_t>(z * kChunkEdge + y)];
+  }
 };
 
 /// Finds the tunnel voxels: tunnels run where two noises are both near zero. The noises are sampled at every fourth
