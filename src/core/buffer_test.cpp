@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include "core/death_for_tests.h"
+
 namespace quoin {
 namespace {
 
@@ -30,6 +32,14 @@ TEST(Buffer, KeepsWhatItHoldsWhenItGrows) {
   for (int i = 0; i < 10'000; ++i) ASSERT_EQ(buffer[static_cast<std::size_t>(i)], i);
   buffer.push_back(buffer[7]);
   EXPECT_EQ(buffer[20'000], 7);
+}
+
+TEST(BufferDeathTest, RejectsIndexBeyondSize) {
+  Buffer<int> buffer;
+  buffer.reserve(10);
+  QUOIN_EXPECT_MISTAKE((void)buffer[0], "i < size");
+  buffer.resize(3);
+  QUOIN_EXPECT_MISTAKE((void)std::as_const(buffer)[3], "i < size");
 }
 
 }  // namespace

@@ -6,6 +6,8 @@
 
 #include <gtest/gtest.h>
 
+#include "core/death_for_tests.h"
+
 namespace quoin {
 namespace {
 
@@ -46,6 +48,16 @@ TEST(DirectionSet, NamesSayAxisAndSign) {
     const FaceFrame& frame = frame_of(direction);
     EXPECT_EQ(name_of(direction), std::string(1, frame.sign > 0 ? '+' : '-') + "XYZ"[frame.axis]);
   }
+}
+
+TEST(DirectionSetDeathTest, RejectsValueOfEndIterator) {
+  QUOIN_EXPECT_MISTAKE((void)*DirectionSet::all().end(), "an iterator before the end");
+}
+
+TEST(DirectionDeathTest, RejectsUnknownDirection) {
+  [[maybe_unused]] const auto unknown = static_cast<Direction>(6);
+  QUOIN_EXPECT_MISTAKE((void)frame_of(unknown), "one of the six directions");
+  QUOIN_EXPECT_MISTAKE((void)name_of(unknown), "one of the six directions");
 }
 
 }  // namespace

@@ -8,6 +8,8 @@
 
 #include <gtest/gtest.h>
 
+#include "core/death_for_tests.h"
+
 namespace quoin {
 namespace {
 
@@ -131,6 +133,14 @@ TEST(SlotMap, AnInsertThatThrowsLeavesItAsItWas) {
     ASSERT_EQ(map.size(), plain.size());
   }
   map.for_each([&](Handle<Fragile> handle, const Fragile& value) { EXPECT_EQ(plain.at(handle.index), value.value); });
+}
+
+TEST(SlotMapDeathTest, RejectsHandleOfRemovedElement) {
+  SlotMap<int> map;
+  const auto handle = map.insert(1);
+  (void)map.remove(handle);
+  QUOIN_EXPECT_MISTAKE((void)map[handle], "the handle names an element");
+  QUOIN_EXPECT_MISTAKE((void)map[Handle<int>{}], "the handle names an element");
 }
 
 }  // namespace

@@ -6,6 +6,8 @@
 
 #include <gtest/gtest.h>
 
+#include "core/death_for_tests.h"
+
 namespace quoin {
 namespace {
 
@@ -26,6 +28,10 @@ TEST(Boxes, AroundABoxAreTheVoxelsThatItMeets) {
   EXPECT_EQ(box_around({{0.0, 0.25, 0.0}, {2.0, 0.25, 1.0}}), (IBox{{0, 0, 0}, {2, 1, 1}}));
   EXPECT_TRUE(box_around({}).empty());
   EXPECT_FALSE(box_around({DVec3(-1e300), DVec3(1e300)}).empty());
+}
+
+TEST(BoxesDeathTest, RejectsUnknownCorner) {
+  QUOIN_EXPECT_MISTAKE((void)box_corner(IBox{IVec3(0), IVec3(1)}, 8), "0 <= index < 8");
 }
 
 }  // namespace

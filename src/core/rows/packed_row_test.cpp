@@ -6,6 +6,8 @@
 
 #include <gtest/gtest.h>
 
+#include "core/death_for_tests.h"
+
 namespace quoin::packed_row {
 namespace {
 
@@ -23,6 +25,14 @@ TEST(PackedRow, EqualMaskIsThatOfSingleVoxels) {
       ASSERT_EQ(equal_mask(row.data(), bits, index), expected) << bits << " bits, index " << index;
     }
   }
+}
+
+TEST(PackedRowDeathTest, RejectsVoxelsAndIndicesThatDoNotFit) {
+  [[maybe_unused]] std::array<std::uint64_t, 4> row{};
+  QUOIN_EXPECT_MISTAKE((void)read(row.data(), 4, 64), "0 <= x < 64");
+  QUOIN_EXPECT_MISTAKE(write(row.data(), 4, 0, 16), "an index of that many bits");
+  QUOIN_EXPECT_MISTAKE((void)equal_mask(row.data(), 4, 16), "an index of that many bits");
+  QUOIN_EXPECT_MISTAKE((void)repeat(3, 1), "1, 2, 4, 8 or 16 bits");
 }
 
 }  // namespace
