@@ -13,6 +13,8 @@
 #include <quoin/grid/voxel_registry.h>
 
 #include "core/death_for_tests.h"
+#include "grid/change_records.h"
+#include "grid/chunk/chunk_storage.h"
 
 namespace quoin {
 namespace {
@@ -177,6 +179,25 @@ TEST(DensityDeathTest, RejectsUseAfterMove) {
   QUOIN_EXPECT_MISTAKE((void)field.changes_since(cursor), "a field that was not moved from");
 }
 // NOLINTEND(bugprone-use-after-move)
+
+TEST(RefDeathTest, RejectsAccessToNullObject) {
+  struct Object : RefCounted {
+    int value = 1;
+  };
+  const Ref<Object> none;
+  QUOIN_EXPECT_MISTAKE((void)none->value, "there is an object");
+  QUOIN_EXPECT_MISTAKE((void)*none, "there is an object");
+}
+
+TEST(ChangesDeathTest, RejectsPackedBoxBeyondChunk) {
+  QUOIN_EXPECT_MISTAKE((void)PackedBox::of(0, 64, 0), "0 <= x, y, z < 64");
+  QUOIN_EXPECT_MISTAKE((void)PackedBox::of_row(0, 0, 0), "voxels of the row");
+}
+
+TEST(ChunkDeathTest, RejectsSlabBeyondChunk) {
+  QUOIN_EXPECT_MISTAKE((void)ChunkStorage::slab_index(64, 0), "0 <= y, z < 64");
+  QUOIN_EXPECT_MISTAKE((void)bits_for((std::size_t{1} << 16) + 1), "types of 16 bits");
+}
 
 }  // namespace
 }  // namespace quoin

@@ -7,6 +7,8 @@
 #include <limits>
 #include <random>
 
+#include "core/death_for_tests.h"
+
 namespace quoin {
 
 namespace {
@@ -93,6 +95,12 @@ TEST(UnitsOfLength, HaveMetres) {
   EXPECT_EQ(metres_of_unit("m"), 1.0);
   EXPECT_EQ(metres_of_unit(""), std::nullopt);
   EXPECT_EQ(metres_of_unit("furlong"), std::nullopt);
+}
+
+TEST(VolumeDeathTest, RejectsUnknownType) {
+  [[maybe_unused]] const auto unknown = static_cast<ScalarType>(10);
+  QUOIN_EXPECT_MISTAKE((void)size_of(unknown), "a known type");
+  QUOIN_EXPECT_MISTAKE((void)name_of(unknown), "a known type");
 }
 
 }  // namespace

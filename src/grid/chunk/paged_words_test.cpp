@@ -144,5 +144,11 @@ TEST(Chunk, AWriteToACopyLeavesItsOtherSlabsShared) {
   EXPECT_EQ(shared, 252);
 }
 
+TEST(PagedWordsDeathTest, RejectsMoreWordsThanAChunkHas) {
+  PagedWords words(10);
+  QUOIN_EXPECT_MISTAKE((void)words.at(10), "an existing word");
+  QUOIN_EXPECT_MISTAKE(words.grow(PagedWords::kMaxWords + 1), "at most kMaxWords");
+}
+
 }  // namespace
 }  // namespace quoin
