@@ -6,6 +6,7 @@
 
 #include <quoin/mesh/visible_faces.h>
 
+#include "core/death_for_tests.h"
 #include "mesh/blocky/face_occlusion.h"
 #include "mesh/mesh_oracle.h"
 
@@ -198,6 +199,10 @@ TEST(Diagonal, KeepsTheBrighterOne) {
   EXPECT_TRUE(flips_diagonal({3, 0, 3, 0}));
   EXPECT_FALSE(flips_diagonal({0, 3, 0, 3}));
   EXPECT_FALSE(flips_diagonal({0, 1, 1, 1}));
+}
+
+TEST(OcclusionDeathTest, RejectsBrightnessOfUnknownOcclusion) {
+  QUOIN_EXPECT_MISTAKE((void)occlusion_brightness(4), "0 <= occlusion <= 3");
 }
 
 }  // namespace

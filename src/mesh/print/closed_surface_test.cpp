@@ -9,6 +9,7 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
+#include "core/death_for_tests.h"
 #include "mesh/print/corner_sheets.h"
 
 namespace quoin {
@@ -174,6 +175,11 @@ TEST(ClosedSurface, RejectsDistantVoxels) {
   Grid grid;
   grid.set({70'000, 0, 0}, 1);
   EXPECT_EQ(closed_surface(grid).error().code, ErrorCode::LimitExceeded);
+}
+
+TEST(ClosedSurfaceDeathTest, RejectsUnknownVoxelOfCorner) {
+  QUOIN_EXPECT_MISTAKE((void)print::corner_face(8, 0), "one of eight voxels, and an axis");
+  QUOIN_EXPECT_MISTAKE((void)print::corner_face(0, 3), "one of eight voxels, and an axis");
 }
 
 }  // namespace

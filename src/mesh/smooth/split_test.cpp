@@ -229,5 +229,12 @@ TEST(SheetsDeathTest, ACellHasEightCorners) {
   QUOIN_EXPECT_MISTAKE(static_cast<void>(joined_face(256)), "eight corners");
 }
 
+TEST(SheetsDeathTest, RejectsPartOfQuad) {
+  SmoothChunkMesh mesh;
+  mesh.indices.resize(6);
+  QUOIN_EXPECT_MISTAKE(smooth::split_sheets({}, {}, 5, mesh), "whole quads of the mesh");
+  QUOIN_EXPECT_MISTAKE(smooth::split_sheets({}, {}, 12, mesh), "whole quads of the mesh");
+}
+
 }  // namespace
 }  // namespace quoin

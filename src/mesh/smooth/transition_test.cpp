@@ -346,5 +346,11 @@ TEST(TransitionsDeathTest, AreBetweenChunksThatShareABorder) {
                        "must be Shared");
 }
 
+TEST(SmoothCellDeathTest, RejectsCellsBeyondPackedRange) {
+  QUOIN_EXPECT_MISTAKE((void)smooth::cell_name(IVec3(64, 0, 0), IVec3(0)), "a cell of the chunk");
+  QUOIN_EXPECT_MISTAKE((void)smooth::cell_name(IVec3(0), IVec3(0, 1, 0)), "0 or -1 on each axis");
+  QUOIN_EXPECT_MISTAKE((void)smooth::ChunkLevels({}).of_chunk(IVec3(2, 0, 0)), "one of its 26 neighbours");
+}
+
 }  // namespace
 }  // namespace quoin

@@ -519,6 +519,12 @@ TEST(SimplifyDeathTest, WantsArraysOfOneLengthIndicesOfVerticesAndFinitePosition
   QUOIN_EXPECT_MISTAKE(simplify(endless), "has_finite_positions");
 }
 
+TEST(TriangleTreeDeathTest, RejectsPartOfTriangle) {
+  [[maybe_unused]] const std::vector<Vec3> positions(3);
+  [[maybe_unused]] const std::vector<std::uint32_t> indices = {0, 1, 2, 0};
+  QUOIN_EXPECT_MISTAKE((void)TriangleTree(positions, indices), "whole triangles");
+}
+
 }  // namespace
 
 }  // namespace quoin
