@@ -7,6 +7,8 @@
 
 #include <gtest/gtest.h>
 
+#include "core/death_for_tests.h"
+
 namespace quoin {
 namespace {
 
@@ -85,6 +87,13 @@ TEST(Noise, DiffersFromSeedToSeed) {
   int equal = 0;
   for (int i = 0; i < 1'000; ++i) equal += noise2(1, 0.37 * i, 0.5) == noise2(2, 0.37 * i, 0.5);
   EXPECT_LT(equal, 150) << "16 gradients: a few agree by chance at a corner, hardly ever at four";
+}
+
+TEST(NoiseDeathTest, RejectsCoordinatesBeyondLattice) {
+  QUOIN_EXPECT_MISTAKE((void)noise2(1, 1e10, 0.0), "2.30");
+  QUOIN_EXPECT_MISTAKE((void)noise3(1, 0.0, 0.0, std::nan("")), "2.30");
+  QUOIN_EXPECT_MISTAKE((void)fractal2(1, 0.0, 0.0, 30), "29 - octaves");
+  QUOIN_EXPECT_MISTAKE((void)ridged2(1, 1e9, 0.0, 2), "29 - octaves");
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <limits>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -9,6 +10,8 @@
 
 #include "core/death_for_tests.h"
 #include "terrain/landform.h"
+#include "terrain/lattice.h"
+#include "terrain/terrain_parts.h"
 
 namespace quoin {
 namespace {
@@ -206,6 +209,14 @@ TEST(TerrainDeathTest, ChunksOfAnImpossibleWorldAndTypesThatNobodyAddedAreMistak
   QUOIN_EXPECT_MISTAKE((void)generate_terrain_chunk(options_of(1, {0, 1, 1}), world.types, {0, 0, 0}), "ranges");
   QUOIN_EXPECT_MISTAKE((void)generate_terrain_chunk(options_of(1, {1, 1, 1}), {}, {0, 0, 0}), "add_terrain_types");
   QUOIN_EXPECT_MISTAKE((void)generate_terrain(options_of(1, {1, 1, 1}), {}), "add_terrain_types");
+}
+
+TEST(TerrainDeathTest, RejectsRowsBeyondChunkAndLattice) {
+  const auto caves = std::make_unique<terrain::CaveMasks>();
+  QUOIN_EXPECT_MISTAKE((void)caves->row(64, 0), "0 <= y, z < 64");
+  const terrain::Lattice lattice;
+  QUOIN_EXPECT_MISTAKE((void)lattice.row(0, terrain::kLatticeEdge), "a row of the lattice");
+  QUOIN_EXPECT_MISTAKE((void)terrain::smooth_step(1.0, 1.0, 0.5), "low < high");
 }
 
 }  // namespace

@@ -6,6 +6,10 @@
 
 #include <gtest/gtest.h>
 
+#include "core/death_for_tests.h"
+#include "voxelize/crossings.h"
+#include "voxelize/frame.h"
+#include "voxelize/inside.h"
 #include "voxelize/shapes_for_tests.h"
 
 namespace quoin {
@@ -451,6 +455,34 @@ TEST(VoxelLattice, HasTheRequestedNumberOfVoxels) {
   ASSERT_TRUE(by_size);
   EXPECT_EQ(by_size->voxel_size, 0.3);
   EXPECT_NEAR(by_size->origin.x, -1.2, 1e-12);
+}
+
+TEST(VoxelizeDeathTest, RejectsRowsAndBitsBeyondChunk) {
+  QUOIN_EXPECT_MISTAKE((void)voxelizing::row_of(0, 64), "0 <= y, z < 64");
+  QUOIN_EXPECT_MISTAKE((void)voxelizing::bits_between(3, 3), "0 <= first < end <= 64");
+  QUOIN_EXPECT_MISTAKE((void)voxelizing::bits_between(0, 65), "0 <= first < end <= 64");
+}
+
+TEST(VoxelizeDeathTest, RejectsChunksAndTrianglesThatAreNotThere) {
+  const TriangleMesh mesh = shapes::box(kOdd, kOdd + 3.0);
+  const auto frame = voxelizing::Frame::make(mesh, {}, 0.0);
+  ASSERT_TRUE(frame.has_value());
+  ASSERT_EQ(frame->chunk_count(), 1U);
+  const voxelizing::ChunkTriangles triangles(*frame, 0.0);
+  QUOIN_EXPECT_MISTAKE((void)frame->index_of(IVec3(0, -1, 0)), "a chunk of the frame");
+  QUOIN_EXPECT_MISTAKE((void)frame->chunk_at(1), "a chunk of the frame");
+  QUOIN_EXPECT_MISTAKE((void)frame->corners(mesh.triangles.size()), "a triangle of the mesh");
+  QUOIN_EXPECT_MISTAKE((void)triangles.of(1), "a chunk of the frame");
+}
+
+TEST(VoxelizeDeathTest, RejectsSolidVoxelsWithoutRule) {
+  const TriangleMesh mesh = shapes::box(kOdd, kOdd + 3.0);
+  const auto frame = voxelizing::Frame::make(mesh, {}, 0.0);
+  ASSERT_TRUE(frame.has_value());
+  const auto crossings = voxelizing::Crossings::find(*frame, SolidVoxels::Winding, {1}, {});
+  ASSERT_TRUE(crossings.has_value());
+  QUOIN_EXPECT_MISTAKE((void)voxelizing::Inside(*crossings, SolidVoxels::None, {1}), "a rule for solid voxels");
+  QUOIN_EXPECT_MISTAKE((void)crossings->columns(3), "0 <= axis < 3");
 }
 
 }  // namespace
