@@ -4,6 +4,8 @@
 
 #include <cstddef>
 
+#include <quoin/core/assert.h>
+
 #include "mesh/array/kernel.h"
 
 namespace quoin::array {
@@ -22,6 +24,7 @@ inline void interleave(const float (&parts)[3][kBatch], const int (&view_axis)[3
 }
 
 void place_vertices(const VertexBatch& batch, std::size_t count, const Placement& placement, Vec3* positions) {
+  QUOIN_ASSERT(count <= kBatch, "vertices of one batch");
   alignas(64) float places[3][kBatch];
   for (int axis = 0; axis < 3; ++axis) {
     for (std::size_t i = 0; i < kBatch; ++i) {

@@ -13,6 +13,8 @@
 
 #include <immintrin.h>
 
+#include <quoin/core/assert.h>
+
 #include "mesh/blocky/runs.inl"
 #include "mesh/blocky/scratch.h"
 
@@ -219,6 +221,7 @@ void emit_batch(const Pass& pass, int first_plane, int groups, const TypeSource&
   constexpr bool kUAlongBits = Layout<kDirection>::kUAlongBits;
   std::size_t rows = 0;
   const std::size_t count = list_rows(groups, s.batch, s.parts.rows, rows);
+  QUOIN_ASSERT(rows <= std::size_t{kBatchPlanes} * 64 && count + 64 <= kBatchQuads, "room for the batch");
   const auto take = [&](auto row_ends) {
     take_apart<kOcclusion, kUAlongBits, kOcclusion && row_ends>(pass, first_plane, rows, s);
   };

@@ -7,6 +7,8 @@
 
 #include <cstdint>
 
+#include <quoin/core/assert.h>
+
 #include "mesh/blocky/runs.inl"
 #include "mesh/blocky/scratch.h"
 
@@ -38,6 +40,7 @@ QUOIN_STAGE std::size_t list_rows(const Pass& pass, int first_plane, int groups,
       runs += __builtin_popcountll(ends);
     }
   }
+  QUOIN_ASSERT(out - b.rows <= kBatchPlanes * 64, "room for the rows of a batch");
   out->ends = out->starts = 0;
   return static_cast<std::size_t>(runs);
 }
@@ -143,6 +146,7 @@ std::uint64_t* emit(const Pass& pass, int log_bits, std::size_t runs, Scratch& s
     case 3:
       return emit<kDirection, kOcclusion, 3>(pass, runs, s, out);
     default:
+      QUOIN_ASSERT(log_bits == 4, "1, 2, 4, 8 or 16 bits per voxel");
       return emit<kDirection, kOcclusion, 4>(pass, runs, s, out);
   }
 }
@@ -153,6 +157,7 @@ void emit_batch(const Pass& pass, int first_plane, int groups, const TypeSource&
   const std::size_t runs = list_rows<kDirection>(pass, first_plane, groups, types, s);
   std::uint64_t* begin = grow_quads(quads, s.quads, runs + 1);
   const std::uint64_t* end = emit<kDirection, kOcclusion>(pass, types.log_bits, runs, s, begin);
+  QUOIN_ASSERT(static_cast<std::size_t>(end - begin) <= runs, "no more quads than runs");
   s.quads += static_cast<std::size_t>(end - begin);
 }
 

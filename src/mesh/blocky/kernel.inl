@@ -9,6 +9,8 @@
 
 #pragma once
 
+#include <quoin/core/assert.h>
+
 #ifdef QUOIN_KERNEL_AVX512
 #include "mesh/blocky/emit_rows.inl"
 #else
@@ -61,6 +63,7 @@ void fill_row_masks(const IBox& region, Scratch& s) {
   for (int axis = 0; axis < 3; ++axis) {
     const int first = region.min[kBitAxis[axis]];
     const int last = region.max[kBitAxis[axis]] - 1;
+    QUOIN_ASSERT(first >= 0 && first <= last && last < 64, "a region that is not empty, inside the chunk");
     const std::uint64_t cells = (~std::uint64_t{0} << first) & (~std::uint64_t{0} >> (63 - last));
     for (int row = 0; row < 72; ++row) {
       const bool is_inside = row >= region.min[kRowAxis[axis]] && row < region.max[kRowAxis[axis]];
@@ -110,6 +113,7 @@ TypeSource find_types(const Chunk& centre, Scratch& s) {
   VoxelType type = kAir;
   if (has_one_type(centre, type)) return {std::uint64_t{type} << Quad::kTypeShift, kOneType, 0};
   const ChunkStorage& voxels = *ChunkStorage::of(centre);
+  QUOIN_ASSERT(voxels.palette.size() <= 256, "room for the palette");
   for (std::size_t i = 0; i < voxels.palette.size(); ++i) {
     s.palette[i] = std::uint64_t{voxels.palette[i]} << Quad::kTypeShift;
     if (i < 16) s.narrow_palette[i] = static_cast<std::uint32_t>(s.palette[i] >> 32);

@@ -10,6 +10,8 @@
 
 #include <cstdint>
 
+#include <quoin/core/assert.h>
+
 #include "core/rows/packed_row.h"
 #include "grid/chunk/chunk_storage.h"
 #include "mesh/blocky/scratch.h"
@@ -190,6 +192,7 @@ struct OpenIndices {
 
 OpenIndices open_indices(const ChunkStorage& voxels, const Scratch& s) {
   OpenIndices open{};
+  QUOIN_ASSERT(voxels.palette.size() <= 16, "a palette of at most 4 bits");
   for (const std::uint8_t wanted : {0, 2}) {
     for (std::size_t i = 0; i < voxels.palette.size(); ++i) {
       if (s.index_class[i] == wanted && voxels.counts[i] != 0)
@@ -337,6 +340,7 @@ void fill_layers(const Job& job, const SlabRange& range, Scratch& s) {
   }
   if (kTypesFromRows || voxels->bits > 4) find_rows(*voxels, range, s);
   if (!voxels->direct()) {
+    QUOIN_ASSERT(voxels->palette.size() <= 256, "a palette of at most 8 bits");
     __builtin_memset(s.index_class, 1, sizeof(s.index_class));
     for (std::size_t i = 0; i < voxels->palette.size(); ++i) {
       s.index_class[i] = static_cast<std::uint8_t>(job.types->visibility(voxels->palette[i]));
@@ -375,6 +379,7 @@ class OpaqueVoxels {
       return;
     }
     if (voxels_->direct()) return;
+    QUOIN_ASSERT(voxels_->palette.size() <= 256, "a palette of at most 8 bits");
     for (std::size_t i = 0; i < voxels_->palette.size(); ++i) {
       is_opaque_[i] = types.is_opaque(voxels_->palette[i]);
       if (is_opaque_[i] == 0 && voxels_->counts[i] != 0) others_[other_count_++] = static_cast<std::uint8_t>(i);

@@ -11,6 +11,8 @@
 #include <cstdint>
 #include <type_traits>
 
+#include <quoin/core/assert.h>
+
 #include "mesh/blocky/scratch.h"
 #include "mesh/blocky/words.inl"
 
@@ -30,6 +32,8 @@ struct Pass {
 // Finds the visible faces of a batch of planes, and lists the groups of kLanes rows that have any.
 template <bool kTransparent>
 QUOIN_STAGE int find_faces(const Pass& pass, int first_plane, int plane_count, Batch& b) {
+  QUOIN_ASSERT(first_plane >= 0 && first_plane + plane_count <= 64, "planes of the chunk");
+  QUOIN_ASSERT(plane_count > 0 && plane_count <= kBatchPlanes, "planes of one batch");
   int groups = 0;
   for (int i = 0; i < plane_count; ++i) {
     const int plane = first_plane + i;

@@ -13,6 +13,8 @@
 
 #include <span>
 
+#include <quoin/core/assert.h>
+
 #include "mesh/smooth/sampled_cells.inl"
 
 namespace quoin::smooth {
@@ -89,6 +91,8 @@ SampleBits bits_of_samples(const Work& work, const Batch& batch, std::size_t v) 
 // Returns the number of samples that the batch lists.
 std::size_t end_list(const std::uint16_t* end, std::size_t count, Batch& batch) {
   const std::ptrdiff_t listed = end - batch.codes;
+  QUOIN_ASSERT(count <= std::size_t{kBatch}, "vertices of one batch");
+  QUOIN_ASSERT(listed >= 0 && listed <= kBatch * kSamples, "at most 27 samples per vertex");
   batch.first_code[count] = static_cast<std::int32_t>(listed);
   return static_cast<std::size_t>(listed);
 }

@@ -14,6 +14,8 @@
 #include <cstdint>
 #include <cstring>
 
+#include <quoin/core/assert.h>
+
 #include "mesh/smooth/cell.h"
 #include "mesh/smooth/scratch.h"
 
@@ -106,6 +108,8 @@ std::uint16_t* append_edges(std::uint64_t bits, std::uint64_t solid, int first_p
 // A row of cells is active if its 2x2 rows of points are neither all solid nor all air.
 void find_active(Work& work) {
   const CellRange& cells = work.cells;
+  QUOIN_ASSERT(work.n > 0 && work.n <= kChunkEdge, "points of the chunk");
+  QUOIN_ASSERT(cells.first >= -1 && cells.first < cells.last && cells.last <= work.n, "a range of cells of the chunk");
   const std::uint64_t in_range = ~std::uint64_t{0} >> (kChunkEdge - std::min(cells.last, work.n));
   const std::uint64_t with_before = cells.first < 0 ? 1 : 0;
   const int top = work.n - 1;
@@ -246,6 +250,7 @@ void mesh_slices(Work& work, SmoothChunkMesh& out) {
     slice.first_vertex_of_last = slice.first_vertex;
     slice.first_vertex = static_cast<std::uint32_t>(out.positions.size());
     const std::size_t count = list_cells(work, slice.z);
+    QUOIN_ASSERT(count <= kVertexMask + 1, "vertex numbers of a slice fit");
     const std::size_t vertices = slice.first_vertex + count;
     gather_slice(work, slice.z + 1);
     out.positions.reserve(vertices + kSlack);

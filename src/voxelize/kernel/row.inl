@@ -1,5 +1,7 @@
 // The distances of a row of points to a triangle, a few at a time.
 
+#include <quoin/core/assert.h>
+
 #include "core/lanes/lanes.h"
 #include "voxelize/kernel/kernel.h"
 
@@ -28,6 +30,7 @@ inline F outside(const EdgeInRow& edge, F x) {
 }
 
 void update_row(const TriangleInRow& triangle, int first, int end, float* squared, std::int32_t* nearest) {
+  QUOIN_ASSERT(first >= 0 && first <= end && end <= 64, "points of the row");
   const auto& [a, b, c] = triangle.edges;
   const F steps = lanes::load(kSteps);
   const I number = lanes::all(triangle.number);
