@@ -6,7 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "io/byte_stream.h"
+#include "core/bytes/byte_stream.h"
 #include "io/minecraft/nbt_writer.h"
 #include "tool_for_tests.h"
 

@@ -13,8 +13,7 @@
 #include <system_error>
 #include <utility>
 
-#include "io/held_files.h"
-#include "io/whole_file.h"
+#include "core/bytes/held_files.h"
 
 namespace quoin {
 
@@ -111,13 +110,6 @@ Result<std::vector<std::byte>> read_regular_file(const std::filesystem::path& pa
 }
 
 }  // namespace
-
-void sync_folder(const std::filesystem::path& folder) {
-  const int descriptor = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor < 0) return;
-  ::fsync(descriptor);
-  ::close(descriptor);
-}
 
 std::filesystem::path follow_links(std::filesystem::path path) {
   constexpr int kMaxLinks = 40;

@@ -4,7 +4,7 @@
 #include <string>
 #include <system_error>
 
-#include "io/text.h"
+#include "core/bytes/text.h"
 
 namespace quoin {
 

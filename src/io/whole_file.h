@@ -10,16 +10,11 @@
 #include <quoin/core/result.h>
 #include <quoin/io/file.h>
 
+#include "core/bytes/error_path.h"
+
 // Adapts readers and writers of bytes to files; lists the sidecar files of a file.
 
 namespace quoin {
-
-/// Returns `result`; its error names `path` unless it already names a file.
-template <class T>
-[[nodiscard]] Result<T> with_path(Result<T> result, const std::filesystem::path& path) {
-  if (!result && result.error().path.empty()) result.error().path = path.string();
-  return result;
-}
 
 /// Returns the result of `read(bytes)` on a file. Errors: also CannotRead; they name the file.
 template <class Read>
@@ -43,8 +38,5 @@ template <class Read>
 
 /// Returns the data file of a NIfTI pair with the header `path`; empty if it is no pair.
 [[nodiscard]] std::vector<std::filesystem::path> files_of_pair(const std::filesystem::path& path);
-
-/// Syncs a folder, so that a power cut cannot undo a rename. Some file systems do not support it.
-void sync_folder(const std::filesystem::path& folder);
 
 }  // namespace quoin

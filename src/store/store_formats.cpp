@@ -6,8 +6,8 @@
 
 #include <quoin/store/world_saver.h>
 
-#include "io/byte_order.h"
-#include "io/byte_reader.h"
+#include "core/bytes/byte_order.h"
+#include "core/bytes/byte_reader.h"
 #include "io/format_driver.h"
 
 namespace quoin {

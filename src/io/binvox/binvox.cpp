@@ -10,9 +10,9 @@
 #include <string_view>
 #include <utility>
 
+#include "core/bytes/byte_reader.h"
+#include "core/bytes/byte_writer.h"
 #include "core/progress_steps.h"
-#include "io/byte_reader.h"
-#include "io/byte_writer.h"
 #include "io/format_driver.h"
 #include "io/models/model_builder.h"
 #include "io/placed/placed_grids.h"

@@ -14,8 +14,8 @@
 #include <nlohmann/json.hpp>
 #include <tiny_gltf.h>
 
-#include "io/byte_reader.h"
-#include "io/byte_writer.h"
+#include "core/bytes/byte_reader.h"
+#include "core/bytes/byte_writer.h"
 #include "io/triangles/triangles.h"
 
 namespace quoin::triangles {

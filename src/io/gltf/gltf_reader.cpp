@@ -14,13 +14,13 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat4x4.hpp>
 
+#include "core/bytes/byte_reader.h"
+#include "core/bytes/text.h"
 #include "core/srgb.h"
-#include "io/byte_reader.h"
 #include "io/format_driver.h"
 #include "io/gltf/gltf_draco.h"
 #include "io/gltf/gltf_layout.h"
 #include "io/gltf/gltf_meshopt.h"
-#include "io/text.h"
 #include "io/triangles/triangles.h"
 
 #ifdef QUOIN_HAVE_TINYGLTF

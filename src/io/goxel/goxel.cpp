@@ -25,9 +25,9 @@
 
 #include <quoin/core/thousands.h>
 
+#include "core/bytes/byte_reader.h"
+#include "core/bytes/byte_writer.h"
 #include "core/progress_steps.h"
-#include "io/byte_reader.h"
-#include "io/byte_writer.h"
 #include "io/format_driver.h"
 #include "io/image/png.h"
 #include "io/models/model_builder.h"

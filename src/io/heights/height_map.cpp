@@ -7,8 +7,8 @@
 #include <string_view>
 #include <utility>
 
-#include "io/byte_order.h"
-#include "io/byte_reader.h"
+#include "core/bytes/byte_order.h"
+#include "core/bytes/byte_reader.h"
 #include "io/heights/heights.h"
 #include "io/image/png.h"
 

@@ -6,8 +6,8 @@
 #include <string>
 #include <string_view>
 
+#include "core/bytes/text.h"
 #include "io/image/decode.h"
-#include "io/text.h"
 #include "io/whole_file.h"
 
 namespace quoin {

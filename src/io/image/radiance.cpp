@@ -8,8 +8,8 @@
 
 #include <quoin/io/image_files.h>
 
+#include "core/bytes/text.h"
 #include "io/image/exr.h"
-#include "io/text.h"
 #include "io/whole_file.h"
 
 namespace quoin {

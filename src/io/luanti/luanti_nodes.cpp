@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <array>
 
+#include "core/bytes/text.h"
 #include "io/minecraft/block_looks.h"
-#include "io/text.h"
 
 namespace quoin::models {
 

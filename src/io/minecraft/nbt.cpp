@@ -4,7 +4,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "io/byte_order.h"
+#include "core/bytes/byte_order.h"
 
 namespace quoin::nbt {
 

@@ -13,7 +13,8 @@
 #include <utility>
 #include <vector>
 
-#include "io/byte_stream.h"
+#include "core/bytes/byte_stream.h"
+#include "core/bytes/text.h"
 #include "io/minecraft/biomes.h"
 #include "io/minecraft/block_types.h"
 #include "io/minecraft/column_builder.h"
@@ -22,7 +23,6 @@
 #include "io/minecraft/nbt.h"
 #include "io/minecraft/region/region_file.h"
 #include "io/minecraft/sections.h"
-#include "io/text.h"
 
 namespace quoin::minecraft {
 

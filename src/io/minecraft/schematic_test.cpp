@@ -7,7 +7,7 @@
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 
-#include "io/byte_stream.h"
+#include "core/bytes/byte_stream.h"
 #include "io/minecraft/block_states.h"
 #include "io/minecraft/large_nbt.h"
 #include "io/minecraft/minecraft_for_tests.h"

@@ -7,7 +7,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "io/byte_order.h"
+#include "core/bytes/byte_order.h"
 #include "io/minecraft/legacy_blocks.h"
 
 namespace quoin::minecraft {

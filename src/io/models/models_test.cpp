@@ -9,7 +9,7 @@
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 
-#include "io/byte_stream.h"
+#include "core/bytes/byte_stream.h"
 #include "io/format_driver.h"
 #include "io/image/png.h"
 #include "io/models/model_builder.h"

@@ -21,8 +21,8 @@
 #include <quoin/mesh/occlusion.h>
 #include <quoin/version.h>
 
+#include "core/bytes/byte_reader.h"
 #include "core/srgb.h"
-#include "io/byte_reader.h"
 #include "io/format_driver.h"
 #include "io/material_palette.h"
 #include "io/mesh_parts.h"

@@ -10,10 +10,10 @@
 
 #include <glm/vec4.hpp>
 
+#include "core/bytes/byte_reader.h"
+#include "core/bytes/text.h"
 #include "core/srgb.h"
-#include "io/byte_reader.h"
 #include "io/format_driver.h"
-#include "io/text.h"
 #include "io/triangles/triangles.h"
 #include "io/triangles/words.h"
 

@@ -12,7 +12,7 @@
 #include <quoin/core/thousands.h>
 #include <quoin/grid/copy_box.h>
 
-#include "io/text.h"
+#include "core/bytes/text.h"
 
 namespace quoin::models {
 

@@ -16,14 +16,14 @@
 #include <string_view>
 #include <utility>
 
+#include "core/bytes/byte_reader.h"
+#include "core/bytes/byte_stream.h"
+#include "core/bytes/byte_writer.h"
+#include "core/bytes/text.h"
 #include "core/progress_steps.h"
-#include "io/byte_reader.h"
-#include "io/byte_stream.h"
-#include "io/byte_writer.h"
 #include "io/format_driver.h"
 #include "io/models/model_builder.h"
 #include "io/placed/placed_grids.h"
-#include "io/text.h"
 
 namespace quoin::models {
 

@@ -7,8 +7,8 @@
 #include <quoin/io/formats.h>
 #include <quoin/io/sidecar_file.h>
 
+#include "core/bytes/text.h"
 #include "io/format_driver.h"
-#include "io/text.h"
 #include "io/whole_file.h"
 #include "scene/hierarchy.h"
 

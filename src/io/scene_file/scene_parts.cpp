@@ -9,8 +9,8 @@
 
 #include <glm/geometric.hpp>
 
+#include "core/bytes/text.h"
 #include "io/base64.h"
-#include "io/text.h"
 
 namespace quoin::scene_json {
 

@@ -11,10 +11,10 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/half.h>
 
+#include "core/bytes/byte_order.h"
+#include "core/bytes/byte_stream.h"
 #include "core/progress_steps.h"
 #include "io/base64.h"
-#include "io/byte_order.h"
-#include "io/byte_stream.h"
 
 namespace quoin {
 namespace {

@@ -19,8 +19,8 @@
 
 #include <quoin/version.h>
 
+#include "core/bytes/byte_reader.h"
 #include "core/srgb.h"
-#include "io/byte_reader.h"
 #include "io/format_driver.h"
 #include "io/mesh_parts.h"
 #include "io/triangles/triangles.h"

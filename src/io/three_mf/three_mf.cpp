@@ -25,11 +25,11 @@
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/version.h>
 
+#include "core/bytes/byte_reader.h"
+#include "core/bytes/text.h"
 #include "core/srgb.h"
-#include "io/byte_reader.h"
 #include "io/format_driver.h"
 #include "io/mesh_parts.h"
-#include "io/text.h"
 #include "io/three_mf/zip.h"
 #include "io/triangles/triangles.h"
 #include "io/triangles/words.h"

@@ -9,9 +9,9 @@
 
 #include <quoin/core/assert.h>
 
-#include "io/byte_reader.h"
-#include "io/byte_stream.h"
-#include "io/text.h"
+#include "core/bytes/byte_reader.h"
+#include "core/bytes/byte_stream.h"
+#include "core/bytes/text.h"
 
 namespace quoin {
 

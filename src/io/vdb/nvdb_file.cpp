@@ -17,10 +17,10 @@
 #include <string_view>
 #include <utility>
 
-#include "io/byte_order.h"
-#include "io/byte_reader.h"
-#include "io/byte_stream.h"
-#include "io/text.h"
+#include "core/bytes/byte_order.h"
+#include "core/bytes/byte_reader.h"
+#include "core/bytes/byte_stream.h"
+#include "core/bytes/text.h"
 #include "io/vdb/blosc.h"
 
 namespace quoin::vdb {

@@ -7,7 +7,7 @@
 #include <limits>
 #include <string>
 
-#include "io/byte_order.h"
+#include "core/bytes/byte_order.h"
 
 namespace quoin {
 

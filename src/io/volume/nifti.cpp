@@ -15,12 +15,12 @@
 
 #include <quoin/core/assert.h>
 
+#include "core/bytes/byte_order.h"
+#include "core/bytes/byte_writer.h"
+#include "core/bytes/text.h"
 #include "core/progress_steps.h"
-#include "io/byte_order.h"
-#include "io/byte_writer.h"
 #include "io/format_driver.h"
 #include "io/placed/placed_grids.h"
-#include "io/text.h"
 #include "io/volume/header.h"
 #include "io/whole_file.h"
 

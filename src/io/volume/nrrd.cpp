@@ -19,7 +19,7 @@
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
 
-#include "io/text.h"
+#include "core/bytes/text.h"
 #include "io/whole_file.h"
 
 namespace quoin::nrrd {

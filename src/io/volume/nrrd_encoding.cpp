@@ -7,8 +7,8 @@
 
 #include <quoin/core/assert.h>
 
-#include "io/byte_reader.h"
-#include "io/text.h"
+#include "core/bytes/byte_reader.h"
+#include "core/bytes/text.h"
 #include "io/volume/header.h"
 
 #ifdef QUOIN_HAVE_BZIP2

@@ -6,8 +6,8 @@
 #include <quoin/io/formats.h>
 #include <quoin/scene/volume_scene.h>
 
+#include "core/bytes/text.h"
 #include "io/format_driver.h"
-#include "io/text.h"
 #include "io/volume/header.h"
 #include "io/whole_file.h"
 

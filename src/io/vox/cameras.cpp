@@ -6,7 +6,7 @@
 #include <numbers>
 #include <optional>
 
-#include "io/text.h"
+#include "core/bytes/text.h"
 
 namespace quoin::vox {
 

@@ -6,8 +6,8 @@
 #include <string>
 #include <string_view>
 
-#include "io/byte_reader.h"
-#include "io/text.h"
+#include "core/bytes/byte_reader.h"
+#include "core/bytes/text.h"
 #include "io/vox/chunks.h"
 
 namespace quoin::vox {

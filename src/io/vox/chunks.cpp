@@ -4,7 +4,7 @@
 #include <limits>
 #include <utility>
 
-#include "io/text.h"
+#include "core/bytes/text.h"
 #include "io/vox/chunk_reader.h"
 
 namespace quoin::vox {

@@ -9,8 +9,8 @@
 #include <string_view>
 #include <utility>
 
+#include "core/bytes/text.h"
 #include "core/srgb.h"
-#include "io/text.h"
 
 namespace quoin::vox {
 namespace {

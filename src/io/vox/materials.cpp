@@ -9,7 +9,7 @@
 #include <optional>
 #include <string_view>
 
-#include "io/text.h"
+#include "core/bytes/text.h"
 #include "io/vox/chunk_reader.h"
 
 namespace quoin::vox {

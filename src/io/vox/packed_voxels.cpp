@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "io/byte_reader.h"
-#include "io/byte_stream.h"
+#include "core/bytes/byte_reader.h"
+#include "core/bytes/byte_stream.h"
 #include "io/vox/chunks.h"
 
 namespace quoin::vox {

@@ -5,7 +5,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "io/byte_reader.h"
+#include "core/bytes/byte_reader.h"
 
 namespace quoin::vox {
 

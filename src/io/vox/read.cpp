@@ -6,8 +6,8 @@
 #include <quoin/core/assert.h>
 #include <quoin/io/vox.h>
 
-#include "io/byte_reader.h"
-#include "io/text.h"
+#include "core/bytes/byte_reader.h"
+#include "core/bytes/text.h"
 #include "io/vox/cameras.h"
 #include "io/vox/chunks.h"
 #include "io/vox/look.h"

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <utility>
 
-#include "io/text.h"
+#include "core/bytes/text.h"
 
 namespace quoin {
 

@@ -11,7 +11,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/result.h>
 
-#include "io/byte_order.h"
+#include "core/bytes/byte_order.h"
 
 namespace quoin::store {
 

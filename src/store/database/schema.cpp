@@ -7,7 +7,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "io/text.h"
+#include "core/bytes/text.h"
 
 #define XXH_INLINE_ALL
 #include <xxhash.h>

@@ -18,8 +18,8 @@
 #include <quoin/core/assert.h>
 #include <quoin/io/file.h>
 
+#include "core/bytes/text.h"
 #include "io/luanti/luanti_nodes.h"
-#include "io/text.h"
 #include "store/database/connection.h"
 #include "store/luanti/map_block.h"
 #include "store/store_formats.h"

@@ -9,7 +9,7 @@
 #include <quoin/io/file.h>
 #include <quoin/store/world_maintenance.h>
 
-#include "io/whole_file.h"
+#include "core/bytes/error_path.h"
 #include "store/chunk/chunk_body.h"
 #include "store/database/world_lock.h"
 #include "store/maintenance/world_rows.h"

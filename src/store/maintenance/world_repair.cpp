@@ -10,7 +10,8 @@
 #include <quoin/io/file.h>
 #include <quoin/store/world_maintenance.h>
 
-#include "io/whole_file.h"
+#include "core/bytes/error_path.h"
+#include "core/bytes/held_files.h"
 #include "store/chunk/chunk_body.h"
 #include "store/database/world_lock.h"
 #include "store/maintenance/found_parts.h"

@@ -14,8 +14,8 @@
 #include <quoin/scene/near_grids.h>
 #include <quoin/store/world_meshes.h>
 
+#include "core/bytes/error_path.h"
 #include "core/coordinates/chunk_order.h"
-#include "io/whole_file.h"
 #include "mesh/blocky/chunk_triangles.h"
 #include "scene/meshes/glass_thickness.h"
 #include "store/meshes/chunk_cache.h"

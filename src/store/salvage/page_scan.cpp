@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-#include "io/byte_order.h"
+#include "core/bytes/byte_order.h"
 #include "store/chunk/chunk_body.h"
 #include "store/salvage/page_file.h"
 

@@ -15,7 +15,7 @@
 
 #include <quoin/io/file.h>
 
-#include "io/byte_order.h"
+#include "core/bytes/byte_order.h"
 #include "store/chunk/chunk_body.h"
 #include "store/database/connection.h"
 #include "store/world/world_for_tests.h"

@@ -14,8 +14,8 @@
 #include <quoin/store/world_saver.h>
 #include <quoin/store/world_store.h>
 
+#include "core/bytes/error_path.h"
 #include "io/luanti/luanti_nodes.h"
-#include "io/whole_file.h"
 #include "store/scene/put_world.h"
 #include "store/world/part_text.h"
 #include "store/world/world_changes.h"

@@ -8,7 +8,7 @@
 
 #include <quoin/store/world_saver.h>
 
-#include "io/whole_file.h"
+#include "core/bytes/error_path.h"
 #include "scene/hierarchy.h"
 #include "store/scene/saver_state.h"
 #include "store/world/part_text.h"

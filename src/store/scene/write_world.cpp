@@ -5,7 +5,6 @@
 #include <quoin/io/file.h>
 #include <quoin/store/world_saver.h>
 
-#include "io/whole_file.h"
 #include "store/database/connection.h"
 #include "store/database/schema.h"
 #include "store/database/world_lock.h"

@@ -10,7 +10,9 @@
 #include <system_error>
 #include <utility>
 
-#include "io/whole_file.h"
+#include <quoin/io/file.h>
+
+#include "core/bytes/held_files.h"
 #include "store/database/schema.h"
 #include "store/database/world_lock.h"
 

@@ -14,8 +14,8 @@
 #include <quoin/core/assert.h>
 #include <quoin/io/file.h>
 
-#include "io/held_files.h"
-#include "io/whole_file.h"
+#include "core/bytes/error_path.h"
+#include "core/bytes/held_files.h"
 #include "store/chunk/chunk_body.h"
 #include "store/database/world_lock.h"
 #include "store/store_formats.h"

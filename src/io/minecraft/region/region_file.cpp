@@ -12,9 +12,9 @@
 
 #include <quoin/io/file.h>
 
-#include "io/byte_order.h"
-#include "io/byte_stream.h"
-#include "io/held_files.h"
+#include "core/bytes/byte_order.h"
+#include "core/bytes/byte_stream.h"
+#include "core/bytes/held_files.h"
 #include "io/minecraft/region/lz4_blocks.h"
 
 namespace quoin::minecraft {

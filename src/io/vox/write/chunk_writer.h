@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "io/byte_writer.h"
+#include "core/bytes/byte_writer.h"
 
 namespace quoin::vox {
 

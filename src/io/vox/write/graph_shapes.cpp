@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "io/text.h"
+#include "core/bytes/text.h"
 #include "io/vox/write/graph_revision_steps.h"
 
 namespace quoin::vox {

@@ -6,8 +6,8 @@
 #include <set>
 #include <tuple>
 
+#include "core/bytes/text.h"
 #include "core/srgb.h"
-#include "io/text.h"
 #include "io/vox/cameras.h"
 #include "io/vox/chunk_reader.h"
 #include "io/vox/look.h"

@@ -10,9 +10,9 @@
 
 #include <quoin/io/vox.h>
 
-#include "io/byte_reader.h"
+#include "core/bytes/byte_reader.h"
+#include "core/bytes/text.h"
 #include "io/format_driver.h"
-#include "io/text.h"
 #include "io/vox/chunk_reader.h"
 #include "io/vox/materials.h"
 #include "io/vox/source.h"

@@ -1,10 +1,13 @@
-#include "io/text.h"
+#include "core/bytes/text.h"
 
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
 #include <system_error>
+
+#include <quoin/core/result.h>
+#include <quoin/core/thousands.h>
 
 namespace quoin {
 
@@ -35,6 +38,24 @@ std::size_t sequence_length(std::string_view text, std::size_t i) {
 }
 
 }  // namespace
+
+std::string to_string(const Error& error) {
+  std::string text;
+  if (!error.path.empty()) text += error.path + ": ";
+  if (error.byte_offset.has_value()) text += "byte " + std::to_string(*error.byte_offset) + ": ";
+  return text + error.message;
+}
+
+std::string with_thousands(std::int64_t number) {
+  const std::string digits = std::to_string(number);
+  const std::size_t first = number < 0 ? 1 : 0;
+  std::string text;
+  for (std::size_t at = 0; at < digits.size(); ++at) {
+    if (at > first && (digits.size() - at) % 3 == 0) text += ',';
+    text += digits[at];
+  }
+  return text;
+}
 
 std::optional<std::int64_t> parse_integer(std::string_view text) {
   std::int64_t value = 0;

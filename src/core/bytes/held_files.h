@@ -29,4 +29,7 @@ class HeldFile {
 /// Closes a descriptor from `open_for_reading`, once the file is no longer held.
 void close_after_reading(int descriptor);
 
+/// Syncs a folder, so that a power cut cannot undo a rename. Some file systems do not support it.
+void sync_folder(const std::filesystem::path& folder);
+
 }  // namespace quoin

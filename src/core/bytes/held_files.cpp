@@ -1,4 +1,4 @@
-#include "io/held_files.h"
+#include "core/bytes/held_files.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -90,6 +90,13 @@ void close_after_reading(int descriptor) {
       return;
     }
   }
+  ::close(descriptor);
+}
+
+void sync_folder(const std::filesystem::path& folder) {
+  const int descriptor = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return;
+  ::fsync(descriptor);
   ::close(descriptor);
 }
 
