@@ -7,7 +7,7 @@
 #include <thread>
 #include <utility>
 
-#include "core/worker_count.h"
+#include "core/work/worker_count.h"
 
 namespace quoin {
 namespace {

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "core/coordinates/chunk_order.h"
-#include "core/worker_count.h"
+#include "core/work/worker_count.h"
 #include "live/live_field.h"
 #include "live/live_grid.h"
 #include "scene/instance_axes.h"

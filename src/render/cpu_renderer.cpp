@@ -15,11 +15,11 @@
 #include "core/moved_from.h"
 #include "light/light_model.h"
 #include "light/surface/light_bricks.h"
+#include "render/draw_tiles.h"
 #include "render/image_detail.h"
 #include "render/image_request.h"
 #include "render/impostor/pass.h"
 #include "render/tile.h"
-#include "render/tile_progress.h"
 #include "scene/tracer/placed_grid.h"
 
 namespace quoin {

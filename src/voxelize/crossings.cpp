@@ -11,8 +11,7 @@
 #include <glm/geometric.hpp>
 
 #include <quoin/core/assert.h>
-
-#include "core/progress_steps.h"
+#include "core/work/progress_steps.h"
 
 namespace quoin::voxelizing {
 

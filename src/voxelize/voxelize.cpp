@@ -14,7 +14,7 @@
 #include <quoin/grid/grid.h>
 
 #include "core/object_pool.h"
-#include "core/progress_steps.h"
+#include "core/work/progress_steps.h"
 #include "grid/looks.h"
 #include "voxelize/crossings.h"
 #include "voxelize/frame.h"

@@ -11,7 +11,7 @@
 
 #include "core/coordinates/chunk_order.h"
 #include "core/moved_from.h"
-#include "core/progress_steps.h"
+#include "core/work/progress_steps.h"
 #include "grid/halving/chunk_halver.h"
 #include "grid/halving/density_halver.h"
 

@@ -12,7 +12,7 @@
 #include <quoin/core/thousands.h>
 
 #include "core/bytes/byte_stream.h"
-#include "core/progress_steps.h"
+#include "core/work/progress_steps.h"
 #include "io/minecraft/block_looks.h"
 #include "io/minecraft/block_states.h"
 #include "io/minecraft/nbt_writer.h"

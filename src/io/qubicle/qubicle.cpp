@@ -20,7 +20,7 @@
 #include "core/bytes/byte_stream.h"
 #include "core/bytes/byte_writer.h"
 #include "core/bytes/text.h"
-#include "core/progress_steps.h"
+#include "core/work/progress_steps.h"
 #include "io/format_driver.h"
 #include "io/models/model_builder.h"
 #include "io/placed/placed_grids.h"

@@ -13,7 +13,7 @@
 
 #include "core/bytes/byte_order.h"
 #include "core/bytes/byte_stream.h"
-#include "core/progress_steps.h"
+#include "core/work/progress_steps.h"
 #include "io/base64.h"
 
 namespace quoin {

@@ -18,7 +18,7 @@
 #include "core/bytes/byte_order.h"
 #include "core/bytes/byte_writer.h"
 #include "core/bytes/text.h"
-#include "core/progress_steps.h"
+#include "core/work/progress_steps.h"
 #include "io/format_driver.h"
 #include "io/placed/placed_grids.h"
 #include "io/volume/header.h"

@@ -19,7 +19,7 @@
 
 #include "core/bytes/byte_reader.h"
 #include "core/bytes/byte_writer.h"
-#include "core/progress_steps.h"
+#include "core/work/progress_steps.h"
 #include "io/format_driver.h"
 #include "io/models/model_builder.h"
 #include "io/placed/placed_grids.h"

@@ -15,7 +15,7 @@
 #include <quoin/core/parallel.h>
 #include <quoin/core/result.h>
 
-#include "core/progress_steps.h"
+#include "core/work/progress_steps.h"
 #include "mesh/array/kernel.h"
 #include "mesh/array/lattice.h"
 

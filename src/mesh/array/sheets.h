@@ -10,7 +10,7 @@
 #include <quoin/core/vec.h>
 #include <quoin/mesh/array_surface.h>
 
-#include "core/progress_steps.h"
+#include "core/work/progress_steps.h"
 #include "mesh/array/cells.h"
 #include "mesh/array/kernel.h"
 #include "mesh/array/placement.h"

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/progress_steps.h"
+#include "core/work/progress_steps.h"
 #include "mesh/blocky/chunk_triangles.h"
 
 namespace quoin {

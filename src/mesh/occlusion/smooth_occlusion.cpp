@@ -11,7 +11,7 @@
 
 #include "core/moved_from.h"
 #include "core/object_pool.h"
-#include "core/progress_steps.h"
+#include "core/work/progress_steps.h"
 #include "mesh/occlusion/places.h"
 
 namespace quoin {

@@ -9,7 +9,7 @@
 
 #include "core/coordinates/chunk_order.h"
 #include "core/object_pool.h"
-#include "core/progress_steps.h"
+#include "core/work/progress_steps.h"
 #include "mesh/smooth/levels.h"
 #include "mesh/surface/build.h"
 #include "mesh/surface/material.h"

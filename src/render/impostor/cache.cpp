@@ -15,7 +15,7 @@
 #include <quoin/core/assert.h>
 
 #include "core/moved_from.h"
-#include "core/worker_count.h"
+#include "core/work/worker_count.h"
 
 namespace quoin {
 namespace {

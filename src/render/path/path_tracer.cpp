@@ -4,12 +4,12 @@
 
 #include "core/moved_from.h"
 #include "light/surfaces.h"
+#include "render/draw_tiles.h"
 #include "render/path/denoise.h"
 #include "render/path/lamps/path_lamps.h"
 #include "render/path/path_request.h"
 #include "render/path/path_tile.h"
 #include "render/path/sky_light.h"
-#include "render/tile_progress.h"
 #include "scene/tracer/scene_view.h"
 
 namespace quoin {

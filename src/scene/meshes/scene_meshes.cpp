@@ -1,7 +1,5 @@
 #include <quoin/scene/scene_meshes.h>
 
-#include <algorithm>
-#include <mutex>
 #include <utility>
 
 #include <glm/common.hpp>
@@ -10,6 +8,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/grid/voxel_field.h>
 
+#include "core/work/progress_steps.h"
 #include "mesh/blocky/occlusion_atlas.h"
 #include "mesh/surface/material.h"
 #include "scene/instance_axes.h"
@@ -23,31 +22,9 @@ namespace {
 /// other, with all threads on their chunks.
 constexpr std::size_t kSmallGridChunks = 4;
 
-/// Combines the progress of many grids, weighted by their chunks, for one callback.
-class SharedProgress {
- public:
-  SharedProgress(const Progress& listener, std::size_t total)
-      : listener_(listener), total_(std::max<std::size_t>(total, 1)) {}
-
-  /// Reports `chunks` more as done. Returns false if the callback cancels.
-  bool advance(double chunks) {
-    if (!listener_) return true;
-    const std::lock_guard lock(mutex_);
-    done_ += chunks;
-    if (going_) going_ = listener_(std::min(1.0, done_ / static_cast<double>(total_)));
-    return going_;
-  }
-
- private:
-  const Progress& listener_;
-  std::size_t total_;
-  std::mutex mutex_;
-  double done_ = 0;
-  bool going_ = true;
-};
-
+/// `progress` counts the chunks of all grids.
 Result<BlockyMesh> mesh_grid(const Scene& scene, GridHandle handle, const BlockySceneOptions& of_scene, Threads threads,
-                             SharedProgress& progress) {
+                             ProgressSteps& progress) {
   BlockyMeshOptions options = of_scene.mesh;
   if (of_scene.cut) options.cut = [&](IVec3 chunk, QuadBuffer& quads) { of_scene.cut(handle, chunk, quads); };
   const Grid& grid = scene.grids()[handle].grid;
@@ -56,9 +33,9 @@ Result<BlockyMesh> mesh_grid(const Scene& scene, GridHandle handle, const Blocky
   auto mesh = build_blocky_mesh(grid, scene.types, options, threads, [&](double fraction) {
     const double more = (fraction - reported) * chunks;
     reported = fraction;
-    return progress.advance(more);
+    return progress.add(more);
   });
-  if (mesh && !progress.advance((1.0 - reported) * chunks)) return make_error(ErrorCode::Cancelled, "cancelled");
+  if (mesh && !progress.add((1.0 - reported) * chunks)) return make_error(ErrorCode::Cancelled, "cancelled");
   return mesh;
 }
 
@@ -74,7 +51,7 @@ MeshResults mesh_all(const Scene& scene, const std::vector<GridHandle>& grids, c
     chunks += count;
     (count <= kSmallGridChunks ? small : large).push_back(i);
   }
-  SharedProgress progress(listener, chunks);
+  ProgressSteps progress(listener, chunks);
   MeshResults results(grids.size());
   parallel_for(small.size(), threads, [&](std::size_t i) {
     results[small[i]] = mesh_grid(scene, grids[small[i]], options, Threads{1}, progress);

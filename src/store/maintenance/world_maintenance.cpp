@@ -14,6 +14,7 @@
 #include <quoin/io/file.h>
 
 #include "core/bytes/error_path.h"
+#include "core/work/progress_steps.h"
 #include "store/chunk/chunk_body.h"
 #include "store/database/world_lock.h"
 #include "store/maintenance/world_rows.h"
@@ -36,30 +37,6 @@ std::uint64_t file_bytes(const std::filesystem::path& path) {
   const std::uintmax_t bytes = std::filesystem::file_size(path, error);
   return error ? 0 : bytes;
 }
-
-/// Reports the bytes read as a fraction of a file's size.
-class ReadProgress {
- public:
-  ReadProgress(const Progress& progress, const std::filesystem::path& path)
-      : progress_(progress), bytes_(static_cast<double>(std::max<std::uint64_t>(file_bytes(path), 1))) {}
-  /// Returns false to cancel.
-  bool add(std::size_t bytes) {
-    read_ += bytes;
-    if (!progress_ || (++calls_ & 255U) != 0) return true;
-    is_cancelled_ = !progress_(std::min(1.0, static_cast<double>(read_) / bytes_));
-    return !is_cancelled_;
-  }
-  [[nodiscard]] Status status() const {
-    return is_cancelled_ ? Status(make_error(ErrorCode::Cancelled, "cancelled")) : Status();
-  }
-
- private:
-  const Progress& progress_;
-  double bytes_;
-  std::size_t read_ = 0;
-  unsigned calls_ = 0;
-  bool is_cancelled_ = false;
-};
 
 Result<WorldSummary> summarize(const std::filesystem::path& path, const Progress& progress) {
   auto reader = open_reader(path);
@@ -107,7 +84,7 @@ Result<WorldSummary> summarize(const std::filesystem::path& path, const Progress
 class Check {
  public:
   Check(WorldReader& reader, const Progress& progress, const std::filesystem::path& path)
-      : reader_(reader), reading_(progress, path) {}
+      : reader_(reader), reading_(progress, file_bytes(path)) {}
 
   Result<WorldCheck> run() {
     // Reads one consistent state, even if others write to the world.
@@ -127,6 +104,11 @@ class Check {
   }
 
  private:
+  // Reports progress every 256 rows. Returns false if the caller cancelled.
+  bool note_row(std::size_t bytes) {
+    unreported_bytes_ += bytes;
+    return (++rows_ & 255U) != 0 || reading_.add(static_cast<double>(std::exchange(unreported_bytes_, 0)));
+  }
   void report(std::string line) { check_.damage.push_back({std::nullopt, std::move(line)}); }
 
   void check_parts(const char* kind) {
@@ -148,7 +130,7 @@ class Check {
     const std::map<std::int64_t, RegionPlace> regions = rows.regions(damage);
     for (std::string& line : damage) report(std::move(line));
     const auto gaps = rows.each([&](std::int64_t key, std::span<const std::byte> body) {
-      if (!reading_.add(body.size())) return RowVerdict::Stop;
+      if (!note_row(body.size())) return RowVerdict::Stop;
       const auto region = regions.find(key >> kRegionBits);
       if (region == regions.end()) {
         report("the chunk with key " + std::to_string(key) + " lies in a missing region");
@@ -167,7 +149,7 @@ class Check {
     });
     if (!gaps) return gaps.error();
     for (const KeyGap& gap : *gaps) report(about(gap, regions) + ": " + gap.why);
-    return reading_.status();
+    return reading_.cancelled() ? Status(make_error(ErrorCode::Cancelled, "cancelled")) : Status();
   }
 
   // Checks structures that rows do not cover: indices, free pages.
@@ -189,7 +171,9 @@ class Check {
   }
 
   WorldReader& reader_;
-  ReadProgress reading_;
+  ProgressSteps reading_;  // bytes of the file
+  std::size_t unreported_bytes_ = 0;
+  unsigned rows_ = 0;
   ChunkDecoder decoder_;
   WorldRules rules_;
   WorldCheck check_;
