@@ -15,6 +15,7 @@
 #include <glm/mat4x4.hpp>
 
 #include "core/bytes/byte_reader.h"
+#include "core/bytes/json_extent.h"
 #include "core/bytes/text.h"
 #include "core/srgb.h"
 #include "io/format_driver.h"
@@ -45,27 +46,7 @@ bool is_gltf(std::span<const std::byte> beginning) {
 
 constexpr FormatCapability kReading = FormatCapability::Read;
 
-constexpr int kDeepest = 128;
-
-/// Returns true if brackets are nested too deeply for tinygltf, which parses recursively.
-bool is_too_deep(std::string_view json) {
-  int depth = 0;
-  bool in_text = false;
-  for (std::size_t i = 0; i < json.size(); ++i) {
-    const char c = json[i];
-    if (in_text) {
-      if (c == '\\') ++i;
-      in_text = c != '"';
-    } else if (c == '"') {
-      in_text = true;
-    } else if (c == '{' || c == '[') {
-      if (++depth > kDeepest) return true;
-    } else if (c == '}' || c == ']') {
-      --depth;
-    }
-  }
-  return false;
-}
+constexpr int kMaxDepth = 128;  // of brackets: tinygltf parses recursively
 
 /// The data for tinygltf's callbacks, and the bytes of the images by number.
 struct Asked {
@@ -764,7 +745,7 @@ Result<tinygltf::Model> parse(std::span<const std::byte> bytes, Asked& asked) {
 Result<LoadedMesh> read_gltf(std::span<const std::byte> bytes, SidecarReader& sidecars) {
   Asked asked{&sidecars};
   const std::string_view json = json_of(bytes);
-  if (is_too_deep(json)) return make_error(ErrorCode::BadFormat, "the JSON is nested too deeply");
+  if (json_extent(json).depth > kMaxDepth) return make_error(ErrorCode::BadFormat, "the JSON is nested too deeply");
   const auto rewritten = readable_by_tinygltf(bytes, json);
   auto model = parse(rewritten.empty() ? bytes : rewritten, asked);
   if (sidecars.refused()) return *sidecars.refused();

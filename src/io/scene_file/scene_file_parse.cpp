@@ -4,6 +4,7 @@
 
 #include <quoin/io/scene_file.h>
 
+#include "core/bytes/json_extent.h"
 #include "io/scene_file/grids_parse.h"
 #include "io/scene_file/json_reader.h"
 #include "io/scene_file/scene_file.h"
@@ -126,35 +127,6 @@ void read_file_object(const Json& json, std::size_t file_bytes, Threads threads,
   if (!faults.error()) NameCheck(scene, faults).check();
 }
 
-/// The structure of a text outside its strings.
-struct Outside {
-  int deepest = 0;        ///< nested brackets
-  std::size_t bytes = 0;  ///< values, and strings as one each
-};
-
-// Determines the memory needs before anything is built.
-Outside outside_strings(std::string_view text) {
-  int depth = 0;
-  int deepest = 0;
-  std::size_t bytes = 0;
-  bool in_string = false;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const char c = text[i];
-    bytes += in_string ? 0 : 1;
-    if (in_string) {
-      if (c == '\\') ++i;
-      if (c == '"') in_string = false;
-    } else if (c == '"') {
-      in_string = true;
-    } else if (c == '{' || c == '[') {
-      deepest = std::max(deepest, ++depth);
-    } else if (c == '}' || c == ']') {
-      --depth;
-    }
-  }
-  return {deepest, bytes};
-}
-
 }  // namespace
 
 Result<SceneFile> parse_scene_file(std::span<const std::byte> text, Threads threads) {
@@ -162,11 +134,11 @@ Result<SceneFile> parse_scene_file(std::span<const std::byte> text, Threads thre
     return make_error(ErrorCode::LimitExceeded, "the scene file has more than 2 GiB");
   }
   const std::string_view chars(reinterpret_cast<const char*>(text.data()), text.size());
-  const Outside outside = outside_strings(chars);
-  if (outside.bytes > kMaxBytes) {
+  const JsonExtent extent = json_extent(chars);
+  if (extent.bytes_outside_strings > kMaxBytes) {
     return make_error(ErrorCode::LimitExceeded, "the scene file has more than 64 MiB outside its strings");
   }
-  if (outside.deepest > kMaxDepth) {
+  if (extent.depth > kMaxDepth) {
     return make_error(ErrorCode::LimitExceeded, "nested more than " + std::to_string(kMaxDepth) + " levels deep");
   }
   SceneFile scene;

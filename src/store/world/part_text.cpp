@@ -7,6 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/bytes/json_extent.h"
 #include "io/scene_file/scene_parts.h"
 
 namespace quoin::store {
@@ -22,16 +23,6 @@ using scene_json::Place;
 
 // Parts are flat; deeper nesting could overflow the stack of a recursive reader.
 constexpr int kMaxDepth = 32;
-
-bool is_too_deep(std::string_view text) {
-  int depth = 0;
-  for (const char c : text) {
-    depth += c == '{' || c == '[' ? 1 : 0;
-    depth -= c == '}' || c == ']' ? 1 : 0;
-    if (depth > kMaxDepth) return true;
-  }
-  return false;
-}
 
 VoxelProperties read(const Json& json, const Place& place, Faults& faults, VoxelProperties*) {
   return scene_json::properties_of(json, place, faults);
@@ -157,7 +148,7 @@ std::string text_of(DVec3 vector) {
 template <class T>
 Result<T> part_from(std::span<const std::byte> text, const std::string& name) {
   const std::string_view chars(reinterpret_cast<const char*>(text.data()), text.size());
-  if (is_too_deep(chars)) return make_error(ErrorCode::BadFormat, name + ": nested too deeply");
+  if (json_extent(chars).depth > kMaxDepth) return make_error(ErrorCode::BadFormat, name + ": nested too deeply");
   Faults faults;
   try {
     const Place place{nullptr, name, std::nullopt};
