@@ -1,0 +1,252 @@
+#include "core/work/workers.h"
+
+#include <algorithm>
+#include <atomic>
+#include <deque>
+#include <stdexcept>
+#include <thread>
+
+#include <gtest/gtest.h>
+
+namespace quoin {
+namespace {
+
+using namespace std::chrono_literals;
+
+// The simplest owner: a queue of functions.
+class Queue {
+ public:
+  using Job = std::function<void()>;
+
+  explicit Queue(unsigned workers) {
+    workers_.start(workers, [this](Workers::Lock& lock, unsigned /*worker*/) { return step(lock); });
+  }
+  void push(Job job) {
+    {
+      const std::lock_guard lock(mutex_);
+      jobs_.push_back(std::move(job));
+      ++unfinished_;
+    }
+    workers_.wake_one();
+  }
+  std::size_t cancel() {
+    const std::lock_guard lock(mutex_);
+    const std::size_t count = jobs_.size();
+    unfinished_ -= count;
+    jobs_.clear();
+    return count;
+  }
+  void finish() {
+    std::unique_lock lock(mutex_);
+    workers_.wait(lock, [&] { return unfinished_ == 0; });
+  }
+  bool finish_within(double seconds) {
+    std::unique_lock lock(mutex_);
+    return workers_.wait_for(lock, seconds, [&] { return unfinished_ == 0; });
+  }
+  std::exception_ptr take_failure() {
+    const std::lock_guard lock(mutex_);
+    return workers_.take_failure();
+  }
+  Workers& workers() { return workers_; }
+  std::mutex& mutex() { return mutex_; }
+
+ private:
+  Workers::Clock::time_point step(Workers::Lock& lock) {
+    if (jobs_.empty()) return Workers::kWhenWoken;
+    const Job job = std::move(jobs_.front());
+    jobs_.pop_front();
+    --unfinished_;  // for the waiting, when the step ends
+    lock.unlock();
+    job();
+    lock.lock();
+    return Workers::kAgain;
+  }
+
+  std::mutex mutex_;
+  std::deque<Job> jobs_;
+  std::size_t unfinished_ = 0;
+  Workers workers_{mutex_};
+};
+
+// Lets a test hold a worker within a job.
+class Gate {
+ public:
+  void pass() {
+    is_reached_ = true;
+    is_reached_.notify_all();
+    is_open_.wait(false);
+  }
+  void wait_until_reached() { is_reached_.wait(false); }
+  void open() {
+    is_open_ = true;
+    is_open_.notify_all();
+  }
+
+ private:
+  std::atomic<bool> is_reached_{false};
+  std::atomic<bool> is_open_{false};
+};
+
+TEST(Workers, DoTheWorkOfManyProducers) {
+  std::atomic<int> done{0};
+  Queue queue(3);
+  std::vector<std::thread> producers;
+  for (int i = 0; i < 4; ++i) {
+    producers.emplace_back([&] {
+      for (int k = 0; k < 500; ++k) queue.push([&] { ++done; });
+    });
+  }
+  for (std::thread& each : producers) each.join();
+  queue.workers().drain();
+  EXPECT_EQ(done, 2000);
+}
+
+TEST(Workers, StopLeavesWaitingWork) {
+  std::atomic<int> done{0};
+  Gate gate;
+  Queue queue(1);
+  queue.push([&] {
+    gate.pass();
+    ++done;
+  });
+  for (int i = 0; i < 10; ++i) queue.push([&] { ++done; });
+  gate.wait_until_reached();
+  std::thread opener([&] {
+    // Opens the gate once the worker has to stop.
+    for (bool is_stopping = false; !is_stopping;) {
+      const std::lock_guard lock(queue.mutex());
+      is_stopping = queue.workers().is_stopping();
+    }
+    gate.open();
+  });
+  queue.workers().stop();
+  opener.join();
+  EXPECT_EQ(done, 1);
+  EXPECT_EQ(queue.cancel(), 10);
+  EXPECT_FALSE(queue.workers().is_started());
+}
+
+TEST(Workers, DrainDoesWaitingWork) {
+  std::atomic<int> done{0};
+  Gate gate;
+  Queue queue(2);
+  queue.push([&] { gate.pass(); });
+  for (int i = 0; i < 10; ++i) {
+    queue.push([&] {
+      if (++done < 20) queue.push([&] { ++done; });
+    });
+  }
+  gate.wait_until_reached();
+  gate.open();
+  queue.workers().drain();
+  EXPECT_EQ(done, 20);
+  EXPECT_EQ(queue.cancel(), 0);
+}
+
+TEST(Workers, CancelledWorkIsNotDone) {
+  std::atomic<int> done{0};
+  Gate gate;
+  Queue queue(1);
+  queue.push([&] { gate.pass(); });
+  gate.wait_until_reached();
+  for (int i = 0; i < 5; ++i) queue.push([&] { ++done; });
+  EXPECT_EQ(queue.cancel(), 5);
+  queue.push([&] { done += 100; });
+  gate.open();
+  queue.workers().drain();
+  EXPECT_EQ(done, 100);
+}
+
+TEST(Workers, KeepTheFirstExceptionAndContinue) {
+  std::atomic<int> done{0};
+  Queue queue(1);
+  queue.push([] { throw std::runtime_error("first"); });
+  queue.push([] { throw 2; });
+  queue.push([&] { ++done; });
+  queue.workers().drain();
+  EXPECT_EQ(done, 1);
+  try {
+    std::rethrow_exception(queue.take_failure());
+    FAIL() << "no exception";
+  } catch (const std::runtime_error& failure) {
+    EXPECT_STREQ(failure.what(), "first");
+  }
+  EXPECT_EQ(queue.take_failure(), nullptr);
+}
+
+TEST(Workers, AnExceptionWakesWaitingCallers) {
+  Queue queue(1);
+  queue.push([] { throw std::runtime_error("failed"); });
+  queue.finish();
+  EXPECT_TRUE(queue.finish_within(10.0));
+}
+
+TEST(Workers, WaitForEndsWhenTheTimeIsOver) {
+  Gate gate;
+  Queue queue(1);
+  queue.push([&] { gate.pass(); });
+  gate.wait_until_reached();
+  queue.push([] {});
+  EXPECT_FALSE(queue.finish_within(0.001));
+  gate.open();
+  queue.finish();
+}
+
+TEST(Workers, StepAgainAtTheTimeThatAStepReturns) {
+  std::mutex mutex;
+  int steps = 0;
+  Workers workers(mutex);
+  workers.start(1, [&](Workers::Lock& /*lock*/, unsigned /*worker*/) {
+    ++steps;
+    return Workers::Clock::now() + 1ms;
+  });
+  {
+    std::unique_lock lock(mutex);
+    workers.wait(lock, [&] { return steps >= 3; });
+  }
+  workers.stop();
+  EXPECT_GE(steps, 3);
+}
+
+TEST(Workers, StopDoesNotWaitForTheNextTime) {
+  std::mutex mutex;
+  std::atomic<int> steps = 0;
+  Workers workers(mutex);
+  workers.start(2, [&](Workers::Lock& /*lock*/, unsigned /*worker*/) {
+    ++steps;
+    return Workers::Clock::now() + 24h;
+  });
+  {
+    std::unique_lock lock(mutex);
+    workers.wait(lock, [&] { return steps == 2; });
+  }
+  workers.stop();
+  EXPECT_EQ(steps, 2);
+}
+
+TEST(Workers, NumberTheirThreads) {
+  std::mutex mutex;
+  std::vector<int> steps(3);
+  Workers workers(mutex);
+  workers.start(3, [&](Workers::Lock& /*lock*/, unsigned worker) {
+    ++steps.at(worker);
+    return Workers::kWhenWoken;
+  });
+  {
+    std::unique_lock lock(mutex);
+    workers.wait(lock, [&] { return std::ranges::all_of(steps, [](int count) { return count > 0; }); });
+  }
+}
+
+TEST(Workers, EndWithoutAStart) {
+  std::mutex mutex;
+  Workers workers(mutex);
+  EXPECT_FALSE(workers.is_started());
+  workers.stop();
+  const std::lock_guard lock(mutex);
+  EXPECT_TRUE(workers.is_stopping());
+}
+
+}  // namespace
+}  // namespace quoin
