@@ -24,26 +24,8 @@ void drop_inputs(LiveJob& job) {
 }  // namespace
 
 MeshJobQueue::MeshJobQueue(unsigned workers, Work work, std::function<void()> on_ready)
-    : work_(std::move(work)), on_ready_(std::move(on_ready)) {
-  try {
-    for (unsigned i = 0; i < workers; ++i) workers_.emplace_back([this] { run(); });
-  } catch (...) {
-    {
-      const std::lock_guard lock(mutex_);
-      is_stopping_ = true;
-    }
-    wake_.notify_all();
-    throw;
-  }
-}
-
-void MeshJobQueue::stop() {
-  {
-    const std::lock_guard lock(mutex_);
-    is_stopping_ = true;
-  }
-  wake_.notify_all();
-  workers_.clear();
+    : work_(std::move(work)), on_ready_(std::move(on_ready)), workspaces_(workers) {
+  workers_.start(workers, [this](Workers::Lock& lock, unsigned worker) { return step(lock, workspaces_[worker]); });
 }
 
 void MeshJobQueue::push(std::unique_ptr<LiveJob> job) {
@@ -54,7 +36,7 @@ void MeshJobQueue::push(std::unique_ptr<LiveJob> job) {
     if (done_.capacity() < wanted) done_.reserve(2 * wanted);
     queue_.push_back(std::move(job));
   }
-  wake_.notify_one();
+  workers_.wake_one();
 }
 
 std::vector<std::unique_ptr<LiveJob>> MeshJobQueue::withdraw(const std::function<bool(const LiveJob&)>& is_unwanted) {
@@ -98,12 +80,12 @@ std::vector<std::unique_ptr<LiveJob>> MeshJobQueue::collect() {
 
 void MeshJobQueue::wait(std::size_t waiting) {
   std::unique_lock lock(mutex_);
-  progressed_.wait(lock, [&] { return queue_.size() <= waiting && (waiting != 0 || running_ == 0); });
+  workers_.wait(lock, [&] { return queue_.size() <= waiting && (waiting != 0 || running_ == 0); });
 }
 
 std::exception_ptr MeshJobQueue::take_failure() {
   const std::lock_guard lock(mutex_);
-  return std::exchange(failure_, nullptr);
+  return workers_.take_failure();
 }
 
 LiveMeshes::Stats MeshJobQueue::stats() const {
@@ -121,63 +103,50 @@ std::unique_ptr<LiveJob> MeshJobQueue::take_nearest() {
   return job;
 }
 
-// Stores an exception of the call for `take_failure`.
-template <class Call>
-void MeshJobQueue::guard(Call&& call) {
+Workers::Clock::time_point MeshJobQueue::step(Workers::Lock& lock, LiveWorkspace& workspace) {
+  if (queue_.empty()) return Workers::kWhenWoken;
+  std::unique_ptr<LiveJob> job = take_nearest();
+  ++running_;
+  auto spent = std::exchange(spent_, {});
+  lock.unlock();
+  spent.clear();
+  const LiveClock::time_point start = LiveClock::now();
+  std::exception_ptr failure;
   try {
-    call();
+    work_(*job, workspace);
+  } catch (const std::bad_alloc&) {
+    job->outcome = LiveJob::Outcome::OutOfMemory;
+    job->surface.reset();
+    workspace = {};
   } catch (...) {
-    const std::lock_guard lock(mutex_);
-    if (failure_ == nullptr) failure_ = std::current_exception();
+    failure = std::current_exception();
   }
+  drop_inputs(*job);
+  // Failures are not reported to the callback: an immediate retry would fail again.
+  const bool is_reported = job->outcome != LiveJob::Outcome::OutOfMemory;
+  lock.lock();
+  workers_.keep_failure(std::move(failure));
+  finish(std::move(job), start);
+  lock.unlock();
+  if (is_reported && on_ready_) on_ready_();
+  lock.lock();
+  return Workers::kAgain;
 }
 
-void MeshJobQueue::run() {
-  LiveWorkspace workspace;
-  std::unique_lock lock(mutex_);
-  for (;;) {
-    wake_.wait(lock, [&] { return is_stopping_ || !queue_.empty(); });
-    if (is_stopping_) return;
-    std::unique_ptr<LiveJob> job = take_nearest();
-    ++running_;
-    auto spent = std::exchange(spent_, {});
-    lock.unlock();
-    spent.clear();
-    const LiveClock::time_point start = LiveClock::now();
-    guard([&] {
-      try {
-        work_(*job, workspace);
-      } catch (const std::bad_alloc&) {
-        job->outcome = LiveJob::Outcome::OutOfMemory;
-        job->surface.reset();
-        workspace = {};
-      }
-    });
-    drop_inputs(*job);
-    // Failures are not reported to the callback: an immediate retry would fail again.
-    const bool is_reported = job->outcome != LiveJob::Outcome::OutOfMemory;
-    finish(std::move(job), start);
-    if (is_reported && on_ready_) guard(on_ready_);
-    lock.lock();
-  }
-}
-
+// Requires: the lock is held.
 void MeshJobQueue::finish(std::unique_ptr<LiveJob> job, LiveClock::time_point start) {
-  {
-    const std::lock_guard lock(mutex_);
-    const LiveClock::time_point now = LiveClock::now();
-    if (job->outcome == LiveJob::Outcome::Meshed) {
-      ++stats_.chunks_meshed;
-      stats_.last_mesh_seconds = seconds(now - start);
-      stats_.last_latency_seconds = seconds(now - job->seen);
-    } else if (job->outcome == LiveJob::Outcome::OutOfMemory) {
-      ++stats_.out_of_memory;
-    }
-    QUOIN_ASSERT(running_ != 0 && done_.size() < done_.capacity(), "room was made when the job came");
-    done_.push_back(std::move(job));
-    --running_;
+  const LiveClock::time_point now = LiveClock::now();
+  if (job->outcome == LiveJob::Outcome::Meshed) {
+    ++stats_.chunks_meshed;
+    stats_.last_mesh_seconds = seconds(now - start);
+    stats_.last_latency_seconds = seconds(now - job->seen);
+  } else if (job->outcome == LiveJob::Outcome::OutOfMemory) {
+    ++stats_.out_of_memory;
   }
-  progressed_.notify_all();
+  QUOIN_ASSERT(running_ != 0 && done_.size() < done_.capacity(), "room was made when the job came");
+  done_.push_back(std::move(job));
+  --running_;
+  workers_.notify();
 }
 
 }  // namespace quoin

@@ -2,14 +2,12 @@
 
 #include <array>
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <exception>
 #include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <thread>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -18,6 +16,7 @@
 #include <quoin/mesh/blocky.h>
 #include <quoin/mesh/smooth.h>
 
+#include "core/work/workers.h"
 #include "live/live_densities.h"
 #include "mesh/surface/material.h"
 
@@ -99,12 +98,9 @@ class MeshJobQueue {
 
   /// `on_ready`, if any, is called by a worker after each job that did not run out of memory.
   MeshJobQueue(unsigned workers, Work work, std::function<void()> on_ready);
-  ~MeshJobQueue() { stop(); }
-  MeshJobQueue(const MeshJobQueue&) = delete;
-  MeshJobQueue& operator=(const MeshJobQueue&) = delete;
 
   /// Waits for started jobs. Discards waiting jobs and all later ones.
-  void stop();
+  void stop() { workers_.stop(); }
   void push(std::unique_ptr<LiveJob> job);
   /// Returns the first exception of a callback since the last call, or null.
   [[nodiscard]] std::exception_ptr take_failure();
@@ -122,25 +118,20 @@ class MeshJobQueue {
   [[nodiscard]] LiveMeshes::Stats stats() const;
 
  private:
-  void run();
-  template <class Call>
-  void guard(Call&& call);
+  [[nodiscard]] Workers::Clock::time_point step(Workers::Lock& lock, LiveWorkspace& workspace);
   void finish(std::unique_ptr<LiveJob> job, LiveClock::time_point start);
   [[nodiscard]] std::unique_ptr<LiveJob> take_nearest();
 
   const Work work_;
   const std::function<void()> on_ready_;
   mutable std::mutex mutex_;
-  std::condition_variable wake_;
-  std::condition_variable progressed_;
-  bool is_stopping_ = false;
   std::size_t running_ = 0;
   std::vector<std::unique_ptr<LiveJob>> queue_;
   std::vector<std::unique_ptr<LiveJob>> done_;  // with capacity for all waiting and running jobs
   std::vector<std::pair<GridSnapshot, LightSnapshot>> spent_;
   LiveMeshes::Stats stats_;
-  std::exception_ptr failure_;
-  std::vector<std::jthread> workers_;  // last: they end first
+  std::vector<LiveWorkspace> workspaces_;  // of each worker
+  Workers workers_{mutex_};
 };
 
 /// Makes the surface of a job's chunk.
