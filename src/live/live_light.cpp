@@ -1,13 +1,12 @@
 #include <quoin/live/live_light.h>
 
-#include <condition_variable>
 #include <exception>
 #include <map>
 #include <mutex>
-#include <thread>
 #include <utility>
 
 #include "core/work/worker_count.h"
+#include "core/work/workers.h"
 
 namespace quoin {
 namespace {
@@ -29,25 +28,15 @@ struct GridCursors {
 struct LiveLight::Impl {
   explicit Impl(LiveLightOptions options)
       : threads{worker_count(options.workers)}, working{nullptr, SceneLight(std::move(options.light))} {
-    worker = std::thread([this] { run(); });
-  }
-  Impl(const Impl&) = delete;
-  Impl& operator=(const Impl&) = delete;
-  ~Impl() {
-    {
-      const std::lock_guard lock(mutex);
-      is_stopping = true;
-    }
-    wake.notify_all();
-    worker.join();
+    worker.start(1, [this](Workers::Lock& lock, unsigned /*worker*/) { return step(lock); });
   }
 
-  void run();
+  [[nodiscard]] Workers::Clock::time_point step(Workers::Lock& lock);
   void throw_failure();
   bool read_changes(const Scene& scene);
   void wait() {
     std::unique_lock lock(mutex);
-    progressed.wait(lock, [&] { return !is_busy; });
+    worker.wait(lock, [&] { return !is_busy; });
   }
 
   // The caller's.
@@ -61,53 +50,47 @@ struct LiveLight::Impl {
   Threads threads;
   LitScene working;
 
-  mutable std::mutex mutex;  // of all below
-  std::condition_variable wake;
-  std::condition_variable progressed;
-  bool is_stopping = false;
+  mutable std::mutex mutex;            // of all below
   bool is_busy = false;                // computing the requested light
   std::shared_ptr<const Scene> asked;  // to be lit
   std::unique_ptr<LitScene> ready;     // to be taken
   std::unique_ptr<LitScene> given_up;  // was shown; the worker destroys it, which takes a while
-  std::exception_ptr failure;
-  std::thread worker;
+  Workers worker{mutex};
 };
 
-void LiveLight::Impl::run() {
-  std::unique_lock lock(mutex);
-  for (;;) {
-    wake.wait(lock, [&] { return is_stopping || asked != nullptr; });
-    if (is_stopping) return;
-    std::shared_ptr<const Scene> scene = std::exchange(asked, nullptr);
-    lock.unlock();
-    std::unique_ptr<LitScene> done;
-    std::exception_ptr failed;
-    try {
-      working.light.update(*scene, threads);
-      working.scene = std::move(scene);
-      done = std::make_unique<LitScene>(LitScene{working.scene, working.light.snapshot()});
-    } catch (...) {
-      failed = std::current_exception();
-    }
-    lock.lock();
-    std::swap(ready, done);  // `done` receives the light that was not taken
-    // Frees the former light here, so that the thread that takes the new one does not have to.
-    std::unique_ptr<LitScene> old = std::exchange(given_up, nullptr);
-    failure = failed;
-    is_busy = false;
-    progressed.notify_all();
-    lock.unlock();
-    done.reset();
-    old.reset();
-    lock.lock();
+Workers::Clock::time_point LiveLight::Impl::step(Workers::Lock& lock) {
+  if (asked == nullptr) return Workers::kWhenWoken;
+  std::shared_ptr<const Scene> scene = std::exchange(asked, nullptr);
+  lock.unlock();
+  std::unique_ptr<LitScene> done;
+  std::exception_ptr failure;
+  try {
+    working.light.update(*scene, threads);
+    working.scene = std::move(scene);
+    done = std::make_unique<LitScene>(LitScene{working.scene, working.light.snapshot()});
+  } catch (...) {
+    failure = std::current_exception();
   }
+  lock.lock();
+  std::swap(ready, done);  // `done` receives the light that was not taken
+  // Frees the former light here, so that the thread that takes the new one does not have to.
+  std::unique_ptr<LitScene> old = std::exchange(given_up, nullptr);
+  worker.keep_failure(std::move(failure));
+  is_busy = false;
+  worker.notify();
+  lock.unlock();
+  done.reset();
+  old.reset();
+  lock.lock();
+  return Workers::kAgain;
 }
 
 // Requires: the mutex is held.
 void LiveLight::Impl::throw_failure() {
+  const std::exception_ptr failure = worker.take_failure();
   if (failure == nullptr) return;
   is_behind = true;
-  std::rethrow_exception(std::exchange(failure, nullptr));
+  std::rethrow_exception(failure);
 }
 
 // Returns true if light depends on any change since the last call. Scenes also report names and voxel data, which light
@@ -148,7 +131,7 @@ void LiveLight::update(const Scene& scene) {
     me.is_busy = true;
     me.is_behind = false;
   }
-  me.wake.notify_one();
+  me.worker.wake_one();
 }
 
 bool LiveLight::take() {
