@@ -1,14 +1,11 @@
 #include <quoin/render/impostor_cache.h>
 
 #include <algorithm>
-#include <chrono>
-#include <condition_variable>
 #include <deque>
 #include <map>
 #include <mutex>
 #include <new>
 #include <optional>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -16,11 +13,10 @@
 
 #include "core/moved_from.h"
 #include "core/work/worker_count.h"
+#include "core/work/workers.h"
 
 namespace quoin {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 // The grid content that an impostor was built from.
 struct Origin {
@@ -60,13 +56,12 @@ using Entries = std::map<GridHandle, Entry>;
 // The mutex guards all following members.
 struct ImpostorCache::Impl {
   explicit Impl(const ImpostorCacheOptions& given) : options(given) {}
-  ~Impl();
 
   void look_at(const VoxelRegistry& types);
   void ask(Entry& entry, GridHandle handle, const SceneGrid& grid, int edge);
   GridChanges changes_of(Entry& entry, const Job& job);
   void start_workers();
-  void work();
+  [[nodiscard]] Workers::Clock::time_point step(Workers::Lock& lock);
   [[nodiscard]] Entries::iterator next_to_build();
   void build(Entries::iterator entry, std::unique_lock<std::mutex>& lock);
   void put(GridHandle handle, const Origin& origin, std::shared_ptr<const Impostor> made);
@@ -79,8 +74,6 @@ struct ImpostorCache::Impl {
 
   const ImpostorCacheOptions options;
   mutable std::mutex mutex;
-  std::condition_variable wake;   // signals workers: a build waits, or the cache ends
-  std::condition_variable ready;  // signalled to waiting callers when an impostor is built
   Entries entries;
   std::deque<GridHandle> queue;  // waiting entries
   std::size_t building = 0;
@@ -93,18 +86,8 @@ struct ImpostorCache::Impl {
   // Impostors replaced while a caller held them. A worker frees them, because that takes time.
   std::vector<std::shared_ptr<const Impostor>> replaced;
   bool has_unused = false;  // some of these may be unused
-  bool is_stopped = false;
-  std::vector<std::thread> workers;
+  Workers workers{mutex};
 };
-
-ImpostorCache::Impl::~Impl() {
-  {
-    const std::lock_guard lock(mutex);
-    is_stopped = true;
-  }
-  wake.notify_all();
-  for (std::thread& worker : workers) worker.join();
-}
 
 void ImpostorCache::Impl::look_at(const VoxelRegistry& now) {
   const bool is_other = has_other_visibility(now.changes_since(followed_types));
@@ -124,7 +107,7 @@ void ImpostorCache::Impl::ask(Entry& entry, GridHandle handle, const SceneGrid& 
   const bool is_new = !entry.waiting.has_value();
   if (is_new) queue.push_back(handle);
   entry.waiting = std::move(job);
-  if (is_new) wake.notify_one();
+  if (is_new) workers.wake_one();
 }
 
 // Returns the changes since the impostor that the job will find. An impostor of another grid (replaced, or with the
@@ -148,26 +131,22 @@ GridChanges ImpostorCache::Impl::changes_of(Entry& entry, const Job& job) {
 }
 
 void ImpostorCache::Impl::start_workers() {
-  if (!workers.empty()) return;
-  const unsigned count = worker_count(options.workers);
-  for (unsigned i = 0; i < count; ++i) workers.emplace_back([this] { work(); });
+  if (workers.is_started()) return;
+  workers.start(worker_count(options.workers), [this](Workers::Lock& lock, unsigned /*worker*/) { return step(lock); });
 }
 
-void ImpostorCache::Impl::work() {
-  std::unique_lock lock(mutex);
-  for (;;) {
-    Entries::iterator next = entries.end();
-    wake.wait(lock, [&] { return is_stopped || has_unused || (next = next_to_build()) != entries.end(); });
-    if (is_stopped) return;
-    try {
-      if (next != entries.end()) build(next, lock);
-      free_unused(lock);
-    } catch (const std::bad_alloc&) {
-      // If memory for the lists above runs out: the impostor is dropped and requested again.
-      if (!lock.owns_lock()) lock.lock();
-      ++stats.out_of_memory;
-    }
+Workers::Clock::time_point ImpostorCache::Impl::step(Workers::Lock& lock) {
+  const Entries::iterator next = has_unused ? entries.end() : next_to_build();
+  if (!has_unused && next == entries.end()) return Workers::kWhenWoken;
+  try {
+    if (next != entries.end()) build(next, lock);
+    free_unused(lock);
+  } catch (const std::bad_alloc&) {
+    // If memory for the lists above runs out: the impostor is dropped and requested again.
+    if (!lock.owns_lock()) lock.lock();
+    ++stats.out_of_memory;
   }
+  return Workers::kAgain;
 }
 
 // Removes and returns the first queued entry that is not being built.
@@ -186,7 +165,7 @@ void ImpostorCache::Impl::build(Entries::iterator entry, std::unique_lock<std::m
   std::optional<Job> job = std::exchange(entry->second.waiting, std::nullopt);
   if (!has_room(entry->second)) {
     drop(entry);  // until the next request
-    ready.notify_all();
+    workers.notify();
     return;
   }
   const GridHandle handle = entry->first;
@@ -220,8 +199,8 @@ void ImpostorCache::Impl::build(Entries::iterator entry, std::unique_lock<std::m
     built.building.reset();
     if (built.waiting) built.waiting->changes = {true, {}};
   }
-  ready.notify_all();
-  wake.notify_all();
+  workers.notify();
+  workers.wake_all();
 }
 
 void ImpostorCache::Impl::put(GridHandle handle, const Origin& origin, std::shared_ptr<const Impostor> made) {
@@ -338,15 +317,16 @@ std::size_t ImpostorCache::wait(const Scene& scene, double seconds) {
   const auto is_ready = [&] { return me.queue.empty() && me.building == 0; };
   if (seconds == std::numeric_limits<double>::infinity()) {
     while (!is_ready()) {
-      const auto next = me.next_to_build();
-      next != me.entries.end() ? me.build(next, lock) : me.ready.wait(lock);
+      auto next = me.entries.end();
+      me.workers.wait(lock, [&] { return is_ready() || (next = me.next_to_build()) != me.entries.end(); });
+      if (next != me.entries.end()) me.build(next, lock);
     }
   } else if (seconds > 0.0) {
     constexpr double kLongest = 1e6;  // limit of the clock type
-    me.ready.wait_for(lock, std::chrono::duration<double>(std::min(seconds, kLongest)), is_ready);
+    me.workers.wait_for(lock, std::min(seconds, kLongest), is_ready);
   }
   me.forget_missing(scene);
-  if (me.has_unused) me.wake.notify_one();
+  if (me.has_unused) me.workers.wake_one();
   return me.queue.size() + me.building;
 }
 
