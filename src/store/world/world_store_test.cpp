@@ -3,6 +3,7 @@
 #include <sys/stat.h>
 
 #include <fstream>
+#include <stdexcept>
 #include <string>
 #include <thread>
 
@@ -320,6 +321,29 @@ TEST(WorldStore, CallbacksMayUseTheWorldWhileItEnds) {
     ASSERT_TRUE(world.save(std::move(changes), [&](const Status&) { number = world.next_grid(); }));
   }
   EXPECT_EQ(number, 1U);
+}
+
+TEST(WorldStore, SavesGoOnAfterACallbackThrows) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  {
+    WorldStore world = made(path);
+    for (int i = 0; i < 4; ++i) {
+      WorldChanges changes;
+      changes.put_chunk({0, 0, {i, 0, 0}}, {random_chunk(static_cast<std::uint32_t>(i), 9)});
+      ASSERT_TRUE(world.save(std::move(changes), [](const Status&) { throw std::runtime_error("cannot draw"); }));
+      if (i == 1) {
+        ASSERT_TRUE(world.flush());
+      }
+    }
+  }
+  auto world = WorldStore::open(path, WorldAccess::Read);
+  ASSERT_TRUE(world) << to_string(world.error());
+  for (int i = 0; i < 4; ++i) {
+    const auto chunk = world->load_chunk({0, 0, {i, 0, 0}});
+    ASSERT_TRUE(chunk && chunk->has_value()) << i;
+    EXPECT_EQ((*chunk)->voxels, random_chunk(static_cast<std::uint32_t>(i), 9)) << i;
+  }
 }
 
 TEST(WorldStore, AWorldThatWasReplacedIsNotReadWithAnothersLog) {

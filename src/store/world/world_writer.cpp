@@ -45,17 +45,15 @@ WorldWriter::WorldWriter(Connection connection, std::uint64_t revision, Threads 
       needs_version_(revision == 0),
       threads_(threads),
       encoders_(thread_count(threads)) {
-  thread_ = std::thread([this] { run(); });
+  thread_.start(1, [this](Workers::Lock& lock, unsigned /*worker*/) { return step(lock); });
 }
 
 WorldWriter::~WorldWriter() {
   {
     const std::scoped_lock lock(mutex_);
-    is_ending_ = true;
     failed_through_ = 0;  // retries
   }
-  work_.notify_all();
-  thread_.join();
+  thread_.drain();
   statements_.clear();
   end_writing(connection_);
   static_cast<void>(connection_.close());
@@ -72,7 +70,7 @@ SaveTicket WorldWriter::save(ChangeSet changes, OnSaved on_saved) {
     queue_.push_back(std::move(save));
     failed_through_ = 0;
   }
-  work_.notify_all();
+  thread_.wake_one();
   return ticket;
 }
 
@@ -112,7 +110,7 @@ void WorldWriter::forget_pending(const Save& group) {
 Status WorldWriter::wait(SaveTicket ticket) {
   std::unique_lock lock(mutex_);
   QUOIN_ASSERT(ticket.number <= last_ticket_, "a ticket of this world");
-  done_.wait(lock, [&] { return saved_through_ >= ticket.number || failed_through_ >= ticket.number; });
+  thread_.wait(lock, [&] { return saved_through_ >= ticket.number || failed_through_ >= ticket.number; });
   return saved_through_ >= ticket.number ? Status() : failure_;
 }
 
@@ -123,7 +121,7 @@ Status WorldWriter::flush() {
     last.number = last_ticket_;
     failed_through_ = 0;
   }
-  work_.notify_all();
+  thread_.wake_one();
   return wait(last);
 }
 
@@ -167,13 +165,11 @@ std::vector<std::pair<PartKey, std::optional<PartBody>>> WorldWriter::pending_pa
   return found;
 }
 
-// Returns saves as list nodes, so that they can be put back without allocation; empty if the writer ends.
-std::list<WorldWriter::Save> WorldWriter::next_group(std::unique_lock<std::mutex>& lock) {
-  work_.wait(lock, [&] { return is_ending_ || (!queue_.empty() && failed_through_ == 0); });
-  std::list<Save> group;
-  if (queue_.empty() || failed_through_ != 0) return group;
-  group.splice(group.begin(), queue_, queue_.begin());
-  Save& first = group.front();
+// Moves saves as list nodes, so that they can be put back without allocation.
+void WorldWriter::begin_group() {
+  if (queue_.empty() || failed_through_ != 0) return;
+  group_.splice(group_.begin(), queue_, queue_.begin());
+  Save& first = group_.front();
   while (!queue_.empty() && first.changes.chunks.size() + queue_.front().changes.chunks.size() <= kGroupChunks) {
     Save& next = queue_.front();
     try {
@@ -186,54 +182,56 @@ std::list<WorldWriter::Save> WorldWriter::next_group(std::unique_lock<std::mutex
     std::ranges::move(next.on_saved, std::back_inserter(first.on_saved));
     queue_.pop_front();
   }
-  return group;
 }
 
-void WorldWriter::run() {
-  std::unique_lock lock(mutex_);
-  for (;;) {
-    std::list<Save> group = next_group(lock);
-    if (group.empty()) return;
-    lock.unlock();
-    Status outcome;
-    try {
-      outcome = write(group.front().changes);
-    } catch (const std::bad_alloc&) {
-      roll_back();
-      outcome = make_error(ErrorCode::LimitExceeded, "not enough memory to save");
-    }
-    finish(std::move(group), outcome);
-    lock.lock();
+Workers::Clock::time_point WorldWriter::step(Workers::Lock& lock) {
+  if (group_.empty()) begin_group();
+  if (group_.empty()) return Workers::kWhenWoken;
+  lock.unlock();
+  Status outcome;
+  try {
+    outcome = write(group_.front().changes);
+  } catch (const std::bad_alloc&) {
+    roll_back();
+    outcome = make_error(ErrorCode::LimitExceeded, "not enough memory to save");
+  } catch (const std::exception& failure) {  // an encoding thread cannot start
+    roll_back();
+    outcome = make_error(ErrorCode::CannotWrite, std::string("cannot save: ") + failure.what());
   }
+  finish(outcome);
+  lock.lock();
+  return Workers::kAgain;
 }
 
-void WorldWriter::finish(std::list<Save> group, const Status& outcome) {
-  Save& save = group.front();
+void WorldWriter::finish(const Status& outcome) {
+  std::list<Save> saved;
   std::vector<OnSaved> to_notify;
   if (outcome) {
-    to_notify = std::move(save.on_saved);
+    to_notify = std::move(group_.front().on_saved);
   } else {
     try {
-      to_notify = save.on_saved;
+      to_notify = group_.front().on_saved;
     } catch (const std::bad_alloc&) {  // callers are notified after the retry
     }
   }
   {
     const std::scoped_lock lock(mutex_);
     if (outcome) {
+      const Save& save = group_.front();
       forget_pending(save);
       saved_through_ = save.last;
       stats_.commits += save.changes.empty() ? 0 : 1;
       stats_.saved_chunks += chunks_of_commit_;
       stats_.saved_bytes += bytes_of_commit_;
+      saved.swap(group_);
     } else {
       failure_ = outcome;
       // Later saves are not tried either, until a caller retries.
       failed_through_ = last_ticket_;
-      queue_.splice(queue_.begin(), group);
+      queue_.splice(queue_.begin(), group_);
     }
   }
-  done_.notify_all();
+  thread_.notify();
   for (const OnSaved& on_saved : to_notify) on_saved(outcome);
 }
 

@@ -1,19 +1,18 @@
 #pragma once
 
-#include <condition_variable>
 #include <cstdint>
 #include <functional>
 #include <list>
 #include <map>
 #include <mutex>
 #include <optional>
-#include <thread>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
 #include <quoin/core/parallel.h>
 
+#include "core/work/workers.h"
 #include "store/chunk/chunk_body.h"
 #include "store/database/connection.h"
 #include "store/world/world_changes.h"
@@ -74,11 +73,11 @@ class WorldWriter {
     Status outcome;
   };
 
-  void run();
-  /// Waits for work; returns an empty list when the writer ends.
-  [[nodiscard]] std::list<Save> next_group(std::unique_lock<std::mutex>& lock);
+  [[nodiscard]] Workers::Clock::time_point step(Workers::Lock& lock);
+  /// Fills `group_`, unless no save waits, or the last commit failed and was not retried. Requires: the lock is held.
+  void begin_group();
   void note_pending(const ChangeSet& changes, std::uint64_t ticket);
-  void finish(std::list<Save> group, const Status& outcome);
+  void finish(const Status& outcome);
   void roll_back();
   void forget_pending(const Save& group);
 
@@ -99,12 +98,11 @@ class WorldWriter {
   std::vector<ChunkEncoder> encoders_;
   std::map<const char*, Statement> statements_;
   std::map<RegionPlace, std::int64_t> regions_;
+  std::list<Save> group_;  ///< being saved: one save; a step that throws leaves it to the next
   std::uint64_t bytes_of_commit_ = 0;
   std::uint64_t chunks_of_commit_ = 0;
 
   mutable std::mutex mutex_;
-  std::condition_variable work_;
-  std::condition_variable done_;
   std::list<Save> queue_;
   std::unordered_map<ChunkAddress, Pending<StoredChunk>, ChunkAddressHash> pending_chunks_;
   std::map<PartKey, Pending<PartBody>> pending_parts_;
@@ -113,10 +111,9 @@ class WorldWriter {
   std::uint64_t saved_through_ = 0;
   std::uint64_t failed_through_ = 0;
   Status failure_;
-  bool is_ending_ = false;
   WorldStats stats_;
 
-  std::thread thread_;
+  Workers thread_{mutex_};
 };
 
 }  // namespace quoin::store
