@@ -1,11 +1,9 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <condition_variable>
 #include <limits>
 #include <mutex>
 #include <set>
-#include <thread>
 #include <utility>
 
 #include <glm/common.hpp>
@@ -16,6 +14,7 @@
 
 #include "core/bytes/error_path.h"
 #include "core/coordinates/chunk_order.h"
+#include "core/work/workers.h"
 #include "mesh/blocky/chunk_triangles.h"
 #include "scene/meshes/glass_thickness.h"
 #include "store/meshes/chunk_cache.h"
@@ -61,8 +60,12 @@ class SpooledMesh {
         if (auto done = spool->finish(); !done) return done;
       }
     }
-    const std::scoped_lock lock(mutex_);
-    giver_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
+    giver_.start(1, [this](Workers::Lock& /*lock*/, unsigned /*worker*/) {
+      for (Surface& surface : surfaces_) {
+        for (const Spool* const spool : surface.all()) spool->give_back();
+      }
+      return Workers::Clock::now() + kGiveBack;
+    });
     return {};
   }
   [[nodiscard]] std::vector<MeshView> views() const {
@@ -88,19 +91,9 @@ class SpooledMesh {
     std::array<Spool*, 5> all() { return {&positions, &directions, &occlusion, &types, &indices}; }
   };
 
-  void run(const std::stop_token& stop) {
-    std::unique_lock lock(mutex_);
-    while (!wake_.wait_for(lock, stop, kGiveBack, [] { return false; }) && !stop.stop_requested()) {
-      for (Surface& surface : surfaces_) {
-        for (const Spool* const spool : surface.all()) spool->give_back();
-      }
-    }
-  }
-
   std::array<Surface, kSurfaceClasses> surfaces_;
   std::mutex mutex_;
-  std::condition_variable_any wake_;
-  std::jthread giver_;  // last member: it ends first
+  Workers giver_{mutex_};
 };
 
 /// Reads voxels of a grid across chunks.
