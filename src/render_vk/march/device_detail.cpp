@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "render_vk/device/drop_oldest.h"
+#include "core/drop_oldest.h"
 #include "scene/tracer/scene_tracer_impl.h"
 
 namespace quoin::vulkan {
@@ -126,8 +126,12 @@ Status DeviceDetail::put_level(const CoarseLevel& coarse, GridHandle grid, std::
 
 void DeviceDetail::drop_unused(std::uint64_t max_bytes) {
   drop_oldest(
-      levels_, image_, max_bytes, [](const auto& entry) { return entry.second.voxels.bytes(); },
-      [&](auto& entry) { entry.second.voxels.release(*memory_); });
+      levels_, halved_bytes(), max_bytes, [&](auto each) { return each->second.last_use != image_; },
+      [](auto each) { return each->second.voxels.bytes(); },
+      [&](auto each) {
+        each->second.voxels.release(*memory_);
+        levels_.erase(each);
+      });
 }
 
 std::uint64_t DeviceDetail::halved_bytes() const {

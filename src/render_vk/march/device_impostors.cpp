@@ -7,7 +7,7 @@
 #include <span>
 #include <utility>
 
-#include "render_vk/device/drop_oldest.h"
+#include "core/drop_oldest.h"
 #include "render_vk/march/device_scene.h"
 #include "render_vk/trees/octahedral.h"
 
@@ -310,9 +310,12 @@ ShaderFar DeviceImpostors::shader_far(const Sent& sent, const DrawnImpostor& dra
 
 void DeviceImpostors::drop_unused(std::uint64_t max_bytes) {
   drop_oldest(
-      entries_, image_, max_bytes,
-      [](const auto& entry) { return entry.second.whole.place.size + entry.second.next.place.size; },
-      [&](auto& entry) { release(entry.second); });
+      entries_, bytes(), max_bytes, [&](auto each) { return each->second.last_use != image_; },
+      [](auto each) { return each->second.whole.place.size + each->second.next.place.size; },
+      [&](auto each) {
+        release(each->second);
+        entries_.erase(each);
+      });
 }
 
 std::uint64_t DeviceImpostors::bytes() const {

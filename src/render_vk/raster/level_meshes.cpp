@@ -1,7 +1,7 @@
 #include "render_vk/raster/level_meshes.h"
 #include "scene/tracer/placed_grid.h"
 
-#include "render_vk/device/drop_oldest.h"
+#include "core/drop_oldest.h"
 
 namespace quoin::vulkan {
 
@@ -67,11 +67,15 @@ Status LevelMeshes::put_updates(MeshKey key, Level& level, const PlacedGrid& pla
 }
 
 void LevelMeshes::drop_unused(std::uint64_t max_bytes) {
-  const auto bytes_of = [&](const auto& entry) {
-    const MeshStore::StoredGrid* stored = store_->find(entry.first);
+  const auto bytes_of = [&](auto each) {
+    const MeshStore::StoredGrid* stored = store_->find(each->first);
     return stored == nullptr ? 0 : stored->bytes;
   };
-  drop_oldest(levels_, image_, max_bytes, bytes_of, [&](const auto& entry) { store_->drop(entry.first); });
+  std::uint64_t held = 0;
+  for (auto each = levels_.begin(); each != levels_.end(); ++each) held += bytes_of(each);
+  drop_oldest(
+      levels_, held, max_bytes, [&](auto each) { return each->second.last_use != image_; }, bytes_of,
+      [&](auto each) { drop(each); });
 }
 
 }  // namespace quoin::vulkan
