@@ -4,6 +4,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/drop_oldest.h"
 #include "store/world/world_rules.h"
 
 namespace quoin::store {
@@ -25,7 +26,7 @@ void ChunkCache::load(std::span<const IVec3> places, Threads threads) {
   for (const IVec3 place : places) {
     const auto found = loaded_.find(place);
     if (found != loaded_.end()) {
-      found->second.used = now_;
+      found->second.last_use = now_;
     } else if (std::ranges::binary_search(places_, place, before)) {
       missing.push_back(place);
     }
@@ -36,7 +37,7 @@ void ChunkCache::load(std::span<const IVec3> places, Threads threads) {
     Result<std::optional<StoredChunk>>& outcome = *read[i];
     const bool is_new = counted_.insert(missing[i]).second;
     Entry entry;
-    entry.used = now_;
+    entry.last_use = now_;
     if (!outcome) {
       if (outcome.error().code != ErrorCode::BadFormat && status_) status_ = outcome.error();
       if (is_new) damage_.push_back(outcome.error().message);
@@ -60,18 +61,10 @@ const Chunk* ChunkCache::find(IVec3 place) const {
 
 void ChunkCache::trim() {
   if (bytes_ <= max_bytes_) return;
-  std::vector<std::pair<std::uint64_t, IVec3>> old;
-  for (const auto& [place, entry] : loaded_) {
-    if (entry.used != now_) old.emplace_back(entry.used, place);
-  }
-  std::ranges::sort(old, {}, [](const auto& each) { return each.first; });
   // Drops more than necessary, so that the cache is not searched for each chunk.
-  for (const auto& [used, place] : old) {
-    if (bytes_ <= max_bytes_ / 8 * 7) return;
-    const auto found = loaded_.find(place);
-    bytes_ -= found->second.chunk.bytes();
-    loaded_.erase(found);
-  }
+  bytes_ = drop_oldest(
+      loaded_, bytes_, max_bytes_ / 8 * 7, [&](auto each) { return each->second.last_use != now_; },
+      [](auto each) { return each->second.chunk.bytes(); }, [&](auto each) { loaded_.erase(each); });
 }
 
 }  // namespace quoin::store

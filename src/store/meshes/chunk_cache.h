@@ -41,7 +41,7 @@ class ChunkCache {
  private:
   struct Entry {
     Chunk chunk{kAir};
-    std::uint64_t used = 0;
+    std::uint64_t last_use = 0;
   };
 
   const WorldStore& world_;
