@@ -11,6 +11,7 @@
 
 #include <quoin/core/assert.h>
 
+#include "core/drop_oldest.h"
 #include "core/moved_from.h"
 #include "core/work/worker_count.h"
 #include "core/work/workers.h"
@@ -242,18 +243,18 @@ void ImpostorCache::Impl::drop(Entries::iterator entry) {
 
 // Makes room for `bytes` by dropping impostors last used before `used_before`. Returns false if that is impossible.
 bool ImpostorCache::Impl::make_room(std::size_t bytes, std::uint64_t used_before) {
-  while (stats.bytes + bytes > options.max_bytes) {
-    auto oldest = entries.end();
-    for (auto each = entries.begin(); each != entries.end(); ++each) {
-      const Entry& entry = each->second;
-      if (entry.impostor == nullptr || entry.waiting || entry.building || entry.last_use >= used_before) continue;
-      if (oldest == entries.end() || entry.last_use < oldest->second.last_use) oldest = each;
-    }
-    if (oldest == entries.end()) return false;
-    ++stats.dropped;
-    drop(oldest);
-  }
-  return true;
+  const auto may_drop = [&](Entries::iterator each) {
+    const Entry& entry = each->second;
+    return entry.impostor != nullptr && !entry.waiting && !entry.building && entry.last_use < used_before;
+  };
+  const std::uint64_t held = drop_oldest(
+      entries, stats.bytes + bytes, options.max_bytes, may_drop,
+      [](Entries::iterator each) { return each->second.impostor->bytes(); },
+      [&](Entries::iterator each) {
+        ++stats.dropped;
+        drop(each);
+      });
+  return held <= options.max_bytes;
 }
 
 // Estimates by the entry's own refused size, or by the mean size of built impostors.
