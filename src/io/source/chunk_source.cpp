@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <condition_variable>
-#include <list>
 #include <mutex>
 #include <numeric>
 #include <tuple>
@@ -10,6 +9,8 @@
 #include <utility>
 
 #include <quoin/core/assert.h>
+
+#include "core/drop_oldest.h"
 
 namespace quoin {
 
@@ -29,29 +30,25 @@ std::tuple<int, int, int> order_of(IVec3 place) {
 /// The most recently read parts. If several threads need a part, the first reads it and the others wait.
 struct ChunkSource::Cache {
   struct Entry {
-    std::size_t part = 0;
     bool is_read = false;
     std::vector<SourceChunk> chunks{};
     std::size_t bytes = 0;
+    std::uint64_t last_use = 0;
   };
   std::mutex mutex;
   std::condition_variable was_read;
-  std::list<Entry> entries;  // most recently used first
-  std::unordered_map<std::size_t, std::list<Entry>::iterator> by_part;
+  std::unordered_map<std::size_t, Entry> entries;  // by part
   std::size_t bytes = 0;
+  std::uint64_t uses = 0;
 
-  void forget(std::list<Entry>::iterator entry) {
-    bytes -= entry->bytes;
-    by_part.erase(entry->part);
-    entries.erase(entry);
-  }
+  // Keeps the entry that was used last.
   void keep_within_limit() {
-    for (auto last = entries.end(); bytes > kCacheBytes && last != entries.begin();) {
-      --last;
-      if (last == entries.begin() || !last->is_read) continue;  // a part that was just read stays
-      const auto gone = last++;
-      forget(gone);
-    }
+    if (bytes <= kCacheBytes) return;
+    // Drops more than necessary, so that the cache is not searched for each part.
+    bytes = drop_oldest(
+        entries, bytes, kCacheBytes / 8 * 7,
+        [&](auto each) { return each->second.is_read && each->second.last_use != uses; },
+        [](auto each) { return each->second.bytes; }, [&](auto each) { entries.erase(each); });
   }
 };
 
@@ -79,17 +76,14 @@ Result<std::optional<Chunk>> ChunkSource::read(IVec3 chunk, std::vector<Error>* 
     return found == chunks.end() ? std::nullopt : std::optional(found->voxels);
   };
   std::unique_lock lock(cache_->mutex);
-  for (auto known = cache_->by_part.find(*part); known != cache_->by_part.end(); known = cache_->by_part.find(*part)) {
-    const auto entry = known->second;
-    if (entry->is_read) {
-      cache_->entries.splice(cache_->entries.begin(), cache_->entries, entry);
-      return chunk_in(entry->chunks);
+  for (auto known = cache_->entries.find(*part); known != cache_->entries.end(); known = cache_->entries.find(*part)) {
+    if (known->second.is_read) {
+      known->second.last_use = ++cache_->uses;
+      return chunk_in(known->second.chunks);
     }
     cache_->was_read.wait(lock);
   }
-  cache_->entries.push_front({.part = *part});
-  const auto entry = cache_->entries.begin();
-  cache_->by_part[*part] = entry;
+  Cache::Entry& entry = cache_->entries[*part];  // stays in place while others come and go
   lock.unlock();
   Result<SourcePart> content = [&]() -> Result<SourcePart> {
     try {
@@ -101,16 +95,17 @@ Result<std::optional<Chunk>> ChunkSource::read(IVec3 chunk, std::vector<Error>* 
   lock.lock();
   cache_->was_read.notify_all();
   if (!content) {
-    cache_->forget(entry);
+    cache_->entries.erase(*part);
     return content.error();
   }
-  entry->is_read = true;
-  entry->chunks = std::move(content->chunks);
-  entry->bytes = kPartBytes;
-  for (const SourceChunk& each : entry->chunks) entry->bytes += each.voxels.bytes();
-  cache_->bytes += entry->bytes;
+  entry.is_read = true;
+  entry.last_use = ++cache_->uses;
+  entry.chunks = std::move(content->chunks);
+  entry.bytes = kPartBytes;
+  for (const SourceChunk& each : entry.chunks) entry.bytes += each.voxels.bytes();
+  cache_->bytes += entry.bytes;
   if (broken != nullptr) std::ranges::move(content->broken, std::back_inserter(*broken));
-  std::optional<Chunk> found = chunk_in(entry->chunks);
+  std::optional<Chunk> found = chunk_in(entry.chunks);
   cache_->keep_within_limit();
   return found;
 }
