@@ -7,6 +7,8 @@
 #include <quoin/core/thousands.h>
 #include <quoin/io/chunk_source.h>
 
+#include "core/work/progress_steps.h"
+
 namespace quoin {
 
 namespace {
@@ -47,34 +49,33 @@ void add_lines(const std::vector<Error>& broken, std::vector<std::string>& warni
   if (broken.size() > kMaxLines) warnings.push_back("and " + std::to_string(broken.size() - kMaxLines) + " more");
 }
 
-/// Reads the parts that meet a box, several at once, into one slot per part.
-struct Reading {
-  const ChunkSource& source;
-  std::vector<std::size_t> wanted{};
-  std::vector<SourcePart> read{};
-  std::mutex mutex{};
-  std::size_t done = 0;
-  bool is_cancelled = false;
-  std::optional<Error> error{};
-
-  void read_one(std::size_t i, const Progress& progress) {
-    {
-      const std::scoped_lock lock(mutex);
-      if (is_cancelled || error) return;
-    }
-    auto part = source.read_part(wanted[i]);
-    const std::scoped_lock lock(mutex);
-    if (!part) {
-      if (!error) error = part.error();
-      return;
-    }
-    read[i] = std::move(*part);
-    ++done;
-    if (progress && !is_cancelled) {
-      is_cancelled = !progress(static_cast<double>(done) / static_cast<double>(wanted.size()));
-    }
+/// Reads the parts that meet a box, several at once. Errors: of a part; Cancelled.
+Result<std::vector<SourcePart>> read_parts(const ChunkSource& source, const IBox& chunks, Threads threads,
+                                           const Progress& progress) {
+  std::vector<std::size_t> wanted;
+  for (std::size_t i = 0; i < source.parts().size(); ++i) {
+    if (meet(source.parts()[i], chunks)) wanted.push_back(i);
   }
-};
+  std::vector<SourcePart> parts(wanted.size());
+  ProgressSteps steps(progress, wanted.size());
+  std::mutex mutex;
+  std::optional<Error> error;
+  std::atomic<bool> has_failed{false};
+  parallel_for(wanted.size(), threads, [&](std::size_t i) {
+    if (has_failed || steps.cancelled()) return;
+    auto part = source.read_part(wanted[i]);
+    if (part) {
+      parts[i] = std::move(*part);
+      return steps.step();
+    }
+    const std::scoped_lock lock(mutex);
+    if (!error) error = part.error();
+    has_failed = true;
+  });
+  if (error) return *error;
+  if (steps.cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
+  return parts;
+}
 
 }  // namespace
 
@@ -88,14 +89,8 @@ std::string text_of_invisible(const std::map<std::string, std::uint64_t>& invisi
 
 Result<LoadedScene> load_source(const ChunkSource& source, const IBox& chunks, Threads threads,
                                 const Progress& progress) {
-  Reading reading{source};
-  for (std::size_t i = 0; i < source.parts().size(); ++i) {
-    if (meet(source.parts()[i], chunks)) reading.wanted.push_back(i);
-  }
-  reading.read.resize(reading.wanted.size());
-  parallel_for(reading.wanted.size(), threads, [&](std::size_t i) { reading.read_one(i, progress); });
-  if (reading.error) return *reading.error;
-  if (reading.is_cancelled) return make_error(ErrorCode::Cancelled, "cancelled");
+  auto parts = read_parts(source, chunks, threads, progress);
+  if (!parts) return parts.error();
   LoadedScene loaded;
   loaded.format = source.info().format;
   SourceTypes types(source);
@@ -103,7 +98,7 @@ Result<LoadedScene> load_source(const ChunkSource& source, const IBox& chunks, T
   grid.name = source.info().name;
   std::vector<Error> broken = source.info().broken;
   std::map<std::string, std::uint64_t> invisible;
-  for (SourcePart& part : reading.read) {
+  for (SourcePart& part : *parts) {
     for (SourceChunk& chunk : part.chunks) {
       if (!chunks.contains(chunk.place)) continue;
       if (auto done = types.renumber(chunk.voxels, loaded.scene.types); !done) return done.error();
@@ -121,7 +116,7 @@ Result<LoadedScene> load_source(const ChunkSource& source, const IBox& chunks, T
   loaded.warnings = source.info().warnings;
   add_lines(broken, loaded.warnings);
   if (!invisible.empty()) loaded.warnings.push_back(text_of_invisible(invisible));
-  warn_of_outside(source, chunks, reading.wanted.size(), loaded.warnings);
+  warn_of_outside(source, chunks, parts->size(), loaded.warnings);
   loaded.dimension = source.info().dimension;
   loaded.dimensions = source.info().dimensions;
   const GridHandle handle = loaded.scene.add_grid(std::move(grid));
