@@ -39,12 +39,14 @@ BrickStore::BrickStore() : lines_(2 * kBrickLines) {
 
 bool BrickStore::is_full(BrickCode brick) const {
   const BrickRun run = BrickRun::of(brick);
+  QUOIN_ASSERT(contains(run), "a brick of the store");
   const std::uint64_t* const first = lines_[run.first].data();
   return std::all_of(first, first + kLineWords * static_cast<std::size_t>(run.count()),
                      [](std::uint64_t word) { return word == kAll; });
 }
 
 std::uint32_t BrickStore::allocate(int lines) {
+  QUOIN_ASSERT(lines >= kBrickLines / 2 && lines <= kBrickLines, "4 to 8 lines");
   const auto wanted = static_cast<std::size_t>(lines);
   std::vector<std::uint32_t>& same = free_[wanted];
   if (!same.empty()) {
@@ -77,6 +79,7 @@ BrickCode BrickStore::put(BrickCode brick, const Node& words) {
     run.first = allocate(run.count());
     ++count_;
   }
+  QUOIN_ASSERT(contains(run), "a run of the store");
   std::uint64_t* const own = lines_[run.first].data();
   const std::size_t skipped = kLineWords * static_cast<std::size_t>(std::max(-run.shift, 0));
   const std::size_t end = skipped + kLineWords * static_cast<std::size_t>(run.count());
@@ -90,12 +93,13 @@ BrickCode BrickStore::put(BrickCode brick, const Node& words) {
 void BrickStore::release(BrickCode brick) {
   if (brick <= kFullBrick) return;
   const BrickRun run = BrickRun::of(brick);
+  QUOIN_ASSERT(count_ > 0 && contains(run), "a brick of the store");
   free_[static_cast<std::size_t>(run.count())].push_back(run.first);
-  QUOIN_ASSERT(count_ > 0, "a brick of the store");
   --count_;
 }
 
 std::uint64_t* BrickStore::find_slab(BrickCode brick, std::size_t slab, std::span<const std::uint64_t, 4> words) {
+  QUOIN_ASSERT(slab < 16 && contains(BrickRun::of(brick)), "a slab of a brick of the store");
   if (brick <= kFullBrick) return nullptr;
   const BrickRun run = BrickRun::of(brick);
   const int place = static_cast<int>(place_of(slab)) + static_cast<int>(kLineWords) * std::min(run.shift, 0);

@@ -56,6 +56,9 @@ class BrickStore {
 
  private:
   [[nodiscard]] std::uint32_t allocate(int lines);
+  [[nodiscard]] bool contains(const BrickRun& run) const {
+    return run.first + static_cast<std::size_t>(run.count()) <= lines_.size();
+  }
   // Returns the four stored words of a slab. Returns null if they are omitted, or if the change affects the first or
   // last stored word, which also represents the omitted ones.
   std::uint64_t* find_slab(BrickCode brick, std::size_t slab, std::span<const std::uint64_t, 4> words);

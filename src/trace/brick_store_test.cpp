@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/death_for_tests.h"
 namespace quoin::trace {
 namespace {
 
@@ -95,6 +96,15 @@ TEST(BrickStore, TheEmptyAndTheFullBrickAreNeverWritten) {
   store.release(kEmptyBrick);
   store.release(kFullBrick);
   EXPECT_EQ(store.count(), 2U);
+}
+
+TEST(BrickStoreDeathTest, RejectsSlabsAndBricksOutsideTheStore) {
+  BrickStore store;
+  QUOIN_EXPECT_MISTAKE((void)store.put_slab(kEmptyBrick, 16, std::array<std::uint64_t, 4>{1}),
+                       "a slab of a brick of the store");
+  QUOIN_EXPECT_MISTAKE((void)store.is_full(BrickRun{1'000, 0}.code()), "a brick of the store");
+  QUOIN_EXPECT_MISTAKE(store.release(BrickRun{1'000, 0}.code()), "a brick of the store");
+  QUOIN_EXPECT_MISTAKE((void)BrickRun({1, 4}).code(), "a shift of 3 bits");
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include <quoin/core/assert.h>
+
 #include "grid/density/density_storage.h"
 
 namespace quoin::trace {
@@ -57,6 +59,7 @@ CellRows::CellRows(const DensityGrid& field, IVec3 chunk) {
 }
 
 std::uint64_t CellRows::either_end(int y, int z) const {
+  QUOIN_ASSERT((y | z) >= 0 && y <= kChunkEdge && z <= kChunkEdge, "0 <= y, z <= 64");
   const std::size_t part = (y >= kChunkEdge ? 2U : 0U) + (z >= kChunkEdge ? 4U : 0U);
   const auto row = static_cast<std::size_t>((z & (kChunkEdge - 1)) * kChunkEdge + (y & (kChunkEdge - 1)));
   const Signs& own = signs_[part];
@@ -93,6 +96,7 @@ void SolidRows::read(const DensityGrid& field, IVec3 chunk, const RowsOf& rows_o
 
 // `offset`: the chunk's offset, 0 or 1 along each axis. In the direction of an offset, only the first samples are read.
 void SolidRows::read_chunk(const DensityChunk& samples, const ChunkRows& materials, IVec3 offset) {
+  QUOIN_ASSERT(((offset.x | offset.y | offset.z) & ~1) == 0, "offsets of 0 or 1");
   if (rows_.empty()) {
     rows_.resize(kRows * kRows);
     last_.resize(kRows * kRows);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/grid/density_grid.h>
 #include <quoin/grid/voxel_registry.h>
 
@@ -16,6 +17,7 @@ namespace quoin::trace {
 /// samples, the bits of the cells along x, each combined from the two ends of the cell; y and z are at most 64.
 template <class Ends, class Join>
 Slab join_corners(int y, int z, const Ends& ends, const Join& join, SlabRows& rows) {
+  QUOIN_ASSERT(((y | z) & ~(kChunkEdge - 4)) == 0, "multiples of 4 within the chunk");
   // Along x, then along y, then along z.
   std::array<std::uint64_t, 4> before{};
   for (int dz = 0; dz <= 4; ++dz) {
@@ -74,7 +76,10 @@ class SolidRows {
 
  private:
   static constexpr std::size_t kRows = kChunkEdge + 1;
-  static std::size_t index(int y, int z) { return static_cast<std::size_t>(z) * kRows + static_cast<std::size_t>(y); }
+  [[nodiscard]] std::size_t index(int y, int z) const {
+    QUOIN_ASSERT((y | z) >= 0 && y <= kChunkEdge && z <= kChunkEdge && !none(), "0 <= y, z <= 64, with solid samples");
+    return static_cast<std::size_t>(z) * kRows + static_cast<std::size_t>(y);
+  }
   template <class RowsOf>
   void read(const DensityGrid& field, IVec3 chunk, const RowsOf& rows_of);
   void read_chunk(const DensityChunk& samples, const ChunkRows& materials, IVec3 offset);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include <quoin/core/assert.h>
+
 #include "core/rows/packed_row.h"
 #include "grid/chunk/chunk_storage.h"
 
@@ -18,8 +20,9 @@ bool counts(const VoxelRegistry& types, VoxelType type, Occupancy which) {
 
 std::uint32_t index_of(const ChunkStorage& mixed, VoxelType type) {
   if (mixed.direct()) return type;
-  return static_cast<std::uint32_t>(std::find(mixed.palette.begin(), mixed.palette.end(), type) -
-                                    mixed.palette.begin());
+  const auto found = std::find(mixed.palette.begin(), mixed.palette.end(), type);
+  QUOIN_ASSERT(found != mixed.palette.end(), "a type of the palette");
+  return static_cast<std::uint32_t>(found - mixed.palette.begin());
 }
 
 }  // namespace
@@ -59,11 +62,13 @@ bool ChunkRows::belongs(VoxelType type) const {
 }
 
 Slab ChunkRows::read(int y, int z, SlabRows& rows) const {
+  QUOIN_ASSERT(((y | z) & ~(kChunkEdge - 4)) == 0, "multiples of 4 within the chunk");
   const ChunkStorage* mixed = ChunkStorage::of(*chunk_);
   if (mixed == nullptr) return in_.empty() ? Slab::Empty : Slab::Full;
   const std::uint32_t slab = mixed->slabs[ChunkStorage::slab_index(y, z)];
   if ((slab & ChunkStorage::kUniformSlab) != 0) {
     const std::uint32_t index = slab & ~ChunkStorage::kUniformSlab;
+    QUOIN_ASSERT(mixed->direct() || index < mixed->palette.size(), "an index of the palette");
     const VoxelType type = mixed->direct() ? static_cast<VoxelType>(index) : mixed->palette[index];
     return belongs(type) ? Slab::Full : Slab::Empty;
   }

@@ -102,6 +102,7 @@ class RowsBox {
   }
   /// Adds 4x4 full rows.
   void add_slab(int y, int z) {
+    QUOIN_ASSERT(((y | z) & ~(kChunkEdge - 4)) == 0, "multiples of 4 within the chunk");
     x_ = ~std::uint64_t{0};
     y_ |= std::uint64_t{15} << y;
     z_ |= std::uint64_t{15} << z;
@@ -132,6 +133,7 @@ class RowsBox {
 
  private:
   [[nodiscard]] bool covers(IVec3 at, std::uint64_t size) const {
+    QUOIN_ASSERT(((at.x | at.y | at.z) & ~(kChunkEdge - 1)) == 0, "a voxel of the chunk");
     return (x_ >> at.x & y_ >> at.y & z_ >> at.z & size) == size;
   }
 
@@ -178,6 +180,7 @@ Slab read_cells(const Rows& rows, int y, int z, SlabRows& words, RowsBox& box) {
 
 template <class Rows>
 bool BrickRow::read(const Rows& rows, int y, int z, RowsBox& box) {
+  QUOIN_ASSERT(((y | z) & ~(kChunkEdge - 16)) == 0, "multiples of 16 within the chunk");
   int empty = 0;
   int full = 0;
   SlabRows words;

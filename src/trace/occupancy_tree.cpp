@@ -39,6 +39,7 @@ struct FlatTables {
 
 // Returns the index of a unit in a table with these strides.
 std::size_t place_in(IVec3 strides, IVec3 unit) {
+  QUOIN_ASSERT((unit.x | unit.y | unit.z) >= 0, "a unit of the table");
   return static_cast<std::size_t>(unit.x) + static_cast<std::size_t>(unit.y) * static_cast<std::size_t>(strides.y) +
          static_cast<std::size_t>(unit.z) * static_cast<std::size_t>(strides.z);
 }
@@ -52,9 +53,11 @@ constexpr std::int64_t kSmallTables = std::int64_t{1} << 20;
 
 // The index of a unit in a node's table of 16^3, and its word and bit in a node.
 std::size_t table_index(IVec3 unit) {
+  QUOIN_ASSERT(((unit.x | unit.y | unit.z) & ~15) == 0, "0 <= x, y, z < 16");
   return static_cast<std::size_t>(unit.x + 16 * unit.y + 256 * unit.z);
 }
 std::size_t word_of(IVec3 unit) {
+  QUOIN_ASSERT(((unit.x | unit.y | unit.z) & ~15) == 0, "0 <= x, y, z < 16");
   return static_cast<std::size_t>((unit.x >> 2) + 4 * (unit.y >> 2) + 16 * (unit.z >> 2));
 }
 unsigned bit_of(IVec3 unit) {
@@ -121,6 +124,7 @@ trace::TreeView make_view(const FlatTables& tables, const trace::FlatChunk* chun
   view.first_cell = view.cell_strides.x + view.cell_strides.y + view.cell_strides.z;
   view.origin = DVec3(tables.origin);
   view.box = {bounds.min - tables.origin, bounds.max - tables.origin};
+  QUOIN_ASSERT((intersect(view.box, {IVec3(0), tables.chunks * kChunkEdge}) == view.box), "tables of every voxel");
   const std::int32_t strides[3] = {1, tables.chunks.x, tables.chunks.x * tables.chunks.y};
   std::copy_n(strides, 3, view.chunk_strides);
   const IVec3 size = view.box.size();
@@ -174,6 +178,7 @@ struct OccupancyTree::Impl {
     std::uint32_t& index = region.nodes[table_index(unit)];
     if (index == 0) return;
     QUOIN_ASSERT((region.chunks[word_of(unit)] >> bit_of(unit) & 1U) != 0, "a region's bits match its nodes");
+    QUOIN_ASSERT(index < chunk_nodes.size(), "an existing node");
     release_bricks(chunk_nodes[index]);
     free_chunks.push_back(index);
     index = 0;
@@ -199,7 +204,7 @@ struct OccupancyTree::Impl {
       }
       region->chunks[word_of(unit)] |= std::uint64_t{1} << bit_of(unit);
     }
-    QUOIN_ASSERT(index < chunk_nodes.size(), "an existing node");
+    QUOIN_ASSERT(index != 0 && index < chunk_nodes.size(), "an existing node");
     return chunk_nodes[index];
   }
 
@@ -214,6 +219,7 @@ struct OccupancyTree::Impl {
 
   // `cells`: the words that are not 0.
   void replace_brick(ChunkNode& node, std::size_t brick, const Node& words, std::uint64_t cells) {
+    QUOIN_ASSERT(brick < node.bricks.size(), "one of the node's 64 bricks");
     const bool is_full =
         cells == kAll && std::all_of(words.begin(), words.end(), [](auto word) { return word == kAll; });
     if (cells == 0 || is_full) {
@@ -225,6 +231,7 @@ struct OccupancyTree::Impl {
   }
 
   bool set_uniform(ChunkNode& node, std::size_t brick, bool is_full) {
+    QUOIN_ASSERT(brick < node.bricks.size(), "one of the node's 64 bricks");
     trace::BrickCode& code = node.bricks[brick];
     const trace::BrickCode wanted = is_full ? trace::kFullBrick : trace::kEmptyBrick;
     if (code == wanted) return false;
@@ -236,6 +243,7 @@ struct OccupancyTree::Impl {
 
   // Returns the non-empty cells of a brick after replacing the words of one slab.
   static std::uint64_t with_slab(std::uint64_t cells, std::size_t slab, std::span<const std::uint64_t, 4> words) {
+    QUOIN_ASSERT(slab < 16, "one of the brick's 16 slabs");
     cells &= ~(std::uint64_t{15} << (4 * slab));
     for (std::size_t i = 0; i < 4; ++i) cells |= std::uint64_t{words[i] != 0} << (4 * slab + i);
     return cells;
@@ -243,6 +251,7 @@ struct OccupancyTree::Impl {
 
   // Replaces the words of one slab in a brick, four of its 64. Returns true if they changed.
   bool set_slab(ChunkNode& node, std::size_t brick, std::size_t slab, std::span<const std::uint64_t, 4> words) {
+    QUOIN_ASSERT(brick < node.bricks.size(), "one of the node's 64 bricks");
     trace::BrickCode& code = node.bricks[brick];
     if (bricks.words(code).has_four(4 * slab, words.data())) return false;
     code = bricks.put_slab(code, slab, words);
@@ -299,6 +308,7 @@ struct OccupancyTree::Impl {
   // Replaces some slabs of a row of four bricks, and stores each brick once.
   template <class Rows>
   std::uint64_t fill_row(ChunkNode& node, const Rows& rows, int row, std::uint32_t slabs, trace::RowsBox& box) {
+    QUOIN_ASSERT(row >= 0 && row < 16 && slabs >> 16 == 0, "one of the node's 16 rows, and some of its 16 slabs");
     const std::size_t first = 4 * static_cast<std::size_t>(row);
     std::array<Node, 4> four;
     std::array<std::uint64_t, 4> cells;
@@ -368,6 +378,7 @@ struct OccupancyTree::Impl {
     if (is_partial && changed == 0) return 0;
     if (is_partial) box = box_after(rows, node, changed, before, box);
     if (box.empty()) return drop(chunk);
+    QUOIN_ASSERT(intersect(box, kWholeChunk) == box, "voxels of the chunk");
     chunk_boxes.put(chunk, {box.min + chunk * kChunkEdge, box.max + chunk * kChunkEdge});
     return changed;
   }
@@ -509,6 +520,7 @@ struct OccupancyTree::Impl {
     const IVec3 size = flat.chunks = chunks.size();
     const std::int64_t cells = (16 * std::int64_t{size.x} + 2) * (16 * std::int64_t{size.y} + 2);
     flat.origin = chunks.min * kChunkEdge;
+    QUOIN_ASSERT(bits_of(cells, size.z) <= 2e9, "cells that kernels can count in 32 bits");
     flat.cells.assign(static_cast<std::size_t>(bits_of(cells, size.z)) / 32 + 2, 0);
     flat.bricks.assign(64 * volume(size) + 2, trace::kEmptyBrick);
     flat_nodes.assign(volume(size), {0, chunk_nodes.data()});
@@ -681,6 +693,7 @@ void OccupancyTree::finish_update(std::span<const trace::ChunkBricks> changed) {
 }
 
 void OccupancyTree::update(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes) {
+  QUOIN_ASSERT(impl_ != nullptr, "a tree that was not moved from");
   if (changes.all) {
     *this = build(grid, types, impl_->which);
     return;
@@ -694,6 +707,7 @@ void OccupancyTree::update(const Grid& grid, const VoxelRegistry& types, const G
 }
 
 void OccupancyTree::update(const DensityGrid& field, const DensityChanges& changes) {
+  QUOIN_ASSERT(impl_ != nullptr, "a tree that was not moved from");
   if (changes.all) {
     *this = build(field);
     return;
@@ -706,6 +720,7 @@ void OccupancyTree::update(const DensityGrid& field, const DensityChanges& chang
 }
 
 void OccupancyTree::update(const DensityGrid& field, const VoxelRegistry& types, const DensityChanges& changes) {
+  QUOIN_ASSERT(impl_ != nullptr, "a tree that was not moved from");
   if (changes.all) {
     *this = build(field, types);
     return;
@@ -736,6 +751,7 @@ bool OccupancyTree::is_occupied(IVec3 voxel) const {
 }
 
 std::size_t OccupancyTree::bytes() const {
+  QUOIN_ASSERT(impl_ != nullptr, "a tree that was not moved from");
   return sizeof(OccupancyTree) + sizeof(Impl) + impl_->regions.size() * sizeof(RegionNode) +
          impl_->chunk_nodes.capacity() * sizeof(ChunkNode) + impl_->bricks.bytes() +
          impl_->uniform.capacity() * sizeof(trace::UniformBlocks) + impl_->chunk_boxes.bytes() +

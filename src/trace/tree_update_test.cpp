@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -10,6 +11,7 @@
 #include <quoin/trace/occupancy_tree.h>
 #include <quoin/trace/ray.h>
 
+#include "core/death_for_tests.h"
 #include "trace/tree_view.h"
 
 namespace quoin {
@@ -179,6 +181,14 @@ TEST(TreeUpdate, FieldsLikewise) {
     expect_equal(tree.cells(), OccupancyTree::build(field), random, false);
     if (HasFatalFailure()) FAIL() << step;
   }
+}
+
+TEST(TreeUpdateDeathTest, RejectsMovedFromTrees) {
+  OccupancyTree tree;
+  const OccupancyTree moved = std::move(tree);
+  // NOLINTNEXTLINE(bugprone-use-after-move)
+  QUOIN_EXPECT_MISTAKE(tree.update(Grid(), VoxelRegistry(), GridChanges()), "not moved from");
+  QUOIN_EXPECT_MISTAKE(tree.update(DensityGrid(), DensityChanges()), "not moved from");
 }
 
 }  // namespace

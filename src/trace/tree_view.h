@@ -54,6 +54,7 @@ struct BrickRun {
     return {(code >> 4) + static_cast<std::uint32_t>(shift > 0 ? shift : 0), shift};
   }
   [[nodiscard]] BrickCode code() const {
+    QUOIN_ASSERT(shift >= -4 && shift <= 3 && first >> 28 == 0, "a shift of 3 bits, a line of 28 bits");
     return (first - static_cast<std::uint32_t>(shift > 0 ? shift : 0)) << 4 | (static_cast<std::uint32_t>(shift) & 7U)
                                                                                   << 1;
   }
@@ -85,6 +86,7 @@ class BrickWords {
   const std::uint64_t& operator[](std::size_t cell) const { return words_[places_[cell]]; }
   /// Returns true if the four words from `cell` on, whose x is 0, equal `four`.
   [[nodiscard]] bool has_four(std::size_t cell, const std::uint64_t* four) const {
+    QUOIN_ASSERT(cell < 64 && (cell & 3) == 0, "the first cell of a row of four");
     const std::uint64_t* const own = words_ + places_[cell];
     const std::size_t step = is_kept(cell) ? 1 : 0;
     return ((own[0] ^ four[0]) | (own[step] ^ four[1]) | (own[2 * step] ^ four[2]) | (own[3 * step] ^ four[3])) == 0;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include <quoin/core/assert.h>
 #include <quoin/trace/ray.h>
 
 #include "trace/tree_view.h"
@@ -151,6 +152,7 @@ class Walk {
 
   // Leaves the aligned block of this size around the voxel.
   void step(int size) {
+    QUOIN_ASSERT(size > 0 && (size & (size - 1)) == 0, "a power of two");
     if (size == 1) return step_voxel();
     std::array<double, 3> t{};
     std::array<int, 3> low{};
@@ -220,6 +222,7 @@ class Walk {
 
   // Returns the edge length of the largest aligned block of one type around an occupied voxel.
   [[nodiscard]] int uniform_size() const {
+    QUOIN_ASSERT(node_ != nullptr, "an occupied voxel, found before");
     const UniformBlocks& blocks = nodes_.uniform_blocks(*node_);
     const std::size_t brick = brick_of(voxel());
     if ((blocks.cells[brick] >> cell_of(voxel()) & 1U) == 0) return 1;
@@ -248,7 +251,9 @@ class Walk {
     const std::uint64_t word = region_->chunks[static_cast<std::size_t>((c.x >> 2) + 4 * (c.y >> 2) + 16 * (c.z >> 2))];
     if (word == 0) return 256;
     if ((word >> ((c.x & 3) + 4 * (c.y & 3) + 16 * (c.z & 3)) & 1U) == 0) return 64;
-    node_ = &nodes_.chunk(region_->nodes[static_cast<std::size_t>(c.x + 16 * c.y + 256 * c.z)]);
+    const std::uint32_t index = region_->nodes[static_cast<std::size_t>(c.x + 16 * c.y + 256 * c.z)];
+    QUOIN_ASSERT(index != 0, "a region's bits match its nodes");
+    node_ = &nodes_.chunk(index);
     return 0;
   }
 
