@@ -445,6 +445,15 @@ TEST(PacketDeathTest, ALaneThatIsNoneIsAMistake) {
   QUOIN_EXPECT_MISTAKE((void)hits[RayPacket::kSize], "0 <= lane < kSize");
 }
 
+TEST(PacketDeathTest, RejectsActiveLanesBeyondThePacket) {
+  RayPacket rays;
+  rays.active = 1U << RayPacket::kSize;
+  PacketHits hits;
+  const OccupancyTree tree;
+  QUOIN_EXPECT_MISTAKE(first_hits(tree, rays, hits), "active lanes are lanes of the packet");
+  QUOIN_EXPECT_MISTAKE((void)any_hits(tree, rays), "active lanes are lanes of the packet");
+}
+
 TEST(PacketDeathTest, ReadingALaneThatHitNothingIsAMistake) {
   PacketHits hits;
   hits.set(3, RayHit{});

@@ -2,6 +2,7 @@
 
 #include <bit>
 
+#include <quoin/core/assert.h>
 #include <quoin/trace/packet.h>
 
 #include "trace/kernel/kernel.h"
@@ -47,10 +48,13 @@ bool any_hit(const OccupancyTree& tree, const Ray& ray, double max_t) {
 }
 
 void first_hits(const OccupancyTree& tree, const RayPacket& rays, PacketHits& hits) {
+  QUOIN_ASSERT(rays.active >> RayPacket::kSize == 0, "active lanes are lanes of the packet");
   hits.hit = hits.starts_inside = 0;
   std::uint32_t unfinished = rays.active;
   if (const trace::TreeView* view = tree.view()) {
     trace::kernel().first_hits(*view, rays, hits, unfinished);
+    QUOIN_ASSERT(((hits.hit | unfinished) & ~rays.active) == 0, "results of active lanes only");
+    QUOIN_ASSERT((hits.hit & unfinished) == 0 && (hits.starts_inside & ~hits.hit) == 0, "one result per lane");
   }
   for (std::uint32_t inside = hits.starts_inside; inside != 0; inside &= inside - 1) {
     const int lane = std::countr_zero(inside);
@@ -64,10 +68,12 @@ void first_hits(const OccupancyTree& tree, const RayPacket& rays, PacketHits& hi
 }
 
 std::uint32_t any_hits(const OccupancyTree& tree, const RayPacket& rays) {
+  QUOIN_ASSERT(rays.active >> RayPacket::kSize == 0, "active lanes are lanes of the packet");
   std::uint32_t unfinished = rays.active;
   std::uint32_t blocked = 0;
   if (const trace::TreeView* view = tree.view()) {
     blocked = trace::kernel().any_hits(*view, rays, unfinished);
+    QUOIN_ASSERT(((blocked | unfinished) & ~rays.active) == 0, "results of active lanes only");
   }
   for (; unfinished != 0; unfinished &= unfinished - 1) {
     const int lane = std::countr_zero(unfinished);

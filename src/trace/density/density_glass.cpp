@@ -40,6 +40,7 @@ struct BodiesInCell {
   [[nodiscard]] bool is_full() const { return !has_air && !has_opaque && count == 1; }
 
   void set(std::size_t i, double density, VoxelType material, const VoxelRegistry& types) {
+    QUOIN_ASSERT(i < body.size(), "one of the eight corners");
     densities[i] = density;
     body[i] = !(density < 0.0) ? kAir : types.is_transparent(material) ? material : kOpaque;
     has_air |= body[i] == kAir;
@@ -48,6 +49,7 @@ struct BodiesInCell {
     const auto end = transparent.begin() + static_cast<std::ptrdiff_t>(count);
     const auto place = std::lower_bound(transparent.begin(), end, body[i]);
     if (place != end && *place == body[i]) return;
+    QUOIN_ASSERT(count < transparent.size(), "one type per corner");
     std::copy_backward(place, end, end + 1);
     *place = body[i];
     ++count;
@@ -127,7 +129,10 @@ class Crossings {
   }
   void sort() { std::sort(places_.begin(), places_.begin() + static_cast<std::ptrdiff_t>(count_)); }
   [[nodiscard]] std::size_t count() const { return count_; }
-  [[nodiscard]] double operator[](std::size_t i) const { return places_[i]; }
+  [[nodiscard]] double operator[](std::size_t i) const {
+    QUOIN_ASSERT(i < count_, "one of the crossings");
+    return places_[i];
+  }
 
  private:
   // The whole field, the opaque field and each pair of eight types have up to three roots each, plus the two ends.
@@ -199,6 +204,7 @@ class RayInCell {
 bool visit_cell(const BodiesInCell& cell, const Ray& ray, const trace::WalkSpan& span, double t_exit,
                 FunctionRef<bool(const GlassSpan&)> visit) {
   const double length = t_exit - span.t_enter;
+  QUOIN_ASSERT(length > 0.0, "a ray that crosses the cell");
   const DVec3 entry = glm::clamp(ray.origin + ray.direction * span.t_enter - DVec3(span.voxel), 0.0, 1.0);
   const RayInCell in_cell(cell, entry, ray.direction * length);
   const Crossings crossings = in_cell.crossings();
@@ -246,6 +252,7 @@ void visit_glass(const DensityGlass& glass, const Ray& ray, double max_t, Functi
 }
 
 DVec3 glass_normal(const DensityGlass& glass, IVec3 cell, const DVec3& point, VoxelType type, VoxelType other) {
+  QUOIN_ASSERT(type != kAir, "a transparent material");
   if (other == kAir) {
     DensityHit hit;
     hit.normal = unit_or_zero(glass.field().gradient_at(point));

@@ -3,6 +3,8 @@
 #include <bit>
 #include <cmath>
 
+#include <quoin/core/assert.h>
+
 #include "core/trilinear.h"
 #include "grid/density/cell_corners.h"
 #include "grid/density/density_storage.h"
@@ -78,12 +80,15 @@ bool any_hit(const DensityTree& tree, const Ray& ray, double max_t) {
 }
 
 void first_hits(const DensityTree& tree, const RayPacket& rays, DensityPacketHits& hits) {
+  QUOIN_ASSERT(rays.active >> RayPacket::kSize == 0, "active lanes are lanes of the packet");
   const trace::FieldView field = view_of(tree);
   const auto kernel = trace::field_kernel().first_hits_in_field;
   RayPacket::Lanes<FieldHit> found;
   std::uint32_t one_by_one = rays.active;
   hits.hit = 0;
   if (field.cells != nullptr && kernel != nullptr) hits.hit = kernel(field, rays, found.data(), one_by_one);
+  QUOIN_ASSERT(((hits.hit | one_by_one) & ~rays.active) == 0 && (hits.hit & one_by_one) == 0,
+               "one result per active lane");
   for (; one_by_one != 0; one_by_one &= one_by_one - 1) {
     const int lane = std::countr_zero(one_by_one);
     const auto i = static_cast<std::size_t>(lane);
@@ -100,11 +105,13 @@ void first_hits(const DensityTree& tree, const RayPacket& rays, DensityPacketHit
 }
 
 std::uint32_t any_hits(const DensityTree& tree, const RayPacket& rays) {
+  QUOIN_ASSERT(rays.active >> RayPacket::kSize == 0, "active lanes are lanes of the packet");
   const trace::FieldView field = view_of(tree);
   const auto kernel = trace::field_kernel().any_hits_in_field;
   std::uint32_t one_by_one = rays.active;
   std::uint32_t blocked = 0;
   if (field.cells != nullptr && kernel != nullptr) blocked = kernel(field, rays, one_by_one);
+  QUOIN_ASSERT(((blocked | one_by_one) & ~rays.active) == 0, "results of active lanes only");
   for (; one_by_one != 0; one_by_one &= one_by_one - 1) {
     const int lane = std::countr_zero(one_by_one);
     const double max_t = rays.max_t[static_cast<std::size_t>(lane)];

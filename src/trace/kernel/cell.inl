@@ -17,6 +17,7 @@
 #include <cstring>
 #include <utility>
 
+#include <quoin/core/assert.h>
 #include <quoin/trace/ray.h>
 
 namespace quoin::trace {
@@ -130,6 +131,7 @@ inline CellCurve<V> curve_of(const CellCubic<V>& f) {
 
 /// Returns the only root of `f` between `low`, where `f` is not negative, and `high`, where it is negative.
 inline double root_between(const CellCubic<double>& f, double low, double high) {
+  QUOIN_ASSERT(low >= 0.0 && low <= high && high <= 1.0, "0 <= low <= high <= 1");
   const double f_low = f(low);
   const double f_high = f(high);
   // Newton's method, starting at the chord's root, within the current bracket.

@@ -61,6 +61,7 @@ class CellGroup {
   /// Adds cells of a word; `at` is the first of the word's cells that the ray could pass.
   /// Requires: the group is not full.
   void add(I4 at, std::uint64_t cells) {
+    QUOIN_ASSERT(!is_full() && word_count_ < kGroup && cells != 0, "room for the cells of a word");
     for (int axis = 0; axis < 3; ++axis) words_[axis][word_count_] = at[axis];
     for (; cells != 0; cells &= cells - 1) codes_[count_++] = word_count_ << 6 | std::countr_zero(cells);
     ++word_count_;
@@ -221,6 +222,7 @@ class FieldLanes {
     store_packed(at_[1] + count_, packing, cells.y + origin[1]);
     store_packed(at_[2] + count_, packing, cells.z + origin[2]);
     count_ += std::popcount(bits(which));
+    QUOIN_ASSERT(count_ <= kCellsAtOnce + kWidth, "room for one more register");
   }
 
   // Tests groups of cells while at least `least_count` cells are left. Returns all lanes with a hit so far.
@@ -309,6 +311,7 @@ class FieldLanes {
 
   // Stores a lane's hit without its t.
   void keep(const Meetings& from, int place, int lane) {
+    QUOIN_ASSERT(lane >= 0 && lane < kWidth && place >= 0 && place < int{kDoubles}, "a lane of the packet");
     kept_.c0[lane] = from.field.c0[place];
     kept_.c1[lane] = from.field.c1[place];
     kept_.c2[lane] = from.field.c2[place];

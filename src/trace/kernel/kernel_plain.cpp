@@ -252,6 +252,7 @@ inline SingleHit trace_single(const TreeView& tree, const Ray& world_ray, double
                            I4{1, tree.cell_strides.y, tree.cell_strides.z, 0});
   for (bool is_first = true;; is_first = false) {
     const auto bit = static_cast<std::uint32_t>(steps.index);
+    QUOIN_ASSERT(bit >> 5 <= tree.last_cell_word, "a cell of the tables, or of their border");
     if ((tree.cells[bit >> 5] >> (bit & 31U) & 1U) != 0) {
       I4 within = __builtin_convertvector(stand.lower - cell, I4);
       if (!is_first) {

@@ -22,6 +22,8 @@
 #include <immintrin.h>
 #endif
 
+#include <quoin/core/assert.h>
+
 #include "trace/kernel/kernel.h"
 
 namespace quoin::trace {
@@ -175,6 +177,7 @@ inline bool bring_near(const TreeView& tree, const Ray& ray, double max_t, D4& p
 }
 
 inline double distance_of(const TreeView& tree, const Ray& ray, const SingleHit& found) {
+  QUOIN_ASSERT(found.is_hit && found.axis >= 0 && found.axis < 3, "a hit on a face");
   const double d = ray.direction[found.axis];
   const double plane = found.voxel[found.axis] + tree.origin[found.axis] + (d > 0.0 ? 0.0 : 1.0);
   return (plane - ray.origin[found.axis]) * (1.0 / d);

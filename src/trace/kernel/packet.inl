@@ -280,6 +280,7 @@ inline Met trace(const TreeView& tree, Lanes& lanes, F t, const Crossing& entere
 }
 
 inline void keep(const Met& met, int first, LaneHits& out) {
+  QUOIN_ASSERT(first % kWidth == 0 && first < RayPacket::kSize, "the first lane of a group");
   out.hit |= bits(met.hit) << first;
   out.starts_inside |= bits(met.inside) << first;
   store(out.x.data() + first, met.x);

@@ -174,6 +174,7 @@ struct Blocked {
 
 // Requires: the ray is short.
 inline Blocked any_at_once(const TreeView& tree, const Ray& ray, double max_t, double length) {
+  QUOIN_ASSERT(max_t >= 0.0 && max_t * length <= kShortRayReach, "a short ray");
   ShortRay own;
   if (!set_up(tree, ray, max_t, length, own)) return {false, true};
   const __m128 one = _mm_set1_ps(1.0F);
