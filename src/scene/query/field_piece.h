@@ -17,6 +17,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
 
 #include "core/trilinear.h"
@@ -78,6 +79,7 @@ struct FieldPiece {
 
   /// Leaves the part from `low` to `high`, which lie within it.
   void restrict_to(const DVec3& low, const DVec3& high) {
+    QUOIN_ASSERT(low.x <= high.x && low.y <= high.y && low.z <= high.z, "low <= high");
     for (int axis_of_box = 0; axis_of_box < 3; ++axis_of_box) {
       const double first = middle[axis_of_box] - half[axis_of_box];
       const double f = (low[axis_of_box] - first) / (2.0 * half[axis_of_box]);

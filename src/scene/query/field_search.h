@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/half.h>
 #include <quoin/trace/density_ray.h>
 
@@ -170,6 +171,7 @@ class FieldSearch {
   static int greatest(const DVec3& v) { return v.x >= v.y && v.x >= v.z ? 0 : v.y >= v.z ? 1 : 2; }
 
   void halve(const FieldPiece& piece, int axis) {
+    QUOIN_ASSERT(axis >= 0 && axis < 3 && piece.half[axis] > 0.0, "an axis along which the piece has a size");
     for (const double side : {-1.0, 1.0}) {
       FieldPiece part = piece;
       DVec3 low = piece.middle - piece.half;

@@ -1,5 +1,7 @@
 #include "scene/query/field_shapes.h"
 
+#include <quoin/core/assert.h>
+
 namespace quoin {
 namespace {
 
@@ -124,6 +126,7 @@ bool BoxInField::may_meet_exactly(FieldPiece& piece) const {
 
 // 0 if two edges are parallel.
 DVec3 BoxInField::direction(const FieldPiece& piece, int which) const {
+  QUOIN_ASSERT(which >= 0 && which < kAllDirections, "one of the directions");
   const auto across = [](const DVec3& a, const DVec3& b) {
     const DVec3 product = glm::cross(a, b);
     return glm::dot(product, product) > 1e-12 * glm::dot(a, a) * glm::dot(b, b) ? product : DVec3(0.0);
@@ -202,6 +205,7 @@ std::array<DVec3, 8> BoxInField::gradients_about(const FieldContact& contact, co
 // If the field continues past a side of the piece there is no ridge, and the gradient is the normal.
 DVec3 BoxInField::across_crease(const FieldContact& contact, const DensityGrid& field) const {
   const FieldPiece& piece = contact.piece;
+  QUOIN_ASSERT(piece.axis >= kFirstCrease && piece.axis < kFirstSide, "a crease of the plane and a side");
   const DVec3 normal = unit_or_zero(parting(piece));
   const DVec3& edge = box_.axes[(piece.axis - kFirstCrease) % 3];
   const DVec3 side = glm::cross(edge, normal);

@@ -11,6 +11,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
 #include <quoin/scene/scene_query.h>
 
@@ -26,7 +27,9 @@ inline constexpr double kTouch = 1e-9;
 // Transforms into the space of a placed grid's voxels.
 struct ToGrid {
   explicit ToGrid(const PlacedGrid& placed)
-      : axes(glm::transpose(placed.world_axes) / placed.voxel_size), position(placed.position), pivot(placed.pivot) {}
+      : axes(glm::transpose(placed.world_axes) / placed.voxel_size), position(placed.position), pivot(placed.pivot) {
+    QUOIN_ASSERT(placed.voxel_size > 0.0, "a positive voxel size");
+  }
   // The difference of two far positions is taken first: it is small, and mostly exact.
   [[nodiscard]] DVec3 point(DVec3 in_world) const { return axes * (in_world - position) + pivot; }
 
@@ -39,6 +42,7 @@ struct ToGrid {
 inline IBox voxels_within(const DBox& bounds, const IBox& tight) {
   IBox box;
   for (int axis = 0; axis < 3; ++axis) {
+    QUOIN_ASSERT(tight.min[axis] <= tight.max[axis], "bounds with min <= max");
     box.min[axis] =
         static_cast<int>(std::clamp(std::floor(bounds.min[axis]), double(tight.min[axis]), double(tight.max[axis])));
     box.max[axis] =

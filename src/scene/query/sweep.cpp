@@ -3,6 +3,8 @@
 #include <array>
 #include <limits>
 
+#include <quoin/core/assert.h>
+
 #include "scene/query/field_sweep.h"
 #include "scene/query/moving_box.h"
 #include "scene/query/moving_capsule.h"
@@ -176,6 +178,7 @@ class BlockSweep {
 
   // Returns true if no matching voxel covers the face that was hit. Always true for edge contacts, which have no face.
   [[nodiscard]] bool faces_air(IVec3 voxel, const Contact& contact) {
+    QUOIN_ASSERT(contact.axis >= 0, "a contact");
     if (contact.axis >= 3) return true;
     IVec3 before = voxel;
     before[contact.axis] += contact.normal[contact.axis] > 0.0 ? 1 : -1;
@@ -194,6 +197,7 @@ class BlockSweep {
 template <class Shape, class Reader>
 SweepHit hit_of(const PlacedGrid& placed, BlockSweep<Shape, Reader>& sweep) {
   const Contact& best = sweep.best();
+  QUOIN_ASSERT(best.axis >= 0, "a contact");
   const DVec3 normal = glm::normalize(placed.world_axes * best.normal);
   return {best.fraction, normal, placed.instance, sweep.voxel(), best.depth * placed.voxel_size, sweep.type()};
 }

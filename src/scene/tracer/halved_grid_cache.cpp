@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include <quoin/core/assert.h>
 #include <quoin/scene/scene_tracer.h>
 
 namespace quoin {
@@ -33,6 +34,7 @@ bool has_shape_of(const DensityPyramid& fields, int halvings) {
 }  // namespace
 
 void CoarseLevel::put_in(PlacedGrid& placed) const {
+  QUOIN_ASSERT(voxels != nullptr && placed.grid != nullptr && level >= 1, "a level that was made, and a placed grid");
   const double cell = std::ldexp(1.0, level);
   placed.voxels = voxels;
   placed.opaque = &trees.opaque();
@@ -90,11 +92,13 @@ bool HalvedGridCache::Entry::is_alike(const SceneGrid& grid, int halvings) const
 // Adds a level of the pyramids if it is similar to the grid. Otherwise removes it and all coarser levels, and returns
 // false.
 bool HalvedGridCache::Entry::take_level(const SceneGrid& grid, const VoxelRegistry& types, int halvings) {
+  QUOIN_ASSERT(halvings >= 1, "1 <= halvings");
   const auto index = static_cast<std::size_t>(halvings - 1);
   if (!is_alike(grid, halvings)) {
     levels.resize(std::min(levels.size(), index));
     return false;
   }
+  QUOIN_ASSERT(index <= levels.size(), "levels in their order");
   if (levels.size() == index) levels.push_back(std::make_unique<CoarseLevel>());
   CoarseLevel& level = *levels[index];
   level.voxels = grid.grid.chunk_count() != 0 ? &pyramid.level(halvings) : &no_voxels;

@@ -80,6 +80,7 @@ void InstanceTree::build() {
 
 // Returns the expected number of nodes that a ray through the whole tree visits (surface area heuristic).
 double InstanceTree::search_cost() const {
+  QUOIN_ASSERT(!nodes_.empty(), "a tree with boxes");
   const double whole = area_of(nodes_.front().box);
   return whole > 0.0 ? areas_ / whole : 0.0;
 }
@@ -92,6 +93,7 @@ void InstanceTree::fit(Node& node) const {
     node.box = {glm::min(a.min, b.min), glm::max(a.max, b.max)};
     return;
   }
+  QUOIN_ASSERT(node.first + node.count <= order_.size(), "a leaf of the boxes");
   node.box = {};
   for (std::size_t i = node.first; i < node.first + node.count; ++i) {
     const DBox& each = boxes_[order_[i]];
@@ -124,6 +126,7 @@ void InstanceTree::change(std::span<const Change> changes) {
 
 // Makes the nodes below the one for `items`, whose boxes begin at `begin` in `order_`.
 void InstanceTree::split(std::size_t node, std::span<Item> items, std::size_t begin) {
+  QUOIN_ASSERT(!items.empty() && node < nodes_.size(), "a node with boxes");
   if (items.size() <= kLeafSize) {
     nodes_[node].first = begin;
     nodes_[node].count = items.size();

@@ -87,6 +87,7 @@ PacketBounds::PacketBounds(const RayPacket& rays) {
     add(origins[axis].low, directions[axis].low, axis);
     add(-origins[axis].high, -directions[axis].high, axis + 3);
   }
+  QUOIN_ASSERT(next_upper == lower_count_, "six limits");
   const Range reach = range_of(rays.max_t, inactive);
   set_reach(is_usual_ ? std::max(reach.high, 0.0) : double{kInfinity});
 }
@@ -116,6 +117,7 @@ void PacketLanes::set(Axis& axis, const RayPacket::Lanes<double>& origin, const 
 }
 
 std::uint32_t PacketLanes::meet(const FourBoxes& boxes, std::size_t box) const {
+  QUOIN_ASSERT(box < 4, "one of the four boxes");
   if (!is_usual_) return ~std::uint32_t{0};
   std::uint32_t met = 0;
   for (std::size_t i = 0; i < kFours; ++i) {
@@ -200,6 +202,8 @@ class PacketTree::Builder {
 };
 
 PacketTree::PacketTree(const InstanceTree& tree, DVec3 origin, const std::vector<bool>& left_out) {
+  QUOIN_ASSERT(left_out.empty() || left_out.size() == tree.boxes().size(), "one entry per box, or none");
+  QUOIN_ASSERT(tree.boxes().size() <= std::numeric_limits<std::uint32_t>::max(), "indices of 32 bits");
   if (tree.nodes().empty()) return;
   nodes_.reserve(tree.nodes().size());
   Builder(tree, origin, left_out, nodes_).make(0);

@@ -11,6 +11,7 @@
 #include <xmmintrin.h>
 #endif
 
+#include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
 #include <quoin/trace/packet.h>
 
@@ -92,6 +93,7 @@ class PacketLanes {
   PacketLanes(const RayPacket& rays, const PacketBounds& bounds);
 
   void set_reach(int lane, double max_t) {
+    QUOIN_ASSERT(lane >= 0 && lane < RayPacket::kSize, "0 <= lane < kSize");
     max_t_[static_cast<std::size_t>(lane)] = static_cast<float>(max_t * double{scale_});
   }
   /// Clears bit i only if ray i, active or not, misses the given box.
@@ -166,6 +168,8 @@ class PacketTree {
     Four near;
     const unsigned met = rays.meet(node.boxes, near);
     const std::size_t base = height;
+    QUOIN_ASSERT(base + static_cast<std::size_t>(std::popcount(met & node.present)) <= kMaxHeight,
+                 "room for the boxes");
     for (std::uint32_t left = met & node.present; left != 0; left &= left - 1) {
       const auto slot = static_cast<std::uint32_t>(std::countr_zero(left));
       std::size_t at = height++;

@@ -2,9 +2,11 @@
 
 #include <cmath>
 #include <map>
+#include <vector>
 
 #include <gtest/gtest.h>
 
+#include "core/death_for_tests.h"
 #include "core/not_finite_for_tests.h"
 #include "scene/query/box_test_support.h"
 
@@ -130,6 +132,17 @@ TEST(PacketTree, SkipsExcludedInstances) {
     for (int lane = 0; lane < 16; ++lane) rays.set(lane, {world.vector(300.0), world.vector(1.0)}, kInfinity);
     for (const auto& [i, lanes] : visited(tree, rays)) EXPECT_LT(i, kept);
   }
+}
+
+TEST(PacketTreeDeathTest, RejectsIndicesAndListsOfOtherSizes) {
+  RandomBoxes world(7);
+  const InstanceTree boxes(world.boxes(5));
+  QUOIN_EXPECT_MISTAKE(PacketTree(boxes, DVec3(0.0), std::vector<bool>(4)), "one entry per box, or none");
+  RayPacket rays;
+  rays.set(0, {{0, 0, 0}, {1, 0, 0}}, kInfinity);
+  PacketLanes lanes(rays, PacketBounds(rays));
+  QUOIN_EXPECT_MISTAKE((void)lanes.meet({}, 4), "one of the four boxes");
+  QUOIN_EXPECT_MISTAKE(lanes.set_reach(RayPacket::kSize, 1.0), "0 <= lane < kSize");
 }
 
 }  // namespace

@@ -3,11 +3,13 @@
 #include <limits>
 #include <numbers>
 #include <random>
+#include <vector>
 
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <gtest/gtest.h>
 
+#include "core/death_for_tests.h"
 #include "core/not_finite_for_tests.h"
 #include "scene/tracer/placed_grid.h"
 #include "scene/tracer/scene_view.h"
@@ -244,6 +246,16 @@ TEST(SceneTracer, CountsTheBytesOfSharedTreesOnce) {
   scene.add_instance(instance);
   EXPECT_EQ(SceneTracer(scene).bytes(), one);
   EXPECT_EQ(placed.voxels, &scene.grids()[handle].grid);
+}
+
+TEST(SceneViewDeathTest, RejectsIndicesOfNoPlacedGrid) {
+  const Scene scene = random_scene(3, 2);
+  const SceneTracer tracer(scene);
+  SceneView view(tracer, DVec3(0.0));
+  QUOIN_EXPECT_MISTAKE((void)view.grid_from_view(2), "a placed grid");
+  QUOIN_EXPECT_MISTAKE((void)view.view_from_grid(-1), "a placed grid");
+  QUOIN_EXPECT_MISTAKE((void)view.any_hits(2, RayPacket()), "a placed grid");
+  QUOIN_EXPECT_MISTAKE(view.leave_to_impostors(std::vector<std::int32_t>{2}), "a placed grid");
 }
 
 }  // namespace

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 #include "scene/instance_axes.h"
 #include "scene/tracer/placed_grid.h"
 #include "scene/tracer/scene_tracer_impl.h"
@@ -35,6 +37,7 @@ void put_trees(const TreeCache& trees, PlacedGrid& placed) {
 }  // namespace
 
 DBox bounds_in_world(const PlacedGrid& placed, const IBox& tight) {
+  QUOIN_ASSERT(placed.voxel_size > 0.0, "a positive voxel size");
   const DVec3 low = (DVec3(tight.min) - placed.pivot) * placed.voxel_size;
   const DVec3 high = (DVec3(tight.max) - placed.pivot) * placed.voxel_size;
   DBox box{DVec3(0.0), DVec3(0.0)};
@@ -156,6 +159,8 @@ TracedGrid* SceneTracer::Impl::grid_to_place(const Instance& instance) const {
 }
 
 void SceneTracer::Impl::place(std::size_t i, InstanceHandle handle, const Instance& instance, TracedGrid& grid) {
+  QUOIN_ASSERT(i < placed.size() && placed.size() == sources.size(), "a placed grid with its source");
+  QUOIN_ASSERT(i == 0 || placed[i - 1].instance < handle, "instances in the order of their handles");
   placed[i].instance = handle;
   placed[i].grid = grid.grid;
   placed[i].voxels = &grid.grid->grid;
@@ -310,6 +315,7 @@ void SceneTracer::Impl::update_trees(const SceneChanges& changes, Threads thread
     return grid != nullptr && grid->is_placed && grid->trees.has_transparent();
   });
   if (!has_other_trees) return;
+  QUOIN_ASSERT(sources.size() == placed.size(), "a source per placed grid");
   for (std::size_t i = 0; i < placed.size(); ++i) {
     const TracedGrid& grid = *sources[i].grid;
     placed[i].grid = grid.grid;

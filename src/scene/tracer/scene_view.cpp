@@ -6,6 +6,8 @@
 
 #include <glm/matrix.hpp>
 
+#include <quoin/core/assert.h>
+
 #include "scene/tracer/packet_tree.h"
 #include "scene/tracer/placed_grid.h"
 #include "scene/tracer/scene_tracer_impl.h"
@@ -121,6 +123,7 @@ struct SceneView::Impl {
   // Returns the rays in view space that hit a transparent voxel or field of the instance.
   [[nodiscard]] std::uint32_t meet_glass(std::size_t index, std::uint32_t near, const RayPacket& in_view,
                                          RayPacket& room) const {
+    QUOIN_ASSERT(index < grid_from_view.size() && is_current(), "an instance of a tracer that was not updated since");
     const PlacedGrid& placed = placed_in(*tracer)[index];
     move(grid_from_view[index], in_view, room);
     room.active = near;
@@ -130,6 +133,8 @@ struct SceneView::Impl {
     return met;
   }
   [[nodiscard]] bool sees_all() const { return left_to_impostors.empty(); }
+  // Returns false if an update of the tracer added or removed placed grids, which invalidates the view.
+  [[nodiscard]] bool is_current() const { return placed_in(*tracer).size() == grid_from_view.size(); }
 
   void take_nearer(std::size_t placed, const PacketHits& found, RayPacket& rays, SceneHits& hits) const {
     for (std::uint32_t left = found.hit; left != 0; left &= left - 1) {
@@ -154,6 +159,7 @@ struct SceneView::Impl {
 
   // Finds the first hits in the only instance of the scene.
   void meet_alone(const RayPacket& rays_in_view, SceneHits& hits) const {
+    QUOIN_ASSERT(grid_from_view.size() == 1 && is_current(), "the only instance of the scene");
     const PlacedGrid& placed = placed_in(*tracer).front();
     RoomFor<RayPacket> room_for_rays;
     RayPacket& rays = *room_for_rays;
@@ -170,6 +176,7 @@ struct SceneView::Impl {
   // Finds hits of the lanes `near` in an instance that are nearer than those in `hits`. Lowers the max_t of these rays.
   // Returns the lanes with a new hit.
   std::uint32_t meet(std::size_t index, std::uint32_t near, RayPacket& left, SceneHits& hits) const {
+    QUOIN_ASSERT(index < grid_from_view.size() && is_current(), "an instance of a tracer that was not updated since");
     const PlacedGrid& placed = placed_in(*tracer)[index];
     RoomFor<RayPacket> room_for_rays;
     RayPacket& rays = *room_for_rays;
@@ -197,6 +204,7 @@ struct SceneView::Impl {
   // space and limited to the known hits. Returns the lanes with a new hit.
   static std::uint32_t add_field(const PlacedGrid& placed, std::size_t index, const RayPacket& rays_in_grid,
                                  SceneHits& hits) {
+    QUOIN_ASSERT(placed.opaque_field != nullptr, "a placed grid with an opaque field");
     DensityPacketHits found;
     quoin::first_hits(*placed.opaque_field, rays_in_grid, found);
     std::uint32_t taken = 0;
@@ -234,6 +242,7 @@ SceneView::SceneView(const SceneTracer& tracer, DVec3 origin) : impl_(std::make_
     const glm::dmat3 view_axes = placed.world_axes * placed.voxel_size;
     impl_->view_from_grid.push_back({view_axes, position - view_axes * placed.pivot});
   }
+  QUOIN_ASSERT(tracer.impl().instances.boxes().size() == placed_in(tracer).size(), "a box per placed grid");
   impl_->origin = origin;
   impl_->instances = PacketTree(tracer.impl().instances, origin);
   impl_->is_alone = placed_in(tracer).size() == 1;
@@ -251,7 +260,10 @@ const SceneTracer& SceneView::tracer() const {
 void SceneView::leave_to_impostors(std::span<const std::int32_t> placed) {
   if (placed.empty()) return;
   impl_->left_to_impostors.resize(placed_in(*impl_->tracer).size());
-  for (const std::int32_t i : placed) impl_->left_to_impostors[static_cast<std::size_t>(i)] = true;
+  for (const std::int32_t i : placed) {
+    QUOIN_ASSERT(i >= 0 && static_cast<std::size_t>(i) < impl_->left_to_impostors.size(), "a placed grid");
+    impl_->left_to_impostors[static_cast<std::size_t>(i)] = true;
+  }
   impl_->seen = PacketTree(impl_->tracer->impl().instances, impl_->origin, impl_->left_to_impostors);
 }
 
@@ -282,6 +294,7 @@ void SceneView::first_hits(const RayPacket& rays_in_view, SceneHits& hits) const
 std::uint32_t SceneView::any_hits(std::int32_t home, const RayPacket& rays_in_grid) const {
   const std::vector<PlacedGrid>& placed = placed_in(*impl_->tracer);
   const auto own = static_cast<std::size_t>(home);
+  QUOIN_ASSERT(own < placed.size() && impl_->is_current(), "a placed grid of a tracer that was not updated since");
   std::uint32_t blocked = blocked_by(placed[own], rays_in_grid);
   if (impl_->is_alone || blocked == rays_in_grid.active) return blocked;
   RoomFor<RayPacket> room_in_view;
@@ -339,16 +352,18 @@ void SceneView::visit_transparent(const Ray& ray_in_view, double max_t,
 }
 
 const Affine& SceneView::grid_from_view(std::int32_t placed) const {
+  QUOIN_ASSERT(static_cast<std::size_t>(placed) < impl_->grid_from_view.size(), "a placed grid");
   return impl_->grid_from_view[static_cast<std::size_t>(placed)];
 }
 
 const Affine& SceneView::view_from_grid(std::int32_t placed) const {
+  QUOIN_ASSERT(static_cast<std::size_t>(placed) < impl_->view_from_grid.size(), "a placed grid");
   return impl_->view_from_grid[static_cast<std::size_t>(placed)];
 }
 
 RayPacket SceneView::view_from_grid(std::int32_t placed, const RayPacket& rays_in_grid) const {
   RayPacket rays;
-  move(impl_->view_from_grid[static_cast<std::size_t>(placed)], rays_in_grid, rays);
+  move(view_from_grid(placed), rays_in_grid, rays);
   return rays;
 }
 
