@@ -101,6 +101,7 @@ namespace {
 /// Returns the size of a pixel of an image with the given height: in the plane 1 in front of a perspective camera, or
 /// in world units.
 double pixel_size(const Camera& camera, int height) {
+  QUOIN_ASSERT(height > 0, "a positive image height");
   const bool is_perspective = camera.projection == Camera::Projection::Perspective;
   const double image_height = is_perspective ? 2.0 * std::tan(camera.vertical_fov_radians / 2.0) : camera.view_height;
   return image_height / height;
@@ -141,6 +142,7 @@ std::optional<View> view_of_name(std::string_view name) {
 }
 
 DVec3 direction_of(View view) {
+  QUOIN_ASSERT(static_cast<std::size_t>(view) < kViews.size(), "one of the views");
   return kViews[static_cast<std::size_t>(view)].forward;
 }
 
@@ -171,6 +173,7 @@ std::array<DVec3, 4> framing_directions(DVec3 forward, double aspect) {
 
 Camera frame(DVec3 middle, const Reach& reach, DVec3 forward, double aspect) {
   QUOIN_ASSERT(aspect > 0.0 && std::isfinite(aspect), "a positive, finite aspect");
+  QUOIN_ASSERT(std::abs(glm::length(forward) - 1.0) < 1e-6, "a unit direction");
   Camera camera;
   camera.vertical_fov_radians = kFramingFov;
   turn(camera, forward);

@@ -42,6 +42,7 @@ struct Candidate {
   Functional functional;
 
   [[nodiscard]] std::uint64_t row(int y, int z) const {
+    QUOIN_ASSERT((samples == nullptr) != (voxels == nullptr), "either voxels or samples");
     return samples == nullptr ? ~voxels->row_mask(y, z, kAir) : samples->solid_row(y, z);
   }
   /// For fields, the solid around a sample begins after the previous sample on each axis.
@@ -119,6 +120,7 @@ namespace {
 
 /// Rotates to the right as seen from the front: +Z towards +X.
 DVec3 turned(DVec3 v, int turn, int turns) {
+  QUOIN_ASSERT(turns > 0, "a positive number of turns");
   const double angle = 2.0 * std::numbers::pi * turn / turns;
   const double c = std::cos(angle);
   const double s = std::sin(angle);
@@ -153,6 +155,7 @@ Camera SceneFraming::camera(int turn) const {
   const DVec3 middle = middle_.value_or(DVec3(0.5));
   std::size_t asked = 0;
   const auto reach = [&](DVec3 direction) {
+    QUOIN_ASSERT(asked < reaches_.size(), "a reach is asked of four directions");
     const double of_cube = 0.5 * (std::abs(direction.x) + std::abs(direction.y) + std::abs(direction.z));
     return middle_ ? reaches_[asked++] : of_cube;
   };

@@ -28,6 +28,7 @@ Frustum::Frustum(const Camera& camera, int width, int height) {
 }
 
 void Frustum::set(std::size_t plane, DVec3 inward, double offset) {
+  QUOIN_ASSERT(plane / 2 < planes_.size(), "one of the six planes");
   Planes& planes = planes_[plane / 2];
   planes.x[plane % 2] = inward.x;
   planes.y[plane % 2] = inward.y;

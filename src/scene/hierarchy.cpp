@@ -80,7 +80,10 @@ class GroupDepths {
     scene.groups().for_each([&](GroupHandle handle, const SceneGroup&) { find(handle); });
   }
 
-  [[nodiscard]] std::size_t of(GroupHandle handle) const { return depths_[handle.index]; }
+  [[nodiscard]] std::size_t of(GroupHandle handle) const {
+    QUOIN_ASSERT(handle.index < depths_.size() && depths_[handle.index] < kOnTheWay, "a group of the scene");
+    return depths_[handle.index];
+  }
 
  private:
   static constexpr std::size_t kUnknown = static_cast<std::size_t>(-1);
@@ -122,6 +125,7 @@ std::vector<GroupHandle> groups_from_top(const Scene& scene) {
   std::vector<GroupHandle> sorted;
   sorted.reserve(by_depth.size());
   for (const auto& [depth, handle] : by_depth) sorted.push_back(handle);
+  QUOIN_ASSERT(sorted.size() == scene.groups().size(), "each group once");
   return sorted;
 }
 

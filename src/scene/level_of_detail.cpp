@@ -207,6 +207,7 @@ std::span<const DetailSelector::Impl::Seen> DetailSelector::Impl::look_at_instan
 
 Choice DetailSelector::Impl::choose(InstanceHandle handle, const Measure& measure, const DetailPolicy& policy) {
   if (handle.index >= choices.size()) choices.resize(handle.index + std::size_t{1});
+  QUOIN_ASSERT(handle.generation != 0, "the handle of an instance");
   Choice& last = choices[handle.index];
   Choice choice = chosen(measure, policy, last.generation == handle.generation ? &last : nullptr);
   choice.generation = handle.generation;

@@ -8,6 +8,8 @@
 
 #include <glm/common.hpp>
 
+#include <quoin/core/assert.h>
+
 #include "core/coordinates/chunk_order.h"
 
 namespace quoin {
@@ -50,6 +52,7 @@ class TouchingChunks {
 
   /// Removes and returns the connected set of a remaining block. Requires: the block exists.
   std::vector<IVec3> take(IVec3 block) {
+    QUOIN_ASSERT(has(block), "a block that was not taken yet");
     std::vector<IVec3> chunks;
     std::vector<IVec3> waiting = {block};
     while (!waiting.empty()) {
@@ -70,6 +73,7 @@ class TouchingChunks {
 };
 
 IVec3 least_of(const std::vector<IVec3>& chunks) {
+  QUOIN_ASSERT(!chunks.empty(), "at least one chunk");
   IVec3 least = chunks.front();
   for (const IVec3 chunk : chunks) least = glm::min(least, chunk);
   return least;
@@ -122,6 +126,7 @@ Scene near_grids(const Scene& scene) {
     const std::vector<IVec3> chunks = chunks_of(grid);
     if (is_near(chunks)) continue;
     const std::vector<Piece> pieces = pieces_of(chunks);
+    QUOIN_ASSERT(!pieces.empty(), "at least one piece");
     near.edit(handle) = grid_of(grid, pieces.front());
     for (std::size_t i = 1; i < pieces.size(); ++i) {
       const GridHandle piece = near.add_grid(grid_of(grid, pieces[i]));

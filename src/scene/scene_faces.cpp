@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/mesh/blocky.h>
 
 #include "core/moved_from.h"
@@ -22,6 +23,7 @@ struct GridFaces {
   FaceCounts counted;          // the part included in the scene's counts
 
   void put(IVec3 chunk, std::int64_t count) {
+    QUOIN_ASSERT(count >= 0, "a count that is not negative");
     const auto known = visible_of.find(chunk);
     visible += count - (known == visible_of.end() ? 0 : known->second);
     if (count > 0) {
@@ -50,6 +52,7 @@ bool has_any_of(const Grid& grid, const TypeChanges& changes) {
 /// Counts the chunks at `first`, `first + step` and so on.
 void count_chunks(std::vector<ChunkCount>& chunks, std::size_t first, std::size_t step, const VoxelRegistry& types,
                   BlockyMesher& mesher) {
+  QUOIN_ASSERT(step > 0, "a positive step");
   for (std::size_t i = first; i < chunks.size(); i += step) {
     chunks[i].visible = mesher.count_faces(chunks[i].grid->neighbourhood(chunks[i].chunk), types);
   }
@@ -102,7 +105,9 @@ void SceneFaces::Impl::forget_those_with(const TypeChanges& types, const Scene& 
 // Records the grid that an instance places, if it is drawn, and adds that grid and the previous one to `touched`.
 void SceneFaces::Impl::look_at(const Scene& scene, InstanceHandle handle, std::vector<GridHandle>& touched) {
   if (const auto before = drawn.find(handle); before != drawn.end()) {
-    --grids[before->second].placements;
+    GridFaces& faces = grids[before->second];
+    QUOIN_ASSERT(faces.placements > 0, "a counted placement");
+    --faces.placements;
     touched.push_back(before->second);
     drawn.erase(before);
   }
@@ -149,6 +154,7 @@ void SceneFaces::Impl::count_in(const Scene& scene, GridHandle handle) {
   if (found == grids.end()) return;
   GridFaces& faces = found->second;
   counts -= std::exchange(faces.counted, {});
+  QUOIN_ASSERT(counts.visible >= 0 && counts.total >= 0, "counts of the grids that were added");
   const SceneGrid* entry = scene.grids().find(handle);
   if (entry == nullptr) {
     grids.erase(found);

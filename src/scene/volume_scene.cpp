@@ -12,6 +12,8 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
+#include <quoin/core/assert.h>
+
 namespace quoin {
 namespace {
 
@@ -59,6 +61,7 @@ double station_count(int size, double spacing, double step) {
 
 // Requires: station_count fits.
 std::vector<Between> stations(int size, double spacing, double step) {
+  QUOIN_ASSERT(size > 0 && spacing > 0.0 && step > 0.0, "samples with a positive spacing");
   std::vector<Between> all(static_cast<std::size_t>(station_count(size, spacing, step)));
   for (std::size_t i = 0; i < all.size(); ++i) {
     const double at = std::min(static_cast<double>(i) * step / spacing, size - 1.0);

@@ -11,6 +11,8 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
+#include <quoin/core/assert.h>
+
 #include "scene/instance_axes.h"
 
 namespace quoin {
@@ -74,6 +76,7 @@ class BoxInGrid {
   }
   // Returns the voxels from `first` to `last` of a row whose centres lie in the box.
   [[nodiscard]] std::pair<int, int> run(int first, int last, int y, int z) const {
+    QUOIN_ASSERT(first <= last, "a row with voxels");
     const DVec3 start = (DVec3(first, y, z) + 0.5 - centre_) * axes_;
     Span span;
     for (int i = 0; i < 3; ++i) {
@@ -147,10 +150,12 @@ class BoxFiller {
     fill_part(upper);
   }
   void fill_rows(const IBox& voxels) {
+    QUOIN_ASSERT(!voxels.empty() && chunk_of(voxels.min) == chunk_of(voxels.max - 1), "voxels of one chunk");
     if (type_ == kAir && grid_.find_chunk(chunk_of(voxels.min)) == nullptr) return;
     changed_ += grid_.edit_rows(voxels, [&](IVec3 row, std::span<VoxelType> types) {
       const int last = row.x + static_cast<int>(types.size()) - 1;
       const auto [low, high] = box_.run(row.x, last, row.y, row.z);
+      QUOIN_ASSERT(low > high || (low >= row.x && high <= last), "voxels of the row");
       for (int x = low; x <= high; ++x) types[static_cast<std::size_t>(x - row.x)] = type_;
     });
   }

@@ -9,6 +9,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/direction.h>
 #include <quoin/scene/scene_meshes.h>
 
@@ -35,6 +36,7 @@ int depth_behind(Reader& reader, Vec3 middle, Direction face, VoxelType type) {
 }
 
 inline float median(const AreaByDepth& areas) {
+  QUOIN_ASSERT(!areas.empty(), "areas of a type");
   double half = 0.0;
   for (const double area : areas) half += area / 2.0;
   for (std::size_t depth = 0; depth < areas.size(); ++depth) {
@@ -55,6 +57,8 @@ std::vector<GlassThickness> glass_thickness(Reader& reader, std::span<const Mesh
   std::map<VoxelType, AreaByDepth> areas;
   for (const MeshView& view : surfaces) {
     if (view.surface != SurfaceClass::Transparent && view.surface != SurfaceClass::EmissiveTransparent) continue;
+    QUOIN_ASSERT(view.types.size() == view.positions.size() && view.directions.size() == view.positions.size(),
+                 "a type and a direction for each vertex");
     for (std::size_t i = 0; i + 2 < view.indices.size(); i += 3) {
       const std::uint32_t first = view.indices[i];
       const Vec3 a = view.positions[first];

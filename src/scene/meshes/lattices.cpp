@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <numeric>
 
+#include <quoin/core/assert.h>
+
 namespace quoin {
 
 namespace {
@@ -27,6 +29,7 @@ class Sets {
   explicit Sets(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), std::size_t{0}); }
 
   std::size_t find(std::size_t i) {
+    QUOIN_ASSERT(i < parent_.size(), "one of the numbers");
     while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
     return i;
   }
@@ -45,7 +48,10 @@ class Grouping {
  public:
   Grouping(const Scene& scene, const std::vector<InstanceHandle>& instances)
       : scene_(scene), instances_(instances), sets_(instances.size()) {
-    for (const InstanceHandle handle : instances) boxes_.push_back(world_box(grid_of(handle), instance_of(handle)));
+    for (const InstanceHandle handle : instances) {
+      QUOIN_ASSERT(has_valid_transform(instance_of(handle)), "instances with a finite transform");
+      boxes_.push_back(world_box(grid_of(handle), instance_of(handle)));
+    }
   }
 
   std::vector<std::vector<LatticeMember>> find() {
@@ -54,6 +60,7 @@ class Grouping {
     std::vector<std::size_t> group_of(instances_.size());
     for (std::size_t i = 0; i < instances_.size(); ++i) {
       const std::size_t first = sets_.find(i);
+      QUOIN_ASSERT(first <= i, "the least number represents a set");
       if (first != i) {
         // Relative to the first member. Small errors can add up over many neighbours. An instance with a larger total
         // error becomes a group by itself.

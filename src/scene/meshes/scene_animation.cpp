@@ -60,6 +60,7 @@ bool SceneAnimation::has_the_same_grids(const Scene& frame) const {
 
 SceneAnimation::Shown& SceneAnimation::shown_as(std::size_t place, const Scene& frame, const Instance& instance) {
   const Look look{in_slot_of(instance.grid, frame.grids(), scene_.grids()), instance.mirrored};
+  QUOIN_ASSERT(place < instances_.size(), "one of the instances");
   auto& all = instances_[place];
   const auto known = std::ranges::find(all, look, &Shown::look);
   if (known != all.end()) return *known;
@@ -73,6 +74,7 @@ SceneAnimation::Shown& SceneAnimation::shown_as(std::size_t place, const Scene& 
 
 void SceneAnimation::show(Shown& shown, std::size_t frame, const Similarity& place) {
   auto& changes = shown.changes;
+  QUOIN_ASSERT(shown.frames_until_last <= frame, "frames in their order");
   const bool was_hidden = !changes.empty() && shown.frames_until_last < frame;
   if (was_hidden) changes.push_back({shown.frames_until_last, std::nullopt});
   if (changes.empty() || changes.back().at != place) changes.push_back({frame, place});
@@ -85,6 +87,7 @@ std::vector<MeshKey> SceneAnimation::keys_of(const Shown& shown, double frames_p
   const auto add = [&](std::size_t frame, bool visible, const Similarity& place) {
     keys.push_back({static_cast<double>(frame) / frames_per_second, visible, place});
   };
+  QUOIN_ASSERT(!shown.changes.empty() && shown.changes.front().at.has_value(), "an instance that a frame shows");
   const Change& first = shown.changes.front();
   if (first.frame > 0) add(0, false, *first.at);
   for (const Change& change : shown.changes) {

@@ -98,6 +98,7 @@ Status check_atlas(const Scene& scene, const std::vector<GridHandle>& grids, con
 Result<std::vector<Coordinates>> move_into_atlas(const Scene& scene, const std::vector<GridHandle>& grids,
                                                  MeshResults& results, Threads threads, const Progress& progress,
                                                  SceneMeshes& meshes) {
+  QUOIN_ASSERT(results.size() == grids.size(), "a mesh per grid");
   MeshResults merged = mesh_all(scene, grids, {.mesh = {.bake_occlusion = false}}, threads, progress);
   OcclusionAtlas atlas;
   for (std::size_t i = 0; i < grids.size(); ++i) {
@@ -127,6 +128,7 @@ MeshPart with_atlas(MeshPart part, Coordinates coordinates) {
   const auto owner = std::make_shared<const Owned>(std::move(part.owner), std::move(coordinates));
   for (MeshView& view : part.surfaces) {
     if (view.surface != SurfaceClass::Opaque) continue;
+    QUOIN_ASSERT(owner->second.size() == view.positions.size(), "texture coordinates for each vertex");
     view.atlas = owner->second;
     view.block_occlusion = {};
   }
@@ -186,6 +188,9 @@ void place_parts(const Scene& scene, const std::vector<GridHandle>& grids, Insta
     const Instance& instance = scene.instances()[handle];
     if (!is_drawn(scene, instance, filter)) continue;
     const auto part = std::lower_bound(grids.begin(), grids.end(), instance.grid) - grids.begin();
+    QUOIN_ASSERT(
+        static_cast<std::size_t>(part) < grids.size() && grids[static_cast<std::size_t>(part)] == instance.grid,
+        "a part for each drawn grid");
     meshes.placements.push_back(hierarchy.place(handle, static_cast<std::size_t>(part)));
   }
 }
@@ -206,6 +211,7 @@ Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockySceneOptions& opt
   for (const auto& result : results) {
     if (result && !*result) return result->error();
   }
+  QUOIN_ASSERT(options.part_of || results.size() == grids.size(), "a mesh per grid");
   SceneMeshes meshes;
   meshes.types = scene.types;
   std::vector<Coordinates> coordinates;

@@ -45,7 +45,10 @@ class UnitedGrid {
   [[nodiscard]] const std::vector<LatticeMember>& members() const { return members_; }
   [[nodiscard]] const Grid& voxels() const { return voxels_; }
   /// Returns the placement from the lattice to a member's own grid.
-  [[nodiscard]] const LatticePlace& way_back(std::size_t member) const { return back_[member]; }
+  [[nodiscard]] const LatticePlace& way_back(std::size_t member) const {
+    QUOIN_ASSERT(member < back_.size(), "one of the members");
+    return back_[member];
+  }
 
   /// Returns the owner of a voxel: the last member with a voxel there. Without one, the first member whose chunk it is,
   /// or 0.
@@ -65,11 +68,13 @@ class UnitedGrid {
   using Owners = std::vector<std::uint32_t>;
 
   static std::size_t index_of(IVec3 local) {
+    QUOIN_ASSERT(((local.x | local.y | local.z) & ~(kChunkEdge - 1)) == 0, "0 <= x, y, z < 64");
     return static_cast<std::size_t>((local.z * kChunkEdge + local.y) * kChunkEdge + local.x);
   }
 
   /// Returns the owners of all voxels of a chunk that several members share. Keeps the result for the last such chunk.
   const Owners& owners_in(IVec3 chunk, const std::vector<std::uint32_t>& members) {
+    QUOIN_ASSERT(!members.empty(), "members in the chunk");
     if (dense_chunk_ == chunk) return dense_;
     dense_chunk_ = chunk;
     dense_.assign(std::size_t{kChunkEdge} * kChunkEdge * kChunkEdge, members.front());
@@ -197,6 +202,7 @@ std::vector<SmoothMesh> divide(const Body& body, const UnitedGrid& united) {
   std::vector<SmoothMesh> parts(united.members().size());
   std::vector<std::uint32_t> places(body.owners.size());
   for (std::size_t i = 0; i < places.size(); ++i) {
+    QUOIN_ASSERT(body.owners[i] < parts.size(), "one of the members");
     SmoothMesh& part = parts[body.owners[i]];
     const LatticePlace& back = united.way_back(body.owners[i]);
     places[i] = smooth::append_vertex(part, body.mesh, i);
@@ -267,6 +273,7 @@ void add_part(MeshPart part, std::span<const LatticeMember> members, MeshHierarc
 
 Status add_unit(const Scene& scene, Unit unit, const Mesher& mesher, const Progress& progress, MeshHierarchy& hierarchy,
                 SceneMeshes& meshes) {
+  QUOIN_ASSERT(!unit.members.empty(), "a unit with instances");
   const auto grid_of = [&](const LatticeMember& member) -> const SceneGrid& {
     return scene.grids()[scene.instances()[member.instance].grid];
   };

@@ -28,6 +28,7 @@ using RowWords = std::array<std::uint64_t, 2>;
 constexpr int kShift = 16;
 
 constexpr std::uint64_t moved(std::uint64_t word, int by) {
+  QUOIN_ASSERT(by > -kShift && by < kShift, "a distance within the overlap");
   return by >= 0 ? word >> by : word << -by;
 }
 
@@ -70,7 +71,10 @@ class Marks {
     std::size_t half;  // of the row
   };
 
-  static std::size_t at(int y, int z) { return static_cast<std::size_t>((z + kMargin) * kRows + y + kMargin); }
+  static std::size_t at(int y, int z) {
+    QUOIN_ASSERT(std::min(y, z) >= -kMargin && std::max(y, z) < kChunkEdge + kMargin, "-5 <= y, z < 69");
+    return static_cast<std::size_t>((z + kMargin) * kRows + y + kMargin);
+  }
 
   static RowWords read(const Neighbourhood& voxels, int y, int z) {
     const auto part = [&](int dx) -> std::uint64_t {
@@ -192,6 +196,7 @@ class BodyBorders {
   static constexpr int kWide = kChunkEdge + 2;
 
   static std::size_t at(int x, int y, int z) {
+    QUOIN_ASSERT(std::min({x, y, z}) >= -1 && std::max({x, y, z}) <= kChunkEdge, "-1 <= x, y, z <= 64");
     return static_cast<std::size_t>(((z + 1) * kWide + y + 1) * kWide + x + 1);
   }
 

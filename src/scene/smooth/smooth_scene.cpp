@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/grid/voxel_field.h>
 
 #include "core/coordinates/chunk_order.h"
@@ -173,6 +174,7 @@ Status SmoothScene::Impl::make(const Scene& of, Threads threads, const Progress&
 // The last chunk to be made.
 void SmoothScene::Impl::make_some(const Grid& grid, const VoxelRegistry& types, GridFields& fields, std::size_t count,
                                   Threads threads) {
+  QUOIN_ASSERT(count <= fields.to_make.size(), "chunks that are still to be made");
   const std::size_t first = fields.to_make.size() - count;
   std::vector<std::optional<DensityChunk>> made(count);
   parallel_for(count, threads,

@@ -14,6 +14,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include <quoin/core/assert.h>
 #include <quoin/grid/changes.h>
 #include <quoin/mesh/quad_triangles.h>
 
@@ -51,17 +52,20 @@ bool read_solid_rows(const Chunk* chunk, const VoxelRegistry& types, SolidRows& 
 
 // Returns the lowest run of ones in a non-zero word.
 std::uint64_t lowest_run(std::uint64_t word) {
+  QUOIN_ASSERT(word != 0, "a word with ones");
   const std::uint64_t above = word + (word & (~word + 1));  // 0 if the run ends at the top
   return word & ~above;
 }
 
 std::size_t rows_along_y(const SolidRows& rows, std::size_t row, std::uint64_t run) {
+  QUOIN_ASSERT(row < rows.size(), "one of the rows");
   std::size_t end = row + 1;
   while (end % kEdge != 0 && (rows[end] & run) == run) ++end;
   return end - row;
 }
 
 bool has_all(const SolidRows& rows, std::size_t row, std::size_t count, std::uint64_t run) {
+  QUOIN_ASSERT(row + count <= rows.size(), "rows of the chunk");
   return std::all_of(rows.begin() + static_cast<std::ptrdiff_t>(row),
                      rows.begin() + static_cast<std::ptrdiff_t>(row + count),
                      [&](std::uint64_t word) { return (word & run) == run; });
@@ -99,6 +103,7 @@ void transpose(Layer& words) {
 
 // Cuts the faces of a layer into rectangles, along the words first.
 void cut_faces(Layer& faces, Direction direction, bool is_u_in_word, int layer, QuadBuffer& out) {
+  QUOIN_ASSERT(layer >= 0 && layer < kChunkEdge, "0 <= layer < 64");
   const FaceFrame& frame = frame_of(direction);
   for (std::size_t row = 0; row < kEdge; ++row) {
     while (faces[row] != 0) {
@@ -112,6 +117,7 @@ void cut_faces(Layer& faces, Direction direction, bool is_u_in_word, int layer, 
       voxel[is_u_in_word ? frame.u : frame.v] = std::countr_zero(run);
       voxel[is_u_in_word ? frame.v : frame.u] = static_cast<int>(row);
       Quad quad;
+      QUOIN_ASSERT(along >= 0 && along < kChunkEdge && across >= 0 && across < kChunkEdge, "sizes of 6 bits");
       const auto put = [&](int value, int shift) { quad.bits |= static_cast<std::uint64_t>(value) << shift; };
       for (int axis = 0; axis < 3; ++axis) put(voxel[axis], 6 * axis);
       put(is_u_in_word ? along : across, Quad::kSizeUShift);
@@ -126,6 +132,7 @@ void cut_faces(Layer& faces, Direction direction, bool is_u_in_word, int layer, 
 class SolidLayers {
  public:
   SolidLayers(const SolidRows& rows, int axis) : rows_(rows), axis_(axis) {
+    QUOIN_ASSERT(axis >= 0 && axis < 3, "0 <= axis < 3");
     if (axis != 0) return;
     for (std::size_t z = 0; z < kEdge; ++z) {
       Layer slice;
@@ -136,6 +143,7 @@ class SolidLayers {
   }
   /// x: bit y of word z. y: bit x of word z. z: bit x of word y.
   [[nodiscard]] Layer at(std::size_t layer) const {
+    QUOIN_ASSERT(layer < kEdge, "0 <= layer < 64");
     if (axis_ == 0) return across_x_[layer];
     Layer words;
     for (std::size_t i = 0; i < kEdge; ++i) words[i] = axis_ == 1 ? rows_[i * kEdge + layer] : rows_[layer * kEdge + i];
