@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <bit>
 
+#include <quoin/core/assert.h>
+
 #include "trace/chunk_rows.h"
 
 namespace quoin::propagated {
@@ -46,6 +48,7 @@ void ChunkMasks::read_rows(const Chunk& voxels, const std::vector<TypeLight>& ty
 // Lamps of a row, each type once.
 void ChunkMasks::add_lamps(const Chunk& voxels, const std::vector<TypeLight>& types, int y, int z,
                            std::uint64_t where) {
+  QUOIN_ASSERT((y | z) >= 0 && (y | z) < kChunkEdge, "0 <= y, z < 64");
   while (where != 0) {
     const VoxelType type = voxels.get(std::countr_zero(where), y, z);
     const std::uint64_t alike = where & voxels.row_mask(y, z, type);
@@ -81,6 +84,7 @@ void ChunkMasks::read_lamps(const Chunk& voxels, const std::vector<TypeLight>& t
 
 void ChunkMasks::read(const Chunk* voxels, const std::vector<TypeLight>& types, const IBox& box,
                       const SlabSet& lamp_slabs) {
+  QUOIN_ASSERT(intersect(box, kWholeChunk) == box, "a box of the chunk");
   lamps_.clear();
   without_lamps_.fill(0);
   rows_of_.fill(0);

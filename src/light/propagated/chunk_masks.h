@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/grid/chunk.h>
 
 #include "light/propagated/light_chunk.h"
@@ -35,12 +36,19 @@ class ChunkMasks {
 
   /// Returns the rows of the box, [y + 64 z]; null if all are `uniform`.
   [[nodiscard]] const std::uint64_t* rows(std::size_t channel) const {
+    QUOIN_ASSERT(channel < kChannels, "one of the channels");
     const Rows& found = rows_[rows_of_[channel]];
     return found.is_uniform ? nullptr : found.words.data();
   }
-  [[nodiscard]] std::uint64_t uniform(std::size_t channel) const { return rows_[rows_of_[channel]].uniform; }
+  [[nodiscard]] std::uint64_t uniform(std::size_t channel) const {
+    QUOIN_ASSERT(channel < kChannels && rows(channel) == nullptr, "a channel with equal rows");
+    return rows_[rows_of_[channel]].uniform;
+  }
   /// Returns true if two channels have the same mask.
-  [[nodiscard]] bool are_alike(std::size_t a, std::size_t b) const { return rows_of_[a] == rows_of_[b]; }
+  [[nodiscard]] bool are_alike(std::size_t a, std::size_t b) const {
+    QUOIN_ASSERT(a < kChannels && b < kChannels, "two of the channels");
+    return rows_of_[a] == rows_of_[b];
+  }
   [[nodiscard]] std::span<const LampRow> lamps() const { return lamps_; }
   /// Slabs that were examined and contain no lamp.
   [[nodiscard]] const SlabSet& without_lamps() const { return without_lamps_; }

@@ -8,6 +8,7 @@ namespace quoin::propagated {
 
 void ChannelLight::take(ChannelChange change) {
   if (change.is_uniform) {
+    QUOIN_ASSERT(change.level < 1U << kPlanes && change.slabs.empty(), "one level for the chunk");
     slabs_.reset();
     level_ = change.level;
     return;

@@ -18,6 +18,7 @@ inline constexpr std::size_t kChannels = 4;  // sky, red, green, blue
 inline constexpr std::size_t kSlabs = 256;   // of a chunk
 
 [[nodiscard]] inline std::size_t slab_index(int y, int z) {
+  QUOIN_ASSERT((y | z) >= 0 && (y | z) < kChunkEdge, "0 <= y, z < 64");
   return static_cast<std::size_t>((z >> 2) * 16 + (y >> 2));
 }
 [[nodiscard]] inline std::size_t row_in_slab(int y, int z) {

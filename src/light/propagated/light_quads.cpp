@@ -19,7 +19,10 @@ struct QuadLight {
   int height = 0;
   std::vector<std::uint16_t> words;
 
-  [[nodiscard]] std::uint16_t at(int u, int v) const { return words[static_cast<std::size_t>(u + width * v)]; }
+  [[nodiscard]] std::uint16_t at(int u, int v) const {
+    QUOIN_ASSERT(u >= 0 && u < width && v >= 0 && v < height, "a face of the quad");
+    return words[static_cast<std::size_t>(u + width * v)];
+  }
   [[nodiscard]] bool is_uniform() const {
     return std::all_of(words.begin(), words.end(), [&](std::uint16_t word) { return word == words.front(); });
   }
@@ -106,6 +109,7 @@ void split_quads(const LightReader& reader, const QuadBuffer& quads, IVec3 chunk
       light.push_back(of_quad.at(u, v));
     });
   }
+  QUOIN_ASSERT(light.size() == out.size(), "one light per quad");
 }
 
 }  // namespace quoin::propagated

@@ -14,10 +14,12 @@ constexpr std::uint64_t kAll = ~std::uint64_t{0};
 }  // namespace
 
 LightSlab LightSlab::of(const SlabPlanes& planes, const SlabKinds& kinds) {
+  QUOIN_ASSERT((kinds.has_ones | kinds.has_zeros) == (1U << kPlanes) - 1, "each plane has ones or zeros");
   if ((kinds.has_ones & kinds.has_zeros) == 0) return LightSlab(kinds.has_ones);
   SlabUnitsRoom units;
   const SlabUnits form = kernel().pack_slab(planes.words.data(), units);
   const std::size_t count = form.first[kPlanes];
+  QUOIN_ASSERT(count <= 2 * kPlanes * kSlabWords, "two units per row and plane");
   auto* const made = new (::operator new(sizeof(Block) + count * sizeof(std::uint32_t))) Block(form);
   std::copy_n(units.begin(), count, made->units());
   LightSlab slab;
@@ -27,6 +29,7 @@ LightSlab LightSlab::of(const SlabPlanes& planes, const SlabKinds& kinds) {
 }
 
 RowPlanes LightSlab::row(std::size_t row) const {
+  QUOIN_ASSERT(row < kSlabWords, "one of the slab's rows");
   RowPlanes planes{};
   if (is_uniform()) {
     for (std::size_t i = 0; i < kPlanes; ++i) planes[i] = (level() >> i & 1U) != 0 ? kAll : 0;

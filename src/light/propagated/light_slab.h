@@ -20,9 +20,16 @@ using RowPlanes = std::array<std::uint64_t, kPlanes>;
 struct SlabPlanes {
   alignas(64) std::array<std::uint64_t, kPlanes * kSlabWords> words;
 
-  [[nodiscard]] std::uint64_t* plane(std::size_t i) { return words.data() + i * kSlabWords; }
-  [[nodiscard]] const std::uint64_t* plane(std::size_t i) const { return words.data() + i * kSlabWords; }
+  [[nodiscard]] std::uint64_t* plane(std::size_t i) {
+    QUOIN_ASSERT(i < kPlanes, "one of the planes");
+    return words.data() + i * kSlabWords;
+  }
+  [[nodiscard]] const std::uint64_t* plane(std::size_t i) const {
+    QUOIN_ASSERT(i < kPlanes, "one of the planes");
+    return words.data() + i * kSlabWords;
+  }
   [[nodiscard]] RowPlanes row(std::size_t row) const {
+    QUOIN_ASSERT(row < kSlabWords, "one of the slab's rows");
     RowPlanes planes;
     for (std::size_t i = 0; i < kPlanes; ++i) planes[i] = plane(i)[row];
     return planes;
@@ -62,6 +69,7 @@ class LightSlab {
     return static_cast<unsigned>(bits_ >> 1);
   }
   [[nodiscard]] unsigned at(std::size_t row, unsigned x) const {
+    QUOIN_ASSERT(x < 64, "0 <= x < 64");
     if (is_uniform()) return level();
     const RowPlanes planes = this->row(row);
     unsigned found = 0;

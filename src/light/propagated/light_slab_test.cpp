@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/death_for_tests.h"
 #include "core/instruction_sets_for_tests.h"
 
 namespace quoin::propagated {
@@ -149,6 +150,12 @@ TEST(LightSlabKernel, MergesAlikeWithEveryInstructionSet) {
       }
     }
   }
+}
+
+TEST(LightSlabDeathTest, RejectsLevelsAndRowsBeyondTheirRange) {
+  QUOIN_EXPECT_MISTAKE(LightSlab(16), "a level");
+  QUOIN_EXPECT_MISTAKE((void)LightSlab(3).row(kSlabWords), "one of the slab's rows");
+  QUOIN_EXPECT_MISTAKE((void)LightSlab(3).at(0, 64), "0 <= x < 64");
 }
 
 }  // namespace

@@ -14,6 +14,7 @@ constexpr std::uint64_t kAll = ~std::uint64_t{0};
 constexpr unsigned kBrightest = 15;
 
 std::uint64_t bits_between(int begin, int end) {
+  QUOIN_ASSERT(begin >= end || (begin >= 0 && end <= 64), "bits of a word");
   return begin >= end ? 0 : kAll >> (64 - (end - begin)) << begin;
 }
 
@@ -25,6 +26,7 @@ std::uint64_t equal_to(const RowPlanes& planes, unsigned level) {
 }
 
 unsigned level_at(const RowPlanes& planes, int x) {
+  QUOIN_ASSERT(x >= 0 && x < 64, "0 <= x < 64");
   unsigned level = 0;
   for (std::size_t i = 0; i < kPlanes; ++i) level |= static_cast<unsigned>(planes[i] >> x & 1U) << i;
   return level;
@@ -46,6 +48,7 @@ unsigned rows_of(const IBox& box, int y, int z) {
 
 // Adds the changed rows of a slab to a record. Rows inside the chunk are added together.
 void add_slab(int y, int z, const std::uint64_t* changed, VoxelRecord& record) {
+  QUOIN_ASSERT(((y | z) & ~(kChunkEdge - 4)) == 0, "multiples of 4 within the chunk");
   std::uint64_t any = 0;
   std::array<std::uint64_t, 4> by_y{};
   std::array<std::uint64_t, 4> by_z{};
@@ -97,6 +100,8 @@ bool LightSolver::fits(IVec3 size) {
 }
 
 void LightSolver::shape(const LightRegion::Box& box) {
+  QUOIN_ASSERT(fits(box.voxels.size()) && intersect(box.wanted, box.voxels) == box.wanted,
+               "a box that is not too large");
   box_ = box;
   size_ = box.voxels.max - box.voxels.min;
   origin_ = box.voxels.min - 1;
@@ -149,6 +154,10 @@ void LightSolver::for_each_part(const IBox& box, Visit&& visit) const {
 void LightSolver::add_word(std::size_t channel, unsigned level, int column, IVec3 at, std::uint64_t where) {
   if (where == 0) return;
   const IVec3 p = at - origin_;
+  QUOIN_ASSERT(channel < kChannels && level > 0 && level <= kBrightest, "a level of a channel");
+  QUOIN_ASSERT(column >= 0 && static_cast<std::size_t>(column) < columns_ && p.y >= 0 && p.y <= size_.y + 1 &&
+                   p.z >= 0 && p.z <= size_.z + 1,
+               "a word of the region or its rim");
   const std::size_t in_layer = static_cast<std::size_t>(column) * column_ + static_cast<std::size_t>(p.y);
   sources_[channel][level].push_back({static_cast<std::uint32_t>(static_cast<std::size_t>(p.z) * layer_ + in_layer),
                                       static_cast<std::uint16_t>(p.z),
@@ -306,6 +315,7 @@ bool LightSolver::has_sources(std::size_t channel) const {
 
 // Gives this level to voxels without a higher one. A voxel that blocks light has only one source.
 void LightSolver::light_up(const Source& source, unsigned level) {
+  QUOIN_ASSERT(source.at < pass_.size() && source.block < 64 && source.z < touched_.size(), "a word of the region");
   const std::uint64_t block = std::uint64_t{1} << source.block;
   const bool is_touched = (touched_[source.z] & block) != 0;
   const std::uint64_t dark = is_touched ? rest_[source.at] : pass_[source.at];
@@ -448,6 +458,7 @@ void LightSolver::read_slab(const Part& part, int y, int z, SlabPlanes& now) con
                 static_cast<unsigned>(part.shift & 63),
                 static_cast<std::size_t>(std::max(1 - p.z, 0)),
                 static_cast<std::size_t>(std::min(size_.z + 1 - p.z, 4))};
+  QUOIN_ASSERT(read.begin < read.end && read.end <= 4, "a slab with layers in the region");
   for (std::size_t plane = 0; plane < kPlanes; ++plane) read.planes[plane] = planes_[plane] + at;
   kernel().read_slab(read, now.words.data());
 }
@@ -499,7 +510,9 @@ void LightSolver::write(std::size_t channel, std::vector<ChunkLightChange>& chan
   const IVec3 size = chunk_of(region_->all.wanted.max - 1) + 1 - first;
   for_each_part(box_.wanted, [&](const Part& part) {
     const IVec3 p = part.chunk - first;
-    ChunkLightChange& change = changes[static_cast<std::size_t>(p.x + size.x * (p.y + size.y * p.z))];
+    const auto index = static_cast<std::size_t>(p.x + size.x * (p.y + size.y * p.z));
+    QUOIN_ASSERT(index < changes.size(), "a change per chunk with wanted voxels");
+    ChunkLightChange& change = changes[index];
     QUOIN_ASSERT(change.chunk == part.chunk, "changes are in the order of chunks");
     if (part.around->is_held) write_chunk(part, channel, change);
   });
@@ -535,6 +548,7 @@ void LightSolver::solve(const LightRegion::Box& box, unsigned channels, std::vec
 
 void LightSolver::solve(const LightRegion& region, std::vector<ChunkLightChange>& changes) {
   QUOIN_ASSERT(fits(region.all.voxels.size()), "a region that is not too large");
+  QUOIN_ASSERT(region.around.size() == region.index(region.chunks.max - 1) + 1, "a chunk for each index");
   region_ = &region;
   box_ = region.all;
   changes.clear();

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/grid/changes.h>
 
 #include "core/change_journal.h"
@@ -38,6 +39,7 @@ class LightStore {
     return entry == nullptr ? nullptr : &entry->light;
   }
   void take(ChunkLightChange change) {
+    QUOIN_ASSERT(!change.empty(), "a change of some voxels");
     journal_.begin_change();
     Entry& entry = entries_.find_or_create(change.chunk, [](auto&) {});
     for (std::size_t c = 0; c < kChannels; ++c) {

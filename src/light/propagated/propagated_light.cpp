@@ -12,6 +12,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/ref.h>
 
 #include "core/coordinates/chunk_order.h"
@@ -86,6 +87,7 @@ IBox around_all(const std::array<IBox, kChannels>& boxes) {
 }
 
 IBox grown(const IBox& box, int by) {
+  QUOIN_ASSERT(by >= 0, "a distance that is not negative");
   return {box.min - by, box.max + by};
 }
 
@@ -188,6 +190,7 @@ void PropagatedLight::Impl::change_domain(const Grid& grid, const std::vector<IV
 
 // Queues a box of voxels by chunks, limited to chunks of the domain.
 void PropagatedLight::Impl::add_chunks(const IBox& voxels) {
+  QUOIN_ASSERT(!voxels.empty(), "a box of voxels");
   const IVec3 first = chunk_of(voxels.min);
   const IVec3 last = chunk_of(voxels.max - 1);
   for (int z = first.z; z <= last.z; ++z) {
@@ -404,6 +407,7 @@ void PropagatedLight::Impl::solve_dirty(const Grid& grid, Threads threads) {
 // other are solved together, because they share surroundings.
 std::vector<LightRegion> PropagatedLight::Impl::next_layer() const {
   constexpr int kRun = 4;
+  QUOIN_ASSERT(!queue.empty(), "chunks that are to be solved");
   int highest = queue.begin()->first.y;
   for (const auto& [chunk, box] : queue) highest = std::max(highest, chunk.y);
   std::vector<LightRegion> regions;
@@ -499,6 +503,7 @@ void PropagatedLight::update(const Grid& grid, const VoxelRegistry& types, Threa
     changes.all ? me.begin_anew(grid) : me.take_over(grid, changes);
     me.solve_dirty(grid, threads);
     me.solve_queue(grid, threads);
+    QUOIN_ASSERT(me.dirty.empty() && me.queue.empty(), "no light is left to be solved");
   } catch (...) {
     me.followed_grid = {};
     throw;

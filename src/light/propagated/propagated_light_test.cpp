@@ -11,6 +11,7 @@
 
 #include <quoin/mesh/blocky.h>
 
+#include "core/death_for_tests.h"
 #include "core/instruction_sets_for_tests.h"
 #include "light/propagated/lamp_levels.h"
 
@@ -492,6 +493,11 @@ TEST(PropagatedLight, SnapshotsKeepTheirLightAndGoOnByThemselves) {
     EXPECT_TRUE(kept.changes_since(of_kept).empty());
     EXPECT_FALSE(light.changes_since(cursor).all);
   }
+}
+
+TEST(PropagatedLightDeathTest, RejectsLevelsThatDoNotFitFourBits) {
+  QUOIN_EXPECT_MISTAKE((void)packed({.sky = 16}), "levels from 0 to 15");
+  QUOIN_EXPECT_MISTAKE((void)packed({.blue = 200}), "levels from 0 to 15");
 }
 
 }  // namespace

@@ -8,6 +8,8 @@
 #include <immintrin.h>
 #endif
 
+#include <quoin/core/assert.h>
+
 #include "light/propagated/kernel/kernel.h"
 
 namespace quoin::propagated {
@@ -127,6 +129,7 @@ void spread_layers(const LevelPass& of) {
 }
 
 void spread(const LevelPass& step) {
+  QUOIN_ASSERT(step.level > 0 && step.level < 15 && step.layers >= 2, "a level below the highest, and two rims");
   step.layer == step.column ? spread_layers<false>(step) : spread_layers<true>(step);
 }
 
@@ -186,6 +189,7 @@ inline bool has_bits(const std::uint64_t* words, std::size_t count) {
 
 // Returns true if some wanted voxels stay dark in a layer with sky light.
 bool take_sky_of_layer(const LevelPass& step, std::size_t z) {
+  QUOIN_ASSERT(step.layer / kBlockRows <= 64 && step.layer % step.column == 0, "at most 64 blocks, in whole columns");
   Words shade{};
   std::uint64_t from_above = 0;
   std::uint64_t lit_blocks = 0;
@@ -232,6 +236,7 @@ bool take_sky(const LevelPass& of) {
 }
 
 std::uint64_t find_blocks(const std::uint64_t* words, std::size_t count) {
+  QUOIN_ASSERT(count <= 64, "a bit for each block");
   std::uint64_t blocks = 0;
   for (std::size_t block = 0; block < count; ++block) {
     Words all{};
@@ -327,6 +332,7 @@ void unpack(const std::uint64_t* planes, std::uint16_t* out) {
 
 void shift_in(const std::uint64_t* from, std::size_t count, std::uint64_t mask, unsigned shift, std::uint64_t* low,
               std::uint64_t* high) {
+  QUOIN_ASSERT(shift < 64, "a bit of a word");
   std::size_t i = 0;
   for (; i + kWidth <= count; i += kWidth) {
     const Words words = load(from + i) & (Words{} + mask);
@@ -340,6 +346,7 @@ void shift_in(const std::uint64_t* from, std::size_t count, std::uint64_t mask, 
 }
 
 void read_slab(const SlabRead& from, std::uint64_t* out) {
+  QUOIN_ASSERT(from.shift < 64 && from.end <= 4, "a bit of a word, layers of the slab");
   using Rows __attribute__((vector_size(32))) = std::uint64_t;
   const auto rows_at = [](const std::uint64_t* at) {
     Rows rows;

@@ -18,6 +18,8 @@
 #include <immintrin.h>
 #endif
 
+#include <quoin/core/assert.h>
+
 #include "light/propagated/kernel/kernel.h"
 
 namespace quoin::propagated {
@@ -206,6 +208,7 @@ SlabUnits pack_slab(const std::uint64_t* planes, SlabUnitsRoom& units) {
       last = rows;
     }
   }
+  QUOIN_ASSERT(next <= units.data() + 2 * kPlanes * kSlabWords, "two units per row and plane");
   made.first[kPlanes] = static_cast<std::uint8_t>(next - units.data());
   return made;
 }
@@ -240,6 +243,7 @@ inline std::uint64_t unit_of(std::uint32_t fresh, const std::uint32_t* units, st
 }
 
 void unpack_row(const SlabUnits& of, const std::uint32_t* units, std::size_t row, std::uint64_t* planes) {
+  QUOIN_ASSERT(row < kSlabWords, "one of the slab's rows");
   std::uint64_t above = 0;
   for (std::size_t plane = kPlanes; plane-- > 0;) {
     const std::uint32_t* own = units + of.first[plane];
