@@ -7,6 +7,7 @@
 
 #include <glm/geometric.hpp>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/direction.h>
 
 #include "light/surfaces.h"
@@ -47,6 +48,7 @@ struct Sum {
     is_used = true;
   }
   [[nodiscard]] EmissiveCell finished() const {
+    QUOIN_ASSERT(weight > 0.0 && is_used, "a cell with power");
     EmissiveCell done = cell;
     const DVec3 mean = first / weight;
     done.centre = DVec3(origin) + mean;

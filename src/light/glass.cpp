@@ -6,6 +6,8 @@
 
 #include <glm/geometric.hpp>
 
+#include <quoin/core/assert.h>
+
 #include "light/light_model.h"
 #include "trace/density/density_glass.h"
 #include "trace/walk.h"
@@ -36,7 +38,9 @@ class BodiesOfGrid {
         max_t_(max_t),
         length_(length),
         voxels_per_cell_(placed_.voxels_per_cell()),
-        out_(out) {}
+        out_(out) {
+    QUOIN_ASSERT(placed_.voxel_size > 0.0, "a positive voxel size");
+  }
 
   void add_voxels() {
     begin();
@@ -163,6 +167,7 @@ void find_glass(const SceneView& view, const Surfaces& surfaces, const Ray& ray_
   out.clear();
   const double length = glm::length(ray_in_view.direction);
   view.visit_transparent(ray_in_view, max_t, [&](std::int32_t index, const Ray& ray) {
+    QUOIN_ASSERT(static_cast<std::size_t>(index) < placed_in(view.tracer()).size(), "one of the placed grids");
     const PlacedGrid& placed = placed_in(view.tracer())[static_cast<std::size_t>(index)];
     BodiesOfGrid bodies(view, surfaces, index, ray, max_t, length, out);
     if (placed.transparent != nullptr) bodies.add_voxels();
@@ -182,6 +187,7 @@ GlassLook look_of(const Surface& surface, const GlassBody& body) {
 }
 
 bool lies_on_opaque(const SceneView& view, const Ray& ray_in_view, const GlassBody& body, double t) {
+  QUOIN_ASSERT(static_cast<std::size_t>(body.exit_placed) < placed_in(view.tracer()).size(), "a body in the view");
   const PlacedGrid& placed = placed_in(view.tracer())[static_cast<std::size_t>(body.exit_placed)];
   return t <= body.t_exit + kRayLift * placed.voxel_size / glm::length(ray_in_view.direction);
 }
@@ -190,6 +196,7 @@ DVec3 normal_entered(const SceneView& view, const Ray& ray_in_view, const GlassB
   if (!body.in_field) return DVec3(normal_of(body.face));
   const DVec3 point = view.grid_from_view(body.placed).point(ray_in_view.origin + ray_in_view.direction * body.t_enter);
   const PlacedGrid& placed = placed_in(view.tracer())[static_cast<std::size_t>(body.placed)];
+  QUOIN_ASSERT(placed.glass != nullptr, "a grid with transparent field parts");
   return glass_normal(*placed.glass, body.voxel, point, body.type, body.before);
 }
 
@@ -198,11 +205,14 @@ DVec3 normal_left(const SceneView& view, const Ray& ray_in_view, const GlassBody
   const DVec3 point =
       view.grid_from_view(body.exit_placed).point(ray_in_view.origin + ray_in_view.direction * body.t_exit);
   const PlacedGrid& placed = placed_in(view.tracer())[static_cast<std::size_t>(body.exit_placed)];
+  QUOIN_ASSERT(placed.glass != nullptr, "a grid with transparent field parts");
   return glass_normal(*placed.glass, IVec3(0), point, body.type, kAir);
 }
 
 Mirror mirror_at(const SceneView& view, const Ray& ray_in_view, std::int32_t placed, const DVec3& normal_in_grid,
                  float ior, float other_ior) {
+  QUOIN_ASSERT(ior > 0.0F && other_ior > 0.0F, "positive indices of refraction");
+  QUOIN_ASSERT(static_cast<std::size_t>(placed) < placed_in(view.tracer()).size(), "one of the placed grids");
   const glm::dmat3& axes = placed_in(view.tracer())[static_cast<std::size_t>(placed)].world_axes;
   const Vec3 normal(axes * normal_in_grid);
   const Vec3 direction(glm::normalize(ray_in_view.direction));

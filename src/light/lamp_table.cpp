@@ -10,6 +10,8 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include <quoin/core/assert.h>
+
 #include "core/coordinates/chunk_order.h"
 #include "trace/tree_view.h"
 
@@ -43,6 +45,7 @@ Vec3 capped(DVec3 power) {
 }
 
 PlacedLamp placed_cell(const EmissiveCell& cell, const LampPlace& place, double brightness) {
+  QUOIN_ASSERT(place.voxel_size > 0.0, "a positive voxel size");
   const double size = place.voxel_size;
   PlacedLamp lamp;
   lamp.position = place.position + place.axes * ((cell.centre - place.pivot) * size);
@@ -115,10 +118,13 @@ std::uint64_t bricks_of(const trace::TreeNodes& nodes, IVec3 chunk) {
 class ListMaker {
  public:
   ListMaker(const std::vector<PlacedLamp>& lamps, const std::vector<double>& power, int max_lamps)
-      : lamps_(&lamps), power_(&power), max_lamps_(static_cast<std::size_t>(max_lamps)) {}
+      : lamps_(&lamps), power_(&power), max_lamps_(static_cast<std::size_t>(max_lamps)) {
+    QUOIN_ASSERT(power.size() == lamps.size() && max_lamps >= 1, "the power of each lamp, and lists with room for one");
+  }
 
   // Adds some chunks of a placed grid.
   void add(const LampPlace& place, std::int32_t index, std::span<const IVec3> chunks) {
+    QUOIN_ASSERT(place.opaque != nullptr, "the tree of the grid's opaque voxels");
     const trace::TreeNodes opaque(*place.opaque);
     for (const IVec3 chunk : chunks) {
       const IVec3 corner = chunk * kChunkEdge;
@@ -180,6 +186,8 @@ void put_bricks(std::vector<ListMaker>& made, LampTable& table) {
     const auto first = static_cast<std::uint32_t>(table.lists.size());
     table.lists.insert(table.lists.end(), each.lists.begin(), each.lists.end());
     for (LampTable::Brick brick : each.bricks) {
+      QUOIN_ASSERT(brick.count != 0 && std::size_t{brick.first} + brick.count <= each.lists.size(),
+                   "lamps of its list");
       table.longest = std::max(table.longest, static_cast<int>(brick.count));
       brick.first += first;
       std::size_t slot = LampTable::slot_of(brick.brick, brick.placed) & mask;
@@ -271,6 +279,7 @@ LampRay lamp_ray(const PlacedLamp& lamp, DVec3 to_lamp, DVec3 normal) {
 }
 
 std::span<const std::uint32_t> LampTable::at(IVec3 brick, std::int32_t placed) const {
+  QUOIN_ASSERT(std::has_single_bit(bricks.size()), "a power of two");
   const std::size_t mask = bricks.size() - 1;
   for (std::size_t slot = slot_of(brick, placed) & mask; bricks[slot].count != 0; slot = (slot + 1) & mask) {
     const Brick& found = bricks[slot];

@@ -57,6 +57,7 @@ std::vector<std::uint32_t> Lighting::coherent_order(std::span<const SurfacePoint
   std::vector<std::uint32_t> begin(kFaces * grids.size() + 1);
   for (const std::uint32_t each : bucket) ++begin[each + 1];
   for (std::size_t i = 1; i < begin.size(); ++i) begin[i] += begin[i - 1];
+  QUOIN_ASSERT(begin.back() == points.size(), "each point in one bucket");
   std::vector<std::uint32_t> order(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) order[begin[bucket[i]]++] = static_cast<std::uint32_t>(i);
   return order;
@@ -170,10 +171,12 @@ std::int64_t Lighting::light(std::span<const SurfacePoint> points, std::span<Vec
 }
 
 double Lighting::voxels_per_cell(std::int32_t placed) const {
+  QUOIN_ASSERT(static_cast<std::size_t>(placed) < frames_.size(), "one of the placed grids");
   return frames_[static_cast<std::size_t>(placed)].voxels_per_cell;
 }
 
 std::int64_t Lighting::light_group(const Group& group, std::span<Vec3> colours) const {
+  QUOIN_ASSERT(group.size <= colours.size(), "a colour for every point");
   std::array<Vec3, RayPacket::kSize> direct{};
   std::array<float, RayPacket::kSize> openness{};
   std::int64_t rays = find_openness(group, openness);
@@ -193,7 +196,9 @@ namespace {
 class PlacedVoxels {
  public:
   PlacedVoxels(const GridLight& of, const VoxelRegistry& types)
-      : light_(*of.light), reader_(*of.voxels), types_(types) {}
+      : light_((QUOIN_ASSERT(of.light != nullptr && of.voxels != nullptr, "light of a grid"), *of.light)),
+        reader_(*of.voxels),
+        types_(types) {}
   [[nodiscard]] std::uint16_t word(IVec3 voxel) const { return packed(light_.at(voxel)); }
   [[nodiscard]] bool passes(IVec3 voxel) { return !types_.is_opaque(reader_.get(voxel)); }
 
@@ -322,7 +327,10 @@ std::int64_t Lighting::add_lamplight(const Group& group, std::span<Vec3> lamplig
       if (lists[i].data() == list.data()) lanes |= 1U << i;
     }
     left &= ~lanes;
-    for (const std::uint32_t lamp : list) rays += add_lamp(group, places, lamps_->lamps[lamp], lanes, lamplight);
+    for (const std::uint32_t lamp : list) {
+      QUOIN_ASSERT(lamp < lamps_->lamps.size(), "a lamp of the table");
+      rays += add_lamp(group, places, lamps_->lamps[lamp], lanes, lamplight);
+    }
   }
   return rays;
 }
@@ -411,6 +419,7 @@ float Lighting::smooth_openness(const SurfacePoint& point) const {
 }
 
 std::int64_t Lighting::trace_openness(const Group& group, std::uint32_t lanes, std::span<float> openness) const {
+  QUOIN_ASSERT((lanes & ~group.surfaces) == 0, "points of surfaces");
   std::array<int, RayPacket::kSize> open{};
   RayPacket rays = group.origins;
   rays.active = lanes;
@@ -431,6 +440,7 @@ std::int64_t Lighting::trace_openness(const Group& group, std::uint32_t lanes, s
 }
 
 void Lighting::set_occlusion_directions(const Group& group, int ray, RayPacket& rays) const {
+  QUOIN_ASSERT(ray >= 0 && ray < directions_.count(), "one of the occlusion rays");
   const auto number = static_cast<std::size_t>(ray);
   if (group.directions != nullptr && group.is_one_face) {
     const DVec3 direction = (*group.directions)[index_of(group.points[0]->face)][number];
@@ -452,6 +462,7 @@ void Lighting::set_occlusion_directions(const Group& group, int ray, RayPacket& 
 Surface Lighting::surface_at(const SurfacePoint& point) const {
   const bool is_bare = point.in_field && point.type == kAir;
   const auto placed = static_cast<std::size_t>(point.placed);
+  QUOIN_ASSERT(placed < frames_.size(), "one of the placed grids");
   if (!detail_surfaces_.empty() && !is_bare) return detail_surfaces_[placed];
   if (point.is_blended) {
     const DensityGrid& field = placed_in(view_->tracer())[placed].opaque_field->field();

@@ -5,6 +5,7 @@
 
 #include <glm/geometric.hpp>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/direction.h>
 
 namespace quoin {
@@ -31,6 +32,7 @@ Basis basis_of(std::size_t face) {
 }  // namespace
 
 OcclusionDirections::OcclusionDirections(int rays) : count_(rays), is_fixed_(rays == 6 || rays == 9) {
+  QUOIN_ASSERT(rays >= 1, "at least one ray");
   const double half = std::sqrt(0.5);
   const double third = std::sqrt(1.0 / 3.0);
   for (std::size_t face = 0; is_fixed_ && face < 6; ++face) {
@@ -55,6 +57,7 @@ OcclusionDirections::OcclusionDirections(int rays) : count_(rays), is_fixed_(ray
 
 // Multiples of the golden ratio, and of its likes in two dimensions, leave no large gaps, however many are taken.
 OcclusionDirections::Turn OcclusionDirections::turn_of(int sample, int rays) {
+  QUOIN_ASSERT(sample >= 0, "a sample of a pixel");
   if (rays != 9 || sample == 0) return {};
   const auto share_of = [&](double step) { return std::fmod(sample * step, 1.0); };
   constexpr double kPlastic = 1.32471795724474602596;
@@ -97,6 +100,7 @@ DVec3 turned_from_up(const DVec3& direction, const DVec3& normal) {
 
 DVec3 OcclusionDirections::spread(std::size_t face, int ray, std::uint32_t hash) const {
   QUOIN_ASSERT(!is_fixed_ && ray >= 0 && ray < count_, "a ray of those that are spread");
+  QUOIN_ASSERT(face < fixed_.size(), "one of the six faces");
   const Angle ring = ring_angles_[static_cast<std::size_t>(ray)];
   const Angle turn = turns_[hash % kTurns];
   const std::uint32_t rest = hash / kTurns;

@@ -28,6 +28,7 @@ class OcclusionDirections {
   /// Requires: `is_fixed`. `face`: a Direction.
   [[nodiscard]] DVec3 fixed(std::size_t face, int ray) const {
     QUOIN_ASSERT(is_fixed_ && ray >= 0 && ray < count_, "a ray of those that all pixels have");
+    QUOIN_ASSERT(face < fixed_.size(), "one of the six faces");
     return fixed_[face][static_cast<std::size_t>(ray)];
   }
   /// Requires: not `is_fixed`. `hash`: of the pixel.

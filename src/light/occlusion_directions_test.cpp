@@ -186,5 +186,12 @@ TEST(OcclusionDirectionsDeathTest, RaysOfTheOtherKindOrBeyondTheirNumberAreMista
   QUOIN_EXPECT_MISTAKE((void)fixed.fixed(0, 6), "ray < count_");
 }
 
+TEST(OcclusionDirectionsDeathTest, RejectsFacesAndNumbersThatDoNotExist) {
+  QUOIN_EXPECT_MISTAKE(OcclusionDirections(0), "at least one ray");
+  QUOIN_EXPECT_MISTAKE((void)OcclusionDirections(6).fixed(6, 0), "one of the six faces");
+  QUOIN_EXPECT_MISTAKE((void)OcclusionDirections(4).spread(6, 0, 1), "one of the six faces");
+  QUOIN_EXPECT_MISTAKE((void)OcclusionDirections::turn_of(-1, 9), "a sample of a pixel");
+}
+
 }  // namespace
 }  // namespace quoin

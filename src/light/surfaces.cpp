@@ -6,6 +6,8 @@
 #include <limits>
 #include <span>
 
+#include <quoin/core/assert.h>
+
 namespace quoin {
 
 std::optional<float> glass_ior(const VoxelProperties& properties) {
@@ -14,6 +16,7 @@ std::optional<float> glass_ior(const VoxelProperties& properties) {
 }
 
 void set_absorption(float alpha, Surface& surface) {
+  QUOIN_ASSERT(alpha >= 0.0F && alpha <= 1.0F, "0 <= alpha <= 1");
   // One voxel covers `alpha` of the background and tints the rest. The tint increases with `alpha`.
   surface.log_clarity = std::log(1.0F - alpha);
   for (int channel = 0; channel < 3; ++channel) {
@@ -96,6 +99,7 @@ class MaterialShares {
   void add(VoxelType material, float share) {
     std::size_t i = 0;
     while (i < count_ && shares_[i].material != material) ++i;
+    QUOIN_ASSERT(i < shares_.size(), "one material per sample");
     if (i == count_) shares_[count_++].material = material;
     shares_[i].share += share;
   }
@@ -140,6 +144,7 @@ bool Surfaces::update(const VoxelRegistry& types) {
   const TypeChanges changes = types.changes_since(now);
   followed_ = {};  // stays so when memory runs out
   const auto put = [&](std::size_t type) {
+    QUOIN_ASSERT(type + 1 < surfaces_.size(), "a registered type");
     surfaces_[type] = surface_of(types[static_cast<VoxelType>(type)], clouds_);
   };
   surfaces_.resize(types.size() + 1);

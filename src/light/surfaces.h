@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/changes.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/density_grid.h>
@@ -52,6 +53,7 @@ class Surfaces {
     return std::ranges::any_of(surfaces_, [](const Surface& each) { return each.scattering > 0.0F; });
   }
   [[nodiscard]] const Surface& operator[](VoxelType type) const {
+    QUOIN_ASSERT(!surfaces_.empty(), "an entry for unregistered types");
     return surfaces_[type < surfaces_.size() - 1 ? type : surfaces_.size() - 1];
   }
   /// Returns the surface of a field's material. kAir has no material and is white, as in smooth meshes.

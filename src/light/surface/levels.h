@@ -7,6 +7,7 @@
 #include <array>
 #include <cstdint>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/direction.h>
 #include <quoin/core/vec.h>
 #include <quoin/light/surface_light.h>
@@ -84,6 +85,7 @@ struct FacePlace {
 
   /// `inside`: in the cell, 0 to 1.
   FacePlace(IVec3 cell, Direction face, DVec3 inside, int level) : front(cell << level) {
+    QUOIN_ASSERT(level >= 0 && level < 31, "cells with an edge of 31 bits");
     const FaceFrame& frame = frame_of(face);
     const int edge = 1 << level;
     front[frame.axis] += frame.sign > 0 ? edge : -1;
@@ -129,6 +131,7 @@ struct VoxelsAround {
 
 /// Returns the voxels of the eight that are reachable from `one` through faces within `passing`.
 [[nodiscard]] constexpr std::uint32_t connected_of_eight(std::uint32_t one, std::uint32_t passing) {
+  QUOIN_ASSERT(passing < 256 && (one & ~passing) == 0, "some of the eight voxels");
   for (;;) {
     const std::uint32_t moved = (one & 0x55U) << 1 | (one & 0xAAU) >> 1 | (one & 0x33U) << 2 | (one & 0xCCU) >> 2 |
                                 (one & 0x0FU) << 4 | (one & 0xF0U) >> 4;

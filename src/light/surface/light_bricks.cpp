@@ -134,6 +134,7 @@ LightBricks::Found LightBricks::find(const OfGrid& of, LightRows& rows, IVec3 br
     const auto bits = static_cast<std::uint32_t>(of_row.passing >> x & 0xFFU);
     passing += static_cast<std::uint32_t>(std::popcount(bits));
     found.numbers[256 + row / 4] |= bits << 8 * (row % 4);
+    QUOIN_ASSERT(x + 8 <= of_row.words.size(), "a brick's part of a row");
     for (std::size_t i = 0; i < 8; ++i) {
       const std::uint16_t word = of_row.words[x + i];
       is_uniform &= word == first;
@@ -147,6 +148,7 @@ LightBricks::Found LightBricks::find(const OfGrid& of, LightRows& rows, IVec3 br
 }
 
 std::size_t LightBricks::find_slot(IVec3 brick, std::int32_t grid) const {
+  QUOIN_ASSERT(std::has_single_bit(bricks_.size()) && held_ < bricks_.size(), "a power of two, with a free slot");
   const std::size_t mask = bricks_.size() - 1;
   std::size_t slot = slot_of(brick, grid) & mask;
   while (bricks_[slot].is_held != 0 && (bricks_[slot].brick != brick || bricks_[slot].grid != grid)) {
@@ -166,6 +168,7 @@ void LightBricks::grow() {
 
 // Bricks that become opaque keep their slot, since others may come after it.
 void LightBricks::put(std::int32_t grid, Found found) {
+  QUOIN_ASSERT(grid >= 0 && static_cast<std::size_t>(grid) < grids_.size(), "one of the grids");
   std::size_t slot = find_slot(found.brick, grid);
   const bool has_numbers = !found.numbers.empty();
   if (bricks_[slot].is_held == 0) {
@@ -192,6 +195,7 @@ void LightBricks::put(std::int32_t grid, Found found) {
     free_.pop_back();
   }
   if (has_numbers) {
+    QUOIN_ASSERT(found.numbers.size() == kNumbers && what + kNumbers <= numbers_.size(), "room for a brick's numbers");
     std::copy(found.numbers.begin(), found.numbers.end(), numbers_.begin() + what);
     changed_.numbers.push_back(what);
   }

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/light/light_colour.h>
 #include <quoin/light/scene_light.h>
 #include <quoin/light/surface_light.h>
@@ -32,6 +33,7 @@ class VertexLights {
 
   // Vertices from `begin` on.
   void light(const MeshView& view, std::size_t begin, std::span<LinearRgba16> out) const {
+    QUOIN_ASSERT(begin + out.size() <= view.positions.size(), "vertices of the mesh");
     SurfaceLight surface(*of_.light, *of_.voxels, types_);
     view.has_albedo() ? light_smooth(surface, view, begin, out) : light_blocks(surface, view, begin, out);
   }
@@ -45,6 +47,8 @@ class VertexLights {
 
   // Four vertices are the corners of a quad.
   void light_blocks(SurfaceLight& surface, const MeshView& view, std::size_t begin, std::span<LinearRgba16> out) const {
+    QUOIN_ASSERT(view.types.size() == view.positions.size() && view.directions.size() == view.positions.size(),
+                 "a type and a direction for each vertex");
     for (std::size_t i = 0; i < out.size(); ++i) {
       const std::size_t vertex = begin + i;
       const std::size_t corner = vertex % 4;

@@ -62,6 +62,8 @@ class QuadCorners {
 
  private:
   [[nodiscard]] std::uint32_t corner(int u, int v) const {
+    QUOIN_ASSERT(u >= 0 && u <= width_ && static_cast<std::size_t>(u + (width_ + 1) * v) < corners_.size(),
+                 "a corner of the quad's faces");
     return corners_[static_cast<std::size_t>(u + (width_ + 1) * v)];
   }
 
@@ -91,6 +93,8 @@ struct SlopePiece {
 // front of the quad. If two voxels at a corner are in front of the quad, they are neighbours, and each gives the same
 // result.
 std::uint32_t corner_of_quad(const std::vector<FrontLight>& fronts, int width, int height, int u, int v) {
+  QUOIN_ASSERT(u >= 0 && u <= width && v >= 0 && v <= height, "a corner of the quad's faces");
+  QUOIN_ASSERT(fronts.size() == static_cast<std::size_t>((width + 2) * (height + 2)), "the voxels in front and around");
   const int own_u = std::min(u, width - 1) + 1;
   const int own_v = std::min(v, height - 1) + 1;
   const int other_u = own_u == u ? u + 1 : u;
@@ -136,6 +140,7 @@ void SurfaceLight::split(const QuadBuffer& quads, IVec3 chunk, LightMerging merg
       corners.push_back(of_quad.of_part(u, v, along_u, along_v));
     });
   }
+  QUOIN_ASSERT(corners.size() == out.size(), "the light of each quad");
 }
 
 void SurfaceLight::read(const SmoothSamples& places, std::span<MeanLevels> out) {
