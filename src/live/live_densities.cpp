@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include <quoin/core/assert.h>
 #include <quoin/grid/voxel_field.h>
 
 #include "core/coordinates/chunk_order.h"
@@ -83,7 +84,10 @@ LiveDensity::LiveDensity(GridSnapshot voxels, IVec3 chunk, std::shared_ptr<const
       voxels_(std::move(voxels)),
       base_(std::move(base)),
       changed_(changed),
-      types_(std::move(types)) {}
+      types_(std::move(types)) {
+  QUOIN_ASSERT(voxels_ != nullptr && types_ != nullptr, "voxels and their types");
+  QUOIN_ASSERT(base_ == nullptr || base_->is_made(), "a base that was made");
+}
 
 void LiveDensity::try_to_make() {
   if (is_made()) return;
@@ -128,6 +132,7 @@ void LiveDensity::make_locked() {
 }
 
 bool LiveDensity::reads_as(std::uint64_t stamp, int reach, IVec3 offset) const {
+  QUOIN_ASSERT(is_made(), "densities that were made");
   if (stamp == stamp_) return true;
   if (!has_base_ || base_stamp_ != stamp) return false;
   // Vertices take the materials of their cells' corners, which end one sample past the chunk. Solid of one body is air
@@ -138,6 +143,7 @@ bool LiveDensity::reads_as(std::uint64_t stamp, int reach, IVec3 offset) const {
 
 // Returns the differences between the edited chunks and their former states, as far as they are compared.
 std::vector<DensityCache::Change> DensityCache::changes_of(const Grid& grid, const GridChanges& edits) const {
+  QUOIN_ASSERT(edits.all || edits.items.empty() || seen_ != nullptr, "a grid that was followed before");
   std::vector<Change> changes;
   if (edits.all) {
     for (const IVec3 chunk : grid.chunks()) changes.push_back({chunk, everything()});
@@ -203,6 +209,7 @@ void DensityCache::invalidate(IVec3 chunk, bool solid, const IBox& changed) {
 }
 
 bool DensityCache::has_voxels_near(IVec3 chunk) const {
+  QUOIN_ASSERT(seen_ != nullptr, "a grid that was followed before");
   for (int i = 0; i < 27; ++i) {
     if (seen_->find_chunk(chunk + Neighbourhood::offset(i)) != nullptr) return true;
   }

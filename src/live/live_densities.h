@@ -9,6 +9,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/density_chunk.h>
 #include <quoin/grid/grid.h>
@@ -60,9 +61,15 @@ class LiveDensity {
   void make();
 
   /// Returns the densities; null if all is far air. Requires: is_made().
-  [[nodiscard]] const DensityChunk* densities() const { return densities_.get(); }
+  [[nodiscard]] const DensityChunk* densities() const {
+    QUOIN_ASSERT(is_made(), "densities that were made");
+    return densities_.get();
+  }
   /// Returns the densities of single bodies. Requires: is_made().
-  [[nodiscard]] BodyChunks& bodies() { return bodies_; }
+  [[nodiscard]] BodyChunks& bodies() {
+    QUOIN_ASSERT(is_made(), "densities that were made");
+    return bodies_;
+  }
   /// Returns true if a neighbour at `offset` that reads `reach` samples past its own reads the same densities here as
   /// in the state `stamp`. Returns false if that is unknown. Requires: is_made().
   [[nodiscard]] bool reads_as(std::uint64_t stamp, int reach, IVec3 offset) const;

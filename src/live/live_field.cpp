@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 #include "core/coordinates/chunk_order.h"
 
 namespace quoin {
@@ -32,6 +34,7 @@ bool is_there(const DensityGrid& field, IVec3 chunk) {
 
 // The signs of the samples of row y + 64 z; null is far air.
 std::uint64_t signs_of(const DensityChunk* samples, int row) {
+  QUOIN_ASSERT(row >= 0 && row < kChunkEdge * kChunkEdge, "a row of the chunk");
   return samples == nullptr ? 0 : samples->solid_row(row % kChunkEdge, row / kChunkEdge);
 }
 
@@ -168,6 +171,7 @@ void LiveField::mark(IVec3 chunk, bool is_bound, LiveClock::time_point now) {
 
 // Neighbours depend on each other's levels.
 void LiveField::set_level(IVec3 chunk, FieldChunk& state, int level, LiveClock::time_point now) {
+  QUOIN_ASSERT(level >= 0 && level <= kMaxSmoothLevel, "a level of detail");
   if (state.level == level) return;
   state.level = static_cast<std::uint8_t>(level);
   bool is_seen = !state.is_new();
@@ -334,6 +338,8 @@ std::shared_ptr<const FieldBodies> LiveField::bodies_around(const Members& membe
 }
 
 void LiveField::finish_chunk(FieldChunk& state, std::shared_ptr<const ChunkSurface> surface) {
+  QUOIN_ASSERT(state.group != nullptr && state.group->unfinished > 0 && !state.is_done,
+               "an unfinished chunk of a group");
   state.is_working = false;
   state.is_done = true;
   state.result = std::move(surface);
@@ -344,6 +350,7 @@ void LiveField::finish_chunk(FieldChunk& state, std::shared_ptr<const ChunkSurfa
 void LiveField::give(const Members& members) {
   for (const IVec3 chunk : members) {
     FieldChunk& state = chunks_.at(chunk);
+    QUOIN_ASSERT(state.group != nullptr && state.is_done, "a finished chunk of the group");
     {
       const Change change(totals_, state);
       state.group.reset();
@@ -361,6 +368,7 @@ void LiveField::give(const Members& members) {
 
 void LiveField::erase_if_over(IVec3 chunk) {
   const auto found = chunks_.find(chunk);
+  QUOIN_ASSERT(found != chunks_.end(), "a known chunk");
   const FieldChunk& state = found->second;
   if (state.is_gone && !state.is_pending() && !state.is_listed) chunks_.erase(found);
 }
@@ -406,6 +414,7 @@ void LiveField::make_ready(IVec3 chunk, FieldChunk& state) {
 }
 
 std::unique_ptr<LiveJob> LiveField::make_job(LiveInputs& inputs, IVec3 chunk) {
+  QUOIN_ASSERT(waiting_.contains(chunk), "a chunk that waits");
   if (chunks_.at(chunk).group == nullptr) {
     const Members members = members_with(chunk);
     const std::shared_ptr<Group> group = begin_group(members);
@@ -429,6 +438,7 @@ std::unique_ptr<LiveJob> LiveField::make_job(LiveInputs& inputs, IVec3 chunk) {
 
 void LiveField::hand_over(IVec3 chunk, std::uint64_t serial) {
   FieldChunk& state = chunks_.at(chunk);
+  QUOIN_ASSERT(state.group != nullptr && !state.is_working, "a chunk whose group has begun");
   waiting_.erase(chunk);
   state.is_working = true;
   state.serial = serial;

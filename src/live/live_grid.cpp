@@ -218,6 +218,7 @@ void LiveGrid::make_ready(IVec3 chunk, LiveChunk& state) {
 }
 
 std::unique_ptr<LiveJob> LiveGrid::make_job(LiveInputs& inputs, IVec3 chunk) {
+  QUOIN_ASSERT(waiting_.contains(chunk), "a chunk that waits");
   // Smooth jobs have that of their densities.
   if (options_.style == SurfaceStyle::Smooth) return make_job(GridSnapshot(), chunk, *inputs.types);
   return make_job(inputs.voxels(), chunk, *inputs.types, inputs.light());
@@ -225,6 +226,7 @@ std::unique_ptr<LiveJob> LiveGrid::make_job(LiveInputs& inputs, IVec3 chunk) {
 
 std::unique_ptr<LiveJob> LiveGrid::make_job(const GridSnapshot& grid, IVec3 chunk, const LiveTypes& types,
                                             const LightSnapshot& light) {
+  QUOIN_ASSERT(types.registry != nullptr, "types to mesh with");
   const LiveChunk& state = chunks_.at(chunk);
   auto job = std::make_unique<LiveJob>();
   job->source = {handle_, SurfaceContent::Voxels};

@@ -60,6 +60,7 @@ struct LiveLight::Impl {
 
 Workers::Clock::time_point LiveLight::Impl::step(Workers::Lock& lock) {
   if (asked == nullptr) return Workers::kWhenWoken;
+  QUOIN_ASSERT(is_busy, "a request in progress");
   std::shared_ptr<const Scene> scene = std::exchange(asked, nullptr);
   lock.unlock();
   std::unique_ptr<LitScene> done;
@@ -127,6 +128,7 @@ void LiveLight::update(const Scene& scene) {
   auto snapshot = std::make_shared<const Scene>(scene.snapshot());
   {
     const std::lock_guard lock(me.mutex);
+    QUOIN_ASSERT(me.asked == nullptr && !me.is_busy, "one request at a time");
     me.asked = std::move(snapshot);
     me.is_busy = true;
     me.is_behind = false;

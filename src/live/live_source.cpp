@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include <quoin/core/assert.h>
 #include <quoin/grid/chunk.h>
 
 #include "scene/instance_axes.h"
@@ -14,6 +15,7 @@ namespace quoin {
 namespace {
 
 double distance_to_chunks(DVec3 point, const IBox& chunks) {
+  QUOIN_ASSERT(!chunks.empty(), "a box of chunks");
   const DVec3 first = DVec3(chunks.min) * double{kChunkEdge};
   const DVec3 last = DVec3(chunks.max) * double{kChunkEdge};
   const double distance = glm::length(point - glm::clamp(point, first, last));
@@ -23,6 +25,7 @@ double distance_to_chunks(DVec3 point, const IBox& chunks) {
 }  // namespace
 
 void ChunkDistances::add(const Instance& instance, const SceneGrid& grid) {
+  QUOIN_ASSERT(has_valid_transform(instance), "an instance with a finite transform");
   for (const DVec3 eye : eyes_) {
     Place place;
     place.voxel_size = instance.voxel_size;

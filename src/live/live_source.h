@@ -72,6 +72,7 @@ class LiveChange {
   ~LiveChange() {
     totals_.unfinished += state_.is_unfinished() ? 1 : 0;
     totals_.pending += state_.is_pending() ? 1 : 0;
+    QUOIN_ASSERT(totals_.pending >= totals_.unfinished, "unfinished chunks are pending");
   }
 
  private:
@@ -109,6 +110,7 @@ class LiveInputs {
   /// Returns the light; null if no light is used.
   [[nodiscard]] const LightSnapshot& light() {
     if (lit_ == nullptr && light_.light != nullptr) {
+      QUOIN_ASSERT(light_.voxels != nullptr, "light with its voxels");
       lit_ = std::make_shared<const LitVoxels>(LitVoxels{light_.light->snapshot(), light_.voxels->snapshot()});
     }
     return lit_;

@@ -3,6 +3,8 @@
 #include <span>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 #include "core/rows/content_hash.h"
 #include "live/mesh_job_queue.h"
 #include "mesh/surface/bodies.h"
@@ -22,6 +24,7 @@ void append(const Buffer<T>& from, Buffer<T>& to) {
 // Bounds along one axis of a quad of `size` voxels from `first` on, cut at multiples of `edge`.
 template <class Visit>
 void cut(int first, int size, int edge, Visit&& visit) {
+  QUOIN_ASSERT(first >= 0 && size > 0 && edge > 0, "voxels from 0 on, and regions with an edge");
   for (int at = first; at < first + size;) {
     const int end = std::min(first + size, (at / edge + 1) * edge);
     visit(at, end - at);
@@ -49,6 +52,7 @@ std::uint64_t hash_of(const SurfaceRegion& region, const ChunkSurface& surface) 
   const std::span<const FaceLight> light(surface.light);
   std::array<std::uint64_t, 4> lanes = {1, 2, 3, 4};
   for (const auto& range : {region.opaque, region.transparent}) {
+    QUOIN_ASSERT(range[0] <= range[6] && range[6] <= quads.size(), "quads of the surface");
     const std::uint32_t count = range[6] - range[0];
     lanes[0] = mixed_with(lanes[0], count);
     mix_into(lanes, quads.subspan(range[0], count));
@@ -61,6 +65,7 @@ std::uint64_t hash_of(const SurfaceRegion& region, const ChunkSurface& surface) 
 
 // Returns the start of each direction's quads, beginning at `first`, and the end of all. Quads are sorted by direction.
 std::array<std::uint32_t, 7> directions_of(const QuadBuffer& quads, std::size_t first, std::size_t end) {
+  QUOIN_ASSERT(first <= end && end <= quads.size(), "quads of the buffer");
   std::array<std::uint32_t, 7> range{};
   auto at = quads.begin() + static_cast<std::ptrdiff_t>(first);
   const auto last = quads.begin() + static_cast<std::ptrdiff_t>(end);
@@ -97,6 +102,7 @@ void sort_into_one(const LitQuads& lit, const VoxelRegistry& types, ChunkSurface
       opaque += is_transparent ? 0 : 1;
       end -= is_transparent ? 1 : 0;
     }
+    QUOIN_ASSERT(opaque == end, "each quad has one place");
     const auto first = static_cast<std::ptrdiff_t>(opaque);
     std::reverse(surface.quads.begin() + first, surface.quads.end());
     if (!lit.light.empty()) std::reverse(surface.light.begin() + first, surface.light.end());
@@ -124,6 +130,7 @@ void sort_into_many(const LitQuads& lit, const VoxelRegistry& types, int edge, C
   std::vector<std::uint32_t> first(12 * regions + 1);
   for (const Quad quad : quads) ++first[place_of(quad) + 1];
   for (std::size_t i = 1; i < first.size(); ++i) first[i] += first[i - 1];
+  QUOIN_ASSERT(first.back() == quads.size(), "each quad has one place");
   for (std::size_t i = 0; i < regions; ++i) {
     const auto opaque = first.begin() + static_cast<std::ptrdiff_t>(6 * i);
     const auto transparent = opaque + static_cast<std::ptrdiff_t>(6 * regions);
@@ -146,6 +153,7 @@ void sort_into_many(const LitQuads& lit, const VoxelRegistry& types, int edge, C
 
 // Returns the quads in the order of ChunkSurface.
 void sort_into_regions(const LitQuads& lit, const VoxelRegistry& types, int edge, ChunkSurface& surface) {
+  QUOIN_ASSERT(lit.light.empty() || lit.light.size() == lit.quads.size(), "the light of each quad, or none");
   if (edge == kChunkEdge) {
     sort_into_one(lit, types, surface);
   } else {
@@ -156,6 +164,7 @@ void sort_into_regions(const LitQuads& lit, const VoxelRegistry& types, int edge
 
 // Splits quads whose faces differ in light.
 LitQuads lit_by(const LiveJob& job, const QuadBuffer& quads, LightMerging merging, LiveWorkspace& workspace) {
+  QUOIN_ASSERT(job.light != nullptr && job.types != nullptr, "a job with light and types");
   if (workspace.lit != job.light || workspace.lit_types != job.types) {
     workspace.surface_light.reset();
     workspace.lit = job.light;
@@ -180,6 +189,7 @@ void cut_at_regions(const QuadBuffer& quads, int edge, QuadBuffer& out) {
 }
 
 void make_blocky(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& workspace) {
+  QUOIN_ASSERT(job.voxels != nullptr, "a job with voxels");
   if (!workspace.blocky) workspace.blocky.emplace();
   QuadOptions wanted;
   wanted.merge = options.merge;
@@ -267,6 +277,7 @@ DensityNeighbourhood make_densities(const LiveDensities& densities) {
 // Adds the surface of one body. `whole`: as in smooth::Shape.
 void mesh_body(const LiveMeshOptions& options, const DensityNeighbourhood& chunks, const DensityNeighbourhood* whole,
                const LiveJob& job, LiveWorkspace& workspace, ChunkSurface& surface) {
+  QUOIN_ASSERT(job.materials != nullptr, "a job with materials");
   if (!workspace.smooth) workspace.smooth.emplace();
   SmoothOptions wanted;
   wanted.occlusion = options.occlusion;
@@ -293,6 +304,10 @@ void mesh_body(const LiveMeshOptions& options, const DensityNeighbourhood& chunk
 
 void finish(std::shared_ptr<ChunkSurface> surface, LiveJob& job) {
   if (surface->smooth.indices.empty()) return;
+  QUOIN_ASSERT(surface->albedo.size() == surface->smooth.positions.size() &&
+                   surface->types.size() == surface->smooth.positions.size(),
+               "a colour and a type for each vertex");
+  QUOIN_ASSERT(surface->glass_indices <= surface->smooth.indices.size(), "indices of the surface");
   surface->style = SurfaceStyle::Smooth;
   surface->level = job.levels[13];
   job.surface = std::move(surface);
@@ -365,9 +380,11 @@ void make_smooth(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& wo
 
 // Fields have no `last_stamps`: chunks with unchanged densities are not meshed.
 void make_field(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& workspace) {
+  QUOIN_ASSERT(job.field != nullptr, "a job with a field");
   const DensityNeighbourhood chunks = job.field->neighbourhood(job.chunk);
   make_bodies(options, chunks, job, workspace, [&](std::size_t i, std::uint32_t body) {
     const IVec3 at = job.chunk + Neighbourhood::offset(static_cast<int>(i));
+    QUOIN_ASSERT(job.bodies != nullptr, "a job with the bodies of the field");
     return job.bodies->at(at)->of(chunks.chunks[i], *job.types, body);
   });
 }
@@ -375,6 +392,7 @@ void make_field(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& wor
 }  // namespace
 
 void make_live_surface(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& workspace) {
+  QUOIN_ASSERT(job.types != nullptr, "a job with types");
   job.outcome = LiveJob::Outcome::Meshed;
   if (job.source.content == SurfaceContent::Field) {
     make_field(options, job, workspace);

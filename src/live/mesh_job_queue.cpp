@@ -1,6 +1,7 @@
 #include "live/mesh_job_queue.h"
 
 #include <algorithm>
+#include <cmath>
 #include <new>
 #include <utility>
 
@@ -25,10 +26,12 @@ void drop_inputs(LiveJob& job) {
 
 MeshJobQueue::MeshJobQueue(unsigned workers, Work work, std::function<void()> on_ready)
     : work_(std::move(work)), on_ready_(std::move(on_ready)), workspaces_(workers) {
+  QUOIN_ASSERT(workers > 0 && work_ != nullptr, "workers with a function");
   workers_.start(workers, [this](Workers::Lock& lock, unsigned worker) { return step(lock, workspaces_[worker]); });
 }
 
 void MeshJobQueue::push(std::unique_ptr<LiveJob> job) {
+  QUOIN_ASSERT(job != nullptr && !std::isnan(job->distance), "a job with a distance");
   {
     const std::lock_guard lock(mutex_);
     const std::size_t wanted = done_.size() + queue_.size() + running_ + 1;

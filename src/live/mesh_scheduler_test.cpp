@@ -1,12 +1,16 @@
 #include "live/mesh_scheduler.h"
 
 #include <condition_variable>
+#include <memory>
 #include <mutex>
 #include <new>
 
 #include <gtest/gtest.h>
 
+#include "core/death_for_tests.h"
 #include "grid/chunk/chunk_storage.h"
+#include "live/live_densities.h"
+#include "live/live_source.h"
 #include "live/live_test_support.h"
 
 namespace quoin {
@@ -357,6 +361,26 @@ TEST(MeshScheduler, EndsWithoutMeshingWhatWaits) {
   }
   EXPECT_EQ(started, ended);
   EXPECT_LT(started, 60);
+}
+
+TEST(MeshJobQueueDeathTest, RejectsQueuesWithoutWorkersAndMissingJobs) {
+  const MeshJobQueue::Work work = [](LiveJob&, LiveWorkspace&) {};
+  QUOIN_EXPECT_MISTAKE(MeshJobQueue(0, work, {}), "workers with a function");
+  QUOIN_EXPECT_MISTAKE(MeshJobQueue(1, {}, {}), "workers with a function");
+  QUOIN_EXPECT_MISTAKE(MeshJobQueue(1, work, {}).push(nullptr), "a job with a distance");
+}
+
+TEST(LiveDensityDeathTest, RejectsReadingBeforeDensitiesAreMade) {
+  LiveDensity density(std::make_shared<const Grid>(), {}, nullptr, {}, std::make_shared<const VoxelRegistry>());
+  QUOIN_EXPECT_MISTAKE((void)density.densities(), "densities that were made");
+  QUOIN_EXPECT_MISTAKE((void)density.reads_as(1, 1, {}), "densities that were made");
+}
+
+TEST(ChunkDistancesDeathTest, RejectsInstancesWithoutAPlace) {
+  ChunkDistances distances({}, {});
+  Instance instance;
+  instance.voxel_size = 0.0;
+  QUOIN_EXPECT_MISTAKE(distances.add(instance, SceneGrid()), "an instance with a finite transform");
 }
 
 }  // namespace
