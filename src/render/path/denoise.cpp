@@ -7,6 +7,8 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include <quoin/core/assert.h>
+
 #include "render/path/numbers/path_math.h"
 
 namespace quoin::path {
@@ -66,6 +68,7 @@ class Denoiser {
 
  private:
   [[nodiscard]] std::size_t index(int x, int y) const {
+    QUOIN_ASSERT(x >= 0 && x < width_ && y >= 0 && y < height_, "a pixel of the image");
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
   }
 
@@ -158,6 +161,10 @@ class Denoiser {
 }  // namespace
 
 void denoise(const SurfaceParts& parts, int samples, Threads threads, PathImage& image) {
+  QUOIN_ASSERT(
+      image.width == parts.width() && image.height == parts.height() && image.radiance.size() == image.scene.size(),
+      "the parts of this image");
+  QUOIN_ASSERT(samples > 0, "at least one sample");
   Denoiser denoiser(parts, threads);
   denoiser.smooth();
   const auto count = static_cast<float>(samples);

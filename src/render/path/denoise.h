@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/parallel.h>
 #include <quoin/core/vec.h>
 #include <quoin/render/path_tracer.h>
@@ -35,8 +36,14 @@ class SurfaceParts {
   SurfaceParts(int width, int height)
       : width_(width), height_(height), pixels_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {}
 
-  [[nodiscard]] OfPixel& at(std::size_t pixel) { return pixels_[pixel]; }
-  [[nodiscard]] const OfPixel& at(std::size_t pixel) const { return pixels_[pixel]; }
+  [[nodiscard]] OfPixel& at(std::size_t pixel) {
+    QUOIN_ASSERT(pixel < pixels_.size(), "a pixel of the image");
+    return pixels_[pixel];
+  }
+  [[nodiscard]] const OfPixel& at(std::size_t pixel) const {
+    QUOIN_ASSERT(pixel < pixels_.size(), "a pixel of the image");
+    return pixels_[pixel];
+  }
   [[nodiscard]] int width() const { return width_; }
   [[nodiscard]] int height() const { return height_; }
 

@@ -13,9 +13,11 @@ constexpr float kLeastShare = 1e-3F;  // of the mean: also samples black pixels,
 
 // Computes cumulative sums of weights, normalised to 1.
 void accumulate(std::span<const float> weights, std::span<float> sums) {
+  QUOIN_ASSERT(sums.size() == weights.size() + 1, "one more sum than weights");
   double sum = 0.0;
   sums[0] = 0.0F;
   for (const float weight : weights) sum += static_cast<double>(weight);
+  QUOIN_ASSERT(sum > 0.0, "a positive sum of weights");
   double so_far = 0.0;
   for (std::size_t i = 0; i < weights.size(); ++i) {
     so_far += static_cast<double>(weights[i]);
@@ -30,6 +32,7 @@ struct Found {
 };
 
 Found find(std::span<const float> sums, float u) {
+  QUOIN_ASSERT(sums.size() >= 2, "the sums of at least one weight");
   const auto above = std::upper_bound(sums.begin() + 1, sums.end() - 1, u);
   const auto index = static_cast<std::size_t>(above - sums.begin()) - 1;
   const float width = sums[index + 1] - sums[index];
@@ -40,6 +43,9 @@ Found find(std::span<const float> sums, float u) {
 
 EnvironmentLight::EnvironmentLight(RadianceImage image) : image_(std::move(image)) {
   QUOIN_ASSERT(image_.width > 0 && image_.height > 0, "at least one pixel");
+  QUOIN_ASSERT(
+      image_.rgb.size() == 3 * static_cast<std::size_t>(image_.width) * static_cast<std::size_t>(image_.height),
+      "three values per pixel");
   for (float& value : image_.rgb) value = value > 0.0F && std::isfinite(value) ? std::min(value, 1e30F) : 0.0F;
   const auto width = static_cast<std::size_t>(image_.width);
   const auto height = static_cast<std::size_t>(image_.height);
@@ -68,6 +74,7 @@ EnvironmentLight::EnvironmentLight(RadianceImage image) : image_(std::move(image
 }
 
 Vec3 EnvironmentLight::pixel(int x, int y) const {
+  QUOIN_ASSERT(x >= 0 && x < image_.width && y >= 0 && y < image_.height, "a pixel of the image");
   const float* const rgb = &image_.rgb[3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(image_.width) +
                                             static_cast<std::size_t>(x))];
   return {rgb[0], rgb[1], rgb[2]};
@@ -97,6 +104,7 @@ Vec3 EnvironmentLight::at(Vec3 direction) const {
 }
 
 float EnvironmentLight::density_at(int x, int y, float sine) const {
+  QUOIN_ASSERT(x >= 0 && x < image_.width && y >= 0 && y < image_.height, "a pixel of the image");
   const auto row = static_cast<std::size_t>(y);
   const float* const sums = &columns_[row * (static_cast<std::size_t>(image_.width) + 1) + static_cast<std::size_t>(x)];
   const float share = (rows_[row + 1] - rows_[row]) * (sums[1] - sums[0]);

@@ -116,6 +116,7 @@ Status check(const Camera& camera, const PathOptions& options) {
 }
 
 PathImage empty_image(const PathOptions& options) {
+  QUOIN_ASSERT(options.width > 0 && options.height > 0, "a positive image size");
   const auto pixels = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
   PathImage image;
   image.width = options.width;
@@ -133,6 +134,7 @@ PathImage empty_image(const PathOptions& options) {
 }
 
 void PixelSums::write_to(PathImage& image, std::size_t pixel, int samples) const {
+  QUOIN_ASSERT(pixel < image.radiance.size() && samples > 0, "a pixel of the image, with samples");
   const auto count = static_cast<float>(samples);
   Vec3 passed(1.0F);
   for (int channel = 0; channel < 3; ++channel) {

@@ -11,6 +11,8 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include <quoin/core/assert.h>
+
 #include "light/light_model.h"
 #include "light/occlusion_directions.h"
 #include "render/on_face.h"
@@ -30,7 +32,10 @@ constexpr float kMostLikely = 0.95F;  // maximum probability to continue
 template <class Key, class Put>
 void sort_by_key(std::size_t count, std::size_t keys, std::vector<std::uint32_t>& starts, Key&& key, Put&& put) {
   starts.assign(keys + 1, 0);
-  for (std::size_t i = 0; i < count; ++i) ++starts[key(i) + 1];
+  for (std::size_t i = 0; i < count; ++i) {
+    QUOIN_ASSERT(key(i) < keys, "a key below the number of keys");
+    ++starts[key(i) + 1];
+  }
   for (std::size_t i = 1; i < starts.size(); ++i) starts[i] += starts[i - 1];
   for (std::size_t i = 0; i < count; ++i) put(starts[key(i)]++, static_cast<std::uint32_t>(i));
 }
@@ -96,6 +101,11 @@ PathTile::PathTile(const TileContext& context, int column, int row)
       light_(light_of(*context.sky, *context.lamps)),
       pixels_(kPixels),
       sums_(kPixels) {
+  QUOIN_ASSERT(column >= 0 && row >= 0, "a pixel of the image");
+  QUOIN_ASSERT(context.face_normals->size() == context.placed.size(), "normals of each placed grid");
+  QUOIN_ASSERT(context.parts == nullptr || (context.parts->width() == context.options->width &&
+                                            context.parts->height() == context.options->height),
+               "parts of the image's size");
   for (std::size_t i = 0; i < kPixels; ++i) {
     const std::uint32_t place = hash_of(static_cast<std::uint32_t>(column + static_cast<int>(i) % kEdge),
                                         static_cast<std::uint32_t>(row + static_cast<int>(i) / kEdge));
@@ -189,6 +199,7 @@ Pair PathTile::on_lens(Pair u) const {
 }
 
 void PathTile::begin_path(std::size_t pixel, Pair jitter, int sample) {
+  QUOIN_ASSERT(pixel < kPixels && sample >= 0, "a sample of a pixel of the tile");
   const PathOptions& options = *context_->options;
   const CameraRays& rays = *context_->rays;
   const Camera& camera = *context_->camera;
@@ -239,6 +250,7 @@ void PathTile::meet() {
 }
 
 void PathTile::meet_packet(std::span<const std::uint32_t> indices) {
+  QUOIN_ASSERT(!indices.empty() && indices.size() <= RayPacket::kSize, "1 to 16 paths");
   // Reused: clearing a packet takes longer than filling it.
   RayPacket& rays = packet_;
   SceneHits& hits = hits_;
@@ -362,6 +374,7 @@ void PathTile::note_layers(Path& path, const Vertex& vertex, double t, VoxelType
 }
 
 SurfacePart& PathTile::part_of(const Path& path) {
+  QUOIN_ASSERT(context_->parts != nullptr && path.part < SurfaceParts::kOfPixel, "a path with a part");
   const auto x = static_cast<std::size_t>(column_ + path.pixel % kEdge);
   const auto y = static_cast<std::size_t>(row_ + path.pixel / kEdge);
   return context_->parts->at(y * static_cast<std::size_t>(context_->options->width) + x)[path.part];
@@ -390,6 +403,8 @@ void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const Scen
   Vertex& vertex = vertices_.emplace_back();  // filled in place
   vertex.path = index;
   vertex.placed = hits.placed[i];
+  QUOIN_ASSERT(vertex.placed >= 0 && static_cast<std::size_t>(vertex.placed) < context_->placed.size(),
+               "a hit on one of the placed grids");
   const PlacedGrid& placed = context_->placed[static_cast<std::size_t>(vertex.placed)];
   const IVec3 voxel{hits.grids.x[i], hits.grids.y[i], hits.grids.z[i]};
   const Direction face = hits.grids.face[i];
@@ -436,6 +451,7 @@ void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const Scen
 }
 
 void PathTile::hit_ground(std::uint32_t index, double t) {
+  QUOIN_ASSERT(context_->options->ground.has_value(), "a scene with ground");
   Path& path = paths_[index];
   const GroundPlane& ground = *context_->options->ground;
   if (path.is_first && ground.fade > 0.0) {
@@ -519,6 +535,7 @@ void PathTile::shade_all() {
 }
 
 void PathTile::put_into_block(const Vertex& vertex, std::size_t lane) {
+  QUOIN_ASSERT(lane < kBlockPoints && vertex.path < paths_.size(), "a lane, and the vertex of a path");
   const Path& path = paths_[vertex.path];
   block_.pixel[lane] = path.random.pixel();
   block_.sample[lane] = path.random.sample();
@@ -676,7 +693,9 @@ void PathTile::trace_requests() {
 }
 
 void PathTile::trace_request_packet(std::span<const std::uint32_t> requests) {
+  QUOIN_ASSERT(!requests.empty() && requests.size() <= RayPacket::kSize, "1 to 16 requests");
   const std::int32_t home = requests_[requests.front()].home;
+  QUOIN_ASSERT(home >= 0 && static_cast<std::size_t>(home) < context_->placed.size(), "one of the placed grids");
   const PlacedGrid& placed = context_->placed[static_cast<std::size_t>(home)];
   RayPacket rays;
   for (std::size_t i = 0; i < requests.size(); ++i) {
@@ -716,6 +735,7 @@ std::int64_t PathTile::pixels_hit() const {
 }
 
 void PathTile::write_to(PathImage& image) const {
+  QUOIN_ASSERT(column_ < image.width && row_ < image.height, "a tile of the image");
   for (int y = 0; y < std::min(kEdge, image.height - row_); ++y) {
     for (int x = 0; x < std::min(kEdge, image.width - column_); ++x) {
       const std::size_t to = static_cast<std::size_t>(row_ + y) * static_cast<std::size_t>(image.width) +

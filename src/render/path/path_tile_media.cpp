@@ -7,6 +7,8 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include <quoin/core/assert.h>
+
 #include "light/light_model.h"
 #include "light/occlusion_directions.h"
 #include "render/on_face.h"
@@ -27,6 +29,7 @@ struct Refraction {
 };
 
 Refraction refraction(float cosine, float eta) {
+  QUOIN_ASSERT(cosine > 0.0F && eta > 0.0F, "a positive cosine and index");
   const float sine2 = eta * eta * std::max(0.0F, 1.0F - cosine * cosine);
   if (sine2 >= 1.0F) return {};
   const float inner = std::sqrt(1.0F - sine2);
@@ -102,6 +105,7 @@ void PathTile::scatter_in(std::uint32_t index, const GlassBody& body, float u) {
 }
 
 bool PathTile::enter_glass(std::uint32_t index) {
+  QUOIN_ASSERT(!glass_.empty(), "a path that meets glass");
   Path& path = paths_[index];
   const GlassBody body = glass_.front();
   const Surface& surface = (*context_->surfaces)[body.type];
@@ -142,6 +146,7 @@ bool PathTile::enter_glass(std::uint32_t index) {
 
 // Follows a path within glass to the end of the body, or to an object inside it.
 bool PathTile::leave_glass(std::uint32_t index) {
+  QUOIN_ASSERT(paths_[index].inside != kAir, "a path within glass");
   Path& path = paths_[index];
   const Ray ray{path.origin, DVec3(path.direction)};
   const bool is_within = !glass_.empty() && glass_.front().starts_inside && glass_.front().type == path.inside;
@@ -196,6 +201,8 @@ void PathTile::turn_at(Path& path, const DVec3& point, Vec3 direction, Vec3 norm
 }
 
 void PathTile::hit_glass(std::uint32_t index, const GlassBody& body, const DVec3& normal_in_grid) {
+  QUOIN_ASSERT(body.placed >= 0 && static_cast<std::size_t>(body.placed) < context_->placed.size(),
+               "a body of one of the placed grids");
   Path& path = paths_[index];
   const Surface& surface = (*context_->surfaces)[body.type];
   Vertex vertex;
@@ -228,6 +235,8 @@ PathTile::Interval PathTile::in_fog(const DVec3& origin, Vec3 direction, double 
 }
 
 void PathTile::hit_air(std::uint32_t index, double t, Vec3 colour, float anisotropy, std::int32_t placed) {
+  QUOIN_ASSERT(placed >= 0 && (context_->placed.empty() || static_cast<std::size_t>(placed) < context_->placed.size()),
+               "one of the placed grids");
   Path& path = paths_[index];
   Vertex vertex;
   vertex.path = index;

@@ -8,6 +8,7 @@
 
 #include <glm/common.hpp>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/direction.h>
 #include <quoin/core/hash.h>
 #include <quoin/core/vec.h>
@@ -74,6 +75,7 @@ inline std::uint32_t surface_id(IVec3 voxel, Direction face, bool in_field, std:
 
 // Returns a free path length in a medium that scatters `density` times per unit length on average.
 inline double free_way(float u, double density) {
+  QUOIN_ASSERT(u >= 0.0F && u < 1.0F && density > 0.0, "0 <= u < 1, and a positive density");
   return -static_cast<double>(log_of_two(1.0F - u)) * std::numbers::ln2 / density;
 }
 

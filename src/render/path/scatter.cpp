@@ -7,6 +7,8 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include <quoin/core/assert.h>
+
 #include "render/path/numbers/path_random.h"
 
 namespace quoin::path {
@@ -89,7 +91,10 @@ class GlossTable {
       for (int i = 0; i < kEdge; ++i) entries_[static_cast<std::size_t>(j * kEdge + i)] = integrate(i, j);
     }
   }
-  [[nodiscard]] const Entry& get(int i, int j) const { return entries_[static_cast<std::size_t>(j * kEdge + i)]; }
+  [[nodiscard]] const Entry& get(int i, int j) const {
+    QUOIN_ASSERT(i >= 0 && i < kEdge && j >= 0 && j < kEdge, "an entry of the table");
+    return entries_[static_cast<std::size_t>(j * kEdge + i)];
+  }
 
   static Entry integrate(int i, int j) {
     const float cosine = std::max(static_cast<float>(i) / (kEdge - 1), 1e-3F);
@@ -121,6 +126,7 @@ std::span<const float> gloss_table() {
 }
 
 Scatter::Scatter(const Material& material, Vec3 out) : out_(out), colour_(material.colour) {
+  QUOIN_ASSERT(out.z > 0.0F, "a viewer above the surface");
   const float metal = std::clamp(material.metalness, 0.0F, 1.0F);
   const float rough = std::clamp(material.roughness, 0.0F, 1.0F);
   matte_ = colour_ * (1.0F - metal);
@@ -147,7 +153,9 @@ Scatter::Scatter(const Material& material, Vec3 out) : out_(out), colour_(materi
   gloss_share_ = shine > 0.0F ? std::clamp(shine / (shine + below), below > 0.0F ? 0.1F : 1.0F, 1.0F) : 0.0F;
 }
 
-Scatter::Scatter(Vec3 colour, float anisotropy) : colour_(colour), is_medium_(true), anisotropy_(anisotropy) {}
+Scatter::Scatter(Vec3 colour, float anisotropy) : colour_(colour), is_medium_(true), anisotropy_(anisotropy) {
+  QUOIN_ASSERT(std::abs(anisotropy) < 1.0F, "-1 < anisotropy < 1");
+}
 
 float Scatter::phase(float cosine) const {
   const float g = anisotropy_;

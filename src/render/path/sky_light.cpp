@@ -5,6 +5,8 @@
 
 #include <glm/geometric.hpp>
 
+#include <quoin/core/assert.h>
+
 #include "light/light_model.h"
 #include "render/path/atmosphere.h"
 
@@ -63,6 +65,7 @@ SkyLight::SkyLight(const Look& options)
       break;
     }
     case SkyModel::Environment: {
+      QUOIN_ASSERT(options.environment != nullptr, "an environment image");
       sunlight_ = Vec3(irradiance);
       image_.emplace(*options.environment);
       is_uneven_ = true;
@@ -110,6 +113,7 @@ SkySample SkyLight::sun_sample(Vec3 direction) const {
 }
 
 SkySample SkyLight::sample_sky(Pair u) const {
+  QUOIN_ASSERT(image_.has_value(), "an uneven sky");
   SkySample sample = image_->sample(u);
   sample.direction = turned(sample.direction, turn_);
   sample.radiance *= brightness_;
@@ -117,6 +121,7 @@ SkySample SkyLight::sample_sky(Pair u) const {
 }
 
 float SkyLight::sky_density(Vec3 direction) const {
+  QUOIN_ASSERT(image_.has_value(), "an uneven sky");
   return image_->density(turned_back(direction, turn_));
 }
 

@@ -3,6 +3,7 @@
 #include <span>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
 
 #include "render/path/environment_light.h"
@@ -46,7 +47,10 @@ class SkyMap {
   [[nodiscard]] std::span<const Vec3> pixels() const { return pixels_; }
 
  private:
-  static std::size_t index(int x, int y) { return static_cast<std::size_t>(y * (kEdge + 1) + x); }
+  static std::size_t index(int x, int y) {
+    QUOIN_ASSERT(x >= 0 && x <= kEdge && y >= 0 && y <= kEdge, "a corner of the map");
+    return static_cast<std::size_t>(y * (kEdge + 1) + x);
+  }
   static Vec3 direction_of(int x, int y) {
     const float u = static_cast<float>(x) / (kEdge / 2.0F) - 1.0F;
     const float v = static_cast<float>(y) / (kEdge / 2.0F) - 1.0F;

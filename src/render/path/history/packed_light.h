@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
 
 namespace quoin::path {
@@ -32,6 +33,7 @@ inline constexpr float kMaxPackedLight = 65'408.0F;
   };
   if (most * scale_of(exponent) + 0.5F >= 512.0F) ++exponent;
   const float scale = scale_of(exponent);
+  QUOIN_ASSERT(exponent >= 0 && exponent < 32, "an exponent of 5 bits");
   const auto part = [scale](float x) { return static_cast<std::uint32_t>(std::lrint(x * scale)); };
   return static_cast<std::uint32_t>(exponent) << 27 | part(kept.z) << 18 | part(kept.y) << 9 | part(kept.x);
 }

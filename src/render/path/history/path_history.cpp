@@ -1,3 +1,4 @@
+#include <quoin/core/assert.h>
 #include <quoin/render/path_history.h>
 
 #include <algorithm>
@@ -20,6 +21,7 @@ using path::unpack_light;
 constexpr int kReach = 2;  // radius in pixels of the area that determines a pixel's share
 
 std::size_t index_of(int x, int y, int width) {
+  QUOIN_ASSERT(x >= 0 && x < width && y >= 0, "a pixel of the image");
   return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
 }
 
@@ -35,6 +37,7 @@ struct Between {
 };
 
 Between between(int at, int size, int of_size) {
+  QUOIN_ASSERT(at >= 0 && at < size && of_size > 0, "a pixel of the larger image");
   if (size == of_size) return {at, at, 0.0F};
   const double place = (at + 0.5) * of_size / size - 0.5;
   const int low = static_cast<int>(std::floor(place));
@@ -131,6 +134,10 @@ std::size_t PathHistory::bytes() const {
 }
 
 void PathHistory::refine(PathImage& image, int samples, Threads threads) {
+  QUOIN_ASSERT(image.width > 0 && image.height > 0 && samples > 0, "an image with samples");
+  QUOIN_ASSERT(image.radiance.size() == pixel_count(image.width, image.height) &&
+                   image.scene.size() == image.radiance.size() && image.alpha.size() == image.radiance.size(),
+               "one value per pixel");
   Taken taken{image.width, image.height, samples, std::vector<std::uint32_t>(image.radiance.size())};
   std::transform(image.radiance.begin(), image.radiance.end(), taken.light.begin(), pack_light);
   if (!earlier_.empty() && !is_finer(earlier_.back(), taken)) earlier_.clear();
@@ -173,6 +180,8 @@ void PathHistory::combine(const Taken& before, const Taken& best, const std::vec
                           PathImage& image) {
   const int of_width = image.width;
   const int of_height = image.height;
+  QUOIN_ASSERT(shares.size() == pixel_count(of_width, of_height), "one share per pixel");
+  QUOIN_ASSERT(best.light.size() == pixel_count(best.width, best.height), "one value per pixel");
   // An image of the same size is changed in place: a pixel is read only for itself, before it is written.
   PathImage smaller;
   const bool is_as_large = of_width == best.width && of_height == best.height;

@@ -9,6 +9,8 @@
 #include <cstdint>
 #include <limits>
 
+#include <quoin/core/assert.h>
+
 #include "render/path/kernel/numbers.inl"
 
 namespace quoin::path {
@@ -101,6 +103,7 @@ inline void choose(const LampBranch* branches, const float* shares, LampBlock& b
 }
 
 void choose_lamps(const LampBranch* branches, const float* shares, LampBlock& block) {
+  QUOIN_ASSERT(branches != nullptr && shares != nullptr, "a tree with a table of shares");
   for (std::size_t at = 0; at < kBlockPoints; at += kWidth) {
     choose(branches, shares, block, at, load(block.normal, at), lanes::load(block.u + at));
   }
@@ -166,6 +169,7 @@ inline void shade_lamps(const ShadeLight& light, ShadeBlock& block, std::size_t 
 }
 
 void shade(const ShadeLight& light, ShadeBlock& block) {
+  QUOIN_ASSERT(light.lamps == nullptr || light.shares != nullptr, "lamps with a table of shares");
   for (std::size_t at = 0; at < kBlockPoints; at += kWidth) {
     const Numbers numbers{load(block.pixel + at), reversed_lanes(load(block.sample + at))};
     const I dimension = load(block.dimension + at);

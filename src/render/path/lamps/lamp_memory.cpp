@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/hash.h>
 
 namespace quoin::path {
@@ -42,6 +43,7 @@ std::int32_t LampMemory::place_of(std::int32_t of, IVec3 voxel, Direction side) 
 void LampMemory::note(const LightTree& tree, std::int32_t place, std::int32_t lamp, float light, bool is_blocked) {
   if (place == 0 || !(light < 1e30F)) return;
   const auto at = static_cast<std::size_t>(place);
+  QUOIN_ASSERT(place > 0 && at < places_.size(), "a place that was returned");
   places_[at].is_new = true;
   places_[at].samples += 1.0F;
   Light* const lights = lights_.data() + at * LightTree::kTopNodes;

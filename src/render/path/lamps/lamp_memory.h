@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/direction.h>
 #include <quoin/core/vec.h>
 
@@ -29,6 +30,7 @@ class LampMemory {
   /// [place][node]: `LightTree::kTopNodes` per place.
   [[nodiscard]] const float* tables() const { return tables_.data(); }
   [[nodiscard]] const float* table(std::int32_t place) const {
+    QUOIN_ASSERT(place >= 0 && static_cast<std::size_t>(place) < places_.size(), "a place that was returned");
     return tables_.data() + static_cast<std::size_t>(place) * LightTree::kTopNodes;
   }
 

@@ -95,6 +95,7 @@ class LightTree::Builder {
       return lamps_[lamp];
     }
     const std::size_t middle = split(begin, end, level);
+    QUOIN_ASSERT(begin < middle && middle < end, "two parts with lamps");
     const LampBounds first = build(begin, middle, way, level + 1);
     const auto second_at = static_cast<std::int32_t>(tree_.nodes_.size());
     const LampBounds second = build(middle, end, way | std::uint64_t{1} << level, level + 1);
@@ -198,6 +199,7 @@ void LightTree::set_branches() {
     branch.top[0] = static_cast<std::int32_t>(top[i + 1]);
     branch.top[1] = static_cast<std::int32_t>(top[second]);
   }
+  QUOIN_ASSERT(branches_.size() == static_cast<std::size_t>(inner), "one branch per inner node");
 }
 
 LampMeasures LightTree::measures_of(const LampBounds& bounds) {
@@ -236,6 +238,7 @@ const float* LightTree::whole_shares() {
 }
 
 LightTree::Choice LightTree::choose(Vec3 point, Vec3 normal, float u, const float* shares) const {
+  QUOIN_ASSERT(u >= 0.0F && u < 1.0F && shares != nullptr, "0 <= u < 1, and a table of shares");
   if (branches_.empty()) return {};
   LampBlock block;
   for (int i = 0; i < 3; ++i) block.point[i][0] = point[i], block.normal[i][0] = normal[i];
@@ -246,7 +249,7 @@ LightTree::Choice LightTree::choose(Vec3 point, Vec3 normal, float u, const floa
 }
 
 float LightTree::probability(std::uint32_t lamp, Vec3 point, Vec3 normal, const float* shares) const {
-  QUOIN_ASSERT(lamp < ways_.size(), "a lamp of the tree");
+  QUOIN_ASSERT(lamp < ways_.size() && shares != nullptr, "a lamp of the tree, and a table of shares");
   std::int32_t at = 0;
   float probability = 1.0F;
   for (std::uint64_t way = ways_[lamp]; at >= 0; way >>= 1) {

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
 
 #include "render/path/kernel/kernel.h"
@@ -53,6 +54,7 @@ class LightTree {
   /// Calls `visit(number)` for the upper nodes above a lamp, and for the lamp's own node.
   template <class Visit>
   void for_each_top_node(std::uint32_t lamp, Visit&& visit) const {
+    QUOIN_ASSERT(lamp < ways_.size(), "a lamp of the tree");
     std::uint64_t way = ways_[lamp];
     std::size_t number = 0;
     visit(number);

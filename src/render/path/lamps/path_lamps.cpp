@@ -101,6 +101,7 @@ float density_of(const PathLamp& lamp, Vec3 direction, float distance) {
 }
 
 LampSample sample_point_lamp(const PathLamp& lamp, DVec3 point) {
+  QUOIN_ASSERT(lamp.is_point, "a lamp without a body");
   LampSample sample;
   const Vec3 way(lamp.corner - point);
   sample.distance = glm::length(way);
@@ -118,6 +119,7 @@ LampSample sample_point_lamp(const PathLamp& lamp, DVec3 point) {
 }
 
 LampSample sample_rectangle(const PathLamp& lamp, DVec3 point, Pair u) {
+  QUOIN_ASSERT(!lamp.is_point, "a lamp with a body");
   LampSample sample;
   const Seen seen = seen_from(lamp, point);
   if (!seen.is_before) return sample;
@@ -173,6 +175,7 @@ PathLamps::PathLamps(std::vector<PathLamp> lamps, DVec3 origin) : origin_(origin
 
 LampSample PathLamps::sample(LightTree::Choice chosen, DVec3 point, Pair u) const {
   if (chosen.lamp < 0 || !(chosen.probability > 0.0F)) return {};
+  QUOIN_ASSERT(static_cast<std::size_t>(chosen.lamp) < lamps_.size(), "one of these lamps");
   const PathLamp& lamp = lamps_[static_cast<std::size_t>(chosen.lamp)];
   LampSample sample = lamp.is_point ? sample_point_lamp(lamp, point) : sample_rectangle(lamp, point, u);
   sample.radiance /= chosen.probability;
@@ -198,6 +201,7 @@ std::size_t PathLamps::hash_of_face(std::int32_t placed, IVec3 voxel, Direction 
 void PathLamps::add_face(std::int32_t placed, IVec3 voxel, Direction face, std::int32_t lamp) {
   QUOIN_ASSERT(lamp >= 0 && static_cast<std::size_t>(lamp) < lamps_.size(), "a face of one of these lamps");
   if (2 * (face_count_ + 1) > faces_.size()) grow();
+  QUOIN_ASSERT(std::has_single_bit(faces_.size()), "a power of two of slots");
   const std::size_t mask = faces_.size() - 1;
   std::size_t slot = hash_of_face(placed, voxel, face) & mask;
   while (faces_[slot].lamp >= 0) slot = (slot + 1) & mask;

@@ -7,6 +7,7 @@
 #include <limits>
 #include <numbers>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
 
 // Path tracing arithmetic with the same bits on every machine: sums, products, quotients and square roots round alike
@@ -24,6 +25,7 @@ struct SineCosine {
 ///
 /// Source: Taylor's series about the nearest eighth of a turn.
 [[nodiscard]] inline SineCosine of_turns(float turns) {
+  QUOIN_ASSERT(turns >= 0.0F && turns <= 1.0F, "0 <= turns <= 1");
   const float quarters = turns * 4.0F;
   const int nearest = static_cast<int>(turns * 8.0F + 1.0F) / 2;
   const float x = (quarters - static_cast<float>(nearest)) * (kPi / 2.0F);  // -pi/4 to pi/4
