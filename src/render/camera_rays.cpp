@@ -6,6 +6,8 @@
 
 #include <glm/geometric.hpp>
 
+#include <quoin/core/assert.h>
+
 namespace quoin {
 namespace {
 
@@ -15,6 +17,7 @@ constexpr double kSkyFov = 50.0 * std::numbers::pi / 180.0;
 }  // namespace
 
 PixelPoint sample_point(int index) {
+  QUOIN_ASSERT(index >= 0, "samples count from 0");
   constexpr double kPlastic = 1.32471795724474602596;
   const double x = 0.5 + index / kPlastic;
   const double y = 0.5 + index / (kPlastic * kPlastic);
@@ -26,6 +29,7 @@ CameraRays::CameraRays(const Camera& camera, int width, int height)
       height_(height),
       is_perspective_(camera.projection == Camera::Projection::Perspective),
       forward_(camera.forward) {
+  QUOIN_ASSERT(width > 0 && height > 0, "a positive image size");
   const double image_height = is_perspective_ ? 2.0 * std::tan(camera.vertical_fov_radians / 2.0) : camera.view_height;
   const double pixel = image_height / height;
   right_ = camera.right * pixel;
@@ -35,6 +39,7 @@ CameraRays::CameraRays(const Camera& camera, int width, int height)
 }
 
 void CameraRays::block(int column, int row, PixelPoint point, RayPacket& rays) const {
+  QUOIN_ASSERT(column >= 0 && row >= 0, "a pixel of the image");
   RayPacket::Lanes<double> x;
   RayPacket::Lanes<double> y;
   rays.active = 0;
@@ -69,6 +74,7 @@ void CameraRays::block(int column, int row, PixelPoint point, RayPacket& rays) c
 }
 
 float CameraRays::sky_up(const RayPacket& rays, std::size_t lane) const {
+  QUOIN_ASSERT(lane < kLanes, "0 <= lane < kSize");
   if (is_perspective_) return static_cast<float>(rays.direction_y[lane]);
   const DVec3 from_middle{rays.origin_x[lane], rays.origin_y[lane], rays.origin_z[lane]};
   return static_cast<float>(glm::normalize(forward_ + from_middle * sky_scale_).y);

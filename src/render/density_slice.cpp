@@ -1,3 +1,4 @@
+#include <quoin/core/assert.h>
 #include <quoin/render/density_slice.h>
 
 #include <algorithm>
@@ -59,6 +60,7 @@ struct Plane {
 };
 
 Plane plane_of(const DBox& box, const DensitySliceOptions& options) {
+  QUOIN_ASSERT(!box.empty() && options.axis >= 0 && options.axis < 3, "a box, and one of three axes");
   constexpr DVec3 kRight[3] = {{0, 0, -1}, {1, 0, 0}, {1, 0, 0}};
   constexpr DVec3 kDown[3] = {{0, -1, 0}, {0, 0, 1}, {0, -1, 0}};
   Plane plane;

@@ -4,11 +4,14 @@
 #include <limits>
 #include <span>
 
+#include <quoin/core/assert.h>
+
 namespace quoin {
 namespace {
 
 std::vector<SelectedInstance> select(const Scene& scene, InstanceFilter filter, const Camera& camera,
                                      const RenderOptions& options) {
+  QUOIN_ASSERT(options.detail.policy.has_value(), "options with a detail policy");
   DetailPolicy policy = *options.detail.policy;
   policy.instances = filter;
   std::vector<SelectedInstance> selected;
@@ -28,6 +31,7 @@ void keep_whole(std::span<const FarInstance> far, std::span<SelectedInstance> se
     choice.level = 0;
     ++next;
   }
+  QUOIN_ASSERT(next == far.end(), "far instances in the order of the selection");
 }
 
 ImageDetail DetailChooser::choose(const Scene& scene, InstanceFilter filter, const Camera& camera,

@@ -5,6 +5,8 @@
 
 #include <glm/geometric.hpp>
 
+#include <quoin/core/assert.h>
+
 namespace quoin {
 namespace {
 
@@ -46,6 +48,7 @@ Status check(const Camera& camera, const RenderOptions& options) {
 }
 
 RenderedImage empty_image(const RenderOptions& options) {
+  QUOIN_ASSERT(options.width > 0 && options.height > 0, "a positive image size");
   const auto pixels = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
   RenderedImage image;
   image.colour = {options.width, options.height, std::vector<std::uint8_t>(3 * pixels)};

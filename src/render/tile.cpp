@@ -8,6 +8,8 @@
 
 #include <glm/common.hpp>
 
+#include <quoin/core/assert.h>
+
 #include "core/srgb.h"
 #include "light/light_model.h"
 #include "render/on_face.h"
@@ -20,6 +22,10 @@ constexpr int kBlock = CameraRays::kBlock;
 }  // namespace
 
 Tile::Tile(const TileContext& context, int column, int row) : context_(&context), column_(column), row_(row) {
+  QUOIN_ASSERT(column >= 0 && row >= 0, "a pixel of the image");
+  QUOIN_ASSERT(
+      context.view != nullptr && context.camera != nullptr && context.lighting != nullptr && context.options != nullptr,
+      "a context with a view, a camera, light and options");
   points_.reserve(kPixels);
   targets_.reserve(kPixels);
   if (context.impostors != nullptr && context.impostors->may_show(column, row))
@@ -112,6 +118,7 @@ void Tile::add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, st
   const bool is_far = (far_faces_.found >> lane & 1U) != 0;
   point.is_blended = point.in_field && point.kind == PointKind::Surface;
   if (!is_far) return;
+  QUOIN_ASSERT(far_faces_.face[i] != nullptr, "a lane that found a far face");
   if (point.in_field) {
     point.position = far_faces_.start_of_light(i, point.position);
     point.lift = ImpostorFaces::kSurfelLift;
@@ -186,6 +193,7 @@ void Tile::meet_surface(const Mirror& mirror, const GlassBody* from, Sight& sigh
 }
 
 SurfacePoint& Tile::add_point(std::size_t pixel, Vec3 weight) {
+  QUOIN_ASSERT(pixel < kPixels, "a pixel of the tile");
   targets_.push_back({static_cast<std::uint32_t>(pixel), weight});
   SurfacePoint& added = points_.emplace_back();
   const auto x = static_cast<std::uint32_t>(column_) + static_cast<std::uint32_t>(pixel % kEdge);
@@ -202,10 +210,12 @@ void Tile::light_points() {
     if (point.in_field) continue;
     if (point.placed != known) {
       known = point.placed;
+      QUOIN_ASSERT(known >= 0 && static_cast<std::size_t>(known) < placed.size(), "one of the placed grids");
       reader.emplace(*placed[static_cast<std::size_t>(known)].voxels);
     }
     if (point.type == kAir) point.type = reader->get(point.voxel);
   }
+  QUOIN_ASSERT(targets_.size() == points_.size(), "one target per point");
   lit_.resize(points_.size());
   rays_ += context_->lighting->light(points_, lit_, sample_number_);
   for (std::size_t i = 0; i < points_.size(); ++i) sample_[targets_[i].pixel] += targets_[i].weight * lit_[i];
@@ -214,6 +224,10 @@ void Tile::light_points() {
 void Tile::write_to(RenderedImage& image) const {
   const SrgbEncoder& encode = SrgbEncoder::shared();
   const int width = image.colour.width;
+  QUOIN_ASSERT(column_ < width && row_ < image.colour.height, "a tile of the image");
+  QUOIN_ASSERT(
+      image.colour.rgb.size() == 3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(image.colour.height),
+      "three bytes per pixel");
   const int columns = std::min(kEdge, width - column_);
   const int rows = std::min(kEdge, image.colour.height - row_);
   const auto samples = static_cast<float>(context_->options->samples);

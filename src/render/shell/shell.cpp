@@ -3,6 +3,8 @@
 #include <bit>
 #include <cstddef>
 
+#include <quoin/core/assert.h>
+
 #include "trace/tree_view.h"
 
 namespace quoin {
@@ -94,6 +96,7 @@ void ImpostorShell::copy_chunk(const OccupancyTree& tree, IVec3 chunk) {
       const std::uint64_t bits = words[static_cast<std::size_t>(word)];
       if (bits == 0) continue;  // may lie outside the box
       const IVec3 cell = corner + IVec3{word & 3, word >> 2 & 3, word >> 4};
+      QUOIN_ASSERT((IBox{IVec3{0}, size_}.contains(cell)), "voxels within the tree's bounds");
       cells_[cell_of(cell * 4)] = bits;
     }
   }
@@ -102,8 +105,9 @@ void ImpostorShell::copy_chunk(const OccupancyTree& tree, IVec3 chunk) {
 std::uint64_t ImpostorShell::exposed(Direction direction, std::size_t cell) const {
   const IVec3 towards = normal_of(direction);
   const std::ptrdiff_t step = (std::ptrdiff_t{towards.z} * size_.y + towards.y) * size_.x + towards.x;
-  return exposed_bits(cells_[cell], cells_[static_cast<std::size_t>(static_cast<std::ptrdiff_t>(cell) + step)],
-                      direction);
+  const auto next = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(cell) + step);
+  QUOIN_ASSERT(cell < cells_.size() && next < cells_.size(), "a cell within the margin");
+  return exposed_bits(cells_[cell], cells_[next], direction);
 }
 
 std::int64_t ImpostorShell::count_faces() const {
@@ -117,7 +121,8 @@ std::int64_t ImpostorShell::count_faces() const {
 
 std::vector<VoxelFace> ImpostorShell::faces() const {
   std::vector<VoxelFace> all;
-  all.reserve(static_cast<std::size_t>(count_faces()));
+  const auto count = static_cast<std::size_t>(count_faces());
+  all.reserve(count);
   for (const Direction direction : kDirections) {
     std::size_t cell = 0;
     for (int z = 0; z < size_.z; ++z) {
@@ -133,6 +138,7 @@ std::vector<VoxelFace> ImpostorShell::faces() const {
       }
     }
   }
+  QUOIN_ASSERT(all.size() == count, "the counted faces");
   return all;
 }
 
