@@ -37,7 +37,10 @@ int first_width_for(const ContentSphere& content, int edge) {
 
 std::uint8_t packed(const FaceOcclusion& corners) {
   unsigned all = 0;
-  for (std::size_t i = 0; i < 4; ++i) all |= static_cast<unsigned>(corners[i]) << 2 * i;
+  for (std::size_t i = 0; i < 4; ++i) {
+    QUOIN_ASSERT(corners[i] < 4, "occlusion of 2 bits");
+    all |= static_cast<unsigned>(corners[i]) << 2 * i;
+  }
   return static_cast<std::uint8_t>(all);
 }
 
@@ -92,6 +95,7 @@ void count_open_rays(const OccupancyTree& opaque, const DensityTree* field, std:
       for (std::size_t i = 0; i < size; ++i) open[i] += (blocked >> i & 1U) == 0;
     }
     for (std::size_t i = 0; i < size; ++i) {
+      QUOIN_ASSERT(open[i] >= 0 && open[i] <= kRays, "at most all rays");
       faces[wanted[begin + i]].open_rays = static_cast<std::uint8_t>(open[i] & 15);
     }
   }
@@ -183,6 +187,8 @@ void put_faces(const Subject& subject, const std::vector<SeenFace>& seen, KnownF
     face.occlusion = packed(corner_occlusion([&](IVec3 voxel) { return subject.is_opaque(voxel, neighbours); },
                                              face.voxel, face.direction));
   }
+  QUOIN_ASSERT(out.faces.size() == seen.size() && out.surfels.size() <= seen.size(),
+               "one entry per face, and its surfels last");
   count_open_rays(*subject.opaque, subject.field, fresh, out);
 }
 
@@ -275,6 +281,7 @@ Impostor Impostor::build(const SceneGrid& grid, const VoxelRegistry& types, cons
 
 Impostor Impostor::rebuilt(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes) const {
   if (changes.empty()) return *this;
+  QUOIN_ASSERT(faces_->surfels.empty(), "an impostor without a field");
   const OccupancyTree opaque = OccupancyTree::build(grid, types, Occupancy::Opaque);
   const std::optional<std::vector<IBox>> changed = small_boxes(changes, opaque.bounds());
   const Subject subject(grid, types, opaque, nullptr, grid.bounds(), options_);

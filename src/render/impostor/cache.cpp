@@ -206,6 +206,7 @@ void ImpostorCache::Impl::build(Entries::iterator entry, std::unique_lock<std::m
 
 void ImpostorCache::Impl::put(GridHandle handle, const Origin& origin, std::shared_ptr<const Impostor> made) {
   const auto entry = entries.find(handle);
+  QUOIN_ASSERT(made != nullptr && entry != entries.end(), "an impostor of a requested grid");
   entry->second.building.reset();
   const std::size_t bytes = made->bytes();
   ++stats.built;

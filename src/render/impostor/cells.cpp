@@ -58,6 +58,7 @@ class Ranks {
     }
   }
   [[nodiscard]] std::uint32_t rank(std::uint32_t hash, std::size_t view, Direction direction) const {
+    QUOIN_ASSERT(view < kImpostorViews, "one of the views");
     const std::uint64_t rank = std::uint64_t{hash} * factors_[6 * view + static_cast<std::size_t>(direction)] >> 17;
     return static_cast<std::uint32_t>(std::min<std::uint64_t>(rank, 0x7FFF'FFFFU));
   }
@@ -161,6 +162,7 @@ WordFaces faces_of_word(TreeWords& words, IVec3 at) {
 
 // Returns the bits of a voxel in its cell, which is 2^`log2_width` voxels wide: eight bits for width 2.
 std::uint64_t bits_of_voxel(IVec3 in_cell, int log2_width) {
+  QUOIN_ASSERT(log2_width >= 1 && ((in_cell.x | in_cell.y | in_cell.z) >> log2_width) == 0, "a voxel of the cell");
   const IVec3 at = log2_width == 1 ? in_cell * 2 : in_cell >> (log2_width - 2);
   const std::uint64_t cube = log2_width == 1 ? 0x0033'0033U : 1U;
   return cube << (at.x + 4 * at.y + 16 * at.z);
@@ -170,11 +172,13 @@ std::uint64_t bits_of_voxel(IVec3 in_cell, int log2_width) {
 std::uint64_t bit_of_eighth(IVec3 in_cell, DVec3 half, int log2_width) {
   if (log2_width > 1) return bits_of_voxel(in_cell, log2_width);
   const IVec3 at = in_cell * 2 + IVec3(half * 2.0);
+  QUOIN_ASSERT(((at.x | at.y | at.z) & ~3) == 0, "an eighth in a cell of 2 voxels");
   return std::uint64_t{1} << (at.x + 4 * at.y + 16 * at.z);
 }
 
 // Reduces the 4^3 bits of a cell to 2^3 bits, in their octant of the cell of twice the width.
 std::uint64_t halved_bits(std::uint64_t bits, unsigned octant) {
+  QUOIN_ASSERT(octant < 8, "one of eight octants");
   bits |= bits >> 1, bits |= bits >> 4, bits |= bits >> 16;
   const std::uint64_t low = (bits & 1U) | (bits >> 1 & 2U) | (bits >> 4 & 16U) | (bits >> 5 & 32U);
   const std::uint64_t upper = bits >> 32;
@@ -227,6 +231,7 @@ class SurfaceCells::Collector {
   // Adds a surfel as the eighths of voxels whose centres lie just below it: two per column, so that no ray passes
   // between two columns.
   void add_surfel(const SeenFace& seen, std::uint32_t index) {
+    QUOIN_ASSERT(seen.surfel != nullptr, "a surfel");
     const FaceFrame& frame = frame_of(seen.face.direction);
     const ImpostorFaces::Surfel& surfel = *seen.surfel;
     const DVec3 middle = surfel.middle(DVec3(seen.face.voxel), seen.face.direction);

@@ -43,7 +43,7 @@ const std::array<DVec3, kImpostorViews>& views() {
 }  // namespace
 
 DVec3 impostor_view(int index) {
-  QUOIN_ASSERT(index >= 0 && index < kImpostorViews);
+  QUOIN_ASSERT(index >= 0 && index < kImpostorViews, "0 <= index < kImpostorViews");
   return views()[static_cast<std::size_t>(index)];
 }
 
@@ -66,6 +66,7 @@ double SnapshotCamera::half_size() const {
 }
 
 SnapshotCamera snapshot_camera(const ContentSphere& content, int view, int edge) {
+  QUOIN_ASSERT(edge >= 1, "at least one texel");
   const DVec3 direction = impostor_view(view);
   SnapshotCamera camera;
   camera.reach = std::max(content.radius, 1.0);

@@ -79,6 +79,7 @@ void LevelMaker::put(const Rectangle& rectangle, std::uint32_t views, std::uint3
 
 void LevelMaker::end_group() {
   ImpostorFaces::Groups& groups = level_.groups;
+  QUOIN_ASSERT(!level_.views.empty() && level_.views.size() % kGroup == 0, "a full group");
   std::uint32_t views = 0;
   for (std::size_t i = level_.views.size() - kGroup; i < level_.views.size(); ++i) views |= level_.views[i];
   groups.views.push_back(views);
@@ -100,6 +101,8 @@ void LevelMaker::end_sides(std::size_t side) {
 
 ImpostorFaces::Level LevelMaker::level() && {
   end_sides(kSides);
+  QUOIN_ASSERT(level_.groups.views.size() * kGroup == level_.views.size(), "whole groups");
+  QUOIN_ASSERT(level_.face.size() == level_.views.size(), "one face per rectangle");
   // Kernels read past the end.
   for (auto* const boxes : {&level_.groups.centre, &level_.groups.half}) {
     for (std::vector<float>& values : *boxes) values.resize(values.size() + kGroup);

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
 
 namespace quoin {
@@ -29,6 +30,7 @@ namespace quoin {
 
 /// The position along a Morton curve, which keeps neighbours mostly together. Requires: coordinates of 0 to 2^21 - 1.
 [[nodiscard]] constexpr std::uint64_t morton_code(IVec3 position) {
+  QUOIN_ASSERT((static_cast<std::uint32_t>(position.x | position.y | position.z) >> 21) == 0, "coordinates of 21 bits");
   return spread_bits(static_cast<std::uint64_t>(position.x)) |
          spread_bits(static_cast<std::uint64_t>(position.y)) << 1 |
          spread_bits(static_cast<std::uint64_t>(position.z)) << 2;

@@ -12,6 +12,8 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include <quoin/core/assert.h>
+
 namespace quoin {
 namespace {
 
@@ -78,6 +80,7 @@ void ImpostorPass::fill_bins() {
 }
 
 const std::vector<std::uint32_t>& ImpostorPass::bin_of(int column, int row) const {
+  QUOIN_ASSERT(column >= 0 && column < width_ && row >= 0 && row < height_, "a pixel of the image");
   return bins_[static_cast<std::size_t>(row / kTile * across_ + column / kTile)];
 }
 
@@ -121,6 +124,7 @@ bool ImpostorPass::is_hidden(const DrawnImpostor& drawn, const raster::Job& job,
 
 double ImpostorPass::distance_to(const DrawnImpostor& drawn, const ImpostorFaces::Level& level, std::size_t number,
                                  const Ray& ray) {
+  QUOIN_ASSERT(number < level.count(), "a rectangle of the level");
   const auto after = std::upper_bound(level.begin.begin(), level.begin.end(), static_cast<std::uint32_t>(number));
   const std::size_t axis = static_cast<std::size_t>(after - level.begin.begin() - 1) / 2;
   const auto a = static_cast<int>(axis);
@@ -152,10 +156,12 @@ void ImpostorPass::find(int column, int row, const RayPacket& rays, const raster
     const std::uint32_t bit = 1U << lane;
     if (std::isinf(canvas.depth[first + i])) continue;
     const std::int32_t id = canvas.id[first + i];
+    QUOIN_ASSERT(id >= 0 && static_cast<std::size_t>(id / kParts) < drawn_.size(), "an id of this pass");
     const DrawnImpostor& drawn = drawn_[static_cast<std::size_t>(id / kParts)];
     const ImpostorFaces::Level& level = drawn.faces->level(static_cast<std::size_t>(id % kParts));
     const raster::Met met = raster::Met::of(canvas.face[first + i]);
     const std::size_t number = raster::face_of(level, met);
+    QUOIN_ASSERT(number < drawn.faces->faces.size(), "a face of the impostor");
     const ImpostorFaces::Face& face = drawn.faces->faces[number];
     const Ray ray = rays.ray(lane);
     double t = 0.0;

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/parallel.h>
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/render/impostor.h>
@@ -27,6 +28,7 @@ struct FarFaces {
 
   /// Returns the start of light rays for a point on a lane's surfel, in the grid.
   [[nodiscard]] DVec3 start_of_light(std::size_t lane, const DVec3& point) const {
+    QUOIN_ASSERT(surfel[lane] != nullptr && face[lane] != nullptr, "a lane that found a surfel");
     return surfel[lane]->start_of_light(point, DVec3(face[lane]->voxel), face[lane]->direction);
   }
 };

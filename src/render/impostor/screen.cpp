@@ -9,6 +9,8 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include <quoin/core/assert.h>
+
 #include "render/impostor/snapshot.h"
 
 namespace quoin {
@@ -29,6 +31,7 @@ constexpr std::int32_t kAllPixels = 1 << 24;
 // Returns an upper bound of a sphere's extent to one side, projected to distance 1. (across, deep): the sphere's centre
 // from the camera. Requires: the sphere is in front of the camera's plane.
 double upper_tangent(double across, double deep, double radius) {
+  QUOIN_ASSERT(deep > radius, "a sphere in front of the camera's plane");
   const double edge = across + radius;
   return edge / (edge > 0.0 ? deep - radius : deep + radius);
 }
@@ -39,6 +42,7 @@ int clamped(double pixel, int size) {
 
 // Chooses the coarsest level for a number of voxels per pixel, and the share of the next level.
 void choose_level(double voxels, DrawnImpostor& drawn) {
+  QUOIN_ASSERT(drawn.faces != nullptr && voxels >= 0.0, "faces, and a number of voxels");
   const auto least = [&](std::size_t level) {
     return least_voxels(drawn.faces->first_width + static_cast<int>(level));
   };
@@ -67,6 +71,7 @@ raster::NearViews near_views(DVec3 towards) {
     shares.at(i) = (size[axis] - next) * std::sqrt(static_cast<double>(i + 1));
   }
   const double sum = shares[0] + shares[1] + shares[2];
+  QUOIN_ASSERT(sum > 0.0, "a direction other than 0");
   for (std::size_t i = 0; i < 2; ++i) {
     near.share.at(i) = static_cast<std::uint16_t>(std::lround(shares.at(i) / sum * (1 << 14)));
   }
@@ -87,7 +92,9 @@ ImpostorScreen::ImpostorScreen(const Camera& camera, int width, int height)
       is_perspective_(camera.projection == Camera::Projection::Perspective),
       width_(width),
       height_(height),
-      focal_(height / (is_perspective_ ? 2.0 * std::tan(camera.vertical_fov_radians / 2.0) : camera.view_height)) {}
+      focal_(height / (is_perspective_ ? 2.0 * std::tan(camera.vertical_fov_radians / 2.0) : camera.view_height)) {
+  QUOIN_ASSERT(width > 0 && height > 0, "a positive image size");
+}
 
 std::optional<PixelArea> ImpostorScreen::area_of(const Sphere& sphere) const {
   const DVec3 seen = sphere.seen;

@@ -7,6 +7,7 @@
 
 #include <tsl/robin_map.h>
 
+#include <quoin/core/assert.h>
 #include <quoin/trace/packet.h>
 
 #include "render/impostor/morton.h"
@@ -29,6 +30,7 @@ raster::Aim aim_of(const SnapshotCamera& camera) {
 template <class Visit>
 void draw_texels(const ImpostorFaces::Level& level, std::uint32_t views, const SnapshotCamera& camera, int edge,
                  const TexelArea& area, raster::Canvas& canvas, Visit visit) {
+  QUOIN_ASSERT(area.left >= 0 && area.right <= edge && area.top >= 0 && area.bottom <= edge, "texels of the snapshot");
   const raster::Aim aim = aim_of(camera);
   raster::Job job;
   job.level = &level;
@@ -68,6 +70,7 @@ class SeenAgain {
         found_(now.size()) {}
 
   void take(int view, const IBox& changed) {
+    QUOIN_ASSERT(view >= 0 && view < kImpostorViews, "one of the views");
     const SnapshotCamera camera = snapshot_camera(*content_, view, edge_);
     const TexelArea core = texels_of(camera, {changed.min - 1, changed.max + 1}, edge_);
     const TexelArea around = widened(core, camera);
@@ -118,6 +121,7 @@ class SeenAgain {
 
 // Requires: `faces` are whole.
 std::vector<SeenFace> seen_of(const ImpostorFaces& faces) {
+  QUOIN_ASSERT(faces.is_whole, "complete faces");
   std::vector<SeenFace> seen(faces.faces.size());
   for (std::size_t i = 0; i < seen.size(); ++i) seen[i].face = {faces.faces[i].voxel, faces.faces[i].direction};
   const ImpostorFaces::Level& from = faces.levels[0];
@@ -222,6 +226,7 @@ std::vector<SeenFace> sorted(const std::vector<SeenFace>& faces, IVec3 least) {
 
 std::vector<SeenFace> faces_seen_of(const ImpostorShell& shell, const FieldSurfels& field, const IBox& box,
                                     const ContentSphere& content, int edge) {
+  QUOIN_ASSERT(field.surfels.size() == field.faces.size(), "one surfel per face");
   std::vector<SeenFace> faces = unseen_of(shell);
   for (std::size_t i = 0; i < field.faces.size(); ++i) faces.push_back({field.faces[i], &field.surfels[i], 0});
   const ImpostorFaces::Level level = all_faces(faces, content);

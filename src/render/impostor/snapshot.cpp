@@ -13,6 +13,7 @@
 namespace quoin {
 
 TexelArea texels_of(const SnapshotCamera& camera, const IBox& box, int edge) {
+  QUOIN_ASSERT(!box.empty() && edge >= 1, "a box, and at least one texel");
   const double half = 0.5 * edge;
   constexpr double kRoom = 1e-6;
   const auto block_of = [&](double texel) {
@@ -33,6 +34,7 @@ TexelArea texels_of(const SnapshotCamera& camera, const IBox& box, int edge) {
 }
 
 RayPacket rays_of_texels(const SnapshotCamera& camera, int edge, int column, int row) {
+  QUOIN_ASSERT(column >= 0 && column < edge && row >= 0 && row < edge, "a texel of the snapshot");
   RayPacket rays;
   rays.origin_x.fill(camera.position.x);
   rays.origin_y.fill(camera.position.y);

@@ -10,6 +10,8 @@
 
 #include <glm/geometric.hpp>
 
+#include <quoin/core/assert.h>
+
 #include "core/coordinates/chunk_order.h"
 #include "trace/density/smooth_normal.h"
 
@@ -76,7 +78,9 @@ class SurfelMaker {
   }
   void take_edge(IVec3 sample, int axis, bool is_solid_below) {
     const auto direction = static_cast<Direction>(2 * axis + (is_solid_below ? 0 : 1));
-    const double offset = *height(sample, axis, is_solid_below);
+    const std::optional<double> crossing = height(sample, axis, is_solid_below);
+    QUOIN_ASSERT(crossing.has_value(), "an edge that the surface crosses");
+    const double offset = *crossing;
     DVec3 point(sample);
     point[axis] += offset;
     const DVec3 normal = normal_at(point);

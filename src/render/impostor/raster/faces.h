@@ -8,6 +8,7 @@
 
 #include <glm/geometric.hpp>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/direction.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/voxel_registry.h>
@@ -123,8 +124,12 @@ struct ImpostorFaces {
   std::vector<Face> faces;
   std::vector<Surfel> surfels;  ///< of the last of `faces`
   /// The rectangles of one part of a drawn impostor: `level` of `levels`, or `unseen` for kLevels.
-  [[nodiscard]] const Level& level(std::size_t number) const { return number < kLevels ? levels[number] : unseen; }
+  [[nodiscard]] const Level& level(std::size_t number) const {
+    QUOIN_ASSERT(number <= kLevels, "a level, or the unseen faces");
+    return number < kLevels ? levels[number] : unseen;
+  }
   [[nodiscard]] const Surfel& surfel_of(std::size_t face) const {
+    QUOIN_ASSERT(face < faces.size() && face >= faces.size() - surfels.size(), "a face with a surfel");
     return surfels[face - (faces.size() - surfels.size())];
   }
 

@@ -2,6 +2,8 @@
 
 #include <limits>
 
+#include <quoin/core/assert.h>
+
 #include "core/instruction_set.h"
 
 namespace quoin::raster {
@@ -14,6 +16,7 @@ Vector single(DVec3 v) {
 }  // namespace
 
 void set_aim(const Aim& aim, double x, double y, Job& job) {
+  QUOIN_ASSERT(aim.focal > 0.0 && aim.voxel_size > 0.0, "a positive focal length and voxel size");
   const DVec3 centre = aim.centre;
   const double step = (aim.is_perspective ? centre.z : 1.0) / aim.focal;  // voxels per pixel at the centre
   job.point.at = single(aim.right * (x * step - centre.x) + aim.down * (y * step - centre.y));

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/hash.h>
 
 #include "render/impostor/raster/faces.h"
@@ -18,6 +19,7 @@ inline constexpr std::size_t kPixels = std::size_t{kTile} * kTile;
 
 /// Returns the index of pixel (x, y) in a tile's arrays: 4x4 pixels together, lane x + 4 y.
 [[nodiscard]] constexpr std::size_t index_of(int x, int y) {
+  QUOIN_ASSERT(x >= 0 && x < kTile && y >= 0 && y < kTile, "a pixel of the tile");
   const int block = y / kBlock * (kTile / kBlock) + x / kBlock;
   return static_cast<std::size_t>(block * kBlock * kBlock + y % kBlock * kBlock + x % kBlock);
 }
@@ -124,12 +126,17 @@ struct Met {
     const auto bits = static_cast<std::uint32_t>(packed);
     return {bits >> 5, bits & 31U};
   }
-  [[nodiscard]] constexpr std::int32_t packed() const { return static_cast<std::int32_t>(rectangle << 5 | view); }
+  [[nodiscard]] constexpr std::int32_t packed() const {
+    QUOIN_ASSERT(rectangle < 1U << 26 && view < 32, "a number of 26 bits and a view of 5 bits");
+    return static_cast<std::int32_t>(rectangle << 5 | view);
+  }
 };
 
 /// Returns the face that lights a hit: an index into ImpostorFaces::faces.
 [[nodiscard]] inline std::uint32_t face_of(const ImpostorFaces::Level& level, Met met) {
+  QUOIN_ASSERT(met.rectangle < level.face.size(), "a rectangle of the level");
   const std::uint32_t at = level.face[met.rectangle];
+  QUOIN_ASSERT(level.cells.empty() || (at < level.cells.size() && met.view < kImpostorViews), "a cell, and a view");
   return level.cells.empty() ? at : level.cells[at].face[met.view];
 }
 

@@ -11,6 +11,8 @@
 #include <cstdint>
 #include <limits>
 
+#include <quoin/core/assert.h>
+
 #include "core/lanes/lanes.h"
 #include "render/impostor/raster/raster.h"
 
@@ -130,6 +132,7 @@ inline void put(const Job& job, std::size_t side, float x, float y, float depth,
   if (!job.level->cells.empty()) {
     float along = (depth - job.depth_at) / job.depth_step;
     const std::uint32_t number = job.level->face[rectangle];
+    QUOIN_ASSERT(number < job.level->cells.size(), "a cell of the level");
     const ImpostorFaces::Cell& cell = job.level->cells[number];
     const int bit = follow(job, cell, side, x, y, along);
     if (bit < 0) return;
@@ -213,6 +216,7 @@ inline void put_all(const Job& job, const Side& side, const F (&q)[3], const F (
 
 void draw_group(const Job& job, const Side& side, std::size_t begin, Canvas& canvas) {
   const ImpostorFaces::Level& level = *job.level;
+  QUOIN_ASSERT(begin + ImpostorFaces::kGroup <= level.count(), "a group of the level");
   const bool has_reach = !level.reach[0].empty();
   Areas areas;
   for (std::size_t first = begin; first < begin + ImpostorFaces::kGroup; first += kLanes) {
@@ -297,6 +301,10 @@ bool is_seen(const Job& job, const Side& side) {
 }
 
 void draw_faces(const Job& job, Canvas& canvas) {
+  QUOIN_ASSERT(job.level != nullptr, "a level to draw");
+  QUOIN_ASSERT(job.left >= 0 && job.left < job.right && job.right <= kTile && job.top >= 0 && job.top < job.bottom &&
+                   job.bottom <= kTile,
+               "pixels of the tile");
   for (std::size_t i = 0; i < ImpostorFaces::kSides; ++i) {
     const std::size_t begin = job.level->begin[i] / ImpostorFaces::kGroup;
     const std::size_t end = job.level->begin[i + 1] / ImpostorFaces::kGroup;
