@@ -5,6 +5,8 @@
 #include <mutex>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 #include "core/work/worker_count.h"
 #include "core/work/workers.h"
 

@@ -26,6 +26,7 @@ constexpr int kCompressionLevel = 1;
 constexpr std::size_t kKeptBytes = std::size_t{4} << 20;
 
 std::uint64_t checksum_of(std::span<const std::byte> body) {
+  QUOIN_ASSERT(body.size() >= sizeof(std::uint64_t), "a body with a checksum");
   return XXH3_64bits(body.data() + sizeof(std::uint64_t), body.size() - sizeof(std::uint64_t));
 }
 
@@ -130,6 +131,7 @@ Status ChunkEncoder::encode(const ChunkAddress& place, std::uint64_t revision, c
     sections |= chunk_sections::kDensities;
     density_writer_.write(*densities, voxel_writer_, content_);
   }
+  QUOIN_ASSERT(content_.size() <= kMaxChunkContent, "at most the content that a reader accepts");
   put_number(out, std::uint64_t{0});
   for (const char letter : kMagic) out.push_back(static_cast<std::byte>(letter));
   put_number(out, sections);
@@ -182,6 +184,7 @@ ChunkDecoder::~ChunkDecoder() = default;
 
 Result<std::span<const std::byte>> ChunkDecoder::impl_of(const ChunkBodyHeader& header,
                                                          std::span<const std::byte> body) {
+  QUOIN_ASSERT(body.size() >= kChunkBodyHeader, "a body with a header");
   const auto stored = body.subspan(kChunkBodyHeader);
   if ((header.sections & chunk_sections::kCompressed) == 0) return stored;
   // Checked before memory is allocated; the encoder always stores the size in the frame.

@@ -26,6 +26,7 @@ void put_number(std::vector<std::byte>& out, T number) {
 
 template <class T>
 [[nodiscard]] T number_at(const std::byte* bytes) {
+  QUOIN_ASSERT(bytes != nullptr, "bytes of a number");
   return load<T>(bytes, std::endian::little);
 }
 
@@ -42,7 +43,10 @@ class ContentReader {
 
   [[nodiscard]] std::size_t at() const { return at_; }
   [[nodiscard]] bool is_at_end() const { return at_ == bytes_.size(); }
-  [[nodiscard]] bool has(std::size_t count) const { return bytes_.size() - at_ >= count; }
+  [[nodiscard]] bool has(std::size_t count) const {
+    QUOIN_ASSERT(at_ <= bytes_.size(), "a position within the content");
+    return bytes_.size() - at_ >= count;
+  }
   /// Requires: has(sizeof(T)).
   template <class T>
   T take() {

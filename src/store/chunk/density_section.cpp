@@ -48,6 +48,7 @@ class Expectation {
 
   /// Predicts a row. Requires: rows come in the order of z, then y.
   void expect(int y, int z, std::array<std::int32_t, kRow>& ranks) const {
+    QUOIN_ASSERT(y >= 0 && y < kChunkEdge && z >= 0 && z < kChunkEdge, "0 <= y, z < 64");
     const auto row = static_cast<std::size_t>(y);
     const FloatRow& below = layers_[z & 1][y > 0 ? row - 1 : 0];
     const FloatRow& behind = layers_[(z & 1) ^ 1][row];
@@ -64,6 +65,7 @@ class Expectation {
   }
   /// Sets the row's actual values.
   void put(int y, int z, const Half* row) {
+    QUOIN_ASSERT(y >= 0 && y < kChunkEdge && z >= 0 && row != nullptr, "a row of the chunk");
     FloatRow& values = layers_[z & 1][static_cast<std::size_t>(y)];
     for (std::size_t x = 0; x < kRow; ++x) values[x] = float_from_half(row[x]);
   }
@@ -180,7 +182,9 @@ namespace {
 class StoredHalves {
  public:
   // Requires: band > 0.
-  explicit StoredHalves(float band) : least_(stored_density(kMinHalf, band)), largest_(stored_density(band, band)) {}
+  explicit StoredHalves(float band) : least_(stored_density(kMinHalf, band)), largest_(stored_density(band, band)) {
+    QUOIN_ASSERT(band > 0.0F, "a positive band");
+  }
 
   [[nodiscard]] bool has(Half half) const {
     const std::uint32_t magnitude = half & kMagnitude;
@@ -238,6 +242,7 @@ Status read_rows(ContentReader& reader, const StoredHalves& stored, Half largest
                  DensityStorage& m) {
   const std::size_t begin = reader.at();
   if (!reader.has(slots * kSlabValues * sizeof(Half))) return reader.cut_off();
+  QUOIN_ASSERT(slots <= kSlabs, "at most the slabs of a chunk");
   m.values.resize(slots * kSlabValues);
   const std::byte* low = reader.take_bytes(m.values.size()).data();
   const std::byte* high = reader.take_bytes(m.values.size()).data();
@@ -263,6 +268,7 @@ Status read_rows(ContentReader& reader, const StoredHalves& stored, Half largest
       high += kRow;
     }
   }
+  QUOIN_ASSERT(low == first + m.values.size(), "every value was read");
   return {};
 }
 

@@ -15,6 +15,7 @@ std::string at_voxel(IVec3 local) {
 }
 
 IVec3 local_of_place(std::uint32_t place) {
+  QUOIN_ASSERT(place < kChunkVoxels, "a voxel of the chunk");
   const auto at = static_cast<int>(place);
   return {at % kChunkEdge, at / kChunkEdge % kChunkEdge, at / kChunkEdge / kChunkEdge};
 }
@@ -64,11 +65,13 @@ Status read_voxel(Streams& streams, const VoxelRegistry& types, std::uint32_t& n
 }  // namespace
 
 Status write_placed_data(const Chunk& chunk, std::vector<std::byte>& out) {
+  QUOIN_ASSERT(chunk.data_count() != 0, "a chunk with data");
   std::array<std::vector<std::byte>, 3> streams;
   std::size_t total = 0;
   std::uint32_t next = 0;
   chunk.for_each_data([&](IVec3 local, const VoxelData& data) {
     const auto place = static_cast<std::uint32_t>((local.z * kChunkEdge + local.y) * kChunkEdge + local.x);
+    QUOIN_ASSERT(place >= next, "voxels in the order of their places");
     put_short_number(streams[0], place - next);
     put_short_number(streams[1], data.state);
     put_short_number(streams[2], static_cast<std::uint32_t>(data.bytes.size()));

@@ -50,8 +50,10 @@ struct VoxelRunReader::Streams {
 
   template <int kBits>
   [[nodiscard]] std::uint32_t take_index() {
+    QUOIN_ASSERT(next < runs, "a run that is left");
     const std::uint32_t i = next++;
     if constexpr (kBits == 1) return i & 1U;
+    QUOIN_ASSERT(low != nullptr && (kBits < 16 || high != nullptr), "a stream of indices");
     const auto index = std::to_integer<std::uint32_t>(low[i]);
     return kBits < 16 ? index : index | std::to_integer<std::uint32_t>(high[i]) << 8;
   }
@@ -118,6 +120,7 @@ class VoxelRunReader::Builder {
   Builder(const std::vector<VoxelType>& palette, std::vector<std::uint32_t>& counts,
           std::vector<std::uint64_t>& changes, std::vector<std::uint64_t>& words)
       : palette_(palette), counts_(counts), changes_(changes), words_(words) {
+    QUOIN_ASSERT(!palette_.empty() && palette_.size() <= std::size_t{1} << kBits, "a palette of indices of kBits bits");
     counts_.assign(palette_.size(), 0);
     changes_.assign(kRows * kBits, 0);
     words_.resize(std::max(words_.size(), kChunkVoxels / 64 * kBits));
@@ -129,6 +132,7 @@ class VoxelRunReader::Builder {
 
   /// Takes the runs that start in the next four layers.
   [[nodiscard]] Fault take_runs(Streams& streams) {
+    QUOIN_ASSERT(layers_begin_ < kChunkVoxels && voxel_ >= layers_begin_, "layers that are left");
     // Local copies stay in registers: for the compiler the loop's writes could alias any member.
     Streams s = streams;
     std::uint64_t* const changes = changes_.data();
@@ -183,6 +187,7 @@ class VoxelRunReader::Builder {
 
   /// Makes slabs of these layers. Requires: their runs were taken.
   void end_layers() {
+    QUOIN_ASSERT(voxel_ >= layers_begin_ + kVoxels, "layers whose runs were taken");
     const auto first_y = static_cast<int>(layers_begin_ / (kChunkEdge * kChunkEdge));
     std::array<std::uint32_t, kRows> before;  // index of the voxel before each row
     std::array<std::uint32_t, kRows> first;   // index of its first voxel; with kMixed if others follow
@@ -206,6 +211,7 @@ class VoxelRunReader::Builder {
         continue;
       }
       entry = m_->slot_count++;
+      QUOIN_ASSERT((std::size_t{entry} + 1) * kSlabRows * kBits <= words_.size(), "room for every slab");
       std::uint64_t* out = words_.data() + std::size_t{entry} * kSlabRows * kBits;
       for (std::uint32_t i = 0; i < kSlabRows; ++i, out += kBits) {
         const std::uint32_t row = row_of_slab(z, i);
@@ -222,6 +228,7 @@ class VoxelRunReader::Builder {
 
   /// Requires: all layers ended, and each index of the palette was seen.
   Chunk finish() {
+    QUOIN_ASSERT(layers_begin_ == kChunkVoxels && seen_ == palette_.size(), "a whole chunk that has every type");
     ChunkStorage& m = *m_;
     m.bits = kBits;
     m.words = PagedWords(std::span(words_).first(std::size_t{m.slot_count} * kSlabRows * kBits));

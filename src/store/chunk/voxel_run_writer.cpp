@@ -96,6 +96,7 @@ struct VoxelRunWriter::Scan {
   }
   void operator()(std::uint32_t voxel, std::uint32_t stored) {
     if (voxel != 0) end_run(voxel);
+    QUOIN_ASSERT(stored < writer.new_index_.size() && runs() < kChunkVoxels, "a stored index, and room for the run");
     std::uint32_t found = writer.new_index_[stored];
     if (found == kUnseen) [[unlikely]] {
       found = static_cast<std::uint32_t>(writer.palette_.size());
@@ -106,6 +107,7 @@ struct VoxelRunWriter::Scan {
     first = voxel;
   }
   void end_run(std::uint32_t voxel) {
+    QUOIN_ASSERT(voxel > first && voxel <= kChunkVoxels, "runs in the order of the voxels");
     std::uint32_t rest = voxel - first - 1;
     for (; rest >= 0x80; rest >>= 7) *length++ = static_cast<std::uint8_t>(rest | 0x80U);
     *length++ = static_cast<std::uint8_t>(rest);
@@ -143,6 +145,7 @@ void VoxelRunWriter::write(const Chunk& chunk, std::vector<std::byte>& out) {
 }
 
 void VoxelRunWriter::put_palette(std::vector<std::byte>& out) const {
+  QUOIN_ASSERT(!palette_.empty() && palette_.size() <= kAllTypes, "1 to 65,536 types");
   put_number(out, static_cast<std::uint16_t>(palette_.size() - 1));
   for (const VoxelType type : palette_) put_number(out, type);
 }
@@ -173,6 +176,7 @@ void VoxelRunWriter::put_packed(const Chunk& chunk, std::vector<std::byte>& out)
       for (int x = 0; x < kChunkEdge; ++x) {
         const std::uint32_t stored =
             is_uniform ? entry & ~ChunkStorage::kUniformSlab : packed_row::read(from, m.bits, x);
+        QUOIN_ASSERT(new_index_[stored] < palette_.size(), "a type of the palette");
         packed_row::write(row.data(), bits, x, new_index_[stored]);
       }
       for (int i = 0; i < bits; ++i) put_number(out, row[static_cast<std::size_t>(i)]);

@@ -103,6 +103,7 @@ void Statement::bind(int parameter, std::span<const std::byte> bytes) {
 }
 
 Result<bool> Statement::step() {
+  QUOIN_ASSERT(is_prepared(), "a prepared statement");
   const int code = sqlite3_step(statement_.get());
   if (code == SQLITE_ROW) return true;
   if (code == SQLITE_DONE) return false;
@@ -123,10 +124,12 @@ void Statement::reset() {
 }
 
 std::int64_t Statement::integer(int column) const {
+  QUOIN_ASSERT(column >= 0 && column < sqlite3_data_count(statement_.get()), "a column of a row");
   return sqlite3_column_int64(statement_.get(), column);
 }
 
 std::span<const std::byte> Statement::bytes(int column) const {
+  QUOIN_ASSERT(column >= 0 && column < sqlite3_data_count(statement_.get()), "a column of a row");
   const auto* const data = static_cast<const std::byte*>(sqlite3_column_blob(statement_.get(), column));
   const int count = sqlite3_column_bytes(statement_.get(), column);
   return data == nullptr ? std::span<const std::byte>() : std::span(data, static_cast<std::size_t>(count));
@@ -138,10 +141,12 @@ std::string_view Statement::text(int column) const {
 }
 
 bool Statement::is_integer(int column) const {
+  QUOIN_ASSERT(column >= 0 && column < sqlite3_data_count(statement_.get()), "a column of a row");
   return sqlite3_column_type(statement_.get(), column) == SQLITE_INTEGER;
 }
 
 bool Statement::is_bytes(int column) const {
+  QUOIN_ASSERT(column >= 0 && column < sqlite3_data_count(statement_.get()), "a column of a row");
   const int type = sqlite3_column_type(statement_.get(), column);
   return type == SQLITE_BLOB || type == SQLITE_TEXT;
 }
@@ -213,6 +218,7 @@ Status Connection::set_up(Mode mode) {
 }
 
 Result<Statement> Connection::prepare(std::string_view sql) {
+  QUOIN_ASSERT(database_ != nullptr, "an open connection");
   sqlite3_stmt* statement = nullptr;
   const int code = sqlite3_prepare_v3(database_.get(), sql.data(), static_cast<int>(sql.size()),
                                       SQLITE_PREPARE_PERSISTENT, &statement, nullptr);
@@ -222,6 +228,7 @@ Result<Statement> Connection::prepare(std::string_view sql) {
 }
 
 Status Connection::run(const char* sql) {
+  QUOIN_ASSERT(database_ != nullptr && sql != nullptr, "an open connection, and a statement");
   const int code = sqlite3_exec(database_.get(), sql, nullptr, nullptr, nullptr);
   if (code != SQLITE_OK) return error_of(database_.get(), code);
   return {};

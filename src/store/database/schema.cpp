@@ -18,6 +18,7 @@ namespace {
 
 // Spreads bits 0 to 4 of a number to every third bit.
 std::uint32_t spread(std::uint32_t bits) {
+  QUOIN_ASSERT(bits < 32, "5 bits");
   bits = (bits | bits << 8) & 0x100FU;
   bits = (bits | bits << 4) & 0x10C3U;
   return (bits | bits << 2) & 0x1249U;

@@ -12,6 +12,7 @@
 #include <variant>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
 #include <quoin/store/world_store.h>
 
@@ -58,11 +59,13 @@ inline constexpr IBox kAllChunks{{-(1 << 26), -(1 << 26), -(1 << 26)}, {1 << 26,
 [[nodiscard]] std::int64_t key_of(std::int64_t region, IVec3 chunk);
 /// Returns the chunk of a key in a region. Ignores the upper bits of the key.
 [[nodiscard]] IVec3 chunk_of_key(const RegionPlace& region, std::int64_t key);
-[[nodiscard]] inline std::int64_t first_key(std::int64_t region) {
-  return region << kRegionBits;
-}
 /// Maximum region id: keys of larger ids would overflow int64.
 inline constexpr std::int64_t kMaxRegion = (std::int64_t{1} << (62 - kRegionBits)) - 1;
+/// Returns the first key of a region; of the number after the last region, the end of all keys.
+[[nodiscard]] inline std::int64_t first_key(std::int64_t region) {
+  QUOIN_ASSERT(region >= 0 && region <= kMaxRegion + 1, "a region's id");
+  return region << kRegionBits;
+}
 
 /// The id of a part: a number or a name.
 using PartId = std::variant<std::int64_t, std::string>;

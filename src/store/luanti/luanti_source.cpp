@@ -159,6 +159,7 @@ class Readers {
 
   void give_back(std::unique_ptr<Reader> reader) {
     const std::scoped_lock lock(mutex_);
+    QUOIN_ASSERT(used_ > 0, "a reader that was taken");
     --used_;
     if (reader != nullptr) free_.push_back(std::move(reader));
     given_back_.notify_one();
@@ -217,6 +218,7 @@ class ChunkBuilder {
   }
   /// `corner`: of the block within the chunk. Errors: LimitExceeded, of types.
   Status put(const MapBlock& block, IVec3 corner) {
+    QUOIN_ASSERT(((corner.x | corner.y | corner.z) & ~(kChunkEdge - kBlockEdge)) == 0, "a block of the chunk");
     types_of_.clear();
     for (const std::string& name : block.names) {
       const auto type = types_.find(name);
@@ -224,6 +226,7 @@ class ChunkBuilder {
       types_of_.push_back(*type);
     }
     for (std::size_t i = 0; i < kBlockNodes; ++i) {
+      QUOIN_ASSERT(block.nodes[i] < types_of_.size(), "a node with a name");
       const VoxelType type = types_of_[block.nodes[i]];
       if (type == kAir) continue;
       const auto node = static_cast<int>(i);

@@ -18,9 +18,13 @@
 
 #include <zstd.h>
 
+#include <quoin/core/assert.h>
 #include "core/bytes/byte_order.h"
 #include "core/bytes/byte_reader.h"
 #include "core/bytes/byte_stream.h"
+#include "io/byte_order.h"
+#include "io/byte_reader.h"
+#include "io/byte_stream.h"
 
 namespace quoin::store::luanti {
 
@@ -52,6 +56,7 @@ Result<std::size_t> read_widths(ByteReader& reader) {
 
 /// Sets the block's nodes. Requires: `content` has the bytes of 4096 nodes.
 void put_nodes(std::span<const std::byte> content, std::size_t width, MapBlock& block) {
+  QUOIN_ASSERT((width == 1 || width == 2) && content.size() >= kBlockNodes * (width + 2), "the bytes of 4096 nodes");
   const std::byte* const param2 = content.data() + kBlockNodes * (width + 1);
   for (std::size_t i = 0; i < kBlockNodes; ++i) {
     block.param2[i] = std::to_integer<std::uint8_t>(param2[i]);

@@ -5,6 +5,8 @@
 #include <set>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 #include "store/world/world_rules.h"
 
 namespace quoin::store {
@@ -93,6 +95,7 @@ Result<std::vector<KeyGap>> ChunkRows::each(FunctionRef<RowVerdict(std::int64_t,
 }
 
 std::string about(const KeyGap& gap, const std::map<std::int64_t, RegionPlace>& regions) {
+  QUOIN_ASSERT(gap.first <= gap.last, "a range of keys");
   const auto place_of = [&](std::int64_t key) -> std::optional<std::string> {
     const auto region = regions.find(key >> kRegionBits);
     if (region == regions.end()) return std::nullopt;

@@ -38,6 +38,9 @@ class SpooledMesh {
     for (std::size_t i = 0; i < kSurfaceClasses; ++i) {
       const BlockyTriangles& from = mesh.surfaces[i];
       if (from.indices.empty()) continue;
+      QUOIN_ASSERT(from.directions.size() == from.positions.size() && from.types.size() == from.positions.size() &&
+                       from.occlusion.size() == from.positions.size(),
+                   "one value per vertex");
       Surface& to = surfaces_[i];
       if (to.vertices + from.positions.size() > std::numeric_limits<std::uint32_t>::max() - 1'024) {
         return make_error(ErrorCode::LimitExceeded, "the mesh needs more than 2^32 vertices");

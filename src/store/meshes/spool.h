@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/result.h>
 
 namespace quoin::store {
@@ -30,6 +31,8 @@ class Spool {
   /// Returns all values. Lifetime: as the spool. Requires: finished, and written as values of that type.
   template <class T>
   [[nodiscard]] std::span<const T> values() const {
+    QUOIN_ASSERT(buffer_.empty() && (mapped_ != nullptr || written_ == 0), "a finished spool");
+    QUOIN_ASSERT(written_ % sizeof(T) == 0, "whole values of this type");
     return {static_cast<const T*>(mapped_), static_cast<std::size_t>(written_) / sizeof(T)};
   }
   [[nodiscard]] std::uint64_t bytes() const { return written_ + buffer_.size(); }

@@ -99,6 +99,9 @@ std::vector<PageLayout> PageFile::layouts() const {
 }
 
 void PageFile::set_layout(const PageLayout& layout) {
+  QUOIN_ASSERT(is_page_size(static_cast<std::uint32_t>(layout.page_size)) && layout.usable <= layout.page_size &&
+                   layout.usable >= kMinUsable,
+               "a layout of `layouts`");
   layout_ = layout;
   file_pages_ = static_cast<std::size_t>((file_.size() + layout.page_size - 1) / layout.page_size);
   frames_.clear();
@@ -115,6 +118,7 @@ void PageFile::set_layout(const PageLayout& layout) {
 }
 
 std::uint64_t PageFile::offset_of_frame(std::size_t frame) const {
+  QUOIN_ASSERT(log_.has_value(), "a database with a log");
   return kLogHeader + std::uint64_t{frame} * (kFrameHeader + layout_.page_size);
 }
 
@@ -125,6 +129,7 @@ void PageFile::read(std::size_t index, std::span<std::byte> page) const {
 }
 
 std::vector<PageView> PageFile::views(std::size_t index) const {
+  QUOIN_ASSERT(index < page_count(), "a page of the file or of its log");
   if (frames_.empty()) return {{0}};
   if (index < file_pages_) return {{0}, {frames_.size()}};
   std::size_t end = index - file_pages_;

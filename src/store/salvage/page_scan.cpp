@@ -8,7 +8,9 @@
 #include <string>
 #include <utility>
 
+#include <quoin/core/assert.h>
 #include "core/bytes/byte_order.h"
+#include "io/byte_order.h"
 #include "store/chunk/chunk_body.h"
 #include "store/salvage/page_file.h"
 
@@ -56,6 +58,7 @@ std::optional<std::uint64_t> bytes_of_type(std::uint64_t type) {
 
 /// Returns the bytes of a payload within the page of its cell.
 std::size_t local_bytes(std::uint64_t payload, std::size_t usable) {
+  QUOIN_ASSERT(usable >= 480, "at least 480 usable bytes in a page");
   if (payload <= usable - 35) return static_cast<std::size_t>(payload);
   const std::size_t least = (usable - 12) * 32 / 255 - 23;
   const std::size_t local = least + static_cast<std::size_t>((payload - least) % (usable - 4));
@@ -94,6 +97,7 @@ class Scan {
   /// Requires: fits(payload).
   template <class IsIt>
   void each_state(std::span<const std::byte> page, std::size_t index, const Payload& payload, IsIt&& is_it) {
+    QUOIN_ASSERT(page.size() == file_.layout().page_size && fits(payload), "a payload that fits its page");
     const std::size_t local = local_bytes(payload.bytes, usable());
     const auto here = page.subspan(payload.at, local);
     if (local == payload.bytes) {
@@ -166,6 +170,7 @@ std::optional<FoundBody> row_of_body(std::span<const std::byte> page, std::size_
 
 /// Returns the row's key, which lies between the payload's length and the payload.
 std::int64_t key_before(std::span<const std::byte> page, const Payload& payload) {
+  QUOIN_ASSERT(payload.at <= page.size(), "a payload of this page");
   for (std::size_t bytes = 1; bytes <= 9 && bytes < payload.at; ++bytes) {
     const auto key = varint_before(page, payload.at, bytes);
     if (!key) continue;
@@ -227,6 +232,7 @@ void Scan::find_layout() {
 
 /// Reads the header of a record. Returns false if its lengths disagree with the payload's.
 bool read_types(std::span<const std::byte> page, const Payload& payload, std::vector<std::uint64_t>& types) {
+  QUOIN_ASSERT(payload.at <= page.size(), "a payload of this page");
   const std::size_t local = std::min<std::uint64_t>(payload.bytes, page.size() - payload.at);
   const auto record = page.subspan(payload.at, local);
   const Varint header = varint_at(record, 0);
@@ -246,6 +252,7 @@ bool read_types(std::span<const std::byte> page, const Payload& payload, std::ve
 }
 
 ColumnValue value_of(std::uint64_t type, std::span<const std::byte> bytes) {
+  QUOIN_ASSERT(bytes_of_type(type) == bytes.size(), "the bytes of that type");
   if (type == 0) return {};
   if (type >= 12) {
     if (type % 2 == 0) return std::vector<std::byte>(bytes.begin(), bytes.end());
@@ -264,6 +271,7 @@ void read_columns(std::span<const std::byte> payload, const std::vector<std::uin
   std::size_t at = static_cast<std::size_t>(varint_at(payload, 0).value);
   for (const std::uint64_t type : types) {
     const auto bytes = static_cast<std::size_t>(*bytes_of_type(type));
+    QUOIN_ASSERT(at <= payload.size() && bytes <= payload.size() - at, "columns within the payload");
     record.columns.push_back(value_of(type, payload.subspan(at, bytes)));
     at += bytes;
   }

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/changes.h>
 #include <quoin/store/world_saver.h>
 
@@ -34,6 +35,7 @@ struct Numbers {
     return number;
   }
   void add(Handle<T> handle, std::int64_t number) {
+    QUOIN_ASSERT(number >= 0 && !numbers.contains(handle), "a number for a new element");
     numbers.emplace(handle, number);
     next = std::max(next, number + 1);
   }

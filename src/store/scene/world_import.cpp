@@ -1,3 +1,4 @@
+#include <quoin/core/assert.h>
 #include <quoin/store/world_import.h>
 
 #include <algorithm>
@@ -201,6 +202,7 @@ class Import {
 
   // Reads the next parts in parallel, numbers their types in order and saves them.
   Status read_parts(std::size_t count) {
+    QUOIN_ASSERT(count <= source_.parts().size() - done_.parts, "parts of the source");
     std::vector<std::optional<Result<SourcePart>>> read(count);
     parallel_for(count, threads_, [&](std::size_t i) { read[i] = source_.read_part(done_.parts + i); });
     const std::size_t known_types = types_.size();

@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include <quoin/core/assert.h>
 #include <quoin/store/world_saver.h>
 
 #include "core/bytes/error_path.h"
@@ -103,6 +104,7 @@ class Load {
   }
 
   void add_grid(std::uint32_t number, SceneGrid grid, SavedGrid saved) {
+    QUOIN_ASSERT(!handles_.contains(number), "each grid is loaded once");
     const GridHandle handle = scene_.add_grid(std::move(grid));
     handles_[number] = handle;
     state_.grids.emplace(handle, std::move(saved));
@@ -165,6 +167,7 @@ class Load {
 
   Status read_instances() {
     return each<SceneFile::Placement>(part::kInstance, [&](std::int64_t number, const SceneFile::Placement& text) {
+      QUOIN_ASSERT(text.grid.has_value(), "a placement that was read has a grid");
       const auto grid = handles_.find(static_cast<std::int64_t>(*text.grid));
       if (grid == handles_.end()) {
         add_line("instance " + std::to_string(number) + ": its grid is lost");

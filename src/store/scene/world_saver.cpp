@@ -289,6 +289,7 @@ WorldSaver::~WorldSaver() = default;
 
 Result<SaveTicket> WorldSaver::save(WorldStore& world, const Scene& scene, WorldChanges more,
                                     std::function<void(const Status&)> on_saved) {
+  QUOIN_ASSERT(impl_ != nullptr && world.is_writable(), "a saver, and a world opened for writing");
   Save saving(world, scene, impl_->state, more);
   const Status put = saving.run();
   Result<SaveTicket> ticket = put ? world.save(std::move(more), std::move(on_saved)) : Result<SaveTicket>(put.error());

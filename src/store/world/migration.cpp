@@ -64,6 +64,7 @@ std::span<const MigrationStep> migration_steps() {
 }
 
 Status migrate(Connection& database, const std::filesystem::path& path, std::span<const MigrationStep> steps) {
+  QUOIN_ASSERT(!database.is_in_transaction(), "no transaction is open");
   const auto version = database.number("PRAGMA user_version");
   if (!version) return version.error();
   const auto first = std::ranges::find(steps, static_cast<int>(*version), &MigrationStep::from);

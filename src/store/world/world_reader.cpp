@@ -6,6 +6,8 @@
 
 #include <glm/common.hpp>
 
+#include <quoin/core/assert.h>
+
 namespace quoin::store {
 
 namespace {
@@ -32,6 +34,7 @@ bool is_small(const IBox& box) {
 }
 
 IBox regions_of(const IBox& chunks) {
+  QUOIN_ASSERT(!chunks.empty(), "a box with chunks");
   const IVec3 last = chunks.max - IVec3(1);
   return {{chunks.min.x >> kRegionShift, chunks.min.y >> kRegionShift, chunks.min.z >> kRegionShift},
           {(last.x >> kRegionShift) + 1, (last.y >> kRegionShift) + 1, (last.z >> kRegionShift) + 1}};

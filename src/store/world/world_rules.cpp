@@ -3,6 +3,8 @@
 #include <string>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 #include "store/chunk/placed_data.h"
 #include "store/world/part_text.h"
 
@@ -25,6 +27,7 @@ Status fill_types(VoxelRegistry& types, std::int64_t number, std::vector<std::st
 }
 
 Status put_type(VoxelRegistry& types, std::int64_t number, const VoxelProperties& properties) {
+  QUOIN_ASSERT(number >= 0 && number <= static_cast<std::int64_t>(types.size()), "a known type, or the next one");
   if (number == static_cast<std::int64_t>(types.size())) {
     const auto added = types.add(properties);
     return added ? Status() : Status(added.error());

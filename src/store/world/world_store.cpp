@@ -126,6 +126,7 @@ struct WorldStore::Impl {
     return WorldReader(std::move(*connection));
   }
   void give_back(std::unique_ptr<ReadKit> kit) const {
+    QUOIN_ASSERT(kit != nullptr, "a kit that was taken");
     const std::scoped_lock guard(mutex);
     idle.push_back(std::move(kit));
   }
@@ -281,6 +282,7 @@ Result<WorldStore> WorldParts::begin(std::unique_ptr<WorldStore::Impl> impl, std
 }
 
 Result<std::optional<StoredChunk>> WorldStore::load_chunk(const ChunkAddress& place) const {
+  QUOIN_ASSERT(impl_ != nullptr, "a world that was not moved from");
   if (impl_->writer != nullptr) {
     if (auto pending = impl_->writer->pending_chunk(place)) return std::move(*pending);
   }
@@ -295,6 +297,7 @@ Result<std::optional<StoredChunk>> WorldStore::load_chunk(const ChunkAddress& pl
 }
 
 Result<std::vector<IVec3>> WorldStore::chunks(std::uint32_t grid, std::uint8_t level, const IBox& box) const {
+  QUOIN_ASSERT(impl_ != nullptr, "a world that was not moved from");
   // Taken before the disk is read, so that chunks written in between are found on disk.
   WorldWriter::PendingChunks pending;
   if (impl_->writer != nullptr) pending = impl_->writer->pending_chunks(grid, level, box);
@@ -334,6 +337,7 @@ Result<std::map<std::uint32_t, WorldGrid>> WorldStore::grids() const {
 }
 
 std::uint32_t WorldStore::next_grid() {
+  QUOIN_ASSERT(impl_ != nullptr, "a world that was not moved from");
   const std::scoped_lock guard(impl_->mutex);
   return impl_->next_grid++;
 }
@@ -428,7 +432,7 @@ std::vector<std::string> WorldParts::damage(const WorldStore& world) {
 }
 
 Result<SaveTicket> WorldStore::save(WorldChanges changes, std::function<void(const Status&)> on_saved) {
-  QUOIN_ASSERT(impl_->writer != nullptr, "a world opened for writing");
+  QUOIN_ASSERT(impl_ != nullptr && impl_->writer != nullptr, "a world opened for writing");
   ChangeSet& content = changes.content();
   if (content.empty() && !on_saved) return SaveTicket{};
   // Under the lock: two threads that put types must not overtake each other.

@@ -63,6 +63,7 @@ SaveTicket WorldWriter::save(ChangeSet changes, OnSaved on_saved) {
   SaveTicket ticket;
   {
     const std::scoped_lock lock(mutex_);
+    QUOIN_ASSERT(!is_ending_, "a writer that is not ending");
     ticket.number = ++last_ticket_;
     note_pending(changes, ticket.number);
     Save save{ticket.number, std::move(changes), {}};
@@ -172,6 +173,7 @@ void WorldWriter::begin_group() {
   Save& first = group_.front();
   while (!queue_.empty() && first.changes.chunks.size() + queue_.front().changes.chunks.size() <= kGroupChunks) {
     Save& next = queue_.front();
+    QUOIN_ASSERT(next.last > first.last, "saves in the order of their tickets");
     try {
       first.on_saved.reserve(first.on_saved.size() + next.on_saved.size());
       first.changes.add(std::move(next.changes));
@@ -219,6 +221,7 @@ void WorldWriter::finish(const Status& outcome) {
     if (outcome) {
       const Save& save = group_.front();
       forget_pending(save);
+      QUOIN_ASSERT(save.last > saved_through_ && save.last <= last_ticket_, "saves in the order of their tickets");
       saved_through_ = save.last;
       stats_.commits += save.changes.empty() ? 0 : 1;
       stats_.saved_chunks += chunks_of_commit_;
