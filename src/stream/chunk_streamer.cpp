@@ -45,6 +45,7 @@ void append(std::vector<T>& to, std::vector<T>& from) {
 }  // namespace
 
 ChunkStreamer::ChunkStreamer(WorldStore& store, Options options) : store_(store), options_(options) {
+  QUOIN_ASSERT(options.workers > 0, "at least one worker");
   try {
     for (unsigned i = 0; i < options.workers; ++i) workers_.emplace_back([this] { run(); });
   } catch (...) {
@@ -143,6 +144,7 @@ void ChunkStreamer::read_inbox() {
     for (const StoredChunk& chunk : reading_.released) released_bytes_ += bytes_of(chunk);
   }
   reading_.released.clear();
+  QUOIN_ASSERT(read_events_ <= reading_.events.size(), "events that are left to read");
   for (; read_events_ < reading_.events.size(); ++read_events_) {
     const Event& event = reading_.events[read_events_];
     if (event.what == Event::What::Gone) {
@@ -258,6 +260,7 @@ void ChunkStreamer::hand_over(CompletedLoad completed) {
     {
       const std::scoped_lock outbox(outbox_mutex_);
       if (reserve_one(outbox_.completed_loads)) {
+        QUOIN_ASSERT(working_ > 0, "a chunk that a worker began");
         outbox_.completed_loads.push_back(std::move(completed));
         --working_;
         break;
@@ -320,6 +323,7 @@ void ChunkStreamer::wait_for_disk() {
 }
 
 void ChunkStreamer::make(const ChunkGenerator& generator, CompletedLoad& completed) {
+  QUOIN_ASSERT(generator.chunks().contains(completed.place.chunk), "a chunk that the generator can make");
   if (options_.keeps_made) wait_for_disk();
   auto made = generator.make(completed.place.chunk);
   if (!made) return add_problem(completed.place, made.error());

@@ -4,6 +4,8 @@
 #include <utility>
 #include <variant>
 
+#include <quoin/core/assert.h>
+
 namespace quoin::stream {
 
 Status check_types(const WorldEdit& edit, const VoxelRegistry& types) {
@@ -35,6 +37,7 @@ std::int64_t apply_fitting(const WorldEdit& edit, Grid& grid, DensityGrid& field
 }
 
 void keep_for(const WorldEdit& edit, const std::vector<IVec3>& chunks, WaitingEdits& waiting) {
+  QUOIN_ASSERT(!chunks.empty(), "at least one chunk");
   const auto* const set = std::get_if<WorldEdit::SetVoxels>(&edit.content);
   if (set == nullptr) {
     const auto shared = std::make_shared<const WorldEdit>(edit);

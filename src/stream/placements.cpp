@@ -6,6 +6,8 @@
 
 #include <glm/geometric.hpp>
 
+#include <quoin/core/assert.h>
+
 namespace quoin::stream {
 namespace {
 
@@ -60,6 +62,7 @@ void Placements::put(InstanceHandle instance) {
 }
 
 void Placements::swap(std::size_t a, std::size_t b) {
+  QUOIN_ASSERT(a < placed_.size() && b < placed_.size(), "two of the placements");
   std::swap(placed_[a], placed_[b]);
   index_[placed_[a].instance] = a;
   index_[placed_[b].instance] = b;
@@ -69,6 +72,7 @@ void Placements::remove(InstanceHandle instance) {
   const auto found = index_.find(instance);
   if (found == index_.end()) return;
   const std::size_t at = found->second;
+  QUOIN_ASSERT(at < placed_.size() && placed_[at].instance == instance, "an index that matches the list");
   if (at + 1 != placed_.size()) swap(at, placed_.size() - 1);
   placed_.pop_back();
   index_.erase(instance);
@@ -77,6 +81,7 @@ void Placements::remove(InstanceHandle instance) {
 }
 
 std::vector<InstanceHandle> Placements::instances() const {
+  QUOIN_ASSERT(index_.size() == placed_.size(), "an index of every placement");
   std::vector<InstanceHandle> all;
   all.reserve(placed_.size());
   for (const auto& [instance, at] : index_) all.push_back(instance);
@@ -85,6 +90,7 @@ std::vector<InstanceHandle> Placements::instances() const {
 
 // Moves placements that are nearer than the farthest of the nearest set into that set.
 void Placements::look(const Scene& scene, const SceneGrid& grid, std::span<const Viewer> viewers) {
+  QUOIN_ASSERT(placed_.size() > kNearest, "more placements than are checked each time");
   const auto measure = [&](std::size_t at) {
     const Instance* const instance = scene.instances().find(placed_[at].instance);
     placed_[at].distance =

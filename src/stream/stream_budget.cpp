@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <quoin/core/assert.h>
+
 namespace quoin::stream {
 namespace {
 
@@ -72,6 +74,7 @@ std::int64_t StreamBudget::room(std::size_t begun) const {
 // Near chunks take more bytes than far ones. If the budget limits the plan, the count is found step by step: it shrinks
 // at once and grows when nearly all wanted chunks are loaded.
 std::size_t StreamBudget::chunks(std::size_t planned, bool is_cut, double missing) const {
+  QUOIN_ASSERT(missing >= 0.0 && missing <= 1.0, "a share of 0 to 1");
   const double total = expected();
   const auto at_least = [](double count) { return std::max(static_cast<std::size_t>(count), kLeastChunks); };
   if (chunks_ < kGuessBelow && !is_cut) {

@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include <quoin/core/assert.h>
+
 namespace quoin::stream {
 
 /// Tracks how much of a byte budget is taken by chunks and by data derived from them, and how many chunks still fit.
@@ -24,10 +26,14 @@ class StreamBudget {
     chunk_bytes_ += bytes;
   }
   void remove_chunk(std::size_t bytes) {
+    QUOIN_ASSERT(chunks_ > 0 && chunk_bytes_ >= bytes, "a chunk that was added");
     --chunks_;
     chunk_bytes_ -= bytes;
   }
-  void resize_chunk(std::size_t before, std::size_t now) { chunk_bytes_ = chunk_bytes_ - before + now; }
+  void resize_chunk(std::size_t before, std::size_t now) {
+    QUOIN_ASSERT(chunk_bytes_ >= before, "a chunk that was added");
+    chunk_bytes_ = chunk_bytes_ - before + now;
+  }
   /// Sets the bytes of chunks that were read but not put in place yet.
   void set_arrived(std::size_t bytes) { arrived_bytes_ = bytes; }
   /// Sets the other memory in use. `is_quiet`: no chunk came or went for some time, so all derived data is complete.

@@ -125,6 +125,7 @@ void StreamPlan::find_wanted() {
   for (const auto& [grid, eyes] : requests_.eyes) {
     std::vector<IVec3> chunks;
     for (const Eye& eye : eyes) {
+      QUOIN_ASSERT(eye.radius >= 0.0 && eye.voxel_size > 0.0, "a radius, and a positive voxel size");
       const double radius = std::min(eye.radius, reach);
       const IBox box = chunks_around(eye, radius);
       for (int z = box.min.z; z < box.max.z; ++z) {
@@ -227,6 +228,7 @@ std::size_t StreamPlan::missing() {
     return state == nullptr || *state == State::Begun;
   };
   while (here_ < wanted_.size() && !is_missing(wanted_[here_])) ++here_;
+  QUOIN_ASSERT(here_ <= wanted_.size(), "at most the wanted chunks");
   missing_count_ = static_cast<std::size_t>(
       std::count_if(wanted_.begin() + static_cast<std::ptrdiff_t>(here_), wanted_.end(), is_missing));
   is_counted_ = true;

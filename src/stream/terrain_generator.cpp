@@ -1,5 +1,6 @@
 #include <utility>
 
+#include <quoin/core/assert.h>
 #include <quoin/stream/chunk_generator.h>
 #include <quoin/terrain/terrain.h>
 
@@ -15,6 +16,7 @@ class VoxelTerrain final : public ChunkGenerator {
 
   [[nodiscard]] IBox chunks() const override { return {{-kReach, 0, -kReach}, {kReach, terrain_.height, kReach}}; }
   [[nodiscard]] Result<StoredChunk> make(IVec3 chunk) const override {
+    QUOIN_ASSERT(chunks().contains(chunk), "a chunk of the landscape");
     // Trees end at a piece's sides: the chunk lies in the middle of one.
     constexpr int kUnits = kChunkEdge / kTerrainUnit;
     TerrainOptions piece;
@@ -36,6 +38,7 @@ class SmoothTerrain final : public ChunkGenerator {
 
   [[nodiscard]] IBox chunks() const override { return {{-kReach, 0, -kReach}, {kReach, terrain_.height, kReach}}; }
   [[nodiscard]] Result<StoredChunk> make(IVec3 chunk) const override {
+    QUOIN_ASSERT(chunks().contains(chunk), "a chunk of the landscape");
     // A piece is closed at its sides: the chunk lies in the middle of one.
     SmoothTerrainOptions piece;
     piece.seed = terrain_.seed;
