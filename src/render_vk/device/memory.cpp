@@ -56,6 +56,7 @@ std::optional<std::uint32_t> memory_type(const VkPhysicalDeviceMemoryProperties&
 }
 
 Result<Buffer> Buffer::create(const Device& device, VkDeviceSize size, Where where, const std::string& doing) {
+  QUOIN_ASSERT(size > 0, "a positive size");
   const Api& api = device.api();
   Buffer buffer;
   buffer.device_ = &device;
@@ -97,12 +98,15 @@ void Buffer::swap(Buffer& other) noexcept {
 
 // Takes the first gap that is large enough; returns an empty place if there is none.
 Place DeviceMemory::take(std::size_t block, VkDeviceSize size) {
+  QUOIN_ASSERT(block < blocks_.size() && blocks_[block] != nullptr && size % kAlignment == 0,
+               "an aligned size in a block");
   Block& from = *blocks_[block];
   const auto gap = std::find_if(from.free.begin(), from.free.end(), [&](const auto& g) { return g.second >= size; });
   if (gap == from.free.end()) return {};
   const auto [offset, room] = *gap;
   from.free.erase(gap);
   if (room > size) from.free[offset + size] = room - size;
+  QUOIN_ASSERT((from.buffer.address() + offset) % kAlignment == 0, "an aligned address");
   return {block, offset, size, from.buffer.address() + offset};
 }
 
@@ -129,7 +133,7 @@ Result<Place> DeviceMemory::allocate(VkDeviceSize wanted, const std::string& doi
 void DeviceMemory::release(Place& place) {
   const Place old = std::exchange(place, {});
   if (old.size == 0) return;
-  QUOIN_ASSERT(old.block < blocks_.size() && blocks_[old.block] != nullptr, "a place of a block that is there");
+  QUOIN_ASSERT(is_allocated(old), "an allocated place");
   std::map<VkDeviceSize, VkDeviceSize>& free = blocks_[old.block]->free;
   const auto [freed, is_new] = free.emplace(old.offset, old.size);
   QUOIN_ASSERT(is_new, "each allocation is freed once");
@@ -153,6 +157,7 @@ void DeviceMemory::release(Place& place) {
 
 Status DeviceMemory::write(const Place& place, std::span<const std::byte> bytes, VkDeviceSize offset) {
   QUOIN_ASSERT(offset + bytes.size() <= place.size || bytes.empty(), "bytes within the place");
+  QUOIN_ASSERT(bytes.empty() || is_allocated(place), "an allocated place");
   written_ += bytes.size();
   if (staging_.handle() == VK_NULL_HANDLE && !bytes.empty()) {
     auto staging = Buffer::create(*device_, kStagingBytes, Buffer::Where::Upload, "uploading");

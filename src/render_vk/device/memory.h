@@ -8,6 +8,8 @@
 #include <span>
 #include <vector>
 
+#include <quoin/core/assert.h>
+
 #include "render_vk/device/device.h"
 #include "render_vk/trees/shader_memory.h"
 
@@ -68,7 +70,10 @@ class DeviceMemory final : public ShaderMemory {
   void discard() override;
 
   /// Returns the buffer that contains a place, at its offset.
-  [[nodiscard]] VkBuffer buffer_of(const Place& place) const { return blocks_[place.block]->buffer.handle(); }
+  [[nodiscard]] VkBuffer buffer_of(const Place& place) const {
+    QUOIN_ASSERT(is_allocated(place), "an allocated place");
+    return blocks_[place.block]->buffer.handle();
+  }
   [[nodiscard]] std::size_t block_count() const;
   /// Returns the bytes written so far by `write`.
   [[nodiscard]] std::uint64_t written() const { return written_; }
@@ -83,6 +88,9 @@ class DeviceMemory final : public ShaderMemory {
     VkBufferCopy region;
   };
   [[nodiscard]] Place take(std::size_t block, VkDeviceSize size);
+  [[nodiscard]] bool is_allocated(const Place& place) const {
+    return place.size != 0 && place.block < blocks_.size() && blocks_[place.block] != nullptr;
+  }
 
   Device* device_;
   VkDeviceSize block_bytes_;
@@ -110,7 +118,10 @@ class Places {
     return upload(std::as_bytes(std::span(values)), address);
   }
   /// Returns the last place. Requires: there is one.
-  [[nodiscard]] const Place& last() const { return places_.back(); }
+  [[nodiscard]] const Place& last() const {
+    QUOIN_ASSERT(!places_.empty(), "at least one place");
+    return places_.back();
+  }
 
  private:
   DeviceMemory* memory_;

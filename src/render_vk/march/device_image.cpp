@@ -3,6 +3,8 @@
 #include <cstring>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 #include "render_vk/march/renderer_impl.h"
 
 namespace quoin {
@@ -20,6 +22,7 @@ VulkanImage& VulkanImage::operator=(VulkanImage&&) noexcept = default;
 VulkanImage::~VulkanImage() = default;
 
 Status VulkanImage::Impl::resize(int new_width, int new_height) {
+  QUOIN_ASSERT(new_width > 0 && new_height > 0, "a positive image size");
   if (width == new_width && height == new_height) return {};
   width = height = samples = 0;
   rays = 0;
@@ -37,6 +40,7 @@ Status VulkanImage::Impl::resize(int new_width, int new_height) {
 }
 
 Status VulkanImage::Impl::begin_sums(const Camera& of_camera, const LightOptions& in_light) {
+  QUOIN_ASSERT(colours.handle() != VK_NULL_HANDLE, "an image with pixels");
   samples = 0;
   rays = 0;
   camera = of_camera;

@@ -7,7 +7,9 @@
 #include <span>
 #include <utility>
 
+#include <quoin/core/assert.h>
 #include "core/drop_oldest.h"
+#include "render_vk/device/drop_oldest.h"
 #include "render_vk/march/device_scene.h"
 #include "render_vk/trees/octahedral.h"
 
@@ -26,11 +28,13 @@ Vec4 to_vec4(const raster::Vector& v, float w = 0.0F) {
 // Packs rectangles without the fillers of groups, which no view saw.
 std::vector<ShaderFarFace> packed(const ImpostorFaces& impostor, const ImpostorFaces::Level& level, std::size_t first,
                                   std::size_t count) {
+  QUOIN_ASSERT(first + count <= level.count(), "rectangles of the level");
   std::vector<ShaderFarFace> faces;
   faces.reserve(count);
   std::uint32_t direction = 0;
   for (std::size_t i = first; i < first + count; ++i) {
     while (i >= level.begin[direction + 1]) ++direction;
+    QUOIN_ASSERT(direction < kSides, "a side of the level");
     ShaderFarFace& face = faces.emplace_back();
     face.centre = {level.centre[0][i], level.centre[1][i], level.centre[2][i], 0.0F};
     face.face = level.face[i];
@@ -45,6 +49,7 @@ std::vector<ShaderFarFace> packed(const ImpostorFaces& impostor, const ImpostorF
     face.direction = (direction - kSides / 2) | kIsSurfel;
     for (std::size_t k = 0; k < 2; ++k) {
       const float half = impostor.surfel_of(level.face[i]).half[k];
+      QUOIN_ASSERT(half >= 0.0F && half <= 1.0F, "half a side of at most one sample");
       face.direction |= static_cast<std::uint32_t>(std::lround(1024.0F * half)) << (kSurfelHalvesShift + 12 * k);
     }
     face.centre.w = level.slope[0][i];
@@ -157,6 +162,7 @@ void DeviceImpostors::follow(const Scene& scene) {
 }
 
 Status DeviceImpostors::begin(const std::shared_ptr<const Impostor>& impostor, Sent& sent) {
+  QUOIN_ASSERT(impostor != nullptr, "an impostor to send");
   memory_->release(sent.place);
   sent = {};
   const ImpostorFaces& from = impostor->faces();
@@ -191,6 +197,7 @@ Status DeviceImpostors::send_some(Sent& sent, std::size_t& faces_left) {
     const bool is_cells = !is_level && sent.part < 2 * kLevels;
     const ImpostorFaces::Level& level = from.level(sent.part % kLevels);
     const std::size_t all = is_level ? level.count() : is_cells ? level.cells.size() : entries_of(from);
+    QUOIN_ASSERT(sent.at <= all, "a position in the part");
     const std::size_t count = std::min(all - sent.at, faces_left);
     if (is_cells) {
       const std::vector<ShaderFarCell> some = packed(std::span(level.cells).subspan(sent.at, count));
@@ -325,6 +332,7 @@ std::uint64_t DeviceImpostors::bytes() const {
 }
 
 FarTiles far_tiles(const std::vector<ShaderFar>& far, int edge, int width, int height) {
+  QUOIN_ASSERT(edge > 0 && width > 0 && height > 0, "a positive tile and image size");
   const int across = (width + edge - 1) / edge;
   const int down = (height + edge - 1) / edge;
   std::vector<std::vector<ShaderFarPart>> lists(static_cast<std::size_t>(across) * static_cast<std::size_t>(down));
@@ -335,6 +343,7 @@ FarTiles far_tiles(const std::vector<ShaderFar>& far, int edge, int width, int h
     for (int y = area.y / edge; y <= (area.w - 1) / edge; ++y) {
       for (int x = area.x / edge; x <= (area.z - 1) / edge; ++x) {
         const auto tile = static_cast<std::size_t>(y * across + x);
+        QUOIN_ASSERT(x >= 0 && x < across && y >= 0 && y < down, "a tile of the image");
         const std::array parts = {far[i].level, far[i].coarser, far[i].unseen};
         for (std::size_t part = 0; part < parts.size(); ++part) {
           const std::uint32_t groups = groups_of(parts.at(part).count);

@@ -5,6 +5,8 @@
 #include <cstring>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 #include "light/surfaces.h"
 #include "scene/instance_axes.h"
 #include "scene/tracer/scene_tracer_impl.h"
@@ -124,7 +126,9 @@ std::vector<GridHandle> DeviceScene::changed_grids(const Scene& scene, InstanceF
 // Updates the data that depends on the grids' present state.
 void DeviceScene::finish_placed(const Scene& scene) {
   for (DevicePlaced& each : placement_.placed) {
-    const KnownGrid& known = grids_.find(scene.instances()[each.placed.instance].grid)->second;
+    const auto found = grids_.find(scene.instances()[each.placed.instance].grid);
+    QUOIN_ASSERT(found != grids_.end(), "the grid of a placed instance");
+    const KnownGrid& known = found->second;
     each.grid = known.index;
     each.origin = known.voxels.origin();
     each.low = DVec3(known.bounds.min - each.origin);
@@ -208,10 +212,12 @@ Status DeviceLevels::put_changes(ShaderMemory& memory, const LightBricks& now, c
   constexpr std::size_t kNumberBytes = LightBricks::kNumbers * sizeof(std::uint32_t);
   Status done;
   for (const std::size_t slot : changed.slots) {
+    QUOIN_ASSERT((slot + 1) * kBrickBytes <= all_bricks.size(), "a brick of the table");
     if (done) done = memory.write(bricks, all_bricks.subspan(slot * kBrickBytes, kBrickBytes), slot * kBrickBytes);
   }
   for (const std::size_t first : changed.numbers) {
     const std::size_t offset = first * sizeof(std::uint32_t);
+    QUOIN_ASSERT(offset + kNumberBytes <= all_numbers.size(), "numbers of the table");
     if (done) done = memory.write(numbers, all_numbers.subspan(offset, kNumberBytes), offset);
   }
   return done;
@@ -230,7 +236,9 @@ Status DeviceLevels::put(ShaderMemory& memory, LightBricks& now) {
 std::vector<LampPlace> DeviceScene::lamp_places(const Scene& scene) const {
   std::vector<LampPlace> places;
   for (const DevicePlaced& each : placement_.placed) {
-    const TreeCache& trees = grids_.find(scene.instances()[each.placed.instance].grid)->second.trees;
+    const auto found = grids_.find(scene.instances()[each.placed.instance].grid);
+    QUOIN_ASSERT(found != grids_.end(), "the scene of the last update");
+    const TreeCache& trees = found->second.trees;
     places.push_back(lamp_place(scene, each.placed, trees.opaque(), trees.transparent(), trees.field()));
   }
   return places;

@@ -11,6 +11,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
+#include <quoin/core/assert.h>
 #include <quoin/light/light_colour.h>
 
 #include "core/srgb.h"
@@ -71,6 +72,7 @@ void add_box(const DBox& box, std::uint32_t low_w, std::int32_t high_w, std::vec
 // `view_origin`: from the camera.
 void add_instances(const Placement& scene, const Camera& camera, DVec3 view_origin, FrameData& data) {
   const InstanceTree& tree = scene.instances;
+  QUOIN_ASSERT(tree.boxes().size() == scene.placed.size(), "one box per instance");
   // Subtracts the two far positions first, as everywhere.
   const auto in_view = [&](const DBox& box) {
     return DBox{box.min - camera.position - view_origin, box.max - camera.position - view_origin};
@@ -186,6 +188,7 @@ void add_directions(int rays, FrameData& data) {
   const OcclusionDirections directions(rays);
   if (directions.is_fixed()) {
     data.frame.flags |= kFixedDirections;
+    QUOIN_ASSERT(rays >= 0 && rays <= 9, "room for nine rays per face");
     data.directions.resize(std::size_t{6} * 9);
     for (std::size_t face = 0; face < 6; ++face) {
       for (int ray = 0; ray < rays; ++ray) {
@@ -299,6 +302,8 @@ std::vector<ShaderLamp> shader_lamps(const LampTable& table, DVec3 camera, DVec3
 }
 
 std::vector<ShaderLamp> put_lamps(const DeviceLamps& lamps, const Camera& camera, FrameData& data) {
+  QUOIN_ASSERT(lamps.table != nullptr && lamps.bricks.address != 0, "a table in device memory");
+  QUOIN_ASSERT(std::has_single_bit(lamps.table->bricks.size()), "a power of two of bricks");
   data.frame.flags |= kLamps;
   data.frame.lamp_mask = static_cast<std::uint32_t>(lamps.table->bricks.size() - 1);
   data.frame.lamp_bricks = lamps.bricks.address;
@@ -308,6 +313,9 @@ std::vector<ShaderLamp> put_lamps(const DeviceLamps& lamps, const Camera& camera
 
 void put_levels(const DeviceLevels& levels, const Scene& scene, const Placement& placement, const LightOptions& light,
                 FrameData& data) {
+  QUOIN_ASSERT(levels.table != nullptr && levels.bricks.address != 0, "a table in device memory");
+  QUOIN_ASSERT(std::has_single_bit(levels.table->bricks().size()), "a power of two of bricks");
+  QUOIN_ASSERT(data.placed.size() == placement.placed.size(), "a frame of this placement");
   const LightLook look = light_look(light);
   data.frame.flags |= kPropagated;
   data.frame.level_sky = {look.sky, 0.0F};

@@ -2,6 +2,8 @@
 
 #include <string>
 
+#include <quoin/core/assert.h>
+
 #include "render_vk/march/device_image.h"
 
 namespace quoin {
@@ -102,6 +104,7 @@ void VulkanImage::Impl::record_copy(VkCommandBuffer commands, const VulkanImageT
   image.subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, target.mip_level, 1, target.array_layer, 1};
   begin_copy(api, commands, image);
   const bool is_swapped = has_blue_first(target.format);
+  QUOIN_ASSERT(samples > 0 && (!is_swapped || swapped.handle() != VK_NULL_HANDLE), "a target that was prepared");
   if (is_swapped) {
     const auto pixels = static_cast<std::uint32_t>(width) * static_cast<std::uint32_t>(height);
     pipelines->swap_red_and_blue(commands, {colours.address(), swapped.address(), pixels, 0});

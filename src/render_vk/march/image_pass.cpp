@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstring>
 
+#include <quoin/core/assert.h>
+
 #include "render/image_request.h"
 
 namespace quoin::vulkan {
@@ -41,6 +43,7 @@ Status ImagePass::put_frame(const Camera& camera, const RenderOptions& options) 
   occlusion_rays_ = options.light.occlusion_rays;
   std::vector<ShaderLamp> lamps;
   if (light_.lamps.table != nullptr) lamps = put_lamps(light_.lamps, camera, data);
+  QUOIN_ASSERT(light_.levels.table == nullptr || content_ != nullptr, "light levels of a scene");
   if (light_.levels.table != nullptr) put_levels(light_.levels, *content_, *placement_, options.light, data);
   frame_ = data.frame;
   Status done = places_.upload(data.placed, frame_.placed);
@@ -103,6 +106,7 @@ Status ImagePass::make_tile_buffers(const RenderOptions& options) {
 }
 
 ShaderPush ImagePass::push_for(const Tile& tile) const {
+  QUOIN_ASSERT(frame_address_ != 0 && tile.width > 0 && tile.height > 0, "a tile of a frame that was sent");
   ShaderPush push;
   push.frame = frame_address_;
   push.corner_x = tile.x;
@@ -177,6 +181,8 @@ Status ImagePass::read_tile(const Tile& tile, RenderedImage& image) {
     device_->api().vkCmdCopyBuffer(commands, output_.handle(), results_.handle(), 1, &all);
   });
   if (!done) return done;
+  QUOIN_ASSERT(tile.x + tile.width <= image.colour.width && tile.y + tile.height <= image.colour.height,
+               "a tile of the image");
   const std::byte* colours = results_.mapped() + (frame_.colours - frame_.counters);
   const std::byte* depths = results_.mapped() + (frame_.depths - frame_.counters);
   const auto columns = static_cast<std::size_t>(tile.width);
@@ -206,6 +212,7 @@ std::vector<ImagePass::Tile> ImagePass::tiles_of(const RenderOptions& options) c
   std::vector<Tile> tiles;
   for (std::int32_t y = 0; y < options.height; y += tile_edge_) {
     for (std::int32_t x = 0; x < options.width; x += tile_edge_) {
+      QUOIN_ASSERT(tiles.size() < far_.size(), "one range of impostors per tile");
       const FarTiles::Range far = far_[tiles.size()];
       tiles.push_back({x, y, std::min(tile_edge_, options.width - x), std::min(tile_edge_, options.height - y), far});
     }

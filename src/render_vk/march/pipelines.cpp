@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <span>
 
+#include <quoin/core/assert.h>
+
 namespace quoin::vulkan {
 namespace {
 
@@ -116,11 +118,13 @@ void Pipelines::dispatch(VkCommandBuffer commands, Pass pass, const ShaderPush& 
 }
 
 void Pipelines::dispatch_far(VkCommandBuffer commands, Pass pass, const ShaderPush& push) const {
+  QUOIN_ASSERT(push.far_groups > 0, "at least one group");
   const std::uint32_t across = std::min(push.far_groups, kMaxAcross);
   dispatch(commands, pass, bytes_of(push), across, (push.far_groups + across - 1) / across);
 }
 
 void Pipelines::swap_red_and_blue(VkCommandBuffer commands, const SwapPush& push) const {
+  QUOIN_ASSERT(push.pixels > 0, "at least one pixel");
   constexpr std::uint32_t kGroup = 256;
   const std::uint32_t groups = (push.pixels + kGroup - 1) / kGroup;
   const std::uint32_t across = std::min(groups, kMaxAcross);
@@ -131,6 +135,8 @@ void Pipelines::swap_red_and_blue(VkCommandBuffer commands, const SwapPush& push
 
 void Pipelines::dispatch(VkCommandBuffer commands, Pass pass, std::span<const std::byte> push, std::uint32_t across,
                          std::uint32_t down) const {
+  QUOIN_ASSERT(pipelines_[static_cast<std::size_t>(pass)] != VK_NULL_HANDLE, "a pass that was made");
+  QUOIN_ASSERT(across > 0 && across <= kMaxAcross && down > 0, "1 to 32,768 workgroups");
   const Api& api = device_->api();
   api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines_[static_cast<std::size_t>(pass)]);
   api.vkCmdPushConstants(commands, layout_, VK_SHADER_STAGE_COMPUTE_BIT, 0, static_cast<std::uint32_t>(push.size()),

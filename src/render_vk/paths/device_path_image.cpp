@@ -5,6 +5,8 @@
 #include <cstring>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 #include "render/path/denoise.h"
 #include "render/path/path_request.h"
 #include "render_vk/march/renderer_impl.h"
@@ -128,6 +130,7 @@ Result<PathImage> VulkanPathImage::read(Threads threads) const {
   if (!parts) return parts.error();
   path::SurfaceParts surfaces(image.width, image.height);
   for (std::size_t i = 0; i < pixels_of(from.options); ++i) {
+    QUOIN_ASSERT((i + 1) * kPartBytes <= parts->size(), "parts of every pixel");
     std::memcpy(&surfaces.at(i), parts->mapped() + i * kPartBytes, kPartBytes);
   }
   path::denoise(surfaces, from.samples, threads, image);

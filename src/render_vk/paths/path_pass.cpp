@@ -140,6 +140,7 @@ Status PathPass::put_frame(int samples) {
 
 // Takes some samples of a tile. `done_before`: progress of the image before it.
 Status PathPass::take(const Tile& tile, int first, int count, const Progress& progress, double done_before) {
+  QUOIN_ASSERT(frame_address_ != 0 && first >= 0 && count > 0, "samples of a frame that was sent");
   PathPush push;
   push.frame = frame_address_;
   push.corner_x = tile.x;

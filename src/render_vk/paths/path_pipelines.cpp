@@ -1,5 +1,7 @@
 #include "render_vk/paths/path_pipelines.h"
 
+#include <quoin/core/assert.h>
+
 namespace quoin::vulkan {
 namespace {
 
@@ -46,6 +48,7 @@ Status PathPipelines::prepare(const Placement& placement) {
 void PathPipelines::dispatch(VkCommandBuffer commands, const Placement& placement, const PathPush& push) const {
   constexpr std::int32_t kGroup = 8;
   const auto groups = [](std::int32_t pixels) { return static_cast<std::uint32_t>((pixels + kGroup - 1) / kGroup); };
+  QUOIN_ASSERT(pipelines_[variant_of(placement)] != VK_NULL_HANDLE, "a variant that was prepared");
   const Api& api = device_->api();
   api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines_[variant_of(placement)]);
   api.vkCmdPushConstants(commands, layout_, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof push, &push);

@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include <quoin/core/assert.h>
 #include <quoin/grid/chunk.h>
 
 #include "light/daylight.h"
@@ -115,6 +116,7 @@ bool add_draws(const Space& space, const MeshStore::StoredGrid& grid, View& view
 }
 
 void append_run(std::uint32_t first, std::uint32_t end, QuadRuns& runs) {
+  QUOIN_ASSERT(first <= end, "a range of quads");
   if (first == end) return;
   if (!runs.empty() && runs.back().second == first) {
     runs.back().second = end;
@@ -238,6 +240,7 @@ void order_glass(std::span<const Space> spaces, const View& view, MeshFrameData&
     data.glass.push_back({draw.mesh->place.address, draw.instance, 0, Vec4(draw.offset, 0.0F)});
     for (std::size_t i = 0; i < draw.mesh->glass.size(); ++i) {
       const Quad& quad = draw.mesh->glass[i];
+      QUOIN_ASSERT(draw.instance < spaces.size(), "an instance of the frame");
       const Space& space = spaces[draw.instance];
       if (!faces_camera(quad, draw, space, view)) continue;
       entries.push_back(
@@ -265,6 +268,7 @@ bool is_flat(const Camera& camera) {
 }  // namespace
 
 QuadRuns visible_quads(const MeshDraw& draw, bool with_glass) {
+  QUOIN_ASSERT(draw.mesh != nullptr, "a mesh to draw");
   const StoredMesh& mesh = *draw.mesh;
   QuadRuns runs;
   const auto add = [&](std::uint32_t first, std::uint32_t end) { append_run(first, end, runs); };
@@ -312,6 +316,7 @@ Result<MeshFrameData> make_mesh_frame(MeshStore& store, std::span<const MeshInst
     add_far(space, view, data);
     keep(space);
   }
+  QUOIN_ASSERT(spaces.size() == data.instances.size() && subpixels > 0, "one space per instance");
   view.finish();
   for (std::size_t i = 0; i < spaces.size(); ++i) {
     data.instances[i] = shader_instance(spaces[i], view, options.light, subpixels);

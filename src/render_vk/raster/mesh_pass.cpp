@@ -4,6 +4,7 @@
 #include <array>
 #include <cstring>
 
+#include <quoin/core/assert.h>
 #include <quoin/render/impostor.h>
 
 namespace quoin::vulkan {
@@ -85,6 +86,7 @@ MeshPass::~MeshPass() {
 }
 
 std::uint32_t MeshPass::samples_for(int wanted) const {
+  QUOIN_ASSERT(wanted > 0, "at least one sample");
   auto samples = static_cast<std::uint32_t>(wanted);
   while (samples > 1 && (sample_counts_ & samples) == 0) samples /= 2;
   return samples;
@@ -145,6 +147,7 @@ Status MeshPass::put_frame(MeshFrameData& data) {
     frame_bytes_ += i == 0 ? parts[i].bytes : aligned(parts[i].bytes);
   }
   if (Status done = grow(frame_bytes_ + kAlignment); !done) return done;
+  QUOIN_ASSERT(frame_bytes_ <= staging_.size() && staging_.mapped() != nullptr, "room for the frame");
   // The allocation left room for this alignment.
   frame_address_ = aligned(frame_.address());
   for (std::size_t i = 0; i < parts.size(); ++i) {
@@ -317,6 +320,7 @@ void MeshPass::draw_chunks(VkCommandBuffer commands, const MeshFrameData& data, 
     const bool is_smooth = draw.mesh->style == SurfaceStyle::Smooth;
     if (!step.draws(draw)) continue;
     const VkPipeline wanted = is_smooth ? step.smooth[draw.mirrored ? 1 : 0] : step.blocky;
+    QUOIN_ASSERT(wanted != VK_NULL_HANDLE && draw.instance < data.instances.size(), "a pipeline, and an instance");
     if (wanted != bound) {
       device_->api().vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, wanted);
       if (!is_smooth) bind_corners(commands);
@@ -336,6 +340,7 @@ void MeshPass::draw_chunks(VkCommandBuffer commands, const MeshFrameData& data, 
 
 void MeshPass::draw_far(VkCommandBuffer commands, const MeshFrameData& data, const Step& step) const {
   if (data.far.empty()) return;
+  QUOIN_ASSERT(step.far != VK_NULL_HANDLE, "a pipeline for impostors");
   device_->api().vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, step.far);
   bind_corners(commands);
   for (std::size_t i = 0; i < data.far.size(); ++i) {
@@ -360,6 +365,7 @@ void MeshPass::draw_mesh(VkCommandBuffer commands, const MeshDraw& draw, const S
   if (mesh.style == SurfaceStyle::Smooth) {
     device_->api().vkCmdBindIndexBuffer(commands, memory_->buffer_of(mesh.place), mesh.place.offset + mesh.first_index,
                                         VK_INDEX_TYPE_UINT32);
+    QUOIN_ASSERT(mesh.glass_indices <= mesh.indices, "at most all indices");
     const std::uint32_t opaque = mesh.indices - mesh.glass_indices;
     const std::uint32_t first = step.is_glass() ? opaque : 0;
     const std::uint32_t end = step.is_glass() || step.over == Step::Over::All ? mesh.indices : opaque;

@@ -16,6 +16,7 @@ namespace {
 constexpr std::size_t kBatchBytes = std::size_t{32} << 20;
 
 void append_vertex(const ChunkSurface& surface, std::size_t i, std::vector<std::uint32_t>& words) {
+  QUOIN_ASSERT(i < surface.smooth.positions.size(), "a vertex of the surface");
   const SmoothChunkMesh& mesh = surface.smooth;
   const Vec3 position = mesh.positions.data()[i];
   for (int axis = 0; axis < 3; ++axis) words.push_back(std::bit_cast<std::uint32_t>(position[axis]));
@@ -112,6 +113,7 @@ Status MeshStore::put_all(std::span<const SurfaceUpdate> surfaces, int level, st
 
 Status MeshStore::upload(const ChunkSurface& surface, StoredMesh& mesh) {
   mesh.style = surface.style;
+  QUOIN_ASSERT(mesh.place.size == 0, "a mesh without memory");
   std::vector<std::uint32_t> words;
   std::span<const std::byte> bytes;
   if (surface.style == SurfaceStyle::Blocky) {

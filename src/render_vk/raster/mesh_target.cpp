@@ -3,6 +3,8 @@
 #include <array>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 #include "render_vk/raster/mesh_pipelines.h"
 
 namespace quoin::vulkan {
@@ -70,6 +72,7 @@ void Attachment::swap(Attachment& other) noexcept {
 }
 
 Result<MeshTarget> MeshTarget::create(const Device& device, VkRenderPass pass, VkExtent2D size, std::uint32_t samples) {
+  QUOIN_ASSERT(size.width > 0 && size.height > 0 && samples > 0, "a positive size and sample count");
   const std::string doing = "allocating an image";
   constexpr VkImageUsageFlags kColour = VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT;
   const Attachment::Kind drawn{kMeshColour, samples > 1 ? kColour : kColour | VK_IMAGE_USAGE_TRANSFER_SRC_BIT,

@@ -1,3 +1,4 @@
+#include <quoin/core/assert.h>
 #include <quoin/render_vk/vulkan_mesh_renderer.h>
 
 #include <algorithm>
@@ -236,6 +237,8 @@ Result<std::vector<vulkan::MeshInstance>> VulkanMeshRenderer::Impl::detailed(con
   }
   levels.drop_unused(kMaxLevelBytes);
   for (const vulkan::ShaderFar& far : placement.far) {
+    QUOIN_ASSERT(far.origin.w >= 0 && static_cast<std::size_t>(far.origin.w) < placement.placed.size(),
+                 "an instance of the placement");
     const vulkan::DevicePlaced& placed = placement.placed[static_cast<std::size_t>(far.origin.w)];
     const auto found = std::lower_bound(
         shown_as.begin(), shown_as.end(), placed.placed.instance,

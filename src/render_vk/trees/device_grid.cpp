@@ -5,6 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
+
 namespace quoin::vulkan {
 namespace {
 
@@ -51,6 +53,7 @@ void DeviceTree::release(ShaderMemory& memory) {
 ShaderTree DeviceTree::shader_tree(const IBox& bounds, IVec3 origin) const {
   ShaderTree shader;
   if (empty()) return shader;
+  QUOIN_ASSERT(!bounds.empty(), "the bounds of a tree with nodes");
   shader.root = top_.root;
   shader.low = IVec4(bounds.min - origin, top_.root_level);
   shader.high = IVec4(bounds.max - origin, 0);
@@ -72,6 +75,7 @@ std::uint64_t DeviceGrid::bytes() const {
 }
 
 Status DeviceGrid::update(ShaderMemory& memory, const Content& content) {
+  QUOIN_ASSERT(content.voxels != nullptr && content.opaque != nullptr, "voxels, and their tree");
   const DensityGrid* const field = content.field == nullptr ? nullptr : &content.field->field();
   const DensityGrid* const glass = content.glass == nullptr ? nullptr : &content.glass->field();
   const auto is_same = [](const DensityGrid* now, const Chunks& chunks, const ChangeCursor& followed) {
@@ -179,6 +183,7 @@ Status DeviceGrid::put_field(ShaderMemory& memory, Chunks& chunks, IVec3 chunk, 
 }
 
 Status DeviceGrid::put_record(ShaderMemory& memory, DeviceChunk& entry, ChunkRecord record) {
+  QUOIN_ASSERT(!record.words.empty(), "a record with content");
   memory.release(entry.place);
   const auto place = memory.allocate(record.words.size() * 4, "uploading voxels");
   if (!place) return place.error();

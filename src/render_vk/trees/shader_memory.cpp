@@ -8,6 +8,7 @@ namespace quoin::vulkan {
 
 Result<Place> ShaderBytes::allocate(std::uint64_t size, const std::string& doing) {
   const std::uint64_t begin = bytes_.size();
+  QUOIN_ASSERT(begin % kAlignment == 0 && begin <= kMost, "an aligned address below 1 GiB");
   const std::uint64_t left = kMost - begin;
   const std::uint64_t room = size > left ? size : (size + kAlignment - 1) / kAlignment * kAlignment;
   if (room > left) return make_error(ErrorCode::LimitExceeded, doing + ": more than 1 GiB for shaders");
@@ -17,6 +18,7 @@ Result<Place> ShaderBytes::allocate(std::uint64_t size, const std::string& doing
 
 Status ShaderBytes::write(const Place& place, std::span<const std::byte> bytes, std::uint64_t offset) {
   QUOIN_ASSERT(offset + bytes.size() <= place.size || bytes.empty(), "bytes within the place");
+  QUOIN_ASSERT(place.offset + place.size <= bytes_.size(), "an allocated place");
   std::copy(bytes.begin(), bytes.end(), bytes_.begin() + static_cast<std::ptrdiff_t>(place.offset + offset));
   return {};
 }

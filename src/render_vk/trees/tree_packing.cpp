@@ -157,6 +157,7 @@ class RecordWriter {
     const ChunkStorage* mixed = ChunkStorage::of(voxels);
     const std::size_t begin = record.words.size();
     for (const std::size_t header : headers_) {
+      QUOIN_ASSERT(header + 3 < record.words.size(), "a header of the record");
       if (mixed == nullptr) {
         record.words[header + 3] = *voxels.uniform();
         continue;
@@ -251,6 +252,7 @@ class RecordWriter {
         }
       }
     }
+    QUOIN_ASSERT(begin < kIsUniform, "a number of 31 bits");
     return static_cast<std::uint32_t>(begin);
   }
   void add_bodies(const FieldBodies& bodies, IVec3 first) {
@@ -275,7 +277,9 @@ class RecordWriter {
 };
 
 void ChunkRecord::move_to(std::uint64_t address) {
+  QUOIN_ASSERT(address % 8 == 0, "an aligned address");
   for (const std::size_t at : addresses_) {
+    QUOIN_ASSERT(at + 1 < words.size(), "words of the record");
     const std::uint64_t moved = (words[at] | std::uint64_t{words[at + 1]} << 32) + address;
     words[at] = static_cast<std::uint32_t>(moved);
     words[at + 1] = static_cast<std::uint32_t>(moved >> 32);
@@ -322,6 +326,7 @@ TopTree build_top_tree(std::vector<ChunkNodeAt> level, std::uint64_t address) {
     std::sort(level.begin(), level.end(), [&](const ChunkNodeAt& a, const ChunkNodeAt& b) { return key(a) < key(b); });
     std::vector<ChunkNodeAt> parents;
     for (const ChunkNodeAt& child : level) {
+      QUOIN_ASSERT((child.chunk.x | child.chunk.y | child.chunk.z) >= 0, "chunks from the tree's origin");
       const IVec3 parent = child.chunk >> 2;
       if (parents.empty() || parents.back().chunk != parent) {
         parents.push_back({parent, {0, address + tree.nodes.size() * sizeof(Node)}});
