@@ -6,6 +6,8 @@
 #include <cstring>
 #include <type_traits>
 
+#include <quoin/core/assert.h>
+
 namespace quoin {
 
 namespace byte_order {
@@ -38,6 +40,7 @@ struct Word<8> {
 /// Reads a number at `bytes`, in either order. Requires: sizeof(T) bytes; T is a number.
 template <class T>
 [[nodiscard]] T load(const std::byte* bytes, std::endian order) {
+  QUOIN_ASSERT(bytes != nullptr, "bytes of a number");
   using Word = byte_order::Word<sizeof(T)>;
   typename Word::Type word;
   std::memcpy(&word, bytes, sizeof(T));
@@ -47,6 +50,7 @@ template <class T>
 /// Writes a number at `bytes`, in either order. Requires: space for sizeof(T) bytes; T is a number.
 template <class T>
 void put_number(std::byte* bytes, T value, std::endian order) {
+  QUOIN_ASSERT(bytes != nullptr, "space for a number");
   using Word = byte_order::Word<sizeof(T)>;
   const auto native = std::bit_cast<typename Word::Type>(value);
   const typename Word::Type word = order == std::endian::native ? native : Word::swapped(native);

@@ -39,7 +39,10 @@ class ByteReader {
   [[nodiscard]] bool failed() const { return failed_; }
   /// The offset from the beginning of `bytes`.
   [[nodiscard]] std::size_t position() const { return position_; }
-  [[nodiscard]] std::size_t remaining() const { return end_ - position_; }
+  [[nodiscard]] std::size_t remaining() const {
+    QUOIN_ASSERT(position_ <= end_, "a position within the bytes");
+    return end_ - position_;
+  }
 
   [[nodiscard]] std::span<const std::byte> take(std::size_t count) {
     if (count > remaining()) {
@@ -72,6 +75,7 @@ class ByteReader {
 
   /// Reads a count of records of at least `record_bytes` each. Fails if the remaining bytes cannot hold that many.
   [[nodiscard]] std::size_t count(std::size_t record_bytes) {
+    QUOIN_ASSERT(record_bytes > 0, "records of at least one byte");
     const std::size_t claimed = u32();
     if (claimed <= remaining() / record_bytes) return claimed;
     failed_ = true;

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
+
 namespace quoin {
 
 /// Builds the bytes of a file; numbers are little-endian.
@@ -34,6 +36,7 @@ class ByteWriter {
   void leave(std::size_t count) { bytes_.resize(bytes_.size() + count); }
   /// Overwrites four bytes at `offset` with the lowest four bytes of a number.
   void patch(std::size_t offset, std::size_t value) {
+    QUOIN_ASSERT(offset + 4 <= bytes_.size(), "four bytes that were written");
     for (std::size_t i = 0; i < 4; ++i) bytes_[offset + i] = static_cast<std::byte>(value >> (8 * i) & 0xFFU);
   }
 

@@ -67,6 +67,7 @@ Result<Block> BlockTypes::add(const std::string& key, const BlockState& state, s
     block.type = *type;
   } else if (look.is_invisible) {
     const auto known = std::ranges::find(invisible_, name);
+    QUOIN_ASSERT(invisible_.size() < 0xFFFF, "a number of 16 bits");
     block.invisible = static_cast<std::uint16_t>(known - invisible_.begin() + 1);
     block.light = light;
     if (known == invisible_.end()) invisible_.emplace_back(name);
@@ -90,6 +91,7 @@ Result<VoxelType> BlockTypes::tinted(const Block& block, const BiomeTints& tints
     if (const auto known = tinted_types_.find(key); known != tinted_types_.end()) return known->second;
   }
   const std::unique_lock lock(mutex_);
+  QUOIN_ASSERT(block.tint != Tint::None && block.number < tinted_.size(), "a tinted block");
   VoxelProperties type = tinted_[block.number];
   type.colour = tinted_colour(type.colour, colour);
   constexpr std::array kNames = {"", "grass", "foliage", "water"};

@@ -55,6 +55,8 @@ Status ColumnBuilder::find_types(const Section& section) {
 void ColumnBuilder::fill(const Section& section, Cell& cell, IVec3 first) const {
   const std::size_t size = section.palette.size();
   const bool is_by_column = section.biome_indices.size() == 256;
+  QUOIN_ASSERT(is_by_column || section.biome_indices.size() == 64 || !has_tints_, "biomes of columns or of cells");
+  QUOIN_ASSERT(types_of_.size() >= size, "types of the whole palette");
   for (int y = 0; y < kSectionEdge; ++y) {
     for (int z = 0; z < kSectionEdge; ++z) {
       const auto row = static_cast<std::size_t>((first.z + z) * kChunkEdge + first.y + y) * kChunkEdge +
@@ -84,6 +86,7 @@ void ColumnBuilder::fill(const Section& section, Cell& cell, IVec3 first) const 
 void ColumnBuilder::count_invisible(const Section& section, IVec3 corner) {
   constexpr double kMaxLevel = 15.0;
   for (std::size_t i = 0; i < kSectionBlocks; ++i) {
+    QUOIN_ASSERT(section.indices[i] < section.palette.size(), "an index into the palette");
     const Block& block = section.palette[section.indices[i]];
     if (block.invisible == 0) continue;
     if (invisible_.size() <= block.invisible) invisible_.resize(std::size_t{block.invisible} + 1);
@@ -110,6 +113,7 @@ void ColumnBuilder::take_invisible(SourcePart& part) {
 }
 
 Status ColumnBuilder::put(const Section& section, IVec3 corner) {
+  QUOIN_ASSERT(((corner.x | corner.y | corner.z) & (kSectionEdge - 1)) == 0, "a multiple of 16");
   if (std::ranges::any_of(section.palette, [](const Block& block) { return block.invisible != 0; })) {
     count_invisible(section, corner);
     if (is_unseen(section)) return {};
@@ -121,6 +125,7 @@ Status ColumnBuilder::put(const Section& section, IVec3 corner) {
 
 void ColumnBuilder::put_block(const Block& block, IVec3 corner) {
   QUOIN_ASSERT(block.is_plain(), "a block that has only a type");
+  QUOIN_ASSERT(((corner.x | corner.y | corner.z) & (kSectionEdge - 1)) == 0, "a multiple of 16");
   Cell& to = cell(chunk_of(corner));
   const IVec3 first = local_of(corner);
   for (int z = first.z; z < first.z + kSectionEdge; ++z) {

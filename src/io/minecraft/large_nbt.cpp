@@ -23,6 +23,7 @@ constexpr std::size_t kLeastLong = std::size_t{1} << 20;
 constexpr int kMaxDepth = 512;
 
 bool is_uniform(std::span<const std::byte> bytes) {
+  QUOIN_ASSERT(!bytes.empty(), "at least one byte");
   return std::memcmp(bytes.data(), bytes.data() + 1, bytes.size() - 1) == 0;
 }
 
@@ -189,6 +190,7 @@ class Walker {
 
 /// Returns the bytes of a page with so many bits per byte, including its values.
 std::size_t bytes_of_page(std::uint8_t bits) {
+  QUOIN_ASSERT(bits == 1 || bits == 2 || bits == 4 || bits == 8, "1, 2, 4 or 8 bits");
   if (bits == 8) return PagedBytes::kPageBytes;
   return (std::size_t{1} << bits) + PagedBytes::kPageBytes * bits / 8;
 }
@@ -215,6 +217,7 @@ struct PageValues {
   [[nodiscard]] std::uint8_t bits() const { return count <= 2 ? 1 : count <= 4 ? 2 : count <= kMost ? 4 : 8; }
   /// Writes for each byte the number of its value.
   void number(std::span<const std::byte> content, PagedBytes::PageContent& out) const {
+    QUOIN_ASSERT(count <= kMost && content.size() <= out.size(), "at most 16 values, and room for their numbers");
     if (count <= 4) {
       for (std::size_t i = 0; i < content.size(); ++i) {
         const std::byte value = content[i];
@@ -231,6 +234,7 @@ struct PageValues {
  private:
   /// Returns true if all bytes are among the values so far. Requires: 0 < count <= 4.
   [[nodiscard]] bool are_first_four(std::span<const std::byte> some) const {
+    QUOIN_ASSERT(count > 0 && count <= 4, "0 < count <= 4");
     const auto value = [&](std::size_t i) { return values[i < count ? i : 0]; };
     const std::array<std::byte, 4> four = {value(0), value(1), value(2), value(3)};
     unsigned others = 0;
@@ -256,6 +260,7 @@ void unpack(const std::byte* values, PagedBytes::PageContent& out) {
 }  // namespace
 
 PagedBytes::Page PagedBytes::packed(std::span<const std::byte> content) {
+  QUOIN_ASSERT(!content.empty() && content.size() <= kPageBytes, "the bytes of a page");
   Page page;
   page.value = content.front();
   if (is_uniform(content)) return page;
@@ -279,6 +284,7 @@ PagedBytes::Page PagedBytes::packed(std::span<const std::byte> content) {
 }
 
 void PagedBytes::read_page(std::size_t number, PageContent& out) const {
+  QUOIN_ASSERT(number < pages_.size(), "a page of the array");
   const Page& page = pages_[number];
   switch (page.bits) {
     case 0:

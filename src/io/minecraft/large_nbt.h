@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/result.h>
 
 namespace quoin::minecraft {
@@ -27,6 +28,7 @@ class PagedBytes {
   void append(std::span<const std::byte> bytes);
   /// Returns the common value of a page's bytes; nullopt if they differ. Requires: page * kPageBytes < size().
   [[nodiscard]] std::optional<std::byte> uniform_page(std::size_t page) const {
+    QUOIN_ASSERT(page < pages_.size(), "a page of the array");
     return pages_[page].bits == 0 ? std::optional(pages_[page].value) : std::nullopt;
   }
   /// Writes the bytes of a page. Bytes past the end of the array are unspecified. Requires: as uniform_page.

@@ -4,6 +4,8 @@
 #include <array>
 #include <string_view>
 
+#include <quoin/core/assert.h>
+
 namespace quoin::minecraft {
 
 namespace {
@@ -487,6 +489,7 @@ std::string name_of(const Legacy& block, int data) {
 }  // namespace
 
 std::pair<std::string, Properties> legacy_block(int id, int data) {
+  QUOIN_ASSERT(id >= 0 && id < 4096 && data >= 0 && data < 16, "0 <= id < 4096, 0 <= data < 16");
   if (id == 0) return {"minecraft:air", {}};
   const auto found = std::ranges::lower_bound(kLegacy, id, {}, &Legacy::id);
   if (found == std::end(kLegacy) || found->id != id) {

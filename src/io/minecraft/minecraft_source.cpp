@@ -10,6 +10,7 @@
 #include <tuple>
 #include <utility>
 
+#include <quoin/core/assert.h>
 #include <quoin/io/file.h>
 
 #include "io/format_driver.h"
@@ -140,6 +141,7 @@ class MinecraftSource final : public ChunkSource {
   Result<SourcePart> read_part(std::size_t part) const override {
     QUOIN_ASSERT(part < parts().size(), "a part of the source");
     SourcePart result;
+    QUOIN_ASSERT(region_of_.size() == parts().size(), "one region per part");
     const std::size_t region = region_of_[part];
     const auto file = regions_.open(region);
     if (!file) {

@@ -254,8 +254,8 @@ bool Value::is_integers() const {
 }
 
 std::int64_t Value::integer(std::size_t i) const {
+  QUOIN_ASSERT(document_ != nullptr && i < node().count, "an element of an array or a list");
   const std::byte* const begin = document_->bytes_.data() + node().begin;
-  QUOIN_ASSERT(i < node().count, "an element");
   switch (element()) {
     case Tag::Byte:
       return static_cast<std::int8_t>(begin[i]);

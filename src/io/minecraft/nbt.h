@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/result.h>
 
 // Named Binary Tag, the tree format of Minecraft (Java) saves: https://minecraft.wiki/w/NBT_format. Numbers are
@@ -111,7 +112,10 @@ class Value {
  private:
   friend class Document;
   Value(const Document* document, std::uint32_t index) : document_(document), index_(index) {}
-  [[nodiscard]] const Document::Node& node() const { return document_->nodes_[index_]; }
+  [[nodiscard]] const Document::Node& node() const {
+    QUOIN_ASSERT(index_ < document_->nodes_.size(), "a value of the document");
+    return document_->nodes_[index_];
+  }
   [[nodiscard]] Tag element() const;
 
   const Document* document_ = nullptr;

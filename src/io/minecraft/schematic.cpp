@@ -13,8 +13,10 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include "core/bytes/byte_stream.h"
 #include "core/bytes/text.h"
+#include "io/byte_stream.h"
 #include "io/minecraft/biomes.h"
 #include "io/minecraft/block_types.h"
 #include "io/minecraft/column_builder.h"
@@ -108,6 +110,7 @@ class VarintReader {
  private:
   /// Returns the contiguous bytes at the position. Requires: at_ < size_.
   [[nodiscard]] std::span<const std::byte> run() {
+    QUOIN_ASSERT(at_ < size_, "a position within the bytes");
     if (pages_ == nullptr) return bytes_.subspan(static_cast<std::size_t>(at_));
     const auto page = static_cast<std::size_t>(at_ / PagedBytes::kPageBytes);
     if (page != page_) pages_->read_page(page, content_);
@@ -506,6 +509,7 @@ void ColumnBiomes::put_into(Section& section, IVec3 corner, IVec3 size) const {
   for (int dz = 0; dz < std::min(kSectionEdge, size.z - corner.z); ++dz) {
     const std::size_t from =
         slab * area + static_cast<std::size_t>(corner.z + dz) * width + static_cast<std::size_t>(corner.x);
+    QUOIN_ASSERT(from + row <= of_columns.size(), "columns of the region");
     std::copy_n(of_columns.begin() + static_cast<std::ptrdiff_t>(from), row,
                 section.biome_indices.begin() + static_cast<std::ptrdiff_t>(dz) * kSectionEdge);
   }
@@ -552,6 +556,7 @@ Status SchematicReader::fill(const Region& region, int first_y, std::span<const 
   const auto width = static_cast<std::size_t>(region.size.x);
   const std::size_t area = width * static_cast<std::size_t>(region.size.z);
   const int height = static_cast<int>(layers.size() / area);
+  QUOIN_ASSERT(layers.size() % area == 0 && height <= kSectionEdge, "up to 16 whole layers");
   const auto air = static_cast<std::uint16_t>(region.palette.size());
   Section section;
   section.palette = region.palette;
@@ -576,6 +581,7 @@ Status SchematicReader::fill(const Region& region, int first_y, std::span<const 
           }
         }
       }
+      QUOIN_ASSERT(first < region.palette.size(), "an index into the palette");
       const Block& block = region.palette[first];
       if (differences == 0 && block.is_air()) continue;
       if (differences == 0 && is_whole && block.is_plain()) {
@@ -605,6 +611,7 @@ bool SchematicReader::put_uniform(const Region& region, int first_y, int height,
   if (!region.read_uniform || !std::ranges::all_of(region.palette, &Block::is_plain)) return false;
   const auto index = region.read_uniform(height);
   if (!index) return false;
+  QUOIN_ASSERT(*index < region.palette.size(), "an index into the palette");
   const VoxelType type = region.palette[*index].type;
   if (type == kAir) return true;
   grid.fill_box({{0, first_y, 0}, {region.size.x, first_y + height, region.size.z}}, type);

@@ -18,6 +18,7 @@ constexpr std::uint16_t kNoIndex = 0xFFFF;
 constexpr std::size_t kLegacyCodes = std::size_t{4096} * 16;
 
 std::uint64_t word(std::span<const std::byte> longs, std::size_t i) {
+  QUOIN_ASSERT(8 * i + 8 <= longs.size(), "one of the longs");
   return load<std::uint64_t>(longs.data() + 8 * i, std::endian::big);
 }
 
@@ -29,10 +30,12 @@ int nibble(std::span<const std::byte> bytes, std::size_t i) {
 }
 
 int bits_of_palette(std::size_t size, int least) {
+  QUOIN_ASSERT(size > 0, "a palette with entries");
   return std::max(static_cast<int>(std::bit_width(size - 1)), least);
 }
 
 bool unpack_indices(nbt::Value longs, int bits, std::span<std::uint16_t> out) {
+  QUOIN_ASSERT(bits >= 1 && bits <= 16, "1 <= bits <= 16");
   const std::span<const std::byte> bytes = longs.long_bytes();
   const std::size_t words = bytes.size() / 8;
   const auto width = static_cast<std::size_t>(bits);
@@ -56,7 +59,8 @@ bool unpack_indices(nbt::Value longs, int bits, std::span<std::uint16_t> out) {
 void unpack_spanning(nbt::Value longs, int bits, std::size_t first, std::span<std::uint16_t> out) {
   const std::span<const std::byte> bytes = longs.long_bytes();
   const auto width = static_cast<std::size_t>(bits);
-  QUOIN_ASSERT(((first + out.size()) * width + 63) / 64 <= bytes.size() / 8, "that many are there");
+  QUOIN_ASSERT(bits >= 1 && bits <= 16, "1 <= bits <= 16");
+  QUOIN_ASSERT(((first + out.size()) * width + 63) / 64 <= bytes.size() / 8, "longs that hold all indices");
   const std::uint64_t mask = (std::uint64_t{1} << width) - 1;
   for (std::size_t at = 0; at < out.size(); ++at) {
     const std::size_t bit = (first + at) * width;
@@ -93,6 +97,7 @@ Status read_block_palette(nbt::Value palette, BlockTypes& types, std::vector<Blo
 }
 
 void SectionReader::begin_legacy() {
+  QUOIN_ASSERT(legacy_used_.empty(), "the previous section has ended");
   section_.palette.clear();
   legacy_index_.resize(kLegacyCodes, kNoIndex);
 }
@@ -103,6 +108,7 @@ void SectionReader::end_legacy() {
 }
 
 Status SectionReader::put_legacy(std::size_t at, int id, int data) {
+  QUOIN_ASSERT(id >= 0 && id < 4096 && data >= 0 && data < 16 && at < kSectionBlocks, "0 <= id < 4096, 0 <= data < 16");
   const auto code = static_cast<std::uint32_t>(id * 16 + data);
   if (legacy_index_[code] == kNoIndex) {
     const auto [name, properties] = legacy_block(id, data);

@@ -26,6 +26,7 @@ constexpr std::uint64_t kMaxBytes = std::uint64_t{1} << 30;
 
 template <class T>
 T big(std::span<const std::byte> bytes, std::size_t at) {
+  QUOIN_ASSERT(at + sizeof(T) <= bytes.size(), "bytes of a number");
   return load<T>(bytes.data() + at, std::endian::big);
 }
 
@@ -114,10 +115,11 @@ void LinearRegion::expand() const {
 }
 
 Result<std::vector<std::byte>> LinearRegion::read(std::size_t chunk) const {
-  QUOIN_ASSERT(chunk < kChunks && has(chunk), "a chunk of the region");
+  QUOIN_ASSERT(has(chunk), "a chunk of the region");
   std::call_once(once_, [this] { expand(); });
   if (!expanded_) return expanded_.error();
   const auto begin = std::accumulate(sizes_.begin(), sizes_.begin() + static_cast<std::ptrdiff_t>(chunk), kTableBytes);
+  QUOIN_ASSERT(begin + sizes_[chunk] <= expanded_->size(), "a chunk within the expanded bytes");
   const auto first = expanded_->begin() + static_cast<std::ptrdiff_t>(begin);
   return std::vector<std::byte>(first, first + static_cast<std::ptrdiff_t>(sizes_[chunk]));
 }

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/result.h>
 
 // Regions as LinearPaper and its relatives store them (.linear): all 1,024 chunks in one zstd stream.
@@ -35,7 +36,10 @@ class LinearRegion {
   [[nodiscard]] static Result<std::unique_ptr<const LinearRegion>> parse(std::vector<std::byte> file);
 
   /// Requires: chunk < kChunks.
-  [[nodiscard]] bool has(std::size_t chunk) const { return sizes_[chunk] != 0; }
+  [[nodiscard]] bool has(std::size_t chunk) const {
+    QUOIN_ASSERT(chunk < kChunks, "a chunk of the table");
+    return sizes_[chunk] != 0;
+  }
   /// Returns the NBT of a chunk. Expands the stream at the first call. Requires: has(chunk).
   /// Errors: BadFormat, with the offset in the file.
   [[nodiscard]] Result<std::vector<std::byte>> read(std::size_t chunk) const;

@@ -10,6 +10,7 @@
 #include <system_error>
 #include <utility>
 
+#include <quoin/core/assert.h>
 #include <quoin/io/file.h>
 
 #include "core/bytes/byte_order.h"
@@ -255,6 +256,7 @@ Result<std::vector<std::byte>> RegionFile::read_external(int x, int z) const {
 }
 
 Result<std::vector<std::byte>> RegionFile::read(int x, int z) const {
+  QUOIN_ASSERT(has(x, z), "a chunk of the region");
   if (linear_) {
     auto chunk = linear_->read(index_of(x, z));
     if (!chunk) chunk.error().path = path_.string();

@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/result.h>
 
 #include "io/minecraft/region/linear_region.h"
@@ -77,7 +78,10 @@ class RegionFile {
   RegionFile(std::filesystem::path path, RegionName name, int descriptor);
   [[nodiscard]] Status read_table();
   [[nodiscard]] Status read_linear();
-  static std::size_t index_of(int x, int z) { return static_cast<std::size_t>(z * kRegionEdge + x); }
+  static std::size_t index_of(int x, int z) {
+    QUOIN_ASSERT(x >= 0 && x < kRegionEdge && z >= 0 && z < kRegionEdge, "0 <= x, z < 32");
+    return static_cast<std::size_t>(z * kRegionEdge + x);
+  }
   [[nodiscard]] std::uint32_t entry(int x, int z) const { return table_[index_of(x, z)]; }
   [[nodiscard]] Result<std::vector<std::byte>> read_sectors(int x, int z, std::uint8_t& compression) const;
   [[nodiscard]] Result<std::vector<std::byte>> read_external(int x, int z) const;
