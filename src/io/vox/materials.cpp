@@ -33,6 +33,7 @@ constexpr std::array<const char*, 4> kOldTypes = {"_diffuse", "_metal", "_glass"
 
 /// Requires: the palette has that entry.
 Rgba8 palette_entry(std::span<const std::byte> palette, std::size_t colour_index) {
+  QUOIN_ASSERT(colour_index > 0 && 4 * colour_index <= palette.size(), "an entry of the palette");
   const std::span<const std::byte> entry = palette.subspan((colour_index - 1) * 4, 4);
   return {static_cast<std::uint8_t>(entry[0]), static_cast<std::uint8_t>(entry[1]), static_cast<std::uint8_t>(entry[2]),
           static_cast<std::uint8_t>(entry[3])};
@@ -183,6 +184,7 @@ std::optional<float> either(std::optional<float> first, std::optional<float> sec
 }
 
 std::uint8_t byte_from_unit(float value) {
+  QUOIN_ASSERT(value >= 0.0F && value <= 1.0F, "0 <= value <= 1");
   return static_cast<std::uint8_t>(std::lround(value * 255.0F));
 }
 

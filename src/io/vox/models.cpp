@@ -24,6 +24,7 @@ constexpr unsigned kChunksShift = 2;
 static_assert((kChunkEdge << kChunksShift) == kMaxModelEdge);
 
 IVec3 local_from_place(std::uint32_t place) {
+  QUOIN_ASSERT(place <= kPlaceMask, "a place in a chunk");
   const auto p = static_cast<int>(place);
   return {p & (kChunkEdge - 1), (p >> kChunkShift) & (kChunkEdge - 1), p >> (2 * kChunkShift)};
 }
@@ -44,6 +45,7 @@ static_assert(kMaxModelEdge <= 256 && (64U << kTypeShift) < Places::kOutside);
 
 /// `strides`: increments of the chunk number per chunk along the grid's axes.
 Places places_in(IVec3 model_size, IVec3 strides) {
+  QUOIN_ASSERT((IBox{IVec3{1}, IVec3{kMaxModelEdge + 1}}.contains(model_size)), "1 to 256 voxels along each axis");
   const auto share = [](int voxel, int stride, int shift) {
     const int chunk = (voxel >> kChunkShift) * stride;
     return static_cast<std::uint32_t>(chunk << kTypeShift | (voxel & (kChunkEdge - 1)) << shift);
@@ -150,6 +152,7 @@ void ModelBuilder::build_densely(const Model& model, Grid& grid) {
     } else if (colour_index == 0) {
       ++losses_.colourless;
     } else {
+      QUOIN_ASSERT(place < dense_.size(), "a voxel of the model");
       dense_[place] = type_of_[colour_index];
     }
   });

@@ -4,6 +4,8 @@
 
 #include <glm/mat3x3.hpp>
 
+#include <quoin/core/assert.h>
+
 namespace quoin::vox {
 
 namespace {
@@ -29,6 +31,7 @@ DQuat quaternion(const Orientation& rotation) {
 Orientation operator*(const Orientation& a, const Orientation& b) {
   Orientation product;
   for (std::size_t i = 0; i < 3; ++i) {
+    QUOIN_ASSERT(a.axis[i] < 3, "one of three axes");
     product.axis[i] = b.axis[a.axis[i]];
     product.sign[i] = static_cast<std::int8_t>(a.sign[i] * b.sign[a.axis[i]]);
   }
@@ -80,6 +83,8 @@ std::optional<Orientation> orientation_from_byte(std::uint8_t byte) {
 }
 
 std::uint8_t byte_from_orientation(const Orientation& orientation) {
+  QUOIN_ASSERT(orientation.axis[0] < 3 && orientation.axis[1] < 3 && orientation.axis[0] != orientation.axis[1],
+               "rows with different columns");
   unsigned byte = orientation.axis[0] | static_cast<unsigned>(orientation.axis[1]) << 2U;
   for (std::size_t i = 0; i < 3; ++i) {
     if (orientation.sign[i] < 0) byte |= 1U << (4U + i);

@@ -3,8 +3,11 @@
 #include <string>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include "core/bytes/byte_reader.h"
 #include "core/bytes/byte_stream.h"
+#include "io/byte_reader.h"
+#include "io/byte_stream.h"
 #include "io/vox/chunks.h"
 
 namespace quoin::vox {
@@ -27,6 +30,8 @@ Status check_end(ByteStream& stream, const Model& model) {
 }  // namespace
 
 Result<std::vector<std::byte>> unpack_voxels(std::span<const std::byte> file, const Model& model) {
+  QUOIN_ASSERT(model.packed_begin <= model.packed_end && model.packed_end <= file.size(),
+               "a compressed model of the file");
   ByteStream stream(file.first(model.packed_end), model.packed_begin, Compression::Zlib);
   std::vector<std::byte> layer(static_cast<std::size_t>(model.size.x) * static_cast<std::size_t>(model.size.y));
   std::vector<std::byte> voxels;

@@ -222,6 +222,7 @@ Status GraphWalk::place(std::size_t at, const Step& parent) {
 
 /// The chain's transforms are the last steps of the path.
 void GraphWalk::close_chain(Hanging& hanging) {
+  QUOIN_ASSERT(hanging.transform_count <= way_.size(), "transforms on the path");
   hanging.first_transform = out_.chains.size();
   for (std::size_t i = way_.size() - hanging.transform_count; i < way_.size(); ++i) out_.chains.push_back(way_[i].node);
 }
@@ -266,6 +267,7 @@ Status GraphWalk::add_group(Step& step) {
 }
 
 Status GraphWalk::enter(std::size_t at, const Step& parent) {
+  QUOIN_ASSERT(at < document_.nodes.size(), "a node of the document");
   const Node& node = document_.nodes[at];
   if (is_open_[at]) return bad_at(node.offset, "node " + std::to_string(node.id) + " is its own descendant");
   if (visits_left_ == 0) {
@@ -344,6 +346,7 @@ Result<Placements> place_lone_model(const Document& document, int frame) {
   }
   Placement placement;
   placement.model = static_cast<std::uint32_t>(frame);
+  QUOIN_ASSERT(frame >= 0 && static_cast<std::size_t>(frame) < document.models.size(), "a model of the document");
   placement.world.translation[2] = document.models[placement.model].size.z / 2;
   out.all.push_back(placement);
   return out;

@@ -5,7 +5,9 @@
 #include <string_view>
 #include <utility>
 
+#include <quoin/core/assert.h>
 #include "core/bytes/text.h"
+#include "io/text.h"
 
 namespace quoin {
 
@@ -31,6 +33,7 @@ std::vector<std::string> source_only_features(const VoxSource& source) {
   std::map<std::string, int> counts;
   for (const vox::ChunkSpan& place : source.document.chunks) {
     if (place.kind != vox::ChunkKind::Other) continue;
+    QUOIN_ASSERT(place.begin + vox::kChunkHeaderBytes <= source.bytes.size(), "a chunk of the file");
     const std::string_view id(reinterpret_cast<const char*>(source.bytes.data()) + place.begin, 4);
     std::string kept = kept_as(id);
     if (!kept.empty()) ++counts[std::move(kept)];

@@ -7,7 +7,9 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include "core/bytes/byte_writer.h"
+#include "io/byte_writer.h"
 
 namespace quoin::vox {
 
@@ -38,6 +40,7 @@ class ChunkWriter : public ByteWriter {
   /// `begin`: the result of begin_chunk. Content beyond 4 GiB wraps: check `size` before using the bytes. `children`:
   /// bytes of child chunks after it.
   void end_chunk(std::size_t begin, std::size_t children = 0) {
+    QUOIN_ASSERT(begin >= 12 && begin <= size(), "a chunk that was begun");
     patch(begin - 8, size() - begin);
     patch(begin - 4, children);
   }

@@ -94,6 +94,9 @@ bool plan_in_place(const SceneGrid& now, const VoxSource& source, std::size_t mo
 
 /// Returns the content of a TDCZ: its size, then the compressed colour indices of the whole box.
 Result<std::vector<std::byte>> packed(IVec3 model_size, std::span<const std::byte> colours) {
+  QUOIN_ASSERT(colours.size() == static_cast<std::size_t>(model_size.x) * static_cast<std::size_t>(model_size.y) *
+                                     static_cast<std::size_t>(model_size.z),
+               "one colour per voxel");
   ChunkWriter out;
   for (int axis = 0; axis < 3; ++axis) out.i32(model_size[axis]);
   uLongf bytes = compressBound(static_cast<uLong>(colours.size()));
@@ -152,6 +155,7 @@ class ColourBox {
 
   [[nodiscard]] IVec3 size() const { return size_; }
   [[nodiscard]] std::size_t place(IVec3 at) const {
+    QUOIN_ASSERT((IBox{IVec3{0}, size_}.contains(at)), "a voxel of the box");
     return (static_cast<std::size_t>(at.z) * static_cast<std::size_t>(size_.y) + static_cast<std::size_t>(at.y)) *
                static_cast<std::size_t>(size_.x) +
            static_cast<std::size_t>(at.x);
@@ -191,6 +195,7 @@ std::vector<FileVoxel> kept_backwards(std::span<const std::byte> voxels, bool ke
 
 Result<std::vector<std::byte>> revised_voxels(const Grid& grid, const GridPlan& plan, const VoxSource& source,
                                               const std::vector<std::uint8_t>& index_of_type) {
+  QUOIN_ASSERT(plan.source_model < source.document.models.size() && plan.pieces.size() == 1, "a model of the source");
   const Model& model = source.document.models[plan.source_model];
   ColourBox box(grid, plan.pieces.front(), index_of_type);
   if (model.packed_end > 0) return packed(box.size(), box.colours());

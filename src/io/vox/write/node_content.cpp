@@ -71,6 +71,7 @@ NodeContent read_node(NodeKind kind, std::span<const std::byte> content) {
       node.models.emplace_back(model, chunk.dict());
     }
   }
+  QUOIN_ASSERT(!chunk.failed(), "a chunk that was read without an error");
   const std::span<const std::byte> tail = chunk.take(chunk.remaining());
   node.tail.assign(tail.begin(), tail.end());
   return node;
@@ -81,6 +82,7 @@ void write_node(const NodeContent& node, ChunkWriter& out) {
   out.dict(node.attributes.all());
   switch (node.kind) {
     case NodeKind::Transform:
+      QUOIN_ASSERT(node.children.size() == 1, "a transform with one child");
       out.i32(node.children.front());
       out.i32(node.reserved);
       out.i32(node.layer);
@@ -115,6 +117,7 @@ std::string_view chunk_id(NodeKind kind) {
 }
 
 NodeContent node_of(const VoxSource& source, std::size_t node) {
+  QUOIN_ASSERT(node < source.document.nodes.size(), "a node of the source");
   const vox::Node& known = source.document.nodes[node];
   const auto& chunks = source.document.chunks;
   const auto at = std::ranges::lower_bound(chunks, known.offset, {}, &ChunkSpan::begin);
@@ -140,6 +143,7 @@ namespace {
 
 template <class Key, class AttributesOf>
 KeyInForce key_in_force(const std::vector<Key>& keys, bool loops, int frame, AttributesOf attributes_of) {
+  QUOIN_ASSERT(!keys.empty(), "a node with keys");
   std::vector<std::pair<std::int64_t, std::size_t>> sorted;
   for (std::size_t i = 0; i < keys.size(); ++i) {
     sorted.emplace_back(frame_of_key(attributes_of(keys[i]).get("_f"), i).value_or(0), i);

@@ -233,7 +233,10 @@ class Cursors {
 
   /// Returns the piece that contains a voxel. Requires: there is one.
   std::size_t piece_of(IVec3 voxel) {
-    if (!is_inside(voxel, pieces_[last_])) last_ = number_of_.find(cell(voxel))->second;
+    if (is_inside(voxel, pieces_[last_])) return last_;
+    const auto found = number_of_.find(cell(voxel));
+    QUOIN_ASSERT(found != number_of_.end(), "a voxel of one of the pieces");
+    last_ = found->second;
     return last_;
   }
   std::size_t advance(std::size_t piece) { return std::exchange(next_[piece], next_[piece] + 4); }
@@ -273,7 +276,9 @@ void write_voxels(const Grid& grid, const std::vector<std::uint8_t>& index_of_ty
     const std::size_t number = cursors.piece_of(voxel);
     const Piece& piece = pieces[number];
     const IVec3 local = voxel - piece.min;
-    std::byte* to = out.data() + cursors.advance(number);
+    const std::size_t at = cursors.advance(number);
+    QUOIN_ASSERT(at + 4 <= out.size() && type < index_of_type.size(), "room for the voxel, and a type with a colour");
+    std::byte* to = out.data() + at;
     to[0] = static_cast<std::byte>(local.x);
     to[1] = static_cast<std::byte>(piece.size.z - 1 - local.z);
     to[2] = static_cast<std::byte>(local.y);
