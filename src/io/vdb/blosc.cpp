@@ -13,6 +13,8 @@
 
 #ifdef QUOIN_HAVE_LZ4
 #include <lz4.h>
+
+#include <quoin/core/assert.h>
 #endif
 
 namespace quoin::vdb {
@@ -72,6 +74,7 @@ Status expand_stream(const Header& header, std::span<const std::byte> packed, st
 }
 
 void unshuffle(std::span<const std::byte> shuffled, std::size_t element, std::span<std::byte> out) {
+  QUOIN_ASSERT(element > 0 && out.size() == shuffled.size(), "as many bytes as before");
   const std::size_t count = shuffled.size() / element;
   for (std::size_t byte = 0; byte < element; ++byte) {
     for (std::size_t i = 0; i < count; ++i) out[i * element + byte] = shuffled[byte * count + i];
@@ -111,6 +114,7 @@ Status expand_blosc(std::span<const std::byte> frame, std::span<std::byte> out) 
     const auto target = header.is_shuffled() ? std::span(shuffled).first(block.size()) : block;
     const bool is_split = header.is_split() && block.size() == header.block && block.size() % header.element == 0;
     const std::size_t stream = is_split ? block.size() / header.element : block.size();
+    QUOIN_ASSERT(stream > 0, "a stream of at least one byte");
     ByteReader streams(frame, at, frame.size());
     for (std::size_t done = 0; done < block.size(); done += stream) {
       const std::size_t place = streams.position();

@@ -17,10 +17,15 @@
 #include <string_view>
 #include <utility>
 
+#include <quoin/core/assert.h>
 #include "core/bytes/byte_order.h"
 #include "core/bytes/byte_reader.h"
 #include "core/bytes/byte_stream.h"
 #include "core/bytes/text.h"
+#include "io/byte_order.h"
+#include "io/byte_reader.h"
+#include "io/byte_stream.h"
+#include "io/text.h"
 #include "io/vdb/blosc.h"
 
 namespace quoin::vdb {
@@ -105,11 +110,13 @@ class GridReader {
   }
   template <class T>
   [[nodiscard]] T load_at(std::size_t at) const {
+    QUOIN_ASSERT(has(at, sizeof(T)), "bytes of the grid");
     return load<T>(bytes_.data() + at, std::endian::little);
   }
   [[nodiscard]] float value_at(std::size_t at) const {
     if (type_ == Type::Float) return load_at<float>(at);
     if (type_ == Type::Double) return static_cast<float>(load_at<double>(at));
+    QUOIN_ASSERT(has(at, 1), "a byte of the grid");
     return bytes_[at] != std::byte{0} ? 1.0F : 0.0F;
   }
   /// Returns the position of a child; past the end of the grid if the offset is invalid.
@@ -150,6 +157,7 @@ class GridReader {
     };
     const std::size_t active = node + 32;
     const std::size_t children = active + shape.places / 8;
+    QUOIN_ASSERT(shape.places == std::size_t{1} << 3 * shape.bits, "2^bits entries along each axis");
     for (std::size_t i = 0; i < shape.places; ++i) {
       const auto at = static_cast<int>(i);
       const int low = (1 << shape.bits) - 1;

@@ -21,6 +21,7 @@
 #include <string_view>
 #include <utility>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/half.h>
 
 #include "core/bytes/byte_order.h"
@@ -113,6 +114,7 @@ std::optional<glm::dmat4> read_map(ByteReader& reader, const std::string& kind) 
 }
 
 bool bit_of(std::span<const std::byte> bits, std::size_t i) {
+  QUOIN_ASSERT(i >> 3 < bits.size(), "a bit of the mask");
   return (std::to_integer<unsigned>(bits[i >> 3]) >> (i & 7U) & 1U) != 0;
 }
 
@@ -251,6 +253,7 @@ Status TreeReader::read_lower(IVec3 origin) {
 Result<std::vector<float>> TreeReader::read_values(std::size_t count, std::span<const std::byte> active) {
   enum Code : std::uint8_t { Background, MinusBackground, OneValue, MaskOfBackground, MaskOfOne, MaskOfTwo, All };
   const std::size_t at = reader_.position();
+  QUOIN_ASSERT(active.size() * 8 == count, "one bit per value");
   const unsigned code = reader_.u8();
   if (code > All) return bad_at(at, "unknown value encoding");
   float first = code == Background ? grid_.background : is_truth() ? 1.0F - grid_.background : -grid_.background;
@@ -265,6 +268,7 @@ Result<std::vector<float>> TreeReader::read_values(std::size_t count, std::span<
   std::vector<float> values(count);
   if (auto done = read_data(stored, std::span(values).first(stored)); !done) return done.error();
   if (stored == count) return values;
+  QUOIN_ASSERT(stored < count, "at most as many active values as places");
   // From the end, so that no value is overwritten before it is moved.
   std::size_t next = stored;
   for (std::size_t i = count; i-- > 0;) {
@@ -278,6 +282,7 @@ Result<std::vector<float>> TreeReader::read_values(std::size_t count, std::span<
 }
 
 Status TreeReader::read_data(std::size_t count, std::span<float> out) {
+  QUOIN_ASSERT(out.size() >= count, "room for the values");
   const bool is_half = is_half_ && !is_truth();
   const std::size_t size = is_half ? 2 : value_bytes();
   if (is_half && count == 0) return {};  // other types store a size even then
@@ -311,6 +316,7 @@ Status TreeReader::read_data(std::size_t count, std::span<float> out) {
       data = expanded_;
     }
   }
+  QUOIN_ASSERT(data.size() >= bytes, "as many bytes as the values need");
   for (std::size_t i = 0; i < count; ++i) {
     const std::byte* const value = data.data() + i * size;
     if (is_half) {
@@ -430,6 +436,7 @@ class FileReader {
   }
 
   Status read_grid(const Descriptor& descriptor, std::size_t number) {
+    QUOIN_ASSERT(number < ends_.size(), "a grid of the file");
     ByteReader reader(bytes_, descriptor.begin, ends_[number]);
     const std::uint32_t compression = reader.u32();
     const Metadata metadata = read_metadata(reader);

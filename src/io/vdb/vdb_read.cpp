@@ -10,6 +10,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/function_ref.h>
 #include <quoin/grid/density_chunk.h>
 #include <quoin/scene/volume_scene.h>
@@ -110,6 +111,7 @@ Status for_chunks(const std::vector<Piece>& pieces, Threads threads, const Progr
 /// Calls `set(index in a chunk's rows, index in a leaf)` for all voxels of a leaf.
 template <class Set>
 void for_leaf(IVec3 origin, Set set) {
+  QUOIN_ASSERT(((origin.x | origin.y | origin.z) & (kLeafEdge - 1)) == 0, "a multiple of 8");
   const IVec3 corner = local_of(origin);
   for (int x = 0; x < kLeafEdge; ++x) {
     for (int y = 0; y < kLeafEdge; ++y) {
@@ -139,6 +141,7 @@ DensityChunk level_set_chunk(const Grid& grid, std::span<const Piece> pieces, fl
       }
       continue;
     }
+    QUOIN_ASSERT(grid.values.size() >= (std::size_t{piece.index} + 1) * kLeafVoxels, "the values of the leaf");
     const float* const values = grid.values.data() + std::size_t{piece.index} * kLeafVoxels;
     for_leaf(grid.leaves[piece.index].origin, [&](std::size_t at, std::size_t i) { dense[at] = stored(values[i]); });
   }
@@ -160,6 +163,7 @@ Chunk mask_chunk(const Grid& grid, std::span<const Piece> pieces) {
       for_leaf(grid.tiles[piece.index].origin, [&](std::size_t at, std::size_t) { dense[at] = kMaterial; });
       continue;
     }
+    QUOIN_ASSERT(piece.index < grid.leaves.size(), "a leaf of the grid");
     const LeafMask& there = grid.leaves[piece.index].active;
     for_leaf(grid.leaves[piece.index].origin, [&](std::size_t at, std::size_t i) {
       if ((there[i >> 6] >> (i & 63U) & 1U) != 0) dense[at] = kMaterial;
@@ -187,6 +191,7 @@ class SceneMaker {
     }
     for (std::size_t i = 0; i < file_.grids.size(); ++i) {
       const std::size_t first = file_.grids[i].same_as;
+      QUOIN_ASSERT(first == SIZE_MAX || first < handles_.size(), "a grid of the file");
       if (first == SIZE_MAX || !handles_[first]) continue;
       place_again(file_.grids[i], *handles_[first], first);
     }
@@ -291,7 +296,11 @@ IBox box_of(const Grid& grid) {
 // Requires: the grid's content is in the box, which has values.size() voxels.
 void fill_values(const Grid& grid, const IBox& box, std::vector<float>& values) {
   const IVec3 size = box.size();
+  QUOIN_ASSERT(values.size() == static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) *
+                                    static_cast<std::size_t>(size.z),
+               "a value for each voxel of the box");
   const auto at = [&](IVec3 place) -> float& {
+    QUOIN_ASSERT(box.contains(place), "a voxel of the box");
     const IVec3 local = place - box.min;
     return values[static_cast<std::size_t>(local.x) +
                   static_cast<std::size_t>(size.x) *

@@ -10,6 +10,7 @@
 
 #include <glm/mat4x4.hpp>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
 
@@ -25,6 +26,7 @@ inline constexpr std::size_t kLeafVoxels = 512;
 
 /// Returns the index of a leaf's voxel among its values and in its masks.
 [[nodiscard]] constexpr std::size_t place_in_leaf(int x, int y, int z) {
+  QUOIN_ASSERT(((x | y | z) & ~(kLeafEdge - 1)) == 0, "0 <= x, y, z < 8");
   return static_cast<std::size_t>(x << 6 | y << 3 | z);
 }
 

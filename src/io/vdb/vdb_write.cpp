@@ -58,6 +58,7 @@ class Writer {
   }
   /// Writes the current offset at `at`.
   void mark(std::size_t at) {
+    QUOIN_ASSERT(at + sizeof(std::uint64_t) <= bytes.size(), "eight bytes that were written");
     put_number(bytes.data() + at, static_cast<std::uint64_t>(bytes.size()), std::endian::little);
   }
 
@@ -89,6 +90,7 @@ using Upper = std::map<int, Lower>;
 using Tree = std::map<Place, Upper>;
 
 void set_bit(std::span<std::uint64_t> bits, int i) {
+  QUOIN_ASSERT(i >= 0 && static_cast<std::size_t>(i) >> 6 < bits.size(), "a bit of the mask");
   bits[static_cast<std::size_t>(i) >> 6] |= std::uint64_t{1} << (i & 63);
 }
 
@@ -128,6 +130,7 @@ Dense dense_of(const DensityChunk& chunk) {
 }
 
 std::size_t place_in_chunk(IVec3 local) {
+  QUOIN_ASSERT(((local.x | local.y | local.z) & ~(kChunkEdge - 1)) == 0, "a voxel of the chunk");
   return static_cast<std::size_t>((local.z * kChunkEdge + local.y) * kChunkEdge + local.x);
 }
 
@@ -277,6 +280,7 @@ class TreeWriter {
   }
 
   void write_leaf(const Dense& dense, IVec3 local, const LeafMask& active) {
+    QUOIN_ASSERT(dense.size() == kChunkVoxels, "the densities of a chunk");
     LeafMask outside{};
     std::vector<std::byte> values;
     for_voxels(local, [&](IVec3 at, std::size_t i) {

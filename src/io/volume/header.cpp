@@ -190,6 +190,7 @@ std::string claim(const Volume& volume, std::uint64_t bytes) {
 
 std::uint64_t bytes_of_values(const VolumeHeader& header) {
   const IVec3 size = header.volume.size;
+  QUOIN_ASSERT(size.x > 0 && size.y > 0 && size.z > 0 && header.components > 0, "positive sizes");
   return static_cast<std::uint64_t>(size.x) * static_cast<std::uint64_t>(size.y) * static_cast<std::uint64_t>(size.z) *
          size_of(header.volume.type) * header.components;
 }
@@ -200,6 +201,7 @@ Status read_values(ByteStream& stream, VolumeHeader& header, std::uint64_t offse
                      static_cast<std::size_t>(volume.size.z);
   const std::size_t width = size_of(volume.type);
   const std::size_t stride = width * header.components;
+  QUOIN_ASSERT(stride > 0, "at least one byte per voxel");
   const auto cut_off = [&](std::uint64_t held, const char* how) {
     return make_error(ErrorCode::BadFormat,
                       claim(volume, bytes_of_values(header)) + ", but there are " + how + std::to_string(held), {},
@@ -222,6 +224,7 @@ Status read_values(ByteStream& stream, VolumeHeader& header, std::uint64_t offse
                   piece.begin() + static_cast<std::ptrdiff_t>(i * width));
     }
     volume.values.resize(done + now);
+    QUOIN_ASSERT(now > 0 && piece.size() >= now * width, "bytes of the values");
     const std::span<float> values = std::span(volume.values).subspan(done, now);
     decode(volume.type, piece.data(), header.order, {header.slope, header.intercept}, values);
     survey.add(values);

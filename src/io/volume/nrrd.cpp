@@ -78,6 +78,7 @@ std::string_view trimmed(std::string_view text) {
 }
 
 Status add_line(std::string_view line, std::size_t at, Fields& fields) {
+  QUOIN_ASSERT(!line.empty(), "a line with text");
   if (line.front() == '#') return {};
   const std::size_t colon = line.find(':');
   if (colon == std::string_view::npos || colon + 1 == line.size()) {
@@ -239,6 +240,7 @@ Status read_directions(const Field& field, const Axes& axes, glm::dmat4& space_f
   }
   for (int axis = 0; axis < 3; ++axis) {
     const std::size_t place = axes.first + static_cast<std::size_t>(axis);
+    QUOIN_ASSERT(place < vectors->size(), "three axes from the first spatial one");
     const std::vector<double>& v = (*vectors)[place];
     if (v.empty()) {
       return unsupported("axis " + std::to_string(place + 1) +

@@ -84,6 +84,7 @@ Append appender(ScalarType type) {
 Result<std::vector<std::byte>> decode_ascii(std::string_view text, std::size_t begin, const VolumeHeader& header) {
   constexpr std::string_view kBetween = " \t\r\n,";
   const Append append_one = appender(header.volume.type);
+  QUOIN_ASSERT(append_one != nullptr && begin <= text.size(), "a known type, and values in the file");
   const std::uint64_t wanted = bytes_of_values(header);
   std::vector<std::byte> out;
   for (std::size_t at = text.find_first_not_of(kBetween, begin); at != std::string_view::npos && out.size() < wanted;) {
@@ -157,6 +158,7 @@ Result<std::vector<std::byte>> decode_bzip2(std::span<const std::byte> bytes, st
     const std::size_t taken = offered - state.avail_in;
     out.resize(filled + written);
     at += taken;
+    QUOIN_ASSERT(written <= room && at <= bytes.size(), "no more than was offered");
     if (outcome != BZ_OK && outcome != BZ_STREAM_END) return bad("the compressed data is damaged", at);
     if (outcome == BZ_OK && written == 0 && taken == 0) return bad("the compressed data is cut off", at);
   }

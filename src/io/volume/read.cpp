@@ -1,3 +1,4 @@
+#include <quoin/core/assert.h>
 #include <quoin/io/volume.h>
 
 #include <algorithm>
@@ -68,6 +69,7 @@ Result<Volume> read_stream(ByteStream& stream, std::uint64_t skipped, VolumeHead
 /// Skips to values that are at the end of the file.
 Result<Volume> read_from_end(std::span<const std::byte> bytes, VolumeHeader& header) {
   const std::uint64_t taken = bytes_of_values(header);
+  QUOIN_ASSERT(header.data_at <= bytes.size(), "values that begin in the file");
   const std::uint64_t room = bytes.size() - header.data_at;
   ByteStream stream(bytes, 0, Compression::None);
   return read_stream(stream, header.data_at + (room > taken ? room - taken : 0), header);
@@ -116,6 +118,7 @@ std::filesystem::path image_beside(const std::filesystem::path& header_path) {
 /// Returns the file with the values of a header. Requires: they are in another file.
 Result<std::filesystem::path> data_file_of(const std::filesystem::path& header_path, const VolumeHeader& header,
                                            const VolumeOptions& options) {
+  QUOIN_ASSERT(header.is_data_elsewhere, "values in another file");
   const std::string name = header.data_file.empty() ? image_beside(header_path).filename().string() : header.data_file;
   return sidecar_path(header_path, name, options.sidecar_files);
 }
