@@ -23,11 +23,12 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/thousands.h>
-
 #include "core/bytes/byte_reader.h"
 #include "core/bytes/byte_writer.h"
 #include "core/work/progress_steps.h"
+#include "io/byte_reader.h"
 #include "io/format_driver.h"
 #include "io/image/png.h"
 #include "io/models/model_builder.h"
@@ -297,6 +298,7 @@ Status GoxelReader::put_shape(const Dict& dict, const Material& material, std::s
 
 Status GoxelReader::put_block(const Block& block, const Material& material) {
   constexpr std::uint8_t kSolid = 127;
+  QUOIN_ASSERT(block.index < blocks_.size(), "a block of the file");
   const std::vector<std::uint8_t>& pixels = blocks_[block.index];
   for (int i = 0; i < kBlockEdge * kBlockEdge * kBlockEdge; ++i) {
     const std::uint8_t* const rgba = pixels.data() + std::size_t{4} * static_cast<std::size_t>(i);

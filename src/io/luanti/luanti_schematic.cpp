@@ -8,11 +8,16 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include "core/bytes/byte_order.h"
 #include "core/bytes/byte_reader.h"
 #include "core/bytes/byte_stream.h"
+#include "io/byte_order.h"
+#include "io/byte_reader.h"
+#include "io/byte_stream.h"
 #include "io/format_driver.h"
 #include "io/luanti/luanti_nodes.h"
+#include "io/models/luanti_nodes.h"
 #include "io/models/model_builder.h"
 
 namespace quoin::models {
@@ -75,6 +80,7 @@ Result<LoadedScene> read_mts(std::span<const std::byte> bytes) {
   for (int z = 0; z < size_z; ++z) {
     for (int y = 0; y < size_y; ++y) {
       for (int x = 0; x < size_x; ++x, ++at) {
+        QUOIN_ASSERT(at < volume, "a node of the schematic");
         const auto index = load<std::uint16_t>(content.data() + 2 * at, std::endian::big);
         if (index >= nodes.size()) return bad_at(begin, "a node index is beyond the names");
         // The node's probability, out of 127 since version 4 and out of 255 before.

@@ -1,6 +1,7 @@
 #include "io/models/model_builder.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include <quoin/core/assert.h>
@@ -16,7 +17,7 @@ constexpr std::size_t kBatch = std::size_t{1} << 18;
 }  // namespace
 
 void ModelBuilder::begin(Model model) {
-  QUOIN_ASSERT(model.voxel_size > 0.0, "a size");
+  QUOIN_ASSERT(model.voxel_size > 0.0 && std::isfinite(model.voxel_size), "0 < voxel_size < infinity");
   parts_.push_back({std::move(model), runs_.size()});
 }
 
@@ -36,6 +37,7 @@ void ModelBuilder::warn(std::string line) {
 
 Status ModelBuilder::put(IVec3 voxel, Rgba8 colour, int count, int axis) {
   QUOIN_ASSERT(!parts_.empty(), "a model has begun");
+  QUOIN_ASSERT(axis >= 0 && axis < 3, "0 <= axis < 3");
   if (colour.a == 0 || count <= 0) return {};
   if (runs_.size() == kMaxRuns) return make_error(ErrorCode::LimitExceeded, "more than 2^25 voxels or runs of voxels");
   runs_.push_back({voxel, looks_.number_of(colour, material_), count, axis});
@@ -57,6 +59,7 @@ Result<LoadedScene> ModelBuilder::take(std::string format) {
     grid.canvas = model.canvas;
     for (std::size_t run = parts_[i].first; run < end; ++run) {
       const Run& r = runs_[run];
+      QUOIN_ASSERT(r.count > 0 && r.look < types->size(), "a run of a known look");
       if (r.count == 1) continue;
       IVec3 size(1);
       size[r.axis] = r.count;

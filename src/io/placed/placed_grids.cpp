@@ -7,6 +7,7 @@
 #include <utility>
 
 #include <glm/gtc/quaternion.hpp>
+#include <quoin/core/assert.h>
 #include <quoin/core/axis_orientation.h>
 #include <quoin/core/function_ref.h>
 #include <quoin/core/thousands.h>
@@ -191,6 +192,7 @@ class Placer {
                                                     " is not rotated by multiples of 90 degrees, as " +
                                                     std::string(holds_.extension) + " requires");
     }
+    QUOIN_ASSERT(voxel_size_ > 0.0 && !box.empty(), "voxels with a size");
     const DVec3 a = world_from_grid(instance, grid, DVec3(box.min)) / voxel_size_;
     const DVec3 b = world_from_grid(instance, grid, DVec3(box.max)) / voxel_size_;
     const DVec3 least = glm::min(a, b);
@@ -261,6 +263,7 @@ Result<MergedGrid> merge_grids(const Scene& scene, const FormatHolds& holds) {
 std::string cut_name(const std::string& name, std::size_t bytes, std::vector<std::string>& warnings) {
   if (name.size() <= bytes) return name;
   std::size_t end = bytes;
+  QUOIN_ASSERT(end < name.size(), "a name that is too long");
   while (end > 0 && (static_cast<unsigned char>(name[end]) & 0xC0U) == 0x80U) --end;
   warnings.push_back("a name was cut to " + std::to_string(end) + " bytes: \"" + printable(name) + "\"");
   return name.substr(0, end);
@@ -272,6 +275,7 @@ void read_voxels(const Grid& grid, IVec3 first, std::span<VoxelType> out) {
     const IVec3 at = first + IVec3(static_cast<int>(done), 0, 0);
     const IVec3 chunk = chunk_of(at);
     const IVec3 within = at - chunk * kChunkEdge;
+    QUOIN_ASSERT(within.x >= 0 && within.x < kChunkEdge, "a voxel of the chunk");
     const auto count = std::min(out.size() - done, static_cast<std::size_t>(kChunkEdge - within.x));
     const auto to = out.subspan(done, count);
     if (const Chunk* const voxels = grid.find_chunk(chunk); voxels != nullptr) {

@@ -16,11 +16,14 @@
 #include <string_view>
 #include <utility>
 
+#include <quoin/core/assert.h>
 #include "core/bytes/byte_reader.h"
 #include "core/bytes/byte_stream.h"
 #include "core/bytes/byte_writer.h"
 #include "core/bytes/text.h"
 #include "core/work/progress_steps.h"
+#include "io/byte_reader.h"
+#include "io/byte_stream.h"
 #include "io/format_driver.h"
 #include "io/models/model_builder.h"
 #include "io/placed/placed_grids.h"
@@ -182,12 +185,14 @@ Status QbReader::read_run(const Matrix& matrix, int z, std::uint64_t& at, std::u
   Rgba8 colour = colour_of(data, is_bgra_);
   if (has_masks_ && colour.a != 0) colour.a = 255;
   const auto width = static_cast<std::uint64_t>(matrix.size.x);
+  QUOIN_ASSERT(count <= width * static_cast<std::uint64_t>(matrix.size.y) - at, "a run within its slice");
   const std::uint64_t end = at + count;
   if (colour.a == 0) {
     at = end;
     return {};
   }
   while (at < end) {
+    QUOIN_ASSERT(width > 0, "a matrix with voxels");
     const IVec3 voxel{static_cast<int>(at % width), static_cast<int>(at / width), z};
     const std::uint64_t row = std::min(end - at, width - at % width);
     if (auto put = builder_.put(voxel, colour, static_cast<int>(row), 0); !put) return put;

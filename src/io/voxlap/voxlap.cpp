@@ -15,11 +15,12 @@
 #include <string>
 #include <utility>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/thousands.h>
-
 #include "core/bytes/byte_reader.h"
 #include "core/bytes/byte_writer.h"
 #include "core/work/progress_steps.h"
+#include "io/byte_reader.h"
 #include "io/format_driver.h"
 #include "io/models/model_builder.h"
 #include "io/placed/placed_grids.h"
@@ -58,12 +59,14 @@ Model model_of(const Sizes& sizes, DVec3 pivot) {
 
 // Blue, green, red and a byte of light.
 Rgba8 colour_of(std::span<const std::byte> bgr) {
+  QUOIN_ASSERT(bgr.size() >= 3, "three channels");
   return {std::to_integer<std::uint8_t>(bgr[2]), std::to_integer<std::uint8_t>(bgr[1]),
           std::to_integer<std::uint8_t>(bgr[0]), 255};
 }
 
 // Six bits per channel, like VGA palettes.
 Rgba8 colour_of(std::span<const std::byte> palette, std::uint8_t index) {
+  QUOIN_ASSERT(palette.size() == kPaletteBytes, "a palette of 256 colours");
   const auto channel = [&](std::size_t i) {
     const auto six = std::to_integer<unsigned>(palette[std::size_t{3} * index + i]) & 63U;
     return static_cast<std::uint8_t>(six << 2 | six >> 4);
@@ -238,6 +241,7 @@ VxlLayout layout_in_header(std::span<const std::byte> whole) {
 /// the column does not fit its map.
 template <class Take>
 bool read_column(ByteReader& reader, int depth, Take take) {
+  QUOIN_ASSERT(depth > 0 && depth <= 256, "depths of one byte");
   int z = 0;
   for (;;) {
     const int words = reader.u8();
