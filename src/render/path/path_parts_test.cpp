@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
+#include "core/death_for_tests.h"
 #include "render/path/atmosphere.h"
 #include "render/path/environment_light.h"
 #include "render/path/lamps/lamp_memory.h"
@@ -365,6 +366,15 @@ TEST(PathAtmosphere, WithoutAirIsBlackAroundTheSun) {
   const AtmosphericSky space = atmospheric_sky({0.0, 1.0, 0.0}, kPi, {0.0, 0.0, 0.0});
   EXPECT_NEAR(space.sunlight.x, kPi, 1e-5F);
   EXPECT_LT(largest(mean_of(space.radiance, 10, 50)), 0.002F);
+}
+
+TEST(PathPartsDeathTest, AnglesAreAtMostOneTurn) {
+  QUOIN_EXPECT_MISTAKE(static_cast<void>(of_turns(1.5F)), "0 <= turns <= 1");
+}
+
+TEST(PathPartsDeathTest, LampSharesAreOfPlacesThatWereReturned) {
+  const LampMemory memory;
+  QUOIN_EXPECT_MISTAKE(static_cast<void>(memory.table(99)), "a place that was returned");
 }
 
 }  // namespace

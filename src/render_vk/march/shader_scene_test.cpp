@@ -7,11 +7,14 @@
 #include <cstring>
 #include <optional>
 #include <random>
+#include <vector>
 
 #include <gtest/gtest.h>
 
+#include "core/death_for_tests.h"
 #include "light/surfaces.h"
 #include "render/render_test_support.h"
+#include "render_vk/trees/tree_packing.h"
 
 namespace quoin {
 namespace {
@@ -190,6 +193,28 @@ TEST(ShaderBytes, MoreThanAddressesReachIsRefused) {
     ASSERT_FALSE(second) << size;
     EXPECT_EQ(second.error().code, ErrorCode::LimitExceeded);
   }
+}
+
+TEST(ShaderBytesDeathTest, BytesLieInTheirPlace) {
+  vulkan::ShaderBytes memory;
+  const auto place = memory.allocate(32, "trying");
+  ASSERT_TRUE(place);
+  const std::vector<std::byte> bytes(8);
+  QUOIN_EXPECT_MISTAKE(static_cast<void>(memory.write(*place, bytes, 25)), "bytes within the place");
+}
+
+TEST(ShaderBytesDeathTest, PlacesAreOfTheirOwnMemory) {
+  vulkan::ShaderBytes memory;
+  vulkan::ShaderBytes other;
+  const auto place = other.allocate(320, "trying");
+  ASSERT_TRUE(place);
+  QUOIN_EXPECT_MISTAKE(static_cast<void>(memory.write(*place, {})), "an allocated place");
+}
+
+TEST(TopTreeDeathTest, ChunksBeginAtTheOriginOfTheTree) {
+  std::vector<vulkan::ChunkNodeAt> chunks(1);
+  chunks.front().chunk = {-1, 0, 0};
+  QUOIN_EXPECT_MISTAKE(static_cast<void>(vulkan::build_top_tree(chunks, 32)), "chunks from the tree's origin");
 }
 
 }  // namespace

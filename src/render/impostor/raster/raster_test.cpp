@@ -15,6 +15,7 @@
 #include <gtest/gtest.h>
 
 #include "bench/workloads.h"
+#include "core/death_for_tests.h"
 #include "core/instruction_sets_for_tests.h"
 #include "render/impostor/cells.h"
 #include "render/impostor/seen.h"
@@ -245,6 +246,15 @@ TEST(ImpostorSeen, DrawingSeesWhatRaysSee) {
     EXPECT_GT(views, 20'000U);
     EXPECT_LE(others, views / 500);
   }
+}
+
+TEST(RasterDeathTest, PixelsLieInTheTile) {
+  QUOIN_EXPECT_MISTAKE(static_cast<void>(raster::index_of(raster::kTile, 0)), "a pixel of the tile");
+}
+
+TEST(RasterDeathTest, HitsFitThePackedWord) {
+  QUOIN_EXPECT_MISTAKE(static_cast<void>(raster::Met{1U << 26, 0}.packed()), "a number of 26 bits");
+  QUOIN_EXPECT_MISTAKE(static_cast<void>(raster::Met{0, 32}.packed()), "a view of 5 bits");
 }
 
 }  // namespace

@@ -15,6 +15,7 @@
 #include <quoin/render/path_history.h>
 #include <quoin/render/path_tracer.h>
 
+#include "core/death_for_tests.h"
 #include "render/path/history/packed_light.h"
 #include "render/path/town_for_tests.h"
 #include "render/render_test_support.h"
@@ -278,6 +279,13 @@ TEST_F(PathHistoryTest, KeepsLayersOfImagesAsLarge) {
   EXPECT_EQ(shown.depth.values, taken.depth.values);
   EXPECT_EQ(shown.alpha, taken.alpha);
   EXPECT_EQ(shown.rays, taken.rays);
+}
+
+TEST(PathHistoryDeathTest, ImagesHaveOneValuePerPixel) {
+  PathHistory history;
+  PathImage image;
+  image.width = image.height = 4;
+  QUOIN_EXPECT_MISTAKE(history.refine(image, 1), "one value per pixel");
 }
 
 }  // namespace
