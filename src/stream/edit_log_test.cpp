@@ -6,6 +6,8 @@
 #include <gtest/gtest.h>
 #include <quoin/stream/world_edit.h>
 
+#include "core/death_for_tests.h"
+
 namespace quoin {
 namespace {
 
@@ -80,6 +82,11 @@ TEST(WorldEdit, SaysWhichChunksItMayChange) {
   EXPECT_EQ(chunks(WorldEdit::FieldSphere{{0.0, 0.0, 0.0}, -1.0, 0.0, 1}).error().code, ErrorCode::InvalidArgument);
   EXPECT_EQ(chunks(WorldEdit::FieldBox{{0.0, 0.0, 0.0}, {1.0, nan, 1.0}, 0.0, 0.0, 1}).error().code,
             ErrorCode::InvalidArgument);
+}
+
+TEST(EditLogDeathTest, EditsAreAddedInTheirOrder) {
+  EditLog log = some_log(1);
+  QUOIN_EXPECT_MISTAKE(log.add({9, 1, {0, WorldEdit::FillBox{}}}), "an edit later than the last one");
 }
 
 }  // namespace

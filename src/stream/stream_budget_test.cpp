@@ -6,6 +6,8 @@
 
 #include <gtest/gtest.h>
 
+#include "core/death_for_tests.h"
+
 namespace quoin {
 namespace {
 
@@ -71,6 +73,17 @@ TEST(StreamBudget, WithoutOthersAllIsForChunks) {
   EXPECT_LE(budget.loaded_bytes(), kBudget);
   EXPECT_FALSE(budget.is_over());
   EXPECT_LT(budget.chunks(2 * budget.loaded_chunks(), true, 0.0), budget.loaded_chunks() + 1);
+}
+
+TEST(StreamBudgetDeathTest, ChunksLeaveAsTheyCame) {
+  StreamBudget budget(kBudget, false);
+  budget.add_chunk(kChunk);
+  QUOIN_EXPECT_MISTAKE(budget.remove_chunk(kChunk + 1), "a chunk that was added");
+}
+
+TEST(StreamBudgetDeathTest, MissingSharesAreAtMostOne) {
+  const StreamBudget budget(kBudget, false);
+  QUOIN_EXPECT_MISTAKE(static_cast<void>(budget.chunks(1, true, 2.0)), "a share of 0 to 1");
 }
 
 }  // namespace

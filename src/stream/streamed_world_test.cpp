@@ -18,6 +18,7 @@
 #include <quoin/store/world_maintenance.h>
 #include <quoin/terrain/terrain.h>
 
+#include "core/death_for_tests.h"
 #include "store/world/world_for_tests.h"
 
 namespace quoin {
@@ -518,6 +519,20 @@ TEST_F(StreamedWorldTest, ReplayedLogsGiveTheSameWorlds) {
     }
   }
   EXPECT_TRUE(ends[0] == ends[1]);
+}
+
+TEST(TerrainGeneratorDeathTest, ChunksLieInTheLandscape) {
+  VoxelRegistry types;
+  const auto generator = make_terrain_generator({.seed = 5, .height = 2}, types);
+  ASSERT_TRUE(generator.has_value());
+  QUOIN_EXPECT_MISTAKE(static_cast<void>((*generator)->make({0, 2, 0})), "a chunk of the landscape");
+}
+
+TEST(StreamedWorldDeathTest, GeneratorsAreForStreamedGrids) {
+  const WorldFolder folder;
+  auto world = StreamedWorld::open_or_create(folder / "w.quoin");
+  ASSERT_TRUE(world.has_value());
+  QUOIN_EXPECT_MISTAKE(world->use_generator({}, nullptr), "a streamed grid");
 }
 
 }  // namespace

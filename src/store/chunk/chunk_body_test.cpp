@@ -14,8 +14,10 @@
 
 #include <quoin/terrain/terrain.h>
 
+#include "core/death_for_tests.h"
 #include "grid/chunk/chunk_storage.h"
 #include "store/chunk/chunk_body_for_tests.h"
+#include "store/chunk/content.h"
 
 namespace quoin::store {
 namespace {
@@ -437,6 +439,17 @@ TEST(ChunkBody, KeepsGeneratedTerrain) {
     EXPECT_TRUE(back->densities == densities);
     expect_sound(back->voxels);
   }
+}
+
+TEST(ChunkBodyDeathTest, ReadersTakeWhatIsThere) {
+  const std::vector<std::byte> bytes(3);
+  ContentReader content(bytes);
+  QUOIN_EXPECT_MISTAKE(static_cast<void>(content.take<std::uint32_t>()), "bytes that .has. confirmed");
+}
+
+TEST(ChunkBodyDeathTest, BandsArePositive) {
+  const std::vector<std::byte> body = encoded(Chunk());
+  QUOIN_EXPECT_MISTAKE(static_cast<void>(decoded(body, many_types(), 0.0F)), "a positive band");
 }
 
 }  // namespace

@@ -16,8 +16,11 @@
 #include <quoin/io/file.h>
 
 #include "core/bytes/byte_order.h"
+#include "core/death_for_tests.h"
+#include "io/byte_order.h"
 #include "store/chunk/chunk_body.h"
 #include "store/database/connection.h"
+#include "store/salvage/page_file.h"
 #include "store/world/world_for_tests.h"
 
 namespace quoin::store {
@@ -410,6 +413,15 @@ TEST(PageScan, FilesOfAnythingAreScanned) {
     static_cast<void>(
         scan_records(folder / "world", [](const PageRecord& record) { EXPECT_GE(record.columns.size(), 2U); }));
   }
+}
+
+TEST(PageFileDeathTest, PagesAreOfTheFileOrItsLog) {
+  const WorldFolder folder;
+  write(folder / "world", Bytes(8'192));
+  const auto file = PageFile::open(folder / "world");
+  ASSERT_TRUE(file.has_value());
+  Bytes page(file->layout().page_size);
+  QUOIN_EXPECT_MISTAKE(file->read(file->page_count(), page), "a page, and room for it");
 }
 
 }  // namespace

@@ -11,6 +11,8 @@
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 
+#include "core/death_for_tests.h"
+#include "store/database/schema.h"
 #include "store/world/world_for_tests.h"
 
 namespace quoin {
@@ -356,6 +358,30 @@ TEST(WorldStore, AWorldThatWasReplacedIsNotReadWithAnothersLog) {
   const auto chunk = reader->load_chunk({0, 0, {}});
   ASSERT_FALSE(chunk);
   EXPECT_NE(chunk.error().message.find("open it again"), std::string::npos);
+}
+
+TEST(WorldStoreDeathTest, KeysAreOfRegionsThatFitThem) {
+  QUOIN_EXPECT_MISTAKE(static_cast<void>(store::key_of(-1, IVec3{0})), "a region's id");
+  QUOIN_EXPECT_MISTAKE(static_cast<void>(store::key_of(store::kMaxRegion + 1, IVec3{0})), "a region's id");
+}
+
+TEST(WorldStoreDeathTest, SavesNeedAWorldOpenedForWriting) {
+  const WorldFolder folder;
+  static_cast<void>(made(folder / "w.quoin"));
+  auto reader = WorldStore::open(folder / "w.quoin", WorldAccess::Read);
+  ASSERT_TRUE(reader);
+  QUOIN_EXPECT_MISTAKE(static_cast<void>(reader->save({})), "a world opened for writing");
+}
+
+TEST(WorldStoreDeathTest, TicketsAreOfTheirOwnWorld) {
+  const WorldFolder folder;
+  WorldStore world = made(folder / "w.quoin");
+  QUOIN_EXPECT_MISTAKE(static_cast<void>(world.wait({1'000})), "a ticket of this world");
+}
+
+TEST(WorldStoreDeathTest, AirIsNoTypeToSave) {
+  WorldChanges changes;
+  QUOIN_EXPECT_MISTAKE(changes.put_type(kAir, {}), "a type other than air");
 }
 
 }  // namespace
