@@ -5,6 +5,7 @@
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 
+#include "core/death_for_tests.h"
 #include "io/minecraft/block_looks.h"
 #include "io/minecraft/block_states.h"
 #include "io/minecraft/legacy_blocks.h"
@@ -280,6 +281,25 @@ TEST(MinecraftSource, ReadsRealRegionsOfFourAges) {
       EXPECT_TRUE(format && *format == FileFormat::Minecraft) << known.file;
     }
   }
+}
+
+TEST(NbtDeathTest, ElementsAreOfTheList) {
+  NbtWriter writer;
+  writer.compound("").list("c", 3, 2).number(5, 4).number(6, 4).end();
+  const auto document = nbt::Document::parse(writer.bytes);
+  ASSERT_TRUE(document);
+  QUOIN_EXPECT_MISTAKE(static_cast<void>(document->root()["c"].integer(2)), "an element of an array or a list");
+}
+
+TEST(MinecraftSectionsDeathTest, PalettesAreNotEmpty) {
+  QUOIN_EXPECT_MISTAKE(static_cast<void>(minecraft::bits_of_palette(0, 4)), "a palette with entries");
+}
+
+TEST(MinecraftSectionsDeathTest, PackedIndicesHaveAtMostSixteenBits) {
+  const auto document = nbt::Document::parse(chunk_of_stairs(0));
+  ASSERT_TRUE(document);
+  std::vector<std::uint16_t> out(1);
+  QUOIN_EXPECT_MISTAKE(static_cast<void>(minecraft::unpack_indices(document->root(), 17, out)), "1 <= bits <= 16");
 }
 
 }  // namespace

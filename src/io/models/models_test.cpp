@@ -10,6 +10,8 @@
 #include <quoin/io/formats.h>
 
 #include "core/bytes/byte_stream.h"
+#include "core/death_for_tests.h"
+#include "io/byte_stream.h"
 #include "io/format_driver.h"
 #include "io/image/png.h"
 #include "io/models/model_builder.h"
@@ -392,6 +394,24 @@ TEST(Models, AProjectOfQubiclesHoldsWhatItsExportHolds) {
       ASSERT_EQ(colour_at(*project, at), colour_at(*exported, at)) << at.x << ", " << at.y << ", " << at.z;
     }
   }
+}
+
+TEST(ModelBuilderDeathTest, ModelsHaveASize) {
+  ModelBuilder builder;
+  Model model;
+  model.voxel_size = 0.0;
+  QUOIN_EXPECT_MISTAKE(builder.begin(model), "0 < voxel_size");
+}
+
+TEST(ModelBuilderDeathTest, MaterialsWereAdded) {
+  ModelBuilder builder;
+  QUOIN_EXPECT_MISTAKE(builder.use_material(1), "a material that was added");
+}
+
+TEST(ModelBuilderDeathTest, RunsGoAlongOneOfThreeAxes) {
+  ModelBuilder builder;
+  builder.begin({});
+  QUOIN_EXPECT_MISTAKE(static_cast<void>(builder.put(IVec3{0}, {1, 2, 3, 255}, 2, 3)), "0 <= axis < 3");
 }
 
 }  // namespace
