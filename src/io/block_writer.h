@@ -31,6 +31,7 @@ class BlockWriter {
   template <class T>
   void put(const T& value) {
     static_assert(std::is_trivially_copyable_v<T> && sizeof(T) <= kBlockBytes);
+    QUOIN_ASSERT(used_ <= kBlockBytes, "a position within the block");
     if (used_ + sizeof(T) > kBlockBytes) flush();
     std::memcpy(block_.data() + used_, &value, sizeof(T));
     used_ += sizeof(T);

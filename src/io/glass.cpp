@@ -84,6 +84,7 @@ float thickness_of(const MeshView& view) {
 namespace {
 
 double area_of(const MeshView& view, std::size_t i) {
+  QUOIN_ASSERT(i + 2 < view.indices.size(), "a triangle of the surface");
   const Vec3 a = view.positions[view.indices[i]];
   return glm::length(glm::cross(DVec3(view.positions[view.indices[i + 1]] - a),
                                 DVec3(view.positions[view.indices[i + 2]] - a))) /
@@ -107,6 +108,7 @@ float thickness_of(const MeshPart& part, const MeshView& view, VoxelType type) {
   }
   std::vector<std::uint32_t> indices;
   for (std::size_t i = 0; i + 2 < view.indices.size(); i += 3) {
+    QUOIN_ASSERT(view.indices[i] < view.types.size(), "a vertex with a type");
     if (view.types[view.indices[i]] == type) indices.insert(indices.end(), &view.indices[i], &view.indices[i] + 3);
   }
   MeshView own = view;
@@ -120,6 +122,7 @@ GlassBodies::GlassBodies(const SceneMeshes& meshes) {
   std::vector<double> squares(meshes.parts.size());
   std::vector<double> cubes(meshes.parts.size());
   for (const MeshPlacement& placement : meshes.placements) {
+    QUOIN_ASSERT(placement.part < meshes.parts.size(), "a part of the meshes");
     const double unit = unit_of(placement);
     squares[placement.part] += unit * unit;
     cubes[placement.part] += unit * unit * unit;
@@ -165,6 +168,7 @@ GlassBodies::Typical GlassBodies::typical_of(std::vector<Seen> seen) {
     area += each.area;
     units += each.area * each.unit;
   }
+  QUOIN_ASSERT(!seen.empty(), "at least one body");
   Typical typical{seen.back().thickness, area > 0.0 ? static_cast<float>(units / area) : 1.0F};
   double before = 0.0;
   for (const Seen& each : seen) {

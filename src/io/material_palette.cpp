@@ -21,6 +21,7 @@ bool emits(SurfaceClass surface) {
 
 /// Appends vertex `from` of `source`; returns its index in `target`.
 std::uint32_t copy_vertex(const MeshView& source, std::size_t from, BlockyTriangles& target) {
+  QUOIN_ASSERT(from < source.positions.size(), "a vertex of the surface");
   target.positions.push_back(source.positions[from]);
   target.directions.push_back(source.directions[from]);
   if (!source.block_occlusion.empty()) target.occlusion.push_back(source.block_occlusion[from]);
@@ -31,6 +32,7 @@ std::uint32_t copy_vertex(const MeshView& source, std::size_t from, BlockyTriang
 /// Appends vertex `from` of a smooth surface; returns its index in `target`.
 std::uint32_t copy_vertex(const MeshView& source, std::size_t from, SmoothMesh& target,
                           std::vector<LinearRgba16>& light) {
+  QUOIN_ASSERT(from < source.positions.size() && from < source.types.size(), "a vertex with a type");
   target.positions.push_back(source.positions[from]);
   target.normals.push_back(source.normals[from]);
   target.albedo.push_back(source.albedo[from]);
@@ -89,7 +91,11 @@ MaterialPalette::MaterialPalette(const SceneMeshes& meshes) : types_(meshes.type
   for (const MeshPart& part : meshes.parts) {
     for (const MeshView& view : part.surfaces) {
       if (view.has_albedo()) continue;
-      for (const VoxelType type : view.types) used[static_cast<std::size_t>(view.surface)][type] = true;
+      std::vector<bool>& of_class = used.at(static_cast<std::size_t>(view.surface));
+      for (const VoxelType type : view.types) {
+        QUOIN_ASSERT(type < types_.size(), "a type of the registry");
+        of_class[type] = true;
+      }
     }
   }
   find_bands(used);
@@ -121,11 +127,13 @@ void MaterialPalette::find_bands(const Usage& used) {
 
 // Returns the material's group: a transparent type, or a band of emission strengths of opaque types.
 std::size_t MaterialPalette::group_of(SurfaceClass surface, VoxelType type) const {
+  QUOIN_ASSERT(type < band_of_type_.size(), "a type of the registry");
   if (is_transparent(surface)) return type;
   return emits(surface) ? band_of_type_[type] : 0;
 }
 
 float MaterialPalette::strength_of(SurfaceClass surface, VoxelType type) const {
+  QUOIN_ASSERT(type < band_of_type_.size(), "a type of the registry");
   return emits(surface) && !bands_.empty() ? bands_[band_of_type_[type]] : 0.0F;
 }
 
@@ -165,6 +173,7 @@ void MaterialPalette::find_glass(const SceneMeshes& meshes) {
 MaterialPalette::SmoothLook MaterialPalette::smooth_look(const MeshView& view, std::uint32_t vertex) const {
   SmoothLook look;
   look.is_transparent = is_transparent(view.surface);
+  QUOIN_ASSERT(vertex < view.positions.size(), "a vertex of the surface");
   const VoxelType type = view.types.empty() || has_light_ ? kAir : view.types[vertex];
   if (type == kAir || type >= types_.size()) return look;
   const VoxelProperties& properties = types_[type];
@@ -227,7 +236,8 @@ std::size_t MaterialPalette::smooth_material(const MeshView& view, std::uint32_t
 }
 
 float MaterialPalette::smooth_thickness(std::size_t material) const {
-  QUOIN_ASSERT(material >= materials_.size() && material - materials_.size() < smooth_materials_.size());
+  QUOIN_ASSERT(material >= materials_.size() && material - materials_.size() < smooth_materials_.size(),
+               "a smooth material");
   const SurfaceMaterial& of = smooth_materials_[material - materials_.size()];
   return of.type == kAir ? smooth_thickness_ : of.glass.thickness;
 }
@@ -254,6 +264,7 @@ PngImage MaterialPalette::base_colour() const {
   }
   for (const SurfaceMaterial& material : materials_) {
     if (material.is_transparent()) {
+      QUOIN_ASSERT(material.type < types_.size(), "a type of the registry");
       image.pixels[std::size_t{material.type} * 4 + 3] = byte_from_unit(static_cast<double>(material.glass.alpha));
     }
   }

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/scene/scene_meshes.h>
 
@@ -71,6 +72,7 @@ class MaterialPalette {
   [[nodiscard]] std::uint32_t rows() const { return rows_; }
   /// Returns the centre of a type's texel, from the top left; exact in float.
   [[nodiscard]] std::array<float, 2> texel_centre(VoxelType type) const {
+    QUOIN_ASSERT(type < std::size_t{kPaletteWidth} * rows_, "a texel of the palette");
     const std::uint32_t column = type % kPaletteWidth;
     const std::uint32_t row = type / kPaletteWidth;
     // Both sizes are powers of two, so multiplying is as exact as dividing.

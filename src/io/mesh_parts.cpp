@@ -241,6 +241,7 @@ std::vector<const MeshPlacement*> placements_by_part(const SceneMeshes& meshes) 
 }
 
 const std::string& name_of(const SceneMeshes& meshes, const MeshPlacement& placement) {
+  QUOIN_ASSERT(placement.part < meshes.parts.size(), "a part of the meshes");
   return placement.name.empty() ? meshes.parts[placement.part].name : placement.name;
 }
 
@@ -281,6 +282,7 @@ DBox bounds_of(const MeshPart& part, const VertexTransform& transform) {
 }
 
 DVec3 float_origin(const DBox& bounds, double most) {
+  QUOIN_ASSERT(most > 0.0, "a positive distance");
   if (bounds.empty()) return DVec3(0.0);
   const DVec3 far = glm::max(glm::abs(bounds.min), glm::abs(bounds.max));
   if (std::max({far.x, far.y, far.z}) <= most) return DVec3(0.0);
@@ -291,6 +293,7 @@ DVec3 file_origin(const SceneMeshes& meshes, double most_steps) {
   DBox all;
   double step = std::numeric_limits<double>::infinity();
   for (const MeshPlacement& placement : meshes.placements) {
+    QUOIN_ASSERT(placement.part < meshes.parts.size(), "a part of the meshes");
     const MeshPart& part = meshes.parts[placement.part];
     const VertexTransform transform(placement.matrix(), part.pivot);
     const DBox box = bounds_of(part, transform);
@@ -317,6 +320,7 @@ std::array<Vec3, 6> VertexTransform::face_normals() const {
 }
 
 float openness_at(const MeshView& view, std::size_t vertex) {
+  QUOIN_ASSERT(vertex < view.positions.size(), "a vertex of the surface");
   if (!view.block_occlusion.empty()) return occlusion_brightness(view.block_occlusion[vertex]);
   return view.occlusion.empty() ? 1.0F : 1.0F - view.occlusion[vertex];
 }
@@ -330,6 +334,7 @@ MeshView without_occlusion(const MeshView& view) {
 }
 
 LinearRgba16 linear_colour(const MeshView& view, std::size_t vertex) {
+  QUOIN_ASSERT(vertex < view.albedo.size(), "a vertex with a colour");
   const float open = view.occlusion.empty() ? 1.0F : 1.0F - view.occlusion[vertex];
   LinearRgba16 colour{0, 0, 0, 65'535};
   if (is_transparent(view.surface)) colour[3] = view.albedo[vertex][3];
@@ -342,6 +347,7 @@ LinearRgba16 linear_colour(const MeshView& view, std::size_t vertex) {
 }
 
 std::array<std::uint8_t, 3> srgb_colour(const MeshView& view, std::size_t vertex) {
+  QUOIN_ASSERT(vertex < view.albedo.size(), "a vertex with a colour");
   constexpr float kFull = 65'535.0F;  // the maximum value of LinearRgba16
   const SrgbEncoder& encode = SrgbEncoder::shared();
   const float open = view.occlusion.empty() ? 1.0F : 1.0F - view.occlusion[vertex];

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/direction.h>
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
@@ -83,6 +84,7 @@ class VertexTransform {
 
 /// Returns the corners of the triangle whose indices begin at `i`, in the order of writing.
 [[nodiscard]] inline std::array<std::uint32_t, 3> corners_of(const MeshView& view, std::size_t i, bool turned) {
+  QUOIN_ASSERT(i + 2 < view.indices.size(), "a triangle of the surface");
   const std::uint32_t* at = view.indices.data() + i;
   return {at[0], at[turned ? 2 : 1], at[turned ? 1 : 2]};
 }

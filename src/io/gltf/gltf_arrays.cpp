@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include <quoin/core/assert.h>
 #include <quoin/mesh/occlusion.h>
 
 #include "io/gltf/gltf_layout.h"
@@ -46,6 +47,7 @@ void for_normals(const VertexTransform& transform, const MeshView& view, const P
     for (const Vec3& normal : view.normals) put(Vec3(transform.normal(normal)));
     return;
   }
+  QUOIN_ASSERT(view.directions.size() == view.positions.size(), "a direction for each vertex");
   auto normals = transform.face_normals();
   for (Vec3& normal : normals) normal += 0.0F;  // no -0
   for (const Direction direction : view.directions) put(normals[static_cast<std::size_t>(direction)]);
@@ -85,6 +87,7 @@ std::uint8_t occlusion_grey(std::uint8_t occlusion) {
 /// Glass gets the alpha of its body.
 void write_smooth_colours(float thickness, const MeshView& view, BlockWriter& out) {
   std::uint16_t alpha = 0;
+  QUOIN_ASSERT(view.albedo.size() == view.positions.size(), "a colour for each vertex");
   for (std::size_t i = 0; i < view.positions.size(); ++i) {
     LinearRgba16 colour = linear_colour(view, i);
     if (is_transparent(view.surface)) {
@@ -98,6 +101,7 @@ void write_smooth_colours(float thickness, const MeshView& view, BlockWriter& ou
 
 /// Writes the light of blocky meshes, darkened by their occlusion.
 void write_light(const MeshView& view, BlockWriter& out) {
+  QUOIN_ASSERT(view.light.size() == view.positions.size(), "a light for each vertex");
   for (std::size_t i = 0; i < view.positions.size(); ++i) {
     LinearRgba16 light = view.light[i];
     const float open = openness_at(view, i);
@@ -117,11 +121,15 @@ void write_colours(const MaterialPalette& palette, std::size_t material, const M
     const std::uint8_t grey = occlusion_grey(static_cast<std::uint8_t>(i));
     greys[i] = {grey, grey, grey, 255};
   }
-  for (const std::uint8_t occlusion : view.block_occlusion) out.put(greys[occlusion]);
+  for (const std::uint8_t occlusion : view.block_occlusion) {
+    QUOIN_ASSERT(occlusion < greys.size(), "occlusion < 4");
+    out.put(greys[occlusion]);
+  }
 }
 
 template <class Index>
 void write_indices(const MeshView& view, bool turned, BlockWriter& out) {
+  QUOIN_ASSERT(view.positions.size() - 1 <= std::numeric_limits<Index>::max(), "vertices that the indices can name");
   for (std::size_t i = 0; i < view.indices.size() && !out.failed(); i += 3) {
     const auto [a, b, c] = corners_of(view, i, turned);
     out.put(std::array<Index, 3>{static_cast<Index>(a), static_cast<Index>(b), static_cast<Index>(c)});

@@ -37,6 +37,7 @@ bool can_compress_gltf() {
 }
 
 std::vector<std::byte> compress_gltf_array(const GltfArray& array, std::span<const std::byte> bytes) {
+  QUOIN_ASSERT(array.stride > 0 && bytes.size() % array.stride == 0, "whole elements");
   choose_versions();
   std::vector<std::byte> packed;
   const auto data = [&] { return reinterpret_cast<unsigned char*>(packed.data()); };

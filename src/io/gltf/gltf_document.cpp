@@ -9,6 +9,7 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
 
+#include <quoin/core/assert.h>
 #include <quoin/version.h>
 
 #include "io/gltf/gltf_layout.h"
@@ -48,6 +49,7 @@ Json json_from(const DQuat& q) {
 }
 
 const char* type_name(int components) {
+  QUOIN_ASSERT(components >= 1 && components <= 4, "1 to 4 components");
   constexpr std::array<const char*, 4> names = {"SCALAR", "VEC2", "VEC3", "VEC4"};
   return names[static_cast<std::size_t>(components - 1)];
 }
@@ -159,6 +161,7 @@ Json meshes_json(const GltfLayout& layout, Arrays& arrays) {
 /// The emissive factor is at most 1 and the extension multiplies it, so clients without the extension still show weak
 /// lights correctly.
 void add_emission(const GltfLayout& layout, const SurfaceMaterial& material, Json& entry) {
+  QUOIN_ASSERT(layout.texture(GltfImageKind::Emissive).has_value(), "an image for emission");
   const float factor = std::min(material.emission, 1.0F);
   entry["emissiveTexture"] = {{"index", *layout.texture(GltfImageKind::Emissive)}};
   entry["emissiveFactor"] = {factor, factor, factor};
@@ -213,6 +216,7 @@ Json materials_json(const GltfLayout& layout) {
     }
     Json entry = {{"name", material.name}};
     const auto atlas = material.surface == SurfaceClass::Opaque ? layout.texture(GltfImageKind::Atlas) : std::nullopt;
+    QUOIN_ASSERT(layout.texture(GltfImageKind::MetallicRoughness).has_value(), "an image for roughness");
     Json roughness = {{"index", *layout.texture(GltfImageKind::MetallicRoughness)}};
     if (atlas) roughness["texCoord"] = 1;
     entry["pbrMetallicRoughness"] = {
@@ -274,6 +278,7 @@ Json node_along(const std::string& name, const DVec3& position, const glm::dmat3
 
 /// Returns any axes with -Z along `direction`. Requires: `direction` is not 0.
 glm::dmat3 axes_along(const DVec3& direction) {
+  QUOIN_ASSERT(direction != DVec3(0.0), "direction is not 0");
   const DVec3 back = -glm::normalize(direction);
   const DVec3 aside = std::abs(back.y) < 0.9 ? DVec3(0, 1, 0) : DVec3(1, 0, 0);
   const DVec3 right = glm::normalize(glm::cross(aside, back));
@@ -283,6 +288,7 @@ glm::dmat3 axes_along(const DVec3& direction) {
 /// A white surface facing a lamp of 1 candela at distance 1 reflects 1 / pi.
 Json lamp_json(const Lamp& lamp) {
   const float most = std::max({lamp.colour.r, lamp.colour.g, lamp.colour.b});
+  QUOIN_ASSERT(most > 0.0F && lamp.intensity > 0.0, "a lamp that gives light");
   const bool is_spot = lamp.kind == Lamp::Kind::Spot;
   Json entry = Json::object();
   if (!lamp.name.empty()) entry["name"] = lamp.name;
@@ -363,10 +369,13 @@ void add_animation(const GltfLayout& layout, Arrays& arrays, Json& document) {
   Json samplers = Json::array();
   for (const GltfChannel& channel : layout.channels) {
     const auto count = static_cast<std::uint64_t>(channel.seconds.size());
+    QUOIN_ASSERT(!channel.seconds.empty(), "at least one time");
     const std::size_t times = arrays.add_floats(channel.seconds_view, count, 1);
     arrays.accessors.back()["min"] = Json::array({channel.seconds.front()});
     arrays.accessors.back()["max"] = Json::array({channel.seconds.back()});
     const int components = channel.path == GltfChannel::Path::Rotation ? 4 : 3;
+    QUOIN_ASSERT(channel.values.size() == static_cast<std::size_t>(components) * channel.seconds.size(),
+                 "a value for each time");
     const std::size_t values = arrays.add_floats(channel.values_view, count, components);
     channels.push_back(
         {{"sampler", samplers.size()}, {"target", {{"node", channel.node}, {"path", name_of(channel.path)}}}});
@@ -415,6 +424,7 @@ void add_extensions(const GltfLayout& layout, Json& document) {
   if (has_ior) used.push_back(kIor);
   Json required = Json::array();
   const auto is_quantized = [](const GltfMesh& mesh) {
+    QUOIN_ASSERT(!mesh.primitives.empty(), "a mesh with triangles");
     const auto& arrays = mesh.primitives.front().arrays;
     return std::ranges::any_of(arrays, [](const GltfArray& array) {
       return array.kind == GltfArrayKind::Normal && array.component != GltfComponent::Float;

@@ -23,6 +23,7 @@ const glm::dmat3 kReflection(-1, 0, 0, 0, 1, 0, 0, 0, 1);
 /// Appends a view to the buffer and advances the buffer to the next multiple of four.
 GltfView reserve_view(std::uint64_t bytes, std::uint64_t& end) {
   constexpr std::uint64_t kAlignment = 4;
+  QUOIN_ASSERT(end % kAlignment == 0, "an aligned end");
   const GltfView view{end, bytes};
   end += (bytes + kAlignment - 1) / kAlignment * kAlignment;
   return view;
@@ -99,6 +100,7 @@ void measure(const GltfMesh& mesh, GltfPrimitive& primitive) {
     return;
   }
   const auto& positions = primitive.view.positions;
+  QUOIN_ASSERT(!positions.empty(), "at least one vertex");
   primitive.min = primitive.max = stored(positions.front());
   for (const Vec3& position : positions) {
     const Vec3 p = stored(position);
@@ -172,7 +174,10 @@ std::vector<std::uint32_t> places_by_use(const MeshView& view) {
   const auto place = [&](std::uint32_t& at) {
     if (at == kNowhere) at = next++;
   };
-  for (const std::uint32_t index : view.indices) place(place_of[index]);
+  for (const std::uint32_t index : view.indices) {
+    QUOIN_ASSERT(index < place_of.size(), "an index of a vertex");
+    place(place_of[index]);
+  }
   for (std::uint32_t& at : place_of) place(at);
   return place_of;
 }
@@ -191,6 +196,7 @@ void renumber(std::vector<std::byte>& bytes, const std::vector<std::uint32_t>& p
 
 std::vector<std::byte> moved(const std::vector<std::byte>& bytes, std::size_t stride,
                              const std::vector<std::uint32_t>& place_of) {
+  QUOIN_ASSERT(bytes.size() == place_of.size() * stride, "an element for each vertex");
   std::vector<std::byte> result(bytes.size());
   for (std::size_t i = 0; i < place_of.size(); ++i) {
     std::memcpy(result.data() + place_of[i] * stride, bytes.data() + i * stride, stride);
@@ -288,6 +294,7 @@ class MeshLayout {
   }
 
   std::size_t mesh_of(std::size_t part, const glm::dmat3& baked) {
+    QUOIN_ASSERT(part < meshes_.parts.size(), "a part of the meshes");
     Key key{part, {}};
     for (std::size_t i = 0; i < 9; ++i) key.second[i] = baked[static_cast<int>(i / 3)][static_cast<int>(i % 3)];
     const auto [found, is_new] = mesh_of_.try_emplace(key, layout_.meshes.size());
@@ -373,6 +380,7 @@ void hang_below_groups(const SceneMeshes& meshes, std::vector<GltfNode>& nodes) 
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     const std::optional<std::size_t> above = i < first ? meshes.placements[i].group : meshes.groups[i - first].parent;
     if (!above) continue;
+    QUOIN_ASSERT(*above < meshes.groups.size(), "a group of the meshes");
     nodes[i].transform = below(meshes.groups[*above].world_from_group, nodes[i].transform);
     nodes[i].is_at_top = false;
     nodes[first + *above].children.push_back(i);
@@ -393,6 +401,7 @@ class ChannelBuilder {
   ChannelBuilder(std::size_t node, GltfChannel::Path path) : channel_{.node = node, .path = path} {}
 
   void add(double seconds, std::span<const float> value, bool is_last) {
+    QUOIN_ASSERT(!value.empty() && channel_.values.size() % value.size() == 0, "as many numbers at each time");
     const std::span<const float> all(channel_.values);
     const bool is_same = !all.empty() && std::ranges::equal(all.last(value.size()), value);
     has_changes_ |= !all.empty() && !is_same;
@@ -424,6 +433,7 @@ void add_channels(const SceneMeshes& meshes, GltfLayout& layout) {
     const MeshPlacement& placement = meshes.placements[i];
     const GltfNode& node = layout.nodes[i];
     if (placement.keys.empty() || !node.mesh) continue;
+    QUOIN_ASSERT(*node.mesh < layout.meshes.size(), "a mesh of the file");
     ChannelBuilder translation(i, GltfChannel::Path::Translation);
     ChannelBuilder rotation(i, GltfChannel::Path::Rotation);
     ChannelBuilder scale(i, GltfChannel::Path::Scale);

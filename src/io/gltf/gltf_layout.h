@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
 #include <quoin/scene/scene_meshes.h>
@@ -55,7 +56,10 @@ struct GltfArray {
   GltfView packed_view{};           ///< compressed files: the view in the file's buffer
   std::vector<std::byte> packed{};  ///< the encoded content (EXT_meshopt_compression)
 
-  [[nodiscard]] std::uint64_t count() const { return view.bytes / stride; }
+  [[nodiscard]] std::uint64_t count() const {
+    QUOIN_ASSERT(stride > 0, "a positive stride");
+    return view.bytes / stride;
+  }
 };
 
 /// The arrays of one primitive, in writing order.

@@ -26,6 +26,7 @@ void write_buffer(const GltfLayout& layout, BlockWriter& out) {
     for (const GltfPrimitive& primitive : mesh.primitives) {
       for (const GltfArray& array : primitive.arrays) {
         if (layout.is_compressed()) {
+          QUOIN_ASSERT(array.packed.size() == array.packed_view.bytes, "as large as its view");
           out.put(std::span<const std::byte>(array.packed));
         } else {
           write_gltf_array(layout.palette, mesh, primitive, array, out);
@@ -35,6 +36,7 @@ void write_buffer(const GltfLayout& layout, BlockWriter& out) {
     }
   }
   for (const GltfImage& image : layout.images) {
+    QUOIN_ASSERT(image.png.size() == image.view.bytes, "as large as its view");
     out.put(std::span<const std::byte>(image.png));
     out.align('\0');
   }
@@ -45,6 +47,7 @@ void write_buffer(const GltfLayout& layout, BlockWriter& out) {
 }
 
 void write_chunk_header(std::uint64_t bytes, std::uint32_t kind, BlockWriter& out) {
+  QUOIN_ASSERT(bytes % 4 == 0 && bytes <= std::numeric_limits<std::uint32_t>::max(), "a size of 32 bits");
   out.put(std::array<std::uint32_t, 2>{static_cast<std::uint32_t>(bytes), kind});
 }
 

@@ -17,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/thousands.h>
 #include <quoin/mesh/occlusion.h>
 #include <quoin/version.h>
@@ -644,9 +645,11 @@ class ObjText {
     write_face_normals(transform);
     for (const auto& [view, material] : split.surfaces()) {
       write_vertices(view, transform);
+      QUOIN_ASSERT(material < palette_.materials().size(), "a material of the palette");
       out_.put_text("usemtl " + mtl_name(palette_.materials()[material]) + "\n");
       for (const std::array<float, 2>& uv : view.atlas) write_texture_coordinate(uv);
       write_faces(view, transform.mirrors(), [&view = view, this](std::uint32_t corner) {
+        QUOIN_ASSERT(corner < view.types.size() && corner < view.directions.size(), "a vertex of the surface");
         const std::uint64_t texture = view.atlas.empty() ? view.types[corner] : textures_ + corner + 1;
         return std::pair(static_cast<std::uint64_t>(view.directions[corner]), texture);
       });
@@ -666,6 +669,7 @@ class ObjText {
   void write_vertices(const MeshView& view, const VertexTransform& transform) {
     for (std::size_t i = 0; i < view.positions.size() && !out_.failed(); ++i) {
       lines_.triple("v", transform.position(view.positions[i]));
+      QUOIN_ASSERT(view.block_occlusion.empty() || view.block_occlusion[i] < greys_.size(), "occlusion < 4");
       if (!view.block_occlusion.empty()) out_.put_text(greys_[view.block_occlusion[i]]);
       out_.put('\n');
     }

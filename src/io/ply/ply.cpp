@@ -1,5 +1,6 @@
 // The Polygon File Format. Source: G. Turk, "The PLY Polygon File Format" (1994).
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -13,6 +14,7 @@
 
 #include <glm/vec4.hpp>
 
+#include <quoin/core/assert.h>
 #include <quoin/mesh/occlusion.h>
 #include <quoin/version.h>
 
@@ -452,6 +454,9 @@ void write_vertices(const MeshView& view, const VertexTransform& transform, cons
   const auto normals = transform.face_normals();
   const bool is_darkened = !coloured.block_occlusion.empty();
   for (std::size_t i = 0; i < view.positions.size() && !out.failed(); ++i) {
+    QUOIN_ASSERT((view.types[i] + std::size_t{1}) * kOcclusions <= colours.size() &&
+                     static_cast<std::size_t>(view.directions[i]) < normals.size(),
+                 "a type and a direction with a colour and a normal");
     put_vertex(Vec3(transform.position(view.positions[i])), normals[static_cast<std::size_t>(view.directions[i])],
                colours[view.types[i] * kOcclusions + (is_darkened ? view.block_occlusion[i] : 0)], out);
     if (is_apart) out.put(openness_at(view, i));
@@ -461,6 +466,7 @@ void write_vertices(const MeshView& view, const VertexTransform& transform, cons
 void write_faces(const MeshView& view, bool turned, std::uint64_t first, BlockWriter& out) {
   for (std::size_t i = 0; i < view.indices.size() && !out.failed(); i += 3) {
     const auto [a, b, c] = corners_of(view, i, turned);
+    QUOIN_ASSERT(first + std::max({a, b, c}) <= 0x7FFF'FFFF, "numbers of 31 bits");
     const std::array corners = {static_cast<std::int32_t>(first + a), static_cast<std::int32_t>(first + b),
                                 static_cast<std::int32_t>(first + c)};
     char* at = out.room(kFaceBytes);

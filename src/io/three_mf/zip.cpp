@@ -28,6 +28,7 @@ void put_number(std::vector<std::byte>& to, std::uint64_t value, int bytes) {
 }
 
 void set_number(std::vector<std::byte>& in, std::uint64_t at, std::uint64_t value) {
+  QUOIN_ASSERT(at + 4 <= in.size(), "four bytes that were written");
   for (std::size_t i = 0; i < 4; ++i) in[static_cast<std::size_t>(at) + i] = static_cast<std::byte>(value >> (8 * i));
 }
 
@@ -71,6 +72,7 @@ ZipFile::ZipFile() = default;
 ZipFile::~ZipFile() = default;
 
 void ZipFile::begin(std::string name) {
+  QUOIN_ASSERT(name.size() <= 0xFFFF && std::ranges::all_of(name, [](char c) { return c > 0; }), "a name of ASCII");
   end();
   Entry entry;
   entry.name = std::move(name);
@@ -107,6 +109,7 @@ void ZipFile::end() {
   deflater_->run({}, Z_FINISH, bytes_);
   deflater_.reset();
   Entry& entry = entries_.back();
+  QUOIN_ASSERT(bytes_.size() >= entry.at + kLocalHeader + entry.name.size(), "content after its header");
   entry.packed = bytes_.size() - entry.at - kLocalHeader - entry.name.size();
   set_number(bytes_, entry.at + kSumAt, entry.crc);
   set_number(bytes_, entry.at + kSumAt + 4, entry.packed);
