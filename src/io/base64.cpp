@@ -3,6 +3,8 @@
 #include <array>
 #include <cstdint>
 
+#include <quoin/core/assert.h>
+
 namespace quoin {
 namespace {
 
@@ -56,6 +58,7 @@ Result<std::vector<std::byte>> from_base64(std::string_view text) {
     if (left_over != 0)
       return make_error(ErrorCode::BadFormat, "the last base64 character has bits beyond the last byte", {}, at);
   }
+  QUOIN_ASSERT(bytes.size() <= text.size() / 4 * 3, "at most three bytes for four characters");
   return bytes;
 }
 

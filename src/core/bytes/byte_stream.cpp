@@ -52,12 +52,14 @@ ByteStream::ByteStream(std::span<const std::byte> file, std::size_t begin, Compr
 ByteStream::~ByteStream() = default;
 
 std::uint64_t ByteStream::max_bytes() const {
+  QUOIN_ASSERT(begin_ <= file_.size(), "a stream that begins in the file");
   const std::uint64_t held = file_.size() - begin_;
   return inflater_ ? held * kMaxDeflateRatio : held;
 }
 
 Result<std::size_t> ByteStream::read(std::span<std::byte> out) {
   if (!inflater_) {
+    QUOIN_ASSERT(position_ <= file_.size(), "a position within the file");
     const std::size_t count = std::min(out.size(), file_.size() - position_);
     if (count > 0) std::memcpy(out.data(), file_.data() + position_, count);
     position_ += count;

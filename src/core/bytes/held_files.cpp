@@ -9,6 +9,8 @@
 #include <tuple>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 namespace quoin {
 
 namespace {
@@ -61,6 +63,7 @@ HeldFile::~HeldFile() {
   HeldFiles& held = held_files();
   const std::scoped_lock lock(held.mutex);
   const auto found = held.files.find({device_, number_});
+  QUOIN_ASSERT(found != held.files.end() && found->second.databases > 0, "a file that is held");
   if (--found->second.databases != 0) return;
   if (found->second.descriptor >= 0) ::close(found->second.descriptor);
   held.files.erase(found);

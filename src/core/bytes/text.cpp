@@ -6,6 +6,7 @@
 #include <cmath>
 #include <system_error>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/result.h>
 #include <quoin/core/thousands.h>
 
@@ -16,6 +17,7 @@ namespace {
 constexpr std::string_view kReplacement = "\xEF\xBF\xBD";
 
 unsigned char byte_at(std::string_view text, std::size_t i) {
+  QUOIN_ASSERT(i < text.size(), "a byte of the text");
   return static_cast<unsigned char>(text[i]);
 }
 

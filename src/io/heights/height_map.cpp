@@ -1,3 +1,4 @@
+#include <quoin/core/assert.h>
 #include <quoin/io/heights.h>
 
 #include <algorithm>
@@ -42,6 +43,7 @@ std::string_view name_of(HeightEncoding encoding) {
 }
 
 HeightMap read_hgt(std::span<const std::byte> bytes, std::size_t edge) {
+  QUOIN_ASSERT(edge > 1 && bytes.size() == 2 * edge * edge, "two bytes for each height");
   constexpr std::int16_t kVoid = -32'768;
   HeightMap map;
   map.format = "hgt";
@@ -62,6 +64,7 @@ HeightMap read_hgt(std::span<const std::byte> bytes, std::size_t edge) {
 }
 
 float metres_of(HeightEncoding encoding, const std::byte* rgb) {
+  QUOIN_ASSERT(encoding != HeightEncoding::Grey && rgb != nullptr, "a pixel with three channels");
   const auto r = std::to_integer<std::uint32_t>(rgb[0]);
   const auto g = std::to_integer<std::uint32_t>(rgb[1]);
   const auto b = std::to_integer<std::uint32_t>(rgb[2]);
@@ -86,6 +89,8 @@ Result<HeightMap> read_image(std::span<const std::byte> bytes, HeightEncoding en
   map.width = static_cast<int>(image->width);
   map.height = static_cast<int>(image->height);
   map.metres.resize(std::size_t{image->width} * image->height);
+  QUOIN_ASSERT(image->bytes.size() == map.metres.size() * image->channels * (image->bits / 8),
+               "a sample for each channel");
   const std::byte* const samples = image->bytes.data();
   for (std::size_t i = 0; i < map.metres.size(); ++i) {
     if (!is_grey) {

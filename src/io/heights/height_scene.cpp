@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/grid/density_chunk.h>
 #include <quoin/io/heights.h>
 #include <quoin/terrain/terrain.h>
@@ -39,6 +40,7 @@ struct Surface {
   float metres_of_height = 1.0F;
 
   [[nodiscard]] float at(int x, int z) const {
+    QUOIN_ASSERT(x >= 0 && x < width && z >= 0 && z < depth, "a column of the surface");
     return heights[static_cast<std::size_t>(z) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)];
   }
   [[nodiscard]] bool has(int x, int z) const {
@@ -84,6 +86,7 @@ Result<Surface> surface_of(const HeightMap& map, const HeightOptions& options) {
   surface.metres_of_height = static_cast<float>(1.0 / scale);
   surface.heights.resize(static_cast<std::size_t>(surface.width) * static_cast<std::size_t>(surface.depth));
   const auto pixel = [&](int x, int y) {
+    QUOIN_ASSERT(x >= 0 && y >= 0, "a pixel of the map");
     const std::size_t row = static_cast<std::size_t>(std::min(y, map.height - 1)) * static_cast<std::size_t>(map.width);
     return double{map.metres[row + static_cast<std::size_t>(std::min(x, map.width - 1))]};
   };
@@ -201,7 +204,10 @@ class ColumnMaker {
   }
 
  private:
-  [[nodiscard]] static std::size_t place(int x, int z) { return static_cast<std::size_t>(z * kChunkEdge + x); }
+  [[nodiscard]] static std::size_t place(int x, int z) {
+    QUOIN_ASSERT(((x | z) & ~(kChunkEdge - 1)) == 0, "a column of the chunk");
+    return static_cast<std::size_t>(z * kChunkEdge + x);
+  }
   /// Returns true if a chunk lies at least `below` under the ground and above the bottom.
   [[nodiscard]] bool is_within(int first_y, float below) const {
     return range_.is_whole && static_cast<float>(first_y + kChunkEdge) + below <= range_.lowest &&
@@ -235,6 +241,7 @@ class ColumnMaker {
     if (!surface_.has(world_x, world_z)) {
       return std::isinf(highest) ? kBand : std::max(kHalf, height - highest);
     }
+    QUOIN_ASSERT(slope_[place(x, z)] >= 1.0F, "1 <= slope");
     float density = (height - surface_.at(world_x, world_z)) / slope_[place(x, z)];
     density = std::max(density, static_cast<float>(surface_.base - y) + kHalf);
     const int inside = std::min({world_x, world_z, surface_.width - 1 - world_x, surface_.depth - 1 - world_z});
@@ -257,6 +264,7 @@ Status make_ground(const Surface& surface, const TerrainTypes& types, bool is_fi
   const IVec3 first{0, chunk_of(IVec3(surface.base - 1)).y, 0};
   // Continues the field until it is far air.
   const IVec3 last = chunk_of({surface.width, surface.top + static_cast<int>(kBand) * 2, surface.depth});
+  QUOIN_ASSERT(last.x >= 0 && last.z >= 0 && last.y >= first.y, "at least one chunk");
   const std::size_t across = static_cast<std::size_t>(last.x) + 1;
   const std::size_t count = across * (static_cast<std::size_t>(last.z) + 1);
   const std::size_t up = static_cast<std::size_t>(last.y - first.y) + 1;

@@ -5,6 +5,7 @@
 #include <set>
 #include <string>
 
+#include <quoin/core/assert.h>
 #include <quoin/io/image_files.h>
 
 #include "io/whole_file.h"
@@ -44,6 +45,7 @@ class MemoryOut : public OPENEXR_IMF_NAMESPACE::OStream {
  public:
   MemoryOut() : OStream("memory") {}
   void write(const char* from, int count) override {
+    QUOIN_ASSERT(count >= 0, "count >= 0");
     const auto size = static_cast<std::size_t>(count);
     if (bytes.size() < at_ + size) bytes.resize(at_ + size);
     std::copy_n(reinterpret_cast<const std::byte*>(from), size, bytes.begin() + static_cast<std::ptrdiff_t>(at_));

@@ -1,3 +1,4 @@
+#include <quoin/core/assert.h>
 #include <quoin/io/image_files.h>
 
 #include <bit>
@@ -83,6 +84,7 @@ Result<Header> read_header(std::span<const std::byte> bytes) {
 }
 
 float float_at(std::span<const std::byte> bytes, bool is_little_endian) {
+  QUOIN_ASSERT(bytes.size() >= 4, "four bytes");
   std::uint32_t bits = 0;
   for (std::size_t i = 0; i < 4; ++i) {
     const std::size_t place = is_little_endian ? i : 3 - i;
@@ -98,6 +100,7 @@ Result<FloatImage> read_pfm(std::span<const std::byte> bytes) {
   if (!header) return header.error();
   const auto width = static_cast<std::size_t>(header->width);
   const auto height = static_cast<std::size_t>(header->height);
+  QUOIN_ASSERT(header->data_at <= bytes.size(), "values that begin in the file");
   const std::size_t held = (bytes.size() - header->data_at) / 4;
   if (held < width * height) {
     return bad("it claims " + std::to_string(width) + " x " + std::to_string(height) + " pixels but holds " +

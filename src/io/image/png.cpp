@@ -50,6 +50,7 @@ void set_effort(png_structp png, PngEffort effort) {
 /// Contains everything that libpng may jump out of. Nothing here needs a destructor.
 bool write_image(png_structp png, png_infop info, const PngImage& image, PngEffort effort,
                  std::vector<std::byte>& out) {
+  QUOIN_ASSERT(image.channels == 3 || image.channels == 4, "3 or 4 channels");
   if (setjmp(png_jmpbuf(png)) != 0) return false;
   png_set_write_fn(png, &out, append_bytes, flush_nothing);
   set_effort(png, effort);
@@ -147,6 +148,7 @@ bool read_header(png_structp png, png_infop info, Input& input, PngSamples& samp
 /// Reads the pixels.
 bool read_rows(png_structp png, int passes, PngSamples& samples) {
   if (setjmp(png_jmpbuf(png)) != 0) return false;
+  QUOIN_ASSERT(samples.height > 0 && samples.bytes.size() % samples.height == 0, "whole rows");
   const std::size_t row = samples.bytes.size() / samples.height;
   for (int pass = 0; pass < passes; ++pass) {
     for (std::uint32_t y = 0; y < samples.height; ++y) {

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/io/image_files.h>
 
 #include "core/bytes/text.h"
@@ -106,9 +107,13 @@ class HdrReader {
   }
 
   [[nodiscard]] std::uint8_t byte(std::size_t offset = 0) const {
+    QUOIN_ASSERT(at_ + offset < bytes_.size(), "a byte of the file");
     return std::to_integer<std::uint8_t>(bytes_[at_ + offset]);
   }
-  [[nodiscard]] bool has(std::size_t count) const { return bytes_.size() - at_ >= count; }
+  [[nodiscard]] bool has(std::size_t count) const {
+    QUOIN_ASSERT(at_ <= bytes_.size(), "a position within the file");
+    return bytes_.size() - at_ >= count;
+  }
 
   Status read_row(std::vector<std::uint8_t>& row) {
     const std::size_t width = row.size() / 4;

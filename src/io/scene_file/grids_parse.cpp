@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/parallel.h>
 
 #include "io/scene_file/scene_parts.h"
@@ -161,6 +162,7 @@ void read_voxels(const std::vector<Piece>& pieces, const VoxelRegistry& types, s
     const Place grid{&list, {}, piece.grid};
     const Place of_content{&grid, key_of(piece.kind), std::nullopt};
     const Place place{&of_content, {}, piece.index};
+    QUOIN_ASSERT(piece.grid < grids.size(), "a grid of the file");
     SceneGrid& into = grids[piece.grid];
     switch (piece.kind) {
       case Piece::Kind::Voxels:

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include <quoin/core/assert.h>
+
 #include "io/base64.h"
 
 namespace quoin::scene_json {
@@ -122,6 +124,7 @@ std::vector<double> Object::numbers(const Json& json, const Place& place, std::s
 
 std::vector<int> Object::whole_numbers(const Json& json, const Place& place, std::size_t count, int least,
                                        int most) const {
+  QUOIN_ASSERT(least <= most, "least <= most");
   std::vector<int> whole;
   for (const double value : numbers(json, place, count)) {
     const bool fits = value >= least && value <= most && value == std::floor(value);
@@ -130,6 +133,7 @@ std::vector<int> Object::whole_numbers(const Json& json, const Place& place, std
     }
     whole.push_back(fits ? static_cast<int>(value) : least);
   }
+  QUOIN_ASSERT(whole.size() == count, "as many numbers as wanted");
   return whole;
 }
 

@@ -59,6 +59,7 @@ using DenseChunk = std::vector<VoxelType>;  // x fastest, then y, then z
 
 // Returns the start of a slab's rows in a dense chunk: four adjacent rows of y, four of z.
 std::size_t first_of_slab(int slab) {
+  QUOIN_ASSERT(slab >= 0 && slab < kSlabs, "0 <= slab < 256");
   return (static_cast<std::size_t>(slab / 16) * 4 * kChunkEdge + static_cast<std::size_t>(slab % 16) * 4) * kChunkEdge;
 }
 constexpr std::size_t kSlabRun = std::size_t{4} * kChunkEdge;  // adjacent voxels of a slab
@@ -109,6 +110,7 @@ class PieceWriter {
     for (std::size_t i = 0; i < sizeof(T); ++i) bytes_.push_back(static_cast<std::byte>(number >> (8 * i)));
   }
   void put_palette(std::span<const VoxelType> types) {
+    QUOIN_ASSERT(!types.empty() && types.size() <= kMaxTypesOfChunk, "1 to 65,536 types");
     put_number(static_cast<std::uint32_t>(types.size()));
     for (const VoxelType type : types) put_number(type);
   }
@@ -279,7 +281,10 @@ class PieceReader {
   }
 
  private:
-  [[nodiscard]] bool has(std::size_t count) const { return bytes_.size() - at_ >= count; }
+  [[nodiscard]] bool has(std::size_t count) const {
+    QUOIN_ASSERT(at_ <= bytes_.size(), "a position within the bytes");
+    return bytes_.size() - at_ >= count;
+  }
   template <class T>
   T take() {
     QUOIN_ASSERT(has(sizeof(T)), "bytes that were seen to be there");
@@ -515,6 +520,7 @@ class DataWriter {
     put_number(static_cast<std::uint32_t>(data.bytes.size()));
     pieces_.back().insert(pieces_.back().end(), data.bytes.begin(), data.bytes.end());
     ++count_;
+    QUOIN_ASSERT(count_ <= kChunkVoxels, "at most the voxels of a chunk");
     for (std::size_t i = 0; i < sizeof(count_); ++i) {
       pieces_.back()[count_at_ + i] = static_cast<std::byte>(count_ >> (8 * i));
     }
@@ -542,6 +548,7 @@ class DataWriter {
 };
 
 std::uint32_t place_of(IVec3 local) {
+  QUOIN_ASSERT(((local.x | local.y | local.z) & ~(kChunkEdge - 1)) == 0, "a voxel of the chunk");
   return static_cast<std::uint32_t>((local.z * kChunkEdge + local.y) * kChunkEdge + local.x);
 }
 
@@ -589,6 +596,7 @@ Result<DataPiece> decode_data(std::string_view text) {
     constexpr std::size_t kBesideBytes = 48;
     std::array<bool, kSlabs> has_data{};
     const auto read = reader.read_data([&](std::uint32_t place, const VoxelData& data) {
+      QUOIN_ASSERT(place < kChunkVoxels, "a voxel of the chunk");
       const std::size_t slab = (place >> 14) * 16 + (place >> 8 & 15);
       piece.memory += std::exchange(has_data[slab], true) ? 0 : kOfSlab;
       piece.memory += data.state == 0 ? 0 : sizeof(data.state);
@@ -604,6 +612,7 @@ Result<DataPiece> decode_data(std::string_view text) {
 void for_each_data(const DataPiece& piece, FunctionRef<bool(IVec3 voxel, const VoxelData& data)> visit) {
   std::size_t at = 0;
   const auto take = [&] {
+    QUOIN_ASSERT(at + sizeof(std::uint32_t) <= piece.bytes.size(), "a whole piece");
     const auto number = load<std::uint32_t>(piece.bytes.data() + at, std::endian::little);
     at += sizeof(number);
     return number;

@@ -54,6 +54,7 @@ struct ChunkSource::Cache {
 
 ChunkSource::ChunkSource(ChunkSourceInfo info, std::vector<IBox> parts)
     : info_(std::move(info)), parts_(std::move(parts)), by_place_(parts_.size()), cache_(std::make_unique<Cache>()) {
+  QUOIN_ASSERT(parts_.size() <= std::numeric_limits<std::uint32_t>::max(), "at most 2^32 - 1 parts");
   std::iota(by_place_.begin(), by_place_.end(), 0U);
   std::ranges::sort(by_place_, {}, [&](std::uint32_t part) { return order_of(parts_[part].min); });
 }

@@ -4,6 +4,7 @@
 #include <mutex>
 #include <utility>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/thousands.h>
 #include <quoin/io/chunk_source.h>
 
