@@ -14,8 +14,11 @@
 #include <nlohmann/json.hpp>
 #include <tiny_gltf.h>
 
+#include <quoin/core/assert.h>
 #include "core/bytes/byte_reader.h"
 #include "core/bytes/byte_writer.h"
+#include "io/byte_reader.h"
+#include "io/byte_writer.h"
 #include "io/triangles/triangles.h"
 
 namespace quoin::triangles {
@@ -83,6 +86,7 @@ std::vector<std::byte> with_json(std::span<const std::byte> file, std::string_vi
   }
   json.resize((json.size() + 3) / 4 * 4, ' ');
   const auto at = static_cast<std::size_t>(old.data() - text_of(file).data());
+  QUOIN_ASSERT(at >= 20 && at <= file.size() && old.size() <= file.size() - at, "the JSON of the file");
   const auto rest = file.subspan(at + old.size());
   const std::size_t size = at + json.size() + rest.size();
   out.reserve(size);

@@ -10,6 +10,7 @@
 
 #include <glm/vec4.hpp>
 
+#include <quoin/core/assert.h>
 #include "core/bytes/byte_reader.h"
 #include "core/bytes/text.h"
 #include "core/srgb.h"
@@ -71,7 +72,10 @@ class Lines {
   [[nodiscard]] std::size_t position() const { return begin_; }
   [[nodiscard]] std::size_t remaining() const { return text_.size() - at_; }
   /// Drops bytes at the beginning of the line.
-  void drop(std::size_t bytes) { line_.remove_prefix(bytes); }
+  void drop(std::size_t bytes) {
+    QUOIN_ASSERT(bytes <= line_.size(), "bytes of the line");
+    line_.remove_prefix(bytes);
+  }
 
  private:
   std::string_view text_;
@@ -89,6 +93,7 @@ std::vector<double> numbers_in(std::string_view line) {
 
 /// Reads three or four channels: 0 to 1 if the text has a decimal point, else 0 to 255.
 glm::vec4 colour_of(std::span<const double> channels, std::string_view text) {
+  QUOIN_ASSERT(channels.size() >= 3, "three or four channels");
   const bool is_fraction = text.find('.') != std::string_view::npos;
   const double most = is_fraction ? 1.0 : 255.0;
   const auto share = [&](std::size_t i) { return static_cast<float>(std::clamp(channels[i] / most, 0.0, 1.0)); };

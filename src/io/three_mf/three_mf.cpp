@@ -19,7 +19,7 @@
 
 #include <glm/mat4x4.hpp>
 #include <glm/matrix.hpp>
-
+#include <quoin/core/assert.h>
 #include <quoin/core/hash.h>
 #include <quoin/core/thousands.h>
 #include <quoin/grid/voxel_registry.h>
@@ -384,6 +384,7 @@ class Package {
     is_clear_ |= colour.a < 255;
   }
   Rgba8 colour_of(const Object& object, const Part& part, const Triangle& triangle, std::size_t corner) {
+    QUOIN_ASSERT(corner < triangle.colours.size(), "corner < 3");
     constexpr Rgba8 kGrey{200, 200, 200, 255};
     const bool is_own = triangle.colours[0] != kNone;
     const std::int64_t group = triangle.group != kNone ? triangle.group : object.group;

@@ -4,6 +4,8 @@
 
 #include <glm/geometric.hpp>
 
+#include <quoin/core/assert.h>
+
 namespace quoin::triangles {
 
 namespace {
@@ -21,6 +23,7 @@ double area(const Point& a, const Point& b, const Point& c) {
 
 /// Projects the corners to the plane in which the polygon is largest, where it turns left.
 std::vector<Point> flattened(std::span<const DVec3> corners) {
+  QUOIN_ASSERT(corners.size() >= 3, "at least three corners");
   DVec3 normal(0.0);
   for (std::size_t i = 1; i + 1 < corners.size(); ++i) {
     normal += glm::cross(corners[i] - corners[0], corners[i + 1] - corners[0]);
@@ -67,6 +70,7 @@ class Ring {
   [[nodiscard]] std::array<std::uint32_t, 3> corner(std::uint32_t i) const { return {last_[i], i, next_[i]}; }
   [[nodiscard]] double turn(std::uint32_t i) const { return area(points_[last_[i]], points_[i], points_[next_[i]]); }
   void remove(std::uint32_t i) {
+    QUOIN_ASSERT(i < next_.size() && next_[last_[i]] == i, "a corner that is left");
     next_[last_[i]] = next_[i];
     last_[next_[i]] = last_[i];
   }

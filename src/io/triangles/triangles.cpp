@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/thousands.h>
 #include <quoin/io/file.h>
 
@@ -94,6 +95,7 @@ Status MeshBuilder::add_polygon(std::span<const std::size_t> corners,
   }
   too_large_ += cut_polygon(polygon_, cut_) ? 0 : 1;
   for (const auto& triangle : cut_) {
+    QUOIN_ASSERT(std::max({triangle[0], triangle[1], triangle[2]}) < corners.size(), "corners of the polygon");
     const auto is_added = add(corners[triangle[0]], corners[triangle[1]], corners[triangle[2]]);
     if (!is_added) return is_added.error();
     if (*is_added) added(triangle);

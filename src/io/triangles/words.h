@@ -6,6 +6,8 @@
 #include <string>
 #include <string_view>
 
+#include <quoin/core/assert.h>
+
 namespace quoin::triangles {
 
 /// Parses a decimal number, "nan" or "inf" that is the whole word.
@@ -22,7 +24,9 @@ namespace quoin::triangles {
 /// Reads the words of a text, separated by blanks and line ends. Lifetime: the text.
 class Words {
  public:
-  explicit Words(std::string_view text, std::size_t position = 0) : text_(text), at_(position) {}
+  explicit Words(std::string_view text, std::size_t position = 0) : text_(text), at_(position) {
+    QUOIN_ASSERT(position <= text.size(), "a position within the text");
+  }
 
   [[nodiscard]] std::optional<std::string_view> next() {
     while (at_ < text_.size() && is_blank(text_[at_])) ++at_;
