@@ -11,6 +11,8 @@
 #include <variant>
 #include <vector>
 
+#include <quoin/core/assert.h>
+
 #include "io/format_driver.h"
 #include "io/mesh_parts.h"
 #include "io/whole_file.h"
@@ -262,7 +264,10 @@ std::uint64_t open_edges_of(const MeshPart& part) {
   for (const MeshView& view : part.surfaces) {
     for (std::size_t i = 0; i + 2 < view.indices.size(); i += 3) {
       std::array<std::uint32_t, 3> corner{};
-      for (std::size_t k = 0; k < 3; ++k) corner[k] = number_of(view.positions[view.indices[i + k]]);
+      for (std::size_t k = 0; k < 3; ++k) {
+        QUOIN_ASSERT(view.indices[i + k] < view.positions.size(), "an index of a vertex");
+        corner[k] = number_of(view.positions[view.indices[i + k]]);
+      }
       for (std::size_t k = 0; k < 3; ++k) {
         const std::uint32_t from = corner[k];
         const std::uint32_t to = corner[(k + 1) % 3];
@@ -283,6 +288,7 @@ std::uint64_t count_open_edges(const SceneMeshes& meshes) {
   std::vector<bool> is_known(meshes.parts.size());
   std::uint64_t open = 0;
   for (const MeshPlacement& placement : meshes.placements) {
+    QUOIN_ASSERT(placement.part < meshes.parts.size(), "a part of the meshes");
     if (!is_known[placement.part]) of_part[placement.part] = open_edges_of(meshes.parts[placement.part]);
     is_known[placement.part] = true;
     open += of_part[placement.part];

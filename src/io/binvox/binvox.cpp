@@ -10,6 +10,8 @@
 #include <string_view>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 #include "core/bytes/byte_reader.h"
 #include "core/bytes/byte_writer.h"
 #include "core/work/progress_steps.h"
@@ -141,6 +143,7 @@ constexpr unsigned kLongestRun = 255;
 std::string text_of(double number) {
   std::array<char, 32> text{};
   const auto end = std::to_chars(text.data(), text.data() + text.size(), number).ptr;
+  QUOIN_ASSERT(end != text.data(), "at least one digit");
   return {text.data(), end};
 }
 
@@ -155,6 +158,7 @@ class RunWriter {
   void end() {
     if (count_ == 0) return;
     out_.u8(solid_ ? 1 : 0);
+    QUOIN_ASSERT(count_ <= kLongestRun, "a run of one byte");
     out_.u8(static_cast<std::uint8_t>(count_));
     count_ = 0;
   }

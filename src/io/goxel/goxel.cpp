@@ -380,6 +380,7 @@ std::size_t GoxelWriter::begin_chunk(std::string_view id) {
 }
 
 void GoxelWriter::end_chunk(std::size_t begin) {
+  QUOIN_ASSERT(begin >= 4 && begin <= out_.size(), "a chunk that was begun");
   out_.patch(begin - 4, out_.size() - begin);
   out_.u32(0);
 }
@@ -398,6 +399,7 @@ void GoxelWriter::numbers(std::string_view key, std::span<const float> values) {
 }
 
 Result<std::uint32_t> GoxelWriter::index_of_image(const std::vector<std::uint8_t>& pixels) {
+  QUOIN_ASSERT(pixels.size() == kBlockBytes, "the voxels of a block");
   std::string key(pixels.begin(), pixels.end());
   const auto found = images_.find(key);
   if (found != images_.end()) return found->second;
@@ -426,6 +428,7 @@ Status GoxelWriter::add_blocks(IVec3 chunk, const Chunk& voxels, std::map<std::u
         for (int x = 0; x < kChunkEdge; ++x) {
           const VoxelType type = row[static_cast<std::size_t>(x)];
           if (type == kAir) continue;
+          QUOIN_ASSERT(type < material_of_.size(), "a type of the scene");
           auto& pixels = blocks.at(static_cast<std::size_t>(x / kBlockEdge))[material_of_[type]];
           pixels.resize(kBlockBytes);
           const int in_file = x % kBlockEdge + kBlockEdge * (kBlockEdge - 1 - i % kBlockEdge) +
@@ -466,6 +469,7 @@ void GoxelWriter::write_materials() {
 
 void GoxelWriter::write_layer(const PlacedGrid& grid, const Layer& layer, std::uint32_t id) {
   const std::size_t begin = begin_chunk("LAYR");
+  QUOIN_ASSERT(layer.first < std::max<std::size_t>(materials_.size(), 1), "a material of the file");
   out_.u32(static_cast<std::uint32_t>(layer.second.size()));
   for (const Block& block : layer.second) {
     out_.u32(block.image);

@@ -173,6 +173,7 @@ class Values {
       return number.value_or(0.0);
     }
     const std::size_t size = kBytes[static_cast<std::size_t>(type)];
+    QUOIN_ASSERT(at_ <= bytes_.size(), "a position within the file");
     if (size > bytes_.size() - at_) {
       failed_ = true;
       return 0.0;

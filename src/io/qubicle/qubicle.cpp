@@ -553,6 +553,7 @@ class RunWriter {
  public:
   explicit RunWriter(ByteWriter& out) : out_(out) {}
   void put(std::uint32_t word, std::uint32_t count = 1) {
+    QUOIN_ASSERT(count > 0, "at least one voxel");
     if (count_ != 0 && word == word_) {
       count_ += count;
       return;
@@ -594,6 +595,7 @@ Status write_matrix(const PlacedGrid& grid, const std::vector<Rgba8>& colours, B
     return make_error(ErrorCode::LimitExceeded, line.append(printable(grid.name)));
   }
   const std::string name = cut_name(grid.name, kLongestName, warnings);
+  QUOIN_ASSERT(name.size() <= kLongestName, "a name of at most 255 bytes");
   out.u8(static_cast<std::uint8_t>(name.size()));
   out.text(name);
   for (int axis = 0; axis < 3; ++axis) out.i32(size[axis]);

@@ -491,6 +491,7 @@ Colour colour_of(const MeshView& view, std::size_t vertex, const VoxelRegistry& 
     const auto [r, g, b] = srgb_colour(without_occlusion(view), vertex);
     return {r, g, b, 255};
   }
+  QUOIN_ASSERT(vertex < view.types.size(), "a vertex with a type");
   const VoxelProperties& type = types[view.types[vertex]];
   const bool is_glass = type.visibility == Visibility::Transparent;
   return {type.colour.r, type.colour.g, type.colour.b, is_glass ? type.colour.a : std::uint8_t{255}};
@@ -560,6 +561,7 @@ class ModelWriter {
   static constexpr std::size_t kFirstObject = 2;  // after the colours
 
   [[nodiscard]] bool has_triangle(const MeshPlacement& placement) const {
+    QUOIN_ASSERT(placement.part < meshes_.parts.size(), "a part of the meshes");
     for (const MeshView& view : meshes_.parts[placement.part].surfaces) {
       if (!view.indices.empty()) return true;
     }

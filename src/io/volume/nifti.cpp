@@ -427,15 +427,20 @@ void write_header(const Header& header, ByteWriter& out) {
   constexpr std::size_t kHeaderBytes = 348;
   constexpr std::size_t kExtenderBytes = 4;
   const IVec3 size = header.box.size();
+  QUOIN_ASSERT(std::max({size.x, size.y, size.z}) <= kMaxEdge, "edges of 16 bits");
   // Maps (i, j, k) to samples of the grid, whose axes are (i, k, j).
   glm::dmat4 grid_from_file(0.0);
   grid_from_file[0][0] = grid_from_file[1][2] = grid_from_file[2][1] = 1.0;
   grid_from_file[3] = glm::dvec4(DVec3(header.box.min), 1.0);
   const glm::dmat4 affine =
       glm::inverse(glm::dmat4(quoin_from_space(VolumeSpace::RightFrontHead))) * header.world_from_grid * grid_from_file;
-  const auto pad_to = [&](std::size_t at) { out.leave(at - out.size()); };
+  const auto pad_to = [&](std::size_t at) {
+    QUOIN_ASSERT(at >= out.size(), "fields in the order of their places");
+    out.leave(at - out.size());
+  };
   const auto small = [&](std::int16_t value) { out.u16(static_cast<std::uint16_t>(value)); };
   const auto text = [&](std::string_view value, std::size_t room) {
+    QUOIN_ASSERT(room > 0, "room for the zero at the end");
     value = value.substr(0, room - 1);
     out.text(value);
     out.leave(room - value.size());
@@ -502,6 +507,7 @@ Result<EncodedFile> write_labels(const Scene& scene, const Progress& progress) {
   auto done = for_each_row(merged->box, progress, [&](IVec3 first) {
     models::read_voxels(merged->voxels, first, row);
     for (const VoxelType type : row) {
+      QUOIN_ASSERT(is_wide || type <= 0xFF, "a type of one byte");
       if (is_wide) {
         out.u16(type);
       } else {
