@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include <quoin/core/direction.h>
+
 #include "core/death_for_tests.h"
 
 namespace quoin {

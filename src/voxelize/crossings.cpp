@@ -11,6 +11,7 @@
 #include <glm/geometric.hpp>
 
 #include <quoin/core/assert.h>
+
 #include "core/work/progress_steps.h"
 
 namespace quoin::voxelizing {

@@ -15,10 +15,9 @@
 #include <tiny_gltf.h>
 
 #include <quoin/core/assert.h>
+
 #include "core/bytes/byte_reader.h"
 #include "core/bytes/byte_writer.h"
-#include "io/byte_reader.h"
-#include "io/byte_writer.h"
 #include "io/triangles/triangles.h"
 
 namespace quoin::triangles {

@@ -25,10 +25,10 @@
 
 #include <quoin/core/assert.h>
 #include <quoin/core/thousands.h>
+
 #include "core/bytes/byte_reader.h"
 #include "core/bytes/byte_writer.h"
 #include "core/work/progress_steps.h"
-#include "io/byte_reader.h"
 #include "io/format_driver.h"
 #include "io/image/png.h"
 #include "io/models/model_builder.h"

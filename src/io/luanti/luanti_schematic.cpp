@@ -9,15 +9,12 @@
 #include <vector>
 
 #include <quoin/core/assert.h>
+
 #include "core/bytes/byte_order.h"
 #include "core/bytes/byte_reader.h"
 #include "core/bytes/byte_stream.h"
-#include "io/byte_order.h"
-#include "io/byte_reader.h"
-#include "io/byte_stream.h"
 #include "io/format_driver.h"
 #include "io/luanti/luanti_nodes.h"
-#include "io/models/luanti_nodes.h"
 #include "io/models/model_builder.h"
 
 namespace quoin::models {

@@ -14,9 +14,9 @@
 #include <vector>
 
 #include <quoin/core/assert.h>
+
 #include "core/bytes/byte_stream.h"
 #include "core/bytes/text.h"
-#include "io/byte_stream.h"
 #include "io/minecraft/biomes.h"
 #include "io/minecraft/block_types.h"
 #include "io/minecraft/column_builder.h"

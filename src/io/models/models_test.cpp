@@ -11,7 +11,6 @@
 
 #include "core/bytes/byte_stream.h"
 #include "core/death_for_tests.h"
-#include "io/byte_stream.h"
 #include "io/format_driver.h"
 #include "io/image/png.h"
 #include "io/models/model_builder.h"

@@ -11,6 +11,7 @@
 #include <glm/vec4.hpp>
 
 #include <quoin/core/assert.h>
+
 #include "core/bytes/byte_reader.h"
 #include "core/bytes/text.h"
 #include "core/srgb.h"

@@ -17,13 +17,12 @@
 #include <utility>
 
 #include <quoin/core/assert.h>
+
 #include "core/bytes/byte_reader.h"
 #include "core/bytes/byte_stream.h"
 #include "core/bytes/byte_writer.h"
 #include "core/bytes/text.h"
 #include "core/work/progress_steps.h"
-#include "io/byte_reader.h"
-#include "io/byte_stream.h"
 #include "io/format_driver.h"
 #include "io/models/model_builder.h"
 #include "io/placed/placed_grids.h"

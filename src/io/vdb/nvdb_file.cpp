@@ -18,14 +18,11 @@
 #include <utility>
 
 #include <quoin/core/assert.h>
+
 #include "core/bytes/byte_order.h"
 #include "core/bytes/byte_reader.h"
 #include "core/bytes/byte_stream.h"
 #include "core/bytes/text.h"
-#include "io/byte_order.h"
-#include "io/byte_reader.h"
-#include "io/byte_stream.h"
-#include "io/text.h"
 #include "io/vdb/blosc.h"
 
 namespace quoin::vdb {

@@ -4,10 +4,9 @@
 #include <vector>
 
 #include <quoin/core/assert.h>
+
 #include "core/bytes/byte_reader.h"
 #include "core/bytes/byte_stream.h"
-#include "io/byte_reader.h"
-#include "io/byte_stream.h"
 #include "io/vox/chunks.h"
 
 namespace quoin::vox {

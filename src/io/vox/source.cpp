@@ -6,8 +6,8 @@
 #include <utility>
 
 #include <quoin/core/assert.h>
+
 #include "core/bytes/text.h"
-#include "io/text.h"
 
 namespace quoin {
 

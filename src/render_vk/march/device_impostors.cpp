@@ -8,8 +8,8 @@
 #include <utility>
 
 #include <quoin/core/assert.h>
+
 #include "core/drop_oldest.h"
-#include "render_vk/device/drop_oldest.h"
 #include "render_vk/march/device_scene.h"
 #include "render_vk/trees/octahedral.h"
 

@@ -19,12 +19,10 @@
 #include <zstd.h>
 
 #include <quoin/core/assert.h>
+
 #include "core/bytes/byte_order.h"
 #include "core/bytes/byte_reader.h"
 #include "core/bytes/byte_stream.h"
-#include "io/byte_order.h"
-#include "io/byte_reader.h"
-#include "io/byte_stream.h"
 
 namespace quoin::store::luanti {
 

@@ -9,8 +9,8 @@
 #include <utility>
 
 #include <quoin/core/assert.h>
+
 #include "core/bytes/byte_order.h"
-#include "io/byte_order.h"
 #include "store/chunk/chunk_body.h"
 #include "store/salvage/page_file.h"
 

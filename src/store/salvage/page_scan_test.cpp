@@ -17,7 +17,6 @@
 
 #include "core/bytes/byte_order.h"
 #include "core/death_for_tests.h"
-#include "io/byte_order.h"
 #include "store/chunk/chunk_body.h"
 #include "store/database/connection.h"
 #include "store/salvage/page_file.h"

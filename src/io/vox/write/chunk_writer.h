@@ -8,8 +8,8 @@
 #include <vector>
 
 #include <quoin/core/assert.h>
+
 #include "core/bytes/byte_writer.h"
-#include "io/byte_writer.h"
 
 namespace quoin::vox {
 
