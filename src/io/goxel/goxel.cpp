@@ -313,10 +313,6 @@ bool is_goxel(std::span<const std::byte> beginning) {
   return ByteReader(beginning).text(4) == kMagic;
 }
 
-Result<LoadedScene> read_goxel(std::span<const std::byte> bytes) {
-  return GoxelReader(bytes).read();
-}
-
 constexpr FormatHolds kHolds = {
     .extension = ".gox", .names = true, .hidden = true, .several = true, .transparency = true, .materials = true};
 constexpr std::uint32_t kVersion = 2;
