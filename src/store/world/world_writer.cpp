@@ -63,7 +63,6 @@ SaveTicket WorldWriter::save(ChangeSet changes, OnSaved on_saved) {
   SaveTicket ticket;
   {
     const std::scoped_lock lock(mutex_);
-    QUOIN_ASSERT(!is_ending_, "a writer that is not ending");
     ticket.number = ++last_ticket_;
     note_pending(changes, ticket.number);
     Save save{ticket.number, std::move(changes), {}};

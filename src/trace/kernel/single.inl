@@ -491,9 +491,6 @@ class PathWalk {
     t_[0] = t[0], t_[1] = t[1], t_[2] = t[2];
     stride_[0] = steps[0], stride_[1] = steps[1], stride_[2] = steps[2];
     index_ = place[0] + place[1] * strides[1] + place[2] * strides[2];
-    QUOIN_ASSERT(
-        mask3((place < 0) | (place >= I4{tree.brick_sizes.x, tree.brick_sizes.y, tree.brick_sizes.z, 4} >> 2)) == 0,
-        "a chunk of the tables");
   }
 
   template <Ask kAsk>
