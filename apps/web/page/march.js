@@ -7,6 +7,7 @@ import instances from './march/instances.wgsl';
 import cameraRays from './march/camera.wgsl';
 import primary from './march/primary.wgsl';
 import lit from './march/lit.wgsl';
+import fieldBlend from './march/field_blend.wgsl';
 import glassOfFields from './march/glass_field.wgsl';
 import glass from './march/glass.wgsl';
 import light from './march/light.wgsl';
@@ -122,7 +123,7 @@ export class Marcher {
     const screen = device.createShaderModule({ code: show });
     const [points, lights, resolves, shows] = await Promise.all([
       make([rays, primary].join('\n'), 'find_points', ['kHasFields']),
-      make([rays, lit, glassOfFields, glass, light].join('\n'), 'light_points', all),
+      make([rays, lit, fieldBlend, glassOfFields, glass, light].join('\n'), 'light_points', all),
       make([data, resolve].join('\n'), 'resolve', []),
       device.createRenderPipelineAsync({ layout: 'auto', vertex: { module: screen, entryPoint: 'corner' },
                                          fragment: { module: screen, entryPoint: 'pixel_of', targets: [{ format }] } }),

@@ -46,6 +46,7 @@ const kSurface = 0u;
 const kUnlit = 1u;
 const kGlow = 2u;
 const kIsField = 8u;
+const kIsBlended = 16u;  // of a field: blended from the materials around, see blend_of_field
 
 // A pixel in progress: the transmittance of the glass so far, where to continue, and the sample's colour so far.
 struct State {

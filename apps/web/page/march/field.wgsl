@@ -10,22 +10,28 @@ fn sample_of(block: u32, at: vec3i) -> f32 {
   return select(two.y, two.x, (i & 1u) == 0u);
 }
 
-// The brick's number for the found word of cells.
-fn number_found() -> u32 {
-  let brick = walk_stack[1];
-  let child = child_of(brick, index_in(walk_voxel, 1));
+// A brick's number for the word of a cell.
+fn number_in(brick: vec4u, cell: vec3i) -> u32 {
+  let child = child_of(brick, index_in(cell, 1));
   let count = countOneBits(brick.x) + countOneBits(brick.y);
   return words[(brick.z >> 2u) + 2u * count + child];
 }
+fn number_found() -> u32 {
+  return number_in(walk_stack[1], walk_voxel);
+}
 
 const kNoBlock = 0u;
+// The samples around a cell of a brick in a chunk with that record; kNoBlock if all of them are solid.
+fn block_in(brick: vec4u, record: u32, cell: vec3i) -> u32 {
+  let begin = number_in(brick, cell);
+  return select((record >> 2u) + begin, kNoBlock, begin == 0u);
+}
 // The samples of the found cell; kNoBlock if they and their neighbours are all solid.
 fn block_found() -> u32 {
   if (walk_level > 0) {
     return kNoBlock;
   }
-  let begin = number_found();
-  return select((record_found() >> 2u) + begin, kNoBlock, begin == 0u);
+  return block_in(walk_stack[1], record_found(), walk_voxel);
 }
 
 // A cubic in powers of s.
@@ -253,6 +259,25 @@ fn normal_found(inside: vec3f) -> vec3f {
   return normal_in(block, (walk_voxel & vec3i(3)) + 1, inside);
 }
 
+// The type of a field's sample; 0 if the tree has no chunk there.
+fn type_at(field: Tree, at: vec3i) -> u32 {
+  if (any(at < field.low.xyz) || any(at >= field.high.xyz)) {
+    return 0u;
+  }
+  var node = field.root;
+  for (var level = field.low.w; level > 2; level--) {
+    if ((node.z & 1u) != 0u) {
+      break;
+    }
+    let index = index_in(at, level);
+    if (!has_child(node, index)) {
+      return 0u;
+    }
+    node = nodes[(node.z >> 4u) + child_of(node, index)];
+  }
+  return type_in(record_of(node), at & vec3i(63));
+}
+
 // The material of the solid sample nearest to the hit.
 fn material_found(field: Tree, inside: vec3f) -> u32 {
   var nearest = vec3i(inside > vec3f(0.5));
@@ -274,20 +299,6 @@ fn material_found(field: Tree, inside: vec3f) -> u32 {
   if (all(((at ^ walk_voxel) & vec3i(~63)) == vec3i())) {
     return type_in(record_found(), at & vec3i(63));
   }
-  // From the next chunk, whose own cell there touches the sample.
-  if (any(at >= field.high.xyz)) {
-    return 0u;
-  }
-  var node = field.root;
-  for (var level = field.low.w; level > 2; level--) {
-    if ((node.z & 1u) != 0u) {
-      break;
-    }
-    let index = index_in(at, level);
-    if (!has_child(node, index)) {
-      return 0u;
-    }
-    node = nodes[(node.z >> 4u) + child_of(node, index)];
-  }
-  return type_in(record_of(node), at & vec3i(63));
+  // The next chunk owns the sample: its cell there touches it.
+  return type_at(field, at);
 }

@@ -178,13 +178,20 @@ fn trace_light(point: Point) -> Lit {
   return Lit(sunlight + of_lamps, f32(open) / f32(frame.occlusion_count));
 }
 
-fn light_of(point: Point) -> vec3f {
-  var surface = surface_of(point.what.x);
-  // As in smooth meshes, a field without materials is white.
-  if (is_of_field(point) && point.what.x == 0u) {
-    surface.colour = vec3f(1.0);
-    surface.emitted = vec3f();
+fn surface_at(point: Point) -> Surface {
+  if (!is_of_field(point)) {
+    return surface_of(point.what.x);
   }
+  if ((point.what.z & kIsBlended) == 0u) {
+    return surface_of_material(point.what.x);
+  }
+  let cell = floor(point.inside.xyz);
+  return blend_of_field(opaque_tree(point.voxel.w, 1), point.voxel.xyz + vec3i(cell), point.inside.xyz - cell,
+                        point.what.x);
+}
+
+fn light_of(point: Point) -> vec3f {
+  let surface = surface_at(point);
   let kind = kind_of(point);
   if (kind == kUnlit) {
     return surface.colour;

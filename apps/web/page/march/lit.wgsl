@@ -15,6 +15,17 @@ fn surface_of(kind: u32) -> Surface {
   return Surface(colour.xyz, colour.w, emitted.xyz, emitted.w, bitcast<vec4f>(nodes[at + 2u]).xyz);
 }
 
+// The surface of a field without materials.
+fn white_surface() -> Surface {
+  return Surface(vec3f(1.0), 0.0, vec3f(), 1.0, vec3f());
+}
+
+// Blends a share, 0 to 1, of another surface into `mixed`.
+fn mix_look(look: Surface, share: f32, mixed: ptr<function, Surface>) {
+  (*mixed).colour = mix((*mixed).colour, look.colour, share);
+  (*mixed).emitted = mix((*mixed).emitted, look.emitted, share);
+}
+
 // `has_own_length`: if false, it counts as at least one voxel long.
 fn counted_length(voxels: f32, has_own_length: bool) -> f32 {
   return max(voxels, select(1.0, 0.0, has_own_length));

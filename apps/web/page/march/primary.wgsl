@@ -43,7 +43,7 @@ fn meet_content(content: i32, i: i32, direction: Pair, scale: f32, nearest: ptr<
   if (is_field) {
     let is_inside = hit.starts_inside && moved.axis < 0;
     (*point).what = vec4u(material_found(tree, hit.inside), packed_normal(normal_found(hit.inside)),
-                          kIsField | select(kSurface, kUnlit, is_inside), bitcast<u32>(found_t));
+                          kIsField | select(kSurface | kIsBlended, kUnlit, is_inside), bitcast<u32>(found_t));
   } else {
     (*point).what = vec4u(type_found(), face_found(), select(kSurface, kUnlit, walk_axis < 0), bitcast<u32>(found_t));
   }
