@@ -79,7 +79,7 @@ class SmoothOracle {
     out.positions.push_back((Vec3(cell) + vertex.snapped) * size);
     out.normals.push_back(vertex.normal);
     const int n = kChunkEdge >> part_.level;
-    const IVec3 offset{cell.x < 0, cell.y < 0, cell.z < 0};
+    const IVec3 offset{cell.x < 0 ? -1 : 0, cell.y < 0 ? -1 : 0, cell.z < 0 ? -1 : 0};
     out.cells.push_back(smooth::cell_name(cell & IVec3{n - 1}, offset));
     if (part_.occlusion.method == SmoothOcclusion::None) return;
     // In cells of the level, like the scaled spread.
