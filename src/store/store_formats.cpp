@@ -87,5 +87,5 @@ constinit const FormatDriver kLuantiFormat = {
 
 // Registers the formats before main. The library's users link with `-u quoin_store_formats` (see CMakeLists.txt), since
 // linkers drop objects of a static library that nothing refers to.
-extern "C" const bool quoin_store_formats =
+extern "C" [[gnu::visibility("hidden")]] const bool quoin_store_formats =
     quoin::register_format(quoin::kWorldFormat) && quoin::register_format(quoin::kLuantiFormat);
