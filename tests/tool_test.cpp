@@ -734,7 +734,7 @@ TEST_F(Tool, WrongUsageNamesTheArgument) {
        "quoin: --raw-size: must be XxYxZ, as in 256x256x128, not \"0x2x2\""},
       {"convert tiny.vox out.glb --raw-size 1x2x2 --raw-type half", "quoin: --raw-type: must be uint8, int8"},
       {"convert tiny.vox out.glb --raw-size 1x1x1 --frame 2", "quoin: cannot use --hidden or --frame: the input"},
-      {"convert tiny.vox out.glb --raw-order big", "quoin: --raw-type and --raw-order need --raw-size"},
+      {"convert tiny.vox out.glb --raw-order big", "quoin: --raw-order needs --raw-size"},
       {"convert tiny.vox out.glb --raw-size 1x1x1 --mesher greedy", "quoin: cannot use --mesher greedy: the input"},
       {"convert tiny.vox", "quoin: OUT is required"},
       {"convert tiny.vox a.vox b.vox", "quoin: cannot convert 3 files: several inputs need --to FORMAT"},

@@ -1,19 +1,22 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <quoin/mesh/smooth.h>
 
+#include "options.h"
+
 namespace quoin::tool {
 
-/// Adds --ao-form, --ao-spread, --ao-offset and --ao-power. `read_field_occlusion` parses them.
-void add_field_occlusion_options(CLI::App& command);
+/// The options of smooth occlusion.
+inline const std::vector<std::string> kFieldOcclusion = {"--ao-form", "--ao-spread", "--ao-offset", "--ao-power"};
 
-/// Returns the first of these options that was given, or null.
-[[nodiscard]] const char* given_field_occlusion(const CLI::App& command);
+/// Adds these options.
+void add_field_occlusion_options(CLI::App& command, SmoothOcclusionOptions& options);
 
-/// Parses the given options into `options`. Returns a usage error, or "".
-[[nodiscard]] std::string read_field_occlusion(const CLI::App& command, SmoothOcclusionOptions& options);
+/// Returns the rules between these options. Requires: `options` outlives the rules.
+[[nodiscard]] std::vector<OptionRule> field_occlusion_rules(const SmoothOcclusionOptions& options);
 
 }  // namespace quoin::tool

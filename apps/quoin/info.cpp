@@ -321,23 +321,16 @@ void add_info_command(CLI::App& app, int& status) {
   CLI::App* command = app.add_subcommand(
       "info", "Print the contents of a file: grids, sizes, voxels, faces, types, transforms, values of volumes");
   const auto options = std::make_shared<CommonOptions>();
-  const auto texts = std::make_shared<VolumeTexts>();
   add_common_options(*command, *options);
-  add_raw_options(*command, *texts);
+  add_raw_options(*command, options->load.raw);
   command->footer("Reads " + extensions_with(FormatCapability::Read) +
                   ".\n"
                   "Faces are counted once per model; only models that are placed and visible count.\n"
                   "Example: quoin info castle.vox\n"
                   "Example: quoin info scan.raw --raw-size 256x256x128 --raw-type uint16");
-  command->callback([command, options, texts, &status] {
-    VolumeArguments volume;
-    if (const std::string fault = read_volume_options(*command, *texts, volume); !fault.empty()) {
-      print_error(fault + " (try --help)");
-      status = kWrongUsage;
-      return;
-    }
-    options->load.raw = volume.raw;
-    status = run_info(*options);
+  command->callback([command, options, &status] {
+    const Status fits = check_rules(*command, raw_rules());
+    status = fits ? run_info(*options) : wrong_usage(fits.error());
   });
 }
 

@@ -32,7 +32,6 @@ struct ViewArguments {
   std::string device;
   std::size_t memory_mebibytes = 0;
   double distance = 0.0;
-  VolumeTexts volume_texts;
 };
 
 #ifdef QUOIN_HAVE_VIEWER
@@ -99,31 +98,26 @@ int run_view(const ViewArguments&) {
 
 #endif
 
-/// Reads the remaining options. Returns a usage error, or "".
-std::string settle(const CLI::App& command, ViewArguments& arguments) {
+std::optional<ImageSize> read_size(const std::string& text) {
   constexpr ImageSize kSmallest{320, 240};
   constexpr int kLongestSide = 16'384;
-  if (command.count("--size") > 0) {
-    const std::string text = command.get_option("--size")->results().back();
-    const auto size = parse_size(text);
-    const bool fits = size && size->width >= kSmallest.width && size->height >= kSmallest.height &&
-                      size->width <= kLongestSide && size->height <= kLongestSide;
-    if (!fits) {
-      return "--size: must be WIDTHxHEIGHT of at least 320x240 and at most 16384 per side, as in 1280x720, not \"" +
-             text + "\"";
-    }
-    arguments.size = *size;
-  }
-  VolumeArguments volume;
-  if (std::string fault = read_volume_options(command, arguments.volume_texts, volume); !fault.empty()) return fault;
-  arguments.load.raw = volume.raw;
-  if (volume.iso) arguments.load.iso = static_cast<float>(*volume.iso);
-  if (volume.raw && arguments.input.empty()) return "--raw-size needs a file to show";
-  if (!arguments.screenshot.empty() && arguments.screenshot.extension() != ".png") {
-    return "--screenshot: the image name must end in .png, not \"" + arguments.screenshot.string() + "\"";
-  }
-  if (!arguments.screenshot.empty() && arguments.input.empty()) return "--screenshot needs a file to show";
-  return "";
+  const auto size = parse_size(text);
+  const bool fits = size && size->width >= kSmallest.width && size->height >= kSmallest.height &&
+                    size->width <= kLongestSide && size->height <= kLongestSide;
+  return fits ? size : std::nullopt;
+}
+
+std::vector<OptionRule> view_rules(const ViewArguments& arguments) {
+  const auto has_file = [&arguments] { return !arguments.input.empty(); };
+  std::vector<OptionRule> rules = raw_rules();
+  rules.push_back({{"--raw-size", "--screenshot"}, needs("a file to show", has_file)});
+  rules.push_back({{"--screenshot"}, [&arguments](const CLI::App&) {
+                     const std::filesystem::path& image = arguments.screenshot;
+                     return image.extension() == ".png"
+                                ? ""
+                                : ": the image name must end in .png, not \"" + image.string() + "\"";
+                   }});
+  return rules;
 }
 
 }  // namespace
@@ -138,10 +132,11 @@ void add_view_command(CLI::App& app, int& status) {
   add_dimension_option(*command, arguments->load);
   add_outside_files_option(*command, arguments->load);
   command->add_option("--frame", arguments->load.frame, "Animation frame (default 0)")->check(not_negative_whole());
-  add_volume_options(*command, arguments->volume_texts);
+  add_volume_options(*command, arguments->load);
   set_heading(*command, heading::kOutput);
-  command->add_option("--size", "Window size in pixels, 320x240 to 16384 per side (default: the last size)")
-      ->type_name("WxH");
+  add_parsed<ImageSize>(*command, "--size", "WxH",
+                        {read_size, "WIDTHxHEIGHT of at least 320x240 and at most 16384 per side, as in 1280x720"},
+                        arguments->size, "Window size in pixels, 320x240 to 16384 per side (default: the last size)");
   command->add_flag("--bare", arguments->is_bare, "Show no panels and save no settings");
   command->add_option("--screenshot", arguments->screenshot, "Write the finished image (.png) and exit")
       ->type_name("FILE")
@@ -176,12 +171,8 @@ void add_view_command(CLI::App& app, int& status) {
       "Example: quoin view castle.vox\n"
       "Example: quoin view scan.raw --raw-size 256x256x128 --raw-type uint16");
   command->callback([command, arguments, &status] {
-    if (const std::string fault = settle(*command, *arguments); !fault.empty()) {
-      print_error(fault + " (try --help)");
-      status = kWrongUsage;
-      return;
-    }
-    status = run_view(*arguments);
+    const Status fits = check_rules(*command, view_rules(*arguments));
+    status = fits ? run_view(*arguments) : wrong_usage(fits.error());
   });
 }
 

@@ -12,6 +12,11 @@ namespace quoin::tool {
 
 namespace {
 
+std::optional<IVec3> parse_raw_size(const std::string& text) {
+  const auto size = parse_box_size(text);
+  return size && size->x >= 1 && size->y >= 1 && size->z >= 1 ? size : std::nullopt;
+}
+
 std::optional<ScalarType> scalar_type(const std::string& name) {
   for (int i = 0; i <= static_cast<int>(ScalarType::Float64); ++i) {
     if (name_of(static_cast<ScalarType>(i)) == name) return static_cast<ScalarType>(i);
@@ -19,57 +24,57 @@ std::optional<ScalarType> scalar_type(const std::string& name) {
   return std::nullopt;
 }
 
-std::string read_iso(const std::string& text, std::optional<double>& iso) {
-  iso = parse_number(text);
-  if (!iso) return "--iso: must be a number, not \"" + text + "\"";
-  if (std::isfinite(static_cast<float>(*iso))) return "";
-  return "--iso: must be from -3.4e38 to 3.4e38, the range of 32-bit floats, not \"" + text + "\"";
+/// Accepts numbers in the range of float, and texts that are no numbers.
+CLI::Validator in_range_of_float() {
+  return {[](std::string& text) {
+            const auto number = parse_number(text);
+            if (!number || std::isfinite(static_cast<float>(*number))) return std::string();
+            return "must be from -3.4e38 to 3.4e38, the range of 32-bit floats, not \"" + text + "\"";
+          },
+          ""};
 }
 
 }  // namespace
 
-void add_raw_options(CLI::App& command, VolumeTexts& texts) {
+void add_raw_options(CLI::App& command, std::optional<RawVolume>& raw) {
   set_heading(command, heading::kVolumes);
-  command
-      .add_option("--raw-size", texts.raw_size,
-                  "Read IN as raw values without a header: number of values along each axis, x fastest")
-      ->type_name("XxYxZ");
-  command.add_option("--raw-type", texts.raw_type,
-                     "Type of raw values: uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32 or float64 "
-                     "(default uint8)");
-  command.add_option("--raw-order", texts.raw_order, "Byte order of raw values: little or big (default little)")
-      ->check(CLI::IsMember({"little", "big"}));
+  add_parsed<IVec3>(
+      command, "--raw-size", "XxYxZ", {parse_raw_size, "XxYxZ, as in 256x256x128"},
+      [&raw](const IVec3& size) { raw.emplace().size = size; },
+      "Read IN as raw values without a header: number of values along each axis, x fastest");
+  // CLI11 reads options in the order in which they were added; raw_rules() refuses these without --raw-size.
+  add_parsed<ScalarType>(
+      command, "--raw-type", "TEXT",
+      {scalar_type, "uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32 or float64"},
+      [&raw](const ScalarType& type) {
+        if (raw) raw->type = type;
+      },
+      "Type of raw values: uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32 or float64 "
+      "(default uint8)");
+  add_choice<std::endian>(
+      command, "--raw-order", {{"little", std::endian::little}, {"big", std::endian::big}},
+      [&raw](const std::endian& order) {
+        if (raw) raw->order = order;
+      },
+      "Byte order of raw values: little or big (default little)");
 }
 
-void add_volume_options(CLI::App& command, VolumeTexts& texts) {
+void add_volume_options(CLI::App& command, LoadOptions& load, std::optional<double>* exact_iso) {
   set_heading(command, heading::kVolumes);
-  command
-      .add_option("--iso", texts.iso,
-                  "Surface value of a volume or of a fog grid of a .vdb. Greater values are solid (default: a value "
-                  "that separates the two main groups of values)")
-      ->type_name("X");
-  add_raw_options(command, texts);
+  add_parsed<double>(
+      command, "--iso", "X", number(),
+      [&load, exact_iso](const double& iso) {
+        load.iso = static_cast<float>(iso);
+        if (exact_iso != nullptr) *exact_iso = iso;
+      },
+      "Surface value of a volume or of a fog grid of a .vdb. Greater values are solid (default: a value "
+      "that separates the two main groups of values)")
+      ->check(in_range_of_float());
+  add_raw_options(command, load.raw);
 }
 
-std::string read_volume_options(const CLI::App& command, const VolumeTexts& texts, VolumeArguments& arguments) {
-  if (command.get_option_no_throw("--iso") != nullptr && command.count("--iso") > 0) {
-    if (std::string fault = read_iso(texts.iso, arguments.iso); !fault.empty()) return fault;
-  }
-  if (command.count("--raw-size") == 0) {
-    const bool is_lone = command.count("--raw-type") + command.count("--raw-order") > 0;
-    return is_lone ? "--raw-type and --raw-order need --raw-size" : "";
-  }
-  const auto size = parse_box_size(texts.raw_size);
-  if (!size || size->x < 1 || size->y < 1 || size->z < 1) {
-    return "--raw-size: must be XxYxZ, as in 256x256x128, not \"" + texts.raw_size + "\"";
-  }
-  const auto type = scalar_type(texts.raw_type);
-  if (!type) {
-    return "--raw-type: must be uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32 or float64, not \"" +
-           texts.raw_type + "\"";
-  }
-  arguments.raw = RawVolume{*size, *type, texts.raw_order == "big" ? std::endian::big : std::endian::little};
-  return "";
+std::vector<OptionRule> raw_rules() {
+  return {{{"--raw-type", "--raw-order"}, needs("--raw-size")}};
 }
 
 Result<bool> holds_volume(const CommonOptions& options) {

@@ -1,37 +1,23 @@
 #pragma once
 
 #include <optional>
-#include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <quoin/io/volume.h>
 
 #include "commands.h"
+#include "options.h"
 
 namespace quoin::tool {
 
-/// Unparsed volume options; `read_volume_options` parses them.
-struct VolumeTexts {
-  std::string iso;
-  std::string raw_size;
-  std::string raw_type = "uint8";
-  std::string raw_order = "little";
-};
-
 /// Adds --raw-size, --raw-type and --raw-order.
-void add_raw_options(CLI::App& command, VolumeTexts& texts);
-/// Adds --iso and the raw options.
-void add_volume_options(CLI::App& command, VolumeTexts& texts);
+void add_raw_options(CLI::App& command, std::optional<RawVolume>& raw);
+/// Adds --iso and the raw options. `exact_iso`: also receives the value of --iso, which `load` rounds to float.
+void add_volume_options(CLI::App& command, LoadOptions& load, std::optional<double>* exact_iso = nullptr);
 
-/// Parsed volume options.
-struct VolumeArguments {
-  std::optional<double> iso;  ///< the given value; within the range of float
-  std::optional<RawVolume> raw;
-};
-
-/// Parses the volume options. Returns a usage error, or "".
-[[nodiscard]] std::string read_volume_options(const CLI::App& command, const VolumeTexts& texts,
-                                              VolumeArguments& arguments);
+/// Returns the rules of the raw options.
+[[nodiscard]] std::vector<OptionRule> raw_rules();
 
 /// Returns true if the input is a volume, by --raw-size or by its content. Errors: CannotRead.
 [[nodiscard]] Result<bool> holds_volume(const CommonOptions& options);

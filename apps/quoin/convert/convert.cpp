@@ -536,7 +536,7 @@ void add_meshing_options(CLI::App& command, ConvertOptions& options) {
       "--ao-attribute", options.ao_as_attribute,
       "Write occlusion as a vertex attribute, 1 (open) to 0 (dark), not in the colours: _AO in glTF, ao in "
       "PLY");
-  add_field_occlusion_options(command);
+  add_field_occlusion_options(command, options.field_occlusion);
 }
 
 void add_mesh_file_options(CLI::App& command, ConvertOptions& options) {
@@ -560,17 +560,15 @@ void add_mesh_file_options(CLI::App& command, ConvertOptions& options) {
       ->check(positive());
 }
 
-/// Reads the options of smooth occlusion. Returns a usage error, or "".
-std::string read_occlusion(const CLI::App& command, ConvertOptions& options) {
-  if (options.occlusion_off) {
-    const char* const given = options.ao_as_attribute ? "--ao-attribute" : given_field_occlusion(command);
-    if (given != nullptr) return std::string(given) + " and --no-ao cannot be used together";
-  }
-  std::string fault = read_field_occlusion(command, options.field_occlusion);
-  const bool has_none = options.has_field_occlusion && options.field_occlusion.method == SmoothOcclusion::None;
-  if (fault.empty() && has_none && options.ao_as_attribute)
-    fault = "--ao-attribute and --ao-form none cannot be used together";
-  return fault;
+std::vector<OptionRule> convert_rules(const ConvertOptions& options) {
+  const auto has_none = [&options] { return options.field_occlusion.method == SmoothOcclusion::None; };
+  std::vector<OptionRule> rules = raw_rules();
+  std::ranges::move(field_occlusion_rules(options.field_occlusion), std::back_inserter(rules));
+  rules.push_back({{heading::kOcclusion}, excludes({"--no-ao"})});
+  rules.push_back({{"--ao-attribute"}, excludes("--ao-form none", has_none)});
+  rules.push_back({{"--fps"}, needs("--animate")});
+  rules.push_back({{"--frame"}, excludes({"--animate"})});
+  return rules;
 }
 
 /// "vox, scene, nifti, nrrd".
@@ -601,16 +599,6 @@ std::string read_files(const std::vector<std::filesystem::path>& rest, ConvertOp
   }
   options.output = rest.front();
   return "";
-}
-
-/// Reads the volume options. Returns a usage error, or "".
-std::string read_texts(const CLI::App& command, const VolumeTexts& texts, ConvertOptions& options) {
-  VolumeArguments volume;
-  std::string fault = read_volume_options(command, texts, volume);
-  options.iso = volume.iso;
-  if (volume.iso) options.common.load.iso = static_cast<float>(*volume.iso);
-  options.common.load.raw = volume.raw;
-  return fault;
 }
 
 }  // namespace
@@ -818,7 +806,7 @@ std::string footer() {
 }
 
 /// Reads options that CLI11 leaves as text and checks combinations of options. Returns a usage error, or "".
-std::string read_options(const CLI::App& command, const VolumeTexts& texts, const MeshInputTexts& triangles,
+std::string read_options(const CLI::App& command, const MeshInputTexts& triangles,
                          const std::vector<std::filesystem::path>& rest, ConvertOptions& options, ManyOptions& many) {
   std::size_t given = 0;
   for (const char* name : {"--mesher", "--no-ao", "--ao-attribute", "--watertight", "--smoothness", "--colours",
@@ -826,21 +814,19 @@ std::string read_options(const CLI::App& command, const VolumeTexts& texts, cons
                            "--compress", "--quantize", "--animate", "--fps"}) {
     given += command.count(name);
   }
-  options.has_field_occlusion = given_field_occlusion(command) != nullptr;
+  const auto is_given = [&](const std::string& name) { return command.count(name) > 0; };
+  options.has_field_occlusion = std::ranges::any_of(kFieldOcclusion, is_given);
   options.mesh_only = given > 0 || options.has_field_occlusion;
-  std::string fault = read_texts(command, texts, options);
-  if (fault.empty()) fault = read_mesh_input_options(command, triangles, options.common.load.mesh);
+  const Status fits = check_rules(command, convert_rules(options));
+  std::string fault =
+      fits ? read_mesh_input_options(command, triangles, options.common.load.mesh) : to_string(fits.error());
   if (const char* name = given_mesh_input(command)) options.mesh_input = name;
   options.as_voxels = command.count("--solid") > 0;
-  if (fault.empty()) fault = read_occlusion(command, options);
   if (command.count("--light") > 0 && command.get_option("--light")->as<std::string>() == "propagated") {
     options.light = natural_light();
   }
   if (fault.empty()) fault = find_atlas_error(options);
   if (fault.empty()) fault = find_light_error(options);
-  if (fault.empty() && command.count("--fps") > 0 && !options.animate) fault = "--fps needs --animate";
-  if (fault.empty() && options.animate && options.common.takes_frame)
-    fault = "--frame and --animate cannot be used together";
   if (fault.empty()) fault = read_files(rest, options, many);
   if (fault.empty()) fault = find_watching_error(options, many);
   return fault;
@@ -851,7 +837,6 @@ std::string read_options(const CLI::App& command, const VolumeTexts& texts, cons
 void add_convert_command(CLI::App& app, int& status) {
   CLI::App* command = app.add_subcommand("convert", "Convert a file to the format of the extension of OUT");
   const auto options = std::make_shared<ConvertOptions>();
-  const auto texts = std::make_shared<VolumeTexts>();
   const auto triangles = std::make_shared<MeshInputTexts>();
   const auto many = std::make_shared<ManyOptions>();
   const auto rest = std::make_shared<std::vector<std::filesystem::path>>();
@@ -859,11 +844,11 @@ void add_convert_command(CLI::App& app, int& status) {
   add_file_options(*command, *options, *many, *rest);
   add_meshing_options(*command, *options);
   add_mesh_file_options(*command, *options);
-  add_volume_options(*command, *texts);
+  add_volume_options(*command, options->common.load, &options->iso);
   add_mesh_input_options(*command, *triangles, options->common.load.mesh);
   command->footer(footer());
-  command->callback([command, options, texts, triangles, many, rest, &status] {
-    if (const std::string fault = read_options(*command, *texts, *triangles, *rest, *options, *many); !fault.empty()) {
+  command->callback([command, options, triangles, many, rest, &status] {
+    if (const std::string fault = read_options(*command, *triangles, *rest, *options, *many); !fault.empty()) {
       print_error(fault + " (try --help)");
       status = kWrongUsage;
       return;

@@ -10,15 +10,17 @@ bool has_ending(const std::filesystem::path& path, const std::string& ending) {
   return CLI::detail::to_lower(path.extension().string()) == ending;
 }
 
-std::string find_image_name_error(const std::filesystem::path& path) {
-  if (has_ending(path, ".png")) return "";
-  const auto lacks = [&](const char* ending, const char* library) {
-    return std::string("cannot write ") + ending + ": this build has no " + library;
+Status check_image_name(const std::filesystem::path& path) {
+  if (has_ending(path, ".png")) return {};
+  const auto check = [](bool is_supported, const char* ending, const char* library) -> Status {
+    if (is_supported) return {};
+    return make_error(ErrorCode::Unsupported, std::string("cannot write ") + ending + ": this build has no " + library);
   };
-  if (has_ending(path, ".jpg")) return has_jpeg() ? "" : lacks(".jpg", "libjpeg");
-  if (has_ending(path, ".webp")) return has_webp() ? "" : lacks(".webp", "libwebp");
-  if (has_ending(path, ".exr")) return has_exr() ? "" : lacks(".exr", "OpenEXR");
-  return "the image name must end in .png, .jpg, .webp or .exr, not \"" + path.string() + "\"";
+  if (has_ending(path, ".jpg")) return check(has_jpeg(), ".jpg", "libjpeg");
+  if (has_ending(path, ".webp")) return check(has_webp(), ".webp", "libwebp");
+  if (has_ending(path, ".exr")) return check(has_exr(), ".exr", "OpenEXR");
+  return make_error(ErrorCode::InvalidArgument,
+                    "the image name must end in .png, .jpg, .webp or .exr, not \"" + path.string() + "\"");
 }
 
 Result<std::uint64_t> write_image_file(const Image& image, const std::filesystem::path& path) {

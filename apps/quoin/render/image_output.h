@@ -12,11 +12,11 @@ namespace quoin::tool {
 /// Returns true if the file name has this extension (".png"), ignoring case.
 [[nodiscard]] bool has_ending(const std::filesystem::path& path, const std::string& ending);
 
-/// Returns an error message unless the extension is that of an image format this build can write, else "".
-[[nodiscard]] std::string find_image_name_error(const std::filesystem::path& path);
+/// Fails unless the extension is that of an image format this build can write.
+[[nodiscard]] Status check_image_name(const std::filesystem::path& path);
 
 /// Writes an image in the format of its extension: .png, .jpg or .webp. Returns the file size.
-/// Requires: `find_image_name_error` returns ""; an image with alpha is not .jpg.
+/// Requires: `check_image_name` succeeds; an image with alpha is not .jpg.
 [[nodiscard]] Result<std::uint64_t> write_image_file(const Image& image, const std::filesystem::path& path);
 [[nodiscard]] Result<std::uint64_t> write_image_file(const AlphaImage& image, const std::filesystem::path& path);
 

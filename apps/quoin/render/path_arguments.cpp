@@ -1,7 +1,7 @@
 #include "render/path_arguments.h"
 
 #include <algorithm>
-#include <array>
+#include <cstdint>
 #include <memory>
 #include <numbers>
 #include <string_view>
@@ -10,28 +10,18 @@
 #include <quoin/io/image_files.h>
 #include <quoin/io/sidecar_file.h>
 
+#include "options.h"
 #include "parse.h"
-#include "render/text_options.h"
+#include "render/image_output.h"
+#include "render/render_arguments.h"
 
 namespace quoin::tool {
 namespace {
 
 constexpr int kMaxBounces = 1'024;
 constexpr double kRadians = std::numbers::pi / 180.0;
-constexpr std::array kPathOptions = {
-    "--bounces",     "--sky",   "--sky-turn", "--tone",       "--sun-angle", "--sun-time", "--ground", "--transparent",
-    "--lens-radius", "--focus", "--fog",      "--fog-colour", "--bloom",     "--vignette", "--look",   "--denoise"};
-// Options of all light models that a scene file can also set.
-constexpr std::array kCommonOptions = {"--sun", "--sky-brightness", "--exposure"};
-constexpr std::array kOtherLight = {"--preset",      "--ao",          "--ao-rays",         "--ao-affects",
-                                    "--ao-distance", "--ao-form",     "--ao-spread",       "--ao-offset",
-                                    "--ao-power",    "--lamps",       "--fixed-sky",       "--plain-glass",
-                                    "--detail",      "--lod-colours", "--shadow-distance", "--least-light"};
-
-std::optional<double> read_sun_angle(const std::string& text) {
-  const auto degrees = parse_number(text);
-  return degrees && *degrees >= 0.0 && *degrees <= 170.0 ? degrees : std::nullopt;
-}
+constexpr int kUsualBounces = 8;
+constexpr double kUsualSunAngle = 0.53;
 
 // Parses `least` to `most` numbers with commas between them.
 std::optional<std::vector<double>> read_numbers(const std::string& text, std::size_t least, std::size_t most) {
@@ -89,15 +79,12 @@ std::optional<Bloom> read_bloom(const std::string& text) {
   return is_share(bloom.mix) && is_share(bloom.radius) && bloom.threshold >= 0.0 ? std::optional(bloom) : std::nullopt;
 }
 
-std::optional<double> read_share(const std::string& text) {
-  const auto number = parse_number(text);
-  return number && *number >= 0.0 && *number <= 1.0 ? number : std::nullopt;
-}
-
-ToneCurve tone_of(const std::string& name) {
-  if (name == "clamp") return ToneCurve::Clamp;
-  if (name == "agx") return ToneCurve::Agx;
-  return name == "aces" ? ToneCurve::Aces : ToneCurve::Neutral;
+std::optional<SkyArgument> read_sky(const std::string& text) {
+  if (text == "physical") return SkyArgument{SkyModel::Physical, {}};
+  if (text == "gradient") return SkyArgument{SkyModel::Gradient, {}};
+  if (text == "uniform") return SkyArgument{SkyModel::Uniform, {}};
+  const bool is_image = has_ending(text, ".hdr") || has_ending(text, ".exr");
+  return is_image ? std::optional(SkyArgument{SkyModel::Environment, text}) : std::nullopt;
 }
 
 // Reads the sky image of a .vox file from the folder of that file. MagicaVoxel keeps it in its own folder.
@@ -121,24 +108,18 @@ void take_file_look(const FileLook& file, PathPlan& plan) {
   }
 }
 
-SkyModel sky_of(const PathArguments& arguments) {
-  if (arguments.sky == "gradient") return SkyModel::Gradient;
-  if (arguments.sky == "uniform") return SkyModel::Uniform;
-  return is_sky_file(arguments) ? SkyModel::Environment : SkyModel::Physical;
-}
-
 Status take_sky(const PathArguments& arguments, const LoadedScene& loaded, const CommonOptions& common,
                 PathPlan& plan) {
   PathOptions& options = plan.options;
-  if (arguments.has("--sky")) {
+  if (arguments.sky) {
     const Look plain;
-    options.sky = sky_of(arguments);
+    options.sky = arguments.sky->model;
     options.sky_brightness = plain.sky_brightness;
     options.sky_colour = plain.sky_colour;
     options.air = plain.air;
     options.background.reset();
-    if (!is_sky_file(arguments)) return {};
-    auto image = read_radiance(arguments.sky);
+    if (options.sky != SkyModel::Environment) return {};
+    auto image = read_radiance(arguments.sky->image);
     if (!image) return image.error();
     options.environment = std::make_shared<const RadianceImage>(std::move(*image));
     options.environment_turn_radians = arguments.sky_turn_degrees * kRadians;
@@ -157,7 +138,7 @@ Status take_sky(const PathArguments& arguments, const LoadedScene& loaded, const
 
 void take_lens(const PathArguments& arguments, const LoadedScene& loaded, std::optional<int> file_camera,
                PathPlan& plan) {
-  if (arguments.has("--lens-radius")) plan.options.lens_radius = arguments.lens_radius;
+  if (arguments.lens_radius) plan.options.lens_radius = *arguments.lens_radius;
   plan.focus = arguments.focus;
   const auto looks = std::ranges::find(loaded.cameras, file_camera.value_or(-1), &FileCamera::number);
   if (!plan.focus && looks != loaded.cameras.end() && looks->focus_distance > 0.0) plan.focus = looks->focus_distance;
@@ -168,105 +149,67 @@ void take_lens(const PathArguments& arguments, const LoadedScene& loaded, std::o
 void add_path_options(CLI::App& command, PathArguments& arguments) {
   command.add_option("--bounces", arguments.bounces, "Maximum number of bounces, 0 to 1024 (default 8)")
       ->check(CLI::Range(0, kMaxBounces));
+  add_parsed<SkyArgument>(
+      command, "--sky", "NAME|FILE", {read_sky, "physical, gradient, uniform, or an .hdr or .exr file"}, arguments.sky,
+      "Sky (default gradient). gradient: as with --light rays. physical: a clear sky for the height of the "
+      "sun. uniform: white from all directions, also from below. Or an environment image, .hdr or .exr");
+  add_parsed(command, "--sky-turn", "DEGREES", number(), arguments.sky_turn_degrees,
+             "Rotation of an environment image around the vertical (default 0)");
+  add_parsed(command, "--sun-angle", "DEGREES", number_between(0.0, 170.0, "from 0 to 170"),
+             arguments.sun_angle_degrees,
+             "Angular diameter of the sun, 0 to 170; greater makes shadows softer (default 0.53)");
+  add_parsed<SunTime>(command, "--sun-time", "MM-DD,HOUR,LATITUDE",
+                      {read_sun_time, "a day, an hour from 0 to 24 and a latitude from -90 to 90, as in 06-21,18.5,52"},
+                      arguments.sun_time,
+                      "Sun direction by date, solar time and latitude, as in 06-21,18.5,52. North is -z");
+  const auto set_ground = [&arguments](std::int64_t sign) { arguments.ground = sign > 0; };
   command
-      .add_option("--sky", arguments.sky,
-                  "Sky (default gradient). gradient: as with --light rays. physical: a clear sky for the height of the "
-                  "sun. uniform: white from all directions, also from below. Or an environment image, .hdr or .exr")
-      ->type_name("NAME|FILE");
-  add_text_option(command, "--sky-turn", "DEGREES", "Rotation of an environment image around the vertical (default 0)");
-  add_text_option(command, "--sun-angle", "DEGREES",
-                  "Angular diameter of the sun, 0 to 170; greater makes shadows softer (default 0.53)");
-  add_text_option(command, "--sun-time", "MM-DD,HOUR,LATITUDE",
-                  "Sun direction by date, solar time and latitude, as in 06-21,18.5,52. North is -z");
-  command.add_flag("--ground,!--no-ground", arguments.has_ground,
-                   "Place the scene on level ground; with --transparent the ground only catches shadows");
+      .add_flag_function("--ground,!--no-ground", set_ground,
+                         "Place the scene on level ground; with --transparent the ground only catches shadows")
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
   command.add_flag("--transparent", arguments.is_transparent, "Write alpha instead of a background");
-  add_text_option(command, "--lens-radius", "X",
-                  "Radius of the lens in world units; more than 0 gives depth of field (default 0)");
-  add_text_option(command, "--focus", "X", "Focus distance in world units (default: the middle of the scene)");
-  add_text_option(command, "--fog", "DENSITY[,TOP]",
-                  "Fog: density in scattering events per world unit, and upper end (default: the top of the scene)");
-  add_text_option(command, "--fog-colour", "R,G,B", "Linear colour of the fog, 0 to 1 each (default 1,1,1)");
-  command
-      .add_option("--tone", arguments.tone,
-                  "Tone curve: clamp, neutral (Khronos PBR), agx or aces (default neutral; clamp with --sky uniform)")
-      ->check(CLI::IsMember({"clamp", "neutral", "agx", "aces"}));
-  add_text_option(command, "--bloom", "MIX[,RADIUS[,THRESHOLD]]",
-                  "Bloom: share of the light that spreads, radius (share of the image height), minimum brightness "
-                  "(default 0,0.02,0)");
-  add_text_option(command, "--vignette", "X", "Darkening of the corners, 0 to 1 (default 0)");
-  command
-      .add_option(
-          "--look", arguments.look,
-          "Source of settings without an option: file (its render settings and focus) or plain (the defaults of "
-          "quoin) (default file)")
-      ->check(CLI::IsMember({"file", "plain"}));
+  add_parsed(command, "--lens-radius", "X", number_from_0(), arguments.lens_radius,
+             "Radius of the lens in world units; more than 0 gives depth of field (default 0)");
+  command.add_option("--focus", arguments.focus, "Focus distance in world units (default: the middle of the scene)")
+      ->type_name("X")
+      ->check(positive());
+  add_parsed<FogPlace>(
+      command, "--fog", "DENSITY[,TOP]", {read_fog, "a density from 0 to 1e6, and a height, as in 0.02,40"},
+      arguments.fog, "Fog: density in scattering events per world unit, and upper end (default: the top of the scene)");
+  add_parsed<DVec3>(command, "--fog-colour", "R,G,B", {read_colour, "three numbers from 0 to 1, as in 0.8,0.9,1"},
+                    arguments.fog_colour, "Linear colour of the fog, 0 to 1 each (default 1,1,1)");
+  add_choice<ToneCurve>(command, "--tone",
+                        {{"clamp", ToneCurve::Clamp},
+                         {"neutral", ToneCurve::Neutral},
+                         {"agx", ToneCurve::Agx},
+                         {"aces", ToneCurve::Aces}},
+                        arguments.tone,
+                        "Tone curve: clamp, neutral (Khronos PBR), agx or aces (default neutral; clamp with --sky "
+                        "uniform)");
+  add_parsed<Bloom>(command, "--bloom", "MIX[,RADIUS[,THRESHOLD]]",
+                    {read_bloom, "a share, a radius from 0 to 1, and a threshold, as in 0.2,0.03,1"}, arguments.bloom,
+                    "Bloom: share of the light that spreads, radius (share of the image height), minimum brightness "
+                    "(default 0,0.02,0)");
+  add_parsed(command, "--vignette", "X", number_between(0.0, 1.0, "from 0 to 1"), arguments.vignette,
+             "Darkening of the corners, 0 to 1 (default 0)");
+  add_choice<bool>(command, "--look", {{"file", true}, {"plain", false}}, arguments.uses_file_look,
+                   "Source of settings without an option: file (its render settings and focus) or plain (the defaults "
+                   "of quoin) (default file)");
   command.add_flag("--denoise", arguments.denoise, "Remove noise within surfaces and keep their edges");
 }
 
-std::string given_path_option(const CLI::App& command) {
-  for (const char* option : kPathOptions) {
-    if (command.count(option) > 0) return option;
-  }
-  return "";
-}
-
-std::string find_path_options_error(const CLI::App& command) {
-  for (const char* option : kOtherLight) {
-    if (command.count(option) > 0) return std::string(option) + " and --light path cannot be used together";
-  }
-  if (command.count("--fog-colour") > 0 && command.count("--fog") == 0) return "--fog-colour needs --fog";
-  if (command.count("--sun-time") > 0 && command.count("--sun") > 0)
-    return "--sun and --sun-time cannot be used together";
-  return "";
-}
-
-std::string read_path_options(const CLI::App& command, PathArguments& arguments) {
-  for (const std::string& fault :
-       {read_option(command, "--sky-turn", parse_number, "a number", arguments.sky_turn_degrees),
-        read_option(command, "--sun-angle", read_sun_angle, "from 0 to 170", arguments.sun_angle_degrees),
-        read_option(command, "--sun-time", read_sun_time,
-                    "a day, an hour from 0 to 24 and a latitude from -90 to 90, as in 06-21,18.5,52",
-                    arguments.sun_time),
-        read_option(command, "--fog", read_fog, "a density from 0 to 1e6, and a height, as in 0.02,40", arguments.fog),
-        read_option(command, "--fog-colour", read_colour, "three numbers from 0 to 1, as in 0.8,0.9,1",
-                    arguments.fog_colour),
-        read_option(command, "--bloom", read_bloom, "a share, a radius from 0 to 1, and a threshold, as in 0.2,0.03,1",
-                    arguments.bloom),
-        read_option(command, "--vignette", read_share, "from 0 to 1", arguments.vignette),
-        read_option(command, "--lens-radius", read_not_negative, "a number of at least 0", arguments.lens_radius),
-        read_option(command, "--focus", read_positive, "a number above 0", arguments.focus)}) {
-    if (!fault.empty()) return fault;
-  }
-  const auto note = [&](const char* option) {
-    if (command.count(option) > 0) arguments.given.insert(option);
-  };
-  std::ranges::for_each(kPathOptions, note);
-  std::ranges::for_each(kCommonOptions, note);
-  if (command.count("--sky-turn") > 0 && !is_sky_file(arguments)) return "--sky-turn needs an image file for --sky";
-  const std::string ending = CLI::detail::to_lower(std::filesystem::path(arguments.sky).extension().string());
-  if (is_sky_file(arguments) && ending != ".hdr" && ending != ".exr") {
-    return "--sky: must be physical, gradient, uniform, or an .hdr or .exr file, not \"" + arguments.sky + "\"";
-  }
-  return "";
-}
-
-bool is_sky_file(const PathArguments& arguments) {
-  return arguments.sky != "physical" && arguments.sky != "gradient" && arguments.sky != "uniform";
-}
-
-Result<PathPlan> plan_paths(const PathArguments& arguments, const RenderOptions& render, const LoadedScene& loaded,
-                            InstanceFilter filter, const CommonOptions& common, std::optional<int> file_camera) {
+Result<PathPlan> plan_paths(const RenderArguments& all, const RenderOptions& render, const LoadedScene& loaded) {
+  const PathArguments& arguments = all.path;
   PathPlan plan;
   PathOptions& options = plan.options;
-  const bool has_look = loaded.look && arguments.look == "file";
+  const bool has_look = loaded.look && arguments.uses_file_look;
   DVec3 sun = render.light.sun;
   if (arguments.sun_time) {
     const auto at_that_time = sun_direction(*arguments.sun_time);
     if (!at_that_time) return at_that_time.error();
     sun = *at_that_time;
   }
-  const NaturalLook natural = natural_look(sky_of(arguments), sun);
+  const NaturalLook natural = natural_look(arguments.sky.value_or(SkyArgument{}).model, sun);
   static_cast<Look&>(options) = natural.look;
   plan.develop = natural.develop;
   options.sun = sun;
@@ -274,29 +217,31 @@ Result<PathPlan> plan_paths(const PathArguments& arguments, const RenderOptions&
   options.width = render.width;
   options.height = render.height;
   options.samples = render.samples;
-  if (!has_look || arguments.has("--bounces")) options.max_bounces = arguments.bounces;
-  if (arguments.has("--sun")) {
+  if (!has_look || arguments.bounces) options.max_bounces = arguments.bounces.value_or(kUsualBounces);
+  if (all.has_sun) {
     options.sun = render.light.sun;
     if (render.light.sun_brightness == 0.0) options.sun_brightness = 0.0;
   }
   if (arguments.sun_time) options.sun = sun;
-  if (!has_look || arguments.has("--sun-angle")) options.sun_angle_radians = arguments.sun_angle_degrees * kRadians;
+  if (!has_look || arguments.sun_angle_degrees) {
+    options.sun_angle_radians = arguments.sun_angle_degrees.value_or(kUsualSunAngle) * kRadians;
+  }
   options.lamp_brightness = render.light.lamp_brightness;
-  if (Status sky = take_sky(arguments, loaded, common, plan); !sky) return sky.error();
-  if (arguments.has("--sky-brightness")) options.sky_brightness = render.light.sky_brightness;
-  take_lens(arguments, loaded, file_camera, plan);
+  if (Status sky = take_sky(arguments, loaded, all.common, plan); !sky) return sky.error();
+  if (all.sky_brightness) options.sky_brightness = *all.sky_brightness;
+  take_lens(arguments, loaded, all.file_camera, plan);
 
-  if (arguments.has("--tone")) plan.develop.tone = tone_of(arguments.tone);
-  if (arguments.has("--exposure")) plan.develop.exposure = render.light.exposure;
-  if (arguments.has("--bloom")) plan.develop.bloom = arguments.bloom;
-  if (arguments.has("--vignette")) plan.develop.vignette = arguments.vignette;
-  plan.is_exposure_automatic = arguments.is_exposure_automatic;
-  if (arguments.has("--transparent")) plan.is_transparent = true;
+  if (arguments.tone) plan.develop.tone = *arguments.tone;
+  if (all.has_exposure) plan.develop.exposure = render.light.exposure;
+  if (arguments.bloom) plan.develop.bloom = *arguments.bloom;
+  if (arguments.vignette) plan.develop.vignette = *arguments.vignette;
+  plan.is_exposure_automatic = all.is_exposure_automatic;
+  if (arguments.is_transparent) plan.is_transparent = true;
   plan.denoise = arguments.denoise;
 
-  if (arguments.has("--ground") && !arguments.has_ground) {
+  if (arguments.ground == false) {
     options.ground.reset();
-  } else if (arguments.has_ground && !options.ground) {
+  } else if (arguments.ground && !options.ground) {
     options.ground.emplace().colour = natural.ground_colour;
   }
   if (options.ground) options.ground->only_shadows = plan.is_transparent;
@@ -305,7 +250,7 @@ Result<PathPlan> plan_paths(const PathArguments& arguments, const RenderOptions&
     options.fog->density = arguments.fog->density;
     options.fog->colour = Vec3(arguments.fog_colour);
   }
-  fit_look(loaded.scene.bounds(filter), options);
+  fit_look(loaded.scene.bounds(all.common.instances()), options);
   if (arguments.fog && arguments.fog->top) options.fog->top = *arguments.fog->top;
   if (arguments.focus && !(options.lens_radius > 0.0)) {
     plan.warnings.emplace_back("--focus has no effect: the lens radius is 0; set --lens-radius");

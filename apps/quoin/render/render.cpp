@@ -82,7 +82,7 @@ std::vector<std::filesystem::path> images_of(const RenderArguments& arguments, s
 /// Returns true if --resume keeps this existing image. Existing images are complete. An automatic exposure needs the
 /// first image, which is then rendered again.
 bool is_kept(const RenderArguments& arguments, const std::filesystem::path& image, const Outcome& outcome) {
-  if (!arguments.resume || (arguments.path.is_exposure_automatic && !outcome.exposure)) return false;
+  if (!arguments.resume || (arguments.is_exposure_automatic && !outcome.exposure)) return false;
   std::error_code none;
   return std::filesystem::is_regular_file(image, none);
 }
@@ -104,12 +104,13 @@ Result<Camera> camera_of_file(const LoadedScene& loaded, int number) {
 
 Result<Camera> camera_for(const LoadedScene& loaded, const RenderArguments& arguments) {
   if (arguments.file_camera) return camera_of_file(loaded, *arguments.file_camera);
-  if (loaded.camera && !arguments.has_view && !arguments.position) return *loaded.camera;
+  if (loaded.camera && !arguments.has_view() && !arguments.position) return *loaded.camera;
   if (arguments.position) {
     return look_at(*arguments.position, *arguments.target, arguments.fov_degrees * std::numbers::pi / 180.0);
   }
   if (!arguments.azimuth && !arguments.elevation) {
-    return frame_scene(loaded.scene, arguments.view, aspect_of(arguments), arguments.common.instances());
+    return frame_scene(loaded.scene, arguments.view.value_or(View::Iso), aspect_of(arguments),
+                       arguments.common.instances());
   }
   SceneFraming framing(arguments.forward(), aspect_of(arguments));
   framing.add(loaded.scene, arguments.common.instances());
@@ -160,7 +161,7 @@ Result<LoadedScene> load(const RenderArguments& arguments, bool is_volume, int f
   ProgressBar bar;
   if (Status sound = check_dimension(arguments.common.input, options); !sound) return sound.error();
   auto loaded = load_scene(arguments.common.input, options, arguments.common.threads, bar.listener("reading"));
-  if (loaded && arguments.volume.iso && !is_volume && !heeds_iso(arguments.common)) {
+  if (loaded && options.iso && !is_volume && !heeds_iso(arguments.common)) {
     return make_error(ErrorCode::InvalidArgument, "cannot use --iso: the input holds voxels, not a volume");
   }
   if (loaded) scale_emission(loaded->scene, arguments.emission_scale);
@@ -227,7 +228,7 @@ Result<VulkanRenderer> device_for(const Scene& scene, const RenderArguments& arg
 Status draw_by_paths(const LoadedScene& loaded, const RenderArguments& arguments, const RenderOptions& options,
                      const std::vector<Shot>& shots, Stopwatch& watch, Outcome& outcome) {
   const InstanceFilter filter = arguments.common.instances();
-  auto plan = plan_paths(arguments.path, options, loaded, filter, arguments.common, arguments.file_camera);
+  auto plan = plan_paths(arguments, options, loaded);
   if (!plan) return plan.error();
   if (has_ending(arguments.output, ".jpg")) plan->is_transparent = false;  // it has no alpha
   for (std::string& warning : plan->warnings) {
@@ -240,7 +241,7 @@ Status draw_by_paths(const LoadedScene& loaded, const RenderArguments& arguments
     images.set_exposure(outcome.exposure);
     return take_images(images, arguments, options, shots, watch, outcome);
   };
-  if (arguments.backend != "vulkan") {
+  if (arguments.backend == Backend::Cpu) {
     return take(PathImages(loaded.scene, filter, arguments.common.threads, std::move(*plan), with_layers));
   }
   auto renderer = device_for(loaded.scene, arguments, outcome);
@@ -259,8 +260,8 @@ Status draw_shots(const LoadedScene& loaded, const RenderArguments& arguments, c
                   Stopwatch& watch, Outcome& outcome) {
   RenderOptions options = arguments.render;
   if (loaded.sun && !arguments.has_sun) options.light.sun = *loaded.sun;
-  const bool is_vulkan = arguments.backend == "vulkan";
-  if (arguments.light_model == "path") return draw_by_paths(loaded, arguments, options, shots, watch, outcome);
+  const bool is_vulkan = arguments.backend == Backend::Vulkan;
+  if (arguments.light == LightChoice::Path) return draw_by_paths(loaded, arguments, options, shots, watch, outcome);
   return (is_vulkan ? draw_by_vulkan : draw_by_cpu)(loaded.scene, arguments, options, shots, watch, outcome);
 }
 
@@ -295,7 +296,7 @@ Status draw_path(const LoadedScene& loaded, const std::vector<Camera>& cameras, 
 Status draw_frames(const LoadedScene& first, const RenderArguments& arguments, Stopwatch& watch, Outcome& outcome) {
   const FrameRange& frames = *arguments.frames;
   const InstanceFilter filter = arguments.common.instances();
-  const bool has_camera = arguments.position || arguments.file_camera || (first.camera && !arguments.has_view);
+  const bool has_camera = arguments.position || arguments.file_camera || (first.camera && !arguments.has_view());
   SceneFraming framing(arguments.forward(), aspect_of(arguments));
   framing.add(first.scene, filter);
   // Start with the last frame: if it does not exist, fail before rendering.
@@ -362,7 +363,7 @@ Result<Outcome> render(const RenderArguments& arguments) {
   outcome.is_volume = is_volume;
   catch_interrupts();
   outcome.faces = count_faces(scene, filter, arguments.common.threads);
-  const bool is_slice = arguments.preset == "density";
+  const bool is_slice = arguments.preset == Preset::Density;
   const auto draw = arguments.frames ? draw_frames : draw_view;
   Status drawn = is_slice        ? draw_slice(scene, arguments, watch, outcome)
                  : !path.empty() ? draw_path(*loaded, path, arguments, watch, outcome)
@@ -394,7 +395,7 @@ Json outcome_json(const RenderArguments& arguments, const Outcome& outcome) {
                {"pixels_hit", outcome.image.pixels_hit},
                {"faces_visible", outcome.is_volume ? Json() : Json(outcome.faces.visible)},
                {"faces_total", outcome.is_volume ? Json() : Json(outcome.faces.total)},
-               {"backend", arguments.backend},
+               {"backend", arguments.backend == Backend::Vulkan ? "vulkan" : "cpu"},
                {"threads", thread_count(arguments.common.threads)},
                {"camera", outcome.slice || outcome.files.empty() ? Json() : camera_json(outcome.camera)},
                {"bytes", outcome.bytes},
@@ -503,9 +504,8 @@ void add_render_command(CLI::App& app, int& status) {
                   "Example: quoin render scan.nii.gz -o cut.png --preset density --slice z:0.5\n"
                   "Example: quoin render scan.raw -o scan.png --raw-size 256x256x128 --raw-type uint16 --iso 1200");
   command->callback([command, arguments, &status] {
-    if (const std::string fault = settle(*command, *arguments); !fault.empty()) {
-      print_error(fault + " (try --help)");
-      status = kWrongUsage;
+    if (const Status fits = settle(*command, *arguments); !fits) {
+      status = wrong_usage(fits.error());
       return;
     }
     const auto work = [&] { return run_render(*arguments); };

@@ -1,16 +1,18 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/render/density_slice.h>
 #include <quoin/scene/camera.h>
 
 #include "commands.h"
+#include "options.h"
 #include "render/path_arguments.h"
-#include "volume_options.h"
 
 namespace quoin::tool {
 
@@ -20,14 +22,20 @@ struct FrameRange {
   int last = 0;
 };
 
+/// The values of --light, --preset, --detail and --backend.
+enum class LightChoice : std::uint8_t { Rays, Path, Propagated };
+enum class Preset : std::uint8_t { Full, NoShadows, NoAo, Unlit, Ao, Density };
+enum class DetailChoice : std::uint8_t { Near, Radius, Pixels };
+enum class Backend : std::uint8_t { Cpu, Vulkan };
+
 /// The options of `quoin render`.
 struct RenderArguments {
   CommonOptions common;
   std::filesystem::path output;
   std::filesystem::path depth;  ///< empty: none
   RenderOptions render;         ///< size, samples, light and detail
-  std::string view_name = "iso";
-  View view = View::Iso;
+  std::optional<int> samples;
+  std::optional<View> view;
   std::optional<DVec3> position;  ///< with `target`; replaces the view
   std::optional<DVec3> target;
   std::optional<int> file_camera;  ///< number of a camera in the file; replaces the view
@@ -39,33 +47,32 @@ struct RenderArguments {
   std::filesystem::path camera_path;  ///< file with one camera per image; empty: none
   bool resume = false;                ///< keeps existing images of a series
   double frames_per_second = 24.0;    ///< for a video
-  bool has_view = false;              ///< a view option was given: ignores the camera of the scene file
-  bool has_sun = false;               ///< --sun was given: ignores the sun of the scene file
-  bool has_fixed_sky = false;
-  bool has_plain_glass = false;
-  bool watch = false;  ///< renders again when the input changes
-  std::string light_model = "rays";
+  bool watch = false;                 ///< renders again when the input changes
+  LightChoice light = LightChoice::Rays;
+  Preset preset = Preset::Full;
+  bool has_sun = false;  ///< --sun was given: ignores the sun of the scene file
+  std::optional<double> sky_brightness;
+  bool has_exposure = false;
+  bool is_exposure_automatic = false;
   double emission_scale = 1.0;
-  PathArguments path;  ///< for the light model path
-  std::string preset = "full";
-  std::string occlusion = "rays";
-  std::string occlusion_affects = "ambient";
-  std::string backend = "cpu";
-  std::string device;  ///< see VulkanOptions::device
-  std::string detail = "near";
-  VolumeTexts volume_texts;
-  VolumeArguments volume;
-  DensitySliceOptions slice;  ///< for the preset density
+  PathArguments path;  ///< for --light path
+  std::optional<DetailChoice> detail;
+  Backend backend = Backend::Cpu;
+  std::string device;         ///< see VulkanOptions::device
+  DensitySliceOptions slice;  ///< for --preset density
 
   [[nodiscard]] bool is_film() const { return frames || turns > 1 || !camera_path.empty(); }
+  /// Returns true if a view option was given, which replaces the camera of the scene file.
+  [[nodiscard]] bool has_view() const { return view || azimuth || elevation || turns > 1; }
   /// Returns the view direction for framing; for a turntable that of the first image.
   [[nodiscard]] DVec3 forward() const;
 };
 
-/// Adds the options of the command. CLI11 reads some into `arguments`; `settle` reads the others.
+/// Adds the options of the command, which CLI11 reads into `arguments`.
 void add_render_options(CLI::App& command, RenderArguments& arguments);
 
-/// After parsing: reads the remaining options and resolves combinations of options. Returns a usage error, or "".
-[[nodiscard]] std::string settle(const CLI::App& command, RenderArguments& arguments);
+/// After parsing: checks the rules between options and sets what follows from several options.
+/// Errors: InvalidArgument, for a command line that breaks a rule.
+[[nodiscard]] Status settle(const CLI::App& command, RenderArguments& arguments);
 
 }  // namespace quoin::tool

@@ -10,7 +10,6 @@
 #include "output_files.h"
 #include "progress_bar.h"
 #include "render/small_image.h"
-#include "render/text_options.h"
 #include "shell/help.h"
 #include "standard_streams.h"
 #include "stopwatch.h"

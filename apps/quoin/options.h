@@ -1,0 +1,99 @@
+#pragma once
+
+#include <algorithm>
+#include <functional>
+#include <optional>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <quoin/core/result.h>
+
+namespace quoin::tool {
+
+/// Parses the text of an option into a value.
+template <class T>
+struct TextParser {
+  std::function<std::optional<T>(const std::string&)> parse;  ///< returns nullopt for invalid text
+  std::string must_be;                                        ///< for messages: "a number of at least 0"
+};
+
+/// Parses finite numbers of any size, of at least 0, or from `least` to `most`, which `range` names in messages.
+[[nodiscard]] TextParser<double> number();
+[[nodiscard]] TextParser<double> number_from_0();
+[[nodiscard]] TextParser<double> number_between(double least, double most, std::string range);
+
+/// Adds an option whose value CLI11 cannot parse, and passes the value to `set`.
+/// Usage error for invalid text: `NAME: must be MUST_BE, not "TEXT"`.
+template <class T>
+CLI::Option* add_parsed(CLI::App& command, const std::string& name, const std::string& type, TextParser<T> parser,
+                        std::type_identity_t<std::function<void(const T&)>> set, const std::string& help) {
+  const auto read = [name, parser = std::move(parser), set = std::move(set)](const std::string& text) {
+    const std::optional<T> value = parser.parse(text);
+    if (!value) throw CLI::ValidationError(name, "must be " + parser.must_be + ", not \"" + text + "\"");
+    set(*value);
+  };
+  return command.add_option_function<std::string>(name, read, help)->type_name(type);
+}
+/// Assigns the value to `target`.
+template <class T, class Target>
+  requires std::is_assignable_v<Target&, const T&>
+CLI::Option* add_parsed(CLI::App& command, const std::string& name, const std::string& type, TextParser<T> parser,
+                        Target& target, const std::string& help) {
+  std::function<void(const T&)> assign = [&target](const T& value) { target = value; };
+  return add_parsed<T>(command, name, type, std::move(parser), std::move(assign), help);
+}
+
+/// The names of the values that an option accepts, in the order of the help.
+template <class T>
+using Choices = std::vector<std::pair<std::string, T>>;
+
+/// Adds an option that accepts one of a few names, and passes the value of the name to `set`.
+template <class T>
+CLI::Option* add_choice(CLI::App& command, const std::string& name, const Choices<T>& choices,
+                        std::type_identity_t<std::function<void(const T&)>> set, const std::string& help) {
+  std::vector<std::string> names;
+  for (const auto& choice : choices) names.push_back(choice.first);
+  const auto read = [choices, set = std::move(set)](const std::string& text) {
+    set(std::ranges::find(choices, text, &std::pair<std::string, T>::first)->second);
+  };
+  return command.add_option_function<std::string>(name, read, help)->check(CLI::IsMember(names));
+}
+/// Assigns the value to `target`.
+template <class T, class Target>
+  requires std::is_assignable_v<Target&, const T&>
+CLI::Option* add_choice(CLI::App& command, const std::string& name, const Choices<T>& choices, Target& target,
+                        const std::string& help) {
+  std::function<void(const T&)> assign = [&target](const T& value) { target = value; };
+  return add_choice<T>(command, name, choices, std::move(assign), help);
+}
+
+/// Returns the end of a message that begins with the name of a given option (" needs --light path"), or "" if the
+/// option can be used.
+using Reason = std::function<std::string(const CLI::App& command)>;
+
+/// A rule between the options of a command.
+struct OptionRule {
+  std::vector<std::string> options;   ///< names, or headings for all options under them
+  Reason reason;                      ///< called for each of these options that was given
+  std::vector<std::string> except{};  ///< options under the headings without this rule
+};
+
+/// The options need a setting, for example "--light path".
+[[nodiscard]] Reason needs(std::string setting, std::function<bool()> is_set);
+/// The options need another option.
+[[nodiscard]] Reason needs(std::string option);
+/// The options and a setting cannot be used together.
+[[nodiscard]] Reason excludes(std::string setting, std::function<bool()> is_set);
+/// The options and each of `others` cannot be used together.
+[[nodiscard]] Reason excludes(std::vector<std::string> others);
+
+/// Checks the given options of a parsed command line. Errors: InvalidArgument, for the first broken rule.
+[[nodiscard]] Status check_rules(const CLI::App& command, const std::vector<OptionRule>& rules);
+
+/// Prints a usage error and returns the exit status.
+[[nodiscard]] int wrong_usage(const Error& error);
+
+}  // namespace quoin::tool
