@@ -3,8 +3,6 @@
 #include <optional>
 #include <string>
 
-#include <quoin/io/formats.h>
-
 #include "commands.h"
 #include "output.h"
 #include "parse.h"
@@ -109,18 +107,6 @@ void add_dimension_option(CLI::App& command, LoadOptions& load) {
           "lists the dimensions of a world")
       ->check(CLI::Validator(
           [](const std::string& text) { return std::string(text.empty() ? "must name a dimension" : ""); }, ""));
-}
-
-Status check_dimension(const std::filesystem::path& path, const LoadOptions& load) {
-  if (load.dimension.empty()) return {};
-  const auto format = detect_format(path);
-  if (!format) return format.error();
-  const bool is_heeded = *format == FileFormat::Minecraft || *format == FileFormat::Scene;
-  if (is_heeded) return {};
-  const std::string found = *format ? std::string((*format)->name()) : "unknown";
-  return make_error(ErrorCode::InvalidArgument,
-                    "cannot select a dimension: --dimension needs a Minecraft world, and the file format is " + found,
-                    path.string());
 }
 
 void add_common_options(CLI::App& command, CommonOptions& options) {

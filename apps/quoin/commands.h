@@ -28,8 +28,6 @@ struct CommonOptions {
 
 /// Adds --dimension.
 void add_dimension_option(CLI::App& command, LoadOptions& load);
-/// Fails if --dimension was given and the file has no dimensions.
-[[nodiscard]] Status check_dimension(const std::filesystem::path& path, const LoadOptions& load);
 
 /// Adds IN and the options of CommonOptions to a command.
 void add_common_options(CLI::App& command, CommonOptions& options);

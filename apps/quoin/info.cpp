@@ -11,6 +11,7 @@
 
 #include "commands.h"
 #include "interrupt.h"
+#include "opened_input.h"
 #include "output.h"
 #include "progress_bar.h"
 #include "scene_content.h"
@@ -290,11 +291,12 @@ std::string info_text(const CommonOptions& options, const std::string& name, con
 }
 
 Result<int> info(const CommonOptions& options, const StandardStreams& streams) {
-  if (holds_volume(options).value_or(false)) return run_volume_info(options, streams);
-  if (Status sound = check_dimension(options.input, options.load); !sound) return sound.error();
+  const auto input = open_input(options.input, options.load);
+  if (!input) return input.error();
+  if (input->is_volume) return run_volume_info(options, streams);
   const auto loaded = [&] {
     ProgressBar bar;
-    return load_scene(options.input, options.load, options.threads, bar.listener("reading"));
+    return load_scene(input->file, options.load, options.threads, bar.listener("reading"));
   }();
   if (!loaded) return loaded.error();
   const FaceCounts faces = count_faces(loaded->scene, options.instances(), options.threads);

@@ -6,6 +6,7 @@
 
 #include "commands.h"
 #include "interrupt.h"
+#include "opened_input.h"
 #include "output.h"
 #include "output_files.h"
 #include "parse.h"
@@ -37,16 +38,14 @@ struct ViewArguments {
 #ifdef QUOIN_HAVE_VIEWER
 
 /// Fails before a window opens if the file format is unknown.
-Status check_input(const std::filesystem::path& path, bool is_raw) {
-  if (path.empty()) return {};
-  const auto format = detect_format(path);
-  if (!format) return format.error();
-  if (!*format && !is_raw) {
-    return make_error(ErrorCode::Unsupported,
-                      "unknown format; supported formats are " + extensions_with(FormatCapability::Read),
-                      path.string());
-  }
-  return {};
+Status check_input(const ViewArguments& arguments) {
+  if (arguments.input.empty()) return {};
+  const auto input = open_input(arguments.input, arguments.load);
+  if (!input) return input.error();
+  if (input->file.format || input->is_volume) return {};
+  return make_error(ErrorCode::Unsupported,
+                    "unknown format; supported formats are " + extensions_with(FormatCapability::Read),
+                    arguments.input.string());
 }
 
 int run_view(const ViewArguments& arguments) {
@@ -75,8 +74,7 @@ int run_view(const ViewArguments& arguments) {
   if (arguments.light == "propagated") options.light = LightModel::Propagated;
   if (arguments.backend == "cpu") options.backend = viewer::ViewerBackend::Processor;
   if (arguments.backend == "vulkan") options.backend = viewer::ViewerBackend::Vulkan;
-  Status status = check_input(arguments.input, arguments.load.raw.has_value());
-  if (status && !arguments.input.empty()) status = check_dimension(arguments.input, arguments.load);
+  Status status = check_input(arguments);
   if (status) status = check_outputs({arguments.screenshot});
   if (status) {
     catch_interrupts();

@@ -3,8 +3,6 @@
 #include <bit>
 #include <cmath>
 
-#include <quoin/io/formats.h>
-
 #include "parse.h"
 #include "shell/help.h"
 
@@ -75,18 +73,6 @@ void add_volume_options(CLI::App& command, LoadOptions& load, std::optional<doub
 
 std::vector<OptionRule> raw_rules() {
   return {{{"--raw-type", "--raw-order"}, needs("--raw-size")}};
-}
-
-Result<bool> holds_volume(const CommonOptions& options) {
-  if (options.load.raw) return true;
-  const auto format = detect_format(options.input);
-  if (!format) return format.error();
-  return can(*format, FormatCapability::Volume);
-}
-
-bool heeds_iso(const CommonOptions& options) {
-  const auto format = detect_format(options.input);
-  return holds_volume(options).value_or(false) || (format && *format == FileFormat::Vdb);
 }
 
 Result<Volume> read_input_volume(const CommonOptions& options, const Progress& progress) {

@@ -19,12 +19,6 @@ void add_volume_options(CLI::App& command, LoadOptions& load, std::optional<doub
 /// Returns the rules of the raw options.
 [[nodiscard]] std::vector<OptionRule> raw_rules();
 
-/// Returns true if the input is a volume, by --raw-size or by its content. Errors: CannotRead.
-[[nodiscard]] Result<bool> holds_volume(const CommonOptions& options);
-
-/// Returns true if --iso applies to the input: a volume, or a .vdb, which may have fog grids.
-[[nodiscard]] bool heeds_iso(const CommonOptions& options);
-
 /// Reads the input as a volume. Errors: those of read_volume and read_raw_volume.
 [[nodiscard]] Result<Volume> read_input_volume(const CommonOptions& options, const Progress& progress);
 

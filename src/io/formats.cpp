@@ -348,12 +348,19 @@ std::vector<std::filesystem::path> sidecar_files_of(const std::filesystem::path&
 
 Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOptions& options, Threads threads,
                                const Progress& progress) {
+  if (options.raw) return load_scene(DetectedFile{path, std::nullopt}, options, threads, progress);
+  const auto format = detect_format(path);
+  if (!format) return format.error();
+  return load_scene(DetectedFile{path, *format}, options, threads, progress);
+}
+
+Result<LoadedScene> load_scene(const DetectedFile& file, const LoadOptions& options, Threads threads,
+                               const Progress& progress) {
+  const std::filesystem::path& path = file.path;
   FormatInput input{path, {}, options, threads, progress};
   // Volume readers take the path, since they may read sidecar files.
   if (options.raw) return with_path(read_volume_scene(input), path);
-  const auto found = detect_format(path);
-  if (!found) return found.error();
-  std::optional<FileFormat> format = options.heights ? FileFormat::Heights : *found;
+  std::optional<FileFormat> format = options.heights ? FileFormat::Heights : file.format;
   if (format && driver_of(*format).reads_path) return with_path(read_as(format, input), path);
   const auto bytes = read_file(path);
   if (!bytes) return bytes.error();

@@ -22,6 +22,7 @@
 #include "convert/mesh_input.h"
 #include "field_occlusion.h"
 #include "interrupt.h"
+#include "opened_input.h"
 #include "output.h"
 #include "output_files.h"
 #include "parse.h"
@@ -180,11 +181,11 @@ Result<SavedScene> save(const LoadedScene& loaded, const FormatInfo& format, con
 }
 
 /// Reads a scene. A volume becomes a field; its surface value is stored in the outcome.
-Result<LoadedScene> read_scene(const ConvertOptions& options, const LoadOptions& load, bool is_volume,
+Result<LoadedScene> read_scene(const ConvertOptions& options, const LoadOptions& load, const OpenedInput& input,
                                Outcome& outcome) {
   ProgressBar bar(!options.is_one_of_many);
   const Progress progress = bar.listener("reading");
-  if (!is_volume) return load_scene(options.common.input, load, options.common.threads, progress);
+  if (!input.is_volume) return load_scene(input.file, load, options.common.threads, progress);
   const auto volume = read_input_volume(options.common, part_of(progress, 0.0, 0.5));
   if (!volume) return volume.error();
   const auto iso = surface_value(*volume, load.iso);
@@ -217,7 +218,7 @@ void fit_voxels(const ConvertOptions& options, const FormatInfo& format, bool is
   if (may_have_size) normalise_scale(loaded.scene, format, warnings);
 }
 
-Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& format, bool is_volume,
+Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& format, const OpenedInput& input,
                               std::string& fault) {
   Stopwatch watch;
   LoadOptions load = options.common.load;
@@ -227,7 +228,7 @@ Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& f
     load.mesh.max_types = std::min(load.mesh.max_types.value_or(kTypesOfVox), kTypesOfVox);
   }
   Outcome outcome;
-  auto loaded = read_scene(options, load, is_volume, outcome);
+  auto loaded = read_scene(options, load, input, outcome);
   if (!loaded) return loaded.error();
   outcome.content = {loaded->scene.voxel_count(), solid_samples(loaded->scene)};
   outcome.warnings = std::move(loaded->warnings);
@@ -245,7 +246,7 @@ Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& f
     return outcome;
   }
   prune_unrequested(options, format, *loaded, outcome.warnings);
-  fit_voxels(options, format, is_volume, *loaded, outcome.warnings);
+  fit_voxels(options, format, input.is_volume, *loaded, outcome.warnings);
   outcome.content = {loaded->scene.voxel_count(), solid_samples(loaded->scene)};
   outcome.files = {options.output};
   outcome.faces = count_faces(loaded->scene, options.common.instances(), options.common.threads);
@@ -353,21 +354,21 @@ std::string find_light_error(const ConvertOptions& options) {
 }
 
 /// Returns true if the input is certainly meshed as blocks. Does not read its content, which may take long.
-bool is_surely_blocks(const ConvertOptions& options, bool is_volume) {
+bool is_surely_blocks(const ConvertOptions& options, const OpenedInput& input) {
   if (!options.mesher.empty()) return options.mesher != "smooth";
   const LoadOptions& load = options.common.load;
-  if (is_volume || load.mesh.as_field || (load.heights && load.heights->as_field)) return false;
-  const auto format = detect_format(options.common.input);
-  return format && *format && *format != FileFormat::Scene && *format != FileFormat::World &&
-         *format != FileFormat::Vdb;
+  if (input.is_volume || load.mesh.as_field || (load.heights && load.heights->as_field)) return false;
+  const std::optional<FileFormat>& format = input.file.format;
+  return format && format != FileFormat::Scene && format != FileFormat::World && format != FileFormat::Vdb;
 }
 
 /// Returns an error message if an option does not fit the kind of input, else "".
-std::string find_usage_error(const ConvertOptions& options, bool is_volume) {
+std::string find_usage_error(const ConvertOptions& options, const OpenedInput& input) {
+  const bool is_volume = input.is_volume;
   if (options.simplify && !can_simplify()) {
     return "cannot use --simplify: this build has no meshoptimizer (libmeshoptimizer-dev in Debian)";
   }
-  if (options.mesh_only && is_surely_blocks(options, is_volume)) {
+  if (options.mesh_only && is_surely_blocks(options, input)) {
     if (std::string fault = find_blocks_error(options); !fault.empty()) return fault;
   }
   if (is_volume && !options.mesher.empty() && options.mesher != "smooth") {
@@ -383,28 +384,29 @@ std::string find_usage_error(const ConvertOptions& options, bool is_volume) {
   if (is_volume)
     return load.show_hidden || load.frame != 0 ? "cannot use --hidden or --frame: the input is a volume, not voxels"
                                                : "";
-  return options.iso && !heeds_iso(options.common) ? "cannot use --iso: the input holds voxels, not a volume" : "";
+  return options.iso && !input.heeds_iso() ? "cannot use --iso: the input holds voxels, not a volume" : "";
 }
 
 /// Returns an error message if an option needs triangles and the input has none, else "".
-std::string find_mesh_input_error(const ConvertOptions& options, const FormatInfo& to) {
+std::string find_mesh_input_error(const ConvertOptions& options, const OpenedInput& input, const FormatInfo& to) {
   if (options.mesh_input.empty()) return "";
-  const auto format = detect_format(options.common.input);
+  const std::optional<FileFormat>& format = input.file.format;
   // An unrecognized file may be a triangle mesh. The reader reports why it is not recognized.
-  if (!format || !*format || can(*format, FormatCapability::Meshes)) return "";
-  const bool may_have_field = heeds_iso(options.common) || *format == FileFormat::Scene || *format == FileFormat::World;
+  if (!format || can(format, FormatCapability::Meshes)) return "";
+  const bool may_have_field = input.heeds_iso() || format == FileFormat::Scene || format == FileFormat::World;
   if (options.mesh_input == "--solid" && may_have_field) {
     return to.can(FormatCapability::Meshes) ? "cannot use --solid: it converts fields to voxels, but " +
                                                   std::string(to.extension) + " is a mesh format"
                                             : "";
   }
   return "cannot use " + options.mesh_input + ": it needs a triangle mesh, and the input is " +
-         std::string((*format)->name());
+         std::string(format->name());
 }
 
-Result<Outcome> convert(const ConvertOptions& options, const FormatInfo& format, bool is_volume, std::string& fault) {
-  return is_volume && format.can(FormatCapability::Meshes) ? convert_volume(options, format)
-                                                           : convert_scene(options, format, is_volume, fault);
+Result<Outcome> convert(const ConvertOptions& options, const FormatInfo& format, const OpenedInput& input,
+                        std::string& fault) {
+  return input.is_volume && format.can(FormatCapability::Meshes) ? convert_volume(options, format)
+                                                                 : convert_scene(options, format, input, fault);
 }
 
 /// Replaces standard streams ("-") by temporary files. Returns a usage error, or "".
@@ -426,11 +428,9 @@ Result<std::string> open_streams(ConvertOptions& options, const ManyOptions& man
 }
 
 /// Fails if the input is not in the format of --from.
-Status check_input(const ConvertOptions& options) {
+Status check_input(const ConvertOptions& options, const OpenedInput& input) {
   if (options.from.empty()) return {};
-  const auto found = detect_format(options.common.input);
-  if (!found) return found.error();
-  const std::string name = *found ? std::string((*found)->name()) : "unknown";
+  const std::string name = input.file.format ? std::string(input.file.format->name()) : "unknown";
   if (name == options.from) return {};
   return make_error(ErrorCode::BadFormat, "the format is " + name + ", not " + options.from,
                     options.common.input.string());
@@ -658,27 +658,26 @@ std::string find_format_error(const ConvertOptions& options, const FormatInfo& f
 }
 
 Result<Outcome> convert_file(const ConvertOptions& options, const FormatInfo& format, std::string& fault) {
-  if (Status sound = check_input(options); !sound) return sound.error();
-  if (Status sound = check_dimension(options.common.input, options.common.load); !sound) return sound.error();
-  const auto is_volume = holds_volume(options.common);
-  if (!is_volume) return is_volume.error();
-  fault = find_usage_error(options, *is_volume);
-  if (fault.empty() && !options.is_one_of_many) fault = find_mesh_input_error(options, format);
+  const auto input = open_input(options.common.input, options.common.load);
+  if (!input) return input.error();
+  if (Status sound = check_input(options, *input); !sound) return sound.error();
+  fault = find_usage_error(options, *input);
+  if (fault.empty() && !options.is_one_of_many) fault = find_mesh_input_error(options, *input, format);
   if (!fault.empty()) return make_error(ErrorCode::InvalidArgument, fault, options.common.input.string());
   if (auto kept = check_replaced(options.output, options.inputs, options.force); !kept) return kept.error();
   if (options.is_one_of_many) {
     if (auto made = make_folder_of(options.output); !made) return made.error();
   }
   if (auto writable = check_outputs({options.output}); !writable) return writable.error();
-  const auto from = detect_format(options.common.input);
-  if (format.format == FileFormat::World && can(*from, FormatCapability::Chunks)) return convert_by_chunks(options);
+  const std::optional<FileFormat>& from = input->file.format;
+  if (format.format == FileFormat::World && can(from, FormatCapability::Chunks)) return convert_by_chunks(options);
   if (from == FileFormat::World && format.format == FileFormat::World) return copy_world_file(options);
   if (from == FileFormat::World && format.can(FormatCapability::Meshes) && meshes_by_chunks(options)) {
     auto meshed = mesh_world_file(options);
     if (!meshed) return meshed.error();
     if (*meshed) return std::move(**meshed);
   }
-  return convert(options, format, *is_volume, fault);
+  return convert(options, format, *input, fault);
 }
 
 void add_lights(const Scene& scene, const ConvertOptions& options, SceneMeshes& meshes,

@@ -11,6 +11,7 @@
 #include <quoin/scene/volume_scene.h>
 
 #include "interrupt.h"
+#include "opened_input.h"
 #include "output.h"
 #include "output_files.h"
 #include "progress_bar.h"
@@ -22,7 +23,6 @@
 #include "scene_content.h"
 #include "standard_streams.h"
 #include "stopwatch.h"
-#include "volume_options.h"
 #include "watch.h"
 
 namespace quoin::tool {
@@ -154,14 +154,13 @@ void scale_emission(Scene& scene, double scale) {
   }
 }
 
-Result<LoadedScene> load(const RenderArguments& arguments, bool is_volume, int frame) {
+Result<LoadedScene> load(const RenderArguments& arguments, const OpenedInput& input, int frame) {
   LoadOptions options = arguments.common.load;
   options.frame = frame;
   options.keep_source = false;
   ProgressBar bar;
-  if (Status sound = check_dimension(arguments.common.input, options); !sound) return sound.error();
-  auto loaded = load_scene(arguments.common.input, options, arguments.common.threads, bar.listener("reading"));
-  if (loaded && options.iso && !is_volume && !heeds_iso(arguments.common)) {
+  auto loaded = load_scene(input.file, options, arguments.common.threads, bar.listener("reading"));
+  if (loaded && options.iso && !input.heeds_iso()) {
     return make_error(ErrorCode::InvalidArgument, "cannot use --iso: the input holds voxels, not a volume");
   }
   if (loaded) scale_emission(loaded->scene, arguments.emission_scale);
@@ -293,7 +292,8 @@ Status draw_path(const LoadedScene& loaded, const std::vector<Camera>& cameras, 
 }
 
 /// Renders all frames with one framing that fits the whole animation. `first` holds the first frame.
-Status draw_frames(const LoadedScene& first, const RenderArguments& arguments, Stopwatch& watch, Outcome& outcome) {
+Status draw_frames(const LoadedScene& first, const OpenedInput& input, const RenderArguments& arguments,
+                   Stopwatch& watch, Outcome& outcome) {
   const FrameRange& frames = *arguments.frames;
   const InstanceFilter filter = arguments.common.instances();
   const bool has_camera = arguments.position || arguments.file_camera || (first.camera && !arguments.has_view());
@@ -301,7 +301,7 @@ Status draw_frames(const LoadedScene& first, const RenderArguments& arguments, S
   framing.add(first.scene, filter);
   // Start with the last frame: if it does not exist, fail before rendering.
   for (int frame = frames.last; frame > frames.first && (!has_camera || frame == frames.last); --frame) {
-    const auto loaded = load(arguments, false, frame);
+    const auto loaded = load(arguments, input, frame);
     if (!loaded) return loaded.error();
     framing.add(loaded->scene, filter);
   }
@@ -314,7 +314,7 @@ Status draw_frames(const LoadedScene& first, const RenderArguments& arguments, S
       ++outcome.kept;
       continue;
     }
-    const auto later = is_first ? Result<LoadedScene>(LoadedScene{}) : load(arguments, false, frame);
+    const auto later = is_first ? Result<LoadedScene>(LoadedScene{}) : load(arguments, input, frame);
     if (!later) return later.error();
     outcome.read += watch.lap();
     const std::vector<Shot> shots = {{*camera, images[static_cast<std::size_t>(frame - frames.first)]}};
@@ -335,46 +335,54 @@ Status draw_slice(const Scene& scene, const RenderArguments& arguments, Stopwatc
   return written;
 }
 
-Result<Outcome> render(const RenderArguments& arguments) {
-  const InstanceFilter filter = arguments.common.instances();
-  Stopwatch watch;
-  std::vector<Camera> path;
-  if (!arguments.camera_path.empty()) {
-    auto cameras = read_camera_path(arguments.camera_path);
-    if (!cameras) return cameras.error();
-    path = std::move(*cameras);
-  }
-  std::vector<std::filesystem::path> outputs = images_of(arguments, path.size());
-  Outcome outcome;
-  outcome.film = outputs;
+/// Returns the cameras of --path; empty without it.
+Result<std::vector<Camera>> cameras_of_path(const RenderArguments& arguments) {
+  return arguments.camera_path.empty() ? std::vector<Camera>() : read_camera_path(arguments.camera_path);
+}
+
+/// Checks that all images can be written, before the work starts, and lists them in `outcome`.
+Status check_images(const RenderArguments& arguments, std::size_t cameras, Outcome& outcome) {
+  outcome.film = images_of(arguments, cameras);
+  std::vector<std::filesystem::path> outputs = outcome.film;
   outputs.push_back(arguments.depth);
-  if (auto writable = check_outputs(outputs); !writable) return writable.error();
-  const bool is_volume = holds_volume(arguments.common).value_or(false);
-  if (is_volume && arguments.frames) {
-    return make_error(ErrorCode::InvalidArgument, "cannot use --frames: the input is a volume, not voxels");
-  }
-  const int frame = arguments.frames ? arguments.frames->first : arguments.common.load.frame;
-  auto loaded = load(arguments, is_volume, frame);
-  if (!loaded) return loaded.error();
-  const Scene& scene = loaded->scene;
-  outcome.warnings = std::move(loaded->warnings);
+  return check_outputs(outputs);
+}
+
+void warn_of_content(const Scene& scene, const RenderArguments& arguments, Outcome& outcome) {
+  const InstanceFilter filter = arguments.common.instances();
   if (arguments.frames) std::erase_if(outcome.warnings, [](const auto& each) { return each.starts_with("animated"); });
-  outcome.read = watch.lap();
-  outcome.is_volume = is_volume;
-  catch_interrupts();
-  outcome.faces = count_faces(scene, filter, arguments.common.threads);
-  const bool is_slice = arguments.preset == Preset::Density;
-  const auto draw = arguments.frames ? draw_frames : draw_view;
-  Status drawn = is_slice        ? draw_slice(scene, arguments, watch, outcome)
-                 : !path.empty() ? draw_path(*loaded, path, arguments, watch, outcome)
-                                 : draw(*loaded, arguments, watch, outcome);
-  if (!drawn) return drawn.error();
   warn_of_left_out(scene, filter, outcome.warnings);
   if (arguments.render.light.model == LightModel::Propagated && !scene.lamps.empty()) {
     outcome.warnings.push_back("--light propagated supports no lamps; lamps left out: " +
                                std::to_string(scene.lamps.size()));
   }
-  if (!is_slice && !outcome.files.empty()) warn_of_empty_images(scene, filter, outcome.image, outcome.warnings);
+  if (!outcome.slice && !outcome.files.empty()) warn_of_empty_images(scene, filter, outcome.image, outcome.warnings);
+}
+
+Result<Outcome> render(const RenderArguments& arguments) {
+  Stopwatch watch;
+  Outcome outcome;
+  const auto cameras = cameras_of_path(arguments);
+  if (!cameras) return cameras.error();
+  if (Status writable = check_images(arguments, cameras->size(), outcome); !writable) return writable.error();
+  const auto input = open_input(arguments.common.input, arguments.common.load);
+  if (!input) return input.error();
+  outcome.is_volume = input->is_volume;
+  if (input->is_volume && arguments.frames) {
+    return make_error(ErrorCode::InvalidArgument, "cannot use --frames: the input is a volume, not voxels");
+  }
+  auto loaded = load(arguments, *input, arguments.frames ? arguments.frames->first : arguments.common.load.frame);
+  if (!loaded) return loaded.error();
+  outcome.warnings = std::move(loaded->warnings);
+  outcome.read = watch.lap();
+  catch_interrupts();
+  outcome.faces = count_faces(loaded->scene, arguments.common.instances(), arguments.common.threads);
+  const Status drawn = arguments.preset == Preset::Density ? draw_slice(loaded->scene, arguments, watch, outcome)
+                       : !cameras->empty()                 ? draw_path(*loaded, *cameras, arguments, watch, outcome)
+                       : arguments.frames                  ? draw_frames(*loaded, *input, arguments, watch, outcome)
+                                                           : draw_view(*loaded, arguments, watch, outcome);
+  if (!drawn) return drawn.error();
+  warn_of_content(loaded->scene, arguments, outcome);
   return outcome;
 }
 

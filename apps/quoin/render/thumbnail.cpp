@@ -6,6 +6,7 @@
 
 #include "commands.h"
 #include "interrupt.h"
+#include "opened_input.h"
 #include "output.h"
 #include "output_files.h"
 #include "progress_bar.h"
@@ -37,8 +38,9 @@ Result<Thumbnail> draw(const ThumbnailArguments& arguments) {
   if (auto writable = check_outputs({arguments.output}); !writable) return writable.error();
   LoadOptions load = arguments.common.load;
   load.keep_source = false;
-  if (Status sound = check_dimension(arguments.common.input, load); !sound) return sound.error();
-  auto loaded = load_scene(arguments.common.input, load, arguments.common.threads);
+  const auto input = open_input(arguments.common.input, load);
+  if (!input) return input.error();
+  auto loaded = load_scene(input->file, load, arguments.common.threads);
   if (!loaded) return loaded.error();
   catch_interrupts();
   auto drawn = draw_small(loaded->scene, arguments.size, arguments.common.instances(), arguments.common.threads,

@@ -27,6 +27,12 @@ namespace quoin {
 /// .vox that these do not identify. Errors: CannotRead.
 [[nodiscard]] Result<std::optional<FileFormat>> detect_format(const std::filesystem::path& path);
 
+/// A file and its format, as detect_format returns it; nullopt if no format matches.
+struct DetectedFile {
+  std::filesystem::path path;
+  std::optional<FileFormat> format;
+};
+
 /// Returns the format in which a file of this name is written, from its extension in any case.
 ///
 /// Errors: Unsupported, listing the writable extensions.
@@ -47,6 +53,9 @@ namespace quoin {
 /// Errors: CannotRead, BadFormat (with the byte offset where there is one), Unsupported; those of the format's reader
 ///         (InvalidArgument for a missing frame, Cancelled, LimitExceeded). `path` is set in all.
 [[nodiscard]] Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOptions& options = {},
+                                             Threads threads = {}, const Progress& progress = {});
+/// Reads a file whose format was detected before. The content decides again, except for formats that are read by path.
+[[nodiscard]] Result<LoadedScene> load_scene(const DetectedFile& file, const LoadOptions& options = {},
                                              Threads threads = {}, const Progress& progress = {});
 /// Reads a scene from bytes. Errors: also Unsupported for scene files that name other files, which need a path.
 [[nodiscard]] Result<LoadedScene> load_scene(std::span<const std::byte> bytes, const LoadOptions& options = {},
