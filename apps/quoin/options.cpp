@@ -12,22 +12,6 @@ namespace {
 
 constexpr const char* kNotTogether = " cannot be used together";
 
-/// Returns the given options of a rule, as their names in messages.
-std::vector<std::string> given_options(const CLI::App& command, const OptionRule& rule) {
-  std::vector<std::string> given;
-  for (const std::string& name : rule.options) {
-    if (name.starts_with('-')) {
-      if (command.count(name) > 0) given.push_back(name);
-      continue;
-    }
-    for (const CLI::Option* option : command.get_options()) {
-      if (option->get_group() == name && option->count() > 0) given.push_back(option->get_name());
-    }
-  }
-  std::erase_if(given, [&](const std::string& name) { return std::ranges::count(rule.except, name) > 0; });
-  return given;
-}
-
 }  // namespace
 
 TextParser<double> number() {
@@ -44,6 +28,20 @@ TextParser<double> number_between(double least, double most, std::string range) 
     return value && *value >= least && *value <= most ? value : std::nullopt;
   };
   return {parse, std::move(range)};
+}
+
+std::vector<std::string> given_options(const CLI::App& command, const std::vector<std::string>& options) {
+  std::vector<std::string> given;
+  for (const std::string& name : options) {
+    if (name.starts_with('-')) {
+      if (command.count(name) > 0) given.push_back(name);
+      continue;
+    }
+    for (const CLI::Option* option : command.get_options()) {
+      if (option->get_group() == name && option->count() > 0) given.push_back(option->get_name());
+    }
+  }
+  return given;
 }
 
 Reason needs(std::string setting, std::function<bool()> is_set) {
@@ -75,7 +73,8 @@ Reason excludes(std::vector<std::string> others) {
 
 Status check_rules(const CLI::App& command, const std::vector<OptionRule>& rules) {
   for (const OptionRule& rule : rules) {
-    for (const std::string& option : given_options(command, rule)) {
+    for (const std::string& option : given_options(command, rule.options)) {
+      if (std::ranges::count(rule.except, option) > 0) continue;
       const std::string reason = rule.reason(command);
       if (!reason.empty()) return make_error(ErrorCode::InvalidArgument, option + reason);
     }

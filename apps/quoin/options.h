@@ -70,6 +70,9 @@ CLI::Option* add_choice(CLI::App& command, const std::string& name, const Choice
   return add_choice<T>(command, name, choices, std::move(assign), help);
 }
 
+/// Returns the given options among `options`, as messages name them. A heading stands for all options under it.
+[[nodiscard]] std::vector<std::string> given_options(const CLI::App& command, const std::vector<std::string>& options);
+
 /// Returns the end of a message that begins with the name of a given option (" needs --light path"), or "" if the
 /// option can be used.
 using Reason = std::function<std::string(const CLI::App& command)>;

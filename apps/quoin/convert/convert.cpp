@@ -541,12 +541,10 @@ void add_meshing_options(CLI::App& command, ConvertOptions& options) {
 
 void add_mesh_file_options(CLI::App& command, ConvertOptions& options) {
   set_heading(command, heading::kMeshFile);
-  command
-      .add_option("--light",
-                  "Light in the vertex colours for viewers without lighting: none, or propagated as in quoin render "
-                  "(default none; .glb, .gltf)")
-      ->type_name("TEXT")
-      ->check(CLI::IsMember({"none", "propagated"}));
+  const Choices<std::optional<LightOptions>> lights = {{"none", std::nullopt}, {"propagated", natural_light()}};
+  add_choice(command, "--light", lights, options.light,
+             "Light in the vertex colours for viewers without lighting: none, or propagated as in quoin render "
+             "(default none; .glb, .gltf)");
   command.add_flag("--lights", options.lights, "Also write lamps (KHR_lights_punctual) and cameras (.glb, .gltf)");
   command.add_flag("--animate", options.animate,
                    "Write all frames of a .vox as an animation (.glb, .gltf). Smooth models are meshed separately");
@@ -564,6 +562,7 @@ std::vector<OptionRule> convert_rules(const ConvertOptions& options) {
   const auto has_none = [&options] { return options.field_occlusion.method == SmoothOcclusion::None; };
   std::vector<OptionRule> rules = raw_rules();
   std::ranges::move(field_occlusion_rules(options.field_occlusion), std::back_inserter(rules));
+  std::ranges::move(mesh_input_rules(), std::back_inserter(rules));
   rules.push_back({{heading::kOcclusion}, excludes({"--no-ao"})});
   rules.push_back({{"--ao-attribute"}, excludes("--ao-form none", has_none)});
   rules.push_back({{"--fps"}, needs("--animate")});
@@ -805,25 +804,17 @@ std::string footer() {
 }
 
 /// Reads options that CLI11 leaves as text and checks combinations of options. Returns a usage error, or "".
-std::string read_options(const CLI::App& command, const MeshInputTexts& triangles,
-                         const std::vector<std::filesystem::path>& rest, ConvertOptions& options, ManyOptions& many) {
-  std::size_t given = 0;
-  for (const char* name : {"--mesher", "--no-ao", "--ao-attribute", "--watertight", "--smoothness", "--colours",
-                           "--no-unite", "--simplify", "--scale", "--up", "--texture", "--light", "--lights",
-                           "--compress", "--quantize", "--animate", "--fps"}) {
-    given += command.count(name);
-  }
-  const auto is_given = [&](const std::string& name) { return command.count(name) > 0; };
-  options.has_field_occlusion = std::ranges::any_of(kFieldOcclusion, is_given);
-  options.mesh_only = given > 0 || options.has_field_occlusion;
-  const Status fits = check_rules(command, convert_rules(options));
-  std::string fault =
-      fits ? read_mesh_input_options(command, triangles, options.common.load.mesh) : to_string(fits.error());
-  if (const char* name = given_mesh_input(command)) options.mesh_input = name;
+std::string read_options(const CLI::App& command, const std::vector<std::filesystem::path>& rest,
+                         ConvertOptions& options, ManyOptions& many) {
+  options.has_field_occlusion = !given_options(command, kFieldOcclusion).empty();
+  std::vector<std::string> given = given_options(command, {heading::kMesh, heading::kOcclusion, heading::kMeshFile});
+  std::erase(given, "--voxel-mm");  // find_format_error() knows better formats for it
+  options.mesh_only = !given.empty();
+  given = given_options(command, {heading::kTriangles});
+  options.mesh_input = given.empty() ? "" : given.front();
   options.as_voxels = command.count("--solid") > 0;
-  if (command.count("--light") > 0 && command.get_option("--light")->as<std::string>() == "propagated") {
-    options.light = natural_light();
-  }
+  const Status fits = check_rules(command, convert_rules(options));
+  std::string fault = fits ? "" : to_string(fits.error());
   if (fault.empty()) fault = find_atlas_error(options);
   if (fault.empty()) fault = find_light_error(options);
   if (fault.empty()) fault = read_files(rest, options, many);
@@ -836,7 +827,6 @@ std::string read_options(const CLI::App& command, const MeshInputTexts& triangle
 void add_convert_command(CLI::App& app, int& status) {
   CLI::App* command = app.add_subcommand("convert", "Convert a file to the format of the extension of OUT");
   const auto options = std::make_shared<ConvertOptions>();
-  const auto triangles = std::make_shared<MeshInputTexts>();
   const auto many = std::make_shared<ManyOptions>();
   const auto rest = std::make_shared<std::vector<std::filesystem::path>>();
   add_common_options(*command, options->common);
@@ -844,10 +834,10 @@ void add_convert_command(CLI::App& app, int& status) {
   add_meshing_options(*command, *options);
   add_mesh_file_options(*command, *options);
   add_volume_options(*command, options->common.load, &options->iso);
-  add_mesh_input_options(*command, *triangles, options->common.load.mesh);
+  add_mesh_input_options(*command, options->common.load.mesh);
   command->footer(footer());
-  command->callback([command, options, triangles, many, rest, &status] {
-    if (const std::string fault = read_options(*command, *triangles, *rest, *options, *many); !fault.empty()) {
+  command->callback([command, options, many, rest, &status] {
+    if (const std::string fault = read_options(*command, *rest, *options, *many); !fault.empty()) {
       print_error(fault + " (try --help)");
       status = kWrongUsage;
       return;
