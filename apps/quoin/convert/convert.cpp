@@ -70,9 +70,9 @@ Status convert_blockily(const Scene& scene, const SceneAnimation& animation, con
   outcome.mesher = options.mesher;
   const InstanceFilter filter = options.common.instances();
   BlockySceneOptions wanted;
-  wanted.mesh = {outcome.mesher == "greedy", !options.occlusion_off, options.watertight};
+  wanted.mesh = {outcome.mesher == Mesher::Greedy, !options.occlusion_off, options.watertight};
   wanted.instances = filter;
-  wanted.atlas = options.texture == "atlas";
+  wanted.atlas = options.is_atlas;
   if (format_for_writing(options.output)->can(FormatCapability::Printing)) {
     wanted.part_of = [&scene](GridHandle grid, MeshStats& stats) { return part_for_printing(scene, grid, stats); };
   }
@@ -149,7 +149,7 @@ Status convert_to_meshes(const LoadedScene& loaded, const ConvertOptions& option
     if (auto done = animate(loaded, options, animation, outcome); !done) return done;
     outcome.seconds.read += watch.lap();
   }
-  const auto convert = options.mesher == "smooth" ? convert_smoothly : convert_blockily;
+  const auto convert = options.mesher == Mesher::Smooth ? convert_smoothly : convert_blockily;
   // Only .vox files are animated, and their models are always near their origins.
   if (options.animate) return convert(animation.scene(), animation, options, outcome);
   return convert(near_grids(loaded.scene), animation, options, outcome);
@@ -164,10 +164,10 @@ std::string find_blocks_error(const ConvertOptions& options) {
 }
 
 /// Returns the given mesher, or the default: smooth if the scene has only fields and there is no atlas, else greedy.
-std::string mesher_for(const Scene& scene, const ConvertOptions& options) {
-  if (!options.mesher.empty()) return options.mesher;
-  const bool is_smooth = scene.voxel_count() == 0 && solid_samples(scene) > 0 && options.texture != "atlas";
-  return is_smooth ? "smooth" : "greedy";
+Mesher mesher_for(const Scene& scene, const ConvertOptions& options) {
+  if (options.mesher) return *options.mesher;
+  const bool is_smooth = scene.voxel_count() == 0 && solid_samples(scene) > 0 && !options.is_atlas;
+  return is_smooth ? Mesher::Smooth : Mesher::Greedy;
 }
 
 Result<SavedScene> save(const LoadedScene& loaded, const FormatInfo& format, const ConvertOptions& options,
@@ -240,7 +240,7 @@ Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& f
     if (options.voxel_mm) settled.scale = scale_for_voxels(loaded->scene, *options.voxel_mm);
     if (settled.light && loaded->sun) settled.light->sun = *loaded->sun;
     settled.cameras = loaded->cameras;
-    fault = settled.mesher == "smooth" ? "" : find_blocks_error(settled);
+    fault = settled.mesher == Mesher::Smooth ? "" : find_blocks_error(settled);
     if (!fault.empty()) return make_error(ErrorCode::InvalidArgument, fault, options.common.input.string());
     if (auto done = convert_to_meshes(*loaded, settled, watch, outcome); !done) return done.error();
     return outcome;
@@ -306,7 +306,7 @@ Result<Outcome> convert_by_chunks(const ConvertOptions& options) {
 std::string mesh_text(const Outcome& outcome) {
   const std::string size = with_thousands(outcome.meshes.triangles) + " triangles, " +
                            with_thousands(outcome.meshes.vertices) + " vertices\n";
-  if (outcome.mesher == "smooth") return "Mesh: " + size;
+  if (outcome.mesher == Mesher::Smooth) return "Mesh: " + size;
   return "Mesh: " + with_thousands(outcome.meshes.quads) + " quads, " + size;
 }
 
@@ -316,13 +316,12 @@ std::string outcome_text(const Outcome& outcome) {
                      "\n";
   if (outcome.faces.total > 0) text += to_string(outcome.faces) + "\n";
   const bool is_field = outcome.content.voxels == 0 && outcome.content.solid_samples > 0;
-  if (is_field && !outcome.mesher.empty())
-    text += "Faces: " + with_thousands(outcome.meshes.triangles) + " triangles\n";
+  if (is_field && outcome.mesher) text += "Faces: " + with_thousands(outcome.meshes.triangles) + " triangles\n";
   if (outcome.iso) {
     text += "Iso: " + digits_for_people(*outcome.iso) +
             (outcome.is_iso_found ? " (between the two groups of values; set another with --iso)\n" : "\n");
   }
-  if (!outcome.mesher.empty()) text += mesh_text(outcome);
+  if (outcome.mesher) text += mesh_text(outcome);
   if (outcome.meshes.simplify_error > 0)
     text += "Simplified: error up to " + digits_for_people(outcome.meshes.simplify_error) + " voxels\n";
   const double seconds = outcome.seconds.read + outcome.seconds.mesh + outcome.seconds.write;
@@ -333,11 +332,11 @@ std::string outcome_text(const Outcome& outcome) {
 
 /// Returns an error message if another option contradicts --texture atlas, else "".
 std::string find_atlas_error(const ConvertOptions& options) {
-  if (options.texture != "atlas") return "";
+  if (!options.is_atlas) return "";
   const std::string reason = ": the atlas holds the occlusion of merged faces";
   const std::string refused = "cannot use --texture atlas with ";
-  if (options.mesher == "smooth" || options.mesher == "culled") {
-    return refused + "--mesher " + options.mesher + reason;
+  if (options.mesher && options.mesher != Mesher::Greedy) {
+    return refused + "--mesher " + name_of(*options.mesher) + reason;
   }
   if (options.occlusion_off) return refused + "--no-ao" + reason;
   if (options.ao_as_attribute) return refused + "--ao-attribute" + reason;
@@ -349,13 +348,13 @@ std::string find_light_error(const ConvertOptions& options) {
   if (!options.light) return "";
   const std::string reason = ": light is stored at the corners of faces";
   const std::string refused = "cannot use --light propagated with ";
-  if (options.texture == "atlas") return refused + "--texture atlas" + reason;
-  return options.watertight && options.mesher != "smooth" ? refused + "--watertight" + reason : "";
+  if (options.is_atlas) return refused + "--texture atlas" + reason;
+  return options.watertight && options.mesher != Mesher::Smooth ? refused + "--watertight" + reason : "";
 }
 
 /// Returns true if the input is certainly meshed as blocks. Does not read its content, which may take long.
 bool is_surely_blocks(const ConvertOptions& options, const OpenedInput& input) {
-  if (!options.mesher.empty()) return options.mesher != "smooth";
+  if (options.mesher) return options.mesher != Mesher::Smooth;
   const LoadOptions& load = options.common.load;
   if (input.is_volume || load.mesh.as_field || (load.heights && load.heights->as_field)) return false;
   const std::optional<FileFormat>& format = input.file.format;
@@ -371,11 +370,11 @@ std::string find_usage_error(const ConvertOptions& options, const OpenedInput& i
   if (options.mesh_only && is_surely_blocks(options, input)) {
     if (std::string fault = find_blocks_error(options); !fault.empty()) return fault;
   }
-  if (is_volume && !options.mesher.empty() && options.mesher != "smooth") {
-    return "cannot use --mesher " + options.mesher + ": the input is a volume; use --mesher smooth";
+  if (is_volume && options.mesher && options.mesher != Mesher::Smooth) {
+    return "cannot use --mesher " + name_of(*options.mesher) + ": the input is a volume; use --mesher smooth";
   }
   if (is_volume && options.light) return "cannot use --light: the input is a volume, not voxels or a field";
-  if (is_volume && options.texture == "atlas") return "cannot use --texture atlas: the input is a volume, not voxels";
+  if (is_volume && options.is_atlas) return "cannot use --texture atlas: the input is a volume, not voxels";
   if (is_volume && options.animate) return "cannot use --animate: the input is a volume, not a .vox file";
   if (is_volume && (options.smoothness || options.colours || options.separate_models)) {
     return "cannot use --smoothness, --colours or --no-unite: the input is a volume, not voxels";
@@ -499,16 +498,15 @@ int run(ConvertOptions& options, const ManyOptions& many) {
 
 void add_meshing_options(CLI::App& command, ConvertOptions& options) {
   set_heading(command, heading::kMesh);
-  command
-      .add_option(
-          "--mesher", options.mesher,
-          "Mesher: greedy or culled for blocks, smooth for rounded surfaces (default greedy; volumes and fields "
-          "always smooth)")
-      ->check(CLI::IsMember({"culled", "greedy", "smooth"}));
+  add_choice<Mesher>(
+      command, "--mesher", {{"culled", Mesher::Culled}, {"greedy", Mesher::Greedy}, {"smooth", Mesher::Smooth}},
+      options.mesher,
+      "Mesher: greedy or culled for blocks, smooth for rounded surfaces (default greedy; volumes and fields "
+      "always smooth)");
   command.add_option("--scale", options.scale, "Mesh units per voxel (default 1; 0.1: ten voxels per metre)")
       ->check(positive());
-  command.add_option("--up", options.up, "Up axis of the mesh: y or z (default y; z for .ply, .stl and .3mf)")
-      ->check(CLI::IsMember({"y", "z"}));
+  add_choice<UpAxis>(command, "--up", {{"y", UpAxis::Y}, {"z", UpAxis::Z}}, options.up,
+                     "Up axis of the mesh: y or z (default y; z for .ply, .stl and .3mf)");
   command.add_option("--simplify", options.simplify, "Simplify with this maximum error in voxels (smooth only)")
       ->check(not_negative());
   command
@@ -516,16 +514,13 @@ void add_meshing_options(CLI::App& command, ConvertOptions& options) {
                   "Roundness of smooth surfaces around voxels, 0 (blocks) to 1 (default 1)")
       ->check(not_negative())
       ->check(CLI::Range(0.0, 1.0));
-  command
-      .add_option("--colours", options.colours,
-                  "Colours of smooth surfaces around voxels: sharp or blended (default sharp)")
-      ->check(CLI::IsMember({"sharp", "blended"}));
-  command
-      .add_option(
-          "--texture", options.texture,
-          "Colours of blocks (default palette). palette: a palette texture, with occlusion per vertex. atlas: an "
-          "atlas with occlusion, about a third fewer triangles (.glb, .gltf, .obj)")
-      ->check(CLI::IsMember({"palette", "atlas"}));
+  add_choice<SurfaceColours>(command, "--colours",
+                             {{"sharp", SurfaceColours::Sharp}, {"blended", SurfaceColours::Blended}}, options.colours,
+                             "Colours of smooth surfaces around voxels: sharp or blended (default sharp)");
+  add_choice<bool>(
+      command, "--texture", {{"palette", false}, {"atlas", true}}, options.is_atlas,
+      "Colours of blocks (default palette). palette: a palette texture, with occlusion per vertex. atlas: an "
+      "atlas with occlusion, about a third fewer triangles (.glb, .gltf, .obj)");
   command.add_flag("--no-ao", options.occlusion_off, "Write no ambient occlusion");
   command.add_flag("--watertight", options.watertight,
                    "Write no T-junctions: edges end at the corners of their neighbours. Smooth meshes never have them");
@@ -606,7 +601,7 @@ std::string read_files(const std::vector<std::filesystem::path>& rest, ConvertOp
 Json faces_json(const Outcome& outcome, std::int64_t of_blocks) {
   const bool is_field = outcome.content.voxels == 0 && outcome.content.solid_samples > 0;
   if (!is_field) return of_blocks;
-  return outcome.mesher.empty() ? Json() : Json(outcome.meshes.triangles);
+  return outcome.mesher ? Json(outcome.meshes.triangles) : Json();
 }
 
 Json outcome_json(const Outcome& outcome) {
@@ -615,7 +610,7 @@ Json outcome_json(const Outcome& outcome) {
   return {
       {"voxels", outcome.is_volume ? outcome.content.solid_samples : outcome.content.voxels},
       {"solid_samples", outcome.content.solid_samples},
-      {"mesher", outcome.mesher.empty() ? Json() : Json(outcome.mesher)},
+      {"mesher", outcome.mesher ? Json(name_of(*outcome.mesher)) : Json()},
       {"iso", outcome.iso ? Json(*outcome.iso) : Json()},
       {"faces_visible", faces_json(outcome, outcome.faces.visible)},
       {"faces_total", faces_json(outcome, outcome.faces.total)},
@@ -642,7 +637,7 @@ std::string find_format_error(const ConvertOptions& options, const FormatInfo& f
   if (options.voxel_mm && options.scale) return "--voxel-mm and --scale cannot be used together";
   const std::tuple<bool, FormatCapability, const char*> needs[] = {
       {options.ao_as_attribute, FormatCapability::OcclusionAttribute, "--ao-attribute"},
-      {options.texture == "atlas", FormatCapability::Textures, "--texture atlas"},
+      {options.is_atlas, FormatCapability::Textures, "--texture atlas"},
       {options.lights, FormatCapability::Lamps, "--lights"},
       {options.light.has_value(), FormatCapability::VertexLight, "--light"},
       {options.animate, FormatCapability::Animation, "--animate"},
@@ -701,8 +696,7 @@ MeshFileOptions mesh_file_options(const ConvertOptions& options, FileFormat form
   file.compress = options.compress;
   file.quantize = options.quantize;
   if (options.scale) file.scale = *options.scale;
-  const UpAxis usual = format_info(format).up;
-  file.up = options.up.empty() ? usual : options.up == "z" ? UpAxis::Z : UpAxis::Y;
+  file.up = options.up.value_or(format_info(format).up);
   return file;
 }
 

@@ -23,6 +23,14 @@
 
 namespace quoin::tool {
 
+enum class Mesher : std::uint8_t { Greedy, Culled, Smooth };
+
+/// Returns the name of a mesher, as in --mesher.
+[[nodiscard]] inline std::string name_of(Mesher mesher) {
+  if (mesher == Mesher::Smooth) return "smooth";
+  return mesher == Mesher::Culled ? "culled" : "greedy";
+}
+
 /// The options of `quoin convert`.
 struct ConvertOptions {
   CommonOptions common;
@@ -30,9 +38,9 @@ struct ConvertOptions {
   FileSet inputs;    ///< all input files, which are never overwritten
   std::string from;  ///< the required input format; empty: any
   bool force = false;
-  bool is_from_stream = false;  ///< IN is standard input and has no name
-  bool is_one_of_many = false;  ///< shows no progress bar
-  std::string mesher;           ///< empty: greedy for voxels, smooth for volumes and fields
+  bool is_from_stream = false;   ///< IN is standard input and has no name
+  bool is_one_of_many = false;   ///< shows no progress bar
+  std::optional<Mesher> mesher;  ///< default: greedy for voxels, smooth for volumes and fields
   bool occlusion_off = false;
   bool ao_as_attribute = false;  ///< writes occlusion as an attribute, not in the colours
   SmoothOcclusionOptions field_occlusion;
@@ -41,15 +49,15 @@ struct ConvertOptions {
   std::optional<double> iso;
   std::optional<double> simplify;
   std::optional<double> smoothness;  ///< for smooth surfaces around voxels
-  std::optional<std::string> colours;
-  std::string texture = "palette";    ///< "palette" or "atlas"
+  std::optional<SurfaceColours> colours;
+  bool is_atlas = false;              ///< an atlas texture instead of a palette
   std::optional<LightOptions> light;  ///< propagated light, stored at vertices
   bool animate = false;               ///< writes all frames as a glTF animation
   double frames_per_second = 10.0;    ///< for `animate`
   bool separate_models = false;       ///< meshes touching instances separately
   std::optional<double> scale;
   std::optional<double> voxel_mm;     ///< millimetres per voxel in .stl and .3mf
-  std::string up;                     ///< "y", "z"; empty: z for .ply, .stl and .3mf, else y
+  std::optional<UpAxis> up;           ///< default: z for .ply, .stl and .3mf, else y
   bool compress = false;              ///< see MeshFileOptions, glTF only
   bool quantize = false;              ///< see MeshFileOptions, glTF only
   bool mesh_only = false;             ///< an option that only applies to meshes was given
@@ -69,8 +77,8 @@ struct Seconds {
 /// The result of a conversion.
 struct Outcome {
   bool is_volume = false;
-  SceneContent content;  ///< for a volume only the solid samples
-  std::string mesher;    ///< empty: nothing was meshed
+  SceneContent content;          ///< for a volume only the solid samples
+  std::optional<Mesher> mesher;  ///< nullopt: nothing was meshed
   MeshStats meshes;
   FaceCounts faces;           ///< block faces
   std::optional<double> iso;  ///< for volumes

@@ -33,7 +33,7 @@ SmoothSceneOptions scene_options(const ConvertOptions& options) {
   SmoothSceneOptions wanted;
   wanted.mesh.occlusion = mesh_options(options).occlusion;
   if (options.smoothness) wanted.mesh.smoothness = static_cast<float>(*options.smoothness);
-  if (options.colours == "blended") wanted.mesh.colours = SurfaceColours::Blended;
+  wanted.mesh.colours = options.colours.value_or(wanted.mesh.colours);
   wanted.unite = !options.separate_models && !options.animate;
   wanted.simplify_error = simplify_error(options);
   wanted.instances = options.common.instances();
@@ -87,7 +87,7 @@ Status convert_smoothly(const Scene& scene, const SceneAnimation& animation, con
     if (Status lit = light_meshes(scene, *options.light, *meshes, options.common.threads); !lit) return lit;
   }
   if (options.animate) animation.animate(*meshes, options.frames_per_second);
-  outcome.mesher = "smooth";
+  outcome.mesher = Mesher::Smooth;
   outcome.faces = count_faces(scene, filter, options.common.threads);
   outcome.seconds.mesh = watch.lap();
   warn_of_left_out(scene, filter, outcome.warnings);
@@ -106,7 +106,7 @@ Result<Outcome> convert_volume(const ConvertOptions& options, const FormatInfo& 
   if (!volume) return volume.error();
   Outcome outcome;
   outcome.is_volume = true;
-  outcome.mesher = "smooth";
+  outcome.mesher = Mesher::Smooth;
   outcome.warnings = volume->warnings;
   outcome.seconds.read = watch.lap();
   catch_interrupts();

@@ -58,10 +58,10 @@ Result<Outcome> copy_world_file(const ConvertOptions& options) {
 }
 
 bool meshes_by_chunks(const ConvertOptions& options) {
-  const bool is_blocky = options.mesher.empty() || options.mesher == "greedy" || options.mesher == "culled";
+  const bool is_blocky = options.mesher != Mesher::Smooth;
   const auto format = format_for_writing(options.output);
   const bool is_print = format && format->can(FormatCapability::Printing);
-  return is_blocky && !is_print && options.texture == "palette" && !options.light && !options.animate &&
+  return is_blocky && !is_print && !options.is_atlas && !options.light && !options.animate &&
          !options.has_field_occlusion && !options.simplify && !options.smoothness && !options.colours &&
          !options.separate_models;
 }
@@ -78,10 +78,10 @@ Result<std::optional<Outcome>> mesh_world_file(const ConvertOptions& options) {
   Outcome outcome;
   outcome.warnings = std::move(loaded->loaded.warnings);
   outcome.seconds.read = watch.lap();
-  outcome.mesher = options.mesher.empty() ? "greedy" : options.mesher;
+  outcome.mesher = options.mesher.value_or(Mesher::Greedy);
   ProgressBar bar(!options.is_one_of_many);
   WorldMeshOptions wanted;
-  wanted.scene.mesh = {outcome.mesher == "greedy", !options.occlusion_off, options.watertight, {}};
+  wanted.scene.mesh = {outcome.mesher == Mesher::Greedy, !options.occlusion_off, options.watertight, {}};
   wanted.scene.instances = options.common.instances();
   wanted.folder = options.output.parent_path();
   auto made = mesh_world(*world, *loaded, wanted, options.common.threads, bar.listener("meshing"));
