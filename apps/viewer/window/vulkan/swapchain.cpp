@@ -28,9 +28,9 @@ VkCompositeAlphaFlagBitsKHR opaque(VkCompositeAlphaFlagsKHR supported) {
 Result<VkSurfaceFormatKHR> Swapchain::format_of(const WindowDevice& device) {
   const VkPhysicalDevice physical = device.physical();
   std::uint32_t count = 0;
-  device.api().vkGetPhysicalDeviceSurfaceFormatsKHR(physical, device.surface(), &count, nullptr);
+  vkGetPhysicalDeviceSurfaceFormatsKHR(physical, device.surface(), &count, nullptr);
   std::vector<VkSurfaceFormatKHR> formats(count);
-  device.api().vkGetPhysicalDeviceSurfaceFormatsKHR(physical, device.surface(), &count, formats.data());
+  vkGetPhysicalDeviceSurfaceFormatsKHR(physical, device.surface(), &count, formats.data());
   for (const VkSurfaceFormatKHR& format : formats) {
     const bool has_bytes = format.format == VK_FORMAT_B8G8R8A8_UNORM || format.format == VK_FORMAT_R8G8B8A8_UNORM;
     if (has_bytes && format.colorSpace == VK_COLOR_SPACE_SRGB_NONLINEAR_KHR) return format;
@@ -49,21 +49,20 @@ Result<std::unique_ptr<Swapchain>> Swapchain::create(const WindowDevice& device,
 }
 
 Swapchain::~Swapchain() {
-  const VulkanFunctions& api = device_->api();
   for (const OneImage& image : images_) {
-    if (image.drawn != VK_NULL_HANDLE) api.vkDestroySemaphore(device_->handle(), image.drawn, nullptr);
-    if (image.framebuffer != VK_NULL_HANDLE) api.vkDestroyFramebuffer(device_->handle(), image.framebuffer, nullptr);
-    if (image.view != VK_NULL_HANDLE) api.vkDestroyImageView(device_->handle(), image.view, nullptr);
+    if (image.drawn != VK_NULL_HANDLE) vkDestroySemaphore(device_->handle(), image.drawn, nullptr);
+    if (image.framebuffer != VK_NULL_HANDLE) vkDestroyFramebuffer(device_->handle(), image.framebuffer, nullptr);
+    if (image.view != VK_NULL_HANDLE) vkDestroyImageView(device_->handle(), image.view, nullptr);
   }
-  if (handle_ != VK_NULL_HANDLE) api.vkDestroySwapchainKHR(device_->handle(), handle_, nullptr);
+  if (handle_ != VK_NULL_HANDLE) vkDestroySwapchainKHR(device_->handle(), handle_, nullptr);
 }
 
 VkPresentModeKHR Swapchain::mode(bool vsync) const {
   std::uint32_t count = 0;
   const VkPhysicalDevice physical = device_->physical();
-  device_->api().vkGetPhysicalDeviceSurfacePresentModesKHR(physical, device_->surface(), &count, nullptr);
+  vkGetPhysicalDeviceSurfacePresentModesKHR(physical, device_->surface(), &count, nullptr);
   std::vector<VkPresentModeKHR> modes(count);
-  device_->api().vkGetPhysicalDeviceSurfacePresentModesKHR(physical, device_->surface(), &count, modes.data());
+  vkGetPhysicalDeviceSurfacePresentModesKHR(physical, device_->surface(), &count, modes.data());
   for (const VkPresentModeKHR one : {VK_PRESENT_MODE_MAILBOX_KHR, VK_PRESENT_MODE_IMMEDIATE_KHR}) {
     if (!vsync && std::find(modes.begin(), modes.end(), one) != modes.end()) return one;
   }
@@ -71,9 +70,8 @@ VkPresentModeKHR Swapchain::mode(bool vsync) const {
 }
 
 VkResult Swapchain::open(VkRenderPass pass, VkExtent2D wanted, bool vsync, VkSwapchainKHR old) {
-  const VulkanFunctions& api = device_->api();
   VkSurfaceCapabilitiesKHR can{};
-  VkResult result = api.vkGetPhysicalDeviceSurfaceCapabilitiesKHR(device_->physical(), device_->surface(), &can);
+  VkResult result = vkGetPhysicalDeviceSurfaceCapabilitiesKHR(device_->physical(), device_->surface(), &can);
   if (result != VK_SUCCESS) return result;
   const auto format = format_of(*device_);
   if (!format) return VK_ERROR_FORMAT_NOT_SUPPORTED;
@@ -93,12 +91,12 @@ VkResult Swapchain::open(VkRenderPass pass, VkExtent2D wanted, bool vsync, VkSwa
   info.presentMode = mode(vsync);
   info.clipped = VK_TRUE;
   info.oldSwapchain = old;
-  result = api.vkCreateSwapchainKHR(device_->handle(), &info, nullptr, &handle_);
+  result = vkCreateSwapchainKHR(device_->handle(), &info, nullptr, &handle_);
   if (result != VK_SUCCESS) return result;
   std::uint32_t count = 0;
-  api.vkGetSwapchainImagesKHR(device_->handle(), handle_, &count, nullptr);
+  vkGetSwapchainImagesKHR(device_->handle(), handle_, &count, nullptr);
   std::vector<VkImage> images(count);
-  result = api.vkGetSwapchainImagesKHR(device_->handle(), handle_, &count, images.data());
+  result = vkGetSwapchainImagesKHR(device_->handle(), handle_, &count, images.data());
   for (std::size_t i = 0; i < images.size() && result == VK_SUCCESS; ++i) {
     result = add_image(images[i], format->format, pass);
   }
@@ -106,14 +104,13 @@ VkResult Swapchain::open(VkRenderPass pass, VkExtent2D wanted, bool vsync, VkSwa
 }
 
 VkResult Swapchain::add_image(VkImage image, VkFormat format, VkRenderPass pass) {
-  const VulkanFunctions& api = device_->api();
   OneImage& one = images_.emplace_back();
   auto view = info_of<VkImageViewCreateInfo>(VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO);
   view.image = image;
   view.viewType = VK_IMAGE_VIEW_TYPE_2D;
   view.format = format;
   view.subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
-  VkResult result = api.vkCreateImageView(device_->handle(), &view, nullptr, &one.view);
+  VkResult result = vkCreateImageView(device_->handle(), &view, nullptr, &one.view);
   if (result != VK_SUCCESS) return result;
   auto frame = info_of<VkFramebufferCreateInfo>(VK_STRUCTURE_TYPE_FRAMEBUFFER_CREATE_INFO);
   frame.renderPass = pass;
@@ -122,10 +119,10 @@ VkResult Swapchain::add_image(VkImage image, VkFormat format, VkRenderPass pass)
   frame.width = extent_.width;
   frame.height = extent_.height;
   frame.layers = 1;
-  result = api.vkCreateFramebuffer(device_->handle(), &frame, nullptr, &one.framebuffer);
+  result = vkCreateFramebuffer(device_->handle(), &frame, nullptr, &one.framebuffer);
   if (result != VK_SUCCESS) return result;
   const auto semaphore = info_of<VkSemaphoreCreateInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO);
-  return api.vkCreateSemaphore(device_->handle(), &semaphore, nullptr, &one.drawn);
+  return vkCreateSemaphore(device_->handle(), &semaphore, nullptr, &one.drawn);
 }
 
 }  // namespace quoin::viewer

@@ -86,50 +86,46 @@ struct VulkanWindow::Impl {
 };
 
 VkResult VulkanWindow::Impl::make_objects() {
-  const VulkanFunctions& api = device->api();
   auto pool_info = info_of<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
   pool_info.queueFamilyIndex = device->queue_family();
-  VkResult result = api.vkCreateCommandPool(device->handle(), &pool_info, nullptr, &pool);
+  VkResult result = vkCreateCommandPool(device->handle(), &pool_info, nullptr, &pool);
   if (result != VK_SUCCESS) return result;
   auto buffer = info_of<VkCommandBufferAllocateInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO);
   buffer.commandPool = pool;
   buffer.commandBufferCount = 1;
-  result = api.vkAllocateCommandBuffers(device->handle(), &buffer, &commands);
+  result = vkAllocateCommandBuffers(device->handle(), &buffer, &commands);
   if (result != VK_SUCCESS) return result;
   const auto fence = info_of<VkFenceCreateInfo>(VK_STRUCTURE_TYPE_FENCE_CREATE_INFO);
-  result = api.vkCreateFence(device->handle(), &fence, nullptr, &done);
+  result = vkCreateFence(device->handle(), &fence, nullptr, &done);
   if (result != VK_SUCCESS) return result;
   const auto semaphore = info_of<VkSemaphoreCreateInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO);
-  return api.vkCreateSemaphore(device->handle(), &semaphore, nullptr, &handed);
+  return vkCreateSemaphore(device->handle(), &semaphore, nullptr, &handed);
 }
 
 // Abandons an acquired image that is not drawn: its semaphore stays signalled and the swapchain lacks the image, so
 // both are created again.
 void VulkanWindow::Impl::give_up_image() {
-  const VulkanFunctions& api = device->api();
-  api.vkDeviceWaitIdle(device->handle());
+  vkDeviceWaitIdle(device->handle());
   swapchain.reset();
   is_stale = true;
-  api.vkDestroySemaphore(device->handle(), handed, nullptr);
+  vkDestroySemaphore(device->handle(), handed, nullptr);
   const auto semaphore = info_of<VkSemaphoreCreateInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO);
-  if (api.vkCreateSemaphore(device->handle(), &semaphore, nullptr, &handed) != VK_SUCCESS) handed = VK_NULL_HANDLE;
+  if (vkCreateSemaphore(device->handle(), &semaphore, nullptr, &handed) != VK_SUCCESS) handed = VK_NULL_HANDLE;
 }
 
 VulkanWindow::Impl::~Impl() {
-  const VulkanFunctions& api = device->api();
-  api.vkDeviceWaitIdle(device->handle());
+  vkDeviceWaitIdle(device->handle());
   swapchain.reset();
-  if (handed != VK_NULL_HANDLE) api.vkDestroySemaphore(device->handle(), handed, nullptr);
-  if (done != VK_NULL_HANDLE) api.vkDestroyFence(device->handle(), done, nullptr);
-  if (pool != VK_NULL_HANDLE) api.vkDestroyCommandPool(device->handle(), pool, nullptr);
+  if (handed != VK_NULL_HANDLE) vkDestroySemaphore(device->handle(), handed, nullptr);
+  if (done != VK_NULL_HANDLE) vkDestroyFence(device->handle(), done, nullptr);
+  if (pool != VK_NULL_HANDLE) vkDestroyCommandPool(device->handle(), pool, nullptr);
 }
 
 // Waits until the last frame is drawn.
 VkResult VulkanWindow::Impl::wait() {
-  const VulkanFunctions& api = device->api();
   const VkResult result =
-      api.vkWaitForFences(device->handle(), 1, &done, VK_TRUE, std::numeric_limits<std::uint64_t>::max());
-  return result == VK_SUCCESS ? api.vkResetFences(device->handle(), 1, &done) : result;
+      vkWaitForFences(device->handle(), 1, &done, VK_TRUE, std::numeric_limits<std::uint64_t>::max());
+  return result == VK_SUCCESS ? vkResetFences(device->handle(), 1, &done) : result;
 }
 
 Status VulkanWindow::Impl::fit(int width, int height) {
@@ -138,7 +134,7 @@ Status VulkanWindow::Impl::fit(int width, int height) {
     return {};
   }
   // Images still being presented must not be destroyed; resizing is rare enough to wait for the whole device.
-  device->api().vkDeviceWaitIdle(device->handle());
+  vkDeviceWaitIdle(device->handle());
   const std::unique_ptr<Swapchain> old = std::move(swapchain);
   auto made = Swapchain::create(*device, pipelines->pass(), width, height, vsync, old.get());
   if (!made) return made.error();
@@ -159,8 +155,8 @@ void VulkanWindow::Impl::draw_image(const VulkanImage& image, const PixelRect& p
   push.scale = glm::vec2(push.source) / glm::vec2(static_cast<float>(place.width), static_cast<float>(place.height));
   pipelines->bind_image(commands, push);
   const VkRect2D scissor = within(place, swapchain->extent());
-  device->api().vkCmdSetScissor(commands, 0, 1, &scissor);
-  device->api().vkCmdDraw(commands, 3, 1, 0, 0);
+  vkCmdSetScissor(commands, 0, 1, &scissor);
+  vkCmdDraw(commands, 3, 1, 0, 0);
 }
 
 void VulkanWindow::Impl::draw_overlay(const Overlay& overlay) const {
@@ -170,19 +166,17 @@ void VulkanWindow::Impl::draw_overlay(const Overlay& overlay) const {
   push.source = font_size;
   push.window = as_vector(swapchain->extent());
   pipelines->bind_overlay(commands, push);
-  device->api().vkCmdBindIndexBuffer(commands, indices.handle(), 0, VK_INDEX_TYPE_UINT16);
+  vkCmdBindIndexBuffer(commands, indices.handle(), 0, VK_INDEX_TYPE_UINT16);
   for (const OverlayDraw& draw : overlay.draws) {
     const VkRect2D scissor = within(draw.clip, swapchain->extent());
     if (scissor.extent.width == 0 || scissor.extent.height == 0) continue;
-    device->api().vkCmdSetScissor(commands, 0, 1, &scissor);
-    device->api().vkCmdDrawIndexed(commands, draw.index_count, 1, draw.first_index,
-                                   static_cast<std::int32_t>(draw.first_vertex), 0);
+    vkCmdSetScissor(commands, 0, 1, &scissor);
+    vkCmdDrawIndexed(commands, draw.index_count, 1, draw.first_index, static_cast<std::int32_t>(draw.first_vertex), 0);
   }
 }
 
 // Begins the command buffer and copies the image into one that shaders read.
 Status VulkanWindow::Impl::begin(const VulkanImage* rendered) {
-  const VulkanFunctions& api = device->api();
   if (rendered != nullptr) {
     const auto is_another = copied.fit(rendered->width(), rendered->height());
     if (!is_another) return is_another.error();
@@ -190,15 +184,14 @@ Status VulkanWindow::Impl::begin(const VulkanImage* rendered) {
   }
   auto info = info_of<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
   info.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
-  VkResult result = api.vkResetCommandPool(device->handle(), pool, 0);
-  if (result == VK_SUCCESS) result = api.vkBeginCommandBuffer(commands, &info);
+  VkResult result = vkResetCommandPool(device->handle(), pool, 0);
+  if (result == VK_SUCCESS) result = vkBeginCommandBuffer(commands, &info);
   if (result != VK_SUCCESS) return device->check(result, kShowing);
   return rendered == nullptr ? Status{} : rendered->record_copy(commands, copied.target());
 }
 
 Status VulkanWindow::Impl::record(std::uint32_t shown, const VulkanImage* image, const PixelRect& place,
                                   const Overlay& overlay) {
-  const VulkanFunctions& api = device->api();
   const bool is_seen = image != nullptr && image->samples() > 0 && place.width > 0 && place.height > 0;
   if (Status begun = begin(is_seen ? image : nullptr); !begun) return begun;
   const VkExtent2D size = swapchain->extent();
@@ -209,15 +202,15 @@ Status VulkanWindow::Impl::record(std::uint32_t shown, const VulkanImage* image,
   pass.renderArea = {{0, 0}, size};
   pass.clearValueCount = 1;
   pass.pClearValues = &ground;
-  api.vkCmdBeginRenderPass(commands, &pass, VK_SUBPASS_CONTENTS_INLINE);
+  vkCmdBeginRenderPass(commands, &pass, VK_SUBPASS_CONTENTS_INLINE);
   const glm::vec2 all = as_vector(size);
   const VkViewport viewport{0.0F, 0.0F, all.x, all.y, 0.0F, 1.0F};
-  api.vkCmdSetViewport(commands, 0, 1, &viewport);
+  vkCmdSetViewport(commands, 0, 1, &viewport);
   if (is_seen) draw_image(*image, place);
   const bool has_overlay = !overlay.draws.empty() && !overlay.indices.empty() && font_size.x > 0;
   if (has_overlay) draw_overlay(overlay);
-  api.vkCmdEndRenderPass(commands);
-  return device->check(api.vkEndCommandBuffer(commands), kShowing);
+  vkCmdEndRenderPass(commands);
+  return device->check(vkEndCommandBuffer(commands), kShowing);
 }
 
 VkResult VulkanWindow::Impl::show(std::uint32_t shown) {
@@ -229,7 +222,7 @@ VkResult VulkanWindow::Impl::show(std::uint32_t shown) {
   submit.pWaitDstStageMask = &stage;
   submit.pCommandBuffers = &commands;
   submit.pSignalSemaphores = &drawn;
-  if (const VkResult result = device->api().vkQueueSubmit(device->queue(), 1, &submit, done); result != VK_SUCCESS) {
+  if (const VkResult result = vkQueueSubmit(device->queue(), 1, &submit, done); result != VK_SUCCESS) {
     return result;
   }
   const VkSwapchainKHR chain = swapchain->handle();
@@ -238,7 +231,7 @@ VkResult VulkanWindow::Impl::show(std::uint32_t shown) {
   present.pWaitSemaphores = &drawn;
   present.pSwapchains = &chain;
   present.pImageIndices = &shown;
-  const VkResult presented = device->api().vkQueuePresentKHR(device->queue(), &present);
+  const VkResult presented = vkQueuePresentKHR(device->queue(), &present);
   // Waits here, because memory that these commands read could otherwise be freed while they run.
   const VkResult waited = wait();
   return waited == VK_SUCCESS ? presented : waited;
@@ -272,15 +265,14 @@ Status VulkanWindow::present(int width, int height, const VulkanImage* image, co
   QUOIN_ASSERT(are_there(overlay), "the indices and vertices of all draw calls exist");
   if (width <= 0 || height <= 0) return {};
   Impl& window = *impl_;
-  const VulkanFunctions& api = window.device->api();
   if (Status written = window.write(overlay); !written) return written;
   constexpr int kTries = 3;  // the size may change meanwhile
   for (int attempt = 0; attempt < kTries; ++attempt) {
     if (Status fits = window.fit(width, height); !fits || !window.swapchain) return fits;
     std::uint32_t shown = 0;
     VkResult result =
-        api.vkAcquireNextImageKHR(window.device->handle(), window.swapchain->handle(),
-                                  std::numeric_limits<std::uint64_t>::max(), window.handed, VK_NULL_HANDLE, &shown);
+        vkAcquireNextImageKHR(window.device->handle(), window.swapchain->handle(),
+                              std::numeric_limits<std::uint64_t>::max(), window.handed, VK_NULL_HANDLE, &shown);
     window.is_stale = result == VK_ERROR_OUT_OF_DATE_KHR;
     if (window.is_stale) continue;
     if (result != VK_SUCCESS && result != VK_SUBOPTIMAL_KHR) return window.device->check(result, kShowing);

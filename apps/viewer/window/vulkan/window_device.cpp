@@ -16,11 +16,11 @@ Error refuse(std::string message) {
   return make_error(ErrorCode::Unsupported, "vulkan: " + std::move(message));
 }
 
-bool has_validation(const VulkanFunctions& api) {
+bool has_validation() {
   std::uint32_t count = 0;
-  api.vkEnumerateInstanceLayerProperties(&count, nullptr);
+  vkEnumerateInstanceLayerProperties(&count, nullptr);
   std::vector<VkLayerProperties> layers(count);
-  api.vkEnumerateInstanceLayerProperties(&count, layers.data());
+  vkEnumerateInstanceLayerProperties(&count, layers.data());
   return std::any_of(layers.begin(), layers.end(), [](const VkLayerProperties& layer) {
     return std::strcmp(layer.layerName, kValidationLayer) == 0;
   });
@@ -52,21 +52,24 @@ Result<std::shared_ptr<WindowDevice>> WindowDevice::create(const WindowDeviceOpt
 
 WindowDevice::~WindowDevice() {
   if (handle_ != VK_NULL_HANDLE) {
-    api_.vkDeviceWaitIdle(handle_);
-    api_.vkDestroyDevice(handle_, nullptr);
+    vkDeviceWaitIdle(handle_);
+    vkDestroyDevice(handle_, nullptr);
   }
   if (instance_ == VK_NULL_HANDLE) return;
-  if (surface_ != VK_NULL_HANDLE) api_.vkDestroySurfaceKHR(instance_, surface_, nullptr);
+  if (surface_ != VK_NULL_HANDLE) vkDestroySurfaceKHR(instance_, surface_, nullptr);
   if (messenger_ != VK_NULL_HANDLE) {
+    // Looked up again, because an instance without messages may have replaced volk's function.
     const auto destroy = reinterpret_cast<PFN_vkDestroyDebugUtilsMessengerEXT>(
-        api_.vkGetInstanceProcAddr(instance_, "vkDestroyDebugUtilsMessengerEXT"));
+        vkGetInstanceProcAddr(instance_, "vkDestroyDebugUtilsMessengerEXT"));
     destroy(instance_, messenger_, nullptr);
   }
-  if (api_.vkDestroyInstance != nullptr) api_.vkDestroyInstance(instance_, nullptr);
+  vkDestroyInstance(instance_, nullptr);
 }
 
 Status WindowDevice::open(const WindowDeviceOptions& options) {
-  if (!api_.load(options.get_instance_proc_addr)) return refuse("the Vulkan loader is missing or incomplete");
+  const bool has_loader = options.get_instance_proc_addr != nullptr;
+  if (has_loader) volkInitializeCustom(options.get_instance_proc_addr);
+  if (!has_loader || vkCreateInstance == nullptr) return refuse("the Vulkan loader is missing or incomplete");
   if (Status made = make_instance(options); !made) return made;
   surface_ = options.make_surface(instance_);
   if (surface_ == VK_NULL_HANDLE) return refuse("the window cannot show images");
@@ -81,7 +84,7 @@ Status WindowDevice::open(const WindowDeviceOptions& options) {
 }
 
 Status WindowDevice::make_instance(const WindowDeviceOptions& options) {
-  if (listener_ && !has_validation(api_)) return refuse(std::string(kValidationLayer) + " is not installed");
+  if (listener_ && !has_validation()) return refuse(std::string(kValidationLayer) + " is not installed");
   const VulkanRequirements needs = vulkan_requirements();
   auto application = info_of<VkApplicationInfo>(VK_STRUCTURE_TYPE_APPLICATION_INFO);
   application.pApplicationName = "quoin view";
@@ -99,36 +102,39 @@ Status WindowDevice::make_instance(const WindowDeviceOptions& options) {
   }
   info.enabledExtensionCount = static_cast<std::uint32_t>(extensions.size());
   info.ppEnabledExtensionNames = extensions.data();
-  if (const VkResult result = api_.vkCreateInstance(&info, nullptr, &instance_); result != VK_SUCCESS) {
+  if (const VkResult result = vkCreateInstance(&info, nullptr, &instance_); result != VK_SUCCESS) {
     if (result == VK_ERROR_INCOMPATIBLE_DRIVER) return refuse("no driver for a graphics device found");
     if (result == VK_ERROR_EXTENSION_NOT_PRESENT) return refuse("no driver can show images in windows");
     return refuse("cannot create an instance (VkResult " + std::to_string(result) + ")");
   }
-  if (!api_.load_instance(instance_)) return refuse("the instance lacks functions");
+  // volk's functions are global. The loader's functions, unlike those of a device, work for every device.
+  volkLoadInstance(instance_);
+  if (vkGetPhysicalDeviceSurfaceSupportKHR == nullptr || vkQueuePresentKHR == nullptr) {
+    return refuse("the instance lacks functions");
+  }
   return listen();
 }
 
 Status WindowDevice::listen() {
   if (!listener_) return {};
   const VkDebugUtilsMessengerCreateInfoEXT messenger = messenger_info(listener_);
-  const auto create = reinterpret_cast<PFN_vkCreateDebugUtilsMessengerEXT>(
-      api_.vkGetInstanceProcAddr(instance_, "vkCreateDebugUtilsMessengerEXT"));
-  if (create(instance_, &messenger, nullptr, &messenger_) != VK_SUCCESS)
+  if (vkCreateDebugUtilsMessengerEXT(instance_, &messenger, nullptr, &messenger_) != VK_SUCCESS) {
     return refuse("cannot receive validation messages");
+  }
   return {};
 }
 
 std::vector<WindowDevice::Candidate> WindowDevice::candidates() const {
   std::uint32_t count = 0;
   std::vector<VkPhysicalDevice> handles;
-  if (api_.vkEnumeratePhysicalDevices(instance_, &count, nullptr) == VK_SUCCESS) {
+  if (vkEnumeratePhysicalDevices(instance_, &count, nullptr) == VK_SUCCESS) {
     handles.resize(count);
-    api_.vkEnumeratePhysicalDevices(instance_, &count, handles.data());
+    vkEnumeratePhysicalDevices(instance_, &count, handles.data());
     handles.resize(count);
   }
   std::vector<Candidate> found;
   for (const VkPhysicalDevice handle : handles) {
-    const auto description = describe_vulkan_device(instance_, handle, api_.vkGetInstanceProcAddr);
+    const auto description = describe_vulkan_device(instance_, handle, vkGetInstanceProcAddr);
     if (!description) continue;
     Candidate one{handle, 0, *description};
     if (one.description.missing.empty() && !find_queue_family(one)) {
@@ -142,21 +148,21 @@ std::vector<WindowDevice::Candidate> WindowDevice::candidates() const {
 // Finds a queue family that computes, draws, and presents to the window.
 bool WindowDevice::find_queue_family(Candidate& candidate) const {
   std::uint32_t count = 0;
-  api_.vkEnumerateDeviceExtensionProperties(candidate.handle, nullptr, &count, nullptr);
+  vkEnumerateDeviceExtensionProperties(candidate.handle, nullptr, &count, nullptr);
   std::vector<VkExtensionProperties> extensions(count);
-  api_.vkEnumerateDeviceExtensionProperties(candidate.handle, nullptr, &count, extensions.data());
+  vkEnumerateDeviceExtensionProperties(candidate.handle, nullptr, &count, extensions.data());
   const bool has_swapchain = std::any_of(extensions.begin(), extensions.end(), [](const VkExtensionProperties& one) {
     return std::strcmp(one.extensionName, VK_KHR_SWAPCHAIN_EXTENSION_NAME) == 0;
   });
   if (!has_swapchain) return false;
-  api_.vkGetPhysicalDeviceQueueFamilyProperties(candidate.handle, &count, nullptr);
+  vkGetPhysicalDeviceQueueFamilyProperties(candidate.handle, &count, nullptr);
   std::vector<VkQueueFamilyProperties> families(count);
-  api_.vkGetPhysicalDeviceQueueFamilyProperties(candidate.handle, &count, families.data());
+  vkGetPhysicalDeviceQueueFamilyProperties(candidate.handle, &count, families.data());
   constexpr VkQueueFlags kWanted = VK_QUEUE_COMPUTE_BIT | VK_QUEUE_GRAPHICS_BIT;
   for (std::uint32_t i = 0; i < count; ++i) {
     VkBool32 can = VK_FALSE;
     if ((families[i].queueFlags & kWanted) != kWanted || families[i].queueCount == 0) continue;
-    if (api_.vkGetPhysicalDeviceSurfaceSupportKHR(candidate.handle, i, surface_, &can) != VK_SUCCESS) continue;
+    if (vkGetPhysicalDeviceSurfaceSupportKHR(candidate.handle, i, surface_, &can) != VK_SUCCESS) continue;
     candidate.queue_family = i;
     if (can != VK_FALSE) return true;
   }
@@ -167,14 +173,14 @@ Status WindowDevice::make_device(const Candidate& chosen) {
   physical_ = chosen.handle;
   queue_family_ = chosen.queue_family;
   name_ = chosen.description.name;
-  api_.vkGetPhysicalDeviceMemoryProperties(physical_, &memory_);
+  vkGetPhysicalDeviceMemoryProperties(physical_, &memory_);
   const float priority = 1.0F;
   auto queue = info_of<VkDeviceQueueCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO);
   queue.queueFamilyIndex = queue_family_;
   queue.queueCount = 1;
   queue.pQueuePriorities = &priority;
   VkPhysicalDeviceFeatures there{};
-  api_.vkGetPhysicalDeviceFeatures(physical_, &there);
+  vkGetPhysicalDeviceFeatures(physical_, &there);
   VkPhysicalDeviceFeatures features{};
   features.fillModeNonSolid = there.fillModeNonSolid;
   draws_lines_ = there.fillModeNonSolid != VK_FALSE;
@@ -189,10 +195,9 @@ Status WindowDevice::make_device(const Candidate& chosen) {
   info.ppEnabledExtensionNames = extensions.data();
   VulkanFeatureStorage storage;
   if (Status enabled = enable_vulkan_features(info, storage); !enabled) return enabled;
-  const VkResult result = api_.vkCreateDevice(physical_, &info, nullptr, &handle_);
+  const VkResult result = vkCreateDevice(physical_, &info, nullptr, &handle_);
   if (result != VK_SUCCESS) return check(result, "starting");
-  if (!api_.load_device(handle_)) return refuse(name_ + ": the device lacks functions");
-  api_.vkGetDeviceQueue(handle_, queue_family_, 0, &queue_);
+  vkGetDeviceQueue(handle_, queue_family_, 0, &queue_);
   return {};
 }
 
@@ -204,7 +209,7 @@ BorrowedVulkanDevice WindowDevice::lent() const {
   lent.queue = queue_;
   lent.queue_family = queue_family_;
   lent.fill_mode_non_solid = draws_lines_;
-  lent.get_instance_proc_addr = api_.vkGetInstanceProcAddr;
+  lent.get_instance_proc_addr = vkGetInstanceProcAddr;
   return lent;  // the window's thread alone uses the queue
 }
 

@@ -6,12 +6,20 @@
 #include <string>
 #include <vector>
 
+#include <volk.h>
+
 #include <quoin/core/result.h>
 #include <quoin/render_vk/vulkan_device.h>
 
-#include "functions.h"
-
 namespace quoin::viewer {
+
+/// Returns a Vulkan structure with its `sType` set.
+template <class T>
+[[nodiscard]] T info_of(VkStructureType type) {
+  T info{};
+  info.sType = type;
+  return info;
+}
 
 /// Requirements of a window for its device.
 struct WindowDeviceOptions {
@@ -39,7 +47,6 @@ class WindowDevice {
   /// Returns the device for VulkanRenderer::create; `this` must outlive the renderer.
   [[nodiscard]] BorrowedVulkanDevice lent() const;
 
-  [[nodiscard]] const VulkanFunctions& api() const { return api_; }
   [[nodiscard]] VkPhysicalDevice physical() const { return physical_; }
   [[nodiscard]] VkDevice handle() const { return handle_; }
   [[nodiscard]] VkQueue queue() const { return queue_; }
@@ -68,7 +75,6 @@ class WindowDevice {
   Status make_device(const Candidate& chosen);
 
   std::function<void(const std::string&)> listener_;
-  VulkanFunctions api_;
   VkInstance instance_ = VK_NULL_HANDLE;
   VkDebugUtilsMessengerEXT messenger_ = VK_NULL_HANDLE;
   VkSurfaceKHR surface_ = VK_NULL_HANDLE;

@@ -31,10 +31,10 @@ class Shader {
     auto info = info_of<VkShaderModuleCreateInfo>(VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO);
     info.codeSize = code.size_bytes();
     info.pCode = code.data();
-    result_ = device.api().vkCreateShaderModule(device.handle(), &info, nullptr, &handle_);
+    result_ = vkCreateShaderModule(device.handle(), &info, nullptr, &handle_);
   }
   ~Shader() {
-    if (handle_ != VK_NULL_HANDLE) device_->api().vkDestroyShaderModule(device_->handle(), handle_, nullptr);
+    if (handle_ != VK_NULL_HANDLE) vkDestroyShaderModule(device_->handle(), handle_, nullptr);
   }
   Shader(const Shader&) = delete;
   Shader& operator=(const Shader&) = delete;
@@ -115,7 +115,7 @@ VkResult make_pipeline(const WindowDevice& device, const PipelineParts& parts, V
   info.pDynamicState = &later;
   info.layout = parts.layout;
   info.renderPass = parts.pass;
-  return device.api().vkCreateGraphicsPipelines(device.handle(), VK_NULL_HANDLE, 1, &info, nullptr, &pipeline);
+  return vkCreateGraphicsPipelines(device.handle(), VK_NULL_HANDLE, 1, &info, nullptr, &pipeline);
 }
 
 }  // namespace
@@ -136,15 +136,14 @@ Result<std::unique_ptr<WindowPipelines>> WindowPipelines::create(const WindowDev
 }
 
 WindowPipelines::~WindowPipelines() {
-  const VulkanFunctions& api = device_->api();
   for (const VkPipeline pipeline : {image_, overlay_}) {
-    if (pipeline != VK_NULL_HANDLE) api.vkDestroyPipeline(device_->handle(), pipeline, nullptr);
+    if (pipeline != VK_NULL_HANDLE) vkDestroyPipeline(device_->handle(), pipeline, nullptr);
   }
-  if (layout_ != VK_NULL_HANDLE) api.vkDestroyPipelineLayout(device_->handle(), layout_, nullptr);
-  if (sets_ != VK_NULL_HANDLE) api.vkDestroyDescriptorPool(device_->handle(), sets_, nullptr);
-  if (set_layout_ != VK_NULL_HANDLE) api.vkDestroyDescriptorSetLayout(device_->handle(), set_layout_, nullptr);
-  if (sampler_ != VK_NULL_HANDLE) api.vkDestroySampler(device_->handle(), sampler_, nullptr);
-  if (pass_ != VK_NULL_HANDLE) api.vkDestroyRenderPass(device_->handle(), pass_, nullptr);
+  if (layout_ != VK_NULL_HANDLE) vkDestroyPipelineLayout(device_->handle(), layout_, nullptr);
+  if (sets_ != VK_NULL_HANDLE) vkDestroyDescriptorPool(device_->handle(), sets_, nullptr);
+  if (set_layout_ != VK_NULL_HANDLE) vkDestroyDescriptorSetLayout(device_->handle(), set_layout_, nullptr);
+  if (sampler_ != VK_NULL_HANDLE) vkDestroySampler(device_->handle(), sampler_, nullptr);
+  if (pass_ != VK_NULL_HANDLE) vkDestroyRenderPass(device_->handle(), pass_, nullptr);
 }
 
 VkResult WindowPipelines::make_pass(VkFormat format) {
@@ -174,14 +173,13 @@ VkResult WindowPipelines::make_pass(VkFormat format) {
   info.pSubpasses = &subpass;
   info.dependencyCount = 1;
   info.pDependencies = &handed;
-  return device_->api().vkCreateRenderPass(device_->handle(), &info, nullptr, &pass_);
+  return vkCreateRenderPass(device_->handle(), &info, nullptr, &pass_);
 }
 
 // The push constants, and one image whose pixels are read directly.
 VkResult WindowPipelines::make_layout() {
-  const VulkanFunctions& api = device_->api();
   const auto nearest = info_of<VkSamplerCreateInfo>(VK_STRUCTURE_TYPE_SAMPLER_CREATE_INFO);
-  VkResult result = api.vkCreateSampler(device_->handle(), &nearest, nullptr, &sampler_);
+  VkResult result = vkCreateSampler(device_->handle(), &nearest, nullptr, &sampler_);
   if (result != VK_SUCCESS) return result;
   VkDescriptorSetLayoutBinding binding{};
   binding.descriptorType = VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER;
@@ -191,7 +189,7 @@ VkResult WindowPipelines::make_layout() {
   auto set = info_of<VkDescriptorSetLayoutCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO);
   set.bindingCount = 1;
   set.pBindings = &binding;
-  result = api.vkCreateDescriptorSetLayout(device_->handle(), &set, nullptr, &set_layout_);
+  result = vkCreateDescriptorSetLayout(device_->handle(), &set, nullptr, &set_layout_);
   if (result != VK_SUCCESS) return result;
   const VkPushConstantRange range{kStages, 0, sizeof(WindowPush)};
   auto info = info_of<VkPipelineLayoutCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO);
@@ -199,7 +197,7 @@ VkResult WindowPipelines::make_layout() {
   info.pSetLayouts = &set_layout_;
   info.pushConstantRangeCount = 1;
   info.pPushConstantRanges = &range;
-  return api.vkCreatePipelineLayout(device_->handle(), &info, nullptr, &layout_);
+  return vkCreatePipelineLayout(device_->handle(), &info, nullptr, &layout_);
 }
 
 VkResult WindowPipelines::make_set() {
@@ -208,13 +206,13 @@ VkResult WindowPipelines::make_set() {
   pool.maxSets = 1;
   pool.poolSizeCount = 1;
   pool.pPoolSizes = &size;
-  const VkResult result = device_->api().vkCreateDescriptorPool(device_->handle(), &pool, nullptr, &sets_);
+  const VkResult result = vkCreateDescriptorPool(device_->handle(), &pool, nullptr, &sets_);
   if (result != VK_SUCCESS) return result;
   auto info = info_of<VkDescriptorSetAllocateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO);
   info.descriptorPool = sets_;
   info.descriptorSetCount = 1;
   info.pSetLayouts = &set_layout_;
-  return device_->api().vkAllocateDescriptorSets(device_->handle(), &info, &set_);
+  return vkAllocateDescriptorSets(device_->handle(), &info, &set_);
 }
 
 void WindowPipelines::show_image(VkImageView view) const {
@@ -226,17 +224,17 @@ void WindowPipelines::show_image(VkImageView view) const {
   write.descriptorCount = 1;
   write.descriptorType = VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER;
   write.pImageInfo = &image;
-  device_->api().vkUpdateDescriptorSets(device_->handle(), 1, &write, 0, nullptr);
+  vkUpdateDescriptorSets(device_->handle(), 1, &write, 0, nullptr);
 }
 
 void WindowPipelines::bind_image(VkCommandBuffer commands, const WindowPush& push) const {
   bind(commands, image_, push);
-  device_->api().vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, layout_, 0, 1, &set_, 0, nullptr);
+  vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, layout_, 0, 1, &set_, 0, nullptr);
 }
 
 void WindowPipelines::bind(VkCommandBuffer commands, VkPipeline pipeline, const WindowPush& push) const {
-  device_->api().vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, pipeline);
-  device_->api().vkCmdPushConstants(commands, layout_, kStages, 0, sizeof push, &push);
+  vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, pipeline);
+  vkCmdPushConstants(commands, layout_, kStages, 0, sizeof push, &push);
 }
 
 }  // namespace quoin::viewer
