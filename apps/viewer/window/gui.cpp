@@ -82,15 +82,17 @@ Gui::Gui(Screen& screen, double scale) : screen_(&screen), scale_(scale) {
   io.ConfigWindowsMoveFromTitleBarOnly = true;
   set_style(static_cast<float>(scale));
   ImGui_ImplSDL2_InitForSDLRenderer(screen.window());
-  status_ = load_font();
+  load_font();
+  status_ = screen_->open_gui();
 }
 
 Gui::~Gui() {
+  screen_->close_gui();
   ImGui_ImplSDL2_Shutdown();
   ImGui::DestroyContext();
 }
 
-Status Gui::load_font() {
+void Gui::load_font() {
   ImGuiIO& io = ImGui::GetIO();
   // The font is rasterised in pixels, to be sharp, and placed in window units.
   const auto pixels_per_unit = static_cast<float>(screen_->pixels_per_unit());
@@ -103,12 +105,6 @@ Status Gui::load_font() {
     io.Fonts->AddFontDefault(&config);
   }
   io.FontGlobalScale = 1.0F / pixels_per_unit;
-  unsigned char* opacity = nullptr;
-  int width = 0;
-  int height = 0;
-  io.Fonts->GetTexDataAsAlpha8(&opacity, &width, &height);
-  return screen_->set_font(width, height,
-                           {opacity, static_cast<std::size_t>(width) * static_cast<std::size_t>(height)});
 }
 
 void Gui::process(const SDL_Event& event) {

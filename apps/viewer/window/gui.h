@@ -23,14 +23,14 @@ class Gui {
   /// Returns the drawing commands since `begin_frame`, valid until the next `begin_frame`.
   const ImDrawData& end_frame();
 
-  /// Returns the outcome of loading the font. Errors: those of Screen::set_font.
+  /// Returns the outcome of opening the GUI. Errors: those of Screen::open_gui.
   [[nodiscard]] const Status& status() const { return status_; }
   [[nodiscard]] double scale() const { return scale_; }
   [[nodiscard]] bool wants_mouse() const { return ImGui::GetIO().WantCaptureMouse; }
   [[nodiscard]] bool wants_keys() const { return ImGui::GetIO().WantTextInput; }
 
  private:
-  Status load_font();
+  void load_font();
   void note_button(const SDL_MouseButtonEvent& button);
 
   Screen* screen_;

@@ -2,9 +2,7 @@
 
 #include <SDL.h>
 
-#include <cstdint>
 #include <memory>
-#include <span>
 #include <string>
 #include <string_view>
 
@@ -63,8 +61,10 @@ class Screen {
   /// Returns the device that shows the window and can draw for it, or null.
   [[nodiscard]] virtual std::shared_ptr<VulkanRenderer> renderer() const { return nullptr; }
 
-  /// Sets the font image, one byte of opacity per pixel.
-  virtual Status set_font(int width, int height, std::span<const std::uint8_t> opacity) = 0;
+  /// Prepares to draw the GUI of the current Dear ImGui context, with its fonts.
+  virtual Status open_gui() = 0;
+  /// Ends drawing it. Required before the context is destroyed.
+  virtual void close_gui() = 0;
   /// Sets the image, in memory or on the device.
   virtual Status show_image(const ViewFrame& frame) = 0;
   virtual void forget_image() = 0;

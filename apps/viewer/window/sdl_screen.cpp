@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 #include <vector>
 
 #include "screen.h"
@@ -18,7 +19,8 @@ class SdlScreen final : public Screen {
 
   [[nodiscard]] SDL_Point output_size() const override;
   [[nodiscard]] bool has_vsync() const override { return has_vsync_; }
-  Status set_font(int width, int height, std::span<const std::uint8_t> opacity) override;
+  Status open_gui() override;
+  void close_gui() override { font_.reset(); }
   Status show_image(const ViewFrame& frame) override;
   void forget_image() override { image_.reset(); }
   Status show(const SDL_Rect& place, const ImDrawData& gui) override;
@@ -83,11 +85,16 @@ SDL_Point SdlScreen::output_size() const {
   return size;
 }
 
-Status SdlScreen::set_font(int width, int height, std::span<const std::uint8_t> opacity) {
+Status SdlScreen::open_gui() {
+  unsigned char* opacity = nullptr;
+  int width = 0;
+  int height = 0;
+  ImGui::GetIO().Fonts->GetTexDataAsAlpha8(&opacity, &width, &height);
   font_.reset(SDL_CreateTexture(renderer_.get(), SDL_PIXELFORMAT_ABGR8888, SDL_TEXTUREACCESS_STATIC, width, height));
   if (!font_) return cannot("store the font");
   std::vector<std::uint32_t> pixels;
-  for (const std::uint8_t one : opacity) pixels.push_back(std::uint32_t{one} << 24 | 0x00FF'FFFFU);
+  const std::span all(opacity, static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  for (const std::uint8_t one : all) pixels.push_back(std::uint32_t{one} << 24 | 0x00FF'FFFFU);
   SDL_UpdateTexture(font_.get(), nullptr, pixels.data(), 4 * width);
   SDL_SetTextureBlendMode(font_.get(), SDL_BLENDMODE_BLEND);
   SDL_SetTextureScaleMode(font_.get(), SDL_ScaleModeLinear);

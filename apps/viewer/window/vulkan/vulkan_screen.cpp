@@ -1,8 +1,5 @@
 #include "vulkan_screen.h"
 
-#include <imgui.h>
-
-#include <cmath>
 #include <vector>
 
 #include "viewer/window/screen.h"
@@ -51,21 +48,17 @@ class VulkanScreen final : public Screen {
   [[nodiscard]] SDL_Point output_size() const override;
   [[nodiscard]] bool has_vsync() const override { return true; }
   [[nodiscard]] std::shared_ptr<VulkanRenderer> renderer() const override { return renderer_; }
-  Status set_font(int width, int height, std::span<const std::uint8_t> opacity) override;
+  Status open_gui() override { return shown_in_->open_gui(); }
+  void close_gui() override { shown_in_->close_gui(); }
   Status show_image(const ViewFrame& frame) override;
   void forget_image() override { image_.reset(); }
   Status show(const SDL_Rect& place, const ImDrawData& gui) override;
 
  private:
-  void collect(const ImDrawData& gui);
-
   std::shared_ptr<VulkanRenderer> renderer_;
   std::unique_ptr<VulkanWindow> shown_in_;
   std::shared_ptr<const VulkanImage> image_;
   std::shared_ptr<VulkanImage> uploaded_;  // images rendered by the processor
-  std::vector<OverlayVertex> vertices_;
-  std::vector<std::uint16_t> indices_;
-  std::vector<OverlayDraw> draws_;
 };
 
 Status VulkanScreen::open(int width, int height, const std::string& device) {
@@ -90,10 +83,6 @@ SDL_Point VulkanScreen::output_size() const {
   return size;
 }
 
-Status VulkanScreen::set_font(int width, int height, std::span<const std::uint8_t> opacity) {
-  return shown_in_->set_font(width, height, opacity);
-}
-
 Status VulkanScreen::show_image(const ViewFrame& frame) {
   if (frame.on_device) {
     image_ = frame.on_device;
@@ -105,41 +94,9 @@ Status VulkanScreen::show_image(const ViewFrame& frame) {
   return {};
 }
 
-void VulkanScreen::collect(const ImDrawData& gui) {
-  static_assert(sizeof(ImDrawIdx) == sizeof(std::uint16_t));
-  vertices_.clear();
-  indices_.clear();
-  draws_.clear();
-  const ImVec2 scale = gui.FramebufferScale;
-  const ImVec2 origin = gui.DisplayPos;
-  for (int i = 0; i < gui.CmdListsCount; ++i) {
-    const ImDrawList& list = *gui.CmdLists[i];
-    const auto first_vertex = static_cast<std::uint32_t>(vertices_.size());
-    const auto first_index = static_cast<std::uint32_t>(indices_.size());
-    for (const ImDrawVert& v : list.VtxBuffer) {
-      vertices_.push_back({(v.pos.x - origin.x) * scale.x, (v.pos.y - origin.y) * scale.y, v.uv.x, v.uv.y, v.col});
-    }
-    indices_.insert(indices_.end(), list.IdxBuffer.begin(), list.IdxBuffer.end());
-    for (const ImDrawCmd& command : list.CmdBuffer) {
-      if (command.UserCallback != nullptr) continue;
-      const auto pixel = [](float value) { return static_cast<int>(std::floor(value)); };
-      const int left = pixel((command.ClipRect.x - origin.x) * scale.x);
-      const int top = pixel((command.ClipRect.y - origin.y) * scale.y);
-      const int right = -pixel(-(command.ClipRect.z - origin.x) * scale.x);
-      const int bottom = -pixel(-(command.ClipRect.w - origin.y) * scale.y);
-      draws_.push_back({{left, top, right - left, bottom - top},
-                        first_index + command.IdxOffset,
-                        command.ElemCount,
-                        first_vertex + command.VtxOffset});
-    }
-  }
-}
-
 Status VulkanScreen::show(const SDL_Rect& place, const ImDrawData& gui) {
-  collect(gui);
   const SDL_Point size = output_size();
-  return shown_in_->present(size.x, size.y, image_.get(), {place.x, place.y, place.w, place.h},
-                            {vertices_, indices_, draws_});
+  return shown_in_->present(size.x, size.y, image_.get(), {place.x, place.y, place.w, place.h}, gui);
 }
 
 }  // namespace

@@ -4,17 +4,14 @@
 #include <limits>
 #include <utility>
 
-#include <quoin/core/assert.h>
-
 #include "swapchain.h"
+#include "vulkan_gui.h"
 #include "window_memory.h"
 #include "window_pipelines.h"
 
 namespace quoin::viewer {
 
 namespace {
-
-static_assert(sizeof(OverlayVertex) == 20, "layout read by window_overlay.vert");
 
 const char* const kShowing = "showing an image";
 constexpr VkClearColorValue kGround = {{0.07F, 0.075F, 0.09F, 1.0F}};
@@ -30,41 +27,20 @@ VkRect2D within(const PixelRect& rect, VkExtent2D window) {
   return {{left, top}, {static_cast<std::uint32_t>(right - left), static_cast<std::uint32_t>(bottom - top)}};
 }
 
-[[maybe_unused]] bool are_there(const Overlay& overlay) {
-  return std::all_of(overlay.draws.begin(), overlay.draws.end(), [&](const OverlayDraw& draw) {
-    if (std::uint64_t{draw.first_index} + draw.index_count > overlay.indices.size()) return false;
-    const auto indices = overlay.indices.subspan(draw.first_index, draw.index_count);
-    return std::all_of(indices.begin(), indices.end(), [&](std::uint16_t index) {
-      return std::uint64_t{draw.first_vertex} + index < overlay.vertices.size();
-    });
-  });
-}
-
-glm::vec2 as_vector(VkExtent2D size) {
-  return {static_cast<float>(size.width), static_cast<float>(size.height)};
-}
-
 }  // namespace
 
 struct VulkanWindow::Impl {
   Impl(std::shared_ptr<WindowDevice> of_device, bool with_vsync)
-      : device(std::move(of_device)),
-        vsync(with_vsync),
-        copied(*device),
-        vertices(*device),
-        indices(*device),
-        font(*device) {}
+      : device(std::move(of_device)), vsync(with_vsync), copied(*device) {}
   ~Impl();
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
   VkResult make_objects();
   Status fit(int width, int height);
-  Status write(const Overlay& overlay);
   Status begin(const VulkanImage* rendered);
-  Status record(std::uint32_t shown, const VulkanImage* rendered, const PixelRect& place, const Overlay& overlay);
+  Status record(std::uint32_t shown, const VulkanImage* rendered, const PixelRect& place, const ImDrawData& gui);
   void draw_image(const VulkanImage& rendered, const PixelRect& place) const;
-  void draw_overlay(const Overlay& overlay) const;
   VkResult show(std::uint32_t shown);
   VkResult wait();
   void give_up_image();
@@ -79,10 +55,7 @@ struct VulkanWindow::Impl {
   VkFence done = VK_NULL_HANDLE;
   VkSemaphore handed = VK_NULL_HANDLE;
   CopiedImage copied;
-  WindowBuffer vertices;
-  WindowBuffer indices;
-  WindowBuffer font;
-  glm::ivec2 font_size{0};
+  std::unique_ptr<VulkanGui> gui;
 };
 
 VkResult VulkanWindow::Impl::make_objects() {
@@ -143,11 +116,6 @@ Status VulkanWindow::Impl::fit(int width, int height) {
   return {};
 }
 
-Status VulkanWindow::Impl::write(const Overlay& overlay) {
-  Status written = vertices.put(std::as_bytes(overlay.vertices));
-  return written ? indices.put(std::as_bytes(overlay.indices)) : written;
-}
-
 void VulkanWindow::Impl::draw_image(const VulkanImage& image, const PixelRect& place) const {
   WindowPush push;
   push.source = {image.width(), image.height()};
@@ -157,22 +125,6 @@ void VulkanWindow::Impl::draw_image(const VulkanImage& image, const PixelRect& p
   const VkRect2D scissor = within(place, swapchain->extent());
   vkCmdSetScissor(commands, 0, 1, &scissor);
   vkCmdDraw(commands, 3, 1, 0, 0);
-}
-
-void VulkanWindow::Impl::draw_overlay(const Overlay& overlay) const {
-  WindowPush push;
-  push.corners = vertices.address();
-  push.font = font.address();
-  push.source = font_size;
-  push.window = as_vector(swapchain->extent());
-  pipelines->bind_overlay(commands, push);
-  vkCmdBindIndexBuffer(commands, indices.handle(), 0, VK_INDEX_TYPE_UINT16);
-  for (const OverlayDraw& draw : overlay.draws) {
-    const VkRect2D scissor = within(draw.clip, swapchain->extent());
-    if (scissor.extent.width == 0 || scissor.extent.height == 0) continue;
-    vkCmdSetScissor(commands, 0, 1, &scissor);
-    vkCmdDrawIndexed(commands, draw.index_count, 1, draw.first_index, static_cast<std::int32_t>(draw.first_vertex), 0);
-  }
 }
 
 // Begins the command buffer and copies the image into one that shaders read.
@@ -191,7 +143,7 @@ Status VulkanWindow::Impl::begin(const VulkanImage* rendered) {
 }
 
 Status VulkanWindow::Impl::record(std::uint32_t shown, const VulkanImage* image, const PixelRect& place,
-                                  const Overlay& overlay) {
+                                  const ImDrawData& drawn_gui) {
   const bool is_seen = image != nullptr && image->samples() > 0 && place.width > 0 && place.height > 0;
   if (Status begun = begin(is_seen ? image : nullptr); !begun) return begun;
   const VkExtent2D size = swapchain->extent();
@@ -203,12 +155,11 @@ Status VulkanWindow::Impl::record(std::uint32_t shown, const VulkanImage* image,
   pass.clearValueCount = 1;
   pass.pClearValues = &ground;
   vkCmdBeginRenderPass(commands, &pass, VK_SUBPASS_CONTENTS_INLINE);
-  const glm::vec2 all = as_vector(size);
-  const VkViewport viewport{0.0F, 0.0F, all.x, all.y, 0.0F, 1.0F};
+  const VkViewport viewport{0.0F, 0.0F, static_cast<float>(size.width), static_cast<float>(size.height), 0.0F, 1.0F};
   vkCmdSetViewport(commands, 0, 1, &viewport);
   if (is_seen) draw_image(*image, place);
-  const bool has_overlay = !overlay.draws.empty() && !overlay.indices.empty() && font_size.x > 0;
-  if (has_overlay) draw_overlay(overlay);
+  Status drawn = gui ? gui->draw(commands, drawn_gui, size) : Status{};
+  if (!drawn) return drawn;
   vkCmdEndRenderPass(commands);
   return device->check(vkEndCommandBuffer(commands), kShowing);
 }
@@ -251,21 +202,32 @@ Result<VulkanWindow> VulkanWindow::create(std::shared_ptr<WindowDevice> device, 
   return VulkanWindow(std::move(impl));
 }
 
-Status VulkanWindow::set_font(int width, int height, std::span<const std::uint8_t> opacity) {
-  QUOIN_ASSERT(
-      width > 0 && height > 0 && opacity.size() == static_cast<std::size_t>(width) * static_cast<std::size_t>(height),
-      "one byte of opacity per pixel");
-  Status put = impl_->font.put(std::as_bytes(opacity));
-  impl_->font_size = put ? glm::ivec2(width, height) : glm::ivec2(0);
-  return put;
+Status VulkanWindow::open_gui() {
+  Impl& window = *impl_;
+  auto made = VulkanGui::create(*window.device, window.pipelines->pass());
+  if (!made) return made.error();
+  if (Status begun = window.begin(nullptr); !begun) return begun;
+  if (Status recorded = (*made)->upload_fonts(window.commands); !recorded) return recorded;
+  auto submit = info_of<VkSubmitInfo>(VK_STRUCTURE_TYPE_SUBMIT_INFO);
+  submit.commandBufferCount = 1;
+  submit.pCommandBuffers = &window.commands;
+  VkResult result = vkEndCommandBuffer(window.commands);
+  if (result == VK_SUCCESS) result = vkQueueSubmit(window.device->queue(), 1, &submit, window.done);
+  if (result == VK_SUCCESS) result = window.wait();
+  if (Status uploaded = window.device->check(result, "uploading fonts"); !uploaded) return uploaded;
+  (*made)->end_upload();
+  window.gui = std::move(*made);
+  return {};
+}
+
+void VulkanWindow::close_gui() {
+  impl_->gui.reset();
 }
 
 Status VulkanWindow::present(int width, int height, const VulkanImage* image, const PixelRect& place,
-                             const Overlay& overlay) {
-  QUOIN_ASSERT(are_there(overlay), "the indices and vertices of all draw calls exist");
+                             const ImDrawData& gui) {
   if (width <= 0 || height <= 0) return {};
   Impl& window = *impl_;
-  if (Status written = window.write(overlay); !written) return written;
   constexpr int kTries = 3;  // the size may change meanwhile
   for (int attempt = 0; attempt < kTries; ++attempt) {
     if (Status fits = window.fit(width, height); !fits || !window.swapchain) return fits;
@@ -276,7 +238,7 @@ Status VulkanWindow::present(int width, int height, const VulkanImage* image, co
     window.is_stale = result == VK_ERROR_OUT_OF_DATE_KHR;
     if (window.is_stale) continue;
     if (result != VK_SUCCESS && result != VK_SUBOPTIMAL_KHR) return window.device->check(result, kShowing);
-    if (Status recorded = window.record(shown, image, place, overlay); !recorded) {
+    if (Status recorded = window.record(shown, image, place, gui); !recorded) {
       window.give_up_image();
       return recorded;
     }

@@ -1,13 +1,13 @@
 #pragma once
 
-#include <cstdint>
 #include <memory>
-#include <span>
 
 #include <quoin/core/result.h>
 #include <quoin/render_vk/vulkan_image.h>
 
 #include "window_device.h"
+
+struct ImDrawData;
 
 namespace quoin::viewer {
 
@@ -17,30 +17,6 @@ struct PixelRect {
   int y = 0;
   int width = 0;
   int height = 0;
-};
-
-/// A vertex of a triangle over the image.
-struct OverlayVertex {
-  float x = 0.0F;  ///< window pixels, from the upper left corner
-  float y = 0.0F;
-  float u = 0.0F;  ///< font image coordinates, 0 to 1
-  float v = 0.0F;
-  std::uint32_t colour = 0;  ///< sRGB bytes, red the lowest, alpha the highest; alpha is multiplied with the font's
-};
-
-/// A draw call of an overlay.
-struct OverlayDraw {
-  PixelRect clip;
-  std::uint32_t first_index = 0;
-  std::uint32_t index_count = 0;
-  std::uint32_t first_vertex = 0;  ///< added to the indices
-};
-
-/// Triangles over an image, such as a GUI's. Blended in sRGB, as GUIs expect.
-struct Overlay {
-  std::span<const OverlayVertex> vertices;
-  std::span<const std::uint16_t> indices;
-  std::span<const OverlayDraw> draws;
 };
 
 /// Shows images of a renderer in the window of the same device.
@@ -55,18 +31,19 @@ class VulkanWindow {
   VulkanWindow& operator=(VulkanWindow&&) noexcept;
   ~VulkanWindow();
 
-  /// Sets the font image, one byte of opacity per pixel. Requires: `opacity` has width * height bytes.
-  [[nodiscard]] Status set_font(int width, int height, std::span<const std::uint8_t> opacity);
+  /// Prepares to draw the GUI of the current Dear ImGui context, with its fonts. Errors: LimitExceeded.
+  [[nodiscard]] Status open_gui();
+  /// Ends drawing it. Required before the context or the window is destroyed.
+  void close_gui();
 
-  /// Shows an image, stretched over `place`, on a dark background, and the overlay over it. `width` and `height` are
-  /// the window's current size in pixels; does nothing if one is 0, as in minimised windows. `image` may be null or
-  /// empty.
+  /// Shows an image, stretched over `place`, on a dark background, and the GUI over it, if `open_gui` has succeeded.
+  /// `width` and `height` are the window's current size in pixels; does nothing if one is 0, as in minimised windows.
+  /// `image` may be null or empty.
   ///
   /// Rebuilds the swapchain if the window's size has changed. Waits for the display and until the window is drawn;
   /// `image` may be freed afterwards.
-  /// Requires: the indices and vertices of all draw calls exist.
   [[nodiscard]] Status present(int width, int height, const VulkanImage* image, const PixelRect& place,
-                               const Overlay& overlay);
+                               const ImDrawData& gui);
 
  private:
   struct Impl;

@@ -4,12 +4,13 @@
 #include "vulkan_window.h"
 
 #include <SDL.h>
-#include <array>
+#include <imgui.h>
+
 #include <cstdlib>
+#include <tuple>
 
 #include <gtest/gtest.h>
 
-#include "core/death_for_tests.h"
 #include "viewer/viewer_fixture.h"
 #include "viewer/window/process_facts_for_tests.h"
 #include "viewer/window/screen.h"
@@ -73,27 +74,76 @@ class VulkanWindowTest : public ::testing::Test {
   std::vector<std::string> messages_;
 };
 
-constexpr std::array<std::uint8_t, 4> kFont = {255, 255, 0, 255};
-constexpr std::array kCorners = {OverlayVertex{0, 0, 0, 0, 0xFF0000FFU}, OverlayVertex{50, 0, 1, 0, 0xFF00FF00U},
-                                 OverlayVertex{0, 50, 0, 1, 0x80FF0000U}};
-constexpr std::array<std::uint16_t, 3> kIndices = {0, 1, 2};
+/// A Dear ImGui context for tests that draw a GUI.
+class TestGui {
+ public:
+  TestGui() {
+    ImGui::CreateContext();
+    ImGui::GetIO().IniFilename = nullptr;
+  }
+  ~TestGui() { ImGui::DestroyContext(); }
+  TestGui(const TestGui&) = delete;
+  TestGui& operator=(const TestGui&) = delete;
 
-TEST_F(VulkanWindowTest, ShowsImagesOfEverySizeAndOverlays) {
+  /// Returns a GUI of this size with text and shapes, some of them outside the window.
+  const ImDrawData& frame(float width, float height, float pixels_per_unit = 1.0F) {
+    ImGuiIO& io = ImGui::GetIO();
+    io.DisplaySize = {width, height};
+    io.DisplayFramebufferScale = {pixels_per_unit, pixels_per_unit};
+    ImGui::NewFrame();
+    ImDrawList& list = *ImGui::GetForegroundDrawList();
+    list.AddText({5.0F, 5.0F}, IM_COL32_WHITE, "text");
+    for (const ImVec4 clip :
+         {ImVec4{0, 0, 40, 40}, {-50, -50, -40, -40}, {100, 50, 5000, 5000}, {10.5F, 0, 20.7F, 9}}) {
+      list.PushClipRect({clip.x, clip.y}, {clip.z, clip.w});
+      list.AddTriangleFilled({0, 0}, {50, 0}, {0, 50}, 0x80FF0000U);
+      list.PopClipRect();
+    }
+    ImGui::Render();
+    return *ImGui::GetDrawData();
+  }
+};
+
+TEST_F(VulkanWindowTest, ShowsImagesOfEverySizeAndTheGui) {
+  TestGui gui;
   auto window = VulkanWindow::create(device_);
   ASSERT_TRUE(window) << to_string(window.error());
-  const std::array draws = {OverlayDraw{{0, 0, 40, 40}, 0, 3, 0}, OverlayDraw{{-50, -50, 10, 10}, 0, 3, 0},
-                            OverlayDraw{{100, 50, 5000, 5000}, 0, 3, 0}};
-  const Overlay overlay{kCorners, kIndices, draws};
-  EXPECT_TRUE(window->present(160, 90, nullptr, {}, overlay)) << "an overlay without a font is not drawn";
-  ASSERT_TRUE(window->set_font(2, 2, kFont));
+  const Status opened = window->open_gui();
+  ASSERT_TRUE(opened) << to_string(opened.error());
   const VulkanImage whole = drawn(160, 90);
   const VulkanImage coarse = drawn(20, 12);
   const VulkanImage never_drawn(*renderer_);
   for (const VulkanImage* image : {&whole, &coarse, &never_drawn, static_cast<const VulkanImage*>(nullptr)}) {
     for (const PixelRect place : {PixelRect{0, 0, 160, 90}, {-20, 30, 70, 500}, {10, 10, 0, 0}, {500, 500, 10, 10}}) {
-      const Status shown = window->present(160, 90, image, place, overlay);
+      const Status shown = window->present(160, 90, image, place, gui.frame(160, 90));
       ASSERT_TRUE(shown) << to_string(shown.error());
     }
+  }
+  window->close_gui();
+}
+
+TEST_F(VulkanWindowTest, DrawsAGuiOfAnotherSizeThanTheWindow) {
+  TestGui gui;
+  auto window = VulkanWindow::create(device_);
+  ASSERT_TRUE(window) << to_string(window.error());
+  ASSERT_TRUE(window->open_gui());
+  for (const auto& [width, height, scale] :
+       {std::tuple{300.0F, 200.0F, 1.0F}, {20.0F, 10.0F, 1.0F}, {80.0F, 45.0F, 2.0F}, {107.0F, 60.0F, 1.5F}}) {
+    const Status shown = window->present(160, 90, nullptr, {}, gui.frame(width, height, scale));
+    EXPECT_TRUE(shown) << to_string(shown.error());
+  }
+  window->close_gui();
+}
+
+TEST_F(VulkanWindowTest, OpensTheGuiOfANewContext) {
+  auto window = VulkanWindow::create(device_);
+  ASSERT_TRUE(window) << to_string(window.error());
+  for (int i = 0; i < 5; ++i) {
+    TestGui gui;
+    EXPECT_TRUE(window->present(160, 90, nullptr, {}, {})) << "a GUI that is not open is not drawn";
+    ASSERT_TRUE(window->open_gui());
+    ASSERT_TRUE(window->present(160, 90, nullptr, {}, gui.frame(160, 90)));
+    window->close_gui();
   }
 }
 
@@ -202,15 +252,6 @@ TEST_F(VulkanWindowTest, ReportsUnsupportedDevices) {
   wrong = options(false);
   wrong.get_instance_proc_addr = nullptr;
   expect_refusal(wrong, "the Vulkan loader is missing");
-}
-
-TEST_F(VulkanWindowTest, RequiresAFontOfItsSizeAndCornersThatAreThere) {
-  auto window = VulkanWindow::create(device_);
-  ASSERT_TRUE(window) << to_string(window.error());
-  [[maybe_unused]] const std::array draws = {OverlayDraw{{0, 0, 40, 40}, 1, 3, 0}};
-  QUOIN_EXPECT_MISTAKE((void)window->present(160, 90, nullptr, {}, {kCorners, kIndices, draws}),
-                       "of all draw calls exist");
-  QUOIN_EXPECT_MISTAKE((void)window->set_font(3, 2, kFont), "one byte of opacity per pixel");
 }
 
 }  // namespace

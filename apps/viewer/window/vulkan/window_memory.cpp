@@ -1,7 +1,5 @@
 #include "window_memory.h"
 
-#include <cstring>
-
 namespace quoin::viewer {
 
 namespace {
@@ -9,55 +7,6 @@ namespace {
 const char* const kMakingRoom = "allocating memory for a window";
 
 }  // namespace
-
-Status WindowBuffer::put(std::span<const std::byte> bytes) {
-  if (bytes.empty()) return {};
-  if (size_ < bytes.size()) {
-    free();
-    if (Status grown = device_->check(grow(bytes.size() * 3 / 2), kMakingRoom); !grown) {
-      free();
-      return grown;
-    }
-  }
-  std::memcpy(mapped_, bytes.data(), bytes.size());
-  return {};
-}
-
-VkResult WindowBuffer::grow(VkDeviceSize size) {
-  auto info = info_of<VkBufferCreateInfo>(VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO);
-  info.size = size;
-  info.usage = VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT | VK_BUFFER_USAGE_INDEX_BUFFER_BIT;
-  VkResult result = vkCreateBuffer(device_->handle(), &info, nullptr, &handle_);
-  if (result != VK_SUCCESS) return result;
-  VkMemoryRequirements needs{};
-  vkGetBufferMemoryRequirements(device_->handle(), handle_, &needs);
-  auto flags = info_of<VkMemoryAllocateFlagsInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO);
-  flags.flags = VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT;
-  auto memory = info_of<VkMemoryAllocateInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO);
-  memory.pNext = &flags;
-  memory.allocationSize = needs.size;
-  memory.memoryTypeIndex = device_->memory_type(
-      needs.memoryTypeBits, VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT);
-  result = vkAllocateMemory(device_->handle(), &memory, nullptr, &memory_);
-  if (result == VK_SUCCESS) result = vkBindBufferMemory(device_->handle(), handle_, memory_, 0);
-  void* mapped = nullptr;
-  if (result == VK_SUCCESS) result = vkMapMemory(device_->handle(), memory_, 0, VK_WHOLE_SIZE, 0, &mapped);
-  if (result != VK_SUCCESS) return result;
-  mapped_ = static_cast<std::byte*>(mapped);
-  auto address = info_of<VkBufferDeviceAddressInfo>(VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO);
-  address.buffer = handle_;
-  address_ = vkGetBufferDeviceAddress(device_->handle(), &address);
-  size_ = size;
-  return VK_SUCCESS;
-}
-
-void WindowBuffer::free() {
-  if (handle_ != VK_NULL_HANDLE) vkDestroyBuffer(device_->handle(), handle_, nullptr);
-  if (memory_ != VK_NULL_HANDLE) vkFreeMemory(device_->handle(), memory_, nullptr);
-  handle_ = VK_NULL_HANDLE;
-  memory_ = VK_NULL_HANDLE;
-  size_ = 0;
-}
 
 Result<bool> CopiedImage::fit(int width, int height) {
   if (width == width_ && height == height_) return false;

@@ -1,40 +1,10 @@
 #pragma once
 
-#include <cstddef>
-#include <span>
-
 #include <quoin/render_vk/vulkan_image.h>
 
 #include "window_device.h"
 
 namespace quoin::viewer {
-
-/// A buffer that the processor writes and shaders read by address.
-class WindowBuffer {
- public:
-  explicit WindowBuffer(const WindowDevice& device) : device_(&device) {}
-  ~WindowBuffer() { free(); }
-  WindowBuffer(const WindowBuffer&) = delete;
-  WindowBuffer& operator=(const WindowBuffer&) = delete;
-
-  /// Writes the bytes; grows the buffer if they do not fit. Requires: no commands that read it are running. Errors:
-  /// LimitExceeded.
-  [[nodiscard]] Status put(std::span<const std::byte> bytes);
-
-  [[nodiscard]] VkBuffer handle() const { return handle_; }
-  [[nodiscard]] VkDeviceAddress address() const { return address_; }
-
- private:
-  VkResult grow(VkDeviceSize size);
-  void free();
-
-  const WindowDevice* device_;
-  VkBuffer handle_ = VK_NULL_HANDLE;
-  VkDeviceMemory memory_ = VK_NULL_HANDLE;
-  VkDeviceSize size_ = 0;
-  VkDeviceAddress address_ = 0;
-  std::byte* mapped_ = nullptr;
-};
 
 /// A Vulkan image that Quoin's images are copied into and shaders read.
 class CopiedImage {

@@ -15,12 +15,6 @@ constexpr std::uint32_t kImageVertex[] = {
 constexpr std::uint32_t kImageFragment[] = {
 #include "window_image.frag.inc"
 };
-constexpr std::uint32_t kOverlayVertex[] = {
-#include "window_overlay.vert.inc"
-};
-constexpr std::uint32_t kOverlayFragment[] = {
-#include "window_overlay.frag.inc"
-};
 constexpr VkShaderStageFlags kStages = VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_FRAGMENT_BIT;
 
 /// A shader module, needed only while pipelines are created.
@@ -129,16 +123,12 @@ Result<std::unique_ptr<WindowPipelines>> WindowPipelines::create(const WindowDev
   if (result == VK_SUCCESS) result = made->make_set();
   PipelineParts parts{made->pass_, made->layout_, kImageVertex, kImageFragment, false};
   if (result == VK_SUCCESS) result = make_pipeline(device, parts, made->image_);
-  parts = {made->pass_, made->layout_, kOverlayVertex, kOverlayFragment, true};
-  if (result == VK_SUCCESS) result = make_pipeline(device, parts, made->overlay_);
   if (Status status = device.check(result, "compiling shaders"); !status) return status.error();
   return made;
 }
 
 WindowPipelines::~WindowPipelines() {
-  for (const VkPipeline pipeline : {image_, overlay_}) {
-    if (pipeline != VK_NULL_HANDLE) vkDestroyPipeline(device_->handle(), pipeline, nullptr);
-  }
+  if (image_ != VK_NULL_HANDLE) vkDestroyPipeline(device_->handle(), image_, nullptr);
   if (layout_ != VK_NULL_HANDLE) vkDestroyPipelineLayout(device_->handle(), layout_, nullptr);
   if (sets_ != VK_NULL_HANDLE) vkDestroyDescriptorPool(device_->handle(), sets_, nullptr);
   if (set_layout_ != VK_NULL_HANDLE) vkDestroyDescriptorSetLayout(device_->handle(), set_layout_, nullptr);

@@ -34,7 +34,6 @@ class WindowPipelines {
   /// Sets the image that `bind_image` draws. Requires: no commands that draw another image are running.
   void show_image(VkImageView view) const;
   void bind_image(VkCommandBuffer commands, const WindowPush& push) const;
-  void bind_overlay(VkCommandBuffer commands, const WindowPush& push) const { bind(commands, overlay_, push); }
 
  private:
   explicit WindowPipelines(const WindowDevice& device) : device_(&device) {}
@@ -51,7 +50,6 @@ class WindowPipelines {
   VkDescriptorSet set_ = VK_NULL_HANDLE;  // one image
   VkPipelineLayout layout_ = VK_NULL_HANDLE;
   VkPipeline image_ = VK_NULL_HANDLE;
-  VkPipeline overlay_ = VK_NULL_HANDLE;
 };
 
 }  // namespace quoin::viewer
