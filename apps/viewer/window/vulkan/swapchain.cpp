@@ -27,6 +27,12 @@ VkCompositeAlphaFlagBitsKHR opaque(VkCompositeAlphaFlagsKHR supported) {
 
 Result<VkSurfaceFormatKHR> Swapchain::format_of(const WindowDevice& device) {
   const VkPhysicalDevice physical = device.physical();
+  VkSurfaceCapabilitiesKHR can{};
+  const VkResult asked = vkGetPhysicalDeviceSurfaceCapabilitiesKHR(physical, device.surface(), &can);
+  if (Status known = device.check(asked, kDoing); !known) return known.error();
+  if ((can.supportedUsageFlags & VK_IMAGE_USAGE_TRANSFER_DST_BIT) == 0) {
+    return make_error(ErrorCode::Unsupported, "vulkan: " + device.name() + ": images cannot be copied to the window");
+  }
   std::uint32_t count = 0;
   vkGetPhysicalDeviceSurfaceFormatsKHR(physical, device.surface(), &count, nullptr);
   std::vector<VkSurfaceFormatKHR> formats(count);
@@ -36,6 +42,40 @@ Result<VkSurfaceFormatKHR> Swapchain::format_of(const WindowDevice& device) {
     if (has_bytes && format.colorSpace == VK_COLOR_SPACE_SRGB_NONLINEAR_KHR) return format;
   }
   return make_error(ErrorCode::Unsupported, "vulkan: " + device.name() + ": the window has no 8-bit sRGB format");
+}
+
+Result<VkRenderPass> Swapchain::make_pass(const WindowDevice& device) {
+  const auto format = format_of(device);
+  if (!format) return format.error();
+  VkAttachmentDescription image{};
+  image.format = format->format;
+  image.samples = VK_SAMPLE_COUNT_1_BIT;
+  image.loadOp = VK_ATTACHMENT_LOAD_OP_LOAD;
+  image.storeOp = VK_ATTACHMENT_STORE_OP_STORE;
+  image.stencilLoadOp = VK_ATTACHMENT_LOAD_OP_DONT_CARE;
+  image.stencilStoreOp = VK_ATTACHMENT_STORE_OP_DONT_CARE;
+  image.initialLayout = VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL;
+  image.finalLayout = VK_IMAGE_LAYOUT_PRESENT_SRC_KHR;
+  const VkAttachmentReference colour{0, VK_IMAGE_LAYOUT_COLOR_ATTACHMENT_OPTIMAL};
+  VkSubpassDescription subpass{};
+  subpass.pipelineBindPoint = VK_PIPELINE_BIND_POINT_GRAPHICS;
+  subpass.colorAttachmentCount = 1;
+  subpass.pColorAttachments = &colour;
+  VkSubpassDependency after_copy{};
+  after_copy.srcSubpass = VK_SUBPASS_EXTERNAL;
+  after_copy.srcStageMask = VK_PIPELINE_STAGE_TRANSFER_BIT;
+  after_copy.srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT;
+  after_copy.dstStageMask = VK_PIPELINE_STAGE_COLOR_ATTACHMENT_OUTPUT_BIT;
+  after_copy.dstAccessMask = VK_ACCESS_COLOR_ATTACHMENT_READ_BIT | VK_ACCESS_COLOR_ATTACHMENT_WRITE_BIT;
+  auto info = info_of<VkRenderPassCreateInfo>(VK_STRUCTURE_TYPE_RENDER_PASS_CREATE_INFO);
+  info.attachmentCount = info.subpassCount = info.dependencyCount = 1;
+  info.pAttachments = &image;
+  info.pSubpasses = &subpass;
+  info.pDependencies = &after_copy;
+  VkRenderPass pass = VK_NULL_HANDLE;
+  const VkResult result = vkCreateRenderPass(device.handle(), &info, nullptr, &pass);
+  if (Status made = device.check(result, "opening a window"); !made) return made.error();
+  return pass;
 }
 
 Result<std::unique_ptr<Swapchain>> Swapchain::create(const WindowDevice& device, VkRenderPass pass, int width,
@@ -85,7 +125,7 @@ VkResult Swapchain::open(VkRenderPass pass, VkExtent2D wanted, bool vsync, VkSwa
   info.imageColorSpace = format->colorSpace;
   info.imageExtent = extent_;
   info.imageArrayLayers = 1;
-  info.imageUsage = VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT;
+  info.imageUsage = VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT;
   info.preTransform = can.currentTransform;
   info.compositeAlpha = opaque(can.supportedCompositeAlpha);
   info.presentMode = mode(vsync);
@@ -105,6 +145,7 @@ VkResult Swapchain::open(VkRenderPass pass, VkExtent2D wanted, bool vsync, VkSwa
 
 VkResult Swapchain::add_image(VkImage image, VkFormat format, VkRenderPass pass) {
   OneImage& one = images_.emplace_back();
+  one.handle = image;
   auto view = info_of<VkImageViewCreateInfo>(VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO);
   view.image = image;
   view.viewType = VK_IMAGE_VIEW_TYPE_2D;

@@ -96,7 +96,7 @@ Status VulkanScreen::show_image(const ViewFrame& frame) {
 
 Status VulkanScreen::show(const SDL_Rect& place, const ImDrawData& gui) {
   const SDL_Point size = output_size();
-  return shown_in_->present(size.x, size.y, image_.get(), {place.x, place.y, place.w, place.h}, gui);
+  return shown_in_->present(size.x, size.y, image_.get(), place, gui);
 }
 
 }  // namespace

@@ -4,10 +4,9 @@
 #include <limits>
 #include <utility>
 
+#include "copied_image.h"
 #include "swapchain.h"
 #include "vulkan_gui.h"
-#include "window_memory.h"
-#include "window_pipelines.h"
 
 namespace quoin::viewer {
 
@@ -15,16 +14,26 @@ namespace {
 
 const char* const kShowing = "showing an image";
 constexpr VkClearColorValue kGround = {{0.07F, 0.075F, 0.09F, 1.0F}};
+constexpr VkImageSubresourceRange kWholeImage = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
+constexpr VkImageSubresourceLayers kLayers = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1};
 
-VkRect2D within(const PixelRect& rect, VkExtent2D window) {
-  const auto clamped = [](std::int64_t value, std::uint32_t most) {
-    return static_cast<int>(std::clamp<std::int64_t>(value, 0, most));
+/// The visible pixels of an image and of the window, along an axis.
+struct VisiblePixels {
+  std::int32_t image[2];
+  std::int32_t window[2];
+};
+
+// Returns the pixels of an axis of `image` pixels, stretched over `size` of `window` pixels from `start` on.
+VisiblePixels visible_pixels(int image, int start, int size, std::uint32_t window) {
+  const auto in_window = [window](std::int64_t at) {
+    return static_cast<std::int32_t>(std::clamp<std::int64_t>(at, 0, window));
   };
-  const int left = clamped(rect.x, window.width);
-  const int top = clamped(rect.y, window.height);
-  const int right = clamped(std::int64_t{rect.x} + std::max(rect.width, 0), window.width);
-  const int bottom = clamped(std::int64_t{rect.y} + std::max(rect.height, 0), window.height);
-  return {{left, top}, {static_cast<std::uint32_t>(right - left), static_cast<std::uint32_t>(bottom - top)}};
+  const std::int32_t low = in_window(start);
+  const std::int32_t high = in_window(std::int64_t{start} + size);
+  // At the edge of the window, pixels that are partly visible are copied too.
+  const std::int64_t image_low = (std::int64_t{low} - start) * image / size;
+  const std::int64_t image_high = ((std::int64_t{high} - start) * image + size - 1) / size;
+  return {{static_cast<std::int32_t>(image_low), static_cast<std::int32_t>(image_high)}, {low, high}};
 }
 
 }  // namespace
@@ -39,15 +48,16 @@ struct VulkanWindow::Impl {
   VkResult make_objects();
   Status fit(int width, int height);
   Status begin(const VulkanImage* rendered);
-  Status record(std::uint32_t shown, const VulkanImage* rendered, const PixelRect& place, const ImDrawData& gui);
-  void draw_image(const VulkanImage& rendered, const PixelRect& place) const;
+  Status record(std::uint32_t shown, const VulkanImage* rendered, const SDL_Rect& place, const ImDrawData& gui);
+  void clear(VkImage image) const;
+  void copy(const VulkanImage& rendered, const SDL_Rect& place, VkImage image) const;
   VkResult show(std::uint32_t shown);
   VkResult wait();
   void give_up_image();
 
   std::shared_ptr<WindowDevice> device;
   bool vsync;
-  std::unique_ptr<WindowPipelines> pipelines;
+  VkRenderPass pass = VK_NULL_HANDLE;
   std::unique_ptr<Swapchain> swapchain;  // null until there is a size
   bool is_stale = true;
   VkCommandPool pool = VK_NULL_HANDLE;
@@ -92,6 +102,7 @@ VulkanWindow::Impl::~Impl() {
   if (handed != VK_NULL_HANDLE) vkDestroySemaphore(device->handle(), handed, nullptr);
   if (done != VK_NULL_HANDLE) vkDestroyFence(device->handle(), done, nullptr);
   if (pool != VK_NULL_HANDLE) vkDestroyCommandPool(device->handle(), pool, nullptr);
+  if (pass != VK_NULL_HANDLE) vkDestroyRenderPass(device->handle(), pass, nullptr);
 }
 
 // Waits until the last frame is drawn.
@@ -109,30 +120,47 @@ Status VulkanWindow::Impl::fit(int width, int height) {
   // Images still being presented must not be destroyed; resizing is rare enough to wait for the whole device.
   vkDeviceWaitIdle(device->handle());
   const std::unique_ptr<Swapchain> old = std::move(swapchain);
-  auto made = Swapchain::create(*device, pipelines->pass(), width, height, vsync, old.get());
+  auto made = Swapchain::create(*device, pass, width, height, vsync, old.get());
   if (!made) return made.error();
   swapchain = std::move(*made);
   is_stale = false;
   return {};
 }
 
-void VulkanWindow::Impl::draw_image(const VulkanImage& image, const PixelRect& place) const {
-  WindowPush push;
-  push.source = {image.width(), image.height()};
-  push.origin = {static_cast<float>(place.x), static_cast<float>(place.y)};
-  push.scale = glm::vec2(push.source) / glm::vec2(static_cast<float>(place.width), static_cast<float>(place.height));
-  pipelines->bind_image(commands, push);
-  const VkRect2D scissor = within(place, swapchain->extent());
-  vkCmdSetScissor(commands, 0, 1, &scissor);
-  vkCmdDraw(commands, 3, 1, 0, 0);
+void VulkanWindow::Impl::clear(VkImage image) const {
+  auto acquired = info_of<VkImageMemoryBarrier>(VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER);
+  acquired.dstAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT;
+  acquired.newLayout = VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL;
+  acquired.srcQueueFamilyIndex = acquired.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
+  acquired.image = image;
+  acquired.subresourceRange = kWholeImage;
+  vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_PIPELINE_STAGE_TRANSFER_BIT, 0, 0, nullptr, 0,
+                       nullptr, 1, &acquired);
+  vkCmdClearColorImage(commands, image, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, &kGround, 1, &kWholeImage);
 }
 
-// Begins the command buffer and copies the image into one that shaders read.
+void VulkanWindow::Impl::copy(const VulkanImage& rendered, const SDL_Rect& place, VkImage image) const {
+  const VkExtent2D window = swapchain->extent();
+  const VisiblePixels x = visible_pixels(rendered.width(), place.x, place.w, window.width);
+  const VisiblePixels y = visible_pixels(rendered.height(), place.y, place.h, window.height);
+  if (x.window[0] == x.window[1] || y.window[0] == y.window[1]) return;
+  auto cleared = info_of<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER);
+  cleared.srcAccessMask = cleared.dstAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT;
+  vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_PIPELINE_STAGE_TRANSFER_BIT, 0, 1, &cleared, 0,
+                       nullptr, 0, nullptr);
+  const VkImageBlit blit{kLayers,
+                         {{x.image[0], y.image[0], 0}, {x.image[1], y.image[1], 1}},
+                         kLayers,
+                         {{x.window[0], y.window[0], 0}, {x.window[1], y.window[1], 1}}};
+  const bool is_stretched = rendered.width() != place.w || rendered.height() != place.h;
+  vkCmdBlitImage(commands, copied.handle(), VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, image,
+                 VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, 1, &blit, is_stretched ? VK_FILTER_LINEAR : VK_FILTER_NEAREST);
+}
+
+// Begins the command buffer and copies the image into one that can be scaled.
 Status VulkanWindow::Impl::begin(const VulkanImage* rendered) {
   if (rendered != nullptr) {
-    const auto is_another = copied.fit(rendered->width(), rendered->height());
-    if (!is_another) return is_another.error();
-    if (*is_another) pipelines->show_image(copied.view());
+    if (Status fits = copied.fit(rendered->width(), rendered->height()); !fits) return fits;
   }
   auto info = info_of<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
   info.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
@@ -142,30 +170,25 @@ Status VulkanWindow::Impl::begin(const VulkanImage* rendered) {
   return rendered == nullptr ? Status{} : rendered->record_copy(commands, copied.target());
 }
 
-Status VulkanWindow::Impl::record(std::uint32_t shown, const VulkanImage* image, const PixelRect& place,
+Status VulkanWindow::Impl::record(std::uint32_t shown, const VulkanImage* image, const SDL_Rect& place,
                                   const ImDrawData& drawn_gui) {
-  const bool is_seen = image != nullptr && image->samples() > 0 && place.width > 0 && place.height > 0;
+  const bool is_seen = image != nullptr && image->samples() > 0 && place.w > 0 && place.h > 0;
   if (Status begun = begin(is_seen ? image : nullptr); !begun) return begun;
-  const VkExtent2D size = swapchain->extent();
-  auto pass = info_of<VkRenderPassBeginInfo>(VK_STRUCTURE_TYPE_RENDER_PASS_BEGIN_INFO);
-  const VkClearValue ground{kGround};
-  pass.renderPass = pipelines->pass();
-  pass.framebuffer = swapchain->framebuffer(shown);
-  pass.renderArea = {{0, 0}, size};
-  pass.clearValueCount = 1;
-  pass.pClearValues = &ground;
-  vkCmdBeginRenderPass(commands, &pass, VK_SUBPASS_CONTENTS_INLINE);
-  const VkViewport viewport{0.0F, 0.0F, static_cast<float>(size.width), static_cast<float>(size.height), 0.0F, 1.0F};
-  vkCmdSetViewport(commands, 0, 1, &viewport);
-  if (is_seen) draw_image(*image, place);
-  Status drawn = gui ? gui->draw(commands, drawn_gui, size) : Status{};
+  clear(swapchain->image(shown));
+  if (is_seen) copy(*image, place, swapchain->image(shown));
+  auto info = info_of<VkRenderPassBeginInfo>(VK_STRUCTURE_TYPE_RENDER_PASS_BEGIN_INFO);
+  info.renderPass = pass;
+  info.framebuffer = swapchain->framebuffer(shown);
+  info.renderArea = {{0, 0}, swapchain->extent()};
+  vkCmdBeginRenderPass(commands, &info, VK_SUBPASS_CONTENTS_INLINE);
+  Status drawn = gui ? gui->draw(commands, drawn_gui, swapchain->extent()) : Status{};
   if (!drawn) return drawn;
   vkCmdEndRenderPass(commands);
   return device->check(vkEndCommandBuffer(commands), kShowing);
 }
 
 VkResult VulkanWindow::Impl::show(std::uint32_t shown) {
-  const VkPipelineStageFlags stage = VK_PIPELINE_STAGE_COLOR_ATTACHMENT_OUTPUT_BIT;
+  const VkPipelineStageFlags stage = VK_PIPELINE_STAGE_TRANSFER_BIT;  // `clear` is the first command on the image
   const VkSemaphore drawn = swapchain->drawn(shown);
   auto submit = info_of<VkSubmitInfo>(VK_STRUCTURE_TYPE_SUBMIT_INFO);
   submit.waitSemaphoreCount = submit.commandBufferCount = submit.signalSemaphoreCount = 1;
@@ -195,16 +218,16 @@ VulkanWindow::~VulkanWindow() = default;
 
 Result<VulkanWindow> VulkanWindow::create(std::shared_ptr<WindowDevice> device, bool vsync) {
   auto impl = std::make_unique<Impl>(std::move(device), vsync);
-  auto pipelines = WindowPipelines::create(*impl->device);
-  if (!pipelines) return pipelines.error();
-  impl->pipelines = std::move(*pipelines);
+  const auto pass = Swapchain::make_pass(*impl->device);
+  if (!pass) return pass.error();
+  impl->pass = *pass;
   if (Status made = impl->device->check(impl->make_objects(), "opening a window"); !made) return made.error();
   return VulkanWindow(std::move(impl));
 }
 
 Status VulkanWindow::open_gui() {
   Impl& window = *impl_;
-  auto made = VulkanGui::create(*window.device, window.pipelines->pass());
+  auto made = VulkanGui::create(*window.device, window.pass);
   if (!made) return made.error();
   if (Status begun = window.begin(nullptr); !begun) return begun;
   if (Status recorded = (*made)->upload_fonts(window.commands); !recorded) return recorded;
@@ -224,7 +247,7 @@ void VulkanWindow::close_gui() {
   impl_->gui.reset();
 }
 
-Status VulkanWindow::present(int width, int height, const VulkanImage* image, const PixelRect& place,
+Status VulkanWindow::present(int width, int height, const VulkanImage* image, const SDL_Rect& place,
                              const ImDrawData& gui) {
   if (width <= 0 || height <= 0) return {};
   Impl& window = *impl_;

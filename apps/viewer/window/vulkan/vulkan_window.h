@@ -1,5 +1,7 @@
 #pragma once
 
+#include <SDL_rect.h>
+
 #include <memory>
 
 #include <quoin/core/result.h>
@@ -10,14 +12,6 @@
 struct ImDrawData;
 
 namespace quoin::viewer {
-
-/// A rectangle in window pixels, from the upper left corner.
-struct PixelRect {
-  int x = 0;
-  int y = 0;
-  int width = 0;
-  int height = 0;
-};
 
 /// Shows images of a renderer in the window of the same device.
 ///
@@ -33,16 +27,16 @@ class VulkanWindow {
 
   /// Prepares to draw the GUI of the current Dear ImGui context, with its fonts. Errors: LimitExceeded.
   [[nodiscard]] Status open_gui();
-  /// Ends drawing it. Required before the context or the window is destroyed.
+  /// Ends drawing it. Required before the context is destroyed.
   void close_gui();
 
-  /// Shows an image, stretched over `place`, on a dark background, and the GUI over it, if `open_gui` has succeeded.
-  /// `width` and `height` are the window's current size in pixels; does nothing if one is 0, as in minimised windows.
-  /// `image` may be null or empty.
+  /// Shows an image, stretched over `place`, on a dark background, and the GUI over it if `open_gui` has succeeded.
+  /// `width` and `height` are the window's current size; does nothing if one is 0, as in minimised windows. All sizes
+  /// are in pixels. `image` may be null or empty.
   ///
   /// Rebuilds the swapchain if the window's size has changed. Waits for the display and until the window is drawn;
   /// `image` may be freed afterwards.
-  [[nodiscard]] Status present(int width, int height, const VulkanImage* image, const PixelRect& place,
+  [[nodiscard]] Status present(int width, int height, const VulkanImage* image, const SDL_Rect& place,
                                const ImDrawData& gui);
 
  private:

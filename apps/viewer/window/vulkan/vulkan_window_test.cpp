@@ -114,7 +114,7 @@ TEST_F(VulkanWindowTest, ShowsImagesOfEverySizeAndTheGui) {
   const VulkanImage coarse = drawn(20, 12);
   const VulkanImage never_drawn(*renderer_);
   for (const VulkanImage* image : {&whole, &coarse, &never_drawn, static_cast<const VulkanImage*>(nullptr)}) {
-    for (const PixelRect place : {PixelRect{0, 0, 160, 90}, {-20, 30, 70, 500}, {10, 10, 0, 0}, {500, 500, 10, 10}}) {
+    for (const SDL_Rect place : {SDL_Rect{0, 0, 160, 90}, {-20, 30, 70, 500}, {10, 10, 0, 0}, {500, 500, 10, 10}}) {
       const Status shown = window->present(160, 90, image, place, gui.frame(160, 90));
       ASSERT_TRUE(shown) << to_string(shown.error());
     }

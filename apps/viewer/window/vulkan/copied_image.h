@@ -6,22 +6,20 @@
 
 namespace quoin::viewer {
 
-/// A Vulkan image that Quoin's images are copied into and shaders read.
+/// A Vulkan image that Quoin's images are copied into, to be scaled from there.
 class CopiedImage {
  public:
-  static constexpr VkFormat kFormat = VK_FORMAT_R8G8B8A8_UNORM;  // unchanged bytes
-
   explicit CopiedImage(const WindowDevice& device) : device_(&device) {}
   ~CopiedImage() { free(); }
   CopiedImage(const CopiedImage&) = delete;
   CopiedImage& operator=(const CopiedImage&) = delete;
 
-  /// Recreates the image, with undefined pixels, if its size differs. Returns true if it did.
+  /// Recreates the image, with undefined pixels, if its size differs.
   /// Requires: no commands that read it are running. Errors: LimitExceeded.
-  [[nodiscard]] Result<bool> fit(int width, int height);
+  [[nodiscard]] Status fit(int width, int height);
 
-  [[nodiscard]] VkImageView view() const { return view_; }
-  /// Returns the target for VulkanImage::record_copy, which leaves the image readable by shaders.
+  [[nodiscard]] VkImage handle() const { return image_; }
+  /// Returns the target for VulkanImage::record_copy, which leaves the image in VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL.
   [[nodiscard]] VulkanImageTarget target() const;
 
  private:
@@ -31,7 +29,6 @@ class CopiedImage {
   const WindowDevice* device_;
   VkImage image_ = VK_NULL_HANDLE;
   VkDeviceMemory memory_ = VK_NULL_HANDLE;
-  VkImageView view_ = VK_NULL_HANDLE;
   int width_ = 0;
   int height_ = 0;
 };
