@@ -12,7 +12,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/hash.h>
 
-#include "grid/density/stored_density.h"
+#include "grid/density/density_storage.h"
 
 namespace quoin {
 namespace {

@@ -10,7 +10,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/terrain/noise.h>
 
-#include "grid/density/stored_density.h"
+#include "grid/density/density_storage.h"
 #include "terrain/lattice.h"
 
 namespace quoin::terrain {

@@ -9,7 +9,6 @@
 
 #include "core/rows/content_hash.h"
 #include "grid/density/density_storage.h"
-#include "grid/density/stored_density.h"
 
 namespace quoin {
 namespace {

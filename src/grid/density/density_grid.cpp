@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <utility>
 
 #include <quoin/core/assert.h>
 
+#include "core/trilinear.h"
 #include "grid/density/density_grid_impl.h"
+#include "grid/density/density_storage.h"
 
 namespace quoin {
 
@@ -163,6 +166,263 @@ std::size_t DensityGrid::bytes() const {
 
 void DensityGrid::compact() {
   impl().store.compact();
+}
+
+namespace {
+
+/// A cell between samples and a point in it.
+struct Cell {
+  IVec3 low{0};
+  DVec3 fraction{0.0};
+
+  /// Returns true if all corners have int32 coordinates; false for NaN.
+  bool locate(DVec3 point) {
+    constexpr double kLow = -2'147'483'648.0;
+    constexpr double kHigh = 2'147'483'647.0;
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!(point[axis] >= kLow && point[axis] < kHigh)) return false;
+      const double whole = std::floor(point[axis]);
+      low[axis] = static_cast<int>(whole);
+      fraction[axis] = point[axis] - whole;
+    }
+    return true;
+  }
+};
+
+CellCorners corners_of(const DensityStore& store, IVec3 low) {
+  CellCorners corners{};
+  const auto find_chunk = [&](IVec3 chunk) {
+    const DensityStore::Entry* const entry = store.find(chunk);
+    return entry == nullptr ? nullptr : &entry->samples;
+  };
+  read_cell_corners(
+      low, 1, find_chunk, [&] { return store.band(); }, corners.data());
+  return corners;
+}
+
+}  // namespace
+
+float DensityGrid::density_at(DVec3 point) const {
+  Cell cell;
+  if (!cell.locate(point)) return band();
+  return static_cast<float>(trilinear(corners_of(impl_->store, cell.low), cell.fraction));
+}
+
+DVec3 DensityGrid::gradient_at(DVec3 point) const {
+  Cell cell;
+  if (!cell.locate(point)) return DVec3(0.0);
+  return trilinear_gradient(corners_of(impl_->store, cell.low), cell.fraction);
+}
+
+namespace {
+
+template <class Holds>
+std::uint64_t mask_where(int first, int end, Holds&& holds) {
+  std::uint64_t mask = 0;
+  for (int x = first; x < end; ++x) mask |= std::uint64_t{holds(static_cast<std::size_t>(x))} << x;
+  return mask;
+}
+
+std::uint64_t mask_where_not(const std::array<Half, kChunkEdge>& row, Half value) {
+  return mask_where(0, kChunkEdge, [&](std::size_t x) { return row[x] != value; });
+}
+
+void read_densities(const DensityChunk* samples, Half far, int y, int z, std::array<Half, kChunkEdge>& out) {
+  if (samples != nullptr) {
+    samples->read_row(y, z, out);
+  } else {
+    out.fill(far);
+  }
+}
+
+// Returns true if both rows of densities, and of materials, are uniform and equal.
+bool are_one_value(const DensityChunk& a, const DensityChunk& b, int y, int z) {
+  if (a.row(y, z) != nullptr || b.row(y, z) != nullptr || a.get(0, y, z) != b.get(0, y, z)) return false;
+  const auto material = a.materials().uniform();
+  return material.has_value() && material == b.materials().uniform();
+}
+
+// Returns true if edits within this band could have stored every density.
+[[maybe_unused]] bool is_stored_within(const DensityChunk& samples, Half far) {
+  const auto is_stored = [far](Half density) { return stored_within(float_from_half(density), far) == density; };
+  for (int z = 0; z < kChunkEdge; ++z) {
+    for (int y = 0; y < kChunkEdge; ++y) {
+      const Half* const row = samples.row(y, z);
+      if (row == nullptr ? !is_stored(samples.get(0, y, z)) : !std::all_of(row, row + kChunkEdge, is_stored))
+        return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+DensityStore::DensityStore(float band) : far_(largest_within(band)) {
+  QUOIN_ASSERT(band > 0.0F && band <= kMaxHalf, "0 < band <= 65,504");
+}
+
+VoxelType DensityStore::material(IVec3 sample) const {
+  const Entry* entry = find(chunk_of(sample));
+  if (entry == nullptr) return kAir;
+  const IVec3 local = local_of(sample);
+  if (entry->samples.get(local.x, local.y, local.z) == far_) return kAir;
+  return entry->samples.materials().get(local);
+}
+
+void DensityStore::read_row(const DensityChunk& samples, int y, int z, SampleRow& out) const {
+  std::array<Half, kChunkEdge> halves;
+  samples.read_row(y, z, halves);
+  samples.materials().read_row(y, z, out.materials);
+  for (std::size_t x = 0; x < kChunkEdge; ++x) {
+    out.densities[x] = float_from_half(halves[x]);
+    if (halves[x] == far_) out.materials[x] = kAir;
+  }
+}
+
+std::uint64_t DensityStore::write_row(DensityChunk& samples, int y, int z, int first, int end,
+                                      const SampleRow& row) const {
+  QUOIN_ASSERT(first >= 0 && first < end && end <= kChunkEdge, "0 <= first < end <= 64");
+  std::array<Half, kChunkEdge> halves;
+  samples.read_row(y, z, halves);
+  const std::uint64_t had_material = mask_where_not(halves, far_);
+  for (int x = first; x < end; ++x) {
+    halves[static_cast<std::size_t>(x)] = stored_within(row.densities[static_cast<std::size_t>(x)], far_);
+  }
+  const std::uint64_t changed = samples.write_row(y, z, halves);
+  const std::uint64_t has_material = mask_where(first, end, [&](std::size_t x) { return halves[x] != far_; });
+  std::uint64_t repainted = 0;
+  for (std::uint64_t left = has_material; left != 0;) {
+    const VoxelType type = row.materials[static_cast<std::size_t>(std::countr_zero(left))];
+    const std::uint64_t same = left & mask_where(first, end, [&](std::size_t x) { return row.materials[x] == type; });
+    repainted |= samples.materials().fill_row(y, z, same, type);
+    left &= ~same;
+  }
+  return changed | (repainted & had_material);
+}
+
+ChangeReach DensityStore::differences(const DensityChunk* before, const DensityChunk* after) const {
+  ChangeReach changes;
+  std::array<Half, kChunkEdge> old_row;
+  std::array<Half, kChunkEdge> new_row;
+  std::array<VoxelType, kChunkEdge> old_materials{};
+  std::array<VoxelType, kChunkEdge> new_materials{};
+  for (int z = 0; z < kChunkEdge; ++z) {
+    for (int y = 0; y < kChunkEdge; ++y) {
+      const bool are_both = before != nullptr && after != nullptr;
+      if (are_both && are_one_value(*before, *after, y, z)) continue;
+      read_densities(before, far_, y, z, old_row);
+      read_densities(after, far_, y, z, new_row);
+      if (are_both) {
+        before->materials().read_row(y, z, old_materials);
+        after->materials().read_row(y, z, new_materials);
+      }
+      changes.add(y, z, mask_where(0, kChunkEdge, [&](std::size_t x) {
+                    return old_row[x] != new_row[x] || (new_row[x] != far_ && old_materials[x] != new_materials[x]);
+                  }));
+    }
+  }
+  return changes;
+}
+
+DensityStore::Entry& DensityStore::find_or_create(IVec3 chunk) {
+  const auto stay = [](auto&) {};
+  if (Entry* entry = entries_.find_to_edit(chunk, stay)) return *entry;
+  Entry& made = entries_.find_or_create(chunk, stay);
+  made.samples = DensityChunk(far_);
+  return made;
+}
+
+void DensityStore::finish_edit(IVec3 chunk, Entry& entry, const ChangeReach& changes, bool has_even_row, bool is_edit) {
+  QUOIN_ASSERT(find(chunk) == &entry, "the entry is the chunk's");
+  if (changes.samples != 0) {
+    ++edits_;
+    journal_.note(entry.serial, {chunk, changes, is_edit}, entries_.size());
+    if (has_even_row) entry.samples.unite_slabs();
+  }
+  if (entry.samples.uniform() == far_) entries_.erase(chunk, [](auto&) {});
+}
+
+std::int64_t DensityStore::make_solid(IVec3 chunk, VoxelType material) {
+  Entry& entry = find_or_create(chunk);
+  entry.samples = DensityChunk(stored_within(-band(), far_), material);
+  ChangeReach changes;
+  changes.add_all();
+  finish_edit(chunk, entry, changes, false);
+  return changes.samples;
+}
+
+std::int64_t DensityStore::put(IVec3 chunk, DensityChunk samples) {
+  QUOIN_ASSERT(is_stored_within(samples, far_), "densities are stored_density of the band");
+  if (!loaded_.may_edit(chunk)) return 0;
+  samples.unite_slabs();
+  const Entry* present = find(chunk);
+  if (present != nullptr && present->samples.shares_storage_with(samples)) return 0;
+  const ChangeReach changes = differences(present == nullptr ? nullptr : &present->samples, &samples);
+  if (present == nullptr && changes.samples == 0) return 0;
+  journal_.begin_change();
+  Entry& entry = find_or_create(chunk);
+  entry.samples = std::move(samples);
+  finish_edit(chunk, entry, changes, false);
+  return changes.samples;
+}
+
+// Records samples that were, or now are, not loaded.
+void DensityStore::replace(IVec3 chunk, DensityChunk samples) {
+  journal_.begin_change();
+  Entry& entry = find_or_create(chunk);
+  entry.samples = std::move(samples);
+  ChangeReach all;
+  all.add_all();
+  finish_edit(chunk, entry, all, false, false);
+}
+
+void DensityStore::make_partial() {
+  clear();
+  loaded_.begin();
+}
+
+// Skips the per-sample checks of `put`: chunks are loaded on threads that must not wait.
+bool DensityStore::load(IVec3 chunk, DensityChunk samples) {
+  if (!loaded_.add(chunk)) return false;
+  samples.unite_slabs();
+  replace(chunk, std::move(samples));
+  return true;
+}
+
+bool DensityStore::unload(IVec3 chunk) {
+  if (!loaded_.remove(chunk)) return false;
+  replace(chunk, DensityChunk(far_));
+  return true;
+}
+
+void DensityStore::clear() {
+  if (entries_.size() == 0) return;
+  ++edits_;
+  journal_.begin_change();
+  entries_.for_each([this](IVec3 at, const Entry& entry) {
+    std::uint64_t serial = entry.serial;
+    journal_.note(serial, {at, differences(&entry.samples, nullptr)}, entries_.size());
+  });
+  entries_.clear();
+}
+
+std::vector<IVec3> DensityStore::chunks() const {
+  std::vector<IVec3> all;
+  all.reserve(entries_.size());
+  entries_.for_each([&](IVec3 at, const Entry&) { all.push_back(at); });
+  std::sort(all.begin(), all.end(), by_zyx);
+  return all;
+}
+
+std::size_t DensityStore::bytes() const {
+  std::size_t total =
+      sizeof(DensityGrid) + sizeof(DensityStore) + entries_.bytes() + loaded_.bytes() + journal_.bytes();
+  entries_.for_each([&](IVec3, const Entry& entry) { total += entry.samples.bytes() - sizeof(DensityChunk); });
+  return total;
+}
+
+void DensityStore::compact() {
+  for (const IVec3 at : chunks()) find_or_create(at).samples.compact();
 }
 
 }  // namespace quoin

@@ -14,7 +14,7 @@
 #include <quoin/core/assert.h>
 
 #include "core/coordinates/chunk_order.h"
-#include "grid/density/stored_density.h"
+#include "grid/density/density_storage.h"
 
 namespace quoin {
 namespace {

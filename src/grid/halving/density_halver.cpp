@@ -7,7 +7,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "grid/density/stored_density.h"
+#include "grid/density/density_storage.h"
 #include "grid/halving/halving.h"
 
 namespace quoin {

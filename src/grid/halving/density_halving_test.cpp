@@ -9,7 +9,7 @@
 
 #include <quoin/grid/downsample.h>
 
-#include "grid/density/stored_density.h"
+#include "grid/density/density_storage.h"
 
 namespace quoin {
 namespace {

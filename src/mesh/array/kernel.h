@@ -9,7 +9,7 @@
 #include <quoin/grid/volume.h>
 
 #include "core/instruction_set.h"
-#include "grid/density/stored_density.h"
+#include "grid/density/density_storage.h"
 #include "mesh/array/interfaces.h"
 #include "mesh/array/placement.h"
 

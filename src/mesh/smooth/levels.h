@@ -14,7 +14,6 @@
 #include <quoin/grid/density_chunk.h>
 #include <quoin/mesh/smooth.h>
 
-#include "grid/density/cell_corners.h"
 #include "grid/density/density_storage.h"
 #include "mesh/smooth/cell.h"
 #include "mesh/smooth/quad.h"

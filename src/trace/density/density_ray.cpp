@@ -6,7 +6,6 @@
 #include <quoin/core/assert.h>
 
 #include "core/trilinear.h"
-#include "grid/density/cell_corners.h"
 #include "grid/density/density_storage.h"
 #include "trace/kernel/kernel.h"
 
