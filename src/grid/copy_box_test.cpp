@@ -44,9 +44,9 @@ void expect_equal(const Grid& found, const Grid& expected) {
   for (const IVec3 chunk : expected.chunks()) ASSERT_TRUE(*found.find_chunk(chunk) == *expected.find_chunk(chunk));
 }
 
-struct Random {
+struct RandomBoxes {
   std::mt19937 engine;
-  explicit Random(unsigned seed) : engine(seed) {}
+  explicit RandomBoxes(unsigned seed) : engine(seed) {}
   int below(int limit) { return static_cast<int>(engine() % static_cast<unsigned>(limit)); }
   IVec3 place(int reach) { return {below(2 * reach) - reach, below(2 * reach) - reach, below(2 * reach) - reach}; }
   // Returns a grid of boxes, single voxels and uniform chunks.
@@ -72,7 +72,7 @@ struct Random {
 TEST(CopyBox, PutsEveryVoxelWhereItBelongs) {
   for (unsigned seed = 1; seed <= 60; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    Random random(seed);
+    RandomBoxes random(seed);
     const Grid from = random.grid();
     Grid to = random.grid();
     Grid expected = to.snapshot();
@@ -94,7 +94,7 @@ TEST(CopyBox, PutsEveryVoxelWhereItBelongs) {
 TEST(CopyBox, WithinOneGridCopiesAsIfAtOnce) {
   for (unsigned seed = 1; seed <= 40; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    Random random(seed);
+    RandomBoxes random(seed);
     Grid grid = random.grid();
     Grid expected = grid.snapshot();
     const IBox box = random.box();
@@ -111,7 +111,7 @@ TEST(CopyBox, WithinOneGridCopiesAsIfAtOnce) {
 }
 
 TEST(CopyBox, WholeChunksAreSharedWhereTheyAreMovedByChunks) {
-  Random random(1);
+  RandomBoxes random(1);
   const Grid from = random.grid();
   Grid to;
   const IBox all{IVec3(-256), IVec3(256)};
@@ -135,7 +135,7 @@ TEST(CopyBox, WholeChunksAreSharedWhereTheyAreMovedByChunks) {
 }
 
 TEST(CopyBox, TurningFourTimesIsNoTurn) {
-  Random random(7);
+  RandomBoxes random(7);
   const Grid from = random.grid();
   const IBox box{{-70, -40, -90}, {50, 77, 33}};
   for (int axis = 0; axis < 3; ++axis) {
@@ -156,7 +156,7 @@ TEST(CopyBox, TurningFourTimesIsNoTurn) {
 }
 
 TEST(CopyBox, TheJournalHoldsExactlyTheChanges) {
-  Random random(11);
+  RandomBoxes random(11);
   Grid grid = random.grid();
   ChangeCursor cursor = grid.cursor();
   EXPECT_EQ(copy_box(grid, {IVec3(-80), IVec3(80)}, grid, IVec3(-80)), 0);
