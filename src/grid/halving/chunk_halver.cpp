@@ -11,6 +11,261 @@
 namespace quoin {
 namespace {
 
+constexpr std::uint64_t kOdd = 0xAAAA'AAAA'AAAA'AAAAU;
+constexpr std::uint64_t kLowHalf = 0xFFFF'FFFFU;
+
+// A bit a cell.
+struct WordCells {
+  std::uint64_t any = 0;
+  std::uint64_t half = 0;
+  std::array<std::uint64_t, 3> rod{};
+};
+
+// The voxels in four rows [z][y] that make a row of cells: of each cell the one with the lower x, and the other.
+struct CellVoxels {
+  std::array<std::uint64_t, 4> lower{};
+  std::array<std::uint64_t, 4> upper{};
+};
+
+std::uint64_t at_least_two(std::uint64_t a, std::uint64_t b, std::uint64_t c) {
+  return (a & b) | (c & (a ^ b));
+}
+
+// Adds up each cell's eight voxels, 64 cells at once.
+WordCells cells_of(const CellVoxels& voxels) {
+  const auto& [lower, upper] = voxels;
+  const std::array<std::uint64_t, 4> pairs = {
+      at_least_two(lower[0], upper[0], lower[1]), at_least_two(upper[1], lower[2], upper[2]), lower[3] & upper[3],
+      at_least_two(lower[0] ^ upper[0] ^ lower[1], upper[1] ^ lower[2] ^ upper[2], lower[3] ^ upper[3])};
+  std::array<std::uint64_t, 4> any{};
+  for (std::size_t i = 0; i < any.size(); ++i) any[i] = lower[i] | upper[i];
+  WordCells cells;
+  cells.any = any[0] | any[1] | any[2] | any[3];
+  cells.half = (pairs[0] & pairs[1]) | (pairs[2] & pairs[3]) | ((pairs[0] | pairs[1]) & (pairs[2] | pairs[3]));
+  const std::uint64_t few = (pairs[0] | pairs[1] | pairs[2] | pairs[3]) & ~cells.half;
+  cells.rod = {few & (lower[0] | lower[1] | lower[2] | lower[3]) & (upper[0] | upper[1] | upper[2] | upper[3]),
+               few & (any[0] | any[2]) & (any[1] | any[3]), few & (any[0] | any[1]) & (any[2] | any[3])};
+  return cells;
+}
+
+// The rows of a chunk as masks of non-air voxels. Looks up air in the palette once.
+class SolidRows {
+ public:
+  explicit SolidRows(const Chunk& chunk) : voxels_(ChunkStorage::of(chunk)) {
+    if (voxels_ == nullptr) {
+      uniform_ = chunk.uniform() == kAir ? 0 : ~std::uint64_t{0};
+      return;
+    }
+    if (voxels_->direct()) return;
+    const auto& palette = voxels_->palette;
+    const auto found = std::find(palette.begin(), palette.end(), kAir);
+    has_air_ = found != palette.end();
+    air_ = static_cast<std::uint32_t>(found - palette.begin());
+  }
+
+  [[nodiscard]] std::uint64_t row(int y, int z) const {
+    if (voxels_ == nullptr) return uniform_;
+    if (!has_air_) return ~std::uint64_t{0};
+    const std::uint32_t slab = voxels_->slabs[ChunkStorage::slab_index(y, z)];
+    if ((slab & ChunkStorage::kUniformSlab) != 0)
+      return (slab & ~ChunkStorage::kUniformSlab) == air_ ? 0 : ~std::uint64_t{0};
+    return ~packed_row::equal_mask(voxels_->row(slab, ChunkStorage::row_in_slab(y, z)), voxels_->bits, air_);
+  }
+
+  /// The first two voxels of a row, at their bits, or the last two.
+  [[nodiscard]] std::uint64_t end_of_row(int y, int z, bool is_first) const {
+    const std::uint64_t ends = is_first ? 3U : std::uint64_t{3} << 62;
+    if (voxels_ == nullptr) return uniform_ & ends;
+    if (!has_air_) return ends;
+    const std::uint32_t slab = voxels_->slabs[ChunkStorage::slab_index(y, z)];
+    if ((slab & ChunkStorage::kUniformSlab) != 0) return (slab & ~ChunkStorage::kUniformSlab) == air_ ? 0 : ends;
+    const int row = ChunkStorage::row_in_slab(y, z);
+    const int x = is_first ? 0 : kChunkEdge - 2;
+    return (std::uint64_t{voxels_->read(slab, row, x) != air_} | std::uint64_t{voxels_->read(slab, row, x + 1) != air_}
+                                                                     << 1)
+           << x;
+  }
+
+  /// The 16 rows of a slab in the order in which they are stored.
+  void slab(std::size_t index, std::array<std::uint64_t, 16>& out) const {
+    const std::uint32_t slot = voxels_ == nullptr ? ChunkStorage::kUniformSlab : voxels_->slabs[index];
+    if ((slot & ChunkStorage::kUniformSlab) != 0 || !has_air_) {
+      const int y = static_cast<int>(index % 16) * 4;
+      const int z = static_cast<int>(index / 16) * 4;
+      out.fill(row(y, z));
+    } else if (voxels_->bits == 2) {
+      where_not_air_of_two_bits(voxels_->row(slot, 0), out);
+    } else {
+      for (int i = 0; i < 16; ++i) {
+        out[static_cast<std::size_t>(i)] = ~packed_row::equal_mask(voxels_->row(slot, i), voxels_->bits, air_);
+      }
+    }
+  }
+
+ private:
+  // Processes all words first, in a loop that compilers vectorise.
+  void where_not_air_of_two_bits(const std::uint64_t* words, std::array<std::uint64_t, 16>& out) const {
+    const std::uint64_t air = packed_row::repeat(2, air_);
+    std::array<std::uint64_t, 32> halves;
+    for (std::size_t i = 0; i < halves.size(); ++i) {
+      const std::uint64_t other = words[i] ^ air;
+      halves[i] = packed_row::gather_even_bits(other | other >> 1);
+    }
+    for (std::size_t i = 0; i < out.size(); ++i) out[i] = halves[2 * i] | halves[2 * i + 1] << 32;
+  }
+
+  const ChunkStorage* voxels_;
+  std::uint64_t uniform_ = 0;
+  std::uint32_t air_ = kAir;
+  bool has_air_ = true;
+};
+
+}  // namespace
+
+HalvingMasks::HalvingMasks(const Grid& grid, IVec3 chunk)
+    : fine_(std::size_t{kRows} * kRows), cells_(std::size_t{kCellRows} * kCellRows) {
+  for (int z = -1; z <= 2; ++z) {
+    for (int y = -1; y <= 2; ++y) {
+      for (int x = -1; x <= 2; ++x) {
+        const IVec3 at{x, y, z};
+        int outside = 0;
+        for (int axis = 0; axis < 3; ++axis) outside += at[axis] < 0 || at[axis] > 1;
+        if (outside > 1) continue;
+        chunks_[slot(at)] = grid.find_chunk(2 * chunk + at);
+        if (chunks_[slot(at)] != nullptr) read_voxels(at);
+      }
+    }
+  }
+  for (int z = -1; z <= kChunkEdge; ++z) {
+    for (int y = -1; y <= kChunkEdge; ++y) count_cells(y, z);
+  }
+}
+
+void HalvingMasks::read_voxels(IVec3 octant) {
+  const SolidRows solid(*chunks_[slot(octant)]);
+  const IVec3 first = octant * kChunkEdge;
+  const IVec3 low = glm::max(IVec3(-2) - first, IVec3(0));
+  const IVec3 high = glm::min(IVec3(kFineEdge + 2) - first, IVec3(kChunkEdge));
+  const auto word = static_cast<std::size_t>(octant.x + 1);
+  if (high.x - low.x < kChunkEdge) {
+    for (int z = low.z; z < high.z; ++z) {
+      for (int y = low.y; y < high.y; ++y) fine(first.y + y, first.z + z)[word] = solid.end_of_row(y, z, low.x == 0);
+    }
+    return;
+  }
+  std::array<std::uint64_t, 16> rows;
+  for (int z = low.z & ~3; z < high.z; z += 4) {
+    for (int y = low.y & ~3; y < high.y; y += 4) {
+      solid.slab(ChunkStorage::slab_index(y, z), rows);
+      const int last_y = std::min(y + 4, high.y);
+      const int last_z = std::min(z + 4, high.z);
+      for (int row_z = std::max(z, low.z); row_z < last_z; ++row_z) {
+        for (int row_y = std::max(y, low.y); row_y < last_y; ++row_y) {
+          fine(first.y + row_y, first.z + row_z)[word] =
+              rows[static_cast<std::size_t>(ChunkStorage::row_in_slab(row_y, row_z))];
+        }
+      }
+    }
+  }
+}
+
+void HalvingMasks::count_cells(int y, int z) {
+  const std::array<const FineRow*, 4> rows = {&fine(2 * y, 2 * z), &fine(2 * y + 1, 2 * z), &fine(2 * y, 2 * z + 1),
+                                              &fine(2 * y + 1, 2 * z + 1)};
+  const auto any_of = [&rows](std::size_t word) {
+    return (*rows[0])[word] | (*rows[1])[word] | (*rows[2])[word] | (*rows[3])[word];
+  };
+  CellRow& row = cells_[static_cast<std::size_t>((z + 1) * kCellRows + y + 1)];
+  if ((any_of(1) | any_of(2)) != 0) {
+    std::array<std::uint64_t, 8> words;
+    for (std::size_t i = 0; i < words.size(); ++i) words[i] = (*rows[i / 2])[1 + i % 2];
+    for (std::uint64_t& word : words) word = packed_row::split_pairs(word);
+    CellVoxels voxels;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      voxels.lower[i] = (words[2 * i] & kLowHalf) | words[2 * i + 1] << 32;
+      voxels.upper[i] = words[2 * i] >> 32 | (words[2 * i + 1] & ~kLowHalf);
+    }
+    const WordCells cells = cells_of(voxels);
+    row.any.bits = cells.any;
+    row.half.bits = cells.half;
+    for (std::size_t axis = 0; axis < 3; ++axis) row.rod[axis].bits = cells.rod[axis];
+  }
+  if ((any_of(0) | any_of(3)) == 0) return;
+  CellVoxels voxels;  // the cell before as bit 0, the one after as bit 1
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const FineRow& of = *rows[i];
+    voxels.lower[i] = (of[0] >> 62 & 1U) | (of[3] & 1U) << 1;
+    voxels.upper[i] = of[0] >> 63 | (of[3] & 2U);
+  }
+  const WordCells cells = cells_of(voxels);
+  const auto put = [](CellBits& to, std::uint64_t from) {
+    to.before = (from & 1U) != 0;
+    to.after = (from & 2U) != 0;
+  };
+  put(row.any, cells.any);
+  put(row.half, cells.half);
+  for (std::size_t axis = 0; axis < 3; ++axis) put(row.rod[axis], cells.rod[axis]);
+}
+
+std::uint64_t HalvingMasks::kept_rods(int y, int z, int axis) const {
+  QUOIN_ASSERT((y | z) >= 0 && (y | z) < kChunkEdge && axis >= 0 && axis < 3, "a row of the chunk, and an axis");
+  const CellRow& here = cells(y, z);
+  const auto of = static_cast<std::size_t>(axis);
+  std::uint64_t kept = here.rod[of].bits;
+  if (kept == 0) return 0;
+  const CellRow& lower_y = cells(y - 1, z);
+  const CellRow& upper_y = cells(y + 1, z);
+  const CellRow& lower_z = cells(y, z - 1);
+  const CellRow& upper_z = cells(y, z + 1);
+  if (axis == 0) {
+    kept &= here.any.lower() | here.any.upper();
+  } else {
+    kept &= ~(here.half.lower() | here.half.upper()) & ~(here.rod[of].lower() & kOdd);
+  }
+  if (axis == 1) {
+    kept &= lower_y.any.bits | upper_y.any.bits;
+  } else {
+    kept &= ~(lower_y.half.bits | upper_y.half.bits);
+    if ((y & 1) != 0) kept &= ~lower_y.rod[of].bits;
+  }
+  if (axis == 2) {
+    kept &= lower_z.any.bits | upper_z.any.bits;
+  } else {
+    kept &= ~(lower_z.half.bits | upper_z.half.bits);
+    if ((z & 1) != 0) kept &= ~lower_z.rod[of].bits;
+  }
+  return kept;
+}
+
+std::uint64_t HalvingMasks::solid_cells(int y, int z) const {
+  std::uint64_t solid = cells(y, z).half.bits;
+  for (int axis = 0; axis < 3; ++axis) solid |= kept_rods(y, z, axis);
+  return solid;
+}
+
+std::array<std::uint64_t, 3> HalvingMasks::exposed_faces(int half, int y, int z) const {
+  QUOIN_ASSERT(half == 0 || half == 1, "one of two halves");
+  const auto word = static_cast<std::size_t>(half + 1);
+  const FineRow& row = fine(y, z);
+  const std::uint64_t lower_x = ~(row[word] << 1 | row[word - 1] >> 63);
+  const std::uint64_t upper_x = ~(row[word] >> 1 | row[word + 1] << 63);
+  const std::array<std::uint64_t, 4> others = {~fine(y - 1, z)[word], ~fine(y + 1, z)[word], ~fine(y, z - 1)[word],
+                                               ~fine(y, z + 1)[word]};
+  struct Sum {
+    std::uint64_t ones;
+    std::uint64_t twos;
+  };
+  const auto add = [](std::uint64_t a, std::uint64_t b, std::uint64_t c) {
+    return Sum{a ^ b ^ c, (a & b) | (c & (a ^ b))};
+  };
+  const Sum first = add(lower_x, upper_x, others[0]);
+  const Sum second = add(others[1], others[2], others[3]);
+  const Sum twos = add(first.twos, second.twos, first.ones & second.ones);
+  return {first.ones ^ second.ones, twos.ones, twos.twos};
+}
+
+namespace {
+
 constexpr int kHalfEdge = kChunkEdge / 2;
 constexpr std::uint64_t kHalfRow = 0xFFFF'FFFFU;
 

@@ -1,16 +1,91 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
 
-#include "grid/halving/halving.h"
-
 namespace quoin {
+
+/// Gathers the 32 even bits.
+constexpr std::uint64_t even_bits(std::uint64_t bits) {
+  bits &= 0x5555'5555'5555'5555U;
+  bits = (bits | bits >> 1) & 0x3333'3333'3333'3333U;
+  bits = (bits | bits >> 2) & 0x0F0F'0F0F'0F0F'0F0FU;
+  bits = (bits | bits >> 4) & 0x00FF'00FF'00FF'00FFU;
+  bits = (bits | bits >> 8) & 0x0000'FFFF'0000'FFFFU;
+  return (bits | bits >> 16) & 0x0000'0000'FFFF'FFFFU;
+}
+
+/// The non-air voxels around one chunk of a halved grid, and the cells that are solid for that reason.
+///
+/// Space: fine, voxels from the chunk's least corner, -2 to 129 on each axis; cells, -1 to 64. Outside of the
+///        chunk, only voxels and cells that share a face with the inside are known.
+class HalvingMasks {
+ public:
+  /// `chunk` is of the halved grid.
+  HalvingMasks(const Grid& grid, IVec3 chunk);
+
+  /// Returns the chunk of the full grid at `octant`, 0 or 1 on each axis; null if all is air.
+  [[nodiscard]] const Chunk* octant(IVec3 octant) const { return chunks_[slot(octant)]; }
+  /// The solid cells of a row, 0 <= y, z < 64.
+  [[nodiscard]] std::uint64_t solid_cells(int y, int z) const;
+  /// Returns the non-air voxels of half a row, 0 <= y, z < 128; `half` is 0 or 1.
+  [[nodiscard]] std::uint64_t voxels(int half, int y, int z) const {
+    QUOIN_ASSERT(half == 0 || half == 1, "one of two halves");
+    return fine(y, z)[static_cast<std::size_t>(half + 1)];
+  }
+  /// Returns the number of exposed faces of each voxel of half a row, as bit planes: [0] ones, [1] twos, [2] fours.
+  [[nodiscard]] std::array<std::uint64_t, 3> exposed_faces(int half, int y, int z) const;
+
+ private:
+  static constexpr int kFineEdge = 2 * kChunkEdge;
+  static constexpr int kRows = kFineEdge + 4;
+  static constexpr int kCellRows = kChunkEdge + 2;
+
+  /// 64 cells along x as bits, plus the cell before and the one after.
+  struct CellBits {
+    std::uint64_t bits = 0;
+    bool before = false;
+    bool after = false;
+    [[nodiscard]] std::uint64_t lower() const { return bits << 1 | std::uint64_t{before}; }
+    [[nodiscard]] std::uint64_t upper() const { return bits >> 1 | std::uint64_t{after} << 63; }
+  };
+  struct CellRow {
+    CellBits any;
+    CellBits half;                ///< at least 4 voxels
+    std::array<CellBits, 3> rod;  ///< 2 or 3 voxels, some in either half along the axis
+  };
+  /// 128 voxels along x, and a word before and after.
+  using FineRow = std::array<std::uint64_t, 4>;
+
+  [[nodiscard]] static std::size_t slot(IVec3 octant) {
+    QUOIN_ASSERT((IBox{IVec3(-1), IVec3(3)}.contains(octant)), "-1 <= x, y, z <= 2");
+    return static_cast<std::size_t>((octant.z + 1) * 16 + (octant.y + 1) * 4 + octant.x + 1);
+  }
+  [[nodiscard]] const FineRow& fine(int y, int z) const {
+    QUOIN_ASSERT(std::min(y, z) >= -2 && std::max(y, z) < kFineEdge + 2, "-2 <= y, z < 130");
+    return fine_[static_cast<std::size_t>((z + 2) * kRows + y + 2)];
+  }
+  [[nodiscard]] FineRow& fine(int y, int z) { return const_cast<FineRow&>(std::as_const(*this).fine(y, z)); }
+  [[nodiscard]] const CellRow& cells(int y, int z) const {
+    QUOIN_ASSERT(std::min(y, z) >= -1 && std::max(y, z) <= kChunkEdge, "-1 <= y, z <= 64");
+    return cells_[static_cast<std::size_t>((z + 1) * kCellRows + y + 1)];
+  }
+  void read_voxels(IVec3 octant);
+  void count_cells(int y, int z);
+  [[nodiscard]] std::uint64_t kept_rods(int y, int z, int axis) const;
+
+  std::array<const Chunk*, 64> chunks_{};
+  std::vector<FineRow> fine_;
+  std::vector<CellRow> cells_;
+};
 
 /// Makes one chunk of a halved grid.
 ///
