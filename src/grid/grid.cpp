@@ -16,7 +16,6 @@
 #include "grid/bounds_cache.h"
 #include "grid/change_records.h"
 #include "grid/chunk/chunk_data.h"
-#include "grid/chunk/chunk_difference.h"
 #include "grid/chunk/chunk_storage.h"
 #include "grid/chunk_table.h"
 #include "grid/loaded_chunks.h"

@@ -15,7 +15,7 @@
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
 
-#include "grid/chunk/chunk_difference.h"
+#include "grid/change_records.h"
 
 namespace quoin {
 

@@ -1,4 +1,4 @@
-#include "grid/chunk/chunk_difference.h"
+#include "grid/change_records.h"
 
 #include <random>
 
