@@ -4,7 +4,7 @@
 
 #ifdef QUOIN_X86_KERNELS
 
-#include "mesh/array/table.inl"
+#include "mesh/array/kernel.inl"
 #include "mesh/array/vertices.inl"
 
 namespace quoin::array {

@@ -2,10 +2,9 @@
 
 #include <cstddef>
 
-#include "mesh/array/cell.h"
+#include "mesh/array/array_vertex.h"
 #include "mesh/array/kernel.h"
-#include "mesh/array/place.inl"
-#include "mesh/array/table.inl"
+#include "mesh/array/kernel.inl"
 
 namespace quoin::array {
 namespace {

@@ -9,7 +9,7 @@
 #include <cstddef>
 
 #include "mesh/array/kernel.h"
-#include "mesh/array/place.inl"
+#include "mesh/array/kernel.inl"
 #include "mesh/trilinear_normals.inl"
 
 namespace quoin::array {

@@ -1,4 +1,4 @@
-#include "mesh/array/lattice.h"
+#include "mesh/array/array_lattice.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,12 +1,25 @@
-#pragma once
+// The samples of an array: values of any type, their signs (solid or air), and their distances from the surface.
 
-// Converts values of any type to signs (solid or air) and to distances from the surface.
+#pragma once
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <type_traits>
+#include <vector>
+
+#include <quoin/core/buffer.h>
+#include <quoin/core/parallel.h>
+#include <quoin/core/result.h>
+#include <quoin/core/vec.h>
+#include <quoin/grid/volume.h>
+#include <quoin/mesh/array_surface.h>
+
+#include "core/work/progress_steps.h"
+#include "mesh/array/array_lattice.h"
+#include "mesh/array/kernel.h"
 
 namespace quoin::array {
 
@@ -110,6 +123,72 @@ class Densities {
   T whole_{};  // for 64-bit integers: the surface's value in two parts
   double part_ = 0.0;
   bool is_inside_ = false;
+};
+
+// The rows of samples at the corners of a row of cells, (y, z) before both, after in y, in z, in both. Beyond the
+// array, the adjacent row is repeated as air at the same distance from the surface.
+struct CornerRows {
+  const std::byte* rows[4];
+  bool is_beyond[4];
+  const std::byte* next;  // after in y, in the slice after both; null if there is none
+  std::ptrdiff_t stride;
+  std::int64_t size;  // samples of a row
+};
+
+// Returns the rows of samples around a row of cells.
+[[nodiscard]] CornerRows corner_rows(const Lattice& lattice, std::int64_t row, std::int64_t slice);
+
+// The raw values at cells' corners, [x + 2 y + 4 z][cell], and the corners beyond the array.
+struct RawCorners {
+  alignas(64) std::byte values[8 * kBatch * 8];
+  std::uint8_t is_beyond[kBatch];
+  bool has_beyond = false;
+};
+
+struct CornerReader {
+  // Reads the corners of cells of a row into `out`, starting at index `at`.
+  void (*read)(const CornerRows& rows, const std::int32_t* cells, std::size_t count, std::size_t at, RawCorners& out);
+  // Converts the first `count` corners to densities.
+  void (*convert)(const RawCorners& raw, const SolidRule& rule, std::size_t count, CornerBatch& out);
+};
+
+[[nodiscard]] CornerReader corner_reader(ScalarType type);
+
+// Writes the limit that kernels compare values with. Returns true if all values are solid; the limit has no effect
+// then.
+[[nodiscard]] bool write_limit(ScalarType type, const SolidRule& rule, std::byte (&limit)[8]);
+
+// The signs of an array's samples, and the edges that get quads.
+class Signs {
+ public:
+  Signs(const Lattice& lattice, const ArraySurfaceOptions& options);
+
+  [[nodiscard]] const SolidRule& rule() const { return rule_; }
+  [[nodiscard]] bool is_open() const { return is_open_; }
+
+  Status find(Threads threads, ProgressSteps& steps);
+
+  // Returns a slice of signs; null beyond the array.
+  [[nodiscard]] const std::uint64_t* slice(std::size_t z) const {
+    return z < lattice_.slices() ? bits_.data() + z * lattice_.slice_words() : nullptr;
+  }
+  // Returns the solid corners of a cell, by x + 2 y + 4 z.
+  [[nodiscard]] std::uint32_t solid_corners(IVec3 cell) const;
+
+  // The functions of a source for EdgeWindow.
+  void within(std::size_t z, std::uint64_t* along_rows, std::uint64_t* between_rows) const;
+  void between(std::size_t slice_of_cells, std::uint64_t* out) const;
+
+ private:
+  void find_row(std::size_t y, std::size_t z, const std::byte* limit, std::vector<std::byte>& packed);
+  void keep_inner(std::uint64_t* rows, std::size_t count, const std::vector<std::uint64_t>& mask) const;
+
+  const Lattice& lattice_;
+  SolidRule rule_;
+  bool is_open_;
+  std::vector<std::uint64_t> along_mask_;  // for an open border
+  std::vector<std::uint64_t> sample_mask_;
+  Buffer<std::uint64_t> bits_;  // [slice][row][word]
 };
 
 }  // namespace quoin::array
