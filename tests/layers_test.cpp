@@ -201,7 +201,7 @@ TEST(Layers, AWrongIncludeIsABreach) {
   EXPECT_TRUE(breach("io", 5, "quoin/render/cpu_renderer.h").has_value()) << "siblings";
   EXPECT_TRUE(breach("grid", 1, "../mesh/watertight.h").has_value());
   EXPECT_FALSE(breach("io", 5, "quoin/mesh/quad.h").has_value());
-  EXPECT_FALSE(breach("mesh", 2, "mesh/blocky/watertight.h").has_value());
+  EXPECT_FALSE(breach("mesh", 2, "mesh/blocky/chunk_triangles.h").has_value());
   EXPECT_FALSE(breach("mesh", 2, "vector").has_value());
 }
 

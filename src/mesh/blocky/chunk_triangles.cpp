@@ -1,11 +1,107 @@
 #include "mesh/blocky/chunk_triangles.h"
 
+#include <algorithm>
 #include <limits>
 
 #include <quoin/core/assert.h>
+#include <quoin/grid/chunk.h>
+#include <quoin/mesh/blocky.h>
 #include <quoin/mesh/quad_triangles.h>
 
+#include "core/work/progress_steps.h"
+
 namespace quoin {
+namespace {
+
+constexpr int kLattice = kChunkEdge + 1;
+
+std::size_t lattice_index(IVec3 p) {
+  QUOIN_ASSERT(std::min({p.x, p.y, p.z}) >= 0 && std::max({p.x, p.y, p.z}) < kLattice,
+               "a corner of the chunk's voxels");
+  return static_cast<std::size_t>((p.z * kLattice + p.y) * kLattice + p.x);
+}
+
+bool is_on_border(int coordinate) {
+  return coordinate == 0 || coordinate == kChunkEdge;
+}
+
+// Returns true if an edge along `axis` through `p` is in a border plane of the chunk.
+bool edge_is_on_border(IVec3 p, int axis) {
+  for (int other = 0; other < 3; ++other) {
+    if (other != axis && is_on_border(p[other])) return true;
+  }
+  return false;
+}
+
+// Returns the indices of the four corners in an outline.
+std::array<std::size_t, 4> corner_places(const std::vector<OutlinePoint>& outline) {
+  std::array<std::size_t, 4> places{};
+  std::size_t found = 1;
+  for (std::size_t i = 1; i < outline.size() && found < 4; ++i) {
+    const IVec3 before = outline[i].position - outline[i - 1].position;
+    const IVec3 after = outline[(i + 1) % outline.size()].position - outline[i].position;
+    const bool is_straight = glm::sign(before) == glm::sign(after);
+    if (!is_straight) places[found++] = i;
+  }
+  QUOIN_ASSERT(found == 4, "an outline with four corners");
+  return places;
+}
+
+}  // namespace
+
+void OutlineFinder::prepare(const QuadBuffer& quads) {
+  corners_.assign((static_cast<std::size_t>(kLattice) * kLattice * kLattice + 63) / 64, 0);
+  for (const Quad& quad : quads) {
+    for (int corner = 0; corner < 4; ++corner) {
+      const std::size_t index = lattice_index(quad.corner(corner));
+      corners_[index / 64] |= std::uint64_t{1} << (index % 64);
+    }
+  }
+}
+
+bool OutlineFinder::is_vertex(IVec3 p) const {
+  QUOIN_ASSERT(!corners_.empty(), "quads that were prepared");
+  const std::size_t index = lattice_index(p);
+  return (corners_[index / 64] >> (index % 64) & 1U) != 0;
+}
+
+void OutlineFinder::outline(const Quad& quad, std::vector<OutlinePoint>& out) const {
+  out.clear();
+  for (int corner = 0; corner < 4; ++corner) {
+    const IVec3 from = quad.corner(corner);
+    const IVec3 to = quad.corner((corner + 1) % 4);
+    const IVec3 step = glm::sign(to - from);
+    const int axis = step.x != 0 ? 0 : step.y != 0 ? 1 : 2;
+    const bool all = edge_is_on_border(from, axis);
+    out.push_back({from, quad.occlusion(corner)});
+    for (IVec3 p = from + step; p != to; p += step) {
+      // Quads merge only where occlusion is constant, so occlusion is constant along an edge longer than a voxel.
+      if (all || is_vertex(p)) out.push_back({p, quad.occlusion(corner)});
+    }
+  }
+}
+
+// A and C are the ends of the diagonal. Fans from C cover side A-B, fans from the last point before B cover side B-C.
+// The other half works in the same way.
+void triangulate_outline(const std::vector<OutlinePoint>& outline, bool flipped, std::uint32_t base,
+                         std::vector<std::uint32_t>& indices) {
+  const std::array<std::size_t, 4> corners = corner_places(outline);
+  const std::size_t count = outline.size();
+  const auto emit = [&](std::size_t a, std::size_t b, std::size_t c) {
+    for (const std::size_t i : {a, b, c}) indices.push_back(base + static_cast<std::uint32_t>(i % count));
+  };
+  const auto half = [&](std::size_t a, std::size_t b, std::size_t c) {
+    // Indices increase from a to b to c, modulo the count.
+    const std::size_t to_b = (b + count - a) % count;
+    const std::size_t to_c = (c + count - a) % count;
+    for (std::size_t i = 0; i + 1 < to_b; ++i) emit(a + i, a + i + 1, c);
+    for (std::size_t i = to_b; i < to_c; ++i) emit(a + to_b - 1, a + i, a + i + 1);
+  };
+  const std::size_t first = flipped ? 1 : 0;
+  half(corners[first], corners[first + 1], corners[(first + 2) % 4]);
+  half(corners[(first + 2) % 4], corners[(first + 3) % 4], corners[first]);
+}
+
 namespace {
 
 constexpr std::size_t kMaxVertices = std::numeric_limits<std::uint32_t>::max() - 1'024;
@@ -97,6 +193,61 @@ Status ChunkTriangles::append_outlines(const QuadBuffer& quads, IVec3 origin, Bl
     append_outline(quad, origin, outline_, out);
   }
   return {};
+}
+
+std::int64_t BlockyMesh::triangle_count() const {
+  std::size_t total = 0;
+  for (const BlockyTriangles& surface : surfaces) total += surface.indices.size() / 3;
+  return static_cast<std::int64_t>(total);
+}
+
+std::int64_t BlockyMesh::vertex_count() const {
+  std::size_t total = 0;
+  for (const BlockyTriangles& surface : surfaces) total += surface.positions.size();
+  return static_cast<std::int64_t>(total);
+}
+
+namespace {
+
+// Returns the quads of all chunks; fewer if `reporter` was cancelled.
+std::vector<QuadBuffer> quads_of(const Grid& grid, const std::vector<IVec3>& chunks, const VoxelRegistry& types,
+                                 const BlockyMeshOptions& options, Threads threads, ProgressSteps& reporter) {
+  std::vector<QuadBuffer> parts(chunks.size());
+  // Enough tasks to keep every thread busy; each task uses one mesher for its chunks.
+  const std::size_t tasks = std::min<std::size_t>(chunks.size(), std::size_t{8} * thread_count(threads));
+  parallel_for(tasks, threads, [&](std::size_t task) {
+    BlockyMesher mesher;
+    QuadOptions quad_options;
+    quad_options.merge = options.merge;
+    quad_options.bake_occlusion = options.bake_occlusion;
+    for (std::size_t i = task; i < chunks.size() && !reporter.cancelled(); i += tasks) {
+      mesher.mesh(grid.neighbourhood(chunks[i]), types, quad_options, parts[i]);
+      if (options.cut) options.cut(chunks[i], parts[i]);
+      reporter.step();
+    }
+  });
+  return parts;
+}
+
+}  // namespace
+
+Result<BlockyMesh> build_blocky_mesh(const Grid& grid, const VoxelRegistry& types, const BlockyMeshOptions& options,
+                                     Threads threads, const Progress& progress) {
+  const std::vector<IVec3> chunks = grid.chunks();
+  ProgressSteps reporter(progress, 2 * chunks.size());
+  std::vector<QuadBuffer> parts = quads_of(grid, chunks, types, options, threads, reporter);
+  if (reporter.cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
+
+  BlockyMesh mesh;
+  mesh.faces_total = 6 * grid.voxel_count();
+  ChunkTriangles triangles(types, options.watertight);
+  for (std::size_t i = 0; i < chunks.size(); ++i) {
+    if (auto done = triangles.append(parts[i], chunks[i], mesh); !done) return done.error();
+    parts[i] = {};
+    reporter.step();
+    if (reporter.cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
+  }
+  return mesh;
 }
 
 }  // namespace quoin
