@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "mesh/blocky/face_occlusion.h"
+#include "mesh/blocky/blocky_mesher.h"
 
 namespace quoin {
 namespace {

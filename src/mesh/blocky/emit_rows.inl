@@ -15,8 +15,8 @@
 
 #include <quoin/core/assert.h>
 
+#include "mesh/blocky/blocky_mesher.h"
 #include "mesh/blocky/runs.inl"
-#include "mesh/blocky/scratch.h"
 
 namespace quoin::blocky {
 namespace {

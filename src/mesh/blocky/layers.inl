@@ -14,7 +14,7 @@
 
 #include "core/rows/packed_row.h"
 #include "grid/chunk/chunk_storage.h"
-#include "mesh/blocky/scratch.h"
+#include "mesh/blocky/blocky_mesher.h"
 #include "mesh/blocky/words.inl"
 
 namespace quoin::blocky {

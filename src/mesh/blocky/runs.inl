@@ -13,7 +13,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "mesh/blocky/scratch.h"
+#include "mesh/blocky/blocky_mesher.h"
 #include "mesh/blocky/words.inl"
 
 namespace quoin::blocky {

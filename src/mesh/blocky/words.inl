@@ -14,7 +14,7 @@
 #include <immintrin.h>
 #endif
 
-#include "mesh/blocky/scratch.h"
+#include "mesh/blocky/blocky_mesher.h"
 
 #define QUOIN_INLINE inline __attribute__((always_inline))
 #define QUOIN_STAGE inline __attribute__((noinline))  // separate function in a profile

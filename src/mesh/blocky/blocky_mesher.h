@@ -3,9 +3,11 @@
 #include <cstdint>
 
 #include <quoin/core/direction.h>
+#include <quoin/core/vec.h>
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/mesh/blocky.h>
+#include <quoin/mesh/occlusion.h>
 #include <quoin/mesh/quad.h>
 
 namespace quoin::blocky {
@@ -143,3 +145,14 @@ bool holds_transparent(const Chunk& chunk, const VoxelRegistry& types);
 void hide_faces_at_border(const Job& job, Scratch& scratch);
 
 }  // namespace quoin::blocky
+
+namespace quoin {
+
+/// Returns the occlusion of the four corners of a face of `voxel` (coordinates in the centre chunk). Only opaque voxels
+/// are occluders: glass and water do not darken.
+///
+/// Cost: 12 voxel look-ups; meshers do 64 faces at once instead.
+[[nodiscard]] FaceOcclusion face_occlusion(const Neighbourhood& chunks, const VoxelRegistry& types, IVec3 voxel,
+                                           Direction direction);
+
+}  // namespace quoin

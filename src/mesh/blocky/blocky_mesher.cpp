@@ -12,8 +12,7 @@
 #include "core/instruction_set.h"
 #include "core/moved_from.h"
 #include "grid/chunk/chunk_storage.h"
-#include "mesh/blocky/face_occlusion.h"
-#include "mesh/blocky/scratch.h"
+#include "mesh/blocky/blocky_mesher.h"
 
 namespace quoin {
 namespace blocky {

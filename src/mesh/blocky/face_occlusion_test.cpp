@@ -7,7 +7,7 @@
 #include <quoin/mesh/visible_faces.h>
 
 #include "core/death_for_tests.h"
-#include "mesh/blocky/face_occlusion.h"
+#include "mesh/blocky/blocky_mesher.h"
 #include "mesh/mesh_oracle.h"
 
 namespace quoin {
