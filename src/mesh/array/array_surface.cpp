@@ -21,14 +21,14 @@
 #include "mesh/array/array_samples.h"
 #include "mesh/array/array_vertex.h"
 #include "mesh/array/kernel.h"
-#include "mesh/smooth/cell.h"
-#include "mesh/smooth/split.h"
+#include "mesh/smooth/sheets.h"
+#include "mesh/smooth/smooth_cell.h"
 
 namespace quoin::array {
 namespace {
 
 // The cells that several sheets of the surface cross. Each sheet gets a vertex. The first sheet has the cell's own
-// vertex; the vertices of other sheets follow the vertices of all cells. smooth/split.h defines sheets. Cells at an
+// vertex; the vertices of other sheets follow the vertices of all cells. smooth/sheets.h defines sheets. Cells at an
 // open border keep one vertex.
 class SplitCells {
  public:

@@ -8,7 +8,7 @@
 #include <quoin/core/vec.h>
 
 #include "mesh/array/kernel.h"
-#include "mesh/smooth/cell.h"
+#include "mesh/smooth/smooth_cell.h"
 
 namespace quoin::array {
 

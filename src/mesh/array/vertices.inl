@@ -1,5 +1,5 @@
 // The vertices of cells with eight densities each, one register of lanes at a time. The arithmetic equals the plain
-// kernel, step for step; smooth/cell.h has the shared part.
+// kernel, step for step; smooth/smooth_cell.h has the shared part.
 //
 // Each crossing has its own division. The chunk kernels divide once for four crossings, which is safe for half
 // densities. Here densities may have any size, and a product of four would overflow or underflow.
@@ -10,7 +10,7 @@
 
 #include "mesh/array/kernel.h"
 #include "mesh/array/kernel.inl"
-#include "mesh/trilinear_normals.inl"
+#include "mesh/smooth/smooth_lanes.inl"
 
 namespace quoin::array {
 namespace {

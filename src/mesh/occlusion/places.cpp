@@ -7,7 +7,7 @@
 #include <quoin/core/assert.h>
 
 #include "core/instruction_set.h"
-#include "mesh/smooth/cell.h"
+#include "mesh/smooth/smooth_cell.h"
 
 namespace quoin::smooth {
 

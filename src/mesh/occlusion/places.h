@@ -12,8 +12,8 @@
 #include <quoin/core/assert.h>
 #include <quoin/mesh/smooth_occlusion.h>
 
-#include "mesh/smooth/cell.h"
-#include "mesh/smooth/scratch.h"
+#include "mesh/smooth/smooth_cell.h"
+#include "mesh/smooth/smooth_mesher.h"
 
 namespace quoin::smooth {
 

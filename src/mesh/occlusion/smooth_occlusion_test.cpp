@@ -12,7 +12,7 @@
 
 #include "core/death_for_tests.h"
 #include "core/instruction_sets_for_tests.h"
-#include "mesh/smooth/test_support.h"
+#include "mesh/smooth/smooth_test_support.h"
 
 namespace quoin {
 namespace {

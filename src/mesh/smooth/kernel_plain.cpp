@@ -7,10 +7,10 @@
 #include <span>
 #include <utility>
 
-#include "mesh/smooth/cell.h"
 #include "mesh/smooth/listed.inl"
-#include "mesh/smooth/scratch.h"
 #include "mesh/smooth/slices.inl"
+#include "mesh/smooth/smooth_cell.h"
+#include "mesh/smooth/smooth_mesher.h"
 
 namespace quoin::smooth {
 namespace {

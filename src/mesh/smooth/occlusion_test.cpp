@@ -11,8 +11,8 @@
 #include <quoin/grid/density_grid.h>
 #include <quoin/mesh/smooth.h>
 
-#include "mesh/smooth/cell.h"
-#include "mesh/smooth/test_support.h"
+#include "mesh/smooth/smooth_cell.h"
+#include "mesh/smooth/smooth_test_support.h"
 
 namespace quoin {
 namespace {

@@ -12,9 +12,9 @@
 #include <quoin/grid/density_chunk.h>
 #include <quoin/mesh/smooth.h>
 
-#include "mesh/smooth/cell.h"
-#include "mesh/smooth/quad.h"
-#include "mesh/smooth/scratch.h"
+#include "mesh/smooth/level_cells.h"
+#include "mesh/smooth/smooth_cell.h"
+#include "mesh/smooth/smooth_mesher.h"
 
 namespace quoin::oracle {
 

@@ -1,4 +1,4 @@
-#include "mesh/smooth/levels.h"
+#include "mesh/smooth/level_cells.h"
 
 #include <algorithm>
 #include <optional>
@@ -7,9 +7,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "mesh/smooth/quad.h"
-#include "mesh/smooth/split.h"
-#include "mesh/smooth/vertex.h"
+#include "mesh/smooth/sheets.h"
 
 namespace quoin::smooth {
 namespace {

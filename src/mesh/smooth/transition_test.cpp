@@ -10,7 +10,7 @@
 #include <quoin/mesh/smooth_mesh.h>
 
 #include "core/death_for_tests.h"
-#include "mesh/smooth/levels.h"
+#include "mesh/smooth/level_cells.h"
 #include "mesh/smooth/smooth_oracle.h"
 #include "mesh/smooth/surface_check_for_tests.h"
 

@@ -1,4 +1,4 @@
-// Vertices and quads, one register of lanes at a time. The arithmetic equals cell.h, step for step.
+// Vertices and quads, one register of lanes at a time. The arithmetic equals smooth_cell.h, step for step.
 //
 //   lanes       | cell 0 | cell 1 | cell 2 | ...       by the list of their places
 //   d[8]        the densities of their corners, x first, then y, then z; a pair of halves along x is one gather
@@ -7,7 +7,7 @@
 #pragma once
 
 // Included first: the slices use the append functions of these lanes.
-#include "mesh/trilinear_normals.inl"
+#include "mesh/smooth/smooth_lanes.inl"
 
 #include "mesh/smooth/slices.inl"
 

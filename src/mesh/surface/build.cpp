@@ -10,7 +10,7 @@
 #include "core/coordinates/chunk_order.h"
 #include "core/object_pool.h"
 #include "core/work/progress_steps.h"
-#include "mesh/smooth/levels.h"
+#include "mesh/smooth/level_cells.h"
 #include "mesh/surface/build.h"
 #include "mesh/surface/material.h"
 #include "mesh/surface/shape.h"

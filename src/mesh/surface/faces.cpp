@@ -5,7 +5,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "mesh/smooth/levels.h"
+#include "mesh/smooth/level_cells.h"
 
 namespace quoin::smooth {
 namespace {

@@ -9,9 +9,8 @@
 
 #include <quoin/core/assert.h>
 
-#include "mesh/smooth/levels.h"
-#include "mesh/smooth/split.h"
-#include "mesh/smooth/vertex.h"
+#include "mesh/smooth/level_cells.h"
+#include "mesh/smooth/sheets.h"
 #include "mesh/surface/bodies.h"
 #include "mesh/surface/faces.h"
 

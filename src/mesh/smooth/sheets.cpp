@@ -1,4 +1,4 @@
-#include "mesh/smooth/split.h"
+#include "mesh/smooth/sheets.h"
 
 #include <algorithm>
 #include <bit>
@@ -8,9 +8,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "mesh/smooth/levels.h"
-#include "mesh/smooth/quad.h"
-#include "mesh/smooth/vertex.h"
+#include "mesh/smooth/level_cells.h"
 
 namespace quoin::smooth {
 namespace {

@@ -1,24 +1,98 @@
-#pragma once
+// The cells of a chunk and its neighbours, where each chunk has its own level of detail, with their quads and vertices:
+// for all code except the fast kernels. Coordinates are in samples of level 0, relative to the centre chunk's sample
+// (0, 0, 0), unless stated otherwise.
 
-// The cells of a chunk and its neighbours, where each chunk has its own level of detail. Coordinates are in samples of
-// level 0, relative to the centre chunk's sample (0, 0, 0), unless stated otherwise.
+#pragma once
 
 #include <algorithm>
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <limits>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/buffer.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/density_chunk.h>
 #include <quoin/mesh/smooth.h>
 
 #include "grid/density/density_storage.h"
-#include "mesh/smooth/cell.h"
-#include "mesh/smooth/quad.h"
+#include "mesh/smooth/smooth_cell.h"
+#include "mesh/smooth/smooth_mesher.h"
 
 namespace quoin::smooth {
+
+inline IVec3 unit_axis(int axis) {
+  QUOIN_ASSERT(axis >= 0 && axis < 3, "0 <= axis < 3");
+  IVec3 unit{0};
+  unit[axis] = 1;
+  return unit;
+}
+
+/// Returns the offset of a cell's corner from its first corner, in cells; corners are numbered by x + 2 y + 4 z.
+inline IVec3 corner_place(int corner) {
+  QUOIN_ASSERT(corner >= 0 && corner < 8, "0 <= corner < 8");
+  return {corner & 1, corner >> 1 & 1, corner >> 2};
+}
+
+/// Returns the name of a cell of a chunk at `offset` (0 or -1 on each axis) from the mesh's chunk.
+inline SmoothCell cell_name(IVec3 cell, IVec3 offset) {
+  QUOIN_ASSERT((cell.x | cell.y | cell.z) >= 0 && (cell.x | cell.y | cell.z) < kChunkEdge, "a cell of the chunk");
+  QUOIN_ASSERT((IBox{IVec3(-1), IVec3(1)}.contains(offset)), "0 or -1 on each axis");
+  std::uint32_t bits = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    bits |= static_cast<std::uint32_t>(cell[axis]) << (kChunkShift * axis);
+    bits |= static_cast<std::uint32_t>(offset[axis] != 0) << (SmoothCell::kPreviousShift + axis);
+  }
+  return {bits};
+}
+
+/// A corner of a quad. Corners are compared in units of 1/64 cell, so that length comparisons are exact.
+struct QuadCorner {
+  std::uint32_t vertex;
+  int level;    ///< level of its cell
+  IVec3 place;  ///< in 1/64 of a sample
+};
+
+/// Returns a vertex in the cell that starts at the sample `first` and has width 2^level.
+inline QuadCorner quad_corner(std::uint32_t vertex, Vec3 position, IVec3 first, int level) {
+  QUOIN_ASSERT(level >= 0 && level <= kMaxSmoothLevel, "a level of detail");
+  const auto size = static_cast<float>(1 << level);
+  QuadCorner corner{vertex, level, first * 64};
+  for (int axis = 0; axis < 3; ++axis) {
+    const float fraction = (position[axis] - static_cast<float>(first[axis])) / size;
+    corner.place[axis] += std::min(static_cast<int>(fraction * 64.0F), 63) * (1 << level);
+  }
+  return corner;
+}
+
+inline bool quad_is_split_at_first(const std::array<QuadCorner, 4>& q) {
+  const auto is_finest = [&](std::size_t i) {
+    return q[i].level <= q[0].level && q[i].level <= q[1].level && q[i].level <= q[2].level && q[i].level <= q[3].level;
+  };
+  // A triangle without a cell of the finest level might exist twice: again around the next part of a long edge.
+  const bool first_allowed = is_finest(0) || is_finest(2);
+  const bool second_allowed = is_finest(1) || is_finest(3);
+  if (first_allowed != second_allowed) return first_allowed;
+  const auto squared_length = [](IVec3 v) { return v.x * v.x + v.y * v.y + v.z * v.z; };
+  return squared_length(q[0].place - q[2].place) <= squared_length(q[1].place - q[3].place);
+}
+
+/// Returns two triangles along the shorter diagonal with an end at the finest level; of equal ones, the diagonal from
+/// corner 0.
+inline std::array<std::uint32_t, 6> triangles_of(const std::array<QuadCorner, 4>& q) {
+  const auto v = [&](std::size_t i) { return q[i].vertex; };
+  if (quad_is_split_at_first(q)) return {v(0), v(1), v(2), v(0), v(2), v(3)};
+  return {v(1), v(2), v(3), v(1), v(3), v(0)};
+}
+
+/// Returns the cells around an edge along `axis` that starts at `p`, counter-clockwise as seen from +axis.
+inline std::array<IVec3, 4> cells_around(IVec3 p, int axis) {
+  const IVec3 u = unit_axis((axis + 1) % 3);
+  const IVec3 v = unit_axis((axis + 2) % 3);
+  return {p - u - v, p - v, p, p - u};
+}
 
 /// A cell of the centre chunk or a neighbour.
 struct LevelCell {
@@ -185,5 +259,88 @@ using MeshOwnCells = std::function<void(SmoothChunkMesh& out)>;
 ///           minimal edges of an octree; here for chunks of any levels. docs/decisions/020-smooth-chunk-borders.md.
 void mesh_with_transitions(const DensityNeighbourhood& chunks, const SmoothOptions& options,
                            const MeshOwnCells& mesh_own_cells, SmoothChunkMesh& out);
+
+/// Reads single, nearby densities. Caches four rows along x, by the parity of y and z.
+class NearbyDensities {
+ public:
+  explicit NearbyDensities(const DensityNeighbourhood& chunks) : chunks_(chunks) {}
+
+  [[nodiscard]] Half get(IVec3 sample) {
+    Row& row = rows_[static_cast<std::size_t>((sample.y & 1) + 2 * (sample.z & 1))];
+    const IVec3 place{sample.x >> kChunkShift, sample.y, sample.z};
+    if (place != row.place) row = find(place);
+    return row.values == nullptr ? row.only : row.values[sample.x & (kChunkEdge - 1)];
+  }
+
+ private:
+  struct Row {
+    IVec3 place{std::numeric_limits<int>::min()};
+    const Half* values = nullptr;
+    Half only = 0;  // the value of a row without storage
+  };
+
+  [[nodiscard]] Row find(IVec3 place) const {
+    const DensityChunk* const chunk = chunks_.at(place.x, place.y >> kChunkShift, place.z >> kChunkShift);
+    if (chunk == nullptr) return {place, nullptr, chunks_.outside};
+    const int y = place.y & (kChunkEdge - 1);
+    const int z = place.z & (kChunkEdge - 1);
+    const Half* const values = chunk->row(y, z);
+    return {place, values, values == nullptr ? chunk->get(0, y, z) : Half{0}};
+  }
+
+  const DensityNeighbourhood& chunks_;
+  std::array<Row, 4> rows_;
+};
+
+/// Writes all attributes of a vertex to an existing index.
+inline void write_vertex(const DensityNeighbourhood& chunks, const SmoothOcclusionOptions& occlusion,
+                         const LevelCell& cell, const CellVertex& vertex, std::uint32_t index, SmoothChunkMesh& out) {
+  out.positions[index] = Vec3(cell.first) + vertex.snapped * static_cast<float>(cell.size());
+  out.normals[index] = vertex.normal;
+  if (occlusion.method == SmoothOcclusion::None) return;
+  NearbyDensities nearby(chunks);
+  const auto density = [&](int x, int y, int z) {
+    return float_from_half(nearby.get(cell.first + IVec3{x, y, z} * cell.size())) * depth_unit(cell.level);
+  };
+  out.occlusion[index] =
+      occlusion_at_vertex(vertex.snapped, vertex.normal, within_limits(occlusion, cell.level), density);
+}
+
+/// Appends a vertex. Returns its index.
+inline std::uint32_t append_vertex(const DensityNeighbourhood& chunks, const SmoothOcclusionOptions& occlusion,
+                                   const LevelCell& cell, const CellVertex& vertex, SmoothCell name,
+                                   SmoothChunkMesh& out) {
+  const std::size_t index = out.positions.size();
+  out.positions.resize(index + 1);
+  out.normals.resize(index + 1);
+  if (occlusion.method != SmoothOcclusion::None) out.occlusion.resize(index + 1);
+  out.cells.push_back(name);
+  write_vertex(chunks, occlusion, cell, vertex, static_cast<std::uint32_t>(index), out);
+  return static_cast<std::uint32_t>(index);
+}
+
+/// Returns a vertex at a position in its cell, with the gradient there.
+inline CellVertex vertex_at(Vec3 fraction, Vec3 gradient) {
+  CellVertex vertex;
+  vertex.fraction = fraction;
+  for (int i = 0; i < 3; ++i) vertex.snapped[i] = snap(fraction[i]);
+  vertex.normal = unit_normal(gradient);
+  return vertex;
+}
+
+/// Returns the corners of a quad of six indices, in its winding, starting with the corner of the first cell.
+inline std::array<std::uint32_t, 4> corners_of_quad(const std::uint32_t* indices, const SmoothChunkMesh& mesh) {
+  std::array<std::uint32_t, 4> cycle = {indices[0], indices[1], indices[2], indices[5]};
+  const auto cell = [&](std::uint32_t vertex) {
+    // At any level: within a quad of one level, cells of the chunk before have lower sums than cells of this chunk.
+    const SmoothCell name = mesh.cells[vertex];
+    const IVec3 place = name.cell() + name.chunk_offset() * kChunkEdge;
+    return place.x + place.y + place.z;
+  };
+  const auto first =
+      std::min_element(cycle.begin(), cycle.end(), [&](std::uint32_t a, std::uint32_t b) { return cell(a) < cell(b); });
+  std::rotate(cycle.begin(), first, cycle.end());
+  return cycle;
+}
 
 }  // namespace quoin::smooth

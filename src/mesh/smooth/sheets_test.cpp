@@ -1,6 +1,6 @@
 // Each sheet of the surface that crosses a cell has its own vertex, and the mesh is manifold.
 
-#include "mesh/smooth/split.h"
+#include "mesh/smooth/sheets.h"
 
 #include <algorithm>
 #include <cstring>

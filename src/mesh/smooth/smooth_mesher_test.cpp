@@ -7,7 +7,7 @@
 
 #include "core/instruction_sets_for_tests.h"
 #include "core/made_with_for_tests.h"
-#include "mesh/smooth/test_support.h"
+#include "mesh/smooth/smooth_test_support.h"
 
 namespace quoin {
 namespace {
