@@ -17,9 +17,6 @@
 namespace quoin {
 namespace {
 
-constexpr SmoothOcclusion kForms[] = {SmoothOcclusion::SolidShare, SmoothOcclusion::Weighted,
-                                      SmoothOcclusion::WeightedPublished, SmoothOcclusion::SoftShare};
-
 /// Returns the occlusion of an open surface: 0, except for the published curve.
 float when_open(SmoothOcclusion form) {
   return form == SmoothOcclusion::WeightedPublished ? 0.4F * 0.4F : 0.0F;

@@ -12,6 +12,9 @@ namespace quoin {
 
 inline constexpr float kBand = 8.0F;
 
+inline constexpr SmoothOcclusion kForms[] = {SmoothOcclusion::SolidShare, SmoothOcclusion::Weighted,
+                                             SmoothOcclusion::WeightedPublished, SmoothOcclusion::SoftShare};
+
 inline DensityChunk chunk_of_field(const std::function<double(IVec3)>& field, IVec3 chunk = IVec3{0}) {
   DensityChunk out(stored_density(kBand, kBand));
   std::array<Half, kChunkEdge> row{};

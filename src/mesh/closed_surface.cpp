@@ -18,7 +18,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "mesh/print/corner_sheets.h"
+#include "mesh/corner_sheets.h"
 
 namespace quoin {
 

@@ -17,8 +17,6 @@
 namespace quoin {
 namespace {
 
-constexpr SmoothOcclusion kForms[] = {SmoothOcclusion::SolidShare, SmoothOcclusion::Weighted,
-                                      SmoothOcclusion::WeightedPublished, SmoothOcclusion::SoftShare};
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
