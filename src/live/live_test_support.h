@@ -20,7 +20,7 @@
 
 #include "core/coordinates/chunk_order.h"
 #include "mesh/surface/bodies.h"
-#include "mesh/surface/build.h"
+#include "mesh/surface/smooth_surface.h"
 
 namespace quoin {
 

@@ -18,7 +18,7 @@
 
 #include "core/work/workers.h"
 #include "live/live_densities.h"
-#include "mesh/surface/material.h"
+#include "mesh/surface/face_materials.h"
 
 namespace quoin {
 

@@ -12,7 +12,7 @@
 #include "mesh/smooth/level_cells.h"
 #include "mesh/smooth/sheets.h"
 #include "mesh/surface/bodies.h"
-#include "mesh/surface/faces.h"
+#include "mesh/surface/face_materials.h"
 
 namespace quoin::smooth {
 namespace {

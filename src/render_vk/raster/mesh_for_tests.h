@@ -14,7 +14,7 @@
 #include <quoin/render_vk/vulkan_mesh_renderer.h>
 
 #include "core/coordinates/chunk_order.h"
-#include "mesh/surface/material.h"
+#include "mesh/surface/face_materials.h"
 #include "render_vk/device/vulkan_for_tests.h"
 
 namespace quoin::vulkan_test {

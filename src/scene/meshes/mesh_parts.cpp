@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "mesh/surface/bodies.h"
-#include "mesh/surface/simplify_tagged.h"
+#include "mesh/surface/simplify.h"
 #include "scene/instance_axes.h"
 
 namespace quoin {

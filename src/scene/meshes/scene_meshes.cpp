@@ -10,7 +10,7 @@
 
 #include "core/work/progress_steps.h"
 #include "mesh/blocky/occlusion_atlas.h"
-#include "mesh/surface/material.h"
+#include "mesh/surface/face_materials.h"
 #include "scene/instance_axes.h"
 #include "scene/meshes/glass_thickness.h"
 #include "scene/meshes/mesh_parts.h"

@@ -17,7 +17,7 @@
 
 #include "core/coordinates/chunk_order.h"
 #include "mesh/surface/bodies.h"
-#include "mesh/surface/build.h"
+#include "mesh/surface/smooth_surface.h"
 #include "scene/meshes/lattices.h"
 #include "scene/meshes/mesh_parts.h"
 

@@ -7,7 +7,7 @@
 
 #include <quoin/mesh/smooth_mesh.h>
 
-#include "mesh/surface/faces.h"
+#include "mesh/surface/face_materials.h"
 
 namespace quoin::smooth {
 

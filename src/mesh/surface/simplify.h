@@ -5,9 +5,14 @@
 #include <span>
 #include <vector>
 
+#include <quoin/core/result.h>
 #include <quoin/core/vec.h>
+#include <quoin/mesh/smooth_mesh.h>
 
 namespace quoin {
+
+/// Like `simplify_smooth_mesh`, with an optional number per vertex that stays with it.
+[[nodiscard]] Result<float> simplify_tagged(SmoothMesh& mesh, float error_in_samples, std::vector<std::uint32_t>& tags);
 
 /// A bounding volume hierarchy of triangles, for distances of points.
 ///

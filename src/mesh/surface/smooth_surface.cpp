@@ -11,9 +11,9 @@
 #include "core/object_pool.h"
 #include "core/work/progress_steps.h"
 #include "mesh/smooth/level_cells.h"
-#include "mesh/surface/build.h"
-#include "mesh/surface/material.h"
+#include "mesh/surface/face_materials.h"
 #include "mesh/surface/shape.h"
+#include "mesh/surface/smooth_surface.h"
 
 namespace quoin {
 namespace smooth {
