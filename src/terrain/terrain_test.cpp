@@ -10,7 +10,7 @@
 
 #include "core/death_for_tests.h"
 #include "terrain/landform.h"
-#include "terrain/lattice.h"
+#include "terrain/noise_lattice.h"
 #include "terrain/terrain_parts.h"
 
 namespace quoin {
