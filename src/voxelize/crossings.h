@@ -18,7 +18,7 @@
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
 
-#include "voxelize/frame.h"
+#include "voxelize/voxel_frame.h"
 
 namespace quoin::voxelizing {
 

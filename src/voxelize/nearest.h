@@ -2,7 +2,7 @@
 
 #include <quoin/core/function_ref.h>
 
-#include "voxelize/frame.h"
+#include "voxelize/voxel_frame.h"
 
 namespace quoin::voxelizing {
 

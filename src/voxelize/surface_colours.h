@@ -10,7 +10,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/grid/voxel_registry.h>
 
-#include "voxelize/frame.h"
+#include "voxelize/voxel_frame.h"
 
 namespace quoin::voxelizing {
 

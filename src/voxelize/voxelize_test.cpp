@@ -8,9 +8,9 @@
 
 #include "core/death_for_tests.h"
 #include "voxelize/crossings.h"
-#include "voxelize/frame.h"
 #include "voxelize/inside.h"
 #include "voxelize/shapes_for_tests.h"
+#include "voxelize/voxel_frame.h"
 
 namespace quoin {
 namespace {

@@ -1,4 +1,4 @@
-#include "voxelize/frame.h"
+#include "voxelize/voxel_frame.h"
 
 #include <algorithm>
 #include <cmath>
