@@ -8,7 +8,7 @@
 
 #include "core/coordinates/chunk_order.h"
 #include "grid/long_box.h"
-#include "mesh/surface/bodies.h"
+#include "mesh/surface/voxel_surface.h"
 
 namespace quoin {
 namespace {

@@ -7,9 +7,8 @@
 
 #include "core/rows/content_hash.h"
 #include "live/mesh_job_queue.h"
-#include "mesh/surface/bodies.h"
 #include "mesh/surface/face_materials.h"
-#include "mesh/surface/shape.h"
+#include "mesh/surface/voxel_surface.h"
 
 namespace quoin {
 namespace {

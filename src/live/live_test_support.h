@@ -19,8 +19,8 @@
 #include <quoin/mesh/smooth_mesh.h>
 
 #include "core/coordinates/chunk_order.h"
-#include "mesh/surface/bodies.h"
 #include "mesh/surface/smooth_surface.h"
+#include "mesh/surface/voxel_surface.h"
 
 namespace quoin {
 

@@ -12,8 +12,8 @@
 #include "core/work/progress_steps.h"
 #include "mesh/smooth/level_cells.h"
 #include "mesh/surface/face_materials.h"
-#include "mesh/surface/shape.h"
 #include "mesh/surface/smooth_surface.h"
+#include "mesh/surface/voxel_surface.h"
 
 namespace quoin {
 namespace smooth {

@@ -4,8 +4,8 @@
 #include <memory>
 #include <utility>
 
-#include "mesh/surface/bodies.h"
 #include "mesh/surface/simplify.h"
+#include "mesh/surface/voxel_surface.h"
 #include "scene/instance_axes.h"
 
 namespace quoin {

@@ -16,8 +16,8 @@
 #include <quoin/grid/voxel_field.h>
 
 #include "core/coordinates/chunk_order.h"
-#include "mesh/surface/bodies.h"
 #include "mesh/surface/smooth_surface.h"
+#include "mesh/surface/voxel_surface.h"
 #include "scene/meshes/lattices.h"
 #include "scene/meshes/mesh_parts.h"
 

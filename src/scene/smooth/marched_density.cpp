@@ -9,7 +9,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/grid/voxel_field.h>
 
-#include "mesh/surface/bodies.h"
+#include "mesh/surface/voxel_surface.h"
 
 namespace quoin {
 namespace {

@@ -10,7 +10,7 @@
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_field.h>
 
-#include "mesh/surface/bodies.h"
+#include "mesh/surface/voxel_surface.h"
 
 namespace quoin {
 namespace {

@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "mesh/surface/bodies.h"
+#include "mesh/surface/voxel_surface.h"
 #include "trace/cell_rows.h"
 
 namespace quoin {

@@ -14,8 +14,8 @@ namespace quoin {
 /// Regions: the solid is the set of points with a negative trilinear density. Its opaque part is the region where the
 /// same field is negative after samples of transparent materials have had their sign flipped. The rest of the solid is
 /// transparent. There is no gap between the two parts, and along lattice edges they meet at the surfaces of meshes
-/// (mesh/surface/bodies.h). A point in reach of several transparent materials has the material with the lowest field
-/// there, each field computed from the samples of that material in the same way.
+/// (mesh/surface/voxel_surface.h). A point in reach of several transparent materials has the material with the lowest
+/// field there, each field computed from the samples of that material in the same way.
 /// Lifetime, threads: as DensityTree.
 class DensityGlass {
  public:

@@ -18,9 +18,8 @@
 #include <quoin/mesh/visible_faces.h>
 
 #include "mesh/smooth/surface_check_for_tests.h"
-#include "mesh/surface/bodies.h"
-#include "mesh/surface/shape.h"
 #include "mesh/surface/smooth_surface.h"
+#include "mesh/surface/voxel_surface.h"
 #include "mesh/surface/welded_for_tests.h"
 
 namespace quoin {
