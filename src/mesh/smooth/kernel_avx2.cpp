@@ -2,7 +2,7 @@
 
 #ifdef QUOIN_X86_KERNELS
 
-#include "mesh/smooth/occlusion.inl"
+#include "mesh/smooth/occlusion_lanes.inl"
 #include "mesh/smooth/slices.inl"
 #include "mesh/smooth/vectors.inl"
 

@@ -4,7 +4,7 @@
 //   active cells   active[z + 1][y + 1]    one word per row of cells: the 2x2x2 points differ
 //   slice z        places of active cells  -> vertices, stored by place for two slices
 //                  places of crossed edges -> quads of the vertices of this slice and the last
-//   occlusion      by lists (listed.inl) or, with many active cells, from decoded[z & ring_mask] (occlusion.inl)
+//   occlusion      by lists (listed.inl) or, with many active cells, from decoded[z & ring_mask] (occlusion_lanes.inl)
 
 #pragma once
 
