@@ -1,10 +1,10 @@
-#pragma once
-
 // The crossings of a mesh with lines through the voxel centres, along each axis.
 //
 //  axis 0 (x): lines of (y, z)     a column is 64 x 64 lines: all lines through a row of chunks
 //  axis 1 (y): lines of (x, z)     its lines' crossings are stored line by line, each sorted along the line
 //  axis 2 (z): lines of (x, y)
+
+#pragma once
 
 #include <array>
 #include <cstddef>
@@ -91,5 +91,39 @@ class Crossings {
 
 /// Marks the voxels of a chunk that contain a crossing or are touched: the 6-separating surface.
 void mark_crossed(const Crossings& crossings, IVec3 chunk, ChunkBits& bits);
+
+/// The part of a chunk within a mesh.
+enum class Filled : std::uint8_t { None, All, Some };
+
+/// Memory that a thread reuses.
+struct InsideScratch {
+  std::vector<std::int16_t> votes;  ///< of every voxel, x fastest
+};
+
+/// The minimum and maximum votes of the lines along an axis in a chunk.
+struct VoteRange {
+  std::int16_t least = 0;
+  std::int16_t most = 0;
+};
+
+/// Finds the voxels within a mesh.
+///
+/// Votes: with Winding, each of the six axis rays from a centre counts its exits from the mesh minus its entries; the
+/// sum is six times the winding number. With Parity, each ray votes if it has an odd number of crossings. The minimum
+/// and maximum votes of the lines of all axes decide most chunks, also in open meshes: `find` tests single voxels only
+/// in the other chunks.
+class Inside {
+ public:
+  /// Requires: `rule` is not None; `crossings` outlives it.
+  Inside(const Crossings& crossings, SolidVoxels rule, Threads threads);
+
+  /// Finds the voxels of a chunk whose centre is solid; sets `bits` only if it returns Some.
+  [[nodiscard]] Filled find(IVec3 chunk, InsideScratch& scratch, ChunkBits& bits) const;
+
+ private:
+  const Crossings* crossings_;
+  SolidVoxels rule_;
+  std::array<std::vector<VoteRange>, 3> ranges_;  // of an axis: chunks along it, column after column
+};
 
 }  // namespace quoin::voxelizing

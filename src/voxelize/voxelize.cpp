@@ -20,7 +20,6 @@
 #include "core/work/progress_steps.h"
 #include "grid/looks.h"
 #include "voxelize/crossings.h"
-#include "voxelize/inside.h"
 #include "voxelize/nearest.h"
 #include "voxelize/surface_colours.h"
 #include "voxelize/voxel_frame.h"

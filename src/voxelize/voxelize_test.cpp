@@ -8,7 +8,6 @@
 
 #include "core/death_for_tests.h"
 #include "voxelize/crossings.h"
-#include "voxelize/inside.h"
 #include "voxelize/shapes_for_tests.h"
 #include "voxelize/voxel_frame.h"
 
