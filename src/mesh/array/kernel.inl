@@ -7,10 +7,10 @@
 
 #include <quoin/core/assert.h>
 
+#include "mesh/array/bit_rows.inl"
 #include "mesh/array/kernel.h"
 #include "mesh/array/quads.inl"
 #include "mesh/array/relax.inl"
-#include "mesh/array/rows.inl"
 
 namespace quoin::array {
 namespace {

@@ -10,8 +10,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "mesh/array/bit_rows.inl"
 #include "mesh/array/kernel.h"
-#include "mesh/array/rows.inl"
 
 namespace quoin::array {
 namespace {

@@ -15,7 +15,7 @@
 #include "core/rows/packed_row.h"
 #include "grid/chunk/chunk_storage.h"
 #include "mesh/blocky/blocky_mesher.h"
-#include "mesh/blocky/words.inl"
+#include "mesh/blocky/layer_words.inl"
 
 namespace quoin::blocky {
 namespace {

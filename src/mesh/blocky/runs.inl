@@ -14,7 +14,7 @@
 #include <quoin/core/assert.h>
 
 #include "mesh/blocky/blocky_mesher.h"
-#include "mesh/blocky/words.inl"
+#include "mesh/blocky/layer_words.inl"
 
 namespace quoin::blocky {
 namespace {
