@@ -2,20 +2,23 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numbers>
+#include <vector>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
 #include <quoin/core/assert.h>
+#include <quoin/scene/scene.h>
 
-#include "scene/framing.h"
+#include "scene/instance_axes.h"
 
 namespace quoin {
-
 namespace {
 
 constexpr double kFramingFov = 30.0 * std::numbers::pi / 180.0;  // narrow enough to keep towers upright
@@ -50,6 +53,10 @@ DBox box_to_frame(const DBox& bounds) {
   return bounds.min == bounds.max ? DBox{bounds.min - 0.5, bounds.max + 0.5} : bounds;
 }
 
+/// A function that returns the maximum dot product of a direction (of any length) with the vectors from the middle
+/// point to the points of an object.
+using Reach = std::function<double(DVec3 direction)>;
+
 /// The camera position, along one image axis and the view direction, such that all corners are visible.
 struct Stand {
   double across;   ///< along the image axis, midway between the limits of the two edges
@@ -61,6 +68,40 @@ Stand stand_for(const Reach& reach, DVec3 axis, DVec3 forward, double slope) {
   const double greatest = reach(axis - slope * forward);
   const double least = reach(-axis - slope * forward);
   return {0.5 * (greatest - least), -0.5 * (greatest + least) / slope};
+}
+
+/// Returns a camera that looks along `forward`, a unit vector. Its image shows the whole object, filling it except for
+/// a margin.
+///
+/// Requires: the object has an inside; everything is finite.
+Camera frame(DVec3 middle, const Reach& reach, DVec3 forward, double aspect) {
+  QUOIN_ASSERT(aspect > 0.0 && std::isfinite(aspect), "a positive, finite aspect");
+  QUOIN_ASSERT(std::abs(glm::length(forward) - 1.0) < 1e-6, "a unit direction");
+  Camera camera;
+  camera.vertical_fov_radians = kFramingFov;
+  turn(camera, forward);
+  const double slope = std::tan(0.5 * kFramingFov) * (1.0 - 2.0 * kMargin);
+  const Stand level = stand_for(reach, camera.right, camera.forward, slope * aspect);
+  const Stand upright = stand_for(reach, camera.up, camera.forward, slope);
+  camera.position = middle + level.across * camera.right + upright.across * camera.up +
+                    std::min(level.forward, upright.forward) * camera.forward;
+  return camera;
+}
+
+/// Returns the four directions that `frame` passes to `reach`, in order.
+std::array<DVec3, 4> framing_directions(DVec3 forward, double aspect) {
+  // The middle and the reach are dummies; only the requested directions matter.
+  std::array<DVec3, 4> asked{};
+  std::size_t count = 0;
+  static_cast<void>(frame(
+      DVec3(0.0),
+      [&](DVec3 direction) {
+        QUOIN_ASSERT(count < asked.size(), "a reach is asked of four directions");
+        asked[count++] = direction;
+        return 1.0;
+      },
+      forward, aspect));
+  return asked;
 }
 
 }  // namespace
@@ -152,45 +193,159 @@ DVec3 direction_of(double azimuth_degrees, double elevation_degrees) {
   return glm::normalize(-DVec3(std::sin(a) * std::cos(e), std::sin(e), std::cos(a) * std::cos(e)));
 }
 
-Camera frame(DVec3 middle, const Reach& reach, View view, double aspect) {
-  return frame(middle, reach, direction_of(view), aspect);
-}
-
-std::array<DVec3, 4> framing_directions(DVec3 forward, double aspect) {
-  // The middle and the reach are dummies; only the requested directions matter.
-  std::array<DVec3, 4> asked{};
-  std::size_t count = 0;
-  static_cast<void>(frame(
-      DVec3(0.0),
-      [&](DVec3 direction) {
-        QUOIN_ASSERT(count < asked.size(), "a reach is asked of four directions");
-        asked[count++] = direction;
-        return 1.0;
-      },
-      forward, aspect));
-  return asked;
-}
-
-Camera frame(DVec3 middle, const Reach& reach, DVec3 forward, double aspect) {
-  QUOIN_ASSERT(aspect > 0.0 && std::isfinite(aspect), "a positive, finite aspect");
-  QUOIN_ASSERT(std::abs(glm::length(forward) - 1.0) < 1e-6, "a unit direction");
-  Camera camera;
-  camera.vertical_fov_radians = kFramingFov;
-  turn(camera, forward);
-  const double slope = std::tan(0.5 * kFramingFov) * (1.0 - 2.0 * kMargin);
-  const Stand level = stand_for(reach, camera.right, camera.forward, slope * aspect);
-  const Stand upright = stand_for(reach, camera.up, camera.forward, slope);
-  camera.position = middle + level.across * camera.right + upright.across * camera.up +
-                    std::min(level.forward, upright.forward) * camera.forward;
-  return camera;
-}
-
 Camera frame_view(const DBox& bounds, View view, double aspect) {
   QUOIN_ASSERT(bounds.empty() || (is_finite(bounds.min) && is_finite(bounds.max)), "finite bounds");
   const DBox box = box_to_frame(bounds);
   const DVec3 half = 0.5 * (box.max - box.min);
   return frame(
-      box.min + half, [half](DVec3 direction) { return glm::dot(glm::abs(direction), half); }, view, aspect);
+      box.min + half, [half](DVec3 direction) { return glm::dot(glm::abs(direction), half); }, direction_of(view),
+      aspect);
+}
+
+namespace {
+
+/// The dot product with a point of the grid is `offset + dot(slope, point)`.
+struct Functional {
+  double offset = 0.0;
+  DVec3 slope{0.0};
+
+  /// Returns the maximum within a box.
+  [[nodiscard]] double over(IVec3 min, IVec3 max) const {
+    const DVec3 corner{slope.x > 0.0 ? max.x : min.x, slope.y > 0.0 ? max.y : min.y, slope.z > 0.0 ? max.z : min.z};
+    return offset + glm::dot(slope, corner);
+  }
+};
+
+struct Candidate {
+  double bound;  ///< upper bound of the chunk's reach
+  const Chunk* voxels;
+  const DensityChunk* samples;  ///< if there are no voxels
+  IVec3 first;                  ///< the chunk's first voxel or sample in its grid
+  IBox box;                     ///< box of the counted voxels or samples, in chunk coordinates
+  Functional functional;
+
+  [[nodiscard]] std::uint64_t row(int y, int z) const {
+    QUOIN_ASSERT((samples == nullptr) != (voxels == nullptr), "either voxels or samples");
+    return samples == nullptr ? ~voxels->row_mask(y, z, kAir) : samples->solid_row(y, z);
+  }
+  /// For fields, the solid around a sample begins after the previous sample on each axis.
+  [[nodiscard]] int margin() const { return samples == nullptr ? 0 : 1; }
+  [[nodiscard]] double over(IVec3 min, IVec3 max) const { return functional.over(min - margin(), max); }
+};
+
+void add_candidates(const Instance& instance, const SceneGrid& grid, DVec3 direction, DVec3 middle,
+                    std::vector<Candidate>& out) {
+  Functional functional;
+  functional.slope = glm::transpose(world_axes(instance)) * direction * instance.voxel_size;
+  functional.offset = glm::dot(direction, instance.position - middle) - glm::dot(functional.slope, grid.pivot);
+  for (const IVec3 coords : grid.grid.chunks()) {
+    const Chunk* chunk = grid.grid.find_chunk(coords);
+    const IVec3 first = coords * kChunkEdge;
+    Candidate candidate{0.0, chunk, nullptr, first, chunk->bounds(), functional};
+    candidate.bound = candidate.over(first + candidate.box.min, first + candidate.box.max);
+    if (!candidate.box.empty()) out.push_back(candidate);
+  }
+  for (const IVec3 coords : grid.field.chunks()) {
+    const IVec3 first = coords * kChunkEdge;
+    Candidate candidate{0.0, nullptr, grid.field.find_chunk(coords), first, kWholeChunk, functional};
+    candidate.bound = candidate.over(first, first + kChunkEdge);
+    out.push_back(candidate);
+  }
+}
+
+/// Returns the maximum over a chunk's contents, or `least` if that is greater.
+double scan(const Candidate& candidate, double least) {
+  const IBox& box = candidate.box;
+  for (int z = box.min.z; z < box.max.z; ++z) {
+    for (int y = box.min.y; y < box.max.y; ++y) {
+      const IVec3 low = candidate.first + IVec3{box.min.x, y, z};
+      const IVec3 high = candidate.first + IVec3{box.max.x, y + 1, z + 1};
+      if (candidate.over(low, high) <= least) continue;
+      const std::uint64_t row = candidate.row(y, z);
+      if (row == 0) continue;
+      const IVec3 first{candidate.first.x + std::countr_zero(row), low.y, low.z};
+      const IVec3 last{candidate.first.x + kChunkEdge - std::countl_zero(row), high.y, high.z};
+      least = std::max(least, candidate.over(first, last));
+    }
+  }
+  return least;
+}
+
+double reach_of(const Scene& scene, InstanceFilter filter, DVec3 direction, DVec3 middle) {
+  std::vector<Candidate> candidates;
+  for (const InstanceHandle handle : scene.instances().handles()) {
+    const Instance& instance = scene.instances()[handle];
+    const SceneGrid* grid = scene.grids().find(instance.grid);
+    if (grid == nullptr || !passes(filter, scene, instance) || !has_valid_transform(instance)) continue;
+    add_candidates(instance, *grid, direction, middle, candidates);
+  }
+  std::sort(candidates.begin(), candidates.end(),
+            [](const Candidate& a, const Candidate& b) { return a.bound > b.bound; });
+  double greatest = -std::numeric_limits<double>::infinity();
+  for (const Candidate& candidate : candidates) {
+    if (candidate.bound <= greatest) break;
+    greatest = scan(candidate, greatest);
+  }
+  return greatest;
+}
+
+}  // namespace
+
+Camera frame_scene(const Scene& scene, View view, double aspect, InstanceFilter filter) {
+  const DBox bounds = scene.bounds(filter);
+  if (bounds.empty()) return frame_view(bounds, view, aspect);
+  const DVec3 middle = bounds.min + 0.5 * (bounds.max - bounds.min);
+  const auto reach = [&](DVec3 direction) { return reach_of(scene, filter, direction, middle); };
+  return frame(middle, reach, direction_of(view), aspect);
+}
+
+namespace {
+
+/// Rotates to the right as seen from the front: +Z towards +X.
+DVec3 turned(DVec3 v, int turn, int turns) {
+  QUOIN_ASSERT(turns > 0, "a positive number of turns");
+  const double angle = 2.0 * std::numbers::pi * turn / turns;
+  const double c = std::cos(angle);
+  const double s = std::sin(angle);
+  return {c * v.x + s * v.z, v.y, c * v.z - s * v.x};
+}
+
+}  // namespace
+
+SceneFraming::SceneFraming(DVec3 forward, double aspect, int turns)
+    : forward_(forward), aspect_(aspect), turns_(turns) {
+  QUOIN_ASSERT(std::abs(glm::length(forward) - 1.0) < 1e-6, "a unit direction");
+  QUOIN_ASSERT(aspect > 0.0 && std::isfinite(aspect), "a positive, finite aspect");
+  QUOIN_ASSERT(turns > 0, "a positive number of turns");
+  reaches_.fill(-std::numeric_limits<double>::infinity());
+}
+
+void SceneFraming::add(const Scene& scene, InstanceFilter filter) {
+  const DBox bounds = scene.bounds(filter);
+  if (bounds.empty()) return;
+  if (!middle_) middle_ = bounds.min + 0.5 * (bounds.max - bounds.min);
+  const std::array<DVec3, 4> directions = framing_directions(forward_, aspect_);
+  for (int turn = 0; turn < turns_; ++turn) {
+    for (std::size_t i = 0; i < directions.size(); ++i) {
+      const double reach = reach_of(scene, filter, turned(directions[i], turn, turns_), *middle_);
+      reaches_[i] = std::max(reaches_[i], reach);
+    }
+  }
+}
+
+Camera SceneFraming::camera(int turn) const {
+  QUOIN_ASSERT(turn >= 0 && turn < turns_, "one of the turns");
+  const DVec3 middle = middle_.value_or(DVec3(0.5));
+  std::size_t asked = 0;
+  const auto reach = [&](DVec3 direction) {
+    QUOIN_ASSERT(asked < reaches_.size(), "a reach is asked of four directions");
+    const double of_cube = 0.5 * (std::abs(direction.x) + std::abs(direction.y) + std::abs(direction.z));
+    return middle_ ? reaches_[asked++] : of_cube;
+  };
+  Camera camera = frame(middle, reach, forward_, aspect_);
+  camera.position = middle + turned(camera.position - middle, turn, turns_);
+  for (DVec3* axis : {&camera.right, &camera.up, &camera.forward}) *axis = turned(*axis, turn, turns_);
+  return camera;
 }
 
 }  // namespace quoin
