@@ -4,7 +4,7 @@
 //           . # # #              . # # .      and z = 1: one box of 2 x 2 x 2; the voxel at (3, 1, 0) remains
 //
 // Faces are rectangles of a layer, which is 64 words of 64 bits in each direction: layers across x are transposed.
-#include "scene/solid/solid_shapes.h"
+#include "scene/solid_shapes.h"
 
 #include <algorithm>
 #include <array>

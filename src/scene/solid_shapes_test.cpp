@@ -1,4 +1,4 @@
-#include "scene/solid/solid_shapes.h"
+#include "scene/solid_shapes.h"
 
 #include <array>
 #include <map>
