@@ -1,21 +1,252 @@
 #pragma once
 
-// Finds the first contact of a shape with the solid of a field. Processes pieces in the order of their earliest
-// possible contact, and halves a piece if its bounds do not decide.
+// Finds the first contact of a shape with the solid of a field. Processes pieces of cells in the order of their
+// earliest possible contact, and halves a piece if its bounds do not decide.
+//
+//   cell: eight samples   piece: a box within it,     its solid lies below the plane
+//   +--------+            with eight corners again     \ |     |   field >= level + slope * (p - middle)
+//   |   __/  |            +---+                         \|     |
+//   |  /solid|            |  /|                          \ air |   which is `doubt` below the field's best plane:
+//   +--------+            +---+                           \----+   a quarter of it when the piece is half as large
+//
+// Trilinear over any such box, the field is least at a corner: a piece with no corner below 0 has no solid.
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
 #include <optional>
 #include <vector>
 
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
 #include <quoin/core/assert.h>
 #include <quoin/core/half.h>
+#include <quoin/core/vec.h>
+#include <quoin/grid/density_grid.h>
 #include <quoin/trace/density_ray.h>
 
-#include "scene/query/field_piece.h"
-#include "scene/query/field_shapes.h"
+#include "core/trilinear.h"
+#include "scene/query/moving_shapes.h"
 #include "scene/query/query_in_grid.h"
 
 namespace quoin {
+
+/// A part of a cell of a field. Lengths are in voxels of the grid, positions relative to the cell's least sample.
+struct FieldPiece {
+  IVec3 cell{0};
+  DVec3 middle{0.5};
+  DVec3 half{0.5};  ///< size; positive
+  CellCorners corners{};
+  // Set by `measure`:
+  DVec3 slope{0.0};
+  DVec3 rise{0.0};  ///< slope * half
+  double square_of_slope = 0.0;
+  double level = 0.0;
+  double doubt = 0.0;
+  DVec3 twist{0.0};  ///< each axis's contribution to the doubt
+  // Set by the search:
+  double enter = 0.0;     ///< no contact with its solid before this time
+  double slack = 0.0;     ///< contact is certain after this additional time, except for the doubt
+  int axis = -1;          ///< the shape's direction that separates it until then; -1: none
+  bool is_exact = false;  ///< all directions were tested, not only the first few
+
+  [[nodiscard]] bool has_solid() const {
+    double least = corners[0];
+    for (const double corner : corners) least = std::min(least, corner);
+    return least < 0.0;
+  }
+
+  [[nodiscard]] double density(const DVec3& point) const {
+    return trilinear(corners, (point - middle) / (2.0 * half) + 0.5);
+  }
+  /// Returns the gradient in density units per voxel.
+  [[nodiscard]] DVec3 gradient(const DVec3& point) const {
+    return trilinear_gradient(corners, (point - middle) / (2.0 * half) + 0.5) / (2.0 * half);
+  }
+
+  /// The plane: the corners as sums of the products of the axes' signs.
+  void measure() {
+    const CellCorners& d = corners;
+    const double a = d[0] + d[3] + d[5] + d[6];
+    const double b = d[1] + d[2] + d[4] + d[7];
+    rise = DVec3(d[1] + d[3] + d[5] + d[7] - d[0] - d[2] - d[4] - d[6],
+                 d[2] + d[3] + d[6] + d[7] - d[0] - d[1] - d[4] - d[5],
+                 d[4] + d[5] + d[6] + d[7] - d[0] - d[1] - d[2] - d[3]) *
+           0.125;
+    const double xy = std::abs(d[0] + d[3] + d[4] + d[7] - d[1] - d[2] - d[5] - d[6]) * 0.125;
+    const double xz = std::abs(d[0] + d[2] + d[5] + d[7] - d[1] - d[3] - d[4] - d[6]) * 0.125;
+    const double yz = std::abs(d[0] + d[1] + d[6] + d[7] - d[2] - d[3] - d[4] - d[5]) * 0.125;
+    const double xyz = std::abs(b - a) * 0.125;
+    doubt = xy + xz + yz + xyz;
+    twist = {xy + xz + xyz, xy + yz + xyz, xz + yz + xyz};
+    level = (a + b) * 0.125 - doubt;
+    slope = rise / half;
+    square_of_slope = glm::dot(slope, slope);
+  }
+
+  /// Leaves the part from `low` to `high`, which lie within it.
+  void restrict_to(const DVec3& low, const DVec3& high) {
+    QUOIN_ASSERT(low.x <= high.x && low.y <= high.y && low.z <= high.z, "low <= high");
+    for (int axis_of_box = 0; axis_of_box < 3; ++axis_of_box) {
+      const double first = middle[axis_of_box] - half[axis_of_box];
+      const double f = (low[axis_of_box] - first) / (2.0 * half[axis_of_box]);
+      const double g = (high[axis_of_box] - first) / (2.0 * half[axis_of_box]);
+      const std::size_t bit = std::size_t{1} << axis_of_box;
+      for (std::size_t i = 0; i < 8; ++i) {
+        if ((i & bit) != 0) continue;
+        const double from = corners[i];
+        const double by = corners[i | bit] - from;
+        corners[i] = from + f * by;
+        corners[i | bit] = from + g * by;
+      }
+    }
+    middle = 0.5 * (low + high);
+    half = 0.5 * (high - low);
+  }
+
+  /// Bounds on the distance from the middle to its solid, along a direction and against it. They are conservative,
+  /// since they use only the plane and the sides of the piece. `along_half` is direction * half, `along_slope`
+  /// direction * slope.
+  struct Extent {
+    double ahead = 0.0;
+    double behind = 0.0;
+  };
+  [[nodiscard]] Extent extent(const DVec3& along_half, double along_slope) const {
+    const double whole = sum(along_half);
+    if (along_slope == 0.0) return {whole, whole};
+    const double cut = std::min(whole, below_plane(along_half, along_slope / square_of_slope));
+    return along_slope > 0.0 ? Extent{cut, whole} : Extent{whole, cut};
+  }
+  /// The exact bounds.
+  [[nodiscard]] Extent exact_extent(const DVec3& along_half) const {
+    const double whole = sum(along_half);
+    Extent extent{whole, whole};
+    for (int i = 0; i < 3; ++i) {
+      if (rise[i] == 0.0) continue;
+      const double multiple = along_half[i] / rise[i];
+      double& end = multiple > 0.0 ? extent.ahead : extent.behind;
+      end = std::min(end, below_plane(along_half, multiple));
+    }
+    return extent;
+  }
+
+ private:
+  static double sum(const DVec3& v) { return std::abs(v.x) + std::abs(v.y) + std::abs(v.z); }
+  // Subtracting a multiple of the slope from a direction gives the same bound for the solid below the plane, which ends
+  // the solid along the slope. The best multiple makes one component 0.
+  [[nodiscard]] double below_plane(const DVec3& along_half, double multiple) const {
+    return sum(along_half - multiple * rise) - std::abs(multiple) * level;
+  }
+};
+
+/// Maximum penetration depth that counts as touching, in voxels.
+inline constexpr double kFieldTouch = 1e-6;
+
+/// A contact of a shape with a field.
+struct FieldContact {
+  double fraction = std::numeric_limits<double>::infinity();
+  bool starts_inside = false;
+  FieldPiece piece;
+  DVec3 point{0.0};  ///< relative to the piece's cell
+};
+
+// A search needs these operations from a shape: the earliest possible contact with a piece's solid, a point of contact,
+// and the part of the piece that the shape passes.
+
+/// A box in motion or at rest.
+///
+/// Separating directions, in the order of tests: the box's three axes; the plane's normal, projected along each of the
+/// box's edges; the plane's normal; the grid's three axes. These ten usually suffice, because a face, an edge or a
+/// corner of the box touches the surface. The cross products of box edges with edges of the solid (where the plane or
+/// two sides of the piece meet) complete the set. The remaining error is the plane's doubt.
+class BoxInField {
+ public:
+  /// `until`: the last fraction of the movement.
+  BoxInField(const MovingBox& box, double until)
+      : box_(box),
+        until_(until),
+        at_once_(1e-9 / std::max(length_of(box.displacement), 1e-6)),
+        half_size_(glm::max(box.half_size, DVec3(2.0 * kFieldTouch))),
+        reach_(glm::max(reach_of_axes(box.half_axes), DVec3(2.0 * kFieldTouch))),
+        is_upright_(is_along_grid(box.axes)) {}
+
+  /// Returns true if the box may touch the piece's solid; then sets `enter`, `slack` and `axis`.
+  [[nodiscard]] bool may_meet(FieldPiece& piece) const;
+  /// As `may_meet`, but tests all directions.
+  [[nodiscard]] bool may_meet_exactly(FieldPiece& piece) const;
+  /// Returns a point of the solid that the box has surely reached by the time `until`, if any.
+  [[nodiscard]] std::optional<DVec3> point_in_solid(const FieldPiece& piece, double until) const;
+  /// Returns the time for a call of `point_in_solid` for a piece on the path: the box is then deeper than the plane's
+  /// doubt.
+  [[nodiscard]] double time_beyond_doubt(const FieldPiece& piece) const;
+  /// Returns the bounds of the box between two fractions, relative to a cell.
+  [[nodiscard]] DBox bounds(IVec3 cell, double from, double to) const;
+  /// Shrinks a box relative to a cell to the approximate region that the shape passes between two fractions.
+  void shrink(DBox& part, IVec3 cell, double from, double to) const;
+  /// Returns the unit normal from the solid towards the box, in the grid's space; 0 if unknown.
+  [[nodiscard]] DVec3 normal(const FieldContact& contact, const DensityGrid& field) const;
+
+ private:
+  static bool is_along_grid(const glm::dmat3& axes) {
+    return std::all_of(&axes[0], &axes[0] + 3, [](const DVec3& axis) {
+      return std::max({std::abs(axis.x), std::abs(axis.y), std::abs(axis.z)}) > 1.0 - 1e-15;
+    });
+  }
+
+  struct Course;
+  [[nodiscard]] bool follow(FieldPiece& piece, bool is_exact) const;
+  [[nodiscard]] DVec3 direction(const FieldPiece& piece, int which) const;
+  [[nodiscard]] DVec3 parting(const FieldPiece& piece) const;
+  [[nodiscard]] std::optional<DVec3> by_support(const FieldPiece& piece, const DVec3& centre) const;
+  [[nodiscard]] DVec3 of_face(const FieldContact& contact, const DensityGrid& field) const;
+  [[nodiscard]] DVec3 across_crease(const FieldContact& contact, const DensityGrid& field) const;
+  [[nodiscard]] static std::array<DVec3, 8> gradients_about(const FieldContact& contact, const DensityGrid& field);
+  [[nodiscard]] DVec3 nearest(const DVec3& centre, const DVec3& point) const;
+
+  const MovingBox& box_;
+  double until_;
+  double at_once_;
+  DVec3 half_size_;  // at least twice the touch tolerance, even for a box without thickness
+  DVec3 reach_;
+  bool is_upright_;  // its axes are the grid's
+};
+
+/// A capsule in motion or at rest. The separating direction joins the nearest points of the capsule and the piece's
+/// solid, found by iteration. Any direction gives a valid bound until the two touch along it.
+class CapsuleInField {
+ public:
+  /// `until`: the last fraction of the movement.
+  CapsuleInField(const MovingCapsule& capsule, double until) : capsule_(capsule), until_(until) {}
+
+  [[nodiscard]] bool may_meet(FieldPiece& piece) const;
+  [[nodiscard]] bool may_meet_exactly(FieldPiece& piece) const { return may_meet(piece); }
+  [[nodiscard]] std::optional<DVec3> point_in_solid(const FieldPiece& piece, double until) const;
+  [[nodiscard]] double time_beyond_doubt(const FieldPiece& piece) const;
+  [[nodiscard]] DBox bounds(IVec3 cell, double from, double to) const;
+  static void shrink(DBox& /*part*/, IVec3 /*cell*/, double /*from*/, double /*to*/) {}
+  [[nodiscard]] DVec3 normal(const FieldContact& contact, const DensityGrid& field) const;
+
+ private:
+  [[nodiscard]] DVec3 parting(const FieldPiece& piece, const DVec3& centre) const;
+
+  const MovingCapsule& capsule_;
+  double until_;
+};
+
+/// Maps a moving shape to its field shape.
+template <class Moving>
+struct InField;
+template <>
+struct InField<MovingBox> {
+  using Shape = BoxInField;
+};
+template <>
+struct InField<MovingCapsule> {
+  using Shape = CapsuleInField;
+};
 
 /// The cells of a field that contain solid of the types that a query meets.
 class FieldCells {
@@ -204,5 +435,44 @@ std::optional<FieldContact> first_overlap_in_field(FieldCells& cells, const Shap
   }
   return std::nullopt;
 }
+
+/// The first contact of a moving shape (MovingBox or MovingCapsule) with a field; for `follow_way`.
+template <class Moving>
+class FieldSweep {
+ public:
+  FieldSweep(const DensityTree& tree, const TypesMet& types, const Moving& shape, double most)
+      : cells_(tree, types), shape_(shape), most_(most) {}
+
+  [[nodiscard]] IBox bounds() const { return cells_.bounds(); }
+  [[nodiscard]] double fraction() const { return best_.fraction; }
+  void check(const IBox& near, double from, double to);
+
+  [[nodiscard]] const FieldContact& best() const { return best_; }
+  [[nodiscard]] VoxelType material() { return cells_.material(best_.piece.cell, best_.point); }
+  [[nodiscard]] DVec3 normal() const;
+
+ private:
+  using Shape = typename InField<Moving>::Shape;
+
+  FieldCells cells_;
+  const Moving& shape_;
+  double most_;
+  FieldContact best_;
+};
+
+/// The way out of a field's solid.
+struct WayOut {
+  DVec3 normal{0.0};  ///< in the grid, unit
+  double depth = 0.0;
+};
+
+/// Returns the way out for a shape that starts inside: along the gradient at the deepest point or, without a gradient,
+/// along the grid axis with the shortest way. If neither leads out within twice the shape's size, the way is a voxel
+/// long along the first.
+///
+/// Cost: some sweeps about as long as the shape.
+template <class Moving>
+[[nodiscard]] WayOut way_out(const DensityTree& tree, const TypesMet& types, const Moving& shape,
+                             const FieldContact& contact);
 
 }  // namespace quoin

@@ -22,7 +22,7 @@
 
 #include <quoin/scene/sweep.h>
 
-#include "scene/query/moving_capsule.h"
+#include "scene/query/moving_shapes.h"
 #include "scene/query/query_in_grid.h"
 #include "scene/query/unloaded_chunks.h"
 #include "scene/tracer/placed_grid.h"

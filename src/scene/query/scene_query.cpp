@@ -11,9 +11,7 @@
 
 #include "core/coordinates/chunk_order.h"
 #include "scene/query/field_search.h"
-#include "scene/query/field_sweep.h"
-#include "scene/query/moving_box.h"
-#include "scene/query/moving_capsule.h"
+#include "scene/query/moving_shapes.h"
 #include "scene/query/query_in_grid.h"
 #include "scene/query/unloaded_chunks.h"
 #include "scene/tracer/placed_grid.h"

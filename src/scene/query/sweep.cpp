@@ -5,9 +5,8 @@
 
 #include <quoin/core/assert.h>
 
-#include "scene/query/field_sweep.h"
-#include "scene/query/moving_box.h"
-#include "scene/query/moving_capsule.h"
+#include "scene/query/field_search.h"
+#include "scene/query/moving_shapes.h"
 #include "scene/query/query_in_grid.h"
 #include "scene/query/unloaded_chunks.h"
 #include "scene/tracer/placed_grid.h"
