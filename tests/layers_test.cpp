@@ -75,7 +75,6 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"scene/meshes/glass_thickness.h", {"store"}},
     {"scene/tracer/placed_grid.h", {"light", "render", "render_vk"}},
     {"scene/tracer/scene_view.h", {"light", "render"}},
-    {"scene/tracer/halved_grid_cache.h", {"render_vk"}},
     {"scene/tracer/instance_tree.h", {"render_vk"}},
     {"scene/tracer/tree_cache.h", {"render", "render_vk"}},
     {"scene/tracer/scene_tracer_impl.h", {"render_vk"}},

@@ -12,7 +12,7 @@
 #include "render_vk/march/device_impostors.h"
 #include "render_vk/march/device_scene.h"
 #include "render_vk/trees/device_grid.h"
-#include "scene/tracer/halved_grid_cache.h"
+#include "scene/tracer/tree_cache.h"
 
 namespace quoin::vulkan {
 

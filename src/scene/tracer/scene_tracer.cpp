@@ -1,10 +1,14 @@
 #include <quoin/scene/scene_tracer.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 #include "core/moved_from.h"
+#include "scene/instance_axes.h"
 #include "scene/tracer/placed_grid.h"
 #include "scene/tracer/scene_tracer_impl.h"
 
@@ -80,6 +84,319 @@ std::size_t SceneTracer::bytes() const {
   std::size_t total = 0;
   for (const OccupancyTree* tree : trees) total += tree->bytes();
   return total;
+}
+
+namespace {
+
+bool is_any_of(const std::vector<VoxelType>& types, const std::vector<VoxelType>& ascending) {
+  return std::any_of(types.begin(), types.end(),
+                     [&](VoxelType type) { return std::binary_search(ascending.begin(), ascending.end(), type); });
+}
+
+bool has_type_of(const SceneGrid& grid, const std::vector<VoxelType>& ascending) {
+  if (is_any_of(grid.grid.types(), ascending)) return true;
+  const std::vector<IVec3> chunks = grid.field.chunks();
+  return std::any_of(chunks.begin(), chunks.end(), [&](IVec3 chunk) {
+    return is_any_of(grid.field.find_chunk(chunk)->materials().types(), ascending);
+  });
+}
+
+void put_trees(const TreeCache& trees, PlacedGrid& placed) {
+  placed.opaque = &trees.opaque();
+  placed.transparent = trees.transparent();
+  placed.field = trees.field();
+  placed.opaque_field = trees.opaque_field();
+  placed.glass = trees.glass();
+}
+
+}  // namespace
+
+DBox bounds_in_world(const PlacedGrid& placed, const IBox& tight) {
+  QUOIN_ASSERT(placed.voxel_size > 0.0, "a positive voxel size");
+  const DVec3 low = (DVec3(tight.min) - placed.pivot) * placed.voxel_size;
+  const DVec3 high = (DVec3(tight.max) - placed.pivot) * placed.voxel_size;
+  DBox box{DVec3(0.0), DVec3(0.0)};
+  for (int axis = 0; axis < 3; ++axis) {
+    const DVec3 a = placed.world_axes[axis] * low[axis];
+    const DVec3 b = placed.world_axes[axis] * high[axis];
+    box = {box.min + glm::min(a, b), box.max + glm::max(a, b)};
+  }
+  box = {box.min + placed.position, box.max + placed.position};
+  const DVec3 room = (box.max - box.min) * 1e-6 + (glm::abs(box.min) + glm::abs(box.max)) * 1e-15;
+  return {box.min - room, box.max + room};
+}
+
+bool SceneTracer::Impl::update(Threads threads) {
+  ChangeCursor types_now = followed_types;
+  ChangeCursor scene_now = followed_scene;
+  const TypeChanges types = scene->types.changes_since(types_now);
+  SceneChanges changes = scene->changes_since(scene_now);
+  followed_types = followed_scene = {};  // stay empty if memory runs out
+  const bool was_unfinished = std::exchange(is_unfinished, true);
+  // Discarded trees are rebuilt, in all placed grids.
+  changes.all |= update_types(types);
+  const bool are_shapes_same = look_at_grids(changes);
+  const bool moves_all = changes.all || !are_shapes_same;
+  const bool are_placed = !was_unfinished && (moves_all ? move_all_instances() : move_instances(changes));
+  if (!are_placed) {
+    place_instances();
+    changes.all = true;
+  }
+  find_unloaded(changes, moves_all || changes.all || has_other_trees);
+  update_trees(changes, threads);
+  followed_types = types_now;
+  followed_scene = scene_now;
+  is_unfinished = false;
+  return std::exchange(has_other_trees, false);
+}
+
+// Discards the data of types that became transparent or ceased to be. Returns false if there are none.
+bool SceneTracer::Impl::update_types(const TypeChanges& changes) {
+  if (!has_other_visibility(changes)) return false;
+  std::vector<VoxelType> changed;
+  for (const TypeChange& change : changes.items) {
+    if (change.visibility_changed) changed.push_back(change.type);
+  }
+  std::vector<GridHandle> kept;
+  bool has_forgotten = false;
+  for (const auto& each : grids) {
+    if (each == nullptr) continue;
+    // An edit may have removed the last voxel of such a type.
+    const SceneGrid* grid = scene->grids().find(each->handle);
+    if (changes.all || grid == nullptr || grid->grid.has_changed_since(each->trees.followed()) ||
+        (each->trees.field() != nullptr && grid->field.has_changed_since(each->trees.followed_field())) ||
+        has_type_of(*grid, changed)) {
+      each->trees.forget();
+      has_forgotten = true;
+    } else {
+      kept.push_back(each->handle);
+    }
+  }
+  coarse.forget([&](GridHandle handle) { return !std::binary_search(kept.begin(), kept.end(), handle); });
+  return has_forgotten;
+}
+
+// Returns false if a grid came or went, or its bounds or pivot changed.
+bool SceneTracer::Impl::look_at_grids(const SceneChanges& changes) {
+  const auto is_gone = [&](GridHandle handle) { return scene->grids().find(handle) == nullptr; };
+  if (changes.all) {
+    for (auto& each : grids) {
+      if (each != nullptr && is_gone(each->handle)) each.reset();
+    }
+    coarse.forget(is_gone);
+    scene->grids().for_each([&](GridHandle handle, const SceneGrid&) { (void)look_at(handle); });
+    return false;
+  }
+  bool is_same = true;
+  bool has_gone = false;
+  for (const GridHandle handle : changes.grids) {
+    if (!is_gone(handle)) {
+      is_same &= look_at(handle);
+      continue;
+    }
+    has_gone = true;
+    is_same = false;
+    if (handle.index >= grids.size() || grids[handle.index] == nullptr) continue;
+    if (grids[handle.index]->handle == handle) grids[handle.index].reset();
+  }
+  if (has_gone) coarse.forget(is_gone);
+  return is_same;
+}
+
+// Returns false if the placement of the grid's contents changed.
+bool SceneTracer::Impl::look_at(GridHandle handle) {
+  const SceneGrid& grid = scene->grids()[handle];
+  if (handle.index >= grids.size()) grids.resize(handle.index + std::size_t{1});
+  auto& known = grids[handle.index];
+  if (known == nullptr || known->handle != handle) {
+    known = std::make_unique<TracedGrid>();
+    known->handle = handle;
+  }
+  has_other_trees |= known->grid != &grid;
+  const bool is_new = std::exchange(known->grid, &grid) == nullptr;
+  const IBox tight = grid.bounds();
+  const bool was_partial = std::exchange(known->is_partial, grid.grid.is_partial() || grid.field.is_partial());
+  // NaN differs from itself, so such a pivot counts as changed each time.
+  if (!is_new && tight == known->tight && known->pivot == grid.pivot && was_partial == known->is_partial) return true;
+  known->shape = ++shapes;
+  known->pivot = grid.pivot;
+  known->tight = tight;
+  known->can_be_placed = !tight.empty() && is_finite(grid.pivot);
+  return false;
+}
+
+// Returns the grid of an instance that can be traced, or null.
+TracedGrid* SceneTracer::Impl::grid_to_place(const Instance& instance) const {
+  if (!passes(filter, *scene, instance) || instance.grid.index >= grids.size()) return nullptr;
+  TracedGrid* grid = grids[instance.grid.index].get();
+  if (grid == nullptr || grid->handle != instance.grid || !grid->can_be_placed) return nullptr;
+  return grid;
+}
+
+void SceneTracer::Impl::place(std::size_t i, InstanceHandle handle, const Instance& instance, TracedGrid& grid) {
+  QUOIN_ASSERT(i < placed.size() && placed.size() == sources.size(), "a placed grid with its source");
+  QUOIN_ASSERT(i == 0 || placed[i - 1].instance < handle, "instances in the order of their handles");
+  placed[i].instance = handle;
+  placed[i].grid = grid.grid;
+  placed[i].voxels = &grid.grid->grid;
+  put_trees(grid.trees, placed[i]);
+  placed[i].pivot = grid.pivot;
+  placed[i].world_axes = world_axes(instance);
+  placed[i].position = instance.position;
+  placed[i].voxel_size = instance.voxel_size;
+  sources[i] = {handle,           &grid, grid.shape, instance.position, instance.rotation, instance.voxel_size,
+                instance.mirrored};
+}
+
+// Updates the placement of an instance. Returns false if the instance must be added to the traced ones or removed.
+bool SceneTracer::Impl::move_instance(InstanceHandle handle, std::vector<InstanceTree::Change>& moved) {
+  const auto found = std::lower_bound(sources.begin(), sources.end(), handle,
+                                      [](const Source& each, InstanceHandle key) { return each.instance < key; });
+  const bool was_placed = found != sources.end() && found->instance == handle;
+  const Instance* instance = scene->instances().find(handle);
+  TracedGrid* grid = instance == nullptr ? nullptr : grid_to_place(*instance);
+  const bool is_placed = grid != nullptr && has_valid_transform(*instance);
+  if (is_placed != was_placed) return false;
+  if (!is_placed || found->is_of(*instance, *grid)) return true;
+  // With another grid, the trees of that grid may be missing.
+  if (found->grid != grid) return false;
+  const auto i = static_cast<std::size_t>(found - sources.begin());
+  place(i, handle, *instance, *grid);
+  moved.push_back({i, bounds_in_world(placed[i], grid->tight)});
+  return true;
+}
+
+bool SceneTracer::Impl::move_instances(const SceneChanges& changes) {
+  std::vector<InstanceTree::Change> moved;
+  for (const InstanceHandle handle : changes.instances) {
+    if (!move_instance(handle, moved)) return false;
+  }
+  instances.change(moved);
+  return true;
+}
+
+// Updates the placement of all instances. Returns false, partly done, if the set of traced instances changed.
+bool SceneTracer::Impl::move_all_instances() {
+  for (const auto& each : grids) {
+    if (each != nullptr) each->is_placed = false;
+  }
+  std::vector<InstanceTree::Change> moved;
+  std::size_t next = 0;
+  bool is_same = true;
+  scene->instances().for_each([&](InstanceHandle handle, const Instance& instance) {
+    if (!is_same) return;
+    TracedGrid* grid = grid_to_place(instance);
+    if (grid == nullptr) return;
+    const bool is_next = next < sources.size() && sources[next].instance == handle;
+    const bool has_moved = !is_next || !sources[next].is_of(instance, *grid);
+    if (has_moved && !has_valid_transform(instance)) return;
+    // With another grid, the trees of that grid may be missing.
+    is_same = is_next && (!has_moved || sources[next].grid == grid);
+    if (!is_same) return;
+    grid->is_placed = true;
+    if (has_moved) {
+      place(next, handle, instance, *grid);
+      moved.push_back({next, bounds_in_world(placed[next], grid->tight)});
+    }
+    ++next;
+  });
+  if (!is_same || next != placed.size()) return false;
+  instances.change(moved);
+  return true;
+}
+
+// Places all traced grids.
+void SceneTracer::Impl::place_instances() {
+  for (const auto& each : grids) {
+    if (each != nullptr) each->is_placed = false;
+  }
+  std::vector<DBox> boxes;
+  placed.clear();
+  sources.clear();
+  scene->instances().for_each([&](InstanceHandle handle, const Instance& instance) {
+    TracedGrid* grid = grid_to_place(instance);
+    if (grid == nullptr || !has_valid_transform(instance)) return;
+    grid->is_placed = true;
+    placed.emplace_back();
+    sources.emplace_back();
+    place(placed.size() - 1, handle, instance, *grid);
+    boxes.push_back(bounds_in_world(placed.back(), grid->tight));
+  });
+  instances = InstanceTree(std::move(boxes));
+}
+
+// Keeps `unloaded` up to date.
+void SceneTracer::Impl::find_unloaded(const SceneChanges& changes, bool finds_all) {
+  const bool has_partial =
+      std::any_of(grids.begin(), grids.end(), [](const auto& grid) { return grid != nullptr && grid->is_partial; });
+  if (!has_partial || finds_all) unloaded.clear();
+  if (!has_partial) return;
+  if (finds_all) {
+    scene->instances().for_each(
+        [&](InstanceHandle handle, const Instance& instance) { place_unloaded(handle, &instance); });
+    return;
+  }
+  for (const InstanceHandle handle : changes.instances) place_unloaded(handle, scene->instances().find(handle));
+}
+
+// Inserts or updates an instance of a partial grid in `unloaded`. Removes an instance that is gone or not partial any
+// more.
+void SceneTracer::Impl::place_unloaded(InstanceHandle handle, const Instance* instance) {
+  const auto at = std::lower_bound(unloaded.begin(), unloaded.end(), handle,
+                                   [](const PlacedGrid& each, InstanceHandle key) { return each.instance < key; });
+  const bool is_there = at != unloaded.end() && at->instance == handle;
+  const TracedGrid* const grid =
+      instance == nullptr || instance->grid.index >= grids.size() ? nullptr : grids[instance->grid.index].get();
+  const bool is_wanted = grid != nullptr && grid->handle == instance->grid && grid->is_partial &&
+                         is_finite(grid->pivot) && passes(filter, *scene, *instance) && has_valid_transform(*instance);
+  if (!is_wanted) {
+    if (is_there) unloaded.erase(at);
+    return;
+  }
+  PlacedGrid placed_chunks;
+  placed_chunks.instance = handle;
+  placed_chunks.grid = grid->grid;
+  placed_chunks.pivot = grid->pivot / double{kChunkEdge};
+  placed_chunks.world_axes = world_axes(*instance);
+  placed_chunks.position = instance->position;
+  placed_chunks.voxel_size = instance->voxel_size * kChunkEdge;
+  if (is_there) {
+    *at = placed_chunks;
+  } else {
+    unloaded.insert(at, placed_chunks);
+  }
+}
+
+void SceneTracer::Impl::update_trees(const SceneChanges& changes, Threads threads) {
+  std::vector<TracedGrid*> used;
+  const auto use = [&](TracedGrid* grid) {
+    if (grid != nullptr && grid->is_placed) used.push_back(grid);
+  };
+  if (changes.all) {
+    for (const auto& each : grids) use(each.get());
+  }
+  for (const GridHandle handle : changes.grids) {
+    if (!changes.all && handle.index < grids.size()) use(grids[handle.index].get());
+  }
+  std::vector<std::uint8_t> is_other(used.size());
+  parallel_for(used.size(), threads, [&](std::size_t i) {
+    const bool has_other_voxels = used[i]->trees.update(used[i]->grid->grid, scene->types);
+    const bool has_other_field = used[i]->trees.update(used[i]->grid->field, scene->types);
+    is_other[i] = static_cast<std::uint8_t>(has_other_voxels || has_other_field);
+  });
+  has_other_trees |= std::find(is_other.begin(), is_other.end(), 1) != is_other.end();
+  if (!changes.all && !has_other_trees) return;
+  has_transparent = std::any_of(grids.begin(), grids.end(), [](const auto& grid) {
+    return grid != nullptr && grid->is_placed && grid->trees.has_transparent();
+  });
+  if (!has_other_trees) return;
+  QUOIN_ASSERT(sources.size() == placed.size(), "a source per placed grid");
+  for (std::size_t i = 0; i < placed.size(); ++i) {
+    const TracedGrid& grid = *sources[i].grid;
+    placed[i].grid = grid.grid;
+    placed[i].voxels = &grid.grid->grid;
+    put_trees(grid.trees, placed[i]);
+  }
 }
 
 }  // namespace quoin

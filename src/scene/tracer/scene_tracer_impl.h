@@ -6,7 +6,6 @@
 
 #include <quoin/scene/scene_tracer.h>
 
-#include "scene/tracer/halved_grid_cache.h"
 #include "scene/tracer/instance_tree.h"
 #include "scene/tracer/placed_grid.h"
 #include "scene/tracer/tree_cache.h"

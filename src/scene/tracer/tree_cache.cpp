@@ -1,10 +1,15 @@
 #include "scene/tracer/tree_cache.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
+#include <quoin/scene/scene_tracer.h>
+
 #include "mesh/surface/voxel_surface.h"
+#include "scene/tracer/placed_grid.h"
 #include "trace/cell_rows.h"
 
 namespace quoin {
@@ -110,6 +115,134 @@ void TreeCache::update_transparent(const Grid& grid, const VoxelRegistry& types,
   }
   transparent_->update(grid, types, changes);
   if (transparent_->bounds().empty()) transparent_.reset();
+}
+
+namespace {
+
+const DensityGrid& no_field() {
+  static const DensityGrid none;
+  return none;
+}
+
+// Returns true if a halved grid fills the same volume as the full one, within an eighth.
+bool has_volume_of(const Grid& coarse, int halvings, const Grid& full) {
+  const auto cells = std::ldexp(static_cast<double>(coarse.voxel_count()), 3 * halvings);
+  const auto voxels = static_cast<double>(full.voxel_count());
+  return std::abs(cells - voxels) <= 0.125 * voxels;
+}
+
+// As above, for a field. Also returns false if so much of its surface is thin that the next halving would make holes.
+bool has_shape_of(const DensityPyramid& fields, int halvings) {
+  const DownsampledDensityCounts& now = fields.counts(halvings);
+  const auto cells = std::ldexp(static_cast<double>(now.solid), 3 * halvings);
+  const auto samples = static_cast<double>(fields.counts(1).finer_solid);
+  return std::abs(cells - samples) <= 0.125 * samples && 8 * now.thin <= now.surface;
+}
+
+}  // namespace
+
+void CoarseLevel::put_in(PlacedGrid& placed) const {
+  QUOIN_ASSERT(voxels != nullptr && placed.grid != nullptr && level >= 1, "a level that was made, and a placed grid");
+  const double cell = std::ldexp(1.0, level);
+  placed.voxels = voxels;
+  placed.opaque = &trees.opaque();
+  placed.transparent = trees.transparent();
+  placed.field = trees.field();
+  placed.opaque_field = trees.opaque_field();
+  placed.glass = trees.glass();
+  placed.pivot = placed.grid->pivot / cell;
+  placed.voxel_size *= cell;
+  placed.level = level;
+}
+
+void HalvedGridCache::Entry::make(const SceneGrid& grid, const VoxelRegistry& types, int halvings, Threads threads) {
+  ChangeCursor now = followed;
+  ChangeCursor field_now = followed_field;
+  const GridChanges changes = grid.grid.changes_since(now);
+  const DensityChanges field_changes = grid.field.changes_since(field_now);
+  followed = followed_field = {};  // stay empty if memory runs out
+  if (changes.all || field_changes.all) {
+    *this = {};
+  } else if (!changes.empty() || !field_changes.empty()) {
+    renew(grid, types, threads);
+  }
+  followed = now;
+  followed_field = field_now;
+  const int known = static_cast<int>(levels.size());
+  if (known < halvings && !is_coarsest) is_coarsest = has_glass(grid.field, types);
+  for (int level = known + 1; level <= halvings && !is_coarsest; ++level) {
+    pyramid.update(grid.grid, types, level, threads);
+    fields.update(grid.field, level, threads);
+    is_coarsest = !take_level(grid, types, level);
+  }
+}
+
+// Updates the existing levels after an edit.
+void HalvedGridCache::Entry::renew(const SceneGrid& grid, const VoxelRegistry& types, Threads threads) {
+  is_coarsest = has_glass(grid.field, types);
+  if (is_coarsest) return levels.clear();
+  const int most = std::max(pyramid.levels(), fields.levels());
+  pyramid.update(grid.grid, types, most, threads);
+  fields.update(grid.field, most, threads);
+  for (int level = 1; level <= most && !is_coarsest; ++level) is_coarsest = !take_level(grid, types, level);
+}
+
+bool HalvedGridCache::Entry::is_alike(const SceneGrid& grid, int halvings) const {
+  const bool has_voxels = grid.grid.chunk_count() != 0;
+  const bool has_field = grid.field.chunk_count() != 0;
+  if (has_voxels && (pyramid.levels() < halvings || !has_volume_of(pyramid.level(halvings), halvings, grid.grid))) {
+    return false;
+  }
+  if (has_field && (fields.levels() < halvings || !has_shape_of(fields, halvings))) return false;
+  return has_voxels || has_field;
+}
+
+// Adds a level of the pyramids if it is similar to the grid. Otherwise removes it and all coarser levels, and returns
+// false.
+bool HalvedGridCache::Entry::take_level(const SceneGrid& grid, const VoxelRegistry& types, int halvings) {
+  QUOIN_ASSERT(halvings >= 1, "1 <= halvings");
+  const auto index = static_cast<std::size_t>(halvings - 1);
+  if (!is_alike(grid, halvings)) {
+    levels.resize(std::min(levels.size(), index));
+    return false;
+  }
+  QUOIN_ASSERT(index <= levels.size(), "levels in their order");
+  if (levels.size() == index) levels.push_back(std::make_unique<CoarseLevel>());
+  CoarseLevel& level = *levels[index];
+  level.voxels = grid.grid.chunk_count() != 0 ? &pyramid.level(halvings) : &no_voxels;
+  level.field = grid.field.chunk_count() != 0 ? &fields.level(halvings) : nullptr;
+  level.level = halvings;
+  const DensityGrid& field = level.field == nullptr ? no_field() : *level.field;
+  level.trees.update(*level.voxels, types);
+  level.trees.update(field, types);
+  level.tight = unite(level.voxels->bounds(), field.bounds());
+  return true;
+}
+
+const CoarseLevel* HalvedGridCache::Lock::find(GridHandle grid, int halvings) const {
+  const auto found = grids_->entries_.find(grid);
+  if (halvings <= 0 || found == grids_->entries_.end() || found->second.levels.empty()) return nullptr;
+  const auto& levels = found->second.levels;
+  return levels[std::min(static_cast<std::size_t>(halvings), levels.size()) - 1].get();
+}
+
+HalvedGridCache::Lock HalvedGridCache::make(const Scene& scene, std::span<const SelectedInstance> selected,
+                                            Threads threads) {
+  Lock lock(*this);
+  std::map<GridHandle, int> wanted;
+  for (const SelectedInstance& choice : selected) {
+    if (choice.level <= 0) continue;
+    int& most = wanted[scene.instances()[choice.instance].grid];
+    most = std::max(most, choice.level);
+  }
+  std::vector<std::pair<GridHandle, int>> tasks(wanted.begin(), wanted.end());
+  for (const auto& [grid, halvings] : tasks) entries_[grid];
+  const Threads inner = tasks.size() > 1 ? Threads{1} : threads;
+  parallel_for(tasks.size(), threads, [&](std::size_t i) {
+    const auto& [handle, halvings] = tasks[i];
+    entries_.find(handle)->second.make(scene.grids()[handle], scene.types, halvings, inner);
+  });
+  return lock;
 }
 
 }  // namespace quoin
