@@ -19,7 +19,7 @@
 #include "mesh/surface/smooth_surface.h"
 #include "mesh/surface/voxel_surface.h"
 #include "scene/meshes/lattices.h"
-#include "scene/meshes/mesh_parts.h"
+#include "scene/meshes/scene_mesh_parts.h"
 
 namespace quoin {
 
