@@ -78,7 +78,6 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"scene/tracer/instance_tree.h", {"render_vk"}},
     {"scene/tracer/tree_cache.h", {"render", "render_vk"}},
     {"scene/tracer/scene_tracer_impl.h", {"render_vk"}},
-    {"trace/cell_rows.h", {"scene"}},
     {"trace/chunk_rows.h", {"light", "scene"}},
     {"trace/density/density_glass.h", {"light", "render_vk", "scene"}},
     {"trace/density/smooth_normal.h", {"render", "scene"}},

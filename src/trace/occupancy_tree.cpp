@@ -12,7 +12,6 @@
 #include "core/coordinates/chunk_boxes.h"
 #include "core/coordinates/chunk_order.h"
 #include "trace/brick_store.h"
-#include "trace/cell_rows.h"
 #include "trace/chunk_rows.h"
 #include "trace/tree_view.h"
 

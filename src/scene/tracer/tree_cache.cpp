@@ -10,7 +10,7 @@
 
 #include "mesh/surface/voxel_surface.h"
 #include "scene/tracer/placed_grid.h"
-#include "trace/cell_rows.h"
+#include "trace/chunk_rows.h"
 
 namespace quoin {
 namespace {
