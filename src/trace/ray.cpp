@@ -5,7 +5,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/trace/packet.h>
 
-#include "trace/kernel/kernel.h"
+#include "trace/kernel/ray_kernel.h"
 #include "trace/tree_view.h"
 #include "trace/walk.h"
 

@@ -233,7 +233,7 @@ bool holds(Tree tree, ivec3 voxel) {
 }
 
 // Density fields. Their trees hold the cells that touch the solid. In a cell the field along a ray is a cubic, whose
-// first root is found as in trace/kernel/cell.inl on the CPU, here in single precision.
+// first root is found as in trace/kernel/cell_cubic.inl on the CPU, here in single precision.
 
 const int kBlockEdge = 7;
 

@@ -13,7 +13,7 @@
 
 #include "core/trilinear.h"
 #include "trace/density/smooth_normal.h"
-#include "trace/kernel/cell.inl"
+#include "trace/kernel/cell_cubic.inl"
 #include "trace/walk.h"
 
 namespace quoin {

@@ -7,7 +7,7 @@
 
 #include "core/trilinear.h"
 #include "grid/density/density_storage.h"
-#include "trace/kernel/kernel.h"
+#include "trace/kernel/ray_kernel.h"
 
 namespace quoin {
 namespace {

@@ -12,10 +12,10 @@
 
 #include <immintrin.h>
 
-#include "trace/kernel/cell.inl"
+#include "trace/kernel/cell_cubic.inl"
 #include "trace/kernel/field_cells.inl"
-#include "trace/kernel/kernel.h"
 #include "trace/kernel/lockstep.inl"
+#include "trace/kernel/ray_kernel.h"
 #include "trace/kernel/single.inl"
 #include "trace/kernel/window.inl"
 

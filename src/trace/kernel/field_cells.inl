@@ -1,5 +1,6 @@
 // Tests several cells of a field at once. In single precision it finds the few cells in which the field can become
-// negative along a ray. Those are then tested in double (trace/kernel/cell.inl), so rounding here costs time only.
+// negative along a ray. Those are then tested in double (trace/kernel/cell_cubic.inl), so rounding here costs time
+// only.
 //
 //   x, y, z      | 0 | 1 | ... | 7 |    the cells; eight, or with AVX-512 also sixteen
 //   corners      | 0 | 1 | ... | 7 |    eight times: gathered from rows of halves, two of a row at once
@@ -14,9 +15,9 @@
 #include <immintrin.h>
 
 #include "grid/density/density_storage.h"
-#include "trace/kernel/cell.inl"
-#include "trace/kernel/kernel.h"
+#include "trace/kernel/cell_cubic.inl"
 #include "trace/kernel/lockstep.inl"
+#include "trace/kernel/ray_kernel.h"
 
 namespace quoin::trace {
 namespace {
@@ -297,7 +298,7 @@ template <int kLanes, class Number, class Base>
 }
 
 // Tests several cells at once in double, with the same operations in the same order as for one cell
-// (trace/kernel/cell.inl).
+// (trace/kernel/cell_cubic.inl).
 
 /// Results of the test in double, before roots are found.
 struct Meetings {

@@ -1,6 +1,6 @@
 // Rays in fields for x86-64 processors with AVX-512 F, BW, DQ and VL. Called only if the processor has all of them.
 
-#include "trace/kernel/kernel.h"
+#include "trace/kernel/ray_kernel.h"
 
 #ifdef QUOIN_X86_KERNELS
 

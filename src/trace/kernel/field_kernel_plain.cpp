@@ -11,8 +11,8 @@
 
 #include <optional>
 
-#include "trace/kernel/cell.inl"
-#include "trace/kernel/kernel.h"
+#include "trace/kernel/cell_cubic.inl"
+#include "trace/kernel/ray_kernel.h"
 #include "trace/tree_view.h"
 
 namespace quoin::trace {

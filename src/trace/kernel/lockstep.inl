@@ -14,11 +14,11 @@
 #pragma once
 
 #ifdef QUOIN_KERNEL_AVX512
-#include "trace/kernel/lanes_avx512.h"
+#include "trace/kernel/ray_lanes_avx512.h"
 #else
-#include "trace/kernel/lanes_avx2.h"
+#include "trace/kernel/ray_lanes_avx2.h"
 #endif
-#include "trace/kernel/numbers.inl"
+#include "trace/kernel/ray_numbers.inl"
 
 namespace quoin::trace {
 namespace {

@@ -18,8 +18,8 @@
 #include <cmath>
 #include <cstdint>
 
-#include "trace/kernel/lanes_avx512.h"
 #include "trace/kernel/lockstep.inl"
+#include "trace/kernel/ray_lanes_avx512.h"
 
 namespace quoin::trace {
 namespace {

@@ -1,11 +1,11 @@
 // The kernel for x86-64 processors with AVX-512 F, BW, DQ and VL. Called only if the processor has all of them.
 
-#include "trace/kernel/kernel.h"
+#include "trace/kernel/ray_kernel.h"
 
 #ifdef QUOIN_X86_KERNELS
 
-#include "trace/kernel/lanes_avx512.h"
 #include "trace/kernel/packet.inl"
+#include "trace/kernel/ray_lanes_avx512.h"
 #include "trace/kernel/short_ray.inl"
 #include "trace/kernel/single.inl"
 

@@ -2,9 +2,9 @@
 // trace/kernel/lockstep.inl, with the same walk, explains the arithmetic.
 //
 //   Steps   the next plane of each axis, and the time of its crossing     | plane0 t0 | plane1 t1 | plane2 t2 |
-//   index   of cells: a bit of the flat table; of voxels: as in trace/kernel/numbers.inl
+//   index   of cells: a bit of the flat table; of voxels: as in trace/kernel/ray_numbers.inl
 
-#include "trace/kernel/numbers.inl"
+#include "trace/kernel/ray_numbers.inl"
 
 namespace quoin::trace {
 namespace {

@@ -24,7 +24,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "trace/kernel/kernel.h"
+#include "trace/kernel/ray_kernel.h"
 
 namespace quoin::trace {
 namespace {
