@@ -44,7 +44,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"light/corner_light.h", {"render"}},
     {"light/daylight.h", {"render", "render_vk"}},
     {"light/glass.h", {"render"}},
-    {"light/emissive_chunks.h", {"render"}},
+    {"light/emissive_cells.h", {"render"}},
     {"light/lamp_table.h", {"render", "render_vk"}},
     {"light/light_model.h", {"render", "render_vk"}},
     {"light/lighting.h", {"render"}},

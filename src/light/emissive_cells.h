@@ -1,15 +1,57 @@
 #pragma once
 
 #include <array>
+#include <map>
+#include <utility>
+#include <vector>
 
+#include <quoin/core/changes.h>
 #include <quoin/core/vec.h>
+#include <quoin/grid/chunk.h>
 #include <quoin/grid/density_grid.h>
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
 
-#include "light/emissive_chunks.h"
+#include "core/coordinates/chunk_order.h"
 
 namespace quoin {
+
+/// Returns true if any type of a chunk's palette emits light. Cost: O(its types).
+[[nodiscard]] bool has_emissive_types(const Chunk& chunk, const VoxelRegistry& types);
+
+/// Data about the light-emitting chunks of a grid or field, kept up to date with its edits.
+template <class Item>
+class EmissiveChunks {
+ public:
+  /// `chunks_of(changes)` returns the chunks to examine again. `look_at(chunk)` returns the items of one chunk in a
+  /// vector.
+  template <class Content, class Find, class Look>
+  void follow(const Content& content, const VoxelRegistry& types, Find&& chunks_of, Look&& look_at) {
+    if (!types.changes_since(followed_types_).empty()) followed_ = {};
+    ChangeCursor now = followed_;
+    const auto changes = content.changes_since(now);
+    followed_ = {};  // stays so when memory runs out
+    if (changes.all) chunks_.clear();
+    for (const IVec3 chunk : chunks_of(changes)) {
+      chunks_.erase(chunk);
+      if (std::vector<Item> found = look_at(chunk); !found.empty()) chunks_[chunk] = std::move(found);
+    }
+    followed_ = now;
+  }
+
+  /// Calls `visit(IVec3 chunk, const Item&)`, chunks by z, y, x.
+  template <class Visit>
+  void for_each(Visit&& visit) const {
+    for (const auto& [chunk, items] : chunks_) {
+      for (const Item& item : items) visit(chunk, item);
+    }
+  }
+
+ private:
+  ChangeCursor followed_;
+  ChangeCursor followed_types_;
+  std::map<IVec3, std::vector<Item>, ByZyx> chunks_;  // non-empty ones
+};
 
 /// The voxels of a cell of 4^3 that emit light, or the surface of a field there, as one lamp. In the grid, in voxels.
 struct EmissiveCell {

@@ -11,7 +11,7 @@
 #include <quoin/mesh/quad.h>
 #include <quoin/scene/scene.h>
 
-#include "light/emissive_chunks.h"
+#include "light/emissive_cells.h"
 #include "light/lamp_table.h"
 #include "light/surfaces.h"
 #include "render/path/lamps/light_tree.h"
