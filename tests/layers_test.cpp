@@ -42,7 +42,6 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"io/scene_file/scene_parts.h", {"store"}},
     {"core/bytes/text.h", {"store"}},
     {"light/corner_light.h", {"render"}},
-    {"light/daylight.h", {"render", "render_vk"}},
     {"light/glass.h", {"render"}},
     {"light/emissive_cells.h", {"render"}},
     {"light/lamp_table.h", {"render", "render_vk"}},

@@ -6,6 +6,7 @@
 
 #include <glm/geometric.hpp>
 
+#include <quoin/core/vec.h>
 #include <quoin/light/light_options.h>
 #include <quoin/scene/level_of_detail.h>
 
@@ -46,5 +47,51 @@ constexpr float kLeastOfAll = 0.25F;  ///< remaining light at full occlusion if 
   const float share = static_cast<float>(halvings - 1) / static_cast<float>(kMaxGridLevel - 1);
   return {0.85F, 0.70F - 0.50F * std::clamp(share, 0.0F, 1.0F), 0.03F};
 }
+
+/// Sky colours in linear light. `kGroundBegins`, `kGroundIsFull`: the y of unit directions.
+namespace sky {
+constexpr Vec3 kZenith{0.145F, 0.335F, 0.700F};
+constexpr Vec3 kHorizon{0.640F, 0.780F, 0.900F};
+constexpr Vec3 kGround{0.400F, 0.410F, 0.430F};
+constexpr float kGroundBegins = -0.02F;
+constexpr float kGroundIsFull = -0.60F;
+}  // namespace sky
+
+/// The colours of a backdrop; by default a day's.
+struct SkyColours {
+  Vec3 zenith = sky::kZenith;
+  Vec3 horizon = sky::kHorizon;
+  Vec3 ground = sky::kGround;
+};
+
+/// Returns the backdrop in linear light: paler towards the horizon, with ground that fades in below it. An image's
+/// exposure does not change it, so that a scene can be made brighter without overexposing the sky.
+///
+/// `up`: the y of a unit direction.
+[[nodiscard]] inline Vec3 sky_colour(float up, const SkyColours& of = {}) {
+  const float y = std::clamp(up, -1.0F, 1.0F);
+  if (y >= 0.0F) {
+    const float low = (1.0F - y) * (1.0F - y);
+    return of.zenith + (of.horizon - of.zenith) * (low * (1.0F - 0.5F * y));
+  }
+  const float s = std::clamp((sky::kGroundBegins - y) / (sky::kGroundBegins - sky::kGroundIsFull), 0.0F, 1.0F);
+  return of.horizon + (of.ground - of.horizon) * (s * s * (3.0F - 2.0F * s));
+}
+
+/// The light of sun and sky: the single model used by all renderers.
+struct Daylight {
+  SkyColours sky;               ///< before LightOptions::sky_brightness
+  Vec3 ambient{1.0F};           ///< times the ambient term
+  Vec3 sun{1.0F};               ///< times the sun's light
+  double sun_brightness = 1.0;  ///< as in the options; 0 if the sun gives no light
+};
+
+/// Returns the colours of sun and sky. Always day unless LightOptions::sky_follows_sun is set.
+///
+/// Sun:     transmittance of the air by Rayleigh scattering. The length of the path is from F. Kasten, A. T. Young,
+///          "Revised optical air mass tables and approximation formula" (1989). The sun fades out within two degrees.
+/// Sky:     a monotone curve through a table of elevations. Above 30 degrees it has the day's colours; from 18 degrees
+///          below the horizon downwards it is night, with a little light of its own.
+[[nodiscard]] Daylight daylight_of(const LightOptions& options);
 
 }  // namespace quoin

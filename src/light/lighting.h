@@ -10,8 +10,8 @@
 #include <quoin/light/light_options.h>
 #include <quoin/light/scene_light.h>
 
-#include "light/daylight.h"
 #include "light/lamp_table.h"
+#include "light/light_model.h"
 #include "light/occlusion_directions.h"
 #include "light/surfaces.h"
 #include "scene/tracer/scene_view.h"

@@ -8,7 +8,7 @@
 
 #include "core/death_for_tests.h"
 #include "core/instruction_sets_for_tests.h"
-#include "light/daylight.h"
+#include "light/light_model.h"
 #include "render/camera_rays.h"
 #include "render/render_test_support.h"
 

@@ -6,7 +6,7 @@
 #include <glm/gtc/quaternion.hpp>
 
 #include "core/instruction_sets_for_tests.h"
-#include "light/daylight.h"
+#include "light/light_model.h"
 #include "render/render_test_support.h"
 
 namespace quoin {

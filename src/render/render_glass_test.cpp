@@ -6,8 +6,8 @@
 
 #include <glm/gtc/quaternion.hpp>
 
-#include "light/daylight.h"
 #include "light/glass.h"
+#include "light/light_model.h"
 #include "render/render_test_support.h"
 #include "scene/tracer/placed_grid.h"
 

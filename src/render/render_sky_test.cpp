@@ -1,6 +1,6 @@
 // Skies that follow the sun.
 
-#include "light/daylight.h"
+#include "light/light_model.h"
 #include "render/render_test_support.h"
 
 namespace quoin {

@@ -6,7 +6,7 @@
 #include <quoin/core/vec.h>
 #include <quoin/render/path_tracer.h>
 
-#include "light/daylight.h"
+#include "light/light_model.h"
 #include "render/path/environment_light.h"
 #include "render/path/sky_map.h"
 

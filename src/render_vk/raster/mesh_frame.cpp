@@ -10,7 +10,6 @@
 #include <quoin/core/assert.h>
 #include <quoin/grid/chunk.h>
 
-#include "light/daylight.h"
 #include "light/light_model.h"
 #include "render/camera_rays.h"
 #include "scene/frustum.h"

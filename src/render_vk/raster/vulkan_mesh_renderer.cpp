@@ -8,7 +8,6 @@
 
 #include <glm/geometric.hpp>
 
-#include "light/daylight.h"
 #include "light/light_model.h"
 #include "render/image_request.h"
 #include "render_vk/march/device_image.h"

@@ -1,4 +1,4 @@
-// The backdrop; matches light/daylight.h on the CPU.
+// The backdrop; matches light/light_model.h on the CPU.
 
 struct Sky {
   vec3 zenith;

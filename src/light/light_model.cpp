@@ -1,11 +1,11 @@
-#include "light/daylight.h"
+#include "light/light_model.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
 
-#include "light/light_model.h"
+#include <quoin/light/light_colour.h>
 
 namespace quoin {
 namespace {
@@ -100,6 +100,23 @@ Daylight daylight_of(const LightOptions& options) {
   daylight.sun = sun_through_air(degrees);
   if (daylight.sun == Vec3(0.0F)) daylight.sun_brightness = 0.0;
   return daylight;
+}
+
+namespace {
+
+constexpr float kOfSky = 0.3F;
+constexpr float kOfSun = 0.7F;
+
+}  // namespace
+
+LightLook light_look(const LightOptions& options) {
+  const Daylight daylight = daylight_of(options);
+  LightLook look;
+  look.sky = kOfSky * static_cast<float>(options.sky_brightness) * daylight.ambient +
+             kOfSun * static_cast<float>(daylight.sun_brightness) * daylight.sun;
+  look.lamps = Vec3(static_cast<float>(options.lamp_brightness));
+  look.least = Vec3(static_cast<float>(options.least_light));
+  return look;
 }
 
 }  // namespace quoin

@@ -1,4 +1,4 @@
-#include "light/daylight.h"
+#include "light/light_model.h"
 
 #include <cmath>
 #include <numbers>
