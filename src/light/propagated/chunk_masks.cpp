@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 
 #include <quoin/core/assert.h>
 
@@ -21,6 +22,16 @@ bool passes(const std::vector<TypeLight>& types, VoxelType type, std::size_t cha
 }
 
 }  // namespace
+
+LightLevels lamp_levels(const VoxelProperties& properties) {
+  const float strength = 15.0F * std::clamp(properties.emission, 0.0F, 1.0F);
+  const Rgba8& colour = properties.colour;
+  const float greatest = std::max({colour.r, colour.g, colour.b, std::uint8_t{1}});
+  const auto level = [&](std::uint8_t channel) {
+    return static_cast<std::uint8_t>(std::lround(strength * static_cast<float>(channel) / greatest));
+  };
+  return {0, level(colour.r), level(colour.g), level(colour.b)};
+}
 
 void ChunkMasks::read_rows(const Chunk& voxels, const std::vector<TypeLight>& types, std::size_t channel,
                            const IBox& box) {

@@ -13,7 +13,7 @@
 
 #include "core/death_for_tests.h"
 #include "core/instruction_sets_for_tests.h"
-#include "light/propagated/lamp_levels.h"
+#include "light/propagated/chunk_masks.h"
 
 namespace quoin {
 namespace {
@@ -97,7 +97,7 @@ class Search {
   void start(IVec3 voxel, int channel, const Raise& raise) {
     const VoxelType type = grid_.get(voxel);
     if (channel > 0 && type < types_.size() && type != kAir) {
-      const LightLevels lamp = lamp_levels(types_[type]);
+      const LightLevels lamp = propagated::lamp_levels(types_[type]);
       raise(voxel, std::array<int, 3>{lamp.red, lamp.green, lamp.blue}.at(static_cast<std::size_t>(channel) - 1));
     }
     if (channel == 0 && voxel.y == box_.max.y - 1) raise(voxel, 15);
@@ -340,7 +340,7 @@ TEST(PropagatedLight, ColouredGlassFiltersLampsAndNotTheSky) {
   EXPECT_GT(light.at({5, 5, 5}).red, 0);
   EXPECT_EQ(light.at({7, 5, 5}).red, 0);
   EXPECT_EQ(light.at({7, 5, 5}).green, 0);
-  EXPECT_EQ(light.at({7, 5, 5}).blue, lamp_levels(types[kLamp]).blue - 5);
+  EXPECT_EQ(light.at({7, 5, 5}).blue, propagated::lamp_levels(types[kLamp]).blue - 5);
   grid.fill_box({{6, 6, 5}, {7, 20, 6}}, kBlueGlass);  // a shaft filled with it
   light.update(grid, types);
   EXPECT_EQ(light.at({6, 5, 5}).sky, 15);

@@ -1,4 +1,4 @@
-#include "light/propagated/light_slab.h"
+#include "light/propagated/light_chunk.h"
 
 #include <algorithm>
 #include <bit>
