@@ -13,7 +13,7 @@
 #include <quoin/core/ref.h>
 #include <quoin/grid/chunk.h>
 
-#include "light/propagated/kernel/kernel.h"
+#include "light/propagated/kernel/light_kernel.h"
 
 namespace quoin::propagated {
 

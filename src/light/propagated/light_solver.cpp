@@ -5,7 +5,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "light/propagated/kernel/kernel.h"
+#include "light/propagated/kernel/light_kernel.h"
 
 namespace quoin::propagated {
 namespace {

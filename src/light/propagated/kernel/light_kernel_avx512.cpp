@@ -2,7 +2,7 @@
 
 #ifdef QUOIN_X86_KERNELS
 
-#include "light/propagated/kernel/kernel.inl"
+#include "light/propagated/kernel/light_kernel.inl"
 #include "light/propagated/kernel/slab_units.inl"
 
 namespace quoin::propagated {

@@ -1,6 +1,6 @@
 // The kernel for any processor.
 
-#include "light/propagated/kernel/kernel.inl"
+#include "light/propagated/kernel/light_kernel.inl"
 #include "light/propagated/kernel/slab_units.inl"
 
 namespace quoin::propagated {
