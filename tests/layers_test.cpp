@@ -42,7 +42,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"io/scene_file/scene_parts.h", {"store"}},
     {"core/bytes/text.h", {"store"}},
     {"light/corner_light.h", {"render"}},
-    {"light/glass.h", {"render"}},
+    {"light/glass_bodies.h", {"render"}},
     {"light/emissive_cells.h", {"render"}},
     {"light/lamp_table.h", {"render", "render_vk"}},
     {"light/light_model.h", {"render", "render_vk"}},

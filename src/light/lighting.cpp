@@ -15,9 +15,9 @@
 
 #include "core/srgb.h"
 #include "light/corner_light.h"
-#include "light/glass.h"
+#include "light/glass_bodies.h"
 #include "light/light_model.h"
-#include "light/surface/levels.h"
+#include "light/surface/voxel_light.h"
 
 namespace quoin {
 namespace {

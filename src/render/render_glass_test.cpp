@@ -6,7 +6,7 @@
 
 #include <glm/gtc/quaternion.hpp>
 
-#include "light/glass.h"
+#include "light/glass_bodies.h"
 #include "light/light_model.h"
 #include "render/render_test_support.h"
 #include "scene/tracer/placed_grid.h"

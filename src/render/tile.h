@@ -9,7 +9,7 @@
 #include <quoin/core/vec.h>
 #include <quoin/render/cpu_renderer.h>
 
-#include "light/glass.h"
+#include "light/glass_bodies.h"
 #include "light/lighting.h"
 #include "render/camera_rays.h"
 #include "render/impostor/pass.h"

@@ -8,7 +8,7 @@
 
 #include "core/coordinates/chunk_order.h"
 #include "light/occlusion_directions.h"
-#include "light/surface/rows.h"
+#include "light/surface/voxel_light.h"
 
 namespace quoin {
 namespace {

@@ -12,7 +12,7 @@
 #include "core/death_for_tests.h"
 #include "light/surface/light_bricks.h"
 #include "light/surface/light_world_for_tests.h"
-#include "light/surface/rows.h"
+#include "light/surface/voxel_light.h"
 
 namespace quoin {
 namespace {

@@ -6,8 +6,7 @@
 
 #include "core/moved_from.h"
 #include "light/quad_cutter.h"
-#include "light/surface/levels.h"
-#include "light/surface/rows.h"
+#include "light/surface/voxel_light.h"
 
 namespace quoin {
 

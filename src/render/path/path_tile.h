@@ -10,7 +10,7 @@
 #include <quoin/core/vec.h>
 #include <quoin/render/path_tracer.h>
 
-#include "light/glass.h"
+#include "light/glass_bodies.h"
 #include "light/surfaces.h"
 #include "render/camera_rays.h"
 #include "render/path/denoise.h"

@@ -13,7 +13,7 @@
 #include <quoin/core/hash.h>
 #include <quoin/core/vec.h>
 
-#include "light/glass.h"
+#include "light/glass_bodies.h"
 #include "light/surfaces.h"
 #include "render/path/denoise.h"
 #include "render/path/kernel/kernel.h"

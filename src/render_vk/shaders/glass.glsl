@@ -1,5 +1,5 @@
-// Glass bodies along a ray; matches light/glass.h on the CPU. They are kept in a list, nearest first. With KEEPS_BODIES
-// there is one of kBodies for each pixel of the tile; with HOLDS_BODIES the invocation has one.
+// Glass bodies along a ray; matches light/glass_bodies.h on the CPU. They are kept in a list, nearest first. With
+// KEEPS_BODIES there is one of kBodies for each pixel of the tile; with HOLDS_BODIES the invocation has one.
 
 // Natural logarithm of the transmittance below which a body counts as closed.
 const float kClosed = -11.0;

@@ -1,4 +1,4 @@
-// Propagated light at surfaces; matches quoin/light/light_colour.h and light/surface/levels.h on the CPU.
+// Propagated light at surfaces; matches quoin/light/light_colour.h and light/surface/voxel_light.h on the CPU.
 
 struct LightBrick {
   ivec4 key;   // voxel coordinates / 8; w: the grid

@@ -1,4 +1,4 @@
-#include "light/glass.h"
+#include "light/glass_bodies.h"
 #include "scene/tracer/placed_grid.h"
 
 #include <algorithm>
