@@ -59,7 +59,6 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"mesh/surface/simplify.h", {"scene"}},
     {"render/camera_rays.h", {"render_vk"}},
     {"render/impostor/raster/faces.h", {"render_vk"}},
-    {"render/impostor/far.h", {"render_vk"}},
     {"render/impostor/screen.h", {"render_vk"}},
     {"render/path/denoise.h", {"render_vk"}},
     {"render/path/lamps/path_lamps.h", {"render_vk"}},

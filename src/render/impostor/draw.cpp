@@ -12,7 +12,6 @@
 #include "render/camera_rays.h"
 #include "render/image_request.h"
 #include "render/impostor/pass.h"
-#include "render/on_face.h"
 
 namespace quoin {
 namespace {

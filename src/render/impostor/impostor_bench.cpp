@@ -19,7 +19,7 @@
 #include <quoin/terrain/terrain.h>
 
 #include "bench/workloads.h"
-#include "render/impostor/far.h"
+#include "render/image_detail.h"
 
 namespace quoin {
 namespace {

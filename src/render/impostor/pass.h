@@ -13,7 +13,7 @@
 #include <quoin/scene/scene_tracer.h>
 
 #include "render/camera_rays.h"
-#include "render/impostor/far.h"
+#include "render/image_detail.h"
 #include "render/impostor/raster/raster.h"
 #include "render/impostor/screen.h"
 #include "scene/tracer/scene_view.h"

@@ -15,7 +15,7 @@
 
 #include "light/light_model.h"
 #include "light/occlusion_directions.h"
-#include "render/on_face.h"
+#include "render/camera_rays.h"
 #include "render/path/path_tile_parts.h"
 #include "scene/tracer/placed_grid.h"
 

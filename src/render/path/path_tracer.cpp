@@ -4,7 +4,7 @@
 
 #include "core/moved_from.h"
 #include "light/surfaces.h"
-#include "render/draw_tiles.h"
+#include "render/image_request.h"
 #include "render/path/denoise.h"
 #include "render/path/lamps/path_lamps.h"
 #include "render/path/path_request.h"

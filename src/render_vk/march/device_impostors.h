@@ -10,7 +10,7 @@
 #include <quoin/render/impostor.h>
 #include <quoin/scene/scene.h>
 
-#include "render/impostor/far.h"
+#include "render/image_detail.h"
 #include "render/impostor/screen.h"
 #include "render_vk/device/memory.h"
 #include "render_vk/trees/shader_data.h"
