@@ -22,7 +22,7 @@
 
 #include "apps/demo/castle.h"
 #include "core/srgb.h"
-#include "render/impostor/test_support.h"
+#include "render/impostor/impostor_test_support.h"
 
 namespace quoin {
 namespace {

@@ -28,7 +28,7 @@
 #include "render/camera_rays.h"
 #include "render/image_detail.h"
 #include "render/image_request.h"
-#include "render/impostor/pass.h"
+#include "render/impostor/impostor_pass.h"
 #include "scene/tracer/placed_grid.h"
 #include "scene/tracer/scene_view.h"
 

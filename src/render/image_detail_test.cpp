@@ -10,7 +10,7 @@
 
 #include <quoin/render/cpu_renderer.h>
 
-#include "render/impostor/test_support.h"
+#include "render/impostor/impostor_test_support.h"
 
 namespace quoin {
 namespace {

@@ -16,7 +16,7 @@
 
 #include "core/death_for_tests.h"
 #include "light/corner_light.h"
-#include "render/impostor/raster/faces.h"
+#include "render/impostor/raster/impostor_faces.h"
 #include "render/impostor/snapshot.h"
 #include "render/render_test_support.h"
 

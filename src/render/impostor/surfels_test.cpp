@@ -11,9 +11,9 @@
 #include <quoin/render/impostor_cache.h>
 
 #include "core/instruction_sets_for_tests.h"
-#include "render/impostor/raster/faces.h"
-#include "render/impostor/surfels.h"
-#include "render/impostor/test_support.h"
+#include "render/impostor/impostor_surface.h"
+#include "render/impostor/impostor_test_support.h"
+#include "render/impostor/raster/impostor_faces.h"
 
 namespace quoin {
 namespace {

@@ -11,7 +11,7 @@
 #include <quoin/scene/scene.h>
 
 #include "render/image_detail.h"
-#include "render/impostor/screen.h"
+#include "render/impostor/impostor_screen.h"
 #include "render_vk/device/memory.h"
 #include "render_vk/trees/shader_data.h"
 

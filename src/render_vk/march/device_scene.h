@@ -12,7 +12,7 @@
 #include "light/lamp_table.h"
 #include "light/surface/light_bricks.h"
 #include "light/surfaces.h"
-#include "render/impostor/raster/faces.h"
+#include "render/impostor/raster/impostor_faces.h"
 #include "render_vk/trees/device_grid.h"
 #include "scene/tracer/instance_tree.h"
 #include "scene/tracer/placed_grid.h"

@@ -7,7 +7,7 @@
 #include <limits>
 #include <thread>
 
-#include "render/impostor/test_support.h"
+#include "render/impostor/impostor_test_support.h"
 #include "render_vk/march/vulkan_detail_support.h"
 
 namespace quoin {

@@ -5,7 +5,7 @@
 #include <random>
 #include <set>
 
-#include "render/impostor/test_support.h"
+#include "render/impostor/impostor_test_support.h"
 #include "render_vk/march/vulkan_detail_support.h"
 #include "render_vk/raster/mesh_for_tests.h"
 

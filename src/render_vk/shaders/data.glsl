@@ -108,7 +108,7 @@ struct State {
   vec4 colour;  // w: 0 when the sample is done, otherwise 1 plus the number of bodies to light in this round
 };
 
-// Height of light ray starts above a surfel, as in render/impostor/raster/faces.h.
+// Height of light ray starts above a surfel, as in render/impostor/raster/impostor_faces.h.
 const float kSurfelLift = 0.5;
 
 const uint kSurface = 0;

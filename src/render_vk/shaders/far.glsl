@@ -65,7 +65,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Vo
 
 const uint kIsSurfel = 8;
 const uint kSurfelHalvesShift = 4;  // in units of 1/1,024, twelve bits each
-const float kSurfelRoom = 0.05;  // as in render/impostor/raster/faces.h
+const float kSurfelRoom = 0.05;  // as in render/impostor/raster/impostor_faces.h
 
 const uint kNoFace = 0xFFFFFFFFu;
 

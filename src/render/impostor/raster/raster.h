@@ -7,7 +7,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/hash.h>
 
-#include "render/impostor/raster/faces.h"
+#include "render/impostor/raster/impostor_faces.h"
 
 /// Draws the faces of an impostor into a square of an image: in single precision relative to the content's centre, in
 /// voxels, with one vector register of faces at a time.

@@ -17,8 +17,8 @@
 #include "bench/workloads.h"
 #include "core/death_for_tests.h"
 #include "core/instruction_sets_for_tests.h"
-#include "render/impostor/cells.h"
-#include "render/impostor/seen.h"
+#include "render/impostor/seen_faces.h"
+#include "render/impostor/surface_cells.h"
 
 namespace quoin {
 namespace {

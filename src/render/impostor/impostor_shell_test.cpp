@@ -1,4 +1,4 @@
-#include "render/shell/shell.h"
+#include "render/impostor/impostor_surface.h"
 
 #include <random>
 #include <set>
@@ -21,12 +21,12 @@ Key key_of(const VoxelFace& face) {
   return {face.voxel.x, face.voxel.y, face.voxel.z, static_cast<int>(face.direction)};
 }
 
-struct World {
+struct ShellWorld {
   VoxelRegistry types = workloads::three_types();
   Grid grid;
   OccupancyTree tree;
 
-  explicit World(unsigned seed) {
+  explicit ShellWorld(unsigned seed) {
     std::mt19937 random(seed);
     const auto around = [&](int reach) {
       return static_cast<int>(random() % static_cast<unsigned>(2 * reach)) - reach;
@@ -44,7 +44,7 @@ struct World {
 
 TEST(ImpostorShell, HoldsEveryFaceOnce) {
   for (unsigned seed = 1; seed <= 12; ++seed) {
-    const World world(seed);
+    const ShellWorld world(seed);
     const auto shell = ImpostorShell::build(world.tree, kPlenty, kPlenty);
     ASSERT_TRUE(shell.has_value());
     const std::vector<VoxelFace> faces = shell->faces();
@@ -74,7 +74,7 @@ TEST(ImpostorShell, HoldsEveryFaceOnce) {
 }
 
 TEST(ImpostorShell, IsNotMadeBeyondItsLimits) {
-  const World world(3);
+  const ShellWorld world(3);
   const auto shell = ImpostorShell::build(world.tree, kPlenty, kPlenty);
   ASSERT_TRUE(shell.has_value());
   const auto count = static_cast<std::int64_t>(shell->faces().size());
@@ -95,7 +95,7 @@ TEST(ImpostorShell, IsNotMadeBeyondItsLimits) {
 }
 
 TEST(ImpostorShellDeathTest, KnowsVoxelsInItsBoxAndBesideIt) {
-  const World world(3);
+  const ShellWorld world(3);
   const auto shell = ImpostorShell::build(world.tree, kPlenty, kPlenty);
   ASSERT_TRUE(shell.has_value());
   const IVec3 adjacent = world.tree.bounds().max;

@@ -10,7 +10,7 @@
 #include <quoin/scene/camera.h>
 #include <quoin/scene/scene_tracer.h>
 
-#include "render/impostor/raster/faces.h"
+#include "render/impostor/raster/impostor_faces.h"
 #include "render/impostor/raster/raster.h"
 #include "scene/tracer/placed_grid.h"
 

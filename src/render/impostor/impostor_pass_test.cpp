@@ -14,7 +14,7 @@
 
 #include "core/death_for_tests.h"
 #include "core/instruction_sets_for_tests.h"
-#include "render/impostor/test_support.h"
+#include "render/impostor/impostor_test_support.h"
 
 namespace quoin {
 namespace {

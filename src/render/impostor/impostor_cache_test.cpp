@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "bench/workloads.h"
-#include "render/impostor/raster/faces.h"
+#include "render/impostor/raster/impostor_faces.h"
 
 namespace quoin {
 namespace {

@@ -14,7 +14,7 @@
 #include <quoin/render/impostor.h>
 
 #include "bench/workloads.h"
-#include "render/impostor/pass.h"
+#include "render/impostor/impostor_pass.h"
 #include "render/render_test_support.h"
 
 namespace quoin::render_test {

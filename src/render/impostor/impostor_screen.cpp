@@ -1,4 +1,4 @@
-#include "render/impostor/screen.h"
+#include "render/impostor/impostor_screen.h"
 #include "scene/tracer/placed_grid.h"
 
 #include <algorithm>

@@ -14,8 +14,8 @@
 
 #include "render/camera_rays.h"
 #include "render/image_detail.h"
+#include "render/impostor/impostor_screen.h"
 #include "render/impostor/raster/raster.h"
-#include "render/impostor/screen.h"
 #include "scene/tracer/scene_view.h"
 
 namespace quoin {

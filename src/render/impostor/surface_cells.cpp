@@ -1,4 +1,4 @@
-#include "render/impostor/cells.h"
+#include "render/impostor/surface_cells.h"
 
 #include <algorithm>
 #include <bit>
@@ -14,8 +14,8 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/hash.h>
 
-#include "render/impostor/level.h"
 #include "render/impostor/morton.h"
+#include "render/impostor/seen_faces.h"
 #include "render/impostor/snapshot.h"
 #include "trace/tree_view.h"
 

@@ -9,8 +9,8 @@
 #include <quoin/core/vec.h>
 #include <quoin/grid/density_grid.h>
 
-#include "render/impostor/raster/faces.h"
-#include "render/impostor/seen.h"
+#include "render/impostor/raster/impostor_faces.h"
+#include "render/impostor/seen_faces.h"
 
 namespace quoin {
 
