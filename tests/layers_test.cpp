@@ -61,7 +61,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"render/impostor/raster/impostor_faces.h", {"render_vk"}},
     {"render/impostor/impostor_screen.h", {"render_vk"}},
     {"render/path/denoise.h", {"render_vk"}},
-    {"render/path/lamps/path_lamps.h", {"render_vk"}},
+    {"render/path/path_lamps.h", {"render_vk"}},
     {"render/path/path_request.h", {"render_vk"}},
     {"render/path/scatter.h", {"render_vk"}},
     {"render/path/sky_light.h", {"render_vk"}},

@@ -20,7 +20,7 @@
 #include "light/light_model.h"
 #include "light/occlusion_directions.h"
 #include "render/camera_rays.h"
-#include "render/path/numbers/path_random.h"
+#include "render/path/path_math.h"
 #include "render/path/path_tile_parts.h"
 #include "render/path/sky_light.h"
 

@@ -9,7 +9,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "render/path/numbers/path_math.h"
+#include "render/path/path_math.h"
 
 namespace quoin::path {
 namespace {

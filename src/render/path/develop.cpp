@@ -13,7 +13,7 @@
 #include <quoin/render/path_tracer.h>
 
 #include "core/srgb.h"
-#include "render/path/numbers/path_math.h"
+#include "render/path/path_math.h"
 
 namespace quoin {
 namespace {

@@ -6,7 +6,7 @@
 #include <quoin/core/image.h>
 #include <quoin/core/vec.h>
 
-#include "render/path/numbers/path_math.h"
+#include "render/path/path_math.h"
 
 namespace quoin::path {
 

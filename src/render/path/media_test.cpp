@@ -12,7 +12,7 @@
 #include <quoin/render/path_tracer.h>
 
 #include "core/srgb.h"
-#include "render/path/numbers/path_random.h"
+#include "render/path/path_math.h"
 #include "render/path/scatter.h"
 #include "render/path/town_for_tests.h"
 #include "render/render_test_support.h"

@@ -11,11 +11,9 @@
 #include "core/death_for_tests.h"
 #include "render/path/atmosphere.h"
 #include "render/path/environment_light.h"
-#include "render/path/lamps/lamp_memory.h"
-#include "render/path/lamps/light_tree.h"
-#include "render/path/lamps/path_lamps.h"
-#include "render/path/numbers/path_math.h"
-#include "render/path/numbers/path_random.h"
+#include "render/path/light_tree.h"
+#include "render/path/path_lamps.h"
+#include "render/path/path_math.h"
 #include "render/path/scatter.h"
 
 namespace quoin::path {

@@ -17,7 +17,7 @@
 #include "light/surfaces.h"
 #include "render/path/denoise.h"
 #include "render/path/kernel/kernel.h"
-#include "render/path/numbers/path_math.h"
+#include "render/path/path_math.h"
 
 // Shared by the two halves of PathTile: path_tile.cpp has surfaces and light, path_tile_media.cpp has glass, fog and
 // clouds.

@@ -6,7 +6,7 @@
 #include "light/surfaces.h"
 #include "render/image_request.h"
 #include "render/path/denoise.h"
-#include "render/path/lamps/path_lamps.h"
+#include "render/path/path_lamps.h"
 #include "render/path/path_request.h"
 #include "render/path/path_tile.h"
 #include "render/path/sky_light.h"

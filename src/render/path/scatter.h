@@ -4,7 +4,7 @@
 
 #include <quoin/core/vec.h>
 
-#include "render/path/numbers/path_math.h"
+#include "render/path/path_math.h"
 
 namespace quoin::path {
 

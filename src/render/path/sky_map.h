@@ -7,7 +7,7 @@
 #include <quoin/core/vec.h>
 
 #include "render/path/environment_light.h"
-#include "render/path/numbers/path_math.h"
+#include "render/path/path_math.h"
 
 namespace quoin::path {
 

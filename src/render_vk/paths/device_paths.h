@@ -8,7 +8,7 @@
 #include <quoin/render/path_tracer.h>
 
 #include "light/surfaces.h"
-#include "render/path/lamps/path_lamps.h"
+#include "render/path/path_lamps.h"
 #include "render/path/sky_light.h"
 #include "render_vk/device/memory.h"
 #include "render_vk/march/device_scene.h"

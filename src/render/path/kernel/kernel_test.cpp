@@ -12,9 +12,8 @@
 #include <quoin/core/hash.h>
 
 #include "core/instruction_sets_for_tests.h"
-#include "render/path/lamps/light_tree.h"
-#include "render/path/numbers/path_math.h"
-#include "render/path/numbers/path_random.h"
+#include "render/path/light_tree.h"
+#include "render/path/path_math.h"
 #include "render/path/path_tile_parts.h"
 #include "render/path/scatter.h"
 #include "render/path/sky_light.h"

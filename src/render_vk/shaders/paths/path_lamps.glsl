@@ -1,4 +1,4 @@
-// Lamps in path tracing; matches render/path/lamps/path_lamps.h and light_tree.h on the CPU.
+// Lamps in path tracing; matches render/path/path_lamps.h and light_tree.h on the CPU.
 
 struct LampSample {
   vec3 direction;

@@ -1,4 +1,4 @@
-// Path tracing arithmetic and random numbers; matches render/path/numbers on the CPU, series for series, so that paths
+// Path tracing arithmetic and random numbers; matches render/path/path_math.h on the CPU, series for series, so that paths
 // are the same.
 
 const float kPi = 3.14159265;

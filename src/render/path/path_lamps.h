@@ -14,8 +14,8 @@
 #include "light/emissive_cells.h"
 #include "light/lamp_table.h"
 #include "light/surfaces.h"
-#include "render/path/lamps/light_tree.h"
-#include "render/path/numbers/path_math.h"
+#include "render/path/light_tree.h"
+#include "render/path/path_math.h"
 #include "scene/tracer/placed_grid.h"
 
 namespace quoin::path {

@@ -10,7 +10,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "render/path/history/packed_light.h"
+#include "render/path/path_math.h"
 
 namespace quoin {
 namespace {

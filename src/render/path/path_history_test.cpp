@@ -16,7 +16,7 @@
 #include <quoin/render/path_tracer.h>
 
 #include "core/death_for_tests.h"
-#include "render/path/history/packed_light.h"
+#include "render/path/path_math.h"
 #include "render/path/town_for_tests.h"
 #include "render/render_test_support.h"
 

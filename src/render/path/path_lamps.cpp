@@ -1,4 +1,4 @@
-#include "render/path/lamps/path_lamps.h"
+#include "render/path/path_lamps.h"
 
 #include <bit>
 #include <limits>
