@@ -21,7 +21,7 @@
 #include "light/occlusion_directions.h"
 #include "render/camera_rays.h"
 #include "render/path/path_math.h"
-#include "render/path/path_tile_parts.h"
+#include "render/path/path_tile.h"
 #include "render/path/sky_light.h"
 
 namespace quoin::peers {

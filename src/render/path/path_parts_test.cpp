@@ -9,12 +9,12 @@
 #include <gtest/gtest.h>
 
 #include "core/death_for_tests.h"
-#include "render/path/atmosphere.h"
 #include "render/path/environment_light.h"
 #include "render/path/light_tree.h"
 #include "render/path/path_lamps.h"
 #include "render/path/path_math.h"
 #include "render/path/scatter.h"
+#include "render/path/sky_light.h"
 
 namespace quoin::path {
 namespace {

@@ -16,7 +16,6 @@
 #include "light/light_model.h"
 #include "light/occlusion_directions.h"
 #include "render/camera_rays.h"
-#include "render/path/path_tile_parts.h"
 #include "scene/tracer/placed_grid.h"
 
 namespace quoin::path {

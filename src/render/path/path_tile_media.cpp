@@ -13,7 +13,6 @@
 #include "light/occlusion_directions.h"
 #include "render/camera_rays.h"
 #include "render/path/path_tile.h"
-#include "render/path/path_tile_parts.h"
 #include "scene/tracer/placed_grid.h"
 
 namespace quoin::path {

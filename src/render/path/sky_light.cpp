@@ -1,16 +1,328 @@
 #include "render/path/sky_light.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <vector>
 
+#include <glm/common.hpp>
+#include <glm/exponential.hpp>
 #include <glm/geometric.hpp>
 
 #include <quoin/core/assert.h>
 
 #include "light/light_model.h"
-#include "render/path/atmosphere.h"
+#include "render/path/path_math.h"
 
 namespace quoin::path {
+namespace {
+
+// Kilometres.
+constexpr float kGround = 6360.0F;
+constexpr float kTop = 6460.0F;
+constexpr float kEye = kGround + 0.2F;
+constexpr Vec3 kRayleigh{5.802e-3F, 13.558e-3F, 33.1e-3F};
+constexpr float kRayleighHeight = 8.0F;
+constexpr float kMieScattering = 3.996e-3F;
+constexpr float kMieAbsorption = 4.4e-3F;
+constexpr float kMieHeight = 1.2F;
+constexpr Vec3 kOzone{0.650e-3F, 1.881e-3F, 0.085e-3F};
+constexpr float kGroundAlbedo = 0.3F;
+constexpr Vec3 kNight{0.0006F, 0.0009F, 0.0016F};  // of stars and air: never black
+
+constexpr int kWidth = 512;  // of the image
+constexpr int kHeight = 256;
+
+struct Medium {
+  Vec3 rayleigh{0.0F};
+  Vec3 mie{0.0F};
+  Vec3 extinction{0.0F};
+};
+
+Medium medium_at(float radius, const AirOptions& air) {
+  const float height = std::max(radius - kGround, 0.0F);
+  Medium medium;
+  medium.rayleigh =
+      kRayleigh * air.rayleigh_colour * (exponential(-height / kRayleighHeight) * static_cast<float>(air.rayleigh));
+  const float haze = exponential(-height / kMieHeight) * static_cast<float>(air.mie);
+  medium.mie = air.mie_colour * (kMieScattering * haze);
+  const float layer = std::max(0.0F, 1.0F - std::abs(height - 25.0F) / 15.0F) * static_cast<float>(air.ozone);
+  medium.extinction =
+      medium.rayleigh + air.mie_colour * ((kMieScattering + kMieAbsorption) * haze) + kOzone * air.ozone_colour * layer;
+  return medium;
+}
+
+Vec3 through(Vec3 depth) {
+  return {exponential(-depth.x), exponential(-depth.y), exponential(-depth.z)};
+}
+
+// Returns the distance from a point at `radius` along a ray whose cosine with the vertical is `cosine`, to a sphere
+// around the Earth's centre; negative: no intersection.
+float distance_to(float radius, float cosine, float sphere, bool is_entered) {
+  const float b = radius * cosine;
+  const float c = radius * radius - sphere * sphere;
+  const float under = b * b - c;
+  if (under < 0.0F) return -1.0F;
+  const float root = std::sqrt(under);
+  return is_entered ? -b - root : -b + root;
+}
+
+bool meets_ground(float radius, float cosine) {
+  return cosine < 0.0F && distance_to(radius, cosine, kGround, true) >= 0.0F;
+}
+
+float along(float radius, float cosine, float t) {
+  return std::sqrt(radius * radius + t * t + 2.0F * radius * cosine * t);
+}
+
+// A table of the transmittance from the top of the atmosphere, by height and angle above the ground.
+class Transmittance {
+ public:
+  explicit Transmittance(const AirOptions& air) : table_(std::size_t{kAngles} * kHeights) {
+    for (int j = 0; j < kHeights; ++j) {
+      for (int i = 0; i < kAngles; ++i) {
+        const float radius = radius_of(static_cast<float>(j) / (kHeights - 1));
+        const float least = -std::sqrt(std::max(0.0F, 1.0F - square(kGround / radius)));
+        const float share = static_cast<float>(i) / (kAngles - 1);
+        table_[static_cast<std::size_t>(j * kAngles + i)] =
+            integrate(radius, least + (1.0F - least) * share * share, air);
+      }
+    }
+  }
+
+  // Returns 0 if the ground is in between.
+  [[nodiscard]] Vec3 at(float radius, float cosine) const {
+    const float least = -std::sqrt(std::max(0.0F, 1.0F - square(kGround / radius)));
+    if (cosine < least) return Vec3(0.0F);
+    const float x = std::sqrt((cosine - least) / (1.0F - least)) * (kAngles - 1);
+    const float height = std::clamp((radius - kGround) / (kTop - kGround), 0.0F, 1.0F);
+    const float y = std::sqrt(height) * (kHeights - 1);
+    const int i = std::clamp(static_cast<int>(x), 0, kAngles - 2);
+    const int j = std::clamp(static_cast<int>(y), 0, kHeights - 2);
+    const float fx = x - static_cast<float>(i);
+    const float fy = y - static_cast<float>(j);
+    const auto entry = [&](int column, int row) { return table_[static_cast<std::size_t>(row * kAngles + column)]; };
+    return (entry(i, j) * (1.0F - fx) + entry(i + 1, j) * fx) * (1.0F - fy) +
+           (entry(i, j + 1) * (1.0F - fx) + entry(i + 1, j + 1) * fx) * fy;
+  }
+
+ private:
+  static constexpr int kAngles = 128;
+  static constexpr int kHeights = 24;
+  static float radius_of(float share) { return kGround + (kTop - kGround) * share * share; }
+  static Vec3 integrate(float radius, float cosine, const AirOptions& air) {
+    constexpr int kSteps = 40;
+    const float length = std::max(distance_to(radius, cosine, kTop, false), 0.0F);
+    Vec3 depth(0.0F);
+    for (int i = 0; i < kSteps; ++i) {
+      const float t = length * (static_cast<float>(i) + 0.5F) / kSteps;
+      depth += medium_at(along(radius, cosine, t), air).extinction * (length / kSteps);
+    }
+    return through(depth);
+  }
+
+  std::vector<Vec3> table_;
+};
+
+// A table of multiply scattered light for an irradiance of 1, by height and the sun's angle.
+class MultipleScattering {
+ public:
+  MultipleScattering(const AirOptions& air, const Transmittance& transmittance) {
+    for (int j = 0; j < kEdge; ++j) {
+      for (int i = 0; i < kEdge; ++i) {
+        const float share = (static_cast<float>(j) + 0.5F) / kEdge;
+        table_[static_cast<std::size_t>(j * kEdge + i)] =
+            integrate(kGround + (kTop - kGround) * share * share, static_cast<float>(i) / (kEdge - 1) * 2.0F - 1.0F,
+                      air, transmittance);
+      }
+    }
+  }
+
+  [[nodiscard]] Vec3 at(float radius, float cosine_of_sun) const {
+    const float x = std::clamp(cosine_of_sun * 0.5F + 0.5F, 0.0F, 1.0F) * (kEdge - 1);
+    const float height = std::sqrt(std::clamp((radius - kGround) / (kTop - kGround), 0.0F, 1.0F));
+    const float y = std::clamp(height * kEdge - 0.5F, 0.0F, static_cast<float>(kEdge - 1));
+    const int i = std::min(static_cast<int>(x), kEdge - 2);
+    const int j = std::min(static_cast<int>(y), kEdge - 2);
+    const float fx = x - static_cast<float>(i);
+    const float fy = y - static_cast<float>(j);
+    const auto entry = [&](int column, int row) { return table_[static_cast<std::size_t>(row * kEdge + column)]; };
+    return (entry(i, j) * (1.0F - fx) + entry(i + 1, j) * fx) * (1.0F - fy) +
+           (entry(i, j + 1) * (1.0F - fx) + entry(i + 1, j + 1) * fx) * fy;
+  }
+
+ private:
+  static constexpr int kEdge = 20;
+
+  static Vec3 integrate(float radius, float cosine_of_sun, const AirOptions& air, const Transmittance& transmittance) {
+    constexpr int kRings = 6;
+    constexpr int kTurns = 6;
+    constexpr int kSteps = 16;
+    const float sine_of_sun = std::sqrt(std::max(0.0F, 1.0F - cosine_of_sun * cosine_of_sun));
+    Vec3 second(0.0F);
+    Vec3 again(0.0F);
+    for (int ring = 0; ring < kRings; ++ring) {
+      const float cosine = 1.0F - 2.0F * (static_cast<float>(ring) + 0.5F) / kRings;
+      const float sine = std::sqrt(1.0F - cosine * cosine);
+      for (int turn = 0; turn < kTurns; ++turn) {
+        const float to_sun_across = sine * of_turns((static_cast<float>(turn) + 0.5F) / kTurns).cosine;
+        const bool on_ground = meets_ground(radius, cosine);
+        const float length = std::max(
+            on_ground ? distance_to(radius, cosine, kGround, true) : distance_to(radius, cosine, kTop, false), 0.0F);
+        const float step = length / kSteps;
+        Vec3 passed(1.0F);
+        const auto sun_at = [&](float t, float here) {
+          // The vertical there, and the sun's angle with it.
+          return (radius * cosine_of_sun + t * (cosine * cosine_of_sun + to_sun_across * sine_of_sun)) / here;
+        };
+        for (int i = 0; i < kSteps; ++i) {
+          const float t = step * (static_cast<float>(i) + 0.5F);
+          const float here = along(radius, cosine, t);
+          const Medium medium = medium_at(here, air);
+          const Vec3 scattering = medium.rayleigh + Vec3(medium.mie);
+          const Vec3 step_passes = through(medium.extinction * step);
+          const Vec3 part = passed * scattering * (Vec3(1.0F) - step_passes) / glm::max(medium.extinction, Vec3(1e-9F));
+          second += part * transmittance.at(here, sun_at(t, here)) * (1.0F / (4.0F * kPi));
+          again += part;
+          passed *= step_passes;
+        }
+        if (on_ground) {
+          const float angle = sun_at(length, kGround);
+          second += passed * transmittance.at(kGround, angle) * (std::max(angle, 0.0F) * kGroundAlbedo / kPi);
+        }
+      }
+    }
+    constexpr float kDirections = kRings * kTurns;
+    return second / kDirections / (Vec3(1.0F) - glm::min(again / kDirections, Vec3(0.95F)));
+  }
+
+  std::array<Vec3, std::size_t{kEdge} * kEdge> table_{};
+};
+
+class Sky {
+ public:
+  explicit Sky(const AirOptions& air) : air_(air), transmittance_(air), scattering_(air, transmittance_) {}
+
+  [[nodiscard]] Vec3 sunlight(float sun_up) const { return transmittance_.at(kEye, sun_up); }
+
+  // Returns the radiance for an irradiance of 1. `up`: the y of the ray; `towards`: its cosine with the sun's
+  // direction.
+  [[nodiscard]] Vec3 radiance(float up, float towards, float sun_up) const {
+    constexpr int kSteps = 32;
+    const bool on_ground = meets_ground(kEye, up);
+    const float length =
+        std::max(on_ground ? distance_to(kEye, up, kGround, true) : distance_to(kEye, up, kTop, false), 0.0F);
+    const float rayleigh_phase = 3.0F / (16.0F * kPi) * (1.0F + towards * towards);
+    const auto g = static_cast<float>(air_.mie_anisotropy);
+    const float gg = g * g;
+    const float under = std::max(1.0F + gg - 2.0F * g * towards, 1e-4F);
+    const float mie_phase =
+        3.0F / (8.0F * kPi) * (1.0F - gg) * (1.0F + towards * towards) / ((2.0F + gg) * under * std::sqrt(under));
+    Vec3 sum(0.0F);
+    Vec3 passed(1.0F);
+    float before = 0.0F;
+    for (int i = 0; i < kSteps; ++i) {
+      const float share = static_cast<float>(i + 1) / kSteps;
+      const float end = length * share * share;  // shorter steps first, in dense air
+      const float t = (before + end) * 0.5F;
+      const float here = along(kEye, up, t);
+      const float sun_here = (kEye * sun_up + t * towards) / here;
+      const Medium medium = medium_at(here, air_);
+      const Vec3 step_passes = through(medium.extinction * (end - before));
+      const Vec3 direct =
+          transmittance_.at(here, sun_here) * (medium.rayleigh * rayleigh_phase + medium.mie * mie_phase);
+      const Vec3 all = direct + scattering_.at(here, sun_here) * (medium.rayleigh + medium.mie);
+      sum += passed * all * (Vec3(1.0F) - step_passes) / glm::max(medium.extinction, Vec3(1e-9F));
+      passed *= step_passes;
+      before = end;
+    }
+    return sum;
+  }
+
+ private:
+  AirOptions air_;
+  Transmittance transmittance_;
+  MultipleScattering scattering_;
+};
+
+// A table of the sky above the horizon, by elevation and by azimuth from the sun. Steps are finer near the horizon and
+// near the sun.
+class Dome {
+ public:
+  Dome(const Sky& sky, float sun_up, float irradiance) {
+    const float sun_across = std::sqrt(std::max(0.0F, 1.0F - sun_up * sun_up));
+    for (int j = 0; j < kUps; ++j) {
+      const float up = std::max(square(static_cast<float>(j) / (kUps - 1)), 1e-5F);
+      const float across = std::sqrt(std::max(0.0F, 1.0F - up * up));
+      for (int i = 0; i < kTurns; ++i) {
+        const float turns = 0.5F * square(static_cast<float>(i) / (kTurns - 1));
+        const float towards = std::clamp(up * sun_up + across * sun_across * of_turns(turns).cosine, -1.0F, 1.0F);
+        entries_[index(i, j)] = sky.radiance(up, towards, sun_up) * irradiance + kNight;
+      }
+    }
+  }
+
+  [[nodiscard]] Vec3 at(float up, float turns) const {
+    const float y = std::sqrt(std::clamp(up, 0.0F, 1.0F)) * (kUps - 1);
+    const float x = std::sqrt(std::clamp(2.0F * turns, 0.0F, 1.0F)) * (kTurns - 1);
+    const int i = std::min(static_cast<int>(x), kTurns - 2);
+    const int j = std::min(static_cast<int>(y), kUps - 2);
+    const float fx = x - static_cast<float>(i);
+    const float fy = y - static_cast<float>(j);
+    return (entries_[index(i, j)] * (1.0F - fx) + entries_[index(i + 1, j)] * fx) * (1.0F - fy) +
+           (entries_[index(i, j + 1)] * (1.0F - fx) + entries_[index(i + 1, j + 1)] * fx) * fy;
+  }
+
+  // Returns the irradiance on level ground.
+  [[nodiscard]] Vec3 on_level_ground() const {
+    Vec3 level(0.0F);
+    for (int j = 0; j < kHeight / 2; ++j) {
+      const SineCosine down = of_turns((static_cast<float>(j) + 0.5F) / kHeight * 0.5F);
+      Vec3 row(0.0F);
+      for (int i = 0; i < 16; ++i) row += at(down.cosine, (static_cast<float>(i) + 0.5F) / 32.0F);
+      level += row * (down.sine * down.cosine / 16.0F * 2.0F * kPi * kPi / kHeight);
+    }
+    return level;
+  }
+
+ private:
+  static constexpr int kUps = 96;
+  static constexpr int kTurns = 64;
+  static std::size_t index(int turn, int up) { return static_cast<std::size_t>(up * kTurns + turn); }
+
+  std::vector<Vec3> entries_ = std::vector<Vec3>(std::size_t{kUps} * kTurns);
+};
+
+}  // namespace
+
+AtmosphericSky atmospheric_sky(DVec3 to_sun, float irradiance, const AirOptions& air) {
+  const Sky sky(air);
+  const auto sun_up = static_cast<float>(to_sun.y);
+  AtmosphericSky made;
+  made.sunlight = sky.sunlight(sun_up) * irradiance;
+  made.radiance = {kWidth, kHeight, std::vector<float>(std::size_t{3} * kWidth * kHeight)};
+  const Dome dome(sky, sun_up, irradiance);
+  // The colour of the ground below the horizon.
+  const Vec3 ground = (dome.on_level_ground() + made.sunlight * std::max(sun_up, 0.0F)) * (kGroundAlbedo / kPi);
+  const double sun_turns = arc_tangent(to_sun.x, -to_sun.z) / (2.0 * std::numbers::pi) + 0.5;
+  for (int y = 0; y < kHeight; ++y) {
+    const float up = of_turns((static_cast<float>(y) + 0.5F) / kHeight * 0.5F).cosine;
+    for (int x = 0; x < kWidth; ++x) {
+      double turns = std::abs((x + 0.5) / kWidth - sun_turns);
+      if (turns > 0.5) turns = 1.0 - turns;
+      Vec3 light = dome.at(up, static_cast<float>(turns));
+      if (up < 0.0F) {
+        const float s = std::clamp(-up / 0.12F, 0.0F, 1.0F);
+        light += (ground - light) * (s * s * (3.0F - 2.0F * s));
+      }
+      float* const rgb = &made.radiance.rgb[3 * (static_cast<std::size_t>(y) * kWidth + static_cast<std::size_t>(x))];
+      for (int channel = 0; channel < 3; ++channel) rgb[channel] = light[channel];
+    }
+  }
+  return made;
+}
+
 namespace {
 
 // Rotates about the vertical: -z turns towards +x.

@@ -14,7 +14,7 @@
 #include "core/instruction_sets_for_tests.h"
 #include "render/path/light_tree.h"
 #include "render/path/path_math.h"
-#include "render/path/path_tile_parts.h"
+#include "render/path/path_tile.h"
 #include "render/path/scatter.h"
 #include "render/path/sky_light.h"
 

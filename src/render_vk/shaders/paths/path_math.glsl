@@ -1,5 +1,5 @@
-// Path tracing arithmetic and random numbers; matches render/path/path_math.h on the CPU, series for series, so that paths
-// are the same.
+// Path tracing arithmetic and random numbers; matches render/path/path_math.h on the CPU, series for series, so that
+// paths are the same.
 
 const float kPi = 3.14159265;
 const float kAlmostOne = 0.99999994;

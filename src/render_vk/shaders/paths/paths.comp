@@ -25,7 +25,7 @@ const uint kSureBounces = 3;
 const float kMostLikely = 0.95;
 const uint kMostGlass = 64;
 
-// Dimensions of a vertex, and additional numbers: render/path/path_tile_parts.h.
+// Dimensions of a vertex, and additional numbers: render/path/path_tile.h.
 const uint kDimensions = 8;
 const uint kOfSun = 0;
 const uint kOfLampChoice = 1;
