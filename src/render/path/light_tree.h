@@ -9,7 +9,7 @@
 #include <quoin/core/direction.h>
 #include <quoin/core/vec.h>
 
-#include "render/path/kernel/kernel.h"
+#include "render/path/kernel/shade.h"
 
 namespace quoin::path {
 

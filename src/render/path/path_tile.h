@@ -22,7 +22,7 @@
 #include "light/surfaces.h"
 #include "render/camera_rays.h"
 #include "render/path/denoise.h"
-#include "render/path/kernel/kernel.h"
+#include "render/path/kernel/shade.h"
 #include "render/path/light_tree.h"
 #include "render/path/path_lamps.h"
 #include "render/path/path_math.h"

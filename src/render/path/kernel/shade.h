@@ -6,8 +6,8 @@
 #include "core/instruction_set.h"
 
 // The path tracing code compiled for each instruction set: random numbers, the choice of a lamp, and the scattering of
-// light by matte surfaces, for sixteen points at once. Every kernel gives the same bits as path_random.h, path_math.h,
-// Scatter and SkyLight.
+// light by matte surfaces, for sixteen points at once. Every kernel gives the same bits as path_math.h, Scatter and
+// SkyLight.
 
 namespace quoin::path {
 

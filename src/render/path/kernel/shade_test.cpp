@@ -1,6 +1,6 @@
 // Compares path tracing kernels with their scalar versions: every bit, with every instruction set.
 
-#include "render/path/kernel/kernel.h"
+#include "render/path/kernel/shade.h"
 
 #include <array>
 #include <cstdint>
