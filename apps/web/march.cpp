@@ -9,7 +9,6 @@
 
 #include "bindings.h"
 #include "handles.h"
-#include "render_vk/march/frame.h"
 #include "render_vk/march/shader_scene.h"
 
 struct quoin_web_march {

@@ -6,8 +6,7 @@
 #include <quoin/render_vk/vulkan_image.h>
 #include <quoin/scene/camera.h>
 
-#include "render_vk/device/access.h"
-#include "render_vk/device/memory.h"
+#include "render_vk/device/device_memory.h"
 #include "render_vk/march/pipelines.h"
 
 namespace quoin {
@@ -39,5 +38,9 @@ struct VulkanImage::Impl {
   LightOptions light;
   vulkan::Buffer sums;  ///< sums of the samples' light, four floats per pixel; only if samples accumulate
 };
+
+namespace vulkan {
+using ImageImpl = VulkanImage::Impl;
+}
 
 }  // namespace quoin

@@ -11,7 +11,7 @@
 
 #include "core/drop_oldest.h"
 #include "render_vk/march/device_scene.h"
-#include "render_vk/trees/octahedral.h"
+#include "render_vk/trees/shader_data.h"
 
 namespace quoin::vulkan {
 namespace {

@@ -12,7 +12,7 @@
 
 #include "render/image_detail.h"
 #include "render/impostor/impostor_screen.h"
-#include "render_vk/device/memory.h"
+#include "render_vk/device/device_memory.h"
 #include "render_vk/trees/shader_data.h"
 
 namespace quoin::vulkan {

@@ -10,9 +10,8 @@
 #include "light/light_model.h"
 #include "light/surface/light_bricks.h"
 #include "render/image_detail.h"
-#include "render_vk/device/access.h"
 #include "render_vk/device/device.h"
-#include "render_vk/device/memory.h"
+#include "render_vk/device/device_memory.h"
 #include "render_vk/march/device_detail.h"
 #include "render_vk/march/device_scene.h"
 #include "render_vk/march/pipelines.h"
@@ -21,7 +20,8 @@ namespace quoin {
 
 namespace vulkan {
 struct PathScene;
-}
+using RendererImpl = VulkanRenderer::Impl;
+}  // namespace vulkan
 
 /// The state shared by a renderer, its images and its mesh renderers.
 struct VulkanRenderer::Impl {

@@ -10,7 +10,7 @@
 #include "light/surfaces.h"
 #include "render/path/path_lamps.h"
 #include "render/path/sky_light.h"
-#include "render_vk/device/memory.h"
+#include "render_vk/device/device_memory.h"
 #include "render_vk/march/device_scene.h"
 #include "render_vk/paths/path_data.h"
 

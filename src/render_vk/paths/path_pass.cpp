@@ -1,19 +1,296 @@
-#include "render_vk/paths/path_pass.h"
-
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
+#include <memory>
 #include <numbers>
 #include <span>
 #include <utility>
+#include <vector>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/progress.h>
+#include <quoin/render_vk/vulkan_image.h>
+#include <quoin/render_vk/vulkan_renderer.h>
+#include <quoin/scene/camera.h>
 
+#include "render/path/denoise.h"
 #include "render/path/path_request.h"
-#include "render_vk/march/frame.h"
+#include "render_vk/device/device.h"
+#include "render_vk/device/device_memory.h"
+#include "render_vk/march/device_scene.h"
+#include "render_vk/march/renderer_impl.h"
+#include "render_vk/march/shader_scene.h"
+#include "render_vk/paths/device_paths.h"
+#include "render_vk/paths/path_data.h"
 
 namespace quoin {
-namespace vulkan {
+
+// The device state of a VulkanPathImage.
+struct VulkanPathImage::Impl {
+  explicit Impl(vulkan::Device& of_device) : device(&of_device) {}
+
+  // Allocates an empty image. Errors: LimitExceeded; the image then has no memory.
+  [[nodiscard]] Status begin(const Camera& of_camera, const PathOptions& with_options);
+
+  vulkan::Device* device;
+  int samples = 0;
+  std::int64_t rays = 0;
+  // The camera of its samples.
+  Camera camera;
+  PathOptions options;
+  vulkan::Buffer sums;   // vectors of four floats per pixel: path_data.glsl
+  vulkan::Buffer parts;  // of surfaces, for the denoiser
+};
+
+namespace {
+
+using DeviceBuffer = vulkan::Buffer;
+using vulkan::Vec4;
+
+const char* const kAllocating = "allocating an image";
+
+constexpr std::size_t kPartBytes = sizeof(path::SurfaceParts::OfPixel);
+static_assert(sizeof(path::SurfacePart) == 15 * sizeof(float));
+
+std::size_t vectors_of(const PathOptions& options) {
+  return options.layers ? vulkan::kPathSumsWithLayers : vulkan::kPathSums;
+}
+
+std::size_t pixels_of(const PathOptions& options) {
+  return static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
+}
+
+// Converts a pixel's vectors to sums.
+path::PixelSums sums_of(const Vec4* from, bool has_layers) {
+  path::PixelSums sums;
+  sums.background = Vec3(from[0]);
+  sums.scene_share = from[0].w;
+  sums.scene = Vec3(from[1]);
+  sums.caught_share = from[1].w;
+  sums.caught = Vec3(from[2]);
+  sums.depth = from[2].w;
+  sums.lit = Vec3(from[3]);
+  sums.open = Vec3(from[4]);
+  if (!has_layers) return sums;
+  sums.type = static_cast<VoxelType>(std::bit_cast<std::uint32_t>(from[3].w));
+  sums.instance = std::bit_cast<std::uint32_t>(from[4].w);
+  sums.albedo = Vec3(from[5]);
+  sums.normal = Vec3(from[6]);
+  return sums;
+}
+
+}  // namespace
+
+VulkanPathImage::VulkanPathImage(VulkanRenderer& renderer) : impl_(std::make_unique<Impl>(*renderer.impl().device)) {}
+VulkanPathImage::VulkanPathImage(VulkanPathImage&&) noexcept = default;
+VulkanPathImage& VulkanPathImage::operator=(VulkanPathImage&&) noexcept = default;
+VulkanPathImage::~VulkanPathImage() = default;
+
+Status VulkanPathImage::Impl::begin(const Camera& of_camera, const PathOptions& with_options) {
+  samples = 0;
+  rays = 0;
+  camera = of_camera;
+  options = with_options;
+  const auto make = [&](DeviceBuffer& buffer, std::size_t bytes) -> Status {
+    if (buffer.size() == bytes) return {};
+    buffer = {};
+    if (bytes == 0) return {};
+    auto made = DeviceBuffer::create(*device, bytes, DeviceBuffer::Where::Device, kAllocating);
+    if (!made) return made.error();
+    buffer = std::move(*made);
+    return {};
+  };
+  const std::size_t pixels = pixels_of(options);
+  Status done = make(sums, pixels * vectors_of(options) * sizeof(Vec4));
+  if (done) done = make(parts, options.denoise ? pixels * kPartBytes : 0);
+  if (!done) return done;
+  return device->run(kAllocating, [&](VkCommandBuffer commands) {
+    device->api().vkCmdFillBuffer(commands, sums.handle(), 0, VK_WHOLE_SIZE, 0);
+    if (parts.size() > 0) device->api().vkCmdFillBuffer(commands, parts.handle(), 0, VK_WHOLE_SIZE, 0);
+  });
+}
+
+int VulkanPathImage::width() const {
+  return impl_->samples > 0 ? impl_->options.width : 0;
+}
+int VulkanPathImage::height() const {
+  return impl_->samples > 0 ? impl_->options.height : 0;
+}
+int VulkanPathImage::samples() const {
+  return impl_->samples;
+}
+std::size_t VulkanPathImage::bytes() const {
+  return static_cast<std::size_t>(impl_->sums.size() + impl_->parts.size());
+}
+
+Result<PathImage> VulkanPathImage::read(Threads threads) const {
+  const Impl& from = *impl_;
+  if (from.samples == 0)
+    return make_error(ErrorCode::InvalidArgument, "vulkan: cannot read the image: nothing was drawn");
+  const char* const doing = "reading an image";
+  const auto fetch = [&](const DeviceBuffer& buffer) -> Result<DeviceBuffer> {
+    auto landing = DeviceBuffer::create(*from.device, buffer.size(), DeviceBuffer::Where::Read, doing);
+    if (!landing) return landing.error();
+    const Status done = from.device->run(doing, [&](VkCommandBuffer commands) {
+      const VkBufferCopy all{0, 0, buffer.size()};
+      from.device->api().vkCmdCopyBuffer(commands, buffer.handle(), landing->handle(), 1, &all);
+    });
+    if (!done) return done.error();
+    return landing;
+  };
+  const auto sums = fetch(from.sums);
+  if (!sums) return sums.error();
+  PathImage image = path::empty_image(from.options);
+  const std::size_t vectors = vectors_of(from.options);
+  const auto* const pixels = reinterpret_cast<const Vec4*>(sums->mapped());
+  const auto width = static_cast<std::size_t>(image.width);
+  std::vector<std::int64_t> hits(static_cast<std::size_t>(image.height));
+  parallel_for(hits.size(), threads, [&](std::size_t y) {
+    for (std::size_t pixel = y * width; pixel < (y + 1) * width; ++pixel) {
+      const path::PixelSums of_pixel = sums_of(pixels + pixel * vectors, from.options.layers);
+      of_pixel.write_to(image, pixel, from.samples);
+      if (of_pixel.scene_share > 0.0F) ++hits[y];
+    }
+  });
+  for (const std::int64_t of_row : hits) image.pixels_hit += of_row;
+  image.rays = from.rays;
+  if (!from.options.denoise) return image;
+  const auto parts = fetch(from.parts);
+  if (!parts) return parts.error();
+  path::SurfaceParts surfaces(image.width, image.height);
+  for (std::size_t i = 0; i < pixels_of(from.options); ++i) {
+    QUOIN_ASSERT((i + 1) * kPartBytes <= parts->size(), "parts of every pixel");
+    std::memcpy(&surfaces.at(i), parts->mapped() + i * kPartBytes, kPartBytes);
+  }
+  path::denoise(surfaces, from.samples, threads, image);
+  return image;
+}
+
+}  // namespace quoin
+
+namespace quoin::vulkan {
+
+using PathImageImpl = VulkanPathImage::Impl;
+
+// The path tracing shader in the variants that scenes need: with glass, with fields, with transparent fields. Each
+// variant is created at first use.
+class PathPipelines {
+ public:
+  [[nodiscard]] static Result<std::unique_ptr<PathPipelines>> create(Device& device);
+  ~PathPipelines();
+  PathPipelines(const PathPipelines&) = delete;
+  PathPipelines& operator=(const PathPipelines&) = delete;
+
+  // Errors: those of VulkanRenderer.
+  [[nodiscard]] Status prepare(const Placement& placement);
+  // Records steps of a tile's paths, and a barrier before their results are read. Requires: it was prepared.
+  void dispatch(VkCommandBuffer commands, const Placement& placement, const PathPush& push) const;
+
+ private:
+  explicit PathPipelines(Device& device) : device_(&device) {}
+  [[nodiscard]] static std::size_t variant_of(const Placement& placement);
+
+  Device* device_;
+  VkPipelineLayout layout_ = VK_NULL_HANDLE;
+  std::array<VkPipeline, 8> pipelines_{};
+};
+
+namespace {
+
+constexpr std::uint32_t kPaths[] = {
+#include "paths.comp.inc"
+};
+
+constexpr std::size_t kGlass = 1;
+constexpr std::size_t kFields = 2;
+constexpr std::size_t kFieldGlass = 4;
+
+}  // namespace
+
+Result<std::unique_ptr<PathPipelines>> PathPipelines::create(Device& device) {
+  std::unique_ptr<PathPipelines> made(new PathPipelines(device));
+  const VkResult result = make_push_layout(device, VK_SHADER_STAGE_COMPUTE_BIT, sizeof(PathPush), made->layout_);
+  if (Status status = device.check(result, "compiling shaders"); !status) return status.error();
+  return made;
+}
+
+PathPipelines::~PathPipelines() {
+  const Api& api = device_->api();
+  for (const VkPipeline pipeline : pipelines_) {
+    if (pipeline != VK_NULL_HANDLE) api.vkDestroyPipeline(device_->handle(), pipeline, nullptr);
+  }
+  if (layout_ != VK_NULL_HANDLE) api.vkDestroyPipelineLayout(device_->handle(), layout_, nullptr);
+}
+
+std::size_t PathPipelines::variant_of(const Placement& placement) {
+  return (placement.has_transparent ? kGlass : 0) | (placement.has_fields ? kFields : 0) |
+         (placement.has_field_glass ? kFieldGlass : 0);
+}
+
+Status PathPipelines::prepare(const Placement& placement) {
+  const std::size_t variant = variant_of(placement);
+  if (pipelines_[variant] != VK_NULL_HANDLE) return {};
+  const std::array constants = {ShaderConstant{0, (variant & kGlass) != 0},
+                                ShaderConstant{4, (variant & (kFields | kFieldGlass)) != 0},
+                                ShaderConstant{6, (variant & kFieldGlass) != 0}};
+  const VkResult result = make_compute_pipeline(*device_, layout_, kPaths, constants, pipelines_[variant]);
+  return device_->check(result, "compiling shaders");
+}
+
+void PathPipelines::dispatch(VkCommandBuffer commands, const Placement& placement, const PathPush& push) const {
+  constexpr std::int32_t kGroup = 8;
+  const auto groups = [](std::int32_t pixels) { return static_cast<std::uint32_t>((pixels + kGroup - 1) / kGroup); };
+  QUOIN_ASSERT(pipelines_[variant_of(placement)] != VK_NULL_HANDLE, "a variant that was prepared");
+  const Api& api = device_->api();
+  api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines_[variant_of(placement)]);
+  api.vkCmdPushConstants(commands, layout_, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof push, &push);
+  api.vkCmdDispatch(commands, groups(push.size_x), groups(push.size_y), 1);
+  device_->separate(commands);
+}
+
+// The data shared by the path-traced images of one renderer.
+struct PathScene {
+  explicit PathScene(std::unique_ptr<PathPipelines> made) : pipelines(std::move(made)) {}
+
+  std::unique_ptr<PathPipelines> pipelines;
+  DevicePaths tables;
+  std::uint64_t update_count = 0;  // of the renderer, when the tables were last updated
+};
+
+// Adds samples to a path-traced image, tile by tile.
+//
+//   tile: begin -> [ some steps of every pixel's path; the next sample's path starts when one ends ] until all end
+class PathPass {
+ public:
+  PathPass(RendererImpl& renderer, PathImageImpl& image);
+  PathPass(const PathPass&) = delete;
+  PathPass& operator=(const PathPass&) = delete;
+
+  // Adds `samples` samples. After an error the image has none.
+  [[nodiscard]] Status draw(int samples, const Progress& progress);
+
+ private:
+  struct Tile {
+    std::int32_t x, y, width, height;
+  };
+  Status put_frame(int samples);
+  Status put_lamps(DVec3 view_origin, ShaderPathFrame& paths);
+  Status put_tile_buffers(int samples, ShaderFrame& frame, ShaderPathFrame& paths);
+  Status add_samples(int samples, const Progress& progress);
+  Status take(const Tile& tile, int first, int count, const Progress& progress, double done_before);
+
+  RendererImpl* renderer_;
+  PathImageImpl* image_;
+  Places places_;
+  std::uint64_t frame_address_ = 0;
+  std::int32_t tile_edge_ = 0;
+  Buffer counters_;  // on the device
+  Buffer results_;   // their copy for the CPU
+};
+
 namespace {
 
 const char* const kDoing = "path tracing";
@@ -213,7 +490,9 @@ Status PathPass::draw(int samples, const Progress& progress) {
   return done;
 }
 
-}  // namespace vulkan
+}  // namespace quoin::vulkan
+
+namespace quoin {
 
 Status VulkanRenderer::draw_paths(VulkanPathImage& image, const Camera& camera, const PathOptions& options,
                                   Accumulation accumulation, const Progress& progress) {

@@ -12,7 +12,6 @@
 #include <quoin/render/path_tracer.h>
 
 #include "render/path/town_for_tests.h"
-#include "render_vk/device/access.h"
 #include "render_vk/device/vulkan_for_tests.h"
 #include "render_vk/lakeside_for_tests.h"
 #include "render_vk/march/renderer_impl.h"

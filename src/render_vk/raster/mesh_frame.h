@@ -11,7 +11,7 @@
 #include <quoin/render_vk/vulkan_mesh_renderer.h>
 #include <quoin/scene/camera.h>
 
-#include "render_vk/march/frame.h"
+#include "render_vk/march/shader_scene.h"
 #include "render_vk/raster/mesh_shader_data.h"
 #include "render_vk/raster/mesh_store.h"
 #include "scene/tracer/placed_grid.h"

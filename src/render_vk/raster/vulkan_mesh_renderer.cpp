@@ -12,8 +12,8 @@
 #include "render/image_request.h"
 #include "render_vk/march/device_image.h"
 #include "render_vk/march/renderer_impl.h"
-#include "render_vk/raster/level_meshes.h"
 #include "render_vk/raster/mesh_pass.h"
+#include "render_vk/raster/mesh_store.h"
 #include "scene/instance_axes.h"
 #include "scene/tracer/placed_grid.h"
 

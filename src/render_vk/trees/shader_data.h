@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 
 #include <glm/vec2.hpp>
@@ -276,5 +278,23 @@ static_assert(sizeof(ShaderFarFace) == 32 && sizeof(ShaderVoxelFace) == 16 && si
 static_assert(sizeof(ShaderPlaced) == 384 && sizeof(ShaderFrame) == 20 * 16 + 26 * 8 + 20 * 4);
 static_assert(sizeof(ShaderLamp) == 13 * 16);
 static_assert(sizeof(ShaderPush) == 104 && sizeof(ShaderCounters) == 16);
+
+/// Packs -1 to 1 in 16 bits.
+[[nodiscard]] inline std::uint32_t signed_16(float value) {
+  const float scaled = std::round(std::clamp(value, -1.0F, 1.0F) * 32767.0F);
+  return static_cast<std::uint32_t>(static_cast<std::int32_t>(scaled)) & 0xFFFF;
+}
+
+/// Packs a unit vector into a word, with precision 1/20,000: the octahedron's faces folded into a square. `unit_vector`
+/// in shaders/data.glsl reads it.
+[[nodiscard]] inline std::uint32_t octahedral(Vec3 v) {
+  const float size = std::abs(v.x) + std::abs(v.y) + std::abs(v.z);
+  if (!(size > 0.0F)) return 0;
+  v /= size;
+  const auto fold = [](float a, float b) { return (1.0F - std::abs(b)) * (a >= 0.0F ? 1.0F : -1.0F); };
+  const float x = v.z >= 0.0F ? v.x : fold(v.x, v.y);
+  const float y = v.z >= 0.0F ? v.y : fold(v.y, v.x);
+  return signed_16(x) | signed_16(y) << 16;
+}
 
 }  // namespace quoin::vulkan

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <span>
 #include <string>
-#include <vector>
 
 #include <quoin/core/result.h>
 
@@ -39,25 +38,6 @@ class ShaderMemory {
   [[nodiscard]] virtual Status flush() = 0;
   /// Discards the writes since the last `flush`.
   virtual void discard() = 0;
-};
-
-/// The same memory as bytes, for devices outside this library: addresses start at the first byte. It is filled once:
-/// released parts are not reused.
-class ShaderBytes final : public ShaderMemory {
- public:
-  /// The largest size that 32-bit programs can hold, including its growth.
-  static constexpr std::uint64_t kMost = std::uint64_t{1} << 30;
-
-  [[nodiscard]] Result<Place> allocate(std::uint64_t size, const std::string& doing) override;
-  void release(Place& place) override { place = {}; }
-  [[nodiscard]] Status write(const Place& place, std::span<const std::byte> bytes, std::uint64_t offset = 0) override;
-  [[nodiscard]] Status flush() override { return {}; }
-  void discard() override {}
-
-  [[nodiscard]] std::span<const std::byte> bytes() const { return bytes_; }
-
- private:
-  std::vector<std::byte> bytes_ = std::vector<std::byte>(kAlignment);  // no table has the address 0
 };
 
 }  // namespace quoin::vulkan

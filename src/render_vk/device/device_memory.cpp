@@ -1,4 +1,4 @@
-#include "render_vk/device/memory.h"
+#include "render_vk/device/device_memory.h"
 
 #include <algorithm>
 #include <cstring>

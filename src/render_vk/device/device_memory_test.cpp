@@ -1,6 +1,6 @@
 #ifdef QUOIN_HAVE_VULKAN
 
-#include "render_vk/device/memory.h"
+#include "render_vk/device/device_memory.h"
 
 #include <algorithm>
 #include <cstring>
