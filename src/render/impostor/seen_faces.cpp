@@ -11,7 +11,6 @@
 #include <quoin/core/assert.h>
 #include <quoin/trace/packet.h>
 
-#include "render/impostor/morton.h"
 #include "render/impostor/raster/raster.h"
 #include "render/impostor/snapshot.h"
 

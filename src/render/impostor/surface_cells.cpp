@@ -14,7 +14,6 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/hash.h>
 
-#include "render/impostor/morton.h"
 #include "render/impostor/seen_faces.h"
 #include "render/impostor/snapshot.h"
 #include "trace/tree_view.h"

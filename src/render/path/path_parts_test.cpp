@@ -9,7 +9,6 @@
 #include <gtest/gtest.h>
 
 #include "core/death_for_tests.h"
-#include "render/path/environment_light.h"
 #include "render/path/light_tree.h"
 #include "render/path/path_lamps.h"
 #include "render/path/path_math.h"
