@@ -54,8 +54,8 @@ struct ConnectedPiece {
 ///           edits.
 /// Memory:   about 0.3 KiB per chunk and 110 bytes per part. A chunk with several parts adds 8 KiB, and 1 to 4 bytes
 ///           per run of voxels along x. Measured: 9 KiB per chunk of terrain full of caves; 1.3 MB for a noise chunk
-///           with 12,000 parts. It also shares the grid's chunks as of the last update, like a snapshot, so the first
-///           edit of each chunk afterwards copies it.
+///           with 12,000 parts. It also shares the grid's chunks as of the last update, so later edits cost the same as
+///           after a snapshot (Grid::snapshot).
 /// Threads:  any number may read at once; an update needs exclusive access.
 /// Source:   runs and union-find: L. He, Y. Chao, K. Suzuki, "A Run-Based Two-Scan Labeling Algorithm" (2008).
 class ConnectedPieces {

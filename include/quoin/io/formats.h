@@ -47,9 +47,9 @@ struct DetectedFile {
 /// (scene_from_volume). Triangles become voxels or a field (LoadOptions::mesh), at the mesh's position and in its unit.
 /// For worlds of open_chunk_source, only the surroundings of the spawn point are loaded.
 ///
-/// The content determines the format, unless `LoadOptions::raw` or `LoadOptions::heights` sets it. The name decides
-/// only
-/// if the content cannot: for .hgt (with its size), damaged Minecraft regions and undetected triangle files.
+/// The content determines the format, unless `LoadOptions::raw` or `LoadOptions::heights` sets it. The name is used
+/// only for files that the content does not identify: .hgt (with its size), damaged Minecraft regions, some triangle
+/// files.
 /// Errors: CannotRead, BadFormat (with the byte offset where there is one), Unsupported; those of the format's reader
 ///         (InvalidArgument for a missing frame, Cancelled, LimitExceeded). `path` is set in all.
 [[nodiscard]] Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOptions& options = {},

@@ -54,7 +54,7 @@ struct MeshLoadOptions {
   bool as_field = false;                                ///< makes a distance field of the solid instead of voxels
   float band = 8.0F;                                    ///< band of the field, in samples
   std::optional<std::size_t> max_types = std::nullopt;  ///< maximum number of colours
-  std::optional<UpAxis> up = std::nullopt;              ///< default: Z for STL and PLY, Y for all others
+  std::optional<UpAxis> up = std::nullopt;              ///< default: Z for PLY, STL and 3MF, Y for all others
 };
 inline constexpr int kDefaultMeshSize = 128;
 

@@ -141,7 +141,7 @@ struct MeshFileOptions {
 /// A mesh read from a file.
 struct LoadedMesh {
   TriangleMesh mesh;
-  std::string format;                 ///< "obj", "gltf", "glb", "ply" or "stl"
+  std::string format;                 ///< "obj", "gltf", "glb", "ply", "stl", "3mf" or "off"
   std::vector<std::string> warnings;  ///< one line per skipped item, with the reason
   /// Other files that were read.
   std::vector<std::filesystem::path> sidecars;
@@ -157,12 +157,15 @@ struct LoadedMesh {
 /// PLY:    version 1.0, text or binary of either byte order; red, green, blue and alpha per vertex (sRGB); polygons are
 ///         read as fans; triangle strips too.
 /// STL:    text or binary, with VisCAM or Magics colours.
+/// 3MF:    objects, components and build items with their transforms; colours of base materials and colour groups
+///         (sRGB). Positions are converted to millimetres. Needs expat in the build.
+/// OFF:    text; polygons are triangulated; colours per vertex or face (sRGB).
 /// Sidecar files: sidecar_path resolves them with `sidecar_files`. A glTF file that names a file outside its folder is
 ///                refused. OBJ and MTL often contain absolute paths of another machine: the file of the same name in
 ///                the folder is read instead, with a warning if there is none. Missing images (PNG, JPEG, WebP) and
 ///                .mtl files give a warning; missing glTF buffers are an error.
 /// Left out, with a warning: triangles with a missing or non-finite corner; points and lines.
-/// `up`:   the file's up axis; default: Z for STL and PLY, Y for all others.
+/// `up`:   the file's up axis; default: Z for PLY, STL and 3MF, Y for all others.
 /// Errors: CannotRead; BadFormat (with the byte offset where there is one); Unsupported for other formats, for
 ///         formats that the build cannot read, and for glTF that requires an unknown extension; LimitExceeded beyond
 ///         2^27 triangles. Memory stays within a multiple of the files' size.

@@ -29,11 +29,11 @@ class DensityTree;
 struct ImpostorFaces;
 
 struct ImpostorOptions {
-  /// Texels per side of the snapshots; doubled for grids wider than this number of voxels. Requires: 16 to 1,024.
+  /// Texels per side of a view; doubled for grids wider than this number of voxels. Requires: 16 to 1,024.
   int edge = 128;
 };
 
-/// A compact representation of a grid's opaque surface (voxels and field), made from snapshots of 26 views. Renderers
+/// A compact representation of a grid's opaque surface (voxels and field), made from 26 rendered views. Renderers
 /// draw it in place of the grid where the grid is small in the image.
 ///
 /// Each face is drawn as it is where a pixel spans few voxels. Where a pixel spans many voxels, the surface is drawn in
@@ -59,18 +59,18 @@ class Impostor {
   /// Creates an impostor without a grid.
   Impostor();
 
-  /// Takes all snapshots, on the calling thread.
+  /// Renders all views on the calling thread.
   ///
   /// Requires: `opaque` is the grid's tree of opaque voxels (not checked); the grid is not edited during the call.
   /// Cost:     about 10 ns per face and view plus nine short rays per face; for grids with very many faces about 0.15
   ///           microseconds per covered texel.
   [[nodiscard]] static Impostor build(const Grid& grid, const VoxelRegistry& types, const OccupancyTree& opaque,
                                       const ImpostorOptions& options = {});
-  /// Takes all snapshots. Builds the tree of opaque voxels itself.
+  /// Renders all views. Builds the tree of opaque voxels itself.
   [[nodiscard]] static Impostor build(const Grid& grid, const VoxelRegistry& types,
                                       const ImpostorOptions& options = {});
 
-  /// Takes all snapshots of the opaque voxels and the field.
+  /// Renders all views of the opaque voxels and the field.
   /// Cost: as above, plus two microseconds per surfel of the field and 10 ns per surfel and view.
   [[nodiscard]] static Impostor build(const SceneGrid& grid, const VoxelRegistry& types,
                                       const ImpostorOptions& options = {});
@@ -80,7 +80,7 @@ class Impostor {
   /// there are very many faces; then it processes all.
   ///
   /// Requires: this impostor was built from the grid or a snapshot of it, without a field, with types of the same
-  ///           visibility; `changes` are all changes since. None of this is checked.
+  ///           visibility; `changes` are all changes since. Only the absence of a field is checked.
   /// Cost:     about 20 ns per face, plus the parts that the edit can affect.
   [[nodiscard]] Impostor rebuilt(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes) const;
 

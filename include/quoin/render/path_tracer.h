@@ -51,8 +51,8 @@ struct PathImage {
   std::int64_t pixels_hit = 0;  ///< pixels with at least one sample that shows the scene
 };
 
-/// Renders images by path tracing: the sun as a disc, a sky, emissive voxels, any number of bounces, gloss, metal and
-/// refractive glass. Images converge to the correct result including the last bounce; until then they have noise.
+/// Renders images by path tracing: the sun as a disc, a sky, emissive voxels, up to `max_bounces` bounces, gloss, metal
+/// and refractive glass. Images converge to the exact result for that number of bounces; until then they have noise.
 ///
 /// Light:       in the units of LightOptions: a sun of 1 shows a white surface that faces it as 1. A voxel of emission
 ///              1 shows its own colour and lights others as such a surface does.
