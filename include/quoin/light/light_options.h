@@ -71,12 +71,13 @@ struct LightOptions {
   /// Derives the colours of sky, ambient light and sun from the sun's height in the world (+Y is up): day, golden hour,
   /// dusk, night. A sun below the horizon gives no light. If false, it is always day.
   bool sky_follows_sun = false;
-  /// Maximum number of lamps that light a surface, each with shadows. Lamps are Scene::lamps and emissive voxels,
-  /// grouped in cells of 4^3. Chosen per brick of 16^3 voxels: the lamps within reach that can contribute most. 0: no
-  /// lamps; emissive voxels only show their own emission. 64 is enough for most scenes. A lamp fades out where it
-  /// contributes less than 1/4096.
+  /// Maximum number of light sources that light a surface, each with shadows. Light sources are Scene::lamps and
+  /// emissive voxels, grouped in cells of 4^3. Chosen per brick of 16^3 voxels: the sources within reach that can
+  /// contribute most. 0: none; emissive voxels only show their own emission. 64 is enough for most scenes. A source
+  /// fades out where it contributes less than 1/4096.
   int max_lamps = 0;
-  double lamp_brightness = 1.0;  ///< scales the light that lamps cast; their own appearance is unchanged
+  /// Scales the light that lamps and emissive voxels cast; their own appearance does not change.
+  double lamp_brightness = 1.0;
   /// Minimum light everywhere, for LightModel::Propagated. With 0, closed rooms are black.
   double least_light = 0.0;
   /// Draws reflections on glass and water. Where a ray enters, leaves or crosses between transparent bodies, the

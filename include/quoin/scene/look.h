@@ -79,7 +79,7 @@ struct Look {
   double environment_turn_radians = 0.0;  ///< rotation about the vertical axis, from -z towards +x
   std::optional<Vec3> background{};       ///< linear; replaces sky and sun for the camera only
 
-  double lamp_brightness = 1.0;  ///< factor on the light that lamps and glowing voxels emit onto other surfaces
+  double lamp_brightness = 1.0;  ///< factor on the light that lamps and emissive voxels cast
   std::optional<GroundPlane> ground{};
   std::optional<Fog> fog{};
 

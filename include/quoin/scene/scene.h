@@ -19,7 +19,7 @@
 
 namespace quoin {
 
-/// A point or spot light without geometry. Voxels that emit light act as lamps without an entry here.
+/// A point or spot light without geometry. Emissive voxels also light surfaces, but are not lamps.
 ///
 /// Intensity falls off with the squared distance, times 1 - (distance / range)^4, as glTF's KHR_lights_punctual
 /// recommends. A lamp also ends, with the same smooth cut-off, at the distance where it would add less than 1/4096. A
@@ -142,8 +142,8 @@ struct SceneChanges {
 class Scene {
  public:
   VoxelRegistry types;
-  /// Lights without geometry. Voxels that emit light act as lamps without an entry here. LightOptions::max_lamps is
-  /// the limit. Renderers apply changes to this list at their next `update`.
+  /// Lights without geometry. LightOptions::max_lamps limits how many of them and of the emissive voxels light a
+  /// surface. Renderers apply changes to this list at their next `update`.
   std::vector<Lamp> lamps;
 
   Scene();
