@@ -29,7 +29,7 @@ struct GridCursors {
 
 struct LiveLight::Impl {
   explicit Impl(LiveLightOptions options)
-      : threads{worker_count(options.workers)}, working{nullptr, SceneLight(std::move(options.light))} {
+      : threads{worker_count(options.threads)}, working{nullptr, SceneLight(std::move(options.light))} {
     worker.start(1, [this](Workers::Lock& lock, unsigned /*worker*/) { return step(lock); });
   }
 

@@ -10,18 +10,19 @@ namespace quoin {
 
 struct LiveLightOptions {
   PropagatedLightOptions light{};
-  Threads workers{};  ///< 0: one less than the hardware threads, at least 1 (different from other options)
+  /// Threads that each update uses. 0: one less than the hardware threads, at least 1 (different from other options).
+  Threads threads{};
 };
 
-/// Propagated light of a scene's grids, updated on worker threads while the scene is edited. Frames never wait for
-/// light; the light shown is a few frames late.
+/// Propagated light of a scene's grids. One background thread computes updates, with several threads each, while the
+/// scene is edited. Frames never wait for light; the light shown is a few frames late.
 ///
 ///   LiveLight light;
 ///   renderer.use_light(&light.shown());
 ///   each frame: edit(scene); light.update(scene); light.take(); renderer.update(); renderer.render(...);
 ///
 /// Exact:    the light shown is always the exact light of the scene at one moment, including its voxels
-///           (GridLight::voxels). The delay depends on the workers. Once edits stop, `take` eventually shows the light
+///           (GridLight::voxels). The delay depends on the threads. Once edits stop, `take` eventually shows the light
 ///           of the current scene.
 /// Follow:   PropagatedLight::changes_since, on `shown().of(grid).light`, reports where light changed between two
 ///           states.
@@ -29,18 +30,18 @@ struct LiveLightOptions {
 /// Threads:  calls must not overlap. Any number of threads can read the shown light until the next `take`.
 class LiveLight {
  public:
-  /// Errors: std::system_error if the worker thread cannot be started.
+  /// Errors: std::system_error if the background thread cannot be started.
   explicit LiveLight(LiveLightOptions options = {});
   /// Waits for the update in progress.
   ~LiveLight();
   LiveLight(const LiveLight&) = delete;
   LiveLight& operator=(const LiveLight&) = delete;
 
-  /// Starts computing the light of the current scene on workers if voxel types, fields, grids or type properties have
-  /// changed, unless an earlier update is still running. Call it once per frame. Voxel data, names and instance
+  /// Starts computing the light of the current scene in the background if voxel types, fields, grids or type properties
+  /// have changed, unless an earlier update is still running. Call it once per frame. Voxel data, names and instance
   /// positions do not affect light and can be out of date in the light shown.
   /// Cost:   no work if nothing changed; otherwise Scene::snapshot.
-  /// Errors: bad_alloc, also from a worker; the next call then computes the missing light from scratch.
+  /// Errors: bad_alloc, also from the background thread; the next call then computes the missing light from scratch.
   void update(const Scene& scene);
   /// Shows the newest completed light. Returns true if there was new light. Cost: O(1).
   bool take();
