@@ -245,7 +245,7 @@ std::shared_ptr<GenerateOptions> add_world(CLI::App& command, const char* files,
   auto options = std::make_shared<GenerateOptions>();
   command.add_option("OUT", options->output, files)->required()->check(file_name());
   set_heading(command, heading::kOutput);
-  command.add_option("--seed", options->seed, "Seed, a whole number (default 42)");
+  command.add_option("--seed", options->seed, "Seed, a whole number (default 42)")->type_name("N");
   command.add_option("--chunks", options->chunks, chunks)->type_name("XxYxZ");
   command.add_flag(
       "--endless", options->is_endless,

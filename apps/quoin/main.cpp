@@ -66,10 +66,15 @@ std::string usage_error(CLI::App& app, const CLI::ParseError& error, const Argum
     const std::string inner = command_names(command);
     if (!inner.empty()) return command.get_name() + " needs one of: " + inner + hint;
   }
-  if (code == CLI::ExitCodes::RequiredError && std::string(error.what()).starts_with("--output")) {
-    return "-o OUT is required" + hint;
+  const std::string message = error.what();
+  if (code == CLI::ExitCodes::RequiredError && message.starts_with("--output")) return "-o OUT is required" + hint;
+  const std::size_t end = message.find(": 1 required ");
+  if (code == CLI::ExitCodes::ArgumentMismatch && end != std::string::npos && !chosen.empty()) {
+    const std::string name = message.substr(0, end);
+    const CLI::Option* option = innermost(*chosen[0]).get_option_no_throw(name);
+    if (option != nullptr) return name + " needs a value: " + value_type(*option) + hint;
   }
-  return error.what() + hint;
+  return message + hint;
 }
 
 /// Returns the arguments with "-.5" written as "-0.5", because CLI11 takes "-.5" for an option.

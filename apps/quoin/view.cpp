@@ -150,7 +150,8 @@ void add_view_command(CLI::App& app, int& status) {
                    "Renderer of rays: auto (a graphics card if there is one), cpu, or vulkan (any device)")
       ->check(CLI::IsMember({"auto", "cpu", "vulkan"}))
       ->capture_default_str();
-  command->add_option("--device", arguments->device, "Vulkan device: its number or a part of its name");
+  command->add_option("--device", arguments->device, "Vulkan device: its number or a part of its name")
+      ->type_name("NAME|N");
   command
       ->add_option(
           "--memory", arguments->memory_mebibytes,

@@ -187,6 +187,7 @@ void add_world_command(CLI::App& app, int& status) {
   added
       ->add_option("-o,--output", repaired->output,
                    "File to write (default: WORLD itself; the damaged file is kept as WORLD~)")
+      ->type_name("FILE")
       ->check(file_name());
   added->footer("Example: quoin world repair home.quoin -o repaired.quoin");
   const auto backed_up =
@@ -195,7 +196,7 @@ void add_world_command(CLI::App& app, int& status) {
   added->footer("Example: quoin world backup home.quoin monday.quoin");
   const auto shown = add(*command, added, "thumbnail", "Write the preview image of a world", run_thumbnail, status);
   added->add_option("OUT", shown->output, "Image to write: .png")->required()->check(file_name());
-  added->add_flag("--force", shown->force, "Overwrite OUT even if it holds a model or a world, not an image");
+  added->add_flag("--force", shown->force, "Overwrite OUT even if it is a voxel file, not an image");
   added->footer("Example: quoin world thumbnail home.quoin home.png");
   add(*command, added, "compact", "Remove unused space from a world file", run_compact, status);
   added->footer("Example: quoin world compact home.quoin");

@@ -1,5 +1,7 @@
 #include "shell/command_line.h"
 
+#include "shell/help.h"
+
 namespace quoin::tool {
 
 namespace {
@@ -26,10 +28,8 @@ OptionOfCommand option_of(const CLI::Option& option) {
   if (out.names.empty()) out.names.push_back(option.get_name());
   out.description = option.get_description();
   if (option.get_items_expected_max() > 0) {
-    const std::string type = option.get_type_name();
-    out.value = type.substr(0, type.find(':'));
-    if (out.value.empty()) out.value = "VALUE";
-    out.choices = choices_in(type);
+    out.value = value_type(option);
+    out.choices = choices_in(option.get_type_name());
   }
   return out;
 }

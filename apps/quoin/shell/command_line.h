@@ -10,7 +10,7 @@ namespace quoin::tool {
 struct OptionOfCommand {
   std::vector<std::string> names;  ///< with their dashes; for a positional argument its name
   std::string description;
-  std::string value;                 ///< type of the value: "TEXT", "WIDTHxHEIGHT"; empty for a flag
+  std::string value;                 ///< type of the value: "NAME", "WxH"; empty for a flag
   std::vector<std::string> choices;  ///< all allowed values; empty: any value
 };
 

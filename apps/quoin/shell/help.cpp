@@ -59,12 +59,8 @@ std::string name_of(const CLI::Option& option) {
   std::string name = option.get_positional() ? option.get_name(true, false) : option.get_name(false, true);
   std::ranges::replace(name, '{', ' ');
   name = name.substr(0, name.find(' '));
-  if (option.get_positional() || option.get_items_expected_max() == 0) return name;
-  std::string type = option.get_type_name();
-  type = type.substr(0, type.find(":{"));
-  if (type.starts_with("INT") || type.starts_with("UINT")) type = "N";
-  if (type.starts_with("FLOAT")) type = "X";
-  return name + " " + (type.empty() ? "VALUE" : type);
+  const std::string type = value_type(option);
+  return option.get_positional() || type.empty() ? name : name + " " + type;
 }
 
 class HelpFormatter : public CLI::FormatterBase {
@@ -152,6 +148,16 @@ class HelpFormatter : public CLI::FormatterBase {
 };
 
 }  // namespace
+
+std::string value_type(const CLI::Option& option) {
+  if (option.get_items_expected_max() == 0) return "";
+  std::string type = option.get_type_name();
+  type = type.substr(0, type.find(":{"));
+  if (type.starts_with("INT") || type.starts_with("UINT")) return "N";
+  if (type.starts_with("FLOAT")) return "X";
+  if (type.starts_with("TEXT")) return "NAME";
+  return type.empty() ? "VALUE" : type;
+}
 
 std::shared_ptr<CLI::FormatterBase> help_formatter() {
   return std::make_shared<HelpFormatter>();

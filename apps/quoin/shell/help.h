@@ -32,6 +32,9 @@ inline void set_heading(CLI::App& command, const char* name) {
   command.option_defaults()->group(name);
 }
 
+/// Returns the type of an option's value in help texts, such as "N", "X", "NAME" or "FILE". Empty for a flag.
+[[nodiscard]] std::string value_type(const CLI::Option& option);
+
 /// Prints help with an example first, options under headings, and lines of at most 100 columns.
 [[nodiscard]] std::shared_ptr<CLI::FormatterBase> help_formatter();
 
