@@ -133,4 +133,9 @@ void add_common_options(CLI::App& command, CommonOptions& options) {
       ->check(CLI::Range(1U, 1024U));
 }
 
+std::string readable_files() {
+  return "Reads " + extensions_with(FormatCapability::Read) +
+         ".\nAlso reads .mcr, .linear, .hdr (NIfTI pairs), and world folders of Minecraft and Luanti.\n";
+}
+
 }  // namespace quoin::tool

@@ -35,8 +35,11 @@ void add_common_options(CLI::App& command, CommonOptions& options);
 /// Adds --allow-outside-files.
 void add_outside_files_option(CLI::App& command, LoadOptions& options);
 
+/// Returns a sentence with the files that the tool reads, for the end of a help text.
+[[nodiscard]] std::string readable_files();
+
 /// Help of --force.
-inline constexpr const char* kForceHelp = "Overwrite OUT even if it is a model or a world";
+inline constexpr const char* kForceHelp = "Overwrite OUT even if it is a voxel file";
 
 /// Accepts a number of at least 0.
 [[nodiscard]] CLI::Validator not_negative();

@@ -325,8 +325,7 @@ void add_info_command(CLI::App& app, int& status) {
   const auto options = std::make_shared<CommonOptions>();
   add_common_options(*command, *options);
   add_raw_options(*command, options->load.raw);
-  command->footer("Reads " + extensions_with(FormatCapability::Read) +
-                  ".\n"
+  command->footer(readable_files() +
                   "Faces are counted once per model; only models that are placed and visible count.\n"
                   "Example: quoin info castle.vox\n"
                   "Example: quoin info scan.raw --raw-size 256x256x128 --raw-type uint16");

@@ -503,7 +503,9 @@ void add_meshing_options(CLI::App& command, ConvertOptions& options) {
       options.mesher,
       "Mesher: greedy or culled for blocks, smooth for rounded surfaces (default greedy; volumes and fields "
       "always smooth)");
-  command.add_option("--scale", options.scale, "Mesh units per voxel (default 1; 0.1: ten voxels per metre)")
+  command
+      .add_option("--scale", options.scale,
+                  "Mesh units per world unit, which is a voxel in most files (default 1; 0.1: ten voxels per unit)")
       ->check(positive());
   add_choice<UpAxis>(command, "--up", {{"y", UpAxis::Y}, {"z", UpAxis::Z}}, options.up,
                      "Up axis of the mesh: y or z (default y; z for .ply, .stl and .3mf)");
@@ -775,15 +777,16 @@ void add_file_options(CLI::App& command, ConvertOptions& options, ManyOptions& m
 }
 
 std::string footer() {
-  return "Reads " + extensions_with(FormatCapability::Read) + ".\nWrites " + extensions_with(FormatCapability::Write) +
+  return readable_files() + "Writes " + extensions_with(FormatCapability::Write) +
          ".\n"
-         "Existing models and worlds are overwritten only with --force. Inputs are never overwritten.\n"
+         "Voxel files (.vox, .qb, .json, .quoin, ...) are overwritten only with --force, meshes (.glb, .obj, ...) "
+         "without asking, inputs never.\n"
          "NAME.gltf comes with NAME.bin; NAME.obj with NAME.mtl, NAME_palette.png, and NAME_emissive.png and "
          "NAME_atlas.png if needed. These replace files with the same names. Smooth meshes keep their colours in the "
          "vertices and need none of them.\n"
          ".json and .quoin keep all grids, types, rotations and scales. Only .vox keeps animation and notes; from .vox "
          "to .vox nothing is lost, and --frame writes one frame.\n"
-         "Triangle meshes are converted to voxels first, at their own size in the world, even if OUT is a mesh.\n"
+         "Triangle meshes are always voxelized first: converting a.obj to a.glb writes a voxel mesh of the same size.\n"
          ".stl and .3mf are closed manifold meshes in millimetres, for 3D printing. Volumes in millimetres are "
          "written in metres to glTF, in millimetres to other mesh formats.\n"
          "Example: quoin convert castle.vox castle.glb\n"
@@ -819,7 +822,7 @@ std::string read_options(const CLI::App& command, const std::vector<std::filesys
 }  // namespace
 
 void add_convert_command(CLI::App& app, int& status) {
-  CLI::App* command = app.add_subcommand("convert", "Convert a file to the format of the extension of OUT");
+  CLI::App* command = app.add_subcommand("convert", "Convert a file; the extension of OUT selects the format");
   const auto options = std::make_shared<ConvertOptions>();
   const auto many = std::make_shared<ManyOptions>();
   const auto rest = std::make_shared<std::vector<std::filesystem::path>>();

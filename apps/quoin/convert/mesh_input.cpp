@@ -38,7 +38,7 @@ void add_mesh_input_options(CLI::App& command, MeshLoadOptions& options) {
           "Maximum number of colours, 1 to 65535; similar colours are merged (default: as many as OUT can hold)")
       ->check(CLI::Range(1, 65'535));
   add_choice<UpAxis>(command, "--input-up", {{"y", UpAxis::Y}, {"z", UpAxis::Z}}, options.up,
-                     "Up axis of the input: y or z (default y; z for .stl and .ply)");
+                     "Up axis of the input: y or z (default y; z for .ply, .stl and .3mf)");
 }
 
 std::vector<OptionRule> mesh_input_rules() {

@@ -165,7 +165,8 @@ void add_path_options(CLI::App& command, PathArguments& arguments) {
   const auto set_ground = [&arguments](std::int64_t sign) { arguments.ground = sign > 0; };
   command
       .add_flag_function("--ground,!--no-ground", set_ground,
-                         "Place the scene on level ground; with --transparent the ground only catches shadows")
+                         "Place the scene on level ground; with --transparent the ground only catches shadows. "
+                         "--no-ground leaves out the ground that the file sets")
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
   command.add_flag("--transparent", arguments.is_transparent, "Write alpha instead of a background");
   add_parsed(command, "--lens-radius", "X", number_from_0(), arguments.lens_radius,

@@ -499,8 +499,8 @@ void add_render_command(CLI::App& app, int& status) {
   CLI::App* command = app.add_subcommand("render", "Render an image with sun, shadows and ambient occlusion");
   const auto arguments = std::make_shared<RenderArguments>();
   add_render_options(*command, *arguments);
-  command->footer("Reads " + extensions_with(FormatCapability::Read) +
-                  ".\nPositions are in world units, +Y up, as printed by quoin info.\n"
+  command->footer(readable_files() +
+                  "Positions are in world units, +Y up, as printed by quoin info.\n"
                   "Example: quoin render castle.vox -o castle.png --view iso --samples 16\n"
                   "Example: quoin render castle.vox -o gate.png --camera 30,60,160 --look-at 0,30,0 --fov 40\n"
                   "Example: quoin render castle.vox -o round.png --turntable 36 --elevation 20\n"

@@ -218,9 +218,9 @@ void add_light_options(CLI::App& command, RenderArguments& arguments) {
       command, "--light",
       {{"rays", LightChoice::Rays}, {"path", LightChoice::Path}, {"propagated", LightChoice::Propagated}},
       arguments.light,
-      "Light model (default rays). rays: hard shadows and occlusion rays. path: path tracing with all "
-      "bounces, soft shadows, gloss and refraction, which takes minutes. propagated: light levels that "
-      "spread from the sky and from glowing voxels, as in block games, without sun shadows");
+      "Light model (default rays). rays: hard shadows and occlusion rays. path: path tracing with indirect "
+      "light, soft shadows, gloss and refraction; takes minutes. propagated: light levels that spread from "
+      "the sky and from emissive voxels, as in block games, without sun shadows");
   add_choice<Preset>(command, "--preset", kPresets, arguments.preset,
                      "Shading (default full): full, no-shadows, no-ao, unlit (colours, times occlusion with --ao), ao "
                      "(occlusion only, grey), or density (a slice through fields and volumes)");
@@ -228,13 +228,14 @@ void add_light_options(CLI::App& command, RenderArguments& arguments) {
   command
       .add_option(
           "--lamps", light.max_lamps,
-          "Maximum number of lamps and glowing voxels that light a surface, 0 to 1024 (default 64). With 0 they "
-          "only glow themselves")
+          "Maximum number of lamps and emissive voxels that light a surface, 0 to 1024 (default 64). With 0, emissive "
+          "voxels light only themselves")
       ->check(CLI::Range(0, 1024));
   add_parsed(command, "--lamp-brightness", "X", number_from_0(), light.lamp_brightness,
-             "Brightness factor of the lamps (default 1)");
+             "Factor on the light that lamps and emissive voxels cast; their own appearance does not change "
+             "(default 1)");
   add_parsed(command, "--emission-scale", "X", number_from_0(), arguments.emission_scale,
-             "Brightness factor of glowing voxels (default 1)");
+             "Factor on voxel emission: appearance and light cast (default 1)");
   add_parsed<ExposureArgument>(
       command, "--exposure", "X|auto", {read_exposure, number_from_0().must_be + ", or auto"},
       [&arguments](const ExposureArgument& exposure) {
@@ -242,8 +243,8 @@ void add_light_options(CLI::App& command, RenderArguments& arguments) {
         arguments.is_exposure_automatic = !exposure.factor;
         if (exposure.factor) arguments.render.light.exposure = *exposure.factor;
       },
-      "Brightness factor of all light (default 1; 1.3 with --light path, 2 with --sky physical), or auto with --light "
-      "path, measured on the first image");
+      "Brightness factor of lit surfaces, with --light path also of the background (default 1; 1.3 with --light path, "
+      "2 with --sky physical), or auto with --light path, measured on the first image");
   add_parsed(command, "--shadow-distance", "VOXELS", number_from_0(), light.shadow_distance_voxels,
              "Maximum length of shadows (default: unlimited)");
   add_parsed(command, "--least-light", "X", number_from_0(), light.least_light,
@@ -286,8 +287,10 @@ void add_detail_options(CLI::App& command, RenderArguments& arguments) {
 
 void add_backend_options(CLI::App& command, RenderArguments& arguments) {
   set_heading(command, heading::kDevice);
-  add_choice<Backend>(command, "--backend", {{"cpu", Backend::Cpu}, {"vulkan", Backend::Vulkan}}, arguments.backend,
-                      "Renderer: cpu or vulkan. Their images differ in a few pixels at most (default cpu)");
+  add_choice<Backend>(
+      command, "--backend", {{"cpu", Backend::Cpu}, {"vulkan", Backend::Vulkan}}, arguments.backend,
+      "Renderer: cpu or vulkan. Their images differ by at most 2 of 255, except in fewer than 1 in 1,000 "
+      "pixels (default cpu)");
   const auto named = [](const std::string& text) { return text.empty() ? std::nullopt : std::optional(text); };
   add_parsed<std::string>(command, "--device", "NAME|N", {named, "a number or a name"}, arguments.device,
                           "Vulkan device: its number or a part of its name (default: the best)");
