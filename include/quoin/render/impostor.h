@@ -89,12 +89,12 @@ class Impostor {
   [[nodiscard]] const ContentSphere& content() const { return content_; }
   /// Returns the smallest box of the grid around the opaque voxels and the opaque part of the field.
   [[nodiscard]] const IBox& bounds() const { return box_; }
-  /// Returns true if the impostor has no face: the grid has no opaque surface, or is_left_to_rays() is true.
+  /// Returns true if the impostor has no face: the grid has no opaque surface, or must_be_traced() is true.
   [[nodiscard]] bool empty() const { return box_.empty(); }
   /// Returns true if the impostor is empty because the grid must be traced instead. This is the case for a field with
   /// more faces than texels, and for a field with more than a quarter of its surface on features at most three samples
   /// thick, because tangent planes show thin features badly.
-  [[nodiscard]] bool is_left_to_rays() const { return is_left_to_rays_; }
+  [[nodiscard]] bool must_be_traced() const { return must_be_traced_; }
   /// Returns the bytes held, including bytes shared with copies.
   [[nodiscard]] std::size_t bytes() const;
 
@@ -108,7 +108,7 @@ class Impostor {
   ImpostorOptions options_;
   ContentSphere content_;
   IBox box_;
-  bool is_left_to_rays_ = false;
+  bool must_be_traced_ = false;
   std::shared_ptr<const ImpostorFaces> faces_;
 };
 

@@ -145,7 +145,7 @@ TEST(Surfels, AnEditMakesThemAnew) {
 TEST(Surfels, TracesModelsThatAreTooLargeOrThin) {
   EXPECT_FALSE(surfels_of(field_of(Model::SmoothBall), 100).has_value());
   const ImpostorWorld rods(Model::SmoothRods);
-  EXPECT_TRUE(rods.impostor.is_left_to_rays());
+  EXPECT_TRUE(rods.impostor.must_be_traced());
   const Camera near = orbiting(rods, 0.7, 0.4, 0.2, 100.0, 120);
   RenderOptions in_detail = sized(120, 120);
   const RenderedImage traced = taken(rods.scene, near, in_detail);
@@ -157,7 +157,7 @@ TEST(Surfels, TracesModelsThatAreTooLargeOrThin) {
   wide.field.add_box({-500, -6, -500}, {500, 6, 500}, type);
   ImpostorOptions smallest;
   smallest.edge = 16;
-  EXPECT_TRUE(Impostor::build(wide, scene.types, smallest).is_left_to_rays());
+  EXPECT_TRUE(Impostor::build(wide, scene.types, smallest).must_be_traced());
   scene.add_instance({"", scene.add_grid(std::move(wide))});
   RenderOptions options = sized(64, 64);
   options.detail.impostor_edge = 16;
