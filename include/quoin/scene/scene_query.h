@@ -28,8 +28,8 @@ enum class QueryTypes : std::uint8_t {
 /// The treatment of unloaded chunks (Grid::make_partial), whose content is unknown. In a partial field, the space
 /// between a loaded and an unloaded sample is also unknown.
 enum class UnloadedChunks : std::uint8_t {
-  Passed,  ///< air
-  Met,     ///< solid; hits report `is_unloaded`
+  Ignore,  ///< treats unloaded chunks as air
+  Block,   ///< treats unloaded chunks as solid; hits report `is_unloaded`
 };
 
 /// Restricts a query; by default it covers the whole scene.
@@ -38,7 +38,7 @@ struct QueryFilter {
   std::span<const InstanceHandle> ignored = {};    ///< instances to skip: a moving body ignores itself
   std::uint32_t categories = ~std::uint32_t{0};    ///< skips instances that have none of these bits
   std::optional<QueryTypes> types = std::nullopt;  ///< default: All for rays, Colliding for shapes
-  /// The default is Passed for rays, whose hits report `unloaded_t`, and Met for shapes, so that bodies do not fall
+  /// The default is Ignore for rays, whose hits report `unloaded_t`, and Block for shapes, so that bodies do not fall
   /// through ground that is still loading.
   std::optional<UnloadedChunks> unloaded = std::nullopt;
 };
@@ -57,7 +57,7 @@ struct SceneHit {
   bool starts_inside = false;
   bool in_field = false;
   DVec3 normal{0.0};  ///< unit normal in world space, pointing out of the solid; 0 if a field has no gradient
-  /// True for a hit on an unloaded chunk (UnloadedChunks::Met): `voxel` is the chunk's first voxel, `type` is air.
+  /// True for a hit on an unloaded chunk (UnloadedChunks::Block): `voxel` is the chunk's first voxel, `type` is air.
   bool is_unloaded = false;
   /// Ray distance of the first entry into unloaded space, before `t`. Unknown content may stop the ray there.
   /// Infinite if it does not enter any.
@@ -71,7 +71,7 @@ struct SceneHit {
 ///
 /// Precision: the ray is transformed into each grid in double, so at 10^9 from the origin a hit is as exact as the ray.
 /// Filters:   excluded voxels and instances count as air; a ray that starts inside them starts in air.
-/// Partial:   with UnloadedChunks::Met, a hit is certain or reports the entry into unloaded space, and a miss
+/// Partial:   with UnloadedChunks::Block, a hit is certain or reports the entry into unloaded space, and a miss
 ///            means that the ray stays in loaded chunks. Costs a look-up per chunk on the ray.
 /// Cost:      O(log instances + grids on the ray). For grids with excluded types, also O(such voxels, and field cells,
 ///            on the ray).
@@ -103,7 +103,7 @@ struct SceneOverlap {
   VoxelType type = kAir;  ///< for a field, the material of the nearest sample with a matching material
   bool in_field = false;
   DVec3 normal{0.0};  ///< for a field, its unit gradient at a point inside the shape, in world space; otherwise 0
-  /// True for an unloaded chunk (UnloadedChunks::Met): `voxel` is its first voxel, `type` is air.
+  /// True for an unloaded chunk (UnloadedChunks::Block): `voxel` is its first voxel, `type` is air.
   bool is_unloaded = false;
 };
 

@@ -40,7 +40,7 @@ struct SweepHit {
 ///          stops before the solid or touching it, less than 1e-5 voxels away, for any densities; less than 1e-6 voxels
 ///          deep counts as touching. If 4,000 cell parts cannot decide (a large box almost flush with an uneven
 ///          surface), the box stops at the first undecided part, up to one part's size away.
-/// Partial: unloaded chunks stop the box, unless `filter` sets UnloadedChunks::Passed.
+/// Partial: unloaded chunks stop the box, unless `filter` sets UnloadedChunks::Ignore.
 /// Inside:  in a field's solid, `normal` is the gradient at the deepest point of the box, and `depth` leads out of all
 ///          of that field's solid around the box. If the gradient does not lead out within about the box's size, the
 ///          grid axis with the shortest way out replaces it. If no axis does, `depth` is one voxel.

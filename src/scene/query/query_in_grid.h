@@ -94,8 +94,8 @@ class Seen {
   Seen(const SceneTracer& tracer, const QueryFilter& filter, QueryTypes by_default)
       : types(tracer.scene().types, filter.types.value_or(by_default)),
         meets_unloaded(filter.unloaded.value_or(by_default == QueryTypes::Colliding
-                                                    ? UnloadedChunks::Met
-                                                    : UnloadedChunks::Passed) == UnloadedChunks::Met),
+                                                    ? UnloadedChunks::Block
+                                                    : UnloadedChunks::Ignore) == UnloadedChunks::Block),
         tracer_(tracer),
         filter_(filter) {}
 

@@ -44,10 +44,10 @@ struct PartialScene {
 };
 
 QueryFilter met() {
-  return {.unloaded = UnloadedChunks::Met};
+  return {.unloaded = UnloadedChunks::Block};
 }
 QueryFilter passed() {
-  return {.unloaded = UnloadedChunks::Passed};
+  return {.unloaded = UnloadedChunks::Ignore};
 }
 const OrientedBox kBody{DVec3(32.0, 10.0, 32.0), DVec3(0.4, 0.9, 0.4)};
 
@@ -92,7 +92,8 @@ TEST(UnloadedRays, AMissIsCertainOnlyWhereAllIsLoaded) {
   EXPECT_EQ(end->face, Direction::NegX);
   EXPECT_EQ(end->normal, DVec3(-1.0, 0.0, 0.0));
   EXPECT_TRUE(any_hit(tracer, level, kInfinity, met()));
-  EXPECT_FALSE(first_hit(tracer, level, kInfinity, {.ignored = {&world.instance, 1}, .unloaded = UnloadedChunks::Met}));
+  EXPECT_FALSE(
+      first_hit(tracer, level, kInfinity, {.ignored = {&world.instance, 1}, .unloaded = UnloadedChunks::Block}));
 }
 
 TEST(UnloadedRays, WholeGridsHaveNoUnloadedChunks) {
