@@ -292,7 +292,7 @@ Result<Outcome> convert_by_chunks(const ConvertOptions& options) {
   if (auto done = add_thumbnail(**source, options); !done) return done.error();
   outcome.warnings = (*source)->info().warnings;
   for (const std::string& line : imported->broken) outcome.warnings.push_back("left out: " + line);
-  if (!imported->invisible.empty()) outcome.warnings.push_back(text_of_invisible(imported->invisible));
+  if (!imported->skipped_blocks.empty()) outcome.warnings.push_back(text_of_skipped_blocks(imported->skipped_blocks));
   if (!imported->guessed.empty()) {
     std::string names;
     for (const std::string& name : imported->guessed) names += (names.empty() ? "" : ", ") + name;

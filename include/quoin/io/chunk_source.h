@@ -39,16 +39,16 @@ struct ChunkSourceInfo {
 
 /// A chunk in the source's voxel types.
 struct SourceChunk {
-  IVec3 place{0};  ///< chunk coordinates, as in Grid::find_chunk
+  IVec3 chunk{0};  ///< chunk coordinates, as in Grid::find_chunk
   Chunk voxels{kAir};
 };
 
 /// The content of one part.
 struct SourcePart {
-  std::vector<SourceChunk> chunks;                   ///< by y, without chunks that are all air
-  std::vector<Error> broken{};                       ///< unreadable items that were skipped, with file and byte offset
-  std::map<std::string, std::uint64_t> invisible{};  ///< number of voxels read as air, by block name
-  std::vector<Lamp> lamps{};                         ///< lights without geometry, in voxels of the source's grid
+  std::vector<SourceChunk> chunks;  ///< by y, without chunks that are all air
+  std::vector<Error> broken{};      ///< unreadable items that were skipped, with file and byte offset
+  std::map<std::string, std::uint64_t> skipped_blocks{};  ///< number of voxels read as air, by block name
+  std::vector<Lamp> lamps{};                              ///< lights without geometry, in voxels of the source's grid
 };
 
 /// A world that is read chunk by chunk and never held whole: a folder of region files, a database, a large model.
@@ -56,7 +56,7 @@ struct SourcePart {
 ///   auto source = quoin::open_chunk_source("saves/New World");
 ///   for (std::size_t i = 0; i < (*source)->parts().size(); ++i) {
 ///     auto part = (*source)->read_part(i);             // from any thread
-///     for (auto& [place, voxels] : part->chunks) ...   // of types in (*source)->types()
+///     for (auto& [chunk, voxels] : part->chunks) ...   // of types in (*source)->types()
 ///   }
 ///
 /// Space:   one grid, right-handed with y upwards; chunks of 64^3 voxels, as everywhere.
@@ -131,8 +131,8 @@ class SourceTypes {
 [[nodiscard]] Result<std::unique_ptr<ChunkSource>> open_chunk_source(const std::filesystem::path& path,
                                                                      std::string_view dimension = {});
 
-/// Returns a warning that lists the named blocks read as air (SourcePart::invisible); empty if there are none.
-[[nodiscard]] std::string text_of_invisible(const std::map<std::string, std::uint64_t>& invisible);
+/// Returns a warning that lists the named blocks read as air (SourcePart::skipped_blocks); empty if there are none.
+[[nodiscard]] std::string text_of_skipped_blocks(const std::map<std::string, std::uint64_t>& blocks);
 
 /// Loads the chunks in a box of chunk coordinates into a scene with one grid and one instance. Adds warnings for broken
 /// items and for content outside the box.

@@ -15,13 +15,13 @@ namespace quoin {
 
 /// The result of importing a world.
 struct ImportedWorld {
-  std::uint64_t bytes = 0;                         ///< file size
-  std::uint64_t chunks = 0;                        ///< number of written chunks, including earlier runs
-  std::uint64_t voxels = 0;                        ///< number of voxels in these chunks
-  std::size_t resumed_parts = 0;                   ///< parts of the source that an earlier run had imported
-  std::vector<std::string> broken;                 ///< unreadable items that were skipped, one line each
-  std::vector<std::string> guessed;                ///< names of types whose appearance is a guess
-  std::map<std::string, std::uint64_t> invisible;  ///< SourcePart::invisible, summed over all parts
+  std::uint64_t bytes = 0;                              ///< file size
+  std::uint64_t chunks = 0;                             ///< number of written chunks, including earlier runs
+  std::uint64_t voxels = 0;                             ///< number of voxels in these chunks
+  std::size_t resumed_parts = 0;                        ///< parts of the source that an earlier run had imported
+  std::vector<std::string> broken;                      ///< unreadable items that were skipped, one line each
+  std::vector<std::string> guessed;                     ///< names of types whose appearance is a guess
+  std::map<std::string, std::uint64_t> skipped_blocks;  ///< SourcePart::skipped_blocks, summed over all parts
 };
 
 /// Imports a whole source into a world on disk, part by part, without holding it in memory.

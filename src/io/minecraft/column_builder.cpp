@@ -105,7 +105,7 @@ void ColumnBuilder::count_invisible(const Section& section, IVec3 corner) {
 void ColumnBuilder::take_invisible(SourcePart& part) {
   for (std::size_t number = 1; number < invisible_.size(); ++number) {
     if (invisible_[number] == 0) continue;
-    part.invisible[types_.invisible_name(static_cast<std::uint16_t>(number))] += invisible_[number];
+    part.skipped_blocks[types_.invisible_name(static_cast<std::uint16_t>(number))] += invisible_[number];
   }
   std::ranges::move(lamps_, std::back_inserter(part.lamps));
   invisible_.clear();

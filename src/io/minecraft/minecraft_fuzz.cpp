@@ -22,8 +22,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const auto part = (*source)->read_part(i);
     if (!part) continue;
     const quoin::VoxelRegistry types = (*source)->types();
-    for (const quoin::SourceChunk& chunk : part->chunks) {
-      const bool is_sound = (*source)->parts()[i].contains(chunk.place) && chunk.voxels.types().back() < types.size();
+    for (const quoin::SourceChunk& each : part->chunks) {
+      const bool is_sound = (*source)->parts()[i].contains(each.chunk) && each.voxels.types().back() < types.size();
       if (is_sound) continue;
       std::fprintf(stderr, "a chunk outside of its part, or of types that there are not\n");
       std::abort();

@@ -190,7 +190,8 @@ TEST(MinecraftSource, CountsInvisibleBlocksAndMakesLampsOfLight) {
   ASSERT_TRUE(part);
   EXPECT_TRUE(part->chunks.empty());
   EXPECT_TRUE(part->broken.empty());
-  EXPECT_EQ(part->invisible, (std::map<std::string, std::uint64_t>{{"minecraft:barrier", 2}, {"minecraft:light", 1}}));
+  EXPECT_EQ(part->skipped_blocks,
+            (std::map<std::string, std::uint64_t>{{"minecraft:barrier", 2}, {"minecraft:light", 1}}));
   ASSERT_EQ(part->lamps.size(), 1U);
   EXPECT_EQ(part->lamps[0].position, DVec3(17.5, 32.5, 0.5));
   EXPECT_EQ(part->lamps[0].range, 5.0);

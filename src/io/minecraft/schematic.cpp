@@ -598,7 +598,7 @@ Status SchematicReader::fill(const Region& region, int first_y, std::span<const 
 void SchematicReader::take_invisible(const Region& region) {
   SourcePart part;
   builder_.take_invisible(part);
-  for (const auto& [name, count] : part.invisible) invisible_[name] += count;
+  for (const auto& [name, count] : part.skipped_blocks) invisible_[name] += count;
   for (Lamp& lamp : part.lamps) {
     lamp.position += DVec3(region.min);
     loaded_.scene.lamps.push_back(std::move(lamp));
@@ -640,7 +640,7 @@ Status SchematicReader::put(const Region& region) {
     if (auto filled = fill(region, y, layers); !filled) return filled;
     const bool is_chunk_done = (y + height) % kChunkEdge == 0 || y + height == region.size.y;
     if (!is_chunk_done) continue;
-    for (SourceChunk& chunk : builder_.take()) grid.grid.put_chunk(chunk.place, std::move(chunk.voxels));
+    for (SourceChunk& each : builder_.take()) grid.grid.put_chunk(each.chunk, std::move(each.voxels));
     if (cancelled(y + height)) return make_error(ErrorCode::Cancelled, "cancelled");
   }
   take_invisible(region);
@@ -659,7 +659,7 @@ void SchematicReader::note_left_out() {
   };
   note(block_entities_, "block entities (chests, signs and others)");
   note(entities_, "entities");
-  if (!invisible_.empty()) loaded_.warnings.push_back(text_of_invisible(invisible_));
+  if (!invisible_.empty()) loaded_.warnings.push_back(text_of_skipped_blocks(invisible_));
   if (has_lost_biomes_) {
     loaded_.warnings.emplace_back("left out: damaged biomes; plains colours are used there");
   }

@@ -73,7 +73,7 @@ Result<std::optional<Chunk>> ChunkSource::read(IVec3 chunk, std::vector<Error>* 
   const auto part = part_of(chunk);
   if (!part) return std::optional<Chunk>();
   const auto chunk_in = [&](const std::vector<SourceChunk>& chunks) -> std::optional<Chunk> {
-    const auto found = std::ranges::find(chunks, chunk, &SourceChunk::place);
+    const auto found = std::ranges::find(chunks, chunk, &SourceChunk::chunk);
     return found == chunks.end() ? std::nullopt : std::optional(found->voxels);
   };
   std::unique_lock lock(cache_->mutex);

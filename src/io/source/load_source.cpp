@@ -80,9 +80,9 @@ Result<std::vector<SourcePart>> read_parts(const ChunkSource& source, const IBox
 
 }  // namespace
 
-std::string text_of_invisible(const std::map<std::string, std::uint64_t>& invisible) {
+std::string text_of_skipped_blocks(const std::map<std::string, std::uint64_t>& blocks) {
   std::string names;
-  for (const auto& [name, count] : invisible) {
+  for (const auto& [name, count] : blocks) {
     names += (names.empty() ? "" : ", ") + with_thousands(static_cast<std::int64_t>(count)) + " " + name;
   }
   return names.empty() ? names : "left out, since they are invisible: " + names;
@@ -98,15 +98,15 @@ Result<LoadedScene> load_source(const ChunkSource& source, const IBox& chunks, T
   SceneGrid grid;
   grid.name = source.info().name;
   std::vector<Error> broken = source.info().broken;
-  std::map<std::string, std::uint64_t> invisible;
+  std::map<std::string, std::uint64_t> skipped_blocks;
   for (SourcePart& part : *parts) {
-    for (SourceChunk& chunk : part.chunks) {
-      if (!chunks.contains(chunk.place)) continue;
-      if (auto done = types.renumber(chunk.voxels, loaded.scene.types); !done) return done.error();
-      grid.grid.put_chunk(chunk.place, std::move(chunk.voxels));
+    for (SourceChunk& each : part.chunks) {
+      if (!chunks.contains(each.chunk)) continue;
+      if (auto done = types.renumber(each.voxels, loaded.scene.types); !done) return done.error();
+      grid.grid.put_chunk(each.chunk, std::move(each.voxels));
     }
     std::ranges::move(part.broken, std::back_inserter(broken));
-    for (const auto& [name, count] : part.invisible) invisible[name] += count;
+    for (const auto& [name, count] : part.skipped_blocks) skipped_blocks[name] += count;
     for (Lamp& lamp : part.lamps) {
       if (!chunks.contains(chunk_of(voxel_of(lamp.position)))) continue;
       lamp.position *= source.info().spacing;
@@ -116,7 +116,7 @@ Result<LoadedScene> load_source(const ChunkSource& source, const IBox& chunks, T
   }
   loaded.warnings = source.info().warnings;
   add_lines(broken, loaded.warnings);
-  if (!invisible.empty()) loaded.warnings.push_back(text_of_invisible(invisible));
+  if (!skipped_blocks.empty()) loaded.warnings.push_back(text_of_skipped_blocks(skipped_blocks));
   warn_of_outside(source, chunks, parts->size(), loaded.warnings);
   loaded.dimension = source.info().dimension;
   loaded.dimensions = source.info().dimensions;

@@ -125,7 +125,7 @@ class Import {
     result.voxels = done_.voxels;
     result.resumed_parts = resumed_;
     result.broken = std::move(done_.broken);
-    result.invisible = std::move(done_.invisible);
+    result.skipped_blocks = std::move(done_.invisible);
     if (done_.broken_count > kMaxLines) {
       result.broken.push_back("and " + std::to_string(done_.broken_count - kMaxLines) + " more");
     }
@@ -209,13 +209,13 @@ class Import {
     WorldChanges changes;
     for (std::optional<Result<SourcePart>>& part : read) {
       if (!*part) return part->error();
-      for (SourceChunk& chunk : (*part)->chunks) {
-        if (auto numbered = numbers_.renumber(chunk.voxels, types_); !numbered) return numbered;
+      for (SourceChunk& each : (*part)->chunks) {
+        if (auto numbered = numbers_.renumber(each.voxels, types_); !numbered) return numbered;
         ++done_.chunks;
-        done_.voxels += static_cast<std::uint64_t>(chunk.voxels.non_air_count());
+        done_.voxels += static_cast<std::uint64_t>(each.voxels.non_air_count());
         StoredChunk stored;
-        stored.voxels = std::move(chunk.voxels);
-        changes.put_chunk({grid_, 0, chunk.place}, std::move(stored));
+        stored.voxels = std::move(each.voxels);
+        changes.put_chunk({grid_, 0, each.chunk}, std::move(stored));
       }
       for (const Error& error : (*part)->broken) done_.add_broken(error);
       take_invisible(**part, changes);
@@ -227,7 +227,7 @@ class Import {
   }
 
   void take_invisible(SourcePart& part, WorldChanges& changes) {
-    for (const auto& [name, count] : part.invisible) done_.invisible[name] += count;
+    for (const auto& [name, count] : part.skipped_blocks) done_.invisible[name] += count;
     for (Lamp& lamp : part.lamps) {
       lamp.position *= source_.info().spacing;
       lamp.range *= source_.info().spacing;

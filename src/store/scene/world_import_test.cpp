@@ -75,7 +75,7 @@ TEST_F(WorldImport, KeepsTheLampsOfLightBlocks) {
   const auto source = open();
   const auto imported = import_world(*source, folder / "out.quoin");
   ASSERT_TRUE(imported) << to_string(imported.error());
-  EXPECT_EQ(imported->invisible, (std::map<std::string, std::uint64_t>{{"minecraft:light", 4096}}));
+  EXPECT_EQ(imported->skipped_blocks, (std::map<std::string, std::uint64_t>{{"minecraft:light", 4096}}));
   const Scene scene = scene_of(folder / "out.quoin");
   ASSERT_EQ(scene.lamps.size(), 4096U);
   EXPECT_EQ(scene.lamps.front().position, DVec3(20 * 512 + 0.5, 0.5, 20 * 512 + 0.5));
