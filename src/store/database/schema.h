@@ -83,6 +83,8 @@ struct Part {
 
 /// Maximum number of a part: far more parts than possible, and safe to increment.
 inline constexpr std::int64_t kMaxPartNumber = std::int64_t{1} << 53;
+/// Maximum number of a grid. Leaves one number above it.
+inline constexpr std::int64_t kMaxGridNumber = 0xFFFF'FFFE;
 
 /// Kinds of parts.
 namespace part {

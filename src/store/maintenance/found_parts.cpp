@@ -48,9 +48,7 @@ FoundParts::FoundParts() {
 
 void FoundParts::take(const Part& part) {
   if (part.key.kind == part::kWorld) return;  // belongs to the damaged file
-  const bool is_named = std::holds_alternative<std::string>(part.key.id);
-  if ((!is_named && (number_of(part.key) < 0 || number_of(part.key) > kMaxPartNumber)) ||
-      !check_part(part.key, part.body)) {
+  if (!check_part(part.key, part.body)) {
     lost_.push_back(name_of(part.key) + " is not valid");
     return;
   }

@@ -1,5 +1,6 @@
 #include <quoin/store/world_maintenance.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <fstream>
 #include <set>
@@ -11,6 +12,8 @@
 #include <quoin/store/world_saver.h>
 
 #include "store/database/connection.h"
+#include "store/database/schema.h"
+#include "store/world/part_text.h"
 #include "store/world/world_for_tests.h"
 
 namespace quoin {
@@ -194,6 +197,49 @@ TEST(WorldMaintenance, LostTypesShow) {
   EXPECT_EQ((*types)[1].colour, (Rgba8{255, 0, 255, 255}));
   EXPECT_EQ((*types)[2], coloured_type(2));
   EXPECT_EQ(sound_chunks(folder / "m.quoin"), std::size_t{kChunks});
+}
+
+/// Adds a part with a correct checksum, as no save would.
+void put_part(const std::filesystem::path& path, const store::PartKey& key, std::string_view text) {
+  auto connection = store::Connection::open(path.string(), store::Connection::Mode::Write);
+  ASSERT_TRUE(connection) << to_string(connection.error());
+  auto insert = connection->prepare("INSERT INTO parts(kind, id, revision, sum, body) VALUES(?, ?, 1, ?, ?)");
+  ASSERT_TRUE(insert) << to_string(insert.error());
+  const std::vector<std::byte> body = store::body_of(text);
+  insert->bind(0, std::string_view(key.kind));
+  store::bind(*insert, 1, key.id);
+  insert->bind(2, static_cast<std::int64_t>(store::sum_of({key, 1, body})));
+  insert->bind(3, std::span<const std::byte>(body));
+  ASSERT_TRUE(insert->run());
+}
+
+TEST(WorldMaintenance, RepairLeavesOutPartsWithInvalidNumbers) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  make_world(path);
+  const std::vector<store::PartKey> invalid = {
+      {store::part::kType, std::int64_t{0}},       {store::part::kType, std::int64_t{65'536}},
+      {store::part::kType, std::int64_t{1} << 52}, {store::part::kType, std::string("stone")},
+      {store::part::kGrid, std::int64_t{-1}},      {store::part::kGrid, std::int64_t{0xFFFF'FFFF}},
+      {store::part::kGrid, std::int64_t{1} << 32},
+  };
+  for (const store::PartKey& key : invalid) {
+    put_part(path, key,
+             key.kind == store::part::kType ? store::text_of(coloured_type(7)) : store::text_of(WorldGrid{}));
+  }
+  const auto check = check_world(path);
+  ASSERT_TRUE(check) << to_string(check.error());
+  EXPECT_EQ(check->damage.size(), invalid.size());
+  const auto repair = repair_world(path, folder / "m.quoin");
+  ASSERT_TRUE(repair) << to_string(repair.error());
+  ASSERT_EQ(repair->check.damage.size(), invalid.size());
+  for (const store::PartKey& key : invalid) {
+    const std::string line = store::name_of(key) + " is not valid";
+    EXPECT_EQ(std::ranges::count(repair->check.damage, line, &WorldDamage::what), 1) << line;
+  }
+  EXPECT_EQ(WorldStore::open(folder / "m.quoin", WorldAccess::Read)->types()->size(), 10U);
+  EXPECT_EQ(sound_chunks(folder / "m.quoin"), std::size_t{kChunks});
+  EXPECT_TRUE(check_world(folder / "m.quoin")->damage.empty());
 }
 
 TEST(WorldMaintenance, NothingIsRepairedOfNothing) {

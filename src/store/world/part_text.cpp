@@ -179,6 +179,20 @@ Status check_as(std::span<const std::byte> body, const std::string& name) {
   return {};
 }
 
+// Checks that parts of the kind can have the number.
+Status check_number(const PartKey& key) {
+  const auto* const number = std::get_if<std::int64_t>(&key.id);
+  const bool is_type = key.kind == part::kType;
+  const bool is_grid = key.kind == part::kGrid;
+  const std::int64_t least = is_type ? 1 : 0;
+  const std::int64_t most = is_type   ? static_cast<std::int64_t>(kMaxVoxelTypes)
+                            : is_grid ? kMaxGridNumber
+                                      : kMaxPartNumber;
+  const bool is_valid = number != nullptr ? *number >= least && *number <= most : !is_type && !is_grid;
+  if (!is_valid) return make_error(ErrorCode::InvalidArgument, name_of(key) + " has an invalid number");
+  return {};
+}
+
 Status check_thumbnail(std::span<const std::byte> body, const std::string& name) {
   constexpr std::size_t kMaxBytes = std::size_t{16} << 20;
   constexpr std::array<std::uint8_t, 8> kPng = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n'};
@@ -194,6 +208,7 @@ Status check_thumbnail(std::span<const std::byte> body, const std::string& name)
 
 Status check_part(const PartKey& key, std::span<const std::byte> body) {
   const std::string name = name_of(key);
+  if (auto numbered = check_number(key); !numbered) return numbered;
   if (key.kind == part::kType) return check_as<VoxelProperties>(body, name);
   if (key.kind == part::kGrid) return check_as<WorldGrid>(body, name);
   if (key.kind == part::kInstance) return check_as<SceneFile::Placement>(body, name);

@@ -32,7 +32,8 @@ namespace quoin::store {
 template <class T>
 [[nodiscard]] Result<T> part_from(std::span<const std::byte> text, const std::string& name);
 
-/// Checks that a scene part can be read again; parts of other kinds may have any content.
+/// Checks that parts of the kind can have the number, and that a scene part can be read again. Parts of other kinds may
+/// have any content.
 /// Errors: InvalidArgument.
 [[nodiscard]] Status check_part(const PartKey& key, std::span<const std::byte> body);
 

@@ -12,8 +12,6 @@ namespace quoin::store {
 
 namespace {
 
-// Leaves one number above it.
-constexpr std::int64_t kMaxGrid = 0xFFFF'FFFE;
 constexpr std::size_t kMaxValueBytes = std::size_t{64} << 20;
 
 // Adds types up to a number, with placeholders for lost types in between.
@@ -27,7 +25,7 @@ Status fill_types(VoxelRegistry& types, std::int64_t number, std::vector<std::st
 }
 
 Status put_type(VoxelRegistry& types, std::int64_t number, const VoxelProperties& properties) {
-  QUOIN_ASSERT(number >= 0 && number <= static_cast<std::int64_t>(types.size()), "a known type, or the next one");
+  QUOIN_ASSERT(number >= 1 && number <= static_cast<std::int64_t>(types.size()), "a known type, or the next one");
   if (number == static_cast<std::int64_t>(types.size())) {
     const auto added = types.add(properties);
     return added ? Status() : Status(added.error());
@@ -90,6 +88,7 @@ Result<WorldRules> WorldRules::after(const ChangeSet& changes) const {
     if (key.kind == part::kType && body && number != nullptr) {
       const auto type = part_from<VoxelProperties>(*body, name_of(key));
       if (!type) return make_error(ErrorCode::InvalidArgument, type.error().message);
+      if (*number < 1) return make_error(ErrorCode::InvalidArgument, name_of(key) + ": number out of range");
       if (*number > static_cast<std::int64_t>(rules.types.size())) {
         return make_error(ErrorCode::InvalidArgument, name_of(key) + " must not be put before lower numbers");
       }
@@ -100,7 +99,7 @@ Result<WorldRules> WorldRules::after(const ChangeSet& changes) const {
       if (auto done = put_type(rules.types, *number, *type); !done) return done.error();
     }
     if (key.kind == part::kGrid && number != nullptr) {
-      if (*number < 0 || *number > kMaxGrid)
+      if (*number < 0 || *number > kMaxGridNumber)
         return make_error(ErrorCode::InvalidArgument, name_of(key) + ": number out of range");
       const auto grid_number = static_cast<std::uint32_t>(*number);
       if (!body) {
@@ -136,7 +135,7 @@ Result<WorldRules> read_rules(WorldReader& reader) {
   if (!types) return types.error();
   const Status grids = reader.each_part(part::kGrid, [&](const Part& part, bool is_sound) {
     const auto* const number = std::get_if<std::int64_t>(&part.key.id);
-    if (number == nullptr || *number < 0 || *number > kMaxGrid) {
+    if (number == nullptr || *number < 0 || *number > kMaxGridNumber) {
       rules.damage.push_back(name_of(part.key) + " has an invalid number");
       return;
     }
