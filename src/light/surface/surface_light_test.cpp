@@ -14,6 +14,7 @@
 #include <quoin/mesh/blocky.h>
 #include <quoin/mesh/smooth_mesh.h>
 
+#include "light/surface/levels.h"
 #include "light/surface/light_world_for_tests.h"
 
 namespace quoin {
@@ -293,6 +294,25 @@ TEST(SurfaceLight, AClosedRoomIsBlackWhateverShinesOutside) {
         ASSERT_EQ(surface.face(wall, opposite), FaceLight{});
       }
     }
+  }
+}
+
+// Passes light above the plane y = 0, and at x = 1 in it; levels grow with x.
+struct OpaquePlane {
+  static bool passes(IVec3 voxel) { return voxel.y > 0 || voxel.x == 1; }
+  static std::uint16_t word(IVec3 voxel) { return static_cast<std::uint16_t>(0x4321 + 2 * voxel.x); }
+};
+
+TEST(SurfaceLight, IsFiniteAtCentresOfOpaqueVoxels) {
+  OpaquePlane voxels;
+  for (const double z : {0.0, 0.25}) {
+    MeanLevels levels;
+    ASSERT_TRUE(light_around(voxels, {0.0, 0.0, z}, levels));
+    // Four voxels have x = 1 and two have x = 0.
+    EXPECT_NEAR(levels.sky, 1.0 + 2.0 * 4.0 / 6.0, 1e-5);
+    EXPECT_FLOAT_EQ(levels.red, 2.0F);
+    EXPECT_FLOAT_EQ(levels.green, 3.0F);
+    EXPECT_FLOAT_EQ(levels.blue, 4.0F);
   }
 }
 

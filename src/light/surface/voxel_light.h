@@ -145,10 +145,11 @@ struct VoxelsAround {
   }
 }
 
-/// Computes the light at a point in front of a surface. Returns false if all eight voxels around are opaque.
+/// Computes the light at a point in front of a surface. Returns false if all eight voxels around are opaque. Voxels that
+/// pass light have equal shares if the point is the centre of an opaque voxel, or between the centres of several.
 template <class Voxels>
 [[nodiscard]] bool light_around(Voxels& voxels, DVec3 point, MeanLevels& out) {
-  const VoxelsAround around(point);
+  VoxelsAround around(point);
   std::uint32_t passing = 0;
   std::size_t nearest = 8;
   for (std::size_t i = 0; i < 8; ++i) {
@@ -157,6 +158,7 @@ template <class Voxels>
     if (nearest == 8 || around.nearness[i] > around.nearness[nearest]) nearest = i;
   }
   if (nearest == 8) return false;
+  if (around.nearness[nearest] == 0.0F) around.nearness.fill(1.0F);
   const std::uint32_t counted = connected_of_eight(1U << nearest, passing);
   std::array<float, 4> sum{};
   float all = 0.0F;

@@ -90,7 +90,7 @@ vec4 levels_on_face(ivec3 cell, uint face, vec3 inside, int level, int grid) {
 }
 
 // Averages the eight voxels around a point (integer coordinates at voxel centres, relative to `base`), restricted to
-// voxels reachable from the nearest one that passes light.
+// voxels reachable from the nearest one that passes light. If that has no share, all shares are equal.
 bool levels_around(ivec3 base, vec3 point, int grid, out vec4 mean) {
   mean = vec4(0.0);
   vec3 low = floor(point);
@@ -108,6 +108,9 @@ bool levels_around(ivec3 base, vec3 point, int grid, out vec4 mean) {
     if (nearest < 0 || nearness[i] > nearness[nearest]) nearest = i;
   }
   if (nearest < 0) return false;
+  if (nearness[nearest] == 0.0) {
+    for (int i = 0; i < 8; ++i) nearness[i] = 1.0;
+  }
   uint counted = 1u << nearest;
   for (int i = 0; i < 7; ++i) {
     uint moved = (counted & 0x55) << 1 | (counted & 0xAA) >> 1 | (counted & 0x33) << 2 | (counted & 0xCC) >> 2 |
