@@ -112,7 +112,10 @@ struct LevelRange {
 
 class ChunkLevels {
  public:
-  explicit ChunkLevels(const std::array<std::uint8_t, 27>& levels) : levels_(levels) {}
+  /// `levels`: as in SmoothOptions, clamped in the same way.
+  explicit ChunkLevels(const std::array<std::uint8_t, 27>& levels) : levels_(levels) {
+    for (std::uint8_t& level : levels_) level = std::min<std::uint8_t>(level, kMaxSmoothLevel);
+  }
 
   [[nodiscard]] int of_chunk(IVec3 chunk) const {
     QUOIN_ASSERT((IBox{IVec3(-1), IVec3(2)}.contains(chunk)), "the chunk or one of its 26 neighbours");

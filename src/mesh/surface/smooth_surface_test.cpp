@@ -12,6 +12,7 @@
 
 #include "mesh/smooth/smooth_oracle.h"
 #include "mesh/smooth/surface_check_for_tests.h"
+#include "mesh/surface/faces.h"
 
 namespace quoin {
 namespace {
@@ -72,6 +73,26 @@ TEST(SmoothMesh, IsTheMeshOfTheFieldInOnePiece) {
       ASSERT_EQ(mesh.normals[v], normal);
       ASSERT_EQ(mesh.occlusion[v], occlusion);
     }
+  }
+}
+
+TEST(SmoothMesh, MaterialsClampLevelsAsTheMesherDoes) {
+  const DensityGrid grid = grid_of({{0, 0, 0}, {64, 64, 64}}, oracle::waves(3, 25.0));
+  const DensityNeighbourhood chunks = grid.neighbourhood({0, 0, 0});
+  const SurfaceMaterials materials{VoxelRegistry()};
+  SmoothOptions coarsest;
+  coarsest.levels.fill(kMaxSmoothLevel);
+  SmoothOptions high;
+  high.levels.fill(200);
+  SmoothChunkMesh mesh;
+  SmoothMesher().mesh(chunks, high, mesh);
+  ASSERT_FALSE(mesh.cells.empty());
+  const auto of_coarsest = smooth::materials_of(chunks, coarsest, materials, mesh);
+  const auto of_high = smooth::materials_of(chunks, high, materials, mesh);
+  ASSERT_EQ(of_high.size(), of_coarsest.size());
+  for (std::size_t i = 0; i < of_high.size(); ++i) {
+    ASSERT_EQ(of_high[i].type, of_coarsest[i].type);
+    ASSERT_EQ(of_high[i].albedo, of_coarsest[i].albedo);
   }
 }
 
