@@ -27,7 +27,8 @@ std::tuple<int, int, int> order_of(IVec3 place) {
 
 }  // namespace
 
-/// The most recently read parts. If several threads need a part, the first reads it and the others wait.
+/// The most recently read parts. If several threads need a part, the first reads it and the others wait. If that fails,
+/// the next thread reads it.
 struct ChunkSource::Cache {
   struct Entry {
     bool is_read = false;
@@ -40,6 +41,21 @@ struct ChunkSource::Cache {
   std::unordered_map<std::size_t, Entry> entries;  // by part
   std::size_t bytes = 0;
   std::uint64_t uses = 0;
+
+  /// Wakes the waiting threads when a thread stops reading a part. If the part is not read, also after an exception,
+  /// the next of them reads it.
+  struct Attempt {
+    Cache& cache;
+    std::size_t part;
+    const Entry& entry;
+    std::unique_lock<std::mutex>& lock;
+
+    ~Attempt() {
+      if (!lock.owns_lock()) lock.lock();
+      if (!entry.is_read) cache.entries.erase(part);
+      cache.was_read.notify_all();
+    }
+  };
 
   // Keeps the entry that was used last.
   void keep_within_limit() {
@@ -85,6 +101,7 @@ Result<std::optional<Chunk>> ChunkSource::read(IVec3 chunk, std::vector<Error>* 
     cache_->was_read.wait(lock);
   }
   Cache::Entry& entry = cache_->entries[*part];  // stays in place while others come and go
+  const Cache::Attempt attempt{*cache_, *part, entry, lock};
   lock.unlock();
   Result<SourcePart> content = [&]() -> Result<SourcePart> {
     try {
@@ -93,12 +110,8 @@ Result<std::optional<Chunk>> ChunkSource::read(IVec3 chunk, std::vector<Error>* 
       return make_error(ErrorCode::LimitExceeded, "not enough memory");
     }
   }();
+  if (!content) return content.error();
   lock.lock();
-  cache_->was_read.notify_all();
-  if (!content) {
-    cache_->entries.erase(*part);
-    return content.error();
-  }
   entry.is_read = true;
   entry.last_use = ++cache_->uses;
   entry.chunks = std::move(content->chunks);

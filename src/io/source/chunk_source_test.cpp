@@ -2,6 +2,8 @@
 
 #include <atomic>
 #include <random>
+#include <stdexcept>
+#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -72,6 +74,52 @@ TEST(ChunkSource, KeepsPartsThatAreUsedAgain) {
     read_row(source, x, x + 1);
   }
   EXPECT_EQ(source.reads(), kParts);
+}
+
+// Fails `failures` times before it reads its only part: the first time by an exception, then by an error.
+class FailingSource final : public ChunkSource {
+ public:
+  explicit FailingSource(int failures) : ChunkSource({}, row_of_parts(1)), failures_(failures) {}
+
+  VoxelRegistry types() const override { return {}; }
+  Result<SourcePart> read_part(std::size_t part) const override {
+    const int read = reads_++;
+    if (read == 0) throw std::runtime_error("no disk");
+    if (read < failures_) return make_error(ErrorCode::CannotRead, "no disk");
+    return SourcePart{{{parts()[part].min, Chunk(VoxelType{1})}}};
+  }
+  int reads() const { return reads_; }
+
+ private:
+  int failures_;
+  mutable std::atomic<int> reads_{0};
+};
+
+TEST(ChunkSource, ReadsAPartAgainAfterAnException) {
+  const FailingSource source(2);
+  EXPECT_THROW(static_cast<void>(source.read({0, 0, 0})), std::runtime_error);
+  EXPECT_FALSE(source.read({0, 0, 0}));
+  EXPECT_TRUE(source.read({0, 0, 0}));
+  EXPECT_EQ(source.reads(), 3);
+}
+
+TEST(ChunkSource, WaitingThreadsReadAPartAfterAnException) {
+  constexpr int kFailures = 3;
+  const FailingSource source(kFailures);
+  std::atomic<int> failed{0};
+  std::vector<std::thread> threads;
+  for (int i = 0; i < 8; ++i) {
+    threads.emplace_back([&] {
+      try {
+        if (!source.read({0, 0, 0})) ++failed;
+      } catch (const std::runtime_error&) {
+        ++failed;
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(failed, kFailures);
+  EXPECT_EQ(source.reads(), kFailures + 1);
 }
 
 TEST(ChunkSource, ReadsAPartOnceForManyThreads) {
