@@ -185,6 +185,7 @@ IBox narrowed(const LongBox& box) {
     narrow.min[axis] = static_cast<int>(box.min[static_cast<std::size_t>(axis)]);
     narrow.max[axis] = static_cast<int>(box.max[static_cast<std::size_t>(axis)]);
   }
+  QUOIN_ASSERT(box_from(narrow).min == box.min && box_from(narrow).max == box.max, "a box in the int32 range");
   return narrow;
 }
 
@@ -311,8 +312,8 @@ class BoxCopy {
     if (const Chunk* const present = to_.find_chunk(at); present != nullptr && present->data_count() != 0) {
       present->for_each_data([&](IVec3 local, const VoxelData&) {
         const IVec3 voxel = at * kChunkEdge + local;
-        const bool arrives = options_.copy_air || mapped(from_.get(source_of(voxel))) != kAir;
-        if (place.contains(voxel) && arrives) gone.push_back(voxel);
+        if (!place.contains(voxel)) return;  // its source may lie outside the int32 range
+        if (options_.copy_air || mapped(from_.get(source_of(voxel))) != kAir) gone.push_back(voxel);
       });
     }
     for (const IVec3 voxel : gone) to_.set_data(voxel, {});

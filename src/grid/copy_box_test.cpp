@@ -187,6 +187,22 @@ TEST(CopyBox, VisitsOnlyExistingChunksOfAlmostEmptyWorlds) {
   EXPECT_EQ(mirrored.get(-1'000'001, -2'000'000, 5), 3);
 }
 
+TEST(CopyBox, KeepsDataWhoseSourceIsOutsideTheWorld) {
+  constexpr int kLast = std::numeric_limits<int>::max();
+  Grid from;
+  from.set(0, 0, 0, 1);
+  CopyOptions solid;
+  solid.copy_air = false;
+  for (const int first : {kLast - 7, -kLast}) {
+    Grid to;
+    const IVec3 voxel{first > 0 ? 63 : 0, 0, 0};
+    to.set(voxel, 1);
+    ASSERT_TRUE(to.set_data(voxel, {5, {}}));
+    EXPECT_EQ(copy_box(from, {{first, 0, 0}, {first + 4, 1, 1}}, to, {20, 0, 0}, {}, solid), 0);
+    EXPECT_EQ(to.data(voxel).state, 5U);
+  }
+}
+
 TEST(CopyBox, SkipsVoxelsOutsideTheWorld) {
   Grid from;
   from.fill_box({{0, 0, 0}, {10, 10, 10}}, 1);
