@@ -1,6 +1,7 @@
 #include "io/vdb/vdb.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <random>
 #include <string>
@@ -182,6 +183,22 @@ TEST(Vdb, ReportsLosses) {
   EXPECT_NE(losses->front().find("types"), std::string::npos);
   EXPECT_EQ(detect_format(path).value(), FileFormat::Vdb);
   fs::remove(path);
+}
+
+TEST(Vdb, LeavesOutInstancesWithInvalidTransforms) {
+  Scene scene = some_scene();
+  const auto expected = write_vdb(scene);
+  ASSERT_TRUE(expected);
+  EXPECT_EQ(vdb_unsupported_features(scene).size(), 1U);
+  const GridHandle grid = scene.grids().handles().front();
+  scene.add_instance({.name = "flat", .grid = grid, .voxel_size = 0.0});
+  scene.add_instance({.name = "lost", .grid = grid, .position = {std::nan(""), 0.0, 0.0}});
+  const auto bytes = write_vdb(scene);
+  ASSERT_TRUE(bytes);
+  EXPECT_EQ(*bytes, *expected);
+  const auto losses = vdb_unsupported_features(scene);
+  ASSERT_EQ(losses.size(), 2U);
+  EXPECT_EQ(losses.back(), "instances without a valid placement left out, not supported by .vdb: 2");
 }
 
 /// Reads bytes that may be damaged; errors must state a position.

@@ -316,7 +316,7 @@ class SceneWriter {
     for (const InstanceHandle handle : scene.instances().handles()) {
       const Instance& instance = scene.instances()[handle];
       const SceneGrid* const grid = scene.grids().find(instance.grid);
-      if (grid == nullptr) continue;
+      if (grid == nullptr || !has_valid_transform(instance)) continue;
       if (grid->field.chunk_count() > 0) wanted_.push_back({&instance, grid, true});
       if (grid->grid.chunk_count() > 0) wanted_.push_back({&instance, grid, false});
     }
@@ -423,6 +423,14 @@ std::vector<std::string> vdb_unsupported_features(const Scene& scene) {
   }
   if (with_data > 0) {
     lines.push_back("voxels whose data is left out, not supported by .vdb: " + std::to_string(with_data));
+  }
+  std::int64_t without_place = 0;
+  scene.instances().for_each([&](InstanceHandle, const Instance& instance) {
+    if (scene.grids().find(instance.grid) != nullptr && !has_valid_transform(instance)) ++without_place;
+  });
+  if (without_place > 0) {
+    lines.push_back("instances without a valid placement left out, not supported by .vdb: " +
+                    std::to_string(without_place));
   }
   if (!scene.groups().handles().empty() || !scene.layers().handles().empty()) {
     lines.emplace_back("left out: groups and layers");
