@@ -127,6 +127,35 @@ TEST(GltfLook, LeavesOutImagesThatEndBeyondTheirBuffer) {
   }
 }
 
+TEST(GltfLook, ReadsATextureOnceDespiteMissingIndices) {
+  if (!can(FileFormat::Gltf, FormatCapability::Read)) GTEST_SKIP() << "the build reads no glTF";
+  const std::string textured = R"({"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}})";
+  const std::string missing = R"({"extensions":{"KHR_materials_pbrSpecularGlossiness":{"diffuseTexture":{}}}})";
+  const std::string image = image_of({{255, 0, 0, 255}});
+  const auto mesh = read_mesh(text_bytes(square_gltf(textured + "," + missing + "," + textured, {image})));
+  ASSERT_TRUE(mesh) << to_string(mesh.error());
+  EXPECT_EQ(mesh->mesh.textures.size(), 1U);
+  ASSERT_EQ(mesh->mesh.materials.size(), 3U);
+  EXPECT_EQ(mesh->mesh.materials[2].texture, 0U);
+}
+
+TEST(GltfLook, LeavesOutWebpSourcesOutOfRange) {
+  if (!can(FileFormat::Gltf, FormatCapability::Read)) GTEST_SKIP() << "the build reads no glTF";
+  for (const std::string source : {"1e300", "-1e300", "4294967296", "-7"}) {
+    std::string gltf =
+        square_gltf(R"({"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}})", {image_of({{255, 0, 0, 255}})});
+    const std::string texture = R"("source":0})";
+    ASSERT_NE(gltf.find(texture), std::string::npos);
+    gltf.replace(gltf.find(texture), texture.size(),
+                 R"("source":0,"extensions":{"EXT_texture_webp":{"source":)" + source + "}}}");
+    const auto mesh = read_mesh(text_bytes(gltf));
+    ASSERT_TRUE(mesh) << source << ": " << to_string(mesh.error());
+    EXPECT_TRUE(mesh->mesh.textures.empty()) << source;
+    ASSERT_EQ(mesh->warnings.size(), 1U) << source;
+    EXPECT_EQ(mesh->warnings[0], "left out: the texture texture 0, whose image does not exist");
+  }
+}
+
 TEST(GltfLook, ReadsSpecularGlossiness) {
   if (!can(FileFormat::Gltf, FormatCapability::Read)) GTEST_SKIP() << "the build reads no glTF";
   const std::string material = R"({"extensions":{"KHR_materials_pbrSpecularGlossiness":{"diffuseFactor":[1,0.5,1,1],)"

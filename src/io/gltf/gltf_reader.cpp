@@ -263,6 +263,11 @@ double number_in(const tinygltf::Value& object, const char* key, double otherwis
   return object.Get(key).GetNumberAsDouble();
 }
 
+/// Returns an index; -1, or one that is too large for any list, if the number is out of range.
+int index_in(const tinygltf::Value& object, const char* key, int otherwise) {
+  return static_cast<int>(std::clamp(number_in(object, key, otherwise), -1.0, 1e9));
+}
+
 glm::vec2 pair_in(const tinygltf::Value& object, const char* key, glm::vec2 otherwise) {
   if (!object.IsObject() || !object.Has(key) || !object.Get(key).IsArray() || object.Get(key).ArrayLen() < 2)
     return otherwise;
@@ -374,11 +379,8 @@ class GltfReader {
   }
   static tinygltf::TextureInfo info_of(const tinygltf::Value& from) {
     tinygltf::TextureInfo info;
-    const auto whole = [&](const char* key, int otherwise) {
-      return static_cast<int>(std::clamp(number_in(from, key, otherwise), -1.0, 1e9));
-    };
-    info.index = whole("index", -1);
-    info.texCoord = whole("texCoord", 0);
+    info.index = index_in(from, "index", -1);
+    info.texCoord = index_in(from, "texCoord", 0);
     if (from.Has("extensions") && from.Get("extensions").Has("KHR_texture_transform")) {
       info.extensions["KHR_texture_transform"] = from.Get("extensions").Get("KHR_texture_transform");
     }
@@ -427,21 +429,21 @@ class GltfReader {
     return wrap == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? TextureWrap::Mirror : TextureWrap::Repeat;
   }
   std::optional<std::size_t> texture_of(int index) {
-    if (static_cast<std::size_t>(index) >= known_textures_.size()) {
-      known_textures_.resize(std::min(model_.textures.size(), static_cast<std::size_t>(index) + 1));
-      asked_textures_.resize(known_textures_.size());
-    }
     const tinygltf::Texture* const texture = entry(model_.textures, index);
     if (texture == nullptr) {
       loaded_.warnings.push_back("left out: texture " + std::to_string(index) + ", which does not exist");
       return std::nullopt;
     }
     const auto at = static_cast<std::size_t>(index);
+    if (at >= known_textures_.size()) {
+      known_textures_.resize(at + 1);
+      asked_textures_.resize(at + 1);
+    }
     if (asked_textures_[at]) return known_textures_[at];
     asked_textures_[at] = true;
     int source = texture->source;
     const auto webp = texture->extensions.find("EXT_texture_webp");
-    if (webp != texture->extensions.end()) source = static_cast<int>(number_in(webp->second, "source", source));
+    if (webp != texture->extensions.end()) source = index_in(webp->second, "source", source);
     const tinygltf::Image* const image = entry(model_.images, source);
     const std::string name = image == nullptr      ? "texture " + std::to_string(index)
                              : !image->uri.empty() ? image->uri
