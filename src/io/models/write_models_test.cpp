@@ -373,6 +373,20 @@ TEST(PlacedGrids, HalvesOfVoxelsAllGoTheSameWay) {
   EXPECT_EQ(warnings.size(), 1U);
 }
 
+TEST(WriteModels, RejectsTypesThatAreNotRegistered) {
+  Scene scene = two_models();
+  const GridHandle grid = scene.grids().handles().front();
+  scene.edit(grid).grid.set(1, 1, 1, 9);
+  scene.edit(grid).grid.set(2, 1, 1, 65'535);
+  for (const FileFormat format : {FileFormat::Goxel, FileFormat::Qubicle, FileFormat::Voxlap, FileFormat::Schematic,
+                                  FileFormat::Binvox, FileFormat::Nifti}) {
+    const auto file = encoded(format, scene);
+    ASSERT_FALSE(file) << driver_of(format).info.name();
+    EXPECT_EQ(file.error().code, ErrorCode::InvalidArgument);
+    EXPECT_EQ(file.error().message, "the instance \"first\" has voxels of type 9, which is not registered");
+  }
+}
+
 TEST(WriteModels, VolumesHoldTypesOrDensities) {
   const Scene scene = two_models();
   const auto file = encoded(FileFormat::Nifti, scene);

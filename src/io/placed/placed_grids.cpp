@@ -45,6 +45,15 @@ std::string text_of(const Instance& instance, const SceneGrid& grid) {
   return text.append(printable(instance.name.empty() ? grid.name : instance.name)).append("\"");
 }
 
+/// Returns an error that names the lowest type without properties, if the voxels have one.
+Status check_types(const Grid& voxels, const VoxelRegistry& types, const std::string& owner) {
+  const std::vector<VoxelType> used = voxels.types();
+  const auto unknown = std::ranges::find_if(used, [&](VoxelType type) { return type >= types.size(); });
+  if (unknown == used.end()) return {};
+  return make_error(ErrorCode::InvalidArgument,
+                    owner + " has voxels of type " + std::to_string(*unknown) + ", which is not registered");
+}
+
 /// Counts the content that a format cannot store.
 class Losses {
  public:
@@ -58,14 +67,15 @@ class Losses {
   std::int64_t nameless = 0;
   std::int64_t turned_states = 0;
 
-  /// Counts a grid of the file. Requires: its types belong to the scene that `Losses` was made for.
+  /// Counts a grid of the file. Requires: its types are registered in the scene.
   void count(const PlacedGrid& grid, bool is_turned) {
     ++placed_;
     const std::int64_t states = grid.voxels.data_count();
     states_ += states;
     if (is_turned) turned_states += states;
     for (const VoxelType type : grid.voxels.types()) {
-      if (type < used_.size()) used_[type] = true;
+      QUOIN_ASSERT(type < used_.size(), "a registered type");
+      used_[type] = true;
     }
   }
 
@@ -212,6 +222,7 @@ class Placer {
     const IVec3 min(nearest);
     placed.box = {min, min + size};
     copy_box(grid.grid, box, placed.voxels, min, *orientation);
+    if (auto known = check_types(placed.voxels, scene_.types, text_of(instance, grid)); !known) return known;
     if (!placed.name.empty()) ++losses_.nameless;
     losses_.count(placed, *orientation != AxisOrientation());
     take_(std::move(placed));

@@ -48,7 +48,7 @@ struct PlacedGrids {
 /// causes a warning.
 ///
 /// Errors: Unsupported for density fields, rotations that are not multiples of 90 degrees, and voxels of different
-/// sizes; LimitExceeded for positions beyond 2^26 voxels.
+/// sizes; LimitExceeded for positions beyond 2^26 voxels; InvalidArgument for voxels whose type is not registered.
 [[nodiscard]] Result<PlacedGrids> place_grids(const Scene& scene, const FormatHolds& holds);
 
 /// The same, merged into one grid; the last grid wins where several have a voxel. Memory: all grids, and one rotated
