@@ -200,6 +200,10 @@ Result<Motion> GraphRevision::place(const Instance& instance, const GridPlan& pl
   if (!translation) {
     return make_error(ErrorCode::LimitExceeded, instance_text(instance) + " is too far from the origin for .vox");
   }
+  for (std::size_t piece = 0; piece < plan.pieces.size(); ++piece) {
+    if (has_32_bits(from_first_piece(plan, piece).translation)) continue;
+    return make_error(ErrorCode::LimitExceeded, instance_text(instance) + " is too wide for .vox");
+  }
   if (!is_exact) ++out_.rounded;
   const bool is_far = std::ranges::any_of(plan.pieces, [&](const auto& piece) {
     return is_beyond_magica(world_from_grid(instance, scene_.grids()[plan.grid], pivot_of(piece)));

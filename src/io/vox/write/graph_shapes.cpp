@@ -123,8 +123,12 @@ Status GraphRevision::add_frames(NodeContent transform, NodeContent shape, const
   const Motion box = from_source_box(plan, static_cast<std::size_t>(source_.frame));
   const auto is_one = [](const Frame& frame) { return frame.plan != nullptr && frame.plan->pieces.size() == 1; };
   std::vector<Frame> frames = frames_about(motion_of(transform.frames.front()) * box);
-  if (!std::ranges::all_of(frames, [](const Frame& frame) { return has_32_bits(frame.first.translation); })) {
+  const auto check_range = [&](const Motion& motion) -> Status {
+    if (has_32_bits(motion.translation)) return {};
     return make_error(ErrorCode::LimitExceeded, "\"" + name + "\" is too far from the origin for .vox");
+  };
+  for (const Frame& frame : frames) {
+    if (auto fits = check_range(frame.first); !fits) return fits;
   }
   if (std::ranges::all_of(frames, [&](const Frame& frame) { return frame.plan == nullptr || is_one(frame); })) {
     show_frames(frames, transform, shape);
@@ -134,14 +138,18 @@ Status GraphRevision::add_frames(NodeContent transform, NodeContent shape, const
     return {};
   }
   frames = frames_about(box);
+  for (const Frame& frame : frames) {
+    if (auto fits = check_range(frame.first); !fits) return fits;
+  }
   out_.added.push_back(std::move(transform));
   const std::size_t group = out_.added.size();
   out_.added.push_back(group_of(shape.id));
   for (std::size_t i = 0; i < frames.size(); ++i) {
     if (frames[i].plan == nullptr || is_one(frames[i])) continue;
     for (std::size_t piece = 0; piece < frames[i].plan->pieces.size(); ++piece) {
-      hang_piece(group, name, *frames[i].plan, piece, frames[i].first * from_first_piece(*frames[i].plan, piece), i,
-                 frames.size());
+      const Motion motion = frames[i].first * from_first_piece(*frames[i].plan, piece);
+      if (auto fits = check_range(motion); !fits) return fits;
+      hang_piece(group, name, *frames[i].plan, piece, motion, i, frames.size());
     }
   }
   if (std::ranges::none_of(frames, is_one)) return {};

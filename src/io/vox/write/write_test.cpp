@@ -280,6 +280,21 @@ TEST(VoxWrite, MoreThan255TypesAreRefused) {
   EXPECT_EQ(written.error().message, "the scene uses 256 voxel types, more than the 255 of a .vox file");
 }
 
+TEST(VoxWrite, RefusesGridsWiderThanOffsets) {
+  Scene scene = scene_with_types(1);
+  SceneGrid grid;
+  grid.grid.set({-1'500'000'000, 0, 0}, 1);
+  grid.grid.set({0, 0, 0}, 1);
+  const GridHandle handle = scene.add_grid(std::move(grid));
+  scene.add_instance({"wide", handle});
+  EXPECT_TRUE(write_vox(scene));
+  scene.edit(handle).grid.set({1'500'000'000, 0, 0}, 1);
+  const auto written = write_vox(scene);
+  ASSERT_FALSE(written);
+  EXPECT_EQ(written.error().code, ErrorCode::LimitExceeded);
+  EXPECT_EQ(written.error().message, "instance \"wide\" is too wide for .vox");
+}
+
 TEST(VoxWrite, RefusesScenesThatVoxCannotHold) {
   Scene scene = scene_with_types(1);
   SceneGrid grid;
