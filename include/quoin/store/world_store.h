@@ -150,8 +150,9 @@ class WorldStore {
   /// failure; the callback must not call `wait` or `flush`. A failed save stays in memory, where `load_chunk` finds it,
   /// and is retried with the next save or `flush`.
   /// Errors:   InvalidArgument, and nothing is saved, for types with fewer state bits than before; chunks with types or
-  ///           grids that were never stored; per-voxel data with more state bits than its type or more than 64 MiB in
-  ///           one chunk; a value above 64 MiB; a thumbnail that is not a PNG.
+  ///           grids that were never stored; chunks more than 2^26 chunks from the origin; per-voxel data with more
+  ///           state bits than its type or more than 64 MiB in one chunk; a value above 64 MiB; a thumbnail that is not
+  ///           a PNG.
   /// Requires: open for writing.
   Result<SaveTicket> save(WorldChanges changes, std::function<void(const Status&)> on_saved = {});
   /// Waits until a save is on disk. Errors: CannotWrite (disk full, ...); the save is not on disk but stays in memory.

@@ -137,6 +137,10 @@ class Check {
         return RowVerdict::Damaged;
       }
       const ChunkAddress place{region->second.grid, region->second.level, chunk_of_key(region->second, key)};
+      if (const Status listed = check_address(place); !listed) {
+        check_.damage.push_back({place, listed.error().message});
+        return RowVerdict::Damaged;
+      }
       const auto grid = rules_.grids.find(place.grid);
       const float band = grid == rules_.grids.end() ? WorldGrid{}.band : grid->second.band;
       const auto chunk = decoder_.decode(place, body, ChunkLimits{&rules_.types, band});

@@ -11,6 +11,7 @@
 #include <quoin/io/formats.h>
 #include <quoin/store/world_saver.h>
 
+#include "store/chunk/chunk_body.h"
 #include "store/database/connection.h"
 #include "store/database/schema.h"
 #include "store/world/part_text.h"
@@ -238,6 +239,48 @@ TEST(WorldMaintenance, RepairLeavesOutPartsWithInvalidNumbers) {
     EXPECT_EQ(std::ranges::count(repair->check.damage, line, &WorldDamage::what), 1) << line;
   }
   EXPECT_EQ(WorldStore::open(folder / "m.quoin", WorldAccess::Read)->types()->size(), 10U);
+  EXPECT_EQ(sound_chunks(folder / "m.quoin"), std::size_t{kChunks});
+  EXPECT_TRUE(check_world(folder / "m.quoin")->damage.empty());
+}
+
+/// Adds a chunk with a correct checksum, as no save would.
+void put_chunk(const std::filesystem::path& path, std::int64_t region, const ChunkAddress& place) {
+  auto connection = store::Connection::open(path.string(), store::Connection::Mode::Write);
+  ASSERT_TRUE(connection) << to_string(connection.error());
+  auto put_region = connection->prepare("INSERT INTO regions(id, grid, level, x, y, z) VALUES(?, ?, 0, ?, ?, ?)");
+  auto put_body = connection->prepare("INSERT INTO chunks(key, body) VALUES(?, ?)");
+  ASSERT_TRUE(put_region && put_body);
+  put_region->bind(0, region);
+  put_region->bind(1, std::int64_t{place.grid});
+  for (int axis = 0; axis < 3; ++axis) {
+    put_region->bind(2 + axis, std::int64_t{store::region_of(place).region[axis]});
+  }
+  ASSERT_TRUE(put_region->run());
+  std::vector<std::byte> body;
+  ASSERT_TRUE(store::ChunkEncoder().encode(place, 1, Chunk(VoxelType{1}), nullptr, body));
+  put_body->bind(0, store::key_of(region, place.chunk));
+  put_body->bind(1, std::span<const std::byte>(body));
+  ASSERT_TRUE(put_body->run());
+}
+
+TEST(WorldMaintenance, RepairLeavesOutChunksWithInvalidAddresses) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  make_world(path);
+  const ChunkAddress far{0, 0, {1 << 27, 0, 0}};
+  const ChunkAddress of_no_grid{0xFFFF'FFFF, 0, {0, 0, 0}};
+  put_chunk(path, 900, far);
+  put_chunk(path, 901, of_no_grid);
+  const auto check = check_world(path);
+  ASSERT_TRUE(check) << to_string(check.error());
+  const auto repair = repair_world(path, folder / "m.quoin");
+  ASSERT_TRUE(repair) << to_string(repair.error());
+  for (const std::vector<WorldDamage>& damage : {check->damage, repair->check.damage}) {
+    ASSERT_EQ(damage.size(), 2U);
+    EXPECT_EQ(damage[0].what, "chunk (134217728, 0, 0) of grid 0 lies more than 2^26 chunks from the origin");
+    EXPECT_EQ(damage[0].chunk, far);
+    EXPECT_EQ(damage[1].chunk, of_no_grid);
+  }
   EXPECT_EQ(sound_chunks(folder / "m.quoin"), std::size_t{kChunks});
   EXPECT_TRUE(check_world(folder / "m.quoin")->damage.empty());
 }

@@ -149,6 +149,11 @@ class Repair {
   Status take(const ChunkBodyHeader& header, std::span<const std::byte> body, Output& output) {
     auto& newest = revisions_[header.place];
     if (newest > header.revision) return {};
+    if (const Status listed = check_address(header.place); !listed) {
+      if (newest == 0) check_.damage.push_back({header.place, listed.error().message});
+      newest = std::max<std::uint64_t>(header.revision, 1);
+      return {};
+    }
     auto chunk = decoder_.decode(header.place, body, ChunkLimits{&parts_.any_types(), parts_.band(header.place.grid)});
     if (!chunk) {
       report(about(header.place) + ": " + chunk.error().message);

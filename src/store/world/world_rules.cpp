@@ -149,9 +149,20 @@ Result<WorldRules> read_rules(WorldReader& reader) {
   return rules;
 }
 
+Status check_address(const ChunkAddress& place) {
+  if (place.grid > kMaxGridNumber) {
+    return make_error(ErrorCode::InvalidArgument, about(place) + ": the grid's number is out of range");
+  }
+  if (!kAllChunks.contains(place.chunk)) {
+    return make_error(ErrorCode::InvalidArgument, about(place) + " lies more than 2^26 chunks from the origin");
+  }
+  return {};
+}
+
 Status check_changes(const ChangeSet& changes, const WorldRules& rules) {
   for (const auto& [place, chunk] : changes.chunks) {
     if (!chunk) continue;
+    if (auto done = check_address(place); !done) return done;
     const auto grid = rules.grids.find(place.grid);
     if (grid == rules.grids.end()) {
       return make_error(ErrorCode::InvalidArgument, about(place) + ": the grid is not defined");

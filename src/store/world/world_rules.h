@@ -33,6 +33,9 @@ struct WorldRules {
 [[nodiscard]] VoxelProperties lost_type(std::int64_t number);
 /// Returns a text such as "chunk (1, 2, 3) of grid 0".
 [[nodiscard]] std::string about(const ChunkAddress& place);
+/// Checks that a world can list the chunk. Errors: InvalidArgument for coordinates outside kAllChunks, or a grid number
+/// above kMaxGridNumber.
+[[nodiscard]] Status check_address(const ChunkAddress& place);
 /// Checks changes as documented for WorldStore::save.
 [[nodiscard]] Status check_changes(const ChangeSet& changes, const WorldRules& rules);
 

@@ -2,6 +2,7 @@
 
 #include <sys/stat.h>
 
+#include <climits>
 #include <fstream>
 #include <stdexcept>
 #include <string>
@@ -176,6 +177,9 @@ TEST(WorldStore, SaveRejectsUnreadableChanges) {
   };
   EXPECT_EQ(refused([](auto& c) { c.put_chunk({0, 0, {}}, {Chunk(77)}); }), ErrorCode::InvalidArgument);
   EXPECT_EQ(refused([](auto& c) { c.put_chunk({5, 0, {}}, {Chunk(1)}); }), ErrorCode::InvalidArgument);
+  for (const IVec3 chunk : {IVec3(1 << 26, 0, 0), IVec3(0, -(1 << 26) - 1, 0), IVec3(0, 0, INT_MIN)}) {
+    EXPECT_EQ(refused([&](auto& c) { c.put_chunk({0, 0, chunk}, {Chunk(1)}); }), ErrorCode::InvalidArgument);
+  }
   EXPECT_EQ(refused([](auto& c) { c.put_type(33, {}); }), ErrorCode::InvalidArgument);
   EXPECT_EQ(refused([](auto& c) { c.put_grid(1, {.pivot = DVec3(std::nan(""))}); }), ErrorCode::InvalidArgument);
   EXPECT_EQ(refused([](auto& c) { c.put_value("x", std::vector<std::byte>((64U << 20) + 1)); }),
@@ -185,6 +189,17 @@ TEST(WorldStore, SaveRejectsUnreadableChanges) {
   EXPECT_EQ(refused([&](auto& c) { c.put_chunk({0, 0, {}}, {chunk}); }), ErrorCode::InvalidArgument);
   EXPECT_TRUE(world.chunks(0, 0)->empty());
   EXPECT_EQ(world.grids()->size(), 1U);
+}
+
+TEST(WorldStore, ListsChunksAtItsLimits) {
+  const WorldFolder folder;
+  WorldStore world = made(folder / "w.quoin");
+  const std::vector<IVec3> ends = {IVec3(-(1 << 26)), IVec3((1 << 26) - 1)};
+  WorldChanges changes;
+  for (const IVec3 chunk : ends) changes.put_chunk({0, 0, chunk}, {Chunk(1)});
+  ASSERT_TRUE(world.save(std::move(changes)));
+  ASSERT_TRUE(world.flush());
+  EXPECT_EQ(*world.chunks(0, 0), ends);
 }
 
 TEST(WorldStore, ErrorsDescribeFileFaults) {
