@@ -80,6 +80,10 @@ Error unrecognised(std::span<const std::byte> bytes, const std::filesystem::path
 
 /// Reads the surroundings of the spawn in a world that is read by chunks.
 Result<LoadedScene> read_around_spawn(const FormatDriver& driver, const FormatInput& input) {
+  if (input.options.radius < 0) {
+    return make_error(ErrorCode::InvalidArgument, "cannot read a world within a radius of " +
+                                                      std::to_string(input.options.radius) + " chunks: it is negative");
+  }
   const auto source = driver.open_chunks(input.path, input.bytes, input.options.dimension);
   if (!source) return source.error();
   return load_source(**source, chunks_around_spawn(**source, input.options.radius), input.threads, input.progress);

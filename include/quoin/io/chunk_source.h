@@ -144,6 +144,7 @@ class SourceTypes {
 
 /// Returns the box of chunks within `radius` chunks of the source's spawn (or its middle, if it has none), over its
 /// full height. If no part lies in that box, returns the box around the part nearest to the spawn.
+/// Requires: radius >= 0.
 [[nodiscard]] IBox chunks_around_spawn(const ChunkSource& source, int radius);
 
 }  // namespace quoin

@@ -67,7 +67,8 @@ struct LoadOptions {
   /// Threshold of a volume, or of the fog of a .vdb: values above are solid. Default: a threshold between the two
   /// groups of values (surface_value).
   std::optional<float> iso = std::nullopt;
-  /// For worlds read by chunks (ChunkSource): the distance around the spawn, in chunks of 64 voxels to each side.
+  /// For worlds read by chunks (ChunkSource): the distance around the spawn, in chunks of 64 voxels to each side. Must
+  /// not be negative.
   int radius = 4;
   /// The dimension of a Minecraft world: "overworld", "nether", "end" or NAMESPACE:NAME. Empty: the overworld, or the
   /// first dimension if there is none. Other formats ignore it.

@@ -82,6 +82,16 @@ TEST(Dimensions, ReadsTheNewerOfTwoLayouts) {
   EXPECT_NE(loaded->warnings[0].find("newer layout"), std::string::npos);
 }
 
+TEST(Dimensions, RejectsNegativeRadius) {
+  WrittenWorld world("radius");
+  world.level().region("region");
+  EXPECT_TRUE(load_scene(world.path(), {.radius = 0}));
+  const auto loaded = load_scene(world.path(), {.radius = -1});
+  ASSERT_FALSE(loaded);
+  EXPECT_EQ(loaded.error().code, ErrorCode::InvalidArgument);
+  EXPECT_EQ(loaded.error().message, "cannot read a world within a radius of -1 chunks: it is negative");
+}
+
 TEST(Dimensions, FoldersOfOneAreRead) {
   WrittenWorld world("one");
   world.level().region("region").region("DIM-1/region").region("dimensions/a/b/region");

@@ -1,14 +1,18 @@
 #include <quoin/io/chunk_source.h>
 
 #include <atomic>
+#include <limits>
 #include <random>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include <quoin/core/parallel.h>
+
+#include "core/death_for_tests.h"
 
 namespace quoin {
 namespace {
@@ -30,7 +34,8 @@ std::vector<IBox> row_of_parts(int count) {
 // A source of equal chunks in a row, one per part, which counts the calls of read_part.
 class CountedSource final : public ChunkSource {
  public:
-  explicit CountedSource(int parts) : ChunkSource({}, row_of_parts(parts)), chunk_(large_chunk()) {}
+  explicit CountedSource(int parts, ChunkSourceInfo info = {})
+      : ChunkSource(std::move(info), row_of_parts(parts)), chunk_(large_chunk()) {}
 
   VoxelRegistry types() const override { return {}; }
   Result<SourcePart> read_part(std::size_t part) const override {
@@ -74,6 +79,21 @@ TEST(ChunkSource, KeepsPartsThatAreUsedAgain) {
     read_row(source, x, x + 1);
   }
   EXPECT_EQ(source.reads(), kParts);
+}
+
+TEST(ChunkSource, TakesAnyRadiusAroundTheSpawn) {
+  ChunkSourceInfo info;
+  info.chunks = {{-5, -1, 0}, {20, 1, 1}};
+  info.spawn = DVec3(130.0, 0.0, 3.0);
+  const CountedSource source(20, info);
+  EXPECT_EQ(chunks_around_spawn(source, 0), (IBox{{2, -1, 0}, {3, 1, 1}}));
+  EXPECT_EQ(chunks_around_spawn(source, 3), (IBox{{-1, -1, 0}, {6, 1, 1}}));
+  EXPECT_EQ(chunks_around_spawn(source, std::numeric_limits<int>::max()), info.chunks);
+}
+
+TEST(ChunkSourceDeathTest, RejectsNegativeRadius) {
+  const CountedSource source(1);
+  QUOIN_EXPECT_MISTAKE(static_cast<void>(chunks_around_spawn(source, -1)), "a radius that is not negative");
 }
 
 // Fails `failures` times before it reads its only part: the first time by an exception, then by an error.

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <atomic>
+#include <limits>
 #include <map>
 #include <mutex>
 #include <utility>
@@ -130,10 +131,16 @@ Result<LoadedScene> load_source(const ChunkSource& source, const IBox& chunks, T
 }
 
 IBox chunks_around_spawn(const ChunkSource& source, int radius) {
+  QUOIN_ASSERT(radius >= 0, "a radius that is not negative");
   const IBox& all = source.info().chunks;
+  const auto moved = [](int at, std::int64_t by) {
+    using Limits = std::numeric_limits<int>;
+    return static_cast<int>(std::clamp<std::int64_t>(at + by, Limits::min(), Limits::max()));
+  };
   const auto around = [&](IVec3 middle) {
-    return intersect(all, {{middle.x - radius, all.min.y, middle.z - radius},
-                           {middle.x + radius + 1, all.max.y, middle.z + radius + 1}});
+    const std::int64_t end = std::int64_t{radius} + 1;
+    return intersect(all, {{moved(middle.x, -radius), all.min.y, moved(middle.z, -radius)},
+                           {moved(middle.x, end), all.max.y, moved(middle.z, end)}});
   };
   IVec3 middle = all.min + all.size() / 2;
   if (source.info().spawn) middle = chunk_of(voxel_of(*source.info().spawn));
