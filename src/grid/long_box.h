@@ -55,12 +55,13 @@ inline LongBox box_from(const IBox& box) {
   return result;
 }
 
-/// Returns the integer points between two corners, and some outside.
+/// Returns the integer points between two corners, and some outside. Requires: no coordinate is NaN.
 inline LongBox box_around(DVec3 min, DVec3 max) {
   constexpr double kLimit = 2'147'483'648.0;
   LongBox box;
   for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<std::size_t>(axis);
+    QUOIN_ASSERT(!std::isnan(min[axis]) && !std::isnan(max[axis]), "corners that are numbers");
     box.min[i] = static_cast<std::int64_t>(std::floor(std::clamp(min[axis] - 1.0, -kLimit, kLimit)));
     box.max[i] = static_cast<std::int64_t>(std::ceil(std::clamp(max[axis] + 1.0, -kLimit, kLimit)));
   }

@@ -242,6 +242,12 @@ TEST(LiveField, SeveralEyesAndInstancesHaveWhatTheNearestNeeds) {
   meshes.finish(one.scene, DVec3(0.0, 40.0, 0.0), others);
   shown.apply(meshes.take());
   expect_levels(shown, {DVec3(0.0, 40.0, 0.0), others[0]}, 40.0);
+  // Only the finite eye counts.
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::array nowhere{DVec3(nan, 0.0, 0.0), DVec3(0.0, 40.0, 0.0)};
+  meshes.finish(one.scene, DVec3(std::numeric_limits<double>::infinity(), 0.0, nan), nowhere);
+  shown.apply(meshes.take());
+  expect_levels(shown, {DVec3(0.0, 40.0, 0.0)}, 40.0);
   // At half the size an eye is twice as many samples away; after moving, the other end is near.
   one.scene.edit(one.placed).voxel_size = 0.5;
   one.scene.edit(one.placed).position = {-125.0, 0.0, -125.0};

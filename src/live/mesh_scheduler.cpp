@@ -51,6 +51,7 @@ void MeshScheduler::update(const Scene& scene, DVec3 eye, std::span<const DVec3>
   try {
     std::vector<DVec3> eyes{eye};
     eyes.insert(eyes.end(), other_eyes.begin(), other_eyes.end());
+    std::erase_if(eyes, [](DVec3 each) { return !is_finite(each); });
     are_places_new_ |= eyes != eyes_;
     eyes_ = std::move(eyes);
     update_or_throw(scene);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <limits>
 #include <random>
 #include <vector>
 
@@ -72,7 +73,13 @@ TEST(Placements, FewAreAllLookedAtAtOnce) {
     instance.position = {100.0 * i, 0.0, 0.0};
     placements.put(scene.add_instance(instance));
   }
-  const std::vector<Viewer> viewers{{.position = {1.0, 0.0, 0.0}}, {.position = {7.0, 0.0, 0.0}}, {.radius = -1.0}};
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<Viewer> viewers{{.position = {1.0, 0.0, 0.0}},
+                                    {.position = {7.0, 0.0, 0.0}},
+                                    {.radius = -1.0},
+                                    {.radius = nan},
+                                    {.position = {nan, 0.0, 0.0}},
+                                    {.position = {0.0, 0.0, std::numeric_limits<double>::infinity()}}};
   EXPECT_EQ(placements.eyes(scene, scene.grids()[grid], viewers).size(), 10U);
   EXPECT_TRUE(placements.eyes(scene, scene.grids()[grid], {}).empty());
 }

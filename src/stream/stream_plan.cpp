@@ -125,7 +125,8 @@ void StreamPlan::find_wanted() {
   for (const auto& [grid, eyes] : requests_.eyes) {
     std::vector<IVec3> chunks;
     for (const Eye& eye : eyes) {
-      QUOIN_ASSERT(eye.radius >= 0.0 && eye.voxel_size > 0.0, "a radius, and a positive voxel size");
+      QUOIN_ASSERT(is_finite(eye.position) && eye.radius >= 0.0 && eye.voxel_size > 0.0,
+                   "a finite position, a radius, and a positive voxel size");
       const double radius = std::min(eye.radius, reach);
       const IBox box = chunks_around(eye, radius);
       for (int z = box.min.z; z < box.max.z; ++z) {

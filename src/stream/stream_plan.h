@@ -14,7 +14,7 @@ namespace quoin::stream {
 
 /// A viewer in the space of a grid.
 struct Eye {
-  DVec3 position{0.0};      ///< voxels
+  DVec3 position{0.0};      ///< voxels; finite
   DVec3 direction{0.0};     ///< unit; 0: no direction
   double radius = 0.0;      ///< voxels
   double voxel_size = 1.0;  ///< world units

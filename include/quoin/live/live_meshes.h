@@ -123,7 +123,7 @@ class LiveMeshes {
   /// Applies the scene's changes since the last update: voxels, grids, visibility of types (smooth: also colour), and
   /// instances that show a grid for the first time or no longer show it. Chunks nearest to an eye (world coordinates)
   /// come first. Call it after edits, and once per frame while `pending` is not 0: each call queues only enough chunks
-  /// to keep the workers busy.
+  /// to keep the workers busy. Eyes that are not finite are ignored; if all are, every chunk has distance 0.
   ///
   /// Cost:   O(changes), independent of the size of the world. O(instances) more if instances were added, removed or
   ///         changed. O(instances + waiting chunks) more while chunks wait for workers.

@@ -22,7 +22,8 @@
 
 namespace quoin {
 
-/// A position around which a world is kept in memory.
+/// A position around which a world is kept in memory. A viewer whose position is not finite, or whose radius is not
+/// positive, is ignored.
 struct Viewer {
   DVec3 position{0.0};    ///< in world space
   DVec3 direction{0.0};   ///< view direction: chunks there load first; 0 or not finite: no preference
