@@ -43,12 +43,13 @@ const std::array<float, 256>& linear_of_bytes() {
   return all;
 }
 
-/// Returns a pixel's index within an image.
-int wrapped(int at, int size, TextureWrap wrap) {
-  QUOIN_ASSERT(size > 0, "at least one pixel");
-  if (wrap == TextureWrap::Clamp) return std::clamp(at, 0, size - 1);
+/// Returns a pixel's index within an image. Requires: `at` is finite.
+int wrapped(double at, int size, TextureWrap wrap) {
+  QUOIN_ASSERT(size > 0 && std::isfinite(at), "at least one pixel, and a place");
+  if (wrap == TextureWrap::Clamp) return static_cast<int>(std::clamp(at, 0.0, static_cast<double>(size - 1)));
   const int period = wrap == TextureWrap::Mirror ? 2 * size : size;
-  int within = at % period;
+  constexpr double kMostOfInt = 2e9;
+  int within = static_cast<int>(std::abs(at) <= kMostOfInt ? at : std::fmod(at, period)) % period;
   if (within < 0) within += period;
   return within < size ? within : period - 1 - within;
 }
@@ -190,8 +191,7 @@ glm::vec4 SurfaceColours::sample(std::size_t texture, std::size_t level, DVec3 p
   const double u = sound_place(place.x) * of.width;
   const double v = sound_place(place.y) * of.height;
   const auto at = [&](double x, double y) {
-    return texel(texture, level, wrapped(static_cast<int>(x), of.width, how.wrap_u),
-                 wrapped(static_cast<int>(y), of.height, how.wrap_v));
+    return texel(texture, level, wrapped(x, of.width, how.wrap_u), wrapped(y, of.height, how.wrap_v));
   };
   if (!how.is_smooth && level == 0) return at(std::floor(u), std::floor(v));
   const double left = std::floor(u - 0.5);

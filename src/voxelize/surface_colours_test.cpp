@@ -119,6 +119,31 @@ TEST(SurfaceColours, FollowTheWrapModeBeyondATexture) {
   EXPECT_EQ(row(TextureWrap::Clamp), "00011111");
 }
 
+TEST(SurfaceColours, WrapPlacesFarOutsideWideTextures) {
+  constexpr int kWidth = 4096;
+  const Rgba8 black{0, 0, 0, 255};
+  const Rgba8 red{255, 0, 0, 255};
+  const Rgba8 blue{0, 0, 255, 255};
+  TriangleMesh mesh = square();
+  for (glm::vec2& place : mesh.uvs) place = {999'999.5F, 0.5F};  // 4e9 pixels
+  MeshTexture wide;
+  wide.image = {kWidth, 1, {}};
+  for (int x = 0; x < kWidth; ++x) {
+    const Rgba8 c = x < kWidth / 4 ? black : x < kWidth / 4 * 3 ? red : blue;
+    wide.image.rgba.insert(wide.image.rgba.end(), {c.r, c.g, c.b, c.a});
+  }
+  mesh.textures.push_back(std::move(wide));
+  for (const bool is_smooth : {false, true}) {
+    mesh.textures[0].is_smooth = is_smooth;
+    mesh.textures[0].wrap_u = TextureWrap::Repeat;
+    EXPECT_EQ(surface_of(mesh).at(3, 5).colour, red);
+    mesh.textures[0].wrap_u = TextureWrap::Mirror;
+    EXPECT_EQ(surface_of(mesh).at(3, 5).colour, red);
+    mesh.textures[0].wrap_u = TextureWrap::Clamp;
+    EXPECT_EQ(surface_of(mesh).at(3, 5).colour, blue);
+  }
+}
+
 TEST(SurfaceColours, AlphaMaskCutsOutVoxels) {
   TriangleMesh mesh = square();
   mesh.materials[0].alpha_mode = AlphaMode::Mask;
