@@ -50,7 +50,8 @@ struct LampRay {
   double distance = -1.0;  ///< world units to the lamp's surface; not positive: the point is inside
 };
 
-/// Requires: `normal` is unit. `to_lamp`: from the point to the lamp's position. Both in the world.
+/// Returns the light of a lamp at a point of a surface. `normal`: unit; 0, as fields have where their density is flat,
+/// gives no light. `to_lamp`: from the point to the lamp's position. Both in the world.
 [[nodiscard]] LampRay lamp_ray(const PlacedLamp& lamp, DVec3 to_lamp, DVec3 normal);
 
 /// The lamps of a scene and the regions that they light.
