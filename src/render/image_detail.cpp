@@ -39,7 +39,7 @@ FarImpostors take_impostors(ImpostorCache& cache, const Scene& scene, std::span<
     cache.wait(scene, seconds);
     for (const GridHandle grid : some) {
       std::shared_ptr<const Impostor> found = cache.find(scene, grid, options);
-      if (found == nullptr || found->is_left_to_rays()) continue;
+      if (found == nullptr || found->must_be_traced()) continue;
       bytes += found->bytes();
       if (bytes > FarImpostors::kMaxBytes) break;
       far.kept.emplace(grid, std::move(found));

@@ -14,8 +14,8 @@
 #include <quoin/mesh/blocky.h>
 #include <quoin/mesh/smooth_mesh.h>
 
-#include "light/surface/levels.h"
 #include "light/surface/light_world_for_tests.h"
+#include "light/surface/voxel_light.h"
 
 namespace quoin {
 namespace {

@@ -12,7 +12,7 @@
 
 #include "mesh/smooth/smooth_oracle.h"
 #include "mesh/smooth/surface_check_for_tests.h"
-#include "mesh/surface/faces.h"
+#include "mesh/surface/face_materials.h"
 
 namespace quoin {
 namespace {

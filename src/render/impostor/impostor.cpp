@@ -175,7 +175,7 @@ struct Subject {
   int first_width = 0;                 // see ImpostorFaces
   std::optional<ImpostorShell> shell;  // none if there are too many faces
   FieldSurfels surfels;
-  bool is_left_to_rays = false;
+  bool must_be_traced = false;
 
   Subject(const Grid& of_grid, const VoxelRegistry& of_types, const OccupancyTree& tree, const DensityTree* of_field,
           const IBox& whole, const ImpostorOptions& options)
@@ -190,7 +190,7 @@ struct Subject {
     if (!shell) first_width = first_width_for(content, edge);
     if (field == nullptr) return;
     auto found = surfels_of(field->field(), static_cast<std::size_t>(max_faces));
-    is_left_to_rays = !shell || !found;
+    must_be_traced = !shell || !found;
     if (found) surfels = std::move(*found);
   }
 
@@ -291,8 +291,8 @@ Impostor Impostor::build(const Grid& grid, const VoxelRegistry& types, const Occ
   Impostor made;
   made.options_ = options;
   made.content_ = subject.content;
-  made.is_left_to_rays_ = subject.is_left_to_rays;
-  if (made.is_left_to_rays_) return made;
+  made.must_be_traced_ = subject.must_be_traced;
+  if (made.must_be_traced_) return made;
   made.box_ = subject.box;
   if (made.empty()) return made;
   const std::vector<SeenFace> seen =

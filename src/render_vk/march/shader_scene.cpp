@@ -15,7 +15,6 @@
 #include <quoin/light/light_colour.h>
 
 #include "core/srgb.h"
-#include "light/daylight.h"
 #include "light/light_model.h"
 #include "light/occlusion_directions.h"
 #include "render/camera_rays.h"
