@@ -11,13 +11,13 @@ Result<OpenedInput> open_input(const std::filesystem::path& path, const LoadOpti
     const auto found = detect_format(path);
     if (!found) return found.error();
     format = *found;
-    input.is_volume = format && format_info(*format).is_volume;
+    input.is_volume = can(format, FormatCapability::Volume);
   }
   const bool may_have_dimensions = format == FileFormat::Minecraft || format == FileFormat::Scene;
   if (load.dimension.empty() || may_have_dimensions) return input;
   return make_error(ErrorCode::InvalidArgument,
                     "cannot select a dimension: --dimension needs a Minecraft world, and the file format is " +
-                        (format ? std::string(format_info(*format).name) : "unknown"),
+                        (format ? std::string(format->name()) : "unknown"),
                     path.string());
 }
 

@@ -627,14 +627,14 @@ Json outcome_json(const Outcome& outcome) {
 }
 
 std::string find_format_error(const ConvertOptions& options, const FormatInfo& format) {
+  if (options.voxel_mm && !format.can(FormatCapability::Printing)) {
+    return "--voxel-mm needs .stl or .3mf; use --scale for other mesh formats";
+  }
   if (!format.can(FormatCapability::Meshes)) {
     if (!options.mesh_only) return "";
     return "--mesher, --no-ao, --ao-..., --watertight, --smoothness, --colours, --no-unite, --simplify, "
            "--scale, --up, --texture, --light, --lights, --animate, --compress and --quantize need a mesh format; " +
            (options.output.empty() ? std::string(format.extension) : options.output.string()) + " is not one";
-  }
-  if (options.voxel_mm && !format.can(FormatCapability::Printing)) {
-    return "--voxel-mm needs .stl or .3mf; use --scale for other mesh formats";
   }
   if (options.voxel_mm && options.scale) return "--voxel-mm and --scale cannot be used together";
   const std::tuple<bool, FormatCapability, const char*> needs[] = {

@@ -13,6 +13,7 @@
 #include "core/work/progress_steps.h"
 #include "mesh/blocky/occlusion_atlas.h"
 #include "mesh/surface/face_materials.h"
+#include "mesh/surface/simplify.h"
 #include "mesh/surface/voxel_surface.h"
 #include "scene/instance_axes.h"
 #include "scene/meshes/glass_thickness.h"
