@@ -4,8 +4,8 @@
 #include <string>
 
 #include "commands.h"
+#include "options/parse.h"
 #include "output.h"
-#include "parse.h"
 #include "shell/help.h"
 
 namespace quoin::tool {

@@ -8,9 +8,9 @@
 
 #include "commands.h"
 #include "interrupt.h"
+#include "options/parse.h"
 #include "output.h"
 #include "output_files.h"
-#include "parse.h"
 #include "progress_bar.h"
 #include "render/small_image.h"
 #include "shell/help.h"

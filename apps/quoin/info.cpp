@@ -12,11 +12,11 @@
 #include "commands.h"
 #include "interrupt.h"
 #include "opened_input.h"
+#include "options/volume_options.h"
 #include "output.h"
 #include "progress_bar.h"
 #include "scene_content.h"
 #include "volume_info.h"
-#include "volume_options.h"
 
 namespace quoin::tool {
 

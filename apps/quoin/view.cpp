@@ -7,11 +7,11 @@
 #include "commands.h"
 #include "interrupt.h"
 #include "opened_input.h"
+#include "options/parse.h"
+#include "options/volume_options.h"
 #include "output.h"
 #include "output_files.h"
-#include "parse.h"
 #include "shell/help.h"
-#include "volume_options.h"
 #ifdef QUOIN_HAVE_VIEWER
 #include "viewer/window/viewer.h"
 #endif

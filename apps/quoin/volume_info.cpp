@@ -2,9 +2,9 @@
 
 #include <quoin/io/volume.h>
 
+#include "options/volume_options.h"
 #include "output.h"
 #include "progress_bar.h"
-#include "volume_options.h"
 
 namespace quoin::tool {
 

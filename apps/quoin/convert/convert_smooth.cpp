@@ -8,10 +8,10 @@
 
 #include "convert/convert.h"
 #include "interrupt.h"
+#include "options/volume_options.h"
 #include "progress_bar.h"
 #include "scene_content.h"
 #include "stopwatch.h"
-#include "volume_options.h"
 
 namespace quoin::tool {
 

@@ -10,8 +10,8 @@
 #include <quoin/io/image_files.h>
 #include <quoin/io/sidecar_file.h>
 
-#include "options.h"
-#include "parse.h"
+#include "options/options.h"
+#include "options/parse.h"
 #include "render/image_output.h"
 #include "render/render_arguments.h"
 

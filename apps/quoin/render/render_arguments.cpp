@@ -10,14 +10,14 @@
 
 #include <quoin/io/file.h>
 
-#include "field_occlusion.h"
-#include "options.h"
-#include "parse.h"
+#include "options/field_occlusion.h"
+#include "options/options.h"
+#include "options/parse.h"
+#include "options/volume_options.h"
 #include "render/image_output.h"
 #include "render/movie.h"
 #include "shell/help.h"
 #include "standard_streams.h"
-#include "volume_options.h"
 
 namespace quoin::tool {
 

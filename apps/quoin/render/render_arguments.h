@@ -11,7 +11,7 @@
 #include <quoin/scene/camera.h>
 
 #include "commands.h"
-#include "options.h"
+#include "options/options.h"
 #include "render/path_arguments.h"
 
 namespace quoin::tool {

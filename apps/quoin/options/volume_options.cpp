@@ -1,9 +1,9 @@
-#include "volume_options.h"
+#include "options/volume_options.h"
 
 #include <bit>
 #include <cmath>
 
-#include "parse.h"
+#include "options/parse.h"
 #include "shell/help.h"
 
 namespace quoin::tool {

@@ -6,7 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <quoin/mesh/smooth.h>
 
-#include "options.h"
+#include "options/options.h"
 
 namespace quoin::tool {
 

@@ -1,6 +1,6 @@
-#include "field_occlusion.h"
+#include "options/field_occlusion.h"
 
-#include "parse.h"
+#include "options/parse.h"
 
 namespace quoin::tool {
 

@@ -1,10 +1,10 @@
-#include "options.h"
+#include "options/options.h"
 
 #include <limits>
 
 #include "commands.h"
+#include "options/parse.h"
 #include "output.h"
-#include "parse.h"
 
 namespace quoin::tool {
 

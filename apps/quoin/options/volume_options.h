@@ -7,7 +7,7 @@
 #include <quoin/io/volume.h>
 
 #include "commands.h"
-#include "options.h"
+#include "options/options.h"
 
 namespace quoin::tool {
 

@@ -1,10 +1,10 @@
-#include "options.h"
+#include "options/options.h"
 
 #include <limits>
 
 #include <gtest/gtest.h>
 
-#include "parse.h"
+#include "options/parse.h"
 
 namespace quoin::tool {
 
