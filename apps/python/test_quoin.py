@@ -291,7 +291,7 @@ class Scenes(unittest.TestCase):
         scene = quoin.Scene()
         glass = quoin.VoxelType((9, 200, 9, 100), roughness=0.1)
         grid = scene.voxelize(corners, cube, 0.5, types=[(200, 0, 0), glass], materials=[0] * 6 + [1] * 6, fill="solid")
-        self.assertEqual((grid.shape, grid.voxels), ((8, 8, 8), 512))
+        self.assertEqual((grid.shape, grid.voxel_count), ((8, 8, 8), 512))
         self.assertIn((9, 200, 9, 100), [one.rgba for one in scene.types])
         painted = scene.voxelize(corners, cube, colours=np.tile([0, 0, 1, 1], (8, 1)), fill="surface")
         self.assertTrue((scene.palette[painted.to_numpy()[0, 0, 0]] == [0, 0, 255, 255]).all())
@@ -308,7 +308,7 @@ class Scenes(unittest.TestCase):
         self.assertEqual(reported[-1], 1)
         with self.assertRaises(quoin.QuoinError) as ended, quoin.progress(lambda fraction: fraction < 0.5):
             scene.render(64, 64)
-        self.assertEqual(ended.exception.status, 7)
+        self.assertEqual(ended.exception.status, quoin.Status.CANCELLED)
         with self.assertRaises(ZeroDivisionError), quoin.progress(lambda fraction: 1 / 0):
             scene.render(64, 64)
         self.assertEqual(scene.render(64, 64).shape, (64, 64, 3))
@@ -362,7 +362,7 @@ class Scenes(unittest.TestCase):
             copied = shutil.copytree(world, f"{folder}/world")
             shutil.copy(os.path.join(world, "..", "minecraft-section-without-longs", "region", "r.0.0.mca"),
                         f"{copied}/dimensions/minecraft/overworld/region/r.0.0.mca")
-            voxels = {name: quoin.load(copied, dimension=name).grids[0].voxels
+            voxels = {name: quoin.load(copied, dimension=name).grids[0].voxel_count
                       for name in (None, "", "minecraft:overworld", "nether")}
             self.assertEqual(voxels, {None: 8192, "": 8192, "minecraft:overworld": 8192, "nether": 8704})
             with self.assertRaisesRegex(quoin.QuoinError, "the world has minecraft:overworld, minecraft:the_nether"):

@@ -135,7 +135,7 @@ def blocks(edge):
     def our_voxels():
         return quoin.Scene().voxelize(surface.positions, surface.triangles, threads=1)
     def check_voxels():
-        close(our_voxels().voxels, int(their_voxels().filled_count), 0.1)
+        close(our_voxels().voxel_count, int(their_voxels().filled_count), 0.1)
     yield Pair(f"{len(surface.triangles)} triangles as voxels, one thread", "trimesh, voxelized().fill()", our_voxels,
                their_voxels, check_voxels)
 

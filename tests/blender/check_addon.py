@@ -76,7 +76,7 @@ def check_castle(quoin, path, folder):
     run(bpy.ops.import_scene.quoin, filepath=path)
     print(f"the castle in {time.perf_counter() - begin:.2f} s")
     scene = quoin.load(path)
-    placed = [one for one in scene.instances if scene.grids[one.grid].voxels]
+    placed = [one for one in scene.instances if scene.grids[one.grid].voxel_count]
     objects = [one for one in bpy.data.objects if one.type == "MESH"]
     require(len(objects) == len(placed), f"{len(objects)} objects of {len(placed)} instances")
     require(len({one.data.name for one in objects}) == len({one.grid for one in placed}), "instances share meshes")

@@ -160,7 +160,7 @@ def mesh_of(grid, name, looks, options):
 
 
 def _keep(mesh, grid, looks, slots, options, made):
-    if not options.keep_voxels or not grid.voxels:
+    if not options.keep_voxels or not grid.voxel_count:
         return
     if not kept.keep(mesh, grid, looks.types, options.scale, slots):
         made.warnings.append(f"{mesh.name}: cannot keep the voxels in the .blend: too many or too scattered; export "
@@ -271,7 +271,8 @@ def _on_lattice(scene, matrix):
     """Scales and snaps the only instance of a file with its own unit, such as a triangle file, to the voxel lattice.
     Returns other matrices unchanged."""
     size = np.cbrt(abs(np.linalg.det(matrix[:3, :3])))
-    if abs(size - 1.0) < 1e-6 or scene.format in _OUR_OWN or len(scene.instances) != 1 or not scene.grids[0].voxels:
+    if (abs(size - 1.0) < 1e-6 or scene.format in _OUR_OWN or len(scene.instances) != 1
+            or not scene.grids[0].voxel_count):
         return matrix
     out = matrix / size
     out[:3, 3] = np.round(out[:3, 3])

@@ -37,7 +37,7 @@ def keep(mesh, grid, types, scale, slots):
     """Stores a grid's voxels in its mesh. `slots` maps types with their own material to its slot. Returns False and
     does nothing if there are too many voxels or they are too scattered."""
     cells = int(np.prod(grid.shape, dtype=np.int64))
-    if cells > min(MOST_CELLS, max(FREE_CELLS, MOST_CELLS_A_VOXEL * grid.voxels)):
+    if cells > min(MOST_CELLS, max(FREE_CELLS, MOST_CELLS_A_VOXEL * grid.voxel_count)):
         return False
     voxels = grid.to_numpy()
     counts = sum(np.bincount(one.ravel(), minlength=len(types)) for one in _slices(voxels))

@@ -49,7 +49,7 @@ def merge(scene, ending):
     most = MOST_TYPES.get(ending, len(types))
     if len(types) - 1 <= most:
         return 0
-    grids = [one for one in scene.grids if one.voxels]
+    grids = [one for one in scene.grids if one.voxel_count]
     counts = sum(np.bincount(one.to_numpy().ravel(), minlength=len(types)) for one in grids)
     used = [int(number) for number in np.flatnonzero(counts) if number]
     boxes = _boxes(types, used, counts, most) if len(used) > most else None

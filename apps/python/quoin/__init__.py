@@ -32,13 +32,13 @@ from typing import Any, Callable, Iterator, List
 import numpy as _np
 
 from . import _c
-from ._c import NdArray, QuoinError
+from ._c import NdArray, QuoinError, Status
 from ._mesh import Mesh, mesh_labels, surface_nets
 from ._scene import (Camera, Format, Grid, Group, Heights, Hits, Instance, Lamp, Layer, Raw, Scene, Sun, VoxelType,
                      formats, from_numpy, load, load_bytes)
 
 __all__ = ["Camera", "Format", "Grid", "Group", "Heights", "Hits", "Instance", "Lamp", "Layer", "Mesh", "QuoinError",
-           "Raw", "Scene", "Sun", "VoxelType", "__version__", "formats", "from_numpy", "load", "load_bytes",
+           "Raw", "Scene", "Status", "Sun", "VoxelType", "__version__", "formats", "from_numpy", "load", "load_bytes",
            "mesh_labels", "png", "progress", "surface_nets", "version"]
 
 
@@ -89,9 +89,9 @@ def progress(listener: Callable[[float], Any]) -> Iterator[None]:
     """Reports the progress of calls that this thread makes inside the `with` block.
 
     `listener` receives the finished fraction of the current call, 0 to 1. Quoin may call it from another thread. To
-    cancel the current call, return False, which raises QuoinError with status 7, or raise an exception, which the call
-    raises too. If the call has already finished, the end of the `with` block raises the exception. Blocks can be
-    nested: only the innermost listener is called.
+    cancel the current call, return False, which raises QuoinError with Status.CANCELLED, or raise an exception, which
+    the call raises too. If the call has already finished, the end of the `with` block raises the exception. Blocks can
+    be nested: only the innermost listener is called.
     """
     mine = _c.Listener(listener)
     _c.check(_c.lib.quoin_set_progress(mine.function, None))

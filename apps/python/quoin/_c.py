@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import enum
 import operator
 import os
 import sys
@@ -17,14 +18,31 @@ else:
     NdArray = np.ndarray
 
 
+class Status(enum.IntEnum):
+    """The codes of errors, as in quoin.h."""
+
+    OK = 0
+    INVALID_ARGUMENT = 1
+    CANNOT_READ = 2
+    CANNOT_WRITE = 3
+    BAD_FORMAT = 4
+    UNSUPPORTED = 5
+    LIMIT_EXCEEDED = 6
+    CANCELLED = 7
+    DEVICE_LOST = 8
+    BAD_HANDLE = 9
+    OUT_OF_MEMORY = 10
+    INTERNAL = 11
+
+
 class QuoinError(Exception):
-    """An error reported by the library. The message is one line.
+    """An error reported by the library. The message is one line. `status` is the code of the error."""
 
-    `status`: int, a quoin_status of quoin.h: 1 invalid argument, 2 cannot read, 3 cannot write, 4 bad format,
-    5 unsupported, 6 limit exceeded, 7 cancelled, 8 device lost, 9 bad handle, 10 out of memory, 11 internal error.
-    """
+    status = Status.OK
 
-    status = 0
+
+# Tracebacks show the public names.
+Status.__module__ = QuoinError.__module__ = "quoin"
 
 
 def _find() -> ctypes.CDLL:
@@ -242,17 +260,16 @@ class Listeners(threading.local):
 
 
 listeners = Listeners()
-_CANCELLED = 7
 
 
 def check(status: int) -> None:
     """Raises QuoinError if a call failed. If a listener raised an exception to cancel the call, raises that instead."""
     if status == 0:
         return
-    if status == _CANCELLED and listeners.all:
+    if status == Status.CANCELLED and listeners.all:
         listeners.all[-1].raise_what_it_raised()
     error = QuoinError(lib.quoin_last_error().decode("utf-8", "replace"))
-    error.status = status
+    error.status = Status(status)
     raise error
 
 

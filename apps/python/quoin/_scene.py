@@ -167,7 +167,7 @@ class Grid:
         return _c.text_of(self._info().name)
 
     @property
-    def voxels(self) -> int:
+    def voxel_count(self) -> int:
         """The number of voxels that are not air."""
         return int(self._info().voxels)
 
@@ -225,11 +225,12 @@ class Grid:
     def mesh(self, smooth: bool = False, occlusion: bool = True, threads: int = 0, watertight: bool = False) -> Mesh:
         """Meshes the grid as blocks with merged faces, or as a smooth surface. Positions are in the grid's voxels.
 
-        A block face has four vertices and two triangles; its vertices are consecutive in the mesh's arrays.
+        Equal neighbouring block faces are merged to quads, which can cover many voxel faces. A quad has two triangles
+        and four vertices, which are consecutive in the mesh's arrays: `types[::4]` is the type of each quad.
 
         `smooth`: makes a smooth surface. `occlusion`: computes `Mesh.occlusion` of blocks. `watertight`: adds a vertex
-        where an edge of a block face meets a corner of another face. This avoids visible gaps, but faces may then have
-        more than four vertices. Smooth surfaces are always watertight.
+        where an edge of a quad meets a corner of another quad. This avoids visible gaps, but quads may then have more
+        than four vertices. Smooth surfaces are always watertight.
         """
         options = _c.sized(_c.MeshOptions)
         options.smooth, options.no_occlusion = int(smooth), int(not occlusion)
@@ -241,7 +242,7 @@ class Grid:
         return Mesh(_c.Owner(out.value))
 
     def __repr__(self) -> str:
-        return f"<quoin.Grid {self.name!r}: {self.voxels} voxels, {'x'.join(map(str, self.shape))}>"
+        return f"<quoin.Grid {self.name!r}: {self.voxel_count} voxels, {'x'.join(map(str, self.shape))}>"
 
 
 class Scene:
@@ -456,7 +457,8 @@ class Scene:
         _c.check(_c.lib.quoin_instance_set_layer(self._owner.handle, instance, _c.name_of(layer)))
 
     def add_camera(self, camera: Camera) -> None:
-        """Adds a camera. Raises QuoinError if its number is in use or its axes are invalid.
+        """Adds a camera. `render` does not use it: pass `camera`. Raises QuoinError if its number is in use or its axes
+        are invalid.
 
         .quoin and .vox files store all cameras, .json files only the initial one.
 
@@ -552,12 +554,12 @@ class Scene:
                sun: Optional[Sequence[float]] = None, out: Optional[NdArray] = None, threads: int = 0) -> NdArray:
         """Renders an sRGB image and returns it: uint8, (height, width, 3), rows from the top.
 
-        `samples`: per pixel; 0: 4, or 64 for path tracing. `paths`: traces paths, which is slower and adds indirect
-        light and soft shadows. `camera`: position in the world; default: a camera that shows the whole scene.
+        `samples`: per pixel; 0 means 4, or 64 with path tracing. `paths`: path tracing, which is slower and adds
+        indirect light and soft shadows. `camera`: position in the world; default: a camera that shows the whole scene.
         `look_at`: point at the image's centre, default (0, 0, 0); needs `camera`. `fov`: vertical field of view of
         `camera`, in degrees. `sun`: direction from the scene towards the sun, of any non-zero length; default
-        (-0.48, 0.72, 0.5). The sky follows the sun. `out`: a contiguous, writable array of the image's shape and dtype,
-        which is filled and returned.
+        (-0.48, 0.72, 0.5). The sky follows the sun. The scene's own sun and cameras are not used. `out`: a contiguous,
+        writable array of the image's shape and dtype, which is filled and returned.
 
         Raises ValueError for a size that is not positive or an unsuitable `out`, and QuoinError for an invalid camera,
         sun or number of samples.
@@ -692,20 +694,20 @@ def load(path: Path, *, frame: int = 0, show_hidden: bool = False, radius: int =
     as raw values. `heights`: reads the file as a height map. `allow_outside_files`: also opens files that the file
     names outside its folder (buffers, images, models); only for input from a trusted source.
 
-    Worlds: `radius`: chunks of 64 voxels to load on each side of the spawn point; 0: 4. `dimension` (Minecraft):
+    Worlds: `radius`: chunks of 64 voxels to load on each side of the spawn point; 0 means 4. `dimension` (Minecraft):
     "overworld", "nether", "end" or "NAMESPACE:NAME"; default: the overworld, or the first dimension if there is none.
 
     Volumes: `iso`: values above it are solid; default: a threshold between the two groups of values.
 
-    Triangle files: `size`: voxels along the longest side; 0: 128. `voxel_size`: edge length of a voxel, in the file's
-    unit; replaces `size`.
+    Triangle files: `size`: voxels along the longest side; 0 means 128. `voxel_size`: edge length of a voxel, in the
+    file's unit; replaces `size`.
 
     Raises QuoinError if the file cannot be read.
 
     >>> load("nothing.vox")
     Traceback (most recent call last):
     ...
-    quoin._c.QuoinError: nothing.vox: No such file or directory
+    quoin.QuoinError: nothing.vox: No such file or directory
     """
     options = _load_options(frame, show_hidden, radius, iso, size, voxel_size, threads, raw, heights)
     options.allow_outside_files = int(allow_outside_files)
