@@ -44,8 +44,8 @@ Result<LoadedScene> read_toy(const FormatInput& input) {
     std::size_t at = line;
     IVec3 voxel{0};
     for (int axis = 0; axis < 3; ++axis) {
-      if (!parse(text, at, voxel[axis])) return bad_at(at, "no coordinate of a voxel");
-      if (std::abs(voxel[axis]) > kFarthest) return bad_at(line, "the voxel is too far away");
+      if (!parse(text, at, voxel[axis])) return bad_at(at, "expected a coordinate");
+      if (std::abs(voxel[axis]) > kFarthest) return bad_at(line, "coordinate exceeds 1,048,576");
     }
     if (Status put = builder.put(voxel, {190, 190, 190, 255}); !put) return put.error();
     line = std::min(text.find('\n', at), text.size() - 1) + 1;
