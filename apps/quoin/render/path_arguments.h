@@ -62,8 +62,8 @@ struct PathPlan {
 
 void add_path_options(CLI::App& command, PathArguments& arguments);
 
-/// Takes each setting from the options, else from the scene file (IN), else the default. `render`: as in `all`, with the
-/// sun of the scene file. An unreadable sky image of the scene file only gives a warning.
+/// Takes each setting from the options, else from the scene file (IN), else the default. `render`: as in `all`, with
+/// the sun of the scene file. An unreadable sky image of the scene file only gives a warning.
 /// Errors: those of reading the sky image of --sky.
 [[nodiscard]] Result<PathPlan> plan_paths(const RenderArguments& all, const RenderOptions& render,
                                           const LoadedScene& loaded);

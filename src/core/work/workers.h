@@ -33,7 +33,8 @@ class Workers {
   static constexpr Clock::time_point kAgain = Clock::time_point::min();
   static constexpr Clock::time_point kWhenWoken = Clock::time_point::max();
 
-  /// Lifetime: `mutex`, and the state that steps use, must outlive the object. As the owner's last member it ends first.
+  /// Lifetime: `mutex`, and the state that steps use, must outlive the object. As the owner's last member it ends
+  /// first.
   explicit Workers(std::mutex& mutex) : mutex_(mutex) {}
   Workers(const Workers&) = delete;
   Workers& operator=(const Workers&) = delete;

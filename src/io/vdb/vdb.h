@@ -22,8 +22,8 @@ namespace quoin::vdb {
                                            Threads threads, const Progress& progress);
 
 /// Writes a scene as .vdb, version 224, zip: for each instance its densities as a level set, and its voxels as a bool
-/// grid. Instances of one grid share its tree. Instances with an invalid transform are left out. Equal scenes give equal
-/// bytes.
+/// grid. Instances of one grid share its tree. Instances with an invalid transform are left out. Equal scenes give
+/// equal bytes.
 [[nodiscard]] Result<std::vector<std::byte>> write_vdb(const Scene& scene);
 /// Returns the parts of a scene that a VDB file cannot store, one line each.
 [[nodiscard]] std::vector<std::string> vdb_unsupported_features(const Scene& scene);

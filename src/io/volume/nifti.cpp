@@ -544,9 +544,9 @@ Result<EncodedFile> write_densities(const Instance& instance, const SceneGrid& g
   return file;
 }
 
-/// Writes a NIfTI-1 file, at the scene's position and size in the world. Voxels become their type numbers (8 or 16 bits,
-/// intent LABEL), 0 for air. A field becomes its negated densities, so that values above 0 are solid (32-bit floats,
-/// within its band). read_volume restores the same positions.
+/// Writes a NIfTI-1 file, at the scene's position and size in the world. Voxels become their type numbers (8 or 16
+/// bits, intent LABEL), 0 for air. A field becomes its negated densities, so that values above 0 are solid (32-bit
+/// floats, within its band). read_volume restores the same positions.
 Result<EncodedFile> write_nifti(const FormatOutput& output) {
   const Scene& scene = output.scene;
   std::int64_t fields = 0;
