@@ -606,7 +606,7 @@ def check_refusals(folder):
     bpy.ops.mesh.primitive_cube_add()
     refused(bpy.ops.export_scene.quoin, "x.unknown", filepath=os.path.join(folder, "x.unknown"))
     refused(bpy.ops.export_scene.quoin, "16384", filepath=os.path.join(folder, "x.vox"), scale=1e-6)
-    refused(bpy.ops.export_scene.quoin, "there is no folder", filepath=os.path.join(folder, "none", "x.vox"))
+    refused(bpy.ops.export_scene.quoin, "does not exist", filepath=os.path.join(folder, "none", "x.vox"))
 
 
 def check_surfaces(path):
