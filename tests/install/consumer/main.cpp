@@ -24,6 +24,8 @@ int main() {
   auto smooth = quoin::build_smooth_mesh(*quoin::field_from_grid(scene.grids()[handle].grid), scene.types, {});
   if (!smooth || smooth->indices.empty()) return 1;
   if (quoin::simplify_smooth_mesh(*smooth, 0.1F).has_value() != quoin::can_simplify()) return 1;
+  // Formats of worlds are registered before main; a static library must not lose them.
+  if (!quoin::format_with_extension("home.quoin", quoin::FormatCapability::Read)) return 2;
   std::printf("%lld faces in %lld quads\n", static_cast<long long>(mesh->faces_visible),
               static_cast<long long>(mesh->quads));
   return 0;
