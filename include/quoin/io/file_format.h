@@ -20,6 +20,8 @@ class FileFormat {
   [[nodiscard]] constexpr std::string_view name() const { return name_; }
   friend constexpr bool operator==(FileFormat, FileFormat) = default;
 
+  // Named like enumerators, since they are used like these.
+  // NOLINTBEGIN(readability-identifier-naming)
   static const FileFormat Vox;
   static const FileFormat Scene;
   static const FileFormat World;
@@ -43,11 +45,13 @@ class FileFormat {
   static const FileFormat Stl;
   static const FileFormat ThreeMf;
   static const FileFormat Off;
+  // NOLINTEND(readability-identifier-naming)
 
  private:
   std::string_view name_;
 };
 
+// NOLINTBEGIN(readability-identifier-naming)
 inline constexpr FileFormat FileFormat::Vox{"vox"};
 inline constexpr FileFormat FileFormat::Scene{"scene"};
 inline constexpr FileFormat FileFormat::World{"world"};
@@ -71,6 +75,7 @@ inline constexpr FileFormat FileFormat::Ply{"ply"};
 inline constexpr FileFormat FileFormat::Stl{"stl"};
 inline constexpr FileFormat FileFormat::ThreeMf{"3mf"};
 inline constexpr FileFormat FileFormat::Off{"off"};
+// NOLINTEND(readability-identifier-naming)
 
 /// Abilities of a format, combined with |. Those after Chunks concern writing.
 enum class FormatCapability : std::uint32_t {
