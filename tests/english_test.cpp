@@ -10,6 +10,7 @@
 #include <fstream>
 #include <map>
 #include <optional>
+#include <regex>
 #include <set>
 #include <string>
 #include <string_view>
@@ -225,6 +226,32 @@ TEST(English, NoFileHasMoreHardPhrasesThanBefore) {
   std::ofstream file(kLimits);
   for (const auto& [name, count] : lowered) file << count << ' ' << name << '\n';
   std::printf("%d lines with hard phrases in %zu files\n", all, lowered.size());
+}
+
+// Names that a reader could not guess, and that were replaced by the field's terms.
+TEST(English, OldNamesAreGone) {
+  const std::regex old(
+      R"re(\b(losses_of_\w*|fault_of_\w*|files_read_beside|only_in_source|FieldOfMesh|SmoothPlaces|ChunkPlace|)re"
+      R"re(PicturePoint|texture_places|has_place|displacement_to_free_place|carried_point|apart_from|)re"
+      R"re(is_beside|kApart|kNobody|Lender|EditNotices?|Wishes|Arrival|hurries|let_go|owes_all|owed_removals|)re"
+      R"re(keep_what_is_asked_for|stand_at_unit_size|occlusion_apart)\b)re");
+  int files = 0;
+  for (const char* const top : {"src", "include", "apps", "examples", "bench", "tests"}) {
+    for (const auto& entry : fs::recursive_directory_iterator(fs::path(QUOIN_SOURCE_DIR) / top)) {
+      const std::string kind = entry.path().extension().string();
+      const bool is_source = kind == ".h" || kind == ".cpp" || kind == ".inl";
+      if (!is_source || entry.path().filename() == "english_test.cpp") continue;
+      std::ifstream in(entry.path());
+      int number = 0;
+      for (std::string line; std::getline(in, line);) {
+        ++number;
+        std::smatch found;
+        EXPECT_FALSE(std::regex_search(line, found, old)) << entry.path() << ":" << number << ": " << found.str();
+      }
+      ++files;
+    }
+  }
+  EXPECT_GT(files, 1000);
 }
 
 TEST(English, FindsHardPhrases) {

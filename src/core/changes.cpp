@@ -5,7 +5,7 @@
 #include <quoin/core/assert.h>
 
 #include "core/change_journal.h"
-#include "core/edit_notices.h"
+#include "core/change_notifiers.h"
 
 namespace quoin {
 
@@ -14,7 +14,7 @@ std::uint64_t next_serial() {
   return count.fetch_add(1, std::memory_order_relaxed) + 1;
 }
 
-void EditNotice::notify_first() {
+void ChangeNotifier::notify_first() {
   QUOIN_ASSERT(to_ != nullptr, "a notice that is followed");
   to_->notify(index_);
   is_notified_ = true;

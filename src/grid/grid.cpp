@@ -47,7 +47,7 @@ struct Grid::Impl {
   }
 
   // Records an edit of one chunk, notifies followers of the grid, and drops the chunk if it is empty.
-  void finish_edit(const IVec3& chunk, const ChunkTable::Slot& slot, VoxelEdit& edit, EditNotice& notice) {
+  void finish_edit(const IVec3& chunk, const ChunkTable::Slot& slot, VoxelEdit& edit, ChangeNotifier& notice) {
     QUOIN_ASSERT(slot.entry != nullptr && entries.find(chunk) == slot.entry, "the slot is the chunk's");
     // Runs before any step that may throw: the known storage may be freed.
     entries.voxels_changed(slot);
@@ -70,7 +70,7 @@ struct Grid::Impl {
   }
 
   // Replaces the voxels of a chunk that was loaded or unloaded. The change is reported as a load, not as an edit.
-  void replace(const IVec3& chunk, Chunk voxels, EditNotice& notice) {
+  void replace(const IVec3& chunk, Chunk voxels, ChangeNotifier& notice) {
     if (non_air_count(voxels) == 0 && quoin::data_count(voxels) == 0 && entries.find(chunk) == nullptr) {
       VoxelRecord record;  // air replaces nothing: no chunk is created or removed
       record.chunk = chunk;
@@ -93,15 +93,15 @@ struct Grid::Impl {
   // Calls `change(chunk, voxels, part of the box in chunk coordinates, edit)` for every chunk of a box. Chunks that are
   // not there are created where `create`, left out otherwise.
   template <class Change>
-  std::int64_t edit_box(const LongBox& wanted, bool create, EditNotice& notice, const Progress& progress,
+  std::int64_t edit_box(const LongBox& wanted, bool create, ChangeNotifier& notice, const Progress& progress,
                         Change&& change);
   template <class Change>
-  std::int64_t edit_chunk(IVec3 chunk, const ChunkTable::Slot& slot, const IBox& part, EditNotice& notice,
+  std::int64_t edit_chunk(IVec3 chunk, const ChunkTable::Slot& slot, const IBox& part, ChangeNotifier& notice,
                           Change& change);
 };
 
 template <class Change>
-std::int64_t Grid::Impl::edit_chunk(IVec3 chunk, const ChunkTable::Slot& slot, const IBox& part, EditNotice& notice,
+std::int64_t Grid::Impl::edit_chunk(IVec3 chunk, const ChunkTable::Slot& slot, const IBox& part, ChangeNotifier& notice,
                                     Change& change) {
   QUOIN_ASSERT(slot.entry != nullptr && !part.empty() && intersect(part, kWholeChunk) == part, "a part of a chunk");
   VoxelEdit edit{.data_before = quoin::data_count(slot.entry->chunk)};
@@ -118,7 +118,7 @@ std::int64_t Grid::Impl::edit_chunk(IVec3 chunk, const ChunkTable::Slot& slot, c
 }
 
 template <class Change>
-std::int64_t Grid::Impl::edit_box(const LongBox& wanted, bool create, EditNotice& notice, const Progress& progress,
+std::int64_t Grid::Impl::edit_box(const LongBox& wanted, bool create, ChangeNotifier& notice, const Progress& progress,
                                   Change&& change) {
   const LongBox box = clipped(wanted);
   if (is_empty(box)) return 0;

@@ -14,7 +14,7 @@
 #include <quoin/core/assert.h>
 
 #include "core/change_journal.h"
-#include "core/edit_notices.h"
+#include "core/change_notifiers.h"
 #include "scene/hierarchy.h"
 #include "scene/instance_axes.h"
 
@@ -135,7 +135,7 @@ struct Scene::Book {
   std::mutex mutex;  // guards concurrent queries
   ChangeJournal<SceneRecord> journal;
   std::array<std::vector<std::uint64_t>, 4> serials;  // by kind and slot, of the last records in the journal
-  EditNotices notices;
+  ChangeNotifiers notices;
   std::vector<std::uint32_t> noticed;
 
   std::vector<std::uint64_t>& serials_of(Kind kind) { return serials[static_cast<std::size_t>(kind)]; }

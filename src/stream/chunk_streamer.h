@@ -83,7 +83,7 @@ class ChunkStreamer {
   /// Sets the generator of a grid. Null: chunks that the world does not store are air.
   void set_generator(std::uint32_t grid, std::shared_ptr<const ChunkGenerator> generator);
   [[nodiscard]] std::shared_ptr<const ChunkGenerator> generator_of(std::uint32_t grid) const;
-  /// Queues a note. Without `hurries` sleeping workers are not woken: a wake-up costs the caller more than the rest.
+  /// Queues a note. Unless `is_urgent`, wakes no sleeping worker: a wake-up costs the caller more than the rest.
   void post(Note note, bool is_urgent = true);
   /// Sets the bytes of chunks that may be read or made in addition to those in progress, and the expected bytes per
   /// chunk. Chunks that edits wait for are always loaded.

@@ -149,11 +149,11 @@ inline double distance_to_segment(DVec3 p, DVec3 a, DVec3 b) {
 
 inline double distance_to_triangle(const std::array<DVec3, 3>& t, DVec3 p) {
   const DVec3 normal = glm::cross(t[1] - t[0], t[2] - t[0]);
-  bool is_beside = glm::length(normal) > 0.0;
+  bool is_inside = glm::length(normal) > 0.0;
   for (std::size_t i = 0; i < 3; ++i) {
-    is_beside &= glm::dot(glm::cross(normal, t[(i + 1) % 3] - t[i]), p - t[i]) >= 0.0;
+    is_inside &= glm::dot(glm::cross(normal, t[(i + 1) % 3] - t[i]), p - t[i]) >= 0.0;
   }
-  if (is_beside) return std::abs(glm::dot(glm::normalize(normal), p - t[0]));
+  if (is_inside) return std::abs(glm::dot(glm::normalize(normal), p - t[0]));
   return std::min(
       {distance_to_segment(p, t[0], t[1]), distance_to_segment(p, t[1], t[2]), distance_to_segment(p, t[2], t[0])});
 }

@@ -53,19 +53,19 @@ struct Changes {
 
 // Part of the layout of Grid and DensityGrid; not for callers.
 
-class EditNotices;
+class ChangeNotifiers;
 
 /// Notifies the owner of a container about edits, for example the scene that owns a grid. The notice stays with its
 /// container object when the container's content is moved.
-class EditNotice {
+class ChangeNotifier {
  public:
-  EditNotice() = default;
-  EditNotice(const EditNotice&) {}
-  EditNotice& operator=(const EditNotice& other) {
+  ChangeNotifier() = default;
+  ChangeNotifier(const ChangeNotifier&) {}
+  ChangeNotifier& operator=(const ChangeNotifier& other) {
     if (this != &other) notify();
     return *this;
   }
-  ~EditNotice() = default;
+  ~ChangeNotifier() = default;
 
   /// Notifies the owner; call it after every edit. Only the first call since the owner last read the notice does work.
   void notify() {
@@ -74,10 +74,10 @@ class EditNotice {
   }
 
  private:
-  friend class EditNotices;
+  friend class ChangeNotifiers;
   void notify_first();
 
-  EditNotices* to_ = nullptr;
+  ChangeNotifiers* to_ = nullptr;
   std::uint32_t index_ = 0;
   bool is_notified_ = true;
 };

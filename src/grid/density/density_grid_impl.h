@@ -232,7 +232,7 @@ inline DensityGrid::Impl& DensityGrid::impl() const {
 /// Notifies followers, on destruction, of edits made during its lifetime, even after an exception.
 class NoticeOfEdits {
  public:
-  NoticeOfEdits(const DensityStore& store, EditNotice& notice)
+  NoticeOfEdits(const DensityStore& store, ChangeNotifier& notice)
       : store_(store), notice_(notice), before_(store.edits()) {}
   NoticeOfEdits(const NoticeOfEdits&) = delete;
   NoticeOfEdits& operator=(const NoticeOfEdits&) = delete;
@@ -242,7 +242,7 @@ class NoticeOfEdits {
 
  private:
   const DensityStore& store_;
-  EditNotice& notice_;
+  ChangeNotifier& notice_;
   std::uint64_t before_;
 };
 

@@ -145,8 +145,8 @@ struct VoxelsAround {
   }
 }
 
-/// Computes the light at a point in front of a surface. Returns false if all eight voxels around are opaque. Voxels
-/// that pass light have equal shares if the point is the centre of an opaque voxel, or between the centres of several.
+/// Computes the light at a point in front of a surface. Returns false if all eight voxels around are opaque. If the
+/// point is the centre of an opaque voxel, or between the centres of several, voxels that pass light have equal shares.
 template <class Voxels>
 [[nodiscard]] bool light_around(Voxels& voxels, DVec3 point, MeanLevels& out) {
   VoxelsAround around(point);

@@ -12,11 +12,11 @@ namespace quoin {
 /// The edit notices of one container: lists which of its items were edited since the last `take`.
 ///
 /// Threads: notices for different items may be given concurrently.
-class EditNotices {
+class ChangeNotifiers {
  public:
-  EditNotices() = default;
-  EditNotices(const EditNotices&) = delete;
-  EditNotices& operator=(const EditNotices&) = delete;
+  ChangeNotifiers() = default;
+  ChangeNotifiers(const ChangeNotifiers&) = delete;
+  ChangeNotifiers& operator=(const ChangeNotifiers&) = delete;
 
   /// Reserves memory for the number, so that neither following it nor giving its notice allocates.
   void make_room(std::uint32_t index) {
@@ -26,7 +26,7 @@ class EditNotices {
     is_notified_.resize(std::size_t{2} * index + 1);
   }
   /// Makes the notice report to this object under a number. Requires: this object outlives the notice.
-  void follow(EditNotice& notice, std::uint32_t index) {
+  void follow(ChangeNotifier& notice, std::uint32_t index) {
     make_room(index);
     const std::lock_guard lock(mutex_);
     notice.to_ = this;
@@ -42,7 +42,7 @@ class EditNotices {
   }
 
  private:
-  friend class EditNotice;
+  friend class ChangeNotifier;
   void notify(std::uint32_t index) {
     const std::lock_guard lock(mutex_);
     QUOIN_ASSERT(index < is_notified_.size(), "an index of a followed item");

@@ -1,4 +1,4 @@
-#include "core/edit_notices.h"
+#include "core/change_notifiers.h"
 
 #include <memory>
 #include <vector>
@@ -8,10 +8,10 @@
 namespace quoin {
 namespace {
 
-TEST(EditNotices, AreTakenOnceAndGivenAgainOnceFollowedAnew) {
-  EditNotices notices;
-  EditNotice a;
-  EditNotice b;
+TEST(ChangeNotifiers, AreTakenOnceAndGivenAgainOnceFollowedAnew) {
+  ChangeNotifiers notices;
+  ChangeNotifier a;
+  ChangeNotifier b;
   notices.follow(a, 4);
   notices.follow(b, 2);
   a.notify();
@@ -30,10 +30,10 @@ TEST(EditNotices, AreTakenOnceAndGivenAgainOnceFollowedAnew) {
   EXPECT_EQ(taken, (std::vector<std::uint32_t>{4}));
 }
 
-TEST(EditNotices, ANumberThatOthersTookOverStandsThereOnce) {
-  EditNotices notices;
+TEST(ChangeNotifiers, ANumberThatOthersTookOverStandsThereOnce) {
+  ChangeNotifiers notices;
   for (int i = 0; i < 1'000; ++i) {
-    EditNotice notice;
+    ChangeNotifier notice;
     notices.follow(notice, 7);
     notice.notify();
   }
