@@ -19,10 +19,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::map<std::string, int> kLevels = {{"core", 0},      {"grid", 1},     {"mesh", 2},  {"trace", 2},
-                                            {"terrain", 2},   {"voxelize", 2}, {"scene", 3}, {"light", 4},
-                                            {"live", 5},      {"render", 5},   {"io", 5},    {"store", 6},
-                                            {"render_vk", 6}, {"formats", 7},  {"stream", 7}};
+const std::map<std::string, int> kLevels = {
+    {"core", 0},  {"grid", 1}, {"mesh", 2},   {"trace", 2}, {"terrain", 2}, {"voxelize", 2},  {"scene", 3},
+    {"light", 4}, {"live", 5}, {"render", 5}, {"io", 5},    {"store", 6},   {"render_vk", 6}, {"stream", 7}};
 constexpr int kAppsLevel = 8;
 
 // Lists the private headers that higher layers use, and the users. A new line is a decision: the alternative is a

@@ -227,7 +227,6 @@ constexpr CapabilityName kCapabilityNames[] = {
     {FormatCapability::Lamps, "lamps and cameras"},
     {FormatCapability::Animation, "animation"},
     {FormatCapability::Compression, "compressed or quantized meshes"},
-    {FormatCapability::Printing, "fixed unit"},
 };
 
 }  // namespace
