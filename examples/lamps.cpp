@@ -80,9 +80,10 @@ int main(int argc, char** argv) {
   options.height = 270;
   options.samples = 4;
   options.light.max_lamps = 64;  // the library's default is 0: lamps light nothing
-  options.light.lamp_brightness = 2.0;
-  options.light.sun_brightness = 0.0;
-  options.light.sky_brightness = 0.2;
+  scene.environment = quoin::Environment::reference();
+  scene.environment->lamp_brightness = 2.0;
+  scene.environment->sun.brightness = 0.0;
+  scene.environment->sky.brightness = 0.2;
   const auto camera = quoin::look_at({93.0, 24.0, 33.0}, {20.0, 17.0, 40.0}, 1.0);
   if (!camera) return 1;
   const auto image = quoin::CpuRenderer(scene).render(*camera, options);

@@ -9,6 +9,7 @@
 
 #include "core/instruction_sets_for_tests.h"
 #include "io/gltf/glb_for_tests.h"
+#include "render/environment_for_tests.h"
 #include "render/path/town_for_tests.h"
 #include "tests/golden_for_tests.h"
 #include "tests/golden_views.h"
@@ -39,7 +40,7 @@ PathOptions options_of(const PathView& view) {
   PathOptions options;
   options.width = options.height = 64;
   options.samples = 16;
-  options.sun = view.sun;
+  physical_in(options).sun.direction = view.sun;
   return options;
 }
 
@@ -73,10 +74,10 @@ TEST_P(GoldenPaths, ATwinWithoutBouncesLampsOrSunIsAnother) {
   options.max_bounces = 0;
   EXPECT_GT(difference_of(taken(view, options), *golden).pixels, 64 * 64 / 4);
   options = options_of(view);
-  options.lamp_brightness = 0.0;
+  physical_in(options).lamp_brightness = 0.0;
   EXPECT_EQ(difference_of(taken(view, options), *golden).pixels > 64 * 64 / 4, view.is_town);
   options = options_of(view);
-  options.sun_brightness = 0.0;
+  physical_in(options).sun.brightness = 0.0;
   EXPECT_EQ(difference_of(taken(view, options), *golden).pixels > 64 * 64 / 16, view.sun.y > 0.0);
 }
 

@@ -8,6 +8,8 @@
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/terrain/terrain.h>
 
+#include "render/environment_for_tests.h"
+
 /// The scenes and views of the golden images.
 namespace quoin::golden {
 
@@ -28,7 +30,7 @@ inline void PrintTo(const GoldenView& view, std::ostream* out) {
   *out << view.name;
 }
 
-inline const DVec3 kUsualSun = LightOptions{}.sun;
+inline const DVec3 kUsualSun = Environment::reference().sun.direction;
 /// From behind the ridge, whose shadow falls over the slope and the water in front.
 inline const DVec3 kLowSun{-1.0, 0.9, -0.5};
 
@@ -73,7 +75,7 @@ inline RenderOptions options_for(const GoldenView& view) {
   options.width = kWidth;
   options.height = kHeight;
   options.depth = true;
-  options.light.sun = view.sun;
+  environment_in(options).sun.direction = view.sun;
   return options;
 }
 

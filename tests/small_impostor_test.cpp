@@ -22,6 +22,7 @@
 
 #include "apps/demo/castle.h"
 #include "core/srgb.h"
+#include "render/environment_for_tests.h"
 #include "render/impostor/impostor_test_support.h"
 
 namespace quoin {
@@ -173,7 +174,7 @@ Vec3 linear_at(const Image& image, std::size_t pixel) {
 Seen seen_in(const SmallModel& model, const Camera& camera, const RenderOptions& options) {
   RenderOptions flat = options;
   flat.light.shading = Shading::Unlit;
-  flat.light.sky_brightness = 0.0;
+  environment_in(flat).sky.brightness = 0.0;
   const Image covered = taken_by(*model.white_renderer, camera, flat);
   Seen seen;
   for (std::size_t i = 0; i < covered.rgb.size() / 3; ++i) seen.coverage.push_back(linear_at(covered, i).x);

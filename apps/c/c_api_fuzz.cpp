@@ -233,6 +233,13 @@ class Program {
     sun.angle_degrees = number();
     took(quoin_sun_set(handle(), perhaps(&sun)));
     took(quoin_sun_get(handle(), perhaps(&sun)));
+    auto environment = made<quoin_environment>();
+    took(quoin_environment_get(handle(), perhaps(&environment)));
+    environment.sky = whole();
+    environment.tone = whole();
+    environment.exposure = environment.fog_density = number();
+    environment.has_exposure = environment.has_fog = environment.has_ground = whole();
+    took(quoin_environment_set(handle(), perhaps(&environment)));
   }
 
   // Calls added later. They use byte values that meant little before, so that programs of the corpus hardly change.

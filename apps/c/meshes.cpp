@@ -190,18 +190,35 @@ Result<Camera> camera_of(const Scene& scene, const quoin_render_options& options
                  {options.look_at[0], options.look_at[1], options.look_at[2]}, degrees * std::numbers::pi / 180.0);
 }
 
+// Returns the scene's environment, or the given one for scenes without, with the sun of the options.
+Environment environment_with(const quoin_render_options& options, const Scene& scene, const Environment& otherwise) {
+  Environment environment = scene.environment.value_or(otherwise);
+  if (options.has_sun != 0) environment.sun.direction = {options.sun[0], options.sun[1], options.sun[2]};
+  return environment;
+}
+
+Environment environment_of_paths(const Scene& scene, const quoin_render_options& options) {
+  Environment usual = Environment::natural();
+  usual.sky.model = SkyModel::Physical;
+  usual.exposure = 1.0;
+  Environment environment = environment_with(options, scene, usual);
+  const bool lacks_image = environment.sky.model == SkyModel::Image && environment.sky.image == nullptr;
+  if (lacks_image) environment.sky.model = SkyModel::Uniform;
+  return environment;
+}
+
 Result<Image> rendered_of(const Scene& scene, const quoin_render_options& options, const ImageTaking& taking) {
   const Threads threads = threads_of(options.threads);
   if (options.paths != 0) {
     PathOptions wanted;
     wanted.width = taking.options.width;
     wanted.height = taking.options.height;
-    wanted.sun = taking.options.light.sun;
+    wanted.environment = environment_of_paths(scene, options);
     if (options.samples != 0) wanted.samples = options.samples;
     const auto image =
         PathTracer(scene, InstanceFilter::Visible, threads).render(taking.camera, wanted, threads, progress());
     if (!image) return image.error();
-    return develop(*image);
+    return develop(*image, develop_options(*wanted.environment));
   }
   auto image =
       CpuRenderer(scene, InstanceFilter::Visible, threads).render(taking.camera, taking.options, threads, progress());
@@ -257,8 +274,8 @@ Result<ImageTaking> taking_of(const Scene& scene, const quoin_render_options& op
   wanted.height = options.height == 0 ? 720 : options.height;
   wanted.samples = options.samples == 0 ? 4 : options.samples;
   wanted.light = natural_light();
-  if (options.has_sun != 0) wanted.light.sun = {options.sun[0], options.sun[1], options.sun[2]};
-  if (Status right = check(wanted.light); !right) return right.error();
+  wanted.environment = environment_with(options, scene, Environment::natural());
+  if (Status right = check(*wanted.environment); !right) return right.error();
   const auto camera = camera_of(scene, options, wanted.width, wanted.height);
   if (!camera) return camera.error();
   taking.camera = *camera;

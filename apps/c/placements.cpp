@@ -1,4 +1,4 @@
-// Instances, groups, layers, cameras, lamps and the sun of a scene; file formats.
+// Instances, groups, layers, cameras, lamps, sun and environment of a scene; file formats.
 
 #include <cmath>
 #include <numbers>
@@ -225,27 +225,94 @@ const char* take(const quoin_lamp& given, Lamp& lamp) {
 }
 
 /// Sets the sun. Returns an error text; null: success.
-const char* take(const quoin_sun& given, Look& look) {
+const char* take(const quoin_sun& given, Sun& sun) {
   const DVec3 direction = point_of(given.direction);
   const double length = glm::length(direction);
   if (!(length > 0.0) || !std::isfinite(length)) return "the sun needs a finite, non-zero direction";
   if (!is_amount(given.brightness) || !is_colour(given.colour)) return "the sun's brightness or colour is out of range";
   if (!(given.angle_degrees >= 0.0 && given.angle_degrees / kDegrees <= kMaxSunAngleRadians))
     return "the sun's angle is out of range";
-  look.sun = direction / length;
-  look.sun_brightness = given.brightness;
-  look.sun_colour = {given.colour[0], given.colour[1], given.colour[2]};
-  look.sun_angle_radians = given.angle_degrees / kDegrees;
+  sun.direction = direction / length;
+  sun.brightness = given.brightness;
+  sun.colour = {given.colour[0], given.colour[1], given.colour[2]};
+  sun.angle_radians = given.angle_degrees / kDegrees;
   return nullptr;
 }
 
-/// Returns the scene's sun; nothing if the scene has none.
-std::optional<Look> sun_of(const LoadedScene& loaded) {
-  if (loaded.look) return loaded.look->look;
-  if (!loaded.sun) return std::nullopt;
-  Look look;
-  look.sun = *loaded.sun;
-  return look;
+constexpr std::array kSkies = {SkyModel::Gradient, SkyModel::Fixed, SkyModel::Physical, SkyModel::Uniform,
+                               SkyModel::Image};  // QUOIN_SKY_...
+constexpr std::array kTones = {ToneCurve::Clamp, ToneCurve::Neutral, ToneCurve::Agx, ToneCurve::Aces};  // from 1 on
+
+void put_colour(Vec3 from, float (&to)[3]) {
+  for (int channel = 0; channel < 3; ++channel) to[channel] = from[channel];
+}
+Vec3 colour_of(const float (&from)[3]) {
+  return {from[0], from[1], from[2]};
+}
+
+void describe(const Environment& environment, quoin_environment& out) {
+  const auto* const sky = std::ranges::find(kSkies, environment.sky.model);
+  out.sky = static_cast<std::int32_t>(sky - kSkies.begin());
+  out.sky_brightness = environment.sky.brightness;
+  put_colour(environment.sky.colour, out.sky_colour);
+  out.has_background = environment.sky.background ? 1 : 0;
+  put_colour(environment.sky.background.value_or(Vec3(0.0F)), out.background);
+  out.lamp_brightness = environment.lamp_brightness;
+  out.has_exposure = environment.exposure ? 1 : 0;
+  out.exposure = environment.exposure.value_or(1.0);
+  if (environment.tone) {
+    out.tone = 1 + static_cast<std::int32_t>(std::ranges::find(kTones, *environment.tone) - kTones.begin());
+  }
+  const GroundPlane ground = environment.ground.value_or(GroundPlane{});
+  out.has_ground = environment.ground ? 1 : 0;
+  out.ground_height = ground.height;
+  put_colour(ground.colour, out.ground_colour);
+  const Fog fog = environment.fog.value_or(Fog{});
+  out.has_fog = environment.fog ? 1 : 0;
+  out.fog_density = fog.density;
+  out.fog_top = fog.top;
+  put_colour(fog.colour, out.fog_colour);
+  out.fog_anisotropy = fog.anisotropy;
+}
+
+/// Sets the environment. Errors: InvalidArgument.
+Status take(const quoin_environment& given, Environment& environment) {
+  const auto refuse = [](const char* message) { return make_error(ErrorCode::InvalidArgument, message); };
+  if (given.sky < 0 || given.sky >= std::ssize(kSkies)) return refuse("the sky is none of QUOIN_SKY_...");
+  if (given.tone < 0 || given.tone > std::ssize(kTones)) return refuse("the tone is none of QUOIN_TONE_...");
+  environment.sky.model = kSkies[static_cast<std::size_t>(given.sky)];
+  environment.sky.brightness = given.sky_brightness;
+  environment.sky.colour = colour_of(given.sky_colour);
+  environment.sky.background.reset();
+  if (given.has_background != 0) environment.sky.background = colour_of(given.background);
+  environment.lamp_brightness = given.lamp_brightness;
+  environment.exposure.reset();
+  if (given.has_exposure != 0) environment.exposure = given.exposure;
+  environment.tone.reset();
+  if (given.tone != 0) environment.tone = kTones[static_cast<std::size_t>(given.tone - 1)];
+  if (given.has_ground == 0) {
+    environment.ground.reset();
+  } else {
+    if (!environment.ground) environment.ground.emplace();
+    environment.ground->height = given.ground_height;
+    environment.ground->colour = colour_of(given.ground_colour);
+  }
+  if (given.has_fog == 0) {
+    environment.fog.reset();
+  } else {
+    if (!environment.fog) environment.fog.emplace();
+    environment.fog->density = given.fog_density;
+    environment.fog->top = given.fog_top;
+    environment.fog->colour = colour_of(given.fog_colour);
+    environment.fog->anisotropy = given.fog_anisotropy;
+  }
+  return check(environment);
+}
+
+/// Returns the sun of the scene, or of its file's render settings; null if there is none.
+const Sun* sun_of(const LoadedScene& loaded) {
+  if (loaded.scene.environment) return &loaded.scene.environment->sun;
+  return loaded.render_settings ? &loaded.render_settings->environment.sun : nullptr;
 }
 
 }  // namespace
@@ -346,8 +413,9 @@ quoin_status quoin_scene_get_info(quoin_scene scene, quoin_scene_info* out) {
       copy(box.min, info.min);
       copy(box.max, info.max);
     }
-    info.has_sun = body.loaded.sun ? 1 : 0;
-    if (body.loaded.sun) copy(*body.loaded.sun, info.sun);
+    const std::optional<Environment>& environment = body.loaded.scene.environment;
+    info.has_sun = environment && environment->sun.brightness > 0.0 ? 1 : 0;
+    if (info.has_sun != 0) copy(environment->sun.direction, info.sun);
     info.last_frame = body.loaded.last_frame;
     return report(info, out);
   });
@@ -463,13 +531,13 @@ quoin_status quoin_lamp_add(quoin_scene scene, const quoin_lamp* lamp) {
 quoin_status quoin_sun_get(quoin_scene scene, quoin_sun* out) {
   return with_scene(scene, Use::Read, [&](SceneBody& body) {
     quoin_sun sun{};
-    if (const auto look = sun_of(body.loaded)) {
+    if (const Sun* const found = sun_of(body.loaded)) {
       for (int axis = 0; axis < 3; ++axis) {
-        sun.direction[axis] = look->sun[axis];
-        sun.colour[axis] = look->sun_colour[axis];
+        sun.direction[axis] = found->direction[axis];
+        sun.colour[axis] = found->colour[axis];
       }
-      sun.brightness = look->sun_brightness;
-      sun.angle_degrees = look->sun_angle_radians * kDegrees;
+      sun.brightness = found->brightness;
+      sun.angle_degrees = found->angle_radians * kDegrees;
     }
     return report(sun, out);
   });
@@ -480,14 +548,36 @@ quoin_status quoin_sun_set(quoin_scene scene, const quoin_sun* sun) {
     const auto given = taken(sun);
     if (!given) return fail(QUOIN_INVALID_ARGUMENT, "sun is null, or its size");
     LoadedScene& loaded = body.loaded;
-    FileLook look;
-    // The defaults of a .vox file that stores only the sun's direction.
-    look.look.sky = SkyModel::Uniform;
-    look.develop.tone = ToneCurve::Aces;
-    if (loaded.look) look = *loaded.look;
-    if (const char* wrong = take(*given, look.look)) return fail(QUOIN_INVALID_ARGUMENT, wrong);
-    loaded.sun = look.look.sun_brightness > 0.0 ? std::optional(look.look.sun) : std::nullopt;
-    loaded.look = std::move(look);
+    Sun wanted;
+    if (const Sun* const before = sun_of(loaded)) wanted = *before;
+    if (const char* wrong = take(*given, wanted)) return fail(QUOIN_INVALID_ARGUMENT, wrong);
+    if (!loaded.scene.environment) loaded.scene.environment = Environment::natural();
+    loaded.scene.environment->sun = wanted;
+    if (loaded.render_settings) loaded.render_settings->environment.sun = wanted;
+    return QUOIN_OK;
+  });
+}
+
+quoin_status quoin_environment_get(quoin_scene scene, quoin_environment* out) {
+  return with_scene(scene, Use::Read, [&](SceneBody& body) {
+    quoin_environment environment{};
+    describe(body.loaded.scene.environment.value_or(Environment::natural()), environment);
+    return report(environment, out);
+  });
+}
+
+quoin_status quoin_environment_set(quoin_scene scene, const quoin_environment* environment) {
+  return with_scene(scene, Use::Change, [&](SceneBody& body) {
+    std::optional<Environment>& of_scene = body.loaded.scene.environment;
+    if (environment == nullptr) {
+      of_scene.reset();
+      return QUOIN_OK;
+    }
+    const auto given = taken(environment);
+    if (!given) return fail(QUOIN_INVALID_ARGUMENT, "the size of the environment");
+    Environment wanted = of_scene.value_or(Environment::natural());
+    if (Status right = take(*given, wanted); !right) return fail(right.error());
+    of_scene = std::move(wanted);
     return QUOIN_OK;
   });
 }

@@ -270,8 +270,8 @@ typedef struct quoin_render_options {
   int32_t has_camera;    /* 0: shows the whole scene from the front, right and above */
   double camera[3], look_at[3];
   double fov_degrees; /* vertical; 0: 45 */
-  int32_t has_sun;    /* 0: (-0.48, 0.72, 0.5) */
-  /* From the scene towards the sun; any non-zero length. The sky follows the sun. */
+  int32_t has_sun;    /* 0: the scene's sun, or (-0.48, 0.72, 0.5) */
+  /* From the scene towards the sun; any non-zero length. */
   double sun[3];
 } quoin_render_options;
 
@@ -394,6 +394,43 @@ typedef struct quoin_sun {
   double angle_degrees; /* angular diameter; 0: a point */
 } quoin_sun;
 
+enum {
+  QUOIN_SKY_GRADIENT = 0, /* follows the sun's height; the default */
+  QUOIN_SKY_FIXED = 1,    /* always day */
+  QUOIN_SKY_PHYSICAL = 2,
+  QUOIN_SKY_UNIFORM = 3,
+  QUOIN_SKY_IMAGE = 4 /* an image that the scene's file names; rendered as uniform */
+};
+enum {
+  QUOIN_TONE_AUTOMATIC = 0, /* neutral, or clamp under a uniform sky */
+  QUOIN_TONE_CLAMP = 1,
+  QUOIN_TONE_NEUTRAL = 2,
+  QUOIN_TONE_AGX = 3,
+  QUOIN_TONE_ACES = 4
+};
+
+/* The light and air around a scene, except the sun. All colours are linear. */
+typedef struct quoin_environment {
+  size_t size;
+  int32_t sky; /* QUOIN_SKY_... */
+  double sky_brightness;
+  float sky_colour[3];    /* of a uniform sky */
+  int32_t has_background; /* path tracing shows this colour to the camera in place of the sky */
+  float background[3];
+  double lamp_brightness; /* factor on the light of lamps and emissive voxels */
+  int32_t has_exposure;   /* 0: 1, or for path tracing a value that suits the sky */
+  double exposure;
+  int32_t tone;           /* QUOIN_TONE_..., for path tracing */
+  int32_t has_ground;     /* a ground plane, for path tracing */
+  double ground_height;   /* world y */
+  float ground_colour[3]; /* 0 to 1 */
+  int32_t has_fog;        /* fog below a height, for path tracing */
+  double fog_density;     /* scattering events per world unit */
+  double fog_top;         /* world y */
+  float fog_colour[3];    /* 0 to 1 */
+  double fog_anisotropy;  /* -0.99 to 0.99 */
+} quoin_environment;
+
 QUOIN_API quoin_status quoin_layer_count(quoin_scene scene, size_t* out);
 QUOIN_API quoin_status quoin_layer_get(quoin_scene scene, size_t index, quoin_layer* out);
 /* Adds a layer, or shows or hides the existing layer of this name. The name must not be empty. */
@@ -411,6 +448,11 @@ QUOIN_API quoin_status quoin_lamp_add(quoin_scene scene, const quoin_lamp* lamp)
  * brightness 1, 0.5 degrees. */
 QUOIN_API quoin_status quoin_sun_get(quoin_scene scene, quoin_sun* out);
 QUOIN_API quoin_status quoin_sun_set(quoin_scene scene, const quoin_sun* sun);
+/* Gets or sets the environment, which quoin_scene_render uses; .json and .quoin files store it. A scene without one
+ * gives the defaults of quoin_scene_render. To change some settings, get the environment first. Settings that this
+ * struct lacks stay. Null removes the environment and the sun. */
+QUOIN_API quoin_status quoin_environment_get(quoin_scene scene, quoin_environment* out);
+QUOIN_API quoin_status quoin_environment_set(quoin_scene scene, const quoin_environment* environment);
 
 #ifdef __cplusplus
 }

@@ -291,6 +291,41 @@ TEST_F(SceneOfARow, IsGivenCamerasLampsAndASun) {
   EXPECT_TRUE(sun.brightness == 1.5 && sun.colour[0] == 1.0F && sun.colour[1] == 0.0F);
 }
 
+TEST_F(SceneOfARow, SetsTheEnvironment) {
+  auto environment = sized<quoin_environment>();
+  ASSERT_EQ(quoin_environment_get(scene_, &environment), QUOIN_OK);
+  EXPECT_TRUE(environment.sky == QUOIN_SKY_GRADIENT && environment.tone == QUOIN_TONE_AUTOMATIC);
+  EXPECT_TRUE(environment.sky_brightness == 1.0 && environment.has_exposure == 0 && environment.has_fog == 0);
+  environment.sky = QUOIN_SKY_UNIFORM;
+  environment.tone = QUOIN_TONE_ACES;
+  environment.has_exposure = environment.has_fog = environment.has_ground = environment.has_background = 1;
+  environment.exposure = 0.5;
+  environment.fog_density = 0.25;
+  environment.ground_height = -3.0;
+  environment.background[1] = 0.75F;
+  ASSERT_EQ(quoin_environment_set(scene_, &environment), QUOIN_OK);
+  auto again = sized<quoin_environment>();
+  ASSERT_EQ(quoin_environment_get(scene_, &again), QUOIN_OK);
+  EXPECT_TRUE(again.sky == QUOIN_SKY_UNIFORM && again.tone == QUOIN_TONE_ACES && again.exposure == 0.5);
+  EXPECT_TRUE(again.has_fog == 1 && again.fog_density == 0.25 && again.ground_height == -3.0);
+  EXPECT_EQ(again.background[1], 0.75F);
+  for (const std::int32_t wrong : {-1, 5, 1'000'000}) {
+    again.sky = wrong;
+    EXPECT_EQ(quoin_environment_set(scene_, &again), QUOIN_INVALID_ARGUMENT);
+    again.sky = QUOIN_SKY_FIXED;
+    again.tone = wrong;
+    EXPECT_EQ(quoin_environment_set(scene_, &again), QUOIN_INVALID_ARGUMENT);
+    again.tone = QUOIN_TONE_CLAMP;
+  }
+  again.lamp_brightness = -1.0;
+  EXPECT_EQ(quoin_environment_set(scene_, &again), QUOIN_INVALID_ARGUMENT);
+  EXPECT_NE(std::string(quoin_last_error()).find("lamp_brightness"), std::string::npos);
+  EXPECT_EQ(quoin_environment_get(scene_, nullptr), QUOIN_INVALID_ARGUMENT);
+  ASSERT_EQ(quoin_environment_set(scene_, nullptr), QUOIN_OK);
+  ASSERT_EQ(quoin_environment_get(scene_, &environment), QUOIN_OK);
+  EXPECT_EQ(environment.sky, QUOIN_SKY_GRADIENT);
+}
+
 TEST_F(SceneOfARow, VoxelsAreWrittenBack) {
   std::array<std::uint8_t, 4> types = {2, 0, 1, 2};  // x = 1, 2; y = 0; z = 0, 1
   auto array = sized<quoin_array>();

@@ -85,7 +85,7 @@ quoin::Result<quoin::LoadedScene> make_fleet() {
   const auto camera = quoin::look_at({0, 30, 60}, {0, -10, -400}, std::numbers::pi / 4);
   if (!camera) return camera.error();
   fleet.camera = *camera;
-  fleet.sun = glm::normalize(quoin::DVec3{-0.4, 0.8, 0.75});
+  fleet.scene.environment = quoin::Environment::natural(glm::normalize(quoin::DVec3{-0.4, 0.8, 0.75}));
   return fleet;
 }
 
@@ -93,8 +93,9 @@ quoin::RenderOptions fleet_options(const quoin::LoadedScene& fleet) {
   quoin::RenderOptions options;
   options.samples = 4;
   options.detail.policy.emplace();
-  options.light.sun = *fleet.sun;
-  options.light.exposure = 1.15;
+  options.environment = quoin::Environment::reference();
+  options.environment->sun.direction = fleet.scene.environment->sun.direction;
+  options.environment->exposure = 1.15;
   return options;
 }
 

@@ -224,6 +224,41 @@ class Scenes(unittest.TestCase):
         self.assertEqual(quoin.from_numpy(ones, [(1, 2, 3)]).grids[0].shape, (3, 4, 5))
         self.assertEqual(len(quoin.mesh_labels(ones).triangles), 2 * 2 * (3 * 4 + 4 * 5 + 5 * 3))
 
+    def test_environment_is_saved_and_rendered(self):
+        _, scene = self.scene()
+        self.assertEqual(scene.environment, quoin.Environment())
+        plain = scene.render(60, 40)
+        night = quoin.Environment(
+            sky="physical", sky_brightness=0.5, sky_colour=(0.5, 0.25, 1.0), background=(0.0, 0.5, 0.25),
+            lamp_brightness=2.0, exposure=0.25, tone="agx", ground=quoin.Ground(-1.0, (0.25, 0.5, 1.0)),
+            fog=quoin.Fog(0.5, 8.0, (1.0, 0.5, 0.25), -0.5))
+        scene.set_environment(night)
+        scene.set_sun(quoin.Sun((0, 1, 1), 0.5))
+        self.assertEqual(scene.environment, night)
+        dark = scene.render(60, 40)
+        self.assertLess(dark.mean(), plain.mean())
+        with tempfile.TemporaryDirectory() as folder:
+            for ending in (".json", ".quoin", ".vox"):
+                path = os.path.join(folder, "night" + ending)
+                scene.save(path)
+                again = quoin.load(path)
+                if ending == ".vox":
+                    self.assertTrue(any("render settings" in one for one in scene.warnings), scene.warnings)
+                    continue
+                self.assertEqual(again.environment, night)
+                self.assertTrue((again.render(60, 40) == dark).all(), ending)
+        for wrong in (night._replace(sky_brightness=-1.0), night._replace(fog=quoin.Fog(-1.0, 0.0)),
+                      night._replace(exposure=float("nan"))):
+            with self.assertRaises(quoin.QuoinError):
+                scene.set_environment(wrong)
+        with self.assertRaises(ValueError):
+            scene.set_environment(night._replace(sky="green"))
+        self.assertEqual(scene.environment, night)
+        scene.set_environment(None)
+        self.assertEqual(scene.environment, quoin.Environment())
+        self.assertIsNone(scene.sun)
+        self.assertTrue((scene.render(60, 40) == plain).all())
+
     def test_groups_layers_cameras_and_the_sun_come_back(self):
         scene = quoin.from_numpy(np.ones((4, 4, 4), np.uint8), [(9, 9, 9)], "box")
         scene.set_layer("attic", visible=False)
@@ -250,12 +285,9 @@ class Scenes(unittest.TestCase):
                 self.assertEqual(any("lamps left out" in one for one in scene.warnings), ending == ".vox", scene.warnings)
                 sun = again.sun_light
                 self.assertTrue(np.allclose(sun.direction, np.array([1, 2, 2]) / 3, atol=1e-6), ending)
-                if ending == ".vox":
-                    self.assertAlmostEqual(sun.brightness, 2.5, 5)
-                    self.assertTrue(np.allclose(sun.colour, (1, 0.5, 0.25), atol=5e-3))
-                    self.assertAlmostEqual(sun.angle, 3.0, 4)
-                else:
-                    self.assertTrue(any("sun" in one for one in scene.warnings), scene.warnings)
+                self.assertAlmostEqual(sun.brightness, 2.5, 5)
+                self.assertTrue(np.allclose(sun.colour, (1, 0.5, 0.25), atol=5e-3))
+                self.assertAlmostEqual(sun.angle, 3.0, 4)
                 if ending == ".json":
                     self.assertTrue(any("cameras" in one for one in scene.warnings), scene.warnings)
                     continue
@@ -275,7 +307,7 @@ class Scenes(unittest.TestCase):
             scene.add_camera(CAMERA)
             scene.set_sun(quoin.Sun((0, 1, 0), 2.0))
             scene.save(os.path.join(folder, "a.json"))
-            self.assertEqual(scene.warnings, ["cameras left out: 1", "the sun's brightness and colour are left out"])
+            self.assertEqual(scene.warnings, ["cameras left out: 1"])
             scene.save(path)
             self.assertEqual(scene.warnings, [])
             again = quoin.load(path)

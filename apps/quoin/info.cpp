@@ -170,6 +170,7 @@ Json cameras_json(const LoadedScene& loaded) {
 
 Json info_json(const LoadedScene& loaded, InstanceFilter filter, const FaceCounts& faces) {
   const Hierarchy hierarchy(loaded.scene);
+  const std::optional<Environment>& environment = loaded.scene.environment;
   Json object = {{"format", loaded.format},
                  {"voxels", loaded.scene.voxel_count()},
                  {"voxels_with_data", voxels_with_data(loaded.scene)},
@@ -179,7 +180,7 @@ Json info_json(const LoadedScene& loaded, InstanceFilter filter, const FaceCount
                  {"faces_total", faces.total},
                  {"bounds", box(loaded.scene.bounds(filter))},
                  {"lamps", loaded.scene.lamps.size()},
-                 {"sun", loaded.sun ? list_of(*loaded.sun) : Json()},
+                 {"sun", environment ? list_of(environment->sun.direction) : Json()},
                  {"camera", loaded.camera ? list_of(loaded.camera->position) : Json()},
                  {"cameras", cameras_json(loaded)},
                  {"frames", loaded.last_frame + 1},
@@ -281,7 +282,7 @@ std::string info_text(const CommonOptions& options, const std::string& name, con
     text += "Data: at " + count_of(voxels, "voxel") + "\n";
   }
   if (!scene.lamps.empty()) text += "Lamps: " + std::to_string(scene.lamps.size()) + "\n";
-  if (loaded.sun) text += "Sun: towards " + three(*loaded.sun, ", ") + "\n";
+  if (scene.environment) text += "Sun: towards " + three(scene.environment->sun.direction, ", ") + "\n";
   for (const FileCamera& each : loaded.cameras) {
     text += "Camera " + std::to_string(each.number) + ": at " + three(each.camera.position, ", ") + "\n";
   }

@@ -69,6 +69,7 @@ RenderOptions options_for(const ViewRequest& request, const Stage& stage) {
   options.height = stage.height(request);
   options.samples = stage.samples;
   options.light = stage.is_draft ? draft_of(request.light) : request.light;
+  options.environment = marched_environment(request);
   // Short-lived images do not wait for impostors.
   if (stage.divisor > 1) options.detail.impostor_seconds = 0.0;
   options.detail.colours = request.detail_colours;

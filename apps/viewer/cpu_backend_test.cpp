@@ -61,6 +61,7 @@ Image expected(const Scene& scene, const ViewRequest& request) {
   options.height = request.height;
   options.samples = request.samples;
   options.light = request.light;
+  options.environment = marched_environment(request);
   return CpuRenderer(scene).render(request.camera, options).value().colour;
 }
 
@@ -107,24 +108,23 @@ TEST(CpuBackend, PathsConvergeToThePathTracersImage) {
   Watched watched(loaded.scene);
   ViewRequest request = request_for(loaded.scene, View::Iso, 48, 32);
   request.mode = DrawMode::Paths;
-  request.light.exposure = 1.5;
-  FileLook look;
-  look.look.sky = SkyModel::Uniform;
-  look.look.ground.emplace();
-  look.develop.tone = ToneCurve::Aces;
-  request.look = std::make_shared<const FileLook>(look);
+  request.exposure = 1.5;
+  FileRenderSettings settings;
+  settings.environment.sky.model = SkyModel::Uniform;
+  settings.environment.ground.emplace();
+  settings.environment.tone = ToneCurve::Aces;
+  request.render_settings = std::make_shared<const FileRenderSettings>(settings);
   watched.backend.show(request);
   const auto frames = watched.settle();
   ASSERT_GE(frames.size(), 5U);
   for (std::size_t i = 1; i < frames.size(); ++i) EXPECT_GE(frames[i].samples, frames[i - 1].samples);
   PathOptions options;
-  static_cast<Look&>(options) = look.look;
-  options.ground->height = loaded.scene.bounds().min.y;
+  options.environment = settings.environment;
+  options.environment->ground->height = loaded.scene.bounds().min.y;
   options.width = 48;
   options.height = 32;
   options.samples = frames.back().samples;
   options.denoise = true;
-  options.sun = request.light.sun;
   const auto image = PathTracer(loaded.scene).render(request.camera, options);
   ASSERT_TRUE(image.has_value());
   EXPECT_EQ(frames.back().colour.rgb, develop(*image, {1.5, ToneCurve::Aces}).value().rgb);
@@ -183,7 +183,7 @@ TEST(CpuBackend, TheSettledImageIsTheRenderersToTheByte) {
   Watched watched(loaded.scene);
   for (const View view : {View::Iso, View::Top}) {
     ViewRequest request = request_for(loaded.scene, view);
-    request.light.sun = {-0.5, 0.6, 0.1};
+    request.environment.sun.direction = {-0.5, 0.6, 0.1};
     watched.backend.show(request);
     const auto frames = watched.settle();
     ASSERT_FALSE(frames.empty());
@@ -206,7 +206,7 @@ TEST(CpuBackend, PathsShowTheNightAsRaysDo) {
     const double radians = degrees * std::numbers::pi / 180.0;
     ViewRequest request = request_for(loaded.scene, View::Iso, 48, 32);
     request.light = natural_light();
-    request.light.sun = {0.0, std::sin(radians), std::cos(radians)};
+    request.environment.sun.direction = {0.0, std::sin(radians), std::cos(radians)};
     const double marched = mean(expected(loaded.scene, request));
     const auto options = path_options(request, 48, 32, 16, loaded.scene.bounds());
     const auto rendered = PathTracer(loaded.scene).render(request.camera, options, {2});
@@ -464,11 +464,11 @@ TEST(CpuBackend, ImpossibleRequestsAreFaults) {
   const LoadedScene loaded = small_scene();
   Watched watched(loaded.scene);
   ViewRequest request = request_for(loaded.scene, View::Iso);
-  request.light.exposure = -1.0;
+  request.exposure = -1.0;
   watched.backend.show(request);
   while (!watched.backend.fault()) ASSERT_TRUE(watched.bell.wait());
   EXPECT_NE(watched.backend.fault()->message.find("exposure"), std::string::npos);
-  request.light.exposure = 1.0;
+  request.exposure = 1.0;
   watched.backend.show(request);
   ASSERT_FALSE(watched.settle().empty());
   EXPECT_FALSE(watched.backend.fault());

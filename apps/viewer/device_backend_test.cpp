@@ -94,6 +94,7 @@ Image by_processor(const Scene& scene, const ViewRequest& request) {
   options.height = request.height;
   options.samples = request.samples;
   options.light = request.light;
+  options.environment = marched_environment(request);
   options.detail.colours = request.detail_colours;
   if (request.detail_by_pixels) options.detail.policy.emplace();
   return CpuRenderer(scene).render(request.camera, options).value().colour;

@@ -208,6 +208,7 @@ MeshImageOptions DeviceDrawer::mesh_image() const {
   wanted.height = (request_->height + divisor_ - 1) / divisor_;
   wanted.samples = samples_;
   wanted.light = request_->light;
+  wanted.environment = marched_environment(*request_);
   wanted.wireframe = request_->wireframe;
   wanted.detail.colours = request_->detail_colours;
   if (request_->detail_by_pixels) wanted.detail.policy.emplace().rule = DetailPolicy::Rule::ByPixels;
@@ -314,6 +315,7 @@ Status DeviceDrawer::draw_stage() {
   wanted.height = stage.height;
   wanted.samples = samples_now(stage, image_->samples(), request_->samples);
   wanted.light = request_->light;
+  wanted.environment = marched_environment(*request_);
   wanted.detail.colours = request_->detail_colours;
   if (request_->detail_by_pixels) wanted.detail.policy.emplace().rule = DetailPolicy::Rule::ByPixels;
   wanted.detail.selector = &selectors_[divisor_];

@@ -15,8 +15,9 @@ namespace quoin::viewer {
 /// A document and its backend.
 struct OpenDocument {
   std::unique_ptr<Document> document;
-  std::unique_ptr<ViewBackend> backend;            // reads the document, so it is destroyed first
-  std::shared_ptr<const FileLook> look = nullptr;  // the file's render settings, if any
+  std::unique_ptr<ViewBackend> backend;                                 // reads the document, so it is destroyed first
+  std::shared_ptr<const FileRenderSettings> render_settings = nullptr;  // of the file, if any
+  std::optional<Environment> environment = std::nullopt;                // of the file, if it stores more than the sun
 };
 
 /// Makes the backend of a loaded document, on the loading thread.

@@ -84,8 +84,19 @@ void read_smooth_occlusion(const Json& object, SmoothOcclusionOptions& options) 
   read("power", 0.0625, 64.0, options.power);
 }
 
+void read_environment(const Json& object, Settings& settings) {
+  Environment& environment = settings.environment;
+  read_sun(object, environment.sun.direction);
+  read_number(object, "exposure", 0.0, 100.0, settings.exposure);
+  read_number(object, "sun_brightness", 0.0, 100.0, environment.sun.brightness);
+  read_number(object, "sky_brightness", 0.0, 100.0, environment.sky.brightness);
+  bool follows_sun = true;
+  read_flag(object, "sky_follows_sun", follows_sun);
+  environment.sky.model = follows_sun ? SkyModel::Gradient : SkyModel::Fixed;
+  read_number(object, "lamp_brightness", 0.0, 1000.0, environment.lamp_brightness);
+}
+
 void read_light(const Json& object, LightOptions& light) {
-  read_sun(object, light.sun);
   bool is_lit = true;
   read_flag(object, "lit", is_lit);  // written by earlier versions
   if (!is_lit) light.shading = Shading::Unlit;
@@ -95,13 +106,8 @@ void read_light(const Json& object, LightOptions& light) {
   read_name(object, "model", kLightModels, light.model);
   read_number(object, "least_light", 0.0, 100.0, light.least_light);
   read_flag(object, "shadows", light.shadows);
-  read_number(object, "exposure", 0.0, 100.0, light.exposure);
-  read_number(object, "sun_brightness", 0.0, 100.0, light.sun_brightness);
-  read_number(object, "sky_brightness", 0.0, 100.0, light.sky_brightness);
-  read_flag(object, "sky_follows_sun", light.sky_follows_sun);
   read_flag(object, "glass_surfaces", light.glass_surfaces);
   read_whole(object, "lamps", 0, 1024, light.max_lamps);
-  read_number(object, "lamp_brightness", 0.0, 1000.0, light.lamp_brightness);
   bool has_occlusion = true;
   read_flag(object, "occlusion", has_occlusion);  // written by earlier versions
   if (!has_occlusion) light.occlusion_mode = OcclusionMode::Off;
@@ -124,7 +130,7 @@ void read_recent(const Json& object, std::vector<std::string>& recent) {
   }
 }
 
-std::string environment(const char* name) {
+std::string environment_variable(const char* name) {
   const char* value = std::getenv(name);
   return value == nullptr ? "" : value;
 }
@@ -142,9 +148,9 @@ void Settings::note_recent(const std::filesystem::path& file) {
 
 std::filesystem::path settings_path() {
   // The XDG specification ignores relative paths.
-  const std::filesystem::path config = environment("XDG_CONFIG_HOME");
+  const std::filesystem::path config = environment_variable("XDG_CONFIG_HOME");
   if (config.is_absolute()) return config / "quoin" / "viewer.json";
-  const std::filesystem::path home = environment("HOME");
+  const std::filesystem::path home = environment_variable("HOME");
   return home.is_absolute() ? home / ".config" / "quoin" / "viewer.json" : std::filesystem::path();
 }
 
@@ -168,6 +174,7 @@ Settings parse_settings(std::string_view json) {
   }
   if (const Json* light = find(object, "light"); light != nullptr && light->is_object()) {
     read_light(*light, settings.light);
+    read_environment(*light, settings);
   }
   read_recent(object, settings.recent);
   return settings;
@@ -175,6 +182,8 @@ Settings parse_settings(std::string_view json) {
 
 std::string to_json(const Settings& settings) {
   const LightOptions& light = settings.light;
+  const Environment& environment = settings.environment;
+  const DVec3 sun = environment.sun.direction;
   Json object = {{"width", settings.width},
                  {"height", settings.height},
                  {"panel", settings.is_panel_shown},
@@ -184,7 +193,7 @@ std::string to_json(const Settings& settings) {
                  {"mode", kModes[static_cast<std::size_t>(settings.mode)]},
                  {"slice", {{"axis", kAxes[static_cast<std::size_t>(settings.slice.axis)]}, {"at", settings.slice.at}}},
                  {"light",
-                  {{"sun", {light.sun.x, light.sun.y, light.sun.z}},
+                  {{"sun", {sun.x, sun.y, sun.z}},
                    {"shading", kShadings[static_cast<std::size_t>(light.shading)]},
                    {"model", kLightModels[static_cast<std::size_t>(light.model)]},
                    {"least_light", light.least_light},
@@ -197,13 +206,13 @@ std::string to_json(const Settings& settings) {
                      {"power", light.smooth_occlusion.power}}},
                    {"occlusion_distance", light.occlusion_distance_voxels},
                    {"occlusion_darkens_all", light.occlusion_affects == OcclusionAffects::All},
-                   {"sun_brightness", light.sun_brightness},
-                   {"sky_brightness", light.sky_brightness},
-                   {"sky_follows_sun", light.sky_follows_sun},
+                   {"sun_brightness", environment.sun.brightness},
+                   {"sky_brightness", environment.sky.brightness},
+                   {"sky_follows_sun", environment.sky.model != SkyModel::Fixed},
                    {"glass_surfaces", light.glass_surfaces},
                    {"lamps", light.max_lamps},
-                   {"lamp_brightness", light.lamp_brightness},
-                   {"exposure", light.exposure}}},
+                   {"lamp_brightness", environment.lamp_brightness},
+                   {"exposure", settings.exposure}}},
                  {"recent", settings.recent}};
   if (std::isfinite(light.shadow_distance_voxels)) object["light"]["shadow_distance"] = light.shadow_distance_voxels;
   if (settings.ui_scale > 0.0) object["ui_scale"] = settings.ui_scale;

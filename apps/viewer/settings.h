@@ -7,6 +7,7 @@
 
 #include <quoin/core/result.h>
 #include <quoin/light/light_options.h>
+#include <quoin/scene/environment.h>
 
 #include "camera/camera_control.h"
 #include "view_backend.h"
@@ -27,6 +28,10 @@ struct Settings {
   DrawMode mode = DrawMode::Rays;
   SlicePlace slice;
   LightOptions light = natural_light();
+  /// For files without an environment of their own. Saved are its sun direction, brightnesses and whether the sky
+  /// follows the sun.
+  Environment environment;
+  double exposure = 1.0;            ///< factor on the environment's exposure
   std::vector<std::string> recent;  ///< files, newest first
 
   /// Moves a file to the front of `recent`, which keeps at most ten.

@@ -26,14 +26,14 @@ DVec3 sun_direction(const SunAngles& angles) {
           std::cos(angles.azimuth * kDegree) * level};
 }
 
-double lowest_sun(const LightOptions& light) {
-  return light.sky_follows_sun ? kNight : kLowest;
+double lowest_sun(const Environment& environment) {
+  return environment.sky.model == SkyModel::Fixed ? kLowest : kNight;
 }
 
-DVec3 drag_sun(const LightOptions& light, double dx, double dy) {
-  SunAngles angles = sun_angles(light.sun);
+DVec3 drag_sun(const Environment& environment, double dx, double dy) {
+  SunAngles angles = sun_angles(environment.sun.direction);
   angles.azimuth = std::remainder(angles.azimuth + dx * kDegreesPerPixel, 360.0);
-  angles.elevation = std::clamp(angles.elevation - dy * kDegreesPerPixel, lowest_sun(light), kHighest);
+  angles.elevation = std::clamp(angles.elevation - dy * kDegreesPerPixel, lowest_sun(environment), kHighest);
   return sun_direction(angles);
 }
 

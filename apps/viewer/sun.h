@@ -1,7 +1,7 @@
 #pragma once
 
 #include <quoin/core/vec.h>
-#include <quoin/light/light_options.h>
+#include <quoin/scene/environment.h>
 
 namespace quoin::viewer {
 
@@ -19,10 +19,10 @@ struct SunAngles {
 
 /// Returns the lowest elevation that can be set, in degrees: night if the sky follows the sun, else just high enough to
 /// light surfaces from above.
-[[nodiscard]] double lowest_sun(const LightOptions& light);
+[[nodiscard]] double lowest_sun(const Environment& environment);
 
 /// Returns the sun after a drag in pixels: dx turns it, an upward drag raises it, limited to the zenith and
 /// `lowest_sun`.
-[[nodiscard]] DVec3 drag_sun(const LightOptions& light, double dx, double dy);
+[[nodiscard]] DVec3 drag_sun(const Environment& environment, double dx, double dy);
 
 }  // namespace quoin::viewer

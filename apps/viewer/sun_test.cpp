@@ -20,25 +20,25 @@ TEST(Sun, AnglesAndDirectionsAgree) {
 }
 
 TEST(Sun, DraggingKeepsItInTheSky) {
-  LightOptions light;
-  light.sun = {0.3, 0.7, 0.2};
+  Environment environment = Environment::reference();
+  environment.sun.direction = {0.3, 0.7, 0.2};
   std::mt19937 random(2);
   std::normal_distribution<double> pixels(0.0, 200.0);
   for (int i = 0; i < 500; ++i) {
-    light.sun = drag_sun(light, pixels(random), pixels(random));
-    EXPECT_NEAR(glm::length(light.sun), 1.0, 1e-9);
-    EXPECT_GT(light.sun.y, 0.0);
+    environment.sun.direction = drag_sun(environment, pixels(random), pixels(random));
+    EXPECT_NEAR(glm::length(environment.sun.direction), 1.0, 1e-9);
+    EXPECT_GT(environment.sun.direction.y, 0.0);
   }
-  light.sun = {0.0, 0.5, 1.0};
-  EXPECT_GT(drag_sun(light, 0.0, -50.0).y, drag_sun(light, 0.0, 0.0).y) << "up is up";
+  environment.sun.direction = {0.0, 0.5, 1.0};
+  EXPECT_GT(drag_sun(environment, 0.0, -50.0).y, drag_sun(environment, 0.0, 0.0).y) << "up is up";
 }
 
 TEST(Sun, ItGoesDownWhereTheSkyFollowsIt) {
-  LightOptions light = natural_light();
-  for (int i = 0; i < 10; ++i) light.sun = drag_sun(light, 0.0, 100.0);
-  EXPECT_LT(sun_angles(light.sun).elevation, -18.0) << "down to night";
-  EXPECT_NEAR(sun_angles(light.sun).elevation, lowest_sun(light), 1e-9);
-  EXPECT_NEAR(sun_angles(light.sun).azimuth, sun_angles(natural_light().sun).azimuth, 1e-9);
+  Environment environment;
+  for (int i = 0; i < 10; ++i) environment.sun.direction = drag_sun(environment, 0.0, 100.0);
+  EXPECT_LT(sun_angles(environment.sun.direction).elevation, -18.0) << "down to night";
+  EXPECT_NEAR(sun_angles(environment.sun.direction).elevation, lowest_sun(environment), 1e-9);
+  EXPECT_NEAR(sun_angles(environment.sun.direction).azimuth, sun_angles(Sun{}.direction).azimuth, 1e-9);
 }
 
 }  // namespace

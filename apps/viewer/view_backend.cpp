@@ -25,28 +25,48 @@ double seconds_known(double known, double measured) {
 bool is_same(const ViewRequest& a, const ViewRequest& b) {
   return a.width == b.width && a.height == b.height && a.samples == b.samples &&
          a.detail_by_pixels == b.detail_by_pixels && a.detail_colours == b.detail_colours && a.mode == b.mode &&
-         a.wireframe == b.wireframe && a.look == b.look && a.slice == b.slice && a.whole_only == b.whole_only &&
+         a.wireframe == b.wireframe && a.environment == b.environment && a.exposure == b.exposure &&
+         a.render_settings == b.render_settings && a.slice == b.slice && a.whole_only == b.whole_only &&
          a.camera == b.camera && a.light == b.light;
 }
 
+Environment marched_environment(const ViewRequest& request) {
+  Environment environment = request.environment;
+  environment.exposure = environment.exposure.value_or(1.0) * request.exposure;
+  return environment;
+}
+
+namespace {
+
+// Returns the environment of path-traced images: the file's render settings, with sun and brightness of the panel.
+Environment traced_environment(const ViewRequest& request) {
+  const Environment& wanted = request.environment;
+  if (!request.render_settings) return wanted;
+  Environment environment = request.render_settings->environment;
+  environment.sun.direction = wanted.sun.direction;
+  environment.sun.brightness *= wanted.sun.brightness;
+  environment.sky.brightness *= wanted.sky.brightness;
+  environment.lamp_brightness = wanted.lamp_brightness;
+  return environment;
+}
+
+}  // namespace
+
 PathOptions path_options(const ViewRequest& request, int width, int height, int samples, const DBox& bounds) {
   PathOptions options;
-  static_cast<Look&>(options) = request.look ? request.look->look : natural_look().look;
-  if (options.sky == SkyModel::Environment) options.sky = SkyModel::Uniform;  // the environment image is not loaded
-  options.lens_radius = 0.0;
+  Environment& environment = options.environment.emplace(traced_environment(request));
+  // The viewer does not read the image of a sky.
+  if (environment.sky.model == SkyModel::Image && environment.sky.image == nullptr) {
+    environment.sky.model = SkyModel::Uniform;
+  }
   options.width = width;
   options.height = height;
   options.samples = samples;
   options.denoise = true;
-  const LightOptions& light = request.light;
-  options.sun = light.sun;
-  options.sun_brightness *= light.sun_brightness;
-  options.sky_brightness *= light.sky_brightness;
-  options.lamp_brightness = light.lamp_brightness;
-  fit_look(bounds, options);
-  if (request.look) {
-    options.max_bounces = request.look->max_bounces;
-    options.max_scatterings = request.look->max_scatterings;
+  if (request.render_settings) {
+    fit_environment(bounds, environment);
+    options.max_bounces = request.render_settings->max_bounces;
+    options.max_scatterings = request.render_settings->max_scatterings;
   }
   return options;
 }
@@ -83,9 +103,8 @@ int PathMemory::first_divisor(const ViewRequest& request, std::span<const int> d
 }
 
 DevelopOptions develop_options(const ViewRequest& request) {
-  DevelopOptions options =
-      request.look ? request.look->develop : natural_look(SkyModel::Gradient, request.light.sun).develop;
-  options.exposure *= request.light.exposure;
+  DevelopOptions options = develop_options(traced_environment(request));
+  options.exposure *= request.exposure;
   return options;
 }
 

@@ -11,13 +11,14 @@
 #include <vector>
 
 #include <quoin/core/image.h>
+#include <quoin/io/loaded_scene.h>
 #include <quoin/light/light_options.h>
 #include <quoin/render/path_history.h>
 #include <quoin/render/path_tracer.h>
 #include <quoin/render_vk/vulkan_image.h>
 #include <quoin/render_vk/vulkan_mesh_renderer.h>
 #include <quoin/scene/camera.h>
-#include <quoin/scene/look.h>
+#include <quoin/scene/environment.h>
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_query.h>
 #include <quoin/scene/sweep.h>
@@ -73,9 +74,12 @@ struct ViewRequest {
   int samples = 16;               ///< per pixel of the settled image; meshes use 4, or 1 if 1 is requested
   DrawMode mode = DrawMode::Rays;
   Wireframe wireframe = Wireframe::Off;  ///< meshes only
-  std::shared_ptr<const FileLook> look;  ///< paths only: the file's render settings; null if it has none
-  SlicePlace slice;                      ///< densities only; these use neither camera nor light
-  bool whole_only = false;               ///< skips smaller images in the meantime
+  Environment environment;
+  double exposure = 1.0;  ///< factor on the environment's exposure
+  /// Paths only: the file's render settings; null if it has none.
+  std::shared_ptr<const FileRenderSettings> render_settings;
+  SlicePlace slice;         ///< densities only; these use neither camera nor light
+  bool whole_only = false;  ///< skips smaller images in the meantime
 };
 
 /// Returns true if both request the same image.
@@ -83,11 +87,14 @@ struct ViewRequest {
 
 constexpr int kPathSamples = 256;  ///< per pixel of a settled path-traced image
 
+/// Returns the environment of images other than path-traced ones.
+[[nodiscard]] Environment marched_environment(const ViewRequest& request);
+
 /// Returns the path tracing options: the file's settings with the light of the window's panel, denoised within
 /// surfaces. `bounds` are the scene's.
 [[nodiscard]] PathOptions path_options(const ViewRequest& request, int width, int height, int samples,
                                        const DBox& bounds);
-/// Returns the matching tone mapping options.
+/// Returns the options for developing an image with these path tracing options.
 [[nodiscard]] DevelopOptions develop_options(const ViewRequest& request);
 
 /// The history that the path-traced images of one request share, across edits of the scene.

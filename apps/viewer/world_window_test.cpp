@@ -300,6 +300,7 @@ TEST_F(WorldWindowTest, DrawingDuringLoadingEndsWithTheFullImage) {
   options.width = request.width;
   options.height = request.height;
   options.light = request.light;
+  options.environment = marched_environment(request);
   const auto expected = CpuRenderer(document->scene()).render(request.camera, options);
   ASSERT_TRUE(expected);
   EXPECT_EQ(last->colour.rgb, expected->colour.rgb);

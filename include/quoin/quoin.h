@@ -88,8 +88,8 @@
 #include <quoin/render_vk/vulkan_mesh_renderer.h>
 #include <quoin/render_vk/vulkan_renderer.h>
 #include <quoin/scene/camera.h>
+#include <quoin/scene/environment.h>
 #include <quoin/scene/level_of_detail.h>
-#include <quoin/scene/look.h>
 #include <quoin/scene/near_grids.h>
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_animation.h>

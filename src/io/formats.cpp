@@ -138,9 +138,14 @@ std::vector<std::string> lost_with_source(const FormatOutput& output) {
   return lines;
 }
 
-/// Lists the cameras and sun that a format leaves out, except items of `lost_with_source`.
+/// Lists the environment, cameras and render settings that a format leaves out, except items of `lost_with_source`.
 std::vector<std::string> lost_views(const FormatOutput& output, const FormatInfo& format) {
   std::vector<std::string> lines;
+  const std::optional<Environment>& environment = output.scene.environment;
+  if (environment && !format.can(FormatCapability::Environment)) {
+    lines.emplace_back(is_only_sun(*environment) ? "the sun is left out"
+                                                 : "the environment (sun, sky, fog) is left out");
+  }
   if (output.loaded == nullptr) return lines;
   const LoadedScene& loaded = *output.loaded;
   // `lost_with_source` already lists the file's own items.
@@ -154,14 +159,7 @@ std::vector<std::string> lost_views(const FormatOutput& output, const FormatInfo
         std::ranges::count_if(loaded.cameras, [&](const FileCamera& one) { return one.camera != *loaded.camera; });
   }
   if (cameras > 0 && !is_reported("cameras: ")) lines.push_back("cameras left out: " + std::to_string(cameras));
-  const Look usual;
-  if (is_reported("render settings: ")) return lines;
-  const bool holds_sun = format.can(FormatCapability::Sun);
-  if (!holds_sun && loaded.sun) lines.emplace_back("the sun is left out");
-  if (holds_sun && loaded.sun && loaded.look &&
-      (loaded.look->look.sun_brightness != usual.sun_brightness || loaded.look->look.sun_colour != usual.sun_colour)) {
-    lines.emplace_back("the sun's brightness and colour are left out");
-  }
+  if (loaded.render_settings && !is_reported("render settings: ")) lines.emplace_back("render settings left out");
   return lines;
 }
 

@@ -309,12 +309,12 @@ void LampCache::update() {
   kept_.clear();
 }
 
-std::shared_ptr<const LampTable> LampCache::table(const Scene& scene, const LightOptions& light, Threads threads,
-                                                  FunctionRef<std::vector<LampPlace>()> places_of) {
-  if (light.max_lamps == 0 || light.lamp_brightness == 0.0 || light.shading != Shading::Lit) return nullptr;
+std::shared_ptr<const LampTable> LampCache::table(const Scene& scene, const LightOptions& light, double brightness,
+                                                  Threads threads, FunctionRef<std::vector<LampPlace>()> places_of) {
+  if (light.max_lamps == 0 || brightness == 0.0 || light.shading != Shading::Lit) return nullptr;
   const std::lock_guard lock(mutex_);
   const auto known = std::find_if(kept_.begin(), kept_.end(), [&](const Kept& kept) {
-    return kept.max_lamps == light.max_lamps && kept.brightness == light.lamp_brightness;
+    return kept.max_lamps == light.max_lamps && kept.brightness == brightness;
   });
   if (known != kept_.end()) {
     std::rotate(known, known + 1, kept_.end());
@@ -322,10 +322,10 @@ std::shared_ptr<const LampTable> LampCache::table(const Scene& scene, const Ligh
   }
   const std::vector<LampPlace> places = places_of();
   auto made = std::make_shared<LampTable>();
-  made->lamps = lamps_of(scene, places, light.lamp_brightness);
+  made->lamps = lamps_of(scene, places, brightness);
   if (!made->lamps.empty()) make_lists(places, light.max_lamps, threads, *made);
   if (kept_.size() == kMaxKept) kept_.erase(kept_.begin());
-  kept_.push_back({light.max_lamps, light.lamp_brightness, made->lists.empty() ? nullptr : std::move(made)});
+  kept_.push_back({light.max_lamps, brightness, made->lists.empty() ? nullptr : std::move(made)});
   return kept_.back().table;
 }
 

@@ -109,12 +109,12 @@ class LampCache {
   /// Call after the scene was edited or its instances changed.
   void update();
 
-  /// Returns null if no lamp shines or the options disable lamps. Calls `places` for the placed grids, in the order of
-  /// SceneTracer::placed, only if it has to make the table.
-  /// Cost of making it: the emissive cells of the changed chunks; for each chunk all lamps, for each brick the lamps
-  /// near its chunk. Reads the scene only then.
-  [[nodiscard]] std::shared_ptr<const LampTable> table(const Scene& scene, const LightOptions& light, Threads threads,
-                                                       FunctionRef<std::vector<LampPlace>()> places);
+  /// Returns null if no lamp shines or the options disable lamps. `brightness`: Environment::lamp_brightness. Calls
+  /// `places` for the placed grids, in the order of SceneTracer::placed, only if it has to make the table. Cost of
+  /// making it: the emissive cells of the changed chunks; for each chunk all lamps, for each brick the lamps near its
+  /// chunk. Reads the scene only then.
+  [[nodiscard]] std::shared_ptr<const LampTable> table(const Scene& scene, const LightOptions& light, double brightness,
+                                                       Threads threads, FunctionRef<std::vector<LampPlace>()> places);
 
  private:
   [[nodiscard]] std::vector<PlacedLamp> lamps_of(const Scene& scene, std::span<const LampPlace> places,

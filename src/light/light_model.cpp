@@ -89,15 +89,18 @@ Vec3 sun_through_air(double degrees) {
 
 }  // namespace
 
-Daylight daylight_of(const LightOptions& options) {
+Daylight daylight_of(const Environment& environment) {
   Daylight daylight;
-  daylight.sun_brightness = options.sun_brightness;
-  if (!options.sky_follows_sun) return daylight;
-  const double degrees = std::asin(std::clamp(to_sun(options).y, -1.0, 1.0)) * 180.0 / std::numbers::pi;
-  const Colours look = look_at_elevation(static_cast<float>(degrees));
-  daylight.sky = {{look[0], look[1], look[2]}, {look[3], look[4], look[5]}, {look[6], look[7], look[8]}};
-  daylight.ambient = {look[9], look[10], look[11]};
-  daylight.sun = sun_through_air(degrees);
+  daylight.sun_brightness = environment.sun.brightness;
+  if (environment.sky.model != SkyModel::Fixed) {
+    const double sine = environment.sun.unit_direction().y;
+    const double degrees = std::asin(std::clamp(sine, -1.0, 1.0)) * 180.0 / std::numbers::pi;
+    const Colours look = look_at_elevation(static_cast<float>(degrees));
+    daylight.sky = {{look[0], look[1], look[2]}, {look[3], look[4], look[5]}, {look[6], look[7], look[8]}};
+    daylight.ambient = {look[9], look[10], look[11]};
+    daylight.sun = sun_through_air(degrees);
+  }
+  daylight.sun *= environment.sun.colour;
   if (daylight.sun == Vec3(0.0F)) daylight.sun_brightness = 0.0;
   return daylight;
 }
@@ -109,13 +112,13 @@ constexpr float kOfSun = 0.7F;
 
 }  // namespace
 
-LightLook light_look(const LightOptions& options) {
-  const Daylight daylight = daylight_of(options);
+LightLook light_look(const Environment& environment, double least_light) {
+  const Daylight daylight = daylight_of(environment);
   LightLook look;
-  look.sky = kOfSky * static_cast<float>(options.sky_brightness) * daylight.ambient +
+  look.sky = kOfSky * static_cast<float>(environment.sky.brightness) * daylight.ambient +
              kOfSun * static_cast<float>(daylight.sun_brightness) * daylight.sun;
-  look.lamps = Vec3(static_cast<float>(options.lamp_brightness));
-  look.least = Vec3(static_cast<float>(options.least_light));
+  look.lamps = Vec3(static_cast<float>(environment.lamp_brightness));
+  look.least = Vec3(static_cast<float>(least_light));
   return look;
 }
 

@@ -8,6 +8,7 @@
 
 #include <quoin/core/vec.h>
 #include <quoin/light/light_options.h>
+#include <quoin/scene/environment.h>
 #include <quoin/scene/level_of_detail.h>
 
 namespace quoin {
@@ -28,16 +29,9 @@ constexpr float kLeastOfAll = 0.25F;  ///< remaining light at full occlusion if 
   return shading == Shading::Occlusion || shading == Shading::Normals;
 }
 
-/// The unit vector towards the sun.
-[[nodiscard]] inline DVec3 to_sun(const LightOptions& options) {
-  // Scaled first: the square of a very small or large number is 0 or infinite.
-  const DVec3 size = glm::abs(options.sun);
-  return glm::normalize(options.sun / std::max({size.x, size.y, size.z}));
-}
-
-/// Returns the exposure, limited to be finite: infinity times black would be NaN.
-[[nodiscard]] inline float exposure_of(const LightOptions& options) {
-  return static_cast<float>(std::min<double>(options.exposure, std::numeric_limits<float>::max()));
+/// Returns the exposure of surfaces, limited to be finite: infinity times black would be NaN.
+[[nodiscard]] inline float exposure_of(const Environment& environment) {
+  return static_cast<float>(std::min<double>(environment.exposure.value_or(1.0), std::numeric_limits<float>::max()));
 }
 
 /// Returns the linear colour that represents a level of detail.
@@ -80,18 +74,18 @@ struct SkyColours {
 
 /// The light of sun and sky: the single model used by all renderers.
 struct Daylight {
-  SkyColours sky;               ///< before LightOptions::sky_brightness
+  SkyColours sky;               ///< before Sky::brightness
   Vec3 ambient{1.0F};           ///< times the ambient term
   Vec3 sun{1.0F};               ///< times the sun's light
-  double sun_brightness = 1.0;  ///< as in the options; 0 if the sun gives no light
+  double sun_brightness = 1.0;  ///< as in the environment; 0 if the sun gives no light
 };
 
-/// Returns the colours of sun and sky. Always day unless LightOptions::sky_follows_sun is set.
+/// Returns the colours of sun and sky. Always day for SkyModel::Fixed; all other models give the colours of Gradient.
 ///
 /// Sun:     transmittance of the air by Rayleigh scattering. The length of the path is from F. Kasten, A. T. Young,
 ///          "Revised optical air mass tables and approximation formula" (1989). The sun fades out within two degrees.
 /// Sky:     a monotone curve through a table of elevations. Above 30 degrees it has the day's colours; from 18 degrees
 ///          below the horizon downwards it is night, with a little light of its own.
-[[nodiscard]] Daylight daylight_of(const LightOptions& options);
+[[nodiscard]] Daylight daylight_of(const Environment& environment);
 
 }  // namespace quoin

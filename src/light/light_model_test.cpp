@@ -9,13 +9,10 @@
 namespace quoin {
 namespace {
 
-LightOptions with_sun(double elevation, double azimuth = 0.7) {
-  LightOptions options;
-  options.sky_follows_sun = true;
+Environment with_sun(double elevation, double azimuth = 0.7) {
   const double radians = elevation * std::numbers::pi / 180.0;
-  options.sun =
-      3.0 * DVec3(std::cos(radians) * std::sin(azimuth), std::sin(radians), std::cos(radians) * std::cos(azimuth));
-  return options;
+  return Environment::natural(
+      3.0 * DVec3(std::cos(radians) * std::sin(azimuth), std::sin(radians), std::cos(radians) * std::cos(azimuth)));
 }
 
 Daylight at(double elevation) {
@@ -26,12 +23,12 @@ std::array<Vec3, 5> parts(const Daylight& light) {
   return {light.sky.zenith, light.sky.horizon, light.sky.ground, light.ambient, light.sun};
 }
 
-TEST(Daylight, ItIsTheReferenceModelUnlessAskedFor) {
+TEST(Daylight, FixedSkiesAreTheReferenceModelAtAnyHour) {
   for (const double elevation : {60.0, 5.0, -30.0}) {
-    LightOptions options = with_sun(elevation);
-    options.sky_follows_sun = false;
-    options.sun_brightness = 0.3;
-    const Daylight light = daylight_of(options);
+    Environment environment = with_sun(elevation);
+    environment.sky.model = SkyModel::Fixed;
+    environment.sun.brightness = 0.3;
+    const Daylight light = daylight_of(environment);
     EXPECT_EQ(light.sky.zenith, sky::kZenith);
     EXPECT_EQ(light.sky.horizon, sky::kHorizon);
     EXPECT_EQ(light.sky.ground, sky::kGround);
@@ -89,6 +86,15 @@ TEST(Daylight, ASunBelowTheHorizonLightsNothing) {
   }
   EXPECT_GT(at(0.5).sun.x, 0.0F);
   EXPECT_EQ(at(0.5).sun_brightness, 1.0);
+}
+
+TEST(Daylight, MultipliesByTheSunsColour) {
+  Environment environment = with_sun(60.0);
+  const Vec3 white = daylight_of(environment).sun;
+  environment.sun.colour = {0.5F, 2.0F, 0.0F};
+  EXPECT_EQ(daylight_of(environment).sun, white * environment.sun.colour);
+  environment.sun.colour = Vec3(0.0F);
+  EXPECT_EQ(daylight_of(environment).sun_brightness, 0.0);
 }
 
 TEST(Daylight, IsIndependentOfTheSunsAzimuth) {

@@ -99,8 +99,8 @@ struct Lighting::Group {
 };
 
 Lighting::Lighting(const SceneView& view, const VoxelRegistry& types, const Surfaces& surfaces,
-                   const LightOptions& options, const LampTable* lamps, bool detail_colours,
-                   std::vector<GridLight> levels)
+                   const LightOptions& options, const Environment& environment, const LampTable* lamps,
+                   bool detail_colours, std::vector<GridLight> levels)
     : view_(&view),
       types_(&types),
       surfaces_(&surfaces),
@@ -108,13 +108,13 @@ Lighting::Lighting(const SceneView& view, const VoxelRegistry& types, const Surf
       options_(options),
       directions_(options.occlusion_rays),
       levels_(std::move(levels)),
-      look_(light_look(options)),
-      exposure_(exposure_of(options)),
-      sky_(static_cast<float>(options.sky_brightness)),
-      daylight_(daylight_of(options)) {
-  QUOIN_ASSERT(check(options).has_value(), "options that `check` accepts");
+      look_(light_look(environment, options.least_light)),
+      exposure_(exposure_of(environment)),
+      sky_(static_cast<float>(environment.sky.brightness)),
+      daylight_(daylight_of(environment)) {
+  QUOIN_ASSERT(check(options).has_value() && check(environment).has_value(), "options that `check` accepts");
   QUOIN_ASSERT(!is_propagated() || levels_.size() == placed_in(view.tracer()).size(), "levels of each placed grid");
-  const DVec3 sun = to_sun(options);
+  const DVec3 sun = environment.sun.unit_direction();
   for (const PlacedGrid& placed : placed_in(view.tracer())) {
     if (detail_colours) detail_surfaces_.emplace_back().colour = colour_of_detail(placed.detail, placed.level);
     Frame& frame = frames_.emplace_back();

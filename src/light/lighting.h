@@ -53,11 +53,12 @@ struct SurfacePoint {
 /// LightModel::Propagated has colour * light_colour * (1 - 0.75 * occlusion) + emitted instead.
 class Lighting {
  public:
-  /// `view`, `surfaces` and `lamps` must outlive it. Requires: `check` accepts the options.
+  /// `view`, `surfaces` and `lamps` must outlive it. Requires: `check` accepts the options and the environment.
   /// `lamps`: for the same placed grids; null: no lamps. `detail_colours`: surfaces have the colour of their grid's
   /// detail and emit nothing. `levels`: for each placed grid, if the options' model is propagated light.
   Lighting(const SceneView& view, const VoxelRegistry& types, const Surfaces& surfaces, const LightOptions& options,
-           const LampTable* lamps = nullptr, bool detail_colours = false, std::vector<GridLight> levels = {});
+           const Environment& environment, const LampTable* lamps = nullptr, bool detail_colours = false,
+           std::vector<GridLight> levels = {});
 
   /// Computes the linear light of each point, not clamped. Returns the number of rays traced.
   ///

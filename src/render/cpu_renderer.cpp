@@ -347,12 +347,14 @@ struct CpuRenderer::Impl {
         instances(filter),
         tracer(of_scene, filter, threads),
         surfaces(of_scene.types),
+        environment(environment_of(of_scene)),
         detail(threads) {}
 
   const Scene* scene;
   InstanceFilter instances;
   SceneTracer tracer;
   Surfaces surfaces;
+  Environment environment;
   DetailChooser detail;
   LampCache lamps;
   LightCache levels;
@@ -365,8 +367,9 @@ struct CpuRenderer::Impl {
     for (const PlacedGrid& each : placed_in(of)) found.push_back(all.of(scene->instances()[each.instance].grid));
     return found;
   }
-  [[nodiscard]] std::shared_ptr<const LampTable> lamp_table(const LightOptions& light, Threads threads) {
-    return lamps.table(*scene, light, threads, [this] { return lamp_places(); });
+  [[nodiscard]] std::shared_ptr<const LampTable> lamp_table(const LightOptions& light, double brightness,
+                                                            Threads threads) {
+    return lamps.table(*scene, light, brightness, threads, [this] { return lamp_places(); });
   }
   [[nodiscard]] std::vector<LampPlace> lamp_places() const {
     std::vector<LampPlace> places;
@@ -408,6 +411,7 @@ void CpuRenderer::update(Threads threads) {
   impl_of(impl_).tracer.update(threads);
   impl_of(impl_).surfaces.update(impl_of(impl_).scene->types);
   impl_of(impl_).detail.update_types(impl_of(impl_).scene->types);
+  impl_of(impl_).environment = environment_of(*impl_of(impl_).scene);
   impl_of(impl_).lamps.update();
   impl_of(impl_).levels.update();
 }
@@ -416,8 +420,10 @@ void CpuRenderer::use_light(const SceneLight* light) {
   impl_of(impl_).levels.use(light);
 }
 
-Result<RenderedImage> CpuRenderer::render(const Camera& camera, const RenderOptions& options, Threads threads,
+Result<RenderedImage> CpuRenderer::render(const Camera& camera, const RenderOptions& asked, Threads threads,
                                           const Progress& progress) const {
+  const RenderOptions options = with_environment(asked, impl_of(impl_).environment);
+  const Environment& environment = *options.environment;
   if (const Status status = check(camera, options); !status) return status.error();
   QUOIN_ASSERT(std::abs(glm::dot(camera.right, camera.up)) < 1e-3 &&
                    std::abs(glm::dot(camera.right, camera.forward)) < 1e-3 &&
@@ -431,9 +437,11 @@ Result<RenderedImage> CpuRenderer::render(const Camera& camera, const RenderOpti
   subject.leave_to_impostors(detail.far.instances, camera, options);
   const SceneView& view = *subject.view;
   const CameraRays rays(camera, options.width, options.height);
-  const std::shared_ptr<const LampTable> lamps = impl_of(impl_).lamp_table(options.light, threads);
-  const Lighting lighting(view, impl_of(impl_).scene->types, impl_of(impl_).surfaces, options.light, lamps.get(),
-                          options.detail.colours, impl_of(impl_).levels_of(view.tracer(), options.light, threads));
+  const std::shared_ptr<const LampTable> lamps =
+      impl_of(impl_).lamp_table(options.light, environment.lamp_brightness, threads);
+  const Lighting lighting(view, impl_of(impl_).scene->types, impl_of(impl_).surfaces, options.light, environment,
+                          lamps.get(), options.detail.colours,
+                          impl_of(impl_).levels_of(view.tracer(), options.light, threads));
   const TileContext context{&view, &rays, &lighting, &options, subject.impostors ? &*subject.impostors : nullptr};
   RenderedImage image = empty_image(options);
   if (Status drawn = draw_tiles<Tile>(context, options, threads, progress, image); !drawn) return drawn.error();

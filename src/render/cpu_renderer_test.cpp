@@ -10,6 +10,7 @@
 #include "core/instruction_sets_for_tests.h"
 #include "light/light_model.h"
 #include "render/camera_rays.h"
+#include "render/environment_for_tests.h"
 #include "render/render_test_support.h"
 
 namespace quoin {
@@ -123,7 +124,7 @@ TEST(CpuRenderer, RefusesWhatCannotBe) {
   expect_refused("size", [](Camera&, RenderOptions& o) { o.width = o.height = std::numeric_limits<int>::max(); });
   expect_refused("samples", [](Camera&, RenderOptions& o) { o.samples = 0; });
   expect_refused("samples", [](Camera&, RenderOptions& o) { o.samples = 4097; });
-  expect_refused("sun", [](Camera&, RenderOptions& o) { o.light.sun = DVec3(0.0); });
+  expect_refused("sun", [](Camera&, RenderOptions& o) { environment_in(o).sun.direction = DVec3(0.0); });
   expect_refused("camera", [](Camera& c, RenderOptions&) { c.position.y = kNan; });
   expect_refused("camera", [](Camera& c, RenderOptions&) { c.forward = DVec3(0.0); });
   expect_refused("camera", [](Camera& c, RenderOptions&) { c.up.x = kNan; });
@@ -187,7 +188,7 @@ TEST(CpuRenderer, UnlitColoursAreThoseOfThePalette) {
   place(scene, std::move(grid));
   RenderOptions options = sized(16, 16);
   options.light.shading = Shading::Unlit;
-  options.light.exposure = 3.0;
+  environment_in(options).exposure = 3.0;
   options.samples = 3;
   const RenderedImage image = taken(scene, from_above(8, 5, 8, 16), options);
   for (int i = 0; i < 256; ++i) {

@@ -44,7 +44,8 @@ Status check(const Camera& camera, const RenderOptions& options) {
   if (options.detail.impostor_edge < 16 || options.detail.impostor_edge > 1024)
     return refuse("impostor_edge: must be 16 to 1024");
   if (options.samples < 1 || options.samples > 4096) return refuse("samples: must be 1 to 4096");
-  return check(options.light);
+  if (Status light = check(options.light); !light) return light;
+  return options.environment ? check(*options.environment) : Status();
 }
 
 RenderedImage empty_image(const RenderOptions& options) {

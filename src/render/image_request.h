@@ -19,6 +19,13 @@ namespace quoin {
 /// Returns the argument errors of CpuRenderer::render, which all renderers share.
 [[nodiscard]] Status check(const Camera& camera, const RenderOptions& options);
 
+/// Returns the options of an image with the environment set: their own, or that of the scene.
+template <class Options>
+[[nodiscard]] Options with_environment(Options options, const Environment& of_scene) {
+  if (!options.environment) options.environment = of_scene;
+  return options;
+}
+
 /// Returns an image of the requested size, with depths if requested.
 [[nodiscard]] RenderedImage empty_image(const RenderOptions& options);
 

@@ -15,6 +15,7 @@
 #include <quoin/scene/scene_tracer.h>
 #include <quoin/terrain/terrain.h>
 
+#include "render/environment_for_tests.h"
 #include "render/render_test_support.h"
 #include "scene/tracer/placed_grid.h"
 
@@ -405,7 +406,7 @@ TEST(RenderDetail, OffscreenInstancesStillCastShadows) {
   roof.fill_box({{-20, 0, -20}, {21, 1, 21}}, type);
   const InstanceHandle handle = place(scene, std::move(roof), {0, 90, 0});
   RenderOptions options = sized(4, 4);
-  options.light.sun = {0, 1, 0};
+  environment_in(options).sun.direction = {0, 1, 0};
   options.detail.policy.emplace().far_pixels = 0;
   const Camera camera = from_above(0, 30, 0, 4);
   const Pixel shadowed = pixel_at(taken(scene, camera, options), 1, 1);

@@ -7,6 +7,7 @@
 
 #include "core/instruction_sets_for_tests.h"
 #include "light/light_model.h"
+#include "render/environment_for_tests.h"
 #include "render/render_test_support.h"
 
 namespace quoin {
@@ -108,7 +109,7 @@ TEST(RenderFieldGlass, TheFloorOfALakeIsWhereItsSamplesSay) {
   });
   place_field(s.scene, std::move(lake));
   RenderOptions options = sized(4, 4);
-  options.light.sun = {0, 1, 0};
+  environment_in(options).sun.direction = {0, 1, 0};
   options.light.occlusion_mode = OcclusionMode::Off;
   const RenderedImage image = taken(s.scene, from_above(0, 20, 0, 4), options);
   // The sun's light passes the water, and the view does too; the surface itself blocks no light.
@@ -125,7 +126,7 @@ TEST(RenderFieldGlass, TintsTheSunAndDoesNotOcclude) {
   add_plate(slab, {-11, 3, -11}, {11, 5, 11}, s.glass);
   const InstanceHandle roof = place_field(s.scene, std::move(slab));
   RenderOptions options = sized(3, 3);
-  options.light.sun = {0, 1, 0};
+  environment_in(options).sun.direction = {0, 1, 0};
   const auto floor_below = [&] { return pixel_at(taken(s.scene, from_above(0, 2, 0, 4), options), 1, 1); };
   expect_near(floor_below(), encoded(linear(kWhite) * (0.15F + through(2.0F))), 1);
   options.light.shadow_distance_voxels = 4.49;
@@ -158,7 +159,7 @@ TEST(RenderFieldGlass, BesideGlassOfBlocksItLooksTheSame) {
   add_plate(plate, {0, 2, -8}, {8, 5, 8}, s.glass);
   place_field(s.scene, std::move(plate));
   RenderOptions options = sized(16, 16);
-  options.light.sun = {0, 1, 0};
+  environment_in(options).sun.direction = {0, 1, 0};
   options.light.glass_surfaces = true;
   const RenderedImage above = taken(s.scene, from_above(0, 30, 0, 12), options);
   for (int y = 2; y < 14; ++y) expect_near(pixel_at(above, 2, y), pixel_at(above, 13, y), 1);

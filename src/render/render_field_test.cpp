@@ -10,6 +10,7 @@
 #include <quoin/mesh/smooth_occlusion.h>
 
 #include "light/occlusion_directions.h"
+#include "render/environment_for_tests.h"
 #include "render/path/town_for_tests.h"
 #include "render/render_test_support.h"
 
@@ -22,7 +23,7 @@ constexpr DVec3 kSun{0.48, 0.6, 0.64};  // unit
 
 RenderOptions lit_by_the_sun(int edge) {
   RenderOptions options = sized(edge, edge);
-  options.light.sun = kSun;
+  environment_in(options).sun.direction = kSun;
   options.light.occlusion_mode = OcclusionMode::Off;
   return options;
 }
@@ -73,12 +74,12 @@ TEST(RenderField, FieldsAndBlocksShadeEachOther) {
   ball.add_sphere(DVec3(16.0), 8.0, grey);
   place_field(scene, std::move(ball), {-16, 0, -16});
   RenderOptions options = lit_by_the_sun(81);
-  options.light.sun = {0, 1, 0};
+  environment_in(options).sun.direction = {0, 1, 0};
   const RenderedImage image = taken(scene, from_above(0, 100, 0, 81), options);
   // No pixel below the ball's outline is visible; next to it the floor is lit.
   EXPECT_EQ(pixel_at(image, 40 + 10, 40), encoded(linear({188, 188, 188, 255}) * 1.1F));
   // With a slanted sun the ball's shadow lies at the projection of its centre onto the floor.
-  options.light.sun = {1, 1, 0};
+  environment_in(options).sun.direction = {1, 1, 0};
   const RenderedImage aslant = taken(scene, from_above(0, 100, 0, 81), options);
   const Pixel in_shadow = encoded(linear({188, 188, 188, 255}) * 0.1F);
   EXPECT_EQ(pixel_at(aslant, 40 - 16, 40), in_shadow);
@@ -89,7 +90,7 @@ TEST(RenderField, FieldsAndBlocksShadeEachOther) {
   Grid roof;
   roof.fill_box({{-3, 30, -3}, {4, 31, 4}}, grey);
   place(scene, std::move(roof));
-  options.light.sun = {0, 1, 0};
+  environment_in(options).sun.direction = {0, 1, 0};
   const RenderedImage under = taken(scene, from_above(0, 28, 0, 81), options);
   EXPECT_EQ(pixel_at(under, 40, 40), in_shadow);
   EXPECT_NE(pixel_at(under, 40 + 6, 40), in_shadow);
@@ -183,7 +184,7 @@ TEST(RenderField, MaterialsColourIt) {
   options.light.shading = Shading::Normals;
   EXPECT_EQ(pixel_at(taken(scene, from_above(25, 50, 5, 20), options), 10, 10), (Pixel{128, 255, 128}));
   options.light.shading = Shading::Lit;
-  options.light.sun_brightness = options.light.sky_brightness = 0.0;
+  environment_in(options).sun.brightness = environment_in(options).sky.brightness = 0.0;
   const RenderedImage night = taken(scene, from_above(25, 50, 5, 20), options);
   EXPECT_EQ(pixel_at(night, 10, 10), (Pixel{0, 0, 0}));
   EXPECT_GT(pixel_at(night, 30, 10)[1], 200);
@@ -251,11 +252,11 @@ TEST(RenderField, BlendsEmissionToo) {
   });
   place_field(scene, std::move(field));
   RenderOptions options = sized(40, 40);
-  options.light.sun_brightness = options.light.sky_brightness = 0.0;
+  environment_in(options).sun.brightness = environment_in(options).sky.brightness = 0.0;
   const Camera camera = from_above(19.5, 50, 20, 4);
   const RenderedImage image = taken(scene, camera, options);
   PathOptions paths = under_even_sky(40, 40, 16);
-  paths.sky_brightness = 0.0;
+  physical_in(paths).sky.brightness = 0.0;
   paths.max_bounces = 0;
   const PathImage traced = path_image(scene, camera, paths);
   for (int x = 0; x < 40; ++x) {

@@ -8,6 +8,7 @@
 
 #include "light/glass_bodies.h"
 #include "light/light_model.h"
+#include "render/environment_for_tests.h"
 #include "render/render_test_support.h"
 #include "scene/tracer/placed_grid.h"
 
@@ -127,7 +128,7 @@ TEST(RenderGlass, TintsTheSunAndDoesNotOcclude) {
   grid.fill_box({{-9, 3, -9}, {10, 5, 10}}, s.glass);
   place(s.scene, std::move(grid));
   RenderOptions options = sized(3, 3);
-  options.light.sun = {0, 1, 0};
+  environment_in(options).sun.direction = {0, 1, 0};
   const RenderedImage image = taken(s.scene, from_above(0, 2, 0, 4), options);
   expect_near(pixel_at(image, 1, 1), encoded(linear(kWhite) * (0.15F + power(through_one(), 2.0F))), 1);
   // Floor at 0, glass from 3 to 5.
@@ -164,7 +165,7 @@ TEST(RenderGlass, EmissiveGlassShinesInTheDarkFromOutsideAndInside) {
       grid.fill_box({{-5, -1, -5}, {6, 0, 6}}, add_type(scene, {0, 0, 0, 255}));
       place(scene, std::move(grid));
       RenderOptions options = sized(2, 2);
-      options.light.sun = {0, -1, 0};
+      environment_in(options).sun.direction = {0, -1, 0};
       seen.at(emission > 0.0F) = pixel_at(taken(scene, from_above(0, height, 0, 2), options), 0, 0);
     }
     EXPECT_GT(seen[1][2], seen[0][2] + 50) << height;
@@ -210,7 +211,7 @@ TEST(RenderGlass, SurfacesShowTheSkyAndDimWhatLiesBehind) {
     // A separate grid, so that the touching faces are rounded twice.
     place(s.scene, std::move(pane), {0.1, 0.1 + gap, 0.1});
     RenderOptions options = sized(4, 4);
-    options.light.sun = {0, 1, 0};
+    environment_in(options).sun.direction = {0, 1, 0};
     options.light.shadows = false;
     options.light.occlusion_mode = OcclusionMode::Off;
     options.light.glass_surfaces = true;

@@ -7,6 +7,7 @@
 #include <glm/gtc/quaternion.hpp>
 
 #include "light/emissive_cells.h"
+#include "render/environment_for_tests.h"
 #include "render/render_test_support.h"
 
 namespace quoin {
@@ -19,8 +20,8 @@ constexpr Rgba8 kWhite{255, 255, 255, 255};
 RenderOptions by_night(int width, int height) {
   RenderOptions options = sized(width, height);
   options.light.occlusion_mode = OcclusionMode::Off;
-  options.light.sun_brightness = 0.0;
-  options.light.sky_brightness = 0.0;
+  environment_in(options).sun.brightness = 0.0;
+  environment_in(options).sky.brightness = 0.0;
   options.light.max_lamps = 64;
   return options;
 }
@@ -271,7 +272,7 @@ TEST(RenderLamps, AreOffUnlessAskedFor) {
   Scene scene = floor_by_night();
   const Camera camera = towards({0, 20, 30}, {0, 0, 0}, 0.8);
   RenderOptions options = sized(32, 32);
-  options.light.exposure = 0.3;
+  environment_in(options).exposure = 0.3;
   const RenderedImage before = taken(scene, camera, options);
   scene.lamps.push_back({"", Lamp::Kind::Point, {0, 4, 0}});
   EXPECT_EQ(taken(scene, camera, options).colour.rgb, before.colour.rgb);

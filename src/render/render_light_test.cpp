@@ -7,6 +7,7 @@
 
 #include <glm/gtc/quaternion.hpp>
 
+#include "render/environment_for_tests.h"
 #include "render/render_test_support.h"
 
 namespace quoin {
@@ -31,8 +32,7 @@ Vec3 cosines(DVec3 sun) {
 TEST(RenderLight, AnOpenFloorHasTheAmbientAndTheSunsShareExactly) {
   Scene scene;
   place(scene, floor_of(add_type(scene, kGrey)));
-  const LightOptions light;
-  const float sun = cosines(light.sun).y;
+  const float sun = cosines(Environment::reference().sun.direction).y;
   for (const int rays : {1, 6, 9, 32}) {
     RenderOptions options = sized(16, 16);
     options.light.occlusion_rays = rays;
@@ -48,8 +48,8 @@ TEST(RenderLight, WithoutOcclusionTheAmbientTermIsATenth) {
   place(scene, floor_of(add_type(scene, kGrey)));
   RenderOptions options = sized(4, 4);
   options.light.occlusion_mode = OcclusionMode::Off;
-  options.light.sun = {0, 2, 0};
-  options.light.exposure = 0.5;
+  environment_in(options).sun.direction = {0, 2, 0};
+  environment_in(options).exposure = 0.5;
   EXPECT_EQ(pixel_at(taken(scene, from_above(0, 30, 0, 20), options), 1, 1), encoded(linear(kGrey) * 0.55F));
 }
 
@@ -67,7 +67,7 @@ TEST(RenderLight, ASmallClosedBoxIsBlackInside) {
     for (const std::uint8_t byte : image.colour.rgb) ASSERT_EQ(byte, 0);
     EXPECT_EQ(image.pixels_hit, 24 * 24);
     options.light.occlusion_affects = OcclusionAffects::All;
-    options.light.exposure = 4.0;
+    environment_in(options).exposure = 4.0;
     EXPECT_EQ(pixel_at(taken(scene, towards({0.5, 0.5, 1.5}, {0.3, 0.4, -5}, 2.0), options), 3, 3),
               encoded(linear(kGrey) * 0.15F * 0.25F * 4.0F));
   }
@@ -83,7 +83,7 @@ TEST(RenderLight, ALoneCubesShadowIsRightToThePixel) {
   place(scene, std::move(grid));
   RenderOptions options = sized(160, 160);
   options.light.occlusion_mode = OcclusionMode::Off;
-  const DVec3 sun = options.light.sun;
+  const DVec3 sun = environment_in(options).sun.direction;
   const RenderedImage image = taken(scene, from_above(0, 30, 0, 32), options);
   const Pixel lit = encoded(linear(kGrey) * (0.1F + cosines(sun).y));
   const Pixel dark = encoded(linear(kGrey) * 0.1F);
@@ -114,7 +114,7 @@ TEST(RenderLight, ShadowsEndAtTheirDistanceInVoxels) {
   scene.edit(instance).voxel_size = 0.25;
   RenderOptions options = sized(1, 1);
   options.light.occlusion_mode = OcclusionMode::Off;
-  options.light.sun = {0, 0.001, 0};  // any length
+  environment_in(options).sun.direction = {0, 0.001, 0};  // any length
   Camera camera = from_above(0, 1, 0, 0.1);
   const Pixel dark = encoded(linear(kGrey) * 0.1F);
   options.light.shadow_distance_voxels = 9.98;
@@ -133,7 +133,7 @@ TEST(RenderLight, OcclusionEndsAtItsDistance) {
   place(scene, std::move(grid));
   RenderOptions options = sized(1, 1);
   options.light.shadows = false;
-  options.light.sun = {1, 0, 0};
+  environment_in(options).sun.direction = {1, 0, 0};
   // Only the ray along the normal reaches the ceiling.
   EXPECT_EQ(pixel_at(taken(scene, from_above(0, 5, 0, 1), options), 0, 0),
             encoded(linear(kGrey) * 0.15F * (8.0F / 9.0F)));
@@ -149,7 +149,7 @@ TEST(RenderLight, SamplesOfAPixelHaveOcclusionRaysOfTheirOwn) {
   grid.fill_box({{1, 0, -40}, {2, 10, 40}}, type);
   place(scene, std::move(grid));
   RenderOptions options = sized(1, 1);
-  options.light.sun = {0, -1, 0};
+  environment_in(options).sun.direction = {0, -1, 0};
   options.light.occlusion_rays = 1;
   const Camera camera = from_above(0.9, 5, 0.5, 1e-6);
   const Pixel open = encoded(linear(kGrey) * 0.15F);
@@ -165,7 +165,7 @@ TEST(RenderLight, ASunBelowTheHorizonLightsWhatFacesIt) {
   Scene scene;
   place(scene, floor_of(add_type(scene, kGrey)));
   RenderOptions options = sized(4, 4);
-  options.light.sun = {0, -1, 0};
+  environment_in(options).sun.direction = {0, -1, 0};
   EXPECT_EQ(pixel_at(taken(scene, from_above(0, 30, 0, 20), options), 1, 1), encoded(linear(kGrey) * 0.15F));
   Camera camera = from_above(0, -30, 0, 20);
   camera.forward = {0, 1, 0};
@@ -178,8 +178,8 @@ TEST(RenderLight, EmissionShinesInTheDarkAndWithTheExposure) {
   const Rgba8 amber{200, 140, 60, 255};
   place(scene, floor_of(add_type(scene, amber, Visibility::Opaque, 0.5F)));
   RenderOptions options = sized(2, 2);
-  options.light.sun = {0, -1, 0};
-  options.light.exposure = 0.25;
+  environment_in(options).sun.direction = {0, -1, 0};
+  environment_in(options).exposure = 0.25;
   EXPECT_EQ(pixel_at(taken(scene, from_above(0, 30, 0, 20), options), 0, 0),
             encoded((linear(amber) * 0.5F + linear(amber) * 0.15F) * 0.25F));
 }
@@ -194,8 +194,8 @@ TEST(RenderLight, VertexOcclusionIsWhatTheMeshCarries) {
   RenderOptions options = sized(40, 1);
   options.light.occlusion_mode = OcclusionMode::Vertex;
   options.light.shadows = false;
-  options.light.sun = {-1, 1, 0};
-  const float sun = cosines(options.light.sun).y;
+  environment_in(options).sun.direction = {-1, 1, 0};
+  const float sun = cosines(environment_in(options).sun.direction).y;
   for (const auto affects : {OcclusionAffects::Ambient, OcclusionAffects::All}) {
     options.light.occlusion_affects = affects;
     // One column of voxels fills the image: x from 3 to 4.
@@ -260,7 +260,7 @@ TEST(RenderLight, OcclusionAloneIsGreyAndDarkensOwnColours) {
   const Camera camera = from_above(5, 30, 5, 10);
   RenderOptions options = sized(200, 200);
   options.light.occlusion_mode = OcclusionMode::Vertex;
-  options.light.exposure = 3.0;  // exposure has no effect
+  environment_in(options).exposure = 3.0;  // exposure has no effect
   options.light.shading = Shading::Occlusion;
   const RenderedImage grey = taken(scene, camera, options);
   options.light.shading = Shading::UnlitWithOcclusion;

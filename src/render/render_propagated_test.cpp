@@ -9,6 +9,7 @@
 #include <quoin/scene/scene_query.h>
 
 #include "render/cave_for_tests.h"
+#include "render/environment_for_tests.h"
 #include "render/render_test_support.h"
 
 namespace quoin {
@@ -36,9 +37,9 @@ MeanLevels between(const FaceLight& corners, double u, double v) {
 TEST(RenderPropagated, ShowsTheLightBetweenTheCornersOfFaces) {
   Cave cave;
   RenderOptions options = propagated(96, 64);
-  options.light.sky_follows_sun = true;
-  options.light.sun = {0.4, 0.2, 0.1};
-  options.light.lamp_brightness = 0.7;
+  environment_in(options).sky.model = SkyModel::Gradient;
+  environment_in(options).sun.direction = {0.4, 0.2, 0.1};
+  environment_in(options).lamp_brightness = 0.7;
   const CpuRenderer renderer(cave.scene);
   const auto image = renderer.render(Cave::inside(), options);
   ASSERT_TRUE(image);
@@ -46,7 +47,7 @@ TEST(RenderPropagated, ShowsTheLightBetweenTheCornersOfFaces) {
   light.update(cave.scene);
   const GridLight of = light.of(cave.grid_handle);
   SurfaceLight surface(*of.light, *of.voxels, cave.scene.types);
-  const LightLook look = light_look(options.light);
+  const LightLook look = light_look(environment_in(options));
   int compared = 0;
   for (int y = 0; y < options.height; ++y) {
     for (int x = 0; x < options.width; ++x) {

@@ -11,6 +11,7 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/matrix.hpp>
 
+#include "render/environment_for_tests.h"
 #include "render/render_test_support.h"
 
 namespace quoin {
@@ -203,7 +204,7 @@ TEST(RenderScene, ShadowsFallFromOneInstanceOntoAnother) {
   Grid roof;
   roof.fill_box({{-9, 0, -9}, {10, 1, 10}}, world.types[0]);
   RenderOptions options = sized(4, 4);
-  options.light.sun = {0, 1, 0};
+  environment_in(options).sun.direction = {0, 1, 0};
   const Camera camera = from_above(0, 2, 0, 4);
   const Pixel lit = pixel_at(taken(world.scene, camera, options), 1, 1);
   place(world.scene, std::move(roof), {0, 3, 0});

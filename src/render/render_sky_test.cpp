@@ -1,6 +1,10 @@
 // Skies that follow the sun.
 
+#include <quoin/render/cpu_renderer.h>
+#include <quoin/render/path_tracer.h>
+
 #include "light/light_model.h"
+#include "render/environment_for_tests.h"
 #include "render/render_test_support.h"
 
 namespace quoin {
@@ -29,8 +33,8 @@ Scene floor_scene() {
 
 RenderOptions follows(DVec3 sun) {
   RenderOptions options = sized(9, 9);
-  options.light.sun = sun;
-  options.light.sky_follows_sun = true;
+  environment_in(options).sun.direction = sun;
+  environment_in(options).sky.model = SkyModel::Gradient;
   return options;
 }
 
@@ -38,7 +42,7 @@ TEST(RenderSky, SurfacesAndTheBackdropAreInTheLightOfTheSunsHeight) {
   const Scene scene = floor_scene();
   for (const DVec3 sun : {DVec3(1, 3, 0), DVec3(1, 0.1, 0), DVec3(1, -0.05, 0), DVec3(0, -1, 0)}) {
     const RenderOptions options = follows(sun);
-    const Daylight light = daylight_of(options.light);
+    const Daylight light = daylight_of(*options.environment);
     const float diffuse = static_cast<float>(std::max(glm::normalize(sun).y, 0.0));
     const Vec3 expected = linear(kGrey) * (0.15F * light.ambient + diffuse * light.sun);
     const Pixel seen = pixel_at(taken(scene, from_above(0, 5, 0, 2), options), 4, 4);
@@ -55,18 +59,46 @@ TEST(RenderSky, ASunBelowTheHorizonLightsNothingFromBelow) {
   camera.right = {-1, 0, 0};
   RenderOptions options = follows({0.2, -1, 0});
   const RenderedImage night = taken(scene, camera, options);
-  const Vec3 ambient = 0.15F * linear(kGrey) * daylight_of(options.light).ambient;
+  const Vec3 ambient = 0.15F * linear(kGrey) * daylight_of(*options.environment).ambient;
   EXPECT_EQ(pixel_at(night, 4, 4), encoded(ambient));
-  options.light.sky_follows_sun = false;
+  environment_in(options).sky.model = SkyModel::Fixed;
   EXPECT_GT(pixel_at(taken(scene, camera, options), 4, 4)[0], 150) << "it does where the sky is fixed";
 }
 
 TEST(RenderSky, BrightnessCountsAsBefore) {
   const Scene scene = floor_scene();
   RenderOptions options = follows({1, 0.3, 0});
-  options.light.sky_brightness = 0.0;
-  options.light.sun_brightness = 0.0;
+  environment_in(options).sky.brightness = 0.0;
+  environment_in(options).sun.brightness = 0.0;
   EXPECT_EQ(pixel_at(taken(scene, from_above(0, 5, 0, 2), options), 4, 4), (Pixel{0, 0, 0}));
+}
+
+TEST(RenderSky, DrawsTheEnvironmentOfTheScene) {
+  Scene scene = floor_scene();
+  const Environment dusk = *follows({1, 0.05, 0}).environment;
+  const Camera camera = towards({0, 4, 9}, {0, 0, -4});
+  RenderOptions options = sized(16, 12);
+  PathOptions paths{.width = 16, .height = 12, .samples = 2};
+  CpuRenderer renderer(scene);
+  PathTracer tracer(scene);
+  const auto before = renderer.render(camera, options).value().colour.rgb;
+  const auto traced_before = tracer.render(camera, paths).value().radiance;
+  options.environment = paths.environment = dusk;
+  const auto wanted = renderer.render(camera, options).value().colour.rgb;
+  const auto traced_wanted = tracer.render(camera, paths).value().radiance;
+  EXPECT_NE(wanted, before);
+  EXPECT_NE(traced_wanted, traced_before);
+  options.environment.reset();
+  paths.environment.reset();
+  scene.environment = dusk;
+  EXPECT_EQ(renderer.render(camera, options).value().colour.rgb, before) << "until the update";
+  renderer.update();
+  tracer.update();
+  EXPECT_EQ(renderer.render(camera, options).value().colour.rgb, wanted);
+  EXPECT_EQ(tracer.render(camera, paths).value().radiance, traced_wanted);
+  EXPECT_EQ(CpuRenderer(scene).render(camera, options).value().colour.rgb, wanted);
+  options.environment = paths.environment = Environment::reference();
+  EXPECT_EQ(renderer.render(camera, options).value().colour.rgb, before) << "options replace it";
 }
 
 }  // namespace

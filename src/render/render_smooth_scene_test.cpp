@@ -41,6 +41,7 @@ TEST(RenderSmoothScene, FlatGlassOfAnyThicknessIsThatOfBlocks) {
   const CpuRenderer of_fields(smooth.scene());
   RenderOptions options = sized(24, 16);
   options.light = natural_light();
+  options.environment = Environment::natural();
   options.light.occlusion_mode = OcclusionMode::Off;
   for (int depth = 1; depth <= 7; ++depth) {
     const double x = 20 * depth - 10;

@@ -203,6 +203,7 @@ Scene Scene::snapshot() const {
   book_->collect(grids_, keys());
   copy.types = types;
   copy.lamps = lamps;
+  copy.environment = environment;
   copy.grids_ = grids_.copied([](const SceneGrid& grid) {
     return SceneGrid{grid.name, grid.grid.snapshot(), grid.pivot, grid.canvas, grid.field.snapshot()};
   });
@@ -335,6 +336,11 @@ std::int64_t Scene::voxel_count() const {
   std::int64_t count = 0;
   for (const GridHandle handle : grids_.handles()) count += grids_[handle].grid.voxel_count();
   return count;
+}
+
+const Environment& environment_of(const Scene& scene) {
+  static const Environment kReference = Environment::reference();
+  return scene.environment ? *scene.environment : kReference;
 }
 
 DBox Scene::bounds(InstanceFilter filter) const {

@@ -17,9 +17,9 @@
 namespace quoin {
 namespace {
 
-struct Random {
+struct RandomInstances {
   std::mt19937 engine;
-  explicit Random(unsigned seed) : engine(seed) {}
+  explicit RandomInstances(unsigned seed) : engine(seed) {}
   double share() { return std::uniform_real_distribution<double>(-1.0, 1.0)(engine); }
   DVec3 vector() { return {share(), share(), share()}; }
   // Returns a rotation of any length, including quarter turns.
@@ -48,7 +48,7 @@ double largest(DVec3 v) {
 TEST(GridFromWorld, IsTheInverseOfWorldFromGrid) {
   for (unsigned seed = 1; seed <= 2'000; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    Random random(seed);
+    RandomInstances random(seed);
     const Instance instance = random.instance(std::pow(10.0, 4.5 + 4.5 * random.share()));
     SceneGrid grid;
     grid.pivot = random.vector() * 100.0;
@@ -72,7 +72,7 @@ TEST(GridFromWorld, IsTheInverseOfWorldFromGrid) {
 TEST(WorldFromGrid, IsTheSameAsAMatrix) {
   for (unsigned seed = 1; seed <= 500; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    Random random(seed);
+    RandomInstances random(seed);
     const Instance instance = random.instance(1e3);
     SceneGrid grid;
     grid.pivot = random.vector() * 100.0;
@@ -133,7 +133,7 @@ TEST(VoxelFromWorld, AgreesWithWhatARayHits) {
     int hits = 0;
     for (unsigned seed = 1; seed <= 60; ++seed) {
       SCOPED_TRACE("seed " + std::to_string(seed));
-      Random random(seed);
+      RandomInstances random(seed);
       Scene scene;
       (void)scene.types.add({});
       SceneGrid grid;

@@ -50,8 +50,8 @@ namespace {
 
 constinit const FormatDriver kWorldFormat = {
     .info = {FileFormat::World, ".quoin", "Quoin world, can be larger than memory",
-             FormatCapability::Read | FormatCapability::Write | FormatCapability::Fields | FormatCapability::Sun |
-                 FormatCapability::Camera | FormatCapability::Cameras},
+             FormatCapability::Read | FormatCapability::Write | FormatCapability::Fields |
+                 FormatCapability::Environment | FormatCapability::Camera | FormatCapability::Cameras},
     .detect = is_world_format,
     .reads_path = true,
     .read = [](const FormatInput& input) -> Result<LoadedScene> {

@@ -165,6 +165,16 @@ class Sun(ctypes.Structure):
                 ("colour", ctypes.c_float * 3), ("angle_degrees", ctypes.c_double)]
 
 
+class Environment(ctypes.Structure):
+    _fields_ = [("size", ctypes.c_size_t), ("sky", ctypes.c_int32), ("sky_brightness", ctypes.c_double),
+                ("sky_colour", ctypes.c_float * 3), ("has_background", ctypes.c_int32),
+                ("background", ctypes.c_float * 3), ("lamp_brightness", ctypes.c_double),
+                ("has_exposure", ctypes.c_int32), ("exposure", ctypes.c_double), ("tone", ctypes.c_int32),
+                ("has_ground", ctypes.c_int32), ("ground_height", ctypes.c_double),
+                ("ground_colour", ctypes.c_float * 3), ("has_fog", ctypes.c_int32), ("fog_density", ctypes.c_double),
+                ("fog_top", ctypes.c_double), ("fog_colour", ctypes.c_float * 3), ("fog_anisotropy", ctypes.c_double)]
+
+
 Progress = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_double, ctypes.c_void_p)
 NO_PROGRESS = ctypes.cast(0, Progress)
 
@@ -215,6 +225,8 @@ _SIGNATURES = {
     "quoin_lamp_add": (_handle, _p),
     "quoin_sun_get": (_handle, _p),
     "quoin_sun_set": (_handle, _p),
+    "quoin_environment_get": (_handle, _p),
+    "quoin_environment_set": (_handle, _p),
     "quoin_scene_rays": (_handle, _n, _p, _p, ctypes.c_double, _p),
 }
 for _name, _arguments in _SIGNATURES.items():

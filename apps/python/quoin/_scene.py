@@ -95,6 +95,40 @@ class Sun(NamedTuple):
     angle: float = 0.53  #: angular diameter, in degrees
 
 
+class Ground(NamedTuple):
+    """A horizontal ground plane, for path tracing."""
+
+    height: float  #: world y
+    colour: Tuple[float, ...] = (0.5, 0.5, 0.5)  #: linear RGB, 0 to 1
+
+
+class Fog(NamedTuple):
+    """Fog below a height, for path tracing."""
+
+    density: float  #: scattering events per world unit
+    top: float  #: world y
+    colour: Tuple[float, ...] = (1.0, 1.0, 1.0)  #: linear RGB, 0 to 1
+    anisotropy: float = 0.0  #: mean cosine of the scattering angle, -0.99 to 0.99
+
+
+class Environment(NamedTuple):
+    """The light and air around a scene, except the sun. All colours are linear RGB."""
+
+    sky: str = "gradient"  #: "gradient" (follows the sun), "fixed" (always day), "physical", "uniform" or "image"
+    sky_brightness: float = 1.0
+    sky_colour: Tuple[float, ...] = (1.0, 1.0, 1.0)  #: of a uniform sky
+    background: Optional[Tuple[float, ...]] = None  #: path tracing shows it to the camera in place of the sky
+    lamp_brightness: float = 1.0  #: factor on the light of lamps and emissive voxels
+    exposure: Optional[float] = None  #: None: 1, or for path tracing a value that suits the sky
+    tone: Optional[str] = None  #: "clamp", "neutral", "agx" or "aces", for path tracing; None: by the sky
+    ground: Optional[Ground] = None
+    fog: Optional[Fog] = None
+
+
+_SKIES = ("gradient", "fixed", "physical", "uniform", "image")
+_TONES = (None, "clamp", "neutral", "agx", "aces")
+
+
 class Format(NamedTuple):
     """A file format."""
 
@@ -354,6 +388,17 @@ class Scene:
         return Sun(tuple(one.direction), one.brightness, tuple(one.colour), one.angle_degrees)
 
     @property
+    def environment(self) -> Environment:
+        """The light and air around the scene; the defaults of `render` if the scene has none of its own."""
+        one = _c.sized(_c.Environment)
+        _c.check(_c.lib.quoin_environment_get(self._owner.handle, ctypes.byref(one)))
+        ground = Ground(one.ground_height, tuple(one.ground_colour)) if one.has_ground else None
+        fog = Fog(one.fog_density, one.fog_top, tuple(one.fog_colour), one.fog_anisotropy) if one.has_fog else None
+        return Environment(_SKIES[one.sky], one.sky_brightness, tuple(one.sky_colour),
+                           tuple(one.background) if one.has_background else None, one.lamp_brightness,
+                           one.exposure if one.has_exposure else None, _TONES[one.tone], ground, fog)
+
+    @property
     def types(self) -> List[VoxelType]:
         """All voxel types. Entry 0 is air."""
         return [VoxelType(tuple(one.rgba), _c.text_of(one.name), one.emission, one.metalness, one.roughness,
@@ -486,9 +531,31 @@ class Scene:
             one.inner_angle_degrees, one.outer_angle_degrees = lamp.inner_angle, lamp.outer_angle
         _c.check(_c.lib.quoin_lamp_add(self._owner.handle, ctypes.byref(one)))
 
+    def set_environment(self, environment: Optional[Environment]) -> None:
+        """Sets the light and air around the scene, which `render` uses. .json and .quoin files store them. None
+        removes them and the sun. Raises ValueError for unknown names and QuoinError for values out of range."""
+        if environment is None:
+            _c.check(_c.lib.quoin_environment_set(self._owner.handle, None))
+            return
+        one = _c.sized(_c.Environment)
+        one.sky, one.tone = _SKIES.index(environment.sky), _TONES.index(environment.tone)
+        one.sky_brightness, one.lamp_brightness = environment.sky_brightness, environment.lamp_brightness
+        one.sky_colour[:] = environment.sky_colour
+        if environment.background is not None:
+            one.has_background, one.background[:] = 1, environment.background
+        if environment.exposure is not None:
+            one.has_exposure, one.exposure = 1, environment.exposure
+        if environment.ground is not None:
+            one.has_ground, one.ground_height = 1, environment.ground.height
+            one.ground_colour[:] = environment.ground.colour
+        if environment.fog is not None:
+            one.has_fog, one.fog_density, one.fog_top = 1, environment.fog.density, environment.fog.top
+            one.fog_colour[:], one.fog_anisotropy = environment.fog.colour, environment.fog.anisotropy
+        _c.check(_c.lib.quoin_environment_set(self._owner.handle, ctypes.byref(one)))
+
     def set_sun(self, sun: Sun) -> None:
-        """Sets the sun of the scene. .vox files store all its properties, .json and .quoin files only the direction.
-        `render` does not use it: pass `sun`. Raises QuoinError for values out of range."""
+        """Sets the sun of the scene, which `render` uses. .vox, .json and .quoin files store it. Raises QuoinError for
+        values out of range."""
         one = _c.sized(_c.Sun)
         one.direction[:], one.colour[:] = sun.direction, sun.colour
         one.brightness, one.angle_degrees = sun.brightness, sun.angle
@@ -557,9 +624,9 @@ class Scene:
         `samples`: per pixel; 0 means 4, or 64 with path tracing. `paths`: path tracing, which is slower and adds
         indirect light and soft shadows. `camera`: position in the world; default: a camera that shows the whole scene.
         `look_at`: point at the image's centre, default (0, 0, 0); needs `camera`. `fov`: vertical field of view of
-        `camera`, in degrees. `sun`: direction from the scene towards the sun, of any non-zero length; default
-        (-0.48, 0.72, 0.5). The sky follows the sun. The scene's own sun and cameras are not used. `out`: a contiguous,
-        writable array of the image's shape and dtype, which is filled and returned.
+        `camera`, in degrees. `sun`: direction from the scene towards the sun, of any non-zero length; default: the
+        scene's sun, or (-0.48, 0.72, 0.5). The scene's `environment` is used, its cameras are not. `out`: a
+        contiguous, writable array of the image's shape and dtype, which is filled and returned.
 
         Raises ValueError for a size that is not positive or an unsuitable `out`, and QuoinError for an invalid camera,
         sun or number of samples.

@@ -238,7 +238,7 @@ Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& f
     ConvertOptions settled = options;
     settled.mesher = mesher_for(loaded->scene, options);
     if (options.voxel_mm) settled.scale = scale_for_voxels(loaded->scene, *options.voxel_mm);
-    if (settled.light && loaded->sun) settled.light->sun = *loaded->sun;
+    if (settled.light && !loaded->scene.environment) loaded->scene.environment = Environment::natural();
     settled.cameras = loaded->cameras;
     fault = settled.mesher == Mesher::Smooth ? "" : find_blocks_error(settled);
     if (!fault.empty()) return make_error(ErrorCode::InvalidArgument, fault, options.common.input.string());

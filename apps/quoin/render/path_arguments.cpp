@@ -84,23 +84,24 @@ std::optional<SkyArgument> read_sky(const std::string& text) {
   if (text == "gradient") return SkyArgument{SkyModel::Gradient, {}};
   if (text == "uniform") return SkyArgument{SkyModel::Uniform, {}};
   const bool is_image = has_ending(text, ".hdr") || has_ending(text, ".exr");
-  return is_image ? std::optional(SkyArgument{SkyModel::Environment, text}) : std::nullopt;
+  return is_image ? std::optional(SkyArgument{SkyModel::Image, text}) : std::nullopt;
 }
 
-// Reads the sky image of a .vox file from the folder of that file. MagicaVoxel keeps it in its own folder.
-Result<RadianceImage> environment_beside(const CommonOptions& common, const std::string& name) {
-  const std::string file = name.substr(name.find_last_of("/\\") + 1);
-  const auto path = sidecar_path(common.input, file, common.load.sidecar_files);
+// Reads the sky image that the file names, from the file's folder. .vox files give its place in MagicaVoxel's folder.
+Result<RadianceImage> sky_image_of(const CommonOptions& common, const LoadedScene& loaded, const std::string& name) {
+  const bool is_own = !loaded.render_settings;
+  const auto path =
+      sidecar_path(common.input, is_own ? name : name.substr(name.find_last_of("/\\") + 1), common.load.sidecar_files);
   if (!path) return path.error();
   return read_radiance(*path);
 }
 
-void take_file_look(const FileLook& file, PathPlan& plan) {
-  static_cast<Look&>(plan.options) = file.look;
-  plan.develop = file.develop;
-  plan.is_transparent = file.is_transparent;
+void take_file_settings(const FileRenderSettings& file, PathPlan& plan) {
+  plan.options.environment = file.environment;
+  plan.options.lens = file.lens;
   plan.options.max_bounces = file.max_bounces;
   plan.options.max_scatterings = file.max_scatterings;
+  plan.is_transparent = file.is_transparent;
   if (!file.not_drawn.empty()) {
     std::string all;
     for (const std::string& each : file.not_drawn) all += (all.empty() ? "" : ", ") + each;
@@ -108,37 +109,59 @@ void take_file_look(const FileLook& file, PathPlan& plan) {
   }
 }
 
-Status take_sky(const PathArguments& arguments, const LoadedScene& loaded, const CommonOptions& common,
-                PathPlan& plan) {
-  PathOptions& options = plan.options;
+Status take_sky(const RenderArguments& all, const LoadedScene& loaded, Sky& sky, std::vector<std::string>& warnings) {
+  const PathArguments& arguments = all.path;
   if (arguments.sky) {
-    const Look plain;
-    options.sky = arguments.sky->model;
-    options.sky_brightness = plain.sky_brightness;
-    options.sky_colour = plain.sky_colour;
-    options.air = plain.air;
-    options.background.reset();
-    if (options.sky != SkyModel::Environment) return {};
+    sky = {.model = arguments.sky->model};
+    if (sky.model != SkyModel::Image) return {};
     auto image = read_radiance(arguments.sky->image);
     if (!image) return image.error();
-    options.environment = std::make_shared<const RadianceImage>(std::move(*image));
-    options.environment_turn_radians = arguments.sky_turn_degrees * kRadians;
-  } else if (options.sky == SkyModel::Environment) {
-    auto image = environment_beside(common, loaded.look->environment);
+    sky.image = std::make_shared<const RadianceImage>(std::move(*image));
+    sky.image_turn_radians = arguments.sky_turn_degrees * kRadians;
+  } else if (sky.model == SkyModel::Image && sky.image == nullptr) {
+    auto image = sky_image_of(all.common, loaded, sky.image_file);
     if (image) {
-      options.environment = std::make_shared<const RadianceImage>(std::move(*image));
+      sky.image = std::make_shared<const RadianceImage>(std::move(*image));
     } else {
-      plan.warnings.push_back("using a uniform sky instead of the file's sky \"" + loaded.look->environment +
-                              "\": " + image.error().message);
-      options.sky = SkyModel::Uniform;
+      warnings.push_back("using a uniform sky instead of the file's sky \"" + sky.image_file +
+                         "\": " + image.error().message);
+      sky.model = SkyModel::Uniform;
     }
   }
   return {};
 }
 
+// Sets ground and fog. Those of .vox files and of options have no height of their own: they get the scene's bottom and
+// top.
+void take_ground_and_fog(const RenderArguments& all, const LoadedScene& loaded, bool is_white, bool is_transparent,
+                         Environment& environment) {
+  const PathArguments& arguments = all.path;
+  const bool keeps_heights = loaded.scene.environment && !loaded.render_settings;
+  Environment fitted;
+  fitted.ground.emplace();
+  fitted.fog.emplace();
+  fit_environment(loaded.scene.bounds(all.common.instances()), fitted);
+  if (arguments.ground == false) {
+    environment.ground.reset();
+  } else if (arguments.ground && !environment.ground) {
+    environment.ground.emplace().height = fitted.ground->height;
+    environment.ground->colour = Vec3(is_white ? 1.0F : 0.5F);
+  }
+  if (environment.ground) {
+    environment.ground->only_shadows = is_transparent;
+    if (!keeps_heights) environment.ground->height = fitted.ground->height;
+  }
+  if (environment.fog && !keeps_heights) environment.fog->top = fitted.fog->top;
+  if (!arguments.fog) return;
+  environment.fog.emplace();
+  environment.fog->density = arguments.fog->density;
+  environment.fog->colour = Vec3(arguments.fog_colour);
+  environment.fog->top = arguments.fog->top.value_or(fitted.fog->top);
+}
+
 void take_lens(const PathArguments& arguments, const LoadedScene& loaded, std::optional<int> file_camera,
                PathPlan& plan) {
-  if (arguments.lens_radius) plan.options.lens_radius = *arguments.lens_radius;
+  if (arguments.lens_radius) plan.options.lens.radius = *arguments.lens_radius;
   plan.focus = arguments.focus;
   const auto looks = std::ranges::find(loaded.cameras, file_camera.value_or(-1), &FileCamera::number);
   if (!plan.focus && looks != loaded.cameras.end() && looks->focus_distance > 0.0) plan.focus = looks->focus_distance;
@@ -199,61 +222,50 @@ void add_path_options(CLI::App& command, PathArguments& arguments) {
   command.add_flag("--denoise", arguments.denoise, "Remove noise within surfaces and keep their edges");
 }
 
-Result<PathPlan> plan_paths(const RenderArguments& all, const RenderOptions& render, const LoadedScene& loaded) {
+Result<PathPlan> plan_paths(const RenderArguments& all, const LoadedScene& loaded) {
   const PathArguments& arguments = all.path;
   PathPlan plan;
   PathOptions& options = plan.options;
-  const bool has_look = loaded.look && arguments.uses_file_look;
-  DVec3 sun = render.light.sun;
+  const std::optional<Environment>& of_scene = loaded.scene.environment;
+  const bool has_settings = loaded.render_settings && arguments.uses_file_look;
+  const bool has_environment = !has_settings && of_scene && arguments.uses_file_look;
+  if (has_settings) {
+    take_file_settings(*loaded.render_settings, plan);
+  } else if (has_environment) {
+    options.environment = of_scene;
+  } else {
+    options.environment = of_scene ? Environment::natural(of_scene->sun.direction) : Environment::natural();
+  }
+  options.width = all.render.width;
+  options.height = all.render.height;
+  options.samples = all.render.samples;
+  if (!has_settings || arguments.bounces) options.max_bounces = arguments.bounces.value_or(kUsualBounces);
+  Environment& environment = *options.environment;
+  Sun& sun = environment.sun;
   if (arguments.sun_time) {
     const auto at_that_time = sun_direction(*arguments.sun_time);
     if (!at_that_time) return at_that_time.error();
-    sun = *at_that_time;
+    sun.direction = *at_that_time;
   }
-  const NaturalLook natural = natural_look(arguments.sky.value_or(SkyArgument{}).model, sun);
-  static_cast<Look&>(options) = natural.look;
-  plan.develop = natural.develop;
-  options.sun = sun;
-  if (has_look) take_file_look(*loaded.look, plan);
-  options.width = render.width;
-  options.height = render.height;
-  options.samples = render.samples;
-  if (!has_look || arguments.bounces) options.max_bounces = arguments.bounces.value_or(kUsualBounces);
-  if (all.has_sun) {
-    options.sun = render.light.sun;
-    if (render.light.sun_brightness == 0.0) options.sun_brightness = 0.0;
+  const bool has_usual_sun = !has_settings && !(has_environment && !is_only_sun(*of_scene));
+  if (has_usual_sun || arguments.sun_angle_degrees) {
+    sun.angle_radians = arguments.sun_angle_degrees.value_or(kUsualSunAngle) * kRadians;
   }
-  if (arguments.sun_time) options.sun = sun;
-  if (!has_look || arguments.sun_angle_degrees) {
-    options.sun_angle_radians = arguments.sun_angle_degrees.value_or(kUsualSunAngle) * kRadians;
-  }
-  options.lamp_brightness = render.light.lamp_brightness;
-  if (Status sky = take_sky(arguments, loaded, all.common, plan); !sky) return sky.error();
-  if (all.sky_brightness) options.sky_brightness = *all.sky_brightness;
+  if (Status sky = take_sky(all, loaded, environment.sky, plan.warnings); !sky) return sky.error();
+  all.environment.apply_to(environment);
   take_lens(arguments, loaded, all.file_camera, plan);
 
-  if (arguments.tone) plan.develop.tone = *arguments.tone;
-  if (all.has_exposure) plan.develop.exposure = render.light.exposure;
-  if (arguments.bloom) plan.develop.bloom = *arguments.bloom;
-  if (arguments.vignette) plan.develop.vignette = *arguments.vignette;
+  if (arguments.tone) environment.tone = arguments.tone;
+  if (arguments.bloom) environment.bloom = *arguments.bloom;
+  if (arguments.vignette) environment.vignette = *arguments.vignette;
+  plan.develop = develop_options(environment);
   plan.is_exposure_automatic = all.is_exposure_automatic;
   if (arguments.is_transparent) plan.is_transparent = true;
   plan.denoise = arguments.denoise;
-
-  if (arguments.ground == false) {
-    options.ground.reset();
-  } else if (arguments.ground && !options.ground) {
-    options.ground.emplace().colour = natural.ground_colour;
-  }
-  if (options.ground) options.ground->only_shadows = plan.is_transparent;
-  if (arguments.fog) {
-    options.fog.emplace();
-    options.fog->density = arguments.fog->density;
-    options.fog->colour = Vec3(arguments.fog_colour);
-  }
-  fit_look(loaded.scene.bounds(all.common.instances()), options);
-  if (arguments.fog && arguments.fog->top) options.fog->top = *arguments.fog->top;
-  if (arguments.focus && !(options.lens_radius > 0.0)) {
+  const bool is_white = arguments.sky ? arguments.sky->model == SkyModel::Uniform
+                                      : has_environment && environment.sky.model == SkyModel::Uniform;
+  take_ground_and_fog(all, loaded, is_white, plan.is_transparent, environment);
+  if (arguments.focus && !(options.lens.radius > 0.0)) {
     plan.warnings.emplace_back("--focus has no effect: the lens radius is 0; set --lens-radius");
   }
   return plan;

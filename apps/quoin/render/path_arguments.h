@@ -8,7 +8,7 @@
 #include <quoin/io/loaded_scene.h>
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/render/path_tracer.h>
-#include <quoin/scene/look.h>
+#include <quoin/scene/environment.h>
 
 #include "commands.h"
 
@@ -25,7 +25,7 @@ struct FogPlace {
 /// The value of --sky.
 struct SkyArgument {
   SkyModel model = SkyModel::Gradient;
-  std::filesystem::path image;  ///< of SkyModel::Environment
+  std::filesystem::path image;  ///< of SkyModel::Image
 };
 
 /// The options of `quoin render --light path` that other light models do not have. Settings without a value come from
@@ -62,10 +62,9 @@ struct PathPlan {
 
 void add_path_options(CLI::App& command, PathArguments& arguments);
 
-/// Takes each setting from the options, else from the scene file (IN), else the default. `render`: as in `all`, with
-/// the sun of the scene file. An unreadable sky image of the scene file only gives a warning.
+/// Takes each setting from the options, else from the scene file (IN), else the default. An unreadable sky image of the
+/// scene file only gives a warning.
 /// Errors: those of reading the sky image of --sky.
-[[nodiscard]] Result<PathPlan> plan_paths(const RenderArguments& all, const RenderOptions& render,
-                                          const LoadedScene& loaded);
+[[nodiscard]] Result<PathPlan> plan_paths(const RenderArguments& all, const LoadedScene& loaded);
 
 }  // namespace quoin::tool

@@ -64,7 +64,7 @@ Result<RenderedImage> PathImages::render(const Camera& camera, const RenderOptio
   wanted.layers = with_layers_ || options.depth;
   wanted.denoise = plan_.denoise;
   const double to_middle = glm::dot(middle_ - camera.position, camera.forward);
-  wanted.focus_distance = plan_.focus.value_or(std::max(to_middle, 1e-3));
+  wanted.lens.focus_distance = plan_.focus.value_or(std::max(to_middle, 1e-3));
   auto taken = tracer_ ? tracer_->render(camera, wanted, threads, progress)
                        : device_->render_paths(camera, wanted, threads, progress);
   if (!taken) return taken.error();

@@ -227,7 +227,7 @@ Result<VulkanRenderer> device_for(const Scene& scene, const RenderArguments& arg
 Status draw_by_paths(const LoadedScene& loaded, const RenderArguments& arguments, const RenderOptions& options,
                      const std::vector<Shot>& shots, Stopwatch& watch, Outcome& outcome) {
   const InstanceFilter filter = arguments.common.instances();
-  auto plan = plan_paths(arguments, options, loaded);
+  auto plan = plan_paths(arguments, loaded);
   if (!plan) return plan.error();
   if (has_ending(arguments.output, ".jpg")) plan->is_transparent = false;  // it has no alpha
   for (std::string& warning : plan->warnings) {
@@ -258,7 +258,8 @@ Status draw_by_vulkan(const Scene& scene, const RenderArguments& arguments, cons
 Status draw_shots(const LoadedScene& loaded, const RenderArguments& arguments, const std::vector<Shot>& shots,
                   Stopwatch& watch, Outcome& outcome) {
   RenderOptions options = arguments.render;
-  if (loaded.sun && !arguments.has_sun) options.light.sun = *loaded.sun;
+  options.environment = loaded.scene.environment.value_or(Environment::natural());
+  arguments.environment.apply_to(*options.environment);
   const bool is_vulkan = arguments.backend == Backend::Vulkan;
   if (arguments.light == LightChoice::Path) return draw_by_paths(loaded, arguments, options, shots, watch, outcome);
   return (is_vulkan ? draw_by_vulkan : draw_by_cpu)(loaded.scene, arguments, options, shots, watch, outcome);

@@ -198,16 +198,14 @@ void add_sun_and_sky_options(CLI::App& command, RenderArguments& arguments) {
   add_parsed<SunArgument>(
       command, "--sun", "X,Y,Z|off", {read_sun, "three numbers that are not all 0, as in 1,2,-0.5, or off"},
       [&arguments](const SunArgument& sun) {
-        arguments.has_sun = true;
-        LightOptions& light = arguments.render.light;
-        if (sun.direction) light.sun = *sun.direction;
-        if (!sun.direction) light.sun_brightness = 0.0;
+        arguments.environment.sun = sun.direction;
+        arguments.environment.is_sun_off = !sun.direction;
       },
       "Direction to the sun (default -0.48,0.72,0.5), or off. The sky follows the sun to dusk and night; off "
       "keeps the sky");
-  command.add_flag("!--fixed-sky", arguments.render.light.sky_follows_sun,
+  command.add_flag("--fixed-sky", arguments.environment.is_sky_fixed,
                    "Keep the sky and the light colour of a clear day for every sun direction");
-  add_parsed(command, "--sky-brightness", "X", number_from_0(), arguments.sky_brightness,
+  add_parsed(command, "--sky-brightness", "X", number_from_0(), arguments.environment.sky_brightness,
              "Brightness factor of the sky (default 1)");
 }
 
@@ -231,7 +229,7 @@ void add_light_options(CLI::App& command, RenderArguments& arguments) {
           "Maximum number of lamps and emissive voxels that light a surface, 0 to 1024 (default 64). With 0, emissive "
           "voxels light only themselves")
       ->check(CLI::Range(0, 1024));
-  add_parsed(command, "--lamp-brightness", "X", number_from_0(), light.lamp_brightness,
+  add_parsed(command, "--lamp-brightness", "X", number_from_0(), arguments.environment.lamp_brightness,
              "Factor on the light that lamps and emissive voxels cast; their own appearance does not change "
              "(default 1)");
   add_parsed(command, "--emission-scale", "X", number_from_0(), arguments.emission_scale,
@@ -239,9 +237,8 @@ void add_light_options(CLI::App& command, RenderArguments& arguments) {
   add_parsed<ExposureArgument>(
       command, "--exposure", "X|auto", {read_exposure, number_from_0().must_be + ", or auto"},
       [&arguments](const ExposureArgument& exposure) {
-        arguments.has_exposure = true;
+        arguments.environment.exposure = exposure.factor;
         arguments.is_exposure_automatic = !exposure.factor;
-        if (exposure.factor) arguments.render.light.exposure = *exposure.factor;
       },
       "Brightness factor of lit surfaces, with --light path also of the background (default 1; 1.3 with --light path, "
       "2 with --sky physical), or auto with --light path, measured on the first image");
@@ -404,7 +401,7 @@ std::vector<OptionRule> light_rules(const RenderArguments& a) {
       {{"--fog-colour"}, needs("--fog")},
       {{"--sun"}, excludes({"--sun-time"})},
       {{"--sky-turn"},
-       needs("an image file for --sky", [&a] { return a.path.sky && a.path.sky->model == SkyModel::Environment; })},
+       needs("an image file for --sky", [&a] { return a.path.sky && a.path.sky->model == SkyModel::Image; })},
       {{"--least-light"}, needs("--light propagated", is_propagated)},
       {{"--light"},
        [&a, is_propagated](const CLI::App&) {
@@ -458,6 +455,15 @@ void settle_preset(const CLI::App& command, Preset preset, LightOptions& light) 
 
 }  // namespace
 
+void EnvironmentArguments::apply_to(Environment& environment) const {
+  if (sun) environment.sun.direction = *sun;
+  if (is_sun_off) environment.sun.brightness = 0.0;
+  if (is_sky_fixed) environment.sky.model = SkyModel::Fixed;
+  environment.sky.brightness = sky_brightness.value_or(environment.sky.brightness);
+  environment.lamp_brightness = lamp_brightness.value_or(environment.lamp_brightness);
+  if (exposure) environment.exposure = exposure;
+}
+
 DVec3 RenderArguments::forward() const {
   if (!azimuth && !elevation) return direction_of(view.value_or(View::Iso));
   const double iso_elevation = std::asin(std::sqrt(1.0 / 3.0)) * 180.0 / std::numbers::pi;
@@ -500,7 +506,6 @@ Status settle(const CLI::App& command, RenderArguments& arguments) {
     render.detail.policy.emplace().rule =
         detail == DetailChoice::Radius ? DetailPolicy::Rule::ByRadius : DetailPolicy::Rule::ByPixels;
   }
-  render.light.sky_brightness = arguments.sky_brightness.value_or(render.light.sky_brightness);
   if (arguments.light == LightChoice::Propagated) render.light.model = LightModel::Propagated;
   settle_occlusion_rays(command, render.light);
   settle_preset(command, arguments.preset, render.light);

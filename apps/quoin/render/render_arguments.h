@@ -9,6 +9,7 @@
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/render/density_slice.h>
 #include <quoin/scene/camera.h>
+#include <quoin/scene/environment.h>
 
 #include "commands.h"
 #include "options/options.h"
@@ -28,12 +29,24 @@ enum class Preset : std::uint8_t { Full, NoShadows, NoAo, Unlit, Ao, Density };
 enum class DetailChoice : std::uint8_t { Near, Radius, Pixels };
 enum class Backend : std::uint8_t { Cpu, Vulkan };
 
+/// The options that replace settings of the environment, in all light models.
+struct EnvironmentArguments {
+  std::optional<DVec3> sun;
+  bool is_sun_off = false;
+  bool is_sky_fixed = false;
+  std::optional<double> sky_brightness;
+  std::optional<double> lamp_brightness;
+  std::optional<double> exposure;
+
+  void apply_to(Environment& environment) const;
+};
+
 /// The options of `quoin render`.
 struct RenderArguments {
   CommonOptions common;
   std::filesystem::path output;
   std::filesystem::path depth;  ///< empty: none
-  RenderOptions render;         ///< size, samples, light and detail
+  RenderOptions render;         ///< size, samples, light and detail; not the environment
   std::optional<int> samples;
   std::optional<View> view;
   std::optional<DVec3> position;  ///< with `target`; replaces the view
@@ -50,9 +63,7 @@ struct RenderArguments {
   bool watch = false;                 ///< renders again when the input changes
   LightChoice light = LightChoice::Rays;
   Preset preset = Preset::Full;
-  bool has_sun = false;  ///< --sun was given: ignores the sun of the scene file
-  std::optional<double> sky_brightness;
-  bool has_exposure = false;
+  EnvironmentArguments environment;
   bool is_exposure_automatic = false;
   double emission_scale = 1.0;
   PathArguments path;  ///< for --light path

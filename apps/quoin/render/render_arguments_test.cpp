@@ -228,24 +228,29 @@ TEST(RenderArguments, DefaultsAreNaturalLightAndFewSamples) {
   EXPECT_EQ(plain.render.samples, 4);
   EXPECT_EQ(arguments_of("--light path").render.samples, 64);
   EXPECT_EQ(arguments_of("--light path --samples 3").render.samples, 3);
+  Environment environment;
+  plain.environment.apply_to(environment);
+  EXPECT_EQ(environment, Environment::natural());
   EXPECT_FALSE(plain.has_view());
   EXPECT_FALSE(plain.is_film());
   EXPECT_EQ(plain.forward(), direction_of(View::Iso));
 }
 
 TEST(RenderArguments, ReadsLight) {
-  const LightOptions light =
-      arguments_of("--sun 0,2,0 --fixed-sky --plain-glass --lamps 3 --exposure 2 --shadow-distance 9").render.light;
-  EXPECT_EQ(light.sun, DVec3(0, 1, 0));
-  EXPECT_FALSE(light.sky_follows_sun);
-  EXPECT_FALSE(light.glass_surfaces);
-  EXPECT_EQ(light.max_lamps, 3);
-  EXPECT_EQ(light.exposure, 2.0);
-  EXPECT_EQ(light.shadow_distance_voxels, 9.0);
-  const RenderArguments night = arguments_of("--sun off");
-  EXPECT_TRUE(night.has_sun);
-  EXPECT_EQ(night.render.light.sun_brightness, 0.0);
-  EXPECT_EQ(night.render.light.sun, natural_light().sun);
+  const RenderArguments day =
+      arguments_of("--sun 0,2,0 --fixed-sky --plain-glass --lamps 3 --exposure 2 --shadow-distance 9");
+  EXPECT_FALSE(day.render.light.glass_surfaces);
+  EXPECT_EQ(day.render.light.max_lamps, 3);
+  EXPECT_EQ(day.render.light.shadow_distance_voxels, 9.0);
+  Environment environment;
+  day.environment.apply_to(environment);
+  EXPECT_EQ(environment.sun.direction, DVec3(0, 1, 0));
+  EXPECT_EQ(environment.sky.model, SkyModel::Fixed);
+  EXPECT_EQ(environment.exposure, 2.0);
+  Environment night;
+  arguments_of("--sun off").environment.apply_to(night);
+  EXPECT_EQ(night.sun.brightness, 0.0);
+  EXPECT_EQ(night.sun.direction, Environment::natural().sun.direction);
   EXPECT_TRUE(arguments_of("--light path --exposure auto").is_exposure_automatic);
   EXPECT_EQ(arguments_of("--light propagated").render.light.model, LightModel::Propagated);
 }
@@ -292,7 +297,7 @@ TEST(RenderArguments, ReadsCamerasAndSeries) {
 TEST(RenderArguments, ReadsPathTracing) {
   const PathArguments path =
       arguments_of("--light path --sky sky.HDR --sky-turn 90 --no-ground --fog 0.5,8 --bloom 0.1 --look plain").path;
-  EXPECT_EQ(path.sky->model, SkyModel::Environment);
+  EXPECT_EQ(path.sky->model, SkyModel::Image);
   EXPECT_EQ(path.sky->image, "sky.HDR");
   EXPECT_EQ(path.sky_turn_degrees, 90.0);
   EXPECT_EQ(path.ground, false);

@@ -58,6 +58,7 @@ Result<SmallImage> draw_small(const Scene& scene, int size, InstanceFilter filte
                               const Progress& progress) {
   RenderOptions options;
   options.light = natural_light();
+  options.environment = scene.environment.value_or(Environment::natural());
   options.light.occlusion_mode = OcclusionMode::Vertex;
   options.light.max_lamps = 4;
   options.width = options.height = size * kFiner;

@@ -253,7 +253,9 @@ ViewRequest App::request_now() const {
   request.mode = state_.settings.mode;
   request.wireframe = state_.settings.wireframe;
   request.slice = state_.settings.slice;
-  request.look = state_.open.look;
+  request.environment = state_.environment();
+  request.exposure = state_.settings.exposure;
+  request.render_settings = state_.open.render_settings;
   return request;
 }
 

@@ -118,7 +118,8 @@ void App::close_document() {
   state_.hover.reset();
   state_.open.backend.reset();  // reads the document, so it is destroyed first
   state_.open.document = std::make_unique<Document>();
-  state_.open.look.reset();
+  state_.open.render_settings.reset();
+  state_.open.environment.reset();
   has_seen_chunks_ = true;
   unframed_.reset();
   reported_saving_.clear();
@@ -135,9 +136,18 @@ void App::adopt(OpenDocument opened) {
   state_.open = std::move(opened);
   const LoadedScene& loaded = state_.open.document->loaded();
   state_.settings.note_recent(state_.open.document->path());
-  if (loaded.look) state_.open.look = std::make_shared<const FileLook>(*loaded.look);
-  if (loaded.look) state_.settings.light.sun = loaded.look->look.sun;
-  if (loaded.sun) state_.settings.light.sun = *loaded.sun;
+  DVec3& sun = state_.settings.environment.sun.direction;
+  if (const auto& settings = loaded.render_settings) {
+    state_.open.render_settings = std::make_shared<const FileRenderSettings>(*settings);
+    sun = settings->environment.sun.direction;
+  }
+  if (const auto& environment = loaded.scene.environment) {
+    if (is_only_sun(*environment)) {
+      sun = environment->sun.direction;
+    } else {
+      state_.open.environment = environment;
+    }
+  }
   state_.brush.type = 1;
   state_.tool = Tool::Look;  // the first click into a world should not change it
   const SDL_Point output = screen_->output_size();

@@ -131,7 +131,7 @@ void Input::motion(const SDL_MouseMotionEvent& motion, ViewState& state) {
       state.camera.pan(dx, dy, state.image_place.h);
       break;
     case Drag::Sun:
-      state.settings.light.sun = drag_sun(state.settings.light, dx, dy);
+      state.environment().sun.direction = drag_sun(state.environment(), dx, dy);
       break;
     case Drag::Stroke:
       editing.move(state.mouse);

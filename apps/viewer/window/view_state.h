@@ -80,6 +80,11 @@ struct ViewState {
   std::unique_ptr<Saver> saver;
 
   [[nodiscard]] const Scene& scene() const { return open.document->scene(); }
+  /// Returns the environment of the images, which the panel changes.
+  [[nodiscard]] Environment& environment() { return open.environment ? *open.environment : settings.environment; }
+  [[nodiscard]] const Environment& environment() const {
+    return open.environment ? *open.environment : settings.environment;
+  }
   [[nodiscard]] double aspect() const { return static_cast<double>(image_place.w) / std::max(image_place.h, 1); }
   /// Returns the bounds that set the scale of speeds and distances at a point.
   [[nodiscard]] DBox bounds(DVec3 from, InstanceFilter filter = InstanceFilter::Visible) const {

@@ -71,6 +71,7 @@ TEST_F(ViewerTest, TheScreenshotIsTheRenderersImage) {
   render.height = 250;
   render.samples = 16;
   render.light = natural_light();
+  render.environment = Environment::natural();
   const auto image = CpuRenderer(scene).render(frame_scene(scene, View::Iso, 333.0 / 250.0), render);
   ASSERT_TRUE(image);
   const auto shot = read_png(given.screenshot);

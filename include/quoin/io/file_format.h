@@ -92,7 +92,7 @@ enum class FormatCapability : std::uint32_t {
   Lamps = 1U << 9,               ///< lamps and cameras of SceneMeshes
   Animation = 1U << 10,          ///< keys of placements
   Compression = 1U << 11,        ///< MeshFileOptions::compress and quantize
-  Sun = 1U << 12,                ///< LoadedScene::sun
+  Environment = 1U << 12,        ///< Scene::environment
   Camera = 1U << 13,             ///< LoadedScene::camera
   Cameras = 1U << 14,            ///< LoadedScene::cameras
   Metres = 1U << 15,             ///< one file unit is a metre

@@ -13,7 +13,7 @@
 #include <quoin/io/sidecar_file.h>
 #include <quoin/io/volume.h>
 #include <quoin/scene/camera.h>
-#include <quoin/scene/look.h>
+#include <quoin/scene/environment.h>
 #include <quoin/scene/scene.h>
 #include <quoin/voxelize/voxelize.h>
 
@@ -29,15 +29,25 @@ struct FileCamera {
   double focus_distance = 0.0;  ///< world units along the forward axis to the point in focus; 0: not stored
 };
 
+/// The settings that a file stores for path-traced images. They are not the scene's environment, which all renderers
+/// read: MagicaVoxel chooses their brightness for its own tone curve.
+struct FileRenderSettings {
+  Environment environment;  ///< with Sky::image_file, but without the image and the ground's height
+  Lens lens;
+  int max_bounces = 8;                 ///< PathOptions::max_bounces
+  int max_scatterings = 64;            ///< PathOptions::max_scatterings
+  bool is_transparent = false;         ///< renders without a background
+  std::vector<std::string> not_drawn;  ///< names and values of settings that Quoin does not render
+};
+
 /// The result of reading a file.
 struct LoadedScene {
   Scene scene;
   std::string format;                                 ///< "vox", ...
   std::vector<std::string> warnings;                  ///< one line per skipped item, with the reason
-  std::optional<DVec3> sun;                           ///< from the surface towards the sun, if the file stores it
   std::optional<Camera> camera;                       ///< the initial camera, if the file stores one
   std::vector<FileCamera> cameras;                    ///< all cameras, in file order
-  std::optional<FileLook> look;                       ///< the file's render settings, if it stores them
+  std::optional<FileRenderSettings> render_settings;  ///< if the file stores them (.vox)
   std::int64_t last_frame = 0;                        ///< of the animation; LoadOptions::frame selects the loaded frame
   std::vector<std::filesystem::path> named_files;     ///< other files that models come from; saving merges them
   std::shared_ptr<const VoxSource> source = nullptr;  ///< for a .vox file, with LoadOptions::keep_source

@@ -14,6 +14,7 @@
 #include <quoin/core/vec.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/scene/camera.h>
+#include <quoin/scene/environment.h>
 #include <quoin/scene/scene.h>
 
 namespace quoin {
@@ -59,7 +60,7 @@ struct SceneFile {
   std::vector<Group> groups = {};
   std::vector<Placement> placements;
   std::vector<Lamp> lamps;
-  std::optional<DVec3> sun;  ///< not zero
+  std::optional<Environment> environment;
   std::optional<Camera> camera;
 };
 
@@ -76,13 +77,15 @@ struct SceneFile {
 [[nodiscard]] Result<SceneFile> parse_scene_file(const std::filesystem::path& path, Threads threads = {});
 
 /// Converts a scene to a self-contained scene file: all types, grids with voxels and fields (as cheap snapshots),
-/// groups, layers, lamps and instances. Handles become list indices, in handle order. The caller adds sun and camera.
+/// groups, layers, lamps and instances. Handles become list indices, in handle order. The caller adds the
+/// camera.
 ///
 /// Errors: InvalidArgument for an instance whose grid does not exist.
 [[nodiscard]] Result<SceneFile> scene_file_of(const Scene& scene);
 
-/// Returns the text of a scene file. `parse_scene_file` restores every number exactly, except that the sun and the
-/// rotations of placed `sources` are normalised. The same scene gives the same text at any thread count.
+/// Returns the text of a scene file. `parse_scene_file` restores every number exactly, except that rotations of
+/// placed `sources`, and the sun's direction where nothing else of the environment is stored, are normalised. The same
+/// scene gives the same text at any thread count.
 ///
 /// Errors: InvalidArgument for content that `parse_scene_file` would refuse (duplicate or unknown ids, numbers that are
 ///         not finite, scales that are not positive, ...), unregistered voxel types, and ids or paths that are not

@@ -31,7 +31,7 @@ namespace quoin {
 /// Lenient: a MAIN chunk that claims up to 20 bytes more than the file has is read with a warning, if its content is
 ///          valid.
 /// Cameras: all that the user set, with the file's numbers; panoramas are skipped with a warning.
-/// Look:    the render settings are in LoadedScene::look, if the file has them.
+/// Render settings: in LoadedScene::render_settings, if the file has them.
 /// Skipped: with a warning, voxels outside their model's box or of colour 0. Other frames, notes and unknown chunks are
 ///          only in LoadedScene::source. `source_only_features` lists these and everything else that a Scene cannot
 ///          hold: cameras and render settings.

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <quoin/core/vec.h>
-#include <quoin/light/light_options.h>
+#include <quoin/scene/environment.h>
 
 namespace quoin {
 
@@ -26,8 +26,8 @@ struct LightLook {
 
 /// Returns the colours of propagated light. The sky's colour combines sky and sun: 0.3 of the ambient light's colour,
 /// scaled by the sky's brightness, plus 0.7 of the sun's colour, scaled by the sun's brightness. By day, with both
-/// brightnesses 1, it is white.
-[[nodiscard]] LightLook light_look(const LightOptions& options);
+/// brightnesses 1, it is white. `least_light`: LightOptions::least_light.
+[[nodiscard]] LightLook light_look(const Environment& environment, double least_light = 0.0);
 
 /// Returns the linear brightness of a light level: f / (4 - 3 f) with f = level / 15. It is 1 at level 15 and 0 at
 /// level 0. It stays within 0.04 of 0.8^(15 - level), the curve of older games, but reaches 0.

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include <quoin/core/image.h>
 #include <quoin/core/parallel.h>
@@ -10,6 +11,7 @@
 #include <quoin/light/light_options.h>
 #include <quoin/light/scene_light.h>
 #include <quoin/scene/camera.h>
+#include <quoin/scene/environment.h>
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_tracer.h>
@@ -22,6 +24,7 @@ struct RenderOptions {
   int samples = 1;     ///< per pixel, 1 to 4,096; in a fixed pattern that starts with the pixel's centre
   bool depth = false;  ///< fill RenderedImage::depth
   LightOptions light{};
+  std::optional<Environment> environment{};  ///< replaces the scene's environment
   DetailOptions detail{};
 };
 
@@ -37,9 +40,9 @@ struct RenderedImage {
 
 /// Renders images of a scene by ray marching on the CPU.
 ///
-/// Light:       see LightOptions. Computed in linear space; each sample is clamped to 0..1, the samples are averaged
-///              and rounded exactly to sRGB bytes. The background is a sky that the exposure does not change. The sky
-///              shows the sun only with LightOptions::sky_follows_sun.
+/// Light:       see LightOptions and `environment_of`. Computed in linear space; each sample is clamped to 0..1, the
+///              samples are averaged and rounded exactly to sRGB bytes. The background is a sky that the exposure does
+///              not change. The sky shows no sun under SkyModel::Fixed.
 /// Transparent: consecutive voxels (or field solid) of one transparent type along a ray form one body, also across
 ///              chunks and grids. A body tints the background by its length: one voxel of alpha a and colour c
 ///              transmits (1 - a) (1 - a (1 - c)). A body of voxels counts as at least one voxel long. It shows its own
@@ -82,7 +85,8 @@ class CpuRenderer {
   /// Errors:   InvalidArgument if a size is not positive, there are more than 2^28 pixels, samples are out of range,
   ///           the camera's position is not finite, its axes are not of unit length, its field of view or view height
   ///           is out of range, the impostor edge is not 16 to 1,024, the impostor time is NaN, or `check` rejects the
-  ///           light. Cancelled if `progress` returns false; it is called after every sample of a tile.
+  ///           light or the environment. Cancelled if `progress` returns false; it is called after every sample of a
+  ///           tile.
   [[nodiscard]] Result<RenderedImage> render(const Camera& camera, const RenderOptions& options = {},
                                              Threads threads = {}, const Progress& progress = {}) const;
 

@@ -12,20 +12,22 @@
 #include <quoin/core/vec.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/scene/camera.h>
-#include <quoin/scene/look.h>
+#include <quoin/scene/environment.h>
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_tracer.h>
 
 namespace quoin {
 
-/// Settings of a path-traced image; Look describes the light.
-struct PathOptions : Look {
+/// Settings of a path-traced image.
+struct PathOptions {
   int width = 1280;
   int height = 720;
   int samples = 64;          ///< per pixel, 1 to 65,536
   int max_bounces = 8;       ///< 0 to 1,024: maximum number of bounces between surfaces on a path
   int max_scatterings = 64;  ///< 0 to 1,024: maximum number of additional scattering events in fog and clouds on a path
   std::uint32_t seed = 0;
+  std::optional<Environment> environment{};  ///< replaces the scene's environment
+  Lens lens{};
   bool layers = false;   ///< fill PathImage's layers
   bool denoise = false;  ///< remove noise within surfaces; keeps edges of objects, shadows and colours
 
@@ -54,14 +56,14 @@ struct PathImage {
 /// Renders images by path tracing: the sun as a disc, a sky, emissive voxels, up to `max_bounces` bounces, gloss, metal
 /// and refractive glass. Images converge to the exact result for that number of bounces; until then they have noise.
 ///
-/// Light:       in the units of LightOptions: a sun of 1 shows a white surface that faces it as 1. A voxel of emission
+/// Light:       of `environment_of`: a sun of 1 shows a white surface that faces it as 1. A voxel of emission
 ///              1 shows its own colour and lights others as such a surface does.
 /// Surfaces:    glTF's metallic-roughness model, energy-conserving: white stays white. A non-metal of roughness 1 is
 ///              matte, without gloss.
 /// Glass:       glass that the camera sees, directly or by reflection, refracts by the types' `ior` and absorbs by path
 ///              length. Light between surfaces passes glass straight and tinted: no caustics. The part that alpha
 ///              covers is matte.
-/// Fog, clouds: light scatters any number of times in Look::fog and in transparent types with
+/// Fog, clouds: light scatters any number of times in Environment::fog and in transparent types with
 ///              VoxelProperties::scattering.
 /// Lamps:       emissive faces and Scene::lamps are sampled with a light tree. Emissive fields and glass are hit only
 ///              by chance.
@@ -84,8 +86,8 @@ class PathTracer {
   /// Renders one image. The bits are the same for any number of threads and any instruction set.
   ///
   /// Requires: the camera's axes are perpendicular.
-  /// Errors:   InvalidArgument, with the option's name, if an option is out of range or not finite, a brightness is
-  ///           outside 0 to 1e9, SkyModel::Environment has an environment without pixels, there are more than 2^28
+  /// Errors:   InvalidArgument, with the option's name, if an option is out of range or not finite, `check` rejects the
+  ///           environment, SkyModel::Image has an image without pixels, there are more than 2^28
   ///           pixels, or CpuRenderer rejects the camera. Cancelled if `progress` returns false; it is called after
   ///           every few samples of a tile.
   /// Memory:   28 bytes per pixel, 62 with layers, about 300 more during `denoise`; 2 MB per thread. The tracer keeps

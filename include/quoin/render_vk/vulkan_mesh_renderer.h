@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 
 #include <quoin/core/parallel.h>
@@ -12,6 +13,7 @@
 #include <quoin/render_vk/vulkan_image.h>
 #include <quoin/render_vk/vulkan_renderer.h>
 #include <quoin/scene/camera.h>
+#include <quoin/scene/environment.h>
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>
 
@@ -31,6 +33,7 @@ struct MeshImageOptions {
   int samples = 4;
   /// `occlusion_rays` has no effect here: every mode except Off uses the occlusion of the meshes' vertices.
   LightOptions light{};
+  std::optional<Environment> environment{};  ///< replaces the scene's environment
   /// Mid: meshes of halved grids, built when an image first shows them; blocky or smooth as the full grid's meshes, or
   ///      blocky if it has none.
   /// Far: the faces of an impostor.

@@ -30,6 +30,17 @@ struct Camera {
   bool operator==(const Camera&) const = default;
 };
 
+inline constexpr int kMaxLensBlades = 64;
+
+/// The lens of a perspective camera.
+struct Lens {
+  double radius = 0.0;          ///< world units; more than 0: blurs objects out of focus
+  double focus_distance = 1.0;  ///< world units along the camera's forward axis; positive
+  int blades = 0;               ///< 3 to 64: number of sides of the aperture polygon; 0: a disc
+  double turn_radians = 0.0;    ///< rotation of that polygon
+  bool operator==(const Lens&) const = default;
+};
+
 /// Returns a perspective camera at `position` that looks at `target`. The camera is upright: +Y is up. When it looks
 /// straight down, the top of the image points towards -Z; when it looks straight up, towards +Z.
 ///

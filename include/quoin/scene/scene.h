@@ -16,6 +16,7 @@
 #include <quoin/grid/density_grid.h>
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
+#include <quoin/scene/environment.h>
 
 namespace quoin {
 
@@ -145,6 +146,9 @@ class Scene {
   /// Lights without geometry. LightOptions::max_lamps limits how many of them and of the emissive voxels light a
   /// surface. Renderers apply changes to this list at their next `update`.
   std::vector<Lamp> lamps;
+  /// Sun, sky, fog, ground, exposure and tone. Renderers apply changes at their next `update`. See
+  /// `environment_of`.
+  std::optional<Environment> environment;
 
   Scene();
   Scene(Scene&&) noexcept;
@@ -195,7 +199,7 @@ class Scene {
   ///       See ChangeCursor.
   [[nodiscard]] SceneChanges changes_since(ChangeCursor& cursor) const;
   /// Returns true if `changes_since` would report a change. It does not report changes of `types`, which have their own
-  /// journal, or of `lamps`. Cost: as `changes_since`.
+  /// journal, or of `lamps` and `environment`. Cost: as `changes_since`.
   [[nodiscard]] bool has_changed_since(const ChangeCursor& cursor) const;
   /// Returns a cursor that reports all changes from now on.
   [[nodiscard]] ChangeCursor cursor() const;
@@ -218,6 +222,9 @@ class Scene {
   SlotMap<SceneLayer> layers_;
   std::unique_ptr<Book> book_;
 };
+
+/// Returns the scene's environment, or Environment::reference() if it has none.
+[[nodiscard]] const Environment& environment_of(const Scene& scene);
 
 /// Returns true if an instance, its layer, its parent groups and their layers are all visible.
 /// Cost: O(parent groups).

@@ -21,9 +21,8 @@ namespace quoin {
 
 struct LoadedWorld;
 
-/// Sun and cameras, as in LoadedScene.
+/// Cameras, as in LoadedScene.
 struct WorldView {
-  std::optional<DVec3> sun;
   std::optional<Camera> camera;
   std::vector<FileCamera> cameras;
 };
@@ -63,7 +62,7 @@ class WorldSaver {
   /// Requires: the same world and scene (or a snapshot of it) in every call; the world is open for writing.
   Result<SaveTicket> save(WorldStore& world, const Scene& scene, WorldChanges more = {},
                           std::function<void(const Status&)> on_saved = {});
-  /// Sets the sun and cameras to store with the next `save`. If not called, `save` keeps the values from load_world.
+  /// Sets the cameras to store with the next `save`. If not called, `save` keeps the values from load_world.
   void set_view(WorldView view);
   /// Returns the number of a grid in the world (ChunkAddress::grid), or nullopt before its first save. Cost: O(log
   /// grids).
@@ -101,7 +100,7 @@ struct LoadedWorld {
 [[nodiscard]] Result<SavedScene> write_world(const Scene& scene, const std::filesystem::path& path,
                                              Threads threads = {}, const Progress& progress = {},
                                              WorldChanges more = {});
-/// Writes a loaded scene with its sun and cameras as a new world.
+/// Writes a loaded scene with its cameras as a new world.
 [[nodiscard]] Result<SavedScene> write_world(const LoadedScene& loaded, const std::filesystem::path& path,
                                              Threads threads = {}, const Progress& progress = {},
                                              WorldChanges more = {});

@@ -205,7 +205,7 @@ Result<Bodies> read_sources(const std::vector<SceneFile::Source>& sources, const
 LoadedScene begin_scene(SceneFile& file, std::vector<GridHandle>& grids) {
   LoadedScene loaded;
   loaded.format = "scene";
-  loaded.sun = file.sun;
+  loaded.scene.environment = std::move(file.environment);
   loaded.camera = file.camera;
   if (file.camera) loaded.cameras.push_back({0, *file.camera});
   loaded.scene.types = std::move(file.types);
@@ -332,8 +332,8 @@ Result<LoadedScene> read_scene_file(std::span<const std::byte> text, const LoadO
 
 extern constinit const FormatDriver kSceneFormat = {
     .info = {FileFormat::Scene, ".json", "Quoin scene file",
-             FormatCapability::Read | FormatCapability::Write | FormatCapability::Fields | FormatCapability::Sun |
-                 FormatCapability::Camera},
+             FormatCapability::Read | FormatCapability::Write | FormatCapability::Fields |
+                 FormatCapability::Environment | FormatCapability::Camera},
     .detect = is_scene_file,
     .read = [](const FormatInput& input) -> Result<LoadedScene> {
       return input.path.empty() ? read_scene_file(input.bytes, input.options, input.threads, input.progress)
@@ -343,10 +343,7 @@ extern constinit const FormatDriver kSceneFormat = {
     .write = [](const FormatOutput& output, const std::filesystem::path& path) -> Result<SavedScene> {
       auto file = scene_file_of(output.scene);
       if (!file) return file.error();
-      if (output.loaded != nullptr) {
-        file->sun = output.loaded->sun;
-        file->camera = output.loaded->camera;
-      }
+      if (output.loaded != nullptr) file->camera = output.loaded->camera;
       const auto bytes = write_scene_file(*file, path, output.threads, output.progress);
       if (!bytes) return bytes.error();
       return SavedScene{*bytes, {}};

@@ -24,7 +24,7 @@ void read_as_text(std::span<const std::byte> bytes) {
     require(placement.grid ? *placement.grid < scene->grids.size() : length > 0.999 && length < 1.001);
     require(quoin::is_finite(placement.position) && placement.scale > 0.0);
   }
-  require(!scene->sun || glm::length(*scene->sun) > 0.999);
+  require(!scene->environment || check(*scene->environment));
   const auto again = quoin::write_scene_file(*scene, quoin::Threads{1});
   require(again.has_value() && quoin::parse_scene_file(*again).has_value());
 }

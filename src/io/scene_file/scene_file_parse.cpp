@@ -23,7 +23,7 @@ constexpr std::size_t kMaxBytes = std::size_t{64} << 20;
 constexpr int kMaxDepth = 32;
 constexpr std::size_t kMaxFiles = 65'536;
 constexpr std::size_t kMaxInstances = std::size_t{1} << 22;
-constexpr int kVersion = 5;
+constexpr int kVersion = 6;
 
 SceneFile::Source source_of(const Json& json, const Place& place, Faults& faults) {
   const Object object(json, place, {"id", "path"}, faults);
@@ -88,14 +88,15 @@ class NameCheck {
 
 void read_file_object(const Json& json, std::size_t file_bytes, Threads threads, SceneFile& scene, Faults& faults) {
   const Place root;
-  const Object file(
-      json, root, {"quoin_scene", "types", "grids", "files", "layers", "groups", "instances", "lamps", "sun", "camera"},
-      faults);
+  const Object file(json, root,
+                    {"quoin_scene", "types", "grids", "files", "layers", "groups", "instances", "lamps", "sun",
+                     "environment", "camera"},
+                    faults);
   const Json* version = file.need("quoin_scene");
   if (version != nullptr && !version->is_number_unsigned())
     faults.add(file.place_of("quoin_scene"), "must be the version, a whole number");
   if (version != nullptr && version->is_number_unsigned() && (*version < 1 || *version > kVersion)) {
-    faults.add(file.place_of("quoin_scene"), "version " + version->dump() + " is not supported (1 to 5 are)",
+    faults.add(file.place_of("quoin_scene"), "version " + version->dump() + " is not supported (1 to 6 are)",
                ErrorCode::Unsupported);
   }
   scene.types = read_types(file);
@@ -121,7 +122,12 @@ void read_file_object(const Json& json, std::size_t file_bytes, Threads threads,
   }
   if (const Json* sun = file.find("sun")) {
     const std::vector<double> v = unit(file.numbers(*sun, file.place_of("sun"), 3), file.place_of("sun"), faults);
-    scene.sun = DVec3(v[0], v[1], v[2]);
+    scene.environment = Environment::natural({v[0], v[1], v[2]});
+  }
+  if (const Json* environment = file.find("environment")) {
+    const Place place = file.place_of("environment");
+    if (scene.environment) faults.add(place, "must not stand next to \"sun\"; give the direction in it");
+    scene.environment = environment_from(*environment, place, faults);
   }
   if (const Json* camera = file.find("camera")) scene.camera = camera_of(*camera, file.place_of("camera"), faults);
   if (!faults.error()) NameCheck(scene, faults).check();

@@ -47,7 +47,7 @@ TEST(SceneFile, ReadsEveryKey) {
   EXPECT_TRUE(first.mirrored);
   EXPECT_FALSE(first.visible);
   EXPECT_NEAR(glm::length(first.rotation * DVec3(0, 0, 1) - DVec3(0.5, 0, std::sqrt(0.75))), 0.0, 1e-12);
-  EXPECT_NEAR(glm::length(*scene->sun - glm::normalize(DVec3(1, 2, 3))), 0.0, 1e-15);
+  EXPECT_NEAR(glm::length(scene->environment.value().sun.direction - glm::normalize(DVec3(1, 2, 3))), 0.0, 1e-15);
   EXPECT_EQ(scene->camera->position, DVec3(9));
 }
 
@@ -71,7 +71,9 @@ TEST(SceneFile, RoundTripsRandomScenes) {
       if (random() % 2 == 0) placement.categories = static_cast<std::uint32_t>(random());
       scene.placements.push_back(placement);
     }
-    if (seed % 2 == 0) scene.sun = glm::normalize(DVec3(number(random), number(random), number(random)));
+    if (seed % 2 == 0) {
+      scene.environment = Environment::natural(glm::normalize(DVec3(number(random), number(random), number(random))));
+    }
     if (seed % 3 == 0) scene.camera = look_at({number(random), 4, 5}, {number(random), 7, 8}, 0.8).value();
     const auto bytes = write_scene_file(scene);
     ASSERT_TRUE(bytes) << to_string(bytes.error());
@@ -96,9 +98,9 @@ TEST(SceneFile, RoundTripsRandomScenes) {
       EXPECT_EQ(b.visible, a.visible);
       EXPECT_EQ(b.categories, a.categories);
     }
-    ASSERT_EQ(read->sun.has_value(), scene.sun.has_value());
-    if (scene.sun) {
-      EXPECT_EQ(*read->sun, *scene.sun);
+    ASSERT_EQ(read->environment.has_value(), scene.environment.has_value());
+    if (scene.environment) {
+      EXPECT_EQ(read->environment->sun.direction, scene.environment->sun.direction);
     }
     ASSERT_EQ(read->camera.has_value(), scene.camera.has_value());
     if (scene.camera) {
@@ -208,10 +210,10 @@ TEST(SceneFile, ErrorsHaveAPosition) {
   }
   EXPECT_EQ(find_error(file_with(R"({"file": "a", "visible": 1})")), "instances[0].visible: must be true or false");
   EXPECT_EQ(find_error(file_with("7")), "instances[0]: must be an object");
-  EXPECT_EQ(find_error(R"({"quoin_scene": 6, "files": [], "instances": []})"),
-            "quoin_scene: version 6 is not supported (1 to 5 are)");
+  EXPECT_EQ(find_error(R"({"quoin_scene": 7, "files": [], "instances": []})"),
+            "quoin_scene: version 7 is not supported (1 to 6 are)");
   EXPECT_EQ(find_error(R"({"quoin_scene": 0, "files": [], "instances": []})"),
-            "quoin_scene: version 0 is not supported (1 to 5 are)");
+            "quoin_scene: version 0 is not supported (1 to 6 are)");
   EXPECT_EQ(find_error(R"({"quoin_scene": 1, "files": []})"), "\"instances\" is missing");
   const auto hierarchy = [](const std::string& lists, const std::string& instance) {
     return R"({"quoin_scene": 4, "files": [{"id": "a", "path": "x"}], )" + lists + R"("instances": [{"file": "a")" +
@@ -292,7 +294,7 @@ TEST_F(SceneFiles, PlaceEachFileAsOftenAsWanted) {
   const Scene& scene = loaded->scene;
   EXPECT_EQ(scene.grids().size(), 2U);
   ASSERT_EQ(scene.instances().size(), 3U);
-  EXPECT_EQ(*loaded->sun, DVec3(0, 1, 0));
+  EXPECT_EQ(loaded->scene.environment, Environment::natural({0, 1, 0}));
   const auto handles = scene.instances().handles();
   // Both files call their colour type 1; here they differ.
   const auto colour_of = [&](InstanceHandle handle) {
@@ -380,6 +382,91 @@ TEST_F(SceneFiles, AreParsedByTheirPathToo) {
   ASSERT_FALSE(broken);
   EXPECT_EQ(broken.error().code, ErrorCode::BadFormat);
   EXPECT_FALSE(broken.error().path.empty());
+}
+
+// Returns an environment in which every setting differs from the natural one.
+Environment changed_environment() {
+  Environment environment;
+  environment.sun = {.direction = {0.1, -3.0, 1e-7},
+                     .brightness = 2.5,
+                     .colour = {1.0F, 0.7F, 0.1F},
+                     .angle_radians = 0.25,
+                     .is_visible = false};
+  environment.sky.model = SkyModel::Image;
+  environment.sky.brightness = 0.3;
+  environment.sky.colour = {0.2F, 0.4F, 0.6F};
+  environment.sky.air = {.rayleigh = 0.5,
+                         .mie = 3.0,
+                         .ozone = 0.0,
+                         .mie_anisotropy = -0.3,
+                         .rayleigh_colour = {1.0F, 2.0F, 3.0F},
+                         .mie_colour = {0.5F, 0.5F, 0.25F},
+                         .ozone_colour = {0.0F, 0.0F, 1.0F}};
+  environment.sky.image_file = "skies/park \xFF.hdr";
+  environment.sky.image_turn_radians = 1.0 / 3.0;
+  environment.sky.background = Vec3(0.1F, 0.2F, 0.3F);
+  environment.ground = GroundPlane{.height = -7.25, .colour = Vec3(0.9F), .only_shadows = true, .fade = 0.1};
+  environment.fog = Fog{.density = 0.02, .colour = {0.9F, 0.8F, 0.7F}, .anisotropy = 0.4, .top = 31.5};
+  environment.lamp_brightness = 4.0;
+  environment.exposure = 1.7;
+  environment.tone = ToneCurve::Agx;
+  environment.vignette = 0.2;
+  environment.gamma = 2.4;
+  environment.bloom = {.mix = 0.3, .radius = 0.05, .aspect = -0.5, .threshold = 1.5};
+  return environment;
+}
+
+std::string text_of(const SceneFile& scene) {
+  const auto bytes = write_scene_file(scene).value();
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+TEST(SceneFile, RestoresEnvironmentsExactly) {
+  SceneFile scene;
+  for (const SkyModel model :
+       {SkyModel::Fixed, SkyModel::Gradient, SkyModel::Physical, SkyModel::Uniform, SkyModel::Image}) {
+    for (const ToneCurve tone : {ToneCurve::Clamp, ToneCurve::Neutral, ToneCurve::Agx, ToneCurve::Aces}) {
+      scene.environment = changed_environment();
+      scene.environment->sky.model = model;
+      scene.environment->tone = tone;
+      const auto read = parse(text_of(scene));
+      ASSERT_TRUE(read) << to_string(read.error());
+      EXPECT_EQ(read->environment, scene.environment);
+    }
+  }
+  scene.environment = Environment::reference();
+  EXPECT_EQ(parse(text_of(scene)).value().environment, Environment::reference());
+}
+
+TEST(SceneFile, NeedsVersion6ForMoreThanASun) {
+  SceneFile scene;
+  EXPECT_NE(text_of(scene).find("\"quoin_scene\": 1"), std::string::npos);
+  scene.environment = Environment::natural({0.0, 1.0, 0.0});
+  const std::string sun = text_of(scene);
+  EXPECT_NE(sun.find("\"quoin_scene\": 1"), std::string::npos) << sun;
+  EXPECT_NE(sun.find("\"sun\": [0.0,1.0,0.0]"), std::string::npos) << sun;
+  scene.environment->exposure = 2.0;
+  EXPECT_NE(text_of(scene).find("\"quoin_scene\": 6"), std::string::npos);
+}
+
+TEST(SceneFile, RejectsInvalidEnvironments) {
+  const auto error_of = [](const std::string& environment) {
+    return find_error(R"({"quoin_scene": 6, "files": [], "instances": [], "environment": )" + environment + "}");
+  };
+  EXPECT_EQ(error_of("{}"), "none");
+  for (const char* wrong :
+       {"[]", R"({"sun": {"direction": [0, 0, 0]}})", R"({"sun": {"brightness": -1}})",
+        R"({"sky": {"model": "green"}})", R"({"sky": {"brightness": 1e10}})", R"({"fog": {"density": -1}})",
+        R"({"ground": {"colour": [2, 0, 0]}})", R"({"exposure": -1})", R"({"exposure": "auto"})", R"({"tone": "film"})",
+        R"({"gamma": 0})", R"({"bloom": {"mix": 2}})", R"({"moon": {}})", R"({"sky": {"background": [1, 2]}})"}) {
+    EXPECT_NE(error_of(wrong), "none") << wrong;
+  }
+  EXPECT_NE(find_error(R"({"quoin_scene": 6, "files": [], "instances": [], "sun": [0, 1, 0], "environment": {}})"),
+            "none");
+  SceneFile scene;
+  scene.environment = Environment::natural();
+  scene.environment->fog = Fog{.density = std::numeric_limits<double>::quiet_NaN()};
+  EXPECT_EQ(write_scene_file(scene).error().code, ErrorCode::InvalidArgument);
 }
 
 }  // namespace

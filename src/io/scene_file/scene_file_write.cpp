@@ -46,6 +46,8 @@ class SceneText {
       for (const SceneFile::Placement& placement : scene.placements) instances_.push_back(parts_.json_of(placement));
       for (const Lamp& lamp : scene.lamps) lamps_.push_back(parts_.json_of(lamp));
       if (scene.camera) camera_ = parts_.json_of(*scene.camera);
+      is_sixth_ = scene.environment && !is_only_sun(*scene.environment);
+      if (is_sixth_) environment_ = parts_.json_of(*scene.environment);
       return text_of(scene);
     } catch (const OrderedJson::type_error&) {  // from text; numbers that are not finite become null
       return make_error(ErrorCode::InvalidArgument, "an id or path is not UTF-8");
@@ -79,7 +81,8 @@ class SceneText {
     const bool has_models = !types_.empty() || !grids_.empty();
     const bool is_fourth = !layers_.empty() || !groups_.empty();
     std::string text = "{\n  \"quoin_scene\": ";
-    text += is_fifth_                                                ? "5"
+    text += is_sixth_                                                ? "6"
+            : is_fifth_                                              ? "5"
             : is_fourth                                              ? "4"
             : is_third_                                              ? "3"
             : has_models || !lamps_.empty() || parts_.needs_second() ? "2"
@@ -94,7 +97,12 @@ class SceneText {
     if (!groups_.empty()) put_list(text, "groups", groups_);
     put_list(text, "instances", instances_);
     if (!lamps_.empty()) put_list(text, "lamps", lamps_);
-    if (scene.sun) text.append(",\n  \"sun\": ").append(OrderedJson{scene.sun->x, scene.sun->y, scene.sun->z}.dump());
+    if (is_sixth_) {
+      text.append(",\n  \"environment\": ").append(environment_.dump());
+    } else if (scene.environment) {
+      const DVec3 sun = scene.environment->sun.direction;
+      text.append(",\n  \"sun\": ").append(OrderedJson{sun.x, sun.y, sun.z}.dump());
+    }
     if (scene.camera) text.append(",\n  \"camera\": ").append(camera_.dump());
     return text + "\n}\n";
   }
@@ -106,9 +114,11 @@ class SceneText {
   std::vector<OrderedJson> instances_;
   std::vector<OrderedJson> lamps_;
   OrderedJson camera_;
+  OrderedJson environment_;
   PartWriter parts_;
   bool is_third_ = false;
   bool is_fifth_ = false;
+  bool is_sixth_ = false;
 };
 
 Status check_types(const SceneFile& scene) {
@@ -242,6 +252,7 @@ Result<SceneFile> scene_file_of(const Scene& scene) {
   SceneFile file;
   file.types = scene.types;
   file.lamps = scene.lamps;
+  file.environment = scene.environment;
   const PlacesInFile places = put_grids_and_groups(scene, file);
   for (const InstanceHandle handle : scene.instances().handles()) {
     const Instance& instance = scene.instances()[handle];

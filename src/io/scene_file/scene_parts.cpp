@@ -1,13 +1,17 @@
 #include "io/scene_file/scene_parts.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <span>
+#include <utility>
 
 #include <glm/geometric.hpp>
+
+#include <quoin/core/assert.h>
 
 #include "core/bytes/text.h"
 #include "io/base64.h"
@@ -121,6 +125,184 @@ void read_attributes(const Object& object, std::map<std::string, std::string>& a
     const bool is_new = attributes.emplace(std::move(key), object.text(pair[1], {&place, {}, 1})).second;
     if (!is_new) object.faults().add(place, "is a duplicate key");
   });
+}
+
+// ---- environments ------------------------------------------------------------------------------------------------
+
+constexpr std::array<std::pair<const char*, SkyModel>, 5> kSkies = {{{"fixed", SkyModel::Fixed},
+                                                                     {"gradient", SkyModel::Gradient},
+                                                                     {"physical", SkyModel::Physical},
+                                                                     {"uniform", SkyModel::Uniform},
+                                                                     {"image", SkyModel::Image}}};
+constexpr std::array<std::pair<const char*, ToneCurve>, 4> kTones = {
+    {{"clamp", ToneCurve::Clamp}, {"neutral", ToneCurve::Neutral}, {"agx", ToneCurve::Agx}, {"aces", ToneCurve::Aces}}};
+
+template <class T, std::size_t kCount>
+const char* name_of(const std::array<std::pair<const char*, T>, kCount>& names, T value) {
+  const auto* const found = std::ranges::find(names, value, &std::pair<const char*, T>::second);
+  QUOIN_ASSERT(found != names.end(), "a value with a name");
+  return found->first;
+}
+
+template <class T, std::size_t kCount>
+void read_name(const Object& object, std::string_view key, const std::array<std::pair<const char*, T>, kCount>& names,
+               T& out) {
+  std::string name = name_of(names, out);
+  object.read(key, name);
+  std::string all;
+  for (const auto& [each, value] : names) {
+    if (name == each) {
+      out = value;
+      return;
+    }
+    all += (all.empty() ? "" : ", ") + std::string(each);
+  }
+  object.faults().add(object.place_of(key), "must be one of " + all);
+}
+
+OrderedJson triple(Vec3 v) {
+  return {v.x, v.y, v.z};
+}
+
+void put_changed(OrderedJson& json, const char* key, double value, double usual) {
+  if (!scene_json::is_same(value, usual)) json[key] = value;
+}
+void put_changed(OrderedJson& json, const char* key, Vec3 value, Vec3 usual) {
+  if (!is_same(DVec3(value), DVec3(usual))) json[key] = triple(value);
+}
+void put_changed(OrderedJson& json, const char* key, DVec3 value, DVec3 usual) {
+  if (!is_same(value, usual)) json[key] = triple(value);
+}
+void put_changed(OrderedJson& json, const char* key, bool value, bool usual) {
+  if (value != usual) json[key] = value;
+}
+
+void read_colour(const Object& object, std::string_view key, Vec3& out) {
+  DVec3 colour(out);
+  object.read(key, colour);
+  out = Vec3(colour);
+}
+
+OrderedJson json_of_sun(const Sun& sun, const Sun& usual) {
+  OrderedJson json = OrderedJson::object();
+  put_changed(json, "direction", sun.direction, usual.direction);
+  put_changed(json, "brightness", sun.brightness, usual.brightness);
+  put_changed(json, "colour", sun.colour, usual.colour);
+  put_changed(json, "angle_radians", sun.angle_radians, usual.angle_radians);
+  put_changed(json, "visible", sun.is_visible, usual.is_visible);
+  return json;
+}
+
+void read_sun(const Json& json, const Place& place, Faults& faults, Sun& sun) {
+  const Object object(json, place, {"direction", "brightness", "colour", "angle_radians", "visible"}, faults);
+  object.read("direction", sun.direction);
+  object.read("brightness", sun.brightness);
+  read_colour(object, "colour", sun.colour);
+  object.read("angle_radians", sun.angle_radians);
+  object.read("visible", sun.is_visible);
+}
+
+OrderedJson json_of_air(const AirOptions& air) {
+  const AirOptions usual;
+  OrderedJson json = OrderedJson::object();
+  put_changed(json, "rayleigh", air.rayleigh, usual.rayleigh);
+  put_changed(json, "mie", air.mie, usual.mie);
+  put_changed(json, "ozone", air.ozone, usual.ozone);
+  put_changed(json, "mie_anisotropy", air.mie_anisotropy, usual.mie_anisotropy);
+  put_changed(json, "rayleigh_colour", air.rayleigh_colour, usual.rayleigh_colour);
+  put_changed(json, "mie_colour", air.mie_colour, usual.mie_colour);
+  put_changed(json, "ozone_colour", air.ozone_colour, usual.ozone_colour);
+  return json;
+}
+
+void read_air(const Json& json, const Place& place, Faults& faults, AirOptions& air) {
+  const Object object(json, place,
+                      {"rayleigh", "mie", "ozone", "mie_anisotropy", "rayleigh_colour", "mie_colour", "ozone_colour"},
+                      faults);
+  object.read("rayleigh", air.rayleigh);
+  object.read("mie", air.mie);
+  object.read("ozone", air.ozone);
+  object.read("mie_anisotropy", air.mie_anisotropy);
+  read_colour(object, "rayleigh_colour", air.rayleigh_colour);
+  read_colour(object, "mie_colour", air.mie_colour);
+  read_colour(object, "ozone_colour", air.ozone_colour);
+}
+
+// Writes a sky without the name of its image.
+OrderedJson json_of_sky(const Sky& sky, const Sky& usual) {
+  OrderedJson json = OrderedJson::object();
+  if (sky.model != usual.model) json["model"] = name_of(kSkies, sky.model);
+  put_changed(json, "brightness", sky.brightness, usual.brightness);
+  put_changed(json, "colour", sky.colour, usual.colour);
+  if (OrderedJson air = json_of_air(sky.air); !air.empty()) json["air"] = air;
+  put_changed(json, "image_turn_radians", sky.image_turn_radians, usual.image_turn_radians);
+  if (sky.background) json["background"] = triple(*sky.background);
+  return json;
+}
+
+void read_sky(const Json& json, const Place& place, Faults& faults, Sky& sky) {
+  const Object object(json, place,
+                      {"model", "brightness", "colour", "air", "image", "image_turn_radians", "background"}, faults);
+  read_name(object, "model", kSkies, sky.model);
+  object.read("brightness", sky.brightness);
+  read_colour(object, "colour", sky.colour);
+  if (const Json* air = object.find("air")) read_air(*air, object.place_of("air"), faults, sky.air);
+  object.read_text("image", sky.image_file);
+  object.read("image_turn_radians", sky.image_turn_radians);
+  if (object.find("background") != nullptr) read_colour(object, "background", sky.background.emplace());
+}
+
+OrderedJson json_of_ground(const GroundPlane& ground) {
+  const GroundPlane usual;
+  OrderedJson json = OrderedJson::object();
+  json["height"] = ground.height;
+  put_changed(json, "colour", ground.colour, usual.colour);
+  put_changed(json, "only_shadows", ground.only_shadows, usual.only_shadows);
+  put_changed(json, "fade", ground.fade, usual.fade);
+  return json;
+}
+
+void read_ground(const Json& json, const Place& place, Faults& faults, GroundPlane& ground) {
+  const Object object(json, place, {"height", "colour", "only_shadows", "fade"}, faults);
+  object.read("height", ground.height);
+  read_colour(object, "colour", ground.colour);
+  object.read("only_shadows", ground.only_shadows);
+  object.read("fade", ground.fade);
+}
+
+OrderedJson json_of_fog(const Fog& fog) {
+  const Fog usual;
+  OrderedJson json = OrderedJson::object();
+  json["density"] = fog.density;
+  json["top"] = fog.top;
+  put_changed(json, "colour", fog.colour, usual.colour);
+  put_changed(json, "anisotropy", fog.anisotropy, usual.anisotropy);
+  return json;
+}
+
+void read_fog(const Json& json, const Place& place, Faults& faults, Fog& fog) {
+  const Object object(json, place, {"density", "top", "colour", "anisotropy"}, faults);
+  object.read("density", fog.density);
+  object.read("top", fog.top);
+  read_colour(object, "colour", fog.colour);
+  object.read("anisotropy", fog.anisotropy);
+}
+
+OrderedJson json_of_bloom(const Bloom& bloom, const Bloom& usual) {
+  OrderedJson json = OrderedJson::object();
+  put_changed(json, "mix", bloom.mix, usual.mix);
+  put_changed(json, "radius", bloom.radius, usual.radius);
+  put_changed(json, "aspect", bloom.aspect, usual.aspect);
+  put_changed(json, "threshold", bloom.threshold, usual.threshold);
+  return json;
+}
+
+void read_bloom(const Json& json, const Place& place, Faults& faults, Bloom& bloom) {
+  const Object object(json, place, {"mix", "radius", "aspect", "threshold"}, faults);
+  object.read("mix", bloom.mix);
+  object.read("radius", bloom.radius);
+  object.read("aspect", bloom.aspect);
+  object.read("threshold", bloom.threshold);
 }
 
 }  // namespace
@@ -237,6 +419,24 @@ OrderedJson PartWriter::json_of(const Camera& camera) {
                       {"up", triple(camera.up)},
                       {"forward", triple(camera.forward)}};
   json[is_flat ? "view_height" : "fov_radians"] = is_flat ? camera.view_height : camera.vertical_fov_radians;
+  return json;
+}
+
+OrderedJson PartWriter::json_of(const Environment& environment) {
+  const Environment usual = Environment::natural();
+  OrderedJson json = OrderedJson::object();
+  if (OrderedJson sun = json_of_sun(environment.sun, usual.sun); !sun.empty()) json["sun"] = sun;
+  OrderedJson sky = json_of_sky(environment.sky, usual.sky);
+  if (!environment.sky.image_file.empty()) sky["image"] = text(environment.sky.image_file);
+  if (!sky.empty()) json["sky"] = sky;
+  if (environment.ground) json["ground"] = json_of_ground(*environment.ground);
+  if (environment.fog) json["fog"] = json_of_fog(*environment.fog);
+  put_changed(json, "lamp_brightness", environment.lamp_brightness, usual.lamp_brightness);
+  if (environment.exposure) json["exposure"] = *environment.exposure;
+  if (environment.tone) json["tone"] = name_of(kTones, *environment.tone);
+  put_changed(json, "vignette", environment.vignette, usual.vignette);
+  put_changed(json, "gamma", environment.gamma, usual.gamma);
+  if (OrderedJson bloom = json_of_bloom(environment.bloom, usual.bloom); !bloom.empty()) json["bloom"] = bloom;
   return json;
 }
 
@@ -362,6 +562,29 @@ Camera camera_of(const Json& json, const Place& place, Faults& faults) {
   const auto camera = look_at(position, target, fov * std::numbers::pi / 180.0);
   if (!camera) faults.add(place, camera.error().message);
   return camera.value_or(Camera{});
+}
+
+Environment environment_from(const Json& json, const Place& place, Faults& faults) {
+  const Object object(
+      json, place, {"sun", "sky", "ground", "fog", "lamp_brightness", "exposure", "tone", "vignette", "gamma", "bloom"},
+      faults);
+  Environment environment = Environment::natural();
+  const auto read_part = [&](const char* key, auto read) {
+    if (const Json* part = object.find(key)) read(*part, object.place_of(key));
+  };
+  read_part("sun", [&](const Json& part, const Place& at) { read_sun(part, at, faults, environment.sun); });
+  read_part("sky", [&](const Json& part, const Place& at) { read_sky(part, at, faults, environment.sky); });
+  read_part("ground",
+            [&](const Json& part, const Place& at) { read_ground(part, at, faults, environment.ground.emplace()); });
+  read_part("fog", [&](const Json& part, const Place& at) { read_fog(part, at, faults, environment.fog.emplace()); });
+  object.read("lamp_brightness", environment.lamp_brightness);
+  if (object.find("exposure") != nullptr) object.read("exposure", environment.exposure.emplace());
+  if (object.find("tone") != nullptr) read_name(object, "tone", kTones, environment.tone.emplace());
+  object.read("vignette", environment.vignette);
+  object.read("gamma", environment.gamma);
+  read_part("bloom", [&](const Json& part, const Place& at) { read_bloom(part, at, faults, environment.bloom); });
+  if (const Status valid = check(environment); !valid && !faults.error()) faults.add(place, valid.error().message);
+  return environment;
 }
 
 void read_grid_header(const Object& object, SceneGrid& grid) {

@@ -29,6 +29,8 @@ class PartWriter {
   [[nodiscard]] OrderedJson json_of(const SceneLayer& layer);
   [[nodiscard]] OrderedJson json_of(const Lamp& lamp);
   [[nodiscard]] OrderedJson json_of(const Camera& camera);
+  /// Writes the settings that differ from Environment::natural().
+  [[nodiscard]] OrderedJson json_of(const Environment& environment);
 
   [[nodiscard]] bool needs_second() const { return needs_second_; }
 
@@ -45,6 +47,8 @@ class PartWriter {
 [[nodiscard]] SceneLayer layer_of(const Json& json, const Place& place, Faults& faults);
 [[nodiscard]] Lamp lamp_of(const Json& json, const Place& place, Faults& faults);
 [[nodiscard]] Camera camera_of(const Json& json, const Place& place, Faults& faults);
+[[nodiscard]] Environment environment_from(const Json& json, const Place& place, Faults& faults);
+
 /// Reads name, pivot and canvas.
 void read_grid_header(const Object& object, SceneGrid& grid);
 /// Reads the density band that a field is clamped to, if the key is present.

@@ -10,9 +10,9 @@
 #include "core/bytes/text.h"
 #include "io/vox/cameras.h"
 #include "io/vox/chunks.h"
-#include "io/vox/look.h"
 #include "io/vox/materials.h"
 #include "io/vox/read.h"
+#include "io/vox/render_settings.h"
 #include "io/vox/source.h"
 #include "io/whole_file.h"
 #include "scene/hierarchy.h"
@@ -166,7 +166,7 @@ Result<LoadedScene> read_vox(std::span<const std::byte> bytes, const LoadOptions
   if (!grids) return grids.error();
   add_instances(source->placements, *grids, add_layers(*source, loaded.scene), loaded.scene);
   loaded.cameras = vox::cameras_of(source->document, loaded.scene.bounds(InstanceFilter::All), loaded.warnings);
-  loaded.look = vox::look_of(source->document);
+  loaded.render_settings = vox::render_settings_of(source->document);
   warn("materials without a colour skipped", source->document.stray_materials, loaded.warnings);
   add_warnings(source->placements, builder.losses(), loaded.warnings);
   if (options.keep_source) {

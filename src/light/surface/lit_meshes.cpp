@@ -28,8 +28,11 @@ Status refused(const MeshPart& part, const char* why) {
 // Computes the light of a mesh's vertices.
 class VertexLights {
  public:
-  VertexLights(const GridLight& of, const VoxelRegistry& types, const LightOptions& options)
-      : of_(of), types_(types), look_(light_look(options)), exposure_(exposure_of(options)) {}
+  VertexLights(const GridLight& of, const Scene& scene, const LightOptions& options)
+      : of_(of),
+        types_(scene.types),
+        look_(light_look(environment_of(scene), options.least_light)),
+        exposure_(exposure_of(environment_of(scene))) {}
 
   // Vertices from `begin` on.
   void light(const MeshView& view, std::size_t begin, std::span<LinearRgba16> out) const {
@@ -124,6 +127,11 @@ std::vector<std::optional<GridHandle>> grids_of_parts(const Scene& scene, const 
   return grids;
 }
 
+Status check_light(const Scene& scene, const LightOptions& options) {
+  if (Status right = check(options); !right) return right;
+  return check(environment_of(scene));
+}
+
 Status light_meshes(const Scene& scene, const SceneLight& light, const LightOptions& options, SceneMeshes& meshes,
                     Threads threads) {
   const std::vector<std::optional<GridHandle>> grids = grids_of_parts(scene, meshes);
@@ -131,7 +139,7 @@ Status light_meshes(const Scene& scene, const SceneLight& light, const LightOpti
     MeshPart& part = meshes.parts[i];
     if (part.surfaces.empty()) continue;
     if (!grids[i]) return refused(part, "cannot light it: no instance of the scene places it");
-    const VertexLights lights(light.of(*grids[i]), scene.types, options);
+    const VertexLights lights(light.of(*grids[i]), scene, options);
     if (Status done = light_part(lights, threads, part); !done) return done;
   }
   return {};
@@ -140,7 +148,7 @@ Status light_meshes(const Scene& scene, const SceneLight& light, const LightOpti
 }  // namespace
 
 Status light_meshes(const Scene& scene, const LightOptions& options, SceneMeshes& meshes, Threads threads) {
-  if (Status right = check(options); !right) return right;
+  if (Status right = check_light(scene, options); !right) return right;
   SceneLight light;
   light.update(scene, threads);
   return light_meshes(scene, light, options, meshes, threads);
@@ -148,7 +156,7 @@ Status light_meshes(const Scene& scene, const LightOptions& options, SceneMeshes
 
 Result<SceneMeshes> mesh_lit_scene(const Scene& scene, const LightOptions& light, BlockySceneOptions options,
                                    Threads threads, const Progress& progress) {
-  if (Status right = check(light); !right) return right.error();
+  if (Status right = check_light(scene, light); !right) return right.error();
   SceneLight levels;
   levels.update(scene, threads);
   options.cut = [&](GridHandle grid, IVec3 chunk, QuadBuffer& quads) {

@@ -30,8 +30,8 @@ class LitMeshes : public ::testing::Test {
   [[nodiscard]] const Grid& grid() const { return scene_.grids()[handle_].grid; }
   // Returns the expected light of a vertex, by the same functions that colour images.
   [[nodiscard]] Vec3 wanted(const MeanLevels& levels, Vec3 normal, float emission) const {
-    const Vec3 light = light_colour(levels, normal, light_look(options_)) + emission;
-    return glm::min(light * static_cast<float>(options_.exposure), Vec3(1.0F)) * 65'535.0F;
+    const Vec3 light = light_colour(levels, normal, light_look(environment_of(scene_))) + emission;
+    return glm::min(light * static_cast<float>(*environment_of(scene_).exposure), Vec3(1.0F)) * 65'535.0F;
   }
   static void expect_light(const LinearRgba16& light, Vec3 wanted, float tolerance) {
     for (int c = 0; c < 3; ++c) ASSERT_NEAR(light[static_cast<std::size_t>(c)], wanted[c], tolerance);
@@ -47,9 +47,8 @@ class LitMeshes : public ::testing::Test {
 // Compares every corner of every face, including those inside merged quads.
 TEST_F(LitMeshes, MergedFacesShowTheLightOfSingleOnes) {
   put(LightWorld(3));
-  options_.exposure = 0.8;
-  options_.sky_follows_sun = true;
-  options_.sun = {0.5, 0.15, 0.3};
+  scene_.environment = Environment::natural({0.5, 0.15, 0.3});
+  scene_.environment->exposure = 0.8;
   const auto meshes = mesh_lit_scene(scene_, options_);
   ASSERT_TRUE(meshes);
   SurfaceLight surface(light_, grid(), scene_.types);
@@ -138,9 +137,10 @@ TEST_F(LitMeshes, RefuseWhatHasNoLight) {
   put(LightWorld(5));
   EXPECT_EQ(mesh_lit_scene(scene_, options_, {.mesh = {.watertight = true}}).error().code, ErrorCode::InvalidArgument);
   EXPECT_EQ(mesh_lit_scene(scene_, options_, {.atlas = true}).error().code, ErrorCode::InvalidArgument);
-  options_.exposure = -1.0;
+  scene_.environment = Environment::natural();
+  scene_.environment->exposure = -1.0;
   EXPECT_EQ(mesh_lit_scene(scene_, options_).error().code, ErrorCode::InvalidArgument);
-  options_.exposure = 1.0;
+  scene_.environment.reset();
   auto meshes = mesh_scene(scene_);
   ASSERT_TRUE(meshes);
   meshes->placements.clear();

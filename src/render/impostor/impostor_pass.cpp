@@ -283,6 +283,7 @@ class FarTile {
 
 void draw_impostors(const SceneTracer& scene, std::span<const FarInstance> far, const Camera& camera,
                     const RenderOptions& options, RenderedImage& image, Threads threads) {
+  const Environment environment = options.environment.value_or(environment_of(scene.scene()));
   QUOIN_ASSERT(check(camera, options).has_value(), "a camera and options that CpuRenderer accepts");
   QUOIN_ASSERT(options.light.model == LightModel::Rays, "ray-traced light");
   QUOIN_ASSERT(image.colour.width == options.width && image.colour.height == options.height &&
@@ -291,7 +292,7 @@ void draw_impostors(const SceneTracer& scene, std::span<const FarInstance> far, 
   const SceneView view(scene, camera.position);
   const VoxelRegistry& types = scene.scene().types;
   const Surfaces surfaces(types);
-  const Lighting lighting(view, types, surfaces, options.light);
+  const Lighting lighting(view, types, surfaces, options.light, environment);
   const CameraRays rays(camera, options.width, options.height);
   const ImpostorPass pass(scene, far, camera, options.width, options.height);
   const int across = (options.width + kTile - 1) / kTile;

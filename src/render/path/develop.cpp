@@ -101,26 +101,6 @@ Vec3 toned(Vec3 light, float exposure, ToneCurve tone) {
   return exposed;
 }
 
-Status refuse(const char* message) {
-  return make_error(ErrorCode::InvalidArgument, message);
-}
-
-Status check(const DevelopOptions& options) {
-  if (!std::isfinite(options.exposure) || options.exposure < 0.0) {
-    return refuse("exposure: must be finite and at least 0");
-  }
-  if (!(options.vignette >= 0.0 && options.vignette <= 1.0)) return refuse("vignette: must be 0 to 1");
-  if (!(options.gamma > 0.0) || !std::isfinite(options.gamma)) return refuse("gamma: must be finite and more than 0");
-  const Bloom& bloom = options.bloom;
-  if (!(bloom.mix >= 0.0 && bloom.mix <= 1.0)) return refuse("bloom: its mix must be 0 to 1");
-  if (!(bloom.radius >= 0.0 && bloom.radius <= 1.0)) return refuse("bloom: its radius must be 0 to 1");
-  if (!(bloom.aspect >= -1.0 && bloom.aspect <= 1.0)) return refuse("bloom: its aspect must be -1 to 1");
-  if (!(bloom.threshold >= 0.0) || !std::isfinite(bloom.threshold)) {
-    return refuse("bloom: its threshold must be finite and at least 0");
-  }
-  return {};
-}
-
 // Computes means of `2 radius + 1` pixels along lines of `count` values with a stride of `step`. Values outside equal
 // the edge's.
 void blur_line(std::vector<Vec3>& values, std::size_t first, std::size_t step, int count, int radius,

@@ -12,6 +12,7 @@
 #include <quoin/render/path_tracer.h>
 
 #include "core/srgb.h"
+#include "render/environment_for_tests.h"
 #include "render/path/path_math.h"
 #include "render/path/scatter.h"
 #include "render/path/town_for_tests.h"
@@ -96,9 +97,9 @@ TEST(PathMedia, WhiteFogAndCloudsCannotBeSeen) {
   EXPECT_NEAR(mean_red(cloud), 1.0, 0.005);
   Scene scene;
   PathOptions options = even_sky(16, 64);
-  options.ground.emplace();
-  options.ground->colour = Vec3(1.0F);
-  options.fog = Fog{0.2, Vec3(1.0F), 0.3, 8.0};
+  physical_in(options).ground.emplace();
+  physical_in(options).ground->colour = Vec3(1.0F);
+  physical_in(options).fog = Fog{0.2, Vec3(1.0F), 0.3, 8.0};
   const PathImage fog = path_image(scene, towards({0.0, 3.0, 10.0}, {0.0, 0.0, 0.0}, 0.5), options);
   EXPECT_NEAR(mean_red(fog), 1.0, 0.005);
 }
@@ -110,20 +111,20 @@ TEST(PathMedia, TransmissionFallsExponentiallyWithLength) {
   lamp.emission = 1.0F;
   const Scene wall = box_of(lamp, {{-20, -20, -1}, {20, 20, 0}});
   PathOptions options = even_sky(16, 256);
-  options.sky_brightness = 0.0;
+  physical_in(options).sky.brightness = 0.0;
   options.max_bounces = 0;
-  options.fog = Fog{0.1, Vec3(0.0F), 0.0, 100.0};
+  physical_in(options).fog = Fog{0.1, Vec3(0.0F), 0.0, 100.0};
   const Camera camera = straight_at_the_front();
   EXPECT_NEAR(mean_red(path_image(wall, camera, options)), std::exp(-1.2), 0.003);
 
   // The sun is above: its light passes through 10 of fog downwards, and 10 upwards to the camera above.
   const Scene floor = box_of({.name = "", .colour = {255, 255, 255, 255}}, {{-20, -1, -20}, {20, 0, 20}});
   options = even_sky(16, 256);
-  options.sky_brightness = 0.0;
-  options.sun = {0.0, 1.0, 0.0};
-  options.sun_brightness = 1.0;
-  options.sun_angle_radians = 0.0;
-  options.fog = Fog{0.05, Vec3(0.0F), 0.0, 10.0};
+  physical_in(options).sky.brightness = 0.0;
+  physical_in(options).sun.direction = {0.0, 1.0, 0.0};
+  physical_in(options).sun.brightness = 1.0;
+  physical_in(options).sun.angle_radians = 0.0;
+  physical_in(options).fog = Fog{0.05, Vec3(0.0F), 0.0, 10.0};
   EXPECT_NEAR(mean_red(path_image(floor, from_above(0.0, 30.0, 0.0, 4.0), options)), std::exp(-1.0), 0.004);
 }
 
@@ -163,8 +164,8 @@ TEST(PathMedia, ALampShinesInFog) {
   lamp.emission = 20.0F;
   const Scene scene = box_of(lamp, {IVec3(0), IVec3(2)});
   PathOptions options = even_sky(24, 64);
-  options.sky_brightness = 0.0;
-  options.fog = Fog{0.05, Vec3(1.0F), 0.0, 100.0};
+  physical_in(options).sky.brightness = 0.0;
+  physical_in(options).fog = Fog{0.05, Vec3(1.0F), 0.0, 100.0};
   const PathImage image = path_image(scene, towards({1.0, 1.0, 20.0}, DVec3(1.0), 1.2), options);
   const auto at = [&](std::size_t x, std::size_t y) { return image.radiance[y * 24 + x].x; };
   EXPECT_GT(at(9, 12), 0.02F);
@@ -176,7 +177,7 @@ TEST(PathMedia, RefusesFogThatCannotBe) {
   const Scene scene;
   const auto refuses = [&](const Fog& fog) {
     PathOptions options = even_sky(2, 1);
-    options.fog = fog;
+    physical_in(options).fog = fog;
     return !PathTracer(scene).render(of_town(), options).has_value();
   };
   const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -196,17 +197,17 @@ TEST(PathLens, BladesShapeWhatIsOutOfFocus) {
   lamp.emission = 1000.0F;
   const Scene scene = box_of(lamp, {IVec3(0), IVec3(1)});
   PathOptions options = even_sky(64, 256);
-  options.sky_brightness = 0.0;
-  options.lens_radius = 4.0;
-  options.focus_distance = 30.0;
-  options.lens_blades = 4;
+  physical_in(options).sky.brightness = 0.0;
+  options.lens.radius = 4.0;
+  options.lens.focus_distance = 30.0;
+  options.lens.blades = 4;
   const Camera camera = towards({0.5, 0.5, 60.0}, DVec3(0.5), 0.3);
   const auto lit = [&](const PathOptions& by) {
     const PathImage image = path_image(scene, camera, by);
     return std::ranges::count_if(image.radiance, [](Vec3 light) { return light.x > 0.0F; });
   };
   const auto square = lit(options);
-  options.lens_blades = 0;
+  options.lens.blades = 0;
   const auto disc = lit(options);
   EXPECT_NEAR(static_cast<double>(square) / static_cast<double>(disc), 2.0 / std::acos(-1.0), 0.12);
 }
@@ -246,10 +247,10 @@ TEST(PathDenoise, KeepsEdges) {
   grid.fill_box({{-2, 0, -2}, {2, 8, 2}}, red);
   place(scene, std::move(grid));
   PathOptions options = even_sky(192, 4);
-  options.sky_brightness = 0.0;
+  physical_in(options).sky.brightness = 0.0;
   options.max_bounces = 1;
-  options.sun_brightness = 1.0;
-  options.sun_angle_radians = 0.0;
+  physical_in(options).sun.brightness = 1.0;
+  physical_in(options).sun.angle_radians = 0.0;
   const Camera camera = towards({15.0, 20.0, 25.0}, DVec3(0.0), 0.8);
   const PathImage plain = path_image(scene, camera, options);
   options.denoise = true;

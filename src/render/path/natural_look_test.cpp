@@ -27,17 +27,17 @@ Scene white_block() {
 }
 
 // `from`: the camera's direction from the block's centre.
-Image natural_image(DVec3 from, SkyModel sky, bool has_ground, DVec3 sun = natural_light().sun) {
+Image natural_image(DVec3 from, SkyModel sky, bool has_ground, DVec3 sun = Sun{}.direction) {
   const Scene scene = white_block();
-  const NaturalLook natural = natural_look(sky, sun);
   PathOptions options;
-  static_cast<Look&>(options) = natural.look;
+  Environment& environment = options.environment.emplace(Environment::natural(sun));
+  environment.sky.model = sky;
   options.width = options.height = kSize;
   options.samples = 32;
-  if (has_ground) options.ground.emplace().colour = natural.ground_colour;
+  if (has_ground) environment.ground.emplace().colour = Vec3(sky == SkyModel::Uniform ? 1.0F : 0.5F);
   const DVec3 middle(4.0);
   const PathImage rendered = path_image(scene, towards(middle + from * 24.0, middle, 0.9), options);
-  auto image = develop(rendered, natural.develop);
+  auto image = develop(rendered, develop_options(environment));
   EXPECT_TRUE(image.has_value());
   return image ? std::move(*image) : Image{};
 }
@@ -62,7 +62,7 @@ double middle_of_image(const Image& image) {
   return darkest_channel(image, kSize / 2 - 2, kSize / 2 - 2, 4);
 }
 
-TEST(NaturalLook, BackgroundsOfTheIsoViewAreBright) {
+TEST(NaturalEnvironment, BackgroundsOfTheIsoViewAreBright) {
   const Image image = natural_image(glm::normalize(DVec3(1.0, 1.0, 1.0)), SkyModel::Gradient, false);
   for (const int y : {0, kSize - 3}) {
     EXPECT_GE(darkest_channel(image, 0, y, 3), 150.0);
@@ -70,7 +70,7 @@ TEST(NaturalLook, BackgroundsOfTheIsoViewAreBright) {
   }
 }
 
-TEST(NaturalLook, WhiteInFullShadowIsNotDark) {
+TEST(NaturalEnvironment, WhiteInFullShadowIsNotDark) {
   // The sun is at -x and +z: the block's sides towards +x and -z are in shadow.
   for (const SkyModel sky : {SkyModel::Gradient, SkyModel::Physical}) {
     for (const DVec3& side : {DVec3(1.0, 0.05, 0.0), DVec3(0.0, 0.05, -1.0)}) {
@@ -83,7 +83,7 @@ TEST(NaturalLook, WhiteInFullShadowIsNotDark) {
 }
 
 // As in marched images: dark, but not black.
-TEST(NaturalLook, WhiteIsSeenAfterSunset) {
+TEST(NaturalEnvironment, WhiteIsSeenAfterSunset) {
   for (const double degrees : {-5.0, -20.0, -60.0}) {
     const double radians = degrees * std::numbers::pi / 180.0;
     const DVec3 sun{0.6 * std::cos(radians), std::sin(radians), 0.8 * std::cos(radians)};
@@ -98,7 +98,7 @@ TEST(NaturalLook, WhiteIsSeenAfterSunset) {
   }
 }
 
-TEST(NaturalLook, WhiteUnderAUniformSkyIsWhite) {
+TEST(NaturalEnvironment, WhiteUnderAUniformSkyIsWhite) {
   for (const bool has_ground : {false, true}) {
     for (const DVec3& side : {DVec3(1.0, 0.05, 0.0), DVec3(-1.0, 0.05, 0.0), DVec3(0.1, 1.0, 0.1)}) {
       const Image image = natural_image(glm::normalize(side), SkyModel::Uniform, has_ground);

@@ -16,6 +16,7 @@
 #include <quoin/render/path_tracer.h>
 
 #include "core/death_for_tests.h"
+#include "render/environment_for_tests.h"
 #include "render/path/path_math.h"
 #include "render/path/town_for_tests.h"
 #include "render/render_test_support.h"
@@ -59,8 +60,8 @@ double mean_square(const PathImage& a, const PathImage& b) {
 class PathHistoryTest : public testing::Test {
  protected:
   PathHistoryTest() : scene_(meadow(grid_)), tracer_(scene_), options_(under_even_sky(kEdge, kEdge, 1)) {
-    options_.sun_brightness = 1.0;
-    options_.sun = {0.5, 0.7, 0.2};
+    physical_in(options_).sun.brightness = 1.0;
+    physical_in(options_).sun.direction = {0.5, 0.7, 0.2};
     options_.max_bounces = 3;
   }
 

@@ -20,80 +20,26 @@ Status refuse(const std::string& message) {
   return make_error(ErrorCode::InvalidArgument, message);
 }
 
-bool is_brightness(double value) {
-  return value >= 0.0 && value <= kMaxBrightness;
+Status check_lens(const Lens& lens) {
+  if (!(lens.radius >= 0.0) || !std::isfinite(lens.radius)) {
+    return refuse("lens.radius: must be finite and at least 0");
+  }
+  if (!(lens.focus_distance > 0.0) || !std::isfinite(lens.focus_distance)) {
+    return refuse("lens.focus_distance: must be finite and more than 0");
+  }
+  if (lens.blades != 0 && (lens.blades < 3 || lens.blades > kMaxLensBlades)) {
+    return refuse("lens.blades: must be 0, or 3 to 64");
+  }
+  return std::isfinite(lens.turn_radians) ? Status() : refuse("lens.turn_radians: must be finite");
 }
 
-bool is_colour(Vec3 colour, float most) {
-  return std::min({colour.x, colour.y, colour.z}) >= 0.0F && std::max({colour.x, colour.y, colour.z}) <= most &&
-         is_finite(DVec3(colour));
-}
-
-bool is_anisotropy(double value) {
-  return value >= -kMaxAnisotropy && value <= kMaxAnisotropy;
-}
-
-Status check_air(const AirOptions& air) {
-  for (const double part : {air.rayleigh, air.mie, air.ozone}) {
-    if (!(part >= 0.0 && part <= kMaxAir)) return refuse("air: each factor must be 0 to 100");
-  }
-  for (const Vec3& colour : {air.rayleigh_colour, air.mie_colour, air.ozone_colour}) {
-    if (!is_colour(colour, static_cast<float>(kMaxAir))) return refuse("air: each colour component must be 0 to 100");
-  }
-  return is_anisotropy(air.mie_anisotropy) ? Status() : refuse("air: its mie_anisotropy must be -0.99 to 0.99");
-}
-
-Status check_ground(const GroundPlane& ground) {
-  if (!std::isfinite(ground.height)) return refuse("ground: its height must be finite");
-  if (!is_colour(ground.colour, 1.0F)) return refuse("ground: each colour component must be 0 to 1");
-  return ground.fade >= 0.0 && ground.fade <= 1.0 ? Status() : refuse("ground: its fade must be 0 to 1");
-}
-
-Status check_fog(const Fog& fog) {
-  if (!(fog.density >= 0.0 && fog.density <= kMaxFogDensity)) return refuse("fog: its density must be 0 to 1e6");
-  if (!is_colour(fog.colour, 1.0F)) return refuse("fog: each colour component must be 0 to 1");
-  if (!is_anisotropy(fog.anisotropy)) return refuse("fog: its anisotropy must be -0.99 to 0.99");
-  return std::isfinite(fog.top) ? Status() : refuse("fog: its top must be finite");
-}
-
-Status check_lens(const Look& look) {
-  if (!(look.lens_radius >= 0.0) || !std::isfinite(look.lens_radius)) {
-    return refuse("lens_radius: must be finite and at least 0");
-  }
-  if (!(look.focus_distance > 0.0) || !std::isfinite(look.focus_distance)) {
-    return refuse("focus_distance: must be finite and more than 0");
-  }
-  if (look.lens_blades != 0 && (look.lens_blades < 3 || look.lens_blades > kMaxLensBlades)) {
-    return refuse("lens_blades: must be 0, or 3 to 64");
-  }
-  return std::isfinite(look.lens_turn_radians) ? Status() : refuse("lens_turn_radians: must be finite");
-}
-
-Status check_sky(const Look& options) {
-  if (!is_finite(options.sun) || options.sun == DVec3(0.0)) return refuse("sun: must be finite and not 0");
-  if (!(options.sun_angle_radians >= 0.0 && options.sun_angle_radians <= kMaxSunAngleRadians)) {
-    return refuse("sun_angle_radians: must be 0 to 3");
-  }
-  if (!is_brightness(options.sun_brightness)) return refuse("sun_brightness: must be 0 to 1e9");
-  if (!is_brightness(options.sky_brightness)) return refuse("sky_brightness: must be 0 to 1e9");
-  if (!is_brightness(options.lamp_brightness)) return refuse("lamp_brightness: must be 0 to 1e9");
-  if (!is_colour(options.sky_colour, static_cast<float>(kMaxBrightness))) {
-    return refuse("sky_colour: must be 0 to 1e9 each");
-  }
-  if (!is_colour(options.sun_colour, static_cast<float>(kMaxBrightness))) {
-    return refuse("sun_colour: must be 0 to 1e9 each");
-  }
-  if (options.background && !is_colour(*options.background, static_cast<float>(kMaxBrightness))) {
-    return refuse("background: must be 0 to 1e9 each");
-  }
-  if (Status air = check_air(options.air); !air) return air;
-  if (!std::isfinite(options.environment_turn_radians)) return refuse("environment_turn_radians: must be finite");
-  if (options.sky != SkyModel::Environment) return {};
-  const RadianceImage* const image = options.environment.get();
+Status check_image(const Sky& sky) {
+  if (sky.model != SkyModel::Image) return {};
+  const RadianceImage* const image = sky.image.get();
   const bool is_whole =
       image != nullptr && image->width > 0 && image->height > 0 &&
       image->rgb.size() == 3 * static_cast<std::size_t>(image->width) * static_cast<std::size_t>(image->height);
-  return is_whole ? Status() : refuse("environment: must be an image of at least one pixel");
+  return is_whole ? Status() : refuse("sky.image: must be an image of at least one pixel");
 }
 
 }  // namespace
@@ -109,10 +55,10 @@ Status check(const Camera& camera, const PathOptions& options) {
   if (options.max_scatterings < 0 || options.max_scatterings > kMaxBounces) {
     return refuse("max_scatterings: must be 0 to 1024");
   }
-  if (Status ground = options.ground ? check_ground(*options.ground) : Status(); !ground) return ground;
-  if (Status fog = options.fog ? check_fog(*options.fog) : Status(); !fog) return fog;
-  if (Status lens = check_lens(options); !lens) return lens;
-  return check_sky(options);
+  if (Status lens = check_lens(options.lens); !lens) return lens;
+  if (!options.environment) return {};
+  if (Status around = quoin::check(*options.environment); !around) return around;
+  return check_image(options.environment->sky);
 }
 
 PathImage empty_image(const PathOptions& options) {

@@ -110,8 +110,8 @@ PathTile::PathTile(const TileContext& context, int column, int row)
                                         static_cast<std::uint32_t>(row + static_cast<int>(i) / kEdge));
     pixels_[i] = mix_bits(place ^ context.options->seed * 0x9E37'79B9U);
   }
-  if (context.options->ground) ground_ = context.options->ground->height - context.camera->position.y;
-  if (context.options->fog) fog_top_ = context.options->fog->top - context.camera->position.y;
+  if (context.environment->ground) ground_ = context.environment->ground->height - context.camera->position.y;
+  if (context.environment->fog) fog_top_ = context.environment->fog->top - context.camera->position.y;
 }
 
 bool PathTile::render(const std::function<bool(std::size_t)>& goes_on) {
@@ -179,12 +179,12 @@ void PathTile::begin(int first, int count) {
 }
 
 Pair PathTile::on_lens(Pair u) const {
-  const int blades = context_->options->lens_blades;
+  const int blades = context_->options->lens.blades;
   if (blades < 3) return on_disc(u);
   // Chooses one of the triangles around the middle, then a point in it.
   const float place = u.x * static_cast<float>(blades);
   const float first = std::min(std::floor(place), static_cast<float>(blades - 1));
-  double turned = context_->options->lens_turn_radians / (2.0 * std::numbers::pi);
+  double turned = context_->options->lens.turn_radians / (2.0 * std::numbers::pi);
   turned -= std::floor(turned);
   const auto corner = [&](float which) {
     const float turns = which / static_cast<float>(blades) + static_cast<float>(turned);
@@ -214,11 +214,11 @@ void PathTile::begin_path(std::size_t pixel, Pair jitter, int sample) {
                        rays.down() * (y + static_cast<double>(jitter.y));
   if (rays.is_perspective()) {
     DVec3 direction = glm::normalize(rays.forward() + across);
-    if (options.lens_radius > 0.0) {
+    if (options.lens.radius > 0.0) {
       const Pair lens = on_lens(path.random.pair(1));
       path.origin =
-          (camera.right * static_cast<double>(lens.x) + camera.up * static_cast<double>(lens.y)) * options.lens_radius;
-      const double t = options.focus_distance / glm::dot(direction, rays.forward());
+          (camera.right * static_cast<double>(lens.x) + camera.up * static_cast<double>(lens.y)) * options.lens.radius;
+      const double t = options.lens.focus_distance / glm::dot(direction, rays.forward());
       direction = glm::normalize(direction * t - path.origin);
     }
     path.direction = Vec3(direction);
@@ -281,7 +281,7 @@ void PathTile::meet_packet(std::span<const std::uint32_t> indices) {
     const bool may_meet_glass = (through_glass >> i & 1U) != 0 || paths_[index].inside != kAir;
     if (may_meet_glass && meet_glass(index, until[i])) continue;
     if ((in_fog_lanes >> i & 1U) != 0) {
-      const Fog& fog = *context_->options->fog;
+      const Fog& fog = *context_->environment->fog;
       hit_air(index, until[i], fog.colour, static_cast<float>(fog.anisotropy), 0);
     } else {
       meet_lane(index, rays, hits, static_cast<int>(i), until[i]);
@@ -302,7 +302,7 @@ void PathTile::meet_lane(std::uint32_t index, const RayPacket& rays, const Scene
 }
 
 bool PathTile::ends_in_fog(const Path& path, double& until) const {
-  const std::optional<Fog>& fog = context_->options->fog;
+  const std::optional<Fog>& fog = context_->environment->fog;
   if (!fog || !(fog->density > 0.0) || path.inside != kAir) return false;
   const Interval way = in_fog(path.origin, path.direction, until);
   const double met = way.begin + free_way(path.random.one(path.dimension + kFog), fog->density);
@@ -312,24 +312,24 @@ bool PathTile::ends_in_fog(const Path& path, double& until) const {
 }
 
 double PathTile::ground_at(const DVec3& origin, Vec3 direction) const {
-  if (!context_->options->ground || !(direction.y < 0.0F) || !(origin.y > ground_)) return kInfinite;
+  if (!context_->environment->ground || !(direction.y < 0.0F) || !(origin.y > ground_)) return kInfinite;
   return (ground_ - origin.y) / static_cast<double>(direction.y);
 }
 
 void PathTile::leave(Path& path, Vec3 direction) {
   const SkyLight& sky = *context_->sky;
-  const PathOptions& options = *context_->options;
+  const Environment& environment = *context_->environment;
   if (path.is_first && !context_->rays->is_perspective()) {
     direction = Vec3(glm::normalize(context_->rays->forward() + path.origin * context_->rays->sky_scale()));
   }
   Vec3 light = sky.sky(direction);
   if (path.density < kNoOther && sky.has_uneven_sky()) light *= balance(path.density, sky.sky_density(direction));
-  const float density = options.sun_is_seen || !path.is_seen ? sky.sun_density(direction) : 0.0F;
+  const float density = environment.sun.is_visible || !path.is_seen ? sky.sun_density(direction) : 0.0F;
   if (density > 0.0F) {
     light += sky.sun(direction) * (path.density < kNoOther ? balance(path.density, density) : 1.0F);
   }
   if (path.is_first) {
-    light = options.background.value_or(light);
+    light = environment.sky.background.value_or(light);
     sums_[path.pixel].background += light;
     if (path.part != kNoPart) {
       SurfacePart& part = part_of(path);
@@ -346,7 +346,7 @@ void PathTile::leave(Path& path, Vec3 direction) {
 
 void PathTile::add_emitted(Path& path, Vec3 emitted, std::int32_t lamp, float distance) const {
   if (is_black(emitted)) return;
-  float share = path.is_seen ? 1.0F : static_cast<float>(context_->options->lamp_brightness);
+  float share = path.is_seen ? 1.0F : static_cast<float>(context_->environment->lamp_brightness);
   if (lamp >= 0 && path.density < kNoOther) {
     const DVec3 vertex = path.origin + context_->camera->position;
     const PathLamps& lamps = *context_->lamps;
@@ -450,9 +450,9 @@ void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const Scen
 }
 
 void PathTile::hit_ground(std::uint32_t index, double t) {
-  QUOIN_ASSERT(context_->options->ground.has_value(), "a scene with ground");
+  QUOIN_ASSERT(context_->environment->ground.has_value(), "a scene with ground");
   Path& path = paths_[index];
-  const GroundPlane& ground = *context_->options->ground;
+  const GroundPlane& ground = *context_->environment->ground;
   if (path.is_first && ground.fade > 0.0) {
     const float near = std::clamp(-path.direction.y / static_cast<float>(ground.fade), 0.0F, 1.0F);
     if (path.random.one(path.dimension + kFade) >= near * near * (3.0F - 2.0F * near)) {
@@ -647,7 +647,7 @@ void PathTile::ask_lamp(const Vertex& vertex, std::size_t lane, const Frame& fra
 bool PathTile::ask(const Vertex& vertex, Vec3 direction, float max_t, Vec3 light, bool is_sun) {
   if (is_black(light)) return false;
   if (ground_at(vertex.in_view, direction) < static_cast<double>(max_t)) return false;
-  if (const std::optional<Fog>& fog = context_->options->fog) {
+  if (const std::optional<Fog>& fog = context_->environment->fog) {
     const Interval way = in_fog(vertex.in_view, direction, static_cast<double>(max_t));
     light *= exponential(static_cast<float>(-fog->density * (way.end - way.begin)));
     if (is_black(light)) return false;

@@ -48,6 +48,7 @@ struct TileContext {
   const CameraRays* rays = nullptr;
   const Camera* camera = nullptr;
   const PathOptions* options = nullptr;
+  const Environment* environment = nullptr;
   SurfaceParts* parts = nullptr;  ///< of the image, to be filled; null: not requested
   bool has_media = false;         ///< true if there are fog or clouds
 };

@@ -16,11 +16,15 @@ namespace quoin {
 
 struct PathTracer::Impl {
   Impl(const Scene& of_scene, InstanceFilter filter, Threads threads)
-      : scene(&of_scene), tracer(of_scene, filter, threads), surfaces(of_scene.types, Clouds::Scatter) {}
+      : scene(&of_scene),
+        tracer(of_scene, filter, threads),
+        surfaces(of_scene.types, Clouds::Scatter),
+        environment(environment_of(of_scene)) {}
 
   const Scene* scene;
   SceneTracer tracer;
   Surfaces surfaces;
+  Environment environment;
 
   [[nodiscard]] std::shared_ptr<const path::PathLamps> lamps(double brightness) {
     const std::lock_guard lock(mutex_);
@@ -35,11 +39,11 @@ struct PathTracer::Impl {
     made_ = nullptr;
   }
   // Returns the sky light; reuses the last image's if the sky is the same.
-  [[nodiscard]] std::shared_ptr<const path::SkyLight> sky(const Look& look) {
+  [[nodiscard]] std::shared_ptr<const path::SkyLight> sky(const Environment& environment) {
     const std::lock_guard lock(mutex_);
-    if (sky_ == nullptr || !path::is_same_sky(sky_of_, look)) {
-      sky_ = std::make_shared<const path::SkyLight>(look);
-      sky_of_ = look;
+    if (sky_ == nullptr || !path::is_same_sky(sky_of_, environment)) {
+      sky_ = std::make_shared<const path::SkyLight>(environment);
+      sky_of_ = environment;
     }
     return sky_;
   }
@@ -50,7 +54,7 @@ struct PathTracer::Impl {
   std::shared_ptr<const path::PathLamps> made_;  // null: out of date
   double made_of_ = 0.0;
   std::shared_ptr<const path::SkyLight> sky_;
-  Look sky_of_;
+  Environment sky_of_;
 };
 
 PathTracer::PathTracer(const Scene& scene, InstanceFilter filter, Threads threads)
@@ -63,16 +67,19 @@ void PathTracer::update(Threads threads) {
   Impl& impl = impl_of(impl_);
   impl.tracer.update(threads);
   impl.surfaces.update(impl.scene->types);
+  impl.environment = environment_of(*impl.scene);
   impl.forget_lamps();
 }
 
-Result<PathImage> PathTracer::render(const Camera& camera, const PathOptions& options, Threads threads,
+Result<PathImage> PathTracer::render(const Camera& camera, const PathOptions& asked, Threads threads,
                                      const Progress& progress) const {
-  if (const Status status = path::check(camera, options); !status) return status.error();
   Impl& impl = impl_of(impl_);
+  const PathOptions options = with_environment(asked, impl.environment);
+  const Environment& environment = *options.environment;
+  if (const Status status = path::check(camera, options); !status) return status.error();
   const SceneView view(impl.tracer, camera.position);
-  const std::shared_ptr<const path::PathLamps> lamps = impl.lamps(options.lamp_brightness);
-  const std::shared_ptr<const path::SkyLight> sky = impl.sky(options);
+  const std::shared_ptr<const path::PathLamps> lamps = impl.lamps(environment.lamp_brightness);
+  const std::shared_ptr<const path::SkyLight> sky = impl.sky(environment);
   const CameraRays rays(camera, options.width, options.height);
   std::optional<path::SurfaceParts> parts;
   if (options.denoise) parts.emplace(options.width, options.height);
@@ -87,8 +94,9 @@ Result<PathImage> PathTracer::render(const Camera& camera, const PathOptions& op
                                   &rays,
                                   &camera,
                                   &options,
+                                  &environment,
                                   parts ? &*parts : nullptr,
-                                  options.fog.has_value() || impl.surfaces.has_clouds()};
+                                  environment.fog.has_value() || impl.surfaces.has_clouds()};
   PathImage image = path::empty_image(options);
   if (Status drawn = draw_tiles<path::PathTile>(context, options, threads, progress, image); !drawn)
     return drawn.error();

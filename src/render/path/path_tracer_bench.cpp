@@ -7,6 +7,7 @@
 #include <quoin/render/path_tracer.h>
 
 #include "bench/image_workload.h"
+#include "render/environment_for_tests.h"
 
 namespace quoin {
 namespace {
@@ -58,8 +59,8 @@ void lamps(benchmark::State& state) {
     return made;
   }();
   PathOptions options;
-  options.sun_brightness = 0.0;
-  options.sky_brightness = 0.01;
+  physical_in(options).sun.brightness = 0.0;
+  physical_in(options).sky.brightness = 0.01;
   time_paths(state, scene, options);
 }
 

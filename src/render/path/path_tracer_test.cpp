@@ -14,6 +14,7 @@
 
 #include "core/instruction_sets_for_tests.h"
 #include "core/srgb.h"
+#include "render/environment_for_tests.h"
 #include "render/path/town_for_tests.h"
 #include "render/render_test_support.h"
 
@@ -124,9 +125,9 @@ TEST(PathTracer, ASlopeSeesTheSkyAboveIt) {
     const DVec3 middle = moved.position + moved.rotation * DVec3(2, 4, 2);
     PathOptions options = under_even_sky(8, 8, 256);
     options.max_bounces = 1;
-    options.ground.emplace();
-    options.ground->colour = Vec3(0.0F);
-    options.ground->height = -1000.0;
+    physical_in(options).ground.emplace();
+    physical_in(options).ground->colour = Vec3(0.0F);
+    physical_in(options).ground->height = -1000.0;
     const Camera camera = looking(middle + normal * 3.0, -normal, moved.rotation * DVec3(0, 0, -1), 2.0);
     const float light = mean(path_image(scene, camera, options)).x / linear_from_srgb(std::uint8_t{188});
     EXPECT_NEAR(light, 0.5 * (1.0 + std::cos(angle)), 0.01) << degrees;
@@ -149,7 +150,7 @@ TEST(PathTracer, ASquareLampLightsAPlateAsLambertSays) {
   grid.fill_box({{3, 6, -3}, {4, 7, 4}}, black);
   place(scene, std::move(grid));
   PathOptions options = under_even_sky(8, 8, 64);
-  options.sky_colour = Vec3(0.0F);
+  physical_in(options).sky.colour = Vec3(0.0F);
   options.max_bounces = 1;
   for (const double x : {0.5, 6.5, 15.5}) {
     const DVec3 point{x, 1.0, 0.5};
@@ -169,11 +170,11 @@ TEST(PathTracer, ASquareLampLightsAPlateAsLambertSays) {
 TEST(PathTracer, TheSunLightsWhatFacesIt) {
   Scene scene = cube_of(kGrey);
   PathOptions options = under_even_sky(8, 8, 16);
-  options.sky_colour = Vec3(0.0F);
-  options.sun_brightness = 1.0;
-  options.sun = {0.0, 1.0, 1.0};
+  physical_in(options).sky.colour = Vec3(0.0F);
+  physical_in(options).sun.brightness = 1.0;
+  physical_in(options).sun.direction = {0.0, 1.0, 1.0};
   for (const double angle : {0.0, 0.0093}) {
-    options.sun_angle_radians = angle;
+    physical_in(options).sun.angle_radians = angle;
     const float light = mean(path_image(scene, from_above(4.0, 20.0, 4.0, 6.0), options)).x;
     EXPECT_NEAR(light, linear_from_srgb(std::uint8_t{188}) * std::sqrt(0.5F), 1e-3F);
   }
@@ -188,9 +189,9 @@ TEST(PathTracer, APenumbraGrowsWithTheDistance) {
   grid.fill_box({{-20, 101, -20}, {0, 102, 20}}, type);
   place(scene, std::move(grid));
   PathOptions options = under_even_sky(256, 1, 256);
-  options.sky_colour = Vec3(0.0F);
-  options.sun_brightness = 1.0;
-  options.sun = {0.0, 1.0, 0.0};
+  physical_in(options).sky.colour = Vec3(0.0F);
+  physical_in(options).sun.brightness = 1.0;
+  physical_in(options).sun.direction = {0.0, 1.0, 0.0};
   options.max_bounces = 1;
   // 256 pixels across 5.12 voxels; the plate above ends at x = 0.
   const Camera camera = looking({0.0, 50.0, 0.0}, {0, -1, 0}, {0, 0, -1}, 5.12 / 256.0);
@@ -260,7 +261,7 @@ TEST(PathTracer, GlassShowsWhatLiesBehindItWhereItIsBent) {
     grid.fill_box({{-40, -40, 2}, {40, 40, 12}}, glass);
     place(scene, std::move(grid));
     PathOptions options = under_even_sky(200, 1, 64);
-    options.sky_colour = Vec3(0.0F);
+    physical_in(options).sky.colour = Vec3(0.0F);
     const DVec3 forward = glm::normalize(DVec3(1, 0, -1));
     return path_image(scene, looking(DVec3(0, 0, 0) - forward * 40.0, forward, {0, 1, 0}, 20.0 / 200.0), options);
   };
@@ -280,7 +281,7 @@ TEST(PathTracer, GlassShowsWhatLiesBehindItWhereItIsBent) {
 TEST(PathTracer, AClosedRoomWithoutLampsIsBlack) {
   const Scene scene = room(6, of_colour(kWhite), of_colour(kWhite));
   PathOptions options = under_even_sky(16, 16, 16);
-  options.sun_brightness = 1.0;
+  physical_in(options).sun.brightness = 1.0;
   options.max_bounces = 16;
   for (const Vec3& light : path_image(scene, towards({3.0, 3.0, 3.0}, {3.0, 2.0, 0.0}), options).radiance) {
     EXPECT_EQ(light.x, 0.0F);
@@ -395,10 +396,10 @@ TEST(PathTracer, LayersDescribePixels) {
 TEST(PathTracer, GroundCatchesShadowsAndIsNotSeenItself) {
   const Scene scene = cube_of(kGrey);
   PathOptions options = under_even_sky(64, 64, 64);
-  options.sun_brightness = 1.0;
-  options.sun = {1.0, 1.0, 0.0};
-  options.ground.emplace();
-  options.ground->only_shadows = true;
+  physical_in(options).sun.brightness = 1.0;
+  physical_in(options).sun.direction = {1.0, 1.0, 0.0};
+  physical_in(options).ground.emplace();
+  physical_in(options).ground->only_shadows = true;
   const PathImage image = path_image(scene, from_above(4.0, 30.0, 4.0, 64.0), options);
   const auto at = [](int x, int y) { return static_cast<std::size_t>(y * 64 + x); };
   // Far away the image shows only the background.
@@ -419,10 +420,10 @@ TEST(PathTracer, FocusedObjectsStaySharp) {
   grid.fill_box({{0, -40, 0}, {40, 40, 1}}, white);
   place(scene, std::move(grid));
   PathOptions options = under_even_sky(64, 4, 64);
-  options.sky_colour = Vec3(0.0F);
-  options.lens_radius = 1.0;
+  physical_in(options).sky.colour = Vec3(0.0F);
+  options.lens.radius = 1.0;
   const auto grey_pixels = [&](double focus) {
-    options.focus_distance = focus;
+    options.lens.focus_distance = focus;
     int grey = 0;
     for (const Vec3& light : path_image(scene, towards({0.013, 0.0, 21.0}, {0.013, 0.0, 0.0}, 0.02), options).scene) {
       grey += light.x > 0.05F && light.x < 0.95F;
@@ -436,8 +437,8 @@ TEST(PathTracer, FocusedObjectsStaySharp) {
 TEST(PathTracer, AnEnvironmentOfOnePixelIsAUniformSky) {
   const Scene scene = cube_of(kGrey);
   PathOptions options = under_even_sky(8, 8, 256);
-  options.sky = SkyModel::Environment;
-  options.environment = std::make_shared<const RadianceImage>(RadianceImage{1, 1, {0.5F, 0.5F, 0.5F}});
+  physical_in(options).sky.model = SkyModel::Image;
+  physical_in(options).sky.image = std::make_shared<const RadianceImage>(RadianceImage{1, 1, {0.5F, 0.5F, 0.5F}});
   const float light = mean(path_image(scene, from_above(4.0, 20.0, 4.0, 6.0), options)).x;
   EXPECT_NEAR(light, 0.5F * linear_from_srgb(std::uint8_t{188}), 0.01F);
 }
@@ -475,7 +476,7 @@ TEST(PathTracer, LearnedLampSharesDarkenNothing) {
   const Scene scene = dim_yard();
   const PathTracer tracer(scene);
   PathOptions options = under_even_sky(32, 32, 4);
-  options.sky_brightness = 0.0;
+  physical_in(options).sky.brightness = 0.0;
   options.max_bounces = 1;
   double forgetful = 0.0;  // the first four samples have learned no shares
   double remembering = 0.0;
@@ -505,19 +506,19 @@ TEST(PathTracer, RejectsInvalidInput) {
   EXPECT_TRUE(refused([](PathOptions& o) { o.width = 0; }));
   EXPECT_TRUE(refused([](PathOptions& o) { o.samples = 0; }));
   EXPECT_TRUE(refused([](PathOptions& o) { o.max_bounces = -1; }));
-  EXPECT_TRUE(refused([](PathOptions& o) { o.sun = DVec3(0.0); }));
-  EXPECT_TRUE(refused([](PathOptions& o) { o.sun.x = kNan; }));
-  EXPECT_TRUE(refused([](PathOptions& o) { o.sun_angle_radians = -0.1; }));
-  EXPECT_TRUE(refused([](PathOptions& o) { o.sun_brightness = kNan; }));
-  EXPECT_TRUE(refused([](PathOptions& o) { o.sky_brightness = -1.0; }));
-  EXPECT_TRUE(refused([](PathOptions& o) { o.lamp_brightness = 1e10; }));
-  EXPECT_TRUE(refused([](PathOptions& o) { o.sky_colour.y = -1.0F; }));
-  EXPECT_TRUE(refused([](PathOptions& o) { o.air.mie = kNan; }));
-  EXPECT_TRUE(refused([](PathOptions& o) { o.lens_radius = kNan; }));
-  EXPECT_TRUE(refused([](PathOptions& o) { o.focus_distance = 0.0; }));
-  EXPECT_TRUE(refused([](PathOptions& o) { o.sky = SkyModel::Environment; }));
-  EXPECT_TRUE(refused([](PathOptions& o) { o.ground.emplace().height = kNan; }));
-  EXPECT_TRUE(refused([](PathOptions& o) { o.ground.emplace().colour = Vec3(2.0F); }));
+  EXPECT_TRUE(refused([](PathOptions& o) { physical_in(o).sun.direction = DVec3(0.0); }));
+  EXPECT_TRUE(refused([](PathOptions& o) { physical_in(o).sun.direction.x = kNan; }));
+  EXPECT_TRUE(refused([](PathOptions& o) { physical_in(o).sun.angle_radians = -0.1; }));
+  EXPECT_TRUE(refused([](PathOptions& o) { physical_in(o).sun.brightness = kNan; }));
+  EXPECT_TRUE(refused([](PathOptions& o) { physical_in(o).sky.brightness = -1.0; }));
+  EXPECT_TRUE(refused([](PathOptions& o) { physical_in(o).lamp_brightness = 1e10; }));
+  EXPECT_TRUE(refused([](PathOptions& o) { physical_in(o).sky.colour.y = -1.0F; }));
+  EXPECT_TRUE(refused([](PathOptions& o) { physical_in(o).sky.air.mie = kNan; }));
+  EXPECT_TRUE(refused([](PathOptions& o) { o.lens.radius = kNan; }));
+  EXPECT_TRUE(refused([](PathOptions& o) { o.lens.focus_distance = 0.0; }));
+  EXPECT_TRUE(refused([](PathOptions& o) { physical_in(o).sky.model = SkyModel::Image; }));
+  EXPECT_TRUE(refused([](PathOptions& o) { physical_in(o).ground.emplace().height = kNan; }));
+  EXPECT_TRUE(refused([](PathOptions& o) { physical_in(o).ground.emplace().colour = Vec3(2.0F); }));
   Camera wrong = camera;
   wrong.position.x = kNan;
   EXPECT_FALSE(tracer.render(wrong, under_even_sky(4, 4, 1)).has_value());
@@ -535,7 +536,7 @@ TEST(PathTracer, StopsHalfway) {
 TEST(PathTracer, AnEmptySceneIsSky) {
   const Scene scene;
   PathOptions options = under_even_sky(8, 8, 2);
-  options.ground.emplace();
+  physical_in(options).ground.emplace();
   const PathImage image = path_image(scene, towards({0.0, 5.0, 10.0}, {0.0, 5.0, 0.0}), options);
   EXPECT_EQ(image.radiance.front(), Vec3(1.0F));
   EXPECT_NEAR(image.radiance.back().x, 0.5F, 1e-6F);

@@ -465,58 +465,52 @@ Vec3 turned_back(Vec3 v, SineCosine by) {
 
 }  // namespace
 
-bool is_same_sky(Look a, const Look& b) {
-  a.background = b.background;
-  a.ground = b.ground;
-  a.fog = b.fog;
-  a.lamp_brightness = b.lamp_brightness;
-  a.lens_radius = b.lens_radius;
-  a.focus_distance = b.focus_distance;
-  a.lens_blades = b.lens_blades;
-  a.lens_turn_radians = b.lens_turn_radians;
-  a.sun_is_seen = b.sun_is_seen;
-  return a == b;
+bool is_same_sky(const Environment& a, const Environment& b) {
+  quoin::Sky sky = a.sky;
+  sky.background = b.sky.background;
+  Sun sun = a.sun;
+  sun.is_visible = b.sun.is_visible;
+  return sky == b.sky && sun == b.sun;
 }
 
-SkyLight::SkyLight(const Look& options)
-    : model_(options.sky), brightness_(static_cast<float>(options.sky_brightness)), uniform_(options.sky_colour) {
-  LightOptions light;
-  light.sun = options.sun;
-  const DVec3 sun = quoin::to_sun(light);
-  to_sun_ = glm::normalize(Vec3(sun));
-  const float sine = of_turns(static_cast<float>(options.sun_angle_radians / 4.0 / std::numbers::pi / 2.0)).sine;
+SkyLight::SkyLight(const Environment& environment)
+    : model_(environment.sky.model == SkyModel::Fixed ? SkyModel::Gradient : environment.sky.model),
+      brightness_(static_cast<float>(environment.sky.brightness)),
+      uniform_(environment.sky.colour) {
+  const Sun& sun = environment.sun;
+  const DVec3 to_sun = sun.unit_direction();
+  to_sun_ = glm::normalize(Vec3(to_sun));
+  const float sine = of_turns(static_cast<float>(sun.angle_radians / 4.0 / std::numbers::pi / 2.0)).sine;
   one_less_cos_ = 2.0F * sine * sine;
-  const float irradiance = kPi * static_cast<float>(options.sun_brightness);
+  const float irradiance = kPi * static_cast<float>(sun.brightness);
   switch (model_) {
     case SkyModel::Uniform:
-      sunlight_ = Vec3(irradiance);
+      sunlight_ = Vec3(irradiance) * sun.colour;
       break;
+    case SkyModel::Fixed:
     case SkyModel::Gradient: {
-      light.sky_follows_sun = true;
-      light.sun_brightness = options.sun_brightness;
-      const Daylight day = daylight_of(light);
+      const Daylight day = daylight_of(environment);
       gradient_ = day.sky;
       sunlight_ = day.sun * (kPi * static_cast<float>(day.sun_brightness));
       break;
     }
     case SkyModel::Physical: {
-      AtmosphericSky made = atmospheric_sky(sun, kPi, options.air);
-      sunlight_ = made.sunlight * static_cast<float>(options.sun_brightness);
+      AtmosphericSky made = atmospheric_sky(to_sun, kPi, environment.sky.air);
+      sunlight_ = made.sunlight * static_cast<float>(sun.brightness) * sun.colour;
       air_.emplace(EnvironmentLight(std::move(made.radiance)));
       break;
     }
-    case SkyModel::Environment: {
-      QUOIN_ASSERT(options.environment != nullptr, "an environment image");
-      sunlight_ = Vec3(irradiance);
-      image_.emplace(*options.environment);
+    case SkyModel::Image: {
+      QUOIN_ASSERT(environment.sky.image != nullptr, "an image of the sky");
+      sunlight_ = Vec3(irradiance) * sun.colour;
+      image_.emplace(*environment.sky.image);
       is_uneven_ = true;
-      double turns = options.environment_turn_radians / (2.0 * std::numbers::pi);
+      double turns = environment.sky.image_turn_radians / (2.0 * std::numbers::pi);
       turns -= std::floor(turns);
       turn_ = of_turns(static_cast<float>(turns));
       break;
     }
   }
-  sunlight_ *= options.sun_colour;
 }
 
 Vec3 SkyLight::sky(Vec3 direction) const {

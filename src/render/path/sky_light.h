@@ -123,14 +123,14 @@ class SkyMap {
   std::vector<Vec3> pixels_;
 };
 
-/// Returns true if the skies of both looks are the same; their other settings are ignored.
-[[nodiscard]] bool is_same_sky(Look a, const Look& b);
+/// Returns true if both have the same SkyLight.
+[[nodiscard]] bool is_same_sky(const Environment& a, const Environment& b);
 
 /// The sun and the sky of an image. Cost: 70 ms for a physical sky.
 class SkyLight {
  public:
   /// Requires: `check` accepts the options.
-  explicit SkyLight(const Look& options);
+  explicit SkyLight(const Environment& environment);
 
   /// Returns the light of a ray that leaves the scene: the sky without the sun, and the sun alone. `direction`: unit,
   /// in the world.
@@ -174,7 +174,7 @@ class SkyLight {
   Vec3 uniform_{1.0F};
   SkyColours gradient_;
   std::optional<SkyMap> air_;              // of SkyModel::Physical
-  std::optional<EnvironmentLight> image_;  // of SkyModel::Environment
+  std::optional<EnvironmentLight> image_;  // of SkyModel::Image
   bool is_uneven_ = false;
   SineCosine turn_;  // of an environment about the vertical
 };

@@ -10,6 +10,7 @@
 #include <quoin/scene/camera.h>
 #include <quoin/scene/scene.h>
 
+#include "render/environment_for_tests.h"
 #include "render/render_test_support.h"
 
 namespace quoin::render_test {
@@ -52,8 +53,8 @@ inline PathOptions under_even_sky(int width, int height, int samples) {
   options.width = width;
   options.height = height;
   options.samples = samples;
-  options.sky = SkyModel::Uniform;
-  options.sun_brightness = 0.0;
+  physical_in(options).sky.model = SkyModel::Uniform;
+  physical_in(options).sun.brightness = 0.0;
   return options;
 }
 

@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "core/death_for_tests.h"
+#include "render/environment_for_tests.h"
 #include "render_vk/device/own_device_for_tests.h"
 #include "render_vk/device/vulkan_for_tests.h"
 #include "tests/golden_views.h"
@@ -175,7 +176,7 @@ TEST_F(VulkanBorrowed, ChecksPreconditions) {
   other.position.x += 1.0;
   QUOIN_EXPECT_MISTAKE((void)one.draw(image, other, options_, Accumulation::Continue), "have the same camera");
   RenderOptions darker = options_;
-  darker.light.exposure = 0.5;
+  environment_in(darker).exposure = 0.5;
   QUOIN_EXPECT_MISTAKE((void)one.draw(image, camera_, darker, Accumulation::Continue), "have the same light");
   EXPECT_TRUE(one.draw(image, other, darker, Accumulation::Restart));
   BorrowedVulkanDevice lent = own_->lent();

@@ -1,5 +1,6 @@
 // Rejected inputs and their error messages.
 
+#include "render/environment_for_tests.h"
 #include "render_vk/device/vulkan_for_tests.h"
 
 namespace quoin {
@@ -75,7 +76,7 @@ TEST_F(VulkanErrors, AreThoseOfTheProcessor) {
   options.samples = 0;
   expect_same(camera, options);
   options.samples = 1;
-  options.light.sun = DVec3(0.0);
+  environment_in(options).sun.direction = DVec3(0.0);
   expect_same(camera, options);
   Camera wrong = camera;
   wrong.up *= 2.0;

@@ -39,12 +39,13 @@ Status VulkanImage::Impl::resize(int new_width, int new_height) {
   return {};
 }
 
-Status VulkanImage::Impl::begin_sums(const Camera& of_camera, const LightOptions& in_light) {
+Status VulkanImage::Impl::begin_sums(const Camera& of_camera, const RenderOptions& options) {
   QUOIN_ASSERT(colours.handle() != VK_NULL_HANDLE, "an image with pixels");
   samples = 0;
   rays = 0;
   camera = of_camera;
-  light = in_light;
+  light = options.light;
+  environment = options.environment;
   if (sums.handle() != VK_NULL_HANDLE) return {};
   auto made = vulkan::Buffer::create(*device, colours.size() * 4, vulkan::Buffer::Where::Device, kAllocating);
   if (!made) return made.error();

@@ -1,10 +1,13 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include <quoin/light/light_options.h>
+#include <quoin/render/cpu_renderer.h>
 #include <quoin/render_vk/vulkan_image.h>
 #include <quoin/scene/camera.h>
+#include <quoin/scene/environment.h>
 
 #include "render_vk/device/device_memory.h"
 #include "render_vk/march/pipelines.h"
@@ -19,7 +22,7 @@ struct VulkanImage::Impl {
   /// Allocates that many pixels; their contents are undefined if the size changes. Errors: LimitExceeded.
   [[nodiscard]] Status resize(int new_width, int new_height);
   /// Allocates `sums` and starts without samples, for this camera. Errors: LimitExceeded.
-  [[nodiscard]] Status begin_sums(const Camera& of_camera, const LightOptions& in_light);
+  [[nodiscard]] Status begin_sums(const Camera& of_camera, const RenderOptions& options);
   /// Records VulkanImage::record_copy, after `prepare_copy` accepted the target.
   void record_copy(VkCommandBuffer commands, const VulkanImageTarget& target) const;
   /// Validates the target. Errors: those of VulkanImage::record_copy.
@@ -33,9 +36,10 @@ struct VulkanImage::Impl {
   std::int64_t rays = 0;
   vulkan::Buffer colours;
   vulkan::Buffer swapped;  ///< the colours with blue lowest; only if a target image needed them
-  /// the camera of its samples
+  // The camera and light of its samples.
   Camera camera;
   LightOptions light;
+  std::optional<Environment> environment;
   vulkan::Buffer sums;  ///< sums of the samples' light, four floats per pixel; only if samples accumulate
 };
 

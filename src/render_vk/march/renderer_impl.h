@@ -45,6 +45,7 @@ struct VulkanRenderer::Impl {
     const bool is_same = updated == voxels && before.shares_container_with(at_update);
     if (chooser == nullptr || !is_same) chooser = std::make_unique<DetailChooser>();
     voxels = updated;
+    environment = updated != nullptr ? environment_of(*updated) : Environment::reference();
     instances = filter;
     lamps.update();
     levels.update();
@@ -61,13 +62,16 @@ struct VulkanRenderer::Impl {
   vulkan::DeviceDetail detail;
   /// The source of levels of detail, as of the last update; null before the first.
   const Scene* voxels = nullptr;
-  ChangeCursor at_update;  ///< its state then; detects another scene at the same address
+  Environment environment = Environment::reference();  ///< of the scene of the last update
+  ChangeCursor at_update;                              ///< its state then; detects another scene at the same address
   InstanceFilter instances = InstanceFilter::Visible;
   std::unique_ptr<DetailChooser> chooser;  // for `voxels`
   /// Returns the lamp table; sends it to the device if it changed.
-  [[nodiscard]] Result<vulkan::DeviceLamps> lamp_table(const LightOptions& light, Threads threads) {
+  [[nodiscard]] Result<vulkan::DeviceLamps> lamp_table(const RenderOptions& options, Threads threads) {
+    const LightOptions& light = options.light;
     if (light.max_lamps == 0 || is_propagated(light) || voxels == nullptr) return vulkan::DeviceLamps{};
-    auto table = lamps.table(*voxels, light, threads, [this] { return scene.lamp_places(*voxels); });
+    auto table = lamps.table(*voxels, light, options.environment->lamp_brightness, threads,
+                             [this] { return scene.lamp_places(*voxels); });
     if (Status done = sent_lamps.put(memory, std::move(table)); !done) return done.error();
     return sent_lamps;
   }
@@ -79,10 +83,10 @@ struct VulkanRenderer::Impl {
     return sent_levels;
   }
 
-  [[nodiscard]] Result<vulkan::DeviceLight> light_tables(const LightOptions& light, Threads threads) {
-    auto of_lamps = lamp_table(light, threads);
+  [[nodiscard]] Result<vulkan::DeviceLight> light_tables(const RenderOptions& options, Threads threads) {
+    auto of_lamps = lamp_table(options, threads);
     if (!of_lamps) return of_lamps.error();
-    auto of_levels = level_table(light, threads);
+    auto of_levels = level_table(options.light, threads);
     if (!of_levels) return of_levels.error();
     return vulkan::DeviceLight{std::move(*of_lamps), *of_levels};
   }

@@ -157,8 +157,8 @@ void set_sun(const PlacedGrid& placed, DVec3 sun, double brightness, ShaderPlace
 // Sets the start of rays, the origin of view space, as far ahead as space is empty.
 void add_placed(const Placement& scene, const Camera& camera, const RenderOptions& options, const Rays& rays,
                 FrameData& data) {
-  const DVec3 sun = to_sun(options.light);
-  const double brightness = daylight_of(options.light).sun_brightness;
+  const DVec3 sun = options.environment->sun.unit_direction();
+  const double brightness = daylight_of(*options.environment).sun_brightness;
   std::vector<GridSpace> spaces;
   std::vector<double> depths;
   double least = scene.placed.empty() ? 0.0 : std::numeric_limits<double>::infinity();
@@ -233,11 +233,12 @@ float capped(double value) {
 
 void set_light(const RenderOptions& options, ShaderFrame& frame) {
   const LightOptions& light = options.light;
-  const auto sky = static_cast<float>(light.sky_brightness);
+  const Environment& environment = *options.environment;
+  const auto sky = static_cast<float>(environment.sky.brightness);
   frame.light = {sky * kAmbient, sky * kAmbientWithoutOcclusion, kLeastOfAll,
                  static_cast<float>(light.field_occlusion_reach)};
   frame.lift = static_cast<float>(kRayLift);
-  const Daylight daylight = daylight_of(light);
+  const Daylight daylight = daylight_of(environment);
   frame.ambient = {daylight.ambient, 0.0F};
   frame.sun = {daylight.sun, 0.0F};
   frame.sky_zenith = {sky * daylight.sky.zenith, 0.0F};
@@ -248,12 +249,13 @@ void set_light(const RenderOptions& options, ShaderFrame& frame) {
   frame.occlusion_count = light.occlusion_rays;
   frame.occlusion_distance = capped(light.occlusion_distance_voxels);
   frame.shadow_distance = capped(light.shadow_distance_voxels);
-  frame.exposure = exposure_of(light);
+  frame.exposure = exposure_of(environment);
 }
 
 }  // namespace
 
 FrameData make_frame(const Placement& scene, const Camera& camera, const RenderOptions& options) {
+  QUOIN_ASSERT(options.environment.has_value(), "options with an environment");
   FrameData data;
   const CameraRays image(camera, options.width, options.height);
   const Rays rays{image.is_perspective(), image.right(), image.down(), image.corner(), image.forward()};
@@ -313,12 +315,12 @@ std::vector<ShaderLamp> put_lamps(const DeviceLamps& lamps, const Camera& camera
   return shader_lamps(*lamps.table, camera.position, data.view_origin);
 }
 
-void put_levels(const DeviceLevels& levels, const Scene& scene, const Placement& placement, const LightOptions& light,
-                FrameData& data) {
+void put_levels(const DeviceLevels& levels, const Scene& scene, const Placement& placement,
+                const RenderOptions& options, FrameData& data) {
   QUOIN_ASSERT(levels.table != nullptr && levels.bricks.address != 0, "a table in device memory");
   QUOIN_ASSERT(std::has_single_bit(levels.table->bricks().size()), "a power of two of bricks");
   QUOIN_ASSERT(data.placed.size() == placement.placed.size(), "a frame of this placement");
-  const LightLook look = light_look(light);
+  const LightLook look = light_look(*options.environment, options.light.least_light);
   data.frame.flags |= kPropagated;
   data.frame.level_sky = {look.sky, 0.0F};
   data.frame.level_lamps = {look.lamps, 0.0F};
@@ -400,14 +402,16 @@ std::uint64_t add_table(const std::vector<T>& values, std::vector<std::byte>& ou
 
 Result<std::unique_ptr<ShaderScene>> ShaderScene::of(const Scene& scene, InstanceFilter filter,
                                                      const LightOptions& light, Threads threads) {
-  std::unique_ptr<ShaderScene> made(new ShaderScene);
+  std::unique_ptr<ShaderScene> made(new ShaderScene(scene));
   if (Status done = made->scene_.update(scene, filter, threads); !done) return done.error();
-  auto lamps = made->lamp_cache_.table(scene, light, threads, [&] { return made->scene_.lamp_places(scene); });
+  auto lamps = made->lamp_cache_.table(scene, light, environment_of(scene).lamp_brightness, threads,
+                                       [&] { return made->scene_.lamp_places(scene); });
   if (Status done = made->lamps_.put(made->memory_, std::move(lamps)); !done) return done.error();
   return made;
 }
 
-Result<std::vector<std::byte>> ShaderScene::frame(const Camera& camera, const RenderOptions& options) const {
+Result<std::vector<std::byte>> ShaderScene::frame(const Camera& camera, const RenderOptions& asked) const {
+  const RenderOptions options = with_environment(asked, environment_of(*content_));
   if (Status right = check(camera, options); !right) return right.error();
   FrameData data = make_frame(placement(), camera, options);
   put_scene(scene_, placement(), data);

@@ -31,6 +31,7 @@ struct FrameData {
 };
 
 /// Makes an image's data. World positions become relative to the camera, in double precision. Cost: O(instances).
+/// Requires: the options have an environment.
 [[nodiscard]] FrameData make_frame(const Placement& scene, const Camera& camera, const RenderOptions& options);
 
 /// Sets a frame's grids and type surfaces. Requires: `placement` belongs to `scene`.
@@ -42,8 +43,8 @@ void put_scene(const DeviceScene& scene, const Placement& placement, FrameData& 
 
 /// Lights a frame by light levels. Requires: `levels` has a table of `scene` in device memory; `data` was made for
 /// `placement`.
-void put_levels(const DeviceLevels& levels, const Scene& scene, const Placement& placement, const LightOptions& light,
-                FrameData& data);
+void put_levels(const DeviceLevels& levels, const Scene& scene, const Placement& placement,
+                const RenderOptions& options, FrameData& data);
 
 /// Returns a table's lamps, relative to the origin of view space in the world.
 [[nodiscard]] std::vector<ShaderLamp> shader_lamps(const LampTable& table, DVec3 camera, DVec3 view_origin);
@@ -77,7 +78,8 @@ class ShaderBytes final : public ShaderMemory {
 /// light and all instances at full detail.
 class ShaderScene {
  public:
-  /// `light`: determines the lamp table. Lifetime: the scene must outlive it and must not be edited.
+  /// `light`, with the brightness of lamps in the scene's environment: determines the lamp table. Lifetime: the scene
+  /// must outlive it and must not be edited.
   /// Errors: those of VulkanRenderer::update; LimitExceeded beyond 1 GiB.
   [[nodiscard]] static Result<std::unique_ptr<ShaderScene>> of(const Scene& scene, InstanceFilter filter,
                                                                const LightOptions& light, Threads threads);
@@ -93,8 +95,9 @@ class ShaderScene {
   [[nodiscard]] Result<std::vector<std::byte>> frame(const Camera& camera, const RenderOptions& options) const;
 
  private:
-  ShaderScene() = default;
+  explicit ShaderScene(const Scene& scene) : content_(&scene) {}
 
+  const Scene* content_;
   ShaderBytes memory_;
   DeviceScene scene_{memory_};
   LampCache lamp_cache_;

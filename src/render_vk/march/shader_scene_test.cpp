@@ -146,6 +146,7 @@ TEST(ShaderScene, AFrameHasItsTablesBehindIt) {
   options.width = 32;
   options.height = 20;
   options.light = natural_light();
+  options.environment = Environment::natural();
   const auto bytes = (*shaders)->frame(camera, options);
   ASSERT_TRUE(bytes) << to_string(bytes.error());
   const Words words(*bytes);
@@ -172,6 +173,7 @@ TEST(ShaderScene, ImagesThatCannotBeAreRefused) {
   ASSERT_TRUE(shaders);
   RenderOptions options;
   options.light = natural_light();
+  options.environment = Environment::natural();
   options.width = 0;
   const auto frame = (*shaders)->frame(look_at({9, 9, 9}, {0, 0, 0}, 0.8).value(), options);
   ASSERT_FALSE(frame);

@@ -9,6 +9,7 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 
+#include "render/environment_for_tests.h"
 #include "render_vk/device/vulkan_for_tests.h"
 #include "render_vk/lakeside_for_tests.h"
 
@@ -79,7 +80,7 @@ TEST_F(VulkanField, FromWithinAndFromAbove) {
   compare(scene, from_above(0.3, 100, -0.7, 150), sized(96, 96), "field_from_above");
   RenderOptions options = sized(96, 72);
   options.light.max_lamps = 8;
-  options.light.sun_brightness = 0.0;
+  environment_in(options).sun.brightness = 0.0;
   compare(scene, towards({50, 40, 60}, {0, 10, 0}), options, "field_lamps");
 }
 
@@ -93,8 +94,8 @@ TEST_F(VulkanField, EmissiveSamplesLightTheirSurroundings) {
   place_grid(scene, std::move(grid));
   RenderOptions options = sized(128, 96);
   options.light.max_lamps = 24;
-  options.light.sun_brightness = 0.1;
-  options.light.sky_brightness = 0.1;
+  environment_in(options).sun.brightness = 0.1;
+  environment_in(options).sky.brightness = 0.1;
   const Camera camera = towards({90, 60, 110}, {10, 5, 20});
   compare(scene, camera, options, "field_glow");
   const RenderedImage with = render_test::taken(scene, camera, options);

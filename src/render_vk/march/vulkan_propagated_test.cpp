@@ -8,6 +8,7 @@
 #include <quoin/light/light_colour.h>
 
 #include "render/cave_for_tests.h"
+#include "render/environment_for_tests.h"
 #include "render_vk/device/vulkan_for_tests.h"
 
 namespace quoin {
@@ -24,11 +25,11 @@ TEST_F(VulkanPropagated, ACaveIsThatOfTheProcessor) {
   expect_equal(taken(cave.scene, Cave::inside(), options), render_test::taken(cave.scene, Cave::inside(), options),
                "cave");
   options.light.occlusion_mode = OcclusionMode::Vertex;
-  options.light.sky_follows_sun = true;
-  options.light.sun = {0.5, 0.1, 0.2};
-  options.light.lamp_brightness = 1.6;
+  environment_in(options).sky.model = SkyModel::Gradient;
+  environment_in(options).sun.direction = {0.5, 0.1, 0.2};
+  environment_in(options).lamp_brightness = 1.6;
   options.light.least_light = 0.02;
-  options.light.exposure = 1.3;
+  environment_in(options).exposure = 1.3;
   options.light.glass_surfaces = true;
   options.samples = 2;
   const Camera other = towards({26.0, -3.0, 12.0}, {-8.0, -10.0, -2.0}, 1.2);

@@ -128,7 +128,7 @@ Status ImagePass::put_frame(const Camera& camera, const RenderOptions& options) 
   std::vector<ShaderLamp> lamps;
   if (light_.lamps.table != nullptr) lamps = put_lamps(light_.lamps, camera, data);
   QUOIN_ASSERT(light_.levels.table == nullptr || content_ != nullptr, "light levels of a scene");
-  if (light_.levels.table != nullptr) put_levels(light_.levels, *content_, *placement_, options.light, data);
+  if (light_.levels.table != nullptr) put_levels(light_.levels, *content_, *placement_, options, data);
   frame_ = data.frame;
   Status done = places_.upload(data.placed, frame_.placed);
   if (done) done = places_.upload(data.tree, frame_.tree);
@@ -466,20 +466,22 @@ std::uint64_t VulkanRenderer::uploaded_bytes() const {
   return impl_->uploaded;
 }
 
-Result<RenderedImage> VulkanRenderer::render(const Camera& camera, const RenderOptions& options, Threads threads,
+Result<RenderedImage> VulkanRenderer::render(const Camera& camera, const RenderOptions& asked, Threads threads,
                                              const Progress& progress) {
+  const RenderOptions options = with_environment(asked, impl_->environment);
   if (const Status status = check_request(camera, options); !status) return status.error();
   const auto subject = vulkan::Subject::of(*impl_, camera, options, threads);
   if (!subject) return subject.error();
-  auto light = impl_->light_tables(options.light, threads);
+  auto light = impl_->light_tables(options, threads);
   if (!light) return light.error();
   vulkan::ImagePass pass(*impl_->device, impl_->memory, *impl_->pipelines, impl_->scene, subject->placement(),
                          std::move(*light), impl_->voxels);
   return pass.render(camera, options, progress);
 }
 
-Status VulkanRenderer::draw(VulkanImage& image, const Camera& camera, const RenderOptions& options,
+Status VulkanRenderer::draw(VulkanImage& image, const Camera& camera, const RenderOptions& asked,
                             Accumulation accumulation, Threads threads, const Progress& progress) {
+  const RenderOptions options = with_environment(asked, impl_->environment);
   constexpr int kMaxSamples = 4096;
   if (Status status = check_request(camera, options); !status) return status;
   vulkan::ImageImpl& target = image.impl();
@@ -490,16 +492,17 @@ Status VulkanRenderer::draw(VulkanImage& image, const Camera& camera, const Rend
   // Mesh images and written images have no sums to add to.
   const bool is_new = accumulation == Accumulation::Restart || target.samples == 0;
   if (is_new || target.sums.handle() == VK_NULL_HANDLE) {
-    if (Status status = target.begin_sums(camera, options.light); !status) return status;
+    if (Status status = target.begin_sums(camera, options); !status) return status;
   }
   QUOIN_ASSERT(target.camera == camera, "all samples of an image have the same camera");
-  QUOIN_ASSERT(target.light == options.light, "all samples of an image have the same light");
+  QUOIN_ASSERT(target.light == options.light && target.environment == options.environment,
+               "all samples of an image have the same light");
   if (target.samples + options.samples > kMaxSamples) {
     return make_error(ErrorCode::LimitExceeded, "vulkan: an image accumulates at most 4096 samples per pixel");
   }
   const auto subject = vulkan::Subject::of(*impl_, camera, options, threads);
   if (!subject) return subject.error();
-  auto light = impl_->light_tables(options.light, threads);
+  auto light = impl_->light_tables(options, threads);
   if (!light) return light.error();
   vulkan::ImagePass pass(*impl_->device, impl_->memory, *impl_->pipelines, impl_->scene, subject->placement(),
                          std::move(*light), impl_->voxels);

@@ -6,6 +6,7 @@
 
 #include <glm/gtc/quaternion.hpp>
 
+#include "render/environment_for_tests.h"
 #include "render_vk/device/vulkan_for_tests.h"
 
 namespace quoin {
@@ -114,7 +115,7 @@ TEST_F(VulkanScene, GlassOfTurnedInstances) {
 TEST_F(VulkanScene, SurfacesOfGlass) {
   RenderOptions options = sized(128, 96);
   options.light.glass_surfaces = true;
-  options.light.sky_follows_sun = true;
+  environment_in(options).sky.model = SkyModel::Gradient;
   Scene scene = village(DVec3(0.0), true);
   compare(scene, towards({-40, 30, 60}, {0, 0, 0}), options, "surfaces_village");
   const DVec3 far{1e9 + 0.25, -1e9 - 0.5, 1e9};
@@ -197,8 +198,8 @@ TEST_F(VulkanScene, EveryOptionOfLight) {
     o.light.occlusion_rays = 5;
   });
   with("short_shadows", [](RenderOptions& o) { o.light.shadow_distance_voxels = 3.0; });
-  with("low_sun", [](RenderOptions& o) { o.light.sun = {1e-30, 0.3e-30, 1e-30}; });
-  with("exposed", [](RenderOptions& o) { o.light.exposure = 2.5; });
+  with("low_sun", [](RenderOptions& o) { environment_in(o).sun.direction = {1e-30, 0.3e-30, 1e-30}; });
+  with("exposed", [](RenderOptions& o) { environment_in(o).exposure = 2.5; });
   with("many_tiles", [](RenderOptions& o) {
     o.width = 530;
     o.height = 20;
@@ -264,7 +265,7 @@ TEST_F(VulkanScene, MorePanesThanThereIsRoomFor) {
   for (int x = 4; x < 40; x += 2) adjacent.fill_box({{x + 1, 1, 2}, {x + 2, 8, 19}}, x % 4 == 0 ? clear : other);
   place(scene, std::move(adjacent));
   RenderOptions options = sized(96, 72);
-  options.light.sun = {1.0, 0.25, 0.1};
+  environment_in(options).sun.direction = {1.0, 0.25, 0.1};
   compare(scene, towards({95, 9, 12}, {0, 7, 10}), options, "panes");
   options.light.glass_surfaces = true;
   compare(scene, towards({95, 9, 12}, {0, 7, 10}), options, "mirroring_panes");
@@ -349,8 +350,8 @@ Scene lit_by_night(DVec3 origin) {
 TEST_F(VulkanScene, LampsOfEveryKind) {
   RenderOptions options = sized(96, 72);
   options.light.max_lamps = 64;
-  options.light.sun_brightness = 0.0;
-  options.light.sky_brightness = 0.05;
+  environment_in(options).sun.brightness = 0.0;
+  environment_in(options).sky.brightness = 0.05;
   const Scene scene = lit_by_night({0, 0, 0});
   const Camera camera = towards({50, 36, 76}, {12, 3, 9}, 1.0);
   compare(scene, camera, options, "lamps");
@@ -364,7 +365,7 @@ TEST_F(VulkanScene, LampsOfEveryKind) {
   options.samples = 2;
   compare(scene, camera, options, "lamps_by_day");
   const DVec3 far{1e9, -1e9, 1e9};
-  options.light.sun_brightness = 0.2;
+  environment_in(options).sun.brightness = 0.2;
   compare(lit_by_night(far), towards(far + DVec3(50, 36, 76), far + DVec3(12, 3, 9), 1.0), options, "lamps_far");
 }
 
@@ -376,11 +377,33 @@ TEST_F(VulkanScene, SkiesThatFollowTheSun) {
   RenderOptions options = sized(96, 72);
   options.samples = 4;
   options.light = natural_light();
+  options.environment = Environment::natural();
   int hour = 0;
   for (const double height : {1.0, 0.1, 0.0, -0.08, -0.5}) {
-    options.light.sun = {-0.8, height, 0.6};
+    environment_in(options).sun.direction = {-0.8, height, 0.6};
     compare(scene, camera, options, "hour_" + std::to_string(hour++));
   }
+}
+
+// The scene itself may be gone by then.
+TEST_F(VulkanScene, DrawsEnvironmentOfUpdatedScene) {
+  Scene scene;
+  place(scene, hut(add_types(scene)));
+  scene.environment = Environment::natural({-0.8, 0.1, 0.6});
+  scene.environment->sun.colour = {1.0F, 0.5F, 0.25F};
+  scene.environment->exposure = 1.5;
+  const Camera camera = towards({-20, 22, 40}, {10, 5, 10}, 0.9);
+  const RenderOptions options = sized(96, 72);
+  compare(scene, camera, options, "environment_of_scene");
+  const RenderedImage wanted = taken_as_is(camera, options);
+  {
+    const Scene copy = scene.snapshot();
+    ASSERT_TRUE(renderer_->update(copy));
+  }
+  EXPECT_EQ(taken_as_is(camera, options).colour.rgb, wanted.colour.rgb);
+  scene.environment.reset();
+  ASSERT_TRUE(renderer_->update(scene));
+  EXPECT_NE(taken_as_is(camera, options).colour.rgb, wanted.colour.rgb);
 }
 
 }  // namespace

@@ -71,16 +71,16 @@ Status DevicePaths::put(DeviceMemory& memory, const Placement& placement, const 
     memory.release(*place);
   }
   has_sent_surfaces_ = false;
-  look_.reset();
+  environment_.reset();
   of_faces_ = nullptr;
   return done;
 }
 
 Status DevicePaths::try_put(DeviceMemory& memory, const Placement& placement, const PathOptions& options,
                             ShaderPathFrame& frame) {
-  find_lamps(placement, options.lamp_brightness);
+  find_lamps(placement, options.environment->lamp_brightness);
   Status done = put_surfaces(memory);
-  if (done) done = put_sky(memory, options);
+  if (done) done = put_sky(memory, *options.environment);
   if (done && gloss_.size == 0) done = put_values(memory, gloss_, path::gloss_table());
   if (done) done = put_faces(memory);
   // Sends the kept data even if the rest of the image fails.
@@ -89,7 +89,7 @@ Status DevicePaths::try_put(DeviceMemory& memory, const Placement& placement, co
   frame.gloss = gloss_.address;
   frame.sky_model = static_cast<std::int32_t>(sky_->model());
   frame.to_sun = Vec4(sky_->to_sun(), sky_->one_less_cos());
-  frame.sunlight = Vec4(sky_->sun_irradiance(), options.sun_is_seen ? 1.0F : 0.0F);
+  frame.sunlight = Vec4(sky_->sun_irradiance(), options.environment->sun.is_visible ? 1.0F : 0.0F);
   frame.sky = Vec4(sky_->uniform(), sky_->brightness());
   frame.sky_pixels = sky_pixels_.address;
   if (const path::EnvironmentLight* const image = sky_->image(); image != nullptr) {
@@ -119,10 +119,10 @@ Status DevicePaths::put_surfaces(DeviceMemory& memory) {
   return done;
 }
 
-Status DevicePaths::put_sky(DeviceMemory& memory, const Look& look) {
-  if (look_ && path::is_same_sky(*look_, look)) return {};
-  look_.reset();
-  sky_ = std::make_unique<const path::SkyLight>(look);
+Status DevicePaths::put_sky(DeviceMemory& memory, const Environment& environment) {
+  if (environment_ && path::is_same_sky(*environment_, environment)) return {};
+  environment_.reset();
+  sky_ = std::make_unique<const path::SkyLight>(environment);
   Status done;
   if (const path::SkyMap* const air = sky_->air(); air != nullptr)
     done = put_values(memory, sky_pixels_, air->pixels());
@@ -131,7 +131,7 @@ Status DevicePaths::put_sky(DeviceMemory& memory, const Look& look) {
     if (done) done = put_values(memory, sky_rows_, image->rows());
     if (done) done = put_values(memory, sky_columns_, image->columns());
   }
-  if (done) look_ = look;
+  if (done) environment_ = environment;
   return done;
 }
 

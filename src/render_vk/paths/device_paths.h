@@ -38,7 +38,7 @@ class DevicePaths {
  private:
   Status try_put(DeviceMemory& memory, const Placement& placement, const PathOptions& options, ShaderPathFrame& frame);
   Status put_surfaces(DeviceMemory& memory);
-  Status put_sky(DeviceMemory& memory, const Look& look);
+  Status put_sky(DeviceMemory& memory, const Environment& environment);
   void find_lamps(const Placement& placement, double brightness);
   Status put_faces(DeviceMemory& memory);
 
@@ -47,7 +47,7 @@ class DevicePaths {
   bool has_sent_surfaces_ = false;
   std::uint32_t last_surface_ = 0;
   Place surfaces_place_;
-  std::optional<Look> look_;  // the settings of the sky that was sent
+  std::optional<Environment> environment_;  // the settings of the sky that was sent
   std::unique_ptr<const path::SkyLight> sky_;
   Place sky_pixels_;
   Place sky_rows_;

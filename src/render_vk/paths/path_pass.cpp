@@ -16,6 +16,7 @@
 #include <quoin/render_vk/vulkan_renderer.h>
 #include <quoin/scene/camera.h>
 
+#include "render/image_request.h"
 #include "render/path/denoise.h"
 #include "render/path/path_request.h"
 #include "render_vk/device/device.h"
@@ -308,23 +309,24 @@ double capped(double value) {
 
 // Sets the options. `from`: the origin of view space in the world.
 void put_options(const Camera& camera, const PathOptions& options, DVec3 from, ShaderPathFrame& frame) {
-  if (options.background) frame.background = Vec4(*options.background, 1.0F);
-  if (const auto& ground = options.ground) {
+  const Environment& environment = *options.environment;
+  if (environment.sky.background) frame.background = Vec4(*environment.sky.background, 1.0F);
+  if (const auto& ground = environment.ground) {
     frame.flags |= kPathGround | (ground->only_shadows ? kPathOnlyShadows : 0);
     frame.ground = Vec4(ground->colour, static_cast<float>(ground->height - from.y));
     frame.environment.z = static_cast<float>(ground->fade);
   }
-  if (const auto& fog = options.fog) {
+  if (const auto& fog = environment.fog) {
     frame.flags |= kPathFog;
     frame.fog = Vec4(fog->colour, static_cast<float>(fog->top - from.y));
     frame.air.x = static_cast<float>(fog->density);
     frame.air.y = static_cast<float>(fog->anisotropy);
   }
-  frame.air.z = static_cast<float>(options.lamp_brightness);
-  frame.lens_right = to_vec4(camera.right, capped(options.lens_radius));
-  frame.lens_up = to_vec4(camera.up, capped(options.focus_distance));
-  frame.lens_blades = options.lens_blades;
-  const double turns = options.lens_turn_radians / (2.0 * std::numbers::pi);
+  frame.air.z = static_cast<float>(environment.lamp_brightness);
+  frame.lens_right = to_vec4(camera.right, capped(options.lens.radius));
+  frame.lens_up = to_vec4(camera.up, capped(options.lens.focus_distance));
+  frame.lens_blades = options.lens.blades;
+  const double turns = options.lens.turn_radians / (2.0 * std::numbers::pi);
   frame.lens_turn = static_cast<float>(turns - std::floor(turns));
   frame.max_bounces = options.max_bounces;
   frame.max_scatterings = options.max_scatterings;
@@ -388,6 +390,7 @@ Status PathPass::put_frame(int samples) {
   RenderOptions plain;
   plain.width = options.width;
   plain.height = options.height;
+  plain.environment = options.environment;
   const Placement& placement = renderer_->scene.placement();
   FrameData data = make_frame(placement, camera, plain);
   ShaderFrame& frame = data.frame;
@@ -396,7 +399,8 @@ Status PathPass::put_frame(int samples) {
   Status done = renderer_->paths->tables.put(renderer_->memory, placement, options, paths);
   if (!done) return done;
   put_options(camera, options, view_origin, paths);
-  if (options.denoise && (options.fog.has_value() || renderer_->paths->tables.has_clouds())) paths.flags |= kPathMedia;
+  const bool has_media = options.environment->fog.has_value() || renderer_->paths->tables.has_clouds();
+  if (options.denoise && has_media) paths.flags |= kPathMedia;
   const SkyColours& gradient = renderer_->paths->tables.sky().gradient();
   frame.sky_zenith = Vec4(gradient.zenith, 0.0F);
   frame.sky_horizon = Vec4(gradient.horizon, 0.0F);
@@ -494,8 +498,9 @@ Status PathPass::draw(int samples, const Progress& progress) {
 
 namespace quoin {
 
-Status VulkanRenderer::draw_paths(VulkanPathImage& image, const Camera& camera, const PathOptions& options,
+Status VulkanRenderer::draw_paths(VulkanPathImage& image, const Camera& camera, const PathOptions& asked,
                                   Accumulation accumulation, const Progress& progress) {
+  const PathOptions options = with_environment(asked, impl_->environment);
   if (Status status = path::check(camera, options); !status) return status;
   vulkan::PathImageImpl& target = image.impl();
   if (target.device != impl_->device.get()) {

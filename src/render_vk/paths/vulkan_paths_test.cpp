@@ -11,6 +11,7 @@
 #include <quoin/io/image_files.h>
 #include <quoin/render/path_tracer.h>
 
+#include "render/environment_for_tests.h"
 #include "render/path/town_for_tests.h"
 #include "render_vk/device/vulkan_for_tests.h"
 #include "render_vk/lakeside_for_tests.h"
@@ -31,6 +32,7 @@ PathOptions small(int samples = 4) {
   options.height = 48;
   options.samples = samples;
   options.layers = true;
+  options.environment = physical_day();
   return options;
 }
 
@@ -107,10 +109,10 @@ class VulkanPaths : public VulkanTest {
 TEST_F(VulkanPaths, AreTheProcessors) {
   PathOptions options = small();
   expect_same_light(town(), of_town(), options, "physical");
-  options.sky = SkyModel::Gradient;
+  physical_in(options).sky.model = SkyModel::Gradient;
   expect_same_light(town(), of_town(), options, "gradient");
-  options.sky = SkyModel::Uniform;
-  options.sun_angle_radians = 0.0;
+  physical_in(options).sky.model = SkyModel::Uniform;
+  physical_in(options).sun.angle_radians = 0.0;
   options.max_bounces = 1;
   expect_same_light(town(), of_town(), options, "uniform");
 }
@@ -119,24 +121,24 @@ TEST_F(VulkanPaths, SampleAnEnvironment) {
   PathOptions options = small();
   RadianceImage image{16, 8, std::vector<float>(std::size_t{16} * 8 * 3, 0.2F)};
   image.rgb[3 * (2 * 16 + 5)] = 40.0F;
-  options.environment = std::make_shared<const RadianceImage>(image);
-  options.sky = SkyModel::Environment;
-  options.environment_turn_radians = 1.0;
-  options.sun_brightness = 0.0;
+  physical_in(options).sky.image = std::make_shared<const RadianceImage>(image);
+  physical_in(options).sky.model = SkyModel::Image;
+  physical_in(options).sky.image_turn_radians = 1.0;
+  physical_in(options).sun.brightness = 0.0;
   expect_same_light(town(), of_town(), options, "environment");
 }
 
 TEST_F(VulkanPaths, HaveGroundAndFogAndALens) {
   PathOptions options = small();
-  options.ground = GroundPlane{.height = -3.0, .colour = Vec3(0.4F), .only_shadows = false, .fade = 0.1};
+  physical_in(options).ground = GroundPlane{.height = -3.0, .colour = Vec3(0.4F), .only_shadows = false, .fade = 0.1};
   expect_same_light(town(), of_town(), options, "ground");
-  options.ground->only_shadows = true;
+  physical_in(options).ground->only_shadows = true;
   expect_same_light(town(), of_town(), options, "caught");
-  options.fog = Fog{.density = 0.02, .colour = {0.9F, 0.95F, 1.0F}, .anisotropy = 0.4, .top = 6.0};
+  physical_in(options).fog = Fog{.density = 0.02, .colour = {0.9F, 0.95F, 1.0F}, .anisotropy = 0.4, .top = 6.0};
   expect_same_light(town(), of_town(), options, "fog");
-  options.lens_radius = 0.7;
-  options.lens_blades = 5;
-  options.focus_distance = 40.0;
+  options.lens.radius = 0.7;
+  options.lens.blades = 5;
+  options.lens.focus_distance = 40.0;
   expect_same_light(town(), of_town(), options, "lens");
 }
 
@@ -164,7 +166,7 @@ TEST_F(VulkanPaths, GoThroughClouds) {
 TEST_F(VulkanPaths, TakeOutTheProcessorsNoise) {
   PathOptions options = small();
   options.denoise = true;
-  options.fog = Fog{.density = 0.01, .colour = Vec3(1.0F), .anisotropy = 0.0, .top = 4.0};
+  physical_in(options).fog = Fog{.density = 0.01, .colour = Vec3(1.0F), .anisotropy = 0.0, .top = 4.0};
   expect_same_light(town(), of_town(), options, "denoised");
 }
 
@@ -236,7 +238,7 @@ TEST_F(VulkanPaths, PassAnyNumberOfPanes) {
   place(scene, std::move(grid));
   PathOptions options = small(4);
   options.width = options.height = 24;
-  options.sky = SkyModel::Uniform;
+  physical_in(options).sky.model = SkyModel::Uniform;
   expect_same_light(scene, towards({0.0, 0.0, 100.0}, {0.0, 0.0, 0.0}), options, "panes");
 }
 
@@ -248,7 +250,8 @@ TEST_F(VulkanPaths, AreAsExactFromFarAway) {
   scene.lamps.front().position += far;
   Camera camera = towards(far + DVec3(9.0e3, 5.0e3, 2.0e4), far, 0.003);
   PathOptions options = small();
-  options.ground = GroundPlane{.height = far.y - 2.0, .colour = Vec3(0.3F), .only_shadows = false, .fade = 0.0};
+  physical_in(options).ground =
+      GroundPlane{.height = far.y - 2.0, .colour = Vec3(0.3F), .only_shadows = false, .fade = 0.0};
   expect_same_light(scene, camera, options, "far", 0.01);
 }
 
@@ -326,10 +329,10 @@ TEST_F(VulkanPaths, RejectTheSameInputAsTheCpu) {
   options.samples = 0;
   EXPECT_EQ(renderer_->render_paths(of_town(), options).error().code, ErrorCode::InvalidArgument);
   options = small();
-  options.sky = SkyModel::Environment;
+  physical_in(options).sky.model = SkyModel::Image;
   EXPECT_EQ(renderer_->render_paths(of_town(), options).error().code, ErrorCode::InvalidArgument);
   options = small();
-  options.sun = DVec3(NAN);
+  physical_in(options).sun.direction = DVec3(NAN);
   EXPECT_EQ(renderer_->render_paths(of_town(), options).error().code, ErrorCode::InvalidArgument);
   VulkanPathImage image(*renderer_);
   ASSERT_TRUE(renderer_->draw_paths(image, of_town(), small(1), Accumulation::Restart));

@@ -49,6 +49,7 @@ inline Camera over_glass_yard(DVec3 at = DVec3(0.0)) {
 inline RenderOptions glass_yard_options(int width, int height) {
   RenderOptions options = render_test::sized(width, height);
   options.light = natural_light();
+  options.environment = Environment::natural();
   options.light.occlusion_mode = OcclusionMode::Vertex;
   return options;
 }

@@ -87,6 +87,7 @@ inline MeshImageOptions mesh_options(const RenderOptions& options) {
   mesh.height = options.height;
   mesh.samples = 1;
   mesh.light = options.light;
+  mesh.environment = options.environment;
   mesh.detail = options.detail;
   return mesh;
 }

@@ -181,11 +181,12 @@ Vec4 clip_point(const View& view, DVec3 in_view) {
   return to_vec4({p.x, p.y, (view.furthest - p.z) / (view.furthest - view.nearest)}, 1.0);
 }
 
-ShaderMeshInstance shader_instance(const Space& space, const View& view, const LightOptions& light, int subpixels) {
+ShaderMeshInstance shader_instance(const Space& space, const View& view, const Environment& environment,
+                                   int subpixels) {
   ShaderMeshInstance out;
   const MeshInstance& instance = *space.instance;
-  const DVec3 sun_in_grid = glm::transpose(instance.world_axes) * to_sun(light);
-  const double brightness = daylight_of(light).sun_brightness;
+  const DVec3 sun_in_grid = glm::transpose(instance.world_axes) * environment.sun.unit_direction();
+  const double brightness = daylight_of(environment).sun_brightness;
   for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<std::size_t>(axis);
     out.clip[i] = clip_vector(view, space.view_axes[axis]);
@@ -252,11 +253,11 @@ void order_glass(std::span<const Space> spaces, const View& view, MeshFrameData&
   for (const Entry& entry : entries) data.order.push_back(entry.quad);
 }
 
-void set_frame(const View& view, const LightOptions& light, MeshFrameData& data) {
+void set_frame(const View& view, const Environment& environment, MeshFrameData& data) {
   data.sky.clip = {to_vec4(view.rays.right()), to_vec4(view.rays.down()), to_vec4(view.rays.corner()),
                    to_vec4(view.rays.forward())};
   data.sky.room = view.rays.is_perspective() ? 1.0F : static_cast<float>(view.rays.sky_scale());
-  data.frame.sun = to_vec4(to_sun(light) * daylight_of(light).sun_brightness);
+  data.frame.sun = to_vec4(environment.sun.unit_direction() * daylight_of(environment).sun_brightness);
 }
 
 // Returns true if the camera's axes lie in one plane. Products of nearly perpendicular unit vectors are near 1.
@@ -318,13 +319,13 @@ Result<MeshFrameData> make_mesh_frame(MeshStore& store, std::span<const MeshInst
   QUOIN_ASSERT(spaces.size() == data.instances.size() && subpixels > 0, "one space per instance");
   view.finish();
   for (std::size_t i = 0; i < spaces.size(); ++i) {
-    data.instances[i] = shader_instance(spaces[i], view, options.light, subpixels);
+    data.instances[i] = shader_instance(spaces[i], view, *options.environment, subpixels);
   }
   for (const FarDraw& draw : data.far) set_impostor(spaces[draw.instance], data.instances[draw.instance]);
   const auto is_nearer = [](const auto& a, const auto& b) { return a.distance < b.distance; };
   std::stable_sort(data.draws.begin(), data.draws.end(), is_nearer);
   std::stable_sort(data.far.begin(), data.far.end(), is_nearer);
-  set_frame(view, options.light, data);
+  set_frame(view, *options.environment, data);
   // When values are shown instead of colours, transparent surfaces are drawn like opaque ones.
   if (!shows_values(options.light.shading)) order_glass(spaces, view, data);
   return data;

@@ -5,6 +5,7 @@
 #include <random>
 #include <set>
 
+#include "render/environment_for_tests.h"
 #include "render/impostor/impostor_test_support.h"
 #include "render_vk/march/vulkan_detail_support.h"
 #include "render_vk/raster/mesh_for_tests.h"
@@ -115,7 +116,7 @@ TEST_F(VulkanMeshDetail, SmallImpostorsHaveNoHoles) {
       const Camera camera = render_test::orbiting(world, 0.7 + pixels, 0.4, 0.1 * pixels, pixels, size);
       RenderOptions options = sized(size, size);
       options.light.shading = Shading::Unlit;
-      options.light.sky_brightness = 0.0;
+      environment_in(options).sky.brightness = 0.0;
       options.samples = 64;
       const auto truth = traced.render(camera, options);
       ASSERT_TRUE(truth.has_value());

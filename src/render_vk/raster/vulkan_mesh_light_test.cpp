@@ -5,6 +5,7 @@
 
 #include <glm/gtc/quaternion.hpp>
 
+#include "render/environment_for_tests.h"
 #include "render_vk/raster/mesh_for_tests.h"
 #include "tests/golden_views.h"
 
@@ -102,11 +103,11 @@ TEST_F(VulkanMeshLight, LightHasTheSameOptions) {
   const Camera camera = towards({10, 40, 70}, {0, 4, 0});
   RenderOptions options = without_shadows(sized(160, 90));
   options.light.occlusion_affects = OcclusionAffects::All;
-  options.light.sun = {-1, 2, 0.5};
+  environment_in(options).sun.direction = {-1, 2, 0.5};
   compare(scene, camera, options, "affects_all");
   options.light.occlusion_mode = OcclusionMode::Off;
   compare(scene, camera, options, "no_occlusion");
-  options.light.exposure = 2.5;
+  environment_in(options).exposure = 2.5;
   compare(scene, camera, options, "exposed");
   options.light.occlusion_mode = OcclusionMode::Vertex;
   options.light.shading = Shading::UnlitWithOcclusion;
@@ -126,7 +127,7 @@ TEST_F(VulkanMeshLight, BrightnessHasNoLimit) {
   grid.fill_box({{5, 0, 0}, {10, 5, 5}}, black);
   place(scene, std::move(grid));
   RenderOptions options = without_shadows(sized(64, 64));
-  options.light.exposure = 1e300;
+  environment_in(options).exposure = 1e300;
   compare(scene, towards({5, 9, 20}, {5, 2, 2}), options, "bright");
 }
 
@@ -151,7 +152,7 @@ TEST_F(VulkanMeshLight, SmoothSurfacesHaveTheReferenceLight) {
   const Camera camera = from_above(30, 50, 30, 8);
   MeshImageOptions options = mesh_options(without_shadows(sized(8, 8)));
   const Vec3 colour = render_test::linear({200, 120, 60});
-  const auto up = static_cast<float>(glm::normalize(options.light.sun).y);
+  const auto up = static_cast<float>(glm::normalize(environment_in(options).sun.direction).y);
   const auto expect = [&](Vec3 light, const char* what) {
     const render_test::Pixel pixel = render_test::encoded(light);
     EXPECT_LE(glm::length(byte_at(drawn(camera, options), 4, 4) - Vec3(pixel[0], pixel[1], pixel[2])), 2.0F) << what;
@@ -159,11 +160,11 @@ TEST_F(VulkanMeshLight, SmoothSurfacesHaveTheReferenceLight) {
   expect(colour * (0.15F + up) + colour * 0.125F, "lit");
   options.light.occlusion_affects = OcclusionAffects::All;
   expect(colour * (0.15F + up) + colour * 0.125F, "all of it is open");
-  options.light.exposure = 0.5;
+  environment_in(options).exposure = 0.5;
   expect(0.5F * (colour * (0.15F + up) + colour * 0.125F), "exposed");
   options.light.occlusion_mode = OcclusionMode::Off;
   expect(0.5F * (colour * (0.10F + up) + colour * 0.125F), "without occlusion");
-  options.light.sun = {0, -1, 0};
+  environment_in(options).sun.direction = {0, -1, 0};
   expect(0.5F * (colour * 0.10F + colour * 0.125F), "the sun below");
   options.light.shading = Shading::Unlit;
   expect(colour, "unlit");

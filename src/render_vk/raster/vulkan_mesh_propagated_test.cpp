@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "render/cave_for_tests.h"
+#include "render/environment_for_tests.h"
 #include "render_vk/raster/mesh_for_tests.h"
 
 namespace quoin {
@@ -21,7 +22,7 @@ TEST_F(VulkanMeshPropagated, ACaveWithGlassIsThatOfTheProcessor) {
   RenderOptions options = propagated(240, 160, OcclusionMode::Vertex);
   compare(cave.scene, Cave::inside(), options, "cave");
   options.light.least_light = 0.03;
-  options.light.lamp_brightness = 2.0;
+  environment_in(options).lamp_brightness = 2.0;
   options.light.occlusion_mode = OcclusionMode::Off;
   compare(cave.scene, towards({26.0, -3.0, 12.0}, {-8.0, -10.0, -2.0}, 1.2), options, "cave_of_lamps");
 }

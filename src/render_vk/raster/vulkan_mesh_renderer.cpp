@@ -31,6 +31,7 @@ RenderOptions request_of(const MeshImageOptions& options) {
   request.width = options.width;
   request.height = options.height;
   request.light = options.light;
+  request.environment = options.environment;
   request.detail = options.detail;
   return request;
 }
@@ -44,10 +45,11 @@ Status check(const Camera& camera, const MeshImageOptions& options) {
   return {};
 }
 
-bool traces_light(const LightOptions& light) {
+bool traces_light(const RenderOptions& options) {
+  const LightOptions& light = options.light;
   if (light.shading != Shading::Lit) return false;
   if (is_propagated(light)) return true;
-  return (light.shadows && daylight_of(light).sun_brightness > 0.0) || light.max_lamps > 0;
+  return (light.shadows && daylight_of(*options.environment).sun_brightness > 0.0) || light.max_lamps > 0;
 }
 
 std::array<std::uint32_t, 7> sides_of(const ImpostorFaces::Level& level) {
@@ -106,7 +108,8 @@ struct VulkanMeshRenderer::Impl {
   vulkan::MeshStore store;
   vulkan::LevelMeshes levels;
   const Scene* scene = nullptr;
-  ChangeCursor at_update;  // of it
+  Environment environment = Environment::reference();  // of the scene
+  ChangeCursor at_update;                              // of it
   InstanceFilter shown = InstanceFilter::Visible;
   std::vector<vulkan::MeshInstance> instances;  // in the order of their handles; voxels, then the field
   vulkan::Place surfaces;
@@ -136,6 +139,7 @@ void VulkanMeshRenderer::Impl::place(const Scene& of_scene, InstanceFilter filte
   const ChangeCursor before = std::exchange(at_update, of_scene.cursor());
   if (scene != &of_scene || !before.shares_container_with(at_update)) levels.clear();
   scene = &of_scene;
+  environment = environment_of(of_scene);
   shown = filter;
   instances.clear();
   scene->instances().for_each([&](InstanceHandle handle, const Instance& instance) {
@@ -196,7 +200,7 @@ Status VulkanMeshRenderer::Impl::check_request(const vulkan::ImageImpl& target, 
   }
   if (target.device != device) return refuse("vulkan: the image belongs to another renderer than the meshes");
   const bool needs_voxels =
-      options.detail.policy.has_value() || traces_light(options.light) || has_glass_by_rays(options);
+      options.detail.policy.has_value() || traces_light(request_of(options)) || has_glass_by_rays(options);
   const bool has_voxels =
       renderer->voxels == scene && renderer->at_update.shares_container_with(at_update) && renderer->instances == shown;
   if (needs_voxels && scene != nullptr && !has_voxels) {
@@ -263,15 +267,15 @@ Status VulkanMeshRenderer::Impl::put_image(const vulkan::Placement& placement, c
   frame.grids = placement.grids;
   frame.surfaces = surfaces.address;
   frame.last_surface = static_cast<std::uint32_t>(std::max<std::size_t>(surface_table.size() / 3, 1) - 1);
-  if (scene == nullptr || !traces_light(request.light)) return {};
-  const auto lamps = renderer->lamp_table(request.light, threads);
+  if (scene == nullptr || !traces_light(request)) return {};
+  const auto lamps = renderer->lamp_table(request, threads);
   if (!lamps) return lamps.error();
   if (lamps->table != nullptr) {
     data.lamps = vulkan::put_lamps(*lamps, camera, data.image);
   }
   const auto light = renderer->level_table(request.light, threads);
   if (!light) return light.error();
-  if (light->table != nullptr) vulkan::put_levels(*light, *scene, placement, request.light, data.image);
+  if (light->table != nullptr) vulkan::put_levels(*light, *scene, placement, request, data.image);
   return {};
 }
 
@@ -279,7 +283,7 @@ Result<vulkan::MeshFrameData> VulkanMeshRenderer::Impl::make_frame(const Camera&
                                                                    const MeshImageOptions& options,
                                                                    vulkan::MeshLight& light, Threads threads) {
   const RenderOptions request = request_of(options);
-  const bool traces = traces_light(request.light) && scene != nullptr;
+  const bool traces = traces_light(request) && scene != nullptr;
   const bool glass_by_rays = has_glass_by_rays(options);
   const vulkan::Placement nothing;
   std::optional<vulkan::Subject> subject;
@@ -300,8 +304,9 @@ Result<vulkan::MeshFrameData> VulkanMeshRenderer::Impl::make_frame(const Camera&
   return data;
 }
 
-Status VulkanMeshRenderer::draw(VulkanImage& image, const Camera& camera, const MeshImageOptions& options,
+Status VulkanMeshRenderer::draw(VulkanImage& image, const Camera& camera, const MeshImageOptions& asked,
                                 Threads threads) {
+  const MeshImageOptions options = with_environment(asked, impl_->environment);
   vulkan::ImageImpl& target = image.impl();
   if (Status right = impl_->check_request(target, camera, options); !right) return right;
   auto light = vulkan::MeshLight::Plain;

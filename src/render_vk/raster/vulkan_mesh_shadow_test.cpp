@@ -2,6 +2,7 @@
 
 #include <glm/gtc/quaternion.hpp>
 
+#include "render/environment_for_tests.h"
 #include "render_vk/raster/mesh_for_tests.h"
 #include "tests/golden_views.h"
 
@@ -61,7 +62,7 @@ TEST_F(VulkanMeshShadow, InstancesThrowThemOnOneAnother) {
   const Scene scene = yard();
   for (const DVec3 sun : {DVec3(1, 1.2, 0.5), DVec3(-0.8, 0.6, 1), DVec3(0.2, 3, -0.4)}) {
     RenderOptions options = with_mesh_light(sized(320, 180));
-    options.light.sun = sun;
+    environment_in(options).sun.direction = sun;
     compare(scene, towards({40, 45, 60}, {0, 4, 5}), options, "yard");
   }
 }
@@ -93,7 +94,7 @@ TEST_F(VulkanMeshShadow, NothingIsDarkWhereAWallBegins) {
   place(scene, std::move(grid));
   put(scene, blocky_surfaces(scene));
   RenderOptions options = with_mesh_light(sized(400, 400));
-  options.light.sun = {1, 1, 0.2};  // shines on the wall and on the floor in front of it
+  environment_in(options).sun.direction = {1, 1, 0.2};  // shines on the wall and on the floor in front of it
   options.light.occlusion_mode = OcclusionMode::Off;
   const Camera camera = towards({31.3, 17.7, 22.1}, {9, 2, 19}, 0.5);
   const Image with = drawn(camera, mesh_options(options));
@@ -112,7 +113,7 @@ TEST_F(VulkanMeshShadow, GlassTintsTheSun) {
   grid.fill_box({{20, 10, 30}, {23, 30, 60}}, blue);
   place(scene, std::move(grid));
   RenderOptions options = with_mesh_light(sized(120, 120));
-  options.light.sun = {-1, 1, 0};
+  environment_in(options).sun.direction = {-1, 1, 0};
   // Only the floor behind the panes is in the image.
   const Camera camera = from_above(41, 9, 30, 36);
   compare(scene, camera, options, "tinted");
@@ -129,8 +130,8 @@ TEST_F(VulkanMeshShadow, LampsShineOnMeshes) {
   scene.edit(scene.instances()[scene.instances().handles().front()].grid)
       .grid.fill_box({{12, 1, 20}, {14, 6, 22}}, glow);
   RenderOptions options = with_mesh_light(sized(320, 180));
-  options.light.sun_brightness = 0.0;
-  options.light.sky_brightness = 0.1;
+  environment_in(options).sun.brightness = 0.0;
+  environment_in(options).sky.brightness = 0.1;
   options.light.max_lamps = 64;
   compare(scene, towards({40, 45, 60}, {0, 4, 5}), options, "lamps");
   const Image lit = drawn(towards({40, 45, 60}, {0, 4, 5}), mesh_options(options));
@@ -141,10 +142,10 @@ TEST_F(VulkanMeshShadow, LampsShineOnMeshes) {
 TEST_F(VulkanMeshShadow, TheSkyAndAllLightFollowTheSun) {
   const Scene scene = yard();
   RenderOptions options = with_mesh_light(sized(320, 180));
-  options.light.sky_follows_sun = true;
+  environment_in(options).sky.model = SkyModel::Gradient;
   int hour = 0;
   for (const double height : {1.0, 0.15, -0.05, -0.5}) {
-    options.light.sun = {-0.8, height, 0.6};
+    environment_in(options).sun.direction = {-0.8, height, 0.6};
     compare(scene, towards({40, 25, 60}, {0, 14, 5}), options, "hour_" + std::to_string(hour++));
   }
 }
@@ -159,7 +160,7 @@ TEST_F(VulkanMeshShadow, SmoothSurfacesHaveThemToo) {
   for (int i = 0; i < 20; ++i) grid.fill_box({{44, 8, 4}, {64 - i, 9 + i / 3, 60}}, stone);
   place(scene, std::move(grid));
   RenderOptions options = with_mesh_light(sized(256, 256));
-  options.light.sun = {0.3, 1, 0.1};
+  environment_in(options).sun.direction = {0.3, 1, 0.1};
   const Camera camera = from_above(32, 60, 32, 60);
   const auto shadows = [&](const std::vector<SurfaceUpdate>& surfaces, const char* name) {
     meshes_->clear();

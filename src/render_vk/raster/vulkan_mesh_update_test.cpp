@@ -6,6 +6,7 @@
 
 #include <glm/vec2.hpp>
 
+#include "render/environment_for_tests.h"
 #include "render_vk/raster/mesh_for_tests.h"
 
 namespace quoin {
@@ -246,7 +247,7 @@ TEST_F(VulkanMeshUpdate, WrongImagesAreRefused) {
   for (const int samples : {0, 3, -1, 16}) {
     expect_refused(camera, with([=](auto& o) { o.samples = samples; }), "samples: must be 1, 2, 4 or 8 for meshes");
   }
-  expect_refused(camera, with([](auto& o) { o.light.sun = DVec3(0.0); }), "sun");
+  expect_refused(camera, with([](auto& o) { environment_in(o).sun.direction = DVec3(0.0); }), "sun");
   Camera wrong = camera;
   wrong.up *= 2.0;
   expect_refused(wrong, right, "camera: directions must be unit vectors");

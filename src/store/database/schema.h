@@ -27,7 +27,7 @@
 
 namespace quoin::store {
 
-inline constexpr int kSchemaVersion = 2;
+inline constexpr int kSchemaVersion = 3;
 inline constexpr int kPageBytes = 8192;
 /// Chunks along a region's edge.
 inline constexpr int kRegionShift = 5;
@@ -97,7 +97,10 @@ inline constexpr const char* kLamp = "lamp";
 inline constexpr const char* kCamera = "camera";
 /// Id 0: the initial camera; the others are the "camera" parts.
 inline constexpr const char* kView = "view";
+/// Id 0: the direction of the sun in a scene whose environment has no other settings.
 inline constexpr const char* kSun = "sun";
+/// Id 0: the environment of any other scene with one.
+inline constexpr const char* kEnvironment = "environment";
 /// Id 0: a PNG.
 inline constexpr const char* kThumbnail = "thumbnail";
 inline constexpr const char* kValue = "value";

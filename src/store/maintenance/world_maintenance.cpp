@@ -28,9 +28,9 @@ using namespace store;
 
 namespace {
 
-constexpr std::array kKinds = {part::kType,  part::kGrid,      part::kInstance, part::kGroup,
-                               part::kLayer, part::kLamp,      part::kCamera,   part::kView,
-                               part::kSun,   part::kThumbnail, part::kValue,    part::kWorld};
+constexpr std::array kKinds = {part::kType,      part::kGrid,   part::kInstance, part::kGroup, part::kLayer,
+                               part::kLamp,      part::kCamera, part::kView,     part::kSun,   part::kEnvironment,
+                               part::kThumbnail, part::kValue,  part::kWorld};
 
 std::uint64_t file_bytes(const std::filesystem::path& path) {
   std::error_code error;

@@ -61,6 +61,7 @@ struct SaverState {
   Numbers<SceneLayer> layers;
   std::vector<Lamp> lamps;
   std::vector<std::int64_t> lamp_numbers;  ///< numbers of the lamps in the world
+  std::optional<Environment> environment;
   WorldView view;
   std::size_t saved_cameras = 0;
   bool is_view_new = false;

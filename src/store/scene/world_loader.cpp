@@ -137,7 +137,13 @@ class Load {
     if (auto read = read_instances(); !read) return read;
     Status read = each<Lamp>(part::kLamp, [&](std::int64_t, Lamp lamp) { scene_.lamps.push_back(std::move(lamp)); });
     if (!read) return read;
-    read = each<DVec3>(part::kSun, [&](std::int64_t, DVec3 sun) { loaded_.sun = sun; });
+    read = each<DVec3>(part::kSun, [&](std::int64_t, DVec3 sun) {
+      if (sun != DVec3(0.0)) scene_.environment = Environment::natural(sun);
+    });
+    if (!read) return read;
+    read = each<Environment>(part::kEnvironment, [&](std::int64_t, Environment environment) {
+      scene_.environment = std::move(environment);
+    });
     if (!read) return read;
     read = each<Camera>(part::kView, [&](std::int64_t, Camera camera) { loaded_.camera = camera; });
     if (!read) return read;
@@ -206,7 +212,8 @@ class Load {
     }
     state_.needs_lamp_save |= lamp_numbers_.size() != scene_.lamps.size();
     state_.lamp_numbers = std::move(lamp_numbers_);
-    state_.view = {loaded_.sun, loaded_.camera, loaded_.cameras};
+    state_.environment = scene_.environment;
+    state_.view = {loaded_.camera, loaded_.cameras};
     state_.saved_cameras = loaded_.cameras.size();
     state_.is_begun = true;
   }

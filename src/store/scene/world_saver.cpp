@@ -45,6 +45,7 @@ class Save {
       if (auto done = put_instance(handle); !done) return done;
     }
     put_lamps();
+    put_environment();
     put_view();
     state_.is_begun = true;
     state_.needs_full_save = false;
@@ -249,19 +250,30 @@ class Save {
     state_.needs_lamp_save = false;
   }
 
+  // Writes a part with id 0, or removes it.
+  template <class T>
+  void put_single(const char* kind, const std::optional<T>& content) {
+    if (content) {
+      WorldParts::put(changes_, kind, 0, text_of(*content));
+    } else {
+      remove(kind, 0);
+    }
+  }
+
+  void put_environment() {
+    const std::optional<Environment>& now = scene_.environment;
+    if (!state_.needs_full_save && state_.environment == now) return;
+    const bool is_sun = now && is_only_sun(*now);
+    put_single(part::kSun, is_sun ? std::optional(now->sun.direction) : std::nullopt);
+    put_single(part::kEnvironment, is_sun ? std::nullopt : now);
+    state_.environment = now;
+  }
+
   void put_view() {
     if (!state_.is_view_new) return;
     had_view_ = true;
     const WorldView& view = state_.view;
-    const auto put = [&](const char* kind, const auto& content) {
-      if (content) {
-        WorldParts::put(changes_, kind, 0, text_of(*content));
-      } else {
-        remove(kind, 0);
-      }
-    };
-    put(part::kSun, view.sun);
-    put(part::kView, view.camera);
+    put_single(part::kView, view.camera);
     for (std::size_t i = 0; i < view.cameras.size(); ++i) {
       WorldParts::put(changes_, part::kCamera, static_cast<std::int64_t>(i), text_of(view.cameras[i]));
     }

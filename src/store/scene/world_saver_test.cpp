@@ -96,7 +96,7 @@ TEST(WorldSaver, SunAndCamerasAreKept) {
   const WorldFolder folder;
   LoadedScene loaded;
   loaded.scene = rich_scene();
-  loaded.sun = DVec3(0.1, 0.7, -0.2);
+  loaded.scene.environment = Environment::natural({0.1, 0.7, -0.2});
   loaded.camera = look_at({1, 2, 3}, {4, 5, 7}, 0.7).value();
   FileCamera flat{.number = -3, .camera = *loaded.camera, .focus_distance = 12.5};
   flat.camera.projection = Camera::Projection::Orthographic;
@@ -104,12 +104,43 @@ TEST(WorldSaver, SunAndCamerasAreKept) {
   ASSERT_TRUE(save_scene(loaded, folder / "w.quoin"));
   const auto again = load_scene(folder / "w.quoin");
   ASSERT_TRUE(again);
-  EXPECT_EQ(*again->sun, *loaded.sun);
+  EXPECT_EQ(again->scene.environment, loaded.scene.environment);
   EXPECT_EQ(again->camera->forward, loaded.camera->forward);
   ASSERT_EQ(again->cameras.size(), 2U);
   EXPECT_EQ(again->cameras[1].number, -3);
   EXPECT_EQ(again->cameras[1].focus_distance, 12.5);
   EXPECT_EQ(again->cameras[1].camera.projection, Camera::Projection::Orthographic);
+}
+
+TEST(WorldSaver, SavesChangesOfTheEnvironment) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  auto world = WorldStore::create(path);
+  ASSERT_TRUE(world);
+  Scene scene = rich_scene();
+  WorldSaver saver;
+  Environment foggy = Environment::natural({1.0, 2.0, 3.0});
+  foggy.fog = Fog{.density = 0.03, .top = 12.0};
+  foggy.exposure = 1.5;
+  const std::array<std::optional<Environment>, 5> states = {Environment::natural({0.0, 1.0, 0.5}), foggy,
+                                                            Environment::reference(), std::nullopt, foggy};
+  for (const std::optional<Environment>& wanted : states) {
+    scene.environment = wanted;
+    ASSERT_TRUE(saver.save(*world, scene));
+    ASSERT_TRUE(world->flush());
+    const auto again = load_world(*world);
+    ASSERT_TRUE(again);
+    EXPECT_EQ(again->loaded.scene.environment, wanted);
+    EXPECT_TRUE(again->loaded.warnings.empty());
+  }
+  // A loaded world's saver knows the environment, so that it writes only changes.
+  auto loaded = load_world(*world);
+  ASSERT_TRUE(loaded);
+  ASSERT_TRUE(loaded->saver.save(*world, loaded->loaded.scene));
+  loaded->loaded.scene.environment.reset();
+  ASSERT_TRUE(loaded->saver.save(*world, loaded->loaded.scene));
+  ASSERT_TRUE(world->flush());
+  EXPECT_FALSE(load_world(*world).value().loaded.scene.environment);
 }
 
 /// A world that is saved repeatedly, and its expected content.

@@ -111,8 +111,7 @@ Result<SavedScene> write_world(const Scene& scene, const std::filesystem::path& 
 
 Result<SavedScene> write_world(const LoadedScene& loaded, const std::filesystem::path& path, Threads threads,
                                const Progress& progress, WorldChanges more) {
-  auto saved =
-      write(loaded.scene, {loaded.sun, loaded.camera, loaded.cameras}, path, threads, progress, std::move(more));
+  auto saved = write(loaded.scene, {loaded.camera, loaded.cameras}, path, threads, progress, std::move(more));
   if (!saved) saved.error().path = path.string();
   return saved;
 }

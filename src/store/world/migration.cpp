@@ -18,7 +18,12 @@ Status add_key_index(Connection& database) {
   return database.run("CREATE INDEX chunk_keys ON chunks(key)");
 }
 
-constexpr std::array kSteps = {MigrationStep{1, false, add_key_index}};
+// Version 3 has environment parts, which earlier programs would ignore.
+Status add_nothing(Connection& /*database*/) {
+  return {};
+}
+
+constexpr std::array kSteps = {MigrationStep{1, false, add_key_index}, MigrationStep{2, false, add_nothing}};
 static_assert(kSteps.back().from + 1 == kSchemaVersion, "a step for each version");
 
 Status keep_copy(Connection& database, const std::filesystem::path& path) {

@@ -54,6 +54,10 @@ Lamp read(const Json& json, const Place& place, Faults& faults, Lamp*) {
   return scene_json::lamp_of(json, place, faults);
 }
 
+Environment read(const Json& json, const Place& place, Faults& faults, Environment*) {
+  return scene_json::environment_from(json, place, faults);
+}
+
 Camera read(const Json& json, const Place& place, Faults& faults, Camera*) {
   return scene_json::camera_of(json, place, faults);
 }
@@ -129,6 +133,10 @@ std::string text_of(const Lamp& lamp) {
   return dumped(lamp);
 }
 
+std::string text_of(const Environment& environment) {
+  return dumped(environment);
+}
+
 std::string text_of(const Camera& camera) {
   return dumped(camera);
 }
@@ -166,6 +174,7 @@ template Result<SceneFile::Placement> part_from(std::span<const std::byte> text,
 template Result<SceneFile::Group> part_from(std::span<const std::byte> text, const std::string& name);
 template Result<SceneLayer> part_from(std::span<const std::byte> text, const std::string& name);
 template Result<Lamp> part_from(std::span<const std::byte> text, const std::string& name);
+template Result<Environment> part_from(std::span<const std::byte> text, const std::string& name);
 template Result<Camera> part_from(std::span<const std::byte> text, const std::string& name);
 template Result<FileCamera> part_from(std::span<const std::byte> text, const std::string& name);
 template Result<DVec3> part_from(std::span<const std::byte> text, const std::string& name);
@@ -218,6 +227,7 @@ Status check_part(const PartKey& key, std::span<const std::byte> body) {
   if (key.kind == part::kView) return check_as<Camera>(body, name);
   if (key.kind == part::kCamera) return check_as<FileCamera>(body, name);
   if (key.kind == part::kSun) return check_as<DVec3>(body, name);
+  if (key.kind == part::kEnvironment) return check_as<Environment>(body, name);
   if (key.kind == part::kThumbnail) return check_thumbnail(body, name);
   return {};
 }

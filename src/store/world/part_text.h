@@ -22,6 +22,7 @@ namespace quoin::store {
 [[nodiscard]] std::string text_of(const SceneFile::Group& group);
 [[nodiscard]] std::string text_of(const SceneLayer& layer);
 [[nodiscard]] std::string text_of(const Lamp& lamp);
+[[nodiscard]] std::string text_of(const Environment& environment);
 [[nodiscard]] std::string text_of(const Camera& camera);
 /// Returns a camera, with `number` and `focus_distance`.
 [[nodiscard]] std::string text_of(const FileCamera& camera);

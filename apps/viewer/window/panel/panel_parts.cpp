@@ -112,20 +112,23 @@ void row(const char* name, const char* format, double value) {
   ImGui::Text(format, value);
 }
 
-void draw_sun(LightOptions& light, bool has_rays) {
-  SunAngles sun = sun_angles(light.sun);
+void draw_sun(Environment& environment, LightOptions& light, bool has_rays) {
+  SunAngles sun = sun_angles(environment.sun.direction);
   auto azimuth = static_cast<float>(sun.azimuth);
   auto elevation = static_cast<float>(sun.elevation);
   const bool is_turned =
       ImGui::SliderFloat("azimuth", &azimuth, -180.0F, 180.0F, "%.0f°", ImGuiSliderFlags_AlwaysClamp);
-  const double lowest = lowest_sun(light);
+  const double lowest = lowest_sun(environment);
   const bool is_raised = ImGui::SliderFloat("elevation", &elevation, static_cast<float>(lowest), 90.0F, "%.0f°",
                                             ImGuiSliderFlags_AlwaysClamp);
   if (is_turned || is_raised) {
     // At the zenith the azimuth would be lost.
-    light.sun = sun_direction({azimuth, std::clamp(static_cast<double>(elevation), lowest, 89.5)});
+    environment.sun.direction = sun_direction({azimuth, std::clamp(static_cast<double>(elevation), lowest, 89.5)});
   }
-  ImGui::Checkbox("sky follows the sun", &light.sky_follows_sun);
+  bool follows_sun = environment.sky.model != SkyModel::Fixed;
+  if (ImGui::Checkbox("sky follows the sun", &follows_sun)) {
+    environment.sky.model = follows_sun ? SkyModel::Gradient : SkyModel::Fixed;
+  }
   ImGui::Checkbox("glass mirrors the sky", &light.glass_surfaces);
   if (!has_rays && ImGui::IsItemHovered()) {
     ImGui::SetTooltip(
@@ -304,11 +307,11 @@ void draw_brightness(const char* name, double& value, float most) {
   }
 }
 
-void draw_lamps(LightOptions& light, bool has_rays) {
-  draw_brightness("sun", light.sun_brightness, 4.0F);
-  draw_brightness("sky", light.sky_brightness, 4.0F);
+void draw_lamps(Environment& environment, LightOptions& light, bool has_rays) {
+  draw_brightness("sun", environment.sun.brightness, 4.0F);
+  draw_brightness("sky", environment.sky.brightness, 4.0F);
   if (light.model == LightModel::Propagated) {
-    draw_brightness("lamps", light.lamp_brightness, 64.0F);
+    draw_brightness("lamps", environment.lamp_brightness, 64.0F);
     draw_brightness("minimum", light.least_light, 1.0F);
     return;
   }
@@ -316,7 +319,7 @@ void draw_lamps(LightOptions& light, bool has_rays) {
   bool has_lamps = light.max_lamps > 0;
   if (ImGui::Checkbox("lamp light", &has_lamps)) light.max_lamps = has_lamps ? natural_light().max_lamps : 0;
   ImGui::BeginDisabled(light.max_lamps == 0);
-  draw_brightness("lamps", light.lamp_brightness, 64.0F);
+  draw_brightness("lamps", environment.lamp_brightness, 64.0F);
   ImGui::EndDisabled();
   ImGui::EndDisabled();
 }
@@ -324,6 +327,7 @@ void draw_lamps(LightOptions& light, bool has_rays) {
 void draw_light_part(ViewState& state) {
   if (!heading("Light")) return;
   LightOptions& light = state.settings.light;
+  Environment& environment = state.environment();
   int shading = static_cast<int>(light.shading);
   if (ImGui::Combo("shading", &shading, "lit\0unlit\0unlit + occlusion\0occlusion only\0normals\0")) {
     light.shading = static_cast<Shading>(shading);
@@ -354,15 +358,19 @@ void draw_light_part(ViewState& state) {
   ImGui::BeginDisabled(!shows_shadows);
   draw_shadow_distance(light);
   ImGui::EndDisabled();
-  draw_sun(light, has_shadows || !is_by_rays);
-  auto exposure = static_cast<float>(light.exposure);
+  draw_sun(environment, light, has_shadows || !is_by_rays);
+  auto exposure = static_cast<float>(state.settings.exposure);
   if (ImGui::SliderFloat("exposure", &exposure, 0.1F, 4.0F, "%.2f",
                          ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_Logarithmic)) {
-    light.exposure = exposure;
+    state.settings.exposure = exposure;
   }
-  draw_lamps(light, has_shadows);
+  draw_lamps(environment, light, has_shadows);
   ImGui::EndDisabled();
-  if (ImGui::Button("Reset light")) light = natural_light();
+  if (ImGui::Button("Reset light")) {
+    light = natural_light();
+    environment = state.scene().environment.value_or(Environment::natural());
+    state.settings.exposure = 1.0;
+  }
 }
 
 namespace {

@@ -32,10 +32,9 @@ LoadedScene divided(const LoadedScene& given, double voxel_size) {
   LoadedScene unit;
   unit.scene = divided(given.scene, voxel_size);
   unit.format = given.format;
-  unit.sun = given.sun;
   unit.camera = given.camera;
   unit.cameras = given.cameras;
-  unit.look = given.look;
+  unit.render_settings = given.render_settings;
   unit.last_frame = given.last_frame;
   unit.source = given.source;
   if (unit.camera) unit.camera->position /= voxel_size;

@@ -4,13 +4,12 @@
 #include <cmath>
 #include <numbers>
 #include <set>
-#include <tuple>
 
 #include "core/bytes/text.h"
 #include "core/srgb.h"
 #include "io/vox/cameras.h"
 #include "io/vox/chunk_reader.h"
-#include "io/vox/look.h"
+#include "io/vox/render_settings.h"
 
 namespace quoin::vox {
 
@@ -21,12 +20,6 @@ constexpr double kUsualFov = 45.0;
 
 bool is_same(const FileCamera& a, const FileCamera& b) {
   return a.camera == b.camera && a.focus_distance == b.focus_distance;
-}
-
-// Returns the sun of a look, const or mutable.
-template <class AnyLook>
-auto sun_of(AnyLook& look) {
-  return std::tie(look.sun, look.sun_angle_radians, look.sun_brightness, look.sun_colour, look.sun_is_seen);
 }
 
 std::vector<FileCamera> wanted_cameras(const LoadedScene& loaded, const Document& document) {
@@ -57,13 +50,20 @@ void plan_cameras(const LoadedScene& loaded, const VoxSource& source, ViewPlan& 
   }
 }
 
-// Returns true if a look has settings other than the sun's.
-bool says_more(const FileLook& all) {
-  FileLook only_sun;
-  only_sun.look.sky = SkyModel::Uniform;
-  sun_of(only_sun.look) = sun_of(all.look);
-  only_sun.develop.tone = ToneCurve::Aces;
-  return all.look != only_sun.look || all.develop != only_sun.develop || !all.environment.empty();
+// Returns true if there are settings other than the sun's.
+bool says_more(const FileRenderSettings& all) {
+  Environment only_sun;
+  only_sun.sun = all.environment.sun;
+  only_sun.sky.model = SkyModel::Uniform;
+  only_sun.exposure = 1.0;
+  only_sun.tone = ToneCurve::Aces;
+  return all.environment != only_sun || all.lens != Lens{};
+}
+
+bool says_more(const Environment& all) {
+  Environment only_sun;
+  only_sun.sun = all.sun;
+  return all != only_sun;
 }
 
 std::string text_of(double x, double y, double z) {
@@ -75,17 +75,13 @@ std::string text_of(double x, double y, double z) {
 ViewPlan plan_view(const LoadedScene& loaded, const VoxSource& source, bool is_new) {
   ViewPlan plan;
   plan_cameras(loaded, source, plan);
-  Look wanted;
-  if (loaded.look) {
-    wanted = loaded.look->look;
-  } else if (loaded.sun) {
-    wanted.sun = *loaded.sun;
-  } else {
-    return plan;
-  }
-  const auto before = look_of(source.document);
-  if (!before || sun_of(before->look) != sun_of(wanted)) plan.sun = wanted;
-  plan.has_more_settings = is_new && loaded.look && says_more(*loaded.look);
+  const std::optional<Environment>& environment = loaded.scene.environment;
+  const std::optional<FileRenderSettings>& settings = loaded.render_settings;
+  if (!environment && !settings) return plan;
+  const Sun& wanted = environment ? environment->sun : settings->environment.sun;
+  const auto before = render_settings_of(source.document);
+  if (!before || before->environment.sun != wanted) plan.sun = wanted;
+  plan.has_more_settings = is_new && (settings ? says_more(*settings) : says_more(*environment));
   return plan;
 }
 
@@ -117,20 +113,19 @@ void set_camera_keys(const FileCamera& file_camera, Entries& keys) {
   keys.set("_fov", to_text(static_cast<float>(fov * kDegrees)));
 }
 
-void set_sun_keys(const Look& look, Entries& keys) {
+void set_sun_keys(const Sun& sun, Entries& keys) {
   const SrgbEncoder& encode = SrgbEncoder::shared();
-  const double length = glm::length(look.sun);
-  const DVec3 towards = length > 0.0 ? look.sun / length : DVec3(0.0, 1.0, 0.0);
-  const float most = std::max({look.sun_colour.x, look.sun_colour.y, look.sun_colour.z, 1.0F});
+  const DVec3 towards = sun.unit_direction();
+  const float most = std::max({sun.colour.x, sun.colour.y, sun.colour.z, 1.0F});
   const auto byte = [&](float channel) { return std::to_string(int{encode(channel / most)}); };
   const double pitch = std::asin(std::clamp(towards.y, -1.0, 1.0));
   const double yaw = std::atan2(towards.x, towards.z);
   keys.set("_type", "_inf");
-  keys.set("_i", to_text(static_cast<float>(look.sun_brightness * static_cast<double>(most))));
-  keys.set("_k", byte(look.sun_colour.x) + " " + byte(look.sun_colour.y) + " " + byte(look.sun_colour.z));
+  keys.set("_i", to_text(static_cast<float>(sun.brightness * static_cast<double>(most))));
+  keys.set("_k", byte(sun.colour.x) + " " + byte(sun.colour.y) + " " + byte(sun.colour.z));
   keys.set("_angle", to_text(static_cast<float>(pitch * kDegrees)) + " " + to_text(static_cast<float>(yaw * kDegrees)));
-  keys.set("_area", to_text(static_cast<float>(std::tan(look.sun_angle_radians / 2.0))));
-  keys.set("_disk", look.sun_is_seen ? "1" : "0");
+  keys.set("_area", to_text(static_cast<float>(std::tan(sun.angle_radians / 2.0))));
+  keys.set("_disk", sun.is_visible ? "1" : "0");
 }
 
 std::optional<std::int32_t> camera_number(std::string_view id, std::span<const std::byte> content) {

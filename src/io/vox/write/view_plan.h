@@ -21,8 +21,8 @@ struct ViewPlan {
   std::map<std::int32_t, FileCamera> cameras;  ///< new and changed cameras, by number
   std::vector<std::int32_t> order;             ///< their numbers, in the scene's order
   std::vector<std::int32_t> removed;           ///< numbers of removed source cameras
-  std::optional<Look> sun;
-  bool has_more_settings = false;  ///< the look has settings other than the sun, which are not written
+  std::optional<Sun> sun;
+  bool has_more_settings = false;  ///< there are settings other than the sun's, which are not written
 };
 
 /// Compares a loaded scene with its source. The initial camera gets a free number, if it is none of the others.
@@ -34,9 +34,9 @@ struct ViewPlan {
 /// Without a focus the radius is 0.
 void set_camera_keys(const FileCamera& camera, Entries& keys);
 
-/// Sets the keys of an rOBJ chunk of `_type` `_inf` so that `look_of` returns the look's sun. Other keys stay. The
+/// Sets the keys of an rOBJ chunk of `_type` `_inf` so that `render_settings_of` returns the sun. Other keys stay. The
 /// colour becomes bytes; brightness above white goes into `_i`.
-void set_sun_keys(const Look& look, Entries& keys);
+void set_sun_keys(const Sun& sun, Entries& keys);
 
 /// Returns the number of an rCAM chunk; nullopt for other chunks.
 [[nodiscard]] std::optional<std::int32_t> camera_number(std::string_view id, std::span<const std::byte> content);

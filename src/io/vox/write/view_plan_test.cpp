@@ -111,34 +111,32 @@ TEST(VoxViewWriting, TheCameraToLookThroughGetsAFreeNumber) {
 
 TEST(VoxViewWriting, TheSunComesBack) {
   LoadedScene loaded = scene_of_a_voxel();
-  loaded.sun = glm::normalize(DVec3(-3, 2, 1));
+  loaded.scene.environment = Environment::natural(glm::normalize(DVec3(-3, 2, 1)));
   LoadedScene again = written(loaded);
-  ASSERT_TRUE(again.look.has_value());
-  EXPECT_LT(glm::length(again.look->look.sun - *loaded.sun), 1e-6);
-  EXPECT_NEAR(again.look->look.sun_brightness, 1.0, 1e-6);
+  ASSERT_TRUE(again.render_settings.has_value());
+  const Sun& first = again.render_settings->environment.sun;
+  EXPECT_LT(glm::length(first.direction - loaded.scene.environment->sun.direction), 1e-6);
+  EXPECT_NEAR(first.brightness, 1.0, 1e-6);
 
-  FileLook look;
-  look.look.sky = SkyModel::Uniform;
-  look.develop.tone = ToneCurve::Aces;
-  look.look.sun = {0, -1, 0};
-  look.look.sun_brightness = 3.0;
-  look.look.sun_colour = {2.0F, 1.0F, 0.0F};
-  look.look.sun_angle_radians = 0.25;
-  look.look.sun_is_seen = false;
-  loaded.look = look;
+  const Sun wanted{.direction = {0, -1, 0},
+                   .brightness = 3.0,
+                   .colour = {2.0F, 1.0F, 0.0F},
+                   .angle_radians = 0.25,
+                   .is_visible = false};
+  loaded.scene.environment->sun = wanted;
   again = written(loaded);
   EXPECT_TRUE(write_vox(loaded).value().warnings.empty());
-  const Look& found = again.look.value().look;
-  EXPECT_LT(glm::length(found.sun - look.look.sun), 1e-6);
+  const Sun& found = again.render_settings.value().environment.sun;
+  EXPECT_LT(glm::length(found.direction - wanted.direction), 1e-6);
   // Values brighter than white become brightness.
   for (int i = 0; i < 3; ++i) {
-    EXPECT_NEAR(static_cast<double>(found.sun_colour[i]) * found.sun_brightness,
-                static_cast<double>(look.look.sun_colour[i]) * 3.0, 0.03);
+    EXPECT_NEAR(static_cast<double>(found.colour[i]) * found.brightness, static_cast<double>(wanted.colour[i]) * 3.0,
+                0.03);
   }
-  EXPECT_NEAR(found.sun_angle_radians, 0.25, 1e-6);
-  EXPECT_FALSE(found.sun_is_seen);
+  EXPECT_NEAR(found.angle_radians, 0.25, 1e-6);
+  EXPECT_FALSE(found.is_visible);
 
-  loaded.look->look.fog = Fog{};
+  loaded.scene.environment->fog = Fog{};
   EXPECT_EQ(write_vox(loaded).value().warnings, std::vector<std::string>{"render settings left out, except the sun's"});
   EXPECT_EQ(vox_unsupported_features(loaded).value().size(), 1U);
 }
@@ -179,7 +177,7 @@ TEST(VoxViewWriting, OnlyWhatChangedIsWrittenAnew) {
   loaded.cameras[1].camera.position.x += 5.0;                 // number 2
   loaded.cameras.push_back({1, turned(0.2, 0.4, 0.0), 7.0});  // the unused camera
   loaded.cameras.push_back({6, turned(0.2, 0.5, 0.0), 7.0});
-  loaded.look->look.sun_brightness = 2.0;
+  loaded.render_settings->environment.sun.brightness = 2.0;
   const std::vector<std::byte> bytes = write_vox(loaded).value().bytes;
   EXPECT_EQ(count_of(bytes, "rCAM"), 4U);
   EXPECT_EQ(count_of(bytes, "rOBJ"), 2U);
@@ -192,8 +190,8 @@ TEST(VoxViewWriting, OnlyWhatChangedIsWrittenAnew) {
   expect_same(again.cameras[1].camera, loaded.cameras[2].camera, "1");
   expect_same(again.cameras[2].camera, loaded.cameras[1].camera, "2");
   expect_same(again.cameras[3].camera, loaded.cameras[3].camera, "6");
-  EXPECT_NEAR(again.look->look.sun_brightness, 2.0, 1e-6);
-  EXPECT_EQ(again.look->develop, loaded.look->develop);
+  EXPECT_NEAR(again.render_settings->environment.sun.brightness, 2.0, 1e-6);
+  EXPECT_EQ(again.render_settings->environment.bloom, loaded.render_settings->environment.bloom);
 
   loaded = read_vox(file_with_views()).value();
   loaded.cameras.erase(loaded.cameras.begin());

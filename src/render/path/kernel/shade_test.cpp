@@ -72,11 +72,11 @@ std::vector<Vec3> awkward_directions() {
 TEST(PathKernel, ShadesLikeTheFunctionsOfOnePoint) {
   Numbers numbers;
   const std::vector<Vec3> awkward = awkward_directions();
-  Look look;
-  look.sky = SkyModel::Uniform;
+  Environment environment;
+  environment.sky.model = SkyModel::Uniform;
   for (const double angle : {0.0, 0.0093, 0.5}) {
-    look.sun_angle_radians = angle;
-    const SkyLight sky(look);
+    environment.sun.angle_radians = angle;
+    const SkyLight sky(environment);
     const SkySample middle = sky.sun_sample(sky.to_sun());
     const Frame sun_frame(sky.to_sun());
     ShadeLight light;

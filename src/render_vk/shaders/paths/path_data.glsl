@@ -46,10 +46,10 @@ const uint kPathMedia = 16;
 const uint kPathUneven = 32;  // the sky is sampled by itself
 const uint kPathSun = 64;
 
-const int kSkyPhysical = 0;
+const int kSkyPhysical = 2;
 const int kSkyGradient = 1;
-const int kSkyUniform = 2;
-const int kSkyEnvironment = 3;
+const int kSkyUniform = 3;
+const int kSkyImage = 4;
 
 struct PathLamp {
   vec4 corner;  // in view; w: the reach of a lamp without a body, else 0

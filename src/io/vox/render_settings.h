@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include <quoin/scene/look.h>
+#include <quoin/io/loaded_scene.h>
 
 #include "io/vox/chunks.h"
 
@@ -21,10 +21,10 @@ namespace quoin::vox {
 ///   _ground  _color, _hor                            _bg       _color
 ///   _setting _ground, _bg_c, _bg_a: 1 if these are drawn; or _enable of the group, in older files
 ///
-/// FileLook::not_drawn lists the other keys with a value other than MagicaVoxel's default, and invalid values. Colours
-/// are sRGB; numbers out of range are clamped.
+/// FileRenderSettings::not_drawn lists the other keys with a value other than MagicaVoxel's default, and invalid
+/// values. Colours are sRGB; numbers out of range are clamped.
 /// Source: no documentation by MagicaVoxel; names and defaults are from its files, units from its images. See
 /// docs/decisions/archive/098.
-[[nodiscard]] std::optional<FileLook> look_of(const Document& document);
+[[nodiscard]] std::optional<FileRenderSettings> render_settings_of(const Document& document);
 
 }  // namespace quoin::vox

@@ -1,4 +1,4 @@
-#include "io/vox/look.h"
+#include "io/vox/render_settings.h"
 
 #include <algorithm>
 #include <array>
@@ -120,16 +120,16 @@ double angle_of_area(double area) {
   return std::min(2.0 * std::atan(std::max(area, 0.0)), kWidest);
 }
 
-void read_sun(Settings& settings, Look& look) {
-  settings.put("_inf", "_i", 0.0, kMaxBrightness, look.sun_brightness);
-  settings.put_colour("_inf", "_k", look.sun_colour);
+void read_sun(Settings& settings, Sun& sun) {
+  settings.put("_inf", "_i", 0.0, kMaxBrightness, sun.brightness);
+  settings.put_colour("_inf", "_k", sun.colour);
   if (const auto angle = settings.numbers<2>("_inf", "_angle")) {
     const double pitch = (*angle)[0] * kRadians;
     const double yaw = (*angle)[1] * kRadians;
-    look.sun = {std::sin(yaw) * std::cos(pitch), std::sin(pitch), std::cos(yaw) * std::cos(pitch)};
+    sun.direction = {std::sin(yaw) * std::cos(pitch), std::sin(pitch), std::cos(yaw) * std::cos(pitch)};
   }
-  if (const auto area = settings.number("_inf", "_area")) look.sun_angle_radians = angle_of_area(*area);
-  look.sun_is_seen = settings.is_on("_inf", "_disk", look.sun_is_seen);
+  if (const auto area = settings.number("_inf", "_area")) sun.angle_radians = angle_of_area(*area);
+  sun.is_visible = settings.is_on("_inf", "_disk", sun.is_visible);
 }
 
 void read_air(Settings& settings, AirOptions& air) {
@@ -145,53 +145,52 @@ void read_air(Settings& settings, AirOptions& air) {
   settings.put("_atm", "_mie_g", -kMaxAnisotropy, kMaxAnisotropy, air.mie_anisotropy);
 }
 
-void read_sky(Settings& settings, FileLook& out) {
-  Look& look = out.look;
+void read_sky(Settings& settings, double sun_brightness, Sky& sky) {
   const int mode = static_cast<int>(std::clamp(settings.number("_env", "_mode").value_or(0.0), 0.0, 2.0));
   if (mode == 1) {
-    look.sky = SkyModel::Physical;
-    look.sky_brightness = look.sun_brightness;
-    read_air(settings, look.air);
+    sky.model = SkyModel::Physical;
+    sky.brightness = sun_brightness;
+    read_air(settings, sky.air);
   } else if (mode == 2) {
-    look.sky = SkyModel::Environment;
-    out.environment = settings.text("_ibl", "_path");
-    settings.put("_ibl", "_i", 0.0, kMaxBrightness, look.sky_brightness);
-    if (const auto turn = settings.number("_ibl", "_rot")) look.environment_turn_radians = *turn * kRadians;
+    sky.model = SkyModel::Image;
+    sky.image_file = settings.text("_ibl", "_path");
+    settings.put("_ibl", "_i", 0.0, kMaxBrightness, sky.brightness);
+    if (const auto turn = settings.number("_ibl", "_rot")) sky.image_turn_radians = *turn * kRadians;
     if (const auto angle = settings.numbers<2>("_ibl", "_angle")) {
-      look.environment_turn_radians = (*angle)[1] * kRadians;
+      sky.image_turn_radians = (*angle)[1] * kRadians;
     }
   } else {
-    look.sky = SkyModel::Uniform;
-    settings.put("_uni", "_i", 0.0, kMaxBrightness, look.sky_brightness);
-    settings.put_colour("_uni", "_k", look.sky_colour);
+    sky.model = SkyModel::Uniform;
+    settings.put("_uni", "_i", 0.0, kMaxBrightness, sky.brightness);
+    settings.put_colour("_uni", "_k", sky.colour);
   }
   for (const char* of_others : {"_uni", "_atm", "_ibl"}) settings.pass(of_others);
 }
 
-void read_fog(Settings& settings, Look& look) {
+void read_fog(Settings& settings, std::optional<Fog>& out) {
   Fog fog;
   fog.density = 0.0;
   settings.put("_fog_uni", "_d", 0.0, kMaxFogDensity, fog.density);
   settings.put_colour("_fog_uni", "_k", fog.colour);
   settings.put("_fog_uni", "_g", -kMaxAnisotropy, kMaxAnisotropy, fog.anisotropy);
-  if (fog.density > 0.0) look.fog = fog;
+  if (fog.density > 0.0) out = fog;
 }
 
-void read_lens(Settings& settings, Look& look) {
+void read_lens(Settings& settings, Lens& lens) {
   constexpr double kMostBlades = kMaxLensBlades;
-  settings.put("_lens", "_aperture", 0.0, kMaxBrightness, look.lens_radius);
+  settings.put("_lens", "_aperture", 0.0, kMaxBrightness, lens.radius);
   if (const auto blades = settings.number("_lens", "_blade_n")) {
-    look.lens_blades = *blades < 3.0 ? 0 : static_cast<int>(std::min(*blades, kMostBlades));
+    lens.blades = *blades < 3.0 ? 0 : static_cast<int>(std::min(*blades, kMostBlades));
   }
-  if (const auto turn = settings.number("_lens", "_blade_r")) look.lens_turn_radians = *turn * kRadians;
+  if (const auto turn = settings.number("_lens", "_blade_r")) lens.turn_radians = *turn * kRadians;
 }
 
-void read_film(Settings& settings, DevelopOptions& develop) {
-  settings.put("_film", "_expo", 0.0, kMaxBrightness, develop.exposure);
-  settings.put("_film", "_vig", 0.0, 1.0, develop.vignette);
-  settings.put("_film", "_gam", 0.1, 10.0, develop.gamma);
-  develop.tone = settings.is_on("_film", "_aces", true) ? ToneCurve::Aces : ToneCurve::Clamp;
-  Bloom& bloom = develop.bloom;
+void read_film(Settings& settings, Environment& environment) {
+  settings.put("_film", "_expo", 0.0, kMaxBrightness, environment.exposure.emplace(1.0));
+  settings.put("_film", "_vig", 0.0, 1.0, environment.vignette);
+  settings.put("_film", "_gam", 0.1, 10.0, environment.gamma);
+  environment.tone = settings.is_on("_film", "_aces", true) ? ToneCurve::Aces : ToneCurve::Clamp;
+  Bloom& bloom = environment.bloom;
   settings.put("_bloom", "_mix", 0.0, 1.0, bloom.mix);
   settings.put("_bloom", "_aspect", -1.0, 1.0, bloom.aspect);
   settings.put("_bloom", "_threshold", 0.0, kMaxBrightness, bloom.threshold);
@@ -201,29 +200,31 @@ void read_film(Settings& settings, DevelopOptions& develop) {
   if (bloom.radius == 0.0) bloom = {};
 }
 
-void read_ground(Settings& settings, FileLook& out) {
+void read_ground(Settings& settings, FileRenderSettings& out) {
   GroundPlane ground;
   settings.put_colour("_ground", "_color", ground.colour);
   settings.put("_ground", "_hor", 0.0, 1.0, ground.fade);
   const bool has_ground = settings.is_on("_setting", "_ground", settings.is_on("_ground", "_enable", false));
-  if (has_ground) out.look.ground = ground;
+  if (has_ground) out.environment.ground = ground;
   Vec3 colour(0.0F);
   settings.put_colour("_bg", "_color", colour);
-  if (settings.is_on("_setting", "_bg_c", settings.is_on("_bg", "_enable", false))) out.look.background = colour;
+  if (settings.is_on("_setting", "_bg_c", settings.is_on("_bg", "_enable", false)))
+    out.environment.sky.background = colour;
   out.is_transparent = settings.is_on("_setting", "_bg_a", false);
 }
 
 }  // namespace
 
-std::optional<FileLook> look_of(const Document& document) {
+std::optional<FileRenderSettings> render_settings_of(const Document& document) {
   if (document.settings.empty()) return std::nullopt;
   Settings settings(document.settings);
-  FileLook out;
-  read_sun(settings, out.look);
-  read_sky(settings, out);
-  read_fog(settings, out.look);
-  read_lens(settings, out.look);
-  read_film(settings, out.develop);
+  FileRenderSettings out;
+  Environment& environment = out.environment;
+  read_sun(settings, environment.sun);
+  read_sky(settings, environment.sun.brightness, environment.sky);
+  read_fog(settings, environment.fog);
+  read_lens(settings, out.lens);
+  read_film(settings, environment);
   read_ground(settings, out);
   constexpr double kMostBounces = 1'023.0;
   double diffuse = 0.0;
