@@ -70,7 +70,8 @@ std::string hard_phrase(const Words& words) {
 
 enum class Kind { Code, Script, Python, Document };
 
-/// Reads the prose of a file line by line: comments, long string literals, documents outside of code blocks.
+/// Reads the prose of a file line by line: comments, long string literals, documents outside of code blocks and link
+/// targets.
 class Prose {
  public:
   explicit Prose(Kind kind) : kind_(kind) {}
@@ -88,7 +89,8 @@ class Prose {
       is_in_block_ = !is_in_block_;
       return "";
     }
-    return is_in_block_ ? "" : line;
+    static const std::regex link_target(R"(\]\([^)]*\))");
+    return is_in_block_ ? "" : std::regex_replace(line, link_target, "]");
   }
   std::string of_python(const std::string& line) {
     const bool was_in_block = is_in_block_;
@@ -265,6 +267,8 @@ TEST(English, FindsHardPhrases) {
   EXPECT_EQ(found(Kind::Code, "  add(\"the file of which nothing is known\");"), "of which");
   EXPECT_EQ(found(Kind::Code, "  add(\"beside\");  // Adds a file."), "");
   EXPECT_EQ(found(Kind::Document, "Files go beside the input."), "beside");
+  EXPECT_EQ(found(Kind::Document, "See [066](archive/066-what-a-view-shows.md)."), "");
+  EXPECT_EQ(found(Kind::Document, "See [beside](a.md)."), "beside");
   EXPECT_EQ(found(Kind::Python, "x = 1  # as those of the grid"), "as those of");
   EXPECT_EQ(found(Kind::Code, "TEST(Ray, ThatMisses) {"), "test name opens with That");
   EXPECT_EQ(found(Kind::Code, "/// Returns true if the grid is empty."), "");
