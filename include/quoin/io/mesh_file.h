@@ -152,8 +152,11 @@ struct LoadedMesh {
 /// OBJ:    polygons of any size, colours after coordinates (sRGB); from .mtl files Kd (sRGB) or map_Kd instead, d, Ke,
 ///         Pr and Pm. Needs tinyobjloader in the build.
 /// glTF:   version 2.0, .gltf and .glb: the nodes of the default scene with their static transforms (no animation, no
-///         skins); triangles, strips and fans; of materials, base colour, alpha mode, roughness, metalness, emission,
-///         KHR_materials_emissive_strength and KHR_texture_transform; COLOR_0. Needs tinygltf in the build.
+///         skins); triangles, strips and fans; of materials, base colour and emission with their textures, alpha mode,
+///         roughness, metalness, KHR_materials_emissive_strength, KHR_materials_pbrSpecularGlossiness and
+///         KHR_texture_transform; COLOR_0; KHR_mesh_quantization, EXT_meshopt_compression and
+///         KHR_draco_mesh_compression. Needs tinygltf in the build, for meshopt data also meshoptimizer, for Draco data
+///         also libdraco.
 /// PLY:    version 1.0, text or binary of either byte order; red, green, blue and alpha per vertex (sRGB); polygons are
 ///         read as fans; triangle strips too.
 /// STL:    text or binary, with VisCAM or Magics colours.

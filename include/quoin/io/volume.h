@@ -31,19 +31,20 @@ struct VolumeOptions {
 ///          LAS and 3D-left-handed become (x, z, y).
 /// NIfTI:   uses the sform if sform_code is positive, else the qform if qform_code is positive, else only the spacing.
 ///          Values are scaled by scl_slope and scl_inter unless the slope is 0 or not finite.
-/// NRRD:    attached headers, raw or gzip encoding, `space directions` and `space origin`, else `spacings`.
+/// NRRD:    the encodings raw, gzip, bzip2, ascii and hex; `space directions` and `space origin`, else `spacings`. A
+///          header without values (.nhdr) needs the overload for paths.
 /// Values:  NaN and infinities are kept, counted and reported in a warning. From more than three dimensions, only the
 ///          first volume is read, with a warning.
 /// Errors:  BadFormat with the byte offset, which counts decompressed bytes if the message says so; Unsupported for
-///          colours, complex and 128-bit numbers, other NRRD encodings, detached NRRD headers, and NIfTI pairs (use the
-///          overload for paths); LimitExceeded beyond `max_values`; Cancelled.
+///          colours, complex and 128-bit numbers, other NRRD encodings, NRRD headers without values, and NIfTI pairs
+///          (use the overload for paths); LimitExceeded beyond `max_values`; Cancelled.
 /// Memory:  4 bytes per value, allocated only for values present in the file: at most four times the size of an
 ///          uncompressed file, and 1,032 values per byte of gzip, within `max_values`.
 [[nodiscard]] Result<Volume> read_volume(std::span<const std::byte> bytes, const VolumeOptions& options = {},
                                          const Progress& progress = {});
 
-/// Reads a volume from a file, or a NIfTI pair from its .hdr with the .img or .img.gz next to it. A volume without a
-/// name gets the file's name. Errors: also CannotRead; errors name the file.
+/// Reads a volume from a file, a NIfTI pair from its .hdr with the .img or .img.gz next to it, or an .nhdr with its
+/// data file. A volume without a name gets the file's name. Errors: also CannotRead; errors name the file.
 [[nodiscard]] Result<Volume> read_volume(const std::filesystem::path& path, const VolumeOptions& options = {},
                                          const Progress& progress = {});
 
