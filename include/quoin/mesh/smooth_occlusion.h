@@ -58,7 +58,7 @@ class SmoothOccluder {
   SmoothOccluder& operator=(SmoothOccluder&&) noexcept;
   ~SmoothOccluder();
 
-  /// Writes the occlusion of all positions. `places.origin` is relative to the centre chunk's sample (0, 0, 0).
+  /// Writes the occlusion of all positions. `samples.origin` is relative to the centre chunk's sample (0, 0, 0).
   /// Positions can lie in the chunk and up to one cell (2^level samples) around it; positions farther away count as far
   /// air.
   /// Requires: as smooth_occlusion.

@@ -142,13 +142,13 @@ void SurfaceLight::split(const QuadBuffer& quads, IVec3 chunk, LightMerging merg
   QUOIN_ASSERT(corners.size() == out.size(), "the light of each quad");
 }
 
-void SurfaceLight::read(const SmoothSamples& places, std::span<MeanLevels> out) {
-  QUOIN_ASSERT(places.normals.size() == places.positions.size() && out.size() >= places.positions.size(),
-               "a normal for every position, and room for its light");
-  const int step = 1 << std::clamp(places.level, 0, kMaxSmoothLevel);
-  for (std::size_t i = 0; i < places.positions.size(); ++i) {
-    const DVec3 point = DVec3(places.positions[i]) + DVec3(places.origin);
-    out[i] = light_before(rows_->voxels, point, places.normals[i], step);
+void SurfaceLight::read(const SmoothSamples& samples, std::span<MeanLevels> out) {
+  QUOIN_ASSERT(samples.normals.size() == samples.positions.size() && out.size() >= samples.positions.size(),
+               "a normal for every position, and an element of `out` for its light");
+  const int step = 1 << std::clamp(samples.level, 0, kMaxSmoothLevel);
+  for (std::size_t i = 0; i < samples.positions.size(); ++i) {
+    const DVec3 point = DVec3(samples.positions[i]) + DVec3(samples.origin);
+    out[i] = light_before(rows_->voxels, point, samples.normals[i], step);
   }
 }
 

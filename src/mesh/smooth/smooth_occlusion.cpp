@@ -85,8 +85,8 @@ struct Sampling {
 
 /// The sample positions of one chunk.
 struct ChunkSamples {
-  const SmoothSamples& places;
-  IVec3 chunk{0};                          ///< its coordinates, if `places` is relative to the field
+  const SmoothSamples& samples;
+  IVec3 chunk{0};                          ///< its coordinates, if `samples` is relative to the field
   std::span<const std::uint32_t> numbers;  ///< samples in the chunk or a cell around it; other samples are far air
 };
 
@@ -95,14 +95,14 @@ class SampleKernel {
  public:
   SampleKernel();
 
-  void occlude(const DensityNeighbourhood& chunks, const ChunkSamples& places, const Sampling& sampling,
+  void occlude(const DensityNeighbourhood& chunks, const ChunkSamples& samples, const Sampling& sampling,
                std::span<float> out);
 
  private:
   using Kernel = void (*)(Work&, int z, std::size_t count, float* occlusion);
 
-  void sort_by_slice(const ChunkSamples& places, const Sampling& sampling, std::span<float> out);
-  void occlude_some(const SmoothSamples& places, int z, std::size_t first, std::size_t count, std::span<float> out);
+  void sort_by_slice(const ChunkSamples& samples, const Sampling& sampling, std::span<float> out);
+  void occlude_some(const SmoothSamples& samples, int z, std::size_t first, std::size_t count, std::span<float> out);
 
   struct Entry {
     std::uint32_t number;
@@ -140,8 +140,8 @@ Sampling::Sampling(const SmoothOcclusionOptions& wanted, int wanted_level)
 
 /// Returns the occlusion of one sample position, without kernels. `place.cell` is relative to the centre chunk's first
 /// cell.
-float occlusion_of_place(const DensityNeighbourhood& chunks, const CellSample& place, Vec3 normal,
-                         const Sampling& sampling) {
+float occlusion_of_sample(const DensityNeighbourhood& chunks, const CellSample& place, Vec3 normal,
+                          const Sampling& sampling) {
   const float unit = depth_unit(sampling.level);
   const int size = 1 << sampling.level;
   return occlusion_at_vertex(place.snapped, sound_normal(normal), sampling.occlusion, [&](int x, int y, int z) {
@@ -153,12 +153,12 @@ SampleKernel::SampleKernel() : kernel_(pick_kernel()) {}
 
 // Finds the cells of the samples. Samples out of reach are open.
 void SampleKernel::sort_by_slice(const ChunkSamples& wanted, const Sampling& sampling, std::span<float> out) {
-  const DVec3 origin = DVec3(wanted.places.origin) - DVec3(wanted.chunk) * static_cast<double>(kChunkEdge);
+  const DVec3 origin = DVec3(wanted.samples.origin) - DVec3(wanted.chunk) * static_cast<double>(kChunkEdge);
   entries_.clear();
   first_of_slice_.fill(0);
   for (const std::uint32_t number : wanted.numbers) {
-    QUOIN_ASSERT(number < wanted.places.positions.size() && number < out.size(), "one of the samples");
-    const auto place = place_at(DVec3(wanted.places.positions[number]) + origin, sampling.level);
+    QUOIN_ASSERT(number < wanted.samples.positions.size() && number < out.size(), "one of the samples");
+    const auto place = place_at(DVec3(wanted.samples.positions[number]) + origin, sampling.level);
     const auto in_reach = [&](int cell) { return cell >= -1 && cell <= work_.n; };
     if (!place || !in_reach(place->cell.x) || !in_reach(place->cell.y) || !in_reach(place->cell.z)) {
       out[number] = open_occlusion(sampling.occlusion);
@@ -175,14 +175,14 @@ void SampleKernel::sort_by_slice(const ChunkSamples& wanted, const Sampling& sam
   for (const Entry& entry : entries_) sorted_[next[static_cast<std::size_t>(entry.z + 1)]++] = entry;
 }
 
-void SampleKernel::occlude_some(const SmoothSamples& places, int z, std::size_t first, std::size_t count,
+void SampleKernel::occlude_some(const SmoothSamples& samples, int z, std::size_t first, std::size_t count,
                                 std::span<float> out) {
   // Kernels read whole registers, so the last place is repeated.
   constexpr std::size_t kOverrun = 16;
   QUOIN_ASSERT(count > 0 && count <= kPlacesAtOnce && first + count <= sorted_.size(), "samples of the slice");
   for (std::size_t i = 0; i < count + kOverrun; ++i) {
     const Entry& entry = sorted_[first + std::min(i, count - 1)];
-    const Vec3 normal = sound_normal(places.normals[entry.number]);
+    const Vec3 normal = sound_normal(samples.normals[entry.number]);
     work_.places[i] = entry.place;
     for (int axis = 0; axis < 3; ++axis) {
       work_.fractions[axis][i] = entry.snapped[axis];
@@ -218,7 +218,7 @@ void SampleKernel::occlude(const DensityNeighbourhood& chunks, const ChunkSample
     const std::size_t first = first_of_slice_[static_cast<std::size_t>(z + 1)];
     const std::size_t count = slice(z).size();
     for (std::size_t done = 0; done < count; done += kPlacesAtOnce) {
-      occlude_some(wanted.places, z, first + done, std::min(kPlacesAtOnce, count - done), out);
+      occlude_some(wanted.samples, z, first + done, std::min(kPlacesAtOnce, count - done), out);
     }
   }
 }
@@ -235,12 +235,12 @@ using smooth::SampleKernel;
 using smooth::Sampling;
 
 // Chunks with fewer samples than this are computed sample by sample: gathering the kernels' rows would cost more.
-constexpr std::size_t kFewPlaces = 24;
+constexpr std::size_t kFewSamples = 24;
 
-void check_places(const SmoothSamples& places, std::span<float> out) {
-  QUOIN_ASSERT(places.normals.size() == places.positions.size(), "as many normals as positions");
-  QUOIN_ASSERT(out.size() >= places.positions.size(), "room for every place");
-  QUOIN_ASSERT(places.positions.size() < std::numeric_limits<std::uint32_t>::max(), "less than 2^32 places");
+void check_samples(const SmoothSamples& samples, std::span<float> out) {
+  QUOIN_ASSERT(samples.normals.size() == samples.positions.size(), "as many normals as positions");
+  QUOIN_ASSERT(out.size() >= samples.positions.size(), "a value for every sample");
+  QUOIN_ASSERT(samples.positions.size() < std::numeric_limits<std::uint32_t>::max(), "fewer than 2^32 samples");
 }
 
 // Requires: the position is in the int32 range.
@@ -255,19 +255,19 @@ CellSample in_chunk(const CellSample& place, IVec3 chunk, int level) {
 }
 
 // The positions of a field, grouped by chunk.
-class PlacesByChunk {
+class SamplesByChunk {
  public:
-  PlacesByChunk(const SmoothSamples& places, const Sampling& sampling, std::span<float> out) {
-    const std::size_t count = places.positions.size();
+  SamplesByChunk(const SmoothSamples& samples, const Sampling& sampling, std::span<float> out) {
+    const std::size_t count = samples.positions.size();
     const float open = smooth::open_occlusion(sampling.occlusion);
     constexpr std::uint32_t kNowhere = std::numeric_limits<std::uint32_t>::max();
-    std::vector<std::uint32_t> chunk_of_place(count);
+    std::vector<std::uint32_t> chunk_of_sample(count);
     for (std::size_t i = 0; i < count; ++i) {
-      const DVec3 position = DVec3(places.positions[i]) + DVec3(places.origin);
+      const DVec3 position = DVec3(samples.positions[i]) + DVec3(samples.origin);
       if (smooth::is_in_int32(position)) {
-        chunk_of_place[i] = index_of(chunk_at(position));
+        chunk_of_sample[i] = index_of(chunk_at(position));
       } else {
-        chunk_of_place[i] = kNowhere;
+        chunk_of_sample[i] = kNowhere;
         out[i] = open;
       }
     }
@@ -275,7 +275,7 @@ class PlacesByChunk {
     numbers_.resize(first_.back());
     std::vector<std::uint32_t> next = first_;
     for (std::size_t i = 0; i < count; ++i) {
-      if (chunk_of_place[i] != kNowhere) numbers_[next[chunk_of_place[i]]++] = static_cast<std::uint32_t>(i);
+      if (chunk_of_sample[i] != kNowhere) numbers_[next[chunk_of_sample[i]]++] = static_cast<std::uint32_t>(i);
     }
   }
 
@@ -317,19 +317,19 @@ float smooth_occlusion(const DensityGrid& field, DVec3 position, Vec3 normal, co
   const auto place = smooth::place_at(position, sampling.level);
   if (!place) return smooth::open_occlusion(sampling.occlusion);
   const IVec3 chunk = chunk_at(position);
-  return smooth::occlusion_of_place(field.neighbourhood(chunk), in_chunk(*place, chunk, sampling.level), normal,
-                                    sampling);
+  return smooth::occlusion_of_sample(field.neighbourhood(chunk), in_chunk(*place, chunk, sampling.level), normal,
+                                     sampling);
 }
 
-Status smooth_occlusion(const DensityGrid& field, const SmoothSamples& places, const SmoothOcclusionOptions& options,
+Status smooth_occlusion(const DensityGrid& field, const SmoothSamples& samples, const SmoothOcclusionOptions& options,
                         std::span<float> out, Threads threads, const Progress& progress) {
-  check_places(places, out);
-  const Sampling sampling(options, places.level);
+  check_samples(samples, out);
+  const Sampling sampling(options, samples.level);
   if (sampling.occlusion.method == SmoothOcclusion::None) {
-    std::fill_n(out.begin(), places.positions.size(), 0.0F);
+    std::fill_n(out.begin(), samples.positions.size(), 0.0F);
     return {};
   }
-  const PlacesByChunk chunks(places, sampling, out);
+  const SamplesByChunk chunks(samples, sampling, out);
   ObjectPool<SampleKernel> kernels;
   ProgressSteps steps(progress, chunks.size());
   parallel_for(chunks.size(), threads, [&](std::size_t i) {
@@ -337,17 +337,17 @@ Status smooth_occlusion(const DensityGrid& field, const SmoothSamples& places, c
     const IVec3 chunk = chunks.chunk(i);
     const DensityNeighbourhood neighbourhood = field.neighbourhood(chunk);
     const auto numbers = chunks.numbers(i);
-    if (numbers.size() >= kFewPlaces) {
+    if (numbers.size() >= kFewSamples) {
       kernels.with([&](SampleKernel& kernel) {
-        kernel.occlude(neighbourhood, {places, chunk, numbers}, sampling, out);
+        kernel.occlude(neighbourhood, {samples, chunk, numbers}, sampling, out);
       });
       return steps.step();
     }
     for (const std::uint32_t number : numbers) {
-      const auto place = smooth::place_at(DVec3(places.positions[number]) + DVec3(places.origin), sampling.level);
+      const auto place = smooth::place_at(DVec3(samples.positions[number]) + DVec3(samples.origin), sampling.level);
       QUOIN_ASSERT(place.has_value(), "a position in the range of int32");
-      out[number] = smooth::occlusion_of_place(neighbourhood, in_chunk(*place, chunk, sampling.level),
-                                               places.normals[number], sampling);
+      out[number] = smooth::occlusion_of_sample(neighbourhood, in_chunk(*place, chunk, sampling.level),
+                                                samples.normals[number], sampling);
     }
     steps.step();
   });
@@ -365,16 +365,16 @@ SmoothOccluder::SmoothOccluder(SmoothOccluder&&) noexcept = default;
 SmoothOccluder& SmoothOccluder::operator=(SmoothOccluder&&) noexcept = default;
 SmoothOccluder::~SmoothOccluder() = default;
 
-void SmoothOccluder::occlude(const DensityNeighbourhood& chunks, const SmoothSamples& places,
+void SmoothOccluder::occlude(const DensityNeighbourhood& chunks, const SmoothSamples& samples,
                              const SmoothOcclusionOptions& options, std::span<float> out) {
-  check_places(places, out);
-  const Sampling sampling(options, places.level);
-  const std::size_t count = places.positions.size();
+  check_samples(samples, out);
+  const Sampling sampling(options, samples.level);
+  const std::size_t count = samples.positions.size();
   if (sampling.occlusion.method == SmoothOcclusion::None) return void(std::fill_n(out.begin(), count, 0.0F));
   for (std::size_t i = impl_of(scratch_).numbers.size(); i < count; ++i) {
     impl_of(scratch_).numbers.push_back(static_cast<std::uint32_t>(i));
   }
-  impl_of(scratch_).kernel.occlude(chunks, {places, IVec3{0}, std::span(impl_of(scratch_).numbers).first(count)},
+  impl_of(scratch_).kernel.occlude(chunks, {samples, IVec3{0}, std::span(impl_of(scratch_).numbers).first(count)},
                                    sampling, out);
 }
 

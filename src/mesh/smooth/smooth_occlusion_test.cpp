@@ -34,10 +34,10 @@ DensityGrid hilly_field() {
   return grid;
 }
 
-std::vector<float> occlusion_of(const DensityGrid& field, const SmoothSamples& places,
+std::vector<float> occlusion_of(const DensityGrid& field, const SmoothSamples& samples,
                                 const SmoothOcclusionOptions& options, Threads threads = {}) {
-  std::vector<float> out(places.positions.size(), -1.0F);
-  EXPECT_TRUE(smooth_occlusion(field, places, options, out, threads).has_value());
+  std::vector<float> out(samples.positions.size(), -1.0F);
+  EXPECT_TRUE(smooth_occlusion(field, samples, options, out, threads).has_value());
   return out;
 }
 
@@ -72,18 +72,18 @@ TEST(SmoothOcclusionOfPlaces, IsThatOfTheChunksMeshWithAnyInstructionsAtAnyLevel
         SmoothChunkMesh mesh;
         mesher.mesh(field.neighbourhood(chunk), options, mesh);
         ASSERT_GT(mesh.positions.size(), 60U);
-        SmoothSamples places{{mesh.positions.data(), mesh.positions.size()},
-                             {mesh.normals.data(), mesh.normals.size()}};
-        places.level = level;
+        SmoothSamples samples{{mesh.positions.data(), mesh.positions.size()},
+                              {mesh.normals.data(), mesh.normals.size()}};
+        samples.level = level;
         const std::vector<float> expected(mesh.occlusion.begin(), mesh.occlusion.end());
         std::vector<float> found(expected.size());
         for (const InstructionSet set : sets_of_this_machine()) {
           const InstructionSetOverride over(set);
-          SmoothOccluder().occlude(field.neighbourhood(chunk), places, options.occlusion, found);
+          SmoothOccluder().occlude(field.neighbourhood(chunk), samples, options.occlusion, found);
           ASSERT_EQ(found, expected) << "level " << level << ", spread " << spread;
         }
-        places.origin = chunk * kChunkEdge;
-        ASSERT_EQ(occlusion_of(field, places, options.occlusion), expected);
+        samples.origin = chunk * kChunkEdge;
+        ASSERT_EQ(occlusion_of(field, samples, options.occlusion), expected);
       }
     }
   }
@@ -99,10 +99,10 @@ TEST(SmoothOcclusionOfPlaces, IsTheSameFarFromTheOrigin) {
   SmoothMesher mesher;
   SmoothChunkMesh mesh;
   mesher.mesh(near.neighbourhood(IVec3(0)), with(SmoothOcclusion::Weighted), mesh);
-  const SmoothSamples places{
+  const SmoothSamples samples{
       {mesh.positions.data(), mesh.positions.size()}, {mesh.normals.data(), mesh.normals.size()}, far_chunk * 64, 0};
   const std::vector<float> expected(mesh.occlusion.begin(), mesh.occlusion.end());
-  EXPECT_EQ(occlusion_of(far, places, with(SmoothOcclusion::Weighted).occlusion), expected);
+  EXPECT_EQ(occlusion_of(far, samples, with(SmoothOcclusion::Weighted).occlusion), expected);
 }
 
 TEST(SmoothOcclusionOfPlaces, IsTheSameInAnyOrderAndCompany) {
@@ -188,12 +188,12 @@ TEST(SmoothOcclusionOfPlaces, CancelsWhereProgressSaysSo) {
   const std::vector<Vec3> positions = {{-7, -4, -11}, {70, -4, -11}, {-7, -4, 80}};
   const std::vector<Vec3> normals(positions.size(), Vec3(0, 1, 0));
   std::vector<float> out(positions.size());
-  const SmoothSamples places{positions, normals};
+  const SmoothSamples samples{positions, normals};
   double last = 0.0;
   const auto listen = [&](double fraction) { return (last = fraction) < 2.0; };
-  EXPECT_TRUE(smooth_occlusion(field, places, {}, out, Threads{1}, listen).has_value());
+  EXPECT_TRUE(smooth_occlusion(field, samples, {}, out, Threads{1}, listen).has_value());
   EXPECT_EQ(last, 1.0);
-  const Status cancelled = smooth_occlusion(field, places, {}, out, Threads{1}, [](double) { return false; });
+  const Status cancelled = smooth_occlusion(field, samples, {}, out, Threads{1}, [](double) { return false; });
   ASSERT_FALSE(cancelled.has_value());
   EXPECT_EQ(cancelled.error().code, ErrorCode::Cancelled);
 }
@@ -208,7 +208,7 @@ TEST(SmoothOcclusionDeathTest, PlacesThatDoNotFitAreAMistake) {
   // An impossible number of samples, which must not be read.
   const std::span<const Vec3> many(three.data(), std::size_t{1} << 32);
   const std::span<float> room(out.data(), many.size());
-  QUOIN_EXPECT_MISTAKE((void)smooth_occlusion(field, {many, many}, {}, room), "less than 2.32 places");
+  QUOIN_EXPECT_MISTAKE((void)smooth_occlusion(field, {many, many}, {}, room), "fewer than 2.32 samples");
   SmoothOccluder occluder;
   QUOIN_EXPECT_MISTAKE(occluder.occlude({}, {three, three}, {}, out), "room for every place");
 }
