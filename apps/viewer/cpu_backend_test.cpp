@@ -398,7 +398,7 @@ TEST(CpuBackend, DensitiesAreTheSliceToTheByte) {
   Watched watched(scene);
   ViewRequest request = request_for(scene, View::Iso);
   request.mode = DrawMode::Density;
-  for (const SlicePlace place : {SlicePlace{1, 0.5}, SlicePlace{0, 0.25}}) {
+  for (const SlicePlane place : {SlicePlane{1, 0.5}, SlicePlane{0, 0.25}}) {
     request.slice = place;
     watched.backend.show(request);
     const std::vector<ViewFrame> frames = watched.settle();

@@ -26,7 +26,7 @@ struct Settings {
   bool detail_colours = false;  ///< not saved, like the next two
   Wireframe wireframe = Wireframe::Off;
   DrawMode mode = DrawMode::Rays;
-  SlicePlace slice;
+  SlicePlane slice;
   LightOptions light = natural_light();
   /// For files without an environment of their own. Saved are its sun direction, brightnesses and whether the sky
   /// follows the sun.

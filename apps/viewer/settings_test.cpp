@@ -50,7 +50,7 @@ TEST(Settings, ComeBackAsTheyWere) {
   EXPECT_FALSE(back.is_panel_shown);
   EXPECT_EQ(back.camera_mode, CameraMode::Fly);
   EXPECT_EQ(back.mode, DrawMode::Density);
-  EXPECT_EQ(back.slice, (SlicePlace{2, 0.25}));
+  EXPECT_EQ(back.slice, (SlicePlane{2, 0.25}));
   EXPECT_EQ(back.ui_scale, 1.5);
   EXPECT_EQ(back.samples, 4);
   EXPECT_TRUE(back.detail_by_pixels);

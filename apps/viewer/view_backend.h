@@ -57,10 +57,10 @@ inline constexpr std::size_t kDrawModes = 5;
 }
 
 /// The plane of a density slice, as in DensitySliceOptions.
-struct SlicePlace {
+struct SlicePlane {
   int axis = 1;
   double at = 0.5;
-  bool operator==(const SlicePlace&) const = default;
+  bool operator==(const SlicePlane&) const = default;
 };
 
 /// The image that the window wants to show.
@@ -78,7 +78,7 @@ struct ViewRequest {
   double exposure = 1.0;  ///< factor on the environment's exposure
   /// Paths only: the file's render settings; null if it has none.
   std::shared_ptr<const FileRenderSettings> render_settings;
-  SlicePlace slice;         ///< densities only; these use neither camera nor light
+  SlicePlane slice;         ///< densities only; these use neither camera nor light
   bool whole_only = false;  ///< skips smaller images in the meantime
 };
 

@@ -61,13 +61,13 @@ bool edit_paused(ViewState& state, Edit edit) {
 
 }  // namespace
 
-void Editing::press(const MousePlace& mouse) {
+void Editing::press(const MousePosition& mouse) {
   *this = {};
   is_pressed_ = true;
   from_ = to_ = mouse;
 }
 
-void Editing::move(const MousePlace& mouse) {
+void Editing::move(const MousePosition& mouse) {
   if (!is_pressed_) return;
   to_ = mouse;
   is_moved_ = true;

@@ -7,8 +7,8 @@ namespace quoin::viewer {
 /// Turns mouse presses and moves into strokes, once per frame and only when picking is up to date.
 class Editing {
  public:
-  void press(const MousePlace& mouse);
-  void move(const MousePlace& mouse);
+  void press(const MousePosition& mouse);
+  void move(const MousePosition& mouse);
   void release() { is_released_ = true; }
   [[nodiscard]] bool is_busy() const { return is_pressed_; }
 
@@ -25,8 +25,8 @@ class Editing {
   bool is_begun_ = false;
   bool is_moved_ = false;
   bool is_released_ = false;
-  MousePlace from_;
-  MousePlace to_;
+  MousePosition from_;
+  MousePosition to_;
 };
 
 /// Undo or redo one step.

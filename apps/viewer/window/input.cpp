@@ -53,7 +53,7 @@ void Input::note_mouse(int x, int y, ViewState& state, bool gui_has_mouse) {
 }
 
 void Input::find_mouse(ViewState& state, bool gui_has_mouse) const {
-  MousePlace& place = state.mouse;
+  MousePosition& place = state.mouse;
   // The middle of the pixel.
   place.x = (mouse_.x + 0.5) * state.pixels_per_unit - state.image_place.x;
   place.y = (mouse_.y + 0.5) * state.pixels_per_unit - state.image_place.y;

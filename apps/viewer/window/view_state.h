@@ -42,7 +42,7 @@ struct FrameStats {
 };
 
 /// The mouse position in image pixels, from the upper left corner.
-struct MousePlace {
+struct MousePosition {
   double x = 0.0;
   double y = 0.0;
   bool is_over = false;  ///< over the image, and no part of the GUI covers it
@@ -62,7 +62,7 @@ struct ViewState {
 
   SDL_Rect image_place{0, 0, 0, 0};  ///< in output pixels
   double pixels_per_unit = 1.0;
-  MousePlace mouse;
+  MousePosition mouse;
   std::optional<SceneHit> hover;  ///< the hit under the mouse
 
   ViewFrame image;  ///< the last frame that arrived

@@ -213,7 +213,7 @@ void draw_camera_part(ViewState& state, MenuChoice& choice) {
   draw_file_cameras(state.open.document->loaded().cameras, choice);
 }
 
-void draw_slice_place(SlicePlace& slice) {
+void draw_slice_place(SlicePlane& slice) {
   ImGui::Combo("axis", &slice.axis, "x\0y\0z\0");
   auto at = static_cast<float>(slice.at);
   if (ImGui::SliderFloat("position", &at, 0.0F, 1.0F, "%.3f of the fields", ImGuiSliderFlags_AlwaysClamp)) {
