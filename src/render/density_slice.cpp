@@ -141,7 +141,7 @@ Result<DensitySlice> draw_density_slice(const Scene& scene, const DensitySliceOp
   const Plane plane = plane_of(box, options);
   const auto width = static_cast<std::size_t>(options.width);
   DensitySlice slice;
-  slice.place = plane.middle[options.axis];
+  slice.position = plane.middle[options.axis];
   slice.colour = {options.width, options.height, {}};
   slice.colour.rgb.resize(3 * width * static_cast<std::size_t>(options.height));
   std::vector<std::int64_t> solid(static_cast<std::size_t>(options.height));

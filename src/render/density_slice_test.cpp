@@ -40,7 +40,7 @@ TEST(DensitySlice, ABallIsADiscInEveryDirection) {
   for (options.axis = 0; options.axis < 3; ++options.axis) {
     const auto slice = draw_density_slice(scene, options);
     ASSERT_TRUE(slice) << to_string(slice.error());
-    EXPECT_NEAR(slice->place, 0.0, 0.5);
+    EXPECT_NEAR(slice->position, 0.0, 0.5);
     EXPECT_TRUE(is_solid(pixel_at(slice->colour, 100, 60)));
     EXPECT_FALSE(is_solid(pixel_at(slice->colour, 5, 60)));
     // 40 samples fill 96 % of 120 pixels.
@@ -77,7 +77,7 @@ TEST(DensitySlice, MovesAlongItsAxisAndIsTheSameWithAnyThreads) {
   ASSERT_TRUE(top && again && middle);
   EXPECT_EQ(top->colour.rgb, again->colour.rgb);
   EXPECT_LT(top->pixels_solid, middle->pixels_solid / 2);
-  EXPECT_GT(top->place, 10.0);
+  EXPECT_GT(top->position, 10.0);
 }
 
 TEST(DensitySlice, RefusesWhatItCannotDraw) {

@@ -327,7 +327,7 @@ Status draw_frames(const LoadedScene& first, const OpenedInput& input, const Ren
 Status draw_slice(const Scene& scene, const RenderArguments& arguments, Stopwatch& watch, Outcome& outcome) {
   auto slice = draw_density_slice(scene, arguments.slice, arguments.common.threads);
   if (!slice) return slice.error();
-  outcome.slice = slice->place;
+  outcome.slice = slice->position;
   outcome.image.colour = std::move(slice->colour);
   outcome.image.pixels_hit = slice->pixels_solid;
   outcome.trace = watch.lap();

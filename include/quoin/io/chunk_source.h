@@ -102,7 +102,7 @@ class ChunkSource {
   struct Cache;
   ChunkSourceInfo info_;
   std::vector<IBox> parts_;
-  std::vector<std::uint32_t> by_place_;  // part indices, by z, x, y
+  std::vector<std::uint32_t> by_position_;  // part indices, by z, x, y
   std::unique_ptr<Cache> cache_;
 };
 

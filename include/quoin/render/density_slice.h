@@ -21,7 +21,7 @@ struct DensitySliceOptions {
 struct DensitySlice {
   Image colour;
   std::int64_t pixels_solid = 0;  ///< pixels in a field's solid
-  double place = 0.0;             ///< position of the plane on its axis, in world units
+  double position = 0.0;          ///< of the plane on its axis, in world units
 };
 
 /// Draws the densities on a plane through a scene's fields as unlit colours. Solid runs from light orange at the

@@ -60,8 +60,8 @@ class SceneAnimation {
   };
 
   [[nodiscard]] bool has_the_same_grids(const Scene& frame) const;
-  Shown& shown_as(std::size_t place, const Scene& frame, const Instance& instance);
-  static void show(Shown& shown, std::size_t frame, const Similarity& place);
+  Shown& shown_as(std::size_t index, const Scene& frame, const Instance& instance);
+  static void show(Shown& shown, std::size_t frame, const Similarity& world_from_grid);
   [[nodiscard]] std::vector<MeshKey> keys_of(const Shown& shown, double frames_per_second) const;
 
   Scene scene_;

@@ -38,13 +38,13 @@ Status SceneAnimation::add(const Scene& frame, InstanceFilter filter) {
         ErrorCode::InvalidArgument,
         "frame " + std::to_string(frames_) + " must have the same instances and grids as the frames before it");
   }
-  std::size_t place = 0;
+  std::size_t index = 0;
   for (const InstanceHandle handle : frame.instances().handles()) {
     const Instance& instance = frame.instances()[handle];
     if (is_drawn(frame, instance, filter)) {
-      show(shown_as(place, frame, instance), frames_, place_of(instance));
+      show(shown_as(index, frame, instance), frames_, place_of(instance));
     }
-    ++place;
+    ++index;
   }
   ++frames_;
   return {};
@@ -58,10 +58,10 @@ bool SceneAnimation::has_the_same_grids(const Scene& frame) const {
   return all_there;
 }
 
-SceneAnimation::Shown& SceneAnimation::shown_as(std::size_t place, const Scene& frame, const Instance& instance) {
+SceneAnimation::Shown& SceneAnimation::shown_as(std::size_t index, const Scene& frame, const Instance& instance) {
   const Look look{in_slot_of(instance.grid, frame.grids(), scene_.grids()), instance.mirrored};
-  QUOIN_ASSERT(place < instances_.size(), "one of the instances");
-  auto& all = instances_[place];
+  QUOIN_ASSERT(index < instances_.size(), "one of the instances");
+  auto& all = instances_[index];
   const auto known = std::ranges::find(all, look, &Shown::look);
   if (known != all.end()) return *known;
   Instance taken = instance;
@@ -72,12 +72,12 @@ SceneAnimation::Shown& SceneAnimation::shown_as(std::size_t place, const Scene& 
   return all.emplace_back(Shown{look, scene_.add_instance(std::move(taken)), {}});
 }
 
-void SceneAnimation::show(Shown& shown, std::size_t frame, const Similarity& place) {
+void SceneAnimation::show(Shown& shown, std::size_t frame, const Similarity& world_from_grid) {
   auto& changes = shown.changes;
   QUOIN_ASSERT(shown.frames_until_last <= frame, "frames in their order");
   const bool was_hidden = !changes.empty() && shown.frames_until_last < frame;
   if (was_hidden) changes.push_back({shown.frames_until_last, std::nullopt});
-  if (changes.empty() || changes.back().at != place) changes.push_back({frame, place});
+  if (changes.empty() || changes.back().at != world_from_grid) changes.push_back({frame, world_from_grid});
   shown.frames_until_last = frame + 1;
 }
 
