@@ -1,11 +1,12 @@
 // Converts every .vox file below a folder with the tool and checks the results:
 // node check_tool.mjs TOOL FOLDER [--pixels N] [--occluded] [--smooth] [--packed] [--lit]
 //
-// With --lit they have propagated light at their vertices, and pixels are compared with the file alone.
-// With --packed they are quantized and compressed. With --smooth they become smooth meshes, and volumes below the folder too.
-// Every GLB must pass the validator without a message, and N of them (default 4, spread over the list) the pixel check
-// against their voxels. Files that the tool refuses are listed, and count only when it did not refuse them properly (status 1, one
-// line, no file). Exit status: 0 all right, 1 not, 77 when something is not installed.
+// --lit adds propagated light to vertices; pixels are then compared with the GLB alone. --packed quantizes and
+// compresses. --smooth makes smooth meshes, and also converts volumes below the folder.
+//
+// Every GLB must pass the validator without a message. N of them (default 4, spread over the list) must pass the pixel
+// check against their voxels. Files that the tool rejects are listed; it must reject them with status 1, one line and
+// no output file. Exit status: 0 on success, 1 on failure, 77 if a program is not installed.
 import { spawnSync } from 'node:child_process';
 import { existsSync, mkdtempSync, readdirSync, rmSync, statSync } from 'node:fs';
 import { tmpdir } from 'node:os';
@@ -57,7 +58,7 @@ function check() {
   // Finding the surface under a pixel tries every triangle.
   const small = written.filter(([, glb]) => statSync(glb).size < 1e6);
   const step = Math.max(1, Math.floor(small.length / Math.max(1, Number(values.pixels))));
-  // Voxels tell what blocks look like, not what smooth surfaces do.
+  // The voxels define the look of blocks, not of smooth surfaces.
   const sampled = small.filter((_, i) => i % step === 0).slice(0, Number(values.pixels));
   const pairs = sampled.map(([source, glb]) => (values.smooth || values.lit ? glb : `${glb}=${source}`));
   if (pairs.length > 0) statuses.push(script('pixels.mjs', ...(values.occluded ? ['--occluded'] : []), ...pairs));

@@ -1,8 +1,10 @@
-// A picture of GLB files in three.js, side by side, for a person to look at:
-// node shot.mjs -o OUT.png [--view iso|front|back|left|right|top|x,y,z] [--size 1280x720] [--zoom 1] [--unlit] FILE.glb...
+// Renders GLB files with three.js, next to each other, for visual checks:
+//   node shot.mjs -o OUT.png [--view iso|front|back|left|right|top|x,y,z] [--size 1280x720] [--zoom 1] [--unlit]
+//     FILE.glb...
 //
-// --camera=X,Y,Z --look-at=X,Y,Z --fov DEGREES stands in the scene instead, as quoin render does.
-// A view is the direction from the model towards the camera (--view=-1,0.5,1 when it begins with a minus). Exit status: 0 done, 77 when the browser is not installed.
+// A view is the direction from the model towards the camera. If it begins with a minus: --view=-1,0.5,1.
+// --camera=X,Y,Z --look-at=X,Y,Z --fov DEGREES sets the camera instead, as for quoin render.
+// Exit status: 0 on success, 77 if the browser is not installed.
 import { parseArgs } from 'node:util';
 
 import { closeBrowser, withViewer } from './browser.mjs';

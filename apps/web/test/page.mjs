@@ -1,5 +1,5 @@
 // Tests the page in headless Chromium on a static file server.
-//   node page.mjs PAGE FILE.vox NATIVE.glb PICTURE.png CORPUS
+//   node page.mjs PAGE FILE.vox NATIVE.glb IMAGE.png CORPUS
 import { readFile, writeFile } from 'node:fs/promises';
 import { basename, join } from 'node:path';
 import { headless, requirements, serve } from '../../../tests/web/browser.mjs';
