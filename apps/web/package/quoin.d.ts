@@ -78,7 +78,7 @@ export interface RenderOptions extends Progress {
   sun?: Vec3;
 }
 
-export interface Picture {
+export interface RenderedImage {
   width: number;
   height: number;
   /** Rows from the top, four bytes per pixel, as in ImageData. */
@@ -115,7 +115,7 @@ export class Scene {
   /** Returns the voxel types of a box, x slowest and z fastest. */
   read(grid: number, min: Vec3, shape: Vec3): Uint16Array;
   /** Renders an image by ray marching, on one thread. */
-  render(options?: RenderOptions): Picture;
+  render(options?: RenderOptions): RenderedImage;
   /** Finds the nearest voxel or surface along each ray. origins, directions: three numbers per ray, in world space.
    *  maxT: maximum distance, in multiples of the direction's length. The first call builds a tree, which the scene
    *  keeps. */
