@@ -345,11 +345,11 @@ TEST_F(ToolRender, FilmsInOneFileAreMadeOfImages) {
   ASSERT_EQ(made.status, 0) << made.err;
   EXPECT_EQ(Json::parse(made.out)["files"], Json({"film.mp4"}));
   EXPECT_EQ(bytes("film.mp4").substr(4, 4), "ftyp");
-  EXPECT_FALSE(std::filesystem::exists(folder_.file("film.mp4.pictures")));
+  EXPECT_FALSE(std::filesystem::exists(folder_.file("film.mp4.images")));
   // An interrupted film continues from its existing frames.
-  std::filesystem::create_directory(folder_.file("film.mp4.pictures"));
-  drawn("many.vox -o film.mp4.pictures/picture.png --size 31x21 --turntable 3");
-  std::filesystem::remove(folder_.file("film.mp4.pictures/picture-02.png"));
+  std::filesystem::create_directory(folder_.file("film.mp4.images"));
+  drawn("many.vox -o film.mp4.images/image.png --size 31x21 --turntable 3");
+  std::filesystem::remove(folder_.file("film.mp4.images/image-02.png"));
   EXPECT_EQ(Json::parse(run(film + " --resume").out)["kept"], 2);
   EXPECT_EQ(run("render many.vox -o film.webm --size 32x24 --turntable 2 --fps 10").status, 0);
   EXPECT_EQ(bytes("film.webm").substr(0, 4), "\x1A\x45\xDF\xA3");

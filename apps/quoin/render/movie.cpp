@@ -75,11 +75,11 @@ bool is_movie(const fs::path& path) {
 }
 
 fs::path Movie::folder() const {
-  return fs::path(output_.string() + ".pictures");
+  return fs::path(output_.string() + ".images");
 }
 
 fs::path Movie::image() const {
-  return folder() / "picture.png";
+  return folder() / "image.png";
 }
 
 Status Movie::begin(bool resume) const {
@@ -100,8 +100,8 @@ Result<std::uint64_t> Movie::write(const std::vector<fs::path>& images, double f
   if (!ffmpeg)
     return make_error(ErrorCode::Unsupported, "cannot encode a video: ffmpeg is no longer installed", output_.string());
   const std::string first = number_in(images.front());
-  const std::string pattern = (folder() / ("picture-%0" + std::to_string(first.size()) + "d.png")).filename().string();
-  const fs::path whole = folder() / ("film" + output_.extension().string());
+  const std::string pattern = (folder() / ("image-%0" + std::to_string(first.size()) + "d.png")).filename().string();
+  const fs::path whole = folder() / ("video" + output_.extension().string());
   std::vector<std::string> words = {
       "-nostdin", "-hide_banner", "-loglevel", "error", "-y", "-framerate", std::to_string(frames_per_second),
       "-start_number", std::to_string(std::stol(first)), "-i", escaped(folder().string()) + "/" + pattern, "-frames:v",
