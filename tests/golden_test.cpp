@@ -39,14 +39,14 @@ RenderedImage render(const Scene& scene, const GoldenView& view, const RenderOpt
   return CpuRenderer(scene).render(camera_for(view), options, threads).value();
 }
 
-/// Returns the number of pixels in which the twin differs from the golden image.
-std::int64_t wrong_pixels(const RenderedImage& twin, const GoldenView& view) {
+/// Returns the number of pixels in which an altered image differs from the golden image.
+std::int64_t wrong_pixels(const RenderedImage& altered, const GoldenView& view) {
   const auto golden = read_png(golden_folders().golden / (std::string(view.name) + ".png"));
-  if (!golden || golden->rgb.size() != twin.colour.rgb.size()) {
-    ADD_FAILURE() << "no golden picture of this size";
+  if (!golden || golden->rgb.size() != altered.colour.rgb.size()) {
+    ADD_FAILURE() << "no golden image of this size";
     return 0;
   }
-  return difference_of(twin.colour, *golden).pixels;
+  return difference_of(altered.colour, *golden).pixels;
 }
 
 class Golden : public ::testing::TestWithParam<GoldenView> {};
@@ -61,7 +61,7 @@ TEST_P(Golden, ImageIsTheGoldenOne) {
   EXPECT_TRUE(is_golden(image.colour, view.name, golden_folders()));
 }
 
-TEST_P(Golden, PictureIsTheSameWithPlainInstructionsAndOneThread) {
+TEST_P(Golden, ImageIsTheSameWithPlainInstructionsAndOneThread) {
   const GoldenView& view = GetParam();
   const Scene scene = terrain_scene();
   const RenderOptions options = options_for(view);
@@ -75,7 +75,7 @@ TEST_P(Golden, PictureIsTheSameWithPlainInstructionsAndOneThread) {
 INSTANTIATE_TEST_SUITE_P(Views, Golden, ::testing::ValuesIn(kViews),
                          [](const auto& view) { return std::string(view.param.name); });
 
-TEST(GoldenTwin, ShadowViewFailsWithoutShadows) {
+TEST(GoldenAltered, ShadowViewFailsWithoutShadows) {
   const GoldenView& view = view_called("shadow");
   RenderOptions options = options_for(view);
   options.light.shadows = false;
@@ -83,7 +83,7 @@ TEST(GoldenTwin, ShadowViewFailsWithoutShadows) {
   EXPECT_GT(wrong, kPixels / 8) << "of " << kPixels;
 }
 
-TEST(GoldenTwin, AoViewFailsWithoutOcclusion) {
+TEST(GoldenAltered, AoViewFailsWithoutOcclusion) {
   const GoldenView& view = view_called("ao");
   RenderOptions options = options_for(view);
   options.light.occlusion_mode = OcclusionMode::Off;
@@ -91,7 +91,7 @@ TEST(GoldenTwin, AoViewFailsWithoutOcclusion) {
   EXPECT_GT(wrong, kPixels / 2) << "of " << kPixels;
 }
 
-TEST(GoldenTwin, BoundaryViewFailsWithoutTheNeighbour) {
+TEST(GoldenAltered, BoundaryViewFailsWithoutTheNeighbour) {
   const GoldenView& view = view_called("boundary");
   const RenderOptions options = options_for(view);
   const RenderedImage whole = render(terrain_scene(), view, options);
@@ -128,7 +128,7 @@ TEST(GoldenComparer, WritesWhatDiffersWhenAPixelDoes) {
   EXPECT_EQ(read_png(folders.failures / "a.actual.png")->rgb, wrong.rgb);
   EXPECT_EQ(read_png(folders.failures / "a.difference.png")->rgb, (std::vector<std::uint8_t>{0, 0, 0, 0, 64, 0}));
   EXPECT_TRUE(is_golden(right, "a", folders)) << "and once it is right again";
-  EXPECT_FALSE(std::filesystem::exists(folders.failures / "a.actual.png")) << "the pictures of the failure go";
+  EXPECT_FALSE(std::filesystem::exists(folders.failures / "a.actual.png")) << "the images of the failure are deleted";
 }
 
 TEST(GoldenComparer, NothingToCompareWithIsAFailure) {
@@ -136,7 +136,7 @@ TEST(GoldenComparer, NothingToCompareWithIsAFailure) {
   const GoldenFolders folders{folder.file("golden"), folder.file("failures")};
   std::filesystem::create_directories(folders.golden);
   const Image image{2, 1, {10, 20, 30, 40, 50, 60}};
-  EXPECT_FALSE(is_golden(image, "a", folders)) << "no golden picture";
+  EXPECT_FALSE(is_golden(image, "a", folders)) << "no golden image";
   EXPECT_TRUE(std::filesystem::exists(folders.failures / "a.actual.png"));
   ASSERT_TRUE(write_png(Image{1, 2, image.rgb}, folders.golden / "a.png"));
   EXPECT_FALSE(is_golden(image, "a", folders)) << "as many pixels, but another size";

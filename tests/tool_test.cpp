@@ -408,9 +408,9 @@ TEST_F(Tool, TheInputIsNotReplacedByACompanion) {
     EXPECT_FALSE(exists(out));
   }
   EXPECT_FALSE(exists("foo.obj"));
-  std::ofstream(folder_.file("castle.png")) << "a picture";
+  std::ofstream(folder_.file("castle.png")) << "an image";
   ASSERT_EQ(run("convert tiny.vox castle.obj").status, 0);
-  EXPECT_EQ(text_of(folder_.file("castle.png")), "a picture") << "an unrelated image of the same name is kept";
+  EXPECT_EQ(text_of(folder_.file("castle.png")), "an image") << "an unrelated image of the same name is kept";
 }
 
 TEST_F(Tool, HiddenInstancesAreMissedOnlyWhereTheyAreLeftOut) {

@@ -269,7 +269,7 @@ TEST(CpuBackend, ImagesBecomeFiner) {
   EXPECT_FALSE(watched.backend.take()) << "a frame is taken once";
 }
 
-TEST(CpuBackend, MovingPicturesAreNeverUnderAQuarterOfTheSizeHoweverSlow) {
+TEST(CpuBackend, MovingImagesAreNeverUnderAQuarterOfTheSizeHoweverSlow) {
   const LoadedScene loaded = small_scene();
   // No image is that fast.
   Watched watched(loaded.scene, 1e-9);

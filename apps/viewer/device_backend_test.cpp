@@ -127,7 +127,7 @@ bool comes(const std::function<bool()>& condition) {
   return true;
 }
 
-TEST_F(DeviceBackendTest, RaysSettleOnTheProcessorsPictureAndFollowEdits) {
+TEST_F(DeviceBackendTest, RaysSettleOnTheCpuImageAndFollowEdits) {
   Document document = small_document();
   const auto backend = backend_of(document);
   const ViewRequest request = request_for(document, DrawMode::Rays);
@@ -533,7 +533,7 @@ TEST_F(DeviceBackendTest, WhileADeviceOpensThereAreRaysAndEdits) {
   EXPECT_EQ(images.back().rgb, same.back().rgb);
 }
 
-TEST_F(DeviceBackendTest, MeshPicturesAreNeverUnderAQuarterOfTheSizeHoweverSlow) {
+TEST_F(DeviceBackendTest, MeshImagesAreNeverUnderAQuarterOfTheSizeHoweverSlow) {
   const Document document = small_document();
   DeviceBackendOptions options;
   options.cpu.threads = {2};
@@ -674,7 +674,7 @@ TEST_F(DeviceBackendTest, MemoryThatRunsOutIsAFaultLikeOthers) {
   EXPECT_FALSE(settle(backend).empty()) << "the processor stands in";
 }
 
-TEST_F(DeviceBackendTest, TheFirstPictureIsSoonThereHoweverSlowTheDevice) {
+TEST_F(DeviceBackendTest, TheFirstImageIsSoonThereHoweverSlowTheDevice) {
   const Document document = small_document();
   const auto backend = backend_of(document);
   ViewRequest request = request_for(document, DrawMode::Rays);

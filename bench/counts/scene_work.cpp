@@ -27,7 +27,7 @@ RenderOptions small_image(bool lit) {
 
 void take(const World& world, bool lit) {
   if (world.renderer.render(workloads::over_the_terrain(), small_image(lit), {1})) return;
-  std::fprintf(stderr, "counts: a picture failed\n");
+  std::fprintf(stderr, "counts: a render failed\n");
   std::exit(1);
 }
 
@@ -36,8 +36,8 @@ void take(const World& world, bool lit) {
 std::vector<Counted> scene_work() {
   const auto world = std::make_shared<World>();
   Grid* const grid = &world->scene.edit(world->scene.grids().handles().front()).grid;  // its address is stable
-  return {{"picture/lit", [=] { take(*world, true); }},
-          {"picture/unlit", [=] { take(*world, false); }},
+  return {{"image/lit", [=] { take(*world, true); }},
+          {"image/unlit", [=] { take(*world, false); }},
           {"grid/get",
            [=] {
              GridReader reader(*grid);

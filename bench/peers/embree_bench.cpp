@@ -343,7 +343,7 @@ void paths(benchmark::State& state) {
     const Vec3 mean = tracer.image(camera, options, sky);
     const double difference = glm::length(DVec3(mean) - expected) / glm::length(expected);
     // Some rays slip through T-junctions of merged faces.
-    workloads::fail_unless(difference < 5e-3, "the difference of pictures, in millionths,",
+    workloads::fail_unless(difference < 5e-3, "the difference of images, in millionths,",
                            std::llround(difference * 1e6));
     rays = tracer.rays();
   }

@@ -22,32 +22,32 @@ namespace {
 using Voxels = std::map<std::tuple<int, int, int>, VoxelType>;
 
 // A grid and its expected voxels.
-struct Twin {
+struct CheckedGrid {
   Grid grid;
   Voxels voxels;
 };
 
-void set_both(Twin& twin, IVec3 at, VoxelType type) {
-  twin.grid.set(at, type);
+void set_both(CheckedGrid& checked, IVec3 at, VoxelType type) {
+  checked.grid.set(at, type);
   if (type == kAir) {
-    twin.voxels.erase({at.x, at.y, at.z});
+    checked.voxels.erase({at.x, at.y, at.z});
   } else {
-    twin.voxels[{at.x, at.y, at.z}] = type;
+    checked.voxels[{at.x, at.y, at.z}] = type;
   }
 }
 
-void expect_equal(const Twin& twin) {
+void expect_equal(const CheckedGrid& checked) {
   Voxels found;
-  twin.grid.for_each([&](IVec3 at, VoxelType type) { found[{at.x, at.y, at.z}] = type; });
-  ASSERT_EQ(found, twin.voxels);
-  ASSERT_EQ(twin.grid.voxel_count(), static_cast<std::int64_t>(twin.voxels.size()));
+  checked.grid.for_each([&](IVec3 at, VoxelType type) { found[{at.x, at.y, at.z}] = type; });
+  ASSERT_EQ(found, checked.voxels);
+  ASSERT_EQ(checked.grid.voxel_count(), static_cast<std::int64_t>(checked.voxels.size()));
   IBox bounds;
-  for (const auto& [at, type] : twin.voxels) {
+  for (const auto& [at, type] : checked.voxels) {
     const IVec3 v{std::get<0>(at), std::get<1>(at), std::get<2>(at)};
     bounds = unite(bounds, {v, v + 1});
-    ASSERT_EQ(twin.grid.get(v), type);
+    ASSERT_EQ(checked.grid.get(v), type);
   }
-  ASSERT_EQ(twin.grid.bounds(), bounds);
+  ASSERT_EQ(checked.grid.bounds(), bounds);
 }
 
 // Edits and destroys snapshots of snapshots in random order.
@@ -61,18 +61,18 @@ TEST(Snapshot, EditsLeaveAllOtherSnapshotsAsTheyWere) {
       const int spread = random() % 8 == 0 ? 100'000 : 300;
       return static_cast<int>(random() % static_cast<unsigned>(2 * spread)) - spread;
     };
-    std::vector<Twin> twins(1);
+    std::vector<CheckedGrid> all(1);
     for (int round = 0; round < 1'500; ++round) {
-      Twin& one = twins[below(twins.size())];
+      CheckedGrid& one = all[below(all.size())];
       switch (random() % 12) {
         case 0:
-          if (twins.size() < 7) {
-            Twin copy{one.grid.snapshot(), one.voxels};
-            twins.push_back(std::move(copy));
+          if (all.size() < 7) {
+            CheckedGrid copy{one.grid.snapshot(), one.voxels};
+            all.push_back(std::move(copy));
           }
           break;
         case 1:
-          if (twins.size() > 1) twins.erase(twins.begin() + static_cast<std::ptrdiff_t>(below(twins.size())));
+          if (all.size() > 1) all.erase(all.begin() + static_cast<std::ptrdiff_t>(below(all.size())));
           break;
         case 2:
           one.grid.compact();
@@ -95,7 +95,7 @@ TEST(Snapshot, EditsLeaveAllOtherSnapshotsAsTheyWere) {
           }
       }
       if (round % 50 == 49) {
-        for (const Twin& each : twins) ASSERT_NO_FATAL_FAILURE(expect_equal(each));
+        for (const CheckedGrid& each : all) ASSERT_NO_FATAL_FAILURE(expect_equal(each));
       }
     }
   }

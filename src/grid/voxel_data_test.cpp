@@ -51,7 +51,7 @@ HeldVoxels voxels_of(const Grid& grid) {
 }
 
 // A grid and a slow, simple model of it.
-struct DataTwin {
+struct CheckedDataGrid {
   Grid grid;
   HeldVoxels voxels;
 
@@ -78,19 +78,19 @@ struct DataTwin {
   }
 };
 
-void expect_equal_data(const DataTwin& twin) {
-  ASSERT_EQ(voxels_of(twin.grid), twin.voxels);
+void expect_equal_data(const CheckedDataGrid& checked) {
+  ASSERT_EQ(voxels_of(checked.grid), checked.voxels);
   std::vector<Key> with_data;
-  for (const auto& [key, held] : twin.voxels) {
+  for (const auto& [key, held] : checked.voxels) {
     if (held.state != 0 || !held.bytes.empty()) with_data.push_back(key);
   }
   std::vector<Key> visited;
-  twin.grid.for_each_data([&](IVec3 at, VoxelType type, const VoxelData& data) {
-    ASSERT_EQ(type, twin.grid.get(at));
-    ASSERT_EQ(data, twin.grid.data(at));
+  checked.grid.for_each_data([&](IVec3 at, VoxelType type, const VoxelData& data) {
+    ASSERT_EQ(type, checked.grid.get(at));
+    ASSERT_EQ(data, checked.grid.data(at));
     visited.push_back(key_of(at));
   });
-  ASSERT_EQ(twin.grid.data_count(), static_cast<std::int64_t>(with_data.size()));
+  ASSERT_EQ(checked.grid.data_count(), static_cast<std::int64_t>(with_data.size()));
   std::ranges::sort(visited);
   ASSERT_EQ(visited, with_data);
 }
@@ -114,32 +114,32 @@ class RandomEdits {
     return std::vector<std::byte>(random_() % 3 == 0 ? random_() % 9 : 0, std::byte(random_()));
   }
 
-  void edit(DataTwin& twin) {
+  void edit(CheckedDataGrid& checked) {
     switch (up_to(7)) {
       case 0:
-        return twin.set(place(), type());
+        return checked.set(place(), type());
       case 1:
       case 2:
       case 3: {
         const std::vector<std::byte> made = bytes();
         const std::uint32_t state = up_to(3) == 0 ? 0 : random_();
-        return twin.set_data(place(), {state, made});
+        return checked.set_data(place(), {state, made});
       }
       case 4: {
         const IBox filled = box();
         const VoxelType to = type();
-        twin.grid.fill_box(filled, to);
-        return for_each_in(filled, [&](IVec3 at) { twin.note(at, to); });
+        checked.grid.fill_box(filled, to);
+        return for_each_in(filled, [&](IVec3 at) { checked.note(at, to); });
       }
       case 5: {
         std::array<VoxelType, kChunkEdge> row{};
         for (VoxelType& each : row) each = type();
         const IVec3 at = place();
         const std::uint64_t mask = std::uint64_t{random_()} << 32 | random_();
-        twin.grid.write_row(at, mask, row);
+        checked.grid.write_row(at, mask, row);
         const int first = at.x & ~(kChunkEdge - 1);
         for (int i = 0; i < kChunkEdge; ++i) {
-          if ((mask >> i & 1U) != 0) twin.note({first + i, at.y, at.z}, row[static_cast<std::size_t>(i)]);
+          if ((mask >> i & 1U) != 0) checked.note({first + i, at.y, at.z}, row[static_cast<std::size_t>(i)]);
         }
         return;
       }
@@ -148,9 +148,9 @@ class RandomEdits {
         const std::vector<std::byte> made = bytes();
         const VoxelType to = type();
         const std::uint32_t state = random_();
-        twin.grid.set(at, to, {state, made});
-        twin.note(at, to);
-        if (to != kAir) twin.voxels[key_of(at)] = {to, state, made};
+        checked.grid.set(at, to, {state, made});
+        checked.note(at, to);
+        if (to != kAir) checked.voxels[key_of(at)] = {to, state, made};
       }
     }
   }
@@ -172,17 +172,17 @@ TEST(VoxelData, FollowsItsVoxelsThroughEditsAndSnapshots) {
   for (unsigned seed = 1; seed <= 8; ++seed) {
     SCOPED_TRACE(seed);
     RandomEdits edits(seed);
-    std::vector<DataTwin> twins(1);
+    std::vector<CheckedDataGrid> all(1);
     for (int i = 0; i < 400; ++i) {
-      DataTwin& twin = twins[static_cast<std::size_t>(edits.up_to(static_cast<int>(twins.size())))];
-      if (i % 60 == 30 && twins.size() < 5) {
-        DataTwin copy{twin.grid.snapshot(), twin.voxels};
-        twins.push_back(std::move(copy));
+      CheckedDataGrid& checked = all[static_cast<std::size_t>(edits.up_to(static_cast<int>(all.size())))];
+      if (i % 60 == 30 && all.size() < 5) {
+        CheckedDataGrid copy{checked.grid.snapshot(), checked.voxels};
+        all.push_back(std::move(copy));
         continue;
       }
-      edits.edit(twin);
+      edits.edit(checked);
     }
-    for (const DataTwin& twin : twins) expect_equal_data(twin);
+    for (const CheckedDataGrid& checked : all) expect_equal_data(checked);
   }
 }
 
@@ -286,7 +286,7 @@ TEST(VoxelDataChanges, TellOfEveryVoxelThatDiffers) {
   for (unsigned seed = 1; seed <= 6; ++seed) {
     SCOPED_TRACE(seed);
     RandomEdits edits(seed);
-    DataTwin twin;
+    CheckedDataGrid checked;
     struct Consumer {
       ChangeCursor types, data;
       Grid before;
@@ -294,25 +294,25 @@ TEST(VoxelDataChanges, TellOfEveryVoxelThatDiffers) {
     };
     std::vector<Consumer> consumers(3);
     for (int i = 0; i < 300; ++i) {
-      edits.edit(twin);
+      edits.edit(checked);
       Consumer& consumer = consumers[static_cast<std::size_t>(edits.up_to(60)) % 20 % 3];
       if (edits.up_to(5) != 0) continue;
       std::map<Key, std::uint32_t> expected;
-      for (const auto& each : {&consumer.voxels, &twin.voxels}) {
+      for (const auto& each : {&consumer.voxels, &checked.voxels}) {
         for (const auto& [key, held] : *each) {
           const auto a = consumer.voxels.find(key);
-          const auto b = twin.voxels.find(key);
+          const auto b = checked.voxels.find(key);
           const Held none;
           const Held& old_held = a == consumer.voxels.end() ? none : a->second;
-          const Held& new_held = b == twin.voxels.end() ? none : b->second;
+          const Held& new_held = b == checked.voxels.end() ? none : b->second;
           if (old_held.state != new_held.state || old_held.bytes != new_held.bytes) expected[key] = new_held.state;
         }
       }
-      const bool is_reported = twin.grid.has_data_changed_since(consumer.data);
-      const DataChanges changes = twin.grid.data_changes_since(consumer.data);
+      const bool is_reported = checked.grid.has_data_changed_since(consumer.data);
+      const DataChanges changes = checked.grid.data_changes_since(consumer.data);
       ASSERT_EQ(is_reported, !changes.empty());
       std::map<Key, std::uint32_t> found;
-      visit_data_changes(consumer.before, twin.grid, changes, [&](IVec3 at, const VoxelData& a, const VoxelData& b) {
+      visit_data_changes(consumer.before, checked.grid, changes, [&](IVec3 at, const VoxelData& a, const VoxelData& b) {
         ASSERT_NE(a, b);
         ASSERT_TRUE(changes.all || std::ranges::any_of(changes.items, [&](const DataChange& change) {
                       return change.chunk == chunk_of(at) && change.box.contains(local_of(at));
@@ -320,10 +320,10 @@ TEST(VoxelDataChanges, TellOfEveryVoxelThatDiffers) {
         found[key_of(at)] = b.state;
       });
       ASSERT_EQ(found, expected);
-      const bool has_types = twin.grid.has_changed_since(consumer.types);
-      ASSERT_EQ(has_types, !twin.grid.changes_since(consumer.types).empty());
-      consumer.before = twin.grid.snapshot();
-      consumer.voxels = twin.voxels;
+      const bool has_types = checked.grid.has_changed_since(consumer.types);
+      ASSERT_EQ(has_types, !checked.grid.changes_since(consumer.types).empty());
+      consumer.before = checked.grid.snapshot();
+      consumer.voxels = checked.voxels;
     }
   }
 }
@@ -344,8 +344,8 @@ TEST(VoxelDataCopies, ArriveTurnedWithTheirVoxels) {
   for (unsigned seed = 1; seed <= 24; ++seed) {
     SCOPED_TRACE(seed);
     RandomEdits edits(seed);
-    DataTwin from;
-    DataTwin to;
+    CheckedDataGrid from;
+    CheckedDataGrid to;
     for (int i = 0; i < 150; ++i) edits.edit(from);
     for (int i = 0; i < 150; ++i) edits.edit(to);
     const AxisOrientation turn = AxisOrientation::at(edits.up_to(AxisOrientation::kCount));

@@ -513,7 +513,7 @@ TEST(MeshFiles, APlacementOfNoPartIsRefused) {
 
 TEST(MeshFiles, TheFormatIsThePathSOrTheOptionS) {
   const TestFolder folder("mesh_file_format");
-  EXPECT_TRUE(write_mesh({}, folder.file("picture"), {.format = FileFormat::Ply}));
+  EXPECT_TRUE(write_mesh({}, folder.file("image"), {.format = FileFormat::Ply}));
   for (const char* name : {"out.png", "out.vox", "out"}) {
     const auto refused = write_mesh({}, folder.file(name));
     ASSERT_FALSE(refused);

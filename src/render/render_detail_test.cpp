@@ -480,7 +480,7 @@ TEST(RenderDetail, NoViewTremblesAtAnyThreshold) {
       EXPECT_EQ(with_memory.size(), 1U) << threshold;
       changes_without += static_cast<int>(without.size()) - 1;
     }
-    EXPECT_GE(changes_without, 2) << "each picture by itself has no memory";
+    EXPECT_GE(changes_without, 2) << "each image by itself has no memory";
   }
 }
 

@@ -552,8 +552,8 @@ def check_colours(quoin, folder):
     for edge in (8, 264):  # the larger square has more colours than there are types
         empty()
         mesh, layer, places = plane(edge)
-        material, node = painted("picture", "ShaderNodeTexImage")
-        node.image = bpy.data.images.new("picture", edge, edge)
+        material, node = painted("image", "ShaderNodeTexImage")
+        node.image = bpy.data.images.new("image", edge, edge)
         node.interpolation = "Closest"
         pixels = np.ones((edge * edge, 4), np.float32)
         number = np.arange(edge * edge)
@@ -567,8 +567,8 @@ def check_colours(quoin, folder):
             require(len(colours()) > 1000, f"{len(colours())} colours")
     empty()
     mesh, layer, places = plane(8)
-    material, node = painted("picture", "ShaderNodeTexImage")
-    node.image = bpy.data.images.new("picture", 4, 4, float_buffer=False)
+    material, node = painted("image", "ShaderNodeTexImage")
+    node.image = bpy.data.images.new("image", 4, 4, float_buffer=False)
     mesh.materials.append(material)
     places = np.full_like(places, -1e-9)
     places[4:8] = np.nan

@@ -7,9 +7,9 @@ set -euo pipefail
 miner="$(realpath "$1")"
 . "$(dirname "$(realpath "$0")")/../on_screen.sh"
 on_screen 960x540 "import convert" "$0" "$@"
-pictures="${2:-$work}"
+images="${2:-$work}"
 device="${3:-}"
-mkdir -p "$pictures"
+mkdir -p "$images"
 
 # Prints a value from the window title: x, y, z, sky, lamps or fallen
 said() {
@@ -20,12 +20,12 @@ is() { local now; now="$(said "$1")"; [ -n "$now" ] && [ "$now" "$2" "$3" ]; }
 # Usage: look DOWN, in hundredths of a radian
 look() { xdotool mousemove_relative --sync -- 0 "$(($1 * 10 / 3))" || true; sleep 0.3; }
 hold() { xdotool keydown "$1"; sleep "$2"; xdotool keyup "$1"; }
-shot() { sleep 0.5; import -window root "$pictures/$1.png"; }
+shot() { sleep 0.5; import -window root "$images/$1.png"; }
 # Prints the mean of an image channel, 0 to 255. Usage: mean NAME CHANNEL
-mean() { convert "$pictures/$1.png" -format "%[fx:round(255*mean.$2)]" info:; }
+mean() { convert "$images/$1.png" -format "%[fx:round(255*mean.$2)]" info:; }
 
 # Counts the pixels that differ between two images.
-other() { convert "$pictures/$1.png" "$pictures/$2.png" -compose difference -composite -colorspace gray -threshold 8% -format '%[fx:round(mean*w*h)]' info:; }
+other() { convert "$images/$1.png" "$images/$2.png" -compose difference -composite -colorspace gray -threshold 8% -format '%[fx:round(mean*w*h)]' info:; }
 
 start() {
   launch Miner "$miner" --units 4 --edits 0 ${device:+--device "$device"} "$@"

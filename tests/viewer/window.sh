@@ -25,11 +25,11 @@ stop() {
   quit ctrl+q
   ! grep -qi 'validation' log || fail "the validation layer has complaints"
 }
-# Saves the finished image as NAME. Usage: picture NAME
-picture() {
+# Saves the finished image as NAME. Usage: save_image NAME
+save_image() {
   rm -f world-*.png
   xdotool key --delay 80 F12
-  until_true 120 test -s world-1.png || fail "F12 gives no picture ($1)"
+  until_true 120 test -s world-1.png || fail "F12 gives no image ($1)"
   mv world-1.png "$1"
 }
 # Saves images as NAME until one equals LIKE. Presses the key again in between, since on a busy machine earlier key
@@ -37,7 +37,7 @@ picture() {
 image_becomes() {
   local tries
   for tries in 1 2 3 4 5 6 7 8; do
-    picture "$1"
+    save_image "$1"
     ! cmp -s "$1" "$2" || return 0
     sleep 0.5
     [ -z "${3:-}" ] || xdotool key --delay 80 "$3"
@@ -75,18 +75,18 @@ echo "{\"width\": 640, \"height\": 400, \"samples\": $samples}" >config/quoin/vi
 echo "open"
 start world.vox
 # On a busy machine the window may not have its size yet.
-picture opened.png
+save_image opened.png
 for _ in 1 2 3 4 5 6 7 8; do
   xdotool key --delay 80 Home
   sleep 0.5
-  picture again.png
+  save_image again.png
   ! cmp -s opened.png again.png || break
   mv again.png opened.png
 done
 
 echo "fly"
 xdotool keydown w; sleep 0.5; xdotool keyup w; sleep 0.7
-picture flown.png
+save_image flown.png
 ! cmp -s opened.png flown.png || fail "W does not move the camera"
 xdotool key --delay 80 Home
 image_becomes home.png opened.png Home || fail "Home does not come back to the first view"
@@ -94,7 +94,7 @@ image_becomes home.png opened.png Home || fail "Home does not come back to the f
 echo "orbit"
 xdotool mousemove 180 220
 drag 3 15 3
-picture turned.png
+save_image turned.png
 ! cmp -s home.png turned.png || fail "the right button does not turn"
 xdotool key --delay 80 Home
 xdotool mousemove 180 220
@@ -103,7 +103,7 @@ sleep 0.5
 echo "the image shows the view at the time of the request"
 image_becomes before.png home.png Home || fail "Home does not come back"
 xdotool key --delay 1 F12 shift+5
-until_true 120 test -s world-1.png || fail "F12 gives no picture (before another view)"
+until_true 120 test -s world-1.png || fail "F12 gives no image (before another view)"
 mv world-1.png pressed.png
 cmp -s before.png pressed.png || fail "F12 saves the view that came after it"
 xdotool key --delay 80 Home
@@ -113,11 +113,11 @@ echo "edit, undo, redo"
 xdotool key --delay 80 3 bracketright bracketright
 drag 1 6 2
 until_true 20 title_is "* world.vox - Quoin" || fail "the edit leaves no mark in the title"
-picture edited.png
+save_image edited.png
 ! cmp -s home.png edited.png || fail "the edit is not seen"
 xdotool key --delay 80 ctrl+z
 until_true 20 title_is "world.vox - Quoin" || fail "undo does not bring back the saved state"
-image_becomes undone.png home.png || fail "undo does not bring back the picture"
+image_becomes undone.png home.png || fail "undo does not bring back the image"
 xdotool key --delay 80 ctrl+y
 image_becomes redone.png edited.png || fail "redo does not bring back the edit"
 
@@ -129,12 +129,12 @@ if "$quoin" render castle.vox --size 32x32 --backend vulkan -o probe.png >/dev/n
   echo "meshes follow edits"
   xdotool key --delay 80 F6
   sleep 0.5
-  picture blocks.png
+  save_image blocks.png
   ! cmp -s home.png blocks.png || fail "F6 draws no meshes"
   xdotool mousemove 180 220
   drag 1 6 2
   until_true 20 title_is "* world.vox - Quoin" || fail "no edit among meshes"
-  picture blocks_edited.png
+  save_image blocks_edited.png
   ! cmp -s blocks.png blocks_edited.png || fail "the meshes do not follow the edit"
   xdotool key --delay 80 ctrl+z
   image_becomes blocks_undone.png blocks.png || fail "the meshes do not follow the undo"
@@ -148,7 +148,7 @@ if "$quoin" render castle.vox --size 32x32 --backend vulkan -o probe.png >/dev/n
   for key in F8 F9 F7; do
     xdotool key --delay 80 "$key"
     sleep 0.5
-    picture next.png
+    save_image next.png
     ! cmp -s blocks.png next.png || fail "$key changes nothing"
     mv next.png blocks.png
   done
@@ -156,7 +156,7 @@ if "$quoin" render castle.vox --size 32x32 --backend vulkan -o probe.png >/dev/n
   image_becomes rays.png home.png F5 || fail "F5 does not bring back the rays"
   xdotool key --delay 80 F3
   sleep 2
-  picture paths.png
+  save_image paths.png
   ! cmp -s home.png paths.png || fail "F3 does not draw paths of light"
   xdotool key --delay 80 F5
   image_becomes rays.png home.png F5 || fail "F5 does not end the paths"
@@ -169,7 +169,7 @@ sleep 0.3
 xdotool click 1
 xdotool mousemove 180 220
 drag 1 6 2
-picture painted.png
+save_image painted.png
 ! cmp -s home.png painted.png || fail "the paint is not seen"
 ! cmp -s edited.png painted.png || fail "painting removes"
 xdotool key --delay 80 ctrl+z
@@ -190,7 +190,7 @@ echo "resize, help, panel"
 xdotool windowsize "$window" 500 300
 sleep 0.5
 xdotool key --delay 80 F1 F1 F2
-picture small.png
+save_image small.png
 stop
 
 echo "settings are remembered"
@@ -227,13 +227,13 @@ echo '{"width": 640, "height": 400, "samples": 1, "panel": false}' >config/quoin
 if "$quoin" generate terrain world.quoin --endless >/dev/null 2>no_worlds; then
   cp world.quoin before.quoin
   start world.quoin --distance 200 --memory 128
-  picture flown.png
+  save_image flown.png
   xdotool mousemove 320 300
   sleep 0.5
   xdotool key --delay 80 3
   xdotool click 1
   sleep 2
-  picture dug.png
+  save_image dug.png
   ! cmp -s flown.png dug.png || fail "nothing was removed from the world"
   title_is "world.quoin - Quoin" || fail "an edit of a world on disk waits to be saved"
   stop
@@ -248,9 +248,9 @@ else
   cat no_worlds
 fi
 
-echo "another file, and the picture of the settled window is the renderer's"
+echo "another file, and the image of the settled window is the renderer's"
 "$quoin" view castle.vox --bare --size 320x240 --screenshot window.png --backend "$backend" >log 2>&1
 "$quoin" render castle.vox --size 320x240 --samples 16 -o render.png --backend "$backend" >/dev/null
-cmp window.png render.png || fail "the window shows another picture than quoin render"
+cmp window.png render.png || fail "the window shows another image than quoin render"
 ! grep -qi 'validation' log || fail "the validation layer has complaints"
 echo "passed"

@@ -101,7 +101,7 @@ enum class View : std::uint8_t { Front, Back, Left, Right, Top, Iso };
 [[nodiscard]] Camera frame_scene(const Scene& scene, View view, double aspect,
                                  InstanceFilter filter = InstanceFilter::Visible);
 
-/// Frames several scenes with one shared distance: the frames of a film, or views of one scene from all sides. Each
+/// Frames several scenes with one shared distance: the frames of a video, or views of one scene from all sides. Each
 /// camera is as close as `frame_scene` allows while every scene stays inside the image.
 ///
 ///   SceneFraming framing(direction_of(View::Iso), aspect, 36);

@@ -107,13 +107,13 @@ TEST(GltfLook, DoesNotGlowWithoutTheEmissiveImage) {
 // tinygltf reads on beyond the buffer.
 TEST(GltfLook, LeavesOutImagesThatEndBeyondTheirBuffer) {
   if (!can(FileFormat::Gltf, FormatCapability::Read)) GTEST_SKIP() << "the build reads no glTF";
-  std::string gltf = square_gltf(R"({"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}})", {"picture"});
+  std::string gltf = square_gltf(R"({"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}})", {"bricks"});
   const auto replace = [&](const std::string& from, const std::string& to) {
     ASSERT_NE(gltf.find(from), std::string::npos) << from;
     gltf.replace(gltf.find(from), from.size(), to);
   };
   const std::string last_view = R"({"buffer":0,"byteOffset":48,"byteLength":32})";
-  replace(R"("uri":"picture")", R"("name":"picture","mimeType":"image/png","bufferView":2)");
+  replace(R"("uri":"bricks")", R"("name":"bricks","mimeType":"image/png","bufferView":2)");
   for (const std::string place : {R"("byteOffset":5616,"byteLength":89)", R"("byteOffset":48,"byteLength":33)",
                                   R"("byteOffset":81,"byteLength":1)", R"("byteOffset":4294967295,"byteLength":9)"}) {
     const std::string before = gltf;
@@ -122,7 +122,7 @@ TEST(GltfLook, LeavesOutImagesThatEndBeyondTheirBuffer) {
     ASSERT_TRUE(mesh) << place << ": " << to_string(mesh.error());
     EXPECT_TRUE(mesh->mesh.textures.empty()) << place;
     ASSERT_EQ(mesh->warnings.size(), 1U) << place;
-    EXPECT_NE(mesh->warnings[0].find("picture"), std::string::npos) << mesh->warnings[0];
+    EXPECT_NE(mesh->warnings[0].find("bricks"), std::string::npos) << mesh->warnings[0];
     gltf = before;
   }
 }

@@ -139,7 +139,7 @@ TEST_F(GltfMaterials, GlassSaysWhatABodyOfItsThicknessDoesToLight) {
 
 // Compares the transmitted background and the body's own colour, for clients with and without transmission, with
 // Quoin's images.
-TEST_F(GltfMaterials, ClientsWithAndWithoutTransmissionComeCloseToPictures) {
+TEST_F(GltfMaterials, ClientsWithAndWithoutTransmissionComeCloseToRenderedImages) {
   add_glass_and_water(scene_);
   const auto meshes = mesh_scene(scene_);
   const MaterialPalette palette(*meshes);

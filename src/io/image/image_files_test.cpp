@@ -33,7 +33,7 @@ Image noise(int width, int height, unsigned seed) {
 class ImageFiles : public ::testing::Test {
  protected:
   std::filesystem::path file(const std::string& name) { return folder_.file(name); }
-  TestFolder folder_{std::string("pictures_") + ::testing::UnitTest::GetInstance()->current_test_info()->name()};
+  TestFolder folder_{std::string("images_") + ::testing::UnitTest::GetInstance()->current_test_info()->name()};
 };
 
 TEST_F(ImageFiles, APngReadsAsItWasWritten) {
@@ -100,7 +100,7 @@ TEST_F(ImageFiles, ABrokenPfmSaysWhere) {
   EXPECT_EQ(error("Pf\n268435456 268435456\n-1\n"), "byte 26: it claims 268435456 x 268435456 pixels but holds 0");
 }
 
-TEST_F(ImageFiles, EveryInputOfThePngCorpusGivesAPictureOrAnError) {
+TEST_F(ImageFiles, EveryInputOfThePngCorpusGivesAnImageOrAnError) {
   int inputs = 0;
   int images = 0;
   for (const auto& entry : std::filesystem::directory_iterator(QUOIN_SOURCE_DIR "/tests/corpus/png")) {
@@ -116,7 +116,7 @@ TEST_F(ImageFiles, EveryInputOfThePngCorpusGivesAPictureOrAnError) {
   EXPECT_GT(images, 4);
 }
 
-TEST_F(ImageFiles, EveryInputOfThePfmCorpusGivesAPictureOrAnError) {
+TEST_F(ImageFiles, EveryInputOfThePfmCorpusGivesAnImageOrAnError) {
   int inputs = 0;
   for (const auto& entry : std::filesystem::directory_iterator(QUOIN_SOURCE_DIR "/tests/corpus/pfm")) {
     const auto bytes = read_file(entry.path());
@@ -163,7 +163,7 @@ TEST_F(ImageFiles, ImpossibleImagesAndPathsAreErrors) {
   EXPECT_EQ(write_png(noise(1, 1, 1), file("no/a.png")).error().code, ErrorCode::CannotWrite);
   EXPECT_EQ(write_pfm({1, 1, {1}}, file("no/a.pfm")).error().code, ErrorCode::CannotWrite);
   EXPECT_EQ(read_png(file("a.png")).error().code, ErrorCode::CannotRead);
-  ASSERT_TRUE(write_file(bytes_of("no picture"), file("a.png")));
+  ASSERT_TRUE(write_file(bytes_of("no image"), file("a.png")));
   EXPECT_EQ(read_png(file("a.png")).error().path, file("a.png").string());
   EXPECT_EQ(read_pfm(file("a.png")).error().path, file("a.png").string());
 }

@@ -188,7 +188,7 @@ void far1000(benchmark::State& state, bool impostors) {
   fail_unless(first.has_value() && first->pixels_hit > 100'000, "too little is seen");
   std::vector<SelectedInstance> selected;
   DetailSelector().select(scene, camera, options.width, options.height, DetailPolicy{}, selected);
-  fail_unless(selected.size() > 950, "too few are in the picture");
+  fail_unless(selected.size() > 950, "too few are in the image");
   for (const SelectedInstance& each : selected) fail_unless(each.detail == Detail::Far, "an instance is not far");
   for (auto _ : state) benchmark::DoNotOptimize(renderer.render(camera, options, {1}));
   state.counters["pixels_hit"] = static_cast<double>(first->pixels_hit);

@@ -187,11 +187,11 @@ TEST(DrawImpostors, OrderDoesNotMatterAndTheLowerHandleWinsAtEqualDepth) {
   grid.pivot = DVec3(20.5);
   const Impostor grey = Impostor::build(grid.grid, world.scene.types);
   other.grid = world.scene.add_grid(std::move(grid));
-  const InstanceHandle twin = world.scene.add_instance(other);
+  const InstanceHandle second = world.scene.add_instance(other);
   other.position = {25, 3, 7};
   other.rotation = glm::angleAxis(0.7, DVec3(0, 0, 1));
   const InstanceHandle adjacent = world.scene.add_instance(other);
-  std::vector<FarInstance> far = {{world.instance, &world.impostor}, {twin, &grey}, {adjacent, &grey}};
+  std::vector<FarInstance> far = {{world.instance, &world.impostor}, {second, &grey}, {adjacent, &grey}};
   const RenderOptions options = sized(120, 120);
   const Camera camera = orbiting(world, 0.7, 0.4, 0.0, 60.0, 120);
   const SceneTracer tracer(world.scene);
@@ -205,7 +205,7 @@ TEST(DrawImpostors, OrderDoesNotMatterAndTheLowerHandleWinsAtEqualDepth) {
   EXPECT_EQ(images[0].depth.values, images[1].depth.values);
   const Likeness found = likeness(taken(world.scene, camera, options), images[0]);
   EXPECT_GE(found.overlap, 0.99);
-  EXPECT_LE(found.difference, 2.0) << "the traced picture shows the lower handle's colours";
+  EXPECT_LE(found.difference, 2.0) << "the traced image shows the lower handle's colours";
 }
 
 TEST(DrawImpostors, HostilePlacesNeitherHangNorCrash) {

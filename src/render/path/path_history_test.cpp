@@ -169,7 +169,7 @@ TEST_F(PathHistoryTest, EndsWithTheImageOfANewTracer) {
   EXPECT_FALSE(history_.has_earlier()) << "the new image has as many samples as the earlier one";
 }
 
-TEST_F(PathHistoryTest, AnEditTakenBackHasThePictureOfBeforeWithTheFirstSample) {
+TEST_F(PathHistoryTest, AnUndoneEditHasTheEarlierImageAtTheFirstSample) {
   converge();
   const PathImage before = take(kEdge, kSamples.back());
   edit(2);

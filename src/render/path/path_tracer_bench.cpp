@@ -22,10 +22,10 @@ void time_paths(benchmark::State& state, const Scene& scene, PathOptions options
   options.max_bounces = 4;
   const Camera camera = frame_view(scene.bounds(), View::Iso, 16.0 / 9.0);
   std::int64_t rays = 0;
-  fail_unless(tracer.render(camera, options, {1}).has_value(), "a picture", 0);  // builds the sky once
+  fail_unless(tracer.render(camera, options, {1}).has_value(), "an image", 0);  // builds the sky once
   for (auto _ : state) {
     const auto image = tracer.render(camera, options, {1});
-    fail_unless(image.has_value() && image->rays > 0, "a picture", 0);
+    fail_unless(image.has_value() && image->rays > 0, "an image", 0);
     rays += image->rays;
   }
   state.counters["rays"] = benchmark::Counter(static_cast<double>(rays), benchmark::Counter::kIsRate);

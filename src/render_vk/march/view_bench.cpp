@@ -73,8 +73,8 @@ void on_device(benchmark::State& state, const World& world, const RenderOptions&
   fail_unless(renderer->update(world.scene).has_value(), "the update's success", 0);
   VulkanImage image(*renderer);
   for (auto _ : state) {
-    fail_unless(renderer->draw(image, world.camera, options, Accumulation::Restart).has_value(),
-                "the picture's success", 0);
+    fail_unless(renderer->draw(image, world.camera, options, Accumulation::Restart).has_value(), "the image's success",
+                0);
   }
   state.SetLabel(renderer->device().name);
   count(state, image.rays());
@@ -85,7 +85,7 @@ void on_processor(benchmark::State& state, const World& world, const RenderOptio
   std::int64_t rays = 0;
   for (auto _ : state) {
     const auto image = renderer.render(world.camera, options);
-    fail_unless(image.has_value(), "the picture's success", 0);
+    fail_unless(image.has_value(), "the image's success", 0);
     rays = image->rays;
   }
   state.SetLabel(std::to_string(thread_count(Threads{})) + " threads");
