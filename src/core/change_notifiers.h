@@ -9,29 +9,29 @@
 
 namespace quoin {
 
-/// The edit notices of one container: lists which of its items were edited since the last `take`.
+/// The notifiers of one container: lists which of its items were edited since the last `take`.
 ///
-/// Threads: notices for different items may be given concurrently.
+/// Threads: notifiers of different items may notify concurrently.
 class ChangeNotifiers {
  public:
   ChangeNotifiers() = default;
   ChangeNotifiers(const ChangeNotifiers&) = delete;
   ChangeNotifiers& operator=(const ChangeNotifiers&) = delete;
 
-  /// Reserves memory for the number, so that neither following it nor giving its notice allocates.
+  /// Reserves memory for the number, so that neither following an item nor notifying allocates.
   void make_room(std::uint32_t index) {
     const std::lock_guard lock(mutex_);
     if (index < is_notified_.size()) return;
     given_.reserve(std::size_t{2} * index + 1);
     is_notified_.resize(std::size_t{2} * index + 1);
   }
-  /// Makes the notice report to this object under a number. Requires: this object outlives the notice.
-  void follow(ChangeNotifier& notice, std::uint32_t index) {
+  /// Makes the notifier report to this object under a number. Requires: this object outlives the notifier.
+  void follow(ChangeNotifier& notifier, std::uint32_t index) {
     make_room(index);
     const std::lock_guard lock(mutex_);
-    notice.to_ = this;
-    notice.index_ = index;
-    notice.is_notified_ = false;
+    notifier.to_ = this;
+    notifier.index_ = index;
+    notifier.is_notified_ = false;
   }
   /// Appends the numbers of the edited items. Each is reported again only after it is followed again.
   void take(std::vector<std::uint32_t>& taken) {

@@ -15,7 +15,7 @@ std::uint64_t next_serial() {
 }
 
 void ChangeNotifier::notify_first() {
-  QUOIN_ASSERT(to_ != nullptr, "a notice that is followed");
+  QUOIN_ASSERT(to_ != nullptr, "a followed notifier");
   to_->notify(index_);
   is_notified_ = true;
 }

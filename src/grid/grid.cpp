@@ -47,7 +47,7 @@ struct Grid::Impl {
   }
 
   // Records an edit of one chunk, notifies followers of the grid, and drops the chunk if it is empty.
-  void finish_edit(const IVec3& chunk, const ChunkTable::Slot& slot, VoxelEdit& edit, ChangeNotifier& notice) {
+  void finish_edit(const IVec3& chunk, const ChunkTable::Slot& slot, VoxelEdit& edit, ChangeNotifier& notifier) {
     QUOIN_ASSERT(slot.entry != nullptr && entries.find(chunk) == slot.entry, "the slot is the chunk's");
     // Runs before any step that may throw: the known storage may be freed.
     entries.voxels_changed(slot);
@@ -60,7 +60,7 @@ struct Grid::Impl {
       journal.begin_change();
       edit.record.chunk = chunk;
       note(slot.entry->serial, edit.record);
-      notice.notify();
+      notifier.notify();
     }
     const int voxels = non_air_count(slot.entry->chunk);
     voxel_count += voxels - slot.entry->counted;
@@ -70,7 +70,7 @@ struct Grid::Impl {
   }
 
   // Replaces the voxels of a chunk that was loaded or unloaded. The change is reported as a load, not as an edit.
-  void replace(const IVec3& chunk, Chunk voxels, ChangeNotifier& notice) {
+  void replace(const IVec3& chunk, Chunk voxels, ChangeNotifier& notifier) {
     if (non_air_count(voxels) == 0 && quoin::data_count(voxels) == 0 && entries.find(chunk) == nullptr) {
       VoxelRecord record;  // air replaces nothing: no chunk is created or removed
       record.chunk = chunk;
@@ -79,7 +79,7 @@ struct Grid::Impl {
       journal.begin_change();
       std::uint64_t serial = 0;
       note(serial, record);
-      return notice.notify();
+      return notifier.notify();
     }
     const ChunkTable::Slot slot = entries.find_or_create(chunk);
     VoxelEdit edit{.data_before = quoin::data_count(slot.entry->chunk)};
@@ -87,22 +87,22 @@ struct Grid::Impl {
     edit.record.is_edit = false;
     entries.voxels_will_change(slot);
     slot.entry->chunk = std::move(voxels);
-    finish_edit(chunk, slot, edit, notice);
+    finish_edit(chunk, slot, edit, notifier);
   }
 
   // Calls `change(chunk, voxels, part of the box in chunk coordinates, edit)` for every chunk of a box. Chunks that are
   // not there are created where `create`, left out otherwise.
   template <class Change>
-  std::int64_t edit_box(const LongBox& wanted, bool create, ChangeNotifier& notice, const Progress& progress,
+  std::int64_t edit_box(const LongBox& wanted, bool create, ChangeNotifier& notifier, const Progress& progress,
                         Change&& change);
   template <class Change>
-  std::int64_t edit_chunk(IVec3 chunk, const ChunkTable::Slot& slot, const IBox& part, ChangeNotifier& notice,
+  std::int64_t edit_chunk(IVec3 chunk, const ChunkTable::Slot& slot, const IBox& part, ChangeNotifier& notifier,
                           Change& change);
 };
 
 template <class Change>
-std::int64_t Grid::Impl::edit_chunk(IVec3 chunk, const ChunkTable::Slot& slot, const IBox& part, ChangeNotifier& notice,
-                                    Change& change) {
+std::int64_t Grid::Impl::edit_chunk(IVec3 chunk, const ChunkTable::Slot& slot, const IBox& part,
+                                    ChangeNotifier& notifier, Change& change) {
   QUOIN_ASSERT(slot.entry != nullptr && !part.empty() && intersect(part, kWholeChunk) == part, "a part of a chunk");
   VoxelEdit edit{.data_before = quoin::data_count(slot.entry->chunk)};
   entries.voxels_will_change(slot);
@@ -110,16 +110,16 @@ std::int64_t Grid::Impl::edit_chunk(IVec3 chunk, const ChunkTable::Slot& slot, c
     change(chunk, slot.entry->chunk, part, edit);
   } catch (...) {
     edit.add_all();
-    finish_edit(chunk, slot, edit, notice);
+    finish_edit(chunk, slot, edit, notifier);
     throw;
   }
-  finish_edit(chunk, slot, edit, notice);
+  finish_edit(chunk, slot, edit, notifier);
   return edit.voxels;
 }
 
 template <class Change>
-std::int64_t Grid::Impl::edit_box(const LongBox& wanted, bool create, ChangeNotifier& notice, const Progress& progress,
-                                  Change&& change) {
+std::int64_t Grid::Impl::edit_box(const LongBox& wanted, bool create, ChangeNotifier& notifier,
+                                  const Progress& progress, Change&& change) {
   const LongBox box = clipped(wanted);
   if (is_empty(box)) return 0;
   const IBox chunks = chunks_of(box);
@@ -129,7 +129,7 @@ std::int64_t Grid::Impl::edit_box(const LongBox& wanted, bool create, ChangeNoti
   if (create && loaded.is_partial()) {  // however large the box is
     const std::vector<IVec3> here = loaded.within(chunks);
     for (const IVec3 at : here) {
-      changed += edit_chunk(at, entries.find_or_create(at), part_of(box, at), notice, change);
+      changed += edit_chunk(at, entries.find_or_create(at), part_of(box, at), notifier, change);
       if (!goes_on(static_cast<double>(here.size()))) return changed;
     }
     return changed;
@@ -140,7 +140,7 @@ std::int64_t Grid::Impl::edit_box(const LongBox& wanted, bool create, ChangeNoti
       for (int y = chunks.min.y; y < chunks.max.y; ++y) {
         for (int x = chunks.min.x; x < chunks.max.x; ++x) {
           const IVec3 at{x, y, z};
-          changed += edit_chunk(at, entries.find_or_create(at), part_of(box, at), notice, change);
+          changed += edit_chunk(at, entries.find_or_create(at), part_of(box, at), notifier, change);
           if (!goes_on(size.x * size.y * size.z)) return changed;
         }
       }
@@ -151,7 +151,7 @@ std::int64_t Grid::Impl::edit_box(const LongBox& wanted, bool create, ChangeNoti
   entries.for_each_in(chunks, [&](IVec3 at, const ChunkEntry&) { present.push_back(at); });
   std::sort(present.begin(), present.end(), by_zyx);
   for (const IVec3 at : present) {
-    changed += edit_chunk(at, entries.find_to_edit(at), part_of(box, at), notice, change);
+    changed += edit_chunk(at, entries.find_to_edit(at), part_of(box, at), notifier, change);
     if (!goes_on(static_cast<double>(present.size()))) return changed;
   }
   return changed;
@@ -191,7 +191,7 @@ bool Grid::set(int x, int y, int z, VoxelType type) {
     if (!slot.entry->chunk.set(local, type)) return false;
   } catch (...) {
     edit.add_all();
-    impl_->finish_edit(at, slot, edit, notice_);
+    impl_->finish_edit(at, slot, edit, notifier_);
     throw;
   }
   edit.voxels = 1;
@@ -201,7 +201,7 @@ bool Grid::set(int x, int y, int z, VoxelType type) {
   } else {
     edit.record.add(local.y, local.z, std::uint64_t{1} << local.x);
   }
-  impl_->finish_edit(at, slot, edit, notice_);
+  impl_->finish_edit(at, slot, edit, notifier_);
   return true;
 }
 
@@ -215,10 +215,10 @@ std::int64_t Grid::write_row(IVec3 row, std::uint64_t mask, std::span<const Voxe
     edit.add(local.y, local.z, slot.entry->chunk.write_row(local.y, local.z, mask, types));
   } catch (...) {
     edit.add_all();
-    impl_->finish_edit(at, slot, edit, notice_);
+    impl_->finish_edit(at, slot, edit, notifier_);
     throw;
   }
-  impl_->finish_edit(at, slot, edit, notice_);
+  impl_->finish_edit(at, slot, edit, notifier_);
   return edit.voxels;
 }
 
@@ -237,7 +237,7 @@ bool Grid::set_data(IVec3 voxel, const VoxelData& data) {
   VoxelEdit edit{.data_before = quoin::data_count(slot.entry->chunk)};
   edit.record.data = PackedBox::of(local.x, local.y, local.z);
   slot.entry->chunk.set_data(local, data);
-  impl().finish_edit(at, slot, edit, notice_);
+  impl().finish_edit(at, slot, edit, notifier_);
   return true;
 }
 
@@ -279,7 +279,7 @@ std::int64_t Grid::set(std::span<const PlacedVoxel> voxels) {
       next = end;
       continue;
     }
-    changed += impl().edit_chunk(at, impl().entries.find_or_create(at), kWholeChunk, notice_, set_all);
+    changed += impl().edit_chunk(at, impl().entries.find_or_create(at), kWholeChunk, notifier_, set_all);
   }
   return changed;
 }
@@ -303,7 +303,7 @@ std::int64_t Grid::fill_box(const IBox& box, VoxelType type, const Progress& pro
     if (part == kWholeChunk) return fill_whole(chunk, type, edit);
     chunk.fill_box(part, type, [&](int y, int z, std::uint64_t changed) { edit.add(y, z, changed); });
   };
-  return impl().edit_box(box_from(box), type != kAir, notice_, progress, fill);
+  return impl().edit_box(box_from(box), type != kAir, notifier_, progress, fill);
 }
 
 std::int64_t Grid::fill_sphere(DVec3 centre, double radius, VoxelType type, const Progress& progress) {
@@ -325,7 +325,7 @@ std::int64_t Grid::fill_sphere(DVec3 centre, double radius, VoxelType type, cons
       }
     }
   };
-  return impl().edit_box(box, type != kAir, notice_, progress, fill);
+  return impl().edit_box(box, type != kAir, notifier_, progress, fill);
 }
 
 std::int64_t Grid::edit_rows(const IBox& wanted, FunctionRef<void(IVec3 first, std::span<VoxelType> types)> change,
@@ -342,7 +342,7 @@ std::int64_t Grid::edit_rows(const IBox& wanted, FunctionRef<void(IVec3 first, s
       }
     }
   };
-  return impl().edit_box(box_from(wanted), true, notice_, progress, change_part);
+  return impl().edit_box(box_from(wanted), true, notifier_, progress, change_part);
 }
 
 std::int64_t Grid::put_chunk(IVec3 at, Chunk voxels) {
@@ -357,7 +357,7 @@ std::int64_t Grid::put_chunk(IVec3 at, Chunk voxels) {
     edit.record.data.unite(PackedBox::of(local.x, local.y, local.z));
   });
   slot.entry->chunk = std::move(voxels);
-  impl().finish_edit(at, slot, edit, notice_);
+  impl().finish_edit(at, slot, edit, notifier_);
   return edit.voxels;
 }
 
@@ -388,13 +388,13 @@ std::vector<IVec3> Grid::loaded_chunks() const {
 
 bool Grid::load_chunk(IVec3 chunk, Chunk voxels) {
   if (!impl().loaded.add(chunk)) return false;
-  impl().replace(chunk, std::move(voxels), notice_);
+  impl().replace(chunk, std::move(voxels), notifier_);
   return true;
 }
 
 bool Grid::unload_chunk(IVec3 chunk) {
   if (!impl().loaded.remove(chunk)) return false;
-  impl().replace(chunk, Chunk(kAir), notice_);
+  impl().replace(chunk, Chunk(kAir), notifier_);
   return true;
 }
 
@@ -413,7 +413,7 @@ void Grid::clear() {
   impl().entries.clear();
   impl().voxel_count = 0;
   impl().data_count = 0;
-  notice_.notify();
+  notifier_.notify();
 }
 
 const Chunk* Grid::find_chunk(int x, int y, int z) const {

@@ -127,7 +127,7 @@ void sort_and_unite(std::vector<Handle<T>>& handles) {
 
 }  // namespace
 
-// A scene's journal of its changes. Grid edits arrive as notices and are recorded at the next query.
+// A scene's journal of its changes. Notifiers report grid edits, which are recorded at the next query.
 struct Scene::Book {
   Book() = default;
   Book(const Book& other) : journal(other.journal), serials(other.serials) {}
@@ -135,8 +135,8 @@ struct Scene::Book {
   std::mutex mutex;  // guards concurrent queries
   ChangeJournal<SceneRecord> journal;
   std::array<std::vector<std::uint64_t>, 4> serials;  // by kind and slot, of the last records in the journal
-  ChangeNotifiers notices;
-  std::vector<std::uint32_t> noticed;
+  ChangeNotifiers notifiers;
+  std::vector<std::uint32_t> notified;
 
   std::vector<std::uint64_t>& serials_of(Kind kind) { return serials[static_cast<std::size_t>(kind)]; }
   // `keys` are grids, instances, groups and layers: they share a journal.
@@ -175,20 +175,20 @@ struct Scene::Book {
     return value;
   }
   void collect(const SlotMap<SceneGrid>& grids, std::size_t keys) {
-    notices.take(noticed);
-    for (const std::uint32_t index : noticed) {
+    notifiers.take(notified);
+    for (const std::uint32_t index : notified) {
       const auto handle = grids.handle_at(index);
       if (!handle.has_value()) continue;
       journal.begin_change();
       note(*handle, keys);
       follow(grids[*handle], index);
     }
-    noticed.clear();
+    notified.clear();
   }
   // Edits of either come under the grid's number.
   void follow(const SceneGrid& grid, std::uint32_t index) {
-    notices.follow(grid.grid.notice_, index);
-    notices.follow(grid.field.notice_, index);
+    notifiers.follow(grid.grid.notifier_, index);
+    notifiers.follow(grid.field.notifier_, index);
   }
 };
 
@@ -225,7 +225,7 @@ Scene::Book& Scene::book() const {
 }
 
 GridHandle Scene::add_grid(SceneGrid grid) {
-  book().notices.make_room(grids_.next_index());
+  book().notifiers.make_room(grids_.next_index());
   const GridHandle handle = book().insert(grids_, std::move(grid), keys());
   book_->follow(grids_[handle], handle.index);
   return handle;

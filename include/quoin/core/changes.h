@@ -55,8 +55,8 @@ struct Changes {
 
 class ChangeNotifiers;
 
-/// Notifies the owner of a container about edits, for example the scene that owns a grid. The notice stays with its
-/// container object when the container's content is moved.
+/// Notifies the owner of a container about edits, for example the scene that owns a grid. The notifier stays with
+/// its container object when the container's content is moved.
 class ChangeNotifier {
  public:
   ChangeNotifier() = default;
@@ -67,7 +67,7 @@ class ChangeNotifier {
   }
   ~ChangeNotifier() = default;
 
-  /// Notifies the owner; call it after every edit. Only the first call since the owner last read the notice does work.
+  /// Notifies the owner; call it after every edit. Only the first call since the owner last read it does work.
   void notify() {
     if (!is_notified_) [[unlikely]]
       notify_first();

@@ -194,7 +194,7 @@ class DensityGrid {
   [[nodiscard]] inline Impl& impl() const;
 
   std::unique_ptr<Impl> impl_;
-  mutable ChangeNotifier notice_;  // mutable: a scene that follows the grid is not part of its value
+  mutable ChangeNotifier notifier_;  // mutable: a scene that follows the grid is not part of its value
 };
 
 }  // namespace quoin

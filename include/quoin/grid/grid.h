@@ -220,7 +220,7 @@ class Grid {
   [[nodiscard]] inline Impl& impl() const;
 
   std::unique_ptr<Impl> impl_;
-  mutable ChangeNotifier notice_;  // mutable: a scene that follows the grid is not part of its value
+  mutable ChangeNotifier notifier_;  // mutable: a scene that follows the grid is not part of its value
 };
 
 /// Reads many voxels that lie near each other. Caches the chunk of the last voxel, and unpacks a row when reads run

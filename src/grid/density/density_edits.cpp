@@ -196,7 +196,7 @@ bool DensityGrid::set(IVec3 sample, DensitySample value) {
     return true;
   };
   const auto rows = [](IVec3) { return ChunkEdit::Rows; };
-  const NoticeOfEdits notice(impl_->store, notice_);
+  const NotifyOnExit notify(impl_->store, notifier_);
   return impl_->store.edit(box_from(sample, sample), true, kAir, rows, replace, {}) != 0;
 }
 
@@ -211,29 +211,29 @@ std::int64_t DensityGrid::edit_rows(
     return true;
   };
   const auto rows = [](IVec3) { return ChunkEdit::Rows; };
-  const NoticeOfEdits notice(impl().store, notice_);
+  const NotifyOnExit notify(impl().store, notifier_);
   return impl().store.edit(box_from(box), true, kAir, rows, change_part, progress);
 }
 
 std::int64_t DensityGrid::add_sphere(DVec3 centre, double radius, VoxelType material, double blend,
                                      const Progress& progress) {
-  const NoticeOfEdits notice(impl().store, notice_);
+  const NotifyOnExit notify(impl().store, notifier_);
   return add_shape(impl().store, Sphere(centre, radius), material, blend, progress);
 }
 
 std::int64_t DensityGrid::remove_sphere(DVec3 centre, double radius, double blend) {
-  const NoticeOfEdits notice(impl().store, notice_);
+  const NotifyOnExit notify(impl().store, notifier_);
   return remove_shape(impl().store, Sphere(centre, radius), blend);
 }
 
 std::int64_t DensityGrid::add_box(DVec3 min, DVec3 max, VoxelType material, double rounding, double blend,
                                   const Progress& progress) {
-  const NoticeOfEdits notice(impl().store, notice_);
+  const NotifyOnExit notify(impl().store, notifier_);
   return add_shape(impl().store, RoundedBox(min, max, rounding), material, blend, progress);
 }
 
 std::int64_t DensityGrid::remove_box(DVec3 min, DVec3 max, double rounding, double blend) {
-  const NoticeOfEdits notice(impl().store, notice_);
+  const NotifyOnExit notify(impl().store, notifier_);
   return remove_shape(impl().store, RoundedBox(min, max, rounding), blend);
 }
 
@@ -242,7 +242,7 @@ std::int64_t DensityGrid::flatten(DVec3 centre, double radius, const FlattenOpti
   const Brush brush(centre, radius, options.strength);
   const Plane plane(options.point, options.normal);
   if (!brush.is_sound() || !plane.is_sound()) return 0;
-  const NoticeOfEdits notice(impl().store, notice_);
+  const NotifyOnExit notify(impl().store, notifier_);
   DensityStore& store = impl().store;
   const double band = store.band();
   const auto choose = [&](IVec3 chunk) {
@@ -385,7 +385,7 @@ std::vector<ChunkPart> parts_near_chunks(const DensityStore& store, const LongBo
 std::int64_t DensityGrid::smooth(DVec3 centre, double radius, double strength) {
   const Brush brush(centre, radius, strength);
   if (!brush.is_sound()) return 0;
-  const NoticeOfEdits notice(impl().store, notice_);
+  const NotifyOnExit notify(impl().store, notifier_);
   DensityStore& store = impl().store;
   const LongBox box = clipped(box_around(brush.sphere().min(), brush.sphere().max()));
   if (is_empty(box)) return 0;

@@ -38,12 +38,12 @@ VoxelType DensityGrid::material(IVec3 sample) const {
 }
 
 std::int64_t DensityGrid::put_chunk(IVec3 chunk, DensityChunk samples) {
-  const NoticeOfEdits notice(impl().store, notice_);
+  const NotifyOnExit notify(impl().store, notifier_);
   return impl().store.put(chunk, std::move(samples));
 }
 
 void DensityGrid::make_partial() {
-  const NoticeOfEdits notice(impl().store, notice_);
+  const NotifyOnExit notify(impl().store, notifier_);
   impl().store.make_partial();
 }
 
@@ -52,7 +52,7 @@ bool DensityGrid::is_partial() const {
 }
 
 bool DensityGrid::load_chunk(IVec3 chunk, DensityChunk samples) {
-  const NoticeOfEdits notice(impl().store, notice_);
+  const NotifyOnExit notify(impl().store, notifier_);
   return impl().store.load(chunk, std::move(samples));
 }
 
@@ -61,7 +61,7 @@ bool DensityGrid::load_air_chunk(IVec3 chunk) {
 }
 
 bool DensityGrid::unload_chunk(IVec3 chunk) {
-  const NoticeOfEdits notice(impl().store, notice_);
+  const NotifyOnExit notify(impl().store, notifier_);
   return impl().store.unload(chunk);
 }
 
@@ -83,7 +83,7 @@ bool DensityGrid::is_loaded_within(const IBox& samples) const {
 }
 
 void DensityGrid::clear() {
-  const NoticeOfEdits notice(impl().store, notice_);
+  const NotifyOnExit notify(impl().store, notifier_);
   impl().store.clear();
 }
 

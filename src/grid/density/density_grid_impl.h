@@ -230,19 +230,19 @@ inline DensityGrid::Impl& DensityGrid::impl() const {
 }
 
 /// Notifies followers, on destruction, of edits made during its lifetime, even after an exception.
-class NoticeOfEdits {
+class NotifyOnExit {
  public:
-  NoticeOfEdits(const DensityStore& store, ChangeNotifier& notice)
-      : store_(store), notice_(notice), before_(store.edits()) {}
-  NoticeOfEdits(const NoticeOfEdits&) = delete;
-  NoticeOfEdits& operator=(const NoticeOfEdits&) = delete;
-  ~NoticeOfEdits() {
-    if (store_.edits() != before_) notice_.notify();
+  NotifyOnExit(const DensityStore& store, ChangeNotifier& notifier)
+      : store_(store), notifier_(notifier), before_(store.edits()) {}
+  NotifyOnExit(const NotifyOnExit&) = delete;
+  NotifyOnExit& operator=(const NotifyOnExit&) = delete;
+  ~NotifyOnExit() {
+    if (store_.edits() != before_) notifier_.notify();
   }
 
  private:
   const DensityStore& store_;
-  ChangeNotifier& notice_;
+  ChangeNotifier& notifier_;
   std::uint64_t before_;
 };
 
