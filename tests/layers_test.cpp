@@ -29,8 +29,8 @@ constexpr int kAppsLevel = 8;
 const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"grid/change_records.h", {"light", "live"}},
     {"grid/chunk/chunk_storage.h", {"io", "live", "mesh", "render_vk", "store", "trace"}},
+    {"grid/colour_table.h", {"io", "voxelize"}},
     {"grid/density/density_storage.h", {"mesh", "store", "terrain", "trace"}},
-    {"grid/looks.h", {"io", "voxelize"}},
     {"grid/long_box.h", {"live", "scene", "stream"}},
     {"io/format_driver.h", {"store"}},
     {"io/luanti/luanti_nodes.h", {"store"}},

@@ -18,7 +18,7 @@
 
 #include "core/object_pool.h"
 #include "core/work/progress_steps.h"
-#include "grid/looks.h"
+#include "grid/colour_table.h"
 #include "voxelize/crossings.h"
 #include "voxelize/nearest.h"
 #include "voxelize/surface_colours.h"
@@ -308,33 +308,33 @@ std::size_t count_of(const Found& found) {
   return count;
 }
 
-/// The voxel types of the results: of deep voxels, and of looks by number.
+/// The voxel types of the results: of deep voxels, and by entry of the colour table.
 struct Types {
   VoxelType deep = kAir;
-  std::vector<VoxelType> by_look;
+  std::vector<VoxelType> by_entry;
 };
 
-/// Numbers looks in the order of chunks and voxels; each `Coloured::material` becomes the look's number.
+/// Collects colours in the order of chunks and voxels; each `Coloured::material` becomes the index of its entry.
 Result<Types> find_types(const SurfaceColours& colours, AllFound& found, VoxelRegistry& registry, std::size_t most,
                          std::vector<std::string>& warnings) {
   std::vector<VoxelProperties> materials = colours.looks();
   // Deep voxels take the one material that all triangles share, or none.
   const std::uint32_t deep_material = colours.deep_look().value_or(static_cast<std::uint32_t>(materials.size()));
   materials.emplace_back();
-  Looks looks;
+  ColourTable table;
   bool has_deep = false;
   for (const auto& chunk : found) {
     if (chunk == nullptr) continue;
-    for (Coloured& voxel : chunk->coloured) voxel.material = looks.number_of(voxel.colour, voxel.material);
+    for (Coloured& voxel : chunk->coloured) voxel.material = table.index_of(voxel.colour, voxel.material);
     has_deep |= count_of(*chunk) > chunk->coloured.size();
   }
   std::uint32_t deep = 0;
   // A model with few colours keeps them: the mean would add another.
-  constexpr std::size_t kFewLooks = 256;
-  const bool has_few = colours.deep_look() && looks.size() <= kFewLooks;
-  const Rgba8 deep_colour = has_few ? looks.nearest(colours.mean(), deep_material) : colours.mean();
-  if (has_deep) deep = looks.number_of(deep_colour, deep_material);
-  auto types = looks.add_to(registry, materials, warnings, most);
+  constexpr std::size_t kFewColours = 256;
+  const bool has_few = colours.deep_look() && table.size() <= kFewColours;
+  const Rgba8 deep_colour = has_few ? table.nearest(colours.mean(), deep_material) : colours.mean();
+  if (has_deep) deep = table.index_of(deep_colour, deep_material);
+  auto types = table.add_to(registry, materials, warnings, most);
   if (!types) return types.error();
   return Types{has_deep ? (*types)[deep] : kAir, std::move(*types)};
 }
@@ -355,8 +355,8 @@ Chunk types_of(const Found& found, const Types& types) {
     std::uint64_t coloured = 0;
     for (; next != found.coloured.end() && next->voxel / kChunkEdge == i; ++next) {
       const std::size_t x = next->voxel % kChunkEdge;
-      QUOIN_ASSERT(next->material < types.by_look.size(), "a look with a type");
-      row[x] = types.by_look[next->material];
+      QUOIN_ASSERT(next->material < types.by_entry.size(), "an entry with a type");
+      row[x] = types.by_entry[next->material];
       coloured |= std::uint64_t{1} << x;
     }
     if (const std::uint64_t deep = bits & ~coloured; deep != 0) chunk.fill_row(y, z, deep, types.deep);
@@ -446,10 +446,10 @@ Result<VoxelizedMesh> voxelize(const TriangleMesh& mesh, const VoxelizeOptions& 
   auto found = find_all(parts->frame, threads, part_of(progress, kLinesShare, kFoundShare),
                         [&](std::size_t i, Scratch& scratch) { return find_voxels(*parts, i, options, scratch); });
   if (!found) return found.error();
-  const auto by_look = find_types(*parts->colours, *found, types, options.max_types, made.warnings);
-  if (!by_look) return by_look.error();
+  const auto by_entry = find_types(*parts->colours, *found, types, options.max_types, made.warnings);
+  if (!by_entry) return by_entry.error();
   put_all(
-      *found, threads, [&](const Found& chunk) { return types_of(chunk, *by_look); },
+      *found, threads, [&](const Found& chunk) { return types_of(chunk, *by_entry); },
       [&](std::size_t i, const Found&, Chunk&& voxels) {
         made.grid.put_chunk(parts->frame.first_chunk() + parts->frame.chunk_at(i), std::move(voxels));
       });
@@ -480,10 +480,10 @@ Result<MeshDistanceField> distance_field(const TriangleMesh& mesh, const Distanc
   auto found = find_all(parts->frame, threads, part_of(progress, kLinesShare, kFoundShare),
                         [&](std::size_t i, Scratch& scratch) { return find_densities(*parts, i, own, scratch); });
   if (!found) return found.error();
-  const auto by_look = find_types(*parts->colours, *found, types, options.max_types, made.warnings);
-  if (!by_look) return by_look.error();
+  const auto by_entry = find_types(*parts->colours, *found, types, options.max_types, made.warnings);
+  if (!by_entry) return by_entry.error();
   put_all(
-      *found, threads, [&](const Found& chunk) { return types_of(chunk, *by_look); },
+      *found, threads, [&](const Found& chunk) { return types_of(chunk, *by_entry); },
       [&](std::size_t i, Found& chunk, Chunk&& materials) {
         chunk.densities->materials() = std::move(materials);
         made.field.put_chunk(parts->frame.first_chunk() + parts->frame.chunk_at(i), std::move(*chunk.densities));

@@ -40,14 +40,14 @@ Status ModelBuilder::put(IVec3 voxel, Rgba8 colour, int count, int axis) {
   QUOIN_ASSERT(axis >= 0 && axis < 3, "0 <= axis < 3");
   if (colour.a == 0 || count <= 0) return {};
   if (runs_.size() == kMaxRuns) return make_error(ErrorCode::LimitExceeded, "more than 2^25 voxels or runs of voxels");
-  runs_.push_back({voxel, looks_.number_of(colour, material_), count, axis});
+  runs_.push_back({voxel, colours_.index_of(colour, material_), count, axis});
   return {};
 }
 
 Result<LoadedScene> ModelBuilder::take(std::string format) {
   LoadedScene loaded;
   loaded.format = std::move(format);
-  const auto types = looks_.add_to(loaded.scene.types, materials_, warnings_);
+  const auto types = colours_.add_to(loaded.scene.types, materials_, warnings_);
   if (!types) return types.error();
   std::vector<PlacedVoxel> batch;
   for (std::size_t i = 0; i < parts_.size(); ++i) {
@@ -59,16 +59,16 @@ Result<LoadedScene> ModelBuilder::take(std::string format) {
     grid.canvas = model.canvas;
     for (std::size_t run = parts_[i].first; run < end; ++run) {
       const Run& r = runs_[run];
-      QUOIN_ASSERT(r.count > 0 && r.look < types->size(), "a run of a known look");
+      QUOIN_ASSERT(r.count > 0 && r.colour < types->size(), "a run of a known colour");
       if (r.count == 1) continue;
       IVec3 size(1);
       size[r.axis] = r.count;
-      grid.grid.fill_box({r.voxel, r.voxel + size}, (*types)[r.look]);
+      grid.grid.fill_box({r.voxel, r.voxel + size}, (*types)[r.colour]);
     }
     for (std::size_t run = parts_[i].first; run < end;) {
       batch.clear();
       for (; run < end && batch.size() < kBatch; ++run) {
-        if (runs_[run].count == 1) batch.push_back({runs_[run].voxel, (*types)[runs_[run].look]});
+        if (runs_[run].count == 1) batch.push_back({runs_[run].voxel, (*types)[runs_[run].colour]});
       }
       grid.grid.set(batch);
     }

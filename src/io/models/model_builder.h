@@ -8,7 +8,7 @@
 #include <quoin/core/result.h>
 #include <quoin/io/loaded_scene.h>
 
-#include "grid/looks.h"
+#include "grid/colour_table.h"
 
 namespace quoin::models {
 
@@ -45,7 +45,7 @@ class ModelBuilder {
  private:
   struct Run {
     IVec3 voxel;
-    std::uint32_t look;
+    std::uint32_t colour;  ///< index in `colours_`
     std::int32_t count;
     std::int32_t axis;
   };
@@ -56,7 +56,7 @@ class ModelBuilder {
 
   std::vector<Part> parts_;
   std::vector<Run> runs_;
-  Looks looks_;
+  ColourTable colours_;
   std::vector<VoxelProperties> materials_{VoxelProperties{}};
   std::uint32_t material_ = 0;
   std::vector<std::string> warnings_;
