@@ -204,7 +204,7 @@ template <class Struct, class Count, class Describe>
 quoin_status report_item(quoin_scene handle, std::size_t index, Struct* out, Count&& count,
                          Describe&& describe) noexcept {
   return with_scene(handle, Use::Read, [&](SceneBody& scene) {
-    if (index >= count(scene)) return fail(QUOIN_INVALID_ARGUMENT, "nothing of the scene has this number");
+    if (index >= count(scene)) return fail(QUOIN_INVALID_ARGUMENT, "index out of range");
     Struct whole{};
     describe(scene, whole);
     return report(whole, out);
@@ -228,7 +228,7 @@ Result<LoadOptions> load_options_of(const quoin_load_options* given);
 
 VoxelProperties properties_of(const quoin_type& type);
 /// Returns the reason that a type is invalid; null if it is valid.
-const char* what_is_wrong(const quoin_type& type);
+const char* validate_type(const quoin_type& type);
 
 /// The camera and the options of a render. Errors: InvalidArgument for invalid values.
 struct ImageTaking {

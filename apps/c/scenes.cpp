@@ -49,7 +49,7 @@ VoxelType type_at(const quoin_array& array, std::int64_t x, std::int64_t y, std:
   return type;
 }
 
-const char* what_is_wrong(const quoin_array& array) {
+const char* validate_array(const quoin_array& array) {
   if (array.data == nullptr) return "the array's data is null";
   if (array.scalar != QUOIN_UINT8 && array.scalar != QUOIN_UINT16)
     return "an array of types must be QUOIN_UINT8 or QUOIN_UINT16";
@@ -170,7 +170,7 @@ LoadOptions options_of(const quoin_load_options& given) {
   return options;
 }
 
-const char* what_is_wrong_with_landscape(const quoin_load_options& options) {
+const char* validate_heights(const quoin_load_options& options) {
   if (options.heights < QUOIN_HEIGHTS_NONE || options.heights > QUOIN_HEIGHTS_TERRARIUM)
     return "heights is not a quoin_heights value";
   // The reader checks their combination and the ground's depth.
@@ -186,7 +186,7 @@ const char* what_is_wrong_with_landscape(const quoin_load_options& options) {
              : nullptr;
 }
 
-const char* what_is_wrong(const quoin_load_options& options) {
+const char* validate_load_options(const quoin_load_options& options) {
   if (options.frame < 0 || options.radius < 0 || options.radius > 1'024) return "frame or radius is out of range";
   if (options.has_iso != 0 && !std::isfinite(options.iso)) return "iso is not finite";
   if (options.mesh_voxels < 0 || !(options.voxel_size >= 0.0) || !std::isfinite(options.voxel_size))
@@ -194,7 +194,7 @@ const char* what_is_wrong(const quoin_load_options& options) {
   if (options.mesh_voxels != 0 && options.voxel_size != 0.0) return "both mesh_voxels and voxel_size are set";
   if (options.raw_scalar < QUOIN_UINT8 || options.raw_scalar > QUOIN_FLOAT64) return "no scalar has this number";
   if (is_raw(options) && options.heights != QUOIN_HEIGHTS_NONE) return "both raw_shape and heights are set";
-  return what_is_wrong_with_landscape(options);
+  return validate_heights(options);
 }
 
 }  // namespace
@@ -263,11 +263,11 @@ void place(SceneBody& scene, SceneGrid grid, DVec3 position, std::size_t* out) {
 Result<LoadOptions> load_options_of(const quoin_load_options* given) {
   const auto whole = taken_or_default(given);
   if (!whole) return make_error(ErrorCode::InvalidArgument, "the size of the options");
-  if (const char* wrong = what_is_wrong(*whole)) return make_error(ErrorCode::InvalidArgument, wrong);
+  if (const char* wrong = validate_load_options(*whole)) return make_error(ErrorCode::InvalidArgument, wrong);
   return options_of(*whole);
 }
 
-const char* what_is_wrong(const quoin_type& type) {
+const char* validate_type(const quoin_type& type) {
   const auto is_share = [](float x) { return x >= 0.0F && x <= 1.0F; };
   const auto is_amount = [](float x) { return x >= 0.0F && std::isfinite(x); };
   if (!is_share(type.metalness) || !is_share(type.roughness) || !is_amount(type.emission))
@@ -408,7 +408,7 @@ quoin_status quoin_type_add(quoin_scene scene, const quoin_type* type, std::uint
   return with_scene(scene, Use::Change, [&](SceneBody& body) {
     const auto given = taken(type);
     if (!given || out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "type or out is null, or the type's size");
-    if (const char* wrong = what_is_wrong(*given)) return fail(QUOIN_INVALID_ARGUMENT, wrong);
+    if (const char* wrong = validate_type(*given)) return fail(QUOIN_INVALID_ARGUMENT, wrong);
     const auto added = body.loaded.scene.types.add(properties_of(*given));
     if (!added) return fail(added.error());
     *out = *added;
@@ -465,7 +465,7 @@ quoin_status quoin_grid_add(quoin_scene scene, const quoin_array* array, const c
   return with_scene(scene, Use::Change, [&](SceneBody& body) {
     const auto given = taken_array(array);
     if (!given) return fail(QUOIN_INVALID_ARGUMENT, "array is null, or its size");
-    if (const char* wrong = what_is_wrong(*given)) return fail(QUOIN_INVALID_ARGUMENT, wrong);
+    if (const char* wrong = validate_array(*given)) return fail(QUOIN_INVALID_ARGUMENT, wrong);
     return add_grid(body, *given, name, out);
   });
 }
@@ -475,7 +475,7 @@ quoin_status quoin_grid_write(quoin_scene scene, std::size_t grid, const quoin_a
     const auto given = taken_array(array);
     if (!given) return fail(QUOIN_INVALID_ARGUMENT, "array is null, or its size");
     if (grid >= body.numbers.grids.size()) return fail(QUOIN_INVALID_ARGUMENT, "no grid has this number");
-    if (const char* wrong = what_is_wrong(*given)) return fail(QUOIN_INVALID_ARGUMENT, wrong);
+    if (const char* wrong = validate_array(*given)) return fail(QUOIN_INVALID_ARGUMENT, wrong);
     return write_grid(body, body.numbers.grids[grid], *given);
   });
 }

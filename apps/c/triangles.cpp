@@ -87,7 +87,7 @@ Result<Given> types_of(const quoin_triangles& triangles) {
   for (std::size_t i = 0; i < triangles.type_count; ++i) {
     const auto type = taken(reinterpret_cast<const quoin_type*>(at));
     if (!type) return make_error(ErrorCode::InvalidArgument, "invalid size of a type");
-    if (const char* wrong = what_is_wrong(*type)) return make_error(ErrorCode::InvalidArgument, wrong);
+    if (const char* wrong = validate_type(*type)) return make_error(ErrorCode::InvalidArgument, wrong);
     add(given, *type);
     at += type->size;
   }
