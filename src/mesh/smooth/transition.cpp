@@ -28,8 +28,8 @@ class Transitions {
   void run(const MeshOwnCells& mesh_own_cells) {
     mesh_own_cells(out_);
     kernel_vertices_ = out_.cells.size();
-    mend_own_cells();
-    mend_diagonals();
+    recompute_own_cells();
+    recompute_diagonals();
     for (int axis = 0; axis < 3; ++axis) add_polygons_on_lower_faces(axis);
     if (options_.split_sheets) split_sheets(chunks_, options_, out_.indices.size(), out_);
     for (const std::uint32_t index : triangles_) out_.indices.push_back(index);
@@ -40,7 +40,7 @@ class Transitions {
   [[nodiscard]] bool is_solid(IVec3 sample) const { return DensityChunk::is_solid(chunks_.get(sample)); }
 
   // Computes the vertices of the chunk's own cells that touch a finer chunk.
-  void mend_own_cells() {
+  void recompute_own_cells() {
     const int level = levels_.of_chunk(IVec3{0});
     if (level == 0) return;
     const int last = (kChunkEdge >> level) - 1;
@@ -49,30 +49,30 @@ class Transitions {
         const bool is_border_row = y == 0 || y == last || z == 0 || z == last;
         for (int x = 0; x <= last; x += is_border_row ? 1 : last) {
           const LevelCell cell{IVec3{0}, IVec3{x, y, z} * (1 << level), level};
-          if (levels_.touches_finer(cell)) mend(cell);
+          if (levels_.touches_finer(cell)) recompute(cell);
         }
       }
     }
   }
 
-  void mend(const LevelCell& cell) {
+  void recompute(const LevelCell& cell) {
     const std::optional<CellVertex> vertex = transition_vertex(cell);
     if (!vertex) return;
     if (const auto found = kernel_vertex(cell.name())) {
       write_vertex(chunks_, options_.occlusion, cell, *vertex, *found, out_);
-      if (mended_.empty()) mended_.resize(kernel_vertices_);
-      mended_[*found] = true;
+      if (recomputed_.empty()) recomputed_.resize(kernel_vertices_);
+      recomputed_[*found] = true;
     } else {
       append(cell, *vertex);
     }
   }
 
   // The kernel chose the diagonals with its own vertices.
-  void mend_diagonals() {
-    if (mended_.empty()) return;
+  void recompute_diagonals() {
+    if (recomputed_.empty()) return;
     for (std::size_t i = 0; i < out_.indices.size(); i += 6) {
       std::uint32_t* quad = out_.indices.data() + i;
-      if (!(mended_[quad[0]] || mended_[quad[1]] || mended_[quad[2]] || mended_[quad[5]])) continue;
+      if (!(recomputed_[quad[0]] || recomputed_[quad[1]] || recomputed_[quad[2]] || recomputed_[quad[5]])) continue;
       std::array<QuadCorner, 4> corners;
       const std::array<std::uint32_t, 4> cycle = corners_of_quad(quad, out_);
       for (std::size_t c = 0; c < 4; ++c) corners[c] = corner(cycle[c], levels_.cell_of(out_.cells[cycle[c]]));
@@ -198,7 +198,7 @@ class Transitions {
   ChunkLevels levels_;
   SmoothChunkMesh& out_;
   std::size_t kernel_vertices_ = 0;
-  std::vector<bool> mended_;                                   // by the kernel's vertex: recomputed; empty: none
+  std::vector<bool> recomputed_;                               // by the kernel's vertex; empty: none
   std::unordered_map<std::uint32_t, std::uint32_t> appended_;  // by name
   std::vector<std::uint32_t> triangles_;
 };

@@ -141,9 +141,9 @@ TEST(WorldMaintenance, AnyDamageIsSeenAndWhatIsSoundIsKept) {
   std::minstd_rand random(5);
   for (int i = 0; i < wanted_damage(); ++i) {
     const auto path = folder / "w.quoin";
-    const auto mended = folder / "mended.quoin";
+    const auto repaired = folder / "repaired.quoin";
     std::filesystem::copy_file(whole, path, std::filesystem::copy_options::overwrite_existing);
-    std::filesystem::remove(mended);
+    std::filesystem::remove(repaired);
     const bool is_page = i % 3 == 0;
     const std::uintmax_t at = is_page ? random() % (size / 8192) * 8192 : random() % size;
     damage(path, at, std::min<std::uintmax_t>(is_page ? 8192 : 1 + random() % 40, size - at));
@@ -153,14 +153,14 @@ TEST(WorldMaintenance, AnyDamageIsSeenAndWhatIsSoundIsKept) {
     if (check && check->damage.empty()) {
       ASSERT_EQ(readable, std::size_t{kChunks}) << "the check finds all damage";
     }
-    const auto repair = repair_world(path, mended);
+    const auto repair = repair_world(path, repaired);
     ASSERT_TRUE(repair) << to_string(repair.error());
-    const std::size_t kept = sound_chunks(mended);
+    const std::size_t kept = sound_chunks(repaired);
     EXPECT_GE(kept, readable);
     // The flipped bytes may hit two bodies; a page holds about thirty of these small ones.
     EXPECT_GE(kept, std::size_t{kChunks} - (is_page ? 40 : 2));
     EXPECT_EQ(repair->check.chunks, kept);
-    const auto sound = check_world(mended);
+    const auto sound = check_world(repaired);
     ASSERT_TRUE(sound) << to_string(sound.error());
     EXPECT_TRUE(sound->damage.empty()) << sound->damage.front().what;
   }
