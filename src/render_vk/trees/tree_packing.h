@@ -15,32 +15,32 @@ namespace quoin::vulkan {
 
 /// A chunk as shaders read it: its part of the opaque and of the transparent tree, and the types of its voxels.
 ///
-///   for each tree that holds any of it, at a multiple of 32 bytes: a header (address of the types, bits a voxel, where
-///   the voxels' words begin; for a chunk of one type 0 bits and that type), the nodes of its bricks, the words of
-///   their cells; then the types: slabs, palette, words, as ChunkStorage has them.
+///   Per tree with voxels of the chunk, aligned to 32 bytes: a header (type address, bits per voxel, offset of the
+///   voxel words; for a chunk of one type 0 bits and that type), the nodes of its bricks, the words of their cells.
+///   Then the types: slabs, palette and words in the layout of ChunkStorage.
 struct ChunkRecord {
   std::vector<std::uint32_t> words;
-  Node opaque;  ///< of the whole chunk; mask 0 where there is none
+  Node opaque;  ///< of the whole chunk; mask 0 without such voxels
   Node transparent;
   Node field;
   Node glass;
 
-  /// Addresses count from the record's beginning until they are moved to where it lies.
+  /// Makes the addresses, which count from the record's beginning, absolute. Called once.
   void move_to(std::uint64_t address);
 
  private:
   friend class RecordWriter;
-  std::vector<std::size_t> addresses_;  // where in `words` they stand
+  std::vector<std::size_t> addresses_;  // their indices in `words`
 };
 
-/// `transparent` may be null.
+/// Packs a chunk of voxels. `transparent` may be null.
 [[nodiscard]] ChunkRecord pack_chunk(const OccupancyTree& opaque, const OccupancyTree* transparent, const Chunk& voxels,
                                      IVec3 chunk);
 
-/// A field's chunk: as one of voxels, a tree of the cells that touch its solid, with the materials of its samples.
-/// After the words of a brick's cells comes a number for each: where its samples lie (see kFieldBlockEdge), in words
-/// from the header; 0 where all of these are solid. Only such bricks, and chunks, count as full.
-/// Requires: `cells` holds some of the chunk.
+/// Packs a field chunk: like a chunk of voxels, a tree of the cells that touch its solid, with the materials of its
+/// samples. The words of a brick's cells are followed by one number per word: the offset of its samples in words from
+/// the header (see kFieldBlockEdge), 0 if all of them are solid. Only solid bricks and chunks count as full.
+/// Requires: `cells` has cells in the chunk.
 [[nodiscard]] ChunkRecord pack_field_chunk(const OccupancyTree& cells, const DensityGrid& field, IVec3 chunk);
 /// Packs the transparent part of a field's chunk: a tree of the cells that touch it. A word's number gives its samples'
 /// position (densities and bodies), or its single type. No brick or chunk counts as full.
@@ -60,7 +60,7 @@ struct ChunkNodeAt {
   Node node;
 };
 
-/// `address`: where the nodes will lie.
+/// Builds the nodes above chunks. `address`: device address of the nodes.
 [[nodiscard]] TopTree build_top_tree(std::vector<ChunkNodeAt> chunks, std::uint64_t address);
 
 }  // namespace quoin::vulkan
