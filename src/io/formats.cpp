@@ -168,7 +168,8 @@ Result<const FormatDriver*> driver_for_saving(const std::filesystem::path& path)
   const auto format = format_for_writing(path);
   if (!format) return format.error();
   if (format->can(FormatCapability::Meshes))
-    return make_error(ErrorCode::Unsupported, "a mesh format, which cannot store voxels", path.string());
+    return make_error(ErrorCode::Unsupported, "cannot write voxels: " + path.extension().string() + " is a mesh format",
+                      path.string());
   return &driver_of(format->format);
 }
 

@@ -74,7 +74,7 @@ Status WindowDevice::open(const WindowDeviceOptions& options) {
   surface_ = options.make_surface(instance_);
   if (surface_ == VK_NULL_HANDLE) return refuse("the window cannot show images");
   const std::vector<Candidate> all = candidates();
-  if (all.empty()) return refuse("no driver for a graphics device found");
+  if (all.empty()) return refuse("no graphics driver found");
   std::vector<VulkanDeviceInfo> descriptions;
   descriptions.reserve(all.size());
   for (const Candidate& one : all) descriptions.push_back(one.description);
@@ -103,7 +103,7 @@ Status WindowDevice::make_instance(const WindowDeviceOptions& options) {
   info.enabledExtensionCount = static_cast<std::uint32_t>(extensions.size());
   info.ppEnabledExtensionNames = extensions.data();
   if (const VkResult result = vkCreateInstance(&info, nullptr, &instance_); result != VK_SUCCESS) {
-    if (result == VK_ERROR_INCOMPATIBLE_DRIVER) return refuse("no driver for a graphics device found");
+    if (result == VK_ERROR_INCOMPATIBLE_DRIVER) return refuse("no graphics driver found");
     if (result == VK_ERROR_EXTENSION_NOT_PRESENT) return refuse("no driver can show images in windows");
     return refuse("cannot create an instance (VkResult " + std::to_string(result) + ")");
   }
