@@ -62,9 +62,9 @@ TEST_F(Tool, DataOfVoxelsIsCountedAndNamedWhereItIsLost) {
   const Json object = Json::parse(run("info data.json --json").out);
   EXPECT_EQ(object["voxels_with_data"], 1);
   EXPECT_EQ(object["grids"][0]["voxels_with_data"], 1);
-  EXPECT_NE(run("convert data.json out.glb").err.find("voxels whose data is left out, not supported by meshes: 1"),
+  EXPECT_NE(run("convert data.json out.glb").err.find("data of voxels left out, not supported by meshes: 1"),
             std::string::npos);
-  EXPECT_NE(run("convert data.json out.vox").err.find("voxels whose data is left out"), std::string::npos);
+  EXPECT_NE(run("convert data.json out.vox").err.find("data of voxels left out"), std::string::npos);
   EXPECT_EQ(run("convert data.json again.json").err, "");
   EXPECT_EQ(read_file(folder_.file("again.json")).value(), read_file(folder_.file("data.json")).value());
 }

@@ -38,7 +38,7 @@ void warn_of_values(std::size_t values, std::vector<std::string>& warnings) {
 
 void warn_of_data(std::int64_t voxels, std::vector<std::string>& warnings) {
   if (voxels == 0) return;
-  warnings.push_back("voxels whose data is left out, not supported by meshes: " + std::to_string(voxels));
+  warnings.push_back("data of voxels left out, not supported by meshes: " + std::to_string(voxels));
 }
 
 void warn_of_left_out(const Scene& scene, InstanceFilter filter, std::vector<std::string>& warnings) {

@@ -221,7 +221,7 @@ Result<EncodedFile> write_schematic(const Scene& scene, const Progress& progress
                                with_thousands(palette.guessed()));
   }
   if (lost_data != 0) {
-    merged->warnings.push_back("voxels whose data is left out, not supported by .schem: " + with_thousands(lost_data));
+    merged->warnings.push_back("data of voxels left out, not supported by .schem: " + with_thousands(lost_data));
   }
   // The limit of readers.
   constexpr std::size_t kMost = std::size_t{1} << 30;

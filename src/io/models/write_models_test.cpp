@@ -336,7 +336,7 @@ TEST(WriteModels, SchematicsSayWhatTheGameWouldTakeOtherwise) {
     return std::ranges::find(file->warnings, line) != file->warnings.end();
   };
   EXPECT_TRUE(has("types that are not Minecraft blocks, written as the block of the nearest colour: 2"));
-  EXPECT_TRUE(has("voxels whose data is left out, not supported by .schem: 1"));
+  EXPECT_TRUE(has("data of voxels left out, not supported by .schem: 1"));
   EXPECT_TRUE(load_scene(file->bytes));
 }
 

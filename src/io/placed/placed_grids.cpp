@@ -89,7 +89,7 @@ class Losses {
     add("groups left out", static_cast<std::int64_t>(scene_.groups().size()));
     add("layers left out", static_cast<std::int64_t>(scene_.layers().size()));
     add("lamps left out", static_cast<std::int64_t>(scene_.lamps.size()));
-    if (!holds_.type_names) add("voxels whose data is left out", states_);
+    if (!holds_.type_names) add("data of voxels left out", states_);
     if (holds_.type_names && turned_states != 0) {
       lines.push_back("voxels of rotated instances whose states keep their unrotated directions: " +
                       with_thousands(turned_states));
@@ -127,9 +127,9 @@ class Losses {
       return;
     }
     if (!holds_.transparency) add("types made opaque", transparent);
-    if (!holds_.materials) add("types whose roughness, metalness or light is left out", materials);
-    if (!holds_.type_names) add("types whose scattering, refraction or collision is left out", others);
-    if (!holds_.type_names) add("types whose names and attributes are left out", names);
+    if (!holds_.materials) add("roughness, metalness or light of types left out", materials);
+    if (!holds_.type_names) add("scattering, refraction or collision of types left out", others);
+    if (!holds_.type_names) add("names and attributes of types left out", names);
   }
 
   const Scene& scene_;

@@ -155,7 +155,7 @@ TEST(SceneData, NamesDataThatVoxCannotHold) {
   const auto losses = vox_unsupported_features(scene);
   ASSERT_TRUE(losses);
   ASSERT_EQ(losses->size(), 1U);
-  EXPECT_EQ((*losses)[0], "voxels whose data is left out, not supported by .vox (.json stores it): 1");
+  EXPECT_EQ((*losses)[0], "data of voxels left out, not supported by .vox (.json stores it): 1");
   const auto written = write_vox(scene);
   ASSERT_TRUE(written);
   const auto again = load_scene(written->bytes);

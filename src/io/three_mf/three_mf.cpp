@@ -404,7 +404,7 @@ class Package {
       loaded_.warnings.push_back("left out: " + what + ": " + with_thousands(static_cast<std::int64_t>(count)));
     }
     if (without_colour_ > 0) {
-      loaded_.warnings.push_back("corners whose colour is left out: " +
+      loaded_.warnings.push_back("colours of corners left out: " +
                                  with_thousands(static_cast<std::int64_t>(without_colour_)));
     }
   }

@@ -422,7 +422,7 @@ std::vector<std::string> vdb_unsupported_features(const Scene& scene) {
     lines.emplace_back("left out: voxel types (.vdb stores only where voxels and densities are)");
   }
   if (with_data > 0) {
-    lines.push_back("voxels whose data is left out, not supported by .vdb: " + std::to_string(with_data));
+    lines.push_back("data of voxels left out, not supported by .vdb: " + std::to_string(with_data));
   }
   std::int64_t without_place = 0;
   scene.instances().for_each([&](InstanceHandle, const Instance& instance) {

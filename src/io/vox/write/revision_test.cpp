@@ -481,7 +481,7 @@ TEST(VoxRevision, CategoriesOfInstancesAreSaidToBeLost) {
   std::vector<std::string> warnings;
   (void)save(loaded, &warnings);
   ASSERT_EQ(warnings.size(), 1U);
-  EXPECT_NE(warnings[0].find("categories are left out"), std::string::npos);
+  EXPECT_NE(warnings[0].find("categories of instances left out"), std::string::npos);
   EXPECT_EQ(vox_unsupported_features(loaded).value(), warnings);
 }
 

@@ -287,7 +287,7 @@ void Writer::warn(std::vector<std::string>& warnings) const {
   };
   count("instances rounded to whole voxels", graph_.rounded);
   count("instances more than 1,000 voxels from the origin, outside MagicaVoxel's world", graph_.beyond_limit);
-  count("groups whose rotation is left out, not supported by .vox", graph_.turns_left_out);
+  count("rotations of groups left out, not supported by .vox", graph_.turns_left_out);
   count("animation frames left out, since their model was removed", graph_.frames_left_out);
   count("models of other frames left unchanged, since they exceed 256 voxels", models_left_as_they_were());
   count("unused palette colours replaced by new ones", types_.replaced);
@@ -298,8 +298,8 @@ void Writer::warn(std::vector<std::string>& warnings) const {
   });
   std::int64_t with_data = 0;
   scene_.grids().for_each([&](GridHandle, const SceneGrid& grid) { with_data += grid.grid.data_count(); });
-  count("voxels whose data is left out, not supported by .vox (.json stores it)", with_data);
-  count("instances whose categories are left out, not supported by .vox (.json stores them)", categories);
+  count("data of voxels left out, not supported by .vox (.json stores it)", with_data);
+  count("categories of instances left out, not supported by .vox (.json stores them)", categories);
   if (view_.has_more_settings) warnings.emplace_back("render settings left out, except the sun's");
   warnings.insert(warnings.end(), lost_.begin(), lost_.end());
 }
