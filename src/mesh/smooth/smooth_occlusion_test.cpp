@@ -204,13 +204,13 @@ TEST(SmoothOcclusionDeathTest, PlacesThatDoNotFitAreAMistake) {
   const std::span<const Vec3> two = std::span(three).first(2);
   std::vector<float> out(2);
   QUOIN_EXPECT_MISTAKE((void)smooth_occlusion(field, {three, two}, {}, out), "as many normals as positions");
-  QUOIN_EXPECT_MISTAKE((void)smooth_occlusion(field, {three, three}, {}, out), "room for every place");
+  QUOIN_EXPECT_MISTAKE((void)smooth_occlusion(field, {three, three}, {}, out), "a value for every sample");
   // An impossible number of samples, which must not be read.
   const std::span<const Vec3> many(three.data(), std::size_t{1} << 32);
   const std::span<float> room(out.data(), many.size());
   QUOIN_EXPECT_MISTAKE((void)smooth_occlusion(field, {many, many}, {}, room), "fewer than 2.32 samples");
   SmoothOccluder occluder;
-  QUOIN_EXPECT_MISTAKE(occluder.occlude({}, {three, three}, {}, out), "room for every place");
+  QUOIN_EXPECT_MISTAKE(occluder.occlude({}, {three, three}, {}, out), "a value for every sample");
 }
 
 }  // namespace
