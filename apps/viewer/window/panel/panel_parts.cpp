@@ -153,7 +153,7 @@ void report_plain_light(const ViewState& state) {
   if (!state.open.backend || state.open.backend->stats().empty()) return;
   if (state.open.backend->traces_light(state.settings.mode)) return;
   ImGui::TextWrapped(
-      "Without a graphics card, smooth meshes of so large a scene lack shadows, lamps and glass depth. Use F5 or F6.");
+      "Without a graphics card, smooth meshes of large scenes have no shadows, lamps or glass depth. Use F5 or F6.");
 }
 
 }  // namespace
@@ -346,7 +346,7 @@ void draw_light_part(ViewState& state) {
   ImGui::EndDisabled();
   if (is_by_rays && !has_shadows && ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled)) {
     ImGui::SetTooltip(
-        "smooth meshes of so large a scene need a graphics card for shadows; ray marching (F5) and blocks (F6)\n"
+        "smooth meshes of large scenes need a graphics card for shadows; ray marching (F5) and blocks (F6)\n"
         "always have them");
   }
   ImGui::BeginDisabled(!is_by_rays);
