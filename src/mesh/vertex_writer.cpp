@@ -316,7 +316,7 @@ VertexWriter::VertexWriter(VertexLayout layout, const VoxelRegistry& types) : la
 }
 
 void VertexWriter::write(std::span<const Quad> quads, Vec3 origin, std::span<std::byte> out) const {
-  QUOIN_ASSERT(out.size() >= bytes_needed(vertices_needed(quads.size())), "room for four vertices a quad");
+  QUOIN_ASSERT(out.size() >= bytes_needed(vertices_needed(quads.size())), "out holds 4 vertices per quad");
   QUOIN_ASSERT(origin_fits(layout_, origin), "positions are integers within the format's range");
   by_blocks(quads.size(), 4, layout_.stride, out.data(), [&](std::size_t first, std::size_t count, std::byte* block) {
     for (std::size_t i = 0; i < layout_.elements.size(); ++i)

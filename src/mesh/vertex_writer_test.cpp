@@ -286,7 +286,7 @@ TEST(VertexWriterDeathTest, MismatchedBuffersAndLayoutsAreMistakes) {
   const VertexWriter writer({16, {{VertexAttribute::Position, Sint16x4, 0}, {VertexAttribute::Uv, Uint8x2, 8}}}, {});
   const QuadBuffer quads(2);
   std::vector<std::byte> out(8 * 16 - 1);
-  QUOIN_EXPECT_MISTAKE(writer.write(quads, Vec3(0.0F), out), "room for four vertices a quad");
+  QUOIN_EXPECT_MISTAKE(writer.write(quads, Vec3(0.0F), out), "out holds 4 vertices per quad");
   out.resize(8 * 16);
   QUOIN_EXPECT_MISTAKE(writer.write(quads, Vec3(0.5F), out), "positions are integers within the format's range");
   QUOIN_EXPECT_MISTAKE(writer.write(quads, Vec3(32'704.0F), out), "positions are integers within the format's range");
@@ -301,7 +301,7 @@ TEST(VertexWriterDeathTest, MismatchedBuffersAndLayoutsAreMistakes) {
   chunk.positions.resize(3);
   QUOIN_EXPECT_MISTAKE(positions.write(chunk, Vec3(0.0F), std::span(out).first(35)), "room for the vertices");
   std::vector<std::uint16_t> indices(11);
-  QUOIN_EXPECT_MISTAKE(write_indices<std::uint16_t>(std::span(quads), 0, indices), "room for six indices a quad");
+  QUOIN_EXPECT_MISTAKE(write_indices<std::uint16_t>(std::span(quads), 0, indices), "out holds 6 indices per quad");
   indices.resize(12);
   QUOIN_EXPECT_MISTAKE(write_indices<std::uint16_t>(std::span(quads), 65'528, indices), "indices fit their type");
   const std::vector<std::uint32_t> far = {0, 1, 65'535};

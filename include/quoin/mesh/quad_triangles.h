@@ -103,7 +103,7 @@ template <class Index>
 void write_indices(std::span<const Quad> quads, std::size_t first_vertex, std::span<Index> out,
                    Winding winding = Winding::CounterClockwise) {
   static_assert(std::is_same_v<Index, std::uint16_t> || std::is_same_v<Index, std::uint32_t>);
-  QUOIN_ASSERT(out.size() >= indices_needed(quads.size()), "room for six indices a quad");
+  QUOIN_ASSERT(out.size() >= indices_needed(quads.size()), "out holds 6 indices per quad");
   QUOIN_ASSERT(first_vertex + vertices_needed(quads.size()) <= std::numeric_limits<Index>::max(),
                "indices fit their type");
   Index* next = out.data();

@@ -14,7 +14,7 @@ namespace {
 constexpr std::uint64_t kOdd = 0xAAAA'AAAA'AAAA'AAAAU;
 constexpr std::uint64_t kLowHalf = 0xFFFF'FFFFU;
 
-// A bit a cell.
+// Masks with one bit per cell.
 struct WordCells {
   std::uint64_t any = 0;
   std::uint64_t half = 0;

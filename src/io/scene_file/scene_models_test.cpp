@@ -278,7 +278,7 @@ TEST(SceneModels, StoresUncompressedWhereReadingWouldTakeTooMuchMemory) {
   for (int i = 0; i < kChunks * kChunks; ++i) grid.grid.put_chunk({i % kChunks, 0, i / kChunks}, Chunk(1));
   scene.add_grid(std::move(grid));
   const auto bytes = written(scene);
-  EXPECT_GT(bytes.size(), std::size_t{kChunks} * kChunks * 18) << "18 bytes a chunk";
+  EXPECT_GT(bytes.size(), std::size_t{kChunks} * kChunks * 18) << "18 bytes per chunk";
   const auto read = load_scene(bytes);
   ASSERT_TRUE(read) << to_string(read.error());
   expect_equal(scene, read->scene);

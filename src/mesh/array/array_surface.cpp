@@ -56,7 +56,7 @@ class SplitCells {
   static std::uint32_t vertex_on_edge(const void* split_cells, std::uint32_t vertex, unsigned edge);
 
   std::vector<Cell> cells_;              // by vertex
-  std::vector<std::uint64_t> is_split_;  // a bit a vertex
+  std::vector<std::uint64_t> is_split_;  // one bit per vertex
   std::uint64_t extra_ = 0;
 };
 

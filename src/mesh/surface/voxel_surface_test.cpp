@@ -117,7 +117,7 @@ TEST(SmoothVoxels, EachVisibleFaceOfAVoxelIsAQuadOfItsColour) {
     const SmoothMesh beads = mesh_of(grid, separate);
     quads.clear();
     for (std::size_t i = 0; i < beads.indices.size(); i += 3) ++quads[beads.types[beads.indices[i]]];
-    EXPECT_EQ(quads, faces) << "two triangles a face";
+    EXPECT_EQ(quads, faces) << "two triangles per face";
     for (std::size_t i = 0; i < mesh.types.size(); ++i) {
       const Rgba8 colour = types[mesh.types[i]].colour;
       EXPECT_EQ(mesh.albedo[i][3], 65'535);
