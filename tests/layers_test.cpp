@@ -1,5 +1,5 @@
 // A folder includes only folders above it, and never a sibling on its own level. The private headers of a layer stay
-// private except for the headers listed here. The rooms of a layer do not include each other in a circle.
+// private except for the headers listed here. The folders of a layer do not include each other in a cycle.
 
 #include <algorithm>
 #include <filesystem>
@@ -84,7 +84,7 @@ const std::map<std::string, int> kLargerFolders = {};
 
 // Returns the reason if a file of `folder` must not include `path`. Paths are as written: <quoin/grid/grid.h> or
 // "grid/x.h".
-std::optional<std::string> breach(const std::string& folder, int level, const std::string& path) {
+std::optional<std::string> forbidden_include(const std::string& folder, int level, const std::string& path) {
   const std::string inner = path.rfind("quoin/", 0) == 0 ? path.substr(6) : path;
   const auto slash = inner.find('/');
   if (slash == std::string::npos) return std::nullopt;
@@ -113,9 +113,9 @@ struct Include {
 
 struct Source {
   fs::path file;
-  fs::path place;  // relative to the top: grid/chunk/chunk.cpp
+  fs::path path;  // relative to the top: grid/chunk/chunk.cpp
   std::vector<Include> includes;
-  [[nodiscard]] std::string layer() const { return place.begin()->string(); }
+  [[nodiscard]] std::string layer() const { return path.begin()->string(); }
 };
 
 std::vector<Include> includes_of(const fs::path& file) {
@@ -142,7 +142,7 @@ std::vector<Source> sources_of(const std::string& top) {
 }
 
 // Returns the reason if a file of a layer must not include another layer's private header.
-std::optional<std::string> trespass(const std::string& layer, const Include& include) {
+std::optional<std::string> forbidden_private_include(const std::string& layer, const Include& include) {
   if (!include.quoted) return std::nullopt;
   const std::string owner = fs::path(include.path).begin()->string();
   if (owner == layer || owner == "core" || !kLevels.contains(owner)) return std::nullopt;
@@ -151,17 +151,17 @@ std::optional<std::string> trespass(const std::string& layer, const Include& inc
   return include.path + " is private to " + owner + ", and not lent to " + layer;
 }
 
-// Returns the room of a file or an include within its layer: "chunk" for grid/chunk/chunk.h, "" for files that the
-// layer's rooms share.
-std::string room_of(const fs::path& place) {
-  const std::string room = place.parent_path().lexically_relative(*place.begin()).generic_string();
-  return room == "." ? "" : room;
+// Returns the folder of a file or an include within its layer: "chunk" for grid/chunk/chunk.h, "" for files directly in
+// the layer.
+std::string folder_of(const fs::path& path) {
+  const std::string folder = path.parent_path().lexically_relative(*path.begin()).generic_string();
+  return folder == "." ? "" : folder;
 }
 
 using Graph = std::map<std::string, std::set<std::string>>;
 
 // Returns a path from a node back to itself, if there is one.
-std::vector<std::string> circle_in(const Graph& graph) {
+std::vector<std::string> cycle_in(const Graph& graph) {
   std::set<std::string> done;
   std::vector<std::string> path;
   const std::function<bool(const std::string&)> visit = [&](const std::string& node) {
@@ -183,14 +183,14 @@ std::vector<std::string> circle_in(const Graph& graph) {
   return {};
 }
 
-TEST(Layers, AWrongIncludeIsABreach) {
-  EXPECT_TRUE(breach("grid", 1, "quoin/mesh/quad.h").has_value());
-  EXPECT_TRUE(breach("mesh", 2, "trace/ray.h").has_value()) << "siblings";
-  EXPECT_TRUE(breach("io", 5, "quoin/render/cpu_renderer.h").has_value()) << "siblings";
-  EXPECT_TRUE(breach("grid", 1, "../mesh/watertight.h").has_value());
-  EXPECT_FALSE(breach("io", 5, "quoin/mesh/quad.h").has_value());
-  EXPECT_FALSE(breach("mesh", 2, "mesh/blocky/chunk_triangles.h").has_value());
-  EXPECT_FALSE(breach("mesh", 2, "vector").has_value());
+TEST(Layers, FindsForbiddenIncludes) {
+  EXPECT_TRUE(forbidden_include("grid", 1, "quoin/mesh/quad.h").has_value());
+  EXPECT_TRUE(forbidden_include("mesh", 2, "trace/ray.h").has_value()) << "siblings";
+  EXPECT_TRUE(forbidden_include("io", 5, "quoin/render/cpu_renderer.h").has_value()) << "siblings";
+  EXPECT_TRUE(forbidden_include("grid", 1, "../mesh/watertight.h").has_value());
+  EXPECT_FALSE(forbidden_include("io", 5, "quoin/mesh/quad.h").has_value());
+  EXPECT_FALSE(forbidden_include("mesh", 2, "mesh/blocky/chunk_triangles.h").has_value());
+  EXPECT_FALSE(forbidden_include("mesh", 2, "vector").has_value());
 }
 
 TEST(Layers, NoSourceIncludesUpwardsOrSideways) {
@@ -200,13 +200,13 @@ TEST(Layers, NoSourceIncludesUpwardsOrSideways) {
       if (is_test(source.file)) continue;
       const bool is_app = std::string(top) == "apps";
       const auto level = kLevels.find(source.layer());
-      const bool is_root_header = !source.place.has_parent_path();
+      const bool is_root_header = !source.path.has_parent_path();
       if (!is_app && !is_root_header) {
         ASSERT_NE(level, kLevels.end()) << source.file << " lies in no layer";
       }
       for (const Include& include : source.includes) {
         const auto problem =
-            breach(source.layer(), is_app || is_root_header ? kAppsLevel : level->second, include.path);
+            forbidden_include(source.layer(), is_app || is_root_header ? kAppsLevel : level->second, include.path);
         EXPECT_FALSE(problem.has_value()) << source.file << ": " << problem.value_or("");
       }
       ++files;
@@ -215,13 +215,13 @@ TEST(Layers, NoSourceIncludesUpwardsOrSideways) {
   EXPECT_GT(files, 40);
 }
 
-TEST(Layers, APrivateHeaderThatIsNotLentIsATrespass) {
-  EXPECT_TRUE(trespass("terrain", {"grid/chunk/chunk_storage.h", true}).has_value());
-  EXPECT_TRUE(trespass("mesh", {"grid/chunk_table.h", true}).has_value());
-  EXPECT_FALSE(trespass("mesh", {"grid/chunk/chunk_storage.h", true}).has_value());
-  EXPECT_FALSE(trespass("grid", {"grid/chunk_table.h", true}).has_value());
-  EXPECT_FALSE(trespass("mesh", {"core/srgb.h", true}).has_value());
-  EXPECT_FALSE(trespass("mesh", {"quoin/grid/grid.h", false}).has_value());
+TEST(Layers, FindsForbiddenPrivateIncludes) {
+  EXPECT_TRUE(forbidden_private_include("terrain", {"grid/chunk/chunk_storage.h", true}).has_value());
+  EXPECT_TRUE(forbidden_private_include("mesh", {"grid/chunk_table.h", true}).has_value());
+  EXPECT_FALSE(forbidden_private_include("mesh", {"grid/chunk/chunk_storage.h", true}).has_value());
+  EXPECT_FALSE(forbidden_private_include("grid", {"grid/chunk_table.h", true}).has_value());
+  EXPECT_FALSE(forbidden_private_include("mesh", {"core/srgb.h", true}).has_value());
+  EXPECT_FALSE(forbidden_private_include("mesh", {"quoin/grid/grid.h", false}).has_value());
 }
 
 TEST(Layers, PrivateHeadersAreUsedInTheirLayerOrLent) {
@@ -230,7 +230,7 @@ TEST(Layers, PrivateHeadersAreUsedInTheirLayerOrLent) {
     if (is_for_tests(source.file)) continue;
     for (const Include& include : source.includes) {
       users[include.path].insert(source.layer());
-      const auto problem = trespass(source.layer(), include);
+      const auto problem = forbidden_private_include(source.layer(), include);
       EXPECT_FALSE(problem.has_value()) << source.file << ": " << problem.value_or("");
     }
   }
@@ -258,7 +258,7 @@ TEST(Layers, TheHeaderOfEverythingIncludesEveryPublicHeader) {
   std::set<std::string> included;
   for (const Include& include : includes_of(root / "quoin/quoin.h")) included.insert(include.path);
   for (const Source& source : sources_of("include")) {
-    const std::string name = source.place.generic_string();
+    const std::string name = source.path.generic_string();
     EXPECT_EQ(included.contains(name), name != "quoin/quoin.h") << name;
   }
 }
@@ -331,30 +331,30 @@ TEST(Layers, PrivateHeadersAreNamedByTheirFullPath) {
   }
 }
 
-TEST(Layers, ACircleOfRoomsIsFound) {
-  EXPECT_EQ(circle_in({{"a", {"b"}}, {"b", {"c"}}, {"c", {"a"}}}).size(), 4);
-  EXPECT_TRUE(circle_in({{"a", {"b", "c"}}, {"b", {"d"}}, {"c", {"d"}}}).empty());
-  EXPECT_EQ(room_of("grid/chunk/chunk.cpp"), "chunk");
-  EXPECT_EQ(room_of("grid/grid.cpp"), "");
+TEST(Layers, FindsCycles) {
+  EXPECT_EQ(cycle_in({{"a", {"b"}}, {"b", {"c"}}, {"c", {"a"}}}).size(), 4);
+  EXPECT_TRUE(cycle_in({{"a", {"b", "c"}}, {"b", {"d"}}, {"c", {"d"}}}).empty());
+  EXPECT_EQ(folder_of("grid/chunk/chunk.cpp"), "chunk");
+  EXPECT_EQ(folder_of("grid/grid.cpp"), "");
 }
 
-// Any room may use the shared files of its layer, and shared files may use the rooms.
-TEST(Layers, RoomsOfALayerDoNotLeanOnEachOtherInACircle) {
+// Files directly in a layer may include its folders, and its folders may include them.
+TEST(Layers, HasNoCyclesBetweenFolders) {
   std::map<std::string, Graph> layers;
   for (const Source& source : sources_of("src")) {
-    const std::string room = room_of(source.place);
-    if (is_for_tests(source.file) || room.empty()) continue;
+    const std::string folder = folder_of(source.path);
+    if (is_for_tests(source.file) || folder.empty()) continue;
     for (const Include& include : source.includes) {
       if (!include.quoted || *fs::path(include.path).begin() != source.layer()) continue;
-      const std::string other = room_of(include.path);
-      if (!other.empty() && other != room) layers[source.layer()][room].insert(other);
+      const std::string other = folder_of(include.path);
+      if (!other.empty() && other != folder) layers[source.layer()][folder].insert(other);
     }
   }
   EXPECT_FALSE(layers.empty());
-  for (const auto& [layer, rooms] : layers) {
-    std::string way;
-    for (const std::string& room : circle_in(rooms)) way += (way.empty() ? "" : " -> ") + room;
-    EXPECT_EQ(way, "") << "in " << layer;
+  for (const auto& [layer, folders] : layers) {
+    std::string cycle;
+    for (const std::string& folder : cycle_in(folders)) cycle += (cycle.empty() ? "" : " -> ") + folder;
+    EXPECT_EQ(cycle, "") << "in " << layer;
   }
 }
 
@@ -381,7 +381,7 @@ TEST(Layers, TestHeadersSaySoByName) {
   }
 }
 
-TEST(Layers, NoFolderHoldsMoreFilesThanARoomShould) {
+TEST(Layers, KeepsFoldersBelowMaxFiles) {
   std::map<std::string, int> files;
   const fs::path root = QUOIN_SOURCE_DIR;
   for (const char* top : {"src", "include/quoin", "apps", "examples"}) {

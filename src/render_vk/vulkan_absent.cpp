@@ -1,4 +1,4 @@
-// In place of all that lies in this folder's rooms where the library is built without Vulkan.
+// Replaces the folders of this layer if the library is built without Vulkan.
 
 #include <quoin/render_vk/vulkan_device.h>
 #include <quoin/render_vk/vulkan_image.h>

@@ -198,7 +198,7 @@ TEST(SmoothOcclusionOfPlaces, CancelsWhereProgressSaysSo) {
   EXPECT_EQ(cancelled.error().code, ErrorCode::Cancelled);
 }
 
-TEST(SmoothOcclusionDeathTest, PlacesThatDoNotFitAreAMistake) {
+TEST(SmoothOcclusionDeathTest, SamplesThatDoNotFitAreAMistake) {
   const DensityGrid field;
   const std::vector<Vec3> three(3, Vec3(0, 1, 0));
   const std::span<const Vec3> two = std::span(three).first(2);
