@@ -25,15 +25,16 @@ namespace fs = std::filesystem;
 using Words = std::vector<std::string>;
 
 const std::set<std::string> kAfterWhat = {
-    "is",    "was",   "are",  "were",  "it",     "they",   "one",     "a",       "an",      "the",
-    "that",  "has",   "had",  "have",  "lies",   "stands", "changed", "became",  "becomes", "comes",
-    "goes",  "does",  "did",  "can",   "cannot", "must",   "may",     "of",      "no",      "this",
-    "there", "in",    "work", "works", "make",   "makes",  "hold",    "holds",   "other",   "others",
-    "file",  "files", "edit", "edits", "ray",    "rays",   "picture", "pictures"};
+    "is",     "was",   "are",   "were",   "it",      "they",   "one",     "a",     "an",   "the",   "that", "has",
+    "had",    "have",  "lies",  "stands", "changed", "became", "becomes", "comes", "goes", "does",  "did",  "can",
+    "cannot", "must",  "may",   "of",     "no",      "this",   "there",   "in",    "work", "works", "make", "makes",
+    "hold",   "holds", "other", "others", "file",    "files",  "edit",    "edits", "ray",  "rays"};
 const std::set<std::string> kPronouns = {"whoever", "whatever", "whichever", "nobody"};
 const std::set<std::string> kPrepositions = {"of",   "by",  "to",    "from",   "at",     "on",
                                              "with", "for", "about", "beyond", "behind", "beside"};
-const std::set<std::string> kOldWords = {"beside", "besides", "anew", "likewise", "mend", "mended", "tells", "told"};
+const std::set<std::string> kOldWords = {"beside",   "besides", "anew",  "likewise", "mend",
+                                         "mended",   "mends",   "tells", "told",     "picture",
+                                         "pictures", "twin",    "twins", "movie",    "movies"};
 const std::set<std::string> kOpeners = {"what", "whether", "of", "how", "where", "that", "whoever", "which"};
 
 Words words_of(std::string_view text) {
@@ -66,6 +67,16 @@ std::string hard_phrase(const Words& words) {
     if (is_comparison && words[i + 2] == "of") return word + " " + next + " of";
   }
   return "";
+}
+
+/// Returns a share without "per" ("4 bits a voxel" instead of "4 bits per voxel"), or "".
+std::string share_without_per(const std::string& text) {
+  if (text.find(" a ") == std::string::npos) return "";
+  static const std::regex share(
+      "\\b(bits?|bytes?|words?|numbers?|values?|indices|vertices|triangles|quads|samples|rays|cycles|instructions) "
+      "a (voxel|vertex|cell|quad|face|pixel|chunk|row|sample|slab|brick|corner|triangle|ray|node|frame)\\b");
+  std::smatch found;
+  return std::regex_search(text, found, share) ? found.str() : "";
 }
 
 enum class Kind { Code, Script, Python, Document };
@@ -131,6 +142,7 @@ class Prose {
 std::string find_error(const std::string& line, Prose& prose) {
   const std::string text = prose.of_line(line);
   if (const std::string phrase = hard_phrase(words_of(text)); !phrase.empty()) return phrase;
+  if (const std::string share = share_without_per(text); !share.empty()) return share;
   const std::size_t begin = line.find_first_not_of(' ');
   if (begin == std::string::npos) return "";
   if (line.compare(begin, 2, "//") == 0) {
@@ -235,8 +247,10 @@ TEST(English, OldNamesAreGone) {
   const std::regex old(
       R"re(\b(losses_of_\w*|fault_of_\w*|files_read_beside|only_in_source|FieldOfMesh|SmoothPlaces|ChunkPlace|)re"
       R"re(PicturePoint|texture_places|has_place|displacement_to_free_place|carried_point|apart_from|)re"
-      R"re(is_beside|kApart|kNobody|Lender|EditNotices?|Wishes|Arrival|hurries|let_go|owes_all|owed_removals|)re"
-      R"re(keep_what_is_asked_for|stand_at_unit_size|occlusion_apart)\b)re");
+      R"re(is_beside|kApart|kNobody|Lender|EditNotices?|NoticeOfEdits|Wishes|Arrival|hurries|let_go|owes_all|)re"
+      R"re(owed_removals|keep_what_is_asked_for|stand_at_unit_size|occlusion_apart|SlicePlace|MousePlace|)re"
+      R"re(by_place_|what_is_wrong\w*|mend_\w+|mended_?|trespass|room_of|circle_in|[Tt]wins?|DataTwin)\b|)re"
+      R"re([Pp]icture)re");
   int files = 0;
   for (const char* const top : {"src", "include", "apps", "examples", "bench", "tests"}) {
     for (const auto& entry : fs::recursive_directory_iterator(fs::path(QUOIN_SOURCE_DIR) / top)) {
@@ -269,6 +283,8 @@ TEST(English, FindsHardPhrases) {
   EXPECT_EQ(found(Kind::Document, "Files go beside the input."), "beside");
   EXPECT_EQ(found(Kind::Document, "See [066](archive/066-what-a-view-shows.md)."), "");
   EXPECT_EQ(found(Kind::Document, "See [beside](a.md)."), "beside");
+  EXPECT_EQ(found(Kind::Document, "It takes 4 bits a voxel."), "bits a voxel");
+  EXPECT_EQ(found(Kind::Document, "It takes 4 bits per voxel. A row has 64 bits. A voxel has one."), "");
   EXPECT_EQ(found(Kind::Python, "x = 1  # as those of the grid"), "as those of");
   EXPECT_EQ(found(Kind::Code, "TEST(Ray, ThatMisses) {"), "test name opens with That");
   EXPECT_EQ(found(Kind::Code, "/// Returns true if the grid is empty."), "");
