@@ -2,9 +2,16 @@
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include <quoin/core/parallel.h>
+#include <quoin/io/volume.h>
 #include <quoin/io/vox.h>
+#include <quoin/mesh/smooth.h>
+
+#include "options.h"
 
 namespace quoin::tool {
 
@@ -50,6 +57,29 @@ inline constexpr const char* kForceHelp = "Overwrite OUT even if it is a voxel f
 /// Accepts a file name that is not empty.
 [[nodiscard]] CLI::Validator file_name();
 
+/// Adds --quiet.
+void add_quiet_option(CLI::App& command);
+
+/// Adds --raw-size, --raw-type and --raw-order.
+void add_raw_options(CLI::App& command, std::optional<RawVolume>& raw);
+/// Adds --iso and the raw options. `exact_iso`: also receives the value of --iso, which `load` rounds to float.
+void add_volume_options(CLI::App& command, LoadOptions& load, std::optional<double>* exact_iso = nullptr);
+
+/// Returns the rules of the raw options.
+[[nodiscard]] std::vector<OptionRule> raw_rules();
+
+/// Reads the input as a volume. Errors: those of read_volume and read_raw_volume.
+[[nodiscard]] Result<Volume> read_input_volume(const CommonOptions& options, const Progress& progress);
+
+/// The options of smooth occlusion.
+inline const std::vector<std::string> kFieldOcclusion = {"--ao-form", "--ao-spread", "--ao-offset", "--ao-power"};
+
+/// Adds these options.
+void add_field_occlusion_options(CLI::App& command, SmoothOcclusionOptions& options);
+
+/// Returns the rules between these options. Requires: `options` outlives the rules.
+[[nodiscard]] std::vector<OptionRule> field_occlusion_rules(const SmoothOcclusionOptions& options);
+
 /// Each function adds one command. When the command is parsed it runs, and sets `status` to its exit status.
 void add_info_command(CLI::App& app, int& status);
 void add_convert_command(CLI::App& app, int& status);
@@ -60,8 +90,5 @@ void add_view_command(CLI::App& app, int& status);
 void add_world_command(CLI::App& app, int& status);
 /// Adds `completions` and `man`, which describe all commands.
 void add_shell_commands(CLI::App& app, int& status);
-
-/// Adds --quiet.
-void add_quiet_option(CLI::App& command);
 
 }  // namespace quoin::tool

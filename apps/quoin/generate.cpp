@@ -6,15 +6,13 @@
 #include <quoin/stream/streamed_world.h>
 #include <quoin/terrain/terrain.h>
 
+#include "command_files.h"
 #include "commands.h"
-#include "interrupt.h"
-#include "options/parse.h"
+#include "help.h"
+#include "options.h"
 #include "output.h"
-#include "output_files.h"
-#include "progress_bar.h"
 #include "render/small_image.h"
-#include "shell/help.h"
-#include "stopwatch.h"
+#include "run_control.h"
 
 namespace quoin::tool {
 

@@ -9,13 +9,10 @@
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_faces.h>
 
+#include "command_files.h"
 #include "commands.h"
-#include "interrupt.h"
-#include "opened_input.h"
-#include "options/volume_options.h"
 #include "output.h"
-#include "progress_bar.h"
-#include "scene_content.h"
+#include "run_control.h"
 #include "volume_info.h"
 
 namespace quoin::tool {

@@ -8,9 +8,9 @@
 #include <quoin/version.h>
 
 #include "commands.h"
-#include "interrupt.h"
+#include "help.h"
 #include "output.h"
-#include "shell/help.h"
+#include "run_control.h"
 
 namespace quoin::tool {
 

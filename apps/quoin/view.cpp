@@ -4,14 +4,12 @@
 
 #include <quoin/io/formats.h>
 
+#include "command_files.h"
 #include "commands.h"
-#include "interrupt.h"
-#include "opened_input.h"
-#include "options/parse.h"
-#include "options/volume_options.h"
+#include "help.h"
+#include "options.h"
 #include "output.h"
-#include "output_files.h"
-#include "shell/help.h"
+#include "run_control.h"
 #ifdef QUOIN_HAVE_VIEWER
 #include "viewer/window/viewer.h"
 #endif

@@ -2,9 +2,9 @@
 
 #include <quoin/io/volume.h>
 
-#include "options/volume_options.h"
+#include "commands.h"
 #include "output.h"
-#include "progress_bar.h"
+#include "run_control.h"
 
 namespace quoin::tool {
 

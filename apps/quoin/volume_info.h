@@ -1,7 +1,7 @@
 #pragma once
 
+#include "command_files.h"
 #include "commands.h"
-#include "standard_streams.h"
 
 namespace quoin::tool {
 

@@ -7,8 +7,8 @@
 #include <quoin/io/formats.h>
 
 #include "commands.h"
-#include "interrupt.h"
 #include "output.h"
+#include "run_control.h"
 
 namespace quoin::tool {
 

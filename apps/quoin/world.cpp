@@ -7,11 +7,10 @@
 #include <quoin/store/world_maintenance.h>
 #include <quoin/store/world_store.h>
 
+#include "command_files.h"
 #include "commands.h"
-#include "interrupt.h"
 #include "output.h"
-#include "output_files.h"
-#include "progress_bar.h"
+#include "run_control.h"
 
 namespace quoin::tool {
 

@@ -19,20 +19,14 @@
 #include <quoin/store/world_saver.h>
 #include <quoin/store/world_store.h>
 
+#include "command_files.h"
+#include "commands.h"
 #include "convert/mesh_input.h"
-#include "interrupt.h"
-#include "opened_input.h"
-#include "options/field_occlusion.h"
-#include "options/parse.h"
-#include "options/volume_options.h"
+#include "help.h"
+#include "options.h"
 #include "output.h"
-#include "output_files.h"
-#include "progress_bar.h"
 #include "render/small_image.h"
-#include "scene_content.h"
-#include "shell/help.h"
-#include "standard_streams.h"
-#include "stopwatch.h"
+#include "run_control.h"
 
 namespace quoin::tool {
 

@@ -15,11 +15,10 @@
 #include <quoin/scene/scene_faces.h>
 #include <quoin/scene/scene_meshes.h>
 
+#include "command_files.h"
 #include "commands.h"
 #include "output.h"
-#include "output_files.h"
-#include "progress_bar.h"
-#include "scene_content.h"
+#include "run_control.h"
 #include "watch.h"
 
 namespace quoin::tool {

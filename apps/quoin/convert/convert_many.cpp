@@ -10,8 +10,7 @@
 #include <quoin/io/formats.h>
 
 #include "convert/convert.h"
-#include "interrupt.h"
-#include "stopwatch.h"
+#include "run_control.h"
 
 namespace quoin::tool {
 

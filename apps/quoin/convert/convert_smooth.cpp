@@ -6,12 +6,10 @@
 
 #include <quoin/light/lit_meshes.h>
 
+#include "commands.h"
 #include "convert/convert.h"
-#include "interrupt.h"
-#include "options/volume_options.h"
-#include "progress_bar.h"
-#include "scene_content.h"
-#include "stopwatch.h"
+#include "output.h"
+#include "run_control.h"
 
 namespace quoin::tool {
 

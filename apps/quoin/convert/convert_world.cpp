@@ -6,9 +6,8 @@
 #include <quoin/store/world_store.h>
 
 #include "convert/convert.h"
-#include "interrupt.h"
-#include "scene_content.h"
-#include "stopwatch.h"
+#include "output.h"
+#include "run_control.h"
 
 namespace quoin::tool {
 

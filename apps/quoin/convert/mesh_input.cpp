@@ -1,6 +1,6 @@
 #include "convert/mesh_input.h"
 
-#include "shell/help.h"
+#include "help.h"
 
 namespace quoin::tool {
 

@@ -5,7 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <quoin/io/loaded_scene.h>
 
-#include "options/options.h"
+#include "options.h"
 
 namespace quoin::tool {
 

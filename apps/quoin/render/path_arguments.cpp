@@ -10,8 +10,7 @@
 #include <quoin/io/image_files.h>
 #include <quoin/io/sidecar_file.h>
 
-#include "options/options.h"
-#include "options/parse.h"
+#include "options.h"
 #include "render/image_output.h"
 #include "render/render_arguments.h"
 

@@ -10,19 +10,14 @@
 #include <quoin/scene/scene_faces.h>
 #include <quoin/scene/volume_scene.h>
 
-#include "interrupt.h"
-#include "opened_input.h"
+#include "command_files.h"
 #include "output.h"
-#include "output_files.h"
-#include "progress_bar.h"
 #include "render/camera_path.h"
 #include "render/image_output.h"
 #include "render/movie.h"
 #include "render/path_images.h"
 #include "render/render_arguments.h"
-#include "scene_content.h"
-#include "standard_streams.h"
-#include "stopwatch.h"
+#include "run_control.h"
 #include "watch.h"
 
 namespace quoin::tool {

@@ -10,14 +10,12 @@
 
 #include <quoin/io/file.h>
 
-#include "options/field_occlusion.h"
-#include "options/options.h"
-#include "options/parse.h"
-#include "options/volume_options.h"
+#include "command_files.h"
+#include "commands.h"
+#include "help.h"
+#include "options.h"
 #include "render/image_output.h"
 #include "render/movie.h"
-#include "shell/help.h"
-#include "standard_streams.h"
 
 namespace quoin::tool {
 

@@ -12,7 +12,7 @@
 #include <quoin/scene/environment.h>
 
 #include "commands.h"
-#include "options/options.h"
+#include "options.h"
 #include "render/path_arguments.h"
 
 namespace quoin::tool {

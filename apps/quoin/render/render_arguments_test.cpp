@@ -7,7 +7,7 @@
 
 #include <quoin/light/light_options.h>
 
-#include "shell/help.h"
+#include "help.h"
 
 namespace quoin::tool {
 

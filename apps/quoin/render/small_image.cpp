@@ -9,7 +9,7 @@
 #include <quoin/io/image_files.h>
 #include <quoin/render/cpu_renderer.h>
 
-#include "interrupt.h"
+#include "run_control.h"
 
 namespace quoin::tool {
 namespace {

@@ -4,16 +4,12 @@
 #include <quoin/io/formats.h>
 #include <quoin/io/image_files.h>
 
+#include "command_files.h"
 #include "commands.h"
-#include "interrupt.h"
-#include "opened_input.h"
+#include "help.h"
 #include "output.h"
-#include "output_files.h"
-#include "progress_bar.h"
 #include "render/small_image.h"
-#include "shell/help.h"
-#include "standard_streams.h"
-#include "stopwatch.h"
+#include "run_control.h"
 
 namespace quoin::tool {
 namespace {

@@ -1,10 +1,36 @@
-#include "shell/command_line.h"
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <string>
+#include <vector>
 
-#include "shell/help.h"
+#include <quoin/version.h>
+
+#include "commands.h"
+#include "help.h"
+#include "output.h"
 
 namespace quoin::tool {
 
 namespace {
+
+/// An option or positional argument of a command.
+struct OptionOfCommand {
+  std::vector<std::string> names;  ///< with their dashes; for a positional argument its name
+  std::string description;
+  std::string value;                 ///< type of the value: "NAME", "WxH"; empty for a flag
+  std::vector<std::string> choices;  ///< all allowed values; empty: any value
+};
+
+/// A command with its options and subcommands.
+struct CommandOfTool {
+  std::string path;  ///< "quoin generate terrain"
+  std::string name;
+  std::string description;
+  std::string footer;
+  std::vector<OptionOfCommand> options;
+  std::vector<OptionOfCommand> positionals;
+  std::vector<CommandOfTool> commands;
+};
 
 /// Returns the choices in a type: {"front", "back"} for "TEXT:{front,back}".
 std::vector<std::string> choices_in(const std::string& type) {
@@ -74,9 +100,8 @@ void for_each_command(const CommandOfTool& command, const Use& use) {
   for (const CommandOfTool& inner : command.commands) for_each_command(inner, use);
 }
 
-}  // namespace
-
-CommandOfTool describe(const CLI::App& app, const std::string& above) {
+/// Describes `app` and its subcommands. `above`: path of the parent command.
+CommandOfTool describe(const CLI::App& app, const std::string& above = "") {
   CommandOfTool command;
   command.name = app.get_name();
   command.path = above.empty() ? command.name : above + " " + command.name;
@@ -90,8 +115,6 @@ CommandOfTool describe(const CLI::App& app, const std::string& above) {
   }
   return command;
 }
-
-namespace {
 
 /// The lines of the three case statements in the script.
 struct BashCases {
@@ -122,8 +145,6 @@ BashCases bash_cases(const CommandOfTool& tool) {
   return cases;
 }
 
-}  // namespace
-
 std::string bash_completion(const CommandOfTool& tool) {
   const BashCases cases = bash_cases(tool);
   return "# Completes quoin in bash: source <(quoin completions bash)\n"
@@ -148,8 +169,6 @@ std::string bash_completion(const CommandOfTool& tool) {
          "}\n"
          "complete -o default -F _quoin quoin\n";
 }
-
-namespace {
 
 /// Escapes text for single quotes and brackets in _arguments.
 std::string zsh_text(const std::string& text) {
@@ -177,8 +196,6 @@ std::string zsh_options(const CommandOfTool& command) {
   }
   return text;
 }
-
-}  // namespace
 
 std::string zsh_completion(const CommandOfTool& tool) {
   std::string functions;
@@ -236,8 +253,6 @@ std::string fish_completion(const CommandOfTool& tool) {
   return text;
 }
 
-namespace {
-
 /// Escapes text so that roff takes no line for a request.
 std::string roff(const std::string& text) {
   std::string out = replaced(replaced(text, "\\", "\\e"), "-", "\\-");
@@ -261,8 +276,7 @@ void add_options(const std::vector<OptionOfCommand>& options, std::string& text)
   }
 }
 
-}  // namespace
-
+/// Returns the manual page in roff format.
 std::string man_page(const CommandOfTool& tool, const std::string& version) {
   std::string text = ".TH QUOIN 1 \"\" \"quoin " + roff(version) + "\" \"User Commands\"\n.SH NAME\nquoin \\- " +
                      roff(tool.description) + "\n.SH SYNOPSIS\n";
@@ -283,6 +297,29 @@ std::string man_page(const CommandOfTool& tool, const std::string& version) {
          ".SH EXIT STATUS\n.TP\n0\nSuccess.\n.TP\n1\nFailure: a file could not be read, written or rendered. Standard "
          "error "
          "gives the reason.\n.TP\n2\nThe command line is invalid.\n";
+}
+
+}  // namespace
+
+void add_shell_commands(CLI::App& app, int& status) {
+  CLI::App* completions = app.add_subcommand("completions", "Print a script that completes command lines in a shell");
+  const auto shell = std::make_shared<std::string>();
+  completions->add_option("SHELL", *shell, "bash, zsh or fish")
+      ->required()
+      ->check(CLI::IsMember({"bash", "zsh", "fish"}));
+  completions->footer(
+      "Example: quoin completions bash > ~/.local/share/bash-completion/completions/quoin\n"
+      "Example: quoin completions zsh > ~/.zfunc/_quoin\n"
+      "Example: quoin completions fish > ~/.config/fish/completions/quoin.fish");
+  completions->callback([&app, shell, &status] {
+    const CommandOfTool tool = describe(app);
+    status = print(*shell == "bash"  ? bash_completion(tool)
+                   : *shell == "zsh" ? zsh_completion(tool)
+                                     : fish_completion(tool));
+  });
+  CLI::App* man = app.add_subcommand("man", "Print the manual page, in roff");
+  man->footer("Example: quoin man > ~/.local/share/man/man1/quoin.1");
+  man->callback([&app, &status] { status = print(man_page(describe(app), std::string(version()))); });
 }
 
 }  // namespace quoin::tool

@@ -1,11 +1,29 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <set>
+#include <span>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <quoin/core/result.h>
+#include <quoin/io/formats.h>
 
 namespace quoin::tool {
+
+/// The input of a command, recognised once.
+struct OpenedInput {
+  DetectedFile file;
+  bool is_volume = false;  ///< by --raw-size or by its content
+
+  /// Returns true if --iso applies: to a volume, or to a .vdb, which may have fog grids.
+  [[nodiscard]] bool heeds_iso() const { return is_volume || file.format == FileFormat::Vdb; }
+};
+
+/// Recognises the input. Errors: CannotRead; InvalidArgument if --dimension was given and the file has no dimensions.
+[[nodiscard]] Result<OpenedInput> open_input(const std::filesystem::path& path, const LoadOptions& load);
 
 /// The file name that stands for standard input or output.
 inline constexpr const char* kStandardStream = "-";
@@ -40,5 +58,27 @@ class StandardStreams {
   std::filesystem::path input_;
   std::filesystem::path output_;
 };
+
+/// Fails if one of the files cannot be written, before the work starts. Ignores empty names.
+[[nodiscard]] Status check_outputs(const std::vector<std::filesystem::path>& files);
+
+/// A set of files, identified by device and inode, not by name.
+class FileSet {
+ public:
+  FileSet() = default;
+  /// Adds the named files that exist.
+  explicit FileSet(std::span<const std::filesystem::path> names);
+  [[nodiscard]] bool contains(const std::filesystem::path& name) const;
+
+ private:
+  std::set<std::pair<std::uint64_t, std::uint64_t>> files_;  // device and inode
+};
+
+/// Creates the folder of a file and its parents. Errors: CannotWrite.
+[[nodiscard]] Status make_folder_of(const std::filesystem::path& file);
+
+/// Fails if `output` is one of `inputs`, or, unless `force`, an existing model, world or volume. Meshes, images and
+/// files in unknown formats may be overwritten.
+[[nodiscard]] Status check_replaced(const std::filesystem::path& output, const FileSet& inputs, bool force);
 
 }  // namespace quoin::tool

@@ -1,8 +1,16 @@
-#include "interrupt.h"
+#include "run_control.h"
 
+#include <unistd.h>
+
+#include <algorithm>
 #include <array>
 #include <atomic>
+#include <cmath>
 #include <csignal>
+#include <cstdio>
+#include <utility>
+
+#include "output.h"
 
 namespace quoin::tool {
 
@@ -53,6 +61,38 @@ void die_if_interrupted() {
   if (signal == 0) return;
   std::signal(signal, SIG_DFL);
   std::raise(signal);
+}
+
+namespace {
+
+constexpr int kBarWidth = 40;
+constexpr auto kPatience = std::chrono::seconds(1);
+constexpr auto kInterval = std::chrono::milliseconds(100);
+
+}  // namespace
+
+ProgressBar::ProgressBar(bool shows)
+    : terminal_(shows && !is_quiet() && isatty(STDERR_FILENO) == 1), next_(start_ + kPatience) {}
+
+ProgressBar::~ProgressBar() {
+  if (shown_) std::fputs("\r\033[K", stderr);
+}
+
+Progress ProgressBar::listener(std::string label) {
+  return [this, label = std::move(label)](double fraction) {
+    if (terminal_ && Clock::now() >= next_) show(label, fraction);
+    return !was_interrupted();
+  };
+}
+
+void ProgressBar::show(const std::string& label, double fraction) {
+  next_ = Clock::now() + kInterval;
+  shown_ = true;
+  const int filled = static_cast<int>(std::lround(std::clamp(fraction, 0.0, 1.0) * kBarWidth));
+  const std::string bar = std::string(static_cast<std::size_t>(filled), '#') +
+                          std::string(static_cast<std::size_t>(kBarWidth - filled), '.');
+  std::fprintf(stderr, "\r%-8s [%s] %3d%%", label.c_str(), bar.c_str(), filled * 100 / kBarWidth);
+  std::fflush(stderr);
 }
 
 }  // namespace quoin::tool

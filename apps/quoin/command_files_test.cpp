@@ -1,4 +1,4 @@
-#include "opened_input.h"
+#include "command_files.h"
 
 #include <fstream>
 #include <string>

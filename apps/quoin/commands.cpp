@@ -1,12 +1,14 @@
+#include "commands.h"
+
+#include <bit>
 #include <charconv>
 #include <cmath>
 #include <optional>
 #include <string>
 
-#include "commands.h"
-#include "options/parse.h"
+#include "help.h"
+#include "options.h"
 #include "output.h"
-#include "shell/help.h"
 
 namespace quoin::tool {
 
@@ -136,6 +138,124 @@ void add_common_options(CLI::App& command, CommonOptions& options) {
 std::string readable_files() {
   return "Reads " + extensions_with(FormatCapability::Read) +
          ".\nAlso reads .mcr, .linear, .hdr (NIfTI pairs), and world folders of Minecraft and Luanti.\n";
+}
+
+namespace {
+
+std::optional<IVec3> parse_raw_size(const std::string& text) {
+  const auto size = parse_box_size(text);
+  return size && size->x >= 1 && size->y >= 1 && size->z >= 1 ? size : std::nullopt;
+}
+
+std::optional<ScalarType> scalar_type(const std::string& name) {
+  for (int i = 0; i <= static_cast<int>(ScalarType::Float64); ++i) {
+    if (name_of(static_cast<ScalarType>(i)) == name) return static_cast<ScalarType>(i);
+  }
+  return std::nullopt;
+}
+
+/// Accepts numbers in the range of float, and texts that are no numbers.
+CLI::Validator in_range_of_float() {
+  return {[](std::string& text) {
+            const auto number = parse_number(text);
+            if (!number || std::isfinite(static_cast<float>(*number))) return std::string();
+            return "must be from -3.4e38 to 3.4e38, the range of 32-bit floats, not \"" + text + "\"";
+          },
+          ""};
+}
+
+}  // namespace
+
+void add_raw_options(CLI::App& command, std::optional<RawVolume>& raw) {
+  set_heading(command, heading::kVolumes);
+  add_parsed<IVec3>(
+      command, "--raw-size", "XxYxZ", {parse_raw_size, "XxYxZ, as in 256x256x128"},
+      [&raw](const IVec3& size) { raw.emplace().size = size; },
+      "Read IN as raw values without a header: number of values along each axis, x fastest");
+  // CLI11 reads options in the order in which they were added; raw_rules() refuses these without --raw-size.
+  add_parsed<ScalarType>(
+      command, "--raw-type", "TEXT",
+      {scalar_type, "uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32 or float64"},
+      [&raw](const ScalarType& type) {
+        if (raw) raw->type = type;
+      },
+      "Type of raw values: uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32 or float64 "
+      "(default uint8)");
+  add_choice<std::endian>(
+      command, "--raw-order", {{"little", std::endian::little}, {"big", std::endian::big}},
+      [&raw](const std::endian& order) {
+        if (raw) raw->order = order;
+      },
+      "Byte order of raw values: little or big (default little)");
+}
+
+void add_volume_options(CLI::App& command, LoadOptions& load, std::optional<double>* exact_iso) {
+  set_heading(command, heading::kVolumes);
+  add_parsed<double>(
+      command, "--iso", "X", number(),
+      [&load, exact_iso](const double& iso) {
+        load.iso = static_cast<float>(iso);
+        if (exact_iso != nullptr) *exact_iso = iso;
+      },
+      "Surface value of a volume or of a fog grid of a .vdb. Greater values are solid (default: a value "
+      "that separates the two main groups of values)")
+      ->check(in_range_of_float());
+  add_raw_options(command, load.raw);
+}
+
+std::vector<OptionRule> raw_rules() {
+  return {{{"--raw-type", "--raw-order"}, needs("--raw-size")}};
+}
+
+Result<Volume> read_input_volume(const CommonOptions& options, const Progress& progress) {
+  if (options.load.raw) return read_raw_volume(options.input, *options.load.raw, {}, progress);
+  VolumeOptions allowed;
+  allowed.sidecar_files = options.load.sidecar_files;
+  return read_volume(options.input, allowed, progress);
+}
+
+namespace {
+
+std::optional<SmoothOcclusion> parse_form(const std::string& text) {
+  const Choices<SmoothOcclusion> forms = {{"none", SmoothOcclusion::None},
+                                          {"soft-share", SmoothOcclusion::SoftShare},
+                                          {"share", SmoothOcclusion::SolidShare},
+                                          {"weighted", SmoothOcclusion::Weighted},
+                                          {"weighted-published", SmoothOcclusion::WeightedPublished}};
+  const auto found = std::ranges::find(forms, text, &std::pair<std::string, SmoothOcclusion>::first);
+  return found == forms.end() ? std::nullopt : std::optional(found->second);
+}
+
+}  // namespace
+
+void add_field_occlusion_options(CLI::App& command, SmoothOcclusionOptions& options) {
+  add_parsed<SmoothOcclusion>(
+      command, "--ao-form", "FORM", {parse_form, "none, soft-share, share, weighted or weighted-published"},
+      options.method,
+      "Ambient occlusion of smooth surfaces from 27 density samples around each vertex (default soft-share). "
+      "soft-share: share of solid samples, without steps. share: count of solid samples. weighted: by their depth in "
+      "the solid. weighted-published: by the published curve, which darkens open surfaces slightly. none: no "
+      "occlusion");
+  const auto add = [&](const char* name, const char* type, double least, double most, const char* range, float& value,
+                       const char* help) {
+    const auto set = [&value](const double& number) { value = static_cast<float>(number); };
+    add_parsed<double>(command, name, type, number_between(least, most, range), set, help);
+  };
+  add("--ao-spread", "SAMPLES", 0.0625, 4.0, "0.0625 to 4", options.spread,
+      "Spacing of the density samples of --ao-form, 0.0625 to 4 (default 2)");
+  add("--ao-offset", "X", 0.0, 0.99, "0 to 0.99", options.offset,
+      "Offset of the weights of the weighted forms, 0 to 0.99; greater is darker (default 0.4)");
+  add("--ao-power", "X", 0.0625, 64.0, "0.0625 to 64", options.power,
+      "Exponent of the weighted forms, 0.0625 to 64 (default 2)");
+}
+
+std::vector<OptionRule> field_occlusion_rules(const SmoothOcclusionOptions& options) {
+  const auto has_form = [&options](SmoothOcclusion form) { return options.method == form; };
+  const auto is_weighted = [has_form] {
+    return has_form(SmoothOcclusion::Weighted) || has_form(SmoothOcclusion::WeightedPublished);
+  };
+  return {{{"--ao-spread"}, excludes("--ao-form none", [has_form] { return has_form(SmoothOcclusion::None); })},
+          {{"--ao-offset", "--ao-power"}, needs("--ao-form weighted", is_weighted)}};
 }
 
 }  // namespace quoin::tool

@@ -1,10 +1,8 @@
-#include "options/options.h"
+#include "options.h"
 
 #include <limits>
 
 #include <gtest/gtest.h>
-
-#include "options/parse.h"
 
 namespace quoin::tool {
 
