@@ -132,6 +132,15 @@ using Converted = std::map<std::filesystem::path, Stamps>;
 /// have not changed, and adds those converted now.
 [[nodiscard]] WatchedWork run_many(const ConvertOptions& options, const ManyOptions& many, Converted& done);
 
+/// Runs `quoin convert`. Returns the exit status.
+[[nodiscard]] int run_convert(ConvertOptions& options, const ManyOptions& many);
+
+/// Adds --size, --voxel, --solid, --surface, --field, --separating, --parity, --band, --max-colours and --input-up.
+void add_mesh_input_options(CLI::App& command, MeshLoadOptions& options);
+
+/// Returns the rules between these options.
+[[nodiscard]] std::vector<OptionRule> mesh_input_rules();
+
 /// Writes meshes and fills in `outcome`.
 [[nodiscard]] Status write_meshes(SceneMeshes& meshes, const ConvertOptions& options, ProgressBar& bar,
                                   Outcome& outcome);

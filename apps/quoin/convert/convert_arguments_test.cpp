@@ -1,4 +1,4 @@
-#include "convert/mesh_input.h"
+#include "convert/convert.h"
 
 #include <string>
 #include <utility>
