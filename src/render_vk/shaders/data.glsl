@@ -243,3 +243,5 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
   uint light_mask;  // for slots of light-level bricks
   uvec2 paths;  // for path tracing: paths/path_data.glsl
 };
+
+#include "core.glsl"

@@ -3,9 +3,7 @@
 // rectangle's number. At equal depth the lower number wins. Numbers order by instance, then by part (level, coarser
 // level, unseen faces), then by rectangle.
 #include "compute.glsl"
-#include "hash.glsl"
 #include "far.glsl"
-#include "faces.glsl"
 
 layout(constant_id = 0) const bool kFindsFaces = false;
 

@@ -3,12 +3,10 @@
 #include "compute.glsl"
 #include "walk.glsl"
 #include "instances.glsl"
-#include "pairs.glsl"
 #include "camera.glsl"
 #define KEEPS_BODIES
 #include "lit.glsl"
 #include "glass.glsl"
-#include "count.glsl"
 
 // Distances are measured from the origin of view space, except `first_t`.
 void find_glass(uint slot, inout State state, out float first_t, out bool has_hit) {

@@ -3,19 +3,14 @@
 #include "compute.glsl"
 #include "walk.glsl"
 #include "instances.glsl"
-#include "pairs.glsl"
 #include "camera.glsl"
 
 layout(constant_id = 0) const bool kHasGlass = true;
 #define KEEPS_BODIES
 #include "lit.glsl"
 #include "glass.glsl"
-#include "count.glsl"
 #include "sky.glsl"
-#include "srgb.glsl"
-#include "lamps.glsl"
-#include "rays.glsl"
-#include "faces.glsl"
+#include "direct_light.glsl"
 #include "field_blend.glsl"
 #include "corners.glsl"
 #include "levels.glsl"
@@ -163,8 +158,8 @@ LevelPlace level_place(Point point) {
                     is_of_field(point) ? -1 : int(point.what.y));
 }
 
-// Computes the light of the sun and lamps at a surface point, and its openness. One loop over all rays; rays.glsl gives
-// the reason.
+// Computes the light of the sun and lamps at a surface point, and its openness. One loop over all rays;
+// direct_light.glsl gives the reason.
 void trace_light(Point point, Placed placed, uint slot, out vec3 light, out float openness) {
   GridRay ray = ray_from(point, placed);
   LightRays rays = rays_of(point, placed, ray);
@@ -256,8 +251,8 @@ vec3 normal_met(int instance, uint face, float t) {
   return face_normal(placed_at(instance), face);
 }
 
-// Lights this round's points of a pixel; returns true if that completes it. One loop over all points; rays.glsl gives
-// the reason.
+// Lights this round's points of a pixel; returns true if that completes it. One loop over all points;
+// direct_light.glsl gives the reason.
 bool light_pixel(uint slot, inout State state) {
   vec2 at = image_point();
   Point opaque = Points(frame().points).at[slot];

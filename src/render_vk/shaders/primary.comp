@@ -3,12 +3,8 @@
 #include "compute.glsl"
 #include "walk.glsl"
 #include "instances.glsl"
-#include "pairs.glsl"
 #include "camera.glsl"
-#include "count.glsl"
-#include "hash.glsl"
 #include "far.glsl"
-#include "faces.glsl"
 
 // Returns the middle of a surfel, from the lower end of its edge.
 vec3 middle_of_surfel(uint side, vec3 shape, vec2 shift) {

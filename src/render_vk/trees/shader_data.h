@@ -68,7 +68,7 @@ struct ShaderPlaced {
   IVec4 origin{0};
 };
 
-// Mirrors src/render_vk/shaders/lamps.glsl; bricks are LampTable::Brick.
+// Mirrors src/render_vk/shaders/direct_light.glsl; bricks are LampTable::Brick.
 struct ShaderLamp {
   Vec4 position{0.0F};
   std::array<Vec4, 3> axes{};

@@ -1,4 +1,4 @@
-// Numbers as sums of two floats, about 48 bits in total, three at a time: src/render_vk/shaders/pairs.glsl. If a
+// Numbers as sums of two floats, about 48 bits in total, three at a time: src/render_vk/shaders/camera.glsl. If a
 // compiler reorders the sums, the first parts remain, with the precision of single floats.
 //
 // Source: T. J. Dekker, "A floating-point technique for extending the available precision" (1971).

@@ -1,5 +1,5 @@
-// Lights each pixel of a tile: src/render_vk/shaders/light.comp and rays.glsl. Compilers inline a function at each
-// call, and a walk is long: one loop therefore traces all rays.
+// Lights each pixel of a tile: src/render_vk/shaders/light.comp and direct_light.glsl. Compilers inline a function at
+// each call, and a walk is long: one loop therefore traces all rays.
 
 // Returns true if a ray in the space of instance `home`, which is tested first, hits an opaque part of any instance.
 fn is_blocked(home: i32, home_ray: GridRay, max_t: f32) -> bool {

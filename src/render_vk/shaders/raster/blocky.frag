@@ -9,7 +9,6 @@ layout(constant_id = 5) const uint kGlassStep = 0;  // draw mode, for the neares
 #include "face_colour.glsl"
 #include "mesh_light.glsl"
 #include "blocky_face.glsl"
-#include "blocky_light.glsl"
 
 layout(location = 0) out vec4 pixel;
 

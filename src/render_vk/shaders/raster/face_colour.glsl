@@ -1,13 +1,6 @@
 // The colour of a point on a face of a blocky mesh or an impostor. The including file defines `kIsGlass`: true for
 // glass.
-#include "faces.glsl"
 #include "lit.glsl"
-
-// Returns the unblocked sunlight on a face of an instance.
-float diffuse_of(uint face, uint instance) {
-  vec4 diffuse = mesh_frame().instances[instance].diffuse[face >> 2];
-  return diffuse[face & 3];
-}
 
 // Returns a colour, or a value that is displayed directly; w: opacity, of the channel drawn.
 vec4 colour_of_face(uint face, uint type, uint instance, vec3 sunlight, float openness) {

@@ -10,7 +10,6 @@ layout(constant_id = 3) const bool kHasGlass = false;
 #include "mesh_light.glsl"
 #include "corners.glsl"
 #include "blocky_face.glsl"
-#include "blocky_light.glsl"
 #include "far.glsl"
 
 layout(location = 0) centroid in vec4 in_place;

@@ -1,7 +1,6 @@
 #version 460
 // A corner of an impostor's rectangle, lit as one voxel's face.
 #include "quad.glsl"
-#include "hash.glsl"
 #include "far.glsl"
 
 layout(location = 5) out vec3 met;         // the ray's entry point, voxels from the content's centre

@@ -1,7 +1,6 @@
 // The inputs of mesh shaders. src/render_vk/raster/mesh_shader_data.h has the same layout for the CPU. Vectors are read
 // as a whole: see docs/decisions/040.
 #include "data.glsl"
-#include "srgb.glsl"
 
 // Draw modes: surfaces, triangle edges, one channel of transparent surfaces; or, for the nearest glass, its depth, its
 // transmittance and its added light.
@@ -74,6 +73,12 @@ bool has(uint flag) {
 }
 uint drawn() {
   return push.numbers & 15;
+}
+
+// Returns the unblocked sunlight on a face of an instance.
+float diffuse_of(uint face, uint instance) {
+  vec4 diffuse = mesh_frame().instances[instance].diffuse[face >> 2];
+  return diffuse[face & 3];
 }
 
 vec4 clip_from(vec4 clip[4], vec3 point) {

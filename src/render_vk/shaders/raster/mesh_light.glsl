@@ -3,15 +3,14 @@
 #include "walk.glsl"
 #include "instances.glsl"
 #include "glass.glsl"
-#include "lamps.glsl"
-#include "rays.glsl"
+#include "direct_light.glsl"
 #include "levels.glsl"
 
 // Returns the light of the sun and of lamps, or all light with light levels. `voxel`: of an instance's tree, w: the
 // instance, -1: it blocks no rays. `from`: the start of rays, as in a GridRay. `normal`: in the world, unit. `diffuse`:
 // the sun's factor. `at`: the same position for light levels.
 //
-// One loop over all rays; rays.glsl gives the reason.
+// One loop over all rays; direct_light.glsl gives the reason.
 vec3 traced_light(ivec4 voxel, ivec3 base, vec3 from, vec3 normal, float diffuse, LevelPlace at) {
   if (!kTraces || voxel.w < 0) return sunlight_of(diffuse);
   Placed placed = placed_at(voxel.w);
@@ -38,4 +37,32 @@ vec3 traced_light(ivec4 voxel, ivec3 base, vec3 from, vec3 normal, float diffuse
     sum += light;
   }
   return sum;
+}
+
+// The point to be lit: the arguments of `traced_light`, its position in front of the surface, and its own colours.
+struct LitPoint {
+  ivec4 voxel;
+  ivec3 base;
+  vec3 from;
+  vec3 normal;
+  float diffuse;
+  vec3 colour;
+  vec3 emitted;
+  float openness;
+  LevelPlace at;
+};
+
+vec3 colour_of(LitPoint point) {
+  vec3 sunlight = vec3(0.0);
+  if (has(kLit)) sunlight = traced_light(point.voxel, point.base, point.from, point.normal, point.diffuse,
+                                             point.at);
+  return colour_in_light(point.colour, point.emitted, sunlight, point.openness);
+}
+
+// Returns the direction from the camera through the fragment's pixel; in the world, unit.
+vec3 seen_direction() {
+  Frame f = frame();
+  vec3 direction = f.forward.xyz;
+  if (has(kPerspective)) direction += f.corner.xyz + f.right.xyz * gl_FragCoord.x + f.down.xyz * gl_FragCoord.y;
+  return direction / length(direction);
 }

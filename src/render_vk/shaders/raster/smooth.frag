@@ -5,11 +5,9 @@
 layout(constant_id = 2) const bool kTraces = false;
 layout(constant_id = 3) const bool kHasGlass = false;
 layout(constant_id = 5) const uint kGlassStep = 0;  // draw mode, for the nearest glass
-#include "faces.glsl"
 #include "lit.glsl"
 #include "mesh_light.glsl"
 #include "sky.glsl"
-#include "lit_point.glsl"
 #include "smooth_point.glsl"
 
 layout(location = 0) out vec4 pixel;

@@ -6,12 +6,10 @@ layout(constant_id = 5) const uint kGlassStep = 0;
 const bool kTraces = true;
 const bool kHasGlass = true;
 #define HOLDS_BODIES
-#include "faces.glsl"
 #include "lit.glsl"
 #include "mesh_light.glsl"
 #include "corners.glsl"
 #include "sky.glsl"
-#include "lit_point.glsl"
 #include "seen_glass.glsl"
 #include "smooth_point.glsl"
 
