@@ -16,7 +16,6 @@
 
 #include "brush.h"
 #include "edit_history.h"
-#include "sculpt.h"
 #include "world_window.h"
 
 namespace quoin::viewer {
