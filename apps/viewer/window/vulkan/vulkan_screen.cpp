@@ -1,42 +1,11 @@
-#include "vulkan_screen.h"
-
-#include <vector>
-
 #include "viewer/window/screen.h"
 #include "vulkan_window.h"
+#include "window_device.h"
 
 // Included after Vulkan's headers, because it would otherwise declare their types itself.
 #include <SDL_vulkan.h>
 
 namespace quoin::viewer {
-
-Result<WindowDeviceOptions> device_options(SDL_Window* window) {
-  unsigned count = 0;
-  if (SDL_Vulkan_GetInstanceExtensions(window, &count, nullptr) == SDL_FALSE) {
-    return make_error(ErrorCode::Unsupported, "cannot draw in a window with Vulkan: " + sdl_says());
-  }
-  std::vector<const char*> names(count);
-  SDL_Vulkan_GetInstanceExtensions(window, &count, names.data());
-  WindowDeviceOptions options;
-  options.instance_extensions.assign(names.begin(), names.end());
-  options.get_instance_proc_addr = reinterpret_cast<PFN_vkGetInstanceProcAddr>(SDL_Vulkan_GetVkGetInstanceProcAddr());
-  options.make_surface = [window](VkInstance instance) {
-    VkSurfaceKHR surface = VK_NULL_HANDLE;
-    return SDL_Vulkan_CreateSurface(window, instance, &surface) == SDL_TRUE ? surface : VK_NULL_HANDLE;
-  };
-  return options;
-}
-
-Result<std::shared_ptr<VulkanRenderer>> make_renderer(std::shared_ptr<WindowDevice> device) {
-  struct Both {
-    std::shared_ptr<WindowDevice> device;
-    VulkanRenderer renderer;  // destroyed first
-  };
-  auto renderer = VulkanRenderer::create(device->lent());
-  if (!renderer) return renderer.error();
-  const auto both = std::make_shared<Both>(Both{std::move(device), std::move(*renderer)});
-  return std::shared_ptr<VulkanRenderer>(both, &both->renderer);
-}
 
 namespace {
 

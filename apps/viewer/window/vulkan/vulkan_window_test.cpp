@@ -15,7 +15,7 @@
 #include "viewer/window/process_facts_for_tests.h"
 #include "viewer/window/screen.h"
 #include "viewer/window/viewer.h"
-#include "vulkan_screen.h"
+#include "window_device.h"
 
 namespace quoin::viewer {
 namespace {

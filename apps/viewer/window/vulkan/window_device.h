@@ -10,6 +10,9 @@
 
 #include <quoin/core/result.h>
 #include <quoin/render_vk/vulkan_device.h>
+#include <quoin/render_vk/vulkan_renderer.h>
+
+struct SDL_Window;
 
 namespace quoin::viewer {
 
@@ -86,5 +89,11 @@ class WindowDevice {
   bool draws_lines_ = false;
   std::string name_;
 };
+
+/// Returns the device options for a window with SDL_WINDOW_VULKAN, which must outlive the device. Errors: Unsupported.
+[[nodiscard]] Result<WindowDeviceOptions> device_options(SDL_Window* window);
+
+/// Creates a renderer that keeps the device alive. Errors: those of VulkanRenderer::create.
+[[nodiscard]] Result<std::shared_ptr<VulkanRenderer>> make_renderer(std::shared_ptr<WindowDevice> device);
 
 }  // namespace quoin::viewer
