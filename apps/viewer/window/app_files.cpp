@@ -7,7 +7,6 @@
 #include <quoin/io/image_files.h>
 
 #include "viewer/device_backend.h"
-#include "wake.h"
 
 namespace quoin::viewer {
 

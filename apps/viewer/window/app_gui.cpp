@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "app.h"
-#include "outline.h"
 
 namespace quoin::viewer {
 

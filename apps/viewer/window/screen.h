@@ -40,6 +40,11 @@ class SdlVideo {
 /// Returns SDL's last error message on one line.
 [[nodiscard]] std::string sdl_says();
 
+/// Wakes the window's loop. Can be called from any thread while SDL runs.
+void wake_window();
+/// Returns true if an event comes from `wake_window`.
+[[nodiscard]] bool is_wake(const SDL_Event& event);
+
 /// A window that shows images and the GUI. Sizes are in output pixels.
 class Screen {
  public:

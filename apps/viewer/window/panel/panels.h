@@ -2,8 +2,8 @@
 
 #include <vector>
 
-#include "viewer/window/commands.h"
 #include "viewer/window/view_state.h"
+#include "viewer/window/window_commands.h"
 
 namespace quoin::viewer {
 
@@ -30,6 +30,8 @@ void draw_message(ViewState& state, float bottom);
 /// Draws a note over the image while it does not fully show the mode of the settings: the remaining work, its progress,
 /// and the mode that is shown meanwhile.
 void draw_progress(ViewState& state, float scale, float top);
+/// Draws the outline of the brush at the voxel under the mouse, as lines over the image.
+void draw_outline(const ViewState& state);
 /// Draws the welcome text of an empty window.
 void draw_welcome(const ViewState& state, MenuChoice& choice);
 

@@ -1,5 +1,3 @@
-#include "outline.h"
-
 #include <imgui.h>
 
 #include <array>
@@ -7,6 +5,8 @@
 #include <numbers>
 
 #include <glm/geometric.hpp>
+
+#include "panels.h"
 
 namespace quoin::viewer {
 
