@@ -15,8 +15,7 @@
 #include <quoin/store/stored_chunk.h>
 
 #include "store/chunk/density_section.h"
-#include "store/chunk/placed_data.h"
-#include "store/chunk/voxel_runs.h"
+#include "store/chunk/voxel_sections.h"
 
 // The body of a chunk's row in a world. Numbers little-endian.
 //
@@ -29,7 +28,7 @@
 //   int32 x, y, z        of the address
 //   uint64 revision      later saves have greater revisions
 //   uint32 bytes         of the content
-//   content              the present sections in order: voxel_runs.h, placed_data.h, density_section.h
+//   content              the present sections in order: voxel_sections.h, density_section.h
 //
 // Without the first section all voxels are air. A body contains its own address, so that a world with a lost index can
 // be rebuilt from its bodies.

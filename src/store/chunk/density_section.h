@@ -11,11 +11,11 @@
 #include <quoin/grid/density_chunk.h>
 
 #include "store/chunk/content.h"
-#include "store/chunk/voxel_runs.h"
+#include "store/chunk/voxel_sections.h"
 
 // The densities of a chunk's samples, and their materials. 256 slabs of 64 x 4 x 4 samples, by z / 4, then y / 4.
 //
-//   materials            like voxel types: voxel_runs.h
+//   materials            like voxel types: voxel_sections.h
 //   uint8 form           0: one density for all samples, 1: several
 //   form 0:
 //     uint16 density     as a half

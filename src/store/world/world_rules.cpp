@@ -5,7 +5,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "store/chunk/placed_data.h"
+#include "store/chunk/voxel_sections.h"
 #include "store/world/part_text.h"
 
 namespace quoin::store {
