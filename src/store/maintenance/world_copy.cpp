@@ -11,7 +11,7 @@
 
 #include "core/bytes/error_path.h"
 #include "store/chunk/chunk_body.h"
-#include "store/database/world_lock.h"
+#include "store/database/connection.h"
 #include "store/maintenance/world_rows.h"
 #include "store/scene/put_world.h"
 #include "store/world/migration.h"

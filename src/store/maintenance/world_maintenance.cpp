@@ -16,7 +16,7 @@
 #include "core/bytes/error_path.h"
 #include "core/work/progress_steps.h"
 #include "store/chunk/chunk_body.h"
-#include "store/database/world_lock.h"
+#include "store/database/connection.h"
 #include "store/maintenance/world_rows.h"
 #include "store/world/part_text.h"
 #include "store/world/world_open.h"

@@ -13,7 +13,7 @@
 #include "core/bytes/error_path.h"
 #include "core/bytes/held_files.h"
 #include "store/chunk/chunk_body.h"
-#include "store/database/world_lock.h"
+#include "store/database/connection.h"
 #include "store/maintenance/found_parts.h"
 #include "store/maintenance/world_rows.h"
 #include "store/salvage/page_scan.h"

@@ -7,7 +7,6 @@
 
 #include "store/database/connection.h"
 #include "store/database/schema.h"
-#include "store/database/world_lock.h"
 #include "store/scene/put_world.h"
 #include "store/store_formats.h"
 #include "store/world/world_changes.h"

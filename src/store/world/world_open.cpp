@@ -13,8 +13,8 @@
 #include <quoin/io/file.h>
 
 #include "core/bytes/held_files.h"
+#include "store/database/connection.h"
 #include "store/database/schema.h"
-#include "store/database/world_lock.h"
 
 namespace quoin::store {
 

@@ -17,7 +17,7 @@
 #include "core/bytes/error_path.h"
 #include "core/bytes/held_files.h"
 #include "store/chunk/chunk_body.h"
-#include "store/database/world_lock.h"
+#include "store/database/connection.h"
 #include "store/store_formats.h"
 #include "store/world/migration.h"
 #include "store/world/world_changes.h"
