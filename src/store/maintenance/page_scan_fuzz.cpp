@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "store/chunk/chunk_body.h"
-#include "store/salvage/page_scan.h"
+#include "store/maintenance/page_scan.h"
 
 namespace {
 

@@ -1,4 +1,4 @@
-#include "store/salvage/page_scan.h"
+#include "store/maintenance/page_scan.h"
 
 #include <algorithm>
 #include <cstdlib>
@@ -19,7 +19,6 @@
 #include "core/death_for_tests.h"
 #include "store/chunk/chunk_body.h"
 #include "store/database/connection.h"
-#include "store/salvage/page_file.h"
 #include "store/world/world_for_tests.h"
 
 namespace quoin::store {
