@@ -19,7 +19,6 @@
 #include "store/chunk/chunk_body.h"
 #include "store/database/connection.h"
 #include "store/maintenance/page_scan.h"
-#include "store/maintenance/world_rows.h"
 #include "store/world/part_text.h"
 #include "store/world/world_changes.h"
 #include "store/world/world_open.h"
