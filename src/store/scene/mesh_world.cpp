@@ -1,24 +1,264 @@
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
 #include <limits>
 #include <mutex>
+#include <optional>
 #include <set>
+#include <span>
+#include <string>
+#include <system_error>
+#include <unordered_map>
+#include <unordered_set>
 #include <utility>
+#include <vector>
 
 #include <glm/common.hpp>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/parallel.h>
+#include <quoin/core/result.h>
+#include <quoin/grid/chunk.h>
 #include <quoin/scene/near_grids.h>
 #include <quoin/store/world_meshes.h>
+#include <quoin/store/world_store.h>
 
 #include "core/bytes/error_path.h"
 #include "core/coordinates/chunk_order.h"
+#include "core/drop_oldest.h"
 #include "core/work/workers.h"
 #include "mesh/blocky/chunk_triangles.h"
 #include "scene/meshes/glass_thickness.h"
-#include "store/meshes/chunk_cache.h"
-#include "store/meshes/spool.h"
+#include "store/world/world_rules.h"
+
+namespace quoin::store {
+namespace {
+
+/// Values written once, in order, and then read: in an unnamed temporary file, which is deleted with the object.
+class Spool {
+ public:
+  Spool() = default;
+  Spool(Spool&& other) noexcept;
+  Spool& operator=(Spool&& other) noexcept;
+  ~Spool();
+
+  /// Errors: CannotWrite (a full disk, a missing folder).
+  [[nodiscard]] Status append(std::span<const std::byte> bytes, const std::filesystem::path& folder);
+  template <class T>
+  [[nodiscard]] Status append(const std::vector<T>& values, const std::filesystem::path& folder) {
+    return append(std::as_bytes(std::span(values)), folder);
+  }
+  /// Ends writing; values can then be read. Errors: as `append`.
+  [[nodiscard]] Status finish();
+
+  /// Returns all values. Lifetime: as the spool. Requires: finished, and written as values of that type.
+  template <class T>
+  [[nodiscard]] std::span<const T> values() const {
+    QUOIN_ASSERT(buffer_.empty() && (mapped_ != nullptr || written_ == 0), "a finished spool");
+    QUOIN_ASSERT(written_ % sizeof(T) == 0, "whole values of this type");
+    return {static_cast<const T*>(mapped_), static_cast<std::size_t>(written_) / sizeof(T)};
+  }
+  [[nodiscard]] std::uint64_t bytes() const { return written_ + buffer_.size(); }
+  /// Releases the pages read from this process's memory; later accesses read them from the file again.
+  void give_back() const;
+
+ private:
+  [[nodiscard]] Status write_buffer();
+
+  int file_ = -1;
+  std::vector<std::byte> buffer_;
+  std::uint64_t written_ = 0;
+  void* mapped_ = nullptr;
+};
+
+constexpr std::size_t kBufferBytes = std::size_t{1} << 20;
+
+Status failed(int number) {
+  return make_error(ErrorCode::CannotWrite,
+                    "cannot write a temporary file: " + std::generic_category().message(number));
+}
+
+// Opens a file without a name, or removes its name at once.
+int open_nameless(const std::filesystem::path& folder) {
+  const std::string where = folder.empty() ? "." : folder.string();
+  const int file = ::open(where.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
+  if (file >= 0 || (errno != EOPNOTSUPP && errno != EISDIR && errno != EINVAL)) return file;
+  std::string name = where + "/.quoin-spool-XXXXXX";
+  const int named = ::mkostemp(name.data(), O_CLOEXEC);
+  if (named >= 0) ::unlink(name.c_str());
+  return named;
+}
+
+Spool::Spool(Spool&& other) noexcept
+    : file_(std::exchange(other.file_, -1)),
+      buffer_(std::move(other.buffer_)),
+      written_(std::exchange(other.written_, 0)),
+      mapped_(std::exchange(other.mapped_, nullptr)) {}
+
+Spool& Spool::operator=(Spool&& other) noexcept {
+  std::swap(file_, other.file_);
+  std::swap(buffer_, other.buffer_);
+  std::swap(written_, other.written_);
+  std::swap(mapped_, other.mapped_);
+  return *this;
+}
+
+Spool::~Spool() {
+  if (mapped_ != nullptr) ::munmap(mapped_, written_);
+  if (file_ >= 0) ::close(file_);
+}
+
+Status Spool::append(std::span<const std::byte> bytes, const std::filesystem::path& folder) {
+  QUOIN_ASSERT(mapped_ == nullptr, "not finished");
+  if (file_ < 0) {
+    file_ = open_nameless(folder);
+    if (file_ < 0) return failed(errno);
+  }
+  buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
+  return buffer_.size() < kBufferBytes ? Status() : write_buffer();
+}
+
+Status Spool::write_buffer() {
+  for (std::size_t done = 0; done < buffer_.size();) {
+    const ssize_t count = ::write(file_, buffer_.data() + done, buffer_.size() - done);
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) return failed(count < 0 ? errno : ENOSPC);
+    done += static_cast<std::size_t>(count);
+  }
+  written_ += buffer_.size();
+  buffer_.clear();
+  return {};
+}
+
+Status Spool::finish() {
+  if (file_ < 0) return {};
+  if (auto done = write_buffer(); !done) return done;
+  buffer_ = {};
+  if (written_ == 0) return {};
+  void* const mapped = ::mmap(nullptr, written_, PROT_READ, MAP_SHARED, file_, 0);
+  if (mapped == MAP_FAILED) return failed(errno);
+  mapped_ = mapped;
+  ::close(std::exchange(file_, -1));
+  return {};
+}
+
+void Spool::give_back() const {
+  if (mapped_ != nullptr) ::madvise(mapped_, written_, MADV_DONTNEED);
+}
+
+/// The chunks of a world's grid, level 0; the most recently used ones are in memory.
+class ChunkCache {
+ public:
+  /// `bytes`: limit of the kept voxels. `world` must outlive it. Errors of reading keys: see `status`.
+  ChunkCache(const WorldStore& world, std::uint32_t grid, std::size_t bytes);
+  /// Returns the errors of reading the world itself.
+  [[nodiscard]] const Status& status() const { return status_; }
+
+  /// Returns the coordinates of all chunks, sorted by z, then y, then x.
+  [[nodiscard]] std::span<const IVec3> places() const { return places_; }
+  /// Reads the missing chunks on several threads; skips addresses without a chunk.
+  void load(std::span<const IVec3> places, Threads threads);
+  /// Returns null if the chunk does not exist or is not loaded. Lifetime: until the next `trim`.
+  [[nodiscard]] const Chunk* find(IVec3 place) const;
+  /// Drops chunks that are not part of the last load and exceed the limit.
+  void trim();
+
+  /// Totals over all chunks read, each counted once: non-air voxels, voxels with data.
+  [[nodiscard]] std::int64_t voxels() const { return voxels_; }
+  [[nodiscard]] std::int64_t data() const { return data_; }
+  [[nodiscard]] bool has_densities() const { return has_densities_; }
+  /// Returns a line for each damaged chunk; these count as air.
+  [[nodiscard]] const std::vector<std::string>& damage() const { return damage_; }
+
+ private:
+  struct Entry {
+    Chunk chunk{kAir};
+    std::uint64_t last_use = 0;
+  };
+
+  const WorldStore& world_;
+  std::uint32_t grid_;
+  std::size_t max_bytes_;
+  std::size_t bytes_ = 0;
+  std::uint64_t now_ = 0;
+  Status status_;
+  std::vector<IVec3> places_;
+  std::unordered_map<IVec3, Entry, CoordinateHash> loaded_;
+  std::unordered_set<IVec3, CoordinateHash> counted_;
+  std::int64_t voxels_ = 0;
+  std::int64_t data_ = 0;
+  bool has_densities_ = false;
+  std::vector<std::string> damage_;
+};
+
+ChunkCache::ChunkCache(const WorldStore& world, std::uint32_t grid, std::size_t bytes)
+    : world_(world), grid_(grid), max_bytes_(bytes) {
+  auto places = world.chunks(grid, 0);
+  if (!places) {
+    status_ = places.error();
+    return;
+  }
+  places_ = std::move(*places);
+}
+
+void ChunkCache::load(std::span<const IVec3> places, Threads threads) {
+  ++now_;
+  std::vector<IVec3> missing;
+  const auto before = [](IVec3 a, IVec3 b) { return std::tie(a.z, a.y, a.x) < std::tie(b.z, b.y, b.x); };
+  for (const IVec3 place : places) {
+    const auto found = loaded_.find(place);
+    if (found != loaded_.end()) {
+      found->second.last_use = now_;
+    } else if (std::ranges::binary_search(places_, place, before)) {
+      missing.push_back(place);
+    }
+  }
+  std::vector<std::optional<Result<std::optional<StoredChunk>>>> read(missing.size());
+  parallel_for(missing.size(), threads, [&](std::size_t i) { read[i] = world_.load_chunk({grid_, 0, missing[i]}); });
+  for (std::size_t i = 0; i < missing.size(); ++i) {
+    Result<std::optional<StoredChunk>>& outcome = *read[i];
+    const bool is_new = counted_.insert(missing[i]).second;
+    Entry entry;
+    entry.last_use = now_;
+    if (!outcome) {
+      if (outcome.error().code != ErrorCode::BadFormat && status_) status_ = outcome.error();
+      if (is_new) damage_.push_back(outcome.error().message);
+    } else if (*outcome) {
+      entry.chunk = std::move((*outcome)->voxels);
+      if (is_new) {
+        voxels_ += entry.chunk.non_air_count();
+        data_ += static_cast<std::int64_t>(entry.chunk.data_count());
+      }
+      has_densities_ = has_densities_ || (*outcome)->densities.has_value();
+    }
+    bytes_ += entry.chunk.bytes();
+    loaded_.insert_or_assign(missing[i], std::move(entry));
+  }
+}
+
+const Chunk* ChunkCache::find(IVec3 place) const {
+  const auto found = loaded_.find(place);
+  return found == loaded_.end() ? nullptr : &found->second.chunk;
+}
+
+void ChunkCache::trim() {
+  if (bytes_ <= max_bytes_) return;
+  // Drops more than necessary, so that the cache is not searched for each chunk.
+  bytes_ = drop_oldest(
+      loaded_, bytes_, max_bytes_ / 8 * 7, [&](auto each) { return each->second.last_use != now_; },
+      [](auto each) { return each->second.chunk.bytes(); }, [&](auto each) { loaded_.erase(each); });
+}
+
+}  // namespace
+}  // namespace quoin::store
 
 namespace quoin {
 
