@@ -21,7 +21,7 @@
 #include "core/work/progress_steps.h"
 #include "store/chunk/chunk_body.h"
 #include "store/database/connection.h"
-#include "store/scene/put_world.h"
+#include "store/scene/world_file.h"
 #include "store/world/migration.h"
 #include "store/world/part_text.h"
 #include "store/world/world_open.h"

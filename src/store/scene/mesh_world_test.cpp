@@ -9,7 +9,7 @@
 #include <quoin/scene/scene_faces.h>
 #include <quoin/terrain/terrain.h>
 
-#include "store/scene/world_memory.h"
+#include "store/scene/world_file.h"
 #include "store/world/world_for_tests.h"
 
 namespace quoin {

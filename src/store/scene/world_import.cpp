@@ -17,7 +17,7 @@
 
 #include "core/bytes/error_path.h"
 #include "io/luanti/luanti_nodes.h"
-#include "store/scene/put_world.h"
+#include "store/scene/world_file.h"
 #include "store/world/part_text.h"
 #include "store/world/world_changes.h"
 

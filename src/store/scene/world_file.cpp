@@ -1,13 +1,18 @@
+#include "store/scene/world_file.h"
+
+#include <algorithm>
+#include <cstddef>
 #include <filesystem>
+#include <string>
 #include <system_error>
 #include <utility>
 
+#include <quoin/core/memory.h>
 #include <quoin/io/file.h>
 #include <quoin/store/world_saver.h>
 
 #include "store/database/connection.h"
 #include "store/database/schema.h"
-#include "store/scene/put_world.h"
 #include "store/store_formats.h"
 #include "store/world/world_changes.h"
 #include "store/world/world_open.h"
@@ -15,6 +20,78 @@
 namespace quoin {
 
 using namespace store;
+
+namespace {
+
+std::string megabytes(std::uint64_t bytes) {
+  return std::to_string((bytes + 500'000) / 1'000'000) + " MB";
+}
+
+// Returns an error if memory is too small, instead of letting the system end the process.
+Status check_memory(const WorldStore& world) {
+  constexpr std::uint64_t kSmall = std::uint64_t{64} << 20;
+  const auto needed = memory_of_world(world);
+  if (!needed || *needed < kSmall) return {};
+  const auto available = available_memory();
+  if (!available || *needed <= *available) return {};
+  return make_error(ErrorCode::LimitExceeded,
+                    "loading the whole world needs about " + megabytes(*needed) + " of memory; " +
+                        megabytes(*available) + " are available",
+                    world.path().string());
+}
+
+Result<LoadedScene> load(const WorldStore& world, const LoadOptions& options, Threads threads,
+                         const Progress& progress) {
+  if (auto fits = check_memory(world); !fits) return fits.error();
+  auto loaded = load_world(world, options, threads, progress);
+  if (!loaded) return loaded.error();
+  const auto values = world.value_names();
+  if (!values) return values.error();
+  if (!values->empty()) {
+    loaded->loaded.warnings.push_back("application values left out: " + std::to_string(values->size()) +
+                                      " (quoin world backup copies them)");
+  }
+  return std::move(loaded->loaded);
+}
+
+}  // namespace
+
+Result<LoadedScene> read_world_format(const std::filesystem::path& path, const LoadOptions& options, Threads threads,
+                                      const Progress& progress) {
+  const auto world = WorldStore::open(path, WorldAccess::Read, threads);
+  if (!world) return world.error();
+  return load(*world, options, threads, progress);
+}
+
+Result<LoadedScene> read_world_format(std::span<const std::byte> bytes, const LoadOptions& options, Threads threads,
+                                      const Progress& progress) {
+  const auto world = WorldParts::open(bytes);
+  if (!world) return world.error();
+  return load(*world, options, threads, progress);
+}
+
+std::optional<std::uint64_t> memory_of_world(const WorldStore& world) {
+  constexpr std::size_t kSamples = 64;
+  const auto grids = world.grids();
+  if (!grids) return std::nullopt;
+  double total = 0.0;
+  for (const auto& [number, grid] : *grids) {
+    const auto places = world.chunks(number, 0);
+    if (!places) return std::nullopt;
+    double bytes = 0.0;
+    std::size_t read = 0;
+    const std::size_t step = std::max<std::size_t>(places->size() / kSamples, 1);
+    for (std::size_t i = 0; i < places->size(); i += step) {
+      const auto chunk = world.load_chunk({number, 0, (*places)[i]});
+      if (!chunk || !*chunk) continue;
+      ++read;
+      bytes += static_cast<double>((*chunk)->voxels.bytes());
+      if ((*chunk)->densities) bytes += static_cast<double>((*chunk)->densities->bytes());
+    }
+    if (read != 0) total += bytes / static_cast<double>(read) * static_cast<double>(places->size());
+  }
+  return static_cast<std::uint64_t>(total);
+}
 
 namespace {
 
