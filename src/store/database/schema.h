@@ -36,7 +36,7 @@ inline constexpr int kRegionBits = 3 * kRegionShift;
 
 /// Makes the tables of an empty database.
 [[nodiscard]] Status create_schema(Connection& database);
-/// Checks that the tables exist, in a version that this program reads (from 1 on). `migrate` (world/migration.h)
+/// Checks that the tables exist, in a version that this program reads (from 1 on). `migrate` (world/world_open.h)
 /// upgrades earlier versions before they are written.
 /// Errors: BadFormat (another program's database), Unsupported (a later version).
 [[nodiscard]] Status check_schema(Connection& database);

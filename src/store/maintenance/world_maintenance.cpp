@@ -22,7 +22,6 @@
 #include "store/chunk/chunk_body.h"
 #include "store/database/connection.h"
 #include "store/scene/world_file.h"
-#include "store/world/migration.h"
 #include "store/world/part_text.h"
 #include "store/world/world_open.h"
 #include "store/world/world_reader.h"

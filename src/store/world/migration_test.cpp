@@ -1,4 +1,4 @@
-#include "store/world/migration.h"
+#include "store/world/world_open.h"
 
 #include <array>
 #include <fstream>
@@ -11,7 +11,6 @@
 
 #include "store/database/schema.h"
 #include "store/world/world_for_tests.h"
-#include "store/world/world_open.h"
 
 namespace quoin::store {
 namespace {

@@ -19,7 +19,6 @@
 #include "store/chunk/chunk_body.h"
 #include "store/database/connection.h"
 #include "store/store_formats.h"
-#include "store/world/migration.h"
 #include "store/world/world_changes.h"
 #include "store/world/world_open.h"
 #include "store/world/world_reader.h"
