@@ -44,7 +44,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"light/occlusion_directions.h", {"render", "render_vk"}},
     {"light/surface/light_bricks.h", {"render", "render_vk"}},
     {"light/surfaces.h", {"io", "render", "render_vk"}},
-    {"live/grid_surfaces.h", {"render_vk"}},
+    {"live/mesh_scheduler.h", {"render_vk"}},
     {"mesh/blocky/chunk_triangles.h", {"store"}},
     {"mesh/blocky/occlusion_atlas.h", {"scene"}},
     {"mesh/surface/voxel_surface.h", {"live", "scene"}},

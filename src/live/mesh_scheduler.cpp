@@ -3,8 +3,12 @@
 #include <algorithm>
 #include <iterator>
 #include <limits>
+#include <memory>
 #include <new>
 #include <utility>
+
+#include <quoin/core/assert.h>
+#include <quoin/live/live_meshes.h>
 
 #include "core/coordinates/chunk_order.h"
 #include "core/work/worker_count.h"
@@ -335,6 +339,100 @@ void MeshScheduler::finish(const Scene& scene, DVec3 eye, std::span<const DVec3>
 
 LiveMeshes::Stats MeshScheduler::stats() const {
   return queue_.stats();
+}
+
+std::int64_t ChunkSurface::triangles() const {
+  return 2 * static_cast<std::int64_t>(quads.size()) + static_cast<std::int64_t>(smooth.indices.size() / 3);
+}
+
+std::size_t ChunkSurface::bytes() const {
+  return sizeof(ChunkSurface) + quads.capacity() * sizeof(Quad) + smooth.positions.capacity() * sizeof(Vec3) +
+         smooth.normals.capacity() * sizeof(Vec3) + smooth.occlusion.capacity() * sizeof(float) +
+         smooth.cells.capacity() * sizeof(SmoothCell) + smooth.indices.capacity() * sizeof(std::uint32_t) +
+         albedo.capacity() * sizeof(LinearRgba16) + types.capacity() * sizeof(VoxelType) +
+         regions.capacity() * sizeof(SurfaceRegion) + light.capacity() * sizeof(FaceLight);
+}
+
+struct LiveMeshes::Impl {
+  explicit Impl(const LiveMeshOptions& options)
+      : scheduler(options,
+                  [options](LiveJob& job, LiveWorkspace& workspace) { make_live_surface(options, job, workspace); }) {}
+  MeshScheduler scheduler;
+};
+
+LiveMeshes::LiveMeshes(const LiveMeshOptions& options) {
+  QUOIN_ASSERT(options.region_edge == 16 || options.region_edge == 32 || options.region_edge == 64,
+               "regions are 16, 32 or 64 voxels wide");
+  impl_ = std::make_unique<Impl>(options);
+}
+// Workers may call the callback until they have stopped.
+LiveMeshes::~LiveMeshes() {
+  impl_->scheduler.stop();
+}
+
+void LiveMeshes::update(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes) {
+  impl_->scheduler.update(scene, eye, other_eyes);
+}
+void LiveMeshes::use_light(const SceneLight* light) {
+  impl_->scheduler.use_light(light);
+}
+std::vector<SurfaceUpdate> LiveMeshes::take(std::size_t max_bytes) {
+  return impl_->scheduler.take(max_bytes);
+}
+std::size_t LiveMeshes::pending() const {
+  return impl_->scheduler.pending();
+}
+void LiveMeshes::finish(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes) {
+  impl_->scheduler.finish(scene, eye, other_eyes);
+}
+LiveMeshes::Stats LiveMeshes::stats() const {
+  return impl_->scheduler.stats();
+}
+
+LiveMeshOptions GridSurfaces::options_for(SurfaceStyle style) {
+  LiveMeshOptions options;
+  options.style = style;
+  return options;
+}
+
+GridSurfaces::GridSurfaces(GridHandle handle, SurfaceContent content, SurfaceStyle style)
+    : options_(options_for(style)) {
+  if (content == SurfaceContent::Field) {
+    source_ = std::make_unique<LiveField>(handle, options_, totals_);
+  } else {
+    source_ = std::make_unique<LiveGrid>(handle, options_, totals_);
+  }
+}
+
+std::vector<SurfaceUpdate> GridSurfaces::update(const SceneGrid& grid, const VoxelRegistry& types, Threads threads) {
+  source_->follow(grid, LiveClock::now());
+  LiveTypes looks;
+  looks.registry = std::shared_ptr<const VoxelRegistry>(std::shared_ptr<void>(), &types);
+  // Connected chunks of a field are meshed as one group; chunks that waited for the group may follow.
+  for (source_->prepare(grid, types); !source_->waiting().empty(); source_->prepare(grid, types)) {
+    const bool needs_materials = options_.style == SurfaceStyle::Smooth && looks.materials == nullptr;
+    if (needs_materials) looks.materials = std::make_shared<const SurfaceMaterials>(types);
+    LiveInputs inputs(grid, looks);
+    const std::vector<IVec3> waiting(source_->waiting().begin(), source_->waiting().end());
+    std::vector<std::unique_ptr<LiveJob>> jobs;
+    for (const IVec3 chunk : waiting) {
+      jobs.push_back(source_->make_job(inputs, chunk));
+      source_->hand_over(chunk, jobs.back()->serial);
+    }
+    parallel_for(jobs.size(), threads, [&](std::size_t i) {
+      thread_local LiveWorkspace workspace;
+      try {
+        make_live_surface(options_, *jobs[i], workspace);
+      } catch (...) {
+        workspace = {};  // an allocation failure may have left it incomplete
+        throw;
+      }
+    });
+    for (const auto& job : jobs) source_->collect(*job);
+  }
+  std::vector<SurfaceUpdate> updates;
+  for (const ReadyChunk& ready : std::exchange(totals_.ready, {})) source_->take(ready.chunk, updates);
+  return updates;
 }
 
 }  // namespace quoin

@@ -12,7 +12,7 @@
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_tracer.h>
 
-#include "live/grid_surfaces.h"
+#include "live/mesh_scheduler.h"
 #include "render_vk/device/device_memory.h"
 #include "scene/tracer/placed_grid.h"
 
