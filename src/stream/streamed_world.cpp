@@ -24,9 +24,9 @@
 #include "core/work/worker_count.h"
 #include "stream/chunk_streamer.h"
 #include "stream/edit_fit.h"
-#include "stream/placements.h"
 #include "stream/stream_budget.h"
-#include "stream/terrain_text.h"
+#include "stream/stream_plan.h"
+#include "stream/terrain_generator.h"
 
 namespace quoin {
 

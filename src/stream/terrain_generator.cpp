@@ -1,4 +1,9 @@
+#include "stream/terrain_generator.h"
+
+#include <cstdint>
 #include <utility>
+
+#include <nlohmann/json.hpp>
 
 #include <quoin/core/assert.h>
 #include <quoin/stream/chunk_generator.h>
@@ -74,3 +79,23 @@ Result<std::shared_ptr<const ChunkGenerator>> make_terrain_generator(const Endle
 }
 
 }  // namespace quoin
+
+namespace quoin::stream {
+
+std::string text_of(const EndlessTerrain& terrain) {
+  return nlohmann::json{{"seed", terrain.seed}, {"height", terrain.height}, {"smooth", terrain.is_smooth}}.dump();
+}
+
+std::optional<EndlessTerrain> terrain_from(std::span<const std::byte> bytes) {
+  const auto* const text = reinterpret_cast<const char*>(bytes.data());  // NOLINT: UTF-8 as it was written
+  const auto json = nlohmann::json::parse(text, text + bytes.size(), nullptr, false);
+  if (!json.is_object() || !json.contains("seed") || !json["seed"].is_number_unsigned() || !json.contains("height") ||
+      !json["height"].is_number_integer() || !json.contains("smooth") || !json["smooth"].is_boolean()) {
+    return std::nullopt;
+  }
+  const auto height = json["height"].get<std::int64_t>();
+  if (height < 1 || height > 16) return std::nullopt;
+  return EndlessTerrain{json["seed"].get<std::uint64_t>(), static_cast<int>(height), json["smooth"].get<bool>()};
+}
+
+}  // namespace quoin::stream

@@ -1,4 +1,4 @@
-#include "stream/placements.h"
+#include "stream/stream_plan.h"
 
 #include <algorithm>
 #include <chrono>
