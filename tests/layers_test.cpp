@@ -64,7 +64,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"scene/frustum.h", {"render_vk"}},
     {"scene/hierarchy.h", {"io", "store"}},
     {"scene/instance_axes.h", {"io", "live", "render_vk"}},
-    {"scene/meshes/glass_thickness.h", {"store"}},
+    {"scene/meshes/scene_mesh_parts.h", {"store"}},
     {"scene/tracer/placed_grid.h", {"light", "render", "render_vk"}},
     {"scene/tracer/scene_view.h", {"light", "render"}},
     {"scene/tracer/instance_tree.h", {"render_vk"}},

@@ -16,7 +16,6 @@
 #include "mesh/surface/simplify.h"
 #include "mesh/surface/voxel_surface.h"
 #include "scene/instance_axes.h"
-#include "scene/meshes/glass_thickness.h"
 #include "scene/meshes/scene_mesh_parts.h"
 
 namespace quoin {

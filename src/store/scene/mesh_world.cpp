@@ -36,7 +36,7 @@
 #include "core/drop_oldest.h"
 #include "core/work/workers.h"
 #include "mesh/blocky/chunk_triangles.h"
-#include "scene/meshes/glass_thickness.h"
+#include "scene/meshes/scene_mesh_parts.h"
 #include "store/world/world_rules.h"
 
 namespace quoin::store {
