@@ -14,7 +14,7 @@
 #include <quoin/core/assert.h>
 
 #include "core/coordinates/chunk_order.h"
-#include "trace/density/smooth_normal.h"
+#include "trace/density/density_glass.h"
 #include "trace/tree_view.h"
 
 namespace quoin {

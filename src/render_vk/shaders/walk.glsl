@@ -419,7 +419,7 @@ vec3 gradient_of(vec4 low, vec4 high, vec3 inside) {
 }
 
 // Returns the lighting normal of a field in a cell, whose lowest corner is `first` of a block; matches
-// trace/density/smooth_normal.h on the CPU. Unit, or 0.
+// trace/density/density_glass.h on the CPU. Unit, or 0.
 vec3 normal_in(Numbers block, ivec3 first, vec3 inside) {
   vec3 at = vec3(first) + inside;
   vec4 low;

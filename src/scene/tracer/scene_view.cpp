@@ -13,7 +13,6 @@
 #include "scene/tracer/scene_tracer_impl.h"
 #include "scene/tracer/scene_view.h"
 #include "trace/density/density_glass.h"
-#include "trace/density/smooth_normal.h"
 
 namespace quoin {
 namespace {

@@ -12,7 +12,6 @@
 #include <quoin/core/assert.h>
 
 #include "core/trilinear.h"
-#include "trace/density/smooth_normal.h"
 #include "trace/kernel/cell_cubic.inl"
 #include "trace/walk.h"
 

@@ -1,9 +1,12 @@
 #pragma once
 
+#include <glm/geometric.hpp>
+
 #include <quoin/core/function_ref.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/density_grid.h>
 #include <quoin/grid/voxel_registry.h>
+#include <quoin/trace/density_ray.h>
 #include <quoin/trace/occupancy_tree.h>
 #include <quoin/trace/ray.h>
 
@@ -58,5 +61,20 @@ void visit_glass(const DensityGlass& glass, const Ray& ray, double max_t, Functi
 /// used to light field surfaces, or towards another transparent material in the cell. Returns 0 if there is none.
 [[nodiscard]] DVec3 glass_normal(const DensityGlass& glass, IVec3 cell, const DVec3& point, VoxelType type,
                                  VoxelType other);
+
+/// Returns the unit normal for lighting a field at a ray's hit. Unlike DensityHit::normal, it has no steps between
+/// cells. It is computed from differences of the field one sample to each side. Where these point away from the hit's
+/// normal, as at solids thinner than two samples, it returns the hit's normal.
+[[nodiscard]] inline DVec3 smooth_normal(const DensityGrid& field, const DVec3& point, const DensityHit& hit) {
+  DVec3 gradient;
+  for (int axis = 0; axis < 3; ++axis) {
+    DVec3 step(0.0);
+    step[axis] = 1.0;
+    gradient[axis] = double{field.density_at(point + step)} - double{field.density_at(point - step)};
+  }
+  constexpr double kAgrees = 0.5;
+  const double length = glm::length(gradient);
+  return glm::dot(gradient, hit.normal) > kAgrees * length ? gradient / length : hit.normal;
+}
 
 }  // namespace quoin
