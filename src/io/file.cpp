@@ -13,7 +13,7 @@
 #include <system_error>
 #include <utility>
 
-#include "core/bytes/held_files.h"
+#include "core/bytes/files.h"
 
 namespace quoin {
 

@@ -10,7 +10,7 @@
 #include <quoin/core/result.h>
 #include <quoin/io/file.h>
 
-#include "core/bytes/error_path.h"
+#include "core/bytes/files.h"
 
 // Adapts readers and writers of bytes to files; lists the sidecar files of a file.
 

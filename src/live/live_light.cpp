@@ -7,7 +7,6 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/work/worker_count.h"
 #include "core/work/workers.h"
 
 namespace quoin {

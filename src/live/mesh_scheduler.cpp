@@ -11,7 +11,7 @@
 #include <quoin/live/live_meshes.h>
 
 #include "core/coordinates/chunk_order.h"
-#include "core/work/worker_count.h"
+#include "core/work/workers.h"
 #include "live/live_field.h"
 #include "live/live_grid.h"
 #include "scene/instance_axes.h"

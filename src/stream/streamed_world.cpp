@@ -21,7 +21,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/io/file.h>
 
-#include "core/work/worker_count.h"
+#include "core/work/workers.h"
 #include "stream/chunk_streamer.h"
 #include "stream/edit_fit.h"
 #include "stream/stream_budget.h"

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -24,5 +25,15 @@ namespace quoin {
 
 /// Returns `text` as valid UTF-8 on one line: bytes that are not UTF-8 become U+FFFD, control characters become blanks.
 [[nodiscard]] std::string printable(std::string_view text);
+
+/// The structure of a JSON text, known before a recursive parser builds anything. It need not be valid JSON.
+struct JsonExtent {
+  int depth = 0;                          ///< of nested brackets, outside strings
+  std::size_t bytes_outside_strings = 0;  ///< with one byte per string
+};
+
+/// Returns the extent of a text. Compare it with limits before parsing: deep nesting overflows the stack of a recursive
+/// parser.
+[[nodiscard]] JsonExtent json_extent(std::string_view text);
 
 }  // namespace quoin

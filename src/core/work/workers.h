@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <exception>
@@ -8,6 +9,8 @@
 #include <thread>
 #include <utility>
 #include <vector>
+
+#include <quoin/core/parallel.h>
 
 namespace quoin {
 
@@ -90,5 +93,11 @@ class Workers {
   std::exception_ptr failure_;
   std::vector<std::thread> threads_;
 };
+
+/// Returns the number of worker threads in addition to the calling thread. Unlike `thread_count`, 0 means one less than
+/// the machine has, at least 1.
+[[nodiscard]] inline unsigned worker_count(Threads threads) {
+  return threads.count != 0 ? threads.count : std::max(2U, thread_count(threads)) - 1;
+}
 
 }  // namespace quoin

@@ -15,7 +15,6 @@
 #include <glm/mat4x4.hpp>
 
 #include "core/bytes/byte_reader.h"
-#include "core/bytes/json_extent.h"
 #include "core/bytes/text.h"
 #include "core/srgb.h"
 #include "io/format_driver.h"

@@ -4,7 +4,7 @@
 
 #include <quoin/io/scene_file.h>
 
-#include "core/bytes/json_extent.h"
+#include "core/bytes/text.h"
 #include "io/scene_file/grids_parse.h"
 #include "io/scene_file/json_reader.h"
 #include "io/scene_file/scene_file.h"

@@ -13,7 +13,6 @@
 
 #include "core/drop_oldest.h"
 #include "core/moved_from.h"
-#include "core/work/worker_count.h"
 #include "core/work/workers.h"
 
 namespace quoin {

@@ -17,7 +17,7 @@
 
 #include <quoin/io/file.h>
 
-#include "core/bytes/error_path.h"
+#include "core/bytes/files.h"
 #include "core/work/progress_steps.h"
 #include "store/chunk/chunk_body.h"
 #include "store/database/connection.h"

@@ -31,7 +31,7 @@
 #include <quoin/store/world_meshes.h>
 #include <quoin/store/world_store.h>
 
-#include "core/bytes/error_path.h"
+#include "core/bytes/files.h"
 #include "core/coordinates/chunk_order.h"
 #include "core/drop_oldest.h"
 #include "core/work/workers.h"

@@ -15,7 +15,7 @@
 #include <quoin/store/world_saver.h>
 #include <quoin/store/world_store.h>
 
-#include "core/bytes/error_path.h"
+#include "core/bytes/files.h"
 #include "io/luanti/luanti_nodes.h"
 #include "store/scene/world_file.h"
 #include "store/world/part_text.h"

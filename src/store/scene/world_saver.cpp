@@ -16,7 +16,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/changes.h>
 
-#include "core/bytes/error_path.h"
+#include "core/bytes/files.h"
 #include "scene/hierarchy.h"
 #include "store/database/schema.h"
 #include "store/world/part_text.h"

@@ -7,7 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/bytes/json_extent.h"
+#include "core/bytes/text.h"
 #include "io/scene_file/scene_parts.h"
 
 namespace quoin::store {

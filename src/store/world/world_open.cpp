@@ -15,7 +15,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/io/file.h>
 
-#include "core/bytes/held_files.h"
+#include "core/bytes/files.h"
 #include "store/database/connection.h"
 #include "store/database/schema.h"
 

@@ -14,8 +14,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/io/file.h>
 
-#include "core/bytes/error_path.h"
-#include "core/bytes/held_files.h"
+#include "core/bytes/files.h"
 #include "store/chunk/chunk_body.h"
 #include "store/database/connection.h"
 #include "store/store_formats.h"

@@ -15,7 +15,7 @@
 
 #include "core/bytes/byte_order.h"
 #include "core/bytes/byte_stream.h"
-#include "core/bytes/held_files.h"
+#include "core/bytes/files.h"
 #include "io/minecraft/region/lz4_blocks.h"
 
 namespace quoin::minecraft {

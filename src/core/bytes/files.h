@@ -2,6 +2,8 @@
 
 #include <filesystem>
 
+#include <quoin/core/result.h>
+
 // A process loses its fcntl locks on a file (used by SQLite) when it closes any descriptor of that file. Therefore this
 // registry tracks the files of open databases, and other readers keep their descriptors open.
 
@@ -31,5 +33,12 @@ void close_after_reading(int descriptor);
 
 /// Syncs a folder, so that a power cut cannot undo a rename. Some file systems do not support it.
 void sync_folder(const std::filesystem::path& folder);
+
+/// Returns `result`; its error names `path` unless it already names a file.
+template <class T>
+[[nodiscard]] Result<T> with_path(Result<T> result, const std::filesystem::path& path) {
+  if (!result && result.error().path.empty()) result.error().path = path.string();
+  return result;
+}
 
 }  // namespace quoin

@@ -1,4 +1,4 @@
-#include "core/bytes/held_files.h"
+#include "core/bytes/files.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>

@@ -1,4 +1,4 @@
-#include "core/bytes/json_extent.h"
+#include "core/bytes/text.h"
 
 #include <string>
 
