@@ -5,7 +5,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/rows/content_hash.h"
+#include "core/rows/packed_row.h"
 #include "live/mesh_job_queue.h"
 #include "mesh/surface/face_materials.h"
 #include "mesh/surface/voxel_surface.h"

@@ -9,7 +9,6 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/rows/content_hash.h"
 #include "core/rows/packed_row.h"
 #include "grid/chunk/chunk_data.h"
 #include "grid/chunk/chunk_storage.h"

@@ -7,7 +7,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/rows/content_hash.h"
+#include "core/rows/packed_row.h"
 #include "grid/density/density_storage.h"
 
 namespace quoin {
