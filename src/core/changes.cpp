@@ -5,7 +5,6 @@
 #include <quoin/core/assert.h>
 
 #include "core/change_journal.h"
-#include "core/change_notifiers.h"
 
 namespace quoin {
 

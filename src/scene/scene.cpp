@@ -14,7 +14,6 @@
 #include <quoin/core/assert.h>
 
 #include "core/change_journal.h"
-#include "core/change_notifiers.h"
 #include "scene/hierarchy.h"
 #include "scene/instance_axes.h"
 

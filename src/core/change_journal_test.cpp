@@ -1,4 +1,4 @@
-#include "core/change_notifiers.h"
+#include "core/change_journal.h"
 
 #include <memory>
 #include <vector>
