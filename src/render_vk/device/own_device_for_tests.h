@@ -14,7 +14,7 @@
 #include <quoin/render_vk/vulkan_device.h>
 #include <quoin/render_vk/vulkan_image.h>
 
-#include "render_vk/device/api.h"
+#include "render_vk/device/device.h"
 
 namespace quoin::vulkan_test {
 
