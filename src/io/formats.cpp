@@ -6,7 +6,7 @@
 #include <quoin/io/chunk_source.h>
 #include <quoin/io/vox.h>
 
-#include "core/bytes/byte_reader.h"
+#include "core/bytes/bytes.h"
 #include "io/format_driver.h"
 #include "io/heights/heights.h"
 #include "io/triangles/triangles.h"

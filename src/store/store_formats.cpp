@@ -6,8 +6,7 @@
 
 #include <quoin/store/world_saver.h>
 
-#include "core/bytes/byte_order.h"
-#include "core/bytes/byte_reader.h"
+#include "core/bytes/bytes.h"
 #include "io/format_driver.h"
 
 namespace quoin {

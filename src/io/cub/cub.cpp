@@ -4,7 +4,7 @@
 #include <span>
 #include <utility>
 
-#include "core/bytes/byte_reader.h"
+#include "core/bytes/bytes.h"
 #include "io/format_driver.h"
 #include "io/models/model_builder.h"
 

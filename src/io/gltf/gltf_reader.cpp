@@ -14,7 +14,7 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat4x4.hpp>
 
-#include "core/bytes/byte_reader.h"
+#include "core/bytes/bytes.h"
 #include "core/bytes/text.h"
 #include "core/srgb.h"
 #include "io/format_driver.h"

@@ -26,8 +26,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/thousands.h>
 
-#include "core/bytes/byte_reader.h"
-#include "core/bytes/byte_writer.h"
+#include "core/bytes/bytes.h"
 #include "core/work/progress_steps.h"
 #include "io/format_driver.h"
 #include "io/image/png.h"

@@ -8,8 +8,7 @@
 #include <string_view>
 #include <utility>
 
-#include "core/bytes/byte_order.h"
-#include "core/bytes/byte_reader.h"
+#include "core/bytes/bytes.h"
 #include "io/heights/heights.h"
 #include "io/image/png.h"
 

@@ -3,7 +3,7 @@
 #include <string_view>
 #include <utility>
 
-#include "core/bytes/byte_reader.h"
+#include "core/bytes/bytes.h"
 #include "io/image/png.h"
 
 namespace quoin {

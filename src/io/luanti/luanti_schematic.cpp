@@ -10,9 +10,8 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/bytes/byte_order.h"
-#include "core/bytes/byte_reader.h"
 #include "core/bytes/byte_stream.h"
+#include "core/bytes/bytes.h"
 #include "io/format_driver.h"
 #include "io/luanti/luanti_nodes.h"
 #include "io/models/model_builder.h"

@@ -4,7 +4,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/bytes/byte_order.h"
+#include "core/bytes/bytes.h"
 
 namespace quoin::nbt {
 

@@ -12,7 +12,7 @@
 #include <string>
 #include <string_view>
 
-#include "core/bytes/byte_reader.h"
+#include "core/bytes/bytes.h"
 #include "io/format_driver.h"
 #include "io/models/model_builder.h"
 #include "io/placed/placed_grids.h"

@@ -12,8 +12,8 @@
 #include <quoin/io/formats.h>
 #include <quoin/io/volume.h>
 
-#include "core/bytes/byte_reader.h"
 #include "core/bytes/byte_stream.h"
+#include "core/bytes/bytes.h"
 #include "io/format_driver.h"
 #include "io/placed/placed_grids.h"
 

@@ -12,7 +12,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/bytes/byte_reader.h"
+#include "core/bytes/bytes.h"
 #include "core/bytes/text.h"
 #include "core/srgb.h"
 #include "io/format_driver.h"

@@ -18,7 +18,7 @@
 #include <quoin/mesh/occlusion.h>
 #include <quoin/version.h>
 
-#include "core/bytes/byte_reader.h"
+#include "core/bytes/bytes.h"
 #include "core/srgb.h"
 #include "io/format_driver.h"
 #include "io/mesh_parts.h"

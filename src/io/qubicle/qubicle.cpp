@@ -18,9 +18,8 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/bytes/byte_reader.h"
 #include "core/bytes/byte_stream.h"
-#include "core/bytes/byte_writer.h"
+#include "core/bytes/bytes.h"
 #include "core/bytes/text.h"
 #include "core/work/progress_steps.h"
 #include "io/format_driver.h"

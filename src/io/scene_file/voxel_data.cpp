@@ -11,8 +11,8 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/half.h>
 
-#include "core/bytes/byte_order.h"
 #include "core/bytes/byte_stream.h"
+#include "core/bytes/bytes.h"
 #include "core/work/progress_steps.h"
 #include "io/base64.h"
 

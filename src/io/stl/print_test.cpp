@@ -10,7 +10,7 @@
 #include <quoin/io/mesh_file.h>
 #include <quoin/mesh/closed_surface.h>
 
-#include "core/bytes/byte_reader.h"
+#include "core/bytes/bytes.h"
 
 namespace quoin {
 namespace {

@@ -25,7 +25,7 @@
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/version.h>
 
-#include "core/bytes/byte_reader.h"
+#include "core/bytes/bytes.h"
 #include "core/bytes/text.h"
 #include "core/srgb.h"
 #include "io/format_driver.h"

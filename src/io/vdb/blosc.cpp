@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "core/bytes/byte_reader.h"
 #include "core/bytes/byte_stream.h"
+#include "core/bytes/bytes.h"
 
 #ifdef QUOIN_HAVE_LZ4
 #include <lz4.h>

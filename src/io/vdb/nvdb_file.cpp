@@ -19,9 +19,8 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/bytes/byte_order.h"
-#include "core/bytes/byte_reader.h"
 #include "core/bytes/byte_stream.h"
+#include "core/bytes/bytes.h"
 #include "core/bytes/text.h"
 #include "io/vdb/blosc.h"
 

@@ -17,7 +17,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/bytes/byte_order.h"
+#include "core/bytes/bytes.h"
 #include "io/vdb/vdb.h"
 #include "io/vdb/vdb_tree.h"
 

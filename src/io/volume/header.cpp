@@ -7,7 +7,7 @@
 #include <limits>
 #include <string>
 
-#include "core/bytes/byte_order.h"
+#include "core/bytes/bytes.h"
 
 namespace quoin {
 

@@ -15,8 +15,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/bytes/byte_order.h"
-#include "core/bytes/byte_writer.h"
+#include "core/bytes/bytes.h"
 #include "core/bytes/text.h"
 #include "core/work/progress_steps.h"
 #include "io/format_driver.h"

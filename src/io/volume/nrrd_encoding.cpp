@@ -7,7 +7,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/bytes/byte_reader.h"
+#include "core/bytes/bytes.h"
 #include "core/bytes/text.h"
 #include "io/volume/header.h"
 

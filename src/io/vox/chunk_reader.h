@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "core/bytes/byte_reader.h"
+#include "core/bytes/bytes.h"
 #include "core/bytes/text.h"
 #include "io/vox/chunks.h"
 

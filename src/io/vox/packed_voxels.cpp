@@ -5,8 +5,8 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/bytes/byte_reader.h"
 #include "core/bytes/byte_stream.h"
+#include "core/bytes/bytes.h"
 #include "io/vox/chunks.h"
 
 namespace quoin::vox {

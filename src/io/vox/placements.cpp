@@ -5,7 +5,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/bytes/byte_reader.h"
+#include "core/bytes/bytes.h"
 
 namespace quoin::vox {
 

@@ -6,7 +6,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/io/vox.h>
 
-#include "core/bytes/byte_reader.h"
+#include "core/bytes/bytes.h"
 #include "core/bytes/text.h"
 #include "io/vox/cameras.h"
 #include "io/vox/chunks.h"

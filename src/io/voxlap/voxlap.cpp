@@ -18,8 +18,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/thousands.h>
 
-#include "core/bytes/byte_reader.h"
-#include "core/bytes/byte_writer.h"
+#include "core/bytes/bytes.h"
 #include "core/work/progress_steps.h"
 #include "io/format_driver.h"
 #include "io/models/model_builder.h"

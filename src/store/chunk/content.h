@@ -11,7 +11,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/result.h>
 
-#include "core/bytes/byte_order.h"
+#include "core/bytes/bytes.h"
 
 namespace quoin::store {
 

@@ -20,9 +20,8 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/bytes/byte_order.h"
-#include "core/bytes/byte_reader.h"
 #include "core/bytes/byte_stream.h"
+#include "core/bytes/bytes.h"
 
 namespace quoin::store::luanti {
 

@@ -16,7 +16,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/bytes/byte_order.h"
+#include "core/bytes/bytes.h"
 #include "store/chunk/chunk_body.h"
 
 namespace quoin::store {

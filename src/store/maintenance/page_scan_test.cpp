@@ -15,7 +15,7 @@
 
 #include <quoin/io/file.h>
 
-#include "core/bytes/byte_order.h"
+#include "core/bytes/bytes.h"
 #include "core/death_for_tests.h"
 #include "store/chunk/chunk_body.h"
 #include "store/database/connection.h"

@@ -7,7 +7,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/bytes/byte_order.h"
+#include "core/bytes/bytes.h"
 #include "io/minecraft/region/region_file.h"
 
 #ifdef QUOIN_HAVE_ZSTD

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "core/bytes/byte_order.h"
+#include "core/bytes/bytes.h"
 
 #ifdef QUOIN_HAVE_LZ4
 #include <lz4.h>

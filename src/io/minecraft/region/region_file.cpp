@@ -13,8 +13,8 @@
 #include <quoin/core/assert.h>
 #include <quoin/io/file.h>
 
-#include "core/bytes/byte_order.h"
 #include "core/bytes/byte_stream.h"
+#include "core/bytes/bytes.h"
 #include "core/bytes/files.h"
 #include "io/minecraft/region/lz4_blocks.h"
 

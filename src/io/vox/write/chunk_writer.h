@@ -9,7 +9,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/bytes/byte_writer.h"
+#include "core/bytes/bytes.h"
 
 namespace quoin::vox {
 

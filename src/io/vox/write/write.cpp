@@ -10,7 +10,7 @@
 
 #include <quoin/io/vox.h>
 
-#include "core/bytes/byte_reader.h"
+#include "core/bytes/bytes.h"
 #include "core/bytes/text.h"
 #include "io/format_driver.h"
 #include "io/vox/chunk_reader.h"
