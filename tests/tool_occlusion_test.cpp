@@ -8,7 +8,7 @@
 #include <quoin/io/formats.h>
 #include <quoin/io/image_files.h>
 
-#include "io/image/png.h"
+#include "io/image/image_codecs.h"
 #include "tests/tool_for_tests.h"
 
 namespace quoin {

@@ -13,8 +13,7 @@
 #include <quoin/io/image_files.h>
 #include <quoin/render_vk/vulkan_renderer.h>
 
-#include "io/image/decode.h"
-#include "io/image/png.h"
+#include "io/image/image_codecs.h"
 #include "io/vox/vox_for_tests.h"
 #include "tests/tool_for_tests.h"
 

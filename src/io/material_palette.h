@@ -15,7 +15,7 @@
 #include <quoin/scene/scene_meshes.h>
 
 #include "io/glass.h"
-#include "io/image/png.h"
+#include "io/image/image_codecs.h"
 
 namespace quoin {
 

@@ -12,7 +12,7 @@
 #include <quoin/io/file.h>
 #include <quoin/io/mesh_file.h>
 
-#include "io/image/png.h"
+#include "io/image/image_codecs.h"
 
 namespace quoin {
 

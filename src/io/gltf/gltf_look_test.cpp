@@ -12,7 +12,7 @@
 
 #include "io/base64.h"
 #include "io/gltf/gltf_draco.h"
-#include "io/image/png.h"
+#include "io/image/image_codecs.h"
 
 namespace quoin {
 namespace {

@@ -29,7 +29,7 @@
 #include "core/bytes/bytes.h"
 #include "core/work/progress_steps.h"
 #include "io/format_driver.h"
-#include "io/image/png.h"
+#include "io/image/image_codecs.h"
 #include "io/models/model_builder.h"
 #include "io/placed/placed_grids.h"
 

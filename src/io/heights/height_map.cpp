@@ -10,7 +10,7 @@
 
 #include "core/bytes/bytes.h"
 #include "io/heights/heights.h"
-#include "io/image/png.h"
+#include "io/image/image_codecs.h"
 
 namespace quoin {
 

@@ -12,8 +12,7 @@
 
 #include "core/death_for_tests.h"
 #include "io/gltf/glb_for_tests.h"
-#include "io/image/decode.h"
-#include "io/image/png.h"
+#include "io/image/image_codecs.h"
 
 namespace quoin {
 namespace {

@@ -8,7 +8,7 @@
 #include <string_view>
 
 #include "core/bytes/text.h"
-#include "io/image/decode.h"
+#include "io/image/image_codecs.h"
 #include "io/whole_file.h"
 
 namespace quoin {

@@ -1,4 +1,4 @@
-#include "io/image/decode.h"
+#include "io/image/image_codecs.h"
 
 #include <cstdlib>
 

@@ -1,4 +1,4 @@
-#include "io/image/png.h"
+#include "io/image/image_codecs.h"
 
 #include <png.h>
 

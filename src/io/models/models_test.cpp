@@ -12,7 +12,7 @@
 #include "core/bytes/byte_stream.h"
 #include "core/death_for_tests.h"
 #include "io/format_driver.h"
-#include "io/image/png.h"
+#include "io/image/image_codecs.h"
 #include "io/models/model_builder.h"
 
 namespace quoin::models {

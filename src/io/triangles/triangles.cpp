@@ -8,7 +8,7 @@
 #include <quoin/io/file.h>
 
 #include "io/format_driver.h"
-#include "io/image/decode.h"
+#include "io/image/image_codecs.h"
 #include "io/triangles/polygon.h"
 #include "io/whole_file.h"
 

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <span>
 #include <vector>
 
@@ -9,6 +10,25 @@
 #include <quoin/core/result.h>
 
 namespace quoin {
+
+/// Decodes a PNG, JPEG or WebP, detected by content, to 8-bit sRGB with alpha.
+///
+/// Errors: BadFormat; Unsupported for other formats and for formats missing from the build; LimitExceeded beyond 2^28
+/// pixels.
+[[nodiscard]] Result<AlphaImage> decode_image(std::span<const std::byte> bytes);
+
+/// Errors: as decode_image.
+[[nodiscard]] Result<AlphaImage> decode_jpeg(std::span<const std::byte> bytes);
+[[nodiscard]] Result<AlphaImage> decode_webp(std::span<const std::byte> bytes);
+
+/// Reads a greyscale PFM of either byte order. Ignores the magnitude of the scale.
+///
+/// Errors: CannotRead; BadFormat with the byte offset; Unsupported for colour ("PF"). Memory stays within the input's
+///         size.
+[[nodiscard]] Result<FloatImage> read_pfm(const std::filesystem::path& path);
+[[nodiscard]] Result<FloatImage> read_pfm(std::span<const std::byte> bytes);
+
+inline constexpr std::size_t kMostImagePixels = std::size_t{1} << 28;
 
 /// 8-bit pixels in PNG order: rows from the top, channels interleaved.
 struct PngImage {
