@@ -11,7 +11,7 @@
 #include <quoin/scene/scene_meshes.h>
 
 #include "io/base64.h"
-#include "io/gltf/gltf_draco.h"
+#include "io/gltf/gltf_decoders.h"
 #include "io/image/image_codecs.h"
 
 namespace quoin {

@@ -1,4 +1,4 @@
-#include "io/gltf/gltf_meshopt.h"
+#include "io/gltf/gltf_decoders.h"
 
 #include <algorithm>
 #include <array>

@@ -18,9 +18,8 @@
 #include "core/bytes/text.h"
 #include "core/srgb.h"
 #include "io/format_driver.h"
-#include "io/gltf/gltf_draco.h"
+#include "io/gltf/gltf_decoders.h"
 #include "io/gltf/gltf_layout.h"
-#include "io/gltf/gltf_meshopt.h"
 #include "io/triangles/triangles.h"
 
 #ifdef QUOIN_HAVE_TINYGLTF

@@ -12,8 +12,10 @@ class Model;
 }
 
 // EXT_meshopt_compression: views with encoded bytes, which are in another buffer than the view's own.
+// KHR_draco_mesh_compression: primitives whose arrays are encoded together in one buffer view.
 //
-// Source: Khronos, "EXT_meshopt_compression"; meshoptimizer implements the codecs.
+// Sources: Khronos, "EXT_meshopt_compression" and "KHR_draco_mesh_compression"; meshoptimizer and Google's Draco
+// implement the codecs.
 
 namespace quoin::triangles {
 
@@ -32,5 +34,15 @@ namespace quoin::triangles {
 /// Memory: at most 256 times the file's buffers; larger results are rejected before allocation.
 /// Errors: BadFormat with the view's number; Unsupported without meshoptimizer.
 [[nodiscard]] Status decode_views(tinygltf::Model& model);
+
+/// Returns true if this build decodes Draco.
+[[nodiscard]] bool has_draco();
+
+/// Decodes all compressed primitives; their accessors then refer to new buffers. Files without such primitives are
+/// unchanged.
+///
+/// Memory: the decoded arrays, whose length must match their accessors.
+/// Errors: BadFormat with the numbers of mesh and primitive; Unsupported for such primitives without Draco.
+[[nodiscard]] Status decode_draco(tinygltf::Model& model);
 
 }  // namespace quoin::triangles
