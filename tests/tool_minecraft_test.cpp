@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/bytes/byte_stream.h"
-#include "io/minecraft/nbt_writer.h"
+#include "io/minecraft/nbt.h"
 #include "tool_for_tests.h"
 
 namespace quoin {

@@ -27,7 +27,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/bytes/byte_reader.h"
+#include "core/bytes/bytes.h"
 #include "core/bytes/byte_writer.h"
 #include "io/triangles/triangles.h"
 

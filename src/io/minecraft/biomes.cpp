@@ -1,4 +1,4 @@
-#include "io/minecraft/biomes.h"
+#include "io/minecraft/block_looks.h"
 
 #include <algorithm>
 

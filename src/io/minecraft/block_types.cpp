@@ -2,12 +2,185 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <charconv>
 #include <utility>
 
 #include <quoin/core/assert.h>
 
 namespace quoin::minecraft {
+
+namespace {
+
+// Properties whose values are words, the commonest first. Booleans and numbers need no line.
+struct Words {
+  std::string_view key;
+  std::vector<std::string_view> values;
+};
+
+const std::vector<Words>& word_tables() {
+  static const std::vector<std::string_view> side = {"none", "low", "tall", "false", "true", "side", "up"};
+  static const std::vector<Words> tables = {
+      {"attachment", {"floor", "ceiling", "single_wall", "double_wall"}},
+      {"axis", {"y", "x", "z"}},
+      {"candles", {"1", "2", "3", "4"}},
+      {"delay", {"1", "2", "3", "4"}},
+      {"east", side},
+      {"eggs", {"1", "2", "3", "4"}},
+      {"face", {"wall", "floor", "ceiling"}},
+      {"facing", {"north", "south", "west", "east", "up", "down"}},
+      {"flower_amount", {"1", "2", "3", "4"}},
+      {"half", {"bottom", "top", "lower", "upper"}},
+      {"hinge", {"left", "right"}},
+      {"instrument", {"harp",       "basedrum", "snare",           "hat",       "bass",           "flute",
+                      "bell",       "guitar",   "chime",           "xylophone", "iron_xylophone", "cow_bell",
+                      "didgeridoo", "bit",      "banjo",           "pling",     "zombie",         "skeleton",
+                      "creeper",    "dragon",   "wither_skeleton", "piglin",    "custom_head"}},
+      {"layers", {"1", "2", "3", "4", "5", "6", "7", "8"}},
+      {"leaves", {"none", "small", "large"}},
+      {"mode", {"compare", "subtract", "save", "load", "corner", "data"}},
+      {"north", side},
+      {"orientation",
+       {"down_east", "down_north", "down_south", "down_west", "up_east", "up_north", "up_south", "up_west", "west_up",
+        "east_up", "north_up", "south_up"}},
+      {"part", {"foot", "head"}},
+      {"pickles", {"1", "2", "3", "4"}},
+      {"sculk_sensor_phase", {"inactive", "active", "cooldown"}},
+      {"segment_amount", {"1", "2", "3", "4"}},
+      {"shape",
+       {"straight", "inner_left", "inner_right", "outer_left", "outer_right", "north_south", "east_west",
+        "ascending_east", "ascending_west", "ascending_north", "ascending_south", "south_east", "south_west",
+        "north_west", "north_east"}},
+      {"south", side},
+      {"thickness", {"tip", "tip_merge", "frustum", "middle", "base"}},
+      {"tilt", {"none", "unstable", "partial", "full"}},
+      {"trial_spawner_state",
+       {"inactive", "waiting_for_players", "active", "waiting_for_reward_ejection", "ejecting_reward", "cooldown"}},
+      {"type", {"bottom", "top", "double", "single", "left", "right", "normal", "sticky"}},
+      {"vault_state", {"inactive", "active", "unlocking", "ejecting"}},
+      {"vertical_direction", {"up", "down"}},
+      {"west", side},
+  };
+  return tables;
+}
+
+const Words* words_of(std::string_view key) {
+  const std::vector<Words>& tables = word_tables();
+  const auto found = std::ranges::lower_bound(tables, key, {}, &Words::key);
+  return found != tables.end() && found->key == key ? &*found : nullptr;
+}
+
+constexpr int kNumberBits = 5;
+
+std::optional<std::uint32_t> number_of(std::string_view text) {
+  std::uint32_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  const bool is_plain = error == std::errc() && end == text.data() + text.size() && number < (1U << kNumberBits) &&
+                        std::to_string(number) == text;
+  return is_plain ? std::optional(number) : std::nullopt;
+}
+
+/// Returns a property's value as bits; nullopt if it has no code.
+struct Coded {
+  std::uint32_t code = 0;
+  int bits = 0;
+  char kind = 'w';  // 'w': words, 'b': true or false, 'n': a number
+};
+
+std::optional<Coded> coded(const Property& property) {
+  const auto& [key, value] = property;
+  if (const Words* const words = words_of(key)) {
+    const auto found = std::ranges::find(words->values, value);
+    if (found == words->values.end()) return std::nullopt;
+    return Coded{static_cast<std::uint32_t>(found - words->values.begin()),
+                 static_cast<int>(std::bit_width(words->values.size() - 1)), 'w'};
+  }
+  if (value == "false" || value == "true") return Coded{value == "true" ? 1U : 0U, 1, 'b'};
+  if (const auto number = number_of(value)) return Coded{*number, kNumberBits, 'n'};
+  return std::nullopt;
+}
+
+std::string value_of(std::string_view key, std::uint32_t code, char kind) {
+  if (kind == 'b') return code != 0 ? "true" : "false";
+  const Words* const words = kind == 'w' ? words_of(key) : nullptr;
+  if (words == nullptr) return std::to_string(code);
+  return code < words->values.size() ? std::string(words->values[code]) : std::to_string(code);
+}
+
+}  // namespace
+
+BlockState block_state(std::string_view name, std::vector<Property> properties) {
+  BlockState block;
+  std::ranges::sort(properties);
+  std::string in_name;
+  const bool is_leaves = name.ends_with("leaves");
+  for (const Property& property : properties) {
+    const auto& [key, value] = property;
+    if (is_leaves && (key == "distance" || key == "persistent")) continue;
+    const bool is_look = key == "lit" || key == "snowy";
+    block.is_lit |= key == "lit" && value == "true";
+    block.is_snowy |= key == "snowy" && value == "true";
+    const auto code = is_look ? std::nullopt : coded(property);
+    if (!code || block.bits + code->bits > kMaxStateBits) {
+      if (is_look && value == "false") continue;  // like blocks without this property
+      in_name.append(in_name.empty() ? "[" : ",").append(key).append("=").append(value);
+      continue;
+    }
+    block.layout += (block.layout.empty() ? "" : ",") + key + ":" + code->kind + std::to_string(code->bits);
+    block.state |= code->code << block.bits;
+    block.bits = static_cast<std::uint8_t>(block.bits + code->bits);
+  }
+  block.name = std::string(name) + in_name + (in_name.empty() ? "" : "]");
+  return block;
+}
+
+std::optional<BlockText> parse_block(std::string_view text) {
+  BlockText block;
+  const std::size_t open = text.find('[');
+  block.name = std::string(text.substr(0, open));
+  if (open == std::string_view::npos) return block;
+  if (!text.ends_with(']')) return std::nullopt;
+  std::string_view rest = text.substr(open + 1, text.size() - open - 2);
+  while (!rest.empty()) {
+    const std::size_t comma = rest.find(',');
+    const std::string_view one = rest.substr(0, comma);
+    const std::size_t equals = one.find('=');
+    if (equals == std::string_view::npos) return std::nullopt;
+    block.properties.emplace_back(one.substr(0, equals), one.substr(equals + 1));
+    rest = comma == std::string_view::npos ? std::string_view() : rest.substr(comma + 1);
+  }
+  return block;
+}
+
+BlockText block_text(const VoxelProperties& type, std::uint32_t state) {
+  const auto layout = type.attributes.find(kStatesAttribute);
+  auto parsed = layout != type.attributes.end() ? parse_block(type.name) : std::nullopt;
+  if (!parsed) return {type.name, {}};
+  BlockText block = std::move(*parsed);
+  std::string_view rest = layout->second;
+  while (!rest.empty()) {
+    const std::size_t comma = rest.find(',');
+    const std::string_view one = rest.substr(0, comma);
+    rest = comma == std::string_view::npos ? std::string_view() : rest.substr(comma + 1);
+    const std::size_t colon = one.find(':');
+    if (colon == std::string_view::npos || colon + 2 >= one.size()) break;  // written by another program
+    const auto bits = number_of(one.substr(colon + 2));
+    if (!bits) break;
+    const std::string_view key = one.substr(0, colon);
+    block.properties.emplace_back(key, value_of(key, state & ((1U << *bits) - 1U), one[colon + 1]));
+    state >>= *bits;
+  }
+  std::ranges::sort(block.properties);
+  return block;
+}
+
+std::string to_string(const BlockText& block) {
+  std::string text = block.name;
+  for (const auto& [key, value] : block.properties) {
+    text.append(&key == &block.properties.front().first ? "[" : ",").append(key).append("=").append(value);
+  }
+  return block.properties.empty() ? text : text + "]";
+}
 
 namespace {
 

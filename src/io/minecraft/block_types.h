@@ -3,20 +3,60 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <shared_mutex>
+#include <span>
 #include <string>
 #include <string_view>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include <quoin/core/result.h>
 #include <quoin/grid/voxel_registry.h>
 
-#include "io/minecraft/biomes.h"
 #include "io/minecraft/block_looks.h"
-#include "io/minecraft/block_states.h"
+
+// The properties of a Minecraft block apart from its name ("facing=east,half=top") as a bit field, VoxelData::state.
+// Blocks that differ only in these are one type. docs/formats/minecraft.md documents the bits.
 
 namespace quoin::minecraft {
+
+using Property = std::pair<std::string, std::string>;
+
+/// The attribute of a type that lists the fields of its state bits, from the lowest up: "facing:3,half:2".
+inline constexpr const char* kStatesAttribute = "minecraft.states";
+/// The attribute of a type with a guessed look: "words" or "nothing".
+inline constexpr const char* kGuessAttribute = "minecraft.look";
+/// The attribute with the tint of a biome-coloured type.
+inline constexpr const char* kTintAttribute = "minecraft.tint";
+
+/// A block as a type and a state.
+struct BlockState {
+  std::string name;         ///< "minecraft:furnace[lit=true]": with the properties that change the look, which have no
+                            ///< bits
+  std::string layout;       ///< in the form of kStatesAttribute
+  std::uint32_t state = 0;  ///< 0 where all properties have their commonest value
+  std::uint8_t bits = 0;
+  bool is_lit = false;
+  bool is_snowy = false;
+};
+
+/// Splits a block's properties into a part of its type's name and a state. Drops the properties of leaves that only
+/// control decay ("distance", "persistent").
+[[nodiscard]] BlockState block_state(std::string_view name, std::vector<Property> properties);
+
+/// Returns the block of a type and a state: its name, and the properties given to `block_state` except the dropped ones
+/// and lit=false and snowy=false, sorted by name. Types of other formats give their name without properties.
+struct BlockText {
+  std::string name;
+  std::vector<Property> properties;
+};
+[[nodiscard]] BlockText block_text(const VoxelProperties& type, std::uint32_t state);
+/// "minecraft:oak_stairs[facing=east,half=top]".
+[[nodiscard]] std::string to_string(const BlockText& block);
+/// Parses such a text; nullopt if brackets or equals signs are missing.
+[[nodiscard]] std::optional<BlockText> parse_block(std::string_view text);
 
 /// A block in voxel form. Biome-coloured blocks have one type per colour: BlockTypes::tinted.
 struct Block {
@@ -53,5 +93,10 @@ class BlockTypes {
   std::vector<VoxelProperties> tinted_;                        // by Block::number, before tinting
   std::unordered_map<std::uint64_t, VoxelType> tinted_types_;  // types, by Block::number and colour
 };
+
+/// Converts a block of a world before 1.13 to later names: its name, and the kind, rotation and height in its data.
+/// Other data becomes the property "data". Unknown block numbers become "legacy:NUMBER". Requires: 0 <= id < 4096, 0 <=
+/// data < 16.
+[[nodiscard]] std::pair<std::string, std::vector<Property>> legacy_block(int id, int data);
 
 }  // namespace quoin::minecraft

@@ -1,4 +1,4 @@
-#include "io/minecraft/legacy_blocks.h"
+#include "io/minecraft/block_types.h"
 
 #include <algorithm>
 #include <array>

@@ -15,12 +15,10 @@
 
 #include "io/format_driver.h"
 #include "io/minecraft/block_types.h"
-#include "io/minecraft/column_builder.h"
-#include "io/minecraft/level_file.h"
 #include "io/minecraft/nbt.h"
-#include "io/minecraft/region/dimensions.h"
-#include "io/minecraft/region/region_file.h"
+#include "io/minecraft/region_file.h"
 #include "io/minecraft/sections.h"
+#include "io/minecraft/world_folder.h"
 
 namespace quoin::minecraft {
 

@@ -7,13 +7,12 @@
 
 #include "core/death_for_tests.h"
 #include "io/minecraft/block_looks.h"
-#include "io/minecraft/block_states.h"
-#include "io/minecraft/legacy_blocks.h"
-#include "io/minecraft/level_file.h"
+#include "io/minecraft/block_types.h"
 #include "io/minecraft/minecraft_for_tests.h"
 #include "io/minecraft/nbt.h"
-#include "io/minecraft/region/region_file.h"
+#include "io/minecraft/region_file.h"
 #include "io/minecraft/sections.h"
+#include "io/minecraft/world_folder.h"
 
 namespace quoin {
 

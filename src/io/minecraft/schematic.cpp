@@ -17,13 +17,11 @@
 
 #include "core/bytes/byte_stream.h"
 #include "core/bytes/text.h"
-#include "io/minecraft/biomes.h"
+#include "io/minecraft/block_looks.h"
 #include "io/minecraft/block_types.h"
-#include "io/minecraft/column_builder.h"
 #include "io/minecraft/large_nbt.h"
-#include "io/minecraft/legacy_blocks.h"
 #include "io/minecraft/nbt.h"
-#include "io/minecraft/region/region_file.h"
+#include "io/minecraft/region_file.h"
 #include "io/minecraft/sections.h"
 
 namespace quoin::minecraft {

@@ -8,7 +8,7 @@
 #include <quoin/io/formats.h>
 
 #include "core/bytes/byte_stream.h"
-#include "io/minecraft/block_states.h"
+#include "io/minecraft/block_types.h"
 #include "io/minecraft/large_nbt.h"
 #include "io/minecraft/minecraft_for_tests.h"
 

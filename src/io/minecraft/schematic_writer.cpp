@@ -14,8 +14,8 @@
 #include "core/bytes/byte_stream.h"
 #include "core/work/progress_steps.h"
 #include "io/minecraft/block_looks.h"
-#include "io/minecraft/block_states.h"
-#include "io/minecraft/nbt_writer.h"
+#include "io/minecraft/block_types.h"
+#include "io/minecraft/nbt.h"
 #include "io/minecraft/schematic.h"
 #include "io/placed/placed_grids.h"
 

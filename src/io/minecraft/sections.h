@@ -3,12 +3,13 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include <quoin/core/function_ref.h>
 #include <quoin/core/result.h>
+#include <quoin/io/chunk_source.h>
 
-#include "io/minecraft/biomes.h"
 #include "io/minecraft/block_types.h"
 #include "io/minecraft/nbt.h"
 
@@ -67,5 +68,40 @@ void unpack_spanning(nbt::Value longs, int bits, std::size_t first, std::span<st
 [[nodiscard]] Status read_block_palette(nbt::Value palette, BlockTypes& types, std::vector<Block>& out);
 /// Returns the bits per index of a palette. Requires: size > 0.
 [[nodiscard]] int bits_of_palette(std::size_t size, int least);
+
+/// Assembles sections into chunks of 64^3: a column of chunks, or a box of blocks.
+class ColumnBuilder {
+ public:
+  explicit ColumnBuilder(BlockTypes& types) : types_(types) {}
+
+  /// Adds a section at its minimum corner, a multiple of 16. Errors: LimitExceeded for types.
+  [[nodiscard]] Status put(const Section& section, IVec3 corner);
+  /// Adds a section of one block. Requires: as `put`; block.is_plain().
+  void put_block(const Block& block, IVec3 corner);
+  /// Returns the chunks by y, then z, then x, without chunks of air. The builder then keeps only the invisible blocks.
+  [[nodiscard]] std::vector<SourceChunk> take();
+  /// Moves the counts of invisible blocks so far to `part`, with a lamp for each light-emitting one.
+  void take_invisible(SourcePart& part);
+
+ private:
+  struct Cell {
+    IVec3 place{0};
+    std::vector<VoxelType> types;
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> states;  // voxel, state
+  };
+  [[nodiscard]] Cell& cell(IVec3 place);
+  [[nodiscard]] Status find_types(const Section& section);
+  void fill(const Section& section, Cell& cell, IVec3 first) const;
+  void count_invisible(const Section& section, IVec3 corner);
+
+  BlockTypes& types_;
+  std::vector<Cell> cells_;
+  std::vector<Cell> spare_;               // reused memory
+  std::vector<VoxelType> types_of_;       // [biome][index in the palette]
+  std::vector<std::uint64_t> invisible_;  // by Block::invisible
+  std::vector<Lamp> lamps_;
+  bool has_states_ = false;
+  bool has_tints_ = false;
+};
 
 }  // namespace quoin::minecraft

@@ -1,4 +1,4 @@
-#include "io/minecraft/region/dimensions.h"
+#include "io/minecraft/world_folder.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,7 @@
 
 #include "io/minecraft/minecraft_for_tests.h"
 #include "io/minecraft/minecraft_source.h"
-#include "io/minecraft/region/linear_region.h"
-#include "io/minecraft/region/region_file.h"
+#include "io/minecraft/region_file.h"
 
 namespace quoin {
 

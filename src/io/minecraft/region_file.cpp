@@ -1,4 +1,4 @@
-#include "io/minecraft/region/region_file.h"
+#include "io/minecraft/region_file.h"
 
 #include <sys/stat.h>
 #include <unistd.h>
@@ -6,7 +6,10 @@
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
+#include <cstdint>
+#include <numeric>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -16,7 +19,14 @@
 #include "core/bytes/byte_stream.h"
 #include "core/bytes/bytes.h"
 #include "core/bytes/files.h"
-#include "io/minecraft/region/lz4_blocks.h"
+
+#ifdef QUOIN_HAVE_ZSTD
+#include <zstd.h>
+#endif
+
+#ifdef QUOIN_HAVE_LZ4
+#include <lz4.h>
+#endif
 
 namespace quoin::minecraft {
 
@@ -276,5 +286,165 @@ Result<std::vector<std::byte>> RegionFile::read(int x, int z) const {
   error.code = expanded.error().code;
   return error;
 }
+
+namespace {
+
+constexpr std::uint64_t kMagic = 0xC3FF13183CCA9D9A;
+constexpr std::size_t kVersionAt = 8;
+constexpr std::size_t kStreamBytesAt = 20;
+constexpr std::size_t kTableBytes = LinearRegion::kChunks * 8;
+constexpr std::uint64_t kMaxBytes = std::uint64_t{1} << 30;
+
+template <class T>
+T big(std::span<const std::byte> bytes, std::size_t at) {
+  QUOIN_ASSERT(at + sizeof(T) <= bytes.size(), "bytes of a number");
+  return load<T>(bytes.data() + at, std::endian::big);
+}
+
+Error bad(std::string message, std::size_t at) {
+  return make_error(ErrorCode::BadFormat, "Linear region: " + std::move(message), {}, at);
+}
+
+#ifdef QUOIN_HAVE_ZSTD
+
+/// Expands the first `wanted` bytes of a zstd stream. Memory grows with the output.
+Result<std::vector<std::byte>> expand_zstd(std::span<const std::byte> stream, std::size_t wanted) {
+  const std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> context(ZSTD_createDCtx(), &ZSTD_freeDCtx);
+  if (!context) return make_error(ErrorCode::LimitExceeded, "not enough memory");
+  std::vector<std::byte> out;
+  ZSTD_inBuffer input{stream.data(), stream.size(), 0};
+  while (out.size() < wanted) {
+    constexpr std::size_t kStep = std::size_t{1} << 17;
+    const std::size_t filled = out.size();
+    out.resize(filled + std::min(wanted - filled, std::max(kStep, filled)));
+    ZSTD_outBuffer output{out.data() + filled, out.size() - filled, 0};
+    for (bool has_moved = true; has_moved && output.pos < output.size;) {
+      const std::size_t before = input.pos + output.pos;
+      const std::size_t state = ZSTD_decompressStream(context.get(), &output, &input);
+      const std::size_t at = LinearRegion::kDataOffset + input.pos;
+      if (ZSTD_isError(state) != 0) return bad(std::string("damaged zstd data: ") + ZSTD_getErrorName(state), at);
+      has_moved = input.pos + output.pos != before;
+    }
+    out.resize(filled + output.pos);
+    if (output.pos < output.size) {
+      return bad(
+          "the data expands to " + std::to_string(out.size()) + " bytes, not the promised " + std::to_string(wanted),
+          LinearRegion::kDataOffset + input.pos);
+    }
+  }
+  return out;
+}
+
+#else
+
+Result<std::vector<std::byte>> expand_zstd(std::span<const std::byte>, std::size_t) {
+  return make_error(ErrorCode::Unsupported,
+                    "cannot read Linear regions (.linear): Quoin was built without zstd (Debian: libzstd-dev)");
+}
+
+#endif
+
+}  // namespace
+
+bool LinearRegion::begins(std::span<const std::byte> beginning) {
+  return beginning.size() >= sizeof(kMagic) && big<std::uint64_t>(beginning, 0) == kMagic;
+}
+
+Result<std::unique_ptr<const LinearRegion>> LinearRegion::parse(std::vector<std::byte> file) {
+  QUOIN_ASSERT(begins(file), "a Linear region");
+  if (file.size() < kDataOffset) return bad("the header is cut off", file.size());
+  const auto version = std::to_integer<int>(file[kVersionAt]);
+  if (version != 1 && version != 2) {
+    return make_error(ErrorCode::Unsupported,
+                      "Linear region: version " + std::to_string(version) + " is not supported (1 and 2 are)", {},
+                      kVersionAt);
+  }
+  std::unique_ptr<LinearRegion> region(new LinearRegion(std::move(file)));
+  const std::span<const std::byte> bytes = region->file_;
+  region->stream_bytes_ = big<std::uint32_t>(bytes, kStreamBytesAt);
+  if (region->stream_bytes_ > bytes.size() - kDataOffset) {
+    return bad("the header claims " + std::to_string(region->stream_bytes_) + " compressed bytes, but " +
+                   std::to_string(bytes.size() - kDataOffset) + " are left",
+               kStreamBytesAt);
+  }
+  const auto table = expand_zstd(bytes.subspan(kDataOffset, region->stream_bytes_), kTableBytes);
+  if (!table) return table.error();
+  std::uint64_t sum = kTableBytes;
+  for (std::size_t i = 0; i < kChunks; ++i) {
+    region->sizes_[i] = big<std::uint32_t>(*table, 8 * i);
+    sum += region->sizes_[i];
+    if (region->sizes_[i] > kMaxChunkBytes || sum > kMaxBytes) {
+      return make_error(ErrorCode::LimitExceeded, "Linear region: the chunks claim too many bytes", {}, kDataOffset);
+    }
+  }
+  return std::unique_ptr<const LinearRegion>(std::move(region));
+}
+
+void LinearRegion::expand() const {
+  const auto all = std::accumulate(sizes_.begin(), sizes_.end(), kTableBytes);
+  expanded_ = expand_zstd(std::span(file_).subspan(kDataOffset, stream_bytes_), all);
+}
+
+Result<std::vector<std::byte>> LinearRegion::read(std::size_t chunk) const {
+  QUOIN_ASSERT(has(chunk), "a chunk of the region");
+  std::call_once(once_, [this] { expand(); });
+  if (!expanded_) return expanded_.error();
+  const auto begin = std::accumulate(sizes_.begin(), sizes_.begin() + static_cast<std::ptrdiff_t>(chunk), kTableBytes);
+  QUOIN_ASSERT(begin + sizes_[chunk] <= expanded_->size(), "a chunk within the expanded bytes");
+  const auto first = expanded_->begin() + static_cast<std::ptrdiff_t>(begin);
+  return std::vector<std::byte>(first, first + static_cast<std::ptrdiff_t>(sizes_[chunk]));
+}
+
+#ifdef QUOIN_HAVE_LZ4
+
+Result<std::vector<std::byte>> expand_lz4_blocks(std::span<const std::byte> bytes, std::size_t max_bytes) {
+  constexpr std::string_view kMagic = "LZ4Block";
+  constexpr std::size_t kHeader = 21;
+  constexpr unsigned kStored = 0x10;
+  constexpr unsigned kCompressed = 0x20;
+  std::vector<std::byte> out;
+  std::size_t at = 0;
+  const auto fault = [&](const char* what) { return make_error(ErrorCode::BadFormat, what, {}, at); };
+  while (at < bytes.size()) {
+    if (bytes.size() - at < kHeader) return fault("LZ4: cut off");
+    const std::byte* const header = bytes.data() + at;
+    if (!std::equal(kMagic.begin(), kMagic.end(), reinterpret_cast<const char*>(header))) {
+      return fault("LZ4: not the start of a block");
+    }
+    const unsigned method = std::to_integer<unsigned>(header[8]) & 0xF0U;
+    const std::size_t packed = load<std::uint32_t>(header + 9, std::endian::little);
+    const std::size_t size = load<std::uint32_t>(header + 13, std::endian::little);
+    if (size == 0 && packed == 0) return out;
+    if (packed > bytes.size() - at - kHeader) return fault("LZ4: cut off");
+    if (size > max_bytes - out.size())
+      return make_error(ErrorCode::LimitExceeded, "LZ4: the output exceeds the limit", {}, at);
+    // LZ4 expands a byte to at most 255 bytes.
+    if (size / 255 > packed) return fault("LZ4: a block claims more output than its bytes can hold");
+    const std::byte* const content = header + kHeader;
+    if (method == kStored) {
+      if (packed != size) return fault("LZ4: an uncompressed block has two different sizes");
+      out.insert(out.end(), content, content + size);
+    } else if (method == kCompressed) {
+      const std::size_t filled = out.size();
+      out.resize(filled + size);
+      const int count =
+          LZ4_decompress_safe(reinterpret_cast<const char*>(content), reinterpret_cast<char*>(out.data() + filled),
+                              static_cast<int>(packed), static_cast<int>(size));
+      if (count != static_cast<int>(size)) return fault("LZ4: the compressed data is damaged");
+    } else {
+      return fault("LZ4: unknown compression method");
+    }
+    at += kHeader + packed;
+  }
+  return out;
+}
+
+#else
+
+Result<std::vector<std::byte>> expand_lz4_blocks(std::span<const std::byte>, std::size_t) {
+  return make_error(ErrorCode::Unsupported, "cannot read LZ4: Quoin was built without it (Debian: liblz4-dev)");
+}
+
+#endif
 
 }  // namespace quoin::minecraft

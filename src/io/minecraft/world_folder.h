@@ -1,12 +1,15 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include <quoin/core/result.h>
+#include <quoin/core/vec.h>
 
 // The folders of regions in worlds of Minecraft (Java). Until 1.21: region, DIM-1/region and DIM1/region for the game's
 // own dimensions, dimensions/NAMESPACE/NAME/region for others. Since 26.1 all lie in dimensions/NAMESPACE/NAME/region.
@@ -39,5 +42,16 @@ struct WorldFolder {
 
 /// Explains why a folder (or its level.dat) without regions is not read. Requires: find_dimensions found none.
 [[nodiscard]] Error no_regions(const std::filesystem::path& path);
+
+/// The world properties in level.dat.
+struct LevelFile {
+  std::string name;
+  std::string version;  ///< "1.18.2"; empty before 1.9
+  std::optional<DVec3> spawn;
+  std::string spawn_dimension = "minecraft:overworld";
+};
+
+/// Errors: BadFormat, with the offset (in the decompressed bytes if it is compressed); LimitExceeded.
+[[nodiscard]] Result<LevelFile> parse_level_file(std::span<const std::byte> bytes);
 
 }  // namespace quoin::minecraft
