@@ -15,7 +15,7 @@
 #include <quoin/scene/scene.h>
 
 #include "core/bytes/byte_stream.h"
-#include "io/vox/write/write.h"
+#include "io/vox/write/vox_parts.h"
 
 namespace quoin {
 

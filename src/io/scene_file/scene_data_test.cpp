@@ -14,7 +14,7 @@
 #include "io/gltf/glb_for_tests.h"
 #include "io/scene_file/scene_file.h"
 #include "io/scene_file/voxel_data.h"
-#include "io/vox/write/write.h"
+#include "io/vox/write/vox_parts.h"
 
 // Voxel data in scene files.
 

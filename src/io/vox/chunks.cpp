@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "core/bytes/text.h"
-#include "io/vox/chunk_reader.h"
 
 namespace quoin::vox {
 

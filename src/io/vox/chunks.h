@@ -11,9 +11,13 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
 
+#include "core/bytes/bytes.h"
+#include "core/bytes/byte_writer.h"
+#include "core/bytes/text.h"
 #include "io/vox/orientation.h"
 
 /// The content of a MagicaVoxel file: axes, ids and colour indices are the file's.
@@ -165,5 +169,63 @@ class ChunkReader;
 [[nodiscard]] Status parse_animation_range(ChunkReader& chunk, Document& out);
 [[nodiscard]] Status parse_material(ChunkReader& chunk, Document& out);
 [[nodiscard]] Status parse_old_material(ChunkReader& chunk, Document& out);
+
+/// The content of one chunk, with the errors that name it.
+class ChunkReader : public ByteReader {
+ public:
+  ChunkReader(std::span<const std::byte> file, std::string_view id, std::size_t offset, std::size_t begin,
+              std::size_t end)
+      : ByteReader(file, begin, end), id_(id), offset_(offset) {}
+
+  [[nodiscard]] std::string_view id() const { return id_; }
+  /// Returns the offset of the chunk's header.
+  [[nodiscard]] std::size_t offset() const { return offset_; }
+
+  [[nodiscard]] std::string_view string() { return text(u32()); }
+  [[nodiscard]] Dict dict();
+
+  /// Returns BadFormat at the chunk: "chunk nTRN <what>".
+  [[nodiscard]] Error error(const std::string& what) const {
+    return bad_at(offset_, "chunk " + printable(id_) + " " + what);
+  }
+  [[nodiscard]] Error too_short() const { return error("ends before its content"); }
+
+ private:
+  std::string_view id_;
+  std::size_t offset_;
+};
+
+/// Builds the bytes of a .vox file.
+class ChunkWriter : public ByteWriter {
+ public:
+  using Entries = std::vector<std::pair<std::string, std::string>>;
+
+  void string(std::string_view value) {
+    u32(static_cast<std::uint32_t>(value.size()));
+    text(value);
+  }
+  void dict(const Entries& entries) {
+    u32(static_cast<std::uint32_t>(entries.size()));
+    for (const auto& [key, value] : entries) {
+      string(key);
+      string(value);
+    }
+  }
+
+  /// Starts a chunk; writes until `end_chunk` are its content.
+  [[nodiscard]] std::size_t begin_chunk(std::string_view id) {
+    text(id);
+    u32(0);
+    u32(0);
+    return size();
+  }
+  /// `begin`: the result of begin_chunk. Content beyond 4 GiB wraps: check `size` before using the bytes. `children`:
+  /// bytes of child chunks after it.
+  void end_chunk(std::size_t begin, std::size_t children = 0) {
+    QUOIN_ASSERT(begin >= 12 && begin <= size(), "a chunk that was begun");
+    patch(begin - 8, size() - begin);
+    patch(begin - 4, children);
+  }
+};
 
 }  // namespace quoin::vox

@@ -10,7 +10,7 @@
 #include <string_view>
 
 #include "core/bytes/text.h"
-#include "io/vox/chunk_reader.h"
+#include "io/vox/chunks.h"
 
 namespace quoin::vox {
 

@@ -14,8 +14,8 @@
 
 #include <quoin/io/vox.h>
 
-#include "io/vox/write/chunk_writer.h"
-#include "io/vox/write/write.h"
+#include "io/vox/chunks.h"
+#include "io/vox/write/vox_parts.h"
 
 /// Shared by the tests and the fuzz target of .vox.
 namespace quoin::vox_test {

@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "core/bytes/text.h"
-#include "io/vox/write/graph_revision_steps.h"
 
 namespace quoin::vox {
 

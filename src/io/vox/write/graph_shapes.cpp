@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/bytes/text.h"
-#include "io/vox/write/graph_revision_steps.h"
+#include "io/vox/write/graph_revision.h"
 
 namespace quoin::vox {
 

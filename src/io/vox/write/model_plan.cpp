@@ -7,7 +7,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "io/vox/write/chunk_writer.h"
+#include "io/vox/chunks.h"
 
 namespace quoin::vox {
 

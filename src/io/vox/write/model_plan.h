@@ -7,8 +7,8 @@
 
 #include <quoin/core/result.h>
 
-#include "io/vox/source.h"
-#include "io/vox/write/write.h"
+#include "io/vox/vox_reader.h"
+#include "io/vox/write/vox_parts.h"
 
 namespace quoin::vox {
 

@@ -6,7 +6,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "io/vox/chunk_reader.h"
+#include "io/vox/chunks.h"
 
 namespace quoin::vox {
 

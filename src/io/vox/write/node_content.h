@@ -10,8 +10,7 @@
 #include <vector>
 
 #include "io/vox/chunks.h"
-#include "io/vox/source.h"
-#include "io/vox/write/chunk_writer.h"
+#include "io/vox/vox_reader.h"
 
 namespace quoin::vox {
 

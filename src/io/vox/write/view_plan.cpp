@@ -8,7 +8,7 @@
 #include "core/bytes/text.h"
 #include "core/srgb.h"
 #include "io/vox/cameras.h"
-#include "io/vox/chunk_reader.h"
+#include "io/vox/chunks.h"
 #include "io/vox/render_settings.h"
 
 namespace quoin::vox {

@@ -10,8 +10,8 @@
 
 #include <quoin/io/loaded_scene.h>
 
-#include "io/vox/source.h"
-#include "io/vox/write/chunk_writer.h"
+#include "io/vox/chunks.h"
+#include "io/vox/vox_reader.h"
 #include "io/vox/write/node_content.h"
 
 namespace quoin::vox {

@@ -7,7 +7,7 @@
 #include <quoin/io/vox.h>
 
 #include "io/vox/vox_for_tests.h"
-#include "io/vox/write/write.h"
+#include "io/vox/write/vox_parts.h"
 
 namespace quoin::vox {
 namespace {

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -65,6 +66,18 @@ void write_voxels(const Grid& grid, const std::vector<std::uint8_t>& index_of_ty
 
 /// Returns the point of the grid at MagicaVoxel's pivot of that piece's model.
 [[nodiscard]] DVec3 pivot_of(const Piece& piece);
+
+// .vox files know only voxels of size 1.
+
+/// Returns the common voxel size of all instances; nullopt if it is 1 or they differ.
+[[nodiscard]] std::optional<double> common_voxel_size(const Scene& scene);
+
+/// Returns the scene with voxels of size 1 and all positions divided by their size.
+[[nodiscard]] Scene divided(const Scene& given, double voxel_size);
+[[nodiscard]] LoadedScene divided(const LoadedScene& given, double voxel_size);
+
+/// Returns the warning that the file does not store the voxel size.
+[[nodiscard]] std::string size_warning(double voxel_size);
 
 }  // namespace quoin::vox
 

@@ -1,6 +1,10 @@
+#include "io/vox/vox_reader.h"
+
 #include <algorithm>
 #include <map>
 #include <memory>
+#include <string>
+#include <string_view>
 #include <utility>
 
 #include <quoin/core/assert.h>
@@ -11,9 +15,7 @@
 #include "io/vox/cameras.h"
 #include "io/vox/chunks.h"
 #include "io/vox/materials.h"
-#include "io/vox/read.h"
 #include "io/vox/render_settings.h"
-#include "io/vox/source.h"
 #include "io/whole_file.h"
 #include "scene/hierarchy.h"
 
@@ -198,6 +200,37 @@ Result<Scene> scene_at_frame(const VoxSource& source, int frame) {
 
 Result<LoadedScene> read_vox(const std::filesystem::path& path, const LoadOptions& options, const Progress& progress) {
   return read_whole(path, [&](std::span<const std::byte> bytes) { return read_vox(bytes, options, progress); });
+}
+
+namespace {
+
+/// Returns a display name for chunks without a place in a scene; "" for chunks that a scene represents.
+std::string kept_as(std::string_view id) {
+  if (id == "rCAM") return "cameras";
+  if (id == "rOBJ") return "render settings";
+  if (id == "NOTE") return "notes";
+  // IMAP is stored as the order of the types, META as the frame range.
+  if (id == "IMAP" || id == "META" || id == "MATL" || id == "MATT") return {};
+  return "chunks " + printable(id);
+}
+
+}  // namespace
+
+std::vector<std::string> source_only_features(const VoxSource& source) {
+  std::vector<std::string> lines;
+  if (vox::is_animated(source.document)) {
+    lines.push_back("animation: frames 0 to " + std::to_string(vox::last_frame(source.document)));
+  }
+  std::map<std::string, int> counts;
+  for (const vox::ChunkSpan& place : source.document.chunks) {
+    if (place.kind != vox::ChunkKind::Other) continue;
+    QUOIN_ASSERT(place.begin + vox::kChunkHeaderBytes <= source.bytes.size(), "a chunk of the file");
+    const std::string_view id(reinterpret_cast<const char*>(source.bytes.data()) + place.begin, 4);
+    std::string kept = kept_as(id);
+    if (!kept.empty()) ++counts[std::move(kept)];
+  }
+  for (const auto& [kept, count] : counts) lines.push_back(kept + ": " + std::to_string(count));
+  return lines;
 }
 
 }  // namespace quoin

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "core/death_for_tests.h"
-#include "io/vox/chunk_reader.h"
+#include "io/vox/chunks.h"
 #include "io/vox/materials.h"
 #include "io/vox/vox_for_tests.h"
 

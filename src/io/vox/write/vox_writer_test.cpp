@@ -8,9 +8,9 @@
 #include "core/death_for_tests.h"
 #include "io/vox/materials.h"
 #include "io/vox/orientation.h"
-#include "io/vox/read.h"
 #include "io/vox/vox_for_tests.h"
-#include "io/vox/write/write.h"
+#include "io/vox/vox_reader.h"
+#include "io/vox/write/vox_parts.h"
 
 namespace quoin {
 namespace {

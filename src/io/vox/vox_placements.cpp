@@ -1,4 +1,4 @@
-#include "io/vox/read.h"
+#include "io/vox/vox_reader.h"
 
 #include <algorithm>
 #include <optional>

@@ -1,16 +1,17 @@
-#include <quoin/core/assert.h>
-
-#include "io/vox/write/write.h"
+#include "io/vox/write/vox_parts.h"
 
 #include <algorithm>
+#include <cmath>
+#include <cstdio>
 #include <map>
 #include <optional>
 #include <string>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 #include "io/vox/materials.h"
-#include "io/vox/read.h"
-#include "io/vox/source.h"
+#include "io/vox/vox_reader.h"
 
 namespace quoin::vox {
 
@@ -288,6 +289,53 @@ void write_voxels(const Grid& grid, const std::vector<std::uint8_t>& index_of_ty
 
 DVec3 pivot_of(const Piece& piece) {
   return DVec3(piece.min) + pivot_of(IVec3{piece.size.x, piece.size.z, piece.size.y});
+}
+
+std::optional<double> common_voxel_size(const Scene& scene) {
+  constexpr double kRounding = 1e-6;
+  std::optional<double> common;
+  bool is_same = true;
+  scene.instances().for_each([&](InstanceHandle, const Instance& instance) {
+    if (!common) common = instance.voxel_size;
+    is_same = is_same && std::abs(instance.voxel_size - *common) <= kRounding * *common;
+  });
+  const bool is_scaled = common && is_same && *common != 1.0 && *common > 0.0 && std::isfinite(*common);
+  return is_scaled ? common : std::nullopt;
+}
+
+Scene divided(const Scene& given, double voxel_size) {
+  Scene scene = given.snapshot();
+  for (const InstanceHandle handle : scene.instances().handles()) {
+    Instance& instance = scene.edit(handle);
+    instance.voxel_size = 1.0;
+    instance.position /= voxel_size;
+  }
+  for (const GroupHandle handle : scene.groups().handles()) scene.edit(handle).position /= voxel_size;
+  return scene;
+}
+
+LoadedScene divided(const LoadedScene& given, double voxel_size) {
+  LoadedScene unit;
+  unit.scene = divided(given.scene, voxel_size);
+  unit.format = given.format;
+  unit.sun = given.sun;
+  unit.camera = given.camera;
+  unit.cameras = given.cameras;
+  unit.look = given.look;
+  unit.last_frame = given.last_frame;
+  unit.source = given.source;
+  if (unit.camera) unit.camera->position /= voxel_size;
+  for (FileCamera& each : unit.cameras) {
+    each.camera.position /= voxel_size;
+    each.focus_distance /= voxel_size;
+  }
+  return unit;
+}
+
+std::string size_warning(double voxel_size) {
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.6g", voxel_size);
+  return std::string("voxel size left out, not supported by .vox: a voxel was ") + text + " units long";
 }
 
 }  // namespace quoin::vox

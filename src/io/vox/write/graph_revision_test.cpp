@@ -11,9 +11,9 @@
 
 #include <gtest/gtest.h>
 
-#include "io/vox/source.h"
 #include "io/vox/vox_for_tests.h"
-#include "io/vox/write/write.h"
+#include "io/vox/vox_reader.h"
+#include "io/vox/write/vox_parts.h"
 
 namespace quoin {
 namespace {
