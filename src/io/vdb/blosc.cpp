@@ -2,7 +2,7 @@
 // then the offset of each block (i32), and the blocks: streams of i32 size and bytes; split blocks have a stream for
 // each byte of an element. Shuffled: the first bytes of all elements come first.
 
-#include "io/vdb/blosc.h"
+#include "io/vdb/vdb.h"
 
 #include <algorithm>
 #include <string>

@@ -8,7 +8,7 @@
 //   leaves     mask of active voxels at 16, values
 // Child offsets are relative to their parent.
 
-#include "io/vdb/vdb_tree.h"
+#include "io/vdb/vdb.h"
 
 #include <algorithm>
 #include <bit>
@@ -22,7 +22,6 @@
 #include "core/bytes/byte_stream.h"
 #include "core/bytes/bytes.h"
 #include "core/bytes/text.h"
-#include "io/vdb/blosc.h"
 
 namespace quoin::vdb {
 

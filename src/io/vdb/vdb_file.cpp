@@ -11,7 +11,7 @@
 //   values: u8 code, up to two inactive values, bits that choose between them; then the active values only, or all
 //   values, uncompressed, or as i64 size and a zlib stream or Blosc frame (a negative size: uncompressed)
 
-#include "io/vdb/vdb_tree.h"
+#include "io/vdb/vdb.h"
 
 #include <algorithm>
 #include <cmath>
@@ -27,7 +27,6 @@
 #include "core/bytes/byte_stream.h"
 #include "core/bytes/bytes.h"
 #include "core/bytes/text.h"
-#include "io/vdb/blosc.h"
 
 namespace quoin::vdb {
 

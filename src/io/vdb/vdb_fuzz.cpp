@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <span>
 
-#include "io/vdb/vdb_tree.h"
+#include "io/vdb/vdb.h"
 
 /// Any bytes must give trees whose leaves have all their values, or an error.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -17,7 +17,6 @@
 
 #include "io/format_driver.h"
 #include "io/vdb/vdb.h"
-#include "io/vdb/vdb_tree.h"
 #include "io/whole_file.h"
 
 namespace quoin::vdb {

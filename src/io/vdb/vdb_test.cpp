@@ -12,9 +12,6 @@
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 
-#include "io/vdb/blosc.h"
-#include "io/vdb/vdb_tree.h"
-
 namespace quoin::vdb {
 
 namespace {

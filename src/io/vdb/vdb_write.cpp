@@ -19,7 +19,6 @@
 
 #include "core/bytes/bytes.h"
 #include "io/vdb/vdb.h"
-#include "io/vdb/vdb_tree.h"
 
 namespace quoin::vdb {
 
