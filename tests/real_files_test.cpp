@@ -118,7 +118,7 @@ TEST(RealFiles, AreReadAsOthersReadThemOrRefusedInALine) {
     const auto loaded = load_scene(kData / file, options);
     if (loaded) {
       ++read;
-      // For .vox files the entry says more; src/io/vox/data_test.cpp compares it.
+      // For .vox files the entry says more; src/io/vox/vox_data_test.cpp compares it.
       const nlohmann::json& info = entry.at("info");
       if (info.is_string() && compare(file, info, *loaded)) ++compared;
       continue;

@@ -10,7 +10,7 @@
 #include "io/format_driver.h"
 #include "io/heights/heights.h"
 #include "io/triangles/triangles.h"
-#include "io/volume/header.h"
+#include "io/volume/volume_file.h"
 #include "io/whole_file.h"
 
 namespace quoin {

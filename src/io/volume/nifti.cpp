@@ -20,7 +20,7 @@
 #include "core/work/progress_steps.h"
 #include "io/format_driver.h"
 #include "io/placed/placed_grids.h"
-#include "io/volume/header.h"
+#include "io/volume/volume_file.h"
 #include "io/whole_file.h"
 
 namespace quoin::nifti {

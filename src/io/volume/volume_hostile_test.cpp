@@ -7,7 +7,7 @@
 #include <quoin/io/file.h>
 
 #include "core/death_for_tests.h"
-#include "io/volume/header.h"
+#include "io/volume/volume_file.h"
 #include "io/volume/volume_for_tests.h"
 
 namespace quoin {
