@@ -32,7 +32,6 @@
 #include "io/mesh_parts.h"
 #include "io/three_mf/zip.h"
 #include "io/triangles/triangles.h"
-#include "io/triangles/words.h"
 
 #ifdef QUOIN_HAVE_EXPAT
 #include <expat.h>

@@ -1,4 +1,4 @@
-#include "io/triangles/polygon.h"
+#include "io/triangles/triangles.h"
 
 #include <cmath>
 #include <numbers>

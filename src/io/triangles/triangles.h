@@ -1,17 +1,21 @@
 #pragma once
 
 #include <array>
+#include <charconv>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/function_ref.h>
 #include <quoin/core/progress.h>
+#include <quoin/core/vec.h>
 #include <quoin/io/formats.h>
 #include <quoin/io/mesh_file.h>
 #include <quoin/io/sidecar_file.h>
@@ -83,5 +87,57 @@ class MeshBuilder {
 /// Converts a mesh to a scene with one grid. `name`: the grid's name.
 [[nodiscard]] Result<LoadedScene> scene_from_mesh(LoadedMesh loaded, const MeshLoadOptions& options,
                                                   const std::string& name, Threads threads, const Progress& progress);
+
+/// Larger polygons that are not convex are cut as if they were convex.
+inline constexpr std::size_t kMostCornersOfConcave = std::size_t{1} << 14;
+
+/// Cuts a polygon into `corners.size() - 2` triangles of its corners with the same orientation.
+///
+/// Convex polygons become a fan from corner 0. Others are cut ear by ear: concave polygons, and polygons whose hole is
+/// connected to the outline by an edge (a keyhole). Corners may coincide or be collinear; such triangles have no area.
+/// The triangles of polygons that cross themselves, or are not flat, still use each edge once.
+/// Requires: finite corners. Cost: O(n) for a convex polygon, else about O(n^2).
+/// Returns false if the polygon was too large and was cut as a fan.
+/// Source: G. Meisters, "Polygons have ears" (1975).
+bool cut_polygon(std::span<const DVec3> corners, std::vector<std::array<std::uint32_t, 3>>& triangles);
+
+/// Parses a decimal number, "nan" or "inf" that is the whole word.
+[[nodiscard]] inline std::optional<double> number_in(std::string_view word) {
+  if (word.starts_with('+')) word.remove_prefix(1);
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  if (end != word.data() + word.size() || word.empty()) return std::nullopt;
+  // Too large or too small numbers are not finite.
+  if (error == std::errc::result_out_of_range) return value;
+  return error == std::errc() ? std::optional(value) : std::nullopt;
+}
+
+/// Reads the words of a text, separated by blanks and line ends. Lifetime: the text.
+class Words {
+ public:
+  explicit Words(std::string_view text, std::size_t position = 0) : text_(text), at_(position) {
+    QUOIN_ASSERT(position <= text.size(), "a position within the text");
+  }
+
+  [[nodiscard]] std::optional<std::string_view> next() {
+    while (at_ < text_.size() && is_blank(text_[at_])) ++at_;
+    const std::size_t first = at_;
+    while (at_ < text_.size() && !is_blank(text_[at_])) ++at_;
+    if (first == at_) return std::nullopt;
+    return text_.substr(first, at_ - first);
+  }
+  [[nodiscard]] std::optional<double> next_number() {
+    const auto word = next();
+    return word ? number_in(*word) : std::nullopt;
+  }
+  /// Returns the position where the search for the next word starts.
+  [[nodiscard]] std::size_t position() const { return at_; }
+
+ private:
+  static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; }
+
+  std::string_view text_;
+  std::size_t at_;
+};
 
 }  // namespace quoin::triangles

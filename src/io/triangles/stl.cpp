@@ -24,7 +24,6 @@
 #include "io/format_driver.h"
 #include "io/mesh_parts.h"
 #include "io/triangles/triangles.h"
-#include "io/triangles/words.h"
 
 namespace quoin::triangles {
 

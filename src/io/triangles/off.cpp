@@ -17,7 +17,6 @@
 #include "core/srgb.h"
 #include "io/format_driver.h"
 #include "io/triangles/triangles.h"
-#include "io/triangles/words.h"
 
 namespace quoin::triangles {
 

@@ -27,9 +27,7 @@
 #include "io/format_driver.h"
 #include "io/material_palette.h"
 #include "io/mesh_parts.h"
-#include "io/triangles/polygon.h"
 #include "io/triangles/triangles.h"
-#include "io/triangles/words.h"
 
 #ifdef QUOIN_HAVE_TINYOBJLOADER
 #define TINYOBJLOADER_USE_DOUBLE
