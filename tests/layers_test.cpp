@@ -33,7 +33,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"grid/density/density_storage.h", {"mesh", "store", "terrain", "trace"}},
     {"grid/long_box.h", {"live", "scene", "stream"}},
     {"io/format_driver.h", {"store"}},
-    {"io/luanti/luanti_nodes.h", {"store"}},
+    {"io/models/luanti.h", {"store"}},
     {"io/scene_file/scene_parts.h", {"store"}},
     {"light/corner_light.h", {"render"}},
     {"light/glass_bodies.h", {"render"}},

@@ -35,7 +35,7 @@ namespace quoin::minecraft {
 /// their states. Others become blocks of the nearest colour: concrete, wool, clay and some more, glass for transparent
 /// types, lights for emissive types.
 ///
-/// Errors, warnings: as in placed/placed_grids.h; LimitExceeded beyond 65,535 blocks per side or 2^30 in total.
+/// Errors, warnings: as in placed_grids.h; LimitExceeded beyond 65,535 blocks per side or 2^30 in total.
 [[nodiscard]] Result<EncodedFile> write_schematic(const Scene& scene, const Progress& progress = {});
 
 }  // namespace quoin::minecraft

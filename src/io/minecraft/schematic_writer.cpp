@@ -17,7 +17,7 @@
 #include "io/minecraft/block_types.h"
 #include "io/minecraft/nbt.h"
 #include "io/minecraft/schematic.h"
-#include "io/placed/placed_grids.h"
+#include "io/placed_grids.h"
 
 namespace quoin::minecraft {
 

@@ -15,7 +15,7 @@
 #include "core/bytes/bytes.h"
 #include "io/format_driver.h"
 #include "io/models/model_builder.h"
-#include "io/placed/placed_grids.h"
+#include "io/placed_grids.h"
 
 // Toy files: the line "toy", then one line "x y z" per voxel. The voxels have no colours: they are grey.
 

@@ -15,7 +15,7 @@
 #include "core/bytes/byte_stream.h"
 #include "core/bytes/bytes.h"
 #include "io/format_driver.h"
-#include "io/placed/placed_grids.h"
+#include "io/placed_grids.h"
 
 namespace quoin::models {
 namespace {

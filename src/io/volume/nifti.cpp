@@ -19,7 +19,7 @@
 #include "core/bytes/text.h"
 #include "core/work/progress_steps.h"
 #include "io/format_driver.h"
-#include "io/placed/placed_grids.h"
+#include "io/placed_grids.h"
 #include "io/volume/volume_file.h"
 #include "io/whole_file.h"
 

@@ -18,7 +18,7 @@
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
 
-#include "core/bytes/byte_reader.h"
+#include "core/bytes/bytes.h"
 #include "core/bytes/text.h"
 #include "io/format_driver.h"
 #include "io/volume/volume_file.h"

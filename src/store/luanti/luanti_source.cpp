@@ -19,7 +19,7 @@
 #include <quoin/io/file.h>
 
 #include "core/bytes/text.h"
-#include "io/luanti/luanti_nodes.h"
+#include "io/models/luanti.h"
 #include "store/database/connection.h"
 #include "store/luanti/map_block.h"
 #include "store/store_formats.h"

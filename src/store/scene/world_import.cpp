@@ -16,7 +16,7 @@
 #include <quoin/store/world_store.h>
 
 #include "core/bytes/files.h"
-#include "io/luanti/luanti_nodes.h"
+#include "io/models/luanti.h"
 #include "store/scene/world_file.h"
 #include "store/world/part_text.h"
 #include "store/world/world_changes.h"

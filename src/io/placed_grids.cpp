@@ -1,4 +1,4 @@
-#include "io/placed/placed_grids.h"
+#include "io/placed_grids.h"
 
 #include <algorithm>
 #include <array>

@@ -31,7 +31,7 @@
 #include "io/format_driver.h"
 #include "io/image/image_codecs.h"
 #include "io/models/model_builder.h"
-#include "io/placed/placed_grids.h"
+#include "io/placed_grids.h"
 
 namespace quoin::models {
 

@@ -16,7 +16,7 @@
 #include "core/work/progress_steps.h"
 #include "io/format_driver.h"
 #include "io/models/model_builder.h"
-#include "io/placed/placed_grids.h"
+#include "io/placed_grids.h"
 
 namespace quoin::models {
 
