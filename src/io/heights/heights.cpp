@@ -16,7 +16,7 @@
 #include <quoin/terrain/terrain.h>
 
 #include "core/bytes/byte_order.h"
-#include "core/bytes/byte_reader.h"
+#include "core/bytes/bytes.h"
 #include "io/format_driver.h"
 #include "io/image/image_codecs.h"
 
