@@ -12,7 +12,6 @@
 #include <quoin/core/vec.h>
 #include <quoin/scene/scene_meshes.h>
 
-#include "io/block_writer.h"
 #include "io/material_palette.h"
 #include "io/mesh_parts.h"
 
