@@ -17,7 +17,6 @@
 #include "core/death_for_tests.h"
 #include "mesh/smooth/smooth_cell.h"
 #include "mesh/smooth/surface_check_for_tests.h"
-#include "mesh/surface/manifold.h"
 #include "mesh/surface/simplify.h"
 #include "mesh/surface/welded_for_tests.h"
 
