@@ -9,7 +9,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "voxelize/kernel/kernel.h"
+#include "voxelize/nearest_kernel.h"
 
 namespace quoin::voxelizing {
 

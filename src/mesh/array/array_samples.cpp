@@ -8,7 +8,7 @@
 #include <quoin/core/assert.h>
 
 #include "mesh/array/array_cells.h"
-#include "mesh/array/kernel.h"
+#include "mesh/array/array_kernel.h"
 
 namespace quoin::array {
 namespace {

@@ -18,8 +18,8 @@
 #include <quoin/mesh/array_surface.h>
 
 #include "core/work/progress_steps.h"
+#include "mesh/array/array_kernel.h"
 #include "mesh/array/array_lattice.h"
-#include "mesh/array/kernel.h"
 
 namespace quoin::array {
 

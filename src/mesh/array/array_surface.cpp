@@ -17,10 +17,10 @@
 
 #include "core/work/progress_steps.h"
 #include "mesh/array/array_cells.h"
+#include "mesh/array/array_kernel.h"
 #include "mesh/array/array_lattice.h"
 #include "mesh/array/array_samples.h"
 #include "mesh/array/array_vertex.h"
-#include "mesh/array/kernel.h"
 #include "mesh/smooth/sheets.h"
 #include "mesh/smooth/smooth_cell.h"
 

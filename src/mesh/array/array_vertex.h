@@ -7,7 +7,7 @@
 
 #include <quoin/core/vec.h>
 
-#include "mesh/array/kernel.h"
+#include "mesh/array/array_kernel.h"
 #include "mesh/smooth/smooth_cell.h"
 
 namespace quoin::array {

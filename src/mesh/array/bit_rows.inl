@@ -14,7 +14,7 @@
 #include <immintrin.h>
 #endif
 
-#include "mesh/array/kernel.h"
+#include "mesh/array/array_kernel.h"
 
 namespace quoin::array {
 namespace {

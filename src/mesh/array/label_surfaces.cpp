@@ -9,8 +9,8 @@
 #include <quoin/core/assert.h>
 
 #include "mesh/array/array_cells.h"
+#include "mesh/array/array_kernel.h"
 #include "mesh/array/array_lattice.h"
-#include "mesh/array/kernel.h"
 
 namespace quoin::array {
 namespace {

@@ -10,8 +10,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "mesh/array/array_kernel.h"
 #include "mesh/array/bit_rows.inl"
-#include "mesh/array/kernel.h"
 
 namespace quoin::array {
 namespace {

@@ -8,8 +8,8 @@
 
 #include <cstddef>
 
-#include "mesh/array/kernel.h"
-#include "mesh/array/kernel.inl"
+#include "mesh/array/array_kernel.h"
+#include "mesh/array/array_kernel.inl"
 #include "mesh/smooth/smooth_lanes.inl"
 
 namespace quoin::array {

@@ -7,8 +7,8 @@
 
 #include <quoin/core/assert.h>
 
+#include "mesh/array/array_kernel.h"
 #include "mesh/array/bit_rows.inl"
-#include "mesh/array/kernel.h"
 #include "mesh/array/quads.inl"
 #include "mesh/array/relax.inl"
 

@@ -1,6 +1,6 @@
 // The mesher's kernel for any processor.
 
-#include "mesh/blocky/kernel.inl"
+#include "mesh/blocky/blocky_kernel.inl"
 
 namespace quoin::blocky {
 

@@ -1,6 +1,6 @@
 // The kernel for any CPU.
 
-#include "voxelize/kernel/row.inl"
+#include "voxelize/nearest_kernel.inl"
 
 namespace quoin::voxelizing {
 

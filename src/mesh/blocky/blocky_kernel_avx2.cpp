@@ -2,7 +2,7 @@
 
 #ifdef QUOIN_X86_KERNELS
 
-#include "mesh/blocky/kernel.inl"
+#include "mesh/blocky/blocky_kernel.inl"
 
 namespace quoin::blocky {
 

@@ -1,10 +1,10 @@
 // The kernel for x86-64 processors with AVX-512 (including VBMI2). Called only if the processor has all of them.
 
-#include "mesh/array/kernel.h"
+#include "mesh/array/array_kernel.h"
 
 #ifdef QUOIN_X86_KERNELS
 
-#include "mesh/array/kernel.inl"
+#include "mesh/array/array_kernel.inl"
 #include "mesh/array/vertices.inl"
 
 namespace quoin::array {

@@ -3,7 +3,7 @@
 #include <quoin/core/assert.h>
 
 #include "core/lanes/lanes.h"
-#include "voxelize/kernel/kernel.h"
+#include "voxelize/nearest_kernel.h"
 
 namespace quoin::voxelizing {
 namespace {

@@ -2,7 +2,7 @@
 
 #ifdef QUOIN_X86_KERNELS
 
-#include "voxelize/kernel/row.inl"
+#include "voxelize/nearest_kernel.inl"
 
 namespace quoin::voxelizing {
 

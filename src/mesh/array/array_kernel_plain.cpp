@@ -2,9 +2,9 @@
 
 #include <cstddef>
 
+#include "mesh/array/array_kernel.h"
+#include "mesh/array/array_kernel.inl"
 #include "mesh/array/array_vertex.h"
-#include "mesh/array/kernel.h"
-#include "mesh/array/kernel.inl"
 
 namespace quoin::array {
 namespace {
