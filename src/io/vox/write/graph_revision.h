@@ -14,15 +14,15 @@
 #include <quoin/scene/scene.h>
 
 #include "io/vox/vox_reader.h"
-#include "io/vox/write/model_plan.h"
 #include "io/vox/write/node_content.h"
+#include "io/vox/write/vox_parts.h"
 
 // Builds the scene graph to write. A single class, since each step uses the members that the previous one set:
 //
 //  number_layers, find_top    ids of layers; the group that is the scene itself, perhaps a new one
 //  remove_what_is_gone        removed nodes of the source
 //  revise_groups              from the top: position, name, layer, parent
-//  revise_instances           the same, and the models that they show: graph_shapes.cpp
+//  revise_instances           the same, and the models that they show
 //  name_shapes, apply_child_changes, settle_root
 //
 // The result is a RevisedGraph: the changed nodes of the source, and new nodes.
