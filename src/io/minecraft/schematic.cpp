@@ -19,7 +19,6 @@
 #include "core/bytes/text.h"
 #include "io/minecraft/block_looks.h"
 #include "io/minecraft/block_types.h"
-#include "io/minecraft/large_nbt.h"
 #include "io/minecraft/nbt.h"
 #include "io/minecraft/region_file.h"
 #include "io/minecraft/sections.h"

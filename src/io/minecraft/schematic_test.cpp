@@ -9,8 +9,8 @@
 
 #include "core/bytes/byte_stream.h"
 #include "io/minecraft/block_types.h"
-#include "io/minecraft/large_nbt.h"
 #include "io/minecraft/minecraft_for_tests.h"
+#include "io/minecraft/nbt.h"
 
 namespace quoin::minecraft {
 namespace {
