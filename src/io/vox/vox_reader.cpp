@@ -12,9 +12,7 @@
 
 #include "core/bytes/bytes.h"
 #include "core/bytes/text.h"
-#include "io/vox/cameras.h"
 #include "io/vox/chunks.h"
-#include "io/vox/materials.h"
 #include "io/vox/render_settings.h"
 #include "io/whole_file.h"
 #include "scene/hierarchy.h"

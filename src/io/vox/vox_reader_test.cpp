@@ -4,8 +4,8 @@
 
 #include "core/death_for_tests.h"
 #include "io/vox/chunks.h"
-#include "io/vox/materials.h"
 #include "io/vox/vox_for_tests.h"
+#include "io/vox/vox_reader.h"
 
 namespace quoin {
 namespace {

@@ -13,7 +13,6 @@
 #include <quoin/core/assert.h>
 
 #include "io/vox/chunks.h"
-#include "io/vox/materials.h"
 #include "io/vox/vox_reader.h"
 
 namespace quoin::vox {

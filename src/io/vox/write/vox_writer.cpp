@@ -14,7 +14,6 @@
 #include "core/bytes/text.h"
 #include "io/format_driver.h"
 #include "io/vox/chunks.h"
-#include "io/vox/materials.h"
 #include "io/vox/vox_reader.h"
 #include "io/vox/write/graph_revision.h"
 #include "io/vox/write/node_content.h"

@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include "core/death_for_tests.h"
-#include "io/vox/materials.h"
 #include "io/vox/orientation.h"
 #include "io/vox/vox_for_tests.h"
 #include "io/vox/vox_reader.h"

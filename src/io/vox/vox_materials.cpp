@@ -1,6 +1,6 @@
 #include <quoin/core/assert.h>
 
-#include "io/vox/materials.h"
+#include "io/vox/vox_reader.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "io/vox/materials.h"
+#include "io/vox/vox_reader.h"
 
 #include <gtest/gtest.h>
 
