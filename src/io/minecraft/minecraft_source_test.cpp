@@ -1,4 +1,4 @@
-#include "io/minecraft/minecraft_source.h"
+#include "io/minecraft/minecraft.h"
 
 #include <gtest/gtest.h>
 

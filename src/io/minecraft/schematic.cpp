@@ -1,4 +1,4 @@
-#include "io/minecraft/schematic.h"
+#include "io/minecraft/minecraft.h"
 
 #include <algorithm>
 #include <array>

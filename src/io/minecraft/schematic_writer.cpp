@@ -15,8 +15,8 @@
 #include "core/work/progress_steps.h"
 #include "io/minecraft/block_looks.h"
 #include "io/minecraft/block_types.h"
+#include "io/minecraft/minecraft.h"
 #include "io/minecraft/nbt.h"
-#include "io/minecraft/schematic.h"
 #include "io/placed_grids.h"
 
 namespace quoin::minecraft {

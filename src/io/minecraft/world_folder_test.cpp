@@ -5,8 +5,8 @@
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 
+#include "io/minecraft/minecraft.h"
 #include "io/minecraft/minecraft_for_tests.h"
-#include "io/minecraft/minecraft_source.h"
 #include "io/minecraft/region_file.h"
 
 namespace quoin {

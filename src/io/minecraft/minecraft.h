@@ -1,21 +1,39 @@
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
+#include <memory>
 #include <span>
+#include <string_view>
 
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
+#include <quoin/io/chunk_source.h>
 #include <quoin/io/loaded_scene.h>
 
 #include "io/format_driver.h"
+
+namespace quoin::minecraft {
+
+/// Returns true if a folder is a Minecraft (Java) world or one of its dimensions, or holds region files. Also accepts
+/// the path of a world's level.dat.
+[[nodiscard]] bool is_minecraft_folder(const std::filesystem::path& path);
+
+/// Opens a Minecraft (Java) world: its folder or level.dat, the folder of a dimension, a folder of region files, or a
+/// region file. `dimension`: "overworld", "nether", "end" or NAMESPACE:NAME; empty: the overworld, or the first.
+/// Errors: CannotRead; BadFormat if no region can be read; Unsupported for regions of entities or points of interest;
+/// InvalidArgument for a missing dimension, with a list of the present ones.
+[[nodiscard]] Result<std::unique_ptr<ChunkSource>> open_minecraft(const std::filesystem::path& path,
+                                                                  std::string_view dimension = {});
+
+/// Opens the bytes of a region file, which are copied. Errors: BadFormat.
+[[nodiscard]] Result<std::unique_ptr<ChunkSource>> open_minecraft(std::span<const std::byte> region);
 
 // Pieces of Minecraft worlds, as players and programs share them:
 //   .schem      https://github.com/SpongePowered/Schematic-Specification, versions 1 to 3
 //   .schematic  https://minecraft.wiki/w/Schematic_file_format
 //   .litematic  of the mod Litematica, versions 1 to 7
 //   .nbt        structures of the game: https://minecraft.wiki/w/Structure_file
-
-namespace quoin::minecraft {
 
 /// Returns true if an NBT file begins here, gzipped or plain; the reader decides if it is a schematic. `beginning`:
 /// about a hundred bytes suffice.
