@@ -77,18 +77,18 @@ struct ChunkSource::Cache {
 };
 
 ChunkSource::ChunkSource(ChunkSourceInfo info, std::vector<IBox> parts)
-    : info_(std::move(info)), parts_(std::move(parts)), by_place_(parts_.size()), cache_(std::make_unique<Cache>()) {
+    : info_(std::move(info)), parts_(std::move(parts)), by_position_(parts_.size()), cache_(std::make_unique<Cache>()) {
   QUOIN_ASSERT(parts_.size() <= std::numeric_limits<std::uint32_t>::max(), "at most 2^32 - 1 parts");
-  std::iota(by_place_.begin(), by_place_.end(), 0U);
-  std::ranges::sort(by_place_, {}, [&](std::uint32_t part) { return order_of(parts_[part].min); });
+  std::iota(by_position_.begin(), by_position_.end(), 0U);
+  std::ranges::sort(by_position_, {}, [&](std::uint32_t part) { return order_of(parts_[part].min); });
 }
 
 ChunkSource::~ChunkSource() = default;
 
 std::optional<std::size_t> ChunkSource::part_of(IVec3 chunk) const {
-  const auto after = std::ranges::upper_bound(by_place_, order_of(chunk), {},
+  const auto after = std::ranges::upper_bound(by_position_, order_of(chunk), {},
                                               [&](std::uint32_t part) { return order_of(parts_[part].min); });
-  if (after == by_place_.begin()) return std::nullopt;
+  if (after == by_position_.begin()) return std::nullopt;
   const std::uint32_t part = *(after - 1);
   return parts_[part].contains(chunk) ? std::optional<std::size_t>(part) : std::nullopt;
 }

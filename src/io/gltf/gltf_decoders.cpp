@@ -28,7 +28,6 @@
 #include <quoin/core/assert.h>
 
 #include "core/bytes/bytes.h"
-#include "core/bytes/byte_writer.h"
 #include "io/triangles/triangles.h"
 
 namespace quoin::triangles {

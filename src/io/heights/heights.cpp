@@ -15,7 +15,6 @@
 #include <quoin/io/heights.h>
 #include <quoin/terrain/terrain.h>
 
-#include "core/bytes/byte_order.h"
 #include "core/bytes/bytes.h"
 #include "io/format_driver.h"
 #include "io/image/image_codecs.h"

@@ -11,7 +11,7 @@
 #include <quoin/io/volume.h>
 #include <quoin/scene/volume_scene.h>
 
-#include "core/bytes/byte_order.h"
+#include "core/bytes/bytes.h"
 #include "core/bytes/text.h"
 #include "io/format_driver.h"
 #include "io/whole_file.h"

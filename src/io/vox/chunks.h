@@ -16,7 +16,6 @@
 #include <quoin/core/vec.h>
 
 #include "core/bytes/bytes.h"
-#include "core/bytes/byte_writer.h"
 #include "core/bytes/text.h"
 #include "io/vox/orientation.h"
 
