@@ -14,9 +14,9 @@
 #include "output.h"
 #include "render/camera_path.h"
 #include "render/image_output.h"
-#include "render/movie.h"
 #include "render/path_images.h"
 #include "render/render_arguments.h"
+#include "render/video.h"
 #include "run_control.h"
 #include "watch.h"
 
@@ -35,10 +35,10 @@ struct Outcome {
   double read = 0, build = 0, trace = 0, write = 0;
   std::string device;  ///< the Vulkan device; empty: rendered on the CPU
   std::vector<std::string> warnings;
-  std::int64_t rays = 0;                    ///< of all images
-  std::optional<double> exposure;           ///< of path-traced images
-  std::int64_t kept = 0;                    ///< existing images that were kept
-  std::vector<std::filesystem::path> film;  ///< all images in order
+  std::int64_t rays = 0;                      ///< of all images
+  std::optional<double> exposure;             ///< of path-traced images
+  std::int64_t kept = 0;                      ///< existing images that were kept
+  std::vector<std::filesystem::path> images;  ///< all images in order
 };
 
 /// An image to render.
@@ -338,8 +338,8 @@ Result<std::vector<Camera>> cameras_of_path(const RenderArguments& arguments) {
 
 /// Checks that all images can be written, before the work starts, and lists them in `outcome`.
 Status check_images(const RenderArguments& arguments, std::size_t cameras, Outcome& outcome) {
-  outcome.film = images_of(arguments, cameras);
-  std::vector<std::filesystem::path> outputs = outcome.film;
+  outcome.images = images_of(arguments, cameras);
+  std::vector<std::filesystem::path> outputs = outcome.images;
   outputs.push_back(arguments.depth);
   return check_outputs(outputs);
 }
@@ -442,16 +442,16 @@ std::string outcome_text(const Outcome& outcome) {
 }
 
 /// Renders the images of a video and encodes them with ffmpeg.
-Result<Outcome> render_movie(const RenderArguments& arguments) {
+Result<Outcome> render_video(const RenderArguments& arguments) {
   if (auto writable = check_outputs({arguments.output}); !writable) return writable.error();
-  const Movie movie(arguments.output);
-  if (Status begun = movie.begin(arguments.resume); !begun) return begun.error();
+  const Video video(arguments.output);
+  if (Status begun = video.begin(arguments.resume); !begun) return begun.error();
   RenderArguments of_images = arguments;
-  of_images.output = movie.image();
+  of_images.output = video.image();
   auto outcome = render(of_images);
   if (!outcome) return outcome.error();
   Stopwatch watch;
-  const auto bytes = movie.write(outcome->film, arguments.frames_per_second);
+  const auto bytes = video.write(outcome->images, arguments.frames_per_second);
   if (!bytes) return bytes.error();
   outcome->write += watch.lap();
   outcome->bytes = *bytes;
@@ -462,7 +462,7 @@ Result<Outcome> render_movie(const RenderArguments& arguments) {
 /// Renders an image or a video. Reads standard input if IN is "-".
 Result<Outcome> render_from(RenderArguments& arguments, StandardStreams& streams) {
   if (Status read = streams.take_input(arguments.common.input); !read) return read.error();
-  return is_movie(arguments.output) ? render_movie(arguments) : render(arguments);
+  return is_video(arguments.output) ? render_video(arguments) : render(arguments);
 }
 
 WatchedWork run_render(RenderArguments& arguments) {

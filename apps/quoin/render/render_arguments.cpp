@@ -15,7 +15,7 @@
 #include "help.h"
 #include "options.h"
 #include "render/image_output.h"
-#include "render/movie.h"
+#include "render/video.h"
 
 namespace quoin::tool {
 
@@ -294,8 +294,9 @@ void add_backend_options(CLI::App& command, RenderArguments& arguments) {
 /// Returns the end of the message about -o, or "".
 std::string output_reason(const RenderArguments& arguments) {
   const std::filesystem::path& output = arguments.output;
-  if (is_movie(output)) {
-    if (!arguments.is_film()) return ": the video " + output.string() + " needs --turntable, --frames or --path";
+  if (is_video(output)) {
+    if (!arguments.is_image_series())
+      return ": the video " + output.string() + " needs --turntable, --frames or --path";
     if (arguments.path.is_transparent) return ": videos have no alpha channel";
   } else if (const Status name = check_image_name(output); !name) {
     return ": " + name.error().message;
@@ -323,14 +324,14 @@ std::vector<OptionRule> output_rules(const RenderArguments& a) {
 }
 
 std::vector<OptionRule> camera_rules(const RenderArguments& a) {
-  const auto is_film = [&a] { return a.is_film(); };
+  const auto is_image_series = [&a] { return a.is_image_series(); };
   return {
       {{"--view", "--camera"}, excludes({"--azimuth", "--elevation"})},
       {{"--turntable"}, excludes({"--camera", "--frames"})},
       {{"--frame"}, excludes({"--frames"})},
       {{"--path"}, excludes({"--view", "--azimuth", "--elevation", "--camera", "--turntable", "--frames"})},
-      {{"--fps"}, needs("a video: .mp4 or .webm", [&a] { return is_movie(a.output); })},
-      {{"--resume"}, needs("an image series: --turntable, --frames or --path", is_film)},
+      {{"--fps"}, needs("a video: .mp4 or .webm", [&a] { return is_video(a.output); })},
+      {{"--resume"}, needs("an image series: --turntable, --frames or --path", is_image_series)},
       {{"--turntable", "--frames", "--path"}, excludes({"--depth"})},
       {{"--camera"}, needs("--look-at", [&a] { return a.file_camera || a.target; })},
       {{"--look-at"}, needs("--camera X,Y,Z", [&a] { return a.position.has_value(); })},

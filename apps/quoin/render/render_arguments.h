@@ -72,7 +72,7 @@ struct RenderArguments {
   std::string device;         ///< see VulkanOptions::device
   DensitySliceOptions slice;  ///< for --preset density
 
-  [[nodiscard]] bool is_film() const { return frames || turns > 1 || !camera_path.empty(); }
+  [[nodiscard]] bool is_image_series() const { return frames || turns > 1 || !camera_path.empty(); }
   /// Returns true if a view option was given, which replaces the camera of the scene file.
   [[nodiscard]] bool has_view() const { return view || azimuth || elevation || turns > 1; }
   /// Returns the view direction for framing; for a turntable that of the first image.

@@ -232,7 +232,7 @@ TEST(RenderArguments, DefaultsAreNaturalLightAndFewSamples) {
   plain.environment.apply_to(environment);
   EXPECT_EQ(environment, Environment::natural());
   EXPECT_FALSE(plain.has_view());
-  EXPECT_FALSE(plain.is_film());
+  EXPECT_FALSE(plain.is_image_series());
   EXPECT_EQ(plain.forward(), direction_of(View::Iso));
 }
 
@@ -287,7 +287,7 @@ TEST(RenderArguments, ReadsCamerasAndSeries) {
   EXPECT_EQ(camera.fov_degrees, 30.0);
   EXPECT_EQ(arguments_of("--camera file:7").file_camera, 7);
   const RenderArguments frames = arguments_of("--frames 2:5 --view left");
-  EXPECT_TRUE(frames.is_film() && frames.has_view());
+  EXPECT_TRUE(frames.is_image_series() && frames.has_view());
   EXPECT_EQ(frames.frames->first, 2);
   EXPECT_EQ(frames.frames->last, 5);
   EXPECT_EQ(frames.view, View::Left);

@@ -11,13 +11,13 @@
 namespace quoin::tool {
 
 /// Returns true for the file name of a video: .mp4 or .webm.
-[[nodiscard]] bool is_movie(const std::filesystem::path& path);
+[[nodiscard]] bool is_video(const std::filesystem::path& path);
 
 /// A video that ffmpeg encodes from numbered images. The images are in a folder next to the video until it is complete,
 /// so that an interrupted render can resume.
-class Movie {
+class Video {
  public:
-  explicit Movie(std::filesystem::path output) : output_(std::move(output)) {}
+  explicit Video(std::filesystem::path output) : output_(std::move(output)) {}
 
   /// The folder of the images, and the name in it that the numbered names extend.
   [[nodiscard]] std::filesystem::path folder() const;

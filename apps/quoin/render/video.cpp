@@ -1,4 +1,4 @@
-#include "render/movie.h"
+#include "render/video.h"
 
 #include <fcntl.h>
 #include <spawn.h>
@@ -70,19 +70,19 @@ std::string escaped(const std::string& name) {
 
 }  // namespace
 
-bool is_movie(const fs::path& path) {
+bool is_video(const fs::path& path) {
   return has_ending(path, ".mp4") || has_ending(path, ".webm");
 }
 
-fs::path Movie::folder() const {
+fs::path Video::folder() const {
   return fs::path(output_.string() + ".images");
 }
 
-fs::path Movie::image() const {
+fs::path Video::image() const {
   return folder() / "image.png";
 }
 
-Status Movie::begin(bool resume) const {
+Status Video::begin(bool resume) const {
   if (!find_program("ffmpeg")) {
     return make_error(ErrorCode::Unsupported,
                       "cannot encode a video: ffmpeg is not installed; numbered images do not need it "
@@ -95,7 +95,7 @@ Status Movie::begin(bool resume) const {
   return code ? make_error(ErrorCode::CannotWrite, code.message(), folder().string()) : Status();
 }
 
-Result<std::uint64_t> Movie::write(const std::vector<fs::path>& images, double frames_per_second) const {
+Result<std::uint64_t> Video::write(const std::vector<fs::path>& images, double frames_per_second) const {
   const auto ffmpeg = find_program("ffmpeg");
   if (!ffmpeg)
     return make_error(ErrorCode::Unsupported, "cannot encode a video: ffmpeg is no longer installed", output_.string());
