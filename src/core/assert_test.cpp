@@ -21,14 +21,14 @@ void throw_caught(const AssertFailure& failure) {
   throw Caught(failure);
 }
 
-TEST(Assert, AProgramMayReplaceTheHandler) {
+TEST(Assert, CallsReplacedHandler) {
   const AssertHandler before = set_assert_handler(&throw_caught);
   EXPECT_NE(before, nullptr);
   EXPECT_THROW(handle_assert_failure({"1 == 2", "sums must add up", std::source_location::current()}), Caught);
   EXPECT_EQ(set_assert_handler(before), &throw_caught);
 }
 
-TEST(AssertDeathTest, AHandlerThatReturnsEndsTheProcessAllTheSame) {
+TEST(AssertDeathTest, AbortsEvenIfHandlerReturns) {
   EXPECT_DEATH(handle_assert_failure({"1 == 2", "sums must add up", std::source_location::current()}),
                "assert_test.cpp:.*requires 1 == 2: sums must add up");
   EXPECT_DEATH(
@@ -39,13 +39,13 @@ TEST(AssertDeathTest, AHandlerThatReturnsEndsTheProcessAllTheSame) {
       "");
 }
 
-TEST(Assert, AConditionIsNotEvaluatedWhereNothingIsChecked) {
+TEST(Assert, EvaluatesConditionOnlyIfEnabled) {
   int evaluated = 0;
   QUOIN_ASSERT(++evaluated > 0, "never fails");
   EXPECT_EQ(evaluated, QUOIN_ASSERT_ENABLED);
 }
 
-TEST(AssertDeathTest, AMistakeNamesTheConditionAndWhatWasRequired) {
+TEST(AssertDeathTest, ReportsConditionAndRequirement) {
   const int size = 3;
   QUOIN_EXPECT_MISTAKE(QUOIN_ASSERT(size < 3, "fewer than three"), "requires size < 3: fewer than three");
 }

@@ -10,7 +10,7 @@
 namespace quoin {
 namespace {
 
-TEST(AxisOrientation, AQuarterTurnIsCounterClockwiseSeenFromTheAxisEnd) {
+TEST(AxisOrientation, TurnsCounterClockwiseAboutAxis) {
   EXPECT_EQ(AxisOrientation::quarter_turns(2, 1).apply(IVec3(1, 0, 0)), IVec3(0, 1, 0));
   EXPECT_EQ(AxisOrientation::quarter_turns(0, 1).apply(IVec3(0, 1, 0)), IVec3(0, 0, 1));
   EXPECT_EQ(AxisOrientation::quarter_turns(1, 1).apply(IVec3(0, 0, 1)), IVec3(1, 0, 0));
@@ -30,7 +30,7 @@ TEST(AxisOrientation, AQuarterTurnIsCounterClockwiseSeenFromTheAxisEnd) {
   }
 }
 
-TEST(AxisOrientation, ThereAreFortyEightOfWhichHalfAreMirrored) {
+TEST(AxisOrientation, Has48OrientationsHalfMirrored) {
   std::set<std::array<double, 9>> matrices;
   int mirrored = 0;
   for (int index = 0; index < AxisOrientation::kCount; ++index) {
@@ -48,7 +48,7 @@ TEST(AxisOrientation, ThereAreFortyEightOfWhichHalfAreMirrored) {
   EXPECT_EQ(AxisOrientation::at(0), AxisOrientation());
 }
 
-TEST(AxisOrientation, ComposesAndInvertsAsItsMatrixDoes) {
+TEST(AxisOrientation, ComposesAndInvertsLikeMatrix) {
   for (int i = 0; i < AxisOrientation::kCount; ++i) {
     const AxisOrientation a = AxisOrientation::at(i);
     EXPECT_EQ(a * a.inverse(), AxisOrientation());
@@ -66,13 +66,13 @@ TEST(AxisOrientation, ComposesAndInvertsAsItsMatrixDoes) {
   }
 }
 
-TEST(AxisOrientation, IsKnownWhenCompiling) {
+TEST(AxisOrientation, WorksInConstantExpressions) {
   constexpr AxisOrientation kHalf = AxisOrientation::quarter_turns(1, 1) * AxisOrientation::quarter_turns(1, 1);
   static_assert(kHalf == AxisOrientation::mirror(0) * AxisOrientation::mirror(2));
   static_assert(!kHalf.is_mirrored() && AxisOrientation::mirror(1).is_mirrored());
 }
 
-TEST(AxisOrientationDeathTest, AnAxisOrAnIndexThatIsNotThereIsAMistake) {
+TEST(AxisOrientationDeathTest, AssertsOnInvalidAxisOrIndex) {
   QUOIN_EXPECT_MISTAKE((void)AxisOrientation::quarter_turns(3, 1), "0 <= axis < 3");
   QUOIN_EXPECT_MISTAKE((void)AxisOrientation::mirror(-1), "0 <= axis < 3");
   QUOIN_EXPECT_MISTAKE((void)AxisOrientation::at(48), "0 <= index < kCount");

@@ -9,7 +9,7 @@
 namespace quoin {
 namespace {
 
-TEST(Buffer, ABufferThatWasMovedFromIsEmptyAndGrowsAgain) {
+TEST(Buffer, IsEmptyAndUsableAfterMove) {
   Buffer<int> from;
   for (int i = 0; i < 100; ++i) from.push_back(i);
   Buffer<int> to = std::move(from);
@@ -25,7 +25,7 @@ TEST(Buffer, ABufferThatWasMovedFromIsEmptyAndGrowsAgain) {
   EXPECT_EQ(to.size(), 3U);
 }
 
-TEST(Buffer, KeepsWhatItHoldsWhenItGrows) {
+TEST(Buffer, KeepsElementsWhenGrowing) {
   Buffer<int> buffer;
   for (int i = 0; i < 10'000; ++i) buffer.push_back(i);
   buffer.resize(20'000);

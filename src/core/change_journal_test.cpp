@@ -8,7 +8,7 @@
 namespace quoin {
 namespace {
 
-TEST(ChangeNotifiers, AreTakenOnceAndGivenAgainOnceFollowedAnew) {
+TEST(ChangeNotifiers, ReportOnceUntilFollowedAgain) {
   ChangeNotifiers notifiers;
   ChangeNotifier a;
   ChangeNotifier b;
@@ -30,7 +30,7 @@ TEST(ChangeNotifiers, AreTakenOnceAndGivenAgainOnceFollowedAnew) {
   EXPECT_EQ(taken, (std::vector<std::uint32_t>{4}));
 }
 
-TEST(ChangeNotifiers, ANumberThatOthersTookOverStandsThereOnce) {
+TEST(ChangeNotifiers, ReportReusedNumberOnce) {
   ChangeNotifiers notifiers;
   for (int i = 0; i < 1'000; ++i) {
     ChangeNotifier notifier;

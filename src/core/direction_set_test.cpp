@@ -11,7 +11,7 @@
 namespace quoin {
 namespace {
 
-TEST(DirectionSet, HoldsWhatWasInserted) {
+TEST(DirectionSet, ContainsInsertedDirections) {
   for (unsigned bits = 0; bits < 64; ++bits) {
     DirectionSet set;
     int count = 0;
@@ -33,12 +33,12 @@ TEST(DirectionSet, HoldsWhatWasInserted) {
   }
 }
 
-TEST(DirectionSet, KnowsNoSeventhDirection) {
+TEST(DirectionSet, IgnoresBitsBeyondSixDirections) {
   EXPECT_EQ(DirectionSet::from_bits(0xFF), DirectionSet::all());
   EXPECT_EQ(DirectionSet::all().size(), 6);
 }
 
-TEST(DirectionSet, NamesSayAxisAndSign) {
+TEST(DirectionSet, IteratesInOrderAndNamesDirections) {
   std::string names;
   for (const Direction direction : DirectionSet{Direction::NegZ, Direction::PosX, Direction::NegY}) {
     names += name_of(direction);

@@ -23,14 +23,14 @@ std::uint64_t trim(Map& cache, std::uint64_t max_bytes, std::uint64_t now) {
       [](auto each) { return each->second.bytes; }, [&](auto each) { cache.erase(each); });
 }
 
-TEST(DropOldest, DropsByTheTimeOfLastUse) {
+TEST(DropOldest, DropsLeastRecentlyUsed) {
   Cache cache = {{1, {10, 5}}, {2, {10, 3}}, {3, {10, 4}}, {4, {10, 6}}};
   EXPECT_EQ(trim(cache, 25, 7), 20);
   EXPECT_EQ(cache.size(), 2);
   EXPECT_TRUE(cache.contains(1) && cache.contains(4));
 }
 
-TEST(DropOldest, KeepsEverythingWithinTheLimit) {
+TEST(DropOldest, KeepsAllEntriesWithinLimit) {
   Cache cache = {{1, {10, 1}}, {2, {10, 2}}};
   EXPECT_EQ(trim(cache, 20, 7), 20);
   EXPECT_EQ(cache.size(), 2);
@@ -42,13 +42,13 @@ TEST(DropOldest, KeepsEntriesThatMustStay) {
   EXPECT_FALSE(cache.contains(2));
 }
 
-TEST(DropOldest, DropsEqualEntriesInTheOrderOfTheMap) {
+TEST(DropOldest, DropsEqualEntriesInMapOrder) {
   Cache cache = {{3, {10, 1}}, {1, {10, 1}}, {2, {10, 1}}};
   EXPECT_EQ(trim(cache, 10, 7), 10);
   EXPECT_TRUE(cache.contains(3));
 }
 
-TEST(DropOldest, DropsManyEntriesOfAHashTable) {
+TEST(DropOldest, DropsManyEntriesOfHashTable) {
   std::unordered_map<int, Entry> cache;
   for (int i = 0; i < 1000; ++i) cache[i] = {1, static_cast<std::uint64_t>(i * 7 % 1000)};
   EXPECT_EQ(trim(cache, 100, 1000), 100);

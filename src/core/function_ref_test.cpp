@@ -13,14 +13,14 @@ int call(FunctionRef<int(int)> function, int argument) {
   return function(argument);
 }
 
-TEST(FunctionRef, TakesPlainFunctionsAndPointersToThem) {
+TEST(FunctionRef, AcceptsFunctionsAndFunctionPointers) {
   EXPECT_EQ(call(twice, 21), 42);
   EXPECT_EQ(call(&twice, 4), 8);
   int (*pointer)(int) = twice;
   EXPECT_EQ(call(pointer, 5), 10);
 }
 
-TEST(FunctionRef, CallsTheCallableItselfAndNoCopy) {
+TEST(FunctionRef, CallsOriginalInsteadOfCopy) {
   int calls = 0;
   auto counting = [&calls, seen = 0](int i) mutable {
     ++calls;
@@ -34,7 +34,7 @@ TEST(FunctionRef, CallsTheCallableItselfAndNoCopy) {
   EXPECT_EQ(calls, 3);
 }
 
-TEST(FunctionRef, DropsAnUnusedReturnValue) {
+TEST(FunctionRef, DropsUnusedReturnValue) {
   int sum = 0;
   const auto adding = [&](int i) { return sum += i; };
   const FunctionRef<void(int)> add = adding;
@@ -43,7 +43,7 @@ TEST(FunctionRef, DropsAnUnusedReturnValue) {
   EXPECT_EQ(sum, 7);
 }
 
-TEST(FunctionRef, PassesReferencesOn) {
+TEST(FunctionRef, ForwardsReferences) {
   int value = 1;
   const auto change = [](int& i) { i = 7; };
   const FunctionRef<void(int&)> function = change;

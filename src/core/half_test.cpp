@@ -35,7 +35,7 @@ Half nearest_half(float value) {
   return static_cast<Half>((is_high ? high : low) | (std::signbit(value) ? 0x8000 : 0));
 }
 
-TEST(Half, EveryHalfIsReadExactlyAndWrittenBack) {
+TEST(Half, RoundTripsEveryHalf) {
   for (unsigned bits = 0; bits < 0x10000U; ++bits) {
     const auto half = static_cast<Half>(bits);
     const float read = float_from_half(half);
@@ -53,7 +53,7 @@ TEST(Half, EveryHalfIsReadExactlyAndWrittenBack) {
   }
 }
 
-TEST(Half, FloatsBecomeTheNearestHalfAndTiesTheEvenOne) {
+TEST(Half, RoundsToNearestEven) {
   constexpr unsigned kSeed = 11;
   SCOPED_TRACE(kSeed);
   std::mt19937 random(kSeed);
@@ -71,7 +71,7 @@ TEST(Half, FloatsBecomeTheNearestHalfAndTiesTheEvenOne) {
   }
 }
 
-TEST(Half, OverflowBecomesInfinite) {
+TEST(Half, RoundsOverflowToInfinity) {
   EXPECT_EQ(half_from_float(65'519.0F), 0x7BFF);
   EXPECT_EQ(half_from_float(65'520.0F), 0x7C00);
   EXPECT_EQ(half_from_float(-1e30F), 0xFC00);

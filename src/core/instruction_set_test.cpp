@@ -11,14 +11,14 @@
 namespace quoin {
 namespace {
 
-TEST(InstructionSets, EachHasThoseBeforeIt) {
+TEST(InstructionSets, RangeFromPlainToBest) {
   const auto sets = sets_of_this_machine();
   ASSERT_FALSE(sets.empty());
   EXPECT_EQ(sets.front(), InstructionSet::Plain);
   EXPECT_EQ(sets.back(), instruction_set());
 }
 
-TEST(InstructionSets, AnOverrideEndsWithItsScopeAndIsSeenByEveryThread) {
+TEST(InstructionSets, OverrideAppliesWithinScopeOnAllThreads) {
   const InstructionSet before = instruction_set();
   {
     const InstructionSetOverride over(InstructionSet::Plain);
@@ -35,7 +35,7 @@ void compare_with_avx2(bool& is_compared) {
   is_compared = true;
 }
 
-TEST(InstructionSets, ATestThatNeedsOneSaysThatItIsMissing) {
+TEST(InstructionSets, SkipTestsThatNeedMissingSet) {
   const InstructionSetOverride over(InstructionSet::Plain);
   bool is_compared = false;
   testing::TestPartResultArray results;
@@ -50,7 +50,7 @@ TEST(InstructionSets, ATestThatNeedsOneSaysThatItIsMissing) {
   EXPECT_STREQ(results.GetTestPartResult(0).message(), "this machine lacks AVX2, BMI and BMI2");
 }
 
-TEST(InstructionSetsDeathTest, AnOverrideIsNoWiderThanTheMachine) {
+TEST(InstructionSetsDeathTest, AssertsOnOverrideBeyondMachine) {
   const InstructionSetOverride over(InstructionSet::Plain);
   QUOIN_EXPECT_MISTAKE(InstructionSetOverride{InstructionSet::Avx2}, "must have the instruction set");
 }

@@ -11,7 +11,7 @@
 namespace quoin {
 namespace {
 
-TEST(ParallelFor, DoesEachOnceAlsoWithinAnotherAndFromSeveralThreads) {
+TEST(ParallelFor, RunsEachIndexOnceNestedOrConcurrent) {
   std::vector<std::jthread> callers;
   for (unsigned caller = 0; caller < 4; ++caller) {
     callers.emplace_back([caller] {
@@ -48,7 +48,7 @@ long resident_kilobytes() {
 }
 
 // A game calls parallel_for several times per frame, for hours.
-TEST(ParallelFor, ManyCallsKeepNoMemory) {
+TEST(ParallelFor, LeaksNoMemoryOverManyCalls) {
   std::atomic<int> done{0};
   const auto call = [&](int times) {
     for (int i = 0; i < times; ++i) parallel_for(8, {2}, [&](std::size_t) { ++done; });

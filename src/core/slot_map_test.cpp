@@ -13,7 +13,7 @@
 namespace quoin {
 namespace {
 
-TEST(SlotMap, ElementsStayWhereTheyAreWhateverElseHappens) {
+TEST(SlotMap, KeepsAddressesOfElements) {
   SlotMap<std::string> map;
   const auto first = map.insert("first");
   const std::string* const place = map.find(first);
@@ -24,7 +24,7 @@ TEST(SlotMap, ElementsStayWhereTheyAreWhateverElseHappens) {
   EXPECT_EQ(*place, "first");
 }
 
-TEST(SlotMap, AMapThatWasMovedFromIsEmptyAndCanBeUsed) {
+TEST(SlotMap, IsEmptyAndUsableAfterMove) {
   SlotMap<int> map;
   const auto handle = map.insert(1);
   SlotMap<int> moved = std::move(map);
@@ -40,7 +40,7 @@ TEST(SlotMap, AMapThatWasMovedFromIsEmptyAndCanBeUsed) {
   EXPECT_TRUE(map.empty());  // NOLINT(bugprone-use-after-move)
 }
 
-TEST(SlotMap, HandlesAreKeys) {
+TEST(SlotMap, HandlesWorkAsMapKeys) {
   SlotMap<int> map;
   const auto first = map.insert(1);
   const auto second = map.insert(2);
@@ -50,7 +50,7 @@ TEST(SlotMap, HandlesAreKeys) {
   EXPECT_FALSE(names.contains(map.insert(3))) << "another, in the same slot";
 }
 
-TEST(SlotMap, AHandleOfARemovedElementStaysInvalid) {
+TEST(SlotMap, KeepsHandleOfRemovedElementInvalid) {
   SlotMap<int> map;
   const auto old = map.insert(1);
   EXPECT_EQ(map.next_index(), 1U);
@@ -63,7 +63,7 @@ TEST(SlotMap, AHandleOfARemovedElementStaysInvalid) {
   EXPECT_EQ(map[next], 2);
 }
 
-TEST(SlotMap, AHandleNamesNothingInAMapThatWasFilledAlike) {
+TEST(SlotMap, RejectsHandlesOfOtherMaps) {
   SlotMap<int> map;
   SlotMap<int> other;
   const auto handle = map.insert(1);
@@ -80,7 +80,7 @@ TEST(SlotMap, AHandleNamesNothingInAMapThatWasFilledAlike) {
   }
 }
 
-TEST(SlotMap, AHandleNamesTheCopyOfItsElementAndNothingThatCameLater) {
+TEST(SlotMap, CopyAcceptsOnlyEarlierHandles) {
   SlotMap<int> map;
   const auto handle = map.insert(1);
   const auto removed = map.insert(2);
@@ -109,7 +109,7 @@ struct Fragile {
   static inline bool throws = false;
 };
 
-TEST(SlotMap, AnInsertThatThrowsLeavesItAsItWas) {
+TEST(SlotMap, StaysUnchangedIfInsertThrows) {
   SlotMap<Fragile> map;
   std::map<std::uint32_t, int> plain;
   std::mt19937 random(5);

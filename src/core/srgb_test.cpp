@@ -16,14 +16,14 @@ int by_formula(float linear) {
   return static_cast<int>(std::floor(encoded * 255.0L + 0.5L));
 }
 
-TEST(Srgb, EveryByteSurvivesTheRoundTrip) {
+TEST(Srgb, RoundTripsEveryByte) {
   const SrgbEncoder& encode = SrgbEncoder::shared();
   for (int byte = 0; byte < 256; ++byte) {
     EXPECT_EQ(encode(linear_from_srgb(static_cast<std::uint8_t>(byte))), byte);
   }
 }
 
-TEST(Srgb, RoundsToTheNearestByteForRandomFloats) {
+TEST(Srgb, RoundsRandomFloatsToNearestByte) {
   const SrgbEncoder& encode = SrgbEncoder::shared();
   std::mt19937 random(5);
   for (int i = 0; i < 300'000; ++i) {
@@ -34,7 +34,7 @@ TEST(Srgb, RoundsToTheNearestByteForRandomFloats) {
   }
 }
 
-TEST(Srgb, RoundsToTheNearestByteNextToEveryThreshold) {
+TEST(Srgb, RoundsCorrectlyNextToEveryThreshold) {
   const SrgbEncoder& encode = SrgbEncoder::shared();
   for (int byte = 1; byte < 256; ++byte) {
     const double middle = (byte - 0.5) / 255.0;

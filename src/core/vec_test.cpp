@@ -11,7 +11,7 @@
 namespace quoin {
 namespace {
 
-TEST(Coordinates, AreKeysInTheOrderOfChunks) {
+TEST(Coordinates, SortByZyxAndHash) {
   const std::map<IVec3, int, ByZyx> sorted{{{1, 0, 0}, 1}, {{0, 1, 0}, 2}, {{0, 0, 1}, 3}, {{0, 0, 0}, 0}};
   int next = 0;
   for (const auto& [at, number] : sorted) EXPECT_EQ(number, next++) << at.x << at.y << at.z;
@@ -21,7 +21,7 @@ TEST(Coordinates, AreKeysInTheOrderOfChunks) {
   EXPECT_EQ(hashed.at({0, 2, -3}), 325);
 }
 
-TEST(Boxes, AroundABoxAreTheVoxelsThatItMeets) {
+TEST(Boxes, RoundOutwardsToVoxels) {
   EXPECT_EQ(box_around({{0.5, -0.5, 2.0}, {1.5, 0.0, 3.0}}), (IBox{{0, -1, 2}, {2, 0, 3}}));
   // Points and flat boxes also lie in voxels.
   EXPECT_EQ(box_around({DVec3(-1.0), DVec3(-1.0)}), (IBox{IVec3(-1), IVec3(0)}));

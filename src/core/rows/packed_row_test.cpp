@@ -11,7 +11,7 @@
 namespace quoin::packed_row {
 namespace {
 
-TEST(PackedRow, EqualMaskIsThatOfSingleVoxels) {
+TEST(PackedRow, EqualMaskMatchesSingleVoxels) {
   std::mt19937_64 random(3);
   for (const int bits : {1, 2, 4, 8, 16}) {
     for (int round = 0; round < 200; ++round) {

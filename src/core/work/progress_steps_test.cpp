@@ -9,7 +9,7 @@
 namespace quoin {
 namespace {
 
-TEST(ProgressSteps, ReportsTheFractionOfFinishedSteps) {
+TEST(ProgressSteps, ReportsFractionOfFinishedSteps) {
   std::vector<double> reports;
   const Progress listener = [&](double fraction) {
     reports.push_back(fraction);
@@ -37,7 +37,7 @@ TEST(ProgressSteps, ReportsAtMostOne) {
   EXPECT_EQ(last, 1.0);
 }
 
-TEST(ProgressSteps, CallsNoMoreOnceCancelled) {
+TEST(ProgressSteps, StopsCallingOnceCancelled) {
   int calls = 0;
   const Progress listener = [&](double) { return ++calls < 2; };
   ProgressSteps steps(listener, 10);

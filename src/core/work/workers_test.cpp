@@ -88,7 +88,7 @@ class Gate {
   std::atomic<bool> is_open_{false};
 };
 
-TEST(Workers, DoTheWorkOfManyProducers) {
+TEST(Workers, RunWorkOfManyProducers) {
   std::atomic<int> done{0};
   Queue queue(3);
   std::vector<std::thread> producers;
@@ -127,7 +127,7 @@ TEST(Workers, StopLeavesWaitingWork) {
   EXPECT_FALSE(queue.workers().is_started());
 }
 
-TEST(Workers, DrainDoesWaitingWork) {
+TEST(Workers, DrainRunsWaitingWork) {
   std::atomic<int> done{0};
   Gate gate;
   Queue queue(2);
@@ -144,7 +144,7 @@ TEST(Workers, DrainDoesWaitingWork) {
   EXPECT_EQ(queue.cancel(), 0);
 }
 
-TEST(Workers, CancelledWorkIsNotDone) {
+TEST(Workers, SkipCancelledWork) {
   std::atomic<int> done{0};
   Gate gate;
   Queue queue(1);
@@ -175,14 +175,14 @@ TEST(Workers, KeepTheFirstExceptionAndContinue) {
   EXPECT_EQ(queue.take_failure(), nullptr);
 }
 
-TEST(Workers, AnExceptionWakesWaitingCallers) {
+TEST(Workers, WakeWaitingCallersOnException) {
   Queue queue(1);
   queue.push([] { throw std::runtime_error("failed"); });
   queue.finish();
   EXPECT_TRUE(queue.finish_within(10.0));
 }
 
-TEST(Workers, WaitForEndsWhenTheTimeIsOver) {
+TEST(Workers, WaitForEndsAtTimeout) {
   Gate gate;
   Queue queue(1);
   queue.push([&] { gate.pass(); });
@@ -193,7 +193,7 @@ TEST(Workers, WaitForEndsWhenTheTimeIsOver) {
   queue.finish();
 }
 
-TEST(Workers, StepAgainAtTheTimeThatAStepReturns) {
+TEST(Workers, RepeatStepAtReturnedTime) {
   std::mutex mutex;
   int steps = 0;
   Workers workers(mutex);
@@ -209,7 +209,7 @@ TEST(Workers, StepAgainAtTheTimeThatAStepReturns) {
   EXPECT_GE(steps, 3);
 }
 
-TEST(Workers, StopDoesNotWaitForTheNextTime) {
+TEST(Workers, StopWithoutWaitingForNextStep) {
   std::mutex mutex;
   std::atomic<int> steps = 0;
   Workers workers(mutex);
@@ -239,7 +239,7 @@ TEST(Workers, NumberTheirThreads) {
   }
 }
 
-TEST(Workers, EndWithoutAStart) {
+TEST(Workers, StopWithoutStart) {
   std::mutex mutex;
   Workers workers(mutex);
   EXPECT_FALSE(workers.is_started());
