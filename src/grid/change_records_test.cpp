@@ -33,7 +33,7 @@ void expect_equal(const ChangeReach& a, const ChangeReach& b) {
   }
 }
 
-TEST(ChunkDifference, IsThatOfEveryVoxel) {
+TEST(ChunkDifference, MatchesVoxelwiseComparison) {
   for (unsigned seed = 0; seed < 30; ++seed) {
     SCOPED_TRACE(seed);
     std::mt19937 random(seed);

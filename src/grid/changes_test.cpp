@@ -112,7 +112,7 @@ std::vector<IVec3> random_edit(std::mt19937& random, Grid& grid) {
   return changed;
 }
 
-TEST(Changes, EveryConsumerReceivesChangesSinceItsCursor) {
+TEST(Changes, ReportsChangesSinceEachCursor) {
   for (unsigned seed = 1; seed <= 6; ++seed) {
     SCOPED_TRACE(seed);
     std::mt19937 random(seed);
@@ -139,7 +139,7 @@ TEST(Changes, EveryConsumerReceivesChangesSinceItsCursor) {
   }
 }
 
-TEST(Changes, ReadersOfSnapshotsMissNoChanges) {
+TEST(Changes, SnapshotReadersMissNoChanges) {
   Grid grid;
   ChangeCursor cursor;
   EXPECT_TRUE(grid.snapshot().changes_since(cursor).all);
@@ -153,7 +153,7 @@ TEST(Changes, ReadersOfSnapshotsMissNoChanges) {
   EXPECT_TRUE(second.changes_since(other).all) << "back in time";
 }
 
-TEST(Changes, ASnapshotThatIsEditedIsAnotherGrid) {
+TEST(Changes, TreatsEditedSnapshotAsOtherGrid) {
   Grid grid;
   grid.set({1, 2, 3}, 4);
   ChangeCursor cursor = grid.cursor();
@@ -167,7 +167,7 @@ TEST(Changes, ASnapshotThatIsEditedIsAnotherGrid) {
   EXPECT_EQ(grid.get({1, 2, 3}), 4);
 }
 
-TEST(Changes, ACursorOfAnotherContainerReceivesAllChunks) {
+TEST(Changes, ReportsEverythingForForeignCursor) {
   const Grid grid;
   const DensityGrid densities;
   const VoxelRegistry types;
@@ -181,7 +181,7 @@ TEST(Changes, ACursorOfAnotherContainerReceivesAllChunks) {
   }
 }
 
-TEST(Changes, NoOpEditsLeaveASnapshotASnapshot) {
+TEST(Changes, IgnoresNoOpEditsOfSnapshot) {
   Grid grid;
   grid.set({1, 2, 3}, 4);
   ChangeCursor cursor = grid.cursor();
@@ -191,7 +191,7 @@ TEST(Changes, NoOpEditsLeaveASnapshotASnapshot) {
   EXPECT_TRUE(copy.changes_since(cursor).empty());
 }
 
-TEST(Changes, ManyEditsOfOneChunkAreOneChange) {
+TEST(Changes, MergesEditsOfOneChunk) {
   Grid grid;
   grid.set({0, 0, 0}, 1);
   ChangeCursor cursor = grid.cursor();
@@ -204,7 +204,7 @@ TEST(Changes, ManyEditsOfOneChunkAreOneChange) {
   EXPECT_EQ(changes.items[0].neighbours, 1U << 13U);
 }
 
-TEST(Changes, ACursorThatLagsTooFarReceivesAllChunks) {
+TEST(Changes, ReportsAllChunksForLateCursor) {
   Grid grid;
   ChangeCursor late = grid.cursor();
   ChangeCursor early = late;

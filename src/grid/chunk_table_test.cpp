@@ -31,7 +31,7 @@ IVec3 random_place(std::mt19937& random, int round, bool strays) {
   return IVec3{below(9) - 4, below(3) - 1, below(9) - 4} + IVec3(round / 400, 0, -round / 300);
 }
 
-TEST(ChunkTable, FindsWhatAMapFindsWhileChunksComeAndGo) {
+TEST(ChunkTable, MatchesMapUnderRandomChanges) {
   for (unsigned seed = 1; seed <= 8; ++seed) {
     SCOPED_TRACE(seed);
     std::mt19937 random(seed);
@@ -69,7 +69,7 @@ TEST(ChunkTable, FindsWhatAMapFindsWhileChunksComeAndGo) {
   }
 }
 
-TEST(ChunkTable, ChunksSideBySideAllStandInTheWindowInWhateverOrderTheyCome) {
+TEST(ChunkTable, KeepsAdjacentChunksInWindowInAnyOrder) {
   std::mt19937 random(3);
   std::vector<IVec3> places;
   places.reserve(12 * 3 * 12);
@@ -83,7 +83,7 @@ TEST(ChunkTable, ChunksSideBySideAllStandInTheWindowInWhateverOrderTheyCome) {
   }
 }
 
-TEST(ChunkTable, TheWindowFollowsACrowdThatMoves) {
+TEST(ChunkTable, WindowFollowsMovingChunks) {
   ChunkTable table;
   for (int x = 0; x < 3'000; ++x) {
     for (int z = 0; z < 16; ++z) add(table, {x, 0, z}, 1);
@@ -95,7 +95,7 @@ TEST(ChunkTable, TheWindowFollowsACrowdThatMoves) {
 
 // Simulates a moving viewer: small numbers of chunks appear ahead and disappear behind, and the window is never
 // rebuilt.
-TEST(ChunkTable, TheWindowSlidesAlongAndKnowsTheSameChunks) {
+TEST(ChunkTable, WindowSlidesWithoutGrowing) {
   for (const IVec3 way : {IVec3{1, 0, 0}, IVec3{-1, 0, 0}, IVec3{0, 1, 0}, IVec3{0, 0, -1}, IVec3{1, -1, 1}}) {
     ChunkTable table;
     const auto each = [](auto&& visit) {
@@ -128,7 +128,7 @@ TEST(ChunkTable, TheWindowSlidesAlongAndKnowsTheSameChunks) {
   }
 }
 
-TEST(ChunkTable, AFewFarAwayDoNotKeepTheOthersOutOfTheWindow) {
+TEST(ChunkTable, KeepsWindowDespiteDistantChunks) {
   for (const bool far_first : {true, false}) {
     ChunkTable table;
     const auto add_far = [&table] {
@@ -146,14 +146,14 @@ TEST(ChunkTable, AFewFarAwayDoNotKeepTheOthersOutOfTheWindow) {
   }
 }
 
-TEST(ChunkTable, FarFromEachOtherChunksTakeNoWindow) {
+TEST(ChunkTable, KeepsScatteredChunksOutsideWindow) {
   ChunkTable table;
   for (int i = 0; i < 100; ++i) add(table, {i * 1'000, -i * 900, i % 7 * 5'000}, 1);
   EXPECT_LE(table.window_cells(), 64U);
   EXPECT_GE(table.outside(), 99U);
 }
 
-TEST(ChunkTable, VoxelsAreThoseOfTheStorageThatAnEditMoved) {
+TEST(ChunkTable, ReadsVoxelsAfterEditMovesStorage) {
   ChunkTable table;
   const IVec3 at{-3, 4, 5};
   add(table, at, 2);

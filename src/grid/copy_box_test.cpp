@@ -69,7 +69,7 @@ struct RandomBoxes {
   AxisOrientation orientation() { return AxisOrientation::at(below(AxisOrientation::kCount)); }
 };
 
-TEST(CopyBox, PutsEveryVoxelWhereItBelongs) {
+TEST(CopyBox, MatchesVoxelwiseCopy) {
   for (unsigned seed = 1; seed <= 60; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     RandomBoxes random(seed);
@@ -91,7 +91,7 @@ TEST(CopyBox, PutsEveryVoxelWhereItBelongs) {
   }
 }
 
-TEST(CopyBox, WithinOneGridCopiesAsIfAtOnce) {
+TEST(CopyBox, CopiesOverlappingBoxesWithinGrid) {
   for (unsigned seed = 1; seed <= 40; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     RandomBoxes random(seed);
@@ -110,7 +110,7 @@ TEST(CopyBox, WithinOneGridCopiesAsIfAtOnce) {
   }
 }
 
-TEST(CopyBox, WholeChunksAreSharedWhereTheyAreMovedByChunks) {
+TEST(CopyBox, SharesChunksMovedByWholeChunks) {
   RandomBoxes random(1);
   const Grid from = random.grid();
   Grid to;
@@ -134,7 +134,7 @@ TEST(CopyBox, WholeChunksAreSharedWhereTheyAreMovedByChunks) {
   }
 }
 
-TEST(CopyBox, TurningFourTimesIsNoTurn) {
+TEST(CopyBox, FourTurnsRestoreBox) {
   RandomBoxes random(7);
   const Grid from = random.grid();
   const IBox box{{-70, -40, -90}, {50, 77, 33}};
@@ -155,7 +155,7 @@ TEST(CopyBox, TurningFourTimesIsNoTurn) {
   }
 }
 
-TEST(CopyBox, TheJournalHoldsExactlyTheChanges) {
+TEST(CopyBox, RecordsExactlyTheChanges) {
   RandomBoxes random(11);
   Grid grid = random.grid();
   ChangeCursor cursor = grid.cursor();
@@ -187,7 +187,7 @@ TEST(CopyBox, VisitsOnlyExistingChunksOfAlmostEmptyWorlds) {
   EXPECT_EQ(mirrored.get(-1'000'001, -2'000'000, 5), 3);
 }
 
-TEST(CopyBox, KeepsDataWhoseSourceIsOutsideTheWorld) {
+TEST(CopyBox, KeepsDataIfSourceIsOutsideWorld) {
   constexpr int kLast = std::numeric_limits<int>::max();
   Grid from;
   from.set(0, 0, 0, 1);

@@ -113,7 +113,7 @@ TEST(VisitChanges, ReportsEveryVoxelAndItsOldType) {
   }
 }
 
-TEST(GridChanges, SlabsAreThoseThatChanged) {
+TEST(GridChanges, ReportChangedSlabs) {
   Grid grid;
   ChangeCursor cursor = grid.cursor();
   const auto expect = [&](const IBox& box) {
@@ -164,7 +164,7 @@ TEST(Grid, SetsManyVoxelsAtOnce) {
   EXPECT_EQ(one.set(std::span<const PlacedVoxel>()), 0);
 }
 
-TEST(Grid, EditsCanBeCancelled) {
+TEST(Grid, CancelsEdits) {
   const IBox endless{IVec3{-1'000'000}, IVec3{1'000'000}};
   for (int kind = 0; kind < 3; ++kind) {
     Grid grid;
@@ -200,13 +200,13 @@ static_assert(TakesAPoint<Grid, IVec3>);
 static_assert(!TakesAPoint<Grid, DVec3>);
 static_assert(!TakesAPoint<Grid, Vec3>);
 
-TEST(VoxelOf, IsTheOneAPointLiesIn) {
+TEST(VoxelOf, ReturnsVoxelContainingPoint) {
   EXPECT_EQ(voxel_of({-0.5, 0.5, 1.0}), IVec3(-1, 0, 1));
   EXPECT_EQ(voxel_of({1e300, -1e300, std::nan("")}),
             IVec3(std::numeric_limits<int>::max(), std::numeric_limits<int>::min(), 0));
 }
 
-TEST(Grid, HasNoNeighboursBeyondTheEndOfNumbers) {
+TEST(Grid, HasNoNeighboursBeyondIntegerRange) {
   const Grid grid;
   for (const int end : {std::numeric_limits<int>::max(), std::numeric_limits<int>::min()}) {
     for (const Chunk* chunk : grid.neighbourhood(IVec3{end}).chunks) EXPECT_EQ(chunk, nullptr);
@@ -225,7 +225,7 @@ TEST(VoxelRegistry, FindsPropertiesWithNanAgain) {
   EXPECT_EQ(types.size(), 3U);
 }
 
-TEST(VoxelRegistry, KnowsWhetherAnyTypeLetsBodiesPass) {
+TEST(VoxelRegistry, ReportsPassableTypes) {
   VoxelRegistry types;
   VoxelProperties properties;
   const VoxelType stone = *types.add(properties);

@@ -19,13 +19,13 @@
 namespace quoin {
 namespace {
 
-TEST(ChunkDeathTest, AVoxelOutsideIsAMistake) {
+TEST(ChunkDeathTest, AssertsOnVoxelOutsideChunk) {
   Chunk chunk;
   QUOIN_EXPECT_MISTAKE((void)chunk.get(0, 64, 0), "0 <= x, y, z < 64");
   QUOIN_EXPECT_MISTAKE(chunk.set(-1, 0, 0, 1), "0 <= x, y, z < 64");
 }
 
-TEST(ChunkDeathTest, ARowOutsideIsAMistake) {
+TEST(ChunkDeathTest, AssertsOnRowOutsideChunk) {
   Chunk chunk;
   std::array<VoxelType, kChunkEdge> row{};
   QUOIN_EXPECT_MISTAKE(chunk.read_row(0, 64, row), "0 <= y, z < 64");
@@ -35,17 +35,17 @@ TEST(ChunkDeathTest, ARowOutsideIsAMistake) {
   QUOIN_EXPECT_MISTAKE((void)chunk.row_mask(0, -1, 1), "0 <= y, z < 64");
 }
 
-TEST(RefDeathTest, AskingNobodyIsAMistake) {
+TEST(RefDeathTest, AssertsOnNullRef) {
   struct Object : RefCounted {};
   QUOIN_EXPECT_MISTAKE((void)Ref<Object>().is_shared(), "there is an object");
 }
 
-TEST(DensityDeathTest, ASampleOutsideIsAMistake) {
+TEST(DensityDeathTest, AssertsOnSampleOutsideChunk) {
   const DensityChunk chunk(0);
   QUOIN_EXPECT_MISTAKE((void)chunk.get(64, 0, 0), "0 <= x, y, z < 64");
 }
 
-TEST(DensityDeathTest, ARowOutsideIsAMistake) {
+TEST(DensityDeathTest, AssertsOnRowOutsideChunk) {
   DensityChunk chunk(0);
   std::array<Half, kChunkEdge> row{};
   QUOIN_EXPECT_MISTAKE((void)chunk.solid_row(64, 0), "0 <= y, z < 64");
@@ -54,7 +54,7 @@ TEST(DensityDeathTest, ARowOutsideIsAMistake) {
   QUOIN_EXPECT_MISTAKE(chunk.write_row(0, 64, row), "0 <= y, z < 64");
 }
 
-TEST(DensityDeathTest, AHalfThatIsNotStoredSoIsAMistake) {
+TEST(DensityDeathTest, AssertsOnInvalidHalf) {
   constexpr Half kMinusZero = 0x8000;
   constexpr Half kInfinity = 0x7C00;
   constexpr Half kNaN = 0x7E00;
@@ -68,7 +68,7 @@ TEST(DensityDeathTest, AHalfThatIsNotStoredSoIsAMistake) {
   }
 }
 
-TEST(DensityDeathTest, AChunkOfAnotherBandIsAMistake) {
+TEST(DensityDeathTest, AssertsOnChunkOfOtherBand) {
   DensityGrid grid(8.0F);
   DensityChunk chunk(stored_density(16.0F, 16.0F));
   QUOIN_EXPECT_MISTAKE(grid.put_chunk(IVec3(0), chunk), "densities are stored_density of the band");
@@ -79,7 +79,7 @@ TEST(DensityDeathTest, AChunkOfAnotherBandIsAMistake) {
   QUOIN_EXPECT_MISTAKE(grid.put_chunk(IVec3(0), chunk), "densities are stored_density of the band");
 }
 
-TEST(NeighbourhoodDeathTest, OffsetsBeyondTheNextChunksAreMistakes) {
+TEST(NeighbourhoodDeathTest, AssertsOnOffsetBeyondNeighbours) {
   const Neighbourhood voxels;
   QUOIN_EXPECT_MISTAKE((void)Neighbourhood::index(0, 2, 0), "-1 <= dx, dy, dz <= 1");
   QUOIN_EXPECT_MISTAKE((void)Neighbourhood::offset(27), "0 <= index < 27");
@@ -90,13 +90,13 @@ TEST(NeighbourhoodDeathTest, OffsetsBeyondTheNextChunksAreMistakes) {
   QUOIN_EXPECT_MISTAKE((void)samples.get(IVec3(0, -65, 0)), "-1 <= dx, dy, dz <= 1");
 }
 
-TEST(ChangesDeathTest, AskingAboutChunksFartherOffIsAMistake) {
+TEST(ChangesDeathTest, AssertsOnChunkBeyondNeighbours) {
   QUOIN_EXPECT_MISTAKE((void)ChunkChange().affects(IVec3(2, 0, 0)), "-1 <= dx, dy, dz <= 1");
   QUOIN_EXPECT_MISTAKE((void)DensityChange().affects(IVec3(0, 0, -2), 0), "-1 <= dx, dy, dz <= 1");
   QUOIN_EXPECT_MISTAKE((void)DensityChange().affects(IVec3(0), 65), "0 <= reach <= 64");
 }
 
-TEST(ChangesDeathTest, SlabsOutsideOfAChunkAreMistakes) {
+TEST(ChangesDeathTest, AssertsOnSlabOutsideChunk) {
   ChunkSlabs slabs;
   QUOIN_EXPECT_MISTAKE(slabs.add(64, 0), "0 <= y, z < 64");
   QUOIN_EXPECT_MISTAKE((void)slabs.has(0, -1), "0 <= y, z < 64");
@@ -104,17 +104,17 @@ TEST(ChangesDeathTest, SlabsOutsideOfAChunkAreMistakes) {
   QUOIN_EXPECT_MISTAKE((void)slabs.block(8, 0), "0, 16, 32 or 48");
 }
 
-TEST(DensityDeathTest, ABandThatIsNotPositiveIsAMistake) {
+TEST(DensityDeathTest, AssertsOnNonPositiveBand) {
   QUOIN_EXPECT_MISTAKE(DensityGrid(0.0F), "0 < band <= 65,504");
   QUOIN_EXPECT_MISTAKE((void)stored_density(1.0F, -1.0F), "a positive band");
 }
 
-TEST(DensityDeathTest, AReachBeyondTheNextChunksIsAMistake) {
+TEST(DensityDeathTest, AssertsOnReachBeyondNeighbours) {
   const DensityGrid grid;
   QUOIN_EXPECT_MISTAKE((void)chunks_to_mesh(grid, {}, 65), "0 <= reach <= 64");
 }
 
-TEST(PyramidDeathTest, ALevelThatIsNotThereIsAMistake) {
+TEST(PyramidDeathTest, AssertsOnMissingLevel) {
   const GridPyramid pyramid;
   QUOIN_EXPECT_MISTAKE((void)pyramid.level(1), "1 <= level <= levels");
   const DensityPyramid densities;
@@ -122,14 +122,14 @@ TEST(PyramidDeathTest, ALevelThatIsNotThereIsAMistake) {
   QUOIN_EXPECT_MISTAKE((void)densities.counts(0), "1 <= level <= levels");
 }
 
-TEST(RegistryDeathTest, ATypeThatIsNotRegisteredIsAMistake) {
+TEST(RegistryDeathTest, AssertsOnUnregisteredType) {
   VoxelRegistry types;
   QUOIN_EXPECT_MISTAKE((void)types[1], "a registered type");
   QUOIN_EXPECT_MISTAKE(types.replace(0, {}), "a registered type, not air");
   QUOIN_EXPECT_MISTAKE(types.replace(3, {}), "a registered type, not air");
 }
 
-TEST(RegistryDeathTest, AnotherAirIsAMistake) {
+TEST(RegistryDeathTest, AssertsOnSecondAirType) {
   VoxelRegistry types;
   const VoxelType type = types.add({}).value();
   VoxelProperties air;

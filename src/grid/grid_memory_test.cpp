@@ -11,9 +11,9 @@ namespace quoin {
 namespace {
 
 // Sets voxels to random types, then back. The memory left must be close to that of a grid without the edits.
-class EditsUndone : public testing::TestWithParam<unsigned> {};
+class GridMemory : public testing::TestWithParam<unsigned> {};
 
-TEST_P(EditsUndone, LeaveTheMemoryOfANewGrid) {
+TEST_P(GridMemory, MatchesNewGridAfterUndoneEdits) {
   constexpr int kEdits = 150'000;
   std::mt19937 random(GetParam());
   Grid grid;
@@ -55,9 +55,9 @@ TEST_P(EditsUndone, LeaveTheMemoryOfANewGrid) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Types, EditsUndone, testing::Values(2U, 5U, 40U, 300U, 60'000U));
+INSTANTIATE_TEST_SUITE_P(Types, GridMemory, testing::Values(2U, 5U, 40U, 300U, 60'000U));
 
-TEST(Grid, ManyChunksThatWereDroppedLeaveNoTable) {
+TEST(Grid, FreesTableOfDroppedChunks) {
   Grid grid;
   for (int i = 0; i < 20'000; ++i) grid.set({i % 100 * 64, i / 100 * 64, 0}, 1);
   for (int i = 0; i < 20'000; ++i) grid.set({i % 100 * 64, i / 100 * 64, 0}, kAir);

@@ -13,7 +13,7 @@
 namespace quoin {
 namespace {
 
-TEST(GridReader, ReadsAsTheGridDoes) {
+TEST(GridReader, MatchesGrid) {
   Grid grid;
   grid.fill_sphere({0, 0, 0}, 20.0, 3);
   GridReader reader(grid);
@@ -31,7 +31,7 @@ TEST(GridReader, ReadsAsTheGridDoes) {
 
 // Covers uniform chunks of air and of solid, and mixed chunks of few and of many types; reads rows forwards and
 // backwards.
-TEST(GridReader, ReadsAsTheGridDoesWhateverTheOrder) {
+TEST(GridReader, MatchesGridInAnyOrder) {
   std::mt19937 random(4);
   const auto below = [&random](int limit) { return static_cast<int>(random() % static_cast<unsigned>(limit)); };
   Grid grid;
@@ -56,7 +56,7 @@ TEST(GridReader, ReadsAsTheGridDoesWhateverTheOrder) {
   }
 }
 
-TEST(Grid, ARowIsSetWhereItsMaskSaysSo) {
+TEST(Grid, WritesRowWhereMaskIsSet) {
   std::mt19937_64 random(11);
   Grid grid;
   Grid plain;
@@ -84,7 +84,7 @@ TEST(Grid, ARowIsSetWhereItsMaskSaysSo) {
       << "the outermost chunks stay air";
 }
 
-TEST(GridWriter, SetsWhatSetsOneByOneSet) {
+TEST(GridWriter, MatchesSingleSets) {
   std::mt19937 random(5);
   Grid grid;
   Grid plain;

@@ -42,7 +42,7 @@ constexpr bool takes_any_of(Place) {
 static_assert(takes_any_of(IVec3{}));
 static_assert(!takes_any_of(DVec3{}) && !takes_any_of(Vec3{}));
 
-TEST(Grid, SettingAirErasesAndDropsTheChunk) {
+TEST(Grid, DropsChunkWhenLastVoxelIsErased) {
   Grid grid;
   grid.set({3, 3, 3}, 1);
   EXPECT_EQ(grid.chunk_count(), 1U);
@@ -51,7 +51,7 @@ TEST(Grid, SettingAirErasesAndDropsTheChunk) {
   EXPECT_TRUE(grid.bounds().empty());
 }
 
-TEST(Grid, AgreesWithAMapUnderRandomEdits) {
+TEST(Grid, MatchesMapUnderRandomEdits) {
   std::mt19937 random(7);
   Grid grid;
   std::map<std::tuple<int, int, int>, VoxelType> plain;
@@ -127,7 +127,7 @@ TEST(Grid, AgreesWithAMapUnderRandomEdits) {
   EXPECT_EQ(copy.voxel_count(), count);
 }
 
-TEST(Grid, EditOfACornerDirtiesSevenNeighboursThatExist) {
+TEST(Grid, CornerEditReportsSevenNeighbours) {
   Grid grid;
   for (int z = -1; z <= 1; ++z) {
     for (int y = -1; y <= 1; ++y) {
@@ -145,7 +145,7 @@ TEST(Grid, EditOfACornerDirtiesSevenNeighboursThatExist) {
   EXPECT_TRUE(follower.take(grid).empty());
 }
 
-TEST(Grid, SphereThatTouchesTwoSidesButNotTheirEdgeSparesTheDiagonalNeighbour) {
+TEST(Grid, SphereSparesUntouchedDiagonalNeighbour) {
   Grid grid;
   for (int y = 0; y <= 1; ++y) {
     for (int x = 0; x <= 1; ++x) grid.set(IVec3{x * 64 + 32, y * 64 + 32, 5}, 1);
@@ -155,7 +155,7 @@ TEST(Grid, SphereThatTouchesTwoSidesButNotTheirEdgeSparesTheDiagonalNeighbour) {
   EXPECT_EQ(follower.take(grid), std::vector<IVec3>({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}));
 }
 
-TEST(Grid, HugeFillsOfAirCostOnlyWhatIsThere) {
+TEST(Grid, HugeAirFillVisitsOnlyExistingChunks) {
   Grid grid;
   grid.set({5, 5, 5}, 1);
   constexpr int kLow = std::numeric_limits<int>::min();
@@ -164,7 +164,7 @@ TEST(Grid, HugeFillsOfAirCostOnlyWhatIsThere) {
   EXPECT_EQ(grid.chunk_count(), 0U);
 }
 
-TEST(Grid, TheOutermostChunksStayAir) {
+TEST(Grid, KeepsOutermostChunksAir) {
   Grid grid;
   constexpr int kHigh = std::numeric_limits<int>::max();
   EXPECT_FALSE(grid.set({kHigh, 0, 0}, 1));
@@ -173,7 +173,7 @@ TEST(Grid, TheOutermostChunksStayAir) {
   EXPECT_EQ(grid.neighbourhood(chunk_of({kHigh - 64, 0, 0})).at(1, 0, 0), nullptr);
 }
 
-TEST(Grid, BadSpheresChangeNothing) {
+TEST(Grid, IgnoresInvalidSpheres) {
   Grid grid;
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(grid.fill_sphere({nan, 0, 0}, 3.0, 1), 0);
@@ -182,7 +182,7 @@ TEST(Grid, BadSpheresChangeNothing) {
   EXPECT_EQ(grid.fill_sphere({1e300, 0, 0}, 3.0, 1), 0);
 }
 
-TEST(Grid, PuttingAChunkBooksOnlyWhatDiffers) {
+TEST(Grid, PutChunkReportsOnlyDifferences) {
   Grid grid;
   Chunk first;
   first.set(0, 0, 0, 1);
@@ -196,7 +196,7 @@ TEST(Grid, PuttingAChunkBooksOnlyWhatDiffers) {
   EXPECT_EQ(follower.take(grid).size(), 1U);
 }
 
-TEST(Grid, PuttingANewChunkDirtiesOnlyWhatItsVoxelsReach) {
+TEST(Grid, NewChunkReportsOnlyReachedNeighbours) {
   Grid grid;
   for (int z = -1; z <= 1; ++z) {
     for (int y = -1; y <= 1; ++y) {
@@ -235,7 +235,7 @@ std::vector<IVec3> reached_chunks(const Grid& before, const Grid& after, const I
   return chunks;
 }
 
-TEST(Grid, EveryKindOfEditReachesExactlyTheNeighboursOfWhatChanged) {
+TEST(Grid, EditsReportExactlyTheReachedNeighbours) {
   std::mt19937 random(3);
   Grid grid;
   grid.fill_box({{-100, -100, -100}, {101, 101, 101}}, 1);
@@ -266,7 +266,7 @@ TEST(Grid, EveryKindOfEditReachesExactlyTheNeighboursOfWhatChanged) {
   }
 }
 
-TEST(Grid, AnEditThatThrowsIsBooked) {
+TEST(Grid, ReportsEditThatThrows) {
   Grid grid;
   grid.set({1, 1, 1}, 1);
   grid.set({64, 1, 1}, 1);
@@ -281,7 +281,7 @@ TEST(Grid, AnEditThatThrowsIsBooked) {
 }
 
 // An edit creates and frees the storage of a chunk.
-TEST(Grid, AnEditMayReadWhatItChanges) {
+TEST(Grid, EditCallbackMayReadGrid) {
   Grid grid;
   const IBox box{{0, 0, 0}, {64, 64, 64}};
   const auto below = [&grid](IVec3 v) { return grid.get(v - IVec3{0, 1, 0}); };
@@ -296,7 +296,7 @@ TEST(Grid, AnEditMayReadWhatItChanges) {
   }
 }
 
-TEST(Grid, ChunksThatComeAndGoDoNotFillTheJournalForEver) {
+TEST(Grid, BoundsJournalOfRecurringChunks) {
   Grid grid;
   for (int i = 0; i < 100'000; ++i) grid.set({i % 3 * 64, 0, 0}, static_cast<VoxelType>(i / 3 % 2));
   EXPECT_LT(grid.bytes(), 32'768U) << "nobody follows";
@@ -308,7 +308,7 @@ TEST(Grid, ChunksThatComeAndGoDoNotFillTheJournalForEver) {
   EXPECT_EQ(grid.changes_since(late).items.size(), 1U);
 }
 
-TEST(Grid, CornersOfTheWorldCanBeEdited) {
+TEST(Grid, EditsCornersOfWorld) {
   constexpr int kLow = std::numeric_limits<int>::min() + 64;
   constexpr int kHigh = std::numeric_limits<int>::max() - 64;
   for (const int x : {kLow, kHigh}) {
@@ -326,7 +326,7 @@ TEST(Grid, CornersOfTheWorldCanBeEdited) {
   }
 }
 
-TEST(Grid, ItsJournalGoesWithTheVoxelsAndIsNoOthers) {
+TEST(Grid, MovesJournalWithVoxels) {
   Grid grid;
   ChangeCursor cursor = grid.cursor();
   grid.set({1, 2, 3}, 1);

@@ -19,7 +19,7 @@ Grid partial() {
   return grid;
 }
 
-TEST(PartialGrid, AWholeGridHasAllChunksInMemory) {
+TEST(PartialGrid, WholeGridIsFullyLoaded) {
   Grid grid;
   EXPECT_FALSE(grid.is_partial());
   EXPECT_TRUE(grid.is_loaded({1, 2, 3}));
@@ -48,7 +48,7 @@ TEST(PartialGrid, RefusesEditsInUnloadedChunks) {
   EXPECT_EQ(grid.fill_box({{-5, 0, 0}, {5, 1, 1}}, 1), 5);
 }
 
-TEST(PartialGrid, LoadingIsReportedAndIsNoEdit) {
+TEST(PartialGrid, ReportsLoadingAsNoEdit) {
   Grid grid = partial();
   ChangeCursor cursor = grid.cursor();
   Chunk chunk(kAir);
@@ -88,7 +88,7 @@ TEST(PartialGrid, LoadingIsReportedAndIsNoEdit) {
   EXPECT_TRUE(grid.loaded_chunks().empty());
 }
 
-TEST(PartialGrid, EditsAfterLoadingAreEdits) {
+TEST(PartialGrid, ReportsEditsAfterLoading) {
   Grid grid = partial();
   ChangeCursor cursor = grid.cursor();
   grid.load_chunk({0, 0, 0}, Chunk(1));
@@ -98,7 +98,7 @@ TEST(PartialGrid, EditsAfterLoadingAreEdits) {
   EXPECT_TRUE(changes.items[0].is_edit);
 }
 
-TEST(PartialGrid, AChunkIsMeshedOnceAllAroundItAreLoaded) {
+TEST(PartialGrid, HasNeighbourhoodOnceNeighboursAreLoaded) {
   Grid grid = partial();
   ChangeCursor cursor = grid.cursor();
   int left = 27;
@@ -122,7 +122,7 @@ TEST(PartialGrid, AChunkIsMeshedOnceAllAroundItAreLoaded) {
   EXPECT_NE(std::find(again.begin(), again.end(), IVec3(0, 0, 0)), again.end());
 }
 
-TEST(PartialGrid, RulesSeeNoDifferenceInWhatCameOrWent) {
+TEST(PartialGrid, VisitChangesSkipsLoadedAndUnloadedChunks) {
   Grid grid = partial();
   grid.load_chunk({0, 0, 0}, Chunk(1));
   grid.load_chunk({1, 0, 0}, Chunk(1));
@@ -140,7 +140,7 @@ TEST(PartialGrid, RulesSeeNoDifferenceInWhatCameOrWent) {
   EXPECT_EQ(rows, 1);
 }
 
-TEST(PartialGrid, SnapshotsKeepWhatWasLoaded) {
+TEST(PartialGrid, SnapshotsKeepLoadedChunks) {
   Grid grid = partial();
   grid.load_chunk({0, 0, 0}, Chunk(1));
   const Grid before = grid.snapshot();
@@ -152,7 +152,7 @@ TEST(PartialGrid, SnapshotsKeepWhatWasLoaded) {
   EXPECT_TRUE(grid.is_loaded({5, 5, 5}));
 }
 
-TEST(PartialGrid, ABoxIsLoadedWhereAllItsChunksAre) {
+TEST(PartialGrid, BoxIsLoadedIfAllItsChunksAre) {
   Grid grid = partial();
   DensityGrid field;
   field.make_partial();
@@ -196,7 +196,7 @@ TEST(PartialGrid, CopiesOnlyLoadedVoxels) {
   }
 }
 
-TEST(PartialGrid, FieldsAlike) {
+TEST(PartialGrid, DensityGridBehavesAlike) {
   DensityGrid field;
   field.add_sphere({32.0, 32.0, 32.0}, 10.0, 1);
   const DensityChunk sphere = *field.find_chunk({0, 0, 0});

@@ -51,7 +51,7 @@ void expect_equal(const CheckedGrid& checked) {
 }
 
 // Edits and destroys snapshots of snapshots in random order.
-TEST(Snapshot, EditsLeaveAllOtherSnapshotsAsTheyWere) {
+TEST(Snapshot, StaysUnchangedByOtherEdits) {
   for (unsigned seed = 1; seed <= 6; ++seed) {
     SCOPED_TRACE(seed);
     std::mt19937 random(seed);
@@ -112,7 +112,7 @@ TEST(Snapshot, SharesChunksUntilTheyAreEdited) {
   }
 }
 
-TEST(Snapshot, AnUnsharedChunkIsEditedInPlace) {
+TEST(Snapshot, EditsUnsharedChunkInPlace) {
   Grid grid;
   grid.fill_sphere({32, 32, 32}, 20.0, 1);
   { const Grid copy = grid.snapshot(); }
@@ -121,7 +121,7 @@ TEST(Snapshot, AnUnsharedChunkIsEditedInPlace) {
   EXPECT_EQ(ChunkStorage::of(*grid.find_chunk({0, 0, 0})), before);
 }
 
-TEST(Snapshot, DensitySnapshotsStayAsTheyWere) {
+TEST(Snapshot, DensitySnapshotsStayUnchanged) {
   std::mt19937 random(4);
   DensityGrid grid;
   std::vector<std::pair<DensityGrid, std::uint64_t>> copies;
@@ -143,7 +143,7 @@ TEST(Snapshot, DensitySnapshotsStayAsTheyWere) {
 }
 
 // Threads keep, read and release snapshots while the grid is edited.
-TEST(Snapshot, IsReadOnOtherThreadsWhileTheGridIsEdited) {
+TEST(Snapshot, IsReadableOnThreadsDuringEdits) {
   Grid grid;
   grid.fill_box({{0, 0, 0}, {256, 64, 256}}, 1);
   std::vector<std::jthread> readers;
@@ -166,7 +166,7 @@ TEST(Snapshot, IsReadOnOtherThreadsWhileTheGridIsEdited) {
 }
 
 // Workers read snapshots, edit their own copies and release both at any time while the grid is edited.
-TEST(Snapshot, PagesOfVoxelsComeAndGoOnManyThreads) {
+TEST(Snapshot, IsEditableOnThreadsDuringEdits) {
   std::mt19937 random(3);
   const auto below = [](std::mt19937& from, unsigned end) { return static_cast<int>(from() % end); };
   const auto edit = [&](Grid& grid, std::mt19937& from) {
@@ -213,7 +213,7 @@ TEST(Snapshot, PagesOfVoxelsComeAndGoOnManyThreads) {
   is_done = true;
 }
 
-TEST(Chunk, ItsHashIsOfWhatItHoldsHoweverItCameToHoldIt) {
+TEST(Chunk, HashIgnoresEditHistory) {
   std::mt19937 random(12);
   Chunk chunk(3);
   const std::uint64_t uniform = chunk.content_hash();
@@ -246,7 +246,7 @@ TEST(Chunk, ItsHashIsOfWhatItHoldsHoweverItCameToHoldIt) {
   EXPECT_FALSE(other == chunk);
 }
 
-TEST(Chunk, IsFullWhereNothingIsAir) {
+TEST(Chunk, IsFullWithoutAir) {
   Chunk chunk;
   EXPECT_FALSE(chunk.is_full());
   chunk.fill(1);

@@ -44,7 +44,7 @@ double ball(IVec3 p) {
   return 1'000.0 - 50.0 * std::sqrt(d.x * d.x + d.y * d.y + d.z * d.z);
 }
 
-TEST(VolumeField, DensitiesOfABallAreDistancesInSamples) {
+TEST(VolumeField, MatchesDistancesOfBall) {
   const Volume volume = sampled({80, 71, 66}, ball);
   const DensityGrid field = field_from_volume(volume, iso_of(100.0F)).value();
   for (int z = 0; z < 66; z += 3) {
@@ -59,7 +59,7 @@ TEST(VolumeField, DensitiesOfABallAreDistancesInSamples) {
   EXPECT_EQ(field.density({-1, 36, 33}), 8.0F);
 }
 
-TEST(VolumeField, SolidIsExactlyWhatIsGreater) {
+TEST(VolumeField, MarksGreaterSamplesSolid) {
   // Differences down to the smallest positive float.
   const auto value = [](IVec3 p) {
     const double least = std::numeric_limits<float>::denorm_min();
@@ -74,14 +74,14 @@ TEST(VolumeField, SolidIsExactlyWhatIsGreater) {
   }
 }
 
-TEST(VolumeField, LabelsLieHalfASampleFromTheSurface) {
+TEST(VolumeField, PutsSurfaceHalfwayBetweenLabels) {
   const Volume volume = sampled({40, 40, 40}, [](IVec3 p) { return p.y < 20 ? 1 : 0; });
   const DensityGrid field = field_from_volume(volume, iso_of(0.5F)).value();
   EXPECT_NEAR(field.density({20, 19, 20}), -0.5F, 0.01F);
   EXPECT_NEAR(field.density({20, 20, 20}), 0.5F, 0.01F);
 }
 
-TEST(VolumeField, NanIsAirAndInfinitiesGoByTheirSign) {
+TEST(VolumeField, TreatsNanAsAirAndInfinitiesBySign) {
   const std::array<float, 4> values = {kNan, kInfinity, -kInfinity, 3.0F};
   const Volume volume = sampled({4, 4, 4}, [&](IVec3 p) { return values[static_cast<std::size_t>(p.x)]; });
   const DensityGrid field = field_from_volume(volume, iso_of(2.0F)).value();
@@ -95,7 +95,7 @@ TEST(VolumeField, NanIsAirAndInfinitiesGoByTheirSign) {
   }
 }
 
-TEST(VolumeField, AVolumeThatIsNeverCrossedIsEmptyOrSolid) {
+TEST(VolumeField, UncrossedVolumeIsEmptyOrSolid) {
   const Volume flat = sampled({5, 70, 5}, [](IVec3) { return 7; });
   EXPECT_EQ(field_from_volume(flat, iso_of(9.0F)).value().solid_count(), 0);
   EXPECT_EQ(field_from_volume(flat, iso_of(7.0F)).value().solid_count(), 0);
@@ -121,7 +121,7 @@ TEST(VolumeField, RefusesInvalidVolumes) {
   EXPECT_FALSE(field_from_volume(nothing, iso_of(1.0F)).has_value());
 }
 
-TEST(VolumeField, IsTheSameAtAnyNumberOfThreadsAndCanBeCancelled) {
+TEST(VolumeField, IsThreadIndependentAndCancellable) {
   const Volume volume = sampled({130, 70, 66}, ball);
   const DensityGrid one = field_from_volume(volume, iso_of(0.0F), Threads{1}).value();
   const DensityGrid four = field_from_volume(volume, iso_of(0.0F), Threads{4}).value();

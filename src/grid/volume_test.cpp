@@ -47,7 +47,7 @@ double variance_within(const std::vector<float>& values, double threshold) {
   return within;
 }
 
-TEST(VolumeThreshold, PartsTwoGroupsBest) {
+TEST(VolumeThreshold, SeparatesTwoGroups) {
   const std::uint32_t seed = std::random_device{}();
   SCOPED_TRACE("seed " + std::to_string(seed));
   std::mt19937 random(seed);
@@ -63,14 +63,14 @@ TEST(VolumeThreshold, PartsTwoGroupsBest) {
   }
 }
 
-TEST(VolumeThreshold, LiesAmidTheGap) {
+TEST(VolumeThreshold, LiesInMiddleOfGap) {
   EXPECT_EQ(threshold_of(volume_of({4, 1, 1}, {0, 0, 255, 255})), 127.5F);
   EXPECT_NEAR(threshold_of(volume_of({4, 1, 1}, {-1e30F, -1e30F, 3e30F, 3e30F})), 1e30F, 1e28F);
   const float huge = std::numeric_limits<float>::max();
   EXPECT_NEAR(threshold_of(volume_of({2, 1, 1}, {-huge, huge})), 0.0F, huge * 1e-3F);
 }
 
-TEST(VolumeThreshold, PartsValuesWithNoFloatBetweenThem) {
+TEST(VolumeThreshold, SeparatesAdjacentFloats) {
   float low = 1.0F;
   for (int i = 0; i < 4; ++i) {
     const float high = std::nextafter(low, 2.0F);
@@ -79,7 +79,7 @@ TEST(VolumeThreshold, PartsValuesWithNoFloatBetweenThem) {
   }
 }
 
-TEST(VolumeThreshold, OddVolumesHaveOne) {
+TEST(VolumeThreshold, HandlesUniformAndNonFiniteVolumes) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   EXPECT_EQ(threshold_of(volume_of({3, 1, 1}, {7, 7, 7})), 7.0F);
   EXPECT_EQ(threshold_of(volume_of({5, 1, 1}, {nan, 0, 10, INFINITY, -INFINITY})), 5.0F);
@@ -88,7 +88,7 @@ TEST(VolumeThreshold, OddVolumesHaveOne) {
   EXPECT_FALSE(surface_value(none)) << "no value has a threshold";
 }
 
-TEST(UnitsOfLength, HaveMetres) {
+TEST(LengthUnits, ConvertToMetres) {
   EXPECT_EQ(metres_of_unit("mm"), 1e-3);
   EXPECT_EQ(metres_of_unit("um"), 1e-6);
   EXPECT_EQ(metres_of_unit("microns"), 1e-6);

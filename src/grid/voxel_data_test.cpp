@@ -168,7 +168,7 @@ class RandomEdits {
   std::mt19937 random_;
 };
 
-TEST(VoxelData, FollowsItsVoxelsThroughEditsAndSnapshots) {
+TEST(VoxelData, FollowsVoxelsThroughEditsAndSnapshots) {
   for (unsigned seed = 1; seed <= 8; ++seed) {
     SCOPED_TRACE(seed);
     RandomEdits edits(seed);
@@ -186,7 +186,7 @@ TEST(VoxelData, FollowsItsVoxelsThroughEditsAndSnapshots) {
   }
 }
 
-TEST(VoxelData, GoesWithAnotherTypeAndStaysWithTheSame) {
+TEST(VoxelData, IsRemovedOnlyWhenTypeChanges) {
   Grid grid;
   const IVec3 at{3, 4, 5};
   EXPECT_FALSE(grid.set_data(at, {.state = 7})) << "air holds nothing";
@@ -203,7 +203,7 @@ TEST(VoxelData, GoesWithAnotherTypeAndStaysWithTheSame) {
   EXPECT_EQ(grid.data_count(), 0);
 }
 
-TEST(VoxelData, AcceptsAViewOfTheSameVoxelsData) {
+TEST(VoxelData, AcceptsViewOfOwnData) {
   Grid grid;
   const IVec3 at{-1, -1, -1};
   const std::vector<std::byte> inventory = bytes_of("three apples");
@@ -227,7 +227,7 @@ TEST(VoxelData, UniformChunkKeepsData) {
   EXPECT_EQ(chunk.data_count(), 0);
 }
 
-TEST(VoxelData, TakesAPointerAChunkWhereThereIsNone) {
+TEST(VoxelData, TakesNoMemoryInChunksWithoutData) {
   Chunk chunk(kStone);
   EXPECT_EQ(chunk.bytes(), sizeof(Chunk));
   EXPECT_LE(sizeof(Chunk), 3 * sizeof(void*));
@@ -237,7 +237,7 @@ TEST(VoxelData, TakesAPointerAChunkWhereThereIsNone) {
   EXPECT_EQ(chunk.bytes(), sizeof(Chunk));
 }
 
-TEST(VoxelData, CountsWhereChunksAreCompared) {
+TEST(VoxelData, IsComparedWithChunks) {
   Chunk one(kStone);
   one.set_data({1, 2, 3}, {.state = 5});
   const Chunk same = one;
@@ -254,7 +254,7 @@ TEST(VoxelData, CountsWhereChunksAreCompared) {
   EXPECT_NE(one.content_hash(), other.content_hash());
 }
 
-TEST(VoxelDataChanges, AreToldApartFromThoseOfTypes) {
+TEST(VoxelDataChanges, AreSeparateFromTypeChanges) {
   Grid grid;
   grid.fill_box({{0, 0, 0}, {128, 8, 8}}, kStone);
   ChangeCursor types = grid.cursor();
@@ -282,7 +282,7 @@ TEST(VoxelDataChanges, AreToldApartFromThoseOfTypes) {
 }
 
 // Several consumers read at different rates.
-TEST(VoxelDataChanges, TellOfEveryVoxelThatDiffers) {
+TEST(VoxelDataChanges, ReportEveryDifferingVoxel) {
   for (unsigned seed = 1; seed <= 6; ++seed) {
     SCOPED_TRACE(seed);
     RandomEdits edits(seed);
@@ -328,7 +328,7 @@ TEST(VoxelDataChanges, TellOfEveryVoxelThatDiffers) {
   }
 }
 
-TEST(VoxelDataChanges, ReportsDataOfAClearedGrid) {
+TEST(VoxelDataChanges, ReportDataOfClearedGrid) {
   Grid grid;
   grid.set({1, 1, 1}, kChest, {.state = 1});
   grid.set({100, 1, 1}, kStone);
@@ -340,7 +340,7 @@ TEST(VoxelDataChanges, ReportsDataOfAClearedGrid) {
   EXPECT_EQ(grid.data_count(), 0);
 }
 
-TEST(VoxelDataCopies, ArriveTurnedWithTheirVoxels) {
+TEST(VoxelDataCopies, TurnWithTheirVoxels) {
   for (unsigned seed = 1; seed <= 24; ++seed) {
     SCOPED_TRACE(seed);
     RandomEdits edits(seed);
@@ -380,7 +380,7 @@ TEST(VoxelDataCopies, ArriveTurnedWithTheirVoxels) {
   }
 }
 
-TEST(VoxelDataCopies, CopiesOfWholeChunksShareData) {
+TEST(VoxelDataCopies, ShareDataOfWholeChunks) {
   Grid from;
   from.fill_box({{0, 0, 0}, {128, 64, 64}}, kStone);
   from.set({70, 2, 2}, kChest, {.state = 4});
@@ -416,7 +416,7 @@ TEST(VoxelDataPieces, MoveWithDetachedPieces) {
   EXPECT_EQ(world.data_count(), 1);
 }
 
-TEST(VoxelDataDeathTest, TooManyBytesAreAMistake) {
+TEST(VoxelDataDeathTest, AssertsOnTooManyBytes) {
   Grid grid;
   grid.set({0, 0, 0}, kChest);
   const std::vector<std::byte> most(kMaxVoxelDataBytes);

@@ -7,7 +7,7 @@
 namespace quoin {
 namespace {
 
-TEST(VoxelRegistry, FindsTypesByTheirNames) {
+TEST(VoxelRegistry, FindsTypesByName) {
   VoxelRegistry types;
   EXPECT_FALSE(types.find("water"));
   const auto stone = types.add({.name = "stone"});
@@ -18,7 +18,7 @@ TEST(VoxelRegistry, FindsTypesByTheirNames) {
   EXPECT_FALSE(types.find("")) << "air is no type that was added";
 }
 
-TEST(VoxelRegistry, ColoursBecomeLightAndColoursAgain) {
+TEST(VoxelRegistry, RoundTripsColours) {
   for (int i = 0; i < 256; ++i) {
     const auto byte = static_cast<std::uint8_t>(i);
     const Rgba8 colour{byte, static_cast<std::uint8_t>(255 - i), 7, 255};

@@ -90,7 +90,7 @@ TEST(Chunk, UniformChunkHoldsNoVoxelData) {
   EXPECT_EQ(Chunk().bounds(), IBox{});
 }
 
-TEST(Chunk, SetReturnsWhetherTheVoxelChanged) {
+TEST(Chunk, SetReturnsTrueIfVoxelChanged) {
   Chunk chunk;
   EXPECT_TRUE(chunk.set(1, 2, 3, 5));
   EXPECT_FALSE(chunk.set(1, 2, 3, 5));
@@ -98,7 +98,7 @@ TEST(Chunk, SetReturnsWhetherTheVoxelChanged) {
   EXPECT_FALSE(chunk.set(1, 2, 3, kAir));
 }
 
-TEST(Chunk, FilledVoxelByVoxelBecomesUniform) {
+TEST(Chunk, BecomesUniformWhenFilledVoxelByVoxel) {
   Chunk chunk;
   for (int z = 0; z < kChunkEdge; ++z) {
     for (int y = 0; y < kChunkEdge; ++y) {
@@ -111,7 +111,7 @@ TEST(Chunk, FilledVoxelByVoxelBecomesUniform) {
 // Uses enough types to reach each bit width, and compares the chunk with a plain array.
 class ChunkOfTypes : public testing::TestWithParam<int> {};
 
-TEST_P(ChunkOfTypes, HoldsWhatAPlainArrayHolds) {
+TEST_P(ChunkOfTypes, MatchesPlainArray) {
   std::mt19937 random(static_cast<unsigned>(GetParam()));
   std::vector<VoxelType> dense(kChunkVoxels, kAir);
   Chunk chunk;
@@ -149,13 +149,13 @@ TEST_P(ChunkOfTypes, HoldsWhatAPlainArrayHolds) {
 
 INSTANTIATE_TEST_SUITE_P(Widths, ChunkOfTypes, testing::Values(2, 3, 4, 5, 16, 17, 200, 256, 257, 65'535));
 
-TEST(Chunk, ReusesPaletteEntriesThatFellOutOfUse) {
+TEST(Chunk, ReusesUnusedPaletteEntries) {
   Chunk chunk;
   for (int i = 1; i < 60'000; ++i) chunk.set(5, 5, 5, static_cast<VoxelType>(i));
   EXPECT_LE(ChunkStorage::of(chunk)->bits, 2);
 }
 
-TEST(Chunk, BoxFillsLeaveWholeSlabsWithoutData) {
+TEST(Chunk, StoresNoDataForFilledSlabs) {
   Chunk chunk;
   int rows = 0;
   chunk.fill_box({{0, 0, 0}, {64, 32, 64}}, 3, [&](int, int, std::uint64_t changed) {
@@ -170,7 +170,7 @@ TEST(Chunk, BoxFillsLeaveWholeSlabsWithoutData) {
   EXPECT_LT(chunk.bytes(), 8'192U);
 }
 
-TEST(Chunk, FilledAsAWholeBecomesUniformAtAnyWidth) {
+TEST(Chunk, BecomesUniformWhenFilledAtAnyWidth) {
   for (const int types : {2, 5, 100, 2'000}) {
     Chunk chunk;
     for (int i = 0; i < types; ++i) chunk.set(i % 64, i / 64, 7, static_cast<VoxelType>(i));
@@ -181,7 +181,7 @@ TEST(Chunk, FilledAsAWholeBecomesUniformAtAnyWidth) {
   }
 }
 
-TEST(Chunk, RandomEditsDoNotGrowWithoutBound) {
+TEST(Chunk, BoundsMemoryUnderRandomEdits) {
   std::mt19937 random(1);
   Chunk chunk;
   std::size_t largest = 0;

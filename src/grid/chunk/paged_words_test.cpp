@@ -25,7 +25,7 @@ std::vector<std::uint64_t> all_of(const PagedWords& words) {
   return all;
 }
 
-TEST(PagedWords, HoldTheirInitialWords) {
+TEST(PagedWords, KeepInitialWords) {
   for (const std::size_t size :
        {std::size_t{0}, std::size_t{1}, std::size_t{1'024}, std::size_t{1'025}, std::size_t{65'536}}) {
     const std::vector<std::uint64_t> wanted = numbers(size, 7);
@@ -38,7 +38,7 @@ TEST(PagedWords, HoldTheirInitialWords) {
   }
 }
 
-TEST(PagedWords, AWriteToACopyCopiesOnePage) {
+TEST(PagedWords, CopyOnePageOnWrite) {
   const std::vector<std::uint64_t> before = numbers(5'000, 1);
   PagedWords first{std::span(before)};
   PagedWords second = first;
@@ -81,14 +81,14 @@ TEST(PagedWords, GrowAndShrinkWithoutTouchingCopies) {
   for (const auto& [copy, its] : copies) EXPECT_EQ(all_of(copy), its);
 }
 
-TEST(PagedWordsDeathTest, ASharedPageIsNotWritten) {
+TEST(PagedWordsDeathTest, AssertsOnWriteToSharedPage) {
   PagedWords words(10);
   const PagedWords copy = words;
   QUOIN_EXPECT_MISTAKE((void)words.own_at(3), "a word on an unshared page");
 }
 
 // Compares chunks and copies of them, written in turn, with plain arrays.
-TEST(Chunk, CopiesShareWhatNoneOfThemWrote) {
+TEST(Chunk, CopiesShareUnwrittenData) {
   for (const int types : {2, 4, 16, 200, 300}) {
     std::mt19937 random(static_cast<unsigned>(types));
     std::vector<VoxelType> dense(kChunkVoxels);
@@ -130,7 +130,7 @@ TEST(Chunk, CopiesShareWhatNoneOfThemWrote) {
   }
 }
 
-TEST(Chunk, AWriteToACopyLeavesItsOtherSlabsShared) {
+TEST(Chunk, KeepsOtherSlabsSharedAfterWrite) {
   std::mt19937 random(5);
   std::vector<VoxelType> dense(kChunkVoxels);
   for (VoxelType& type : dense) type = static_cast<VoxelType>(random() % 200);

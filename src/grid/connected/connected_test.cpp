@@ -132,7 +132,7 @@ void expect_pieces(const ConnectedPieces& found, const Grid& grid, const Connect
   EXPECT_EQ(wrong, 0);
 }
 
-TEST(ConnectedPieces, AreThoseOfAFloodFill) {
+TEST(ConnectedPieces, MatchFloodFill) {
   for (unsigned seed = 1; seed <= 24; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     Random random(seed);
@@ -162,7 +162,7 @@ TEST(ConnectedPieces, FollowEdits) {
   }
 }
 
-TEST(ConnectedPieces, StartsOverForAnotherGrid) {
+TEST(ConnectedPieces, StartOverForAnotherGrid) {
   Random random(5);
   ConnectedPieces pieces;
   pieces.update(random_grid(random));
@@ -175,7 +175,7 @@ TEST(ConnectedPieces, StartsOverForAnotherGrid) {
 }
 
 // Uses hundreds of types; only some belong.
-TEST(ConnectedPieces, MatchAFloodFillWithManyTypes) {
+TEST(ConnectedPieces, MatchFloodFillWithManyTypes) {
   Random random(3);
   Grid grid;
   grid.edit({IVec3(-40), IVec3(40)}, [&](IVec3, VoxelType) { return static_cast<VoxelType>(random.below(1'000)); });
@@ -186,7 +186,7 @@ TEST(ConnectedPieces, MatchAFloodFillWithManyTypes) {
   expect_pieces(pieces, grid, options);
 }
 
-TEST(ConnectedPieces, ExtractedMakeUpTheGrid) {
+TEST(ConnectedPieces, ExtractAndRemovePieces) {
   for (unsigned seed = 1; seed <= 6; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     Random random(seed);
@@ -218,7 +218,7 @@ TEST(ConnectedPieces, ExtractedMakeUpTheGrid) {
   }
 }
 
-TEST(ConnectedPieces, WholeChunksOfAPieceAreShared) {
+TEST(ConnectedPieces, ShareWholeChunks) {
   Grid grid;
   grid.fill_box({{0, 0, 0}, {201, 91, 71}}, 1);
   grid.set({5, 5, 5}, 2);
@@ -232,7 +232,7 @@ TEST(ConnectedPieces, WholeChunksOfAPieceAreShared) {
   }
 }
 
-TEST(ConnectedPieces, TouchABoxWhereTheyHaveAVoxelInIt) {
+TEST(ConnectedPieces, TouchBoxIfVoxelIsInside) {
   for (unsigned seed = 1; seed <= 10; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     Random random(seed);
@@ -261,7 +261,7 @@ TEST(ConnectedPieces, TouchABoxWhereTheyHaveAVoxelInIt) {
   }
 }
 
-TEST(ConnectedPieces, FindsPiecesCutFromTheGround) {
+TEST(ConnectedPieces, FindPiecesCutFromGround) {
   constexpr int kMin = std::numeric_limits<int>::min();
   constexpr int kMax = std::numeric_limits<int>::max();
   const IBox ground{{kMin, 0, kMin}, {kMax, 1, kMax}};
@@ -282,7 +282,7 @@ TEST(ConnectedPieces, FindsPiecesCutFromTheGround) {
   EXPECT_EQ(pieces.size(), 1U);
 }
 
-TEST(ConnectedPieces, VoxelsAcrossCornersOfChunksHoldTogetherOnlyWithCorners) {
+TEST(ConnectedPieces, ConnectAcrossChunkCorners) {
   for (int i = 0; i < 27; ++i) {
     const IVec3 step{i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
     if (step == IVec3(0)) continue;
@@ -315,7 +315,7 @@ TEST(ConnectedPieces, AreTheSameAtAnyThreadCount) {
   }
 }
 
-TEST(ConnectedPiecesDeathTest, APieceThatIsNotThereIsAMistake) {
+TEST(ConnectedPiecesDeathTest, AssertsOnUnknownPiece) {
   Grid grid;
   grid.set({0, 0, 0}, 1);
   ConnectedPieces pieces;
@@ -342,7 +342,7 @@ bool touches_unloaded(const Grid& grid, const ConnectedPieces& pieces, std::size
   return found;
 }
 
-TEST(ConnectedPieces, HoldsPiecesThatTouchUnloadedChunks) {
+TEST(ConnectedPieces, HoldPiecesThatTouchUnloadedChunks) {
   Grid grid;
   grid.make_partial();
   grid.load_chunk({0, 0, 0}, Chunk(kAir));
@@ -372,7 +372,7 @@ TEST(ConnectedPieces, HoldsPiecesThatTouchUnloadedChunks) {
   EXPECT_EQ(of_whole.not_touching(ground), (std::vector<std::size_t>{0, 1}));
 }
 
-TEST(ConnectedPieces, EdgesAndCornersOfChunksCountWhereVoxelsConnectByThem) {
+TEST(ConnectedPieces, TouchUnloadedDiagonallyOnlyWithCorners) {
   for (const Connectivity connectivity : {Connectivity::Faces6, Connectivity::Corners26}) {
     Grid grid;
     grid.make_partial();
@@ -395,7 +395,7 @@ TEST(ConnectedPieces, EdgesAndCornersOfChunksCountWhereVoxelsConnectByThem) {
   }
 }
 
-TEST(ConnectedPieces, RandomLoadingAgreesWithVoxelsOneByOne) {
+TEST(ConnectedPieces, TouchUnloadedChunksAsOracleSays) {
   std::mt19937 random(11);
   std::uniform_int_distribution<int> place(-2, 1);
   std::uniform_int_distribution<int> voxel(-128, 127);

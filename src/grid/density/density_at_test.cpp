@@ -43,7 +43,7 @@ TEST(DensityAt, IsExactOnLinearFieldsAcrossChunkBorders) {
   }
 }
 
-TEST(DensityAt, EqualsTheSamplesAtTheSamples) {
+TEST(DensityAt, EqualsSamplesAtTheirPositions) {
   DensityGrid grid;
   grid.add_sphere({0.3, -0.7, 63.1}, 6.0, 1);
   for (int z = 50; z < 75; ++z) {
@@ -53,7 +53,7 @@ TEST(DensityAt, EqualsTheSamplesAtTheSamples) {
   }
 }
 
-TEST(DensityAt, AgreesWithTheSumOverTheCornersInARandomField) {
+TEST(DensityAt, MatchesSumOverCornersInRandomField) {
   constexpr unsigned kSeed = 37;
   SCOPED_TRACE(kSeed);
   std::mt19937 random(kSeed);
@@ -87,7 +87,7 @@ TEST(DensityAt, AgreesWithTheSumOverTheCornersInARandomField) {
   }
 }
 
-TEST(DensityAt, TheGradientOnAFaceIsThatOfTheCellAbove) {
+TEST(DensityAt, GradientOnFaceUsesCellAbove) {
   DensityGrid grid;
   grid.set({-1, 0, 0}, {-1.0F, 1});
   grid.set({0, 0, 0}, {1.0F, 1});
@@ -96,7 +96,7 @@ TEST(DensityAt, TheGradientOnAFaceIsThatOfTheCellAbove) {
   EXPECT_EQ(grid.gradient_at({-0.25, 0, 0}).x, 2.0);
 }
 
-TEST(DensityAt, NowhereIsFarAirWithoutAGradient) {
+TEST(DensityAt, IsFarAirAtInvalidPositions) {
   DensityGrid grid;
   grid.add_sphere({0, 0, 0}, 5.0, 1);
   for (const double bad : {kNan, kInfinity, -kInfinity, 1e300, -1e300, 2147483647.0, 2147483648.0, -2147483649.0}) {

@@ -17,7 +17,7 @@ constexpr Half kFar = 0x4800;   // 8
 constexpr Half kDeep = 0xC800;  // -8
 constexpr float kFloatInfinity = std::numeric_limits<float>::infinity();
 
-TEST(StoredDensity, KeepsTheSignHoweverSmallAndNothingButZeroIsZero) {
+TEST(StoredDensity, KeepsSignOfTinyDensities) {
   for (const float small : {1e-45F, 1e-30F, 1e-8F, 3e-8F, 1e-6F, 6e-5F}) {
     EXPECT_TRUE(DensityChunk::is_solid(stored_density(-small, 8.0F))) << small;
     EXPECT_GT(float_from_half(stored_density(small, 8.0F)), 0.0F) << small;
@@ -27,7 +27,7 @@ TEST(StoredDensity, KeepsTheSignHoweverSmallAndNothingButZeroIsZero) {
   EXPECT_EQ(stored_density(-0.0F, 8.0F), 0);
 }
 
-TEST(StoredDensity, EndsAtTheBandAndReadsNanAsFarAir) {
+TEST(StoredDensity, ClampsToBandAndTreatsNanAsAir) {
   EXPECT_EQ(stored_density(100.0F, 8.0F), kFar);
   EXPECT_EQ(stored_density(-100.0F, 8.0F), kDeep);
   EXPECT_EQ(stored_density(kFloatInfinity, 8.0F), kFar);
@@ -37,7 +37,7 @@ TEST(StoredDensity, EndsAtTheBandAndReadsNanAsFarAir) {
   EXPECT_EQ(float_from_half(stored_density(1e9F, kMaxHalf)), kMaxHalf);
 }
 
-TEST(StoredDensity, ABandBetweenTwoHalvesIsNeverExceeded) {
+TEST(StoredDensity, NeverExceedsBandBetweenHalves) {
   std::mt19937 random(3);
   for (int round = 0; round < 1'000; ++round) {
     const float band =
@@ -88,7 +88,7 @@ void expect_equal(const DensityChunk& chunk, PlainChunk& plain) {
   }
 }
 
-TEST(DensityChunk, AgreesWithAPlainArrayUnderRandomWrites) {
+TEST(DensityChunk, MatchesPlainArrayUnderRandomWrites) {
   constexpr unsigned kSeed = 19;
   SCOPED_TRACE(kSeed);
   std::mt19937 random(kSeed);
@@ -145,7 +145,7 @@ TEST(DensityChunk, UniteAndCompactFreeUniformStorage) {
   EXPECT_EQ(chunk.bytes(), empty);
 }
 
-TEST(DensityChunk, HoldsOnlyTheSlabsThatDiffer) {
+TEST(DensityChunk, StoresOnlyDifferingSlabs) {
   DensityChunk chunk(kFar);
   std::array<Half, kChunkEdge> row;
   row.fill(kFar);
@@ -171,7 +171,7 @@ TEST(DensityNeighbourhood, ReadsAcrossChunksAndOutside) {
   EXPECT_EQ(around.get({127, 0, 127}), kFar);
 }
 
-TEST(DensityChunk, EqualsWhatHoldsTheSameHoweverItIsStored) {
+TEST(DensityChunk, ComparesContentNotStorage) {
   const Half air = stored_density(8.0F, 8.0F);
   const Half solid = stored_density(-3.0F, 8.0F);
   DensityChunk chunk(air);

@@ -160,7 +160,7 @@ void expect_equal(const DensityGrid& grid, PlainField& plain) {
   ASSERT_EQ(differing, 0);
 }
 
-TEST(DensityEdits, AgreeWithAPlainFieldAndTellOfEveryChunkThatTheyReach) {
+TEST(DensityEdits, MatchPlainFieldAndReportReachedChunks) {
   for (unsigned seed = 1; seed <= 4; ++seed) {
     SCOPED_TRACE(seed);
     std::mt19937 random(seed);
@@ -181,7 +181,7 @@ TEST(DensityEdits, AgreeWithAPlainFieldAndTellOfEveryChunkThatTheyReach) {
   }
 }
 
-TEST(DensityEdits, ASphereIsItsDistance) {
+TEST(DensityEdits, StoreDistancesOfSphere) {
   DensityGrid grid;
   const DVec3 centre{-0.3, 63.7, 0.2};
   EXPECT_GT(grid.add_sphere(centre, 10.0, 7), 0);
@@ -195,7 +195,7 @@ TEST(DensityEdits, ASphereIsItsDistance) {
   EXPECT_EQ(grid.add_sphere(centre, 10.0, 9), 0);
 }
 
-TEST(DensityEdits, RemovedRockKeepsItsMaterialWhileItIsNearTheSurface) {
+TEST(DensityEdits, KeepMaterialOfRemovedRockNearSurface) {
   DensityGrid grid;
   grid.add_box({-20, -20, -20}, {20, 20, 20}, 3);
   grid.remove_sphere({20, 0, 0}, 6.0);
@@ -218,7 +218,7 @@ TEST(DensityEdits, RemovingAllSolidLeavesNoChunks) {
   EXPECT_FALSE(follower.take(grid, 0).empty());
 }
 
-TEST(DensityEdits, ABlendIntoEmptyAirAddsNothingButTheShape) {
+TEST(DensityEdits, BlendIntoAirAddsOnlyShape) {
   DensityGrid sharp;
   DensityGrid blended;
   sharp.add_sphere({5, 5, 5}, 9.0, 1);
@@ -226,7 +226,7 @@ TEST(DensityEdits, ABlendIntoEmptyAirAddsNothingButTheShape) {
   EXPECT_EQ(sharp.solid_count(), blended.solid_count());
 }
 
-TEST(DensityEdits, ABlendFillsTheCrease) {
+TEST(DensityEdits, BlendFillsCrease) {
   DensityGrid sharp;
   DensityGrid blended;
   for (DensityGrid* grid : {&sharp, &blended}) grid->add_box({-20, -20, -20}, {20, 0, 20}, 1);
@@ -236,7 +236,7 @@ TEST(DensityEdits, ABlendFillsTheCrease) {
   for (int x = 0; x < 20; ++x) EXPECT_LE(blended.density({x, 1, 0}), sharp.density({x, 1, 0}));
 }
 
-TEST(DensityEdits, SizesThatAreNoneChangeNothing) {
+TEST(DensityEdits, IgnoreInvalidSizes) {
   DensityGrid grid;
   grid.add_sphere({0, 0, 0}, 5.0, 1);
   ChangeFollower follower(grid);
@@ -265,7 +265,7 @@ TEST(DensityEdits, SizesThatAreNoneChangeNothing) {
   EXPECT_TRUE(follower.take(grid, 64).empty());
 }
 
-TEST(DensityEdits, FarPlacesAndHugeRemovalsCostOnlyWhatIsThere) {
+TEST(DensityEdits, HandleDistantAndHugeShapes) {
   DensityGrid grid;
   ChangeFollower follower(grid);
   EXPECT_EQ(grid.add_sphere({1e300, 0, 0}, 5.0, 1), 0);
@@ -283,7 +283,7 @@ TEST(DensityEdits, FarPlacesAndHugeRemovalsCostOnlyWhatIsThere) {
   EXPECT_FALSE(follower.take(grid, 64).empty());
 }
 
-TEST(DensityEdits, TheInsideOfALargeSolidIsUniformChunks) {
+TEST(DensityEdits, StoreInsideOfLargeSolidUniformly) {
   DensityGrid grid;
   EXPECT_EQ(grid.add_box({-8, -8, -8}, {64 * 4 + 7, 64 * 4 + 7, 64 * 4 + 7}, 2) > 0, true);
   EXPECT_EQ(grid.find_chunk({1, 1, 1})->uniform(), std::optional(stored_density(-8.0F, 8.0F)));
@@ -292,7 +292,7 @@ TEST(DensityEdits, TheInsideOfALargeSolidIsUniformChunks) {
   EXPECT_EQ(grid.material({100, 100, 100}), 2);
 }
 
-TEST(DensityEdits, SmoothingTowardsTheMeanLowersATip) {
+TEST(DensityEdits, SmoothingLowersTip) {
   DensityGrid grid;
   grid.add_box({-30, -30, -30}, {30, 0, 30}, 4);
   grid.add_sphere({0, 0, 0}, 1.2, 6);
@@ -302,7 +302,7 @@ TEST(DensityEdits, SmoothingTowardsTheMeanLowersATip) {
   EXPECT_GT(grid.density({0, 1, 0}), before);
 }
 
-TEST(DensityEdits, FlatteningAtFullStrengthPutsTheSurfaceOnThePlane) {
+TEST(DensityEdits, FlatteningMovesSurfaceToPlane) {
   DensityGrid grid;
   grid.add_box({-30, -30, -30}, {30, 0, 30}, 4);
   grid.flatten({0, 3, 0}, 20.0, {{0, 3, 0}, {0, 1e300, 0}, 1.0, 5});
@@ -313,7 +313,7 @@ TEST(DensityEdits, FlatteningAtFullStrengthPutsTheSurfaceOnThePlane) {
   EXPECT_EQ(grid.material({0, -2, 0}), 4);
 }
 
-TEST(DensityEdits, GoOnUntilTheirProgressSaysOtherwise) {
+TEST(DensityEdits, StopWhenCancelled) {
   std::int64_t asked = 0;
   double last = 0.0;
   const auto listen = [&](double fraction) {

@@ -84,7 +84,7 @@ void expect_that_of(const DensityGrid& grid, PlainField& plain) {
   EXPECT_EQ(grid.solid_count(), count);
 }
 
-TEST(DensityGrid, AgreesWithAPlainFieldUnderSetsEditsAndWholeChunks) {
+TEST(DensityGrid, MatchesPlainFieldUnderRandomEdits) {
   constexpr unsigned kSeed = 23;
   SCOPED_TRACE(kSeed);
   std::mt19937 random(kSeed);
@@ -101,7 +101,7 @@ TEST(DensityGrid, AgreesWithAPlainFieldUnderSetsEditsAndWholeChunks) {
   }
 }
 
-TEST(DensityGrid, TheSameStoredValueIsNoChange) {
+TEST(DensityGrid, IgnoresWritesOfEqualStoredValue) {
   DensityGrid grid;
   EXPECT_TRUE(grid.set({1, 2, 3}, {-0.5F, 2}));
   ChangeFollower follower(grid);
@@ -115,7 +115,7 @@ TEST(DensityGrid, TheSameStoredValueIsNoChange) {
   EXPECT_EQ(follower.take(grid, 1).size(), 1U);
 }
 
-TEST(DensityGrid, FarAirGivenAMaterialForgetsIt) {
+TEST(DensityGrid, DropsMaterialOfFarAir) {
   DensityGrid grid;
   grid.set({0, 0, 0}, {-1.0F, 5});
   grid.set({0, 0, 0}, {9.0F, 5});
@@ -126,7 +126,7 @@ TEST(DensityGrid, FarAirGivenAMaterialForgetsIt) {
   EXPECT_EQ(grid.material({2, 0, 0}), 6);
 }
 
-TEST(DensityGrid, ADroppedChunkIsStillTakenWithItsNeighbours) {
+TEST(DensityGrid, ReportsDroppedChunkWithNeighbours) {
   DensityGrid grid;
   grid.set({63, 10, 0}, {-1.0F, 1});
   ChangeFollower follower(grid);
@@ -136,7 +136,7 @@ TEST(DensityGrid, ADroppedChunkIsStillTakenWithItsNeighbours) {
   EXPECT_TRUE(follower.take(grid, 1).empty());
 }
 
-TEST(DensityGrid, ChangesThatNobodyTakesDoNotPileUp) {
+TEST(DensityGrid, BoundsMemoryOfUnreadChanges) {
   DensityGrid grid;
   for (int i = 0; i < 20; ++i) grid.set({i, 0, 0}, {i % 2 == 0 ? -1.0F : 1.0F, 1});
   const std::size_t bytes = grid.bytes();
@@ -157,7 +157,7 @@ TEST(DensityGrid, ClearReportsAllChunks) {
   EXPECT_FALSE(follower.is_behind(grid));
 }
 
-TEST(DensityGrid, ASnapshotStaysAsItWas) {
+TEST(DensityGrid, SnapshotStaysUnchanged) {
   DensityGrid grid(5.0F);
   grid.add_sphere({10, 10, 10}, 12.0, 2);
   DensityGrid copy = grid.snapshot();
@@ -169,7 +169,7 @@ TEST(DensityGrid, ASnapshotStaysAsItWas) {
   EXPECT_EQ(grid.solid_count(), 0);
 }
 
-TEST(DensityGrid, TheEndsOfTheWorldStayAir) {
+TEST(DensityGrid, KeepsAirAtEndsOfWorld) {
   DensityGrid grid;
   ChangeFollower follower(grid);
   for (const int edge : {kLowest, kHighest}) {
@@ -212,7 +212,7 @@ TEST(DensityGrid, EditVisitsEverySampleOnceInOrder) {
   EXPECT_EQ(grid.chunk_count(), 0U);
 }
 
-TEST(DensityGrid, PuttingAChunkCountsChangedSamples) {
+TEST(DensityGrid, PutChunkCountsChangedSamples) {
   DensityGrid grid;
   DensityChunk chunk(stored_density(grid.band(), grid.band()));
   EXPECT_EQ(grid.put_chunk(IVec3(0), chunk), 0) << "far air";

@@ -61,7 +61,7 @@ Grid random_model(unsigned seed) {
   return grid;
 }
 
-TEST(VoxelField, AgreesWithTheSlowWay) {
+TEST(VoxelField, MatchesOracle) {
   for (unsigned seed = 1; seed <= 2; ++seed) {
     SCOPED_TRACE(seed);
     const Grid grid = random_model(seed);
@@ -83,7 +83,7 @@ TEST(VoxelField, AgreesWithTheSlowWay) {
   }
 }
 
-TEST(VoxelField, KeepsEveryVoxelsKindAndType) {
+TEST(VoxelField, KeepsSolidityAndTypeOfVoxels) {
   const Grid grid = random_model(5);
   const DensityGrid field = *field_from_grid(grid);
   EXPECT_EQ(field.solid_count(), grid.voxel_count());
@@ -102,7 +102,7 @@ TEST(VoxelField, KeepsEveryVoxelsKindAndType) {
   }
 }
 
-TEST(VoxelField, AFlatWallIsTheDistanceFromItsFace) {
+TEST(VoxelField, EqualsDistanceFromFlatWall) {
   Grid grid;
   grid.fill_box({{-100, -100, -40}, {101, 10, 41}}, 3);
   const DensityGrid field = *field_from_grid(grid);
@@ -113,7 +113,7 @@ TEST(VoxelField, AFlatWallIsTheDistanceFromItsFace) {
   }
 }
 
-TEST(VoxelField, IsTheSameAtAnyNumberOfThreadsAndNothingForNothing) {
+TEST(VoxelField, IsTheSameAtAnyThreadCount) {
   const Grid grid = random_model(8);
   const DensityGrid one = *field_from_grid(grid, Threads{1});
   const DensityGrid four = *field_from_grid(grid, Threads{4});
@@ -130,7 +130,7 @@ TEST(VoxelField, IsTheSameAtAnyNumberOfThreadsAndNothingForNothing) {
   EXPECT_EQ(field_from_grid(Grid())->chunk_count(), 0U);
 }
 
-TEST(VoxelField, AnUpdateGivesTheBitsOfAFreshChunk) {
+TEST(VoxelField, UpdateMatchesFreshChunk) {
   std::mt19937 random(11);
   const auto below = [&](int end) { return static_cast<int>(random() % static_cast<unsigned>(end)); };
   Grid grid;
@@ -153,7 +153,7 @@ TEST(VoxelField, AnUpdateGivesTheBitsOfAFreshChunk) {
   }
 }
 
-TEST(VoxelField, TheInsideOfALargeModelTakesNoMemoryPerSample) {
+TEST(VoxelField, StoresInsideOfLargeModelUniformly) {
   Grid grid;
   grid.fill_box({{0, 0, 0}, {64 * 5, 64 * 5, 64 * 5}}, 3);
   const DensityGrid field = *field_from_grid(grid);
@@ -162,7 +162,7 @@ TEST(VoxelField, TheInsideOfALargeModelTakesNoMemoryPerSample) {
   EXPECT_FALSE(field.find_chunk({0, 2, 2})->uniform().has_value());
 }
 
-TEST(VoxelField, CancelsWhereProgressSaysSo) {
+TEST(VoxelField, StopsWhenCancelled) {
   Grid grid;
   grid.fill_box({IVec3(-70), IVec3(200)}, 1);
   double last = 0.0;

@@ -73,7 +73,7 @@ bool are_equal(const DensityGrid& a, const DensityGrid& b) {
   return true;
 }
 
-TEST(DensityHalving, EverySampleFollowsTheRules) {
+TEST(DensityHalving, MatchesOracle) {
   for (unsigned seed = 1; seed <= 4; ++seed) {
     std::mt19937 random(seed);
     const DensityGrid field = random_field(random, seed == 4 ? 3.1F : 8.0F);
@@ -95,7 +95,7 @@ TEST(DensityHalving, EverySampleFollowsTheRules) {
   }
 }
 
-TEST(DensityHalving, TheSurfaceStaysWhereItWas) {
+TEST(DensityHalving, KeepsPositionOfSurface) {
   DensityGrid field;
   const DVec3 centre{70.3, 61.8, 10.4};
   field.add_sphere(centre, 40.0, 1);
@@ -109,7 +109,7 @@ TEST(DensityHalving, TheSurfaceStaysWhereItWas) {
   }
 }
 
-TEST(DensityHalving, TakesTheMaterialFromTheOutside) {
+TEST(DensityHalving, TakesMaterialFromOutside) {
   DensityGrid field;
   field.add_box({-100, -40, -100}, {100, 0.8, 100}, 1);
   // A layer of grass one sample thick.
@@ -135,7 +135,7 @@ TEST(DensityHalving, TakesTheMaterialFromTheOutside) {
   EXPECT_EQ(downsample(lower)->material({6, -1, 6}), 2);
 }
 
-TEST(DensityHalving, APyramidFollowsEdits) {
+TEST(DensityHalving, PyramidFollowsEdits) {
   std::mt19937 random(21);
   DensityGrid field = random_field(random);
   DensityPyramid pyramid;
@@ -164,7 +164,7 @@ TEST(DensityHalving, APyramidFollowsEdits) {
   EXPECT_EQ(pyramid.levels(), 0);
 }
 
-TEST(DensityHalving, CountsAreOfTheSurfaceAndOfWhatIsThin) {
+TEST(DensityHalving, CountsSurfaceAndThinSamples) {
   DensityGrid field;
   const auto counted = [&](auto&& change) {
     field.clear();
@@ -205,7 +205,7 @@ TEST(DensityHalving, CountsAreOfTheSurfaceAndOfWhatIsThin) {
   EXPECT_EQ(plate.thin, plate.surface);
 }
 
-TEST(DensityHalving, AnEditRebuildsOnlyTheChunksThatReadIt) {
+TEST(DensityHalving, RebuildsOnlyChunksThatReadEdit) {
   DensityGrid field;
   for (const int x : {-40, 40}) {
     for (const int y : {-40, 40}) {
@@ -239,7 +239,7 @@ TEST(DensityHalving, AnEditRebuildsOnlyTheChunksThatReadIt) {
   EXPECT_EQ(made_anew({-2, 1, -2}), 8);
 }
 
-TEST(DensityHalving, TheSameAtAnyNumberOfThreads) {
+TEST(DensityHalving, IsTheSameAtAnyThreadCount) {
   std::mt19937 random(9);
   const DensityGrid field = random_field(random);
   EXPECT_TRUE(are_equal(*downsample(field, {1}), *downsample(field, {4})));

@@ -104,7 +104,7 @@ bool are_equal(const Grid& a, const Grid& b) {
   return equal;
 }
 
-TEST(Downsample, EveryCellFollowsTheRules) {
+TEST(Downsample, MatchesOracle) {
   const VoxelRegistry types = some_types();
   for (unsigned seed = 1; seed <= 6; ++seed) {
     std::mt19937 random(seed);
@@ -128,14 +128,14 @@ TEST(Downsample, EveryCellFollowsTheRules) {
   }
 }
 
-TEST(Downsample, TheSameAtAnyNumberOfThreads) {
+TEST(Downsample, IsTheSameAtAnyThreadCount) {
   const VoxelRegistry types = some_types();
   std::mt19937 random(8);
   const Grid grid = random_grid(random);
   EXPECT_TRUE(are_equal(*downsample(grid, types, {1}), *downsample(grid, types, {5})));
 }
 
-TEST(Downsample, EmptyFullAndUniform) {
+TEST(Downsample, HalvesEmptyAndUniformGrids) {
   const VoxelRegistry types = some_types();
   EXPECT_EQ(downsample(Grid(), types)->chunk_count(), 0U);
   Grid block;
@@ -145,7 +145,7 @@ TEST(Downsample, EmptyFullAndUniform) {
   EXPECT_TRUE(are_equal(*downsample(block, types), expected));
 }
 
-TEST(Downsample, RodsStayWholeWhereverTheyLie) {
+TEST(Downsample, KeepsRodsWhole) {
   const VoxelRegistry types = some_types();
   for (int axis = 0; axis < 3; ++axis) {
     for (int width = 1; width <= 2; ++width) {
@@ -168,7 +168,7 @@ TEST(Downsample, RodsStayWholeWhereverTheyLie) {
   }
 }
 
-TEST(Downsample, SpecksGoAndStepsOfASurfaceDoNotGrow) {
+TEST(Downsample, DropsSpecksWithoutGrowingSteps) {
   const VoxelRegistry types = some_types();
   Grid grid;
   grid.fill_box({{-20, -20, -20}, {20, 0, 20}}, 3);
@@ -179,7 +179,7 @@ TEST(Downsample, SpecksGoAndStepsOfASurfaceDoNotGrow) {
   EXPECT_EQ(downsample(grid, types)->voxel_count(), ground);
 }
 
-TEST(Downsample, ExposedVoxelsGiveTheColourAndOpaqueBeatsTransparent) {
+TEST(Downsample, PrefersExposedAndOpaqueTypes) {
   const VoxelRegistry types = some_types();
   Grid lawn;
   lawn.fill_box({{0, 0, 0}, {8, 7, 8}}, 4);
@@ -192,7 +192,7 @@ TEST(Downsample, ExposedVoxelsGiveTheColourAndOpaqueBeatsTransparent) {
   EXPECT_EQ(downsample(framed, types)->get({0, 0, 0}), 4);
 }
 
-TEST(Downsample, APyramidFollowsEdits) {
+TEST(Downsample, PyramidFollowsEdits) {
   const VoxelRegistry types = some_types();
   std::mt19937 random(21);
   Grid grid = random_grid(random);
@@ -216,7 +216,7 @@ TEST(Downsample, APyramidFollowsEdits) {
   EXPECT_EQ(pyramid.levels(), 0);
 }
 
-TEST(Downsample, AnUpdateLeavesUntouchedChunksAlone) {
+TEST(Downsample, UpdateKeepsUntouchedChunks) {
   const VoxelRegistry types = some_types();
   Grid grid;
   grid.fill_box({{0, 0, 0}, {601, 21, 21}}, 3);
@@ -234,7 +234,7 @@ TEST(Downsample, AnUpdateLeavesUntouchedChunksAlone) {
   EXPECT_EQ(changes.items[0].chunk, IVec3(0));
 }
 
-TEST(Downsample, AnEditRebuildsOnlyTheChunksThatReadIt) {
+TEST(Downsample, RebuildsOnlyChunksThatReadEdit) {
   const VoxelRegistry types = some_types();
   Grid grid;
   grid.fill_box({{-150, -150, -150}, {151, 151, 151}}, 3);
@@ -268,7 +268,7 @@ TEST(Downsample, AnEditRebuildsOnlyTheChunksThatReadIt) {
   EXPECT_EQ(made_anew({-2, 1, -2}), 8);
 }
 
-TEST(Downsample, AGridOfWhichNothingWouldBeLeftHasFewerLevels) {
+TEST(Downsample, PyramidStopsBeforeEmptyLevel) {
   const VoxelRegistry types = some_types();
   Grid grid;
   grid.fill_box({{0, 0, 0}, {4, 4, 4}}, 3);
@@ -278,7 +278,7 @@ TEST(Downsample, AGridOfWhichNothingWouldBeLeftHasFewerLevels) {
   EXPECT_EQ(pyramid.level(2).voxel_count(), 1);
 }
 
-TEST(Downsample, CancelsWhereProgressSaysSo) {
+TEST(Downsample, StopsWhenCancelled) {
   Grid grid;
   grid.fill_box({IVec3(-70), IVec3(200)}, 1);
   VoxelRegistry types;
