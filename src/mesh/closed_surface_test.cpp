@@ -89,7 +89,7 @@ void expect_sound(const Grid& grid, double volume_error = 0.0) {
   EXPECT_NEAR(found.volume, static_cast<double>(grid.voxel_count()), 1e-3 + volume_error);
 }
 
-TEST(ClosedSurface, OneVoxelIsACube) {
+TEST(ClosedSurface, SingleVoxelIsCube) {
   Grid grid;
   grid.set({5, -3, 7}, 2);
   const BlockyTriangles mesh = surface_of(grid);
@@ -99,7 +99,7 @@ TEST(ClosedSurface, OneVoxelIsACube) {
   expect_sound(grid);
 }
 
-TEST(ClosedSurface, CrossesChunksWithoutASeam) {
+TEST(ClosedSurface, CrossesChunksWithoutSeam) {
   Grid grid;
   grid.fill_box({IVec3(-3), IVec3(70, 66, 5)}, 1);
   grid.fill_box({IVec3(0, 70, 0), IVec3(3, 72, 2)}, 2);

@@ -66,7 +66,7 @@ Written written(const Grid& grid, const VoxelRegistry& types, const VertexWriter
   return all;
 }
 
-TEST(VertexWriter, WritesTheTrianglesOfTheWholeMesh) {
+TEST(VertexWriter, MatchesBlockyMesh) {
   const VoxelRegistry types = oracle::mixed_types();
   const VertexWriter writer(full_layout(), types);
   for (unsigned seed = 1; seed <= 8; ++seed) {
@@ -101,7 +101,7 @@ TEST(VertexWriter, WritesTheTrianglesOfTheWholeMesh) {
   }
 }
 
-TEST(VertexWriter, WritesAViewLikeItsQuads) {
+TEST(VertexWriter, WritesViewLikeQuads) {
   const VoxelRegistry types = oracle::mixed_types();
   VertexLayout layout = full_layout();
   std::erase_if(layout.elements, [](const VertexElement& element) {
@@ -117,7 +117,7 @@ TEST(VertexWriter, WritesAViewLikeItsQuads) {
   EXPECT_EQ(found, written(grid, types, writer, SurfaceClass::Opaque).vertices);
 }
 
-TEST(VertexWriter, AgreesWithALayoutThatTheCompilerKnows) {
+TEST(VertexWriter, MatchesLayoutOfStruct) {
   struct Vertex {
     Vec3 position;
     std::uint16_t type;
@@ -154,7 +154,7 @@ TEST(VertexWriter, AgreesWithALayoutThatTheCompilerKnows) {
   EXPECT_EQ(std::memcmp(found.data(), expected.data(), found.size()), 0);
 }
 
-TEST(VertexWriter, CornersAreThoseOfTheQuad) {
+TEST(VertexWriter, CornersMatchQuad) {
   std::mt19937_64 random(1);
   for (int i = 0; i < 1'000; ++i) {
     Quad quad{random() & 0x3FF'FFFF'FFFF'FFFFU};
@@ -248,7 +248,7 @@ TEST(VertexWriter, WritesSmoothMeshes) {
   }
 }
 
-TEST(VertexWriter, ClockwiseTrianglesAreTheOthersTurnedOver) {
+TEST(VertexWriter, ReversesClockwiseTriangles) {
   for (const bool flipped : {false, true}) {
     const auto& plain = triangle_corners(flipped);
     const auto& turned = triangle_corners(flipped, Winding::Clockwise);
@@ -260,7 +260,7 @@ TEST(VertexWriter, ClockwiseTrianglesAreTheOthersTurnedOver) {
   }
 }
 
-TEST(VertexLayout, IsRefusedWhereItCannotBeWritten) {
+TEST(VertexLayout, RejectsUnwritableLayouts) {
   const VertexElement position{VertexAttribute::Position, Float32x3, 0};
   EXPECT_TRUE(can_write({12, {position}}, VertexSource::Quads));
   EXPECT_TRUE(can_write({2'048, {position}}, VertexSource::Smooth));
@@ -277,12 +277,12 @@ TEST(VertexLayout, IsRefusedWhereItCannotBeWritten) {
   EXPECT_FALSE(can_write({16, {{VertexAttribute::Uv, Uint8x2, 0}}}, VertexSource::Blocks));
 }
 
-TEST(VertexWriterDeathTest, ALayoutThatCannotBeWrittenIsAMistake) {
+TEST(VertexWriterDeathTest, AssertsOnUnwritableLayout) {
   QUOIN_EXPECT_MISTAKE(VertexWriter({4, {{VertexAttribute::Position, Float32x3, 0}}}, {}),
                        "a layout that can be written");
 }
 
-TEST(VertexWriterDeathTest, MismatchedBuffersAndLayoutsAreMistakes) {
+TEST(VertexWriterDeathTest, AssertsOnMismatchedBuffersAndLayouts) {
   const VertexWriter writer({16, {{VertexAttribute::Position, Sint16x4, 0}, {VertexAttribute::Uv, Uint8x2, 8}}}, {});
   const QuadBuffer quads(2);
   std::vector<std::byte> out(8 * 16 - 1);

@@ -53,7 +53,7 @@ std::size_t most_bytes(Make make) {
   return most - before;
 }
 
-TEST(ArrayMemory, IsAtMostAByteASampleBesideInputAndOutput) {
+TEST(ArrayMemory, SurfaceNeedsAtMostOneBytePerSample) {
   if (!can_count()) GTEST_SKIP() << "the C library does not tell how much memory is in use";
   // Noise needs the most memory.
   for (const Size size : {Size{64, 64, 64}, Size{100, 64, 256}, Size{64, 256, 40}}) {
@@ -72,7 +72,7 @@ TEST(ArrayMemory, IsAtMostAByteASampleBesideInputAndOutput) {
   }
 }
 
-TEST(ArrayMemory, LabelsTakeAtMostAByteASamplePlusInputAndOutput) {
+TEST(ArrayMemory, LabelsNeedAtMostOneBytePerSample) {
   if (!can_count()) GTEST_SKIP() << "the C library does not tell how much memory is in use";
   const Size size = {128, 64, 256};
   const auto samples = static_cast<std::size_t>(size[0] * size[1] * size[2]);

@@ -100,13 +100,13 @@ void expect_ball(const ArraySurface& surface, const Ball& ball, double tolerance
   EXPECT_NEAR(enclosed_volume(surface.positions, surface.indices), volume, 0.01 * volume);
 }
 
-TEST(ArraySurface, MatchesTheSampledBall) {
+TEST(ArraySurface, MatchesSampledBall) {
   const Ball ball{{64, 70, 81}, {31.3, 34.1, 40.7}, 27.4};
   const TestArray<float> samples = ball.samples();
   expect_ball(surface_of(ball.view(samples), kBelow), ball, 0.02, 0.9995);
 }
 
-TEST(ArraySurface, IsInSpaceWhereSpacingDiffersByAxis) {
+TEST(ArraySurface, AppliesSpacingPerAxis) {
   for (const DVec3 sign : {DVec3(1, 1, 1), DVec3(-1, 1, 1), DVec3(1, -1, -1), DVec3(-1, -1, -1), DVec3(1, 1, -1)}) {
     Ball ball{{90, 50, 40}, DVec3(0.0), 15.0, sign * DVec3(0.4, 0.75, 1.0)};
     ball.origin = -0.5 * ball.spacing * DVec3(ball.size[0], ball.size[1], ball.size[2]) + DVec3(0.1, 0.2, 0.0);
@@ -116,7 +116,7 @@ TEST(ArraySurface, IsInSpaceWhereSpacingDiffersByAxis) {
   }
 }
 
-TEST(ArraySurface, TurnsWithTheSide) {
+TEST(ArraySurface, SolidSideMatchesNegatedValues) {
   const Ball ball{{40, 40, 40}, {19.3, 20.1, 19.7}, 14.0};
   const TestArray<float> samples = ball.samples();
   const TestArray<float> negated(ball.size, [&](DVec3 p) { return static_cast<float>(-ball.distance(p)); });
@@ -126,7 +126,7 @@ TEST(ArraySurface, TurnsWithTheSide) {
 // Noise has every configuration, including cells with several sheets.
 class ArrayNoise : public testing::TestWithParam<Size> {};
 
-TEST_P(ArrayNoise, IsClosedWhateverTheSize) {
+TEST_P(ArrayNoise, IsClosedAtAnySize) {
   const TestArray<float> samples = noise(GetParam(), 11);
   const ArraySurface surface = surface_of(samples.view());
   if (!surface.indices.empty()) {
@@ -137,7 +137,7 @@ TEST_P(ArrayNoise, IsClosedWhateverTheSize) {
   EXPECT_EQ(surface.indices.size(), 6 * naive_edges(samples, 0.0));
 }
 
-TEST_P(ArrayNoise, HasVerticesAtTheMeanOfTheCrossings) {
+TEST_P(ArrayNoise, HasVerticesAtMeanOfCrossings) {
   const TestArray<float> samples = noise(GetParam(), 12);
   const ArraySurface surface = surface_of(samples.view());
   const std::vector<DVec3> expected = naive_vertices(samples, 0.0);
@@ -158,7 +158,7 @@ TEST_P(ArrayNoise, IsTheSameForEveryInstructionSetAndThreadCount) {
   }
 }
 
-TEST_P(ArrayNoise, WithAnOpenBorderEndsThere) {
+TEST_P(ArrayNoise, EndsAtOpenBorder) {
   const TestArray<float> samples = noise(GetParam(), 14);
   ArraySurfaceOptions options = kPlain;
   options.border = ArrayBorder::Open;
@@ -176,7 +176,7 @@ TEST_P(ArrayNoise, WithAnOpenBorderEndsThere) {
   EXPECT_EQ(surface.indices.size(), 6 * naive_edges(samples, 0.0, true));
 }
 
-TEST_P(ArrayNoise, WithAVertexASheetIsManifold) {
+TEST_P(ArrayNoise, IsManifoldWithSplitSheets) {
   for (const unsigned seed : {15U, 16U, 17U}) {
     const TestArray<float> samples = noise(GetParam(), seed);
     ArraySurfaceOptions options = kPlain;
@@ -204,7 +204,7 @@ INSTANTIATE_TEST_SUITE_P(Sizes, ArrayNoise,
                                   std::to_string(param.param[2]);
                          });
 
-TEST(ArraySurface, IsTheSameWhateverTheStrides) {
+TEST(ArraySurface, IsIndependentOfStrides) {
   const Ball ball{{45, 52, 70}, {20.2, 30.1, 33.3}, 18.0};
   const TestArray<float> samples = ball.samples();
   const ArraySurface expected = surface_of(samples.view(), kBelow);
@@ -246,7 +246,7 @@ using SampleTypes = testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std
 TYPED_TEST_SUITE(ArrayTypes, SampleTypes);
 
 // Integers from 0 to 100 are exact in all types.
-TYPED_TEST(ArrayTypes, AllMakeTheSameSurface) {
+TYPED_TEST(ArrayTypes, MakeSameSurface) {
   const TestArray<float> samples = noise({20, 21, 66}, 5);
   const auto whole = [&](DVec3 p) { return std::floor(50.0F + 50.0F * samples.at(IVec3(p))); };
   const TestArray<double> doubles(samples.size(), [&](DVec3 p) { return static_cast<double>(whole(p)); });
@@ -271,7 +271,7 @@ std::size_t triangles_without_area(const ArraySurface& surface) {
 }
 
 // Waves and noise with few distinct values, so that many values equal iso.
-TYPED_TEST(ArrayTypes, HaveNoTrianglesWithoutAreaWhereValuesEqualIso) {
+TYPED_TEST(ArrayTypes, MakeNoDegenerateTrianglesAtIso) {
   const TestArray<float> random = noise({20, 21, 66}, 9);
   for (const double levels : {2.0, 6.0}) {
     const TestArray<TypeParam> samples(random.size(), [&](DVec3 p) {
@@ -293,7 +293,7 @@ TYPED_TEST(ArrayTypes, HaveNoTrianglesWithoutAreaWhereValuesEqualIso) {
   }
 }
 
-TYPED_TEST(ArrayTypes, KnowLimitsOutOfTheirRange) {
+TYPED_TEST(ArrayTypes, HandleIsoOutsideTheirRange) {
   const TestArray<TypeParam> samples({3, 4, 50}, [](DVec3 p) {
     return p.z == 7 ? std::numeric_limits<TypeParam>::max() : std::numeric_limits<TypeParam>::lowest();
   });
@@ -312,7 +312,7 @@ TYPED_TEST(ArrayTypes, KnowLimitsOutOfTheirRange) {
   EXPECT_EQ(triangles(most, SolidSide::Above), 0U) << "the value of the surface is air";
 }
 
-TEST(ArraySurface, TellsLargeWholeNumbersApart) {
+TEST(ArraySurface, DistinguishesLargeIntegers) {
   const TestArray<float> samples = noise({12, 13, 64}, 6);
   const auto whole = [&](DVec3 p) { return static_cast<std::int64_t>(std::floor(50.0F * samples.at(IVec3(p)))); };
   const TestArray<std::int64_t> small(samples.size(), whole);
@@ -328,7 +328,7 @@ TEST(ArraySurface, TellsLargeWholeNumbersApart) {
               expected);
 }
 
-TEST(ArraySurface, IsTheSameAtAnyScaleOfItsValues) {
+TEST(ArraySurface, IsIndependentOfValueScale) {
   const TestArray<float> samples = noise({12, 13, 64}, 7);
   const ArraySurface expected = surface_of(samples.view());
   for (const double scale : {1e-310, 1e-200, 1e-36, 1e30, 1e200}) {
@@ -350,7 +350,7 @@ TEST(ArraySurface, DistinguishesDoublesThatRoundToOneFloat) {
   EXPECT_NEAR(most, 19.5F, 1e-3F);
 }
 
-TEST(ArraySurface, StaysFiniteWhereValuesAreNot) {
+TEST(ArraySurface, StaysFiniteForNonFiniteValues) {
   TestArray<float> samples = noise({20, 21, 66}, 8);
   std::mt19937 random(8);
   for (float& value : samples.values()) {
@@ -379,7 +379,7 @@ TEST(ArraySurface, StaysFiniteWhereValuesAreNot) {
   }
 }
 
-TEST(ArraySurface, TakesWhatIsNoNumberAsAir) {
+TEST(ArraySurface, TreatsNanAsAir) {
   const TestArray<float> samples({5, 5, 50}, [](DVec3 p) { return p.z < 20 ? 4.0F : kNan; });
   const ArraySurface above = surface_of(samples.view());
   float most = 0.0F;
@@ -389,7 +389,7 @@ TEST(ArraySurface, TakesWhatIsNoNumberAsAir) {
   expect_same(surface_of(negative.view(), kBelow), above);
 }
 
-TEST(ArraySurface, FullArrayIsABoxHalfASampleLarger) {
+TEST(ArraySurface, FullArrayBecomesBox) {
   const TestArray<std::uint8_t> samples({30, 20, 50}, [](DVec3) { return std::uint8_t{1}; });
   const ArraySurface surface = surface_of(samples.view(), {0.5, SolidSide::Above, ArrayBorder::Closed, false});
   oracle::expect_manifold(count_of(surface));
@@ -399,7 +399,7 @@ TEST(ArraySurface, FullArrayIsABoxHalfASampleLarger) {
   EXPECT_EQ(open.positions.size(), 0U);
 }
 
-TEST(ArraySurface, OneSampleIsClosed) {
+TEST(ArraySurface, SingleSampleIsClosed) {
   const float one = 1.0F;
   ArrayView view{&one, ScalarType::Float32, {1, 1, 1}, {4, 4, 4}};
   const ArraySurface surface = surface_of(view);
@@ -410,7 +410,7 @@ TEST(ArraySurface, OneSampleIsClosed) {
 }
 
 // Halves and a band of 8: positions agree within the precision of both.
-TEST(ArraySurface, IsThatOfTheFieldOfTheSameVolume) {
+TEST(ArraySurface, MatchesSurfaceOfVolumeField) {
   Volume volume;
   volume.size = {70, 60, 50};
   const oracle::Field field = oracle::waves(4, 12.0, 0.4);
@@ -454,7 +454,7 @@ TEST(ArraySurface, IsThatOfTheFieldOfTheSameVolume) {
   }
 }
 
-TEST(ArraySurface, RefusesWhatCannotBe) {
+TEST(ArraySurface, RejectsInvalidInput) {
   const TestArray<float> samples({4, 5, 6}, [](DVec3) { return 1.0F; });
   const auto error = [&](auto change, double iso = 0.0) {
     ArrayView view = samples.view();
@@ -484,7 +484,7 @@ TEST(ArraySurface, RefusesWhatCannotBe) {
             ErrorCode::LimitExceeded);
 }
 
-TEST(ArraySurface, TellsItsProgressAndStops) {
+TEST(ArraySurface, ReportsProgressAndCanBeCancelled) {
   const TestArray<float> samples = noise({40, 10, 50}, 9);
   double last = 0.0;
   const auto reported = surface_from_array(samples.view(), {}, {1}, [&](double fraction) {
@@ -501,7 +501,7 @@ TEST(ArraySurface, TellsItsProgressAndStops) {
   }
 }
 
-TEST(ArraySurfaceDeathTest, AViewWithoutAColourForEachVertexIsAMistake) {
+TEST(ArraySurfaceDeathTest, AssertsOnMissingAlbedo) {
   ArraySurface surface;
   surface.positions.resize(3);
   surface.normals.resize(3);

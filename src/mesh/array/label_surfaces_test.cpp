@@ -112,7 +112,7 @@ Face face_of(const LabelSurfaces& surfaces, std::size_t first_index) {
 
 class LabelNoise : public testing::TestWithParam<Size> {};
 
-TEST_P(LabelNoise, HasOneFaceBetweenAnyTwoNeighboursThatDiffer) {
+TEST_P(LabelNoise, HasOneFaceBetweenDifferingNeighbours) {
   for (const std::int64_t background : {std::int64_t{0}, std::int64_t{3}}) {
     const auto labels = scattered<std::uint8_t>(GetParam(), 21);
     const LabelSurfaces surfaces = surfaces_of(labels.view(), {background, 0});
@@ -134,7 +134,7 @@ TEST_P(LabelNoise, HasOneFaceBetweenAnyTwoNeighboursThatDiffer) {
   }
 }
 
-TEST_P(LabelNoise, HasAClosedSurfaceForEachLabel) {
+TEST_P(LabelNoise, HasClosedSurfacePerLabel) {
   const auto labels = scattered<std::uint8_t>(GetParam(), 22);
   for (const int steps : {0, 3}) {
     const LabelSurfaces surfaces = surfaces_of(labels.view(), {0, steps});
@@ -169,7 +169,7 @@ INSTANTIATE_TEST_SUITE_P(Sizes, LabelNoise,
                                   std::to_string(param.param[2]);
                          });
 
-TEST(LabelSurfaces, NeighboursShareTheirInterface) {
+TEST(LabelSurfaces, ShareInterfaceBetweenNeighbours) {
   const auto labels = cells_in_a_ball(48, 31, 12);
   const LabelSurfaces surfaces = surfaces_of(labels.view());
   // Each triangle starts at its least vertex.
@@ -196,7 +196,7 @@ TEST(LabelSurfaces, NeighboursShareTheirInterface) {
   EXPECT_GT(between_objects, 10);
 }
 
-TEST(LabelSurfaces, RelaxedStayWithinTheirCells) {
+TEST(LabelSurfaces, StayWithinCellsWhenRelaxed) {
   const auto labels = scattered<std::uint8_t>({19, 20, 70}, 24);
   const LabelSurfaces before = surfaces_of(labels.view(), {0, 0});
   const LabelSurfaces after = surfaces_of(labels.view(), {0, 25});
@@ -233,7 +233,7 @@ TEST(LabelSurfaces, AreSmootherWhenRelaxed) {
   EXPECT_NEAR(enclosed_volume(surface.positions, surface.indices), 4.18879 * kRadius * kRadius * kRadius, 1'050.0);
 }
 
-TEST(LabelSurfaces, AreTheSameWhateverTheStrides) {
+TEST(LabelSurfaces, AreIndependentOfStrides) {
   const auto labels = cells_in_a_ball(44, 32, 9);
   const LabelSurfaces expected = surfaces_of(labels.view());
   const Relaid<std::uint8_t> sparse(labels, {2, 1, 0}, 0, 3, 1);
@@ -272,13 +272,13 @@ using LabelSampleTypes = testing::Types<std::uint8_t, std::int8_t, std::uint16_t
                                         std::int32_t, std::uint64_t, std::int64_t>;
 TYPED_TEST_SUITE(LabelTypes, LabelSampleTypes);
 
-TYPED_TEST(LabelTypes, AllMakeTheSameSurfaces) {
+TYPED_TEST(LabelTypes, MakeSameSurfaces) {
   const auto bytes = scattered<std::uint8_t>({18, 9, 66}, 25);
   const TestArray<TypeParam> others(bytes.size(), [&](DVec3 p) { return static_cast<TypeParam>(bytes.at(IVec3(p))); });
   expect_same(surfaces_of(others.view()), surfaces_of(bytes.view()));
 }
 
-TYPED_TEST(LabelTypes, KeepTheirExtremes) {
+TYPED_TEST(LabelTypes, KeepExtremeLabels) {
   const std::array<TypeParam, 3> kinds = {std::numeric_limits<TypeParam>::lowest(),
                                           std::numeric_limits<TypeParam>::max(), 7};
   const TestArray<TypeParam> labels({4, 5, 60}, [&](DVec3 p) { return kinds[static_cast<std::size_t>(p.z) / 20]; });
@@ -293,7 +293,7 @@ TYPED_TEST(LabelTypes, KeepTheirExtremes) {
   EXPECT_EQ(surfaces.interfaces[2].front, static_cast<std::int64_t>(kinds[0]));
 }
 
-TEST(LabelSurfaces, OneKindIsABoxOrNothing) {
+TEST(LabelSurfaces, SingleLabelIsBoxOrEmpty) {
   const TestArray<std::uint16_t> labels({6, 7, 64}, [](DVec3) { return std::uint16_t{9}; });
   const LabelSurfaces box = surfaces_of(labels.view(), {0, 0});
   EXPECT_EQ(labels_of(box), std::vector<std::int64_t>{9});
@@ -306,7 +306,7 @@ TEST(LabelSurfaces, OneKindIsABoxOrNothing) {
   EXPECT_TRUE(nothing.interfaces.empty());
 }
 
-TEST(LabelSurfaces, RefuseWhatCannotBe) {
+TEST(LabelSurfaces, RejectInvalidInput) {
   const TestArray<std::uint8_t> labels({4, 5, 6}, [](DVec3) { return std::uint8_t{1}; });
   const TestArray<float> floats({4, 5, 6}, [](DVec3) { return 1.0F; });
   const auto error = [](const ArrayView& view, LabelSurfaceOptions options) {

@@ -55,7 +55,7 @@ Chunk box_chunk(const IBox& box, VoxelType type = 1) {
   return chunk;
 }
 
-TEST(BlockyMesher, EmptyChunkHasNone) {
+TEST(BlockyMesher, EmptyChunkHasNoQuads) {
   QuadBuffer quads(5);
   BlockyMesher().mesh(isolated(Chunk()), oracle::mixed_types(), {}, quads);
   EXPECT_TRUE(quads.empty());
@@ -63,14 +63,14 @@ TEST(BlockyMesher, EmptyChunkHasNone) {
   EXPECT_TRUE(quads.empty());
 }
 
-TEST(BlockyMesher, OneVoxelHasSix) {
+TEST(BlockyMesher, SingleVoxelHasSixQuads) {
   QuadBuffer quads;
   BlockyMesher().mesh(isolated(box_chunk({{5, 6, 7}, {6, 7, 8}})), oracle::mixed_types(), {}, quads);
   EXPECT_EQ(quads.size(), 6U);
   for (const Quad& quad : quads) EXPECT_EQ(quad.voxel(), IVec3(5, 6, 7));
 }
 
-TEST(BlockyMesher, SolidCubeHasSix) {
+TEST(BlockyMesher, SolidCubeHasSixQuads) {
   QuadBuffer quads;
   BlockyMesher().mesh(isolated(box_chunk({{0, 0, 0}, {32, 32, 32}})), oracle::mixed_types(), {}, quads);
   EXPECT_EQ(quads.size(), 6U);
@@ -79,11 +79,11 @@ TEST(BlockyMesher, SolidCubeHasSix) {
   EXPECT_EQ(quads[0].size_u(), 64);
 }
 
-TEST(BlockyMesher, SlabTopIsOne) {
+TEST(BlockyMesher, SlabTopIsOneQuad) {
   EXPECT_EQ(quad_count(box_chunk({{0, 4, 0}, {32, 5, 32}}), Direction::PosY), 1);
 }
 
-TEST(BlockyMesher, CheckerboardLayerTopHas512) {
+TEST(BlockyMesher, CheckerboardLayerTopHas512Quads) {
   Chunk chunk;
   for (int z = 0; z < 32; ++z) {
     for (int x = z & 1; x < 32; x += 2) chunk.set(x, 4, z, 1);
@@ -91,7 +91,7 @@ TEST(BlockyMesher, CheckerboardLayerTopHas512) {
   EXPECT_EQ(quad_count(chunk, Direction::PosY), 512);
 }
 
-TEST(BlockyMesher, CheckerboardOfTwoTypesTopHas1024) {
+TEST(BlockyMesher, CheckerboardOfTwoTypesTopHas1024Quads) {
   Chunk chunk;
   for (int z = 0; z < 32; ++z) {
     for (int x = 0; x < 32; ++x) chunk.set(x, 4, z, static_cast<VoxelType>(1 + ((x ^ z) & 1)));
@@ -99,7 +99,7 @@ TEST(BlockyMesher, CheckerboardOfTwoTypesTopHas1024) {
   EXPECT_EQ(quad_count(chunk, Direction::PosY), 1'024);
 }
 
-TEST(BlockyMesher, FloorSplitsAlongAWallsFoot) {
+TEST(BlockyMesher, SplitsFloorAlongFootOfWall) {
   Chunk chunk = box_chunk({{0, 0, 0}, {16, 1, 16}});
   chunk.fill_box({{0, 1, 8}, {16, 4, 9}}, 1, [](int, int, std::uint64_t) {});
   // On either side: the floor away from the wall, the row at its foot, and the two ends of that row, where the end of
@@ -108,7 +108,7 @@ TEST(BlockyMesher, FloorSplitsAlongAWallsFoot) {
   EXPECT_EQ(quad_count(chunk, Direction::PosY, false), 3);
 }
 
-TEST(BlockyMesher, TerrainHasTheSpecifiedFacesAndAboutTheSpecifiedQuads) {
+TEST(BlockyMesher, TerrainHasSpecifiedFacesAndQuads) {
   const VoxelRegistry types = workloads::glass_types();
   QuadOptions options;
   options.region = workloads::kInterior;
@@ -129,7 +129,7 @@ TEST(BlockyMesher, TerrainHasTheSpecifiedFacesAndAboutTheSpecifiedQuads) {
   }
 }
 
-TEST(BlockyMesher, BuriedChunkIsReadFromThePalettes) {
+TEST(BlockyMesher, UniformBuriedChunkShowsOnlyVisibleFaces) {
   const Chunk full(1);
   Neighbourhood n;
   n.chunks.fill(&full);
@@ -164,7 +164,7 @@ class RandomWorld : public testing::TestWithParam<World> {
   Grid world(IVec3 shift = IVec3{0}) const { return grid_of(GetParam(), shift); }
 };
 
-TEST_P(RandomWorld, MergedQuadsCoverEachVisibleFaceOnceWithItsTypeAndOcclusion) {
+TEST_P(RandomWorld, QuadsCoverEachVisibleFaceOnce) {
   const VoxelRegistry types = oracle::mixed_types();
   const Grid grid = world();
   for (const bool occlusion : {true, false}) {
@@ -182,7 +182,7 @@ TEST_P(RandomWorld, MergedQuadsCoverEachVisibleFaceOnceWithItsTypeAndOcclusion) 
   }
 }
 
-TEST_P(RandomWorld, ChunkedGivesTheFacesOfTheWorldInOnePiece) {
+TEST_P(RandomWorld, ChunkedFacesMatchSingleChunk) {
   const VoxelRegistry types = oracle::mixed_types();
   const IVec3 shift{30, 30, 30};  // the whole world in one chunk
   const FaceSet cut = faces_of_quads(world(), types, {});
@@ -196,7 +196,7 @@ TEST_P(RandomWorld, ChunkedGivesTheFacesOfTheWorldInOnePiece) {
   EXPECT_EQ(cut, moved);
 }
 
-TEST_P(RandomWorld, VisibleFaceSetsAgreeWithTheOracle) {
+TEST_P(RandomWorld, VisibleFacesMatchOracle) {
   const VoxelRegistry types = oracle::mixed_types();
   const Grid grid = world();
   const FaceSet expected = oracle::visible_faces(grid, types, false);
@@ -228,9 +228,9 @@ constexpr World kWorlds[] = {World{1, 1, 0.0},  World{2, 1, 0.02}, World{3, 1, 0
                              World{9, 5, 0.1},  World{10, 5, 0.7}, World{11, 5, 0.0}, World{12, 4, 0.05}};
 INSTANTIATE_TEST_SUITE_P(Seeds, RandomWorld, testing::ValuesIn(kWorlds));
 
-class BlockySets : public testing::TestWithParam<InstructionSet> {};
+class BlockyMesherKernels : public testing::TestWithParam<InstructionSet> {};
 
-TEST_P(BlockySets, GiveTheBytesOfThePlainKernel) {
+TEST_P(BlockyMesherKernels, MatchPlainKernel) {
   QUOIN_SKIP_WITHOUT(GetParam());
   const VoxelRegistry types = oracle::mixed_types();
   BlockyMesher mesher = made_with<BlockyMesher>(GetParam());
@@ -251,13 +251,13 @@ TEST_P(BlockySets, GiveTheBytesOfThePlainKernel) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(InstructionSets, BlockySets,
+INSTANTIATE_TEST_SUITE_P(InstructionSets, BlockyMesherKernels,
                          testing::Values(InstructionSet::Avx2, InstructionSet::Avx512Bytes), name_of_set);
 
 // Wide palettes reach the same masks by other code paths.
 class ManyTypes : public testing::TestWithParam<int> {};
 
-TEST_P(ManyTypes, MeshLikeAnyOther) {
+TEST_P(ManyTypes, MatchOracle) {
   VoxelRegistry types;
   for (int i = 0; i < GetParam(); ++i) {
     VoxelProperties properties;
@@ -277,7 +277,7 @@ TEST_P(ManyTypes, MeshLikeAnyOther) {
 
 INSTANTIATE_TEST_SUITE_P(Counts, ManyTypes, testing::Values(3, 12, 40, 250, 1'000));
 
-TEST(BlockyMesher, RegionsEmitOnlyTheirOwnVoxels) {
+TEST(BlockyMesher, EmitsOnlyVoxelsOfRegion) {
   const VoxelRegistry types = oracle::mixed_types();
   const Grid grid = oracle::random_world(21, {IVec3{0}, IVec3{64}}, 5, 0.05);
   std::mt19937 random(5);
@@ -296,7 +296,7 @@ TEST(BlockyMesher, RegionsEmitOnlyTheirOwnVoxels) {
   }
 }
 
-TEST(BlockyMesher, EditsDirtyExactlyTheChunksWhoseQuadsChange) {
+TEST(BlockyMesher, EditsReportExactlyTheChunksWithChangedQuads) {
   const VoxelRegistry types = oracle::mixed_types();
   std::mt19937 random(17);
   Grid grid = oracle::random_world(31, {IVec3{-70, -70, -70}, IVec3{70, 70, 70}}, 5, 0.01);
@@ -337,7 +337,7 @@ TEST(BlockyMesher, EditsDirtyExactlyTheChunksWhoseQuadsChange) {
   EXPECT_GT(dirty_count, 100);
 }
 
-TEST(QuadDeathTest, ACornerThatIsNoneIsAMistake) {
+TEST(QuadDeathTest, AssertsOnInvalidCorner) {
   const Quad quad;
   QUOIN_EXPECT_MISTAKE((void)quad.corner(4), "0 <= index < 4");
   QUOIN_EXPECT_MISTAKE((void)quad.occlusion(-1), "0 <= corner < 4");

@@ -10,7 +10,7 @@ namespace {
 
 class WatertightWorld : public testing::TestWithParam<unsigned> {};
 
-TEST_P(WatertightWorld, HasNoOpenEdgeAndNoVertexInsideAnEdge) {
+TEST_P(WatertightWorld, HasNoOpenEdgesOrTJunctions) {
   VoxelRegistry types = oracle::mixed_types();
   VoxelProperties lamp = types[3];
   lamp.emission = 1.0F;
@@ -40,7 +40,7 @@ TEST(BlockyMesh, PlainGreedyQuadsAreNotWatertight) {
   EXPECT_EQ(oracle::watertight_fault(*build_blocky_mesh(grid, oracle::mixed_types(), options)), "");
 }
 
-TEST(BlockyMesh, VoxelsThatTouchAlongAnEdgeAreWatertight) {
+TEST(BlockyMesh, IsWatertightForVoxelsTouchingAtEdge) {
   Grid grid;
   grid.set({0, 0, 0}, 1);
   grid.set({1, 1, 0}, 1);
@@ -88,7 +88,7 @@ Grid ten_chunks() {
   return grid;
 }
 
-TEST(BlockyMesh, StopsWhenProgressSaysSo) {
+TEST(BlockyMesh, StopsWhenCancelled) {
   // The first ten calls occur while faces are found, the others during the conversion to triangles.
   for (const int last : {1, 3, 10, 11, 15, 20}) {
     int calls = 0;
@@ -100,7 +100,7 @@ TEST(BlockyMesh, StopsWhenProgressSaysSo) {
   }
 }
 
-TEST(BlockyMesh, ProgressRisesToOneThroughBothHalves) {
+TEST(BlockyMesh, ReportsRisingProgressUpToOne) {
   std::vector<double> reported;
   const auto listen = [&](double fraction) {
     reported.push_back(fraction);

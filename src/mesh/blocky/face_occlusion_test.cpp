@@ -37,14 +37,14 @@ int face_count(const Grid& grid, IVec3 voxel) {
   return faces_of(grid, voxel).size();
 }
 
-TEST(VisibleFaces, OneVoxelShowsAllSix) {
+TEST(VisibleFaces, SingleVoxelShowsSixFaces) {
   Grid grid;
   grid.set({10, 10, 10}, kStone);
   EXPECT_EQ(faces_of(grid, {10, 10, 10}), DirectionSet::all());
   EXPECT_EQ(faces_of(grid, {10, 10, 11}), DirectionSet()) << "air has none";
 }
 
-TEST(VisibleFaces, NeighboursHideTheFaceBetweenThem) {
+TEST(VisibleFaces, NeighboursHideSharedFace) {
   Grid grid;
   grid.set({10, 10, 10}, kStone);
   grid.set({11, 10, 10}, kStone);
@@ -52,7 +52,7 @@ TEST(VisibleFaces, NeighboursHideTheFaceBetweenThem) {
   EXPECT_EQ(faces_of(grid, {11, 10, 10}), all_but(Direction::NegX));
 }
 
-TEST(VisibleFaces, StoneShowsBehindGlassAndGlassNotBehindStone) {
+TEST(VisibleFaces, StoneHidesGlassButGlassShowsStone) {
   Grid grid;
   grid.set({10, 10, 10}, kStone);
   grid.set({11, 10, 10}, kGlass);
@@ -68,7 +68,7 @@ TEST(VisibleFaces, GlassOfOneTypeHidesItsSharedFaces) {
   EXPECT_EQ(face_count(grid, {11, 10, 10}), 5);
 }
 
-TEST(VisibleFaces, TwoKindsOfGlassShowBoth) {
+TEST(VisibleFaces, GlassOfTwoTypesShowsBothFaces) {
   Grid grid;
   grid.set({10, 10, 10}, kGlass);
   grid.set({11, 10, 10}, kOtherGlass);
@@ -76,7 +76,7 @@ TEST(VisibleFaces, TwoKindsOfGlassShowBoth) {
   EXPECT_EQ(face_count(grid, {11, 10, 10}), 6);
 }
 
-TEST(VisibleFaces, ANeighbourChunkHidesFacesToo) {
+TEST(VisibleFaces, NeighbourChunkHidesFaces) {
   Grid grid;
   grid.set({0, 10, 10}, kStone);
   grid.set({-1, 10, 10}, kStone);
@@ -109,7 +109,7 @@ TEST(VisibleFaces, EmptyChunkShowsNothing) {
   EXPECT_EQ(faces, std::vector<DirectionSet>(32 * 32 * 32));
 }
 
-TEST(VertexOcclusion, IsThreeBetweenTwoSidesAndACountOtherwise) {
+TEST(VertexOcclusion, CountsNeighboursAndIsThreeBetweenSides) {
   EXPECT_EQ(vertex_occlusion(false, false, false), 0);
   EXPECT_EQ(vertex_occlusion(false, false, true), 1);
   EXPECT_EQ(vertex_occlusion(true, false, false), 1);
@@ -127,7 +127,7 @@ TEST(VertexOcclusion, BrightnessFallsByQuarters) {
   EXPECT_EQ(occlusion_brightness(3), 0.25F);
 }
 
-TEST(FaceOcclusion, AWallDarkensTheFloorAtItsFoot) {
+TEST(FaceOcclusion, WallDarkensFloorAtFoot) {
   Grid grid;
   grid.set({5, 0, 5}, kStone);
   grid.set({5, 1, 6}, kStone);
@@ -146,7 +146,7 @@ TEST(FaceOcclusion, GlassDoesNotDarken) {
   EXPECT_EQ(corners, FaceOcclusion{});
 }
 
-TEST(FaceOcclusion, AgreesWithTheOracleAcrossChunkCorners) {
+TEST(FaceOcclusion, MatchesOracleAcrossChunkCorners) {
   const VoxelRegistry types = oracle::mixed_types();
   const Grid grid = oracle::random_world(3, {IVec3{-4}, IVec3{4}}, 5, 0.6);
   grid.for_each([&](IVec3 v, VoxelType) {
@@ -157,7 +157,7 @@ TEST(FaceOcclusion, AgreesWithTheOracleAcrossChunkCorners) {
   });
 }
 
-TEST(FaceOcclusion, ATableSaysWhichVoxelsGiveIt) {
+TEST(FaceOcclusion, MatchesTableOfCornerNeighbours) {
   const VoxelRegistry types = oracle::mixed_types();
   const Grid grid = oracle::random_world(5, {IVec3{-4}, IVec3{4}}, 5, 0.6);
   const auto is_opaque = [&](IVec3 at) { return types.is_opaque(grid.get(at)); };
@@ -173,7 +173,7 @@ TEST(FaceOcclusion, ATableSaysWhichVoxelsGiveIt) {
   });
 }
 
-TEST(FaceOcclusion, TheTablesVoxelsTouchTheCornerFromTheFront) {
+TEST(FaceOcclusion, TableListsVoxelsInFrontOfCorner) {
   for (const Direction d : kDirections) {
     const FaceFrame& frame = frame_of(d);
     for (std::size_t i = 0; i < 4; ++i) {
@@ -193,7 +193,7 @@ TEST(FaceOcclusion, TheTablesVoxelsTouchTheCornerFromTheFront) {
   }
 }
 
-TEST(Diagonal, KeepsTheBrighterOne) {
+TEST(Diagonal, ConnectsBrighterCorners) {
   EXPECT_FALSE(flips_diagonal({0, 0, 0, 0}));
   EXPECT_FALSE(flips_diagonal({2, 2, 2, 2}));
   EXPECT_TRUE(flips_diagonal({3, 0, 3, 0}));

@@ -112,7 +112,7 @@ Grid random_grid(unsigned seed, int types) {
 }
 
 // At every corner of every voxel, the texture has the colour times the occlusion, for any merging.
-TEST(OcclusionAtlas, EveryCornerHasItsColourAndOcclusion) {
+TEST(OcclusionAtlas, StoresColourTimesOcclusionAtCorners) {
   const VoxelRegistry types = three_types();
   for (unsigned seed = 1; seed <= 6; ++seed) {
     SCOPED_TRACE(seed);
@@ -141,7 +141,7 @@ TEST(OcclusionAtlas, EveryCornerHasItsColourAndOcclusion) {
   }
 }
 
-TEST(OcclusionAtlas, EqualPatchesAreOneAndPlainOnesASingleTexel) {
+TEST(OcclusionAtlas, SharesEqualPatchesAndPlainTexels) {
   const VoxelRegistry types = three_types();
   Grid grid;
   grid.fill_box({{0, 0, 0}, {60, 3, 60}}, 1);
@@ -159,7 +159,7 @@ TEST(OcclusionAtlas, EqualPatchesAreOneAndPlainOnesASingleTexel) {
   EXPECT_EQ(two.image.rgb, one.image.rgb) << "a second model of the same patches";
 }
 
-TEST(OcclusionAtlas, TypesOfOneColourShareTheirTexels) {
+TEST(OcclusionAtlas, TypesOfSameColourShareTexels) {
   const VoxelRegistry types = three_types();
   Grid grid;
   grid.set({0, 0, 0}, 2);
@@ -171,13 +171,13 @@ TEST(OcclusionAtlas, TypesOfOneColourShareTheirTexels) {
   EXPECT_NE(other.coordinates.front(), other.coordinates.back());
 }
 
-TEST(OcclusionAtlas, NothingIsATexelAndNoCoordinates) {
+TEST(OcclusionAtlas, EmptyGridHasNoCoordinates) {
   const Baked baked = bake(Grid(), three_types());
   EXPECT_TRUE(baked.coordinates.empty());
   EXPECT_EQ(baked.image.height, 1);
 }
 
-TEST(OcclusionAtlas, SidesArePowersOfTwoAndTheSameBytesComeOutAgain) {
+TEST(OcclusionAtlas, IsDeterministicWithPowerOfTwoSides) {
   const Grid grid = random_grid(9, 3);
   const Baked first = bake(grid, three_types());
   const Baked second = bake(grid, three_types());

@@ -62,7 +62,7 @@ TEST(MesherReuse, CulledAfterGreedyMergesNothing) {
 class NeighbourOffset : public testing::TestWithParam<int> {};
 
 // A chunk with a single neighbour at each of the 26 offsets: the neighbour's voxels must hide and darken faces.
-TEST_P(NeighbourOffset, AloneHidesAndDarkens) {
+TEST_P(NeighbourOffset, HidesAndDarkensFaces) {
   const int i = GetParam();
   const IVec3 offset = Neighbourhood::offset(i);
   const VoxelRegistry types = oracle::mixed_types();
@@ -131,7 +131,7 @@ QuadOptions random_options(std::mt19937& random) {
 class MesherReuse : public testing::TestWithParam<InstructionSet> {};
 
 // Compares the plain kernel with the oracle, and the other kernels also with the bytes of the plain kernel.
-TEST_P(MesherReuse, RandomSequencesOfChunksRegionsAndOptionsAgreeWithTheOracle) {
+TEST_P(MesherReuse, MatchesOracleOverRandomSequences) {
   QUOIN_SKIP_WITHOUT(GetParam());
   const std::vector<LitWorld> worlds = worlds_of_all_widths();
   std::mt19937 random(11);

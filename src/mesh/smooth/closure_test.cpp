@@ -23,7 +23,7 @@ const std::vector<DVec3> kPlaces = {{31.3, 30.2, 33.1}, {64.0, 31.4, 30.0},     
                                     {63.5, 63.9, 64.2}, {-64.1, -128.3, -0.4},     {0.0, 0.0, 0.0},
                                     {20.0, 62.9, -1.0}, {1000.2, -3000.6, 500.11}, {32.0, 63.0, 63.0}};
 
-TEST(SmoothClosure, ASphereIsOneClosedSurfaceWhereverBordersLie) {
+TEST(SmoothClosure, SphereIsClosedAcrossBorders) {
   for (const DVec3 centre : kPlaces) {
     for (const double radius : {1.2, 4.0, 13.7}) {
       SCOPED_TRACE(testing::Message() << "sphere at " << centre.x << " " << centre.y << " " << centre.z << ", "
@@ -43,7 +43,7 @@ TEST(SmoothClosure, ASphereIsOneClosedSurfaceWhereverBordersLie) {
   }
 }
 
-TEST(SmoothClosure, ABoxWithFacesOnTheLatticeIsClosed) {
+TEST(SmoothClosure, BoxWithFacesOnLatticeIsClosed) {
   for (const IVec3 first : {IVec3{3, 4, 5}, IVec3{60, 60, 60}, IVec3{-5, 63, 0}, IVec3{0, 0, 0}, IVec3{64, -64, 64}}) {
     const IVec3 last = first + IVec3{5, 7, 3};
     // The density is 0 on the box's faces. These samples are air, since 0 is air.
@@ -66,7 +66,7 @@ TEST(SmoothClosure, ABoxWithFacesOnTheLatticeIsClosed) {
   }
 }
 
-TEST(SmoothClosure, RandomBlobsAreClosedOverBordersAtAnyScale) {
+TEST(SmoothClosure, RandomBlobsAreClosedAcrossBorders) {
   for (unsigned seed = 1; seed <= 4; ++seed) {
     for (const double wavelength : {5.0, 12.0, 40.0}) {
       SCOPED_TRACE(testing::Message() << "seed " << seed << ", wavelength " << wavelength);
@@ -82,7 +82,7 @@ TEST(SmoothClosure, RandomBlobsAreClosedOverBordersAtAnyScale) {
 }
 
 // Edges of solid blocks on a chunk's outermost samples start or end in chunks that do not exist.
-TEST(SmoothClosure, ASurfaceThatEndsInChunksThatDoNotExistIsClosed) {
+TEST(SmoothClosure, SurfaceNextToMissingChunksIsClosed) {
   DensityGrid grid;
   grid.edit({IVec3{0}, IVec3{64}}, [](IVec3, DensitySample) { return DensitySample{-3.0F, 1}; });
   ASSERT_EQ(grid.chunk_count(), 1U);
@@ -95,7 +95,7 @@ TEST(SmoothClosure, ASurfaceThatEndsInChunksThatDoNotExistIsClosed) {
   oracle::expect_manifold(count_surface(mesh_of(corner, {}), true));
 }
 
-TEST(SmoothClosure, FieldsWithoutASurfaceGiveNoTriangle) {
+TEST(SmoothClosure, FieldsWithoutSurfaceHaveNoTriangles) {
   const IBox box{IVec3{-70}, IVec3{70}};
   EXPECT_TRUE(mesh_of(DensityGrid{}, {}).indices.empty());
   EXPECT_TRUE(mesh_of(grid_of(box, [](DVec3) { return 0.0; }), {}).indices.empty());
@@ -103,7 +103,7 @@ TEST(SmoothClosure, FieldsWithoutASurfaceGiveNoTriangle) {
   EXPECT_TRUE(mesh_of(grid_of(box, [](DVec3) { return std::nan(""); }), {}).indices.empty());
 }
 
-TEST(SmoothClosure, InfiniteDensitiesMakeASurfaceOfFiniteVertices) {
+TEST(SmoothClosure, InfiniteDensitiesGiveFiniteVertices) {
   const double infinity = std::numeric_limits<double>::infinity();
   const DensityGrid grid = grid_of(box_around(DVec3{64.0}, 7.0),
                                    [&](DVec3 p) { return glm::length(p - 64.0) < 7.0 ? -infinity : infinity; });
@@ -114,7 +114,7 @@ TEST(SmoothClosure, InfiniteDensitiesMakeASurfaceOfFiniteVertices) {
   for (const float occlusion : mesh.occlusion) EXPECT_TRUE(occlusion >= 0.0F && occlusion <= 1.0F);
 }
 
-TEST(SmoothClosure, NormalsOfASphereAreNearlyItsRadii) {
+TEST(SmoothClosure, SphereNormalsFollowRadii) {
   for (const double radius : {8.0, 16.0, 30.0}) {
     const DVec3 centre{63.7, 0.4, -64.2};
     const SmoothMesh mesh = mesh_of(grid_of(box_around(centre, radius), oracle::sphere(centre, radius)), {});
@@ -132,7 +132,7 @@ TEST(SmoothClosure, NormalsOfASphereAreNearlyItsRadii) {
   }
 }
 
-TEST(SmoothClosure, TrianglesFaceTheWayTheirNormalsPoint) {
+TEST(SmoothClosure, TrianglesFaceAlongNormals) {
   const DVec3 centre{64.2, 64.3, 63.9};
   const SmoothMesh mesh = mesh_of(grid_of(box_around(centre, 12.0), oracle::sphere(centre, 12.0)), {});
   for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {

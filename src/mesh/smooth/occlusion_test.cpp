@@ -48,7 +48,7 @@ DVec3 random_direction(std::mt19937& random) {
   return glm::normalize(DVec3(normal(random), normal(random), normal(random)));
 }
 
-TEST(SmoothOcclusion, APlaneOfAnyOrientationIsFullyOpen) {
+TEST(SmoothOcclusion, PlaneOfAnyOrientationIsFullyOpen) {
   std::mt19937 random(11);
   for (int i = 0; i < 12; ++i) {
     const DVec3 n =
@@ -67,7 +67,7 @@ TEST(SmoothOcclusion, APlaneOfAnyOrientationIsFullyOpen) {
   }
 }
 
-TEST(SmoothOcclusion, AConvexSurfaceIsFullyOpen) {
+TEST(SmoothOcclusion, ConvexSurfaceIsFullyOpen) {
   for (const SmoothOcclusion form : kForms) {
     const SmoothChunkMesh mesh = mesh_of(sphere({31.2, 32.4, 30.9}, 20.0), form);
     for (const float occlusion : mesh.occlusion) ASSERT_EQ(occlusion, when_open(form));
@@ -96,7 +96,7 @@ double occlusion_in_valley(double degrees, SmoothOcclusion form) {
   return sum / count;
 }
 
-TEST(SmoothOcclusion, AValleyIsTheDarkerTheSharperItIs) {
+TEST(SmoothOcclusion, SharperValleysAreDarker) {
   for (const SmoothOcclusion form : kForms) {
     double last = when_open(form);
     EXPECT_NEAR(occlusion_in_valley(0, form), last, 1e-6);
@@ -110,7 +110,7 @@ TEST(SmoothOcclusion, AValleyIsTheDarkerTheSharperItIs) {
 }
 
 // s = sum of min(density, 0), m the least of them, ratio = s / (27 m); openness = clamp(1 - (ratio + offset)^power).
-TEST(SmoothOcclusion, ThePublishedCurveIsAsPublished) {
+TEST(SmoothOcclusion, MatchesPublishedCurve) {
   std::mt19937 random(9);
   std::uniform_real_distribution<float> any(-4.0F, 4.0F);
   for (int round = 0; round < 200; ++round) {
@@ -164,7 +164,7 @@ World enlarged(const World& small, int level) {
   });
 }
 
-TEST(SmoothOcclusion, IsTheSameOfAFieldThatGrowsWithItsCellsAndSpread) {
+TEST(SmoothOcclusion, ScalesWithFieldCellsAndSpread) {
   // Within the band at every size.
   const World small(
       [](IVec3 p) { return 0.3 * (std::sin(0.7 * p.x) + std::sin(0.9 * p.y + 1.0) + std::cos(0.8 * p.z)); });
@@ -202,7 +202,7 @@ World rugged() {
 }
 
 // Lengths are in samples of level 0, so the surface of one field is about as dark at several levels.
-TEST(SmoothOcclusion, IsAboutTheSameAtEveryLevel) {
+TEST(SmoothOcclusion, IsSimilarAtEveryLevel) {
   const World world = rugged();
   for (const SmoothOcclusion form :
        {SmoothOcclusion::SolidShare, SmoothOcclusion::SoftShare, SmoothOcclusion::Weighted}) {
@@ -223,7 +223,7 @@ TEST(SmoothOcclusion, IsAboutTheSameAtEveryLevel) {
 }
 
 // The soft share follows the plain one, but also has values between the 28 values of a count.
-TEST(SmoothOcclusion, TheSoftShareHasNoSteps) {
+TEST(SmoothOcclusion, SoftShareHasNoSteps) {
   const World world = rugged();
   const SmoothChunkMesh soft = mesh_of(world, SmoothOcclusion::SoftShare);
   const SmoothChunkMesh counted = mesh_of(world, SmoothOcclusion::SolidShare);
@@ -243,7 +243,7 @@ TEST(SmoothOcclusion, TheSoftShareHasNoSteps) {
   EXPECT_LT(difference / static_cast<double>(dark), 0.05);
 }
 
-TEST(SmoothOcclusion, TurnsAndMirrorsWithTheField) {
+TEST(SmoothOcclusion, TurnsAndMirrorsWithField) {
   const DVec3 centre(31.5);
   using Cell = std::array<int, 3>;
   const auto occlusion_by_cell = [&](const Symmetry& turn, SmoothOcclusion form) {
@@ -286,7 +286,7 @@ TEST(SmoothOcclusion, TurnsAndMirrorsWithTheField) {
   }
 }
 
-TEST(SmoothOcclusion, ChunksAgreeBitForBitAtSharedVertices) {
+TEST(SmoothOcclusion, ChunksMatchExactlyAtSharedVertices) {
   DensityGrid grid(kBand);
   const auto field = [](IVec3 p) { return hills(DVec3(p) * 1.7) * 1.3; };
   for (int i = 0; i < 64; ++i) {
@@ -318,7 +318,7 @@ TEST(SmoothOcclusion, ChunksAgreeBitForBitAtSharedVertices) {
   }
 }
 
-TEST(SmoothOcclusion, AnEditBeyondTheReachChangesNothing) {
+TEST(SmoothOcclusion, IgnoresEditsBeyondReach) {
   const auto field = [](IVec3 p) { return hills(DVec3(p)); };
   for (const int level : {0, 2}) {
     const SmoothOptions options = with(SmoothOcclusion::Weighted, level);

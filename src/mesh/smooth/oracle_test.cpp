@@ -72,7 +72,7 @@ class SmoothKernels : public testing::TestWithParam<unsigned> {
   SmoothChunkMesh mesh_;
 };
 
-TEST_P(SmoothKernels, GiveTheOraclesBytes) {
+TEST_P(SmoothKernels, MatchOracle) {
   const DensityGrid field = grid();
   const DensityNeighbourhood chunks = field.neighbourhood(IVec3{0});
   for (int level = 0; level <= kMaxSmoothLevel; ++level) {
@@ -90,7 +90,7 @@ TEST_P(SmoothKernels, GiveTheOraclesBytes) {
 }
 
 // Few active cells take occlusion from lists, many take it otherwise; spreads of 1 and 2 have separate code.
-TEST_P(SmoothKernels, GiveTheOraclesOcclusionInEveryFormWithAnySpread) {
+TEST_P(SmoothKernels, MatchOracleOcclusion) {
   const DensityGrid field = grid();
   const DensityNeighbourhood chunks = field.neighbourhood(IVec3{0});
   constexpr std::array<std::pair<int, float>, 8> kCases = {

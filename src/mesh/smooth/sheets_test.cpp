@@ -43,7 +43,7 @@ bool is_ambiguous(std::uint32_t solid, int face) {
                      [&](std::size_t edge) { return sheets.of_edge[edge] != Sheets::kUncrossed; });
 }
 
-TEST(SmoothSheets, AreCyclesThatPassEveryFaceByPairs) {
+TEST(SmoothSheets, FormCyclesCrossingFacesInPairs) {
   for (std::uint32_t solid = 0; solid < 256; ++solid) {
     for (int flipped = 0; flipped <= kNoFace; ++flipped) {
       const Sheets sheets = sheets_of(solid, flipped);
@@ -63,7 +63,7 @@ TEST(SmoothSheets, AreCyclesThatPassEveryFaceByPairs) {
   }
 }
 
-TEST(SmoothSheets, AreAsManyAsTheSolidPartsOrTheAirPartsOfSimpleCells) {
+TEST(SmoothSheets, MatchPartCountsOfSimpleCells) {
   EXPECT_EQ(sheets_of(0).count, 0);
   EXPECT_EQ(sheets_of(0xFF).count, 0);
   EXPECT_EQ(sheets_of(0x01).count, 1);
@@ -76,7 +76,7 @@ TEST(SmoothSheets, AreAsManyAsTheSolidPartsOrTheAirPartsOfSimpleCells) {
 }
 
 // The proof in docs/decisions/archive/021-two-sheets.md depends on this.
-TEST(SmoothSheets, AtMostOneFaceHasAllItsCrossingsInOneSheet) {
+TEST(SmoothSheets, JoinAllCrossingsOnAtMostOneFace) {
   int cells_with_one = 0;
   for (std::uint32_t solid = 0; solid < 256; ++solid) {
     int joined = 0;
@@ -100,7 +100,7 @@ TEST(SmoothSheets, AtMostOneFaceHasAllItsCrossingsInOneSheet) {
   EXPECT_GT(cells_with_one, 0);
 }
 
-TEST(SmoothSheets, TheOtherPairingOfAJoinedFaceParts) {
+TEST(SmoothSheets, OtherPairingSplitsJoinedFace) {
   for (std::uint32_t solid = 0; solid < 256; ++solid) {
     const int face = joined_face(solid);
     if (face == kNoFace) continue;
@@ -123,7 +123,7 @@ TEST(SmoothSheets, TheOtherPairingOfAJoinedFaceParts) {
 
 class SplitNoise : public testing::TestWithParam<unsigned> {};
 
-TEST_P(SplitNoise, ScatteredSamplesGiveAManifold) {
+TEST_P(SplitNoise, ScatteredSamplesAreManifold) {
   const IBox box{IVec3{64 - 17}, IVec3{64 + 18}};
   for (const double share : {0.15, 0.5, 0.8}) {
     SCOPED_TRACE(testing::Message() << "seed " << GetParam() << ", solid share " << share);
@@ -136,7 +136,7 @@ TEST_P(SplitNoise, ScatteredSamplesGiveAManifold) {
   }
 }
 
-TEST_P(SplitNoise, AManifoldAtEveryLevel) {
+TEST_P(SplitNoise, IsManifoldAtEveryLevel) {
   const IBox box{IVec3{64 - 32}, IVec3{64 + 32}};
   const DensityGrid grid = grid_of(box, oracle::waves(GetParam(), 6.0));
   for (int level = 0; level <= kMaxSmoothLevel; ++level) {
@@ -149,7 +149,7 @@ TEST_P(SplitNoise, AManifoldAtEveryLevel) {
 
 INSTANTIATE_TEST_SUITE_P(Seeds, SplitNoise, testing::Range(1U, 6U));
 
-TEST(SmoothSheets, CellsOfOneSheetKeepTheirBits) {
+TEST(SmoothSheets, LeaveSingleSheetCellsUnchanged) {
   const DensityGrid grid = grid_of({IVec3{-1}, IVec3{66}}, oracle::waves(11, 7.0));
   SmoothMesher mesher;
   SmoothChunkMesh plain;
@@ -177,7 +177,7 @@ TEST(SmoothSheets, CellsOfOneSheetKeepTheirBits) {
   EXPECT_GT(same, 1000);
 }
 
-TEST(SmoothSheets, VerticesLieInTheirCells) {
+TEST(SmoothSheets, KeepVerticesInTheirCells) {
   const DensityGrid grid = grid_of({IVec3{2}, IVec3{40}}, oracle::scatter(4));
   SmoothMesher mesher;
   SmoothChunkMesh mesh;
@@ -217,7 +217,7 @@ int edits_that_matter(DensityGrid& grid, int z) {
 }
 
 // A sheet's vertex depends on the neighbouring cells, one further than the kernel reads.
-TEST(SmoothSheets, AnEditReachesTwoSamplesWithoutOcclusion) {
+TEST(SmoothSheets, EditsReachTwoSamplesWithoutOcclusion) {
   const SmoothOcclusionOptions none{SmoothOcclusion::None, 2.0F, 0.4F, 2.0F};
   ASSERT_EQ(reach_of(none), 2);
   DensityGrid grid = grid_of({{-1, -1, -5}, {22, 22, 3}}, oracle::scatter(21));
@@ -225,7 +225,7 @@ TEST(SmoothSheets, AnEditReachesTwoSamplesWithoutOcclusion) {
   EXPECT_EQ(edits_that_matter(grid, -3), 0);
 }
 
-TEST(SheetsDeathTest, ACellHasEightCorners) {
+TEST(SheetsDeathTest, AssertsOnMoreThanEightCorners) {
   QUOIN_EXPECT_MISTAKE(static_cast<void>(joined_face(256)), "eight corners");
 }
 

@@ -25,9 +25,9 @@ void expect_same(const SmoothChunkMesh& a, const SmoothChunkMesh& b) {
   EXPECT_TRUE(same_bytes(a.indices, b.indices));
 }
 
-class SmoothSets : public testing::TestWithParam<InstructionSet> {};
+class SmoothMesherKernels : public testing::TestWithParam<InstructionSet> {};
 
-TEST_P(SmoothSets, GiveTheBytesOfThePlainKernel) {
+TEST_P(SmoothMesherKernels, MatchPlainKernel) {
   QUOIN_SKIP_WITHOUT(GetParam());
   const World worlds[] = {World(sphere({20.3, 40.1, 31.7}, 30.2)), World(noise(7, 3.0)), World([](IVec3 p) {
                             return std::sin(0.3 * p.x) + std::sin(0.21 * p.y) + std::cos(0.17 * p.z);
@@ -54,10 +54,10 @@ TEST_P(SmoothSets, GiveTheBytesOfThePlainKernel) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(InstructionSets, SmoothSets,
+INSTANTIATE_TEST_SUITE_P(InstructionSets, SmoothMesherKernels,
                          testing::Values(InstructionSet::Avx2, InstructionSet::Avx512Bytes), name_of_set);
 
-TEST(SmoothMesher, GivesTheSameBytesWhateverItMeshedBefore) {
+TEST(SmoothMesher, IsIndependentOfPreviousMeshes) {
   const World first(noise(1, 5.0));
   const World second(sphere({31, 31, 31}, 25.5));
   const SmoothOptions options = with(SmoothOcclusion::SolidShare);
@@ -71,7 +71,7 @@ TEST(SmoothMesher, GivesTheSameBytesWhateverItMeshedBefore) {
   expect_same(mesh, expected);
 }
 
-TEST(SmoothMesher, NormalsOfASpherePointOutwards) {
+TEST(SmoothMesher, SphereNormalsPointOutwards) {
   const DVec3 centre(31.2, 30.7, 31.9);
   const World world(sphere(centre, 28.0));
   SmoothMesher mesher;
@@ -93,7 +93,7 @@ TEST(SmoothMesher, NormalsOfASpherePointOutwards) {
   RecordProperty("mean_degrees", std::to_string(sum / static_cast<double>(mesh.positions.size())));
 }
 
-TEST(SmoothMesher, HoldsStillWhereTheSurfacePassesThroughPoints) {
+TEST(SmoothMesher, KeepsPlaneThroughSamplesFlat) {
   const World world([](IVec3 p) { return p.y - 20.0; });
   SmoothMesher mesher;
   SmoothChunkMesh mesh;
@@ -105,7 +105,7 @@ TEST(SmoothMesher, HoldsStillWhereTheSurfacePassesThroughPoints) {
   for (const float occlusion : mesh.occlusion) EXPECT_EQ(occlusion, 0.0F);
 }
 
-TEST(SmoothMesher, FindsNothingInOneSign) {
+TEST(SmoothMesher, FindsNoSurfaceInOneSign) {
   SmoothMesher mesher;
   SmoothChunkMesh mesh;
   for (const double value : {0.0, 8.0, -8.0, -0.0, 1e30, -1e30, std::nan("")}) {
@@ -140,7 +140,7 @@ TEST(SmoothMesher, SurvivesInfinitiesAndNaN) {
   }
 }
 
-TEST(SmoothMesher, LevelsBeyondTheCoarsestCountAsIt) {
+TEST(SmoothMesher, ClampsLevelsToCoarsest) {
   const World world(sphere({31.2, 30.7, 31.9}, 25.0));
   SmoothMesher mesher;
   SmoothChunkMesh coarsest;

@@ -41,7 +41,7 @@ std::vector<float> occlusion_of(const DensityGrid& field, const SmoothSamples& s
   return out;
 }
 
-TEST(SmoothOcclusionOfPlaces, MatchesTheMeshersOcclusionExactly) {
+TEST(SmoothOcclusionAtPoints, MatchesMesherExactly) {
   const DensityGrid field = hilly_field();
   for (const SmoothOcclusion form : kForms) {
     for (const float spread : {0.0625F, 0.4F, 1.0F, 1.7F, 2.0F, 4.0F}) {
@@ -61,7 +61,7 @@ TEST(SmoothOcclusionOfPlaces, MatchesTheMeshersOcclusionExactly) {
   }
 }
 
-TEST(SmoothOcclusionOfPlaces, IsThatOfTheChunksMeshWithAnyInstructionsAtAnyLevel) {
+TEST(SmoothOcclusionAtPoints, MatchesChunkMeshOnEveryKernelAndLevel) {
   const DensityGrid field = hilly_field();
   const IVec3 chunk(-1, -1, -1);
   for (int level = 0; level <= kMaxSmoothLevel; ++level) {
@@ -89,7 +89,7 @@ TEST(SmoothOcclusionOfPlaces, IsThatOfTheChunksMeshWithAnyInstructionsAtAnyLevel
   }
 }
 
-TEST(SmoothOcclusionOfPlaces, IsTheSameFarFromTheOrigin) {
+TEST(SmoothOcclusionAtPoints, IsTheSameFarFromOrigin) {
   const IVec3 far_chunk(30'000'000, -33'000'000, 20'000'000);
   DensityGrid near(kBand);
   DensityGrid far(kBand);
@@ -105,7 +105,7 @@ TEST(SmoothOcclusionOfPlaces, IsTheSameFarFromTheOrigin) {
   EXPECT_EQ(occlusion_of(far, samples, with(SmoothOcclusion::Weighted).occlusion), expected);
 }
 
-TEST(SmoothOcclusionOfPlaces, IsTheSameInAnyOrderAndCompany) {
+TEST(SmoothOcclusionAtPoints, IsIndependentOfOrderAndBatch) {
   const DensityGrid field = hilly_field();
   std::mt19937 random(5);
   std::uniform_real_distribution<float> at(-90.0F, 80.0F);
@@ -133,7 +133,7 @@ TEST(SmoothOcclusionOfPlaces, IsTheSameInAnyOrderAndCompany) {
   }
 }
 
-TEST(SmoothOcclusionOfPlaces, FarAirIsOpenWhereverItIsAsked) {
+TEST(SmoothOcclusionAtPoints, FarAirIsOpen) {
   const DensityGrid field = hilly_field();
   const std::vector<Vec3> positions = {{kNaN, 0, 0}, {0, kInfinity, 0}, {0, 0, -kInfinity},
                                        {3e9F, 0, 0}, {0, -4e37F, 0},    {1e6F, 5, 5},
@@ -155,7 +155,7 @@ TEST(SmoothOcclusionOfPlaces, FarAirIsOpenWhereverItIsAsked) {
   EXPECT_EQ(smooth_occlusion(field, {-20, -50, -20}, {0, 1, 0}), 1.0F) << "deep in the rock";
 }
 
-TEST(SmoothOcclusionOfPlaces, NormalsAreMadeUnitAndUpWithoutADirection) {
+TEST(SmoothOcclusionAtPoints, NormalizesNormalsAndDefaultsToUp) {
   const DensityGrid field = hilly_field();
   const DVec3 position(-7.3, -4.2, -11.9);
   const SmoothOcclusionOptions options{SmoothOcclusion::Weighted, 2.0F, 0.4F, 2.0F};
@@ -167,7 +167,7 @@ TEST(SmoothOcclusionOfPlaces, NormalsAreMadeUnitAndUpWithoutADirection) {
   EXPECT_NE(smooth_occlusion(field, position, {0, -1, 0}, options), up);
 }
 
-TEST(SmoothOcclusionOfPlaces, NumbersOutOfRangeCountAsForTheMesher) {
+TEST(SmoothOcclusionAtPoints, ClampsOptionsLikeMesher) {
   const DensityGrid field = hilly_field();
   const DVec3 position(-7.3, -4.2, -11.9);
   const auto at = [&](SmoothOcclusionOptions options, int level = 0) {
@@ -179,11 +179,11 @@ TEST(SmoothOcclusionOfPlaces, NumbersOutOfRangeCountAsForTheMesher) {
   EXPECT_EQ(at({}, -1), at({}, 0));
 }
 
-TEST(SmoothOcclusionOfPlaces, IsEmptyWithoutPositions) {
+TEST(SmoothOcclusionAtPoints, IsEmptyWithoutPositions) {
   EXPECT_TRUE(occlusion_of(hilly_field(), {}, {}).empty());
 }
 
-TEST(SmoothOcclusionOfPlaces, CancelsWhereProgressSaysSo) {
+TEST(SmoothOcclusionAtPoints, StopsWhenCancelled) {
   const DensityGrid field = hilly_field();
   const std::vector<Vec3> positions = {{-7, -4, -11}, {70, -4, -11}, {-7, -4, 80}};
   const std::vector<Vec3> normals(positions.size(), Vec3(0, 1, 0));
@@ -198,7 +198,7 @@ TEST(SmoothOcclusionOfPlaces, CancelsWhereProgressSaysSo) {
   EXPECT_EQ(cancelled.error().code, ErrorCode::Cancelled);
 }
 
-TEST(SmoothOcclusionDeathTest, SamplesThatDoNotFitAreAMistake) {
+TEST(SmoothOcclusionDeathTest, AssertsOnMismatchedSamples) {
   const DensityGrid field;
   const std::vector<Vec3> three(3, Vec3(0, 1, 0));
   const std::span<const Vec3> two = std::span(three).first(2);

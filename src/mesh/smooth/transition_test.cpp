@@ -42,7 +42,7 @@ constexpr IBox box_over_borders() {
 
 class MixedLevels : public testing::TestWithParam<unsigned> {};
 
-TEST_P(MixedLevels, NoiseOfAnyScaleHasNoOpenEdge) {
+TEST_P(MixedLevels, NoiseHasNoOpenEdges) {
   for (const double wavelength : {6.0, 17.0, 50.0}) {
     SCOPED_TRACE(testing::Message() << "seed " << GetParam() << ", wavelength " << wavelength);
     const DensityGrid grid = grid_of(box_over_borders(), oracle::waves(GetParam(), wavelength));
@@ -55,7 +55,7 @@ TEST_P(MixedLevels, NoiseOfAnyScaleHasNoOpenEdge) {
   }
 }
 
-TEST_P(MixedLevels, ScatteredSamplesHaveNoOpenEdge) {
+TEST_P(MixedLevels, ScatteredSamplesHaveNoOpenEdges) {
   const IBox box{IVec3{64 - 14}, IVec3{64 + 13}};
   for (const double share : {0.03, 0.5, 0.97}) {
     SCOPED_TRACE(testing::Message() << "seed " << GetParam() << ", solid share " << share);
@@ -68,7 +68,7 @@ TEST_P(MixedLevels, ScatteredSamplesHaveNoOpenEdge) {
   }
 }
 
-TEST_P(MixedLevels, ALargeSphereStaysASphere) {
+TEST_P(MixedLevels, LargeSphereStaysSphere) {
   std::mt19937 random(GetParam());
   std::uniform_real_distribution<double> offset(-30.0, 30.0);
   const DVec3 centre{64.0 + offset(random), 64.0 + offset(random), 64.0 + offset(random)};
@@ -140,7 +140,7 @@ void expect_that_chunks_agree(const DensityGrid& grid, const std::function<int(I
   EXPECT_GT(shared, 50);
 }
 
-TEST(SmoothBorders, ChunksGiveTheirCommonVerticesTheSameBits) {
+TEST(SmoothBorders, MatchExactlyAtSharedVertices) {
   for (unsigned seed = 1; seed <= 5; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     const DensityGrid grid = grid_of(box_over_borders(), oracle::waves(seed, 9.0 + 4.0 * seed));
@@ -220,7 +220,7 @@ void expect_vertices_of(const SmoothChunkMesh& mesh, IVec3 chunk, int level, Pol
   }
 }
 
-TEST_P(MixedLevels, EveryShortestEdgeHasItsPolygonAndEveryCellTheMeanOfItsCrossings) {
+TEST_P(MixedLevels, MatchOraclePolygonsAndVertices) {
   const auto level_of = random_levels(GetParam() + 100);
   const IBox box = box_over_borders();
   const DensityGrid grid = grid_of(box, oracle::waves(GetParam(), 14.0));
@@ -245,7 +245,7 @@ TEST_P(MixedLevels, EveryShortestEdgeHasItsPolygonAndEveryCellTheMeanOfItsCrossi
 }
 
 // Shows that the tests above can fail: without transitions the borders between levels are open.
-TEST(SmoothLevels, MeshesThatKnowNothingOfTheirNeighboursLevelsDoNotMeet) {
+TEST(SmoothLevels, MeshesWithoutNeighbourLevelsDoNotMeet) {
   const DVec3 centre{64.0, 30.0, 30.0};
   const DensityGrid grid = grid_of(oracle::box_around(centre, 30.0), oracle::sphere(centre, 20.0), 32.0F);
   SmoothMesher mesher;
@@ -274,7 +274,7 @@ std::vector<VertexBits> all_bits(const SmoothChunkMesh& mesh) {
   return all;
 }
 
-TEST(SmoothLevels, AnEditBeyondTheReachChangesNothingWhateverTheLevels) {
+TEST(SmoothLevels, IgnoreEditsBeyondReach) {
   SmoothMesher mesher;
   SmoothChunkMesh before;
   SmoothChunkMesh after;
@@ -313,7 +313,7 @@ TEST(SmoothLevels, AnEditBeyondTheReachChangesNothingWhateverTheLevels) {
   EXPECT_GT(changed_within, 20) << "the edits reach nothing";
 }
 
-TEST(SmoothLevels, CellsAwayFromOtherLevelsAreThoseOfTheKernel) {
+TEST(SmoothLevels, MatchKernelAwayFromOtherLevels) {
   const DensityGrid grid = grid_of({{-3, 0, 0}, {70, 50, 50}}, oracle::waves(3, 15.0));
   SmoothMesher mesher;
   SmoothChunkMesh mixed;
@@ -337,7 +337,7 @@ TEST(SmoothLevels, CellsAwayFromOtherLevelsAreThoseOfTheKernel) {
 
 INSTANTIATE_TEST_SUITE_P(Seeds, MixedLevels, testing::Range(1U, 7U));
 
-TEST(TransitionsDeathTest, AreBetweenChunksThatShareABorder) {
+TEST(TransitionsDeathTest, AssertsOnOpenBorder) {
   SmoothOptions options;
   options.border = SmoothBorder::Open;
   SmoothChunkMesh mesh;

@@ -132,7 +132,7 @@ class Simplify : public ::testing::Test {
   }
 };
 
-TEST_F(Simplify, ASphereStaysClosedAndWithinTheError) {
+TEST_F(Simplify, KeepsSphereClosedWithinError) {
   for (const float error : {0.01F, 0.03F, 0.1F, 0.3F, 1.0F}) {
     SmoothMesh mesh = surface_of(sphere, 41);
     ASSERT_EQ(open_edges(mesh), 0U);
@@ -164,7 +164,7 @@ void expect_stays_closed(const SmoothMesh& whole) {
   }
 }
 
-TEST_F(Simplify, RandomBlobsStayClosed) {
+TEST_F(Simplify, KeepsRandomBlobsClosed) {
   // The nightly run takes a random seed.
   const bool is_nightly = std::getenv("QUOIN_NIGHTLY") != nullptr;
   const std::uint32_t seed = is_nightly ? std::random_device{}() : 20U;
@@ -187,7 +187,7 @@ std::size_t coincident_vertices(const SmoothMesh& mesh) {
   return mesh.positions.size() - positions.size();
 }
 
-TEST_F(Simplify, StaysClosedAtAZeroLengthEdge) {
+TEST_F(Simplify, StaysClosedAtZeroLengthEdge) {
   std::mt19937 random(1'548'743'885U);
   for (int i = 0; i < 15; ++i) blob(random);
   const SmoothMesh whole = surface_of(blob(random), 41);
@@ -206,7 +206,7 @@ TEST_F(Simplify, StaysClosedAtManyZeroLengthEdges) {
   }
 }
 
-TEST_F(Simplify, TouchingSurfacesStayClosed) {
+TEST_F(Simplify, KeepsTouchingSurfacesClosed) {
   for (std::uint32_t seed = 1; seed <= 3; ++seed) {
     SCOPED_TRACE(seed);
     SmoothMesh whole = surface_of(random_samples(seed, 16), 16);
@@ -227,7 +227,7 @@ float distance_from(const SmoothMesh& mesh, Vec3 p) {
   return nearest;
 }
 
-TEST(TriangleTree, DistancesAreThoseOfPointsOnTriangles) {
+TEST(TriangleTree, MatchesDistanceToSampledPoints) {
   std::mt19937 random(3);
   std::uniform_real_distribution<float> any(-1.0F, 1.0F);
   const auto point = [&] { return Vec3(any(random), any(random), any(random)); };
@@ -251,7 +251,7 @@ TEST(TriangleTree, DistancesAreThoseOfPointsOnTriangles) {
   EXPECT_EQ(TriangleTree({}, {}).distance(Vec3(1.0F), 4.0F), 4.0F);
 }
 
-TEST_F(Simplify, NoVertexIsFartherOffThanTheError) {
+TEST_F(Simplify, KeepsVerticesWithinError) {
   std::mt19937 random(21);
   for (int i = 0; i < 3; ++i) {
     const SmoothMesh whole = surface_of(blob(random), 41);
@@ -308,7 +308,7 @@ TEST_F(Simplify, SlightlyMoreErrorLeavesFewerTriangles) {
 }
 
 // The lower error would remove less than 1 % of the triangles of this noise.
-TEST_F(Simplify, LeavesALargeMeshThatHardlyShrinks) {
+TEST_F(Simplify, LeavesLargeMeshThatHardlyShrinks) {
   std::mt19937 random(3);
   std::vector<float> values(std::size_t{27} * 27 * 27);
   for (float& value : values) value = static_cast<float>(random()) * 0x1p-31F - 1.0F;
@@ -328,7 +328,7 @@ TEST_F(Simplify, LeavesALargeMeshThatHardlyShrinks) {
 }
 
 // A third of the mesh is noise, the rest flat plates. Its position does not affect how much it shrinks.
-TEST_F(Simplify, AMeshThatIsRoughInOnePlaceShrinksWhereverItLies) {
+TEST_F(Simplify, ShrinksPartlyRoughMeshAtAnyPosition) {
   std::mt19937 random(3);
   std::vector<float> values(std::size_t{23} * 23 * 23);
   for (float& value : values) value = static_cast<float>(random()) * 0x1p-31F - 1.0F;
@@ -351,7 +351,7 @@ TEST_F(Simplify, AMeshThatIsRoughInOnePlaceShrinksWhereverItLies) {
   }
 }
 
-TEST_F(Simplify, ColoursStayWhereTheyAreAndTheMeshIsManifoldByPlaces) {
+TEST_F(Simplify, KeepsColourBordersAndStaysClosed) {
   // A voxel ball in two halves; the smaller half has a checkerboard of small fields.
   Grid grid;
   grid.edit({{-16, -16, -16}, {17, 17, 17}}, [](IVec3 p, VoxelType) -> VoxelType {
@@ -405,7 +405,7 @@ TEST_F(Simplify, KeepsTheAttributesOfRemainingVertices) {
   }
 }
 
-TEST_F(Simplify, WithoutAnErrorOnlyFlatPlacesLoseTriangles) {
+TEST_F(Simplify, ZeroErrorSimplifiesOnlyFlatParts) {
   const SmoothMesh whole = surface_of(sphere, 41);
   SmoothMesh mesh = whole;
   mesh.occlusion.clear();
@@ -418,7 +418,7 @@ TEST_F(Simplify, WithoutAnErrorOnlyFlatPlacesLoseTriangles) {
   EXPECT_TRUE(mesh.occlusion.empty());
 }
 
-TEST(Manifold, SheetsThatShareAnEdgeAreSeparated) {
+TEST(Manifold, SeparatesSheetsThatShareEdge) {
   SmoothMesh mesh;
   mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, -1, 0}, {0, 0, -1}};
   mesh.normals.resize(6, Vec3(0, 1, 0));
@@ -437,7 +437,7 @@ TEST(Manifold, SheetsThatShareAnEdgeAreSeparated) {
   EXPECT_EQ(signed_volume(mesh), before);
 }
 
-TEST(Manifold, SolidsThatShareAVertexAreSeparated) {
+TEST(Manifold, SeparatesSolidsThatShareVertex) {
   SmoothMesh mesh;
   mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {-1, 0, 0}, {0, -1, 0}, {0, 0, -1}, {9, 9, 9}};
   mesh.normals.resize(8, Vec3(0, 1, 0));
@@ -457,7 +457,7 @@ TEST(Manifold, SolidsThatShareAVertexAreSeparated) {
   EXPECT_EQ(signed_volume(mesh), before);
 }
 
-TEST(Manifold, SoundMeshesStayAsTheyAre) {
+TEST(Manifold, LeavesSoundMeshesUnchanged) {
   SmoothMesh mesh = surface_of(sphere, 41);
   const SmoothMesh whole = mesh;
   make_one_manifold(mesh);
@@ -469,7 +469,7 @@ TEST(Manifold, SoundMeshesStayAsTheyAre) {
   EXPECT_EQ(mesh.indices, open);
 }
 
-TEST(Manifold, SurfacesThatTouchInManyEdgesBecomeClosedOnes) {
+TEST(Manifold, ClosesSurfacesThatTouchAtManyEdges) {
   const std::uint32_t seed = std::random_device{}();
   SCOPED_TRACE("seed " + std::to_string(seed));
   for (std::uint32_t i = 0; i < 5; ++i) {
@@ -501,7 +501,7 @@ TEST(SimplifyErrors, RefusedSimplificationLeavesTheMesh) {
   EXPECT_EQ(simplify_smooth_mesh(empty, 1.0F).value_or(-1.0F), can_simplify() ? 0.0F : -1.0F);
 }
 
-TEST(SimplifyDeathTest, WantsArraysOfOneLengthIndicesOfVerticesAndFinitePositions) {
+TEST(SimplifyDeathTest, AssertsOnInvalidMesh) {
   if (!can_simplify()) GTEST_SKIP() << "this build cannot simplify";
   const SmoothMesh mesh = surface_of([](Vec3 p) { return glm::length(p - Vec3(6.0F)) - 4.2F; }, 12);
   [[maybe_unused]] const auto simplify = [](SmoothMesh broken) {

@@ -46,7 +46,7 @@ std::multiset<TriangleBits> triangles_of(const Positions& positions, const Indic
 }
 
 // Chunks and their borders leave no trace: the mesh equals a mesh made in one piece.
-TEST(SmoothMesh, IsTheMeshOfTheFieldInOnePiece) {
+TEST(SmoothMesh, MatchesMeshMadeInOnePiece) {
   for (int level = 0; level <= kMaxSmoothLevel; ++level) {
     SCOPED_TRACE(testing::Message() << "level " << level);
     const IBox box{{50, -20, 40}, {90, 20, 80}};
@@ -76,7 +76,7 @@ TEST(SmoothMesh, IsTheMeshOfTheFieldInOnePiece) {
   }
 }
 
-TEST(SmoothMesh, MaterialsClampLevelsAsTheMesherDoes) {
+TEST(SmoothMesh, MaterialsClampLevelsLikeMesher) {
   const DensityGrid grid = grid_of({{0, 0, 0}, {64, 64, 64}}, oracle::waves(3, 25.0));
   const DensityNeighbourhood chunks = grid.neighbourhood({0, 0, 0});
   const SurfaceMaterials materials{VoxelRegistry()};
@@ -111,7 +111,7 @@ TEST(SmoothMesh, IsTheSameAtAnyThreadCount) {
   EXPECT_EQ(one->indices, four->indices);
 }
 
-TEST(SmoothMesh, LiesWhereTheFieldDoes) {
+TEST(SmoothMesh, LiesAtPositionOfField) {
   const DVec3 centre{100000.0, -70000.0, 2048.0};
   const DensityGrid grid = grid_of(oracle::box_around(centre, 9.0), oracle::sphere(centre, 9.0));
   for (const Vec3 p : mesh_of(grid, {}).positions) EXPECT_NEAR(glm::length(DVec3(p) - centre), 9.0, 0.15);
@@ -136,7 +136,7 @@ VoxelRegistry red_and_white() {
   return types;
 }
 
-TEST(SmoothMesh, MaterialsAreThoseOfTheSolidSamplesAndNeverAir) {
+TEST(SmoothMesh, TakesMaterialsFromSolidSamples) {
   SmoothMeshOptions options;
   for (int level = 0; level <= kMaxSmoothLevel; ++level) {
     options.level_of = [=](IVec3 chunk) { return chunk.x == 0 ? level : 0; };
@@ -166,7 +166,7 @@ TEST(SmoothMesh, MaterialsAreThoseOfTheSolidSamplesAndNeverAir) {
 }
 
 // Two samples of white sand cover red rock: at every level the view from above shows sand.
-TEST(SmoothMesh, AThinCoverShowsAtEveryLevel) {
+TEST(SmoothMesh, ShowsThinCoverAtEveryLevel) {
   DensityGrid grid;
   grid.edit({IVec3{0}, {128, 70, 128}}, [](IVec3 p, DensitySample) {
     const double height = 40.3 + 5.0 * std::sin(0.1 * p.x) + 4.0 * std::cos(0.07 * p.z);
@@ -189,7 +189,7 @@ TEST(SmoothMesh, AThinCoverShowsAtEveryLevel) {
   }
 }
 
-TEST(SmoothMesh, ColoursAreDecodedFromSrgb) {
+TEST(SmoothMesh, DecodesColoursFromSrgb) {
   const SmoothMesh mesh = mesh_of(grid_of({IVec3{0}, IVec3{5}}, [](DVec3) { return -1.0; }), {});
   for (const LinearRgba16 albedo : mesh.albedo) {
     EXPECT_NEAR(albedo[0] / 65'535.0, 0.215861, 1e-5);
@@ -207,7 +207,7 @@ TEST(SmoothMesh, UnknownMaterialsAreWhite) {
   for (const LinearRgba16 albedo : mesh.albedo) EXPECT_EQ(albedo, (LinearRgba16{65'535, 65'535, 65'535, 65'535}));
 }
 
-TEST(SmoothMesh, HasNoOcclusionUnlessAskedFor) {
+TEST(SmoothMesh, HasNoOcclusionIfMethodIsNone) {
   const DensityGrid grid = grid_of({IVec3{0}, IVec3{9}}, oracle::sphere(DVec3{4.2}, 3.0));
   SmoothMeshOptions options;
   EXPECT_EQ(mesh_of(grid, options).occlusion.size(), mesh_of(grid, options).positions.size());
@@ -215,7 +215,7 @@ TEST(SmoothMesh, HasNoOcclusionUnlessAskedFor) {
   EXPECT_TRUE(mesh_of(grid, options).occlusion.empty());
 }
 
-TEST(SmoothMesh, AsksForEachLevelOnceAndRefusesWhatIsNone) {
+TEST(SmoothMesh, RequestsEachLevelOnceAndRejectsInvalidLevels) {
   const DensityGrid grid = grid_of({IVec3{60}, IVec3{70}}, oracle::sphere(DVec3{65.0}, 3.0));
   std::map<std::tuple<int, int, int>, int> asked;
   SmoothMeshOptions options;
@@ -235,7 +235,7 @@ TEST(SmoothMesh, AsksForEachLevelOnceAndRefusesWhatIsNone) {
   }
 }
 
-TEST(SmoothMesh, ReportsProgressAndStopsWhenTold) {
+TEST(SmoothMesh, ReportsProgressAndCanBeCancelled) {
   const DensityGrid grid = grid_of({IVec3{-40}, IVec3{90}}, oracle::waves(2, 30.0));
   double last = 0.0;
   bool rising = true;

@@ -82,7 +82,7 @@ Grid random_grid(unsigned seed, const IBox& box, double share, const std::vector
   return grid;
 }
 
-TEST(SmoothVoxels, EachVisibleFaceOfAVoxelIsAQuadOfItsColour) {
+TEST(SmoothVoxels, HaveOneColouredQuadPerVisibleFace) {
   const VoxelRegistry types = six_types();
   for (const unsigned seed : {1U, 2U, 3U}) {
     const IBox box{{55, -7, 60}, {75, 9, 70}};
@@ -133,7 +133,7 @@ TEST(SmoothVoxels, EachVisibleFaceOfAVoxelIsAQuadOfItsColour) {
   }
 }
 
-TEST(SmoothVoxels, ThinThingsKeepTheirThickness) {
+TEST(SmoothVoxels, KeepThicknessOfThinParts) {
   struct Case {
     const char* name;
     IBox box;
@@ -161,7 +161,7 @@ TEST(SmoothVoxels, ThinThingsKeepTheirThickness) {
   }
 }
 
-TEST(SmoothVoxels, GapsOfOneVoxelStayOpen) {
+TEST(SmoothVoxels, KeepOneVoxelGapsOpen) {
   Grid grid;
   grid.fill_box({{0, 0, 0}, {21, 20, 20}}, 1);
   grid.fill_box({{10, 10, 0}, {11, 20, 20}}, kAir);
@@ -196,7 +196,7 @@ std::size_t pieces_of(const SmoothMesh& mesh) {
   return roots.size();
 }
 
-TEST(SmoothVoxels, SlantedRailsHoldTogetherAndAreManifold) {
+TEST(SmoothVoxels, SlantedRailsAreConnectedAndManifold) {
   for (const IVec3 step : {IVec3(1, 1, 0), IVec3(1, -1, 0), IVec3(0, 1, -1), IVec3(-1, 0, 1)}) {
     SCOPED_TRACE(testing::Message() << step.x << step.y << step.z);
     Grid grid;
@@ -210,14 +210,14 @@ TEST(SmoothVoxels, SlantedRailsHoldTogetherAndAreManifold) {
   }
 }
 
-TEST(SmoothVoxels, AnyVoxelsAreManifoldWhereDiagonalsHoldTogether) {
+TEST(SmoothVoxels, AreManifoldWithJoinedDiagonals) {
   for (const double share : {0.15, 0.5, 0.8}) {
     const Grid grid = random_grid(9, {{50, 50, 50}, {80, 80, 80}}, share, {1});
     oracle::expect_manifold(count_surface(mesh_of(grid, voxels()), true));
   }
 }
 
-TEST(SmoothVoxels, WithoutSmoothnessTheyAreBlocks) {
+TEST(SmoothVoxels, AreBlocksWithoutSmoothness) {
   const Grid grid = random_grid(4, {{58, 60, -5}, {70, 70, 9}}, 0.5, {1, 2});
   SmoothMeshOptions options = voxels();
   options.smoothness = 0.0F;
@@ -248,7 +248,7 @@ TEST(SmoothVoxels, WithoutSmoothnessTheyAreBlocks) {
   oracle::expect_closed(count);
 }
 
-TEST(SmoothVoxels, MoreSmoothnessIsRounder) {
+TEST(SmoothVoxels, AreRounderWithMoreSmoothness) {
   Grid grid;
   grid.fill_box({{0, 0, 0}, {6, 6, 6}}, 1);
   double last = 216.001;
@@ -273,7 +273,7 @@ TEST(SmoothVoxels, MoreSmoothnessIsRounder) {
   EXPECT_EQ(mesh_of(grid, odd).positions, mesh_of(grid, whole).positions);
 }
 
-TEST(SmoothVoxels, ShapesOfNeighbouringChunksMeet) {
+TEST(SmoothVoxels, MeetAtChunkBorders) {
   const Grid grid = random_grid(12, {{40, 40, 40}, {90, 90, 90}}, 0.4, {1, 5});
   const VoxelRegistry types = six_types();
   const DensityGrid whole = *field_from_grid(grid);
@@ -328,7 +328,7 @@ TEST(SmoothVoxels, CoarseLevelsHaveColoursAndAreClosed) {
   }
 }
 
-TEST(SmoothBodies, GlassIsAClosedBodyThatMeetsItsFrameExactly) {
+TEST(SmoothBodies, GlassIsClosedAndMeetsFrameExactly) {
   const VoxelRegistry types = six_types();
   Grid grid;
   grid.fill_box({{50, 0, 10}, {80, 30, 12}}, 1);  // a wall across a chunk border
@@ -372,7 +372,7 @@ TEST(SmoothBodies, GlassIsAClosedBodyThatMeetsItsFrameExactly) {
 }
 
 // Checks every sample of one body's densities, in rock with water and two kinds of glass.
-TEST(SmoothBodies, OthersAreAsFarOutAsTheyWereIn) {
+TEST(SmoothBodies, NegateDensitiesOfOtherBodies) {
   const VoxelRegistry types = six_types();
   std::mt19937 random(11);
   for (int round = 0; round < 6; ++round) {
@@ -404,7 +404,7 @@ TEST(SmoothBodies, OthersAreAsFarOutAsTheyWereIn) {
   }
 }
 
-TEST(SmoothBodies, KindsOfGlassAreBodiesOfTheirOwn) {
+TEST(SmoothBodies, SeparateGlassTypes) {
   const VoxelRegistry types = six_types();
   Grid grid;
   grid.fill_box({{0, 0, 0}, {4, 4, 1}}, 5);
