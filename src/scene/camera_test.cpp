@@ -62,7 +62,7 @@ Extent extent_of(const Camera& camera, double aspect, const DBox& box) {
   return extent;
 }
 
-TEST(Camera, LooksAtItsTargetUpright) {
+TEST(Camera, LooksAtTargetUpright) {
   const auto camera = look_at({3, 5, 8}, {-1, 2, 0.5}, 1.0);
   ASSERT_TRUE(camera);
   expect_orthonormal(*camera);
@@ -77,7 +77,7 @@ TEST(Camera, LooksAtItsTargetUpright) {
   EXPECT_GT(project(*look_at({0, 0, 5}, {0, 0, 0}, 1.0), 1.0, {1, 0, 0}).x, 0.0) << "not mirrored";
 }
 
-TEST(Camera, TheViewMatrixAgreesWithItsRays) {
+TEST(Camera, ViewMatrixMatchesRays) {
   const Camera camera = *look_at({3, 4, 5}, {-7, 1, 20}, 0.8);
   const glm::dmat4 view = camera_from_world(camera);
   expect_near(DVec3(view * glm::dvec4(camera.position, 1.0)), DVec3(0.0));
@@ -92,7 +92,7 @@ TEST(Camera, TheViewMatrixAgreesWithItsRays) {
   }
 }
 
-TEST(Camera, StraightDownAndUpHaveADefinedTop) {
+TEST(Camera, DefinesTopOfVerticalViews) {
   const auto down = look_at({1, 9, 2}, {1, -4, 2}, 1.0);
   expect_near(down->forward, {0, -1, 0});
   expect_near(down->up, {0, 0, -1});
@@ -104,7 +104,7 @@ TEST(Camera, StraightDownAndUpHaveADefinedTop) {
   expect_orthonormal(*look_at({1e-200, 9, 0}, {0, 0, 0}, 1.0));
 }
 
-TEST(Camera, LooksAlongADirectionOfAnyLength) {
+TEST(Camera, LooksAlongDirectionOfAnyLength) {
   for (const double length : {1e-300, 1.0, 7.0, 1e300}) {
     const auto camera = look_along({1, 2, 3}, length * DVec3{1, 0.5, -0.75}, 0.7);
     ASSERT_TRUE(camera);
@@ -121,7 +121,7 @@ TEST(Camera, LooksAlongADirectionOfAnyLength) {
   EXPECT_FALSE(look_along({1, 1, 1}, {1, 0, 0}, 0.0));
 }
 
-TEST(Camera, NumbersOfAnySizeWork) {
+TEST(Camera, AcceptsPositionsOfAnySize) {
   constexpr double kMost = std::numeric_limits<double>::max();
   for (const auto& [position, target] : {std::pair{DVec3{-kMost, 0, kMost}, DVec3{kMost, 1, -kMost}},
                                          std::pair{DVec3{0.0}, DVec3{1e-300, 1e-300, 1e-300}},
@@ -132,7 +132,7 @@ TEST(Camera, NumbersOfAnySizeWork) {
   }
 }
 
-TEST(Camera, ImpossibleCamerasAreRefused) {
+TEST(Camera, RejectsInvalidCameras) {
   const auto refused = [](DVec3 position, DVec3 target, double fov) {
     const auto camera = look_at(position, target, fov);
     return !camera && camera.error().code == ErrorCode::InvalidArgument;
@@ -146,7 +146,7 @@ TEST(Camera, ImpossibleCamerasAreRefused) {
   for (const double fov : {0.0, -1.0, std::numbers::pi, 4.0}) EXPECT_TRUE(refused({1, 1, 1}, {0, 0, 0}, fov)) << fov;
 }
 
-TEST(Camera, ViewsHaveNames) {
+TEST(Camera, FindsViewsByName) {
   EXPECT_EQ(view_of_name("front"), View::Front);
   EXPECT_EQ(view_of_name("back"), View::Back);
   EXPECT_EQ(view_of_name("left"), View::Left);
@@ -156,7 +156,7 @@ TEST(Camera, ViewsHaveNames) {
   for (const char* name : {"", "Front", "bottom", "iso "}) EXPECT_EQ(view_of_name(name), std::nullopt);
 }
 
-TEST(Camera, EachViewShowsTheSideOfItsName) {
+TEST(Camera, ViewsShowNamedSide) {
   const DBox box{{-2, -1, -3}, {2, 5, 3}};
   const auto camera = [&](View view) { return frame_view(box, view, 1.6); };
   expect_near(camera(View::Front).forward, {0, 0, -1});
@@ -195,7 +195,7 @@ void expect_framed(const DBox& box, View view, double aspect) {
   EXPECT_TRUE(is_wide || is_high) << extent.left << " " << extent.right << " " << extent.low << " " << extent.high;
 }
 
-TEST(Camera, FramedBoxesLieWithinTheImageAndFillIt) {
+TEST(Camera, FramesBoxesTightly) {
   std::mt19937_64 random(2024);
   const auto between = [&](double low, double high) { return std::uniform_real_distribution(low, high)(random); };
   for (int i = 0; i < 2'000; ++i) {
@@ -260,7 +260,7 @@ Extent extent_of(const Camera& camera, double aspect, const Scene& scene, Instan
   return all;
 }
 
-TEST(Camera, APointIsSeenWhereItsRayGoes) {
+TEST(Camera, ImagePointInvertsRay) {
   for (const auto projection : {Camera::Projection::Perspective, Camera::Projection::Orthographic}) {
     Camera camera = look_at({3.0, -2.0, 7.0}, {40.0, 12.0, -5.0}, 0.9).value();
     camera.projection = projection;
@@ -279,7 +279,7 @@ TEST(Camera, APointIsSeenWhereItsRayGoes) {
   }
 }
 
-TEST(Camera, FramedScenesFillTheImageWithTheirVoxels) {
+TEST(Camera, FramesScenesTightly) {
   std::mt19937_64 random(7);
   for (int i = 0; i < 30; ++i) {
     const Scene scene = scattered_scene(random);
@@ -296,7 +296,7 @@ TEST(Camera, FramedScenesFillTheImageWithTheirVoxels) {
   EXPECT_EQ(frame_scene({}, View::Iso, 1.5).position, frame_view({}, View::Iso, 1.5).position);
 }
 
-TEST(Camera, NothingAndAPointAreFramedAsAUnitCube) {
+TEST(Camera, FramesEmptyBoxAndPointAsUnitCube) {
   for (const View view : kAllViews) {
     const Camera nothing = frame_view({}, view, 1.5);
     expect_near(nothing.position, frame_view({{0, 0, 0}, {1, 1, 1}}, view, 1.5).position);
@@ -306,7 +306,7 @@ TEST(Camera, NothingAndAPointAreFramedAsAUnitCube) {
 }
 
 // Every frame of a turn, and every scene, fits into the image; the camera keeps its distance from the axis.
-TEST(Framing, SeveralScenesAndTurnsAreFramedAlike) {
+TEST(Framing, FitsAllScenesAndTurns) {
   std::mt19937 random(18);
   const auto number = [&](int count) { return static_cast<int>(random() % static_cast<unsigned>(count)); };
   for (int round = 0; round < 20; ++round) {

@@ -21,7 +21,7 @@ double elevation(const SunTime& time) {
   return sun ? std::asin(sun->y) * 180.0 / std::numbers::pi : 0.0;
 }
 
-TEST(SunDirection, StandsAsHighAsTheSeasonSays) {
+TEST(SunDirection, ElevationFollowsSeason) {
   EXPECT_NEAR(elevation({6, 21, 12.0, 52.0}), 90.0 - 52.0 + 23.44, 0.3);
   EXPECT_NEAR(elevation({12, 21, 12.0, 52.0}), 90.0 - 52.0 - 23.44, 0.3);
   EXPECT_NEAR(elevation({3, 21, 12.12, 0.0}), 90.0, 1.0);  // noon is seven minutes late on that day
@@ -30,7 +30,7 @@ TEST(SunDirection, StandsAsHighAsTheSeasonSays) {
   EXPECT_NEAR(elevation({12, 21, 12.0, -52.0}), 90.0 - 52.0 + 23.44, 0.3);
 }
 
-TEST(SunDirection, RisesInTheEastAndStandsInTheSouthAtNoon) {
+TEST(SunDirection, RisesInEastAndIsSouthAtNoon) {
   const DVec3 morning = sun_direction({3, 21, 7.0, 45.0}).value();
   EXPECT_GT(morning.x, 0.9);
   EXPECT_GT(sun_direction({6, 21, 12.0, 45.0}).value().z, 0.3);
@@ -49,7 +49,7 @@ TEST(SunDirection, RejectsInvalidDirections) {
   EXPECT_FALSE(sun_direction({6, 1, 12.0, 91.0}).has_value());
 }
 
-TEST(Environment, NaturalSunStandsBesideTheIsoCamera) {
+TEST(Environment, PlacesNaturalSunNextToIsoCamera) {
   const Environment environment = Environment::natural();
   EXPECT_LT(environment.sun.direction.x, 0.0) << "one of the three sides in the view is in shade";
   EXPECT_GT(environment.sun.direction.z, 0.0);
@@ -58,7 +58,7 @@ TEST(Environment, NaturalSunStandsBesideTheIsoCamera) {
   EXPECT_EQ(Environment::reference().sky.model, SkyModel::Fixed);
 }
 
-TEST(Environment, ScenesWithoutOneHaveTheReference) {
+TEST(Environment, DefaultsToReference) {
   Scene scene;
   EXPECT_EQ(environment_of(scene), Environment::reference());
   scene.environment = Environment::natural();
@@ -66,7 +66,7 @@ TEST(Environment, ScenesWithoutOneHaveTheReference) {
   EXPECT_EQ(environment_of(scene.snapshot()), Environment::natural());
 }
 
-TEST(Environment, OnlySunsDifferInTheDirection) {
+TEST(Environment, DetectsSettingsBeyondSunDirection) {
   EXPECT_TRUE(is_only_sun(Environment::natural({3.0, -1.0, 0.5})));
   Environment environment;
   environment.sun.brightness = 2.0;
@@ -74,13 +74,13 @@ TEST(Environment, OnlySunsDifferInTheDirection) {
   EXPECT_FALSE(is_only_sun(Environment::reference()));
 }
 
-TEST(Environment, DirectionsOfAnyLengthBecomeUnit) {
+TEST(Environment, NormalizesSunDirectionOfAnyLength) {
   for (const double length : {1e-300, 1e-20, 1.0, 1e20, 1e300}) {
     EXPECT_NEAR(glm::length(Sun{.direction = DVec3(1.0, 2.0, -3.0) * length}.unit_direction()), 1.0, 1e-12);
   }
 }
 
-TEST(Environment, DevelopsBrighterUnderEverySky) {
+TEST(Environment, ChoosesExposureAndToneBySky) {
   Environment environment;
   const double gradient = develop_options(environment).exposure;
   environment.sky.model = SkyModel::Physical;
@@ -98,7 +98,7 @@ TEST(Environment, DevelopsBrighterUnderEverySky) {
   EXPECT_EQ(develop_options(environment), (DevelopOptions{3.0, ToneCurve::Aces, 0.5, 2.0, {.mix = 0.1}}));
 }
 
-TEST(Environment, DevelopsTheNightBrighter) {
+TEST(Environment, DevelopsNightBrighter) {
   const auto exposure = [](double degrees, SkyModel sky = SkyModel::Gradient) {
     const double radians = degrees * std::numbers::pi / 180.0;
     Environment environment = Environment::natural({2.0 * std::cos(radians), 2.0 * std::sin(radians), 0.0});
@@ -117,7 +117,7 @@ TEST(Environment, DevelopsTheNightBrighter) {
   EXPECT_EQ(exposure(-60.0, SkyModel::Fixed), day) << "always day";
 }
 
-TEST(Environment, FitsGroundAndFogToAScene) {
+TEST(Environment, FitsGroundAndFogToScene) {
   Environment environment;
   fit_environment({{-1.0, -2.0, -3.0}, {4.0, 5.0, 6.0}}, environment);
   EXPECT_EQ(environment, Environment{});

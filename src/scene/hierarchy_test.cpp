@@ -30,7 +30,7 @@ GridHandle add_voxel(Scene& scene) {
   return scene.add_grid(std::move(grid));
 }
 
-TEST(Hierarchy, AnInstanceIsShownWhenItAndAllAboveItAre) {
+TEST(Hierarchy, ShowsInstanceIfAllAncestorsAreShown) {
   Scene scene;
   const GridHandle grid = add_voxel(scene);
   const LayerHandle layer = scene.add_layer({"houses"});
@@ -55,7 +55,7 @@ TEST(Hierarchy, AnInstanceIsShownWhenItAndAllAboveItAre) {
   EXPECT_FALSE(shown());
 }
 
-TEST(Hierarchy, GroupsInACircleStandAtTheTop) {
+TEST(Hierarchy, TreatsCyclicGroupsAsTopLevel) {
   Scene scene;
   const GridHandle grid = add_voxel(scene);
   const GroupHandle a = group_below(scene, {});
@@ -76,7 +76,7 @@ TEST(Hierarchy, GroupsInACircleStandAtTheTop) {
   EXPECT_EQ(parent_of(scene, below), GroupHandle{});
 }
 
-TEST(Hierarchy, ThousandsOfGroupsInEachOtherAreSortedAtOnce) {
+TEST(Hierarchy, SortsDeepGroupChains) {
   Scene scene;
   std::vector<GroupHandle> chain;
   for (int i = 0; i < 4'000; ++i) {
@@ -95,7 +95,7 @@ TEST(Hierarchy, ThousandsOfGroupsInEachOtherAreSortedAtOnce) {
   EXPECT_EQ(std::vector(around.begin() + 3, around.end()), std::vector(chain.begin() + 3, chain.end()));
 }
 
-TEST(Hierarchy, AfterRemovalWhatWasBelowBelongsToTheParent) {
+TEST(Hierarchy, MovesChildrenOfRemovedGroupToParent) {
   Scene scene;
   const GridHandle grid = add_voxel(scene);
   const GroupHandle top = group_below(scene, {});
@@ -112,7 +112,7 @@ TEST(Hierarchy, AfterRemovalWhatWasBelowBelongsToTheParent) {
   EXPECT_EQ(changes.instances, std::vector{instance});
 }
 
-TEST(Hierarchy, AMovedGroupTakesAllBelowWithIt) {
+TEST(Hierarchy, MovesDescendantsWithGroup) {
   Scene scene;
   const GridHandle grid = add_voxel(scene);
   const GroupHandle ship = group_below(scene, {});

@@ -57,7 +57,7 @@ bool meets_sphere(const Ray& ray, DVec3 centre, double radius) {
   return glm::length(to - along * ray.direction) <= radius;
 }
 
-TEST(LevelOfDetail, ByRadiusHasTheThresholdsOfTheSpecification) {
+TEST(LevelOfDetail, RadiusRuleHasSpecifiedThresholds) {
   EXPECT_EQ(detail_by_radius(0, 100), Detail::Near);
   EXPECT_EQ(detail_by_radius(100, 100), Detail::Near);
   EXPECT_EQ(detail_by_radius(100.000001, 100), Detail::Mid);
@@ -76,7 +76,7 @@ TEST(LevelOfDetail, ByRadiusHasTheThresholdsOfTheSpecification) {
   EXPECT_EQ(detail_by_radius(301, 100, policy), Detail::Far);
 }
 
-TEST(LevelOfDetail, ByPixelsGoesByVoxelsAndTheWhole) {
+TEST(LevelOfDetail, PixelRuleUsesVoxelAndObjectSize) {
   EXPECT_EQ(detail_by_pixels({1.0, 129.0}), Detail::Near);
   EXPECT_EQ(detail_by_pixels({0.999, 129.0}), Detail::Mid);
   EXPECT_EQ(detail_by_pixels({0.999, 128.0}), Detail::Far);
@@ -87,7 +87,7 @@ TEST(LevelOfDetail, ByPixelsGoesByVoxelsAndTheWhole) {
   EXPECT_EQ(detail_by_pixels({2.0, kInfinity}), Detail::Far);
 }
 
-TEST(LevelOfDetail, ContentIsWhatIsThereNotTheOriginNorTheChunk) {
+TEST(LevelOfDetail, ContentSphereSurroundsVoxels) {
   Grid grid;
   EXPECT_EQ(content_sphere(grid).radius, 0.0);
   grid.fill_box({{100, -7, 3}, {141, 34, 44}}, 1);  // 41 wide
@@ -96,7 +96,7 @@ TEST(LevelOfDetail, ContentIsWhatIsThereNotTheOriginNorTheChunk) {
   EXPECT_NEAR(sphere.radius, 20.5 * std::sqrt(3.0), 1e-12);
 }
 
-TEST(LevelOfDetail, AFieldIsContentToo) {
+TEST(LevelOfDetail, ContentSphereIncludesField) {
   SceneGrid grid;
   grid.field.add_box({9.5, -4.5, 0.5}, {30.5, 20.5, 7.5}, 1);
   EXPECT_EQ(content_sphere(grid).centre, DVec3(20.0, 8.0, 4.0));
@@ -121,7 +121,7 @@ TEST(LevelOfDetail, AFieldIsContentToo) {
   EXPECT_TRUE(selected.empty());
 }
 
-TEST(LevelOfDetail, DistancesCountFromTheContentAndInTheInstancesSize) {
+TEST(LevelOfDetail, MeasuresDistanceFromPlacedContent) {
   Scene scene = cubes(1, 20);
   Instance& instance = scene.edit(scene.instances().handles()[0]);
   instance.position = {5, -3, 2};
@@ -146,7 +146,7 @@ TEST(LevelOfDetail, DistancesCountFromTheContentAndInTheInstancesSize) {
   }
 }
 
-TEST(LevelOfDetail, CellsSpanWhatThePolicyAllowsAndNotLessThanHalfOfIt) {
+TEST(LevelOfDetail, ChoosesCoarsestCellsWithinPolicy) {
   const Scene scene = cubes(1, 600);
   const double radius = 300.0 * std::sqrt(3.0);
   DetailPolicy policy;
@@ -168,7 +168,7 @@ TEST(LevelOfDetail, CellsSpanWhatThePolicyAllowsAndNotLessThanHalfOfIt) {
   EXPECT_EQ(last, kMaxGridLevel);
 }
 
-TEST(LevelOfDetail, NothingVisibleIsCulled) {
+TEST(LevelOfDetail, CullsNothingVisible) {
   std::mt19937 random(17);
   std::uniform_real_distribution<double> share(-1.0, 1.0);
   constexpr int kWidth = 48;
@@ -195,7 +195,7 @@ TEST(LevelOfDetail, NothingVisibleIsCulled) {
   EXPECT_GT(culled, 100) << "instances outside the view are culled";
 }
 
-TEST(LevelOfDetail, ACameraThatTremblesAtAThresholdChangesNothing) {
+TEST(LevelOfDetail, KeepsDetailIfCameraTrembles) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> tremor(-1.0, 1.0);
   const Scene scene = cubes(1, 400);
@@ -244,7 +244,7 @@ TEST(LevelOfDetail, IgnoresHistoryFarBeyondAThreshold) {
   }
 }
 
-TEST(LevelOfDetail, AHandleThatIsUsedAgainRemembersNothing) {
+TEST(LevelOfDetail, ForgetsHistoryOfReusedIndex) {
   Scene scene = cubes(1, 400);
   DetailSelector selector;
   std::vector<SelectedInstance> selected;
@@ -259,7 +259,7 @@ TEST(LevelOfDetail, AHandleThatIsUsedAgainRemembersNothing) {
   EXPECT_EQ(selected.at(0).detail, Detail::Near);
 }
 
-TEST(LevelOfDetail, EditsAreSeen) {
+TEST(LevelOfDetail, FollowsEdits) {
   Scene scene = cubes(1, 20);
   DetailSelector selector;
   std::vector<SelectedInstance> selected;
@@ -270,7 +270,7 @@ TEST(LevelOfDetail, EditsAreSeen) {
   EXPECT_NE(selected.at(0).detail, Detail::Far);
 }
 
-TEST(LevelOfDetail, LeavesOutHiddenEmptyAndImpossibleInstances) {
+TEST(LevelOfDetail, SkipsHiddenEmptyAndInvalidInstances) {
   Scene scene = cubes(7);
   const std::vector<InstanceHandle> all = scene.instances().handles();
   scene.edit(all[1]).visible = false;

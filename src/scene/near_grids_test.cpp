@@ -45,7 +45,7 @@ Scene scene_of(const std::vector<IVec3>& voxels) {
   return scene;
 }
 
-TEST(NearGrids, LeavesNearGridsAsTheyAre) {
+TEST(NearGrids, LeaveNearGridsUnchanged) {
   const Scene scene = scene_of({{0, 0, 0}, {60'000, -3, -60'000}});
   const Scene near = near_grids(scene);
   EXPECT_EQ(near.grids().size(), 1U);
@@ -53,7 +53,7 @@ TEST(NearGrids, LeavesNearGridsAsTheyAre) {
   EXPECT_EQ(near.grids()[near.grids().handles().front()].pivot, DVec3(1.0, 2.0, 3.0));
 }
 
-TEST(NearGrids, MovesFarVoxelsToTheirOrigin) {
+TEST(NearGrids, MoveFarVoxelsToTheirOrigin) {
   const Scene scene = scene_of({{20'000'001, 64, -30'000'000}, {20'000'003, 65, -30'000'001}});
   const Scene near = near_grids(scene);
   ASSERT_EQ(near.grids().size(), 1U);
@@ -67,7 +67,7 @@ TEST(NearGrids, MovesFarVoxelsToTheirOrigin) {
   EXPECT_EQ(world_voxels(near), world_voxels(scene));
 }
 
-TEST(NearGrids, DividesGridsWhosePiecesAreFarApart) {
+TEST(NearGrids, SplitGridsWithDistantPieces) {
   const Scene scene = scene_of({{5, 5, 5}, {-20'000'001, 0, 0}, {20'000'001, 0, 0}, {20'000'001, 300'000, 0}});
   const Scene near = near_grids(scene);
   EXPECT_EQ(near.grids().size(), 4U);
@@ -79,7 +79,7 @@ TEST(NearGrids, DividesGridsWhosePiecesAreFarApart) {
   }
 }
 
-TEST(NearGrids, KeepVoxelsTogetherThatTouch) {
+TEST(NearGrids, KeepTouchingVoxelsTogether) {
   // Across the border of two cells of kNearVoxels.
   const int edge = 300 * kNearVoxels;
   const Scene near = near_grids(scene_of({{edge - 1, 0, 0}, {edge, 0, 0}, {edge + 2 * kChunkEdge, 0, 0}}));
@@ -107,7 +107,7 @@ std::size_t count_degenerate(const TriangleMesh& mesh) {
   }));
 }
 
-TEST(NearGrids, KeepShapesInFilesOfMeshes) {
+TEST(NearGrids, KeepShapesOfMeshes) {
   std::vector<IVec3> voxels;
   for (int i = 0; i < 125; ++i)
     voxels.emplace_back(20'000'001 + 2 * (i % 5), 2 * (i / 5 % 5), -20'000'001 + i / 25 * 2);

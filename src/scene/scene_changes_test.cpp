@@ -25,7 +25,7 @@ std::set<Handle<T>> as_set(const std::vector<Handle<T>>& handles) {
   return {handles.begin(), handles.end()};
 }
 
-TEST(SceneChanges, EveryConsumerReceivesChangesSinceItsCursor) {
+TEST(SceneChanges, ReportChangesSinceEachCursor) {
   std::mt19937 random(2);
   Scene scene;
   std::vector<GridHandle> grids;
@@ -103,7 +103,7 @@ TEST(SceneChanges, EveryConsumerReceivesChangesSinceItsCursor) {
   }
 }
 
-TEST(SceneChanges, ABusySceneReportsChangesPerFrame) {
+TEST(SceneChanges, ReportChangesPerFrameOfBusyScene) {
   Scene scene;
   std::vector<GridHandle> grids;
   for (int i = 0; i < 50; ++i) grids.push_back(scene.add_grid({}));
@@ -124,7 +124,7 @@ TEST(SceneChanges, ABusySceneReportsChangesPerFrame) {
   }
 }
 
-TEST(SceneChanges, ReportsEditsThroughAKeptReference) {
+TEST(SceneChanges, ReportEditsThroughKeptReference) {
   Scene scene;
   const GridHandle first = scene.add_grid({});
   Grid& kept = scene.edit(first).grid;
@@ -149,7 +149,7 @@ TEST(SceneChanges, ReportsEditsThroughAKeptReference) {
   EXPECT_EQ(moved.changes_since(cursor).grids, std::vector<GridHandle>{first});
 }
 
-TEST(SceneChanges, ReportsAnEditThatThrows) {
+TEST(SceneChanges, ReportEditThatThrows) {
   Scene scene;
   const GridHandle handle = scene.add_grid({});
   Grid& grid = scene.edit(handle).grid;
@@ -166,7 +166,7 @@ TEST(SceneChanges, ReportsAnEditThatThrows) {
 }
 
 // A consumer that reads during an edit's callback reads the rest of the edit later.
-TEST(SceneChanges, ReportsTheRestOfAnEditReadHalfway) {
+TEST(SceneChanges, ReportRestOfEditReadHalfway) {
   Scene scene;
   const GridHandle handle = scene.add_grid({});
   Grid& grid = scene.edit(handle).grid;
@@ -180,7 +180,7 @@ TEST(SceneChanges, ReportsTheRestOfAnEditReadHalfway) {
   EXPECT_EQ(scene.changes_since(cursor).grids, std::vector<GridHandle>{handle});
 }
 
-TEST(SceneChanges, DifferentGridsMayBeEditedAtOnce) {
+TEST(SceneChanges, AllowConcurrentEditsOfGrids) {
   Scene scene;
   std::vector<Grid*> grids;
   for (int i = 0; i < 8; ++i) grids.push_back(&scene.edit(scene.add_grid({})).grid);
@@ -198,7 +198,7 @@ TEST(SceneChanges, DifferentGridsMayBeEditedAtOnce) {
   }
 }
 
-TEST(SceneChanges, ASnapshotStaysAsItWas) {
+TEST(SceneChanges, SnapshotStaysUnchanged) {
   Scene scene;
   VoxelProperties properties;
   properties.name = "stone";

@@ -27,7 +27,7 @@
 namespace quoin {
 namespace {
 
-TEST(SceneDeathTest, AHandleOfNothingIsAMistake) {
+TEST(SceneDeathTest, AssertsOnInvalidHandle) {
   Scene scene;
   const GridHandle gone = scene.add_grid({});
   scene.remove_grid(gone);
@@ -62,7 +62,7 @@ void expect_to_name_nothing(Scene& scene, const Built& other) {
                scene.remove_group(other.group) || scene.remove_layer(other.layer));
 }
 
-TEST(SceneDeathTest, AHandleOfAnotherSceneIsAMistakeAlsoWhereBothWereBuiltAlike) {
+TEST(SceneDeathTest, AssertsOnHandleOfOtherScene) {
   Built ours;
   const Built other;
   ASSERT_EQ(ours.grid.index, other.grid.index);
@@ -71,7 +71,7 @@ TEST(SceneDeathTest, AHandleOfAnotherSceneIsAMistakeAlsoWhereBothWereBuiltAlike)
   EXPECT_EQ(ours.scene.grids().size() + ours.scene.instances().size(), 2U);
 }
 
-TEST(SceneDeathTest, AHandleOfWhatCameAfterASnapshotIsAMistakeInTheOther) {
+TEST(SceneDeathTest, AssertsOnHandleAddedAfterSnapshot) {
   Built ours;
   Built other{.scene = ours.scene.snapshot()};
   ASSERT_EQ(ours.scene.grids().size(), 1U);
@@ -85,7 +85,7 @@ TEST(SceneDeathTest, AHandleOfWhatCameAfterASnapshotIsAMistakeInTheOther) {
 }
 
 // The instance counts as not placed.
-TEST(SceneDeathTest, AnInstanceOfAnotherScenesGridIsLeftOut) {
+TEST(SceneDeathTest, IgnoresInstanceOfOtherScenesGrid) {
   Built ours;
   Built other;
   ours.scene.edit(ours.grid).grid.set({0, 0, 0}, 1);
@@ -96,7 +96,7 @@ TEST(SceneDeathTest, AnInstanceOfAnotherScenesGridIsLeftOut) {
   EXPECT_TRUE(first_hit(SceneTracer(other.scene), {{-5.0, 0.5, 0.5}, {1.0, 0.0, 0.0}}).has_value());
 }
 
-TEST(SceneDeathTest, MovingAGroupWithoutARotationIsAMistake) {
+TEST(SceneDeathTest, AssertsOnInvalidGroupRotation) {
   Scene scene;
   const GroupHandle group = scene.add_group({});
   const GroupHandle unturned = scene.add_group({});
@@ -108,7 +108,7 @@ TEST(SceneDeathTest, MovingAGroupWithoutARotationIsAMistake) {
   QUOIN_EXPECT_MISTAKE(move_group(scene, unturned, DVec3(0.0), none), "finite and not zero");
 }
 
-TEST(SceneDeathTest, UsingMovedFromScenesAndTreesIsAMistake) {
+TEST(SceneDeathTest, AssertsOnMovedFromSceneOrTree) {
   Scene scene;
   const Scene moved = std::move(scene);
   QUOIN_EXPECT_MISTAKE(scene.add_grid({}), "a scene that was not moved from");  // NOLINT(bugprone-use-after-move)
@@ -122,7 +122,7 @@ TEST(SceneDeathTest, UsingMovedFromScenesAndTreesIsAMistake) {
 }
 
 // NOLINTBEGIN(bugprone-use-after-move): tested here
-TEST(SceneDeathTest, UsingOtherMovedFromObjectsIsAMistake) {
+TEST(SceneDeathTest, AssertsOnOtherMovedFromObjects) {
   const char* const wanted = "an object that was not moved from";
   const auto leave = [](auto& object) { [[maybe_unused]] const auto taken = std::move(object); };
   Scene scene;
@@ -160,7 +160,7 @@ TEST(SceneDeathTest, UsingOtherMovedFromObjectsIsAMistake) {
 }
 
 // Objects that refer to a scene need it at its original address.
-TEST(SceneDeathTest, ASceneThatWasMovedAwayFromWhatLooksAtItIsAMistake) {
+TEST(SceneDeathTest, AssertsOnUpdateAfterSceneMoved) {
   Scene scene;
   SceneTracer tracer(scene);
   CpuRenderer renderer(scene);
@@ -170,7 +170,7 @@ TEST(SceneDeathTest, ASceneThatWasMovedAwayFromWhatLooksAtItIsAMistake) {
 }
 // NOLINTEND(bugprone-use-after-move)
 
-TEST(SceneDeathTest, SlidingWithoutContactsIsAMistake) {
+TEST(SceneDeathTest, AssertsOnSlideWithoutContacts) {
   const Scene scene;
   const SceneTracer tracer(scene);
   SlideOptions options;
@@ -178,7 +178,7 @@ TEST(SceneDeathTest, SlidingWithoutContactsIsAMistake) {
   QUOIN_EXPECT_MISTAKE((void)move_and_slide(tracer, OrientedBox(), DVec3(1.0), options), "at least one contact");
 }
 
-TEST(CameraDeathTest, RequiresAnImageWithPixels) {
+TEST(CameraDeathTest, AssertsOnEmptyImage) {
   QUOIN_EXPECT_MISTAKE((void)ray_through({}, {0.0, 0.0, 0, 5}), "a positive image size");
   DetailSelector selector;
   std::vector<SelectedInstance> selected;
@@ -187,7 +187,7 @@ TEST(CameraDeathTest, RequiresAnImageWithPixels) {
   QUOIN_EXPECT_MISTAKE(selector.select(Scene(), {}, 5, -1, {}, selected), "a positive image size");
 }
 
-TEST(CameraDeathTest, BoundsAndAspectsThatAreNoneAreMistakes) {
+TEST(CameraDeathTest, AssertsOnInvalidBoundsOrAspect) {
   const double infinity = std::numeric_limits<double>::infinity();
   QUOIN_EXPECT_MISTAKE((void)frame_view({DVec3(0.0), DVec3(infinity)}, View::Top, 1.0), "finite bounds");
   QUOIN_EXPECT_MISTAKE((void)frame_view({DVec3(0.0), DVec3(1.0)}, View::Top, -1.0), "a positive, finite aspect");
@@ -205,7 +205,7 @@ TEST(CameraDeathTest, RejectsFramingByInvalidInput) {
   QUOIN_EXPECT_MISTAKE((void)framing.camera(-1), "one of the turns");
 }
 
-TEST(NoiseDeathTest, PlacesBeyondTheLatticeAreMistakes) {
+TEST(NoiseDeathTest, AssertsOnPointsBeyondLattice) {
   QUOIN_EXPECT_MISTAKE((void)noise2(1, 2e9, 0.0), "2.30");
   QUOIN_EXPECT_MISTAKE((void)noise3(1, 0.0, 0.0, -2e9), "2.30");
   const double edge = 1 << 24;  // the limit for five octaves

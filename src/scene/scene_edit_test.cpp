@@ -75,7 +75,7 @@ void expect_filled(const Placed& placed, const Grid& before, VoxelType type, DVe
   EXPECT_GT(within, 0);
 }
 
-TEST(SceneEdit, SpheresFillTheVoxelsWhoseCentresTheyHold) {
+TEST(SceneEdit, SpheresFillVoxelsByCentre) {
   for (unsigned seed = 1; seed <= 24; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     Random random(seed);
@@ -92,7 +92,7 @@ TEST(SceneEdit, SpheresFillTheVoxelsWhoseCentresTheyHold) {
   }
 }
 
-TEST(SceneEdit, BoxesFillTheVoxelsWhoseCentresTheyHold) {
+TEST(SceneEdit, BoxesFillVoxelsByCentre) {
   for (unsigned seed = 1; seed <= 60; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     Random random(seed);
@@ -115,7 +115,7 @@ TEST(SceneEdit, BoxesFillTheVoxelsWhoseCentresTheyHold) {
   }
 }
 
-TEST(SceneEdit, LargeBoxesFillWholeChunksWithin) {
+TEST(SceneEdit, LargeBoxesFillWholeChunks) {
   Random random(3);
   Placed placed = random_placement(random, 0.0);
   placed.scene.edit(placed.instance().grid).grid.clear();
@@ -134,7 +134,7 @@ TEST(SceneEdit, LargeBoxesFillWholeChunksWithin) {
 }
 
 // A tilted beam of 2,000 voxels in a box of 10^9 voxels.
-TEST(SceneEdit, ABeamCrossesOnlyTheChunksOnItsWay) {
+TEST(SceneEdit, BeamCreatesOnlyChunksOnItsWay) {
   Scene scene;
   Instance instance;
   instance.grid = scene.add_grid({});
@@ -147,7 +147,7 @@ TEST(SceneEdit, ABeamCrossesOnlyTheChunksOnItsWay) {
   EXPECT_LT(scene.grids()[instance.grid].grid.chunk_count(), 150U);
 }
 
-TEST(SceneEdit, ClearingALargePartOfTheWorldCostsWhatIsThere) {
+TEST(SceneEdit, ClearingVisitsOnlyExistingChunks) {
   Scene scene;
   SceneGrid made;
   constexpr int kFar = 1'000'000'000;
@@ -164,7 +164,7 @@ TEST(SceneEdit, ClearingALargePartOfTheWorldCostsWhatIsThere) {
   EXPECT_EQ(fill_box(scene, handle, {{0, 0, 0}, DVec3(3.0 * kFar), askew}, kAir), 5);
 }
 
-TEST(SceneEdit, TheWorldsLastVoxelsCanBeReached) {
+TEST(SceneEdit, ReachesLastVoxelsOfWorld) {
   Scene scene;
   SceneGrid made;
   made.grid.set({0, 0, 0}, 1);
@@ -181,7 +181,7 @@ TEST(SceneEdit, TheWorldsLastVoxelsCanBeReached) {
   }
 }
 
-TEST(SceneEdit, AVoxelIsSetAtAPoint) {
+TEST(SceneEdit, SetsVoxelAtPoint) {
   for (unsigned seed = 1; seed <= 50; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     Random random(seed);
@@ -195,7 +195,7 @@ TEST(SceneEdit, AVoxelIsSetAtAPoint) {
   }
 }
 
-TEST(SceneEdit, EditsAreInTheJournals) {
+TEST(SceneEdit, RecordsEditsInJournals) {
   Random random(1);
   Placed placed = random_placement(random, 10.0);
   const DVec3 point = world_from_grid(placed.instance(), placed.grid(), {200.5, 0.5, 0.5});
@@ -241,7 +241,7 @@ TEST(SceneEdit, NonFiniteOrNegativeInputChangesNothing) {
   EXPECT_EQ(fill_box(placed.scene, placed.handle, {}, 3), 0);
 }
 
-TEST(SceneEditDeathTest, AnInstanceOfAGridThatIsNotThereIsAMistake) {
+TEST(SceneEditDeathTest, AssertsOnInstanceWithoutGrid) {
   Scene scene;
   const InstanceHandle handle = scene.add_instance({});
   QUOIN_EXPECT_MISTAKE(set_voxel(scene, handle, {0, 0, 0}, 1), "the instance's grid is in the scene");
@@ -249,7 +249,7 @@ TEST(SceneEditDeathTest, AnInstanceOfAGridThatIsNotThereIsAMistake) {
   QUOIN_EXPECT_MISTAKE(fill_box(scene, handle, {}, 1), "the instance's grid is in the scene");
 }
 
-TEST(SceneEditDeathTest, AnInstanceThatIsNotThereIsAMistake) {
+TEST(SceneEditDeathTest, AssertsOnUnknownInstance) {
   Scene scene;
   QUOIN_EXPECT_MISTAKE(set_voxel(scene, {}, {0, 0, 0}, 1), "the handle names an element");
   QUOIN_EXPECT_MISTAKE(fill_sphere(scene, {}, {0, 0, 0}, 1.0, 1), "the handle names an element");

@@ -76,7 +76,7 @@ void change(Scene& scene, std::mt19937& random) {
   }
 }
 
-TEST(SceneFaces, FollowEveryChangeOfAScene) {
+TEST(SceneFaces, FollowSceneChanges) {
   constexpr unsigned kSeed = 31;
   std::mt19937 random(kSeed);
   Scene scene;
@@ -93,7 +93,7 @@ TEST(SceneFaces, FollowEveryChangeOfAScene) {
   }
 }
 
-TEST(SceneFaces, AreThoseThatAMesherFinds) {
+TEST(SceneFaces, MatchMesher) {
   std::mt19937 random(5);
   Scene scene;
   scene.types = oracle::mixed_types();
@@ -112,7 +112,7 @@ TEST(SceneFaces, AreThoseThatAMesherFinds) {
   }
 }
 
-TEST(SceneFaces, CountsAnotherSceneFromScratch) {
+TEST(SceneFaces, CountAnotherSceneFromScratch) {
   std::mt19937 random(6);
   SceneFaces faces;
   EXPECT_EQ(faces.update(Scene()), FaceCounts());
@@ -127,7 +127,7 @@ TEST(SceneFaces, CountsAnotherSceneFromScratch) {
   }
 }
 
-TEST(SceneFaces, ReadWithThousands) {
+TEST(SceneFaces, PrintThousandsSeparators) {
   EXPECT_EQ(to_string(FaceCounts{1'234, 5'000'676}), "Faces: 1,234 visible of 5,000,676 total");
 }
 

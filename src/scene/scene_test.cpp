@@ -13,7 +13,7 @@ SceneGrid box_grid(IVec3 first, IVec3 last) {
   return grid;
 }
 
-TEST(Scene, WorldFromGridMirrorsThenTurnsAboutThePivot) {
+TEST(Scene, WorldFromGridMirrorsThenTurnsAboutPivot) {
   SceneGrid grid;
   grid.pivot = {1, 2, 3};
   Instance instance;
@@ -26,7 +26,7 @@ TEST(Scene, WorldFromGridMirrorsThenTurnsAboutThePivot) {
   EXPECT_EQ(world_from_grid(instance, grid, {5, 2, 3}), DVec3(100, 200, 302));
 }
 
-TEST(Scene, BoundsAreThoseOfWhatIsPlaced) {
+TEST(Scene, BoundsSurroundPlacedInstances) {
   Scene scene;
   EXPECT_TRUE(scene.bounds(InstanceFilter::All).empty());
   const GridHandle grid = scene.add_grid(box_grid({0, 0, 0}, {3, 1, 0}));
@@ -40,7 +40,7 @@ TEST(Scene, BoundsAreThoseOfWhatIsPlaced) {
   EXPECT_EQ(scene.bounds(InstanceFilter::All).max.y, 52);
 }
 
-TEST(Scene, RemovingAGridRemovesItsInstances) {
+TEST(Scene, RemovesInstancesOfRemovedGrid) {
   Scene scene;
   const GridHandle a = scene.add_grid(box_grid({0, 0, 0}, {0, 0, 0}));
   const GridHandle b = scene.add_grid(box_grid({0, 0, 0}, {1, 1, 1}));
@@ -55,7 +55,7 @@ TEST(Scene, RemovingAGridRemovesItsInstances) {
   EXPECT_EQ(scene.voxel_count(), 8);
 }
 
-TEST(Scene, TheDeclaredBoxHoldsCanvasAndVoxels) {
+TEST(Scene, DeclaredBoxIncludesCanvasAndVoxels) {
   SceneGrid grid = box_grid({5, 5, 5}, {5, 5, 5});
   EXPECT_EQ(grid.declared_box(), (IBox{{5, 5, 5}, {6, 6, 6}}));
   grid.canvas = {{0, 0, 0}, {2, 2, 2}};

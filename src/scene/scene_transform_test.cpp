@@ -45,7 +45,7 @@ double largest(DVec3 v) {
   return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
 }
 
-TEST(GridFromWorld, IsTheInverseOfWorldFromGrid) {
+TEST(GridFromWorld, InvertsWorldFromGrid) {
   for (unsigned seed = 1; seed <= 2'000; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     RandomInstances random(seed);
@@ -69,7 +69,7 @@ TEST(GridFromWorld, IsTheInverseOfWorldFromGrid) {
   }
 }
 
-TEST(WorldFromGrid, IsTheSameAsAMatrix) {
+TEST(WorldFromGrid, MatchesMatrix) {
   for (unsigned seed = 1; seed <= 500; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     RandomInstances random(seed);
@@ -83,7 +83,7 @@ TEST(WorldFromGrid, IsTheSameAsAMatrix) {
   }
 }
 
-TEST(GridFromWorld, IsExactForQuarterTurnsOfWholeNumbers) {
+TEST(GridFromWorld, IsExactForQuarterTurnsOfIntegers) {
   SceneGrid grid;
   grid.pivot = {0.5, 2.0, -3.0};
   for (int turns = 0; turns < 4; ++turns) {
@@ -99,7 +99,7 @@ TEST(GridFromWorld, IsExactForQuarterTurnsOfWholeNumbers) {
   }
 }
 
-TEST(GridFromWorld, IsNowhereWhereTheInstanceHasNoPlace) {
+TEST(GridFromWorld, IsNanForInvalidTransforms) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const SceneGrid grid;
   for (int fault = 0; fault < 5; ++fault) {
@@ -117,7 +117,7 @@ TEST(GridFromWorld, IsNowhereWhereTheInstanceHasNoPlace) {
   }
 }
 
-TEST(VoxelFromWorld, IsTheVoxelWhoseCubeHoldsThePoint) {
+TEST(VoxelFromWorld, ReturnsVoxelContainingPoint) {
   const SceneGrid grid;
   const Instance instance;
   EXPECT_EQ(voxel_from_world(instance, grid, {1.5, -0.5, 2.0}), IVec3(1, -1, 2));
@@ -128,7 +128,7 @@ TEST(VoxelFromWorld, IsTheVoxelWhoseCubeHoldsThePoint) {
   EXPECT_FALSE(voxel_from_world(instance, grid, {0.0, 0.0, std::nan("")}).has_value());
 }
 
-TEST(VoxelFromWorld, AgreesWithWhatARayHits) {
+TEST(VoxelFromWorld, MatchesRayHits) {
   for (const double distance : {0.0, 1e9}) {
     int hits = 0;
     for (unsigned seed = 1; seed <= 60; ++seed) {

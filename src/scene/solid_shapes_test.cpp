@@ -114,7 +114,7 @@ void expect_faces(const Grid& grid, IVec3 chunk, const VoxelRegistry& types, con
   ASSERT_EQ(covered.size(), faces) << "nothing else";
 }
 
-TEST(SolidShapes, AreThoseOfTheGridAfterAnyEdits) {
+TEST(SolidShapes, MatchGridAfterEdits) {
   for (unsigned seed = 0; seed < 6; ++seed) {
     SCOPED_TRACE(seed);
     std::mt19937 random(seed);
@@ -150,7 +150,7 @@ TEST(SolidShapes, AreThoseOfTheGridAfterAnyEdits) {
   }
 }
 
-TEST(SolidShapes, AFullChunkIsABoxAndSixFaces) {
+TEST(SolidShapes, FullChunkIsBoxAndSixFaces) {
   const VoxelRegistry types = three_types();
   Grid grid;
   grid.fill_box({{0, 0, 0}, {64, 64, 64}}, 1);
@@ -168,7 +168,7 @@ TEST(SolidShapes, AFullChunkIsABoxAndSixFaces) {
   EXPECT_TRUE(shapes.boxes({0, 0, 0}).empty());
 }
 
-TEST(SolidShapes, TrianglesLookOutwards) {
+TEST(SolidShapes, TrianglesFaceOutwards) {
   const VoxelRegistry types = three_types();
   Grid grid;
   grid.fill_sphere({32, 32, 32}, 13.3, 1);
@@ -180,7 +180,7 @@ TEST(SolidShapes, TrianglesLookOutwards) {
   EXPECT_NEAR(oracle::signed_volume(mesh), static_cast<double>(grid.voxel_count()), 1e-6);
 }
 
-TEST(SolidShapes, AreFewForATerrain) {
+TEST(SolidShapes, AreFewForTerrain) {
   const VoxelRegistry types = three_types();
   Grid grid;
   for (int z = 0; z < 64; ++z) {

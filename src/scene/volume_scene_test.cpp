@@ -42,7 +42,7 @@ glm::dmat4 placed(const glm::dmat3& axes, DVec3 spacing, IVec3 size) {
   return matrix;
 }
 
-TEST(VolumeScene, SpacingsThatWouldNeedTooManySamplesAreRefusedBeforeAnyIsMade) {
+TEST(VolumeScene, RejectsSpacingWithTooManySamples) {
   for (const double spacing : {1e-7, 1e-9, 1e-25}) {
     const auto scene = scene_from_volume(ball({2, 2, 2}, placed(glm::dmat3(1.0), {spacing, 1, 1}, {2, 2, 2})), {64.0F});
     ASSERT_FALSE(scene);
@@ -50,7 +50,7 @@ TEST(VolumeScene, SpacingsThatWouldNeedTooManySamplesAreRefusedBeforeAnyIsMade) 
   }
 }
 
-TEST(VolumeScene, StandsWhereTheVolumeSays) {
+TEST(VolumeScene, FollowsTransformOfVolume) {
   const glm::dmat3 turned(glm::rotate(glm::dmat4(1.0), 0.6, DVec3{1, 2, -1}));
   glm::dmat3 mirrored = turned;
   mirrored[1] = -mirrored[1];

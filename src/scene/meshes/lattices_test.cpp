@@ -44,7 +44,7 @@ Instance placed(const Scene& scene, const Instance& lattice, GridHandle grid, co
   return instance;
 }
 
-TEST(Lattices, EveryOrientationIsFoundAndNothingElse) {
+TEST(Lattices, FindExactlyTheOrientations) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> any(-1.0, 1.0);
   for (int i = 0; i < AxisOrientation::kCount; ++i) {
@@ -77,7 +77,7 @@ TEST(Lattices, EveryOrientationIsFoundAndNothingElse) {
   }
 }
 
-TEST(Lattices, GroupsAreWhatTouches) {
+TEST(Lattices, GroupTouchingInstances) {
   Scene scene;
   const GridHandle cube = add_grid(scene, {{0, 0, 0}, {4, 4, 4}});
   std::vector<InstanceHandle> all;
@@ -130,7 +130,7 @@ std::map<Triangle, int> triangles_of(const SceneMeshes& meshes) {
   return all;
 }
 
-TEST(UnitedInstances, LookAsIfTheyWereOneGrid) {
+TEST(UnitedInstances, MatchSingleGrid) {
   std::mt19937 random(8);
   for (const bool glass : {false, true}) {
     Scene whole;
@@ -184,7 +184,7 @@ TEST(UnitedInstances, LookAsIfTheyWereOneGrid) {
   }
 }
 
-TEST(UnitedInstances, ThoseThatStandAloneShareAPart) {
+TEST(UnitedInstances, SeparateInstancesSharePart) {
   Scene scene;
   const GridHandle cube = add_grid(scene, {{0, 0, 0}, {3, 3, 3}});
   for (int i = 0; i < 5; ++i) {
@@ -206,7 +206,7 @@ TEST(UnitedInstances, ThoseThatStandAloneShareAPart) {
   EXPECT_EQ(parted->parts.size(), 1U);
 }
 
-TEST(UnitedInstances, TheLastOfSeveralThatHaveAVoxelShowsIt) {
+TEST(UnitedInstances, LastInstanceWinsSharedVoxels) {
   Scene scene;
   ASSERT_TRUE(scene.types.add({}).has_value());
   VoxelProperties red;

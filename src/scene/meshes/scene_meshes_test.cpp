@@ -64,7 +64,7 @@ VoxelType add_type(Scene& scene, const char* name, Visibility visibility) {
   return *scene.types.add(look);
 }
 
-TEST(SceneMeshes, TransparentMaterialsOfFieldsAreClosedBodies) {
+TEST(SceneMeshes, CloseTransparentMaterialsOfFields) {
   Scene scene;
   const VoxelType stone = add_type(scene, "stone", Visibility::Opaque);
   const VoxelType water = add_type(scene, "water", Visibility::Transparent);
@@ -101,7 +101,7 @@ TEST(SceneMeshes, TransparentMaterialsOfFieldsAreClosedBodies) {
   }
 }
 
-TEST(SceneMeshes, OnlyGridsOfDrawnInstancesAreMeshedAndEachOnce) {
+TEST(SceneMeshes, MeshEachDrawnGridOnce) {
   Scene scene;
   const GridHandle twice = add_grid(scene, 3);
   const GridHandle hidden = add_grid(scene, 4);
@@ -125,7 +125,7 @@ TEST(SceneMeshes, OnlyGridsOfDrawnInstancesAreMeshedAndEachOnce) {
   EXPECT_EQ(all->parts.size(), 2U) << "none of the grid that is placed nowhere";
 }
 
-TEST(SceneMeshes, InstancesOfGridsThatAreGoneArePassedOver) {
+TEST(SceneMeshes, SkipInstancesOfMissingGrids) {
   Scene scene;
   Instance lost;
   lost.grid = GridHandle{7, 0};
@@ -136,7 +136,7 @@ TEST(SceneMeshes, InstancesOfGridsThatAreGoneArePassedOver) {
   EXPECT_TRUE(meshes->placements.empty());
 }
 
-TEST(SceneMeshes, ProgressNeverFallsAndEndsAtOne) {
+TEST(SceneMeshes, ReportRisingProgressUpToOne) {
   Scene scene;
   for (const int length : {3, 700, 30, 1000}) place(scene, add_grid(scene, length));
   std::vector<double> reported;
@@ -150,7 +150,7 @@ TEST(SceneMeshes, ProgressNeverFallsAndEndsAtOne) {
   EXPECT_NEAR(reported.back(), 1.0, 1e-9);
 }
 
-TEST(SceneMeshes, AListenerCanStopTheWork) {
+TEST(SceneMeshes, StopWhenCancelled) {
   Scene scene;
   for (const int length : {3, 700}) place(scene, add_grid(scene, length));
   const auto meshes = mesh_scene(scene, {}, {}, [](double) { return false; });
@@ -158,7 +158,7 @@ TEST(SceneMeshes, AListenerCanStopTheWork) {
   EXPECT_EQ(meshes.error().code, ErrorCode::Cancelled);
 }
 
-TEST(SceneMeshes, InstancesWithoutAPlaceAreRefused) {
+TEST(SceneMeshes, RejectInvalidTransforms) {
   const auto refuses = [](const std::function<void(Instance&)>& spoil) {
     Scene scene;
     place(scene, add_grid(scene, 1));
@@ -173,7 +173,7 @@ TEST(SceneMeshes, InstancesWithoutAPlaceAreRefused) {
   EXPECT_TRUE(refuses([](Instance& i) { i.rotation.y = std::numeric_limits<double>::infinity(); }));
 }
 
-TEST(SceneMeshes, RotationsOfAnyLengthTurnAsTheyDoInImages) {
+TEST(SceneMeshes, NormalizeRotationsOfAnyLength) {
   const DQuat turn = glm::angleAxis(0.9, glm::normalize(DVec3(1, 2, -1)));
   const std::array<std::pair<DQuat, DQuat>, 4> cases = {
       {{DQuat(0, 0, 0, 0), DQuat(1, 0, 0, 0)}, {turn * 1e200, turn}, {turn * 1e-200, turn}, {turn * -3.0, -turn}}};
@@ -206,7 +206,7 @@ double distance_from_voxels(const Instance& instance, const SceneGrid& grid, DVe
   return nearest;
 }
 
-TEST(SmoothSceneMeshes, SurfacesLieAroundTheVoxelsOfEveryInstance) {
+TEST(SmoothSceneMeshes, SurroundVoxelsOfEveryInstance) {
   Scene scene;
   const GridHandle grid = add_asymmetric(scene);
   std::mt19937 random(7);
@@ -238,7 +238,7 @@ TEST(SmoothSceneMeshes, SurfacesLieAroundTheVoxelsOfEveryInstance) {
   }
 }
 
-TEST(SmoothSceneMeshes, AreTheSameAtAnyThreadCountAndCanBeCancelled) {
+TEST(SmoothSceneMeshes, AreThreadIndependentAndCancellable) {
   Scene scene;
   place(scene, add_asymmetric(scene));
   place(scene, add_grid(scene, 40));
@@ -265,7 +265,7 @@ TEST(SmoothSceneMeshes, AreTheSameAtAnyThreadCountAndCanBeCancelled) {
   EXPECT_EQ(cancelled.error().code, ErrorCode::Cancelled);
 }
 
-TEST(VolumeMeshes, SimplifyingIsWithinTheErrorOrRefused) {
+TEST(VolumeMeshes, SimplifyWithinErrorIfSupported) {
   Volume ball;
   ball.size = {40, 40, 40};
   for (int i = 0; i < 40 * 40 * 40; ++i) {

@@ -114,7 +114,7 @@ Grid random_voxels(Random& random) {
   return grid;
 }
 
-TEST(Capsule, SweepsMeetVoxelsWhenTheirDistanceIsTheRadius) {
+TEST(Capsule, SweepsStopAtRadiusFromVoxels) {
   Random random(11);
   int hits = 0;
   int inside = 0;
@@ -187,7 +187,7 @@ TEST(Capsule, InvalidCapsulesHitNothing) {
   EXPECT_TRUE(sweep_capsule(tracer, Capsule{}, DVec3(0.0))) << "it starts inside";
 }
 
-TEST(Capsule, FiltersAreThoseOfBoxes) {
+TEST(Capsule, FiltersLikeBoxes) {
   SceneGrid content;
   content.grid.set({0, 0, 0}, kWater);
   content.grid.set({0, -3, 0}, kStone);
@@ -207,7 +207,7 @@ TEST(Capsule, FiltersAreThoseOfBoxes) {
 }
 
 // For distance fields, analysis gives the contact.
-TEST(Capsule, MeetsFieldsWhereTheyAre) {
+TEST(Capsule, StopsAtSurfaceOfField) {
   Random random(4);
   for (int i = 0; i < 60; ++i) {
     const DVec3 normal = random.direction();
@@ -236,7 +236,7 @@ TEST(Capsule, MeetsFieldsWhereTheyAre) {
   }
 }
 
-TEST(Capsule, IsNeverInFieldsThatItHasNotMet) {
+TEST(Capsule, NeverEntersFieldWithoutHit) {
   Random random(8);
   int hits = 0;
   for (int i = 0; i < 80; ++i) {
@@ -291,7 +291,7 @@ TEST(Capsule, WalksLevelGroundStairsAndEdges) {
   EXPECT_NEAR(player.centre.y, 5.0 + 0.9, 3e-3) << "up the stairs";
 }
 
-TEST(Capsule, IsPushedOutToANearFreePlace) {
+TEST(Capsule, IsPushedOutToFreePosition) {
   Random random(21);
   SceneGrid content;
   content.grid.fill_box({{0, 0, 0}, {100, 20, 100}}, kStone);

@@ -69,7 +69,7 @@ struct Way {
   }
 };
 
-TEST(FieldQuery, SweepsStopBeforeEveryPointOfTheSolidAndNoSooner) {
+TEST(FieldQuery, SweepsStopExactlyAtSolid) {
   Random random(11);
   int hits = 0;
   int inside = 0;
@@ -113,7 +113,7 @@ TEST(FieldQuery, SweepsStopBeforeEveryPointOfTheSolidAndNoSooner) {
   EXPECT_GT(inside, 20);
 }
 
-TEST(FieldQuery, OverlapsAreThoseOfThePointsOfTheSolid) {
+TEST(FieldQuery, OverlapsMatchPointsOfSolid) {
   Random random(4);
   int both = 0;
   int neither = 0;
@@ -162,7 +162,7 @@ TEST(FieldQuery, OverlapsAreThoseOfThePointsOfTheSolid) {
 }
 
 // The trilinear field represents a plane exactly where halves hold its samples exactly.
-TEST(FieldQuery, PlanesInAnyOrientationAreMetWhereTheyAre) {
+TEST(FieldQuery, SweepsStopAtPlanesOfAnyOrientation) {
   Random random(21);
   for (const IVec3 normal : {IVec3(0, 1, 0), IVec3(1, 2, 0), IVec3(1, 2, 2), IVec3(-2, 3, 1), IVec3(3, -1, 2)}) {
     DensityGrid field(1024.0F);
@@ -196,7 +196,7 @@ TEST(FieldQuery, PlanesInAnyOrientationAreMetWhereTheyAre) {
   }
 }
 
-TEST(FieldQuery, ABallIsMetByFacesEdgesAndCorners) {
+TEST(FieldQuery, BallIsHitByFacesEdgesAndCorners) {
   Random random(5);
   DensityGrid field;
   field.add_sphere(DVec3(0.25, -0.5, 0.125), 9.0, 1);
@@ -244,7 +244,7 @@ TEST(FieldQuery, NeverTunnelsAtAnySpeed) {
   }
 }
 
-TEST(FieldQuery, APointIsMetWhereItsRayIs) {
+TEST(FieldQuery, PointSweepMatchesRay) {
   Random random(31);
   Scene scene = random_blobs(random);
   place_anywhere(scene.edit(scene.instances().handles()[0]), random);
@@ -266,7 +266,7 @@ TEST(FieldQuery, APointIsMetWhereItsRayIs) {
   EXPECT_GT(hits, 100);
 }
 
-TEST(FieldQuery, AnyHitSaysWhetherThereIsAFirst) {
+TEST(FieldQuery, AnyHitMatchesFirstHit) {
   Random random(53);
   Scene scene = random_blobs(random);
   SceneGrid& blocks = scene.edit(scene.grids().handles()[0]);
@@ -294,7 +294,7 @@ TEST(FieldQuery, AnyHitSaysWhetherThereIsAFirst) {
   EXPECT_GT(std::min(answers[0], answers[1]), 60);
 }
 
-TEST(FieldQuery, MovesOutOfWhatItStartsIn) {
+TEST(FieldQuery, MovesOutOfSolidAtStart) {
   Random random(77);
   int moved_out = 0;
   for (int round = 0; round < 20; ++round) {
@@ -328,7 +328,7 @@ TEST(FieldQuery, MovesOutOfWhatItStartsIn) {
   EXPECT_GT(moved_out, 100);
 }
 
-TEST(FieldQuery, OnlyMaterialsThatCollideStop) {
+TEST(FieldQuery, StopsOnlyAtCollidingMaterials) {
   DensityGrid sea;
   sea.add_box({-8, -8, -8}, {8, 0, 8}, kStone);
   sea.add_box({-8, -8, -8}, {8, 4, 8}, kWater);
@@ -354,7 +354,7 @@ TEST(FieldQuery, OnlyMaterialsThatCollideStop) {
   }
 }
 
-TEST(FieldQuery, TouchingIsNotMeeting) {
+TEST(FieldQuery, TouchingIsNoHit) {
   DensityGrid floor;
   floor.edit({IVec3{-10}, IVec3{11}}, [](IVec3 p, DensitySample) {
     return DensitySample{static_cast<float>(p.y), kStone};
@@ -373,7 +373,7 @@ TEST(FieldQuery, TouchingIsNotMeeting) {
   EXPECT_EQ(hit->normal, DVec3(0, 1, 0));
 }
 
-TEST(FieldQuery, NonFiniteInputMeetsNothing) {
+TEST(FieldQuery, NonFiniteInputHitsNothing) {
   const Scene scene = scene_of(
       [] {
         DensityGrid ball;
@@ -406,7 +406,7 @@ TEST(FieldQuery, NonFiniteInputMeetsNothing) {
 }
 
 // Only the signs of densities and the trilinear field between them matter.
-TEST(FieldQuery, DensitiesNeedNotBeDistances) {
+TEST(FieldQuery, AcceptsDensitiesOfAnyScale) {
   for (const float scale : {1e-4F, 1.0F, 1000.0F}) {
     DensityGrid field(60'000.0F);
     field.edit({IVec3{-10}, IVec3{11}}, [&](IVec3 p, DensitySample) {
@@ -428,7 +428,7 @@ TEST(FieldQuery, DensitiesNeedNotBeDistances) {
 }
 
 // Results do not depend on an instance's placement.
-TEST(FieldQuery, ResultsMoveWithTheInstance) {
+TEST(FieldQuery, ResultsMoveWithInstance) {
   Random random(64);
   Scene plain = random_blobs(random);
   Scene turned = plain.snapshot();
@@ -457,7 +457,7 @@ TEST(FieldQuery, ResultsMoveWithTheInstance) {
   }
 }
 
-TEST(FieldQuery, BlocksAndFieldsOfOneGridAreMetTogether) {
+TEST(FieldQuery, HitsBlocksAndFieldOfOneGrid) {
   SceneGrid farm;
   farm.field.edit({IVec3{-20}, IVec3{21}}, [](IVec3 p, DensitySample) {
     return DensitySample{static_cast<float>(p.y) - 0.5F, kStone};
@@ -486,7 +486,7 @@ TEST(FieldQuery, BlocksAndFieldsOfOneGridAreMetTogether) {
   EXPECT_LT(glm::length(field[0].normal - DVec3(0, 1, 0)), 1e-9);
 }
 
-TEST(FieldQuery, PointsAndPlatesMeetBlocksAsWell) {
+TEST(FieldQuery, PointsAndPlatesHitBlocks) {
   SceneGrid wall;
   wall.grid.fill_box({{2, -3, -3}, {8, 4, 3}}, kWood);
   const Scene scene = scene_of(std::move(wall), {});
@@ -502,7 +502,7 @@ TEST(FieldQuery, PointsAndPlatesMeetBlocksAsWell) {
   }
 }
 
-TEST(FieldQuery, EditsAreMetOnceTheTracerIsUpdated) {
+TEST(FieldQuery, FollowsEditsAfterUpdate) {
   Scene scene = scene_of(DensityGrid(), {});
   const GridHandle grid = scene.grids().handles()[0];
   SceneTracer tracer(scene);

@@ -40,7 +40,7 @@ double least_of_samples(const SceneTracer& tracer, const OrientedBox& box, doubl
   return least;
 }
 
-TEST(FreePlace, AmongHeapsOfBlocksItIsTheNearest) {
+TEST(FreePlace, IsNearestAmongBlocks) {
   Random random(3);
   int found = 0;
   int none = 0;
@@ -71,7 +71,7 @@ TEST(FreePlace, AmongHeapsOfBlocksItIsTheNearest) {
   EXPECT_GT(none, 3);
 }
 
-TEST(FreePlace, AmongTurnedBlocksAndFieldsItIsNearTheNearest) {
+TEST(FreePlace, IsNearNearestAmongTurnedBlocksAndFields) {
   Random random(5);
   int found = 0;
   for (int round = 0; round < 16; ++round) {
@@ -95,7 +95,7 @@ TEST(FreePlace, AmongTurnedBlocksAndFieldsItIsNearTheNearest) {
   EXPECT_GT(found, 8);
 }
 
-TEST(FreePlace, AShaftAsWideAsTheBoxIsFound) {
+TEST(FreePlace, FindsShaftAsWideAsBox) {
   Grid grid;
   grid.fill_box({{-4, -4, -4}, {5, 5, 5}}, kStone);
   grid.fill_box({{1, -4, 0}, {2, 5, 1}}, kAir);
@@ -106,7 +106,7 @@ TEST(FreePlace, AShaftAsWideAsTheBoxIsFound) {
   EXPECT_NEAR(glm::distance(*away, DVec3(0.8, 0.0, -0.1)), 0.0, 1e-9);
 }
 
-TEST(FreePlace, ThereIsNoneBeyondTheDistance) {
+TEST(FreePlace, StaysWithinDistance) {
   Grid grid;
   grid.fill_box({{-9, -9, -9}, {10, 10, 10}}, kStone);
   const Scene scene = scene_of(std::move(grid));
@@ -125,7 +125,7 @@ TEST(FreePlace, ThereIsNoneBeyondTheDistance) {
   EXPECT_NEAR(depenetration(tracer, {{0.5, 9.8, 0.5}, DVec3(0.0), {1, 0, 0, 0}}, 1.0)->y, 0.2, 1e-9);
 }
 
-TEST(FreePlace, ABoxOnAHumpStandsOnItAndStaysThere) {
+TEST(FreePlace, BoxStaysOnHump) {
   Grid grid;
   grid.fill_box({{0, 0, 0}, {100, 21, 100}}, kStone);
   grid.fill_box({{49, 21, 49}, {52, 22, 52}}, kStone);
@@ -144,7 +144,7 @@ TEST(FreePlace, ABoxOnAHumpStandsOnItAndStaysThere) {
   }
 }
 
-TEST(FreePlace, AMovedBoxStaysOut) {
+TEST(FreePlace, MovedBoxStaysOutside) {
   Random random(7);
   for (int round = 0; round < 40; ++round) {
     Instance instance;

@@ -181,7 +181,7 @@ TEST(QueryFilter, RaysPassThroughWaterOfFields) {
   EXPECT_NEAR(rod->fraction * 60.0, floor->t, 1e-4);
 }
 
-TEST(QueryFilter, ABodyThatMovesIgnoresItself) {
+TEST(QueryFilter, MovingBodyIgnoresItself) {
   Scene scene;
   ASSERT_TRUE(scene.types.add({}).has_value());
   SceneGrid ship;
@@ -251,7 +251,7 @@ TEST(SlideContact, ReportsTheHit) {
 }
 
 // A box on a lift, and on a raft that turns and drifts, keeps its position relative to the floor.
-TEST(SlideContact, FloorsThatMoveCarryWhatStandsOnThem) {
+TEST(SlideContact, MovingFloorsCarryBodies) {
   Scene scene;
   ASSERT_TRUE(scene.types.add({}).has_value());
   SceneGrid raft;
@@ -290,7 +290,7 @@ TEST(SlideContact, FloorsThatMoveCarryWhatStandsOnThem) {
 }
 
 // A point, a rod and a plate stop in the same way as boxes, also between two voxels, and slide along a wall.
-TEST(QueryFilter, BoxesWithoutSizeAreStopped) {
+TEST(QueryFilter, StopsBoxesWithoutSize) {
   Scene scene;
   ASSERT_TRUE(scene.types.add({}).has_value());
   SceneGrid ground;

@@ -94,7 +94,7 @@ double entry(const PlainVoxel& voxel, DVec3 origin, DVec3 direction) {
   return low <= high ? low : std::numeric_limits<double>::infinity();
 }
 
-TEST(SceneQuery, FirstHitIsTheNearestVoxelOfAllHereAndFarAway) {
+TEST(SceneQuery, FirstHitIsNearestVoxel) {
   for (const DVec3 away : {DVec3(0.0), DVec3(1e9, -1e9, 1e9)}) {
     Random random(5);
     const Scene scene = random_scene(random, away);
@@ -143,7 +143,7 @@ TEST(SceneQuery, RejectsInvalidRays) {
   EXPECT_TRUE(overlaps(tracer, {DVec3(0.0), DVec3(nan), {}}).empty());
 }
 
-TEST(SceneQuery, PickAndDepthNameTheSameVoxel) {
+TEST(SceneQuery, PickAndDepthFindSameVoxel) {
   Random random(9);
   const Scene scene = random_scene(random, DVec3(0.0));
   const SceneTracer tracer(scene);
@@ -192,7 +192,7 @@ std::vector<InstanceHandle> plain_overlaps(const std::vector<PlainVoxel>& voxels
   return all;
 }
 
-TEST(SceneQuery, SpheresOverlapWhatIsNearerThanTheirRadius) {
+TEST(SceneQuery, SpheresOverlapVoxelsWithinRadius) {
   Random random(21);
   const Scene scene = random_scene(random, DVec3(0.0));
   const SceneTracer tracer(scene);
@@ -229,7 +229,7 @@ bool holds_a_point(const OrientedBox& box, const PlainVoxel& voxel) {
   return false;
 }
 
-TEST(SceneQuery, BoxesOverlapWhatTheyHoldAPointOf) {
+TEST(SceneQuery, BoxesOverlapIntersectedVoxels) {
   Random random(33);
   const Scene scene = random_scene(random, DVec3(0.0));
   const SceneTracer tracer(scene);
@@ -273,7 +273,7 @@ TEST(SceneQuery, TouchingIsNotOverlapping) {
   EXPECT_TRUE(overlaps(tracer, {0.5, 5.5, 0.5}, 2.0).empty());
 }
 
-TEST(SceneQuery, FindsHalvedGridsWhereTheyAreTraced) {
+TEST(SceneQuery, FindsHalvedGridsAsTraced) {
   Scene scene;
   scene.types = stone_and_ghost();
   SceneGrid grid;

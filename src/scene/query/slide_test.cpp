@@ -60,7 +60,7 @@ Player player_at(const SceneTracer& tracer, DVec3 centre, const SlideOptions& op
   return player;
 }
 
-TEST(Walk, StandsStillOnASlope) {
+TEST(Walk, StandsStillOnSlope) {
   const Scene scene = slope_of(30.0);
   const SceneTracer tracer(scene);
   Player player = player_at(tracer, {0.0, 2.5, 0.3}, on_foot());
@@ -77,7 +77,7 @@ TEST(Walk, StandsStillOnASlope) {
   EXPECT_LT(sliding.box.centre.x, settled.x - 0.05);
 }
 
-TEST(Walk, ClimbsWhatIsAFloorAndNothingSteeper) {
+TEST(Walk, ClimbsOnlySlopesUpToLimit) {
   const Scene scene = slope_of(40.0);
   const SceneTracer tracer(scene);
   for (const double max_slope : {45.0, 30.0}) {
@@ -98,7 +98,7 @@ TEST(Walk, ClimbsWhatIsAFloorAndNothingSteeper) {
   }
 }
 
-TEST(Walk, GoesDownWithoutAHop) {
+TEST(Walk, DescendsWithoutHopping) {
   const Scene scene = slope_of(35.0);
   const SceneTracer tracer(scene);
   Player player = player_at(tracer, {10.0, 10.0, 0.3}, on_foot());
@@ -162,7 +162,7 @@ TEST(Walk, FollowsRollingGroundInAnyPlacement) {
   }
 }
 
-TEST(Walk, StepsOntoWhatIsNoHigher) {
+TEST(Walk, StepsUpToStepHeight) {
   SceneGrid yard;
   yard.field.edit({IVec3{-24, -8, -12}, IVec3{25, 9, 13}}, [](IVec3 p, DensitySample) {
     return DensitySample{static_cast<float>(p.y) + 0.5F, kStone};
@@ -194,7 +194,7 @@ TEST(Walk, StepsOntoWhatIsNoHigher) {
   EXPECT_NEAR(down.feet(), -0.5, 2e-3);
 }
 
-TEST(Walk, StepsOntoRocksOfAField) {
+TEST(Walk, StepsOntoRocksOfField) {
   SceneGrid yard;
   yard.field.edit({IVec3{-24, -8, -12}, IVec3{25, 9, 13}}, [](IVec3 p, DensitySample) {
     return DensitySample{static_cast<float>(p.y) + 0.5F, kStone};
@@ -216,7 +216,7 @@ TEST(Walk, StepsOntoRocksOfAField) {
   }
 }
 
-TEST(Walk, DoesNotStepOntoSlopesThatAreTooSteep) {
+TEST(Walk, DoesNotStepOntoSteepSlopes) {
   const Scene scene = slope_of(60.0);
   const SceneTracer tracer(scene);
   Player player = player_at(tracer, {-3.0, 1.0, 0.3}, on_foot(45.0, 0.6));
@@ -247,7 +247,7 @@ TEST(Walk, StaysOutOfCornersOfBlocksAndSlopes) {
 }
 
 // Thousands of steps of all kinds over hills with houses and rocks never end inside a solid.
-TEST(Walk, WandersWithoutComingIntoAnything) {
+TEST(Walk, WandersWithoutEnteringSolids) {
   Random random(2024);
   for (int round = 0; round < 8; ++round) {
     SceneGrid land;
@@ -311,7 +311,7 @@ TEST(Walk, WalksOnBlocks) {
   EXPECT_FALSE(player.last.is_on_floor);
 }
 
-TEST(Walk, ImpossibleDirectionsOfUpAreNoFloors) {
+TEST(Walk, InvalidFloorOptionsDisableFloor) {
   const Scene scene = slope_of(20.0);
   const SceneTracer tracer(scene);
   const double nan = std::nan("");

@@ -111,7 +111,7 @@ TEST(Sweep, NeverTunnelsAtAnySpeed) {
   }
 }
 
-TEST(Sweep, ReadsOnlyWhatCollidesAndIgnoresImpossibleNumbers) {
+TEST(Sweep, HitsOnlyCollidingTypesAndRejectsInvalidInput) {
   Grid grid;
   grid.set({0, 0, 0}, 2);
   grid.set({0, 0, 5}, 1);
@@ -131,7 +131,7 @@ TEST(Sweep, ReadsOnlyWhatCollidesAndIgnoresImpossibleNumbers) {
   EXPECT_TRUE(is_finite(move_and_slide(tracer, box, DVec3(nan)).centre));
 }
 
-TEST(Sweep, RestingNeitherSinksNorJitters) {
+TEST(Sweep, RestsWithoutSinkingOrJitter) {
   Random random(14);
   for (const DVec3 away : {DVec3(0.0), DVec3(1e9, 1e9, -1e9)}) {
     Grid floor;
@@ -181,7 +181,7 @@ TEST(Sweep, SlidesAlongWallsAndStopsInCorners) {
   }
 }
 
-TEST(Sweep, MovesOutOfWhatItStartsIn) {
+TEST(Sweep, MovesOutOfSolidAtStart) {
   Grid floor;
   floor.fill_box({{-5, -3, -5}, {6, 1, 6}}, 1);
   const Scene scene = scene_of_voxels(std::move(floor));

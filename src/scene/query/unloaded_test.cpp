@@ -51,7 +51,7 @@ QueryFilter passed() {
 }
 const OrientedBox kBody{DVec3(32.0, 10.0, 32.0), DVec3(0.4, 0.9, 0.4)};
 
-TEST(UnloadedRays, SayWhereTheyCameToWhatIsNotLoaded) {
+TEST(UnloadedRays, ReportDistanceToUnloadedChunk) {
   PartialScene world;
   world.load_around(2);
   const SceneTracer tracer(world.scene);
@@ -76,7 +76,7 @@ TEST(UnloadedRays, SayWhereTheyCameToWhatIsNotLoaded) {
   EXPECT_EQ(stopped->type, kAir);
 }
 
-TEST(UnloadedRays, AMissIsCertainOnlyWhereAllIsLoaded) {
+TEST(UnloadedRays, HitUnloadedChunksIfTheyBlock) {
   PartialScene world;
   world.load_around(2);
   const SceneTracer tracer(world.scene);
@@ -109,7 +109,7 @@ TEST(UnloadedRays, WholeGridsHaveNoUnloadedChunks) {
   EXPECT_FALSE(sweep_box(tracer, kBody, {0.0, -100.0, 0.0}));
 }
 
-TEST(UnloadedRays, AnEmptyPartialGridIsNotLoadedAnywhere) {
+TEST(UnloadedRays, EmptyPartialGridIsUnloadedEverywhere) {
   PartialScene world;
   const SceneTracer tracer(world.scene);
   EXPECT_FALSE(first_hit(tracer, {{0.5, 0.5, 0.5}, {1.0, 0.0, 0.0}}));
@@ -127,7 +127,7 @@ std::optional<double> by_steps(const Grid& grid, const Ray& ray, double max_t, d
   return std::nullopt;
 }
 
-TEST(UnloadedRays, RandomRaysAgreeWithSmallSteps) {
+TEST(UnloadedRays, MatchSmallStepsOnRandomRays) {
   std::mt19937 random(7);
   PartialScene world;
   std::uniform_int_distribution<int> place(-3, 3);
@@ -155,7 +155,7 @@ TEST(UnloadedRays, RandomRaysAgreeWithSmallSteps) {
   EXPECT_GT(ends, 100);
 }
 
-TEST(UnloadedRays, FollowWhatComesAndGoes) {
+TEST(UnloadedRays, FollowLoadingAndUnloading) {
   PartialScene world;
   world.load_around(2);
   SceneTracer tracer(world.scene);
@@ -175,7 +175,7 @@ TEST(UnloadedRays, FollowWhatComesAndGoes) {
   EXPECT_FALSE(first_hit(tracer, level, kInfinity, met()));
 }
 
-TEST(UnloadedRays, BetweenSamplesOfAFieldBothMustBeLoaded) {
+TEST(UnloadedRays, RequireBothFieldSamplesLoaded) {
   PartialScene world;
   world.scene.edit(world.grid).field.make_partial();
   for (int x = -1; x < 1; ++x) {
@@ -198,7 +198,7 @@ TEST(UnloadedRays, BetweenSamplesOfAFieldBothMustBeLoaded) {
   EXPECT_NEAR(box->fraction * 100.0, 57.0, 1e-6);
 }
 
-TEST(UnloadedSweeps, ABodyDoesNotFallThroughGroundThatHasNotCome) {
+TEST(UnloadedSweeps, BodyDoesNotFallThroughUnloadedGround) {
   PartialScene world;
   world.load_around(1);
   world.unload({0, -1, 0});  // the ground
@@ -236,7 +236,7 @@ TEST(UnloadedSweeps, ABodyDoesNotFallThroughGroundThatHasNotCome) {
   EXPECT_NEAR(stands.centre.y, 0.9, 0.01);
 }
 
-TEST(UnloadedSweeps, ABoxThatStartsInUnloadedChunksStaysThere) {
+TEST(UnloadedSweeps, BoxStaysInUnloadedChunks) {
   PartialScene world;
   world.load_around(1);
   SceneTracer tracer(world.scene);
@@ -269,7 +269,7 @@ TEST(UnloadedSweeps, BoxesAreNotPushedIntoUnloadedChunks) {
   EXPECT_GT(wrong->x, 1.0);
 }
 
-TEST(UnloadedSweeps, TurnedAndScaledGridsAlike) {
+TEST(UnloadedSweeps, WorkInTurnedAndScaledGrids) {
   const DQuat turned = glm::angleAxis(0.4, glm::normalize(DVec3(1.0, 2.0, 3.0)));
   PartialScene world(turned, 0.25);
   world.load_around(1);
@@ -287,7 +287,7 @@ TEST(UnloadedSweeps, TurnedAndScaledGridsAlike) {
   EXPECT_NEAR(ball->fraction * 100.0, 15.0, 1e-6);
 }
 
-TEST(UnloadedOverlaps, AreFoundOnceAnInstance) {
+TEST(UnloadedOverlaps, AreReportedOncePerInstance) {
   PartialScene world;
   world.load_around(1);
   const SceneTracer tracer(world.scene);

@@ -131,7 +131,7 @@ Grid random_grid(std::uint32_t seed, const std::array<VoxelType, 4>& types) {
   return grid;
 }
 
-TEST(MarchedDensity, IsWhatTheObviousVersionSays) {
+TEST(MarchedDensity, MatchesOracle) {
   VoxelRegistry types;
   const VoxelType stone = add(types, Visibility::Opaque);
   const VoxelType water = add(types, Visibility::Transparent);
@@ -162,7 +162,7 @@ TEST(MarchedDensity, IsWhatTheObviousVersionSays) {
   }
 }
 
-TEST(MarchedDensity, AirStaysAirAndGroundGround) {
+TEST(MarchedDensity, KeepsAirAndSolidUniform) {
   VoxelRegistry types;
   const VoxelType stone = add(types, Visibility::Opaque);
   Grid grid;

@@ -71,7 +71,7 @@ std::vector<std::uint64_t> made_anew(const Scene& scene) {
   return impl_of(smooth.scene());
 }
 
-TEST(SmoothScene, HoldsFieldsInThePlacesOfVoxels) {
+TEST(SmoothScene, ReplacesVoxelsByFields) {
   const Made made = small_scene();
   SmoothScene smooth;
   ASSERT_TRUE(smooth.update(made.scene, {2}));
@@ -115,7 +115,7 @@ TEST(SmoothScene, FollowsEdits) {
   }
 }
 
-TEST(SmoothScene, TellsRenderersOfTheChunksThatAnEditReaches) {
+TEST(SmoothScene, ReportsChunksReachedByEdit) {
   Made made = small_scene();
   SmoothScene smooth;
   ASSERT_TRUE(smooth.update(made.scene, {2}));
@@ -131,7 +131,7 @@ TEST(SmoothScene, TellsRenderersOfTheChunksThatAnEditReaches) {
   EXPECT_EQ(changes.items[0].chunk, (IVec3{1, 0, 0}));
 }
 
-TEST(SmoothScene, GoesOnWhereItWasCancelled) {
+TEST(SmoothScene, ResumesAfterCancellation) {
   const Made made = small_scene();
   SmoothScene smooth;
   int rounds = 0;

@@ -29,7 +29,7 @@ void expect_finds_all(const InstanceTree& tree, const std::vector<DBox>& boxes, 
   }
 }
 
-TEST(InstanceTree, FindsEveryBoxThatARayMeets) {
+TEST(InstanceTree, FindsEveryBoxHitByRay) {
   RandomBoxes world(3);
   for (const int count : {0, 1, 2, 5, 64, 300}) {
     const std::vector<DBox> boxes = world.boxes(count);
@@ -37,7 +37,7 @@ TEST(InstanceTree, FindsEveryBoxThatARayMeets) {
   }
 }
 
-TEST(InstanceTree, FindsThemAfterChangesToo) {
+TEST(InstanceTree, FindsEveryBoxAfterChanges) {
   for (unsigned seed = 0; seed < 20; ++seed) {
     SCOPED_TRACE(seed);
     RandomBoxes world(seed);
@@ -63,7 +63,7 @@ TEST(InstanceTree, FindsThemAfterChangesToo) {
 }
 
 // After random movements of boxes, the search cost stays within a factor of a new tree's.
-TEST(InstanceTree, StaysGoodToSearchHoweverBoxesWander) {
+TEST(InstanceTree, StaysEfficientAsBoxesMove) {
   RandomBoxes world(5);
   std::vector<DBox> boxes = world.boxes(1000);
   InstanceTree tree(boxes);
@@ -85,7 +85,7 @@ TEST(InstanceTree, StaysGoodToSearchHoweverBoxesWander) {
   EXPECT_LT(looked_into(tree), 4 * looked_into(InstanceTree(boxes)));
 }
 
-TEST(InstanceTree, LeavesOutMostOfWhatIsFarFromTheRay) {
+TEST(InstanceTree, SkipsMostBoxesFarFromRay) {
   RandomBoxes world(3);
   const InstanceTree tree(world.boxes(1000));
   EXPECT_LT(visited(tree, {{-200, 0, 0}, {1, 0, 0}}, kInfinity).size(), 40U);

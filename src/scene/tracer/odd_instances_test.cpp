@@ -47,7 +47,7 @@ std::vector<SelectedInstance> selected(const Scene& scene) {
   return out;
 }
 
-TEST(OddInstances, ARotationOfAnyLengthIsThatOfUnitLength) {
+TEST(OddInstances, NormalizeRotationsOfAnyLength) {
   const DQuat unit = glm::angleAxis(0.7, glm::normalize(DVec3(1, 2, 3)));
   SlabScene expected;
   expected.scene.add_instance(expected.instance(unit));
@@ -77,7 +77,7 @@ TEST(OddInstances, ARotationOfAnyLengthIsThatOfUnitLength) {
   }
 }
 
-TEST(OddInstances, AZeroRotationIsNone) {
+TEST(OddInstances, TreatZeroRotationAsIdentity) {
   SlabScene world;
   world.scene.add_instance(world.instance({0.0, 0.0, 0.0, 0.0}));
   world.scene.add_instance(world.instance());
@@ -89,7 +89,7 @@ TEST(OddInstances, AZeroRotationIsNone) {
   EXPECT_EQ(chosen[0].distance, chosen[1].distance);
 }
 
-TEST(OddInstances, IgnoresNonFiniteAndSizelessInstances) {
+TEST(OddInstances, IgnoreNonFiniteAndSizelessInstances) {
   SlabScene world;
   std::vector<Instance> odd;
   for (const double bad : {kNan, kInfinity, -kInfinity}) {
@@ -111,7 +111,7 @@ TEST(OddInstances, IgnoresNonFiniteAndSizelessInstances) {
   EXPECT_TRUE(is_finite(frame_scene(world.scene, View::Iso, 1.5, InstanceFilter::All).position));
 }
 
-TEST(OddInstances, ACameraWithinAGridOrAtItsContentsCentreSeesItNear) {
+TEST(OddInstances, SelectNearDetailAroundCamera) {
   SlabScene world;
   const InstanceHandle slab = world.scene.add_instance(world.instance());
   const SceneTracer tracer(world.scene);
@@ -136,7 +136,7 @@ TEST(OddInstances, ACameraWithinAGridOrAtItsContentsCentreSeesItNear) {
   EXPECT_EQ(inside->fraction, 0.0);
 }
 
-TEST(OddInstances, OddQueriesMeetNothingAndComeToAnEnd) {
+TEST(OddInstances, InvalidQueriesHitNothing) {
   SlabScene world;
   world.scene.add_instance(world.instance());
   const SceneTracer tracer(world.scene);
@@ -157,7 +157,7 @@ TEST(OddInstances, OddQueriesMeetNothingAndComeToAnEnd) {
 }
 
 // At such distances, steps of a box's own size are lost in rounding.
-TEST(OddInstances, ASweepThroughEndlessSpaceComesToAnEnd) {
+TEST(OddInstances, SweepsOverHugeDistancesEnd) {
   SlabScene world;
   Instance far = world.instance();
   far.position = {1e17, 0, 0};

@@ -43,7 +43,7 @@ RayPacket random_packet(RandomBoxes& world, int round, DVec3 around) {
   return rays;
 }
 
-TEST(PacketTree, FindsEveryBoxThatARayMeetsAndTheRay) {
+TEST(PacketTree, FindsEveryHitBoxAndItsRays) {
   for (const DVec3 far : {DVec3(0.0), DVec3(1e9, -2e7, 3e8)}) {
     RandomBoxes world(3);
     for (const int count : {0, 1, 2, 5, 64, 300}) {
@@ -66,7 +66,7 @@ TEST(PacketTree, FindsEveryBoxThatARayMeetsAndTheRay) {
   }
 }
 
-TEST(PacketTree, LeavesOutNearlyAllThatARayAloneDoesNotMeet) {
+TEST(PacketTree, SkipsNearlyAllBoxesMissedByRay) {
   RandomBoxes world(4);
   const std::vector<DBox> boxes = world.boxes(1000);
   const PacketTree tree(InstanceTree(boxes), DVec3(0.0));
@@ -86,7 +86,7 @@ TEST(PacketTree, LeavesOutNearlyAllThatARayAloneDoesNotMeet) {
   EXPECT_LT(needless, met / 100 + 1);
 }
 
-TEST(PacketTree, VisitsNearerBoxesFirstAndNoneBeyondReach) {
+TEST(PacketTree, VisitsNearerBoxesFirstWithinReach) {
   std::vector<DBox> boxes;
   for (int i = 0; i < 50; ++i) boxes.push_back({{3.0 * i, -1, -1}, {3.0 * i + 1.0, 1, 1}});
   const PacketTree tree(InstanceTree(boxes), DVec3(0.0));

@@ -39,7 +39,7 @@ DVec3 random_direction(std::mt19937& random) {
   return glm::normalize(DVec3{any(random), any(random), any(random)});
 }
 
-TEST(SceneFields, ReportsChanges) {
+TEST(SceneFields, ReportChanges) {
   BallScene s;
   ChangeCursor cursor = s.scene.cursor();
   DensityGrid& field = s.scene.edit(s.grid).field;
@@ -61,7 +61,7 @@ TEST(SceneFields, ReportsChanges) {
   EXPECT_EQ(s.scene.changes_since(cursor).grids, std::vector<GridHandle>{s.grid});
 }
 
-TEST(SceneFields, ASnapshotKeepsThem) {
+TEST(SceneFields, SnapshotKeepsFields) {
   BallScene s;
   const Scene before = s.scene.snapshot();
   s.scene.edit(s.grid).field.clear();
@@ -71,7 +71,7 @@ TEST(SceneFields, ASnapshotKeepsThem) {
   EXPECT_FALSE(first_hit(SceneTracer(s.scene), {kCentre + DVec3{0, 100, 0}, {0, -1, 0}}));
 }
 
-TEST(SceneFields, BoundsAreAroundTheSolid) {
+TEST(SceneFields, BoundsSurroundSolid) {
   DensityGrid field;
   EXPECT_TRUE(field.bounds().empty());
   field.add_sphere({5.5, 6.5, 7.5}, 3.0, 1);
@@ -86,7 +86,7 @@ TEST(SceneFields, BoundsAreAroundTheSolid) {
   EXPECT_TRUE(field.solid_bounds().empty());
 }
 
-TEST(SceneFields, RaysMeetThemWhereTheyArePlaced) {
+TEST(SceneFields, RaysHitFieldsWherePlaced) {
   const BallScene s;
   const SceneTracer tracer(s.scene);
   std::mt19937 random(1);
@@ -105,7 +105,7 @@ TEST(SceneFields, RaysMeetThemWhereTheyArePlaced) {
   EXPECT_FALSE(first_hit(tracer, {kCentre + DVec3{0, 90, 25}, {0, -1, 0}}));
 }
 
-TEST(SceneFields, TheNearestCountsBesideBlocks) {
+TEST(SceneFields, RaysHitNearestOfFieldsAndBlocks) {
   Scene scene;
   SceneGrid both;
   both.grid.fill_box({{0, 0, 0}, {32, 4, 32}}, 1);
@@ -163,7 +163,7 @@ TEST(SceneFields, TheNearestCountsBesideBlocks) {
   }
 }
 
-TEST(SceneFields, AnUpdatedTracerMatchesANewOne) {
+TEST(SceneFields, UpdatedTracerMatchesNewTracer) {
   BallScene s;
   SceneTracer followed(s.scene);
   std::mt19937 random(3);

@@ -72,7 +72,7 @@ RayPacket random_packet(std::mt19937& random, DVec3 towards) {
   return rays;
 }
 
-TEST(SceneTracer, FirstHitsAreTheNearestOfAllInstances) {
+TEST(SceneTracer, FirstHitsAreNearestOfAllInstances) {
   for (const int instances : {1, 3, 40}) {
     const Scene scene = random_scene(1, instances);
     const SceneTracer tracer(scene);
@@ -105,7 +105,7 @@ TEST(SceneTracer, FirstHitsAreTheNearestOfAllInstances) {
   }
 }
 
-TEST(SceneTracer, AnyHitsAskEveryInstanceFromTheHomeGrid) {
+TEST(SceneTracer, AnyHitsMatchFirstHits) {
   const Scene scene = random_scene(5, 25);
   const SceneTracer tracer(scene);
   const SceneView view(tracer, {3, 4, 5});
@@ -123,7 +123,7 @@ TEST(SceneTracer, AnyHitsAskEveryInstanceFromTheHomeGrid) {
   EXPECT_GT(blocked_count, 100);
 }
 
-TEST(SceneTracer, IsAsExactFarFromTheWorldsOriginAsNearIt) {
+TEST(SceneTracer, IsExactFarFromOrigin) {
   const DVec3 away{1e9, -1e9, 1e9};
   const Scene near_scene = random_scene(9, 12);
   const Scene far_scene = random_scene(9, 12, away);
@@ -153,7 +153,7 @@ TEST(SceneTracer, IsAsExactFarFromTheWorldsOriginAsNearIt) {
   EXPECT_GE(same, all - all / 200);
 }
 
-TEST(SceneTracer, EquallyNearHitsBelongToTheFirstInstance) {
+TEST(SceneTracer, EqualDistancesBelongToFirstInstance) {
   Scene scene;
   scene.types = stone_and_glass();
   SceneGrid grid;
@@ -174,7 +174,7 @@ TEST(SceneTracer, EquallyNearHitsBelongToTheFirstInstance) {
   EXPECT_EQ(hits.grids.t[0], 8.0);
 }
 
-TEST(SceneTracer, LeavesOutHiddenEmptyAndImpossibleInstances) {
+TEST(SceneTracer, SkipsHiddenEmptyAndInvalidInstances) {
   Scene scene;
   scene.types = stone_and_glass();
   SceneGrid grid;
@@ -196,7 +196,7 @@ TEST(SceneTracer, LeavesOutHiddenEmptyAndImpossibleInstances) {
   EXPECT_EQ(placed_in(SceneTracer(scene, InstanceFilter::All)).size(), 2U);
 }
 
-TEST(SceneTracer, TransparentVoxelsAreVisitedAndNeverHit) {
+TEST(SceneTracer, VisitsTransparentVoxelsWithoutHitting) {
   Scene scene;
   scene.types = stone_and_glass();
   SceneGrid glass;
@@ -228,7 +228,7 @@ TEST(SceneTracer, TransparentVoxelsAreVisitedAndNeverHit) {
   EXPECT_DOUBLE_EQ(length, 3.0);
 }
 
-TEST(SceneTracer, CountsTheBytesOfSharedTreesOnce) {
+TEST(SceneTracer, CountsBytesOfSharedTreesOnce) {
   Scene scene;
   const VoxelType stone = scene.types.add({}).value();
   SceneGrid grid;

@@ -231,7 +231,7 @@ std::vector<SelectedInstance> random_details(const SceneTracer& tracer, Changing
   return selected;
 }
 
-TEST(SceneUpdate, AnUpdatedTracerMatchesANewOne) {
+TEST(SceneUpdate, UpdatedTracerMatchesNewTracer) {
   Counts counts;
   for (unsigned seed = 0; seed < 60; ++seed) {
     SCOPED_TRACE(seed);
@@ -277,7 +277,7 @@ struct TwoCubes {
   }
 };
 
-TEST(SceneUpdate, KeepsTheTreesOfGridsAndSaysWhetherTheyChanged) {
+TEST(SceneUpdate, KeepsTreesAndReportsChanges) {
   TwoCubes world;
   SceneTracer tracer(world.scene);
   const OccupancyTree* first = placed_in(tracer)[0].opaque;
@@ -297,7 +297,7 @@ TEST(SceneUpdate, KeepsTheTreesOfGridsAndSaysWhetherTheyChanged) {
 }
 
 // An instance gets a grid without earlier instances while the bounds of another grid change.
-TEST(SceneUpdate, AGridThatIsShownForTheFirstTimeHasItsTrees) {
+TEST(SceneUpdate, BuildsTreesOfNewlyShownGrid) {
   TwoCubes world;
   const GridHandle hidden = world.add_cube();
   SceneTracer tracer(world.scene);
@@ -309,7 +309,7 @@ TEST(SceneUpdate, AGridThatIsShownForTheFirstTimeHasItsTrees) {
   EXPECT_EQ(placed_in(tracer)[1].opaque->bounds(), world.scene.grids()[other].grid.bounds());
 }
 
-TEST(SceneUpdate, OtherConsumersOfTheGridMissNoChanges) {
+TEST(SceneUpdate, OtherConsumersMissNoChanges) {
   TwoCubes world;
   SceneTracer tracer(world.scene);
   Grid& grid = world.scene.edit(world.grid).grid;
