@@ -26,7 +26,7 @@ Node layered(int from, int to, bool is_turned, std::mt19937_64& random) {
   return words;
 }
 
-TEST(BrickStore, BricksReadAsTheyWerePutAndLeaveOutWhatIsAlikeAtAnEnd) {
+TEST(BrickStore, RoundTripsBricksWithoutUniformEnds) {
   std::mt19937_64 random(7);
   BrickStore store;
   std::array<int, 8> shifts{};
@@ -53,7 +53,7 @@ TEST(BrickStore, BricksReadAsTheyWerePutAndLeaveOutWhatIsAlikeAtAnEnd) {
   EXPECT_EQ(std::count(shifts.begin(), shifts.end(), 0), 0) << "every shift was met";
 }
 
-TEST(BrickStore, SlabsThatArePutOneAfterAnotherMakeTheBrickThatIsPutAtOnce) {
+TEST(BrickStore, SingleSlabsMatchWholeBrick) {
   std::mt19937_64 random(11);
   BrickStore store;
   BrickCode brick = kEmptyBrick;
@@ -84,7 +84,7 @@ TEST(BrickStore, SlabsThatArePutOneAfterAnotherMakeTheBrickThatIsPutAtOnce) {
   EXPECT_LE(store.line_count(), 16U + 3U * (4 + 5 + 6 + 7 + 8));
 }
 
-TEST(BrickStore, TheEmptyAndTheFullBrickAreNeverWritten) {
+TEST(BrickStore, NeverWritesEmptyOrFullBrick) {
   BrickStore store;
   const std::array<std::uint64_t, 4> full = {kEveryVoxel, kEveryVoxel, kEveryVoxel, kEveryVoxel};
   const BrickCode with_slab = store.put_slab(kEmptyBrick, 5, full);

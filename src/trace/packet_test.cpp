@@ -180,7 +180,7 @@ void limit_to_hits(const OccupancyTree& tree, RayPacket& rays, InstructionSet wi
   }
 }
 
-TEST_P(Packets, AgreeWithPlainOnesAndOneByOne) {
+TEST_P(Packets, MatchPlainPacketsAndSingleRays) {
   int hits = 0;
   for (int i = 0; i < 5'000; ++i) {
     RayPacket rays = packet();
@@ -193,7 +193,7 @@ TEST_P(Packets, AgreeWithPlainOnesAndOneByOne) {
 }
 
 // Values in inactive lanes change no bit, however small they are.
-TEST_P(Packets, AreTheSameWhateverInactiveLanesHold) {
+TEST_P(Packets, IgnoreInactiveLanes) {
   const InstructionSetOverride over(set());
   int hits = 0;
   for (int i = 0; i < 1'000; ++i) {
@@ -234,7 +234,7 @@ TEST_P(Packets, RaysWithTinyDirectionComponentsAgree) {
   EXPECT_GT(hits, 100);
 }
 
-TEST_P(Packets, RaysInTheSameDirectionAgree) {
+TEST_P(Packets, ParallelRaysAgree) {
   int hits = 0;
   for (int i = 0; i < 4'000; ++i) {
     hits += hits_if_all_agree(tree_, beam(), set());
@@ -256,7 +256,7 @@ TEST_P(Packets, ShortRaysFromNearbyOriginsAgree) {
 }
 
 // Voxels fill whole chunks, so that rays reach the ends of the tables.
-TEST_P(Packets, ShortRaysAtTheEndsOfAWorldAgree) {
+TEST_P(Packets, ShortRaysAtEndsOfWorldAgree) {
   Grid grid;
   const IVec3 corner = IVec3{whole(-2, 1), whole(-2, 1), whole(-2, 1)} * kChunkEdge;
   const IVec3 size = IVec3{whole(1, 2), whole(1, 2), whole(1, 2)} * kChunkEdge;
@@ -280,7 +280,7 @@ TEST_P(Packets, ShortRaysAtTheEndsOfAWorldAgree) {
 }
 
 // Rays that are moved to the bounds and enter them where planes meet, or nearly miss them.
-TEST_P(Packets, DistantRaysTowardsEdgesAndCornersOfAWorldAgree) {
+TEST_P(Packets, DistantRaysToEdgesAndCornersAgree) {
   Grid grid;
   const IVec3 corner{whole(-40, 40), whole(-40, 40), whole(-40, 40)};
   grid.fill_box({corner, corner + IVec3{whole(1, 40), whole(1, 40), whole(1, 40)}}, VoxelType{1});
@@ -313,7 +313,7 @@ TEST_P(Packets, DistantRaysTowardsEdgesAndCornersOfAWorldAgree) {
 }
 
 // Beyond the 4^3 chunks that a beam reads at a time, and beyond the range of single precision.
-TEST_P(Packets, RaysInTheSameDirectionThroughALongWorldAgree) {
+TEST_P(Packets, ParallelRaysThroughLongWorldAgree) {
   Grid grid;
   for (int i = 0; i < 400; ++i) {
     const IVec3 corner{whole(-1'500, 2'500), whole(-40, 90), whole(-70, 75)};
@@ -342,7 +342,7 @@ INSTANTIATE_TEST_SUITE_P(Seeds, Packets,
                          });
 
 // Rays of every kind give the same results in a tree that followed edits and in a new tree.
-TEST(PacketsOf, ThroughATreeThatFollowedEditsAreThoseThroughANewOne) {
+TEST(PacketTracing, UpdatedTreeMatchesNewTree) {
   const VoxelRegistry types = oracle::mixed_types();
   Grid grid;
   grid.fill_box({{-70, -70, -70}, {71, -19, 71}}, 1);
@@ -378,7 +378,7 @@ TEST(PacketsOf, ThroughATreeThatFollowedEditsAreThoseThroughANewOne) {
 }
 
 // Rays too long for single precision, and worlds without flat tables, are walked in double precision.
-TEST(PacketsOf, AcrossALongWorldAndBetweenIslandsAgreeWithTheDenseTracer) {
+TEST(PacketTracing, MatchesDenseTracerOverLongDistances) {
   const VoxelRegistry types = oracle::mixed_types();
   for (const int gap : {5'000, 1'000'000}) {
     Grid grid;
@@ -412,7 +412,7 @@ TEST(PacketsOf, AcrossALongWorldAndBetweenIslandsAgreeWithTheDenseTracer) {
   }
 }
 
-TEST(PacketsOf, InvalidRaysHitNothing) {
+TEST(PacketTracing, InvalidRaysHitNothing) {
   Grid grid;
   grid.fill_box({{-5, -5, -5}, {6, 6, 6}}, 1);
   const OccupancyTree tree = OccupancyTree::build(grid, oracle::mixed_types());
@@ -436,7 +436,7 @@ TEST(PacketsOf, InvalidRaysHitNothing) {
   }
 }
 
-TEST(PacketDeathTest, ALaneThatIsNoneIsAMistake) {
+TEST(PacketDeathTest, AssertsOnInvalidLane) {
   RayPacket rays;
   QUOIN_EXPECT_MISTAKE(rays.set(RayPacket::kSize, Ray{}, kInfinity), "0 <= lane < kSize");
   QUOIN_EXPECT_MISTAKE((void)rays.ray(-1), "0 <= lane < kSize");
@@ -454,7 +454,7 @@ TEST(PacketDeathTest, RejectsActiveLanesBeyondThePacket) {
   QUOIN_EXPECT_MISTAKE((void)any_hits(tree, rays), "active lanes are lanes of the packet");
 }
 
-TEST(PacketDeathTest, ReadingALaneThatHitNothingIsAMistake) {
+TEST(PacketDeathTest, AssertsOnReadOfLaneWithoutHit) {
   PacketHits hits;
   hits.set(3, RayHit{});
   EXPECT_EQ(hits[3].voxel, IVec3(0));

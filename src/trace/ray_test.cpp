@@ -76,20 +76,20 @@ class Rays : public testing::TestWithParam<unsigned> {
   OccupancyTree tree_;
 };
 
-TEST_P(Rays, RandomOnesAgreeWithTheDenseTracer) {
+TEST_P(Rays, RandomRaysMatchDenseTracer) {
   Tally tally;
   for (int i = 0; i < 20'000; ++i) compare(grid_, tree_, {point(), direction()}, kInfinity, tally);
   EXPECT_GT(tally.hits, 20);
   EXPECT_LE(tally.excused, tally.rays / 1'000);
 }
 
-TEST_P(Rays, ShortOnesAgreeWithTheDenseTracer) {
+TEST_P(Rays, ShortRaysMatchDenseTracer) {
   Tally tally;
   for (int i = 0; i < 20'000; ++i) compare(grid_, tree_, {point(), direction()}, uniform(0, 8), tally);
   EXPECT_LE(tally.excused, tally.rays / 1'000);
 }
 
-TEST_P(Rays, AxisAlignedAndFlatOnesAgreeWithTheDenseTracer) {
+TEST_P(Rays, AxisAlignedRaysMatchDenseTracer) {
   Tally tally;
   const double zeros[] = {0.0, -0.0, 1.0, -1.0};
   for (int i = 0; i < 20'000; ++i) {
@@ -103,7 +103,7 @@ TEST_P(Rays, AxisAlignedAndFlatOnesAgreeWithTheDenseTracer) {
   EXPECT_GT(tally.hits, 20);
 }
 
-TEST_P(Rays, ThroughEdgesAndCornersTheyStillHitWhatTheyTouch) {
+TEST_P(Rays, RaysThroughEdgesAndCornersMatchDenseTracer) {
   Tally tally;
   const double signs[] = {-1.0, 1.0};
   for (int i = 0; i < 20'000; ++i) {
@@ -116,7 +116,7 @@ TEST_P(Rays, ThroughEdgesAndCornersTheyStillHitWhatTheyTouch) {
   EXPECT_EQ(tally.excused, 0) << "whole numbers leave nothing to round";
 }
 
-TEST_P(Rays, FarOnesAgreeWithTheDenseTracer) {
+TEST_P(Rays, DistantRaysMatchDenseTracer) {
   Tally tally;
   for (int i = 0; i < 300; ++i) {
     const DVec3 target = point() * 0.5;
@@ -128,7 +128,7 @@ TEST_P(Rays, FarOnesAgreeWithTheDenseTracer) {
 
 INSTANTIATE_TEST_SUITE_P(Seeds, Rays, testing::Range(1U, 13U));
 
-TEST(Ray, ABillionVoxelsFromTheOriginHitsAsAtTheOrigin) {
+TEST(Ray, HitsAreTheSameFarFromOrigin) {
   const IVec3 away{1'000'000'000, -1'000'000'000, 999'999'937};
   Grid near;
   Grid far;
@@ -171,7 +171,7 @@ TEST(Ray, RejectsNonFiniteRay) {
   EXPECT_TRUE(first_hit(tree, {{-1e6, 0.5, 0.5}, {1, 0, 0}}).has_value());
 }
 
-TEST(Ray, HitsAtOnceFromInside) {
+TEST(Ray, HitsImmediatelyFromInside) {
   Grid grid;
   grid.fill_box({{0, 0, 0}, {10, 10, 10}}, 1);
   const OccupancyTree tree = OccupancyTree::build(grid, oracle::mixed_types());
@@ -183,7 +183,7 @@ TEST(Ray, HitsAtOnceFromInside) {
   EXPECT_EQ(hit->face, Direction::PosY);
 }
 
-TEST(Ray, BlockerThatStraddlesTheEndIsHit) {
+TEST(Ray, HitsVoxelThatStartsAtEnd) {
   Grid grid;
   grid.set({10, 0, 0}, 1);
   const OccupancyTree tree = OccupancyTree::build(grid, oracle::mixed_types());
@@ -192,7 +192,7 @@ TEST(Ray, BlockerThatStraddlesTheEndIsHit) {
 }
 
 // Rays from far away are moved to the bounds first. A flat floor is one face of these bounds.
-TEST(Ray, IsHitWithinTheDistanceAtWhichItWasHit) {
+TEST(Ray, HitsWithinReportedDistance) {
   Grid grid;
   grid.fill_box({{-200, -5, -200}, {201, 1, 201}}, 1);
   const OccupancyTree tree = OccupancyTree::build(grid, oracle::mixed_types());
@@ -212,7 +212,7 @@ TEST(Ray, IsHitWithinTheDistanceAtWhichItWasHit) {
   }
 }
 
-TEST(OccupancyTree, HoldsTheTypesAskedForAndFollowsEdits) {
+TEST(OccupancyTree, ContainsRequestedTypesAndFollowsEdits) {
   const VoxelRegistry types = oracle::mixed_types();
   Grid grid = oracle::random_world(3, {IVec3{-70}, IVec3{70}}, 5, 0.001);
   std::array<OccupancyTree, 3> trees;

@@ -104,7 +104,7 @@ void edit(Grid& grid, Random& random, int chunks) {
   }
 }
 
-TEST(TreeUpdate, EqualsARebuiltTree) {
+TEST(TreeUpdate, MatchesRebuiltTree) {
   const VoxelRegistry types = two_of_each();
   for (unsigned seed = 1; seed <= 6; ++seed) {
     Random random(seed);
@@ -130,7 +130,7 @@ TEST(TreeUpdate, EqualsARebuiltTree) {
 }
 
 // Adds voxels one by one, each outside the previous bounds, and then removes them again.
-TEST(TreeUpdate, WorldsThatGrowAndShrink) {
+TEST(TreeUpdate, MatchesRebuiltTreeOfGrowingWorld) {
   const VoxelRegistry types = two_of_each();
   Random random(5);
   Grid grid;
@@ -161,7 +161,7 @@ TEST(TreeUpdate, WorldsThatGrowAndShrink) {
   expect_equal(tree, OccupancyTree::build(grid, types), random, false);
 }
 
-TEST(TreeUpdate, FieldsLikewise) {
+TEST(TreeUpdate, MatchesRebuiltTreeOfField) {
   Random random(11);
   DensityGrid field;
   const auto dig = [&](int chunks) {

@@ -9,9 +9,9 @@
 namespace quoin {
 namespace {
 
-class WalkOfBlocks : public ::testing::Test {
+class BlockWalk : public ::testing::Test {
  protected:
-  WalkOfBlocks() {
+  BlockWalk() {
     for (const Visibility visibility : {Visibility::Transparent, Visibility::Transparent, Visibility::Opaque}) {
       VoxelProperties properties;
       properties.visibility = visibility;
@@ -102,13 +102,13 @@ class WalkOfBlocks : public ::testing::Test {
   Grid grid;
 };
 
-TEST_F(WalkOfBlocks, PassesTheSameVoxelsAtTheSameDistances) {
+TEST_F(BlockWalk, VisitsSameVoxelsAtSameDistances) {
   scatter();
   const OccupancyTree tree = OccupancyTree::build(grid, types, Occupancy::Transparent);
   EXPECT_GT(compare(tree, 4000), 2.0) << "most steps are longer than a voxel";
 }
 
-TEST_F(WalkOfBlocks, FollowsEdits) {
+TEST_F(BlockWalk, FollowsEdits) {
   scatter();
   OccupancyTree tree = OccupancyTree::build(grid, types, Occupancy::Transparent);
   ChangeCursor cursor;
@@ -122,7 +122,7 @@ TEST_F(WalkOfBlocks, FollowsEdits) {
   }
 }
 
-TEST_F(WalkOfBlocks, WholeChunksAreOneStep) {
+TEST_F(BlockWalk, CrossesUniformAreasInLargeSteps) {
   grid.fill_box({{0, 0, 0}, {128, 64, 64}}, ids[0]);
   const OccupancyTree tree = OccupancyTree::build(grid, types, Occupancy::Transparent);
   EXPECT_EQ(blocks(tree, {{-5, 30.5, 30.5}, {1, 0, 0}}, 1e9).size(), 2U);

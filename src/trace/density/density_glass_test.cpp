@@ -151,7 +151,7 @@ int check(const DensityGlass& glass, const Oracle& oracle, const Ray& ray, doubl
   return transparent;
 }
 
-TEST(DensityGlass, SpansAreWhereTheFieldsSay) {
+TEST(DensityGlass, SpansMatchOracle) {
   const Types types;
   std::mt19937 random(3);
   for (const int materials : {2, 3, 4}) {
@@ -188,7 +188,7 @@ DensityGrid lake(const Types& types) {
   return field;
 }
 
-TEST(DensityGlass, BlocksAtATimeAreTheSameAsCells) {
+TEST(DensityGlass, BlocksMatchCells) {
   const Types types;
   const DensityGrid field = lake(types);
   const DensityGlass glass(field, types.registry);
@@ -214,7 +214,7 @@ TEST(DensityGlass, BlocksAtATimeAreTheSameAsCells) {
   EXPECT_LT(2 * by_blocks, by_cells);
 }
 
-TEST(DensityGlass, ABallInWaterIsEnteredAndLeftWhereItIs) {
+TEST(DensityGlass, ReportsEntryAndExitOfBallInWater) {
   const Types types;
   const DensityGrid field = lake(types);
   const DensityGlass glass(field, types.registry);
@@ -270,7 +270,7 @@ TEST(DensityGlass, FollowsEdits) {
   }
 }
 
-TEST(DensityGlass, EndsWhereTheVisitorOrTheRayDoes) {
+TEST(DensityGlass, StopsWithVisitorOrRay) {
   const Types types;
   const DensityGrid field = lake(types);
   const DensityGlass glass(field, types.registry);

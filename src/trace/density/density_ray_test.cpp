@@ -134,7 +134,7 @@ class DensityRays : public testing::TestWithParam<InstructionSet> {
   std::optional<InstructionSetOverride> over_;
 };
 
-TEST_P(DensityRays, AgreeWithTheTrilinearField) {
+TEST_P(DensityRays, MatchTrilinearField) {
   Tally tally;
   std::mt19937 random(1);
   // Within one chunk, over the corner of eight, and among negative numbers.
@@ -162,7 +162,7 @@ TEST_P(DensityRays, AgreeWithTheTrilinearField) {
   EXPECT_LE(tally.left_out, 1);
 }
 
-TEST_P(DensityRays, AreTheSameInPackets) {
+TEST_P(DensityRays, MatchPackets) {
   const DensityGrid field = noise({58, 57, 59}, 12, 5, 0.8);
   const DensityTree tree(field);
   std::mt19937 random(2);
@@ -201,7 +201,7 @@ TEST_P(DensityRays, AreTheSameInPackets) {
 }
 
 // Packets of short rays walk in windows, other packets from cell to cell.
-TEST_P(DensityRays, ShortRaysAreTheSameInPackets) {
+TEST_P(DensityRays, ShortRaysMatchPackets) {
   std::mt19937 random(11);
   int blocked = 0;
   int free = 0;
@@ -238,7 +238,7 @@ TEST_P(DensityRays, ShortRaysAreTheSameInPackets) {
 }
 
 // A ray that enters and leaves a cell at zeros of the field has no root in it.
-TEST_P(DensityRays, RaysThroughZerosAreTheSameInPackets) {
+TEST_P(DensityRays, RaysThroughZerosMatchPackets) {
   std::mt19937 random(12);
   DensityGrid field;
   field.edit({IVec3{58}, IVec3{70}}, [&](IVec3, DensitySample) {
@@ -271,7 +271,7 @@ TEST_P(DensityRays, RaysThroughZerosAreTheSameInPackets) {
   EXPECT_GT(hits, 20'000);
 }
 
-TEST_P(DensityRays, MeetASphereWhereItIs) {
+TEST_P(DensityRays, HitSphereAtItsSurface) {
   for (const DVec3 centre : {DVec3(31.5), DVec3(64.0, -64.0, 0.0), DVec3(1'000'000.0, -2'000'000.0, 500'000.0)}) {
     DensityGrid field;
     field.add_sphere(centre, 20.0, 7);
@@ -310,7 +310,7 @@ DensityGrid long_hills() {
 }
 
 // Single precision skips no cell that a ray passes in double precision, even where it grazes the surface from far away.
-TEST_P(DensityRays, AreThoseOfTheWalkInDoubleHoweverFarTheyGo) {
+TEST_P(DensityRays, MatchDoublePrecisionAtAnyDistance) {
   const DensityGrid field = long_hills();
   const DensityTree tree(field);
   std::mt19937 random(5);
@@ -361,7 +361,7 @@ TEST_P(DensityRays, TinyDirectionComponentsCountAsZero) {
   }
 }
 
-TEST(DensityRay, StopsAtItsEnd) {
+TEST(DensityRay, StopsAtEnd) {
   DensityGrid field;
   field.add_box({10, 10, 10}, {20, 20, 20}, 1);
   const DensityTree tree(field);
@@ -391,7 +391,7 @@ TEST(DensityRay, StopsAtItsEnd) {
   EXPECT_FALSE(any_hit(empty, ray));
 }
 
-TEST(DensityRay, ComingToZeroIsNoHit) {
+TEST(DensityRay, TouchingZeroIsNoHit) {
   // A plane of samples that are exactly 0, with air on both sides.
   DensityGrid field;
   field.edit({IVec3{0}, IVec3{16}}, [](IVec3 p, DensitySample) {
