@@ -16,7 +16,7 @@ std::uint64_t fold(std::uint64_t hash, double value) {
   return (hash ^ std::bit_cast<std::uint64_t>(value)) * 0x100'0000'01B3U;
 }
 
-TEST(Noise, HasTheSameBitsEverywhere) {
+TEST(Noise, IsReproducible) {
   std::uint64_t plane = 0;
   std::uint64_t space = 0;
   std::uint64_t sums = 0;
@@ -32,7 +32,7 @@ TEST(Noise, HasTheSameBitsEverywhere) {
   EXPECT_EQ(sums, 3'318'916'902'815'889'144U);
 }
 
-TEST(Noise, IsZeroOnTheLatticeAndContinuousAcrossIt) {
+TEST(Noise, IsZeroAndContinuousOnLattice) {
   for (int i = -20; i < 20; ++i) {
     EXPECT_EQ(noise2(3, i, 5 - i), 0.0);
     const double y = 0.31 * i;
@@ -41,7 +41,7 @@ TEST(Noise, IsZeroOnTheLatticeAndContinuousAcrossIt) {
   }
 }
 
-TEST(Noise, KeepsItsBoundsAndItsMean) {
+TEST(Noise, KeepsBoundsAndMean) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> place(-1e5, 1e5);
   double sum2 = 0;
@@ -64,7 +64,7 @@ TEST(Noise, KeepsItsBoundsAndItsMean) {
 }
 
 // Slopes are equally likely in all directions of the plane.
-TEST(Noise, PrefersNoDirectionOfThePlane) {
+TEST(Noise, PrefersNoDirection) {
   std::mt19937 random(2);
   std::uniform_real_distribution<double> place(-1e4, 1e4);
   double along[4] = {};
@@ -83,7 +83,7 @@ TEST(Noise, PrefersNoDirectionOfThePlane) {
   EXPECT_LT(*greatest / *least, 1.05);
 }
 
-TEST(Noise, DiffersFromSeedToSeed) {
+TEST(Noise, DiffersBetweenSeeds) {
   int equal = 0;
   for (int i = 0; i < 1'000; ++i) equal += noise2(1, 0.37 * i, 0.5) == noise2(2, 0.37 * i, 0.5);
   EXPECT_LT(equal, 150) << "16 gradients: a few agree by chance at a corner, hardly ever at four";

@@ -59,14 +59,14 @@ bool is_solid(const DensityGrid& field, IVec3 p) {
 }
 
 // Worlds must be reproducible from a saved seed. A change here changes every world.
-TEST(SmoothTerrain, GivesTheSameWorldsEverywhere) {
+TEST(SmoothTerrain, IsReproducible) {
   EXPECT_EQ(hash_of(make(smooth_options_of(42, {2, 2, 2}))), 16'385'689'152'749'590'625U);
   EXPECT_EQ(hash_of(make(smooth_options_of(7, {1, 4, 1}, -3, 5))), 12'034'568'528'284'950'785U);
   EXPECT_EQ(hash_of(make(smooth_options_of(0x1234'5678'9ABC'DEF0U, {2, 1, 1}, -524'288, 524'287))),
             7'607'016'377'544'171'522U);
 }
 
-TEST(SmoothTerrain, IsTheSameForAnyNumberOfThreadsAndChunkByChunk) {
+TEST(SmoothTerrain, IsTheSameByThreadsAndByChunk) {
   const SmoothTerrainOptions options = smooth_options_of(5, {3, 2, 2}, -2, -1);
   const DensityGrid one = make(options);
   const DensityGrid many = make(options, {4});
@@ -88,7 +88,7 @@ TEST(SmoothTerrain, IsTheSameForAnyNumberOfThreadsAndChunkByChunk) {
   }
 }
 
-TEST(SmoothTerrain, PiecesOfOneLandscapeAgreeAwayFromTheirSides) {
+TEST(SmoothTerrain, PiecesMatchAwayFromTheirSides) {
   const DensityGrid left = make(smooth_options_of(11, {2, 2, 1}, 0, 0));
   const DensityGrid right = make(smooth_options_of(11, {2, 2, 1}, 1, 0));
   for (int z = 10; z < 54; ++z) {
@@ -101,7 +101,7 @@ TEST(SmoothTerrain, PiecesOfOneLandscapeAgreeAwayFromTheirSides) {
   }
 }
 
-TEST(SmoothTerrain, IsAClosedBlockWithFlatSides) {
+TEST(SmoothTerrain, IsClosedBlockWithFlatSides) {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     const DensityGrid field = make(smooth_options_of(seed, {2, 2, 1}));
     const IBox solid = field.solid_bounds();
@@ -117,7 +117,7 @@ TEST(SmoothTerrain, IsAClosedBlockWithFlatSides) {
   }
 }
 
-TEST(SmoothTerrain, WithoutOverhangsTheGroundIsThatOfTheBlockyWorld) {
+TEST(SmoothTerrain, MatchesBlockyGroundWithoutOverhangs) {
   SmoothTerrainOptions options = smooth_options_of(42, {2, 2, 2});
   options.overhangs = false;
   options.caves = false;
@@ -181,7 +181,7 @@ std::vector<std::int64_t> pieces(const DensityGrid& field, IVec3 size) {
   return sizes;
 }
 
-TEST(SmoothTerrain, HasOverhangsAndCavesWhereAskedForAndHardlyAnythingFloats) {
+TEST(SmoothTerrain, HasOverhangsAndCavesButHardlyFloats) {
   int overhung = 0;
   int caved = 0;
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
@@ -231,7 +231,7 @@ TEST(SmoothTerrain, DensitiesChangeLikeDistances) {
   EXPECT_LT(steep, near / 50);
 }
 
-TEST(SmoothTerrain, SolidSamplesAreOfTheLandscapesTypesWithGrassOnTop) {
+TEST(SmoothTerrain, HasLandscapeTypesWithGrassOnTop) {
   const SmoothWorld world;
   SmoothTerrainOptions options = smooth_options_of(42, {3, 2, 3});
   options.caves = false;
@@ -253,7 +253,7 @@ TEST(SmoothTerrain, SolidSamplesAreOfTheLandscapesTypesWithGrassOnTop) {
   EXPECT_GT(green, tops / 4);
 }
 
-TEST(SmoothTerrain, RefusesInvalidOptionsAndStopsWhenCancelled) {
+TEST(SmoothTerrain, RejectsInvalidOptionsAndStopsWhenCancelled) {
   const SmoothWorld world;
   for (const IVec3 size : {IVec3(0, 1, 1), IVec3(1, 17, 1), IVec3(513, 1, 1), IVec3(1, 1, -1)}) {
     EXPECT_EQ(generate_smooth_terrain(smooth_options_of(1, size), world.types).error().code,
@@ -266,7 +266,7 @@ TEST(SmoothTerrain, RefusesInvalidOptionsAndStopsWhenCancelled) {
   EXPECT_EQ(cancelled.error().code, ErrorCode::Cancelled);
 }
 
-TEST(SmoothTerrainDeathTest, ChunksOfAnImpossibleWorldAndTypesThatNobodyAddedAreMistakes) {
+TEST(SmoothTerrainDeathTest, AssertsOnInvalidOptionsOrTypes) {
   const SmoothWorld world;
   QUOIN_EXPECT_MISTAKE((void)generate_smooth_terrain_chunk(smooth_options_of(1, {0, 1, 1}), world.types, {0, 0, 0}),
                        "ranges");

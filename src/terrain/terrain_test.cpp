@@ -46,7 +46,7 @@ std::uint64_t hash_of_voxels(const Grid& grid) {
 }
 
 // Worlds must be reproducible from a saved seed. A change here changes every world.
-TEST(Terrain, GivesTheSameWorldsEverywhere) {
+TEST(Terrain, IsReproducible) {
   EXPECT_EQ(hash_of_voxels(make(options_of(42, {4, 2, 4}))), 3'554'384'073'062'585'728U);
   EXPECT_EQ(hash_of_voxels(make(options_of(7, {3, 1, 5}))), 14'850'430'397'421'753'799U);
   EXPECT_EQ(hash_of_voxels(make(options_of(1, {3, 4, 3}, -2, -1))), 13'522'174'968'722'041'687U);
@@ -54,7 +54,7 @@ TEST(Terrain, GivesTheSameWorldsEverywhere) {
             874'518'870'833'611'989U);
 }
 
-TEST(Terrain, IsTheSameForAnyNumberOfThreads) {
+TEST(Terrain, IsTheSameAtAnyThreadCount) {
   const TerrainOptions options = options_of(5, {7, 3, 5}, -3, -2);
   const Grid one = make(options);
   const Grid many = make(options, {4});
@@ -63,7 +63,7 @@ TEST(Terrain, IsTheSameForAnyNumberOfThreads) {
   EXPECT_EQ(one.chunks(), many.chunks());
 }
 
-TEST(Terrain, ChunkByChunkIsTheWorld) {
+TEST(Terrain, ChunksFormWholeWorld) {
   const World world;
   const TerrainOptions options = options_of(11, {5, 2, 3}, -3, 1);
   const Grid whole = make(options);
@@ -76,7 +76,7 @@ TEST(Terrain, ChunkByChunkIsTheWorld) {
   EXPECT_EQ(hash_of_voxels(pieces), hash_of_voxels(whole));
 }
 
-TEST(Terrain, StaysInItsBoxAtAnySize) {
+TEST(Terrain, StaysInBoxAtAnySize) {
   for (const IVec3 size : {IVec3{1, 1, 1}, IVec3{3, 1, 2}, IVec3{4, 2, 4}, IVec3{1, 8, 3}, IVec3{2, 32, 1}}) {
     const IBox box = make(options_of(42, size, -1, -2)).bounds();
     EXPECT_EQ(box.min, IVec3(-32, 0, -64));
@@ -100,7 +100,7 @@ TEST(Terrain, GroundHasNoHolesWithoutCaves) {
   }
 }
 
-TEST(Terrain, PiecesSideBySideFitTogether) {
+TEST(Terrain, PiecesMatchWholeWorld) {
   TerrainOptions options = options_of(9, {4, 2, 2});
   options.plants = options.rocks = false;
   const Grid whole = make(options);
@@ -128,7 +128,7 @@ TEST(Terrain, HasRidgesValleysAndEveryMaterial) {
   EXPECT_GT(highest - lowest, 36);
 }
 
-TEST(Terrain, WaterRestsOnSomething) {
+TEST(Terrain, WaterTouchesAirOnlyAbove) {
   for (const std::uint64_t seed : {1U, 2U, 3U, 42U}) {
     const World world;
     const TerrainOptions options = options_of(seed, {4, 2, 4});
@@ -148,7 +148,7 @@ TEST(Terrain, WaterRestsOnSomething) {
   }
 }
 
-TEST(Terrain, OptionsLeaveThingsOut) {
+TEST(Terrain, OptionsRemoveFeatures) {
   const World world;
   const auto count = [&](const TerrainOptions& options, VoxelType type) {
     const Grid grid = make(options);
@@ -204,7 +204,7 @@ TEST(Terrain, CanBeCancelled) {
   EXPECT_EQ(grid.error().code, ErrorCode::Cancelled);
 }
 
-TEST(TerrainDeathTest, ChunksOfAnImpossibleWorldAndTypesThatNobodyAddedAreMistakes) {
+TEST(TerrainDeathTest, AssertsOnInvalidOptionsOrTypes) {
   const World world;
   QUOIN_EXPECT_MISTAKE((void)generate_terrain_chunk(options_of(1, {0, 1, 1}), world.types, {0, 0, 0}), "ranges");
   QUOIN_EXPECT_MISTAKE((void)generate_terrain_chunk(options_of(1, {1, 1, 1}), {}, {0, 0, 0}), "add_terrain_types");
