@@ -57,7 +57,7 @@ Made surface_of(const TriangleMesh& mesh) {
   return made;
 }
 
-TEST(SurfaceColours, MatchATextureWithOnePixelPerVoxel) {
+TEST(SurfaceColours, MatchTextureWithOnePixelPerVoxel) {
   TriangleMesh mesh = square();
   const auto of = [](int x, int y) {
     return Rgba8{static_cast<std::uint8_t>(x * 16), static_cast<std::uint8_t>(y * 16), 7, 255};
@@ -102,7 +102,7 @@ TEST(SurfaceColours, CoarseTexturesBlendOrStaySharp) {
   EXPECT_EQ(sharp.at(8, 3).colour, (Rgba8{255, 255, 255, 255}));
 }
 
-TEST(SurfaceColours, FollowTheWrapModeBeyondATexture) {
+TEST(SurfaceColours, FollowWrapModeBeyondTexture) {
   TriangleMesh mesh = square();
   for (glm::vec2& place : mesh.uvs) place.x = 4.0F * place.x - 1.0F;
   mesh.textures.push_back(texture(2, [](int x, int) { return Rgba8{static_cast<std::uint8_t>(x * 255), 0, 0, 255}; }));
@@ -119,7 +119,7 @@ TEST(SurfaceColours, FollowTheWrapModeBeyondATexture) {
   EXPECT_EQ(row(TextureWrap::Clamp), "00011111");
 }
 
-TEST(SurfaceColours, WrapPlacesFarOutsideWideTextures) {
+TEST(SurfaceColours, WrapDistantCoordinatesOfWideTextures) {
   constexpr int kWidth = 4096;
   const Rgba8 black{0, 0, 0, 255};
   const Rgba8 red{255, 0, 0, 255};
@@ -193,7 +193,7 @@ TEST(SurfaceColours, CombineVertexColoursAndMaterials) {
   EXPECT_NEAR(made.at(8, 0).colour.r, 193, 1);
 }
 
-TEST(SurfaceColours, InsideASolidIsTheMeanColour) {
+TEST(SurfaceColours, SolidInsideHasMeanColour) {
   TriangleMesh mesh = shapes::box(DVec3(0.0), DVec3(20.0));
   mesh.materials.resize(2);
   mesh.materials[0].colour = {1.0F, 0.0F, 0.0F, 1.0F};
@@ -210,7 +210,7 @@ TEST(SurfaceColours, InsideASolidIsTheMeanColour) {
   EXPECT_EQ(types[made->grid.get({10, 10, 0})].colour, (Rgba8{0, 0, 255, 255}));
 }
 
-TEST(SurfaceColours, OneMaterialAlsoFillsTheInside) {
+TEST(SurfaceColours, SingleMaterialAlsoFillsInside) {
   TriangleMesh mesh = shapes::box({0.25, 0.25, 0.25}, {9.75, 9.75, 9.75});
   MeshMaterial glass;
   glass.name = "glass";
@@ -228,7 +228,7 @@ TEST(SurfaceColours, OneMaterialAlsoFillsTheInside) {
   EXPECT_EQ(deep.visibility, Visibility::Transparent);
 }
 
-TEST(SurfaceColours, RoundsColoursWhenThereAreTooMany) {
+TEST(SurfaceColours, RoundColoursBeyondRegistryLimit) {
   TriangleMesh mesh = square();
   constexpr int kWide = 300;
   constexpr int kTimes = kWide / kSide;
@@ -246,7 +246,7 @@ TEST(SurfaceColours, RoundsColoursWhenThereAreTooMany) {
   EXPECT_NE(made.warnings[0].find("reduced"), std::string::npos);
 }
 
-TEST(SurfaceColours, RespectsTheColourLimit) {
+TEST(SurfaceColours, RespectColourLimit) {
   TriangleMesh mesh = square();
   mesh.textures.push_back(texture(kSide, [](int x, int y) {
     return Rgba8{static_cast<std::uint8_t>(x < 8 ? x : 200 + x), static_cast<std::uint8_t>(y * 2), 0, 255};

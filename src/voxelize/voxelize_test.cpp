@@ -45,7 +45,7 @@ std::vector<TriangleMesh> closed_meshes() {
           shapes::rotated(shapes::torus(kOdd, 9.2, 3.4, 17, 9), {1.0, 0.4, 0.2}, 0.5)};
 }
 
-TEST(VoxelizeSolid, MatchesTheWindingNumberOfClosedMeshes) {
+TEST(VoxelizeSolid, MatchesWindingNumberOfClosedMeshes) {
   for (const TriangleMesh& mesh : closed_meshes()) {
     const Voxels expected = shapes::solid_by_winding(mesh);
     EXPECT_GT(expected.size(), 100U);
@@ -54,7 +54,7 @@ TEST(VoxelizeSolid, MatchesTheWindingNumberOfClosedMeshes) {
   }
 }
 
-TEST(VoxelizeSolid, MatchesTheVoxelCountsOfKnownShapes) {
+TEST(VoxelizeSolid, MatchesVoxelCountsOfKnownShapes) {
   EXPECT_EQ(solid_of(shapes::box(DVec3(-3.0, 0.0, 2.0), DVec3(7.0, 5.0, 4.0))).size(), 10U * 5U * 2U);
   // Centres lie on the sides of the box: those on lower sides count, those on upper sides do not.
   EXPECT_EQ(solid_of(shapes::box(DVec3(0.5), DVec3(4.5))).size(), 64U);
@@ -97,7 +97,7 @@ TEST(VoxelizeSolid, MergesSelfIntersectingParts) {
   EXPECT_LT(solid_of(mesh, SolidVoxels::Parity).size(), both.size());
 }
 
-TEST(VoxelizeSolid, IgnoresTheOrientationOfParts) {
+TEST(VoxelizeSolid, IgnoresOrientationOfParts) {
   for (TriangleMesh mesh : closed_meshes()) {
     const Voxels expected = solid_of(mesh);
     std::mt19937 random(7);
@@ -196,7 +196,7 @@ TEST(VoxelizeSolid, OpenTrianglesMatchVotesOfSixRays) {
   }
 }
 
-TEST(VoxelizeSurface, ThickCoversEveryCubeThatTheMeshMeets) {
+TEST(VoxelizeSurface, ThickCoversEveryIntersectedCube) {
   for (const TriangleMesh& mesh : closed_meshes()) {
     const Voxels expected = shapes::surface_by_boxes(mesh);
     EXPECT_TRUE(voxelized(mesh, SurfaceVoxels::Separating26, SolidVoxels::None) == expected) << expected.size();
@@ -207,14 +207,14 @@ TEST(VoxelizeSurface, ThickCoversEveryCubeThatTheMeshMeets) {
   EXPECT_TRUE(voxelized(box, SurfaceVoxels::Separating26, SolidVoxels::None) == shapes::surface_by_boxes(box));
 }
 
-TEST(VoxelizeSurface, ThinCoversVoxelsWhoseCentreLinesMeetTheMesh) {
+TEST(VoxelizeSurface, ThinCoversVoxelsWithIntersectedCentreLines) {
   for (const TriangleMesh& mesh : closed_meshes()) {
     const Voxels expected = shapes::surface_by_lines(mesh);
     EXPECT_TRUE(voxelized(mesh, SurfaceVoxels::Separating6, SolidVoxels::None) == expected) << expected.size();
   }
 }
 
-TEST(VoxelizeSurface, BetweenVoxelsBelongsToItsInnerSide) {
+TEST(VoxelizeSurface, SideBetweenVoxelsCoversInnerVoxels) {
   TriangleMesh box = shapes::box(DVec3(0.0), DVec3(4.0));
   constexpr std::size_t kShell = 4U * 4U * 4U - 2U * 2U * 2U;
   EXPECT_EQ(voxelized(box, SurfaceVoxels::Separating6, SolidVoxels::None).size(), kShell);
@@ -248,7 +248,7 @@ TEST(VoxelizeSurface, KeepsTipsOnTheLatticeWithinBounds) {
   }
 }
 
-TEST(VoxelizeSurface, OnCentresCoversVoxelsOnEverySide) {
+TEST(VoxelizeSurface, SidesOnCentresCoverTheirVoxels) {
   const TriangleMesh box = shapes::box(DVec3(0.5), DVec3(3.5));
   EXPECT_EQ(voxelized(box, SurfaceVoxels::Separating6, SolidVoxels::Winding).size(), 64U);
   EXPECT_EQ(voxelized(box, SurfaceVoxels::Separating6, SolidVoxels::None).size(), 56U);
@@ -257,7 +257,7 @@ TEST(VoxelizeSurface, OnCentresCoversVoxelsOnEverySide) {
   EXPECT_EQ(voxelized(long_box, SurfaceVoxels::Separating6, SolidVoxels::Winding).size(), 4U * 4U * 11U);
 }
 
-TEST(VoxelizeSurface, RoundingNextToASideCountsAsOnIt) {
+TEST(VoxelizeSurface, ToleratesRoundingAtSides) {
   for (const double size : {0.1, 0.02, 1.0 / 3.0, 0.7}) {
     const TriangleMesh box = shapes::box(DVec3(3.0 * size, -7.0 * size, 11.0 * size), DVec3(17.0 * size));
     VoxelRegistry types;
@@ -315,7 +315,7 @@ bool reaches_inside(const Voxels& surface, const Voxels& solid, const DBox& boun
   return false;
 }
 
-TEST(VoxelizeSurface, separates) {
+TEST(VoxelizeSurface, SeparatesInsideFromOutside) {
   int thin_ones_with_gaps = 0;
   for (const TriangleMesh& mesh : closed_meshes()) {
     const Voxels solid = solid_of(mesh);
@@ -330,7 +330,7 @@ TEST(VoxelizeSurface, separates) {
   EXPECT_GT(thin_ones_with_gaps, 0);
 }
 
-TEST(VoxelizeSurface, WarnsOfTipsThatAreThinnerThanAVoxel) {
+TEST(VoxelizeSurface, WarnsOfTipsThinnerThanVoxel) {
   // A spike of 20 voxels, 0.4 thick at its base, between the centre lines.
   TriangleMesh mesh;
   mesh.positions = {{0.05, 0, 0.05}, {0.45, 0, 0.05}, {0.05, 0, 0.45}, {0.1, 20, 0.1}};
@@ -350,7 +350,7 @@ TEST(VoxelizeSurface, WarnsOfTipsThatAreThinnerThanAVoxel) {
   EXPECT_GE(thick->grid.bounds().max.y, 20);
 }
 
-TEST(VoxelizeField, HasTheDistancesOfTheMesh) {
+TEST(VoxelizeField, HasDistancesOfMesh) {
   for (const TriangleMesh& mesh : closed_meshes()) {
     VoxelRegistry types;
     DistanceFieldOptions options;
@@ -436,7 +436,7 @@ TEST(Voxelize, CanBeCancelled) {
   EXPECT_EQ(last, 1.0);
 }
 
-TEST(VoxelLattice, HasTheRequestedNumberOfVoxels) {
+TEST(VoxelLattice, HasRequestedNumberOfVoxels) {
   const TriangleMesh mesh = shapes::box(DVec3(-1.0, 2.0, 5.0), DVec3(3.0, 3.0, 7.0));
   VoxelRegistry types;
   VoxelizeOptions options;
@@ -462,7 +462,7 @@ TEST(VoxelizeDeathTest, RejectsRowsAndBitsBeyondChunk) {
   QUOIN_EXPECT_MISTAKE((void)voxelizing::bits_between(0, 65), "0 <= first < end <= 64");
 }
 
-TEST(VoxelizeDeathTest, RejectsChunksAndTrianglesThatAreNotThere) {
+TEST(VoxelizeDeathTest, RejectsUnknownChunksAndTriangles) {
   const TriangleMesh mesh = shapes::box(kOdd, kOdd + 3.0);
   const auto frame = voxelizing::Frame::make(mesh, {}, 0.0);
   ASSERT_TRUE(frame.has_value());
