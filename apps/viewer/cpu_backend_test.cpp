@@ -86,7 +86,7 @@ struct Watched {
   CpuBackend backend;
 };
 
-TEST(CpuBackend, NoImageOfAnEarlierRequestIsSettled) {
+TEST(CpuBackend, SettlesOnlyLatestRequest) {
   const LoadedScene loaded = small_scene();
   Watched watched(loaded.scene, 10.0);
   ViewRequest request = request_for(loaded.scene, View::Iso);
@@ -103,7 +103,7 @@ TEST(CpuBackend, NoImageOfAnEarlierRequestIsSettled) {
   EXPECT_FALSE(frame->colour.width == request.width && frame->is_settled);
 }
 
-TEST(CpuBackend, PathsConvergeToThePathTracersImage) {
+TEST(CpuBackend, PathsConvergeToPathTracerImage) {
   const LoadedScene loaded = small_scene();
   Watched watched(loaded.scene);
   ViewRequest request = request_for(loaded.scene, View::Iso, 48, 32);
@@ -134,7 +134,7 @@ TEST(CpuBackend, PathsConvergeToThePathTracersImage) {
   EXPECT_FALSE(watched.settle().empty());
 }
 
-TEST(CpuBackend, PathsGoOnAcrossEditsAndBeginAgainWithTheView) {
+TEST(CpuBackend, PathsContinueAcrossEditsAndRestartOnMove) {
   LoadedScene loaded = small_scene();
   Watched watched(loaded.scene);
   ViewRequest request = request_for(loaded.scene, View::Iso, 96, 64);
@@ -178,7 +178,7 @@ TEST(CpuBackend, PathsGoOnAcrossEditsAndBeginAgainWithTheView) {
   EXPECT_LT(elsewhere.front().colour.width, request.width);
 }
 
-TEST(CpuBackend, TheSettledImageIsTheRenderersToTheByte) {
+TEST(CpuBackend, SettlesOnExactRendererImage) {
   const LoadedScene loaded = small_scene();
   Watched watched(loaded.scene);
   for (const View view : {View::Iso, View::Top}) {
@@ -195,7 +195,7 @@ TEST(CpuBackend, TheSettledImageIsTheRenderersToTheByte) {
 }
 
 // Path-traced images of the night are no darker than half of the marched ones.
-TEST(CpuBackend, PathsShowTheNightAsRaysDo) {
+TEST(CpuBackend, PathsMatchBrightnessOfRaysAtNight) {
   const LoadedScene loaded = small_scene();
   const auto mean = [](const Image& image) {
     double sum = 0.0;
@@ -217,7 +217,7 @@ TEST(CpuBackend, PathsShowTheNightAsRaysDo) {
   }
 }
 
-TEST(CpuBackend, ShowsNoFrameOfTheModeBefore) {
+TEST(CpuBackend, DropsFramesOfPreviousMode) {
   const LoadedScene loaded = small_scene();
   Watched watched(loaded.scene);
   ViewRequest request = request_for(loaded.scene, View::Iso);
@@ -238,7 +238,7 @@ TEST(CpuBackend, ShowsNoFrameOfTheModeBefore) {
 }
 
 #ifdef __linux__
-TEST(CpuBackend, DrawsAtALowerPriorityThanTheWindow) {
+TEST(CpuBackend, DrawsAtLowerThreadPriority) {
   const auto yielding = [] {
     int count = 0;
     for (const auto& task : std::filesystem::directory_iterator("/proc/self/task")) {
@@ -256,7 +256,7 @@ TEST(CpuBackend, DrawsAtALowerPriorityThanTheWindow) {
 }
 #endif
 
-TEST(CpuBackend, ImagesBecomeFiner) {
+TEST(CpuBackend, RefinesImages) {
   const LoadedScene loaded = small_scene();
   Watched watched(loaded.scene);
   watched.backend.show(request_for(loaded.scene, View::Iso, 400, 300));
@@ -269,7 +269,7 @@ TEST(CpuBackend, ImagesBecomeFiner) {
   EXPECT_FALSE(watched.backend.take()) << "a frame is taken once";
 }
 
-TEST(CpuBackend, MovingImagesAreNeverUnderAQuarterOfTheSizeHoweverSlow) {
+TEST(CpuBackend, KeepsMovingImagesAboveQuarterSize) {
   const LoadedScene loaded = small_scene();
   // No image is that fast.
   Watched watched(loaded.scene, 1e-9);
@@ -291,7 +291,7 @@ TEST(CpuBackend, MovingImagesAreNeverUnderAQuarterOfTheSizeHoweverSlow) {
   EXPECT_EQ(frames.back().colour.rgb, expected(loaded.scene, request).rgb);
 }
 
-TEST(CpuBackend, MovingImagesAreWholeWhereThereIsTime) {
+TEST(CpuBackend, DrawsMovingImagesInFullWhenTimeAllows) {
   const LoadedScene loaded = small_scene();
   Watched watched(loaded.scene, 1e9);
   ViewRequest request = request_for(loaded.scene, View::Iso);
@@ -336,7 +336,7 @@ TEST(CpuBackend, DraftsMovingImagesInReducedLightWhenTimeIsShort) {
   }
 }
 
-TEST(CpuBackend, TheSameRequestAgainChangesNothing) {
+TEST(CpuBackend, IgnoresRepeatedRequest) {
   const LoadedScene loaded = small_scene();
   Watched watched(loaded.scene);
   const ViewRequest request = request_for(loaded.scene, View::Iso);
@@ -348,7 +348,7 @@ TEST(CpuBackend, TheSameRequestAgainChangesNothing) {
   EXPECT_FALSE(watched.backend.take());
 }
 
-TEST(CpuBackend, ManyRequestsEndWithTheLast) {
+TEST(CpuBackend, SettlesOnLastOfManyRequests) {
   const LoadedScene loaded = small_scene();
   Watched watched(loaded.scene, 0.01);
   ViewRequest request;
@@ -365,7 +365,7 @@ TEST(CpuBackend, ManyRequestsEndWithTheLast) {
   FAIL() << "never settled";
 }
 
-TEST(CpuBackend, EditsAreDrawn) {
+TEST(CpuBackend, DrawsEdits) {
   const unsigned seed = std::random_device{}();
   SCOPED_TRACE("seed " + std::to_string(seed));
   std::mt19937 random(seed);
@@ -390,7 +390,7 @@ TEST(CpuBackend, EditsAreDrawn) {
   }
 }
 
-TEST(CpuBackend, DensitiesAreTheSliceToTheByte) {
+TEST(CpuBackend, DensityModeMatchesSliceExactly) {
   Scene scene;
   SceneGrid ball;
   ball.field.add_sphere({20, 21, 22}, 15.0, kAir);
@@ -420,7 +420,7 @@ TEST(CpuBackend, DensitiesAreTheSliceToTheByte) {
   EXPECT_TRUE(watched.backend.pick(request.camera, 45, 30, request.width, request.height));
 }
 
-TEST(CpuBackend, WithoutAFieldThereAreNoDensities) {
+TEST(CpuBackend, ReportsDensityModeWithoutField) {
   const Scene scene;
   Watched watched(scene);
   ViewRequest request;
@@ -431,7 +431,7 @@ TEST(CpuBackend, WithoutAFieldThereAreNoDensities) {
   EXPECT_TRUE(watched.backend.fault());
 }
 
-TEST(CpuBackend, PicksWhatIsSeen) {
+TEST(CpuBackend, PicksVisibleVoxel) {
   const LoadedScene loaded = small_scene();
   Watched watched(loaded.scene);
   const ViewRequest request = request_for(loaded.scene, View::Top);
@@ -445,7 +445,7 @@ TEST(CpuBackend, PicksWhatIsSeen) {
   EXPECT_FALSE(watched.backend.pick(request.camera, 0.5, 0.5, 0, 0));
 }
 
-TEST(CpuBackend, NothingIsPickedWhileAnEditIsTakenOver) {
+TEST(CpuBackend, PicksAgainAfterSceneUpdate) {
   const LoadedScene loaded = small_scene();
   Watched watched(loaded.scene);
   EXPECT_TRUE(watched.backend.is_up_to_date());
@@ -460,7 +460,7 @@ TEST(CpuBackend, NothingIsPickedWhileAnEditIsTakenOver) {
   EXPECT_GT(hits, 0);
 }
 
-TEST(CpuBackend, ImpossibleRequestsAreFaults) {
+TEST(CpuBackend, ReportsInvalidRequests) {
   const LoadedScene loaded = small_scene();
   Watched watched(loaded.scene);
   ViewRequest request = request_for(loaded.scene, View::Iso);
@@ -474,7 +474,7 @@ TEST(CpuBackend, ImpossibleRequestsAreFaults) {
   EXPECT_FALSE(watched.backend.fault());
 }
 
-TEST(CpuBackend, StopsInTheMiddle) {
+TEST(CpuBackend, StopsDuringRendering) {
   const LoadedScene loaded = small_scene();
   for (int i = 0; i < 30; ++i) {
     Watched watched(loaded.scene);
@@ -484,7 +484,7 @@ TEST(CpuBackend, StopsInTheMiddle) {
   }
 }
 
-TEST(CpuBackend, AnEmptySceneIsSky) {
+TEST(CpuBackend, SettlesOnEmptyScene) {
   const Scene empty;
   Watched watched(empty);
   watched.backend.show(request_for(empty, View::Iso, 20, 10));
@@ -497,7 +497,7 @@ MakeBackend by_processor() {
   };
 }
 
-TEST(Loader, ReadsOnItsOwnThread) {
+TEST(Loader, ReadsInBackground) {
   const ScratchFolder folder("loader");
   std::vector<std::string> warnings;
   ASSERT_TRUE(small_document().write(folder.file("hill.vox"), warnings));
@@ -511,7 +511,7 @@ TEST(Loader, ReadsOnItsOwnThread) {
   EXPECT_EQ(opened->backend->name(), "processor");
 }
 
-TEST(Loader, MayBeCancelledAtAnyTime) {
+TEST(Loader, CancelsAtAnyTime) {
   const ScratchFolder folder("cancelled");
   std::vector<std::string> warnings;
   ASSERT_TRUE(small_document().write(folder.file("hill.vox"), warnings));
@@ -526,7 +526,7 @@ TEST(Loader, MayBeCancelledAtAnyTime) {
   }
 }
 
-TEST(Loader, ErrorsArriveToo) {
+TEST(Loader, ReportsReadErrors) {
   Bell bell;
   Loader loader("/nowhere/a.vox", {}, {}, by_processor(), [&bell] { bell.ring(); });
   ASSERT_TRUE(bell.wait());

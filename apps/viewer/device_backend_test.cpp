@@ -145,7 +145,7 @@ TEST_F(DeviceBackendTest, RaysSettleOnTheCpuImageAndFollowEdits) {
   EXPECT_LT(differing(images.back(), by_processor(document, request), 2), 0.001);
 }
 
-TEST_F(DeviceBackendTest, MeshesShowTheScenePromptlyAndFollowEditsAndUndo) {
+TEST_F(DeviceBackendTest, MeshesFollowEditsAndUndo) {
   Document document = small_document();
   const auto backend = backend_of(document);
   ViewRequest request = request_for(document, DrawMode::Blocks);
@@ -173,7 +173,7 @@ TEST_F(DeviceBackendTest, MeshesShowTheScenePromptlyAndFollowEditsAndUndo) {
   EXPECT_FALSE(backend->stats().empty());
 }
 
-TEST_F(DeviceBackendTest, EveryModeAndShadingDraws) {
+TEST_F(DeviceBackendTest, DrawsEveryModeAndShading) {
   Document document = small_document();
   const auto backend = backend_of(document);
   std::vector<Image> all;
@@ -270,7 +270,7 @@ TEST_F(DeviceBackendTest, PathTracingTimesDoNotAffectRays) {
   EXPECT_EQ(width_of_first(), 20);
 }
 
-TEST_F(DeviceBackendTest, SmoothMeshesTakeTheOcclusionThatIsWanted) {
+TEST_F(DeviceBackendTest, SmoothMeshesUseRequestedOcclusion) {
   Document document = small_document();
   const auto backend = backend_of(document);
   ViewRequest request = request_for(document, DrawMode::Smooth);
@@ -302,7 +302,7 @@ TEST_F(DeviceBackendTest, SmoothMeshesTakeTheOcclusionThatIsWanted) {
   EXPECT_EQ(edited.rgb, images.back().rgb);
 }
 
-TEST_F(DeviceBackendTest, TheProcessorMarchesRaysWithSmoothOcclusion) {
+TEST_F(DeviceBackendTest, MarchesSmoothOcclusionOnCpu) {
   const Document document = small_document();
   const auto backend = backend_of(document);
   ViewRequest request = request_for(document, DrawMode::Rays);
@@ -315,7 +315,7 @@ TEST_F(DeviceBackendTest, TheProcessorMarchesRaysWithSmoothOcclusion) {
   EXPECT_EQ(images.back().rgb, by_processor(document, request).rgb);
 }
 
-TEST_F(DeviceBackendTest, TheProcessorMarchesRaysWhereThatIsFaster) {
+TEST_F(DeviceBackendTest, MarchesRaysOnFasterCpu) {
   const Document document = small_document();
   const auto backend = backend_of(document, false);
   const ViewRequest request = request_for(document, DrawMode::Rays);
@@ -326,7 +326,7 @@ TEST_F(DeviceBackendTest, TheProcessorMarchesRaysWhereThatIsFaster) {
   EXPECT_EQ(backend->name(), "processor");
 }
 
-TEST_F(DeviceBackendTest, TheDeviceDrawsLevelsOfDetail) {
+TEST_F(DeviceBackendTest, DrawsLevelsOfDetailOnDevice) {
   const Document document = small_document();
   const auto backend = backend_of(document, true);
   ViewRequest request = request_for(document, DrawMode::Rays);
@@ -343,7 +343,7 @@ TEST_F(DeviceBackendTest, TheDeviceDrawsLevelsOfDetail) {
   }
 }
 
-TEST_F(DeviceBackendTest, MeshesHaveLevelsOfDetail) {
+TEST_F(DeviceBackendTest, DrawsMeshesWithLevelsOfDetail) {
   const Document document = small_document();
   const auto backend = backend_of(document, true);
   ViewRequest request = request_for(document, DrawMode::Blocks);
@@ -364,7 +364,7 @@ TEST_F(DeviceBackendTest, MeshesHaveLevelsOfDetail) {
   }
 }
 
-TEST_F(DeviceBackendTest, WithoutADeviceThereAreRays) {
+TEST_F(DeviceBackendTest, FallsBackToRaysWithoutDevice) {
   const Document document = small_document();
   DeviceBackendOptions options;
   options.cpu.threads = {2};
@@ -384,7 +384,7 @@ TEST_F(DeviceBackendTest, WithoutADeviceThereAreRays) {
   EXPECT_FALSE(settle(backend).empty());
 }
 
-TEST_F(DeviceBackendTest, DrawsTheSameOnAThreadAndFollowsEdits) {
+TEST_F(DeviceBackendTest, DrawsAlikeOnSeparateThread) {
   Document document = small_document();
   const auto at_once = backend_of(document, true);
   // The drawing thread has its own device.
@@ -427,7 +427,7 @@ class DeviceBackendLight : public DeviceBackendTest, public ::testing::WithParam
 INSTANTIATE_TEST_SUITE_P(Meshes, DeviceBackendLight, ::testing::Values(DrawMode::Blocks, DrawMode::Smooth),
                          [](const auto& mode) { return mode.param == DrawMode::Blocks ? "Blocks" : "Smooth"; });
 
-TEST_P(DeviceBackendLight, IsAllThereAtRestWhereAProcessorActsAsTheDevice) {
+TEST_P(DeviceBackendLight, ShowsFullLightAtRestOnSoftwareDevice) {
   if (!is_processor()) GTEST_SKIP() << "a graphics card draws all light itself";
   Document document = small_document();
   const auto backend = backend_of(document, false);
@@ -468,7 +468,7 @@ TEST_P(DeviceBackendLight, IsAllThereAtRestWhereAProcessorActsAsTheDevice) {
   EXPECT_GT(differing(edges.back(), wanted(), 8), 0.02);
 }
 
-TEST_F(DeviceBackendTest, SmoothScenesThatAreTooLargeForLightSaySoAndStayTheDevices) {
+TEST_F(DeviceBackendTest, ReportsSmoothScenesTooLargeForLight) {
   if (!is_processor()) GTEST_SKIP() << "a graphics card draws all light itself";
   Document document = small_document();
   DeviceBackendOptions options;
@@ -495,7 +495,7 @@ TEST_F(DeviceBackendTest, SmoothScenesThatAreTooLargeForLightSaySoAndStayTheDevi
   EXPECT_EQ(backend->activity(), "");
 }
 
-TEST_F(DeviceBackendTest, WhileADeviceOpensThereAreRaysAndEdits) {
+TEST_F(DeviceBackendTest, DrawsRaysAndEditsWhileDeviceOpens) {
   Document document = small_document();
   std::promise<void> go_on;
   DeviceBackendOptions options;
@@ -533,7 +533,7 @@ TEST_F(DeviceBackendTest, WhileADeviceOpensThereAreRaysAndEdits) {
   EXPECT_EQ(images.back().rgb, same.back().rgb);
 }
 
-TEST_F(DeviceBackendTest, MeshImagesAreNeverUnderAQuarterOfTheSizeHoweverSlow) {
+TEST_F(DeviceBackendTest, KeepsMeshImagesAboveQuarterSize) {
   const Document document = small_document();
   DeviceBackendOptions options;
   options.cpu.threads = {2};
@@ -553,7 +553,7 @@ TEST_F(DeviceBackendTest, MeshImagesAreNeverUnderAQuarterOfTheSizeHoweverSlow) {
   EXPECT_EQ(images.back().width, request.width);
 }
 
-TEST_F(DeviceBackendTest, ReportsModesThatTakeTooLong) {
+TEST_F(DeviceBackendTest, ReportsSlowModes) {
   const Document document = small_document();
   for (const double seconds : {1e-9, 1e9}) {
     DeviceBackendOptions options;
@@ -584,7 +584,7 @@ Document wide_document() {
   return {std::move(loaded), "wide.vox"};
 }
 
-TEST_F(DeviceBackendTest, ChunksStillToMeshAreCounted) {
+TEST_F(DeviceBackendTest, ReportsMeshingProgress) {
   const Document document = wide_document();
   const auto backend = backend_of(document, false);
   backend->show(request_for(document, DrawMode::Blocks));
@@ -610,7 +610,7 @@ TEST_F(DeviceBackendTest, ChunksStillToMeshAreCounted) {
 }
 
 // An image of the sky alone would not be better than the rays that stand in.
-TEST_F(DeviceBackendTest, TheFirstImageOfMeshesShowsSome) {
+TEST_F(DeviceBackendTest, FirstMeshImageShowsSurfaces) {
   const Document document = wide_document();
   const Scene sky;
   for (const DrawMode mode : {DrawMode::Blocks, DrawMode::Smooth}) {
@@ -634,7 +634,7 @@ TEST_F(DeviceBackendTest, TheFirstImageOfMeshesShowsSome) {
   }
 }
 
-TEST_F(DeviceBackendTest, PausesWithoutAnEditLoseNothing) {
+TEST_F(DeviceBackendTest, SettlesAfterPausesWithoutEdits) {
   const Document document = small_document();
   for (int attempt = 0; attempt < 10; ++attempt) {
     const auto backend = backend_of(document, false);
@@ -648,7 +648,7 @@ TEST_F(DeviceBackendTest, PausesWithoutAnEditLoseNothing) {
   }
 }
 
-TEST_F(DeviceBackendTest, EndsWhileChunksAreMeshed) {
+TEST_F(DeviceBackendTest, StopsDuringMeshing) {
   const Document document = wide_document();
   for (int attempt = 0; attempt < 2; ++attempt) {
     const auto backend = backend_of(document, false);
@@ -657,7 +657,7 @@ TEST_F(DeviceBackendTest, EndsWhileChunksAreMeshed) {
   }
 }
 
-TEST_F(DeviceBackendTest, MemoryThatRunsOutIsAFaultLikeOthers) {
+TEST_F(DeviceBackendTest, FallsBackToCpuWhenOutOfMemory) {
   const Document document = small_document();
   DeviceBackendOptions options;
   options.cpu.threads = {2};
@@ -674,7 +674,7 @@ TEST_F(DeviceBackendTest, MemoryThatRunsOutIsAFaultLikeOthers) {
   EXPECT_FALSE(settle(backend).empty()) << "the processor stands in";
 }
 
-TEST_F(DeviceBackendTest, TheFirstImageIsSoonThereHoweverSlowTheDevice) {
+TEST_F(DeviceBackendTest, DrawsCoarseFirstImageAtOnce) {
   const Document document = small_document();
   const auto backend = backend_of(document);
   ViewRequest request = request_for(document, DrawMode::Rays);
@@ -696,7 +696,7 @@ TEST_F(DeviceBackendTest, TheFirstImageIsSoonThereHoweverSlowTheDevice) {
   }
 }
 
-TEST_F(DeviceBackendTest, ADeviceThatIsForgottenIsStoodInFor) {
+TEST_F(DeviceBackendTest, DrawsOnCpuAfterForgettingDevice) {
   const Document document = small_document();
   const auto backend = backend_of(document);
   const ViewRequest request = request_for(document, DrawMode::Rays);
@@ -708,7 +708,7 @@ TEST_F(DeviceBackendTest, ADeviceThatIsForgottenIsStoodInFor) {
   EXPECT_EQ(images.back().rgb, by_processor(document, request).rgb);
 }
 
-TEST_F(DeviceBackendTest, ManyRequestsEndWithTheLast) {
+TEST_F(DeviceBackendTest, SettlesOnLastOfManyRequests) {
   const Document document = small_document();
   const auto backend = backend_of(document);
   ViewRequest request = request_for(document, DrawMode::Rays);

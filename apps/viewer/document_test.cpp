@@ -40,7 +40,7 @@ SceneHit hit_at(const Document& document, IVec3 voxel, Direction face) {
   return hit;
 }
 
-TEST(Brush, CoversWhatItsShapeSays) {
+TEST(Brush, CoversExactShape) {
   for (const BrushShape shape : {BrushShape::Box, BrushShape::Sphere}) {
     for (const int radius : {0, 1, 3}) {
       Grid grid;
@@ -81,7 +81,7 @@ TEST(Brush, DoesNothingAtTheCoordinateLimits) {
   EXPECT_EQ(apply({BrushAction::Place, BrushShape::Sphere, 9, 3}, {0, std::numeric_limits<int>::min(), 0}, grid), 0);
 }
 
-TEST(Brush, ARayInAGridIsTheRayInTheWorld) {
+TEST(Brush, GridRayMatchesWorldRay) {
   const unsigned seed = std::random_device{}();
   SCOPED_TRACE("seed " + std::to_string(seed));
   std::mt19937 random(seed);
@@ -104,7 +104,7 @@ TEST(Brush, ARayInAGridIsTheRayInTheWorld) {
   }
 }
 
-TEST(Document, ASceneFileIsItsOwnOnceItHoldsItsModels) {
+TEST(Document, SavesOnlySelfContainedSceneFilesInPlace) {
   const ScratchFolder folder("scene");
   std::vector<std::string> warnings;
   Document document = small_document();
@@ -132,7 +132,7 @@ TEST(Document, ASceneFileIsItsOwnOnceItHoldsItsModels) {
   EXPECT_EQ(first(**again).position, first(**hills).position);
 }
 
-TEST(Document, TheNameThatIsProposedIsOfAFormatThatHoldsIt) {
+TEST(Document, ProposesFormatThatHoldsContent) {
   const auto proposed = [](const char* path, const char* format, bool has_field) {
     LoadedScene loaded;
     loaded.format = format;
@@ -150,7 +150,7 @@ TEST(Document, TheNameThatIsProposedIsOfAFormatThatHoldsIt) {
   EXPECT_EQ(proposed("a/model.qb", "qubicle", false), "a/model.vox");
 }
 
-TEST(Document, FacesFollowEdits) {
+TEST(Document, FaceCountsFollowEdits) {
   Document document = small_document();
   const FaceCounts before = document.faces();
   EXPECT_EQ(before, count_faces(document.scene()));
@@ -165,7 +165,7 @@ TEST(Document, FacesFollowEdits) {
   EXPECT_EQ(document.faces(), before);
 }
 
-TEST(Document, UndoAllAndRedoAllGiveTheSameBytes) {
+TEST(Document, UndoAndRedoRestoreExactBytes) {
   const unsigned seed = std::random_device{}();
   SCOPED_TRACE("seed " + std::to_string(seed));
   std::mt19937 random(seed);
@@ -204,7 +204,7 @@ TEST(Document, UndoAllAndRedoAllGiveTheSameBytes) {
   EXPECT_FALSE(document.redo());
 }
 
-TEST(Document, FieldsAreSculptedPaintedAndUndone) {
+TEST(Document, SculptsPaintsAndUndoesFields) {
   LoadedScene loaded;
   for (int i = 0; i < 2; ++i) ASSERT_TRUE(loaded.scene.types.add({}));
   SceneGrid ground;
@@ -268,7 +268,7 @@ TEST(Document, FieldsAreSculptedPaintedAndUndone) {
   EXPECT_FALSE(document.begin_stroke(brush, hit)) << "blocks are not smoothed";
 }
 
-TEST(Document, AnEditAfterAnUndoClearsRedo) {
+TEST(Document, ClearsRedoOnNewEdit) {
   Document document = small_document();
   const Brush brush{BrushAction::Place, BrushShape::Box, 0, 3};
   for (const int x : {5, 9}) {
@@ -285,7 +285,7 @@ TEST(Document, AnEditAfterAnUndoClearsRedo) {
   EXPECT_EQ(only_grid(document).get({20, 4, 5}), 3);
 }
 
-TEST(Document, AStrokeThatChangesNothingLeavesNoTrace) {
+TEST(Document, IgnoresStrokeWithoutChanges) {
   Document document = small_document();
   ASSERT_TRUE(
       document.begin_stroke({BrushAction::Paint, BrushShape::Box, 0, 1}, hit_at(document, {0, 3, 0}, Direction::PosY)));
@@ -294,7 +294,7 @@ TEST(Document, AStrokeThatChangesNothingLeavesNoTrace) {
   EXPECT_FALSE(document.is_dirty());
 }
 
-TEST(Document, AStrokeStaysInItsLayerAndHasNoGaps) {
+TEST(Document, StrokeStaysInLayerWithoutGaps) {
   Document document = small_document();
   const Brush brush{BrushAction::Place, BrushShape::Box, 0, 3};
   ASSERT_TRUE(document.begin_stroke(brush, hit_at(document, {2, 3, 2}, Direction::PosY)));
@@ -310,7 +310,7 @@ TEST(Document, AStrokeStaysInItsLayerAndHasNoGaps) {
   EXPECT_EQ(document.history().steps(), 1U) << "a drag is one step";
 }
 
-TEST(Document, WrongTargetsBeginNoStroke) {
+TEST(Document, RejectsStrokeOnInvalidTarget) {
   Document document = small_document();
   SceneHit gone = hit_at(document, {0, 0, 0}, Direction::PosY);
   gone.instance.generation += 1;
@@ -320,7 +320,7 @@ TEST(Document, WrongTargetsBeginNoStroke) {
   EXPECT_EQ(document.drag_to({}, std::nullopt), 0);
 }
 
-TEST(EditHistory, ForgetsTheOldestBeyondItsLimit) {
+TEST(EditHistory, DropsOldestStepsBeyondLimit) {
   LoadedScene loaded = small_scene();
   Scene& scene = loaded.scene;
   const GridHandle handle = scene.grids().handles().front();
@@ -343,7 +343,7 @@ TEST(EditHistory, ForgetsTheOldestBeyondItsLimit) {
   EXPECT_EQ(undone, history.steps());
 }
 
-TEST(Document, SavesAndKnowsWhatIsSaved) {
+TEST(Document, TracksUnsavedChangesAcrossSaves) {
   const ScratchFolder folder("document");
   Document document = small_document();
   ASSERT_TRUE(document.begin_stroke({BrushAction::Place, BrushShape::Sphere, 3, 3},
@@ -387,7 +387,7 @@ std::filesystem::path write_layered(const ScratchFolder& folder) {
   return path;
 }
 
-TEST(Document, ASavedStrokeKeepsEverythingElseAndTheFileBefore) {
+TEST(Document, SaveChangesOnlyStrokeAndKeepsBackup) {
   const ScratchFolder folder("keeping");
   const auto path = write_layered(folder);
   const auto before = read_file(path).value();
@@ -415,7 +415,7 @@ TEST(Document, ASavedStrokeKeepsEverythingElseAndTheFileBefore) {
   EXPECT_TRUE((*document)->losses(path).value().empty()) << "written by this document";
 }
 
-TEST(Document, ReportsLossesOfSavingOnce) {
+TEST(Document, ReportsUnsupportedFeaturesOnce) {
   const ScratchFolder folder("losing");
   const auto path = write_layered(folder);
   const auto document = Document::open(path);
@@ -515,7 +515,7 @@ TEST(Document, ReportsErrors) {
   EXPECT_FALSE(Document::open(folder.file("text.vox")));
 }
 
-TEST(Document, ColoursBecomeTypesOnce) {
+TEST(Document, ReusesTypeOfEqualColour) {
   Document document = small_document();
   EXPECT_EQ(document.type_of_colour({200, 40, 40, 255}).value(), 3);
   const VoxelType fresh = document.type_of_colour({1, 2, 3, 255}).value();

@@ -10,7 +10,7 @@
 namespace quoin::viewer {
 namespace {
 
-TEST(Settings, ComeBackAsTheyWere) {
+TEST(Settings, RoundTripThroughFile) {
   const ScratchFolder folder("settings");
   const auto path = folder.file("deep/er/viewer.json");
   Settings settings;
@@ -76,7 +76,7 @@ TEST(Settings, ReadsSettingsOfEarlierVersions) {
   EXPECT_EQ(parse_settings(R"({"light": {"lit": true, "occlusion": true}})").light, Settings{}.light);
 }
 
-TEST(Settings, NonsenseIsLeftOut) {
+TEST(Settings, IgnoresInvalidValues) {
   const std::string defaults = to_json(Settings{});
   for (const char* text : {"",
                            "{",
@@ -106,7 +106,7 @@ TEST(Settings, NonsenseIsLeftOut) {
   EXPECT_EQ(parse_settings("{\"height\": false, \"width\": 800}").width, 800) << "other values are kept";
 }
 
-TEST(Settings, RecentFilesAreFewAndNewestFirst) {
+TEST(Settings, KeepsTenRecentFilesNewestFirst) {
   Settings settings;
   for (int i = 0; i < 30; ++i) settings.note_recent("/tmp/" + std::to_string(i % 15) + ".vox");
   EXPECT_EQ(settings.recent.size(), 10U);
@@ -116,7 +116,7 @@ TEST(Settings, RecentFilesAreFewAndNewestFirst) {
   EXPECT_EQ(settings.recent.size(), 10U);
 }
 
-TEST(Settings, LieWhereTheSpecificationSays) {
+TEST(Settings, FollowsXdgConfigPath) {
   const auto old = [](const char* name) {
     const char* value = std::getenv(name);
     return value == nullptr ? std::string() : std::string(value);
@@ -136,7 +136,7 @@ TEST(Settings, LieWhereTheSpecificationSays) {
   if (!home.empty()) ::setenv("HOME", home.c_str(), 1);
 }
 
-TEST(Settings, AnAbsentFileGivesTheDefaults) {
+TEST(Settings, UsesDefaultsWithoutFile) {
   EXPECT_EQ(to_json(read_settings("/nowhere/viewer.json")), to_json(Settings{}));
   EXPECT_FALSE(write_settings({}, "/dev/null/viewer.json"));
 }

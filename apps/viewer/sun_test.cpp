@@ -8,7 +8,7 @@
 namespace quoin::viewer {
 namespace {
 
-TEST(Sun, AnglesAndDirectionsAgree) {
+TEST(Sun, ConvertsDirectionsToAnglesAndBack) {
   std::mt19937 random(1);
   std::normal_distribution<double> number;
   for (int i = 0; i < 200; ++i) {
@@ -19,7 +19,7 @@ TEST(Sun, AnglesAndDirectionsAgree) {
   EXPECT_NEAR(sun_angles({0.0, 3.0, 0.0}).elevation, 90.0, 1e-9);
 }
 
-TEST(Sun, DraggingKeepsItInTheSky) {
+TEST(Sun, DragKeepsSunAboveHorizon) {
   Environment environment = Environment::reference();
   environment.sun.direction = {0.3, 0.7, 0.2};
   std::mt19937 random(2);
@@ -33,7 +33,7 @@ TEST(Sun, DraggingKeepsItInTheSky) {
   EXPECT_GT(drag_sun(environment, 0.0, -50.0).y, drag_sun(environment, 0.0, 0.0).y) << "up is up";
 }
 
-TEST(Sun, ItGoesDownWhereTheSkyFollowsIt) {
+TEST(Sun, DragReachesNightWhenSkyFollowsSun) {
   Environment environment;
   for (int i = 0; i < 10; ++i) environment.sun.direction = drag_sun(environment, 0.0, 100.0);
   EXPECT_LT(sun_angles(environment.sun.direction).elevation, -18.0) << "down to night";

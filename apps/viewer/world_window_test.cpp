@@ -92,7 +92,7 @@ WorldOptions near_by() {
   return options;
 }
 
-TEST_F(WorldWindowTest, ASmallWorldIsThereAsAWholeWhereverTheCameraIs) {
+TEST_F(WorldWindowTest, LoadsSmallWorldInFull) {
   make_small();
   const auto document = open();
   ASSERT_NE(document->world(), nullptr);
@@ -102,7 +102,7 @@ TEST_F(WorldWindowTest, ASmallWorldIsThereAsAWholeWhereverTheCameraIs) {
   EXPECT_EQ(document->world()->first_camera(1.5).forward, direction_of(View::Iso));
 }
 
-TEST_F(WorldWindowTest, AWideWorldOfSmallVoxelsIsSeenWhereTheCameraIs) {
+TEST_F(WorldWindowTest, LoadsWideWorldAroundCamera) {
   Scene scene;
   (void)scene.types.add(VoxelProperties{}).value();
   SceneGrid wide;
@@ -120,7 +120,7 @@ TEST_F(WorldWindowTest, AWideWorldOfSmallVoxelsIsSeenWhereTheCameraIs) {
   EXPECT_GE(document->scene().voxel_count(), 32 * 32 * 32);
 }
 
-TEST_F(WorldWindowTest, EditsAreSavedWithoutBeingAsked) {
+TEST_F(WorldWindowTest, SavesEditsAutomatically) {
   make_small();
   {
     const auto document = open();
@@ -136,7 +136,7 @@ TEST_F(WorldWindowTest, EditsAreSavedWithoutBeingAsked) {
   EXPECT_EQ(again->scene.voxel_count(), small_scene().scene.voxel_count() + 18);
 }
 
-TEST_F(WorldWindowTest, UndoesDistantEditsOnlyThere) {
+TEST_F(WorldWindowTest, UndoesEditsOnlyWhereLoaded) {
   make_endless();
   const auto document = open(near_by());
   const Camera here = camera_at({0.0, 100.0, 0.0});
@@ -167,7 +167,7 @@ TEST_F(WorldWindowTest, UndoesDistantEditsOnlyThere) {
   EXPECT_EQ(type_there(), kAir);
 }
 
-TEST_F(WorldWindowTest, OpensAWorldWithAnotherWriter) {
+TEST_F(WorldWindowTest, OpensWorldReadOnlyWithAnotherWriter) {
   make_small();
   const auto before = std::filesystem::file_size(path());
   {
@@ -184,7 +184,7 @@ TEST_F(WorldWindowTest, OpensAWorldWithAnotherWriter) {
   EXPECT_EQ(std::filesystem::file_size(path()), before);
 }
 
-TEST_F(WorldWindowTest, IsCopiedAsAWorldAndAsNothingElse) {
+TEST_F(WorldWindowTest, CopiesOnlyToWorldFiles) {
   make_endless();
   const auto document = open(near_by());
   settle(*document->world(), camera_at({0.0, 100.0, 0.0}));
@@ -200,7 +200,7 @@ TEST_F(WorldWindowTest, IsCopiedAsAWorldAndAsNothingElse) {
   EXPECT_TRUE(warnings.empty());
 }
 
-TEST_F(WorldWindowTest, ACopyTakesThePlaceOfAWorldThatIsKept) {
+TEST_F(WorldWindowTest, CopyReplacesWorldAndKeepsBackup) {
   make_endless();
   const auto document = open(near_by());
   settle(*document->world(), camera_at({0.0, 100.0, 0.0}));
@@ -222,7 +222,7 @@ TEST_F(WorldWindowTest, ACopyTakesThePlaceOfAWorldThatIsKept) {
 }
 
 // Images of a flight match those of a fully loaded world, as far as chunks are loaded.
-TEST_F(WorldWindowTest, AFlightShowsWhatTheWholeWorldShows) {
+TEST_F(WorldWindowTest, FlightMatchesFullyLoadedWorld) {
   make_endless();
   WorldOptions options = near_by();
   options.memory_bytes = std::size_t{64} << 20;

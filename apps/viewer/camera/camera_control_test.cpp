@@ -28,7 +28,7 @@ void expect_upright(const Camera& camera) {
   EXPECT_TRUE(is_finite(camera.position));
 }
 
-TEST(CameraControl, TakesOverEveryView) {
+TEST(CameraControl, AdoptsEveryView) {
   for (const View view : {View::Front, View::Back, View::Left, View::Right, View::Top, View::Iso}) {
     const Camera camera = frame_view(kBounds, view, 1.5);
     CameraControl control;
@@ -56,7 +56,7 @@ TEST(CameraControl, KeepsViewDirectionOfRolledCamera) {
   EXPECT_LT(glm::length(control.camera().right - right), 1e-12);
 }
 
-TEST(CameraControl, TheFrameRateMakesNoDifference) {
+TEST(CameraControl, MovesAlikeAtAnyFrameRate) {
   const CameraPush push{0.3, -0.2, 1.0};
   CameraControl coarse = framed();
   CameraControl fine = framed();
@@ -72,7 +72,7 @@ TEST(CameraControl, TheFrameRateMakesNoDifference) {
   EXPECT_LT(glm::length(coarse.camera().position - fine.camera().position), 0.02 * moved);
 }
 
-TEST(CameraControl, FlightAloneIsExactAtAnyFrameRate) {
+TEST(CameraControl, FliesExactlyAtAnyFrameRate) {
   CameraControl coarse = framed();
   CameraControl fine = framed();
   for (int i = 0; i < 10; ++i) coarse.advance(0.1, {0.0, 0.0, 1.0});
@@ -90,7 +90,7 @@ TEST(CameraControl, GlidesToAStop) {
   EXPECT_FALSE(control.is_gliding());
 }
 
-TEST(CameraControl, OrbitKeepsTheDistanceAndThePivotsPlace) {
+TEST(CameraControl, OrbitKeepsPivotInViewSpace) {
   CameraControl control = framed();
   control.mode = CameraMode::Orbit;
   const DVec3 pivot{3.0, 5.0, -7.0};
@@ -110,7 +110,7 @@ TEST(CameraControl, OrbitKeepsTheDistanceAndThePivotsPlace) {
   }
 }
 
-TEST(CameraControl, FacesAPoint) {
+TEST(CameraControl, FacesGivenPoint) {
   CameraControl control = framed();
   const DVec3 position = control.camera().position;
   for (const DVec3 point : {DVec3{3.0, 4.0, 5.0}, position + DVec3{0.0, -9.0, 0.0}, position + DVec3{-5.0, 0.0, 0.0}}) {
@@ -124,7 +124,7 @@ TEST(CameraControl, FacesAPoint) {
   EXPECT_NE(control.pivot(), position) << "nowhere to look";
 }
 
-TEST(CameraControl, FlyingTurnsTheHeadOnly) {
+TEST(CameraControl, TurnsInPlaceWhileFlying) {
   CameraControl control = framed(View::Front);
   control.mode = CameraMode::Fly;
   const DVec3 position = control.camera().position;
@@ -135,7 +135,7 @@ TEST(CameraControl, FlyingTurnsTheHeadOnly) {
   EXPECT_LT(control.camera().forward.y, 0.0) << "a drag down looks down";
 }
 
-TEST(CameraControl, ThePolesAreSafe) {
+TEST(CameraControl, StaysUprightAtPoles) {
   for (const double dy : {1e6, -1e6}) {
     for (const CameraMode mode : {CameraMode::Fly, CameraMode::Orbit}) {
       CameraControl control = framed(View::Top);
@@ -148,7 +148,7 @@ TEST(CameraControl, ThePolesAreSafe) {
   }
 }
 
-TEST(CameraControl, ZoomHasBounds) {
+TEST(CameraControl, LimitsZoom) {
   for (const double notches : {1.0, -1.0}) {
     CameraControl control = framed();
     for (int i = 0; i < 2'000; ++i) {
@@ -168,7 +168,7 @@ TEST(CameraControl, ZoomHasBounds) {
   }
 }
 
-TEST(CameraControl, ZoomGoesTowardsItsTarget) {
+TEST(CameraControl, ZoomsTowardsTarget) {
   CameraControl control = framed();
   const DVec3 target{10.0, 3.0, 2.0};
   const DVec3 direction = glm::normalize(target - control.camera().position);
@@ -179,7 +179,7 @@ TEST(CameraControl, ZoomGoesTowardsItsTarget) {
   EXPECT_LT(glm::length(glm::normalize(target - control.camera().position) - direction), 1e-9);
 }
 
-TEST(CameraControl, PanningKeepsThePivotUnderTheMouse) {
+TEST(CameraControl, PanKeepsPivotUnderMouse) {
   CameraControl control = framed(View::Front);
   const int height = 700;
   const DVec3 pivot = control.pivot();
@@ -191,7 +191,7 @@ TEST(CameraControl, PanningKeepsThePivotUnderTheMouse) {
   EXPECT_NEAR(glm::dot(offset, control.camera().up) * pixels, 25.0, 1e-6);
 }
 
-TEST(CameraControl, OddNumbersChangeNothing) {
+TEST(CameraControl, IgnoresInvalidInput) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double infinity = std::numeric_limits<double>::infinity();
   for (const double odd : {nan, infinity, -infinity}) {
@@ -216,7 +216,7 @@ TEST(CameraControl, OddNumbersChangeNothing) {
   }
 }
 
-TEST(CameraControl, RandomUseStaysFinite) {
+TEST(CameraControl, StaysFiniteUnderRandomInput) {
   const unsigned seed = std::random_device{}();
   SCOPED_TRACE("seed " + std::to_string(seed));
   std::mt19937 random(seed);
@@ -247,7 +247,7 @@ TEST(CameraControl, RandomUseStaysFinite) {
   }
 }
 
-TEST(CameraControl, AnEmptySceneHasACameraToo) {
+TEST(CameraControl, AcceptsEmptyScene) {
   CameraControl control;
   control.set(frame_view({}, View::Iso, 1.0), {});
   control.turn(10.0, 10.0, 300);

@@ -52,7 +52,7 @@ class Walking : public ::testing::Test {
 
 constexpr CameraPush kAhead{0.0, 0.0, 1.0};
 
-TEST_F(Walking, FallsToTheGroundAndStands) {
+TEST_F(Walking, FallsToGroundAndStands) {
   walker_.stand({0.5, 6.0, 0.5}, scene_.bounds());
   EXPECT_TRUE(walker_.is_moving());
   walk(3.0, {});
@@ -62,7 +62,7 @@ TEST_F(Walking, FallsToTheGroundAndStands) {
   EXPECT_GT(walker_.eyes().y, 1.5);
 }
 
-TEST_F(Walking, StepsUpAndStopsAtAWall) {
+TEST_F(Walking, ClimbsStepsAndStopsAtWall) {
   walker_.stand({2.5, 0.5, 0.5}, scene_.bounds());
   walk(12.0, kAhead);
   EXPECT_NEAR(walker_.feet().y, 2.0, 0.01) << "two steps";
@@ -70,7 +70,7 @@ TEST_F(Walking, StepsUpAndStopsAtAWall) {
   EXPECT_NEAR(walker_.feet().z, 0.5, 0.01);
 }
 
-TEST_F(Walking, JumpsAndComesDownAgain) {
+TEST_F(Walking, JumpsAndLands) {
   walker_.stand({-10.5, 0.0, 0.5}, scene_.bounds());
   walk(1.0, {});
   double highest = 0.0;
@@ -93,7 +93,7 @@ TEST_F(Walking, FollowsSmoothGround) {
   EXPECT_GT(walker_.feet().x, -10.0);
 }
 
-TEST_F(Walking, TheFrameRateMakesNoDifference) {
+TEST_F(Walking, WalksAlikeAtAnyFrameRate) {
   walker_.stand({2.5, 0.5, 0.5}, scene_.bounds());
   const Walker before = walker_;
   walk(2.0, kAhead, 1.0 / 240.0);
@@ -103,7 +103,7 @@ TEST_F(Walking, TheFrameRateMakesNoDifference) {
   EXPECT_LT(glm::length(walker_.feet() - at), 0.1);
 }
 
-TEST_F(Walking, NobodyFallsOutOfTheWorld) {
+TEST_F(Walking, StopsAtWorldBottom) {
   walker_.stand({500.0, 3.0, 0.5}, scene_.bounds());
   walk(6.0, kAhead);
   EXPECT_EQ(walker_.feet().y, scene_.bounds().min.y);

@@ -8,7 +8,7 @@
 namespace quoin::viewer {
 namespace {
 
-TEST(SdlScreen, KnowsOpenGlThatDrawsByTheProcessor) {
+TEST(SdlScreen, DetectsSoftwareOpenGl) {
   for (const char* const name :
        {"llvmpipe (LLVM 15.0.6, 256 bits)", "softpipe", "Mesa DRI swrast", "Software Rasterizer"}) {
     EXPECT_TRUE(is_software_opengl(name)) << name;
@@ -20,7 +20,7 @@ TEST(SdlScreen, KnowsOpenGlThatDrawsByTheProcessor) {
 }
 
 // On a display with Mesa's software OpenGL, such as Xvfb.
-TEST(SdlWindow, IsDrawnBySdlWhereOpenGlIsTheProcessors) {
+TEST(SdlWindow, AvoidsSoftwareOpenGl) {
   ::setenv("LIBGL_ALWAYS_SOFTWARE", "1", 1);
   for (const char* const name : {"SDL_VIDEODRIVER", "SDL_RENDER_DRIVER", "SDL_FRAMEBUFFER_ACCELERATION"}) {
     ::unsetenv(name);

@@ -59,7 +59,7 @@ class ViewerTest : public ::testing::Test {
   ScratchFolder folder_{"window"};
 };
 
-TEST_F(ViewerTest, TheScreenshotIsTheRenderersImage) {
+TEST_F(ViewerTest, ScreenshotMatchesRendererImage) {
   const ViewerOptions given = options(333, 250);
   const Status status = run_viewer(given);
   ASSERT_TRUE(status) << to_string(status.error());
@@ -79,7 +79,7 @@ TEST_F(ViewerTest, TheScreenshotIsTheRenderersImage) {
   EXPECT_EQ(shot->rgb, image->colour.rgb);
 }
 
-TEST_F(ViewerTest, ManyStartsLeaveNothingBehind) {
+TEST_F(ViewerTest, LeaksNothingOverManyStarts) {
   const ViewerOptions given = options(64, 48);
   for (int start = 0; start < 3; ++start) ASSERT_TRUE(run_viewer(given));
   const std::size_t files = open_files();
@@ -103,7 +103,7 @@ TEST_F(ViewerTest, ManyStartsLeaveNothingBehind) {
   EXPECT_LT(held_megabytes() - memory, kMegabytes);
 }
 
-TEST_F(ViewerTest, PanelsAreDrawnInWindowsOfAnySize) {
+TEST_F(ViewerTest, DrawsPanelsAtAnyWindowSize) {
   ::setenv("XDG_CONFIG_HOME", folder_.file("config").c_str(), 1);
   for (const auto& [width, height] : {std::pair{320, 240}, std::pair{900, 500}}) {
     ViewerOptions given = options(width, height);
@@ -118,7 +118,7 @@ TEST_F(ViewerTest, PanelsAreDrawnInWindowsOfAnySize) {
   EXPECT_TRUE(std::filesystem::exists(folder_.file("config/quoin/viewer.json")));
 }
 
-TEST_F(ViewerTest, ADroppedFileIsOpened) {
+TEST_F(ViewerTest, OpensDroppedFile) {
   ViewerOptions given = options(320, 240);
   const std::string file = std::exchange(given.file, {}).string();
   int asked = 0;
@@ -197,7 +197,7 @@ class Deadline {
 };
 
 // The keys for the mode and for saving the image arrive within one frame.
-TEST_F(ViewerTest, SavesAnImageOfTheModeThatWasJustChosen) {
+TEST_F(ViewerTest, SavesImageOfJustChosenMode) {
   ViewerOptions given = options(320, 240);
   given.screenshot.clear();
   const WorkingFolder inside(folder_.file(""));
@@ -231,7 +231,7 @@ TEST_F(ViewerTest, SavesAnImageOfTheModeThatWasJustChosen) {
 }
 
 // SDL detects double clicks, however long frames take.
-TEST_F(ViewerTest, OpensTheFileThatIsDoubleClicked) {
+TEST_F(ViewerTest, OpensDoubleClickedFile) {
   using std::chrono::milliseconds;
   const WorkingFolder inside(folder_.file(""));
   ::setenv("XDG_CONFIG_HOME", folder_.file("config").c_str(), 1);
@@ -269,7 +269,7 @@ TEST_F(ViewerTest, EndsAtOnceWhenInterrupted) {
   EXPECT_EQ(asked, 4);
 }
 
-TEST_F(ViewerTest, FilesThatCannotBeReadAreErrors) {
+TEST_F(ViewerTest, ReportsUnreadableAndUnwritableFiles) {
   ViewerOptions given = options(200, 100);
   given.file = folder_.file("absent.vox");
   const Status absent = run_viewer(given);
@@ -282,7 +282,7 @@ TEST_F(ViewerTest, FilesThatCannotBeReadAreErrors) {
   EXPECT_EQ(unwritable.error().code, ErrorCode::CannotWrite);
 }
 
-TEST_F(ViewerTest, NoDisplayIsAnError) {
+TEST_F(ViewerTest, ReportsMissingDisplay) {
   ::setenv("SDL_VIDEODRIVER", "no_such_driver", 1);
   const Status status = run_viewer(options(200, 100));
   ASSERT_FALSE(status);

@@ -8,7 +8,7 @@ namespace quoin::viewer {
 namespace {
 
 // A hidden layer without a name leaves an empty image, so the panel must list it as the reason.
-TEST(SceneTree, KnowsWhatIsHiddenAndFollowsSwitches) {
+TEST(SceneTree, CountsHiddenLayersAndInstances) {
   LoadedScene loaded = small_scene();
   Scene& scene = loaded.scene;
   SceneTree tree;
@@ -28,7 +28,7 @@ TEST(SceneTree, KnowsWhatIsHiddenAndFollowsSwitches) {
   EXPECT_EQ(tree.hidden().instances, 0U);
 }
 
-TEST(SceneTree, HasGroupsAndInstancesBelowWhatTheyBelongTo) {
+TEST(SceneTree, NestsGroupsAndInstancesUnderParents) {
   LoadedScene loaded = small_scene();
   Scene& scene = loaded.scene;
   const GroupHandle outer = scene.add_group({});

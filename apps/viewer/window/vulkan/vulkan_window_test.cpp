@@ -104,7 +104,7 @@ class TestGui {
   }
 };
 
-TEST_F(VulkanWindowTest, ShowsImagesOfEverySizeAndTheGui) {
+TEST_F(VulkanWindowTest, PresentsImagesOfAnySizeWithGui) {
   TestGui gui;
   auto window = VulkanWindow::create(device_);
   ASSERT_TRUE(window) << to_string(window.error());
@@ -122,7 +122,7 @@ TEST_F(VulkanWindowTest, ShowsImagesOfEverySizeAndTheGui) {
   window->close_gui();
 }
 
-TEST_F(VulkanWindowTest, DrawsAGuiOfAnotherSizeThanTheWindow) {
+TEST_F(VulkanWindowTest, DrawsGuiAtOtherSizeThanWindow) {
   TestGui gui;
   auto window = VulkanWindow::create(device_);
   ASSERT_TRUE(window) << to_string(window.error());
@@ -135,7 +135,7 @@ TEST_F(VulkanWindowTest, DrawsAGuiOfAnotherSizeThanTheWindow) {
   window->close_gui();
 }
 
-TEST_F(VulkanWindowTest, OpensTheGuiOfANewContext) {
+TEST_F(VulkanWindowTest, ReopensGuiForNewContext) {
   auto window = VulkanWindow::create(device_);
   ASSERT_TRUE(window) << to_string(window.error());
   for (int i = 0; i < 5; ++i) {
@@ -147,7 +147,7 @@ TEST_F(VulkanWindowTest, OpensTheGuiOfANewContext) {
   }
 }
 
-TEST_F(VulkanWindowTest, ImagesMayGoOnceTheyAreShown) {
+TEST_F(VulkanWindowTest, AllowsDestroyingImagesAfterPresenting) {
   auto window = VulkanWindow::create(device_);
   ASSERT_TRUE(window) << to_string(window.error());
   for (int i = 0; i < 40; ++i) {
@@ -163,7 +163,7 @@ TEST_F(VulkanWindowTest, ImagesMayGoOnceTheyAreShown) {
   }
 }
 
-TEST_F(VulkanWindowTest, FollowsTheWindowsSizeAndRestsWhileMinimised) {
+TEST_F(VulkanWindowTest, FollowsWindowSizeAndMinimising) {
   auto window = VulkanWindow::create(device_, false);
   ASSERT_TRUE(window) << to_string(window.error());
   const VulkanImage image = drawn(64, 64);
@@ -186,7 +186,7 @@ TEST_F(VulkanWindowTest, OpensAndClosesFiftyTimes) {
   }
 }
 
-TEST_F(VulkanWindowTest, FiftyStartsOfTheViewerLeaveNothingBehind) {
+TEST_F(VulkanWindowTest, LeaksNothingOverFiftyViewerStarts) {
   // The viewer starts and ends SDL itself.
   renderer_.reset();
   device_.reset();
@@ -220,7 +220,7 @@ TEST_F(VulkanWindowTest, FiftyStartsOfTheViewerLeaveNothingBehind) {
   EXPECT_LT(held_megabytes() - memory, 25.0);
 }
 
-TEST_F(VulkanWindowTest, ImagesOfTheProcessorAreShownToo) {
+TEST_F(VulkanWindowTest, PresentsUploadedCpuImages) {
   VulkanImage rendered(*renderer_);
   EXPECT_EQ(rendered.write({}).error().code, ErrorCode::InvalidArgument);
   const Image image{2, 1, {10, 20, 30, 250, 240, 230}};
