@@ -28,7 +28,7 @@ double occlusion_by_triangles(const FaceOcclusion& corners, double u, double v) 
   return 0.0;
 }
 
-TEST(CornerLight, IsThatOfTheMeshEverywhereOnEveryFace) {
+TEST(CornerLight, MatchesMeshOcclusionEverywhere) {
   VoxelRegistry types;
   VoxelProperties properties;
   ASSERT_TRUE(types.add(properties).has_value());
@@ -63,7 +63,7 @@ TEST(CornerLight, IsThatOfTheMeshEverywhereOnEveryFace) {
   EXPECT_GT(sum, 10'000.0) << "the world has occlusion at all";
 }
 
-TEST(CornerLight, IsExactAtTheCorners) {
+TEST(CornerLight, IsExactAtCorners) {
   for (int code = 0; code < 256; ++code) {
     const FaceOcclusion corners = {static_cast<std::uint8_t>(code & 3), static_cast<std::uint8_t>(code >> 2 & 3),
                                    static_cast<std::uint8_t>(code >> 4 & 3), static_cast<std::uint8_t>(code >> 6)};

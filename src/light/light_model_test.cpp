@@ -23,7 +23,7 @@ std::array<Vec3, 5> parts(const Daylight& light) {
   return {light.sky.zenith, light.sky.horizon, light.sky.ground, light.ambient, light.sun};
 }
 
-TEST(Daylight, FixedSkiesAreTheReferenceModelAtAnyHour) {
+TEST(Daylight, FixedSkyMatchesReferenceAtAnyHour) {
   for (const double elevation : {60.0, 5.0, -30.0}) {
     Environment environment = with_sun(elevation);
     environment.sky.model = SkyModel::Fixed;
@@ -38,7 +38,7 @@ TEST(Daylight, FixedSkiesAreTheReferenceModelAtAnyHour) {
   }
 }
 
-TEST(Daylight, HighSunsHaveTheReferencesSkyAndNearlyWhiteLight) {
+TEST(Daylight, HighSunMatchesReferenceSky) {
   for (double elevation = 31.0; elevation <= 90.0; elevation += 1.0) {
     const Daylight light = at(elevation);
     EXPECT_EQ(light.sky.zenith, sky::kZenith);
@@ -51,7 +51,7 @@ TEST(Daylight, HighSunsHaveTheReferencesSkyAndNearlyWhiteLight) {
   EXPECT_GT(at(90.0).sun.z, 0.999F);
 }
 
-TEST(Daylight, ItFollowsTheSunSmoothlyAndIsNeverBlack) {
+TEST(Daylight, ChangesSmoothlyAndIsNeverBlack) {
   for (double elevation = -90.0; elevation < 90.0; elevation += 0.02) {
     const auto now = parts(at(elevation));
     const auto next = parts(at(elevation + 0.02));
@@ -70,7 +70,7 @@ TEST(Daylight, ItFollowsTheSunSmoothlyAndIsNeverBlack) {
   }
 }
 
-TEST(Daylight, GoldenHoursAreWarmAndNightsBlue) {
+TEST(Daylight, WarmsAtGoldenHourAndCoolsAtNight) {
   const auto warmth = [](Vec3 colour) { return colour.x / colour.z; };
   EXPECT_GT(warmth(at(4.0).sun), 3.0F * warmth(at(60.0).sun));
   EXPECT_GT(warmth(at(1.0).sky.horizon), 2.0F);
@@ -79,7 +79,7 @@ TEST(Daylight, GoldenHoursAreWarmAndNightsBlue) {
   EXPECT_LT(at(-20.0).ambient.y, 0.25F * at(40.0).ambient.y);
 }
 
-TEST(Daylight, ASunBelowTheHorizonLightsNothing) {
+TEST(Daylight, SunBelowHorizonGivesNoLight) {
   for (const double elevation : {-1.001, -2.0, -40.0, -90.0}) {
     EXPECT_EQ(at(elevation).sun, Vec3(0.0F));
     EXPECT_EQ(at(elevation).sun_brightness, 0.0);

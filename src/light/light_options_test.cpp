@@ -12,7 +12,7 @@
 namespace quoin {
 namespace {
 
-TEST(LightOptions, DefaultsAndLimitsAreAccepted) {
+TEST(LightOptions, AcceptsDefaultsAndLimits) {
   EXPECT_TRUE(check(LightOptions{}).has_value());
   EXPECT_TRUE(check(natural_light()).has_value());
   LightOptions options;
@@ -28,12 +28,12 @@ TEST(LightOptions, NaturalLightHasLampsAndReflectingGlass) {
   EXPECT_EQ(LightOptions{}.max_lamps, 0);
 }
 
-TEST(LightOptions, FieldsHaveLongerOcclusionRaysInNaturalLightAlone) {
+TEST(LightOptions, LengthensFieldOcclusionOnlyInNaturalLight) {
   EXPECT_EQ(LightOptions{}.field_occlusion_reach, 1.0);
   EXPECT_EQ(natural_light().field_occlusion_reach, 3.0);
 }
 
-TEST(LightOptions, ImpossibleOnesAreRefusedByName) {
+TEST(LightOptions, RejectsInvalidValuesByName) {
   const auto expect_refused = [](const std::string& name, const std::function<void(LightOptions&)>& change) {
     LightOptions options;
     change(options);

@@ -33,7 +33,7 @@ std::vector<DVec3> fixed_set(int rays, Direction face) {
   return all;
 }
 
-TEST(OcclusionDirections, SixAreTheLopsidedReference) {
+TEST(OcclusionDirections, SixMatchReferenceDirections) {
   for (const Direction face : kDirections) {
     SCOPED_TRACE(static_cast<int>(face));
     const auto all = fixed_set(6, face);
@@ -57,7 +57,7 @@ TEST(OcclusionDirections, SixAreTheLopsidedReference) {
   EXPECT_TRUE(holds(fixed_set(6, Direction::NegZ), {1, 1, -1}));
 }
 
-TEST(OcclusionDirections, NineTurnAboutTheNormalFromSampleToSample) {
+TEST(OcclusionDirections, TurnsNineAboutNormalPerSample) {
   const OcclusionDirections nine(9);
   std::set<double> angles;
   for (int sample = 0; sample < 64; ++sample) {
@@ -92,7 +92,7 @@ TEST(OcclusionDirections, NineTurnAboutTheNormalFromSampleToSample) {
 
 // Turned about itself, the upright direction would stay the same: its shadow would have a hard edge at any number of
 // samples.
-TEST(OcclusionDirections, TheUprightOneLeansFromSampleToSampleEvenlyToAllSides) {
+TEST(OcclusionDirections, TiltsUprightRayEvenlyPerSample) {
   const OcclusionDirections nine(9);
   for (const Direction face : kDirections) {
     const auto f = static_cast<std::size_t>(face);
@@ -135,7 +135,7 @@ TEST(OcclusionDirections, NineHaveAllFourDiagonals) {
   }
 }
 
-TEST(OcclusionDirections, OtherNumbersAreSpreadByTheCosine) {
+TEST(OcclusionDirections, SpreadsOtherCountsByCosine) {
   constexpr int kRays = 64;
   const OcclusionDirections directions(kRays);
   ASSERT_FALSE(directions.is_fixed());
@@ -160,7 +160,7 @@ TEST(OcclusionDirections, OtherNumbersAreSpreadByTheCosine) {
   }
 }
 
-TEST(OcclusionDirections, TheWholeIsTurnedFromPixelToPixel) {
+TEST(OcclusionDirections, TurnsSpreadPerPixel) {
   const OcclusionDirections directions(1);
   constexpr std::uint32_t kPixels = 4000;
   std::array<int, 4> quarters{};
@@ -171,7 +171,7 @@ TEST(OcclusionDirections, TheWholeIsTurnedFromPixelToPixel) {
   for (const int count : quarters) EXPECT_NEAR(count, kPixels / 4, 120);
 }
 
-TEST(OcclusionDirections, PixelsDiffer) {
+TEST(OcclusionDirections, HashesDifferBetweenPixels) {
   std::set<std::uint32_t> hashes;
   for (std::uint32_t y = 0; y < 64; ++y) {
     for (std::uint32_t x = 0; x < 64; ++x) hashes.insert(hash_of(x, y));
@@ -179,7 +179,7 @@ TEST(OcclusionDirections, PixelsDiffer) {
   EXPECT_GT(hashes.size(), 4090U);
 }
 
-TEST(OcclusionDirectionsDeathTest, RaysOfTheOtherKindOrBeyondTheirNumberAreMistakes) {
+TEST(OcclusionDirectionsDeathTest, AssertsOnWrongKindOrRayIndex) {
   const OcclusionDirections fixed(6);
   const OcclusionDirections spread(4);
   QUOIN_EXPECT_MISTAKE((void)fixed.spread(0, 0, 1), "is_fixed_");
@@ -187,7 +187,7 @@ TEST(OcclusionDirectionsDeathTest, RaysOfTheOtherKindOrBeyondTheirNumberAreMista
   QUOIN_EXPECT_MISTAKE((void)fixed.fixed(0, 6), "ray < count_");
 }
 
-TEST(OcclusionDirectionsDeathTest, RejectsFacesAndNumbersThatDoNotExist) {
+TEST(OcclusionDirectionsDeathTest, RejectsUnknownFacesAndCounts) {
   QUOIN_EXPECT_MISTAKE(OcclusionDirections(0), "at least one ray");
   QUOIN_EXPECT_MISTAKE((void)OcclusionDirections(6).fixed(6, 0), "one of the six faces");
   QUOIN_EXPECT_MISTAKE((void)OcclusionDirections(4).spread(6, 0, 1), "one of the six faces");

@@ -49,7 +49,7 @@ SlabKinds kinds_of(SlabPlanes& planes) {
   return kernel().merge(before.words.data(), inside.data(), planes.words.data(), changed.data());
 }
 
-TEST(LightSlab, KeepsWhatItIsMadeOf) {
+TEST(LightSlab, RoundTripsPlanes) {
   std::mt19937_64 random(1);
   for (int step = 0; step < 200; ++step) {
     SlabPlanes planes = random_planes(random);
@@ -65,7 +65,7 @@ TEST(LightSlab, KeepsWhatItIsMadeOf) {
   }
 }
 
-TEST(LightSlab, TakesNoMoreThanItsPlanesDiffer) {
+TEST(LightSlab, StoresOnlyDifferencesBetweenPlanes) {
   SlabPlanes planes{};
   const auto bytes = [&] { return LightSlab::of(planes, kinds_of(planes)).bytes(); };
   for (std::size_t i = 0; i < kPlanes; ++i) {

@@ -150,7 +150,7 @@ void edit(Grid& grid, std::mt19937& random) {
   }
 }
 
-TEST(PropagatedLight, IsThatOfASearchAfterAnyEdits) {
+TEST(PropagatedLight, MatchesSearchAfterRandomEdits) {
   const std::vector<InstructionSet> sets = sets_of_this_machine();
   for (unsigned seed = 0; seed < 4; ++seed) {
     SCOPED_TRACE(seed);
@@ -193,7 +193,7 @@ void edit_little(Grid& grid, std::mt19937& random) {
   grid.fill_box({at, at + IVec3(1 + below(12), 1 + below(4), 1 + below(12))}, below(2) == 0 ? kStone : kAir);
 }
 
-TEST(PropagatedLight, AMillionRandomEditsEqualASearch) {
+TEST(PropagatedLight, MatchesSearchAfterManyEdits) {
   // A million edits only in nightly runs and in fast builds: debug and sanitizer builds take ten times as long.
 #if defined(NDEBUG) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
   const bool is_night = std::getenv("QUOIN_NIGHTLY") != nullptr;
@@ -222,7 +222,7 @@ TEST(PropagatedLight, AMillionRandomEditsEqualASearch) {
   EXPECT_GE(checked, checks);
 }
 
-TEST(PropagatedLight, ShadowsFallAsFarAsThereIsSky) {
+TEST(PropagatedLight, CastsSkyShadowsOfAnyLength) {
   const VoxelRegistry types = light_types();
   Grid grid;
   grid.fill_box({{-4, -900, -4}, {12, -890, 12}}, kStone);  // ground
@@ -245,7 +245,7 @@ TEST(PropagatedLight, ShadowsFallAsFarAsThereIsSky) {
 
 // Small edits are solved as a whole: lamps, stones, glass and holes at corners of chunks, one or several per update,
 // with every kernel.
-TEST(PropagatedLight, AfterSmallEditsIsThatOfTheWorldBuiltAnew) {
+TEST(PropagatedLight, MatchesFreshLightAfterSmallEdits) {
   const VoxelRegistry types = light_types();
   for (const InstructionSet set : sets_of_this_machine()) {
     const InstructionSetOverride only(set);
@@ -282,7 +282,7 @@ TEST(PropagatedLight, AfterSmallEditsIsThatOfTheWorldBuiltAnew) {
   }
 }
 
-TEST(PropagatedLight, SkyFallsInAShaftAndLampsFillACave) {
+TEST(PropagatedLight, LightsShaftFromSkyAndCaveFromLamps) {
   VoxelRegistry types = light_types();
   Grid grid;
   grid.fill_box({{0, -200, 0}, {130, 0, 130}}, kStone);
@@ -312,7 +312,7 @@ TEST(PropagatedLight, SkyFallsInAShaftAndLampsFillACave) {
   EXPECT_EQ(light.at({28, -185, 50}), LightLevels{});
 }
 
-TEST(PropagatedLight, ASealedRoomIsDark) {
+TEST(PropagatedLight, KeepsSealedRoomDark) {
   VoxelRegistry types = light_types();
   Grid grid;
   grid.fill_box({{40, 40, 40}, {90, 90, 90}}, kStone);
@@ -328,7 +328,7 @@ TEST(PropagatedLight, ASealedRoomIsDark) {
   EXPECT_EQ(light.at({38, 60, 60}).red, 14);
 }
 
-TEST(PropagatedLight, ColouredGlassFiltersLampsAndNotTheSky) {
+TEST(PropagatedLight, ColouredGlassFiltersLampsButNotSky) {
   VoxelRegistry types = light_types();
   Grid grid;
   grid.fill_box({{0, 0, 0}, {20, 20, 20}}, kStone);
@@ -346,7 +346,7 @@ TEST(PropagatedLight, ColouredGlassFiltersLampsAndNotTheSky) {
   EXPECT_EQ(light.at({6, 5, 5}).sky, 15);
 }
 
-TEST(PropagatedLight, TellsWhereItChanged) {
+TEST(PropagatedLight, ReportsChangedRegions) {
   VoxelRegistry types = light_types();
   std::mt19937 random(5);
   Grid grid;
@@ -393,7 +393,7 @@ TEST(PropagatedLight, TellsWhereItChanged) {
   }
 }
 
-TEST(PropagatedLight, TellsOfChunksThatComeAndGoInTheOpenSky) {
+TEST(PropagatedLight, ReportsChunksAddedAndRemovedInOpenSky) {
   const VoxelRegistry types = light_types();
   Grid grid;
   grid.fill_box({{0, 0, 0}, {20, 5, 20}}, kStone);
@@ -419,7 +419,7 @@ TEST(PropagatedLight, TellsOfChunksThatComeAndGoInTheOpenSky) {
   EXPECT_TRUE(is_reported());
 }
 
-TEST(PropagatedLight, SplitsQuadsWhereItChanges) {
+TEST(PropagatedLight, SplitsQuadsAtLightChanges) {
   VoxelRegistry types = light_types();
   std::mt19937 random(9);
   Grid grid;
@@ -453,7 +453,7 @@ TEST(PropagatedLight, SplitsQuadsWhereItChanges) {
   EXPECT_GT(more, 0U);
 }
 
-TEST(PropagatedLight, GamesHaveLevelsOfTheirOwn) {
+TEST(PropagatedLight, UsesCustomLevelsOfTypes) {
   VoxelRegistry types = light_types();
   Grid grid;
   grid.set({5, 5, 5}, kStone);
@@ -466,7 +466,7 @@ TEST(PropagatedLight, GamesHaveLevelsOfTheirOwn) {
   EXPECT_EQ(light.at({5, 4, 5}), (LightLevels{14, 2, 1, 0})) << "next to columns of sky";
 }
 
-TEST(PropagatedLight, SnapshotsKeepTheirLightAndGoOnByThemselves) {
+TEST(PropagatedLight, SnapshotsKeepLightAndUpdateIndependently) {
   const VoxelRegistry types = light_types();
   std::mt19937 random(17);
   Grid grid;

@@ -45,7 +45,7 @@ class LitMeshes : public ::testing::Test {
 };
 
 // Compares every corner of every face, including those inside merged quads.
-TEST_F(LitMeshes, MergedFacesShowTheLightOfSingleOnes) {
+TEST_F(LitMeshes, MergedFacesMatchSingleFaces) {
   put(LightWorld(3));
   scene_.environment = Environment::natural({0.5, 0.15, 0.3});
   scene_.environment->exposure = 0.8;
@@ -89,7 +89,7 @@ TEST_F(LitMeshes, MergedFacesShowTheLightOfSingleOnes) {
   EXPECT_LT(quads, faces);
 }
 
-TEST_F(LitMeshes, SmoothVerticesHaveTheLightBeforeThem) {
+TEST_F(LitMeshes, SmoothVerticesTakeLightInFront) {
   put(LightWorld(4));
   auto meshes = mesh_scene_smoothly(scene_);
   ASSERT_TRUE(meshes);
@@ -107,7 +107,7 @@ TEST_F(LitMeshes, SmoothVerticesHaveTheLightBeforeThem) {
   EXPECT_GT(lit, 1000U);
 }
 
-TEST_F(LitMeshes, FieldsAreLitByTheirOwnSamples) {
+TEST_F(LitMeshes, LightsFieldsBySamples) {
   LightWorld empty;
   scene_.types = empty.types;
   SceneGrid made;
@@ -133,7 +133,7 @@ TEST_F(LitMeshes, FieldsAreLitByTheirOwnSamples) {
   EXPECT_GT(inner, 500);
 }
 
-TEST_F(LitMeshes, RefuseWhatHasNoLight) {
+TEST_F(LitMeshes, RejectInvalidInput) {
   put(LightWorld(5));
   EXPECT_EQ(mesh_lit_scene(scene_, options_, {.mesh = {.watertight = true}}).error().code, ErrorCode::InvalidArgument);
   EXPECT_EQ(mesh_lit_scene(scene_, options_, {.atlas = true}).error().code, ErrorCode::InvalidArgument);
@@ -147,7 +147,7 @@ TEST_F(LitMeshes, RefuseWhatHasNoLight) {
   EXPECT_EQ(light_meshes(scene_, options_, *meshes).error().code, ErrorCode::InvalidArgument);
 }
 
-TEST_F(LitMeshes, TheSameBytesWithAnyThreads) {
+TEST_F(LitMeshes, GiveSameBytesForAnyThreadCount) {
   put(LightWorld(6));
   const auto one = mesh_lit_scene(scene_, options_, {}, {1});
   const auto four = mesh_lit_scene(scene_, options_, {}, {4});

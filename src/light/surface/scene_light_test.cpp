@@ -45,7 +45,7 @@ void edit(SceneGrid& grid, std::mt19937& random) {
   }
 }
 
-TEST(SceneLight, FollowsVoxelsAndFieldsAsIfMadeAnew) {
+TEST(SceneLight, MatchesFreshLightAfterEdits) {
   GridHandle handle;
   Scene scene = scene_of(LightWorld(11), handle);
   std::mt19937 random(3);
@@ -68,7 +68,7 @@ TEST(SceneLight, FollowsVoxelsAndFieldsAsIfMadeAnew) {
 }
 
 // Bricks contain the same light as the grid, for every voxel near a surface.
-TEST(LightBricks, HoldTheLightAroundSurfaces) {
+TEST(LightBricks, HoldLightAroundSurfaces) {
   GridHandle handle;
   Scene scene = scene_of(LightWorld(12), handle);
   LightCache cache;
@@ -125,7 +125,7 @@ TEST(SceneLight, UnknownGridIsOpenSky) {
   EXPECT_GE(light.bytes(), light.of(handle).light->bytes());
 }
 
-TEST(SceneLight, SnapshotsKeepTheirLight) {
+TEST(SceneLight, SnapshotsKeepLight) {
   GridHandle handle;
   Scene scene = scene_of(LightWorld(1), handle);
   scene.edit(handle).field.add_sphere({60.0, 0.0, 0.0}, 6.0, LightWorld::kStone);
@@ -142,7 +142,7 @@ TEST(SceneLight, SnapshotsKeepTheirLight) {
   EXPECT_EQ(light.of(handle).voxels->get(0, 50, 0), LightWorld::kStone);
 }
 
-TEST(SceneLightDeathTest, AskingOfTooFewNormals) {
+TEST(SceneLightDeathTest, AssertsOnMissingNormals) {
   GridHandle handle;
   const Scene scene = scene_of(LightWorld(1), handle);
   SceneLight light;

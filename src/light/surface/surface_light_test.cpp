@@ -67,7 +67,7 @@ void expect_levels(std::uint32_t twelfths, const std::array<double, 4>& wanted) 
   EXPECT_NEAR(levels.blue, wanted[3], 1e-5);
 }
 
-TEST(SurfaceLight, CornersAreMeansOfWhatCanBeWalkedTo) {
+TEST(SurfaceLight, CornersAverageReachableVoxels) {
   for (unsigned seed = 0; seed < 3; ++seed) {
     SCOPED_TRACE(seed);
     const LightWorld world(seed);
@@ -107,7 +107,7 @@ std::array<double, 4> shown_by_quad(const FaceLight& corners, int width, int hei
   return shown;
 }
 
-TEST(SurfaceLight, SplitQuadsShowWhatSingleFacesDo) {
+TEST(SurfaceLight, SplitQuadsMatchSingleFaces) {
   for (unsigned seed = 0; seed < 3; ++seed) {
     SCOPED_TRACE(seed);
     const LightWorld world(seed);
@@ -187,7 +187,7 @@ std::array<double, 4> walked_light(const LightWorld& world, DVec3 place) {
   return sum;
 }
 
-TEST(SurfaceLight, VerticesHaveTheLightBeforeThem) {
+TEST(SurfaceLight, VerticesTakeLightInFront) {
   for (unsigned seed = 0; seed < 3; ++seed) {
     SCOPED_TRACE(seed);
     const LightWorld world(seed);
@@ -217,7 +217,7 @@ TEST(SurfaceLight, VerticesHaveTheLightBeforeThem) {
   }
 }
 
-TEST(SurfaceLight, VerticesAreTheSameFromAnyChunk) {
+TEST(SurfaceLight, SharedVerticesMatchAcrossChunks) {
   const LightWorld world(7);
   const auto field = field_from_grid(world.grid);
   ASSERT_TRUE(field);
@@ -248,7 +248,7 @@ TEST(SurfaceLight, VerticesAreTheSameFromAnyChunk) {
 }
 
 // A house of thin walls surrounded by lamps and sky, and another lamp behind a separate wall.
-TEST(SurfaceLight, AClosedRoomIsBlackWhateverShinesOutside) {
+TEST(SurfaceLight, KeepsClosedRoomBlack) {
   for (unsigned seed = 0; seed < 4; ++seed) {
     SCOPED_TRACE(seed);
     LightWorld world;
@@ -316,7 +316,7 @@ TEST(SurfaceLight, IsFiniteAtCentresOfOpaqueVoxels) {
   }
 }
 
-TEST(SurfaceLight, AWhiteLampSplitsAFloorIntoFewQuads) {
+TEST(SurfaceLight, LinearMergingSplitsFloorIntoFewQuads) {
   LightWorld world;
   VoxelProperties lamp = world.types[LightWorld::kLamp];
   lamp.colour = {255, 255, 255, 255};
