@@ -134,7 +134,7 @@ LiveMeshOptions options_of(unsigned threads) {
   return options;
 }
 
-TEST(LiveField, ItsMeshIsThatOfTheWholeField) {
+TEST(LiveField, MatchesWholeFieldMesh) {
   OneGrid one;
   one.field() = hills(2);
   LiveMeshes meshes(options_of(2));
@@ -149,7 +149,7 @@ TEST(LiveField, ItsMeshIsThatOfTheWholeField) {
   EXPECT_TRUE(shown.all().empty());
 }
 
-TEST(LiveField, VoxelsBesideItAreSurfacesOfTheirOwn) {
+TEST(LiveField, MeshesVoxelsSeparatelyFromField) {
   OneGrid one;
   one.field().add_sphere({32, 32, 32}, 10, 1);
   one.scene.edit(one.handle).grid.fill_box({{40, 40, 40}, {50, 50, 50}}, 3);
@@ -199,7 +199,7 @@ TEST(LiveField, SurfacesStayClosedWhileEdited) {
   }
 }
 
-TEST(LiveField, LevelsFollowTheEyeWithoutASeamAtAnyTime) {
+TEST(LiveField, LevelsFollowEyeWithoutSeams) {
   for (unsigned seed = 1; seed <= (kIsSlow ? 1U : 2U); ++seed) {
     SCOPED_TRACE(seed);
     std::mt19937 random(seed);
@@ -231,7 +231,7 @@ TEST(LiveField, LevelsFollowTheEyeWithoutASeamAtAnyTime) {
   }
 }
 
-TEST(LiveField, SeveralEyesAndInstancesHaveWhatTheNearestNeeds) {
+TEST(LiveField, ChoosesLevelsByNearestEyeAndInstance) {
   OneGrid one;
   one.field() = hills(4);
   LiveMeshOptions options = options_of(2);
@@ -261,7 +261,7 @@ TEST(LiveField, SeveralEyesAndInstancesHaveWhatTheNearestNeeds) {
   EXPECT_TRUE(shown.all().empty());
 }
 
-TEST(LiveField, ColoursOfTypesAreFollowed) {
+TEST(LiveField, FollowsTypeColours) {
   OneGrid one;
   one.field().add_sphere({60, 60, 60}, 10, 1);
   LiveMeshes meshes(options_of(1));
@@ -303,7 +303,7 @@ std::size_t glass_indices(const ShownSurfaces& shown) {
   return all;
 }
 
-TEST(LiveField, TransparentMaterialsAreClosedBodies) {
+TEST(LiveField, MeshesTransparentMaterialsAsClosedBodies) {
   OneGrid one;
   VoxelProperties glass = one.scene.types[2];
   glass.colour = {220, 240, 250, 30};
@@ -325,7 +325,7 @@ TEST(LiveField, TransparentMaterialsAreClosedBodies) {
   ASSERT_NO_FATAL_FAILURE(expect_shown(meshes, one, shown));
 }
 
-TEST(LiveField, TypesThatBecomeTransparentAreFollowed) {
+TEST(LiveField, FollowsTypesThatBecomeTransparent) {
   OneGrid one;
   one.field() = lake(3, 3, 1);
   LiveMeshes meshes(options_of(2));
@@ -343,7 +343,7 @@ TEST(LiveField, TypesThatBecomeTransparentAreFollowed) {
   }
 }
 
-TEST(LiveField, AnotherFieldTakesThePlaceAtOnce) {
+TEST(LiveField, ReplacesFieldAtOnce) {
   OneGrid one;
   one.field() = hills(2, 1);
   LiveMeshes meshes(options_of(2));

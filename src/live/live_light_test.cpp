@@ -89,7 +89,7 @@ TEST(LiveLight, ShownLightIsAlwaysCorrect) {
   EXPECT_GT(taken, 4);
 }
 
-TEST(LiveLight, ThreadsAndTimeDoNotMatter) {
+TEST(LiveLight, GivesSameLightForAnyWorkerCount) {
   std::vector<std::vector<std::uint16_t>> results;
   for (const unsigned workers : {1U, 3U}) {
     LitScene world(9);
@@ -109,7 +109,7 @@ TEST(LiveLight, ThreadsAndTimeDoNotMatter) {
 }
 
 // Readers use the shown light while workers compute the next light and the scene is edited.
-TEST(LiveLight, IsReadWhileWorkersGoOn) {
+TEST(LiveLight, AllowsReadingWhileWorkersRun) {
   LitScene world(2);
   LiveLight light({{}, {2}});
   light.finish(world.scene);
@@ -133,7 +133,7 @@ TEST(LiveLight, IsReadWhileWorkersGoOn) {
 }
 
 // A consumer that copies only the reported changes has all of the light.
-TEST(LiveLight, TellsWhereLightChanged) {
+TEST(LiveLight, ReportsChangedRegions) {
   LitScene world(4);
   LiveLight light;
   std::map<std::array<int, 3>, std::vector<std::uint16_t>> copy;  // by chunk row
@@ -206,7 +206,7 @@ TEST(LiveLight, FollowsTypesGridsAndFields) {
   EXPECT_EQ(light.shown().of(world.handle).light->at({0, -20, 0}).sky, 15);
 }
 
-TEST(LiveLight, MovedInstancesAreNoWork) {
+TEST(LiveLight, IgnoresMovedInstances) {
   LitScene world(1);
   const InstanceHandle instance = world.scene.add_instance({"another", world.handle});
   LiveLight light;
@@ -216,7 +216,7 @@ TEST(LiveLight, MovedInstancesAreNoWork) {
   EXPECT_FALSE(light.is_late());
 }
 
-TEST(LiveLight, DataAtVoxelsAndNamesAreNoWork) {
+TEST(LiveLight, IgnoresVoxelDataAndNames) {
   LitScene world(1);
   ASSERT_TRUE(world.grid().set({0, 0, 0}, LightWorld::kStone) || world.grid().get({0, 0, 0}) == LightWorld::kStone);
   LiveLight light;

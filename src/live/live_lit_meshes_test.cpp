@@ -78,7 +78,7 @@ void expect_right(const DarkeningScene& world, const SceneLight& light, const Su
 
 class LitMeshes : public testing::TestWithParam<LightMerging> {};
 
-TEST_P(LitMeshes, AreThoseOfTheLightAfterAnyEdits) {
+TEST_P(LitMeshes, MatchLightAfterEdits) {
   DarkeningScene world(3);
   SceneLight light;
   LiveMeshOptions options;
@@ -116,7 +116,7 @@ struct Room {
   GridHandle handle;
 };
 
-TEST(LiveLitMeshes, RemeshesAChunkThatOnlyItsLightReaches) {
+TEST(LiveLitMeshes, RemeshesChunkReachedOnlyByLight) {
   Room room;
   SceneLight light;
   LiveMeshOptions options;
@@ -166,7 +166,7 @@ TEST(LiveLitMeshes, RemeshesAChunkThatOnlyItsLightReaches) {
   }
 }
 
-TEST(LiveLitMeshes, NothingIsMadeAgainWhereNothingChanged) {
+TEST(LiveLitMeshes, RemeshesNothingWithoutChanges) {
   Room room;
   SceneLight light;
   light.update(room.scene);
@@ -179,7 +179,7 @@ TEST(LiveLitMeshes, NothingIsMadeAgainWhereNothingChanged) {
   EXPECT_EQ(meshes.stats().chunks_meshed, meshed);
 }
 
-TEST(LiveLitMeshes, WithoutLightAnyMoreAreThoseOfBefore) {
+TEST(LiveLitMeshes, RestoresPlainMeshesWithoutLight) {
   Room room;
   SceneLight light;
   light.update(room.scene);

@@ -18,7 +18,7 @@
 namespace quoin {
 namespace {
 
-class LiveMeshesOf : public testing::TestWithParam<SurfaceStyle> {
+class LiveMeshesTest : public testing::TestWithParam<SurfaceStyle> {
  protected:
   LiveMeshOptions options(unsigned threads = 2) const {
     LiveMeshOptions options;
@@ -33,7 +33,7 @@ std::vector<SurfaceUpdate> all_of(LiveMeshes& meshes, const Scene& scene) {
   return meshes.take();
 }
 
-TEST_P(LiveMeshesOf, RandomEditsEndAsAFreshStart) {
+TEST_P(LiveMeshesTest, MatchesFreshMeshesAfterRandomEdits) {
   const unsigned seeds = kIsSlow && GetParam() == SurfaceStyle::Smooth ? 2 : 40;
   for (unsigned seed = 0; seed < seeds; ++seed) {
     SCOPED_TRACE(seed);
@@ -65,7 +65,7 @@ TEST_P(LiveMeshesOf, RandomEditsEndAsAFreshStart) {
   }
 }
 
-TEST_P(LiveMeshesOf, EditsGoOnWhileWorkersRun) {
+TEST_P(LiveMeshesTest, AllowsEditsWhileWorkersRun) {
   SceneEditor editor(7);
   std::atomic<int> calls{0};
   LiveMeshOptions wanted = options(3);
@@ -88,7 +88,7 @@ TEST_P(LiveMeshesOf, EditsGoOnWhileWorkersRun) {
   EXPECT_GE(calls, meshed);
 }
 
-TEST_P(LiveMeshesOf, CanEndInTheMiddle) {
+TEST_P(LiveMeshesTest, StopsDuringMeshing) {
   for (int i = 0; i < (kIsSlow ? 2 : 20); ++i) {
     OneGrid one;
     one.grid().fill_box({{0, 0, 0}, {301, 21, 101}}, 1);
@@ -99,7 +99,7 @@ TEST_P(LiveMeshesOf, CanEndInTheMiddle) {
   }
 }
 
-TEST_P(LiveMeshesOf, NothingIsMadeWhereNothingChanged) {
+TEST_P(LiveMeshesTest, RemeshesNothingWithoutChanges) {
   OneGrid one;
   one.grid().fill_sphere({60, 60, 60}, 30.0, 1);
   LiveMeshes meshes(options());
@@ -114,7 +114,7 @@ TEST_P(LiveMeshesOf, NothingIsMadeWhereNothingChanged) {
   EXPECT_EQ(meshes.stats().chunks_meshed, before);
 }
 
-TEST_P(LiveMeshesOf, HiddenSurfacesGoAndComeBack) {
+TEST_P(LiveMeshesTest, RemovesHiddenSurfacesUntilShown) {
   OneGrid one;
   one.grid().fill_box({{3, 3, 3}, {10, 10, 10}}, 1);
   LiveMeshes meshes(options());
@@ -149,7 +149,7 @@ TEST_P(LiveMeshesOf, HiddenSurfacesGoAndComeBack) {
   EXPECT_EQ(gone[0].grid, one.handle);
 }
 
-TEST_P(LiveMeshesOf, TheWorldsEdgeIsMeshedAsTheRest) {
+TEST_P(LiveMeshesTest, MeshesVoxelsAtWorldEdge) {
   constexpr int kLast = std::numeric_limits<int>::max() - 64;
   constexpr int kFirst = std::numeric_limits<int>::min() + 64;
   for (const int at : {kLast, kFirst}) {
@@ -167,7 +167,7 @@ TEST_P(LiveMeshesOf, TheWorldsEdgeIsMeshedAsTheRest) {
   }
 }
 
-TEST_P(LiveMeshesOf, AnEyeThatIsNowhereHarmsNothing) {
+TEST_P(LiveMeshesTest, IgnoresNonFiniteEye) {
   OneGrid one;
   one.grid().fill_box({{-70, 0, 0}, {71, 4, 4}}, 1);
   LiveMeshes meshes(options());
@@ -180,7 +180,7 @@ TEST_P(LiveMeshesOf, AnEyeThatIsNowhereHarmsNothing) {
   expect_surfaces(shown, one.scene, options());
 }
 
-INSTANTIATE_TEST_SUITE_P(Styles, LiveMeshesOf, testing::Values(SurfaceStyle::Blocky, SurfaceStyle::Smooth),
+INSTANTIATE_TEST_SUITE_P(Styles, LiveMeshesTest, testing::Values(SurfaceStyle::Blocky, SurfaceStyle::Smooth),
                          [](const auto& style) { return style.param == SurfaceStyle::Blocky ? "Blocky" : "Smooth"; });
 
 // Returns the unit faces of quads with all their attributes.
@@ -236,7 +236,7 @@ void expect_regions(const ChunkSurface& surface, const ChunkSurface& whole, int 
   EXPECT_EQ(listed, surface.quads.size()) << "each once";
 }
 
-TEST(LiveRegions, HoldTheSameFacesAndSayWhichChanged) {
+TEST(LiveRegions, HoldSameFacesAndReportChanges) {
   for (const int edge : {16, 32, 64}) {
     SceneEditor editor(static_cast<std::uint32_t>(edge));
     LiveMeshOptions wanted;
@@ -276,7 +276,7 @@ TEST(LiveRegions, HoldTheSameFacesAndSayWhichChanged) {
   }
 }
 
-TEST(LiveCallbacks, SurfacesAreConvertedByWorkersAndTakenByThem) {
+TEST(LiveCallbacks, ConvertAndTakeSurfacesOnWorkers) {
   SceneEditor editor(5);
   LiveMeshOptions wanted;
   wanted.workers = {3};
@@ -326,7 +326,7 @@ TEST(LiveCallbacks, SurfacesAreConvertedByWorkersAndTakenByThem) {
   EXPECT_EQ(taken.size(), with_quads);
 }
 
-TEST(LiveCallbacks, ExceptionsArrive) {
+TEST(LiveCallbacks, PassExceptionsToFinish) {
   OneGrid one;
   one.grid().fill_box({{0, 0, 0}, {200, 10, 10}}, 1);
   for (const bool from_convert : {false, true}) {
@@ -360,7 +360,7 @@ TEST(LiveCallbacks, ExceptionsArrive) {
   }
 }
 
-TEST(LiveCallbacks, MayTakeWhileTheMeshesEnd) {
+TEST(LiveCallbacks, AllowTakingDuringDestruction) {
   OneGrid one;
   one.grid().fill_box({{0, 0, 0}, {600, 21, 301}}, 1);
   for (int i = 0; i < 20; ++i) {
@@ -374,7 +374,7 @@ TEST(LiveCallbacks, MayTakeWhileTheMeshesEnd) {
   }
 }
 
-TEST(LiveBudget, TheRestWaitsForTheNextCall) {
+TEST(LiveBudget, LeavesRestForNextCall) {
   OneGrid one;
   one.grid().fill_box({{0, 0, 0}, {640, 10, 10}}, 1);
   LiveMeshes meshes;
@@ -397,7 +397,7 @@ TEST(LiveBudget, TheRestWaitsForTheNextCall) {
   EXPECT_TRUE(meshes.take(0).empty());
 }
 
-TEST(LiveMistakes, RegionsOfAnotherSizeAreFound) {
+TEST(LiveMeshesDeathTest, RejectsUnknownRegionEdge) {
   LiveMeshOptions wanted;
   wanted.region_edge = 24;
   QUOIN_EXPECT_MISTAKE(LiveMeshes{wanted}, "16, 32 or 64");

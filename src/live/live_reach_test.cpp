@@ -44,7 +44,7 @@ class FollowedGrid {
   ShownSurfaces shown;
 };
 
-TEST(LiveReach, BlockyEditsReachTheChunksOfTheNeighbouringVoxels) {
+TEST(LiveReach, BlockyEditsReachNeighbourChunks) {
   FollowedGrid followed(SurfaceStyle::Blocky);
   Grid& grid = followed.one.grid();
   for (int i = 0; i < 27; ++i) grid.set(Neighbourhood::offset(i) * 64 + 30, 1);
@@ -103,7 +103,7 @@ Places chunks_that_read_changes(const DensityGrid& before, const DensityGrid& af
   return changed;
 }
 
-TEST(LiveReach, SmoothEditsReachTheChunksThatReadAnotherDensity) {
+TEST(LiveReach, SmoothEditsReachChunksWithChangedDensity) {
   FollowedGrid followed(SurfaceStyle::Smooth);
   Grid& grid = followed.one.grid();
   grid.fill_box({{-40, 0, -40}, {91, 21, 91}}, 1);
@@ -133,7 +133,7 @@ TEST(LiveReach, SmoothEditsReachTheChunksThatReadAnotherDensity) {
   }
 }
 
-TEST(LiveReach, SmoothEditsDeepInsideAreMeshedNowhere) {
+TEST(LiveReach, SkipsSmoothEditsDeepInside) {
   FollowedGrid followed(SurfaceStyle::Smooth);
   Grid& grid = followed.one.grid();
   grid.fill_box({{-40, -40, -40}, {101, 101, 101}}, 1);
@@ -149,7 +149,7 @@ TEST(LiveReach, SmoothEditsDeepInsideAreMeshedNowhere) {
   expect_smooth(followed.shown, followed.one.scene, FollowedGrid::options_of(SurfaceStyle::Smooth));
 }
 
-TEST(LiveReach, OnlyChunksThatShowAChangedTypeAreMeshedAgain) {
+TEST(LiveReach, RemeshesOnlyChunksWithChangedType) {
   for (const SurfaceStyle style : {SurfaceStyle::Blocky, SurfaceStyle::Smooth}) {
     FollowedGrid followed(style);
     followed.one.grid().fill_box({{10, 10, 10}, {21, 21, 21}}, 1);

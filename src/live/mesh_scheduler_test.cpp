@@ -81,7 +81,7 @@ std::size_t faces_of(const SurfaceUpdate& update) {
   return update.surface == nullptr ? 0 : update.surface->quads.size();
 }
 
-TEST(MeshScheduler, TheNearestChunksComeFirst) {
+TEST(MeshScheduler, MeshesNearestChunksFirst) {
   OneGrid one;
   fill_row(one.grid(), 200);
   Instance& instance = one.scene.edit(one.placed);
@@ -99,7 +99,7 @@ TEST(MeshScheduler, TheNearestChunksComeFirst) {
   EXPECT_EQ(started.back().chunk.x, 0);
 }
 
-TEST(MeshScheduler, AnEyeThatMovedIsServedBeforeWhatWaitsForWorkers) {
+TEST(MeshScheduler, ReordersQueueWhenEyeMoves) {
   OneGrid one;
   fill_row(one.grid(), 200);
   GatedWork gated(blocky(1));
@@ -117,7 +117,7 @@ TEST(MeshScheduler, AnEyeThatMovedIsServedBeforeWhatWaitsForWorkers) {
   EXPECT_EQ(scheduler.stats().chunks_meshed, 200);
 }
 
-TEST(MeshScheduler, SnapshotsAreLetGoOnceNoWorkerNeedsThem) {
+TEST(MeshScheduler, ReleasesUnneededSnapshots) {
   OneGrid one;
   for (int i = 0; i < 100; ++i) {
     for (int x = 0; x < 64; ++x) one.grid().set({64 * i + x, x, x / 2}, static_cast<VoxelType>(1 + x % 3));
@@ -195,7 +195,7 @@ TEST(MeshScheduler, MeshesTheLastOfSeveralEdits) {
   for (const SurfaceUpdate& update : scheduler.take()) EXPECT_EQ(faces_of(update), update.chunk.x == 0 ? 6U : 36U);
 }
 
-TEST(MeshScheduler, AnEditDuringMeshingGivesBothInOrder) {
+TEST(MeshScheduler, DeliversEditDuringMeshingInOrder) {
   OneGrid one;
   fill_row(one.grid(), 1);
   GatedWork gated(blocky(1));
@@ -242,7 +242,7 @@ TEST(MeshScheduler, DropsChunksRemovedOrReplacedDuringMeshing) {
 }
 
 // Each edit adds an isolated voxel: the number of faces counts the edits.
-TEST(MeshScheduler, NothingOlderIsGivenAfterSomethingNewer) {
+TEST(MeshScheduler, DeliversNoOlderMeshAfterNewer) {
   LiveMeshOptions options = blocky(4);
   OneGrid one;
   MeshScheduler scheduler(options, [&](LiveJob& job, LiveWorkspace& workspace) {
@@ -272,7 +272,7 @@ TEST(MeshScheduler, NothingOlderIsGivenAfterSomethingNewer) {
 }
 
 // Unchanged chunks deliver no surface, but callers that wait for `pending` to be 0 still finish.
-TEST(MeshScheduler, AConsumerDrivenByOnReadyReceivesAllMeshes) {
+TEST(MeshScheduler, OnReadyDeliversAllMeshes) {
   OneGrid one;
   constexpr int kEdited = 40;
   for (int row = 0; row < 2; ++row) {
@@ -312,7 +312,7 @@ TEST(MeshScheduler, AConsumerDrivenByOnReadyReceivesAllMeshes) {
   EXPECT_GT(as_before, 0) << "the test is of such chunks";
 }
 
-TEST(MeshScheduler, MemoryThatRunsOutIsTriedAgain) {
+TEST(MeshScheduler, RetriesAfterRunningOutOfMemory) {
   for (const SurfaceStyle style : {SurfaceStyle::Blocky, SurfaceStyle::Smooth}) {
     LiveMeshOptions options = blocky(2);
     options.style = style;
@@ -336,7 +336,7 @@ TEST(MeshScheduler, MemoryThatRunsOutIsTriedAgain) {
   }
 }
 
-TEST(MeshScheduler, FinishSaysSoWhereMemoryNeverSuffices) {
+TEST(MeshScheduler, FinishThrowsWithoutMemory) {
   OneGrid one;
   fill_row(one.grid(), 3);
   MeshScheduler scheduler(blocky(2), [](LiveJob&, LiveWorkspace&) { throw std::bad_alloc(); });
@@ -345,7 +345,7 @@ TEST(MeshScheduler, FinishSaysSoWhereMemoryNeverSuffices) {
   EXPECT_TRUE(scheduler.take().empty());
 }
 
-TEST(MeshScheduler, EndsWithoutMeshingWhatWaits) {
+TEST(MeshScheduler, StopsWithoutMeshingQueue) {
   OneGrid one;
   fill_row(one.grid(), 60);
   std::atomic<int> started{0};
@@ -376,7 +376,7 @@ TEST(LiveDensityDeathTest, RejectsReadingBeforeDensitiesAreMade) {
   QUOIN_EXPECT_MISTAKE((void)density.reads_as(1, 1, {}), "densities that were made");
 }
 
-TEST(ChunkDistancesDeathTest, RejectsInstancesWithoutAPlace) {
+TEST(ChunkDistancesDeathTest, RejectsInvalidTransform) {
   ChunkDistances distances({}, {});
   Instance instance;
   instance.voxel_size = 0.0;
