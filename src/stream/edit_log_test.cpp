@@ -22,7 +22,7 @@ EditLog some_log(std::uint32_t author) {
   return log;
 }
 
-TEST(EditLog, RoundTripsALog) {
+TEST(EditLog, RoundTripsThroughBytes) {
   const EditLog log = some_log(1);
   const auto read = EditLog::decode(log.encode());
   ASSERT_TRUE(read.has_value()) << to_string(read.error());
@@ -30,7 +30,7 @@ TEST(EditLog, RoundTripsALog) {
   EXPECT_TRUE(EditLog::decode(EditLog().encode())->empty());
 }
 
-TEST(EditLog, EveryByteThatIsTurnedIsNoticed) {
+TEST(EditLog, DetectsEveryFlippedByte) {
   const std::vector<std::byte> bytes = some_log(1).encode();
   for (std::size_t i = 0; i < bytes.size(); ++i) {
     std::vector<std::byte> turned = bytes;
@@ -39,7 +39,7 @@ TEST(EditLog, EveryByteThatIsTurnedIsNoticed) {
   }
 }
 
-TEST(EditLog, EveryEndIsNoticedButThatOfAnEdit) {
+TEST(EditLog, DetectsTruncationWithinEdits) {
   const EditLog log = some_log(1);
   const std::vector<std::byte> bytes = log.encode();
   std::size_t whole = 0;
@@ -53,7 +53,7 @@ TEST(EditLog, EveryEndIsNoticedButThatOfAnEdit) {
   EXPECT_EQ(whole, log.edits().size());
 }
 
-TEST(EditLog, LogsAreMergedByNumberAndAuthor) {
+TEST(EditLog, MergesByNumberAndAuthor) {
   const EditLog a = some_log(1);
   const EditLog b = some_log(2);
   const auto both = EditLog::merged(a, b);
@@ -68,7 +68,7 @@ TEST(EditLog, LogsAreMergedByNumberAndAuthor) {
   EXPECT_FALSE(EditLog::merged(a, other).has_value());
 }
 
-TEST(WorldEdit, SaysWhichChunksItMayChange) {
+TEST(WorldEdit, ListsAffectedChunks) {
   const auto chunks = [](WorldEdit::Content content) { return chunks_of_edit({0, std::move(content)}); };
   EXPECT_EQ(chunks(WorldEdit::FillBox{{{0, 0, 0}, {65, 1, 1}}, 1})->size(), 2U);
   EXPECT_EQ(chunks(WorldEdit::FillBox{})->size(), 0U);
@@ -84,7 +84,7 @@ TEST(WorldEdit, SaysWhichChunksItMayChange) {
             ErrorCode::InvalidArgument);
 }
 
-TEST(EditLogDeathTest, EditsAreAddedInTheirOrder) {
+TEST(EditLogDeathTest, RejectsOutOfOrderEdits) {
   EditLog log = some_log(1);
   QUOIN_EXPECT_MISTAKE(log.add({9, 1, {0, WorldEdit::FillBox{}}}), "an edit later than the last one");
 }

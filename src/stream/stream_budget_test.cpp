@@ -41,7 +41,7 @@ class Program {
   StreamBudget::Clock::time_point now_{};
 };
 
-TEST(StreamBudget, RoomIsKeptForWhatIsMadeOfChunksLater) {
+TEST(StreamBudget, ReservesMemoryForDerivedData) {
   Program program;
   program.load(100'000);
   EXPECT_LT(program.budget.loaded_bytes(), kBudget / 2);
@@ -66,7 +66,7 @@ TEST(StreamBudget, RoomIsKeptForWhatIsMadeOfChunksLater) {
   EXPECT_LT(program.most, static_cast<double>(kBudget));
 }
 
-TEST(StreamBudget, WithoutOthersAllIsForChunks) {
+TEST(StreamBudget, GivesAllToChunksWithoutOthers) {
   StreamBudget budget(kBudget, false);
   while (budget.room(0) > 0) budget.add_chunk(kChunk);
   EXPECT_GT(budget.loaded_bytes(), kBudget * 8 / 10);
@@ -75,13 +75,13 @@ TEST(StreamBudget, WithoutOthersAllIsForChunks) {
   EXPECT_LT(budget.chunks(2 * budget.loaded_chunks(), true, 0.0), budget.loaded_chunks() + 1);
 }
 
-TEST(StreamBudgetDeathTest, ChunksLeaveAsTheyCame) {
+TEST(StreamBudgetDeathTest, RejectsRemovingUnknownChunk) {
   StreamBudget budget(kBudget, false);
   budget.add_chunk(kChunk);
   QUOIN_EXPECT_MISTAKE(budget.remove_chunk(kChunk + 1), "a chunk that was added");
 }
 
-TEST(StreamBudgetDeathTest, MissingSharesAreAtMostOne) {
+TEST(StreamBudgetDeathTest, RejectsShareAboveOne) {
   const StreamBudget budget(kBudget, false);
   QUOIN_EXPECT_MISTAKE(static_cast<void>(budget.chunks(1, true, 2.0)), "a share of 0 to 1");
 }

@@ -23,7 +23,7 @@ std::vector<double> distances_of(const std::vector<Eye>& eyes) {
 }
 
 // Thousands of placements move, appear and disappear; the nearest are found after a few updates at most.
-TEST(Placements, TheNearestAreFound) {
+TEST(Placements, FindsNearestAmongThousands) {
   std::mt19937 random(4);
   const auto place = [&] { return static_cast<double>(random() % 20'000); };
   Scene scene;
@@ -63,7 +63,7 @@ TEST(Placements, TheNearestAreFound) {
   EXPECT_EQ(placements.instances().size(), instances.size());
 }
 
-TEST(Placements, FewAreAllLookedAtAtOnce) {
+TEST(Placements, UsesAllOfFewPlacements) {
   Scene scene;
   const GridHandle grid = scene.add_grid({});
   Placements placements;

@@ -102,7 +102,7 @@ class StreamedWorldTest : public ::testing::Test {
   WorldFolder folder_;
 };
 
-TEST_F(StreamedWorldTest, LoadsWhatIsAroundAViewerAndNothingElse) {
+TEST_F(StreamedWorldTest, LoadsOnlyChunksAroundViewer) {
   auto generator = std::make_shared<PatternGround>();
   StreamedWorld world = ground(path(), generator);
   const Viewer viewer{.position = {10.0, 5.0, 10.0}, .radius = 150.0};
@@ -128,7 +128,7 @@ TEST_F(StreamedWorldTest, LoadsWhatIsAroundAViewerAndNothingElse) {
   EXPECT_TRUE(world.take_problems().empty());
 }
 
-TEST_F(StreamedWorldTest, EditsSurviveEvictionAndTheGeneratorIsAskedOnce) {
+TEST_F(StreamedWorldTest, KeepsEditsAfterEvictionAndGeneratesOnce) {
   auto generator = std::make_shared<PatternGround>();
   {
     StreamedWorld world = ground(path(), generator);
@@ -177,7 +177,7 @@ TEST_F(StreamedWorldTest, SavesEditsOnDestruction) {
   EXPECT_EQ(grid.get(9000, 1, 1), 3);
 }
 
-TEST_F(StreamedWorldTest, TheBudgetHoldsAndTheNearestStay) {
+TEST_F(StreamedWorldTest, KeepsBudgetAndNearestChunks) {
   auto generator = std::make_shared<PatternGround>();
   StreamOptions options;
   std::size_t others = 0;
@@ -223,7 +223,7 @@ TEST_F(StreamedWorldTest, EditsReachUnloadedChunks) {
   EXPECT_EQ(world.apply({7, WorldEdit::FillBox{}}).error().code, ErrorCode::InvalidArgument);
 }
 
-TEST_F(StreamedWorldTest, MeshesHaveNoWallsWhereTheWorldIsNotLoaded) {
+TEST_F(StreamedWorldTest, MeshesNoWallsAtUnloadedChunks) {
   auto generator = std::make_shared<PatternGround>();
   StreamedWorld world = ground(path(), generator);
   LiveMeshes meshes;
@@ -262,7 +262,7 @@ TEST_F(StreamedWorldTest, MeshesHaveNoWallsWhereTheWorldIsNotLoaded) {
   EXPECT_TRUE(quads.contains({15, -1, 0}));
 }
 
-TEST_F(StreamedWorldTest, FieldsAreStreamedLikeVoxels) {
+TEST_F(StreamedWorldTest, StreamsFieldsLikeVoxels) {
   Viewer viewer{.position = {100.0, 100.0, 100.0}, .radius = 130.0};
   {
     auto world = StreamedWorld::open_or_create(path());
@@ -308,7 +308,7 @@ TEST_F(StreamedWorldTest, FieldsAreStreamedLikeVoxels) {
   EXPECT_GT(world->scene().grids()[only_grid(*world)].field.chunk_count(), 4U);
 }
 
-TEST_F(StreamedWorldTest, TerrainIsTheSameAsInOnePiece) {
+TEST_F(StreamedWorldTest, MatchesTerrainGeneratedInOnePiece) {
   VoxelRegistry types;
   const auto filled = add_terrain_types(types);
   const auto whole = generate_terrain({.seed = 5, .size = {8, 4, 8}}, *filled);
@@ -327,7 +327,7 @@ TEST_F(StreamedWorldTest, TerrainIsTheSameAsInOnePiece) {
   EXPECT_FALSE(make_terrain_generator({.height = 17}, again).has_value());
 }
 
-TEST_F(StreamedWorldTest, AWorldThatIsOnlyReadKeepsItsEditsInMemory) {
+TEST_F(StreamedWorldTest, KeepsEditsInMemoryWhenReadOnly) {
   auto generator = std::make_shared<PatternGround>();
   Viewer viewer{.radius = 100.0};
   {
@@ -348,7 +348,7 @@ TEST_F(StreamedWorldTest, AWorldThatIsOnlyReadKeepsItsEditsInMemory) {
   EXPECT_TRUE(world->flush().has_value());
 }
 
-TEST_F(StreamedWorldTest, EditsWithNewTypesWaitAndAreSaved) {
+TEST_F(StreamedWorldTest, SavesWaitingEditsWithNewTypes) {
   {
     StreamedWorld world = ground(path(), std::make_shared<PatternGround>());
     const VoxelType fresh = world.scene().types.add(coloured_type(9)).value();
@@ -367,7 +367,7 @@ TEST_F(StreamedWorldTest, EditsWithNewTypesWaitAndAreSaved) {
   EXPECT_EQ((*kept)->voxels.get(local_of(IVec3{900, 1, 1})), 4);
 }
 
-TEST_F(StreamedWorldTest, EditsThatWaitForAGridThatIsRemovedDoNotHang) {
+TEST_F(StreamedWorldTest, DropsWaitingEditsOfRemovedGrid) {
   StreamedWorld world = ground(path(), std::make_shared<PatternGround>());
   ASSERT_TRUE(world.apply({0, WorldEdit::FillBox{{{900, 0, 0}, {1000, 9, 9}}, 1}}).has_value());
   world.scene().remove_grid(only_grid(world));
@@ -375,7 +375,7 @@ TEST_F(StreamedWorldTest, EditsThatWaitForAGridThatIsRemovedDoNotHang) {
   EXPECT_EQ(world.stats().waiting_edits, 0U);
 }
 
-TEST_F(StreamedWorldTest, EditsThatWaitAreMadeOneAfterTheOther) {
+TEST_F(StreamedWorldTest, AppliesWaitingEditsInTurn) {
   StreamedWorld world = ground(path(), std::make_shared<PatternGround>());
   const Viewer viewer{.radius = 70.0};
   ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
@@ -390,7 +390,7 @@ TEST_F(StreamedWorldTest, EditsThatWaitAreMadeOneAfterTheOther) {
   EXPECT_EQ(world.stats().waiting_edits, 0U);
 }
 
-TEST_F(StreamedWorldTest, ALargeEditThatWaitsDoesNotHoldUpItsCaller) {
+TEST_F(StreamedWorldTest, AppliesLargeWaitingEdit) {
   StreamedWorld world = ground(path(), std::make_shared<PatternGround>());
   const Viewer viewer{.radius = 70.0};
   ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
@@ -412,7 +412,7 @@ class BrokenGround final : public ChunkGenerator {
   }
 };
 
-TEST_F(StreamedWorldTest, NamesChunksThatCannotBeGeneratedAndShowsAir) {
+TEST_F(StreamedWorldTest, ReportsFailedChunksAndShowsAir) {
   auto world = StreamedWorld::open_or_create(path());
   ASSERT_TRUE(world.has_value());
   add_types(*world);
@@ -430,7 +430,7 @@ TEST_F(StreamedWorldTest, NamesChunksThatCannotBeGeneratedAndShowsAir) {
 }
 
 // Random flights, edits and threads: the world file has the same chunks in any order of events.
-TEST_F(StreamedWorldTest, RandomSchedulesGiveTheSameBytes) {
+TEST_F(StreamedWorldTest, StoresSameChunksForRandomSchedules) {
   const int rounds = std::getenv("QUOIN_SCHEDULES") == nullptr ? 8 : std::atoi(std::getenv("QUOIN_SCHEDULES"));
   std::map<Key, StoredChunk> expected;
   for (int round = 0; round < rounds; ++round) {
@@ -480,7 +480,7 @@ TEST_F(StreamedWorldTest, RandomSchedulesGiveTheSameBytes) {
 }
 
 // Simulates a server: the same log is applied to two worlds with viewers at different positions.
-TEST_F(StreamedWorldTest, ReplayedLogsGiveTheSameWorlds) {
+TEST_F(StreamedWorldTest, ReplaysLogToSameWorld) {
   EditLog log;
   std::mt19937 chance(3);
   for (std::uint64_t i = 1; i <= 60; ++i) {
@@ -521,14 +521,14 @@ TEST_F(StreamedWorldTest, ReplayedLogsGiveTheSameWorlds) {
   EXPECT_TRUE(ends[0] == ends[1]);
 }
 
-TEST(TerrainGeneratorDeathTest, ChunksLieInTheLandscape) {
+TEST(TerrainGeneratorDeathTest, RejectsChunkOutsideLandscape) {
   VoxelRegistry types;
   const auto generator = make_terrain_generator({.seed = 5, .height = 2}, types);
   ASSERT_TRUE(generator.has_value());
   QUOIN_EXPECT_MISTAKE(static_cast<void>((*generator)->make({0, 2, 0})), "a chunk of the landscape");
 }
 
-TEST(StreamedWorldDeathTest, GeneratorsAreForStreamedGrids) {
+TEST(StreamedWorldDeathTest, RejectsGeneratorForUnknownGrid) {
   const WorldFolder folder;
   auto world = StreamedWorld::open_or_create(folder / "w.quoin");
   ASSERT_TRUE(world.has_value());
