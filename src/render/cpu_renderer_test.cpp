@@ -42,7 +42,7 @@ Scene lively_scene() {
   return scene;
 }
 
-TEST(CpuRenderer, GivesTheSameBytesForAnyThreadsAndInstructions) {
+TEST(CpuRenderer, GivesSameBytesForAnyThreadsAndInstructions) {
   const Scene scene = lively_scene();
   const CpuRenderer renderer(scene);
   const Camera camera = towards({25, 18, 30}, {0, 2, 0});
@@ -82,7 +82,7 @@ TEST(CpuRenderer, ProgressNeverFallsAndReachesOne) {
   EXPECT_EQ(last, 1.0);
 }
 
-TEST(CpuRenderer, StopsWhenTold) {
+TEST(CpuRenderer, StopsWhenCancelled) {
   const Scene scene = lively_scene();
   int calls = 0;
   const auto image = CpuRenderer(scene).render(towards({25, 18, 30}, {0, 2, 0}), sized(300, 300), {},
@@ -92,7 +92,7 @@ TEST(CpuRenderer, StopsWhenTold) {
   EXPECT_EQ(calls, 3);
 }
 
-TEST(CpuRenderer, TellsOfEverySampleAndStopsAmongThem) {
+TEST(CpuRenderer, ReportsAndStopsBetweenSamples) {
   const Scene scene = lively_scene();
   RenderOptions options = sized(16, 16);  // one tile
   options.samples = 50;
@@ -106,7 +106,7 @@ TEST(CpuRenderer, TellsOfEverySampleAndStopsAmongThem) {
   EXPECT_EQ(calls, 57);
 }
 
-TEST(CpuRenderer, RefusesWhatCannotBe) {
+TEST(CpuRenderer, RejectsInvalidInput) {
   const Scene scene = lively_scene();
   const CpuRenderer renderer(scene);
   const auto expect_refused = [&](const char* name, const std::function<void(Camera&, RenderOptions&)>& change) {
@@ -137,7 +137,7 @@ TEST(CpuRenderer, RefusesWhatCannotBe) {
   }
 }
 
-TEST(CpuRenderer, AnEmptySceneIsSky) {
+TEST(CpuRenderer, DrawsSkyForEmptyScene) {
   const Scene scene;
   const RenderedImage image = taken(scene, towards({0, 0, 0}, {0, 0, -1}), sized(9, 9));
   EXPECT_EQ(image.pixels_hit, 0);
@@ -149,14 +149,14 @@ TEST(CpuRenderer, AnEmptySceneIsSky) {
   EXPECT_LT(top[0], horizon[0]) << "the sky is paler towards the horizon";
 }
 
-TEST(CpuRenderer, TheSkyHasNoStepAnywhere) {
+TEST(CpuRenderer, SkyIsSmooth) {
   for (int i = -10'000; i < 10'000; ++i) {
     const Vec3 step = sky_colour(static_cast<float>(i + 1) * 1e-4F) - sky_colour(static_cast<float>(i) * 1e-4F);
     ASSERT_LT(glm::length(step), 1e-3F) << i;
   }
 }
 
-TEST(CpuRenderer, OneVoxelIsSeenUprightAndNotMirrored) {
+TEST(CpuRenderer, DrawsVoxelUprightAndUnmirrored) {
   Scene scene;
   const Rgba8 red{200, 40, 30, 255};
   const VoxelType type = add_type(scene, red);
@@ -178,7 +178,7 @@ TEST(CpuRenderer, OneVoxelIsSeenUprightAndNotMirrored) {
   EXPECT_LT(image.pixels_hit, 165);
 }
 
-TEST(CpuRenderer, UnlitColoursAreThoseOfThePalette) {
+TEST(CpuRenderer, UnlitColoursMatchPalette) {
   Scene scene;
   Grid grid;
   for (int i = 0; i < 256; ++i) {
@@ -218,7 +218,7 @@ TEST(CpuRenderer, SamplesSoftenEdgesOnly) {
   EXPECT_LT(count_different(one, many, 2), 64 * 64 / 8);
 }
 
-TEST(CpuRenderer, SamplePointsStartInTheCentreAndFillThePixel) {
+TEST(CpuRenderer, SamplePointsStartAtCentreAndFillPixel) {
   EXPECT_EQ(sample_point(0).x, 0.5);
   EXPECT_EQ(sample_point(0).y, 0.5);
   std::array<int, 16> cells{};
@@ -229,7 +229,7 @@ TEST(CpuRenderer, SamplePointsStartInTheCentreAndFillThePixel) {
   for (const int count : cells) EXPECT_NEAR(count, 16, 3);
 }
 
-TEST(CameraRays, AreThoseThatPickThePixel) {
+TEST(CameraRays, MatchPickingRays) {
   Camera perspective = *look_at({3, 4, 5}, {-20, 1, 9}, 0.7);
   Camera orthographic = perspective;
   orthographic.projection = Camera::Projection::Orthographic;
@@ -277,7 +277,7 @@ class UpdatedRenderer {
 };
 
 // Applies changes of all kinds between images of all kinds.
-TEST(CpuRenderer, UpdatedItTakesTheImagesOfANewOne) {
+TEST(CpuRenderer, UpdatedRendererMatchesNewRenderer) {
   Scene scene = lively_scene();
   UpdatedRenderer renderer(scene);
   renderer.expect_as_new("nothing");
@@ -305,7 +305,7 @@ TEST(CpuRenderer, UpdatedItTakesTheImagesOfANewOne) {
   renderer.expect_as_new("emptied");
 }
 
-TEST(CpuRendererDeathTest, WantsACameraOfPerpendicularAxes) {
+TEST(CpuRendererDeathTest, RejectsCameraWithoutPerpendicularAxes) {
   const Scene scene = lively_scene();
   const CpuRenderer renderer(scene);
   Camera camera = towards({25, 18, 30}, {0, 2, 0});

@@ -32,7 +32,7 @@ Scene ball(double cut_above_y = 100.0) {
   return scene;
 }
 
-TEST(DensitySlice, ABallIsADiscInEveryDirection) {
+TEST(DensitySlice, ShowsBallAsDiscInEveryDirection) {
   const Scene scene = ball();
   DensitySliceOptions options;
   options.width = 200;
@@ -49,7 +49,7 @@ TEST(DensitySlice, ABallIsADiscInEveryDirection) {
   }
 }
 
-TEST(DensitySlice, IsSeenFromThePositiveEndUpright) {
+TEST(DensitySlice, IsUprightSeenFromPositiveEnd) {
   const Scene scene = ball(0.0);  // the lower half
   DensitySliceOptions options;
   options.width = 100;
@@ -66,7 +66,7 @@ TEST(DensitySlice, IsSeenFromThePositiveEndUpright) {
   }
 }
 
-TEST(DensitySlice, MovesAlongItsAxisAndIsTheSameWithAnyThreads) {
+TEST(DensitySlice, MovesAlongAxisAndIgnoresThreadCount) {
   const Scene scene = ball();
   DensitySliceOptions options;
   options.at = 0.9;
@@ -80,7 +80,7 @@ TEST(DensitySlice, MovesAlongItsAxisAndIsTheSameWithAnyThreads) {
   EXPECT_GT(top->position, 10.0);
 }
 
-TEST(DensitySlice, RefusesWhatItCannotDraw) {
+TEST(DensitySlice, RejectsInvalidInput) {
   const Scene scene = ball();
   DensitySliceOptions options;
   EXPECT_FALSE(draw_density_slice(Scene()));

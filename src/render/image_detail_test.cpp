@@ -32,7 +32,7 @@ TEST(RenderFar, TracesImpostorsThatAreNotReadyInTime) {
   EXPECT_FALSE(renderer.render(camera, options).has_value());
 }
 
-TEST(RenderFar, TheRendererDrawsFarInstancesFromImpostors) {
+TEST(RenderFar, DrawsFarInstancesFromImpostors) {
   ImpostorWorld world(Model::Castle);
   Instance ground = world.placed();
   SceneGrid slab;
@@ -56,7 +56,7 @@ TEST(RenderFar, TheRendererDrawsFarInstancesFromImpostors) {
 }
 
 // Without this, some renderers would find impostors still being built by another one, and trace those grids.
-TEST(RenderFar, ImagesTakenAtOnceAreThoseTakenAlone) {
+TEST(RenderFar, ConcurrentImagesMatchSingleImage) {
   ImpostorWorld world(Model::Castle);
   for (int i = 1; i < 4; ++i) {
     Instance other = world.placed();

@@ -190,15 +190,15 @@ void expect_close(const Model& model, int halvings) {
   }
 }
 
-TEST(RenderDetail, AShipLooksTheSameInCoarserCells) {
+TEST(RenderDetail, ShipLooksAlikeInCoarserCells) {
   expect_close(ship(), 1);
 }
 
-TEST(RenderDetail, ATerrainLooksTheSameInCoarserCells) {
+TEST(RenderDetail, TerrainLooksAlikeInCoarserCells) {
   expect_close(terrain(), 1);
 }
 
-TEST(RenderDetail, AThinBridgeStaysAsItIs) {
+TEST(RenderDetail, ThinBridgeIsNotHalved) {
   expect_close(bridge(), 0);
 }
 
@@ -215,7 +215,7 @@ void expect_close_at(const Model& model, int level, int halvings, double differe
   ::testing::Test::RecordProperty("overlap" + std::to_string(level), std::to_string(found.overlap));
 }
 
-TEST(RenderDetail, ASmoothTerrainLooksTheSameInCoarserSamples) {
+TEST(RenderDetail, SmoothTerrainLooksAlikeInCoarserSamples) {
   const Model model = smooth_terrain();
   expect_close_at(model, 1, 1, 6.0);
   expect_close_at(model, 2, 2, 7.5);
@@ -223,18 +223,18 @@ TEST(RenderDetail, ASmoothTerrainLooksTheSameInCoarserSamples) {
   expect_close_at(model, 3, 2, 7.5);
 }
 
-TEST(RenderDetail, AFieldAndItsBlocksAreHalvedTogether) {
+TEST(RenderDetail, HalvesFieldTogetherWithBlocks) {
   const Model model = village(false);
   for (int level = 1; level <= 2; ++level) expect_close_at(model, level, level, 6.0);
   // The eaves of the house would be twice as thick.
   expect_close_at(model, 3, 2, 6.0);
 }
 
-TEST(RenderDetail, AFieldOfThinWallsStaysAsItIsAndItsBlocksToo) {
+TEST(RenderDetail, ThinFieldAndItsBlocksAreNotHalved) {
   expect_close_at(village(true), 1, 0, 0.0);
 }
 
-TEST(RenderDetail, TheMeasureOfClosenessTellsThingsApart) {
+TEST(RenderDetail, ClosenessDetectsDifferences) {
   const Model model = terrain();
   DetailPolicy coarse = without_impostors();
   coarse.cell_pixels = 4.0;
@@ -270,7 +270,7 @@ RenderOptions always_mid() {
   return options;
 }
 
-TEST(RenderDetail, MidIsTheHalvedGridWithTheFullOnesLight) {
+TEST(RenderDetail, MidMatchesHalvedGridInFullLight) {
   const Model model = blobs();
   const Camera camera = towards({30, 25, 40}, {0, 0, 0}, 0.9);
   Scene coarse;
@@ -299,7 +299,7 @@ TEST(RenderDetail, MidIsTheHalvedGridWithTheFullOnesLight) {
   EXPECT_NE(mid.depth.values, near.depth.values);
 }
 
-TEST(RenderDetail, MidOfAFieldIsTheHalvedFieldWithTheFullOnesLight) {
+TEST(RenderDetail, MidMatchesHalvedFieldInFullLight) {
   const Model model = village(false);
   const Camera camera = towards({160, 150, 200}, {0, 0, 0}, 0.9);
   Scene coarse;
@@ -332,7 +332,7 @@ TEST(RenderDetail, MidOfAFieldIsTheHalvedFieldWithTheFullOnesLight) {
   }
 }
 
-TEST(RenderDetail, LevelsFollowEditsOfAField) {
+TEST(RenderDetail, LevelsFollowFieldEdits) {
   Model model = village(false);
   CpuRenderer renderer(model.scene);
   const Camera camera = towards({160, 150, 200}, {0, 0, 0}, 0.9);
@@ -352,7 +352,7 @@ TEST(RenderDetail, LevelsFollowEditsOfAField) {
   }
 }
 
-TEST(RenderDetail, OpaqueMidIsTheHalvedGridToTheByteButForRounding) {
+TEST(RenderDetail, OpaqueMidMatchesHalvedGrid) {
   VoxelType glass = kAir;
   Model model = blobs(&glass);
   Grid& voxels = model.scene.edit(model.scene.instances()[model.instance].grid).grid;
@@ -374,7 +374,7 @@ TEST(RenderDetail, OpaqueMidIsTheHalvedGridToTheByteButForRounding) {
   EXPECT_LE(count_different(taken(model.scene, camera, always_mid()), taken(coarse, camera, expected), 2), 8);
 }
 
-TEST(RenderDetail, NearIsTheImageWithoutDetailToTheByte) {
+TEST(RenderDetail, NearMatchesImageWithoutDetailExactly) {
   const Model model = blobs();
   const Camera camera = towards({30, 25, 40}, {0, 0, 0}, 0.9);
   RenderOptions options = sized(64, 64);
@@ -385,7 +385,7 @@ TEST(RenderDetail, NearIsTheImageWithoutDetailToTheByte) {
   EXPECT_EQ(plain.depth.values, detailed.depth.values);
 }
 
-TEST(RenderDetail, TheSameBytesAtAnyNumberOfThreadsAndAgain) {
+TEST(RenderDetail, GivesSameBytesForAnyThreadCount) {
   const Model model = blobs();
   const CpuRenderer renderer(model.scene);
   const Camera camera = towards({300, 250, 400}, {0, 0, 0}, 0.2);
@@ -414,7 +414,7 @@ TEST(RenderDetail, OffscreenInstancesStillCastShadows) {
   EXPECT_LT(shadowed[0], pixel_at(taken(scene, camera, options), 1, 1)[0] / 2);
 }
 
-TEST(RenderDetail, ColoursTellTheDetail) {
+TEST(RenderDetail, ColoursShowDetail) {
   Scene scene;
   const VoxelType type = add_type(scene, {200, 200, 200, 255});
   Grid slab;
@@ -454,7 +454,7 @@ std::vector<double> thresholds_of(const Model& model, const DetailPolicy& policy
   return found;
 }
 
-TEST(RenderDetail, NoViewTremblesAtAnyThreshold) {
+TEST(RenderDetail, ViewsAreStableAtThresholds) {
   const Model model = blobs();
   const CpuRenderer renderer(model.scene);
   RenderOptions options = sized(64, 64);

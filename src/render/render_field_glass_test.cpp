@@ -62,7 +62,7 @@ InstanceHandle place_field(Scene& scene, DensityGrid field, DVec3 position = DVe
   return scene.add_instance({"", scene.add_grid(std::move(placed)), position});
 }
 
-TEST(RenderFieldGlass, ASlabTintsByItsThicknessAndShowsItsOwnColour) {
+TEST(RenderFieldGlass, SlabTintsByThicknessAndShowsOwnColour) {
   for (const float thickness : {0.5F, 1.0F, 2.25F, 7.0F}) {
     for (const bool is_glass : {true, false}) {
       GlassScene s;
@@ -83,7 +83,7 @@ TEST(RenderFieldGlass, ASlabTintsByItsThicknessAndShowsItsOwnColour) {
   }
 }
 
-TEST(RenderFieldGlass, LengthsAreInVoxelsWhateverTheirSize) {
+TEST(RenderFieldGlass, MeasuresLengthInVoxels) {
   GlassScene s;
   Grid wall;
   wall.fill_box({{-9, -1, -9}, {10, 0, 10}}, s.red);
@@ -98,7 +98,7 @@ TEST(RenderFieldGlass, LengthsAreInVoxelsWhateverTheirSize) {
 }
 
 // The floor of a lake in the same field: at the same position below water and below air.
-TEST(RenderFieldGlass, TheFloorOfALakeIsWhereItsSamplesSay) {
+TEST(RenderFieldGlass, LakeFloorLiesAtItsSamples) {
   GlassScene s;
   DensityGrid lake;
   lake.edit({{-12, -12, -12}, {13, 12, 13}}, [&](IVec3 p, DensitySample) {
@@ -149,7 +149,7 @@ TEST(RenderFieldGlass, TintsTheSunAndDoesNotOcclude) {
 }
 
 // Blocks and a field of the same glass next to each other, seen from above and along both.
-TEST(RenderFieldGlass, BesideGlassOfBlocksItLooksTheSame) {
+TEST(RenderFieldGlass, MatchesAdjacentGlassOfBlocks) {
   GlassScene s;
   Grid blocks;
   blocks.fill_box({{-12, -1, -12}, {13, 0, 13}}, s.stone);
@@ -174,7 +174,7 @@ TEST(RenderFieldGlass, BesideGlassOfBlocksItLooksTheSame) {
               1);
 }
 
-TEST(RenderFieldGlass, OverlappingBlocksAreSeenThroughIt) {
+TEST(RenderFieldGlass, ShowsOverlappingBlocks) {
   GlassScene s;
   SceneGrid both;
   add_plate(both.field, {-10, -10, -10}, {10, 4, 10}, s.glass);
@@ -188,7 +188,7 @@ TEST(RenderFieldGlass, OverlappingBlocksAreSeenThroughIt) {
 }
 
 // A ball of clear glass in front of the sky: its two surfaces reflect by the field's normals.
-TEST(RenderFieldGlass, SurfacesMirrorByTheGradient) {
+TEST(RenderFieldGlass, SurfacesReflectByGradient) {
   Scene scene;
   VoxelProperties clear;
   clear.colour = {255, 255, 255, 0};
@@ -255,7 +255,7 @@ struct PondScene : GlassScene {
   }
 };
 
-TEST(RenderFieldGlass, TheSameBytesWhateverComputesThem) {
+TEST(RenderFieldGlass, GivesSameBytesForAnyThreadsAndInstructions) {
   PondScene s;
   RenderOptions options = sized(80, 60);
   options.light.glass_surfaces = true;
@@ -275,7 +275,7 @@ TEST(RenderFieldGlass, TheSameBytesWhateverComputesThem) {
   EXPECT_GT(count_different(one, taken(s.scene, camera, options), 4), 500);
 }
 
-TEST(RenderFieldGlass, ARendererFollowsEditsAndTypes) {
+TEST(RenderFieldGlass, FollowsEditsAndTypes) {
   PondScene s;
   RenderOptions options = sized(64, 48);
   options.light.glass_surfaces = true;
@@ -334,7 +334,7 @@ TEST(RenderFieldGlass, SeenFromInsideTintsOnly) {
 }
 
 // The opaque part comes from an impostor, the glass from rays; neither is halved.
-TEST(RenderFieldGlass, FromAfarItIsSeenThrough) {
+TEST(RenderFieldGlass, StaysTransparentFromAfar) {
   PondScene s;
   RenderOptions options = sized(96, 72);
   const Camera camera = towards({170, 120, 190}, {0, 0, 0});

@@ -34,7 +34,7 @@ InstanceHandle place_field(Scene& scene, DensityGrid field, DVec3 position = DVe
   return scene.add_instance({"", scene.add_grid(std::move(placed)), position});
 }
 
-TEST(RenderField, ABallHasTheLightOfItsNormals) {
+TEST(RenderField, LightsBallByNormals) {
   Scene scene;
   const Rgba8 colour{200, 120, 60, 255};
   DensityGrid field;
@@ -96,7 +96,7 @@ TEST(RenderField, FieldsAndBlocksShadeEachOther) {
   EXPECT_NE(pixel_at(under, 40 + 6, 40), in_shadow);
 }
 
-TEST(RenderField, AFlatFloorIsLitAsOneOfBlocks) {
+TEST(RenderField, LightsFlatFloorLikeBlocks) {
   const auto floor = [](bool of_blocks) {
     Scene scene;
     const VoxelType grey = add_type(scene, {188, 188, 188, 255});
@@ -135,7 +135,7 @@ TEST(RenderField, AFlatFloorIsLitAsOneOfBlocks) {
   }
 }
 
-TEST(RenderField, SmoothOcclusionIsThatOfItsMeshAtEveryPoint) {
+TEST(RenderField, SmoothOcclusionMatchesMesh) {
   Scene scene;
   DensityGrid field;
   field.add_box({0, 0, 0}, {40, 10, 40}, kAir);
@@ -166,7 +166,7 @@ TEST(RenderField, SmoothOcclusionIsThatOfItsMeshAtEveryPoint) {
   EXPECT_EQ(pixel_at(image, 20, 20), (Pixel{255, 255, 255})) << "convex";
 }
 
-TEST(RenderField, MaterialsColourIt) {
+TEST(RenderField, ShowsMaterialColours) {
   Scene scene;
   const VoxelType red = add_type(scene, {200, 30, 30, 255});
   const VoxelType glow = add_type(scene, {30, 200, 30, 255}, Visibility::Opaque, 2.0F);
@@ -203,7 +203,7 @@ DensityGrid patchwork(Scene& scene) {
 }
 
 // Seen from above, the floor has the colours of the mesh's vertices, interpolated between them.
-TEST(RenderField, MaterialsBlendAsThoseOfItsMesh) {
+TEST(RenderField, BlendsMaterialsLikeMesh) {
   Scene scene;
   DensityGrid field = patchwork(scene);
   const SmoothMesh mesh = build_smooth_mesh(field, scene.types, {}).value();
@@ -242,7 +242,7 @@ TEST(RenderField, MaterialsBlendAsThoseOfItsMesh) {
 }
 
 // Emission and path-traced materials blend by the same shares.
-TEST(RenderField, BlendsEmissionToo) {
+TEST(RenderField, BlendsEmission) {
   Scene scene;
   const VoxelType dark = add_type(scene, {0, 0, 0, 255});
   const VoxelType glow = add_type(scene, {255, 255, 255, 255}, Visibility::Opaque, 0.5F);
@@ -267,7 +267,7 @@ TEST(RenderField, BlendsEmissionToo) {
   }
 }
 
-TEST(RenderField, DirectionsTurnWithTheNormal) {
+TEST(RenderField, TurnsDirectionsWithNormal) {
   for (const DVec3 normal : {DVec3{0, 1, 0}, DVec3{0, -1, 0}, DVec3{1, 0, 0}, glm::normalize(DVec3{-1, -9, 0.2}),
                              glm::normalize(DVec3{0.3, 0.2, -0.7})}) {
     EXPECT_LT(glm::distance(turned_from_up({0, 1, 0}, normal), normal), 1e-9);

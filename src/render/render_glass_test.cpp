@@ -41,7 +41,7 @@ void expect_near(Pixel a, Pixel b, int tolerance) {
   for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(a[c], b[c], tolerance);
 }
 
-TEST(RenderGlass, PanesTintByTheirThicknessAndShowTheirOwnColour) {
+TEST(RenderGlass, PanesTintByThicknessAndShowOwnColour) {
   for (const int thickness : {1, 2, 3, 7}) {
     GlassScene s;
     Grid grid;
@@ -59,7 +59,7 @@ TEST(RenderGlass, PanesTintByTheirThicknessAndShowTheirOwnColour) {
   }
 }
 
-TEST(RenderGlass, IsVisibleOnADarkGroundAndAgainstTheSky) {
+TEST(RenderGlass, IsVisibleAgainstBackground) {
   GlassScene s;
   Grid grid;
   grid.fill_box({{-5, 0, -5}, {6, 1, 6}}, s.glass);
@@ -89,7 +89,7 @@ TEST(RenderGlass, HasNoSeamsBetweenEqualNeighbours) {
   EXPECT_EQ(count_different(whole, rendered_of(64, true), 1), 0) << "two grids";
 }
 
-TEST(RenderGlass, DifferentGlassesAreTwoBodies) {
+TEST(RenderGlass, SeparatesBodiesOfDifferentGlass) {
   GlassScene s;
   Grid grid;
   grid.fill_box({{0, 0, 0}, {1, 1, 2}}, s.glass);
@@ -106,7 +106,7 @@ TEST(RenderGlass, DifferentGlassesAreTwoBodies) {
   EXPECT_DOUBLE_EQ(bodies[1].voxels, 1.5) << "as far as the ray goes";
 }
 
-TEST(RenderGlass, LengthsAreInVoxelsWhateverTheirSize) {
+TEST(RenderGlass, MeasuresLengthInVoxels) {
   GlassScene s;
   Grid grid;
   grid.fill_box({{0, 0, 0}, {1, 1, 4}}, s.glass);
@@ -154,7 +154,7 @@ TEST(RenderGlass, SeenFromInsideTintsOnly) {
   EXPECT_EQ(depth_at(image, 1, 1), 0.0F);
 }
 
-TEST(RenderGlass, EmissiveGlassShinesInTheDarkFromOutsideAndInside) {
+TEST(RenderGlass, EmissiveGlassShinesFromOutsideAndInside) {
   for (const double height : {20.0, 1.0}) {
     std::array<Pixel, 2> seen{};
     for (const float emission : {0.0F, 2.0F}) {
@@ -173,7 +173,7 @@ TEST(RenderGlass, EmissiveGlassShinesInTheDarkFromOutsideAndInside) {
 }
 
 // Checks Fresnel's equations for glass of index 1.5.
-TEST(RenderGlass, SurfacesMirrorWhatFresnelSays) {
+TEST(RenderGlass, SurfacesReflectByFresnel) {
   GlassScene s;
   Grid grid;
   grid.fill_box({{0, 0, 0}, {1, 1, 1}}, s.glass);
@@ -200,7 +200,7 @@ TEST(RenderGlass, SurfacesMirrorWhatFresnelSays) {
 }
 
 // Compares images with and without reflecting surfaces: a pane on stone, and a pane above it.
-TEST(RenderGlass, SurfacesShowTheSkyAndDimWhatLiesBehind) {
+TEST(RenderGlass, SurfacesReflectSkyAndDimBackground) {
   for (const int gap : {0, 3}) {
     GlassScene s;
     Grid grid;
@@ -228,7 +228,7 @@ TEST(RenderGlass, SurfacesShowTheSkyAndDimWhatLiesBehind) {
   }
 }
 
-TEST(RenderGlass, SurfacesBelongToLightAndToBodies) {
+TEST(RenderGlass, SurfacesDependOnIndexAndLitMode) {
   const auto scene_with = [](float ior, float other_ior, bool is_split) {
     GlassScene s;
     for (const auto& [type, index] : {std::pair{s.glass, ior}, std::pair{s.green, other_ior}}) {
@@ -266,7 +266,7 @@ TEST(RenderGlass, SurfacesBelongToLightAndToBodies) {
 }
 
 // Fully covering glass, deep seas and grazing rays must give finite numbers.
-TEST(RenderGlass, DarkAndDeepGlassIsNeverNotANumber) {
+TEST(RenderGlass, OpaqueAndDeepGlassStaysFinite) {
   Scene scene;
   const VoxelType ink = add_type(scene, {0, 0, 0, 255}, Visibility::Transparent);
   const VoxelType clear = add_type(scene, {255, 255, 255, 0}, Visibility::Transparent);

@@ -51,7 +51,7 @@ DVec3 floor_at(int x, int y, int size, double height) {
   return {((x + 0.5) / size - 0.5) * height, 0.0, ((y + 0.5) / size - 0.5) * height};
 }
 
-TEST(RenderLamps, APointFallsOffWithTheSquareOfTheDistance) {
+TEST(RenderLamps, PointLampFallsOffWithSquaredDistance) {
   Scene scene = floor_by_night();
   Lamp lamp;
   lamp.position = {3.0, 5.0, -2.0};
@@ -70,7 +70,7 @@ TEST(RenderLamps, APointFallsOffWithTheSquareOfTheDistance) {
   EXPECT_EQ(pixel_at(image, 0, 39), (Pixel{0, 0, 0})) << "beyond its range";
 }
 
-TEST(RenderLamps, ASpotLightsItsCone) {
+TEST(RenderLamps, SpotLampLightsItsCone) {
   Scene scene = floor_by_night();
   Lamp lamp;
   lamp.kind = Lamp::Kind::Spot;
@@ -106,7 +106,7 @@ TEST(RenderLamps, CastShadowsUnlessDisabled) {
 }
 
 // One voxel as a lamp of six faces: its light is close to the light of the faces.
-TEST(RenderLamps, AVoxelThatEmitsLightsAsItsFacesDo) {
+TEST(RenderLamps, EmissiveVoxelMatchesItsFaces) {
   Scene scene = floor_by_night();
   const VoxelType torch = add_type(scene, kWhite, Visibility::Opaque, 6.0F);
   Grid& grid = scene.edit(scene.grids().handles()[0]).grid;
@@ -139,7 +139,7 @@ TEST(RenderLamps, AVoxelThatEmitsLightsAsItsFacesDo) {
 }
 
 // Analytic check of a ball of constant radiance: its light falls off with the squared distance from its centre.
-TEST(RenderLamps, AFieldThatEmitsLightsAsItsSurfaceDoes) {
+TEST(RenderLamps, EmissiveFieldMatchesItsSurface) {
   Scene scene = floor_by_night();
   const VoxelType glow = add_type(scene, kWhite, Visibility::Opaque, 1.5F);
   constexpr double kRadius = 4.0;
@@ -188,7 +188,7 @@ TEST(RenderLamps, FieldsAreLitAndCastShadows) {
   EXPECT_GT(pixel_at(image, 30, 8)[0], 10) << "beside it";
 }
 
-TEST(RenderLamps, AClosedLanternLightsNothing) {
+TEST(RenderLamps, ClosedLanternLightsNothing) {
   Scene scene = floor_by_night();
   const VoxelType torch = add_type(scene, kWhite, Visibility::Opaque, 50.0F);
   Grid& grid = scene.edit(scene.grids().handles()[0]).grid;
@@ -229,7 +229,7 @@ TEST(RenderLamps, LightFollowsEditsAndTypes) {
   EXPECT_EQ(light(), 0);
 }
 
-TEST(RenderLamps, GlassTintsTheirLight) {
+TEST(RenderLamps, GlassTintsLampLight) {
   Scene scene = floor_by_night();
   const VoxelType glass = add_type(scene, {255, 40, 40, 200}, Visibility::Transparent);
   scene.edit(scene.grids().handles()[0]).grid.fill_box({{-20, 3, -20}, {20, 4, 20}}, glass);
@@ -243,7 +243,7 @@ TEST(RenderLamps, GlassTintsTheirLight) {
 }
 
 // Holds with any other content in the image.
-TEST(RenderLamps, WhichLampsLightAPlaceDependsOnThePlaceAlone) {
+TEST(RenderLamps, LampChoiceDependsOnlyOnPosition) {
   Scene scene = floor_by_night();
   for (int i = 0; i < 200; ++i) {
     Lamp lamp;
@@ -268,7 +268,7 @@ TEST(RenderLamps, WhichLampsLightAPlaceDependsOnThePlaceAlone) {
   EXPECT_GT(count_different(taken(scene, from_above(8, 50, -8, 16), options), part, 1), 500) << "more add more";
 }
 
-TEST(RenderLamps, AreOffUnlessAskedFor) {
+TEST(RenderLamps, AreOffByDefault) {
   Scene scene = floor_by_night();
   const Camera camera = towards({0, 20, 30}, {0, 0, 0}, 0.8);
   RenderOptions options = sized(32, 32);
@@ -282,7 +282,7 @@ TEST(RenderLamps, AreOffUnlessAskedFor) {
   EXPECT_FALSE(CpuRenderer(scene).render(camera, options).has_value());
 }
 
-TEST(RenderLamps, BadOnesLightNothing) {
+TEST(RenderLamps, InvalidLampsGiveNoLight) {
   Scene scene = floor_by_night();
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double infinity = std::numeric_limits<double>::infinity();
@@ -333,7 +333,7 @@ void expect_same(const EmissiveCells& kept, const EmissiveCells& fresh) {
   }
 }
 
-TEST(EmissiveCells, FieldEditsMatchARebuild) {
+TEST(EmissiveCells, MatchRebuildAfterFieldEdits) {
   Scene scene;
   const VoxelType stone = add_type(scene, kWhite);
   const VoxelType torch = add_type(scene, {255, 120, 30, 255}, Visibility::Opaque, 3.0F);
@@ -358,7 +358,7 @@ TEST(EmissiveCells, FieldEditsMatchARebuild) {
 }
 
 // A glowing ball in a lake of the same field shines as in air; in stone it does not.
-TEST(EmissiveCells, EmissiveFieldsShineIntoGlassAroundThem) {
+TEST(EmissiveCells, EmissiveFieldsShineIntoSurroundingGlass) {
   Scene scene;
   const VoxelType stone = add_type(scene, kWhite);
   const VoxelType torch = add_type(scene, {255, 120, 30, 255}, Visibility::Opaque, 3.0F);
@@ -386,7 +386,7 @@ TEST(EmissiveCells, EmissiveFieldsShineIntoGlassAroundThem) {
   EXPECT_EQ(power_in(stone), 0.0);
 }
 
-TEST(EmissiveCells, MatchARebuildAfterEdits) {
+TEST(EmissiveCells, MatchRebuildAfterEdits) {
   Scene scene;
   const VoxelType stone = add_type(scene, kWhite);
   const VoxelType torch = add_type(scene, {255, 120, 30, 255}, Visibility::Opaque, 3.0F);
@@ -405,7 +405,7 @@ TEST(EmissiveCells, MatchARebuildAfterEdits) {
   }
 }
 
-TEST(RenderLamps, ImagesOfFewLampsAndOfManyMayTakeTurns) {
+TEST(RenderLamps, AllowsAlternatingLampLimits) {
   Scene scene = floor_by_night();
   for (int i = 0; i < 6; ++i) {
     Lamp lamp;

@@ -29,7 +29,7 @@ Vec3 cosines(DVec3 sun) {
   return Vec3(glm::normalize(sun));
 }
 
-TEST(RenderLight, AnOpenFloorHasTheAmbientAndTheSunsShareExactly) {
+TEST(RenderLight, OpenFloorReceivesExactAmbientAndSun) {
   Scene scene;
   place(scene, floor_of(add_type(scene, kGrey)));
   const float sun = cosines(Environment::reference().sun.direction).y;
@@ -43,7 +43,7 @@ TEST(RenderLight, AnOpenFloorHasTheAmbientAndTheSunsShareExactly) {
   }
 }
 
-TEST(RenderLight, WithoutOcclusionTheAmbientTermIsATenth) {
+TEST(RenderLight, AmbientIsOneTenthWithoutOcclusion) {
   Scene scene;
   place(scene, floor_of(add_type(scene, kGrey)));
   RenderOptions options = sized(4, 4);
@@ -53,7 +53,7 @@ TEST(RenderLight, WithoutOcclusionTheAmbientTermIsATenth) {
   EXPECT_EQ(pixel_at(taken(scene, from_above(0, 30, 0, 20), options), 1, 1), encoded(linear(kGrey) * 0.55F));
 }
 
-TEST(RenderLight, ASmallClosedBoxIsBlackInside) {
+TEST(RenderLight, SmallClosedBoxIsBlackInside) {
   Scene scene;
   Grid grid;
   const VoxelType type = add_type(scene, kGrey);
@@ -73,7 +73,7 @@ TEST(RenderLight, ASmallClosedBoxIsBlackInside) {
   }
 }
 
-TEST(RenderLight, ALoneCubesShadowIsRightToThePixel) {
+TEST(RenderLight, CubeShadowIsExactToPixel) {
   Scene scene;
   const VoxelType type = add_type(scene, kGrey);
   Grid grid = floor_of(type);
@@ -105,7 +105,7 @@ TEST(RenderLight, ALoneCubesShadowIsRightToThePixel) {
   EXPECT_GT(shadow, 200);
 }
 
-TEST(RenderLight, ShadowsEndAtTheirDistanceInVoxels) {
+TEST(RenderLight, ShadowsEndAtDistanceInVoxels) {
   Scene scene;
   const VoxelType type = add_type(scene, kGrey);
   Grid grid = floor_of(type);
@@ -125,7 +125,7 @@ TEST(RenderLight, ShadowsEndAtTheirDistanceInVoxels) {
   EXPECT_NE(pixel_at(taken(scene, camera, options), 0, 0), dark);
 }
 
-TEST(RenderLight, OcclusionEndsAtItsDistance) {
+TEST(RenderLight, OcclusionEndsAtDistance) {
   Scene scene;
   const VoxelType type = add_type(scene, kGrey);
   Grid grid = floor_of(type);
@@ -142,7 +142,7 @@ TEST(RenderLight, OcclusionEndsAtItsDistance) {
 }
 
 // Every ray of this image hits one point, where a wall hides part of the sky.
-TEST(RenderLight, SamplesOfAPixelHaveOcclusionRaysOfTheirOwn) {
+TEST(RenderLight, SamplesUseDifferentOcclusionRays) {
   Scene scene;
   const VoxelType type = add_type(scene, kGrey);
   Grid grid = floor_of(type);
@@ -161,7 +161,7 @@ TEST(RenderLight, SamplesOfAPixelHaveOcclusionRaysOfTheirOwn) {
   EXPECT_LT(many, open[0] - 5);
 }
 
-TEST(RenderLight, ASunBelowTheHorizonLightsWhatFacesIt) {
+TEST(RenderLight, SunBelowHorizonLightsFacingSurfaces) {
   Scene scene;
   place(scene, floor_of(add_type(scene, kGrey)));
   RenderOptions options = sized(4, 4);
@@ -173,7 +173,7 @@ TEST(RenderLight, ASunBelowTheHorizonLightsWhatFacesIt) {
   EXPECT_EQ(pixel_at(taken(scene, camera, options), 1, 1), encoded(linear(kGrey) * 1.15F));
 }
 
-TEST(RenderLight, EmissionShinesInTheDarkAndWithTheExposure) {
+TEST(RenderLight, EmissionShinesInDarkAndScalesWithExposure) {
   Scene scene;
   const Rgba8 amber{200, 140, 60, 255};
   place(scene, floor_of(add_type(scene, amber, Visibility::Opaque, 0.5F)));
@@ -185,7 +185,7 @@ TEST(RenderLight, EmissionShinesInTheDarkAndWithTheExposure) {
 }
 
 // Next to a wall, where the corner occlusion falls from 2 to 0 across one voxel.
-TEST(RenderLight, VertexOcclusionIsWhatTheMeshCarries) {
+TEST(RenderLight, VertexOcclusionMatchesMesh) {
   Scene scene;
   const VoxelType type = add_type(scene, kGrey);
   Grid grid = floor_of(type);
@@ -211,7 +211,7 @@ TEST(RenderLight, VertexOcclusionIsWhatTheMeshCarries) {
   }
 }
 
-TEST(RenderLight, ASolidSeenFromInsideIsItsOwnColour) {
+TEST(RenderLight, SolidFromInsideShowsOwnColour) {
   Scene scene;
   place(scene, floor_of(add_type(scene, kGrey)));
   const RenderedImage image = taken(scene, towards({0.5, -0.5, 0.5}, {0, -0.7, -4}), sized(5, 5));
@@ -222,7 +222,7 @@ TEST(RenderLight, ASolidSeenFromInsideIsItsOwnColour) {
   EXPECT_EQ(image.rays, 25) << "there is nothing to light";
 }
 
-TEST(RenderLight, UnregisteredTypesShow) {
+TEST(RenderLight, UnregisteredTypesAreMagenta) {
   Scene scene;
   add_type(scene, kGrey);
   place(scene, floor_of(777));
@@ -231,7 +231,7 @@ TEST(RenderLight, UnregisteredTypesShow) {
   EXPECT_EQ(pixel_at(taken(scene, from_above(0, 9, 0, 4), options), 0, 0), (Pixel{255, 0, 255}));
 }
 
-TEST(RenderLight, TheSixthOcclusionRayIsTheReferences) {
+TEST(RenderLight, SixthOcclusionRayMatchesReference) {
   for (const Direction face : kDirections) {
     SCOPED_TRACE(static_cast<int>(face));
     Scene scene;
@@ -254,7 +254,7 @@ Scene with_step(Rgba8 colour) {
   return scene;
 }
 
-TEST(RenderLight, OcclusionAloneIsGreyAndDarkensOwnColours) {
+TEST(RenderLight, OcclusionModeIsGreyAndDarkensUnlitColours) {
   const Rgba8 colour{200, 120, 40, 255};
   const Scene scene = with_step(colour);
   const Camera camera = from_above(5, 30, 5, 10);
@@ -284,7 +284,7 @@ TEST(RenderLight, OcclusionAloneIsGreyAndDarkensOwnColours) {
   EXPECT_EQ(pixel_at(taken(scene, camera, options), 101, 100), (Pixel{255, 255, 255}));
 }
 
-TEST(RenderLight, OcclusionAloneByRaysIsTheShareThatIsOpen) {
+TEST(RenderLight, OcclusionModeShowsOpenShareOfRays) {
   const Scene scene = with_step({200, 120, 40, 255});
   RenderOptions options = sized(100, 1);
   options.light.shading = Shading::Occlusion;
@@ -301,7 +301,7 @@ TEST(RenderLight, OcclusionAloneByRaysIsTheShareThatIsOpen) {
 }
 
 // With the nine unchanged directions there would be steps of a ninth at any number of samples.
-TEST(RenderLight, ManySamplesLeaveNoBandsBesideAWall) {
+TEST(RenderLight, ManySamplesLeaveNoBandsNextToWall) {
   Scene scene;
   const VoxelType type = add_type(scene, kGrey);
   Grid grid = floor_of(type);
@@ -324,7 +324,7 @@ TEST(RenderLight, ManySamplesLeaveNoBandsBesideAWall) {
 }
 
 // The ray along the normal ends at the slab's edge: upright in all samples, it would leave a step of a ninth there.
-TEST(RenderLight, ManySamplesLeaveNoBandBelowASlab) {
+TEST(RenderLight, ManySamplesLeaveNoBandBelowSlab) {
   Scene scene;
   const VoxelType type = add_type(scene, kGrey);
   Grid grid = floor_of(type);
@@ -347,7 +347,7 @@ TEST(RenderLight, ManySamplesLeaveNoBandBelowASlab) {
   EXPECT_LE(largest_step(64), 6);
 }
 
-TEST(RenderLight, NormalsAreThoseOfTheWorldAndGlassIsAsGoodAsStone) {
+TEST(RenderLight, ShowsWorldNormalsOfStoneAndGlass) {
   Scene scene;
   const VoxelType glass = add_type(scene, {60, 140, 220, 100}, Visibility::Transparent);
   Grid grid = floor_of(glass);

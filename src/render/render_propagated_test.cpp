@@ -34,7 +34,7 @@ MeanLevels between(const FaceLight& corners, double u, double v) {
           static_cast<float>(sum[3])};
 }
 
-TEST(RenderPropagated, ShowsTheLightBetweenTheCornersOfFaces) {
+TEST(RenderPropagated, InterpolatesLightBetweenFaceCorners) {
   Cave cave;
   RenderOptions options = propagated(96, 64);
   environment_in(options).sky.model = SkyModel::Gradient;
@@ -70,7 +70,7 @@ TEST(RenderPropagated, ShowsTheLightBetweenTheCornersOfFaces) {
   EXPECT_GT(compared, 3000);
 }
 
-TEST(RenderPropagated, ShowsTheLightThatItIsGivenAsOfTheLastUpdate) {
+TEST(RenderPropagated, ShowsSharedLightOfLastUpdate) {
   Cave cave;
   const RenderOptions options = propagated(48, 32);
   const auto taken = [&](const CpuRenderer& renderer) {
@@ -97,7 +97,7 @@ TEST(RenderPropagated, ShowsTheLightThatItIsGivenAsOfTheLastUpdate) {
   EXPECT_EQ(taken(lent), dark);
 }
 
-TEST(RenderPropagated, AClosedRoomIsBlackAndOpensWithAnEdit) {
+TEST(RenderPropagated, ClosedRoomIsBlackUntilOpened) {
   Cave cave;
   const DVec3 eye = DVec3(Cave::kRoom.min) + 0.9;
   const Camera camera = towards(eye, DVec3(Cave::kRoom.max) - 0.9, 1.4);
@@ -113,7 +113,7 @@ TEST(RenderPropagated, AClosedRoomIsBlackAndOpensWithAnEdit) {
   EXPECT_EQ(count_different(renderer.render(camera, options).value(), taken(cave.scene, camera, options), 0), 0);
 }
 
-TEST(RenderPropagated, OcclusionDarkensAllOfIt) {
+TEST(RenderPropagated, OcclusionDarkensAllLight) {
   Cave cave;
   RenderOptions options = propagated(64, 48);
   const RenderedImage open = taken(cave.scene, Cave::inside(), options);
@@ -127,7 +127,7 @@ TEST(RenderPropagated, OcclusionDarkensAllOfIt) {
   EXPECT_GT(darker, 300);
 }
 
-TEST(RenderPropagated, TheSameBytesWithAnyThreadsAndNoRaysForLight) {
+TEST(RenderPropagated, GivesSameBytesWithoutLightRays) {
   Cave cave;
   const RenderOptions options = propagated(64, 48);
   const RenderedImage one = taken(cave.scene, Cave::inside(), options, {1});
@@ -152,7 +152,7 @@ TEST(RenderPropagated, HalvedGridsKeepTheirLight) {
 }
 
 // Field samples lie at the corners of voxels: the light comes from in front of the surface.
-TEST(RenderPropagated, FieldsAreLitWhereTheySeeTheSky) {
+TEST(RenderPropagated, LightsFieldsOpenToSky) {
   Scene scene;
   SceneGrid made;
   for (const IBox& box : {IBox{{-30, -8, -30}, {31, 1, 31}}, IBox{{-12, 6, -12}, {13, 9, 13}}}) {

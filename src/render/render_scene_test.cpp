@@ -58,7 +58,7 @@ std::vector<glm::dmat3> signed_permutations() {
   return all;
 }
 
-TEST(RenderScene, TurnedAndMirroredInstancesLookLikeTurnedAndMirroredVoxels) {
+TEST(RenderScene, TransformedInstancesMatchTransformedVoxels) {
   const std::vector<glm::dmat3> all = signed_permutations();
   ASSERT_EQ(all.size(), 48U);
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -85,7 +85,7 @@ TEST(RenderScene, TurnedAndMirroredInstancesLookLikeTurnedAndMirroredVoxels) {
   }
 }
 
-TEST(RenderScene, MovingEverythingByWholeNumbersChangesNoByte) {
+TEST(RenderScene, MovingEverythingByIntegersChangesNoByte) {
   World world;
   place(world.scene, blobs(world, 7));
   const RenderedImage reference = taken(world.scene, kCamera, sized(64, 64));
@@ -100,7 +100,7 @@ TEST(RenderScene, MovingEverythingByWholeNumbersChangesNoByte) {
   }
 }
 
-TEST(RenderScene, VoxelsFarFromTheirGridsOriginLookTheSame) {
+TEST(RenderScene, VoxelsFarFromGridOriginLookAlike) {
   World world;
   place(world.scene, blobs(world, 7));
   const RenderedImage reference = taken(world.scene, kCamera, sized(64, 64));
@@ -110,7 +110,7 @@ TEST(RenderScene, VoxelsFarFromTheirGridsOriginLookTheSame) {
   EXPECT_LE(count_different(taken(moved.scene, kCamera, sized(64, 64)), reference, 1), 20);
 }
 
-TEST(RenderScene, APartedWorldLooksLikeTheWhole) {
+TEST(RenderScene, SplitWorldLooksLikeWhole) {
   World whole;
   World parted;
   Grid voxels = blobs(whole, 12);
@@ -127,7 +127,7 @@ TEST(RenderScene, APartedWorldLooksLikeTheWhole) {
   EXPECT_EQ(a.pixels_hit, b.pixels_hit);
 }
 
-TEST(RenderScene, TheOrderOfInstancesDoesNotMatter) {
+TEST(RenderScene, IgnoresOrderOfInstances) {
   std::array<RenderedImage, 2> images;
   for (const bool is_reversed : {false, true}) {
     World world;
@@ -152,7 +152,7 @@ TEST(RenderScene, TheOrderOfInstancesDoesNotMatter) {
   EXPECT_GT(images[0].pixels_hit, 500);
 }
 
-TEST(RenderScene, AmongOthersOutOfSightAGridHasTheBytesOfTheGridAlone) {
+TEST(RenderScene, IgnoresGridsOutOfSight) {
   World alone;
   place(alone.scene, blobs(alone, 7));
   World among;
@@ -164,7 +164,7 @@ TEST(RenderScene, AmongOthersOutOfSightAGridHasTheBytesOfTheGridAlone) {
   EXPECT_EQ(a.depth.values, b.depth.values);
 }
 
-TEST(RenderScene, AtEqualDepthTheLowerHandleWins) {
+TEST(RenderScene, PrefersLowerHandleAtEqualDepth) {
   std::array<Pixel, 2> seen{};
   for (const bool is_reversed : {false, true}) {
     World world;
@@ -183,7 +183,7 @@ TEST(RenderScene, AtEqualDepthTheLowerHandleWins) {
   EXPECT_EQ(seen[1], (Pixel{60, 160, 90}));
 }
 
-TEST(RenderScene, SmallVoxelsSeenFromNearLookLikeLargeOnesFromFar) {
+TEST(RenderScene, NearSmallVoxelsMatchFarLargeVoxels) {
   World large;
   World small;
   place(large.scene, blobs(large, 7));
@@ -196,7 +196,7 @@ TEST(RenderScene, SmallVoxelsSeenFromNearLookLikeLargeOnesFromFar) {
   for (std::size_t i = 0; i < a.depth.values.size(); ++i) EXPECT_EQ(a.depth.values[i] * 0.125F, b.depth.values[i]);
 }
 
-TEST(RenderScene, ShadowsFallFromOneInstanceOntoAnother) {
+TEST(RenderScene, CastsShadowsBetweenInstances) {
   World world;
   Grid floor;
   floor.fill_box({{-9, -1, -9}, {10, 0, 10}}, world.types[0]);
@@ -211,7 +211,7 @@ TEST(RenderScene, ShadowsFallFromOneInstanceOntoAnother) {
   EXPECT_LT(pixel_at(taken(world.scene, camera, options), 1, 1)[0], lit[0] / 2);
 }
 
-TEST(RenderScene, OrthographicImagesHaveASkyToo) {
+TEST(RenderScene, OrthographicImagesShowSky) {
   const Scene empty;
   Camera camera = towards({0, 0, 0}, {0, 0, -1});
   camera.projection = Camera::Projection::Orthographic;

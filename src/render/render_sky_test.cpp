@@ -38,7 +38,7 @@ RenderOptions follows(DVec3 sun) {
   return options;
 }
 
-TEST(RenderSky, SurfacesAndTheBackdropAreInTheLightOfTheSunsHeight) {
+TEST(RenderSky, SurfacesAndSkyFollowSunHeight) {
   const Scene scene = floor_scene();
   for (const DVec3 sun : {DVec3(1, 3, 0), DVec3(1, 0.1, 0), DVec3(1, -0.05, 0), DVec3(0, -1, 0)}) {
     const RenderOptions options = follows(sun);
@@ -52,7 +52,7 @@ TEST(RenderSky, SurfacesAndTheBackdropAreInTheLightOfTheSunsHeight) {
   }
 }
 
-TEST(RenderSky, ASunBelowTheHorizonLightsNothingFromBelow) {
+TEST(RenderSky, SunBelowHorizonGivesNoLightFromBelow) {
   const Scene scene = floor_scene();
   Camera camera = from_above(0, -9, 0, 2);
   camera.forward = {0, 1, 0};
@@ -65,7 +65,7 @@ TEST(RenderSky, ASunBelowTheHorizonLightsNothingFromBelow) {
   EXPECT_GT(pixel_at(taken(scene, camera, options), 4, 4)[0], 150) << "it does where the sky is fixed";
 }
 
-TEST(RenderSky, BrightnessCountsAsBefore) {
+TEST(RenderSky, ZeroBrightnessIsBlack) {
   const Scene scene = floor_scene();
   RenderOptions options = follows({1, 0.3, 0});
   environment_in(options).sky.brightness = 0.0;

@@ -21,7 +21,7 @@ VoxelType add_glass(Scene& scene, Rgba8 colour) {
 }
 
 // On walls and water, away from edges, smooth glass matches blocks.
-TEST(RenderSmoothScene, FlatGlassOfAnyThicknessIsThatOfBlocks) {
+TEST(RenderSmoothScene, FlatGlassMatchesBlocksAtAnyThickness) {
   Scene scene;
   const VoxelType stone = add_type(scene, {190, 180, 165});
   const VoxelType green = add_glass(scene, {70, 190, 110, 70});

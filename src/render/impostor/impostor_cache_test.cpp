@@ -34,7 +34,7 @@ bool shows(const Impostor& impostor, VoxelType type) {
   return std::any_of(faces.begin(), faces.end(), [&](const ImpostorFaces::Face& face) { return face.type == type; });
 }
 
-TEST(ImpostorCache, BuildsWhatIsAskedFor) {
+TEST(ImpostorCache, BuildsRequestedImpostors) {
   CacheWorld world(3);
   ImpostorCache cache;
   for (const GridHandle grid : world.grids) static_cast<void>(cache.find(world.scene, grid));
@@ -47,7 +47,7 @@ TEST(ImpostorCache, BuildsWhatIsAskedFor) {
   EXPECT_EQ(cache.find(world.scene, GridHandle{}), nullptr);
 }
 
-TEST(ImpostorCache, KeepsTheOldOneUntilTheEditedGridsIsReady) {
+TEST(ImpostorCache, KeepsOldImpostorUntilRebuilt) {
   CacheWorld world(2);
   ImpostorCache cache;
   EXPECT_EQ(cache.find(world.scene, world.grids[0]), nullptr);
@@ -66,7 +66,7 @@ TEST(ImpostorCache, KeepsTheOldOneUntilTheEditedGridsIsReady) {
   EXPECT_EQ(cache.stats().bytes, renewed->bytes());
 }
 
-TEST(ImpostorCache, SeesGridsThatTookAnothersPlaceAndTypesThatBecameOpaque) {
+TEST(ImpostorCache, NoticesReplacedGridsAndChangedTypes) {
   CacheWorld world(1);
   ImpostorCache cache;
   const auto ready = [&] {
@@ -88,7 +88,7 @@ TEST(ImpostorCache, SeesGridsThatTookAnothersPlaceAndTypesThatBecameOpaque) {
   EXPECT_TRUE(ready()->empty());
 }
 
-TEST(ImpostorCache, ThoseOfAnotherScenesGridsAreNotSeenMeanwhile) {
+TEST(ImpostorCache, NeverReturnsImpostorOfAnotherScene) {
   const CacheWorld first(2);
   CacheWorld second(2);
   // The same handles with other voxels.
@@ -110,7 +110,7 @@ TEST(ImpostorCache, ThoseOfAnotherScenesGridsAreNotSeenMeanwhile) {
   EXPECT_EQ(stats.bytes, cache.find(second.scene, second.grids[0])->bytes());
 }
 
-TEST(ImpostorCache, SeesTypesThatWereRegisteredAfterTheirVoxels) {
+TEST(ImpostorCache, NoticesTypesRegisteredAfterTheirVoxels) {
   CacheWorld world(1);
   const auto type = static_cast<VoxelType>(world.scene.types.size());
   world.scene.edit(world.grids[0]).grid.fill_box({{0, 0, 0}, {1, 3, 4}}, type);
@@ -128,7 +128,7 @@ TEST(ImpostorCache, SeesTypesThatWereRegisteredAfterTheirVoxels) {
   EXPECT_TRUE(is_empty());
 }
 
-TEST(ImpostorCache, DropsWhatWasUsedLongestAgo) {
+TEST(ImpostorCache, DropsLeastRecentlyUsed) {
   CacheWorld world(3);
   const std::size_t one = Impostor::build(world.scene.grids()[world.grids[2]].grid, world.scene.types).bytes();
   ImpostorCache cache({.max_bytes = 2 * one, .workers = {1}});
@@ -147,7 +147,7 @@ TEST(ImpostorCache, DropsWhatWasUsedLongestAgo) {
   EXPECT_EQ(cache.find(world.scene, world.grids[1]), nullptr);
 }
 
-TEST(ImpostorCache, HoldsNothingThatIsLargerThanItsRoom) {
+TEST(ImpostorCache, DropsImpostorLargerThanLimit) {
   CacheWorld world(1);
   ImpostorCache cache({.max_bytes = 1000, .workers = {1}});
   EXPECT_EQ(cache.find(world.scene, world.grids[0]), nullptr);
@@ -158,7 +158,7 @@ TEST(ImpostorCache, HoldsNothingThatIsLargerThanItsRoom) {
   EXPECT_EQ(cache.stats().dropped, 1U);
 }
 
-TEST(ImpostorCache, ForgetsGridsThatAreGone) {
+TEST(ImpostorCache, ForgetsRemovedGrids) {
   CacheWorld world(2);
   ImpostorCache cache;
   EXPECT_EQ(cache.find(world.scene, world.grids[0]), nullptr);
@@ -168,7 +168,7 @@ TEST(ImpostorCache, ForgetsGridsThatAreGone) {
   EXPECT_EQ(cache.stats().held, 0U);
 }
 
-TEST(ImpostorCache, MayBeAskedWhileOthersBuild) {
+TEST(ImpostorCache, AllowsFindWhileAnotherThreadBuilds) {
   CacheWorld world(8);
   ImpostorCache cache({.max_bytes = kRoom, .workers = {2}});
   std::thread other([&] { EXPECT_EQ(cache.wait(world.scene), 0U); });
@@ -180,7 +180,7 @@ TEST(ImpostorCache, MayBeAskedWhileOthersBuild) {
   EXPECT_EQ(cache.stats().built, 8U);
 }
 
-TEST(ImpostorCache, WorkersBuildWhileNobodyWaits) {
+TEST(ImpostorCache, WorkersBuildWithoutWaitingCallers) {
   CacheWorld world(3);
   ImpostorCache cache({.max_bytes = kRoom, .workers = {1}});
   for (const GridHandle grid : world.grids) static_cast<void>(cache.find(world.scene, grid));
@@ -189,7 +189,7 @@ TEST(ImpostorCache, WorkersBuildWhileNobodyWaits) {
   EXPECT_EQ(cache.wait(world.scene, 0.0), 0U);
 }
 
-TEST(ImpostorCache, AnEditRebuildsFromTheOneBefore) {
+TEST(ImpostorCache, RebuildsEditedGridFromPreviousImpostor) {
   CacheWorld world(1);
   Grid& grid = world.scene.edit(world.grids[0]).grid;
   grid.fill_box({{0, 0, 0}, {40, 40, 40}}, 1);
@@ -217,7 +217,7 @@ TEST(ImpostorCache, AnEditRebuildsFromTheOneBefore) {
   EXPECT_EQ(cache.stats().waiting, 0U);
 }
 
-TEST(ImpostorCache, OtherOptionsAskForAnotherOne) {
+TEST(ImpostorCache, BuildsAgainForOtherOptions) {
   CacheWorld world(1);
   ImpostorCache cache;
   const auto ready = [&](int edge) {
@@ -230,7 +230,7 @@ TEST(ImpostorCache, OtherOptionsAskForAnotherOne) {
   EXPECT_EQ(cache.stats().built, 2U);
 }
 
-TEST(ImpostorCache, CanEndInTheMiddle) {
+TEST(ImpostorCache, StopsDuringBuilds) {
   for (int i = 0; i < 10; ++i) {
     CacheWorld world(6);
     ImpostorCache cache({.max_bytes = kRoom, .workers = {2}});
@@ -239,7 +239,7 @@ TEST(ImpostorCache, CanEndInTheMiddle) {
 }
 
 // A game's frame only looks up impostors, no matter how many are being built.
-TEST(ImpostorCache, EditsEveryFrameNeverWaitForABuild) {
+TEST(ImpostorCache, FindNeverWaitsForBuild) {
   CacheWorld world(1);
   world.scene.edit(world.grids[0]).grid.fill_box({{0, 0, 0}, {160, 160, 160}}, 1);
   ImpostorCache cache({.max_bytes = kRoom, .workers = {1}});

@@ -41,7 +41,7 @@ std::vector<Likeness> likenesses(World& world, int pixels, int count) {
 
 // The specification requires 0.97 and 6; the worst measured values are 0.997 and 3.8 (the terrain), 0.9986 and 1.2 (all
 // others).
-TEST(DrawImpostors, LooksLikeTheTracedImageAtTheThreshold) {
+TEST(DrawImpostors, LooksLikeTracedImageAtThreshold) {
   for (const Model model : kModels) {
     World world(model);
     for (const int pixels : {128, 64}) {
@@ -67,7 +67,7 @@ TEST(DrawImpostors, HasNoHolesInCrevices) {
 
 // Voxels are then far smaller than pixels, so the single ray of a pixel hits them at random. Measured minimum: 0.9014
 // (blobs at 16 pixels).
-TEST(DrawImpostors, KeepsItsOutlineWhereItIsSmall) {
+TEST(DrawImpostors, KeepsOutlineWhenSmall) {
   for (const Model model : kModels) {
     World world(model);
     for (const int pixels : {32, 16}) {
@@ -104,7 +104,7 @@ TEST(DrawImpostors, DoesNotJumpWhileOrbiting) {
   }
 }
 
-TEST(DrawImpostors, TurnsMirrorsAndScalesWithTheInstance) {
+TEST(DrawImpostors, FollowsInstanceTransform) {
   World world(Model::Castle);
   std::mt19937 random(5);
   std::normal_distribution<double> normal;
@@ -133,7 +133,7 @@ TEST(DrawImpostors, TurnsMirrorsAndScalesWithTheInstance) {
   }
 }
 
-TEST(DrawImpostors, OrthographicImagesToo) {
+TEST(DrawImpostors, DrawsOrthographicImages) {
   const World world(Model::Castle);
   Camera camera = orbiting(world, 0.7, 0.4, 0.2, 128.0, 148);
   camera.projection = Camera::Projection::Orthographic;
@@ -143,7 +143,7 @@ TEST(DrawImpostors, OrthographicImagesToo) {
   EXPECT_LE(found.difference, 6.0);
 }
 
-TEST(DrawImpostors, ShowsThePaletteOfTheDay) {
+TEST(DrawImpostors, ShowsCurrentPalette) {
   World world(Model::Box);
   const Camera camera = orbiting(world, 0.7, 0.4, 0.0, 60.0, 70);
   RenderOptions options = sized(70, 70);
@@ -158,7 +158,7 @@ TEST(DrawImpostors, ShowsThePaletteOfTheDay) {
   EXPECT_EQ(pixel_at(image, 35, 35), (Pixel{0, 0, 0})) << "and black is no hole";
 }
 
-TEST(DrawImpostors, EmptyPixelsKeepWhatTheyHad) {
+TEST(DrawImpostors, KeepsEmptyAndNearerPixels) {
   const World world(Model::Ball);
   const RenderOptions options = sized(80, 80);
   const Camera camera = orbiting(world, 0.7, 0.4, 0.0, 60.0, 80);
@@ -178,7 +178,7 @@ TEST(DrawImpostors, EmptyPixelsKeepWhatTheyHad) {
   EXPECT_EQ(nearer.colour.rgb, before.colour.rgb) << "nearer voxels hide it";
 }
 
-TEST(DrawImpostors, OrderDoesNotMatterAndTheLowerHandleWinsAtEqualDepth) {
+TEST(DrawImpostors, PrefersLowerHandleAtEqualDepth) {
   World world(Model::Box);
   Instance other = world.placed();
   SceneGrid grid;
@@ -208,7 +208,7 @@ TEST(DrawImpostors, OrderDoesNotMatterAndTheLowerHandleWinsAtEqualDepth) {
   EXPECT_LE(found.difference, 2.0) << "the traced image shows the lower handle's colours";
 }
 
-TEST(DrawImpostors, HostilePlacesNeitherHangNorCrash) {
+TEST(DrawImpostors, SurvivesExtremePositionsAndSizes) {
   World world(Model::Ball);
   const RenderOptions options = sized(200, 100);
   const Camera camera = towards({0, 0, 0}, {0, 0, -1}, 1.2);
@@ -235,7 +235,7 @@ TEST(DrawImpostors, HostilePlacesNeitherHangNorCrash) {
   static_cast<void>(pixels_at({0, 0, -1e-200}, 1e-202));
 }
 
-TEST(DrawImpostors, ThreadsAndInstructionsChangeNoByte) {
+TEST(DrawImpostors, GivesSameBytesForAnyThreadsAndInstructions) {
   const World world(Model::Castle);
   const Camera camera = orbiting(world, 0.7, 0.4, 0.2, 128.0, 148);
   const RenderOptions options = sized(148, 148);
@@ -246,7 +246,7 @@ TEST(DrawImpostors, ThreadsAndInstructionsChangeNoByte) {
   EXPECT_EQ(one.depth.values, four.depth.values);
 }
 
-TEST(DrawImpostorsDeathTest, RequiresAnImageOfTheRequestedSize) {
+TEST(DrawImpostorsDeathTest, RejectsImageOfOtherSize) {
   const World world(Model::Castle);
   const Camera camera = orbiting(world, 0.7, 0.4, 0.2, 128.0, 32);
   [[maybe_unused]] const auto draw = [&](const RenderOptions& options) {

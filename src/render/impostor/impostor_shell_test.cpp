@@ -73,7 +73,7 @@ TEST(ImpostorShell, HoldsEveryFaceOnce) {
   }
 }
 
-TEST(ImpostorShell, IsNotMadeBeyondItsLimits) {
+TEST(ImpostorShell, BuildsNothingBeyondLimits) {
   const ShellWorld world(3);
   const auto shell = ImpostorShell::build(world.tree, kPlenty, kPlenty);
   ASSERT_TRUE(shell.has_value());
@@ -94,7 +94,7 @@ TEST(ImpostorShell, IsNotMadeBeyondItsLimits) {
   EXPECT_FALSE(ImpostorShell::build(tree, kPlenty, kPlenty).has_value()) << "without a sum that overflows";
 }
 
-TEST(ImpostorShellDeathTest, KnowsVoxelsInItsBoxAndBesideIt) {
+TEST(ImpostorShellDeathTest, RejectsPositionsFarOutsideBox) {
   const ShellWorld world(3);
   const auto shell = ImpostorShell::build(world.tree, kPlenty, kPlenty);
   ASSERT_TRUE(shell.has_value());

@@ -56,7 +56,7 @@ Ray ray_of_texel(const SnapshotCamera& camera, int x, int y) {
   return {camera.position, glm::normalize(direction)};
 }
 
-TEST(ImpostorViews, AreTheSpecifiedOnesInTheirOrder) {
+TEST(ImpostorViews, FollowSpecifiedOrder) {
   const std::array<IVec3, 10> first = {IVec3{1, 0, 0}, {-1, 0, 0},  {0, 1, 0},   {0, -1, 0},  {0, 0, 1},
                                        {0, 0, -1},     {-1, -1, 0}, {-1, 0, -1}, {0, -1, -1}, {-1, 1, 0}};
   for (std::size_t i = 0; i < first.size(); ++i) {
@@ -68,7 +68,7 @@ TEST(ImpostorViews, AreTheSpecifiedOnesInTheirOrder) {
   }
 }
 
-TEST(ImpostorViews, AreUnitDistinctAndInAllOctants) {
+TEST(ImpostorViews, AreDistinctUnitVectors) {
   std::set<std::tuple<double, double, double>> distinct;
   for (int i = 0; i < kImpostorViews; ++i) {
     const DVec3 view = impostor_view(i);
@@ -79,7 +79,7 @@ TEST(ImpostorViews, AreUnitDistinctAndInAllOctants) {
   EXPECT_EQ(distinct.size(), 26U);
 }
 
-TEST(ImpostorViews, NearestIsTheLargestProductAndNeverFurtherThanStated) {
+TEST(ImpostorViews, NearestViewHasLargestDotProduct) {
   EXPECT_EQ(nearest_impostor_view({1, 0, 0}), 0);
   EXPECT_EQ(nearest_impostor_view({0, 0, -1}), 5);
   EXPECT_EQ(nearest_impostor_view({1, 1, 1}), 25);
@@ -101,7 +101,7 @@ TEST(ImpostorViews, NearestIsTheLargestProductAndNeverFurtherThanStated) {
   EXPECT_NEAR(std::acos(worst) * 180.0 / 3.14159265358979, 27.57, 0.1);
 }
 
-TEST(ImpostorViews, CamerasShowTheWholeSphereAndNoMore) {
+TEST(ImpostorViews, CamerasFitWholeSphere) {
   const ContentSphere content{{3, -7, 1e6}, 35.5};
   for (int view = 0; view < kImpostorViews; ++view) {
     const SnapshotCamera camera = snapshot_camera(content, view, 128);
@@ -117,7 +117,7 @@ TEST(ImpostorViews, CamerasShowTheWholeSphereAndNoMore) {
   EXPECT_EQ(snapshot_camera({{0, 0, 0}, 0.2}, 0, 128).distance, 8.0) << "a radius of 1 at least";
 }
 
-TEST(Impostor, HoldsWhatSingleRaysSee) {
+TEST(Impostor, MatchesSingleRays) {
   const VoxelRegistry types = two_types();
   const Grid grid = blobs(4);
   const OccupancyTree tree = OccupancyTree::build(grid, types, Occupancy::Opaque);
@@ -141,7 +141,7 @@ TEST(Impostor, HoldsWhatSingleRaysSee) {
   }
 }
 
-TEST(Impostor, BlackVoxelsAreNoHoles) {
+TEST(Impostor, ShowsBlackVoxels) {
   const VoxelRegistry types = two_types();
   Grid grid;
   grid.fill_box({{0, 0, 0}, {10, 10, 10}}, 1);
@@ -154,7 +154,7 @@ TEST(Impostor, BlackVoxelsAreNoHoles) {
   }
 }
 
-TEST(Impostor, IsEmptyForAnEmptyGrid) {
+TEST(Impostor, IsEmptyForEmptyGrid) {
   EXPECT_TRUE(Impostor().empty());
   const VoxelRegistry types = two_types();
   const Grid grid;
@@ -168,7 +168,7 @@ TEST(Impostor, IsEmptyForAnEmptyGrid) {
   }
 }
 
-TEST(Impostor, SeesWhateverLiesInABoxFromEveryView) {
+TEST(Impostor, CropsNothingInAnyView) {
   const VoxelRegistry types = two_types();
   std::mt19937 random(7);
   for (int round = 0; round < 12; ++round) {
@@ -188,7 +188,7 @@ TEST(Impostor, SeesWhateverLiesInABoxFromEveryView) {
   }
 }
 
-TEST(Impostor, LeavesTransparentVoxelsOut) {
+TEST(Impostor, LeavesOutTransparentVoxels) {
   Scene scene;
   const VoxelType glass = add_type(scene, {90, 120, 220, 120}, Visibility::Transparent);
   Grid grid;
@@ -245,7 +245,7 @@ void edit_a_little(Grid& grid, VoxelType types, std::mt19937& random) {
   grid.fill_box({at, at + size}, type);
 }
 
-TEST(Impostor, RebuildAfterAnEditEqualsANewImpostor) {
+TEST(Impostor, RebuildAfterEditEqualsNewImpostor) {
   for (unsigned seed = 1; seed <= 24; ++seed) {
     SCOPED_TRACE(seed);
     std::mt19937 random(seed);
@@ -270,7 +270,7 @@ TEST(Impostor, RebuildAfterAnEditEqualsANewImpostor) {
   }
 }
 
-TEST(Impostor, RebuiltKnowsWhatItCannotKeep) {
+TEST(Impostor, RebuildMatchesAfterLargeChanges) {
   const VoxelRegistry types = two_types();
   Grid grid = blobs(3);
   Impostor impostor = Impostor::build(grid, types);
@@ -295,7 +295,7 @@ TEST(Impostor, RebuiltKnowsWhatItCannotKeep) {
   expect_same(impostor.rebuilt(grid, types, all), impostor);
 }
 
-TEST(Impostor, MoreTexelsSeeSmallerFaces) {
+TEST(Impostor, SmallerFacesNeedMoreTexels) {
   VoxelRegistry types = two_types();
   Grid grid;
   for (int x = 0; x < 200; x += 2) grid.fill_box({{x, 0, 0}, {x + 1, 200, 3}}, 2);
@@ -309,7 +309,7 @@ TEST(Impostor, MoreTexelsSeeSmallerFaces) {
   EXPECT_LT(bytes(16), bytes(64));
 }
 
-TEST(Impostor, ImagesAreThoseOfTheRenderer) {
+TEST(Impostor, ImagesMatchRenderer) {
   Scene scene;
   scene.types = two_types();
   place(scene, blobs(5));
@@ -341,7 +341,7 @@ TEST(Impostor, ImagesAreThoseOfTheRenderer) {
   }
 }
 
-TEST(ImpostorDeathTest, ThereAre26ViewsAndSnapshotsHaveOneTexelAtLeast) {
+TEST(ImpostorDeathTest, RejectsInvalidViewsAndEdges) {
   const VoxelRegistry types = two_types();
   const Grid grid = blobs(1);
   const OccupancyTree tree = OccupancyTree::build(grid, types, Occupancy::Opaque);

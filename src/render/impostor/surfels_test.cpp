@@ -45,7 +45,7 @@ Worst worst_of(ImpostorWorld& world, int pixels, int count) {
 }
 
 // The specification requires 0.97 and 6 for blocks; the worst measured values are 0.984 and 4.4.
-TEST(Surfels, LookLikeTheTracedField) {
+TEST(Surfels, LookLikeTracedField) {
   for (const Model model : kSurfelModels) {
     ImpostorWorld world(model);
     EXPECT_GT(world.impostor.faces().surfels.size(), 1'000U);
@@ -59,7 +59,7 @@ TEST(Surfels, LookLikeTheTracedField) {
   }
 }
 
-TEST(Surfels, DepthsAndNormalsAreThoseOfTheSurface) {
+TEST(Surfels, MatchDepthsAndNormalsOfSurface) {
   ImpostorWorld world(Model::SmoothBall);
   const Camera camera = orbiting(world, 0.7, 0.4, 0.2, 128.0, 148);
   const RenderedImage truth = taken(world.scene, camera, sized(148, 148));
@@ -85,7 +85,7 @@ TEST(Surfels, DepthsAndNormalsAreThoseOfTheSurface) {
   }
 }
 
-TEST(Surfels, TheSameBitsWithAnyInstructions) {
+TEST(Surfels, GiveSameBitsForAnyInstructions) {
   for (const Model model : {Model::SmoothHills, Model::Village}) {
     const ImpostorWorld world(model);
     const Camera camera = orbiting(world, 0.7, 0.4, 0.2, 100.0, 120);
@@ -101,7 +101,7 @@ TEST(Surfels, TheSameBitsWithAnyInstructions) {
   }
 }
 
-TEST(Surfels, RenderersDrawFarFieldsFromThem) {
+TEST(Surfels, DrawFarFields) {
   ImpostorWorld world(Model::Village);
   const Camera camera = orbiting(world, 0.7, 0.4, 0.2, 100.0, 120);
   RenderOptions options = sized(120, 120);
@@ -120,7 +120,7 @@ TEST(Surfels, RenderersDrawFarFieldsFromThem) {
   EXPECT_LE(likeness(near, taken(world.scene, camera, options)).difference, 6.0);
 }
 
-TEST(Surfels, AnEditMakesThemAnew) {
+TEST(Surfels, RebuildAfterEdit) {
   ImpostorWorld world(Model::Village);
   ImpostorCache cache;
   const GridHandle grid = world.scene.instances()[world.instance].grid;
@@ -142,7 +142,7 @@ TEST(Surfels, AnEditMakesThemAnew) {
   EXPECT_FALSE(cache.find(world.scene, grid)->empty());
 }
 
-TEST(Surfels, TracesModelsThatAreTooLargeOrThin) {
+TEST(Surfels, FallBackToTracingLargeOrThinModels) {
   EXPECT_FALSE(surfels_of(field_of(Model::SmoothBall), 100).has_value());
   const ImpostorWorld rods(Model::SmoothRods);
   EXPECT_TRUE(rods.impostor.must_be_traced());

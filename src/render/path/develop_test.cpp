@@ -21,7 +21,7 @@ PathImage rendered_of(int width, int height, Vec3 light) {
   return image;
 }
 
-TEST(PathDevelop, KeepsOrderAndEnds) {
+TEST(PathDevelop, MapsBrightnessMonotonicallyToFullRange) {
   PathImage rendered;
   rendered.width = 64;
   rendered.height = 1;
@@ -40,7 +40,7 @@ TEST(PathDevelop, KeepsOrderAndEnds) {
 }
 
 // The published values for grey of 0.18 and for white.
-TEST(PathDevelop, CurvesHaveTheirPublishedValues) {
+TEST(PathDevelop, CurvesMatchPublishedValues) {
   PathImage image;
   image.width = 2;
   image.height = 1;
@@ -56,7 +56,7 @@ TEST(PathDevelop, CurvesHaveTheirPublishedValues) {
   EXPECT_EQ(clamp->rgb[3], 255);
 }
 
-TEST(PathDevelop, FindsTheExposureThatShowsTheImage) {
+TEST(PathDevelop, FindsExposureOfDarkImage) {
   PathImage image;
   image.width = 10;
   image.height = 10;
@@ -70,7 +70,7 @@ TEST(PathDevelop, FindsTheExposureThatShowsTheImage) {
 }
 
 // For dark, bright, colourful and grey images every curve gives the same mean as the neutral curve.
-TEST(PathDevelop, AutomaticExposureGivesEveryCurveTheSameMean) {
+TEST(PathDevelop, AutomaticExposureGivesSameMeanForEveryCurve) {
   PathImage rendered = rendered_of(64, 64, Vec3(0.0F));
   for (std::size_t i = 0; i < rendered.radiance.size(); ++i) {
     const float light = std::pow(1.4F, static_cast<float>(i % 23) - 18.0F);
@@ -92,7 +92,7 @@ TEST(PathDevelop, AutomaticExposureGivesEveryCurveTheSameMean) {
 }
 
 // A bright pixel in the centre of a dark image lights its surroundings and leaves the rest.
-TEST(PathDevelop, BloomSpreadsWhatIsBright) {
+TEST(PathDevelop, BloomSpreadsBrightPixels) {
   PathImage rendered = rendered_of(65, 65, Vec3(0.1F));
   const std::size_t middle = 32 * 65 + 32;
   rendered.radiance[middle] = Vec3(40.0F);
@@ -113,7 +113,7 @@ TEST(PathDevelop, BloomSpreadsWhatIsBright) {
   EXPECT_GT(wide->rgb[3 * (32 * 65 + 40)], wide->rgb[3 * (40 * 65 + 32)]);
 }
 
-TEST(PathDevelop, BloomOfAnEvenImageChangesNothing) {
+TEST(PathDevelop, BloomKeepsUniformImage) {
   const PathImage image = rendered_of(33, 20, Vec3(0.3F, 0.2F, 0.1F));
   DevelopOptions options{1.5, ToneCurve::Clamp};
   const auto plain = develop(image, options);
@@ -123,7 +123,7 @@ TEST(PathDevelop, BloomOfAnEvenImageChangesNothing) {
   for (std::size_t i = 0; i < plain->rgb.size(); ++i) EXPECT_NEAR(int{plain->rgb[i]}, int{bloomed->rgb[i]}, 1);
 }
 
-TEST(PathDevelop, AVignetteDarkensTheCorners) {
+TEST(PathDevelop, VignetteDarkensCorners) {
   const PathImage rendered = rendered_of(64, 64, Vec3(0.5F));
   DevelopOptions options{1.0, ToneCurve::Clamp, 1.0};
   const auto image = develop(rendered, options);
@@ -132,7 +132,7 @@ TEST(PathDevelop, AVignetteDarkensTheCorners) {
   EXPECT_LT(image->rgb[0], 40);
 }
 
-TEST(PathDevelop, ASmallerGammaIsDarker) {
+TEST(PathDevelop, SmallerGammaDarkens) {
   const PathImage rendered = rendered_of(1, 1, Vec3(0.25F));
   DevelopOptions options{1.0, ToneCurve::Clamp, 0.0, 1.1};
   const auto image = develop(rendered, options);
@@ -140,7 +140,7 @@ TEST(PathDevelop, ASmallerGammaIsDarker) {
   EXPECT_NEAR(image->rgb[0], SrgbEncoder::shared()(0.0625F), 1);
 }
 
-TEST(PathDevelop, RefusesWhatCannotBe) {
+TEST(PathDevelop, RejectsInvalidOptions) {
   const PathImage image = rendered_of(1, 1, Vec3(0.25F));
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const auto refuses = [&](auto&& change) {

@@ -70,7 +70,7 @@ VoxelProperties cloud_of(Rgba8 colour, float scattering, float anisotropy = 0.0F
   return properties;
 }
 
-TEST(PathMedia, ThePhaseFunctionsSamplesHaveItsDensityAndMean) {
+TEST(PathMedia, PhaseFunctionSamplesMatchDensityAndMean) {
   for (const float g : {-0.7F, 0.0F, 0.3F, 0.9F}) {
     const path::Scatter scatter(Vec3(0.5F), g);
     double sum = 0.0;
@@ -91,7 +91,7 @@ TEST(PathMedia, ThePhaseFunctionsSamplesHaveItsDensityAndMean) {
 }
 
 // White furnace: white fog over white ground, and a white cloud, cannot be seen in a white sky.
-TEST(PathMedia, WhiteFogAndCloudsCannotBeSeen) {
+TEST(PathMedia, WhiteFogAndCloudsVanishInWhiteSky) {
   const Scene cube = box_of(cloud_of({255, 255, 255, 255}, 0.4F, 0.5F), {IVec3(0), IVec3(8)});
   const PathImage cloud = path_image(cube, towards({4.0, 10.0, 24.0}, DVec3(4.0), 0.5), even_sky(16, 64));
   EXPECT_NEAR(mean_red(cloud), 1.0, 0.005);
@@ -129,7 +129,7 @@ TEST(PathMedia, TransmissionFallsExponentiallyWithLength) {
 }
 
 // Black clouds also transmit e^-length. Glass with edges counts as at least one voxel; clouds do not.
-TEST(PathMedia, ABlackCloudOnlyTakesAway) {
+TEST(PathMedia, BlackCloudOnlyAbsorbs) {
   for (const int depth : {1, 6}) {
     const Scene scene = box_of(cloud_of({0, 0, 0, 255}, 0.25F), {{-20, -20, -depth}, {20, 20, 0}});
     const Camera camera = straight_at_the_front();
@@ -141,7 +141,7 @@ TEST(PathMedia, ABlackCloudOnlyTakesAway) {
 }
 
 // Glass in front of and behind a cloud, and a lamp within: no light is lost under a white sky.
-TEST(PathMedia, CloudsStandBesideGlass) {
+TEST(PathMedia, CloudsBetweenGlassLoseNoLight) {
   Scene scene;
   const VoxelType cloud = scene.types.add(cloud_of({255, 255, 255, 255}, 0.3F)).value_or(kAir);
   VoxelProperties clear = cloud_of({255, 255, 255, 255}, 0.0F);
@@ -158,7 +158,7 @@ TEST(PathMedia, CloudsStandBesideGlass) {
 }
 
 // A lamp in fog lights the air about it, by next-event estimation and by chance alike.
-TEST(PathMedia, ALampShinesInFog) {
+TEST(PathMedia, LampLightsSurroundingFog) {
   VoxelProperties lamp;
   lamp.colour = {255, 255, 255, 255};
   lamp.emission = 20.0F;
@@ -173,7 +173,7 @@ TEST(PathMedia, ALampShinesInFog) {
   EXPECT_GT(at(0, 0), 0.0F);
 }
 
-TEST(PathMedia, RefusesFogThatCannotBe) {
+TEST(PathMedia, RejectsInvalidFog) {
   const Scene scene;
   const auto refuses = [&](const Fog& fog) {
     PathOptions options = even_sky(2, 1);
@@ -191,7 +191,7 @@ TEST(PathMedia, RefusesFogThatCannotBe) {
 }
 
 // A lens with blades shows an out-of-focus point as the polygon of the blades.
-TEST(PathLens, BladesShapeWhatIsOutOfFocus) {
+TEST(PathLens, BladesShapeUnfocusedPoint) {
   VoxelProperties lamp;
   lamp.colour = {255, 255, 255, 255};
   lamp.emission = 1000.0F;
@@ -222,7 +222,7 @@ double error_of(const PathImage& image, const PathImage& truth) {
   return std::sqrt(sum / static_cast<double>(image.radiance.size()));
 }
 
-TEST(PathDenoise, HalvesTheErrorAtLeast) {
+TEST(PathDenoise, ReducesErrorByFortyPercent) {
   const Scene scene = town();
   PathOptions options;
   options.width = 240;
@@ -263,7 +263,7 @@ TEST(PathDenoise, KeepsEdges) {
   EXPECT_LT(different, static_cast<int>(plain.radiance.size()) / 100);
 }
 
-TEST(PathDenoise, TheSameBitsForAnyThreads) {
+TEST(PathDenoise, GivesSameBitsForAnyThreadCount) {
   const Scene scene = town();
   PathOptions options;
   options.width = 70;

@@ -62,7 +62,7 @@ double middle_of_image(const Image& image) {
   return darkest_channel(image, kSize / 2 - 2, kSize / 2 - 2, 4);
 }
 
-TEST(NaturalEnvironment, BackgroundsOfTheIsoViewAreBright) {
+TEST(NaturalEnvironment, IsoViewHasBrightBackground) {
   const Image image = natural_image(glm::normalize(DVec3(1.0, 1.0, 1.0)), SkyModel::Gradient, false);
   for (const int y : {0, kSize - 3}) {
     EXPECT_GE(darkest_channel(image, 0, y, 3), 150.0);
@@ -83,7 +83,7 @@ TEST(NaturalEnvironment, WhiteInFullShadowIsNotDark) {
 }
 
 // As in marched images: dark, but not black.
-TEST(NaturalEnvironment, WhiteIsSeenAfterSunset) {
+TEST(NaturalEnvironment, WhiteIsVisibleAfterSunset) {
   for (const double degrees : {-5.0, -20.0, -60.0}) {
     const double radians = degrees * std::numbers::pi / 180.0;
     const DVec3 sun{0.6 * std::cos(radians), std::sin(radians), 0.8 * std::cos(radians)};
@@ -98,7 +98,7 @@ TEST(NaturalEnvironment, WhiteIsSeenAfterSunset) {
   }
 }
 
-TEST(NaturalEnvironment, WhiteUnderAUniformSkyIsWhite) {
+TEST(NaturalEnvironment, WhiteStaysWhiteUnderUniformSky) {
   for (const bool has_ground : {false, true}) {
     for (const DVec3& side : {DVec3(1.0, 0.05, 0.0), DVec3(-1.0, 0.05, 0.0), DVec3(0.1, 1.0, 0.1)}) {
       const Image image = natural_image(glm::normalize(side), SkyModel::Uniform, has_ground);

@@ -108,7 +108,7 @@ class PathHistoryTest : public testing::Test {
   PathHistory history_;
 };
 
-TEST(PackedLight, IsOffByAFewThousandthsOfItsGreatestPart) {
+TEST(PackedLight, RoundsWithinSmallErrorOfLargestChannel) {
   for (std::uint32_t i = 0; i < 4'096; ++i) {
     const auto any = [i](std::uint32_t of) { return static_cast<float>(mix_bits(4 * i + of) >> 8) * 0x1p-24F; };
     const float scale = std::exp2(any(3) * 24.0F - 9.0F);
@@ -120,7 +120,7 @@ TEST(PackedLight, IsOffByAFewThousandthsOfItsGreatestPart) {
   }
 }
 
-TEST(PackedLight, IsBoundedAndNeverSomethingElse) {
+TEST(PackedLight, ClampsOutOfRangeValues) {
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   EXPECT_EQ(pack_light(Vec3(0.0F)), 0U);
   EXPECT_EQ(unpack_light(pack_light({-1.0F, 0.0F, 1.0F})), Vec3(0.0F, 0.0F, 1.0F));
@@ -130,7 +130,7 @@ TEST(PackedLight, IsBoundedAndNeverSomethingElse) {
   EXPECT_EQ(unpack_light(pack_light(Vec3(511.9F))), Vec3(512.0F)) << "rounded up into the next exponent";
 }
 
-TEST_F(PathHistoryTest, WithoutAnEditImagesStayAsTheyAre) {
+TEST_F(PathHistoryTest, KeepsImagesWithoutEdits) {
   for (const int samples : kSamples) {
     const PathImage taken = take(kEdge, samples);
     PathImage shown = taken;
@@ -160,7 +160,7 @@ TEST_F(PathHistoryTest, KeepsPixelsUnaffectedByAnEdit) {
   EXPECT_GT(same, kEdge * kEdge / 2);
 }
 
-TEST_F(PathHistoryTest, EndsWithTheImageOfANewTracer) {
+TEST_F(PathHistoryTest, ConvergesToImageOfNewTracer) {
   converge();
   edit(2);
   PathImage shown;
@@ -169,7 +169,7 @@ TEST_F(PathHistoryTest, EndsWithTheImageOfANewTracer) {
   EXPECT_FALSE(history_.has_earlier()) << "the new image has as many samples as the earlier one";
 }
 
-TEST_F(PathHistoryTest, AnUndoneEditHasTheEarlierImageAtTheFirstSample) {
+TEST_F(PathHistoryTest, RestoresEarlierImageAfterUndoneEdit) {
   converge();
   const PathImage before = take(kEdge, kSamples.back());
   edit(2);
@@ -180,7 +180,7 @@ TEST_F(PathHistoryTest, AnUndoneEditHasTheEarlierImageAtTheFirstSample) {
 }
 
 // The edit removes only little of the light.
-TEST_F(PathHistoryTest, ShowsWhatTheNewSceneShowsInTheMean) {
+TEST_F(PathHistoryTest, MatchesMeanOfNewScene) {
   constexpr int kTries = 24;
   std::vector<DVec3> shown(static_cast<std::size_t>(kEdge) * kEdge, DVec3(0.0));
   for (std::uint32_t seed = 1; seed <= kTries; ++seed) {
@@ -203,7 +203,7 @@ TEST_F(PathHistoryTest, ShowsWhatTheNewSceneShowsInTheMean) {
 }
 
 // Few samples find a light behind a window: samples that miss it do not show that the window is gone.
-TEST(PathHistory, ARoomThatIsWalledUpBecomesDarkWithinAFewSamples) {
+TEST(PathHistory, DarkensClosedRoomWithinFewSamples) {
   constexpr IBox kWindow{{32, 12, 12}, {33, 18, 18}};
   Scene scene;
   const VoxelType wall = add_type(scene, {200, 200, 200, 255});
@@ -236,7 +236,7 @@ TEST(PathHistory, ARoomThatIsWalledUpBecomesDarkWithinAFewSamples) {
   EXPECT_EQ(mean_shown(kSamples.back()), 0.0);
 }
 
-TEST_F(PathHistoryTest, SmallImagesAreShownInTheLargeOnesPlace) {
+TEST_F(PathHistoryTest, RefinesSmallImagesFromLargerOnes) {
   for (const int edge : {kEdge / 4, kEdge / 2, kEdge}) static_cast<void>(refined(edge, 1));
   converge();
   const PathImage before = take(kEdge, kSamples.back());
@@ -268,7 +268,7 @@ TEST_F(PathHistoryTest, KeepsImagesOfUnknownSampleCounts) {
   EXPECT_EQ(history_.bytes(), 0U);
 }
 
-TEST_F(PathHistoryTest, KeepsLayersOfImagesAsLarge) {
+TEST_F(PathHistoryTest, KeepsLayersOfFullSizeImages) {
   options_.layers = true;
   for (const int edge : {kEdge / 2, kEdge}) static_cast<void>(refined(edge, 1));
   converge();
@@ -282,7 +282,7 @@ TEST_F(PathHistoryTest, KeepsLayersOfImagesAsLarge) {
   EXPECT_EQ(shown.rays, taken.rays);
 }
 
-TEST(PathHistoryDeathTest, ImagesHaveOneValuePerPixel) {
+TEST(PathHistoryDeathTest, RejectsImageWithoutOneValuePerPixel) {
   PathHistory history;
   PathImage image;
   image.width = image.height = 4;

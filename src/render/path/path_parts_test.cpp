@@ -18,7 +18,7 @@
 namespace quoin::path {
 namespace {
 
-TEST(PathMath, FollowsTheCLibrary) {
+TEST(PathMath, MatchesCLibrary) {
   for (int i = 0; i <= 4000; ++i) {
     const float turns = static_cast<float>(i) / 4000.0F;
     const double angle = 2.0 * std::numbers::pi * static_cast<double>(turns);
@@ -60,7 +60,7 @@ TEST(PathRandom, IsStratifiedInEveryPairOfDimensions) {
   }
 }
 
-TEST(PathRandom, DimensionsAndPixelsDoNotFollowEachOther) {
+TEST(PathRandom, DimensionsAreUncorrelated) {
   double products = 0.0;
   constexpr int kCount = 4096;
   for (std::uint32_t i = 0; i < kCount; ++i) {
@@ -76,7 +76,7 @@ const std::vector<Material> kMaterials = {{{0.8F, 0.5F, 0.2F}, 1.0F, 0.0F},
                                           {{0.8F, 0.5F, 0.2F}, 0.2F, 0.5F},
                                           {{1.0F, 1.0F, 1.0F}, 0.8F, 1.0F}};
 
-TEST(PathScatter, ItsDensityIsThatOfItsSamples) {
+TEST(PathScatter, DensityMatchesSamples) {
   for (const Material& material : kMaterials) {
     const Vec3 out = glm::normalize(Vec3(0.6F, -0.2F, 0.5F));
     const Scatter scatter(material, out);
@@ -107,7 +107,7 @@ TEST(PathScatter, ItsDensityIsThatOfItsSamples) {
 }
 
 // A white surface reflects all light at any gloss.
-TEST(PathScatter, WhiteStaysWhite) {
+TEST(PathScatter, WhiteReflectsAllLight) {
   for (const float metal : {0.0F, 0.5F, 1.0F}) {
     for (const float rough : {0.0F, 0.1F, 0.25F, 0.5F, 0.75F, 0.99F, 1.0F}) {
       for (const float cosine : {0.05F, 0.3F, 0.7F, 1.0F}) {
@@ -125,7 +125,7 @@ TEST(PathScatter, WhiteStaysWhite) {
   }
 }
 
-TEST(PathScatter, ReciprocalGlossHasTheSameValueBothWays) {
+TEST(PathScatter, GlossIsReciprocal) {
   const Material metal{{0.9F, 0.6F, 0.3F}, 0.4F, 1.0F};
   const Vec3 a = glm::normalize(Vec3(0.4F, 0.1F, 0.8F));
   const Vec3 b = glm::normalize(Vec3(-0.5F, 0.3F, 0.6F));
@@ -149,7 +149,7 @@ std::vector<LampBounds> random_lamps(std::mt19937& random, int count) {
   return lamps;
 }
 
-TEST(PathLightTree, FindsLampsAsOftenAsItSays) {
+TEST(PathLightTree, ChoosesLampsWithStatedProbability) {
   std::mt19937 random(5);
   for (const int count : {1, 2, 7, 60}) {
     const std::vector<LampBounds> lamps = random_lamps(random, count);
@@ -179,7 +179,7 @@ TEST(PathLightTree, FindsLampsAsOftenAsItSays) {
 }
 
 // Every lamp whose light may reach a point can be chosen.
-TEST(PathLightTree, MissesNoLampThatShinesThere) {
+TEST(PathLightTree, CanChooseEveryLampThatReachesPoint) {
   std::mt19937 random(9);
   std::uniform_real_distribution<float> unit(-1.0F, 1.0F);
   const std::vector<LampBounds> lamps = random_lamps(random, 100);
@@ -272,7 +272,7 @@ TEST(PathLampMemory, LeadsAwayFromLampsBehindWalls) {
   EXPECT_EQ(tree.probability(0, point, up, memory.table(0)), before) << "of other places nothing is known";
 }
 
-TEST(PathLampMemory, ForgetsPlacesBeyondItsRoom) {
+TEST(PathLampMemory, GivesNoPlaceWhenFull) {
   LampMemory memory;
   std::int32_t last = 0;
   for (int i = 0; i < 5000; ++i) last = memory.place_of(0, {8 * i, 0, 0}, Direction::PosX);
@@ -281,7 +281,7 @@ TEST(PathLampMemory, ForgetsPlacesBeyondItsRoom) {
   EXPECT_EQ(memory.table(last)[0], 1.0F);
 }
 
-TEST(PathLamps, GiveTheIrradianceOfLambertsFormula) {
+TEST(PathLamps, MatchIrradianceByLambert) {
   for (const double height : {0.5, 3.0, 40.0}) {
     const PathLamp lamp = square_lamp({-1.0, height, -0.5}, 2.0F);
     const PathLamps lamps({lamp}, DVec3(0.0));
@@ -301,7 +301,7 @@ TEST(PathLamps, GiveTheIrradianceOfLambertsFormula) {
   }
 }
 
-TEST(PathEnvironment, SamplesLightAsItShines) {
+TEST(PathEnvironment, ImportanceSamplingMatchesUniformSampling) {
   RadianceImage image{16, 8, std::vector<float>(3 * 16 * 8, 0.2F)};
   for (int channel = 0; channel < 3; ++channel)
     image.rgb[static_cast<std::size_t>(3 * (2 * 16 + 12) + channel)] = 50.0F;
@@ -326,7 +326,7 @@ TEST(PathEnvironment, SamplesLightAsItShines) {
   EXPECT_NEAR(by_light / uniform, 1.0, 0.01);
 }
 
-TEST(PathEnvironment, ItsMiddleIsAheadAndItsRightHalfToTheRight) {
+TEST(PathEnvironment, MapsImageToDirections) {
   RadianceImage image{4, 2, std::vector<float>(3 * 4 * 2, 0.0F)};
   image.rgb[3 * 3] = 1.0F;  // the upper right pixel: between +x and +z
   const EnvironmentLight light(image);
@@ -359,17 +359,17 @@ TEST(PathAtmosphere, IsBlueByDayRedAtSunsetAndDarkAtNight) {
   EXPECT_GT(mean_of(night.radiance, 0, 128).x, 0.0F);
 }
 
-TEST(PathAtmosphere, WithoutAirIsBlackAroundTheSun) {
+TEST(PathAtmosphere, SkyIsBlackWithoutAir) {
   const AtmosphericSky space = atmospheric_sky({0.0, 1.0, 0.0}, kPi, {0.0, 0.0, 0.0});
   EXPECT_NEAR(space.sunlight.x, kPi, 1e-5F);
   EXPECT_LT(largest(mean_of(space.radiance, 10, 50)), 0.002F);
 }
 
-TEST(PathPartsDeathTest, AnglesAreAtMostOneTurn) {
+TEST(PathPartsDeathTest, RejectsAngleBeyondOneTurn) {
   QUOIN_EXPECT_MISTAKE(static_cast<void>(of_turns(1.5F)), "0 <= turns <= 1");
 }
 
-TEST(PathPartsDeathTest, LampSharesAreOfPlacesThatWereReturned) {
+TEST(PathPartsDeathTest, RejectsUnknownPlace) {
   const LampMemory memory;
   QUOIN_EXPECT_MISTAKE(static_cast<void>(memory.table(99)), "a place that was returned");
 }

@@ -80,7 +80,7 @@ Camera looking(DVec3 position, DVec3 forward, DVec3 up, double view_height) {
   return camera;
 }
 
-TEST(PathTracer, AConvexBodyUnderAUniformSkyShowsItsAlbedo) {
+TEST(PathTracer, ConvexBodyUnderUniformSkyShowsAlbedo) {
   const Scene scene = cube_of(kGrey);
   const PathImage image = path_image(scene, from_above(4.0, 20.0, 4.0, 6.0), under_even_sky(16, 16, 4));
   for (const Vec3& light : image.radiance) EXPECT_NEAR(light.x, linear_from_srgb(std::uint8_t{188}), 1e-6F);
@@ -88,7 +88,7 @@ TEST(PathTracer, AConvexBodyUnderAUniformSkyShowsItsAlbedo) {
 }
 
 // E (1 - a^(n+1)) / (1 - a) after n bounces.
-TEST(PathTracer, AClosedBoxThatEmitsFillsWithLight) {
+TEST(PathTracer, EmissiveBoxFillsWithLight) {
   const float albedo = linear_from_srgb(std::uint8_t{188});
   const Scene scene = room(6, of_colour(kGrey, 1.0F), of_colour(kGrey, 1.0F));
   for (const int bounces : {0, 1, 2, 5, 40}) {
@@ -101,7 +101,7 @@ TEST(PathTracer, AClosedBoxThatEmitsFillsWithLight) {
 }
 
 // The fraction of light from one wall of a cube that reaches another wall.
-TEST(PathTracer, FormFactorsOfACubesWalls) {
+TEST(PathTracer, MatchesFormFactorsOfCube) {
   constexpr int kEdge = 8;
   const Scene scene = room(kEdge, of_colour(kGrey), of_colour({255, 255, 255, 255}, 1.0F));
   const float albedo = linear_from_srgb(std::uint8_t{188});
@@ -114,7 +114,7 @@ TEST(PathTracer, FormFactorsOfACubesWalls) {
 }
 
 // Above black ground a surface inclined by phi sees (1 + cos phi) / 2 of a uniform sky.
-TEST(PathTracer, ASlopeSeesTheSkyAboveIt) {
+TEST(PathTracer, SlopeReceivesVisibleShareOfSky) {
   for (const double degrees : {0.0, 30.0, 60.0, 90.0}) {
     Scene scene = cube_of(kGrey, 4);
     const double angle = degrees * kPi / 180.0;
@@ -135,7 +135,7 @@ TEST(PathTracer, ASlopeSeesTheSkyAboveIt) {
 }
 
 // A square lamp above a plate, by Lambert's formula.
-TEST(PathTracer, ASquareLampLightsAPlateAsLambertSays) {
+TEST(PathTracer, SquareLampMatchesLambertFormula) {
   Scene scene;
   const VoxelType plate = add_type(scene, kGrey);
   const VoxelType lamp = add_type(scene, kWhite, Visibility::Opaque, 3.0F);
@@ -167,7 +167,7 @@ TEST(PathTracer, ASquareLampLightsAPlateAsLambertSays) {
   }
 }
 
-TEST(PathTracer, TheSunLightsWhatFacesIt) {
+TEST(PathTracer, SunLightFollowsCosine) {
   Scene scene = cube_of(kGrey);
   PathOptions options = under_even_sky(8, 8, 16);
   physical_in(options).sky.colour = Vec3(0.0F);
@@ -181,7 +181,7 @@ TEST(PathTracer, TheSunLightsWhatFacesIt) {
 }
 
 // A penumbra is as wide as the sun's disc times the distance of the occluder.
-TEST(PathTracer, APenumbraGrowsWithTheDistance) {
+TEST(PathTracer, PenumbraGrowsWithDistance) {
   Scene scene;
   const VoxelType type = add_type(scene, kWhite);
   Grid grid;
@@ -218,7 +218,7 @@ Grid voxel_sphere(int radius, VoxelType type) {
 }
 
 // White furnace: a surface that reflects all light is invisible at any gloss.
-TEST(PathTracer, AWhiteBallInAWhiteSkyCannotBeSeen) {
+TEST(PathTracer, WhiteBallVanishesInWhiteSky) {
   for (const auto& [rough, metal] : {std::pair{1.0F, 0.0F}, {0.4F, 0.0F}, {0.4F, 1.0F}, {0.0F, 1.0F}}) {
     Scene scene;
     VoxelProperties properties = of_colour(kWhite);
@@ -234,7 +234,7 @@ TEST(PathTracer, AWhiteBallInAWhiteSkyCannotBeSeen) {
 }
 
 // Clear glass absorbs no light, with any refraction and reflection.
-TEST(PathTracer, ClearGlassInAWhiteSkyCannotBeSeen) {
+TEST(PathTracer, ClearGlassVanishesInWhiteSky) {
   Scene scene;
   VoxelProperties properties = of_colour({255, 255, 255, 0});
   properties.visibility = Visibility::Transparent;
@@ -245,7 +245,7 @@ TEST(PathTracer, ClearGlassInAWhiteSkyCannotBeSeen) {
   EXPECT_NEAR(mean(image).x, 1.0F, 0.003F);
 }
 
-TEST(PathTracer, GlassShowsWhatLiesBehindItWhereItIsBent) {
+TEST(PathTracer, GlassRefractsBackground) {
   // A thick pane in front of a wall that is black on one half: seen at an angle, the edge is displaced.
   const auto rendered_of = [](float ior) {
     Scene scene;
@@ -278,7 +278,7 @@ TEST(PathTracer, GlassShowsWhatLiesBehindItWhereItIsBent) {
   EXPECT_NEAR(std::abs(edge_of(bent) - edge_of(plain)), moved, 6.0);
 }
 
-TEST(PathTracer, AClosedRoomWithoutLampsIsBlack) {
+TEST(PathTracer, ClosedRoomWithoutLampsIsBlack) {
   const Scene scene = room(6, of_colour(kWhite), of_colour(kWhite));
   PathOptions options = under_even_sky(16, 16, 16);
   physical_in(options).sun.brightness = 1.0;
@@ -288,7 +288,7 @@ TEST(PathTracer, AClosedRoomWithoutLampsIsBlack) {
   }
 }
 
-TEST(PathTracer, ALampOfABillionIsANumberAndNoPixelIsBrighterThanIt) {
+TEST(PathTracer, ExtremeLampStaysFinite) {
   const Scene scene = room(6, of_colour(kGrey), of_colour(kWhite, 1e9F));
   const PathImage image = path_image(scene, towards({3.0, 3.0, 3.0}, {3.0, 5.0, 0.0}), under_even_sky(16, 16, 32));
   for (const Vec3& light : image.radiance) {
@@ -300,7 +300,7 @@ TEST(PathTracer, ALampOfABillionIsANumberAndNoPixelIsBrighterThanIt) {
 }
 
 // Light from lamp hits and from lamp samples agrees: here a lamp without gloss next to mirrors.
-TEST(PathTracer, AimedAndFoundLightAgreeOnGloss) {
+TEST(PathTracer, LampAndPathSamplingAgreeOnGloss) {
   for (const float rough : {0.15F, 0.35F, 0.6F}) {
     VoxelProperties walls = of_colour(kGrey);
     walls.roughness = rough;
@@ -327,7 +327,7 @@ PathOptions quick() {
   return options;
 }
 
-TEST(PathTracer, TheSameBitsForAnyThreadsAndInstructionSets) {
+TEST(PathTracer, GivesSameBitsForAnyThreadsAndInstructions) {
   const Scene scene = town();
   const PathImage expected = path_image(scene, of_town(), quick(), {1});
   for (const InstructionSet set : sets_of_this_machine()) {
@@ -341,7 +341,7 @@ TEST(PathTracer, TheSameBitsForAnyThreadsAndInstructionSets) {
   }
 }
 
-TEST(PathTracer, ImagesFarFromTheOriginAreTheSame) {
+TEST(PathTracer, MatchesImageFarFromOrigin) {
   const Scene near = town();
   Scene far = town();
   const DVec3 there{3e6, -1e6, 7e6};
@@ -393,7 +393,7 @@ TEST(PathTracer, LayersDescribePixels) {
   EXPECT_EQ(image.radiance[0], Vec3(1.0F));
 }
 
-TEST(PathTracer, GroundCatchesShadowsAndIsNotSeenItself) {
+TEST(PathTracer, InvisibleGroundCatchesShadows) {
   const Scene scene = cube_of(kGrey);
   PathOptions options = under_even_sky(64, 64, 64);
   physical_in(options).sun.brightness = 1.0;
@@ -434,7 +434,7 @@ TEST(PathTracer, FocusedObjectsStaySharp) {
   EXPECT_GT(grey_pixels(10.0), 50);
 }
 
-TEST(PathTracer, AnEnvironmentOfOnePixelIsAUniformSky) {
+TEST(PathTracer, OnePixelEnvironmentIsUniformSky) {
   const Scene scene = cube_of(kGrey);
   PathOptions options = under_even_sky(8, 8, 256);
   physical_in(options).sky.model = SkyModel::Image;
@@ -472,7 +472,7 @@ Scene dim_yard() {
 }
 
 // Each pixel covers one position, so the position learns from the pixel's own samples.
-TEST(PathTracer, LearnedLampSharesDarkenNothing) {
+TEST(PathTracer, LearnedLampSharesKeepBrightness) {
   const Scene scene = dim_yard();
   const PathTracer tracer(scene);
   PathOptions options = under_even_sky(32, 32, 4);
@@ -524,7 +524,7 @@ TEST(PathTracer, RejectsInvalidInput) {
   EXPECT_FALSE(tracer.render(wrong, under_even_sky(4, 4, 1)).has_value());
 }
 
-TEST(PathTracer, StopsHalfway) {
+TEST(PathTracer, StopsWhenCancelled) {
   const Scene scene = town();
   int calls = 0;
   const auto image = PathTracer(scene).render(of_town(), quick(), {2}, [&](double) { return ++calls < 3; });
@@ -533,7 +533,7 @@ TEST(PathTracer, StopsHalfway) {
   EXPECT_LE(calls, 4);
 }
 
-TEST(PathTracer, AnEmptySceneIsSky) {
+TEST(PathTracer, DrawsSkyForEmptyScene) {
   const Scene scene;
   PathOptions options = under_even_sky(8, 8, 2);
   physical_in(options).ground.emplace();

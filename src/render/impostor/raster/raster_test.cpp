@@ -112,7 +112,7 @@ int met_face(const Shape& shape, const raster::Canvas& canvas, std::size_t pixel
   return static_cast<int>(raster::face_of(shape.level, raster::Met::of(canvas.face[pixel])));
 }
 
-TEST(ImpostorRaster, MeetsWhatEveryFaceAskedForEveryPixelMeets) {
+TEST(ImpostorRaster, MatchesBruteForceOverFacesAndPixels) {
   std::int64_t pixels = 0;
   std::int64_t others = 0;
   std::int64_t covered = 0;
@@ -199,9 +199,9 @@ void expect_same_as_plain(const ImpostorFaces::Level& level, double radius, unsi
   }
 }
 
-class RasterSets : public testing::TestWithParam<InstructionSet> {};
+class RasterKernel : public testing::TestWithParam<InstructionSet> {};
 
-TEST_P(RasterSets, WriteTheBitsOfThePlainKernel) {
+TEST_P(RasterKernel, MatchesPlainKernelExactly) {
   QUOIN_SKIP_WITHOUT(GetParam());
   for (unsigned seed = 1; seed <= 10; ++seed) {
     SCOPED_TRACE(seed);
@@ -214,10 +214,10 @@ TEST_P(RasterSets, WriteTheBitsOfThePlainKernel) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(InstructionSets, RasterSets, testing::Values(InstructionSet::Avx2, InstructionSet::Avx512),
+INSTANTIATE_TEST_SUITE_P(InstructionSets, RasterKernel, testing::Values(InstructionSet::Avx2, InstructionSet::Avx512),
                          name_of_set);
 
-TEST(ImpostorSeen, DrawingSeesWhatRaysSee) {
+TEST(ImpostorSeen, DrawingSeesSameFacesAsRays) {
   const VoxelRegistry types = workloads::three_types();
   for (const workloads::Blocky which : {workloads::Blocky::W4, workloads::Blocky::W2}) {
     Grid grid;
@@ -248,11 +248,11 @@ TEST(ImpostorSeen, DrawingSeesWhatRaysSee) {
   }
 }
 
-TEST(RasterDeathTest, PixelsLieInTheTile) {
+TEST(RasterDeathTest, RejectsPixelOutsideTile) {
   QUOIN_EXPECT_MISTAKE(static_cast<void>(raster::index_of(raster::kTile, 0)), "a pixel of the tile");
 }
 
-TEST(RasterDeathTest, HitsFitThePackedWord) {
+TEST(RasterDeathTest, RejectsValuesBeyondPackedWord) {
   QUOIN_EXPECT_MISTAKE(static_cast<void>(raster::Met{1U << 26, 0}.packed()), "a number of 26 bits");
   QUOIN_EXPECT_MISTAKE(static_cast<void>(raster::Met{0, 32}.packed()), "a view of 5 bits");
 }

@@ -69,7 +69,7 @@ std::vector<Vec3> awkward_directions() {
   return all;
 }
 
-TEST(PathKernel, ShadesLikeTheFunctionsOfOnePoint) {
+TEST(PathKernel, MatchesSinglePointFunctions) {
   Numbers numbers;
   const std::vector<Vec3> awkward = awkward_directions();
   Environment environment;
@@ -132,7 +132,7 @@ TEST(PathKernel, ShadesLikeTheFunctionsOfOnePoint) {
   }
 }
 
-TEST(PathKernel, ChoosesLampsWithTheirChances) {
+TEST(PathKernel, ChoosesLampsByProbability) {
   Numbers numbers;
   for (const std::size_t count : {1U, 2U, 3U, 200U}) {
     const LightTree tree(some_lamps(numbers, count));
@@ -173,7 +173,7 @@ TEST(PathKernel, ChoosesLampsWithTheirChances) {
 }
 
 // Matches a single point with choose and pairs of numbers; each pixel uses its own numbers for lamps.
-TEST(PathKernel, ShadesByLampsOfNumbersOfTheirOwn) {
+TEST(PathKernel, ShadesByLampsWithPerPixelNumbers) {
   Numbers numbers;
   const LightTree tree(some_lamps(numbers, 200));
   std::size_t chosen = 0;
@@ -218,7 +218,7 @@ TEST(PathKernel, ShadesByLampsOfNumbersOfTheirOwn) {
   EXPECT_GT(chosen, 30U);
 }
 
-TEST(PathKernel, DrawsTheNumbersOfPixels) {
+TEST(PathKernel, MatchesRandomNumbersOfPixels) {
   Numbers numbers;
   for (std::uint32_t sample = 0; sample < 300; ++sample) {
     BlockLanes<std::uint32_t> pixel;
