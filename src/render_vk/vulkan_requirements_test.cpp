@@ -13,19 +13,19 @@ const std::array<VulkanDeviceInfo, 4> kDevices = {
     VulkanDeviceInfo{"llvmpipe (LLVM 15)", "cpu", ""}, VulkanDeviceInfo{"Old Card", "discrete", "bufferDeviceAddress"},
     VulkanDeviceInfo{"Card 1", "integrated", ""}, VulkanDeviceInfo{"Card 2", "integrated", ""}};
 
-TEST(ChooseVulkanDevice, TakesTheFirstOfTheBestKindThatLacksNothing) {
+TEST(ChooseVulkanDevice, ChoosesFirstSuitableDeviceOfBestKind) {
   EXPECT_EQ(choose_vulkan_device(kDevices, "").value(), 2U);
   EXPECT_EQ(choose_vulkan_device(std::span(kDevices).first(1), "").value(), 0U);
 }
 
-TEST(ChooseVulkanDevice, TakesNumbersAndPartsOfNames) {
+TEST(ChooseVulkanDevice, AcceptsNumbersAndPartsOfNames) {
   EXPECT_EQ(choose_vulkan_device(kDevices, "3").value(), 3U);
   EXPECT_EQ(choose_vulkan_device(kDevices, "CARD 2").value(), 3U);
   EXPECT_EQ(choose_vulkan_device(kDevices, "card").value(), 2U);
   EXPECT_EQ(choose_vulkan_device(kDevices, "LlvmPipe").value(), 0U);
 }
 
-TEST(ChooseVulkanDevice, SaysWhatThereIsAndWhatIsMissing) {
+TEST(ChooseVulkanDevice, ReportsAvailableDevicesAndMissingFeatures) {
   const auto expect_refusal = [](std::span<const VulkanDeviceInfo> devices, const char* wanted, const char* message) {
     const auto chosen = choose_vulkan_device(devices, wanted);
     ASSERT_FALSE(chosen);

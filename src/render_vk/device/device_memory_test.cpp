@@ -22,7 +22,7 @@ class VulkanMemory : public ::testing::Test {
   std::unique_ptr<Device> device_;
 };
 
-TEST_F(VulkanMemory, PlacesNeverOverlapAndBlocksAreGivenBack) {
+TEST_F(VulkanMemory, PlacesNeverOverlapAndFreeTheirBlocks) {
   DeviceMemory memory(*device_, 1 << 16);
   const unsigned seed = 11;
   std::mt19937 random(seed);
@@ -52,7 +52,7 @@ TEST_F(VulkanMemory, PlacesNeverOverlapAndBlocksAreGivenBack) {
   EXPECT_EQ(memory.block_count(), 1U);
 }
 
-TEST_F(VulkanMemory, WritesArrive) {
+TEST_F(VulkanMemory, WritesMoreThanStagingBuffer) {
   DeviceMemory memory(*device_, 1 << 20);
   // More than the staging buffer holds.
   std::vector<std::uint32_t> values(5'000'000);
@@ -65,7 +65,7 @@ TEST_F(VulkanMemory, WritesArrive) {
   EXPECT_EQ(memory.written(), values.size() * 4 + 100);
 }
 
-TEST_F(VulkanMemory, AFullMemoryIsAnErrorAndNoMore) {
+TEST_F(VulkanMemory, ReportsExhaustedMemoryAndContinues) {
   DeviceMemory memory(*device_, 1 << 16);
   const auto refused = memory.allocate(VkDeviceSize{1} << 50, "testing");
   ASSERT_FALSE(refused);
@@ -75,13 +75,13 @@ TEST_F(VulkanMemory, AFullMemoryIsAnErrorAndNoMore) {
   EXPECT_TRUE(memory.allocate(100, "testing"));
 }
 
-TEST_F(VulkanMemory, ReportsALostDevice) {
+TEST_F(VulkanMemory, ReportsLostDevice) {
   const Error lost = device_->error_of(VK_ERROR_DEVICE_LOST, "drawing");
   EXPECT_EQ(lost.code, ErrorCode::DeviceLost);
   EXPECT_EQ(lost.message, "vulkan: " + device_->description().name + ": the device was lost while drawing");
 }
 
-TEST(VulkanValidation, ReportsMistakes) {
+TEST(VulkanValidation, ReportsInvalidCalls) {
   std::vector<std::string> messages;
   VulkanOptions options;
   options.on_validation_message = [&](const std::string& message) { messages.push_back(message); };

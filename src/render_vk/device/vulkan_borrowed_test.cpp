@@ -50,7 +50,7 @@ class VulkanBorrowed : public ::testing::Test {
   RenderOptions options_;
 };
 
-TEST_F(VulkanBorrowed, DrawsTheImagesOfAnOwnDevice) {
+TEST_F(VulkanBorrowed, MatchesImagesOfOwnDevice) {
   const Scene scene = golden::terrain_scene();
   VulkanRenderer borrowing = renderer();
   EXPECT_EQ(borrowing.device().name, describe_vulkan_device(own_->instance, own_->physical)->name);
@@ -61,7 +61,7 @@ TEST_F(VulkanBorrowed, DrawsTheImagesOfAnOwnDevice) {
   EXPECT_EQ(drawn(borrowing, scene).rgb, drawn(*owning, scene).rgb);
 }
 
-TEST_F(VulkanBorrowed, DeviceAndImageOutliveTheRenderer) {
+TEST_F(VulkanBorrowed, DeviceAndImageOutliveRenderer) {
   const Scene scene = golden::terrain_scene();
   OwnImage image(*own_, VK_FORMAT_B8G8R8A8_UNORM, 80, 60);
   Image right;
@@ -77,7 +77,7 @@ TEST_F(VulkanBorrowed, DeviceAndImageOutliveTheRenderer) {
   image.write(image.target(), bytes);
 }
 
-TEST_F(VulkanBorrowed, TwoRenderersShareADevice) {
+TEST_F(VulkanBorrowed, TwoRenderersShareOneDevice) {
   const Scene scene = golden::terrain_scene();
   VulkanRenderer first = renderer();
   VulkanRenderer second = renderer();
@@ -98,7 +98,7 @@ TEST_F(VulkanBorrowed, TwoRenderersShareADevice) {
   EXPECT_EQ(drawn(second, scene).rgb, right.rgb);
 }
 
-TEST_F(VulkanBorrowed, NullHandlesAreRefused) {
+TEST_F(VulkanBorrowed, RejectsNullHandles) {
   const BorrowedVulkanDevice right = own_->lent();
   BorrowedVulkanDevice wrong = right;
   wrong.instance = nullptr;
@@ -150,7 +150,7 @@ VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL without_a_function(VkInstance instance,
   return real()(instance, name);
 }
 
-TEST_F(VulkanBorrowed, DevicesThatLackSomethingAreRefused) {
+TEST_F(VulkanBorrowed, RejectsDevicesLackingRequirements) {
   BorrowedVulkanDevice lent = own_->lent();
   const auto as_found = [&](VulkanGetInstanceProcAddr find) {
     lent.get_instance_proc_addr = find;
@@ -188,7 +188,7 @@ TEST_F(VulkanBorrowed, ChecksPreconditions) {
   QUOIN_EXPECT_MISTAKE((void)never.write({1, 1, {1, 2, 3}}), "must call its argument");
 }
 
-TEST(VulkanFeatures, AreEnabledInTheStructuresThatAreThere) {
+TEST(VulkanFeatures, AreEnabledInExistingOrNewStructures) {
   auto info = info_of<VkDeviceCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO);
   VulkanFeatureStorage storage;
   ASSERT_TRUE(enable_vulkan_features(info, storage));
@@ -220,13 +220,13 @@ TEST(VulkanFeatures, AreEnabledInTheStructuresThatAreThere) {
   EXPECT_EQ(static_cast<const VkBaseInStructure*>(info.pNext)->pNext, reinterpret_cast<VkBaseInStructure*>(&first));
 }
 
-TEST(VulkanFeatures, AStructureThatDoesNotSayWhatItIsIsAMistake) {
+TEST(VulkanFeatures, AssertsOnStructureWithoutType) {
   VkDeviceCreateInfo info{};
   VulkanFeatureStorage storage;
   QUOIN_EXPECT_MISTAKE((void)enable_vulkan_features(info, storage), "with its sType set");
 }
 
-TEST(VulkanRequirements, AreThoseOfTheHeaders) {
+TEST(VulkanRequirements, MatchHeaders) {
   const VulkanRequirements needs = vulkan_requirements();
   EXPECT_EQ(needs.api_version, VK_API_VERSION_1_2);
   EXPECT_EQ(std::string(needs.features.front()), "bufferDeviceAddress");

@@ -13,7 +13,7 @@ using render_test::towards;
 
 class VulkanErrors : public vulkan_test::VulkanTest {};
 
-TEST(Vulkan, SaysWhatDevicesThereAreOrWhatIsMissing) {
+TEST(Vulkan, ListsDevicesOrReportsMissingRequirements) {
   const auto devices = vulkan_devices();
   const auto renderer = VulkanRenderer::create();
   if (!devices) {
@@ -30,7 +30,7 @@ TEST(Vulkan, SaysWhatDevicesThereAreOrWhatIsMissing) {
   }
 }
 
-TEST_F(VulkanErrors, DevicesAreChosenByNumberOrName) {
+TEST_F(VulkanErrors, ChoosesDevicesByNumberOrName) {
   const auto devices = vulkan_devices().value();
   VulkanOptions options;
   options.device = "no such device";
@@ -58,7 +58,7 @@ TEST_F(VulkanErrors, DevicesAreChosenByNumberOrName) {
   }
 }
 
-TEST_F(VulkanErrors, AreThoseOfTheProcessor) {
+TEST_F(VulkanErrors, MatchCpuErrors) {
   const Scene scene;
   const CpuRenderer cpu(scene);
   const Camera camera = towards({0, 0, 0}, {1, 0, 0});
@@ -84,7 +84,7 @@ TEST_F(VulkanErrors, AreThoseOfTheProcessor) {
 }
 
 // Before the first update and after a failed one, there is no scene for levels of detail.
-TEST_F(VulkanErrors, DetailOfNothingIsTheSky) {
+TEST_F(VulkanErrors, DetailWithoutSceneShowsSky) {
   const Camera camera = towards({20, 20, 40}, {0, 0, 0});
   RenderOptions options = sized(16, 12);
   options.detail.policy.emplace();
@@ -102,7 +102,7 @@ TEST_F(VulkanErrors, DetailOfNothingIsTheSky) {
   EXPECT_EQ(render_test::count_different(taken_as_is(camera, options), sky, 2), 0);
 }
 
-TEST_F(VulkanErrors, AListenerCanStopIt) {
+TEST_F(VulkanErrors, ProgressCallbackCancelsRendering) {
   Scene scene;
   const VoxelType stone = add_type(scene, {140, 140, 150});
   Grid grid;

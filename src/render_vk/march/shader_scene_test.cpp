@@ -105,7 +105,7 @@ struct Scattered {
   }
 };
 
-TEST(ShaderScene, TreesAreReadAsWordsByAddressesFromTheFirstByte) {
+TEST(ShaderScene, ReadsTreesByByteAddress) {
   Scattered made;
   const auto shaders = vulkan::ShaderScene::of(made.scene, InstanceFilter::Visible, natural_light(), {});
   ASSERT_TRUE(shaders) << to_string(shaders.error());
@@ -137,7 +137,7 @@ TEST(ShaderScene, TreesAreReadAsWordsByAddressesFromTheFirstByte) {
   EXPECT_GT(transparent, 100);
 }
 
-TEST(ShaderScene, AFrameHasItsTablesBehindIt) {
+TEST(ShaderScene, FrameIsFollowedByItsTables) {
   Scattered made;
   const auto shaders = vulkan::ShaderScene::of(made.scene, InstanceFilter::Visible, natural_light(), {});
   ASSERT_TRUE(shaders);
@@ -167,7 +167,7 @@ TEST(ShaderScene, AFrameHasItsTablesBehindIt) {
   EXPECT_EQ(words.read<float>(frame.thresholds + 4 * 255), words.read<float>(bytes->size() - 4));
 }
 
-TEST(ShaderScene, ImagesThatCannotBeAreRefused) {
+TEST(ShaderScene, RejectsEmptyImage) {
   Scattered made;
   const auto shaders = vulkan::ShaderScene::of(made.scene, InstanceFilter::Visible, natural_light(), {});
   ASSERT_TRUE(shaders);
@@ -180,7 +180,7 @@ TEST(ShaderScene, ImagesThatCannotBeAreRefused) {
   EXPECT_EQ(frame.error().code, ErrorCode::InvalidArgument);
 }
 
-TEST(ShaderBytes, MoreThanAddressesReachIsRefused) {
+TEST(ShaderBytes, RejectsMoreThanAddressableBytes) {
   vulkan::ShaderBytes memory;
   const auto first = memory.allocate(1, "trying");
   ASSERT_TRUE(first);
@@ -197,7 +197,7 @@ TEST(ShaderBytes, MoreThanAddressesReachIsRefused) {
   }
 }
 
-TEST(ShaderBytesDeathTest, BytesLieInTheirPlace) {
+TEST(ShaderBytesDeathTest, RejectsWriteBeyondPlace) {
   vulkan::ShaderBytes memory;
   const auto place = memory.allocate(32, "trying");
   ASSERT_TRUE(place);
@@ -205,7 +205,7 @@ TEST(ShaderBytesDeathTest, BytesLieInTheirPlace) {
   QUOIN_EXPECT_MISTAKE(static_cast<void>(memory.write(*place, bytes, 25)), "bytes within the place");
 }
 
-TEST(ShaderBytesDeathTest, PlacesAreOfTheirOwnMemory) {
+TEST(ShaderBytesDeathTest, RejectsPlaceOfAnotherMemory) {
   vulkan::ShaderBytes memory;
   vulkan::ShaderBytes other;
   const auto place = other.allocate(320, "trying");
@@ -213,7 +213,7 @@ TEST(ShaderBytesDeathTest, PlacesAreOfTheirOwnMemory) {
   QUOIN_EXPECT_MISTAKE(static_cast<void>(memory.write(*place, {})), "an allocated place");
 }
 
-TEST(TopTreeDeathTest, ChunksBeginAtTheOriginOfTheTree) {
+TEST(TopTreeDeathTest, RejectsChunkBeforeTreeOrigin) {
   std::vector<vulkan::ChunkNodeAt> chunks(1);
   chunks.front().chunk = {-1, 0, 0};
   QUOIN_EXPECT_MISTAKE(static_cast<void>(vulkan::build_top_tree(chunks, 32)), "chunks from the tree's origin");

@@ -41,7 +41,7 @@ RenderOptions always_mid(double cell_pixels) {
   return options;
 }
 
-TEST_F(VulkanDetail, HalvedGridsAreTheProcessors) {
+TEST_F(VulkanDetail, HalvedGridsMatchCpu) {
   add_crowd(scene_, {add_blobs(scene_, 31), add_blobs(scene_, 32)}, 4, 260.0);
   const Camera camera = towards({-300, 420, -500}, {400, 0, 400}, 0.7);
   std::set<int> halvings;
@@ -56,7 +56,7 @@ TEST_F(VulkanDetail, HalvedGridsAreTheProcessors) {
   EXPECT_NE(near.depth.values, taken_as_is(camera, always_mid(6.0)).depth.values);
 }
 
-TEST_F(VulkanDetail, EveryKindOfLightOnHalvedGrids) {
+TEST_F(VulkanDetail, HalvedGridsMatchCpuInAllLight) {
   add_crowd(scene_, {add_blobs(scene_, 31)}, 2, 260.0);
   const Camera camera = towards({-300, 420, -500}, {150, 0, 150}, 0.6);
   const auto with = [&](const std::string& name, auto&& change) {
@@ -72,7 +72,7 @@ TEST_F(VulkanDetail, EveryKindOfLightOnHalvedGrids) {
   with("samples", [](RenderOptions& o) { o.samples = 3; });
 }
 
-TEST_F(VulkanDetail, NearIsTheImageWithoutDetailToTheByte) {
+TEST_F(VulkanDetail, NearMatchesImageWithoutDetailExactly) {
   add_crowd(scene_, {add_blobs(scene_, 31)}, 2, 260.0);
   ASSERT_TRUE(renderer_->update(scene_));
   const Camera camera = towards({-100, 220, -200}, {150, 0, 150}, 0.6);
@@ -102,7 +102,7 @@ TEST_F(VulkanDetail, EditsReachHalvedGrids) {
   }
 }
 
-TEST_F(VulkanDetail, AnEditUploadsItsChanges) {
+TEST_F(VulkanDetail, UploadsOnlyChangesOfLevels) {
   const GridHandle edited = add_blobs(scene_, 31);
   add_crowd(scene_, {edited}, 1, 1.0);
   const Camera camera = towards({-300, 420, -500}, {0, 0, 0}, 0.6);
@@ -134,7 +134,7 @@ GridHandle add_hills(Scene& scene, bool has_house) {
   return handle;
 }
 
-TEST_F(VulkanDetail, HalvedFieldsAreTheProcessors) {
+TEST_F(VulkanDetail, HalvedFieldsMatchCpu) {
   add_crowd(scene_, {add_hills(scene_, true), add_blobs(scene_, 32), add_hills(scene_, false)}, 3, 360.0);
   const Camera camera = towards({-300, 420, -500}, {400, 0, 400}, 0.7);
   std::set<int> halvings;
@@ -164,7 +164,7 @@ TEST_F(VulkanDetail, EditsReachHalvedFields) {
   }
 }
 
-TEST_F(VulkanDetail, GridsThatAreGoneLeaveNothing) {
+TEST_F(VulkanDetail, FreesLevelsOfRemovedGrids) {
   const std::vector<GridHandle> grids = {add_blobs(scene_, 31), add_blobs(scene_, 32)};
   add_crowd(scene_, grids, 2, 260.0);
   const Camera camera = towards({-300, 420, -500}, {150, 0, 150}, 0.6);
@@ -192,7 +192,7 @@ TEST_F(VulkanDetail, GridsThatAreGoneLeaveNothing) {
   EXPECT_EQ(halved_bytes(), 0U);
 }
 
-TEST_F(VulkanDetail, EvictsImpostorsThatNoImageUses) {
+TEST_F(VulkanDetail, EvictsUnusedLevels) {
   const std::vector<GridHandle> grids = {add_blobs(scene_, 31), add_blobs(scene_, 32)};
   add_crowd(scene_, grids, 2, 260.0);
   ASSERT_TRUE(renderer_->update(scene_));
@@ -218,7 +218,7 @@ TEST_F(VulkanDetail, EvictsImpostorsThatNoImageUses) {
   compare(camera, always_mid(4.0), "after_giving_way");
 }
 
-TEST_F(VulkanDetail, SamplesAddUpToTheRenderedImage) {
+TEST_F(VulkanDetail, SamplesAddUpToRenderedImage) {
   add_crowd(scene_, {add_blobs(scene_, 31)}, 2, 260.0);
   ASSERT_TRUE(renderer_->update(scene_));
   const Camera camera = towards({-300, 420, -500}, {150, 0, 150}, 0.6);
@@ -232,7 +232,7 @@ TEST_F(VulkanDetail, SamplesAddUpToTheRenderedImage) {
   EXPECT_EQ(image.rays(), whole.rays);
 }
 
-TEST_F(VulkanDetail, ColoursTellTheDetail) {
+TEST_F(VulkanDetail, DetailColoursMatchCpu) {
   add_crowd(scene_, {add_blobs(scene_, 31), add_blobs(scene_, 32)}, 7, 300.0);
   const Camera camera = towards({-150, 120, -150}, {500, -60, 500}, 0.7);
   RenderOptions options = in_detail(320, 200, 0);

@@ -52,7 +52,7 @@ class VulkanField : public VulkanTest {
   }
 };
 
-TEST_F(VulkanField, HillsWithAHouseAndGlass) {
+TEST_F(VulkanField, HillsWithHouseAndGlassMatchCpu) {
   Scene scene;
   const FieldTypes types = add_field_types(scene);
   place_grid(scene, village(types));
@@ -71,7 +71,7 @@ TEST_F(VulkanField, HillsWithAHouseAndGlass) {
   }
 }
 
-TEST_F(VulkanField, FromWithinAndFromAbove) {
+TEST_F(VulkanField, MatchesCpuFromInsideAndAbove) {
   Scene scene;
   const FieldTypes types = add_field_types(scene);
   place_grid(scene, village(types));
@@ -85,7 +85,7 @@ TEST_F(VulkanField, FromWithinAndFromAbove) {
 }
 
 // Emissive balls over hills, a house and a lantern: near, halved and from an impostor.
-TEST_F(VulkanField, EmissiveSamplesLightTheirSurroundings) {
+TEST_F(VulkanField, EmissiveSamplesLightSurroundings) {
   Scene scene;
   const FieldTypes types = add_field_types(scene);
   SceneGrid grid = village(types);
@@ -109,7 +109,7 @@ TEST_F(VulkanField, EmissiveSamplesLightTheirSurroundings) {
   compare(scene, camera, options, "field_glow_far");
 }
 
-TEST_F(VulkanField, TurnedAndScaledAmongOthersFarAway) {
+TEST_F(VulkanField, TransformedFieldsFarAwayMatchCpu) {
   Scene scene;
   const FieldTypes types = add_field_types(scene);
   const DVec3 far{3e6, -2e5, 7e5};
@@ -143,7 +143,7 @@ TEST_F(VulkanField, TurnedAndScaledAmongOthersFarAway) {
   compare(scene, towards(far + DVec3(90, 80, 110), far), sized(160, 120), "field_instances");
 }
 
-TEST_F(VulkanField, EditsAreTakenOver) {
+TEST_F(VulkanField, FollowsEdits) {
   Scene scene;
   const FieldTypes types = add_field_types(scene);
   const InstanceHandle placed = place_grid(scene, village(types));
@@ -177,7 +177,7 @@ TEST_F(VulkanField, EditsAreTakenOver) {
   compare(scene, camera, options, "field_again");
 }
 
-TEST_F(VulkanField, ALakeAndBallsOfGlass) {
+TEST_F(VulkanField, LakeAndGlassBallsMatchCpu) {
   Scene scene;
   const FieldTypes types = add_field_types(scene);
   place_grid(scene, lakeside(types, add_water(scene)));
@@ -210,7 +210,7 @@ TEST_F(VulkanField, ALakeAndBallsOfGlass) {
 }
 
 // Every cell has several transparent materials, and opaque ones.
-TEST_F(VulkanField, MixedGlassInEveryCell) {
+TEST_F(VulkanField, MixedGlassMatchesCpu) {
   Scene scene;
   const FieldTypes types = add_field_types(scene);
   const VoxelType water = add_water(scene);
@@ -235,7 +235,7 @@ TEST_F(VulkanField, MixedGlassInEveryCell) {
   compare(scene, towards({100, 94, 104}, {64, 64, 64}), options, "field_mixed_glass");
 }
 
-TEST_F(VulkanField, GlassTurnedAndScaledFarAway) {
+TEST_F(VulkanField, TransformedGlassFarAwayMatchesCpu) {
   Scene scene;
   const FieldTypes types = add_field_types(scene);
   const DVec3 far{3e6, -2e5, 7e5};
@@ -266,7 +266,7 @@ TEST_F(VulkanField, GlassTurnedAndScaledFarAway) {
   compare(scene, towards(far + DVec3(90, 80, 110), far), options, "field_glass_far");
 }
 
-TEST_F(VulkanField, EditsOfGlassAreTakenOver) {
+TEST_F(VulkanField, FollowsGlassEdits) {
   Scene scene;
   const FieldTypes types = add_field_types(scene);
   const VoxelType water = add_water(scene);
@@ -302,7 +302,7 @@ TEST_F(VulkanField, EditsOfGlassAreTakenOver) {
   compare(scene, camera, options, "field_glass_gone");
 }
 
-TEST_F(VulkanField, MaterialsComeFromTheChunkOfTheSample) {
+TEST_F(VulkanField, TakesMaterialsFromChunkOfSample) {
   Scene scene;
   std::vector<VoxelType> all;
   for (int i = 0; i < 40; ++i) {

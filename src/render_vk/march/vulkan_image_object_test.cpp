@@ -39,7 +39,7 @@ class VulkanImageObject : public VulkanTest {
   }();
 };
 
-TEST_F(VulkanImageObject, SamplesAddUpToTheRenderedImage) {
+TEST_F(VulkanImageObject, SamplesAddUpToRenderedImage) {
   VulkanImage image(*renderer_);
   add(image, 1, Accumulation::Restart);
   EXPECT_EQ(bytes_of(image), rendered(1).colour.rgb);
@@ -51,7 +51,7 @@ TEST_F(VulkanImageObject, SamplesAddUpToTheRenderedImage) {
   EXPECT_EQ(image.rays(), whole.rays);
 }
 
-TEST_F(VulkanImageObject, RestartOnRequestAndOnResize) {
+TEST_F(VulkanImageObject, RestartsOnRequestAndOnResize) {
   VulkanImage image(*renderer_);
   add(image, 2, Accumulation::Restart);
   add(image, 1, Accumulation::Restart);
@@ -63,7 +63,7 @@ TEST_F(VulkanImageObject, RestartOnRequestAndOnResize) {
   EXPECT_EQ(bytes_of(image), rendered(1).colour.rgb);
 }
 
-TEST_F(VulkanImageObject, AddNothingToWhatIsNoSumOfSamples) {
+TEST_F(VulkanImageObject, RestartsAfterWrittenImage) {
   options_.width = 200;
   const std::vector<std::uint8_t> alone = rendered(1).colour.rgb;
   VulkanImage image(*renderer_);
@@ -77,7 +77,7 @@ TEST_F(VulkanImageObject, AddNothingToWhatIsNoSumOfSamples) {
   }
 }
 
-TEST_F(VulkanImageObject, RejectInvalidInput) {
+TEST_F(VulkanImageObject, RejectsInvalidInput) {
   VulkanImage image(*renderer_);
   EXPECT_EQ(image.read().error().code, ErrorCode::InvalidArgument);
   add(image, 1, Accumulation::Restart);

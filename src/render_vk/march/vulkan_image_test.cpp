@@ -87,7 +87,7 @@ class VulkanImages : public ::testing::Test {
   std::unique_ptr<VulkanImage> image_;
 };
 
-TEST_F(VulkanImages, HaveTheImagesBytesInEveryFormat) {
+TEST_F(VulkanImages, MatchImageBytesInEveryFormat) {
   const Scene scene = golden::terrain_scene();
   ASSERT_TRUE(renderer_->update(scene));
   draw(130, 90);
@@ -112,7 +112,7 @@ TEST_F(VulkanImages, HaveTheImagesBytesInEveryFormat) {
   }
 }
 
-TEST_F(VulkanImages, KeepWhatLiesBesideTheImage) {
+TEST_F(VulkanImages, KeepPixelsOutsideTarget) {
   constexpr unsigned kSeed = 61;
   std::mt19937 random(kSeed);
   const auto below = [&](int end) { return static_cast<int>(random() % static_cast<unsigned>(end)); };
@@ -142,7 +142,7 @@ TEST_F(VulkanImages, KeepWhatLiesBesideTheImage) {
 }
 
 // Later recordings must not change earlier ones.
-TEST_F(VulkanImages, OneCommandBufferFillsMany) {
+TEST_F(VulkanImages, OneCommandBufferFillsSeveralImages) {
   std::mt19937 random(5);
   draw_noise(70, 50, random);
   VulkanImage other(*renderer_);
@@ -169,7 +169,7 @@ TEST_F(VulkanImages, OneCommandBufferFillsMany) {
   }
 }
 
-TEST_F(VulkanImages, HaveMeshesToo) {
+TEST_F(VulkanImages, CopyMeshImages) {
   const Scene scene = golden::terrain_scene();
   auto meshes = VulkanMeshRenderer::create(*renderer_);
   ASSERT_TRUE(meshes) << to_string(meshes.error());
@@ -201,7 +201,7 @@ TEST_F(VulkanImages, HaveMeshesToo) {
   EXPECT_EQ(refused.error().code, ErrorCode::Unsupported);
 }
 
-TEST_F(VulkanImages, RefusesInvalidTargets) {
+TEST_F(VulkanImages, RejectInvalidTargets) {
   OwnImage image(*own_, VK_FORMAT_R8G8B8A8_UNORM, 40, 30);
   const VulkanImageTarget right = image.target();
   expect_error(right, ErrorCode::InvalidArgument, "nothing was drawn");

@@ -40,7 +40,7 @@ class VulkanImpostors : public vulkan_test::VulkanDetailTest {
   static RenderOptions far_options(int size) { return in_detail(size, size, 128); }
 };
 
-TEST_F(VulkanImpostors, AreTheProcessorsFromAllAround) {
+TEST_F(VulkanImpostors, MatchCpuFromAllSides) {
   for (const Model model : {Model::Ball, Model::Castle, Model::Ship, Model::Comb, Model::Blobs, Model::SmoothBall,
                             Model::SmoothHills, Model::Village}) {
     add_model(model);
@@ -56,7 +56,7 @@ TEST_F(VulkanImpostors, AreTheProcessorsFromAllAround) {
   }
 }
 
-TEST_F(VulkanImpostors, EveryKindOfLight) {
+TEST_F(VulkanImpostors, MatchCpuInAllLight) {
   for (const Model model : {Model::Castle, Model::Village}) {
     add_model(model);
     const ImpostorWorld world(model);
@@ -79,7 +79,7 @@ TEST_F(VulkanImpostors, EveryKindOfLight) {
   }
 }
 
-TEST_F(VulkanImpostors, AmongOthersOfEveryDetail) {
+TEST_F(VulkanImpostors, MatchCpuAmongAllDetails) {
   add_crowd(scene_, {add_blobs(scene_, 31, 12), add_blobs(scene_, 32, 12)}, 6, 320.0);
   Camera camera = towards({-150, 160, -150}, {900, -60, 900}, 0.7);
   // More than one tile, with Near, Mid and Far instances.
@@ -96,7 +96,7 @@ TEST_F(VulkanImpostors, AmongOthersOfEveryDetail) {
 }
 
 // Frames wait neither for the build of an impostor nor for its whole upload.
-TEST_F(VulkanImpostors, FramesSendALittleAtATime) {
+TEST_F(VulkanImpostors, FramesUploadInParts) {
   SceneGrid large;
   large.grid.edit({IVec3(0), IVec3(150)}, [](IVec3 v, VoxelType) {
     return static_cast<VoxelType>((v.x / 2 + v.y / 3 + v.z / 2) % 3 == 0 ? 1 : 0);
@@ -142,7 +142,7 @@ TEST_F(VulkanImpostors, FramesSendALittleAtATime) {
 }
 
 // Up to the range of single precision and beyond.
-TEST_F(VulkanImpostors, FarFromTheOriginAndTheCamera) {
+TEST_F(VulkanImpostors, MatchCpuFarFromOriginAndCamera) {
   add_crowd(scene_, {add_blobs(scene_, 31), add_blobs(scene_, 32)}, 5, 260.0);
   const DVec3 away{1e9, -3e8, 5e8};
   for (const InstanceHandle handle : scene_.instances().handles()) scene_.edit(handle).position += away;
@@ -152,7 +152,7 @@ TEST_F(VulkanImpostors, FarFromTheOriginAndTheCamera) {
 }
 
 // The fields too are turned and mirrored.
-TEST_F(VulkanImpostors, FieldsFarFromTheOriginAndTheCamera) {
+TEST_F(VulkanImpostors, FieldsMatchCpuFarFromOriginAndCamera) {
   ImpostorWorld world(Model::Village);
   scene_ = std::move(world.scene);
   const GridHandle village = scene_.instances()[world.instance].grid;
@@ -167,7 +167,7 @@ TEST_F(VulkanImpostors, FieldsFarFromTheOriginAndTheCamera) {
   compare(towards(away + DVec3(-100, 220, -200), away + DVec3(150, 0, 150), 0.7), options, "far_fields_edited");
 }
 
-TEST_F(VulkanImpostors, InTheSamePlaceTheFirstInstanceShows) {
+TEST_F(VulkanImpostors, ShowFirstOfCoincidingInstances) {
   const GridHandle grid = add_blobs(scene_, 31);
   // Without glass, whose start would coincide with the other grid's opaque voxels up to rounding.
   Grid& voxels = scene_.edit(grid).grid;
@@ -186,7 +186,7 @@ TEST_F(VulkanImpostors, InTheSamePlaceTheFirstInstanceShows) {
   compare(towards({-900, 1200, -1500}, {400, 0, 400}, 0.7), in_detail(256, 192, 128), "same_place");
 }
 
-TEST_F(VulkanImpostors, EditsAndRemovalsReachThem) {
+TEST_F(VulkanImpostors, FollowEditsAndRemovals) {
   const std::vector<GridHandle> grids = {add_blobs(scene_, 31), add_blobs(scene_, 32)};
   add_crowd(scene_, grids, 4, 300.0);
   const Camera camera = towards({-900, 1200, -1500}, {400, 0, 400}, 0.7);
@@ -211,7 +211,7 @@ TEST_F(VulkanImpostors, EditsAndRemovalsReachThem) {
   EXPECT_EQ(impostor_bytes(), 0U);
 }
 
-TEST_F(VulkanImpostors, HiddenInstancesShowWhereTheyAreWanted) {
+TEST_F(VulkanImpostors, ShowHiddenInstancesOnRequest) {
   add_crowd(scene_, {add_blobs(scene_, 31, 12)}, 3, 300.0);
   const std::vector<InstanceHandle> handles = scene_.instances().handles();
   for (std::size_t i = 0; i < handles.size(); i += 2) scene_.edit(handles[i]).visible = false;
@@ -225,7 +225,7 @@ TEST_F(VulkanImpostors, HiddenInstancesShowWhereTheyAreWanted) {
 }
 
 // Voxels smaller than texels grow to texel size.
-TEST_F(VulkanImpostors, LargeGrid) {
+TEST_F(VulkanImpostors, LargeGridMatchesCpu) {
   add_model(Model::Terrain);
   const ImpostorWorld world(Model::Terrain);
   for (const int view : {0, 1, 2}) {
@@ -234,7 +234,7 @@ TEST_F(VulkanImpostors, LargeGrid) {
   }
 }
 
-TEST_F(VulkanImpostors, AroundTheCamera) {
+TEST_F(VulkanImpostors, MatchCpuAroundCamera) {
   add_crowd(scene_, {add_blobs(scene_, 31, 12)}, 2, 120.0);
   RenderOptions options = in_detail(128, 96, 1'000'000);
   int view = 0;
@@ -247,7 +247,7 @@ TEST_F(VulkanImpostors, AroundTheCamera) {
   compare(above, options, "far_above");
 }
 
-TEST_F(VulkanImpostors, RandomScenesAndPolicies) {
+TEST_F(VulkanImpostors, MatchCpuOnRandomScenesAndPolicies) {
   for (std::uint32_t seed = 1; seed <= 12; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     scene_ = Scene();
@@ -281,7 +281,7 @@ TEST_F(VulkanImpostors, TracesImpostorsThatAreNotReadyInTime) {
   EXPECT_EQ(impostor_bytes(), 0U);
 }
 
-TEST_F(VulkanImpostors, ThoseOfAnotherSceneWithTheSameHandlesAreNotShown) {
+TEST_F(VulkanImpostors, NeverShowImpostorsOfAnotherScene) {
   const Camera camera = towards({-900, 1200, -1500}, {300, 0, 300}, 0.7);
   RenderOptions options = in_detail(128, 96, 128);
   add_crowd(scene_, {add_blobs(scene_, 31, 12)}, 3, 300.0);
@@ -304,7 +304,7 @@ TEST_F(VulkanImpostors, ThoseOfAnotherSceneWithTheSameHandlesAreNotShown) {
   }
 }
 
-TEST_F(VulkanImpostors, SamplesAddUpToTheRenderedImage) {
+TEST_F(VulkanImpostors, SamplesAddUpToRenderedImage) {
   add_crowd(scene_, {add_blobs(scene_, 31, 12)}, 3, 300.0);
   ASSERT_TRUE(renderer_->update(scene_));
   const Camera camera = towards({-900, 1200, -1500}, {300, 0, 300}, 0.7);

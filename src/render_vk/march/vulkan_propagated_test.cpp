@@ -19,7 +19,7 @@ using namespace vulkan_test;
 
 class VulkanPropagated : public VulkanTest {};
 
-TEST_F(VulkanPropagated, ACaveIsThatOfTheProcessor) {
+TEST_F(VulkanPropagated, CaveMatchesCpu) {
   Cave cave;
   RenderOptions options = propagated(240, 160);
   expect_equal(taken(cave.scene, Cave::inside(), options), render_test::taken(cave.scene, Cave::inside(), options),
@@ -38,7 +38,7 @@ TEST_F(VulkanPropagated, ACaveIsThatOfTheProcessor) {
   expect_equal(taken(cave.scene, other, options), render_test::taken(cave.scene, other, options), "cave_open");
 }
 
-TEST_F(VulkanPropagated, AClosedRoomIsBlackAndOpensWithAnEdit) {
+TEST_F(VulkanPropagated, ClosedRoomIsBlackUntilOpened) {
   Cave cave;
   const Camera camera = towards(DVec3(Cave::kRoom.min) + 0.9, DVec3(Cave::kRoom.max) - 0.9, 1.4);
   const RenderOptions options = propagated(64, 48);
@@ -50,7 +50,7 @@ TEST_F(VulkanPropagated, AClosedRoomIsBlackAndOpensWithAnEdit) {
   expect_equal(lit, render_test::taken(cave.scene, camera, options), "opened_room");
 }
 
-TEST_F(VulkanPropagated, ShowsTheLightThatItIsGiven) {
+TEST_F(VulkanPropagated, ShowsSharedLight) {
   Cave cave;
   const RenderOptions options = propagated(64, 48);
   SceneLight light;
@@ -66,7 +66,7 @@ TEST_F(VulkanPropagated, ShowsTheLightThatItIsGiven) {
 
 // A corridor with a lamp of each colour channel at its own end, and a shaft of sky: every level of each, on plain
 // white.
-TEST_F(VulkanPropagated, EveryLevelHasTheColourThatTheProcessorGivesIt) {
+TEST_F(VulkanPropagated, ColoursOfAllLevelsMatchCpu) {
   Scene scene;
   const VoxelType white = add_type(scene, {255, 255, 255, 255});
   for (const Rgba8 colour : {Rgba8{255, 0, 0, 255}, Rgba8{0, 255, 0, 255}, Rgba8{0, 0, 255, 255}}) {
@@ -94,7 +94,7 @@ TEST_F(VulkanPropagated, EveryLevelHasTheColourThatTheProcessorGivesIt) {
   for (const std::set<int>& channel : seen) EXPECT_GT(channel.size(), 100U) << "bytes from dark to bright";
 }
 
-TEST_F(VulkanPropagated, TurnedHalvedAndManyGridsHaveTheirOwnLight) {
+TEST_F(VulkanPropagated, TransformedAndHalvedGridsMatchCpu) {
   Cave cave;
   cave.add_others();
   const Camera camera = Cave::outside();
@@ -104,7 +104,7 @@ TEST_F(VulkanPropagated, TurnedHalvedAndManyGridsHaveTheirOwnLight) {
   expect_equal(taken(cave.scene, camera, options), render_test::taken(cave.scene, camera, options), "halved");
 }
 
-TEST_F(VulkanPropagated, FieldsAreLitBeforeTheirSurfaces) {
+TEST_F(VulkanPropagated, FieldsMatchCpu) {
   Scene scene;
   const VoxelType lamp = add_type(scene, {255, 160, 60, 255}, Visibility::Opaque, 1.0F);
   SceneGrid made;

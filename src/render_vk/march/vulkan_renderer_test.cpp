@@ -11,7 +11,7 @@ using vulkan_test::VulkanTest;
 
 class VulkanGolden : public VulkanTest {};
 
-TEST_F(VulkanGolden, ImagesAreThoseOfTheProcessor) {
+TEST_F(VulkanGolden, ImagesMatchCpu) {
   const Scene scene = golden::terrain_scene();
   const CpuRenderer cpu(scene);
   for (const golden::GoldenView& view : golden::kViews) {

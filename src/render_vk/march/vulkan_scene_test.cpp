@@ -84,12 +84,12 @@ Scene village(DVec3 centre, bool has_glass) {
   return scene;
 }
 
-TEST_F(VulkanScene, TurnedMirroredAndScaledInstances) {
+TEST_F(VulkanScene, TransformedInstancesMatchCpu) {
   const Scene scene = village(DVec3(0.0), false);
   compare(scene, towards({50, 40, 70}, {0, 0, 0}), sized(160, 120), "village");
 }
 
-TEST_F(VulkanScene, ManyInstances) {
+TEST_F(VulkanScene, ManyInstancesMatchCpu) {
   Scene scene;
   const Types types = add_types(scene);
   SceneGrid small;
@@ -107,12 +107,12 @@ TEST_F(VulkanScene, ManyInstances) {
   compare(scene, from_above(0.3, 60, -0.7, 80), sized(64, 64), "many_from_above");
 }
 
-TEST_F(VulkanScene, GlassOfTurnedInstances) {
+TEST_F(VulkanScene, GlassOfTurnedInstancesMatchesCpu) {
   const Scene scene = village(DVec3(0.0), true);
   compare(scene, towards({-40, 30, 60}, {0, 0, 0}), sized(128, 96), "glass_village");
 }
 
-TEST_F(VulkanScene, SurfacesOfGlass) {
+TEST_F(VulkanScene, GlassSurfacesMatchCpu) {
   RenderOptions options = sized(128, 96);
   options.light.glass_surfaces = true;
   environment_in(options).sky.model = SkyModel::Gradient;
@@ -127,7 +127,7 @@ TEST_F(VulkanScene, SurfacesOfGlass) {
 }
 
 // Bodies that touch bodies of another index, in air, on stone of their own grid and of another grid.
-TEST_F(VulkanScene, SurfacesOfGlassThatTouches) {
+TEST_F(VulkanScene, TouchingGlassSurfacesMatchCpu) {
   Scene scene;
   const Types types = add_types(scene);
   VoxelProperties water = scene.types[types.water];
@@ -150,18 +150,18 @@ TEST_F(VulkanScene, SurfacesOfGlassThatTouches) {
   compare(scene, towards({1, 1.5, 11}, {-2, 3, -4}, 1.4), options, "surfaces_from_inside");
 }
 
-TEST_F(VulkanScene, AThousandMillionAway) {
+TEST_F(VulkanScene, MatchesCpuFarFromOrigin) {
   const DVec3 far{1e9 + 0.25, -1e9 - 0.5, 1e9};
   const Scene scene = village(far, true);
   compare(scene, towards(far + DVec3(50, 40, 70), far), sized(96, 72), "far_village");
 }
 
-TEST_F(VulkanScene, AVillageSeenFromAfarThroughALongLens) {
+TEST_F(VulkanScene, MatchesCpuThroughLongLens) {
   const Scene scene = village(DVec3(0.0), true);
   compare(scene, towards({4e5, 3e5, 6e5}, {0, 0, 0}, 1.3e-4), sized(96, 72), "long_lens");
 }
 
-TEST_F(VulkanScene, OrthographicCameras) {
+TEST_F(VulkanScene, MatchesCpuInOrthographicImages) {
   const Scene scene = village(DVec3(0.0), true);
   compare(scene, from_above(3.3, 60, -2.7, 90), sized(96, 96), "orthographic");
   Camera slanted = towards({300, 260, 400}, {0, 0, 0});
@@ -172,7 +172,7 @@ TEST_F(VulkanScene, OrthographicCameras) {
   compare(scene, slanted, sized(96, 72), "slanted_from_afar");
 }
 
-TEST_F(VulkanScene, EveryOptionOfLight) {
+TEST_F(VulkanScene, MatchesCpuForEveryLightOption) {
   Scene scene;
   place(scene, hut(add_types(scene)));
   const Camera camera = towards({34, 26, 46}, {9, 5, 9});
@@ -208,7 +208,7 @@ TEST_F(VulkanScene, EveryOptionOfLight) {
   with("colours", [](RenderOptions& o) { o.detail.colours = true; });
 }
 
-TEST_F(VulkanScene, EveryShading) {
+TEST_F(VulkanScene, MatchesCpuForEveryShading) {
   Scene scene;
   scene.edit(place(scene, hut(add_types(scene)))).rotation = glm::angleAxis(0.4, glm::normalize(DVec3(1, 3, 2)));
   const Camera camera = towards({34, 26, 46}, {9, 5, 9});
@@ -224,7 +224,7 @@ TEST_F(VulkanScene, EveryShading) {
   }
 }
 
-TEST_F(VulkanScene, TheSixthOcclusionRayIsTheReferences) {
+TEST_F(VulkanScene, SixthOcclusionRayMatchesReference) {
   for (const Direction face : kDirections) {
     Scene scene;
     const Camera camera = sixth_ray_blocked(scene, face);
@@ -235,7 +235,7 @@ TEST_F(VulkanScene, TheSixthOcclusionRayIsTheReferences) {
   }
 }
 
-TEST_F(VulkanScene, FromInsideGlassAndStone) {
+TEST_F(VulkanScene, MatchesCpuFromInsideGlassAndStone) {
   Scene scene;
   const Types types = add_types(scene);
   Grid grid;
@@ -250,7 +250,7 @@ TEST_F(VulkanScene, FromInsideGlassAndStone) {
   compare(scene, towards({20.4, 8.3, 20.6}, {2, 8, 2}), sized(32, 24), "in_stone");
 }
 
-TEST_F(VulkanScene, MorePanesThanThereIsRoomFor) {
+TEST_F(VulkanScene, ManyPanesMatchCpu) {
   Scene scene;
   const Types types = add_types(scene);
   const VoxelType clear = add_type(scene, {250, 230, 240, 12}, Visibility::Transparent);
@@ -271,7 +271,7 @@ TEST_F(VulkanScene, MorePanesThanThereIsRoomFor) {
   compare(scene, towards({95, 9, 12}, {0, 7, 10}), options, "mirroring_panes");
 }
 
-TEST_F(VulkanScene, TwentyThousandVoxelsThroughOneGrid) {
+TEST_F(VulkanScene, LongRayThroughOneGridMatchesCpu) {
   Scene scene;
   const Types types = add_types(scene);
   Grid grid;
@@ -283,13 +283,13 @@ TEST_F(VulkanScene, TwentyThousandVoxelsThroughOneGrid) {
   compare(scene, towards({3.2, 6.1, 7.7}, {20'000, 6, 15}, 2e-3), sized(96, 72), "corridor");
 }
 
-TEST_F(VulkanScene, AnEmptySceneIsTheSky) {
+TEST_F(VulkanScene, EmptySceneShowsSky) {
   const Scene scene;
   compare(scene, towards({0, 0, 0}, {1, 0.2, 0}, 2.0), sized(64, 48), "sky");
   compare(scene, from_above(0, 10, 0, 20), sized(64, 48), "ground");
 }
 
-TEST_F(VulkanScene, RandomScenesFromRandomPlaces) {
+TEST_F(VulkanScene, RandomScenesMatchCpu) {
   for (unsigned seed = 1; seed <= 6; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937 random(seed);
@@ -347,7 +347,7 @@ Scene lit_by_night(DVec3 origin) {
   return scene;
 }
 
-TEST_F(VulkanScene, LampsOfEveryKind) {
+TEST_F(VulkanScene, LampsOfEveryKindMatchCpu) {
   RenderOptions options = sized(96, 72);
   options.light.max_lamps = 64;
   environment_in(options).sun.brightness = 0.0;
@@ -369,7 +369,7 @@ TEST_F(VulkanScene, LampsOfEveryKind) {
   compare(lit_by_night(far), towards(far + DVec3(50, 36, 76), far + DVec3(12, 3, 9), 1.0), options, "lamps_far");
 }
 
-TEST_F(VulkanScene, SkiesThatFollowTheSun) {
+TEST_F(VulkanScene, SkiesFollowingSunMatchCpu) {
   Scene scene;
   const Types types = add_types(scene);
   place(scene, hut(types));

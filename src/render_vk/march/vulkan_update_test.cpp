@@ -42,7 +42,7 @@ Grid hills(VoxelType ground, VoxelType stone, int edge) {
   return grid;
 }
 
-TEST_F(VulkanUpdate, AnEditUploadsOnlyItsChanges) {
+TEST_F(VulkanUpdate, UploadsOnlyChanges) {
   Scene scene;
   const VoxelType ground = add_type(scene, {90, 160, 70});
   const VoxelType stone = add_type(scene, {140, 140, 150});
@@ -68,7 +68,7 @@ TEST_F(VulkanUpdate, AnEditUploadsOnlyItsChanges) {
   edited("chunk_away", [&] { grid.fill_box({{-70, 0, 60}, {-65, 31, 65}}, kAir); });
 }
 
-TEST_F(VulkanUpdate, InstancesAndTypesComeAndGo) {
+TEST_F(VulkanUpdate, FollowsInstancesAndTypes) {
   Scene scene;
   const VoxelType stone = add_type(scene, {140, 140, 150});
   const VoxelType brick = add_type(scene, {170, 80, 60});
@@ -106,7 +106,7 @@ TEST_F(VulkanUpdate, InstancesAndTypesComeAndGo) {
   then("removed_and_edited");
 }
 
-TEST_F(VulkanUpdate, AnotherSceneWithTheSameHandlesAndVersions) {
+TEST_F(VulkanUpdate, FollowsOtherSceneWithSameHandles) {
   const Camera camera = towards({40, 30, 50}, {8, 8, 8});
   for (int size = 4; size < 16; size += 5) {
     Scene scene;
@@ -119,7 +119,7 @@ TEST_F(VulkanUpdate, AnotherSceneWithTheSameHandlesAndVersions) {
   }
 }
 
-TEST_F(VulkanUpdate, WorldsLargerThanABlock) {
+TEST_F(VulkanUpdate, HoldsWorldsLargerThanBlock) {
   VulkanOptions options = test_options();
   options.block_bytes = 64 << 10;
   auto small = VulkanRenderer::create(options);
@@ -135,7 +135,7 @@ TEST_F(VulkanUpdate, WorldsLargerThanABlock) {
   EXPECT_GT(renderer_->uploaded_bytes(), 20 * options.block_bytes);
 }
 
-TEST_F(VulkanUpdate, IslandsFarApart) {
+TEST_F(VulkanUpdate, DrawsIslandsFarApart) {
   Scene scene;
   const VoxelType ground = add_type(scene, {90, 160, 70});
   const VoxelType stone = add_type(scene, {140, 140, 150});
@@ -163,7 +163,7 @@ TEST_F(VulkanUpdate, IslandsFarApart) {
   expect_equal(taken(scene, near, options), render_test::taken(scene, near, options), "island_again");
 }
 
-TEST_F(VulkanUpdate, HundredsOfTypesInOneChunk) {
+TEST_F(VulkanUpdate, DrawsHundredsOfTypesPerChunk) {
   Scene scene;
   std::mt19937 random(3);
   for (int i = 0; i < 700; ++i) {

@@ -106,7 +106,7 @@ class VulkanPaths : public VulkanTest {
   }
 };
 
-TEST_F(VulkanPaths, AreTheProcessors) {
+TEST_F(VulkanPaths, MatchCpu) {
   PathOptions options = small();
   expect_same_light(town(), of_town(), options, "physical");
   physical_in(options).sky.model = SkyModel::Gradient;
@@ -117,7 +117,7 @@ TEST_F(VulkanPaths, AreTheProcessors) {
   expect_same_light(town(), of_town(), options, "uniform");
 }
 
-TEST_F(VulkanPaths, SampleAnEnvironment) {
+TEST_F(VulkanPaths, SampleEnvironmentLikeCpu) {
   PathOptions options = small();
   RadianceImage image{16, 8, std::vector<float>(std::size_t{16} * 8 * 3, 0.2F)};
   image.rgb[3 * (2 * 16 + 5)] = 40.0F;
@@ -128,7 +128,7 @@ TEST_F(VulkanPaths, SampleAnEnvironment) {
   expect_same_light(town(), of_town(), options, "environment");
 }
 
-TEST_F(VulkanPaths, HaveGroundAndFogAndALens) {
+TEST_F(VulkanPaths, MatchCpuWithGroundFogAndLens) {
   PathOptions options = small();
   physical_in(options).ground = GroundPlane{.height = -3.0, .colour = Vec3(0.4F), .only_shadows = false, .fade = 0.1};
   expect_same_light(town(), of_town(), options, "ground");
@@ -142,14 +142,14 @@ TEST_F(VulkanPaths, HaveGroundAndFogAndALens) {
   expect_same_light(town(), of_town(), options, "lens");
 }
 
-TEST_F(VulkanPaths, LookAlongParallelRays) {
+TEST_F(VulkanPaths, MatchCpuInOrthographicImages) {
   Camera camera = of_town();
   camera.projection = Camera::Projection::Orthographic;
   camera.view_height = 40.0;
   expect_same_light(town(), camera, small(), "orthographic");
 }
 
-TEST_F(VulkanPaths, GoThroughClouds) {
+TEST_F(VulkanPaths, MatchCpuInClouds) {
   Scene scene = town();
   VoxelProperties cloud;
   cloud.colour = {230, 230, 240, 60};
@@ -163,7 +163,7 @@ TEST_F(VulkanPaths, GoThroughClouds) {
   expect_same_light(scene, of_town(), small(), "clouds");
 }
 
-TEST_F(VulkanPaths, TakeOutTheProcessorsNoise) {
+TEST_F(VulkanPaths, DenoiseLikeCpu) {
   PathOptions options = small();
   options.denoise = true;
   physical_in(options).fog = Fog{.density = 0.01, .colour = Vec3(1.0F), .anisotropy = 0.0, .top = 4.0};
@@ -171,7 +171,7 @@ TEST_F(VulkanPaths, TakeOutTheProcessorsNoise) {
 }
 
 // From the fifth sample on, paths on the CPU use the learned shares of lamps.
-TEST_F(VulkanPaths, ConvergeToTheCpuImage) {
+TEST_F(VulkanPaths, ConvergeToCpuImage) {
   const PathOptions options = small(48);
   const Scene scene = town();
   const PathImage device = drawn(scene, of_town(), options);
@@ -201,7 +201,7 @@ TEST_F(VulkanPaths, ConvergeToTheCpuImage) {
 
 // Fields, one of them without materials, which is white. Nightly runs add glass of fields and of voxels, since their
 // shader takes a minute to compile.
-TEST_F(VulkanPaths, MeetFields) {
+TEST_F(VulkanPaths, MatchCpuOnFields) {
   const bool is_night = std::getenv("QUOIN_NIGHTLY") != nullptr;
   Scene scene = is_night ? town() : Scene();
   const FieldTypes types = add_field_types(scene);
@@ -218,7 +218,7 @@ TEST_F(VulkanPaths, MeetFields) {
 }
 
 // More glass bodies along a ray than a pixel's list holds.
-TEST_F(VulkanPaths, PassAnyNumberOfPanes) {
+TEST_F(VulkanPaths, MatchCpuThroughManyPanes) {
   Scene scene;
   const VoxelType ground = add_type(scene, {200, 200, 200, 255});
   VoxelProperties pane;
@@ -243,7 +243,7 @@ TEST_F(VulkanPaths, PassAnyNumberOfPanes) {
 }
 
 // A distant camera, whose view space begins in front of the scene; also far from the world's origin.
-TEST_F(VulkanPaths, AreAsExactFromFarAway) {
+TEST_F(VulkanPaths, MatchCpuFromFarAway) {
   Scene scene = town();
   const DVec3 far(3.0e6, -2.0e5, 1.0e6);
   for (const InstanceHandle handle : scene.instances().handles()) scene.edit(handle).position += far;
@@ -255,11 +255,11 @@ TEST_F(VulkanPaths, AreAsExactFromFarAway) {
   expect_same_light(scene, camera, options, "far", 0.01);
 }
 
-TEST_F(VulkanPaths, EmptySceneShowsTheSky) {
+TEST_F(VulkanPaths, EmptySceneShowsSky) {
   expect_same_light(Scene(), of_town(), small(), "nothing", 0.0);
 }
 
-TEST_F(VulkanPaths, AddSamplesToAnImage) {
+TEST_F(VulkanPaths, AddSamplesToImage) {
   const Scene scene = town();
   ASSERT_TRUE(renderer_->update(scene));
   VulkanPathImage image(*renderer_);
@@ -295,7 +295,7 @@ TEST_F(VulkanPaths, FollowEdits) {
   expect_same_light(scene, of_town(), small(), "edited");
 }
 
-TEST_F(VulkanPaths, KeepTheFacesThatGlowUntilTheyAreOthers) {
+TEST_F(VulkanPaths, UploadEmissiveFacesOnlyOnChange) {
   Scene scene = town();
   const vulkan::DeviceMemory& memory = renderer_->impl().memory;
   const auto sent = [&] {
@@ -322,7 +322,7 @@ TEST_F(VulkanPaths, KeepTheFacesThatGlowUntilTheyAreOthers) {
   expect_same_light(scene, of_town(), small(), "glowing");
 }
 
-TEST_F(VulkanPaths, RejectTheSameInputAsTheCpu) {
+TEST_F(VulkanPaths, RejectSameInputAsCpu) {
   const Scene scene = town();
   ASSERT_TRUE(renderer_->update(scene));
   PathOptions options = small();

@@ -58,7 +58,7 @@ RenderOptions always(Detail detail, double cell_pixels) {
   return options;
 }
 
-TEST_F(VulkanMeshDetail, HalvedGridsAreThoseOfTheProcessor) {
+TEST_F(VulkanMeshDetail, HalvedGridsMatchCpu) {
   add_crowd(scene_, {add_blobs(scene_, 31), add_blobs(scene_, 32)}, 4, 260.0);
   make_opaque();
   const Camera camera = towards({-300, 420, -500}, {400, 0, 400}, 0.7);
@@ -74,7 +74,7 @@ TEST_F(VulkanMeshDetail, HalvedGridsAreThoseOfTheProcessor) {
   }
 }
 
-TEST_F(VulkanMeshDetail, ImpostorsAreThoseOfTheProcessor) {
+TEST_F(VulkanMeshDetail, ImpostorsMatchCpu) {
   add_crowd(scene_, {add_blobs(scene_, 31), add_blobs(scene_, 32)}, 6, 260.0);
   make_opaque();
   const Camera camera = towards({-900, 1420, -1500}, {700, 0, 700}, 0.6);
@@ -140,7 +140,7 @@ TEST_F(VulkanMeshDetail, SmallImpostorsHaveNoHoles) {
   }
 }
 
-TEST_F(VulkanMeshDetail, AllThreeInOneImage) {
+TEST_F(VulkanMeshDetail, AllDetailsInOneImageMatchCpu) {
   add_crowd(scene_, {add_blobs(scene_, 31), add_blobs(scene_, 32)}, 8, 260.0);
   make_opaque();
   RenderOptions options = in_detail(480, 270, 60);
@@ -156,7 +156,7 @@ TEST_F(VulkanMeshDetail, AllThreeInOneImage) {
   compare_all(camera, options, "mesh_detail_colours");
 }
 
-TEST_F(VulkanMeshDetail, GlassOfFarInstancesIsDrawn) {
+TEST_F(VulkanMeshDetail, DrawsGlassOfFarInstances) {
   const VoxelType glass = add_type(scene_, {90, 120, 220, 120}, Visibility::Transparent);
   const VoxelType stone = add_type(scene_, {200, 180, 150});
   Grid grid;
@@ -192,7 +192,7 @@ TEST_F(VulkanMeshDetail, EditsShowInEveryDetail) {
 }
 
 // Without waiting, grids without an impostor are drawn halved, and all grids are drawn.
-TEST_F(VulkanMeshDetail, DrawsGridsWithoutAnImpostorHalved) {
+TEST_F(VulkanMeshDetail, DrawsGridsWithoutImpostorHalved) {
   add_crowd(scene_, {add_blobs(scene_, 31), add_blobs(scene_, 32)}, 3, 260.0);
   make_opaque();
   put(scene_, blocky_surfaces(scene_, false));
@@ -228,7 +228,7 @@ TEST_F(VulkanMeshDetail, SmoothMeshesStaySmooth) {
 
 // Fields are drawn from meshes of their halved samples, together with the halved blocks of the same grid; distant
 // fields from their full meshes.
-TEST_F(VulkanMeshDetail, FieldsAreHalvedToo) {
+TEST_F(VulkanMeshDetail, HalvesFields) {
   const VoxelType stone = add_type(scene_, {200, 190, 170});
   const VoxelType brick = add_type(scene_, {190, 90, 70});
   SceneGrid hill;
@@ -277,7 +277,7 @@ TEST_F(VulkanMeshDetail, FieldsAreHalvedToo) {
 }
 
 // A view's hysteresis prevents flicker near a threshold.
-TEST_F(VulkanMeshDetail, AViewRemembersItsChoice) {
+TEST_F(VulkanMeshDetail, ViewIsStableNearThreshold) {
   add_crowd(scene_, {add_blobs(scene_, 31)}, 1, 260.0);
   make_opaque();
   put(scene_, blocky_surfaces(scene_));

@@ -67,7 +67,7 @@ Scene panes(const std::vector<VoxelType Types::*>& panes) {
   return scene;
 }
 
-TEST_F(VulkanMeshGlass, PanesOfOneVoxelAreThoseOfTheProcessor) {
+TEST_F(VulkanMeshGlass, OneVoxelPanesMatchCpu) {
   RenderOptions options = without_shadows(sized(120, 120));
   const Camera camera = straight({20.03, 20.02, 500}, 44);
   for (const bool is_lit : {true, false}) {
@@ -83,7 +83,7 @@ TEST_F(VulkanMeshGlass, PanesOfOneVoxelAreThoseOfTheProcessor) {
   }
 }
 
-TEST_F(VulkanMeshGlass, OrderIsThatOfTheCameraAndNotOfChunksOrInstances) {
+TEST_F(VulkanMeshGlass, OrdersGlassByCamera) {
   Scene scene;
   const Types types = add_types(scene);
   const auto pane = [&](VoxelType type, double z) {
@@ -114,7 +114,7 @@ TEST_F(VulkanMeshGlass, SolidVoxelsHideGlassBehindThem) {
 }
 
 // Drawn face by face, water of any depth differs from the CPU's, which counts its voxels; all other pixels match.
-TEST_F(VulkanMeshGlass, MatchesTheCpuExceptThroughGlass) {
+TEST_F(VulkanMeshGlass, MatchesCpuExceptThroughGlass) {
   Scene scene = golden::terrain_scene();
   const golden::GoldenView& view = golden::kViews[0];
   const Camera camera = golden::camera_for(view);
@@ -151,7 +151,7 @@ TEST_F(VulkanMeshGlass, MatchesTheCpuExceptThroughGlass) {
   }
 }
 
-TEST_F(VulkanMeshGlass, MoreQuadsThanAreSortedAreDrawnByChunk) {
+TEST_F(VulkanMeshGlass, DrawsTooManyQuadsByChunk) {
   const Scene shown = panes({&Types::red, &Types::blue, &Types::glowing});
   MeshImageOptions options = mesh_options(without_shadows(sized(120, 120)));
   options.glass_by_rays = false;

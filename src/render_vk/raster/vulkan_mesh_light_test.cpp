@@ -58,7 +58,7 @@ Scene huts(DVec3 at) {
   return scene;
 }
 
-TEST_F(VulkanMeshLight, GoldenViewsAreThoseOfTheProcessor) {
+TEST_F(VulkanMeshLight, GoldenViewsMatchCpu) {
   Scene scene = golden::terrain_scene();
   // Transparent surfaces have their own tests.
   for (std::size_t type = 1; type < scene.types.size(); ++type) {
@@ -71,25 +71,25 @@ TEST_F(VulkanMeshLight, GoldenViewsAreThoseOfTheProcessor) {
   }
 }
 
-TEST_F(VulkanMeshLight, InstancesAreTurnedMirroredAndScaled) {
+TEST_F(VulkanMeshLight, TransformedInstancesMatchCpu) {
   const RenderOptions options = without_shadows(sized(240, 135));
   compare(huts({0, 0, 0}), towards({10, 40, 70}, {0, 4, 0}), options, "huts");
   compare(huts({0, 0, 0}), towards({-60, 15, 30}, {-20, 4, 0}, 0.5), options, "huts_left");
 }
 
-TEST_F(VulkanMeshLight, FarFromTheOriginTheyAreTheSame) {
+TEST_F(VulkanMeshLight, MatchesCpuFarFromOrigin) {
   const DVec3 far{1e9, -1e9, 1e9};
   const RenderOptions options = without_shadows(sized(240, 135));
   compare(huts(far), towards(far + DVec3(10, 40, 70), far + DVec3(0, 4, 0)), options, "huts_far");
 }
 
-TEST_F(VulkanMeshLight, FarFromTheCameraTheyAreTheSame) {
+TEST_F(VulkanMeshLight, MatchesCpuFarFromCamera) {
   const DVec3 eye{400'000, 300'000, 600'000};
   const RenderOptions options = without_shadows(sized(240, 135));
   compare(huts({0, 0, 0}), towards(eye, {0, 4, 0}, 80.0 / 780'000), options, "huts_telephoto");
 }
 
-TEST_F(VulkanMeshLight, OrthographicImagesAreTheSame) {
+TEST_F(VulkanMeshLight, MatchesCpuInOrthographicImages) {
   const RenderOptions options = without_shadows(sized(160, 160));
   compare(huts({0, 0, 0}), from_above(0.013, 60, 0.017, 90), options, "huts_above");
   Camera camera = towards({50, 40, 60}, {0, 4, 0});
@@ -98,7 +98,7 @@ TEST_F(VulkanMeshLight, OrthographicImagesAreTheSame) {
   compare(huts({0, 0, 0}), camera, options, "huts_orthographic");
 }
 
-TEST_F(VulkanMeshLight, LightHasTheSameOptions) {
+TEST_F(VulkanMeshLight, MatchesCpuForEveryLightOption) {
   const Scene scene = huts({0, 0, 0});
   const Camera camera = towards({10, 40, 70}, {0, 4, 0});
   RenderOptions options = without_shadows(sized(160, 90));
@@ -131,7 +131,7 @@ TEST_F(VulkanMeshLight, BrightnessHasNoLimit) {
   compare(scene, towards({5, 9, 20}, {5, 2, 2}), options, "bright");
 }
 
-TEST_F(VulkanMeshLight, TypesThatAreNotRegisteredAreMagenta) {
+TEST_F(VulkanMeshLight, UnregisteredTypesAreMagenta) {
   Scene scene;
   Grid grid;
   grid.fill_box({{0, 0, 0}, {5, 5, 5}}, 77);
@@ -140,7 +140,7 @@ TEST_F(VulkanMeshLight, TypesThatAreNotRegisteredAreMagenta) {
   compare(scene, towards({5, 9, 20}, {5, 2, 2}), without_shadows(sized(64, 64)), "unregistered");
 }
 
-TEST_F(VulkanMeshLight, SmoothSurfacesHaveTheReferenceLight) {
+TEST_F(VulkanMeshLight, SmoothSurfacesMatchReferenceLight) {
   Scene scene;
   const VoxelType lamp = add_type(scene, {200, 120, 60}, Visibility::Opaque, 0.125F);
   DensityGrid field;
@@ -184,7 +184,7 @@ TEST_F(VulkanMeshLight, MergedQuadsLookLikeSingleFaces) {
   EXPECT_LE(different, 20) << "of " << single.rgb.size();
 }
 
-TEST_F(VulkanMeshLight, ScenesWithNothingShowTheSky) {
+TEST_F(VulkanMeshLight, EmptySceneShowsSky) {
   const Scene scene;
   Camera camera = towards({3, 4, 5}, {20, 1, 2}, 1.6);
   const RenderOptions options = without_shadows(sized(96, 64));
@@ -200,7 +200,7 @@ TEST_F(VulkanMeshLight, ScenesWithNothingShowTheSky) {
   }
 }
 
-TEST_F(VulkanMeshLight, ValuesAreShownAsTheyAre) {
+TEST_F(VulkanMeshLight, ShowsExactValues) {
   Scene scene;
   const VoxelType stone = add_type(scene, {140, 140, 150});
   Grid grid;

@@ -42,7 +42,7 @@ class VulkanMeshModel : public vulkan_test::VulkanMeshTest {
   }
 };
 
-TEST_F(VulkanMeshModel, IsDrawnInEveryWay) {
+TEST_F(VulkanMeshModel, DrawsInEveryMode) {
   const char* chosen = std::getenv("QUOIN_VULKAN_MODEL");
   const fs::path model =
       chosen != nullptr ? fs::path(chosen)

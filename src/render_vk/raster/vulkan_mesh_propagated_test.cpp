@@ -17,7 +17,7 @@ using vulkan_test::mesh_options;
 
 class VulkanMeshPropagated : public vulkan_test::VulkanMeshTest {};
 
-TEST_F(VulkanMeshPropagated, ACaveWithGlassIsThatOfTheProcessor) {
+TEST_F(VulkanMeshPropagated, CaveWithGlassMatchesCpu) {
   Cave cave;
   RenderOptions options = propagated(240, 160, OcclusionMode::Vertex);
   compare(cave.scene, Cave::inside(), options, "cave");
@@ -27,7 +27,7 @@ TEST_F(VulkanMeshPropagated, ACaveWithGlassIsThatOfTheProcessor) {
   compare(cave.scene, towards({26.0, -3.0, 12.0}, {-8.0, -10.0, -2.0}, 1.2), options, "cave_of_lamps");
 }
 
-TEST_F(VulkanMeshPropagated, TurnedHalvedAndFarGridsHaveTheirOwnLight) {
+TEST_F(VulkanMeshPropagated, TransformedAndHalvedGridsMatchCpu) {
   Cave cave;
   cave.add_others();
   const Camera camera = Cave::outside();
@@ -37,7 +37,7 @@ TEST_F(VulkanMeshPropagated, TurnedHalvedAndFarGridsHaveTheirOwnLight) {
   compare(cave.scene, camera, options, "halved");
 }
 
-TEST_F(VulkanMeshPropagated, AnEditOpensARoom) {
+TEST_F(VulkanMeshPropagated, EditLightsClosedRoom) {
   Cave cave;
   const Camera camera = towards(DVec3(Cave::kRoom.min) + 0.9, DVec3(Cave::kRoom.max) - 0.9, 1.4);
   const RenderOptions options = propagated(64, 48, OcclusionMode::Vertex);
@@ -52,7 +52,7 @@ TEST_F(VulkanMeshPropagated, AnEditOpensARoom) {
 }
 
 // The mesh matches the marched field except for the mesh's own shape.
-TEST_F(VulkanMeshPropagated, SmoothSurfacesAreLitAsTheFieldsThatTheyAreOf) {
+TEST_F(VulkanMeshPropagated, LightsSmoothSurfacesLikeFields) {
   Scene scene;
   const VoxelType stone = render_test::add_type(scene, {180, 170, 160, 255});
   const VoxelType lamp = render_test::add_type(scene, {255, 160, 60, 255}, Visibility::Opaque, 1.0F);

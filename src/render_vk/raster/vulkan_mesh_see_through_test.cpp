@@ -26,7 +26,7 @@ using vulkan_test::over_glass_yard;
 
 class VulkanMeshSeeThrough : public vulkan_test::VulkanMeshTest {};
 
-TEST_F(VulkanMeshSeeThrough, TheYardIsThatOfTheProcessor) {
+TEST_F(VulkanMeshSeeThrough, GlassYardMatchesCpu) {
   RenderOptions options = glass_yard_options(160, 120);
   compare(glass_yard(), over_glass_yard(), options, "yard_of_glass");
   compare(glass_yard(), towards({30, 14, 70}, {22, 12, 20}, 0.9), options, "yard_of_glass_low");
@@ -40,13 +40,13 @@ TEST_F(VulkanMeshSeeThrough, TheYardIsThatOfTheProcessor) {
   compare(glass_yard(), over_glass_yard(), options, "yard_of_glass_plain_light");
 }
 
-TEST_F(VulkanMeshSeeThrough, FarFromTheOriginItIsTheSame) {
+TEST_F(VulkanMeshSeeThrough, MatchesCpuFarFromOrigin) {
   const DVec3 far{1e9, -1e9, 1e9};
   compare(glass_yard(far), over_glass_yard(far), glass_yard_options(160, 120), "yard_of_glass_far");
 }
 
 // The comparison fails without any one of these features.
-TEST_F(VulkanMeshSeeThrough, SurfacesAndDepthAreSeen) {
+TEST_F(VulkanMeshSeeThrough, ComparisonDetectsMissingSurfacesAndDepth) {
   const Scene scene = glass_yard();
   RenderOptions options = glass_yard_options(160, 120);
   put(scene, blocky_surfaces(scene));
@@ -60,7 +60,7 @@ TEST_F(VulkanMeshSeeThrough, SurfacesAndDepthAreSeen) {
 }
 
 // Turned, mirrored and scaled instances that intersect or cover each other.
-TEST_F(VulkanMeshSeeThrough, InstancesAreSeenThroughOneAnother) {
+TEST_F(VulkanMeshSeeThrough, OverlappingInstancesMatchCpu) {
   Scene scene = glass_yard();
   const VoxelType amber = add_glass(scene, {240, 170, 60, 60}, 1.4F);
   SceneGrid block;
@@ -76,7 +76,7 @@ TEST_F(VulkanMeshSeeThrough, InstancesAreSeenThroughOneAnother) {
 }
 
 // More bodies in a row than a fragment can hold at a time, in one grid and in many.
-TEST_F(VulkanMeshSeeThrough, ManyPanesStandBehindEachOther) {
+TEST_F(VulkanMeshSeeThrough, ManyPanesInRowMatchCpu) {
   Scene scene;
   const VoxelType wall = add_type(scene, {200, 180, 150});
   const VoxelType blue = add_glass(scene, {120, 190, 240, 12}, 1.3F);
@@ -93,7 +93,7 @@ TEST_F(VulkanMeshSeeThrough, ManyPanesStandBehindEachOther) {
   compare(scene, towards({130, 12, 14}, {0, 10, 10}, 0.25), glass_yard_options(160, 120), "many_panes");
 }
 
-TEST_F(VulkanMeshSeeThrough, ColoursAndLightHaveTheSameOptions) {
+TEST_F(VulkanMeshSeeThrough, MatchesCpuForUnlitAndPlainGlass) {
   RenderOptions options = glass_yard_options(160, 120);
   options.light.shading = Shading::Unlit;
   compare(glass_yard(), over_glass_yard(), options, "glass_unlit");
@@ -106,7 +106,7 @@ TEST_F(VulkanMeshSeeThrough, ColoursAndLightHaveTheSameOptions) {
 }
 
 // At seams between differently merged quads each pixel is passed once: no pixel is darker than its neighbours.
-TEST_F(VulkanMeshSeeThrough, SeamsBetweenQuadsDoNotShow) {
+TEST_F(VulkanMeshSeeThrough, HidesSeamsBetweenQuads) {
   Scene scene;
   const VoxelType stone = add_type(scene, {230, 230, 230});
   const VoxelType water = add_glass(scene, {40, 90, 160, 90}, 1.33F);
@@ -125,7 +125,7 @@ TEST_F(VulkanMeshSeeThrough, SeamsBetweenQuadsDoNotShow) {
 }
 
 // The renderer does not know another scene at the address of a former one.
-TEST_F(VulkanMeshSeeThrough, ItTellsScenesApartThatStandInTheSamePlace) {
+TEST_F(VulkanMeshSeeThrough, DetectsNewSceneAtSameAddress) {
   std::optional<Scene> scene(glass_yard());
   ASSERT_TRUE(renderer_->update(*scene));
   ASSERT_TRUE(meshes_->update(*scene));
@@ -140,7 +140,7 @@ TEST_F(VulkanMeshSeeThrough, ItTellsScenesApartThatStandInTheSamePlace) {
   meshes_->clear();
 }
 
-TEST_F(VulkanMeshSeeThrough, ItNeedsTheVoxelsOfTheSceneWhereThereIsGlass) {
+TEST_F(VulkanMeshSeeThrough, RequiresVoxelsForGlass) {
   const Scene scene = glass_yard();
   ASSERT_TRUE(meshes_->update(scene));
   VulkanImage image(*renderer_);
@@ -164,7 +164,7 @@ TEST_F(VulkanMeshSeeThrough, ItNeedsTheVoxelsOfTheSceneWhereThereIsGlass) {
 }
 
 // Glass dims the edges of objects behind it, and has edges of its own.
-TEST_F(VulkanMeshSeeThrough, EdgesAreSeenThroughGlass) {
+TEST_F(VulkanMeshSeeThrough, ShowsEdgesThroughGlass) {
   Scene scene;
   const VoxelType wall = add_type(scene, {230, 230, 230});
   const VoxelType glass = add_glass(scene, {120, 160, 220, 60}, 1.3F);
@@ -209,7 +209,7 @@ int different_walls(const std::vector<Image>& images, const std::vector<Image>& 
 
 // Compares marched walls, walls of blocks and walls of smooth bodies, in light without occlusion, since smooth surfaces
 // have their own.
-TEST_F(VulkanMeshSeeThrough, WallsAreTheSameMarchedAndFromBlocksAndSmooth) {
+TEST_F(VulkanMeshSeeThrough, WallsMatchMarchedWalls) {
   const Scene scene = glass_yard();
   RenderOptions options = glass_yard_options(48, 36);
   options.light.occlusion_mode = OcclusionMode::Off;
@@ -242,7 +242,7 @@ TEST_F(VulkanMeshSeeThrough, WallsAreTheSameMarchedAndFromBlocksAndSmooth) {
 }
 
 // Pixels at shores and silhouettes differ: a mesh interpolates the normals of its vertices.
-TEST_F(VulkanMeshSeeThrough, LakesAndBallsOfFieldsAreThoseOfTheProcessor) {
+TEST_F(VulkanMeshSeeThrough, LakesAndBallsOfFieldsMatchCpu) {
   Scene scene;
   const vulkan_test::FieldTypes types = vulkan_test::add_field_types(scene);
   const VoxelType water = vulkan_test::add_water(scene);

@@ -45,7 +45,7 @@ Scene yard(DVec3 at = DVec3(0.0)) {
   return scene;
 }
 
-TEST_F(VulkanMeshShadow, GoldenViewsAreThoseOfTheProcessor) {
+TEST_F(VulkanMeshShadow, GoldenViewsMatchCpu) {
   Scene scene = golden::terrain_scene();
   for (std::size_t type = 1; type < scene.types.size(); ++type) {
     VoxelProperties properties = scene.types[static_cast<VoxelType>(type)];
@@ -58,7 +58,7 @@ TEST_F(VulkanMeshShadow, GoldenViewsAreThoseOfTheProcessor) {
   }
 }
 
-TEST_F(VulkanMeshShadow, InstancesThrowThemOnOneAnother) {
+TEST_F(VulkanMeshShadow, ShadowsBetweenInstancesMatchCpu) {
   const Scene scene = yard();
   for (const DVec3 sun : {DVec3(1, 1.2, 0.5), DVec3(-0.8, 0.6, 1), DVec3(0.2, 3, -0.4)}) {
     RenderOptions options = with_mesh_light(sized(320, 180));
@@ -67,7 +67,7 @@ TEST_F(VulkanMeshShadow, InstancesThrowThemOnOneAnother) {
   }
 }
 
-TEST_F(VulkanMeshShadow, FarFromTheOriginAndOrthographicTheyAreTheSame) {
+TEST_F(VulkanMeshShadow, MatchesCpuFarFromOriginAndOrthographic) {
   const DVec3 far{1e9, -1e9, 1e9};
   const RenderOptions options = with_mesh_light(sized(320, 180));
   compare(yard(far), towards(far + DVec3(40, 45, 60), far + DVec3(0, 4, 5)), options, "yard_far");
@@ -77,7 +77,7 @@ TEST_F(VulkanMeshShadow, FarFromTheOriginAndOrthographicTheyAreTheSame) {
   compare(yard(), camera, options, "yard_orthographic");
 }
 
-TEST_F(VulkanMeshShadow, TheyAreAsLongAsTheyMayBe) {
+TEST_F(VulkanMeshShadow, EndsAtShadowDistance) {
   const Scene scene = yard();
   RenderOptions options = with_mesh_light(sized(320, 180));
   options.light.shadow_distance_voxels = 6.0;
@@ -85,7 +85,7 @@ TEST_F(VulkanMeshShadow, TheyAreAsLongAsTheyMayBe) {
 }
 
 // Points of a merged floor next to a wall lie on its edge and must not start rays inside the wall.
-TEST_F(VulkanMeshShadow, NothingIsDarkWhereAWallBegins) {
+TEST_F(VulkanMeshShadow, WallBaseHasNoFalseShadow) {
   Scene scene;
   const VoxelType stone = add_type(scene, {200, 200, 200});
   Grid grid;
@@ -139,7 +139,7 @@ TEST_F(VulkanMeshShadow, LampsShineOnMeshes) {
   EXPECT_GT(bytes_that_differ(lit, drawn(towards({40, 45, 60}, {0, 4, 5}), mesh_options(options)), 20), 5000);
 }
 
-TEST_F(VulkanMeshShadow, TheSkyAndAllLightFollowTheSun) {
+TEST_F(VulkanMeshShadow, SkyAndLightFollowSun) {
   const Scene scene = yard();
   RenderOptions options = with_mesh_light(sized(320, 180));
   environment_in(options).sky.model = SkyModel::Gradient;
@@ -151,7 +151,7 @@ TEST_F(VulkanMeshShadow, TheSkyAndAllLightFollowTheSun) {
 }
 
 // A slab over a plain, and a cliff behind a gentle slope: shadows equal those of blocks, without additional ones.
-TEST_F(VulkanMeshShadow, SmoothSurfacesHaveThemToo) {
+TEST_F(VulkanMeshShadow, SmoothSurfacesCastShadowsOfBlocks) {
   Scene scene;
   const VoxelType stone = add_type(scene, {200, 190, 170});
   Grid grid;
@@ -195,7 +195,7 @@ TEST_F(VulkanMeshShadow, SmoothSurfacesHaveThemToo) {
   EXPECT_EQ(on_slope, 0);
 }
 
-TEST_F(VulkanMeshShadow, TheyNeedTheVoxelsOfTheSameScene) {
+TEST_F(VulkanMeshShadow, RequiresVoxelsOfSameScene) {
   const Scene scene = yard();
   const Scene other = yard();
   ASSERT_TRUE(meshes_->update(scene));
@@ -221,7 +221,7 @@ TEST_F(VulkanMeshShadow, TheyNeedTheVoxelsOfTheSameScene) {
   EXPECT_TRUE(meshes_->draw(image, camera, options));
 }
 
-TEST_F(VulkanMeshShadow, EdgesAndValuesHaveNone) {
+TEST_F(VulkanMeshShadow, EdgesAndUnlitModesHaveNoShadows) {
   const Scene scene = yard();
   put(scene, blocky_surfaces(scene));
   const Camera camera = towards({40, 45, 60}, {0, 4, 5});

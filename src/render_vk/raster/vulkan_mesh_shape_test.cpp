@@ -52,7 +52,7 @@ Scene white_room(std::mt19937& random) {
   return scene;
 }
 
-TEST_F(VulkanMeshShape, MergedFacesHaveNoHolesBetweenThem) {
+TEST_F(VulkanMeshShape, MergedFacesHaveNoHoles) {
   const unsigned seed = 5;
   std::mt19937 random(seed);
   const Scene scene = white_room(random);
@@ -81,7 +81,7 @@ std::optional<DVec3> normal_at(const Camera& camera, int x, int y, DVec3 centre,
   return (at - centre) / radius;
 }
 
-TEST_F(VulkanMeshShape, SmoothSpheresHaveTheNormalsOfSpheres) {
+TEST_F(VulkanMeshShape, SmoothSpheresHaveSphereNormals) {
   Scene scene;
   const VoxelType stone = add_type(scene, {200, 60, 40});
   DensityGrid field;
@@ -117,7 +117,7 @@ TEST_F(VulkanMeshShape, SmoothSpheresHaveTheNormalsOfSpheres) {
 }
 
 // Sample (i, j, k) of a field is the point (i, j, k) of its grid, as in marched images.
-TEST_F(VulkanMeshShape, FieldsStandWhereTheirSamplesAre) {
+TEST_F(VulkanMeshShape, FieldsLieAtTheirSamples) {
   Scene scene;
   const VoxelType stone = add_type(scene, {200, 60, 40});
   SceneGrid grid;
@@ -179,7 +179,7 @@ Scene white_cube() {
   return scene;
 }
 
-TEST_F(VulkanMeshShape, WireframesShowEdgesWhereTheyAre) {
+TEST_F(VulkanMeshShape, WireframesShowEdgesInPlace) {
   const Scene scene = white_cube();
   put(scene, blocky_surfaces(scene));
   // Shifted by a quarter of a pixel, so that no edge runs between two pixels.
@@ -212,7 +212,7 @@ TEST_F(VulkanMeshShape, WireframesShowEdgesWhereTheyAre) {
   EXPECT_LE(std::min(diagonal, other_diagonal), 6) << "where they cross";
 }
 
-TEST_F(VulkanMeshShape, EdgesWinOverTheirSurfaces) {
+TEST_F(VulkanMeshShape, EdgesCoverTheirSurfaces) {
   // Only a floor of unmerged faces, so that no edge is hidden.
   Scene scene;
   const VoxelType white = add_type(scene, {255, 255, 255});

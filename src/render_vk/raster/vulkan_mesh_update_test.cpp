@@ -45,7 +45,7 @@ Camera before_boxes() {
   return towards({84, 40, 220}, {84, 20, 20});
 }
 
-TEST_F(VulkanMeshUpdate, SurfacesAreReplacedAndRemoved) {
+TEST_F(VulkanMeshUpdate, ReplacesAndRemovesSurfaces) {
   Scene scene = boxes();
   const RenderOptions options = without_shadows(sized(160, 90));
   compare(scene, before_boxes(), options, "two_boxes");
@@ -74,7 +74,7 @@ TEST_F(VulkanMeshUpdate, SurfacesAreReplacedAndRemoved) {
   EXPECT_EQ(meshes_->stats().bytes, 0U);
 }
 
-TEST_F(VulkanMeshUpdate, LastUpdateOfAChunkInACallCounts) {
+TEST_F(VulkanMeshUpdate, LastUpdateOfChunkApplies) {
   const Scene scene = boxes();
   const std::vector<SurfaceUpdate> right = blocky_surfaces(scene);
   SurfaceUpdate wrong = right[0];
@@ -113,7 +113,7 @@ TEST_F(VulkanMeshUpdate, InstancesFollowTheScene) {
   expect_current("no_grid");
 }
 
-TEST_F(VulkanMeshUpdate, InstancesAtTheEndOfNumbersDisturbNoOthers) {
+TEST_F(VulkanMeshUpdate, ExtremeInstancesDisturbNoOthers) {
   Scene scene = boxes();
   const GridHandle grid = blocky_surfaces(scene)[0].grid;
   for (const double far : {1e30, 1e150, 1e300, -1.7e308}) scene.add_instance({"", grid, {84, 40, far}});
@@ -160,7 +160,7 @@ TEST_F(VulkanMeshUpdate, ImagesTakeTheSizeOfEachDrawing) {
   }
 }
 
-TEST_F(VulkanMeshUpdate, CamerasInsideOfThingsSeeWhatIsBehindThem) {
+TEST_F(VulkanMeshUpdate, DrawsFromInsideAndNearFaces) {
   const Scene scene = boxes();
   put(scene, blocky_surfaces(scene));
   const MeshImageOptions options = mesh_options(without_shadows(sized(32, 32)));
@@ -170,7 +170,7 @@ TEST_F(VulkanMeshUpdate, CamerasInsideOfThingsSeeWhatIsBehindThem) {
   EXPECT_EQ(byte_at(near, 16, 16), byte_at(near, 2, 29));
 }
 
-TEST_F(VulkanMeshUpdate, TenThousandChunksComeAreReplacedAndGo) {
+TEST_F(VulkanMeshUpdate, AddsReplacesAndRemovesManyChunks) {
   Scene scene;
   add_type(scene, {200, 40, 40});
   const GridHandle grid = scene.add_grid({});
@@ -201,7 +201,7 @@ TEST_F(VulkanMeshUpdate, TenThousandChunksComeAreReplacedAndGo) {
   EXPECT_EQ(meshes_->stats().triangles, 0);
 }
 
-TEST_F(VulkanMeshUpdate, WrongSurfacesAreRefusedAndChangeNothing) {
+TEST_F(VulkanMeshUpdate, RejectsInvalidSurfacesWithoutChanges) {
   const Scene scene = boxes();
   std::vector<SurfaceUpdate> surfaces = blocky_surfaces(scene);
   put(scene, surfaces);
@@ -226,7 +226,7 @@ TEST_F(VulkanMeshUpdate, WrongSurfacesAreRefusedAndChangeNothing) {
   EXPECT_TRUE(meshes_->put(surfaces));
 }
 
-TEST_F(VulkanMeshUpdate, WrongImagesAreRefused) {
+TEST_F(VulkanMeshUpdate, RejectsInvalidImages) {
   const Scene scene = boxes();
   put(scene, blocky_surfaces(scene));
   VulkanImage image(*renderer_);
