@@ -222,7 +222,7 @@ std::map<std::string, int> read_limits() {
   return limits;
 }
 
-TEST(English, NoFileHasMoreHardPhrasesThanBefore) {
+TEST(English, KeepsHardPhrasesWithinLimits) {
   const Counted counted = count_all();
   const bool lowers = std::getenv("QUOIN_LOWER_ENGLISH_LIMITS") != nullptr;
   const std::map<std::string, int> limits = lowers && !fs::exists(kLimits) ? counted.lines : read_limits();
@@ -243,7 +243,7 @@ TEST(English, NoFileHasMoreHardPhrasesThanBefore) {
 }
 
 // Names that a reader could not guess, and that were replaced by the field's terms.
-TEST(English, OldNamesAreGone) {
+TEST(English, UsesNoOldNames) {
   const std::regex old(
       R"re(\b(losses_of_\w*|fault_of_\w*|files_read_beside|only_in_source|FieldOfMesh|SmoothPlaces|ChunkPlace|)re"
       R"re(PicturePoint|texture_places|has_place|displacement_to_free_place|carried_point|apart_from|)re"

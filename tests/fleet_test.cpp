@@ -15,7 +15,7 @@ namespace quoin {
 namespace {
 
 // The demo fleet has properties that no .vox file can hold: ships turned by any angle, with voxels of half a unit.
-TEST(Fleet, ItsImageFromTheWrittenFileIsTheOriginals) {
+TEST(Fleet, RendersAlikeAfterRoundTrip) {
   const auto fleet = demo::make_fleet();
   ASSERT_TRUE(fleet);
   const TestFolder folder("fleet");

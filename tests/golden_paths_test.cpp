@@ -53,7 +53,7 @@ Image taken(const PathView& view, const PathOptions& options, Threads threads = 
 
 class GoldenPaths : public ::testing::TestWithParam<PathView> {};
 
-TEST_P(GoldenPaths, ImageIsTheGoldenOneWithAnyInstructionsAndThreads) {
+TEST_P(GoldenPaths, MatchesGoldenImageWithAnyInstructionsAndThreads) {
   const PathView& view = GetParam();
   const Image usual = taken(view, options_of(view));
   if (const char* accept = std::getenv("QUOIN_ACCEPT_GOLDEN"); accept != nullptr && std::string(accept) == "1") {
@@ -66,7 +66,7 @@ TEST_P(GoldenPaths, ImageIsTheGoldenOneWithAnyInstructionsAndThreads) {
 }
 
 // Each golden image fails when its feature is switched off.
-TEST_P(GoldenPaths, AnImageWithoutBouncesLampsOrSunDiffers) {
+TEST_P(GoldenPaths, DiffersWithoutBouncesLampsOrSun) {
   const PathView& view = GetParam();
   const auto golden = read_png(golden_folders().golden / (std::string(view.name) + ".png"));
   ASSERT_TRUE(golden.has_value());

@@ -51,7 +51,7 @@ std::int64_t wrong_pixels(const RenderedImage& altered, const GoldenView& view) 
 
 class Golden : public ::testing::TestWithParam<GoldenView> {};
 
-TEST_P(Golden, ImageIsTheGoldenOne) {
+TEST_P(Golden, MatchesGoldenImage) {
   const GoldenView& view = GetParam();
   const RenderedImage image = render(terrain_scene(), view, options_for(view));
   if (const char* accept = std::getenv("QUOIN_ACCEPT_GOLDEN"); accept != nullptr && std::string(accept) == "1") {
@@ -61,7 +61,7 @@ TEST_P(Golden, ImageIsTheGoldenOne) {
   EXPECT_TRUE(is_golden(image.colour, view.name, golden_folders()));
 }
 
-TEST_P(Golden, ImageIsTheSameWithPlainInstructionsAndOneThread) {
+TEST_P(Golden, IsSameWithPlainInstructionsAndOneThread) {
   const GoldenView& view = GetParam();
   const Scene scene = terrain_scene();
   const RenderOptions options = options_for(view);
@@ -111,7 +111,7 @@ TEST(GoldenAltered, BoundaryViewFailsWithoutTheNeighbour) {
   EXPECT_GT(other_light, 100) << "of " << same_place;
 }
 
-TEST(GoldenComparer, WritesWhatDiffersWhenAPixelDoes) {
+TEST(GoldenComparer, WritesDifferenceImages) {
   const TestFolder folder("golden_comparer");
   const GoldenFolders folders{folder.file("golden"), folder.file("failures")};
   std::filesystem::create_directories(folders.golden);
@@ -131,7 +131,7 @@ TEST(GoldenComparer, WritesWhatDiffersWhenAPixelDoes) {
   EXPECT_FALSE(std::filesystem::exists(folders.failures / "a.actual.png")) << "the images of the failure are deleted";
 }
 
-TEST(GoldenComparer, NothingToCompareWithIsAFailure) {
+TEST(GoldenComparer, FailsWithoutComparableImage) {
   const TestFolder folder("golden_nothing");
   const GoldenFolders folders{folder.file("golden"), folder.file("failures")};
   std::filesystem::create_directories(folders.golden);

@@ -9,7 +9,7 @@
 namespace quoin {
 namespace {
 
-TEST(HalvedMesh, HasFewerFacesOfAboutTheSameAreaInTheSameBox) {
+TEST(HalvedMesh, HasFewerFacesOfSimilarArea) {
   VoxelRegistry types;
   const auto materials = add_terrain_types(types);
   ASSERT_TRUE(materials);

@@ -192,7 +192,7 @@ TEST(Layers, FindsForbiddenIncludes) {
   EXPECT_FALSE(forbidden_include("mesh", 2, "vector").has_value());
 }
 
-TEST(Layers, NoSourceIncludesUpwardsOrSideways) {
+TEST(Layers, SourcesIncludeOnlyLowerLayers) {
   int files = 0;
   for (const char* top : {"src", "include/quoin", "apps"}) {
     for (const Source& source : sources_of(top)) {
@@ -223,7 +223,7 @@ TEST(Layers, FindsForbiddenPrivateIncludes) {
   EXPECT_FALSE(forbidden_private_include("mesh", {"quoin/grid/grid.h", false}).has_value());
 }
 
-TEST(Layers, PrivateHeadersAreUsedInTheirLayerOrLent) {
+TEST(Layers, PrivateHeadersStayInLayerUnlessLent) {
   std::map<std::string, std::set<std::string>> users;
   for (const Source& source : sources_of("src")) {
     if (is_for_tests(source.file)) continue;
@@ -242,7 +242,7 @@ TEST(Layers, PrivateHeadersAreUsedInTheirLayerOrLent) {
 }
 
 // The other tests rely on this.
-TEST(Layers, IncludesAreFound) {
+TEST(Layers, FindsIncludes) {
   std::set<std::string> found;
   for (const Include& include : includes_of(__FILE__)) {
     EXPECT_FALSE(include.quoted) << include.path;
@@ -252,7 +252,7 @@ TEST(Layers, IncludesAreFound) {
   EXPECT_TRUE(found.contains("filesystem"));
 }
 
-TEST(Layers, TheHeaderOfEverythingIncludesEveryPublicHeader) {
+TEST(Layers, QuoinHeaderIncludesEveryPublicHeader) {
   const fs::path root = fs::path(QUOIN_SOURCE_DIR) / "include";
   std::set<std::string> included;
   for (const Include& include : includes_of(root / "quoin/quoin.h")) included.insert(include.path);
@@ -263,7 +263,7 @@ TEST(Layers, TheHeaderOfEverythingIncludesEveryPublicHeader) {
 }
 
 // Test sources are found by their names and compiled together; none may get lost.
-TEST(Layers, EverySourceOfTestsIsPartOfThisProgram) {
+TEST(Layers, ProgramContainsEveryTestSource) {
   std::set<fs::path> run;
   const testing::UnitTest& all = *testing::UnitTest::GetInstance();
   for (int i = 0; i < all.total_test_suite_count(); ++i) {
@@ -318,7 +318,7 @@ TEST(Layers, SmallHeadersWithoutASourceAreShared) {
 }
 
 // The path shows the folder of each header in use. Generated headers have no folder.
-TEST(Layers, PrivateHeadersAreNamedByTheirFullPath) {
+TEST(Layers, PrivateIncludesUseFullPaths) {
   const fs::path root = QUOIN_SOURCE_DIR;
   for (const Source& source : sources_of("src")) {
     for (const Include& include : source.includes) {
@@ -358,7 +358,7 @@ TEST(Layers, HasNoCyclesBetweenFolders) {
 }
 
 // The name of a header says whether only tests include it; other sources include no such header.
-TEST(Layers, TestHeadersSaySoByName) {
+TEST(Layers, TestHeadersHaveTestNames) {
   std::set<std::string> used;
   for (const char* top : {"src", "apps"}) {
     for (const Source& source : sources_of(top)) {

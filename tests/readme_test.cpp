@@ -74,15 +74,15 @@ int run_tool_commands(const std::string& page) {
   return commands;
 }
 
-TEST(Readme, EveryToolCommandWorks) {
+TEST(Readme, ToolCommandsWork) {
   EXPECT_GE(run_tool_commands("README.md"), 3);
 }
 
-TEST(Readme, EveryToolCommandOfTheCookbookWorks) {
+TEST(Readme, CookbookCommandsWork) {
   EXPECT_GE(run_tool_commands("docs/cookbook.md"), 30);
 }
 
-TEST(Readme, CodeOfThePagesIsFromExamples) {
+TEST(Readme, TakesCodeFromExamples) {
   std::string examples;
   for (const auto& entry : fs::directory_iterator(fs::path(QUOIN_SOURCE_DIR) / "examples")) {
     if (entry.path().extension() == ".cpp") examples += read_text(entry.path());
@@ -119,7 +119,7 @@ TEST(Readme, LinkTargetsExist) {
   EXPECT_GT(links, 100);
 }
 
-TEST(Readme, EveryDevCommandExists) {
+TEST(Readme, DevCommandsExist) {
   const std::string dev = read_text(fs::path(QUOIN_SOURCE_DIR) / "dev");
   for (const char* const page : kPages) {
     for (const std::string& line : shell_lines(page)) {

@@ -46,7 +46,7 @@ const VoxelProperties& type_at(const LoadedScene& loaded, IVec3 voxel) {
   return loaded.scene.types[first_grid(loaded).grid.get(voxel)];
 }
 
-TEST(MinecraftCases, OpensTheLayoutOf26) {
+TEST(MinecraftCases, OpensLayoutOf26) {
   for (const char* path : {"minecraft-26.1-layout", "minecraft-26.1-layout/level.dat"}) {
     const LoadedScene loaded = load_case(path);
     EXPECT_EQ(loaded.scene.voxel_count(), 8704) << path;
@@ -55,7 +55,7 @@ TEST(MinecraftCases, OpensTheLayoutOf26) {
   }
 }
 
-TEST(MinecraftCases, ReadsTheDimensionThatIsAskedFor) {
+TEST(MinecraftCases, ReadsRequestedDimension) {
   for (const char* name : {"nether", "minecraft:the_nether"}) {
     const LoadedScene loaded = load_case("minecraft-26.1-layout", {.dimension = name});
     EXPECT_EQ(loaded.dimension, "minecraft:the_nether");
@@ -79,7 +79,7 @@ TEST(MinecraftCases, ReadsSectionsWithoutLongs) {
   EXPECT_EQ(load_case("litematic-one-kind-no-longs.litematic").scene.voxel_count(), 64);
 }
 
-TEST(MinecraftCases, ReadsLinearRegionsOrSaysWhatIsMissing) {
+TEST(MinecraftCases, ReadsLinearRegionsOrNamesMissingLibrary) {
   const auto loaded = load_scene(case_file("minecraft-linear"));
   if (loaded) {
     EXPECT_EQ(loaded->scene.voxel_count(), 4352);
@@ -110,7 +110,7 @@ TEST(SchematicCases, BambooIsOpaqueAndYellow) {
   }
 }
 
-TEST(SchematicCases, InvisibleBlocksAreReportedAndLightShines) {
+TEST(SchematicCases, ReportsInvisibleBlocksAndKeepsLights) {
   const LoadedScene loaded = load_case("schem-barrier-light-vanish.schem");
   EXPECT_EQ(loaded.scene.voxel_count(), 1);
   for (const char* name : {"1 minecraft:barrier", "1 minecraft:light", "1 minecraft:structure_void"}) {
@@ -129,7 +129,7 @@ TEST(VoxCases, ReadsPalettesOfFewerColours) {
   EXPECT_EQ(type.colour, (Rgba8{255, 0, 0, 255}));
 }
 
-TEST(VoxCases, IgnoresContentThatMainDoesNotHave) {
+TEST(VoxCases, IgnoresContentClaimedByMain) {
   LoadedScene loaded = load_case("vox-main-claims-8-bytes-of-content.vox");
   EXPECT_EQ(loaded.scene.voxel_count(), 1);
   EXPECT_TRUE(has_warning(loaded, "MAIN claims 8 bytes of content"));
@@ -141,7 +141,7 @@ TEST(VoxCases, IgnoresContentThatMainDoesNotHave) {
   EXPECT_TRUE(again->warnings.empty()) << again->warnings.front();
 }
 
-TEST(QubicleCases, TheZAxisDoesNotMirror) {
+TEST(QubicleCases, ZAxisFlagDoesNotMirror) {
   const LoadedScene left = load_case("qb-letter-F-zaxis0.qb");
   const LoadedScene right = load_case("qb-letter-F-zaxis1.qb");
   EXPECT_EQ(left.scene.bounds().min, right.scene.bounds().min);
@@ -175,7 +175,7 @@ TEST(BinvoxCases, BecomesVoxWithoutItsScale) {
   EXPECT_EQ(vox_unsupported_features(loaded).value(), written->warnings);
 }
 
-TEST(NrrdCases, ReadsBzip2OrSaysWhatIsMissing) {
+TEST(NrrdCases, ReadsBzip2OrNamesMissingLibrary) {
   const auto volume = read_volume(case_file("nrrd-bzip2.nrrd"));
   if (volume) {
     EXPECT_EQ(volume->values, read_volume(case_file("nrrd-detached-gzip.nhdr"))->values);
@@ -211,12 +211,12 @@ std::int64_t voxels_of(const char* name, double voxel_size, SolidVoxels solid = 
   return load_case(name, options).scene.voxel_count();
 }
 
-TEST(TriangleCases, FacesBetweenVoxelsAddNone) {
+TEST(TriangleCases, FacesBetweenVoxelsAddNoVoxels) {
   EXPECT_EQ(voxels_of("obj-cube-on-lattice.obj", 1.0), 64);
   EXPECT_EQ(voxels_of("obj-cube-through-centres.obj", 1.0), 64);
 }
 
-TEST(TriangleCases, PolygonsAreCutAsTheyAre) {
+TEST(TriangleCases, VoxelizesConcavePolygonsExactly) {
   // A square of 4 with a hole of 2, and a star: each voxel whose centre lies in the polygon counts. The square without
   // its hole has the area 12, 30,000 voxels of 0.02 x 0.02. The star has the area 4.702282 by the shoelace formula, of
   // the corners in the file; that is 11,755.7 voxels. Counting the centres within by the even-odd rule gives 11,758.
@@ -234,7 +234,7 @@ TEST(TriangleCases, ReadsFilesOfOtherPrograms) {
   }
 }
 
-TEST(TriangleCases, ModelsThatAreAllInvisibleAreOpaque) {
+TEST(TriangleCases, ReadsFullyTransparentModelsAsOpaque) {
   const LoadedScene loaded = load_case("obj-tr-1.obj");
   EXPECT_TRUE(has_warning(loaded, "fully transparent"));
   const VoxelProperties& type = type_at(loaded, first_grid(loaded).grid.bounds().min);
@@ -242,7 +242,7 @@ TEST(TriangleCases, ModelsThatAreAllInvisibleAreOpaque) {
   EXPECT_EQ(type.visibility, Visibility::Opaque);
 }
 
-TEST(TriangleCases, StlFilesOfOtherLengthsAreReadOrRefusedWithTheReason) {
+TEST(TriangleCases, ReadsLongStlAndRefusesCutStl) {
   const auto mesh = read_mesh(case_file("stl-trailing-bytes.stl"));
   ASSERT_TRUE(mesh) << to_string(mesh.error());
   EXPECT_EQ(mesh->mesh.triangles.size(), 1U);
@@ -269,7 +269,7 @@ TEST(GoxelCases, ReadsShapeLayers) {
 }
 
 // A file of 15 bytes promises 65,535 names: the reader looks up none of them.
-TEST(LuantiCases, RefusesNamesThatAreCutOff) {
+TEST(LuantiCases, RefusesCutOffNames) {
   const auto loaded = load_scene(case_file("mts-names-cut-off.mts"));
   ASSERT_FALSE(loaded);
   EXPECT_EQ(loaded.error().message, "the file ends before its nodes");
@@ -277,7 +277,7 @@ TEST(LuantiCases, RefusesNamesThatAreCutOff) {
 }
 
 // Its width is 0, with 38,400 x 65,280 rows.
-TEST(LuantiCases, RefusesASchematicWithoutNodes) {
+TEST(LuantiCases, RefusesSchematicWithoutNodes) {
   const auto loaded = load_scene(case_file("mts-no-width.mts"));
   ASSERT_FALSE(loaded);
   EXPECT_EQ(loaded.error().message, "invalid size: 0 x 38400 x 65280 nodes");

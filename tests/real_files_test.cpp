@@ -105,7 +105,7 @@ bool compare(const std::string& file, const std::string& info, const LoadedScene
   return is_known;
 }
 
-TEST(RealFiles, AreReadAsOthersReadThemOrRefusedInALine) {
+TEST(RealFiles, MatchOtherReadersOrFailInOneLine) {
   if (!fs::exists(kData / "index.json")) GTEST_SKIP() << "the collection of real files is not here: " << kData;
   std::ifstream index(kData / "index.json");
   std::map<std::string, std::array<int, 3>> counts;  // by folder: read, of these compared, refused

@@ -285,13 +285,13 @@ void expect_like_the_traced_image(const SmallModel& model, const Views& views = 
   }
 }
 
-TEST(SmallImpostors, LookLikeTheTracedImage) {
+TEST(SmallImpostors, LookLikeTracedImage) {
   for (const Source& source : made_models()) {
     expect_like_the_traced_image(SmallModel(source.name, source.make()));
   }
 }
 
-TEST(SmallImpostors, RealFilesLookLikeTheTracedImage) {
+TEST(SmallImpostors, RealFilesLookLikeTracedImage) {
   if (!std::filesystem::exists(folder_of_files())) GTEST_SKIP() << "without the real files";
   for (const char* name : kFiles) {
     auto loaded = load_scene(folder_of_files() / name);
@@ -334,7 +334,7 @@ Changes changes_of(const SmallModel& model, int direction, double from_pixels, d
 }
 
 // Covers every threshold between two levels, in windows of 45 steps.
-TEST(SmallImpostors, ChangeAtMostTwiceAsMuchAsTheTracedImageAsTheDistanceDoes) {
+TEST(SmallImpostors, ChangeAtMostTwiceAsTracedImage) {
   const bool is_nightly = std::getenv("QUOIN_NIGHTLY") != nullptr;
   for (const Source& source : made_models()) {
     const SmallModel model(source.name, source.make());

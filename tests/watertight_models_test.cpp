@@ -16,7 +16,7 @@ namespace quoin {
 namespace {
 
 // Tests every model of the real files, which lie next to the source tree on some machines.
-TEST(WatertightModels, EveryRealModelIsWatertight) {
+TEST(WatertightModels, RealModelsAreWatertight) {
   const std::filesystem::path folder = std::filesystem::path(QUOIN_SOURCE_DIR) / ".." / "shared" / "data" / "vox";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << "the collection of real files is not here: " << folder;
   BlockyMeshOptions options;
@@ -49,7 +49,7 @@ void expect_manifold_by_places(const MeshView& view) {
   EXPECT_EQ(count.crowded_edges, 0) << count;
 }
 
-TEST(WatertightModels, EveryRealModelHasASmoothSurfaceThatIsAManifold) {
+TEST(WatertightModels, RealModelsHaveManifoldSmoothSurfaces) {
   const std::filesystem::path folder = std::filesystem::path(QUOIN_SOURCE_DIR) / ".." / "shared" / "data" / "vox";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << "the collection of real files is not here: " << folder;
   int models = 0;
