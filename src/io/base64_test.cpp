@@ -12,7 +12,7 @@ std::string text_of(std::string_view bytes) {
   return to_base64(std::as_bytes(std::span(bytes)));
 }
 
-TEST(Base64, IsThatOfTheStandard) {  // RFC 4648, section 10
+TEST(Base64, EncodesRfc4648Examples) {  // RFC 4648, section 10
   EXPECT_EQ(text_of(""), "");
   EXPECT_EQ(text_of("f"), "Zg==");
   EXPECT_EQ(text_of("fo"), "Zm8=");
@@ -22,7 +22,7 @@ TEST(Base64, IsThatOfTheStandard) {  // RFC 4648, section 10
   EXPECT_EQ(text_of("foobar"), "Zm9vYmFy");
 }
 
-TEST(Base64, AnyBytesComeBack) {
+TEST(Base64, RoundTripsAnyBytes) {
   std::mt19937 random(3);
   for (std::size_t size = 0; size < 300; ++size) {
     std::vector<std::byte> bytes(size);
@@ -33,7 +33,7 @@ TEST(Base64, AnyBytesComeBack) {
   }
 }
 
-TEST(Base64, RefusesDamageWithItsPosition) {
+TEST(Base64, ReportsPositionOfDamage) {
   const auto fault = [](std::string_view text) {
     const auto bytes = from_base64(text);
     return bytes ? std::string("none") : to_string(bytes.error());

@@ -71,7 +71,7 @@ TEST(ChunkSource, KeepsRecentlyReadParts) {
   EXPECT_EQ(source.reads(), kParts + 1) << "the oldest part is not";
 }
 
-TEST(ChunkSource, KeepsPartsThatAreUsedAgain) {
+TEST(ChunkSource, KeepsReusedParts) {
   constexpr int kParts = 200;
   const CountedSource source(kParts);
   for (int x = 1; x < kParts; ++x) {
@@ -81,7 +81,7 @@ TEST(ChunkSource, KeepsPartsThatAreUsedAgain) {
   EXPECT_EQ(source.reads(), kParts);
 }
 
-TEST(ChunkSource, TakesAnyRadiusAroundTheSpawn) {
+TEST(ChunkSource, SelectsChunksAroundSpawn) {
   ChunkSourceInfo info;
   info.chunks = {{-5, -1, 0}, {20, 1, 1}};
   info.spawn = DVec3(130.0, 0.0, 3.0);
@@ -115,7 +115,7 @@ class FailingSource final : public ChunkSource {
   mutable std::atomic<int> reads_{0};
 };
 
-TEST(ChunkSource, ReadsAPartAgainAfterAnException) {
+TEST(ChunkSource, RereadsPartAfterException) {
   const FailingSource source(2);
   EXPECT_THROW(static_cast<void>(source.read({0, 0, 0})), std::runtime_error);
   EXPECT_FALSE(source.read({0, 0, 0}));
@@ -123,7 +123,7 @@ TEST(ChunkSource, ReadsAPartAgainAfterAnException) {
   EXPECT_EQ(source.reads(), 3);
 }
 
-TEST(ChunkSource, WaitingThreadsReadAPartAfterAnException) {
+TEST(ChunkSource, WaitingThreadsRereadPartAfterException) {
   constexpr int kFailures = 3;
   const FailingSource source(kFailures);
   std::atomic<int> failed{0};
@@ -142,7 +142,7 @@ TEST(ChunkSource, WaitingThreadsReadAPartAfterAnException) {
   EXPECT_EQ(source.reads(), kFailures + 1);
 }
 
-TEST(ChunkSource, ReadsAPartOnceForManyThreads) {
+TEST(ChunkSource, ReadsPartOnceForManyThreads) {
   const CountedSource source(20);
   parallel_for(200, Threads{4}, [&](std::size_t i) {
     const auto chunk = source.read({static_cast<int>(i / 10), 0, 0});

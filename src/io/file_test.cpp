@@ -51,7 +51,7 @@ TEST_F(FileTest, RoundTrips) {
   EXPECT_EQ(entries(), 1U);
 }
 
-TEST_F(FileTest, WithoutCommitTheOldFileStays) {
+TEST_F(FileTest, KeepsOldFileWithoutCommit) {
   const fs::path path = folder_ / "a";
   ASSERT_TRUE(write_file(bytes_in("old"), path));
   {
@@ -76,7 +76,7 @@ TEST_F(FileTest, KeepsPermissionsAndSymbolicLinks) {
   EXPECT_EQ(fs::status(target).permissions(), fs::perms::owner_all | fs::perms::others_read);
 }
 
-TEST_F(FileTest, RefusesFoldersDevicesAndPathsThatAreNotThere) {
+TEST_F(FileTest, RefusesFoldersDevicesAndMissingPaths) {
   for (const fs::path& path : {folder_, fs::path("/dev/null"), folder_ / "no" / "such", fs::path("")}) {
     const Status written = write_file(bytes_in("x"), path);
     ASSERT_FALSE(written) << path;
@@ -96,7 +96,7 @@ TEST_F(FileTest, DoesNotWaitForAFifo) {
   EXPECT_FALSE(write_file(bytes_in("x"), fifo));
 }
 
-TEST_F(FileTest, ABackupKeepsWhatWasReplaced) {
+TEST_F(FileTest, BackupKeepsReplacedFile) {
   const fs::path path = folder_ / "world.vox";
   const fs::path backup_path = folder_ / "world.vox~";
   {
@@ -124,7 +124,7 @@ TEST_F(FileTest, ABackupKeepsWhatWasReplaced) {
   EXPECT_EQ(entries(), 2U);
 }
 
-TEST_F(FileTest, ABackupReplacesNoFolderAndFollowsLinks) {
+TEST_F(FileTest, BackupSparesFoldersAndFollowsLinks) {
   const fs::path path = folder_ / "a";
   ASSERT_TRUE(write_file(bytes_in("kept"), path));
   fs::create_directory(folder_ / "a~");
@@ -141,7 +141,7 @@ TEST_F(FileTest, ABackupReplacesNoFolderAndFollowsLinks) {
   EXPECT_EQ(content(folder_ / "a~"), "kept");
 }
 
-TEST_F(FileTest, ABackupThatIsToStayHasItsName) {
+TEST_F(FileTest, NumbersKeptBackups) {
   const fs::path path = folder_ / "a";
   for (const char* version : {"first", "second", "third"}) {
     ASSERT_TRUE(write_file(bytes_in(version), path));
@@ -154,7 +154,7 @@ TEST_F(FileTest, ABackupThatIsToStayHasItsName) {
   EXPECT_EQ(FileBackup::name_for(folder_ / "nothing"), fs::path());
 }
 
-TEST_F(FileTest, AMoveCarriesTheFileAlong) {
+TEST_F(FileTest, CommitsMovedFile) {
   const fs::path path = folder_ / "a";
   auto first = AtomicFile::create(path);
   ASSERT_TRUE(first);

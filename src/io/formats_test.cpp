@@ -23,14 +23,14 @@ Error error_of(const TestFolder& folder, const std::string& name, const std::str
   return loaded ? Error{} : loaded.error();
 }
 
-TEST(Formats, ContentDecidesTheInputFormat) {
+TEST(Formats, DetectsInputFormatByContent) {
   EXPECT_EQ(detect_format(bytes_of("VOX \x96")), FileFormat::Vox);
   EXPECT_EQ(detect_format(bytes_of("VOX")), std::nullopt);
   EXPECT_EQ(detect_format(bytes_of("glTF")), FileFormat::Glb);
   EXPECT_EQ(detect_format(std::span<const std::byte>()), std::nullopt);
 }
 
-TEST(Formats, BytesOfSceneFilesAreReadAsTheirFilesAre) {
+TEST(Formats, LoadsSceneFilesFromBytes) {
   SceneFile file;
   file.grids.emplace_back();
   file.grids[0].grid.set({1, 2, 3}, *file.types.add({}));
@@ -47,7 +47,7 @@ TEST(Formats, BytesOfSceneFilesAreReadAsTheirFilesAre) {
   }
 }
 
-TEST(Formats, NamesDecideTheOutputFormat) {
+TEST(Formats, SelectsOutputFormatByExtension) {
   EXPECT_EQ(format_for_writing("a/b.GLB")->format, FileFormat::Glb);
   EXPECT_EQ(format_for_writing("b.gltf")->format, FileFormat::Gltf);
   EXPECT_EQ(format_for_writing("b.obj")->format, FileFormat::Obj);
@@ -67,7 +67,7 @@ TEST(Formats, NamesDecideTheOutputFormat) {
   }
 }
 
-TEST(Formats, StemsLeaveOutWhatIsWithinGzip) {
+TEST(Formats, StripsGzipAndInnerExtension) {
   for (const auto& [name, stem] : {std::pair("a/castle.vox", "castle"),
                                    {"scan.nii.gz", "scan"},
                                    {"SCAN.NII.GZ", "SCAN"},
@@ -81,7 +81,7 @@ TEST(Formats, StemsLeaveOutWhatIsWithinGzip) {
   }
 }
 
-TEST(Formats, RawValuesAreAVolumeWhereOptionsSayHowMany) {
+TEST(Formats, LoadsRawVolumeOfGivenSize) {
   std::string values(4 * 4 * 4, '\0');
   values[21] = values[22] = '\x50';
   LoadOptions options;
@@ -99,7 +99,7 @@ TEST(Formats, RawValuesAreAVolumeWhereOptionsSayHowMany) {
   EXPECT_EQ(short_of_values.error().path, folder.file("four.dat").string());
 }
 
-TEST(Formats, FilesOfNoKnownFormatAreRefusedWithTheReason) {
+TEST(Formats, ReportsReasonForUnreadableFiles) {
   const TestFolder folder("formats");
   EXPECT_EQ(error_of(folder, "a.txt", "hello").code, ErrorCode::BadFormat);
   EXPECT_NE(error_of(folder, "a.vox", "").message.find("empty"), std::string::npos);

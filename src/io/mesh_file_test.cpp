@@ -119,7 +119,7 @@ glm::dmat4 random_placement(std::mt19937& random, bool mirrored) {
   return glm::scale(matrix, DVec3(mirrored ? -scale : scale, scale, scale));
 }
 
-TEST_F(SmoothMeshFiles, EveryFormatPutsVerticesWhereThePlacementSays) {
+TEST_F(SmoothMeshFiles, PlacesVerticesInEveryFormat) {
   const std::uint32_t seed = std::random_device{}();
   SCOPED_TRACE("seed " + std::to_string(seed));
   std::mt19937 random(seed);
@@ -129,7 +129,7 @@ TEST_F(SmoothMeshFiles, EveryFormatPutsVerticesWhereThePlacementSays) {
   expect_all_formats_agree();
 }
 
-TEST_F(SmoothMeshFiles, ShearAndUnevenScaleKeepNormalsAndOutside) {
+TEST_F(SmoothMeshFiles, KeepsNormalsUnderShearAndUnevenScale) {
   glm::dmat4 sheared(1.0);
   sheared[1].x = 0.7;
   place(sheared);
@@ -143,13 +143,13 @@ TEST_F(SmoothMeshFiles, ShearAndUnevenScaleKeepNormalsAndOutside) {
   EXPECT_EQ(glb.document["nodes"][3]["scale"], nlohmann::json({0.5, 2.0, 3.0}));
 }
 
-TEST_F(SmoothMeshFiles, TinyUnitsAreNoReasonToRefuse) {
+TEST_F(SmoothMeshFiles, AcceptsTinyUnits) {
   place(glm::scale(glm::dmat4(1.0), DVec3(1e-6)));
   place(glm::scale(glm::dmat4(1.0), DVec3(-1e-9, 1e-9, 1e-9)));
   expect_all_formats_agree();
 }
 
-TEST_F(SmoothMeshFiles, PlacementsShareAMeshAndMirroredOnesAnother) {
+TEST_F(SmoothMeshFiles, SharesOneMeshPerHandedness) {
   place(glm::dmat4(1.0), "first");
   place(glm::translate(glm::dmat4(1.0), DVec3(0, 9, 0)));
   place(glm::scale(glm::dmat4(1.0), DVec3(-1, 1, 1)));
@@ -165,7 +165,7 @@ TEST_F(SmoothMeshFiles, PlacementsShareAMeshAndMirroredOnesAnother) {
   expect_all_formats_agree();
 }
 
-TEST_F(SmoothMeshFiles, ColoursAreAlbedoDarkenedByOcclusion) {
+TEST_F(SmoothMeshFiles, MultipliesAlbedoByOcclusion) {
   place(glm::dmat4(1.0));
   const SmoothMesh& mesh = parts_[0].mesh;
   for (const Format& format : kFormats) {
@@ -189,7 +189,7 @@ TEST_F(SmoothMeshFiles, ColoursAreAlbedoDarkenedByOcclusion) {
   EXPECT_EQ(write(kFormats[1]).colours[1][1], 188 / 255.0) << "half of the light is 188 in sRGB";
 }
 
-TEST_F(SmoothMeshFiles, AGlbHasWhatTheSpecificationAsksFor) {
+TEST_F(SmoothMeshFiles, WritesValidGlb) {
   place(glm::dmat4(1.0));
   const ParsedGlb glb = write_glb_file();
   const auto& primitive = glb.document["meshes"][0]["primitives"][0];
@@ -208,7 +208,7 @@ TEST_F(SmoothMeshFiles, AGlbHasWhatTheSpecificationAsksFor) {
   EXPECT_EQ(glb.binary.size() % 4, 0U);
 }
 
-TEST_F(SmoothMeshFiles, IndicesTake16BitsAsLongAsNoneIsTheRestartValue) {
+TEST_F(SmoothMeshFiles, Uses16BitIndicesBelowRestartValue) {
   for (const std::size_t vertices : {65'534U, 65'535U, 65'536U}) {
     SmoothMesh mesh = test_mesh();
     mesh.positions.resize(vertices, Vec3(0.0F));
@@ -225,7 +225,7 @@ TEST_F(SmoothMeshFiles, IndicesTake16BitsAsLongAsNoneIsTheRestartValue) {
   }
 }
 
-TEST_F(SmoothMeshFiles, GltfIsTheSameInTwoFiles) {
+TEST_F(SmoothMeshFiles, GltfWithBinFileMatchesGlb) {
   place(glm::dmat4(1.0));
   const auto path = folder_.file("a b.gltf");
   const SceneMeshes meshes = meshes_of(parts_);
@@ -243,7 +243,7 @@ TEST_F(SmoothMeshFiles, GltfIsTheSameInTwoFiles) {
   EXPECT_EQ(read_file(folder_.file("a b.bin")).value(), glb.binary);
 }
 
-TEST_F(SmoothMeshFiles, NothingToDrawIsAValidFile) {
+TEST_F(SmoothMeshFiles, WritesValidEmptyFiles) {
   parts_ = {{"empty", {}, {}, {}}};
   for (const Format& format : kFormats) EXPECT_TRUE(write(format).positions.empty()) << format.extension;
   const ParsedGlb glb = write_glb_file();
@@ -255,7 +255,7 @@ TEST_F(SmoothMeshFiles, NothingToDrawIsAValidFile) {
   EXPECT_NE(ply.find("element vertex 0\n"), std::string::npos);
 }
 
-TEST_F(SmoothMeshFiles, ObjectsOfObjHaveNamesThatDiffer) {
+TEST_F(SmoothMeshFiles, WritesUniqueObjNames) {
   place(glm::dmat4(1.0), "a b");
   place(glm::dmat4(1.0), "a b");
   place(glm::dmat4(1.0));
@@ -264,7 +264,7 @@ TEST_F(SmoothMeshFiles, ObjectsOfObjHaveNamesThatDiffer) {
   for (const char* line : {"\no a_b\n", "\no a_b_2\n", "\no thing\n"}) EXPECT_NE(text.find(line), std::string::npos);
 }
 
-TEST_F(SmoothMeshFiles, UnsoundInputIsRefusedAndLeavesNoFile) {
+TEST_F(SmoothMeshFiles, RefusesUnsoundInputWithoutFile) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   std::vector<std::pair<std::string, TestPart>> wrong;
   const auto add = [&](const std::string& message, const std::function<void(TestPart&)>& spoil) {
@@ -304,7 +304,7 @@ TEST_F(SmoothMeshFiles, UnsoundInputIsRefusedAndLeavesNoFile) {
   }
 }
 
-TEST_F(SmoothMeshFiles, CancellingLeavesTheOldFile) {
+TEST_F(SmoothMeshFiles, CancellingKeepsOldFile) {
   place(glm::dmat4(1.0));
   for (const Format& format : kFormats) {
     const auto path = folder_.file(std::string("old") + format.extension);
@@ -317,7 +317,7 @@ TEST_F(SmoothMeshFiles, CancellingLeavesTheOldFile) {
   EXPECT_EQ(folder_.count(), kFormats.size());
 }
 
-TEST_F(SmoothMeshFiles, AFolderThatIsNotThereIsAnError) {
+TEST_F(SmoothMeshFiles, ReportsMissingFolder) {
   place(glm::dmat4(1.0));
   for (const Format& format : kFormats) {
     const auto refused = write_mesh(meshes_of(parts_), folder_.file(std::string("none/out") + format.extension));
@@ -326,7 +326,7 @@ TEST_F(SmoothMeshFiles, AFolderThatIsNotThereIsAnError) {
   }
 }
 
-TEST_F(SmoothMeshFiles, APlacementOfNothingIsANodeWithoutAMesh) {
+TEST_F(SmoothMeshFiles, WritesEmptyPartAsNodeWithoutMesh) {
   parts_ = {{"empty", {}, {}, {{"here", glm::translate(glm::dmat4(1.0), DVec3(1, 2, 3))}}}};
   for (const Format& format : kFormats) {
     if (format.format == FileFormat::Glb) continue;
@@ -339,7 +339,7 @@ TEST_F(SmoothMeshFiles, APlacementOfNothingIsANodeWithoutAMesh) {
 }
 
 /// Writes blocks and a smooth mesh in one file.
-TEST(MeshFiles, HoldBlocksAndSmoothMeshesSideBySide) {
+TEST(MeshFiles, CombinesBlocksAndSmoothMeshes) {
   Scene scene;
   place(scene, add_asymmetric_grid(scene, "L"), {});
   SceneMeshes meshes = mesh_scene(scene).value();
@@ -361,7 +361,7 @@ TEST(MeshFiles, HoldBlocksAndSmoothMeshesSideBySide) {
   EXPECT_EQ(folder.count(), 3U) << "palette and materials of the blocks";
 }
 
-TEST(MeshFiles, HoldSurfacesOfArraysAndOfLabels) {
+TEST(MeshFiles, HoldsArrayAndLabelSurfaces) {
   // Two balls that touch, in an array of labels.
   constexpr int kEdge = 16;
   std::vector<std::uint8_t> labels(std::size_t{kEdge} * kEdge * kEdge);
@@ -412,7 +412,7 @@ std::vector<float> ply_occlusion(const std::vector<std::byte>& bytes, std::size_
   return found;
 }
 
-TEST(MeshFiles, OcclusionIsAnAttributeOfItsOwnWhereThatIsWanted) {
+TEST(MeshFiles, WritesOcclusionAttributeOnRequest) {
   Scene scene;
   const VoxelType grey = add_type(scene, "grey", {120, 120, 120, 255});
   SceneGrid grid;
@@ -464,7 +464,7 @@ TEST(MeshFiles, OcclusionIsAnAttributeOfItsOwnWhereThatIsWanted) {
             std::vector<float>(both.size(), 1.0F));
 }
 
-TEST(MeshFiles, BlocksThatDoNotHangTogetherAreRefused) {
+TEST(MeshFiles, RefusesInconsistentBlocks) {
   Scene scene;
   const GridHandle grid = add_asymmetric_grid(scene, "L");
   const TestFolder folder("blocky_unsound");
@@ -491,7 +491,7 @@ TEST(MeshFiles, BlocksThatDoNotHangTogetherAreRefused) {
   EXPECT_TRUE(refuses([](BlockyTriangles& t) { t.positions[0].y = std::numeric_limits<float>::infinity(); }));
 }
 
-TEST(MeshFiles, TypesThatAreNotRegisteredAreRefused) {
+TEST(MeshFiles, RefusesUnregisteredTypes) {
   for (const VoxelType type : std::array<VoxelType, 5>{3, 255, 256, 300, 65535}) {
     Scene scene;
     const GridHandle grid = add_asymmetric_grid(scene, "L");
@@ -503,7 +503,7 @@ TEST(MeshFiles, TypesThatAreNotRegisteredAreRefused) {
   }
 }
 
-TEST(MeshFiles, APlacementOfNoPartIsRefused) {
+TEST(MeshFiles, RefusesPlacementOfMissingPart) {
   SceneMeshes meshes;
   meshes.placements.push_back({1, "lost", Similarity{}});
   const auto refused = write_mesh(meshes, FileFormat::Ply);
@@ -511,7 +511,7 @@ TEST(MeshFiles, APlacementOfNoPartIsRefused) {
   EXPECT_EQ(refused.error().message, "placement \"lost\" has a part that does not exist");
 }
 
-TEST(MeshFiles, TheFormatIsThePathSOrTheOptionS) {
+TEST(MeshFiles, SelectsFormatByOptionOrPath) {
   const TestFolder folder("mesh_file_format");
   EXPECT_TRUE(write_mesh({}, folder.file("image"), {.format = FileFormat::Ply}));
   for (const char* name : {"out.png", "out.vox", "out"}) {
@@ -537,7 +537,7 @@ Volume ball(IVec3 size, DVec3 centre, double radius) {
   return volume;
 }
 
-TEST(MeshFiles, ABallInAVolumeIsOneAndLiesWhereTheVolumeSays) {
+TEST(MeshFiles, MeshesBallWhereVolumePlacesIt) {
   for (const double x_axis : {2.0, -2.0}) {
     Volume volume = ball({70, 30, 28}, {40, 15, 13}, 10);
     volume.world_from_voxel = glm::dmat4{{x_axis, 0, 0, 0}, {0, 0, 3, 0}, {0, 1, 0, 0}, {100, 50, 20, 1}};
@@ -553,17 +553,17 @@ TEST(MeshFiles, ABallInAVolumeIsOneAndLiesWhereTheVolumeSays) {
   }
 }
 
-TEST(MeshMistakes, SingularTransformsAreFound) {
+TEST(MeshFileDeathTest, AssertsOnSingularTransforms) {
   QUOIN_EXPECT_MISTAKE((void)VertexTransform(glm::dmat4(0.0), DVec3(0.0)), "not singular");
 }
 
-TEST(MeshMistakes, LayoutsOfUnsoundMeshesAreFound) {
+TEST(MeshFileDeathTest, AssertsOnUnsoundMeshes) {
   SceneMeshes meshes;
   meshes.placements.emplace_back();
   QUOIN_EXPECT_MISTAKE((void)lay_out_gltf(meshes), "sound meshes");
 }
 
-TEST(MeshMistakes, MaterialsOfTypesWithoutATriangleAreFound) {
+TEST(MeshFileDeathTest, AssertsOnTypesWithoutTriangles) {
   const SceneMeshes meshes;
   const MaterialPalette palette(meshes);
   QUOIN_EXPECT_MISTAKE((void)palette.material_of(SurfaceClass::Opaque, 0), "that the meshes have");

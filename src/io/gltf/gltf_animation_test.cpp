@@ -105,7 +105,7 @@ std::optional<std::size_t> node_named(const Json& document, const std::string& n
   return std::nullopt;
 }
 
-TEST_F(GltfAnimation, ModelsComeAndGoAndWhatStandsHasNoChannels) {
+TEST_F(GltfAnimation, AnimatesVisibilityAndSkipsStaticNodes) {
   const SceneAnimation animation = animation_of(film());
   EXPECT_EQ(animation.frame_count(), 6U);
   const ParsedGlb glb = written(animation, 4.0);
@@ -165,7 +165,7 @@ void expect_same_places(const std::vector<std::byte>& file, const SceneAnimation
   }
 }
 
-TEST_F(GltfAnimation, EveryFrameIsThatFrame) {
+TEST_F(GltfAnimation, MatchesFileAtEveryFrame) {
   vox_test::FileBuilder builder;
   std::mt19937 random(7);
   const auto number = [&](int most) { return static_cast<int>(random() % static_cast<unsigned>(most)); };
@@ -192,7 +192,7 @@ TEST_F(GltfAnimation, EveryFrameIsThatFrame) {
   expect_same_places(file, animation, written(animation, 10.0));
 }
 
-TEST_F(GltfAnimation, QuantizedAndCompressedNodesMoveAlike) {
+TEST_F(GltfAnimation, MovesPackedNodesLikePlainNodes) {
   const SceneAnimation animation = animation_of(film());
   const ParsedGlb plain = written(animation, 10.0);
   for (const MeshFileOptions options :
@@ -212,7 +212,7 @@ TEST_F(GltfAnimation, QuantizedAndCompressedNodesMoveAlike) {
   }
 }
 
-TEST_F(GltfAnimation, ScaledFilesMoveFurther) {
+TEST_F(GltfAnimation, ScalesMotion) {
   const SceneAnimation animation = animation_of(film());
   const ParsedGlb glb = written(animation, 10.0, {.scale = 0.5});
   const std::size_t bird = node_named(glb.document, "bird").value();
@@ -222,7 +222,7 @@ TEST_F(GltfAnimation, ScaledFilesMoveFurther) {
   EXPECT_EQ(node_at(glb, walker, 0.25).scale, DVec3(0.0));
 }
 
-TEST_F(GltfAnimation, WithoutASceneGraphModelsAreTheFrames) {
+TEST_F(GltfAnimation, TreatsModelsAsFramesWithoutSceneGraph) {
   vox_test::FileBuilder builder;
   for (std::uint8_t i = 1; i <= 3; ++i) builder.model(1, 1, i, {{0, 0, 0, i}});
   const auto file = builder.file();
@@ -245,7 +245,7 @@ TEST_F(GltfAnimation, WritesNoAnimationForStaticModels) {
   EXPECT_FALSE(glb.document.contains("animations"));
 }
 
-TEST_F(GltfAnimation, OddFramesAndKeysAreRefused) {
+TEST_F(GltfAnimation, RefusesInvalidFramesAndKeys) {
   SceneAnimation animation;
   Scene scene;
   const GridHandle grid = add_asymmetric_grid(scene, "crane");
@@ -272,7 +272,7 @@ TEST_F(GltfAnimation, OddFramesAndKeysAreRefused) {
   EXPECT_EQ(write_mesh(meshes, FileFormat::Glb).error().code, ErrorCode::InvalidArgument);
 }
 
-TEST(SceneAnimationDeathTest, MeshesOfAnotherSceneAndNoTimeAreMistakes) {
+TEST(SceneAnimationDeathTest, AssertsOnForeignMeshesAndZeroRate) {
   Scene scene;
   place(scene, add_asymmetric_grid(scene, "crane"), {0, 0, 0});
   SceneAnimation animation;

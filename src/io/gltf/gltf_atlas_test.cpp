@@ -23,7 +23,7 @@ class GltfAtlas : public Gltf {
   }
 };
 
-TEST_F(GltfAtlas, IsTheColourOfOpaqueBlocks) {
+TEST_F(GltfAtlas, SuppliesBaseColourOfOpaqueBlocks) {
   const ParsedGlb glb = write(meshed());
   const Json& document = glb.document;
   ASSERT_EQ(document["images"].size(), 2U) << "no material needs the palette's colours";
@@ -39,7 +39,7 @@ TEST_F(GltfAtlas, IsTheColourOfOpaqueBlocks) {
 }
 
 // The red tip stands on grey: without occlusion the texture shows its own colour.
-TEST_F(GltfAtlas, ShowsTheColoursOfTypes) {
+TEST_F(GltfAtlas, ShowsTypeColours) {
   const SceneMeshes meshes = meshed();
   const ParsedGlb glb = write(meshes);
   const PngImage atlas = glb.image(1);
@@ -53,7 +53,7 @@ TEST_F(GltfAtlas, ShowsTheColoursOfTypes) {
   EXPECT_GT(seen.size(), 2U) << "and darker ones, in the corners";
 }
 
-TEST_F(GltfAtlas, GlassAndWhatGlowsStayInThePalette) {
+TEST_F(GltfAtlas, KeepsGlassAndEmissionInPalette) {
   VoxelProperties glass;
   glass.visibility = Visibility::Transparent;
   glass.colour = {10, 20, 200, 100};
@@ -82,7 +82,7 @@ TEST_F(GltfAtlas, GlassAndWhatGlowsStayInThePalette) {
   EXPECT_EQ(document["meshes"][0]["primitives"].size(), 3U);
 }
 
-TEST_F(GltfAtlas, WithoutOcclusionThereIsNoAtlas) {
+TEST_F(GltfAtlas, HasNoAtlasWithoutOcclusion) {
   const auto bytes = write_mesh(meshed(), FileFormat::Glb, {.write_occlusion = false});
   ASSERT_TRUE(bytes.has_value());
   const ParsedGlb glb = parse_glb(*bytes);
@@ -90,7 +90,7 @@ TEST_F(GltfAtlas, WithoutOcclusionThereIsNoAtlas) {
   EXPECT_FALSE(glb.document["meshes"][0]["primitives"][0]["attributes"].contains("TEXCOORD_1"));
 }
 
-TEST_F(GltfAtlas, FewerTrianglesOfTheSameFaces) {
+TEST_F(GltfAtlas, NeedsFewerTrianglesForSameFaces) {
   SceneGrid grid;
   grid.grid.fill_box({{0, 0, 0}, {40, 1, 40}}, 1);
   for (int i = 0; i < 10; ++i) grid.grid.fill_box({{4 * i, 1, 3 * i}, {4 * i + 1, 4, 3 * i + 2}}, 1);
@@ -114,7 +114,7 @@ TEST_F(GltfAtlas, HasNoAtlasWithoutOpaqueVoxels) {
   EXPECT_TRUE(mesh_scene(Scene(), {.atlas = true}).value().atlas.rgb.empty());
 }
 
-TEST_F(GltfAtlas, VoxelsThatFloatsDoNotTellApartAreRefused) {
+TEST_F(GltfAtlas, RefusesVoxelsBeyondFloatPrecision) {
   SceneGrid far;
   far.grid.set({1 << 25, 0, 0}, 1);
   place(scene_, scene_.add_grid(std::move(far)), {0, 0, 0});

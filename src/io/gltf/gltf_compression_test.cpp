@@ -168,9 +168,9 @@ int component_of(const ParsedGlb& glb, const char* attribute) {
 }
 
 /// The asymmetric grid: unchanged, turned and mirrored, scaled, and below a group.
-class GltfStored : public Gltf {
+class GltfCompression : public Gltf {
  protected:
-  GltfStored() {
+  GltfCompression() {
     const GridHandle grid = add_asymmetric_grid(scene_, "crane");
     place(scene_, grid, {0, 0, 0});
     Instance turned;
@@ -217,11 +217,11 @@ class GltfStored : public Gltf {
   }
 };
 
-TEST_F(GltfStored, BlocksStandWhereTheyDidHoweverTheyAreStored) {
+TEST_F(GltfCompression, KeepsBlockPositions) {
   expect_alike(meshes(), 1e-12);
 }
 
-TEST_F(GltfStored, BlocksAreBytesAroundTheirPivot) {
+TEST_F(GltfCompression, StoresBlocksAsBytesAroundPivot) {
   MeshFileOptions options;
   options.quantize = true;
   const ParsedGlb glb = glb_of(meshes(), options);
@@ -231,7 +231,7 @@ TEST_F(GltfStored, BlocksAreBytesAroundTheirPivot) {
   EXPECT_EQ(glb.document["extensionsRequired"], Json::array({"KHR_mesh_quantization"}));
 }
 
-TEST_F(GltfStored, TexelsAreThoseOfTheTypes) {
+TEST_F(GltfCompression, KeepsTexelsOfTypes) {
   for (int i = 0; i < 700; ++i) add_type(scene_, "spare" + std::to_string(i), {1, 2, 3, 255});
   const VoxelType last = add_type(scene_, "last", {9, 8, 7, 255});
   SceneGrid grid;
@@ -249,7 +249,7 @@ TEST_F(GltfStored, TexelsAreThoseOfTheTypes) {
   }
 }
 
-TEST_F(GltfStored, FarFromThePivotBlocksKeepTheirPlaces) {
+TEST_F(GltfCompression, KeepsPositionsFarFromPivot) {
   SceneGrid grid;
   grid.grid.fill_box({{900'000, 0, -5}, {900'040, 300, 2}}, VoxelType{1});
   grid.pivot = {0.5, 0.0, 0.25};
@@ -257,7 +257,7 @@ TEST_F(GltfStored, FarFromThePivotBlocksKeepTheirPlaces) {
   expect_alike(meshes(), 1e-9);
 }
 
-TEST_F(GltfStored, StoresFloatsBeyondTheIntegerRange) {
+TEST_F(GltfCompression, StoresFloatsBeyondIntegerRange) {
   SceneGrid grid;
   grid.grid.set({0, 0, 0}, VoxelType{1});
   grid.grid.set({70'000, 0, 0}, VoxelType{2});
@@ -272,7 +272,7 @@ TEST_F(GltfStored, StoresFloatsBeyondTheIntegerRange) {
   EXPECT_EQ(component_of(glb_of(*meshes, options), "POSITION"), 5126);
 }
 
-TEST_F(GltfStored, ShearedBlocksKeepTheirPlaces) {
+TEST_F(GltfCompression, KeepsPositionsOfShearedBlocks) {
   SceneMeshes sheared = meshes();
   glm::dmat4 matrix(1.0);
   matrix[1][0] = 0.3;
@@ -280,7 +280,7 @@ TEST_F(GltfStored, ShearedBlocksKeepTheirPlaces) {
   expect_alike(sheared, 1e-12);
 }
 
-TEST_F(GltfStored, OcclusionApartIsStoredToo) {
+TEST_F(GltfCompression, StoresOcclusionAttribute) {
   SceneMeshes all = meshes();
   MeshFileOptions options;
   options.occlusion_in = OcclusionIn::Attribute;
@@ -290,7 +290,7 @@ TEST_F(GltfStored, OcclusionApartIsStoredToo) {
   EXPECT_EQ(corners_of(glb_of(all, options)).others.size(), plain.others.size());
 }
 
-TEST_F(GltfStored, SmoothMeshesAreOffByASmallShareOfTheirSize) {
+TEST_F(GltfCompression, BoundsErrorOfSmoothMeshes) {
   for (const double pivot : {0.0, 4.5, 1000.0}) {
     SceneMeshes smooth;
     smooth.parts.push_back(mesh_part("body", test_mesh(), DVec3(pivot)));
@@ -300,7 +300,7 @@ TEST_F(GltfStored, SmoothMeshesAreOffByASmallShareOfTheirSize) {
   }
 }
 
-TEST_F(GltfStored, CompressionMakesSmallFiles) {
+TEST_F(GltfCompression, ShrinksFiles) {
   if (!can_compress_gltf()) GTEST_SKIP() << "this build has no meshoptimizer";
   SceneGrid hill;
   for (int x = 0; x < 60; ++x) {
@@ -319,7 +319,7 @@ TEST_F(GltfStored, CompressionMakesSmallFiles) {
   EXPECT_EQ(*write_mesh(meshes(), FileFormat::Glb, options), *small) << "the same bytes on every run";
 }
 
-TEST_F(GltfStored, AFileBesideHoldsWhatIsCompressed) {
+TEST_F(GltfCompression, StoresCompressedDataInBinFile) {
   if (!can_compress_gltf()) GTEST_SKIP() << "this build has no meshoptimizer";
   MeshFileOptions options;
   options.compress = true;
@@ -336,7 +336,7 @@ TEST_F(GltfStored, AFileBesideHoldsWhatIsCompressed) {
   EXPECT_EQ(corners_of({document, *binary}, true).positions, corners_of(glb_of(meshes(), {}), true).positions);
 }
 
-TEST_F(GltfStored, OtherFormatsHaveNeither) {
+TEST_F(GltfCompression, RefusesOtherFormats) {
   for (const auto format : {FileFormat::Obj, FileFormat::Ply}) {
     MeshFileOptions options;
     options.compress = true;
@@ -347,7 +347,7 @@ TEST_F(GltfStored, OtherFormatsHaveNeither) {
   }
 }
 
-TEST_F(GltfStored, NothingToDrawIsNothingToCompress) {
+TEST_F(GltfCompression, WritesNoBuffersForEmptyMeshes) {
   MeshFileOptions options;
   options.quantize = options.compress = can_compress_gltf();
   const ParsedGlb glb = glb_of({}, options);

@@ -38,7 +38,7 @@ class GltfLight : public Gltf {
   [[nodiscard]] SceneMeshes lit() const { return mesh_lit_scene(scene_, {}).value(); }
 };
 
-TEST_F(GltfLight, MaterialsAreUnlitAndColoursAreTheLight) {
+TEST_F(GltfLight, WritesUnlitMaterialsAndLightColours) {
   const SceneMeshes meshes = lit();
   const ParsedGlb glb = write(meshes);
   EXPECT_EQ(glb.document["extensionsUsed"], Json({"KHR_materials_unlit"}));
@@ -65,7 +65,7 @@ TEST_F(GltfLight, MaterialsAreUnlitAndColoursAreTheLight) {
 }
 
 // Emissive voxels have full brightness; opaque blocks, which need a single material, keep the mesh as it is.
-TEST_F(GltfLight, OcclusionDarkensLightUnlessItIsApart) {
+TEST_F(GltfLight, OcclusionDarkensLightUnlessSeparate) {
   const SceneMeshes meshes = lit();
   const MeshView& view = meshes.parts[0].surfaces[0];
   ASSERT_EQ(view.surface, SurfaceClass::Opaque);
@@ -91,7 +91,7 @@ TEST_F(GltfLight, OcclusionDarkensLightUnlessItIsApart) {
   }
 }
 
-TEST_F(GltfLight, SmoothMeshesHaveItInTheirColours) {
+TEST_F(GltfLight, MultipliesSmoothColoursByLight) {
   auto meshes = mesh_scene_smoothly(scene_).value();
   ASSERT_TRUE(light_meshes(scene_, {}, meshes));
   const ParsedGlb glb = write(meshes);
@@ -109,7 +109,7 @@ TEST_F(GltfLight, SmoothMeshesHaveItInTheirColours) {
   }
 }
 
-TEST_F(GltfLight, OtherFormatsAndHalfLitScenesAreRefused) {
+TEST_F(GltfLight, RefusesOtherFormatsAndPartlyLitScenes) {
   SceneMeshes meshes = lit();
   EXPECT_EQ(write_mesh(meshes, FileFormat::Ply).error().code, ErrorCode::Unsupported);
   EXPECT_EQ(write_mesh(meshes, folder_.file("x.obj")).error().code, ErrorCode::Unsupported);

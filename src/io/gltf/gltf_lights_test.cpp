@@ -49,7 +49,7 @@ SceneMeshes lit_meshes() {
   return meshes;
 }
 
-TEST(GltfLights, AreNodesWithLampsAndCameras) {
+TEST(GltfLights, WritesLampsAndCamerasAsNodes) {
   const auto bytes = write_mesh(lit_meshes(), FileFormat::Glb);
   ASSERT_TRUE(bytes) << to_string(bytes.error());
   const nlohmann::json document = parse_glb(*bytes).document;
@@ -80,7 +80,7 @@ TEST(GltfLights, AreNodesWithLampsAndCameras) {
   EXPECT_LT(glm::length(forward_of(nodes[3]) - DVec3(1.0, 0.0, 0.0)), 1e-9);
 }
 
-TEST(GltfLights, AreScaledAndTurnedAsMeshesAre) {
+TEST(GltfLights, ScalesAndTurnsLikeMeshes) {
   MeshFileOptions options;
   options.scale = 2.0;
   options.up = UpAxis::Z;

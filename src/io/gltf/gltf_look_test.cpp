@@ -74,7 +74,7 @@ std::vector<VoxelProperties> columns_of(const std::string& gltf) {
   return columns;
 }
 
-TEST(GltfLook, MultipliesEmissionByItsTexture) {
+TEST(GltfReader, MultipliesEmissionByItsTexture) {
   if (!can(FileFormat::Gltf, FormatCapability::Read)) GTEST_SKIP() << "the build reads no glTF";
   const std::string material =
       R"({"emissiveFactor":[1,1,1],"emissiveTexture":{"index":0},"pbrMetallicRoughness":{"baseColorFactor":[1,1,1,1]},)"
@@ -94,7 +94,7 @@ TEST(GltfLook, MultipliesEmissionByItsTexture) {
   }
 }
 
-TEST(GltfLook, DoesNotGlowWithoutTheEmissiveImage) {
+TEST(GltfReader, DoesNotGlowWithoutEmissiveImage) {
   if (!can(FileFormat::Gltf, FormatCapability::Read)) GTEST_SKIP() << "the build reads no glTF";
   const std::string gltf = square_gltf(R"({"emissiveFactor":[1,1,1],"emissiveTexture":{"index":0}})", {"missing.png"});
   const auto mesh = read_mesh(text_bytes(gltf));
@@ -105,7 +105,7 @@ TEST(GltfLook, DoesNotGlowWithoutTheEmissiveImage) {
 }
 
 // tinygltf reads on beyond the buffer.
-TEST(GltfLook, LeavesOutImagesThatEndBeyondTheirBuffer) {
+TEST(GltfReader, LeavesOutImagesThatEndBeyondTheirBuffer) {
   if (!can(FileFormat::Gltf, FormatCapability::Read)) GTEST_SKIP() << "the build reads no glTF";
   std::string gltf = square_gltf(R"({"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}})", {"bricks"});
   const auto replace = [&](const std::string& from, const std::string& to) {
@@ -127,7 +127,7 @@ TEST(GltfLook, LeavesOutImagesThatEndBeyondTheirBuffer) {
   }
 }
 
-TEST(GltfLook, ReadsATextureOnceDespiteMissingIndices) {
+TEST(GltfReader, ReadsTextureOnceDespiteMissingIndices) {
   if (!can(FileFormat::Gltf, FormatCapability::Read)) GTEST_SKIP() << "the build reads no glTF";
   const std::string textured = R"({"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}})";
   const std::string missing =
@@ -140,7 +140,7 @@ TEST(GltfLook, ReadsATextureOnceDespiteMissingIndices) {
   EXPECT_EQ(mesh->mesh.materials[2].texture, 0U);
 }
 
-TEST(GltfLook, LeavesOutWebpSourcesOutOfRange) {
+TEST(GltfReader, LeavesOutWebpSourcesOutOfRange) {
   if (!can(FileFormat::Gltf, FormatCapability::Read)) GTEST_SKIP() << "the build reads no glTF";
   for (const std::string source : {"1e300", "-1e300", "4294967296.0", "-7"}) {
     std::string gltf =
@@ -157,7 +157,7 @@ TEST(GltfLook, LeavesOutWebpSourcesOutOfRange) {
   }
 }
 
-TEST(GltfLook, ReadsSpecularGlossiness) {
+TEST(GltfReader, ReadsSpecularGlossiness) {
   if (!can(FileFormat::Gltf, FormatCapability::Read)) GTEST_SKIP() << "the build reads no glTF";
   const std::string material = R"({"extensions":{"KHR_materials_pbrSpecularGlossiness":{"diffuseFactor":[1,0.5,1,1],)"
                                R"("diffuseTexture":{"index":0},"glossinessFactor":0.25}}})";
@@ -169,7 +169,7 @@ TEST(GltfLook, ReadsSpecularGlossiness) {
   EXPECT_EQ(columns[0].metalness, 0.0F);
 }
 
-TEST(GltfLook, RefusesOtherVersionsByTheirNumber) {
+TEST(GltfReader, NamesUnsupportedVersions) {
   if (!can(FileFormat::Gltf, FormatCapability::Read)) GTEST_SKIP() << "the build reads no glTF";
   for (const std::string text :
        {R"({"asset": {"version": "1.0"}, "scene": "s", "scenes": {"s": {"nodes": []}}, "nodes": {}, "meshes": {}})",
@@ -205,7 +205,7 @@ Scene scene_of_stairs() {
   return scene;
 }
 
-TEST(GltfLook, TakesOcclusionOfQuoinsFilesForNoColour) {
+TEST(GltfReader, IgnoresOcclusionColoursOfQuoinFiles) {
   const auto meshes = mesh_scene(scene_of_stairs());
   ASSERT_TRUE(meshes);
   const auto folder = std::filesystem::temp_directory_path() / "quoin_gltf_look_test";
@@ -245,7 +245,7 @@ std::string draco_gltf(int vertices, const std::string& code) {
          R"("attributes":{"POSITION":0,"COLOR_0":1}}}}]}],"nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}],"scene":0})";
 }
 
-TEST(GltfLook, ReadsDraco) {
+TEST(GltfReader, ReadsDraco) {
   if (!can(FileFormat::Gltf, FormatCapability::Read)) GTEST_SKIP() << "the build reads no glTF";
   const auto read = read_mesh(text_bytes(draco_gltf(4, kDracoTetrahedron)));
   if (!triangles::has_draco()) {
@@ -267,7 +267,7 @@ TEST(GltfLook, ReadsDraco) {
   EXPECT_EQ(colours, (std::set<std::array<float, 3>>{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 1}}));
 }
 
-TEST(GltfLook, RefusesDracoThatContradictsTheFile) {
+TEST(GltfReader, RefusesDracoThatContradictsTheFile) {
   if (!can(FileFormat::Gltf, FormatCapability::Read)) GTEST_SKIP() << "the build reads no glTF";
   if (!triangles::has_draco()) GTEST_SKIP() << "the build has no Draco";
   EXPECT_EQ(read_mesh(text_bytes(draco_gltf(5, kDracoTetrahedron))).error().code, ErrorCode::BadFormat);

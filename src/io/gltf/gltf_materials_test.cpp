@@ -15,7 +15,7 @@ using Json = nlohmann::json;
 
 using GltfMaterials = Gltf;
 
-TEST_F(GltfMaterials, OcclusionIsLinearGreyWithFullAlphaAndCanBeLeftOut) {
+TEST_F(GltfMaterials, WritesOcclusionAsLinearGreyOrOmitsIt) {
   place(scene_, add_asymmetric_grid(scene_, "crane"), {0, 0, 0});
   const auto meshes = mesh_scene(scene_);
   const ParsedGlb glb = write(*meshes);
@@ -39,7 +39,7 @@ TEST_F(GltfMaterials, OcclusionIsLinearGreyWithFullAlphaAndCanBeLeftOut) {
   EXPECT_FALSE(plain.document["meshes"][0]["primitives"][0]["attributes"].contains("COLOR_0"));
 }
 
-TEST_F(GltfMaterials, EveryTypeHasItsTexel) {
+TEST_F(GltfMaterials, StoresOneTexelPerType) {
   SceneGrid grid;
   grid.name = "ramp";
   for (int i = 0; i < 600; ++i) {
@@ -72,7 +72,7 @@ TEST_F(GltfMaterials, EveryTypeHasItsTexel) {
   EXPECT_EQ(glb.document["materials"][0]["pbrMetallicRoughness"]["roughnessFactor"], 1.0);
 }
 
-TEST_F(GltfMaterials, TransparentTypesBlendWithAlphaInThePalette) {
+TEST_F(GltfMaterials, BlendsTransparentTypesWithPaletteAlpha) {
   VoxelProperties glass;
   glass.colour = {10, 200, 220, 90};
   glass.visibility = Visibility::Transparent;
@@ -124,7 +124,7 @@ const Json& material_of(const ParsedGlb& glb, float ior) {
   return glb.document["materials"][0];
 }
 
-TEST_F(GltfMaterials, GlassSaysWhatABodyOfItsThicknessDoesToLight) {
+TEST_F(GltfMaterials, WritesThicknessAndAttenuationOfGlass) {
   add_glass_and_water(scene_);
   const ParsedGlb glb = write();
   EXPECT_EQ(glb.document["extensionsUsed"],
@@ -139,7 +139,7 @@ TEST_F(GltfMaterials, GlassSaysWhatABodyOfItsThicknessDoesToLight) {
 
 // Compares the transmitted background and the body's own colour, for clients with and without transmission, with
 // Quoin's images.
-TEST_F(GltfMaterials, ClientsWithAndWithoutTransmissionComeCloseToRenderedImages) {
+TEST_F(GltfMaterials, ApproximatesRenderedGlassWithAndWithoutTransmission) {
   add_glass_and_water(scene_);
   const auto meshes = mesh_scene(scene_);
   const MaterialPalette palette(*meshes);
@@ -164,7 +164,7 @@ TEST_F(GltfMaterials, ClientsWithAndWithoutTransmissionComeCloseToRenderedImages
   EXPECT_EQ(seen, 2);
 }
 
-TEST(GlassMaterial, AttenuationIsNoDarkerThanTheBody) {
+TEST(GlassMaterial, AttenuationIsNoDarkerThanBody) {
   Surface pane;
   pane.colour = {0.79F, 0.87F, 1.0F};
   for (const float absorption : {0.05F, 0.1F, 0.3F}) {
@@ -180,7 +180,7 @@ TEST(GlassMaterial, AttenuationIsNoDarkerThanTheBody) {
   }
 }
 
-TEST(GlassMaterial, IsClearOrClosedAtTheEnds) {
+TEST(GlassMaterial, IsClearOrOpaqueAtExtremes) {
   Surface clear;
   clear.colour = {0.5F, 0.2F, 1.0F};
   set_absorption(0.0F, clear);
@@ -199,7 +199,7 @@ TEST(GlassMaterial, IsClearOrClosedAtTheEnds) {
   EXPECT_GT(last, 0.98F);
 }
 
-TEST_F(GltfMaterials, ABodyWithoutGridIsAsThickAsItsVolumeSays) {
+TEST_F(GltfMaterials, EstimatesThicknessWithoutGrid) {
   add_glass_and_water(scene_);
   auto meshes = *mesh_scene(scene_);
   for (MeshPart& part : meshes.parts) part.thickness.clear();
@@ -218,7 +218,7 @@ double linear_from_srgb(int srgb) {
   return value <= 0.04045 ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4);
 }
 
-TEST_F(GltfMaterials, EmissionComesOutRightInLinearLightWhateverTheStrengths) {
+TEST_F(GltfMaterials, PreservesEmissionOfMixedStrengths) {
   const std::vector<float> strengths = {8.0F, 6.5F, 4.0F, 3.9F, 0.5F, 0.02F, 1000.0F};
   SceneGrid grid;
   std::vector<VoxelType> types;
@@ -256,7 +256,7 @@ TEST_F(GltfMaterials, EmissionComesOutRightInLinearLightWhateverTheStrengths) {
   EXPECT_EQ(found.size(), strengths.size());
 }
 
-TEST_F(GltfMaterials, OneStrengthKeepsThePaletteColourInTheEmissiveTexture) {
+TEST_F(GltfMaterials, SingleStrengthKeepsPaletteColour) {
   VoxelProperties lamp;
   lamp.colour = {201, 102, 3, 255};
   lamp.emission = 0.35F;

@@ -71,7 +71,7 @@ TEST(GltfMeshopt, ReadsCompressedMeshesLikeUncompressedMeshes) {
 }
 
 // 64 views of one encoded buffer that decodes to a mebibyte.
-TEST(GltfMeshopt, OneCodeIsNotDecodedAnyNumberOfTimes) {
+TEST(GltfMeshopt, LimitsRepeatedDecodingOfOneBuffer) {
   if (!reads_and_writes()) GTEST_SKIP() << "this build has no tinygltf or no meshoptimizer";
   const std::vector<std::byte> zeros(std::size_t{1} << 20);
   GltfArray array;
@@ -106,7 +106,7 @@ std::vector<std::byte> with(std::vector<std::byte> file, std::string_view old, s
   return file;
 }
 
-TEST(GltfMeshopt, CodesThatLieAreRefusedWithTheirView) {
+TEST(GltfMeshopt, RefusesContradictoryCompressedViews) {
   if (!reads_and_writes()) GTEST_SKIP() << "this build has no tinygltf or no meshoptimizer";
   const auto file = castle(true, true);
   const std::pair<std::string_view, std::string_view> lies[] = {

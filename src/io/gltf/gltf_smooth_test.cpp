@@ -42,7 +42,7 @@ Scene scene_of_balls() {
   return scene;
 }
 
-TEST(GltfSmooth, KeepsTheLooksOfTypes) {
+TEST(GltfSmooth, KeepsMaterialsOfTypes) {
   const Scene scene = scene_of_balls();
   const auto meshes = mesh_scene_smoothly(scene);
   ASSERT_TRUE(meshes);

@@ -76,7 +76,7 @@ void expect_outward_windings(const ParsedGlb& glb) {
   }
 }
 
-TEST_F(Gltf, InstancesOfOneGridShareItsMeshAndKeepNamesAndTransforms) {
+TEST_F(Gltf, InstancesOfOneGridShareOneMesh) {
   const GridHandle grid = add_asymmetric_grid(scene_, "crane");
   place(scene_, grid, {0, 0, 0}, "first");
   const InstanceHandle second = place(scene_, grid, {10.5, -3, 1e6}, "second");
@@ -99,7 +99,7 @@ TEST_F(Gltf, InstancesOfOneGridShareItsMeshAndKeepNamesAndTransforms) {
   EXPECT_TRUE(glb.document["asset"]["generator"].get<std::string>().starts_with("Quoin "));
 }
 
-TEST_F(Gltf, EveryInstanceLiesWhereTheSceneHasItMirroredOnesToo) {
+TEST_F(Gltf, PlacesTurnedAndMirroredInstances) {
   const GridHandle grid = add_asymmetric_grid(scene_, "crane");
   std::mt19937 random(7);
   std::uniform_real_distribution<double> number(-20.0, 20.0);
@@ -128,7 +128,7 @@ TEST_F(Gltf, EveryInstanceLiesWhereTheSceneHasItMirroredOnesToo) {
   }
 }
 
-TEST_F(Gltf, AnAsymmetricModelIsPinned) {
+TEST_F(Gltf, KeepsHandednessOfAsymmetricModel) {
   const GridHandle grid = add_asymmetric_grid(scene_, "crane");
   place(scene_, grid, {0, 0, 0});
   Instance& mirrored = scene_.edit(place(scene_, grid, {0, 0, 0}));
@@ -150,7 +150,7 @@ TEST_F(Gltf, AnAsymmetricModelIsPinned) {
   EXPECT_EQ(reflected.max, DVec3(-1, -0.5, 0.5));
 }
 
-TEST_F(Gltf, ArraysAreAlignedBoundedAndInsideTheBuffer) {
+TEST_F(Gltf, AlignsAndBoundsArrays) {
   place(scene_, add_asymmetric_grid(scene_, "crane"), {0, 0, 0});
   const ParsedGlb glb = write();
   EXPECT_EQ(glb.document["buffers"][0]["byteLength"], glb.binary.size());
@@ -187,7 +187,7 @@ SceneMeshes mesh_of_size(std::size_t vertices) {
   return meshes;
 }
 
-TEST_F(Gltf, IndicesTake16BitsWhereTheyFit) {
+TEST_F(Gltf, Uses16BitIndicesIfPossible) {
   const auto component = [&](std::size_t vertices) {
     const ParsedGlb glb = write(mesh_of_size(vertices));
     const Json& primitive = glb.document["meshes"][0]["primitives"][0];
@@ -200,7 +200,7 @@ TEST_F(Gltf, IndicesTake16BitsWhereTheyFit) {
   EXPECT_EQ(component(65'538), 5125);
 }
 
-TEST_F(Gltf, AnEmptySceneAndAnEmptyGridAreValidFiles) {
+TEST_F(Gltf, WritesValidFilesForEmptyScenesAndGrids) {
   const ParsedGlb nothing = write();
   EXPECT_EQ(nothing.document["scenes"], Json::parse("[{}]"));
   EXPECT_TRUE(nothing.binary.empty());
@@ -215,7 +215,7 @@ TEST_F(Gltf, AnEmptySceneAndAnEmptyGridAreValidFiles) {
   EXPECT_FALSE(glb.document.contains("buffers"));
 }
 
-TEST_F(Gltf, HiddenInstancesAreLeftOutUnlessAskedFor) {
+TEST_F(Gltf, LeavesOutHiddenInstancesByDefault) {
   const GridHandle grid = add_asymmetric_grid(scene_, "crane");
   const GridHandle other = add_asymmetric_grid(scene_, "ghost");
   place(scene_, grid, {0, 0, 0}, "seen");
@@ -243,7 +243,7 @@ glm::dmat4 matrix_of(const nlohmann::json& node) {
   return matrix;
 }
 
-TEST_F(Gltf, GroupsAreNodesAndNothingMovesByThem) {
+TEST_F(Gltf, WritesGroupsAsNodesWithoutMovingInstances) {
   const double half = std::sqrt(0.5);
   const GridHandle grid = add_asymmetric_grid(scene_, "crane");
   const LayerHandle layer = scene_.add_layer({"harbour"});
@@ -278,7 +278,7 @@ TEST_F(Gltf, GroupsAreNodesAndNothingMovesByThem) {
   EXPECT_LT(glm::length(DVec3(whole[3]) - alone.position), 1e-12);
 }
 
-TEST_F(Gltf, NamesThatAreNoUtf8AreRepaired) {
+TEST_F(Gltf, RepairsInvalidUtf8Names) {
   SceneGrid grid;
   grid.name = "caf\xE9";
   grid.grid.set({0, 0, 0}, add_type(scene_, "stone", {90, 90, 90, 255}));
@@ -286,7 +286,7 @@ TEST_F(Gltf, NamesThatAreNoUtf8AreRepaired) {
   EXPECT_EQ(write().document["meshes"][0]["name"], "caf\xEF\xBF\xBD");
 }
 
-TEST_F(Gltf, MoreThan4GibIsRefused) {
+TEST_F(Gltf, RefusesFilesAbove4Gib) {
   constexpr std::uint64_t limit = std::numeric_limits<std::uint32_t>::max();
   EXPECT_EQ(glb_file_bytes(100, 0).value_or(0), 120U);
   EXPECT_EQ(glb_file_bytes(100, limit - 128).value_or(0), limit);
@@ -295,7 +295,7 @@ TEST_F(Gltf, MoreThan4GibIsRefused) {
   EXPECT_EQ(refused.error().code, ErrorCode::LimitExceeded);
 }
 
-TEST_F(Gltf, TheSameBytesAtAnyThreadCount) {
+TEST_F(Gltf, WritesSameBytesAtAnyThreadCount) {
   std::mt19937 random(11);
   for (int g = 0; g < 5; ++g) {
     const GridHandle handle = add_asymmetric_grid(scene_, "grid " + std::to_string(g));
@@ -317,7 +317,7 @@ TEST_F(Gltf, TheSameBytesAtAnyThreadCount) {
   EXPECT_EQ(one, file(8));
 }
 
-TEST_F(Gltf, TextFormHoldsTheSameContent) {
+TEST_F(Gltf, TextFormMatchesBinaryForm) {
   place(scene_, add_asymmetric_grid(scene_, "crane"), {0, 0, 0});
   const auto meshes = mesh_scene(scene_);
   const ParsedGlb glb = write(*meshes);

@@ -154,7 +154,7 @@ TEST(Heights, ReadsHgtMetresWithVoids) {
   fs::remove(path);
 }
 
-TEST(Heights, ColumnsAreAsHighAsTheirHeights) {
+TEST(Heights, FillsColumnsUpToHeight) {
   HeightMap map = map_of(70, 5, 10.0F);
   map.metres[3] = 12.4F;
   map.metres[4] = 12.6F;
@@ -173,7 +173,7 @@ TEST(Heights, ColumnsAreAsHighAsTheirHeights) {
   EXPECT_EQ(scene.types[grid.get(3, 11, 0)].name, "stone") << "steep";
 }
 
-TEST(Heights, VoxelsAndExaggerationAreOfAnySize) {
+TEST(Heights, AppliesVoxelSizeAndExaggeration) {
   HeightMap map = map_of(9, 3, 100.0F);
   map.metres_per_pixel = 10.0;
   for (int z = 0; z < 3; ++z) map.metres[static_cast<std::size_t>(9 * z + 1)] = 140.0F;
@@ -190,7 +190,7 @@ TEST(Heights, VoxelsAndExaggerationAreOfAnySize) {
   EXPECT_EQ(scene.instances()[scene.instances().handles().front()].voxel_size, 5.0);
 }
 
-TEST(Heights, DensitiesAreDistancesToAPlane) {
+TEST(Heights, DensitiesMatchDistanceToPlane) {
   HeightMap map = map_of(100, 90, 0.0F);
   for (int z = 0; z < 90; ++z) {
     for (int x = 0; x < 100; ++x)
@@ -216,7 +216,7 @@ TEST(Heights, DensitiesAreDistancesToAPlane) {
   EXPECT_EQ(field.solid_bounds().min, IVec3(1, -19, 1));
 }
 
-TEST(Heights, AnyNumberOfThreadsGivesTheSame) {
+TEST(Heights, MatchesAtAnyThreadCount) {
   HeightMap map = map_of(200, 150, 0.0F);
   for (std::size_t i = 0; i < map.metres.size(); ++i) map.metres[i] = static_cast<float>((i * 7919) % 97);
   for (const bool as_field : {false, true}) {
@@ -284,7 +284,7 @@ TEST(Heights, RefusesDamagedImages) {
   EXPECT_GT(read, 4);
 }
 
-TEST(Heights, ReadsARealTileOfMountFuji) {
+TEST(Heights, ReadsRealTileOfMountFuji) {
   const fs::path path = fs::path(QUOIN_SOURCE_DIR) / "../shared/data/dem/mapbox+martini/test__fixtures__fuji.png";
   if (!fs::exists(path)) GTEST_SKIP() << path << " is not there";
   LoadOptions options;

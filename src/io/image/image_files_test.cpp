@@ -35,7 +35,7 @@ class ImageFiles : public ::testing::Test {
   TestFolder folder_{std::string("images_") + ::testing::UnitTest::GetInstance()->current_test_info()->name()};
 };
 
-TEST_F(ImageFiles, APngReadsAsItWasWritten) {
+TEST_F(ImageFiles, RoundTripsPng) {
   for (const auto& [width, height] : {std::pair{1, 1}, {7, 3}, {1, 100}, {640, 2}}) {
     const Image image = noise(width, height, 5);
     const auto size = write_png(image, file("a.png"));
@@ -52,7 +52,7 @@ TEST_F(ImageFiles, APngReadsAsItWasWritten) {
   EXPECT_EQ(*once, *read_file(file("b.png"))) << "the same bytes on every run";
 }
 
-TEST_F(ImageFiles, APfmKeepsEveryFloatAndRunsFromTheBottom) {
+TEST_F(ImageFiles, RoundTripsPfmFromBottomRow) {
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   const FloatImage image{3, 2, {1.5F, kInfinity, -0.0F, 1e-45F, 3e38F, 2.0F}};
   const auto size = write_pfm(image, file("a.pfm"));
@@ -75,13 +75,13 @@ TEST_F(ImageFiles, APfmKeepsEveryFloatAndRunsFromTheBottom) {
   }
 }
 
-TEST_F(ImageFiles, APfmOfTheOtherByteOrderIsRead) {
+TEST_F(ImageFiles, ReadsPfmOfOtherByteOrder) {
   const auto image = read_pfm(bytes_of(std::string("Pf 2 1 1.0\n\x3F\x80\0\0\x40\0\0\0", 19)));
   ASSERT_TRUE(image);
   EXPECT_EQ(image->values, (std::vector<float>{1.0F, 2.0F}));
 }
 
-TEST_F(ImageFiles, ABrokenPfmSaysWhere) {
+TEST_F(ImageFiles, ReportsPositionOfPfmErrors) {
   const auto error = [](const std::string& text) {
     const auto image = read_pfm(bytes_of(text));
     return image ? "none" : to_string(image.error());
@@ -99,7 +99,7 @@ TEST_F(ImageFiles, ABrokenPfmSaysWhere) {
   EXPECT_EQ(error("Pf\n268435456 268435456\n-1\n"), "byte 26: it claims 268435456 x 268435456 pixels but holds 0");
 }
 
-TEST_F(ImageFiles, EveryInputOfThePngCorpusGivesAnImageOrAnError) {
+TEST_F(ImageFiles, ReadsOrRefusesPngCorpus) {
   int inputs = 0;
   int images = 0;
   for (const auto& entry : std::filesystem::directory_iterator(QUOIN_SOURCE_DIR "/tests/corpus/png")) {
@@ -115,7 +115,7 @@ TEST_F(ImageFiles, EveryInputOfThePngCorpusGivesAnImageOrAnError) {
   EXPECT_GT(images, 4);
 }
 
-TEST_F(ImageFiles, EveryInputOfThePfmCorpusGivesAnImageOrAnError) {
+TEST_F(ImageFiles, ReadsOrRefusesPfmCorpus) {
   int inputs = 0;
   for (const auto& entry : std::filesystem::directory_iterator(QUOIN_SOURCE_DIR "/tests/corpus/pfm")) {
     const auto bytes = read_file(entry.path());
@@ -127,7 +127,7 @@ TEST_F(ImageFiles, EveryInputOfThePfmCorpusGivesAnImageOrAnError) {
   EXPECT_GT(inputs, 3);
 }
 
-TEST_F(ImageFiles, APngThatClaimsTooMuchTakesNoMemory) {
+TEST_F(ImageFiles, RefusesOversizedPng) {
   auto bytes = *encode_png({1, 1, 3, {1, 2, 3}});
   // Width and height lie at 16 and 20, their checksum at 29.
   const auto put = [&](std::size_t at, std::uint32_t value) {
@@ -146,7 +146,7 @@ TEST_F(ImageFiles, APngThatClaimsTooMuchTakesNoMemory) {
   EXPECT_NE(image.error().message.find("more pixels than its bytes"), std::string::npos) << image.error().message;
 }
 
-TEST_F(ImageFiles, ImpossibleImagesAndPathsAreErrors) {
+TEST_F(ImageFiles, RejectsInvalidImagesAndPaths) {
   for (const Image& image : {Image{}, Image{-1, -1, {1, 2, 3}}, Image{2, 1, {1, 2, 3}}}) {
     const auto written = write_png(image, file("a.png"));
     ASSERT_FALSE(written);
@@ -167,7 +167,7 @@ TEST_F(ImageFiles, ImpossibleImagesAndPathsAreErrors) {
   EXPECT_EQ(read_pfm(file("a.png")).error().path, file("a.png").string());
 }
 
-TEST(PngMistakes, PixelsThatAreNotWhatTheSizesSayAreFound) {
+TEST(PngDeathTest, AssertsOnMissingPixels) {
   QUOIN_EXPECT_MISTAKE((void)encode_png({2, 2, 3, {}}), "as many bytes of pixels as the sizes say");
 }
 

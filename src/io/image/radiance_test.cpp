@@ -46,7 +46,7 @@ TEST(Radiance, ReadsRuns) {
   }
 }
 
-TEST(Radiance, TakesTheExposureBack) {
+TEST(Radiance, DividesByExposure) {
   const auto image =
       read("#?RADIANCE\nEXPOSURE=2\nEXPOSURE= 2.0\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n\x80\x80\x80\x81");
   ASSERT_TRUE(image.has_value()) << image.error().message;
@@ -68,7 +68,7 @@ TEST(Radiance, RejectsBrokenFiles) {
                    .has_value());
 }
 
-TEST(Radiance, TheCorpusIsReadOrRefused) {
+TEST(Radiance, ReadsOrRefusesCorpus) {
   int files = 0;
   for (const auto& entry : std::filesystem::directory_iterator(QUOIN_SOURCE_DIR "/tests/corpus/radiance")) {
     ++files;
@@ -135,7 +135,7 @@ Image stripes() {
   return image;
 }
 
-TEST(LossyAndSmallImages, AreTheSameEveryTimeAndRefuseWhatCannotBe) {
+TEST(LossyImages, AreDeterministicAndRejectInvalidInput) {
   if (!has_jpeg() || !has_webp()) GTEST_SKIP() << "built without libjpeg or libwebp";
   const Image image = stripes();
   const auto jpeg = write_jpeg(image);

@@ -47,7 +47,7 @@ TEST(Nbt, RefusesTruncationAnywhere) {
   }
 }
 
-TEST(Nbt, DepthIsBounded) {
+TEST(Nbt, RefusesDeepNesting) {
   NbtWriter writer;
   for (int i = 0; i < 600; ++i) writer.compound("");
   const auto document = nbt::Document::parse(writer.bytes);
@@ -55,7 +55,7 @@ TEST(Nbt, DepthIsBounded) {
   EXPECT_EQ(document.error().code, ErrorCode::LimitExceeded);
 }
 
-TEST(BlockStates, ComeBackAsTheyWere) {
+TEST(BlockStates, RoundTrips) {
   const auto block = minecraft::block_state("minecraft:oak_stairs", {{"half", "top"}, {"facing", "east"}});
   EXPECT_EQ(block.name, "minecraft:oak_stairs");
   VoxelProperties type;
@@ -64,13 +64,13 @@ TEST(BlockStates, ComeBackAsTheyWere) {
   EXPECT_EQ(to_string(minecraft::block_text(type, block.state)), "minecraft:oak_stairs[facing=east,half=top]");
 }
 
-TEST(BlockStates, PutsPropertiesWithoutBitsIntoTheName) {
+TEST(BlockStates, PutsPropertiesWithoutBitsIntoName) {
   const auto block = minecraft::block_state("mod:thing", {{"kind", "strange"}, {"lit", "true"}});
   EXPECT_EQ(block.name, "mod:thing[kind=strange,lit=true]");
   EXPECT_EQ(block.bits, 0);
 }
 
-TEST(BlockLooks, ShapesAndModsLookLikeWhatTheyAreMadeOf) {
+TEST(BlockLooks, DerivesShapesAndModsFromMaterials) {
   const auto colour = [](const char* name) { return minecraft::look_of_block(name, false, false).colour; };
   EXPECT_EQ(colour("minecraft:stone_brick_stairs"), colour("minecraft:stone_bricks"));
   EXPECT_EQ(colour("minecraft:oak_slab"), colour("minecraft:oak_planks"));
@@ -79,7 +79,7 @@ TEST(BlockLooks, ShapesAndModsLookLikeWhatTheyAreMadeOf) {
   EXPECT_EQ(minecraft::look_of_block("mod:xyzzy", false, false).knowledge, minecraft::Knowledge::Nothing);
 }
 
-TEST(LegacyBlocks, HaveTheNamesOfLaterOnes) {
+TEST(LegacyBlocks, MapsNumbersToModernNames) {
   EXPECT_EQ(minecraft::legacy_block(1, 3).first, "minecraft:diorite");
   EXPECT_EQ(minecraft::legacy_block(35, 14).first, "minecraft:red_wool");
   const auto log = minecraft::legacy_block(17, 5);
@@ -88,7 +88,7 @@ TEST(LegacyBlocks, HaveTheNamesOfLaterOnes) {
   EXPECT_EQ(minecraft::legacy_block(255 + 16, 0).first, "legacy:271");
 }
 
-TEST(MinecraftSource, PlacesBlocksWhereTheGameHasThem) {
+TEST(MinecraftSource, PlacesBlocksLikeTheGame) {
   const auto source = minecraft::open_minecraft(region_with(chunk_of_stairs(-4), 5, 2));
   ASSERT_TRUE(source);
   ASSERT_EQ((*source)->parts().size(), 1U);
@@ -107,7 +107,7 @@ TEST(MinecraftSource, PlacesBlocksWhereTheGameHasThem) {
   EXPECT_TRUE(outside && !*outside);
 }
 
-TEST(MinecraftSource, ABrokenChunkIsNamedWithItsPlace) {
+TEST(MinecraftSource, NamesBrokenChunkAndPosition) {
   std::vector<std::byte> chunk = chunk_of_stairs(0);
   chunk.resize(100);
   const auto source = minecraft::open_minecraft(region_with(chunk, 5, 2));
@@ -120,7 +120,7 @@ TEST(MinecraftSource, ABrokenChunkIsNamedWithItsPlace) {
   EXPECT_NE(part->broken[0].message.find("chunk (5, 2)"), std::string::npos);
 }
 
-TEST(MinecraftSource, Lz4IsReadOrSaysWhatIsMissing) {
+TEST(MinecraftSource, ReadsLz4OrNamesMissingLibrary) {
   // One uncompressed LZ4 block, and the empty block that ends the stream.
   const std::vector<std::byte> chunk = chunk_of_stairs(0);
   std::vector<std::byte> stream;
@@ -146,7 +146,7 @@ TEST(MinecraftSource, Lz4IsReadOrSaysWhatIsMissing) {
   }
 }
 
-TEST(MinecraftSource, IndicesThatSpanLongsAreRead) {
+TEST(MinecraftSource, ReadsIndicesThatSpanLongs) {
   // 17 blocks take 5 bits: 320 longs if indices span longs, otherwise 342.
   for (const std::size_t words : {320U, 342U}) {
     NbtWriter nbt;
@@ -201,7 +201,7 @@ TEST(MinecraftSource, CountsInvisibleBlocksAndMakesLampsOfLight) {
   EXPECT_EQ(loaded->warnings[0], "left out, since they are invisible: 2 minecraft:barrier, 1 minecraft:light");
 }
 
-TEST(MinecraftSource, NumbersOfTypesDoNotDependOnWhatWasReadBefore) {
+TEST(MinecraftSource, TypeNumbersIgnoreReadingOrder) {
   const auto bytes = region_with(chunk_of_stairs(0));
   const auto a = minecraft::open_minecraft(bytes);
   ASSERT_TRUE(a);
@@ -218,7 +218,7 @@ TEST(MinecraftSource, NumbersOfTypesDoNotDependOnWhatWasReadBefore) {
   EXPECT_NE((*chunk)->data({1, 0, 0}).state, 0U);
 }
 
-TEST(MinecraftSource, FilesOfTheCorpusGiveWorldsOrErrors) {
+TEST(MinecraftSource, ReadsOrRefusesCorpus) {
   std::size_t read = 0;
   std::size_t broken = 0;
   for (const auto& entry : fs::directory_iterator(fs::path(QUOIN_SOURCE_DIR) / "tests" / "corpus" / "minecraft")) {
@@ -252,7 +252,7 @@ struct Known {
   std::size_t broken;
 };
 
-TEST(MinecraftSource, ReadsRealRegionsOfFourAges) {
+TEST(MinecraftSource, ReadsRealRegionsOfFourVersions) {
   constexpr Known kFiles[] = {
       {"PrismarineJS+prismarine-provider-anvil/test__fixtures__1.12.2__r.0.-1.mca", 18, 0},
       {"PrismarineJS+prismarine-provider-anvil/test__fixtures__1.13.2__r.-1.-1.mca", 32, 0},
@@ -283,7 +283,7 @@ TEST(MinecraftSource, ReadsRealRegionsOfFourAges) {
   }
 }
 
-TEST(NbtDeathTest, ElementsAreOfTheList) {
+TEST(NbtDeathTest, AssertsOnElementOutOfRange) {
   NbtWriter writer;
   writer.compound("").list("c", 3, 2).number(5, 4).number(6, 4).end();
   const auto document = nbt::Document::parse(writer.bytes);
@@ -291,11 +291,11 @@ TEST(NbtDeathTest, ElementsAreOfTheList) {
   QUOIN_EXPECT_MISTAKE(static_cast<void>(document->root()["c"].integer(2)), "an element of an array or a list");
 }
 
-TEST(MinecraftSectionsDeathTest, PalettesAreNotEmpty) {
+TEST(MinecraftSectionsDeathTest, AssertsOnEmptyPalette) {
   QUOIN_EXPECT_MISTAKE(static_cast<void>(minecraft::bits_of_palette(0, 4)), "a palette with entries");
 }
 
-TEST(MinecraftSectionsDeathTest, PackedIndicesHaveAtMostSixteenBits) {
+TEST(MinecraftSectionsDeathTest, AssertsOnIndicesAbove16Bits) {
   const auto document = nbt::Document::parse(chunk_of_stairs(0));
   ASSERT_TRUE(document);
   std::vector<std::uint16_t> out(1);

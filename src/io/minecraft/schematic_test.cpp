@@ -102,7 +102,7 @@ void expect_house(const Result<LoadedScene>& loaded) {
       << block_at(*loaded, {1, 1, 2});
 }
 
-TEST(Schematic, AllKindsHoldTheSameHouse) {
+TEST(Schematic, ReadsSameHouseFromEveryFormat) {
   for (int version = 1; version <= 3; ++version) {
     const auto loaded = read_schematic(sponge(version));
     expect_house(loaded);
@@ -113,7 +113,7 @@ TEST(Schematic, AllKindsHoldTheSameHouse) {
   expect_house(read_schematic(structure({1, 1, 2})));
 }
 
-TEST(Schematic, IsKnownByItsContentAlsoWithinGzip) {
+TEST(Schematic, IsDetectedByContentAndWithinGzip) {
   for (const auto& bytes : {sponge(2), sponge(3), mcedit(), structure({1, 1, 2}), litematic({11, 1, 3})}) {
     EXPECT_EQ(detect_format(bytes), FileFormat::Schematic);
     const std::vector<std::byte> packed = gzipped(bytes, 6);
@@ -122,7 +122,7 @@ TEST(Schematic, IsKnownByItsContentAlsoWithinGzip) {
   }
 }
 
-TEST(Schematic, ALitematicsSizeMayReachDownwards) {
+TEST(Schematic, ReadsLitematicOfNegativeSize) {
   const auto up = read_schematic(litematic({11, 1, 3}));
   const auto down = read_schematic(litematic({-11, 1, -3}));
   ASSERT_TRUE(up && down);
@@ -138,7 +138,7 @@ TEST(Schematic, ALitematicsSizeMayReachDownwards) {
   EXPECT_EQ(place(*down), DVec3(0.0, 20.0, 28.0));
 }
 
-TEST(Schematic, LargerOnesThanASectionComeWhole) {
+TEST(Schematic, ReadsBlocksBeyondOneSection) {
   // 70 x 70 x 70 blocks; the type depends on the position.
   constexpr int kEdge = 70;
   std::vector<std::uint8_t> data;
@@ -178,7 +178,7 @@ std::vector<std::byte> meadow(int version, const std::vector<std::uint8_t>& biom
   return nbt.end().bytes;
 }
 
-TEST(Schematic, BiomesColourTheGrassOfColumns) {
+TEST(Schematic, BiomesColourGrass) {
   constexpr std::uint8_t kDesert = 2;  // by number
   std::vector<std::uint8_t> by_block(36, 0);
   for (std::size_t y = 0; y < 16; ++y) by_block[2 * y + 1] = 1;
@@ -238,7 +238,7 @@ TEST(Schematic, SurvivesTruncationAndFlippedBits) {
   }
 }
 
-TEST(Schematic, RealOnesHaveTheirCounts) {
+TEST(Schematic, RealFilesHaveExpectedCounts) {
   const fs::path folder = fs::path(QUOIN_SOURCE_DIR).parent_path() / "shared" / "data" / "mc";
   if (!fs::exists(folder)) GTEST_SKIP() << "real files are not here";
   struct Known {
@@ -283,7 +283,7 @@ std::vector<std::byte> large_sponge(int version, bool has_states) {
   return nbt.end().bytes;
 }
 
-TEST(Schematic, LongArraysAreReadInPages) {
+TEST(Schematic, ReadsLongArraysInPages) {
   for (const int version : {2, 3}) {
     for (const bool has_states : {false, true}) {
       const std::vector<std::byte> plain = large_sponge(version, has_states);
@@ -306,7 +306,7 @@ TEST(Schematic, LongArraysAreReadInPages) {
 }
 
 // More than 128 block types, so that indices take one or two bytes: reading by pages equals reading one array.
-TEST(Schematic, LongArraysOfManyBlocksAreReadInPages) {
+TEST(Schematic, ReadsLongArraysOfManyBlocksInPages) {
   constexpr IVec3 kSize(130, 41, 290);
   constexpr unsigned kKinds = 200;
   std::mt19937 random(6);
@@ -343,7 +343,7 @@ TEST(Schematic, LongArraysOfManyBlocksAreReadInPages) {
   }
 }
 
-TEST(Schematic, LongArraysThatAreCutOffAreErrors) {
+TEST(Schematic, RefusesTruncatedLongArrays) {
   const std::vector<std::byte> plain = large_sponge(2, false);
   for (const std::size_t size : {plain.size() - 1, plain.size() - 1'000'000, plain.size() / 2}) {
     EXPECT_FALSE(load_scene(gzipped(std::span(plain).first(size), 1))) << size;
@@ -364,7 +364,7 @@ std::vector<std::byte> bytes_of(const PagedBytes& pages) {
   return all;
 }
 
-TEST(PagedBytes, PagesOfFewValuesArePacked) {
+TEST(PagedBytes, PacksPagesOfFewValues) {
   std::mt19937 random(5);
   std::uint64_t held = 0;
   for (const unsigned kinds : {1U, 2U, 3U, 4U, 5U, 16U, 17U, 256U}) {
@@ -382,7 +382,7 @@ TEST(PagedBytes, PagesOfFewValuesArePacked) {
   }
 }
 
-TEST(PagedBytes, HoldAppendedBytes) {
+TEST(PagedBytes, HoldsAppendedBytes) {
   PagedBytes pages;
   std::vector<std::byte> bytes(3 * PagedBytes::kPageBytes + 100, std::byte{7});
   bytes[PagedBytes::kPageBytes + 5] = std::byte{8};
@@ -395,7 +395,7 @@ TEST(PagedBytes, HoldAppendedBytes) {
   EXPECT_EQ(pages.uniform(PagedBytes::kPageBytes + 6, bytes.size()), std::byte{7});
 }
 
-TEST(Schematic, NamesTheBedrockEdition) {
+TEST(Schematic, NamesBedrockEdition) {
   // Little-endian: {"format_version": 1}.
   std::vector<std::byte> bytes = {std::byte{10}, std::byte{0}, std::byte{0}, std::byte{3}, std::byte{14}, std::byte{0}};
   for (const char c : std::string("format_version")) bytes.push_back(static_cast<std::byte>(c));
@@ -405,7 +405,7 @@ TEST(Schematic, NamesTheBedrockEdition) {
   EXPECT_NE(loaded.error().message.find("Bedrock structure (.mcstructure)"), std::string::npos);
 }
 
-TEST(Schematic, UnknownKindIsDescribedInPrintableCharacters) {
+TEST(Schematic, DescribesUnknownKindInPrintableCharacters) {
   NbtWriter nbt;
   nbt.compound("").integer("a\n\x01", 1).end();
   const auto loaded = load_scene(nbt.bytes);

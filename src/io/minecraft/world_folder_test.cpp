@@ -69,7 +69,7 @@ TEST(Dimensions, AreFoundInBothLayouts) {
   EXPECT_EQ(load_scene(world.path(), {.dimension = "worlds/2b2t/2b2t_2"})->dimension, names.back());
 }
 
-TEST(Dimensions, ReadsTheNewerOfTwoLayouts) {
+TEST(Dimensions, ReadsNewerOfTwoLayouts) {
   WrittenWorld world("twice");
   world.level().region("region").region("dimensions/minecraft/overworld/region");
   const minecraft::WorldFolder found = minecraft::find_dimensions(world.path());
@@ -91,7 +91,7 @@ TEST(Dimensions, RejectsNegativeRadius) {
   EXPECT_EQ(loaded.error().message, "cannot read a world within a radius of -1 chunks: it is negative");
 }
 
-TEST(Dimensions, FoldersOfOneAreRead) {
+TEST(Dimensions, ReadsFolderOfOneDimension) {
   WrittenWorld world("one");
   world.level().region("region").region("DIM-1/region").region("dimensions/a/b/region");
   const auto name = [&](const char* folder) { return load_scene(world.path() / folder)->dimension; };
@@ -101,13 +101,13 @@ TEST(Dimensions, FoldersOfOneAreRead) {
   EXPECT_EQ(name("region"), "minecraft:overworld");
 }
 
-TEST(Dimensions, ReadsAServersNetherFolder) {
+TEST(Dimensions, ReadsNetherFolderOfServer) {
   WrittenWorld world("world_nether");
   world.level().region("DIM-1/region");
   EXPECT_EQ(load_scene(world.path())->dimension, "minecraft:the_nether");
 }
 
-TEST(Dimensions, OnesThatAreNotThereAreErrors) {
+TEST(Dimensions, ReportsMissingDimensions) {
   WrittenWorld world("missing");
   world.level().region("region").region("DIM1/region");
   EXPECT_EQ(error_of(world.path(), "nether"),
@@ -115,7 +115,7 @@ TEST(Dimensions, OnesThatAreNotThereAreErrors) {
   EXPECT_NE(error_of(world.path() / "region" / "r.0.0.mca", "nether").find("one region file"), std::string::npos);
 }
 
-TEST(Dimensions, AFolderWithoutRegionsSaysWhatIsMissing) {
+TEST(Dimensions, ReportsMissingRegions) {
   WrittenWorld world("none");
   EXPECT_NE(error_of(world.path()).find("without a Minecraft world"), std::string::npos);
   world.level();
@@ -125,7 +125,7 @@ TEST(Dimensions, AFolderWithoutRegionsSaysWhatIsMissing) {
   EXPECT_NE(error_of(world.path()).find("Bedrock"), std::string::npos);
 }
 
-TEST(MinecraftSource, RegionsOfEntitiesAndPointsAreRefused) {
+TEST(MinecraftSource, RefusesEntityAndPointRegions) {
   NbtWriter entities;
   entities.compound("").list("Entities", 10, 0).tag(11, "Position").number(2, 4).number(0, 4).number(0, 4).end();
   NbtWriter points;
@@ -138,7 +138,7 @@ TEST(MinecraftSource, RegionsOfEntitiesAndPointsAreRefused) {
   EXPECT_NE(error_of(world.path() / "poi").find("a region file of points of interest"), std::string::npos);
 }
 
-TEST(MinecraftSource, ARegionOfAnotherNameIsPlacedAtTheOrigin) {
+TEST(MinecraftSource, PlacesRenamedRegionAtOrigin) {
   WrittenWorld world("renamed");
   world.region("region");
   fs::rename(world.path() / "region" / "r.0.0.mca", world.path() / "mine (1).mca");
@@ -149,7 +149,7 @@ TEST(MinecraftSource, ARegionOfAnotherNameIsPlacedAtTheOrigin) {
   EXPECT_NE(loaded->warnings[0].find("r.0.0.mca"), std::string::npos);
 }
 
-TEST(LinearRegion, DamageAnywhereGivesErrorsAndNoCrash) {
+TEST(LinearRegion, SurvivesDamageAnywhere) {
   const fs::path path =
       fs::path(QUOIN_SOURCE_DIR) / "tests" / "corpus" / "cases" / "minecraft-linear" / "region" / "r.0.0.linear";
   const auto whole = read_file(path);

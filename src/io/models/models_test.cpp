@@ -213,7 +213,7 @@ Rgba8 colour_at(const LoadedScene& loaded, IVec3 voxel) {
   return loaded.scene.types[only_grid(loaded).grid.get(voxel)].colour;
 }
 
-TEST(Models, AllHoldTheSameTwoVoxels) {
+TEST(Models, ReadsSameVoxelsFromEveryFormat) {
   for (const Kind& kind : all_kinds()) {
     SCOPED_TRACE(kind.name);
     EXPECT_EQ(detect_format(kind.bytes), kind.format);
@@ -228,7 +228,7 @@ TEST(Models, AllHoldTheSameTwoVoxels) {
   }
 }
 
-TEST(Models, PlacesAreKept) {
+TEST(Models, KeepsPositions) {
   const auto position = [](const LoadedScene& loaded) {
     return loaded.scene.instances()[loaded.scene.instances().handles().front()].position;
   };
@@ -262,7 +262,7 @@ TEST(Models, SurvivesTruncationAndFlippedBits) {
   }
 }
 
-TEST(Models, HeadersThatClaimTooMuchAreRefused) {
+TEST(Models, RefusesExcessiveHeaderSizes) {
   Writer many;
   many.u32s({0x101, 0, 1, 1, 0, 1}).number(0, 1).u32s({16'384, 16'384, 16'384, 0, 0, 0, 2, 0xFFFFFFFF, kRed, 6});
   EXPECT_EQ(read_as(FileFormat::Qubicle, many.bytes).error().code, ErrorCode::BadFormat);
@@ -274,7 +274,7 @@ TEST(Models, HeadersThatClaimTooMuchAreRefused) {
   EXPECT_EQ(read_as(FileFormat::LuantiSchematic, nodes.bytes).error().code, ErrorCode::LimitExceeded);
 }
 
-TEST(Models, AModelOfWidth10IsNoNbt) {
+TEST(Models, DistinguishesWidth10FromNbt) {
   Writer wide;
   wide.u32s({10, 1, 1});
   for (int x = 0; x < 10; ++x) wide.number(0x0000FF, 3);
@@ -292,7 +292,7 @@ TEST(Models, ReportsInvalidSizes) {
   ASSERT_EQ(loaded->warnings.size(), 1U);
 }
 
-TEST(Models, NodesThatMayBePlacedAre) {
+TEST(Models, PlacesNodesByProbability) {
   for (const int version : {2, 3, 4}) {
     Writer nodes;
     nodes.big(0, 2).big(0, 2).number(128, 1).number(1, 1).number(0, 2);
@@ -308,7 +308,7 @@ TEST(Models, NodesThatMayBePlacedAre) {
   }
 }
 
-TEST(Models, TooManyColoursAreReducedWithAWord) {
+TEST(Models, ReducesExcessColoursWithWarning) {
   ModelBuilder builder;
   builder.begin({});
   for (int i = 0; i < 70'000; ++i) {
@@ -324,7 +324,7 @@ TEST(Models, TooManyColoursAreReducedWithAWord) {
   EXPECT_EQ(loaded->scene.types.size(), kMaxVoxelTypes + 1);
 }
 
-TEST(Models, AMapOfSpansIsSolidBelowItsSurface) {
+TEST(Models, FillsVoxlapMapsBelowSurface) {
   // 512 x 512 columns of one colour at 60, with ground below; one column is a bridge over air.
   Writer map;
   for (int i = 0; i < 512 * 512; ++i) {
@@ -350,7 +350,7 @@ TEST(Models, AMapOfSpansIsSolidBelowItsSurface) {
   EXPECT_FALSE(driver_of(FileFormat::Voxlap).detect_whole(map.bytes));
 }
 
-TEST(Models, RealOnesHaveTheirCounts) {
+TEST(Models, RealFilesHaveExpectedCounts) {
   const fs::path folder = fs::path(QUOIN_SOURCE_DIR).parent_path() / "shared" / "data";
   if (!fs::exists(folder)) GTEST_SKIP() << "real files are not here";
   struct Known {
@@ -379,7 +379,7 @@ TEST(Models, RealOnesHaveTheirCounts) {
   }
 }
 
-TEST(Models, AProjectOfQubiclesHoldsWhatItsExportHolds) {
+TEST(Models, QubicleProjectMatchesItsExport) {
   const fs::path folder = fs::path(QUOIN_SOURCE_DIR).parent_path() / "shared" / "data" / "qb" / "vengi-voxel+vengi";
   if (!fs::exists(folder)) GTEST_SKIP() << "real files are not here";
   const auto project = load_scene(folder / "fd7931__data__tests__rgb.qbcl");
@@ -395,19 +395,19 @@ TEST(Models, AProjectOfQubiclesHoldsWhatItsExportHolds) {
   }
 }
 
-TEST(ModelBuilderDeathTest, ModelsHaveASize) {
+TEST(ModelBuilderDeathTest, AssertsOnZeroVoxelSize) {
   ModelBuilder builder;
   Model model;
   model.voxel_size = 0.0;
   QUOIN_EXPECT_MISTAKE(builder.begin(model), "0 < voxel_size");
 }
 
-TEST(ModelBuilderDeathTest, MaterialsWereAdded) {
+TEST(ModelBuilderDeathTest, AssertsOnUnknownMaterial) {
   ModelBuilder builder;
   QUOIN_EXPECT_MISTAKE(builder.use_material(1), "a material that was added");
 }
 
-TEST(ModelBuilderDeathTest, RunsGoAlongOneOfThreeAxes) {
+TEST(ModelBuilderDeathTest, AssertsOnInvalidAxis) {
   ModelBuilder builder;
   builder.begin({});
   QUOIN_EXPECT_MISTAKE(static_cast<void>(builder.put(IVec3{0}, {1, 2, 3, 255}, 2, 3)), "0 <= axis < 3");

@@ -89,7 +89,7 @@ void register_toy() {
   ASSERT_TRUE(done);
 }
 
-TEST(NewFormat, OneDriverMakesAFormatReadableAndWritable) {
+TEST(NewFormat, ReadsAndWritesWithOneDriver) {
   register_toy();
   const std::string text = "toy\n0 0 0\n1 0 0\n-5 70 3";
   const auto bytes = std::as_bytes(std::span(text));
@@ -129,7 +129,7 @@ std::string text_of_file(const std::string& path) {
   return text.str();
 }
 
-TEST(NewFormat, ThePageShowsThisCode) {
+TEST(NewFormat, MatchesDocumentedCode) {
   const std::string source = text_of_file("src/io/models/new_format_test.cpp");
   const std::string begin = std::string("// docs: ") + "begin\n";
   const std::string end = std::string("// docs: ") + "end\n";

@@ -100,7 +100,7 @@ bool are_alike(const Scene& a, const Scene& b) {
   return true;
 }
 
-TEST(PlacedGrids, TurnsAndMirrorsAsInstancesDo) {
+TEST(PlacedGrids, TurnsAndMirrorsLikeInstances) {
   const Scene scene = two_models();
   const Voxels voxels = voxels_of(scene);
   std::size_t expected = 0;
@@ -118,7 +118,7 @@ TEST(PlacedGrids, TurnsAndMirrorsAsInstancesDo) {
   EXPECT_EQ(voxels.size(), expected);
 }
 
-TEST(WriteModels, QubicleIsReadAgainAsItWas) {
+TEST(WriteModels, RoundTripsQubicle) {
   const Scene scene = two_models();
   const auto file = encoded(FileFormat::Qubicle, scene);
   ASSERT_TRUE(file) << to_string(file.error());
@@ -132,7 +132,7 @@ TEST(WriteModels, QubicleIsReadAgainAsItWas) {
   EXPECT_TRUE(again->bytes == file->bytes);
 }
 
-TEST(WriteModels, GoxelKeepsMaterialsAndWhatIsHidden) {
+TEST(WriteModels, GoxelKeepsMaterialsAndVisibility) {
   Scene scene = two_models();
   VoxelProperties metal = type_of({90, 90, 90, 255}, "metal");
   metal.metalness = 0.75F;
@@ -164,7 +164,7 @@ TEST(WriteModels, GoxelKeepsMaterialsAndWhatIsHidden) {
   EXPECT_NE(file->warnings[1].find("several layers, since a layer has one material: 2"), std::string::npos);
 }
 
-TEST(WriteModels, BinvoxKeepsPlaceAndSize) {
+TEST(WriteModels, BinvoxKeepsPositionAndSize) {
   Scene scene = two_models();
   for (const InstanceHandle handle : scene.instances().handles()) scene.edit(handle).voxel_size = 0.25;
   const auto file = encoded(FileFormat::Binvox, scene);
@@ -182,7 +182,7 @@ TEST(WriteModels, BinvoxKeepsPlaceAndSize) {
   after->voxels.for_each([&](IVec3 v, VoxelType) { EXPECT_NE(before->voxels.get(v), kAir); });
 }
 
-TEST(WriteModels, ABinvoxIsNoCubeWhereThatWouldBeAirAlone) {
+TEST(WriteModels, BinvoxPadsOnlySmallModelsToCubes) {
   Scene scene;
   const VoxelType grey = scene.types.add({.name = "grey"}).value();
   SceneGrid grid;
@@ -204,7 +204,7 @@ TEST(WriteModels, ABinvoxIsNoCubeWhereThatWouldBeAirAlone) {
   EXPECT_NE(text.find("dim 100 100 100"), std::string::npos);
 }
 
-TEST(WriteModels, MapsKeepEveryColourAndGetGround) {
+TEST(WriteModels, VoxlapKeepsColoursAndAddsGround) {
   Scene scene = two_models();
   const auto file = encoded(FileFormat::Voxlap, scene);
   ASSERT_TRUE(file) << to_string(file.error());
@@ -236,7 +236,7 @@ TEST(WriteModels, MapsKeepEveryColourAndGetGround) {
 }
 
 // Spans with a bottom and a filling top, and stretches without colours within.
-TEST(WriteModels, SpansOfMapsOfAnyForm) {
+TEST(WriteModels, RoundTripsVoxlapSpans) {
   Scene scene;
   const VoxelType red = *scene.types.add(type_of({200, 10, 20, 255}));
   const VoxelType earth = *scene.types.add(type_of({101, 77, 51, 255}));
@@ -260,7 +260,7 @@ TEST(WriteModels, SpansOfMapsOfAnyForm) {
   EXPECT_TRUE(are_alike(read->scene, scene));
 }
 
-TEST(WriteModels, LargeMapsAreVoxlaps) {
+TEST(WriteModels, VoxlapGrowsForLargeMapsAndRefusesTallOnes) {
   Scene scene;
   const VoxelType red = *scene.types.add(type_of({200, 10, 20, 255}));
   SceneGrid grid;
@@ -282,7 +282,7 @@ TEST(WriteModels, LargeMapsAreVoxlaps) {
   EXPECT_EQ(refused.error().code, ErrorCode::LimitExceeded);
 }
 
-TEST(WriteModels, SchematicsHaveBlocksOfTheNearestColour) {
+TEST(WriteModels, SchematicsUseBlocksOfNearestColour) {
   Scene scene = two_models();
   const VoxelType stairs = *scene.types.add(type_of({100, 80, 50, 255}, "minecraft:oak_stairs"));
   scene.edit(scene.grids().handles().front()).grid.set(-4, 9, -4, stairs);
@@ -309,7 +309,7 @@ TEST(WriteModels, SchematicsHaveBlocksOfTheNearestColour) {
 }
 
 /// The written file has properties that the block reader drops because they do not change the appearance.
-TEST(WriteModels, SchematicsSayWhatTheGameWouldTakeOtherwise) {
+TEST(WriteModels, SchematicsKeepBlocksStableInTheGame) {
   Scene scene;
   SceneGrid grid;
   int x = 0;
@@ -340,7 +340,7 @@ TEST(WriteModels, SchematicsSayWhatTheGameWouldTakeOtherwise) {
   EXPECT_TRUE(load_scene(file->bytes));
 }
 
-TEST(PlacedGrids, HalvesOfVoxelsAllGoTheSameWay) {
+TEST(PlacedGrids, RoundsHalfVoxelsConsistently) {
   Scene scene;
   const VoxelType type = *scene.types.add(type_of({1, 2, 3, 255}));
   SceneGrid grid;
@@ -373,7 +373,7 @@ TEST(PlacedGrids, HalvesOfVoxelsAllGoTheSameWay) {
   EXPECT_EQ(warnings.size(), 1U);
 }
 
-TEST(WriteModels, RejectsTypesThatAreNotRegistered) {
+TEST(WriteModels, RejectsUnregisteredTypes) {
   Scene scene = two_models();
   const GridHandle grid = scene.grids().handles().front();
   scene.edit(grid).grid.set(1, 1, 1, 9);
@@ -438,7 +438,7 @@ TEST(WriteModels, VolumesHoldTypesOrDensities) {
   EXPECT_LT(read->min, 0.0F);
 }
 
-TEST(WriteModels, RefuseWhatTheyWouldShowOtherwise) {
+TEST(WriteModels, RefusesUnsupportedTransformsAndFields) {
   for (const FileFormat format : {FileFormat::Qubicle, FileFormat::Goxel, FileFormat::Voxlap, FileFormat::Binvox,
                                   FileFormat::Schematic, FileFormat::Nifti}) {
     Scene turned = two_models();
@@ -468,7 +468,7 @@ TEST(WriteModels, RefuseWhatTheyWouldShowOtherwise) {
 
 #ifdef QUOIN_SOURCE_DIR
 /// Real files are unchanged after reading and writing in their own format.
-TEST(WriteModels, RealFilesAreReadAgainAsTheyWere) {
+TEST(WriteModels, RoundTripsRealFiles) {
   const fs::path data = fs::path(QUOIN_SOURCE_DIR) / "../shared/data";
   if (!fs::exists(data)) GTEST_SKIP() << "no real files here: " << data;
   std::map<std::string, int> tried;

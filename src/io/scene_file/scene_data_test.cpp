@@ -57,7 +57,7 @@ void expect_same_chunks(const Grid& a, const Grid& b) {
   ASSERT_EQ(a.data_count(), b.data_count());
 }
 
-TEST(SceneData, ComesBackAtEveryVoxel) {
+TEST(SceneData, RoundTripsEveryVoxel) {
   std::mt19937 random(5);
   Grid grid;
   for (int i = 0; i < 3'000; ++i) {
@@ -103,7 +103,7 @@ TEST(SceneData, StoresHighlyRegularDataUncompressed) {
   EXPECT_EQ(only_grid(loaded->scene).data_count(), grid.data_count());
 }
 
-TEST(SceneData, IsKeptWhereTypesOfNamedFilesAreRenumbered) {
+TEST(SceneData, SurvivesRenumberingOfTypes) {
   const TestFolder folder("scene_data");
   Grid grid;
   grid.set({1, 2, 3}, kTurned, {.state = 2});
@@ -242,7 +242,7 @@ TEST(SceneData, RefusesInvalidDataWithItsPosition) {
   EXPECT_EQ(find_bytes_error(bytes_of({{.voxels = {{.place = 1}}}}), ", 5"), "grids[0].data[1]: must be a string");
 }
 
-TEST(SceneData, StateBitsAreAtMostThirtyTwo) {
+TEST(SceneData, RejectsMoreThan32StateBits) {
   std::string text = text_of(scene_of(Grid()));
   const std::string wanted = "\"state_bits\":2";
   const std::size_t place = text.find(wanted);

@@ -49,7 +49,7 @@ void expect_same(const DensityGrid& a, const DensityGrid& b) {
   }
 }
 
-TEST(SceneFields, ComeBackToTheLastBit) {
+TEST(SceneFields, RoundTripExactly) {
   std::mt19937 random(3);
   for (const float band : {8.0F, 0.3F, 20.0F}) {
     DensityGrid field(band);
@@ -71,7 +71,7 @@ TEST(SceneFields, ComeBackToTheLastBit) {
 }
 
 // Voxels precede densities; data so regular that it is stored uncompressed is written twice.
-TEST(SceneFields, WritingThemTellsOfOneWholeThatNeverFalls) {
+TEST(SceneFields, ReportNonDecreasingProgress) {
   DensityGrid field;
   field.add_sphere({0.0, 0.0, 0.0}, 150.0, 1);
   Scene scene = scene_with(std::move(field));
@@ -98,7 +98,7 @@ TEST(SceneFields, WritingThemTellsOfOneWholeThatNeverFalls) {
   }
 }
 
-TEST(SceneFields, WithoutOneFilesAreOfTheVersionsBefore) {
+TEST(SceneFields, RaiseFileVersionOnlyIfPresent) {
   const auto text = write_scene_file(scene_file_of(scene_with(DensityGrid())).value()).value();
   const std::string_view view(reinterpret_cast<const char*>(text.data()), text.size());
   EXPECT_NE(view.find("\"quoin_scene\": 2"), std::string_view::npos);
@@ -110,7 +110,7 @@ TEST(SceneFields, WithoutOneFilesAreOfTheVersionsBefore) {
             std::string_view::npos);
 }
 
-TEST(SceneFields, MaterialsThatAreNotRegisteredAreRefused) {
+TEST(SceneFields, RefuseUnregisteredMaterials) {
   DensityGrid field;
   field.add_sphere({0, 0, 0}, 4.0, 9);
   const auto refused = there_and_back(scene_with(std::move(field)));
@@ -136,7 +136,7 @@ std::string find_densities_error(const std::vector<std::uint16_t>& words, std::s
   return find_grid_error(R"("densities": [")" + to_base64(gzipped(bytes, 9)) + "\"]");
 }
 
-TEST(SceneFields, DamagedOnesAreRefusedWithTheirPlace) {
+TEST(SceneFields, ReportPositionOfDamage) {
   const std::string at = "grids[0].densities[0]: ";
   const Half solid = half_from_float(-8.0F);
   const Half beyond = half_from_float(-9.0F);

@@ -145,7 +145,7 @@ TEST(SceneFile, HoldsCamerasOfEveryKind) {
   }
 }
 
-TEST(SceneFile, EveryFileOfTheCorpusIsReadOrRefused) {
+TEST(SceneFile, ReadsOrRefusesCorpus) {
   int read = 0;
   int refused = 0;
   for (const auto& entry : fs::directory_iterator(fs::path(QUOIN_SOURCE_DIR) / "tests" / "corpus" / "scene_file")) {
@@ -161,7 +161,7 @@ TEST(SceneFile, EveryFileOfTheCorpusIsReadOrRefused) {
   EXPECT_GE(refused, 4);
 }
 
-TEST(SceneFile, WritesNothingThatTheReaderRefuses) {
+TEST(SceneFile, RefusesToWriteUnreadableScenes) {
   const auto code_of = [](const std::function<void(SceneFile&)>& change) {
     SceneFile scene;
     scene.sources = {{"a", "a.vox"}};
@@ -283,7 +283,7 @@ class SceneFiles : public testing::Test {
   fs::path folder_;
 };
 
-TEST_F(SceneFiles, PlaceEachFileAsOftenAsWanted) {
+TEST_F(SceneFiles, PlaceFilesRepeatedly) {
   const auto loaded = load_scene(write_text(R"({"quoin_scene": 1,
       "files": [{"id": "r", "path": "red.vox"}, {"id": "b", "path": "blue.vox"}],
       "instances": [{"file": "r"}, {"file": "b", "name": "second", "position": [10, 0, 0], "scale": 2, "mirrored": true,
@@ -319,7 +319,7 @@ TEST_F(SceneFiles, PlaceEachFileAsOftenAsWanted) {
 }
 
 // A smooth world with a lamp, saved as a whole, below a house of blocks.
-TEST_F(SceneFiles, PlaceSceneFilesThatHoldAllThemselves) {
+TEST_F(SceneFiles, PlaceSelfContainedSceneFiles) {
   Scene world;
   VoxelProperties grass;
   grass.colour = {10, 180, 20, 255};
@@ -368,7 +368,7 @@ TEST_F(SceneFiles, ErrorsNameTheFile) {
   EXPECT_NE(with_path("noise.vox").find("noise.vox"), std::string::npos);
 }
 
-TEST_F(SceneFiles, AreParsedByTheirPathToo) {
+TEST_F(SceneFiles, AreParsedByPath) {
   const auto file = parse_scene_file(write_text(R"({"quoin_scene": 1, "files": [{"id": "a", "path": "absent.vox"}],
                                                     "instances": [{"file": "a"}]})"));
   ASSERT_TRUE(file) << to_string(file.error());

@@ -236,7 +236,7 @@ std::vector<std::byte> written(const Scene& scene, Threads threads = {}) {
   return bytes ? std::move(*bytes) : std::vector<std::byte>();
 }
 
-TEST(SceneModels, AnySceneComesBackToTheLastBit) {
+TEST(SceneModels, RoundTripsAnySceneExactly) {
   for (unsigned seed = 0; seed < 30; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const Scene scene = RandomScene(seed).scene();
@@ -249,7 +249,7 @@ TEST(SceneModels, AnySceneComesBackToTheLastBit) {
   }
 }
 
-TEST(SceneModels, ChunksOfEveryWidthComeBack) {
+TEST(SceneModels, RoundTripsChunksOfEveryWidth) {
   Scene scene;
   for (int i = 0; i < 65'535; ++i) {
     VoxelProperties properties;
@@ -270,7 +270,7 @@ TEST(SceneModels, ChunksOfEveryWidthComeBack) {
 }
 
 // The reader refuses data that compresses too well, so the writer stores it uncompressed.
-TEST(SceneModels, StoresUncompressedWhereReadingWouldTakeTooMuchMemory) {
+TEST(SceneModels, StoresHighlyRegularVoxelsUncompressed) {
   Scene scene;
   ASSERT_TRUE(scene.types.add({}));
   SceneGrid grid;
@@ -284,7 +284,7 @@ TEST(SceneModels, StoresUncompressedWhereReadingWouldTakeTooMuchMemory) {
   expect_equal(scene, read->scene);
 }
 
-TEST(SceneModels, StandBesideFilesOfModels) {
+TEST(SceneModels, CombinesWithModelFiles) {
   const TestFolder folder("scene_models");
   const Scene ship = RandomScene(1).scene();
   Scene red;
@@ -364,7 +364,7 @@ std::string find_piece_error(std::vector<std::uint16_t> words, std::size_t cut =
   return find_scene_error(file_with_voxels("\"" + to_base64(gzipped(bytes, 9)) + "\""));
 }
 
-TEST(SceneModels, DamagedVoxelsAreRefusedWithTheirPlace) {
+TEST(SceneModels, ReportsPositionOfDamagedVoxels) {
   const std::string at = "grids[0].voxels[0]: ";
   EXPECT_EQ(find_piece_error({1, 0, 2, 0, 3, 0, 1, 0, 1}), "none");
   EXPECT_EQ(find_piece_error({}), "none");
@@ -385,7 +385,7 @@ TEST(SceneModels, DamagedVoxelsAreRefusedWithTheirPlace) {
             at + "byte 30 of the voxel data: cut off");
 }
 
-TEST(SceneModels, LampsAreRefusedWithTheirPlace) {
+TEST(SceneModels, ReportsPositionOfInvalidLamps) {
   const auto fault = [](const std::string& lamp) {
     return find_scene_error(R"({"quoin_scene": 2, "grids": [], "instances": [], "lamps": [)" + lamp + "]}");
   };
@@ -396,7 +396,7 @@ TEST(SceneModels, LampsAreRefusedWithTheirPlace) {
   EXPECT_EQ(fault(R"({"position": [1, 2]})"), "lamps[0].position: must be a list of 3 numbers");
 }
 
-TEST(SceneModels, DamagedTextIsRefusedWithItsPlace) {
+TEST(SceneModels, ReportsPositionOfDamagedText) {
   const std::string at = "grids[0].voxels[0]: ";
   EXPECT_EQ(find_scene_error(file_with_voxels("")), "none");
   EXPECT_EQ(find_scene_error(file_with_voxels("7")), at + "must be a string");
@@ -432,7 +432,7 @@ TEST(SceneModels, DamagedTextIsRefusedWithItsPlace) {
 }
 
 // Deflate can expand data to about a thousand times its size.
-TEST(SceneModels, BombsAreRefusedBeforeTheyExpand) {
+TEST(SceneModels, RefusesBombsBeforeExpansion) {
   const std::vector<std::byte> zeros(std::size_t{64} << 20);
   EXPECT_EQ(find_scene_error(file_with_voxels("\"" + to_base64(gzipped(zeros, 9)) + "\"")),
             "grids[0].voxels[0]: expands to more than 32 MiB");

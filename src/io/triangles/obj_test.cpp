@@ -103,7 +103,7 @@ class Obj : public ::testing::Test {
   TestFolder folder_{std::string("obj_") + ::testing::UnitTest::GetInstance()->current_test_info()->name()};
 };
 
-TEST_F(Obj, ObjectsAreBakedWithOutwardWindingsMirroredOnesToo) {
+TEST_F(Obj, KeepsWindingsOutwardInMirroredObjects) {
   place({0, 0, 0});
   Instance& turned = place({100, 5, -7.25});
   turned.rotation = glm::normalize(DQuat(0.3, 0.5, -0.1, 0.7));
@@ -125,7 +125,7 @@ TEST_F(Obj, ObjectsAreBakedWithOutwardWindingsMirroredOnesToo) {
   EXPECT_NEAR(second.max.y, all.max.y, 1e-5);
 }
 
-TEST_F(Obj, TextureCoordinatesMeetThePalette) {
+TEST_F(Obj, TextureCoordinatesMatchPalette) {
   place({0, 0, 0});
   const ParsedObj obj = write();
   const PngImage palette = *decode_png(*read_file(folder_.file("my model_palette.png")));
@@ -140,7 +140,7 @@ TEST_F(Obj, TextureCoordinatesMeetThePalette) {
   EXPECT_EQ(seen, (std::set<std::array<int, 3>>{{90, 80, 70}, {10, 200, 220}, {250, 240, 10}}));
 }
 
-TEST_F(Obj, AnAtlasIsTheImageOfOpaqueBlocks) {
+TEST_F(Obj, TexturesOpaqueBlocksWithAtlas) {
   place({0, 0, 0});
   place({50, 0, 0});
   meshes_ = mesh_scene(scene_, {.atlas = true}).value();
@@ -166,7 +166,7 @@ TEST_F(Obj, AnAtlasIsTheImageOfOpaqueBlocks) {
   EXPECT_EQ(files.size(), folder_.count());
 }
 
-TEST_F(Obj, MaterialsAreInTheLibraryBesideIt) {
+TEST_F(Obj, WritesMaterialsToLibrary) {
   place({0, 0, 0});
   const ParsedObj obj = write();
   EXPECT_EQ(obj.library, "my model.mtl");
@@ -183,7 +183,7 @@ TEST_F(Obj, MaterialsAreInTheLibraryBesideIt) {
   EXPECT_EQ(folder_.count(), 4U);
 }
 
-TEST_F(Obj, GlassHasOneAlphaAMaterialThatEveryClientReads) {
+TEST_F(Obj, WritesGlassAlphaPerMaterial) {
   place({0, 0, 0});
   write();
   const std::string library = text_of(folder_.file("my model.mtl"));
@@ -199,7 +199,7 @@ TEST_F(Obj, GlassHasOneAlphaAMaterialThatEveryClientReads) {
   for (std::size_t i = 7; i < 16; i += 4) EXPECT_EQ(palette.pixels[i], 255) << "some clients multiply it";
 }
 
-TEST_F(Obj, OcclusionIsAColourOfVerticesOnlyWhenThereIsAny) {
+TEST_F(Obj, WritesOcclusionAsVertexColoursIfPresent) {
   place({0, 0, 0});
   const ParsedObj shaded = write();
   EXPECT_EQ(shaded.greys.size(), shaded.positions.size());
@@ -215,7 +215,7 @@ TEST_F(Obj, FailuresLeaveNoFile) {
   EXPECT_EQ(folder_.count(), 0U);
 }
 
-TEST_F(Obj, AnEmptySceneIsAFileWithoutObjects) {
+TEST_F(Obj, WritesEmptySceneWithoutObjects) {
   EXPECT_TRUE(write().objects.empty());
 }
 

@@ -7,7 +7,7 @@ namespace quoin {
 
 namespace {
 
-TEST(BlockyPly, EveryFaceStandsInTheWorldWithItsColour) {
+TEST(BlockyPly, WritesColouredFacesInWorldSpace) {
   Scene scene;
   const GridHandle grid = add_asymmetric_grid(scene, "L");
   const InstanceHandle mirrored = place(scene, grid, {10, 20, 30});

@@ -31,19 +31,19 @@ double total_area(const std::vector<DVec3>& corners) {
   return sum;
 }
 
-TEST(Polygon, AConcaveOneIsNotFilled) {
+TEST(Polygon, KeepsAreaOfConcavePolygon) {
   const std::vector<DVec3> arrow = {{0, 0, 0}, {4, 0, 0}, {4, 4, 0}, {2, 2, 0}, {0, 4, 0}};
   EXPECT_NEAR(total_area(arrow), 12.0, 1e-12);
   for (const auto& triangle : cut(arrow)) EXPECT_GE(area_of(arrow, triangle).z, 0.0);
 }
 
-TEST(Polygon, AKeyholeKeepsItsHole) {
+TEST(Polygon, KeepsHoleOfKeyhole) {
   const std::vector<DVec3> keyhole = {{0, 0, 0}, {4, 0, 0}, {4, 4, 0}, {0, 4, 0}, {0, 0, 0},
                                       {1, 1, 0}, {1, 3, 0}, {3, 3, 0}, {3, 1, 0}, {1, 1, 0}};
   EXPECT_NEAR(total_area(keyhole), 12.0, 1e-12);
 }
 
-TEST(Polygon, EveryStarKeepsItsAreaAndItsEdgesFromAnySide) {
+TEST(Polygon, KeepsAreaAndEdgesOfStars) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> radius(0.2, 3.0);
   for (int run = 0; run < 200; ++run) {
@@ -64,14 +64,14 @@ TEST(Polygon, EveryStarKeepsItsAreaAndItsEdgesFromAnySide) {
   }
 }
 
-TEST(Polygon, OnesWithoutAreaOrThatCrossThemselvesAreCutAllTheSame) {
+TEST(Polygon, CutsDegenerateAndCrossingPolygons) {
   (void)cut({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}});
   (void)cut({{0, 0, 0}, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}});
   (void)cut({{0, 0, 0}, {2, 2, 0}, {2, 0, 0}, {0, 2, 0}});
   (void)cut({{0, 0, 0}, {4, 0, 0}, {1, 3, 0}, {2, -1, 0}, {3, 3, 0}});
 }
 
-TEST(Polygon, AFanIsMadeOfWhatIsTooLarge) {
+TEST(Polygon, CutsLargePolygonsAsFan) {
   std::vector<DVec3> comb;
   for (std::size_t i = 0; i <= kMostCornersOfConcave; ++i) comb.emplace_back(double(i), i % 2 == 0 ? 0.0 : 9.0, 0.0);
   Triangles triangles;

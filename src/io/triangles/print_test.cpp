@@ -93,7 +93,7 @@ std::size_t count_of(const std::string& text, const std::string& what) {
   return count;
 }
 
-TEST(Print, PrintMeshesAreClosedAndOthersAreNot) {
+TEST(Print, ClosesMeshesForPrinting) {
   const Scene scene = touching_voxels();
   EXPECT_EQ(count_open_edges(for_printing(scene)), 0U);
   EXPECT_GT(count_open_edges(*mesh_scene(scene)), 100U);

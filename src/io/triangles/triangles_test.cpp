@@ -156,7 +156,7 @@ std::string tetrahedron_gltf(const std::string& nodes, const std::string& materi
                   materials + R"("nodes":)" + nodes);
 }
 
-TEST(Triangles, AllFormatsGiveTheSameTriangles) {
+TEST(Triangles, ReadsSameTrianglesFromEveryFormat) {
   std::vector<std::string> files = {ply_bytes(false), ply_bytes(true), stl_bytes(), stl_text()};
   std::string text = ply_header("ascii");
   for (const auto& c : kCorners) {
@@ -366,7 +366,7 @@ TEST(Triangles, FindsFilesOnlyBelowTheirFolder) {
   EXPECT_EQ(scene->scene.grids()[scene->scene.grids().handles().front()].name, "one");
 }
 
-TEST(Triangles, BecomeScenesAtTheirOwnSize) {
+TEST(Triangles, VoxelizesAtOriginalSize) {
   LoadOptions options;
   options.mesh.up = UpAxis::Y;
   auto scene = load_scene(bytes_of(stl_bytes()), options);
@@ -404,7 +404,7 @@ TEST(Triangles, ReadsCorpusFilesAsScenes) {
   EXPECT_GE(read, 6U);
 }
 
-TEST(Triangles, RealFilesHaveTheExpectedCounts) {
+TEST(Triangles, RealFilesHaveExpectedCounts) {
   const fs::path folder = fs::path(QUOIN_SOURCE_DIR).parent_path() / "shared" / "data" / "mesh";
   if (!fs::exists(folder)) GTEST_SKIP() << "the files are not here";
   const fs::path models = folder / "alecjacobson+common-3d-test-models";
@@ -426,7 +426,7 @@ TEST(Triangles, RealFilesHaveTheExpectedCounts) {
   }
 }
 
-TEST(MeshFiles, PolygonsOfManyCornersAreRead) {
+TEST(MeshFiles, ReadsPolygonsOfManyCorners) {
   if (!reads(FileFormat::Obj)) GTEST_SKIP() << "without OBJ";
   // A comb of 1,000 teeth: not convex, and more corners than a byte can count.
   std::string text;
@@ -448,7 +448,7 @@ TEST(MeshFiles, PolygonsOfManyCornersAreRead) {
   EXPECT_TRUE(loaded.warnings.empty());
 }
 
-TEST(MeshFiles, ObjLinesMayEndInAnyWay) {
+TEST(MeshFiles, ReadsEveryObjLineEnding) {
   if (!reads(FileFormat::Obj)) GTEST_SKIP() << "without OBJ";
   for (const std::string end : {"\r", "\r\n", "\n"}) {
     const std::string text =
@@ -463,7 +463,7 @@ std::string corpus_file(const char* name) {
   return bytes ? std::string(reinterpret_cast<const char*>(bytes->data()), bytes->size()) : std::string();
 }
 
-TEST(Triangles, RefuseSecondVertexElement) {
+TEST(Triangles, RefusesSecondVertexElement) {
   const auto bytes = read_file(fs::path(QUOIN_SOURCE_DIR) / "tests" / "corpus" / "cases" / "fuzz-ply-unsound.ply");
   ASSERT_TRUE(bytes.has_value());
   const auto loaded = read_mesh(*bytes);
@@ -471,7 +471,7 @@ TEST(Triangles, RefuseSecondVertexElement) {
   EXPECT_NE(to_string(loaded.error()).find("more than one element is named vertex"), std::string::npos);
 }
 
-TEST(OffFiles, HaveCornersFacesAndColours) {
+TEST(OffFiles, ReadsCornersFacesAndColours) {
   const LoadedMesh plain = mesh_of(corpus_file("off"), std::nullopt);
   EXPECT_EQ(plain.format, "off");
   EXPECT_EQ(plain.mesh.positions[3], DVec3(0, 0, 1)) << "y is up";
@@ -488,7 +488,7 @@ TEST(OffFiles, HaveCornersFacesAndColours) {
   EXPECT_EQ(coloured.mesh.materials[2].colour, glm::vec4(1, 0, 0, 1));
 }
 
-TEST(OffFiles, HeadersMayStandOnOneLineAndNormalsAreLeftOut) {
+TEST(OffFiles, ReadsOneLineHeadersAndSkipsNormals) {
   EXPECT_EQ(mesh_of("OFF 3 1 3\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n").mesh.triangles.size(), 1U);
   EXPECT_EQ(mesh_of("# first\n\nSTCNOFF\n3 1 0\n0 0 0 0 0 1 1 1 1 1 0.5 0.5\n1 0 0 0 0 1 1 1 1 1 0 0\n"
                     "0 1 0 0 0 1 1 1 1 1 1 1\n3 0 1 2\n")
@@ -496,7 +496,7 @@ TEST(OffFiles, HeadersMayStandOnOneLineAndNormalsAreLeftOut) {
             glm::vec4(1.0F / 255.0F / 12.92F, 1.0F / 255.0F / 12.92F, 1.0F / 255.0F / 12.92F, 1.0F / 255.0F));
 }
 
-TEST(OffFiles, DamageIsNamedWithItsPlace) {
+TEST(OffFiles, DescribesDamage) {
   EXPECT_EQ(error_of("OFF\n9999999 1 0\n0 0 0\n").message, "the file claims 9999999 vertices and 1 faces in 6 bytes");
   EXPECT_EQ(error_of("OFF\n2 1 0\n0 0 0\n1 x 0\n3 0 1 1\n").byte_offset, 16U);
   EXPECT_EQ(error_of("OFF\n2 1 0\n0 0 0\n1 0 0\n3 0 1\n").message, "a face has fewer corners than it claims");
@@ -504,7 +504,7 @@ TEST(OffFiles, DamageIsNamedWithItsPlace) {
   EXPECT_EQ(error_of("OFF BINARY\n????").code, ErrorCode::Unsupported);
 }
 
-TEST(ThreeMfFiles, PlaceObjectsInMillimetresWithTheirColours) {
+TEST(ThreeMfFiles, PlacesColouredObjectsInMillimetres) {
   if (!reads(FileFormat::ThreeMf)) GTEST_SKIP() << "without expat";
   const LoadedMesh loaded = mesh_of(corpus_file("3mf__components"));
   EXPECT_EQ(loaded.format, "3mf");
@@ -536,7 +536,7 @@ TEST(ThreeMfFiles, PlaceObjectsInMillimetresWithTheirColours) {
   EXPECT_EQ(up.mesh.bounds().max, DVec3(1, 1, 0)) << "z is up";
 }
 
-TEST(ThreeMfFiles, OnesThatQuoinWritesAreRead) {
+TEST(ThreeMfFiles, ReadsFilesWrittenByQuoin) {
   if (!reads(FileFormat::ThreeMf) || !reads(FileFormat::Obj)) GTEST_SKIP() << "without expat or OBJ";
   LoadedScene scene = load_scene(bytes_of(kObj), {.mesh = {.size = 6}}).value();
   const fs::path path = fs::path(testing::TempDir()) / "quoin_again.3mf";
@@ -550,7 +550,7 @@ TEST(ThreeMfFiles, OnesThatQuoinWritesAreRead) {
   fs::remove(path);
 }
 
-TEST(ThreeMfFiles, DamageAnywhereGivesErrorsAndNoCrash) {
+TEST(ThreeMfFiles, SurvivesDamageAnywhere) {
   for (const char* name : {"3mf", "3mf__components"}) {
     const std::string whole = corpus_file(name);
     for (std::size_t size = 0; size < whole.size(); size += 3) (void)read_mesh(bytes_of(whole.substr(0, size)));

@@ -50,7 +50,7 @@ void expect_near(const DVec3& a, const DVec3& b) {
   EXPECT_LT(glm::length(a - b), 1e-9) << a.x << ", " << a.y << ", " << a.z;
 }
 
-TEST(Vdb, ALevelSetIsAFieldOfDistancesInSamples) {
+TEST(Vdb, ReadsLevelSetAsDistanceField) {
   for (const char* name : {"level_set_blosc.vdb", "level_set_blosc.nvdb"}) {
     const LoadedScene loaded = load(kCorpus / name);
     EXPECT_EQ(loaded.format, "vdb");
@@ -67,13 +67,13 @@ TEST(Vdb, ALevelSetIsAFieldOfDistancesInSamples) {
   }
 }
 
-TEST(Vdb, DoublesAreReadAsFloats) {
+TEST(Vdb, ReadsDoublesAsFloats) {
   for (const char* name : {"double_zip.vdb", "double_zip.nvdb"}) {
     EXPECT_EQ(grid_named(load(kCorpus / name), "double").field.solid_count(), 251) << name;
   }
 }
 
-TEST(Vdb, GridsThatShareATreeAreInstances) {
+TEST(Vdb, ReadsSharedTreesAsInstances) {
   const LoadedScene loaded = load(kCorpus / "instances.vdb");
   EXPECT_EQ(loaded.scene.grids().handles().size(), 1U);
   const SceneGrid& sphere = grid_named(loaded, "sphere");
@@ -82,7 +82,7 @@ TEST(Vdb, GridsThatShareATreeAreInstances) {
   expect_near(world_from_grid(instance_of(loaded, "turned"), sphere, {2, 4, 6}), {3, 2, 6});
 }
 
-TEST(Vdb, MasksAreVoxelsAroundTheirIndices) {
+TEST(Vdb, ReadsMasksAsVoxels) {
   for (const auto& [file, name, count] : {std::tuple{"masks.vdb", "bool", 69'005},
                                           {"masks.vdb", "mask", 2'310},
                                           {"bool_zip.nvdb", "bool", 69'005},
@@ -100,7 +100,7 @@ TEST(Vdb, MasksAreVoxelsAroundTheirIndices) {
   EXPECT_NE(loaded.warnings[0].find("\"velocity\", of type Tree_vec3s"), std::string::npos);
 }
 
-TEST(Vdb, FogIsSolidAboveAValue) {
+TEST(Vdb, ReadsFogAsSolidAboveIso) {
   LoadOptions options;
   options.iso = 0.5F;
   const LoadedScene loaded = load(kCorpus / "fog_half_zip.vdb", options);
@@ -210,7 +210,7 @@ void expect_sound(std::span<const std::byte> bytes, const std::string& what) {
   }
 }
 
-TEST(Vdb, DamageIsAnErrorWithItsPlace) {
+TEST(Vdb, SurvivesDamageAnywhere) {
   std::minstd_rand random(3);
   for (const auto& entry : fs::directory_iterator(kCorpus)) {
     const auto sound = read_file(entry.path());
@@ -231,7 +231,7 @@ TEST(Vdb, DamageIsAnErrorWithItsPlace) {
   }
 }
 
-TEST(Vdb, OtherVersionsAndStreamsAreRefused) {
+TEST(Vdb, RefusesOtherVersionsAndStreams) {
   auto bytes = read_file(kCorpus / "instances.vdb").value();
   bytes[8] = std::byte{200};
   EXPECT_EQ(load_scene(bytes).error().code, ErrorCode::Unsupported);
@@ -240,7 +240,7 @@ TEST(Vdb, OtherVersionsAndStreamsAreRefused) {
   EXPECT_EQ(load_scene(bytes).error().byte_offset, 20U);
 }
 
-TEST(Vdb, FramesOfBloscThatAreDamagedAreErrors) {
+TEST(Vdb, SurvivesDamagedBloscFrames) {
   std::vector<std::byte> frame(64);
   std::vector<std::byte> out(2048);
   EXPECT_FALSE(expand_blosc(frame, out));
@@ -256,7 +256,7 @@ TEST(Vdb, FramesOfBloscThatAreDamagedAreErrors) {
   }
 }
 
-TEST(Vdb, RealFilesHoldWhatOpenVdbFindsInThem) {
+TEST(Vdb, MatchesOpenVdbOnRealFiles) {
   const fs::path folder = fs::path(QUOIN_SOURCE_DIR) / "../shared/data/vdb";
   if (!fs::exists(folder)) GTEST_SKIP() << folder << " is not there";
   const fs::path sphere = folder / "mjurczyk+openvdb" / "examples__public__assets__sphere.vdb";

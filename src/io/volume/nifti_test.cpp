@@ -38,7 +38,7 @@ bool warns(const Volume& volume, const std::string& of) {
   return false;
 }
 
-TEST(Nifti, EveryTypeInEveryOrderAndVersionIsRead) {
+TEST(Nifti, ReadsEveryTypeOrderAndVersion) {
   for (std::size_t type = 0; type < kNiftiTypes.size(); ++type) {
     const auto scalar = static_cast<ScalarType>(type);
     std::vector<double> values = kTwelve;
@@ -67,7 +67,7 @@ TEST(Nifti, EveryTypeInEveryOrderAndVersionIsRead) {
   }
 }
 
-TEST(Nifti, GzipMakesNoDifferenceNorDoesItsDivisionIntoMembers) {
+TEST(Nifti, ReadsGzipOfSeveralMembers) {
   const Bytes plain = NiftiFile{}.bytes(encode(kTwelve, ScalarType::UInt8));
   const std::vector<float> expected(kTwelve.begin(), kTwelve.end());
   EXPECT_EQ(read_volume(gzipped(plain)).value().values, expected);
@@ -80,7 +80,7 @@ TEST(Nifti, GzipMakesNoDifferenceNorDoesItsDivisionIntoMembers) {
   EXPECT_EQ(read_volume(members).value().values, expected) << "padded with zeros";
 }
 
-TEST(Nifti, SlopeAndInterceptScaleUnlessTheSlopeSaysNothing) {
+TEST(Nifti, AppliesValidSlopeAndIntercept) {
   NiftiFile file;
   const auto first = [&](double slope, double intercept) {
     file.slope = slope;
@@ -94,7 +94,7 @@ TEST(Nifti, SlopeAndInterceptScaleUnlessTheSlopeSaysNothing) {
   EXPECT_TRUE(warns(placed(file), "scl_slope"));
 }
 
-TEST(Nifti, WithoutAFormTheSpacingPlacesSamples) {
+TEST(Nifti, PlacesSamplesBySpacingWithoutForm) {
   NiftiFile file;
   file.pixdim = {1, 2, 3, 4, 1, 1, 1, 1};
   const Volume volume = placed(file);
@@ -104,7 +104,7 @@ TEST(Nifti, WithoutAFormTheSpacingPlacesSamples) {
   EXPECT_GT(glm::determinant(volume.world_from_voxel), 0.0);
 }
 
-TEST(Nifti, TheSformGoesBeforeTheQform) {
+TEST(Nifti, PrefersSformOverQform) {
   NiftiFile file;
   file.pixdim = {1, 2, 2, 2, 1, 1, 1, 1};
   file.qform_code = 1;
@@ -121,7 +121,7 @@ TEST(Nifti, TheSformGoesBeforeTheQform) {
   expect_near(position_of(placed(file), {0, 0, 0}), {-7, 7, 7});
 }
 
-TEST(Nifti, FormsThatDisagreeAreWarnedOf) {
+TEST(Nifti, WarnsIfFormsDisagree) {
   NiftiFile file;
   file.qform_code = 1;
   file.sform_code = 1;
@@ -137,7 +137,7 @@ TEST(Nifti, FormsThatDisagreeAreWarnedOf) {
   EXPECT_FALSE(warns(placed(file), "orient the axes differently"));
 }
 
-TEST(Nifti, TheQformTurnsAndQfacFlipsTheThirdAxis) {
+TEST(Nifti, AppliesQformAndQfac) {
   for (const bool is_second : {false, true}) {
     NiftiFile file{.is_second = is_second, .order = std::endian::big};
     file.pixdim = {-1, 2, 3, 4, 1, 1, 1, 1};
@@ -159,7 +159,7 @@ TEST(Nifti, TheQformTurnsAndQfacFlipsTheThirdAxis) {
   }
 }
 
-TEST(Nifti, FormsThatPlaceNothingAreLeftOutWithAWarning) {
+TEST(Nifti, IgnoresInvalidFormsWithWarning) {
   NiftiFile file;
   file.sform_code = 1;
   Volume volume = placed(file);
@@ -182,7 +182,7 @@ TEST(Nifti, FormsThatPlaceNothingAreLeftOutWithAWarning) {
   EXPECT_EQ(placed(second).spacing, DVec3(1));
 }
 
-TEST(Nifti, ReadsTheFirstVolumeOfMoreThanThreeDimensions) {
+TEST(Nifti, ReadsFirstVolumeOfMoreThanThreeDimensions) {
   NiftiFile file;
   file.dim = {4, 3, 2, 2, 5, 1, 1, 1};
   std::vector<double> values = kTwelve;
@@ -221,7 +221,7 @@ TEST(Nifti, KeepsAndCountsNonFiniteValues) {
   EXPECT_EQ(none.max, 0.0F);
 }
 
-TEST(Nifti, ValuesMayBeginBehindExtensions) {
+TEST(Nifti, ReadsValuesBehindExtensions) {
   NiftiFile file;
   file.vox_offset = 1024;
   EXPECT_EQ(placed(file).values.front(), 1.0F);

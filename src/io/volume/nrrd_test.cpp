@@ -42,7 +42,7 @@ std::string error_of(const Bytes& bytes) {
   return volume ? "none" : to_string(volume.error());
 }
 
-TEST(Nrrd, EveryTypeByEveryNameInEveryOrderIsRead) {
+TEST(Nrrd, ReadsEveryTypeNameAndByteOrder) {
   const std::vector<std::pair<ScalarType, std::vector<std::string>>> names = {
       {ScalarType::UInt8, {"uchar", "unsigned char", "uint8", "uint8_t"}},
       {ScalarType::Int8, {"signed char", "int8", "int8_t"}},
@@ -71,11 +71,11 @@ TEST(Nrrd, EveryTypeByEveryNameInEveryOrderIsRead) {
   EXPECT_NE(error_of(file_of("NRRD0001\ntype: uint8|uint8_t\n\n", {})), "none");
 }
 
-TEST(Nrrd, TheWholeFileMayBeCompressed) {
+TEST(Nrrd, ReadsCompressedFile) {
   EXPECT_EQ(volume_of(gzipped(tiny(""))).values, kTwelveFloats);
 }
 
-TEST(Nrrd, LinesMayEndInTwoCharactersAndFieldsInBlanks) {
+TEST(Nrrd, AcceptsCrLfAndTrailingBlanks) {
   const std::string header =
       "NRRD0005\r\ntype:  unsigned  char \r\ndimension: 3\r\nkey:=value: x\r\nsizes: 3\t2 2 \r\n"
       "encoding: raw\r\ncontent: a name\r\n\r\n";
@@ -84,7 +84,7 @@ TEST(Nrrd, LinesMayEndInTwoCharactersAndFieldsInBlanks) {
   EXPECT_EQ(volume.name, "a name");
 }
 
-TEST(Nrrd, SpacingsPlaceSamplesLikeVoxels) {
+TEST(Nrrd, PlacesSamplesBySpacings) {
   const Volume volume = volume_of(tiny("spacings: 2 0.5 +4\n"));
   EXPECT_EQ(volume.spacing, DVec3(2, 0.5, 4));
   EXPECT_EQ(position_of(volume, {1, 1, 1}), DVec3(2, 4, -0.5));
@@ -94,7 +94,7 @@ TEST(Nrrd, SpacingsPlaceSamplesLikeVoxels) {
   EXPECT_EQ(turned.warnings, std::vector<std::string>{"a spacing is negative; its absolute value is used"});
 }
 
-TEST(Nrrd, DirectionsAndOriginPlaceSamples) {
+TEST(Nrrd, PlacesSamplesByDirectionsAndOrigin) {
   const Volume volume =
       volume_of(tiny("space: left-posterior-superior\nspace directions: (2,0,0) (0,0,3) ( 0, -4, 0 )\n"
                      "space origin: (10,20,30)\nspace units: \"mm\" \"mm\" \"mm\"\n"));
@@ -107,7 +107,7 @@ TEST(Nrrd, DirectionsAndOriginPlaceSamples) {
 }
 
 /// A point of the body lies at the same position in every space.
-TEST(Nrrd, TheSameBodyInEverySpaceIsTheSame) {
+TEST(Nrrd, ConvertsEverySpace) {
   const auto origin = [](const std::string& space, const std::string& vector) {
     return position_of(volume_of(tiny("space: " + space + "\nspace origin: (" + vector + ")\n")), {0, 0, 0});
   };
@@ -122,7 +122,7 @@ TEST(Nrrd, TheSameBodyInEverySpaceIsTheSame) {
   EXPECT_LT(glm::determinant(volume_of(tiny("space: 3D-left-handed\n")).world_from_voxel), 0.0);
 }
 
-TEST(Nrrd, SkipsLeadToTheData) {
+TEST(Nrrd, SkipsLinesAndBytesBeforeData) {
   Bytes data = encode({77, 78, 10, 79, 10, 80}, ScalarType::UInt8);
   const Bytes values = encode(kTwelve, ScalarType::UInt8);
   data.insert(data.end(), values.begin(), values.end());
@@ -132,7 +132,7 @@ TEST(Nrrd, SkipsLeadToTheData) {
   EXPECT_NE(error_of(tiny("line skip: 3\n", encode(kTwelve, ScalarType::UInt8))), "none");
 }
 
-TEST(Nrrd, ValuesBeyondThreeDimensionsAreLeftOut) {
+TEST(Nrrd, LeavesOutValuesBeyondThreeDimensions) {
   const std::string header = "NRRD0004\ntype: uint8\ndimension: 4\nencoding: raw\n";
   Bytes data = encode(kTwelve, ScalarType::UInt8);
   const Volume volume = volume_of(
@@ -141,7 +141,7 @@ TEST(Nrrd, ValuesBeyondThreeDimensionsAreLeftOut) {
   ASSERT_EQ(volume.warnings.size(), 1U);
 }
 
-TEST(Nrrd, ReadsTheFirstOfSeveralComponents) {
+TEST(Nrrd, ReadsFirstOfSeveralComponents) {
   const std::string header = "NRRD0004\ntype: uint8\ndimension: 4\nencoding: raw\nsizes: 3 2 2 1\n";
   const Bytes data = encode(kTwelve, ScalarType::UInt8);
   const std::vector<float> first = {1, 4, 7, 10};
@@ -176,7 +176,7 @@ TEST(Nrrd, ReadsValuesAsText) {
   EXPECT_NE(error_of(file("uint8", "ascii", "1 2 3")), "none");
 }
 
-TEST(Nrrd, ReadsValuesOfTheFileNextToADetachedHeader) {
+TEST(Nrrd, ReadsDataFileOfDetachedHeader) {
   const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "quoin_detached";
   std::filesystem::create_directories(folder);
   const auto write = [&](const char* name, const Bytes& bytes) { ASSERT_TRUE(write_file(bytes, folder / name)); };
@@ -235,7 +235,7 @@ TEST(Nrrd, ReportsErrorsInOneLine) {
   EXPECT_EQ(error_of(tiny("", {})), "byte 74: 3 x 2 x 2 values of uint8 take 12 bytes, but there are 0");
 }
 
-TEST(Nrrd, OtherEncodingsAndTypesAreRefused) {
+TEST(Nrrd, RefusesOtherEncodingsAndTypes) {
   const std::string header = "NRRD0004\ndimension: 3\nsizes: 1 1 1\n";
   EXPECT_EQ(error_of(file_of(header + "type: uint8\nencoding: zrl\n\n", {})),
             "byte 47: unsupported encoding \"zrl\" (raw, gzip, bzip2, ascii and hex are supported)");

@@ -38,7 +38,7 @@ std::vector<int> dims_in(const std::string& info) {
   return dims;
 }
 
-TEST_F(VolumeData, EveryFileHasTheSizeAndTypeThatOthersFound) {
+TEST_F(VolumeData, MatchesSizesAndTypesInIndex) {
   std::ifstream index(kData / "index.json");
   int count = 0;
   for (const nlohmann::json& entry : nlohmann::json::parse(index)) {
@@ -61,13 +61,13 @@ TEST_F(VolumeData, EveryFileHasTheSizeAndTypeThatOthersFound) {
   EXPECT_EQ(count, 6);
 }
 
-TEST_F(VolumeData, ScaledValuesAreAsTheHeaderSays) {
+TEST_F(VolumeData, ScalesValuesByHeader) {
   const Volume volume = read("nipy+nibabel/nibabel__tests__data__functional.nii");
   EXPECT_NEAR(volume.min, 762.542, 0.001);
   EXPECT_NEAR(volume.max, 5538.07, 0.01);
 }
 
-TEST_F(VolumeData, SformAndQformOfRealScansAgree) {
+TEST_F(VolumeData, PlacesRealScansByHeader) {
   // From the header of this scan: srow_x and its like, in RAS.
   const Volume brain = read("neurolabusc+VolumeRenderingData/stroke__T1.nii.gz");
   const DVec3 origin(brain.world_from_voxel[3]);

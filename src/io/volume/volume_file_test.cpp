@@ -15,7 +15,7 @@ using volume_test::kTwelve;
 using volume_test::kTwelveFloats;
 using volume_test::NiftiFile;
 
-TEST(VolumeFiles, RawFilesAreReadAsTheyAreSaidToBe) {
+TEST(VolumeFiles, ReadsRawFilesByOptions) {
   const TestFolder folder("raw_volume");
   ASSERT_TRUE(write_file(encode(kTwelve, ScalarType::Int16, std::endian::big), folder.file("a.raw")));
   RawVolume raw{.size = {3, 2, 2}, .type = ScalarType::Int16, .order = std::endian::big};
@@ -37,7 +37,7 @@ TEST(VolumeFiles, RawFilesAreReadAsTheyAreSaidToBe) {
   EXPECT_EQ(read_raw_volume(folder.file("b.raw"), raw).error().code, ErrorCode::CannotRead);
 }
 
-TEST(VolumeFiles, APairIsReadByItsHeader) {
+TEST(VolumeFiles, ReadsHeaderAndImagePair) {
   const TestFolder folder("volume_pair");
   NiftiFile file{.vox_offset = 0, .magic = "ni1"};
   Bytes header = file.bytes({});
@@ -53,7 +53,7 @@ TEST(VolumeFiles, APairIsReadByItsHeader) {
   EXPECT_EQ(read_volume(folder.file("a.hdr")).value().values, kTwelveFloats);
 }
 
-TEST(VolumeFiles, TheContentDecidesAndErrorsNameTheFile) {
+TEST(VolumeFiles, DetectsContentAndNamesFileInErrors) {
   const TestFolder folder("volume_content");
   const Bytes compressed = volume_test::gzipped(NiftiFile{}.bytes(encode(kTwelve, ScalarType::UInt8)));
   ASSERT_TRUE(write_file(compressed, folder.file("scan.dat.gz")));
@@ -74,7 +74,7 @@ TEST(VolumeFiles, TheContentDecidesAndErrorsNameTheFile) {
   EXPECT_EQ(read_volume(folder.file("b.nii")).error().path, folder.file("b.nii").string());
 }
 
-TEST(VolumeFiles, ReadingEndsWhenItsListenerSaysSo) {
+TEST(VolumeFiles, StopsWhenCancelled) {
   int reported = 0;
   const Bytes values(std::size_t{1} << 16);
   const RawVolume raw{{64, 32, 32}, ScalarType::UInt8, std::endian::little};

@@ -55,7 +55,7 @@ std::vector<Bytes> small_files() {
       first, second.bytes(twelve()), gzipped(first), small_nrrd(false), small_nrrd(true), gzipped(small_nrrd(false))};
 }
 
-TEST(VolumeHostile, TheSmallFilesAreSound) {
+TEST(VolumeHostile, AcceptsSmallFiles) {
   for (const Bytes& file : small_files()) {
     const auto volume = read_volume(file);
     ASSERT_TRUE(volume) << to_string(volume.error());
@@ -64,7 +64,7 @@ TEST(VolumeHostile, TheSmallFilesAreSound) {
   }
 }
 
-TEST(VolumeHostile, EveryTruncationIsAnError) {
+TEST(VolumeHostile, RefusesEveryTruncation) {
   for (const Bytes& whole : small_files()) {
     for (std::size_t size = 0; size < whole.size(); ++size) {
       const Bytes cut(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size));
@@ -74,7 +74,7 @@ TEST(VolumeHostile, EveryTruncationIsAnError) {
   }
 }
 
-TEST(VolumeHostile, FlippedBitsAreHarmless) {
+TEST(VolumeHostile, SurvivesFlippedBits) {
   constexpr std::uint32_t kSeed = 4'242;
   std::mt19937 random(kSeed);
   for (const Bytes& whole : small_files()) {
@@ -88,7 +88,7 @@ TEST(VolumeHostile, FlippedBitsAreHarmless) {
   }
 }
 
-TEST(VolumeHostile, EverySingleByteMayBeAnything) {
+TEST(VolumeHostile, SurvivesAnyChangedByte) {
   for (const Bytes& whole : small_files()) {
     for (std::size_t at = 0; at < whole.size(); ++at) {
       for (const int value : {0, 0x7F, 0x80, 0xFF}) {
@@ -100,7 +100,7 @@ TEST(VolumeHostile, EverySingleByteMayBeAnything) {
   }
 }
 
-TEST(VolumeHostile, DimensionsThatAreNoneAreErrors) {
+TEST(VolumeHostile, RefusesInvalidDimensions) {
   EXPECT_EQ(text_of({.dim = {0, 3, 2, 2}}), "byte 40: dim[0] is 0; it must be 1 to 7");
   EXPECT_EQ(text_of({.dim = {8, 3, 2, 2, 1, 1, 1, 1}}), "byte 40: dim[0] is 8; it must be 1 to 7");
   EXPECT_EQ(text_of({.dim = {-1, 3, 2, 2}}), "byte 40: dim[0] is -1; it must be 1 to 7");
@@ -110,7 +110,7 @@ TEST(VolumeHostile, DimensionsThatAreNoneAreErrors) {
   EXPECT_EQ(text_of({.is_second = true, .dim = {3, 3, 2, -1}}), "byte 40: dim[3] is -1");
 }
 
-TEST(VolumeHostile, SizesThatOverflowAreErrors) {
+TEST(VolumeHostile, RefusesOverflowingSizes) {
   const std::int64_t huge = std::numeric_limits<std::int64_t>::max();
   EXPECT_EQ(text_of({.is_second = true, .dim = {3, huge, huge, 2}}),
             "byte 16: the header claims 9223372036854775807 x 9223372036854775807 x 2 values, more than the limit of "
@@ -122,7 +122,7 @@ TEST(VolumeHostile, SizesThatOverflowAreErrors) {
   EXPECT_FALSE(read_volume(NiftiFile{}.bytes(twelve()), {.max_values = -1}));
 }
 
-TEST(VolumeHostile, OffsetsBeyondTheFileAreErrors) {
+TEST(VolumeHostile, RefusesOffsetsBeyondFile) {
   EXPECT_EQ(text_of({.vox_offset = 1e6}), "byte 0: the values begin at byte 1000000, but there are 364");
   EXPECT_EQ(text_of({.vox_offset = 100}), "byte 108: vox_offset is 100, within the header");
   EXPECT_EQ(text_of({.vox_offset = 400.5}), "byte 108: vox_offset is 400.5");
@@ -134,7 +134,7 @@ TEST(VolumeHostile, OffsetsBeyondTheFileAreErrors) {
   }
 }
 
-TEST(VolumeHostile, HeadersThatLieOfTheirValuesAreErrors) {
+TEST(VolumeHostile, RefusesContradictoryHeaders) {
   EXPECT_EQ(text_of({.dim = {3, 3, 3, 2}}), "byte 352: 3 x 3 x 2 values of uint8 take 18 bytes, but there are 12");
   EXPECT_EQ(text_of({.datatype = 64}), "byte 352: 3 x 2 x 2 values of float64 take 96 bytes, but there are 12");
   EXPECT_EQ(text_of({.datatype = 3}), "byte 70: datatype 3 is not a NIfTI type");
@@ -148,12 +148,12 @@ TEST(VolumeHostile, HeadersThatLieOfTheirValuesAreErrors) {
   EXPECT_EQ(to_string(error_in({})), "neither a NIfTI nor a NRRD file");
 }
 
-TEST(VolumeHostile, OffsetsWithinCompressedFilesSayWhatTheyCount) {
+TEST(VolumeHostile, ReportsOffsetsAfterDecompression) {
   EXPECT_EQ(to_string(error_in(gzipped(NiftiFile{.dim = {0}}.bytes(twelve())))),
             "byte 40: dim[0] is 0; it must be 1 to 7 (counted after decompression)");
 }
 
-TEST(VolumeHostile, BombsOfGzipAreErrors) {
+TEST(VolumeHostile, StopsGzipBombs) {
   // 64 MiB of zeros in 64 KiB, with and without a matching header.
   NiftiFile file{.dim = {3, 512, 512, 256}};
   const Bytes bomb = gzipped(file.bytes(Bytes(std::size_t{1} << 26)));
@@ -168,13 +168,13 @@ TEST(VolumeHostile, BombsOfGzipAreErrors) {
   EXPECT_NE(lie.message.find("but there are at most"), std::string::npos) << lie.message;
 }
 
-TEST(VolumeHostile, DamagedCompressionIsAnErrorEvenBehindTheValues) {
+TEST(VolumeHostile, RefusesDamagedCompressionBehindValues) {
   Bytes bytes = gzipped(NiftiFile{}.bytes(twelve()));
   bytes[bytes.size() - 6] ^= std::byte{1};
   EXPECT_NE(to_string(error_in(bytes)).find("the compressed data is damaged"), std::string::npos);
 }
 
-TEST(VolumeHostile, TheCorpusIsHarmless) {
+TEST(VolumeHostile, SurvivesCorpus) {
   int count = 0;
   for (const auto& entry : std::filesystem::directory_iterator(QUOIN_SOURCE_DIR "/tests/corpus/volume")) {
     const auto bytes = read_file(entry.path());
@@ -185,16 +185,16 @@ TEST(VolumeHostile, TheCorpusIsHarmless) {
   EXPECT_GT(count, 5);
 }
 
-TEST(VolumeMistakes, AStreamThatBeginsBehindItsFileIsFound) {
+TEST(VolumeFileDeathTest, AssertsOnStreamBeyondFile) {
   QUOIN_EXPECT_MISTAKE((void)ByteStream({}, 1, Compression::None), "the stream begins in the file");
 }
 
-TEST(VolumeMistakes, SizesThatAreNotPositiveAreFound) {
+TEST(VolumeFileDeathTest, AssertsOnNonPositiveSizes) {
   Volume volume;
   QUOIN_EXPECT_MISTAKE((void)set_size({1, 0, 1}, {}, std::nullopt, volume), "positive extents");
 }
 
-TEST(VolumeMistakes, HeadersThatAreNoneAreFound) {
+TEST(VolumeFileDeathTest, AssertsOnMissingHeader) {
   QUOIN_EXPECT_MISTAKE((void)nifti::read_header({}, {}), "a header begins here");
   QUOIN_EXPECT_MISTAKE((void)nrrd::read_header({}, {}), "a header begins here");
 }

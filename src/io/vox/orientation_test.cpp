@@ -91,7 +91,7 @@ std::vector<FileVoxel> asymmetric_voxels(IVec3 size) {
 
 const std::vector<IVec3> kSizes = {{1, 1, 1}, {2, 2, 2}, {3, 3, 3}, {1, 2, 3}, {4, 3, 2}, {5, 2, 4}, {3, 6, 1}};
 
-TEST(VoxOrientation, AllFortyEightPlaceVoxelCentresAsTheFormatSays) {
+TEST(VoxOrientation, PlacesVoxelCentresForAll48Rotations) {
   ASSERT_EQ(all_rotation_bytes().size(), 48U);
   const IVec3 t{7, -5, 3};
   for (const IVec3 size : kSizes) {
@@ -136,7 +136,7 @@ TEST(VoxOrientation, NestedTransformsMultiplyParentFirst) {
   }
 }
 
-TEST(VoxOrientation, BytesSurviveTheTripThroughInstances) {
+TEST(VoxOrientation, RoundTripsBytesThroughInstanceTurns) {
   for (const int byte : all_rotation_bytes()) {
     const auto orientation = vox::orientation_from_byte(static_cast<std::uint8_t>(byte));
     ASSERT_TRUE(orientation.has_value());
@@ -147,7 +147,7 @@ TEST(VoxOrientation, BytesSurviveTheTripThroughInstances) {
   }
 }
 
-TEST(VoxOrientation, OnlyQuarterTurnsHaveAByte) {
+TEST(VoxOrientation, EncodesOnlyQuarterTurns) {
   const DQuat eighth = glm::angleAxis(0.78539816339744831, DVec3(0, 1, 0));
   EXPECT_FALSE(vox::orientation_from_turn({eighth, false}).has_value());
   EXPECT_FALSE(vox::orientation_from_turn({DQuat(0, 0, 0, 0), false}).has_value());
@@ -156,7 +156,7 @@ TEST(VoxOrientation, OnlyQuarterTurnsHaveAByte) {
   EXPECT_FALSE(vox::orientation_from_byte(3).has_value());
 }
 
-TEST(VoxOrientationDeathTest, RowsHaveDifferentColumns) {
+TEST(VoxOrientationDeathTest, AssertsOnRowsWithEqualColumns) {
   vox::Orientation orientation;
   orientation.axis[1] = orientation.axis[0];
   QUOIN_EXPECT_MISTAKE(static_cast<void>(vox::byte_from_orientation(orientation)), "rows with different columns");

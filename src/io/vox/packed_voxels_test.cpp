@@ -72,7 +72,7 @@ std::string find_error(FileBuilder& file) {
   return loaded ? "none" : to_string(loaded.error());
 }
 
-TEST(PackedVoxels, AreTheSameModelsAsPlainOnes) {
+TEST(PackedVoxels, MatchPlainModels) {
   std::mt19937 random(12);
   for (int round = 0; round < 40; ++round) {
     FileBuilder plain;
@@ -93,7 +93,7 @@ TEST(PackedVoxels, AreTheSameModelsAsPlainOnes) {
   }
 }
 
-TEST(PackedVoxels, RefusesDamageWithItsPosition) {
+TEST(PackedVoxels, ReportPositionOfDamage) {
   const std::vector<std::byte> box(27, std::byte{1});
   const auto fault = [&](IVec3 size, std::vector<std::byte> stream) {
     FileBuilder file;
@@ -127,7 +127,7 @@ TEST(PackedVoxels, RefusesDamageWithItsPosition) {
 }
 
 // A stream expands to at most 1,032 times its own length, and a model has at most 256 voxels per side.
-TEST(PackedVoxels, BombsStayWithinTheBoundsOfModels) {
+TEST(PackedVoxels, BoundMemoryOfBombs) {
   std::vector<std::byte> box(std::size_t{256} * 256 * 256);
   // A voxel in every slab of every chunk: expensive in memory, and small in the file.
   for (std::size_t i = 0; i < box.size(); i += 1'024) box[i] = std::byte{static_cast<unsigned char>(1 + i % 255)};

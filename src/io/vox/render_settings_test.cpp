@@ -90,11 +90,11 @@ TEST(VoxRenderSettings, ReadsTheDefaultSettings) {
   EXPECT_FALSE(file.is_transparent);
 }
 
-TEST(VoxRenderSettings, HasNoneForAFileWithoutSettings) {
+TEST(VoxRenderSettings, ReadsNoneIfFileHasNone) {
   EXPECT_FALSE(file_with_settings({}).render_settings.has_value());
 }
 
-TEST(VoxRenderSettings, AirAndImagesOfTheSky) {
+TEST(VoxRenderSettings, ReadsAirAndSkyImages) {
   const FileRenderSettings air =
       settings_with({{{"_type", "_env"}, {"_mode", "1"}},
                      {{"_type", "_atm"}, {"_ray_d", "0.8"}, {"_ray_k", "90 104 255"}, {"_mie_g", "5"}},
@@ -112,7 +112,7 @@ TEST(VoxRenderSettings, AirAndImagesOfTheSky) {
   EXPECT_NEAR(image.environment.sky.image_turn_radians, std::numbers::pi / 2.0, 1e-6);
 }
 
-TEST(VoxRenderSettings, FogLensFilmBloomAndBackground) {
+TEST(VoxRenderSettings, ReadsFogLensFilmBloomAndBackground) {
   const FileRenderSettings file =
       settings_with({{{"_type", "_fog_uni"}, {"_d", "0.02"}, {"_k", "255 0 0"}, {"_g", "0.5"}},
                      {{"_type", "_lens"}, {"_aperture", "2"}, {"_blade_n", "6"}, {"_blade_r", "30"}},
@@ -160,7 +160,7 @@ TEST(VoxRenderSettings, OlderFilesEnableGroups) {
   EXPECT_TRUE(file.not_drawn.empty());
 }
 
-TEST(VoxRenderSettings, CamerasSayWhatTheyFocus) {
+TEST(VoxRenderSettings, ReadsFocusDistanceOfCameras) {
   FileBuilder file;
   file.model(1, 1, 1, {{0, 0, 0, 1}});
   file.with("rCAM", [&](auto& out) {

@@ -45,7 +45,7 @@ double distance_of(DVec3 a, DVec3 b) {
   return glm::length(a - b);
 }
 
-TEST(VoxCameras, WithoutAnglesTheFrontIsSeen) {
+TEST(VoxCameras, FaceFrontWithoutAngles) {
   const Camera camera = only_camera({{"_mode", "pers"}, {"_focus", "1 2 3"}, {"_radius", "10"}, {"_fov", "60"}});
   EXPECT_EQ(camera.projection, Camera::Projection::Perspective);
   EXPECT_LT(distance_of(camera.forward, {0, 0, -1}), 1e-12);
@@ -56,7 +56,7 @@ TEST(VoxCameras, WithoutAnglesTheFrontIsSeen) {
 }
 
 // Turns in MagicaVoxel's axes, in this order, as matrices: roll, pitch, yaw.
-TEST(VoxCameras, AnyAnglesAreThoseTurns) {
+TEST(VoxCameras, MatchMatricesAtRandomAngles) {
   std::mt19937 random(42);
   std::uniform_real_distribution<double> degrees(-360.0, 360.0);
   for (int i = 0; i < 500; ++i) {
@@ -75,14 +75,14 @@ TEST(VoxCameras, AnyAnglesAreThoseTurns) {
   }
 }
 
-TEST(VoxCameras, AnOrthographicOneShowsOfTheFocusWhatAPerspectiveOneWould) {
+TEST(VoxCameras, MatchOrthographicAndPerspectiveAtFocus) {
   const Camera camera = only_camera({{"_mode", "orth"}, {"_focus", "0 50 0"}, {"_radius", "3"}, {"_fov", "90"}});
   EXPECT_EQ(camera.projection, Camera::Projection::Orthographic);
   EXPECT_NEAR(camera.view_height, 6.0, 1e-9);
   EXPECT_GT(camera.position.z, 0.5) << "before the voxel, which is far nearer than the focus";
 }
 
-TEST(VoxCameras, ThoseThatNobodySetAreNone) {
+TEST(VoxCameras, IgnoreUnsetCameras) {
   const Entries newer = {{"_mode", "pers"}, {"_focus", "0 0 0"}, {"_angle", "0 0 0"}, {"_radius", "0"}, {"_fov", "45"}};
   const Entries older = {{"_mode", "pers"}, {"_focus", "0 0 0"}, {"_angle", "0 0 0"}, {"_radius", "1"}, {"_fov", "45"}};
   const LoadedScene loaded = file_with({newer, older, {}, {{"_radius", "7"}}, {{"_angle", "0 0 1"}}});
@@ -92,7 +92,7 @@ TEST(VoxCameras, ThoseThatNobodySetAreNone) {
   EXPECT_TRUE(loaded.warnings.empty());
 }
 
-TEST(VoxCameras, SkipsAndNamesUnsupportedCameras) {
+TEST(VoxCameras, SkipAndNameUnsupportedCameras) {
   const LoadedScene loaded = file_with({{{"_mode", "pano"}, {"_radius", "5"}},
                                         {{"_angle", "1 2"}},
                                         {{"_focus", "1 2 nan"}},
@@ -107,7 +107,7 @@ TEST(VoxCameras, SkipsAndNamesUnsupportedCameras) {
                                       "camera 4 skipped: _radius is below 0", "camera 5 skipped: _radius is 0"}));
 }
 
-TEST(VoxCameras, ThoseThatNobodyCanNameAreSkippedAndSaid) {
+TEST(VoxCameras, SkipCamerasWithInvalidIds) {
   FileBuilder file;
   file.model(1, 1, 1, {{0, 0, 0, 1}});
   for (const std::int32_t id : {-1, 4, 4}) {
@@ -122,7 +122,7 @@ TEST(VoxCameras, ThoseThatNobodyCanNameAreSkippedAndSaid) {
                                                        "camera 4 skipped: its id is a duplicate"}));
 }
 
-TEST(VoxCameras, ADamagedOneIsNoReasonToRefuseTheVoxels) {
+TEST(VoxCameras, KeepVoxelsDespiteDamagedCamera) {
   FileBuilder file;
   file.model(1, 1, 1, {{0, 0, 0, 1}});
   file.with("rCAM", [](auto& out) {

@@ -45,7 +45,7 @@ class VoxData : public testing::Test {
   std::vector<DataFile> files_;
 };
 
-TEST_F(VoxData, EveryFileHasTheVoxelsThatOthersCounted) {
+TEST_F(VoxData, MatchesIndependentVoxelCounts) {
   int readable = 0;
   for (const DataFile& file : files_) {
     if (file.voxels < 0) continue;
@@ -59,7 +59,7 @@ TEST_F(VoxData, EveryFileHasTheVoxelsThatOthersCounted) {
   EXPECT_EQ(readable, 150);
 }
 
-TEST_F(VoxData, WritingAndReadingEveryFileIsTheIdentity) {
+TEST_F(VoxData, RoundTripsEveryFile) {
   for (const DataFile& file : files_) {
     if (file.voxels < 0) continue;
     const auto loaded = read_vox(bytes_of(file.path));
@@ -68,7 +68,7 @@ TEST_F(VoxData, WritingAndReadingEveryFileIsTheIdentity) {
   }
 }
 
-TEST_F(VoxData, AnUntouchedFileComesBackByteForByte) {
+TEST_F(VoxData, WritesUntouchedFilesUnchanged) {
   for (const DataFile& file : files_) {
     if (file.voxels < 0) continue;
     const std::vector<std::byte> bytes = bytes_of(file.path);
@@ -82,7 +82,7 @@ TEST_F(VoxData, AnUntouchedFileComesBackByteForByte) {
 }
 
 // Simulates an artist's first stroke: it changes the voxels of one model only.
-TEST_F(VoxData, APaintedVoxelChangesTheVoxelsOfItsModelAlone) {
+TEST_F(VoxData, PaintedVoxelChangesOnlyItsModel) {
   for (const DataFile& file : files_) {
     if (file.voxels <= 0) continue;
     const std::vector<std::byte> bytes = bytes_of(file.path);
@@ -106,7 +106,7 @@ TEST_F(VoxData, APaintedVoxelChangesTheVoxelsOfItsModelAlone) {
   }
 }
 
-TEST_F(VoxData, OtherFormatsUnderThisNameGiveOneLine) {
+TEST_F(VoxData, RefusesOtherFormatsInOneLine) {
   for (const DataFile& file : files_) {
     if (file.voxels >= 0) continue;
     const auto loaded = read_vox(bytes_of(file.path));
@@ -123,7 +123,7 @@ TEST_F(VoxData, OtherFormatsUnderThisNameGiveOneLine) {
 const std::string kSmallFile = "vox/vengi-voxel+vengi/data__tests__rgb_small.vox";
 const std::string kSceneFile = "vox/vengi-voxel+vengi/data__tests__robo.vox";
 
-TEST_F(VoxData, EveryTruncationOfRealFilesIsAnError) {
+TEST_F(VoxData, RefusesEveryTruncationOfRealFiles) {
   for (const std::string& path : {kSmallFile, kSceneFile}) {
     const std::vector<std::byte> whole = bytes_of(path);
     for (std::size_t size = 0; size < whole.size(); ++size) {
@@ -132,7 +132,7 @@ TEST_F(VoxData, EveryTruncationOfRealFilesIsAnError) {
   }
 }
 
-TEST_F(VoxData, FlippedBitsInRealFilesAreHarmless) {
+TEST_F(VoxData, SurvivesFlippedBitsInRealFiles) {
   constexpr std::uint32_t kSeed = 4'711;
   std::mt19937 random(kSeed);
   for (const std::string& path : {kSmallFile, kSceneFile}) {
@@ -145,7 +145,7 @@ TEST_F(VoxData, FlippedBitsInRealFilesAreHarmless) {
   }
 }
 
-TEST_F(VoxData, AxesPointWhereTheFilesNamedForThemSay) {
+TEST_F(VoxData, KeepsAxesOfRealFile) {
   // An artist's axes of 32^3: red along x, green along y, blue (up) along z, from the corner.
   const auto loaded = read_vox(bytes_of("vox/Arlorean+Voxels/Voxels.CommandLine__Axes.vox"));
   ASSERT_TRUE(loaded);

@@ -61,7 +61,7 @@ std::vector<std::byte> full_file() {
   return builder.file();
 }
 
-TEST(VoxHostile, TheFullFileIsSound) {
+TEST(VoxHostile, AcceptsFullFile) {
   const auto loaded = read_vox(full_file());
   ASSERT_TRUE(loaded) << to_string(loaded.error());
   EXPECT_EQ(loaded->scene.instances().size(), 3U);
@@ -69,7 +69,7 @@ TEST(VoxHostile, TheFullFileIsSound) {
   EXPECT_EQ(wrong_with(full_file(), {.frame = 4}), "");
 }
 
-TEST(VoxHostile, EveryTruncationIsAnError) {
+TEST(VoxHostile, RefusesEveryTruncation) {
   const std::vector<std::byte> whole = full_file();
   for (std::size_t size = 0; size < whole.size(); ++size) {
     const auto loaded = read_vox(std::span(whole).first(size));
@@ -79,7 +79,7 @@ TEST(VoxHostile, EveryTruncationIsAnError) {
 }
 
 /// MAIN grows and shrinks with the cut, so that the chunks inside are cut instead of MAIN itself.
-TEST(VoxHostile, EveryTruncationInsideMainIsHarmless) {
+TEST(VoxHostile, SurvivesEveryTruncationInsideMain) {
   const std::vector<std::byte> whole = full_file();
   for (std::size_t size = 20; size < whole.size(); ++size) {
     std::vector<std::byte> cut(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size));
@@ -88,7 +88,7 @@ TEST(VoxHostile, EveryTruncationInsideMainIsHarmless) {
   }
 }
 
-TEST(VoxHostile, FlippedBitsAreHarmless) {
+TEST(VoxHostile, SurvivesFlippedBits) {
   const std::vector<std::byte> whole = full_file();
   constexpr std::uint32_t kSeed = 20'261;
   std::mt19937 random(kSeed);
@@ -101,7 +101,7 @@ TEST(VoxHostile, FlippedBitsAreHarmless) {
   }
 }
 
-TEST(VoxHostile, EverySingleByteMayBeAnything) {
+TEST(VoxHostile, SurvivesAnyChangedByte) {
   const std::vector<std::byte> whole = full_file();
   for (std::size_t at = 0; at < whole.size(); ++at) {
     for (const int value : {0, 0x7F, 0x80, 0xFF}) {
@@ -112,7 +112,7 @@ TEST(VoxHostile, EverySingleByteMayBeAnything) {
   }
 }
 
-TEST(VoxHostile, OtherFormatsAreNamed) {
+TEST(VoxHostile, NamesOtherFormats) {
   EXPECT_EQ(text_of({}), "the file is empty");
   EXPECT_EQ(text_of(bytes_of("version https://git-lfs.github.com/spec/v1\noid sha256:0\n")),
             "a Git LFS pointer, not the file itself (git lfs pull fetches it)");
@@ -122,13 +122,13 @@ TEST(VoxHostile, OtherFormatsAreNamed) {
   EXPECT_EQ(text_of(slab6), "a SLAB6 .vox file, not a MagicaVoxel .vox file");
 }
 
-TEST(VoxHostile, SizesBeyondTheFormatAreErrors) {
+TEST(VoxHostile, RefusesSizesBeyondFormat) {
   EXPECT_EQ(text_of(FileBuilder().size(0xFFFF'FFFF, 40, 40).voxels({}).file()),
             "byte 20: chunk SIZE claims 4294967295 x 40 x 40 voxels");
   EXPECT_EQ(text_of(FileBuilder().size(1, 257, 1).voxels({}).file()), "byte 20: chunk SIZE claims 1 x 257 x 1 voxels");
 }
 
-TEST(VoxHostile, CountsBeyondTheBytesAreErrors) {
+TEST(VoxHostile, RefusesCountsBeyondBytes) {
   const auto with_words = [](std::string_view id, const std::vector<std::uint32_t>& words) {
     return file_of_one_voxel()
         .with(id,
@@ -151,7 +151,7 @@ TEST(VoxHostile, CountsBeyondTheBytesAreErrors) {
   EXPECT_EQ(text_of(with_words("IMAP", {0})), "byte 64: chunk IMAP ends before its content");
 }
 
-TEST(VoxHostile, ChunksBeyondTheFileAreErrors) {
+TEST(VoxHostile, RefusesChunksBeyondFile) {
   std::vector<std::byte> bytes = file_of_one_voxel().file();
   bytes[16] = std::byte{44 + 21};
   EXPECT_EQ(text_of(bytes), "byte 8: chunk MAIN claims 65 bytes, but 44 are left");
@@ -163,7 +163,7 @@ TEST(VoxHostile, ChunksBeyondTheFileAreErrors) {
   EXPECT_EQ(text_of(bytes), "byte 8: the first chunk must be MAIN, not \"NAIN\"");
 }
 
-TEST(VoxHostile, SkipsBytesAfterMainWithAWarning) {
+TEST(VoxHostile, SkipsBytesAfterMainWithWarning) {
   std::vector<std::byte> bytes = file_of_one_voxel().file();
   bytes.resize(bytes.size() + 9);
   const auto loaded = read_vox(bytes);
@@ -171,14 +171,14 @@ TEST(VoxHostile, SkipsBytesAfterMainWithAWarning) {
   EXPECT_EQ(loaded->warnings, std::vector<std::string>{"the last 9 bytes are outside MAIN; skipped"});
 }
 
-TEST(VoxHostile, SizesAndVoxelsComeInPairs) {
+TEST(VoxHostile, RequiresPairsOfSizesAndVoxels) {
   EXPECT_EQ(text_of(FileBuilder().voxels({}).file()), "byte 20: chunk XYZI has no SIZE before it");
   EXPECT_EQ(text_of(FileBuilder().size(1, 1, 1).file()), "byte 20: chunk SIZE has no XYZI after it");
   EXPECT_EQ(text_of(FileBuilder().size(1, 1, 1).size(1, 1, 1).voxels({}).file()),
             "byte 44: chunk SIZE follows another SIZE, whose XYZI is missing");
 }
 
-TEST(VoxHostile, GraphsThatAreNoGraphsAreErrors) {
+TEST(VoxHostile, RefusesInvalidGraphs) {
   EXPECT_EQ(text_of(file_of_one_voxel().transform(0, 0, {{}}).file()), "byte 64: node 0 is its own descendant");
   EXPECT_EQ(text_of(file_of_one_voxel().transform(0, 1, {{}}).group(1, {2}).transform(2, 1, {{}}).file()),
             "byte 104: node 1 is its own descendant");
@@ -195,7 +195,7 @@ TEST(VoxHostile, GraphsThatAreNoGraphsAreErrors) {
       "byte 104: chunk nSHP has no model");
 }
 
-TEST(VoxHostile, TransformsThatAreNoTransformsAreErrors) {
+TEST(VoxHostile, RefusesInvalidTransforms) {
   const auto with_frame = [](const Entries& frame) {
     return file_of_one_voxel().transform(0, 1, {frame}).shape(1, 0).file();
   };
@@ -210,7 +210,7 @@ TEST(VoxHostile, TransformsThatAreNoTransformsAreErrors) {
   EXPECT_EQ(text_of(with_frame({{"_f", "-1"}})), "byte 64: chunk nTRN has the invalid frame \"-1\"");
 }
 
-TEST(VoxHostile, HugeTranslationsAddUpWithoutOverflow) {
+TEST(VoxHostile, AddsHugeTranslationsWithoutOverflow) {
   FileBuilder builder = file_of_one_voxel();
   constexpr int kDepth = 100;
   for (int i = 0; i < kDepth; ++i) builder.transform(i, i + 1, {{{"_t", "2147483647 -2147483648 0"}}});
@@ -224,7 +224,7 @@ TEST(VoxHostile, HugeTranslationsAddUpWithoutOverflow) {
   EXPECT_EQ(written.error().code, ErrorCode::LimitExceeded);
 }
 
-TEST(VoxHostile, AMillionNestedGroupsAreWalked) {
+TEST(VoxHostile, WalksMillionNestedGroups) {
   FileBuilder builder = file_of_one_voxel();
   constexpr int kDepth = 1'000'000;
   builder.transform(0, 1, {{}});
@@ -243,12 +243,12 @@ FileBuilder doubling_graph() {
   return builder;
 }
 
-TEST(VoxHostile, NodesWithSeveralParentsCannotMultiplyWithoutBound) {
+TEST(VoxHostile, BoundsCopiesOfSharedNodes) {
   EXPECT_EQ(error_of(doubling_graph().shape(65, 0).file()).code, ErrorCode::LimitExceeded);
   EXPECT_EQ(error_of(doubling_graph().group(65, {}).file()).code, ErrorCode::LimitExceeded);
 }
 
-TEST(VoxHostile, LongNamesCannotMultiplyWithoutBound) {
+TEST(VoxHostile, BoundsCopiesOfLongNames) {
   FileBuilder builder = file_of_one_voxel();
   std::vector<std::int32_t> children(60'000, 2);
   builder.transform(0, 1, {{}}).group(1, children);
@@ -256,7 +256,7 @@ TEST(VoxHostile, LongNamesCannotMultiplyWithoutBound) {
   EXPECT_EQ(error_of(builder.file()).code, ErrorCode::LimitExceeded);
 }
 
-TEST(VoxHostile, ScatteredVoxelsCannotTakeMemoryWithoutBound) {
+TEST(VoxHostile, BoundsMemoryOfScatteredVoxels) {
   std::vector<vox_test::FileVoxel> voxels;
   for (int i = 0; i < 16'384; ++i) {
     // One voxel in every slab of 64x4x4, with every colour.
@@ -273,7 +273,7 @@ TEST(VoxHostile, ScatteredVoxelsCannotTakeMemoryWithoutBound) {
 }
 
 // Real writers have counted headers as part of MAIN's children.
-TEST(VoxHostile, AMainThatClaimsAFewBytesTooManyIsReadWhenAllWithinIsSound) {
+TEST(VoxHostile, ReadsMainThatClaimsTooManyBytes) {
   for (const int more : {1, 8, 12, 20}) {
     std::vector<std::byte> bytes = file_of_one_voxel().file();
     bytes[16] = static_cast<std::byte>(44 + more);
@@ -292,7 +292,7 @@ TEST(VoxHostile, AMainThatClaimsAFewBytesTooManyIsReadWhenAllWithinIsSound) {
   }
 }
 
-TEST(VoxHostile, TheCorpusIsHarmless) {
+TEST(VoxHostile, SurvivesCorpus) {
   const std::filesystem::path folder = std::filesystem::path(QUOIN_SOURCE_DIR) / "tests/corpus/vox";
   int count = 0;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {

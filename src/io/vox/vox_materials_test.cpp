@@ -11,7 +11,7 @@ VoxelProperties decoded(const Attributes& attributes) {
   return decode_material("palette 1", kRed, attributes);
 }
 
-TEST(VoxMaterial, WithoutTypeItIsDiffuseWhateverTheSlidersSay) {
+TEST(VoxMaterial, IsDiffuseWithoutType) {
   const VoxelProperties p = decoded({{"_rough", "0.1"}, {"_metal", "0.8"}, {"_emit", "1"}, {"_trans", "0.5"}});
   EXPECT_EQ(p.visibility, Visibility::Opaque);
   EXPECT_EQ(p.roughness, 1.0F);
@@ -21,7 +21,7 @@ TEST(VoxMaterial, WithoutTypeItIsDiffuseWhateverTheSlidersSay) {
   EXPECT_EQ(p.attributes.size(), 4U);
 }
 
-TEST(VoxMaterial, MetalTakesItsShareFromMetalOrWeight) {
+TEST(VoxMaterial, ReadsMetalnessFromMetalOrWeight) {
   EXPECT_EQ(decoded({{"_type", "_metal"}, {"_metal", "0.25"}, {"_rough", "0.5"}}).metalness, 0.25F);
   EXPECT_EQ(decoded({{"_type", "_metal"}, {"_metal", "0.25"}, {"_rough", "0.5"}}).roughness, 0.5F);
   EXPECT_EQ(decoded({{"_type", "_metal"}, {"_weight", "0.75"}}).metalness, 0.75F);
@@ -30,7 +30,7 @@ TEST(VoxMaterial, MetalTakesItsShareFromMetalOrWeight) {
   EXPECT_EQ(decoded({{"_type", "_metal"}, {"_plastic", "1"}}).metalness, 0.0F);
 }
 
-TEST(VoxMaterial, GlassIsTransparentAndNeverQuiteInvisible) {
+TEST(VoxMaterial, GlassIsTransparentButVisible) {
   const VoxelProperties p = decoded({{"_type", "_glass"}, {"_trans", "0.2"}, {"_ri", "1.3"}});
   EXPECT_EQ(p.visibility, Visibility::Transparent);
   EXPECT_EQ(p.colour.a, 204);
@@ -51,7 +51,7 @@ TEST(VoxMaterial, EmissionDoublesWithEachStepOfFlux) {
   EXPECT_EQ(decoded({{"_type", "_emit"}}).emission, 1.0F);
 }
 
-TEST(VoxMaterial, NumbersOutOfRangeOrUnreadableDoNoHarm) {
+TEST(VoxMaterial, ToleratesInvalidNumbers) {
   const VoxelProperties p =
       decoded({{"_type", "_metal"}, {"_metal", "-7"}, {"_rough", "1e30"}, {"_ior", "nan"}, {"_spec", "x"}});
   EXPECT_EQ(p.metalness, 0.0F);
@@ -60,12 +60,12 @@ TEST(VoxMaterial, NumbersOutOfRangeOrUnreadableDoNoHarm) {
   EXPECT_EQ(decoded({{"_type", "_emit"}, {"_flux", "1e9"}}).emission, 65536.0F);
 }
 
-TEST(VoxMaterial, UntouchedAttributesAreWrittenAsTheyWereRead) {
+TEST(VoxMaterial, WritesUntouchedAttributesUnchanged) {
   const Attributes original = {{"_type", "_glass"}, {"_trans", "0.500"}, {"_att", "0.02"}, {"_unknown", "7"}};
   EXPECT_EQ(encode_material("palette 1", decoded(original)), original);
 }
 
-TEST(VoxMaterial, EditedPropertiesWinOverOldAttributes) {
+TEST(VoxMaterial, EditedPropertiesOverrideAttributes) {
   VoxelProperties p = decoded({{"_type", "_glass"}, {"_trans", "0.5"}, {"_att", "0.02"}});
   p.visibility = Visibility::Opaque;
   p.colour.a = 255;
@@ -78,14 +78,14 @@ TEST(VoxMaterial, EditedPropertiesWinOverOldAttributes) {
   EXPECT_EQ(decoded(written), p);
 }
 
-TEST(VoxMaterial, APlainTypeNeedsNoMaterialAtAll) {
+TEST(VoxMaterial, WritesNoMaterialForPlainType) {
   VoxelProperties p;
   p.name = "palette 1";
   p.colour = kRed;
   EXPECT_TRUE(encode_material("palette 1", p).empty());
 }
 
-TEST(VoxMaterial, EveryCombinationOfPropertiesSurvives) {
+TEST(VoxMaterial, RoundTripsEveryPropertyCombination) {
   for (const Visibility visibility : {Visibility::Opaque, Visibility::Transparent}) {
     for (const float metalness : {0.0F, 0.3F, 1.0F}) {
       for (const float emission : {0.0F, 0.1F, 1.0F, 3.7F, 1e9F}) {

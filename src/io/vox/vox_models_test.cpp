@@ -41,7 +41,7 @@ Grid one_by_one(const RandomModel& model, const std::array<std::uint8_t, kColour
   return grid;
 }
 
-TEST(VoxModels, GridsAreThoseOfSettingOneVoxelAfterTheOther) {
+TEST(VoxModels, MatchSettingVoxelsOneByOne) {
   constexpr unsigned kSeed = 61;
   std::mt19937 random(kSeed);
   SCOPED_TRACE(kSeed);

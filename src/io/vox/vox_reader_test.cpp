@@ -48,7 +48,7 @@ TEST(VoxRead, TurnsZUpIntoYUpWithoutMirroring) {
   EXPECT_EQ(grid.grid.voxel_count(), 3);
 }
 
-TEST(VoxRead, AModelWithoutNodesStandsOnTheGroundCentred) {
+TEST(VoxRead, CentresModelWithoutNodesOnGround) {
   const LoadedScene loaded = load(FileBuilder().model(4, 6, 5, {{0, 0, 0, 1}, {3, 5, 4, 1}}).file());
   EXPECT_EQ(loaded.format, "vox");
   EXPECT_TRUE(loaded.warnings.empty());
@@ -57,7 +57,7 @@ TEST(VoxRead, AModelWithoutNodesStandsOnTheGroundCentred) {
   EXPECT_EQ(bounds.max, DVec3(2, 5, 3));
 }
 
-TEST(VoxRead, ModelsWithoutNodesAreFramesOfAnAnimation) {
+TEST(VoxRead, ReadsModelsWithoutNodesAsFrames) {
   FileBuilder builder;
   builder.with("PACK", [](auto& out) { out.u32(2); });
   builder.model(1, 1, 1, {{0, 0, 0, 1}}).model(2, 1, 1, {{0, 0, 0, 2}, {1, 0, 0, 2}});
@@ -75,7 +75,7 @@ TEST(VoxRead, ModelsWithoutNodesAreFramesOfAnAnimation) {
   EXPECT_FALSE(read_vox(bytes, {.frame = -1}));
 }
 
-TEST(VoxRead, TellsHowFarItHasComeAndStopsWhenAsked) {
+TEST(VoxRead, ReportsProgressAndCanBeCancelled) {
   FileBuilder builder;
   for (int i = 0; i < 5; ++i) builder.model(1, 1, 1, {{0, 0, 0, 1}});
   const auto bytes = builder.file();
@@ -103,7 +103,7 @@ TEST(VoxRead, SharedModelsStayShared) {
   EXPECT_EQ(instance_at(loaded, 1).position, DVec3(-1, -3, 2));
 }
 
-TEST(VoxRead, NamesComeFromTheTransformAboveTheShape) {
+TEST(VoxRead, ReadsNamesFromParentTransform) {
   FileBuilder builder = one_voxel();
   builder.transform(0, 1, {{}}, {{"_name", "root"}}).group(1, {2, 4});
   builder.transform(2, 3, {{}}, {{"_name", "wheel"}}).shape(3, 0);
@@ -114,7 +114,7 @@ TEST(VoxRead, NamesComeFromTheTransformAboveTheShape) {
   EXPECT_EQ(grid_at(loaded, 0).name, "wheel");
 }
 
-TEST(VoxRead, HiddenNodesAndLayersHideWhatIsBelow) {
+TEST(VoxRead, HiddenNodesAndLayersHideDescendants) {
   FileBuilder builder = one_voxel();
   builder.layer(5, {{"_hidden", "1"}}).layer(6, {{"_hidden", "0"}});
   builder.transform(0, 1, {{}}).group(1, {2, 4, 6, 8});
@@ -148,7 +148,7 @@ TEST(VoxRead, PaletteEntryZeroIsColourOne) {
   EXPECT_EQ(loaded.scene.types[12].name, "palette 12");
 }
 
-TEST(VoxRead, WithoutPaletteTheDefaultOneHolds) {
+TEST(VoxRead, UsesDefaultPaletteWithoutPalette) {
   const LoadedScene loaded = load(one_voxel().file());
   const VoxelRegistry& types = loaded.scene.types;
   EXPECT_EQ(types[1].colour, (Rgba8{255, 255, 255, 255}));
@@ -184,7 +184,7 @@ TEST(VoxRead, IndexMapReordersTypesButNoColours) {
   EXPECT_EQ(loaded.scene.types[79].colour, vox::default_palette()[1]);
 }
 
-TEST(VoxRead, AnIndexMapThatIsNoPermutationIsIgnored) {
+TEST(VoxRead, IgnoresInvalidIndexMap) {
   std::vector<std::byte> map = swapping_index_map();
   map[3] = map[4];
   const LoadedScene loaded = load(one_voxel(79).chunk("IMAP", map).file());
@@ -213,7 +213,7 @@ TEST(VoxRead, KeyFramesMoveAndChangeModels) {
   EXPECT_FALSE(read_vox(bytes, {.frame = 11}));
 }
 
-TEST(VoxRead, LoopingNodesRepeatUntilTheLastFrame) {
+TEST(VoxRead, LoopingNodesRepeatUntilLastFrame) {
   FileBuilder builder = one_voxel();
   builder.with("META", [](auto& out) { out.dict({{"_anim_range", "0 20"}}); });
   builder.transform(0, 1, {{}}).group(1, {2});
@@ -228,7 +228,7 @@ TEST(VoxRead, LoopingNodesRepeatUntilTheLastFrame) {
   EXPECT_EQ(x_at(3), 3);
 }
 
-TEST(VoxRead, EmptyModelsAndUnusedModelsAreKept) {
+TEST(VoxRead, KeepsEmptyAndUnusedModels) {
   FileBuilder builder;
   builder.model(5, 6, 7, {}).model(1, 1, 1, {{0, 0, 0, 1}});
   builder.transform(0, 1, {{}}).group(1, {2}).transform(2, 3, {{}}).shape(3, 0);
@@ -240,13 +240,13 @@ TEST(VoxRead, EmptyModelsAndUnusedModelsAreKept) {
   EXPECT_EQ(loaded.warnings, std::vector<std::string>{"models without a placement: 1"});
 }
 
-TEST(VoxRead, AFileWithoutModelsIsAnEmptyScene) {
+TEST(VoxRead, ReadsFileWithoutModelsAsEmptyScene) {
   const LoadedScene loaded = load(FileBuilder().file());
   EXPECT_TRUE(loaded.scene.grids().empty());
   EXPECT_TRUE(warns(loaded, "no model"));
 }
 
-TEST(VoxRead, VoxelsOutsideTheModelAndAirAreSkippedWithAWarning) {
+TEST(VoxRead, SkipsOutsideAndAirVoxelsWithWarning) {
   const LoadedScene loaded =
       load(FileBuilder().model(2, 2, 2, {{0, 0, 0, 1}, {2, 0, 0, 1}, {0, 255, 0, 1}, {1, 1, 1, 0}}).file());
   EXPECT_EQ(loaded.scene.voxel_count(), 1);
@@ -254,13 +254,13 @@ TEST(VoxRead, VoxelsOutsideTheModelAndAirAreSkippedWithAWarning) {
   EXPECT_TRUE(warns(loaded, "air, skipped: 1"));
 }
 
-TEST(VoxRead, TheLastOfSeveralVoxelsInOnePlaceCounts) {
+TEST(VoxRead, LastDuplicateVoxelWins) {
   const LoadedScene loaded = load(FileBuilder().model(2, 2, 2, {{0, 0, 0, 1}, {0, 0, 0, 9}}).file());
   EXPECT_EQ(loaded.scene.voxel_count(), 1);
   EXPECT_EQ(grid_at(loaded, 0).grid.get({0, 0, 1}), 9);
 }
 
-TEST(VoxRead, UnknownChunksAndVersionsAreRead) {
+TEST(VoxRead, AcceptsUnknownChunksAndVersions) {
   const std::array<std::byte, 5> junk{};
   const LoadedScene loaded = load(one_voxel().chunk("zzzz", junk).file(300));
   EXPECT_EQ(loaded.scene.voxel_count(), 1);
@@ -268,7 +268,7 @@ TEST(VoxRead, UnknownChunksAndVersionsAreRead) {
   EXPECT_TRUE(load(one_voxel().file(200)).warnings.empty());
 }
 
-TEST(VoxRead, FewSomeAndManyVoxelsInAChunkAreAllPlacedTheSame) {
+TEST(VoxRead, PlacesAnyNumberOfVoxels) {
   for (const int edge : {3, 12, 30, 70}) {
     std::vector<vox_test::FileVoxel> voxels;
     for (int i = 0; i < edge * edge * edge; ++i) {
@@ -284,12 +284,12 @@ TEST(VoxRead, FewSomeAndManyVoxelsInAChunkAreAllPlacedTheSame) {
   }
 }
 
-TEST(VoxMistakes, AReaderOfBytesThatAreNotThereIsFound) {
+TEST(VoxDeathTest, AssertsOnReadBeyondBytes) {
   const std::vector<std::byte> bytes(4);
   QUOIN_EXPECT_MISTAKE((void)ByteReader(bytes, 0, 5), "a stretch of the bytes");
 }
 
-TEST(VoxMistakes, ARegistryWithTypesIsFound) {
+TEST(VoxDeathTest, AssertsOnRegistryWithTypes) {
   VoxelRegistry types;
   ASSERT_TRUE(types.add({}));
   QUOIN_EXPECT_MISTAKE((void)vox::register_palette({}, {}, types), "types hold air only");

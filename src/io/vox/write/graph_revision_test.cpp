@@ -169,7 +169,7 @@ TEST(VoxRevision, WritesTheSameFileWithoutEdits) {
   for (const int frame : {0, 3, 5, 12}) EXPECT_EQ(save(load(bytes, frame)), bytes) << frame;
 }
 
-TEST(VoxRevision, APaintedVoxelIsAByte) {
+TEST(VoxRevision, PaintedVoxelChangesOneByte) {
   const auto bytes = house();
   LoadedScene loaded = load(bytes);
   Grid& grid = loaded.scene.edit(loaded.scene.grids().handles()[0]).grid;
@@ -181,7 +181,7 @@ TEST(VoxRevision, APaintedVoxelIsAByte) {
   EXPECT_EQ(different, 1) << "voxels that cannot be seen stay, and so does the order";
 }
 
-TEST(VoxRevision, AnUndoneEditIsNone) {
+TEST(VoxRevision, IgnoresUndoneEdits) {
   const auto bytes = house();
   LoadedScene loaded = load(bytes);
   const GridHandle grid = loaded.scene.grids().handles()[0];
@@ -190,7 +190,7 @@ TEST(VoxRevision, AnUndoneEditIsNone) {
   EXPECT_EQ(save(loaded), bytes);
 }
 
-TEST(VoxRevision, NamesAndSwitchesAreInTheirTransforms) {
+TEST(VoxRevision, NamesAndVisibilityChangeOnlyTheirChunks) {
   const auto bytes = house();
   LoadedScene loaded = load(bytes);
   Scene& scene = loaded.scene;
@@ -206,7 +206,7 @@ TEST(VoxRevision, NamesAndSwitchesAreInTheirTransforms) {
   EXPECT_EQ(changed_chunks(saved, save(loaded)), " ~LAYR ~LAYR");
 }
 
-TEST(VoxRevision, AnimationStaysWhenAnotherFrameWasEdited) {
+TEST(VoxRevision, EditingOneFrameKeepsAnimation) {
   const auto bytes = house();
   LoadedScene loaded = load(bytes, 7);  // the bird shows model 2
   const GridHandle bird = loaded.scene.grids().handles()[2];
@@ -217,7 +217,7 @@ TEST(VoxRevision, AnimationStaysWhenAnotherFrameWasEdited) {
   EXPECT_EQ(text_of(said_by(load(saved, 7).scene)), text_of(said_by(loaded.scene)));
 }
 
-TEST(VoxRevision, MovingWhatMovesSetsAKeyAtItsFrame) {
+TEST(VoxRevision, MovingAnimatedNodeSetsKeyFrame) {
   const auto bytes = house();
   LoadedScene loaded = load(bytes, 5);
   Scene& scene = loaded.scene;
@@ -232,7 +232,7 @@ TEST(VoxRevision, MovingWhatMovesSetsAKeyAtItsFrame) {
   }
 }
 
-TEST(VoxRevision, AMovedGroupIsOneTransform) {
+TEST(VoxRevision, MovedGroupChangesOneTransform) {
   const auto bytes = house();
   LoadedScene loaded = load(bytes);
   const GroupHandle garden = loaded.scene.groups().handles()[0];
@@ -243,7 +243,7 @@ TEST(VoxRevision, AMovedGroupIsOneTransform) {
   EXPECT_EQ(text_of(said_by(load(saved).scene)), text_of(said_by(loaded.scene)));
 }
 
-TEST(VoxRevision, AModelThatOutgrowsItsBoxStaysWhereItIsInEveryFrame) {
+TEST(VoxRevision, KeepsGrownModelInPlaceInEveryFrame) {
   const auto bytes = house();
   LoadedScene loaded = load(bytes);
   // The tree and the bird share model 1, and the bird moves.
@@ -254,7 +254,7 @@ TEST(VoxRevision, AModelThatOutgrowsItsBoxStaysWhereItIsInEveryFrame) {
   EXPECT_EQ(text_of(said_by(load(saved, 5).scene)).find("bird"), text_of(said_by(load(bytes, 5).scene)).find("bird"));
 }
 
-TEST(VoxRevision, AModelBeyond256BecomesPiecesAndOtherFramesStay) {
+TEST(VoxRevision, SplitsModelBeyond256AndKeepsOtherFrames) {
   const auto bytes = house();
   LoadedScene loaded = load(bytes);
   loaded.scene.edit(loaded.scene.grids().handles()[1]).grid.set({400, 0, 0}, 4);
@@ -284,7 +284,7 @@ TEST(VoxRevision, AModelBeyond256BecomesPiecesAndOtherFramesStay) {
   EXPECT_TRUE(has_bird) << "the model of frame 5 is shown there";
 }
 
-TEST(VoxRevision, NewColoursTakeEntriesThatNoVoxelHas) {
+TEST(VoxRevision, NewColoursReplaceUnusedEntries) {
   const auto bytes = house();
   LoadedScene loaded = load(bytes);
   VoxelProperties gold;
@@ -324,7 +324,7 @@ TEST(VoxRevision, NewColoursTakeEntriesThatNoVoxelHas) {
   EXPECT_EQ(changed_chunks(bytes, save(loaded)), " ~XYZI");
 }
 
-TEST(VoxRevision, AMaterialThatChangedKeepsKeysThatNobodyKnows) {
+TEST(VoxRevision, ChangedMaterialKeepsUnknownKeys) {
   const auto bytes = house();
   LoadedScene loaded = load(bytes);
   VoxelProperties glass = loaded.scene.types[5];
@@ -337,7 +337,7 @@ TEST(VoxRevision, AMaterialThatChangedKeepsKeysThatNobodyKnows) {
   EXPECT_EQ(again.scene.types[5].attributes.at("_unknown"), "kept");
 }
 
-TEST(VoxRevision, FilesWithoutASceneGraphKeepTheirFrames) {
+TEST(VoxRevision, KeepsFramesWithoutSceneGraph) {
   FileBuilder file;
   file.model(3, 3, 5, {{0, 0, 0, 1}}).model(3, 3, 3, {{1, 0, 0, 2}}).model(1, 1, 1, {{0, 0, 0, 3}});
   const auto bytes = file.file();
@@ -388,7 +388,7 @@ std::vector<std::byte> three_frames() {
   return file.file();
 }
 
-TEST(VoxRevision, AFrameThatOutgrowsItsBoxLeavesTheOthersWhereTheyAre) {
+TEST(VoxRevision, GrownFrameLeavesOthersInPlace) {
   const auto bytes = three_frames();
   for (const int edited : {0, 1}) {
     // Voxels beyond each side, beyond two sides at once, and too far away for any model.
@@ -409,7 +409,7 @@ TEST(VoxRevision, AFrameThatOutgrowsItsBoxLeavesTheOthersWhereTheyAre) {
   }
 }
 
-TEST(VoxRevision, FramesThatAreNotShownMayOutgrowTheirBoxesToo) {
+TEST(VoxRevision, AllowsGrowthOfOtherFrames) {
   const auto bytes = three_frames();
   for (const IVec3 voxel : {IVec3(0, 0, 3), IVec3(1, 6, 0), IVec3(0, 280, 0)}) {
     SCOPED_TRACE(voxel.y);
@@ -429,7 +429,7 @@ TEST(VoxRevision, FramesThatAreNotShownMayOutgrowTheirBoxesToo) {
   }
 }
 
-TEST(VoxRevision, FramesThatGoAreSaidToBeLost) {
+TEST(VoxRevision, ReportsLostFrames) {
   LoadedScene loaded = load(three_frames(), 0);
   loaded.scene.remove_instance(loaded.scene.instances().handles()[0]);
   Instance other;
@@ -440,7 +440,7 @@ TEST(VoxRevision, FramesThatGoAreSaidToBeLost) {
   EXPECT_EQ(losses[0], "animation frames left out, since their model was removed: 3");
 }
 
-TEST(VoxRevision, AModelOfAnotherFrameThatOutgrows256IsSaidToStay) {
+TEST(VoxRevision, ReportsUnchangedModelsBeyond256) {
   LoadedScene loaded = load(house());
   // Both the bird and the bench show model 2 later.
   for (const InstanceHandle handle : loaded.scene.instances().handles()) {
@@ -452,7 +452,7 @@ TEST(VoxRevision, AModelOfAnotherFrameThatOutgrows256IsSaidToStay) {
   EXPECT_EQ(losses[0], "models of other frames left unchanged, since they exceed 256 voxels: 1");
 }
 
-TEST(VoxRevision, SharedNodesAreWrittenAnewAndThatIsSaid) {
+TEST(VoxRevision, RewritesSharedNodesWithWarning) {
   FileBuilder file;
   file.model(2, 2, 2, {{0, 0, 0, 1}});
   file.transform(0, 1, {{}}).group(1, {2, 4});
@@ -472,7 +472,7 @@ TEST(VoxRevision, SharedNodesAreWrittenAnewAndThatIsSaid) {
   EXPECT_EQ(vox_unsupported_features(loaded).value(), warnings) << "said before it is written";
 }
 
-TEST(VoxRevision, CategoriesOfInstancesAreSaidToBeLost) {
+TEST(VoxRevision, ReportsLostCategories) {
   FileBuilder file;
   file.model(2, 2, 2, {{0, 0, 0, 1}});
   LoadedScene loaded = load(file.file());
@@ -509,7 +509,7 @@ std::string text_in(const std::vector<std::byte>& file) {
   return {reinterpret_cast<const char*>(file.data()), file.size()};
 }
 
-TEST(VoxRevision, AboveALoneRootThereIsRoomForMore) {
+TEST(VoxRevision, EditsFilesWithLoneRoot) {
   for (const bool has_hidden_group : {false, true}) {
     const auto file = lone_walk(has_hidden_group);
     for (const char* edit : {"add", "name", "show", "leave the group", "remove"}) {
@@ -557,7 +557,7 @@ TEST(VoxRevision, AboveALoneRootThereIsRoomForMore) {
   }
 }
 
-TEST(VoxRevision, BytesAfterTheVoxelsStay) {
+TEST(VoxRevision, KeepsBytesAfterVoxels) {
   FileBuilder file;
   file.size(2, 2, 2).with("XYZI", [](auto& out) {
     out.u32(1);
@@ -580,7 +580,7 @@ TEST(VoxRevision, SavesHiddenModelsAsShownWhenTheyWereShown) {
   }
 }
 
-TEST(VoxRevision, NamesContentThatASceneCannotHold) {
+TEST(VoxRevision, NamesContentThatScenesCannotHold) {
   const auto lines = source_only_features(*load(house()).source);
   const std::vector<std::string> expected = {
       "animation: frames 0 to 24", "cameras: 10", "chunks QQQQ: 1", "chunks xxxx: 1", "notes: 1", "render settings: 1"};
@@ -739,7 +739,7 @@ class History {
   Scene& scene_;
 };
 
-TEST(VoxRevision, AnyHistoryIsReadBackAsItWasWritten) {
+TEST(VoxRevision, RoundTripsAnyEditHistory) {
   FileBuilder lone;
   lone.model(3, 3, 5, {{0, 0, 0, 1}}).model(3, 3, 3, {{1, 0, 0, 2}});
   FileBuilder shared;

@@ -52,7 +52,7 @@ void expect_same(const Camera& found, const Camera& wanted, const char* what) {
   EXPECT_EQ(found.projection, wanted.projection) << what;
 }
 
-TEST(VoxViewWriting, AnyCameraComesBack) {
+TEST(VoxViewWriting, RoundTripsAnyCamera) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> any(-180.0, 180.0);
   LoadedScene loaded = scene_of_a_voxel();
@@ -74,7 +74,7 @@ TEST(VoxViewWriting, AnyCameraComesBack) {
   }
 }
 
-TEST(VoxViewWriting, ACameraThatLooksUnsetComesBackToo) {
+TEST(VoxViewWriting, RoundTripsCameraThatLooksUnset) {
   LoadedScene loaded = scene_of_a_voxel();
   for (const double focus : {0.0, 1.0}) {
     FileCamera one{static_cast<int>(focus), {}, focus};
@@ -86,7 +86,7 @@ TEST(VoxViewWriting, ACameraThatLooksUnsetComesBackToo) {
   for (std::size_t i = 0; i < 2; ++i) expect_same(again.cameras[i].camera, loaded.cameras[i].camera, "unset");
 }
 
-TEST(VoxViewWriting, AnOrthographicCameraBeforeTheSceneComesBack) {
+TEST(VoxViewWriting, RoundTripsOrthographicCamera) {
   LoadedScene loaded = scene_of_a_voxel();
   FileCamera one{3, turned(-0.5, 0.7, 0.1), 0.0};
   one.camera.projection = Camera::Projection::Orthographic;
@@ -99,7 +99,7 @@ TEST(VoxViewWriting, AnOrthographicCameraBeforeTheSceneComesBack) {
   EXPECT_NEAR(again.cameras[0].camera.view_height, 12.5, 1e-4);
 }
 
-TEST(VoxViewWriting, TheCameraToLookThroughGetsAFreeNumber) {
+TEST(VoxViewWriting, AssignsFreeNumberToFirstCamera) {
   LoadedScene loaded = scene_of_a_voxel();
   loaded.cameras.push_back({0, turned(0.1, 0.2, 0.3), 5.0});
   loaded.camera = turned(0.3, 0.2, 0.1);
@@ -109,7 +109,7 @@ TEST(VoxViewWriting, TheCameraToLookThroughGetsAFreeNumber) {
   expect_same(again.cameras[0].camera, *loaded.camera, "first");
 }
 
-TEST(VoxViewWriting, TheSunComesBack) {
+TEST(VoxViewWriting, RoundTripsSun) {
   LoadedScene loaded = scene_of_a_voxel();
   loaded.scene.environment = Environment::natural(glm::normalize(DVec3(-3, 2, 1)));
   LoadedScene again = written(loaded);
@@ -171,7 +171,7 @@ TEST(VoxViewWriting, WritesTheSameFileWithoutChanges) {
   EXPECT_EQ(write_vox(read_vox(file).value()).value().bytes, file);
 }
 
-TEST(VoxViewWriting, OnlyWhatChangedIsWrittenAnew) {
+TEST(VoxViewWriting, RewritesOnlyChanges) {
   LoadedScene loaded = read_vox(file_with_views()).value();
   ASSERT_EQ(loaded.cameras.size(), 2U);
   loaded.cameras[1].camera.position.x += 5.0;                 // number 2

@@ -98,7 +98,7 @@ Scene random_scene(std::uint32_t seed) {
   return scene;
 }
 
-TEST(VoxWrite, WritingAndReadingIsTheIdentityOnRandomScenes) {
+TEST(VoxWrite, RoundTripsRandomScenes) {
   for (std::uint32_t seed = 1; seed <= 60; ++seed) {
     const Scene scene = random_scene(seed);
     const auto written = write_vox(scene);
@@ -149,7 +149,7 @@ Scene scene_with_types(int count) {
   return scene;
 }
 
-TEST(VoxWrite, GridsOfAnyBoundsAndPivotStandWhereTheyStood) {
+TEST(VoxWrite, KeepsPositionsForAnyBoundsAndPivot) {
   Scene scene = scene_with_types(5);
   SceneGrid grid;
   grid.grid.fill_box({{-3, -70, 5}, {5, -59, 10}}, 2);
@@ -170,7 +170,7 @@ TEST(VoxWrite, GridsOfAnyBoundsAndPivotStandWhereTheyStood) {
   EXPECT_EQ(again.grids().size(), 1U);
 }
 
-TEST(VoxWrite, WarnsOfPositionsBeyondTheWorldOfMagicaVoxel) {
+TEST(VoxWrite, WarnsOfPositionsBeyondMagicaVoxelWorld) {
   for (const auto& [position, count] : {std::pair(DVec3(1000, -1000, 1000), 0), std::pair(DVec3(0, 0, -1001), 1)}) {
     Scene scene = scene_with_types(2);
     SceneGrid grid;
@@ -188,7 +188,7 @@ TEST(VoxWrite, WarnsOfPositionsBeyondTheWorldOfMagicaVoxel) {
   }
 }
 
-TEST(VoxWrite, GridsBeyond256AreCutAndStillStandWhereTheyStood) {
+TEST(VoxWrite, SplitsGridsBeyond256InPlace) {
   Scene scene = scene_with_types(5);
   SceneGrid grid;
   grid.grid.fill_box({{-300, 0, 0}, {311, 2, 2}}, 3);
@@ -214,7 +214,7 @@ TEST(VoxWrite, GridsBeyond256AreCutAndStillStandWhereTheyStood) {
   EXPECT_EQ(difference_after_round_trip(again), "");
 }
 
-TEST(VoxWrite, TypesBelow256KeepTheirIndicesNamesAndProperties) {
+TEST(VoxWrite, KeepsIndicesAndPropertiesOfTypesBelow256) {
   Scene scene = scene_with_types(200);
   VoxelProperties lamp = scene.types[150];
   lamp.emission = 3.0F;
@@ -236,7 +236,7 @@ TEST(VoxWrite, TypesBelow256KeepTheirIndicesNamesAndProperties) {
 }
 
 // MagicaVoxel has no such key: it is stored under Quoin's own key, independent of the type's other properties.
-TEST(VoxWrite, KeepsCollisionOfTypesWithoutAWarning) {
+TEST(VoxWrite, KeepsCollisionOfTypesWithoutWarning) {
   Scene scene = scene_with_types(4);
   for (VoxelType type = 1; type <= 4; ++type) {
     VoxelProperties properties = scene.types[type];
@@ -253,7 +253,7 @@ TEST(VoxWrite, KeepsCollisionOfTypesWithoutAWarning) {
   for (VoxelType type = 1; type <= 4; ++type) EXPECT_EQ(again.types[type].collides, type % 2 == 0);
 }
 
-TEST(VoxWrite, ManyTypesAreNumberedWhenFewOccur) {
+TEST(VoxWrite, RenumbersUsedTypes) {
   Scene scene = scene_with_types(1000);
   SceneGrid grid;
   grid.grid.set({0, 0, 0}, 900);
@@ -268,7 +268,7 @@ TEST(VoxWrite, ManyTypesAreNumberedWhenFewOccur) {
   EXPECT_EQ(again.types[2].colour, scene.types[900].colour);
 }
 
-TEST(VoxWrite, MoreThan255TypesAreRefused) {
+TEST(VoxWrite, RefusesMoreThan255Types) {
   Scene scene = scene_with_types(300);
   SceneGrid grid;
   for (int i = 1; i <= 256; ++i) grid.grid.set({i, 0, 0}, static_cast<VoxelType>(i));
@@ -329,7 +329,7 @@ TEST(VoxWrite, RefusesScenesThatVoxCannotHold) {
   EXPECT_EQ(warnings, std::vector<std::string>{"instances rounded to whole voxels: 1"});
 }
 
-TEST(VoxWrite, EmptyGridsAndEmptyScenesAreWritten) {
+TEST(VoxWrite, WritesEmptyGridsAndScenes) {
   Scene scene;
   EXPECT_EQ(difference_after_round_trip(scene), "number of types");
   std::vector<std::string> warnings;
@@ -341,7 +341,7 @@ TEST(VoxWrite, EmptyGridsAndEmptyScenesAreWritten) {
   EXPECT_EQ(difference_after_round_trip(again), "");
 }
 
-TEST(VoxWrite, VoxelsAreVisitedInTheOrderOfTheGrid) {
+TEST(VoxWrite, VisitsVoxelsInGridOrder) {
   const Scene scene = random_scene(3);
   for (const GridHandle handle : scene.grids().handles()) {
     vox_test::VoxelList expected;
@@ -351,7 +351,7 @@ TEST(VoxWrite, VoxelsAreVisitedInTheOrderOfTheGrid) {
   }
 }
 
-TEST(VoxWrite, TellsHowFarItIsAndCanBeCancelled) {
+TEST(VoxWrite, ReportsProgressAndCanBeCancelled) {
   Scene scene;
   VoxelProperties grey;
   grey.colour = {9, 9, 9, 255};
@@ -388,11 +388,11 @@ TEST(VoxWrite, TellsHowFarItIsAndCanBeCancelled) {
   }
 }
 
-TEST(VoxWrite, TheSameSceneGivesTheSameBytes) {
+TEST(VoxWrite, IsDeterministic) {
   EXPECT_EQ(write_vox(random_scene(7))->bytes, write_vox(random_scene(7))->bytes);
 }
 
-TEST(VoxMistakes, PiecesWithoutAPlaceInTheFileAreFound) {
+TEST(VoxDeathTest, AssertsOnUnplacedPieces) {
   const std::vector<vox::Piece> pieces(1);
   QUOIN_EXPECT_MISTAKE(vox::write_voxels({}, {}, pieces, {}, {}), "a place for every piece");
 }
