@@ -136,7 +136,7 @@ TEST(ChunkBody, KeepsSingleVoxelsAnywhere) {
   }
 }
 
-TEST(ChunkBody, ChunksThatWereReadCanBeEdited) {
+TEST(ChunkBody, EditsDecodedChunks) {
   std::mt19937 random(3);
   for (const Kind& kind : kKinds) {
     Chunk chunk = chunk_of_boxes(random, kind.types, kind.boxes, kind.noise / 10);
@@ -186,7 +186,7 @@ TEST(ChunkBody, KeepsDataAtVoxels) {
   }
 }
 
-TEST(ChunkBody, KeepsTheMostBytesOfAVoxel) {
+TEST(ChunkBody, KeepsLargestVoxelData) {
   const VoxelRegistry types = types_for_tests(5);
   Chunk chunk(VoxelType{5});
   chunk.set_data({63, 63, 63}, {0xFFFF'FFFFU, std::vector<std::byte>(kMaxVoxelDataBytes, std::byte{9})});
@@ -196,7 +196,7 @@ TEST(ChunkBody, KeepsTheMostBytesOfAVoxel) {
   EXPECT_TRUE(back->voxels == chunk);
 }
 
-TEST(ChunkBody, RefusesMoreDataThanAWorldKeeps) {
+TEST(ChunkBody, RefusesMoreDataThanWorldsKeep) {
   Chunk chunk(VoxelType{1});
   const std::vector<std::byte> bytes(kMaxVoxelDataBytes);
   for (int i = 0; i <= static_cast<int>(kMaxChunkDataBytes / kMaxVoxelDataBytes); ++i) {
@@ -230,7 +230,7 @@ TEST(ChunkBody, KeepsDensitiesAndMaterials) {
   }
 }
 
-TEST(ChunkBody, KeepsDensitiesAtRandom) {
+TEST(ChunkBody, KeepsRandomDensities) {
   std::mt19937 random(7);
   DensityChunk densities(stored_density(8.0F, 8.0F));
   std::array<Half, kChunkEdge> row{};
@@ -244,7 +244,7 @@ TEST(ChunkBody, KeepsDensitiesAtRandom) {
   EXPECT_EQ(back->voxels.uniform(), VoxelType{3});
 }
 
-TEST(ChunkBody, DensitiesThatAreNoneOfTheBandAreRefused) {
+TEST(ChunkBody, RefusesDensitiesOutsideBand) {
   std::mt19937 random(8);
   const DensityChunk densities = densities_of_spheres(random, 3, 8.0F, 2);
   const auto body = encoded(Chunk(), &densities);
@@ -253,7 +253,7 @@ TEST(ChunkBody, DensitiesThatAreNoneOfTheBandAreRefused) {
   EXPECT_EQ(back.error().code, ErrorCode::BadFormat);
 }
 
-TEST(ChunkBody, SaysWhatItIs) {
+TEST(ChunkBody, IdentifiesItsChunk) {
   std::mt19937 random(9);
   const Chunk chunk = chunk_of_boxes(random, 5, 10, 10);
   const auto body = encoded(chunk, nullptr, 0x0102'0304'0506'0708U);
@@ -330,7 +330,7 @@ std::vector<std::byte> impl_of(const Chunk& chunk) {
   return content;
 }
 
-TEST(ChunkBody, LiesBehindARightChecksumAreErrorsOrChunks) {
+TEST(ChunkBody, SurvivesDamageWithValidChecksum) {
   std::mt19937 random(11);
   const VoxelRegistry types = types_for_tests(30);
   ChunkDecoder decoder;
@@ -366,7 +366,7 @@ TEST(ChunkBody, LiesBehindARightChecksumAreErrorsOrChunks) {
   EXPECT_GT(chunks, 500);
 }
 
-TEST(ChunkBody, LiesAreNamed) {
+TEST(ChunkBody, DescribesDamage) {
   const VoxelRegistry types = types_for_tests(3);
   Chunk chunk(VoxelType{1});
   chunk.set(5, 0, 0, VoxelType{2});
@@ -396,7 +396,7 @@ TEST(ChunkBody, LiesAreNamed) {
 }
 
 // Bodies from earlier versions still decode to the same chunks.
-TEST(ChunkBody, ReadsEveryFileOfTheCorpus) {
+TEST(ChunkBody, ReadsCorpus) {
   const VoxelRegistry types = types_for_tests(300);
   for (const CorpusChunk& each : corpus_chunks()) {
     const auto path = std::filesystem::path(QUOIN_SOURCE_DIR) / "tests" / "corpus" / "chunk_body" / each.file;
@@ -411,7 +411,7 @@ TEST(ChunkBody, ReadsEveryFileOfTheCorpus) {
 }
 
 // A frame whose size exceeds any chunk is rejected before memory is allocated.
-TEST(ChunkBody, BombsAreRefused) {
+TEST(ChunkBody, RefusesBombs) {
   auto body = encoded(Chunk(VoxelType{1}));
   body[12] = static_cast<std::byte>(chunk_sections::kVoxels | chunk_sections::kCompressed);
   for (std::size_t i = 40; i < 44; ++i) body[i] = std::byte{0xFF};
@@ -441,13 +441,13 @@ TEST(ChunkBody, KeepsGeneratedTerrain) {
   }
 }
 
-TEST(ChunkBodyDeathTest, ReadersTakeWhatIsThere) {
+TEST(ChunkBodyDeathTest, AssertsOnReadBeyondContent) {
   const std::vector<std::byte> bytes(3);
   ContentReader content(bytes);
   QUOIN_EXPECT_MISTAKE(static_cast<void>(content.take<std::uint32_t>()), "bytes that .has. confirmed");
 }
 
-TEST(ChunkBodyDeathTest, BandsArePositive) {
+TEST(ChunkBodyDeathTest, AssertsOnZeroBand) {
   const std::vector<std::byte> body = encoded(Chunk());
   QUOIN_EXPECT_MISTAKE(static_cast<void>(decoded(body, many_types(), 0.0F)), "a positive band");
 }

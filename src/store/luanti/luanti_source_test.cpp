@@ -57,7 +57,7 @@ void expect_some_block(const LoadedScene& loaded, IVec3 corner) {
   EXPECT_EQ(grid.data(corner + IVec3{1, 2, 12}).state, 0U);
 }
 
-TEST(LuantiMap, EveryVersionAndBothTablesGiveTheSameNodes) {
+TEST(LuantiMap, ReadsSameNodesFromEveryVersionAndTable) {
   for (const bool by_three : {false, true}) {
     for (int version = 25; version <= 29; ++version) {
       for (const int width : {1, 2}) {
@@ -72,7 +72,7 @@ TEST(LuantiMap, EveryVersionAndBothTablesGiveTheSameNodes) {
   }
 }
 
-TEST(LuantiMap, AFolderHasItsName) {
+TEST(LuantiMap, ReadsNameOfFolder) {
   const WorldFolder folder;
   Map(folder / "map.sqlite").put({0, 0, 0}, row_of(some_block(), 28));
   ASSERT_TRUE(write_file(Bytes(), folder / "world.mt"));
@@ -96,7 +96,7 @@ TEST(LuantiMap, ReportsUnsupportedBackends) {
   EXPECT_NE(refused.error().message.find("leveldb"), std::string::npos);
 }
 
-TEST(LuantiMap, IsKnownByItsTable) {
+TEST(LuantiMap, IsDetectedByTable) {
   const WorldFolder folder;
   Map(folder / "map.sqlite").put({0, 0, 0}, row_of(some_block(), 28));
   auto bytes = read_file(folder / "map.sqlite").value();
@@ -154,7 +154,7 @@ TEST(LuantiMap, NamesAndSkipsBrokenBlocks) {
   EXPECT_TRUE(said("block (0, 0, 1): the row has no data"));
 }
 
-TEST(LuantiMap, ReadsRowsThatAreCutOffOrChangedAnywhere) {
+TEST(LuantiMap, SurvivesTruncatedAndChangedRows) {
   store::luanti::MapBlockReader reader;
   store::luanti::MapBlock block;
   std::minstd_rand random(5);
@@ -174,7 +174,7 @@ TEST(LuantiMap, ReadsRowsThatAreCutOffOrChangedAnywhere) {
   }
 }
 
-TEST(LuantiMap, TheCorpusIsReadOrRefusedWithAnOffset) {
+TEST(LuantiMap, ReadsOrRefusesCorpusWithOffset) {
   int read = 0;
   int refused = 0;
   for (const auto& entry : fs::directory_iterator(fs::path(QUOIN_SOURCE_DIR) / "tests" / "corpus" / "luanti")) {
@@ -192,7 +192,7 @@ TEST(LuantiMap, TheCorpusIsReadOrRefusedWithAnOffset) {
   EXPECT_EQ(refused, 1);
 }
 
-TEST(LuantiMap, AFrameThatExpandsToMuchIsCutOff) {
+TEST(LuantiMap, RefusesFrameThatExpandsTooFar) {
   luanti_test::Writer content;
   content.big(0, 7).big(0, 1).big(0xFFFF, 2).append(Bytes(std::size_t{64} << 20));
   luanti_test::Writer row;
@@ -202,7 +202,7 @@ TEST(LuantiMap, AFrameThatExpandsToMuchIsCutOff) {
   EXPECT_FALSE(reader.read(row.bytes, block));
 }
 
-TEST(LuantiMap, AnImportThatWasStoppedEndsAsIfItHadNotBeen) {
+TEST(LuantiMap, ResumedImportMatchesUninterruptedImport) {
   const WorldFolder folder;
   {
     Map map(folder / "map.sqlite", true);
@@ -228,7 +228,7 @@ TEST(LuantiMap, AnImportThatWasStoppedEndsAsIfItHadNotBeen) {
   }
 }
 
-TEST(LuantiMap, ARealWorldHasTheNodesThatItHas) {
+TEST(LuantiMap, RealWorldHasExpectedNodes) {
   const fs::path folder = fs::path(QUOIN_SOURCE_DIR) / "../shared/data/luanti/cornernote+minetest-mesecons-circuits";
   if (!fs::exists(folder)) GTEST_SKIP() << folder << " is not there";
   const auto source = open_chunk_source(folder);

@@ -178,7 +178,7 @@ std::map<std::int64_t, std::vector<Span>> places_of_rows(const Bytes& file, std:
   return places;
 }
 
-TEST(PageScan, FindsAllOfASoundFile) {
+TEST(PageScan, FindsAllRowsOfSoundFile) {
   const WorldFolder folder;
   std::mt19937 random(1);
   for (const int page_size : {512, 1'024, 8'192, 65'536}) {
@@ -189,7 +189,7 @@ TEST(PageScan, FindsAllOfASoundFile) {
   }
 }
 
-TEST(PageScan, FindsAllWithoutTheFirstPage) {
+TEST(PageScan, FindsAllRowsWithoutFirstPage) {
   const WorldFolder folder;
   std::mt19937 random(2);
   for (const int page_size : {512, 2'048, 4'096, 8'192, 65'536}) {
@@ -210,7 +210,7 @@ TEST(PageScan, FindsAllWithoutTheFirstPage) {
   }
 }
 
-TEST(PageScan, FindsAllWithoutInnerPagesAndHeaders) {
+TEST(PageScan, FindsAllRowsWithoutInnerPagesAndHeaders) {
   const WorldFolder folder;
   std::mt19937 random(3);
   const auto path = folder / "world";
@@ -232,7 +232,7 @@ TEST(PageScan, FindsAllWithoutInnerPagesAndHeaders) {
   expect_all_found(path, rows);
 }
 
-TEST(PageScan, FindsJustTheRowsWhoseBytesAreSound) {
+TEST(PageScan, FindsOnlySoundRows) {
   const WorldFolder folder;
   std::mt19937 random(4);
   const auto path = folder / "world";
@@ -272,7 +272,7 @@ TEST(PageScan, FindsJustTheRowsWhoseBytesAreSound) {
   EXPECT_GT(lost, static_cast<std::size_t>(cases));
 }
 
-TEST(PageScan, FindsWhatOnlyTheLogHolds) {
+TEST(PageScan, FindsRowsOfLog) {
   const WorldFolder folder;
   std::mt19937 random(5);
   auto rows = rows_of(random, 60);
@@ -297,7 +297,7 @@ TEST(PageScan, FindsWhatOnlyTheLogHolds) {
   }
 }
 
-TEST(PageScan, FindsRowsThatWereRemoved) {
+TEST(PageScan, FindsRemovedRows) {
   const WorldFolder folder;
   std::mt19937 random(6);
   const auto path = folder / "world";
@@ -352,7 +352,7 @@ TEST(PageScan, FindsRecordsOfAnyColumns) {
 }
 
 // Pages that point to themselves, and rows without a number that begin there.
-TEST(PageScan, EndsWhereRecordsDoNot) {
+TEST(PageScan, TerminatesOnCyclicPages) {
   constexpr std::size_t kPage = 512;
   constexpr std::size_t kPages = 2'048;
   const WorldFolder folder;
@@ -375,7 +375,7 @@ TEST(PageScan, EndsWhereRecordsDoNot) {
 
 // Uses the form of page_scan_fuzz: the first byte is the database's number of 256-byte blocks, followed by the database
 // and its log.
-TEST(PageScan, FilesOfTheCorpusHoldTheirBodies) {
+TEST(PageScan, FindsBodiesInCorpus) {
   const WorldFolder folder;
   for (const char* const name : {"pages_of_512", "pages_of_1024"}) {
     const Bytes file = file_of(std::filesystem::path(QUOIN_SOURCE_DIR) / "tests" / "corpus" / "page_scan" / name);
@@ -391,7 +391,7 @@ TEST(PageScan, FilesOfTheCorpusHoldTheirBodies) {
   }
 }
 
-TEST(PageScan, SaysThatThereIsNoFile) {
+TEST(PageScan, ReportsMissingFile) {
   const WorldFolder folder;
   const auto status = scan_bodies(folder / "none", [](std::int64_t, std::span<const std::byte>) {});
   ASSERT_FALSE(status.has_value());
@@ -399,7 +399,7 @@ TEST(PageScan, SaysThatThereIsNoFile) {
   EXPECT_FALSE(scan_bodies(folder.path(), [](std::int64_t, std::span<const std::byte>) {}).has_value());
 }
 
-TEST(PageScan, FilesOfAnythingAreScanned) {
+TEST(PageScan, SurvivesRandomFiles) {
   const WorldFolder folder;
   std::mt19937 random(8);
   for (int i = 0; i < 60; ++i) {
@@ -413,7 +413,7 @@ TEST(PageScan, FilesOfAnythingAreScanned) {
   }
 }
 
-TEST(PageFileDeathTest, PagesAreOfTheFileOrItsLog) {
+TEST(PageFileDeathTest, AssertsOnPageOutOfRange) {
   const WorldFolder folder;
   write(folder / "world", Bytes(8'192));
   const auto file = PageFile::open(folder / "world");

@@ -53,7 +53,7 @@ std::size_t sound_chunks(const std::filesystem::path& path) {
   return sound;
 }
 
-TEST(WorldMaintenance, SummaryAndCheckOfASoundWorld) {
+TEST(WorldMaintenance, SummarizesAndChecksSoundWorld) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   make_world(path);
@@ -72,7 +72,7 @@ TEST(WorldMaintenance, SummaryAndCheckOfASoundWorld) {
   EXPECT_TRUE(check->damage.empty()) << check->damage.front().what;
 }
 
-TEST(WorldMaintenance, BackupsAreMadeWhileTheWorldIsWritten) {
+TEST(WorldMaintenance, BacksUpWhileWorldIsWritten) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   make_world(path);
@@ -97,7 +97,7 @@ TEST(WorldMaintenance, BackupsAreMadeWhileTheWorldIsWritten) {
   EXPECT_EQ(compacted.error().code, ErrorCode::CannotWrite);
 }
 
-TEST(WorldMaintenance, CompactGivesSpaceBack) {
+TEST(WorldMaintenance, CompactingReclaimsSpace) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   make_world(path);
@@ -133,7 +133,7 @@ int wanted_damage() {
 }
 
 // The check names all lost items; the repaired world has all others.
-TEST(WorldMaintenance, AnyDamageIsSeenAndWhatIsSoundIsKept) {
+TEST(WorldMaintenance, DetectsDamageAndKeepsSoundParts) {
   const WorldFolder folder;
   const auto whole = folder / "whole.quoin";
   make_world(whole);
@@ -166,7 +166,7 @@ TEST(WorldMaintenance, AnyDamageIsSeenAndWhatIsSoundIsKept) {
   }
 }
 
-TEST(WorldMaintenance, ARepairedWorldTakesThePlaceOfTheDamagedOne) {
+TEST(WorldMaintenance, RepairReplacesDamagedWorld) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   make_world(path);
@@ -181,7 +181,7 @@ TEST(WorldMaintenance, ARepairedWorldTakesThePlaceOfTheDamagedOne) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 2);
 }
 
-TEST(WorldMaintenance, LostTypesShow) {
+TEST(WorldMaintenance, MarksLostTypesByColour) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   make_world(path);
@@ -285,7 +285,7 @@ TEST(WorldMaintenance, RepairLeavesOutChunksWithInvalidAddresses) {
   EXPECT_TRUE(check_world(folder / "m.quoin")->damage.empty());
 }
 
-TEST(WorldMaintenance, NothingIsRepairedOfNothing) {
+TEST(WorldMaintenance, RefusesToRepairInvalidFiles) {
   const WorldFolder folder;
   std::ofstream(folder / "text.quoin") << std::string(30'000, 'x');
   const auto repair = repair_world(folder / "text.quoin", folder / "m.quoin");
@@ -302,7 +302,7 @@ std::vector<std::byte> png_of(char last) {
   return {bytes.begin(), bytes.end()};
 }
 
-TEST(WorldThumbnail, IsKeptUntilTheNext) {
+TEST(WorldThumbnail, IsKeptUntilReplaced) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   make_world(path);
@@ -333,7 +333,7 @@ TEST(WorldThumbnail, IsKeptUntilTheNext) {
   EXPECT_FALSE(world->thumbnail()->has_value());
 }
 
-TEST(WorldCopy, HasAllThatTheWorldHas) {
+TEST(WorldCopy, CopiesEverything) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   make_world(path);
@@ -368,7 +368,7 @@ TEST(WorldCopy, HasAllThatTheWorldHas) {
   EXPECT_EQ(on->chunks(0, 0)->size(), kChunks + 1U);
 }
 
-TEST(WorldCopy, LeavesOutChunksThatAreDamagedAndRefusesOtherDamage) {
+TEST(WorldCopy, SkipsDamagedChunksAndRefusesOtherDamage) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   make_world(path);
@@ -392,7 +392,7 @@ TEST(WorldCopy, LeavesOutChunksThatAreDamagedAndRefusesOtherDamage) {
   EXPECT_FALSE(std::filesystem::exists(folder / "d.quoin"));
 }
 
-TEST(WorldCopy, TakesThePlaceOfAWorldUnlessSomebodyWritesThat) {
+TEST(WorldCopy, ReplacesWorldUnlessOpenForWriting) {
   const WorldFolder folder;
   make_world(folder / "w.quoin");
   make_world(folder / "c.quoin");

@@ -88,7 +88,7 @@ void expect_equal(const SceneMeshes& a, const SceneMeshes& b) {
   EXPECT_EQ(a.stats.vertices, b.stats.vertices);
 }
 
-TEST(WorldMeshes, AreThoseOfTheWholeScene) {
+TEST(WorldMeshes, MatchWholeScene) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   const Scene scene = landscape();
@@ -113,7 +113,7 @@ TEST(WorldMeshes, AreThoseOfTheWholeScene) {
   }
 }
 
-TEST(WorldFaces, AreThoseOfTheWholeScene) {
+TEST(WorldFaces, MatchWholeScene) {
   const Scene scene = landscape();
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
@@ -125,7 +125,7 @@ TEST(WorldFaces, AreThoseOfTheWholeScene) {
   }
 }
 
-TEST(WorldMeshes, AreReadAgainAfterTheyWereGivenBack) {
+TEST(WorldMeshes, AreReadAgainAfterRelease) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   ASSERT_TRUE(write_world(landscape(), path));
@@ -146,7 +146,7 @@ TEST(WorldMeshes, AreReadAgainAfterTheyWereGivenBack) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 3);
 }
 
-TEST(WorldMeshes, DensitiesAreMeshedAsAWhole) {
+TEST(WorldMeshes, RefuseDensities) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   Scene scene = landscape();
@@ -163,7 +163,7 @@ TEST(WorldMeshes, DensitiesAreMeshedAsAWhole) {
   EXPECT_EQ(made.error().code, ErrorCode::Unsupported);
 }
 
-TEST(WorldMeshes, ReportsAMissingFolder) {
+TEST(WorldMeshes, ReportMissingFolder) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   ASSERT_TRUE(write_world(landscape(), path));
@@ -187,7 +187,7 @@ TEST(WorldMeshes, CanBeCancelled) {
   EXPECT_EQ(made.error().code, ErrorCode::Cancelled);
 }
 
-TEST(WorldMeshes, AWorldsMemoryIsGuessedFromSomeOfItsChunks) {
+TEST(WorldMeshes, EstimateMemoryFromSampleOfChunks) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   const Scene scene = landscape();

@@ -52,7 +52,7 @@ class WorldImport : public testing::Test {
   fs::path folder;
 };
 
-TEST_F(WorldImport, HoldsAllThatCanBeReadAndNamesTheRest) {
+TEST_F(WorldImport, ImportsReadableChunksAndNamesOthers) {
   const auto source = open();
   const auto imported = import_world(*source, folder / "out.quoin");
   ASSERT_TRUE(imported) << to_string(imported.error());
@@ -67,7 +67,7 @@ TEST_F(WorldImport, HoldsAllThatCanBeReadAndNamesTheRest) {
   EXPECT_NE(grid.data({-3 * 512 + 1, -64, 512}).state, 0U);
 }
 
-TEST_F(WorldImport, KeepsTheLampsOfLightBlocks) {
+TEST_F(WorldImport, KeepsLampsOfLightBlocks) {
   minecraft_test::NbtWriter nbt;
   nbt.compound("").list("sections", 10, 1).byte("Y", 0).compound("block_states").list("palette", 10, 1);
   nbt.string("Name", "minecraft:light").end().end().end().end();
@@ -110,7 +110,7 @@ TEST_F(WorldImport, ResumedImportsMatchUninterruptedImports) {
   }
 }
 
-TEST_F(WorldImport, RefusesToGoOnWithAnotherSource) {
+TEST_F(WorldImport, RefusesToResumeWithOtherSource) {
   int calls = 0;
   const auto part = import_world(*open(), folder / "out.quoin", {1}, [&](double) { return calls++ == 0; });
   ASSERT_FALSE(part);

@@ -73,7 +73,7 @@ Scene loaded_from(const std::filesystem::path& path) {
   return std::move(loaded->scene);
 }
 
-TEST(WorldSaver, ASceneIsTheSameAgain) {
+TEST(WorldSaver, RoundTripsScene) {
   const WorldFolder folder;
   const Scene scene = rich_scene();
   const auto saved = save_scene(scene, folder / "w.quoin");
@@ -84,7 +84,7 @@ TEST(WorldSaver, ASceneIsTheSameAgain) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1) << "no other files in the folder";
 }
 
-TEST(WorldSaver, TheSameSceneGivesTheSameBytes) {
+TEST(WorldSaver, IsDeterministic) {
   const WorldFolder folder;
   const Scene scene = rich_scene();
   ASSERT_TRUE(save_scene(scene, folder / "a.quoin", {1}));
@@ -92,7 +92,7 @@ TEST(WorldSaver, TheSameSceneGivesTheSameBytes) {
   EXPECT_EQ(*read_file(folder / "a.quoin"), *read_file(folder / "b.quoin"));
 }
 
-TEST(WorldSaver, SunAndCamerasAreKept) {
+TEST(WorldSaver, KeepsSunAndCameras) {
   const WorldFolder folder;
   LoadedScene loaded;
   loaded.scene = rich_scene();
@@ -112,7 +112,7 @@ TEST(WorldSaver, SunAndCamerasAreKept) {
   EXPECT_EQ(again->cameras[1].camera.projection, Camera::Projection::Orthographic);
 }
 
-TEST(WorldSaver, SavesChangesOfTheEnvironment) {
+TEST(WorldSaver, SavesChangesOfEnvironment) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   auto world = WorldStore::create(path);
@@ -200,7 +200,7 @@ TEST(WorldSaver, SavesOnlyChanges) {
   EXPECT_EQ((*air)->voxels.uniform(), kAir);
 }
 
-TEST(WorldSaver, FollowsEverythingThatASceneCanDo) {
+TEST(WorldSaver, SavesEveryKindOfChange) {
   const WorldFolder folder;
   KeptWorld kept(folder / "w.quoin");
   Scene scene = rich_scene();
@@ -231,7 +231,7 @@ TEST(WorldSaver, FollowsEverythingThatASceneCanDo) {
   EXPECT_EQ(kept.world().grids()->size(), 2U);
 }
 
-TEST(WorldSaver, GoesOnWithWhatWasLoaded) {
+TEST(WorldSaver, ContinuesFromLoadedWorld) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   ASSERT_TRUE(save_scene(rich_scene(), path));
@@ -263,7 +263,7 @@ TEST(WorldSaver, GoesOnWithWhatWasLoaded) {
   EXPECT_TRUE(WorldStore::open(path, WorldAccess::Read)->value("time")->has_value());
 }
 
-TEST(WorldSaver, SavesRefusedChangesTheNextTime) {
+TEST(WorldSaver, SavesRefusedChangesNextTime) {
   const WorldFolder folder;
   KeptWorld kept(folder / "w.quoin");
   Scene scene = rich_scene();
@@ -281,7 +281,7 @@ TEST(WorldSaver, SavesRefusedChangesTheNextTime) {
   kept.save(scene);
 }
 
-TEST(WorldSaver, ANewSceneDoesNotFitAnotherWorldsTypes) {
+TEST(WorldSaver, RefusesSceneWithOtherTypes) {
   const WorldFolder folder;
   KeptWorld kept(folder / "w.quoin");
   kept.save(rich_scene());
@@ -291,7 +291,7 @@ TEST(WorldSaver, ANewSceneDoesNotFitAnotherWorldsTypes) {
   EXPECT_FALSE(saver.save(kept.world(), other));
 }
 
-TEST(WorldSaver, OldWorldsAreReplacedWholeWithTheirLogs) {
+TEST(WorldSaver, ReplacesOldWorldAndLog) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   ASSERT_TRUE(save_scene(rich_scene(), path));
@@ -309,7 +309,7 @@ TEST(WorldSaver, OldWorldsAreReplacedWholeWithTheirLogs) {
   EXPECT_EQ(text_of(loaded_from(path)), text_of(small));
 }
 
-TEST(WorldSaver, BytesInMemoryAreAWorldToo) {
+TEST(WorldSaver, LoadsWorldFromBytes) {
   const WorldFolder folder;
   ASSERT_TRUE(save_scene(rich_scene(), folder / "w.quoin"));
   const auto bytes = read_file(folder / "w.quoin");
@@ -320,7 +320,7 @@ TEST(WorldSaver, BytesInMemoryAreAWorldToo) {
   EXPECT_EQ(loaded->format, "world");
 }
 
-TEST(WorldSaver, CancelledLeavesNothing) {
+TEST(WorldSaver, CancellingLeavesNoFile) {
   const WorldFolder folder;
   const auto saved = save_scene(rich_scene(), folder / "w.quoin", {}, [](double) { return false; });
   ASSERT_FALSE(saved);
@@ -357,7 +357,7 @@ TEST(WorldSaver, KeepsDamagedChunks) {
   EXPECT_EQ(load_world(*world)->loaded.warnings.size(), 1U) << "it is damaged still, not air";
 }
 
-TEST(WorldSaver, ANewSceneIsNotMixedWithOneThatIsThere) {
+TEST(WorldSaver, RefusesToMixScenes) {
   const WorldFolder folder;
   KeptWorld kept(folder / "w.quoin");
   kept.save(rich_scene());

@@ -44,7 +44,7 @@ int wanted_kills() {
   return wanted != nullptr ? std::atoi(wanted) : 15;
 }
 
-TEST(WorldKill, NothingAcknowledgedIsLost) {
+TEST(WorldKill, LosesNoAcknowledgedSave) {
   const WorldFolder folder;
   const std::string file = folder / "w.quoin";
   { ASSERT_TRUE(create_for_saves(file, nullptr)); }

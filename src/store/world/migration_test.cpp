@@ -64,7 +64,7 @@ std::size_t sound_chunks(const std::filesystem::path& path) {
   return check && check->damage.empty() ? check->chunks : 0;
 }
 
-TEST(Migration, AWorldOfTheFirstVersionIsReadAsItIs) {
+TEST(Migration, ReadsFirstVersionUnchanged) {
   const WorldFolder folder;
   const auto path = folder / "old.quoin";
   make_version_1(path);
@@ -77,7 +77,7 @@ TEST(Migration, AWorldOfTheFirstVersionIsReadAsItIs) {
   EXPECT_EQ(sound_chunks(path), std::size_t{kChunks});
 }
 
-TEST(Migration, IsTakenToThePresentVersionWhenItIsWritten) {
+TEST(Migration, UpgradesWhenOpenedForWriting) {
   const WorldFolder folder;
   const auto path = folder / "old.quoin";
   make_version_1(path);
@@ -95,7 +95,7 @@ TEST(Migration, IsTakenToThePresentVersionWhenItIsWritten) {
   EXPECT_FALSE(std::filesystem::exists(path.string() + "~"));  // steps that only add keep no copy
 }
 
-TEST(Migration, KeysAreListedWithoutTheirBodies) {
+TEST(Migration, ListsKeysWithoutReadingBodies) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   make_world(path);
@@ -121,7 +121,7 @@ Status fail_halfway(Connection& database) {
   return database.run("INSERT INTO nowhere VALUES(1)");
 }
 
-TEST(Migration, ACopyIsKeptWhereRowsChange) {
+TEST(Migration, KeepsCopyIfRowsChange) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   make_world(path);
@@ -145,7 +145,7 @@ TEST(Migration, ACopyIsKeptWhereRowsChange) {
   EXPECT_EQ(WorldStore::open(path, WorldAccess::Write).error().code, ErrorCode::Unsupported);
 }
 
-TEST(Migration, FailedStepsLeaveTheWorldUnchanged) {
+TEST(Migration, FailedStepsLeaveWorldUnchanged) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   make_world(path);
@@ -161,7 +161,7 @@ TEST(Migration, FailedStepsLeaveTheWorldUnchanged) {
   EXPECT_EQ(sound_chunks(path.string() + "~"), std::size_t{kChunks});
 }
 
-TEST(Migration, ACopyNeverReplacesAnother) {
+TEST(Migration, NeverReplacesOlderCopy) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   make_world(path);

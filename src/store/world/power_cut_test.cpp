@@ -82,7 +82,7 @@ int wanted_cuts() {
   return wanted != nullptr ? std::atoi(wanted) : 400;
 }
 
-TEST(WorldPowerCut, NothingAcknowledgedIsLost) {
+TEST(WorldPowerCut, LosesNoAcknowledgedSave) {
   int cuts = 0;
   for (unsigned seed = 1; cuts < wanted_cuts(); ++seed) {
     Cuts run(seed, 4);
@@ -95,7 +95,7 @@ TEST(WorldPowerCut, NothingAcknowledgedIsLost) {
 }
 
 // Verifies that the test can fail: on a disk that reports the log as synced without syncing it.
-TEST(WorldPowerCut, ADiskThatLiesAboutSyncsLosesSaves) {
+TEST(WorldPowerCut, LosesSavesIfDiskSkipsSyncs) {
   int bad = 0;
   for (unsigned seed = 1; seed < 4; ++seed) {
     Cuts run(seed, 4);
@@ -183,7 +183,7 @@ bool survives_fault(int number, int code, bool is_lasting) {
   return fault.was_hit();
 }
 
-TEST(WorldFault, AnyCallMayFailAndNothingIsLost) {
+TEST(WorldFault, SurvivesFailureOfAnyCall) {
   for (const int code : {SQLITE_FULL, SQLITE_IOERR_WRITE}) {
     for (const bool is_lasting : {false, true}) {
       int number = 1;

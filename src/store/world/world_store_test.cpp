@@ -35,7 +35,7 @@ WorldStore made(const std::filesystem::path& path, int types = 9) {
   return std::move(*world);
 }
 
-TEST(WorldStore, ChunksValuesTypesAndGridsSurviveAReopening) {
+TEST(WorldStore, KeepsContentAfterReopening) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   {
@@ -103,7 +103,7 @@ TEST(WorldStore, ReadsSavedChunksBeforeTheyAreOnDisk) {
   EXPECT_EQ(world.stats().pending_bytes, 0U);
 }
 
-TEST(WorldStore, ARemovedGridTakesItsChunksAlong) {
+TEST(WorldStore, RemovesChunksWithGrid) {
   const WorldFolder folder;
   WorldStore world = made(folder / "w.quoin");
   WorldChanges two;
@@ -125,7 +125,7 @@ TEST(WorldStore, ARemovedGridTakesItsChunksAlong) {
   EXPECT_FALSE(world.load_chunk({0, 0, {3, 0, 0}})->has_value());
 }
 
-TEST(WorldStore, ChunksInABoxAreFoundBothWays) {
+TEST(WorldStore, FindsChunksInBox) {
   const WorldFolder folder;
   WorldStore world = made(folder / "w.quoin");
   WorldChanges changes;
@@ -145,7 +145,7 @@ TEST(WorldStore, ChunksInABoxAreFoundBothWays) {
   EXPECT_TRUE(world.chunks(0, 0, {})->empty());
 }
 
-TEST(WorldStore, ASecondWriterIsRefusedAndReadersAreNot) {
+TEST(WorldStore, RefusesSecondWriterButAllowsReaders) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   WorldStore world = made(path);
@@ -242,7 +242,7 @@ TEST(WorldStore, ThreadsReadAndWriteAtOnce) {
   EXPECT_EQ(world.chunks(0, 0)->size(), 20U);
 }
 
-TEST(WorldStore, CallbacksComeOnceItIsOnDisk) {
+TEST(WorldStore, CallsBackAfterCommit) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   WorldStore world = made(path);
@@ -271,7 +271,7 @@ int locks_on(const std::filesystem::path& path) {
   return count;
 }
 
-TEST(WorldStore, ReadingTheFileByOtherMeansEndsNoLocks) {
+TEST(WorldStore, OtherReadersOfFileEndNoLocks) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   WorldStore world = made(path);
@@ -287,7 +287,7 @@ TEST(WorldStore, ReadingTheFileByOtherMeansEndsNoLocks) {
   EXPECT_EQ(locks_on(path), before);
 }
 
-TEST(WorldStore, AWriterByAnotherNameIsAWriterToo) {
+TEST(WorldStore, RefusesSecondWriterThroughLink) {
   const WorldFolder folder;
   WorldStore world = made(folder / "w.quoin");
   std::filesystem::create_symlink(folder / "w.quoin", folder / "link.quoin");
@@ -295,7 +295,7 @@ TEST(WorldStore, AWriterByAnotherNameIsAWriterToo) {
   EXPECT_TRUE(WorldStore::open(folder / "link.quoin", WorldAccess::Read));
 }
 
-TEST(WorldStore, AGridThatComesAgainIsRead) {
+TEST(WorldStore, ReadsRecreatedGrid) {
   const WorldFolder folder;
   WorldStore world = made(folder / "w.quoin");
   for (int round = 0; round < 3; ++round) {
@@ -311,7 +311,7 @@ TEST(WorldStore, AGridThatComesAgainIsRead) {
   }
 }
 
-TEST(WorldStore, NumbersOfGridsAreNeverGivenAgain) {
+TEST(WorldStore, NeverReusesGridNumbers) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   {
@@ -328,7 +328,7 @@ TEST(WorldStore, NumbersOfGridsAreNeverGivenAgain) {
   EXPECT_EQ(WorldStore::open(path, WorldAccess::Write)->next_grid(), 8U);
 }
 
-TEST(WorldStore, CallbacksMayUseTheWorldWhileItEnds) {
+TEST(WorldStore, CallbacksCanUseClosingWorld) {
   const WorldFolder folder;
   std::uint32_t number = 0;
   {
@@ -340,7 +340,7 @@ TEST(WorldStore, CallbacksMayUseTheWorldWhileItEnds) {
   EXPECT_EQ(number, 1U);
 }
 
-TEST(WorldStore, SavesGoOnAfterACallbackThrows) {
+TEST(WorldStore, ContinuesSavingAfterCallbackThrows) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   {
@@ -363,7 +363,7 @@ TEST(WorldStore, SavesGoOnAfterACallbackThrows) {
   }
 }
 
-TEST(WorldStore, AWorldThatWasReplacedIsNotReadWithAnothersLog) {
+TEST(WorldStore, RefusesToReadReplacedWorld) {
   const WorldFolder folder;
   { WorldStore first = made(folder / "a.quoin"); }
   { WorldStore second = made(folder / "b.quoin"); }
@@ -375,12 +375,12 @@ TEST(WorldStore, AWorldThatWasReplacedIsNotReadWithAnothersLog) {
   EXPECT_NE(chunk.error().message.find("open it again"), std::string::npos);
 }
 
-TEST(WorldStoreDeathTest, KeysAreOfRegionsThatFitThem) {
+TEST(WorldStoreDeathTest, AssertsOnRegionOutOfRange) {
   QUOIN_EXPECT_MISTAKE(static_cast<void>(store::key_of(-1, IVec3{0})), "a region's id");
   QUOIN_EXPECT_MISTAKE(static_cast<void>(store::key_of(store::kMaxRegion + 1, IVec3{0})), "a region's id");
 }
 
-TEST(WorldStoreDeathTest, SavesNeedAWorldOpenedForWriting) {
+TEST(WorldStoreDeathTest, AssertsOnSaveToReadOnlyWorld) {
   const WorldFolder folder;
   static_cast<void>(made(folder / "w.quoin"));
   auto reader = WorldStore::open(folder / "w.quoin", WorldAccess::Read);
@@ -388,13 +388,13 @@ TEST(WorldStoreDeathTest, SavesNeedAWorldOpenedForWriting) {
   QUOIN_EXPECT_MISTAKE(static_cast<void>(reader->save({})), "a world opened for writing");
 }
 
-TEST(WorldStoreDeathTest, TicketsAreOfTheirOwnWorld) {
+TEST(WorldStoreDeathTest, AssertsOnForeignTicket) {
   const WorldFolder folder;
   WorldStore world = made(folder / "w.quoin");
   QUOIN_EXPECT_MISTAKE(static_cast<void>(world.wait({1'000})), "a ticket of this world");
 }
 
-TEST(WorldStoreDeathTest, AirIsNoTypeToSave) {
+TEST(WorldStoreDeathTest, AssertsOnSavingAir) {
   WorldChanges changes;
   QUOIN_EXPECT_MISTAKE(changes.put_type(kAir, {}), "a type other than air");
 }
