@@ -52,7 +52,7 @@ quoin_scene made_scene(std::vector<std::uint16_t>& voxels) {
   return scene;
 }
 
-TEST(C, ArraysComeBackAsTheyWent) {
+TEST(C, RoundTripsArrays) {
   std::vector<std::uint16_t> voxels;
   const quoin_scene scene = made_scene(voxels);
   auto info = sized<quoin_grid_info>();
@@ -66,7 +66,7 @@ TEST(C, ArraysComeBackAsTheyWent) {
   EXPECT_EQ(quoin_free(scene), QUOIN_OK);
 }
 
-TEST(C, FilesKeepThem) {
+TEST(C, RoundTripsFiles) {
   std::vector<std::uint16_t> voxels;
   const quoin_scene scene = made_scene(voxels);
   ASSERT_EQ(quoin_scene_save(scene, test_file("c_test.json").c_str()), QUOIN_OK) << quoin_last_error();
@@ -86,7 +86,7 @@ TEST(C, FilesKeepThem) {
   EXPECT_EQ(quoin_free(scene), QUOIN_OK);
 }
 
-TEST(C, MeshesAreSeenWhereTheyLie) {
+TEST(C, MeshesBallInPlace) {
   std::vector<float> values(std::size_t{kEdge} * kEdge * kEdge);
   for (int i = 0; i < kEdge * kEdge * kEdge; ++i) {
     const double x = static_cast<double>(i / (kEdge * kEdge)) - 5.5;
@@ -119,7 +119,7 @@ TEST(C, MeshesAreSeenWhereTheyLie) {
   EXPECT_EQ(quoin_surface_nets(&array, std::nan(""), 0, 0, &mesh), QUOIN_INVALID_ARGUMENT);
 }
 
-TEST(C, SurfacesHaveNoPointsWhereValuesEqualIso) {
+TEST(C, SurfacesHaveNoDegenerateTrianglesAtIso) {
   std::vector<std::uint8_t> values(std::size_t{kEdge} * kEdge * kEdge);
   for (int i = 0; i < kEdge * kEdge * kEdge; ++i) {
     const int x = i / (kEdge * kEdge) - 5;
@@ -144,7 +144,7 @@ TEST(C, SurfacesHaveNoPointsWhereValuesEqualIso) {
   EXPECT_EQ(quoin_free(mesh), QUOIN_OK);
 }
 
-TEST(C, LabelsAndGridsAreMeshed) {
+TEST(C, MeshesLabelsAndGrids) {
   std::vector<std::uint16_t> voxels;
   const quoin_scene scene = made_scene(voxels);
   const quoin_array array = array_of(voxels, QUOIN_UINT16);
@@ -210,12 +210,12 @@ std::size_t corners_in_edges(std::int32_t watertight) {
   return found;
 }
 
-TEST(C, WatertightMeshesHaveNoCornerInsideAnEdge) {
+TEST(C, WatertightMeshesHaveNoCornerInsideEdge) {
   EXPECT_GT(corners_in_edges(0), 0U);
   EXPECT_EQ(corners_in_edges(1), 0U);
 }
 
-TEST(C, ImagesHaveTheSunThatIsAskedFor) {
+TEST(C, RendersRequestedSun) {
   std::vector<std::uint16_t> voxels;
   const quoin_scene scene = made_scene(voxels);
   auto options = sized<quoin_render_options>();
@@ -253,7 +253,7 @@ TEST(C, ImagesHaveTheSunThatIsAskedFor) {
   EXPECT_EQ(quoin_free(scene), QUOIN_OK);
 }
 
-TEST(C, ImagesAndRaysSeeTheScene) {
+TEST(C, RendersAndTracesScene) {
   std::vector<std::uint16_t> voxels;
   const quoin_scene scene = made_scene(voxels);
   auto options = sized<quoin_render_options>();

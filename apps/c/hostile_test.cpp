@@ -14,7 +14,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
 
 namespace {
 
-TEST(CHostile, TheCorpusIsReplayed) {
+TEST(CHostile, ReplaysCorpus) {
   std::size_t programs = 0;
   for (const auto& entry : std::filesystem::directory_iterator(QUOIN_SOURCE_DIR "/tests/corpus/c_api")) {
     SCOPED_TRACE(entry.path().filename());
@@ -26,7 +26,7 @@ TEST(CHostile, TheCorpusIsReplayed) {
   EXPECT_GT(programs, 5U);
 }
 
-TEST(CHostile, ProgramsByChanceReturnAStatusEachCall) {
+TEST(CHostile, SurvivesRandomPrograms) {
   std::mt19937 random(20261126);
   for (int turn = 0; turn < 200; ++turn) {
     // A scene first, so that calls find one; then anything.

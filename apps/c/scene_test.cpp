@@ -35,7 +35,7 @@ constexpr const char* kSceneFile = R"({
 })";
 
 // Three voxels, one of glass between two that are opaque, 7 above the ground.
-class SceneOfARow : public testing::Test {
+class CScene : public testing::Test {
  protected:
   void SetUp() override {
     ASSERT_EQ(quoin_scene_create(&scene_), QUOIN_OK);
@@ -73,7 +73,7 @@ class SceneOfARow : public testing::Test {
   quoin_scene scene_ = 0;
 };
 
-TEST_F(SceneOfARow, ReportsAddsAndMovesInstances) {
+TEST_F(CScene, ReportsAddsAndMovesInstances) {
   auto place = sized<quoin_instance>();
   ASSERT_EQ(quoin_instance_get(scene_, 0, &place), QUOIN_OK);
   EXPECT_STREQ(place.name, "row");
@@ -109,7 +109,7 @@ TEST_F(SceneOfARow, ReportsAddsAndMovesInstances) {
   EXPECT_EQ(count, 2U);
 }
 
-TEST_F(SceneOfARow, TypesTellWhatLightDoesInThem) {
+TEST_F(CScene, ReportsOpticsOfTypes) {
   auto type = sized<quoin_type>();
   ASSERT_EQ(quoin_type_get(scene_, 2, &type), QUOIN_OK);
   EXPECT_EQ(type.rgba[3], 90);
@@ -121,7 +121,7 @@ TEST_F(SceneOfARow, TypesTellWhatLightDoesInThem) {
   EXPECT_TRUE(info.min[1] == 7.0 && info.max[0] == 3.0 && info.has_sun == 0);
 }
 
-TEST_F(SceneOfARow, BlocksSayTheirTypes) {
+TEST_F(CScene, ReportsTypesOfBlocks) {
   quoin_mesh mesh = 0;
   ASSERT_EQ(quoin_grid_mesh(scene_, 0, nullptr, &mesh), QUOIN_OK);
   auto data = sized<quoin_mesh_data>();
@@ -139,7 +139,7 @@ TEST_F(SceneOfARow, BlocksSayTheirTypes) {
 }
 
 // As programs compiled with the first header do.
-TEST_F(SceneOfARow, ShorterStructsStayAsTheyAre) {
+TEST_F(CScene, AcceptsShorterStructs) {
   std::array<std::byte, sizeof(quoin_type)> room;
   room.fill(std::byte{0xA5});
   auto* type = reinterpret_cast<quoin_type*>(room.data());
@@ -191,7 +191,7 @@ TEST(CFile, ReportsGroupsLayersLampsAndCameras) {
   EXPECT_EQ(quoin_free(scene), QUOIN_OK);
 }
 
-TEST_F(SceneOfARow, IsGivenLayersAndGroups) {
+TEST_F(CScene, AddsLayersAndGroups) {
   auto layer = sized<quoin_layer>();
   EXPECT_EQ(quoin_layer_set(scene_, &layer), QUOIN_INVALID_ARGUMENT);  // without a name
   std::strcpy(layer.name, "attic");
@@ -245,7 +245,7 @@ quoin_camera camera_ahead(std::int32_t number) {
   return camera;
 }
 
-TEST_F(SceneOfARow, IsGivenCamerasLampsAndASun) {
+TEST_F(CScene, AddsCamerasLampsAndSun) {
   quoin_camera camera = camera_ahead(4);
   camera.is_first = 1;
   ASSERT_EQ(quoin_camera_add(scene_, &camera), QUOIN_OK) << quoin_last_error();
@@ -291,7 +291,7 @@ TEST_F(SceneOfARow, IsGivenCamerasLampsAndASun) {
   EXPECT_TRUE(sun.brightness == 1.5 && sun.colour[0] == 1.0F && sun.colour[1] == 0.0F);
 }
 
-TEST_F(SceneOfARow, SetsTheEnvironment) {
+TEST_F(CScene, SetsEnvironment) {
   auto environment = sized<quoin_environment>();
   ASSERT_EQ(quoin_environment_get(scene_, &environment), QUOIN_OK);
   EXPECT_TRUE(environment.sky == QUOIN_SKY_GRADIENT && environment.tone == QUOIN_TONE_AUTOMATIC);
@@ -326,7 +326,7 @@ TEST_F(SceneOfARow, SetsTheEnvironment) {
   EXPECT_EQ(environment.sky, QUOIN_SKY_GRADIENT);
 }
 
-TEST_F(SceneOfARow, VoxelsAreWrittenBack) {
+TEST_F(CScene, WritesVoxels) {
   std::array<std::uint8_t, 4> types = {2, 0, 1, 2};  // x = 1, 2; y = 0; z = 0, 1
   auto array = sized<quoin_array>();
   array.data = types.data();
@@ -353,7 +353,7 @@ TEST_F(SceneOfARow, VoxelsAreWrittenBack) {
   EXPECT_EQ(quoin_grid_write(scene_, 0, &array), QUOIN_INVALID_ARGUMENT);
 }
 
-TEST(CArrays, WithoutStridesHaveNoGaps) {
+TEST(CArrays, ArePackedWithoutStrides) {
   const std::array<std::uint16_t, 24> types = {1, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0};
   quoin_scene scene = 0;
   ASSERT_EQ(quoin_scene_create(&scene), QUOIN_OK);
@@ -396,7 +396,7 @@ TEST(CFormats, ListReadableFormats) {
 }
 
 // A cube of 4 units, red except for its top, with corners at -2 and 2: its sides lie between voxels.
-TEST(CTriangles, BecomeVoxelsWhereTheyAre) {
+TEST(CTriangles, BecomeVoxelsInPlace) {
   std::vector<float> positions;
   for (int corner = 0; corner < 8; ++corner) {
     for (int axis = 0; axis < 3; ++axis) positions.push_back((corner >> axis & 1) != 0 ? 2.0F : -2.0F);
@@ -466,7 +466,7 @@ TEST(CTriangles, BecomeVoxelsWhereTheyAre) {
 }
 
 // Two sheets at x = 0 and x = 4, of 8 x 8 voxels each, of two types.
-class TwoSheets : public testing::Test {
+class CTriangleTypes : public testing::Test {
  protected:
   void SetUp() override {
     for (const float x : {0.5F, 4.5F}) {
@@ -510,7 +510,7 @@ class TwoSheets : public testing::Test {
   quoin_scene scene_ = 0;
 };
 
-TEST_F(TwoSheets, KeepAllOfTheirTypes) {
+TEST_F(CTriangleTypes, KeepTheirProperties) {
   std::strcpy(types_[0].name, "ice");
   types_[0].transparent = 1;
   types_[0].ior = 1.31F;
@@ -529,7 +529,7 @@ TEST_F(TwoSheets, KeepAllOfTheirTypes) {
   EXPECT_TRUE(cloud.transparent == 1 && cloud.scattering == 0.5F && cloud.anisotropy == 0.25F && cloud.rgba[3] == 90);
 }
 
-TEST_F(TwoSheets, MergeTypesThatDifferInColourAlone) {
+TEST_F(CTriangleTypes, MergeIfOnlyColoursDiffer) {
   auto found = added();
   ASSERT_EQ(found.size(), 2U);
   EXPECT_EQ(std::max(found[0].rgba[0], found[1].rgba[0]), 104);
@@ -547,7 +547,7 @@ TEST_F(TwoSheets, MergeTypesThatDifferInColourAlone) {
   EXPECT_EQ(warnings, 1U);
 }
 
-TEST_F(TwoSheets, HaveTheAlphaOfTheirColours) {
+TEST_F(CTriangleTypes, KeepAlphaOfColours) {
   std::vector<float> colours;
   for (int corner = 0; corner < 8; ++corner)
     colours.insert(colours.end(), {1.0F, 1.0F, 1.0F, corner < 4 ? 0.0F : 0.5F});
@@ -557,7 +557,7 @@ TEST_F(TwoSheets, HaveTheAlphaOfTheirColours) {
   EXPECT_TRUE(found[0].rgba[3] == 128 && found[0].rgba[0] == 104 && found[0].transparent == 1);
 }
 
-TEST_F(SceneOfARow, AnInstanceKeepsALongName) {
+TEST_F(CScene, KeepsLongInstanceNames) {
   const std::string name(300, 'n');
   const std::string path = test_file("c_test_name.json");
   std::ofstream(path) << R"({"quoin_scene": 4, "grids": [{"voxels": []}], "instances": [{"grid": 0, "name": ")" << name
@@ -592,7 +592,7 @@ std::int32_t listen(double fraction, void* user) {
   return ++listener->calls == listener->stop_at ? 0 : 1;
 }
 
-TEST_F(SceneOfARow, ReportsProgressAndCanBeCancelled) {
+TEST_F(CScene, ReportsProgressAndCanBeCancelled) {
   Listener listener;
   ASSERT_EQ(quoin_set_progress(listen, &listener), QUOIN_OK);
   auto options = sized<quoin_render_options>();
@@ -615,7 +615,7 @@ TEST_F(SceneOfARow, ReportsProgressAndCanBeCancelled) {
   EXPECT_EQ(listener.calls, calls + 2);
 }
 
-TEST_F(SceneOfARow, ProgressOfSavingAndAddingNeverFalls) {
+TEST_F(CScene, ReportsNonDecreasingProgress) {
   Listener listener;
   const std::vector<std::uint16_t> voxels(std::size_t{200} * 80 * 80, 1);
   auto array = sized<quoin_array>();
@@ -643,7 +643,7 @@ TEST_F(SceneOfARow, ProgressOfSavingAndAddingNeverFalls) {
 }
 
 // As the header says, concurrent readers and a writer need no lock of their own.
-TEST_F(SceneOfARow, ThreadsShareIt) {
+TEST_F(CScene, AllowsConcurrentReadersAndWriter) {
   std::vector<std::thread> readers;
   readers.reserve(4);
   for (int i = 0; i < 4; ++i) {
@@ -661,7 +661,7 @@ TEST_F(SceneOfARow, ThreadsShareIt) {
   EXPECT_EQ(t_below(0.5, 0.5), 50.0);
 }
 
-TEST(CLoading, TakesOptions) {
+TEST(CLoading, AppliesOptions) {
   quoin_scene scene = 0;
   std::ofstream(test_file("c_test.obj")) << "v 0 0 0\nv 8 0 0\nv 0 8 0\nv 0 0 8\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
   auto options = sized<quoin_load_options>();
@@ -683,7 +683,7 @@ TEST(CLoading, TakesOptions) {
   EXPECT_EQ(quoin_scene_load_with(test_file("c_test.obj").c_str(), &options, &scene), QUOIN_INVALID_ARGUMENT);
 }
 
-TEST(CLoading, ChoosesADimension) {
+TEST(CLoading, SelectsDimension) {
   // A world of two dimensions, the overworld with the region of another.
   namespace fs = std::filesystem;
   const fs::path cases = QUOIN_SOURCE_DIR "/tests/corpus/cases";
@@ -717,7 +717,7 @@ TEST(CLoading, ChoosesADimension) {
   EXPECT_EQ(quoin_free(scene), QUOIN_OK);
 }
 
-TEST(CLoading, TakesValuesAlone) {
+TEST(CLoading, ReadsRawValues) {
   // A box of 40 within 10, from (2, 0, 0) on, of 6 x 4 x 3 values of 16 bits, the most significant byte first.
   std::vector<std::uint8_t> bytes;
   for (int i = 0; i < 6 * 4 * 3; ++i) bytes.insert(bytes.end(), {0, static_cast<std::uint8_t>(i % 6 >= 2 ? 40 : 10)});
@@ -752,7 +752,7 @@ TEST(CLoading, TakesValuesAlone) {
   EXPECT_EQ(quoin_scene_load_bytes_with(nullptr, 3, nullptr, &scene), QUOIN_INVALID_ARGUMENT);
 }
 
-TEST(CLoading, TakesHeights) {
+TEST(CLoading, ReadsHeights) {
   const std::vector<char> png = [] {
     std::ifstream file(QUOIN_SOURCE_DIR "/tests/corpus/png/grey_1_bit.png", std::ios::binary);
     return std::vector<char>(std::istreambuf_iterator<char>(file), {});
