@@ -34,14 +34,14 @@ TEST(OpenedInput, IsRecognisedByContent) {
   EXPECT_FALSE(input->is_volume || input->heeds_iso());
 }
 
-TEST(OpenedInput, MayHaveAnUnknownFormat) {
+TEST(OpenedInput, MayHaveUnknownFormat) {
   const TemporaryFile text(".txt", "neither voxels nor triangles");
   const auto input = open_input(text.path, {});
   ASSERT_TRUE(input);
   EXPECT_EQ(input->file.format, std::nullopt);
 }
 
-TEST(OpenedInput, RawValuesAreAVolumeOfAnyContent) {
+TEST(OpenedInput, IsVolumeIfRawOptionsAreGiven) {
   const TemporaryFile values(".raw", "VOX ");
   LoadOptions load;
   load.raw = RawVolume{IVec3(2, 2, 1)};
@@ -50,13 +50,13 @@ TEST(OpenedInput, RawValuesAreAVolumeOfAnyContent) {
   EXPECT_TRUE(input->is_volume && input->heeds_iso());
 }
 
-TEST(OpenedInput, MissingFilesCannotBeRead) {
+TEST(OpenedInput, ReportsMissingFiles) {
   const auto input = open_input("no_such_folder/model.vox", {});
   ASSERT_FALSE(input);
   EXPECT_EQ(input.error().code, ErrorCode::CannotRead);
 }
 
-TEST(OpenedInput, OnlyWorldsHaveDimensions) {
+TEST(OpenedInput, RejectsDimensionOfOtherFormats) {
   const TemporaryFile model(".vox", "VOX ");
   LoadOptions load;
   load.dimension = "nether";

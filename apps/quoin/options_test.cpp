@@ -19,7 +19,7 @@ std::string parsed(CLI::App& command, const std::string& line, const std::vector
   return fits ? "" : to_string(fits.error());
 }
 
-TEST(Options, ParsedValuesReachTheirTarget) {
+TEST(Options, StoreParsedValues) {
   CLI::App command;
   std::optional<double> fov;
   add_parsed(command, "--fov", "DEGREES", number_between(0.0, 180.0, "from 0 to 180"), fov, "Field of view");
@@ -29,7 +29,7 @@ TEST(Options, ParsedValuesReachTheirTarget) {
   EXPECT_EQ(fov, 45.5);
 }
 
-TEST(Options, RefusedTextsNameOptionAndText) {
+TEST(Options, NameOptionAndRefusedText) {
   CLI::App command;
   double fov = 1.0;
   add_parsed(command, "--fov", "DEGREES", number_between(0.0, 180.0, "from 0 to 180"), fov, "Field of view");
@@ -39,14 +39,14 @@ TEST(Options, RefusedTextsNameOptionAndText) {
   EXPECT_EQ(fov, 1.0);
 }
 
-TEST(Options, NumbersFrom0IncludeTheLargest) {
+TEST(Options, AcceptLargestNumber) {
   const auto parse = number_from_0().parse;
   EXPECT_EQ(parse("0"), 0.0);
   EXPECT_EQ(parse("1.7976931348623157e308"), std::numeric_limits<double>::max());
   for (const char* text : {"-0.1", "inf", "", " 1"}) EXPECT_EQ(parse(text), std::nullopt) << text;
 }
 
-TEST(Options, ChoicesBecomeTheirValues) {
+TEST(Options, MapChoicesToValues) {
   enum class Colour { Red, Blue };
   CLI::App command;
   Colour colour = Colour::Red;
@@ -84,7 +84,7 @@ TEST(OptionRules, ExcludeOtherOptionsInBothOrders) {
   EXPECT_EQ(broken("--b --c", rules), "");
 }
 
-TEST(OptionRules, AskForSettingsWhenChecked) {
+TEST(OptionRules, EvaluateConditionsWhenChecked) {
   bool is_on = false;
   const std::vector<OptionRule> rules = {{{"--a"}, needs("a lamp", [&] { return is_on; })},
                                          {{"--b"}, excludes("a lamp", [&] { return is_on; })}};
@@ -95,7 +95,7 @@ TEST(OptionRules, AskForSettingsWhenChecked) {
   EXPECT_EQ(broken("--b", rules), "--b and a lamp cannot be used together");
 }
 
-TEST(OptionRules, HeadingsStandForAllOptionsUnderThem) {
+TEST(OptionRules, CoverOptionsUnderHeadings) {
   const std::vector<OptionRule> rules = {{{"First"}, needs("--c"), {"--b"}}};
   EXPECT_EQ(broken("--a", rules), "--a needs --c");
   EXPECT_EQ(broken("--b", rules), "") << "an exception";

@@ -129,7 +129,7 @@ const std::vector<Sample> kSamples = {{"--size", "9x9", kAll},
                                       {"--backend", "vulkan", kImages},
                                       {"--device", "0 --backend vulkan", kImages}};
 
-TEST(RenderArguments, EveryOptionHasASample) {
+TEST(RenderArguments, SamplesCoverEveryOption) {
   // Options of all commands, the options of kModes, and --fps, which needs a video.
   std::set<std::string> sampled = {"--help",    "--hidden",    "--frame",  "--allow-outside-files",
                                    "--around",  "--dimension", "--json",   "--quiet",
@@ -144,7 +144,7 @@ TEST(RenderArguments, EveryOptionHasASample) {
   }
 }
 
-TEST(RenderArguments, OptionsFitTheModesThatUseThem) {
+TEST(RenderArguments, AcceptOptionsOnlyInFittingModes) {
   for (const Sample& sample : kSamples) {
     std::istringstream words(sample.modes);
     const std::set<std::string> fitting{std::istream_iterator<std::string>(words), {}};
@@ -191,7 +191,7 @@ TEST(RenderArguments, RefusesOptionsThatContradictEachOther) {
   for (const auto& [options, fault] : faults) EXPECT_EQ(fault_of(options), fault) << options;
 }
 
-TEST(RenderArguments, RefusesOutputsThatCannotHoldTheImage) {
+TEST(RenderArguments, RefusesOutputsThatCannotHoldImage) {
   const std::vector<std::pair<std::string, std::string>> faults = {
       {"in.vox -o out.gif", "-o: the image name must end in .png, .jpg, .webp or .exr, not \"out.gif\""},
       {"in.vox -o out.exr", "-o: .exr needs --light path"},
@@ -204,7 +204,7 @@ TEST(RenderArguments, RefusesOutputsThatCannotHoldTheImage) {
   for (const auto& [line, fault] : faults) EXPECT_EQ(Parsed(line).fault, fault) << line;
 }
 
-TEST(RenderArguments, RefusedValuesNameTheOption) {
+TEST(RenderArguments, NamesOptionOfRefusedValue) {
   for (const std::string options :
        {"--size 0x9",        "--size 40000x25000", "--samples 0",      "--view side",
         "--elevation 91",    "--camera file:x",    "--camera 1,2",     "--look-at 1,2,nan",
@@ -222,7 +222,7 @@ TEST(RenderArguments, RefusedValuesNameTheOption) {
   }
 }
 
-TEST(RenderArguments, DefaultsAreNaturalLightAndFewSamples) {
+TEST(RenderArguments, DefaultsToNaturalLightAndFewSamples) {
   const RenderArguments plain = arguments_of("");
   EXPECT_EQ(plain.render.light, natural_light());
   EXPECT_EQ(plain.render.samples, 4);
@@ -255,7 +255,7 @@ TEST(RenderArguments, ReadsLight) {
   EXPECT_EQ(arguments_of("--light propagated").render.light.model, LightModel::Propagated);
 }
 
-TEST(RenderArguments, PresetsAndOcclusionSelectTheShading) {
+TEST(RenderArguments, PresetsAndOcclusionSelectShading) {
   const auto light = [](const std::string& options) { return arguments_of(options).render.light; };
   EXPECT_EQ(light("--preset no-ao").occlusion_mode, OcclusionMode::Off);
   EXPECT_EQ(light("--ao vertex").occlusion_mode, OcclusionMode::Vertex);
@@ -266,7 +266,7 @@ TEST(RenderArguments, PresetsAndOcclusionSelectTheShading) {
   EXPECT_EQ(light("--ao-affects all").occlusion_affects, OcclusionAffects::All);
 }
 
-TEST(RenderArguments, LongOcclusionRaysAreMore) {
+TEST(RenderArguments, UsesMoreRaysForLongOcclusion) {
   const auto light = [](const std::string& options) { return arguments_of(options).render.light; };
   EXPECT_EQ(light("--ao-distance 12").occlusion_rays, natural_light().occlusion_rays);
   EXPECT_EQ(light("--ao-distance 13").occlusion_rays, 16);
@@ -274,7 +274,7 @@ TEST(RenderArguments, LongOcclusionRaysAreMore) {
   EXPECT_EQ(light("--ao-distance 3").field_occlusion_reach, 1.0);
 }
 
-TEST(RenderArguments, ColoursOfDetailImplyPixels) {
+TEST(RenderArguments, LodColoursImplyPixels) {
   EXPECT_FALSE(arguments_of("").render.detail.policy);
   EXPECT_FALSE(arguments_of("--lod-colours --detail near").render.detail.policy);
   EXPECT_EQ(arguments_of("--lod-colours").render.detail.policy->rule, DetailPolicy::Rule::ByPixels);
