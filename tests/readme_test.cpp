@@ -74,15 +74,15 @@ int run_tool_commands(const std::string& page) {
   return commands;
 }
 
-TEST(Readme, ToolCommandsWork) {
+TEST(Readme, RunsToolCommands) {
   EXPECT_GE(run_tool_commands("README.md"), 3);
 }
 
-TEST(Readme, CookbookCommandsWork) {
+TEST(Readme, RunsToolCommandsOfCookbook) {
   EXPECT_GE(run_tool_commands("docs/cookbook.md"), 30);
 }
 
-TEST(Readme, TakesCodeFromExamples) {
+TEST(Readme, CodeComesFromExamples) {
   std::string examples;
   for (const auto& entry : fs::directory_iterator(fs::path(QUOIN_SOURCE_DIR) / "examples")) {
     if (entry.path().extension() == ".cpp") examples += read_text(entry.path());

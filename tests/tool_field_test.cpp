@@ -66,7 +66,7 @@ class ToolField : public ToolTest {
   }
 };
 
-TEST_F(ToolField, BecomesVoxelsAtTheSurfaceValue) {
+TEST_F(ToolField, BecomesVoxelsAtSurfaceValue) {
   for (const std::string ending : {"vox", "qb", "gox", "vxl", "binvox", "schem"}) {
     const Json made = said("convert ball.nrrd a." + ending + " --iso 60");
     EXPECT_EQ(made["voxels"], count_above(60)) << ending;
@@ -78,7 +78,7 @@ TEST_F(ToolField, BecomesVoxelsAtTheSurfaceValue) {
   EXPECT_GT(said("convert ball.nrrd b.vox")["voxels"], 0) << "at a value that is found";
 }
 
-TEST_F(ToolField, StaysAFieldInFormatsThatHoldFieldsUnlessSolidIsAskedFor) {
+TEST_F(ToolField, StaysFieldUnlessSolidIsRequested) {
   const Json field = said("convert ball.nrrd a.json --iso 60");
   EXPECT_EQ(field["voxels"], 0);
   EXPECT_EQ(field["solid_samples"], count_above(60));
@@ -88,7 +88,7 @@ TEST_F(ToolField, StaysAFieldInFormatsThatHoldFieldsUnlessSolidIsAskedFor) {
   EXPECT_EQ(run("convert ball.nrrd a.glb --solid").status, 2);
 }
 
-TEST_F(ToolField, IsTurnedToQuarterTurnsForVoxels) {
+TEST_F(ToolField, RoundsRotationToQuarterTurns) {
   const Json made = said("convert turned.nrrd a.vox --iso 60");
   EXPECT_EQ(made["voxels"], count_above(60));
   EXPECT_NE(made["warnings"].dump().find("rotated by up to 10"), std::string::npos) << made["warnings"];
@@ -104,7 +104,7 @@ TEST_F(ToolField, CountsTriangles) {
   EXPECT_EQ(of_field["faces_total"], of_field["triangles"]);
 }
 
-TEST_F(ToolField, RefusesSimplifyingBlocksBeforeItReadsThem) {
+TEST_F(ToolField, RefusesSimplifyingBlocksBeforeReading) {
   // The file cannot be read, but option errors come first.
   std::ofstream(folder_.file("broken.vox"), std::ios::binary) << "VOX \x96";
   const ToolRun result = run("convert broken.vox a.glb --simplify 0.1");
@@ -112,7 +112,7 @@ TEST_F(ToolField, RefusesSimplifyingBlocksBeforeItReadsThem) {
   EXPECT_NE(result.err.find("--simplify needs --mesher smooth"), std::string::npos) << result.err;
 }
 
-TEST_F(ToolField, SaysThatNothingCanBeSimplified) {
+TEST_F(ToolField, WarnsIfNothingCanBeSimplified) {
   if (!can_simplify()) GTEST_SKIP() << "this build cannot simplify";
   // No two of its triangles are coplanar.
   {
@@ -174,7 +174,7 @@ void expect_sound_surface(const std::filesystem::path& path, float iso) {
   EXPECT_EQ(faults.twice, 0U);
 }
 
-TEST_F(ToolField, HasASoundSurfaceWhereValuesEqualThatOfTheSurface) {
+TEST_F(ToolField, HasSoundSurfaceWhereValuesEqualIso) {
   expect_sound_surface(folder_.file("ball.nrrd"), 60.0F);
   const auto real = std::filesystem::path(QUOIN_SOURCE_DIR).parent_path() / "shared" / "data" / "cases" /
                     "nrrd-integers-equal-to-iso.nrrd";

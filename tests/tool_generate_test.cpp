@@ -16,7 +16,7 @@ using Json = nlohmann::json;
 
 class ToolGenerate : public ToolTest {};
 
-TEST_F(ToolGenerate, WritesTheSameWorldAsTheLibrary) {
+TEST_F(ToolGenerate, WritesSameWorldAsLibrary) {
   const ToolRun result = run("generate terrain world.vox --seed 9 --chunks 3x2x2 --json");
   ASSERT_EQ(result.status, 0) << result.err;
   EXPECT_EQ(result.err, "");
@@ -54,7 +54,7 @@ TEST_F(ToolGenerate, DefaultsToSeed42And4x2x4) {
   EXPECT_FALSE(a == text_of(folder_.file("c.vox")));
 }
 
-TEST_F(ToolGenerate, ReportsTheResult) {
+TEST_F(ToolGenerate, ReportsResult) {
   const ToolRun result = run("generate terrain hills.vox --chunks 1x1x1");
   ASSERT_EQ(result.status, 0) << result.err;
   EXPECT_NE(result.out.find("seed 42, 32 x 32 x 32"), std::string::npos) << result.out;
@@ -64,7 +64,7 @@ TEST_F(ToolGenerate, ReportsTheResult) {
   EXPECT_NE(run("generate --help").out.find("Example: quoin generate terrain"), std::string::npos);
 }
 
-TEST_F(ToolGenerate, SmoothTerrainIsSceneThatAllElseReads) {
+TEST_F(ToolGenerate, OtherCommandsReadSmoothTerrain) {
   const ToolRun made = run("generate smooth-terrain cliffs.json --seed 9 --chunks 2x1x1 --no-caves --json");
   ASSERT_EQ(made.status, 0) << made.err;
   SmoothTerrainOptions options;
@@ -107,7 +107,7 @@ TEST_F(ToolGenerate, WorldsBeyond256VoxelsKeepEveryVoxel) {
   EXPECT_EQ(Json::parse(info.out)["voxels"], Json::parse(made.out)["voxels"]);
 }
 
-TEST_F(ToolGenerate, WrongUsageIsStatus2AndLeavesNoFile) {
+TEST_F(ToolGenerate, ReturnsStatus2WithoutFileForWrongUsage) {
   for (const std::string arguments : {"",
                                       "terrain",
                                       "forest out.vox",
@@ -140,7 +140,7 @@ TEST_F(ToolGenerate, WrongUsageIsStatus2AndLeavesNoFile) {
 }
 
 // The error comes before the work: this world would take minutes and gigabytes.
-TEST_F(ToolGenerate, AFileThatCannotBeWrittenIsStatus1AtOnce) {
+TEST_F(ToolGenerate, ReportsUnwritableFileBeforeGenerating) {
   const ToolRun result = shell("ulimit -t 10; '" QUOIN_TOOL "' generate terrain nowhere/out.vox --chunks 1024x2x32");
   EXPECT_EQ(result.status, 1);
   expect_one_error_line(result);

@@ -40,7 +40,7 @@ class ToolMesh : public ToolTest {
   }
 };
 
-TEST_F(ToolMesh, BecomesVoxelsOfAnySize) {
+TEST_F(ToolMesh, VoxelizesAtAnySize) {
   EXPECT_EQ(converted("a.json --size 40 --solid")["voxels"], 40 * 20 * 20);
   EXPECT_EQ(converted("b.json --voxel 0.1 --solid")["voxels"], 20 * 10 * 10);
   EXPECT_EQ(converted("c.json --size 40")["warnings"].size(), 0U);
@@ -55,7 +55,7 @@ TEST_F(ToolMesh, BecomesVoxelsOfAnySize) {
   EXPECT_EQ(info["grids"][0]["name"], "box");
 }
 
-TEST_F(ToolMesh, OptionsOfTrianglesAreChecked) {
+TEST_F(ToolMesh, ChecksTriangleOptions) {
   for (const std::string arguments :
        {"convert box.stl a.json --size 10 --voxel 1", "convert box.stl a.json --solid --surface",
         "convert box.stl a.json --field --surface", "convert box.stl a.json --band 3",
@@ -67,14 +67,14 @@ TEST_F(ToolMesh, OptionsOfTrianglesAreChecked) {
   }
 }
 
-TEST_F(ToolMesh, IsAFileOfVoxAtUnitSizeWithFewColours) {
+TEST_F(ToolMesh, WritesVoxAtUnitSize) {
   const ToolRun result = run("convert box.stl box.vox --size 20");
   EXPECT_EQ(result.status, 0) << result.err;
   EXPECT_NE(result.err.find("stores no voxel size"), std::string::npos);
   EXPECT_EQ(Json::parse(run("info box.vox --json").out)["voxels"], 20 * 10 * 10);
 }
 
-TEST_F(ToolMesh, ForPrintersIsClosed) {
+TEST_F(ToolMesh, ClosesMeshesForPrinting) {
   std::ofstream(folder_.file("checker.vox"), std::ios::binary) << checkerboard_vox(4);
   for (const std::string out : {"a.stl", "a.3mf", "b.stl --mesher smooth", "b.3mf --mesher smooth"}) {
     const ToolRun result = run("convert checker.vox " + out + " --voxel-mm 2 --json");

@@ -42,7 +42,7 @@ DVec3 triple(const Json& json) {
   return {json[0].get<double>(), json[1].get<double>(), json[2].get<double>()};
 }
 
-TEST_F(ToolRender, WritesAnImageOfTheRequestedSizeAndReportsIt) {
+TEST_F(ToolRender, WritesAndReportsImageOfRequestedSize) {
   const Json said = drawn("tiny.vox -o out.png --size 64x48 --threads 2");
   EXPECT_EQ(said["size"], Json({64, 48}));
   EXPECT_GT(said["rays"], 64 * 48);
@@ -67,7 +67,7 @@ TEST_F(ToolRender, WritesAnImageOfTheRequestedSizeAndReportsIt) {
   EXPECT_NE(text.out.find("\nWrote out.png, "), std::string::npos) << text.out;
 }
 
-TEST_F(ToolRender, TheSameBytesAtAnyNumberOfThreads) {
+TEST_F(ToolRender, WritesSameBytesAtAnyThreadCount) {
   const std::string flags = " --size 80x60 --samples 3 --ao-rays 12 --depth ";
   drawn("tiny.vox -o a.png --threads 1" + flags + "a.pfm");
   drawn("tiny.vox -o b.png --threads 7" + flags + "b.pfm");
@@ -79,7 +79,7 @@ TEST_F(ToolRender, TheSameBytesAtAnyNumberOfThreads) {
   EXPECT_EQ(bytes("a.pfm"), bytes("c.pfm"));
 }
 
-TEST_F(ToolRender, DepthIsTheDistanceAlongEachRay) {
+TEST_F(ToolRender, DepthIsDistanceAlongRay) {
   write_one_voxel();
   const DBox box = [&] {
     const Json info = Json::parse(run("info one.vox --json").out);
@@ -116,7 +116,7 @@ TEST_F(ToolRender, DepthIsTheDistanceAlongEachRay) {
   EXPECT_EQ(said["pixels_hit"], hit);
 }
 
-TEST_F(ToolRender, ACameraOfTheFileIsNamedByItsNumber) {
+TEST_F(ToolRender, SelectsFileCameraByNumber) {
   vox_test::FileBuilder file;
   file.model(4, 4, 4, {{0, 0, 0, 1}, {3, 0, 0, 2}, {0, 3, 3, 3}});
   for (const std::int32_t number : {0, 2, 5}) {
@@ -156,7 +156,7 @@ TEST_F(ToolRender, ACameraOfTheFileIsNamedByItsNumber) {
   }
 }
 
-TEST_F(ToolRender, NegativeNumbersAreNoOptions) {
+TEST_F(ToolRender, AcceptsNegativeNumbersAsValues) {
   const std::string size = "tiny.vox -o out.png --size 8x8 ";
   const Json camera = drawn(size + "--camera -3,5,2 --look-at -.5,-1e0,-0 --sun -1,.5,0")["camera"];
   EXPECT_EQ(triple(camera["position"]), DVec3(-3, 5, 2));
@@ -166,7 +166,7 @@ TEST_F(ToolRender, NegativeNumbersAreNoOptions) {
   EXPECT_EQ(camera["fov"], 45.0);
 }
 
-TEST_F(ToolRender, EveryOptionChangesTheImage) {
+TEST_F(ToolRender, OptionsChangeTheImage) {
   std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(8);
   const std::string base = "many.vox -o out.png --size 64x48";
   drawn(base);
@@ -216,7 +216,7 @@ TEST_F(ToolRender, EveryOptionChangesTheImage) {
   EXPECT_EQ(bytes("out.png"), plain) << "these are the defaults";
 }
 
-TEST_F(ToolRender, EveryOptionOfPathsChangesTheImage) {
+TEST_F(ToolRender, PathTracingOptionsChangeTheImage) {
   std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(8);
   const std::string base = "many.vox -o out.png --size 64x48 --light path --samples 4";
   drawn(base);
@@ -242,7 +242,7 @@ TEST_F(ToolRender, EveryOptionOfPathsChangesTheImage) {
   EXPECT_EQ(bytes("out.png"), plain) << "these are the defaults";
 }
 
-TEST_F(ToolRender, PathTracedImagesHaveABrightBackground) {
+TEST_F(ToolRender, PathTracedImagesHaveBrightBackground) {
   std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(4);
   const auto corners = [&](const std::string& flags) {
     drawn("many.vox -o out.png --size 32x24 --light path --samples 4 " + flags);
@@ -263,7 +263,7 @@ TEST_F(ToolRender, PathTracedImagesHaveABrightBackground) {
 }
 
 // A cave is wider than rooms of blocks. A distance set by an option applies to fields too.
-TEST_F(ToolRender, OcclusionShapesACaveOfAField) {
+TEST_F(ToolRender, OcclusionShapesCaveOfField) {
   ASSERT_EQ(run("generate smooth-terrain s.json --chunks 3x2x3").status, 0);
   const std::string base =
       "s.json -o out.png --size 64x48 --camera 98,35,161 --look-at 100.8,41.2,142.2 --fov 80 --exposure 3 ";
@@ -328,7 +328,7 @@ TEST_F(ToolRender, FileSettingsApplyWithoutOptions) {
   EXPECT_GT(corner()[1], 150);
 }
 
-TEST_F(ToolRender, FilmsInOneFileAreMadeOfImages) {
+TEST_F(ToolRender, WritesVideos) {
   std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(2);
   for (const std::string wrong :
        {"-o film.mp4", "-o film.mp4 --turntable 2 --light path --transparent", "-o film.png --turntable 2 --fps 12",
@@ -354,7 +354,7 @@ TEST_F(ToolRender, FilmsInOneFileAreMadeOfImages) {
   EXPECT_EQ(bytes("film.webm").substr(0, 4), "\x1A\x45\xDF\xA3");
 }
 
-TEST_F(ToolRender, PathsTakeASkyFromAFileAndGiveLinearLight) {
+TEST_F(ToolRender, PathTracingReadsSkyFileAndWritesLinearLight) {
   std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(8);
   std::ofstream(folder_.file("red.hdr"), std::ios::binary) << "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n"
                                                            << std::string("\x80\x00\x00\x81", 4);
@@ -373,7 +373,7 @@ TEST_F(ToolRender, PathsTakeASkyFromAFileAndGiveLinearLight) {
   drawn("many.vox -o again.png --size 32x24 --light path --samples 2 --sky out.exr --sky-turn 90");
 }
 
-TEST_F(ToolRender, TheNameSaysWhatKindOfImageItIs) {
+TEST_F(ToolRender, SelectsImageFormatByExtension) {
   std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(4);
   if (has_jpeg()) {
     drawn("many.vox -o out.JPG --size 64x48");
@@ -421,7 +421,7 @@ TEST_F(ToolRender, PathTracingRejectsOtherOptions) {
   EXPECT_EQ(run("render many.vox -o out.exr").status, 2);
 }
 
-TEST_F(ToolRender, AFilmAlongAPathOfCamerasGoesOnWhereItEnded) {
+TEST_F(ToolRender, ResumesSeriesAlongCameraPath) {
   std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(4);
   const Json said = drawn("many.vox -o one.png --size 64x48 --camera 12,10,14 --look-at 2,2,-2 --fov 40");
   std::ofstream(folder_.file("path.json"))
@@ -451,7 +451,7 @@ TEST_F(ToolRender, AFilmAlongAPathOfCamerasGoesOnWhereItEnded) {
   EXPECT_EQ(bytes("turn-02.png"), third);
 }
 
-TEST_F(ToolRender, PathsOfCamerasThatAreNoneAreNamed) {
+TEST_F(ToolRender, ReportsInvalidCameraPaths) {
   std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(2);
   for (const std::string text :
        {"", "{}", "[]", "[1]", "[{}]", R"([{"position":[1,2,3]}])", R"([{"position":[1,2,3],"look_at":[1,2,3]}])",
@@ -472,7 +472,7 @@ TEST_F(ToolRender, PathsOfCamerasThatAreNoneAreNamed) {
   EXPECT_EQ(run("render many.vox -o film.png --resume").status, 2);
 }
 
-TEST_F(ToolRender, ThumbnailsAreSmallAndClearWhereNothingIs) {
+TEST_F(ToolRender, ThumbnailsAreSmallWithTransparentBackground) {
   std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(8);
   const auto made = run("thumbnail many.vox small.png --size 40 --json");
   ASSERT_EQ(made.status, 0) << made.err;
@@ -489,7 +489,7 @@ TEST_F(ToolRender, ThumbnailsAreSmallAndClearWhereNothingIs) {
   EXPECT_EQ(run("thumbnail many.vox small.png --size 0").status, 2);
 }
 
-TEST_F(ToolRender, FieldsShowTheirDensitiesAndTheOcclusionOfTheirMeshes) {
+TEST_F(ToolRender, FieldsShowDensitiesAndMeshOcclusion) {
   ASSERT_EQ(run("generate smooth-terrain hills.json --chunks 2x1x2").status, 0);
   const std::string base = "hills.json -o out.png --size 64x48 --preset ";
   const auto image = [&](const std::string& flags) {
@@ -518,7 +518,7 @@ TEST_F(ToolRender, FieldsShowTheirDensitiesAndTheOcclusionOfTheirMeshes) {
   EXPECT_FALSE(exists("out2.png"));
 }
 
-TEST_F(ToolRender, AnImageOfTheSkyHasAWarning) {
+TEST_F(ToolRender, WarnsIfImageShowsOnlySky) {
   std::ofstream(folder_.file("none.vox"), std::ios::binary) << vox_file({1, 1, 1}, "");
   EXPECT_EQ(drawn("none.vox -o a.png --size 9x9")["warnings"], Json({"nothing visible; the image shows only sky"}));
   EXPECT_TRUE(exists("a.png"));
@@ -526,7 +526,7 @@ TEST_F(ToolRender, AnImageOfTheSkyHasAWarning) {
             Json({"no voxel is in view of this camera; the image shows only sky"}));
 }
 
-TEST_F(ToolRender, HiddenInstancesAreDrawnAndFramedOnlyWhenAskedFor) {
+TEST_F(ToolRender, DrawsHiddenInstancesOnlyOnRequest) {
   std::ofstream(folder_.file("one.vox"), std::ios::binary) << vox_with_hidden(1);
   std::ofstream(folder_.file("both.vox"), std::ios::binary) << vox_with_hidden(0);
   const Json without = drawn("one.vox -o one.png --size 64x48");
@@ -538,7 +538,7 @@ TEST_F(ToolRender, HiddenInstancesAreDrawnAndFramedOnlyWhenAskedFor) {
   EXPECT_EQ(bytes("hidden.png"), bytes("both.png"));
 }
 
-TEST_F(ToolRender, WrongUsageIsOneLineAndStatus2) {
+TEST_F(ToolRender, ReportsWrongUsageInOneLine) {
   std::ofstream(folder_.file("vox.png"), std::ios::binary) << tiny_vox();
   std::filesystem::create_hard_link(folder_.file("tiny.vox"), folder_.file("link.png"));
   std::filesystem::create_hard_link(folder_.file("tiny.vox"), folder_.file("link.pfm"));
@@ -636,7 +636,7 @@ TEST_F(ToolRender, WrongUsageIsOneLineAndStatus2) {
   EXPECT_EQ(bytes("tiny.vox"), tiny_vox());
 }
 
-TEST_F(ToolRender, DetailAndItsColours) {
+TEST_F(ToolRender, SelectsDetailAndLodColours) {
   drawn("tiny.vox -o plain.png --size 64x48");
   drawn("tiny.vox -o near.png --size 64x48 --detail near");
   EXPECT_EQ(bytes("near.png"), bytes("plain.png")) << "near is the default";
@@ -650,7 +650,7 @@ TEST_F(ToolRender, DetailAndItsColours) {
   EXPECT_FALSE(exists("out.png"));
 }
 
-TEST_F(ToolRender, FailuresAreOneLineStatus1AndNoFile) {
+TEST_F(ToolRender, ReportsFailuresInOneLineWithoutFile) {
   std::ofstream(folder_.file("broken.vox"), std::ios::binary) << tiny_vox().substr(0, 60);
   std::filesystem::create_directory(folder_.file("folder.png"));
   for (const std::string arguments : {"broken.vox -o out.png", "missing.vox -o out.png", "tiny.vox -o none/out.png",
@@ -663,7 +663,7 @@ TEST_F(ToolRender, FailuresAreOneLineStatus1AndNoFile) {
   EXPECT_EQ(shell("ls -A").out.find(".quoin-"), std::string::npos);
 }
 
-TEST_F(ToolRender, ASignalEndsItWithoutAFile) {
+TEST_F(ToolRender, LeavesNoFileAfterSignal) {
   for (const auto& [signal, status] : {std::pair{"INT", 130}, {"TERM", 143}}) {
     // A non-interactive shell makes background jobs ignore SIGINT; env restores the default.
     const ToolRun result = shell("env --default-signal=INT '" QUOIN_TOOL
@@ -676,7 +676,7 @@ TEST_F(ToolRender, ASignalEndsItWithoutAFile) {
   }
 }
 
-TEST_F(ToolRender, AFullDiskLeavesNoFile) {
+TEST_F(ToolRender, LeavesNoFileAtFileSizeLimit) {
   const ToolRun result =
       shell("ulimit -f 40; '" QUOIN_TOOL "' render tiny.vox -o out.png --size 320x200 --depth d.pfm");
   EXPECT_EQ(result.status, 1);
@@ -688,7 +688,7 @@ TEST_F(ToolRender, AFullDiskLeavesNoFile) {
 /// A separate suite, since drivers keep memory that sanitizers report as leaks.
 class VulkanTool : public ToolRender {};
 
-TEST_F(VulkanTool, ADeviceDrawsTheSameImage) {
+TEST_F(VulkanTool, MatchesCpuImage) {
   const auto devices = vulkan_devices();
   const ToolRun result = run("render tiny.vox -o device.png --size 160x120 --backend vulkan --json --depth d.pfm");
   if (!devices) {
@@ -728,7 +728,7 @@ TEST_F(VulkanTool, ADeviceDrawsTheSameImage) {
   EXPECT_GT(different("far.png", "device.png"), 100) << "in the colours of its detail";
 }
 
-TEST_F(VulkanTool, DevicesThatAreNotThereAreOneLineStatus1AndNoFile) {
+TEST_F(VulkanTool, ReportsMissingDevicesInOneLineWithoutFile) {
   for (const std::string device : {"999", "nobody"}) {
     const ToolRun result = run("render tiny.vox -o out.png --backend vulkan --device " + device);
     EXPECT_EQ(result.status, 1) << device;
@@ -738,14 +738,14 @@ TEST_F(VulkanTool, DevicesThatAreNotThereAreOneLineStatus1AndNoFile) {
   }
 }
 
-TEST_F(ToolRender, ItsHelpHasAnExample) {
+TEST_F(ToolRender, HelpHasExample) {
   const ToolRun help = run("render --help");
   EXPECT_EQ(help.status, 0);
   EXPECT_NE(help.out.find("Example: quoin render"), std::string::npos) << help.out;
 }
 
 // All frames of a film share one framing: static objects keep their position.
-TEST_F(ToolRender, FilmsAreFramedAlike) {
+TEST_F(ToolRender, FramesOfSeriesShareOneCamera) {
   vox_test::FileBuilder file;
   file.model(1, 1, 1, {{0, 0, 0, 1}});
   file.transform(0, 1, {{}}, {}, -1).group(1, {2, 4});
@@ -771,7 +771,7 @@ TEST_F(ToolRender, FilmsAreFramedAlike) {
   EXPECT_EQ(run("render film.vox -o b.png --frames 0:1 --frame 0").status, 2);
 }
 
-TEST_F(ToolRender, ATurntableGoesRoundAtOneDistance) {
+TEST_F(ToolRender, RendersTurntablesAndViewsByAngle) {
   const ToolRun said = run("render tiny.vox -o round.png --turntable 12 --size 32x24 --elevation 10 --json");
   ASSERT_EQ(said.status, 0) << said.err;
   EXPECT_EQ(Json::parse(said.out)["files"].size(), 12U);

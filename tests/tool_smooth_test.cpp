@@ -95,7 +95,7 @@ std::size_t open_edges(const WorldMesh& mesh) {
   return open;
 }
 
-TEST_F(ToolSmooth, VoxelsBecomeAClosedSurfaceInEveryFormat) {
+TEST_F(ToolSmooth, MeshesClosedSurfaceInEveryFormat) {
   for (const std::string name : {"out.ply", "out.obj", "out.glb"}) {
     const Json said = converted("tiny.vox " + name + " --mesher smooth --watertight --threads 2");
     EXPECT_EQ(said["mesher"], "smooth");
@@ -118,7 +118,7 @@ TEST_F(ToolSmooth, VoxelsBecomeAClosedSurfaceInEveryFormat) {
   EXPECT_EQ(converted("tiny.vox out.gltf --mesher smooth")["files"], Json({"out.gltf", "out.bin"}));
 }
 
-TEST_F(ToolSmooth, VoxelsKeepTheirPlacesAndColours) {
+TEST_F(ToolSmooth, KeepsPositionsAndColours) {
   std::ofstream(folder_.file("bar.vox"), std::ios::binary) << vox_file({9, 1, 1}, std::string("\0\0\0\1"
                                                                                               "\1\0\0\1"
                                                                                               "\2\0\0\1"
@@ -152,7 +152,7 @@ TEST_F(ToolSmooth, VoxelsKeepTheirPlacesAndColours) {
   }
 }
 
-TEST_F(ToolSmooth, OcclusionDarkensHollowsUnlessItIsLeftOut) {
+TEST_F(ToolSmooth, OcclusionDarkensHollows) {
   write_corner();
   const auto darkest = [&](const std::string& flags) {
     converted("corner.vox out.glb --mesher smooth " + flags);
@@ -165,7 +165,7 @@ TEST_F(ToolSmooth, OcclusionDarkensHollowsUnlessItIsLeftOut) {
   EXPECT_NEAR(plain, 0.6038, 1e-3) << "0xCC in linear light";
 }
 
-TEST_F(ToolSmooth, OcclusionHasTheFormAndThePlaceThatAreAskedFor) {
+TEST_F(ToolSmooth, AppliesOcclusionFormAndAttribute) {
   write_corner();
   const auto glb = [&](const std::string& flags) {
     converted("corner.vox out.glb --mesher smooth " + flags);
@@ -189,7 +189,7 @@ TEST_F(ToolSmooth, OcclusionHasTheFormAndThePlaceThatAreAskedFor) {
   EXPECT_EQ(run("convert corner.vox out.ply --ao-attribute").status, 0) << "of blocks too";
 }
 
-TEST_F(ToolSmooth, WrongWishesForOcclusionAreStatus2) {
+TEST_F(ToolSmooth, RefusesInvalidOcclusionOptions) {
   const std::vector<std::pair<std::string, std::string>> errors = {
       {"out.glb --ao-form share", "--ao-form, --ao-spread, --ao-offset and --ao-power need --mesher smooth"},
       {"out.glb --mesher smooth --ao-form rays",
@@ -212,7 +212,7 @@ TEST_F(ToolSmooth, WrongWishesForOcclusionAreStatus2) {
   }
 }
 
-TEST_F(ToolSmooth, HiddenInstancesAndNothingToDrawAreSaid) {
+TEST_F(ToolSmooth, WarnsOfHiddenInstancesAndEmptyMesh) {
   std::ofstream(folder_.file("two.vox"), std::ios::binary) << vox_with_hidden(2);
   const Json said = converted("two.vox out.glb --mesher smooth");
   EXPECT_EQ(said["warnings"], Json({"2 hidden instances left out; --hidden includes them", "the mesh is empty"}));
@@ -221,7 +221,7 @@ TEST_F(ToolSmooth, HiddenInstancesAndNothingToDrawAreSaid) {
   EXPECT_EQ(parse_glb(read_file(folder_.file("out.glb")).value()).document["nodes"].size(), 2U);
 }
 
-TEST_F(ToolSmooth, ARawVolumeBecomesItsSurface) {
+TEST_F(ToolSmooth, MeshesRawVolume) {
   const IVec3 size{40, 36, 38};
   const DVec3 centre(21.3, 18.1, 17.6);
   for (const auto& [type, name] :
@@ -248,7 +248,7 @@ TEST_F(ToolSmooth, ARawVolumeBecomesItsSurface) {
   EXPECT_EQ(run("convert ball.raw out.ply --raw-size 40x36x39 --raw-type float64").status, 1);
 }
 
-TEST_F(ToolSmooth, FindsAndReportsTheSurfaceValue) {
+TEST_F(ToolSmooth, FindsAndReportsSurfaceValue) {
   std::vector<double> values = ball({24, 24, 24}, DVec3(11.5), 8.0);
   for (double& value : values) value = value > 0.0 ? 200.0 : 40.0;
   write("ball.raw", volume_test::encode(values, ScalarType::UInt8));
@@ -260,7 +260,7 @@ TEST_F(ToolSmooth, FindsAndReportsTheSurfaceValue) {
   EXPECT_NE(text.out.find("Solid samples: "), std::string::npos) << text.out;
 }
 
-TEST_F(ToolSmooth, MillimetresAreMetresInGltfAlone) {
+TEST_F(ToolSmooth, ConvertsMillimetresToMetresOnlyInGltf) {
   volume_test::NiftiFile file;
   file.dim = {3, 20, 20, 20, 1, 1, 1, 1};
   file.datatype = 16;
@@ -288,7 +288,7 @@ TEST_F(ToolSmooth, MillimetresAreMetresInGltfAlone) {
   }
 }
 
-TEST_F(ToolSmooth, VolumesWithoutASurfaceAreEmptyFiles) {
+TEST_F(ToolSmooth, WritesEmptyFilesForVolumesWithoutSurface) {
   for (const double value : {0.0, 255.0}) {
     write("flat.raw", volume_test::encode(std::vector<double>(1000, value), ScalarType::UInt8));
     const Json said = converted("flat.raw out.glb --raw-size 10x10x10");
@@ -304,7 +304,7 @@ TEST_F(ToolSmooth, VolumesWithoutASurfaceAreEmptyFiles) {
   EXPECT_GT(read("out.glb").volume(), 0.0);
 }
 
-TEST_F(ToolSmooth, VolumesWithoutAFiniteValueAreErrors) {
+TEST_F(ToolSmooth, RefusesVolumesWithoutFiniteValue) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double infinity = std::numeric_limits<double>::infinity();
   for (const double value : {nan, infinity}) {
@@ -327,7 +327,7 @@ TEST_F(ToolSmooth, VolumesWithoutAFiniteValueAreErrors) {
   }
 }
 
-TEST_F(ToolSmooth, RawVolumesAreReportedRenderedAndKeptAsFields) {
+TEST_F(ToolSmooth, ReportsRendersAndKeepsRawVolumes) {
   write("ball.raw", volume_test::encode(ball({20, 18, 16}, DVec3(9.0), 6.0), ScalarType::Float32));
   const std::string raw = " --raw-size 20x18x16 --raw-type float32";
   const ToolRun reported = run("info ball.raw --json" + raw);
@@ -352,7 +352,7 @@ TEST_F(ToolSmooth, RawVolumesAreReportedRenderedAndKeptAsFields) {
   EXPECT_NE(run("view --raw-size 2x2x2").err.find("--raw-size needs a file"), std::string::npos);
 }
 
-TEST_F(ToolSmooth, SurfaceValuesThatNoFloatHoldsAreRefusedForThat) {
+TEST_F(ToolSmooth, RefusesSurfaceValuesBeyondFloat) {
   write("ball.raw", volume_test::encode(ball({8, 8, 8}, DVec3(4.0), 3.0), ScalarType::Float32));
   for (const std::string command : {"convert ball.raw out.glb", "render ball.raw -o out.png", "view ball.raw"}) {
     const std::string raw = command + " --raw-size 8x8x8 --raw-type float32 --iso ";
@@ -365,7 +365,7 @@ TEST_F(ToolSmooth, SurfaceValuesThatNoFloatHoldsAreRefusedForThat) {
   }
 }
 
-TEST_F(ToolSmooth, FieldsAreToldByTheirSamplesAndAreSmoothInAnyCase) {
+TEST_F(ToolSmooth, ReportsSamplesAndMeshesFieldsSmoothly) {
   ASSERT_EQ(run("generate smooth-terrain cliffs.json --chunks 1x1x1 --seed 4").status, 0);
   const Json info = Json::parse(run("info cliffs.json --json").out);
   EXPECT_EQ(info["voxels"], 0);
@@ -387,7 +387,7 @@ TEST_F(ToolSmooth, FieldsAreToldByTheirSamplesAndAreSmoothInAnyCase) {
             whole["triangles"].get<int>() / 2);
 }
 
-TEST_F(ToolSmooth, SimplifyingSaysHowFarItWent) {
+TEST_F(ToolSmooth, ReportsSimplificationError) {
   if (!can_simplify()) GTEST_SKIP() << "this build has no meshoptimizer";
   write("ball.raw", volume_test::encode(ball({40, 40, 40}, DVec3(20.0), 15.0), ScalarType::Float32));
   const std::string arguments = "ball.raw out.ply --raw-size 40x40x40 --raw-type float32 --iso 0";
@@ -401,7 +401,7 @@ TEST_F(ToolSmooth, SimplifyingSaysHowFarItWent) {
   EXPECT_NE(run("convert " + arguments + " --simplify 0.1").out.find("Simplified: "), std::string::npos);
 }
 
-TEST_F(ToolSmooth, VolumesBecomeMeshesVoxelsAndImages) {
+TEST_F(ToolSmooth, ConvertsAndRendersVolumes) {
   write("ball.raw", volume_test::encode(ball({8, 8, 8}, DVec3(4.0), 3.0), ScalarType::Int8));
   const ToolRun voxels = run("convert ball.raw out.vox --raw-size 8x8x8 --raw-type int8");
   EXPECT_EQ(voxels.status, 0) << voxels.err;
@@ -425,7 +425,7 @@ TEST_F(ToolSmooth, VolumesBecomeMeshesVoxelsAndImages) {
   EXPECT_EQ(run("convert a.nrrd out.glb").status, 0);
 }
 
-TEST_F(ToolSmooth, FailuresAreOneLineStatus1AndNoFile) {
+TEST_F(ToolSmooth, ReportsFailuresInOneLineWithoutFile) {
   for (const std::string arguments :
        {"missing.nii out.glb", "tiny.vox none/out.ply --mesher smooth", "tiny.vox none/out.gltf --mesher smooth",
         "missing.raw out.glb --raw-size 1x1x1", "tiny.vox out.glb --raw-size 900000000x900000000x900000000"}) {

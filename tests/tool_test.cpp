@@ -22,7 +22,7 @@ using Json = nlohmann::json;
 
 class Tool : public ToolTest {};
 
-TEST_F(Tool, InfoDescribesAFile) {
+TEST_F(Tool, InfoDescribesFile) {
   const ToolRun text = run("info tiny.vox");
   EXPECT_EQ(text.status, 0) << text.err;
   EXPECT_NE(text.out.find("Voxels: 4 of 2 types\nFaces: 18 visible of 24 total\n"), std::string::npos) << text.out;
@@ -48,7 +48,7 @@ TEST_F(Tool, InfoDescribesAFile) {
   EXPECT_EQ(object["warnings"], Json::array());
 }
 
-TEST_F(Tool, DataOfVoxelsIsCountedAndNamedWhereItIsLost) {
+TEST_F(Tool, ReportsVoxelDataAndItsLoss) {
   Scene scene;
   const auto stairs = scene.types.add({.name = "stairs", .colour = {150, 110, 70, 255}, .state_bits = 2});
   ASSERT_TRUE(stairs);
@@ -69,7 +69,7 @@ TEST_F(Tool, DataOfVoxelsIsCountedAndNamedWhereItIsLost) {
   EXPECT_EQ(read_file(folder_.file("again.json")).value(), read_file(folder_.file("data.json")).value());
 }
 
-TEST_F(Tool, InfoDescribesAVolume) {
+TEST_F(Tool, InfoDescribesVolume) {
   std::ofstream(folder_.file("a.nrrd"), std::ios::binary)
       << "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 2 3 1\nencoding: raw\nspacings: 0.5 1 2\n\nabcdef";
   const ToolRun text = run("info a.nrrd");
@@ -111,7 +111,7 @@ TEST_F(Tool, ConvertWritesEveryFormatAndCounts) {
   }
 }
 
-TEST_F(Tool, ASceneFileHoldsWhatNoVoxDoes) {
+TEST_F(Tool, SceneFileKeepsTransformsThatVoxCannotHold) {
   std::ofstream(folder_.file("turned.json")) << R"({"quoin_scene": 1, "files": [{"id": "a", "path": "tiny.vox"}],
       "instances": [{"file": "a", "name": "first", "position": [0.1, 1e9, -3]},
                     {"file": "a", "rotation": [0.1, 0.2, 0.3, 0.4], "scale": 0.45, "mirrored": true}],
@@ -132,7 +132,7 @@ TEST_F(Tool, ASceneFileHoldsWhatNoVoxDoes) {
   EXPECT_EQ(text_of(folder_.file("again.json")), text_of(folder_.file("whole.json")));
 }
 
-TEST_F(Tool, AnAtlasTakesFewerTriangles) {
+TEST_F(Tool, AtlasNeedsFewerTriangles) {
   std::string voxels;
   for (int i = 0; i < 400; ++i) {
     for (const int byte : {i % 20, i / 20, 0, 1}) voxels += static_cast<char>(byte);
@@ -158,7 +158,7 @@ TEST_F(Tool, AnAtlasTakesFewerTriangles) {
 }
 
 // A box with a hole in its lid: vertices carry the light inside, and faces are split where it changes.
-TEST_F(Tool, LightIsWrittenAtVertices) {
+TEST_F(Tool, WritesLightAtVertices) {
   std::string voxels;
   for (int i = 0; i < 20 * 20 * 6; ++i) {
     const int x = i % 20, y = i / 20 % 20, z = i / 400;
@@ -185,7 +185,7 @@ TEST_F(Tool, LightIsWrittenAtVertices) {
   }
 }
 
-TEST_F(Tool, FramesBecomeAnAnimation) {
+TEST_F(Tool, ConvertsFramesToAnimation) {
   vox_test::FileBuilder file;
   file.model(1, 1, 1, {{0, 0, 0, 1}}).model(1, 1, 2, {{0, 0, 0, 2}, {0, 0, 1, 2}});
   ASSERT_TRUE(write_file(file.file(), folder_.file("film.vox")));
@@ -223,7 +223,7 @@ TEST_F(Tool, InfoReportsHiddenUnnamedLayers) {
 }
 
 // .vox to .vox keeps everything in an artist's file, including content other than voxels; other formats warn of losses.
-TEST_F(Tool, FromVoxToVoxEverythingIsKept) {
+TEST_F(Tool, VoxToVoxKeepsEverything) {
   vox_test::FileBuilder file;
   file.model(4, 4, 4, {{0, 0, 0, 1}}).model(2, 2, 2, {{0, 0, 0, 3}});
   file.transform(0, 1, {{}}, {}, -1).group(1, {2});
@@ -276,7 +276,7 @@ std::pair<DVec3, DVec3> extent_of_obj(const std::string& text) {
   return {min, max};
 }
 
-TEST_F(Tool, MeshesAreScaledAndTurnedUpright) {
+TEST_F(Tool, ScalesAndTurnsMeshes) {
   ASSERT_EQ(run("convert tiny.vox plain.obj").status, 0);
   ASSERT_EQ(run("convert tiny.vox turned.obj --scale 0.25 --up z").status, 0);
   const auto [min, max] = extent_of_obj(text_of(folder_.file("plain.obj")));
@@ -294,7 +294,7 @@ TEST_F(Tool, MeshesAreScaledAndTurnedUpright) {
   EXPECT_EQ(run("convert tiny.vox b.vox --scale 2 --force").status, 2) << "voxels have no scale";
 }
 
-TEST_F(Tool, QuietLeavesErrorsAndJson) {
+TEST_F(Tool, QuietKeepsErrorsAndJson) {
   std::ofstream(folder_.file("hidden.vox"), std::ios::binary) << vox_with_hidden(1);
   const ToolRun quiet = run("convert hidden.vox a.glb -q");
   EXPECT_EQ(quiet.status, 0);
@@ -332,7 +332,7 @@ TEST_F(Tool, ShellsCompleteCommandsOptionsAndChoices) {
   EXPECT_EQ(run("completions tcsh").status, 2);
 }
 
-TEST_F(Tool, TheManualPageHasEveryCommandAndOption) {
+TEST_F(Tool, ManualPageHasCommandsAndOptions) {
   const std::string page = run("man").out;
   EXPECT_TRUE(page.starts_with(".TH QUOIN 1"));
   for (const std::string what :
@@ -341,7 +341,7 @@ TEST_F(Tool, TheManualPageHasEveryCommandAndOption) {
   }
 }
 
-TEST_F(Tool, AMissingOutputFolderIsSaidAtOnce) {
+TEST_F(Tool, ReportsMissingOutputFolder) {
   std::ofstream(folder_.file("file")) << "no folder";
   for (const std::string command :
        {"convert tiny.vox none/out.glb", "convert tiny.vox none/out.gltf", "convert tiny.vox none/out.obj",
@@ -357,7 +357,7 @@ TEST_F(Tool, AMissingOutputFolderIsSaidAtOnce) {
   EXPECT_EQ(run("convert tiny.vox file/out.glb").err, "quoin: file/out.glb: \"file\" is not a folder\n");
 }
 
-TEST_F(Tool, FacesAreCountedAlikeByEveryCommand) {
+TEST_F(Tool, CommandsAgreeOnFaceCounts) {
   std::ofstream(folder_.file("hidden.vox"), std::ios::binary) << vox_with_hidden(2);
   std::vector<Json> counts;
   for (const std::string hidden : {"", " --hidden"}) {
@@ -374,7 +374,7 @@ TEST_F(Tool, FacesAreCountedAlikeByEveryCommand) {
   EXPECT_EQ(counts[4], Json({18, 24}));
 }
 
-TEST_F(Tool, ConvertNamesEveryFileThatItWrites) {
+TEST_F(Tool, ConvertListsWrittenFiles) {
   const std::vector<std::pair<std::string, std::vector<std::string>>> files_of = {
       {"a.glb", {"a.glb"}},
       {"b.vox", {"b.vox"}},
@@ -396,7 +396,7 @@ TEST_F(Tool, ConvertNamesEveryFileThatItWrites) {
   }
 }
 
-TEST_F(Tool, TheInputIsNotReplacedByACompanion) {
+TEST_F(Tool, NeverReplacesInputWithCompanionFile) {
   for (const auto& [in, out] : std::vector<std::array<std::string, 2>>{
            {"foo.bin", "foo.gltf"}, {"foo.mtl", "foo.obj"}, {"foo_palette.png", "foo.obj"}, {"link", "castle.gltf"}}) {
     std::ofstream(folder_.file(in == "link" ? "castle.bin" : in), std::ios::binary) << tiny_vox();
@@ -413,7 +413,7 @@ TEST_F(Tool, TheInputIsNotReplacedByACompanion) {
   EXPECT_EQ(text_of(folder_.file("castle.png")), "an image") << "an unrelated image of the same name is kept";
 }
 
-TEST_F(Tool, HiddenInstancesAreMissedOnlyWhereTheyAreLeftOut) {
+TEST_F(Tool, WarnsOnlyIfHiddenInstancesAreLeftOut) {
   const auto warnings = [&](const std::string& arguments) {
     const ToolRun result = run(arguments + " --json");
     EXPECT_EQ(result.status, 0) << result.err;
@@ -432,7 +432,7 @@ TEST_F(Tool, HiddenInstancesAreMissedOnlyWhereTheyAreLeftOut) {
   EXPECT_EQ(run("convert one.vox out.glb").err, "quoin: warning: 1 hidden instance left out; --hidden includes it\n");
 }
 
-TEST_F(Tool, CulledGivesAQuadAFaceAndGreedyFewer) {
+TEST_F(Tool, GreedyMesherNeedsFewerQuadsThanCulled) {
   const auto quads = [&](const std::string& flags) {
     const ToolRun result = run("convert tiny.vox out.glb --json " + flags);
     return Json::parse(result.out)["quads"].get<int>();
@@ -442,7 +442,7 @@ TEST_F(Tool, CulledGivesAQuadAFaceAndGreedyFewer) {
   EXPECT_LT(quads("--no-ao"), 18);
 }
 
-TEST_F(Tool, MoreThreadsThanProcessorsAreNoNews) {
+TEST_F(Tool, AcceptsMoreThreadsThanProcessors) {
   const ToolRun result = run("convert tiny.vox out.glb --threads 1000");
   EXPECT_EQ(result.status, 0);
   EXPECT_EQ(result.err, "");
@@ -487,7 +487,7 @@ TEST_F(Tool, ReplacesModelsOnlyWithForce) {
   EXPECT_EQ(run("convert tiny.vox mesh.glb").status, 0);
 }
 
-TEST_F(Tool, ConvertsManyFilesAndNamesThoseThatFailLast) {
+TEST_F(Tool, ConvertsManyFilesAndListsFailuresLast) {
   std::filesystem::create_directories(folder_.file("models/deep"));
   std::ofstream(folder_.file("models/one.vox"), std::ios::binary) << tiny_vox();
   std::ofstream(folder_.file("models/deep/two.VOX"), std::ios::binary) << tiny_vox();
@@ -515,7 +515,7 @@ TEST_F(Tool, ConvertsManyFilesAndNamesThoseThatFailLast) {
   EXPECT_EQ(object["failed"][0]["input"], "missing.vox");
 }
 
-TEST_F(Tool, ManyFilesAreNotMixedUp) {
+TEST_F(Tool, KeepsOutputsOfManyFilesApart) {
   std::filesystem::create_directories(folder_.file("a"));
   std::ofstream(folder_.file("a/tiny.vox"), std::ios::binary) << tiny_vox();
   const ToolRun both = run("convert tiny.vox a/tiny.vox --to glb --out-dir out");
@@ -559,7 +559,7 @@ TEST_F(Tool, InfoAndRenderReadStandardInput) {
   }
 }
 
-TEST_F(Tool, DimensionsAreListedAndChosen) {
+TEST_F(Tool, ListsAndSelectsDimensions) {
   const std::string world = QUOIN_SOURCE_DIR "/tests/corpus/cases/minecraft-26.1-layout";
   const Json all = Json::parse(run("info '" + world + "' --json").out);
   EXPECT_EQ(all["dimension"], "minecraft:overworld");
@@ -584,7 +584,7 @@ TEST_F(Tool, DimensionsAreListedAndChosen) {
   EXPECT_NE(none.err.find("tiny.vox: cannot select a dimension"), std::string::npos) << none.err;
 }
 
-TEST_F(Tool, AFileOfTrianglesThatIsNotRecognisedIsNoMisuseOfVoxel) {
+TEST_F(Tool, ReportsUnrecognisedMeshBeforeVoxelOption) {
   std::ofstream(folder_.file("broken.ply")) << "hello";
   const ToolRun result = run("convert broken.ply out.vox --voxel 1");
   EXPECT_EQ(result.status, 1);
@@ -629,7 +629,7 @@ TEST_F(Tool, ConvertReadsAndWritesStandardStreams) {
   }
 }
 
-TEST_F(Tool, FailuresAreOneLineStatus1AndNoFile) {
+TEST_F(Tool, ReportsFailuresInOneLineWithoutFile) {
   std::ofstream(folder_.file("broken.vox"), std::ios::binary) << tiny_vox().substr(0, 60);
   std::ofstream(folder_.file("pointer.vox")) << "version https://git-lfs.github.com/spec/v1\noid sha256:0\n";
   std::ofstream(folder_.file("empty.vox"));
@@ -650,7 +650,7 @@ TEST_F(Tool, FailuresAreOneLineStatus1AndNoFile) {
   }
 }
 
-TEST_F(Tool, AFullDiskIsOneLineStatus1AndNoFile) {
+TEST_F(Tool, ReportsFullDiskInOneLineWithoutFile) {
   // A file system of 16 KiB, mounted only for these commands; the filler leaves one page free.
   const std::string in_small_disk =
       "unshare -rm sh -c \"mkdir -p disk && mount -t tmpfs -o size=16k none disk && "
@@ -672,7 +672,7 @@ TEST_F(Tool, AFullDiskIsOneLineStatus1AndNoFile) {
   }
 }
 
-TEST_F(Tool, ALimitOnTheSizeOfFilesIsOneLineStatus1AndNoFile) {
+TEST_F(Tool, ReportsFileSizeLimitInOneLineWithoutFile) {
   std::ofstream(folder_.file("large.vox"), std::ios::binary) << checkerboard_vox();
   for (const std::string out : {"out.glb", "out.gltf", "out.obj"}) {
     const ToolRun result = shell("ulimit -f 40; '" QUOIN_TOOL "' convert large.vox " + out);
@@ -699,7 +699,7 @@ TEST_F(Tool, SignalsLeaveNoTemporaryFile) {
   }
 }
 
-TEST_F(Tool, AnIgnoredHangupStaysIgnored) {
+TEST_F(Tool, KeepsIgnoringHangup) {
   std::ofstream(folder_.file("large.vox"), std::ios::binary) << checkerboard_vox(40);
   const ToolRun result = shell("trap '' HUP; '" QUOIN_TOOL
                                "' convert large.vox out.obj & while kill -0 $! && ! ls -A | grep -q quoin-; do sleep "
@@ -708,7 +708,7 @@ TEST_F(Tool, AnIgnoredHangupStaysIgnored) {
   EXPECT_TRUE(exists("out.obj"));
 }
 
-TEST_F(Tool, OutputThatCannotBeWrittenIsStatus1) {
+TEST_F(Tool, ReturnsStatus1ForUnwritableOutput) {
   if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "there is no /dev/full here";
   for (const std::string arguments :
        {"--help", "--version", "convert --help", "info tiny.vox", "info tiny.vox --json"}) {
@@ -718,7 +718,7 @@ TEST_F(Tool, OutputThatCannotBeWrittenIsStatus1) {
   }
 }
 
-TEST_F(Tool, WrongUsageNamesTheArgument) {
+TEST_F(Tool, NamesArgumentOfWrongUsage) {
   const std::vector<std::array<std::string, 2>> errors = {
       {"info tiny.vox --frame -1", "quoin: --frame: must be 0 or more, not \"-1\""},
       {"info tiny.vox --frame x", "quoin: --frame: must be 0 or more, not \"x\""},
@@ -758,7 +758,7 @@ TEST_F(Tool, WrongUsageNamesTheArgument) {
   }
 }
 
-TEST_F(Tool, WrongUsageIsStatus2) {
+TEST_F(Tool, ReturnsStatus2ForWrongUsage) {
   for (const std::string arguments :
        {"", "frobnicate", "info", "info tiny.vox --frame -1", "convert tiny.vox", "convert tiny.vox out.xyz",
         "convert tiny.vox out.glb --mesher fast", "convert tiny.vox out.glb --iso 0.5",
@@ -771,7 +771,7 @@ TEST_F(Tool, WrongUsageIsStatus2) {
   }
 }
 
-TEST_F(Tool, HelpHasAnExampleForEveryCommand) {
+TEST_F(Tool, HelpHasExampleForEveryCommand) {
   const ToolRun all = run("--help");
   EXPECT_EQ(all.status, 0);
   EXPECT_NE(all.out.find("Example: quoin convert"), std::string::npos) << all.out;

@@ -19,7 +19,7 @@ class ToolView : public ToolTest {
   static constexpr const char* kNoDisplay = "unset DISPLAY WAYLAND_DISPLAY SDL_VIDEODRIVER; '" QUOIN_TOOL "' ";
 };
 
-TEST_F(ToolView, ReportsAMissingDisplay) {
+TEST_F(ToolView, ReportsMissingDisplay) {
   const ToolRun result = without_display("view tiny.vox");
   EXPECT_EQ(result.status, 1);
   expect_one_error_line(result);
@@ -28,7 +28,7 @@ TEST_F(ToolView, ReportsAMissingDisplay) {
   EXPECT_TRUE(says_why) << result.err;
 }
 
-TEST_F(ToolView, FilesThatCannotBeShownFailBeforeAWindowOpens) {
+TEST_F(ToolView, RefusesUnreadableFilesBeforeOpeningWindow) {
   if (!is_built()) GTEST_SKIP() << "the viewer is not built";
   std::ofstream(folder_.file("text.txt")) << "no voxels here";
   for (const char* file : {"absent.vox", "text.txt", "."}) {
@@ -39,7 +39,7 @@ TEST_F(ToolView, FilesThatCannotBeShownFailBeforeAWindowOpens) {
   }
 }
 
-TEST_F(ToolView, WrongUsageIsRefused) {
+TEST_F(ToolView, RefusesWrongUsage) {
   for (const char* arguments :
        {"view tiny.vox --size 3", "view tiny.vox --size 10x10", "view tiny.vox --size 99999x500",
         "view tiny.vox --frame -1", "view tiny.vox --screenshot a.jpg", "view --screenshot a.png", "view ''",
@@ -50,7 +50,7 @@ TEST_F(ToolView, WrongUsageIsRefused) {
   }
 }
 
-TEST_F(ToolView, AHiddenWindowShowsTheRenderersImage) {
+TEST_F(ToolView, HiddenWindowMatchesRenderedImage) {
   if (!is_built()) GTEST_SKIP() << "the viewer is not built";
   const ToolRun shown = shell("SDL_VIDEODRIVER=dummy SDL_RENDER_DRIVER=software '" QUOIN_TOOL
                               "' view tiny.vox --bare --size 320x240 --screenshot a.png");

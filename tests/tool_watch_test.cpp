@@ -25,7 +25,7 @@ class ToolWatch : public ToolTest {
   std::string bytes(const std::string& name) { return text_of(folder_.file(name)); }
 };
 
-TEST_F(ToolWatch, AChangedInputIsConvertedAgain) {
+TEST_F(ToolWatch, ReconvertsChangedInput) {
   ASSERT_EQ(run("convert tiny.vox first.ply").status, 0);
   ASSERT_EQ(run("convert other.vox second.ply").status, 0);
   const ToolRun result = script(
@@ -40,7 +40,7 @@ TEST_F(ToolWatch, AChangedInputIsConvertedAgain) {
   EXPECT_NE(result.err.find("quoin: watching tiny.vox; press Ctrl-C to stop"), std::string::npos) << result.err;
 }
 
-TEST_F(ToolWatch, ReportsABrokenFileAndConvertsTheNextVersion) {
+TEST_F(ToolWatch, ReportsBrokenFileAndConvertsNextVersion) {
   ASSERT_EQ(run("convert other.vox second.ply").status, 0);
   const ToolRun result = script(
       "start convert tiny.vox out.ply --watch\n"
@@ -57,7 +57,7 @@ TEST_F(ToolWatch, ReportsABrokenFileAndConvertsTheNextVersion) {
 }
 
 // The image of a scene file depends on the files that the scene names.
-TEST_F(ToolWatch, AnImageFollowsTheModelsOfItsScene) {
+TEST_F(ToolWatch, RendersAgainAfterModelChanges) {
   std::ofstream(folder_.file("fleet.json")) << R"({"quoin_scene": 1, "files": [{"id": "a", "path": "tiny.vox"}],)"
                                             << R"( "instances": [{"file": "a", "position": [0, 0, 0]}]})";
   const std::string flags = " --size 64x48 --samples 1";
@@ -74,7 +74,7 @@ TEST_F(ToolWatch, AnImageFollowsTheModelsOfItsScene) {
 
 // First a model is broken when it is first read and later fixed; then a model of a scene changes, with other inputs
 // given.
-TEST_F(ToolWatch, SeesChangedModelsOfAScene) {
+TEST_F(ToolWatch, ReconvertsScenesAfterModelChanges) {
   std::ofstream(folder_.file("fleet.json")) << R"({"quoin_scene": 1, "files": [{"id": "a", "path": "ship.vox"}],)"
                                             << R"( "instances": [{"file": "a"}]})";
   const ToolRun result = script(
@@ -93,7 +93,7 @@ TEST_F(ToolWatch, SeesChangedModelsOfAScene) {
 }
 
 // Only changed and new files of a folder are converted again; outputs in the folder trigger nothing.
-TEST_F(ToolWatch, AFolderIsFollowedFileByFile) {
+TEST_F(ToolWatch, ReconvertsOnlyChangedFilesOfFolder) {
   const ToolRun result = script(
       "mkdir models; cp tiny.vox models/a.vox; cp other.vox models/b.vox\n"
       "start convert models --recursive --to glb --watch >summary\n"

@@ -28,7 +28,7 @@ class ToolWorld : public ToolTest {
   }
 };
 
-TEST_F(ToolWorld, AWorldIsAFileLikeAnyOther) {
+TEST_F(ToolWorld, OtherCommandsReadAndWriteWorlds) {
   const Json world = Json::parse(run("info hills.quoin --json").out);
   EXPECT_EQ(world["format"], "world");
   ASSERT_EQ(run("convert hills.quoin hills.json -q").status, 0);
@@ -47,7 +47,7 @@ TEST_F(ToolWorld, AWorldIsAFileLikeAnyOther) {
   EXPECT_EQ(run("convert hills.json again.quoin --force -q").status, 0);
 }
 
-TEST_F(ToolWorld, InfoDescribesAWorld) {
+TEST_F(ToolWorld, InfoDescribesWorld) {
   const ToolRun text = run("world info hills.quoin");
   EXPECT_EQ(text.status, 0) << text.err;
   EXPECT_NE(text.out.find(": world version 3"), std::string::npos) << text.out;
@@ -74,7 +74,7 @@ TEST_F(ToolWorld, ReportsAndRepairsDamage) {
   EXPECT_EQ(run("render hills.quoin -o a.png --size 64x48 -q").status, 0);
 }
 
-TEST_F(ToolWorld, BackupAndCompact) {
+TEST_F(ToolWorld, BacksUpAndCompacts) {
   EXPECT_EQ(run("world backup hills.quoin monday.quoin").status, 0);
   EXPECT_EQ(run("world check monday.quoin").status, 0);
   const ToolRun again = run("world backup hills.quoin monday.quoin");
@@ -90,7 +90,7 @@ TEST_F(ToolWorld, BackupAndCompact) {
   EXPECT_EQ(run("world backup hills.quoin tuesday.quoin").status, 0) << "while it is written";
 }
 
-TEST_F(ToolWorld, ShowsItselfByAThumbnail) {
+TEST_F(ToolWorld, WritesThumbnail) {
   EXPECT_GT(Json::parse(run("world info hills.quoin --json").out)["thumbnail_bytes"], 1000);
   ASSERT_EQ(run("world thumbnail hills.quoin hills.png -q").status, 0);
   EXPECT_EQ(text_of(folder_.file("hills.png")).substr(1, 3), "PNG");
@@ -105,7 +105,7 @@ TEST_F(ToolWorld, ShowsItselfByAThumbnail) {
   EXPECT_EQ(run("world thumbnail hills.quoin hills.quoin").status, 1);
 }
 
-TEST_F(ToolWorld, IsConvertedToAnotherWithAllThatItHas) {
+TEST_F(ToolWorld, ConvertingKeepsEverything) {
   {
     auto world = WorldStore::open(folder_.file("hills.quoin"), WorldAccess::Write);
     WorldChanges changes;
@@ -127,7 +127,7 @@ TEST_F(ToolWorld, IsConvertedToAnotherWithAllThatItHas) {
   EXPECT_NE(damaged.err, "");
 }
 
-TEST_F(ToolWorld, MeshesAreThoseOfTheSameSceneHeldWhole) {
+TEST_F(ToolWorld, MeshesMatchSceneInMemory) {
   ASSERT_EQ(run("convert hills.quoin hills.json -q").status, 0);
   for (const std::string options : {"", "--mesher culled", "--no-ao", "--watertight"}) {
     for (const std::string ending : {"glb", "ply"}) {
@@ -179,7 +179,7 @@ TEST_F(ToolWorld, ReportsInsufficientMemoryBeforeLoading) {
   EXPECT_EQ(copied.status, 0) << copied.err;
 }
 
-TEST_F(ToolWorld, IsMadeOfHeightsWhereTheyAreSaidToBeHeights) {
+TEST_F(ToolWorld, ImportsHeightsOnRequest) {
   const std::string image = "'" QUOIN_SOURCE_DIR "/tests/corpus/heights/grey_8_bits.png'";
   const ToolRun refused = run("convert " + image + " fuji.quoin");
   EXPECT_EQ(refused.status, 1);
