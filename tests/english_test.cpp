@@ -153,9 +153,8 @@ std::string find_error(const std::string& line, Prose& prose) {
     if (line.find(opening) != std::string::npos) return opening;
   }
   if (line.starts_with("TEST")) {
-    for (const char* name : {", That", ", What", ", Whether"}) {
-      if (line.find(name) != std::string::npos) return "test name opens with " + std::string(name + 2);
-    }
+    static const std::regex kOldName(", (That|What|Whether|It|Its|The|A|An|Every|No|Of|Where)[A-Z]");
+    if (std::smatch found; std::regex_search(line, found, kOldName)) return "test name opens with " + found[1].str();
   }
   return "";
 }
@@ -287,6 +286,9 @@ TEST(English, FindsHardPhrases) {
   EXPECT_EQ(found(Kind::Document, "It takes 4 bits per voxel. A row has 64 bits. A voxel has one."), "");
   EXPECT_EQ(found(Kind::Python, "x = 1  # as those of the grid"), "as those of");
   EXPECT_EQ(found(Kind::Code, "TEST(Ray, ThatMisses) {"), "test name opens with That");
+  EXPECT_EQ(found(Kind::Code, "TEST(Ray, ItMisses) {"), "test name opens with It");
+  EXPECT_EQ(found(Kind::Code, "TEST_F(Rays, AMissIsInfinite) {"), "test name opens with A");
+  EXPECT_EQ(found(Kind::Code, "TEST(Ray, AssertsOnNullDirection) {"), "");
   EXPECT_EQ(found(Kind::Code, "/// Returns true if the grid is empty."), "");
 }
 
