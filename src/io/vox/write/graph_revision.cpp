@@ -172,7 +172,7 @@ void GraphRevision::remove(const Hanging& hanging) {
   children_[parent_in_source(hanging.parent)].removed.insert(document.nodes[highest].id);
 }
 
-void GraphRevision::remove_what_is_gone() {
+void GraphRevision::remove_missing_nodes() {
   const Placements& placements = source_.placements;
   for (std::size_t i = 0; i < placements.groups.size(); ++i) {
     if (scene_.groups().find(handle_read(source_.scene.groups(), i)) == nullptr) remove(placements.groups[i]);
@@ -507,7 +507,7 @@ void GraphRevision::settle_root() {
 Result<RevisedGraph> GraphRevision::run() {
   number_layers();
   find_top();
-  if (keeps_graph_) remove_what_is_gone();
+  if (keeps_graph_) remove_missing_nodes();
   if (Status done = revise_groups(); !done) return done.error();
   if (Status done = revise_instances(); !done) return done.error();
   if (was_of_frames() && !keeps_frames_) out_.frames_left_out = std::ssize(source_.document.models);

@@ -20,7 +20,7 @@
 // Builds the scene graph to write. A single class, since each step uses the members that the previous one set:
 //
 //  number_layers, find_top    ids of layers; the group that is the scene itself, perhaps a new one
-//  remove_what_is_gone        removed nodes of the source
+//  remove_missing_nodes       removed nodes of the source
 //  revise_groups              from the top: position, name, layer, parent
 //  revise_instances           the same, and the models that they show
 //  name_shapes, apply_child_changes, settle_root
@@ -159,7 +159,7 @@ class GraphRevision {
   [[nodiscard]] bool needs_new_top() const;
   void settle_root();
   void free_root_id();
-  void remove_what_is_gone();
+  void remove_missing_nodes();
   void remove(const Hanging& hanging);
   Status revise_groups();
   Status revise_group(GroupHandle handle);
