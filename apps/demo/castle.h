@@ -25,5 +25,7 @@ inline constexpr int kSeaLevel = 9;
 [[nodiscard]] quoin::Grid make_tree(const Palette& palette, int height);
 /// A ship, its bow towards -z.
 [[nodiscard]] quoin::Grid make_ship(const Palette& palette);
+/// The demo world: the island about the world's origin, trees where the ground is grass, two ships at sea.
+[[nodiscard]] quoin::Result<quoin::Scene> make_castle();
 
 }  // namespace demo

@@ -1,0 +1,42 @@
+// Renders the demo world to the PNG file named on the command line. Needs only the renderer's part of the library, so
+// that `./dev demo` shows an image before the tool is built.
+
+#include <cstdio>
+#include <numbers>
+
+#include <quoin/io/image_files.h>
+#include <quoin/render/cpu_renderer.h>
+
+#include "castle.h"
+
+namespace {
+
+quoin::Status draw(const char* file) {
+  const auto scene = demo::make_castle();
+  if (!scene) return scene.error();
+  // The options of `quoin render` in `./dev demo`.
+  const auto camera = quoin::look_at({95, 84, 214}, {1, 20, 6}, 33 * std::numbers::pi / 180);
+  if (!camera) return camera.error();
+  quoin::RenderOptions options;
+  options.samples = 8;
+  options.light.sun = {-0.4, 0.8, 0.75};
+  options.light.exposure = 1.15;
+  const auto image = quoin::CpuRenderer(*scene).render(*camera, options);
+  if (!image) return image.error();
+  const auto written = quoin::write_png(image->colour, file);
+  return written ? quoin::Status{} : written.error();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2 || argv[1][0] == '-') {
+    std::fprintf(stderr, "usage: quoin_demo_image OUT.png\n");
+    return 2;
+  }
+  if (const auto drawn = draw(argv[1]); !drawn) {
+    std::fprintf(stderr, "quoin_demo_image: %s\n", quoin::to_string(drawn.error()).c_str());
+    return 1;
+  }
+  return 0;
+}
