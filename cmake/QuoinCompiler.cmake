@@ -25,6 +25,16 @@ function(quoin_precompile target)
   endif()
 endfunction()
 
+# Uses the precompiled headers of another target that has the same compiler options.
+function(quoin_share_precompiled target owner)
+  if(QUOIN_PRECOMPILED_HEADERS)
+    target_precompile_headers(${target} REUSE_FROM ${owner})
+    if(QUOIN_CCACHE AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+      target_compile_options(${target} PRIVATE -fpch-preprocess)
+    endif()
+  endif()
+endfunction()
+
 # Compiles the sources of a folder together, at most nine at a time: tests, the tool and the viewer spend most time on
 # templates that each source would instantiate separately. Names in a folder's anonymous namespaces must therefore
 # differ. Not for the library, which would gain a fifth and be optimised differently. Sources with their own definitions
