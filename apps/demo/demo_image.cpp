@@ -19,8 +19,9 @@ quoin::Status draw(const char* file) {
   if (!camera) return camera.error();
   quoin::RenderOptions options;
   options.samples = 8;
-  options.light.sun = {-0.4, 0.8, 0.75};
-  options.light.exposure = 1.15;
+  options.light = quoin::natural_light();
+  options.environment = quoin::Environment::natural({-0.4, 0.8, 0.75});
+  options.environment->exposure = 1.15;
   const auto image = quoin::CpuRenderer(*scene).render(*camera, options);
   if (!image) return image.error();
   const auto written = quoin::write_png(image->colour, file);
