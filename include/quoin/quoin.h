@@ -77,6 +77,7 @@
 #include <quoin/mesh/smooth_occlusion.h>
 #include <quoin/mesh/vertex_writer.h>
 #include <quoin/mesh/visible_faces.h>
+#include <quoin/render/chunk_surface.h>
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/render/density_slice.h>
 #include <quoin/render/impostor.h>

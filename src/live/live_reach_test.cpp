@@ -6,8 +6,8 @@
 
 #include <gtest/gtest.h>
 
-#include "live/live_densities.h"
 #include "live/live_test_support.h"
+#include "render/chunks/voxel_densities.h"
 
 namespace quoin {
 namespace {

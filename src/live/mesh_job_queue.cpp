@@ -10,12 +10,12 @@
 namespace quoin {
 namespace {
 
-double seconds(LiveClock::duration duration) {
+double seconds(SurfaceClock::duration duration) {
   return std::chrono::duration<double>(duration).count();
 }
 
 // Releases the inputs of a job. Copies of chunks are freed as early as possible.
-void drop_inputs(LiveJob& job) {
+void drop_inputs(SurfaceJob& job) {
   job.voxels = {};
   job.field.reset();
   job.types.reset();
@@ -30,7 +30,7 @@ MeshJobQueue::MeshJobQueue(unsigned workers, Work work, std::function<void()> on
   workers_.start(workers, [this](Workers::Lock& lock, unsigned worker) { return step(lock, workspaces_[worker]); });
 }
 
-void MeshJobQueue::push(std::unique_ptr<LiveJob> job) {
+void MeshJobQueue::push(std::unique_ptr<SurfaceJob> job) {
   QUOIN_ASSERT(job != nullptr && !std::isnan(job->distance), "a job with a distance");
   {
     const std::lock_guard lock(mutex_);
@@ -42,11 +42,12 @@ void MeshJobQueue::push(std::unique_ptr<LiveJob> job) {
   workers_.wake_one();
 }
 
-std::vector<std::unique_ptr<LiveJob>> MeshJobQueue::withdraw(const std::function<bool(const LiveJob&)>& is_unwanted) {
-  std::vector<std::unique_ptr<LiveJob>> taken;
+std::vector<std::unique_ptr<SurfaceJob>> MeshJobQueue::withdraw(
+    const std::function<bool(const SurfaceJob&)>& is_unwanted) {
+  std::vector<std::unique_ptr<SurfaceJob>> taken;
   const std::lock_guard lock(mutex_);
   taken.reserve(queue_.size());
-  std::erase_if(queue_, [&](std::unique_ptr<LiveJob>& job) {
+  std::erase_if(queue_, [&](std::unique_ptr<SurfaceJob>& job) {
     if (!is_unwanted(*job)) return false;
     taken.push_back(std::move(job));
     return true;
@@ -54,29 +55,29 @@ std::vector<std::unique_ptr<LiveJob>> MeshJobQueue::withdraw(const std::function
   return taken;
 }
 
-std::vector<double> MeshJobQueue::measure(const std::function<double(const LiveJob&)>& distance) {
+std::vector<double> MeshJobQueue::measure(const std::function<double(const SurfaceJob&)>& distance) {
   std::vector<double> distances;
   const std::lock_guard lock(mutex_);
   distances.reserve(queue_.size());
-  for (const std::unique_ptr<LiveJob>& job : queue_) distances.push_back(job->distance = distance(*job));
+  for (const std::unique_ptr<SurfaceJob>& job : queue_) distances.push_back(job->distance = distance(*job));
   std::sort(distances.begin(), distances.end());
   return distances;
 }
 
-void MeshJobQueue::renew(const std::function<void(LiveJob&)>& renew) {
+void MeshJobQueue::renew(const std::function<void(SurfaceJob&)>& renew) {
   const std::lock_guard lock(mutex_);
-  for (const std::unique_ptr<LiveJob>& job : queue_) {
+  for (const std::unique_ptr<SurfaceJob>& job : queue_) {
     if (job->voxels == nullptr) continue;
     spent_.emplace_back(job->voxels, job->light);
     renew(*job);
   }
 }
 
-std::vector<std::unique_ptr<LiveJob>> MeshJobQueue::collect() {
-  std::vector<std::unique_ptr<LiveJob>> taken;
+std::vector<std::unique_ptr<SurfaceJob>> MeshJobQueue::collect() {
+  std::vector<std::unique_ptr<SurfaceJob>> taken;
   const std::lock_guard lock(mutex_);
   taken.reserve(done_.size());
-  for (std::unique_ptr<LiveJob>& job : done_) taken.push_back(std::move(job));
+  for (std::unique_ptr<SurfaceJob>& job : done_) taken.push_back(std::move(job));
   done_.clear();
   return taken;
 }
@@ -96,29 +97,29 @@ LiveMeshes::Stats MeshJobQueue::stats() const {
   return stats_;
 }
 
-std::unique_ptr<LiveJob> MeshJobQueue::take_nearest() {
+std::unique_ptr<SurfaceJob> MeshJobQueue::take_nearest() {
   QUOIN_ASSERT(!queue_.empty(), "a job waits");
   const auto nearest = std::min_element(queue_.begin(), queue_.end(), [](const auto& a, const auto& b) {
     return a->distance != b->distance ? a->distance < b->distance : a->serial < b->serial;
   });
-  std::unique_ptr<LiveJob> job = std::move(*nearest);
+  std::unique_ptr<SurfaceJob> job = std::move(*nearest);
   queue_.erase(nearest);
   return job;
 }
 
-Workers::Clock::time_point MeshJobQueue::step(Workers::Lock& lock, LiveWorkspace& workspace) {
+Workers::Clock::time_point MeshJobQueue::step(Workers::Lock& lock, SurfaceWorkspace& workspace) {
   if (queue_.empty()) return Workers::kWhenWoken;
-  std::unique_ptr<LiveJob> job = take_nearest();
+  std::unique_ptr<SurfaceJob> job = take_nearest();
   ++running_;
   auto spent = std::exchange(spent_, {});
   lock.unlock();
   spent.clear();
-  const LiveClock::time_point start = LiveClock::now();
+  const SurfaceClock::time_point start = SurfaceClock::now();
   std::exception_ptr failure;
   try {
     work_(*job, workspace);
   } catch (const std::bad_alloc&) {
-    job->outcome = LiveJob::Outcome::OutOfMemory;
+    job->outcome = SurfaceJob::Outcome::OutOfMemory;
     job->surface.reset();
     workspace = {};
   } catch (...) {
@@ -126,7 +127,7 @@ Workers::Clock::time_point MeshJobQueue::step(Workers::Lock& lock, LiveWorkspace
   }
   drop_inputs(*job);
   // Failures are not reported to the callback: an immediate retry would fail again.
-  const bool is_reported = job->outcome != LiveJob::Outcome::OutOfMemory;
+  const bool is_reported = job->outcome != SurfaceJob::Outcome::OutOfMemory;
   lock.lock();
   workers_.keep_failure(std::move(failure));
   finish(std::move(job), start);
@@ -137,19 +138,37 @@ Workers::Clock::time_point MeshJobQueue::step(Workers::Lock& lock, LiveWorkspace
 }
 
 // Requires: the lock is held.
-void MeshJobQueue::finish(std::unique_ptr<LiveJob> job, LiveClock::time_point start) {
-  const LiveClock::time_point now = LiveClock::now();
-  if (job->outcome == LiveJob::Outcome::Meshed) {
+void MeshJobQueue::finish(std::unique_ptr<SurfaceJob> job, SurfaceClock::time_point start) {
+  const SurfaceClock::time_point now = SurfaceClock::now();
+  if (job->outcome == SurfaceJob::Outcome::Meshed) {
     ++stats_.chunks_meshed;
     stats_.last_mesh_seconds = seconds(now - start);
     stats_.last_latency_seconds = seconds(now - job->seen);
-  } else if (job->outcome == LiveJob::Outcome::OutOfMemory) {
+  } else if (job->outcome == SurfaceJob::Outcome::OutOfMemory) {
     ++stats_.out_of_memory;
   }
   QUOIN_ASSERT(running_ != 0 && done_.size() < done_.capacity(), "room was made when the job came");
   done_.push_back(std::move(job));
   --running_;
   workers_.notify();
+}
+
+ChunkSurfaceOptions surface_options(const LiveMeshOptions& options) {
+  return {.style = options.style,
+          .merge = options.merge,
+          .region_edge = options.region_edge,
+          .light_merging = options.light_merging,
+          .occlusion = options.occlusion,
+          .colours = options.colours,
+          .detail_distance = options.detail_distance};
+}
+
+void make_live_surface(const LiveMeshOptions& options, SurfaceJob& job, SurfaceWorkspace& workspace) {
+  make_chunk_surface(surface_options(options), job, workspace);
+  if (options.convert && job.surface != nullptr) {
+    job.surface->converted =
+        options.convert({job.source.grid, job.chunk, job.surface, job.source.content, ~std::uint64_t{0}});
+  }
 }
 
 }  // namespace quoin

@@ -12,8 +12,6 @@
 
 #include "core/coordinates/chunk_order.h"
 #include "core/work/workers.h"
-#include "live/live_field.h"
-#include "live/live_grid.h"
 #include "scene/instance_axes.h"
 
 namespace quoin {
@@ -34,13 +32,14 @@ bool is_placed(const Scene& scene, const Instance& instance, InstanceFilter filt
 // A chunk that waits for a job.
 struct MeshScheduler::Candidate {
   double distance = 0.0;
-  LiveSource* live = nullptr;
-  LiveKey source;
+  SurfaceSource* live = nullptr;
+  SurfaceKey source;
   IVec3 chunk{0};
 };
 
 MeshScheduler::MeshScheduler(const LiveMeshOptions& options, MeshJobQueue::Work work)
     : options_(options),
+      surface_options_(surface_options(options)),
       workers_(worker_count(options.workers)),
       max_ahead_(jobs_ahead(options.style, workers_)),
       queue_(workers_, std::move(work), options.on_ready) {}
@@ -72,7 +71,7 @@ void MeshScheduler::forget() {
 }
 
 void MeshScheduler::update_or_throw(const Scene& scene) {
-  const LiveClock::time_point now = LiveClock::now();
+  const SurfaceClock::time_point now = SurfaceClock::now();
   collect();
   const ChangedTypes changed_types = follow_types(scene.types);
   for (const GridHandle handle : follow_scene(scene)) follow_grid(scene, handle, now);
@@ -84,35 +83,36 @@ void MeshScheduler::update_or_throw(const Scene& scene) {
     if (std::binary_search(drawn_.begin(), drawn_.end(), key.grid)) live->mark_types(*grid, changed_types, now);
     live->prepare(*grid, scene.types);
   }
-  withdraw([&](const LiveJob& job) {
-    const LiveSource* live = find(job.source);
+  withdraw([&](const SurfaceJob& job) {
+    const SurfaceSource* live = find(job.source);
     return live == nullptr || !live->is_current(job);
   });
   renew_jobs(scene, now);
   if (totals_.unfinished != 0) hand_over(scene);
 }
 
-void MeshScheduler::follow_grid(const Scene& scene, GridHandle handle, LiveClock::time_point now) {
+void MeshScheduler::follow_grid(const Scene& scene, GridHandle handle, SurfaceClock::time_point now) {
   const SceneGrid& grid = scene.grids()[handle];
   const auto [voxels, is_new] = sources_.try_emplace({handle, SurfaceContent::Voxels});
-  if (voxels->second == nullptr) voxels->second = std::make_unique<LiveGrid>(handle, options_, totals_);
+  if (voxels->second == nullptr) voxels->second = make_surface_source(voxels->first, surface_options_, totals_);
   voxels->second->follow(grid, now);
-  LiveSource* field = find({handle, SurfaceContent::Field});
+  SurfaceSource* field = find({handle, SurfaceContent::Field});
   if (field == nullptr) {
     if (grid.field.chunk_count() == 0) return;
-    field = (sources_[{handle, SurfaceContent::Field}] = std::make_unique<LiveField>(handle, options_, totals_)).get();
+    const SurfaceKey key{handle, SurfaceContent::Field};
+    field = (sources_[key] = make_surface_source(key, surface_options_, totals_)).get();
   }
   field->follow(grid, now);
 }
 
-void MeshScheduler::follow_light(LiveClock::time_point now) {
+void MeshScheduler::follow_light(SurfaceClock::time_point now) {
   for (auto& [key, live] : sources_) {
     live->follow_light(light_ == nullptr ? GridLight{} : light_->of(key.grid), now);
   }
 }
 
 // Chooses levels of fields if eyes or instances moved, or if some levels are still to be chosen.
-void MeshScheduler::choose_levels(const Scene& scene, LiveClock::time_point now) {
+void MeshScheduler::choose_levels(const Scene& scene, SurfaceClock::time_point now) {
   if (options_.detail_distance == std::numeric_limits<double>::infinity()) return;
   std::map<GridHandle, ChunkDistances> distances;
   for (const auto& [key, live] : sources_) {
@@ -191,18 +191,18 @@ std::vector<GridHandle> MeshScheduler::drawn_grids(const Scene& scene) const {
 }
 
 void MeshScheduler::collect() {
-  for (const std::unique_ptr<LiveJob>& job : queue_.collect()) {
-    if (LiveSource* live = find(job->source)) live->collect(*job);
+  for (const std::unique_ptr<SurfaceJob>& job : queue_.collect()) {
+    if (SurfaceSource* live = find(job->source)) live->collect(*job);
   }
 }
 
-void MeshScheduler::withdraw(const std::function<bool(const LiveJob&)>& is_unwanted) {
-  for (const std::unique_ptr<LiveJob>& job : queue_.withdraw(is_unwanted)) {
-    if (LiveSource* live = find(job->source)) live->withdrawn(*job);
+void MeshScheduler::withdraw(const std::function<bool(const SurfaceJob&)>& is_unwanted) {
+  for (const std::unique_ptr<SurfaceJob>& job : queue_.withdraw(is_unwanted)) {
+    if (SurfaceSource* live = find(job->source)) live->withdrawn(*job);
   }
 }
 
-LiveSource* MeshScheduler::find(LiveKey source) {
+SurfaceSource* MeshScheduler::find(SurfaceKey source) {
   const auto found = sources_.find(source);
   return found == sources_.end() ? nullptr : found->second.get();
 }
@@ -248,15 +248,15 @@ std::vector<MeshScheduler::Candidate> MeshScheduler::candidates(const std::map<G
   return all;
 }
 
-void MeshScheduler::renew_jobs(const Scene& scene, LiveClock::time_point now) {
+void MeshScheduler::renew_jobs(const Scene& scene, SurfaceClock::time_point now) {
   constexpr auto kOld = std::chrono::milliseconds(250);
   if (now - renewed_ < kOld) return;
   renewed_ = now;
-  std::map<GridHandle, LiveInputs> inputs;
-  queue_.renew([&](LiveJob& job) {
+  std::map<GridHandle, SurfaceInputs> inputs;
+  queue_.renew([&](SurfaceJob& job) {
     const GridHandle grid = job.source.grid;
     const GridLight light = light_ == nullptr ? GridLight{} : light_->of(grid);
-    LiveInputs& input = inputs.try_emplace(grid, scene.grids()[grid], types_, light).first->second;
+    SurfaceInputs& input = inputs.try_emplace(grid, scene.grids()[grid], types_, light).first->second;
     if (job.light != nullptr && input.light() == nullptr) return;
     if (job.light != nullptr) job.light = input.light();
     job.voxels = input.voxels();
@@ -268,9 +268,9 @@ void MeshScheduler::hand_over(const Scene& scene) {
   if (!has_waiting()) return;
   constexpr double kNone = std::numeric_limits<double>::infinity();
   const std::map<GridHandle, ChunkDistances> distances = distances_of_grids(scene);
-  std::map<GridHandle, LiveInputs> inputs;
+  std::map<GridHandle, SurfaceInputs> inputs;
   std::vector<double> queued =
-      queue_.measure([&](const LiveJob& job) { return distances.at(job.source.grid).to(job.chunk); });
+      queue_.measure([&](const SurfaceJob& job) { return distances.at(job.source.grid).to(job.chunk); });
   double farthest = kNone;  // waiting jobs from this distance on are withdrawn
   for (const Candidate& each : candidates(distances)) {
     if (queued.size() >= max_ahead_) {
@@ -280,15 +280,15 @@ void MeshScheduler::hand_over(const Scene& scene) {
     }
     const GridHandle grid = each.source.grid;
     const GridLight light = light_ == nullptr ? GridLight{} : light_->of(grid);
-    LiveInputs& input = inputs.try_emplace(grid, scene.grids()[grid], types_, light).first->second;
-    std::unique_ptr<LiveJob> job = each.live->make_job(input, each.chunk);
+    SurfaceInputs& input = inputs.try_emplace(grid, scene.grids()[grid], types_, light).first->second;
+    std::unique_ptr<SurfaceJob> job = each.live->make_job(input, each.chunk);
     job->distance = each.distance;
     const std::uint64_t serial = job->serial;
     queue_.push(std::move(job));
     each.live->hand_over(each.chunk, serial);
     queued.insert(std::upper_bound(queued.begin(), queued.end(), each.distance), each.distance);
   }
-  if (farthest != kNone) withdraw([&](const LiveJob& job) { return job.distance >= farthest; });
+  if (farthest != kNone) withdraw([&](const SurfaceJob& job) { return job.distance >= farthest; });
 }
 
 std::vector<SurfaceUpdate> MeshScheduler::take(std::size_t max_bytes) {
@@ -310,7 +310,7 @@ std::vector<SurfaceUpdate> MeshScheduler::take(std::size_t max_bytes) {
       continue;
     }
     const std::size_t before = taken.size();
-    if (LiveSource* live = find(ready.source)) live->take(ready.chunk, taken);
+    if (SurfaceSource* live = find(ready.source)) live->take(ready.chunk, taken);
     if (taken.size() == before || ready.source.content != SurfaceContent::Voxels) continue;
     if (const auto& surface = taken.back().surface) bytes += surface->bytes();
   }
@@ -341,22 +341,11 @@ LiveMeshes::Stats MeshScheduler::stats() const {
   return queue_.stats();
 }
 
-std::int64_t ChunkSurface::triangles() const {
-  return 2 * static_cast<std::int64_t>(quads.size()) + static_cast<std::int64_t>(smooth.indices.size() / 3);
-}
-
-std::size_t ChunkSurface::bytes() const {
-  return sizeof(ChunkSurface) + quads.capacity() * sizeof(Quad) + smooth.positions.capacity() * sizeof(Vec3) +
-         smooth.normals.capacity() * sizeof(Vec3) + smooth.occlusion.capacity() * sizeof(float) +
-         smooth.cells.capacity() * sizeof(SmoothCell) + smooth.indices.capacity() * sizeof(std::uint32_t) +
-         albedo.capacity() * sizeof(LinearRgba16) + types.capacity() * sizeof(VoxelType) +
-         regions.capacity() * sizeof(SurfaceRegion) + light.capacity() * sizeof(FaceLight);
-}
-
 struct LiveMeshes::Impl {
   explicit Impl(const LiveMeshOptions& options)
-      : scheduler(options,
-                  [options](LiveJob& job, LiveWorkspace& workspace) { make_live_surface(options, job, workspace); }) {}
+      : scheduler(options, [options](SurfaceJob& job, SurfaceWorkspace& workspace) {
+          make_live_surface(options, job, workspace);
+        }) {}
   MeshScheduler scheduler;
 };
 
@@ -387,52 +376,6 @@ void LiveMeshes::finish(const Scene& scene, DVec3 eye, std::span<const DVec3> ot
 }
 LiveMeshes::Stats LiveMeshes::stats() const {
   return impl_->scheduler.stats();
-}
-
-LiveMeshOptions GridSurfaces::options_for(SurfaceStyle style) {
-  LiveMeshOptions options;
-  options.style = style;
-  return options;
-}
-
-GridSurfaces::GridSurfaces(GridHandle handle, SurfaceContent content, SurfaceStyle style)
-    : options_(options_for(style)) {
-  if (content == SurfaceContent::Field) {
-    source_ = std::make_unique<LiveField>(handle, options_, totals_);
-  } else {
-    source_ = std::make_unique<LiveGrid>(handle, options_, totals_);
-  }
-}
-
-std::vector<SurfaceUpdate> GridSurfaces::update(const SceneGrid& grid, const VoxelRegistry& types, Threads threads) {
-  source_->follow(grid, LiveClock::now());
-  LiveTypes looks;
-  looks.registry = std::shared_ptr<const VoxelRegistry>(std::shared_ptr<void>(), &types);
-  // Connected chunks of a field are meshed as one group; chunks that waited for the group may follow.
-  for (source_->prepare(grid, types); !source_->waiting().empty(); source_->prepare(grid, types)) {
-    const bool needs_materials = options_.style == SurfaceStyle::Smooth && looks.materials == nullptr;
-    if (needs_materials) looks.materials = std::make_shared<const SurfaceMaterials>(types);
-    LiveInputs inputs(grid, looks);
-    const std::vector<IVec3> waiting(source_->waiting().begin(), source_->waiting().end());
-    std::vector<std::unique_ptr<LiveJob>> jobs;
-    for (const IVec3 chunk : waiting) {
-      jobs.push_back(source_->make_job(inputs, chunk));
-      source_->hand_over(chunk, jobs.back()->serial);
-    }
-    parallel_for(jobs.size(), threads, [&](std::size_t i) {
-      thread_local LiveWorkspace workspace;
-      try {
-        make_live_surface(options_, *jobs[i], workspace);
-      } catch (...) {
-        workspace = {};  // an allocation failure may have left it incomplete
-        throw;
-      }
-    });
-    for (const auto& job : jobs) source_->collect(*job);
-  }
-  std::vector<SurfaceUpdate> updates;
-  for (const ReadyChunk& ready : std::exchange(totals_.ready, {})) source_->take(ready.chunk, updates);
-  return updates;
 }
 
 }  // namespace quoin

@@ -14,8 +14,8 @@
 #include <quoin/live/live_meshes.h>
 #include <quoin/scene/scene.h>
 
-#include "live/live_source.h"
 #include "live/mesh_job_queue.h"
+#include "render/chunks/surface_source.h"
 
 namespace quoin {
 
@@ -43,65 +43,43 @@ class MeshScheduler {
  private:
   struct Candidate;
 
-  using Sources = std::map<LiveKey, std::unique_ptr<LiveSource>>;
+  using Sources = std::map<SurfaceKey, std::unique_ptr<SurfaceSource>>;
 
   void update_or_throw(const Scene& scene);
   void throw_failure();
   [[nodiscard]] ChangedTypes follow_types(const VoxelRegistry& types);
   [[nodiscard]] std::vector<GridHandle> drawn_grids(const Scene& scene) const;
   [[nodiscard]] std::vector<GridHandle> follow_scene(const Scene& scene);
-  void follow_grid(const Scene& scene, GridHandle handle, LiveClock::time_point now);
-  void follow_light(LiveClock::time_point now);
-  void choose_levels(const Scene& scene, LiveClock::time_point now);
+  void follow_grid(const Scene& scene, GridHandle handle, SurfaceClock::time_point now);
+  void follow_light(SurfaceClock::time_point now);
+  void choose_levels(const Scene& scene, SurfaceClock::time_point now);
   void forget();
   void collect();
-  void renew_jobs(const Scene& scene, LiveClock::time_point now);
+  void renew_jobs(const Scene& scene, SurfaceClock::time_point now);
   void hand_over(const Scene& scene);
   [[nodiscard]] bool has_waiting() const;
   void add_places(const Scene& scene, std::map<GridHandle, ChunkDistances>& distances) const;
   [[nodiscard]] std::map<GridHandle, ChunkDistances> distances_of_grids(const Scene& scene) const;
   [[nodiscard]] std::vector<Candidate> candidates(const std::map<GridHandle, ChunkDistances>& distances);
-  void withdraw(const std::function<bool(const LiveJob&)>& is_unwanted);
-  [[nodiscard]] LiveSource* find(LiveKey source);
+  void withdraw(const std::function<bool(const SurfaceJob&)>& is_unwanted);
+  [[nodiscard]] SurfaceSource* find(SurfaceKey source);
 
   const LiveMeshOptions options_;
+  const ChunkSurfaceOptions surface_options_;
   const unsigned workers_;
   const std::size_t max_ahead_;  // jobs that wait for workers
   mutable std::mutex mutex_;     // guards the following members, except the queue, which has its own mutex
-  LiveTotals totals_;
-  LiveTypes types_;
+  SurfaceTotals totals_;
+  SurfaceTypes types_;
   const SceneLight* light_ = nullptr;  // of the caller
   ChangeCursor followed_types_;
-  LiveClock::time_point renewed_{};
+  SurfaceClock::time_point renewed_{};
   ChangeCursor followed_scene_;
   std::vector<GridHandle> drawn_;  // sorted
   Sources sources_;
   std::vector<DVec3> eyes_;
   bool are_places_new_ = true;  // eyes or instances moved since levels were last chosen
   MeshJobQueue queue_;          // last: its threads end first
-};
-
-/// The surfaces of the chunks of one grid's voxels or field, made on request instead of by workers. Equal to those of
-/// LiveMeshes; after an edit, only the affected ones are made.
-class GridSurfaces {
- public:
-  GridSurfaces(GridHandle handle, SurfaceContent content, SurfaceStyle style);
-  GridSurfaces(const GridSurfaces&) = delete;
-  GridSurfaces& operator=(const GridSurfaces&) = delete;
-
-  [[nodiscard]] SurfaceStyle style() const { return options_.style; }
-  /// Makes the next `update` start from scratch, because the look of types may have changed.
-  void forget() { source_->forget(); }
-  /// Returns the changes since the last call, as LiveMeshes::take does. Requires: always the same grid or its
-  /// snapshots. Errors: bad_alloc; do not call it again after that.
-  [[nodiscard]] std::vector<SurfaceUpdate> update(const SceneGrid& grid, const VoxelRegistry& types, Threads threads);
-
- private:
-  static LiveMeshOptions options_for(SurfaceStyle style);
-
-  const LiveMeshOptions options_;
-  LiveTotals totals_;
-  std::unique_ptr<LiveSource> source_;
 };
 
 }  // namespace quoin

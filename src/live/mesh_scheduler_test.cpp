@@ -9,9 +9,9 @@
 
 #include "core/death_for_tests.h"
 #include "grid/chunk/chunk_storage.h"
-#include "live/live_densities.h"
-#include "live/live_source.h"
 #include "live/live_test_support.h"
+#include "render/chunks/surface_source.h"
+#include "render/chunks/voxel_densities.h"
 
 namespace quoin {
 namespace {
@@ -22,7 +22,7 @@ class GatedWork {
   explicit GatedWork(const LiveMeshOptions& options) : options_(options) {}
 
   MeshJobQueue::Work work() {
-    return [this](LiveJob& job, LiveWorkspace& workspace) {
+    return [this](SurfaceJob& job, SurfaceWorkspace& workspace) {
       {
         std::unique_lock lock(mutex_);
         started_.push_back({job.chunk, job.distance});
@@ -245,7 +245,7 @@ TEST(MeshScheduler, DropsChunksRemovedOrReplacedDuringMeshing) {
 TEST(MeshScheduler, DeliversNoOlderMeshAfterNewer) {
   LiveMeshOptions options = blocky(4);
   OneGrid one;
-  MeshScheduler scheduler(options, [&](LiveJob& job, LiveWorkspace& workspace) {
+  MeshScheduler scheduler(options, [&](SurfaceJob& job, SurfaceWorkspace& workspace) {
     // Jobs of one chunk overtake each other.
     if (job.serial % 3 == 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     make_live_surface(options, job, workspace);
@@ -291,9 +291,9 @@ TEST(MeshScheduler, OnReadyDeliversAllMeshes) {
     called.notify_all();
   };
   std::atomic<int> as_before{0};
-  MeshScheduler scheduler(options, [&](LiveJob& job, LiveWorkspace& workspace) {
+  MeshScheduler scheduler(options, [&](SurfaceJob& job, SurfaceWorkspace& workspace) {
     make_live_surface(options, job, workspace);
-    as_before += job.outcome == LiveJob::Outcome::AsBefore ? 1 : 0;
+    as_before += job.outcome == SurfaceJob::Outcome::AsBefore ? 1 : 0;
   });
   const DVec3 eye{0.0, -1'000'000.0, 0.0};  // the lower row, which is edited, has priority
   const auto come_to_the_end = [&] {
@@ -319,7 +319,7 @@ TEST(MeshScheduler, RetriesAfterRunningOutOfMemory) {
     OneGrid one;
     one.grid().fill_box({{25, 25, 25}, {36, 36, 36}}, 1);
     std::atomic<int> calls{0};
-    MeshScheduler scheduler(options, [&](LiveJob& job, LiveWorkspace& workspace) {
+    MeshScheduler scheduler(options, [&](SurfaceJob& job, SurfaceWorkspace& workspace) {
       if (++calls % 2 == 1) throw std::bad_alloc();
       make_live_surface(options, job, workspace);
     });
@@ -339,7 +339,7 @@ TEST(MeshScheduler, RetriesAfterRunningOutOfMemory) {
 TEST(MeshScheduler, FinishThrowsWithoutMemory) {
   OneGrid one;
   fill_row(one.grid(), 3);
-  MeshScheduler scheduler(blocky(2), [](LiveJob&, LiveWorkspace&) { throw std::bad_alloc(); });
+  MeshScheduler scheduler(blocky(2), [](SurfaceJob&, SurfaceWorkspace&) { throw std::bad_alloc(); });
   EXPECT_THROW(scheduler.finish(one.scene, {}), std::bad_alloc);
   EXPECT_EQ(scheduler.pending(), 3U);
   EXPECT_TRUE(scheduler.take().empty());
@@ -351,7 +351,7 @@ TEST(MeshScheduler, StopsWithoutMeshingQueue) {
   std::atomic<int> started{0};
   std::atomic<int> ended{0};
   {
-    MeshScheduler scheduler(blocky(2), [&](LiveJob&, LiveWorkspace&) {
+    MeshScheduler scheduler(blocky(2), [&](SurfaceJob&, SurfaceWorkspace&) {
       ++started;
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
       ++ended;
@@ -364,14 +364,14 @@ TEST(MeshScheduler, StopsWithoutMeshingQueue) {
 }
 
 TEST(MeshJobQueueDeathTest, RejectsQueuesWithoutWorkersAndMissingJobs) {
-  const MeshJobQueue::Work work = [](LiveJob&, LiveWorkspace&) {};
+  const MeshJobQueue::Work work = [](SurfaceJob&, SurfaceWorkspace&) {};
   QUOIN_EXPECT_MISTAKE(MeshJobQueue(0, work, {}), "workers with a function");
   QUOIN_EXPECT_MISTAKE(MeshJobQueue(1, {}, {}), "workers with a function");
   QUOIN_EXPECT_MISTAKE(MeshJobQueue(1, work, {}).push(nullptr), "a job with a distance");
 }
 
-TEST(LiveDensityDeathTest, RejectsReadingBeforeDensitiesAreMade) {
-  LiveDensity density(std::make_shared<const Grid>(), {}, nullptr, {}, std::make_shared<const VoxelRegistry>());
+TEST(VoxelDensityDeathTest, RejectsReadingBeforeDensitiesAreMade) {
+  VoxelDensity density(std::make_shared<const Grid>(), {}, nullptr, {}, std::make_shared<const VoxelRegistry>());
   QUOIN_EXPECT_MISTAKE((void)density.densities(), "densities that were made");
   QUOIN_EXPECT_MISTAKE((void)density.reads_as(1, 1, {}), "densities that were made");
 }

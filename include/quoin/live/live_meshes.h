@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -13,67 +12,11 @@
 #include <quoin/core/vec.h>
 #include <quoin/light/scene_light.h>
 #include <quoin/light/surface_light.h>
-#include <quoin/mesh/quad.h>
 #include <quoin/mesh/smooth_mesh.h>
+#include <quoin/render/chunk_surface.h>
 #include <quoin/scene/scene.h>
 
 namespace quoin {
-
-enum class SurfaceStyle : std::uint8_t { Blocky, Smooth };
-
-/// Part of a SceneGrid that a surface comes from.
-enum class SurfaceContent : std::uint8_t {
-  Voxels,  ///< its `grid`, in LiveMeshOptions::style
-  Field,   ///< its `field`; always smooth
-};
-
-/// The quads of one region of a chunk: [LiveMeshOptions::region_edge]^3 voxels, aligned to region_edge.
-struct SurfaceRegion {
-  IVec3 region{0};  ///< the region starts at voxel `region` * region_edge of the chunk
-  /// Ranges in the surface's quads: opaque quads that face Direction d are [opaque[d], opaque[d + 1]), transparent
-  /// quads are [transparent[d], transparent[d + 1]). A renderer can skip directions that face away from the camera.
-  std::array<std::uint32_t, 7> opaque{};
-  std::array<std::uint32_t, 7> transparent{};
-  std::uint64_t hash = 0;  ///< hash of the region's quads and light
-};
-
-/// The renderable surface of one chunk. Immutable.
-struct ChunkSurface {
-  SurfaceStyle style = SurfaceStyle::Blocky;
-  /// Level of detail of a field, 0 to kMaxSmoothLevel; its cells are 2^level samples wide.
-  int level = 0;
-  /// Blocky: voxels, origin at the chunk's minimum corner. Opaque quads come before transparent quads; each group is
-  ///         sorted by region, then direction, layer, row, column. No quad crosses a region border.
-  QuadBuffer quads;
-  std::size_t opaque_quads = 0;
-  std::vector<FaceLight> light;        ///< one per quad if LiveMeshes uses light; otherwise empty
-  std::vector<SurfaceRegion> regions;  ///< blocky: regions that have quads, sorted by z, then y, then x
-  /// Smooth: mesh point p is grid point p + 64 * chunk; for voxels p + 0.5 + 64 * chunk, because samples are voxel
-  ///         centres. Each vertex has a linear colour and a type. Each transparent type is a closed body of its own.
-  ///         Thin voxel features are kept (SmoothMeshOptions::keep_thin), as in mesh_scene_smoothly. Instances are not
-  ///         united.
-  SmoothChunkMesh smooth;
-  std::size_t glass_indices = 0;  ///< number of indices of transparent bodies, which come last
-  std::vector<LinearRgba16> albedo;
-  std::vector<VoxelType> types;
-  /// Result of LiveMeshOptions::convert; null without `convert`.
-  std::shared_ptr<const void> converted;
-
-  [[nodiscard]] bool is_empty() const { return quads.empty() && smooth.indices.empty(); }
-  [[nodiscard]] std::int64_t triangles() const;
-  [[nodiscard]] std::size_t bytes() const;  ///< excludes `converted`
-};
-
-/// A new surface of a chunk.
-struct SurfaceUpdate {
-  GridHandle grid;
-  IVec3 chunk{0};
-  std::shared_ptr<const ChunkSurface> surface;  ///< null: the chunk no longer has a surface
-  SurfaceContent content = SurfaceContent::Voxels;
-  /// Bit mask of changed regions. Bit x + n (y + n z), with n = 64 / region_edge, is set if the quads of region
-  /// (x, y, z) differ from the previous surface, are new or were removed. Smooth surfaces have one region.
-  std::uint64_t changed_regions = ~std::uint64_t{0};
-};
 
 struct LiveMeshOptions {
   SurfaceStyle style = SurfaceStyle::Blocky;  ///< of voxels

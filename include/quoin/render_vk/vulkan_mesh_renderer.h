@@ -9,7 +9,7 @@
 #include <quoin/core/parallel.h>
 #include <quoin/core/result.h>
 #include <quoin/light/light_options.h>
-#include <quoin/live/live_meshes.h>
+#include <quoin/render/chunk_surface.h>
 #include <quoin/render_vk/vulkan_image.h>
 #include <quoin/render_vk/vulkan_renderer.h>
 #include <quoin/scene/camera.h>

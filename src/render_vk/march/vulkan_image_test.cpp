@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <random>
 
+#include <quoin/live/live_meshes.h>
 #include <quoin/render_vk/vulkan_mesh_renderer.h>
 
 #include "render_vk/device/own_device_for_tests.h"

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <quoin/grid/density_grid.h>
+#include <quoin/live/live_meshes.h>
 #include <quoin/mesh/blocky.h>
 #include <quoin/mesh/smooth.h>
 #include <quoin/render_vk/vulkan_image.h>

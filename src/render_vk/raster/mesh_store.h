@@ -8,11 +8,11 @@
 #include <vector>
 
 #include <quoin/core/changes.h>
-#include <quoin/live/live_meshes.h>
+#include <quoin/render/chunk_surface.h>
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_tracer.h>
 
-#include "live/mesh_scheduler.h"
+#include "render/chunks/grid_surfaces.h"
 #include "render_vk/device/device_memory.h"
 #include "scene/tracer/placed_grid.h"
 

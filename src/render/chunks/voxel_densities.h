@@ -45,12 +45,12 @@ using GridSnapshot = std::shared_ptr<const Grid>;
 /// The densities of one chunk of voxels in one state, computed by the first thread that needs them.
 ///
 /// Threads: any. The voxels are released once the densities exist.
-class LiveDensity {
+class VoxelDensity {
  public:
   /// `base` are the densities of an earlier state, or null. `changed` holds the voxels that came or went since, in the
   /// grid; empty where the two differ in types alone. `types` says which of these are transparent.
-  LiveDensity(GridSnapshot voxels, IVec3 chunk, std::shared_ptr<const LiveDensity> base, const IBox& changed,
-              std::shared_ptr<const VoxelRegistry> types);
+  VoxelDensity(GridSnapshot voxels, IVec3 chunk, std::shared_ptr<const VoxelDensity> base, const IBox& changed,
+               std::shared_ptr<const VoxelRegistry> types);
 
   /// Returns the unique stamp of this state of this chunk. 0 stands for far air, which has no object.
   [[nodiscard]] std::uint64_t stamp() const { return stamp_; }
@@ -80,8 +80,8 @@ class LiveDensity {
   const std::uint64_t stamp_;
   const IVec3 chunk_;
   std::mutex mutex_;
-  GridSnapshot voxels_;                      // until made, as `base_`
-  std::shared_ptr<const LiveDensity> base_;  // made
+  GridSnapshot voxels_;                       // until made, as `base_`
+  std::shared_ptr<const VoxelDensity> base_;  // made
   const IBox changed_;
   std::unique_ptr<const DensityChunk> densities_;
   std::uint64_t base_stamp_ = 0;
@@ -95,7 +95,7 @@ class LiveDensity {
 };
 
 /// The densities around a chunk; null is far air.
-using LiveDensities = std::array<std::shared_ptr<LiveDensity>, 27>;
+using VoxelDensities = std::array<std::shared_ptr<VoxelDensity>, 27>;
 using DensityStamps = std::array<std::uint64_t, 27>;
 
 /// Follows the voxels of one grid: which densities hold still, and which chunks an edit reaches.
@@ -112,16 +112,16 @@ class DensityCache {
   void follow(GridSnapshot grid, const GridChanges& edits, std::vector<IVec3>& changed, std::vector<IVec3>& reached);
   /// Returns densities for the grid as of the last `follow`. `types`: must have the same visibility in all calls for
   /// one registry state.
-  [[nodiscard]] LiveDensities around(IVec3 chunk, const std::shared_ptr<const VoxelRegistry>& types);
+  [[nodiscard]] VoxelDensities around(IVec3 chunk, const std::shared_ptr<const VoxelRegistry>& types);
   /// Keeps the densities that workers computed, unless their chunks have changed since. Returns a bit for each new one.
-  std::uint32_t keep(IVec3 chunk, const LiveDensities& made);
+  std::uint32_t keep(IVec3 chunk, const VoxelDensities& made);
 
  private:
   struct Slot {
-    std::shared_ptr<LiveDensity> kept;     // made
-    std::weak_ptr<LiveDensity> under_way;  // of the present state; held by jobs
-    bool is_solid_stale = true;            // `kept` is of other voxels
-    IBox changed;                          // where these came or went since, as far as that is near
+    std::shared_ptr<VoxelDensity> kept;     // made
+    std::weak_ptr<VoxelDensity> under_way;  // of the present state; held by jobs
+    bool is_solid_stale = true;             // `kept` is of other voxels
+    IBox changed;                           // where these came or went since, as far as that is near
     bool is_type_stale = true;
   };
 
@@ -134,7 +134,7 @@ class DensityCache {
   void drop_what_is_gone(const std::vector<IVec3>& changed);
   void invalidate(IVec3 chunk, bool solid, const IBox& changed);
   [[nodiscard]] bool has_voxels_near(IVec3 chunk) const;
-  [[nodiscard]] std::shared_ptr<LiveDensity> density(IVec3 chunk, const std::shared_ptr<const VoxelRegistry>& types);
+  [[nodiscard]] std::shared_ptr<VoxelDensity> density(IVec3 chunk, const std::shared_ptr<const VoxelRegistry>& types);
 
   int reach_;
   GridSnapshot seen_;  // the grid as it was followed last

@@ -1,4 +1,4 @@
-#include "live/live_source.h"
+#include "render/chunks/surface_source.h"
 
 #include <algorithm>
 #include <limits>
@@ -9,6 +9,8 @@
 #include <quoin/core/assert.h>
 #include <quoin/grid/chunk.h>
 
+#include "render/chunks/field_surfaces.h"
+#include "render/chunks/voxel_surfaces.h"
 #include "scene/instance_axes.h"
 
 namespace quoin {
@@ -55,6 +57,12 @@ double ChunkDistances::in_voxels(IVec3 chunk) const {
   double least = places_.empty() ? 0.0 : std::numeric_limits<double>::infinity();
   for (const Place& place : places_) least = std::min(least, distance_to_chunks(place.eye_in_grid, {chunk, chunk + 1}));
   return least;
+}
+
+std::unique_ptr<SurfaceSource> make_surface_source(SurfaceKey key, const ChunkSurfaceOptions& options,
+                                                   SurfaceTotals& totals) {
+  if (key.content == SurfaceContent::Field) return std::make_unique<FieldSurfaces>(key.grid, options, totals);
+  return std::make_unique<VoxelSurfaces>(key.grid, options, totals);
 }
 
 }  // namespace quoin

@@ -1,4 +1,4 @@
-#include "live/live_field.h"
+#include "render/chunks/field_surfaces.h"
 
 #include <algorithm>
 #include <cmath>
@@ -92,10 +92,10 @@ int level_for(double distance, int present, double step) {
 
 }  // namespace
 
-LiveField::LiveField(GridHandle handle, const LiveMeshOptions& options, LiveTotals& totals)
+FieldSurfaces::FieldSurfaces(GridHandle handle, const ChunkSurfaceOptions& options, SurfaceTotals& totals)
     : handle_(handle), options_(options), totals_(totals) {}
 
-void LiveField::follow(const SceneGrid& content, LiveClock::time_point now) {
+void FieldSurfaces::follow(const SceneGrid& content, SurfaceClock::time_point now) {
   ChangeCursor end = followed_;
   const DensityChanges changes = content.field.changes_since(end);
   if (changes.empty()) return;
@@ -109,7 +109,7 @@ void LiveField::follow(const SceneGrid& content, LiveClock::time_point now) {
 }
 
 // Discards all surfaces and jobs, because they belong to another field.
-void LiveField::begin_anew(const DensityGrid& field, LiveClock::time_point now) {
+void FieldSurfaces::begin_anew(const DensityGrid& field, SurfaceClock::time_point now) {
   abandon_groups();
   bodies_.clear();
   const bool replaces =
@@ -126,7 +126,8 @@ void LiveField::begin_anew(const DensityGrid& field, LiveClock::time_point now) 
   }
 }
 
-void LiveField::follow_changes(const DensityGrid& field, const DensityChanges& changes, LiveClock::time_point now) {
+void FieldSurfaces::follow_changes(const DensityGrid& field, const DensityChanges& changes,
+                                   SurfaceClock::time_point now) {
   for (const DensityChange& change : changes.items) {
     bodies_.erase(change.chunk);
     // A loaded chunk completes surfaces that did not exist before, and unloading removes the neighbours' surfaces.
@@ -147,7 +148,8 @@ void LiveField::follow_changes(const DensityGrid& field, const DensityChanges& c
   }
 }
 
-void LiveField::see_whether_there(const DensityGrid& field, IVec3 chunk, bool is_bound, LiveClock::time_point now) {
+void FieldSurfaces::see_whether_there(const DensityGrid& field, IVec3 chunk, bool is_bound,
+                                      SurfaceClock::time_point now) {
   const auto found = chunks_.find(chunk);
   const bool was_there = found != chunks_.end() && !found->second.is_gone;
   if (is_there(field, chunk) == was_there) return;
@@ -158,7 +160,7 @@ void LiveField::see_whether_there(const DensityGrid& field, IVec3 chunk, bool is
   if (was_there) set_level(chunk, state, 0, now);
 }
 
-void LiveField::mark(IVec3 chunk, bool is_bound, LiveClock::time_point now) {
+void FieldSurfaces::mark(IVec3 chunk, bool is_bound, SurfaceClock::time_point now) {
   FieldChunk& state = chunks_[chunk];
   stale_.insert(chunk);
   box_ = unite(box_, {chunk, chunk + 1});
@@ -170,7 +172,7 @@ void LiveField::mark(IVec3 chunk, bool is_bound, LiveClock::time_point now) {
 }
 
 // Neighbours depend on each other's levels.
-void LiveField::set_level(IVec3 chunk, FieldChunk& state, int level, LiveClock::time_point now) {
+void FieldSurfaces::set_level(IVec3 chunk, FieldChunk& state, int level, SurfaceClock::time_point now) {
   QUOIN_ASSERT(level >= 0 && level <= kMaxSmoothLevel, "a level of detail");
   if (state.level == level) return;
   state.level = static_cast<std::uint8_t>(level);
@@ -185,7 +187,7 @@ void LiveField::set_level(IVec3 chunk, FieldChunk& state, int level, LiveClock::
   if (is_seen) mark(chunk, true, now);
 }
 
-void LiveField::choose_levels(const ChunkDistances& distances, LiveClock::time_point now) {
+void FieldSurfaces::choose_levels(const ChunkDistances& distances, SurfaceClock::time_point now) {
   std::erase_if(changing_levels_, [&](IVec3 chunk) {
     const auto found = chunks_.find(chunk);
     return found == chunks_.end() || !found->second.is_unfinished();
@@ -221,7 +223,7 @@ void LiveField::choose_levels(const ChunkDistances& distances, LiveClock::time_p
   }
 }
 
-std::array<std::uint8_t, 27> LiveField::levels_around(IVec3 chunk) const {
+std::array<std::uint8_t, 27> FieldSurfaces::levels_around(IVec3 chunk) const {
   std::array<std::uint8_t, 27> levels{};
   for (std::size_t i = 0; i < 27; ++i) {
     const auto found = chunks_.find(chunk + Neighbourhood::offset(static_cast<int>(i)));
@@ -230,13 +232,13 @@ std::array<std::uint8_t, 27> LiveField::levels_around(IVec3 chunk) const {
   return levels;
 }
 
-int LiveField::reach_at(IVec3 chunk) const {
+int FieldSurfaces::reach_at(IVec3 chunk) const {
   const std::array<std::uint8_t, 27> levels = levels_around(chunk);
   return reach_of(options_.occlusion, *std::max_element(levels.begin(), levels.end()));
 }
 
 // Types that become transparent, or no longer are, make other surfaces, which chunks have in common.
-void LiveField::mark_types(const SceneGrid& content, const ChangedTypes& changed, LiveClock::time_point now) {
+void FieldSurfaces::mark_types(const SceneGrid& content, const ChangedTypes& changed, SurfaceClock::time_point now) {
   if (changed.colour.empty() && changed.visibility.empty()) return;
   for (const IVec3 chunk : content.field.chunks()) {
     const std::vector<VoxelType> types = content.field.find_chunk(chunk)->materials().types();
@@ -254,7 +256,7 @@ void LiveField::mark_types(const SceneGrid& content, const ChangedTypes& changed
 }
 
 // The chunks that have to be given together with a stale one.
-LiveField::Members LiveField::members_with(IVec3 chunk) const {
+FieldSurfaces::Members FieldSurfaces::members_with(IVec3 chunk) const {
   Members members{chunk};
   if (!chunks_.at(chunk).is_bound) return members;
   ChunkSet seen{chunk};
@@ -268,11 +270,11 @@ LiveField::Members LiveField::members_with(IVec3 chunk) const {
   return members;
 }
 
-bool LiveField::may_begin(const Members& members) const {
+bool FieldSurfaces::may_begin(const Members& members) const {
   return std::none_of(members.begin(), members.end(), [&](IVec3 chunk) { return chunks_.at(chunk).group != nullptr; });
 }
 
-void LiveField::prepare(const SceneGrid& content, const VoxelRegistry& types) {
+void FieldSurfaces::prepare(const SceneGrid& content, const VoxelRegistry& types) {
   if (is_prepared_) return;
   is_blocked_ = false;
   ChunkSet seen;
@@ -300,7 +302,7 @@ void LiveField::prepare(const SceneGrid& content, const VoxelRegistry& types) {
   is_prepared_ = true;
 }
 
-std::shared_ptr<LiveField::Group> LiveField::begin_group(const Members& members) {
+std::shared_ptr<FieldSurfaces::Group> FieldSurfaces::begin_group(const Members& members) {
   auto group = std::make_shared<Group>();
   group->chunks = members;
   group->unfinished = members.size();
@@ -323,7 +325,7 @@ std::shared_ptr<LiveField::Group> LiveField::begin_group(const Members& members)
   return group;
 }
 
-std::shared_ptr<const FieldBodies> LiveField::bodies_around(const Members& members, const DensityGrid& field) {
+std::shared_ptr<const FieldBodies> FieldSurfaces::bodies_around(const Members& members, const DensityGrid& field) {
   auto around = std::make_shared<FieldBodies>();
   for (const IVec3 chunk : members) {
     for (int i = 0; i < 27; ++i) {
@@ -337,7 +339,7 @@ std::shared_ptr<const FieldBodies> LiveField::bodies_around(const Members& membe
   return around;
 }
 
-void LiveField::finish_chunk(FieldChunk& state, std::shared_ptr<const ChunkSurface> surface) {
+void FieldSurfaces::finish_chunk(FieldChunk& state, std::shared_ptr<const ChunkSurface> surface) {
   QUOIN_ASSERT(state.group != nullptr && state.group->unfinished > 0 && !state.is_done,
                "an unfinished chunk of a group");
   state.is_working = false;
@@ -347,7 +349,7 @@ void LiveField::finish_chunk(FieldChunk& state, std::shared_ptr<const ChunkSurfa
 }
 
 // The whole group is done.
-void LiveField::give(const Members& members) {
+void FieldSurfaces::give(const Members& members) {
   for (const IVec3 chunk : members) {
     FieldChunk& state = chunks_.at(chunk);
     QUOIN_ASSERT(state.group != nullptr && state.is_done, "a finished chunk of the group");
@@ -366,14 +368,14 @@ void LiveField::give(const Members& members) {
   if (is_blocked_) is_prepared_ = false;
 }
 
-void LiveField::erase_if_over(IVec3 chunk) {
+void FieldSurfaces::erase_if_over(IVec3 chunk) {
   const auto found = chunks_.find(chunk);
   QUOIN_ASSERT(found != chunks_.end(), "a known chunk");
   const FieldChunk& state = found->second;
   if (state.is_gone && !state.is_pending() && !state.is_listed) chunks_.erase(found);
 }
 
-void LiveField::abandon_groups() {
+void FieldSurfaces::abandon_groups() {
   for (auto& [chunk, state] : chunks_) {
     if (state.group == nullptr) continue;
     stale_.insert(chunk);
@@ -388,7 +390,7 @@ void LiveField::abandon_groups() {
   is_prepared_ = false;
 }
 
-void LiveField::leave() {
+void FieldSurfaces::leave() {
   abandon_groups();
   bodies_.clear();
   stale_.clear();
@@ -406,14 +408,14 @@ void LiveField::leave() {
   followed_ = {};
 }
 
-void LiveField::make_ready(IVec3 chunk, FieldChunk& state) {
+void FieldSurfaces::make_ready(IVec3 chunk, FieldChunk& state) {
   state.is_ready = true;
   if (state.is_listed) return;
   totals_.ready.push_back({{handle_, SurfaceContent::Field}, chunk});
   state.is_listed = true;
 }
 
-std::unique_ptr<LiveJob> LiveField::make_job(LiveInputs& inputs, IVec3 chunk) {
+std::unique_ptr<SurfaceJob> FieldSurfaces::make_job(SurfaceInputs& inputs, IVec3 chunk) {
   QUOIN_ASSERT(waiting_.contains(chunk), "a chunk that waits");
   if (chunks_.at(chunk).group == nullptr) {
     const Members members = members_with(chunk);
@@ -423,7 +425,7 @@ std::unique_ptr<LiveJob> LiveField::make_job(LiveInputs& inputs, IVec3 chunk) {
     if (group->types->has_transparent()) group->bodies = bodies_around(members, *group->field);
   }
   const FieldChunk& state = chunks_.at(chunk);
-  auto job = std::make_unique<LiveJob>();
+  auto job = std::make_unique<SurfaceJob>();
   job->source = {handle_, SurfaceContent::Field};
   job->chunk = chunk;
   job->serial = ++totals_.serial;
@@ -436,7 +438,7 @@ std::unique_ptr<LiveJob> LiveField::make_job(LiveInputs& inputs, IVec3 chunk) {
   return job;
 }
 
-void LiveField::hand_over(IVec3 chunk, std::uint64_t serial) {
+void FieldSurfaces::hand_over(IVec3 chunk, std::uint64_t serial) {
   FieldChunk& state = chunks_.at(chunk);
   QUOIN_ASSERT(state.group != nullptr && !state.is_working, "a chunk whose group has begun");
   waiting_.erase(chunk);
@@ -444,28 +446,28 @@ void LiveField::hand_over(IVec3 chunk, std::uint64_t serial) {
   state.serial = serial;
 }
 
-bool LiveField::is_current(const LiveJob& job) const {
+bool FieldSurfaces::is_current(const SurfaceJob& job) const {
   const auto found = chunks_.find(job.chunk);
   return found != chunks_.end() && found->second.group != nullptr && found->second.serial == job.serial;
 }
 
-void LiveField::withdrawn(const LiveJob& job) {
+void FieldSurfaces::withdrawn(const SurfaceJob& job) {
   if (!is_current(job)) return;
   waiting_.insert(job.chunk);
   chunks_.at(job.chunk).is_working = false;
 }
 
-void LiveField::collect(LiveJob& job) {
+void FieldSurfaces::collect(SurfaceJob& job) {
   if (!is_current(job)) return;
   FieldChunk& state = chunks_.at(job.chunk);
-  if (job.outcome == LiveJob::Outcome::OutOfMemory) return withdrawn(job);
+  if (job.outcome == SurfaceJob::Outcome::OutOfMemory) return withdrawn(job);
   finish_chunk(state, std::move(job.surface));
   if (state.group->unfinished != 0) return;
   const std::shared_ptr<Group> group = state.group;
   give(group->chunks);
 }
 
-void LiveField::take(IVec3 chunk, std::vector<SurfaceUpdate>& out) {
+void FieldSurfaces::take(IVec3 chunk, std::vector<SurfaceUpdate>& out) {
   const auto found = chunks_.find(chunk);
   if (found == chunks_.end()) return;
   FieldChunk& state = found->second;

@@ -1,3 +1,5 @@
+#include "render/chunks/surface_job.h"
+
 #include <algorithm>
 #include <array>
 #include <span>
@@ -6,7 +8,6 @@
 #include <quoin/core/assert.h>
 
 #include "core/rows/packed_row.h"
-#include "live/mesh_job_queue.h"
 #include "mesh/surface/face_materials.h"
 #include "mesh/surface/voxel_surface.h"
 
@@ -162,7 +163,7 @@ void sort_into_regions(const LitQuads& lit, const VoxelRegistry& types, int edge
 }
 
 // Splits quads whose faces differ in light.
-LitQuads lit_by(const LiveJob& job, const QuadBuffer& quads, LightMerging merging, LiveWorkspace& workspace) {
+LitQuads lit_by(const SurfaceJob& job, const QuadBuffer& quads, LightMerging merging, SurfaceWorkspace& workspace) {
   QUOIN_ASSERT(job.light != nullptr && job.types != nullptr, "a job with light and types");
   if (workspace.lit != job.light || workspace.lit_types != job.types) {
     workspace.surface_light.reset();
@@ -187,7 +188,7 @@ void cut_at_regions(const QuadBuffer& quads, int edge, QuadBuffer& out) {
   }
 }
 
-void make_blocky(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& workspace) {
+void make_blocky(const ChunkSurfaceOptions& options, SurfaceJob& job, SurfaceWorkspace& workspace) {
   QUOIN_ASSERT(job.voxels != nullptr, "a job with voxels");
   if (!workspace.blocky) workspace.blocky.emplace();
   QuadOptions wanted;
@@ -247,7 +248,7 @@ void append_by_faces(const DensityNeighbourhood& chunks, const SmoothOptions& op
   std::swap(split.indices, mesh.indices);
 }
 
-bool reads_as_before(const LiveJob& job, int reach) {
+bool reads_as_before(const SurfaceJob& job, int reach) {
   if (!job.last_stamps.has_value()) return false;
   for (int i = 0; i < 27; ++i) {
     const auto& density = job.densities[static_cast<std::size_t>(i)];
@@ -260,7 +261,7 @@ bool reads_as_before(const LiveJob& job, int reach) {
 }
 
 // Computes first the densities that no other worker computes. The remaining ones are then finished or nearly so.
-DensityNeighbourhood make_densities(const LiveDensities& densities) {
+DensityNeighbourhood make_densities(const VoxelDensities& densities) {
   DensityNeighbourhood chunks;
   for (const auto& density : densities) {
     if (density != nullptr) density->try_to_make();
@@ -274,8 +275,9 @@ DensityNeighbourhood make_densities(const LiveDensities& densities) {
 }
 
 // Adds the surface of one body. `whole`: as in smooth::Shape.
-void mesh_body(const LiveMeshOptions& options, const DensityNeighbourhood& chunks, const DensityNeighbourhood* whole,
-               const LiveJob& job, LiveWorkspace& workspace, ChunkSurface& surface) {
+void mesh_body(const ChunkSurfaceOptions& options, const DensityNeighbourhood& chunks,
+               const DensityNeighbourhood* whole, const SurfaceJob& job, SurfaceWorkspace& workspace,
+               ChunkSurface& surface) {
   QUOIN_ASSERT(job.materials != nullptr, "a job with materials");
   if (!workspace.smooth) workspace.smooth.emplace();
   SmoothOptions wanted;
@@ -301,7 +303,7 @@ void mesh_body(const LiveMeshOptions& options, const DensityNeighbourhood& chunk
   append(workspace.mesh, surface.smooth);
 }
 
-void finish(std::shared_ptr<ChunkSurface> surface, LiveJob& job) {
+void finish(std::shared_ptr<ChunkSurface> surface, SurfaceJob& job) {
   if (surface->smooth.indices.empty()) return;
   QUOIN_ASSERT(surface->albedo.size() == surface->smooth.positions.size() &&
                    surface->types.size() == surface->smooth.positions.size(),
@@ -344,8 +346,8 @@ BodiesAround bodies_around(const DensityNeighbourhood& chunks, const VoxelRegist
 
 // `chunk_of(i, body)` returns the body's densities in the i-th chunk of the neighbourhood.
 template <class ChunkOf>
-void make_bodies(const LiveMeshOptions& options, const DensityNeighbourhood& whole, LiveJob& job,
-                 LiveWorkspace& workspace, const ChunkOf& chunk_of) {
+void make_bodies(const ChunkSurfaceOptions& options, const DensityNeighbourhood& whole, SurfaceJob& job,
+                 SurfaceWorkspace& workspace, const ChunkOf& chunk_of) {
   auto surface = std::make_shared<ChunkSurface>();
   const BodiesAround bodies = bodies_around(whole, *job.types, job.source.content);
   for (const std::uint32_t body : bodies.own) {
@@ -366,10 +368,10 @@ void make_bodies(const LiveMeshOptions& options, const DensityNeighbourhood& who
   finish(std::move(surface), job);
 }
 
-void make_smooth(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& workspace) {
+void make_smooth(const ChunkSurfaceOptions& options, SurfaceJob& job, SurfaceWorkspace& workspace) {
   const DensityNeighbourhood chunks = make_densities(job.densities);
   if (reads_as_before(job, reach_of(options.occlusion))) {
-    job.outcome = LiveJob::Outcome::AsBefore;
+    job.outcome = SurfaceJob::Outcome::AsBefore;
     return;
   }
   make_bodies(options, chunks, job, workspace, [&](std::size_t i, std::uint32_t body) {
@@ -378,7 +380,7 @@ void make_smooth(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& wo
 }
 
 // Fields have no `last_stamps`: chunks with unchanged densities are not meshed.
-void make_field(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& workspace) {
+void make_field(const ChunkSurfaceOptions& options, SurfaceJob& job, SurfaceWorkspace& workspace) {
   QUOIN_ASSERT(job.field != nullptr, "a job with a field");
   const DensityNeighbourhood chunks = job.field->neighbourhood(job.chunk);
   make_bodies(options, chunks, job, workspace, [&](std::size_t i, std::uint32_t body) {
@@ -390,9 +392,9 @@ void make_field(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& wor
 
 }  // namespace
 
-void make_live_surface(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& workspace) {
+void make_chunk_surface(const ChunkSurfaceOptions& options, SurfaceJob& job, SurfaceWorkspace& workspace) {
   QUOIN_ASSERT(job.types != nullptr, "a job with types");
-  job.outcome = LiveJob::Outcome::Meshed;
+  job.outcome = SurfaceJob::Outcome::Meshed;
   if (job.source.content == SurfaceContent::Field) {
     make_field(options, job, workspace);
   } else if (options.style == SurfaceStyle::Blocky) {
@@ -400,10 +402,18 @@ void make_live_surface(const LiveMeshOptions& options, LiveJob& job, LiveWorkspa
   } else {
     make_smooth(options, job, workspace);
   }
-  if (options.convert && job.surface != nullptr) {
-    job.surface->converted =
-        options.convert({job.source.grid, job.chunk, job.surface, job.source.content, ~std::uint64_t{0}});
-  }
+}
+
+std::int64_t ChunkSurface::triangles() const {
+  return 2 * static_cast<std::int64_t>(quads.size()) + static_cast<std::int64_t>(smooth.indices.size() / 3);
+}
+
+std::size_t ChunkSurface::bytes() const {
+  return sizeof(ChunkSurface) + quads.capacity() * sizeof(Quad) + smooth.positions.capacity() * sizeof(Vec3) +
+         smooth.normals.capacity() * sizeof(Vec3) + smooth.occlusion.capacity() * sizeof(float) +
+         smooth.cells.capacity() * sizeof(SmoothCell) + smooth.indices.capacity() * sizeof(std::uint32_t) +
+         albedo.capacity() * sizeof(LinearRgba16) + types.capacity() * sizeof(VoxelType) +
+         regions.capacity() * sizeof(SurfaceRegion) + light.capacity() * sizeof(FaceLight);
 }
 
 }  // namespace quoin

@@ -1,4 +1,4 @@
-#include "live/live_grid.h"
+#include "render/chunks/voxel_surfaces.h"
 
 #include <algorithm>
 #include <array>
@@ -30,10 +30,10 @@ bool can_own_smooth_quads(const Grid& grid, IVec3 chunk) {
 
 }  // namespace
 
-LiveGrid::LiveGrid(GridHandle handle, const LiveMeshOptions& options, LiveTotals& totals)
+VoxelSurfaces::VoxelSurfaces(GridHandle handle, const ChunkSurfaceOptions& options, SurfaceTotals& totals)
     : handle_(handle), options_(options), totals_(totals), densities_(reach_of(options.occlusion)) {}
 
-void LiveGrid::follow(const Grid& grid, LiveClock::time_point now) {
+void VoxelSurfaces::follow(const Grid& grid, SurfaceClock::time_point now) {
   ChangeCursor end = followed_;
   const GridChanges changes = grid.changes_since(end);
   if (changes.empty()) return;
@@ -49,7 +49,7 @@ void LiveGrid::follow(const Grid& grid, LiveClock::time_point now) {
 
 // Corners of faces have the light of voxels in front of them: chunks that hold one of the 26 neighbours of a voxel
 // whose light changed are meshed again.
-void LiveGrid::follow_light(const GridLight& light, LiveClock::time_point now) {
+void VoxelSurfaces::follow_light(const GridLight& light, SurfaceClock::time_point now) {
   if (options_.style != SurfaceStyle::Blocky) return;
   if (light.light == nullptr) {
     if (std::exchange(is_lit_, false)) mark_all(now);
@@ -72,7 +72,7 @@ void LiveGrid::follow_light(const GridLight& light, LiveClock::time_point now) {
 }
 
 // Discards all surfaces and jobs, because they belong to another grid.
-void LiveGrid::begin_anew() {
+void VoxelSurfaces::begin_anew() {
   densities_.clear();
   for (auto& [chunk, state] : chunks_) {
     if (state.is_gone) continue;
@@ -87,7 +87,7 @@ void LiveGrid::begin_anew() {
   }
 }
 
-void LiveGrid::leave() {
+void VoxelSurfaces::leave() {
   std::vector<IVec3> all;
   for (const auto& [chunk, state] : chunks_) {
     if (!state.is_gone) all.push_back(chunk);
@@ -97,7 +97,7 @@ void LiveGrid::leave() {
   densities_.clear();
 }
 
-void LiveGrid::follow_blocky(const Grid& grid, const GridChanges& changes, LiveClock::time_point now) {
+void VoxelSurfaces::follow_blocky(const Grid& grid, const GridChanges& changes, SurfaceClock::time_point now) {
   std::vector<IVec3> seen = chunks_to_mesh(grid, changes);
   if (changes.all) {
     for (const auto& [chunk, state] : chunks_) seen.push_back(chunk);
@@ -112,7 +112,7 @@ void LiveGrid::follow_blocky(const Grid& grid, const GridChanges& changes, LiveC
 }
 
 // Adds chunks that may have waited for a chunk to load, or must be hidden without it.
-void LiveGrid::add_chunks_around(IVec3 chunk, int distance, std::vector<IVec3>& to) {
+void VoxelSurfaces::add_chunks_around(IVec3 chunk, int distance, std::vector<IVec3>& to) {
   for (int z = -distance; z <= distance; ++z) {
     for (int y = -distance; y <= distance; ++y) {
       for (int x = -distance; x <= distance; ++x) to.push_back(chunk + IVec3{x, y, z});
@@ -120,12 +120,12 @@ void LiveGrid::add_chunks_around(IVec3 chunk, int distance, std::vector<IVec3>& 
   }
 }
 
-void LiveGrid::remove_if_there(IVec3 chunk) {
+void VoxelSurfaces::remove_if_there(IVec3 chunk) {
   const auto found = chunks_.find(chunk);
   if (found != chunks_.end() && !found->second.is_gone) remove(chunk);
 }
 
-void LiveGrid::follow_smooth(const Grid& grid, const GridChanges& changes, LiveClock::time_point now) {
+void VoxelSurfaces::follow_smooth(const Grid& grid, const GridChanges& changes, SurfaceClock::time_point now) {
   std::vector<IVec3> changed;
   std::vector<IVec3> reached;
   densities_.follow(std::make_shared<const Grid>(grid.snapshot()), changes, changed, reached);
@@ -144,7 +144,7 @@ void LiveGrid::follow_smooth(const Grid& grid, const GridChanges& changes, LiveC
   for (const IVec3 chunk : reached) mark_if_there(chunk, now);
 }
 
-void LiveGrid::see_whether_meshed(const Grid& grid, IVec3 chunk, LiveClock::time_point now) {
+void VoxelSurfaces::see_whether_meshed(const Grid& grid, IVec3 chunk, SurfaceClock::time_point now) {
   const auto found = chunks_.find(chunk);
   const bool is_there = found != chunks_.end() && !found->second.is_gone;
   const bool is_meshed = can_own_smooth_quads(grid, chunk);
@@ -152,7 +152,7 @@ void LiveGrid::see_whether_meshed(const Grid& grid, IVec3 chunk, LiveClock::time
   if (!is_meshed && is_there) remove(chunk);
 }
 
-void LiveGrid::mark_types(const SceneGrid& content, const ChangedTypes& changed, LiveClock::time_point now) {
+void VoxelSurfaces::mark_types(const SceneGrid& content, const ChangedTypes& changed, SurfaceClock::time_point now) {
   const bool is_smooth = options_.style == SurfaceStyle::Smooth;
   if (changed.visibility.empty() && (!is_smooth || changed.colour.empty())) return;
   for (const IVec3 chunk : content.grid.chunks()) {
@@ -166,18 +166,18 @@ void LiveGrid::mark_types(const SceneGrid& content, const ChangedTypes& changed,
   }
 }
 
-void LiveGrid::mark_if_there(IVec3 chunk, LiveClock::time_point now) {
+void VoxelSurfaces::mark_if_there(IVec3 chunk, SurfaceClock::time_point now) {
   const auto found = chunks_.find(chunk);
   if (found != chunks_.end() && !found->second.is_gone) mark(chunk, found->second, now);
 }
 
-void LiveGrid::mark_all(LiveClock::time_point now) {
+void VoxelSurfaces::mark_all(SurfaceClock::time_point now) {
   for (auto& [chunk, state] : chunks_) {
     if (!state.is_gone) mark(chunk, state, now);
   }
 }
 
-void LiveGrid::mark(IVec3 chunk, LiveChunk& state, LiveClock::time_point now) {
+void VoxelSurfaces::mark(IVec3 chunk, VoxelChunk& state, SurfaceClock::time_point now) {
   waiting_.insert(chunk);
   box_ = unite(box_, {chunk, chunk + 1});
   const Change change(totals_, state);
@@ -190,12 +190,12 @@ void LiveGrid::mark(IVec3 chunk, LiveChunk& state, LiveClock::time_point now) {
   state.seen = now;
 }
 
-void LiveGrid::wait_again(IVec3 chunk, LiveChunk& state) {
+void VoxelSurfaces::wait_again(IVec3 chunk, VoxelChunk& state) {
   mark(chunk, state, state.seen);
 }
 
-void LiveGrid::remove(IVec3 chunk) {
-  LiveChunk& state = chunks_.at(chunk);
+void VoxelSurfaces::remove(IVec3 chunk) {
+  VoxelChunk& state = chunks_.at(chunk);
   waiting_.erase(chunk);
   {
     const Change change(totals_, state);
@@ -210,25 +210,25 @@ void LiveGrid::remove(IVec3 chunk) {
   if (!state.is_listed) chunks_.erase(chunk);
 }
 
-void LiveGrid::make_ready(IVec3 chunk, LiveChunk& state) {
+void VoxelSurfaces::make_ready(IVec3 chunk, VoxelChunk& state) {
   state.is_ready = true;
   if (state.is_listed) return;
   totals_.ready.push_back({{handle_, SurfaceContent::Voxels}, chunk});
   state.is_listed = true;
 }
 
-std::unique_ptr<LiveJob> LiveGrid::make_job(LiveInputs& inputs, IVec3 chunk) {
+std::unique_ptr<SurfaceJob> VoxelSurfaces::make_job(SurfaceInputs& inputs, IVec3 chunk) {
   QUOIN_ASSERT(waiting_.contains(chunk), "a chunk that waits");
   // Smooth jobs have that of their densities.
   if (options_.style == SurfaceStyle::Smooth) return make_job(GridSnapshot(), chunk, *inputs.types);
   return make_job(inputs.voxels(), chunk, *inputs.types, inputs.light());
 }
 
-std::unique_ptr<LiveJob> LiveGrid::make_job(const GridSnapshot& grid, IVec3 chunk, const LiveTypes& types,
-                                            const LightSnapshot& light) {
+std::unique_ptr<SurfaceJob> VoxelSurfaces::make_job(const GridSnapshot& grid, IVec3 chunk, const SurfaceTypes& types,
+                                                    const LightSnapshot& light) {
   QUOIN_ASSERT(types.registry != nullptr, "types to mesh with");
-  const LiveChunk& state = chunks_.at(chunk);
-  auto job = std::make_unique<LiveJob>();
+  const VoxelChunk& state = chunks_.at(chunk);
+  auto job = std::make_unique<SurfaceJob>();
   job->source = {handle_, SurfaceContent::Voxels};
   job->chunk = chunk;
   job->types = types.registry;
@@ -247,8 +247,8 @@ std::unique_ptr<LiveJob> LiveGrid::make_job(const GridSnapshot& grid, IVec3 chun
   return job;
 }
 
-void LiveGrid::hand_over(IVec3 chunk, std::uint64_t serial) {
-  LiveChunk& state = chunks_.at(chunk);
+void VoxelSurfaces::hand_over(IVec3 chunk, std::uint64_t serial) {
+  VoxelChunk& state = chunks_.at(chunk);
   QUOIN_ASSERT(state.is_waiting && !state.is_gone, "a chunk that waits");
   waiting_.erase(chunk);
   const Change change(totals_, state);
@@ -257,17 +257,17 @@ void LiveGrid::hand_over(IVec3 chunk, std::uint64_t serial) {
   state.serial = serial;
 }
 
-bool LiveGrid::is_current(const LiveJob& job) const {
+bool VoxelSurfaces::is_current(const SurfaceJob& job) const {
   const auto found = chunks_.find(job.chunk);
   if (found == chunks_.end()) return false;
-  const LiveChunk& state = found->second;
+  const VoxelChunk& state = found->second;
   return !state.is_gone && !state.is_waiting && state.serial == job.serial && job.serial >= state.oldest;
 }
 
-void LiveGrid::withdrawn(const LiveJob& job) {
+void VoxelSurfaces::withdrawn(const SurfaceJob& job) {
   const auto found = chunks_.find(job.chunk);
   if (found == chunks_.end() || found->second.serial != job.serial || found->second.is_gone) return;
-  LiveChunk& state = found->second;
+  VoxelChunk& state = found->second;
   wait_again(job.chunk, state);
   const Change change(totals_, state);
   state.is_working = false;
@@ -275,12 +275,12 @@ void LiveGrid::withdrawn(const LiveJob& job) {
 
 // Updates the stamps of the surface if the new densities read the same as its old ones. Later
 // densities are then compared with the new ones.
-void LiveGrid::keep_densities(const LiveJob& job) {
+void VoxelSurfaces::keep_densities(const SurfaceJob& job) {
   const std::uint32_t kept = densities_.keep(job.chunk, job.densities);
   const int reach = reach_of(options_.occlusion);
   for (int i = 0; i < 27; ++i) {
     if ((kept >> i & 1U) == 0) continue;
-    const LiveDensity& density = *job.densities[static_cast<std::size_t>(i)];
+    const VoxelDensity& density = *job.densities[static_cast<std::size_t>(i)];
     for (int n = 0; n < 27; ++n) {
       const auto found = chunks_.find(job.chunk + Neighbourhood::offset(i) + Neighbourhood::offset(n));
       if (found == chunks_.end() || found->second.last_stamps == nullptr) continue;
@@ -290,7 +290,7 @@ void LiveGrid::keep_densities(const LiveJob& job) {
   }
 }
 
-void LiveGrid::keep_stamps(const LiveJob& job, LiveChunk& state) {
+void VoxelSurfaces::keep_stamps(const SurfaceJob& job, VoxelChunk& state) {
   if (state.last_stamps == nullptr) state.last_stamps = std::make_unique<DensityStamps>();
   for (std::size_t i = 0; i < 27; ++i) {
     (*state.last_stamps)[i] = job.densities[i] == nullptr ? 0 : job.densities[i]->stamp();
@@ -298,18 +298,18 @@ void LiveGrid::keep_stamps(const LiveJob& job, LiveChunk& state) {
   state.type_generation = job.type_generation;
 }
 
-void LiveGrid::collect(LiveJob& job) {
+void VoxelSurfaces::collect(SurfaceJob& job) {
   if (options_.style == SurfaceStyle::Smooth) keep_densities(job);
   const auto found = chunks_.find(job.chunk);
   if (found == chunks_.end() || found->second.is_gone) return;
-  LiveChunk& state = found->second;
+  VoxelChunk& state = found->second;
   const Change change(totals_, state);
   const bool is_newest = job.serial == state.serial;
   if (is_newest) state.is_working = false;
   if (job.serial < state.oldest || job.serial <= state.collected) return;
   // Another job's surface, collected in the meantime, may differ from the surface that this job was compared with.
-  const bool is_void = job.outcome == LiveJob::Outcome::OutOfMemory ||
-                       (job.outcome == LiveJob::Outcome::AsBefore && job.last_collected != state.collected);
+  const bool is_void = job.outcome == SurfaceJob::Outcome::OutOfMemory ||
+                       (job.outcome == SurfaceJob::Outcome::AsBefore && job.last_collected != state.collected);
   if (is_void) {
     if (is_newest) {
       waiting_.insert(job.chunk);
@@ -319,14 +319,14 @@ void LiveGrid::collect(LiveJob& job) {
   }
   state.collected = job.serial;
   if (options_.style == SurfaceStyle::Smooth) keep_stamps(job, state);
-  if (job.outcome == LiveJob::Outcome::AsBefore) return;
+  if (job.outcome == SurfaceJob::Outcome::AsBefore) return;
   state.surface = std::move(job.surface);
   state.is_ready = false;
   if (state.surface != nullptr || state.is_shown) make_ready(job.chunk, state);
 }
 
 // Returns the regions that differ from the ones taken last.
-std::uint64_t LiveGrid::note_regions(LiveChunk& state) const {
+std::uint64_t VoxelSurfaces::note_regions(VoxelChunk& state) const {
   constexpr std::uint64_t kAll = ~std::uint64_t{0};
   const int across = kChunkEdge / options_.region_edge;
   if (across == 1 || options_.style != SurfaceStyle::Blocky) return kAll;
@@ -347,10 +347,10 @@ std::uint64_t LiveGrid::note_regions(LiveChunk& state) const {
   return changed;
 }
 
-void LiveGrid::take(IVec3 chunk, std::vector<SurfaceUpdate>& out) {
+void VoxelSurfaces::take(IVec3 chunk, std::vector<SurfaceUpdate>& out) {
   const auto found = chunks_.find(chunk);
   if (found == chunks_.end()) return;
-  LiveChunk& state = found->second;
+  VoxelChunk& state = found->second;
   {
     const Change change(totals_, state);
     state.is_listed = false;

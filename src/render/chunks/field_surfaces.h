@@ -7,7 +7,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "live/live_source.h"
+#include "render/chunks/surface_source.h"
 
 namespace quoin {
 
@@ -17,27 +17,27 @@ namespace quoin {
 /// meshed from one snapshot with one choice of levels, and delivered together when the last is done. A change to a
 /// chunk whose group is in progress waits until that group has been delivered. Loaded chunks that were never shown do
 /// not wait.
-class LiveField final : public LiveSource {
+class FieldSurfaces final : public SurfaceSource {
  public:
-  LiveField(GridHandle handle, const LiveMeshOptions& options, LiveTotals& totals);
+  FieldSurfaces(GridHandle handle, const ChunkSurfaceOptions& options, SurfaceTotals& totals);
 
-  void follow(const SceneGrid& content, LiveClock::time_point now) override;
+  void follow(const SceneGrid& content, SurfaceClock::time_point now) override;
   void leave() override;
   void forget() override { followed_ = {}; }
-  void mark_types(const SceneGrid& content, const ChangedTypes& changed, LiveClock::time_point now) override;
+  void mark_types(const SceneGrid& content, const ChangedTypes& changed, SurfaceClock::time_point now) override;
 
   [[nodiscard]] bool wants_levels() const override { return wants_levels_; }
   /// Chunks that were never shown get their levels at once. Other chunks change a few at a time, nearest first.
-  void choose_levels(const ChunkDistances& distances, LiveClock::time_point now) override;
+  void choose_levels(const ChunkDistances& distances, SurfaceClock::time_point now) override;
   void prepare(const SceneGrid& content, const VoxelRegistry& types) override;
   [[nodiscard]] const ChunkSet& waiting() const override { return waiting_; }
   [[nodiscard]] const IBox& box() const override { return box_; }
   [[nodiscard]] bool has_chunks() const override { return !chunks_.empty(); }
-  [[nodiscard]] std::unique_ptr<LiveJob> make_job(LiveInputs& inputs, IVec3 chunk) override;
+  [[nodiscard]] std::unique_ptr<SurfaceJob> make_job(SurfaceInputs& inputs, IVec3 chunk) override;
   void hand_over(IVec3 chunk, std::uint64_t serial) override;
-  [[nodiscard]] bool is_current(const LiveJob& job) const override;
-  void withdrawn(const LiveJob& job) override;
-  void collect(LiveJob& job) override;
+  [[nodiscard]] bool is_current(const SurfaceJob& job) const override;
+  void withdrawn(const SurfaceJob& job) override;
+  void collect(SurfaceJob& job) override;
   void take(IVec3 chunk, std::vector<SurfaceUpdate>& out) override;
 
  private:
@@ -49,19 +49,19 @@ class LiveField final : public LiveSource {
     std::size_t unfinished = 0;  // of these
   };
   struct FieldChunk {
-    std::shared_ptr<Group> group;  // that it is meshed in; null: in none
-    std::uint64_t serial = 0;      // of the newest job
-    LiveClock::time_point seen;    // time of the last change
-    bool is_stale = false;         // it changed after it was meshed or put into a group
-    bool is_bound = false;         // the same change also reached neighbours
-    bool is_working = false;       // a worker has the newest job
-    bool is_done = false;          // in its group
-    bool is_empty = false;         // there is nothing to mesh
-    bool is_gone = false;          // it no longer exists in the field
-    bool is_ready = false;         // `surface` is ready to be taken
-    bool is_listed = false;        // in LiveTotals::ready
-    bool is_shown = false;         // the last surface taken is not null
-    bool was_given = false;        // a surface, or the report that there is none
+    std::shared_ptr<Group> group;   // that it is meshed in; null: in none
+    std::uint64_t serial = 0;       // of the newest job
+    SurfaceClock::time_point seen;  // time of the last change
+    bool is_stale = false;          // it changed after it was meshed or put into a group
+    bool is_bound = false;          // the same change also reached neighbours
+    bool is_working = false;        // a worker has the newest job
+    bool is_done = false;           // in its group
+    bool is_empty = false;          // there is nothing to mesh
+    bool is_gone = false;           // it no longer exists in the field
+    bool is_ready = false;          // `surface` is ready to be taken
+    bool is_listed = false;         // in SurfaceTotals::ready
+    bool is_shown = false;          // the last surface taken is not null
+    bool was_given = false;         // a surface, or the report that there is none
     std::uint8_t level = 0;
     std::array<std::uint8_t, 27> levels{};        // in its group
     std::shared_ptr<const ChunkSurface> result;   // in its group
@@ -72,15 +72,15 @@ class LiveField final : public LiveSource {
     [[nodiscard]] bool is_unfinished() const { return is_stale || group != nullptr; }
     [[nodiscard]] bool is_pending() const { return is_unfinished() || is_ready; }
   };
-  using Change = LiveChange<FieldChunk>;
+  using Change = CountedChange<FieldChunk>;
   using Chunks = std::unordered_map<IVec3, FieldChunk, CoordinateHash>;
   using Members = std::vector<IVec3>;
 
-  void begin_anew(const DensityGrid& field, LiveClock::time_point now);
-  void follow_changes(const DensityGrid& field, const DensityChanges& changes, LiveClock::time_point now);
-  void see_whether_there(const DensityGrid& field, IVec3 chunk, bool is_bound, LiveClock::time_point now);
-  void mark(IVec3 chunk, bool is_bound, LiveClock::time_point now);
-  void set_level(IVec3 chunk, FieldChunk& state, int level, LiveClock::time_point now);
+  void begin_anew(const DensityGrid& field, SurfaceClock::time_point now);
+  void follow_changes(const DensityGrid& field, const DensityChanges& changes, SurfaceClock::time_point now);
+  void see_whether_there(const DensityGrid& field, IVec3 chunk, bool is_bound, SurfaceClock::time_point now);
+  void mark(IVec3 chunk, bool is_bound, SurfaceClock::time_point now);
+  void set_level(IVec3 chunk, FieldChunk& state, int level, SurfaceClock::time_point now);
   [[nodiscard]] std::array<std::uint8_t, 27> levels_around(IVec3 chunk) const;
   [[nodiscard]] int reach_at(IVec3 chunk) const;
   [[nodiscard]] Members members_with(IVec3 chunk) const;
@@ -94,8 +94,8 @@ class LiveField final : public LiveSource {
   void erase_if_over(IVec3 chunk);
 
   GridHandle handle_;
-  const LiveMeshOptions& options_;
-  LiveTotals& totals_;
+  const ChunkSurfaceOptions& options_;
+  SurfaceTotals& totals_;
   ChangeCursor followed_;
   Chunks chunks_;
   FieldBodies bodies_;  // of the field as it is

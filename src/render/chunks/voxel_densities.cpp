@@ -1,4 +1,4 @@
-#include "live/live_densities.h"
+#include "render/chunks/voxel_densities.h"
 
 #include <algorithm>
 #include <utility>
@@ -77,8 +77,8 @@ std::shared_ptr<const DensityChunk> BodyChunks::of(const DensityChunk* whole, co
   return known;
 }
 
-LiveDensity::LiveDensity(GridSnapshot voxels, IVec3 chunk, std::shared_ptr<const LiveDensity> base, const IBox& changed,
-                         std::shared_ptr<const VoxelRegistry> types)
+VoxelDensity::VoxelDensity(GridSnapshot voxels, IVec3 chunk, std::shared_ptr<const VoxelDensity> base,
+                           const IBox& changed, std::shared_ptr<const VoxelRegistry> types)
     : stamp_(next_stamp()),
       chunk_(chunk),
       voxels_(std::move(voxels)),
@@ -89,19 +89,19 @@ LiveDensity::LiveDensity(GridSnapshot voxels, IVec3 chunk, std::shared_ptr<const
   QUOIN_ASSERT(base_ == nullptr || base_->is_made(), "a base that was made");
 }
 
-void LiveDensity::try_to_make() {
+void VoxelDensity::try_to_make() {
   if (is_made()) return;
   const std::unique_lock lock(mutex_, std::try_to_lock);
   if (lock.owns_lock() && !is_made()) make_locked();
 }
 
-void LiveDensity::make() {
+void VoxelDensity::make() {
   if (is_made()) return;
   const std::lock_guard lock(mutex_);
   if (!is_made()) make_locked();
 }
 
-void LiveDensity::make_locked() {
+void VoxelDensity::make_locked() {
   const Neighbourhood voxels = voxels_->neighbourhood(chunk_);
   std::unique_ptr<DensityChunk> made;
   const IVec3 origin = chunk_ * kChunkEdge;
@@ -131,7 +131,7 @@ void LiveDensity::make_locked() {
   types_.reset();
 }
 
-bool LiveDensity::reads_as(std::uint64_t stamp, int reach, IVec3 offset) const {
+bool VoxelDensity::reads_as(std::uint64_t stamp, int reach, IVec3 offset) const {
   QUOIN_ASSERT(is_made(), "densities that were made");
   if (stamp == stamp_) return true;
   if (!has_base_ || base_stamp_ != stamp) return false;
@@ -185,7 +185,7 @@ void DensityCache::reach_from(const Change& change, std::vector<IVec3>& reached)
     } else if (i == 13 && change.difference.types.samples != 0) {
       invalidate(at, false, {});
     }
-    // Types matter only next to the chunk. The body of a sample can matter further away; LiveDensity checks that.
+    // Types matter only next to the chunk. The body of a sample can matter further away; VoxelDensity checks that.
     if (is_within(change.difference.solid, kVoxelFieldReach + reach_) || is_within(change.difference.types, reach_)) {
       reached.push_back(at);
     }
@@ -216,27 +216,27 @@ bool DensityCache::has_voxels_near(IVec3 chunk) const {
   return false;
 }
 
-LiveDensities DensityCache::around(IVec3 chunk, const std::shared_ptr<const VoxelRegistry>& types) {
-  LiveDensities all;
+VoxelDensities DensityCache::around(IVec3 chunk, const std::shared_ptr<const VoxelRegistry>& types) {
+  VoxelDensities all;
   for (int i = 0; i < 27; ++i) all[static_cast<std::size_t>(i)] = density(chunk + Neighbourhood::offset(i), types);
   return all;
 }
 
-std::shared_ptr<LiveDensity> DensityCache::density(IVec3 chunk, const std::shared_ptr<const VoxelRegistry>& types) {
+std::shared_ptr<VoxelDensity> DensityCache::density(IVec3 chunk, const std::shared_ptr<const VoxelRegistry>& types) {
   // The outermost chunks stay air, as in a DensityGrid.
   if (!is_inside_world(chunk) || !has_voxels_near(chunk)) return nullptr;
   Slot& slot = slots_[chunk];
   if (slot.kept != nullptr && !slot.is_solid_stale && !slot.is_type_stale) return slot.kept;
-  if (std::shared_ptr<LiveDensity> under_way = slot.under_way.lock()) return under_way;
-  auto made = std::make_shared<LiveDensity>(seen_, chunk, slot.kept, slot.changed, types);
+  if (std::shared_ptr<VoxelDensity> under_way = slot.under_way.lock()) return under_way;
+  auto made = std::make_shared<VoxelDensity>(seen_, chunk, slot.kept, slot.changed, types);
   slot.under_way = made;
   return made;
 }
 
-std::uint32_t DensityCache::keep(IVec3 chunk, const LiveDensities& made) {
+std::uint32_t DensityCache::keep(IVec3 chunk, const VoxelDensities& made) {
   std::uint32_t kept = 0;
   for (int i = 0; i < 27; ++i) {
-    const std::shared_ptr<LiveDensity>& each = made[static_cast<std::size_t>(i)];
+    const std::shared_ptr<VoxelDensity>& each = made[static_cast<std::size_t>(i)];
     if (each == nullptr || !each->is_made()) continue;
     const auto found = slots_.find(chunk + Neighbourhood::offset(i));
     if (found == slots_.end() || found->second.under_way.lock() != each) continue;

@@ -9,10 +9,10 @@
 
 #include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
-#include <quoin/live/live_meshes.h>
+#include <quoin/light/scene_light.h>
 #include <quoin/scene/scene.h>
 
-#include "live/mesh_job_queue.h"
+#include "render/chunks/surface_job.h"
 
 namespace quoin {
 
@@ -45,12 +45,12 @@ class ChunkDistances {
 
 /// A chunk whose newest surface is to be taken.
 struct ReadyChunk {
-  LiveKey source;
+  SurfaceKey source;
   IVec3 chunk{0};
 };
 
 /// Totals over all sources.
-struct LiveTotals {
+struct SurfaceTotals {
   std::uint64_t serial = 0;  ///< of the job that was made last
   std::size_t unfinished = 0;
   std::size_t pending = 0;
@@ -59,29 +59,29 @@ struct LiveTotals {
 
 /// Keeps the totals right while a chunk's state changes, which has `is_unfinished` and `is_pending`.
 template <class State>
-class LiveChange {
+class CountedChange {
  public:
-  LiveChange(LiveTotals& totals, const State& state) : totals_(totals), state_(state) {
+  CountedChange(SurfaceTotals& totals, const State& state) : totals_(totals), state_(state) {
     QUOIN_ASSERT(totals.unfinished >= (state.is_unfinished() ? 1U : 0U), "every state is counted");
     QUOIN_ASSERT(totals.pending >= (state.is_pending() ? 1U : 0U), "every state is counted");
     totals_.unfinished -= state.is_unfinished() ? 1 : 0;
     totals_.pending -= state.is_pending() ? 1 : 0;
   }
-  LiveChange(const LiveChange&) = delete;
-  LiveChange& operator=(const LiveChange&) = delete;
-  ~LiveChange() {
+  CountedChange(const CountedChange&) = delete;
+  CountedChange& operator=(const CountedChange&) = delete;
+  ~CountedChange() {
     totals_.unfinished += state_.is_unfinished() ? 1 : 0;
     totals_.pending += state_.is_pending() ? 1 : 0;
     QUOIN_ASSERT(totals_.pending >= totals_.unfinished, "unfinished chunks are pending");
   }
 
  private:
-  LiveTotals& totals_;
+  SurfaceTotals& totals_;
   const State& state_;
 };
 
 /// The type data that surfaces are made with.
-struct LiveTypes {
+struct SurfaceTypes {
   std::shared_ptr<const VoxelRegistry> registry;
   std::shared_ptr<const SurfaceMaterials> materials;
   std::uint64_t generation = 0;
@@ -94,9 +94,9 @@ struct ChangedTypes {
 };
 
 /// The inputs of one update's jobs. A snapshot is taken when the first job needs it.
-class LiveInputs {
+class SurfaceInputs {
  public:
-  LiveInputs(const SceneGrid& content, const LiveTypes& with, const GridLight& light = {})
+  SurfaceInputs(const SceneGrid& content, const SurfaceTypes& with, const GridLight& light = {})
       : types(&with), content_(&content), light_(light) {}
 
   [[nodiscard]] const GridSnapshot& voxels() {
@@ -116,7 +116,7 @@ class LiveInputs {
     return lit_;
   }
 
-  const LiveTypes* types;
+  const SurfaceTypes* types;
 
  private:
   const SceneGrid* content_;
@@ -129,17 +129,17 @@ class LiveInputs {
 using ChunkSet = std::unordered_set<IVec3, CoordinateHash>;
 
 /// Follows the voxels or the field of one grid of a scene: tracks which chunks need meshing and their results.
-class LiveSource {
+class SurfaceSource {
  public:
-  LiveSource() = default;
-  LiveSource(const LiveSource&) = delete;
-  LiveSource& operator=(const LiveSource&) = delete;
-  virtual ~LiveSource() = default;
+  SurfaceSource() = default;
+  SurfaceSource(const SurfaceSource&) = delete;
+  SurfaceSource& operator=(const SurfaceSource&) = delete;
+  virtual ~SurfaceSource() = default;
 
   /// Takes over the edits. Cost: proportional to the edits.
-  virtual void follow(const SceneGrid& content, LiveClock::time_point now) = 0;
+  virtual void follow(const SceneGrid& content, SurfaceClock::time_point now) = 0;
   /// Takes over the changes of its light. The pointers of `light` are null if no light is used.
-  virtual void follow_light(const GridLight& light, LiveClock::time_point now) {
+  virtual void follow_light(const GridLight& light, SurfaceClock::time_point now) {
     (void)light;
     (void)now;
   }
@@ -148,11 +148,11 @@ class LiveSource {
   /// Makes the next `follow` start from scratch.
   virtual void forget() = 0;
   /// Marks the chunks that show one of the types for meshing.
-  virtual void mark_types(const SceneGrid& content, const ChangedTypes& changed, LiveClock::time_point now) = 0;
+  virtual void mark_types(const SceneGrid& content, const ChangedTypes& changed, SurfaceClock::time_point now) = 0;
   /// Returns true if it needs to choose levels of detail even though no eye moved.
   [[nodiscard]] virtual bool wants_levels() const { return false; }
   /// Takes over the distances of chunks; call after `follow`.
-  virtual void choose_levels(const ChunkDistances& distances, LiveClock::time_point now) {
+  virtual void choose_levels(const ChunkDistances& distances, SurfaceClock::time_point now) {
     (void)distances;
     (void)now;
   }
@@ -164,17 +164,21 @@ class LiveSource {
   [[nodiscard]] virtual const IBox& box() const = 0;
   [[nodiscard]] virtual bool has_chunks() const = 0;
   /// Creates the job of a waiting chunk. Requires: the chunk waits; `inputs` match the last `follow`.
-  [[nodiscard]] virtual std::unique_ptr<LiveJob> make_job(LiveInputs& inputs, IVec3 chunk) = 0;
+  [[nodiscard]] virtual std::unique_ptr<SurfaceJob> make_job(SurfaceInputs& inputs, IVec3 chunk) = 0;
   /// Called when a worker has received the job.
   virtual void hand_over(IVec3 chunk, std::uint64_t serial) = 0;
   /// Returns true if the job's result is still needed.
-  [[nodiscard]] virtual bool is_current(const LiveJob& job) const = 0;
+  [[nodiscard]] virtual bool is_current(const SurfaceJob& job) const = 0;
   /// Called when the job was withdrawn. The chunk waits again unless it is already waiting.
-  virtual void withdrawn(const LiveJob& job) = 0;
+  virtual void withdrawn(const SurfaceJob& job) = 0;
   /// Called when the job is done.
-  virtual void collect(LiveJob& job) = 0;
+  virtual void collect(SurfaceJob& job) = 0;
   /// Appends the surface if one is ready.
   virtual void take(IVec3 chunk, std::vector<SurfaceUpdate>& out) = 0;
 };
+
+/// Returns the source of the voxels or the field of a grid. Lifetime: `options` and `totals` must outlive it.
+[[nodiscard]] std::unique_ptr<SurfaceSource> make_surface_source(SurfaceKey key, const ChunkSurfaceOptions& options,
+                                                                 SurfaceTotals& totals);
 
 }  // namespace quoin
