@@ -9,7 +9,7 @@
 #include <vulkan/vulkan.h>
 
 #include <quoin/io/image_files.h>
-#include <quoin/render_vk/vulkan_renderer.h>
+#include <quoin/render/vulkan_renderer.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/scene.h>
 

@@ -9,7 +9,7 @@
 
 #include "core/instruction_sets_for_tests.h"
 #include "io/gltf/glb_for_tests.h"
-#include "render/environment_for_tests.h"
+#include "render/cpu/environment_for_tests.h"
 #include "render/path/town_for_tests.h"
 #include "tests/golden_for_tests.h"
 #include "tests/golden_views.h"

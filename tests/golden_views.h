@@ -8,7 +8,7 @@
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/terrain/terrain.h>
 
-#include "render/environment_for_tests.h"
+#include "render/cpu/environment_for_tests.h"
 
 /// The scenes and views of the golden images.
 namespace quoin::golden {

@@ -22,7 +22,7 @@
 
 #include "apps/demo/castle.h"
 #include "core/srgb.h"
-#include "render/environment_for_tests.h"
+#include "render/cpu/environment_for_tests.h"
 #include "render/impostor/impostor_test_support.h"
 
 namespace quoin {

@@ -11,7 +11,7 @@
 
 #include <quoin/io/file.h>
 #include <quoin/io/image_files.h>
-#include <quoin/render_vk/vulkan_renderer.h>
+#include <quoin/render/vulkan_renderer.h>
 
 #include "io/image/image_codecs.h"
 #include "io/vox/vox_for_tests.h"

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include <quoin/render_vk/vulkan_renderer.h>
+#include <quoin/render/vulkan_renderer.h>
 
 #include "cpu_backend.h"
 #include "view_backend.h"

@@ -7,7 +7,7 @@
 #include <new>
 #include <system_error>
 
-#include <quoin/render_vk/vulkan_mesh_renderer.h>
+#include <quoin/render/vulkan_mesh_renderer.h>
 
 namespace quoin::viewer {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include <quoin/core/result.h>
-#include <quoin/light/light_options.h>
+#include <quoin/render/light_options.h>
 #include <quoin/scene/environment.h>
 
 #include "camera/camera_control.h"

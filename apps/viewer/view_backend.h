@@ -12,11 +12,11 @@
 
 #include <quoin/core/image.h>
 #include <quoin/io/loaded_scene.h>
-#include <quoin/light/light_options.h>
+#include <quoin/render/light_options.h>
 #include <quoin/render/path_history.h>
 #include <quoin/render/path_tracer.h>
-#include <quoin/render_vk/vulkan_image.h>
-#include <quoin/render_vk/vulkan_mesh_renderer.h>
+#include <quoin/render/vulkan_image.h>
+#include <quoin/render/vulkan_mesh_renderer.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/environment.h>
 #include <quoin/scene/scene.h>

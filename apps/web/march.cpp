@@ -5,11 +5,11 @@
 #include <utility>
 #include <vector>
 
-#include <quoin/light/light_options.h>
+#include <quoin/render/light_options.h>
 
 #include "bindings.h"
 #include "handles.h"
-#include "render_vk/march/shader_scene.h"
+#include "render/vulkan/march/shader_scene.h"
 
 struct quoin_web_march {
   std::shared_ptr<quoin::c::SceneBody> scene;  // kept alive

@@ -17,12 +17,12 @@
 
 #include "bench/image_workload.h"
 #include "bench/peers/peer_report.h"
-#include "light/light_model.h"
-#include "light/occlusion_directions.h"
-#include "render/camera_rays.h"
+#include "render/light/light_model.h"
+#include "render/light/occlusion_directions.h"
 #include "render/path/path_math.h"
 #include "render/path/path_tile.h"
 #include "render/path/sky_light.h"
+#include "render/shared/camera_rays.h"
 
 namespace quoin::peers {
 namespace {

@@ -17,7 +17,7 @@
 #include <quoin/scene/scene_meshes.h>
 
 #include "io/image/image_codecs.h"
-#include "light/surfaces.h"
+#include "scene/surfaces.h"
 
 namespace quoin {
 

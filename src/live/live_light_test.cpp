@@ -12,8 +12,8 @@
 
 #include <gtest/gtest.h>
 
-#include "light/surface/light_world_for_tests.h"
 #include "live/placed_light_world_for_tests.h"
+#include "render/light/surface/light_world_for_tests.h"
 
 namespace quoin {
 namespace {

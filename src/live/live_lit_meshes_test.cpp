@@ -15,8 +15,8 @@
 #include <quoin/live/live_light.h>
 #include <quoin/mesh/blocky.h>
 
-#include "light/surface/light_world_for_tests.h"
 #include "live/placed_light_world_for_tests.h"
+#include "render/light/surface/light_world_for_tests.h"
 
 namespace quoin {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <quoin/scene/scene.h>
 
-#include "light/surface/light_world_for_tests.h"
+#include "render/light/surface/light_world_for_tests.h"
 
 namespace quoin {
 

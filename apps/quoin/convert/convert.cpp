@@ -9,9 +9,9 @@
 #include <quoin/io/chunk_source.h>
 #include <quoin/io/mesh_file.h>
 #include <quoin/io/vox.h>
-#include <quoin/light/lit_meshes.h>
 #include <quoin/mesh/closed_surface.h>
 #include <quoin/mesh/smooth_mesh.h>
+#include <quoin/render/lit_meshes.h>
 #include <quoin/scene/near_grids.h>
 #include <quoin/scene/volume_scene.h>
 #include <quoin/store/world_import.h>

@@ -10,7 +10,7 @@
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 #include <quoin/io/volume.h>
-#include <quoin/light/light_options.h>
+#include <quoin/render/light_options.h>
 #include <quoin/scene/scene_animation.h>
 #include <quoin/scene/scene_faces.h>
 #include <quoin/scene/scene_meshes.h>

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <memory>
 
-#include <quoin/light/light_options.h>
+#include <quoin/render/light_options.h>
 
 #include "command_files.h"
 #include "commands.h"

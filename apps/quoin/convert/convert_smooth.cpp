@@ -4,7 +4,7 @@
 
 #include <glm/gtc/matrix_transform.hpp>
 
-#include <quoin/light/lit_meshes.h>
+#include <quoin/render/lit_meshes.h>
 
 #include "commands.h"
 #include "convert/convert.h"

@@ -6,7 +6,7 @@
 
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/render/path_tracer.h>
-#include <quoin/render_vk/vulkan_renderer.h>
+#include <quoin/render/vulkan_renderer.h>
 
 #include "render/path_arguments.h"
 

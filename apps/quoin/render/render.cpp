@@ -6,7 +6,7 @@
 #include <quoin/io/formats.h>
 #include <quoin/io/image_files.h>
 #include <quoin/io/volume.h>
-#include <quoin/render_vk/vulkan_renderer.h>
+#include <quoin/render/vulkan_renderer.h>
 #include <quoin/scene/scene_faces.h>
 #include <quoin/scene/volume_scene.h>
 

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include <quoin/light/light_options.h>
+#include <quoin/render/light_options.h>
 
 #include "help.h"
 

@@ -8,7 +8,7 @@
 
 #include <quoin/core/image.h>
 #include <quoin/core/result.h>
-#include <quoin/render_vk/vulkan_renderer.h>
+#include <quoin/render/vulkan_renderer.h>
 
 #include "viewer/view_backend.h"
 

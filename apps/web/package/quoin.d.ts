@@ -126,7 +126,7 @@ export class Scene {
   free(): void;
 }
 
-/** A scene for ray-marching shaders: the tables declared in src/render_vk/shaders/data.glsl of Quoin's sources, with
+/** A scene for ray-marching shaders: the tables declared in src/render/shaders/data.glsl of Quoin's sources, with
  *  32-bit addresses. For an example see Quoin's page, apps/web/page/march.js. */
 export class ShaderScene {
   private constructor();

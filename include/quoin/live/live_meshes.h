@@ -10,10 +10,10 @@
 
 #include <quoin/core/parallel.h>
 #include <quoin/core/vec.h>
-#include <quoin/light/scene_light.h>
-#include <quoin/light/surface_light.h>
 #include <quoin/mesh/smooth_mesh.h>
 #include <quoin/render/chunk_surface.h>
+#include <quoin/render/scene_light.h>
+#include <quoin/render/surface_light.h>
 #include <quoin/scene/scene.h>
 
 namespace quoin {

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include <quoin/core/vec.h>
-#include <quoin/light/surface_light.h>
 #include <quoin/mesh/quad.h>
 #include <quoin/mesh/smooth_mesh.h>
+#include <quoin/render/surface_light.h>
 #include <quoin/scene/scene.h>
 
 namespace quoin {

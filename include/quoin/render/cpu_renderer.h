@@ -8,8 +8,8 @@
 #include <quoin/core/parallel.h>
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
-#include <quoin/light/light_options.h>
-#include <quoin/light/scene_light.h>
+#include <quoin/render/light_options.h>
+#include <quoin/render/scene_light.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/environment.h>
 #include <quoin/scene/level_of_detail.h>

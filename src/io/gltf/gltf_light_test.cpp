@@ -3,7 +3,7 @@
 #include <array>
 #include <string>
 
-#include <quoin/light/lit_meshes.h>
+#include <quoin/render/lit_meshes.h>
 
 #include "io/gltf/gltf_for_tests.h"
 

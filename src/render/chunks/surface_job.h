@@ -10,10 +10,10 @@
 #include <vector>
 
 #include <quoin/grid/density_grid.h>
-#include <quoin/light/propagated_light.h>
 #include <quoin/mesh/blocky.h>
 #include <quoin/mesh/smooth.h>
 #include <quoin/render/chunk_surface.h>
+#include <quoin/render/propagated_light.h>
 #include <quoin/scene/smooth_scene.h>
 
 #include "mesh/surface/face_materials.h"

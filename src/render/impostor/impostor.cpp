@@ -15,13 +15,13 @@
 #include <quoin/core/assert.h>
 #include <quoin/trace/packet.h>
 
-#include "light/corner_light.h"
-#include "light/occlusion_directions.h"
 #include "render/impostor/impostor_surface.h"
 #include "render/impostor/raster/impostor_faces.h"
 #include "render/impostor/seen_faces.h"
 #include "render/impostor/snapshot.h"
 #include "render/impostor/surface_cells.h"
+#include "render/light/corner_light.h"
+#include "render/light/occlusion_directions.h"
 #include "scene/tracer/tree_cache.h"
 
 namespace quoin {

@@ -19,7 +19,7 @@
 #include <quoin/terrain/terrain.h>
 
 #include "bench/workloads.h"
-#include "render/image_detail.h"
+#include "render/shared/image_detail.h"
 
 namespace quoin {
 namespace {

@@ -17,10 +17,10 @@
 #include <quoin/render/impostor.h>
 
 #include "core/srgb.h"
-#include "light/lighting.h"
-#include "render/camera_rays.h"
-#include "render/image_request.h"
 #include "render/impostor/seen_faces.h"
+#include "render/light/lighting.h"
+#include "render/shared/camera_rays.h"
+#include "render/shared/image_request.h"
 #include "scene/tracer/placed_grid.h"
 
 namespace quoin {

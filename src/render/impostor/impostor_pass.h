@@ -12,10 +12,10 @@
 #include <quoin/scene/camera.h>
 #include <quoin/scene/scene_tracer.h>
 
-#include "render/camera_rays.h"
-#include "render/image_detail.h"
 #include "render/impostor/impostor_screen.h"
 #include "render/impostor/raster/raster.h"
+#include "render/shared/camera_rays.h"
+#include "render/shared/image_detail.h"
 #include "scene/tracer/scene_view.h"
 
 namespace quoin {

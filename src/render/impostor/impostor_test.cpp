@@ -15,10 +15,10 @@
 #include <quoin/trace/ray.h>
 
 #include "core/death_for_tests.h"
-#include "light/corner_light.h"
+#include "render/cpu/render_test_support.h"
 #include "render/impostor/raster/impostor_faces.h"
 #include "render/impostor/snapshot.h"
-#include "render/render_test_support.h"
+#include "render/light/corner_light.h"
 
 namespace quoin {
 namespace {

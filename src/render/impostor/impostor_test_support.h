@@ -14,8 +14,8 @@
 #include <quoin/render/impostor.h>
 
 #include "bench/workloads.h"
+#include "render/cpu/render_test_support.h"
 #include "render/impostor/impostor_pass.h"
-#include "render/render_test_support.h"
 
 namespace quoin::render_test {
 

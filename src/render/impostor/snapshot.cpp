@@ -10,7 +10,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "light/corner_light.h"
+#include "render/light/corner_light.h"
 
 namespace quoin {
 namespace {

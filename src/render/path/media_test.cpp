@@ -12,11 +12,11 @@
 #include <quoin/render/path_tracer.h>
 
 #include "core/srgb.h"
-#include "render/environment_for_tests.h"
+#include "render/cpu/environment_for_tests.h"
+#include "render/cpu/render_test_support.h"
 #include "render/path/path_math.h"
 #include "render/path/scatter.h"
 #include "render/path/town_for_tests.h"
-#include "render/render_test_support.h"
 
 namespace quoin {
 namespace {

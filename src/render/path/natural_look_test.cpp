@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include <quoin/light/light_options.h>
+#include <quoin/render/light_options.h>
 #include <quoin/render/path_tracer.h>
 
 #include "render/path/town_for_tests.h"

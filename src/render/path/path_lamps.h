@@ -11,11 +11,11 @@
 #include <quoin/mesh/quad.h>
 #include <quoin/scene/scene.h>
 
-#include "light/emissive_cells.h"
-#include "light/lamp_table.h"
-#include "light/surfaces.h"
+#include "render/light/emissive_cells.h"
+#include "render/light/lamp_table.h"
 #include "render/path/light_tree.h"
 #include "render/path/path_math.h"
+#include "scene/surfaces.h"
 #include "scene/tracer/placed_grid.h"
 
 namespace quoin::path {

@@ -8,8 +8,8 @@
 
 #include <quoin/core/assert.h>
 
-#include "render/image_request.h"
 #include "render/path/path_math.h"
+#include "render/shared/image_request.h"
 
 namespace quoin::path {
 namespace {

@@ -13,9 +13,9 @@
 
 #include <quoin/core/assert.h>
 
-#include "light/light_model.h"
-#include "light/occlusion_directions.h"
-#include "render/camera_rays.h"
+#include "render/light/light_model.h"
+#include "render/light/occlusion_directions.h"
+#include "render/shared/camera_rays.h"
 #include "scene/tracer/placed_grid.h"
 
 namespace quoin::path {

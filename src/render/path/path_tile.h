@@ -18,9 +18,7 @@
 #include <quoin/core/vec.h>
 #include <quoin/render/path_tracer.h>
 
-#include "light/glass_bodies.h"
-#include "light/surfaces.h"
-#include "render/camera_rays.h"
+#include "render/light/glass_bodies.h"
 #include "render/path/denoise.h"
 #include "render/path/kernel/shade.h"
 #include "render/path/light_tree.h"
@@ -29,6 +27,8 @@
 #include "render/path/path_request.h"
 #include "render/path/scatter.h"
 #include "render/path/sky_light.h"
+#include "render/shared/camera_rays.h"
+#include "scene/surfaces.h"
 #include "scene/tracer/scene_view.h"
 
 namespace quoin::path {

@@ -3,13 +3,13 @@
 #include <mutex>
 
 #include "core/moved_from.h"
-#include "light/surfaces.h"
-#include "render/image_request.h"
 #include "render/path/denoise.h"
 #include "render/path/path_lamps.h"
 #include "render/path/path_request.h"
 #include "render/path/path_tile.h"
 #include "render/path/sky_light.h"
+#include "render/shared/image_request.h"
+#include "scene/surfaces.h"
 #include "scene/tracer/scene_view.h"
 
 namespace quoin {

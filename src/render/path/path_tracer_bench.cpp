@@ -7,7 +7,7 @@
 #include <quoin/render/path_tracer.h>
 
 #include "bench/image_workload.h"
-#include "render/environment_for_tests.h"
+#include "render/cpu/environment_for_tests.h"
 
 namespace quoin {
 namespace {

@@ -14,9 +14,9 @@
 
 #include "core/instruction_sets_for_tests.h"
 #include "core/srgb.h"
-#include "render/environment_for_tests.h"
+#include "render/cpu/environment_for_tests.h"
+#include "render/cpu/render_test_support.h"
 #include "render/path/town_for_tests.h"
-#include "render/render_test_support.h"
 
 namespace quoin {
 namespace {

@@ -13,7 +13,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "light/light_model.h"
+#include "render/light/light_model.h"
 #include "render/path/path_math.h"
 
 namespace quoin::path {

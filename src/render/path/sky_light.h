@@ -10,7 +10,7 @@
 #include <quoin/core/vec.h>
 #include <quoin/render/path_tracer.h>
 
-#include "light/light_model.h"
+#include "render/light/light_model.h"
 #include "render/path/path_math.h"
 
 namespace quoin::path {

@@ -10,8 +10,8 @@
 #include <quoin/scene/camera.h>
 #include <quoin/scene/scene.h>
 
-#include "render/environment_for_tests.h"
-#include "render/render_test_support.h"
+#include "render/cpu/environment_for_tests.h"
+#include "render/cpu/render_test_support.h"
 
 namespace quoin::render_test {
 

@@ -5,7 +5,7 @@
 #include <memory>
 
 #include <quoin/core/result.h>
-#include <quoin/render_vk/vulkan_image.h>
+#include <quoin/render/vulkan_image.h>
 
 #include "window_device.h"
 

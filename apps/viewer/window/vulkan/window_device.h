@@ -9,8 +9,8 @@
 #include <volk.h>
 
 #include <quoin/core/result.h>
-#include <quoin/render_vk/vulkan_device.h>
-#include <quoin/render_vk/vulkan_renderer.h>
+#include <quoin/render/vulkan_device.h>
+#include <quoin/render/vulkan_renderer.h>
 
 struct SDL_Window;
 

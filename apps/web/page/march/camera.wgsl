@@ -1,4 +1,4 @@
-// Numbers as sums of two floats, about 48 bits in total, three at a time: src/render_vk/shaders/camera.glsl. If a
+// Numbers as sums of two floats, about 48 bits in total, three at a time: src/render/shaders/camera.glsl. If a
 // compiler reorders the sums, the first parts remain, with the precision of single floats.
 //
 // Source: T. J. Dekker, "A floating-point technique for extending the available precision" (1971).
@@ -63,7 +63,7 @@ fn unit_of(a: Pair) -> Pair {
   return product_of(a, renewed(rough, error));
 }
 
-// The camera's rays, one per invocation, in view space and in instances' grids: src/render_vk/shaders/camera.glsl.
+// The camera's rays, one per invocation, in view space and in instances' grids: src/render/shaders/camera.glsl.
 
 var<private> pixel: vec2i;  // of the invocation, in the image
 

@@ -1,4 +1,4 @@
-// The shaders' data: src/render_vk/shaders/data.glsl in WGSL, which has no memory addresses. The scene is one array of
+// The shaders' data: src/render/shaders/data.glsl in WGSL, which has no memory addresses. The scene is one array of
 // words, the image's own tables another. Addresses are byte offsets below 2^32 in them, so only their lower word is
 // used. Supports only Quoin's default lighting: rays, nine occlusion rays, lamps and glass surfaces; march.js rejects
 // all else.
@@ -155,8 +155,8 @@ fn vector_at(table: u32, i: u32) -> vec4f {
   return bitcast<vec4f>(tables[(table >> 4u) + i]);
 }
 
-// Fields of an instance, read one by one: src/render_vk/trees/shader_data.h, ShaderPlaced. View space has the world's
-// axes and units; its origin is the camera, or a point in front of it if everything is far.
+// Fields of an instance, read one by one: src/render/vulkan/trees/shader_data.h, ShaderPlaced. View space has the
+// world's axes and units; its origin is the camera, or a point in front of it if everything is far.
 const kGridAxes = 0u;     // columns: grid from view
 const kViewAxes = 3u;     // columns: view from grid
 const kRefBase = 6u;      // in the tree's coordinates; w: the grid

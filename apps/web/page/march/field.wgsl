@@ -1,4 +1,4 @@
-// Density fields: src/render_vk/shaders/walk.glsl. Their trees contain the cells that touch the solid. In a cell, the
+// Density fields: src/render/shaders/walk.glsl. Their trees contain the cells that touch the solid. In a cell, the
 // field along a ray is a cubic; the hit is its first root.
 
 const kBlockEdge = 7;

@@ -1,4 +1,4 @@
-// The surface of a field, blended from the materials around a point: src/render_vk/shaders/field_blend.glsl.
+// The surface of a field, blended from the materials around a point: src/render/shaders/field_blend.glsl.
 
 // The samples around the word of a cell; kNoBlock if the word has none because all samples are solid.
 fn samples_around(field: Tree, cell: vec3i) -> u32 {

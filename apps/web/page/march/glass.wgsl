@@ -1,4 +1,4 @@
-// Glass bodies along a ray: src/render_vk/shaders/glass.glsl and see_through.glsl. An invocation has two lists, nearest
+// Glass bodies along a ray: src/render/shaders/glass.glsl and see_through.glsl. An invocation has two lists, nearest
 // first: the visible bodies, and the bodies on a light ray.
 
 // ln of the transmittance below which a body counts as opaque.

@@ -1,4 +1,4 @@
-// Transparent parts of fields: src/render_vk/shaders/glass.glsl. The tree contains the cells with a transparent corner.
+// Transparent parts of fields: src/render/shaders/glass.glsl. The tree contains the cells with a transparent corner.
 // A word of 4^3 cells either has one material throughout, or has the samples around it and the bodies of its corners.
 
 const kOpaqueBody = 0xFFFFu;  // not the number of any type

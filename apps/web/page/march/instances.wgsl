@@ -1,4 +1,4 @@
-// Rays among many instances: src/render_vk/shaders/instances.glsl.
+// Rays among many instances: src/render/shaders/instances.glsl.
 
 struct GridRay {
   base: vec3i,

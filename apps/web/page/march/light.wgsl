@@ -1,4 +1,4 @@
-// Lights each pixel of a tile: src/render_vk/shaders/light.comp and direct_light.glsl. Compilers inline a function at
+// Lights each pixel of a tile: src/render/shaders/light.comp and direct_light.glsl. Compilers inline a function at
 // each call, and a walk is long: one loop therefore traces all rays.
 
 // Returns true if a ray in the space of instance `home`, which is tested first, hits an opaque part of any instance.

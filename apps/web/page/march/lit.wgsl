@@ -1,4 +1,4 @@
-// Materials, the sky, and lamps: src/render_vk/shaders/lit.glsl, sky.glsl, core.glsl and direct_light.glsl.
+// Materials, the sky, and lamps: src/render/shaders/lit.glsl, sky.glsl, core.glsl and direct_light.glsl.
 
 struct Surface {
   colour: vec3f,

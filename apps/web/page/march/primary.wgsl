@@ -1,4 +1,4 @@
-// The nearest opaque voxel of each pixel of a tile: src/render_vk/shaders/primary.comp.
+// The nearest opaque voxel of each pixel of a tile: src/render/shaders/primary.comp.
 
 // Every instance has its own start. The start of the nearest hit so far is at this depth, and the hit is `t` behind it.
 struct Nearest {

@@ -1,4 +1,4 @@
-// Walks a ray through a tree in a single loop: src/render_vk/shaders/walk.glsl documents each part. Crossings are
+// Walks a ray through a tree in a single loop: src/render/shaders/walk.glsl documents each part. Crossings are
 // ordered by t, ties by axis, so that the CPU kernels visit the same voxels.
 
 const kLevels = 15;

@@ -12,9 +12,9 @@
 #include <quoin/core/direction.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/voxel_registry.h>
-#include <quoin/light/light_options.h>
 #include <quoin/mesh/occlusion.h>
 #include <quoin/render/impostor.h>
+#include <quoin/render/light_options.h>
 
 namespace quoin {
 

@@ -1,0 +1,119 @@
+#include "render/light/propagated/chunk_masks.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include <quoin/core/assert.h>
+
+#include "trace/chunk_rows.h"
+
+namespace quoin::propagated {
+namespace {
+
+constexpr std::uint64_t kAll = ~std::uint64_t{0};
+
+TypeLight light_of(const std::vector<TypeLight>& types, VoxelType type) {
+  return type < types.size() ? types[type] : TypeLight{0, 0};
+}
+
+bool passes(const std::vector<TypeLight>& types, VoxelType type, std::size_t channel) {
+  return type == kAir || (light_of(types, type).passes >> channel & 1U) != 0;
+}
+
+}  // namespace
+
+LightLevels lamp_levels(const VoxelProperties& properties) {
+  const float strength = 15.0F * std::clamp(properties.emission, 0.0F, 1.0F);
+  const Rgba8& colour = properties.colour;
+  const float greatest = std::max({colour.r, colour.g, colour.b, std::uint8_t{1}});
+  const auto level = [&](std::uint8_t channel) {
+    return static_cast<std::uint8_t>(std::lround(strength * static_cast<float>(channel) / greatest));
+  };
+  return {0, level(colour.r), level(colour.g), level(colour.b)};
+}
+
+void ChunkMasks::read_rows(const Chunk& voxels, const std::vector<TypeLight>& types, std::size_t channel,
+                           const IBox& box) {
+  Rows& rows = rows_[channel];
+  const auto stopped =
+      std::count_if(found_.begin(), found_.end(), [&](VoxelType type) { return !passes(types, type, channel); });
+  rows.is_uniform = stopped == 0 || static_cast<std::size_t>(stopped) == found_.size();
+  rows.uniform = stopped == 0 ? kAll : 0;
+  if (rows.is_uniform) return;
+  rows.words.resize(static_cast<std::size_t>(kChunkEdge) * kChunkEdge);
+  const auto stops = [&](VoxelType type) { return !passes(types, type, channel); };
+  const FunctionRef<bool(VoxelType)> asked(stops);
+  const trace::ChunkRows stopping(voxels, asked);
+  trace::SlabRows slab;
+  for (int z = box.min.z & ~3; z < box.max.z; z += 4) {
+    for (int y = box.min.y & ~3; y < box.max.y; y += 4) {
+      const trace::Slab kind = stopping.read(y, z, slab);
+      if (kind != trace::Slab::Mixed) slab.fill(kind == trace::Slab::Full ? kAll : 0);
+      std::uint64_t* to = rows.words.data() + y + kChunkEdge * z;
+      for (std::size_t i = 0; i < slab.size(); ++i) to[(i & 3) + kChunkEdge * (i >> 2)] = ~slab[i];
+    }
+  }
+}
+
+// Lamps of a row, each type once.
+void ChunkMasks::add_lamps(const Chunk& voxels, const std::vector<TypeLight>& types, int y, int z,
+                           std::uint64_t where) {
+  QUOIN_ASSERT((y | z) >= 0 && (y | z) < kChunkEdge, "0 <= y, z < 64");
+  while (where != 0) {
+    const VoxelType type = voxels.get(std::countr_zero(where), y, z);
+    const std::uint64_t alike = where & voxels.row_mask(y, z, type);
+    lamps_.push_back({static_cast<std::uint8_t>(y), static_cast<std::uint8_t>(z), light_of(types, type).lamp, alike});
+    where &= ~alike;
+  }
+}
+
+void ChunkMasks::read_lamps(const Chunk& voxels, const std::vector<TypeLight>& types, const IBox& box,
+                            const SlabSet& slabs) {
+  const auto is_lamp = [&](VoxelType type) { return light_of(types, type).lamp != 0; };
+  if (std::none_of(found_.begin(), found_.end(), is_lamp)) {
+    without_lamps_ = all_slabs();
+    return;
+  }
+  const FunctionRef<bool(VoxelType)> asked(is_lamp);
+  const trace::ChunkRows lamps(voxels, asked);
+  trace::SlabRows rows;
+  for (int z = box.min.z & ~3; z < box.max.z; z += 4) {
+    for (int y = box.min.y & ~3; y < box.max.y; y += 4) {
+      const auto bit = static_cast<std::uint16_t>(1U << (y / 4));
+      const auto of_z = static_cast<std::size_t>(z / 4);
+      if ((slabs[of_z] & bit) == 0) continue;
+      const trace::Slab kind = lamps.read(y, z, rows);
+      if (kind == trace::Slab::Empty) without_lamps_[of_z] |= bit;
+      if (kind == trace::Slab::Empty) continue;
+      if (kind == trace::Slab::Full) rows.fill(kAll);
+      for (int i = 0; i < 16; ++i)
+        add_lamps(voxels, types, y + (i & 3), z + (i >> 2), rows[static_cast<std::size_t>(i)]);
+    }
+  }
+}
+
+void ChunkMasks::read(const Chunk* voxels, const std::vector<TypeLight>& types, const IBox& box,
+                      const SlabSet& lamp_slabs) {
+  QUOIN_ASSERT(intersect(box, kWholeChunk) == box, "a box of the chunk");
+  lamps_.clear();
+  without_lamps_.fill(0);
+  rows_of_.fill(0);
+  rows_[0].is_uniform = true;
+  rows_[0].uniform = kAll;
+  if (voxels == nullptr) return;
+  found_ = voxels->types();
+  for (std::size_t channel = 0; channel < kChannels; ++channel) {
+    const auto is_like = [&](std::size_t other) {
+      return std::all_of(found_.begin(), found_.end(),
+                         [&](VoxelType type) { return passes(types, type, channel) == passes(types, type, other); });
+    };
+    std::size_t other = 0;
+    while (other < channel && !is_like(other)) ++other;
+    rows_of_[channel] = other;
+    if (other == channel) read_rows(*voxels, types, channel, box);
+  }
+  read_lamps(*voxels, types, box, lamp_slabs);
+}
+
+}  // namespace quoin::propagated

@@ -1,0 +1,504 @@
+#include <quoin/render/propagated_light.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <map>
+#include <random>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include <quoin/mesh/blocky.h>
+
+#include "core/death_for_tests.h"
+#include "core/instruction_sets_for_tests.h"
+#include "render/light/propagated/chunk_masks.h"
+
+namespace quoin {
+namespace {
+
+constexpr VoxelType kStone = 1, kLamp = 2, kRedLamp = 3, kGlass = 4, kBlueGlass = 5, kGlowGlass = 6;
+
+VoxelRegistry light_types() {
+  VoxelRegistry types;
+  const auto add = [&](Rgba8 colour, Visibility visibility, float emission) {
+    VoxelProperties properties;
+    properties.colour = colour;
+    properties.visibility = visibility;
+    properties.emission = emission;
+    EXPECT_TRUE(types.add(properties));
+  };
+  add({120, 120, 120, 255}, Visibility::Opaque, 0.0F);
+  add({255, 220, 160, 255}, Visibility::Opaque, 1.0F);
+  add({250, 30, 0, 255}, Visibility::Opaque, 0.6F);
+  add({240, 240, 240, 60}, Visibility::Transparent, 0.0F);
+  add({20, 40, 250, 60}, Visibility::Transparent, 0.0F);
+  add({100, 255, 100, 60}, Visibility::Transparent, 2.0F);
+  return types;
+}
+
+/// Searches from every lamp and all of the sky, level by level, one voxel at a time. Its box contains all voxels plus
+/// the range of light, so that light from outside reaches a voxel in the middle only as sky light.
+class Search {
+ public:
+  Search(const Grid& grid, const VoxelRegistry& types, const IBox& box)
+      : grid_(grid), types_(types), box_(box), size_(box.max - box.min) {
+    levels_.resize(static_cast<std::size_t>(size_.x) * static_cast<std::size_t>(size_.y) *
+                   static_cast<std::size_t>(size_.z));
+    for (int channel = 0; channel < 4; ++channel) find(channel);
+  }
+  [[nodiscard]] std::uint16_t at(IVec3 voxel) const {
+    unsigned word = 0;
+    for (std::size_t c = 0; c < 4; ++c) word |= static_cast<unsigned>(levels_[index(voxel)][c]) << (4 * c);
+    return static_cast<std::uint16_t>(word);
+  }
+
+ private:
+  [[nodiscard]] std::size_t index(IVec3 voxel) const {
+    const IVec3 p = voxel - box_.min;
+    return static_cast<std::size_t>(p.x + size_.x * (p.y + size_.y * p.z));
+  }
+  [[nodiscard]] bool passes(IVec3 voxel, int channel) const {
+    const VoxelType type = grid_.get(voxel);
+    if (type == kAir) return true;
+    if (type >= types_.size() || types_.is_opaque(type)) return false;
+    const Rgba8& colour = types_[type].colour;
+    const std::array<int, 3> rgb{colour.r, colour.g, colour.b};
+    return channel == 0 ||
+           2 * rgb.at(static_cast<std::size_t>(channel) - 1) >= *std::max_element(rgb.begin(), rgb.end());
+  }
+  void find(int channel) {
+    const auto c = static_cast<std::size_t>(channel);
+    std::array<std::vector<IVec3>, 16> open;
+    const auto raise = [&](IVec3 voxel, int level) {
+      if (!box_.contains(voxel) || levels_[index(voxel)][c] >= level) return;
+      levels_[index(voxel)][c] = static_cast<std::uint8_t>(level);
+      open.at(static_cast<std::size_t>(level)).push_back(voxel);
+    };
+    for (int z = box_.min.z; z < box_.max.z; ++z) {
+      for (int y = box_.min.y; y < box_.max.y; ++y) {
+        for (int x = box_.min.x; x < box_.max.x; ++x) start({x, y, z}, channel, raise);
+      }
+    }
+    for (int level = 15; level > 0; --level) {
+      for (std::size_t i = 0; i < open.at(static_cast<std::size_t>(level)).size(); ++i) {
+        const IVec3 voxel = open.at(static_cast<std::size_t>(level))[i];
+        if (levels_[index(voxel)][c] != level) continue;
+        for (const Direction direction : kDirections) {
+          const IVec3 next = voxel + normal_of(direction);
+          const bool falls = channel == 0 && level == 15 && direction == Direction::NegY;
+          if (box_.contains(next) && passes(next, channel)) raise(next, falls ? 15 : level - 1);
+        }
+      }
+    }
+  }
+  template <class Raise>
+  void start(IVec3 voxel, int channel, const Raise& raise) {
+    const VoxelType type = grid_.get(voxel);
+    if (channel > 0 && type < types_.size() && type != kAir) {
+      const LightLevels lamp = propagated::lamp_levels(types_[type]);
+      raise(voxel, std::array<int, 3>{lamp.red, lamp.green, lamp.blue}.at(static_cast<std::size_t>(channel) - 1));
+    }
+    if (channel == 0 && voxel.y == box_.max.y - 1) raise(voxel, 15);
+  }
+
+  const Grid& grid_;
+  const VoxelRegistry& types_;
+  IBox box_;
+  IVec3 size_;
+  std::vector<std::array<std::uint8_t, 4>> levels_;
+};
+
+void expect_searched(const PropagatedLight& light, const Grid& grid, const VoxelRegistry& types) {
+  const IBox bounds = grid.bounds();
+  if (bounds.empty()) return;
+  const Search search(grid, types, {bounds.min - 16, bounds.max + 16});
+  std::array<std::uint16_t, kChunkEdge> row;
+  for (int z = bounds.min.z - 1; z <= bounds.max.z; ++z) {
+    for (int y = bounds.min.y - 1; y <= bounds.max.y; ++y) {
+      for (int x = bounds.min.x - 1; x <= bounds.max.x; ++x) {
+        const IVec3 voxel{x, y, z};
+        if (x == bounds.min.x - 1 || local_of(voxel).x == 0) light.read_row(voxel, row);
+        ASSERT_EQ(row.at(static_cast<std::size_t>(local_of(voxel).x)), search.at(voxel)) << x << " " << y << " " << z;
+      }
+    }
+  }
+}
+
+void edit(Grid& grid, std::mt19937& random) {
+  const auto below = [&](unsigned n) { return static_cast<int>(random() % n); };
+  const IVec3 at{below(60) - 20, below(70) - 30, below(60) - 20};
+  const auto type = static_cast<VoxelType>(random() % 8);  // one of the types is not registered
+  switch (below(6)) {
+    case 0:
+      grid.fill_box({at, at + IVec3(1 + below(30), 1 + below(5), 1 + below(30))}, type);
+      break;
+    case 1:
+      grid.fill_box({at, at + IVec3(1 + below(5), 1 + below(40), 1 + below(5))}, kAir);
+      break;
+    case 2:
+      grid.fill_sphere(DVec3(at), 2.0 + below(9), kStone);
+      grid.fill_sphere(DVec3(at), 1.0 + below(8), kAir);
+      grid.set(at, below(2) == 0 ? kLamp : kRedLamp);
+      break;
+    case 3:
+      for (int i = 0; i < 40; ++i) grid.set(at + IVec3(below(12), below(12), below(12)), type);
+      break;
+    default:
+      grid.set(at, type);
+  }
+}
+
+TEST(PropagatedLight, MatchesSearchAfterRandomEdits) {
+  const std::vector<InstructionSet> sets = sets_of_this_machine();
+  for (unsigned seed = 0; seed < 4; ++seed) {
+    SCOPED_TRACE(seed);
+    const InstructionSetOverride set(sets[seed % sets.size()]);
+    std::mt19937 random(seed);
+    VoxelRegistry types = light_types();
+    Grid grid;
+    PropagatedLight light;
+    if (seed % 2 == 0) grid.fill_box({{-20, -30, -20}, {40, 0, 40}}, kStone);
+    for (int step = 0; step < 12; ++step) {
+      for (unsigned i = 0; i < 1 + random() % 6; ++i) edit(grid, random);
+      if (step == 7) {
+        VoxelProperties stone = types[kStone];
+        stone.emission = 0.4F;
+        types.replace(kStone, stone);
+      }
+      light.update(grid, types, {1 + seed % 2});
+      if (step % 3 == 2) expect_searched(light, grid, types);
+      if (HasFatalFailure()) return;
+    }
+    PropagatedLight fresh;
+    fresh.update(grid, types);
+    for (int i = 0; i < 5000; ++i) {
+      const IVec3 at{static_cast<int>(random() % 150) - 60, static_cast<int>(random() % 150) - 70,
+                     static_cast<int>(random() % 150) - 60};
+      ASSERT_EQ(light.at(at), fresh.at(at));
+    }
+  }
+}
+
+// Mostly edits single voxels, so that neither rock nor air prevails.
+void edit_little(Grid& grid, std::mt19937& random) {
+  const auto below = [&](unsigned n) { return static_cast<int>(random() % n); };
+  const IVec3 at{below(70) - 30, below(60) - 40, below(70) - 30};
+  const VoxelType type = below(3) == 0 ? static_cast<VoxelType>(1 + below(7)) : kAir;
+  if (below(50) > 0) {
+    grid.set(at, type);
+    return;
+  }
+  grid.fill_box({at, at + IVec3(1 + below(12), 1 + below(4), 1 + below(12))}, below(2) == 0 ? kStone : kAir);
+}
+
+TEST(PropagatedLight, MatchesSearchAfterManyEdits) {
+  // A million edits only in nightly runs and in fast builds: debug and sanitizer builds take ten times as long.
+#if defined(NDEBUG) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+  const bool is_night = std::getenv("QUOIN_NIGHTLY") != nullptr;
+#else
+  const bool is_night = false;
+#endif
+  const int edits = is_night ? 1'000'000 : 6'000;
+  const int checks = is_night ? 40 : 4;
+  std::mt19937 random(11);
+  VoxelRegistry types = light_types();
+  Grid grid;
+  grid.fill_box({{-30, -40, -30}, {40, 0, 40}}, kStone);
+  PropagatedLight light;
+  int checked = 0;
+  for (int done = 0; done < edits;) {
+    // Sometimes enough edits that boxes overlap.
+    const int count = random() % 100 == 0 ? 200 : 1 + static_cast<int>(random() % 30);
+    for (int i = 0; i < count; ++i) edit_little(grid, random);
+    done += count;
+    light.update(grid, types, {1 + static_cast<unsigned>(random() % 2)});
+    if (done < (checked + 1) * (edits / checks)) continue;
+    ++checked;
+    expect_searched(light, grid, types);
+    ASSERT_FALSE(HasFatalFailure()) << "after " << done << " edits";
+  }
+  EXPECT_GE(checked, checks);
+}
+
+TEST(PropagatedLight, CastsSkyShadowsOfAnyLength) {
+  const VoxelRegistry types = light_types();
+  Grid grid;
+  grid.fill_box({{-4, -900, -4}, {12, -890, 12}}, kStone);  // ground
+  grid.set({2, -890, 3}, kLamp);
+  grid.set({0, -500, 0}, kGlass);
+  PropagatedLight light;
+  light.update(grid, types);
+  for (const int y : {-100, -600, 3}) {  // one shadow longer than the solver's regions, and shorter ones
+    const IBox roof{{-2, y, -2}, {3, y + 1, 3}};
+    grid.fill_box(roof, kStone);
+    light.update(grid, types);
+    EXPECT_LT(light.at({0, y - 1, 0}).sky, 15);
+    expect_searched(light, grid, types);
+    grid.fill_box(roof, kAir);
+    light.update(grid, types);
+    EXPECT_EQ(light.at({0, y - 1, 0}).sky, 15);
+    expect_searched(light, grid, types);
+  }
+}
+
+// Small edits are solved as a whole: lamps, stones, glass and holes at corners of chunks, one or several per update,
+// with every kernel.
+TEST(PropagatedLight, MatchesFreshLightAfterSmallEdits) {
+  const VoxelRegistry types = light_types();
+  for (const InstructionSet set : sets_of_this_machine()) {
+    const InstructionSetOverride only(set);
+    SCOPED_TRACE(name_in_tests(set));
+    std::mt19937 random(static_cast<unsigned>(set));
+    const auto below = [&](unsigned n) { return static_cast<int>(random() % n); };
+    Grid grid;
+    grid.fill_box({{-90, -100, -90}, {90, 10, 90}}, kStone);
+    for (int i = 0; i < 40; ++i) grid.fill_sphere(DVec3(below(60) - 30, below(60) - 50, below(60) - 30), 7.0, kAir);
+    PropagatedLight light;
+    light.update(grid, types, {1});
+    for (int step = 0; step < 60; ++step) {
+      for (int i = 1 + step % 3 * below(5); i > 0; --i) {
+        const IVec3 at{below(40) - 20, below(60) - 40, below(40) - 20};
+        grid.set(at, static_cast<VoxelType>(below(3) == 0 ? 0 : below(7)));
+      }
+      if (step % 20 == 7) grid.fill_box({{3, -30, 3}, {4, 30, 4}}, step == 7 ? kAir : kStone);
+      light.update(grid, types, {1});
+      if (step % 6 != 5) continue;
+      PropagatedLight fresh;
+      fresh.update(grid, types, {1});
+      std::array<std::uint16_t, kChunkEdge> row;
+      std::array<std::uint16_t, kChunkEdge> expected;
+      for (int z = -60; z < 60; ++z) {
+        for (int y = -80; y < 40; ++y) {
+          for (const int x : {-64, 0}) {
+            light.read_row({x, y, z}, row);
+            fresh.read_row({x, y, z}, expected);
+            ASSERT_EQ(row, expected) << x << ' ' << y << ' ' << z << ", step " << step;
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(PropagatedLight, LightsShaftFromSkyAndCaveFromLamps) {
+  VoxelRegistry types = light_types();
+  Grid grid;
+  grid.fill_box({{0, -200, 0}, {130, 0, 130}}, kStone);
+  PropagatedLight light;
+  light.update(grid, types);
+  EXPECT_EQ(light.at({50, 0, 50}), (LightLevels{15, 0, 0, 0}));
+  EXPECT_EQ(light.at({50, 5000, 50}), (LightLevels{15, 0, 0, 0}));
+  EXPECT_EQ(light.at({50, -1, 50}), LightLevels{});
+  grid.fill_box({{50, -180, 50}, {51, 0, 51}}, kAir);     // a shaft
+  grid.fill_box({{20, -185, 45}, {60, -180, 55}}, kAir);  // a cave
+  light.update(grid, types);
+  EXPECT_EQ(light.at({50, -185, 50}).sky, 15);
+  EXPECT_EQ(light.at({53, -185, 50}).sky, 12);
+  EXPECT_EQ(light.at({50, -183, 53}).sky, 12);
+  EXPECT_EQ(light.at({30, -183, 50}).sky, 0);
+  grid.set({25, -185, 50}, kRedLamp);
+  light.update(grid, types);
+  EXPECT_EQ(light.at({25, -185, 50}), (LightLevels{0, 9, 1, 0}));
+  EXPECT_EQ(light.at({28, -185, 50}), (LightLevels{0, 6, 0, 0}));
+  grid.set({50, -1, 50}, kStone);  // closed
+  light.update(grid, types);
+  EXPECT_EQ(light.at({50, -180, 50}).sky, 0);
+  grid.set({50, -1, 50}, kGlass);  // the sky passes glass
+  grid.set({25, -185, 50}, kAir);
+  light.update(grid, types);
+  EXPECT_EQ(light.at({50, -185, 50}), (LightLevels{15, 0, 0, 0}));
+  EXPECT_EQ(light.at({28, -185, 50}), LightLevels{});
+}
+
+TEST(PropagatedLight, KeepsSealedRoomDark) {
+  VoxelRegistry types = light_types();
+  Grid grid;
+  grid.fill_box({{40, 40, 40}, {90, 90, 90}}, kStone);
+  grid.fill_box({{41, 41, 41}, {89, 89, 89}}, kAir);
+  grid.set({39, 60, 60}, kLamp);  // outside, next to the wall
+  PropagatedLight light;
+  light.update(grid, types);
+  for (int z = 41; z < 89; ++z) {
+    for (int y = 41; y < 89; ++y) {
+      for (int x = 41; x < 89; ++x) ASSERT_EQ(light.at({x, y, z}), LightLevels{});
+    }
+  }
+  EXPECT_EQ(light.at({38, 60, 60}).red, 14);
+}
+
+TEST(PropagatedLight, ColouredGlassFiltersLampsButNotSky) {
+  VoxelRegistry types = light_types();
+  Grid grid;
+  grid.fill_box({{0, 0, 0}, {20, 20, 20}}, kStone);
+  grid.fill_box({{1, 5, 5}, {19, 6, 6}}, kAir);  // a corridor
+  grid.set({2, 5, 5}, kLamp);
+  grid.set({6, 5, 5}, kBlueGlass);
+  PropagatedLight light;
+  light.update(grid, types);
+  EXPECT_GT(light.at({5, 5, 5}).red, 0);
+  EXPECT_EQ(light.at({7, 5, 5}).red, 0);
+  EXPECT_EQ(light.at({7, 5, 5}).green, 0);
+  EXPECT_EQ(light.at({7, 5, 5}).blue, propagated::lamp_levels(types[kLamp]).blue - 5);
+  grid.fill_box({{6, 6, 5}, {7, 20, 6}}, kBlueGlass);  // a shaft filled with it
+  light.update(grid, types);
+  EXPECT_EQ(light.at({6, 5, 5}).sky, 15);
+}
+
+TEST(PropagatedLight, ReportsChangedRegions) {
+  VoxelRegistry types = light_types();
+  std::mt19937 random(5);
+  Grid grid;
+  grid.fill_box({{-20, -30, -20}, {40, 0, 40}}, kStone);
+  PropagatedLight light;
+  light.update(grid, types);
+  ChangeCursor cursor;
+  static_cast<void>(light.changes_since(cursor));
+  EXPECT_TRUE(light.changes_since(cursor).empty());
+  const IBox all{{-60, -60, -60}, {100, 100, 100}};
+  const auto snapshot = [&] {
+    std::vector<std::uint16_t> words;
+    for (int z = all.min.z; z < all.max.z; ++z) {
+      for (int y = all.min.y; y < all.max.y; ++y) {
+        for (int x = all.min.x; x < all.max.x; ++x) words.push_back(packed(light.at({x, y, z})));
+      }
+    }
+    return words;
+  };
+  std::vector<std::uint16_t> before = snapshot();
+  for (int step = 0; step < 5; ++step) {
+    edit(grid, random);
+    light.update(grid, types);
+    std::vector<std::uint16_t> now = snapshot();
+    const GridChanges changes = light.changes_since(cursor);
+    std::size_t i = 0;
+    for (int z = all.min.z; z < all.max.z; ++z) {
+      for (int y = all.min.y; y < all.max.y; ++y) {
+        for (int x = all.min.x; x < all.max.x; ++x, ++i) {
+          if (before[i] == now[i]) continue;
+          const IVec3 voxel{x, y, z};
+          const bool is_reported =
+              std::any_of(changes.items.begin(), changes.items.end(), [&](const ChunkChange& change) {
+                const IVec3 local = local_of(voxel);
+                return change.chunk == chunk_of(voxel) && change.box.contains(local) &&
+                       change.slabs.has(local.y, local.z);
+              });
+          // Light above all chunks is not stored.
+          ASSERT_TRUE(is_reported || changes.all) << x << " " << y << " " << z;
+        }
+      }
+    }
+    before = std::move(now);
+  }
+}
+
+TEST(PropagatedLight, ReportsChunksAddedAndRemovedInOpenSky) {
+  const VoxelRegistry types = light_types();
+  Grid grid;
+  grid.fill_box({{0, 0, 0}, {20, 5, 20}}, kStone);
+  PropagatedLight light;
+  light.update(grid, types);
+  ChangeCursor cursor;
+  static_cast<void>(light.changes_since(cursor));
+  const IVec3 voxel{200, 200, 5};
+  const auto is_reported = [&] {
+    const GridChanges changes = light.changes_since(cursor);
+    return std::any_of(changes.items.begin(), changes.items.end(), [&](const ChunkChange& change) {
+      return change.chunk == chunk_of(voxel) && change.box.contains(local_of(voxel));
+    });
+  };
+  EXPECT_EQ(light.at(voxel).sky, 15);
+  grid.fill_box({{192, 192, 0}, {256, 256, 64}}, kStone);
+  light.update(grid, types);
+  EXPECT_EQ(light.at(voxel).sky, 0);
+  EXPECT_TRUE(is_reported());
+  grid.put_chunk(chunk_of(voxel), Chunk());
+  light.update(grid, types);
+  EXPECT_EQ(light.at(voxel).sky, 15);
+  EXPECT_TRUE(is_reported());
+}
+
+TEST(PropagatedLight, SplitsQuadsAtLightChanges) {
+  VoxelRegistry types = light_types();
+  std::mt19937 random(9);
+  Grid grid;
+  grid.fill_box({{-10, -30, -10}, {80, 0, 80}}, kStone);
+  for (int i = 0; i < 20; ++i) edit(grid, random);
+  PropagatedLight light;
+  light.update(grid, types);
+  BlockyMesher mesher;
+  QuadBuffer quads;
+  QuadBuffer lit;
+  std::vector<std::uint16_t> levels;
+  std::size_t more = 0;
+  for (const IVec3 chunk : grid.chunks()) {
+    mesher.mesh(grid.neighbourhood(chunk), types, {}, quads);
+    light.split(quads, chunk, lit, levels);
+    ASSERT_EQ(lit.size(), levels.size());
+    ASSERT_EQ(face_count(lit), face_count(quads));
+    more += lit.size() - quads.size();
+    for (std::size_t i = 0; i < lit.size(); ++i) {
+      const FaceFrame& frame = frame_of(lit[i].direction());
+      for (int v = 0; v < lit[i].size_v(); ++v) {
+        for (int u = 0; u < lit[i].size_u(); ++u) {
+          IVec3 at = chunk * kChunkEdge + lit[i].voxel() + normal_of(lit[i].direction());
+          at[frame.u] += u;
+          at[frame.v] += v;
+          ASSERT_EQ(packed(light.at(at)), levels[i]);
+        }
+      }
+    }
+  }
+  EXPECT_GT(more, 0U);
+}
+
+TEST(PropagatedLight, UsesCustomLevelsOfTypes) {
+  VoxelRegistry types = light_types();
+  Grid grid;
+  grid.set({5, 5, 5}, kStone);
+  PropagatedLight light({[](VoxelType type, const VoxelProperties&) {
+    return type == kStone ? LightLevels{9, 3, 2, 1} : LightLevels{};
+  }});
+  light.update(grid, types);
+  EXPECT_EQ(light.at({5, 5, 5}), (LightLevels{0, 3, 2, 1}));
+  EXPECT_EQ(light.at({6, 5, 5}), (LightLevels{15, 2, 1, 0}));
+  EXPECT_EQ(light.at({5, 4, 5}), (LightLevels{14, 2, 1, 0})) << "next to columns of sky";
+}
+
+TEST(PropagatedLight, SnapshotsKeepLightAndUpdateIndependently) {
+  const VoxelRegistry types = light_types();
+  std::mt19937 random(17);
+  Grid grid;
+  for (int i = 0; i < 6; ++i) edit(grid, random);
+  PropagatedLight light;
+  light.update(grid, types);
+  ChangeCursor cursor;
+  EXPECT_TRUE(light.changes_since(cursor).all);
+  for (int round = 0; round < 4; ++round) {
+    const PropagatedLight kept = light.snapshot();
+    PropagatedLight other = light.snapshot();
+    const Grid before = grid.snapshot();
+    Grid branch = grid.snapshot();
+    edit(grid, random);
+    edit(branch, random);
+    light.update(grid, types);
+    other.update(branch, types);
+    expect_searched(kept, before, types);
+    expect_searched(light, grid, types);
+    expect_searched(other, branch, types);
+    ASSERT_FALSE(HasFatalFailure()) << round;
+    // The updated object continues with its journal; an updated snapshot has a separate one.
+    ChangeCursor of_kept = cursor;
+    EXPECT_TRUE(kept.changes_since(of_kept).empty());
+    EXPECT_FALSE(light.changes_since(cursor).all);
+  }
+}
+
+TEST(PropagatedLightDeathTest, RejectsLevelsThatDoNotFitFourBits) {
+  QUOIN_EXPECT_MISTAKE((void)packed({.sky = 16}), "levels from 0 to 15");
+  QUOIN_EXPECT_MISTAKE((void)packed({.blue = 200}), "levels from 0 to 15");
+}
+
+}  // namespace
+}  // namespace quoin

@@ -1,0 +1,436 @@
+// Glass bodies along a ray; matches render/light/glass_bodies.h on the CPU. They are kept in a list, nearest first.
+// With KEEPS_BODIES there is one of kBodies for each pixel of the tile; with HOLDS_BODIES the invocation has one.
+
+// Natural logarithm of the transmittance below which a body counts as closed.
+const float kClosed = -11.0;
+const float kDiagonal = 1.7320508;  // of a cube of 1
+// Lengths of t within which two bodies touch: the rounding of single precision.
+const float kTouching = 4e-6;
+
+bool reaches(Body body, float t) {
+  return t <= body.lengths.y + kTouching * max(1.0, body.lengths.y);
+}
+// Returns true if a body counts with its own length: bodies of fields, bodies that a ray starts in, and clouds.
+bool has_own_length(Body body) {
+#ifdef HAS_CLOUDS
+  if (surface_of(body.what.x).scattering > 0.0) return true;
+#endif
+  return (body.what.z & kHowItBegins) != 0;
+}
+bool continues(Body body, Body next) {
+  return next.what.x == body.what.x && reaches(body, next.lengths.x);
+}
+
+struct BodyList {
+  uvec2 address;
+  uint first;
+  uint room;  // 0: none is kept
+  uint count;
+  float dropped_t;  // start of the first body that did not fit
+};
+
+#ifdef HOLDS_BODIES
+const uint kHeldBodies = 8;
+Body held_bodies[kHeldBodies];
+
+Body listed_body(BodyList list, uint i) {
+  return held_bodies[i];
+}
+void list_body(BodyList list, uint i, Body body) {
+  held_bodies[i] = body;
+}
+#else
+Body listed_body(BodyList list, uint i) {
+  return Bodies(list.address).at[list.first + i];
+}
+void list_body(BodyList list, uint i, Body body) {
+  Bodies(list.address).at[list.first + i] = body;
+}
+#endif
+
+// Inserts a body in order; if the list is full, removes and returns the farthest.
+bool insert_body(inout BodyList list, Body body, out Body dropped) {
+  dropped = body;
+  if (list.room == 0) return true;
+  bool is_full = list.count == list.room;
+  if (is_full) {
+    Body last = listed_body(list, list.room - 1);
+    if (body.lengths.x >= last.lengths.x) return true;
+    dropped = last;
+  } else {
+    ++list.count;
+  }
+  uint i = list.count - 1;
+  for (; i > 0; --i) {
+    Body before = listed_body(list, i - 1);
+    bool stays = before.lengths.x < body.lengths.x ||
+                 (before.lengths.x == body.lengths.x && before.voxel.w <= body.voxel.w);
+    if (stays) break;
+    list_body(list, i, before);
+  }
+  list_body(list, i, body);
+  return is_full;
+}
+
+// Adds a body; if the list is full, keeps the transmittance of the bodies that did not fit.
+void keep_body(inout BodyList list, Body body, float from_t, inout vec3 passed) {
+  if (body.lengths.x < from_t) return;
+  Body dropped;
+  if (!insert_body(list, body, dropped)) return;
+  list.dropped_t = min(list.dropped_t, dropped.lengths.x);
+  passed *= passed_by(surface_of(dropped.what.x), dropped.lengths.z, has_own_length(dropped));
+}
+
+// The bodies of one instance along a ray, in order.
+struct BodyRun {
+  Body body;  // the last one
+  bool has_body;
+  float clarity;
+};
+
+void end_as(inout Body body, Body next) {
+  body.what.w = next.what.w;
+  if (kHasFieldGlass) body.what.z = (body.what.z & kHowItBegins) | (next.what.z & ~kHowItBegins);
+}
+
+void add_to_run(inout BodyRun run, Body next, float from_t, inout BodyList list, inout vec3 passed) {
+  if (!(next.lengths.z > 0.0)) return;
+  run.clarity += surface_of(next.what.x).log_clarity * next.lengths.z;
+  if (run.has_body && continues(run.body, next)) {
+    run.body.lengths.y = next.lengths.y;
+    run.body.lengths.z += next.lengths.z;
+    end_as(run.body, next);
+    return;
+  }
+  if (run.has_body) keep_body(list, run.body, from_t, passed);
+  run.body = next;
+  run.has_body = true;
+}
+
+// The transparent part of a field; matches trace/density/density_glass.h on the CPU. Its tree holds the cells with a
+// transparent corner. A word of 4^3 cells has either a single material, or the samples around it and the bodies of
+// these corners.
+
+const uint kOpaqueBody = 0xFFFF;  // no type's number
+const int kBodiesEdge = 5;
+const uint kBodiesBegin = 172;  // in a block, after its densities
+const uint kIsUniform = 0x80000000u;
+
+// A cell and its corners, indexed by x + 2 y, at z and z + 1: densities, and 0 for air, kOpaqueBody, or a transparent
+// type.
+struct GlassCell {
+  Numbers block;
+  ivec3 first;  // its lowest corner in the block
+  vec4 low;
+  vec4 high;
+  uvec4 body_low;
+  uvec4 body_high;
+};
+
+// Gets the block of the word found. Returns false if the word has a single type.
+bool glass_block_found(out Numbers block, out uint type) {
+  uvec4 brick = walk_stack[1];
+  uint child = child_of(brick, index_in(walk_voxel, 1));
+  uint words = bitCount(brick.x) + bitCount(brick.y);
+  uint from = Numbers(address_after(brick.zw, 8 * words)).at[child];
+  block = Numbers(address_after(record_found(), 4 * from));
+  type = from & 0xFFFF;
+  return (from & kIsUniform) == 0;
+}
+
+uint body_of(Numbers block, ivec3 at) {
+  uint i = uint((at.z * kBodiesEdge + at.y) * kBodiesEdge + at.x);
+  return block.at[kBodiesBegin + (i >> 1)] >> (16 * (i & 1)) & 0xFFFF;
+}
+uvec4 bodies_of(Numbers block, ivec3 at) {
+  return uvec4(body_of(block, at), body_of(block, at + ivec3(1, 0, 0)), body_of(block, at + ivec3(0, 1, 0)),
+               body_of(block, at + ivec3(1, 1, 0)));
+}
+
+GlassCell glass_cell(Numbers block, ivec3 voxel) {
+  GlassCell cell;
+  cell.block = block;
+  cell.first = (voxel & 3) + 1;
+  corners_of(block, cell.first, cell.low, cell.high);
+  cell.body_low = bodies_of(block, voxel & 3);
+  cell.body_high = bodies_of(block, (voxel & 3) + ivec3(0, 0, 1));
+  return cell;
+}
+
+uint body_at_corner(GlassCell cell, int i) {
+  return i < 4 ? cell.body_low[i] : cell.body_high[i - 4];
+}
+bool is_transparent(uint body) {
+  return body != 0 && body != kOpaqueBody;
+}
+
+// Computes the field of one body: solid corners of other bodies are as far outside as they are inside their own.
+void corners_of_body(GlassCell cell, uint body, out vec4 low, out vec4 high) {
+  low = mix(abs(cell.low), cell.low, equal(cell.body_low, uvec4(body)));
+  high = mix(abs(cell.high), cell.high, equal(cell.body_high, uvec4(body)));
+}
+
+// A ray in a cell, and the cubics of its crossings.
+struct RayInGlass {
+  vec3 entry;
+  vec3 way;
+  vec4 solid;
+  vec4 opaque;
+  bool has_air;
+  bool has_opaque;
+  bool has_several;  // several transparent types
+  uint type;         // the first of these
+};
+
+vec4 cubic_of_body(GlassCell cell, RayInGlass ray, uint body) {
+  vec4 low;
+  vec4 high;
+  corners_of_body(cell, body, low, high);
+  return cubic_of(low, high, ray.entry, ray.way);
+}
+
+RayInGlass ray_in_glass(GlassCell cell, vec3 entry, vec3 way) {
+  RayInGlass ray;
+  ray.entry = entry;
+  ray.way = way;
+  ray.solid = cubic_of(cell.low, cell.high, entry, way);
+  ray.has_air = ray.has_opaque = ray.has_several = false;
+  ray.type = 0;
+  for (int i = 0; i < 8; ++i) {
+    uint body = body_at_corner(cell, i);
+    ray.has_air = ray.has_air || body == 0;
+    ray.has_opaque = ray.has_opaque || body == kOpaqueBody;
+    if (!is_transparent(body)) continue;
+    ray.has_several = ray.has_several || (ray.type != 0 && body != ray.type);
+    ray.type = body;
+  }
+  ray.opaque = ray.has_opaque ? cubic_of_body(cell, ray, kOpaqueBody) : vec4(1.0, 0.0, 0.0, 0.0);
+  return ray;
+}
+
+// Returns the first sign change of a cubic beyond `after`; 1 if there is none before.
+float change_after(vec4 f, float after) {
+  float a = 3.0 * f.w;
+  float b = 2.0 * f.z;
+  float discriminant = b * b - 4.0 * a * f.y;
+  vec2 extremes = vec2(-1.0);
+  if (discriminant > 0.0) {
+    float q = -0.5 * (b + (b < 0.0 ? -1.0 : 1.0) * sqrt(discriminant));
+    float one = a != 0.0 ? q / a : -1.0;
+    float other = q != 0.0 ? f.y / q : -1.0;
+    extremes = vec2(min(one, other), max(one, other));
+  }
+  float low = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    float high = i == 0 ? extremes.x : i == 1 ? extremes.y : 1.0;
+    if (!(high > low && high <= 1.0)) continue;
+    bool falls = value_at(f, high) < 0.0;
+    if ((value_at(f, low) < 0.0) != falls) {
+      float s = root_between(falls ? f : -f, low, high);
+      if (s > after) return s;
+    }
+    low = high;
+  }
+  return 1.0;
+}
+
+// Returns the ray's next transition from one body, or air, to another. One loop over the cubics for the three
+// decisions: solid, opaque, and the nearer of two transparent types.
+float next_change(GlassCell cell, RayInGlass ray, float after) {
+  const int kSolid = -2;
+  float next = 1.0;
+  for (int i = kSolid; i < (ray.has_several ? 8 : 0); ++i) {
+    for (int k = 0; k < max(i, 1); ++k) {
+      vec4 f = ray.solid;
+      if (i < 0) {
+        if (!(i == kSolid ? ray.has_air : ray.has_opaque)) break;
+        if (i != kSolid) f = ray.opaque;
+      } else {
+        uint one = body_at_corner(cell, i);
+        uint other = body_at_corner(cell, k);
+        if (!is_transparent(one)) break;
+        if (!is_transparent(other) || other == one) continue;
+        f = cubic_of_body(cell, ray, one) - cubic_of_body(cell, ray, other);
+      }
+      next = min(next, change_after(f, after));
+    }
+  }
+  return next;
+}
+
+// Returns the transparent type at `s`; 0 if there is none.
+uint glass_at(GlassCell cell, RayInGlass ray, float s) {
+  if (!(value_at(ray.solid, s) < 0.0) || value_at(ray.opaque, s) < 0.0) return 0;
+  if (!ray.has_several) return ray.type;
+  uint nearest = 0;
+  float least = kNever;
+  for (int i = 0; i < 8; ++i) {
+    uint body = body_at_corner(cell, i);
+    if (!is_transparent(body)) continue;
+    float own = value_at(cubic_of_body(cell, ray, body), s);
+    if (own > least || (own == least && body >= nearest)) continue;
+    least = own;
+    nearest = body;
+  }
+  return nearest;
+}
+
+// Returns the normal of a body's surface in the cell, towards air (`other` is 0) or another transparent type.
+vec3 glass_normal(GlassCell cell, vec3 inside, uint type, uint other) {
+  if (other == 0) return normal_in(cell.block, cell.first, inside);
+  vec4 low;
+  vec4 high;
+  vec4 other_low;
+  vec4 other_high;
+  corners_of_body(cell, type, low, high);
+  corners_of_body(cell, other, other_low, other_high);
+  vec3 gradient = gradient_of(low - other_low, high - other_high, inside);
+  float size = length(gradient);
+  return size > 0.0 ? gradient / size : vec3(0.0);
+}
+
+// A unit vector, or 0, in 28 bits: like unit_vector's word, but coarser.
+const float kNormalSteps = 8191.0;
+uint packed_in_28(vec3 n) {
+  uint word = packed_normal(n);
+  if (word == kNoNormal) return 0;
+  uvec2 at = uvec2(round(unpackSnorm2x16(word) * kNormalSteps) + kNormalSteps) + 1;
+  return at.x | at.y << 14;
+}
+vec3 normal_from_28(uint word) {
+  if (word == 0) return vec3(0.0);
+  vec2 at = vec2(uvec2(word & 0x3FFF, word >> 14) - 1) / kNormalSteps - 1.0;
+  return unit_vector(packSnorm2x16(at));
+}
+
+// Sets the normals at both ends of a cell's body, from `begin` to `end` of the ray's path in it.
+void put_normals(GlassCell cell, RayInGlass ray, float begin, float end, BodyRun run, inout Body body) {
+  bool touches = run.has_body && reaches(run.body, body.lengths.x);
+  bool is_entered = !touches || run.body.what.x != body.what.x;
+  for (int side = 0; side < 2; ++side) {
+    bool is_begin = side == 0;
+    if (!(is_begin ? is_entered : ray.has_air)) continue;
+    vec3 at = ray.entry + (is_begin ? begin : end) * ray.way;
+    vec3 normal = glass_normal(cell, at, body.what.x, is_begin && touches ? run.body.what.x : 0);
+    if (is_begin) {
+      body.what.y = packed_normal(normal);
+    } else {
+      body.what.z |= packed_in_28(normal) << kExitNormal;
+    }
+  }
+}
+
+// Adds the bodies of a voxel, of a field's cell, or of a word of a single type, from `enter_t` to `exit_t`. `next`: a
+// body with the shared properties set; `cell`: used if `is_mixed`.
+void add_bodies(GlassCell cell, bool is_mixed, Body next, float enter_t, float exit_t, float ray_t, float voxels_a_t,
+                float from_t, inout BodyRun run, inout BodyList list, inout vec3 passed) {
+  float size = exit_t - enter_t;
+  RayInGlass ray;
+  if (is_mixed) {
+    vec3 place = vec3(next.voxel.xyz - ray_base);
+    vec3 entry = clamp(ray_origin + enter_t * ray_direction - place, vec3(0.0), vec3(1.0));
+    ray = ray_in_glass(cell, entry, ray_direction * size);
+  }
+  uint how = next.what.z;
+  float begin = 0.0;
+  while (begin < 1.0) {
+    float end = 1.0;
+    if (is_mixed) {
+      end = next_change(cell, ray, begin);
+      next.what.x = glass_at(cell, ray, 0.5 * (begin + end));
+      next.what.z = begin <= 0.0 ? how : how & ~kStartsInside;
+    }
+    if (next.what.x != 0) {
+      float begin_t = begin <= 0.0 ? enter_t : enter_t + begin * size;
+      float end_t = end >= 1.0 ? exit_t : enter_t + end * size;
+      next.lengths = vec4(ray_t + begin_t, ray_t + end_t, (end_t - begin_t) * voxels_a_t, begin_t);
+#if defined(KEEPS_BODIES) || defined(HOLDS_BODIES)
+      if (is_mixed) put_normals(cell, ray, begin, end, run, next);
+#endif
+      add_to_run(run, next, from_t, list, passed);
+    }
+    begin = end;
+  }
+}
+
+// Finds the bodies of an instance's voxels, or of its field, along a ray whose walk has started. `voxels_a_t`:
+// full-grid voxels per t.
+void find_bodies_in(int i, bool is_of_field, GridRay ray, float voxels_a_t, float max_t, float from_t,
+                    inout BodyList list, inout vec3 passed) {
+  float room = max_t - ray.t;
+  BodyRun run;
+  run.clarity = 0.0;
+  run.has_body = false;
+  bool goes_on = true;
+  while (goes_on && run.clarity > kClosed && find_voxel(room)) {
+    Body next;
+    next.voxel = ivec4(walk_voxel, i);
+    uint inside = walk_axis < 0 ? kStartsInside : 0;
+    float enter_t = walk_t;
+    GlassCell cell;
+    bool is_mixed = false;
+    int shift = 0;
+    if (is_of_field) {
+      Numbers block;
+      is_mixed = glass_block_found(block, next.what.x);
+      next.what = uvec4(next.what.x, kNoNormal, inside | kBeginsInField | kEndsInField, 8 * uint(i));
+      // A whole word is one body if it does not close along the diagonal; it then closes at the same cell as cell by
+      // cell.
+      float closing = -surface_of(next.what.x).log_clarity * voxels_a_t / length(ray_direction) * kDiagonal;
+      if (is_mixed) {
+        cell = glass_cell(block, walk_voxel);
+      } else if (run.clarity - kClosed > 4.0 * closing) {
+        shift = 2;
+      }
+    } else {
+      next.what = uvec4(type_found(), face_found(), inside, 8 * uint(i));
+    }
+    goes_on = leave_block(shift, room);
+    if (!is_of_field) next.what.w += uint(2 * walk_axis + (ray_forward[walk_axis] ? 0 : 1));
+    add_bodies(cell, is_mixed, next, enter_t, min(walk_t, room), ray.t, voxels_a_t, from_t, run, list, passed);
+  }
+  if (run.has_body) keep_body(list, run.body, from_t, passed);
+}
+
+// Finds all bodies of one instance along a ray.
+void find_bodies(int i, GridTrees trees, GridRay ray, float voxels_a_t, float max_t, float from_t,
+                 inout BodyList list, inout vec3 passed) {
+  for (int content = 0; content < kGlassContents; ++content) {
+    bool is_of_field = kHasFieldGlass && content == 1;
+    Tree tree = trees.transparent;
+    if (is_of_field) tree = trees.glass;
+    if (!start_walk(tree, ray.base, ray.origin, ray.direction, max_t - ray.t, -1)) continue;
+    find_bodies_in(i, is_of_field, ray, voxels_a_t, max_t, from_t, list, passed);
+  }
+}
+
+// Gets the next body of a list, joined with the bodies that touch it. Returns false at the list's end.
+bool next_body(BodyList list, inout uint i, out Body body) {
+  if (i >= list.count) return false;
+  body = listed_body(list, i++);
+  while (i < list.count) {
+    Body next = listed_body(list, i);
+    if (!continues(body, next)) break;
+    if (next.lengths.y > body.lengths.y) {
+      body.lengths.y = next.lengths.y;
+      end_as(body, next);
+    }
+    body.lengths.z += next.lengths.z;
+    ++i;
+  }
+  return true;
+}
+
+// Returns the reflectance at a surface between media of two refractive indices, and the y of the reflected direction.
+// `direction`, `normal`: in the world, unit.
+vec2 mirror_at(vec3 direction, vec3 normal, float ior, float other_ior) {
+  float along = dot(direction, normal);
+  float cosine = min(abs(along), 1.0);
+  float denser = max(ior, other_ior) / min(ior, other_ior);
+  float up = direction.y - 2.0 * along * normal.y;
+  if (!(denser > 1.0)) return vec2(0.0, up);
+  float inside = sqrt(1.0 - (1.0 - cosine * cosine) / (denser * denser));
+  float across = (cosine - denser * inside) / (cosine + denser * inside);
+  float in_plane = (denser * cosine - inside) / (denser * cosine + inside);
+  return vec2(0.5 * (across * across + in_plane * in_plane), up);
+}

@@ -1,0 +1,140 @@
+#pragma once
+
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include <quoin/scene/scene.h>
+#include <quoin/scene/scene_tracer.h>
+
+#include "render/impostor/raster/impostor_faces.h"
+#include "render/light/lamp_table.h"
+#include "render/light/surface/light_bricks.h"
+#include "render/vulkan/trees/device_grid.h"
+#include "scene/surfaces.h"
+#include "scene/tracer/instance_tree.h"
+#include "scene/tracer/placed_grid.h"
+#include "scene/tracer/tree_cache.h"
+
+namespace quoin::vulkan {
+
+/// An instance and its data for frames.
+struct DevicePlaced {
+  PlacedGrid placed;      ///< only `voxels` of a halved grid is a valid pointer, until the next image
+  std::int32_t grid = 0;  ///< index into the device's grids
+  IVec3 origin{0};        ///< of the tree's coordinates, in the grid
+  DVec3 low{0.0};         ///< tight bounds of all voxels and the field, in the tree's coordinates
+  DVec3 high{0.0};
+  bool is_far = false;                      ///< drawn from its impostor: camera rays skip it
+  const ImpostorFaces* impostor = nullptr;  ///< its impostor, valid until the next image
+  std::size_t impostor_level = 0;           ///< the finest level drawn
+};
+
+/// Returns an instance's position among those from `begin` on, sorted by handle, or the next position if it is missing.
+template <class Iterator>
+[[nodiscard]] Iterator find_placed(Iterator begin, Iterator end, InstanceHandle instance) {
+  return std::lower_bound(begin, end, instance, [](const DevicePlaced& each, InstanceHandle handle) {
+    return each.placed.instance < handle;
+  });
+}
+
+/// The content that rays traverse: instances, and the table of their grids.
+struct Placement {
+  std::vector<DevicePlaced> placed;  ///< in the order of their handles
+  InstanceTree instances;            ///< their boxes in the world
+  std::uint64_t grids = 0;           ///< the table's address
+  bool has_transparent = false;
+  bool has_fields = false;
+  bool has_field_glass = false;  ///< any field has a transparent part
+  std::vector<ShaderFar> far;    ///< visible faces of impostors, in the order of the instances
+};
+/// Writes a table to its place, or to a larger place.
+[[nodiscard]] Status put_table(ShaderMemory& memory, Place& place, std::span<const std::byte> bytes);
+[[nodiscard]] bool is_same(const std::vector<ShaderGrid>& a, const std::vector<ShaderGrid>& b);
+
+/// Appends a type's surface in shader form: three vectors; the last number is `last`.
+void add_surface(const Surface& surface, float last, std::vector<Vec4>& table);
+/// Returns the surfaces of all types in the form of shaders/data.glsl: three vectors each; the last entry is for types
+/// out of range.
+[[nodiscard]] std::vector<Vec4> surface_table(const VoxelRegistry& types);
+
+/// A table of lamps, its bricks and lists in device memory.
+struct DeviceLamps {
+  std::shared_ptr<const LampTable> table;  ///< null: no lamps
+  Place bricks;
+  Place lists;
+
+  /// After an error it is empty.
+  [[nodiscard]] Status put(ShaderMemory& memory, std::shared_ptr<const LampTable> now);
+};
+
+/// Light levels around surfaces in device memory.
+struct DeviceLevels {
+  const LightBricks* table = nullptr;  ///< null: images use another light model
+  Place bricks;
+  Place numbers;
+
+  /// Sends the changes since the last call. After an error it is empty and sends everything at the next call.
+  [[nodiscard]] Status put(ShaderMemory& memory, LightBricks& now);
+
+ private:
+  [[nodiscard]] Status put_changes(ShaderMemory& memory, const LightBricks& now, const LightBricks::Changed& changed);
+};
+
+/// The lookup data for the light of an image.
+struct DeviceLight {
+  DeviceLamps lamps;
+  DeviceLevels levels;
+};
+
+/// A scene's voxels in device memory, and its instances.
+class DeviceScene {
+ public:
+  explicit DeviceScene(ShaderMemory& memory) : memory_(&memory) {}
+
+  /// As VulkanRenderer::update. After an error it is empty.
+  [[nodiscard]] Status update(const Scene& scene, InstanceFilter filter, Threads threads);
+
+  [[nodiscard]] const Placement& placement() const { return placement_; }
+  /// Returns the lamps of the last update's scene. Requires: the scene has not been edited since.
+  [[nodiscard]] std::vector<LampPlace> lamp_places(const Scene& scene) const;
+  [[nodiscard]] const std::vector<ShaderGrid>& grid_table() const { return grid_table_; }
+  [[nodiscard]] std::uint64_t surfaces_address() const { return surfaces_place_.address; }
+  [[nodiscard]] std::uint32_t last_surface() const { return last_surface_; }
+
+ private:
+  struct KnownGrid {
+    IBox bounds;
+    DVec3 pivot{0.0};
+    bool is_used = false;  // by an instance
+    TreeCache trees;
+    DeviceGrid voxels;
+    std::int32_t index = 0;
+  };
+
+  void clear();
+  void place(const Scene& scene, InstanceFilter filter);
+  [[nodiscard]] std::vector<GridHandle> changed_grids(const Scene& scene, InstanceFilter filter, bool& places);
+  Status update_grids(const Scene& scene, const std::vector<GridHandle>& changed, Threads threads);
+  void finish_placed(const Scene& scene);
+  Status try_update(const Scene& scene, InstanceFilter filter, Threads threads);
+  Status put_surfaces(const VoxelRegistry& types);
+  Status put_grids();
+
+  ShaderMemory* memory_;
+  std::map<GridHandle, KnownGrid> grids_;
+  ChangeCursor followed_types_;
+  ChangeCursor followed_visibility_;
+  ChangeCursor followed_scene_;
+  InstanceFilter filter_ = InstanceFilter::Visible;
+  Placement placement_;
+  Place grids_place_;
+  std::vector<ShaderGrid> grid_table_;
+  Place surfaces_place_;
+  std::vector<Vec4> surface_table_;
+  std::uint32_t last_surface_ = 0;
+};
+
+}  // namespace quoin::vulkan

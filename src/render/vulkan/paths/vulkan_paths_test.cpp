@@ -1,0 +1,349 @@
+// Compares path-traced images of a device with the CPU's: the same random numbers give the same paths.
+
+#include <cstdlib>
+
+#include <cmath>
+#include <string>
+
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+
+#include <quoin/io/image_files.h>
+#include <quoin/render/path_tracer.h>
+
+#include "render/cpu/environment_for_tests.h"
+#include "render/path/town_for_tests.h"
+#include "render/vulkan/device/vulkan_for_tests.h"
+#include "render/vulkan/lakeside_for_tests.h"
+#include "render/vulkan/march/renderer_impl.h"
+
+namespace quoin::vulkan_test {
+namespace {
+
+using render_test::add_type;
+using render_test::of_town;
+using render_test::place;
+using render_test::towards;
+using render_test::town;
+
+PathOptions small(int samples = 4) {
+  PathOptions options;
+  options.width = 64;
+  options.height = 48;
+  options.samples = samples;
+  options.layers = true;
+  options.environment = physical_day();
+  return options;
+}
+
+// The differences of two images with the same paths.
+struct PathDifferences {
+  int pixels = 0;      ///< pixels whose light differs by more than 1/100
+  int depths = 0;      ///< by more than 1e-4 of the distance
+  double light = 1.0;  /// ratio of the total light to the other image
+  int total = 0;
+};
+
+bool is_near(float a, float b, float relative, float absolute) {
+  return a == b || std::abs(a - b) <= relative * std::max(std::abs(a), std::abs(b)) + absolute;
+}
+
+PathDifferences path_differences(const PathImage& a, const PathImage& b) {
+  PathDifferences found;
+  EXPECT_EQ(a.radiance.size(), b.radiance.size());
+  if (a.radiance.size() != b.radiance.size()) return found;
+  found.total = static_cast<int>(a.radiance.size());
+  DVec3 of_a(0.0);
+  DVec3 of_b(0.0);
+  for (std::size_t i = 0; i < a.radiance.size(); ++i) {
+    bool differs = !is_near(a.alpha[i], b.alpha[i], 0.01F, 1e-4F);
+    for (int c = 0; c < 3; ++c) {
+      differs = differs || !is_near(a.radiance[i][c], b.radiance[i][c], 0.01F, 1e-3F) ||
+                !is_near(a.scene[i][c], b.scene[i][c], 0.01F, 1e-3F);
+    }
+    found.pixels += static_cast<int>(differs);
+    of_a += DVec3(a.radiance[i]);
+    of_b += DVec3(b.radiance[i]);
+    if (a.depth.values.empty() || b.depth.values.empty()) continue;
+    found.depths += static_cast<int>(!is_near(a.depth.values[i], b.depth.values[i], 1e-4F, 0.0F));
+  }
+  const DVec3 ones(1.0);
+  found.light = of_b == DVec3(0.0) ? (of_a == DVec3(0.0) ? 1.0 : 2.0) : glm::dot(of_a, ones) / glm::dot(of_b, ones);
+  return found;
+}
+
+class VulkanPaths : public VulkanTest {
+ protected:
+  PathImage drawn(const Scene& scene, const Camera& camera, const PathOptions& options) {
+    const Status updated = renderer_->update(scene);
+    EXPECT_TRUE(updated) << to_string(updated.error());
+    auto image = renderer_->render_paths(camera, options);
+    EXPECT_TRUE(image) << to_string(image.error());
+    return image ? std::move(*image) : PathImage{};
+  }
+
+  // `share`: the share of pixels in which single precision may change paths.
+  void expect_same_light(const Scene& scene, const Camera& camera, const PathOptions& options, const std::string& name,
+                         double share = 0.002) {
+    const PathImage device = drawn(scene, camera, options);
+    auto cpu = PathTracer(scene).render(camera, options);
+    ASSERT_TRUE(cpu);
+    const PathDifferences found = path_differences(device, *cpu);
+    EXPECT_LE(found.pixels, share * found.total) << name;
+    EXPECT_LE(found.depths, 0.005 * found.total + 1.0) << name;
+    EXPECT_NEAR(found.light, 1.0, 0.01) << name;
+    EXPECT_NEAR(static_cast<double>(device.rays), static_cast<double>(cpu->rays), 0.02 * static_cast<double>(cpu->rays))
+        << name;
+    EXPECT_NEAR(static_cast<double>(device.pixels_hit), static_cast<double>(cpu->pixels_hit),
+                0.002 * found.total + 1.0);
+    if (std::getenv("QUOIN_WRITE_VULKAN") == nullptr) return;
+    std::printf("%s: %d pixels, %d depths of %d; light %.5f; rays %lld, %lld\n", name.c_str(), found.pixels,
+                found.depths, found.total, found.light, static_cast<long long>(device.rays),
+                static_cast<long long>(cpu->rays));
+    const std::string base = std::string(QUOIN_BINARY_DIR "/paths_") + name;
+    EXPECT_TRUE(write_png(*develop(device), base + ".vulkan.png"));
+    EXPECT_TRUE(write_png(*develop(*cpu), base + ".cpu.png"));
+  }
+};
+
+TEST_F(VulkanPaths, MatchCpu) {
+  PathOptions options = small();
+  expect_same_light(town(), of_town(), options, "physical");
+  physical_in(options).sky.model = SkyModel::Gradient;
+  expect_same_light(town(), of_town(), options, "gradient");
+  physical_in(options).sky.model = SkyModel::Uniform;
+  physical_in(options).sun.angle_radians = 0.0;
+  options.max_bounces = 1;
+  expect_same_light(town(), of_town(), options, "uniform");
+}
+
+TEST_F(VulkanPaths, SampleEnvironmentLikeCpu) {
+  PathOptions options = small();
+  RadianceImage image{16, 8, std::vector<float>(std::size_t{16} * 8 * 3, 0.2F)};
+  image.rgb[3 * (2 * 16 + 5)] = 40.0F;
+  physical_in(options).sky.image = std::make_shared<const RadianceImage>(image);
+  physical_in(options).sky.model = SkyModel::Image;
+  physical_in(options).sky.image_turn_radians = 1.0;
+  physical_in(options).sun.brightness = 0.0;
+  expect_same_light(town(), of_town(), options, "environment");
+}
+
+TEST_F(VulkanPaths, MatchCpuWithGroundFogAndLens) {
+  PathOptions options = small();
+  physical_in(options).ground = GroundPlane{.height = -3.0, .colour = Vec3(0.4F), .only_shadows = false, .fade = 0.1};
+  expect_same_light(town(), of_town(), options, "ground");
+  physical_in(options).ground->only_shadows = true;
+  expect_same_light(town(), of_town(), options, "caught");
+  physical_in(options).fog = Fog{.density = 0.02, .colour = {0.9F, 0.95F, 1.0F}, .anisotropy = 0.4, .top = 6.0};
+  expect_same_light(town(), of_town(), options, "fog");
+  options.lens.radius = 0.7;
+  options.lens.blades = 5;
+  options.lens.focus_distance = 40.0;
+  expect_same_light(town(), of_town(), options, "lens");
+}
+
+TEST_F(VulkanPaths, MatchCpuInOrthographicImages) {
+  Camera camera = of_town();
+  camera.projection = Camera::Projection::Orthographic;
+  camera.view_height = 40.0;
+  expect_same_light(town(), camera, small(), "orthographic");
+}
+
+TEST_F(VulkanPaths, MatchCpuInClouds) {
+  Scene scene = town();
+  VoxelProperties cloud;
+  cloud.colour = {230, 230, 240, 60};
+  cloud.visibility = Visibility::Transparent;
+  cloud.scattering = 0.2F;
+  cloud.anisotropy = 0.5F;
+  const VoxelType type = scene.types.add(cloud).value_or(kAir);
+  Grid grid;
+  grid.fill_box({IVec3(0), {12, 6, 12}}, type);
+  place(scene, std::move(grid), {6.0, 10.0, 6.0});
+  expect_same_light(scene, of_town(), small(), "clouds");
+}
+
+TEST_F(VulkanPaths, DenoiseLikeCpu) {
+  PathOptions options = small();
+  options.denoise = true;
+  physical_in(options).fog = Fog{.density = 0.01, .colour = Vec3(1.0F), .anisotropy = 0.0, .top = 4.0};
+  expect_same_light(town(), of_town(), options, "denoised");
+}
+
+// From the fifth sample on, paths on the CPU use the learned shares of lamps.
+TEST_F(VulkanPaths, ConvergeToCpuImage) {
+  const PathOptions options = small(48);
+  const Scene scene = town();
+  const PathImage device = drawn(scene, of_town(), options);
+  const auto cpu = PathTracer(scene).render(of_town(), options);
+  ASSERT_TRUE(cpu);
+  EXPECT_NEAR(path_differences(device, *cpu).light, 1.0, 0.005);
+  constexpr int kBlock = 8;
+  double sum = 0.0;
+  int blocks = 0;
+  for (int y = 0; y < options.height; y += kBlock) {
+    for (int x = 0; x < options.width; x += kBlock) {
+      DVec3 of_device(0.0);
+      DVec3 of_cpu(0.0);
+      for (int i = 0; i < kBlock * kBlock; ++i) {
+        const auto at = static_cast<std::size_t>((y + i / kBlock) * options.width + x + i % kBlock);
+        of_device += DVec3(device.radiance[at]);
+        of_cpu += DVec3(cpu->radiance[at]);
+      }
+      const double difference = glm::length(of_device - of_cpu) / glm::length(of_cpu);
+      EXPECT_LT(difference, 0.15) << x << ' ' << y;
+      sum += difference * difference;
+      ++blocks;
+    }
+  }
+  EXPECT_LT(std::sqrt(sum / blocks), 0.03);
+}
+
+// Fields, one of them without materials, which is white. Nightly runs add glass of fields and of voxels, since their
+// shader takes a minute to compile.
+TEST_F(VulkanPaths, MatchCpuOnFields) {
+  const bool is_night = std::getenv("QUOIN_NIGHTLY") != nullptr;
+  Scene scene = is_night ? town() : Scene();
+  const FieldTypes types = add_field_types(scene);
+  SceneGrid hill;
+  hill.field.add_sphere({0.0, 0.0, 0.0}, 6.0, types.stone);
+  hill.field.add_sphere({9.0, 2.0, 3.0}, 4.0, is_night ? types.glass : types.glow);
+  scene.add_instance({"", scene.add_grid(std::move(hill)), DVec3(12.0, 4.0, 12.0)});
+  SceneGrid plain;
+  plain.field.edit({IVec3(-6), IVec3(7)}, [](IVec3 p, DensitySample) {
+    return DensitySample{glm::length(Vec3(p)) - 4.0F, kAir};
+  });
+  scene.add_instance({"", scene.add_grid(std::move(plain)), DVec3(-8.0, 3.0, 14.0)});
+  expect_same_light(scene, of_town(), small(), "fields");
+}
+
+// More glass bodies along a ray than a pixel's list holds.
+TEST_F(VulkanPaths, MatchCpuThroughManyPanes) {
+  Scene scene;
+  const VoxelType ground = add_type(scene, {200, 200, 200, 255});
+  VoxelProperties pane;
+  pane.visibility = Visibility::Transparent;
+  pane.ior = 1.0F;
+  Grid grid;
+  grid.fill_box({{-20, -20, -1}, {20, 20, 0}}, ground);
+  VoxelProperties cloud;
+  cloud.visibility = Visibility::Transparent;
+  cloud.scattering = 0.01F;
+  for (int i = 0; i < 40; ++i) {
+    VoxelProperties& next = i % 2 == 0 ? pane : cloud;
+    next.colour = {static_cast<std::uint8_t>(200 + i), 240, 250, 10};
+    const VoxelType type = scene.types.add(next).value_or(kAir);
+    grid.fill_box({{-20, -20, 2 + 2 * i}, {20, 20, 3 + 2 * i}}, type);
+  }
+  place(scene, std::move(grid));
+  PathOptions options = small(4);
+  options.width = options.height = 24;
+  physical_in(options).sky.model = SkyModel::Uniform;
+  expect_same_light(scene, towards({0.0, 0.0, 100.0}, {0.0, 0.0, 0.0}), options, "panes");
+}
+
+// A distant camera, whose view space begins in front of the scene; also far from the world's origin.
+TEST_F(VulkanPaths, MatchCpuFromFarAway) {
+  Scene scene = town();
+  const DVec3 far(3.0e6, -2.0e5, 1.0e6);
+  for (const InstanceHandle handle : scene.instances().handles()) scene.edit(handle).position += far;
+  scene.lamps.front().position += far;
+  Camera camera = towards(far + DVec3(9.0e3, 5.0e3, 2.0e4), far, 0.003);
+  PathOptions options = small();
+  physical_in(options).ground =
+      GroundPlane{.height = far.y - 2.0, .colour = Vec3(0.3F), .only_shadows = false, .fade = 0.0};
+  expect_same_light(scene, camera, options, "far", 0.01);
+}
+
+TEST_F(VulkanPaths, EmptySceneShowsSky) {
+  expect_same_light(Scene(), of_town(), small(), "nothing", 0.0);
+}
+
+TEST_F(VulkanPaths, AddSamplesToImage) {
+  const Scene scene = town();
+  ASSERT_TRUE(renderer_->update(scene));
+  VulkanPathImage image(*renderer_);
+  EXPECT_EQ(image.samples(), 0);
+  EXPECT_EQ(image.read().error().code, ErrorCode::InvalidArgument);
+  PathOptions options = small(3);
+  ASSERT_TRUE(renderer_->draw_paths(image, of_town(), options, Accumulation::Restart));
+  options.samples = 5;
+  ASSERT_TRUE(renderer_->draw_paths(image, of_town(), options, Accumulation::Continue));
+  EXPECT_EQ(image.samples(), 8);
+  EXPECT_EQ(image.width(), 64);
+  EXPECT_GE(image.bytes(), std::size_t{64} * 48 * 112);
+  const auto in_parts = image.read();
+  const auto at_once = renderer_->render_paths(of_town(), small(8));
+  ASSERT_TRUE(in_parts && at_once);
+  EXPECT_EQ(in_parts->radiance, at_once->radiance);
+  EXPECT_EQ(in_parts->rays, at_once->rays);
+  ASSERT_TRUE(renderer_->draw_paths(image, of_town(), small(1), Accumulation::Restart));
+  EXPECT_EQ(image.samples(), 1);
+}
+
+TEST_F(VulkanPaths, FollowEdits) {
+  Scene scene = town();
+  ASSERT_TRUE(renderer_->update(scene));
+  ASSERT_TRUE(renderer_->render_paths(of_town(), small(1)));
+  VoxelProperties glowing;
+  glowing.colour = {90, 255, 90, 255};
+  glowing.emission = 9.0F;
+  const VoxelType type = scene.types.add(glowing).value_or(kAir);
+  const GridHandle grid = scene.instances()[scene.instances().handles().front()].grid;
+  scene.edit(grid).grid.fill_box({{-4, 0, 10}, {2, 6, 12}}, type);
+  scene.lamps.clear();
+  expect_same_light(scene, of_town(), small(), "edited");
+}
+
+TEST_F(VulkanPaths, UploadEmissiveFacesOnlyOnChange) {
+  Scene scene = town();
+  const vulkan::DeviceMemory& memory = renderer_->impl().memory;
+  const auto sent = [&] {
+    EXPECT_TRUE(renderer_->update(scene));
+    const std::uint64_t before = memory.written();
+    EXPECT_TRUE(renderer_->render_paths(of_town(), small(1)));
+    return memory.written() - before;
+  };
+  const std::uint64_t first = sent();
+  const std::uint64_t again = sent();
+  EXPECT_LT(again, first);
+  const GridHandle grid = scene.instances()[scene.instances().handles().front()].grid;
+  scene.edit(grid).grid.fill_box({{-4, 0, 10}, {2, 6, 12}}, 1);
+  EXPECT_EQ(sent(), again) << "what glows is where it was";
+  VoxelProperties glowing;
+  glowing.colour = {90, 255, 90, 255};
+  glowing.emission = 9.0F;
+  const VoxelType type = scene.types.add(glowing).value_or(kAir);
+  const std::uint64_t with_a_type = sent();
+  EXPECT_GT(with_a_type, again);
+  scene.edit(grid).grid.fill_box({{-4, 0, 10}, {2, 6, 12}}, type);
+  // More than a hundred unit faces, which take 20 bytes each, and as many free slots.
+  EXPECT_GT(sent(), again + 4'000);
+  expect_same_light(scene, of_town(), small(), "glowing");
+}
+
+TEST_F(VulkanPaths, RejectSameInputAsCpu) {
+  const Scene scene = town();
+  ASSERT_TRUE(renderer_->update(scene));
+  PathOptions options = small();
+  options.samples = 0;
+  EXPECT_EQ(renderer_->render_paths(of_town(), options).error().code, ErrorCode::InvalidArgument);
+  options = small();
+  physical_in(options).sky.model = SkyModel::Image;
+  EXPECT_EQ(renderer_->render_paths(of_town(), options).error().code, ErrorCode::InvalidArgument);
+  options = small();
+  physical_in(options).sun.direction = DVec3(NAN);
+  EXPECT_EQ(renderer_->render_paths(of_town(), options).error().code, ErrorCode::InvalidArgument);
+  VulkanPathImage image(*renderer_);
+  ASSERT_TRUE(renderer_->draw_paths(image, of_town(), small(1), Accumulation::Restart));
+  options = small(65'536);
+  EXPECT_EQ(renderer_->draw_paths(image, of_town(), options, Accumulation::Continue).error().code,
+            ErrorCode::LimitExceeded);
+  const auto stop = [](double) { return false; };
+  EXPECT_EQ(renderer_->draw_paths(image, of_town(), small(1), Accumulation::Continue, stop).error().code,
+            ErrorCode::Cancelled);
+  EXPECT_EQ(image.samples(), 0);
+}
+
+}  // namespace
+}  // namespace quoin::vulkan_test
