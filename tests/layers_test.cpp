@@ -46,7 +46,6 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"scene/tracer/tree_cache.h", {"render"}},
     {"scene/tracer/scene_tracer_impl.h", {"render"}},
     {"mesh/blocky/chunk_triangles.h", {"store"}},
-    {"mesh/blocky/occlusion_atlas.h", {"scene"}},
     {"mesh/surface/voxel_surface.h", {"render", "scene"}},
     {"mesh/surface/smooth_surface.h", {"scene"}},
     {"mesh/surface/face_materials.h", {"render", "scene"}},

@@ -11,11 +11,11 @@
 #include <quoin/grid/voxel_field.h>
 
 #include "core/work/progress_steps.h"
-#include "mesh/blocky/occlusion_atlas.h"
 #include "mesh/surface/face_materials.h"
 #include "mesh/surface/simplify.h"
 #include "mesh/surface/voxel_surface.h"
 #include "scene/instance_axes.h"
+#include "scene/meshes/occlusion_atlas.h"
 #include "scene/meshes/scene_mesh_parts.h"
 
 namespace quoin {

@@ -1,4 +1,4 @@
-#include "mesh/blocky/occlusion_atlas.h"
+#include "scene/meshes/occlusion_atlas.h"
 
 #include <algorithm>
 #include <bit>

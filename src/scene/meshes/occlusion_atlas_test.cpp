@@ -1,4 +1,4 @@
-#include "mesh/blocky/occlusion_atlas.h"
+#include "scene/meshes/occlusion_atlas.h"
 
 #include <gtest/gtest.h>
 
@@ -64,7 +64,7 @@ std::array<double, 3> filtered(const Image& image, double u, double v) {
   return sum;
 }
 
-using Corner = std::tuple<int, int, int, int>;  // position, and direction of the face
+using FaceCorner = std::tuple<int, int, int, int>;  // position, and direction of the face
 
 /// Calls `visit(voxel corner, occlusion level, type)` for every corner of every voxel face.
 template <class Visit>
@@ -80,16 +80,16 @@ void for_corners(const BlockyTriangles& mesh, Visit visit) {
         place[frame.v] += v;
         visit(at, static_cast<double>(u) / static_cast<double>(size[frame.u]),
               static_cast<double>(v) / static_cast<double>(size[frame.v]),
-              Corner{place.x, place.y, place.z, static_cast<int>(mesh.directions[at])});
+              FaceCorner{place.x, place.y, place.z, static_cast<int>(mesh.directions[at])});
       }
     }
   }
 }
 
 /// Returns the corner occlusion of the split faces, which is equal wherever two faces meet.
-std::map<Corner, double> levels_of(const BlockyTriangles& split) {
-  std::map<Corner, double> levels;
-  for_corners(split, [&](std::size_t at, double u, double v, const Corner& corner) {
+std::map<FaceCorner, double> levels_of(const BlockyTriangles& split) {
+  std::map<FaceCorner, double> levels;
+  for_corners(split, [&](std::size_t at, double u, double v, const FaceCorner& corner) {
     const auto level = [&](std::size_t i) { return static_cast<double>(split.occlusion[at + i]); };
     const double here =
         (1 - u) * (1 - v) * level(0) + u * (1 - v) * level(1) + u * v * level(2) + (1 - u) * v * level(3);
@@ -118,10 +118,10 @@ TEST(OcclusionAtlas, StoresColourTimesOcclusionAtCorners) {
     SCOPED_TRACE(seed);
     const Baked baked = bake(random_grid(seed, 3), types);
     ASSERT_LT(baked.merged.positions.size(), baked.split.positions.size());
-    const std::map<Corner, double> levels = levels_of(baked.split);
+    const std::map<FaceCorner, double> levels = levels_of(baked.split);
     std::size_t checked = 0;
     double largest = 0.0;
-    for_corners(baked.merged, [&](std::size_t at, double u, double v, const Corner& corner) {
+    for_corners(baked.merged, [&](std::size_t at, double u, double v, const FaceCorner& corner) {
       const auto uv = [&](std::size_t axis) {
         const auto of = [&](std::size_t i) { return static_cast<double>(baked.coordinates[at + i][axis]); };
         return (1 - u) * (1 - v) * of(0) + u * (1 - v) * of(1) + u * v * of(2) + (1 - u) * v * of(3);
