@@ -139,6 +139,11 @@ std::string folder_of(const fs::path& path) {
   return folder == "." ? "" : folder;
 }
 
+// Returns the first part of a folder: "light" for "light/propagated".
+std::string top_folder(const std::string& folder) {
+  return folder.substr(0, folder.find('/'));
+}
+
 using Graph = std::map<std::string, std::set<std::string>>;
 
 // Returns a path from a node back to itself, if there is one.
@@ -317,25 +322,34 @@ TEST(Layers, FindsCycles) {
   EXPECT_TRUE(cycle_in({{"a", {"b", "c"}}, {"b", {"d"}}, {"c", {"d"}}}).empty());
   EXPECT_EQ(folder_of("grid/chunk/chunk.cpp"), "chunk");
   EXPECT_EQ(folder_of("grid/grid.cpp"), "");
+  EXPECT_EQ(top_folder("light/propagated"), "light");
+  EXPECT_EQ(top_folder("light"), "light");
 }
 
 // Files directly in a layer may include its folders, and its folders may include them.
 TEST(Layers, HasNoCyclesBetweenFolders) {
   std::map<std::string, Graph> layers;
+  std::map<std::string, Graph> parts;  // each folder directly in a layer with all its subfolders
   for (const Source& source : sources_of("src")) {
     const std::string folder = folder_of(source.path);
     if (is_for_tests(source.file) || folder.empty()) continue;
     for (const Include& include : source.includes) {
       if (!include.quoted || *fs::path(include.path).begin() != source.layer()) continue;
       const std::string other = folder_of(include.path);
-      if (!other.empty() && other != folder) layers[source.layer()][folder].insert(other);
+      if (other.empty()) continue;
+      if (other != folder) layers[source.layer()][folder].insert(other);
+      const std::string part = top_folder(folder);
+      const std::string other_part = top_folder(other);
+      if (part != other_part) parts[source.layer()][part].insert(other_part);
     }
   }
-  EXPECT_FALSE(layers.empty());
-  for (const auto& [layer, folders] : layers) {
-    std::string cycle;
-    for (const std::string& folder : cycle_in(folders)) cycle += (cycle.empty() ? "" : " -> ") + folder;
-    EXPECT_EQ(cycle, "") << "in " << layer;
+  for (const auto* graphs : {&layers, &parts}) {
+    EXPECT_FALSE(graphs->empty());
+    for (const auto& [layer, folders] : *graphs) {
+      std::string cycle;
+      for (const std::string& folder : cycle_in(folders)) cycle += (cycle.empty() ? "" : " -> ") + folder;
+      EXPECT_EQ(cycle, "") << "in " << layer;
+    }
   }
 }
 
