@@ -363,6 +363,14 @@ TEST(MeshScheduler, StopsWithoutMeshingQueue) {
   EXPECT_LT(started, 60);
 }
 
+// GridSurfaces uses the defaults, and must give the surfaces of LiveMeshes.
+TEST(MeshScheduler, HasDefaultsOfGridSurfaces) {
+  EXPECT_TRUE(surface_options({}) == ChunkSurfaceOptions{});
+  LiveMeshOptions options;
+  options.merge = false;
+  EXPECT_FALSE(surface_options(options) == ChunkSurfaceOptions{});
+}
+
 TEST(MeshJobQueueDeathTest, RejectsQueuesWithoutWorkersAndMissingJobs) {
   const MeshJobQueue::Work work = [](SurfaceJob&, SurfaceWorkspace&) {};
   QUOIN_EXPECT_MISTAKE(MeshJobQueue(0, work, {}), "workers with a function");

@@ -30,6 +30,8 @@ struct ChunkSurfaceOptions {
   SmoothOcclusionOptions occlusion{};
   SurfaceColours colours = SurfaceColours::Sharp;
   double detail_distance = std::numeric_limits<double>::infinity();
+
+  bool operator==(const ChunkSurfaceOptions&) const = default;
 };
 
 using SurfaceClock = std::chrono::steady_clock;
