@@ -28,11 +28,21 @@ Result<FileFormat> format_of(const std::filesystem::path& path, const MeshFileOp
   return format->format;
 }
 
-/// Returns the driver of a mesh format. Errors: Unsupported.
+/// Returns the driver of a format that a caller passed. Errors: InvalidArgument for a name of no format.
+Result<const FormatDriver*> find_driver(FileFormat format) {
+  const auto info = [](const FormatDriver* driver) { return driver->info.format; };
+  const auto drivers = format_drivers();
+  const auto found = std::ranges::find(drivers, format, info);
+  if (found != drivers.end()) return *found;
+  return make_error(ErrorCode::InvalidArgument,
+                    "cannot write meshes: no format is named \"" + std::string(format.name()) + "\"");
+}
+
+/// Returns the driver of a mesh format. Errors: InvalidArgument, Unsupported.
 Result<const FormatDriver*> driver_for_meshes(FileFormat format) {
-  const FormatDriver& driver = driver_of(format);
-  if (driver.plan_mesh != nullptr) return &driver;
-  return make_error(ErrorCode::Unsupported, std::string(driver.info.extension) + " is not a mesh format");
+  auto driver = find_driver(format);
+  if (!driver || (*driver)->plan_mesh != nullptr) return driver;
+  return make_error(ErrorCode::Unsupported, std::string((*driver)->info.extension) + " is not a mesh format");
 }
 
 /// Returns an error if a format cannot store something in the meshes or options. Errors: Unsupported.
@@ -207,7 +217,8 @@ Result<std::vector<std::byte>> write_mesh(const SceneMeshes& meshes, FileFormat 
 }
 
 DVec3 mesh_file_offset(const SceneMeshes& meshes, FileFormat format, const MeshFileOptions& options) {
-  const double most_steps = driver_of(format).most_steps;
+  const auto driver = find_driver(format);
+  const double most_steps = driver ? (*driver)->most_steps : 0.0;
   const auto written = as_written(meshes, options);
   if (most_steps == 0.0 || !written || !check_meshes(*written)) return DVec3(0.0);
   return file_origin(*written, most_steps);

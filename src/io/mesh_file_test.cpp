@@ -524,6 +524,24 @@ TEST(MeshFiles, SelectsFormatByOptionOrPath) {
   EXPECT_EQ(folder.count(), 1U);
 }
 
+TEST(MeshFiles, RefusesUnknownFormat) {
+  const TestFolder folder("mesh_file_unknown_format");
+  const FileFormat mistyped("glbb");
+  const auto path = folder.file("out.glb");
+  const auto file = write_mesh({}, path, {.format = mistyped});
+  const auto bytes = write_mesh({}, mistyped);
+  const auto files = mesh_files({}, path, {.format = mistyped});
+  ASSERT_FALSE(file);
+  EXPECT_EQ(file.error().code, ErrorCode::InvalidArgument);
+  EXPECT_EQ(to_string(file.error()), path.string() + ": cannot write meshes: no format is named \"glbb\"");
+  ASSERT_FALSE(bytes);
+  EXPECT_EQ(bytes.error().code, ErrorCode::InvalidArgument);
+  ASSERT_FALSE(files);
+  EXPECT_EQ(files.error().code, ErrorCode::InvalidArgument);
+  EXPECT_EQ(mesh_file_offset({}, mistyped), DVec3(0.0));
+  EXPECT_EQ(folder.count(), 0U);
+}
+
 /// Positive inside; samples of a ball.
 Volume ball(IVec3 size, DVec3 centre, double radius) {
   Volume volume;

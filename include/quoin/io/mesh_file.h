@@ -106,10 +106,10 @@ struct MeshFileOptions {
 /// Errors:    Unsupported for formats without meshes; for light, `quantize` and `compress` outside glTF; for an atlas
 ///            with occlusion in PLY, STL and 3MF; for OcclusionIn::Attribute in OBJ, STL and 3MF; for `compress` in
 ///            builds without meshoptimizer. CannotWrite. Cancelled. LimitExceeded beyond 4 GiB of GLB, or 2^31 - 1
-///            vertices or triangles of PLY. InvalidArgument if a transform is not finite, not affine or singular, the
-///            scale is not positive, a vertex exceeds the range of floats, or a mesh is inconsistent (array
-///            lengths that differ, vertex indices out of range, unregistered types, numbers that are not finite). Each
-///            file is written atomically; if a later file fails, earlier ones stay.
+///            vertices or triangles of PLY. InvalidArgument if no format has the name of `format`, a transform is not
+///            finite, not affine or singular, the scale is not positive, a vertex exceeds the range of floats, or a
+///            mesh is inconsistent (array lengths that differ, vertex indices out of range, unregistered types, numbers
+///            that are not finite). Each file is written atomically; if a later file fails, earlier ones stay.
 /// Sources:   Khronos glTF 2.0 specification, sections 3 and 4.4; KHR_materials_emissive_strength, _transmission,
 ///            _volume, _ior and _unlit; KHR_mesh_quantization; EXT_meshopt_compression; Alias/Wavefront's OBJ and MTL.
 [[nodiscard]] Result<std::uint64_t> write_mesh(const SceneMeshes& meshes, const std::filesystem::path& path,
@@ -129,7 +129,7 @@ struct MeshFileOptions {
 /// STL header after "offset". Returns (0, 0, 0) for other formats and for invalid meshes.
 [[nodiscard]] DVec3 mesh_file_offset(const SceneMeshes& meshes, FileFormat format, const MeshFileOptions& options = {});
 
-/// Returns the files that write_mesh writes or replaces, `path` first. Errors: Unsupported.
+/// Returns the files that write_mesh writes or replaces, `path` first. Errors: Unsupported, InvalidArgument.
 [[nodiscard]] Result<std::vector<std::filesystem::path>> mesh_files(const SceneMeshes& meshes,
                                                                     const std::filesystem::path& path,
                                                                     const MeshFileOptions& options = {});
