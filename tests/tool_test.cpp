@@ -617,8 +617,8 @@ TEST_F(Tool, ConvertReadsAndWritesStandardStreams) {
            {"convert - x.glb < nothing.txt", "quoin: standard input: unknown file format; readable are .3mf"},
            {"convert tiny.vox -", "quoin: writing to standard output needs --to FORMAT"},
            {"convert tiny.vox - --to obj",
-            "quoin: cannot write .obj to standard output: it consists of several files\n"},
-           {"convert tiny.vox - --to glb --json", "quoin: cannot use --json: OUT is standard output\n"},
+            "quoin: cannot write .obj to standard output: it consists of several files (try --help)\n"},
+           {"convert tiny.vox - --to glb --json", "quoin: cannot use --json: OUT is standard output (try --help)\n"},
            {"convert - --to glb", "quoin: standard input (-) must be the only input"},
            {"convert tiny.vox - --to glb > /dev/full", "quoin: standard output: No space left on device\n"}}) {
     const ToolRun result = shell("'" QUOIN_TOOL "' " + arguments);

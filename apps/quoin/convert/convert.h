@@ -5,68 +5,24 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 #include <quoin/io/volume.h>
-#include <quoin/render/light_options.h>
 #include <quoin/scene/scene_animation.h>
 #include <quoin/scene/scene_faces.h>
 #include <quoin/scene/scene_meshes.h>
 
 #include "command_files.h"
 #include "commands.h"
+#include "convert/convert_arguments.h"
 #include "output.h"
 #include "run_control.h"
 #include "watch.h"
 
 namespace quoin::tool {
-
-enum class Mesher : std::uint8_t { Greedy, Culled, Smooth };
-
-/// Returns the name of a mesher, as in --mesher.
-[[nodiscard]] inline std::string name_of(Mesher mesher) {
-  if (mesher == Mesher::Smooth) return "smooth";
-  return mesher == Mesher::Culled ? "culled" : "greedy";
-}
-
-/// The options of `quoin convert`.
-struct ConvertOptions {
-  CommonOptions common;
-  std::filesystem::path output;
-  FileSet inputs;    ///< all input files, which are never overwritten
-  std::string from;  ///< the required input format; empty: any
-  bool force = false;
-  bool is_from_stream = false;   ///< IN is standard input and has no name
-  bool is_one_of_many = false;   ///< shows no progress bar
-  std::optional<Mesher> mesher;  ///< default: greedy for voxels, smooth for volumes and fields
-  bool occlusion_off = false;
-  bool ao_as_attribute = false;  ///< writes occlusion as an attribute, not in the colours
-  SmoothOcclusionOptions field_occlusion;
-  bool has_field_occlusion = false;  ///< an option of `field_occlusion` was given
-  bool watertight = false;
-  std::optional<double> iso;
-  std::optional<double> simplify;
-  std::optional<double> smoothness;  ///< for smooth surfaces around voxels
-  std::optional<SurfaceColours> colours;
-  bool is_atlas = false;              ///< an atlas texture instead of a palette
-  std::optional<LightOptions> light;  ///< propagated light, stored at vertices
-  bool animate = false;               ///< writes all frames as a glTF animation
-  double frames_per_second = 10.0;    ///< for `animate`
-  bool separate_models = false;       ///< meshes touching instances separately
-  std::optional<double> scale;
-  std::optional<double> voxel_mm;     ///< millimetres per voxel in .stl and .3mf
-  std::optional<UpAxis> up;           ///< default: z for .ply, .stl and .3mf, else y
-  bool compress = false;              ///< see MeshFileOptions, glTF only
-  bool quantize = false;              ///< see MeshFileOptions, glTF only
-  bool mesh_only = false;             ///< an option that only applies to meshes was given
-  std::string mesh_input;             ///< a given option that only applies to triangle meshes, or ""
-  bool lights = false;                ///< writes lamps and cameras, glTF only
-  std::vector<FileCamera> cameras{};  ///< the cameras of the input, for `lights`
-  bool as_voxels = false;             ///< --solid: converts fields to voxels even if OUT can hold fields
-  bool watch = false;                 ///< converts again when the input changes
-};
 
 struct Seconds {
   double read = 0;
@@ -89,8 +45,40 @@ struct Outcome {
   std::vector<std::string> warnings;
 };
 
-/// Converts one file. If the options do not fit the content of the file, `fault` gets the message of the error.
-[[nodiscard]] Result<Outcome> convert_file(const ConvertOptions& options, const FormatInfo& format, std::string& fault);
+/// The result of convert_file: an outcome, or an error with the exit status of the tool.
+class Conversion : public Result<Outcome> {
+ public:
+  Conversion(Result<Outcome> result) : Result<Outcome>(std::move(result)) {}
+  Conversion(Outcome outcome) : Result<Outcome>(std::move(outcome)) {}
+  Conversion(Error error) : Result<Outcome>(std::move(error)) {}
+
+  /// Returns the result for options that do not fit the input.
+  [[nodiscard]] static Conversion wrong_usage(Error error) {
+    Conversion refused(std::move(error));
+    refused.exit_status_ = kWrongUsage;
+    return refused;
+  }
+
+  /// Returns the exit status for the error.
+  [[nodiscard]] int exit_status() const { return exit_status_; }
+
+ private:
+  int exit_status_ = kFailed;
+};
+
+/// Converts one file to `format`.
+[[nodiscard]] Conversion convert_file(const ConvertOptions& options, const FormatInfo& format);
+
+/// Checks --from. Errors: BadFormat.
+[[nodiscard]] Status check_input_format(const ConvertOptions& options, const OpenedInput& input);
+
+/// Checks the rules that need the opened input, before its content is read. `to`: the format of the output.
+/// Errors: InvalidArgument, without a path.
+[[nodiscard]] Status check_input_rules(const ConvertOptions& options, const FormatInfo& to, const OpenedInput& input);
+
+/// Checks the rules that need the mesher, which may depend on the content of the input.
+/// Errors: InvalidArgument, without a path.
+[[nodiscard]] Status check_mesher_rules(const ConvertOptions& options, Mesher mesher);
 
 /// Returns true for formats that hold voxels and no fields.
 [[nodiscard]] inline bool holds_only_voxels(const FormatInfo& format) {
@@ -112,34 +100,14 @@ void normalise_scale(Scene& scene, const FormatInfo& format, std::vector<std::st
 void add_lights(const Scene& scene, const ConvertOptions& options, SceneMeshes& meshes,
                 std::vector<std::string>& warnings);
 
-/// Returns an error message if the options do not fit the output format, else "".
-[[nodiscard]] std::string find_format_error(const ConvertOptions& options, const FormatInfo& format);
-
 [[nodiscard]] Json outcome_json(const Outcome& outcome);
-
-/// Options for converting several files.
-struct ManyOptions {
-  std::vector<std::filesystem::path> inputs;  ///< files and folders
-  std::optional<std::filesystem::path> folder;
-  std::string to;  ///< an extension, with or without its dot
-  bool recursive = false;
-};
 
 /// For each converted input, the stamps of its files at that time.
 using Converted = std::map<std::filesystem::path, Stamps>;
 
-/// Converts all inputs in parallel and prints the failures last. With `options.watch`, skips the inputs in `done` that
+/// Converts all inputs in parallel and prints the failures last. With --watch, skips the inputs in `done` that
 /// have not changed, and adds those converted now.
-[[nodiscard]] WatchedWork run_many(const ConvertOptions& options, const ManyOptions& many, Converted& done);
-
-/// Runs `quoin convert`. Returns the exit status.
-[[nodiscard]] int run_convert(ConvertOptions& options, const ManyOptions& many);
-
-/// Adds --size, --voxel, --solid, --surface, --field, --separating, --parity, --band, --max-colours and --input-up.
-void add_mesh_input_options(CLI::App& command, MeshLoadOptions& options);
-
-/// Returns the rules between these options.
-[[nodiscard]] std::vector<OptionRule> mesh_input_rules();
+[[nodiscard]] WatchedWork run_many(const ConvertArguments& arguments, Converted& done);
 
 /// Writes meshes and fills in `outcome`.
 [[nodiscard]] Status write_meshes(SceneMeshes& meshes, const ConvertOptions& options, ProgressBar& bar,
@@ -148,6 +116,17 @@ void add_mesh_input_options(CLI::App& command, MeshLoadOptions& options);
 /// Meshes a scene smoothly, writes it and fills in `outcome`. With `options.animate`, the scene is that of `animation`.
 [[nodiscard]] Status convert_smoothly(const Scene& scene, const SceneAnimation& animation,
                                       const ConvertOptions& options, Outcome& outcome);
+
+/// Reads a scene and converts it to `format`.
+[[nodiscard]] Conversion convert_scene(const ConvertOptions& options, const FormatInfo& format,
+                                       const OpenedInput& input);
+
+/// Meshes a scene, writes it and returns the completed `outcome`. `watch` has measured the time of reading.
+[[nodiscard]] Conversion convert_to_meshes(const ConvertOptions& options, LoadedScene& loaded, Outcome outcome,
+                                           Stopwatch& watch);
+
+/// Converts a world of any size chunk by chunk to a .quoin file.
+[[nodiscard]] Result<Outcome> convert_by_chunks(const ConvertOptions& options);
 
 /// Copies a world (.quoin) to another file, row by row.
 [[nodiscard]] Result<Outcome> copy_world_file(const ConvertOptions& options);

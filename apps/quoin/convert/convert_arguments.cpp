@@ -1,16 +1,16 @@
+#include "convert/convert_arguments.h"
+
 #include <algorithm>
-#include <memory>
+#include <array>
+#include <iterator>
+#include <tuple>
+#include <utility>
 
-#include <quoin/render/light_options.h>
-
-#include "command_files.h"
-#include "commands.h"
-#include "convert/convert.h"
 #include "help.h"
-#include "options.h"
-#include "output.h"
 
 namespace quoin::tool {
+
+namespace {
 
 void add_mesh_input_options(CLI::App& command, MeshLoadOptions& options) {
   set_heading(command, heading::kTriangles);
@@ -59,8 +59,6 @@ std::vector<OptionRule> mesh_input_rules() {
   };
 }
 
-namespace {
-
 /// "vox, scene, nifti, nrrd".
 std::string readable_names() {
   std::string names;
@@ -70,9 +68,10 @@ std::string readable_names() {
   return names;
 }
 
-void add_file_options(CLI::App& command, ConvertOptions& options, ManyOptions& many,
-                      std::vector<std::filesystem::path>& rest) {
-  command.add_option("OUT", rest, "File to write, or - for standard output; with --to, more input files")
+void add_file_options(CLI::App& command, ConvertArguments& arguments) {
+  ConvertOptions& options = arguments.options;
+  ManyOptions& many = arguments.many;
+  command.add_option("OUT", arguments.rest, "File to write, or - for standard output; with --to, more input files")
       ->check(file_name());
   set_heading(command, heading::kOutput);
   command.add_flag("--force", options.force, kForceHelp);
@@ -152,138 +151,171 @@ void add_mesh_file_options(CLI::App& command, ConvertOptions& options) {
       ->check(positive());
 }
 
-std::vector<OptionRule> convert_rules(const ConvertOptions& options) {
+/// Appends an explanation to the messages of a reason.
+Reason because(Reason reason, std::string explanation) {
+  return [reason = std::move(reason), explanation = ": " + std::move(explanation)](const CLI::App& command) {
+    const std::string broken = reason(command);
+    return broken.empty() ? broken : broken + explanation;
+  };
+}
+
+std::vector<OptionRule> file_rules(const ConvertArguments& a) {
+  const auto has_stream = [&a] { return a.options.common.input == kStandardStream || a.is_to_stream(); };
+  return {
+      {{"--out-dir", "--recursive"}, excludes("standard output", [&a] { return a.is_to_stream(); })},
+      {{"--out-dir", "--recursive"}, needs("--to FORMAT", [&a] { return a.has_many_inputs(); })},
+      {{"--watch"}, excludes({"--json"})},
+      {{"--watch"}, excludes("standard input or output", has_stream)},
+  };
+}
+
+std::vector<OptionRule> occlusion_rules(const ConvertOptions& options) {
   const auto has_none = [&options] { return options.field_occlusion.method == SmoothOcclusion::None; };
+  return {
+      {{heading::kOcclusion}, excludes({"--no-ao"})},
+      {{"--ao-attribute"}, excludes("--ao-form none", has_none)},
+  };
+}
+
+std::vector<OptionRule> mesh_rules(const ConvertOptions& options) {
+  const auto is_atlas = [&options] { return options.is_atlas; };
+  const auto is_other_mesher = [&options] { return options.is_atlas && options.mesher != Mesher::Greedy; };
+  const auto is_lit_atlas = [&options] { return options.light && options.is_atlas; };
+  const auto is_lit_as_blocks = [&options] { return options.light && options.mesher != Mesher::Smooth; };
+  const std::string occlusion = "the atlas holds the occlusion of merged faces";
+  const std::string light = "light is stored at the corners of faces";
+  return {
+      {{"--mesher"}, because(excludes("--texture atlas", is_other_mesher), occlusion)},
+      {{"--no-ao", "--ao-attribute", "--watertight"}, because(excludes("--texture atlas", is_atlas), occlusion)},
+      {{"--light"}, because(excludes("--texture atlas", is_lit_atlas), light)},
+      {{"--watertight"}, because(excludes("--light propagated", is_lit_as_blocks), light)},
+      {{"--voxel-mm"}, excludes({"--scale"})},
+      {{"--fps"}, needs("--animate")},
+      {{"--frame"}, excludes({"--animate"})},
+  };
+}
+
+/// Returns the rules that do not depend on the format of the output.
+std::vector<OptionRule> option_rules(const ConvertArguments& arguments) {
+  const ConvertOptions& options = arguments.options;
   std::vector<OptionRule> rules = raw_rules();
-  std::ranges::move(field_occlusion_rules(options.field_occlusion), std::back_inserter(rules));
-  std::ranges::move(mesh_input_rules(), std::back_inserter(rules));
-  rules.push_back({{heading::kOcclusion}, excludes({"--no-ao"})});
-  rules.push_back({{"--ao-attribute"}, excludes("--ao-form none", has_none)});
-  rules.push_back({{"--fps"}, needs("--animate")});
-  rules.push_back({{"--frame"}, excludes({"--animate"})});
+  for (std::vector<OptionRule>& more :
+       std::array{field_occlusion_rules(options.field_occlusion), mesh_input_rules(), occlusion_rules(options),
+                  mesh_rules(options), file_rules(arguments)}) {
+    std::ranges::move(more, std::back_inserter(rules));
+  }
   return rules;
 }
 
-/// Returns an error message if another option contradicts --texture atlas, else "".
-std::string find_atlas_error(const ConvertOptions& options) {
-  if (!options.is_atlas) return "";
-  const std::string reason = ": the atlas holds the occlusion of merged faces";
-  const std::string refused = "cannot use --texture atlas with ";
-  if (options.mesher && options.mesher != Mesher::Greedy) {
-    return refused + "--mesher " + name_of(*options.mesher) + reason;
-  }
-  if (options.occlusion_off) return refused + "--no-ao" + reason;
-  if (options.ao_as_attribute) return refused + "--ao-attribute" + reason;
-  return options.watertight ? refused + "--watertight" + reason : "";
+/// Returns the rules between options and the format of the output.
+std::vector<OptionRule> format_rules(const ConvertOptions& options, const FormatInfo& format) {
+  const auto prints = [&format] { return format.can(FormatCapability::Printing); };
+  const auto may_replace = [&options, &format] { return options.force || format.can(FormatCapability::Meshes); };
+  return {
+      {{"--voxel-mm"}, needs(".stl or .3mf; use --scale for other mesh formats", prints)},
+      {{"--watch"}, needs("--force: it overwrites OUT, a model, after each change", may_replace)},
+  };
 }
 
-/// Returns an error message if another option contradicts light at vertices, else "".
-std::string find_light_error(const ConvertOptions& options) {
-  if (!options.light) return "";
-  const std::string reason = ": light is stored at the corners of faces";
-  const std::string refused = "cannot use --light propagated with ";
-  if (options.is_atlas) return refused + "--texture atlas" + reason;
-  return options.watertight && options.mesher != Mesher::Smooth ? refused + "--watertight" + reason : "";
+Error usage_error(std::string message) {
+  return make_error(ErrorCode::InvalidArgument, std::move(message));
 }
 
-/// Returns an error message if another option contradicts --watch, else "".
-std::string find_watching_error(const ConvertOptions& options, const ManyOptions& many) {
-  if (!options.watch) return "";
-  if (options.common.json) return "--watch and --json cannot be used together";
-  if (options.common.input == kStandardStream || options.output == kStandardStream) {
-    return "cannot use --watch with standard input or output";
+/// Separates OUT from further inputs. Errors: InvalidArgument.
+Status settle_files(ConvertArguments& arguments) {
+  const std::vector<std::filesystem::path>& rest = arguments.rest;
+  std::vector<std::filesystem::path>& inputs = arguments.many.inputs;
+  if (arguments.has_many_inputs()) {
+    inputs = {arguments.options.common.input};
+    inputs.insert(inputs.end(), rest.begin(), rest.end());
+    if (std::count(inputs.begin(), inputs.end(), kStandardStream) == 0) return {};
+    return usage_error("standard input (-) must be the only input and needs OUT");
   }
-  const auto format = format_for_writing(many.inputs.empty() ? options.output : std::filesystem::path("f." + many.to));
-  const bool is_kept = format && !format->can(FormatCapability::Meshes) && !options.force;
-  return is_kept ? "--watch needs --force: it overwrites OUT, a model, after each change" : "";
-}
-
-/// Separates OUT from further inputs. Returns a usage error, or "".
-std::string read_files(const std::vector<std::filesystem::path>& rest, ConvertOptions& options, ManyOptions& many) {
-  const bool is_to_stream = rest.size() == 1 && rest.front() == kStandardStream;
-  if (!many.to.empty() && !is_to_stream) {
-    many.inputs = {options.common.input};
-    many.inputs.insert(many.inputs.end(), rest.begin(), rest.end());
-    const bool has_stream = std::find(many.inputs.begin(), many.inputs.end(), kStandardStream) != many.inputs.end();
-    return has_stream ? "standard input (-) must be the only input and needs OUT" : "";
-  }
-  if (many.folder) return is_to_stream ? "cannot use --out-dir: OUT is standard output" : "--out-dir needs --to FORMAT";
-  if (many.recursive) {
-    return is_to_stream ? "cannot use --recursive: OUT is standard output" : "--recursive needs --to FORMAT";
-  }
-  if (rest.empty()) return "OUT is required";
+  if (rest.empty()) return usage_error("OUT is required");
   if (rest.size() > 1) {
-    return "cannot convert " + std::to_string(rest.size() + 1) + " files: several inputs need --to FORMAT";
+    return usage_error("cannot convert " + std::to_string(rest.size() + 1) + " files: several inputs need --to FORMAT");
   }
-  options.output = rest.front();
-  return "";
+  arguments.options.output = rest.front();
+  return {};
 }
 
-/// Reads options that CLI11 leaves as text and checks combinations of options. Returns a usage error, or "".
-std::string read_options(const CLI::App& command, const std::vector<std::filesystem::path>& rest,
-                         ConvertOptions& options, ManyOptions& many) {
-  options.has_field_occlusion = !given_options(command, kFieldOcclusion).empty();
-  std::vector<std::string> given = given_options(command, {heading::kMesh, heading::kOcclusion, heading::kMeshFile});
-  std::erase(given, "--voxel-mm");  // find_format_error() knows better formats for it
-  options.mesh_only = !given.empty();
-  given = given_options(command, {heading::kTriangles});
-  options.mesh_input = given.empty() ? "" : given.front();
-  options.as_voxels = command.count("--solid") > 0;
-  const Status fits = check_rules(command, convert_rules(options));
-  std::string fault = fits ? "" : to_string(fits.error());
-  if (fault.empty()) fault = find_atlas_error(options);
-  if (fault.empty()) fault = find_light_error(options);
-  if (fault.empty()) fault = read_files(rest, options, many);
-  if (fault.empty()) fault = find_watching_error(options, many);
-  return fault;
+/// Returns the format of the output. Errors: Unsupported; InvalidArgument if standard output cannot hold it.
+Result<FormatInfo> output_format(const ConvertArguments& arguments) {
+  const std::string& to = arguments.many.to;
+  const bool is_named = !arguments.has_many_inputs() && !arguments.is_to_stream();
+  auto format = format_for_writing(is_named ? arguments.options.output : std::filesystem::path("file." + to));
+  if (is_named) return format;
+  if (arguments.has_many_inputs()) {
+    if (format) return format;
+    return make_error(format.error().code, "--to: " + format.error().message + ", not \"" + to + "\"");
+  }
+  if (to.empty() || !format) {
+    return usage_error("writing to standard output needs --to FORMAT, one of " +
+                       extensions_with(FormatCapability::Write));
+  }
+  if (format->format == FileFormat::Gltf || format->format == FileFormat::Obj) {
+    return usage_error("cannot write " + std::string(format->extension) +
+                       " to standard output: it consists of several files");
+  }
+  if (arguments.options.common.json) return usage_error("cannot use --json: OUT is standard output");
+  return format;
 }
 
-std::string footer() {
-  return readable_files() + "Writes " + extensions_with(FormatCapability::Write) +
-         ".\n"
-         "Voxel files (.vox, .qb, .json, .quoin, ...) are overwritten only with --force, meshes (.glb, .obj, ...) "
-         "without asking, inputs never.\n"
-         "NAME.gltf comes with NAME.bin; NAME.obj with NAME.mtl, NAME_palette.png, and NAME_emissive.png and "
-         "NAME_atlas.png if needed. These replace files with the same names. Smooth meshes keep their colours in the "
-         "vertices and need none of them.\n"
-         ".json and .quoin keep all grids, types, rotations and scales. Only .vox keeps animation and notes; from .vox "
-         "to .vox nothing is lost, and --frame writes one frame.\n"
-         "Triangle meshes are always voxelized first: converting a.obj to a.glb writes a voxel mesh of the same size.\n"
-         ".stl and .3mf are closed manifold meshes in millimetres, for 3D printing. Volumes in millimetres are "
-         "written in metres to glTF, in millimetres to other mesh formats.\n"
-         "Example: quoin convert castle.vox castle.glb\n"
-         "Example: quoin convert models/*.vox --to glb --out-dir meshes\n"
-         "Example: quoin convert castle.vox castle.ply --mesher smooth --simplify 0.1\n"
-         "Example: quoin convert statue.glb statue.vox --size 200\n"
-         "Example: quoin convert scan.nii.gz scan.glb --iso 300\n"
-         "Example: quoin convert fleet.json whole_fleet.json\n"
-         "Example: quoin convert statue.obj statue.json --voxel 0.05 --field\n"
-         "Example: quoin convert castle.vox castle.3mf --voxel-mm 0.8\n"
-         "Example: quoin convert scan.nii.gz scan.ply --ao-form weighted --ao-spread 4 --ao-attribute";
+/// Checks that the output can hold the content that the options request. Errors: InvalidArgument, Unsupported.
+Status check_capabilities(const CLI::App& command, const ConvertArguments& arguments) {
+  const ConvertOptions& options = arguments.options;
+  const FormatInfo& format = *arguments.format;
+  if (!format.can(FormatCapability::Meshes)) {
+    const auto given = given_options(command, {heading::kMesh, heading::kOcclusion, heading::kMeshFile});
+    if (given.empty()) return {};
+    const bool is_named = !options.output.empty() && !arguments.is_to_stream();
+    return usage_error(
+        "--mesher, --no-ao, --ao-..., --watertight, --smoothness, --colours, --no-unite, --simplify, "
+        "--scale, --up, --texture, --light, --lights, --animate, --compress and --quantize need a mesh format; " +
+        (is_named ? options.output.string() : std::string(format.extension)) + " is not one");
+  }
+  const std::tuple<bool, FormatCapability, const char*> wanted[] = {
+      {options.ao_as_attribute, FormatCapability::OcclusionAttribute, "--ao-attribute"},
+      {options.is_atlas, FormatCapability::Textures, "--texture atlas"},
+      {options.lights, FormatCapability::Lamps, "--lights"},
+      {options.light.has_value(), FormatCapability::VertexLight, "--light"},
+      {options.animate, FormatCapability::Animation, "--animate"},
+      {options.compress, FormatCapability::Compression, "--compress"},
+      {options.quantize, FormatCapability::Compression, "--quantize"},
+  };
+  for (const auto& [is_given, capability, option] : wanted) {
+    if (!is_given) continue;
+    if (Status able = check_capability(format.format, capability, option); !able) return able;
+  }
+  return {};
 }
 
 }  // namespace
 
-void add_convert_command(CLI::App& app, int& status) {
-  CLI::App* command = app.add_subcommand("convert", "Convert a file; the extension of OUT selects the format");
-  const auto options = std::make_shared<ConvertOptions>();
-  const auto many = std::make_shared<ManyOptions>();
-  const auto rest = std::make_shared<std::vector<std::filesystem::path>>();
-  add_common_options(*command, options->common);
-  add_file_options(*command, *options, *many, *rest);
-  add_meshing_options(*command, *options);
-  add_mesh_file_options(*command, *options);
-  add_volume_options(*command, options->common.load, &options->iso);
-  add_mesh_input_options(*command, options->common.load.mesh);
-  command->footer(footer());
-  command->callback([command, options, many, rest, &status] {
-    if (const std::string fault = read_options(*command, *rest, *options, *many); !fault.empty()) {
-      print_error(fault + " (try --help)");
-      status = kWrongUsage;
-      return;
-    }
-    status = run_convert(*options, *many);
-  });
+void add_convert_options(CLI::App& command, ConvertArguments& arguments) {
+  ConvertOptions& options = arguments.options;
+  add_common_options(command, options.common);
+  add_file_options(command, arguments);
+  add_meshing_options(command, options);
+  add_mesh_file_options(command, options);
+  add_volume_options(command, options.common.load, &options.iso);
+  add_mesh_input_options(command, options.common.load.mesh);
+}
+
+Status settle(const CLI::App& command, ConvertArguments& arguments) {
+  ConvertOptions& options = arguments.options;
+  if (Status fits = check_rules(command, option_rules(arguments)); !fits) return fits;
+  if (Status complete = settle_files(arguments); !complete) return complete;
+  const auto format = output_format(arguments);
+  if (!format) return format.error();
+  arguments.format = *format;
+  if (Status fits = check_rules(command, format_rules(options, *format)); !fits) return fits;
+  if (Status able = check_capabilities(command, arguments); !able) return able;
+  options.has_field_occlusion = !given_options(command, kFieldOcclusion).empty();
+  const std::vector<std::string> given = given_options(command, {heading::kTriangles});
+  options.mesh_input = given.empty() ? "" : given.front();
+  options.as_voxels = command.count("--solid") > 0;
+  return {};
 }
 
 }  // namespace quoin::tool

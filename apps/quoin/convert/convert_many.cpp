@@ -111,8 +111,8 @@ fs::path real_name(const fs::path& file) {
   return unknown ? file.lexically_normal() : folder / file.filename();
 }
 
-/// Returns an error message if two inputs have the same output, else "". Merges tasks with the same input.
-std::string find_plan_error(std::vector<Task>& tasks) {
+/// Merges tasks with the same input. Errors: InvalidArgument if two inputs have the same output.
+Status merge_same_inputs(std::vector<Task>& tasks) {
   std::map<fs::path, fs::path> made;
   std::vector<Task> kept;
   for (Task& task : tasks) {
@@ -120,11 +120,12 @@ std::string find_plan_error(std::vector<Task>& tasks) {
     if (is_new) {
       kept.push_back(std::move(task));
     } else if (at->second != task.input && !is_same_file(at->second, task.input)) {
-      return at->second.string() + " and " + task.input.string() + " would both be written to " + task.output.string();
+      return make_error(ErrorCode::InvalidArgument, at->second.string() + " and " + task.input.string() +
+                                                        " would both be written to " + task.output.string());
     }
   }
   tasks = std::move(kept);
-  return "";
+  return {};
 }
 
 void run_task(const ConvertOptions& wanted, const FormatInfo& format, Task& task) {
@@ -132,8 +133,7 @@ void run_task(const ConvertOptions& wanted, const FormatInfo& format, Task& task
   options.common.input = task.input;
   options.output = task.output;
   try {
-    std::string fault;
-    auto outcome = convert_file(options, format, fault);
+    Conversion outcome = convert_file(options, format);
     if (outcome) {
       task.outcome = std::move(*outcome);
     } else {
@@ -251,31 +251,28 @@ Totals totals_of(const std::vector<Task>& tasks, double seconds) {
 
 }  // namespace
 
-WatchedWork run_many(const ConvertOptions& options, const ManyOptions& many, Converted& done) {
+WatchedWork run_many(const ConvertArguments& arguments, Converted& done) {
+  const ConvertOptions& options = arguments.options;
+  const ManyOptions& many = arguments.many;
   WatchedWork work;
   work.read = many.inputs;
   const auto ended = [&](int status) {
     work.status = status;
     return work;
   };
-  const auto misused = [&](const std::string& fault) {
-    print_error(fault);
-    return ended(kWrongUsage);
-  };
-  const std::string extension = (many.to.starts_with('.') ? "" : ".") + many.to;
-  const auto format = format_for_writing("file" + extension);
-  if (!format) return misused("--to: " + format.error().message + ", not \"" + many.to + "\"");
-  if (const std::string fault = find_format_error(options, *format); !fault.empty()) return misused(fault);
   catch_interrupts();
   Stopwatch watch;
   std::vector<Error> errors;
-  std::vector<Task> tasks = plan(many, extension, errors);
-  if (const std::string fault = find_plan_error(tasks); !fault.empty()) return misused(fault);
+  std::vector<Task> tasks = plan(many, (many.to.starts_with('.') ? "" : ".") + many.to, errors);
+  if (const Status merged = merge_same_inputs(tasks); !merged) {
+    print_error(merged.error());
+    return ended(kWrongUsage);
+  }
   ConvertOptions wanted = options;
   wanted.inputs = inputs_of(tasks);
   const bool is_again = !done.empty();
   if (options.watch) leave_out(done, options.common.load.sidecar_files, tasks, work);
-  run_tasks(wanted, *format, tasks);
+  run_tasks(wanted, *arguments.format, tasks);
   die_if_interrupted();
   if (options.watch) note(tasks, done, work);
   if (is_again && tasks.empty() && errors.empty()) return ended(kDone);

@@ -1,5 +1,7 @@
 #include <algorithm>
 
+#include <quoin/io/chunk_source.h>
+#include <quoin/store/world_import.h>
 #include <quoin/store/world_maintenance.h>
 #include <quoin/store/world_meshes.h>
 #include <quoin/store/world_saver.h>
@@ -7,6 +9,7 @@
 
 #include "convert/convert.h"
 #include "output.h"
+#include "render/small_image.h"
 #include "run_control.h"
 
 namespace quoin::tool {
@@ -22,7 +25,50 @@ void report_lost(const std::vector<std::string>& lines, std::vector<std::string>
   }
 }
 
+/// Renders the area around the spawn of a source as the thumbnail of the converted world.
+Status add_thumbnail(const ChunkSource& source, const ConvertOptions& options) {
+  constexpr int kRadius = 4;
+  const Threads threads = options.common.threads;
+  const auto stop = [](double) { return !was_interrupted(); };
+  const auto around = load_source(source, chunks_around_spawn(source, kRadius), threads, stop);
+  if (!around) return around.error();
+  WorldChanges changes;
+  if (auto done = put_thumbnail(around->scene, threads, changes); !done) return done;
+  if (changes.empty()) return {};
+  auto world = WorldStore::open(options.output, WorldAccess::Write, threads);
+  if (!world) return world.error();
+  if (const auto ticket = world->save(std::move(changes)); !ticket) return ticket.error();
+  return world->flush();
+}
+
 }  // namespace
+
+Result<Outcome> convert_by_chunks(const ConvertOptions& options) {
+  Stopwatch watch;
+  const auto source = open_chunk_source(options.common.input, options.common.load.dimension);
+  if (!source) return source.error();
+  catch_interrupts();
+  Outcome outcome;
+  outcome.files = {options.output};
+  outcome.seconds.read = watch.lap();
+  ProgressBar bar(!options.is_one_of_many);
+  const auto imported = import_world(**source, options.output, options.common.threads, bar.listener("converting"));
+  if (!imported) return imported.error();
+  outcome.content.voxels = static_cast<std::int64_t>(imported->voxels);
+  outcome.bytes = imported->bytes;
+  if (auto done = add_thumbnail(**source, options); !done) return done.error();
+  outcome.warnings = (*source)->info().warnings;
+  for (const std::string& line : imported->broken) outcome.warnings.push_back("left out: " + line);
+  if (!imported->skipped_blocks.empty()) outcome.warnings.push_back(text_of_skipped_blocks(imported->skipped_blocks));
+  if (!imported->guessed.empty()) {
+    std::string names;
+    for (const std::string& name : imported->guessed) names += (names.empty() ? "" : ", ") + name;
+    outcome.warnings.push_back("unknown blocks, with an appearance guessed from their names: " + names);
+  }
+  outcome.seconds.write = watch.lap();
+  if (Status counted = count_faces_of_output(options, outcome); !counted) return counted.error();
+  return outcome;
+}
 
 Status count_faces_of_output(const ConvertOptions& options, Outcome& outcome) {
   if (!options.common.json) return {};
