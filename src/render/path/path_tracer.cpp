@@ -39,11 +39,11 @@ struct PathTracer::Impl {
     made_ = nullptr;
   }
   // Returns the sky light; reuses the last image's if the sky is the same.
-  [[nodiscard]] std::shared_ptr<const path::SkyLight> sky(const Environment& environment) {
+  [[nodiscard]] std::shared_ptr<const path::SkyLight> sky(const Environment& wanted) {
     const std::lock_guard lock(mutex_);
-    if (sky_ == nullptr || !path::is_same_sky(sky_of_, environment)) {
-      sky_ = std::make_shared<const path::SkyLight>(environment);
-      sky_of_ = environment;
+    if (sky_ == nullptr || !path::is_same_sky(sky_of_, wanted)) {
+      sky_ = std::make_shared<const path::SkyLight>(wanted);
+      sky_of_ = wanted;
     }
     return sky_;
   }
