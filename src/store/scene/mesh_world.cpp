@@ -46,8 +46,8 @@ namespace {
 class Spool {
  public:
   Spool() = default;
-  Spool(Spool&& other) noexcept;
-  Spool& operator=(Spool&& other) noexcept;
+  Spool(const Spool&) = delete;
+  Spool& operator=(const Spool&) = delete;
   ~Spool();
 
   /// Errors: CannotWrite (a full disk, a missing folder).
@@ -95,20 +95,6 @@ int open_nameless(const std::filesystem::path& folder) {
   const int named = ::mkostemp(name.data(), O_CLOEXEC);
   if (named >= 0) ::unlink(name.c_str());
   return named;
-}
-
-Spool::Spool(Spool&& other) noexcept
-    : file_(std::exchange(other.file_, -1)),
-      buffer_(std::move(other.buffer_)),
-      written_(std::exchange(other.written_, 0)),
-      mapped_(std::exchange(other.mapped_, nullptr)) {}
-
-Spool& Spool::operator=(Spool&& other) noexcept {
-  std::swap(file_, other.file_);
-  std::swap(buffer_, other.buffer_);
-  std::swap(written_, other.written_);
-  std::swap(mapped_, other.mapped_);
-  return *this;
 }
 
 Spool::~Spool() {

@@ -17,6 +17,8 @@ constexpr VkClearColorValue kGround = {{0.07F, 0.075F, 0.09F, 1.0F}};
 constexpr VkImageSubresourceRange kWholeImage = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
 constexpr VkImageSubresourceLayers kLayers = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1};
 
+}  // namespace
+
 /// A Vulkan image that Quoin's images are copied into, to be scaled from there.
 class CopiedImage {
  public:
@@ -93,6 +95,8 @@ VulkanImageTarget CopiedImage::target() const {
   target.layout_after = VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL;
   return target;
 }
+
+namespace {
 
 /// The visible pixels of an image and of the window, along an axis.
 struct VisiblePixels {
