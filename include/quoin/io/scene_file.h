@@ -77,8 +77,7 @@ struct SceneFile {
 [[nodiscard]] Result<SceneFile> parse_scene_file(const std::filesystem::path& path, Threads threads = {});
 
 /// Converts a scene to a self-contained scene file: all types, grids with voxels and fields (as cheap snapshots),
-/// groups, layers, lamps and instances. Handles become list indices, in handle order. The caller adds the
-/// camera.
+/// groups, layers, lamps and instances. Handles become list indices, in handle order. The caller adds the camera.
 ///
 /// Errors: InvalidArgument for an instance whose grid does not exist.
 [[nodiscard]] Result<SceneFile> scene_file_of(const Scene& scene);
