@@ -1,5 +1,5 @@
-// Renders the demo world to the PNG file named on the command line. Needs only the renderer's part of the library, so
-// that `./dev demo` shows an image before the tool is built.
+// Renders the demo world to the PNG file named on the command line. Needs only the renderer's part of the library:
+// `./dev demo` shows its image before the tool is built.
 
 #include <cstdio>
 #include <numbers>
