@@ -1,5 +1,6 @@
 // Instances, groups, layers, cameras, lamps, sun and environment of a scene; file formats.
 
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <optional>
@@ -240,7 +241,7 @@ const char* take(const quoin_sun& given, Sun& sun) {
 }
 
 constexpr std::array kSkies = {SkyModel::Gradient, SkyModel::Fixed, SkyModel::Physical, SkyModel::Uniform,
-                               SkyModel::Image};  // QUOIN_SKY_...
+                               SkyModel::Image};                                                        // QUOIN_SKY_...
 constexpr std::array kTones = {ToneCurve::Clamp, ToneCurve::Neutral, ToneCurve::Agx, ToneCurve::Aces};  // from 1 on
 
 void put_colour(Vec3 from, float (&to)[3]) {
@@ -250,9 +251,15 @@ Vec3 colour_of(const float (&from)[3]) {
   return {from[0], from[1], from[2]};
 }
 
+template <class T, std::size_t kCount>
+std::int32_t index_of(const std::array<T, kCount>& all, T value) {
+  std::int32_t index = 0;
+  while (all.at(static_cast<std::size_t>(index)) != value) ++index;
+  return index;
+}
+
 void describe(const Environment& environment, quoin_environment& out) {
-  const auto* const sky = std::ranges::find(kSkies, environment.sky.model);
-  out.sky = static_cast<std::int32_t>(sky - kSkies.begin());
+  out.sky = index_of(kSkies, environment.sky.model);
   out.sky_brightness = environment.sky.brightness;
   put_colour(environment.sky.colour, out.sky_colour);
   out.has_background = environment.sky.background ? 1 : 0;
@@ -260,9 +267,7 @@ void describe(const Environment& environment, quoin_environment& out) {
   out.lamp_brightness = environment.lamp_brightness;
   out.has_exposure = environment.exposure ? 1 : 0;
   out.exposure = environment.exposure.value_or(1.0);
-  if (environment.tone) {
-    out.tone = 1 + static_cast<std::int32_t>(std::ranges::find(kTones, *environment.tone) - kTones.begin());
-  }
+  if (environment.tone) out.tone = 1 + index_of(kTones, *environment.tone);
   const GroundPlane ground = environment.ground.value_or(GroundPlane{});
   out.has_ground = environment.ground ? 1 : 0;
   out.ground_height = ground.height;

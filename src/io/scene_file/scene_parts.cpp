@@ -139,9 +139,12 @@ constexpr std::array<std::pair<const char*, ToneCurve>, 4> kTones = {
 
 template <class T, std::size_t kCount>
 const char* name_of(const std::array<std::pair<const char*, T>, kCount>& names, T value) {
-  const auto* const found = std::ranges::find(names, value, &std::pair<const char*, T>::second);
-  QUOIN_ASSERT(found != names.end(), "a value with a name");
-  return found->first;
+  const char* found = nullptr;
+  for (const auto& [name, each] : names) {
+    if (each == value) found = name;
+  }
+  QUOIN_ASSERT(found != nullptr, "a value with a name");
+  return found;
 }
 
 template <class T, std::size_t kCount>
