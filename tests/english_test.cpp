@@ -234,7 +234,8 @@ TEST(English, KeepsHardPhrasesWithinLimits) {
     EXPECT_LE(count, most) << name << ", the first: " << counted.example.at(name);
     if (std::min(count, most) > 0) lowered[name] = std::min(count, most);
   }
-  for (const auto& [name, most] : limits) EXPECT_TRUE(counted.lines.contains(name)) << "a limit that nothing needs: " << name;
+  for (const auto& [name, most] : limits)
+    EXPECT_TRUE(counted.lines.contains(name)) << "a limit that nothing needs: " << name;
   RecordProperty("hard_phrases", all);
   if (!lowers) return;
   std::ofstream file(kLimits);

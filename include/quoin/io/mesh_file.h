@@ -108,8 +108,8 @@ struct MeshFileOptions {
 ///            builds without meshoptimizer. CannotWrite. Cancelled. LimitExceeded beyond 4 GiB of GLB, or 2^31 - 1
 ///            vertices or triangles of PLY. InvalidArgument if no format has the name of `format`, a transform is not
 ///            finite, not affine or singular, the scale is not positive, a vertex exceeds the range of floats, or a
-///            mesh is inconsistent (array lengths that differ, vertex indices out of range, unregistered types, infinite
-///            numbers). Each file is written atomically; if a later file fails, earlier ones stay.
+///            mesh is inconsistent (array lengths that differ, vertex indices out of range, unregistered types,
+///            infinite numbers). Each file is written atomically; if a later file fails, earlier ones stay.
 /// Sources:   Khronos glTF 2.0 specification, sections 3 and 4.4; KHR_materials_emissive_strength, _transmission,
 ///            _volume, _ior and _unlit; KHR_mesh_quantization; EXT_meshopt_compression; Alias/Wavefront's OBJ and MTL.
 [[nodiscard]] Result<std::uint64_t> write_mesh(const SceneMeshes& meshes, const std::filesystem::path& path,

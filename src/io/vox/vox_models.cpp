@@ -9,8 +9,8 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/bytes/bytes.h"
 #include "core/bytes/byte_stream.h"
+#include "core/bytes/bytes.h"
 
 namespace quoin::vox {
 

@@ -1,6 +1,6 @@
 // The view through bodies of glass; matches render/light/glass_bodies.h on the CPU. The including file defines two
-// functions: the view direction in the world, and the surface normal at `t` in the face of an instance's voxel. Both are
-// unit vectors in the world.
+// functions: the view direction in the world, and the surface normal at `t` in the face of an instance's voxel. Both
+// are unit vectors in the world.
 vec3 seen_direction();
 vec3 normal_met(int instance, uint face, float t);
 
