@@ -9,36 +9,18 @@
 #include <gtest/gtest.h>
 
 #include "convert/convert.h"
+#include "parsed_line_for_tests.h"
 
 namespace quoin::tool {
 
 namespace {
 
-/// A parsed command line of `quoin convert`, without the name of the command.
-struct Parsed {
-  CLI::App command;
-  ConvertArguments arguments;
-  std::string fault;  ///< the usage error, or ""
-
-  explicit Parsed(const std::string& line) {
-    add_convert_options(command, arguments);
-    try {
-      command.parse(line);
-    } catch (const CLI::ParseError& error) {
-      fault = error.what();
-      return;
-    }
-    const Status fits = settle(command, arguments);
-    if (!fits) fault = to_string(fits.error());
-  }
-};
-
 std::string fault_of(const std::string& line) {
-  return Parsed(line).fault;
+  return ParsedLine<ConvertArguments>(line, add_convert_options).fault;
 }
 
 ConvertArguments arguments_of(const std::string& line) {
-  const Parsed parsed(line);
+  const ParsedLine<ConvertArguments> parsed(line, add_convert_options);
   EXPECT_EQ(parsed.fault, "") << line;
   return parsed.arguments;
 }

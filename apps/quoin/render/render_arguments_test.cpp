@@ -8,36 +8,18 @@
 #include <quoin/render/light_options.h>
 
 #include "help.h"
+#include "parsed_line_for_tests.h"
 
 namespace quoin::tool {
 
 namespace {
 
-/// A parsed command line of `quoin render`, without the name of the command.
-struct Parsed {
-  CLI::App command;
-  RenderArguments arguments;
-  std::string fault;  ///< the usage error, or ""
-
-  explicit Parsed(const std::string& line) {
-    add_render_options(command, arguments);
-    try {
-      command.parse(line);
-    } catch (const CLI::ParseError& error) {
-      fault = error.what();
-      return;
-    }
-    const Status fits = settle(command, arguments);
-    if (!fits) fault = to_string(fits.error());
-  }
-};
-
 std::string fault_of(const std::string& options) {
-  return Parsed("in.vox -o out.png " + options).fault;
+  return ParsedLine<RenderArguments>("in.vox -o out.png " + options, add_render_options).fault;
 }
 
 RenderArguments arguments_of(const std::string& options) {
-  const Parsed parsed("in.vox -o out.png " + options);
+  const ParsedLine<RenderArguments> parsed("in.vox -o out.png " + options, add_render_options);
   EXPECT_EQ(parsed.fault, "") << options;
   return parsed.arguments;
 }
@@ -201,7 +183,8 @@ TEST(RenderArguments, RefusesOutputsThatCannotHoldImage) {
       {"in.vox -o out.webm --turntable 3 --fps 30", ""},
       {"- -o out.png --watch", "--watch and standard input cannot be used together"},
       {"in.vox", "--output is required"}};
-  for (const auto& [line, fault] : faults) EXPECT_EQ(Parsed(line).fault, fault) << line;
+  for (const auto& [line, fault] : faults)
+    EXPECT_EQ(ParsedLine<RenderArguments>(line, add_render_options).fault, fault) << line;
 }
 
 TEST(RenderArguments, NamesOptionOfRefusedValue) {
