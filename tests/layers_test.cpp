@@ -31,7 +31,6 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"grid/chunk/chunk_storage.h", {"io", "mesh", "render", "store", "trace"}},
     {"grid/colour_table.h", {"io", "voxelize"}},
     {"grid/density/density_storage.h", {"mesh", "store", "terrain", "trace"}},
-    {"grid/long_box.h", {"render", "scene", "stream"}},
     {"io/format_driver.h", {"store"}},
     {"io/models/luanti.h", {"store"}},
     {"io/scene_file/scene_parts.h", {"store"}},

@@ -14,7 +14,7 @@
 #include <quoin/grid/chunk.h>
 
 #include "core/coordinates/chunk_order.h"
-#include "grid/long_box.h"
+#include "core/coordinates/long_box.h"
 
 namespace quoin {
 namespace {

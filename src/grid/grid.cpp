@@ -12,6 +12,7 @@
 
 #include "core/change_journal.h"
 #include "core/coordinates/chunk_order.h"
+#include "core/coordinates/long_box.h"
 #include "core/rows/packed_row.h"
 #include "grid/bounds_cache.h"
 #include "grid/change_records.h"
@@ -19,7 +20,6 @@
 #include "grid/chunk/chunk_storage.h"
 #include "grid/chunk_table.h"
 #include "grid/loaded_chunks.h"
-#include "grid/long_box.h"
 
 namespace quoin {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "core/coordinates/chunk_order.h"
 #include "core/coordinates/chunk_trie.h"
-#include "grid/long_box.h"
+#include "core/coordinates/long_box.h"
 
 namespace quoin {
 

@@ -11,7 +11,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/grid/chunk.h>
 
-#include "grid/long_box.h"
+#include "core/coordinates/long_box.h"
 
 namespace quoin::stream {
 namespace {

@@ -9,7 +9,7 @@
 #include <quoin/core/assert.h>
 
 #include "core/coordinates/chunk_order.h"
-#include "grid/long_box.h"
+#include "core/coordinates/long_box.h"
 #include "stream/edit_fit.h"
 
 namespace quoin {

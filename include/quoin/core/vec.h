@@ -48,6 +48,25 @@ using Point = glm::vec<3, T, glm::defaultp>;
   return {whole(point.x), whole(point.y), whole(point.z)};
 }
 
+/// log2 of kChunkEdge.
+inline constexpr int kChunkShift = 6;
+/// Number of voxels along the edge of a chunk: the width of a machine word.
+inline constexpr int kChunkEdge = 1 << kChunkShift;
+inline constexpr std::size_t kChunkVoxels = std::size_t{1} << (3 * kChunkShift);
+
+/// Returns the chunk that contains a voxel; voxel -1 lies in chunk -1.
+[[nodiscard]] inline IVec3 chunk_of(IVec3 voxel) {
+  return {voxel.x >> kChunkShift, voxel.y >> kChunkShift, voxel.z >> kChunkShift};
+}
+template <std::floating_point T>
+IVec3 chunk_of(Point<T> point) = delete;  // chunk_of(voxel_of(point))
+/// Returns the position of a voxel inside its chunk, 0 to 63 on each axis.
+[[nodiscard]] inline IVec3 local_of(IVec3 voxel) {
+  return {voxel.x & (kChunkEdge - 1), voxel.y & (kChunkEdge - 1), voxel.z & (kChunkEdge - 1)};
+}
+template <std::floating_point T>
+IVec3 local_of(Point<T> point) = delete;
+
 /// Returns true if no component is infinite or NaN.
 [[nodiscard]] inline bool is_finite(DVec3 v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);

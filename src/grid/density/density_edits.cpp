@@ -9,8 +9,8 @@
 #include <quoin/core/buffer.h>
 #include <quoin/core/vec.h>
 
+#include "core/coordinates/long_box.h"
 #include "grid/density/density_grid_impl.h"
-#include "grid/long_box.h"
 
 namespace quoin {
 namespace {

@@ -16,10 +16,10 @@
 #include "core/change_journal.h"
 #include "core/coordinates/chunk_order.h"
 #include "core/coordinates/chunk_trie.h"
+#include "core/coordinates/long_box.h"
 #include "grid/bounds_cache.h"
 #include "grid/change_records.h"
 #include "grid/loaded_chunks.h"
-#include "grid/long_box.h"
 
 namespace quoin {
 

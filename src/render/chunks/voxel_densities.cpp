@@ -7,7 +7,7 @@
 #include <quoin/grid/voxel_field.h>
 
 #include "core/coordinates/chunk_order.h"
-#include "grid/long_box.h"
+#include "core/coordinates/long_box.h"
 #include "mesh/surface/voxel_surface.h"
 
 namespace quoin {

@@ -18,7 +18,7 @@
 #include <quoin/scene/scene_query.h>
 #include <quoin/trace/ray.h>
 
-#include "grid/long_box.h"
+#include "core/coordinates/long_box.h"
 #include "scene/query/query_in_grid.h"
 #include "scene/tracer/placed_grid.h"
 

@@ -8,7 +8,6 @@
 
 #include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
-#include <quoin/grid/chunk.h>
 
 namespace quoin {
 
