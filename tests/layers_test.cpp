@@ -51,7 +51,6 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"mesh/surface/simplify.h", {"scene"}},
     {"render/chunks/surface_job.h", {"live"}},
     {"render/chunks/surface_source.h", {"live"}},
-    {"store/chunk/content.h", {"stream"}},
     {"trace/chunk_rows.h", {"render", "scene"}},
     {"trace/density/density_glass.h", {"render", "scene"}},
     {"trace/tree_view.h", {"render"}},

@@ -10,13 +10,10 @@
 #include <quoin/core/assert.h>
 #include <quoin/stream/world_edit.h>
 
-#include "store/chunk/content.h"
+#include "core/bytes/bytes.h"
 
 namespace quoin {
 namespace {
-
-using store::ContentReader;
-using store::put_number;
 
 // docs/formats/edit_log.md
 constexpr std::string_view kMagic = "QuoinEdt";
@@ -34,83 +31,67 @@ std::uint32_t checksum_of(std::span<const std::byte> bytes) {
 /// Writes an edit's content as bytes. `visit_fields` describes each kind for reading and writing.
 class Writer {
  public:
-  explicit Writer(std::vector<std::byte>& out) : out_(out) {}
+  explicit Writer(ByteWriter& out) : out_(out) {}
 
-  bool operator()(const std::uint32_t& number) { return put(number); }
-  bool operator()(const VoxelType& type) { return put(type); }
-  bool operator()(const double& number) { return put(std::bit_cast<std::uint64_t>(number)); }
+  bool operator()(const std::uint32_t& number) { return out_.u32(number), true; }
+  bool operator()(const VoxelType& type) { return out_.u16(type), true; }
+  bool operator()(const double& number) { return out_.f64(number), true; }
   bool operator()(const IVec3& v) {
-    for (int axis = 0; axis < 3; ++axis) put(static_cast<std::uint32_t>(v[axis]));
+    for (int axis = 0; axis < 3; ++axis) out_.i32(v[axis]);
     return true;
   }
   bool operator()(const DVec3& v) {
-    for (int axis = 0; axis < 3; ++axis) (*this)(v[axis]);
+    for (int axis = 0; axis < 3; ++axis) out_.f64(v[axis]);
     return true;
   }
   bool operator()(const std::vector<PlacedVoxel>& voxels) {
-    put(static_cast<std::uint32_t>(voxels.size()));
+    out_.u32(static_cast<std::uint32_t>(voxels.size()));
     for (const PlacedVoxel& each : voxels) (*this)(each.voxel), (*this)(each.type);
     return true;
   }
   bool operator()(const std::vector<std::byte>& bytes) {
-    put(static_cast<std::uint32_t>(bytes.size()));
-    out_.insert(out_.end(), bytes.begin(), bytes.end());
+    out_.u32(static_cast<std::uint32_t>(bytes.size()));
+    out_.raw(bytes);
     return true;
   }
 
  private:
-  template <class T>
-  bool put(T number) {
-    put_number(out_, number);
-    return true;
-  }
-  std::vector<std::byte>& out_;
+  ByteWriter& out_;
 };
 
 class Reader {
  public:
-  explicit Reader(ContentReader& in) : in_(in) {}
+  explicit Reader(ByteReader& in) : in_(in) {}
 
   bool operator()(std::uint32_t& number) { return take(number); }
   bool operator()(VoxelType& type) { return take(type); }
-  bool operator()(double& number) {
-    std::uint64_t bits = 0;
-    if (!take(bits)) return false;
-    number = std::bit_cast<double>(bits);
-    return true;
-  }
-  bool operator()(IVec3& v) {
-    for (int axis = 0; axis < 3; ++axis) {
-      std::uint32_t number = 0;
-      if (!take(number)) return false;
-      v[axis] = static_cast<int>(number);
-    }
-    return true;
-  }
-  bool operator()(DVec3& v) { return (*this)(v.x) && (*this)(v.y) && (*this)(v.z); }
+  bool operator()(double& number) { return take(number); }
+  bool operator()(IVec3& v) { return take(v.x) && take(v.y) && take(v.z); }
+  bool operator()(DVec3& v) { return take(v.x) && take(v.y) && take(v.z); }
   bool operator()(std::vector<PlacedVoxel>& voxels) {
     constexpr std::size_t kBytes = 14;
     std::uint32_t count = 0;
-    if (!take(count) || !in_.has(count * kBytes)) return false;
+    if (!take(count) || in_.remaining() / kBytes < count) return false;
     voxels.resize(count);
     return std::ranges::all_of(voxels, [&](PlacedVoxel& each) { return (*this)(each.voxel) && (*this)(each.type); });
   }
   bool operator()(std::vector<std::byte>& bytes) {
     std::uint32_t count = 0;
-    if (!take(count) || !in_.has(count)) return false;
-    const auto taken = in_.take_bytes(count);
+    if (!take(count) || in_.remaining() < count) return false;
+    const auto taken = in_.take(count);
     bytes.assign(taken.begin(), taken.end());
     return true;
   }
 
  private:
+  // Takes nothing if too few bytes are left, so that errors name the byte where the field begins.
   template <class T>
   bool take(T& number) {
-    if (!in_.has(sizeof(T))) return false;
-    number = in_.take<T>();
+    if (in_.remaining() < sizeof(T)) return false;
+    number = load<T>(in_.take(sizeof(T)).data(), std::endian::little);
     return true;
   }
-  ContentReader& in_;
+  ByteReader& in_;
 };
 
 // The fields of each kind, in file order. `Edit` is const for writing.
@@ -146,20 +127,20 @@ bool begin_kind(std::uint32_t number, WorldEdit::Content& content) {
 }
 
 Result<LoggedEdit> read_edit(std::span<const std::byte> body, std::size_t offset) {
-  ContentReader in(body);
-  const auto fault = [&](const char* what) { return make_error(ErrorCode::BadFormat, what, {}, offset + in.at()); };
+  ByteReader in(body);
+  const auto fault = [&](const char* what) { return bad_at(offset + in.position(), what); };
   constexpr std::size_t kFixed = 8 + 4 + 4 + 4;
-  if (!in.has(kFixed)) return fault("unexpected end in an edit");
+  if (in.remaining() < kFixed) return fault("unexpected end in an edit");
   LoggedEdit read;
-  read.number = in.take<std::uint64_t>();
-  read.author = in.take<std::uint32_t>();
-  read.edit.grid = in.take<std::uint32_t>();
-  if (!begin_kind(in.take<std::uint32_t>(), read.edit.content)) return fault("unknown kind of edit");
+  read.number = in.u64();
+  read.author = in.u32();
+  read.edit.grid = in.u32();
+  if (!begin_kind(in.u32(), read.edit.content)) return fault("unknown kind of edit");
   Reader fields(in);
   if (!std::visit([&](auto& content) { return visit_fields(content, fields); }, read.edit.content)) {
     return fault("unexpected end in an edit");
   }
-  if (!in.is_at_end()) return fault("extra bytes in an edit");
+  if (in.remaining() > 0) return fault("extra bytes in an edit");
   return read;
 }
 
@@ -192,49 +173,45 @@ Result<EditLog> EditLog::merged(const EditLog& a, const EditLog& b) {
 }
 
 std::vector<std::byte> EditLog::encode() const {
-  std::vector<std::byte> out;
-  for (const char c : kMagic) out.push_back(static_cast<std::byte>(c));
-  put_number(out, kVersion);
+  ByteWriter out;
+  out.text(kMagic);
+  out.u32(kVersion);
   for (const LoggedEdit& each : edits_) {
-    std::vector<std::byte> body;
-    put_number(body, each.number);
-    put_number(body, each.author);
-    put_number(body, each.edit.grid);
-    put_number(body, static_cast<std::uint32_t>(each.edit.content.index()));
+    ByteWriter body;
+    body.u64(each.number);
+    body.u32(each.author);
+    body.u32(each.edit.grid);
+    body.u32(static_cast<std::uint32_t>(each.edit.content.index()));
     Writer fields(body);
     std::visit([&](const auto& content) { visit_fields(content, fields); }, each.edit.content);
-    put_number(out, static_cast<std::uint32_t>(body.size()));
-    put_number(out, checksum_of(body));
-    out.insert(out.end(), body.begin(), body.end());
+    out.u32(static_cast<std::uint32_t>(body.size()));
+    out.u32(checksum_of(body.bytes()));
+    out.raw(body.bytes());
   }
-  return out;
+  return out.take();
 }
 
 Result<EditLog> EditLog::decode(std::span<const std::byte> bytes) {
-  ContentReader in(bytes);
-  const auto fault = [](const char* what, std::size_t at) { return make_error(ErrorCode::BadFormat, what, {}, at); };
-  const auto has_magic = [&] {
-    return std::ranges::equal(in.take_bytes(kMagic.size()), kMagic,
-                              [](std::byte a, char b) { return a == static_cast<std::byte>(b); });
-  };
-  if (!in.has(kMagic.size() + sizeof(kVersion)) || !has_magic()) return fault("not an edit log", 0);
-  if (const auto version = in.take<std::uint32_t>(); version != kVersion) {
+  ByteReader in(bytes);
+  if (in.remaining() < kMagic.size() + sizeof(kVersion) || in.text(kMagic.size()) != kMagic) {
+    return bad_at(0, "not an edit log");
+  }
+  if (const std::uint32_t version = in.u32(); version != kVersion) {
     return make_error(ErrorCode::Unsupported, "unsupported edit log version " + std::to_string(version), {},
                       kMagic.size());
   }
   EditLog log;
-  while (!in.is_at_end()) {
-    const std::size_t start = in.at();
-    if (!in.has(8)) return fault("unexpected end in an edit", start);
-    const auto size = in.take<std::uint32_t>();
-    const auto checksum = in.take<std::uint32_t>();
-    if (!in.has(size)) return fault("unexpected end in an edit", start);
-    const auto body = in.take_bytes(size);
-    if (checksum_of(body) != checksum) return fault("wrong checksum of an edit", start);
+  while (in.remaining() > 0) {
+    const std::size_t start = in.position();
+    const std::uint32_t size = in.u32();
+    const std::uint32_t checksum = in.u32();
+    const auto body = in.take(size);
+    if (in.failed()) return bad_at(start, "unexpected end in an edit");
+    if (checksum_of(body) != checksum) return bad_at(start, "wrong checksum of an edit");
     auto edit = read_edit(body, start + 8);
     if (!edit) return edit.error();
     if (!log.edits_.empty() && order_of(log.edits_.back()) >= order_of(*edit)) {
-      return fault("edit out of order", start);
+      return bad_at(start, "edit out of order");
     }
     log.edits_.push_back(std::move(*edit));
   }

@@ -121,6 +121,10 @@ class ByteReader {
     if (b.empty()) return 0;
     return static_cast<std::uint16_t>(static_cast<unsigned>(b[0]) | static_cast<unsigned>(b[1]) << 8);
   }
+  [[nodiscard]] std::uint64_t u64() {
+    const std::span<const std::byte> b = take(8);
+    return b.empty() ? 0 : load<std::uint64_t>(b.data(), std::endian::little);
+  }
   [[nodiscard]] float f32() { return std::bit_cast<float>(u32()); }
   [[nodiscard]] std::int32_t i32() { return static_cast<std::int32_t>(u32()); }
 
@@ -156,8 +160,9 @@ class ByteWriter {
   void u16(std::uint16_t value) { put(value, 2); }
   void u32(std::uint32_t value) { put(value, 4); }
   void i32(std::int32_t value) { u32(static_cast<std::uint32_t>(value)); }
+  void u64(std::uint64_t value) { put(value, 8); }
   void f32(float value) { u32(std::bit_cast<std::uint32_t>(value)); }
-  void f64(double value) { put(std::bit_cast<std::uint64_t>(value), 8); }
+  void f64(double value) { u64(std::bit_cast<std::uint64_t>(value)); }
 
   /// Appends space to be written through `bytes` later.
   void leave(std::size_t count) { bytes_.resize(bytes_.size() + count); }
