@@ -12,7 +12,6 @@
 
 #include "core/coordinates/chunk_order.h"
 #include "core/work/workers.h"
-#include "scene/instance_axes.h"
 
 namespace quoin {
 namespace {

@@ -16,8 +16,6 @@
 #include <quoin/core/assert.h>
 #include <quoin/scene/scene.h>
 
-#include "scene/instance_axes.h"
-
 namespace quoin {
 namespace {
 

@@ -9,7 +9,4 @@ namespace quoin {
 /// Cost: nothing without changed groups and layers; else O(instances + groups * depth).
 void add_instances_below(const Scene& scene, SceneChanges& changes);
 
-/// Shows every instance, group and layer.
-void show_all(Scene& scene);
-
 }  // namespace quoin

@@ -55,6 +55,20 @@ TEST(Hierarchy, ShowsInstanceIfAllAncestorsAreShown) {
   EXPECT_FALSE(shown());
 }
 
+TEST(Hierarchy, ShowsAll) {
+  Scene scene;
+  const LayerHandle layer = scene.add_layer({"houses", false});
+  const GroupHandle street = scene.add_group({.name = "street", .layer = layer, .visible = false});
+  const InstanceHandle door = instance_below(scene, add_voxel(scene), street);
+  scene.edit(door).visible = false;
+  ChangeCursor before = scene.cursor();
+  show_all(scene);
+  EXPECT_TRUE(is_shown(scene, scene.instances()[door]));
+  EXPECT_TRUE(is_shown(scene, scene.groups()[street]));
+  EXPECT_TRUE(scene.layers()[layer].visible);
+  EXPECT_EQ(scene.changes_since(before).instances, std::vector<InstanceHandle>{door});
+}
+
 TEST(Hierarchy, TreatsCyclicGroupsAsTopLevel) {
   Scene scene;
   const GridHandle grid = add_voxel(scene);

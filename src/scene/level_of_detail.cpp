@@ -9,9 +9,9 @@
 
 #include <quoin/core/assert.h>
 
+#include "core/coordinates/unit_rotation.h"
 #include "core/moved_from.h"
 #include "scene/frustum.h"
-#include "scene/instance_axes.h"
 
 namespace quoin {
 namespace {

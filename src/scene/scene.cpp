@@ -14,8 +14,8 @@
 #include <quoin/core/assert.h>
 
 #include "core/change_journal.h"
+#include "core/coordinates/unit_rotation.h"
 #include "scene/hierarchy.h"
-#include "scene/instance_axes.h"
 
 namespace quoin {
 
@@ -37,14 +37,6 @@ glm::dmat3 exact_matrix(const DQuat& rotation) {
 constexpr DVec3 kNowhere{std::numeric_limits<double>::quiet_NaN()};
 
 }  // namespace
-
-DQuat made_unit(const DQuat& q) {
-  if (q.x == 0.0 && q.y == 0.0 && q.z == 0.0 && q.w == 0.0) return {1.0, 0.0, 0.0, 0.0};
-  // Scaled first: the square of a very small or large number is 0 or infinite.
-  const double largest = std::max({std::abs(q.x), std::abs(q.y), std::abs(q.z), std::abs(q.w)});
-  const DQuat scaled = q / largest;
-  return scaled / std::sqrt(glm::dot(scaled, scaled));
-}
 
 glm::dmat3 world_axes(const Instance& instance) {
   glm::dmat3 axes = exact_matrix(instance.rotation);

@@ -13,7 +13,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "scene/instance_axes.h"
+#include "core/coordinates/unit_rotation.h"
 
 namespace quoin {
 namespace {

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include <glm/mat3x3.hpp>
 #include <glm/mat4x4.hpp>
 
 #include <quoin/core/changes.h>
@@ -232,6 +233,9 @@ class Scene {
 /// Returns true if a group, its layer, its parent groups and their layers are all visible.
 [[nodiscard]] bool is_shown(const Scene& scene, const SceneGroup& group);
 
+/// Sets `visible` of every instance, group and layer. Cost: O(instances, groups and layers).
+void show_all(Scene& scene);
+
 /// Returns true if the filter accepts an instance.
 [[nodiscard]] inline bool passes(InstanceFilter filter, const Scene& scene, const Instance& instance) {
   return filter == InstanceFilter::All || is_shown(scene, instance);
@@ -257,6 +261,9 @@ void move_group(Scene& scene, GroupHandle group, DVec3 position, const DQuat& ro
 /// Returns true if an instance's grid exists and `filter` accepts the instance. Does not check the transform.
 [[nodiscard]] bool is_drawn(const Scene& scene, const Instance& instance, InstanceFilter filter);
 
+/// Returns the grid's axes in the world, as columns: the rotation after the mirror, without the voxels' size. Exact for
+/// quarter turns, whose quaternions hold the irrational square root of one half.
+[[nodiscard]] glm::dmat3 world_axes(const Instance& instance);
 /// Transforms a point from the instance's grid (voxels) to the world.
 [[nodiscard]] DVec3 world_from_grid(const Instance& instance, const SceneGrid& grid, DVec3 point_in_grid);
 /// Returns the matrix that transforms points from the instance's grid (voxels) to the world. The determinant is

@@ -1,8 +1,8 @@
 #include <quoin/core/assert.h>
 #include <quoin/scene/near_grids.h>
 
+#include "core/coordinates/unit_rotation.h"
 #include "io/gltf/gltf_layout.h"
-#include "scene/instance_axes.h"
 
 #include <algorithm>
 #include <array>

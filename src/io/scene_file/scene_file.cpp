@@ -10,7 +10,6 @@
 #include "core/bytes/text.h"
 #include "io/format_driver.h"
 #include "io/whole_file.h"
-#include "scene/hierarchy.h"
 
 namespace quoin {
 

@@ -15,7 +15,6 @@
 #include "io/vox/chunks.h"
 #include "io/vox/render_settings.h"
 #include "io/whole_file.h"
-#include "scene/hierarchy.h"
 
 namespace quoin {
 

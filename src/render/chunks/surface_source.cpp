@@ -11,7 +11,6 @@
 
 #include "render/chunks/field_surfaces.h"
 #include "render/chunks/voxel_surfaces.h"
-#include "scene/instance_axes.h"
 
 namespace quoin {
 namespace {

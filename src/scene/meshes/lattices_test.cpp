@@ -11,7 +11,7 @@
 #include <quoin/grid/copy_box.h>
 #include <quoin/scene/scene_meshes.h>
 
-#include "scene/instance_axes.h"
+#include "core/coordinates/unit_rotation.h"
 
 namespace quoin {
 

@@ -7,7 +7,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "scene/instance_axes.h"
+#include "core/coordinates/unit_rotation.h"
 
 namespace quoin {
 

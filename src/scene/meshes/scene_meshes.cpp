@@ -10,11 +10,11 @@
 #include <quoin/core/assert.h>
 #include <quoin/grid/voxel_field.h>
 
+#include "core/coordinates/unit_rotation.h"
 #include "core/work/progress_steps.h"
 #include "mesh/surface/face_materials.h"
 #include "mesh/surface/simplify.h"
 #include "mesh/surface/voxel_surface.h"
-#include "scene/instance_axes.h"
 #include "scene/meshes/occlusion_atlas.h"
 #include "scene/meshes/scene_mesh_parts.h"
 

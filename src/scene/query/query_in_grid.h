@@ -15,7 +15,7 @@
 #include <quoin/core/vec.h>
 #include <quoin/scene/scene_query.h>
 
-#include "scene/instance_axes.h"
+#include "core/coordinates/unit_rotation.h"
 #include "scene/tracer/placed_grid.h"
 #include "scene/tracer/scene_tracer_impl.h"
 

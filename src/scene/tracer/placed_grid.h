@@ -39,6 +39,9 @@ struct PlacedGrid {
   [[nodiscard]] double voxels_per_cell() const { return std::ldexp(1.0, level); }
 };
 
+/// The box around a placed grid whose voxels lie within `tight`, with room for rounding.
+[[nodiscard]] DBox bounds_in_world(const PlacedGrid& placed, const IBox& tight);
+
 /// Returns the placed grids of a tracer, by instance handle. Lifetime: the tracer owns them, until its next update.
 [[nodiscard]] const std::vector<PlacedGrid>& placed_in(const SceneTracer& tracer);
 

@@ -8,7 +8,6 @@
 #include <quoin/core/assert.h>
 
 #include "core/moved_from.h"
-#include "scene/instance_axes.h"
 #include "scene/tracer/placed_grid.h"
 #include "scene/tracer/scene_tracer_impl.h"
 

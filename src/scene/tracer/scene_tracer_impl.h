@@ -25,9 +25,6 @@ struct TracedGrid {
   TreeCache trees;             ///< up to date while it is placed
 };
 
-/// The box around a placed grid whose voxels lie within `tight`, with room for rounding.
-[[nodiscard]] DBox bounds_in_world(const PlacedGrid& placed, const IBox& tight);
-
 struct SceneTracer::Impl {
   // The state that a placed grid was read from, for comparison with the current instance.
   struct Source {

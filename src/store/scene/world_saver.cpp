@@ -17,7 +17,6 @@
 #include <quoin/core/changes.h>
 
 #include "core/bytes/files.h"
-#include "scene/hierarchy.h"
 #include "store/database/schema.h"
 #include "store/world/part_text.h"
 #include "store/world/world_changes.h"

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "core/drop_oldest.h"
-#include "scene/tracer/scene_tracer_impl.h"
 
 namespace quoin::vulkan {
 namespace {

@@ -7,9 +7,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "scene/instance_axes.h"
 #include "scene/surfaces.h"
-#include "scene/tracer/scene_tracer_impl.h"
 
 namespace quoin::vulkan {
 namespace {

@@ -14,7 +14,6 @@
 #include "render/vulkan/march/renderer_impl.h"
 #include "render/vulkan/raster/mesh_pass.h"
 #include "render/vulkan/raster/mesh_store.h"
-#include "scene/instance_axes.h"
 #include "scene/tracer/placed_grid.h"
 
 namespace quoin {
