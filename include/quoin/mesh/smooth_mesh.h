@@ -17,6 +17,8 @@ namespace quoin {
 
 /// Linear colour, 16 bits per channel: 65,535 is 1. Eight bits would show banding in dark colours.
 using LinearRgba16 = std::array<std::uint16_t, 4>;
+/// Converts an sRGB colour to linear light. Alpha is linear already.
+[[nodiscard]] LinearRgba16 linear_colour_of(Rgba8 colour);
 
 /// A welded surface. The vertex arrays have one entry per vertex.
 struct SmoothMesh {
@@ -89,6 +91,9 @@ struct SmoothMeshOptions {
 /// Cost:     from a few microseconds to tens of microseconds per triangle, on one thread.
 /// Source:   M. Garland, P. Heckbert, "Surface Simplification Using Quadric Error Metrics" (1997); meshoptimizer.
 [[nodiscard]] Result<float> simplify_smooth_mesh(SmoothMesh& mesh, float error_in_samples);
+/// As above. `tags`: one number per vertex, which stays with the vertex, or empty.
+[[nodiscard]] Result<float> simplify_smooth_mesh(SmoothMesh& mesh, float error_in_samples,
+                                                 std::vector<std::uint32_t>& tags);
 
 /// Returns true if this build can simplify (has meshoptimizer).
 [[nodiscard]] bool can_simplify();

@@ -18,9 +18,6 @@ struct CellMaterial {
   VoxelType type = kAir;
 };
 
-/// Converts a colour to linear light.
-[[nodiscard]] LinearRgba16 linear_colour_of(Rgba8 colour);
-
 /// The surface material of cells: the materials of their solid samples.
 class SurfaceMaterials {
  public:

@@ -431,7 +431,7 @@ bool can_simplify() {
   return true;
 }
 
-Result<float> simplify_tagged(SmoothMesh& mesh, float error_in_samples, std::vector<std::uint32_t>& tags) {
+Result<float> simplify_smooth_mesh(SmoothMesh& mesh, float error_in_samples, std::vector<std::uint32_t>& tags) {
   if (!(error_in_samples >= 0.0F)) return make_error(ErrorCode::InvalidArgument, "the error must be at least 0");
 #if QUOIN_ASSERT_ENABLED
   QUOIN_ASSERT(has_arrays_of_one_length(mesh));
@@ -451,7 +451,7 @@ bool can_simplify() {
   return false;
 }
 
-Result<float> simplify_tagged(SmoothMesh&, float error_in_samples, std::vector<std::uint32_t>&) {
+Result<float> simplify_smooth_mesh(SmoothMesh&, float error_in_samples, std::vector<std::uint32_t>&) {
   if (!(error_in_samples >= 0.0F)) return make_error(ErrorCode::InvalidArgument, "the error must be at least 0");
   return make_error(ErrorCode::Unsupported,
                     "cannot simplify meshes: this build lacks meshoptimizer (libmeshoptimizer-dev in Debian)");
@@ -461,7 +461,7 @@ Result<float> simplify_tagged(SmoothMesh&, float error_in_samples, std::vector<s
 
 Result<float> simplify_smooth_mesh(SmoothMesh& mesh, float error_in_samples) {
   std::vector<std::uint32_t> none;
-  return simplify_tagged(mesh, error_in_samples, none);
+  return simplify_smooth_mesh(mesh, error_in_samples, none);
 }
 
 namespace {

@@ -11,9 +11,6 @@
 
 namespace quoin {
 
-/// Like `simplify_smooth_mesh`, with an optional number per vertex that stays with it.
-[[nodiscard]] Result<float> simplify_tagged(SmoothMesh& mesh, float error_in_samples, std::vector<std::uint32_t>& tags);
-
 /// A bounding volume hierarchy of triangles, for distances of points.
 ///
 /// Lifetime: the arrays must outlive it. Threads: concurrent queries are safe.

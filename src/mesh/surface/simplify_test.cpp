@@ -405,6 +405,17 @@ TEST_F(Simplify, KeepsTheAttributesOfRemainingVertices) {
   }
 }
 
+TEST_F(Simplify, KeepsTagsWithTheirVertices) {
+  SmoothMesh mesh = surface_of(sphere, 41);
+  std::vector<std::uint32_t> tags(mesh.positions.size());
+  for (std::size_t i = 0; i < tags.size(); ++i) tags[i] = static_cast<std::uint32_t>(i);
+  ASSERT_TRUE(simplify_smooth_mesh(mesh, 0.2F, tags).has_value());
+  ASSERT_EQ(tags.size(), mesh.positions.size());
+  for (std::size_t i = 0; i < tags.size(); ++i) {
+    EXPECT_EQ(tags[i], mesh.albedo[i][0] | std::uint32_t{mesh.albedo[i][1]} << 16) << i;
+  }
+}
+
 TEST_F(Simplify, ZeroErrorSimplifiesOnlyFlatParts) {
   const SmoothMesh whole = surface_of(sphere, 41);
   SmoothMesh mesh = whole;

@@ -12,8 +12,6 @@
 
 #include "core/coordinates/unit_rotation.h"
 #include "core/work/progress_steps.h"
-#include "mesh/surface/face_materials.h"
-#include "mesh/surface/simplify.h"
 #include "mesh/surface/voxel_surface.h"
 #include "scene/meshes/occlusion_atlas.h"
 #include "scene/meshes/scene_mesh_parts.h"
@@ -336,7 +334,7 @@ Status simplify_and_count(SmoothMesh& mesh, std::optional<float> error, std::vec
                           MeshStats& stats) {
   if (error) {
     const std::size_t before = mesh.indices.size() / 3;
-    const auto reached = simplify_tagged(mesh, *error, tags);
+    const auto reached = simplify_smooth_mesh(mesh, *error, tags);
     if (!reached) return reached.error();
     stats.simplified_away += static_cast<std::int64_t>(before) - static_cast<std::int64_t>(mesh.indices.size() / 3);
     stats.simplify_error = std::max(stats.simplify_error, *reached);
