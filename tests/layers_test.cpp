@@ -36,12 +36,10 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"io/scene_file/scene_parts.h", {"store"}},
     {"scene/surfaces.h", {"io", "render"}},
     {"scene/frustum.h", {"render"}},
-    {"scene/meshes/scene_mesh_parts.h", {"store"}},
     {"scene/tracer/placed_grid.h", {"render"}},
     {"scene/tracer/scene_view.h", {"render"}},
     {"scene/tracer/instance_tree.h", {"render"}},
     {"scene/tracer/tree_cache.h", {"render"}},
-    {"mesh/blocky/chunk_triangles.h", {"store"}},
     {"mesh/surface/voxel_surface.h", {"render", "scene"}},
     {"mesh/surface/smooth_surface.h", {"scene"}},
     {"mesh/surface/face_materials.h", {"render"}},
@@ -169,7 +167,7 @@ TEST(Layers, FindsForbiddenIncludes) {
   EXPECT_TRUE(forbidden_include("io", 4, "quoin/render/cpu_renderer.h").has_value()) << "siblings";
   EXPECT_TRUE(forbidden_include("grid", 1, "../mesh/watertight.h").has_value());
   EXPECT_FALSE(forbidden_include("io", 4, "quoin/mesh/quad.h").has_value());
-  EXPECT_FALSE(forbidden_include("mesh", 2, "mesh/blocky/chunk_triangles.h").has_value());
+  EXPECT_FALSE(forbidden_include("mesh", 2, "mesh/surface/simplify.h").has_value());
   EXPECT_FALSE(forbidden_include("mesh", 2, "vector").has_value());
 }
 

@@ -12,7 +12,6 @@
 #include <quoin/mesh/blocky.h>
 
 #include "core/death_for_tests.h"
-#include "mesh/blocky/chunk_triangles.h"
 #include "mesh/mesh_oracle.h"
 
 namespace quoin {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include <quoin/core/direction.h>
@@ -66,6 +67,7 @@ class BlockyMesher {
 /// mesh files.
 enum class SurfaceClass : std::uint8_t { Opaque, Transparent, Emissive, EmissiveTransparent };
 inline constexpr std::size_t kSurfaceClasses = 4;
+[[nodiscard]] SurfaceClass surface_class(const VoxelProperties& properties);
 
 /// Triangles of one surface class. The vertex arrays have one entry per vertex; faces share no vertices.
 struct BlockyTriangles {
@@ -108,5 +110,14 @@ struct BlockyMeshOptions {
 [[nodiscard]] Result<BlockyMesh> build_blocky_mesh(const Grid& grid, const VoxelRegistry& types,
                                                    const BlockyMeshOptions& options = {}, Threads threads = {},
                                                    const Progress& progress = {});
+
+/// Appends the triangles of some chunks to `mesh`, and counts their faces and quads, like build_blocky_mesh. For grids
+/// that are not in memory as a whole.
+///
+/// `quads`:  of each chunk, from BlockyMesher. `chunks`: their coordinates; vertices are relative to chunk 0's corner.
+/// Errors:   LimitExceeded if a surface class needs more than about 2^32 vertices; `mesh` then has some of the chunks.
+/// Requires: `quads` and `chunks` have one length.
+[[nodiscard]] Status append_triangles(std::span<const QuadBuffer> quads, std::span<const IVec3> chunks,
+                                      const VoxelRegistry& types, bool watertight, BlockyMesh& mesh);
 
 }  // namespace quoin

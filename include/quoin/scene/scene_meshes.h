@@ -5,12 +5,14 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include <glm/mat4x4.hpp>
 
+#include <quoin/core/function_ref.h>
 #include <quoin/core/image.h>
 #include <quoin/core/parallel.h>
 #include <quoin/core/progress.h>
@@ -94,6 +96,12 @@ struct MeshPart {
 ///   meshes.parts.push_back(mesh_part("bone", std::move(*surface), {230, 220, 200}));
 ///   meshes.placements.push_back({.part = 0});
 [[nodiscard]] MeshPart mesh_part(std::string name, ArraySurface surface, Rgba8 colour, const DVec3& pivot = DVec3(0.0));
+
+/// Returns the thickness of the bodies of each transparent type, by type: MeshPart::thickness of blocks. Measures
+/// straight inwards from the middle of each triangle of a grid's surfaces, at most 1,024 voxels deep. `type_at`: the
+/// grid's voxels, in the coordinates of the surfaces. Cost: one lookup per voxel behind the middle of a triangle.
+[[nodiscard]] std::vector<GlassThickness> glass_thickness(const FunctionRef<VoxelType(IVec3)>& type_at,
+                                                          std::span<const MeshView> surfaces);
 
 /// Meshing statistics; a part that is placed several times counts once.
 struct MeshStats {

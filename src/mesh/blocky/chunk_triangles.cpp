@@ -1,11 +1,13 @@
-#include "mesh/blocky/chunk_triangles.h"
+#include <quoin/mesh/blocky.h>
 
 #include <algorithm>
+#include <array>
 #include <limits>
+#include <vector>
 
 #include <quoin/core/assert.h>
 #include <quoin/grid/chunk.h>
-#include <quoin/mesh/blocky.h>
+#include <quoin/mesh/quad.h>
 #include <quoin/mesh/quad_triangles.h>
 
 #include "core/work/progress_steps.h"
@@ -14,6 +16,31 @@ namespace quoin {
 namespace {
 
 constexpr int kLattice = kChunkEdge + 1;
+
+struct OutlinePoint {
+  IVec3 position;  ///< chunk coordinates, 0..64
+  std::uint8_t occlusion;
+};
+
+/// Finds, for the quads of one chunk, the vertices that must be on their outlines so that no vertex is inside another
+/// quad's edge.
+///
+/// Inside the chunk, these are the corners of its other quads. An edge in a border plane of the chunk is shared with a
+/// chunk that may be meshed separately, so it is divided at every voxel: both sides follow this rule.
+class OutlineFinder {
+ public:
+  /// Records the corners of all quads of a chunk.
+  void prepare(const QuadBuffer& quads);
+
+  /// Computes the outline of one of these quads, counter-clockwise from outside, starting at corner 0. Includes all
+  /// corners.
+  void outline(const Quad& quad, std::vector<OutlinePoint>& out) const;
+
+ private:
+  [[nodiscard]] bool is_vertex(IVec3 p) const;
+
+  std::vector<std::uint64_t> corners_;  // one bit for each of 65^3 lattice points
+};
 
 std::size_t lattice_index(IVec3 p) {
   QUOIN_ASSERT(std::min({p.x, p.y, p.z}) >= 0 && std::max({p.x, p.y, p.z}) < kLattice,
@@ -47,8 +74,6 @@ std::array<std::size_t, 4> corner_places(const std::vector<OutlinePoint>& outlin
   return places;
 }
 
-}  // namespace
-
 void OutlineFinder::prepare(const QuadBuffer& quads) {
   corners_.assign((static_cast<std::size_t>(kLattice) * kLattice * kLattice + 63) / 64, 0);
   for (const Quad& quad : quads) {
@@ -81,6 +106,10 @@ void OutlineFinder::outline(const Quad& quad, std::vector<OutlinePoint>& out) co
   }
 }
 
+// Appends triangles that cover a quad's outline. Uses all points of the outline and no triangle of zero area.
+//
+// Order of `outline`: as OutlineFinder returns it. An outline of four points is split along the quad's diagonal.
+//
 // A and C are the ends of the diagonal. Fans from C cover side A-B, fans from the last point before B cover side B-C.
 // The other half works in the same way.
 void triangulate_outline(const std::vector<OutlinePoint>& outline, bool flipped, std::uint32_t base,
@@ -101,8 +130,6 @@ void triangulate_outline(const std::vector<OutlinePoint>& outline, bool flipped,
   half(corners[first], corners[first + 1], corners[(first + 2) % 4]);
   half(corners[(first + 2) % 4], corners[(first + 3) % 4], corners[first]);
 }
-
-namespace {
 
 constexpr std::size_t kMaxVertices = std::numeric_limits<std::uint32_t>::max() - 1'024;
 
@@ -154,6 +181,27 @@ SurfaceClass surface_class(const VoxelProperties& properties) {
   return is_transparent ? SurfaceClass::Transparent : SurfaceClass::Opaque;
 }
 
+namespace {
+
+/// Converts the quads of consecutive chunks to triangles.
+class ChunkTriangles {
+ public:
+  ChunkTriangles(const VoxelRegistry& types, bool watertight);
+
+  /// Appends the triangles of one chunk, and counts its faces and quads. Errors: LimitExceeded if a surface class needs
+  /// more than about 2^32 vertices.
+  [[nodiscard]] Status append(const QuadBuffer& quads, IVec3 chunk, BlockyMesh& mesh);
+
+ private:
+  [[nodiscard]] SurfaceClass class_of(const Quad& quad) const;
+  [[nodiscard]] Status append_outlines(const QuadBuffer& quads, IVec3 origin, BlockyMesh& mesh);
+
+  std::vector<SurfaceClass> classes_;  // [VoxelType]
+  bool watertight_;
+  OutlineFinder finder_;
+  std::vector<OutlinePoint> outline_;
+};
+
 ChunkTriangles::ChunkTriangles(const VoxelRegistry& types, bool watertight)
     : classes_(types.size()), watertight_(watertight) {
   for (std::size_t i = 0; i < classes_.size(); ++i) classes_[i] = surface_class(types[static_cast<VoxelType>(i)]);
@@ -195,6 +243,8 @@ Status ChunkTriangles::append_outlines(const QuadBuffer& quads, IVec3 origin, Bl
   return {};
 }
 
+}  // namespace
+
 std::int64_t BlockyMesh::triangle_count() const {
   std::size_t total = 0;
   for (const BlockyTriangles& surface : surfaces) total += surface.indices.size() / 3;
@@ -230,6 +280,16 @@ std::vector<QuadBuffer> quads_of(const Grid& grid, const std::vector<IVec3>& chu
 }
 
 }  // namespace
+
+Status append_triangles(std::span<const QuadBuffer> quads, std::span<const IVec3> chunks, const VoxelRegistry& types,
+                        bool watertight, BlockyMesh& mesh) {
+  QUOIN_ASSERT(quads.size() == chunks.size(), "a chunk for each buffer of quads");
+  ChunkTriangles triangles(types, watertight);
+  for (std::size_t i = 0; i < quads.size(); ++i) {
+    if (auto done = triangles.append(quads[i], chunks[i], mesh); !done) return done;
+  }
+  return {};
+}
 
 Result<BlockyMesh> build_blocky_mesh(const Grid& grid, const VoxelRegistry& types, const BlockyMeshOptions& options,
                                      Threads threads, const Progress& progress) {

@@ -88,6 +88,31 @@ Grid ten_chunks() {
   return grid;
 }
 
+TEST(BlockyMesh, AppendsChunksInParts) {
+  const VoxelRegistry types = oracle::mixed_types();
+  const Grid grid = oracle::random_world(7, {IVec3{-20}, IVec3{25}}, 5, 0.04);
+  const std::vector<IVec3> chunks = grid.chunks();
+  BlockyMesher mesher;
+  std::vector<QuadBuffer> quads(chunks.size());
+  for (std::size_t i = 0; i < chunks.size(); ++i) mesher.mesh(grid.neighbourhood(chunks[i]), types, {}, quads[i]);
+  for (const bool watertight : {false, true}) {
+    const auto whole = build_blocky_mesh(grid, types, {.watertight = watertight}, {1});
+    ASSERT_TRUE(whole.has_value());
+    BlockyMesh parts;
+    const std::span<const QuadBuffer> all(quads);
+    const std::span<const IVec3> places(chunks);
+    ASSERT_TRUE(append_triangles(all.first(3), places.first(3), types, watertight, parts));
+    ASSERT_TRUE(append_triangles(all.subspan(3), places.subspan(3), types, watertight, parts));
+    EXPECT_EQ(parts.quads, whole->quads);
+    EXPECT_EQ(parts.faces_visible, whole->faces_visible);
+    for (std::size_t i = 0; i < kSurfaceClasses; ++i) {
+      EXPECT_EQ(parts.surfaces[i].positions, whole->surfaces[i].positions);
+      EXPECT_EQ(parts.surfaces[i].indices, whole->surfaces[i].indices);
+      EXPECT_EQ(parts.surfaces[i].types, whole->surfaces[i].types);
+    }
+  }
+}
+
 TEST(BlockyMesh, StopsWhenCancelled) {
   // The first ten calls occur while faces are found, the others during the conversion to triangles.
   for (const int last : {1, 3, 10, 11, 15, 20}) {

@@ -1,13 +1,16 @@
 #include <quoin/scene/scene_meshes.h>
 
 #include <algorithm>
+#include <map>
 #include <memory>
 #include <utility>
 
 #include <glm/common.hpp>
+#include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/direction.h>
 #include <quoin/grid/voxel_field.h>
 
 #include "core/coordinates/unit_rotation.h"
@@ -182,6 +185,62 @@ MeshPart mesh_part(std::string name, ArraySurface surface, Rgba8 colour, const D
 
 namespace {
 
+constexpr int kDeepest = 1024;
+
+// [depth in voxels]: the area of the triangles with this depth behind them. Areas are integers, so that sums do not
+// depend on the order.
+using AreaByDepth = std::vector<double>;
+
+int depth_behind(const FunctionRef<VoxelType(IVec3)>& type_at, Vec3 middle, Direction face, VoxelType type) {
+  const IVec3 inwards = -normal_of(face);
+  IVec3 voxel(glm::floor(middle + 0.5F * Vec3(inwards)));
+  int depth = 0;
+  while (depth < kDeepest && type_at(voxel) == type) {
+    ++depth;
+    voxel += inwards;
+  }
+  return std::max(depth, 1);
+}
+
+float median(const AreaByDepth& areas) {
+  QUOIN_ASSERT(!areas.empty(), "areas of a type");
+  double half = 0.0;
+  for (const double area : areas) half += area / 2.0;
+  for (std::size_t depth = 0; depth < areas.size(); ++depth) {
+    half -= areas[depth];
+    if (half <= 0.0 && areas[depth] > 0.0) return static_cast<float>(depth);
+  }
+  return static_cast<float>(areas.size() - 1);
+}
+
+}  // namespace
+
+std::vector<GlassThickness> glass_thickness(const FunctionRef<VoxelType(IVec3)>& type_at,
+                                            std::span<const MeshView> surfaces) {
+  std::map<VoxelType, AreaByDepth> areas;
+  for (const MeshView& view : surfaces) {
+    if (view.surface != SurfaceClass::Transparent && view.surface != SurfaceClass::EmissiveTransparent) continue;
+    QUOIN_ASSERT(view.types.size() == view.positions.size() && view.directions.size() == view.positions.size(),
+                 "a type and a direction for each vertex");
+    for (std::size_t i = 0; i + 2 < view.indices.size(); i += 3) {
+      const std::uint32_t first = view.indices[i];
+      const Vec3 a = view.positions[first];
+      const Vec3 b = view.positions[view.indices[i + 1]];
+      const Vec3 c = view.positions[view.indices[i + 2]];
+      const VoxelType type = view.types[first];
+      const int voxels = depth_behind(type_at, (a + b + c) / 3.0F, view.directions[first], type);
+      AreaByDepth& of_type = areas.try_emplace(type, kDeepest + 1).first->second;
+      of_type[static_cast<std::size_t>(voxels)] += glm::length(glm::cross(b - a, c - a));
+    }
+  }
+  std::vector<GlassThickness> thickness;
+  thickness.reserve(areas.size());
+  for (const auto& [type, each] : areas) thickness.push_back({type, median(each)});
+  return thickness;
+}
+
+namespace {
+
 // Places the parts of grids by the drawn instances.
 void place_parts(const Scene& scene, const std::vector<GridHandle>& grids, InstanceFilter filter,
                  MeshHierarchy& hierarchy, SceneMeshes& meshes) {
@@ -233,7 +292,8 @@ Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockySceneOptions& opt
       add_stats(**results[i], meshes.stats);
       meshes.parts.push_back(mesh_part(grid.name, std::move(**results[i]), grid.pivot));
       GridReader reader(grid.grid);
-      meshes.parts.back().thickness = glass_thickness(reader, meshes.parts.back().surfaces);
+      meshes.parts.back().thickness =
+          glass_thickness([&](IVec3 voxel) { return reader.get(voxel); }, meshes.parts.back().surfaces);
     }
     MeshPart& part = meshes.parts.back();
     if (!meshes.atlas.rgb.empty()) part = with_atlas(std::move(part), std::move(coordinates[i]));

@@ -27,6 +27,7 @@
 #include <quoin/core/parallel.h>
 #include <quoin/core/result.h>
 #include <quoin/grid/chunk.h>
+#include <quoin/mesh/blocky.h>
 #include <quoin/scene/near_grids.h>
 #include <quoin/store/world_meshes.h>
 #include <quoin/store/world_store.h>
@@ -35,8 +36,6 @@
 #include "core/coordinates/chunk_order.h"
 #include "core/drop_oldest.h"
 #include "core/work/workers.h"
-#include "mesh/blocky/chunk_triangles.h"
-#include "scene/meshes/scene_mesh_parts.h"
 #include "store/world/world_rules.h"
 
 namespace quoin::store {
@@ -454,14 +453,13 @@ class WorldMesher {
     meshed_.insert(grid);
     ChunkCache cache(world_, number_of(grid), options_.cache_bytes);
     auto spooled = std::make_shared<SpooledMesh>();
-    ChunkTriangles triangles(loaded_.loaded.scene.types, options_.scene.mesh.watertight);
     const std::span<const IVec3> places = cache.places();
     const auto origin = origin_of(places);
     if (!origin) return origin.error();
     for (std::size_t i = 0; i < places.size(); i += kBatch) {
       const auto batch = places.subspan(i, std::min(kBatch, places.size() - i));
       BlockyMesh mesh;
-      Status done = mesh_batch(batch, *origin, cache, triangles, mesh);
+      Status done = mesh_batch(batch, *origin, cache, mesh);
       if (!done) return done.error();
       if (auto spool = spooled->append(mesh, options_.folder); !spool) return of_folder(spool.error());
       stats.faces_visible += mesh.faces_visible;
@@ -478,7 +476,7 @@ class WorldMesher {
     if (auto done = spooled->finish(); !done) return of_folder(done.error());
     MeshPart part{{}, spooled->views(), DVec3(-*origin * kChunkEdge), spooled};
     CachedReader reader(cache, *origin, threads_);
-    part.thickness = glass_thickness(reader, part.surfaces);
+    part.thickness = glass_thickness([&](IVec3 voxel) { return reader.get(voxel); }, part.surfaces);
     return part;
   }
 
@@ -500,8 +498,7 @@ class WorldMesher {
     return make_error(ErrorCode::Unsupported, "chunks are too far apart to mesh in one grid");
   }
 
-  Status mesh_batch(std::span<const IVec3> batch, IVec3 origin, ChunkCache& cache, ChunkTriangles& triangles,
-                    BlockyMesh& mesh) const {
+  Status mesh_batch(std::span<const IVec3> batch, IVec3 origin, ChunkCache& cache, BlockyMesh& mesh) const {
     const auto window = window_around(batch, cache, threads_);
     if (!window) return window.error();
     if (cache.has_densities()) return densities();
@@ -516,10 +513,9 @@ class WorldMesher {
         mesher.mesh(window->neighbourhood(batch[i]), loaded_.loaded.scene.types, options, quads[i]);
       }
     });
-    for (std::size_t i = 0; i < batch.size(); ++i) {
-      if (auto done = triangles.append(quads[i], batch[i] - origin, mesh); !done) return done;
-    }
-    return {};
+    std::vector<IVec3> from_origin;
+    for (const IVec3 chunk : batch) from_origin.push_back(chunk - origin);
+    return append_triangles(quads, from_origin, loaded_.loaded.scene.types, options_.scene.mesh.watertight, mesh);
   }
 
   const WorldStore& world_;
