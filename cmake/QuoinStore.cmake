@@ -1,4 +1,4 @@
-# Worlds on disk: stored with SQLite and zstd; xxHash (header-only) detects corrupted data.
+# Worlds on disk, and Luanti's maps: stored with SQLite and zstd; xxHash (header-only) detects corrupted data.
 
 find_package(SQLite3 3.35 QUIET)
 find_package(zstd CONFIG QUIET)
@@ -18,11 +18,11 @@ if(quoin_store_missing)
   message(STATUS "Building without worlds on disk: ${quoin_store_missing} not found")
 endif()
 
-# Removes sources whose libraries are missing: those in the folders of src/store need all three.
+# Removes sources whose libraries are missing: SQLite's connections, Luanti's maps, and the folders of src/store.
 function(quoin_choose_store_sources sources)
   set(all ${${sources}})
   if(quoin_store_missing)
-    list(FILTER all EXCLUDE REGEX "/store/[^/]+/")
+    list(FILTER all EXCLUDE REGEX "/store/[^/]+/|/core/database/|/io/luanti/(luanti_.*|map_block)\\.cpp$")
   else()
     list(FILTER all EXCLUDE REGEX "/store/store_absent\\.cpp$")
   endif()
@@ -31,7 +31,7 @@ endfunction()
 
 function(quoin_add_store target)
   if(quoin_store_missing)
-    set_source_files_properties(src/store/store_absent.cpp PROPERTIES COMPILE_DEFINITIONS
+    set_source_files_properties(src/store/store_absent.cpp src/io/luanti/luanti.cpp PROPERTIES COMPILE_DEFINITIONS
       "QUOIN_STORE_MISSING=\"there was no ${quoin_store_missing}\"")
     return()
   endif()

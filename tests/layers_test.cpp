@@ -32,7 +32,6 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"grid/colour_table.h", {"io", "voxelize"}},
     {"grid/density/density_storage.h", {"mesh", "store", "terrain", "trace"}},
     {"io/format_driver.h", {"store"}},
-    {"io/models/luanti.h", {"store"}},
     {"io/scene_file/scene_parts.h", {"store"}},
     {"scene/surfaces.h", {"io", "render"}},
     {"scene/frustum.h", {"render"}},

@@ -19,6 +19,8 @@
 #include "core/drop_oldest.h"
 #include "core/work/progress_steps.h"
 #include "grid/chunk/chunk_storage.h"
+#include "io/luanti/luanti.h"
+#include "io/minecraft/block_types.h"
 
 namespace quoin {
 
@@ -266,6 +268,11 @@ Result<std::vector<SourcePart>> read_parts(const ChunkSource& source, const IBox
 }
 
 }  // namespace
+
+bool has_guessed_look(const VoxelProperties& properties) {
+  return properties.attributes.contains(minecraft::kGuessAttribute) ||
+         properties.attributes.contains(models::kNodeGuessAttribute);
+}
 
 std::string text_of_skipped_blocks(const std::map<std::string, std::uint64_t>& blocks) {
   std::string names;

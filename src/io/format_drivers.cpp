@@ -30,7 +30,8 @@ namespace quoin {
   ROW(kStlFormat)             \
   ROW(kThreeMfFormat)         \
   ROW(kOffFormat)             \
-  ROW(kObjFormat)
+  ROW(kObjFormat)             \
+  ROW(kLuantiMapFormat)
 
 #define QUOIN_DECLARE(driver) extern const FormatDriver driver;
 QUOIN_FORMATS(QUOIN_DECLARE)

@@ -169,13 +169,6 @@ Result<LoadedScene> read_world_format(const std::filesystem::path& path, const L
 Result<LoadedScene> read_world_format(std::span<const std::byte>, const LoadOptions&, Threads, const Progress&) {
   return absent();
 }
-Result<std::unique_ptr<ChunkSource>> open_luanti(const std::filesystem::path& path) {
-  return make_error(ErrorCode::Unsupported,
-                    "cannot read Luanti worlds: not supported by this build: " QUOIN_STORE_MISSING, path.string());
-}
-Result<std::unique_ptr<ChunkSource>> open_luanti(std::span<const std::byte>) {
-  return open_luanti(std::filesystem::path());
-}
 
 }  // namespace quoin
 // NOLINTEND(performance-unnecessary-value-param)

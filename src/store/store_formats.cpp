@@ -2,7 +2,6 @@
 
 #include <bit>
 #include <string_view>
-#include <system_error>
 
 #include <quoin/store/world_saver.h>
 
@@ -21,28 +20,6 @@ constexpr std::size_t kIdAt = 68;  // the application id
 bool is_world_format(std::span<const std::byte> beginning) {
   return beginning.size() >= kWorldHeaderBytes && text_of(beginning).starts_with(kSqliteHeader) &&
          load<std::uint32_t>(beginning.data() + kIdAt, std::endian::big) == kWorldApplicationId;
-}
-
-bool is_luanti_map(std::span<const std::byte> beginning) {
-  const std::string_view text = text_of(beginning);
-  if (!text.starts_with(kSqliteHeader) || text.size() < kIdAt + 4) return false;
-  if (text.substr(kIdAt, 4) != std::string_view("\0\0\0\0", 4)) return false;  // the application id of another program
-  // The first page lists the tables, as SQL.
-  const std::size_t page =
-      std::to_integer<std::size_t>(beginning[16]) << 8 | std::to_integer<std::size_t>(beginning[17]);
-  const std::string_view tables = text.substr(0, page == 1 ? 65536 : page);
-  constexpr std::string_view kTable = "CREATE TABLE ";
-  for (std::size_t at = tables.find(kTable); at != std::string_view::npos; at = tables.find(kTable, at + 1)) {
-    std::string_view name = tables.substr(at + kTable.size());
-    if (name.starts_with("IF NOT EXISTS ")) name.remove_prefix(14);
-    if (!name.empty() && (name.front() == '`' || name.front() == '"' || name.front() == '[')) name.remove_prefix(1);
-    constexpr std::string_view kBlocks = "blocks";
-    if (name.starts_with(kBlocks) && name.size() > kBlocks.size() &&
-        std::string_view("`\"] (").find(name[kBlocks.size()]) != std::string_view::npos) {
-      return true;
-    }
-  }
-  return false;
 }
 
 namespace {
@@ -66,25 +43,10 @@ constinit const FormatDriver kWorldFormat = {
     },
 };
 
-constinit const FormatDriver kLuantiFormat = {
-    .info = {FileFormat::LuantiMap, ".sqlite", "Luanti world: its folder or map.sqlite",
-             FormatCapability::Read | FormatCapability::Chunks},
-    .detect_path =
-        [](const std::filesystem::path& path) {
-          std::error_code error;
-          return std::filesystem::is_regular_file(path / "world.mt", error);
-        },
-    .detect = is_luanti_map,
-    .reads_path = true,
-    .open_chunks = [](const std::filesystem::path& path, std::span<const std::byte> bytes, std::string_view)
-        -> Result<std::unique_ptr<ChunkSource>> { return path.empty() ? open_luanti(bytes) : open_luanti(path); },
-};
-
 }  // namespace
 
 }  // namespace quoin
 
-// Registers the formats before main. The library's users link with `-u quoin_store_formats` (see CMakeLists.txt), since
+// Registers the format before main. The library's users link with `-u quoin_store_formats` (see CMakeLists.txt), since
 // linkers drop objects of a static library that nothing refers to.
-extern "C" [[gnu::visibility("hidden")]] const bool quoin_store_formats =
-    quoin::register_format(quoin::kWorldFormat) && quoin::register_format(quoin::kLuantiFormat);
+extern "C" [[gnu::visibility("hidden")]] const bool quoin_store_formats = quoin::register_format(quoin::kWorldFormat);

@@ -3,16 +3,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <memory>
 #include <span>
 
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
-#include <quoin/io/chunk_source.h>
 #include <quoin/io/loaded_scene.h>
 
-// The formats of SQLite databases, registered with io: Quoin's worlds, and Luanti's. Builds without SQLite detect them,
-// and return an error when reading.
+// The format of Quoin's worlds, registered with io. Builds without SQLite detect it, and return an error when reading.
 
 namespace quoin {
 
@@ -27,14 +24,5 @@ inline constexpr std::size_t kWorldHeaderBytes = 100;
                                                     Threads threads, const Progress& progress);
 [[nodiscard]] Result<LoadedScene> read_world_format(std::span<const std::byte> bytes, const LoadOptions& options,
                                                     Threads threads, const Progress& progress);
-
-/// Returns true if bytes begin like a Luanti map: with SQLite's header, and the table of blocks.
-[[nodiscard]] bool is_luanti_map(std::span<const std::byte> beginning);
-
-/// Opens a Luanti world: its folder, or the database in it (map.sqlite).
-/// Errors: CannotRead; BadFormat; Unsupported if world.mt names another storage.
-[[nodiscard]] Result<std::unique_ptr<ChunkSource>> open_luanti(const std::filesystem::path& path);
-/// Opens the bytes of a database, which are copied.
-[[nodiscard]] Result<std::unique_ptr<ChunkSource>> open_luanti(std::span<const std::byte> database);
 
 }  // namespace quoin

@@ -131,6 +131,9 @@ class SourceTypes {
 [[nodiscard]] Result<std::unique_ptr<ChunkSource>> open_chunk_source(const std::filesystem::path& path,
                                                                      std::string_view dimension = {});
 
+/// Returns true if a type of a source was guessed from its name, because the block or node is unknown.
+[[nodiscard]] bool has_guessed_look(const VoxelProperties& properties);
+
 /// Returns a warning that lists the named blocks read as air (SourcePart::skipped_blocks); empty if there are none.
 [[nodiscard]] std::string text_of_skipped_blocks(const std::map<std::string, std::uint64_t>& blocks);
 

@@ -16,7 +16,7 @@
 #include <quoin/core/vec.h>
 #include <quoin/store/world_store.h>
 
-#include "store/database/connection.h"
+#include "core/database/connection.h"
 
 // The tables of a world; docs/formats/world.md documents them.
 //

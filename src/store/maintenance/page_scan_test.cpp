@@ -16,9 +16,9 @@
 #include <quoin/io/file.h>
 
 #include "core/bytes/bytes.h"
+#include "core/database/connection.h"
 #include "core/death_for_tests.h"
 #include "store/chunk/chunk_body.h"
-#include "store/database/connection.h"
 #include "store/world/world_for_tests.h"
 
 namespace quoin::store {

@@ -18,9 +18,10 @@
 #include <quoin/io/file.h>
 
 #include "core/bytes/files.h"
+#include "core/database/connection.h"
 #include "core/work/progress_steps.h"
 #include "store/chunk/chunk_body.h"
-#include "store/database/connection.h"
+#include "store/database/world_lock.h"
 #include "store/scene/world_file.h"
 #include "store/world/part_text.h"
 #include "store/world/world_open.h"

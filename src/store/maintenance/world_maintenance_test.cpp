@@ -11,8 +11,8 @@
 #include <quoin/io/formats.h>
 #include <quoin/store/world_saver.h>
 
+#include "core/database/connection.h"
 #include "store/chunk/chunk_body.h"
-#include "store/database/connection.h"
 #include "store/database/schema.h"
 #include "store/world/part_text.h"
 #include "store/world/world_for_tests.h"
@@ -202,7 +202,7 @@ TEST(WorldMaintenance, MarksLostTypesByColour) {
 
 /// Adds a part with a correct checksum, as no save would.
 void put_part(const std::filesystem::path& path, const store::PartKey& key, std::string_view text) {
-  auto connection = store::Connection::open(path.string(), store::Connection::Mode::Write);
+  auto connection = Connection::open(path.string(), Connection::Mode::Write);
   ASSERT_TRUE(connection) << to_string(connection.error());
   auto insert = connection->prepare("INSERT INTO parts(kind, id, revision, sum, body) VALUES(?, ?, 1, ?, ?)");
   ASSERT_TRUE(insert) << to_string(insert.error());
@@ -245,7 +245,7 @@ TEST(WorldMaintenance, RepairLeavesOutPartsWithInvalidNumbers) {
 
 /// Adds a chunk with a correct checksum, as no save would.
 void put_chunk(const std::filesystem::path& path, std::int64_t region, const ChunkAddress& place) {
-  auto connection = store::Connection::open(path.string(), store::Connection::Mode::Write);
+  auto connection = Connection::open(path.string(), Connection::Mode::Write);
   ASSERT_TRUE(connection) << to_string(connection.error());
   auto put_region = connection->prepare("INSERT INTO regions(id, grid, level, x, y, z) VALUES(?, ?, 0, ?, ?, ?)");
   auto put_body = connection->prepare("INSERT INTO chunks(key, body) VALUES(?, ?)");
@@ -373,7 +373,7 @@ TEST(WorldCopy, SkipsDamagedChunksAndRefusesOtherDamage) {
   const auto path = folder / "w.quoin";
   make_world(path);
   const auto damage = [&](const char* sql) {
-    auto database = store::Connection::open(path.string(), store::Connection::Mode::Write);
+    auto database = Connection::open(path.string(), Connection::Mode::Write);
     ASSERT_TRUE(database->run(sql));
     ASSERT_TRUE(database->close());
   };

@@ -11,8 +11,9 @@
 #include <quoin/io/file.h>
 #include <quoin/store/world_saver.h>
 
-#include "store/database/connection.h"
+#include "core/database/connection.h"
 #include "store/database/schema.h"
+#include "store/database/world_lock.h"
 #include "store/store_formats.h"
 #include "store/world/world_changes.h"
 #include "store/world/world_open.h"

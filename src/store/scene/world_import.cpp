@@ -16,7 +16,6 @@
 #include <quoin/store/world_store.h>
 
 #include "core/bytes/files.h"
-#include "io/models/luanti.h"
 #include "store/scene/world_file.h"
 #include "store/world/part_text.h"
 #include "store/world/world_changes.h"
@@ -131,9 +130,7 @@ class Import {
     }
     for (std::size_t type = 1; type < types_.size(); ++type) {
       const VoxelProperties& properties = types_[static_cast<VoxelType>(type)];
-      const bool is_guess = properties.attributes.contains("minecraft.look") ||
-                            properties.attributes.contains(models::kNodeGuessAttribute);
-      if (is_guess) result.guessed.push_back(properties.name);
+      if (has_guessed_look(properties)) result.guessed.push_back(properties.name);
     }
     std::ranges::sort(result.guessed);
     const auto same = std::ranges::unique(result.guessed);

@@ -9,7 +9,7 @@
 #include <quoin/io/scene_file.h>
 #include <quoin/terrain/terrain.h>
 
-#include "store/database/connection.h"
+#include "core/database/connection.h"
 #include "store/world/world_for_tests.h"
 
 namespace quoin {
@@ -337,7 +337,7 @@ TEST(WorldSaver, KeepsDamagedChunks) {
   const auto path = folder / "w.quoin";
   ASSERT_TRUE(save_scene(rich_scene(), path));
   {  // the last byte of a chunk's body
-    auto connection = store::Connection::open(path.string(), store::Connection::Mode::Write);
+    auto connection = Connection::open(path.string(), Connection::Mode::Write);
     ASSERT_TRUE(connection);
     ASSERT_TRUE(
         connection->run("UPDATE chunks SET body = substr(body, 1, length(body) - 1) || x'00' WHERE key IN (SELECT key "

@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-#include "store/database/connection.h"
+#include "core/database/connection.h"
 #include "store/world/world_changes.h"
 #include "store/world/world_for_tests.h"
 
@@ -92,7 +92,7 @@ struct Found {
 };
 
 inline Found look_at(const std::string& file, const char* vfs) {
-  auto connection = store::Connection::open(file, store::Connection::Mode::Write, vfs);
+  auto connection = Connection::open(file, Connection::Mode::Write, vfs);
   if (!connection) return {-1, "it does not open: " + connection.error().message};
   const auto sound = connection->text("PRAGMA integrity_check");
   if (!sound || *sound != "ok") return {-1, "integrity_check: " + (sound ? *sound : sound.error().message)};

@@ -72,7 +72,7 @@ struct WorldParts {
 
  private:
   [[nodiscard]] static Result<WorldStore> begin(std::unique_ptr<WorldStore::Impl> impl,
-                                                std::optional<store::Connection> writing, Threads threads);
+                                                std::optional<Connection> writing, Threads threads);
 };
 
 }  // namespace quoin

@@ -16,8 +16,9 @@
 #include <quoin/io/file.h>
 
 #include "core/bytes/files.h"
-#include "store/database/connection.h"
+#include "core/database/connection.h"
 #include "store/database/schema.h"
+#include "store/database/world_lock.h"
 
 namespace quoin::store {
 

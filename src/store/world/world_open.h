@@ -5,7 +5,7 @@
 
 #include <quoin/core/result.h>
 
-#include "store/database/connection.h"
+#include "core/database/connection.h"
 #include "store/world/world_reader.h"
 
 namespace quoin::store {

@@ -12,7 +12,7 @@
 #include <quoin/core/function_ref.h>
 #include <quoin/core/progress.h>
 
-#include "store/database/connection.h"
+#include "core/database/connection.h"
 #include "store/database/schema.h"
 
 namespace quoin::store {

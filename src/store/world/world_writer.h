@@ -12,9 +12,9 @@
 
 #include <quoin/core/parallel.h>
 
+#include "core/database/connection.h"
 #include "core/work/workers.h"
 #include "store/chunk/chunk_body.h"
-#include "store/database/connection.h"
 #include "store/world/world_changes.h"
 
 namespace quoin::store {

@@ -19,14 +19,13 @@
 #include <quoin/io/file.h>
 
 #include "core/bytes/text.h"
-#include "io/models/luanti.h"
-#include "store/database/connection.h"
-#include "store/luanti/map_block.h"
-#include "store/store_formats.h"
+#include "core/database/connection.h"
+#include "io/luanti/luanti.h"
+#include "io/luanti/map_block.h"
 
 namespace quoin {
 
-namespace store::luanti {
+namespace luanti {
 
 namespace {
 
@@ -422,10 +421,10 @@ std::string value_of(const std::string& text, std::string_view key) {
 
 }  // namespace
 
-}  // namespace store::luanti
+}  // namespace luanti
 
 Result<std::unique_ptr<ChunkSource>> open_luanti(const std::filesystem::path& path) {
-  using namespace store::luanti;
+  using namespace luanti;
   std::error_code error;
   if (!fs::is_directory(path, error)) return open(std::make_unique<Readers>(path, std::vector<std::byte>()), {});
   constexpr std::size_t kMaxSettings = std::size_t{1} << 20;
@@ -449,7 +448,7 @@ Result<std::unique_ptr<ChunkSource>> open_luanti(const std::filesystem::path& pa
 }
 
 Result<std::unique_ptr<ChunkSource>> open_luanti(std::span<const std::byte> database) {
-  using namespace store::luanti;
+  using namespace luanti;
   return open(std::make_unique<Readers>(fs::path(), std::vector<std::byte>(database.begin(), database.end())), {});
 }
 

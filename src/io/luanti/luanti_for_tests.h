@@ -17,7 +17,7 @@
 
 #include <quoin/core/vec.h>
 
-#include "store/database/connection.h"
+#include "core/database/connection.h"
 
 // Luanti maps, written independently of the reader.
 
@@ -110,8 +110,7 @@ inline Bytes row_of(const Block& block, int version, int width = 2) {
 class Map {
  public:
   explicit Map(const std::filesystem::path& path, bool by_three = false)
-      : database_(store::Connection::open(path.string(), store::Connection::Mode::Create).value()),
-        by_three_(by_three) {
+      : database_(Connection::open(path.string(), Connection::Mode::Create).value()), by_three_(by_three) {
     const char* const table = by_three ? "CREATE TABLE IF NOT EXISTS `blocks` (`x` INTEGER, `y` INTEGER, `z` INTEGER, "
                                          "`data` BLOB NOT NULL, PRIMARY KEY (`x`, `z`, `y`))"
                                        : "CREATE TABLE `blocks` (`pos` INT NOT NULL PRIMARY KEY,`data` BLOB)";
@@ -136,7 +135,7 @@ class Map {
   void run(const char* sql) { EXPECT_TRUE(database_.run(sql)); }
 
  private:
-  store::Connection database_;
+  Connection database_;
   bool by_three_;
 };
 

@@ -1,4 +1,4 @@
-#include "io/models/luanti.h"
+#include "io/luanti/luanti.h"
 
 #include <algorithm>
 #include <array>
@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -216,3 +217,57 @@ std::optional<VoxelProperties> node_properties(std::string_view name) {
 }
 
 }  // namespace quoin::models
+
+namespace quoin {
+
+bool is_luanti_map(std::span<const std::byte> beginning) {
+  constexpr std::string_view kSqliteHeader{"SQLite format 3\0", 16};
+  constexpr std::size_t kIdAt = 68;  // the application id
+  const std::string_view text = text_of(beginning);
+  if (!text.starts_with(kSqliteHeader) || text.size() < kIdAt + 4) return false;
+  if (text.substr(kIdAt, 4) != std::string_view("\0\0\0\0", 4)) return false;  // the application id of another program
+  // The first page lists the tables, as SQL.
+  const std::size_t page =
+      std::to_integer<std::size_t>(beginning[16]) << 8 | std::to_integer<std::size_t>(beginning[17]);
+  const std::string_view tables = text.substr(0, page == 1 ? 65536 : page);
+  constexpr std::string_view kTable = "CREATE TABLE ";
+  for (std::size_t at = tables.find(kTable); at != std::string_view::npos; at = tables.find(kTable, at + 1)) {
+    std::string_view name = tables.substr(at + kTable.size());
+    if (name.starts_with("IF NOT EXISTS ")) name.remove_prefix(14);
+    if (!name.empty() && (name.front() == '`' || name.front() == '"' || name.front() == '[')) name.remove_prefix(1);
+    constexpr std::string_view kBlocks = "blocks";
+    if (name.starts_with(kBlocks) && name.size() > kBlocks.size() &&
+        std::string_view("`\"] (").find(name[kBlocks.size()]) != std::string_view::npos) {
+      return true;
+    }
+  }
+  return false;
+}
+
+#if !defined(QUOIN_HAVE_STORE)
+
+Result<std::unique_ptr<ChunkSource>> open_luanti(const std::filesystem::path& path) {
+  return make_error(ErrorCode::Unsupported,
+                    "cannot read Luanti worlds: not supported by this build: " QUOIN_STORE_MISSING, path.string());
+}
+Result<std::unique_ptr<ChunkSource>> open_luanti(std::span<const std::byte>) {
+  return open_luanti(std::filesystem::path());
+}
+
+#endif
+
+extern constinit const FormatDriver kLuantiMapFormat = {
+    .info = {FileFormat::LuantiMap, ".sqlite", "Luanti world: its folder or map.sqlite",
+             FormatCapability::Read | FormatCapability::Chunks},
+    .detect_path =
+        [](const std::filesystem::path& path) {
+          std::error_code error;
+          return std::filesystem::is_regular_file(path / "world.mt", error);
+        },
+    .detect = is_luanti_map,
+    .reads_path = true,
+    .open_chunks = [](const std::filesystem::path& path, std::span<const std::byte> bytes, std::string_view)
+        -> Result<std::unique_ptr<ChunkSource>> { return path.empty() ? open_luanti(bytes) : open_luanti(path); },
+};
+
+}  // namespace quoin

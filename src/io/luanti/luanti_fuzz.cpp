@@ -4,12 +4,12 @@
 #include <cstdlib>
 #include <span>
 
-#include "store/luanti/map_block.h"
+#include "io/luanti/map_block.h"
 
 /// Any bytes must give a block whose nodes have names, or an error.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static quoin::store::luanti::MapBlockReader reader;
-  static quoin::store::luanti::MapBlock block;
+  static quoin::luanti::MapBlockReader reader;
+  static quoin::luanti::MapBlock block;
   if (!reader.read({reinterpret_cast<const std::byte*>(data), size}, block)) return 0;
   for (const std::uint16_t node : block.nodes) {
     if (node < block.names.size()) continue;

@@ -12,7 +12,7 @@
 
 struct ZSTD_DCtx_s;
 
-namespace quoin::store::luanti {
+namespace quoin::luanti {
 
 inline constexpr int kBlockEdge = 16;
 inline constexpr std::size_t kBlockNodes = 4096;
@@ -51,4 +51,4 @@ class MapBlockReader {
   std::vector<std::uint32_t> name_of_;  // index into the block's names, by number in its table
 };
 
-}  // namespace quoin::store::luanti
+}  // namespace quoin::luanti

@@ -10,7 +10,7 @@
 //                      the nodes uncompressed, metadata, objects, timers
 //   names              u8 0, u16 count, each u16 number, u16 size, bytes
 
-#include "store/luanti/map_block.h"
+#include "io/luanti/map_block.h"
 
 #include <algorithm>
 #include <new>
@@ -23,7 +23,7 @@
 #include "core/bytes/byte_stream.h"
 #include "core/bytes/bytes.h"
 
-namespace quoin::store::luanti {
+namespace quoin::luanti {
 
 namespace {
 
@@ -206,4 +206,4 @@ Status MapBlockReader::read(std::span<const std::byte> row, MapBlock& block) {
   return read;
 }
 
-}  // namespace quoin::store::luanti
+}  // namespace quoin::luanti

@@ -10,9 +10,9 @@
 #include <quoin/store/world_import.h>
 #include <quoin/store/world_saver.h>
 
-#include "store/luanti/luanti_for_tests.h"
-#include "store/luanti/map_block.h"
-#include "store/store_formats.h"
+#include "io/luanti/luanti.h"
+#include "io/luanti/luanti_for_tests.h"
+#include "io/luanti/map_block.h"
 #include "store/world/world_for_tests.h"
 
 namespace quoin {
@@ -107,12 +107,12 @@ TEST(LuantiMap, IsDetectedByTable) {
   bytes[68] = std::byte{1};  // the mark of another program
   EXPECT_FALSE(is_luanti_map(bytes));
   {
-    auto other = store::Connection::open((folder / "other").string(), store::Connection::Mode::Create).value();
+    auto other = Connection::open((folder / "other").string(), Connection::Mode::Create).value();
     ASSERT_TRUE(other.run("CREATE TABLE blocks_of_others (pos INT, data BLOB); CREATE TABLE players (blocks INT)"));
   }
   EXPECT_EQ(detect_format(folder / "other").value(), std::nullopt);
   {
-    auto other = store::Connection::open((folder / "without").string(), store::Connection::Mode::Create).value();
+    auto other = Connection::open((folder / "without").string(), Connection::Mode::Create).value();
     ASSERT_TRUE(other.run("CREATE TABLE blocks (x INT)"));
   }
   const auto refused = load_scene(folder / "without");
@@ -155,8 +155,8 @@ TEST(LuantiMap, NamesAndSkipsBrokenBlocks) {
 }
 
 TEST(LuantiMap, SurvivesTruncatedAndChangedRows) {
-  store::luanti::MapBlockReader reader;
-  store::luanti::MapBlock block;
+  luanti::MapBlockReader reader;
+  luanti::MapBlock block;
   std::minstd_rand random(5);
   for (const int version : {25, 28, 29}) {
     const Bytes sound = row_of(some_block(), version);
@@ -178,8 +178,8 @@ TEST(LuantiMap, ReadsOrRefusesCorpusWithOffset) {
   int read = 0;
   int refused = 0;
   for (const auto& entry : fs::directory_iterator(fs::path(QUOIN_SOURCE_DIR) / "tests" / "corpus" / "luanti")) {
-    store::luanti::MapBlockReader reader;
-    store::luanti::MapBlock block;
+    luanti::MapBlockReader reader;
+    luanti::MapBlock block;
     const auto row = read_file(entry.path());
     ASSERT_TRUE(row);
     const auto done = reader.read(*row, block);
@@ -197,8 +197,8 @@ TEST(LuantiMap, RefusesFrameThatExpandsTooFar) {
   content.big(0, 7).big(0, 1).big(0xFFFF, 2).append(Bytes(std::size_t{64} << 20));
   luanti_test::Writer row;
   row.big(29, 1).append(luanti_test::zstd_of(content.bytes));
-  store::luanti::MapBlockReader reader;
-  store::luanti::MapBlock block;
+  luanti::MapBlockReader reader;
+  luanti::MapBlock block;
   EXPECT_FALSE(reader.read(row.bytes, block));
 }
 
