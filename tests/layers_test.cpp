@@ -28,9 +28,9 @@ constexpr int kAppsLevel = 7;
 // public header, or a function next to the data. All layers may use the headers of core.
 const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"grid/change_records.h", {"render"}},
-    {"grid/chunk/chunk_storage.h", {"io", "mesh", "render", "store", "trace"}},
+    {"grid/chunk/chunk_storage.h", {"mesh", "render", "store", "trace"}},
     {"grid/colour_table.h", {"io", "voxelize"}},
-    {"grid/density/density_storage.h", {"mesh", "store", "terrain", "trace"}},
+    {"grid/density/density_storage.h", {"mesh", "store", "trace"}},
     {"io/format_driver.h", {"store"}},
     {"io/scene_file/scene_parts.h", {"store"}},
     {"scene/surfaces.h", {"io", "render"}},

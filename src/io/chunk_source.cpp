@@ -18,7 +18,6 @@
 
 #include "core/drop_oldest.h"
 #include "core/work/progress_steps.h"
-#include "grid/chunk/chunk_storage.h"
 #include "io/luanti/luanti.h"
 #include "io/minecraft/block_types.h"
 
@@ -148,36 +147,6 @@ bool comes_before(const VoxelProperties& a, const VoxelProperties& b) {
   return key(a) < key(b);
 }
 
-/// Requires: the chunk is compact; `number` maps its types to distinct numbers, and only air to air.
-Chunk renumbered(const Chunk& chunk, FunctionRef<VoxelType(VoxelType)> number) {
-  if (const auto uniform = chunk.uniform()) {
-    Chunk result(number(*uniform));
-    chunk.for_each_data([&](IVec3 local, const VoxelData& data) { result.set_data(local, data); });
-    return result;
-  }
-  const ChunkStorage& from = *ChunkStorage::of(chunk);
-  Chunk result;
-  if (from.direct()) {
-    std::array<VoxelType, kChunkEdge> row{};
-    for (int z = 0; z < kChunkEdge; ++z) {
-      for (int y = 0; y < kChunkEdge; ++y) {
-        chunk.read_row(y, z, row);
-        for (VoxelType& type : row) type = number(type);
-        result.write_row(y, z, row);
-      }
-    }
-  } else {
-    auto storage = make_ref<ChunkStorage>(from);
-    for (std::size_t i = 0; i < storage->palette.size(); ++i) {
-      QUOIN_ASSERT(storage->counts[i] > 0, "a compact chunk");
-      storage->palette[i] = number(storage->palette[i]);
-    }
-    result = ChunkStorage::chunk_of(std::move(storage));
-  }
-  chunk.for_each_data([&](IVec3 local, const VoxelData& data) { result.set_data(local, data); });
-  return result;
-}
-
 }  // namespace
 
 Status SourceTypes::renumber(Chunk& chunk, VoxelRegistry& into) {
@@ -197,7 +166,7 @@ Status SourceTypes::renumber(Chunk& chunk, VoxelRegistry& into) {
     if (!number) return number.error();
     numbers_[type] = *number;
   }
-  chunk = renumbered(chunk, [&](VoxelType type) { return numbers_[type]; });
+  chunk = chunk.renumbered([&](VoxelType type) { return numbers_[type]; });
   return {};
 }
 

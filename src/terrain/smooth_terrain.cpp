@@ -15,7 +15,6 @@
 #include <quoin/grid/density_chunk.h>
 #include <quoin/terrain/noise.h>
 
-#include "grid/density/density_storage.h"
 #include "terrain/landform.h"
 #include "terrain/noise_lattice.h"
 
@@ -217,8 +216,7 @@ Cover SmoothColumn::Impl::cover(const TerrainTypes& types, int x, int world_y, i
 
 void SmoothColumn::Impl::write_row(const TerrainTypes& types, IVec3 corner, int y, int z, bool is_caved,
                                    DensityChunk& out) {
-  static const Half far = largest_within(kBand);
-  std::array<Half, kChunkEdge> row;
+  std::array<float, kChunkEdge> row;
   VoxelType* material = materials.data() + (z * kChunkEdge + y) * kChunkEdge;
   for (int x = 0; x < kChunkEdge; ++x) {
     const Slope slope = above.slope(x, y, z);
@@ -226,7 +224,7 @@ void SmoothColumn::Impl::write_row(const TerrainTypes& types, IVec3 corner, int 
     float density = ground;
     if (is_caved) density = std::max(density, cave(x, y, z, corner.y + y));
     density = std::max(density, outside_of_world(corner + IVec3{x, y, z}));
-    row[static_cast<std::size_t>(x)] = stored_within(density, far);
+    row[static_cast<std::size_t>(x)] = density;
     material[x] = kAir;
     if (!(density < 0.0F)) continue;
     material[x] = types.stone;
@@ -234,7 +232,7 @@ void SmoothColumn::Impl::write_row(const TerrainTypes& types, IVec3 corner, int 
     const Cover cover_here = cover(types, x, corner.y + y, z);
     material[x] = -ground < kTurfDepth ? cover_here.turf : cover_here.soil;
   }
-  out.write_row(y, z, row);
+  out.write_row(y, z, row, kBand);
 }
 
 SmoothColumn::SmoothColumn(const Landform& land, const SmoothTerrainOptions& options, const IBox& world, int chunk_x,

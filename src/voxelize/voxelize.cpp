@@ -238,18 +238,17 @@ Found find_voxels(const Parts& parts, std::size_t index, const VoxelizeOptions& 
 /// Makes signed distances from the nearest triangles and the solid voxels.
 DensityChunk signed_densities(const Nearest& nearest, const ChunkBits& solid, float band) {
   QUOIN_ASSERT(nearest.squared.size() == kChunkVoxels, "a distance per sample");
-  const Half far = stored_density(band, band);
-  DensityChunk densities(far);
-  std::array<Half, kChunkEdge> halves{};
+  DensityChunk densities(stored_density(band, band));
+  std::array<float, kChunkEdge> distances{};
   for (std::size_t row = 0; row < kRows; ++row) {
     const float* squared = nearest.squared.data() + row * kChunkEdge;
     for (unsigned x = 0; x < kChunkEdge; ++x) {
       const float distance = std::sqrt(squared[x]);
       // Points on the surface count as inside, as they do for voxels.
       const bool is_solid = (solid[row] >> x & 1U) != 0;
-      halves[x] = stored_density(is_solid ? -std::max(distance, 1e-6F) : distance, band);
+      distances[x] = is_solid ? -std::max(distance, 1e-6F) : distance;
     }
-    densities.write_row(static_cast<int>(row % kChunkEdge), static_cast<int>(row / kChunkEdge), halves);
+    densities.write_row(static_cast<int>(row % kChunkEdge), static_cast<int>(row / kChunkEdge), distances, band);
   }
   densities.unite_slabs();
   return densities;

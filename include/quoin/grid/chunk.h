@@ -92,6 +92,10 @@ class Chunk {
   bool set(IVec3 local, VoxelType type) { return set(local.x, local.y, local.z, type); }
   /// Sets all voxels to one type.
   void fill(VoxelType type);
+  /// Returns a copy in which each type is replaced by `number(type)`. Voxels keep their data.
+  /// Requires: different types have different numbers, and only air has air's. Cost: O(types); O(voxels) if there are
+  /// more than 256 types, or if edits left entries of the palette unused (`compact`).
+  [[nodiscard]] Chunk renumbered(FunctionRef<VoxelType(VoxelType)> number) const;
 
   /// Returns the data of a voxel. Lifetime: until the chunk is written. Requires: 0 <= x, y, z < 64.
   [[nodiscard]] VoxelData data(IVec3 local) const;

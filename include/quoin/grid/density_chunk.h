@@ -58,6 +58,8 @@ class DensityChunk {
   /// `unite_slabs`.
   /// Requires: 0 <= y, z < 64; every density is a `stored_density`.
   std::uint64_t write_row(int y, int z, std::span<const Half, kChunkEdge> densities);
+  /// As above, for densities that are not rounded yet (`stored_density`). Requires: 0 < band.
+  std::uint64_t write_row(int y, int z, std::span<const float, kChunkEdge> densities, float band);
   /// Sets all densities to one value and keeps the materials. Requires: the density is a `stored_density`.
   void fill(Half density);
   /// Returns the density of all samples if the chunk is stored as uniform, nullopt otherwise.

@@ -273,6 +273,30 @@ void Chunk::repack(int bits) {
   m.slot_count = slots;
 }
 
+Chunk Chunk::renumbered(FunctionRef<VoxelType(VoxelType)> number) const {
+  QUOIN_ASSERT(number(kAir) == kAir, "air stays air");
+  Chunk result;
+  if (storage_ == nullptr) {
+    result.uniform_ = number(uniform_);
+  } else if (storage_->direct() || storage_->used < storage_->palette.size()) {
+    std::array<VoxelType, kChunkEdge> row{};
+    for (int z = 0; z < kChunkEdge; ++z) {
+      for (int y = 0; y < kChunkEdge; ++y) {
+        read_row(y, z, row);
+        for (VoxelType& type : row) type = number(type);
+        result.write_row(y, z, row);
+      }
+    }
+  } else {
+    auto storage = make_ref<ChunkStorage>(*storage_);
+    for (VoxelType& type : storage->palette) type = number(type);
+    result.storage_ = std::move(storage);
+  }
+  result.data_ = data_;
+  QUOIN_ASSERT(result.non_air_count() == non_air_count(), "only air has air's number");
+  return result;
+}
+
 std::size_t Chunk::bytes() const {
   const std::size_t of_data = data_ == nullptr ? 0 : data_->allocated();
   if (storage_ == nullptr) return sizeof(Chunk) + of_data;

@@ -181,6 +181,26 @@ TEST(Chunk, BecomesUniformWhenFilledAtAnyWidth) {
   }
 }
 
+TEST(Chunk, RenumbersTypesAtAnyWidth) {
+  const auto number = [](VoxelType type) { return static_cast<VoxelType>(type == kAir ? kAir : 3'001 - type); };
+  for (const int types : {1, 2, 5, 100, 2'000}) {
+    for (const bool has_unused : {false, true}) {
+      Chunk chunk(types == 1 ? 7 : kAir);
+      for (int i = 1; i < types; ++i) chunk.set(i % 64, i / 64, 7, static_cast<VoxelType>(i));
+      if (has_unused) chunk.set(1, 0, 7, static_cast<VoxelType>(3'001 - 2));  // type 1 has no voxel now
+      if (types > 2) chunk.set_data({2, 0, 7}, {.state = 5});
+      Chunk renumbered = chunk.renumbered(number);
+      for (int i = 0; i < 64 * 64; ++i) {
+        ASSERT_EQ(renumbered.get(i % 64, i / 64, 7), number(chunk.get(i % 64, i / 64, 7))) << types << ", " << i;
+      }
+      EXPECT_EQ(renumbered.data_count(), chunk.data_count());
+      // The palette has one entry per type, so that later writes find it.
+      renumbered.set(63, 63, 63, 2'999);
+      EXPECT_EQ(renumbered.count(2'999), chunk.count(2) + 1);
+    }
+  }
+}
+
 TEST(Chunk, BoundsMemoryUnderRandomEdits) {
   std::mt19937 random(1);
   Chunk chunk;

@@ -110,6 +110,14 @@ std::uint32_t DensityChunk::slot_for_writing(std::size_t slab) {
   return slot;
 }
 
+std::uint64_t DensityChunk::write_row(int y, int z, std::span<const float, kChunkEdge> densities, float band) {
+  QUOIN_ASSERT(band > 0.0F, "a positive band");
+  const Half far = largest_within(band);
+  std::array<Half, kChunkEdge> stored;
+  std::ranges::transform(densities, stored.begin(), [&](float density) { return stored_within(density, far); });
+  return write_row(y, z, stored);
+}
+
 std::uint64_t DensityChunk::write_row(int y, int z, std::span<const Half, kChunkEdge> densities) {
   QUOIN_ASSERT(std::all_of(densities.begin(), densities.end(), is_stored), "every density is a stored_density");
   std::array<Half, kChunkEdge> uniform_row;

@@ -194,5 +194,20 @@ TEST(DensityChunk, ComparesContentNotStorage) {
   EXPECT_NE(chunk, DensityChunk(air));
 }
 
+TEST(DensityChunk, RoundsRowsToStoredDensities) {
+  constexpr float kBand = 5.3F;
+  std::array<float, kChunkEdge> densities{};
+  std::array<Half, kChunkEdge> stored{};
+  for (std::size_t i = 0; i < densities.size(); ++i) {
+    densities[i] = i == 9 ? std::numeric_limits<float>::quiet_NaN() : 0.37F * (static_cast<float>(i) - 30.0F);
+    stored[i] = stored_density(densities[i], kBand);
+  }
+  DensityChunk rounded(stored_density(kBand, kBand));
+  DensityChunk exact = rounded;
+  EXPECT_EQ(rounded.write_row(3, 4, densities, kBand), exact.write_row(3, 4, stored));
+  EXPECT_EQ(rounded, exact);
+  EXPECT_EQ(rounded.get(0, 3, 4), stored_density(-kBand, kBand));
+}
+
 }  // namespace
 }  // namespace quoin

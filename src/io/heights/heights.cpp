@@ -333,18 +333,18 @@ class ColumnMaker {
     if (is_within(first_y, kBand * steepest())) return DensityChunk(stored_density(-kBand, kBand), types_.stone);
     DensityChunk chunk(stored_density(kBand, kBand));
     dense_.assign(kChunkVoxels, kAir);
-    std::array<Half, kChunkEdge> row{};
+    std::array<float, kChunkEdge> row{};
     for (int z = 0; z < kChunkEdge; ++z) {
       for (int y = 0; y < kChunkEdge; ++y) {
         for (int x = 0; x < kChunkEdge; ++x) {
           const float density = density_at(x, first_y + y, z);
-          row[static_cast<std::size_t>(x)] = stored_density(density, kBand);
+          row[static_cast<std::size_t>(x)] = density;
           if (density >= kBand || ground_[place(x, z)].surface == kAir) continue;
           const float below = surface_.at(first_x_ + x, first_z_ + z) - static_cast<float>(first_y + y);
           dense_[static_cast<std::size_t>((z * kChunkEdge + y) * kChunkEdge + x)] =
               type_at(ground_[place(x, z)], std::max(below, 0.0F));
         }
-        chunk.write_row(y, z, row);
+        chunk.write_row(y, z, row, kBand);
       }
     }
     chunk.materials() = Chunk::from_dense(std::span<const VoxelType, kChunkVoxels>(dense_));
