@@ -111,8 +111,8 @@ struct BlockyMeshOptions {
                                                    const BlockyMeshOptions& options = {}, Threads threads = {},
                                                    const Progress& progress = {});
 
-/// Appends the triangles of some chunks to `mesh`, and counts their faces and quads, like build_blocky_mesh. For grids
-/// that are not in memory as a whole.
+/// Appends the triangles of some chunks to `mesh`, and counts their faces and quads. build_blocky_mesh does it for all
+/// chunks of a grid; this function meshes grids that do not fit in memory.
 ///
 /// `quads`:  of each chunk, from BlockyMesher. `chunks`: their coordinates; vertices are relative to chunk 0's corner.
 /// Errors:   LimitExceeded if a surface class needs more than about 2^32 vertices; `mesh` then has some of the chunks.
