@@ -36,7 +36,7 @@ TEST(Formats, LoadsSceneFilesFromBytes) {
   file.grids[0].grid.set({1, 2, 3}, *file.types.add({}));
   file.placements.push_back({});
   file.placements[0].grid = 0;
-  file.placements[0].visible = false;
+  file.placements[0].instance.visible = false;
   const auto bytes = write_scene_file(file);
   ASSERT_TRUE(bytes);
   for (const bool shows : {false, true}) {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <span>
@@ -29,29 +28,22 @@ struct SceneFile {
     std::string id;
     std::string file;  ///< relative to the scene file
   };
+  /// An instance of a grid, or of all that a source contains. Indices replace the handles of `instance`, which are not
+  /// used. A source is scaled by `voxel_size`, and its rotation is unit.
   struct Placement {
-    std::string source;               ///< an id from `sources`, if `grid` is not set
-    std::optional<std::size_t> grid;  ///< index into `grids`
-    std::string name;
-    DVec3 position{0.0};
-    DQuat rotation{1.0, 0.0, 0.0, 0.0};  ///< unit; for a grid any length, as Instance::rotation
-    double scale = 1.0;                  ///< positive
-    bool mirrored = false;
-    bool visible = true;
+    Instance instance;
+    std::optional<std::size_t> grid = {};   ///< index into `grids`
     std::optional<std::size_t> group = {};  ///< index into `groups`
     std::optional<std::size_t> layer = {};  ///< index into `layers`
-    /// As Instance::categories. Default: 1, and for a source the values of its own instances.
-    std::optional<std::uint32_t> categories = {};
+    std::string source = {};                ///< an id from `sources`, if `grid` is not set
+    /// True if `instance.categories` replaces the categories of the source's own instances.
+    bool sets_categories = false;
   };
-  /// Corresponds to SceneGroup.
+  /// A group. Indices replace the handles of `group`, which are not used.
   struct Group {
-    std::string name;
+    SceneGroup group;
     std::optional<std::size_t> parent = {};  ///< index into `groups` of an earlier group
     std::optional<std::size_t> layer = {};   ///< index into `layers`
-    DVec3 position{0.0};
-    DQuat rotation{1.0, 0.0, 0.0, 0.0};  ///< any length
-    bool mirrored = false;
-    bool visible = true;
   };
   VoxelRegistry types;  ///< voxel types of `grids`
   std::vector<SceneGrid> grids;

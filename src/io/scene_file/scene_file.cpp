@@ -107,17 +107,17 @@ Result<Body> take_over(Scene& from, Scene& into) {
   return body;
 }
 
-/// Returns the direction, or point, of a body under a placement.
-DVec3 placed_direction(DVec3 direction, const SceneFile::Placement& outer) {
+/// Returns the direction, or point, of a body under a placement of the body.
+DVec3 placed_direction(DVec3 direction, const Instance& outer) {
   return outer.rotation * (direction * DVec3(outer.mirrored ? -1.0 : 1.0, 1.0, 1.0));
 }
-DVec3 placed_point(DVec3 point, const SceneFile::Placement& outer) {
-  return outer.position + placed_direction(point * outer.scale, outer);
+DVec3 placed_point(DVec3 point, const Instance& outer) {
+  return outer.position + placed_direction(point * outer.voxel_size, outer);
 }
 
 /// Moves an instance or a group of a body by a placement of the body.
 template <class Placed>
-void put(const SceneFile::Placement& outer, Placed& placed) {
+void put(const Instance& outer, Placed& placed) {
   const double side = outer.mirrored ? -1.0 : 1.0;
   placed.position = placed_point(placed.position, outer);
   // A mirror before a rotation is the mirrored rotation before the mirror.
@@ -127,20 +127,20 @@ void put(const SceneFile::Placement& outer, Placed& placed) {
 }
 
 /// Moves a lamp of a body. Its brightness at the scaled distance is unchanged.
-Lamp placed(const Lamp& inner, const SceneFile::Placement& outer) {
+Lamp placed(const Lamp& inner, const Instance& outer) {
   Lamp lamp = inner;
   lamp.position = placed_point(inner.position, outer);
   lamp.direction = placed_direction(inner.direction, outer);
-  lamp.intensity *= outer.scale * outer.scale;
-  lamp.range *= outer.scale;
+  lamp.intensity *= outer.voxel_size * outer.voxel_size;
+  lamp.range *= outer.voxel_size;
   return lamp;
 }
 
 /// Moves an instance of a body by a placement of the body.
-Instance placed(const Instance& inner, const SceneFile::Placement& outer, bool is_alone) {
+Instance placed(const Instance& inner, const Instance& outer, bool is_alone) {
   Instance instance = inner;
   put(outer, instance);
-  instance.voxel_size = inner.voxel_size * outer.scale;
+  instance.voxel_size = inner.voxel_size * outer.voxel_size;
   if (is_alone && !outer.name.empty()) {
     instance.name = outer.name;
   } else if (!outer.name.empty()) {
@@ -221,15 +221,21 @@ class Placer {
 
   void place() {
     for (const SceneLayer& layer : file_.layers) layers_.push_back(scene_.add_layer(layer));
-    for (const SceneFile::Group& group : file_.groups) {
-      groups_.push_back(scene_.add_group({group.name, named(groups_, group.parent), named(layers_, group.layer),
-                                          group.position, group.rotation, group.mirrored, group.visible}));
+    for (const SceneFile::Group& entry : file_.groups) {
+      SceneGroup group = entry.group;
+      group.parent = named(groups_, entry.parent);
+      group.layer = named(layers_, entry.layer);
+      groups_.push_back(scene_.add_group(std::move(group)));
     }
     for (const SceneFile::Placement& placement : file_.placements) {
+      Instance instance = placement.instance;
+      instance.grid = named(grids_, placement.grid);
+      instance.group = named(groups_, placement.group);
+      instance.layer = named(layers_, placement.layer);
       if (placement.grid) {
-        place_grid(placement);
+        scene_.add_instance(std::move(instance));
       } else {
-        place_body(placement, bodies_.at(placement.source));
+        place_body(instance, placement.sets_categories, bodies_.at(placement.source));
       }
     }
   }
@@ -240,29 +246,21 @@ class Placer {
     return place ? handles[*place] : Handle<T>{};
   }
 
-  void place_grid(const SceneFile::Placement& placement) {
-    scene_.add_instance({placement.name, grids_[*placement.grid], placement.position, placement.rotation,
-                         placement.scale, placement.mirrored, placement.visible, named(groups_, placement.group),
-                         named(layers_, placement.layer), placement.categories.value_or(Instance().categories)});
-  }
-
-  void place_body(const SceneFile::Placement& placement, const Body& body) {
-    if (placement.visible) {
-      for (const Lamp& lamp : body.lamps) scene_.lamps.push_back(placed(lamp, placement));
+  void place_body(const Instance& outer, bool sets_categories, const Body& body) {
+    if (outer.visible) {
+      for (const Lamp& lamp : body.lamps) scene_.lamps.push_back(placed(lamp, outer));
     }
-    const GroupHandle outer = named(groups_, placement.group);
-    const LayerHandle layer = named(layers_, placement.layer);
     if (body.instances.size() == 1) {
-      Instance instance = placed(body.instances.front(), placement, true);
-      instance.visible = instance.visible && placement.visible;
-      instance.group = outer;
-      if (placement.layer) instance.layer = layer;
-      instance.categories = placement.categories.value_or(instance.categories);
+      Instance instance = placed(body.instances.front(), outer, true);
+      instance.visible = instance.visible && outer.visible;
+      instance.group = outer.group;
+      if (outer.layer != LayerHandle{}) instance.layer = outer.layer;
+      if (sets_categories) instance.categories = outer.categories;
       scene_.add_instance(std::move(instance));
       return;
     }
     const GroupHandle whole = scene_.add_group(
-        {placement.name, outer, layer, placement.position, placement.rotation, placement.mirrored, placement.visible});
+        {outer.name, outer.group, outer.layer, outer.position, outer.rotation, outer.mirrored, outer.visible});
     std::map<GroupHandle, GroupHandle> new_group_of;
     const auto group_of = [&](GroupHandle handle) {
       const auto found = new_group_of.find(handle);
@@ -271,13 +269,13 @@ class Placer {
     for (const Body::Group& inner : body.groups) {
       SceneGroup group = inner.group;
       group.parent = group_of(group.parent);
-      put(placement, group);
+      put(outer, group);
       new_group_of[inner.handle] = scene_.add_group(std::move(group));
     }
     for (const Instance& inner : body.instances) {
-      Instance instance = placed(inner, placement, false);
+      Instance instance = placed(inner, outer, false);
       instance.group = group_of(inner.group);
-      instance.categories = placement.categories.value_or(inner.categories);
+      if (sets_categories) instance.categories = outer.categories;
       scene_.add_instance(std::move(instance));
     }
   }

@@ -20,9 +20,9 @@ void read_as_text(std::span<const std::byte> bytes) {
   const auto scene = quoin::parse_scene_file(bytes);
   if (!scene) return;
   for (const auto& placement : scene->placements) {
-    const double length = glm::length(placement.rotation);
+    const double length = glm::length(placement.instance.rotation);
     require(placement.grid ? *placement.grid < scene->grids.size() : length > 0.999 && length < 1.001);
-    require(quoin::is_finite(placement.position) && placement.scale > 0.0);
+    require(quoin::is_finite(placement.instance.position) && placement.instance.voxel_size > 0.0);
   }
   require(!scene->environment || check(*scene->environment));
   const auto again = quoin::write_scene_file(*scene, quoin::Threads{1});

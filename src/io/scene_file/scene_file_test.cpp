@@ -41,12 +41,12 @@ TEST(SceneFile, ReadsEveryKey) {
   ASSERT_EQ(scene->placements.size(), 2U);
   const SceneFile::Placement& first = scene->placements[0];
   EXPECT_EQ(first.source, "a");
-  EXPECT_EQ(first.name, "n");
-  EXPECT_EQ(first.position, DVec3(1, 2, 3));
-  EXPECT_EQ(first.scale, 0.5);
-  EXPECT_TRUE(first.mirrored);
-  EXPECT_FALSE(first.visible);
-  EXPECT_NEAR(glm::length(first.rotation * DVec3(0, 0, 1) - DVec3(0.5, 0, std::sqrt(0.75))), 0.0, 1e-12);
+  EXPECT_EQ(first.instance.name, "n");
+  EXPECT_EQ(first.instance.position, DVec3(1, 2, 3));
+  EXPECT_EQ(first.instance.voxel_size, 0.5);
+  EXPECT_TRUE(first.instance.mirrored);
+  EXPECT_FALSE(first.instance.visible);
+  EXPECT_NEAR(glm::length(first.instance.rotation * DVec3(0, 0, 1) - DVec3(0.5, 0, std::sqrt(0.75))), 0.0, 1e-12);
   EXPECT_NEAR(glm::length(scene->environment.value().sun.direction - glm::normalize(DVec3(1, 2, 3))), 0.0, 1e-15);
   EXPECT_EQ(scene->camera->position, DVec3(9));
 }
@@ -60,15 +60,17 @@ TEST(SceneFile, RoundTripsRandomScenes) {
     for (std::size_t i = 0; i < scene.sources.size() * 3; ++i) {
       SceneFile::Placement placement;
       placement.source = scene.sources[i % scene.sources.size()].id;
-      if (random() % 2 == 0) placement.name = "n\n" + std::to_string(i);
-      if (random() % 2 == 0) placement.position = {number(random), number(random) * 1e-12, 0.1};
+      Instance& instance = placement.instance;
+      if (random() % 2 == 0) instance.name = "n\n" + std::to_string(i);
+      if (random() % 2 == 0) instance.position = {number(random), number(random) * 1e-12, 0.1};
       if (random() % 2 == 0) {
-        placement.rotation = glm::normalize(DQuat(number(random), number(random), number(random), number(random)));
+        instance.rotation = glm::normalize(DQuat(number(random), number(random), number(random), number(random)));
       }
-      if (random() % 2 == 0) placement.scale = std::abs(number(random)) + 1e-9;
-      placement.mirrored = random() % 2 == 0;
-      placement.visible = random() % 2 == 0;
-      if (random() % 2 == 0) placement.categories = static_cast<std::uint32_t>(random());
+      if (random() % 2 == 0) instance.voxel_size = std::abs(number(random)) + 1e-9;
+      instance.mirrored = random() % 2 == 0;
+      instance.visible = random() % 2 == 0;
+      placement.sets_categories = random() % 2 == 0;
+      if (placement.sets_categories) instance.categories = static_cast<std::uint32_t>(random());
       scene.placements.push_back(placement);
     }
     if (seed % 2 == 0) {
@@ -87,13 +89,14 @@ TEST(SceneFile, RoundTripsRandomScenes) {
     }
     ASSERT_EQ(read->placements.size(), scene.placements.size());
     for (std::size_t i = 0; i < scene.placements.size(); ++i) {
-      const SceneFile::Placement& a = scene.placements[i];
-      const SceneFile::Placement& b = read->placements[i];
-      EXPECT_EQ(b.source, a.source);
+      EXPECT_EQ(read->placements[i].source, scene.placements[i].source);
+      EXPECT_EQ(read->placements[i].sets_categories, scene.placements[i].sets_categories);
+      const Instance& a = scene.placements[i].instance;
+      const Instance& b = read->placements[i].instance;
       EXPECT_EQ(b.name, a.name);
       EXPECT_EQ(b.position, a.position);
       EXPECT_EQ(b.rotation, a.rotation);
-      EXPECT_EQ(b.scale, a.scale);
+      EXPECT_EQ(b.voxel_size, a.voxel_size);
       EXPECT_EQ(b.mirrored, a.mirrored);
       EXPECT_EQ(b.visible, a.visible);
       EXPECT_EQ(b.categories, a.categories);
@@ -173,9 +176,12 @@ TEST(SceneFile, RefusesToWriteUnreadableScenes) {
   };
   EXPECT_EQ(code_of([](SceneFile& s) { s.placements[0].source = "b"; }), ErrorCode::InvalidArgument);
   EXPECT_EQ(code_of([](SceneFile& s) { s.sources.push_back(s.sources[0]); }), ErrorCode::InvalidArgument);
-  EXPECT_EQ(code_of([](SceneFile& s) { s.placements[0].position.y = NAN; }), ErrorCode::InvalidArgument);
-  EXPECT_EQ(code_of([](SceneFile& s) { s.placements[0].scale = 0.0; }), ErrorCode::InvalidArgument);
-  EXPECT_EQ(code_of([](SceneFile& s) { s.placements[0].rotation = {0, 0, 0, 0}; }), ErrorCode::InvalidArgument);
+  EXPECT_EQ(code_of([](SceneFile& s) { s.placements[0].instance.position.y = NAN; }), ErrorCode::InvalidArgument);
+  EXPECT_EQ(code_of([](SceneFile& s) { s.placements[0].instance.voxel_size = 0.0; }), ErrorCode::InvalidArgument);
+  EXPECT_EQ(code_of([](SceneFile& s) {
+              s.placements[0].instance.rotation = {0, 0, 0, 0};
+            }),
+            ErrorCode::InvalidArgument);
   EXPECT_EQ(code_of([](SceneFile& s) { s.sources[0].file = "\xFF"; }), ErrorCode::InvalidArgument);
   EXPECT_EQ(code_of([](SceneFile& s) { s.placements[0].grid = 0; }), ErrorCode::InvalidArgument);
   EXPECT_EQ(code_of([](SceneFile& s) { s.sources[0].file.clear(); }), ErrorCode::InvalidArgument);
@@ -352,6 +358,27 @@ TEST_F(SceneFiles, PlaceSelfContainedSceneFiles) {
   EXPECT_EQ(scene.lamps[0].direction, DVec3(-1, 0, 0));
   EXPECT_EQ(scene.lamps[0].intensity, 12.0);
   EXPECT_EQ(scene.lamps[0].range, 20.0);
+}
+
+TEST_F(SceneFiles, KeepCategoriesOfSourcesUnlessSet) {
+  Scene world;
+  Instance ship;
+  ship.grid = world.add_grid({});
+  ship.categories = 6;
+  world.add_instance(ship);
+  ASSERT_TRUE(save_scene(world, folder_ / "ship.json"));
+  ship.categories = 1;
+  world.add_instance(ship);
+  ASSERT_TRUE(save_scene(world, folder_ / "fleet.json"));
+  const auto loaded = load_scene(write_text(R"({"quoin_scene": 1,
+      "files": [{"id": "ship", "path": "ship.json"}, {"id": "fleet", "path": "fleet.json"}],
+      "instances": [{"file": "ship"}, {"file": "ship", "categories": 1}, {"file": "fleet"},
+                    {"file": "fleet", "categories": 3}]})"));
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  std::vector<std::uint32_t> categories;
+  loaded->scene.instances().for_each(
+      [&](InstanceHandle, const Instance& instance) { categories.push_back(instance.categories); });
+  EXPECT_EQ(categories, (std::vector<std::uint32_t>{6, 1, 6, 1, 3, 3}));
 }
 
 TEST_F(SceneFiles, ErrorsNameTheFile) {

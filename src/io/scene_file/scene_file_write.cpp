@@ -239,9 +239,8 @@ PlacesInFile put_grids_and_groups(const Scene& scene, SceneFile& file) {
   for (const GroupHandle handle : groups_from_top(scene)) {
     const SceneGroup& group = scene.groups()[handle];
     places.groups[handle] = file.groups.size();
-    file.groups.push_back({group.name, place_of(places.groups, parent_of(scene, handle)),
-                           place_of(places.layers, group.layer), group.position, group.rotation, group.mirrored,
-                           group.visible});
+    file.groups.push_back(
+        {group, place_of(places.groups, parent_of(scene, handle)), place_of(places.layers, group.layer)});
   }
   return places;
 }
@@ -261,19 +260,8 @@ Result<SceneFile> scene_file_of(const Scene& scene) {
       return make_error(ErrorCode::InvalidArgument,
                         "instance \"" + instance.name + "\" refers to a grid that does not exist");
     }
-    file.placements.push_back({.source = {},
-                               .grid = grid,
-                               .name = instance.name,
-                               .position = instance.position,
-                               .rotation = instance.rotation,
-                               .scale = instance.voxel_size,
-                               .mirrored = instance.mirrored,
-                               .visible = instance.visible,
-                               .group = place_of(places.groups, instance.group),
-                               .layer = place_of(places.layers, instance.layer),
-                               .categories = instance.categories == Instance().categories
-                                                 ? std::nullopt
-                                                 : std::optional<std::uint32_t>(instance.categories)});
+    file.placements.push_back(
+        {instance, grid, place_of(places.groups, instance.group), place_of(places.layers, instance.layer)});
   }
   return file;
 }

@@ -35,6 +35,16 @@ bool is_same(const DQuat& a, const DQuat& b) {
   return scene_json::is_same(a.w, b.w) && scene_json::is_same(a.x, b.x) && scene_json::is_same(a.y, b.y) &&
          scene_json::is_same(a.z, b.z);
 }
+
+// Writes the position and rotation of an instance or a group, unless they are the defaults.
+template <class Placed>
+void put_frame(const Placed& placed, OrderedJson& json) {
+  const Placed plain;
+  if (!is_same(placed.position, plain.position)) json["position"] = triple(placed.position);
+  const DQuat& q = placed.rotation;
+  if (!is_same(q, plain.rotation)) json["rotation"] = {q.x, q.y, q.z, q.w};
+}
+
 DQuat rotation_of(const Object& instance, const Json& json) {
   const Place place = instance.place_of("rotation");
   Faults& faults = instance.faults();
@@ -349,30 +359,28 @@ OrderedJson PartWriter::json_of(const SceneGrid& grid) {
 }
 
 OrderedJson PartWriter::json_of(const SceneFile::Placement& placement) {
-  const SceneFile::Placement plain;
+  const Instance& instance = placement.instance;
+  const Instance plain;
   OrderedJson json = placement.grid ? OrderedJson{{"grid", *placement.grid}} : OrderedJson{{"file", placement.source}};
-  if (!placement.name.empty()) json["name"] = text(placement.name);
-  if (!is_same(placement.position, plain.position)) json["position"] = triple(placement.position);
-  const DQuat& q = placement.rotation;
-  if (!is_same(q, plain.rotation)) json["rotation"] = {q.x, q.y, q.z, q.w};
-  if (!is_same(placement.scale, plain.scale)) json["scale"] = placement.scale;
-  if (placement.mirrored) json["mirrored"] = true;
-  if (!placement.visible) json["visible"] = false;
+  if (!instance.name.empty()) json["name"] = text(instance.name);
+  put_frame(instance, json);
+  if (!is_same(instance.voxel_size, plain.voxel_size)) json["scale"] = instance.voxel_size;
+  if (instance.mirrored) json["mirrored"] = true;
+  if (!instance.visible) json["visible"] = false;
   if (placement.group) json["group"] = *placement.group;
   if (placement.layer) json["layer"] = *placement.layer;
-  if (placement.categories) json["categories"] = *placement.categories;
+  const bool has_categories = placement.grid ? instance.categories != plain.categories : placement.sets_categories;
+  if (has_categories) json["categories"] = instance.categories;
   return json;
 }
 
-OrderedJson PartWriter::json_of(const SceneFile::Group& group) {
-  const SceneFile::Group plain;
+OrderedJson PartWriter::json_of(const SceneFile::Group& entry) {
+  const SceneGroup& group = entry.group;
   OrderedJson json = OrderedJson::object();
   if (!group.name.empty()) json["name"] = text(group.name);
-  if (group.parent) json["parent"] = *group.parent;
-  if (group.layer) json["layer"] = *group.layer;
-  if (!is_same(group.position, plain.position)) json["position"] = triple(group.position);
-  const DQuat& q = group.rotation;
-  if (!is_same(q, plain.rotation)) json["rotation"] = {q.x, q.y, q.z, q.w};
+  if (entry.parent) json["parent"] = *entry.parent;
+  if (entry.layer) json["layer"] = *entry.layer;
+  put_frame(group, json);
   if (group.mirrored) json["mirrored"] = true;
   if (!group.visible) json["visible"] = false;
   return json;
@@ -481,27 +489,30 @@ VoxelProperties properties_of(const Json& json, const Place& place, Faults& faul
 }
 
 SceneFile::Placement placement_of(const Json& json, const Place& place, Faults& faults) {
-  const Object instance(
+  const Object object(
       json, place,
       {"file", "grid", "name", "position", "rotation", "scale", "mirrored", "visible", "group", "layer", "categories"},
       faults);
   SceneFile::Placement placement;
-  placement.grid = place_in(instance, "grid", "grids");
-  if (!placement.grid && instance.need("file") != nullptr) {
-    instance.read("file", placement.source);
+  Instance& instance = placement.instance;
+  placement.grid = place_in(object, "grid", "grids");
+  if (!placement.grid && object.need("file") != nullptr) {
+    object.read("file", placement.source);
   }
-  instance.read_text("name", placement.name);
-  instance.read("position", placement.position);
-  instance.read("scale", placement.scale);
-  instance.read("mirrored", placement.mirrored);
-  instance.read("visible", placement.visible);
-  placement.categories = bits_in(instance, "categories");
-  if (const Json* rotation = instance.find("rotation")) {
-    placement.rotation = placement.grid ? kept_rotation(instance, *rotation) : rotation_of(instance, *rotation);
+  object.read_text("name", instance.name);
+  object.read("position", instance.position);
+  object.read("scale", instance.voxel_size);
+  object.read("mirrored", instance.mirrored);
+  object.read("visible", instance.visible);
+  const auto categories = bits_in(object, "categories");
+  placement.sets_categories = categories.has_value();
+  instance.categories = categories.value_or(instance.categories);
+  if (const Json* rotation = object.find("rotation")) {
+    instance.rotation = placement.grid ? kept_rotation(object, *rotation) : rotation_of(object, *rotation);
   }
-  if (!(placement.scale > 0.0)) faults.add(instance.place_of("scale"), "must be more than 0");
-  placement.group = place_in(instance, "group", "groups");
-  placement.layer = place_in(instance, "layer", "layers");
+  if (!(instance.voxel_size > 0.0)) faults.add(object.place_of("scale"), "must be more than 0");
+  placement.group = place_in(object, "group", "groups");
+  placement.layer = place_in(object, "layer", "layers");
   return placement;
 }
 
@@ -534,15 +545,16 @@ Lamp lamp_of(const Json& json, const Place& place, Faults& faults) {
 
 SceneFile::Group group_of(const Json& json, const Place& place, Faults& faults) {
   const Object object(json, place, {"name", "parent", "layer", "position", "rotation", "mirrored", "visible"}, faults);
-  SceneFile::Group group;
+  SceneFile::Group entry;
+  SceneGroup& group = entry.group;
   object.read_text("name", group.name);
-  group.parent = place_in(object, "parent", "groups");
-  group.layer = place_in(object, "layer", "layers");
+  entry.parent = place_in(object, "parent", "groups");
+  entry.layer = place_in(object, "layer", "layers");
   object.read("position", group.position);
   if (const Json* rotation = object.find("rotation")) group.rotation = kept_rotation(object, *rotation);
   object.read("mirrored", group.mirrored);
   object.read("visible", group.visible);
-  return group;
+  return entry;
 }
 
 SceneLayer layer_of(const Json& json, const Place& place, Faults& faults) {

@@ -25,7 +25,7 @@ class PartWriter {
   /// Writes a grid without its voxels, densities and data.
   [[nodiscard]] OrderedJson json_of(const SceneGrid& grid);
   [[nodiscard]] OrderedJson json_of(const SceneFile::Placement& placement);
-  [[nodiscard]] OrderedJson json_of(const SceneFile::Group& group);
+  [[nodiscard]] OrderedJson json_of(const SceneFile::Group& entry);
   [[nodiscard]] OrderedJson json_of(const SceneLayer& layer);
   [[nodiscard]] OrderedJson json_of(const Lamp& lamp);
   [[nodiscard]] OrderedJson json_of(const Camera& camera);

@@ -179,10 +179,10 @@ void FoundParts::add_grid(std::uint32_t grid) {
   put({part::kGrid, std::int64_t{grid}}, text_of(header));
   grids_[grid] = header;
   if (placed_grids_.contains(grid)) return;
-  SceneFile::Placement instance;  // makes the grid visible
-  instance.grid = grid;
-  instance.name = name;
-  put({part::kInstance, next_instance_++}, text_of(instance));
+  SceneFile::Placement placement;  // makes the grid visible
+  placement.grid = grid;
+  placement.instance.name = name;
+  put({part::kInstance, next_instance_++}, text_of(placement));
 }
 
 void FoundParts::add_types_up_to(VoxelType last) {

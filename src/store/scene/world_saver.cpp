@@ -221,14 +221,9 @@ class Save {
         if (const auto number = state_.groups.take(handle)) remove(part::kGroup, *number);
         continue;
       }
-      const SceneFile::Group text{group->name,
-                                  number_of(state_.groups, parent_of(scene_, handle)),
-                                  number_of(state_.layers, group->layer),
-                                  group->position,
-                                  group->rotation,
-                                  group->mirrored,
-                                  group->visible};
-      WorldParts::put(changes_, part::kGroup, state_.groups.of(handle), text_of(text));
+      const std::string text = text_of(SceneFile::Group{*group, number_of(state_.groups, parent_of(scene_, handle)),
+                                                        number_of(state_.layers, group->layer)});
+      WorldParts::put(changes_, part::kGroup, state_.groups.of(handle), text);
     }
   }
 
@@ -242,18 +237,10 @@ class Save {
     if (grid == state_.grids.end()) {
       return make_error(ErrorCode::InvalidArgument, "the grid of instance \"" + instance->name + "\" does not exist");
     }
-    SceneFile::Placement text;
-    text.grid = grid->second.number;
-    text.name = instance->name;
-    text.position = instance->position;
-    text.rotation = instance->rotation;
-    text.scale = instance->voxel_size;
-    text.mirrored = instance->mirrored;
-    text.visible = instance->visible;
-    text.group = number_of(state_.groups, instance->group);
-    text.layer = number_of(state_.layers, instance->layer);
-    if (instance->categories != Instance().categories) text.categories = instance->categories;
-    WorldParts::put(changes_, part::kInstance, state_.instances.of(handle), text_of(text));
+    const std::string text =
+        text_of(SceneFile::Placement{*instance, grid->second.number, number_of(state_.groups, instance->group),
+                                     number_of(state_.layers, instance->layer)});
+    WorldParts::put(changes_, part::kInstance, state_.instances.of(handle), text);
     return {};
   }
 
@@ -526,12 +513,12 @@ class Load {
     });
     if (!read) return read;
     std::vector<std::pair<GroupHandle, std::int64_t>> parents;
-    read = each<SceneFile::Group>(part::kGroup, [&](std::int64_t number, const SceneFile::Group& group) {
-      const GroupHandle handle = scene_.add_group(
-          {group.name, {}, named(layers_, group.layer), group.position, group.rotation, group.mirrored, group.visible});
+    read = each<SceneFile::Group>(part::kGroup, [&](std::int64_t number, SceneFile::Group part) {
+      part.group.layer = named(layers_, part.layer);
+      const GroupHandle handle = scene_.add_group(std::move(part.group));
       groups_[number] = handle;
       state_.groups.add(handle, number);
-      if (group.parent) parents.emplace_back(handle, static_cast<std::int64_t>(*group.parent));
+      if (part.parent) parents.emplace_back(handle, static_cast<std::int64_t>(*part.parent));
     });
     for (const auto& [handle, parent] : parents) {
       scene_.edit(handle).parent = named(groups_, static_cast<std::size_t>(parent));
@@ -540,17 +527,17 @@ class Load {
   }
 
   Status read_instances() {
-    return each<SceneFile::Placement>(part::kInstance, [&](std::int64_t number, const SceneFile::Placement& text) {
-      QUOIN_ASSERT(text.grid.has_value(), "a placement that was read has a grid");
-      const auto grid = handles_.find(static_cast<std::int64_t>(*text.grid));
+    return each<SceneFile::Placement>(part::kInstance, [&](std::int64_t number, SceneFile::Placement part) {
+      QUOIN_ASSERT(part.grid.has_value(), "a placement that was read has a grid");
+      const auto grid = handles_.find(static_cast<std::int64_t>(*part.grid));
       if (grid == handles_.end()) {
         add_line("instance " + std::to_string(number) + ": its grid is lost");
         return;
       }
-      const InstanceHandle handle = scene_.add_instance(
-          {text.name, grid->second, text.position, text.rotation, text.scale, text.mirrored, text.visible,
-           named(groups_, text.group), named(layers_, text.layer), text.categories.value_or(Instance().categories)});
-      state_.instances.add(handle, number);
+      part.instance.grid = grid->second;
+      part.instance.group = named(groups_, part.group);
+      part.instance.layer = named(layers_, part.layer);
+      state_.instances.add(scene_.add_instance(std::move(part.instance)), number);
     });
   }
 
