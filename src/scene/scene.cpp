@@ -21,26 +21,20 @@ namespace quoin {
 
 namespace {
 
-/// The rotation's matrix, exact for quarter turns, whose quaternions hold the irrational square root of one half.
-glm::dmat3 exact_matrix(const DQuat& rotation) {
-  constexpr double kRounding = 1e-12;
-  glm::dmat3 matrix = glm::mat3_cast(unit_rotation(rotation));
-  for (int column = 0; column < 3; ++column) {
-    for (int row = 0; row < 3; ++row) {
-      const double nearest = std::round(matrix[column][row]);
-      if (std::abs(matrix[column][row] - nearest) < kRounding) matrix[column][row] = nearest;
-    }
-  }
-  return matrix;
-}
-
 constexpr DVec3 kNowhere{std::numeric_limits<double>::quiet_NaN()};
 
 }  // namespace
 
-glm::dmat3 world_axes(const Instance& instance) {
-  glm::dmat3 axes = exact_matrix(instance.rotation);
-  if (instance.mirrored) axes[0] = -axes[0];
+glm::dmat3 world_axes(const DQuat& rotation, bool mirrored) {
+  constexpr double kRounding = 1e-12;
+  glm::dmat3 axes = glm::mat3_cast(unit_rotation(rotation));
+  for (int column = 0; column < 3; ++column) {
+    for (int row = 0; row < 3; ++row) {
+      const double nearest = std::round(axes[column][row]);
+      if (std::abs(axes[column][row] - nearest) < kRounding) axes[column][row] = nearest;
+    }
+  }
+  if (mirrored) axes[0] = -axes[0];
   return axes;
 }
 
@@ -352,9 +346,7 @@ bool is_drawn(const Scene& scene, const Instance& instance, InstanceFilter filte
 }
 
 DVec3 world_from_grid(const Instance& instance, const SceneGrid& grid, DVec3 point_in_grid) {
-  DVec3 offset = (point_in_grid - grid.pivot) * instance.voxel_size;
-  if (instance.mirrored) offset.x = -offset.x;
-  return instance.position + exact_matrix(instance.rotation) * offset;
+  return instance.position + world_axes(instance) * ((point_in_grid - grid.pivot) * instance.voxel_size);
 }
 
 }  // namespace quoin

@@ -263,7 +263,10 @@ void move_group(Scene& scene, GroupHandle group, DVec3 position, const DQuat& ro
 
 /// Returns the grid's axes in the world, as columns: the rotation after the mirror, without the voxels' size. Exact for
 /// quarter turns, whose quaternions hold the irrational square root of one half.
-[[nodiscard]] glm::dmat3 world_axes(const Instance& instance);
+[[nodiscard]] glm::dmat3 world_axes(const DQuat& rotation, bool mirrored);
+[[nodiscard]] inline glm::dmat3 world_axes(const Instance& instance) {
+  return world_axes(instance.rotation, instance.mirrored);
+}
 /// Transforms a point from the instance's grid (voxels) to the world.
 [[nodiscard]] DVec3 world_from_grid(const Instance& instance, const SceneGrid& grid, DVec3 point_in_grid);
 /// Returns the matrix that transforms points from the instance's grid (voxels) to the world. The determinant is

@@ -7,15 +7,11 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/coordinates/unit_rotation.h"
+#include "scene/meshes/scene_mesh_parts.h"
 
 namespace quoin {
 
 namespace {
-
-Similarity place_of(const Instance& instance) {
-  return {instance.position, unit_rotation(instance.rotation), instance.voxel_size, instance.mirrored};
-}
 
 // Returns the object in the same slot of another map, or a null handle if the handle is invalid in its own map.
 template <class T>
@@ -42,7 +38,7 @@ Status SceneAnimation::add(const Scene& frame, InstanceFilter filter) {
   for (const InstanceHandle handle : frame.instances().handles()) {
     const Instance& instance = frame.instances()[handle];
     if (is_drawn(frame, instance, filter)) {
-      show(shown_as(index, frame, instance), frames_, place_of(instance));
+      show(shown_as(index, frame, instance), frames_, similarity_of(instance));
     }
     ++index;
   }

@@ -20,6 +20,9 @@ namespace quoin {
 /// Returns the grids that drawn instances place, each once, in handle order.
 [[nodiscard]] std::vector<GridHandle> drawn_grids(const Scene& scene, InstanceFilter filter);
 
+/// Returns an instance's transform from points relative to its grid's pivot to the world, with a unit rotation.
+[[nodiscard]] Similarity similarity_of(const Instance& instance);
+
 /// Places instances, and takes the groups above them into the meshes.
 class MeshHierarchy {
  public:

@@ -145,10 +145,7 @@ MeshPart with_atlas(MeshPart part, Coordinates coordinates) {
 glm::dmat4 MeshPlacement::matrix() const {
   if (const auto* matrix = std::get_if<glm::dmat4>(&world_from_part)) return *matrix;
   const auto& place = std::get<Similarity>(world_from_part);
-  Instance turned;
-  turned.rotation = place.rotation;
-  turned.mirrored = place.mirrored;
-  glm::dmat4 matrix(world_axes(turned) * place.scale);
+  glm::dmat4 matrix(world_axes(place.rotation, place.mirrored) * place.scale);
   matrix[3] = glm::dvec4(place.position, 1.0);
   return matrix;
 }
@@ -354,6 +351,10 @@ std::vector<GridHandle> drawn_grids(const Scene& scene, InstanceFilter filter) {
   return grids;
 }
 
+Similarity similarity_of(const Instance& instance) {
+  return {instance.position, unit_rotation(instance.rotation), instance.voxel_size, instance.mirrored};
+}
+
 std::string MeshHierarchy::layer_name(LayerHandle handle) const {
   const SceneLayer* layer = scene_.layers().find(handle);
   return layer == nullptr ? std::string() : layer->name;
@@ -381,9 +382,7 @@ std::optional<std::size_t> MeshHierarchy::group_of(GroupHandle handle) {
 
 MeshPlacement MeshHierarchy::place(InstanceHandle handle, std::size_t part) {
   const Instance& instance = scene_.instances()[handle];
-  const DQuat rotation = unit_rotation(instance.rotation);
-  MeshPlacement placement{part, instance.name,
-                          Similarity{instance.position, rotation, instance.voxel_size, instance.mirrored}};
+  MeshPlacement placement{part, instance.name, similarity_of(instance)};
   placement.group = group_of(instance.group);
   placement.layer = layer_name(instance.layer);
   placement.instance = handle;
