@@ -1,5 +1,7 @@
 #include <quoin/core/axis_orientation.h>
 
+#include <limits>
+#include <optional>
 #include <set>
 
 #include <glm/matrix.hpp>
@@ -72,12 +74,29 @@ TEST(AxisOrientation, WorksInConstantExpressions) {
   static_assert(!kHalf.is_mirrored() && AxisOrientation::mirror(1).is_mirrored());
 }
 
+TEST(AxisOrientation, IsFoundNearItsMatrix) {
+  for (int index = 0; index < AxisOrientation::kCount; ++index) {
+    const AxisOrientation orientation = AxisOrientation::at(index);
+    glm::dmat3 matrix = orientation.matrix();
+    EXPECT_EQ(AxisOrientation::near_matrix(matrix, 0.0), orientation);
+    matrix[index % 3][index / 3 % 3] += 0.125;
+    EXPECT_EQ(AxisOrientation::near_matrix(matrix, 0.125), orientation);
+    EXPECT_EQ(AxisOrientation::near_matrix(matrix, 0.12), std::nullopt);
+    matrix[index % 3][index / 3 % 3] = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_EQ(AxisOrientation::near_matrix(matrix, 0.125), std::nullopt);
+  }
+  EXPECT_EQ(AxisOrientation::near_matrix(glm::dmat3(0.0), 0.1), std::nullopt);
+  EXPECT_EQ(AxisOrientation::near_matrix({0, 1, 0, 1, 1, 0, 0, 0, 1}, 0.1), std::nullopt) << "two entries in a row";
+  EXPECT_EQ(AxisOrientation::near_matrix({1, 1, 0, 0, 0, 0, 0, 0, 1}, 0.1), std::nullopt) << "two in a column";
+}
+
 TEST(AxisOrientationDeathTest, AssertsOnInvalidAxisOrIndex) {
   QUOIN_EXPECT_MISTAKE((void)AxisOrientation::quarter_turns(3, 1), "0 <= axis < 3");
   QUOIN_EXPECT_MISTAKE((void)AxisOrientation::mirror(-1), "0 <= axis < 3");
   QUOIN_EXPECT_MISTAKE((void)AxisOrientation::at(48), "0 <= index < kCount");
   QUOIN_EXPECT_MISTAKE((void)AxisOrientation().source_axis(3), "0 <= axis < 3");
   QUOIN_EXPECT_MISTAKE((void)AxisOrientation().is_negated(-1), "0 <= axis < 3");
+  QUOIN_EXPECT_MISTAKE((void)AxisOrientation::near_matrix(glm::dmat3(1.0), 0.5), "tolerance < 0.5");
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 #include <quoin/grid/copy_box.h>
 
 #include "core/bytes/text.h"
+#include "scene/instance_axes.h"
 
 namespace quoin::models {
 
@@ -21,24 +22,6 @@ namespace {
 
 constexpr double kRounding = 1e-6;
 constexpr double kFarthest = 1 << 26;
-
-/// Returns nullopt if the rotation is not a multiple of 90 degrees.
-std::optional<AxisOrientation> orientation_of(const Instance& instance) {
-  const double length = glm::length(instance.rotation);
-  const DQuat rotation = length > 0.0 ? instance.rotation / length : DQuat(1.0, 0.0, 0.0, 0.0);
-  glm::dmat3 matrix = glm::mat3_cast(rotation);
-  if (instance.mirrored) matrix[0] = -matrix[0];
-  for (int index = 0; index < AxisOrientation::kCount; ++index) {
-    const AxisOrientation orientation = AxisOrientation::at(index);
-    const glm::dmat3 other = orientation.matrix();
-    double most = 0.0;
-    for (int column = 0; column < 3; ++column) {
-      for (int row = 0; row < 3; ++row) most = std::max(most, std::abs(matrix[column][row] - other[column][row]));
-    }
-    if (most <= kRounding) return orientation;
-  }
-  return std::nullopt;
-}
 
 std::string text_of(const Instance& instance, const SceneGrid& grid) {
   std::string text = "the instance \"";
@@ -196,7 +179,7 @@ class Placer {
   }
 
   Status turn(const Instance& instance, const SceneGrid& grid, const IBox& box, bool visible) {
-    const auto orientation = orientation_of(instance);
+    const auto orientation = AxisOrientation::near_matrix(world_axes(instance), kRounding);
     if (!orientation) {
       return make_error(ErrorCode::Unsupported, text_of(instance, grid) +
                                                     " is not rotated by multiples of 90 degrees, as " +

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include <glm/mat3x3.hpp>
 
@@ -53,6 +55,24 @@ class AxisOrientation {
     found.source_ = kOrders[static_cast<std::size_t>(index / 8)];
     for (std::size_t i = 0; i < 3; ++i) found.is_negated_[i] = (index >> i & 1) != 0;
     return found;
+  }
+  /// Returns the orientation whose matrix differs by at most `tolerance` from a matrix in each entry; nullopt if there
+  /// is none. Requires: tolerance < 0.5.
+  [[nodiscard]] static std::optional<AxisOrientation> near_matrix(const glm::dmat3& matrix, double tolerance) {
+    QUOIN_ASSERT(tolerance < 0.5, "tolerance < 0.5");
+    AxisOrientation found;
+    unsigned columns = 0;
+    for (std::size_t row = 0; row < 3; ++row) {
+      for (std::size_t column = 0; column < 3; ++column) {
+        const double entry = matrix[static_cast<int>(column)][static_cast<int>(row)];
+        if (std::abs(entry) <= tolerance) continue;
+        if (!(std::abs(std::abs(entry) - 1.0) <= tolerance)) return std::nullopt;
+        found.source_[row] = static_cast<std::uint8_t>(column);
+        found.is_negated_[row] = entry < 0.0;
+        columns += 1U << 2 * column;
+      }
+    }
+    return columns == 0b010101 ? std::optional(found) : std::nullopt;
   }
   /// Returns the index of this orientation, 0 to 47, for files and tables.
   [[nodiscard]] constexpr int index() const {

@@ -349,7 +349,7 @@ Result<TransformKey> parse_transform_key(ChunkReader& chunk, std::size_t place) 
   if (chunk.failed()) return chunk.too_short();
   const Result<std::int32_t> frame = parse_frame(chunk, dict, place);
   if (!frame) return frame.error();
-  const std::optional<Orientation> orientation = parse_orientation(dict.get("_r"));
+  const std::optional<AxisOrientation> orientation = parse_orientation(dict.get("_r"));
   if (!orientation) return chunk.error("has the invalid rotation " + quoted(dict.get("_r")));
   const std::optional<IVec3> translation = parse_translation(dict.get("_t"));
   if (!translation) return chunk.error("has the invalid translation " + quoted(dict.get("_t")));
@@ -403,8 +403,8 @@ std::optional<std::int32_t> frame_of_key(std::string_view text, std::size_t plac
   return static_cast<std::int32_t>(*frame);
 }
 
-std::optional<Orientation> parse_orientation(std::string_view text) {
-  if (text.empty()) return Orientation{};
+std::optional<AxisOrientation> parse_orientation(std::string_view text) {
+  if (text.empty()) return AxisOrientation{};
   const std::optional<std::int64_t> byte = parse_integer(text);
   if (!byte.has_value() || *byte < 0 || *byte > 255) return std::nullopt;
   return orientation_from_byte(static_cast<std::uint8_t>(*byte));

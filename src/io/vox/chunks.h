@@ -50,7 +50,7 @@ struct Model {
 
 struct TransformKey {
   std::int32_t frame = 0;
-  Orientation orientation;
+  AxisOrientation orientation;
   IVec3 translation{0};
 };
 
@@ -137,7 +137,7 @@ inline constexpr std::size_t kChunkHeaderBytes = 12;
 /// if it is invalid.
 [[nodiscard]] std::optional<std::int32_t> frame_of_key(std::string_view text, std::size_t place);
 /// Parses `_r` and `_t` of a transform's key; nullopt if they are invalid.
-[[nodiscard]] std::optional<Orientation> parse_orientation(std::string_view text);
+[[nodiscard]] std::optional<AxisOrientation> parse_orientation(std::string_view text);
 [[nodiscard]] std::optional<IVec3> parse_translation(std::string_view text);
 
 /// Returns true if the file has several frames.

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 
+#include <quoin/core/axis_orientation.h>
 #include <quoin/core/vec.h>
 
 namespace quoin::vox {
@@ -11,26 +12,11 @@ namespace quoin::vox {
 /// A translation that sums of many 32-bit ones cannot overflow.
 using Offset = std::array<std::int64_t, 3>;
 
-/// One of the 48 rotations and reflections that map axes to axes, as a matrix whose row `i` has `sign[i]` in column
-/// `axis[i]` and zeros elsewhere.
-struct Orientation {
-  std::array<std::uint8_t, 3> axis{0, 1, 2};
-  std::array<std::int8_t, 3> sign{1, 1, 1};
-
-  bool operator==(const Orientation&) const = default;
-};
-
-/// The matrix product: first `b`, then `a`.
-[[nodiscard]] Orientation operator*(const Orientation& a, const Orientation& b);
-[[nodiscard]] Offset operator*(const Orientation& a, const Offset& offset);
-/// Its determinant is -1.
-[[nodiscard]] bool is_reflection(const Orientation& orientation);
-
-[[nodiscard]] Orientation inverse(const Orientation& orientation);
+[[nodiscard]] Offset operator*(const AxisOrientation& orientation, const Offset& offset);
 
 /// A rotation followed by a translation. Requires for computations: offsets stay below 2^62, as all file offsets do.
 struct Motion {
-  Orientation orientation;
+  AxisOrientation orientation;
   Offset translation{0, 0, 0};
 
   bool operator==(const Motion&) const = default;
@@ -42,8 +28,8 @@ struct Motion {
 
 /// Converts from and to the `_r` byte: bits 0-1 and 2-3 the columns of the first and second row's entry, bits 4-6 the
 /// rows' signs. Returns nullopt if the two rows have the same or an invalid column.
-[[nodiscard]] std::optional<Orientation> orientation_from_byte(std::uint8_t byte);
-[[nodiscard]] std::uint8_t byte_from_orientation(const Orientation& orientation);
+[[nodiscard]] std::optional<AxisOrientation> orientation_from_byte(std::uint8_t byte);
+[[nodiscard]] std::uint8_t byte_from_orientation(const AxisOrientation& orientation);
 
 /// An orientation as an Instance holds it: mirror x, then rotate.
 struct InstanceTurn {
@@ -52,9 +38,9 @@ struct InstanceTurn {
 };
 
 /// From MagicaVoxel's axes (z up) to Quoin's (y up): the same motion seen from axes (x, z, -y).
-[[nodiscard]] InstanceTurn turn_from_orientation(const Orientation& in_vox);
+[[nodiscard]] InstanceTurn turn_from_orientation(const AxisOrientation& in_vox);
 /// The inverse conversion; nullopt if the rotation is not a multiple of quarter turns.
-[[nodiscard]] std::optional<Orientation> orientation_from_turn(const InstanceTurn& turn);
+[[nodiscard]] std::optional<AxisOrientation> orientation_from_turn(const InstanceTurn& turn);
 
 /// (x, y, z) of MagicaVoxel as Quoin's (x, z, -y), and back.
 [[nodiscard]] Offset quoin_from_vox(const Offset& offset);

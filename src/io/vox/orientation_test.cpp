@@ -6,7 +6,6 @@
 
 #include <gtest/gtest.h>
 
-#include "core/death_for_tests.h"
 #include "io/vox/vox_for_tests.h"
 
 namespace quoin {
@@ -154,12 +153,6 @@ TEST(VoxOrientation, EncodesOnlyQuarterTurns) {
   EXPECT_FALSE(vox::orientation_from_turn({DQuat(std::nan(""), 0, 0, 0), false}).has_value());
   EXPECT_FALSE(vox::orientation_from_byte(0).has_value());
   EXPECT_FALSE(vox::orientation_from_byte(3).has_value());
-}
-
-TEST(VoxOrientationDeathTest, AssertsOnRowsWithEqualColumns) {
-  vox::Orientation orientation;
-  orientation.axis[1] = orientation.axis[0];
-  QUOIN_EXPECT_MISTAKE(static_cast<void>(vox::byte_from_orientation(orientation)), "rows with different columns");
 }
 
 }  // namespace

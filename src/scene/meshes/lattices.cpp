@@ -153,19 +153,11 @@ std::optional<LatticePlace> place_in_lattice(const Scene& scene, const Instance&
   };
   const IBox box = other.grid.bounds();
   const DVec3 origin = moved(DVec3(box.min));
-  LatticePlace place;
-  bool is_found = false;
-  for (int i = 0; i < AxisOrientation::kCount && !is_found; ++i) {
-    place.orientation = AxisOrientation::at(i);
-    is_found = true;
-    for (int axis = 0; axis < 3 && is_found; ++axis) {
-      DVec3 unit(0.0);
-      unit[axis] = 1.0;
-      const DVec3 turned = moved(DVec3(box.min) + unit) - origin;
-      is_found = glm::length(turned - place.orientation.apply(unit)) < 0.1;
-    }
-  }
-  if (!is_found) return std::nullopt;
+  glm::dmat3 axes(1.0);
+  for (int axis = 0; axis < 3; ++axis) axes[axis] = moved(DVec3(box.min) + axes[axis]) - origin;
+  const auto orientation = AxisOrientation::near_matrix(axes, 0.1);
+  if (!orientation) return std::nullopt;
+  LatticePlace place{*orientation};
   const DVec3 whole = glm::round(origin - place.orientation.apply(DVec3(box.min)));
   const IBox lattice_box = own.grid.bounds();
   const auto is_near = [](DVec3 point) {

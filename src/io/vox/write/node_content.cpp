@@ -128,7 +128,7 @@ NodeContent node_of(const VoxSource& source, std::size_t node) {
 
 void set_motion(Entries& key, const Motion& motion) {
   const Offset& t = motion.translation;
-  const bool turns = motion.orientation != Orientation{} || !key.get("_r").empty();
+  const bool turns = motion.orientation != AxisOrientation{} || !key.get("_r").empty();
   const bool moves = t != Offset{0, 0, 0} || !key.get("_t").empty();
   if (turns) key.set("_r", std::to_string(byte_from_orientation(motion.orientation)));
   if (moves) key.set("_t", std::to_string(t[0]) + " " + std::to_string(t[1]) + " " + std::to_string(t[2]));
@@ -136,7 +136,7 @@ void set_motion(Entries& key, const Motion& motion) {
 
 Motion motion_of(const Entries& key) {
   const IVec3 moved = parse_translation(key.get("_t")).value_or(IVec3{0});
-  return {parse_orientation(key.get("_r")).value_or(Orientation{}), {moved.x, moved.y, moved.z}};
+  return {parse_orientation(key.get("_r")).value_or(AxisOrientation{}), {moved.x, moved.y, moved.z}};
 }
 
 namespace {

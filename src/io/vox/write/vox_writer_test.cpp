@@ -28,7 +28,7 @@ class Random {
   std::mt19937 engine_;
 };
 
-vox::Orientation random_orientation(Random& random) {
+AxisOrientation random_orientation(Random& random) {
   while (true) {
     const auto found = vox::orientation_from_byte(static_cast<std::uint8_t>(random.between(0, 127)));
     if (found.has_value()) return *found;
