@@ -103,12 +103,12 @@ Motion motion_at(const Document& document, const Node& node, int requested) {
 
 namespace {
 
-/// A transform or a group on the path from the root to the current node. `hanging` is its position if it is a group,
+/// A transform or a group on the path from the root to the current node. `placed` is its position if it is a group,
 /// else the chain down to it.
 struct Step {
   std::size_t node = 0;
   std::size_t next_child = 0;
-  Hanging hanging;
+  PlacedNode placed;
   std::size_t group = kNone;  ///< its index in Placements::groups, if it is a listed group
 };
 
@@ -125,11 +125,11 @@ class GraphWalk {
   [[nodiscard]] std::size_t find_root() const;
   [[nodiscard]] bool is_layer_hidden(std::int32_t id) const;
   [[nodiscard]] Status check_shapes();
-  [[nodiscard]] Hanging below(const Step& parent) const;
-  [[nodiscard]] bool is_scene_itself(const Hanging& hanging) const;
+  [[nodiscard]] PlacedNode below(const Step& parent) const;
+  [[nodiscard]] bool is_scene_itself(const PlacedNode& placed) const;
   [[nodiscard]] bool has_layer(std::int32_t id) const;
-  Status take_names(const Hanging& hanging, std::string_view more);
-  void close_chain(Hanging& hanging);
+  Status take_names(const PlacedNode& placed, std::string_view more);
+  void close_chain(PlacedNode& placed);
   void add_transform(Step& step);
   Status add_group(Step& step);
   Status enter(std::size_t node, const Step& parent);
@@ -187,21 +187,21 @@ Status GraphWalk::check_shapes() {
   return {};
 }
 
-/// Returns the initial Hanging of a step's children.
-Hanging GraphWalk::below(const Step& parent) const {
-  if (parent.node != kNone && document_.nodes[parent.node].kind == NodeKind::Transform) return parent.hanging;
-  Hanging hanging;
-  hanging.parent = parent.group;
-  hanging.parent_motion = parent.hanging.world;
-  hanging.world = parent.hanging.world;
-  return hanging;
+/// Returns the initial PlacedNode of a step's children.
+PlacedNode GraphWalk::below(const Step& parent) const {
+  if (parent.node != kNone && document_.nodes[parent.node].kind == NodeKind::Transform) return parent.placed;
+  PlacedNode placed;
+  placed.parent = parent.group;
+  placed.parent_motion = parent.placed.world;
+  placed.world = parent.placed.world;
+  return placed;
 }
 
-Status GraphWalk::take_names(const Hanging& hanging, std::string_view more) {
-  const std::size_t bytes = hanging.name.size() + more.size();
+Status GraphWalk::take_names(const PlacedNode& placed, std::string_view more) {
+  const std::size_t bytes = placed.name.size() + more.size();
   if (bytes > names_left_) {
     return make_error(ErrorCode::LimitExceeded, "the scene graph repeats names too often", {},
-                      document_.nodes[hanging.node].offset);
+                      document_.nodes[placed.node].offset);
   }
   names_left_ -= bytes;
   return {};
@@ -209,7 +209,7 @@ Status GraphWalk::take_names(const Hanging& hanging, std::string_view more) {
 
 Status GraphWalk::place(std::size_t at, const Step& parent) {
   const Node& node = document_.nodes[at];
-  Placement placement{below(parent), 0, {}};
+  PlacedShape placement{below(parent), 0, {}};
   placement.node = at;
   placement.hidden = placement.hidden || node.hidden;
   placement.model = document_.model_keys[node.first_key + key_of_shape(document_, node, frame_)].model;
@@ -221,48 +221,48 @@ Status GraphWalk::place(std::size_t at, const Step& parent) {
 }
 
 /// The chain's transforms are the last steps of the path.
-void GraphWalk::close_chain(Hanging& hanging) {
-  QUOIN_ASSERT(hanging.transform_count <= way_.size(), "transforms on the path");
-  hanging.first_transform = out_.chains.size();
-  for (std::size_t i = way_.size() - hanging.transform_count; i < way_.size(); ++i) out_.chains.push_back(way_[i].node);
+void GraphWalk::close_chain(PlacedNode& placed) {
+  QUOIN_ASSERT(placed.transform_count <= way_.size(), "transforms on the path");
+  placed.first_transform = out_.chains.size();
+  for (std::size_t i = way_.size() - placed.transform_count; i < way_.size(); ++i) out_.chains.push_back(way_[i].node);
 }
 
 /// Returns true if the topmost group is the scene itself: it has no properties that a scene cannot hold.
-bool GraphWalk::is_scene_itself(const Hanging& hanging) const {
-  return out_.top_group == kNone && out_.groups.empty() && out_.all.empty() && hanging.parent == kNone &&
-         !hanging.hidden && hanging.name.empty() && !has_layer(hanging.layer);
+bool GraphWalk::is_scene_itself(const PlacedNode& placed) const {
+  return out_.top_group == kNone && out_.groups.empty() && out_.all.empty() && placed.parent == kNone &&
+         !placed.hidden && placed.name.empty() && !has_layer(placed.layer);
 }
 
 void GraphWalk::add_transform(Step& step) {
   const Node& node = document_.nodes[step.node];
-  Hanging& hanging = step.hanging;
+  PlacedNode& placed = step.placed;
   // The effects of a chain's earlier transforms count as its own.
-  if (hanging.transform_count > 0) {
-    hanging.before = inverse(hanging.parent_motion) * hanging.world;
-    hanging.hidden = hanging.hidden || is_layer_hidden(hanging.layer);
+  if (placed.transform_count > 0) {
+    placed.before = inverse(placed.parent_motion) * placed.world;
+    placed.hidden = placed.hidden || is_layer_hidden(placed.layer);
   }
-  ++hanging.transform_count;
-  hanging.world = hanging.world * motion_at(document_, node, frame_);
-  hanging.hidden = hanging.hidden || node.hidden;
-  hanging.name = node.name;
-  hanging.layer = node.layer;
+  ++placed.transform_count;
+  placed.world = placed.world * motion_at(document_, node, frame_);
+  placed.hidden = placed.hidden || node.hidden;
+  placed.name = node.name;
+  placed.layer = node.layer;
 }
 
 Status GraphWalk::add_group(Step& step) {
   const Node& node = document_.nodes[step.node];
-  Hanging& hanging = step.hanging;
-  hanging.node = step.node;
-  hanging.hidden = hanging.hidden || node.hidden;
-  if (hanging.name.empty()) hanging.name = node.name;
-  close_chain(hanging);
-  if (is_scene_itself(hanging)) {
+  PlacedNode& placed = step.placed;
+  placed.node = step.node;
+  placed.hidden = placed.hidden || node.hidden;
+  if (placed.name.empty()) placed.name = node.name;
+  close_chain(placed);
+  if (is_scene_itself(placed)) {
     out_.top_group = step.node;
-    out_.top_motion = hanging.world;
+    out_.top_motion = placed.world;
     return {};
   }
-  if (Status status = take_names(hanging, {}); !status) return status;
+  if (Status status = take_names(placed, {}); !status) return status;
   step.group = out_.groups.size();
-  out_.groups.push_back(hanging);
+  out_.groups.push_back(placed);
   return {};
 }
 
@@ -280,7 +280,7 @@ Status GraphWalk::enter(std::size_t at, const Step& parent) {
   if (node.kind == NodeKind::Shape) return place(at, parent);
   Step step;
   step.node = at;
-  step.hanging = below(parent);
+  step.placed = below(parent);
   if (node.kind == NodeKind::Transform) {
     add_transform(step);
   } else if (Status status = add_group(step); !status) {
@@ -344,7 +344,7 @@ Result<Placements> place_lone_model(const Document& document, int frame) {
     out.warnings.emplace_back("the file has no models");
     return out;
   }
-  Placement placement;
+  PlacedShape placement;
   placement.model = static_cast<std::uint32_t>(frame);
   QUOIN_ASSERT(frame >= 0 && static_cast<std::size_t>(frame) < document.models.size(), "a model of the document");
   placement.world.translation[2] = document.models[placement.model].size.z / 2;

@@ -90,13 +90,13 @@ LayerHandle layer_named(const LayersById& layers, std::int32_t id) {
 std::vector<GroupHandle> add_groups(const vox::Placements& placements, const LayersById& layers, Scene& scene) {
   std::vector<GroupHandle> handles;
   handles.reserve(placements.groups.size());
-  for (const vox::Hanging& hanging : placements.groups) {
+  for (const vox::PlacedNode& placed : placements.groups) {
     SceneGroup group;
-    group.name = printable(hanging.name);
-    if (hanging.parent != vox::kNone) group.parent = handles[hanging.parent];
-    group.layer = layer_named(layers, hanging.layer);
-    put_place(hanging.world, group);
-    group.visible = !hanging.hidden;
+    group.name = printable(placed.name);
+    if (placed.parent != vox::kNone) group.parent = handles[placed.parent];
+    group.layer = layer_named(layers, placed.layer);
+    put_place(placed.world, group);
+    group.visible = !placed.hidden;
     handles.push_back(scene.add_group(std::move(group)));
   }
   return handles;
@@ -106,7 +106,7 @@ std::vector<GroupHandle> add_groups(const vox::Placements& placements, const Lay
 void add_instances(const vox::Placements& placements, const std::vector<GridHandle>& grids, const LayersById& layers,
                    Scene& scene) {
   const std::vector<GroupHandle> groups = add_groups(placements, layers, scene);
-  for (const vox::Placement& placement : placements.all) {
+  for (const vox::PlacedShape& placement : placements.all) {
     Instance instance;
     instance.name = printable(placement.name);
     instance.grid = grids[placement.model];
@@ -118,7 +118,7 @@ void add_instances(const vox::Placements& placements, const std::vector<GridHand
     std::string& name = scene.edit(grids[placement.model]).name;
     if (name.empty()) name = printable(placement.shape_name);
   }
-  for (const vox::Placement& placement : placements.all) {
+  for (const vox::PlacedShape& placement : placements.all) {
     std::string& name = scene.edit(grids[placement.model]).name;
     if (name.empty()) name = printable(placement.name);
   }
@@ -187,7 +187,7 @@ Result<Scene> scene_at_frame(const VoxSource& source, int frame) {
                "frames must differ only in placements and models");
   for (std::size_t i = 0; i < instances.size(); ++i) {
     Instance& instance = scene.edit(instances[i]);
-    const vox::Placement& placement = placements->all[i];
+    const vox::PlacedShape& placement = placements->all[i];
     instance.grid = grids[placement.model];
     put_place(placement.world, instance);
   }

@@ -21,7 +21,7 @@ inline constexpr std::size_t kNone = static_cast<std::size_t>(-1);
 
 /// The position of a shape or a group in the scene graph: below its nearest ancestor group, through a chain of
 /// transforms, usually one.
-struct Hanging {
+struct PlacedNode {
   std::size_t node = kNone;         ///< the shape or group in Document::nodes; kNone without a scene graph
   std::size_t parent = kNone;       ///< in Placements::groups; kNone: the scene itself
   std::size_t first_transform = 0;  ///< in Placements::chains, from the top down
@@ -35,17 +35,17 @@ struct Hanging {
 };
 
 /// A model in the scene graph: the combined motion of all transforms on one path down to a shape. MagicaVoxel's axes.
-struct Placement : Hanging {
+struct PlacedShape : PlacedNode {
   std::uint32_t model = 0;
   std::string_view shape_name;  ///< the shape's own name; Quoin's writer stores a grid's name there
 };
 
 /// The placements at one frame, in the order of the graph, with warnings.
 struct Placements {
-  std::vector<Placement> all;
+  std::vector<PlacedShape> all;
   /// All groups except the topmost, which is the scene itself unless it is hidden, on a layer or named. Parents come
   /// first.
-  std::vector<Hanging> groups;
+  std::vector<PlacedNode> groups;
   std::vector<std::size_t> chains;  ///< transforms, as indices into Document::nodes
   std::size_t top_group = kNone;    ///< the topmost group's node; kNone if it is in `groups` or does not exist
   Motion top_motion;                ///< its motion

@@ -74,15 +74,15 @@ NodeContent& GraphRevision::change(std::size_t node) {
   return known != out_.changed.end() ? known->second : out_.changed.emplace(node, read(node)).first->second;
 }
 
-std::size_t GraphRevision::last_transform(const Hanging& hanging) const {
-  if (hanging.transform_count == 0) return kNone;
-  return source_.placements.chains[hanging.first_transform + hanging.transform_count - 1];
+std::size_t GraphRevision::last_transform(const PlacedNode& placed) const {
+  if (placed.transform_count == 0) return kNone;
+  return source_.placements.chains[placed.first_transform + placed.transform_count - 1];
 }
 
 Parent GraphRevision::parent_in_source(std::size_t group) const {
   if (group == kNone) return top_;
-  const Hanging& hanging = source_.placements.groups[group];
-  return {hanging.node, kNone, hanging.world};
+  const PlacedNode& placed = source_.placements.groups[group];
+  return {placed.node, kNone, placed.world};
 }
 
 Parent GraphRevision::parent_now(GroupHandle group) const {
@@ -135,10 +135,9 @@ void GraphRevision::begin_graph(std::vector<std::int32_t> below) {
 std::optional<std::int32_t> GraphRevision::root_below_no_group() const {
   const Placements& placements = source_.placements;
   const auto first_of = [&](const auto& all) -> std::optional<std::int32_t> {
-    for (const Hanging& hanging : all) {
-      if (hanging.parent != kNone) continue;
-      const std::size_t highest =
-          hanging.transform_count > 0 ? placements.chains[hanging.first_transform] : hanging.node;
+    for (const PlacedNode& placed : all) {
+      if (placed.parent != kNone) continue;
+      const std::size_t highest = placed.transform_count > 0 ? placements.chains[placed.first_transform] : placed.node;
       return source_.document.nodes[highest].id;
     }
     return std::nullopt;
@@ -160,16 +159,16 @@ void GraphRevision::find_top() {
 }
 
 /// Removes a node and its chain from the graph. Nodes below stay, or are removed separately.
-void GraphRevision::remove(const Hanging& hanging) {
+void GraphRevision::remove(const PlacedNode& placed) {
   if (!source_.placements.is_tree) out_.must_be_new = true;
   const Document& document = source_.document;
-  std::size_t highest = hanging.node;
-  for (std::size_t i = hanging.transform_count; i-- > 0;) {
-    highest = source_.placements.chains[hanging.first_transform + i];
+  std::size_t highest = placed.node;
+  for (std::size_t i = placed.transform_count; i-- > 0;) {
+    highest = source_.placements.chains[placed.first_transform + i];
     out_.is_removed[highest] = true;
   }
-  out_.is_removed[hanging.node] = true;
-  children_[parent_in_source(hanging.parent)].removed.insert(document.nodes[highest].id);
+  out_.is_removed[placed.node] = true;
+  children_[parent_in_source(placed.parent)].removed.insert(document.nodes[highest].id);
 }
 
 void GraphRevision::remove_missing_nodes() {
@@ -226,14 +225,14 @@ Motion GraphRevision::place(const SceneGroup& group, const Motion& parent) {
 
 /// Returns the transform right above a node, inserting one if there is none.
 NodeContent& GraphRevision::transform_of(const Known& known) {
-  const std::size_t last = last_transform(known.hanging);
+  const std::size_t last = last_transform(known.placed);
   if (last != kNone) return change(last);
-  const auto [place, is_new] = inserted_.try_emplace(known.hanging.node, out_.added.size());
+  const auto [place, is_new] = inserted_.try_emplace(known.placed.node, out_.added.size());
   if (!is_new) return out_.added[place->second];
   NodeContent inserted;
   inserted.kind = NodeKind::Transform;
   inserted.id = ids_.take();
-  inserted.children = {source_.document.nodes[known.hanging.node].id};
+  inserted.children = {source_.document.nodes[known.placed.node].id};
   inserted.frames.emplace_back();
   if (!source_.placements.is_tree) out_.must_be_new = true;
   children_[known.parent].replaced.emplace(inserted.children.front(), inserted.id);
@@ -246,10 +245,10 @@ void GraphRevision::show(const Known& known, bool visible, NodeContent& transfor
     return;
   }
   transform.attributes.erase("_hidden");
-  const Hanging& hanging = known.hanging;
-  if (source_.document.nodes[hanging.node].hidden) change(hanging.node).attributes.erase("_hidden");
-  for (std::size_t i = 0; i + 1 < hanging.transform_count; ++i) {
-    const std::size_t above = source_.placements.chains[hanging.first_transform + i];
+  const PlacedNode& placed = known.placed;
+  if (source_.document.nodes[placed.node].hidden) change(placed.node).attributes.erase("_hidden");
+  for (std::size_t i = 0; i + 1 < placed.transform_count; ++i) {
+    const std::size_t above = source_.placements.chains[placed.first_transform + i];
     const bool on_hidden_layer = was_hidden(source_.document.nodes[above].layer);
     if (!on_hidden_layer && !source_.document.nodes[above].hidden) continue;
     NodeContent& node = change(above);
@@ -276,9 +275,9 @@ bool GraphRevision::is_hidden(std::int32_t layer) const {
 /// A chain's transforms above its last one may be on layers that the scene does not track. If such a layer was shown or
 /// hidden, they are removed from it.
 void GraphRevision::keep_shown_by_chain(const Wanted& wanted, const Known& known) {
-  const Hanging& hanging = known.hanging;
-  for (std::size_t i = 0; i + 1 < hanging.transform_count; ++i) {
-    const std::size_t above = source_.placements.chains[hanging.first_transform + i];
+  const PlacedNode& placed = known.placed;
+  for (std::size_t i = 0; i + 1 < placed.transform_count; ++i) {
+    const std::size_t above = source_.placements.chains[placed.first_transform + i];
     const std::int32_t layer = source_.document.nodes[above].layer;
     if (was_hidden(layer) == is_hidden(layer)) continue;
     change(above).layer = kNoLayer;
@@ -288,12 +287,12 @@ void GraphRevision::keep_shown_by_chain(const Wanted& wanted, const Known& known
 
 /// `transform`: null if there is none; one is inserted if the node has to move.
 Status GraphRevision::move(const Wanted& wanted, const Known& known, NodeContent* transform, const NodeContent& read) {
-  const Hanging& hanging = known.hanging;
+  const PlacedNode& placed = known.placed;
   const bool is_elsewhere = !wanted.parent.is_same(known.parent);
-  const Motion above_now = wanted.parent.world * hanging.before;
-  const Motion above_before = hanging.parent_motion * hanging.before;
+  const Motion above_now = wanted.parent.world * placed.before;
+  const Motion above_before = placed.parent_motion * placed.before;
   const Motion local = inverse(above_now) * wanted.world;
-  Motion now = inverse(above_before) * hanging.world;
+  Motion now = inverse(above_before) * placed.world;
   if (is_elsewhere && read.frames.size() > 1) {
     // Moves all keys.
     const Motion from_before = inverse(above_now) * above_before;
@@ -316,17 +315,17 @@ Status GraphRevision::move(const Wanted& wanted, const Known& known, NodeContent
 }
 
 Status GraphRevision::revise_transform(const Wanted& wanted, const Known& known) {
-  const Hanging& hanging = known.hanging;
+  const PlacedNode& placed = known.placed;
   if (wanted.name != known.name) {
     transform_of(known).attributes.set_or_erase("_name", printable(wanted.name));
-    if (source_.document.nodes[hanging.node].kind == NodeKind::Group) {
-      if (!source_.document.nodes[hanging.node].name.empty()) change(hanging.node).attributes.erase("_name");
+    if (source_.document.nodes[placed.node].kind == NodeKind::Group) {
+      if (!source_.document.nodes[placed.node].name.empty()) change(placed.node).attributes.erase("_name");
     }
   }
   if (wanted.visible != known.visible) show(known, wanted.visible, transform_of(known));
   keep_shown_by_chain(wanted, known);
   if (wanted.layer != known.layer) transform_of(known).layer = layer_id(wanted.layer);
-  const std::size_t last = last_transform(hanging);
+  const std::size_t last = last_transform(placed);
   const NodeContent read_transform = last == kNone ? NodeContent{} : read(last);
   const bool is_changed = last != kNone && out_.changed.contains(last);
   const bool is_elsewhere = !wanted.parent.is_same(known.parent);
@@ -334,9 +333,9 @@ Status GraphRevision::revise_transform(const Wanted& wanted, const Known& known)
   if (Status moved = move(wanted, known, transform, read_transform); !moved) return moved;
   if (!is_elsewhere) return {};
   if (!source_.placements.is_tree) out_.must_be_new = true;
-  const bool has_chain = hanging.transform_count > 0;
+  const bool has_chain = placed.transform_count > 0;
   std::int32_t top =
-      source_.document.nodes[has_chain ? source_.placements.chains[hanging.first_transform] : hanging.node].id;
+      source_.document.nodes[has_chain ? source_.placements.chains[placed.first_transform] : placed.node].id;
   ChildChanges& before = children_[known.parent];
   before.removed.insert(top);
   // An inserted transform moves with its node.
@@ -365,10 +364,10 @@ Status GraphRevision::revise_group(GroupHandle handle) {
     out_.added.push_back(std::move(content));
     return {};
   }
-  const Hanging& hanging = source_.placements.groups[handle.index];
-  const Known known{hanging, before->name, before->visible, before->layer, parent_in_source(hanging.parent)};
-  wanted.world = has_same_place(group, *before) ? hanging.world : place(group, wanted.parent.world);
-  groups_[handle] = {hanging.node, kNone, wanted.world};
+  const PlacedNode& placed = source_.placements.groups[handle.index];
+  const Known known{placed, before->name, before->visible, before->layer, parent_in_source(placed.parent)};
+  wanted.world = has_same_place(group, *before) ? placed.world : place(group, wanted.parent.world);
+  groups_[handle] = {placed.node, kNone, wanted.world};
   return revise_transform(wanted, known);
 }
 
@@ -416,7 +415,7 @@ Status GraphRevision::add_instance(InstanceHandle handle, const Instance& instan
   return {};
 }
 
-Status GraphRevision::revise_instance(const Instance& instance, const Placement& placement, const Instance& before) {
+Status GraphRevision::revise_instance(const Instance& instance, const PlacedShape& placement, const Instance& before) {
   const GridPlan& plan = *models_.find(instance.grid);
   Wanted wanted{instance.name, instance.visible, instance.layer, parent_now(instance.group), placement.world};
   if (scene_.layers().find(wanted.layer) == nullptr) wanted.layer = {};
@@ -468,8 +467,8 @@ bool GraphRevision::would_be_the_scene(const SceneGroup& group) const {
 bool GraphRevision::needs_new_top() const {
   const auto changes = children_.find(top_);
   if (changes != children_.end()) return true;
-  const std::vector<Hanging>& groups = source_.placements.groups;
-  const auto root = std::ranges::find(groups, kNone, &Hanging::parent);
+  const std::vector<PlacedNode>& groups = source_.placements.groups;
+  const auto root = std::ranges::find(groups, kNone, &PlacedNode::parent);
   if (root == groups.end()) return false;
   const auto slot = static_cast<std::uint32_t>(root - groups.begin());
   const SceneGroup* group = scene_.groups().find({slot, 0});
@@ -758,7 +757,7 @@ void GraphRevision::show_pieces(std::size_t shape_node, const GridPlan& plan) {
   shape.children = std::move(children);
 }
 
-void GraphRevision::show_model(const Placement& placement, const GridPlan& plan) {
+void GraphRevision::show_model(const PlacedShape& placement, const GridPlan& plan) {
   if (plan.pieces.size() > 1) {
     show_pieces(placement.node, plan);
     return;

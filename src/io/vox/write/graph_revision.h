@@ -120,7 +120,7 @@ struct Wanted {
 
 /// The same properties as read from the source.
 struct Known {
-  const Hanging& hanging;
+  const PlacedNode& placed;
   const std::string& name;
   bool visible = true;
   LayerHandle layer;
@@ -160,11 +160,11 @@ class GraphRevision {
   void settle_root();
   void free_root_id();
   void remove_missing_nodes();
-  void remove(const Hanging& hanging);
+  void remove(const PlacedNode& placed);
   Status revise_groups();
   Status revise_group(GroupHandle handle);
   Status revise_instances();
-  Status revise_instance(const Instance& instance, const Placement& placement, const Instance& before);
+  Status revise_instance(const Instance& instance, const PlacedShape& placement, const Instance& before);
   Status add_instance(InstanceHandle handle, const Instance& instance);
   Status revise_transform(const Wanted& wanted, const Known& known);
   void show(const Known& known, bool visible, NodeContent& transform);
@@ -172,7 +172,7 @@ class GraphRevision {
   [[nodiscard]] bool was_hidden(std::int32_t layer) const;
   [[nodiscard]] bool is_hidden(std::int32_t layer) const;
   Status move(const Wanted& wanted, const Known& known, NodeContent* transform, const NodeContent& read);
-  void show_model(const Placement& placement, const GridPlan& plan);
+  void show_model(const PlacedShape& placement, const GridPlan& plan);
   void show_pieces(std::size_t shape, const GridPlan& plan);
   std::int32_t add_shape(const NodeContent& before, const std::vector<std::uint32_t>& shown, const Motion& motion);
   void name_shapes();
@@ -180,7 +180,7 @@ class GraphRevision {
 
   NodeContent& change(std::size_t node);
   [[nodiscard]] NodeContent read(std::size_t node) const;
-  [[nodiscard]] std::size_t last_transform(const Hanging& hanging) const;
+  [[nodiscard]] std::size_t last_transform(const PlacedNode& placed) const;
   NodeContent& transform_of(const Known& known);
   [[nodiscard]] Parent parent_in_source(std::size_t group) const;
   [[nodiscard]] Parent parent_now(GroupHandle group) const;

@@ -346,7 +346,7 @@ std::vector<bool> models_of_one_key(const VoxSource& source) {
   const Document& document = source.document;
   std::vector<bool> free(document.models.size(), document.models.size() == 1 || !document.nodes.empty());
   std::vector<bool> has_one_key(document.nodes.size());
-  for (const Placement& placement : source.placements.all) {
+  for (const PlacedShape& placement : source.placements.all) {
     if (placement.node == kNone || placement.transform_count == 0) continue;
     const std::size_t last = placement.first_transform + placement.transform_count - 1;
     has_one_key[placement.node] = document.nodes[source.placements.chains[last]].key_count == 1;
