@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 #include <string>
+#include <type_traits>
+#include <utility>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -14,65 +16,41 @@
 namespace quoin {
 namespace {
 
-Status refuse(const std::string& message) {
-  return make_error(ErrorCode::InvalidArgument, message);
+bool is_valid(double number, const SettingRange& range) {
+  return number >= range.least && number <= range.most;
+}
+bool is_valid(Vec3 colour, const SettingRange& range) {
+  return is_valid(colour.x, range) && is_valid(colour.y, range) && is_valid(colour.z, range);
+}
+bool is_valid(DVec3 direction, const SettingRange& /*range*/) {
+  return is_finite(direction) && direction != DVec3(0.0);
 }
 
-bool is_brightness(double value) {
-  return value >= 0.0 && value <= kMaxBrightness;
-}
+template <class T>
+std::string find_fault(const std::optional<T>& value, const SettingRange& range);
 
-bool is_colour(Vec3 colour, double most) {
-  return is_finite(DVec3(colour)) && std::min({colour.x, colour.y, colour.z}) >= 0.0F &&
-         std::max({colour.x, colour.y, colour.z}) <= static_cast<float>(most);
-}
-
-bool is_anisotropy(double value) {
-  return value >= -kMaxAnisotropy && value <= kMaxAnisotropy;
-}
-
-Status check(const Sun& sun) {
-  if (!is_finite(sun.direction) || sun.direction == DVec3(0.0)) {
-    return refuse("sun.direction: must be finite and not 0,0,0");
+// Returns the message about a setting without its name (": must be 0 to 1"), or about the first invalid setting of a
+// part, with its name in the part; "" if all are valid.
+template <class T>
+std::string find_fault(const T& value, const SettingRange& range) {
+  if constexpr (EnvironmentPart<T>) {
+    std::string fault;
+    visit_settings(std::type_identity<T>{}, [&](const char* key, auto member, const SettingRange& valid = {}) {
+      if (!fault.empty()) return;
+      fault = find_fault(value.*member, valid);
+      if (!fault.empty()) fault = key + std::string(fault.front() == ':' ? "" : ".") + fault;
+    });
+    return fault;
+  } else if constexpr (requires { is_valid(value, range); }) {
+    if (is_valid(value, range)) return "";
+    return ": must be " + std::string(range.text) + (std::is_same_v<T, Vec3> ? " each" : "");
+  } else {
+    return "";  // flags, names and files
   }
-  if (!(sun.angle_radians >= 0.0 && sun.angle_radians <= kMaxSunAngleRadians)) {
-    return refuse("sun.angle_radians: must be 0 to 3");
-  }
-  if (!is_brightness(sun.brightness)) return refuse("sun.brightness: must be 0 to 1e9");
-  return is_colour(sun.colour, kMaxBrightness) ? Status() : refuse("sun.colour: must be 0 to 1e9 each");
 }
-
-Status check(const AirOptions& air) {
-  for (const double part : {air.rayleigh, air.mie, air.ozone}) {
-    if (!(part >= 0.0 && part <= kMaxAir)) return refuse("sky.air: each factor must be 0 to 100");
-  }
-  for (const Vec3& colour : {air.rayleigh_colour, air.mie_colour, air.ozone_colour}) {
-    if (!is_colour(colour, kMaxAir)) return refuse("sky.air: each colour component must be 0 to 100");
-  }
-  return is_anisotropy(air.mie_anisotropy) ? Status() : refuse("sky.air: its mie_anisotropy must be -0.99 to 0.99");
-}
-
-Status check(const Sky& sky) {
-  if (!is_brightness(sky.brightness)) return refuse("sky.brightness: must be 0 to 1e9");
-  if (!is_colour(sky.colour, kMaxBrightness)) return refuse("sky.colour: must be 0 to 1e9 each");
-  if (sky.background && !is_colour(*sky.background, kMaxBrightness)) {
-    return refuse("sky.background: must be 0 to 1e9 each");
-  }
-  if (!std::isfinite(sky.image_turn_radians)) return refuse("sky.image_turn_radians: must be finite");
-  return check(sky.air);
-}
-
-Status check(const GroundPlane& ground) {
-  if (!std::isfinite(ground.height)) return refuse("ground: its height must be finite");
-  if (!is_colour(ground.colour, 1.0)) return refuse("ground: each colour component must be 0 to 1");
-  return ground.fade >= 0.0 && ground.fade <= 1.0 ? Status() : refuse("ground: its fade must be 0 to 1");
-}
-
-Status check(const Fog& fog) {
-  if (!(fog.density >= 0.0 && fog.density <= kMaxFogDensity)) return refuse("fog: its density must be 0 to 1e6");
-  if (!is_colour(fog.colour, 1.0)) return refuse("fog: each colour component must be 0 to 1");
-  if (!is_anisotropy(fog.anisotropy)) return refuse("fog: its anisotropy must be -0.99 to 0.99");
-  return std::isfinite(fog.top) ? Status() : refuse("fog: its top must be finite");
+template <class T>
+std::string find_fault(const std::optional<T>& value, const SettingRange& range) {
+  return value ? find_fault(*value, range) : "";
 }
 
 // The exposure of a gradient sky, as a multiple of the day's.
@@ -144,28 +122,17 @@ void fit_environment(const DBox& bounds, Environment& environment) {
 }
 
 Status check(const Environment& environment) {
-  if (Status sun = check(environment.sun); !sun) return sun;
-  if (Status sky = check(environment.sky); !sky) return sky;
-  if (Status ground = environment.ground ? check(*environment.ground) : Status(); !ground) return ground;
-  if (Status fog = environment.fog ? check(*environment.fog) : Status(); !fog) return fog;
-  if (!is_brightness(environment.lamp_brightness)) return refuse("lamp_brightness: must be 0 to 1e9");
-  return check(develop_options(environment));
+  std::string fault = find_fault(environment, {});
+  return fault.empty() ? Status() : make_error(ErrorCode::InvalidArgument, std::move(fault));
 }
 
 Status check(const DevelopOptions& options) {
-  if (!std::isfinite(options.exposure) || options.exposure < 0.0) {
-    return refuse("exposure: must be finite and at least 0");
-  }
-  if (!(options.vignette >= 0.0 && options.vignette <= 1.0)) return refuse("vignette: must be 0 to 1");
-  if (!(options.gamma > 0.0) || !std::isfinite(options.gamma)) return refuse("gamma: must be finite and more than 0");
-  const Bloom& bloom = options.bloom;
-  if (!(bloom.mix >= 0.0 && bloom.mix <= 1.0)) return refuse("bloom: its mix must be 0 to 1");
-  if (!(bloom.radius >= 0.0 && bloom.radius <= 1.0)) return refuse("bloom: its radius must be 0 to 1");
-  if (!(bloom.aspect >= -1.0 && bloom.aspect <= 1.0)) return refuse("bloom: its aspect must be -1 to 1");
-  if (!(bloom.threshold >= 0.0) || !std::isfinite(bloom.threshold)) {
-    return refuse("bloom: its threshold must be finite and at least 0");
-  }
-  return {};
+  Environment environment;
+  environment.exposure = options.exposure;
+  environment.vignette = options.vignette;
+  environment.gamma = options.gamma;
+  environment.bloom = options.bloom;
+  return check(environment);
 }
 
 Result<DVec3> sun_direction(const SunTime& time) {

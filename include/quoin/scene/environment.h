@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
+#include <type_traits>
 
 #include <quoin/core/image.h>
 #include <quoin/core/result.h>
@@ -144,6 +146,99 @@ struct Environment {
   [[nodiscard]] static Environment natural(DVec3 sun = Sun{}.direction);
 };
 
+/// The numbers that a setting can have; of colours, each component.
+struct SettingRange {
+  double least = -std::numeric_limits<double>::max();
+  double most = std::numeric_limits<double>::max();
+  const char* text = "finite";  ///< for messages: "0 to 1"
+};
+
+/// The ranges of settings. A direction is finite and not 0.
+namespace setting {
+inline constexpr SettingRange kFinite{};
+inline constexpr SettingRange kNotNegative{.least = 0.0, .text = "finite and at least 0"};
+inline constexpr SettingRange kPositive{std::numeric_limits<double>::denorm_min(), kFinite.most,
+                                        "finite and more than 0"};
+inline constexpr SettingRange kDirection{.text = "finite and not 0,0,0"};
+inline constexpr SettingRange kShare{0.0, 1.0, "0 to 1"};
+inline constexpr SettingRange kSignedShare{-1.0, 1.0, "-1 to 1"};
+inline constexpr SettingRange kBrightness{0.0, kMaxBrightness, "0 to 1e9"};
+inline constexpr SettingRange kAir{0.0, kMaxAir, "0 to 100"};
+inline constexpr SettingRange kAnisotropy{-kMaxAnisotropy, kMaxAnisotropy, "-0.99 to 0.99"};
+inline constexpr SettingRange kFogDensity{0.0, kMaxFogDensity, "0 to 1e6"};
+inline constexpr SettingRange kSunAngle{0.0, kMaxSunAngleRadians, "0 to 3"};
+}  // namespace setting
+
+/// Calls `visit` for each setting of an Environment, or of a part of it, in the order of scene files: with its key
+/// there, a pointer to its member, and the range of its numbers; parts, flags, names and files have no range. `check`,
+/// scene files and worlds find the settings here, so that a new setting needs one line.
+template <class Visit>
+void visit_settings(std::type_identity<Sun>, Visit visit) {
+  visit("direction", &Sun::direction, setting::kDirection);
+  visit("brightness", &Sun::brightness, setting::kBrightness);
+  visit("colour", &Sun::colour, setting::kBrightness);
+  visit("angle_radians", &Sun::angle_radians, setting::kSunAngle);
+  visit("visible", &Sun::is_visible);
+}
+template <class Visit>
+void visit_settings(std::type_identity<AirOptions>, Visit visit) {
+  visit("rayleigh", &AirOptions::rayleigh, setting::kAir);
+  visit("mie", &AirOptions::mie, setting::kAir);
+  visit("ozone", &AirOptions::ozone, setting::kAir);
+  visit("mie_anisotropy", &AirOptions::mie_anisotropy, setting::kAnisotropy);
+  visit("rayleigh_colour", &AirOptions::rayleigh_colour, setting::kAir);
+  visit("mie_colour", &AirOptions::mie_colour, setting::kAir);
+  visit("ozone_colour", &AirOptions::ozone_colour, setting::kAir);
+}
+template <class Visit>
+void visit_settings(std::type_identity<Sky>, Visit visit) {
+  visit("model", &Sky::model);
+  visit("brightness", &Sky::brightness, setting::kBrightness);
+  visit("colour", &Sky::colour, setting::kBrightness);
+  visit("air", &Sky::air);
+  visit("image_turn_radians", &Sky::image_turn_radians, setting::kFinite);
+  visit("background", &Sky::background, setting::kBrightness);
+  visit("image", &Sky::image_file);
+}
+template <class Visit>
+void visit_settings(std::type_identity<GroundPlane>, Visit visit) {
+  visit("height", &GroundPlane::height, setting::kFinite);
+  visit("colour", &GroundPlane::colour, setting::kShare);
+  visit("only_shadows", &GroundPlane::only_shadows);
+  visit("fade", &GroundPlane::fade, setting::kShare);
+}
+template <class Visit>
+void visit_settings(std::type_identity<Fog>, Visit visit) {
+  visit("density", &Fog::density, setting::kFogDensity);
+  visit("top", &Fog::top, setting::kFinite);
+  visit("colour", &Fog::colour, setting::kShare);
+  visit("anisotropy", &Fog::anisotropy, setting::kAnisotropy);
+}
+template <class Visit>
+void visit_settings(std::type_identity<Bloom>, Visit visit) {
+  visit("mix", &Bloom::mix, setting::kShare);
+  visit("radius", &Bloom::radius, setting::kShare);
+  visit("aspect", &Bloom::aspect, setting::kSignedShare);
+  visit("threshold", &Bloom::threshold, setting::kNotNegative);
+}
+template <class Visit>
+void visit_settings(std::type_identity<Environment>, Visit visit) {
+  visit("sun", &Environment::sun);
+  visit("sky", &Environment::sky);
+  visit("ground", &Environment::ground);
+  visit("fog", &Environment::fog);
+  visit("lamp_brightness", &Environment::lamp_brightness, setting::kBrightness);
+  visit("exposure", &Environment::exposure, setting::kNotNegative);
+  visit("tone", &Environment::tone);
+  visit("vignette", &Environment::vignette, setting::kShare);
+  visit("gamma", &Environment::gamma, setting::kPositive);
+  visit("bloom", &Environment::bloom);
+}
+
+/// An Environment, or a part of it with settings of its own.
+template <class T>
+concept EnvironmentPart = requires { visit_settings(std::type_identity<T>{}, 0); };
+
 /// Returns true if all settings except the sun's direction are those of Environment::natural().
 [[nodiscard]] bool is_only_sun(const Environment& environment);
 
@@ -160,10 +255,8 @@ struct Environment {
 /// bounds in world space; for empty bounds both heights become 0.
 void fit_environment(const DBox& bounds, Environment& environment);
 
-/// Checks that all settings are valid.
-/// Errors: InvalidArgument, with the setting's name, if a number is not finite or out of range: a sun of length 0, a
-///         sun's angle outside 0 to 3, a brightness or exposure outside 0 to 1e9, and so on. SkyModel::Image is valid
-///         without an image.
+/// Checks that all settings are in their ranges. SkyModel::Image is valid without an image.
+/// Errors: InvalidArgument, with the setting's name: "sky.air.mie: must be 0 to 100".
 [[nodiscard]] Status check(const Environment& environment);
 [[nodiscard]] Status check(const DevelopOptions& options);
 

@@ -33,7 +33,7 @@ std::string excerpt(std::string_view text) {
   return out;
 }
 
-Object::Object(const Json& json, const Place& place, std::initializer_list<std::string_view> keys, Faults& faults)
+Object::Object(const Json& json, const Place& place, std::span<const std::string_view> keys, Faults& faults)
     : json_(json), place_(place), faults_(faults) {
   if (!json.is_object()) {
     faults.add(place, "must be an object");

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <initializer_list>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -41,7 +42,10 @@ class Faults {
 /// An object of the file that is read key by key. Missing keys leave the output of `read` unchanged.
 class Object {
  public:
-  Object(const Json& json, const Place& place, std::initializer_list<std::string_view> keys, Faults& faults);
+  /// `keys`: all keys that the object can have.
+  Object(const Json& json, const Place& place, std::span<const std::string_view> keys, Faults& faults);
+  Object(const Json& json, const Place& place, std::initializer_list<std::string_view> keys, Faults& faults)
+      : Object(json, place, std::span(keys.begin(), keys.size()), faults) {}
 
   [[nodiscard]] const Json* find(std::string_view key) const;
   [[nodiscard]] const Json* need(std::string_view key) const;

@@ -6,7 +6,11 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <optional>
 #include <random>
+#include <sstream>
+#include <string>
+#include <type_traits>
 
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
@@ -463,6 +467,55 @@ TEST(SceneFile, RestoresEnvironmentsExactly) {
   }
   scene.environment = Environment::reference();
   EXPECT_EQ(parse(text_of(scene)).value().environment, Environment::reference());
+}
+
+using TestSetting = std::function<void(const std::string& key)>;
+
+template <class T>
+void change_setting(std::optional<T>& value, const TestSetting& test, const std::string& key);
+
+// Changes a setting and calls `test` with its key; of a part, each of its settings in turn.
+template <class T>
+void change_setting(T& value, const TestSetting& test, const std::string& key) {
+  if constexpr (EnvironmentPart<T>) {
+    visit_settings(std::type_identity<T>{}, [&](const char* inner, auto member, const SettingRange& /*range*/ = {}) {
+      const auto before = value.*member;
+      change_setting(value.*member, test, inner);
+      value.*member = before;
+    });
+    return;
+  } else if constexpr (std::is_same_v<T, Vec3> || std::is_same_v<T, DVec3>) {
+    value = T(0.0, 0.6, 0.8);
+  } else if constexpr (std::is_same_v<T, std::string>) {
+    value = "park.exr";
+  } else if constexpr (std::is_floating_point_v<T>) {
+    value = 0.37;
+  } else {
+    value = static_cast<T>(!static_cast<bool>(value));  // the other flag, or an enumerator
+  }
+  test(key);
+}
+template <class T>
+void change_setting(std::optional<T>& value, const TestSetting& test, const std::string& key) {
+  change_setting(value.emplace(), test, key);
+}
+
+TEST(SceneFile, StoresAndDocumentsEverySetting) {
+  std::ostringstream documented;
+  documented << std::ifstream(QUOIN_SOURCE_DIR "/docs/scene-files.md").rdbuf();
+  SceneFile scene;
+  scene.environment = Environment::natural();
+  int settings = 0;
+  const auto test = [&](const std::string& key) {
+    ++settings;
+    const auto read = parse(text_of(scene));
+    ASSERT_TRUE(read) << key << ": " << to_string(read.error());
+    EXPECT_EQ(read->environment, scene.environment) << key;
+    EXPECT_NE(scene.environment, Environment::natural()) << key;
+    EXPECT_NE(documented.str().find("`" + key + "`"), std::string::npos) << key << ": describe it in the table of keys";
+  };
+  change_setting(*scene.environment, test, "");
+  EXPECT_GE(settings, 30);
 }
 
 TEST(SceneFile, NeedsVersion6ForMoreThanASun) {

@@ -4,9 +4,11 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <span>
+#include <type_traits>
 #include <utility>
 
 #include <glm/geometric.hpp>
@@ -177,145 +179,139 @@ OrderedJson triple(Vec3 v) {
   return {v.x, v.y, v.z};
 }
 
-void put_changed(OrderedJson& json, const char* key, double value, double usual) {
-  if (!scene_json::is_same(value, usual)) json[key] = value;
+// ---- writing settings
+
+OrderedJson json_of_value(double value) {
+  return value;
 }
-void put_changed(OrderedJson& json, const char* key, Vec3 value, Vec3 usual) {
-  if (!is_same(DVec3(value), DVec3(usual))) json[key] = triple(value);
+OrderedJson json_of_value(bool value) {
+  return value;
 }
-void put_changed(OrderedJson& json, const char* key, DVec3 value, DVec3 usual) {
-  if (!is_same(value, usual)) json[key] = triple(value);
+OrderedJson json_of_value(Vec3 value) {
+  return triple(value);
 }
-void put_changed(OrderedJson& json, const char* key, bool value, bool usual) {
-  if (value != usual) json[key] = value;
+OrderedJson json_of_value(DVec3 value) {
+  return triple(value);
+}
+OrderedJson json_of_value(SkyModel value) {
+  return name_of(kSkies, value);
+}
+OrderedJson json_of_value(ToneCurve value) {
+  return name_of(kTones, value);
 }
 
-void read_colour(const Object& object, std::string_view key, Vec3& out) {
+template <class T>
+bool is_usual(const T& value, const T& usual) {
+  return value == usual;
+}
+// NaN is never usual: a part without a number is written, and reading it back fails.
+bool is_usual(double value, double usual) {
+  return !std::isnan(value) && scene_json::is_same(value, usual);
+}
+bool is_usual(Vec3 value, Vec3 usual) {
+  return is_same(DVec3(value), DVec3(usual));
+}
+bool is_usual(DVec3 value, DVec3 usual) {
+  return is_same(value, usual);
+}
+
+// Returns the usual settings of an optional part. A setting with NaN is always written.
+template <class Part>
+Part usual_part() {
+  return {};
+}
+template <>
+GroundPlane usual_part() {
+  return {.height = std::numeric_limits<double>::quiet_NaN()};
+}
+template <>
+Fog usual_part() {
+  Fog fog;
+  fog.density = fog.top = std::numeric_limits<double>::quiet_NaN();
+  return fog;
+}
+
+// Writes the settings of an environment that differ from the usual ones.
+class SettingsWriter {
+ public:
+  using WriteText = std::function<OrderedJson(const std::string&)>;
+  explicit SettingsWriter(WriteText write_text) : write_text_(std::move(write_text)) {}
+
+  template <EnvironmentPart Part>
+  [[nodiscard]] OrderedJson json_of(const Part& part, const Part& usual) const {
+    OrderedJson json = OrderedJson::object();
+    visit_settings(std::type_identity<Part>{}, [&](const char* key, auto member, const SettingRange& /*range*/ = {}) {
+      put(json, key, part.*member, usual.*member);
+    });
+    return json;
+  }
+
+ private:
+  template <class T>
+  void put(OrderedJson& json, const char* key, const T& value, const T& usual) const {
+    if constexpr (EnvironmentPart<T>) {
+      if (OrderedJson part = json_of(value, usual); !part.empty()) json[key] = std::move(part);
+    } else {
+      if (!is_usual(value, usual)) json[key] = json_of_value(value);
+    }
+  }
+  void put(OrderedJson& json, const char* key, const std::string& value, const std::string& usual) const {
+    if (value != usual) json[key] = write_text_(value);
+  }
+  template <class T>
+  void put(OrderedJson& json, const char* key, const std::optional<T>& value, const std::optional<T>& /*usual*/) const {
+    if (!value) return;
+    if constexpr (EnvironmentPart<T>) {
+      json[key] = json_of(*value, usual_part<T>());
+    } else {
+      json[key] = json_of_value(*value);
+    }
+  }
+
+  WriteText write_text_;
+};
+
+// ---- reading settings
+
+template <EnvironmentPart Part>
+void read_settings(const Json& json, const Place& place, Faults& faults, Part& part);
+
+template <class T>
+void read_setting(const Object& object, const char* key, T& out) {
+  if constexpr (EnvironmentPart<T>) {
+    if (const Json* part = object.find(key)) read_settings(*part, object.place_of(key), object.faults(), out);
+  } else {
+    object.read(key, out);
+  }
+}
+void read_setting(const Object& object, const char* key, Vec3& out) {
   DVec3 colour(out);
   object.read(key, colour);
   out = Vec3(colour);
 }
-
-OrderedJson json_of_sun(const Sun& sun, const Sun& usual) {
-  OrderedJson json = OrderedJson::object();
-  put_changed(json, "direction", sun.direction, usual.direction);
-  put_changed(json, "brightness", sun.brightness, usual.brightness);
-  put_changed(json, "colour", sun.colour, usual.colour);
-  put_changed(json, "angle_radians", sun.angle_radians, usual.angle_radians);
-  put_changed(json, "visible", sun.is_visible, usual.is_visible);
-  return json;
+void read_setting(const Object& object, const char* key, SkyModel& out) {
+  read_name(object, key, kSkies, out);
+}
+void read_setting(const Object& object, const char* key, ToneCurve& out) {
+  read_name(object, key, kTones, out);
+}
+void read_setting(const Object& object, const char* key, std::string& out) {
+  object.read_text(key, out);
+}
+template <class T>
+void read_setting(const Object& object, const char* key, std::optional<T>& out) {
+  if (object.find(key) != nullptr) read_setting(object, key, out.emplace());
 }
 
-void read_sun(const Json& json, const Place& place, Faults& faults, Sun& sun) {
-  const Object object(json, place, {"direction", "brightness", "colour", "angle_radians", "visible"}, faults);
-  object.read("direction", sun.direction);
-  object.read("brightness", sun.brightness);
-  read_colour(object, "colour", sun.colour);
-  object.read("angle_radians", sun.angle_radians);
-  object.read("visible", sun.is_visible);
-}
-
-OrderedJson json_of_air(const AirOptions& air) {
-  const AirOptions usual;
-  OrderedJson json = OrderedJson::object();
-  put_changed(json, "rayleigh", air.rayleigh, usual.rayleigh);
-  put_changed(json, "mie", air.mie, usual.mie);
-  put_changed(json, "ozone", air.ozone, usual.ozone);
-  put_changed(json, "mie_anisotropy", air.mie_anisotropy, usual.mie_anisotropy);
-  put_changed(json, "rayleigh_colour", air.rayleigh_colour, usual.rayleigh_colour);
-  put_changed(json, "mie_colour", air.mie_colour, usual.mie_colour);
-  put_changed(json, "ozone_colour", air.ozone_colour, usual.ozone_colour);
-  return json;
-}
-
-void read_air(const Json& json, const Place& place, Faults& faults, AirOptions& air) {
-  const Object object(json, place,
-                      {"rayleigh", "mie", "ozone", "mie_anisotropy", "rayleigh_colour", "mie_colour", "ozone_colour"},
-                      faults);
-  object.read("rayleigh", air.rayleigh);
-  object.read("mie", air.mie);
-  object.read("ozone", air.ozone);
-  object.read("mie_anisotropy", air.mie_anisotropy);
-  read_colour(object, "rayleigh_colour", air.rayleigh_colour);
-  read_colour(object, "mie_colour", air.mie_colour);
-  read_colour(object, "ozone_colour", air.ozone_colour);
-}
-
-// Writes a sky without the name of its image.
-OrderedJson json_of_sky(const Sky& sky, const Sky& usual) {
-  OrderedJson json = OrderedJson::object();
-  if (sky.model != usual.model) json["model"] = name_of(kSkies, sky.model);
-  put_changed(json, "brightness", sky.brightness, usual.brightness);
-  put_changed(json, "colour", sky.colour, usual.colour);
-  if (OrderedJson air = json_of_air(sky.air); !air.empty()) json["air"] = air;
-  put_changed(json, "image_turn_radians", sky.image_turn_radians, usual.image_turn_radians);
-  if (sky.background) json["background"] = triple(*sky.background);
-  return json;
-}
-
-void read_sky(const Json& json, const Place& place, Faults& faults, Sky& sky) {
-  const Object object(json, place,
-                      {"model", "brightness", "colour", "air", "image", "image_turn_radians", "background"}, faults);
-  read_name(object, "model", kSkies, sky.model);
-  object.read("brightness", sky.brightness);
-  read_colour(object, "colour", sky.colour);
-  if (const Json* air = object.find("air")) read_air(*air, object.place_of("air"), faults, sky.air);
-  object.read_text("image", sky.image_file);
-  object.read("image_turn_radians", sky.image_turn_radians);
-  if (object.find("background") != nullptr) read_colour(object, "background", sky.background.emplace());
-}
-
-OrderedJson json_of_ground(const GroundPlane& ground) {
-  const GroundPlane usual;
-  OrderedJson json = OrderedJson::object();
-  json["height"] = ground.height;
-  put_changed(json, "colour", ground.colour, usual.colour);
-  put_changed(json, "only_shadows", ground.only_shadows, usual.only_shadows);
-  put_changed(json, "fade", ground.fade, usual.fade);
-  return json;
-}
-
-void read_ground(const Json& json, const Place& place, Faults& faults, GroundPlane& ground) {
-  const Object object(json, place, {"height", "colour", "only_shadows", "fade"}, faults);
-  object.read("height", ground.height);
-  read_colour(object, "colour", ground.colour);
-  object.read("only_shadows", ground.only_shadows);
-  object.read("fade", ground.fade);
-}
-
-OrderedJson json_of_fog(const Fog& fog) {
-  const Fog usual;
-  OrderedJson json = OrderedJson::object();
-  json["density"] = fog.density;
-  json["top"] = fog.top;
-  put_changed(json, "colour", fog.colour, usual.colour);
-  put_changed(json, "anisotropy", fog.anisotropy, usual.anisotropy);
-  return json;
-}
-
-void read_fog(const Json& json, const Place& place, Faults& faults, Fog& fog) {
-  const Object object(json, place, {"density", "top", "colour", "anisotropy"}, faults);
-  object.read("density", fog.density);
-  object.read("top", fog.top);
-  read_colour(object, "colour", fog.colour);
-  object.read("anisotropy", fog.anisotropy);
-}
-
-OrderedJson json_of_bloom(const Bloom& bloom, const Bloom& usual) {
-  OrderedJson json = OrderedJson::object();
-  put_changed(json, "mix", bloom.mix, usual.mix);
-  put_changed(json, "radius", bloom.radius, usual.radius);
-  put_changed(json, "aspect", bloom.aspect, usual.aspect);
-  put_changed(json, "threshold", bloom.threshold, usual.threshold);
-  return json;
-}
-
-void read_bloom(const Json& json, const Place& place, Faults& faults, Bloom& bloom) {
-  const Object object(json, place, {"mix", "radius", "aspect", "threshold"}, faults);
-  object.read("mix", bloom.mix);
-  object.read("radius", bloom.radius);
-  object.read("aspect", bloom.aspect);
-  object.read("threshold", bloom.threshold);
+template <EnvironmentPart Part>
+void read_settings(const Json& json, const Place& place, Faults& faults, Part& part) {
+  std::vector<std::string_view> keys;
+  visit_settings(std::type_identity<Part>{},
+                 [&](const char* key, auto /*member*/, const SettingRange& /*range*/ = {}) { keys.emplace_back(key); });
+  const Object object(json, place, keys, faults);
+  visit_settings(std::type_identity<Part>{}, [&](const char* key, auto member, const SettingRange& /*range*/ = {}) {
+    read_setting(object, key, part.*member);
+  });
 }
 
 }  // namespace
@@ -434,21 +430,8 @@ OrderedJson PartWriter::json_of(const Camera& camera) {
 }
 
 OrderedJson PartWriter::json_of(const Environment& environment) {
-  const Environment usual = Environment::natural();
-  OrderedJson json = OrderedJson::object();
-  if (OrderedJson sun = json_of_sun(environment.sun, usual.sun); !sun.empty()) json["sun"] = sun;
-  OrderedJson sky = json_of_sky(environment.sky, usual.sky);
-  if (!environment.sky.image_file.empty()) sky["image"] = text(environment.sky.image_file);
-  if (!sky.empty()) json["sky"] = sky;
-  if (environment.ground) json["ground"] = json_of_ground(*environment.ground);
-  if (environment.fog) json["fog"] = json_of_fog(*environment.fog);
-  put_changed(json, "lamp_brightness", environment.lamp_brightness, usual.lamp_brightness);
-  if (environment.exposure) json["exposure"] = *environment.exposure;
-  if (environment.tone) json["tone"] = name_of(kTones, *environment.tone);
-  put_changed(json, "vignette", environment.vignette, usual.vignette);
-  put_changed(json, "gamma", environment.gamma, usual.gamma);
-  if (OrderedJson bloom = json_of_bloom(environment.bloom, usual.bloom); !bloom.empty()) json["bloom"] = bloom;
-  return json;
+  const SettingsWriter writer([this](const std::string& bytes) { return text(bytes); });
+  return writer.json_of(environment, Environment::natural());
 }
 
 VoxelProperties properties_of(const Json& json, const Place& place, Faults& faults) {
@@ -580,24 +563,8 @@ Camera camera_of(const Json& json, const Place& place, Faults& faults) {
 }
 
 Environment environment_from(const Json& json, const Place& place, Faults& faults) {
-  const Object object(
-      json, place, {"sun", "sky", "ground", "fog", "lamp_brightness", "exposure", "tone", "vignette", "gamma", "bloom"},
-      faults);
   Environment environment = Environment::natural();
-  const auto read_part = [&](const char* key, auto read) {
-    if (const Json* part = object.find(key)) read(*part, object.place_of(key));
-  };
-  read_part("sun", [&](const Json& part, const Place& at) { read_sun(part, at, faults, environment.sun); });
-  read_part("sky", [&](const Json& part, const Place& at) { read_sky(part, at, faults, environment.sky); });
-  read_part("ground",
-            [&](const Json& part, const Place& at) { read_ground(part, at, faults, environment.ground.emplace()); });
-  read_part("fog", [&](const Json& part, const Place& at) { read_fog(part, at, faults, environment.fog.emplace()); });
-  object.read("lamp_brightness", environment.lamp_brightness);
-  if (object.find("exposure") != nullptr) object.read("exposure", environment.exposure.emplace());
-  if (object.find("tone") != nullptr) read_name(object, "tone", kTones, environment.tone.emplace());
-  object.read("vignette", environment.vignette);
-  object.read("gamma", environment.gamma);
-  read_part("bloom", [&](const Json& part, const Place& at) { read_bloom(part, at, faults, environment.bloom); });
+  read_settings(json, place, faults, environment);
   if (const Status valid = check(environment); !valid && !faults.error()) faults.add(place, valid.error().message);
   return environment;
 }
