@@ -1,10 +1,108 @@
 #include "render/image_output.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <optional>
 
+#include <quoin/io/file.h>
 #include <quoin/io/image_files.h>
 
+#include "command_files.h"
+#include "commands.h"
+#include "help.h"
+#include "render/path_images.h"
+#include "render/render_arguments.h"
+#include "render/video.h"
+#include "run_control.h"
+
 namespace quoin::tool {
+
+namespace {
+
+constexpr int kMaxSamples = 4'096;
+constexpr std::int64_t kMaxPixels = std::int64_t{1} << 28;
+constexpr int kLongestSide = 1'000'000;  // the limit of PNG readers and writers
+
+std::optional<ImageSize> read_size(const std::string& text) {
+  const auto size = parse_size(text);
+  const bool fits = size && std::max(size->width, size->height) <= kLongestSide &&
+                    std::int64_t{size->width} * size->height <= kMaxPixels;
+  return fits ? size : std::nullopt;
+}
+
+/// Returns the end of the message about -o, or "".
+std::string output_reason(const RenderArguments& arguments) {
+  const std::filesystem::path& output = arguments.output;
+  if (is_video(output)) {
+    if (!arguments.is_image_series())
+      return ": the video " + output.string() + " needs --turntable, --frames or --path";
+    if (arguments.path.is_transparent) return ": videos have no alpha channel";
+  } else if (const Status name = check_image_name(output); !name) {
+    return ": " + name.error().message;
+  }
+  if (has_ending(output, ".exr") && arguments.light != LightChoice::Path) return ": .exr needs --light path";
+  if (has_ending(output, ".jpg") && arguments.path.is_transparent) return ": .jpg has no alpha channel";
+  return is_same_file(output, arguments.common.input) ? ": " + output.string() + " is the input" : "";
+}
+
+/// Returns the end of the message about --depth, or "".
+std::string depth_reason(const RenderArguments& arguments) {
+  const std::string depth = arguments.depth.string();
+  if (!has_ending(arguments.depth, ".pfm")) return ": the name must end in .pfm, not \"" + depth + "\"";
+  if (is_same_file(arguments.depth, arguments.common.input)) return ": " + depth + " is the input";
+  return is_same_file(arguments.depth, arguments.output) ? ": " + depth + " is the same file as -o" : "";
+}
+
+}  // namespace
+
+void add_output_options(CLI::App& command, RenderArguments& arguments) {
+  set_heading(command, heading::kOutput);
+  command
+      .add_option("-o,--output", arguments.output,
+                  "Image to write: .png, .jpg or .webp; .exr with --light path (linear light, with layers for "
+                  "compositing). With an image series also a video, .mp4 or .webm, encoded by ffmpeg")
+      ->required()
+      ->type_name("FILE")
+      ->check(file_name());
+  add_parsed<ImageSize>(
+      command, "--size", "WxH", {read_size, "WIDTHxHEIGHT of at most 2^28 pixels and 1000000 per side, as in 1280x720"},
+      [&render = arguments.render](const ImageSize& size) {
+        render.width = size.width;
+        render.height = size.height;
+      },
+      "Image size in pixels (default 1280x720)");
+  command.add_option("--samples", arguments.samples, "Samples per pixel, 1 to 4096 (default 4; 64 with --light path)")
+      ->check(CLI::Range(1, kMaxSamples));
+  command.add_option("--depth", arguments.depth, "Also write the distances from the camera: .pfm")
+      ->type_name("FILE")
+      ->check(file_name());
+  command.add_flag("--watch", arguments.watch, "Render again after each change of the input, until Ctrl-C");
+}
+
+std::vector<OptionRule> output_rules(const RenderArguments& a) {
+  return {
+      {{"-o"}, [&a](const CLI::App&) { return output_reason(a); }},
+      {{"--depth"}, [&a](const CLI::App&) { return depth_reason(a); }},
+      {{"--watch"}, excludes({"--json"})},
+      {{"--watch"}, excludes("standard input", [&a] { return a.common.input == kStandardStream; })},
+  };
+}
+
+Result<WrittenFiles> write_outputs(const RenderArguments& arguments, const RenderedImage& image,
+                                   const PathImages* path_traced, const std::filesystem::path& path) {
+  if (was_interrupted()) return make_error(ErrorCode::Cancelled, "cancelled", path.string());
+  const bool is_plain = path_traced == nullptr || !(has_ending(path, ".exr") || path_traced->is_transparent());
+  const auto bytes = is_plain ? write_image_file(image.colour, path) : path_traced->write(path);
+  if (!bytes) return bytes.error();
+  WrittenFiles written{{path}, *bytes};
+  if (arguments.depth.empty()) return written;
+  if (was_interrupted()) return make_error(ErrorCode::Cancelled, "cancelled", arguments.depth.string());
+  const auto pfm = write_pfm(image.depth, arguments.depth);
+  if (!pfm) return pfm.error();
+  written.paths.push_back(arguments.depth);
+  written.bytes += *pfm;
+  return written;
+}
 
 bool has_ending(const std::filesystem::path& path, const std::string& ending) {
   return CLI::detail::to_lower(path.extension().string()) == ending;

@@ -10,6 +10,7 @@
 #include <quoin/io/image_files.h>
 #include <quoin/io/sidecar_file.h>
 
+#include "help.h"
 #include "options.h"
 #include "render/image_output.h"
 #include "render/render_arguments.h"
@@ -169,6 +170,7 @@ void take_lens(const PathArguments& arguments, const LoadedScene& loaded, std::o
 }  // namespace
 
 void add_path_options(CLI::App& command, PathArguments& arguments) {
+  set_heading(command, heading::kPathTracing);
   command.add_option("--bounces", arguments.bounces, "Maximum number of bounces, 0 to 1024 (default 8)")
       ->check(CLI::Range(0, kMaxBounces));
   add_parsed<SkyArgument>(
@@ -219,6 +221,16 @@ void add_path_options(CLI::App& command, PathArguments& arguments) {
                    "Source of settings without an option: file (its render settings and focus) or plain (the defaults "
                    "of quoin) (default file)");
   command.add_flag("--denoise", arguments.denoise, "Remove noise within surfaces and keep their edges");
+}
+
+std::vector<OptionRule> path_rules(const PathArguments& arguments) {
+  return {
+      {{"--fog-colour"}, needs("--fog")},
+      {{"--sun"}, excludes({"--sun-time"})},
+      {{"--sky-turn"},
+       needs("an image file for --sky",
+             [&arguments] { return arguments.sky && arguments.sky->model == SkyModel::Image; })},
+  };
 }
 
 Result<PathPlan> plan_paths(const RenderArguments& all, const LoadedScene& loaded) {

@@ -60,7 +60,11 @@ struct PathPlan {
   std::vector<std::string> warnings;
 };
 
+/// Adds the options under the heading of path tracing.
 void add_path_options(CLI::App& command, PathArguments& arguments);
+
+/// Returns the rules between these options. That they need --light path holds for the whole heading.
+[[nodiscard]] std::vector<OptionRule> path_rules(const PathArguments& arguments);
 
 /// Takes each setting from the options, else from the scene file (IN), else the default. An unreadable sky image of the
 /// scene file only gives a warning.

@@ -39,6 +39,11 @@ struct Outcome {
   std::optional<double> exposure;             ///< of path-traced images
   std::int64_t kept = 0;                      ///< existing images that were kept
   std::vector<std::filesystem::path> images;  ///< all images in order
+
+  void add(const WrittenFiles& written) {
+    files.insert(files.end(), written.paths.begin(), written.paths.end());
+    bytes += written.bytes;
+  }
 };
 
 /// An image to render.
@@ -121,24 +126,6 @@ void warn_of_empty_images(const Scene& scene, InstanceFilter filter, const Rende
   }
 }
 
-// `paths`: the renderer of the image if it is the path tracer, else null.
-Status write_outputs(const RenderArguments& arguments, const std::filesystem::path& output, const PathImages* paths,
-                     Outcome& outcome) {
-  if (was_interrupted()) return make_error(ErrorCode::Cancelled, "cancelled", output.string());
-  const bool is_plain = paths == nullptr || !(has_ending(output, ".exr") || paths->is_transparent());
-  const auto written = is_plain ? write_image_file(outcome.image.colour, output) : paths->write(output);
-  if (!written) return written.error();
-  outcome.files.push_back(output);
-  outcome.bytes += *written;
-  if (arguments.depth.empty()) return {};
-  if (was_interrupted()) return make_error(ErrorCode::Cancelled, "cancelled", arguments.depth.string());
-  const auto pfm = write_pfm(outcome.image.depth, arguments.depth);
-  if (!pfm) return pfm.error();
-  outcome.files.push_back(arguments.depth);
-  outcome.bytes += *pfm;
-  return {};
-}
-
 // Multiplies the emission of all types.
 void scale_emission(Scene& scene, double scale) {
   for (std::size_t type = 1; scale != 1.0 && type < scene.types.size(); ++type) {
@@ -194,7 +181,9 @@ Status take_images(Renderer& renderer, const RenderArguments& arguments, const R
     outcome.image = std::move(*image);
     outcome.rays += outcome.image.rays;
     outcome.trace += watch.lap();
-    if (auto written = write_outputs(arguments, shots[i].output, paths_of(renderer), outcome); !written) return written;
+    const auto written = write_outputs(arguments, outcome.image, paths_of(renderer), shots[i].output);
+    if (!written) return written.error();
+    outcome.add(*written);
     outcome.write += watch.lap();
   }
   return {};
@@ -326,9 +315,11 @@ Status draw_slice(const Scene& scene, const RenderArguments& arguments, Stopwatc
   outcome.image.colour = std::move(slice->colour);
   outcome.image.pixels_hit = slice->pixels_solid;
   outcome.trace = watch.lap();
-  auto written = write_outputs(arguments, arguments.output, nullptr, outcome);
+  const auto written = write_outputs(arguments, outcome.image, nullptr, arguments.output);
+  if (!written) return written.error();
+  outcome.add(*written);
   outcome.write = watch.lap();
-  return written;
+  return {};
 }
 
 /// Returns the cameras of --path; empty without it.

@@ -8,9 +8,6 @@
 #include <limits>
 #include <numbers>
 
-#include <quoin/io/file.h>
-
-#include "command_files.h"
 #include "commands.h"
 #include "help.h"
 #include "options.h"
@@ -21,9 +18,7 @@ namespace quoin::tool {
 
 namespace {
 
-constexpr int kMaxSamples = 4'096;
-constexpr std::int64_t kMaxPixels = std::int64_t{1} << 28;
-constexpr int kLongestSide = 1'000'000;  // the limit of PNG readers and writers
+constexpr int kMaxOcclusionRays = 4'096;
 
 const Choices<Preset> kPresets = {{"full", Preset::Full},  {"no-shadows", Preset::NoShadows},
                                   {"no-ao", Preset::NoAo}, {"unlit", Preset::Unlit},
@@ -66,13 +61,6 @@ std::optional<double> read_angle(const std::string& text) {
 std::optional<double> read_rate(const std::string& text) {
   const auto rate = parse_number(text);
   return rate && *rate > 0.0 && *rate <= 1000.0 ? rate : std::nullopt;
-}
-
-std::optional<ImageSize> read_size(const std::string& text) {
-  const auto size = parse_size(text);
-  const bool fits = size && std::max(size->width, size->height) <= kLongestSide &&
-                    std::int64_t{size->width} * size->height <= kMaxPixels;
-  return fits ? size : std::nullopt;
 }
 
 /// The value of --camera.
@@ -121,30 +109,6 @@ std::optional<SliceArgument> read_slice(const std::string& text) {
   const auto at = parse_number(std::string_view(text).substr(2));
   if (!at || *at < 0.0 || *at > 1.0) return std::nullopt;
   return SliceArgument{static_cast<int>(axis), *at};
-}
-
-void add_output_options(CLI::App& command, RenderArguments& arguments) {
-  set_heading(command, heading::kOutput);
-  command
-      .add_option("-o,--output", arguments.output,
-                  "Image to write: .png, .jpg or .webp; .exr with --light path (linear light, with layers for "
-                  "compositing). With an image series also a video, .mp4 or .webm, encoded by ffmpeg")
-      ->required()
-      ->type_name("FILE")
-      ->check(file_name());
-  add_parsed<ImageSize>(
-      command, "--size", "WxH", {read_size, "WIDTHxHEIGHT of at most 2^28 pixels and 1000000 per side, as in 1280x720"},
-      [&render = arguments.render](const ImageSize& size) {
-        render.width = size.width;
-        render.height = size.height;
-      },
-      "Image size in pixels (default 1280x720)");
-  command.add_option("--samples", arguments.samples, "Samples per pixel, 1 to 4096 (default 4; 64 with --light path)")
-      ->check(CLI::Range(1, kMaxSamples));
-  command.add_option("--depth", arguments.depth, "Also write the distances from the camera: .pfm")
-      ->type_name("FILE")
-      ->check(file_name());
-  command.add_flag("--watch", arguments.watch, "Render again after each change of the input, until Ctrl-C");
 }
 
 void add_camera_options(CLI::App& command, RenderArguments& arguments) {
@@ -258,7 +222,7 @@ void add_occlusion_options(CLI::App& command, LightOptions& light) {
   command
       .add_option("--ao-rays", light.occlusion_rays,
                   "Rays per point with --ao rays, 1 to 4096 (default 9; 16 if --ao-distance is more than 12)")
-      ->check(CLI::Range(1, kMaxSamples));
+      ->check(CLI::Range(1, kMaxOcclusionRays));
   add_parsed(command, "--ao-distance", "VOXELS", number_from_0(), light.occlusion_distance_voxels,
              "Length of rays with --ao rays (default 6; on fields 18)");
   add_choice<OcclusionAffects>(
@@ -289,38 +253,6 @@ void add_backend_options(CLI::App& command, RenderArguments& arguments) {
   const auto named = [](const std::string& text) { return text.empty() ? std::nullopt : std::optional(text); };
   add_parsed<std::string>(command, "--device", "NAME|N", {named, "a number or a name"}, arguments.device,
                           "Vulkan device: its number or a part of its name (default: the best)");
-}
-
-/// Returns the end of the message about -o, or "".
-std::string output_reason(const RenderArguments& arguments) {
-  const std::filesystem::path& output = arguments.output;
-  if (is_video(output)) {
-    if (!arguments.is_image_series())
-      return ": the video " + output.string() + " needs --turntable, --frames or --path";
-    if (arguments.path.is_transparent) return ": videos have no alpha channel";
-  } else if (const Status name = check_image_name(output); !name) {
-    return ": " + name.error().message;
-  }
-  if (has_ending(output, ".exr") && arguments.light != LightChoice::Path) return ": .exr needs --light path";
-  if (has_ending(output, ".jpg") && arguments.path.is_transparent) return ": .jpg has no alpha channel";
-  return is_same_file(output, arguments.common.input) ? ": " + output.string() + " is the input" : "";
-}
-
-/// Returns the end of the message about --depth, or "".
-std::string depth_reason(const RenderArguments& arguments) {
-  const std::string depth = arguments.depth.string();
-  if (!has_ending(arguments.depth, ".pfm")) return ": the name must end in .pfm, not \"" + depth + "\"";
-  if (is_same_file(arguments.depth, arguments.common.input)) return ": " + depth + " is the input";
-  return is_same_file(arguments.depth, arguments.output) ? ": " + depth + " is the same file as -o" : "";
-}
-
-std::vector<OptionRule> output_rules(const RenderArguments& a) {
-  return {
-      {{"-o"}, [&a](const CLI::App&) { return output_reason(a); }},
-      {{"--depth"}, [&a](const CLI::App&) { return depth_reason(a); }},
-      {{"--watch"}, excludes({"--json"})},
-      {{"--watch"}, excludes("standard input", [&a] { return a.common.input == kStandardStream; })},
-  };
 }
 
 std::vector<OptionRule> camera_rules(const RenderArguments& a) {
@@ -397,10 +329,6 @@ std::vector<OptionRule> light_rules(const RenderArguments& a) {
        [&a, is_path](const CLI::App&) {
          return a.is_exposure_automatic && !is_path() ? " auto needs --light path" : "";
        }},
-      {{"--fog-colour"}, needs("--fog")},
-      {{"--sun"}, excludes({"--sun-time"})},
-      {{"--sky-turn"},
-       needs("an image file for --sky", [&a] { return a.path.sky && a.path.sky->model == SkyModel::Image; })},
       {{"--least-light"}, needs("--light propagated", is_propagated)},
       {{"--light"},
        [&a, is_propagated](const CLI::App&) {
@@ -428,7 +356,7 @@ std::vector<OptionRule> render_rules(const RenderArguments& arguments) {
   for (std::vector<OptionRule>& more :
        std::array{field_occlusion_rules(arguments.render.light.smooth_occlusion), output_rules(arguments),
                   camera_rules(arguments), slice_rules(arguments), preset_rules(arguments), light_rules(arguments),
-                  backend_rules(arguments)}) {
+                  path_rules(arguments.path), backend_rules(arguments)}) {
     std::ranges::move(more, std::back_inserter(rules));
   }
   return rules;
@@ -477,7 +405,6 @@ void add_render_options(CLI::App& command, RenderArguments& arguments) {
   add_series_options(command, arguments);
   add_light_options(command, arguments);
   add_occlusion_options(command, arguments.render.light);
-  set_heading(command, heading::kPathTracing);
   add_path_options(command, arguments.path);
   add_volume_options(command, arguments.common.load);
   add_parsed<SliceArgument>(
