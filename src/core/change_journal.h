@@ -76,7 +76,7 @@ class ChangeJournal {
   }
 
   /// Implements `changes_since`: returns the changes since the cursor, each key once, sorted by `less(a, b)`, which
-  /// compares records by their keys. `Record::change()` returns the change.
+  /// compares records by their keys. `Record::change()` returns the change. If it throws, the cursor stays unchanged.
   template <class Change, class Less>
   [[nodiscard]] Changes<Change> changes_since(ChangeCursor& cursor, Less&& less) const {
     return changes_since<Change>(
@@ -87,13 +87,15 @@ class ChangeJournal {
   [[nodiscard]] Changes<Change> changes_since(ChangeCursor& cursor, Less&& less, Report&& report) const {
     std::vector<Record> records;
     Changes<Change> changes;
-    changes.all = !visit_since(cursor, [&](const Record& record) { records.push_back(record); });
+    ChangeCursor end = cursor;
+    changes.all = !visit_since(end, [&](const Record& record) { records.push_back(record); });
     std::stable_sort(records.begin(), records.end(), less);
     for (std::size_t i = 0; i < records.size();) {
       Record united = records[i];
       for (++i; i < records.size() && !less(united, records[i]); ++i) united.merge(records[i]);
       report(united, changes.items);
     }
+    cursor = end;
     return changes;
   }
 

@@ -246,5 +246,32 @@ TEST(Changes, ReportsTypeChangesWithVisibilityAndColour) {
   EXPECT_EQ(copy.find_or_add(properties).value(), glass);
 }
 
+TEST(PendingChanges, ReportEverythingAfterFailure) {
+  Grid grid;
+  ChangeCursor cursor = grid.cursor();
+  grid.set({1, 2, 3}, 4);
+  {
+    const PendingChanges changes(cursor, grid);
+    EXPECT_FALSE(changes->all);
+    EXPECT_EQ(changes->items.size(), 1U);
+  }
+  grid.set({100, 2, 3}, 4);
+  PendingChanges changes(cursor, grid);
+  EXPECT_TRUE(changes->all);
+  changes.commit();
+  EXPECT_FALSE(grid.has_changed_since(cursor));
+  grid.set({1, 2, 4}, 4);
+  EXPECT_EQ(PendingChanges(cursor, grid)->items.size(), 1U) << "each read reports the changes since the commit";
+}
+
+TEST(PendingChanges, NeedNoCommitWithoutChanges) {
+  Grid grid;
+  ChangeCursor cursor = grid.cursor();
+  EXPECT_TRUE(PendingChanges(cursor, grid)->empty());
+  grid.set({1, 2, 3}, 4);
+  EXPECT_FALSE(PendingChanges(cursor, grid)->all);
+  EXPECT_TRUE(PendingChanges(cursor, grid)->all) << "the previous read was not committed";
+}
+
 }  // namespace
 }  // namespace quoin

@@ -281,7 +281,8 @@ SceneChanges Scene::changes_since(ChangeCursor& cursor) const {
   SceneChanges changes;
   const std::lock_guard lock(book().mutex);
   book_->collect(grids_, keys());
-  changes.all = !book_->journal.visit_since(cursor, [&](const SceneRecord& record) {
+  ChangeCursor end = cursor;
+  changes.all = !book_->journal.visit_since(end, [&](const SceneRecord& record) {
     switch (record.kind) {
       case Kind::Grid:
         changes.grids.push_back({record.index, record.generation});
@@ -302,6 +303,7 @@ SceneChanges Scene::changes_since(ChangeCursor& cursor) const {
   add_instances_below(*this, changes);
   sort_and_unite(changes.grids);
   sort_and_unite(changes.instances);
+  cursor = end;
   return changes;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 namespace quoin {
@@ -25,7 +26,8 @@ namespace quoin {
 ///             further behind gets `Changes::all`. Recording starts when the first cursor reads; until then, edits
 ///             have no journal cost.
 /// Cost:       proportional to the number of changes, independent of the container's size.
-/// Failure:    a consumer that fails halfway can retry with a copy of the cursor from before the read.
+/// Failure:    if a read throws (bad_alloc), the cursor is unchanged. A consumer that may fail later reads with
+///             PendingChanges.
 class ChangeCursor {
  public:
   bool operator==(const ChangeCursor&) const = default;
@@ -49,6 +51,40 @@ struct Changes {
   std::vector<Change> items;  ///< each chunk (type, handle) once, in the container's order
 
   [[nodiscard]] bool empty() const { return !all && items.empty(); }
+};
+
+/// Changes that a consumer applies completely or not at all.
+///
+///   quoin::PendingChanges changes(cursor, grid);
+///   if (changes->all) forget_everything();
+///   for (const quoin::IVec3 chunk : quoin::chunks_to_mesh(grid, *changes)) mesh(grid.neighbourhood(chunk));
+///   changes.commit();
+///
+/// If the consumer throws or returns before `commit`, the next read from the cursor reports that everything changed.
+/// Without changes there is nothing to apply, and the cursor is at the present at once.
+/// Lifetime: the cursor must outlive it. Use one at a time per cursor.
+template <class Container>
+class PendingChanges {
+ public:
+  PendingChanges(ChangeCursor& cursor, const Container& container)
+      : cursor_(&cursor), end_(cursor), changes_(container.changes_since(end_)) {
+    cursor = changes_.empty() ? end_ : ChangeCursor{};
+  }
+  PendingChanges(const PendingChanges&) = delete;
+  PendingChanges& operator=(const PendingChanges&) = delete;
+
+  /// Call when all changes are applied.
+  void commit() { *cursor_ = end_; }
+
+  [[nodiscard]] auto& operator*() { return changes_; }
+  [[nodiscard]] const auto& operator*() const { return changes_; }
+  [[nodiscard]] auto* operator->() { return &changes_; }
+  [[nodiscard]] const auto* operator->() const { return &changes_; }
+
+ private:
+  ChangeCursor* cursor_;
+  ChangeCursor end_;
+  decltype(std::declval<const Container&>().changes_since(std::declval<ChangeCursor&>())) changes_;
 };
 
 // Part of the layout of Grid and DensityGrid; not for callers.
