@@ -156,13 +156,12 @@ struct DetailSelector::Impl {
 };
 
 void DetailSelector::Impl::look_at_grids(const Scene& scene) {
-  ChangeCursor now = followed;
-  const SceneChanges changes = scene.changes_since(now);
-  if (changes.all) {
+  PendingChanges changes(followed, scene);
+  if (changes->all) {
     for (Content& content : contents) content.is_there = false;
     scene.grids().for_each([&](GridHandle handle, const SceneGrid& grid) { look_at_grid(handle, grid); });
   }
-  for (const GridHandle handle : changes.grids) {
+  for (const GridHandle handle : changes->grids) {
     const SceneGrid* grid = scene.grids().find(handle);
     if (grid != nullptr) {
       look_at_grid(handle, *grid);
@@ -170,7 +169,7 @@ void DetailSelector::Impl::look_at_grids(const Scene& scene) {
       contents[handle.index].is_there = false;
     }
   }
-  followed = now;
+  changes.commit();
 }
 
 void DetailSelector::Impl::look_at_grid(GridHandle handle, const SceneGrid& grid) {

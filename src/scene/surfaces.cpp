@@ -139,10 +139,8 @@ const Surface& Surfaces::of_field(VoxelType material) const {
 }
 
 bool Surfaces::update(const VoxelRegistry& types) {
-  if (!types.has_changed_since(followed_)) return false;
-  ChangeCursor now = followed_;
-  const TypeChanges changes = types.changes_since(now);
-  followed_ = {};  // stays so when memory runs out
+  PendingChanges changes(followed_, types);
+  if (changes->empty()) return false;
   const auto put = [&](std::size_t type) {
     QUOIN_ASSERT(type + 1 < surfaces_.size(), "a registered type");
     surfaces_[type] = surface_of(types[static_cast<VoxelType>(type)], clouds_);
@@ -150,9 +148,9 @@ bool Surfaces::update(const VoxelRegistry& types) {
   surfaces_.resize(types.size() + 1);
   surfaces_.back() = {};
   surfaces_.back().colour = {1.0F, 0.0F, 1.0F};
-  for (std::size_t type = 0; changes.all && type < types.size(); ++type) put(type);
-  for (const TypeChange& change : changes.items) put(change.type);
-  followed_ = now;
+  for (std::size_t type = 0; changes->all && type < types.size(); ++type) put(type);
+  for (const TypeChange& change : changes->items) put(change.type);
+  changes.commit();
   return true;
 }
 

@@ -126,14 +126,12 @@ DBox bounds_in_world(const PlacedGrid& placed, const IBox& tight) {
 }
 
 bool SceneTracer::Impl::update(Threads threads) {
-  ChangeCursor types_now = followed_types;
-  ChangeCursor scene_now = followed_scene;
-  const TypeChanges types = scene->types.changes_since(types_now);
-  SceneChanges changes = scene->changes_since(scene_now);
-  followed_types = followed_scene = {};  // stay empty if memory runs out
+  PendingChanges types(followed_types, scene->types);
+  PendingChanges pending(followed_scene, *scene);
+  SceneChanges& changes = *pending;
   const bool was_unfinished = std::exchange(is_unfinished, true);
   // Discarded trees are rebuilt, in all placed grids.
-  changes.all |= update_types(types);
+  changes.all |= update_types(*types);
   const bool are_shapes_same = look_at_grids(changes);
   const bool moves_all = changes.all || !are_shapes_same;
   const bool are_placed = !was_unfinished && (moves_all ? move_all_instances() : move_instances(changes));
@@ -143,8 +141,8 @@ bool SceneTracer::Impl::update(Threads threads) {
   }
   find_unloaded(changes, moves_all || changes.all || has_other_trees);
   update_trees(changes, threads);
-  followed_types = types_now;
-  followed_scene = scene_now;
+  types.commit();
+  pending.commit();
   is_unfinished = false;
   return std::exchange(has_other_trees, false);
 }

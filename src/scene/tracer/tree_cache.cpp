@@ -58,36 +58,32 @@ bool has_glass(const DensityGrid& field, const VoxelRegistry& types, const Densi
 }
 
 bool TreeCache::update(const Grid& grid, const VoxelRegistry& types) {
-  ChangeCursor now = followed_;
-  const GridChanges changes = grid.changes_since(now);
-  if (changes.empty()) return false;
-  followed_ = {};  // stays empty if memory runs out
-  if (changes.all) transparent_.reset();
-  opaque_.update(grid, types, changes);
-  update_transparent(grid, types, changes);
-  followed_ = now;
+  PendingChanges changes(followed_, grid);
+  if (changes->empty()) return false;
+  if (changes->all) transparent_.reset();
+  opaque_.update(grid, types, *changes);
+  update_transparent(grid, types, *changes);
+  changes.commit();
   return true;
 }
 
 bool TreeCache::update(const DensityGrid& field, const VoxelRegistry& types) {
-  ChangeCursor now = followed_field_;
   const bool is_known = field_ && &field_->field() == &field;
   if (!is_known && field.chunk_count() == 0) {
     field_.reset();
     split_.reset();
     return false;
   }
-  DensityChanges changes = field.changes_since(now);
-  if (is_known && changes.empty()) return false;
-  changes.all |= !is_known;
-  followed_field_ = {};  // stays empty if memory runs out
+  if (!is_known) followed_field_ = {};
+  PendingChanges changes(followed_field_, field);
+  if (changes->empty()) return false;
   if (is_known) {
-    field_->update(changes);
+    field_->update(*changes);
   } else {
     field_.emplace(field);
   }
-  update_split(field, types, changes);
-  followed_field_ = now;
+  update_split(field, types, *changes);
+  changes.commit();
   return true;
 }
 
@@ -156,18 +152,15 @@ void CoarseLevel::put_in(PlacedGrid& placed) const {
 }
 
 void HalvedGridCache::Entry::make(const SceneGrid& grid, const VoxelRegistry& types, int halvings, Threads threads) {
-  ChangeCursor now = followed;
-  ChangeCursor field_now = followed_field;
-  const GridChanges changes = grid.grid.changes_since(now);
-  const DensityChanges field_changes = grid.field.changes_since(field_now);
-  followed = followed_field = {};  // stay empty if memory runs out
-  if (changes.all || field_changes.all) {
+  PendingChanges changes(followed, grid.grid);
+  PendingChanges field_changes(followed_field, grid.field);
+  if (changes->all || field_changes->all) {
     *this = {};
-  } else if (!changes.empty() || !field_changes.empty()) {
+  } else if (!changes->empty() || !field_changes->empty()) {
     renew(grid, types, threads);
   }
-  followed = now;
-  followed_field = field_now;
+  changes.commit();
+  field_changes.commit();
   const int known = static_cast<int>(levels.size());
   if (known < halvings && !is_coarsest) is_coarsest = has_glass(grid.field, types);
   for (int level = known + 1; level <= halvings && !is_coarsest; ++level) {
