@@ -221,7 +221,8 @@ std::vector<bool> solid_types(const VoxelRegistry& types) {
 }  // namespace
 
 struct SolidShapes::Impl {
-  [[nodiscard]] std::vector<IVec3> chunks_to_make(const Grid& grid, const VoxelRegistry& types);
+  [[nodiscard]] bool follow_types(const VoxelRegistry& types);
+  [[nodiscard]] std::vector<IVec3> chunks_to_make(const Grid& grid, const GridChanges& changes) const;
   void make(const Grid& grid, IVec3 chunk, const VoxelRegistry& types, ChunkShapes& made) const;
 
   SolidShapesOptions options;
@@ -231,18 +232,22 @@ struct SolidShapes::Impl {
   std::unordered_map<IVec3, ChunkShapes, CoordinateHash> shapes;
 };
 
-// Returns the chunks whose shapes may have changed: for another grid, or after solid types changed, all chunks that
-// have or had shapes.
-std::vector<IVec3> SolidShapes::Impl::chunks_to_make(const Grid& grid, const VoxelRegistry& types) {
-  GridChanges changes = grid.changes_since(followed_grid);
-  if (types.has_changed_since(followed_types)) {
-    followed_types = types.cursor();
-    std::vector<bool> now = solid_types(types);
-    // Unregistered types are solid.
-    const auto is_other = [&](std::size_t i) { return (i >= now.size() || now[i]) != (i >= solid.size() || solid[i]); };
-    for (std::size_t i = 1; i < std::max(now.size(), solid.size()) && !changes.all; ++i) changes.all = is_other(i);
-    solid = std::move(now);
-  }
+// Returns true if types became solid or ceased to be.
+bool SolidShapes::Impl::follow_types(const VoxelRegistry& types) {
+  PendingChanges changes(followed_types, types);
+  if (changes->empty()) return false;
+  std::vector<bool> now = solid_types(types);
+  // Unregistered types are solid.
+  const auto is_other = [&](std::size_t i) { return (i >= now.size() || now[i]) != (i >= solid.size() || solid[i]); };
+  bool is_any_other = false;
+  for (std::size_t i = 1; i < std::max(now.size(), solid.size()); ++i) is_any_other |= is_other(i);
+  solid = std::move(now);
+  changes.commit();
+  return is_any_other;
+}
+
+// Returns the chunks whose shapes may have changed: all chunks that have or had shapes if everything changed.
+std::vector<IVec3> SolidShapes::Impl::chunks_to_make(const Grid& grid, const GridChanges& changes) const {
   std::vector<IVec3> chunks = chunks_to_mesh(grid, changes);
   if (!changes.all) return chunks;
   for (const auto& [chunk, shape] : shapes) {
@@ -268,27 +273,30 @@ SolidShapes::~SolidShapes() = default;
 
 std::vector<IVec3> SolidShapes::update(const Grid& grid, const VoxelRegistry& types, Threads threads) {
   Impl& me = impl_of(impl_);
-  try {
-    std::vector<IVec3> chunks = me.chunks_to_make(grid, types);
-    std::vector<ChunkShapes> made(chunks.size());
-    parallel_for(chunks.size(), threads, [&](std::size_t i) { me.make(grid, chunks[i], types, made[i]); });
-    std::vector<IVec3> changed;
-    for (std::size_t i = 0; i < chunks.size(); ++i) {
-      const auto found = me.shapes.find(chunks[i]);
-      const bool is_same = found == me.shapes.end() ? made[i].empty() : found->second == made[i];
-      if (is_same) continue;
-      changed.push_back(chunks[i]);
-      if (made[i].empty()) {
-        me.shapes.erase(found);
-      } else {
-        me.shapes[chunks[i]] = std::move(made[i]);
-      }
-    }
-    return changed;
-  } catch (...) {
-    me.followed_grid = {};
-    throw;
+  if (me.follow_types(types)) me.followed_grid = {};
+  PendingChanges changes(me.followed_grid, grid);
+  const std::vector<IVec3> chunks = me.chunks_to_make(grid, *changes);
+  std::vector<ChunkShapes> made(chunks.size());
+  parallel_for(chunks.size(), threads, [&](std::size_t i) { me.make(grid, chunks[i], types, made[i]); });
+  std::vector<IVec3> changed;
+  changed.reserve(chunks.size());
+  // Nothing throws once the first chunk is replaced, so that each change is reported.
+  for (std::size_t i = 0; i < chunks.size(); ++i) {
+    if (!made[i].empty()) me.shapes.try_emplace(chunks[i]);
   }
+  for (std::size_t i = 0; i < chunks.size(); ++i) {
+    const auto found = me.shapes.find(chunks[i]);
+    const bool is_same = found == me.shapes.end() ? made[i].empty() : found->second == made[i];
+    if (is_same) continue;
+    changed.push_back(chunks[i]);
+    if (made[i].empty()) {
+      me.shapes.erase(found);
+    } else {
+      found->second = std::move(made[i]);
+    }
+  }
+  changes.commit();
+  return changed;
 }
 
 const std::vector<IBox>& SolidShapes::boxes(IVec3 chunk) const {
