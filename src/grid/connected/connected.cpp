@@ -451,28 +451,24 @@ void ConnectedPieces::Impl::take_data(IVec3 at, const Chunk* chunk) {
 }
 
 void ConnectedPieces::update(const Grid& grid, Threads threads) {
-  ChangeCursor now = impl_of(impl_).followed;
-  ChangeCursor of_data = now;
-  const GridChanges changes = grid.changes_since(now);
+  ChangeCursor of_data = impl_of(impl_).followed;
   // Voxels that also changed their type are handled below.
   for (const DataChange& change : grid.data_changes_since(of_data).items) {
     impl_of(impl_).take_data(change.chunk, grid.find_chunk(change.chunk));
   }
-  if (changes.empty()) {
-    impl_of(impl_).followed = now;
-    return;
-  }
+  PendingChanges changes(impl_of(impl_).followed, grid);
+  if (changes->empty()) return;
   std::vector<IVec3> chunks;
-  if (changes.all) {
+  if (changes->all) {
     impl_of(impl_).entries.clear();
     chunks = grid.chunks();
   }
-  for (const ChunkChange& change : changes.items) chunks.push_back(change.chunk);
+  for (const ChunkChange& change : changes->items) chunks.push_back(change.chunk);
   impl_of(impl_).find_parts(grid, chunks, threads);
   impl_of(impl_).find_links(chunks, threads);
   impl_of(impl_).find_open_parts(grid, chunks);
   impl_of(impl_).make_pieces();
-  impl_of(impl_).followed = now;
+  changes.commit();
 }
 
 std::span<const ConnectedPiece> ConnectedPieces::pieces() const {

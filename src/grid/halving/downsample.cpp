@@ -357,15 +357,14 @@ struct Level : Kept {
 
   // Returns false, without a change, if `progress` cancelled the update.
   bool update(const Content& finer, const Halving& halving, Threads threads, const Progress& progress = {}) {
-    ChangeCursor now = followed;
-    const auto changes = finer.changes_since(now);
+    PendingChanges changes(followed, finer);
     std::vector<IVec3> dirty;
-    if (changes.all) {
+    if (changes->all) {
       Kept::begin(finer);
       dirty = content.chunks();
       for (const IVec3 chunk : finer.chunks()) dirty.push_back(halved_coordinates(chunk));
     }
-    for (const auto& change : changes.items) add_readers(change, dirty);
+    for (const auto& change : changes->items) add_readers(change, dirty);
     sort_and_unite(dirty);
     std::erase_if(dirty, [&](IVec3 chunk) {
       for (int i = 0; i < 8; ++i) {
@@ -382,7 +381,7 @@ struct Level : Kept {
     });
     if (steps.cancelled()) return false;
     for (std::size_t i = 0; i < dirty.size(); ++i) Kept::put(dirty[i], std::move(made[i]));
-    followed = now;
+    changes.commit();
     return true;
   }
 };
