@@ -96,16 +96,14 @@ FieldSurfaces::FieldSurfaces(GridHandle handle, const ChunkSurfaceOptions& optio
     : handle_(handle), options_(options), totals_(totals) {}
 
 void FieldSurfaces::follow(const SceneGrid& content, SurfaceClock::time_point now) {
-  ChangeCursor end = followed_;
-  const DensityChanges changes = content.field.changes_since(end);
-  if (changes.empty()) return;
-  followed_ = {};  // stays so when memory runs out
-  if (changes.all) {
+  PendingChanges changes(followed_, content.field);
+  if (changes->empty()) return;
+  if (changes->all) {
     begin_anew(content.field, now);
   } else {
-    follow_changes(content.field, changes, now);
+    follow_changes(content.field, *changes, now);
   }
-  followed_ = end;
+  changes.commit();
 }
 
 // Discards all surfaces and jobs, because they belong to another field.

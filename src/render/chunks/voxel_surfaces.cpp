@@ -34,17 +34,15 @@ VoxelSurfaces::VoxelSurfaces(GridHandle handle, const ChunkSurfaceOptions& optio
     : handle_(handle), options_(options), totals_(totals), densities_(reach_of(options.occlusion)) {}
 
 void VoxelSurfaces::follow(const Grid& grid, SurfaceClock::time_point now) {
-  ChangeCursor end = followed_;
-  const GridChanges changes = grid.changes_since(end);
-  if (changes.empty()) return;
-  followed_ = {};  // stays so when memory runs out
-  if (changes.all) begin_anew();
+  PendingChanges changes(followed_, grid);
+  if (changes->empty()) return;
+  if (changes->all) begin_anew();
   if (options_.style == SurfaceStyle::Blocky) {
-    follow_blocky(grid, changes, now);
+    follow_blocky(grid, *changes, now);
   } else {
-    follow_smooth(grid, changes, now);
+    follow_smooth(grid, *changes, now);
   }
-  followed_ = end;
+  changes.commit();
 }
 
 // Corners of faces have the light of voxels in front of them: chunks that hold one of the 26 neighbours of a voxel
@@ -57,18 +55,15 @@ void VoxelSurfaces::follow_light(const GridLight& light, SurfaceClock::time_poin
     return;
   }
   is_lit_ = true;
-  ChangeCursor end = followed_light_;
-  const GridChanges changes = light.light->changes_since(end);
-  if (changes.empty()) return;
-  followed_light_ = {};
-  if (changes.all) mark_all(now);
-  for (const ChunkChange& change : changes.items) {
+  PendingChanges changes(followed_light_, *light.light);
+  if (changes->all) mark_all(now);
+  for (const ChunkChange& change : changes->items) {
     for (int i = 0; i < 27; ++i) {
       const IVec3 offset = Neighbourhood::offset(i);
       if (change.affects(offset)) mark_if_there(change.chunk + offset, now);
     }
   }
-  followed_light_ = end;
+  changes.commit();
 }
 
 // Discards all surfaces and jobs, because they belong to another grid.

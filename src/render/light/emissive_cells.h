@@ -28,15 +28,13 @@ class EmissiveChunks {
   template <class Content, class Find, class Look>
   void follow(const Content& content, const VoxelRegistry& types, Find&& chunks_of, Look&& look_at) {
     if (!types.changes_since(followed_types_).empty()) followed_ = {};
-    ChangeCursor now = followed_;
-    const auto changes = content.changes_since(now);
-    followed_ = {};  // stays so when memory runs out
-    if (changes.all) chunks_.clear();
-    for (const IVec3 chunk : chunks_of(changes)) {
+    PendingChanges changes(followed_, content);
+    if (changes->all) chunks_.clear();
+    for (const IVec3 chunk : chunks_of(*changes)) {
       chunks_.erase(chunk);
       if (std::vector<Item> found = look_at(chunk); !found.empty()) chunks_[chunk] = std::move(found);
     }
-    followed_ = now;
+    changes.commit();
   }
 
   /// Calls `visit(IVec3 chunk, const Item&)`, chunks by z, y, x.

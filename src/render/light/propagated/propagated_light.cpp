@@ -115,6 +115,7 @@ struct PropagatedLight::Impl {
   [[nodiscard]] const std::vector<TypeLight>& lights() const { return *shared_lights; }
   [[nodiscard]] const LightDomain& domain() const { return shared_domain->columns; }
   [[nodiscard]] LightReader reader() const { return {store, domain()}; }
+  void follow_types(const VoxelRegistry& types);
   void begin_anew(const Grid& grid);
   void take_over(const Grid& grid, const GridChanges& changes);
   [[nodiscard]] Dirty reach_of(const Grid& grid, const IBox& voxels) const;
@@ -142,6 +143,19 @@ struct PropagatedLight::Impl {
   Queue queue;               // boxes of chunks that are to be solved, a layer at a time
   std::unordered_map<IVec3, std::unique_ptr<ChunkMasks>, CoordinateHash> masks;  // during an update
 };
+
+// Unregistered types count as opaque, so new types change light.
+void PropagatedLight::Impl::follow_types(const VoxelRegistry& types) {
+  PendingChanges changes(followed_types, types);
+  if (changes->empty()) return;
+  std::vector<TypeLight> now = type_lights(types, options);
+  if (now != lights()) {
+    followed_grid = {};
+    lamp_channels = quoin::lamp_channels(now);
+    shared_lights = std::make_shared<const std::vector<TypeLight>>(std::move(now));
+  }
+  changes.commit();
+}
 
 void PropagatedLight::Impl::begin_anew(const Grid& grid) {
   queue.clear();
@@ -482,24 +496,13 @@ PropagatedLight::~PropagatedLight() = default;
 
 void PropagatedLight::update(const Grid& grid, const VoxelRegistry& types, Threads threads) {
   Impl& me = impl_of(impl_);
-  try {
-    GridChanges changes = grid.changes_since(me.followed_grid);
-    if (me.lights().empty() || types.has_changed_since(me.followed_types)) {
-      me.followed_types = types.cursor();
-      std::vector<TypeLight> lights = type_lights(types, me.options);
-      // Unregistered types count as opaque, so new types change light.
-      changes.all |= lights != me.lights();
-      me.lamp_channels = lamp_channels(lights);
-      me.shared_lights = std::make_shared<const std::vector<TypeLight>>(std::move(lights));
-    }
-    changes.all ? me.begin_anew(grid) : me.take_over(grid, changes);
-    me.solve_dirty(grid, threads);
-    me.solve_queue(grid, threads);
-    QUOIN_ASSERT(me.dirty.empty() && me.queue.empty(), "no light is left to be solved");
-  } catch (...) {
-    me.followed_grid = {};
-    throw;
-  }
+  me.follow_types(types);
+  PendingChanges changes(me.followed_grid, grid);
+  changes->all ? me.begin_anew(grid) : me.take_over(grid, *changes);
+  me.solve_dirty(grid, threads);
+  me.solve_queue(grid, threads);
+  QUOIN_ASSERT(me.dirty.empty() && me.queue.empty(), "no light is left to be solved");
+  changes.commit();
 }
 
 PropagatedLight PropagatedLight::snapshot() const {

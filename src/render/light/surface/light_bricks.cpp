@@ -97,11 +97,10 @@ bool LightBricks::is_at_surface(const OfGrid& of, IVec3 brick) {
 }
 
 // Returns the bricks whose light or voxels may have changed.
-std::vector<IVec3> LightBricks::bricks_to_find(OfGrid& of, const GridLight& light) {
+std::vector<IVec3> LightBricks::bricks_to_find(OfGrid& of, const GridLight& light, const GridChanges& voxels,
+                                               const GridChanges& levels) {
   std::vector<IVec3> bricks;
   const auto add = [&](const IBox& box) { for_bricks(box, [&](IVec3 brick) { bricks.push_back(brick); }); };
-  const GridChanges voxels = light.voxels->changes_since(of.followed_voxels);
-  const GridChanges levels = light.light->changes_since(of.followed_light);
   if (voxels.all || levels.all) {
     // Known bricks may have disappeared.
     for (const auto& [chunk, held] : of.occupied) add({chunk * kBricksOfChunk - 1, (chunk + 1) * kBricksOfChunk + 1});
@@ -188,8 +187,8 @@ void LightBricks::put(std::int32_t grid, Found found) {
   if (!has_numbers) {
     what = found.what;
   } else if (!had_numbers && free_.empty()) {
-    what = static_cast<std::uint32_t>(numbers_.size());
     numbers_.resize(numbers_.size() + kNumbers);
+    what = static_cast<std::uint32_t>(numbers_.size() - kNumbers);
   } else if (!had_numbers) {
     what = free_.back();
     free_.pop_back();
@@ -207,12 +206,14 @@ void LightBricks::update(const Scene& scene, const SceneLight& light, Threads th
   const bool is_known = scene.grids().size() == grids_.size() &&
                         std::all_of(grids_.begin(), grids_.end(),
                                     [&](const OfGrid& each) { return scene.grids().find(each.handle) != nullptr; });
-  if (!is_known || scene.types.has_changed_since(followed_types_)) begin_anew(scene);
-  followed_types_ = scene.types.cursor();
+  PendingChanges types(followed_types_, scene.types);
+  if (!is_known || !types->empty()) begin_anew(scene);
   for (std::size_t grid = 0; grid < grids_.size(); ++grid) {
     OfGrid& of = grids_[grid];
     const GridLight content = light.of(of.handle);
-    const std::vector<IVec3> places = bricks_to_find(of, content);
+    PendingChanges voxels(of.followed_voxels, *content.voxels);
+    PendingChanges levels(of.followed_light, *content.light);
+    const std::vector<IVec3> places = bricks_to_find(of, content, *voxels, *levels);
     std::vector<Found> found(places.size());
     parallel_for((places.size() + kAtOnce - 1) / kAtOnce, threads, [&](std::size_t part) {
       LightRows rows(*content.light, *content.voxels, scene.types);
@@ -220,7 +221,10 @@ void LightBricks::update(const Scene& scene, const SceneLight& light, Threads th
       for (std::size_t i = part * kAtOnce; i < end; ++i) found[i] = find(of, rows, places[i]);
     });
     for (Found& each : found) put(static_cast<std::int32_t>(grid), std::move(each));
+    voxels.commit();
+    levels.commit();
   }
+  types.commit();
 }
 
 void LightCache::update() {

@@ -72,7 +72,8 @@ class LightBricks {
   };
 
   void begin_anew(const Scene& scene);
-  [[nodiscard]] static std::vector<IVec3> bricks_to_find(OfGrid& of, const GridLight& light);
+  [[nodiscard]] static std::vector<IVec3> bricks_to_find(OfGrid& of, const GridLight& light, const GridChanges& voxels,
+                                                         const GridChanges& levels);
   static void look_at_chunk(OfGrid& of, const GridLight& light, IVec3 chunk);
   [[nodiscard]] static bool is_at_surface(const OfGrid& of, IVec3 brick);
   [[nodiscard]] static Found find(const OfGrid& of, LightRows& rows, IVec3 brick);

@@ -62,25 +62,23 @@ Chunk united_chunk(const Chunk* voxels, const DensityChunk* field) {
 
 void SceneLight::Entry::unite(const SceneGrid& grid) {
   std::vector<IVec3> chunks;
-  ChangeCursor read_voxels = followed_voxels;
-  ChangeCursor read_field = followed_field;
-  const GridChanges of_voxels = grid.grid.changes_since(read_voxels);
-  const DensityChanges of_field = grid.field.changes_since(read_field);
-  if (of_voxels.all || of_field.all) {
+  PendingChanges of_voxels(followed_voxels, grid.grid);
+  PendingChanges of_field(followed_field, grid.field);
+  if (of_voxels->all || of_field->all) {
     both.clear();
     for (const std::vector<IVec3>& more : {grid.grid.chunks(), grid.field.chunks()}) {
       chunks.insert(chunks.end(), more.begin(), more.end());
     }
   } else {
-    for (const auto& change : of_voxels.items) chunks.push_back(change.chunk);
-    for (const auto& change : of_field.items) chunks.push_back(change.chunk);
+    for (const auto& change : of_voxels->items) chunks.push_back(change.chunk);
+    for (const auto& change : of_field->items) chunks.push_back(change.chunk);
   }
   sort_and_unite(chunks);
   for (const IVec3 chunk : chunks) {
     both.put_chunk(chunk, united_chunk(grid.grid.find_chunk(chunk), grid.field.find_chunk(chunk)));
   }
-  followed_voxels = read_voxels;
-  followed_field = read_field;
+  of_voxels.commit();
+  of_field.commit();
 }
 
 void SceneLight::Entry::update(const SceneGrid& grid, const VoxelRegistry& types, Threads threads) {
