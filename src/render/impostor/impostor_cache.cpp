@@ -90,9 +90,12 @@ struct ImpostorCache::Impl {
 };
 
 void ImpostorCache::Impl::look_at(const VoxelRegistry& now) {
-  const bool is_other = has_other_visibility(now.changes_since(followed_types));
-  if (is_other) ++types_changed;
-  if (is_other || types == nullptr) types = std::make_shared<const VoxelRegistry>(now);
+  PendingChanges changes(followed_types, now);
+  if (has_other_visibility(*changes)) {
+    types = std::make_shared<const VoxelRegistry>(now);
+    ++types_changed;
+  }
+  changes.commit();
 }
 
 // Queues the grid's present state; replaces an older state in the queue.

@@ -34,18 +34,22 @@ void DeviceDetail::clear() {
 }
 
 void DeviceDetail::look_at(const Scene& scene) {
-  if (has_other_visibility(scene.types.changes_since(followed_types_))) clear();
-  const SceneChanges changes = scene.changes_since(followed_scene_);
-  if (changes.all || !changes.grids.empty()) impostors_.follow(scene);
+  PendingChanges types(followed_types_, scene.types);
+  PendingChanges changes(followed_scene_, scene);
+  if (has_other_visibility(*types)) clear();
+  if (changes->all || !changes->grids.empty()) impostors_.follow(scene);
   const auto is_gone = [&](GridHandle handle) { return scene.grids().find(handle) == nullptr; };
-  if (!changes.all && std::none_of(changes.grids.begin(), changes.grids.end(), is_gone)) return;
-  coarse_.forget(is_gone);
-  for (auto level = levels_.begin(); level != levels_.end();) {
-    const auto each = level++;
-    if (!is_gone(each->first.grid)) continue;
-    each->second.voxels.release(*memory_);
-    levels_.erase(each);
+  if (changes->all || std::any_of(changes->grids.begin(), changes->grids.end(), is_gone)) {
+    coarse_.forget(is_gone);
+    for (auto level = levels_.begin(); level != levels_.end();) {
+      const auto each = level++;
+      if (!is_gone(each->first.grid)) continue;
+      each->second.voxels.release(*memory_);
+      levels_.erase(each);
+    }
   }
+  types.commit();
+  changes.commit();
 }
 
 Result<Placement> DeviceDetail::place(const DeviceScene& device, const Scene& scene, const ImageDetail& detail,

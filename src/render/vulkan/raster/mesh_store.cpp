@@ -223,16 +223,17 @@ void LevelMeshes::clear() {
 }
 
 void LevelMeshes::look_at(const Scene& scene) {
-  const TypeChanges types = scene.types.changes_since(followed_types_);
-  const bool is_seen_otherwise = has_other_visibility(types);
+  PendingChanges types(followed_types_, scene.types);
+  const bool is_seen_otherwise = has_other_visibility(*types);
   for (auto level = levels_.begin(); level != levels_.end();) {
     const auto each = level++;
     if (scene.grids().find(each->first.grid) == nullptr) {
       drop(each);
-    } else if (is_seen_otherwise || (!types.empty() && each->second.surfaces->style() == SurfaceStyle::Smooth)) {
+    } else if (is_seen_otherwise || (!types->empty() && each->second.surfaces->style() == SurfaceStyle::Smooth)) {
       each->second.surfaces->forget();
     }
   }
+  types.commit();
 }
 
 void LevelMeshes::drop(std::map<MeshKey, Level>::iterator level) {

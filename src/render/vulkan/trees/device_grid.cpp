@@ -119,18 +119,17 @@ Status DeviceGrid::update_tops(ShaderMemory& memory, const Content& content) {
 }
 
 Status DeviceGrid::update_voxels(ShaderMemory& memory, const Content& content) {
-  ChangeCursor now = followed_;
-  const GridChanges changes = content.voxels->changes_since(now);
-  if (changes.all) {
+  PendingChanges changes(followed_, *content.voxels);
+  if (changes->all) {
     drop_all(memory, chunks_);
     for (const IVec3 at : content.voxels->chunks()) {
       if (Status done = put_voxels(memory, content, at); !done) return done;
     }
   }
-  for (const ChunkChange& change : changes.items) {
+  for (const ChunkChange& change : changes->items) {
     if (Status done = put_voxels(memory, content, change.chunk); !done) return done;
   }
-  followed_ = now;
+  changes.commit();
   return {};
 }
 
@@ -143,13 +142,12 @@ Status DeviceGrid::update_field(ShaderMemory& memory, const DensityGrid* field, 
     followed = {};
     return {};
   }
-  ChangeCursor now = followed;
-  const DensityChanges changes = field->changes_since(now);
-  if (changes.all) drop_all(memory, chunks);
-  for (const IVec3 chunk : chunks_to_mesh(*field, changes, kFieldRecordReach)) {
+  PendingChanges changes(followed, *field);
+  if (changes->all) drop_all(memory, chunks);
+  for (const IVec3 chunk : chunks_to_mesh(*field, *changes, kFieldRecordReach)) {
     if (Status done = put_chunk(chunk); !done) return done;
   }
-  followed = now;
+  changes.commit();
   return {};
 }
 
