@@ -98,11 +98,11 @@ void LiveLight::Impl::throw_failure() {
 // Returns true if light depends on any change since the last call. Scenes also report names and voxel data, which light
 // ignores.
 bool LiveLight::Impl::read_changes(const Scene& scene) {
-  const SceneChanges changes = scene.changes_since(followed_scene);
-  bool is_any = changes.all || scene.types.has_changed_since(followed_types);
-  followed_types = scene.types.cursor();
-  if (changes.all) followed_grids.clear();
-  for (const GridHandle handle : changes.all ? scene.grids().handles() : changes.grids) {
+  PendingChanges types(followed_types, scene.types);
+  PendingChanges changes(followed_scene, scene);
+  bool is_any = changes->all || !types->empty();
+  if (changes->all) followed_grids.clear();
+  for (const GridHandle handle : changes->all ? scene.grids().handles() : changes->grids) {
     const SceneGrid* grid = scene.grids().find(handle);
     if (grid == nullptr) {
       is_any |= followed_grids.erase(handle) > 0;
@@ -112,6 +112,8 @@ bool LiveLight::Impl::read_changes(const Scene& scene) {
     is_any |= grid->grid.has_changed_since(followed.voxels) || grid->field.has_changed_since(followed.field);
     followed = {grid->grid.cursor(), grid->field.cursor()};
   }
+  types.commit();
+  changes.commit();
   return is_any;
 }
 

@@ -219,7 +219,7 @@ StreamedWorld::Impl::Streamed& StreamedWorld::Impl::add_streamed(GridHandle hand
 }
 
 void StreamedWorld::Impl::follow_instances() {
-  const SceneChanges changes = scene().changes_since(followed_scene);
+  PendingChanges changes(followed_scene, scene());
   const auto follow = [&](InstanceHandle handle) {
     const Instance* const instance = scene().instances().find(handle);
     const auto was = grid_of_instance.find(handle);
@@ -233,13 +233,12 @@ void StreamedWorld::Impl::follow_instances() {
     grid_of_instance[handle] = *number;
     streamed(*number)->placements.put(handle);
   };
-  if (changes.all) {
+  if (changes->all) {
     for (auto& [number, grid] : grids) grid.placements.clear();
     grid_of_instance.clear();
-    for (const InstanceHandle handle : scene().instances().handles()) follow(handle);
-    return;
   }
-  for (const InstanceHandle handle : changes.instances) follow(handle);
+  for (const InstanceHandle handle : changes->all ? scene().instances().handles() : changes->instances) follow(handle);
+  changes.commit();
 }
 
 Eyes StreamedWorld::Impl::eyes_of(std::span<const Viewer> viewers) {
