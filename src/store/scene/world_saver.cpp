@@ -36,14 +36,6 @@ struct Numbers {
     if (is_new) ++next;
     return found->second;
   }
-  /// Removes an element and returns its number.
-  std::optional<std::int64_t> take(Handle<T> handle) {
-    const auto found = numbers.find(handle);
-    if (found == numbers.end()) return std::nullopt;
-    const std::int64_t number = found->second;
-    numbers.erase(found);
-    return number;
-  }
   void add(Handle<T> handle, std::int64_t number) {
     QUOIN_ASSERT(number >= 0 && !numbers.contains(handle), "a number for a new element");
     numbers.emplace(handle, number);
@@ -103,8 +95,8 @@ class Save {
       : world_(world), scene_(scene), state_(state), changes_(changes) {}
 
   Status run() {
-    for (const PartKey& key : std::exchange(state_.pending_removals, {}))
-      remove(key.kind.c_str(), std::get<std::int64_t>(key.id));
+    std::swap(removed_, state_.pending_removals);
+    for (const PartKey& key : removed_) put_removal(key);
     if (state_.needs_full_save) start_anew();
     if (auto done = put_types(); !done) return done;
     SceneChanges changed = scene_.changes_since(state_.scene);
@@ -129,7 +121,7 @@ class Save {
   void give_back() {
     state_.needs_full_save = true;
     state_.is_view_new |= had_view_;
-    std::ranges::move(removed_, std::back_inserter(state_.pending_removals));
+    std::swap(removed_, state_.pending_removals);
   }
 
  private:
@@ -140,13 +132,22 @@ class Save {
     for (auto& [handle, grid] : state_.grids) grid.voxels = grid.data = grid.densities = {};
   }
 
-  void remove(const char* kind, std::int64_t number) {
-    if (kind == std::string_view(part::kGrid)) {
+  void put_removal(const PartKey& key) {
+    const auto number = std::get<std::int64_t>(key.id);
+    if (key.kind == part::kGrid) {
       changes_.remove_grid(static_cast<std::uint32_t>(number));
     } else {
-      WorldParts::remove(changes_, kind, number);
+      WorldParts::remove(changes_, key.kind.c_str(), number);
     }
-    removed_.push_back({kind, number});
+  }
+  void remove(const char* kind, std::int64_t number) { put_removal(removed_.emplace_back(PartKey{kind, number})); }
+  // Removes an element that the scene does not have any more.
+  template <class T>
+  void remove(const char* kind, Numbers<T>& numbers, Handle<T> handle) {
+    const auto found = numbers.numbers.find(handle);
+    if (found == numbers.numbers.end()) return;
+    remove(kind, found->second);
+    numbers.numbers.erase(found);
   }
 
   Status put_types() {
@@ -198,8 +199,8 @@ class Save {
     for (const Handle<T> handle : handles) {
       if (const T* const found = map.find(handle)) {
         WorldParts::put(changes_, kind, numbers.of(handle), text_of(*found));
-      } else if (const auto number = numbers.take(handle)) {
-        remove(kind, *number);
+      } else {
+        remove(kind, numbers, handle);
       }
     }
   }
@@ -218,7 +219,7 @@ class Save {
     for (const GroupHandle handle : handles) {
       const SceneGroup* const group = scene_.groups().find(handle);
       if (group == nullptr) {
-        if (const auto number = state_.groups.take(handle)) remove(part::kGroup, *number);
+        remove(part::kGroup, state_.groups, handle);
         continue;
       }
       const std::string text = text_of(SceneFile::Group{*group, number_of(state_.groups, parent_of(scene_, handle)),
@@ -230,7 +231,7 @@ class Save {
   Status put_instance(InstanceHandle handle) {
     const Instance* const instance = scene_.instances().find(handle);
     if (instance == nullptr) {
-      if (const auto number = state_.instances.take(handle)) remove(part::kInstance, *number);
+      remove(part::kInstance, state_.instances, handle);
       return {};
     }
     const auto grid = state_.grids.find(instance->grid);
@@ -246,7 +247,7 @@ class Save {
 
   Status put_grid(GridHandle handle) {
     const SceneGrid* const grid = scene_.grids().find(handle);
-    const auto known = state_.grids.find(handle);
+    auto known = state_.grids.find(handle);
     if (grid == nullptr) {
       if (known == state_.grids.end()) return {};
       remove(part::kGrid, known->second.number);
@@ -254,8 +255,12 @@ class Save {
       return {};
     }
     const bool is_new = known == state_.grids.end();
-    SavedGrid& saved = is_new ? state_.grids[handle] : known->second;
-    if (is_new) saved.number = world_.next_grid();
+    if (is_new) {
+      const std::uint32_t number = world_.next_grid();
+      known = state_.grids.try_emplace(handle).first;
+      known->second.number = number;
+    }
+    SavedGrid& saved = known->second;
     const WorldGrid header{grid->name, grid->pivot, grid->canvas, grid->field.band()};
     if (is_new || state_.needs_full_save || header != saved.header) changes_.put_grid(saved.number, header);
     saved.header = header;
@@ -364,10 +369,16 @@ Result<SaveTicket> WorldSaver::save(WorldStore& world, const Scene& scene, World
                                     std::function<void(const Status&)> on_saved) {
   QUOIN_ASSERT(impl_ != nullptr && world.is_writable(), "a saver, and a world opened for writing");
   Save saving(world, scene, impl_->state, more);
-  const Status put = saving.run();
-  Result<SaveTicket> ticket = put ? world.save(std::move(more), std::move(on_saved)) : Result<SaveTicket>(put.error());
-  if (!ticket) saving.give_back();
-  return ticket;
+  try {
+    const Status put = saving.run();
+    Result<SaveTicket> ticket =
+        put ? world.save(std::move(more), std::move(on_saved)) : Result<SaveTicket>(put.error());
+    if (!ticket) saving.give_back();
+    return ticket;
+  } catch (...) {
+    saving.give_back();
+    throw;
+  }
 }
 
 void WorldSaver::set_view(WorldView view) {
