@@ -347,6 +347,15 @@ bool is_drawn(const Scene& scene, const Instance& instance, InstanceFilter filte
   return passes(filter, scene, instance) && scene.grids().find(instance.grid) != nullptr;
 }
 
+std::vector<GridHandle> drawn_grids(const Scene& scene, InstanceFilter filter) {
+  std::vector<GridHandle> grids;
+  scene.instances().for_each([&](InstanceHandle, const Instance& instance) {
+    if (is_drawn(scene, instance, filter)) grids.push_back(instance.grid);
+  });
+  sort_and_unite(grids);
+  return grids;
+}
+
 DVec3 world_from_grid(const Instance& instance, const SceneGrid& grid, DVec3 point_in_grid) {
   return instance.position + world_axes(instance) * ((point_in_grid - grid.pivot) * instance.voxel_size);
 }

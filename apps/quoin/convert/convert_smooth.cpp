@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 #include <glm/gtc/matrix_transform.hpp>
 
@@ -41,15 +40,9 @@ SmoothSceneOptions scene_options(const ConvertOptions& options) {
 /// Warns if the output loses glow or transparency: outside glTF, vertex colours have no emission, and .obj and .ply
 /// have no alpha.
 void warn_of_looks(const Scene& scene, const ConvertOptions& options, std::vector<std::string>& warnings) {
-  const InstanceFilter filter = options.common.instances();
-  std::set<GridHandle> drawn;
-  for (const InstanceHandle handle : scene.instances().handles()) {
-    const Instance& instance = scene.instances()[handle];
-    if (is_drawn(scene, instance, filter)) drawn.insert(instance.grid);
-  }
   bool is_lost = false;
   bool is_transparent = false;
-  for (const GridHandle grid : drawn) {
+  for (const GridHandle grid : drawn_grids(scene, options.common.instances())) {
     for (const VoxelType type : scene.grids()[grid].grid.types()) {
       is_lost |= type != kAir && type < scene.types.size() && scene.types[type].emission > 0.0F;
       is_transparent |= scene.types.is_transparent(type);

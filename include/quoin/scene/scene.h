@@ -260,6 +260,8 @@ void move_group(Scene& scene, GroupHandle group, DVec3 position, const DQuat& ro
 
 /// Returns true if an instance's grid exists and `filter` accepts the instance. Does not check the transform.
 [[nodiscard]] bool is_drawn(const Scene& scene, const Instance& instance, InstanceFilter filter);
+/// Returns the grids that drawn instances place, each once, in handle order. Cost: O(instances).
+[[nodiscard]] std::vector<GridHandle> drawn_grids(const Scene& scene, InstanceFilter filter);
 
 /// Returns the grid's axes in the world, as columns: the rotation after the mirror, without the voxels' size. Exact for
 /// quarter turns, whose quaternions hold the irrational square root of one half.

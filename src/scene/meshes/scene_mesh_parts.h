@@ -17,9 +17,6 @@ namespace quoin {
 /// Checks the drawn instances. Errors: InvalidArgument, naming the first instance with an invalid placement.
 [[nodiscard]] Status check_instances(const Scene& scene, InstanceFilter filter);
 
-/// Returns the grids that drawn instances place, each once, in handle order.
-[[nodiscard]] std::vector<GridHandle> drawn_grids(const Scene& scene, InstanceFilter filter);
-
 /// Returns an instance's transform from points relative to its grid's pivot to the world, with a unit rotation.
 [[nodiscard]] Similarity similarity_of(const Instance& instance);
 

@@ -340,17 +340,6 @@ Status check_instances(const Scene& scene, InstanceFilter filter) {
   return {};
 }
 
-std::vector<GridHandle> drawn_grids(const Scene& scene, InstanceFilter filter) {
-  std::vector<GridHandle> grids;
-  for (const InstanceHandle handle : scene.instances().handles()) {
-    const Instance& instance = scene.instances()[handle];
-    if (is_drawn(scene, instance, filter)) grids.push_back(instance.grid);
-  }
-  std::sort(grids.begin(), grids.end());
-  grids.erase(std::unique(grids.begin(), grids.end()), grids.end());
-  return grids;
-}
-
 Similarity similarity_of(const Instance& instance) {
   return {instance.position, unit_rotation(instance.rotation), instance.voxel_size, instance.mirrored};
 }

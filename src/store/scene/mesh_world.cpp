@@ -538,11 +538,7 @@ Result<WorldMeshes> mesh_world(const WorldStore& world, const LoadedWorld& loade
 Result<FaceCounts> count_world_faces(const WorldStore& world, const LoadedWorld& loaded, InstanceFilter filter,
                                      Threads threads, const Progress& progress) {
   const Scene& scene = loaded.loaded.scene;
-  std::set<GridHandle> drawn;
-  for (const InstanceHandle handle : scene.instances().handles()) {
-    const Instance& instance = scene.instances()[handle];
-    if (is_drawn(scene, instance, filter)) drawn.insert(instance.grid);
-  }
+  const std::vector<GridHandle> drawn = drawn_grids(scene, filter);
   FaceCounts counts;
   std::size_t done = 0;
   for (const GridHandle grid : drawn) {
