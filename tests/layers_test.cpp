@@ -35,6 +35,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"io/scene_file/scene_parts.h", {"store"}},
     {"scene/surfaces.h", {"io", "render"}},
     {"scene/frustum.h", {"render"}},
+    {"scene/scene_follower.h", {"live"}},
     {"scene/tracer/placed_grid.h", {"render"}},
     {"scene/tracer/scene_view.h", {"render"}},
     {"scene/tracer/instance_tree.h", {"render"}},
@@ -51,7 +52,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
 };
 
 // Pairs of a lent header and its user. Lower it when a pair goes; a higher number needs a reason in docs/decisions.
-constexpr std::size_t kMaxLoans = 31;
+constexpr std::size_t kMaxLoans = 32;
 
 // A folder with more files should be split.
 constexpr int kMaxFiles = 32;

@@ -41,6 +41,7 @@ MeshScheduler::MeshScheduler(const LiveMeshOptions& options, MeshJobQueue::Work 
       surface_options_(surface_options(options)),
       workers_(worker_count(options.workers)),
       max_ahead_(jobs_ahead(options.style, workers_)),
+      drawn_(options.instances, SceneFollower::Transforms::Valid),
       queue_(workers_, std::move(work), options.on_ready) {}
 
 void MeshScheduler::throw_failure() {
@@ -66,7 +67,7 @@ void MeshScheduler::update(const Scene& scene, DVec3 eye, std::span<const DVec3>
 // Memory ran out during an update. Starting from scratch recovers all lost changes.
 void MeshScheduler::forget() {
   for (auto& [key, source] : sources_) source->forget();
-  followed_scene_ = {};
+  drawn_.forget();
 }
 
 void MeshScheduler::update_or_throw(const Scene& scene) {
@@ -79,7 +80,7 @@ void MeshScheduler::update_or_throw(const Scene& scene) {
   for (auto& [key, live] : sources_) {
     const SceneGrid* const grid = scene.grids().find(key.grid);
     if (grid == nullptr) continue;
-    if (std::binary_search(drawn_.begin(), drawn_.end(), key.grid)) live->mark_types(*grid, changed_types, now);
+    if (drawn_.places(key.grid)) live->mark_types(*grid, changed_types, now);
     live->prepare(*grid, scene.types);
   }
   withdraw([&](const SurfaceJob& job) {
@@ -128,37 +129,30 @@ void MeshScheduler::choose_levels(const Scene& scene, SurfaceClock::time_point n
 
 // Returns the drawn grids that may have changed.
 std::vector<GridHandle> MeshScheduler::follow_scene(const Scene& scene) {
-  ChangeCursor now = followed_scene_;
-  const SceneChanges changes = scene.changes_since(now);
-  followed_scene_ = now;
-  const auto is_gone = [&](GridHandle handle) { return scene.grids().find(handle) == nullptr; };
-  const bool may_draw_others =
-      changes.all || !changes.instances.empty() || std::any_of(changes.grids.begin(), changes.grids.end(), is_gone);
-  if (!may_draw_others) {
-    std::vector<GridHandle> changed;
-    std::set_intersection(changes.grids.begin(), changes.grids.end(), drawn_.begin(), drawn_.end(),
-                          std::back_inserter(changed));
-    return changed;
+  SceneFollower::Update update(drawn_, scene);
+  std::vector<GridHandle> drawn;
+  std::copy_if(update.touched().begin(), update.touched().end(), std::back_inserter(drawn),
+               [&](GridHandle handle) { return drawn_.places(handle); });
+  if (update.has_other_instances()) {
+    are_places_new_ = true;
+    for (auto& [key, source] : sources_) {
+      if (!drawn_.places(key.grid)) source->leave();
+    }
+    std::erase_if(sources_,
+                  [&](const auto& each) { return !each.second->has_chunks() && !drawn_.places(each.first.grid); });
   }
-  drawn_ = drawn_grids(scene);
-  are_places_new_ = true;
-  const auto is_drawn = [&](GridHandle handle) { return std::binary_search(drawn_.begin(), drawn_.end(), handle); };
-  for (auto& [key, source] : sources_) {
-    if (!is_drawn(key.grid)) source->leave();
-  }
-  std::erase_if(sources_, [&](const auto& each) { return !each.second->has_chunks() && !is_drawn(each.first.grid); });
-  return drawn_;
+  update.commit();
+  return drawn;
 }
 
 // Follows the type registry. If the registry is new, all types count as changed, including types it does not contain.
 ChangedTypes MeshScheduler::follow_types(const VoxelRegistry& types) {
-  ChangeCursor now = followed_types_;
-  const TypeChanges changes = types.changes_since(now);
+  PendingChanges changes(followed_types_, types);
   ChangedTypes changed;
-  if (changes.empty()) return changed;
+  if (changes->empty()) return changed;
   const auto add = [&](std::vector<bool>& to, bool TypeChange::*matters) {
-    if (changes.all) to.assign(kMaxVoxelTypes + 1, true);
-    for (const TypeChange& change : changes.items) {
+    if (changes->all) to.assign(kMaxVoxelTypes + 1, true);
+    for (const TypeChange& change : changes->items) {
       if (!(change.*matters)) continue;
       to.resize(types.size());
       to[change.type] = true;
@@ -169,24 +163,8 @@ ChangedTypes MeshScheduler::follow_types(const VoxelRegistry& types) {
   if (!changed.visibility.empty()) types_.registry = std::make_shared<const VoxelRegistry>(types);
   if (!changed.colour.empty()) types_.materials = std::make_shared<const SurfaceMaterials>(types);
   if (!changed.visibility.empty() || !changed.colour.empty()) ++types_.generation;
-  followed_types_ = now;
+  changes.commit();
   return changed;
-}
-
-// Sorted, each once.
-std::vector<GridHandle> MeshScheduler::drawn_grids(const Scene& scene) const {
-  std::vector<GridHandle> drawn;
-  std::vector<bool> is_known;
-  scene.instances().for_each([&](InstanceHandle, const Instance& instance) {
-    const std::size_t index = instance.grid.index;
-    if (index < is_known.size() && is_known[index]) return;
-    if (!is_placed(scene, instance, options_.instances)) return;
-    if (is_known.size() <= index) is_known.resize(index + 1);
-    is_known[index] = true;
-    drawn.push_back(instance.grid);
-  });
-  std::sort(drawn.begin(), drawn.end());
-  return drawn;
 }
 
 void MeshScheduler::collect() {

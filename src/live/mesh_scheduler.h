@@ -16,6 +16,7 @@
 
 #include "live/mesh_job_queue.h"
 #include "render/chunks/surface_source.h"
+#include "scene/scene_follower.h"
 
 namespace quoin {
 
@@ -48,7 +49,6 @@ class MeshScheduler {
   void update_or_throw(const Scene& scene);
   void throw_failure();
   [[nodiscard]] ChangedTypes follow_types(const VoxelRegistry& types);
-  [[nodiscard]] std::vector<GridHandle> drawn_grids(const Scene& scene) const;
   [[nodiscard]] std::vector<GridHandle> follow_scene(const Scene& scene);
   void follow_grid(const Scene& scene, GridHandle handle, SurfaceClock::time_point now);
   void follow_light(SurfaceClock::time_point now);
@@ -74,8 +74,7 @@ class MeshScheduler {
   const SceneLight* light_ = nullptr;  // of the caller
   ChangeCursor followed_types_;
   SurfaceClock::time_point renewed_{};
-  ChangeCursor followed_scene_;
-  std::vector<GridHandle> drawn_;  // sorted
+  SceneFollower drawn_;
   Sources sources_;
   std::vector<DVec3> eyes_;
   bool are_places_new_ = true;  // eyes or instances moved since levels were last chosen

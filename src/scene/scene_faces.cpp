@@ -11,6 +11,7 @@
 #include <quoin/mesh/blocky.h>
 
 #include "core/moved_from.h"
+#include "scene/scene_follower.h"
 
 namespace quoin {
 namespace {
@@ -19,8 +20,7 @@ struct GridFaces {
   ChangeCursor read;
   std::unordered_map<IVec3, std::int64_t, CoordinateHash> visible_of;  // chunks with a visible face
   std::int64_t visible = 0;
-  std::size_t placements = 0;  // drawn instances
-  FaceCounts counted;          // the part included in the scene's counts
+  FaceCounts counted;  // the part included in the scene's counts
 
   void put(IVec3 chunk, std::int64_t count) {
     QUOIN_ASSERT(count >= 0, "a count that is not negative");
@@ -61,35 +61,19 @@ void count_chunks(std::vector<ChunkCount>& chunks, std::size_t first, std::size_
 }  // namespace
 
 struct SceneFaces::Impl {
-  InstanceFilter filter = InstanceFilter::Visible;
-  ChangeCursor scene_read;
+  explicit Impl(InstanceFilter filter) : follower(filter) {}
+
+  SceneFollower follower;
   ChangeCursor types_read;
-  std::map<GridHandle, GridFaces> grids;       // includes grids that no drawn instance places any more
-  std::map<InstanceHandle, GridHandle> drawn;  // the grid of each drawn instance
+  std::map<GridHandle, GridFaces> grids;  // includes grids that no drawn instance places any more
   FaceCounts counts;
   std::optional<BlockyMesher> mesher;  // for the few chunks around an edit
 
-  std::vector<GridHandle> touched_by(const Scene& scene, const SceneChanges& changes);
   void forget_those_with(const TypeChanges& types, const Scene& scene, std::vector<GridHandle>& touched);
-  void look_at(const Scene& scene, InstanceHandle handle, std::vector<GridHandle>& touched);
   void follow(const Scene& scene, GridHandle handle, std::vector<ChunkCount>& chunks);
   void count(std::vector<ChunkCount>& chunks, const VoxelRegistry& types, Threads threads);
   void count_in(const Scene& scene, GridHandle handle);
 };
-
-// Returns the grids whose counts may have changed.
-std::vector<GridHandle> SceneFaces::Impl::touched_by(const Scene& scene, const SceneChanges& changes) {
-  std::vector<GridHandle> touched = changes.grids;
-  std::vector<InstanceHandle> instances = changes.instances;
-  if (changes.all) {
-    grids.clear();
-    drawn.clear();
-    counts = {};
-    instances = scene.instances().handles();
-  }
-  for (const InstanceHandle handle : instances) look_at(scene, handle, touched);
-  return touched;
-}
 
 // Grids with voxels of types that became opaque or transparent are counted from scratch.
 void SceneFaces::Impl::forget_those_with(const TypeChanges& types, const Scene& scene,
@@ -102,28 +86,11 @@ void SceneFaces::Impl::forget_those_with(const TypeChanges& types, const Scene& 
   }
 }
 
-// Records the grid that an instance places, if it is drawn, and adds that grid and the previous one to `touched`.
-void SceneFaces::Impl::look_at(const Scene& scene, InstanceHandle handle, std::vector<GridHandle>& touched) {
-  if (const auto before = drawn.find(handle); before != drawn.end()) {
-    GridFaces& faces = grids[before->second];
-    QUOIN_ASSERT(faces.placements > 0, "a counted placement");
-    --faces.placements;
-    touched.push_back(before->second);
-    drawn.erase(before);
-  }
-  const Instance* instance = scene.instances().find(handle);
-  if (instance == nullptr || !is_drawn(scene, *instance, filter)) return;
-  drawn[handle] = instance->grid;
-  ++grids[instance->grid].placements;
-  touched.push_back(instance->grid);
-}
-
 // Adds the chunks of a grid that must be counted again.
 void SceneFaces::Impl::follow(const Scene& scene, GridHandle handle, std::vector<ChunkCount>& chunks) {
   const SceneGrid* entry = scene.grids().find(handle);
-  const auto found = grids.find(handle);
-  if (entry == nullptr || found == grids.end() || found->second.placements == 0) return;
-  GridFaces& faces = found->second;
+  if (entry == nullptr || !follower.places(handle)) return;
+  GridFaces& faces = grids[handle];
   const GridChanges changes = entry->grid.changes_since(faces.read);
   if (changes.all) {
     faces.visible_of.clear();
@@ -160,14 +127,12 @@ void SceneFaces::Impl::count_in(const Scene& scene, GridHandle handle) {
     grids.erase(found);
     return;
   }
-  if (faces.placements == 0) return;
+  if (!follower.places(handle)) return;
   faces.counted = {faces.visible, 6 * entry->grid.voxel_count()};
   counts += faces.counted;
 }
 
-SceneFaces::SceneFaces(InstanceFilter filter) : impl_(std::make_unique<Impl>()) {
-  impl_of(impl_).filter = filter;
-}
+SceneFaces::SceneFaces(InstanceFilter filter) : impl_(std::make_unique<Impl>(filter)) {}
 SceneFaces::SceneFaces(SceneFaces&&) noexcept = default;
 SceneFaces& SceneFaces::operator=(SceneFaces&&) noexcept = default;
 SceneFaces::~SceneFaces() = default;
@@ -177,24 +142,25 @@ const FaceCounts& SceneFaces::counts() const {
 }
 
 const FaceCounts& SceneFaces::update(const Scene& scene, Threads threads) {
-  ChangeCursor scene_read = impl_of(impl_).scene_read;
-  ChangeCursor types_read = impl_of(impl_).types_read;
-  const SceneChanges changes = scene.changes_since(scene_read);
-  const TypeChanges types = scene.types.changes_since(types_read);
-  if (changes.empty() && types.empty()) return impl_of(impl_).counts;
-  impl_of(impl_).scene_read = impl_of(impl_).types_read = {};  // stays empty if memory runs out
-  std::vector<GridHandle> touched = impl_of(impl_).touched_by(scene, changes);
-  if (has_other_visibility(types)) impl_of(impl_).forget_those_with(types, scene, touched);
+  Impl& me = impl_of(impl_);
+  PendingChanges types(me.types_read, scene.types);
+  SceneFollower::Update update(me.follower, scene);
+  if (update.all()) {
+    me.grids.clear();
+    me.counts = {};
+  }
+  std::vector<GridHandle> touched(update.touched().begin(), update.touched().end());
+  if (has_other_visibility(*types)) me.forget_those_with(*types, scene, touched);
   std::sort(touched.begin(), touched.end());
   touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
   std::vector<ChunkCount> chunks;
-  for (const GridHandle handle : touched) impl_of(impl_).follow(scene, handle, chunks);
-  impl_of(impl_).count(chunks, scene.types, threads);
+  for (const GridHandle handle : touched) me.follow(scene, handle, chunks);
+  me.count(chunks, scene.types, threads);
   for (const ChunkCount& counted : chunks) counted.faces->put(counted.chunk, counted.visible);
-  for (const GridHandle handle : touched) impl_of(impl_).count_in(scene, handle);
-  impl_of(impl_).scene_read = scene_read;
-  impl_of(impl_).types_read = types_read;
-  return impl_of(impl_).counts;
+  for (const GridHandle handle : touched) me.count_in(scene, handle);
+  types.commit();
+  update.commit();
+  return me.counts;
 }
 
 FaceCounts count_faces(const Scene& scene, InstanceFilter filter, Threads threads) {

@@ -11,6 +11,7 @@
 
 #include "core/coordinates/chunk_order.h"
 #include "core/moved_from.h"
+#include "scene/scene_follower.h"
 #include "scene/smooth/marched_density.h"
 
 namespace quoin {
@@ -54,9 +55,11 @@ std::size_t chunk_count(const Scene& scene) {
 }  // namespace
 
 struct SmoothScene::Impl {
+  explicit Impl(const SmoothFieldOptions& given) : options(given), follower(given.instances) {}
+
   SmoothFieldOptions options;
   Scene scene;
-  ChangeCursor scene_read;
+  SceneFollower follower;
   ChangeCursor types_read;
   std::map<GridHandle, GridFields> grids;  // placed by drawn instances
   bool is_placed_anew = true;              // the instances or the set of grids changed
@@ -72,9 +75,7 @@ struct SmoothScene::Impl {
   Error refuse(const Scene& of);
 };
 
-SmoothScene::SmoothScene(const SmoothFieldOptions& options) : impl_(std::make_unique<Impl>()) {
-  impl_of(impl_).options = options;
-}
+SmoothScene::SmoothScene(const SmoothFieldOptions& options) : impl_(std::make_unique<Impl>(options)) {}
 SmoothScene::SmoothScene(SmoothScene&&) noexcept = default;
 SmoothScene& SmoothScene::operator=(SmoothScene&&) noexcept = default;
 SmoothScene::~SmoothScene() = default;
@@ -89,43 +90,37 @@ std::size_t SmoothScene::bytes() const {
 
 // Records the outdated chunks. Makes nothing yet.
 void SmoothScene::Impl::follow(const Scene& of) {
-  const SceneChanges changes = of.changes_since(scene_read);
-  if (changes.all || !changes.instances.empty() || !changes.groups.empty() || !changes.layers.empty()) {
-    is_placed_anew = true;
-  }
+  SceneFollower::Update update(follower, of);
+  is_placed_anew |= update.has_other_instances();
   if (has_other_visibility(of.types.changes_since(types_read))) {
     for (auto& [handle, fields] : grids) fields.voxels_read = {};
   }
-  if (is_placed_anew) {
-    std::map<GridHandle, GridFields> drawn;
-    for (const InstanceHandle handle : of.instances().handles()) {
-      const Instance& instance = of.instances()[handle];
-      if (!is_drawn(of, instance, options.instances) || drawn.contains(instance.grid)) continue;
-      const auto known = grids.find(instance.grid);
-      drawn.emplace(instance.grid, known == grids.end() ? GridFields{} : std::move(known->second));
+  for (const GridHandle grid : update.touched()) {
+    if (follower.places(grid)) {
+      grids.try_emplace(grid);
+    } else {
+      grids.erase(grid);
     }
-    grids = std::move(drawn);
   }
+  update.commit();
   for (auto& [handle, fields] : grids) follow_grid(of.grids()[handle], fields);
 }
 
 void SmoothScene::Impl::follow_grid(const SceneGrid& grid, GridFields& fields) {
   const DVec3 pivot = std::exchange(fields.pivot, grid.pivot);
   if (pivot != grid.pivot) is_placed_anew = true;
-  if (grid.field.has_changed_since(fields.field_read)) {
-    (void)grid.field.changes_since(fields.field_read);
-    fields.is_field_new = true;
-  }
-  const GridChanges changes = grid.grid.changes_since(fields.voxels_read);
-  if (changes.empty()) return;
-  if (changes.all) {
+  fields.is_field_new |= !grid.field.changes_since(fields.field_read).empty();
+  PendingChanges changes(fields.voxels_read, grid.grid);
+  if (changes->empty()) return;
+  if (changes->all) {
     fields.made = DensityGrid();
     fields.to_make.clear();
     add_all_near(grid.grid, fields.to_make);
   }
-  for (const ChunkChange& change : changes.items) add_reached(change, fields.to_make);
+  for (const ChunkChange& change : changes->items) add_reached(change, fields.to_make);
   sort_and_unite(fields.to_make);
   fields.is_made_new = true;
+  changes.commit();
 }
 
 Status SmoothScene::update(const Scene& of, Threads threads, const Progress& progress) {
@@ -192,7 +187,7 @@ void SmoothScene::Impl::make_some(const Grid& grid, const VoxelRegistry& types, 
 Error SmoothScene::Impl::refuse(const Scene& of) {
   grids.clear();
   scene = Scene();
-  scene_read = {};
+  follower.forget();
   bytes = 0;
   is_placed_anew = true;
   return Error{ErrorCode::LimitExceeded,
@@ -245,13 +240,14 @@ void SmoothScene::Impl::renew_fields(const Scene& of) {
   });
   if (is_other) return place_all(of);
   for (auto& [handle, fields] : grids) {
-    if (std::exchange(fields.is_made_new, false) && fields.made.chunk_count() > 0) {
+    if (fields.is_made_new && fields.made.chunk_count() > 0) {
       scene.edit(fields.of_voxels).field = fields.made.snapshot();
     }
     const DensityGrid& field = of.grids()[handle].field;
-    if (std::exchange(fields.is_field_new, false) && field.chunk_count() > 0) {
+    if (fields.is_field_new && field.chunk_count() > 0) {
       scene.edit(fields.of_field).field = field.snapshot();
     }
+    fields.is_made_new = fields.is_field_new = false;
   }
 }
 
