@@ -1,0 +1,475 @@
+// Consumers of changes stay correct if memory runs out during an update. This file replaces `operator new` of the test
+// program, so that a chosen allocation of the calling thread fails.
+
+#include <algorithm>
+#include <cstdint>
+#include <cstdlib>
+#include <functional>
+#include <map>
+#include <memory>
+#include <new>
+#include <optional>
+#include <random>
+#include <set>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+
+#include <quoin/grid/connected.h>
+#include <quoin/grid/downsample.h>
+#include <quoin/live/live_light.h>
+#include <quoin/live/live_meshes.h>
+#include <quoin/render/scene_light.h>
+#include <quoin/scene/level_of_detail.h>
+#include <quoin/scene/scene_faces.h>
+#include <quoin/scene/scene_query.h>
+#include <quoin/scene/scene_tracer.h>
+#include <quoin/scene/smooth_scene.h>
+#include <quoin/scene/solid_shapes.h>
+#include <quoin/store/world_saver.h>
+
+#include "core/coordinates/chunk_order.h"
+#include "live/live_test_support.h"
+#include "render/light/emissive_cells.h"
+#include "render/light/surface/light_bricks.h"
+#include "scene/surfaces.h"
+#include "store/world/world_for_tests.h"
+
+namespace {
+
+constinit thread_local std::int64_t allocations_left = -1;  // before one fails; negative: none fails
+
+}  // namespace
+
+void* operator new(std::size_t bytes) {
+  if (allocations_left >= 0 && allocations_left-- == 0) throw std::bad_alloc();
+  if (void* const memory = std::malloc(bytes == 0 ? 1 : bytes)) return memory;
+  throw std::bad_alloc();
+}
+void operator delete(void* memory) noexcept {
+  std::free(memory);
+}
+void operator delete(void* memory, std::size_t) noexcept {
+  std::free(memory);
+}
+
+namespace quoin {
+namespace {
+
+constexpr VoxelType kStone = 1;
+constexpr VoxelType kLamp = 2;
+constexpr VoxelType kGlass = 3;
+
+/// A scene of a few small grids, and random edits of all parts that consumers follow.
+class BusyScene {
+ public:
+  BusyScene() {
+    for (const auto& [visibility, emission] :
+         {std::pair{Visibility::Opaque, 0.0F}, {Visibility::Opaque, 1.0F}, {Visibility::Transparent, 0.0F}}) {
+      VoxelProperties properties;
+      properties.name = "type " + std::to_string(scene.types.size());
+      properties.colour = {200, 150, 90, 120};
+      properties.visibility = visibility;
+      properties.emission = emission;
+      EXPECT_TRUE(scene.types.add(properties));
+    }
+    for (int i = 0; i < 3; ++i) {
+      SceneGrid grid;
+      grid.grid.fill_box({{58, 0, 0}, {70, 3, 9}}, kStone);
+      grid.grid.set({60, 3, 4}, kLamp);
+      if (i == 1) fill_field(grid.field, {20, 1, 4});
+      scene.add_instance({.name = "", .grid = scene.add_grid(std::move(grid)), .position = {20.0 * i, 0.0, 1.0 * i}});
+    }
+  }
+
+  void edit() {
+    for (int i = 0; i < 3; ++i) {
+      const auto grids = scene.grids().handles();
+      const auto instances = scene.instances().handles();
+      SceneGrid& grid = scene.edit(grids[below(grids.size())]);
+      switch (below(9)) {
+        case 0:
+        case 1:
+        case 2:
+          grid.grid.set(voxel(), static_cast<VoxelType>(below(4)));
+          break;
+        case 3:
+          grid.grid.fill_box({{56, 4, 2}, voxel() + IVec3(1, 2, 1)}, kGlass);
+          break;
+        case 4:
+          if (grid.field.chunk_count() != 0) fill_field(grid.field, voxel());
+          break;
+        case 5:
+          scene.add_instance({.name = "", .grid = grids[below(grids.size())], .position = DVec3(voxel())});
+          break;
+        case 6: {
+          Instance& instance = scene.edit(instances[below(instances.size())]);
+          instance.visible = below(3) != 0;
+          instance.position.y += 1.0;
+          break;
+        }
+        case 7:
+          if (instances.size() > 4) scene.remove_instance(instances[below(instances.size())]);
+          break;
+        default: {
+          VoxelProperties properties = scene.types[kGlass];
+          properties.visibility = below(2) == 0 ? Visibility::Opaque : Visibility::Transparent;
+          properties.collides = below(2) == 0;
+          properties.colour.r = static_cast<std::uint8_t>(below(256));
+          scene.types.replace(kGlass, properties);
+        }
+      }
+    }
+  }
+  /// Returns the first grid, which has no field.
+  [[nodiscard]] const Grid& grid() const { return scene.grids()[scene.grids().handles().front()].grid; }
+
+  Scene scene;
+
+ private:
+  std::size_t below(std::size_t end) { return random_() % end; }
+  IVec3 voxel() {
+    const auto number = [&](std::size_t end) { return static_cast<int>(below(end)); };
+    return {56 + number(16), number(8), number(10)};
+  }
+  static void fill_field(DensityGrid& field, IVec3 centre) {
+    field.edit({centre - 5, centre + 6}, [&](IVec3 sample, DensitySample before) {
+      const float distance = glm::length(Vec3(sample - centre)) - 3.0F;
+      return distance < before.density ? DensitySample{distance, kStone} : before;
+    });
+  }
+
+  std::mt19937 random_{11};
+};
+
+/// Calls `update` after edits while the n-th allocation fails, for growing n, then again without a failure, and expects
+/// that `is_current` then returns true. `growth`: of the steps of n.
+void expect_recovery(BusyScene& busy, const std::function<void()>& update, const std::function<bool()>& is_current,
+                     std::int64_t growth = 8) {
+  update();
+  int failures = 0;
+  int successes = 0;
+  for (std::int64_t n = 0; n < 100'000 && successes < 3; n += 1 + n / growth) {
+    busy.edit();
+    allocations_left = n;
+    bool has_failed = false;
+    try {
+      update();
+    } catch (const std::bad_alloc&) {
+      has_failed = true;
+    }
+    successes = std::exchange(allocations_left, -1) >= 0 ? successes + 1 : 0;
+    failures += has_failed ? 1 : 0;
+    if (n % 3 == 0) busy.edit();
+    update();
+    ASSERT_TRUE(is_current()) << "allocation " << n << (has_failed ? " failed" : "");
+  }
+  EXPECT_GT(failures, 2);
+}
+
+TEST(FailedAllocations, KeepSurfaces) {
+  BusyScene busy;
+  Surfaces surfaces(busy.scene.types);
+  expect_recovery(
+      busy, [&] { surfaces.update(busy.scene.types); },
+      [&] {
+        const Surfaces expected(busy.scene.types);
+        return surfaces[kGlass].colour == expected[kGlass].colour && surfaces[kGlass].ior == expected[kGlass].ior;
+      });
+}
+
+TEST(FailedAllocations, KeepFaceCounts) {
+  BusyScene busy;
+  SceneFaces faces;
+  expect_recovery(
+      busy, [&] { faces.update(busy.scene, {1}); },
+      [&] { return faces.counts() == count_faces(busy.scene, InstanceFilter::Visible, {1}); });
+}
+
+// The shapes that a game holds after it has replaced the reported chunks.
+using HeldShapes = std::map<IVec3, std::vector<IBox>, ByZyx>;
+
+void take_shapes(SolidShapes& shapes, const BusyScene& busy, HeldShapes& held) {
+  for (const IVec3 chunk : shapes.update(busy.grid(), busy.scene.types, {1})) {
+    held[chunk] = shapes.boxes(chunk);
+    if (held[chunk].empty()) held.erase(chunk);
+  }
+}
+
+TEST(FailedAllocations, KeepSolidShapes) {
+  BusyScene busy;
+  SolidShapes shapes;
+  HeldShapes held;
+  expect_recovery(
+      busy,
+      [&] {
+        const std::vector<IVec3> changed = shapes.update(busy.grid(), busy.scene.types, {1});
+        const std::int64_t left = std::exchange(allocations_left, -1);
+        for (const IVec3 chunk : changed) {
+          held[chunk] = shapes.boxes(chunk);
+          if (held[chunk].empty()) held.erase(chunk);
+        }
+        allocations_left = left;
+      },
+      [&] {
+        SolidShapes fresh;
+        HeldShapes expected;
+        take_shapes(fresh, busy, expected);
+        return held == expected;
+      });
+}
+
+using Hit = std::tuple<InstanceHandle, IVec3, double>;
+
+std::vector<std::optional<Hit>> hits_of(const SceneTracer& tracer) {
+  std::vector<std::optional<Hit>> hits;
+  for (int x = 0; x < 130; x += 3) {
+    for (int z = 0; z < 12; z += 2) {
+      const auto hit = first_hit(tracer, {{x + 0.4, 50.0, z + 0.3}, {0.01, -1.0, 0.02}});
+      hits.push_back(hit ? std::optional<Hit>({hit->instance, hit->voxel, hit->t}) : std::nullopt);
+    }
+  }
+  return hits;
+}
+
+std::vector<SelectedInstance> all_halved(const Scene& scene) {
+  std::vector<SelectedInstance> selected;
+  for (const InstanceHandle handle : scene.instances().handles()) selected.push_back({handle, Detail::Mid, 1, 100.0});
+  return selected;
+}
+
+TEST(FailedAllocations, KeepTracer) {
+  BusyScene busy;
+  SceneTracer tracer(busy.scene, InstanceFilter::Visible, {1});
+  expect_recovery(
+      busy, [&] { tracer.update({1}); },
+      [&] { return hits_of(tracer) == hits_of(SceneTracer(busy.scene, InstanceFilter::Visible, {1})); });
+}
+
+TEST(FailedAllocations, KeepHalvedGrids) {
+  BusyScene busy;
+  SceneTracer tracer(busy.scene, InstanceFilter::Visible, {1});
+  std::optional<SceneTracer> detailed;
+  const auto halved = [&](const SceneTracer& of) { return of.with_detail(all_halved(busy.scene), {1}); };
+  expect_recovery(
+      busy,
+      [&] {
+        detailed.reset();
+        tracer.update({1});
+        detailed.emplace(halved(tracer));
+      },
+      [&] {
+        const SceneTracer fresh(busy.scene, InstanceFilter::Visible, {1});
+        return hits_of(*detailed) == hits_of(halved(fresh));
+      });
+}
+
+TEST(FailedAllocations, KeepSelectedDetail) {
+  BusyScene busy;
+  Camera camera;
+  camera.position = {40.0, 5.0, 200.0};
+  const auto select = [&](DetailSelector& selector) {
+    std::vector<SelectedInstance> selected;
+    selector.select(busy.scene, camera, 320, 200, {}, selected);
+    return selected;
+  };
+  DetailSelector selector;
+  std::vector<SelectedInstance> selected;
+  expect_recovery(
+      busy, [&] { selected = select(selector); },
+      [&] {
+        DetailSelector fresh;
+        const std::vector<SelectedInstance> expected = select(fresh);
+        return std::equal(selected.begin(), selected.end(), expected.begin(), expected.end(),
+                          [](const SelectedInstance& a, const SelectedInstance& b) {
+                            return a.instance == b.instance && a.level == b.level && a.distance == b.distance;
+                          });
+      });
+}
+
+TEST(FailedAllocations, KeepSmoothScene) {
+  BusyScene busy;
+  SmoothScene smooth;
+  const auto hits = [](const Scene& scene) {
+    std::vector<double> found;
+    for (const std::optional<Hit>& hit : hits_of(SceneTracer(scene, InstanceFilter::Visible, {1}))) {
+      found.push_back(hit ? std::get<2>(*hit) : -1.0);
+    }
+    return found;
+  };
+  expect_recovery(
+      busy, [&] { ASSERT_TRUE(smooth.update(busy.scene, {1})); },
+      [&] {
+        SmoothScene fresh;
+        return fresh.update(busy.scene, {1}) && hits(smooth.scene()) == hits(fresh.scene());
+      },
+      2);
+}
+
+std::vector<LightLevels> levels_of(const SceneLight& light, const Scene& scene) {
+  std::vector<LightLevels> levels;
+  for (const GridHandle grid : scene.grids().handles()) {
+    for (int i = 0; i < 1'000; ++i) {
+      levels.push_back(light.of(grid).light->at({50 + i % 10 * 3, i / 10 % 10 * 2 - 2, i / 100 * 2 - 4}));
+    }
+  }
+  return levels;
+}
+
+TEST(FailedAllocations, KeepLight) {
+  BusyScene busy;
+  SceneLight light;
+  expect_recovery(
+      busy, [&] { light.update(busy.scene, {1}); },
+      [&] {
+        SceneLight fresh;
+        fresh.update(busy.scene, {1});
+        return levels_of(light, busy.scene) == levels_of(fresh, busy.scene);
+      });
+}
+
+TEST(FailedAllocations, KeepLiveLight) {
+  BusyScene busy;
+  LiveLight light;
+  expect_recovery(
+      busy, [&] { light.update(busy.scene); },
+      [&] {
+        light.finish(busy.scene);
+        SceneLight fresh;
+        fresh.update(busy.scene, {1});
+        return levels_of(light.shown(), busy.scene) == levels_of(fresh, busy.scene);
+      });
+}
+
+// The held bricks that let light pass, with their numbers.
+std::map<std::tuple<int, int, int, int>, std::vector<std::uint32_t>> contents_of(const LightBricks& bricks) {
+  std::map<std::tuple<int, int, int, int>, std::vector<std::uint32_t>> contents;
+  for (const LightBricks::Brick& each : bricks.bricks()) {
+    if (each.is_held == 0 || each.what == LightBricks::kAllOpaque) continue;
+    std::vector<std::uint32_t>& numbers = contents[{each.grid, each.brick.x, each.brick.y, each.brick.z}];
+    const auto first = bricks.numbers().begin() + each.what;
+    if ((each.what & LightBricks::kIsUniform) != 0) {
+      numbers = {each.what};
+    } else {
+      numbers.assign(first, first + LightBricks::kNumbers);
+    }
+  }
+  return contents;
+}
+
+TEST(FailedAllocations, KeepLightBricks) {
+  BusyScene busy;
+  SceneLight light;
+  LightBricks bricks;
+  expect_recovery(
+      busy,
+      [&] {
+        const std::int64_t left = std::exchange(allocations_left, -1);
+        light.update(busy.scene, {1});
+        allocations_left = left;
+        bricks.update(busy.scene, light, {1});
+      },
+      [&] {
+        LightBricks fresh;
+        fresh.update(busy.scene, light, {1});
+        return contents_of(bricks) == contents_of(fresh);
+      });
+}
+
+TEST(FailedAllocations, KeepEmissiveCells) {
+  BusyScene busy;
+  EmissiveCells cells;
+  const auto boxes = [](const EmissiveCells& of) {
+    std::vector<IBox> found;
+    of.for_each([&](const EmissiveCell& cell) { found.push_back(cell.box); });
+    return found;
+  };
+  expect_recovery(
+      busy, [&] { cells.update(busy.grid(), busy.scene.types); },
+      [&] {
+        EmissiveCells fresh;
+        fresh.update(busy.grid(), busy.scene.types);
+        return boxes(cells) == boxes(fresh);
+      });
+}
+
+TEST(FailedAllocations, KeepConnectedPieces) {
+  BusyScene busy;
+  ConnectedPieces pieces;
+  expect_recovery(
+      busy, [&] { pieces.update(busy.grid(), {1}); },
+      [&] {
+        ConnectedPieces fresh;
+        fresh.update(busy.grid(), {1});
+        return std::ranges::equal(pieces.pieces(), fresh.pieces(), [](const auto& a, const auto& b) {
+          return a.box == b.box && a.voxels == b.voxels && a.first == b.first;
+        });
+      });
+}
+
+TEST(FailedAllocations, KeepPyramid) {
+  BusyScene busy;
+  GridPyramid pyramid;
+  expect_recovery(
+      busy, [&] { pyramid.update(busy.grid(), busy.scene.types, 2, {1}); },
+      [&] {
+        GridPyramid fresh;
+        fresh.update(busy.grid(), busy.scene.types, 2, {1});
+        if (pyramid.levels() != fresh.levels()) return false;
+        for (int level = 1; level <= fresh.levels(); ++level) {
+          const Grid& a = pyramid.level(level);
+          const Grid& b = fresh.level(level);
+          if (a.voxel_count() != b.voxel_count() || a.bounds() != b.bounds()) return false;
+        }
+        return true;
+      });
+}
+
+TEST(FailedAllocations, KeepLiveMeshes) {
+  BusyScene busy;
+  LiveMeshOptions options;
+  options.workers = {1};
+  LiveMeshes meshes(options);
+  ShownSurfaces shown;
+  expect_recovery(
+      busy, [&] { meshes.update(busy.scene, {}); },
+      [&] {
+        meshes.finish(busy.scene, {});
+        shown.apply(meshes.take());
+        expect_blocky(shown, busy.scene, options);
+        return !testing::Test::HasFailure();
+      });
+}
+
+// A failed save stores nothing; the next one stores everything.
+TEST(FailedAllocations, KeepSavedWorld) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  BusyScene busy;
+  auto world = WorldStore::create(path);
+  ASSERT_TRUE(world);
+  WorldSaver saver;
+  const auto voxels_of = [](const Scene& scene) {
+    std::multiset<std::tuple<std::int64_t, std::int64_t>> found;
+    for (const GridHandle grid : scene.grids().handles()) {
+      found.insert({scene.grids()[grid].grid.voxel_count(), scene.grids()[grid].field.solid_count()});
+    }
+    return found;
+  };
+  expect_recovery(
+      busy, [&] { ASSERT_TRUE(saver.save(*world, busy.scene)); },
+      [&] {
+        if (!world->flush()) return false;
+        const auto loaded = load_world(*world);
+        return loaded && voxels_of(loaded->loaded.scene) == voxels_of(busy.scene) &&
+               loaded->loaded.scene.instances().size() == busy.scene.instances().size() &&
+               loaded->loaded.scene.types[kGlass] == busy.scene.types[kGlass];
+      });
+}
+
+}  // namespace
+}  // namespace quoin
