@@ -11,7 +11,6 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -43,52 +42,113 @@ Rgba8 colour_of(std::uint32_t rgba, bool is_bgra) {
           static_cast<std::uint8_t>(rgba >> 24)};
 }
 
-/// A matrix's size and position. Qubicle gives empty matrices any position.
+constexpr std::uint32_t kRun = 2;
+constexpr std::uint32_t kNextSlice = 6;
+
+/// The properties of a matrix, except its voxels.
 struct Matrix {
-  std::string name;
+  std::string name{};
   IVec3 size{0};
   IVec3 place{0};
+  DVec3 pivot{0.0};  ///< voxels from `place`
+  bool is_visible = true;
 };
 
-std::optional<IVec3> read_size(ByteReader& reader) {
-  IVec3 size{0};
+IVec3 read_ivec3(ByteReader& reader) {
+  IVec3 value{0};
+  for (int axis = 0; axis < 3; ++axis) value[axis] = reader.i32();
+  return value;
+}
+
+DVec3 read_pivot(ByteReader& reader) {
+  DVec3 pivot{0.0};
+  for (int axis = 0; axis < 3; ++axis) pivot[axis] = reader.f32();
+  return pivot;
+}
+
+bool is_empty(const Matrix& matrix) {
+  return matrix.size.x == 0 || matrix.size.y == 0 || matrix.size.z == 0;
+}
+
+/// Checks the size and position of the matrix at an offset. Qubicle gives empty matrices any position.
+Status check_range(const Matrix& matrix, std::size_t at) {
   bool is_sound = true;
   for (int axis = 0; axis < 3; ++axis) {
-    const std::uint32_t edge = reader.u32();
-    is_sound &= edge <= std::uint32_t{kMaxEdge};
-    size[axis] = static_cast<int>(edge);
+    const int place = matrix.place[axis];
+    is_sound &= matrix.size[axis] >= 0 && matrix.size[axis] <= kMaxEdge;
+    is_sound &= is_empty(matrix) || (place >= -kMaxPlace && place <= kMaxPlace);
   }
-  return is_sound ? std::optional(size) : std::nullopt;
+  return is_sound ? Status() : Status(bad_at(at, "a matrix's size or position is out of range"));
 }
 
-bool is_empty(IVec3 size) {
-  return size.x == 0 || size.y == 0 || size.z == 0;
-}
-
-std::string empty_text(const std::string& name) {
-  return "left out: the matrix \"" + printable(name) + "\", which has no voxels";
-}
-
-std::optional<IVec3> read_place(ByteReader& reader) {
-  IVec3 place{0};
-  bool is_sound = true;
-  for (int axis = 0; axis < 3; ++axis) {
-    place[axis] = reader.i32();
-    is_sound &= place[axis] >= -kMaxPlace && place[axis] <= kMaxPlace;
+/// Starts a model that rotates about the matrix's pivot, or about its position if the pivot is out of range. Returns
+/// false, with a warning, for empty matrices.
+bool begin_model(const Matrix& matrix, ModelBuilder& builder) {
+  if (is_empty(matrix)) {
+    builder.warn("left out: the matrix \"" + printable(matrix.name) + "\", which has no voxels");
+    return false;
   }
-  return is_sound ? std::optional(place) : std::nullopt;
-}
-
-/// Returns a model that rotates about a pivot, in voxels from its position. If the pivot is out of range it rotates
-/// about the position.
-Model model_about(const Matrix& matrix, const DVec3& pivot) {
   constexpr double kFarthest = 1e6;
   Model model;
   model.name = matrix.name;
   model.canvas = {IVec3(0), matrix.size};
-  if (is_finite(pivot) && glm::length(pivot) < kFarthest) model.pivot = pivot;
+  if (is_finite(matrix.pivot) && glm::length(matrix.pivot) < kFarthest) model.pivot = matrix.pivot;
   model.position = DVec3(matrix.place) + model.pivot;
-  return model;
+  model.visible = matrix.is_visible;
+  builder.begin(std::move(model));
+  return true;
+}
+
+/// Reads the zlib stream of a matrix.
+class PackedColumns {
+ public:
+  /// Takes the stream and its size before it.
+  explicit PackedColumns(ByteReader& reader)
+      : at_(reader.position() + 4), stream_(reader.take(reader.u32()), 0, Compression::Zlib) {}
+
+  /// Takes the next bytes. Lifetime: until the next call.
+  Result<ByteReader> take(std::size_t count) {
+    bytes_.resize(count);
+    const auto read = stream_.read(bytes_);
+    if (!read)
+      return make_error(read.error().code, read.error().message, {}, at_ + read.error().byte_offset.value_or(0));
+    if (*read != count) return bad_at(at_, "a matrix has fewer voxels than its size requires");
+    return ByteReader(bytes_);
+  }
+
+  /// Calls put_column(x, z) for each column, in the order of the stream, until it fails.
+  template <class PutColumn>
+  Status for_each(IVec3 size, PutColumn put_column) {
+    for (int x = 0; x < size.x; ++x) {
+      for (int z = 0; z < size.z; ++z) {
+        if (Status done = put_column(x, z); !done) return done;
+      }
+    }
+    return {};
+  }
+
+  /// Returns the offset of the stream.
+  [[nodiscard]] std::size_t position() const { return at_; }
+
+ private:
+  std::size_t at_;
+  ByteStream stream_;
+  std::vector<std::byte> bytes_;
+};
+
+enum class NodeKind : std::uint32_t { Matrix, Model, Compound };
+
+Status check_depth(int depth, std::size_t at) {
+  constexpr int kDeepest = 64;
+  if (depth <= kDeepest) return {};
+  return make_error(ErrorCode::LimitExceeded, "nodes are nested more than 64 deep", {}, at);
+}
+
+/// Reads the number of a node's children. A child takes at least `least_bytes`.
+Result<std::size_t> read_child_count(ByteReader& reader, std::size_t least_bytes, std::size_t at) {
+  const std::size_t children = reader.count(least_bytes);
+  if (reader.failed()) return bad_at(at, "a node claims more children than the file can hold");
+  return children;
 }
 
 class QbReader {
@@ -127,22 +187,12 @@ Status QbReader::read_matrix() {
   const std::size_t at = reader_.position();
   Matrix matrix;
   matrix.name = reader_.text(reader_.u8());
-  const auto size = read_size(reader_);
-  const auto place = read_place(reader_);
+  matrix.size = read_ivec3(reader_);
+  matrix.place = read_ivec3(reader_);
   if (reader_.failed()) return too_short();
-  if (!size || (!place && !is_empty(*size))) return bad_at(at, "a matrix's size or position is out of range");
-  matrix.size = *size;
-  if (is_empty(matrix.size)) {
-    builder_.warn(empty_text(matrix.name));
-    return read_slices(matrix);  // in the packed form, slices have end marks
-  }
-  matrix.place = *place;
-  Model model;
-  model.name = matrix.name;
-  model.position = DVec3(matrix.place);
-  model.canvas = {IVec3(0), matrix.size};
-  builder_.begin(std::move(model));
-  return read_slices(matrix);
+  if (Status sound = check_range(matrix, at); !sound) return sound;
+  begin_model(matrix, builder_);
+  return read_slices(matrix);  // in the packed form, slices of empty matrices have end marks
 }
 
 Status QbReader::read_slices(const Matrix& matrix) {
@@ -153,8 +203,6 @@ Status QbReader::read_slices(const Matrix& matrix) {
 }
 
 Status QbReader::read_slice(const Matrix& matrix, int z) {
-  constexpr std::uint32_t kRun = 2;
-  constexpr std::uint32_t kNextSlice = 6;
   const std::uint64_t area = static_cast<std::uint64_t>(matrix.size.x) * static_cast<std::uint64_t>(matrix.size.y);
   std::uint64_t at = 0;
   if (!is_packed_) {
@@ -223,7 +271,7 @@ class QbtReader {
  private:
   Status read_node(ByteReader& reader, int depth);
   Status read_matrix(ByteReader& reader);
-  Status put_voxels(const Matrix& matrix, std::span<const std::byte> packed, std::size_t at);
+  Status put_column(ByteReader voxels, int x, int z, std::size_t at);
 
   std::span<const std::byte> bytes_;
   std::vector<Rgba8> colours_;
@@ -231,23 +279,21 @@ class QbtReader {
 };
 
 Status QbtReader::read_node(ByteReader& reader, int depth) {
-  enum class Kind : std::uint32_t { Matrix, Model, Compound };
-  constexpr int kDeepest = 64;
   const std::size_t at = reader.position();
-  const auto kind = static_cast<Kind>(reader.u32());
+  const auto kind = static_cast<NodeKind>(reader.u32());
   const std::size_t size = reader.u32();
   if (reader.failed() || size > reader.remaining()) return bad_at(at, "a node extends past the end of the file");
-  if (depth > kDeepest) return make_error(ErrorCode::LimitExceeded, "nodes are nested more than 64 deep", {}, at);
+  if (Status sound = check_depth(depth, at); !sound) return sound;
   ByteReader node(bytes_, reader.position(), reader.position() + size);
   static_cast<void>(reader.take(size));
-  if (kind == Kind::Matrix || kind == Kind::Compound) return read_matrix(node);
-  if (kind != Kind::Model) {
+  if (kind == NodeKind::Matrix || kind == NodeKind::Compound) return read_matrix(node);
+  if (kind != NodeKind::Model) {
     builder_.warn("left out: a node of unknown kind " + std::to_string(static_cast<std::uint32_t>(kind)));
     return {};
   }
-  const std::size_t children = node.count(8);
-  if (node.failed()) return bad_at(at, "a node claims more children than the file can hold");
-  for (std::size_t i = 0; i < children; ++i) {
+  const auto children = read_child_count(node, 8, at);
+  if (!children) return children.error();
+  for (std::size_t i = 0; i < *children; ++i) {
     if (auto done = read_node(node, depth + 1); !done) return done;
   }
   return {};
@@ -257,47 +303,31 @@ Status QbtReader::read_matrix(ByteReader& reader) {
   const std::size_t at = reader.position();
   Matrix matrix;
   matrix.name = reader.text(reader.u32());
-  const auto place = read_place(reader);
+  matrix.place = read_ivec3(reader);
   static_cast<void>(reader.take(12));  // scale
-  const std::array<float, 3> pivot = {reader.f32(), reader.f32(), reader.f32()};
-  const auto size = read_size(reader);
-  const std::size_t packed_at = reader.position() + 4;
-  const auto packed = reader.take(reader.u32());
+  matrix.pivot = read_pivot(reader);
+  matrix.size = read_ivec3(reader);
+  PackedColumns columns(reader);
   if (reader.failed()) return bad_at(at, "a matrix ends too early");
-  if (!size || (!place && !is_empty(*size))) return bad_at(at, "a matrix's size or position is out of range");
-  if (is_empty(*size)) {
-    builder_.warn(empty_text(matrix.name));
-    return {};
-  }
-  matrix.size = *size;
-  matrix.place = *place;
-  Model model = model_about(matrix, DVec3(pivot[0], pivot[1], pivot[2]));
-  builder_.begin(std::move(model));
-  return put_voxels(matrix, packed, packed_at);
+  if (Status sound = check_range(matrix, at); !sound) return sound;
+  if (!begin_model(matrix, builder_)) return {};
+  return columns.for_each(matrix.size, [&](int x, int z) -> Status {
+    const auto voxels = columns.take(static_cast<std::size_t>(matrix.size.y) * 4);
+    return voxels ? put_column(*voxels, x, z, columns.position()) : Status(voxels.error());
+  });
 }
 
-// x changes slowest, then z, then y. The last byte is the mask of visible faces: 0 for empty voxels.
-Status QbtReader::put_voxels(const Matrix& matrix, std::span<const std::byte> packed, std::size_t at) {
-  ByteStream stream(packed, 0, Compression::Zlib);
-  std::vector<std::byte> column(static_cast<std::size_t>(matrix.size.y) * 4);
-  for (int x = 0; x < matrix.size.x; ++x) {
-    for (int z = 0; z < matrix.size.z; ++z) {
-      const auto read = stream.read(column);
-      if (!read)
-        return make_error(read.error().code, read.error().message, {}, at + read.error().byte_offset.value_or(0));
-      if (*read != column.size()) return bad_at(at, "a matrix has fewer voxels than its size requires");
-      ByteReader voxels(column);
-      for (int y = 0; y < matrix.size.y; ++y) {
-        Rgba8 colour = colour_of(voxels.u32(), false);
-        if (colour.a == 0) continue;
-        if (!colours_.empty()) {
-          if (colour.r >= colours_.size()) return bad_at(at, "a colour index is beyond the colour map");
-          colour = colours_[colour.r];
-        }
-        colour.a = 255;
-        if (auto put = builder_.put({x, y, z}, colour); !put) return put;
-      }
+// The last byte of a voxel is the mask of visible faces: 0 for empty voxels.
+Status QbtReader::put_column(ByteReader voxels, int x, int z, std::size_t at) {
+  for (int y = 0; voxels.remaining() > 0; ++y) {
+    Rgba8 colour = colour_of(voxels.u32(), false);
+    if (colour.a == 0) continue;
+    if (!colours_.empty()) {
+      if (colour.r >= colours_.size()) return bad_at(at, "a colour index is beyond the colour map");
+      colour = colours_[colour.r];
     }
+    colour.a = 255;
+    if (auto put = builder_.put({x, y, z}, colour); !put) return put;
   }
   return {};
 }
@@ -337,7 +367,7 @@ class QbclReader {
   [[nodiscard]] Error too_short() const { return bad_at(reader_.position(), "the file ends before its nodes"); }
   Status read_node(int depth, bool is_used, bool is_shown);
   Status read_matrix(std::string name, bool is_used, bool is_shown);
-  Status put_columns(const Matrix& matrix, std::span<const std::byte> packed, std::size_t at);
+  Status put_column(ByteReader column, const Matrix& matrix, int x, int z, std::size_t at);
   Status read_children(int depth, bool is_used, bool is_shown);
 
   ByteReader reader_;
@@ -346,31 +376,28 @@ class QbclReader {
 
 /// `is_used`: false for the source matrices of a compound.
 Status QbclReader::read_node(int depth, bool is_used, bool is_shown) {
-  enum class Kind : std::uint32_t { Matrix, Model, Compound };
-  constexpr int kDeepest = 64;
   const std::size_t at = reader_.position();
-  const auto kind = static_cast<Kind>(reader_.u32());
+  const auto kind = static_cast<NodeKind>(reader_.u32());
   static_cast<void>(reader_.u32());
   std::string name(reader_.text(reader_.u32()));
   is_shown &= reader_.u8() != 0;
   static_cast<void>(reader_.take(2));
   if (reader_.failed()) return too_short();
-  if (depth > kDeepest) return make_error(ErrorCode::LimitExceeded, "nodes are nested more than 64 deep", {}, at);
-  if (kind == Kind::Model) {
+  if (Status sound = check_depth(depth, at); !sound) return sound;
+  if (kind == NodeKind::Model) {
     static_cast<void>(reader_.take(36));
     return read_children(depth, is_used, is_shown);
   }
   // The file does not store a node's size.
-  if (kind != Kind::Matrix && kind != Kind::Compound) return bad_at(at, "unknown node kind");
+  if (kind != NodeKind::Matrix && kind != NodeKind::Compound) return bad_at(at, "unknown node kind");
   if (auto done = read_matrix(std::move(name), is_used, is_shown); !done) return done;
-  return kind == Kind::Compound ? read_children(depth, false, is_shown) : Status();
+  return kind == NodeKind::Compound ? read_children(depth, false, is_shown) : Status();
 }
 
 Status QbclReader::read_children(int depth, bool is_used, bool is_shown) {
-  const std::size_t at = reader_.position();
-  const std::size_t children = reader_.count(15);
-  if (reader_.failed()) return bad_at(at, "a node claims more children than the file can hold");
-  for (std::size_t i = 0; i < children; ++i) {
+  const auto children = read_child_count(reader_, 15, reader_.position());
+  if (!children) return children.error();
+  for (std::size_t i = 0; i < *children; ++i) {
     if (auto done = read_node(depth + 1, is_used, is_shown); !done) return done;
   }
   return {};
@@ -380,64 +407,40 @@ Status QbclReader::read_matrix(std::string name, bool is_used, bool is_shown) {
   const std::size_t at = reader_.position();
   Matrix matrix;
   matrix.name = std::move(name);
-  const auto size = read_size(reader_);
-  const auto place = read_place(reader_);
+  matrix.is_visible = is_shown;
+  matrix.size = read_ivec3(reader_);
+  matrix.place = read_ivec3(reader_);
   if (reader_.failed()) return too_short();
-  if (!size || (!place && !is_empty(*size))) return bad_at(at, "a matrix's size or position is out of range");
-  std::array<float, 3> pivot{};
-  for (float& part : pivot) part = reader_.f32();
-  const std::size_t packed_at = reader_.position() + 4;
-  const auto packed = reader_.take(reader_.u32());
+  if (Status sound = check_range(matrix, at); !sound) return sound;
+  matrix.pivot = read_pivot(reader_);
+  PackedColumns columns(reader_);
   if (reader_.failed()) return too_short();
-  if (!is_used) return {};
-  if (is_empty(*size)) {
-    builder_.warn(empty_text(matrix.name));
-    return {};
-  }
-  matrix.size = *size;
-  matrix.place = *place;
-  Model model = model_about(matrix, DVec3(pivot[0], pivot[1], pivot[2]));
-  model.visible = is_shown;
-  builder_.begin(std::move(model));
-  return put_columns(matrix, packed, packed_at);
+  if (!is_used || !begin_model(matrix, builder_)) return {};
+  return columns.for_each(matrix.size, [&](int x, int z) -> Status {
+    auto entries = columns.take(2);
+    if (entries) entries = columns.take(std::size_t{entries->u16()} * 4);
+    return entries ? put_column(*entries, matrix, x, z, columns.position()) : Status(entries.error());
+  });
 }
 
-Status QbclReader::put_columns(const Matrix& matrix, std::span<const std::byte> packed, std::size_t at) {
-  constexpr std::uint32_t kRun = 2;
-  ByteStream stream(packed, 0, Compression::Zlib);
-  std::vector<std::byte> entries;
-  const auto read = [&](std::size_t count) -> Status {
-    entries.resize(count);
-    const auto got = stream.read(entries);
-    if (!got) return make_error(got.error().code, got.error().message, {}, at + got.error().byte_offset.value_or(0));
-    return *got == count ? Status() : Status(bad_at(at, "a matrix has fewer voxels than its size requires"));
-  };
-  for (int x = 0; x < matrix.size.x; ++x) {
-    for (int z = 0; z < matrix.size.z; ++z) {
-      if (auto done = read(2); !done) return done;
-      const std::size_t count = ByteReader(entries).u16();
-      if (auto done = read(count * 4); !done) return done;
-      ByteReader column(entries);
-      std::uint32_t y = 0;
-      while (column.remaining() > 0) {
-        std::uint32_t entry = column.u32();
-        std::uint32_t length = 1;
-        if (entry >> 24 == kRun) {
-          length = entry & 0xFFU;  // the other bytes are unused
-          entry = column.u32();
-        }
-        if (column.failed() || length > static_cast<std::uint32_t>(matrix.size.y) - y) {
-          return bad_at(at, "a column has more voxels than its matrix");
-        }
-        Rgba8 colour = colour_of(entry, false);
-        if (colour.a != 0 && length > 0) {
-          colour.a = 255;
-          const IVec3 first{x, static_cast<int>(y), z};
-          if (auto put = builder_.put(first, colour, static_cast<int>(length), 1); !put) return put;
-        }
-        y += length;
-      }
+Status QbclReader::put_column(ByteReader column, const Matrix& matrix, int x, int z, std::size_t at) {
+  std::uint32_t y = 0;
+  while (column.remaining() > 0) {
+    std::uint32_t entry = column.u32();
+    std::uint32_t length = 1;
+    if (entry >> 24 == kRun) {
+      length = entry & 0xFFU;  // the other bytes are unused
+      entry = column.u32();
     }
+    if (column.failed() || length > static_cast<std::uint32_t>(matrix.size.y) - y) {
+      return bad_at(at, "a column has more voxels than its matrix");
+    }
+    Rgba8 colour = colour_of(entry, false);
+    if (colour.a != 0 && length > 0) {
+      colour.a = 255;
+      if (auto put = builder_.put({x, static_cast<int>(y), z}, colour, static_cast<int>(length)); !put) return put;
+    }
+    y += length;
   }
   return {};
 }
@@ -535,8 +538,6 @@ Result<LoadedScene> read_qubicle(std::span<const std::byte> bytes) {
 
 constexpr FormatHolds kHolds = {.extension = ".qb", .names = true, .several = true, .transparency = true};
 constexpr std::uint32_t kVersion = 0x0000'0101;
-constexpr std::uint32_t kRun = 2;
-constexpr std::uint32_t kNextSlice = 6;
 constexpr std::size_t kLongestName = 255;
 // The size limit of readers.
 constexpr std::uint64_t kMaxBytes = std::uint64_t{1} << 32;
