@@ -202,8 +202,7 @@ Environment environment_of_paths(const Scene& scene, const quoin_render_options&
   usual.sky.model = SkyModel::Physical;
   usual.exposure = 1.0;
   Environment environment = environment_with(options, scene, usual);
-  const bool lacks_image = environment.sky.model == SkyModel::Image && environment.sky.image == nullptr;
-  if (lacks_image) environment.sky.model = SkyModel::Uniform;
+  if (lacks_image(environment.sky)) environment.sky.model = SkyModel::Uniform;
   return environment;
 }
 

@@ -56,9 +56,7 @@ PathOptions path_options(const ViewRequest& request, int width, int height, int 
   PathOptions options;
   Environment& environment = options.environment.emplace(traced_environment(request));
   // The viewer does not read the image of a sky.
-  if (environment.sky.model == SkyModel::Image && environment.sky.image == nullptr) {
-    environment.sky.model = SkyModel::Uniform;
-  }
+  if (lacks_image(environment.sky)) environment.sky.model = SkyModel::Uniform;
   options.width = width;
   options.height = height;
   options.samples = samples;

@@ -103,6 +103,13 @@ Environment Environment::natural(DVec3 sun) {
   return environment;
 }
 
+bool lacks_image(const Sky& sky) {
+  if (sky.model != SkyModel::Image) return false;
+  const RadianceImage* const image = sky.image.get();
+  return image == nullptr || image->width <= 0 || image->height <= 0 ||
+         image->rgb.size() != 3 * static_cast<std::size_t>(image->width) * static_cast<std::size_t>(image->height);
+}
+
 bool is_only_sun(const Environment& environment) {
   return environment == Environment::natural(environment.sun.direction);
 }

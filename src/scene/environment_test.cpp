@@ -1,6 +1,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <memory>
 #include <numbers>
 #include <string>
 
@@ -96,6 +97,18 @@ TEST(Environment, ChoosesExposureAndToneBySky) {
   environment.gamma = 2.0;
   environment.bloom.mix = 0.1;
   EXPECT_EQ(develop_options(environment), (DevelopOptions{3.0, ToneCurve::Aces, 0.5, 2.0, {.mix = 0.1}}));
+}
+
+TEST(Environment, LacksImageOnlyForModelImage) {
+  Sky sky{.model = SkyModel::Image};
+  EXPECT_TRUE(lacks_image(sky));
+  sky.model = SkyModel::Physical;
+  EXPECT_FALSE(lacks_image(sky));
+  sky.model = SkyModel::Image;
+  sky.image = std::make_shared<const RadianceImage>(RadianceImage{2, 1, {1.0F, 1.0F, 1.0F}});
+  EXPECT_TRUE(lacks_image(sky)) << "2 pixels with the values of 1";
+  sky.image = std::make_shared<const RadianceImage>(RadianceImage{1, 1, {1.0F, 1.0F, 1.0F}});
+  EXPECT_FALSE(lacks_image(sky));
 }
 
 TEST(Environment, DevelopsNightBrighter) {

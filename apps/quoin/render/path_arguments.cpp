@@ -118,7 +118,7 @@ Status take_sky(const RenderArguments& all, const LoadedScene& loaded, Sky& sky,
     if (!image) return image.error();
     sky.image = std::make_shared<const RadianceImage>(std::move(*image));
     sky.image_turn_radians = arguments.sky_turn_degrees * kRadians;
-  } else if (sky.model == SkyModel::Image && sky.image == nullptr) {
+  } else if (lacks_image(sky)) {
     auto image = sky_image_of(all.common, loaded, sky.image_file);
     if (image) {
       sky.image = std::make_shared<const RadianceImage>(std::move(*image));

@@ -71,6 +71,9 @@ struct Sky {
   bool operator==(const Sky&) const = default;
 };
 
+/// Returns true if the model is SkyModel::Image, but `image` has no pixels. Path tracing rejects such a sky.
+[[nodiscard]] bool lacks_image(const Sky& sky);
+
 /// A horizontal ground plane below a scene, for path tracing.
 struct GroundPlane {
   double height = 0.0;  ///< world y

@@ -33,15 +33,6 @@ Status check_lens(const Lens& lens) {
   return std::isfinite(lens.turn_radians) ? Status() : refuse("lens.turn_radians: must be finite");
 }
 
-Status check_image(const Sky& sky) {
-  if (sky.model != SkyModel::Image) return {};
-  const RadianceImage* const image = sky.image.get();
-  const bool is_whole =
-      image != nullptr && image->width > 0 && image->height > 0 &&
-      image->rgb.size() == 3 * static_cast<std::size_t>(image->width) * static_cast<std::size_t>(image->height);
-  return is_whole ? Status() : refuse("sky.image: must be an image of at least one pixel");
-}
-
 }  // namespace
 
 Status check(const Camera& camera, const PathOptions& options) {
@@ -58,7 +49,7 @@ Status check(const Camera& camera, const PathOptions& options) {
   if (Status lens = check_lens(options.lens); !lens) return lens;
   if (!options.environment) return {};
   if (Status around = quoin::check(*options.environment); !around) return around;
-  return check_image(options.environment->sky);
+  return lacks_image(options.environment->sky) ? refuse("sky.image: must be an image of at least one pixel") : Status();
 }
 
 PathImage empty_image(const PathOptions& options) {
