@@ -328,6 +328,24 @@ TEST_F(ToolRender, FileSettingsApplyWithoutOptions) {
   EXPECT_GT(corner()[1], 150);
 }
 
+TEST_F(ToolRender, ShowsSkyImageOfSceneFile) {
+  std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(2);
+  std::ofstream(folder_.file("green.hdr"), std::ios::binary) << "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n"
+                                                             << std::string("\0\x80\0\x80", 4);
+  std::ofstream(folder_.file("scene.json")) << R"({"quoin_scene": 6, "files": [{"id": "a", "path": "many.vox"}],
+      "instances": [{"file": "a"}], "environment": {"sky": {"model": "image", "image": "green.hdr"}}})";
+  const std::string base = "scene.json -o out.png --size 32x24 --light path --samples 1";
+  EXPECT_EQ(drawn(base)["warnings"], Json::array());
+  const auto image = read_png(folder_.file("out.png"));
+  ASSERT_TRUE(image);
+  EXPECT_EQ(image->rgb[0], 0);
+  EXPECT_GT(image->rgb[1], 150);
+  std::filesystem::remove(folder_.file("green.hdr"));
+  const Json warnings = drawn(base)["warnings"];
+  ASSERT_EQ(warnings.size(), 1U) << warnings;
+  EXPECT_NE(warnings[0].dump().find("the image of the sky"), std::string::npos) << warnings;
+}
+
 TEST_F(ToolRender, WritesVideos) {
   std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(2);
   for (const std::string wrong :

@@ -399,7 +399,7 @@ enum {
   QUOIN_SKY_FIXED = 1,    /* always day */
   QUOIN_SKY_PHYSICAL = 2,
   QUOIN_SKY_UNIFORM = 3,
-  QUOIN_SKY_IMAGE = 4 /* an image that the scene's file names; rendered as uniform */
+  QUOIN_SKY_IMAGE = 4 /* an image that the scene's file names; uniform if it cannot be read */
 };
 enum {
   QUOIN_TONE_AUTOMATIC = 0, /* neutral, or clamp under a uniform sky */

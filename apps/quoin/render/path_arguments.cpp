@@ -87,11 +87,9 @@ std::optional<SkyArgument> read_sky(const std::string& text) {
   return is_image ? std::optional(SkyArgument{SkyModel::Image, text}) : std::nullopt;
 }
 
-// Reads the sky image that the file names, from the file's folder. .vox files give its place in MagicaVoxel's folder.
-Result<RadianceImage> sky_image_of(const CommonOptions& common, const LoadedScene& loaded, const std::string& name) {
-  const bool is_own = !loaded.render_settings;
-  const auto path =
-      sidecar_path(common.input, is_own ? name : name.substr(name.find_last_of("/\\") + 1), common.load.sidecar_files);
+// Reads the sky image that a .vox file names, from the file's folder. The name has the path in MagicaVoxel's folder.
+Result<RadianceImage> sky_image_of(const CommonOptions& common, const std::string& name) {
+  const auto path = sidecar_path(common.input, name.substr(name.find_last_of("/\\") + 1), common.load.sidecar_files);
   if (!path) return path.error();
   return read_radiance(*path);
 }
@@ -109,7 +107,7 @@ void take_file_settings(const FileRenderSettings& file, PathPlan& plan) {
   }
 }
 
-Status take_sky(const RenderArguments& all, const LoadedScene& loaded, Sky& sky, std::vector<std::string>& warnings) {
+Status take_sky(const RenderArguments& all, Sky& sky, bool is_of_vox, std::vector<std::string>& warnings) {
   const PathArguments& arguments = all.path;
   if (arguments.sky) {
     sky = {.model = arguments.sky->model};
@@ -118,16 +116,18 @@ Status take_sky(const RenderArguments& all, const LoadedScene& loaded, Sky& sky,
     if (!image) return image.error();
     sky.image = std::make_shared<const RadianceImage>(std::move(*image));
     sky.image_turn_radians = arguments.sky_turn_degrees * kRadians;
-  } else if (lacks_image(sky)) {
-    auto image = sky_image_of(all.common, loaded, sky.image_file);
+    return {};
+  }
+  if (lacks_image(sky) && is_of_vox) {
+    auto image = sky_image_of(all.common, sky.image_file);
     if (image) {
       sky.image = std::make_shared<const RadianceImage>(std::move(*image));
     } else {
       warnings.push_back("using a uniform sky instead of the file's sky \"" + sky.image_file +
                          "\": " + image.error().message);
-      sky.model = SkyModel::Uniform;
     }
   }
+  if (lacks_image(sky)) sky.model = SkyModel::Uniform;
   return {};
 }
 
@@ -262,7 +262,7 @@ Result<PathPlan> plan_paths(const RenderArguments& all, const LoadedScene& loade
   if (has_usual_sun || arguments.sun_angle_degrees) {
     sun.angle_radians = arguments.sun_angle_degrees.value_or(kUsualSunAngle) * kRadians;
   }
-  if (Status sky = take_sky(all, loaded, environment.sky, plan.warnings); !sky) return sky.error();
+  if (Status sky = take_sky(all, environment.sky, has_settings, plan.warnings); !sky) return sky.error();
   all.environment.apply_to(environment);
   take_lens(arguments, loaded, all.file_camera, plan);
 

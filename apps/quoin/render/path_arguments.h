@@ -66,8 +66,8 @@ void add_path_options(CLI::App& command, PathArguments& arguments);
 /// Returns the rules between these options. That they need --light path holds for the whole heading.
 [[nodiscard]] std::vector<OptionRule> path_rules(const PathArguments& arguments);
 
-/// Takes each setting from the options, else from the scene file (IN), else the default. An unreadable sky image of the
-/// scene file only gives a warning.
+/// Takes each setting from the options, else from the scene file (IN), else the default. An unreadable sky image of a
+/// .vox file gives a warning; load_scene warns of those of scene files.
 /// Errors: those of reading the sky image of --sky.
 [[nodiscard]] Result<PathPlan> plan_paths(const RenderArguments& all, const LoadedScene& loaded);
 

@@ -9,6 +9,7 @@
 
 #include "core/bytes/text.h"
 #include "io/format_driver.h"
+#include "io/scene_file/scene_parts.h"
 #include "io/whole_file.h"
 
 namespace quoin {
@@ -167,6 +168,7 @@ Result<LoadedScene> load_source(const std::filesystem::path& path, const LoadOpt
                         "a scene file that references files cannot be referenced itself; save it as one file first",
                         path.string());
     }
+    file->environment.reset();  // not taken over
     return with_path(put_together(*file, {}, taken_over, threads, progress), path);
   }
   return load_scene(path, taken_over, threads, progress);
@@ -296,6 +298,10 @@ Result<LoadedScene> put_together(SceneFile& file, const std::filesystem::path& p
   const auto bodies = read_sources(file.sources, path, options, threads, loaded, progress);
   if (!bodies) return bodies.error();
   Placer(file, grids, *bodies, loaded.scene).place();
+  if (std::optional<Environment>& environment = loaded.scene.environment) {
+    std::string warning = scene_json::read_sky_image(path, options.sidecar_files, environment->sky);
+    if (!warning.empty()) loaded.warnings.push_back(std::move(warning));
+  }
   if (options.show_hidden) show_all(loaded.scene);
   return loaded;
 }
@@ -314,6 +320,9 @@ std::vector<std::filesystem::path> files_named_in_scene(const std::filesystem::p
   std::vector<std::filesystem::path> named;
   if (!file) return named;
   for (const SceneFile::Source& source : file->sources) named.push_back(path.parent_path() / source.file);
+  if (file->environment && lacks_image(file->environment->sky)) {
+    named.push_back(path.parent_path() / file->environment->sky.image_file);
+  }
   return named;
 }
 

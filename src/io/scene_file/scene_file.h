@@ -14,7 +14,7 @@ namespace quoin {
 
 /// Reads a scene file and all files that it names. Each file is read once, however often it is placed. The instances of
 /// a named file are placed as one body; several instances become a group. Types that equal an existing type in every
-/// property are merged with it.
+/// property are merged with it. Warns of an unreadable sky image.
 ///
 /// Errors: those of `parse_scene_file` and of reading the named files (with their paths); Unsupported if a named file
 ///         is a scene file that names files itself; LimitExceeded if all files together have more types than a registry

@@ -399,6 +399,43 @@ TEST_F(SceneFiles, ErrorsNameTheFile) {
   EXPECT_NE(with_path("noise.vox").find("noise.vox"), std::string::npos);
 }
 
+TEST_F(SceneFiles, ReadSkyImages) {
+  const auto sky_of = [&](const std::string& image, const LoadOptions& options = {}) {
+    return load_scene(write_text(R"({"quoin_scene": 6, "environment": {"sky": {"model": "image", "image": ")" + image +
+                                 R"("}}, "files": [{"id": "r", "path": "red.vox"}], "instances": [{"file": "r"}]})"),
+                      options);
+  };
+  const auto missing = sky_of("sky.hdr");
+  ASSERT_TRUE(missing) << to_string(missing.error());
+  EXPECT_TRUE(lacks_image(missing->scene.environment->sky));
+  ASSERT_EQ(missing->warnings.size(), 1U);
+  EXPECT_EQ(missing->warnings[0].find("left out: the image of the sky \"sky.hdr\": "), 0U) << missing->warnings[0];
+
+  std::ofstream(folder_ / "sky.hdr", std::ios::binary) << "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n"
+                                                       << std::string("\x80\0\0\x81", 4);
+  const auto loaded = sky_of("sky.hdr");
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  EXPECT_TRUE(loaded->warnings.empty()) << loaded->warnings[0];
+  ASSERT_NE(loaded->scene.environment->sky.image, nullptr);
+  EXPECT_EQ(loaded->scene.environment->sky.image->width, 1);
+  EXPECT_GT(loaded->scene.environment->sky.image->rgb[0], 0.9F);
+  EXPECT_EQ(sidecar_files_of(folder_ / "scene.json"),
+            (std::vector<fs::path>{folder_ / "red.vox", folder_ / "sky.hdr"}));
+
+  const auto outside = sky_of("../sky.hdr");
+  ASSERT_TRUE(outside && outside->warnings.size() == 1U);
+  EXPECT_NE(outside->warnings[0].find("outside the folder"), std::string::npos) << outside->warnings[0];
+  fs::rename(folder_ / "sky.hdr", folder_ / "other.hdr");
+  EXPECT_TRUE(sky_of((folder_ / "other.hdr").string(), {.sidecar_files = SidecarFiles::Anywhere})->warnings.empty());
+
+  const std::string text = R"({"quoin_scene": 6, "files": [], "instances": [],
+      "environment": {"sky": {"model": "image", "image": "other.hdr"}}})";
+  const auto from_bytes = load_scene(std::as_bytes(std::span(text)));
+  ASSERT_TRUE(from_bytes) << to_string(from_bytes.error());
+  ASSERT_EQ(from_bytes->warnings.size(), 1U);
+  EXPECT_NE(from_bytes->warnings[0].find("by path, not from bytes"), std::string::npos) << from_bytes->warnings[0];
+}
+
 TEST_F(SceneFiles, AreParsedByPath) {
   const auto file = parse_scene_file(write_text(R"({"quoin_scene": 1, "files": [{"id": "a", "path": "absent.vox"}],
                                                     "instances": [{"file": "a"}]})"));

@@ -14,6 +14,7 @@
 #include <glm/geometric.hpp>
 
 #include <quoin/core/assert.h>
+#include <quoin/io/image_files.h>
 
 #include "core/bytes/text.h"
 #include "io/base64.h"
@@ -567,6 +568,21 @@ Environment environment_from(const Json& json, const Place& place, Faults& fault
   read_settings(json, place, faults, environment);
   if (const Status valid = check(environment); !valid && !faults.error()) faults.add(place, valid.error().message);
   return environment;
+}
+
+std::string read_sky_image(const std::filesystem::path& from, SidecarFiles allowed, Sky& sky) {
+  if (!lacks_image(sky)) return "";
+  std::string reason = "load the scene by path, not from bytes";
+  if (!from.empty()) {
+    const auto path = sidecar_path(from, sky.image_file, allowed);
+    auto image = path ? read_radiance(*path) : Result<RadianceImage>(path.error());
+    if (image) {
+      sky.image = std::make_shared<const RadianceImage>(std::move(*image));
+      return "";
+    }
+    reason = image.error().message;
+  }
+  return "left out: the image of the sky \"" + printable(sky.image_file) + "\": " + reason;
 }
 
 void read_grid_header(const Object& object, SceneGrid& grid) {

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <filesystem>
 #include <string>
 
 #include <nlohmann/json.hpp>
 #include <quoin/io/scene_file.h>
+#include <quoin/io/sidecar_file.h>
 
 #include "io/scene_file/json_reader.h"
 
@@ -48,6 +50,10 @@ class PartWriter {
 [[nodiscard]] Lamp lamp_of(const Json& json, const Place& place, Faults& faults);
 [[nodiscard]] Camera camera_of(const Json& json, const Place& place, Faults& faults);
 [[nodiscard]] Environment environment_from(const Json& json, const Place& place, Faults& faults);
+
+/// Reads the sky's image, which a scene file or world names relative to itself. `from`: the path of this file; empty:
+/// it was read from bytes. Returns a warning, or "" if the image was read or the sky has none.
+[[nodiscard]] std::string read_sky_image(const std::filesystem::path& from, SidecarFiles allowed, Sky& sky);
 
 /// Reads name, pivot and canvas.
 void read_grid_header(const Object& object, SceneGrid& grid);

@@ -1,6 +1,7 @@
 #include <quoin/store/world_saver.h>
 
 #include <fstream>
+#include <span>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -141,6 +142,20 @@ TEST(WorldSaver, SavesChangesOfEnvironment) {
   ASSERT_TRUE(loaded->saver.save(*world, loaded->loaded.scene));
   ASSERT_TRUE(world->flush());
   EXPECT_FALSE(load_world(*world).value().loaded.scene.environment);
+}
+
+TEST(WorldSaver, LoadsSkyImage) {
+  const WorldFolder folder;
+  Scene scene = rich_scene();
+  scene.environment.emplace().sky.model = SkyModel::Image;
+  scene.environment->sky.image_file = "sky.hdr";
+  ASSERT_TRUE(save_scene(scene, folder / "w.quoin"));
+  const auto missing = load_scene(folder / "w.quoin");
+  ASSERT_TRUE(missing && missing->warnings.size() == 1U);
+  EXPECT_NE(missing->warnings[0].find("the image of the sky \"sky.hdr\""), std::string::npos) << missing->warnings[0];
+  const std::string pixel = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n" + std::string("\x80\0\0\x81", 4);
+  ASSERT_TRUE(write_file(std::as_bytes(std::span(pixel)), folder / "sky.hdr"));
+  EXPECT_FALSE(lacks_image(loaded_from(folder / "w.quoin").environment->sky));
 }
 
 /// A world that is saved repeatedly, and its expected content.
