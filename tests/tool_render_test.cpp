@@ -328,6 +328,17 @@ TEST_F(ToolRender, FileSettingsApplyWithoutOptions) {
   EXPECT_GT(corner()[1], 150);
 }
 
+TEST_F(ToolRender, UsesInitialCameraOfSceneFileByDefault) {
+  std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(2);
+  std::ofstream(folder_.file("scene.json")) << R"({"quoin_scene": 1, "files": [{"id": "a", "path": "many.vox"}],
+      "instances": [{"file": "a"}], "camera": {"position": [9, 8, 7], "look_at": [0, 0, 0]}})";
+  const std::string base = "scene.json -o out.png --size 9x9 --samples 1";
+  EXPECT_EQ(triple(drawn(base)["camera"]["position"]), DVec3(9, 8, 7));
+  EXPECT_EQ(triple(drawn(base + " --camera 1,2,3 --look-at 0,0,0")["camera"]["position"]), DVec3(1, 2, 3));
+  EXPECT_EQ(drawn(base + " --view iso")["camera"], drawn("many.vox -o out.png --size 9x9 --samples 1")["camera"]);
+  EXPECT_NE(triple(drawn(base + " --azimuth 45")["camera"]["position"]), DVec3(9, 8, 7));
+}
+
 TEST_F(ToolRender, ShowsSkyImageOfSceneFile) {
   std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(2);
   std::ofstream(folder_.file("green.hdr"), std::ios::binary) << "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n"

@@ -118,8 +118,10 @@ void add_camera_options(CLI::App& command, RenderArguments& arguments) {
     views.emplace_back(name, view_of_name(name).value());
   }
   set_heading(command, heading::kCamera);
-  add_choice(command, "--view", views, arguments.view,
-             "Frame the whole scene from the front, back, left, right, top or iso (default iso)");
+  add_choice(
+      command, "--view", views, arguments.view,
+      "Frame the whole scene from the front, back, left, right, top or iso (default: the initial camera of a .json "
+      "or .quoin file, else iso)");
   add_parsed(command, "--azimuth", "DEGREES", number(), arguments.azimuth,
              "Camera angle around the whole scene, from the front to the right (default 45)");
   add_parsed(command, "--elevation", "DEGREES", number_between(-90.0, 90.0, "from -90 to 90"), arguments.elevation,
