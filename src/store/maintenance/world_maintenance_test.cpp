@@ -285,6 +285,22 @@ TEST(WorldMaintenance, RepairLeavesOutChunksWithInvalidAddresses) {
   EXPECT_TRUE(check_world(folder / "m.quoin")->damage.empty());
 }
 
+TEST(WorldMaintenance, RepairPlacesLostGridDespiteLargeGridNumber) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  make_world(path);
+  put_chunk(path, 900, {5, 0, {0, 0, 0}});
+  SceneFile::Placement of_no_grid;
+  of_no_grid.grid = (std::size_t{1} << 32U) + 5;
+  put_part(path, {store::part::kInstance, std::int64_t{3}}, store::text_of(of_no_grid));
+  ASSERT_TRUE(repair_world(path, folder / "m.quoin"));
+  const auto loaded = load_scene(folder / "m.quoin");
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  const auto instances = loaded->scene.instances().handles();
+  ASSERT_EQ(instances.size(), 1U);
+  EXPECT_EQ(loaded->scene.instances()[instances[0]].name, "lost grid 5");
+}
+
 TEST(WorldMaintenance, RefusesToRepairInvalidFiles) {
   const WorldFolder folder;
   std::ofstream(folder / "text.quoin") << std::string(30'000, 'x');

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <limits>
@@ -68,7 +69,7 @@ class FoundParts {
   std::size_t count_ = 0;
   std::int64_t types_put_ = 0;
   std::map<std::uint32_t, WorldGrid> grids_;
-  std::set<std::uint32_t> placed_grids_;
+  std::set<std::size_t> placed_grids_;  // may exceed 32 bits in damaged worlds
   std::int64_t next_instance_ = 0;
   std::vector<std::string> lost_;
 };
@@ -124,7 +125,7 @@ void FoundParts::take(const Part& part) {
   if (part.key.kind == part::kInstance) {
     next_instance_ = std::max(next_instance_, number + 1);
     if (const auto instance = part_from<SceneFile::Placement>(part.body, name_of(part.key))) {
-      placed_grids_.insert(static_cast<std::uint32_t>(*instance->grid));
+      placed_grids_.insert(*instance->grid);
     }
   }
 }
