@@ -23,6 +23,7 @@
 #include "io/format_driver.h"
 #include "io/models/model_builder.h"
 #include "io/placed_grids.h"
+#include "io/vox/chunks.h"
 
 namespace quoin::models {
 
@@ -185,20 +186,12 @@ Result<LoadedScene> read_kvx(std::span<const std::byte> bytes) {
   return builder.take("voxlap");
 }
 
-bool is_slab6(std::span<const std::byte> whole) {
-  ByteReader reader(whole);
-  const auto sizes = read_sizes(reader);
-  return sizes && static_cast<std::uint64_t>(sizes->x) * static_cast<std::uint64_t>(sizes->y) *
-                              static_cast<std::uint64_t>(sizes->z) +
-                          kPaletteBytes ==
-                      reader.remaining();
-}
-
 Result<LoadedScene> read_slab6(std::span<const std::byte> bytes) {
-  if (!is_slab6(bytes)) return bad_at(0, "the file size does not match the model's three sizes");
-  constexpr std::uint8_t kEmpty = 255;
   ByteReader reader(bytes);
-  const Sizes sizes = *read_sizes(reader);
+  const auto read = read_sizes(reader);
+  if (!read || !vox::is_slab6(bytes)) return bad_at(0, "the file size does not match the model's three sizes");
+  constexpr std::uint8_t kEmpty = 255;
+  const Sizes& sizes = *read;
   const std::span<const std::byte> palette = bytes.last(kPaletteBytes);
   ModelBuilder builder;
   builder.begin(model_of(sizes, DVec3(0.0, 0.0, sizes.z)));
@@ -327,7 +320,7 @@ Result<LoadedScene> read_vxl(std::span<const std::byte> bytes) {
 Result<LoadedScene> read_voxlap(const FormatInput& input) {
   if (is_kv6(input.bytes)) return read_kv6(input.bytes);
   if (is_kvx(input.bytes)) return read_kvx(input.bytes);
-  if (is_slab6(input.bytes)) return read_slab6(input.bytes);
+  if (vox::is_slab6(input.bytes)) return read_slab6(input.bytes);
   return read_vxl(input.bytes);
 }
 
@@ -534,7 +527,7 @@ extern constinit const FormatDriver kVoxlapFormat = {
     .detect = models::is_kv6,
     .detect_whole =
         [](std::span<const std::byte> whole) {
-          return models::is_slab6(whole) || models::is_kvx(whole) || models::is_vxl(whole);
+          return vox::is_slab6(whole) || models::is_kvx(whole) || models::is_vxl(whole);
         },
     .read = models::read_voxlap,
     .encode = models::write_vxl,

@@ -29,17 +29,22 @@ std::string_view text_of(std::span<const std::byte> bytes, std::size_t count) {
   return {reinterpret_cast<const char*>(bytes.data()), std::min(count, bytes.size())};
 }
 
-/// The layout of SLAB6's .vox: three sizes, the voxels, and a palette of 768 bytes.
+}  // namespace
+
 bool is_slab6(std::span<const std::byte> bytes) {
+  constexpr std::uint64_t kMaxEdge = 4096;
   constexpr std::uint64_t kPaletteBytes = 768;
   ByteReader reader(bytes);
-  const std::uint64_t x = reader.u32();
-  const std::uint64_t y = reader.u32();
-  const std::uint64_t z = reader.u32();
-  // Below 2^16 each, so that the product cannot overflow.
-  if (reader.failed() || x == 0 || y == 0 || z == 0 || (x | y | z) >= (1U << 16U)) return false;
-  return bytes.size() == 12 + x * y * z + kPaletteBytes;
+  std::uint64_t voxels = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::uint64_t edge = reader.u32();
+    if (edge == 0 || edge > kMaxEdge) return false;
+    voxels *= edge;
+  }
+  return reader.remaining() == voxels + kPaletteBytes;
 }
+
+namespace {
 
 Status check_signature(std::span<const std::byte> bytes) {
   if (bytes.empty()) return make_error(ErrorCode::BadFormat, "the file is empty");
