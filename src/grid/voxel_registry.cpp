@@ -8,8 +8,8 @@
 #include <quoin/core/assert.h>
 
 #include "core/change_journal.h"
+#include "core/make_room.h"
 #include "core/srgb.h"
-#include "grid/make_room.h"
 
 namespace quoin {
 namespace {

@@ -7,6 +7,8 @@
 
 #include <quoin/core/assert.h>
 
+#include "core/make_room.h"
+
 namespace quoin {
 namespace {
 
@@ -36,7 +38,7 @@ void MeshJobQueue::push(std::unique_ptr<SurfaceJob> job) {
     const std::lock_guard lock(mutex_);
     const std::size_t wanted = done_.size() + queue_.size() + running_ + 1;
     // Reserves memory here, so that workers cannot fail when they report a failure.
-    if (done_.capacity() < wanted) done_.reserve(2 * wanted);
+    make_room(done_, wanted - done_.size(), wanted);
     queue_.push_back(std::move(job));
   }
   workers_.wake_one();

@@ -4,6 +4,8 @@
 
 #include <quoin/core/assert.h>
 
+#include "core/make_room.h"
+
 namespace quoin::trace {
 namespace {
 
@@ -61,7 +63,7 @@ std::uint32_t BrickStore::allocate(int lines) {
     same.push_back(first + static_cast<std::uint32_t>(lines));
     return first;
   }
-  if (is_built_) make_room(lines_, wanted);
+  if (is_built_) make_room(lines_, wanted, eighth_of(lines_));
   lines_.resize(lines_.size() + wanted);
   return static_cast<std::uint32_t>(lines_.size() - wanted);
 }

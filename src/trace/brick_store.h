@@ -2,6 +2,7 @@
 
 // The words of a tree's bricks: consecutive runs of four to eight lines (tree_view.h).
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -12,12 +13,10 @@
 
 namespace quoin::trace {
 
-/// Reserves an eighth more than the current size if there is no room. Doubling would leave half of the memory unused
-/// for long.
+/// Returns the number of spare elements for make_room. Doubling would leave half of the memory unused for long.
 template <class T>
-void make_room(std::vector<T>& all, std::size_t more = 1) {
-  if (all.size() + more <= all.capacity()) return;
-  all.reserve(all.size() + (all.size() / 8 > 64 ? all.size() / 8 : 64) + more);
+std::size_t eighth_of(const std::vector<T>& all) {
+  return std::max<std::size_t>(all.size() / 8, 64);
 }
 
 /// Shrinks the capacity but leaves a small reserve in large vectors. Untouched pages take no memory, and the first edit

@@ -11,6 +11,7 @@
 
 #include "core/coordinates/chunk_boxes.h"
 #include "core/coordinates/chunk_order.h"
+#include "core/make_room.h"
 #include "trace/brick_store.h"
 #include "trace/chunk_rows.h"
 #include "trace/tree_view.h"
@@ -194,7 +195,7 @@ struct OccupancyTree::Impl {
     std::uint32_t& index = region->nodes[table_index(unit)];
     if (index == 0) {
       if (free_chunks.empty()) {
-        if (is_built) trace::make_room(chunk_nodes);
+        if (is_built) make_room(chunk_nodes, 1, trace::eighth_of(chunk_nodes));
         chunk_nodes.emplace_back();
         index = static_cast<std::uint32_t>(chunk_nodes.size() - 1);
       } else {

@@ -4,7 +4,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "grid/make_room.h"
+#include "core/make_room.h"
 
 namespace quoin {
 

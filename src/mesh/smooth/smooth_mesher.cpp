@@ -258,14 +258,14 @@ void begin_occlusion(Work& work) {
   const std::size_t slices = work.apron <= 6 ? 16 : kMostSlices;
   work.ring_mask = static_cast<int>(slices) - 1;
   work.next_slice = work.cells.first - work.apron;
-  const auto make_room = [](auto& values, std::size_t size) {
+  const auto grow = [](auto& values, std::size_t size) {
     if (values.size() < size) values.resize(size);
   };
-  if (work.is_dense) return make_room(work.decoded, (slices + kRepeatedSlices) * kDecodedSlice + 64);
+  if (work.is_dense) return grow(work.decoded, (slices + kRepeatedSlices) * kDecodedSlice + 64);
   // The first slice is not gathered yet.
   --work.next_slice;
-  make_room(work.cell_words, slices * 2 * Work::kSlots + 4);
-  make_room(work.sampled, slices * kSampledSlice + 64);
+  grow(work.cell_words, slices * 2 * Work::kSlots + 4);
+  grow(work.sampled, slices * kSampledSlice + 64);
 }
 
 }  // namespace quoin::smooth
