@@ -446,18 +446,29 @@ TEST(CpuBackend, PicksVisibleVoxel) {
 }
 
 TEST(CpuBackend, PicksAgainAfterSceneUpdate) {
-  const LoadedScene loaded = small_scene();
+  LoadedScene loaded = small_scene();
   Watched watched(loaded.scene);
   EXPECT_TRUE(watched.backend.is_up_to_date());
-  watched.backend.pause();
-  watched.backend.resume(true);
-  while (!watched.backend.is_up_to_date()) ASSERT_TRUE(watched.bell.wait());
   const ViewRequest request = request_for(loaded.scene, View::Front);
-  int hits = 0;
-  for (int y = 0; y < request.height; ++y) {
-    hits += watched.backend.pick(request.camera, 30.5, y + 0.5, request.width, request.height).has_value() ? 1 : 0;
-  }
-  EXPECT_GT(hits, 0);
+  const auto hits = [&] {
+    int count = 0;
+    for (int y = 0; y < request.height; ++y) {
+      count += watched.backend.pick(request.camera, 30.5, y + 0.5, request.width, request.height).has_value() ? 1 : 0;
+    }
+    return count;
+  };
+  const int before = hits();
+  EXPECT_GT(before, 0);
+  const auto update_with = [&](auto edit) {
+    watched.backend.pause();
+    for (const GridHandle grid : loaded.scene.grids().handles()) edit(loaded.scene.edit(grid).grid);
+    watched.backend.resume(true);
+    while (!watched.backend.is_up_to_date()) ASSERT_TRUE(watched.bell.wait());
+  };
+  update_with([](Grid& grid) { grid.fill_box({{0, 10, 0}, {71, 20, 41}}, 1); });
+  EXPECT_GT(hits(), before) << "a higher scene";
+  update_with([](Grid& grid) { grid.clear(); });
+  EXPECT_EQ(hits(), 0);
 }
 
 TEST(CpuBackend, ReportsInvalidRequests) {
@@ -487,8 +498,11 @@ TEST(CpuBackend, StopsDuringRendering) {
 TEST(CpuBackend, SettlesOnEmptyScene) {
   const Scene empty;
   Watched watched(empty);
-  watched.backend.show(request_for(empty, View::Iso, 20, 10));
-  EXPECT_FALSE(watched.settle().empty());
+  const ViewRequest request = request_for(empty, View::Iso, 20, 10);
+  watched.backend.show(request);
+  const auto frames = watched.settle();
+  ASSERT_FALSE(frames.empty());
+  EXPECT_EQ(frames.back().colour.rgb, expected(empty, request).rgb) << "only sky";
 }
 
 MakeBackend by_processor() {

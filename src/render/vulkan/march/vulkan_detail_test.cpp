@@ -214,6 +214,10 @@ TEST_F(VulkanDetail, EvictsUnusedLevels) {
   EXPECT_EQ(detail.halved_bytes(), first) << "the other one was not asked for";
   place(grids[0], 0);
   EXPECT_EQ(detail.halved_bytes(), first) << "levels that the image needs are kept";
+  place(grids[1], both);
+  EXPECT_EQ(detail.halved_bytes(), both) << "the evicted level is made again";
+  place(grids[1], both - 1);
+  EXPECT_EQ(detail.halved_bytes(), both - first) << "the level that was used longer ago is evicted";
   const Camera camera = towards({-300, 420, -500}, {150, 0, 150}, 0.6);
   compare(camera, always_mid(4.0), "after_giving_way");
 }
