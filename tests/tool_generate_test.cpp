@@ -135,6 +135,13 @@ TEST_F(ToolGenerate, ReturnsStatus2WithoutFileForWrongUsage) {
   }
   EXPECT_FALSE(exists("out.vox") || exists("out.glb") || exists("out"));
   EXPECT_EQ(run("generate forest out.vox").err, "quoin: generate needs one of: terrain, smooth-terrain (try --help)\n");
+  EXPECT_EQ(run("generate terrain out.vox --endless").err, "quoin: --endless needs a .quoin file (try --help)\n");
+  EXPECT_EQ(run("generate smooth-terrain out.json --chunks 4x17x4").err,
+            "quoin: --chunks: must be XxYxZ, as in 4x2x4, at most 512x16x512 and 8,192 units, not \"4x17x4\" "
+            "(try --help)\n");
+  EXPECT_EQ(run("generate smooth-terrain out.vox").err,
+            "quoin: cannot write out.vox: smooth terrain is written as .quoin or .json; use `quoin convert` for other "
+            "formats (try --help)\n");
   EXPECT_TRUE(
       run("generate terrain out.vox --seed 5 --unknown").err.starts_with("quoin: unknown option \"--unknown\""));
 }

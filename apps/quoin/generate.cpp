@@ -23,8 +23,6 @@ constexpr std::int64_t kMaxVoxels = std::int64_t{1} << 31;
 
 struct GenerateOptions {
   std::filesystem::path output;
-  std::string seed = "42";
-  std::string chunks = "4x2x4";
   bool is_smooth = false;
   bool is_endless = false;  ///< an unbounded world, generated around the origin
   bool force = false;
@@ -45,35 +43,35 @@ struct Outcome {
 };
 
 /// Returns the voxels or samples along each axis of one unit of --chunks.
-int edge_of_unit(const GenerateOptions& options) {
-  return options.is_smooth ? kChunkEdge : kTerrainUnit;
+int edge_of_unit(bool is_smooth) {
+  return is_smooth ? kChunkEdge : kTerrainUnit;
 }
 
 /// Returns the height of an endless world in chunks.
 int endless_height(const GenerateOptions& options) {
-  return (options.terrain.size.y * edge_of_unit(options) + kChunkEdge - 1) / kChunkEdge;
+  return (options.terrain.size.y * edge_of_unit(options.is_smooth) + kChunkEdge - 1) / kChunkEdge;
 }
 
-/// Reads the options into `options.terrain` and `options.smooth`. Returns a usage error, or "".
-std::string read_options(GenerateOptions& options) {
-  const auto seed = parse_unsigned(options.seed);
-  if (!seed) return "--seed: must be a whole number from 0 to 18446744073709551615, not \"" + options.seed + "\"";
-  const std::string got = ", not \"" + options.chunks + "\"";
-  const auto parsed = parse_box_size(options.chunks);
-  if (!parsed) return "--chunks: must be XxYxZ, as in 4x2x4" + got;
-  const IVec3 size = *parsed;
-  const IVec3 most = options.is_smooth ? IVec3{512, 16, 512} : IVec3{1'024, 32, 1'024};
-  if (glm::any(glm::lessThan(size, IVec3{1})) || glm::any(glm::greaterThan(size, most))) {
-    return "--chunks: must be 1 to " + std::to_string(most.x) + " wide and deep and 1 to " + std::to_string(most.y) +
-           " high" + got;
-  }
-  const std::int64_t unit = edge_of_unit(options);
-  if (std::int64_t{size.x} * size.y * size.z > kMaxVoxels / (unit * unit * unit)) {
-    return "--chunks: must be at most " + with_thousands(kMaxVoxels / (unit * unit * unit)) + " in all" + got;
-  }
-  options.terrain.seed = options.smooth.seed = *seed;
-  options.terrain.size = options.smooth.size = size;
-  return "";
+/// The limits of --chunks.
+IVec3 max_chunks(bool is_smooth) {
+  return is_smooth ? IVec3{512, 16, 512} : IVec3{1'024, 32, 1'024};
+}
+std::int64_t max_total(bool is_smooth) {
+  const std::int64_t unit = edge_of_unit(is_smooth);
+  return kMaxVoxels / (unit * unit * unit);
+}
+std::string chunk_limits(bool is_smooth) {
+  const IVec3 most = max_chunks(is_smooth);
+  return "at most " + std::to_string(most.x) + "x" + std::to_string(most.y) + "x" + std::to_string(most.z) + " and " +
+         with_thousands(max_total(is_smooth)) + " units";
+}
+
+std::optional<IVec3> read_chunks(const std::string& text, bool is_smooth) {
+  const auto size = parse_box_size(text);
+  const bool fits = size && glm::all(glm::greaterThan(*size, IVec3{0})) &&
+                    glm::all(glm::lessThanEqual(*size, max_chunks(is_smooth))) &&
+                    std::int64_t{size->x} * size->y * size->z <= max_total(is_smooth);
+  return fits ? size : std::nullopt;
 }
 
 /// Generates the voxels or the field of the world. Errors: Cancelled.
@@ -112,7 +110,7 @@ Result<Outcome> generate(const GenerateOptions& options) {
   if (!materials) return materials.error();
   SceneGrid content;
   content.name = "terrain";
-  content.canvas = {IVec3{0}, options.terrain.size * edge_of_unit(options)};
+  content.canvas = {IVec3{0}, options.terrain.size * edge_of_unit(options.is_smooth)};
   if (Status done = make_content(options, *materials, bar.listener("generating"), content); !done) return done.error();
   Outcome outcome;
   outcome.voxels = content.grid.voxel_count() + content.field.solid_count();
@@ -149,7 +147,7 @@ Result<Outcome> generate_endless(const GenerateOptions& options) {
     if (!world) return world.error();
     const EndlessTerrain terrain{options.terrain.seed, endless_height(options), options.is_smooth};
     const auto grid = world->add_terrain(terrain);
-    const IVec3 size = options.terrain.size * edge_of_unit(options);
+    const IVec3 size = options.terrain.size * edge_of_unit(options.is_smooth);
     const Viewer viewer{.position = {0.0, 0.5 * size.y, 0.0}, .radius = 0.5 * std::max(size.x, size.z)};
     done = grid ? world->load_all({&viewer, 1}) : Status(grid.error());
     if (done) {
@@ -184,7 +182,7 @@ bool has_faces(const GenerateOptions& options) {
 
 Json outcome_json(const GenerateOptions& options, const Outcome& outcome) {
   const IVec3 size = options.terrain.size;
-  const int unit = edge_of_unit(options);
+  const int unit = edge_of_unit(options.is_smooth);
   return {{"seed", options.terrain.seed},
           {"chunks", {size.x, size.y, size.z}},
           {"size", {size.x * unit, size.y * unit, size.z * unit}},
@@ -200,7 +198,7 @@ Json outcome_json(const GenerateOptions& options, const Outcome& outcome) {
 }
 
 std::string outcome_text(const GenerateOptions& options, const Outcome& outcome) {
-  const IVec3 size = options.terrain.size * edge_of_unit(options);
+  const IVec3 size = options.terrain.size * edge_of_unit(options.is_smooth);
   return std::string(options.is_endless ? "Endless terrain: seed " : "Terrain: seed ") +
          std::to_string(options.terrain.seed) + ", " + std::to_string(size.x) + " x " + std::to_string(size.y) + " x " +
          std::to_string(size.z) + (options.is_smooth ? "\nSolid samples: " : "\nVoxels: ") +
@@ -210,24 +208,22 @@ std::string outcome_text(const GenerateOptions& options, const Outcome& outcome)
          number_for_people(outcome.seconds_generate + outcome.seconds_write) + " s\n";
 }
 
-int run_generate(GenerateOptions& options) {
+/// Checks the options against the format of the output. Errors: InvalidArgument.
+Status settle(const CLI::App& command, const GenerateOptions& options) {
   const auto format = format_for_writing(options.output);
   const bool is_wrong =
       !format || format->can(FormatCapability::Meshes) || (options.is_smooth && format->format == FileFormat::Vox);
   if (is_wrong) {
-    print_error("cannot write " + options.output.string() + ": " + (options.is_smooth ? "smooth terrain" : "terrain") +
-                " is written as .quoin" + (options.is_smooth ? " or " : ", .vox or ") +
-                ".json; use `quoin convert` for other formats");
-    return kWrongUsage;
+    return make_error(ErrorCode::InvalidArgument,
+                      "cannot write " + options.output.string() + ": " +
+                          (options.is_smooth ? "smooth terrain" : "terrain") + " is written as .quoin" +
+                          (options.is_smooth ? " or " : ", .vox or ") + ".json; use `quoin convert` for other formats");
   }
-  if (options.is_endless && format->format != FileFormat::World) {
-    print_error("cannot write " + options.output.string() + ": --endless needs a .quoin file");
-    return kWrongUsage;
-  }
-  if (const std::string fault = read_options(options); !fault.empty()) {
-    print_error(fault + " (try --help)");
-    return kWrongUsage;
-  }
+  const auto is_world = [&] { return format->format == FileFormat::World; };
+  return check_rules(command, {{{"--endless"}, needs("a .quoin file", is_world)}});
+}
+
+int run_generate(const GenerateOptions& options) {
   const auto outcome = options.is_endless ? generate_endless(options) : generate(options);
   if (!outcome) {
     die_if_interrupted();
@@ -239,12 +235,23 @@ int run_generate(GenerateOptions& options) {
   return print_summary(outcome_text(options, *outcome));
 }
 
-std::shared_ptr<GenerateOptions> add_world(CLI::App& command, const char* files, const char* chunks, int& status) {
+/// Adds the options of both kinds of terrain. `unit`: the unit of --chunks.
+std::shared_ptr<GenerateOptions> add_world(CLI::App& command, const char* files, bool is_smooth, const char* unit,
+                                           int& status) {
   auto options = std::make_shared<GenerateOptions>();
+  options->is_smooth = is_smooth;
   command.add_option("OUT", options->output, files)->required()->check(file_name());
   set_heading(command, heading::kOutput);
-  command.add_option("--seed", options->seed, "Seed, a whole number (default 42)")->type_name("N");
-  command.add_option("--chunks", options->chunks, chunks)->type_name("XxYxZ");
+  add_parsed<std::uint64_t>(
+      command, "--seed", "N", {parse_unsigned, "a whole number from 0 to 18446744073709551615"},
+      [options](const std::uint64_t& seed) { options->terrain.seed = options->smooth.seed = seed; },
+      "Seed, a whole number (default 42)");
+  add_parsed<IVec3>(
+      command, "--chunks", "XxYxZ",
+      {[is_smooth](const std::string& text) { return read_chunks(text, is_smooth); },
+       "XxYxZ, as in 4x2x4, " + chunk_limits(is_smooth)},
+      [options](const IVec3& size) { options->terrain.size = options->smooth.size = size; },
+      std::string("Width, height and depth in units of ") + unit + " (default 4x2x4); " + chunk_limits(is_smooth));
   command.add_flag(
       "--endless", options->is_endless,
       "Write an unbounded .quoin, which programs extend with StreamedWorld. Generates only a square of the "
@@ -255,7 +262,10 @@ std::shared_ptr<GenerateOptions> add_world(CLI::App& command, const char* files,
   add_quiet_option(command);
   command.add_option("--threads", options->threads.count, "Number of threads, 1 to 1024 (default: all)")
       ->check(CLI::Range(1U, 1024U));
-  command.callback([options, &status] { status = run_generate(*options); });
+  command.callback([&command, options, &status] {
+    const Status fits = settle(command, *options);
+    status = fits ? run_generate(*options) : wrong_usage(fits.error());
+  });
   return options;
 }
 
@@ -266,17 +276,12 @@ void add_generate_command(CLI::App& app, int& status) {
   command->require_subcommand(1);
   command->footer("Example: quoin generate terrain hills.vox");
   CLI::App* terrain = command->add_subcommand("terrain", "Hills, rivers, caves and woods");
-  add_world(*terrain, "File to write: .quoin, .vox, .json",
-            "Width, height and depth in units of 32 voxels (default 4x2x4); at most 1024x32x1024 and 65,536 units",
-            status);
+  add_world(*terrain, "File to write: .quoin, .vox, .json", false, "32 voxels", status);
   terrain->footer(
       "The same seed gives the same world on every machine. Taller worlds have larger hills.\n"
       "Example: quoin generate terrain hills.vox --seed 7 --chunks 8x3x8");
   CLI::App* smooth = command->add_subcommand("smooth-terrain", "Smooth hills with cliffs, arches and caves");
-  const auto options = add_world(
-      *smooth, "File to write: .quoin, .json",
-      "Width, height and depth in units of 64 samples (default 4x2x4); at most 512x16x512 and 8,192 units", status);
-  options->is_smooth = true;
+  const auto options = add_world(*smooth, "File to write: .quoin, .json", true, "64 samples", status);
   set_heading(*smooth, heading::kOutput);
   smooth->add_flag("!--no-overhangs", options->smooth.overhangs, "Generate no overhangs and no arches");
   smooth->add_flag("!--no-caves", options->smooth.caves, "Generate no caves");

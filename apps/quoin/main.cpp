@@ -47,34 +47,31 @@ const CLI::App& innermost(CLI::App& command) {
 
 /// Returns the message of a usage error; replaces unclear messages of CLI11.
 std::string usage_error(CLI::App& app, const CLI::ParseError& error, const Arguments& arguments) {
-  const std::string hint = " (try --help)";
   const auto chosen = app.get_subcommands();
-  if (chosen.empty() && arguments.empty()) return "missing command; use one of: " + command_names(app) + hint;
+  if (chosen.empty() && arguments.empty()) return "missing command; use one of: " + command_names(app);
   if (chosen.empty() && !arguments[0].starts_with('-')) {
-    return "unknown command \"" + arguments[0] + "\"; use one of: " + command_names(app) + hint;
+    return "unknown command \"" + arguments[0] + "\"; use one of: " + command_names(app);
   }
   const auto code = static_cast<CLI::ExitCodes>(error.get_exit_code());
   if (code == CLI::ExitCodes::ExtrasError || code == CLI::ExitCodes::RequiredError) {
     const std::string unknown = unknown_option(chosen.empty() ? app : innermost(*chosen[0]), arguments);
-    if (unknown.starts_with("--") || (chosen.empty() && !unknown.empty()))
-      return "unknown option \"" + unknown + "\"" + hint;
-    if (!unknown.empty())
-      return "unknown option \"" + unknown + "\"; for a file with this name use ./" + unknown + hint;
+    if (unknown.starts_with("--") || (chosen.empty() && !unknown.empty())) return "unknown option \"" + unknown + "\"";
+    if (!unknown.empty()) return "unknown option \"" + unknown + "\"; for a file with this name use ./" + unknown;
   }
   if (!chosen.empty()) {
     const CLI::App& command = innermost(*chosen[0]);
     const std::string inner = command_names(command);
-    if (!inner.empty()) return command.get_name() + " needs one of: " + inner + hint;
+    if (!inner.empty()) return command.get_name() + " needs one of: " + inner;
   }
   const std::string message = error.what();
-  if (code == CLI::ExitCodes::RequiredError && message.starts_with("--output")) return "-o OUT is required" + hint;
+  if (code == CLI::ExitCodes::RequiredError && message.starts_with("--output")) return "-o OUT is required";
   const std::size_t end = message.find(": 1 required ");
   if (code == CLI::ExitCodes::ArgumentMismatch && end != std::string::npos && !chosen.empty()) {
     const std::string name = message.substr(0, end);
     const CLI::Option* option = innermost(*chosen[0]).get_option_no_throw(name);
-    if (option != nullptr) return name + " needs a value: " + value_type(*option) + hint;
+    if (option != nullptr) return name + " needs a value: " + value_type(*option);
   }
-  return message + hint;
+  return message;
 }
 
 /// Returns the arguments with "-.5" written as "-0.5", because CLI11 takes "-.5" for an option.
@@ -119,8 +116,7 @@ int run(int argc, char** argv) {
     app.parse(Arguments(arguments.rbegin(), arguments.rend()));
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) return print_answer(app, error);
-    print_error(usage_error(app, error, arguments));
-    return kWrongUsage;
+    return wrong_usage({ErrorCode::InvalidArgument, usage_error(app, error, arguments), {}, {}});
   }
   return status;
 }

@@ -29,6 +29,16 @@ struct Thumbnail {
   std::vector<std::string> warnings;
 };
 
+/// Checks the name of the output. Errors: InvalidArgument.
+Status check_image_name(const ThumbnailArguments& arguments) {
+  const std::string name = arguments.output.string();
+  if (CLI::detail::to_lower(arguments.output.extension().string()) != ".png") {
+    return make_error(ErrorCode::InvalidArgument, "OUT: the image name must end in .png, not \"" + name + "\"");
+  }
+  if (!is_same_file(arguments.output, arguments.common.input)) return {};
+  return make_error(ErrorCode::InvalidArgument, "OUT: " + name + " is the input");
+}
+
 Result<Thumbnail> draw(const ThumbnailArguments& arguments) {
   Stopwatch watch;
   if (auto writable = check_outputs({arguments.output}); !writable) return writable.error();
@@ -90,17 +100,8 @@ void add_thumbnail_command(CLI::App& app, int& status) {
       ->check(CLI::Range(1, kMaxSize));
   command->footer("Example: quoin thumbnail castle.vox castle.png --size 128");
   command->callback([arguments, &status] {
-    if (CLI::detail::to_lower(arguments->output.extension().string()) != ".png") {
-      print_error("OUT: the image name must end in .png, not \"" + arguments->output.string() + "\" (try --help)");
-      status = kWrongUsage;
-      return;
-    }
-    if (is_same_file(arguments->output, arguments->common.input)) {
-      print_error("OUT: " + arguments->output.string() + " is the input (try --help)");
-      status = kWrongUsage;
-      return;
-    }
-    status = run_thumbnail(*arguments);
+    const Status fits = check_image_name(*arguments);
+    status = fits ? run_thumbnail(*arguments) : wrong_usage(fits.error());
   });
 }
 
