@@ -61,7 +61,7 @@ fn next_instance(max_t: f32) -> i32 {
       }
     }
     if (visit_height == 0) {
-      return -1;
+      break;
     }
     visit_height--;
     let node = visit_stack[visit_height];
@@ -83,6 +83,7 @@ fn next_instance(max_t: f32) -> i32 {
     visit_stack[visit_height + 1] = select(first, first - 1u, is_forward);
     visit_height += 2;
   }
+  return -1;
 }
 
 fn grid_from_view(i: i32, ray: ViewRay) -> GridRay {

@@ -77,13 +77,14 @@ fn lamps_around(voxel: vec4i) -> vec2u {
     let place = (frame.lamp_bricks.x >> 4u) + 2u * slot;
     let list = nodes[place + 1u].xy;
     if (list.y == 0u) {
-      return vec2u();
+      break;
     }
     if (all(bitcast<vec4i>(nodes[place]) == vec4i(brick, voxel.w))) {
       return list;
     }
     slot = (slot + 1u) & frame.lamp_mask;
   }
+  return vec2u();
 }
 
 // Evaluates a lamp, which has thirteen vectors: position (w: its reach), three axes (w: the addend to the squared

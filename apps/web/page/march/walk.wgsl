@@ -158,7 +158,7 @@ fn find_voxel(max_t: f32) -> bool {
     let index = index_in(walk_voxel, walk_level);
     if (!has_child(walk_node, index)) {
       if (!leave_block(2u * u32(walk_level), max_t)) {
-        return false;
+        break;
       }
       continue;
     }
@@ -177,6 +177,7 @@ fn find_voxel(max_t: f32) -> bool {
       walk_node = vec4u(words[word], words[word + 1u], 1u, 0u);
     }
   }
+  return false;
 }
 
 // The address of a chunk's record: types, storage, then the tree's bricks.
