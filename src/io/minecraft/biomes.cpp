@@ -241,4 +241,16 @@ std::string_view name_of_biome(std::int64_t number) {
   return found != std::end(kNumbers) ? found->name : "plains";
 }
 
+std::uint32_t colour_of(Tint tint, const BiomeTints& biome) {
+  if (tint == Tint::None) return 0xFFFFFF;
+  return tint == Tint::Grass ? biome.grass : tint == Tint::Foliage ? biome.foliage : biome.water;
+}
+
+Rgba8 tinted_colour(Rgba8 colour, std::uint32_t tint) {
+  const auto times = [tint](std::uint8_t part, int shift) {
+    return static_cast<std::uint8_t>((part * (tint >> shift & 255U) + 127U) / 255U);
+  };
+  return {times(colour.r, 16), times(colour.g, 8), times(colour.b, 0), colour.a};
+}
+
 }  // namespace quoin::minecraft

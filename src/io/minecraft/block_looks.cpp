@@ -51,7 +51,6 @@ constexpr Entry kBlocks[] = {
     {"barrier", 0, K::Invisible},
     // Stone.
     {"stone", 0x7D7D7D},
-    {"infested_stone", 0x7D7D7D},
     {"smooth_stone", 0x9E9E9E},
     {"granite", 0x956755},
     {"diorite", 0xBCBCBD},
@@ -145,7 +144,6 @@ constexpr Entry kBlocks[] = {
     {"magma_block", 0xC2601F, K::Glow},
     {"crimson_nylium", 0x831F1F},
     {"warped_nylium", 0x2B7265},
-    {"snow", 0xF9FEFE},
     {"snow_block", 0xF9FEFE},
     {"powder_snow", 0xF8FDFD},
     {"ice", 0x91B7FD, K::Clear},
@@ -253,7 +251,6 @@ constexpr Entry kBlocks[] = {
     {"tall_grass", 0xB8B8B8, K::Herb},
     {"fern", 0xA8A8A8, K::Herb},
     {"large_fern", 0xA0A0A0, K::Herb},
-    {"potted_fern", 0xA8A8A8, K::Herb},
     {"bush", 0xA8A8A8, K::Herb},
     {"sugar_cane", 0xC8D0B0, K::Herb},
     {"vine", 0xB0B0B0, K::Vine},
@@ -317,7 +314,6 @@ constexpr Entry kBlocks[] = {
     {"big_dripleaf_stem", 0x5C732B, K::Plant},
     {"small_dripleaf", 0x5F782E, K::Plant},
     {"bamboo", 0x5D9023, K::Plant},
-    {"bamboo_sapling", 0x5D8A2C, K::Plant},
     {"cactus", 0x557F2B},
     {"lily_pad", 0x208030, K::Thin},
     {"kelp", 0x57822B, K::Plant},
@@ -495,29 +491,30 @@ constexpr Dye kDyes[] = {
     {"black", 0x141519, 0x080A0F, 0x251610},
 };
 
-// Suffixes of block shapes; longer ones first. `is_thin`: the shape fills little of its voxel.
-struct Shape {
-  std::string_view suffix;
-  bool is_thin;
+// Suffixes of block shapes; longer ones first.
+constexpr std::string_view kShapes[] = {
+    "_wall_hanging_sign",
+    "_hanging_sign",
+    "_pressure_plate",
+    "_double_slab",
+    "_fence_gate",
+    "_wall_sign",
+    "_trapdoor",
+    "_stairs",
+    "_button",
+    "_fence",
+    "_slab",
+    "_wall",
+    "_door",
+    "_sign",
+    "_shelf",
+    "_pane",
 };
-constexpr Shape kShapes[] = {
-    {"_wall_hanging_sign", false},
-    {"_hanging_sign", false},
-    {"_pressure_plate", true},
-    {"_double_slab", false},
-    {"_fence_gate", false},
-    {"_wall_sign", false},
-    {"_trapdoor", false},
-    {"_stairs", false},
-    {"_button", true},
-    {"_fence", false},
-    {"_slab", false},
-    {"_wall", false},
-    {"_door", false},
-    {"_sign", false},
-    {"_shelf", false},
-    {"_pane", false},
-};
+
+/// Returns true if a shape fills little of its voxel.
+bool is_thin(std::string_view shape) {
+  return shape == "_pressure_plate" || shape == "_button";
+}
 
 constexpr std::string_view kPrefixesWithoutLook[] = {"waxed_",  "infested_", "potted_",   "dead_",     "stripped_",
                                                      "smooth_", "cut_",      "chiseled_", "polished_", "cracked_"};
@@ -618,7 +615,7 @@ std::optional<BlockLook> look_of_wood(std::string_view name) {
       return look_of(is_stripped ? wood.inner : wood.bark, Kind::Solid);
     }
     if (rest == "_sapling") return look_of(wood.sapling, Kind::Plant);
-    if (rest.empty() || rest == "_mosaic") return look_of(wood.planks, Kind::Solid);
+    if (rest.empty()) return look_of(wood.planks, Kind::Solid);
   }
   return std::nullopt;
 }
@@ -664,8 +661,8 @@ std::optional<BlockLook> look_of_material(std::string_view name, bool is_of_shap
   return std::nullopt;
 }
 
-BlockLook thinned(BlockLook look, bool is_thin) {
-  if (is_thin && look.colour.a == 255) {
+BlockLook thinned(BlockLook look) {
+  if (look.colour.a == 255) {
     look.colour.a = look_of(0, Kind::Thin).colour.a;
     look.ior = 1.0F;
   }
@@ -674,10 +671,10 @@ BlockLook thinned(BlockLook look, bool is_thin) {
 
 std::optional<BlockLook> look_in_table(std::string_view name) {
   if (auto look = look_of_material(name, false)) return look;
-  for (const Shape& shape : kShapes) {
-    if (!name.ends_with(shape.suffix) || name.size() == shape.suffix.size()) continue;
-    if (auto look = look_of_material(name.substr(0, name.size() - shape.suffix.size()), true)) {
-      return thinned(*look, shape.is_thin);
+  for (const std::string_view shape : kShapes) {
+    if (!name.ends_with(shape) || name.size() == shape.size()) continue;
+    if (auto look = look_of_material(name.substr(0, name.size() - shape.size()), true)) {
+      return is_thin(shape) ? thinned(*look) : *look;
     }
   }
   for (const std::string_view prefix : kPrefixesWithoutLook) {
@@ -848,18 +845,6 @@ bool is_lamp(std::string_view name) {
 }
 
 }  // namespace
-
-std::uint32_t colour_of(Tint tint, const BiomeTints& biome) {
-  if (tint == Tint::None) return 0xFFFFFF;
-  return tint == Tint::Grass ? biome.grass : tint == Tint::Foliage ? biome.foliage : biome.water;
-}
-
-Rgba8 tinted_colour(Rgba8 colour, std::uint32_t tint) {
-  const auto times = [tint](std::uint8_t part, int shift) {
-    return static_cast<std::uint8_t>((part * (tint >> shift & 255U) + 127U) / 255U);
-  };
-  return {times(colour.r, 16), times(colour.g, 8), times(colour.b, 0), colour.a};
-}
 
 BlockLook look_of_block(std::string_view name, bool is_lit, bool is_snowy) {
   constexpr std::string_view kNamespace = "minecraft:";
