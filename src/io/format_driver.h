@@ -14,6 +14,7 @@
 #include <quoin/core/result.h>
 #include <quoin/io/chunk_source.h>
 #include <quoin/io/file_format.h>
+#include <quoin/io/formats.h>
 #include <quoin/io/loaded_scene.h>
 #include <quoin/io/mesh_file.h>
 
@@ -24,29 +25,6 @@ namespace quoin {
 namespace triangles {
 class SidecarReader;
 }
-
-/// A file to read, with the options of load_scene.
-struct FormatInput {
-  const std::filesystem::path& path;  ///< empty if there are only bytes
-  std::span<const std::byte> bytes;   ///< the whole file; empty for drivers with `reads_path` if there is a path
-  const LoadOptions& options;
-  Threads threads;
-  const Progress& progress;
-};
-
-/// A scene to save.
-struct FormatOutput {
-  const Scene& scene;
-  const LoadedScene* loaded = nullptr;  ///< the scene with its file's additional data, if it was read from a file
-  Threads threads{};
-  const Progress& progress;
-};
-
-/// A file made from a scene, with one line for each kind of content that it lacks.
-struct EncodedFile {
-  std::vector<std::byte> bytes;
-  std::vector<std::string> warnings;
-};
 
 /// All that the library knows about one format. Functions that do not apply are null. Errors need no path, except of
 /// functions that take one.
@@ -106,7 +84,8 @@ struct FormatDriver {
   double most_steps = 0.0;
 };
 
-/// Adds a driver. Higher layers call it before main, so that this layer does not depend on them. Returns true.
+/// Adds a driver. Higher layers call it before main, so that this layer does not depend on them; programs call
+/// add_format. Returns true.
 /// Requires: no driver has its name, and no other thread uses the formats.
 bool register_format(const FormatDriver& driver);
 

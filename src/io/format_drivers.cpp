@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <deque>
+#include <string>
 #include <vector>
 
 #include <quoin/core/assert.h>
@@ -69,6 +71,7 @@ class FormatTable {
     infos_.push_back(info);
   }
 
+  [[nodiscard]] bool is_full() const { return drivers_.size() == kMost; }
   [[nodiscard]] std::span<const FormatDriver* const> drivers() const { return drivers_; }
   [[nodiscard]] std::span<const FormatInfo> infos() const { return infos_; }
 
@@ -88,6 +91,31 @@ FormatTable& table() {
 bool register_format(const FormatDriver& driver) {
   table().add(driver);
   return true;
+}
+
+Status add_format(const CustomFormat& format) {
+  const FormatInfo& info = format.info;
+  const auto refuse = [&](const std::string& reason) {
+    return make_error(ErrorCode::InvalidArgument, "cannot add format " + std::string(info.name()) + ": " + reason);
+  };
+  if (info.name().empty() || info.extension.size() < 2 || !info.extension.starts_with('.')) {
+    return refuse("it needs a name and an extension that starts with a point");
+  }
+  for (const FormatInfo& known : file_formats()) {
+    if (known.format == info.format) return refuse("the name exists");
+    if (known.extension == info.extension) return refuse("the extension exists");
+  }
+  const bool has_others =
+      info.can(FormatCapability::Meshes) || info.can(FormatCapability::Volume) || info.can(FormatCapability::Chunks);
+  if (has_others || info.can(FormatCapability::Read) != (format.read != nullptr && format.detect != nullptr) ||
+      info.can(FormatCapability::Write) != (format.encode != nullptr)) {
+    return refuse("its capabilities do not match its functions");
+  }
+  if (table().is_full()) return make_error(ErrorCode::LimitExceeded, "cannot add a format: there are 64");
+  static std::deque<FormatDriver> added;  // with stable addresses
+  added.push_back({.info = info, .detect = format.detect, .read = format.read, .encode = format.encode});
+  table().add(added.back());
+  return {};
 }
 
 std::span<const FormatDriver* const> format_drivers() {

@@ -88,4 +88,43 @@ struct DetectedFile {
 [[nodiscard]] Result<std::vector<std::string>> unsupported_features(const LoadedScene& loaded,
                                                                     const std::filesystem::path& path);
 
+/// A file to read, with the options of load_scene.
+struct FormatInput {
+  const std::filesystem::path& path;  ///< empty if there are only bytes
+  std::span<const std::byte> bytes;   ///< the whole file; empty for formats that open a path themselves
+  const LoadOptions& options;
+  Threads threads;
+  const Progress& progress;
+};
+
+/// A scene to save.
+struct FormatOutput {
+  const Scene& scene;
+  const LoadedScene* loaded = nullptr;  ///< the scene with its file's additional data, if it was read from a file
+  Threads threads{};
+  const Progress& progress;
+};
+
+/// A file made from a scene, with one line for each kind of content that it lacks.
+struct EncodedFile {
+  std::vector<std::byte> bytes;
+  std::vector<std::string> warnings;
+};
+
+/// A format of the calling program. Functions that do not apply are null. Errors need no path.
+struct CustomFormat {
+  FormatInfo info;  ///< has Read and Write as there are functions; none of Meshes, Volume and Chunks. Lifetime: static
+  bool (*detect)(std::span<const std::byte> beginning) = nullptr;  ///< by the first 64 KiB of a file
+  Result<LoadedScene> (*read)(const FormatInput& input) = nullptr;
+  Result<EncodedFile> (*encode)(const FormatOutput& output) = nullptr;  ///< makes the file, which save_scene writes
+};
+
+/// Adds a format, which all functions for formats then know until the program ends. Detection asks the library's formats
+/// first.
+///
+/// Requires: no other thread reads, writes or lists formats during the call; best called first in main.
+/// Errors:   InvalidArgument if the name or extension exists or is invalid, or if the capabilities do not match the
+///           functions; LimitExceeded.
+[[nodiscard]] Status add_format(const CustomFormat& format);
+
 }  // namespace quoin

@@ -123,6 +123,69 @@ TEST(NewFormat, AppearsInListsAndMessages) {
   EXPECT_EQ(refused.error().message, "cannot write --lights to .toy: it has no lamps and cameras; use .glb or .gltf");
 }
 
+/// The format of a program: the line "dots", then a character per voxel along x.
+CustomFormat dots_format() {
+  return {.info = {FileFormat("dots"), ".dots", "Dots", FormatCapability::Read | FormatCapability::Write},
+          .detect = [](std::span<const std::byte> beginning) { return text_of(beginning).starts_with("dots\n"); },
+          .read = [](const FormatInput& input) -> Result<LoadedScene> {
+            LoadedScene loaded;
+            loaded.format = "dots";
+            const auto type = loaded.scene.types.add(VoxelProperties{});
+            if (!type) return type.error();
+            SceneGrid row;
+            row.grid.fill_box({{0, 0, 0}, {static_cast<int>(input.bytes.size()) - 5, 1, 1}}, *type);
+            Instance instance;
+            instance.grid = loaded.scene.add_grid(std::move(row));
+            loaded.scene.add_instance(instance);
+            return loaded;
+          },
+          .encode = [](const FormatOutput& output) -> Result<EncodedFile> {
+            const std::string text = "dots\n" + std::string(static_cast<std::size_t>(output.scene.voxel_count()), '.');
+            const auto bytes = std::as_bytes(std::span(text));
+            return EncodedFile{{bytes.begin(), bytes.end()}, {"colours left out"}};
+          }};
+}
+
+TEST(AddedFormat, IsReadWrittenAndListed) {
+  static const Status added = add_format(dots_format());
+  ASSERT_TRUE(added) << to_string(added.error());
+  const std::string text = "dots\n...";
+  const auto loaded = load_scene(std::as_bytes(std::span(text)));
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  EXPECT_EQ(loaded->scene.voxel_count(), 3);
+  const auto path = std::filesystem::temp_directory_path() / "quoin_added_format.dots";
+  const auto saved = save_scene(loaded->scene, path);
+  ASSERT_TRUE(saved) << to_string(saved.error());
+  EXPECT_EQ(saved->warnings, std::vector<std::string>{"colours left out"});
+  EXPECT_EQ(detect_format(path).value(), FileFormat("dots"));
+  EXPECT_EQ(load_scene(path).value().scene.voxel_count(), 3);
+  std::filesystem::remove(path);
+  EXPECT_EQ(format_with_extension("a.dots", FormatCapability::Write)->name(), "dots");
+}
+
+TEST(AddedFormat, RefusesInvalidFormats) {
+  const auto refusal = [](auto change) {
+    CustomFormat format = dots_format();
+    format.info.format = FileFormat("refused");
+    format.info.extension = ".refused";
+    change(format);
+    const Status added = add_format(format);
+    return added ? "" : added.error().message;
+  };
+  EXPECT_EQ(refusal([](CustomFormat& f) { f.info.format = FileFormat::Vox; }),
+            "cannot add format vox: the name exists");
+  EXPECT_EQ(refusal([](CustomFormat& f) { f.info.extension = ".glb"; }),
+            "cannot add format refused: the extension exists");
+  EXPECT_EQ(refusal([](CustomFormat& f) { f.info.extension = "dots"; }),
+            "cannot add format refused: it needs a name and an extension that starts with a point");
+  const std::string mismatch = "cannot add format refused: its capabilities do not match its functions";
+  EXPECT_EQ(refusal([](CustomFormat& f) { f.read = nullptr; }), mismatch);
+  EXPECT_EQ(refusal([](CustomFormat& f) { f.detect = nullptr; }), mismatch);
+  EXPECT_EQ(refusal([](CustomFormat& f) { f.info.capabilities = FormatCapability::Read; }), mismatch);
+  EXPECT_EQ(refusal([](CustomFormat& f) { f.info.capabilities = f.info.capabilities | FormatCapability::Meshes; }),
+            mismatch);
+}
+
 std::string text_of_file(const std::string& path) {
   std::ostringstream text;
   text << std::ifstream(std::string(QUOIN_SOURCE_DIR) + "/" + path).rdbuf();
