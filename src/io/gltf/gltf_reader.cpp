@@ -7,6 +7,7 @@
 #include <cstring>
 #include <functional>
 #include <limits>
+#include <map>
 #include <new>
 #include <string>
 #include <string_view>
@@ -398,11 +399,7 @@ class GltfReader {
     for (int i = 0; i < 3; ++i) {
       material.emissive_tint[i] = static_cast<float>(from.emissiveFactor[static_cast<std::size_t>(i)] / most);
     }
-    tinygltf::TextureInfo info = info_of({});
-    info.index = from.emissiveTexture.index;
-    info.texCoord = from.emissiveTexture.texCoord;
-    info.extensions = from.emissiveTexture.extensions;
-    return place_of(info);
+    return place_of(from.emissiveTexture);
   }
   static float emission_of(const tinygltf::Material& from) {
     double most = 0.0;
@@ -432,13 +429,8 @@ class GltfReader {
       loaded_.warnings.push_back("left out: texture " + std::to_string(index) + ", which does not exist");
       return std::nullopt;
     }
-    const auto at = static_cast<std::size_t>(index);
-    if (at >= known_textures_.size()) {
-      known_textures_.resize(at + 1);
-      asked_textures_.resize(at + 1);
-    }
-    if (asked_textures_[at]) return known_textures_[at];
-    asked_textures_[at] = true;
+    const auto [known, is_new] = textures_.try_emplace(index);
+    if (!is_new) return known->second;
     int source = texture->source;
     const auto webp = texture->extensions.find("EXT_texture_webp");
     if (webp != texture->extensions.end()) source = index_in(webp->second, "source", source);
@@ -453,15 +445,15 @@ class GltfReader {
       loaded_.warnings.push_back("left out: the texture " + name + ", whose image does not exist");
       return std::nullopt;
     }
-    known_textures_[at] = add_texture(file_bytes, name, loaded_);
+    known->second = add_texture(file_bytes, name, loaded_);
     const tinygltf::Sampler* const sampler = entry(model_.samplers, texture->sampler);
-    if (known_textures_[at] && sampler != nullptr) {
-      MeshTexture& made = loaded_.mesh.textures[*known_textures_[at]];
+    if (known->second && sampler != nullptr) {
+      MeshTexture& made = loaded_.mesh.textures[*known->second];
       made.wrap_u = wrap_of(sampler->wrapS);
       made.wrap_v = wrap_of(sampler->wrapT);
       made.is_smooth = sampler->magFilter != TINYGLTF_TEXTURE_FILTER_NEAREST;
     }
-    return known_textures_[at];
+    return known->second;
   }
 
   /// Returns the file of an image; nullopt if it does not exist or extends past its buffer.
@@ -678,10 +670,9 @@ class GltfReader {
   const Asked& asked_;
   LoadedMesh loaded_;
   MeshBuilder builder_{loaded_};
-  std::vector<PlaceTransform> places_;       // texture transforms of base colours
-  std::vector<PlaceTransform> glow_places_;  // texture transforms of emission
-  std::vector<std::optional<std::size_t>> known_textures_;
-  std::vector<bool> asked_textures_;
+  std::vector<PlaceTransform> places_;                  // texture transforms of base colours
+  std::vector<PlaceTransform> glow_places_;             // texture transforms of emission
+  std::map<int, std::optional<std::size_t>> textures_;  // by index in the file
   std::vector<bool> seen_;
   std::size_t no_material_ = 0;
   bool has_textures_ = false;

@@ -190,14 +190,10 @@ std::string without_large_faces(const std::string& text) {
     }
     triangles.clear();
     (void)cut_polygon(polygon, triangles);
-    for (const auto& [a, b, c] : triangles) {
-      out.append("f ")
-          .append(corners[a])
-          .append(1, ' ')
-          .append(corners[b])
-          .append(1, ' ')
-          .append(corners[c])
-          .append(1, '\n');
+    for (const std::array<std::uint32_t, 3>& triangle : triangles) {
+      out += 'f';
+      for (const std::uint32_t corner : triangle) out.append(1, ' ').append(corners[corner]);
+      out += '\n';
     }
   }
   return out;
@@ -754,13 +750,9 @@ Result<std::vector<MeshFile>> plan_obj(const SceneMeshes& meshes, const std::fil
   const ObjNames names = names_beside(path);
   std::vector<MeshFile> files;
   if (has_materials(meshes)) {
-    if (auto added = add_image(names.palette, palette->opaque_colour(), files); !added) {
-      return added.error();
-    }
+    if (auto added = add_image(names.palette, palette->opaque_colour(), files); !added) return added.error();
     if (palette->has_emission()) {
-      if (auto added = add_image(names.emissive, palette->emissive(), files); !added) {
-        return added.error();
-      }
+      if (auto added = add_image(names.emissive, palette->emissive(), files); !added) return added.error();
     }
     if (!meshes.atlas.rgb.empty()) {
       if (auto added = add_image(names.atlas, png_of(meshes.atlas), files); !added) return added.error();

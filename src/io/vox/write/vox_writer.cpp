@@ -564,32 +564,27 @@ void Writer::note_model() {
 }
 
 void Writer::write_new_models() {
+  // Returns the offset of the voxels, which are written later.
+  const auto begin_model = [&](IVec3 size, std::size_t voxels) {
+    const std::size_t size_chunk = out_.begin_chunk("SIZE");
+    for (const int edge : {size.x, size.z, size.y}) out_.i32(edge);
+    out_.end_chunk(size_chunk);
+    const std::size_t voxel_chunk = out_.begin_chunk("XYZI");
+    out_.u32(static_cast<std::uint32_t>(voxels));
+    const std::size_t start = out_.size();
+    out_.leave(4 * voxels);
+    out_.end_chunk(voxel_chunk);
+    return start;
+  };
   for (const vox::GridPlan& plan : models_.grids) {
     if (plan.source_model != vox::kNone) continue;
     if (!failure_) return;
     std::vector<std::size_t> starts;
-    for (const vox::Piece& piece : plan.pieces) {
-      const std::size_t size_chunk = out_.begin_chunk("SIZE");
-      out_.i32(piece.size.x);
-      out_.i32(piece.size.z);
-      out_.i32(piece.size.y);
-      out_.end_chunk(size_chunk);
-      const std::size_t voxel_chunk = out_.begin_chunk("XYZI");
-      out_.u32(static_cast<std::uint32_t>(piece.voxels));
-      starts.push_back(out_.size());
-      out_.leave(4 * piece.voxels);
-      out_.end_chunk(voxel_chunk);
-    }
+    for (const vox::Piece& piece : plan.pieces) starts.push_back(begin_model(piece.size, piece.voxels));
     vox::write_voxels(scene_.grids()[plan.grid].grid, types_.table.index_of_type, plan.pieces, starts, out_.bytes());
     note_model();
   }
-  if (!graph_.has_empty_model) return;
-  const std::size_t size_chunk = out_.begin_chunk("SIZE");
-  for (int axis = 0; axis < 3; ++axis) out_.i32(1);
-  out_.end_chunk(size_chunk);
-  const std::size_t voxel_chunk = out_.begin_chunk("XYZI");
-  out_.u32(0);
-  out_.end_chunk(voxel_chunk);
+  if (graph_.has_empty_model) static_cast<void>(begin_model(IVec3(1), 0));
 }
 
 void Writer::write_new_nodes() {
