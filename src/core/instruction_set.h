@@ -48,6 +48,30 @@ struct KernelTable {
   }
 };
 
+// A kernel's source is compiled once for each instruction set (cmake/QuoinKernels.cmake). It defines kPlainKernel,
+// kAvx2Kernel or kAvx512Kernel and, when compiled for the plain set, the table of them:
+//
+//   const Kernel QUOIN_KERNEL(Kernel) = {...};
+//   #ifndef QUOIN_KERNEL_AVX2
+//   constinit const KernelTable<Kernel> kKernels = QUOIN_KERNEL_TABLE(Kernel, Avx512);
+//   #endif
+//
+// The second argument names the kernel of InstructionSet::Avx512: Avx2 if the widest kernel needs more than this set.
+#if defined(QUOIN_KERNEL_AVX512)
+#define QUOIN_KERNEL(Kernel) kAvx512##Kernel
+#elif defined(QUOIN_KERNEL_AVX2)
+#define QUOIN_KERNEL(Kernel) kAvx2##Kernel
+#else
+#define QUOIN_KERNEL(Kernel) kPlain##Kernel
+#endif
+#ifdef QUOIN_X86_KERNELS
+#define QUOIN_KERNEL_TABLE(Kernel, avx512) \
+  { &kPlain##Kernel, &kAvx2##Kernel, &k##avx512##Kernel, &kAvx512##Kernel }
+#else
+#define QUOIN_KERNEL_TABLE(Kernel, avx512) \
+  { &kPlain##Kernel }
+#endif
+
 /// Returns a name of the processors that have the set, for messages.
 [[nodiscard]] const char* name_of(InstructionSet set);
 

@@ -9,7 +9,6 @@
 #include <quoin/mesh/occlusion.h>
 #include <quoin/mesh/visible_faces.h>
 
-#include "core/instruction_set.h"
 #include "core/moved_from.h"
 #include "grid/chunk/chunk_storage.h"
 #include "mesh/blocky/blocky_mesher.h"
@@ -168,24 +167,6 @@ bool is_buried(const Neighbourhood& chunks, const VoxelRegistry& types) {
   });
 }
 
-struct Kernel {
-  void (*mesh)(const blocky::Job&, blocky::Scratch&, QuadBuffer&);
-  void (*find_faces)(const blocky::Job&, blocky::Scratch&);
-  std::int64_t (*count_faces)(const blocky::Job&, blocky::Scratch&);
-};
-
-Kernel pick_kernel() {
-#ifdef QUOIN_X86_KERNELS
-  if (has_instruction_set(InstructionSet::Avx512Bytes)) {
-    return {blocky::mesh_avx512, blocky::find_faces_avx512, blocky::count_faces_avx512};
-  }
-  if (has_instruction_set(InstructionSet::Avx2)) {
-    return {blocky::mesh_avx2, blocky::find_faces_avx2, blocky::count_faces_avx2};
-  }
-#endif
-  return {blocky::mesh_plain, blocky::find_faces_plain, blocky::count_faces_plain};
-}
-
 // Returns the job for the visible faces of a region.
 blocky::Job job_of_faces(const Neighbourhood& chunks, const VoxelRegistry& types, const IBox& region) {
   return {.chunks = &chunks,
@@ -200,12 +181,11 @@ blocky::Job job_of_faces(const Neighbourhood& chunks, const VoxelRegistry& types
 }  // namespace
 
 struct BlockyMesher::Scratch : blocky::Scratch {
-  Kernel kernel{};
+  const blocky::Kernel& kernel = blocky::kKernels.widest();
 };
 
 BlockyMesher::BlockyMesher() : scratch_(new Scratch()) {
   impl_of(scratch_).occlusion = blocky::make_occlusion_tables();
-  impl_of(scratch_).kernel = pick_kernel();
 }
 BlockyMesher::BlockyMesher(BlockyMesher&&) noexcept = default;
 BlockyMesher& BlockyMesher::operator=(BlockyMesher&&) noexcept = default;

@@ -10,6 +10,8 @@
 #include <quoin/mesh/occlusion.h>
 #include <quoin/mesh/quad.h>
 
+#include "core/instruction_set.h"
+
 namespace quoin::blocky {
 
 // A layer has one bit per voxel of a chunk and of the rows around it: planes and rows run from -1 to 64, and a word
@@ -120,19 +122,20 @@ struct Job {
   bool one_type;         // all its voxels except air have one opaque type: the layers of equal types are not filled
 };
 
-// One kernel per instruction set; all give the same bytes. `find_faces` leaves the visible faces in `sides` and in the
-// z view's `faces`, for the rows of the region. `count_faces` counts the visible faces of the region instead.
-void mesh_plain(const Job& job, Scratch& scratch, QuadBuffer& out);
-void find_faces_plain(const Job& job, Scratch& scratch);
-std::int64_t count_faces_plain(const Job& job, Scratch& scratch);
-#ifdef QUOIN_X86_KERNELS
-void mesh_avx2(const Job& job, Scratch& scratch, QuadBuffer& out);
-void find_faces_avx2(const Job& job, Scratch& scratch);
-std::int64_t count_faces_avx2(const Job& job, Scratch& scratch);
-void mesh_avx512(const Job& job, Scratch& scratch, QuadBuffer& out);
-void find_faces_avx512(const Job& job, Scratch& scratch);
-std::int64_t count_faces_avx512(const Job& job, Scratch& scratch);
-#endif
+// One kernel per instruction set; all give the same bytes.
+struct Kernel {
+  void (*mesh)(const Job& job, Scratch& scratch, QuadBuffer& out);
+  // Leaves the visible faces in `sides` and in the z view's `faces`, for the rows of the region.
+  void (*find_faces)(const Job& job, Scratch& scratch);
+  // Counts the visible faces of the region instead.
+  std::int64_t (*count_faces)(const Job& job, Scratch& scratch);
+};
+
+// The wider kernels exist only in builds that compile them. `kKernels` contains the available ones.
+extern const Kernel kPlainKernel;
+extern const Kernel kAvx2Kernel;
+extern const Kernel kAvx512Kernel;
+extern const KernelTable<Kernel> kKernels;
 
 // Reserves `more` quads after the first `used`. Returns a pointer to them.
 std::uint64_t* grow_quads(QuadBuffer& out, std::size_t used, std::size_t more);

@@ -6,7 +6,6 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/instruction_set.h"
 #include "core/moved_from.h"
 #include "grid/density/density_storage.h"
 #include "mesh/smooth/level_cells.h"
@@ -279,22 +278,8 @@ int reach_of(const SmoothOcclusionOptions& occlusion, int coarsest_level) {
   return (std::max(smooth::apron_of(limited), 1) + 1) << level;
 }
 
-namespace {
-
-using MeshKernel = void (*)(smooth::Work&, SmoothChunkMesh&);
-
-MeshKernel pick_kernel() {
-#ifdef QUOIN_X86_KERNELS
-  if (has_instruction_set(InstructionSet::Avx512Bytes)) return smooth::mesh_avx512;
-  if (has_instruction_set(InstructionSet::Avx2)) return smooth::mesh_avx2;
-#endif
-  return smooth::mesh_plain;
-}
-
-}  // namespace
-
 struct SmoothMesher::Scratch {
-  const MeshKernel kernel = pick_kernel();
+  const smooth::Kernel& kernel = smooth::kKernels.widest();
   smooth::Work work;
 
   // Replaces `out` by the surface of a range of cells of the centre chunk.
@@ -305,7 +290,7 @@ struct SmoothMesher::Scratch {
     work.n = kChunkEdge >> work.level;
     work.cells = cells;
     work.occlusion = smooth::within_limits(options.occlusion, work.level);
-    if (smooth::prepare(chunks, work)) kernel(work, out);
+    if (smooth::prepare(chunks, work)) kernel.mesh(work, out);
   }
 };
 

@@ -9,6 +9,8 @@
 #include <quoin/grid/density_chunk.h>
 #include <quoin/mesh/smooth.h>
 
+#include "core/instruction_set.h"
+
 namespace quoin::smooth {
 
 // The mesher works on a lattice: every 2^level-th sample of the chunk and its neighbours. Lattice points of the chunk
@@ -227,17 +229,22 @@ void add_occlusion_rows(Work& work, RowSet rows, int z);
 // Allocates the slices that occlusion reads, starting at the slice of the first cells. Requires: `is_dense` is set.
 void begin_occlusion(Work& work);
 
-void mesh_plain(Work& work, SmoothChunkMesh& out);
-void mesh_avx2(Work& work, SmoothChunkMesh& out);
-void mesh_avx512(Work& work, SmoothChunkMesh& out);
-
 // The maximum number of samples per call.
 inline constexpr std::size_t kPlacesAtOnce = 4096;
-// Computes the occlusion of `count` samples in slice z of cells, given by `places`, `fractions` and `normals` of the
-// work. Writes up to 64 more numbers. Requires: `chunks`, `apron` and `occlusion_rows` are set, `begin_occlusion` was
-// called, and slices come in order; 0 < count <= kPlacesAtOnce, and 64 additional places are readable.
-void occlude_plain(Work& work, int z, std::size_t count, float* occlusion);
-void occlude_avx2(Work& work, int z, std::size_t count, float* occlusion);
-void occlude_avx512(Work& work, int z, std::size_t count, float* occlusion);
+
+// One kernel per instruction set; all give the same bytes.
+struct Kernel {
+  void (*mesh)(Work& work, SmoothChunkMesh& out);
+  // Computes the occlusion of `count` samples in slice z of cells, given by `places`, `fractions` and `normals` of the
+  // work. Writes up to 64 more numbers. Requires: `chunks`, `apron` and `occlusion_rows` are set, `begin_occlusion` was
+  // called, and slices come in order; 0 < count <= kPlacesAtOnce, and 64 additional places are readable.
+  void (*occlude)(Work& work, int z, std::size_t count, float* occlusion);
+};
+
+// The wider kernels exist only in builds that compile them. `kKernels` contains the available ones.
+extern const Kernel kPlainKernel;
+extern const Kernel kAvx2Kernel;
+extern const Kernel kAvx512Kernel;
+extern const KernelTable<Kernel> kKernels;
 
 }  // namespace quoin::smooth

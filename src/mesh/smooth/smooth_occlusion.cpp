@@ -16,7 +16,6 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/instruction_set.h"
 #include "core/moved_from.h"
 #include "core/object_pool.h"
 #include "core/work/progress_steps.h"
@@ -93,14 +92,10 @@ struct ChunkSamples {
 /// Computes occlusion with the mesher's kernels, including the rows that the samples of a chunk read.
 class SampleKernel {
  public:
-  SampleKernel();
-
   void occlude(const DensityNeighbourhood& chunks, const ChunkSamples& samples, const Sampling& sampling,
                std::span<float> out);
 
  private:
-  using Kernel = void (*)(Work&, int z, std::size_t count, float* occlusion);
-
   void sort_by_slice(const ChunkSamples& samples, const Sampling& sampling, std::span<float> out);
   void occlude_some(const SmoothSamples& samples, int z, std::size_t first, std::size_t count, std::span<float> out);
 
@@ -111,21 +106,13 @@ class SampleKernel {
     Vec3 snapped;
   };
 
-  Kernel kernel_;
+  const Kernel& kernel_ = kKernels.widest();
   Work work_;
   std::vector<Entry> entries_;                                  // samples within reach, in input order
   std::vector<Entry> sorted_;                                   // by slice
   std::array<std::uint32_t, kChunkEdge + 3> first_of_slice_{};  // [z + 1], starting at cell -1
   std::array<float, kPlacesAtOnce + 64> occlusion_{};
 };
-
-auto pick_kernel() {
-#ifdef QUOIN_X86_KERNELS
-  if (has_instruction_set(InstructionSet::Avx512Bytes)) return occlude_avx512;
-  if (has_instruction_set(InstructionSet::Avx2)) return occlude_avx2;
-#endif
-  return occlude_plain;
-}
 
 /// Returns the occlusion of a position in far air.
 float open_occlusion(const SmoothOcclusionOptions& options) {
@@ -148,8 +135,6 @@ float occlusion_of_sample(const DensityNeighbourhood& chunks, const CellSample& 
     return float_from_half(chunks.get((place.cell + IVec3{x, y, z}) * size)) * unit;
   });
 }
-
-SampleKernel::SampleKernel() : kernel_(pick_kernel()) {}
 
 // Finds the cells of the samples. Samples out of reach are open.
 void SampleKernel::sort_by_slice(const ChunkSamples& wanted, const Sampling& sampling, std::span<float> out) {
@@ -189,7 +174,7 @@ void SampleKernel::occlude_some(const SmoothSamples& samples, int z, std::size_t
       work_.normals[axis][i] = normal[axis];
     }
   }
-  kernel_(work_, z, count, occlusion_.data());
+  kernel_.occlude(work_, z, count, occlusion_.data());
   for (std::size_t i = 0; i < count; ++i) out[sorted_[first + i].number] = occlusion_[i];
 }
 

@@ -1,4 +1,4 @@
-// Impostors: the rectangles of far instances; matches render/impostor/raster/raster.inl on the CPU.
+// Impostors: the rectangles of far instances; matches render/impostor/raster/raster_kernel.cpp on the CPU.
 
 // A rectangle of a level.
 struct FarFace {

@@ -20,6 +20,7 @@
 
 #include "trace/kernel/lockstep.inl"
 #include "trace/kernel/ray_lanes_avx512.h"
+#include "trace/kernel/single.inl"
 
 namespace quoin::trace {
 namespace {
@@ -226,6 +227,21 @@ inline Blocked any_at_once(const TreeView& tree, const Ray& ray, double max_t, d
   // All bits are set if no lane is clean.
   const auto none = static_cast<unsigned>(static_cast<int>(clean - 1) >> 31);
   return {clean != 0, (doubtful & none) != 0};
+}
+
+// Like any_single.
+inline bool any_short_single(const TreeView& tree, const Ray& ray, double max_t, bool& unfinished) {
+  // Tested first, since most rays are longer.
+  const double length = std::abs(ray.direction.x) + std::abs(ray.direction.y) + std::abs(ray.direction.z);
+  if (!(max_t * length <= kShortRayReach && max_t >= 0.0)) {
+    return any_single<PathTracer>(tree, ray, max_t, unfinished);
+  }
+  const Blocked blocked = any_at_once(tree, ray, max_t, length);
+  unfinished = false;
+  // No branch on the hit itself, which is unpredictable.
+  if (blocked.is_doubtful) [[unlikely]]
+    return any_single<PathTracer>(tree, ray, max_t, unfinished);
+  return blocked.is_sure;
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 // Traces one ray with sets of units, on processors with BMI2. The ray is mirrored to go forward along every axis, then
-// walks from chunk to chunk. It uses the arithmetic of the walk in trace/kernel/ray_kernel_plain.cpp and returns the
-// same bits: negating both a plane and an origin leaves their distance unchanged.
+// walks from chunk to chunk. It uses the arithmetic of the walk in trace/kernel/ray_kernel.cpp and returns the same
+// bits: negating both a plane and an origin leaves their distance unchanged.
 //
 //   chunk        bricks passed  &  occupied bricks             ->  lowest bit: the next brick
 //     brick        cells passed   &  occupied cells              ->  lowest bit: the next cell

@@ -4,8 +4,6 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/instruction_set.h"
-
 namespace quoin::raster {
 namespace {
 
@@ -44,14 +42,6 @@ void Canvas::set_pattern(int column, int row, std::uint32_t sample) {
   for (int y = 0; y < kTile; ++y) {
     for (int x = 0; x < kTile; ++x) pattern[index_of(x, y)] = Pattern::at(column + x, row + y, sample);
   }
-}
-
-Draw draw() {
-#ifdef QUOIN_X86_KERNELS
-  if (has_instruction_set(InstructionSet::Avx512)) return kDrawAvx512;
-  if (has_instruction_set(InstructionSet::Avx2)) return kDrawAvx2;
-#endif
-  return kDrawPlain;
 }
 
 }  // namespace quoin::raster

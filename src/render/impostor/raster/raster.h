@@ -7,6 +7,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/hash.h>
 
+#include "core/instruction_set.h"
 #include "render/impostor/raster/impostor_faces.h"
 
 /// Draws the faces of an impostor into a square of an image: in single precision relative to the content's centre, in
@@ -157,11 +158,15 @@ struct Canvas {
 /// then to the lower face.
 using Draw = void (*)(const Job& job, Canvas& canvas);
 
-extern const Draw kDrawPlain;
-extern const Draw kDrawAvx2;
-extern const Draw kDrawAvx512;
+// The wider kernels exist only in builds that compile them. `kDraws` contains the available ones.
+extern const Draw kPlainDraw;
+extern const Draw kAvx2Draw;
+extern const Draw kAvx512Draw;
+extern const KernelTable<Draw> kDraws;
 
 /// Returns the kernel with the widest instructions that this machine has. Every kernel writes the same bits.
-[[nodiscard]] Draw draw();
+[[nodiscard]] inline Draw draw() {
+  return kDraws.widest();
+}
 
 }  // namespace quoin::raster

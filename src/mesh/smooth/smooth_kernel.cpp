@@ -1,4 +1,12 @@
-// The kernel for any processor: cell by cell.
+// The Surface Nets kernel: one register of lanes at a time, or cell by cell.
+
+#include "mesh/smooth/smooth_mesher.h"
+
+#ifdef QUOIN_KERNEL_AVX2
+#include "mesh/smooth/occlusion_lanes.inl"
+#include "mesh/smooth/slices.inl"
+#include "mesh/smooth/vectors.inl"
+#else
 
 #include <algorithm>
 #include <array>
@@ -10,7 +18,6 @@
 #include "mesh/smooth/listed.inl"
 #include "mesh/smooth/slices.inl"
 #include "mesh/smooth/smooth_cell.h"
-#include "mesh/smooth/smooth_mesher.h"
 
 namespace quoin::smooth {
 namespace {
@@ -172,15 +179,29 @@ void make_quads(const Work& work, const Slice& slice, std::size_t count, std::ui
 }
 
 }  // namespace
+}  // namespace quoin::smooth
 
-void mesh_plain(Work& work, SmoothChunkMesh& out) {
+#endif
+
+namespace quoin::smooth {
+namespace {
+
+void mesh(Work& work, SmoothChunkMesh& out) {
   mesh_slices(work, out);
 }
 
-void occlude_plain(Work& work, int z, std::size_t count, float* occlusion) {
+void occlude(Work& work, int z, std::size_t count, float* occlusion) {
   Slice slice;
   slice.z = z;
   add_occlusion(work, slice, count, occlusion);
 }
+
+}  // namespace
+
+const Kernel QUOIN_KERNEL(Kernel) = {&mesh, &occlude};
+
+#ifndef QUOIN_KERNEL_AVX2
+constinit const KernelTable<Kernel> kKernels = QUOIN_KERNEL_TABLE(Kernel, Avx2);
+#endif
 
 }  // namespace quoin::smooth

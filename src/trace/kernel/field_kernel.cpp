@@ -1,6 +1,6 @@
-// Traces one ray in a density field, from cell to cell by the planes that it crosses. Used on processors without the
-// kernels' instructions, and for rays that the kernels do not support. It steps only through short empty stretches,
-// since it is slow there. The tree crosses longer ones.
+// The kernel for rays in density fields. Without lanes it is empty, and its source has the walk of one ray from cell to
+// cell by the planes that it crosses, for processors without the kernels' instructions and for rays that the kernels do
+// not support. The walk steps only through short empty stretches, since it is slow there. The tree crosses longer ones.
 //
 //      tree                     planes               planes, cells without solid            tree
 //   o--------->|  s  |  s  |  s  |     |     |     |   find the next cell with solid        ------->|  s  |
@@ -9,10 +9,24 @@
 // An `s` is a cell with a solid corner. In each of them, meet_cell solves the field's cubic along the ray, from the
 // ray's entry into the cell to its exit (span_).
 
+#include "trace/kernel/ray_kernel.h"
+
+#ifdef QUOIN_KERNEL_AVX2
+
+#include "trace/kernel/field.inl"
+
+namespace quoin::trace {
+
+const FieldKernel QUOIN_KERNEL(FieldKernel) = {first_in_field<true>, first_in_field<false>, first_hits_in_field,
+                                               any_hits_in_field};
+
+}  // namespace quoin::trace
+
+#else
+
 #include <optional>
 
 #include "trace/kernel/cell_cubic.inl"
-#include "trace/kernel/ray_kernel.h"
 #include "trace/tree_view.h"
 
 namespace quoin::trace {
@@ -135,11 +149,8 @@ bool walk_in_field(const OccupancyTree& cells, const FieldView& field, const Ray
 
 const FieldKernel kPlainFieldKernel = {nullptr, nullptr, nullptr, nullptr};
 
-#ifdef QUOIN_X86_KERNELS
-constinit const KernelTable<FieldKernel> kFieldKernels = {
-    {&kPlainFieldKernel, &kAvx2FieldKernel, &kAvx512FieldKernel, &kAvx512FieldKernel}};
-#else
-constinit const KernelTable<FieldKernel> kFieldKernels = {{&kPlainFieldKernel}};
-#endif
+constinit const KernelTable<FieldKernel> kFieldKernels = QUOIN_KERNEL_TABLE(FieldKernel, Avx512);
 
 }  // namespace quoin::trace
+
+#endif

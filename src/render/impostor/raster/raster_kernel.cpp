@@ -4,8 +4,6 @@
 //     Level       rectangles of one side       | 0 | 1 | ...              find the pixels that each may cover
 //       pixels      one of each lane's rectangle, until the largest is done
 
-#pragma once
-
 #include <algorithm>
 #include <bit>
 #include <cstdint>
@@ -318,4 +316,11 @@ void draw_faces(const Job& job, Canvas& canvas) {
 }
 
 }  // namespace
+
+const Draw QUOIN_KERNEL(Draw) = draw_faces;
+
+#ifndef QUOIN_KERNEL_AVX2
+constinit const KernelTable<Draw> kDraws = QUOIN_KERNEL_TABLE(Draw, Avx512);
+#endif
+
 }  // namespace quoin::raster

@@ -3,8 +3,6 @@
 //   ShadeBlock   | point 0 | point 1 | ... | point 15 |     a register's width of them at a time
 //     numbers -> sun, lamp, next direction
 
-#pragma once
-
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -392,4 +390,11 @@ void pairs(const BlockLanes<std::uint32_t>& pixel, std::uint32_t sample, std::ui
 }
 
 }  // namespace
+
+const Kernel QUOIN_KERNEL(Kernel) = {&shade, &choose_lamps, &pairs};
+
+#ifndef QUOIN_KERNEL_AVX2
+constinit const KernelTable<Kernel> kKernels = QUOIN_KERNEL_TABLE(Kernel, Avx512);
+#endif
+
 }  // namespace quoin::path

@@ -7,8 +7,6 @@
 // row and from row to row takes a few word operations (an addition carries "every cell agrees" to a run's end). The
 // rest of the work is one flat loop over the quads, without unpredictable branches.
 
-#pragma once
-
 #include <quoin/core/assert.h>
 
 #ifdef QUOIN_KERNEL_AVX512
@@ -227,4 +225,11 @@ void mesh_chunk(const Job& whole, Scratch& s, QuadBuffer& out) {
 }
 
 }  // namespace
+
+const Kernel QUOIN_KERNEL(Kernel) = {&mesh_chunk, &find_all_faces, &count_all_faces};
+
+#ifndef QUOIN_KERNEL_AVX2
+constinit const KernelTable<Kernel> kKernels = QUOIN_KERNEL_TABLE(Kernel, Avx2);
+#endif
+
 }  // namespace quoin::blocky

@@ -1,4 +1,4 @@
-// Included by the kernel of each instruction set.
+// The kernel of light_kernel.h, except for slabs as units (slab_units.inl).
 
 #include <bit>
 #include <cstring>
@@ -11,6 +11,7 @@
 #include <quoin/core/assert.h>
 
 #include "render/light/propagated/kernel/light_kernel.h"
+#include "render/light/propagated/kernel/slab_units.inl"
 
 namespace quoin::propagated {
 namespace {
@@ -392,4 +393,12 @@ SlabKinds merge(const std::uint64_t* before, const std::uint64_t* inside, std::u
 }
 
 }  // namespace
+
+const Kernel QUOIN_KERNEL(Kernel) = {&spread,    &take_sky, &find_blocks, &find_rows,   &unpack,    &shift_in,
+                                     &read_slab, &merge,    &pack_slab,   &unpack_slab, &unpack_row};
+
+#ifndef QUOIN_KERNEL_AVX2
+constinit const KernelTable<Kernel> kKernels = QUOIN_KERNEL_TABLE(Kernel, Avx512);
+#endif
+
 }  // namespace quoin::propagated

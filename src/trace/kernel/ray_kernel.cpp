@@ -1,8 +1,17 @@
-// The kernel for any processor. Walks rays one by one in portable code, over cells and, in occupied cells, over voxels.
-// trace/kernel/lockstep.inl, with the same walk, explains the arithmetic.
+// The ray kernel. Without lanes, it walks rays one by one in portable code, over cells and, in occupied cells, over
+// voxels. trace/kernel/lockstep.inl, with the same walk, explains the arithmetic.
 //
 //   Steps   the next plane of each axis, and the time of its crossing     | plane0 t0 | plane1 t1 | plane2 t2 |
 //   index   of cells: a bit of the flat table; of voxels: as in trace/kernel/ray_numbers.inl
+
+#include "trace/kernel/ray_kernel.h"
+
+#if defined(QUOIN_KERNEL_AVX512)
+#include "trace/kernel/packet.inl"
+#include "trace/kernel/short_ray.inl"
+#elif defined(QUOIN_KERNEL_AVX2)
+#include "trace/kernel/packet.inl"
+#else
 
 #include "trace/kernel/ray_numbers.inl"
 
@@ -312,13 +321,21 @@ std::uint32_t any_one_by_one(const TreeView& tree, const RayPacket& rays, std::u
 }
 
 }  // namespace
+}  // namespace quoin::trace
 
-const Kernel kPlainKernel = {first_single<PlainTracer>, any_single<PlainTracer>, first_one_by_one, any_one_by_one};
+#endif
 
-#ifdef QUOIN_X86_KERNELS
-constinit const KernelTable<Kernel> kKernels = {{&kPlainKernel, &kAvx2Kernel, &kAvx512Kernel, &kAvx512Kernel}};
+namespace quoin::trace {
+
+#if defined(QUOIN_KERNEL_AVX512)
+const Kernel QUOIN_KERNEL(Kernel) = {first_single<PathTracer>, any_short_single, trace_first, trace_any};
+#elif defined(QUOIN_KERNEL_AVX2)
+const Kernel QUOIN_KERNEL(Kernel) = {first_single<PathTracer>, any_single<PathTracer>, trace_first, trace_any};
 #else
-constinit const KernelTable<Kernel> kKernels = {{&kPlainKernel}};
+const Kernel QUOIN_KERNEL(Kernel) = {first_single<PlainTracer>, any_single<PlainTracer>, first_one_by_one,
+                                     any_one_by_one};
+
+constinit const KernelTable<Kernel> kKernels = QUOIN_KERNEL_TABLE(Kernel, Avx512);
 #endif
 
 }  // namespace quoin::trace

@@ -1,8 +1,13 @@
-// The kernel for any processor.
+// The kernel of array_kernel.h. Without lanes, vertices are computed one by one.
+
+#include "mesh/array/array_kernel.h"
+
+#ifdef QUOIN_KERNEL_AVX2
+#include "mesh/array/vertices.inl"
+#else
 
 #include <cstddef>
 
-#include "mesh/array/array_kernel.h"
 #include "mesh/array/array_kernel.inl"
 #include "mesh/array/array_vertex.h"
 
@@ -29,13 +34,16 @@ void vertices(const CornerBatch& corners, std::size_t count, const Placement& pl
 }
 
 }  // namespace
+}  // namespace quoin::array
 
-const Kernel kPlainKernel = make_kernel();
+#endif
 
-#ifdef QUOIN_X86_KERNELS
-constinit const KernelTable<Kernel> kKernels = {{&kPlainKernel, &kAvx2Kernel, &kAvx2Kernel, &kAvx512Kernel}};
-#else
-constinit const KernelTable<Kernel> kKernels = {{&kPlainKernel}};
+namespace quoin::array {
+
+const Kernel QUOIN_KERNEL(Kernel) = make_kernel();
+
+#ifndef QUOIN_KERNEL_AVX2
+constinit const KernelTable<Kernel> kKernels = QUOIN_KERNEL_TABLE(Kernel, Avx2);
 #endif
 
 }  // namespace quoin::array
