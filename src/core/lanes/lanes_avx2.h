@@ -199,6 +199,11 @@ inline I merge(I which, I a, I b) {
 inline Mask operator<(I a, I b) {
   return {_mm256_castsi256_ps(_mm256_cmpgt_epi32(b.v, a.v))};
 }
+inline float least_of(F a) {
+  __m128 least = _mm_min_ps(_mm256_castps256_ps128(a.v), _mm256_extractf128_ps(a.v, 1));
+  least = _mm_min_ps(least, _mm_movehl_ps(least, least));
+  return _mm_cvtss_f32(_mm_min_ss(least, _mm_movehdup_ps(least)));
+}
 inline float greatest_of(F a) {
   __m128 most = _mm_max_ps(_mm256_castps256_ps128(a.v), _mm256_extractf128_ps(a.v, 1));
   most = _mm_max_ps(most, _mm_movehl_ps(most, most));

@@ -206,6 +206,9 @@ inline I merge(I which, I a, I b) {
 inline Mask operator<(I a, I b) {
   return {_mm512_cmplt_epi32_mask(a.v, b.v)};
 }
+inline float least_of(F a) {
+  return _mm512_reduce_min_ps(a.v);
+}
 inline float greatest_of(F a) {
   return _mm512_reduce_max_ps(a.v);
 }

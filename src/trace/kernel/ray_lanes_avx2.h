@@ -256,10 +256,7 @@ inline void store_packed(std::int32_t* to, const Packing& packing, I a) {
 }
 
 inline float least_of(F a) {
-  const __m256 v = _mm256_min_ps(a.low.v, a.high.v);
-  __m128 least = _mm_min_ps(_mm256_castps256_ps128(v), _mm256_extractf128_ps(v, 1));
-  least = _mm_min_ps(least, _mm_movehl_ps(least, least));
-  return _mm_cvtss_f32(_mm_min_ss(least, _mm_movehdup_ps(least)));
+  return half::least_of(half::min(a.low, a.high));
 }
 
 class BrickWindow {

@@ -72,18 +72,12 @@ inline void store_packed(std::int32_t* to, Packing packing, I a) {
   _mm512_storeu_si512(to, _mm512_maskz_compress_epi32(packing.m, a.v));
 }
 
-inline float least_of(F a) {
-  return _mm512_reduce_min_ps(a.v);
-}
 // Looks up entry `at % 16`, or `at % 32`, of a table.
 inline I from_16(I table, I at) {
   return {_mm512_permutexvar_epi32(at.v, table.v)};
 }
 inline I from_32(const std::int32_t* table, I at) {
   return {_mm512_permutex2var_epi32(load(table).v, at.v, load(table + 16).v)};
-}
-inline F from_16(F table, I at) {
-  return {_mm512_permutexvar_ps(at.v, table.v)};
 }
 // The codes of 4^3 bricks; bricks outside the table are empty.
 class BrickWindow {

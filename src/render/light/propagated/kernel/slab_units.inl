@@ -14,62 +14,58 @@
 #include <cstdint>
 #include <cstring>
 
-#ifdef QUOIN_KERNEL_AVX2
-#include <immintrin.h>
-#endif
-
 #include <quoin/core/assert.h>
 
+#ifdef QUOIN_KERNEL_AVX2
+#include "core/lanes/lanes.h"
+#endif
 #include "render/light/propagated/kernel/light_kernel.h"
 
 namespace quoin::propagated {
 namespace {
 
-#if defined(QUOIN_KERNEL_AVX512)
+#ifdef QUOIN_KERNEL_AVX2
 
-constexpr std::size_t kRows = 8;  // of a register
-using Units = __m512i;
+using Units = lanes::I;
+constexpr std::size_t kRows = lanes::kWidth / 2;  // of a register
 
 inline Units none() {
-  return _mm512_setzero_si512();
+  return lanes::all(0);
 }
 inline Units load_rows(const std::uint64_t* from) {
-  return _mm512_loadu_si512(from);
+  return lanes::load(reinterpret_cast<const std::int32_t*>(from));
 }
 inline void store_rows(Units rows, std::uint64_t* to) {
-  _mm512_storeu_si512(to, rows);
+  lanes::store(reinterpret_cast<std::int32_t*>(to), rows);
 }
-inline Units exclusive_or(Units a, Units b) {
-  return _mm512_xor_si512(a, b);
+inline Units select(unsigned which, Units a, Units b) {
+  return lanes::select(lanes::mask_of(which), a, b);
 }
+
+#ifdef QUOIN_KERNEL_AVX512
+
 // Moves each row by kBy rows; the first rows come from the end of `before`.
 template <int kBy>
 inline Units moved(Units rows, Units before) {
-  return _mm512_alignr_epi64(rows, before, 8 - kBy);
+  return {_mm512_alignr_epi64(rows.v, before.v, 8 - kBy)};
 }
 // Bit i: unit i differs.
 inline unsigned differing(Units a, Units b) {
-  return _mm512_cmpneq_epi32_mask(a, b);
+  return _mm512_cmpneq_epi32_mask(a.v, b.v);
 }
 inline void store_some(Units units, unsigned which, std::uint32_t* to) {
-  _mm512_storeu_si512(to, _mm512_maskz_compress_epi32(static_cast<__mmask16>(which), units));
+  _mm512_storeu_si512(to, _mm512_maskz_compress_epi32(static_cast<__mmask16>(which), units.v));
 }
 // 0 in the others.
 inline Units load_some(const std::uint32_t* from, unsigned which) {
-  return _mm512_maskz_expandloadu_epi32(static_cast<__mmask16>(which), from);
+  return {_mm512_maskz_expandloadu_epi32(static_cast<__mmask16>(which), from)};
 }
 // Copies its last row to all rows.
 inline Units last_row(Units rows) {
-  return _mm512_permutex_epi64(_mm512_shuffle_i64x2(rows, rows, 0xFF), 0xFF);
-}
-inline Units select(unsigned which, Units a, Units b) {
-  return _mm512_mask_blend_epi32(static_cast<__mmask16>(which), b, a);
+  return {_mm512_permutex_epi64(_mm512_shuffle_i64x2(rows.v, rows.v, 0xFF), 0xFF)};
 }
 
-#elif defined(QUOIN_KERNEL_AVX2)
-
-constexpr std::size_t kRows = 4;
-using Units = __m256i;
+#else
 
 // Permutations that compact a subset of eight units, and their inverses.
 struct Orders {
@@ -90,50 +86,33 @@ constexpr Orders make_orders() {
 }
 constexpr Orders kOrders = make_orders();
 
-inline Units order(const std::array<std::uint8_t, 8>& of) {
+inline __m256i order(const std::array<std::uint8_t, 8>& of) {
   return _mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(of.data())));
-}
-// Returns a mask of the lanes whose bit is set.
-inline Units lanes(unsigned which) {
-  const Units own = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
-  return _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(static_cast<int>(which)), own), own);
-}
-inline Units none() {
-  return _mm256_setzero_si256();
-}
-inline Units load_rows(const std::uint64_t* from) {
-  return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from));
-}
-inline void store_rows(Units rows, std::uint64_t* to) {
-  _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), rows);
-}
-inline Units exclusive_or(Units a, Units b) {
-  return _mm256_xor_si256(a, b);
 }
 template <int kBy>
 inline Units moved(Units rows, Units before) {
-  const Units middle = _mm256_permute2x128_si256(before, rows, 0x21);  // the upper half before, the lower half
-  return kBy == 1 ? _mm256_alignr_epi8(rows, middle, 8) : middle;
+  const __m256i middle = _mm256_permute2x128_si256(before.v, rows.v, 0x21);  // the upper half before, the lower half
+  return {kBy == 1 ? _mm256_alignr_epi8(rows.v, middle, 8) : middle};
 }
 inline unsigned differing(Units a, Units b) {
-  const int same = _mm256_movemask_ps(_mm256_castsi256_ps(_mm256_cmpeq_epi32(a, b)));
+  const int same = _mm256_movemask_ps(_mm256_castsi256_ps(_mm256_cmpeq_epi32(a.v, b.v)));
   return ~static_cast<unsigned>(same) & 255U;
 }
 inline void store_some(Units units, unsigned which, std::uint32_t* to) {
-  const Units packed = _mm256_permutevar8x32_epi32(units, order(kOrders.together[which]));
+  const __m256i packed = _mm256_permutevar8x32_epi32(units.v, order(kOrders.together[which]));
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), packed);
 }
 inline Units load_some(const std::uint32_t* from, unsigned which) {
-  const Units there = lanes((1U << std::popcount(which)) - 1);
-  const Units packed = _mm256_maskload_epi32(reinterpret_cast<const int*>(from), there);
-  return _mm256_and_si256(_mm256_permutevar8x32_epi32(packed, order(kOrders.spread[which])), lanes(which));
+  const auto lanes_of = [](unsigned bits) { return _mm256_castps_si256(lanes::mask_of(bits).v); };
+  const __m256i packed =
+      _mm256_maskload_epi32(reinterpret_cast<const int*>(from), lanes_of((1U << std::popcount(which)) - 1));
+  return {_mm256_and_si256(_mm256_permutevar8x32_epi32(packed, order(kOrders.spread[which])), lanes_of(which))};
 }
 inline Units last_row(Units rows) {
-  return _mm256_permute4x64_epi64(rows, 0xFF);
+  return {_mm256_permute4x64_epi64(rows.v, 0xFF)};
 }
-inline Units select(unsigned which, Units a, Units b) {
-  return _mm256_blendv_epi8(b, a, lanes(which));
-}
+
+#endif
 
 #else
 
@@ -148,9 +127,6 @@ inline Units load_rows(const std::uint64_t* from) {
 }
 inline void store_rows(Units rows, std::uint64_t* to) {
   *to = rows;
-}
-inline Units exclusive_or(Units a, Units b) {
-  return a ^ b;
 }
 template <int kBy>
 inline Units moved(Units, Units before) {
@@ -200,7 +176,7 @@ SlabUnits pack_slab(const std::uint64_t* planes, SlabUnitsRoom& units) {
     for (std::size_t row = 0; row < kSlabWords; row += kRows) {
       const std::uint64_t* from = planes + plane * kSlabWords + row;
       Units rows = load_rows(from);
-      if (plane + 1 < kPlanes) rows = exclusive_or(rows, load_rows(from + kSlabWords));
+      if (plane + 1 < kPlanes) rows = rows ^ load_rows(from + kSlabWords);
       const unsigned fresh = differing(rows, moved<1>(rows, last));
       store_some(rows, fresh, next);
       next += std::popcount(fresh);
@@ -228,7 +204,7 @@ void unpack_slab(const SlabUnits& of, const std::uint32_t* units, std::uint64_t*
       if (row > 0) rows = select(known, rows, last_row(last));
       last = rows;
       std::uint64_t* to = planes + plane * kSlabWords + row;
-      store_rows(plane + 1 < kPlanes ? exclusive_or(rows, load_rows(to + kSlabWords)) : rows, to);
+      store_rows(plane + 1 < kPlanes ? rows ^ load_rows(to + kSlabWords) : rows, to);
     }
   }
 }
