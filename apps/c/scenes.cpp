@@ -10,7 +10,6 @@
 
 #include <quoin/io/formats.h>
 #include <quoin/io/mesh_file.h>
-#include <quoin/scene/near_grids.h>
 #include <quoin/scene/scene_meshes.h>
 #include <quoin/version.h>
 

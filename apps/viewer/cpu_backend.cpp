@@ -12,7 +12,6 @@
 #include <utility>
 
 #include <quoin/render/cpu_renderer.h>
-#include <quoin/render/density_slice.h>
 #include <quoin/render/path_tracer.h>
 #include <quoin/scene/smooth_scene.h>
 

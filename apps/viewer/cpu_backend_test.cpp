@@ -15,7 +15,6 @@
 
 #include <gtest/gtest.h>
 #include <quoin/render/cpu_renderer.h>
-#include <quoin/render/density_slice.h>
 #include <quoin/render/path_tracer.h>
 
 #include "loader.h"

@@ -10,7 +10,7 @@
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 #include <quoin/io/mesh_file.h>
-#include <quoin/scene/near_grids.h>
+#include <quoin/scene/scene_meshes.h>
 
 namespace quoin::viewer {
 

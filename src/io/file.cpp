@@ -13,8 +13,6 @@
 #include <system_error>
 #include <utility>
 
-#include <quoin/io/sidecar_file.h>
-
 #include "core/bytes/files.h"
 #include "core/bytes/text.h"
 

@@ -1,4 +1,4 @@
-#include <quoin/io/sidecar_file.h>
+#include <quoin/io/file.h>
 
 #include <unistd.h>
 

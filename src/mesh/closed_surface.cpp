@@ -6,7 +6,7 @@
 //      | 4 ---| 5      joined.
 //      0 ---- 1
 
-#include <quoin/mesh/closed_surface.h>
+#include <quoin/mesh/blocky.h>
 
 #include <array>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include <quoin/mesh/closed_surface.h>
+#include <quoin/mesh/blocky.h>
 
 #include <array>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include <quoin/scene/near_grids.h>
+#include <quoin/scene/scene_meshes.h>
 
 #include <algorithm>
 #include <map>

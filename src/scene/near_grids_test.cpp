@@ -1,4 +1,4 @@
-#include <quoin/scene/near_grids.h>
+#include <quoin/scene/scene_meshes.h>
 
 #include <algorithm>
 #include <set>
@@ -7,7 +7,6 @@
 #include <gtest/gtest.h>
 
 #include <quoin/io/mesh_file.h>
-#include <quoin/scene/scene_meshes.h>
 
 namespace quoin {
 namespace {

@@ -9,7 +9,7 @@
 
 #include <quoin/mesh/blocky.h>
 #include <quoin/render/cpu_renderer.h>
-#include <quoin/render/scene_light.h>
+#include <quoin/render/propagated_light.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>

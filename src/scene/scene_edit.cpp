@@ -1,4 +1,4 @@
-#include <quoin/scene/scene_edit.h>
+#include <quoin/scene/scene.h>
 
 #include <algorithm>
 #include <cmath>

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include <quoin/store/world_store.h>
-#include <quoin/stream/chunk_generator.h>
+#include <quoin/stream/streamed_world.h>
 
 #include "stream/stream_plan.h"
 

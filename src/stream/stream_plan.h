@@ -10,7 +10,7 @@
 
 #include <quoin/core/vec.h>
 #include <quoin/scene/scene.h>
-#include <quoin/store/stored_chunk.h>
+#include <quoin/store/world_store.h>
 #include <quoin/stream/streamed_world.h>
 
 namespace quoin::stream {

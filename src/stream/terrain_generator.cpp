@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include <quoin/core/assert.h>
-#include <quoin/stream/chunk_generator.h>
+#include <quoin/stream/streamed_world.h>
 #include <quoin/terrain/terrain.h>
 
 namespace quoin {

@@ -5,7 +5,7 @@
 #include <span>
 #include <string>
 
-#include <quoin/stream/chunk_generator.h>
+#include <quoin/stream/streamed_world.h>
 
 namespace quoin::stream {
 

@@ -7,9 +7,9 @@
 
 #include <quoin/io/mesh_file.h>
 #include <quoin/io/vox.h>
-#include <quoin/mesh/closed_surface.h>
+#include <quoin/mesh/blocky.h>
 #include <quoin/render/lit_meshes.h>
-#include <quoin/scene/near_grids.h>
+#include <quoin/scene/scene_meshes.h>
 
 #include "convert/convert.h"
 

@@ -7,8 +7,8 @@
 #include <string_view>
 #include <utility>
 
+#include <quoin/io/file.h>
 #include <quoin/io/image_files.h>
-#include <quoin/io/sidecar_file.h>
 
 #include "help.h"
 #include "options.h"

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include <quoin/render/cpu_renderer.h>
-#include <quoin/render/density_slice.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/environment.h>
 

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include <quoin/core/vec.h>
+#include <quoin/io/file.h>
 #include <quoin/io/file_format.h>
 #include <quoin/io/heights.h>
-#include <quoin/io/sidecar_file.h>
 #include <quoin/io/volume.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/environment.h>

@@ -10,7 +10,7 @@
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/volume.h>
-#include <quoin/io/sidecar_file.h>
+#include <quoin/io/file.h>
 
 namespace quoin {
 

@@ -3,7 +3,7 @@
 #include <memory>
 
 #include <quoin/core/parallel.h>
-#include <quoin/render/scene_light.h>
+#include <quoin/render/propagated_light.h>
 #include <quoin/scene/scene.h>
 
 namespace quoin {

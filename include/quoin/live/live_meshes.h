@@ -12,7 +12,7 @@
 #include <quoin/core/vec.h>
 #include <quoin/mesh/smooth_mesh.h>
 #include <quoin/render/chunk_surface.h>
-#include <quoin/render/scene_light.h>
+#include <quoin/render/propagated_light.h>
 #include <quoin/render/surface_light.h>
 #include <quoin/scene/scene.h>
 

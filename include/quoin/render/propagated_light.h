@@ -1,8 +1,10 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <span>
 #include <vector>
@@ -13,6 +15,8 @@
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/mesh/quad.h>
+#include <quoin/scene/environment.h>
+#include <quoin/scene/scene.h>
 
 namespace quoin {
 
@@ -102,6 +106,94 @@ class PropagatedLight {
   struct Impl;
   explicit PropagatedLight(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
+};
+
+// Conversion of propagated light levels to colours. Images, shaders and mesh files all use these functions.
+
+/// Mean of the light levels of several voxels: 0 to 15, fractional.
+struct MeanLevels {
+  float sky = 0.0F;
+  float red = 0.0F;
+  float green = 0.0F;
+  float blue = 0.0F;
+
+  bool operator==(const MeanLevels&) const = default;
+};
+
+/// Colours that light levels convert to, linear.
+struct LightLook {
+  Vec3 sky{1.0F};
+  Vec3 lamps{1.0F};  ///< light of level 15 from lamps; multiplied with the lamps' own colours
+  Vec3 least{0.0F};  ///< minimum light, added everywhere, also at level 0
+};
+
+/// Returns the colours of propagated light. The sky's colour combines sky and sun: 0.3 of the ambient light's colour,
+/// scaled by the sky's brightness, plus 0.7 of the sun's colour, scaled by the sun's brightness. By day, with both
+/// brightnesses 1, it is white. `least_light`: LightOptions::least_light.
+[[nodiscard]] LightLook light_look(const Environment& environment, double least_light = 0.0);
+
+/// Returns the linear brightness of a light level: f / (4 - 3 f) with f = level / 15. It is 1 at level 15 and 0 at
+/// level 0. It stays within 0.04 of 0.8^(15 - level), the curve of older games, but reaches 0.
+/// Source: the curve of Minecraft's light table, applied to linear light.
+[[nodiscard]] constexpr float light_of_level(float level) {
+  const float f = level * (1.0F / 15.0F);
+  return f / (4.0F - 3.0F * f);
+}
+
+/// Returns the brightness of a surface by its orientation: 1 upwards, 0.5 downwards, 0.8 along z, 0.6 along x, and
+/// between these weighted by the squares of the normal. It keeps edges visible in evenly lit rooms.
+/// Source: Minecraft's block shading, extended to any normal as in Forge.
+[[nodiscard]] constexpr float light_of_facing(Vec3 normal) {
+  const float up = normal.y < 0.0F ? 0.5F : 1.0F;
+  return 0.6F * normal.x * normal.x + up * normal.y * normal.y + 0.8F * normal.z * normal.z;
+}
+
+/// Returns the linear, unclamped factor for a surface's colour. Sky light and lamp light add up.
+/// Requires: `normal` has unit length, in grid coordinates (y is up).
+[[nodiscard]] inline Vec3 light_colour(const MeanLevels& levels, Vec3 normal, const LightLook& look) {
+  const Vec3 of_lamps{light_of_level(levels.red), light_of_level(levels.green), light_of_level(levels.blue)};
+  return light_of_facing(normal) * (look.least + light_of_level(levels.sky) * look.sky + of_lamps * look.lamps);
+}
+
+/// The light of a grid and the voxels that block it. Lifetime: until the next update of the SceneLight it comes from.
+struct GridLight {
+  const PropagatedLight* light = nullptr;
+  /// The grid's voxels. If the grid has a field, each of its solid samples in an air voxel adds a voxel of the field's
+  /// material, or of an unregistered type if it has no material.
+  const Grid* voxels = nullptr;
+};
+
+/// Propagated light of all grids of a scene, each grid separately.
+///
+///   SceneLight light;
+///   light.update(scene);                       // once, and after edits
+///   const GridLight of = light.of(handle);
+///   SurfaceLight surface(*of.light, *of.voxels, scene.types);
+///
+/// Fields: a solid sample blocks light like the voxel whose minimum corner it is, which is half a voxel off.
+/// Cost:   an update costs PropagatedLight::update for the changes plus a check per grid. Fields are updated by whole
+///         chunks.
+class SceneLight {
+ public:
+  explicit SceneLight(PropagatedLightOptions options = {});
+  SceneLight(SceneLight&&) noexcept;
+  SceneLight& operator=(SceneLight&&) noexcept;
+  ~SceneLight();
+
+  void update(const Scene& scene, Threads threads = {});
+  /// Returns a PropagatedLight::snapshot of each grid. GridLight::voxels still points into the scene of the last
+  /// update, which must outlive the snapshot, except for grids with fields.
+  [[nodiscard]] SceneLight snapshot() const;
+  /// Returns the light of a grid as of the last update. For a grid that the scene did not have then: open sky.
+  [[nodiscard]] GridLight of(GridHandle grid) const;
+  /// Returns the bytes of all light, including bytes shared with snapshots.
+  [[nodiscard]] std::size_t bytes() const;
+
+ private:
+  struct Entry;
+  PropagatedLightOptions options_;
+  std::unique_ptr<Entry> unknown_;  // returned for unknown grids
+  std::map<GridHandle, std::unique_ptr<Entry>> grids_;
 };
 
 }  // namespace quoin

@@ -12,7 +12,6 @@
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/mesh/quad.h>
 #include <quoin/mesh/smooth_occlusion.h>
-#include <quoin/render/light_colour.h>
 #include <quoin/render/propagated_light.h>
 
 namespace quoin {

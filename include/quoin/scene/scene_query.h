@@ -7,7 +7,6 @@
 #include <vector>
 
 #include <quoin/core/direction.h>
-#include <quoin/core/shapes.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/scene/camera.h>

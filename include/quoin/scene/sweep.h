@@ -4,7 +4,6 @@
 #include <optional>
 #include <vector>
 
-#include <quoin/core/shapes.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/scene/scene.h>

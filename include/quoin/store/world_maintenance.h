@@ -10,7 +10,6 @@
 
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
-#include <quoin/store/stored_chunk.h>
 #include <quoin/store/world_store.h>
 
 // Maintenance of world files: summary, check, repair, backup, compaction.

@@ -1,5 +1,5 @@
 #include <quoin/core/assert.h>
-#include <quoin/scene/near_grids.h>
+#include <quoin/scene/scene_meshes.h>
 
 #include "core/coordinates/unit_rotation.h"
 #include "io/gltf/gltf_layout.h"

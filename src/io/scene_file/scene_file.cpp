@@ -4,8 +4,8 @@
 #include <map>
 #include <optional>
 
+#include <quoin/io/file.h>
 #include <quoin/io/formats.h>
-#include <quoin/io/sidecar_file.h>
 
 #include "core/bytes/text.h"
 #include "io/format_driver.h"

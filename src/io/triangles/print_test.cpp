@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include <quoin/io/mesh_file.h>
-#include <quoin/mesh/closed_surface.h>
+#include <quoin/mesh/blocky.h>
 
 #include "core/bytes/bytes.h"
 

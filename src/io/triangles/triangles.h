@@ -16,9 +16,9 @@
 #include <quoin/core/function_ref.h>
 #include <quoin/core/progress.h>
 #include <quoin/core/vec.h>
+#include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 #include <quoin/io/mesh_file.h>
-#include <quoin/io/sidecar_file.h>
 
 // Files of triangles. docs/formats/meshes.md lists the supported content of each.
 //

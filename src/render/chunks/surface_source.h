@@ -9,7 +9,7 @@
 
 #include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
-#include <quoin/render/scene_light.h>
+#include <quoin/render/propagated_light.h>
 #include <quoin/scene/scene.h>
 
 #include "render/chunks/surface_job.h"

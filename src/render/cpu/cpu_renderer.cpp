@@ -17,7 +17,7 @@
 
 #include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
-#include <quoin/render/scene_light.h>
+#include <quoin/render/propagated_light.h>
 
 #include "core/moved_from.h"
 #include "core/srgb.h"

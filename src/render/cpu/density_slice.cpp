@@ -1,5 +1,5 @@
 #include <quoin/core/assert.h>
-#include <quoin/render/density_slice.h>
+#include <quoin/render/cpu_renderer.h>
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include <quoin/render/density_slice.h>
+#include <quoin/render/cpu_renderer.h>
 
 #include <array>
 

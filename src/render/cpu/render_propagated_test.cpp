@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <vector>
 
-#include <quoin/render/scene_light.h>
+#include <quoin/render/propagated_light.h>
 #include <quoin/render/surface_light.h>
 #include <quoin/scene/scene_query.h>
 

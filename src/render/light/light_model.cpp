@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include <quoin/render/light_colour.h>
+#include <quoin/render/propagated_light.h>
 
 namespace quoin {
 namespace {

@@ -6,9 +6,8 @@
 
 #include <quoin/core/direction.h>
 #include <quoin/core/vec.h>
-#include <quoin/render/light_colour.h>
 #include <quoin/render/light_options.h>
-#include <quoin/render/scene_light.h>
+#include <quoin/render/propagated_light.h>
 
 #include "render/light/lamp_table.h"
 #include "render/light/light_model.h"

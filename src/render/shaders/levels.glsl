@@ -1,4 +1,4 @@
-// Propagated light at surfaces; matches quoin/render/light_colour.h and render/light/voxel_light.h on the CPU.
+// Propagated light at surfaces; matches quoin/render/propagated_light.h and render/light/voxel_light.h on the CPU.
 
 struct LightBrick {
   ivec4 key;   // voxel coordinates / 8; w: the grid

@@ -10,7 +10,7 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include <quoin/core/shapes.h>
+#include <quoin/core/vec.h>
 #include <quoin/scene/scene.h>
 
 #include "core/not_finite_for_tests.h"

@@ -18,7 +18,7 @@
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 
-#include <quoin/core/shapes.h>
+#include <quoin/core/vec.h>
 
 #include "scene/query/query_in_grid.h"
 #include "scene/tracer/placed_grid.h"

@@ -12,7 +12,7 @@
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/density_chunk.h>
 #include <quoin/grid/voxel_registry.h>
-#include <quoin/store/stored_chunk.h>
+#include <quoin/store/world_store.h>
 
 #include "store/chunk/density_section.h"
 #include "store/chunk/voxel_sections.h"

@@ -13,7 +13,7 @@
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/density_chunk.h>
 #include <quoin/grid/voxel_registry.h>
-#include <quoin/store/stored_chunk.h>
+#include <quoin/store/world_store.h>
 
 namespace quoin::store {
 

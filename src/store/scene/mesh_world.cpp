@@ -28,7 +28,7 @@
 #include <quoin/core/result.h>
 #include <quoin/grid/chunk.h>
 #include <quoin/mesh/blocky.h>
-#include <quoin/scene/near_grids.h>
+#include <quoin/scene/scene_meshes.h>
 #include <quoin/store/world_meshes.h>
 #include <quoin/store/world_store.h>
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include <quoin/store/stored_chunk.h>
+#include <quoin/store/world_store.h>
 #include <quoin/terrain/terrain.h>
 
 namespace quoin {

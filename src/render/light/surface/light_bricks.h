@@ -11,7 +11,7 @@
 #include <quoin/core/changes.h>
 #include <quoin/core/parallel.h>
 #include <quoin/core/vec.h>
-#include <quoin/render/scene_light.h>
+#include <quoin/render/propagated_light.h>
 #include <quoin/scene/scene.h>
 
 namespace quoin {

@@ -10,8 +10,7 @@
 #include <vector>
 
 #include <quoin/core/assert.h>
-#include <quoin/render/light_colour.h>
-#include <quoin/render/scene_light.h>
+#include <quoin/render/propagated_light.h>
 #include <quoin/render/surface_light.h>
 
 #include "render/light/light_model.h"

@@ -7,7 +7,7 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include <quoin/render/light_colour.h>
+#include <quoin/render/propagated_light.h>
 #include <quoin/render/surface_light.h>
 
 #include "render/light/surface/light_world_for_tests.h"

@@ -1,4 +1,4 @@
-#include <quoin/render/scene_light.h>
+#include <quoin/render/propagated_light.h>
 
 #include <array>
 #include <bit>

@@ -12,7 +12,7 @@
 #include <glm/matrix.hpp>
 
 #include <quoin/core/assert.h>
-#include <quoin/render/light_colour.h>
+#include <quoin/render/propagated_light.h>
 
 #include "core/srgb.h"
 #include "render/light/light_model.h"

@@ -5,7 +5,7 @@
 #include <set>
 #include <utility>
 
-#include <quoin/render/light_colour.h>
+#include <quoin/render/propagated_light.h>
 
 #include "render/cpu/cave_for_tests.h"
 #include "render/cpu/environment_for_tests.h"
