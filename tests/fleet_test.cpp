@@ -8,7 +8,7 @@
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/scene/scene_faces.h>
 
-#include "apps/demo/fleet.h"
+#include "../apps/demo/demo_scenes.h"
 #include "tests/tool_for_tests.h"
 
 namespace quoin {

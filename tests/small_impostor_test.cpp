@@ -20,7 +20,7 @@
 #include <quoin/io/formats.h>
 #include <quoin/render/cpu_renderer.h>
 
-#include "apps/demo/castle.h"
+#include "../apps/demo/demo_scenes.h"
 #include "core/srgb.h"
 #include "render/cpu/environment_for_tests.h"
 #include "render/impostor/impostor_test_support.h"

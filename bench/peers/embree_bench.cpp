@@ -22,7 +22,7 @@
 #include "render/path/path_math.h"
 #include "render/path/path_tile.h"
 #include "render/path/sky_light.h"
-#include "render/shared/camera_rays.h"
+#include "render/shared/image_request.h"
 
 namespace quoin::peers {
 namespace {

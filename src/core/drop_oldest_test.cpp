@@ -1,4 +1,4 @@
-#include "core/drop_oldest.h"
+#include "core/caches.h"
 
 #include <map>
 #include <unordered_map>

@@ -16,7 +16,7 @@
 #include <quoin/core/function_ref.h>
 #include <quoin/core/thousands.h>
 
-#include "core/drop_oldest.h"
+#include "core/caches.h"
 #include "core/work/progress_steps.h"
 #include "io/luanti/luanti.h"
 #include "io/minecraft/block_types.h"

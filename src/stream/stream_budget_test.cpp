@@ -1,4 +1,4 @@
-#include "stream/stream_budget.h"
+#include "stream/stream_plan.h"
 
 #include <algorithm>
 #include <chrono>

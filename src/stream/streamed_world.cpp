@@ -24,7 +24,6 @@
 #include "core/work/workers.h"
 #include "stream/chunk_streamer.h"
 #include "stream/edit_fit.h"
-#include "stream/stream_budget.h"
 #include "stream/stream_plan.h"
 #include "stream/terrain_generator.h"
 

@@ -16,7 +16,7 @@
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/grid.h>
 
-#include "core/object_pool.h"
+#include "core/caches.h"
 #include "core/work/progress_steps.h"
 #include "grid/colour_table.h"
 #include "voxelize/crossings.h"

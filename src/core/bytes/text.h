@@ -6,6 +6,9 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
+
+#include <quoin/core/result.h>
 
 namespace quoin {
 
@@ -35,5 +38,11 @@ struct JsonExtent {
 /// Returns the extent of a text. Compare it with limits before parsing: deep nesting overflows the stack of a recursive
 /// parser.
 [[nodiscard]] JsonExtent json_extent(std::string_view text);
+
+/// Encodes bytes as base64 with padding (RFC 4648, section 4).
+[[nodiscard]] std::string to_base64(std::span<const std::byte> bytes);
+
+/// Errors: BadFormat for text that `to_base64` does not produce, with the offset in `text`.
+[[nodiscard]] Result<std::vector<std::byte>> from_base64(std::string_view text);
 
 }  // namespace quoin

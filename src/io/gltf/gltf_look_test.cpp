@@ -10,7 +10,7 @@
 #include <quoin/io/mesh_file.h>
 #include <quoin/scene/scene_meshes.h>
 
-#include "io/base64.h"
+#include "core/bytes/text.h"
 #include "io/gltf/gltf_decoders.h"
 #include "io/image/image_codecs.h"
 

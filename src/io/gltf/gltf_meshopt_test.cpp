@@ -11,7 +11,7 @@
 #include <quoin/io/formats.h>
 #include <quoin/io/mesh_file.h>
 
-#include "io/base64.h"
+#include "core/bytes/text.h"
 #include "io/gltf/gltf_for_tests.h"
 #include "io/gltf/gltf_layout.h"
 

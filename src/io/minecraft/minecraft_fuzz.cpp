@@ -7,7 +7,6 @@
 #include <quoin/core/assert.h>
 
 #include "io/minecraft/minecraft.h"
-#include "io/minecraft/world_folder.h"
 
 /// Any bytes must give a world or errors, as a region file, as level.dat and as a schematic. All voxels read must have
 /// registered types.

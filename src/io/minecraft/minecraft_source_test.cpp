@@ -12,7 +12,6 @@
 #include "io/minecraft/nbt.h"
 #include "io/minecraft/region_file.h"
 #include "io/minecraft/sections.h"
-#include "io/minecraft/world_folder.h"
 
 namespace quoin {
 

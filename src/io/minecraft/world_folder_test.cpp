@@ -1,11 +1,10 @@
-#include "io/minecraft/world_folder.h"
+#include "io/minecraft/minecraft.h"
 
 #include <gtest/gtest.h>
 
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 
-#include "io/minecraft/minecraft.h"
 #include "io/minecraft/minecraft_for_tests.h"
 #include "io/minecraft/region_file.h"
 

@@ -6,7 +6,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "io/base64.h"
+#include "core/bytes/text.h"
 
 namespace quoin::scene_json {
 namespace {

@@ -10,7 +10,7 @@
 #include <quoin/io/vox.h>
 
 #include "core/bytes/byte_stream.h"
-#include "io/base64.h"
+#include "core/bytes/text.h"
 #include "io/gltf/glb_for_tests.h"
 #include "io/scene_file/scene_file.h"
 #include "io/scene_file/voxel_data.h"

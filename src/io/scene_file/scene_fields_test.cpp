@@ -15,7 +15,7 @@
 #include <quoin/io/scene_file.h>
 
 #include "core/bytes/byte_stream.h"
-#include "io/base64.h"
+#include "core/bytes/text.h"
 
 namespace quoin {
 namespace {

@@ -6,7 +6,7 @@
 #include <quoin/io/scene_file.h>
 
 #include "core/bytes/byte_stream.h"
-#include "io/base64.h"
+#include "core/bytes/text.h"
 #include "io/scene_file/voxel_data.h"
 
 namespace {

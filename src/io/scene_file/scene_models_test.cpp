@@ -12,7 +12,7 @@
 #include <quoin/io/formats.h>
 
 #include "core/bytes/byte_stream.h"
-#include "io/base64.h"
+#include "core/bytes/text.h"
 #include "io/gltf/glb_for_tests.h"
 #include "io/scene_file/voxel_data.h"
 

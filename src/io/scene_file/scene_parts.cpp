@@ -17,7 +17,6 @@
 #include <quoin/io/image_files.h>
 
 #include "core/bytes/text.h"
-#include "io/base64.h"
 
 namespace quoin::scene_json {
 

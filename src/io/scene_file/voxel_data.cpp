@@ -13,8 +13,8 @@
 
 #include "core/bytes/byte_stream.h"
 #include "core/bytes/bytes.h"
+#include "core/bytes/text.h"
 #include "core/work/progress_steps.h"
-#include "io/base64.h"
 
 namespace quoin {
 namespace {

@@ -14,7 +14,7 @@
 #include <quoin/io/mesh_file.h>
 #include <quoin/scene/scene_meshes.h>
 
-#include "io/base64.h"
+#include "core/bytes/text.h"
 #include "io/format_driver.h"
 #include "io/triangles/triangles.h"
 

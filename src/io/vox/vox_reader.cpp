@@ -13,7 +13,6 @@
 #include "core/bytes/bytes.h"
 #include "core/bytes/text.h"
 #include "io/vox/chunks.h"
-#include "io/vox/render_settings.h"
 #include "io/whole_file.h"
 
 namespace quoin {

@@ -16,8 +16,8 @@
 
 #include <quoin/core/assert.h>
 
+#include "core/caches.h"
 #include "core/moved_from.h"
-#include "core/object_pool.h"
 #include "core/work/progress_steps.h"
 #include "mesh/smooth/smooth_cell.h"
 #include "mesh/smooth/smooth_mesher.h"

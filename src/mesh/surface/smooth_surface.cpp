@@ -7,8 +7,8 @@
 
 #include <quoin/core/assert.h>
 
+#include "core/caches.h"
 #include "core/coordinates/chunk_order.h"
-#include "core/object_pool.h"
 #include "core/work/progress_steps.h"
 #include "mesh/smooth/level_cells.h"
 #include "mesh/surface/face_materials.h"

@@ -26,7 +26,6 @@
 #include "render/light/light_model.h"
 #include "render/light/lighting.h"
 #include "render/light/surface/light_bricks.h"
-#include "render/shared/camera_rays.h"
 #include "render/shared/image_detail.h"
 #include "render/shared/image_request.h"
 #include "scene/tracer/placed_grid.h"

@@ -11,7 +11,7 @@
 #include "render/cpu/environment_for_tests.h"
 #include "render/cpu/render_test_support.h"
 #include "render/light/light_model.h"
-#include "render/shared/camera_rays.h"
+#include "render/shared/image_request.h"
 
 namespace quoin {
 namespace {

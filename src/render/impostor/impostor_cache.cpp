@@ -11,7 +11,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/drop_oldest.h"
+#include "core/caches.h"
 #include "core/moved_from.h"
 #include "core/work/workers.h"
 

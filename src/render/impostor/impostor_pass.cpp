@@ -19,7 +19,6 @@
 #include "core/srgb.h"
 #include "render/impostor/seen_faces.h"
 #include "render/light/lighting.h"
-#include "render/shared/camera_rays.h"
 #include "render/shared/image_request.h"
 #include "scene/tracer/placed_grid.h"
 

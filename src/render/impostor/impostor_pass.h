@@ -14,8 +14,8 @@
 
 #include "render/impostor/impostor_screen.h"
 #include "render/impostor/raster/raster.h"
-#include "render/shared/camera_rays.h"
 #include "render/shared/image_detail.h"
+#include "render/shared/image_request.h"
 #include "scene/tracer/scene_view.h"
 
 namespace quoin {

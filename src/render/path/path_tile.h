@@ -27,7 +27,7 @@
 #include "render/path/path_request.h"
 #include "render/path/scatter.h"
 #include "render/path/sky_light.h"
-#include "render/shared/camera_rays.h"
+#include "render/shared/image_request.h"
 #include "scene/surfaces.h"
 #include "scene/tracer/scene_view.h"
 

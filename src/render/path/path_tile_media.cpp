@@ -12,7 +12,7 @@
 #include "render/light/light_model.h"
 #include "render/light/occlusion_directions.h"
 #include "render/path/path_tile.h"
-#include "render/shared/camera_rays.h"
+#include "render/shared/image_request.h"
 #include "scene/tracer/placed_grid.h"
 
 namespace quoin::path {

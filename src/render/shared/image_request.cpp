@@ -1,6 +1,7 @@
 #include "render/shared/image_request.h"
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include <glm/geometric.hpp>
@@ -55,6 +56,77 @@ RenderedImage empty_image(const RenderOptions& options) {
   image.colour = {options.width, options.height, std::vector<std::uint8_t>(3 * pixels)};
   if (options.depth) image.depth = {options.width, options.height, std::vector<float>(pixels)};
   return image;
+}
+
+namespace {
+
+constexpr std::size_t kLanes = RayPacket::kSize;
+constexpr double kSkyFov = 50.0 * std::numbers::pi / 180.0;
+
+}  // namespace
+
+PixelPoint sample_point(int index) {
+  QUOIN_ASSERT(index >= 0, "samples count from 0");
+  constexpr double kPlastic = 1.32471795724474602596;
+  const double x = 0.5 + index / kPlastic;
+  const double y = 0.5 + index / (kPlastic * kPlastic);
+  return {x - std::floor(x), y - std::floor(y)};
+}
+
+CameraRays::CameraRays(const Camera& camera, int width, int height)
+    : width_(width),
+      height_(height),
+      is_perspective_(camera.projection == Camera::Projection::Perspective),
+      forward_(camera.forward) {
+  QUOIN_ASSERT(width > 0 && height > 0, "a positive image size");
+  const double image_height = is_perspective_ ? 2.0 * std::tan(camera.vertical_fov_radians / 2.0) : camera.view_height;
+  const double pixel = image_height / height;
+  right_ = camera.right * pixel;
+  down_ = camera.up * -pixel;
+  if (!is_perspective_) sky_scale_ = 2.0 * std::tan(kSkyFov / 2.0) / image_height;
+  corner_ = right_ * (-0.5 * width) + down_ * (-0.5 * height);
+}
+
+void CameraRays::block(int column, int row, PixelPoint point, RayPacket& rays) const {
+  QUOIN_ASSERT(column >= 0 && row >= 0, "a pixel of the image");
+  RayPacket::Lanes<double> x;
+  RayPacket::Lanes<double> y;
+  rays.active = 0;
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    const int pixel_x = column + static_cast<int>(i) % kBlock;
+    const int pixel_y = row + static_cast<int>(i) / kBlock;
+    x[i] = pixel_x + point.x;
+    y[i] = pixel_y + point.y;
+    if (pixel_x < width_ && pixel_y < height_) rays.active |= 1U << i;
+  }
+  rays.max_t.fill(std::numeric_limits<double>::infinity());
+  // The crossing of each ray with the image plane, relative to the image's centre.
+  const auto across = [&](int axis, RayPacket::Lanes<double>& out) {
+    for (std::size_t i = 0; i < kLanes; ++i) out[i] = corner_[axis] + right_[axis] * x[i] + down_[axis] * y[i];
+  };
+  if (!is_perspective_) {
+    across(0, rays.origin_x), across(1, rays.origin_y), across(2, rays.origin_z);
+    rays.direction_x.fill(forward_.x), rays.direction_y.fill(forward_.y), rays.direction_z.fill(forward_.z);
+    return;
+  }
+  rays.origin_x.fill(0.0), rays.origin_y.fill(0.0), rays.origin_z.fill(0.0);
+  across(0, rays.direction_x), across(1, rays.direction_y), across(2, rays.direction_z);
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    const double dx = rays.direction_x[i] + forward_.x;
+    const double dy = rays.direction_y[i] + forward_.y;
+    const double dz = rays.direction_z[i] + forward_.z;
+    const double inverse = 1.0 / std::sqrt(dx * dx + dy * dy + dz * dz);
+    rays.direction_x[i] = dx * inverse;
+    rays.direction_y[i] = dy * inverse;
+    rays.direction_z[i] = dz * inverse;
+  }
+}
+
+float CameraRays::sky_up(const RayPacket& rays, std::size_t lane) const {
+  QUOIN_ASSERT(lane < kLanes, "0 <= lane < kSize");
+  if (is_perspective_) return static_cast<float>(rays.direction_y[lane]);
+  const DVec3 from_middle{rays.origin_x[lane], rays.origin_y[lane], rays.origin_z[lane]};
+  return static_cast<float>(glm::normalize(forward_ + from_middle * sky_scale_).y);
 }
 
 }  // namespace quoin

@@ -24,9 +24,9 @@
 #include "store/database/world_lock.h"
 #include "store/scene/world_file.h"
 #include "store/world/part_text.h"
+#include "store/world/world_changes.h"
 #include "store/world/world_open.h"
 #include "store/world/world_reader.h"
-#include "store/world/world_rules.h"
 
 namespace quoin {
 

@@ -33,10 +33,10 @@
 #include <quoin/store/world_store.h>
 
 #include "core/bytes/files.h"
+#include "core/caches.h"
 #include "core/coordinates/chunk_order.h"
-#include "core/drop_oldest.h"
 #include "core/work/workers.h"
-#include "store/world/world_rules.h"
+#include "store/world/world_changes.h"
 
 namespace quoin::store {
 namespace {

@@ -21,7 +21,6 @@
 #include "store/database/schema.h"
 #include "store/world/part_text.h"
 #include "store/world/world_changes.h"
-#include "store/world/world_rules.h"
 
 namespace quoin::store {
 

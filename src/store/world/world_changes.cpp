@@ -5,6 +5,7 @@
 
 #include <quoin/core/assert.h>
 
+#include "store/chunk/voxel_sections.h"
 #include "store/world/part_text.h"
 
 namespace quoin::store {
@@ -33,6 +34,180 @@ void ChangeSet::add(ChangeSet&& later) {
     parts.insert(std::move(node));
   }
   later.removed_grids.clear();
+}
+
+namespace {
+
+constexpr std::size_t kMaxValueBytes = std::size_t{64} << 20;
+
+// Adds types up to a number, with placeholders for lost types in between.
+Status fill_types(VoxelRegistry& types, std::int64_t number, std::vector<std::string>& damage) {
+  while (static_cast<std::int64_t>(types.size()) < number) {
+    const auto missing = static_cast<std::int64_t>(types.size());
+    damage.push_back(name_of({part::kType, missing}) + " is lost");
+    if (const auto added = types.add(lost_type(missing)); !added) return added.error();
+  }
+  return {};
+}
+
+Status put_type(VoxelRegistry& types, std::int64_t number, const VoxelProperties& properties) {
+  QUOIN_ASSERT(number >= 1 && number <= static_cast<std::int64_t>(types.size()), "a known type, or the next one");
+  if (number == static_cast<std::int64_t>(types.size())) {
+    const auto added = types.add(properties);
+    return added ? Status() : Status(added.error());
+  }
+  types.replace(static_cast<VoxelType>(number), properties);
+  return {};
+}
+
+Status check_data(const ChunkAddress& place, const Chunk& chunk, const VoxelRegistry& types) {
+  if (chunk.data_count() == 0) return {};
+  std::string fault;
+  std::size_t bytes = 0;
+  chunk.for_each_data([&](IVec3 local, const VoxelData& data) {
+    const std::uint8_t bits = types[chunk.get(local)].state_bits;
+    const bool fits = bits == kMaxStateBits || data.state >> bits == 0;
+    if (!fits && fault.empty()) fault = about(place) + ": a state has more bits than its type allows";
+    bytes += data.bytes.size();
+  });
+  if (bytes > kMaxChunkDataBytes) fault = about(place) + ": its voxel data exceeds 64 MiB";
+  if (!fault.empty()) return make_error(ErrorCode::InvalidArgument, fault);
+  return {};
+}
+
+Status check_types(const ChunkAddress& place, const Chunk& chunk, const VoxelRegistry& types) {
+  for (const VoxelType type : chunk.types()) {
+    if (type < types.size()) continue;
+    return make_error(ErrorCode::InvalidArgument,
+                      about(place) + " has voxels of type " + std::to_string(type) + ", which is not defined");
+  }
+  return {};
+}
+
+}  // namespace
+
+VoxelProperties lost_type(std::int64_t number) {
+  VoxelProperties properties;
+  properties.name = "lost type " + std::to_string(number);
+  properties.colour = {255, 0, 255, 255};
+  properties.state_bits = kMaxStateBits;  // accepts any state of its voxels
+  return properties;
+}
+
+std::string about(const ChunkAddress& place) {
+  std::string text = "chunk (";
+  for (int axis = 0; axis < 3; ++axis) text += std::to_string(place.chunk[axis]) + (axis < 2 ? ", " : ") of grid ");
+  return text + std::to_string(place.grid);
+}
+
+bool WorldRules::concern(const ChangeSet& changes) {
+  for (const auto& [key, body] : changes.parts) {
+    if (key.kind == part::kType || key.kind == part::kGrid) return true;
+  }
+  return false;
+}
+
+Result<WorldRules> WorldRules::after(const ChangeSet& changes) const {
+  WorldRules rules = *this;
+  for (const auto& [key, body] : changes.parts) {
+    const auto* const number = std::get_if<std::int64_t>(&key.id);
+    if (key.kind == part::kType && body && number != nullptr) {
+      const auto type = part_from<VoxelProperties>(*body, name_of(key));
+      if (!type) return make_error(ErrorCode::InvalidArgument, type.error().message);
+      if (*number < 1) return make_error(ErrorCode::InvalidArgument, name_of(key) + ": number out of range");
+      if (*number > static_cast<std::int64_t>(rules.types.size())) {
+        return make_error(ErrorCode::InvalidArgument, name_of(key) + " must not be put before lower numbers");
+      }
+      if (*number < static_cast<std::int64_t>(rules.types.size()) &&
+          type->state_bits < rules.types[static_cast<VoxelType>(*number)].state_bits) {
+        return make_error(ErrorCode::InvalidArgument, name_of(key) + " must not have fewer state bits than before");
+      }
+      if (auto done = put_type(rules.types, *number, *type); !done) return done.error();
+    }
+    if (key.kind == part::kGrid && number != nullptr) {
+      if (*number < 0 || *number > kMaxGridNumber)
+        return make_error(ErrorCode::InvalidArgument, name_of(key) + ": number out of range");
+      const auto grid_number = static_cast<std::uint32_t>(*number);
+      if (!body) {
+        rules.grids.erase(grid_number);
+        continue;
+      }
+      const auto grid = part_from<WorldGrid>(*body, name_of(key));
+      if (!grid) return make_error(ErrorCode::InvalidArgument, grid.error().message);
+      rules.grids.insert_or_assign(grid_number, *grid);
+    }
+  }
+  return rules;
+}
+
+Result<WorldRules> read_rules(WorldReader& reader) {
+  WorldRules rules;
+  Status fault;
+  const auto keep = [&](Status outcome) {
+    if (!outcome && fault) fault = std::move(outcome);
+  };
+  const Status types = reader.each_part(part::kType, [&](const Part& part, bool is_sound) {
+    const auto* const number = std::get_if<std::int64_t>(&part.key.id);
+    if (number == nullptr || *number < 1 || *number > static_cast<std::int64_t>(kMaxVoxelTypes)) {
+      rules.damage.push_back(name_of(part.key) + " has an invalid number");
+      return;
+    }
+    keep(fill_types(rules.types, *number, rules.damage));
+    auto type = is_sound ? part_from<VoxelProperties>(part.body, name_of(part.key))
+                         : Result<VoxelProperties>(make_error(ErrorCode::BadFormat, name_of(part.key) + " is damaged"));
+    if (!type) rules.damage.push_back(type.error().message);
+    if (fault) keep(put_type(rules.types, *number, type ? *type : lost_type(*number)));
+  });
+  if (!types) return types.error();
+  const Status grids = reader.each_part(part::kGrid, [&](const Part& part, bool is_sound) {
+    const auto* const number = std::get_if<std::int64_t>(&part.key.id);
+    if (number == nullptr || *number < 0 || *number > kMaxGridNumber) {
+      rules.damage.push_back(name_of(part.key) + " has an invalid number");
+      return;
+    }
+    const auto grid = is_sound ? part_from<WorldGrid>(part.body, name_of(part.key))
+                               : Result<WorldGrid>(make_error(ErrorCode::BadFormat, name_of(part.key) + " is damaged"));
+    if (!grid) rules.damage.push_back(grid.error().message);
+    rules.grids.emplace(static_cast<std::uint32_t>(*number), grid.value_or(WorldGrid{}));
+  });
+  if (!grids) return grids.error();
+  if (!fault) return fault.error();
+  return rules;
+}
+
+Status check_address(const ChunkAddress& place) {
+  if (place.grid > kMaxGridNumber) {
+    return make_error(ErrorCode::InvalidArgument, about(place) + ": the grid's number is out of range");
+  }
+  if (!kAllChunks.contains(place.chunk)) {
+    return make_error(ErrorCode::InvalidArgument, about(place) + " lies more than 2^26 chunks from the origin");
+  }
+  return {};
+}
+
+Status check_changes(const ChangeSet& changes, const WorldRules& rules) {
+  for (const auto& [place, chunk] : changes.chunks) {
+    if (!chunk) continue;
+    if (auto done = check_address(place); !done) return done;
+    const auto grid = rules.grids.find(place.grid);
+    if (grid == rules.grids.end()) {
+      return make_error(ErrorCode::InvalidArgument, about(place) + ": the grid is not defined");
+    }
+    if (auto done = check_types(place, chunk->voxels, rules.types); !done) return done;
+    if (auto done = check_data(place, chunk->voxels, rules.types); !done) return done;
+    if (!chunk->densities) continue;
+    if (auto done = check_types(place, chunk->densities->materials(), rules.types); !done) return done;
+  }
+  for (const auto& [key, body] : changes.parts) {
+    if (!body) continue;
+    if (body->size() > kMaxValueBytes) {
+      return make_error(ErrorCode::InvalidArgument, name_of(key) + " exceeds 64 MiB");
+    }
+    // Types and grids were read by `after`.
+    if (key.kind == part::kType || key.kind == part::kGrid) continue;
+    if (auto done = check_part(key, *body); !done) return done;
+  }
+  return {};
 }
 
 }  // namespace quoin::store

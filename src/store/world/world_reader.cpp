@@ -10,7 +10,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "store/world/world_rules.h"
+#include "store/world/world_changes.h"
 
 namespace quoin::store {
 

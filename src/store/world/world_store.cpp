@@ -22,7 +22,6 @@
 #include "store/world/world_changes.h"
 #include "store/world/world_open.h"
 #include "store/world/world_reader.h"
-#include "store/world/world_rules.h"
 #include "store/world/world_writer.h"
 
 namespace quoin {

@@ -8,7 +8,6 @@
 #include "core/bytes/text.h"
 #include "core/srgb.h"
 #include "io/vox/chunks.h"
-#include "io/vox/render_settings.h"
 #include "io/vox/vox_reader.h"
 
 namespace quoin::vox {

@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "core/drop_oldest.h"
+#include "core/caches.h"
 
 namespace quoin::vulkan {
 namespace {

@@ -9,7 +9,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/drop_oldest.h"
+#include "core/caches.h"
 #include "render/vulkan/march/device_scene.h"
 #include "render/vulkan/trees/shader_data.h"
 

@@ -17,7 +17,6 @@
 #include "core/srgb.h"
 #include "render/light/light_model.h"
 #include "render/light/occlusion_directions.h"
-#include "render/shared/camera_rays.h"
 #include "render/shared/image_request.h"
 #include "render/vulkan/trees/shader_memory.h"
 #include "scene/tracer/placed_grid.h"

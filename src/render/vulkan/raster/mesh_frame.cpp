@@ -11,7 +11,7 @@
 #include <quoin/grid/chunk.h>
 
 #include "render/light/light_model.h"
-#include "render/shared/camera_rays.h"
+#include "render/shared/image_request.h"
 #include "scene/frustum.h"
 
 namespace quoin::vulkan {

@@ -7,7 +7,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/drop_oldest.h"
+#include "core/caches.h"
 #include "render/vulkan/trees/shader_data.h"
 #include "scene/tracer/placed_grid.h"
 

@@ -1,4 +1,4 @@
-#include "io/base64.h"
+#include "core/bytes/text.h"
 
 #include <gtest/gtest.h>
 
