@@ -1,4 +1,4 @@
-#include "castle.h"
+#include "demo_scenes.h"
 
 #include <algorithm>
 #include <cmath>

@@ -8,7 +8,7 @@
 #include <quoin/io/image_files.h>
 #include <quoin/render/cpu_renderer.h>
 
-#include "fleet.h"
+#include "demo_scenes.h"
 
 namespace {
 

@@ -7,7 +7,7 @@
 #include <quoin/io/image_files.h>
 #include <quoin/render/cpu_renderer.h>
 
-#include "castle.h"
+#include "demo_scenes.h"
 
 namespace {
 

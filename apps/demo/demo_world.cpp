@@ -4,7 +4,7 @@
 
 #include <quoin/io/vox.h>
 
-#include "castle.h"
+#include "demo_scenes.h"
 
 int main(int argc, char** argv) {
   if (argc != 2 || argv[1][0] == '-') {

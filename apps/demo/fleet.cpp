@@ -1,4 +1,4 @@
-#include "fleet.h"
+#include "demo_scenes.h"
 
 #include <algorithm>
 #include <cmath>

@@ -6,7 +6,6 @@
 #include <optional>
 #include <string>
 
-#include "help.h"
 #include "options.h"
 #include "output.h"
 

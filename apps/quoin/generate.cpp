@@ -8,10 +8,9 @@
 
 #include "command_files.h"
 #include "commands.h"
-#include "help.h"
 #include "options.h"
 #include "output.h"
-#include "render/small_image.h"
+#include "render/thumbnail.h"
 #include "run_control.h"
 
 namespace quoin::tool {

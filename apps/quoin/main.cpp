@@ -8,7 +8,7 @@
 #include <quoin/version.h>
 
 #include "commands.h"
-#include "help.h"
+#include "options.h"
 #include "output.h"
 #include "run_control.h"
 

@@ -6,7 +6,7 @@
 #include <quoin/version.h>
 
 #include "commands.h"
-#include "help.h"
+#include "options.h"
 #include "output.h"
 
 namespace quoin::tool {

@@ -6,7 +6,6 @@
 
 #include "command_files.h"
 #include "commands.h"
-#include "help.h"
 #include "options.h"
 #include "output.h"
 #include "run_control.h"

@@ -4,13 +4,14 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
-#include <nlohmann/json.hpp>
+#include <numbers>
 #include <span>
+
+#include <nlohmann/json.hpp>
 
 #include <quoin/io/file.h>
 
 namespace quoin::viewer {
-
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -231,6 +232,37 @@ Status write_settings(const Settings& settings, const std::filesystem::path& pat
   if (error) return make_error(ErrorCode::CannotWrite, "cannot create the folder: " + error.message(), path.string());
   const std::string text = to_json(settings);
   return write_file(std::as_bytes(std::span(text)), path);
+}
+
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+constexpr double kDegreesPerPixel = 0.4;
+constexpr double kLowest = 2.0;  // a sun at the horizon lights nothing from above
+constexpr double kNight = -20.0;
+constexpr double kHighest = 89.0;  // the azimuth is still defined
+
+}  // namespace
+
+SunAngles sun_angles(DVec3 sun) {
+  return {std::atan2(sun.x, sun.z) / kDegree, std::atan2(sun.y, std::hypot(sun.x, sun.z)) / kDegree};
+}
+
+DVec3 sun_direction(const SunAngles& angles) {
+  const double level = std::cos(angles.elevation * kDegree);
+  return {std::sin(angles.azimuth * kDegree) * level, std::sin(angles.elevation * kDegree),
+          std::cos(angles.azimuth * kDegree) * level};
+}
+
+double lowest_sun(const Environment& environment) {
+  return environment.sky.model == SkyModel::Fixed ? kLowest : kNight;
+}
+
+DVec3 drag_sun(const Environment& environment, double dx, double dy) {
+  SunAngles angles = sun_angles(environment.sun.direction);
+  angles.azimuth = std::remainder(angles.azimuth + dx * kDegreesPerPixel, 360.0);
+  angles.elevation = std::clamp(angles.elevation - dy * kDegreesPerPixel, lowest_sun(environment), kHighest);
+  return sun_direction(angles);
 }
 
 }  // namespace quoin::viewer

@@ -1,4 +1,4 @@
-#include "sun.h"
+#include "settings.h"
 
 #include <random>
 

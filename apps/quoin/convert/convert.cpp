@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "help.h"
+#include "options.h"
 
 namespace quoin::tool {
 

@@ -20,7 +20,6 @@
 #include "convert/convert_arguments.h"
 #include "output.h"
 #include "run_control.h"
-#include "watch.h"
 
 namespace quoin::tool {
 

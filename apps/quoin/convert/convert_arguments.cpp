@@ -6,7 +6,7 @@
 #include <tuple>
 #include <utility>
 
-#include "help.h"
+#include "options.h"
 
 namespace quoin::tool {
 

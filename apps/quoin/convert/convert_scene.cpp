@@ -5,7 +5,7 @@
 #include <quoin/store/world_saver.h>
 
 #include "convert/convert.h"
-#include "render/small_image.h"
+#include "render/thumbnail.h"
 
 namespace quoin::tool {
 

@@ -9,7 +9,7 @@
 
 #include "convert/convert.h"
 #include "output.h"
-#include "render/small_image.h"
+#include "render/thumbnail.h"
 #include "run_control.h"
 
 namespace quoin::tool {

@@ -12,13 +12,10 @@
 
 #include "command_files.h"
 #include "output.h"
-#include "render/camera_path.h"
 #include "render/image_output.h"
-#include "render/path_images.h"
+#include "render/image_series.h"
 #include "render/render_arguments.h"
-#include "render/video.h"
 #include "run_control.h"
-#include "watch.h"
 
 namespace quoin::tool {
 

@@ -9,10 +9,9 @@
 #include <numbers>
 
 #include "commands.h"
-#include "help.h"
 #include "options.h"
 #include "render/image_output.h"
-#include "render/video.h"
+#include "render/image_series.h"
 
 namespace quoin::tool {
 

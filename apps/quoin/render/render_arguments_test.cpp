@@ -7,7 +7,7 @@
 
 #include <quoin/render/light_options.h>
 
-#include "help.h"
+#include "options.h"
 #include "parsed_line_for_tests.h"
 
 namespace quoin::tool {

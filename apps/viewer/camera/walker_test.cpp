@@ -1,4 +1,4 @@
-#include "walker.h"
+#include "camera_control.h"
 
 #include <cmath>
 

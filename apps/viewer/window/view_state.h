@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "viewer/camera/walker.h"
+#include "viewer/camera/camera_control.h"
 #include "viewer/loader.h"
 #include "viewer/settings.h"
 #include "viewer/window/panel/scene_tree.h"

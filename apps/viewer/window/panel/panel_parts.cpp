@@ -1,4 +1,4 @@
-#include "panel_parts.h"
+#include "panels.h"
 
 #include <imgui.h>
 
@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-#include "viewer/sun.h"
+#include "viewer/settings.h"
 #include "viewer/window/process_memory.h"
 
 namespace quoin::viewer {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "panel_parts.h"
+#include "panels.h"
 
 namespace quoin::viewer {
 

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <quoin/grid/grid.h>
+#include <quoin/io/vox.h>
+#include <quoin/render/cpu_renderer.h>
 #include <quoin/scene/scene.h>
 
 namespace demo {
@@ -27,5 +29,11 @@ inline constexpr int kSeaLevel = 9;
 [[nodiscard]] quoin::Grid make_ship(const Palette& palette);
 /// The demo world: the island about the world's origin, trees where the ground is grass, two ships at sea.
 [[nodiscard]] quoin::Result<quoin::Scene> make_castle();
+
+/// A fleet of voxel ships over a generated terrain, with a camera and a sun.
+[[nodiscard]] quoin::Result<quoin::LoadedScene> make_fleet();
+
+/// Returns the render options of the fleet, with its own sun.
+[[nodiscard]] quoin::RenderOptions fleet_options(const quoin::LoadedScene& fleet);
 
 }  // namespace demo
