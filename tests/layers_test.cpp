@@ -54,6 +54,14 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
 // Pairs of a lent header and its user. Lower it when a pair goes; a higher number needs a reason in docs/decisions.
 constexpr std::size_t kMaxLoans = 32;
 
+// A file with fewer lines needs a reason, because compile time and a reader's way are paid per file.
+constexpr int kSmallFile = 60;
+constexpr int kMaxLines = 900;
+// Numbers of C++ files without tests in src, include and apps. They may only fall: a change that merges files lowers
+// them.
+constexpr int kMaxSources = 713;
+constexpr int kMaxSmallSources = 111;
+
 // A folder with more files should be split.
 constexpr int kMaxFiles = 32;
 const std::map<std::string, int> kLargerFolders = {};
@@ -137,6 +145,23 @@ std::string folder_of(const fs::path& path) {
 // Returns the first part of a folder: "light" for "light/propagated".
 std::string top_folder(const std::string& folder) {
   return folder.substr(0, folder.find('/'));
+}
+
+// Returns the number of lines, as `wc -l` counts them.
+int lines_of(const fs::path& file) {
+  std::ifstream in(file);
+  return static_cast<int>(std::count(std::istreambuf_iterator<char>(in), {}, '\n'));
+}
+
+// Returns the names that occur more than once.
+std::set<std::string> repeated_names(const std::vector<fs::path>& files) {
+  std::set<std::string> names;
+  std::set<std::string> repeated;
+  for (const fs::path& file : files) {
+    const std::string name = file.filename().string();
+    if (!names.insert(name).second) repeated.insert(name);
+  }
+  return repeated;
 }
 
 using Graph = std::map<std::string, std::set<std::string>>;
@@ -279,7 +304,6 @@ TEST(Layers, PublicHeadersIncludeNoPrivateOnes) {
 
 // A header that serves a single source belongs in that source, unless it is long enough to be read by itself.
 TEST(Layers, SmallHeadersWithoutASourceAreShared) {
-  constexpr int kSmall = 60;
   const std::set<std::string> choices = {"lanes.h"};  // one of several, chosen by the flags of the including source
   std::map<std::string, std::set<fs::path>> users;
   std::vector<fs::path> small;
@@ -290,9 +314,7 @@ TEST(Layers, SmallHeadersWithoutASourceAreShared) {
       }
       fs::path own = source.file;
       if (source.file.extension() != ".h" || fs::exists(own.replace_extension(".cpp"))) continue;
-      std::ifstream in(source.file);
-      const auto lines = std::count(std::istreambuf_iterator<char>(in), {}, '\n');
-      if (lines < kSmall && !is_for_tests(source.file)) small.push_back(source.file);
+      if (!is_for_tests(source.file) && lines_of(source.file) < kSmallFile) small.push_back(source.file);
     }
   }
   EXPECT_FALSE(small.empty());
@@ -372,6 +394,34 @@ TEST(Layers, TestHeadersHaveTestNames) {
       EXPECT_TRUE(used.contains(source.file.filename().string())) << source.file << " is included by tests alone";
     }
   }
+}
+
+TEST(Layers, KeepsNumberAndSizesOfFiles) {
+  int sources = 0;
+  int small = 0;
+  for (const char* top : {"src", "include", "apps"}) {
+    for (const Source& source : sources_of(top)) {
+      if (is_for_tests(source.file)) continue;
+      const int lines = lines_of(source.file);
+      EXPECT_LE(lines, kMaxLines) << source.file;
+      ++sources;
+      if (lines < kSmallFile) ++small;
+    }
+  }
+  EXPECT_GT(sources, 500);
+  EXPECT_LE(sources, kMaxSources) << "merge files of one subject";
+  EXPECT_LE(small, kMaxSmallSources) << "merge small files into those of their subject";
+}
+
+TEST(Layers, FindsRepeatedNames) {
+  EXPECT_TRUE(repeated_names({"a/x.h", "a/x.cpp", "b/y.h"}).empty());
+  EXPECT_EQ(repeated_names({"a/x.h", "b/x.h", "y.h"}), std::set<std::string>{"x.h"});
+}
+
+TEST(Layers, FileNamesInSrcDiffer) {
+  std::vector<fs::path> files;
+  for (const Source& source : sources_of("src")) files.push_back(source.path);
+  EXPECT_EQ(repeated_names(files), std::set<std::string>{});
 }
 
 TEST(Layers, KeepsFoldersBelowMaxFiles) {
