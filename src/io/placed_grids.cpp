@@ -14,7 +14,6 @@
 #include <quoin/grid/copy_box.h>
 
 #include "core/bytes/text.h"
-#include "scene/instance_axes.h"
 
 namespace quoin::models {
 

@@ -23,7 +23,7 @@
 #include <quoin/grid/downsample.h>
 #include <quoin/live/live_light.h>
 #include <quoin/live/live_meshes.h>
-#include <quoin/render/scene_light.h>
+#include <quoin/render/propagated_light.h>
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene_faces.h>
 #include <quoin/scene/scene_query.h>

@@ -10,7 +10,7 @@
 #include <quoin/io/file.h>
 #include <quoin/io/image_files.h>
 
-#include "help.h"
+#include "options.h"
 #include "options.h"
 #include "render/image_output.h"
 #include "render/render_arguments.h"

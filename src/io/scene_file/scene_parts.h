@@ -5,7 +5,7 @@
 
 #include <nlohmann/json.hpp>
 #include <quoin/io/scene_file.h>
-#include <quoin/io/sidecar_file.h>
+#include <quoin/io/file.h>
 
 #include "io/scene_file/json_reader.h"
 
