@@ -11,7 +11,6 @@
 #include <quoin/io/image_files.h>
 
 #include "options.h"
-#include "options.h"
 #include "render/image_output.h"
 #include "render/render_arguments.h"
 
