@@ -89,7 +89,7 @@ class BusyScene {
 
   void edit() {
     scene.edit(scene.grids().handles().front()).grid.set(voxel(), static_cast<VoxelType>(below(4)));
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < 3 && !edits_voxels_only; ++i) {
       const auto grids = scene.grids().handles();
       const auto instances = scene.instances().handles();
       SceneGrid& grid = scene.edit(grids[below(grids.size())]);
@@ -131,6 +131,7 @@ class BusyScene {
   [[nodiscard]] const Grid& grid() const { return scene.grids()[scene.grids().handles().front()].grid; }
 
   Scene scene;
+  bool edits_voxels_only = false;
 
  private:
   std::size_t below(std::size_t end) { return random_() % end; }
@@ -309,7 +310,7 @@ TEST(FailedAllocations, KeepSmoothScene) {
         SmoothScene fresh;
         return fresh.update(busy.scene, {1}) && hits(smooth.scene()) == hits(fresh.scene());
       },
-      2);
+      1);
 }
 
 std::vector<LightLevels> levels_of(const SceneLight& light, const Scene& scene) {
@@ -431,6 +432,13 @@ TEST(FailedAllocations, KeepPyramid) {
       });
 }
 
+bool has_same_surfaces(const ShownSurfaces& a, const ShownSurfaces& b) {
+  return std::ranges::equal(a.all(), b.all(), [](const SurfaceUpdate& x, const SurfaceUpdate& y) {
+    return x.grid == y.grid && x.chunk == y.chunk && x.content == y.content && x.surface->quads == y.surface->quads &&
+           x.surface->smooth.positions.size() == y.surface->smooth.positions.size();
+  });
+}
+
 TEST(FailedAllocations, KeepLiveMeshes) {
   BusyScene busy;
   LiveMeshOptions options;
@@ -442,16 +450,21 @@ TEST(FailedAllocations, KeepLiveMeshes) {
       [&] {
         meshes.finish(busy.scene, {});
         shown.apply(meshes.take());
-        expect_blocky(shown, busy.scene, options);
-        return !testing::Test::HasFailure();
+        LiveMeshes fresh(options);
+        fresh.finish(busy.scene, {});
+        ShownSurfaces expected;
+        expected.apply(fresh.take());
+        return has_same_surfaces(shown, expected);
       });
 }
 
-// A failed save stores nothing; the next one stores everything.
+// A failed save stores nothing; the next one stores everything. Destructors of the JSON library allocate memory, so no
+// part that is stored as JSON changes.
 TEST(FailedAllocations, KeepSavedWorld) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   BusyScene busy;
+  busy.edits_voxels_only = true;
   auto world = WorldStore::create(path);
   ASSERT_TRUE(world);
   WorldSaver saver;
