@@ -21,14 +21,14 @@
 #include "mesh/array/array_lattice.h"
 #include "mesh/array/array_samples.h"
 #include "mesh/array/array_vertex.h"
-#include "mesh/smooth/sheets.h"
-#include "mesh/smooth/smooth_cell.h"
+#include "mesh/nets/cell.h"
+#include "mesh/nets/sheets.h"
 
 namespace quoin::array {
 namespace {
 
 // The cells that several sheets of the surface cross. Each sheet gets a vertex. The first sheet has the cell's own
-// vertex; the vertices of other sheets follow the vertices of all cells. smooth/sheets.h defines sheets. Cells at an
+// vertex; the vertices of other sheets follow the vertices of all cells. mesh/nets/sheets.h defines sheets. Cells at an
 // open border keep one vertex.
 class SplitCells {
  public:
@@ -73,37 +73,18 @@ bool may_have_sheets(const Lattice& lattice, bool is_open, IVec3 cell) {
 // Returns the face with flipped pairs of crossings, or kNoFace. The cell on its other side flips them too: both cells
 // have all four crossings in one sheet.
 int flipped_face_of(const Lattice& lattice, const Signs& signs, IVec3 cell, std::uint32_t solid) {
-  const int face = smooth::joined_face(solid);
-  if (face == smooth::kNoFace) return face;
-  IVec3 other = cell;
-  other[face / 2] += face % 2 != 0 ? 1 : -1;
-  if (!may_have_sheets(lattice, signs.is_open(), other)) return smooth::kNoFace;
-  return smooth::joined_face(signs.solid_corners(other)) == (face ^ 1) ? face : smooth::kNoFace;
+  return smooth::face_joined_in_both(solid, [&](int face) {
+    const IVec3 other = cell + smooth::step_across(face);
+    return may_have_sheets(lattice, signs.is_open(), other) ? signs.solid_corners(other) : 0;
+  });
 }
 
 // Returns the mean of the crossings of one sheet, and the gradient there.
-smooth::CellVertex vertex_of_sheet(const smooth::Corners& d, const smooth::Sheets& sheets, int sheet,
-                                   const float* scale) {
-  Vec3 sum(0.0F);
-  float count = 0.0F;
-  for (std::size_t edge = 0; edge < 12; ++edge) {
-    if (sheets.of_edge[edge] != sheet) continue;
-    const int axis = static_cast<int>(edge / 4);
-    Vec3 at(0.0F);
-    at[(axis + 1) % 3] = static_cast<float>(edge & 1U);
-    at[(axis + 2) % 3] = static_cast<float>(edge >> 1U & 1U);
-    const auto first = static_cast<std::size_t>(at.x + 2.0F * at.y + 4.0F * at.z);
-    at[axis] = crossing_of(d[first], d[first + (std::size_t{1} << axis)]);
-    sum += at;
-    count += 1.0F;
-  }
-  QUOIN_ASSERT(count > 0.0F, "a sheet of the cell");
-  smooth::CellVertex vertex;
-  vertex.fraction = sum * (1.0F / count);
-  const Vec3 g = smooth::trilinear_gradient(d, vertex.fraction);
-  vertex.normal = unit_of_any({g.x * scale[0], g.y * scale[1], g.z * scale[2]});
-  for (int axis = 0; axis < 3; ++axis) vertex.snapped[axis] = smooth::snap(vertex.fraction[axis]);
-  return vertex;
+smooth::CellVertex vertex_of_sheet(const ArrayField& field, const smooth::Corners& d, const smooth::Sheets& sheets,
+                                   int sheet) {
+  const smooth::SheetCrossings crossings = smooth::crossings_of_sheet(d, sheets, sheet, crossing_of<float>);
+  const Vec3 fraction = crossings.sum * (1.0F / crossings.count);
+  return smooth::vertex_at(fraction, field.normal_of(smooth::trilinear_gradient(d, fraction)));
 }
 
 Status SplitCells::find(const Lattice& lattice, const Signs& signs, const CellIndex& index, Threads threads,
@@ -169,9 +150,9 @@ void SplitCells::place(const Lattice& lattice, const SolidRule& rule, Threads th
 
 void SplitCells::place_sheets(const Cell& cell, const smooth::Corners& d, const Placement& placement,
                               ArraySurface& out) {
-  const smooth::Sheets sheets = smooth::sheets_of(cell.solid, cell.flipped_face);
+  const smooth::Sheets& sheets = smooth::sheets_of(cell.solid, cell.flipped_face);
   for (int sheet = 0; sheet < sheets.count; ++sheet) {
-    const smooth::CellVertex vertex = vertex_of_sheet(d, sheets, sheet, placement.gradient_scale);
+    const smooth::CellVertex vertex = vertex_of_sheet({placement.gradient_scale}, d, sheets, sheet);
     const std::uint32_t at = sheet == 0 ? cell.vertex : cell.first_extra + static_cast<std::uint32_t>(sheet - 1);
     QUOIN_ASSERT(at < out.positions.size(), "a vertex that was counted");
     for (int axis = 0; axis < 3; ++axis) {
@@ -193,7 +174,8 @@ std::uint32_t SplitCells::vertex_on_edge(const void* split_cells, std::uint32_t 
   const auto& cells = static_cast<const SplitCells*>(split_cells)->cells_;
   const auto cell =
       std::lower_bound(cells.begin(), cells.end(), vertex, [](const Cell& a, std::uint32_t b) { return a.vertex < b; });
-  QUOIN_ASSERT(cell != cells.end() && cell->vertex == vertex && edge < 12, "an edge of a cell with several sheets");
+  QUOIN_ASSERT(cell != cells.end() && cell->vertex == vertex && edge < smooth::kEdges,
+               "an edge of a cell with several sheets");
   const unsigned sheet = smooth::sheets_of(cell->solid, cell->flipped_face).of_edge[edge];
   return sheet == 0 ? vertex : cell->first_extra + sheet - 1;
 }

@@ -1,72 +1,87 @@
 #pragma once
 
-// The arithmetic of one cell with densities of any size. The notes in vertices.inl apply here too.
+// The arithmetic of one cell with densities of any size, for mesh/nets/cell.h.
+//
+// Each crossing has its own division. The chunk kernels divide once for four crossings, which is safe for half
+// densities. Here densities may have any size, and a product of four would overflow or underflow.
 
 #include <cmath>
 #include <cstddef>
+#include <type_traits>
 
 #include <quoin/core/vec.h>
 
 #include "mesh/array/array_kernel.h"
-#include "mesh/smooth/smooth_cell.h"
+#include "mesh/nets/cell.h"
 
 namespace quoin::array {
 
-using smooth::Corners;
+using namespace smooth;
 
 // NaN counts as air, at the greatest distance from the surface of all corners.
-inline void make_finite(Corners& d) {
-  float most = 0.0F;
-  for (float& density : d) {
-    density = kFarthest < density ? kFarthest : density;
-    density = density < -kFarthest ? -kFarthest : density;
-    most = most < std::fabs(density) ? std::fabs(density) : most;
+template <class D>
+void make_finite(D& d) {
+  using F = NumberOf<D>;
+  using std::abs;
+  const F far = all_of<F>(kFarthest);
+  const F near = all_of<F>(-kFarthest);
+  F most = all_of<F>(0.0F);
+  for (int i = 0; i < 8; ++i) {
+    d[i] = select(far < d[i], far, d[i]);
+    d[i] = select(d[i] < near, near, d[i]);
+    const F size = abs(d[i]);
+    most = select(most < size, size, most);
   }
-  for (float& density : d) density = std::isnan(density) ? most : density;
+  for (int i = 0; i < 8; ++i) d[i] = select(d[i] == d[i], d[i], most);
 }
 
 // Returns the crossing of an edge between densities of different signs, as a fraction of the edge.
-inline float crossing_of(float a, float b) {
-  const float t = a / (a - b);
-  return a == 0.0F ? kLeastFraction : b == 0.0F ? 1.0F - kLeastFraction : t;
-}
-
-// Returns the mean of a cell's crossings.
-inline Vec3 mean_crossing(const Corners& d) {
-  float sum[3];
-  float high[3][2];  // crossed edges along an axis: at the high end of the next axis, and of the one after
-  float total = 0.0F;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const std::size_t step = std::size_t{1} << axis;
-    const std::size_t u = std::size_t{1} << (axis + 1) % 3;
-    const std::size_t v = std::size_t{1} << (axis + 2) % 3;
-    const std::size_t starts[4] = {0, u, v, u + v};
-    float t[4];
-    float one[4];
-    for (int i = 0; i < 4; ++i) {
-      const float a = d[starts[i]];
-      const float b = d[starts[i] + step];
-      const bool is_crossed = (a < 0.0F) != (b < 0.0F);
-      t[i] = is_crossed ? crossing_of(a, b) : 0.0F;
-      one[i] = is_crossed ? 1.0F : 0.0F;
-    }
-    sum[axis] = (t[0] + t[1]) + (t[2] + t[3]);
-    high[axis][0] = one[1] + one[3];
-    high[axis][1] = one[2] + one[3];
-    total = total + ((one[0] + one[1]) + (one[2] + one[3]));
-  }
-  const float inverse = 1.0F / total;
-  return {(sum[0] + (high[1][1] + high[2][0])) * inverse, (sum[1] + (high[2][1] + high[0][0])) * inverse,
-          (sum[2] + (high[0][1] + high[1][0])) * inverse};
+template <class F>
+F crossing_of(F a, F b) {
+  const F zero = all_of<F>(0.0F);
+  const F t = select(a == zero, all_of<F>(kLeastFraction), a / (a - b));
+  return select(b == zero, all_of<F>(1.0F - kLeastFraction), t);
 }
 
 // Scales the vector so that its square is a finite number, then normalizes it.
-inline Vec3 unit_of_any(Vec3 g) {
-  float most = std::fabs(g.x);
-  most = most < std::fabs(g.y) ? std::fabs(g.y) : most;
-  most = most < std::fabs(g.z) ? std::fabs(g.z) : most;
-  const float inverse = 1.0F / (most < kLeastGradient ? kLeastGradient : most);
-  return smooth::unit_normal(g * inverse);
+template <class V = Vec3>
+V unit_of_any(V g) {
+  using F = std::remove_cvref_t<decltype(g.x)>;
+  using std::abs;
+  const F least = all_of<F>(kLeastGradient);
+  F most = abs(g.x);
+  most = select(most < abs(g.y), abs(g.y), most);
+  most = select(most < abs(g.z), abs(g.z), most);
+  const F inverse = all_of<F>(1.0F) / select(most < least, least, most);
+  return unit_normal(V{g.x * inverse, g.y * inverse, g.z * inverse});
+}
+
+// The field of an array for cell_vertex.
+struct ArrayField {
+  const float* gradient_scale = nullptr;
+
+  template <class D>
+  [[nodiscard]] static NumberOf<D> sum_of_crossings(const D& d, int axis) {
+    using F = NumberOf<D>;
+    F t[4];
+    for (std::size_t i = 0; i < 4; ++i) {
+      const std::size_t edge = 4 * static_cast<std::size_t>(axis) + i;
+      const F a = d[edge_start(edge)];
+      const F b = d[edge_end(edge)];
+      t[i] = only(signs_differ(a, b), crossing_of(a, b));
+    }
+    return (t[0] + t[1]) + (t[2] + t[3]);
+  }
+  template <class V>
+  [[nodiscard]] V normal_of(V g) const {
+    using F = std::remove_cvref_t<decltype(g.x)>;
+    const float* const scale = gradient_scale;
+    return unit_of_any(V{g.x * all_of<F>(scale[0]), g.y * all_of<F>(scale[1]), g.z * all_of<F>(scale[2])});
+  }
+};
+
+inline Vec3 mean_crossing(const Corners& d) {
+  return mean_of_crossings(ArrayField{}, d, solid_corners(d));
 }
 
 }  // namespace quoin::array

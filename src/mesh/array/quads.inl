@@ -2,8 +2,7 @@
 //
 //   edges   a bit row; all four cells around a crossed edge have a vertex
 //   cells   active[row of cells][word], the vertex of cell c is first[row] + the bits before c
-//   quad    corners 0 to 3 counter-clockwise as seen from the end of the edge's axis:
-//           | before in both next axes | in the second | in none | in the first |
+//   quad    the cells around the edge, in the order of smooth::kCellsAround
 
 #pragma once
 
@@ -13,6 +12,7 @@
 
 #include "mesh/array/array_kernel.h"
 #include "mesh/array/bit_rows.inl"
+#include "mesh/nets/cell.h"
 
 namespace quoin::array {
 namespace {
@@ -26,15 +26,11 @@ inline float squared_distance(const Vec3& a, const Vec3& b) {
 
 // Writes a quad, split along its shorter diagonal; of equal ones, from corner 0.
 [[gnu::always_inline]] inline void write_quad(const Vec3* positions, std::uint32_t q0, std::uint32_t q1,
-                                              std::uint32_t q2, std::uint32_t q3, bool is_turned, std::uint32_t* out) {
+                                              std::uint32_t q2, std::uint32_t q3, bool faces_along,
+                                              std::uint32_t* out) {
   const bool from_second =
       squared_distance(positions[q1], positions[q3]) < squared_distance(positions[q0], positions[q2]);
-  const std::uint32_t second = is_turned ? q3 : q1;
-  const std::uint32_t fourth = is_turned ? q1 : q3;
-  const std::uint32_t a = from_second ? second : q0;
-  const std::uint32_t b = from_second ? q2 : second;
-  const std::uint32_t c = from_second ? fourth : q2;
-  const std::uint32_t d = from_second ? q0 : fourth;
+  const auto [a, b, c, d] = smooth::split_quad(q0, q1, q2, q3, faces_along, from_second);
   out[0] = a;
   out[1] = b;
   out[2] = c;
@@ -123,9 +119,8 @@ struct FieldQuads {
   // Returns the vertex of a cell, which may have several, on the current edge.
   [[nodiscard]] std::uint32_t resolved(std::uint32_t vertex, unsigned corner) const {
     if ((rules.split[vertex / kWordBits] >> (vertex % kWordBits) & 1U) == 0) return vertex;
-    // The edge's position in the cell: at the high end of each axis along which the cell is before the edge.
-    constexpr unsigned kEnds[4] = {3, 2, 0, 1};
-    return rules.vertex_on_edge(rules.split_cells, vertex, 4 * static_cast<unsigned>(edge_axis) + kEnds[corner]);
+    const unsigned edge = 4 * static_cast<unsigned>(edge_axis) + smooth::kCellsAround[corner];
+    return rules.vertex_on_edge(rules.split_cells, vertex, edge);
   }
   void operator()(std::size_t place, std::uint32_t q0, std::uint32_t q1, std::uint32_t q2, std::uint32_t q3) {
     if constexpr (kHasSplitCells) {
@@ -134,7 +129,7 @@ struct FieldQuads {
       q2 = resolved(q2, 2);
       q3 = resolved(q3, 3);
     }
-    write_quad(rules.positions, q0, q1, q2, q3, starts_solid(place) == rules.is_mirrored, out);
+    write_quad(rules.positions, q0, q1, q2, q3, starts_solid(place) != rules.is_mirrored, out);
     out += 6;
   }
 };
@@ -238,7 +233,7 @@ struct LabelQuads {
     const std::uint64_t b = pairs.end(place);
     const bool swap = is_front(a, b, background);
     const std::uint64_t at = table.slot(swap ? b : a, swap ? a : b).number++;
-    write_quad(rules.positions, q0, q1, q2, q3, swap != rules.is_mirrored, out + 6 * at);
+    write_quad(rules.positions, q0, q1, q2, q3, swap == rules.is_mirrored, out + 6 * at);
   }
 };
 

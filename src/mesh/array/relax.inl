@@ -1,7 +1,6 @@
 // The start positions of label vertices, and their relaxation.
 //
-//   crossings of a cell   | along rows | from row to row | from slice to slice |    12 bits
-//                         | dy + 2 dz  | dx + 2 dz       | dx + 2 dy           |    number of the edge, of four
+//   crossings of a cell   | along rows | from row to row | from slice to slice |    one bit per edge, as in mesh/nets
 
 #pragma once
 
@@ -12,6 +11,7 @@
 
 #include "mesh/array/array_kernel.h"
 #include "mesh/array/bit_rows.inl"
+#include "mesh/nets/cell.h"
 
 namespace quoin::array {
 namespace {
@@ -29,17 +29,15 @@ constexpr auto kCrossingSums = [] {
   for (unsigned crossings = 0; crossings < 4096; ++crossings) {
     CrossingSum& sum = sums[crossings];
     unsigned on_face[6] = {};
-    for (unsigned edge = 0; edge < 12; ++edge) {
+    for (std::size_t edge = 0; edge < smooth::kEdges; ++edge) {
       if ((crossings >> edge & 1U) == 0) continue;
-      const unsigned axis = edge / 4;
-      // The ends of the other two axes, in their order: 0 is low, 1 is high.
-      const unsigned ends[2] = {edge & 1U, edge >> 1 & 1U};
-      const unsigned others[2] = {axis == 0 ? 1U : 0U, axis == 2 ? 1U : 2U};
+      const std::size_t axis = edge / 4;
       ++sum.count;
       ++sum.halves[axis];
-      for (int i = 0; i < 2; ++i) {
-        sum.halves[others[i]] = static_cast<std::uint8_t>(sum.halves[others[i]] + 2 * ends[i]);
-        ++on_face[2 * others[i] + ends[i]];
+      for (const std::size_t other : {(axis + 1) % 3, (axis + 2) % 3}) {
+        const std::size_t end = smooth::edge_start(edge) >> other & 1U;
+        sum.halves[other] = static_cast<std::uint8_t>(sum.halves[other] + 2 * end);
+        ++on_face[2 * other + end];
       }
     }
     // A face with three crossings has three labels: a line where surfaces meet leaves the cell there. Vertices on such
@@ -66,22 +64,22 @@ void label_vertices(const CellSlice& slice, const RankedRows& ranked, Vec3* frac
     const std::uint64_t* const active = ranked.active + row * slice.words;
     for (std::size_t w = 0; w < slice.words; ++w) {
       if (active[w] == 0) continue;
-      const std::uint64_t bits[12] = {e.along[0][w],
-                                      e.along[1][w],
-                                      e.along[2][w],
-                                      e.along[3][w],
-                                      shifted(e.between[0], w),
-                                      e.between[0][w],
-                                      shifted(e.between[1], w),
-                                      e.between[1][w],
-                                      shifted(e.across[0], w),
-                                      e.across[0][w],
-                                      shifted(e.across[1], w),
-                                      e.across[1][w]};
+      const std::uint64_t bits[smooth::kEdges] = {e.along[0][w],
+                                                  e.along[1][w],
+                                                  e.along[2][w],
+                                                  e.along[3][w],
+                                                  shifted(e.between[0], w),
+                                                  shifted(e.between[1], w),
+                                                  e.between[0][w],
+                                                  e.between[1][w],
+                                                  shifted(e.across[0], w),
+                                                  e.across[0][w],
+                                                  shifted(e.across[1], w),
+                                                  e.across[1][w]};
       for (std::uint64_t left = active[w]; left != 0; left &= left - 1, ++vertex) {
         const int bit = std::countr_zero(left);
         unsigned crossings = 0;
-        for (int i = 0; i < 12; ++i) crossings |= static_cast<unsigned>(bits[i] >> bit & 1U) << i;
+        for (std::size_t i = 0; i < smooth::kEdges; ++i) crossings |= static_cast<unsigned>(bits[i] >> bit & 1U) << i;
         const CrossingSum& sum = kCrossingSums[crossings];
         const float half = 0.5F / static_cast<float>(sum.count);
         float* const to = &fractions[vertex].x;

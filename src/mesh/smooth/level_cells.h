@@ -23,19 +23,6 @@
 
 namespace quoin::smooth {
 
-inline IVec3 unit_axis(int axis) {
-  QUOIN_ASSERT(axis >= 0 && axis < 3, "0 <= axis < 3");
-  IVec3 unit{0};
-  unit[axis] = 1;
-  return unit;
-}
-
-/// Returns the offset of a cell's corner from its first corner, in cells; corners are numbered by x + 2 y + 4 z.
-inline IVec3 corner_place(int corner) {
-  QUOIN_ASSERT(corner >= 0 && corner < 8, "0 <= corner < 8");
-  return {corner & 1, corner >> 1 & 1, corner >> 2};
-}
-
 /// Returns the name of a cell of a chunk at `offset` (0 or -1 on each axis) from the mesh's chunk.
 inline SmoothCell cell_name(IVec3 cell, IVec3 offset) {
   QUOIN_ASSERT((cell.x | cell.y | cell.z) >= 0 && (cell.x | cell.y | cell.z) < kChunkEdge, "a cell of the chunk");
@@ -82,16 +69,9 @@ inline bool quad_is_split_at_first(const std::array<QuadCorner, 4>& q) {
 /// Returns two triangles along the shorter diagonal with an end at the finest level; of equal ones, the diagonal from
 /// corner 0.
 inline std::array<std::uint32_t, 6> triangles_of(const std::array<QuadCorner, 4>& q) {
-  const auto v = [&](std::size_t i) { return q[i].vertex; };
-  if (quad_is_split_at_first(q)) return {v(0), v(1), v(2), v(0), v(2), v(3)};
-  return {v(1), v(2), v(3), v(1), v(3), v(0)};
-}
-
-/// Returns the cells around an edge along `axis` that starts at `p`, counter-clockwise as seen from +axis.
-inline std::array<IVec3, 4> cells_around(IVec3 p, int axis) {
-  const IVec3 u = unit_axis((axis + 1) % 3);
-  const IVec3 v = unit_axis((axis + 2) % 3);
-  return {p - u - v, p - v, p, p - u};
+  const auto [a, b, c, d] =
+      split_quad(q[0].vertex, q[1].vertex, q[2].vertex, q[3].vertex, true, !quad_is_split_at_first(q));
+  return {a, b, c, a, c, d};
 }
 
 /// A cell of the centre chunk or a neighbour.
@@ -263,6 +243,19 @@ using MeshOwnCells = std::function<void(SmoothChunkMesh& out)>;
 void mesh_with_transitions(const DensityNeighbourhood& chunks, const SmoothOptions& options,
                            const MeshOwnCells& mesh_own_cells, SmoothChunkMesh& out);
 
+/// Gives each cell of `out` that several sheets cross one vertex per sheet. The vertices of other cells stay unchanged.
+/// Cells that touch a chunk of another level along a face or an edge keep one vertex. A sheet's vertex is the mean of
+/// its crossings, its normal the gradient there.
+///
+/// Quads:    the first `quad_indices` of the indices, six per quad.
+/// Bridges:  with `join_diagonals`, two cells that both have all crossings of their common face in one sheet get two
+///           vertices on that face, one for each of its air corners, on the edge that joins the two cells. Each of the
+///           edges then has two triangles instead of four. Quads along such an edge become polygons, which come last.
+/// Order:    a cell's first sheet keeps the cell's vertex index; the other sheets are appended.
+/// Proof:    docs/decisions/archive/021-two-sheets.md.
+void split_sheets(const DensityNeighbourhood& chunks, const SmoothOptions& options, std::size_t quad_indices,
+                  SmoothChunkMesh& out);
+
 /// Reads single, nearby densities. Caches four rows along x, by the parity of y and z.
 class NearbyDensities {
  public:
@@ -320,15 +313,6 @@ inline std::uint32_t append_vertex(const DensityNeighbourhood& chunks, const Smo
   out.cells.push_back(name);
   write_vertex(chunks, occlusion, cell, vertex, static_cast<std::uint32_t>(index), out);
   return static_cast<std::uint32_t>(index);
-}
-
-/// Returns a vertex at a position in its cell, with the gradient there.
-inline CellVertex vertex_at(Vec3 fraction, Vec3 gradient) {
-  CellVertex vertex;
-  vertex.fraction = fraction;
-  for (int i = 0; i < 3; ++i) vertex.snapped[i] = snap(fraction[i]);
-  vertex.normal = unit_normal(gradient);
-  return vertex;
 }
 
 /// Returns the corners of a quad of six indices, in its winding, starting with the corner of the first cell.

@@ -70,10 +70,9 @@ RowSet find_cell_words(Work& work, int z, int window) {
   }
 #else
   for (int row = 0; row < kReachRows; ++row) {
-    std::uint64_t any = low[row] | low[row + 1] | high[row] | high[row + 1];
-    std::uint64_t all = low[row] & low[row + 1] & high[row] & high[row + 1];
-    any |= any >> 1, all &= all >> 1;
-    any &= columns;
+    const FourRows points = four_rows(low + row, high + row);
+    const std::uint64_t any = (points.any | points.any >> 1) & columns;
+    const std::uint64_t all = points.all & points.all >> 1;
     const std::uint64_t listed = kCounted ? any & ~all : any;
     words[work.slot_of(row)] = {listed, kCounted ? all : 0};
     rows[row / 64] |= std::uint64_t{listed != 0} << (row & 63);

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstring>
+#include <random>
 #include <utility>
 #include <vector>
 
@@ -10,6 +11,8 @@
 #include <quoin/mesh/smooth.h>
 
 #include "core/instruction_sets_for_tests.h"
+#include "core/trilinear.h"
+#include "mesh/smooth/smooth_cell.h"
 #include "mesh/smooth/smooth_oracle.h"
 #include "mesh/smooth/surface_check_for_tests.h"
 
@@ -108,6 +111,37 @@ TEST_P(SmoothKernels, MatchOracleOcclusion) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, SmoothKernels, testing::Range(1U, 4U));
+
+// The oracle shares the arithmetic of a cell with the kernels, so it is compared with doubles here.
+TEST(SmoothCell, HasVertexAtMeanOfCrossings) {
+  std::mt19937 random(1);
+  int compared = 0;
+  for (int round = 0; round < 2000; ++round) {
+    smooth::Corners corners{};
+    CellCorners exact{};
+    for (std::size_t i = 0; i < 8; ++i) exact[i] = corners[i] = static_cast<float>(random()) * 0x1p-29F - 4.0F;
+    DVec3 sum(0.0);
+    double count = 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+      for (std::size_t i = 0; i < 8; ++i) {
+        const std::size_t end = i | std::size_t{1} << axis;
+        if (end == i || (exact[i] < 0.0) == (exact[end] < 0.0)) continue;
+        DVec3 at(smooth::corner_place(static_cast<int>(i)));
+        at[axis] = exact[i] / (exact[i] - exact[end]);
+        sum += at;
+        count += 1.0;
+      }
+    }
+    const DVec3 gradient = trilinear_gradient(exact, sum / count);
+    if (count == 0.0 || glm::length(gradient) < 0.1) continue;
+    const smooth::CellVertex vertex = smooth::cell_vertex(corners);
+    ASSERT_LT(glm::distance(DVec3(vertex.fraction), sum / count), 1e-5) << round;
+    ASSERT_LT(glm::distance(DVec3(vertex.snapped), sum / count), 3e-5) << round;
+    ASSERT_LT(glm::distance(DVec3(vertex.normal), glm::normalize(gradient)), 1e-4) << round;
+    ++compared;
+  }
+  EXPECT_GT(compared, 1500);
+}
 
 }  // namespace
 }  // namespace quoin

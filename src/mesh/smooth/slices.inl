@@ -56,21 +56,20 @@ constexpr int kPlaceMask = 0x3FFF;
 constexpr int kStartsSolid = 0x8000;
 constexpr std::uint32_t kVertexMask = (1U << kVertexBits) - 1;
 
-// The four cells around an edge, counter-clockwise as seen from the end of its axis; (u, v) are the next two axes.
-// Corners 0 to 3: before in both, in v, in none, in u.
+// The cells around an edge along an axis, in the order of kCellsAround; (u, v) are the next two axes.
 template <Axis kAxis>
 struct Around {
-  // The distance of a cell back to an earlier index in its slice, and whether it is in the slice before.
-  static constexpr int kX = 1;
-  static constexpr int kY = kPlaceStride;
-  static constexpr std::array<int, 4> back = kAxis == Axis::X   ? std::array{kY, 0, 0, kY}
-                                             : kAxis == Axis::Y ? std::array{kX, kX, 0, 0}
-                                                                : std::array{kX + kY, kY, 0, kX};
-  static constexpr std::array<bool, 4> is_last = kAxis == Axis::X   ? std::array{true, true, false, false}
-                                                 : kAxis == Axis::Y ? std::array{true, false, false, true}
-                                                                    : std::array{false, false, false, false};
   static constexpr int u = (static_cast<int>(kAxis) + 1) % 3;
   static constexpr int v = (static_cast<int>(kAxis) + 2) % 3;
+  // Returns 1 if a cell is before the edge along an axis.
+  static constexpr int before(std::size_t cell, int axis) {
+    return static_cast<int>(axis == u ? kCellsAround[cell] & 1U : axis == v ? kCellsAround[cell] >> 1 : 0U);
+  }
+  static constexpr int places_back(std::size_t cell) { return before(cell, 0) + before(cell, 1) * kPlaceStride; }
+  // The distance of a cell back to an earlier index in its slice, and whether it is in the slice before.
+  static constexpr std::array<int, 4> back = {places_back(0), places_back(1), places_back(2), places_back(3)};
+  static constexpr std::array<bool, 4> is_last = {before(0, 2) != 0, before(1, 2) != 0, before(2, 2) != 0,
+                                                  before(3, 2) != 0};
 };
 
 // The vectors from corner 0 to corner 2, and from corner 3 to corner 1, in whole cells: (1, 1) and (1, -1) along (u,
@@ -105,6 +104,16 @@ std::uint16_t* append_edges(std::uint64_t bits, std::uint64_t solid, int first_p
 }
 #endif
 
+// The points of a row and the next, in two slices: solid in any of the four rows, and in all of them.
+struct FourRows {
+  std::uint64_t any;
+  std::uint64_t all;
+};
+
+inline FourRows four_rows(const std::uint64_t* low, const std::uint64_t* high) {
+  return {low[0] | low[1] | high[0] | high[1], low[0] & low[1] & high[0] & high[1]};
+}
+
 // A row of cells is active if its 2x2 rows of points are neither all solid nor all air.
 void find_active(Work& work) {
   const CellRange& cells = work.cells;
@@ -114,24 +123,16 @@ void find_active(Work& work) {
   const std::uint64_t with_before = cells.first < 0 ? 1 : 0;
   const int top = work.n - 1;
   for (int z = cells.first; z < cells.last; ++z) {
-    const auto s = [&](const auto& words, int dy, int dz) { return words[z + 1 + dz] + dy; };
-    const std::uint64_t* const s00 = s(work.solid, 0, 0);
-    const std::uint64_t* const s01 = s(work.solid, 0, 1);
-    const std::uint64_t* const a00 = s(work.after, 0, 0);
-    const std::uint64_t* const a01 = s(work.after, 0, 1);
-    const std::uint64_t* const b00 = s(work.before, 0, 0);
-    const std::uint64_t* const b01 = s(work.before, 0, 1);
+    const auto four = [z](const auto& words, int i) { return four_rows(words[z + 1] + i, words[z + 2] + i); };
     std::uint64_t* const active = work.active[z + 1];
     std::uint64_t* const active_before = work.active_before[z + 1];
     for (int i = cells.first + 1; i <= cells.last; ++i) {
-      const std::uint64_t any = s00[i] | s00[i + 1] | s01[i] | s01[i + 1];
-      const std::uint64_t all = s00[i] & s00[i + 1] & s01[i] & s01[i + 1];
-      const std::uint64_t any_after = a00[i] | a00[i + 1] | a01[i] | a01[i + 1];
-      const std::uint64_t all_after = a00[i] & a00[i + 1] & a01[i] & a01[i + 1];
-      const std::uint64_t any_before = b00[i] | b00[i + 1] | b01[i] | b01[i + 1];
-      const std::uint64_t all_before = b00[i] & b00[i + 1] & b01[i] & b01[i + 1];
-      active[i] = (any | any >> 1 | any_after << top) & ~(all & (all >> 1 | all_after << top)) & in_range;
-      active_before[i] = (any | any_before) & ~(all & all_before) & with_before;
+      const FourRows own = four(work.solid, i);
+      const FourRows after = four(work.after, i);
+      const FourRows before = four(work.before, i);
+      active[i] =
+          (own.any | own.any >> 1 | after.any << top) & ~(own.all & (own.all >> 1 | after.all << top)) & in_range;
+      active_before[i] = (own.any | before.any) & ~(own.all & before.all) & with_before;
     }
     // Bit y + 1 represents row y; row -1 is separate.
     std::uint64_t rows = 0;
@@ -185,8 +186,7 @@ std::size_t list_cells(Work& work, int z) {
     if (work.active_before[z + 1][y + 1] != 0) *end++ = static_cast<std::uint16_t>(place_of(-1, y));
     end = append_places(work.active[z + 1][y + 1], place_of(0, y), end);
   };
-  for (std::uint64_t left = rows.low; left != 0; left &= left - 1) list_row(std::countr_zero(left) - 16);
-  for (std::uint64_t left = rows.high; left != 0; left &= left - 1) list_row(std::countr_zero(left) + 48);
+  rows.for_each(list_row);
   return static_cast<std::size_t>(end - work.places);
 }
 
@@ -221,8 +221,7 @@ std::size_t list_edges(Work& work, int z) {
     const std::uint64_t crossed = crossed_edges<kAxis>(work, y, z, columns);
     if (crossed != 0) end = append_edges(crossed, work.solid[z + 1][y + 1], place_of(0, y), end);
   };
-  for (std::uint64_t left = rows.low; left != 0; left &= left - 1) list_row(std::countr_zero(left) - 16);
-  for (std::uint64_t left = rows.high; left != 0; left &= left - 1) list_row(std::countr_zero(left) + 48);
+  rows.for_each(list_row);
   return static_cast<std::size_t>(end - work.places);
 }
 

@@ -1,123 +1,54 @@
 #pragma once
 
-// The arithmetic of one cell and of its vertex' occlusion. Every kernel keeps this order of operations, without
-// contraction, so all give the same bits.
+// The arithmetic of one cell of a density field and of its vertex' occlusion. Every kernel keeps this order of
+// operations, without contraction, so all give the same bits.
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstdint>
 
 #include <quoin/core/vec.h>
 #include <quoin/mesh/smooth.h>
 
+#include "mesh/nets/cell.h"
+
 namespace quoin::smooth {
 
-/// The vertex of a cell, as computed by its arithmetic.
-struct CellVertex {
-  Vec3 fraction;  ///< 0 to 1 within the cell, not rounded; used for normals
-  Vec3 snapped;   ///< rounded to 1/65,536, so that sums with integers are exact; used for positions and occlusion
-  Vec3 normal;    ///< unit, into the air
+/// The field of a chunk for cell_vertex: half floats. Their range allows a single division for four crossings.
+struct HalfField {
+  template <class D>
+  [[nodiscard]] static NumberOf<D> sum_of_crossings(const D& d, int axis) {
+    using F = NumberOf<D>;
+    // The starts of the edges; the order decides how sums are rounded.
+    constexpr int kStarts[3][4] = {{0, 2, 4, 6}, {0, 1, 4, 5}, {0, 1, 2, 3}};
+    F n[4];
+    F w[4];
+    for (int i = 0; i < 4; ++i) {
+      const F a = d[kStarts[axis][i]];
+      const F b = d[kStarts[axis][i] + (1 << axis)];
+      const auto is_crossed = signs_differ(a, b);
+      n[i] = only(is_crossed, a);
+      w[i] = select(is_crossed, a - b, all_of<F>(1.0F));
+    }
+    const F p = n[0] * w[1] + n[1] * w[0];
+    const F q = w[0] * w[1];
+    const F r = n[2] * w[3] + n[3] * w[2];
+    const F s = w[2] * w[3];
+    return (p * s + r * q) / (q * s);
+  }
+  template <class V>
+  [[nodiscard]] static V normal_of(V gradient) {
+    return unit_normal(gradient);
+  }
 };
 
-/// Densities of the corners, by x + 2 y + 4 z.
-using Corners = std::array<float, 8>;
-
-/// Returns the solid corners as bits. A corner is solid below 0; -0 and 0 are air.
-inline std::uint32_t solid_corners(const Corners& d) {
-  std::uint32_t solid = 0;
-  for (std::size_t i = 0; i < 8; ++i) solid |= static_cast<std::uint32_t>(d[i] < 0.0F) << i;
-  return solid;
-}
-
-/// 1 / n for n = 0 to 12 crossings.
-inline constexpr std::array<float, 16> kReciprocals = {
-    0.0F,        1.0F,        1.0F / 2.0F,  1.0F / 3.0F,  1.0F / 4.0F,  1.0F / 5.0F, 1.0F / 6.0F, 1.0F / 7.0F,
-    1.0F / 8.0F, 1.0F / 9.0F, 1.0F / 10.0F, 1.0F / 11.0F, 1.0F / 12.0F, 0.0F,        0.0F,        0.0F};
-
-/// Returns the sum of the fractions where four parallel edges (a[i], b[i]) are crossed, with a single division.
-/// Edges that are not crossed count 0.
-inline float sum_of_crossings(const float* a, const float* b) {
-  float n[4];
-  float d[4];
-  for (int i = 0; i < 4; ++i) {
-    const bool crossed = (a[i] < 0.0F) != (b[i] < 0.0F);
-    n[i] = crossed ? a[i] : 0.0F;
-    d[i] = crossed ? a[i] - b[i] : 1.0F;
-  }
-  const float p = n[0] * d[1] + n[1] * d[0];
-  const float q = d[0] * d[1];
-  const float r = n[2] * d[3] + n[3] * d[2];
-  const float s = d[2] * d[3];
-  return (p * s + r * q) / (q * s);
-}
-
-/// Returns 1 / sqrt(x), accurate to about 1e-7, with multiplications only. Requires: x is normal.
-inline float reciprocal_root(float x) {
-  const float half = 0.5F * x;
-  float y = std::bit_cast<float>(0x5F37'59DFU - (std::bit_cast<std::uint32_t>(x) >> 1));
-  y = y * (1.5F - (half * y) * y);
-  y = y * (1.5F - (half * y) * y);
-  return y * (1.5F - (half * y) * y);
-}
-
-/// Gradients with a smaller square have no direction.
-inline constexpr float kLeastSquaredGradient = 1e-30F;
-
-/// Normalizes a gradient. Returns (0, 1, 0) if it has no direction.
-inline Vec3 unit_normal(Vec3 g) {
-  const float q = (g.x * g.x + g.y * g.y) + g.z * g.z;
-  if (!(q >= kLeastSquaredGradient)) return {0.0F, 1.0F, 0.0F};
-  const float r = reciprocal_root(q);
-  return {g.x * r, g.y * r, g.z * r};
-}
-
-/// Interpolates between four values at the corners of a unit square: first along u, then along v.
-inline float bilinear(float v00, float v10, float v01, float v11, float u, float v) {
-  const float a = v00 + u * (v10 - v00);
-  const float b = v01 + u * (v11 - v01);
-  return a + v * (b - a);
-}
-
-/// Returns the gradient of the trilinear field at a point of the cell.
-inline Vec3 trilinear_gradient(const Corners& d, Vec3 f) {
-  return {bilinear(d[1] - d[0], d[3] - d[2], d[5] - d[4], d[7] - d[6], f.y, f.z),
-          bilinear(d[2] - d[0], d[3] - d[1], d[6] - d[4], d[7] - d[5], f.x, f.z),
-          bilinear(d[4] - d[0], d[5] - d[1], d[6] - d[2], d[7] - d[3], f.x, f.y)};
-}
-
-/// Rounds a number from 0 to 1 to a multiple of 1/65,536.
-inline float snap(float f) {
-  return (f + 128.0F) - 128.0F;
+inline CellVertex cell_vertex(const Corners& d) {
+  return cell_vertex(HalfField{}, d, solid_corners(d));
 }
 
 /// Added and then subtracted to round numbers from -8 to 8 to multiples of 1/524,288.
 inline constexpr float kSnapOffset = 24.0F;
-
-/// Returns the vertex of a cell that the surface crosses: the mean of its edge crossings.
-inline CellVertex cell_vertex(const Corners& d) {
-  const float x_low[4] = {d[0], d[2], d[4], d[6]};
-  const float x_high[4] = {d[1], d[3], d[5], d[7]};
-  const float y_low[4] = {d[0], d[1], d[4], d[5]};
-  const float y_high[4] = {d[2], d[3], d[6], d[7]};
-  const float z_low[4] = {d[0], d[1], d[2], d[3]};
-  const float z_high[4] = {d[4], d[5], d[6], d[7]};
-  const std::uint32_t m = solid_corners(d);
-  // Crossed edges by axis, as bits at the number of their first corner.
-  const std::uint32_t cx = (m ^ m >> 1) & 0x55U;
-  const std::uint32_t cy = (m ^ m >> 2) & 0x33U;
-  const std::uint32_t cz = (m ^ m >> 4) & 0x0FU;
-  const auto count = [](std::uint32_t bits) { return static_cast<float>(std::popcount(bits)); };
-  const float inverse = kReciprocals[static_cast<std::size_t>(std::popcount(cx | cy << 8 | cz << 16))];
-  CellVertex vertex;
-  vertex.fraction.x = (sum_of_crossings(x_low, x_high) + count((cy & 0xAAU) | (cz & 0xAAU) << 8)) * inverse;
-  vertex.fraction.y = (sum_of_crossings(y_low, y_high) + count((cx & 0xCCU) | (cz & 0xCCU) << 8)) * inverse;
-  vertex.fraction.z = (sum_of_crossings(z_low, z_high) + count((cx & 0xF0U) | (cy & 0xF0U) << 8)) * inverse;
-  for (int i = 0; i < 3; ++i) vertex.snapped[i] = snap(vertex.fraction[i]);
-  vertex.normal = unit_normal(trilinear_gradient(d, vertex.fraction));
-  return vertex;
-}
 
 /// The height of the lowest samples above a planar surface.
 inline constexpr float kLift = 0.1F;

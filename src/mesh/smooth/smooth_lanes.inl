@@ -1,5 +1,4 @@
-// Lanes of cells for surfaces: additions to core/lanes (with AVX-512, they also require VBMI2), and unit gradients of
-// trilinear cells. The arithmetic equals smooth_cell.h, step for step.
+// Lanes of cells of a chunk: additions to mesh/nets/lanes.inl. With AVX-512, they also require VBMI2.
 
 #pragma once
 
@@ -14,33 +13,14 @@
 #include <quoin/core/half.h>
 #include <quoin/core/vec.h>
 
-#ifdef QUOIN_KERNEL_AVX512
-#include "core/lanes/lanes_avx512.h"
-#else
-#include "core/lanes/lanes_avx2.h"
-#endif
-#include "mesh/smooth/smooth_cell.h"
+#include "mesh/nets/lanes.inl"
 
 namespace quoin::smooth {
 namespace {
 
+using namespace lanes;
+
 #ifdef QUOIN_KERNEL_AVX512
-
-using namespace lanes_avx512;
-
-inline Mask equal(I a, I b) {
-  return {_mm512_cmpeq_epi32_mask(a.v, b.v)};
-}
-// Returns the lanes with different signs.
-inline Mask signs_differ(F a, F b) {
-  return {_mm512_movepi32_mask(_mm512_castps_si512(_mm512_xor_ps(a.v, b.v)))};
-}
-inline F only(Mask m, F a) {
-  return {_mm512_maskz_mov_ps(m.m, a.v)};
-}
-inline I min(I a, I b) {
-  return {_mm512_min_epi32(a.v, b.v)};
-}
 
 inline I load_words(const std::uint16_t* from) {
   return {_mm512_cvtepu16_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(from)))};
@@ -54,10 +34,6 @@ inline I gather_pairs(const Half* base, I place) {
 }
 inline F gather(const float* base, I place) {
   return {_mm512_i32gather_ps(place.v, base, 4)};
-}
-// Looks up values of a table in one register.
-inline F look_up(const std::array<float, 16>& table, I index) {
-  return {_mm512_permutexvar_ps(index.v, _mm512_loadu_ps(table.data()))};
 }
 // Looks up entries of a table in two registers.
 inline F look_up(const float (&table)[32], I index) {
@@ -201,22 +177,6 @@ inline std::uint32_t open_bits(F a) {
 
 #else
 
-using namespace lanes_avx2;
-
-inline Mask equal(I a, I b) {
-  return {_mm256_castsi256_ps(_mm256_cmpeq_epi32(a.v, b.v))};
-}
-// Returns the lanes with different signs.
-inline Mask signs_differ(F a, F b) {
-  return {_mm256_castsi256_ps(_mm256_srai_epi32(_mm256_castps_si256(_mm256_xor_ps(a.v, b.v)), 31))};
-}
-inline F only(Mask m, F a) {
-  return {_mm256_and_ps(a.v, m.v)};
-}
-inline I min(I a, I b) {
-  return {_mm256_min_epi32(a.v, b.v)};
-}
-
 inline I load_words(const std::uint16_t* from) {
   return {_mm256_cvtepu16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(from)))};
 }
@@ -229,9 +189,6 @@ inline I gather_pairs(const Half* base, I place) {
 }
 inline F gather(const float* base, I place) {
   return {_mm256_i32gather_ps(base, place.v, 4)};
-}
-inline F look_up(const std::array<float, 16>& table, I index) {
-  return gather(table.data(), index);
 }
 inline F look_up(const float (&table)[32], I index) {
   return gather(table, index);
@@ -316,40 +273,6 @@ inline std::uint32_t open_bits(F a) {
 }
 
 #endif
-
-struct Lanes3 {
-  F x, y, z;
-};
-
-inline F bilinear(F v00, F v10, F v01, F v11, F u, F v) {
-  const F a = v00 + u * (v10 - v00);
-  const F b = v01 + u * (v11 - v01);
-  return a + v * (b - a);
-}
-
-inline Lanes3 unit_normals(Lanes3 g) {
-  const F q = (g.x * g.x + g.y * g.y) + g.z * g.z;
-  const F half = all(0.5F) * q;
-  F r = as_float(all(0x5F3759DF) - shift_right<1>(as_int(q)));
-  for (int i = 0; i < 3; ++i) r = r * (all(1.5F) - (half * r) * r);
-  const Mask none = q < all(kLeastSquaredGradient);
-  const F zero = all(0.0F);
-  return {select(none, zero, g.x * r), select(none, all(1.0F), g.y * r), select(none, zero, g.z * r)};
-}
-
-inline Lanes3 gradient_at(const F* d, Lanes3 f) {
-  return {bilinear(d[1] - d[0], d[3] - d[2], d[5] - d[4], d[7] - d[6], f.y, f.z),
-          bilinear(d[2] - d[0], d[3] - d[1], d[6] - d[4], d[7] - d[5], f.x, f.z),
-          bilinear(d[4] - d[0], d[5] - d[1], d[6] - d[2], d[7] - d[3], f.x, f.y)};
-}
-
-inline Lanes3 normals_at(const F* d, Lanes3 f) {
-  return unit_normals(gradient_at(d, f));
-}
-
-inline F snapped(F f) {
-  return (f + all(128.0F)) - all(128.0F);
-}
 
 }  // namespace
 }  // namespace quoin::smooth

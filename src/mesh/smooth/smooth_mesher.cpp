@@ -9,7 +9,6 @@
 #include "core/moved_from.h"
 #include "grid/density/density_storage.h"
 #include "mesh/smooth/level_cells.h"
-#include "mesh/smooth/sheets.h"
 #include "mesh/smooth/smooth_cell.h"
 #include "mesh/smooth/smooth_mesher.h"
 

@@ -7,7 +7,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "mesh/smooth/sheets.h"
+#include "mesh/nets/cell.h"
 
 namespace quoin::smooth {
 namespace {
@@ -96,7 +96,7 @@ class Transitions {
     const Vec3 fraction(crossings.sum / crossings.weight);
     const Vec3 gradient = trilinear_gradient(corners_of(chunks_, cell), fraction);
     const bool has_direction = glm::dot(gradient, gradient) >= kLeastSquaredGradient;
-    return vertex_at(fraction, has_direction ? gradient : Vec3(crossings.slopes));
+    return vertex_at(fraction, unit_normal(has_direction ? gradient : Vec3(crossings.slopes)));
   }
 
   // Adds the crossings of the shortest edges along a line on the cell's boundary, if there is such a line.

@@ -1,4 +1,4 @@
-// Vertices and quads, one register of lanes at a time. The arithmetic equals smooth_cell.h, step for step.
+// Vertices and quads, one register of lanes at a time, with the arithmetic of smooth_cell.h.
 //
 //   lanes       | cell 0 | cell 1 | cell 2 | ...       by the list of their places
 //   d[8]        the densities of their corners, x first, then y, then z; a pair of halves along x is one gather
@@ -14,33 +14,10 @@
 namespace quoin::smooth {
 namespace {
 
-// The number of crossings by configuration of a cell, one byte each: on its edges at the high end of each axis, and in
-// total. Bits of a configuration: x low at (y, z) 00, 10, 01, 11, then x high.
-constexpr auto kCrossings = [] {
-  std::array<std::uint32_t, 256> counts{};
-  for (unsigned c = 0; c < 256; ++c) {
-    const auto solid = [&](unsigned x, unsigned y, unsigned z) { return c >> (4 * x + y + 2 * z) & 1U; };
-    std::array<std::uint32_t, 4> n{};
-    for (unsigned u = 0; u < 2; ++u) {
-      for (unsigned v = 0; v < 2; ++v) {
-        const std::uint32_t x = solid(0, u, v) ^ solid(1, u, v);
-        const std::uint32_t y = solid(u, 0, v) ^ solid(u, 1, v);
-        const std::uint32_t z = solid(u, v, 0) ^ solid(u, v, 1);
-        n[0] += (y + z) * u;
-        n[1] += x * u + z * v;
-        n[2] += (x + y) * v;
-        n[3] += x + y + z;
-      }
-    }
-    counts[c] = n[0] | n[1] << 8 | n[2] << 16 | n[3] << 24;
-  }
-  return counts;
-}();
-
-// The densities of a cell's corners, and its configuration.
+// The densities of a cell's corners, and the solid corners as bits.
 struct CornerLanes {
   F d[8];
-  I configuration;
+  I solid;
 };
 
 inline F low_half(I pair) {
@@ -59,39 +36,10 @@ inline CornerLanes load_corners(const Half* low, const Half* high, I place) {
     corners.d[2 * i + 1] = high_half(pairs[i]);
   }
   const I signs = all(static_cast<int>(0x80008000U));
-  const I bits = shift_right<3>(pairs[0] & signs) | shift_right<2>(pairs[1] & signs) |
-                 shift_right<1>(pairs[2] & signs) | (pairs[3] & signs);
-  corners.configuration = (shift_right<12>(bits) & all(0x0F)) | (shift_right<24>(bits) & all(0xF0));
+  const I bits = shift_right<6>(pairs[0] & signs) | shift_right<4>(pairs[1] & signs) |
+                 shift_right<2>(pairs[2] & signs) | (pairs[3] & signs);
+  corners.solid = (shift_right<9>(bits) & all(0x55)) | (shift_right<24>(bits) & all(0xAA));
   return corners;
-}
-
-struct Crossing {
-  F part;
-  F whole;
-};
-
-inline Crossing crossing(F a, F b) {
-  const Mask is_crossed = signs_differ(a, b);
-  return {only(is_crossed, a), select(is_crossed, a - b, all(1.0F))};
-}
-
-inline F sum_of_crossings(const F* d, const int (&low)[4], int step) {
-  Crossing c[4];
-  for (int i = 0; i < 4; ++i) c[i] = crossing(d[low[i]], d[low[i] + step]);
-  const F p = c[0].part * c[1].whole + c[1].part * c[0].whole;
-  const F q = c[0].whole * c[1].whole;
-  const F r = c[2].part * c[3].whole + c[3].part * c[2].whole;
-  const F s = c[2].whole * c[3].whole;
-  return (p * s + r * q) / (q * s);
-}
-
-inline Lanes3 mean_of_crossings(const CornerLanes& corners) {
-  const I counts = gather(kCrossings.data(), corners.configuration);
-  const F inverse = look_up(kReciprocals, shift_right<24>(counts));
-  const I byte = all(0xFF);
-  return {(sum_of_crossings(corners.d, {0, 2, 4, 6}, 1) + to_float(counts & byte)) * inverse,
-          (sum_of_crossings(corners.d, {0, 1, 4, 5}, 2) + to_float(shift_right<8>(counts) & byte)) * inverse,
-          (sum_of_crossings(corners.d, {0, 1, 2, 3}, 4) + to_float(shift_right<16>(counts) & byte)) * inverse};
 }
 
 // Returns SmoothCell::bits of cells of slice z; x and y are one more than the cell's.
@@ -99,7 +47,7 @@ inline I cell_codes(I x, I y, int z, int n) {
   const std::uint32_t z_bits = cell_code(0, 0, z, n).bits;
   const I mask = all(n - 1);
   const auto previous = [](I c, int axis) {
-    return select(equal(c, all(0)), all(1 << (SmoothCell::kPreviousShift + axis)), all(0));
+    return select(equals(c, 0), all(1 << (SmoothCell::kPreviousShift + axis)), all(0));
   };
   const I x_bits = ((x + mask) & mask) | previous(x, 0);
   const I y_bits = shift_left<6>((y + mask) & mask) | previous(y, 1);
@@ -107,7 +55,7 @@ inline I cell_codes(I x, I y, int z, int n) {
 }
 
 inline I in_64ths(F f) {
-  return min(to_int(f * all(64.0F)), all(63));
+  return min_unsigned(to_int(f * all(64.0F)), all(63));
 }
 
 inline I lane_numbers() {
@@ -116,14 +64,14 @@ inline I lane_numbers() {
 }
 
 // Stores the vertices of the current slice for the quads of this and the next slice.
-inline void remember(Work& work, const Slice& slice, std::size_t first, std::size_t count, I place, Lanes3 at) {
+inline void remember(Work& work, const Slice& slice, std::size_t first, std::size_t count, I place, Lanes3<F> at) {
   const I index = lane_numbers() + all(static_cast<int>(first));
   const I fractions = shift_left<kVertexBits>(in_64ths(at.x)) | shift_left<kVertexBits + 6>(in_64ths(at.y)) |
                       shift_left<kVertexBits + 12>(in_64ths(at.z));
   scatter(work.vertices[slice.z & 1], place, index | fractions, count - first);
 }
 
-inline void keep_for_occlusion(Work& work, std::size_t first, Lanes3 at, Lanes3 normal) {
+inline void keep_for_occlusion(Work& work, std::size_t first, Lanes3<F> at, Lanes3<F> normal) {
   const F parts[6] = {at.x, at.y, at.z, normal.x, normal.y, normal.z};
   for (int i = 0; i < 3; ++i) {
     store(work.fractions[i] + first, parts[i]);
@@ -139,9 +87,7 @@ void make_vertices(Work& work, const Slice& slice, std::size_t count, SmoothChun
   for (std::size_t first = 0; first < count; first += kWidth) {
     const I place = load_words(work.places + first) & all(kPlaceMask);
     const CornerLanes corners = load_corners(low, high, place);
-    const Lanes3 fraction = mean_of_crossings(corners);
-    const Lanes3 normal = normals_at(corners.d, fraction);
-    const Lanes3 at = {snapped(fraction.x), snapped(fraction.y), snapped(fraction.z)};
+    const auto [fraction, at, normal] = cell_vertex(HalfField{}, corners.d, corners.solid);
     const I x = place & all(kPlaceStride - 1);
     const I y = shift_right<kPlaceShift>(place);
     const std::size_t vertex = slice.first_vertex + first;
@@ -183,13 +129,11 @@ void make_quads(const Work& work, const Slice& slice, std::size_t count, std::ui
       corners[c] = gather(work.vertices[(slice.z ^ is_last) & 1], place - all(back));
       q[c] = (corners[c] & all(static_cast<int>(kVertexMask))) + firsts[is_last];
     }
-    const Mask flip =
+    const Mask from_second =
         squared_length<kAxis, -1>(corners[3], corners[1]) < squared_length<kAxis, 1>(corners[0], corners[2]);
     const Mask starts_solid = all(kStartsSolid - 1) < edge;
-    const I second = select(starts_solid, q[1], q[3]);
-    const I fourth = select(starts_solid, q[3], q[1]);
-    store_triangles(out + 6 * i, select(flip, second, q[0]), select(flip, q[2], second), select(flip, fourth, q[2]),
-                    select(flip, q[0], fourth));
+    const auto [a, b, c, d] = split_quad(q[0], q[1], q[2], q[3], starts_solid, from_second);
+    store_triangles(out + 6 * i, a, b, c, d);
   }
 }
 

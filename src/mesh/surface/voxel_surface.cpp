@@ -12,8 +12,8 @@
 
 #include "core/coordinates/chunk_order.h"
 #include "grid/density/density_storage.h"
+#include "mesh/nets/sheets.h"
 #include "mesh/smooth/level_cells.h"
-#include "mesh/smooth/sheets.h"
 #include "mesh/surface/face_materials.h"
 
 namespace quoin::smooth {

@@ -1,176 +1,16 @@
-#include "mesh/smooth/sheets.h"
-
 #include <algorithm>
-#include <bit>
 #include <optional>
 #include <unordered_map>
 #include <vector>
 
 #include <quoin/core/assert.h>
 
+#include "mesh/nets/cell.h"
+#include "mesh/nets/sheets.h"
 #include "mesh/smooth/level_cells.h"
 
 namespace quoin::smooth {
 namespace {
-
-constexpr std::size_t kEdges = 12;
-
-int corner_at(IVec3 place) {
-  return place.x + 2 * place.y + 4 * place.z;
-}
-
-// Returns the start of an edge of a cell, in cells.
-IVec3 edge_start(std::size_t edge) {
-  QUOIN_ASSERT(edge < kEdges, "one of twelve edges");
-  const int axis = static_cast<int>(edge / 4);
-  IVec3 start{0};
-  start[(axis + 1) % 3] = static_cast<int>(edge & 1U);
-  start[(axis + 2) % 3] = static_cast<int>(edge >> 1U & 1U);
-  return start;
-}
-
-// Returns the edge between two adjacent corners.
-std::size_t edge_between(int a, int b) {
-  QUOIN_ASSERT(std::has_single_bit(static_cast<unsigned>(a ^ b)), "adjacent corners");
-  const IVec3 first = corner_place(a & b);
-  const IVec3 step = corner_place(a ^ b);
-  const int axis = step.x != 0 ? 0 : step.y != 0 ? 1 : 2;
-  return static_cast<std::size_t>(4 * axis + first[(axis + 1) % 3] + 2 * first[(axis + 2) % 3]);
-}
-
-// Returns the corners of a face, in order around it.
-std::array<int, 4> face_corners(int face) {
-  QUOIN_ASSERT(face >= 0 && face < kNoFace, "one of six faces");
-  const int axis = face / 2;
-  const IVec3 base = unit_axis(axis) * (face % 2);
-  const IVec3 u = unit_axis((axis + 1) % 3);
-  const IVec3 v = unit_axis((axis + 2) % 3);
-  return {corner_at(base), corner_at(base + u), corner_at(base + u + v), corner_at(base + v)};
-}
-
-// The edges on both sides of each corner of a face. A sheet that cuts off the corner contains both.
-struct FaceEdges {
-  std::array<std::size_t, 4> before{};
-  std::array<std::size_t, 4> after{};
-};
-
-FaceEdges edges_of_face(const std::array<int, 4>& corners) {
-  FaceEdges edges;
-  for (std::size_t i = 0; i < 4; ++i) {
-    edges.after[i] = edge_between(corners[i], corners[(i + 1) % 4]);
-    edges.before[(i + 1) % 4] = edges.after[i];
-  }
-  return edges;
-}
-
-bool is_solid_corner(std::uint32_t solid, int corner) {
-  return (solid >> corner & 1U) != 0;
-}
-
-// Returns true if a face has four crossings: opposite corners are equal, adjacent corners differ.
-bool has_four_crossings(std::uint32_t solid, const std::array<int, 4>& corners) {
-  return is_solid_corner(solid, corners[0]) == is_solid_corner(solid, corners[2]) &&
-         is_solid_corner(solid, corners[1]) == is_solid_corner(solid, corners[3]) &&
-         is_solid_corner(solid, corners[0]) != is_solid_corner(solid, corners[1]);
-}
-
-using SheetOfEdge = std::array<std::uint8_t, kEdges>;
-
-void join(SheetOfEdge& sheets, std::size_t a, std::size_t b) {
-  const std::uint8_t from = std::max(sheets[a], sheets[b]);
-  const std::uint8_t to = std::min(sheets[a], sheets[b]);
-  std::replace(sheets.begin(), sheets.end(), from, to);
-}
-
-void join_on_face(std::uint32_t solid, int face, bool flipped, SheetOfEdge& sheets) {
-  const std::array<int, 4> corners = face_corners(face);
-  const FaceEdges edges = edges_of_face(corners);
-  if (has_four_crossings(solid, corners)) {
-    for (std::size_t i = 0; i < 4; ++i) {
-      if (is_solid_corner(solid, corners[i]) != flipped) join(sheets, edges.before[i], edges.after[i]);
-    }
-    return;
-  }
-  std::size_t last = kEdges;
-  for (const std::size_t edge : edges.after) {
-    if (sheets[edge] == Sheets::kUncrossed) continue;
-    if (last != kEdges) join(sheets, last, edge);
-    last = edge;
-  }
-}
-
-Sheets find_sheets(std::uint32_t solid, int flipped_face) {
-  Sheets sheets;
-  for (std::size_t edge = 0; edge < kEdges; ++edge) {
-    const int first = corner_at(edge_start(edge));
-    const int second = first + corner_at(unit_axis(static_cast<int>(edge / 4)));
-    const bool crossed = is_solid_corner(solid, first) != is_solid_corner(solid, second);
-    sheets.of_edge[edge] = crossed ? static_cast<std::uint8_t>(edge) : Sheets::kUncrossed;
-  }
-  for (int face = 0; face < 6; ++face) join_on_face(solid, face, face == flipped_face, sheets.of_edge);
-  // Sheets have the numbers of their first edges; now they are renumbered 0, 1, ...
-  for (std::size_t edge = 0; edge < kEdges; ++edge) {
-    if (sheets.of_edge[edge] != edge) continue;
-    std::replace(sheets.of_edge.begin() + static_cast<std::ptrdiff_t>(edge), sheets.of_edge.end(),
-                 static_cast<std::uint8_t>(edge), static_cast<std::uint8_t>(sheets.count));
-    ++sheets.count;
-  }
-  return sheets;
-}
-
-int find_joined_face(std::uint32_t solid) {
-  const Sheets sheets = find_sheets(solid, kNoFace);
-  for (int face = 0; face < 6; ++face) {
-    const std::array<int, 4> corners = face_corners(face);
-    if (!has_four_crossings(solid, corners)) continue;
-    const FaceEdges edges = edges_of_face(corners);
-    if (sheets.of_edge[edges.before[0]] == sheets.of_edge[edges.before[2]] &&
-        sheets.of_edge[edges.after[0]] == sheets.of_edge[edges.after[2]] &&
-        sheets.of_edge[edges.before[0]] == sheets.of_edge[edges.after[0]]) {
-      return face;
-    }
-  }
-  return kNoFace;
-}
-
-struct SheetTables {
-  std::array<std::array<Sheets, kNoFace + 1>, 256> sheets;  // by solid corners, then flipped face
-  std::array<std::uint8_t, 256> joined_face;
-  std::array<bool, 256> is_plain;  // by solid corners: at most one sheet, independent of the neighbouring cells
-  SheetTables() {
-    for (std::uint32_t solid = 0; solid < 256; ++solid) {
-      joined_face[solid] = static_cast<std::uint8_t>(find_joined_face(solid));
-      for (int face = 0; face <= kNoFace; ++face) {
-        sheets[solid][static_cast<std::size_t>(face)] = find_sheets(solid, face);
-      }
-      is_plain[solid] = joined_face[solid] == kNoFace && sheets[solid][kNoFace].count < 2;
-    }
-  }
-};
-
-const SheetTables& tables() {
-  static const SheetTables built;
-  return built;
-}
-
-// Returns the mean of the crossings of one sheet.
-Vec3 mean_of_crossings(const Corners& corners, const Sheets& sheets, int sheet) {
-  Vec3 sum{0.0F};
-  float count = 0.0F;
-  for (std::size_t edge = 0; edge < kEdges; ++edge) {
-    if (sheets.of_edge[edge] != sheet) continue;
-    const int axis = static_cast<int>(edge / 4);
-    const IVec3 start = edge_start(edge);
-    const float a = corners[static_cast<std::size_t>(corner_at(start))];
-    const float b = corners[static_cast<std::size_t>(corner_at(start + unit_axis(axis)))];
-    Vec3 at(start);
-    at[axis] = a / (a - b);
-    sum += at;
-    count += 1.0F;
-  }
-  QUOIN_ASSERT(count > 0.0F, "a sheet of the cell");
-  return sum / count;
-}
 
 class Splitter {
  public:
@@ -179,11 +19,11 @@ class Splitter {
 
   void run(std::size_t quad_indices) {
     const std::size_t vertices = out_.cells.size();
-    const std::array<bool, 256>& is_plain = tables().is_plain;
+    const std::array<bool, 256>& has_one_sheet = cells_with_one_sheet();
     for (std::size_t i = 0; i < vertices; ++i) {
       const LevelCell cell = levels_.cell_of(out_.cells[i]);
       const std::uint32_t solid = parted_corners(cell);
-      if (!is_plain[solid]) split_vertex(static_cast<std::uint32_t>(i), cell, solid);
+      if (!has_one_sheet[solid]) split_vertex(static_cast<std::uint32_t>(i), cell, solid);
     }
     if (split_.empty() && bridges_.empty()) return;
     is_split_.assign(vertices, false);
@@ -216,19 +56,18 @@ class Splitter {
   };
 
   void split_vertex(std::uint32_t vertex, const LevelCell& cell, std::uint32_t solid) {
-    const int joined = tables().joined_face[solid];
     if (!same_levels_ && levels_.touches_another(cell)) return;
-    const bool joins = joined != kNoFace && joins_as_well(cell, joined);
+    const int joined = face_joined_in_both(solid, [&](int face) { return parted_beyond(cell, face); });
     // With `join_diagonals`, a bridge replaces the flip. The lower of the two cells makes it.
-    const bool flipped = joins && !options_.join_diagonals;
-    if (joins && !flipped && joined % 2 == 1) add_bridge(vertex, cell, joined);
-    const Sheets& sheets = tables().sheets[solid][static_cast<std::size_t>(flipped ? joined : kNoFace)];
+    if (options_.join_diagonals && joined != kNoFace && joined % 2 == 1) add_bridge(vertex, cell, joined);
+    const Sheets& sheets = sheets_of(solid, options_.join_diagonals ? kNoFace : joined);
     if (sheets.count < 2) return;
     split_.emplace(vertex, Split{sheets, static_cast<std::uint32_t>(out_.positions.size())});
     const Corners corners = corners_of(chunks_, cell);
     for (int sheet = 0; sheet < sheets.count; ++sheet) {
-      const Vec3 fraction = mean_of_crossings(corners, sheets, sheet);
-      const CellVertex placed = vertex_at(fraction, trilinear_gradient(corners, fraction));
+      const SheetCrossings crossings =
+          crossings_of_sheet(corners, sheets, sheet, [](float a, float b) { return a / (a - b); });
+      const CellVertex placed = vertex_in(corners, crossings.sum / crossings.count);
       const SmoothCell name{out_.cells[vertex].bits | static_cast<std::uint32_t>(sheet) << SmoothCell::kSheetShift};
       if (sheet == 0) {
         write_vertex(chunks_, options_.occlusion, cell, placed, vertex, out_);
@@ -252,11 +91,15 @@ class Splitter {
           (crossing(corners, corner, around[(at + 1) % 4]) + crossing(corners, corner, around[(at + 3) % 4])) * 0.5F;
       const SmoothCell name{out_.cells[vertex].bits | side << SmoothCell::kSheetShift |
                             static_cast<std::uint32_t>(axis + 1) << SmoothCell::kBridgeShift};
-      append_vertex(chunks_, options_.occlusion, cell, vertex_at(fraction, trilinear_gradient(corners, fraction)), name,
-                    out_);
+      append_vertex(chunks_, options_.occlusion, cell, vertex_in(corners, fraction), name, out_);
       ++side;
     }
     QUOIN_ASSERT(side == 2, "two air corners");
+  }
+
+  // Returns a vertex at a position in a cell, with the gradient there.
+  static CellVertex vertex_in(const Corners& corners, Vec3 fraction) {
+    return vertex_at(fraction, unit_normal(trilinear_gradient(corners, fraction)));
   }
 
   static std::array<int, 4> sorted(std::array<int, 4> corners) {
@@ -290,24 +133,22 @@ class Splitter {
     return found->second.first + (corner < other ? 0U : 1U);
   }
 
-  // Returns true if the cell on the other side of a face also has all four crossings of that face in one sheet.
-  [[nodiscard]] bool joins_as_well(const LevelCell& cell, int face) const {
-    const IVec3 step = unit_axis(face / 2) * (face % 2 == 1 ? cell.size() : -cell.size());
-    LevelCell other = cell;
-    other.first += step;
-    if (options_.border == SmoothBorder::Open) {
-      const int last = kChunkEdge - 2 * cell.size();
-      const bool inside = std::min({other.first.x, other.first.y, other.first.z}) >= 0 &&
-                          std::max({other.first.x, other.first.y, other.first.z}) <= last;
-      if (!inside) return false;
-    }
-    other.chunk = chunk_of(other.first);
-    return tables().joined_face[parted_corners(other)] == (face ^ 1);
-  }
-
   // Returns the corners of a cell that stay separate on faces with alternating corners.
   [[nodiscard]] std::uint32_t parted_corners(const LevelCell& cell) const {
     return solid_corners_of(chunks_, cell) ^ (options_.join_diagonals ? 255U : 0U);
+  }
+
+  // Returns these corners of the cell on the other side of a face, 0 if the mesh has no such cell.
+  [[nodiscard]] std::uint32_t parted_beyond(LevelCell cell, int face) const {
+    cell.first += step_across(face) * cell.size();
+    if (options_.border == SmoothBorder::Open) {
+      const int last = kChunkEdge - 2 * cell.size();
+      const bool inside = std::min({cell.first.x, cell.first.y, cell.first.z}) >= 0 &&
+                          std::max({cell.first.x, cell.first.y, cell.first.z}) <= last;
+      if (!inside) return 0;
+    }
+    cell.chunk = chunk_of(cell.first);
+    return parted_corners(cell);
   }
 
   // Returns false if the quad remains; otherwise adds its triangles to the polygons.
@@ -354,9 +195,7 @@ class Splitter {
     const auto found = split_.find(vertex);
     if (found == split_.end()) return vertex;
     const Split& split = found->second;
-    const IVec3 place = (start - cell.first) / cell.size();
-    const auto edge = static_cast<std::size_t>(4 * axis + place[(axis + 1) % 3] + 2 * place[(axis + 2) % 3]);
-    const std::uint8_t sheet = split.sheets.of_edge[edge];
+    const std::uint8_t sheet = split.sheets.of_edge[edge_at(axis, (start - cell.first) / cell.size())];
     QUOIN_ASSERT(sheet != Sheets::kUncrossed, "an edge that the surface crosses");
     return sheet == 0 ? vertex : split.second + sheet - 1U;
   }
@@ -373,16 +212,6 @@ class Splitter {
 };
 
 }  // namespace
-
-Sheets sheets_of(std::uint32_t solid, int flipped_face) {
-  QUOIN_ASSERT(solid < 256 && flipped_face >= 0 && flipped_face <= kNoFace, "eight corners, and a face or none");
-  return tables().sheets[solid][static_cast<std::size_t>(flipped_face)];
-}
-
-int joined_face(std::uint32_t solid) {
-  QUOIN_ASSERT(solid < 256, "eight corners");
-  return tables().joined_face[solid];
-}
 
 void split_sheets(const DensityNeighbourhood& chunks, const SmoothOptions& options, std::size_t quad_indices,
                   SmoothChunkMesh& out) {

@@ -1,6 +1,6 @@
 // Each sheet of the surface that crosses a cell has its own vertex, and the mesh is manifold.
 
-#include "mesh/smooth/sheets.h"
+#include "mesh/nets/sheets.h"
 
 #include <algorithm>
 #include <cstring>
@@ -12,6 +12,7 @@
 #include <quoin/mesh/smooth_mesh.h>
 
 #include "core/death_for_tests.h"
+#include "mesh/smooth/level_cells.h"
 #include "mesh/smooth/surface_check_for_tests.h"
 
 namespace quoin {
