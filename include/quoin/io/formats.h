@@ -119,8 +119,8 @@ struct CustomFormat {
   Result<EncodedFile> (*encode)(const FormatOutput& output) = nullptr;  ///< makes the file, which save_scene writes
 };
 
-/// Adds a format, which all functions for formats then know until the program ends. Detection asks the library's formats
-/// first.
+/// Adds a format, which all functions for formats then know until the program ends. Detection asks the library's
+/// formats first.
 ///
 /// Requires: no other thread reads, writes or lists formats during the call; best called first in main.
 /// Errors:   InvalidArgument if the name or extension exists or is invalid, or if the capabilities do not match the

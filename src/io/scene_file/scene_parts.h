@@ -4,8 +4,8 @@
 #include <string>
 
 #include <nlohmann/json.hpp>
-#include <quoin/io/scene_file.h>
 #include <quoin/io/file.h>
+#include <quoin/io/scene_file.h>
 
 #include "io/scene_file/json_reader.h"
 

@@ -145,8 +145,8 @@ inline constexpr std::size_t kChunkHeaderBytes = 12;
 /// Returns the last frame of the file.
 [[nodiscard]] std::int64_t last_frame(const Document& document);
 
-/// Returns true for the layout of SLAB6's .vox, which Voxlap's reader reads: three sizes from 1 to 4,096, the voxels, and
-/// a palette of 768 bytes.
+/// Returns true for the layout of SLAB6's .vox, which Voxlap's reader reads: three sizes from 1 to 4,096, the voxels,
+/// and a palette of 768 bytes.
 [[nodiscard]] bool is_slab6(std::span<const std::byte> bytes);
 
 /// Reads all chunks and checks each against the available bytes; references of nodes are not checked.
