@@ -44,7 +44,7 @@ F crossing_of(F a, F b) {
 }
 
 // Scales the vector so that its square is a finite number, then normalizes it.
-template <class V = Vec3>
+template <class V>
 V unit_of_any(V g) {
   using F = std::remove_cvref_t<decltype(g.x)>;
   using std::abs;
@@ -79,9 +79,5 @@ struct ArrayField {
     return unit_of_any(V{g.x * all_of<F>(scale[0]), g.y * all_of<F>(scale[1]), g.z * all_of<F>(scale[2])});
   }
 };
-
-inline Vec3 mean_crossing(const Corners& d) {
-  return mean_of_crossings(ArrayField{}, d, solid_corners(d));
-}
 
 }  // namespace quoin::array

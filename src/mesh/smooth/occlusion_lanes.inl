@@ -142,15 +142,6 @@ inline SampledCorners corners_of(const Work& work, I place) {
   return corners;
 }
 
-// Interpolates along z, y and x in turn.
-inline F interpolated(const SampledCorners& c, const F (&fraction)[3]) {
-  F along_z[4];
-  for (int i = 0; i < 4; ++i) along_z[i] = c.d[i] + fraction[2] * (c.d[i + 4] - c.d[i]);
-  F along_y[2];
-  for (int i = 0; i < 2; ++i) along_y[i] = along_z[i] + fraction[1] * (along_z[i + 2] - along_z[i]);
-  return along_y[0] + fraction[0] * (along_y[1] - along_y[0]);
-}
-
 inline F solidity(F density, F solid, float deep) {
   return min(min(density, all(0.0F)) / min(solid, all(-deep)), all(1.0F));
 }
@@ -165,14 +156,14 @@ bool find_values(const Work& work, std::size_t count, Batch& batch) {
   for (std::size_t i = 0; i < count; i += kWidth) {
     const Listed listed = listed_at<kSpread>(batch, batch.codes + i);
     SampledCorners corners = corners_of(work, listed.place);
-    const F density = interpolated(corners, listed.fraction);
+    const F density = interpolated(corners.d, listed.fraction);
     const std::uint32_t solid = bits(density < zero);
     any |= solid;
     std::memcpy(batch.solid + i / 8, &solid, kWidth / 8);
     if constexpr (kCounted) continue;
     if (is_soft) {
       for (F& d : corners.d) d = min(d, zero);
-      const F of_solid = interpolated(corners, listed.fraction);
+      const F of_solid = interpolated(corners.d, listed.fraction);
       store(batch.values + i, solidity(density * unit, of_solid * unit, whole_depth(work.occlusion.spread)));
     } else {
       store(batch.values + i, min(density * unit, zero));

@@ -88,6 +88,17 @@ struct SampleAxis {
   return axis;
 }
 
+/// Returns the density at a position in a cell. Interpolates along z, y and x in turn.
+template <class D, class Fraction>
+NumberOf<D> interpolated(const D& corners, const Fraction& fraction) {
+  using F = NumberOf<D>;
+  const auto between = [](F a, F b, F f) { return a + f * (b - a); };
+  F along_z[4];
+  for (int i = 0; i < 4; ++i) along_z[i] = between(corners[i], corners[i + 4], fraction[2]);
+  const F low = between(along_z[0], along_z[2], fraction[1]);
+  return between(low, between(along_z[1], along_z[3], fraction[1]), fraction[0]);
+}
+
 /// Returns the solid share of 27 samples, given the number in air.
 [[gnu::always_inline]] inline float solid_share(int in_air) {
   return 1.0F - static_cast<float>(in_air) * (1.0F / 27.0F);
@@ -161,26 +172,18 @@ template <class Density>
     const std::size_t ix = i % 3;
     const std::size_t iy = i / 3 % 3;
     const std::size_t iz = i / 9;
-    const int x = axes[0].base[ix];
-    const int y = axes[1].base[iy];
-    const int z = axes[2].base[iz];
-    const auto interpolated = [&](auto&& corner) {
-      const auto along_z = [&](int dx, int dy) {
-        const float low = corner(x + dx, y + dy, z);
-        return low + axes[2].fraction[iz] * (corner(x + dx, y + dy, z + 1) - low);
-      };
-      const auto along_y = [&](int dx) {
-        const float low = along_z(dx, 0);
-        return low + axes[1].fraction[iy] * (along_z(dx, 1) - low);
-      };
-      const float low = along_y(0);
-      return low + axes[0].fraction[ix] * (along_y(1) - low);
-    };
-    samples[i] = interpolated(density);
+    const Vec3 fraction(axes[0].fraction[ix], axes[1].fraction[iy], axes[2].fraction[iz]);
+    Corners corners;
+    for (int c = 0; c < 8; ++c) {
+      const IVec3 place = corner_place(c);
+      corners[static_cast<std::size_t>(c)] =
+          density(axes[0].base[ix] + place.x, axes[1].base[iy] + place.y, axes[2].base[iz] + place.z);
+    }
+    samples[i] = interpolated(corners, fraction);
     if (options.method != SmoothOcclusion::SoftShare) continue;
     if (samples[i] < 0.0F) {
-      const auto solid = [&](int cx, int cy, int cz) { return std::min(density(cx, cy, cz), 0.0F); };
-      samples[i] = solidity(samples[i], interpolated(solid), whole_depth(options.spread));
+      for (float& d : corners) d = std::min(d, 0.0F);
+      samples[i] = solidity(samples[i], interpolated(corners, fraction), whole_depth(options.spread));
     } else {
       samples[i] = 0.0F;
     }

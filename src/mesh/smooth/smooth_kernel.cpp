@@ -13,7 +13,6 @@
 #include <bit>
 #include <cmath>
 #include <span>
-#include <utility>
 
 #include "mesh/smooth/listed.inl"
 #include "mesh/smooth/slices.inl"
@@ -92,14 +91,6 @@ void find_batch(const Work& work, const Slice& slice, std::size_t first, std::si
   }
 }
 
-// Interpolates along z, y and x in turn; corners by x + 2 y + 4 z.
-float interpolated(const Corners& d, Vec3 fraction) {
-  const auto between = [](float a, float b, float f) { return a + f * (b - a); };
-  std::array<float, 4> along_z{};
-  for (std::size_t i = 0; i < 4; ++i) along_z[i] = between(d[i], d[i + 4], fraction.z);
-  return between(between(along_z[0], along_z[2], fraction.y), between(along_z[1], along_z[3], fraction.y), fraction.x);
-}
-
 template <int kSpread, bool kCounted>
 bool find_values(const Work& work, std::size_t count, Batch& batch) {
   const float unit = depth_unit(work.level);
@@ -170,11 +161,11 @@ void make_quads(const Work& work, const Slice& slice, std::size_t count, std::ui
       corners[c] = work.vertices[(slice.z ^ (is_last ? 1 : 0)) & 1][(work.places[i] & kPlaceMask) - Cells::back[c]];
       q[c] = (corners[c] & kVertexMask) + (is_last ? slice.first_vertex_of_last : slice.first_vertex);
     }
-    const bool flip = squared_length(corners[0], corners[2], along_diagonal<kAxis>(1)) >
-                      squared_length(corners[3], corners[1], along_diagonal<kAxis>(-1));
-    if ((work.places[i] & kStartsSolid) == 0) std::swap(q[1], q[3]);
-    const std::size_t first = flip ? 1 : 0;
-    for (const std::size_t c : {0, 1, 2, 0, 2, 3}) *out++ = q[(c + first) % 4];
+    const bool from_second = squared_length(corners[3], corners[1], along_diagonal<kAxis>(-1)) <
+                             squared_length(corners[0], corners[2], along_diagonal<kAxis>(1));
+    const bool starts_solid = (work.places[i] & kStartsSolid) != 0;
+    const auto [a, b, c, d] = split_quad(q[0], q[1], q[2], q[3], starts_solid, from_second);
+    for (const std::uint32_t vertex : {a, b, c, a, c, d}) *out++ = vertex;
   }
 }
 
