@@ -178,6 +178,7 @@ std::vector<std::byte> EditLog::encode() const {
   out.u32(kVersion);
   for (const LoggedEdit& each : edits_) {
     ByteWriter body;
+    body.reserve(64);
     body.u64(each.number);
     body.u32(each.author);
     body.u32(each.edit.grid);
