@@ -13,7 +13,7 @@
 #include "mesh/array/quads.inl"
 #include "mesh/array/relax.inl"
 #ifdef QUOIN_KERNEL_AVX2
-#include "mesh/nets/lanes.inl"
+#include "mesh/nets/cell_lanes.inl"
 #endif
 
 namespace quoin::array {

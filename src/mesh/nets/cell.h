@@ -67,7 +67,7 @@ inline std::uint32_t solid_corners(const Corners& d) {
   return solid;
 }
 
-// The operations of lanes (core/lanes, mesh/nets/lanes.inl) for single numbers.
+// The operations of lanes (core/lanes, mesh/nets/cell_lanes.inl) for single numbers.
 
 /// Repeats a number in every lane.
 template <class F>

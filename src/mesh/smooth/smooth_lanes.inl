@@ -1,4 +1,4 @@
-// Lanes of cells of a chunk: additions to mesh/nets/lanes.inl. With AVX-512, they also require VBMI2.
+// Lanes of cells of a chunk: additions to mesh/nets/cell_lanes.inl. With AVX-512, they also require VBMI2.
 
 #pragma once
 
@@ -13,7 +13,7 @@
 #include <quoin/core/half.h>
 #include <quoin/core/vec.h>
 
-#include "mesh/nets/lanes.inl"
+#include "mesh/nets/cell_lanes.inl"
 
 namespace quoin::smooth {
 namespace {
