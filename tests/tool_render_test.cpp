@@ -355,6 +355,11 @@ TEST_F(ToolRender, ShowsSkyImageOfSceneFile) {
   const Json warnings = drawn(base)["warnings"];
   ASSERT_EQ(warnings.size(), 1U) << warnings;
   EXPECT_NE(warnings[0].dump().find("the image of the sky"), std::string::npos) << warnings;
+  for (const char* unused : {"--light path --sky uniform", "--light path --look plain", "--light rays"}) {
+    const std::string options = std::string("scene.json -o out.png --size 32x24 --samples 1 ") + unused;
+    EXPECT_EQ(drawn(options)["warnings"], Json::array()) << unused;
+  }
+  EXPECT_EQ(Json::parse(run("info scene.json --json").out)["warnings"], Json::array());
 }
 
 TEST_F(ToolRender, WritesVideos) {

@@ -23,7 +23,7 @@ inline constexpr int kWrongUsage = 2;
 /// Options of all commands that read a file.
 struct CommonOptions {
   std::filesystem::path input;
-  LoadOptions load;
+  LoadOptions load{.sky_image = false};  ///< only path tracing sets sky_image
   Threads threads;
   bool json = false;
   bool takes_frame = false;  ///< --frame was given

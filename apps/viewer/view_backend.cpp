@@ -55,7 +55,7 @@ Environment traced_environment(const ViewRequest& request) {
 PathOptions path_options(const ViewRequest& request, int width, int height, int samples, const DBox& bounds) {
   PathOptions options;
   Environment& environment = options.environment.emplace(traced_environment(request));
-  // The viewer does not read the sky image of a .vox file.
+  // The viewer does not read the sky image of a .vox file or of a world.
   if (lacks_image(environment.sky)) environment.sky.model = SkyModel::Uniform;
   options.width = width;
   options.height = height;

@@ -58,8 +58,10 @@ struct FormatDriver {
   Result<std::unique_ptr<ChunkSource>> (*open_chunks)(const std::filesystem::path& path,
                                                       std::span<const std::byte> bytes,
                                                       std::string_view dimension) = nullptr;
-  /// Lists the other files that belong to a file. Null: none, or those that `read_mesh` reads.
-  std::vector<std::filesystem::path> (*sidecar_files)(const std::filesystem::path& path) = nullptr;
+  /// Lists the other files that belong to a file and that `allowed` permits. Null: none, or those that `read_mesh`
+  /// reads.
+  std::vector<std::filesystem::path> (*sidecar_files)(const std::filesystem::path& path,
+                                                      SidecarFiles allowed) = nullptr;
 
   // Writing scenes: `encode`, or `write` and `unsupported_features`.
 

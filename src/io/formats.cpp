@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <iterator>
+#include <system_error>
 
 #include <quoin/io/chunk_source.h>
+#include <quoin/io/file.h>
 #include <quoin/io/vox.h>
 
 #include "core/bytes/bytes.h"
+#include "core/bytes/text.h"
 #include "io/format_driver.h"
 #include "io/heights/heights.h"
 #include "io/triangles/triangles.h"
@@ -138,13 +141,28 @@ std::vector<std::string> lost_with_source(const FormatOutput& output) {
   return lines;
 }
 
-/// Lists the environment, cameras and render settings that a format leaves out, except items of `lost_with_source`.
-std::vector<std::string> lost_views(const FormatOutput& output, const FormatInfo& format) {
+/// Returns a warning if a file at `path` would name a sky image that is not there, else "".
+std::string lost_sky_image(const Sky& sky, const std::filesystem::path& path) {
+  if (sky.model != SkyModel::Image) return "";
+  if (sky.image_file.empty()) return "the sky image is left out: it has no file name";
+  std::error_code unknown;
+  const auto image = sidecar_path(path, sky.image_file, SidecarFiles::WithinFolder);
+  if (image && std::filesystem::exists(*image, unknown)) return "";
+  return "the sky image is left out: the saved file names \"" + printable(sky.image_file) +
+         "\", which is not in its folder";
+}
+
+/// Lists the environment, cameras and render settings that a file lacks, except items of `lost_with_source`.
+std::vector<std::string> lost_views(const FormatOutput& output, const FormatInfo& format,
+                                    const std::filesystem::path& path) {
   std::vector<std::string> lines;
   const std::optional<Environment>& environment = output.scene.environment;
   if (environment && !format.can(FormatCapability::Environment)) {
     lines.emplace_back(is_only_sun(*environment) ? "the sun is left out"
                                                  : "the environment (sun, sky, fog) is left out");
+  } else if (environment) {
+    std::string line = lost_sky_image(environment->sky, path);
+    if (!line.empty()) lines.push_back(std::move(line));
   }
   if (output.loaded == nullptr) return lines;
   const LoadedScene& loaded = *output.loaded;
@@ -173,11 +191,12 @@ Result<const FormatDriver*> driver_for_saving(const std::filesystem::path& path)
   return &driver_of(format->format);
 }
 
-/// Adds warnings of the loaded file's data that the format leaves out.
-void add_lost_data(const FormatDriver& driver, const FormatOutput& output, std::vector<std::string>& warnings) {
+/// Adds warnings of the loaded file's data that the saved file lacks.
+void add_lost_data(const FormatDriver& driver, const FormatOutput& output, const std::filesystem::path& path,
+                   std::vector<std::string>& warnings) {
   if (driver.reports_loaded_data) return;
   std::ranges::move(lost_with_source(output), std::back_inserter(warnings));
-  std::ranges::move(lost_views(output, driver.info), std::back_inserter(warnings));
+  std::ranges::move(lost_views(output, driver.info, path), std::back_inserter(warnings));
 }
 
 Result<SavedScene> write_with(const FormatDriver& driver, const FormatOutput& output,
@@ -194,7 +213,7 @@ Result<SavedScene> save(const FormatOutput& output, const std::filesystem::path&
   const auto driver = driver_for_saving(path);
   if (!driver) return driver.error();
   auto saved = with_path(write_with(**driver, output, path), path);
-  if (saved) add_lost_data(**driver, output, saved->warnings);
+  if (saved) add_lost_data(**driver, output, path, saved->warnings);
   return saved;
 }
 
@@ -210,7 +229,7 @@ Result<std::vector<std::string>> warnings_of_saving(const FormatOutput& output, 
   const auto driver = driver_for_saving(path);
   if (!driver) return driver.error();
   auto warnings = with_path(warnings_with(**driver, output), path);
-  if (warnings) add_lost_data(**driver, output, *warnings);
+  if (warnings) add_lost_data(**driver, output, path, *warnings);
   return warnings;
 }
 
@@ -342,7 +361,7 @@ std::vector<std::filesystem::path> sidecar_files_of(const std::filesystem::path&
   const auto format = detect_format(path);
   if (!format || !*format) return {};
   const FormatDriver& driver = driver_of(**format);
-  if (driver.sidecar_files != nullptr) return driver.sidecar_files(path);
+  if (driver.sidecar_files != nullptr) return driver.sidecar_files(path, allowed);
   if (driver.read_mesh == nullptr) return {};
   const auto mesh = read_mesh(path, {}, allowed);
   return mesh ? mesh->sidecars : std::vector<std::filesystem::path>();

@@ -33,10 +33,11 @@ template <class Read>
   return bytes->size();
 }
 
-/// Returns the files that a scene file refers to; empty if it cannot be read.
-[[nodiscard]] std::vector<std::filesystem::path> files_named_in_scene(const std::filesystem::path& path);
+/// Returns the files that a scene file refers to, without those that sidecar_path refuses; empty if it cannot be read.
+[[nodiscard]] std::vector<std::filesystem::path> files_named_in_scene(const std::filesystem::path& path,
+                                                                      SidecarFiles allowed);
 
-/// Returns the data file of a NIfTI pair with the header `path`; empty if it is no pair.
-[[nodiscard]] std::vector<std::filesystem::path> files_of_pair(const std::filesystem::path& path);
+/// Returns the data file of a NIfTI or NRRD pair with the header `path`; empty if it is no pair or is refused.
+[[nodiscard]] std::vector<std::filesystem::path> files_of_pair(const std::filesystem::path& path, SidecarFiles allowed);
 
 }  // namespace quoin

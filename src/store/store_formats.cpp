@@ -34,7 +34,8 @@ constinit const FormatDriver kWorldFormat = {
       return input.path.empty() ? read_world_format(input.bytes, input.options, input.threads, input.progress)
                                 : read_world_format(input.path, input.options, input.threads, input.progress);
     },
-    .sidecar_files = [](const std::filesystem::path& path) -> std::vector<std::filesystem::path> {
+    // Without the sky image: its name is in the database.
+    .sidecar_files = [](const std::filesystem::path& path, SidecarFiles) -> std::vector<std::filesystem::path> {
       return {path.string() + "-wal"};
     },
     .write = [](const FormatOutput& output, const std::filesystem::path& path) -> Result<SavedScene> {

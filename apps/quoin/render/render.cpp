@@ -137,6 +137,8 @@ Result<LoadedScene> load(const RenderArguments& arguments, const OpenedInput& in
   LoadOptions options = arguments.common.load;
   options.frame = frame;
   options.keep_source = false;
+  options.sky_image =
+      arguments.light == LightChoice::Path && arguments.path.uses_file_look && !arguments.path.sky.has_value();
   ProgressBar bar;
   auto loaded = load_scene(input.file, options, arguments.common.threads, bar.listener("reading"));
   if (loaded && options.iso && !input.heeds_iso()) {

@@ -61,9 +61,10 @@ struct DetectedFile {
 [[nodiscard]] Result<LoadedScene> load_scene(std::span<const std::byte> bytes, const LoadOptions& options = {},
                                              Threads threads = {}, const Progress& progress = {});
 
-/// Returns the files that load_scene reads in addition to `path`: files named by a scene file (which need not exist),
-/// the values of a NIfTI pair, a world's -wal file, and a mesh's materials, buffers and images. Empty if the file
-/// cannot be read. Cost: for a mesh, as read_mesh. `allowed`: see LoadOptions::sidecar_files.
+/// Returns the files that load_scene reads in addition to `path`: models and a sky image named by a scene file (which
+/// need not exist), the values of a NIfTI or NRRD pair, a world's -wal file, and a mesh's materials, buffers and
+/// images. A world's sky image is not listed. Empty if the file cannot be read. Cost: for a mesh, as read_mesh.
+/// `allowed`: see LoadOptions::sidecar_files; files that it refuses are not listed.
 [[nodiscard]] std::vector<std::filesystem::path> sidecar_files_of(const std::filesystem::path& path,
                                                                   SidecarFiles allowed = SidecarFiles::WithinFolder);
 

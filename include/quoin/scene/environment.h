@@ -64,8 +64,8 @@ struct Sky {
   /// An equirectangular image for SkyModel::Image. Its top is +y, its middle -z, and its right half +x. Must not change
   /// after rendering starts.
   std::shared_ptr<const RadianceImage> image{};
-  /// The file name of `image`, relative to the scene's file. `load_scene` reads it for scene files and worlds; for
-  /// other files see read_radiance.
+  /// The file name of `image`, relative to the scene's file. `load_scene` reads it for scene files and worlds
+  /// (LoadOptions::sky_image); for other files see read_radiance.
   std::string image_file{};
   double image_turn_radians = 0.0;   ///< rotation of `image` about the vertical axis, from -z towards +x
   std::optional<Vec3> background{};  ///< linear; path tracing shows it to the camera in place of sky and sun

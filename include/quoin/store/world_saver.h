@@ -84,13 +84,14 @@ struct LoadedWorld {
 
 /// Loads a world's scene with all chunks of level 0 into memory.
 ///
-/// Warnings: one per damaged item; it is left out of the scene but stays in the file.
+/// Warnings: one per damaged item; it is left out of the scene but stays in the file. Also one for an unreadable sky
+///           image.
 /// Errors:   CannotRead, BadFormat, Cancelled.
 [[nodiscard]] Result<LoadedWorld> load_world(const WorldStore& world, const LoadOptions& options = {},
                                              Threads threads = {}, const Progress& progress = {});
 
 /// Loads a world's scene without chunks: its grids are partial, with all chunks unloaded (Grid::make_partial). The
-/// saver saves edits of chunks that are loaded later; unloaded chunks stay as stored.
+/// saver saves edits of chunks that are loaded later; unloaded chunks stay as stored. Does not read the sky image.
 [[nodiscard]] Result<LoadedWorld> load_partial_world(const WorldStore& world, const LoadOptions& options = {});
 
 /// Writes a scene as a new world, replacing an existing file atomically. Returns its size. `more`: see

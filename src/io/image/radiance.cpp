@@ -146,6 +146,12 @@ bool has_exr() {
 
 namespace {
 
+// Deflate gives at most 1,032 bytes per byte, which is 516 grey pixels of 16 bits, so that longer images are not in the
+// file. The wavelet codecs compress only flat images more; the constant part lets small ones pass.
+constexpr std::size_t max_pixels_in(std::size_t file_bytes) {
+  return (std::size_t{1} << 16) + 516 * file_bytes;
+}
+
 // Reads the channels R, G and B, or Y. OpenEXR reports errors by exceptions, which must not leave this file.
 Result<RadianceImage> decode_exr(std::span<const std::byte> bytes, std::size_t max_pixels) {
   try {
@@ -157,6 +163,10 @@ Result<RadianceImage> decode_exr(std::span<const std::byte> bytes, std::size_t m
     if (width <= 0 || height <= 0) return make_error(ErrorCode::BadFormat, "the OpenEXR file has no pixels");
     if (static_cast<std::uint64_t>(width) > max_pixels / static_cast<std::uint64_t>(height)) {
       return make_error(ErrorCode::LimitExceeded, "the image has more than " + std::to_string(max_pixels) + " pixels");
+    }
+    if (static_cast<std::size_t>(width * height) > max_pixels_in(bytes.size())) {
+      return make_error(ErrorCode::BadFormat, "the OpenEXR file is too short for its " + std::to_string(width) + " x " +
+                                                  std::to_string(height) + " pixels");
     }
     const imf::ChannelList& channels = file.header().channels();
     const bool is_grey = channels.findChannel("R") == nullptr && channels.findChannel("Y") != nullptr;

@@ -109,6 +109,30 @@ TEST(Exr, RoundTrips) {
   }
 }
 
+TEST(Exr, RejectsSizesThatTheFileCannotHold) {
+  if (!has_exr()) GTEST_SKIP() << "built without OpenEXR";
+  const auto bytes = write_exr(1, 1, three_channels({1.0F}, ExrChannel::Type::Float16));
+  ASSERT_TRUE(bytes) << bytes.error().message;
+  std::string text(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+  for (const char* name : {"dataWindow", "displayWindow"}) {
+    const std::size_t at = text.find(name);
+    ASSERT_NE(at, std::string::npos);
+    // After name, type "box2i" and length: the box 0, 0, 8191, 8191.
+    const std::size_t box = text.find("box2i", at) + 10;
+    for (const std::size_t corner : {box + 8, box + 12}) text.replace(corner, 4, std::string("\xFF\x1F\0\0", 4));
+  }
+  text.append(std::size_t{1} << 14, '\0');  // space for the table of rows
+  const auto image = read(text);
+  ASSERT_FALSE(image);
+  EXPECT_EQ(image.error().code, ErrorCode::BadFormat);
+  EXPECT_NE(image.error().message.find("too short for its 8192 x 8192 pixels"), std::string::npos)
+      << image.error().message;
+  // A flat image compresses well, and is still read.
+  const std::size_t flat = std::size_t{2048} * 1024;
+  EXPECT_TRUE(
+      read_radiance(*write_exr(2048, 1024, three_channels(std::vector<float>(flat, 0.5F), ExrChannel::Type::Float16))));
+}
+
 TEST(Exr, ClampsValuesTooBrightForHalf) {
   if (!has_exr()) GTEST_SKIP() << "built without OpenEXR";
   const auto image = read_radiance(*write_exr(1, 1, three_channels({1e9F}, ExrChannel::Type::Float16)));

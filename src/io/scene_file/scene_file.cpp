@@ -159,6 +159,7 @@ Result<LoadedScene> load_source(const std::filesystem::path& path, const LoadOpt
   if (!format) return format.error();
   LoadOptions taken_over = options;
   taken_over.keep_source = false;
+  taken_over.sky_image = false;  // the environment is not taken over
   if (*format == FileFormat::Scene) {
     auto file = parse_scene_file(path, threads);
     if (!file) return file.error();
@@ -168,7 +169,6 @@ Result<LoadedScene> load_source(const std::filesystem::path& path, const LoadOpt
                         "a scene file that references files cannot be referenced itself; save it as one file first",
                         path.string());
     }
-    file->environment.reset();  // not taken over
     return with_path(put_together(*file, {}, taken_over, threads, progress), path);
   }
   return load_scene(path, taken_over, threads, progress);
@@ -299,7 +299,7 @@ Result<LoadedScene> put_together(SceneFile& file, const std::filesystem::path& p
   if (!bodies) return bodies.error();
   Placer(file, grids, *bodies, loaded.scene).place();
   if (std::optional<Environment>& environment = loaded.scene.environment) {
-    std::string warning = scene_json::read_sky_image(path, options.sidecar_files, environment->sky);
+    std::string warning = scene_json::read_sky_image(path, options, environment->sky);
     if (!warning.empty()) loaded.warnings.push_back(std::move(warning));
   }
   if (options.show_hidden) show_all(loaded.scene);
@@ -315,14 +315,15 @@ Result<LoadedScene> read_scene_file(const std::filesystem::path& path, const Loa
   return with_path(put_together(*file, path, options, threads, progress), path);
 }
 
-std::vector<std::filesystem::path> files_named_in_scene(const std::filesystem::path& path) {
+std::vector<std::filesystem::path> files_named_in_scene(const std::filesystem::path& path, SidecarFiles allowed) {
   const auto file = parse_scene_file(path);
   std::vector<std::filesystem::path> named;
   if (!file) return named;
-  for (const SceneFile::Source& source : file->sources) named.push_back(path.parent_path() / source.file);
-  if (file->environment && lacks_image(file->environment->sky)) {
-    named.push_back(path.parent_path() / file->environment->sky.image_file);
-  }
+  const auto add = [&](const std::string& name) {
+    if (auto found = sidecar_path(path, name, allowed)) named.push_back(std::move(*found));
+  };
+  for (const SceneFile::Source& source : file->sources) add(source.file);
+  if (file->environment && lacks_image(file->environment->sky)) add(file->environment->sky.image_file);
   return named;
 }
 

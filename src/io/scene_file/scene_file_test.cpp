@@ -410,6 +410,7 @@ TEST_F(SceneFiles, ReadSkyImages) {
   EXPECT_TRUE(lacks_image(missing->scene.environment->sky));
   ASSERT_EQ(missing->warnings.size(), 1U);
   EXPECT_EQ(missing->warnings[0].find("left out: the image of the sky \"sky.hdr\": "), 0U) << missing->warnings[0];
+  EXPECT_TRUE(sky_of("sky.hdr", {.sky_image = false})->warnings.empty());
 
   std::ofstream(folder_ / "sky.hdr", std::ios::binary) << "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n"
                                                        << std::string("\x80\0\0\x81", 4);
@@ -434,6 +435,43 @@ TEST_F(SceneFiles, ReadSkyImages) {
   ASSERT_TRUE(from_bytes) << to_string(from_bytes.error());
   ASSERT_EQ(from_bytes->warnings.size(), 1U);
   EXPECT_NE(from_bytes->warnings[0].find("by path, not from bytes"), std::string::npos) << from_bytes->warnings[0];
+}
+
+TEST_F(SceneFiles, ListOnlyReadableSidecarFiles) {
+  const auto files_of = [&](const std::string& sky, const std::string& model, SidecarFiles allowed) {
+    return sidecar_files_of(write_text(R"({"quoin_scene": 6, "environment": {"sky": {"model": "image")" + sky +
+                                       R"(}}, "files": [{"id": "r", "path": ")" + model + R"("}], "instances": []})"),
+                            allowed);
+  };
+  using Files = std::vector<fs::path>;
+  constexpr auto kWithin = SidecarFiles::WithinFolder;
+  EXPECT_EQ(files_of("", "red.vox", kWithin), Files{folder_ / "red.vox"}) << "no image";
+  EXPECT_EQ(files_of(R"(, "image": "skies\\day.hdr")", "red.vox", kWithin),
+            (Files{folder_ / "red.vox", folder_ / "skies/day.hdr"}));
+  EXPECT_EQ(files_of(R"(, "image": "../day.hdr")", "../red.vox", kWithin), Files{});
+  EXPECT_EQ(files_of(R"(, "image": "../day.hdr")", "../red.vox", SidecarFiles::Anywhere),
+            (Files{folder_ / "../red.vox", folder_ / "../day.hdr"}));
+}
+
+TEST_F(SceneFiles, WarnWhenSavedAwayFromTheSkyImage) {
+  LoadedScene loaded;
+  Sky& sky = loaded.scene.environment.emplace().sky;
+  sky.model = SkyModel::Image;
+  const auto warnings_at = [&](const fs::path& path) {
+    const auto saved = save_scene(loaded, path);
+    EXPECT_TRUE(saved) << to_string(saved.error());
+    EXPECT_EQ(unsupported_features(loaded, path).value(), saved->warnings);
+    return saved->warnings;
+  };
+  EXPECT_EQ(warnings_at(folder_ / "a.json"),
+            std::vector<std::string>{"the sky image is left out: it has no file name"});
+  sky.image_file = "sky.hdr";
+  std::ofstream(folder_ / "sky.hdr") << "an image";
+  EXPECT_TRUE(warnings_at(folder_ / "a.json").empty());
+  fs::create_directory(folder_ / "other");
+  EXPECT_EQ(warnings_at(folder_ / "other/a.json"),
+            std::vector<std::string>{
+                "the sky image is left out: the saved file names \"sky.hdr\", which is not in its folder"});
 }
 
 TEST_F(SceneFiles, AreParsedByPath) {

@@ -569,11 +569,11 @@ Environment environment_from(const Json& json, const Place& place, Faults& fault
   return environment;
 }
 
-std::string read_sky_image(const std::filesystem::path& from, SidecarFiles allowed, Sky& sky) {
-  if (!lacks_image(sky)) return "";
+std::string read_sky_image(const std::filesystem::path& from, const LoadOptions& options, Sky& sky) {
+  if (!options.sky_image || !lacks_image(sky)) return "";
   std::string reason = "load the scene by path, not from bytes";
   if (!from.empty()) {
-    const auto path = sidecar_path(from, sky.image_file, allowed);
+    const auto path = sidecar_path(from, sky.image_file, options.sidecar_files);
     auto image = path ? read_radiance(*path) : Result<RadianceImage>(path.error());
     if (image) {
       sky.image = std::make_shared<const RadianceImage>(std::move(*image));

@@ -4,7 +4,7 @@
 #include <string>
 
 #include <nlohmann/json.hpp>
-#include <quoin/io/file.h>
+#include <quoin/io/loaded_scene.h>
 #include <quoin/io/scene_file.h>
 
 #include "io/scene_file/json_reader.h"
@@ -52,8 +52,9 @@ class PartWriter {
 [[nodiscard]] Environment environment_from(const Json& json, const Place& place, Faults& faults);
 
 /// Reads the sky's image, which a scene file or world names relative to itself. `from`: the path of this file; empty:
-/// it was read from bytes. Returns a warning, or "" if the image was read or the sky has none.
-[[nodiscard]] std::string read_sky_image(const std::filesystem::path& from, SidecarFiles allowed, Sky& sky);
+/// it was read from bytes. Returns a warning, or "" if the image was read, or the sky or LoadOptions::sky_image needs
+/// none.
+[[nodiscard]] std::string read_sky_image(const std::filesystem::path& from, const LoadOptions& options, Sky& sky);
 
 /// Reads name, pivot and canvas.
 void read_grid_header(const Object& object, SceneGrid& grid);

@@ -190,13 +190,15 @@ Result<Volume> read_volume(const std::filesystem::path& path, const VolumeOption
   });
 }
 
-std::vector<std::filesystem::path> files_of_pair(const std::filesystem::path& path) {
+std::vector<std::filesystem::path> files_of_pair(const std::filesystem::path& path, SidecarFiles allowed) {
   const auto bytes = read_file(path);
   const auto beginning = bytes ? beginning_of(*bytes) : Result<Beginning>(bytes.error());
   if (!beginning) return {};
   const auto header = header_of(*beginning, {});
   if (!header || !header->is_data_elsewhere) return {};
-  const auto data = data_file_of(path, *header, {});
+  VolumeOptions options;
+  options.sidecar_files = allowed;
+  const auto data = data_file_of(path, *header, options);
   return data ? std::vector{*data} : std::vector<std::filesystem::path>();
 }
 

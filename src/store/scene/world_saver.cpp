@@ -396,13 +396,8 @@ class Load {
  public:
   enum class Chunks : std::uint8_t { All, None };
 
-  Load(const WorldStore& world, Chunks chunks, SidecarFiles sidecar_files, LoadedScene& loaded, SaverState& state)
-      : world_(world),
-        wanted_(chunks),
-        sidecar_files_(sidecar_files),
-        scene_(loaded.scene),
-        loaded_(loaded),
-        state_(state) {}
+  Load(const WorldStore& world, Chunks chunks, const LoadOptions& options, LoadedScene& loaded, SaverState& state)
+      : world_(world), wanted_(chunks), options_(options), scene_(loaded.scene), loaded_(loaded), state_(state) {}
 
   Status run(Threads threads, const Progress& progress) {
     auto types = world_.types();
@@ -420,6 +415,10 @@ class Load {
     }
     if (auto read = read_parts(); !read) return read;
     report_rest();
+    if (wanted_ == Chunks::All && scene_.environment) {
+      std::string warning = scene_json::read_sky_image(world_.path(), options_, scene_.environment->sky);
+      if (!warning.empty()) loaded_.warnings.push_back(std::move(warning));
+    }
     remember();
     return {};
   }
@@ -513,8 +512,6 @@ class Load {
     });
     if (!read) return read;
     read = each<Environment>(part::kEnvironment, [&](std::int64_t, Environment environment) {
-      std::string warning = scene_json::read_sky_image(world_.path(), sidecar_files_, environment.sky);
-      if (!warning.empty()) add_line(std::move(warning));
       scene_.environment = std::move(environment);
     });
     if (!read) return read;
@@ -593,7 +590,7 @@ class Load {
 
   const WorldStore& world_;
   const Chunks wanted_;
-  const SidecarFiles sidecar_files_;
+  const LoadOptions& options_;
   Scene& scene_;
   LoadedScene& loaded_;
   SaverState& state_;
@@ -609,7 +606,7 @@ class Load {
 Result<LoadedWorld> load(const WorldStore& world, Load::Chunks chunks, LoadedWorld result, SaverState& state,
                          const LoadOptions& options, Threads threads, const Progress& progress) {
   result.loaded.format = "world";
-  Load load(world, chunks, options.sidecar_files, result.loaded, state);
+  Load load(world, chunks, options, result.loaded, state);
   if (auto done = load.run(threads, progress); !done) return with_path(Result<LoadedWorld>(done.error()), world.path());
   if (options.show_hidden) show_all(result.loaded.scene);
   return result;

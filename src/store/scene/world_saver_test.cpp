@@ -153,9 +153,16 @@ TEST(WorldSaver, LoadsSkyImage) {
   const auto missing = load_scene(folder / "w.quoin");
   ASSERT_TRUE(missing && missing->warnings.size() == 1U);
   EXPECT_NE(missing->warnings[0].find("the image of the sky \"sky.hdr\""), std::string::npos) << missing->warnings[0];
+  LoadOptions without_sky;
+  without_sky.sky_image = false;
+  EXPECT_TRUE(load_scene(folder / "w.quoin", without_sky)->warnings.empty());
   const std::string pixel = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n" + std::string("\x80\0\0\x81", 4);
   ASSERT_TRUE(write_file(std::as_bytes(std::span(pixel)), folder / "sky.hdr"));
   EXPECT_FALSE(lacks_image(loaded_from(folder / "w.quoin").environment->sky));
+  const auto partial = load_partial_world(*WorldStore::open(folder / "w.quoin", WorldAccess::Read));
+  ASSERT_TRUE(partial);
+  EXPECT_TRUE(lacks_image(partial->loaded.scene.environment->sky)) << "read only with the chunks";
+  EXPECT_TRUE(partial->loaded.warnings.empty());
 }
 
 /// A world that is saved repeatedly, and its expected content.
