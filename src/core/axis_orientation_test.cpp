@@ -88,6 +88,7 @@ TEST(AxisOrientation, IsFoundNearItsMatrix) {
   EXPECT_EQ(AxisOrientation::near_matrix(glm::dmat3(0.0), 0.1), std::nullopt);
   EXPECT_EQ(AxisOrientation::near_matrix({0, 1, 0, 1, 1, 0, 0, 0, 1}, 0.1), std::nullopt) << "two entries in a row";
   EXPECT_EQ(AxisOrientation::near_matrix({1, 1, 0, 0, 0, 0, 0, 0, 1}, 0.1), std::nullopt) << "two in a column";
+  EXPECT_EQ(AxisOrientation::near_matrix({1, 0, 0, 1, 0, 0, 0, 0, 1}, 0.1), std::nullopt) << "none in a row";
 }
 
 TEST(AxisOrientationDeathTest, AssertsOnInvalidAxisOrIndex) {

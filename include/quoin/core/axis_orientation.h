@@ -63,16 +63,19 @@ class AxisOrientation {
     AxisOrientation found;
     unsigned columns = 0;
     for (std::size_t row = 0; row < 3; ++row) {
+      int entries = 0;
       for (std::size_t column = 0; column < 3; ++column) {
         const double entry = matrix[static_cast<int>(column)][static_cast<int>(row)];
         if (std::abs(entry) <= tolerance) continue;
         if (!(std::abs(std::abs(entry) - 1.0) <= tolerance)) return std::nullopt;
         found.source_[row] = static_cast<std::uint8_t>(column);
         found.is_negated_[row] = entry < 0.0;
-        columns += 1U << 2 * column;
+        columns |= 1U << column;
+        ++entries;
       }
+      if (entries != 1) return std::nullopt;
     }
-    return columns == 0b010101 ? std::optional(found) : std::nullopt;
+    return columns == 0b111 ? std::optional(found) : std::nullopt;
   }
   /// Returns the index of this orientation, 0 to 47, for files and tables.
   [[nodiscard]] constexpr int index() const {
