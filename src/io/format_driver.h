@@ -104,4 +104,7 @@ bool register_format(const FormatDriver& driver);
 /// Returns the extension of a path in lower case: ".glb".
 [[nodiscard]] std::string lower_case_extension(const std::filesystem::path& path);
 
+/// Returns the extension for writing or, for reading, all extensions of a format. Lifetime: the format's.
+[[nodiscard]] std::vector<std::string_view> extensions_of(const FormatInfo& info, FormatCapability wanted);
+
 }  // namespace quoin

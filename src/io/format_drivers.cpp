@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <deque>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <quoin/core/assert.h>
@@ -71,12 +72,12 @@ class FormatTable {
     infos_.push_back(info);
   }
 
+  static constexpr std::size_t kMost = 64;
   [[nodiscard]] bool is_full() const { return drivers_.size() == kMost; }
   [[nodiscard]] std::span<const FormatDriver* const> drivers() const { return drivers_; }
   [[nodiscard]] std::span<const FormatInfo> infos() const { return infos_; }
 
  private:
-  static constexpr std::size_t kMost = 64;
   std::vector<const FormatDriver*> drivers_;
   std::vector<FormatInfo> infos_;
 };
@@ -84,6 +85,26 @@ class FormatTable {
 FormatTable& table() {
   static FormatTable all;
   return all;
+}
+
+/// Returns true if a file can have this extension as format_with_extension compares it: in lower case, with one point,
+/// at the beginning. Blanks separate extensions.
+bool is_extension(std::string_view text) {
+  return text.size() > 1 && text.find(' ') == std::string_view::npos &&
+         lower_case_extension(std::string("a").append(text)) == text;
+}
+
+/// Returns the reason why the extensions of a new format cannot be used; empty if there is none.
+std::string find_extension_error(const FormatInfo& info) {
+  for (const std::string_view extension : extensions_of(info, FormatCapability::Read)) {
+    const std::string quoted = "extension \"" + std::string(extension) + "\"";
+    if (!is_extension(extension)) return "invalid " + quoted;
+    for (const FormatInfo& known : file_formats()) {
+      const auto others = extensions_of(known, FormatCapability::Read);
+      if (std::ranges::find(others, extension) != others.end()) return quoted + " exists";
+    }
+  }
+  return {};
 }
 
 }  // namespace
@@ -95,15 +116,15 @@ bool register_format(const FormatDriver& driver) {
 
 Status add_format(const CustomFormat& format) {
   const FormatInfo& info = format.info;
-  const auto refuse = [&](const std::string& reason) {
-    return make_error(ErrorCode::InvalidArgument, "cannot add format " + std::string(info.name()) + ": " + reason);
+  const auto refuse = [&](const std::string& reason, ErrorCode code = ErrorCode::InvalidArgument) {
+    return make_error(code, "cannot add format " + std::string(info.name()) + ": " + reason);
   };
-  if (info.name().empty() || info.extension.size() < 2 || !info.extension.starts_with('.')) {
-    return refuse("it needs a name and an extension that starts with a point");
-  }
-  for (const FormatInfo& known : file_formats()) {
-    if (known.format == info.format) return refuse("the name exists");
-    if (known.extension == info.extension) return refuse("the extension exists");
+  if (info.name().empty()) return refuse("it has no name");
+  const auto has_name = [&](const FormatInfo& known) { return known.format == info.format; };
+  if (std::ranges::any_of(file_formats(), has_name)) return refuse("the name exists");
+  if (const std::string error = find_extension_error(info); !error.empty()) return refuse(error);
+  if (!info.can(FormatCapability::Read) && !info.can(FormatCapability::Write)) {
+    return refuse("it can be neither read nor written");
   }
   const bool has_others =
       info.can(FormatCapability::Meshes) || info.can(FormatCapability::Volume) || info.can(FormatCapability::Chunks);
@@ -111,7 +132,9 @@ Status add_format(const CustomFormat& format) {
       info.can(FormatCapability::Write) != (format.encode != nullptr)) {
     return refuse("its capabilities do not match its functions");
   }
-  if (table().is_full()) return make_error(ErrorCode::LimitExceeded, "cannot add a format: there are 64");
+  if (table().is_full()) {
+    return refuse("there are " + std::to_string(FormatTable::kMost), ErrorCode::LimitExceeded);
+  }
   static std::deque<FormatDriver> added;  // with stable addresses
   added.push_back({.info = info, .detect = format.detect, .read = format.read, .encode = format.encode});
   table().add(added.back());

@@ -24,17 +24,6 @@ constexpr bool is_reading(FormatCapability wanted) {
   return (wanted | FormatCapability::Read) == wanted;
 }
 
-/// Returns the extension for writing or, for reading, all extensions of a format.
-std::vector<std::string_view> extensions_of(const FormatInfo& info, FormatCapability wanted) {
-  std::vector<std::string_view> all = {info.extension};
-  for (std::string_view rest = is_reading(wanted) ? info.also : ""; !rest.empty();) {
-    const std::size_t end = std::min(rest.find(' '), rest.size());
-    all.push_back(rest.substr(0, end));
-    rest.remove_prefix(std::min(end + 1, rest.size()));
-  }
-  return all;
-}
-
 /// Returns the sorted extensions of all formats with the capabilities.
 std::vector<std::string_view> sorted_extensions(FormatCapability wanted) {
   std::vector<std::string_view> sorted;
@@ -255,6 +244,16 @@ std::string lower_case_extension(const std::filesystem::path& path) {
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
   }
   return extension;
+}
+
+std::vector<std::string_view> extensions_of(const FormatInfo& info, FormatCapability wanted) {
+  std::vector<std::string_view> all = {info.extension};
+  for (std::string_view rest = is_reading(wanted) ? info.also : ""; !rest.empty();) {
+    const std::size_t end = std::min(rest.find(' '), rest.size());
+    all.push_back(rest.substr(0, end));
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+  }
+  return all;
 }
 
 std::optional<FormatInfo> format_with_extension(const std::filesystem::path& path, FormatCapability wanted) {

@@ -114,8 +114,13 @@ struct EncodedFile {
 
 /// A format of the calling program. Functions that do not apply are null. Errors need no path.
 struct CustomFormat {
-  FormatInfo info;  ///< has Read and Write as there are functions; none of Meshes, Volume and Chunks. Lifetime: static
-  bool (*detect)(std::span<const std::byte> beginning) = nullptr;  ///< by the first 64 KiB of a file
+  /// Has Read and Write as there are functions, at least one of them; none of Meshes, Volume and Chunks. Extensions
+  /// are in lower case, without blanks, with one point, at the beginning. Lifetime: static.
+  FormatInfo info;
+  /// Detects a file by its beginning: at least 64 KiB, or the whole file if it is shorter. detect_format(path) passes
+  /// the first 64 KiB; detect_format(bytes) and load_scene pass the whole file, load_scene also after detection by path.
+  /// Files in gzip are passed as they are, not unpacked, here and to `read`.
+  bool (*detect)(std::span<const std::byte> beginning) = nullptr;
   Result<LoadedScene> (*read)(const FormatInput& input) = nullptr;
   Result<EncodedFile> (*encode)(const FormatOutput& output) = nullptr;  ///< makes the file, which save_scene writes
 };
@@ -124,8 +129,8 @@ struct CustomFormat {
 /// formats first.
 ///
 /// Requires: no other thread reads, writes or lists formats during the call; best called first in main.
-/// Errors:   InvalidArgument if the name or extension exists or is invalid, or if the capabilities do not match the
-///           functions; LimitExceeded.
+/// Errors:   InvalidArgument if the name or an extension exists or is invalid (those of `also` count too), or if the
+///           capabilities do not match the functions; LimitExceeded beyond 64 formats, with the library's.
 [[nodiscard]] Status add_format(const CustomFormat& format);
 
 }  // namespace quoin

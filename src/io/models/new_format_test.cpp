@@ -1,6 +1,10 @@
 // The format of docs/formats/new_format.md, which shows the code between the two marks.
 
+#include <algorithm>
+#include <cstdlib>
+#include <deque>
 #include <fstream>
+#include <iostream>
 #include <sstream>
 
 #include <gtest/gtest.h>
@@ -161,6 +165,12 @@ TEST(AddedFormat, IsReadWrittenAndListed) {
   EXPECT_EQ(load_scene(path).value().scene.voxel_count(), 3);
   std::filesystem::remove(path);
   EXPECT_EQ(format_with_extension("a.dots", FormatCapability::Write)->name(), "dots");
+  EXPECT_EQ(std::ranges::count(file_formats(), FileFormat("dots"), &FormatInfo::format), 1);
+  EXPECT_NE(extensions_with(FormatCapability::Read).find(".dots, "), std::string::npos);
+  EXPECT_NE(extensions_with(FormatCapability::Write).find(".dots, "), std::string::npos);
+  const auto unknown = format_for_writing("a.unknown");
+  ASSERT_FALSE(unknown);
+  EXPECT_NE(unknown.error().message.find(".dots, "), std::string::npos) << unknown.error().message;
 }
 
 TEST(AddedFormat, RefusesInvalidFormats) {
@@ -174,16 +184,56 @@ TEST(AddedFormat, RefusesInvalidFormats) {
   };
   EXPECT_EQ(refusal([](CustomFormat& f) { f.info.format = FileFormat::Vox; }),
             "cannot add format vox: the name exists");
+  EXPECT_EQ(refusal([](CustomFormat& f) { f.info.format = FileFormat(""); }), "cannot add format : it has no name");
   EXPECT_EQ(refusal([](CustomFormat& f) { f.info.extension = ".glb"; }),
-            "cannot add format refused: the extension exists");
-  EXPECT_EQ(refusal([](CustomFormat& f) { f.info.extension = "dots"; }),
-            "cannot add format refused: it needs a name and an extension that starts with a point");
+            "cannot add format refused: extension \".glb\" exists");
+  EXPECT_EQ(refusal([](CustomFormat& f) { f.info.extension = ".kvx"; }),
+            "cannot add format refused: extension \".kvx\" exists");
+  EXPECT_EQ(refusal([](CustomFormat& f) { f.info.also = ".refused2 .glb"; }),
+            "cannot add format refused: extension \".glb\" exists");
+  EXPECT_EQ(refusal([](CustomFormat& f) { f.info.also = ".refused2 .kvx"; }),
+            "cannot add format refused: extension \".kvx\" exists");
+  for (const char* const invalid : {"", ".", "refused", "a.refused", ".Refused", ".re.fused", ".re fused", " .refused",
+                                    ".refused ", "..refused", ".re/fused"}) {
+    EXPECT_EQ(refusal([&](CustomFormat& f) { f.info.extension = invalid; }),
+              "cannot add format refused: invalid extension \"" + std::string(invalid) + "\"");
+  }
+  EXPECT_EQ(refusal([](CustomFormat& f) { f.info.also = ".refused2 .Refused3"; }),
+            "cannot add format refused: invalid extension \".Refused3\"");
+  EXPECT_EQ(refusal([](CustomFormat& f) { f.info.also = ".refused2  .refused3"; }),
+            "cannot add format refused: invalid extension \"\"");
+  EXPECT_EQ(refusal([](CustomFormat& f) {
+              f = {.info = f.info};
+              f.info.capabilities = FormatCapability::Environment;
+            }),
+            "cannot add format refused: it can be neither read nor written");
   const std::string mismatch = "cannot add format refused: its capabilities do not match its functions";
   EXPECT_EQ(refusal([](CustomFormat& f) { f.read = nullptr; }), mismatch);
   EXPECT_EQ(refusal([](CustomFormat& f) { f.detect = nullptr; }), mismatch);
   EXPECT_EQ(refusal([](CustomFormat& f) { f.info.capabilities = FormatCapability::Read; }), mismatch);
   EXPECT_EQ(refusal([](CustomFormat& f) { f.info.capabilities = f.info.capabilities | FormatCapability::Meshes; }),
             mismatch);
+}
+
+/// Adds formats until one is refused, and ends the process.
+[[noreturn]] void fill_table() {
+  static std::deque<std::string> words;  // which the formats view
+  for (int i = 0; i < 100; ++i) {
+    const std::string number = std::to_string(file_formats().size());
+    CustomFormat format = dots_format();
+    format.info.format = FileFormat(words.emplace_back("f" + number));
+    format.info.extension = words.emplace_back(".f" + number);
+    if (const Status added = add_format(format); !added) {
+      std::cerr << added.error().message;
+      std::_Exit(added.error().code == ErrorCode::LimitExceeded && file_formats().size() == 64 ? 0 : 1);
+    }
+  }
+  std::_Exit(2);
+}
+
+TEST(AddedFormatDeathTest, RefusesTheSixtyFifth) {
+  // In another process, since formats cannot be removed.
+  EXPECT_EXIT(fill_table(), testing::ExitedWithCode(0), "cannot add format f64: there are 64");
 }
 
 std::string text_of_file(const std::string& path) {
