@@ -67,6 +67,8 @@ class BlockyMesher {
 /// mesh files.
 enum class SurfaceClass : std::uint8_t { Opaque, Transparent, Emissive, EmissiveTransparent };
 inline constexpr std::size_t kSurfaceClasses = 4;
+/// Returns the class of the triangles of a type. Transparent: its visibility is Transparent; Air and Opaque count as
+/// opaque. Emissive: its emission exceeds 0; NaN does not. Any properties are valid.
 [[nodiscard]] SurfaceClass surface_class(const VoxelProperties& properties);
 
 /// Triangles of one surface class. The vertex arrays have one entry per vertex; faces share no vertices.
