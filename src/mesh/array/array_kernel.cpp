@@ -29,6 +29,8 @@ inline I solid_corners(const std::array<F, 8>& d) {
   return solid;
 }
 #else
+using smooth::solid_corners;
+
 // A register of one lane.
 using F = float;
 constexpr int kWidth = 1;
@@ -72,7 +74,7 @@ void vertices(const CornerBatch& corners, std::size_t count, const Placement& pl
     std::array<F, 8> d;
     for (std::size_t i = 0; i < 8; ++i) d[i] = load(corners.densities[i] + first);
     make_finite(d);
-    const auto [fraction, at, normal] = cell_vertex(field, d, solid_corners(d));
+    const auto [fraction, at, normal] = smooth::cell_vertex(field, d, solid_corners(d));
     const F parts[6] = {at.x, at.y, at.z, normal.x, normal.y, normal.z};
     for (int i = 0; i < 3; ++i) {
       store(batch.fractions[i] + first, parts[i]);
@@ -126,7 +128,7 @@ constexpr Kernel make_kernel() {
 
 }  // namespace
 
-const Kernel QUOIN_KERNEL(Kernel) = make_kernel();
+constinit const Kernel QUOIN_KERNEL(Kernel) = make_kernel();
 
 #ifndef QUOIN_KERNEL_AVX2
 constinit const KernelTable<Kernel> kKernels = QUOIN_KERNEL_TABLE(Kernel, Avx2);

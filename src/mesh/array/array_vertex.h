@@ -16,7 +16,14 @@
 
 namespace quoin::array {
 
-using namespace smooth;
+using smooth::all_of;
+using smooth::edge_end;
+using smooth::edge_start;
+using smooth::NumberOf;
+using smooth::only;
+using smooth::select;
+using smooth::signs_differ;
+using smooth::unit_normal;
 
 // NaN counts as air, at the greatest distance from the surface of all corners.
 template <class D>
