@@ -51,7 +51,7 @@ struct KernelTable {
 // A kernel's source is compiled once for each instruction set (cmake/QuoinKernels.cmake). It defines kPlainKernel,
 // kAvx2Kernel or kAvx512Kernel and, when compiled for the plain set, the table of them:
 //
-//   const Kernel QUOIN_KERNEL(Kernel) = {...};
+//   constinit const Kernel QUOIN_KERNEL(Kernel) = {...};
 //   #ifndef QUOIN_KERNEL_AVX2
 //   constinit const KernelTable<Kernel> kKernels = QUOIN_KERNEL_TABLE(Kernel, Avx512);
 //   #endif

@@ -52,7 +52,7 @@ void update_row(const TriangleInRow& triangle, int first, int end, float* square
 
 }  // namespace
 
-const Kernel QUOIN_KERNEL(Kernel) = {&update_row};
+constinit const Kernel QUOIN_KERNEL(Kernel) = {&update_row};
 
 #ifndef QUOIN_KERNEL_AVX2
 constinit const KernelTable<Kernel> kKernels = QUOIN_KERNEL_TABLE(Kernel, Avx512);

@@ -226,7 +226,7 @@ void mesh_chunk(const Job& whole, Scratch& s, QuadBuffer& out) {
 
 }  // namespace
 
-const Kernel QUOIN_KERNEL(Kernel) = {&mesh_chunk, &find_all_faces, &count_all_faces};
+constinit const Kernel QUOIN_KERNEL(Kernel) = {&mesh_chunk, &find_all_faces, &count_all_faces};
 
 #ifndef QUOIN_KERNEL_AVX2
 constinit const KernelTable<Kernel> kKernels = QUOIN_KERNEL_TABLE(Kernel, Avx2);

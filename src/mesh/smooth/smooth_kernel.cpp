@@ -189,7 +189,7 @@ void occlude(Work& work, int z, std::size_t count, float* occlusion) {
 
 }  // namespace
 
-const Kernel QUOIN_KERNEL(Kernel) = {&mesh, &occlude};
+constinit const Kernel QUOIN_KERNEL(Kernel) = {&mesh, &occlude};
 
 #ifndef QUOIN_KERNEL_AVX2
 constinit const KernelTable<Kernel> kKernels = QUOIN_KERNEL_TABLE(Kernel, Avx2);

@@ -17,8 +17,8 @@
 
 namespace quoin::trace {
 
-const FieldKernel QUOIN_KERNEL(FieldKernel) = {first_in_field<true>, first_in_field<false>, first_hits_in_field,
-                                               any_hits_in_field};
+constinit const FieldKernel QUOIN_KERNEL(FieldKernel) = {first_in_field<true>, first_in_field<false>,
+                                                         first_hits_in_field, any_hits_in_field};
 
 }  // namespace quoin::trace
 
@@ -147,7 +147,7 @@ bool walk_in_field(const OccupancyTree& cells, const FieldView& field, const Ray
   return found.has_value();
 }
 
-const FieldKernel kPlainFieldKernel = {nullptr, nullptr, nullptr, nullptr};
+constinit const FieldKernel kPlainFieldKernel = {nullptr, nullptr, nullptr, nullptr};
 
 constinit const KernelTable<FieldKernel> kFieldKernels = QUOIN_KERNEL_TABLE(FieldKernel, Avx512);
 

@@ -328,12 +328,13 @@ std::uint32_t any_one_by_one(const TreeView& tree, const RayPacket& rays, std::u
 namespace quoin::trace {
 
 #if defined(QUOIN_KERNEL_AVX512)
-const Kernel QUOIN_KERNEL(Kernel) = {first_single<PathTracer>, any_short_single, trace_first, trace_any};
+constinit const Kernel QUOIN_KERNEL(Kernel) = {first_single<PathTracer>, any_short_single, trace_first, trace_any};
 #elif defined(QUOIN_KERNEL_AVX2)
-const Kernel QUOIN_KERNEL(Kernel) = {first_single<PathTracer>, any_single<PathTracer>, trace_first, trace_any};
+constinit const Kernel QUOIN_KERNEL(Kernel) = {first_single<PathTracer>, any_single<PathTracer>, trace_first,
+                                               trace_any};
 #else
-const Kernel QUOIN_KERNEL(Kernel) = {first_single<PlainTracer>, any_single<PlainTracer>, first_one_by_one,
-                                     any_one_by_one};
+constinit const Kernel QUOIN_KERNEL(Kernel) = {first_single<PlainTracer>, any_single<PlainTracer>, first_one_by_one,
+                                               any_one_by_one};
 
 constinit const KernelTable<Kernel> kKernels = QUOIN_KERNEL_TABLE(Kernel, Avx512);
 #endif

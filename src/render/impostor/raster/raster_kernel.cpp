@@ -317,7 +317,7 @@ void draw_faces(const Job& job, Canvas& canvas) {
 
 }  // namespace
 
-const Draw QUOIN_KERNEL(Draw) = draw_faces;
+constinit const Draw QUOIN_KERNEL(Draw) = draw_faces;
 
 #ifndef QUOIN_KERNEL_AVX2
 constinit const KernelTable<Draw> kDraws = QUOIN_KERNEL_TABLE(Draw, Avx512);

@@ -391,7 +391,7 @@ void pairs(const BlockLanes<std::uint32_t>& pixel, std::uint32_t sample, std::ui
 
 }  // namespace
 
-const Kernel QUOIN_KERNEL(Kernel) = {&shade, &choose_lamps, &pairs};
+constinit const Kernel QUOIN_KERNEL(Kernel) = {&shade, &choose_lamps, &pairs};
 
 #ifndef QUOIN_KERNEL_AVX2
 constinit const KernelTable<Kernel> kKernels = QUOIN_KERNEL_TABLE(Kernel, Avx512);

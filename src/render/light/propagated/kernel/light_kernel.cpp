@@ -394,8 +394,8 @@ SlabKinds merge(const std::uint64_t* before, const std::uint64_t* inside, std::u
 
 }  // namespace
 
-const Kernel QUOIN_KERNEL(Kernel) = {&spread,    &take_sky, &find_blocks, &find_rows,   &unpack,    &shift_in,
-                                     &read_slab, &merge,    &pack_slab,   &unpack_slab, &unpack_row};
+constinit const Kernel QUOIN_KERNEL(Kernel) = {&spread,    &take_sky, &find_blocks, &find_rows,   &unpack,    &shift_in,
+                                               &read_slab, &merge,    &pack_slab,   &unpack_slab, &unpack_row};
 
 #ifndef QUOIN_KERNEL_AVX2
 constinit const KernelTable<Kernel> kKernels = QUOIN_KERNEL_TABLE(Kernel, Avx512);
