@@ -198,7 +198,7 @@ Status DeviceLamps::put(ShaderMemory& memory, std::shared_ptr<const LampTable> n
 Status DeviceLevels::put_changes(ShaderMemory& memory, const LightBricks& now, const LightBricks::Changed& changed) {
   const auto all_bricks = std::as_bytes(now.bricks());
   const auto all_numbers = std::as_bytes(now.numbers());
-  if (changed.all || table == nullptr || all_numbers.size() > numbers.size) {
+  if (changed.all || all_numbers.size() > numbers.size) {
     memory.release(numbers);
     const auto larger = memory.allocate(all_numbers.size() + all_numbers.size() / 4 + 4, "uploading light");
     if (!larger) return larger.error();
@@ -222,13 +222,20 @@ Status DeviceLevels::put_changes(ShaderMemory& memory, const LightBricks& now, c
 }
 
 Status DeviceLevels::put(ShaderMemory& memory, LightBricks& now) {
-  const LightBricks::Changed changed = now.take_changes();
-  if (table != nullptr && !changed.all && changed.slots.empty()) return {};
-  Status done = put_changes(memory, now, changed);
-  if (done) done = memory.flush();
-  if (!done) memory.discard();
-  table = done ? &now : nullptr;
-  return done;
+  const bool knows_all = std::exchange(table, nullptr) != nullptr;
+  if (!knows_all) memory.discard();  // a call that threw may have left writes
+  LightBricks::Changed changed = now.take_changes();
+  changed.all |= !knows_all;
+  if (changed.all || !changed.slots.empty()) {
+    Status done = put_changes(memory, now, changed);
+    if (done) done = memory.flush();
+    if (!done) {
+      memory.discard();
+      return done;
+    }
+  }
+  table = &now;
+  return {};
 }
 
 std::vector<LampPlace> DeviceScene::lamp_places(const Scene& scene) const {
