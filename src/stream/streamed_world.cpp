@@ -236,7 +236,10 @@ void StreamedWorld::Impl::follow_instances() {
     for (auto& [number, grid] : grids) grid.placements.clear();
     grid_of_instance.clear();
   }
-  for (const InstanceHandle handle : changes->all ? scene().instances().handles() : changes->instances) follow(handle);
+  if (changes->all) {
+    for (const InstanceHandle handle : scene().instances().handles()) follow(handle);
+  }
+  for (const InstanceHandle handle : changes->instances) follow(handle);
   changes.commit();
 }
 
@@ -331,9 +334,16 @@ void StreamedWorld::Impl::note_edits() {
         for (const auto& [chunk, size] : of.sizes) of.kept.insert(chunk);
       }
     };
-    if (content->grid.has_changed_since(grid.voxels)) note(content->grid.changes_since(grid.voxels));
-    if (content->grid.has_data_changed_since(grid.data)) note(content->grid.data_changes_since(grid.data));
-    if (content->field.has_changed_since(grid.densities)) note(content->field.changes_since(grid.densities));
+    // If `note` throws, the next call reads the changes again.
+    ChangeCursor voxels = grid.voxels;
+    ChangeCursor data = grid.data;
+    ChangeCursor densities = grid.densities;
+    if (content->grid.has_changed_since(voxels)) note(content->grid.changes_since(voxels));
+    if (content->grid.has_data_changed_since(data)) note(content->grid.data_changes_since(data));
+    if (content->field.has_changed_since(densities)) note(content->field.changes_since(densities));
+    grid.voxels = voxels;
+    grid.data = data;
+    grid.densities = densities;
   }
 }
 
@@ -341,10 +351,11 @@ Status StreamedWorld::Impl::save_now() {
   saved = Clock::now();
   moved_since_save = 0;
   if (!store.is_writable()) return {};
-  saved_types = scene().types.cursor();
+  const ChangeCursor types = scene().types.cursor();
   const auto ticket = world.saver.save(store, scene(), {}, [to = disk](const Status& outcome) { to->put(outcome); });
   handed_over = ticket ? Status() : Status(ticket.error());
   if (!ticket) return ticket.error();
+  saved_types = types;
   is_edited = false;
   return {};
 }
