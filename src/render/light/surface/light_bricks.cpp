@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <utility>
 
 #include <quoin/core/assert.h>
 #include <quoin/grid/changes.h>
@@ -207,7 +208,8 @@ void LightBricks::update(const Scene& scene, const SceneLight& light, Threads th
                         std::all_of(grids_.begin(), grids_.end(),
                                     [&](const OfGrid& each) { return scene.grids().find(each.handle) != nullptr; });
   PendingChanges types(followed_types_, scene.types);
-  if (!is_known || !types->empty()) begin_anew(scene);
+  const bool was_unfinished = std::exchange(is_unfinished_, true);
+  if (!is_known || !types->empty() || was_unfinished) begin_anew(scene);
   for (std::size_t grid = 0; grid < grids_.size(); ++grid) {
     OfGrid& of = grids_[grid];
     const GridLight content = light.of(of.handle);
@@ -225,6 +227,7 @@ void LightBricks::update(const Scene& scene, const SceneLight& light, Threads th
     levels.commit();
   }
   types.commit();
+  is_unfinished_ = false;
 }
 
 void LightCache::update() {

@@ -87,6 +87,7 @@ class LightBricks {
   std::vector<std::uint32_t> free_;  // where numbers may begin
   std::vector<OfGrid> grids_;        // in the order of their handles
   ChangeCursor followed_types_;
+  bool is_unfinished_ = false;  // the last update threw
   Changed changed_;
 };
 

@@ -100,9 +100,9 @@ void SceneLight::update(const Scene& scene, Threads threads) {
   std::erase_if(grids_, [&](const auto& each) { return scene.grids().find(each.first) == nullptr; });
   for (const GridHandle handle : scene.grids().handles()) {
     const SceneGrid& grid = scene.grids()[handle];
-    std::unique_ptr<Entry>& entry = grids_[handle];
-    if (entry == nullptr) entry = std::make_unique<Entry>(options_);
-    entry->update(grid, scene.types, threads);
+    auto entry = grids_.find(handle);
+    if (entry == grids_.end()) entry = grids_.emplace(handle, std::make_unique<Entry>(options_)).first;
+    entry->second->update(grid, scene.types, threads);
   }
 }
 
@@ -120,7 +120,9 @@ std::size_t SceneLight::bytes() const {
 
 GridLight SceneLight::of(GridHandle grid) const {
   const auto found = grids_.find(grid);
-  const Entry& entry = found == grids_.end() ? impl_of(unknown_) : *found->second;
+  // An update that threw may have left an entry without voxels.
+  const bool is_known = found != grids_.end() && found->second->voxels != nullptr;
+  const Entry& entry = is_known ? *found->second : impl_of(unknown_);
   return {&entry.light, entry.voxels};
 }
 
