@@ -198,6 +198,7 @@ Error SmoothScene::Impl::refuse(const Scene& of) {
 
 // Rebuilds the scene with all grids in place.
 void SmoothScene::Impl::place_all(const Scene& of) {
+  is_placed_anew = true;  // until all is placed
   Scene placed;
   for (auto& [handle, fields] : grids) {
     const SceneGrid& grid = of.grids()[handle];
