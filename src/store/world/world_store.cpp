@@ -436,27 +436,29 @@ Result<SaveTicket> WorldStore::save(WorldChanges changes, std::function<void(con
   // Under the lock: two threads that put types must not overtake each other.
   const std::scoped_lock guard(impl_->mutex);
   std::shared_ptr<const WorldRules> rules = impl_->rules;
+  std::uint32_t next_after = impl_->next_grid;
+  bool stores_next_grid = false;
   if (WorldRules::concern(content)) {
     auto now = rules->after(content);
     if (!now) return with_path(Result<SaveTicket>(now.error()), impl_->path);
-    std::uint32_t next_after = impl_->next_grid;
     for (const auto& [key, body] : content.parts) {
       const auto* const number = std::get_if<std::int64_t>(&key.id);
       const bool is_grid = key.kind == part::kGrid && body && number != nullptr;
       if (is_grid) next_after = std::max(next_after, static_cast<std::uint32_t>(*number) + 1);
     }
-    if (next_after > impl_->saved_next_grid) {
-      impl_->next_grid = next_after;
-      impl_->saved_next_grid = next_after;
-      content.parts.insert_or_assign({part::kWorld, std::string("next_grid")},
-                                     body_of(std::to_string(impl_->next_grid)));
+    stores_next_grid = next_after > impl_->saved_next_grid;
+    if (stores_next_grid) {
+      content.parts.insert_or_assign({part::kWorld, std::string("next_grid")}, body_of(std::to_string(next_after)));
     }
     rules = std::make_shared<const WorldRules>(std::move(*now));
   }
   if (auto done = check_changes(content, *rules); !done)
     return with_path(Result<SaveTicket>(done.error()), impl_->path);
-  impl_->rules = rules;
-  return impl_->writer->save(std::move(content), std::move(on_saved));
+  const SaveTicket ticket = impl_->writer->save(std::move(content), std::move(on_saved));
+  // A save that is refused or throws leaves these as they were.
+  impl_->rules = std::move(rules);
+  if (stores_next_grid) impl_->next_grid = impl_->saved_next_grid = next_after;
+  return ticket;
 }
 
 Status WorldStore::wait(SaveTicket ticket) {

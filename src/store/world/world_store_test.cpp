@@ -328,6 +328,26 @@ TEST(WorldStore, NeverReusesGridNumbers) {
   EXPECT_EQ(WorldStore::open(path, WorldAccess::Write)->next_grid(), 8U);
 }
 
+TEST(WorldStore, StoresNextGridNumberAfterRefusedSave) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  {
+    WorldStore world = made(path);
+    WorldChanges refused;
+    refused.put_grid(7, {});
+    refused.put_chunk({9, 0, {0, 0, 0}}, {Chunk(1)});  // of an undefined grid
+    EXPECT_FALSE(world.save(std::move(refused)));
+    WorldChanges accepted;
+    accepted.put_grid(7, {});
+    ASSERT_TRUE(world.save(std::move(accepted)));
+    WorldChanges gone;
+    gone.remove_grid(7);
+    ASSERT_TRUE(world.save(std::move(gone)));
+    ASSERT_TRUE(world.flush());
+  }
+  EXPECT_EQ(WorldStore::open(path, WorldAccess::Write)->next_grid(), 8U);
+}
+
 TEST(WorldStore, CallbacksCanUseClosingWorld) {
   const WorldFolder folder;
   std::uint32_t number = 0;
