@@ -240,7 +240,7 @@ Result<std::int64_t> Connection::number(const char* sql) {
   if (!statement) return statement.error();
   const auto row = statement->step();
   if (!row) return row.error();
-  if (!*row) return make_error(ErrorCode::BadFormat, "the world header is missing");
+  if (!*row) return make_error(ErrorCode::BadFormat, "a query returned no row");
   return statement->integer(0);
 }
 
