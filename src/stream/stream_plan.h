@@ -176,8 +176,7 @@ class StreamBudget {
   /// Returns true if the memory in use exceeds the budget.
   [[nodiscard]] bool is_over() const { return used() > static_cast<double>(budget_); }
   /// Returns the bytes of chunks that may still be read while workers process `begun` chunks; negative if too many
-  /// bytes
-  /// are already expected.
+  /// bytes are already expected.
   [[nodiscard]] std::int64_t room(std::size_t begun) const;
   /// Returns the expected bytes of an unknown chunk.
   [[nodiscard]] std::int64_t guess() const;

@@ -57,7 +57,8 @@ class WorldSaver {
   /// saved in the same commit: game values or a thumbnail, for example.
   /// Errors:   InvalidArgument, and nothing is saved, for unregistered voxel types, numbers that are not finite, or an
   ///           instance whose grid does not exist. With a default-constructed saver, also if the world already holds a
-  ///           scene or other types. For write errors, see WorldStore::save.
+  ///           scene or other types. For write errors, see WorldStore::save. If it throws bad_alloc, the next save
+  ///           stores everything.
   /// Cost:     O(changes); O(chunks) the first time.
   /// Requires: the same world and scene (or a snapshot of it) in every call; the world is open for writing.
   Result<SaveTicket> save(WorldStore& world, const Scene& scene, WorldChanges more = {},

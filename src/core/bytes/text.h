@@ -42,7 +42,7 @@ struct JsonExtent {
 /// Encodes bytes as base64 with padding (RFC 4648, section 4).
 [[nodiscard]] std::string to_base64(std::span<const std::byte> bytes);
 
-/// Errors: BadFormat for text that `to_base64` does not produce, with the offset in `text`.
+/// Decodes base64. Errors: BadFormat for text that `to_base64` does not produce, with the offset in `text`.
 [[nodiscard]] Result<std::vector<std::byte>> from_base64(std::string_view text);
 
 }  // namespace quoin
