@@ -100,9 +100,7 @@ TEST(SceneChanges, ReportChangesSinceEachCursor) {
     for (Consumer& each : consumers) each.instances.insert(instance);
   };
   for (int round = 0; round < 600; ++round) {
-    const auto any = [&](auto& all) -> auto& {
-      return all[random() % all.size()];
-    };
+    const auto any = [&](auto& all) -> auto& { return all[random() % all.size()]; };
     switch (random() % 8) {
       case 0:
         reported_change(grids.emplace_back(scene.add_grid({})));

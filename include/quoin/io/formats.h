@@ -118,8 +118,8 @@ struct CustomFormat {
   /// are in lower case, without blanks, with one point, at the beginning. Lifetime: static.
   FormatInfo info;
   /// Detects a file by its beginning: at least 64 KiB, or the whole file if it is shorter. detect_format(path) passes
-  /// the first 64 KiB; detect_format(bytes) and load_scene pass the whole file, load_scene also after detection by path.
-  /// Files in gzip are passed as they are, not unpacked, here and to `read`.
+  /// the first 64 KiB; detect_format(bytes) and load_scene pass the whole file, load_scene also after detection by
+  /// path. Files in gzip are passed as they are, not unpacked, here and to `read`.
   bool (*detect)(std::span<const std::byte> beginning) = nullptr;
   Result<LoadedScene> (*read)(const FormatInput& input) = nullptr;
   Result<EncodedFile> (*encode)(const FormatOutput& output) = nullptr;  ///< makes the file, which save_scene writes
