@@ -93,7 +93,7 @@ class BusyScene {
       const auto grids = scene.grids().handles();
       const auto instances = scene.instances().handles();
       SceneGrid& grid = scene.edit(grids[below(grids.size())]);
-      switch (below(9)) {
+      switch (below(10)) {
         case 0:
         case 1:
         case 2:
@@ -114,7 +114,10 @@ class BusyScene {
           instance.position.y += 1.0;
           break;
         }
-        case 7:
+        case 7:  // the chunk disappears
+          grid.grid.fill_box({{64, 0, 0}, {128, 64, 64}}, kAir);
+          break;
+        case 8:
           if (instances.size() > 4) scene.remove_instance(instances[below(instances.size())]);
           break;
         default: {
@@ -150,13 +153,14 @@ class BusyScene {
 };
 
 /// Calls `update` after edits while the n-th allocation fails, for growing n. Calls it again without a failure, and
-/// expects `is_current` to return true. Larger `growth`: smaller steps of n.
+/// expects `is_current` to return true. `growth`: factor from each n to the next.
 void expect_recovery(BusyScene& busy, const std::function<void()>& update, const std::function<bool()>& is_current,
-                     std::int64_t growth = 8) {
+                     double growth = 1.125) {
   update();
   int failures = 0;
-  int successes = 0;
-  for (std::int64_t n = 0; n < 100'000 && successes < 9; n += 1 + n / growth) {
+  std::int64_t last_reached = 0;
+  for (std::int64_t n = 0; n < 100'000 && n < 9 + 3 * last_reached;
+       n = 1 + static_cast<std::int64_t>(static_cast<double>(n) * growth)) {
     busy.edit();
     allocations_left = n;
     bool has_failed = false;
@@ -165,7 +169,7 @@ void expect_recovery(BusyScene& busy, const std::function<void()>& update, const
     } catch (const std::bad_alloc&) {
       has_failed = true;
     }
-    successes = std::exchange(allocations_left, -1) >= 0 ? successes + 1 : 0;
+    if (std::exchange(allocations_left, -1) < 0) last_reached = n;
     failures += has_failed ? 1 : 0;
     if (n % 3 == 0) busy.edit();
     update();
@@ -310,7 +314,7 @@ TEST(FailedAllocations, KeepSmoothScene) {
         SmoothScene fresh;
         return fresh.update(busy.scene, {1}) && hits(smooth.scene()) == hits(fresh.scene());
       },
-      1);
+      8.0);
 }
 
 std::vector<LightLevels> levels_of(const SceneLight& light, const Scene& scene) {
@@ -426,7 +430,8 @@ TEST(FailedAllocations, KeepPyramid) {
         for (int level = 1; level <= fresh.levels(); ++level) {
           const Grid& a = pyramid.level(level);
           const Grid& b = fresh.level(level);
-          if (a.voxel_count() != b.voxel_count() || a.bounds() != b.bounds()) return false;
+          const auto is_same = [&](IVec3 chunk) { return *a.find_chunk(chunk) == *b.find_chunk(chunk); };
+          if (a.chunks() != b.chunks() || !std::ranges::all_of(a.chunks(), is_same)) return false;
         }
         return true;
       });
@@ -458,6 +463,7 @@ TEST(FailedAllocations, KeepLiveMeshes) {
       });
 }
 
+#ifdef QUOIN_HAVE_STORE
 // A failed save stores nothing; the next one stores everything. Destructors of the JSON library allocate memory, so no
 // part that is stored as JSON changes.
 TEST(FailedAllocations, KeepSavedWorld) {
@@ -485,6 +491,7 @@ TEST(FailedAllocations, KeepSavedWorld) {
                loaded->loaded.scene.types[kGlass] == busy.scene.types[kGlass];
       });
 }
+#endif
 
 }  // namespace
 }  // namespace quoin
