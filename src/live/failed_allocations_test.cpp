@@ -158,9 +158,10 @@ void expect_recovery(BusyScene& busy, const std::function<void()>& update, const
                      double growth = 1.125) {
   update();
   int failures = 0;
+  int idle = 0;  // updates without an allocation: the edit was none that the consumer follows
   std::int64_t last_reached = 0;
-  for (std::int64_t n = 0; n < 100'000 && n < 9 + 3 * last_reached;
-       n = 1 + static_cast<std::int64_t>(static_cast<double>(n) * growth)) {
+  std::int64_t n = 0;
+  while (n < 100'000 && n < 9 + 3 * last_reached && idle < 200) {
     busy.edit();
     allocations_left = n;
     bool has_failed = false;
@@ -169,11 +170,17 @@ void expect_recovery(BusyScene& busy, const std::function<void()>& update, const
     } catch (const std::bad_alloc&) {
       has_failed = true;
     }
-    if (std::exchange(allocations_left, -1) < 0) last_reached = n;
+    const std::int64_t left = std::exchange(allocations_left, -1);
+    if (left == n) {
+      ++idle;
+      continue;
+    }
+    if (left < 0) last_reached = n;
     failures += has_failed ? 1 : 0;
     if (n % 3 == 0) busy.edit();
     update();
     ASSERT_TRUE(is_current()) << "allocation " << n << (has_failed ? " failed" : "");
+    n = 1 + static_cast<std::int64_t>(static_cast<double>(n) * growth);
   }
   EXPECT_GT(failures, 0);
 }
