@@ -21,6 +21,7 @@
 #include <quoin/render/cpu_renderer.h>
 
 #include "../apps/demo/demo_scenes.h"
+#include "core/nightly_for_tests.h"
 #include "core/srgb.h"
 #include "render/cpu/environment_for_tests.h"
 #include "render/impostor/impostor_test_support.h"
@@ -243,14 +244,13 @@ struct Findings {
 struct Views {
   int directions = 24;
   int samples = 64;  // per pixel
-  bool is_nightly = std::getenv("QUOIN_NIGHTLY") != nullptr;
 };
 
 Findings look_at(const SmallModel& model, int pixels, const Views& views) {
   Findings found;
   const int size = pixels + 8;
   // Small images render fast and contain few pixels, so more of them are rendered.
-  const int step = views.is_nightly || pixels <= 8 ? 1 : 7;
+  const int step = is_nightly() || pixels <= 8 ? 1 : 7;
   for (int i = 0; i < views.directions; i += step) {
     const Camera camera = camera_at(model, direction_of(i, views.directions), pixels, size, 0.31 * i);
     RenderOptions options = sized(size, size);
@@ -268,13 +268,13 @@ Findings look_at(const SmallModel& model, int pixels, const Views& views) {
   return found;
 }
 
-std::vector<int> sizes_of(const Views& views) {
-  if (views.is_nightly) return {64, 48, 42, 32, 21, 16, 11, 8};
+std::vector<int> sizes_of() {
+  if (is_nightly()) return {64, 48, 42, 32, 21, 16, 11, 8};
   return {48, 21, 8};
 }
 
 void expect_like_the_traced_image(const SmallModel& model, const Views& views = {}) {
-  for (const int pixels : sizes_of(views)) {
+  for (const int pixels : sizes_of()) {
     const Findings found = look_at(model, pixels, views);
     std::printf("%s, %d px: holes %.3f %% of %lld, overlap %.3f (worst %.3f), colour %.1f (worst %.1f)\n",
                 model.name.c_str(), pixels, 100.0 * found.hole_share(), static_cast<long long>(found.interior),
@@ -335,14 +335,13 @@ Changes changes_of(const SmallModel& model, int direction, double from_pixels, d
 
 // Covers every threshold between two levels, in windows of 45 steps.
 TEST(SmallImpostors, ChangeAtMostTwiceAsTracedImage) {
-  const bool is_nightly = std::getenv("QUOIN_NIGHTLY") != nullptr;
   for (const Source& source : made_models()) {
     const SmallModel model(source.name, source.make());
     double worst = 0.0;
     int window = 0;
     for (double pixels = 64.0; pixels > 8.0; pixels /= 1.25, ++window) {
-      const int first = is_nightly ? 0 : 7 * window % 24;
-      for (int direction = first; direction < (is_nightly ? 24 : first + 1); direction += 5) {
+      const int first = is_nightly() ? 0 : 7 * window % 24;
+      for (int direction = first; direction < (is_nightly() ? 24 : first + 1); direction += 5) {
         const Changes most = changes_of(model, direction, pixels, pixels / 1.25);
         // Changes below 1 of 255 are invisible.
         worst = std::max(worst, most.drawn / std::max(most.traced, 1.0));

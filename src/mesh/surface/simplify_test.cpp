@@ -15,6 +15,7 @@
 #include <quoin/grid/voxel_field.h>
 
 #include "core/death_for_tests.h"
+#include "core/nightly_for_tests.h"
 #include "mesh/smooth/smooth_cell.h"
 #include "mesh/smooth/surface_check_for_tests.h"
 #include "mesh/surface/simplify.h"
@@ -166,8 +167,7 @@ void expect_stays_closed(const SmoothMesh& whole) {
 
 TEST_F(Simplify, KeepsRandomBlobsClosed) {
   // The nightly run takes a random seed.
-  const bool is_nightly = std::getenv("QUOIN_NIGHTLY") != nullptr;
-  const std::uint32_t seed = is_nightly ? std::random_device{}() : 20U;
+  const std::uint32_t seed = is_nightly() ? std::random_device{}() : 20U;
   std::mt19937 random(seed);
   int tried = 0;
   for (int i = 0; i < 20; ++i) {

@@ -1,7 +1,6 @@
 #include "store/maintenance/page_scan.h"
 
 #include <algorithm>
-#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <map>
@@ -18,6 +17,7 @@
 #include "core/bytes/bytes.h"
 #include "core/database/connection.h"
 #include "core/death_for_tests.h"
+#include "core/nightly_for_tests.h"
 #include "store/chunk/chunk_body.h"
 #include "store/world/world_for_tests.h"
 
@@ -243,9 +243,9 @@ TEST(PageScan, FindsOnlySoundRows) {
   ASSERT_EQ(places.size(), rows.size());
   std::set<Bytes> bodies;
   for (const Row& row : rows) bodies.insert(row.body);
-  const int cases = std::getenv("QUOIN_NIGHTLY") != nullptr ? 10'000 : 1'000;
+  const int count = cases(1'000, 10'000);
   std::size_t lost = 0;
-  for (int i = 0; i < cases; ++i) {
+  for (int i = 0; i < count; ++i) {
     Bytes file = sound;
     for (std::size_t k = 1 + random() % 30; k > 0; --k) {
       // Damages single bytes, sectors and pages.
@@ -269,7 +269,7 @@ TEST(PageScan, FindsOnlySoundRows) {
       }
     }
   }
-  EXPECT_GT(lost, static_cast<std::size_t>(cases));
+  EXPECT_GT(lost, static_cast<std::size_t>(count));
 }
 
 TEST(PageScan, FindsRowsOfLog) {

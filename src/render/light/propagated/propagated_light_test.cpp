@@ -13,6 +13,7 @@
 
 #include "core/death_for_tests.h"
 #include "core/instruction_sets_for_tests.h"
+#include "core/nightly_for_tests.h"
 #include "render/light/propagated/chunk_masks.h"
 
 namespace quoin {
@@ -196,7 +197,7 @@ void edit_little(Grid& grid, std::mt19937& random) {
 TEST(PropagatedLight, MatchesSearchAfterManyEdits) {
   // A million edits only in nightly runs and in fast builds: debug and sanitizer builds take ten times as long.
 #if defined(NDEBUG) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-  const bool is_night = std::getenv("QUOIN_NIGHTLY") != nullptr;
+  const bool is_night = is_nightly();
 #else
   const bool is_night = false;
 #endif

@@ -15,6 +15,7 @@
 #include <quoin/io/image_files.h>
 #include <quoin/render/vulkan_renderer.h>
 
+#include "core/nightly_for_tests.h"
 #include "render/cpu/render_test_support.h"
 
 namespace quoin::vulkan_test {
@@ -129,6 +130,15 @@ inline Differences differences(const RenderedImage& a, const RenderedImage& b) {
     found.depths += d != e && !(std::abs(d - e) <= 1e-4F * std::max(d, e));
   }
   return found;
+}
+
+/// Returns the options of an image of half as many pixels, except in nightly runs: drivers for processors take most of
+/// the time of the tests.
+inline RenderOptions of_day(RenderOptions options) {
+  if (is_nightly()) return options;
+  options.width = options.width * 7 / 10;
+  options.height = options.height * 7 / 10;
+  return options;
 }
 
 /// Checks the differences that VulkanRenderer permits. Writes both images on failure.

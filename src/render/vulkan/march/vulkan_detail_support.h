@@ -16,7 +16,8 @@ namespace quoin::vulkan_test {
 
 class VulkanDetailTest : public VulkanTest {
  protected:
-  void compare(const Camera& camera, const RenderOptions& options, const std::string& name) {
+  void compare(const Camera& camera, const RenderOptions& whole, const std::string& name) {
+    const RenderOptions options = of_day(whole);
     const Status updated = renderer_->update(scene_);
     ASSERT_TRUE(updated) << to_string(updated.error());
     auto expected = CpuRenderer(scene_).render(camera, options);

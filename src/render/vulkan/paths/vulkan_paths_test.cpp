@@ -11,6 +11,7 @@
 #include <quoin/io/image_files.h>
 #include <quoin/render/path_tracer.h>
 
+#include "core/nightly_for_tests.h"
 #include "render/cpu/environment_for_tests.h"
 #include "render/path/town_for_tests.h"
 #include "render/vulkan/device/vulkan_for_tests.h"
@@ -202,12 +203,11 @@ TEST_F(VulkanPaths, ConvergeToCpuImage) {
 // Fields, one of them without materials, which is white. Nightly runs add glass of fields and of voxels, since their
 // shader takes a minute to compile.
 TEST_F(VulkanPaths, MatchCpuOnFields) {
-  const bool is_night = std::getenv("QUOIN_NIGHTLY") != nullptr;
-  Scene scene = is_night ? town() : Scene();
+  Scene scene = is_nightly() ? town() : Scene();
   const FieldTypes types = add_field_types(scene);
   SceneGrid hill;
   hill.field.add_sphere({0.0, 0.0, 0.0}, 6.0, types.stone);
-  hill.field.add_sphere({9.0, 2.0, 3.0}, 4.0, is_night ? types.glass : types.glow);
+  hill.field.add_sphere({9.0, 2.0, 3.0}, 4.0, is_nightly() ? types.glass : types.glow);
   scene.add_instance({"", scene.add_grid(std::move(hill)), DVec3(12.0, 4.0, 12.0)});
   SceneGrid plain;
   plain.field.edit({IVec3(-6), IVec3(7)}, [](IVec3 p, DensitySample) {
@@ -255,7 +255,9 @@ TEST_F(VulkanPaths, MatchCpuFromFarAway) {
   expect_same_light(scene, camera, options, "far", 0.01);
 }
 
+// Nightly only: its shader takes half a minute to compile.
 TEST_F(VulkanPaths, EmptySceneShowsSky) {
+  if (!is_nightly()) GTEST_SKIP() << "nightly only";
   expect_same_light(Scene(), of_town(), small(), "nothing", 0.0);
 }
 

@@ -140,7 +140,8 @@ class VulkanMeshTest : public VulkanTest {
   }
 
   /// Compares the scene's blocky meshes with the CPU renderer's image.
-  void compare(const Scene& scene, const Camera& camera, const RenderOptions& options, const std::string& name) {
+  void compare(const Scene& scene, const Camera& camera, const RenderOptions& whole, const std::string& name) {
+    const RenderOptions options = of_day(whole);
     meshes_->clear();
     put(scene, blocky_surfaces(scene));
     expect_like(drawn(camera, mesh_options(options)), render_test::taken(scene, camera, options), name);

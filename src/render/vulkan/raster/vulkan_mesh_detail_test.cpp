@@ -5,6 +5,7 @@
 #include <random>
 #include <set>
 
+#include "core/nightly_for_tests.h"
 #include "render/cpu/environment_for_tests.h"
 #include "render/impostor/impostor_test_support.h"
 #include "render/vulkan/march/vulkan_detail_support.h"
@@ -22,6 +23,7 @@ using vulkan_test::blocky_surfaces;
 using vulkan_test::bytes_that_differ;
 using vulkan_test::in_detail;
 using vulkan_test::mesh_options;
+using vulkan_test::of_day;
 using vulkan_test::with_mesh_light;
 
 class VulkanMeshDetail : public vulkan_test::VulkanMeshTest {
@@ -36,7 +38,7 @@ class VulkanMeshDetail : public vulkan_test::VulkanMeshTest {
   }
   // With merged quads, the meshes of these scenes have fewer quads than the impostors have faces.
   void compare_all(const Camera& camera, const RenderOptions& options, const std::string& name, bool merge = false) {
-    const RenderOptions lit = with_mesh_light(options);
+    const RenderOptions lit = with_mesh_light(of_day(options));
     meshes_->clear();
     put(scene_, blocky_surfaces(scene_, merge));
     expect_like(drawn(camera, mesh_options(lit)), render_test::taken(scene_, camera, lit), name);
@@ -75,7 +77,7 @@ TEST_F(VulkanMeshDetail, HalvedGridsMatchCpu) {
 }
 
 TEST_F(VulkanMeshDetail, ImpostorsMatchCpu) {
-  add_crowd(scene_, {add_blobs(scene_, 31), add_blobs(scene_, 32)}, 6, 260.0);
+  add_crowd(scene_, {add_blobs(scene_, 31), add_blobs(scene_, 32)}, cases(4, 6), 260.0);
   make_opaque();
   const Camera camera = towards({-900, 1420, -1500}, {700, 0, 700}, 0.6);
   const RenderOptions options = in_detail(320, 240, 128);
@@ -179,7 +181,7 @@ TEST_F(VulkanMeshDetail, EditsShowInEveryDetail) {
   const Camera camera = towards({-300, 420, -500}, {260, 0, 260}, 0.7);
   const GridHandle handle = scene_.instances()[scene_.instances().handles().front()].grid;
   std::mt19937 random(5);
-  for (int i = 0; i < 4; ++i) {
+  for (int i = 0; i < cases(2, 4); ++i) {
     const IVec3 at = 16 * IVec3(static_cast<int>(random() % 8) - 4, static_cast<int>(random() % 8) - 4,
                                 static_cast<int>(random() % 8) - 4);
     scene_.edit(handle).grid.fill_box({at, at + 32}, i % 2 == 0 ? VoxelType{2} : kAir);
