@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <set>
 #include <utility>
 #include <vector>
@@ -22,25 +21,28 @@ bool is_visible_layer(const Scene& scene, LayerHandle handle) {
   return layer == nullptr || layer->visible;
 }
 
-/// Returns true if all groups above show it; nullopt if the groups form a cycle.
-std::optional<bool> is_shown_without_circles(const Scene& scene, GroupHandle from) {
-  bool shown = true;
+/// Returns true if `passes` holds for a group and all groups above it, true for an invalid handle. Groups in a cycle
+/// count as top-level groups.
+template <class Passes>
+bool all_above(const Scene& scene, GroupHandle from, Passes passes) {
   std::size_t left = scene.groups().size();
-  for (const SceneGroup* group = scene.groups().find(from); group != nullptr;
-       group = scene.groups().find(group->parent)) {
-    if (left-- == 0) return std::nullopt;
-    shown = shown && group->visible && is_visible_layer(scene, group->layer);
+  bool all = true;
+  const SceneGroup* group = scene.groups().find(from);
+  for (; group != nullptr && left != 0; group = scene.groups().find(group->parent), --left) all = all && passes(*group);
+  if (group == nullptr) return all;
+  for (; scene.groups().find(from) != nullptr; from = parent_of(scene, from)) {  // there is a cycle
+    if (!passes(scene.groups()[from])) return false;
   }
-  return shown;
+  return true;
 }
 
 bool is_shown_by(const Scene& scene, GroupHandle from) {
-  if (const auto shown = is_shown_without_circles(scene, from)) return *shown;
-  for (; scene.groups().find(from) != nullptr; from = parent_of(scene, from)) {
-    const SceneGroup& group = scene.groups()[from];
-    if (!group.visible || !is_visible_layer(scene, group.layer)) return false;
-  }
-  return true;
+  return all_above(scene, from,
+                   [&](const SceneGroup& group) { return group.visible && is_visible_layer(scene, group.layer); });
+}
+
+bool is_saved_by(const Scene& scene, GroupHandle from) {
+  return all_above(scene, from, [](const SceneGroup& group) { return group.saved; });
 }
 
 }  // namespace
@@ -51,6 +53,21 @@ bool is_shown(const Scene& scene, const Instance& instance) {
 
 bool is_shown(const Scene& scene, const SceneGroup& group) {
   return group.visible && is_visible_layer(scene, group.layer) && is_shown_by(scene, group.parent);
+}
+
+bool is_saved(const Scene& scene, const Instance& instance) {
+  const SceneGrid* const grid = scene.grids().find(instance.grid);
+  return instance.saved && (grid == nullptr || grid->saved) && is_saved_by(scene, instance.group);
+}
+
+bool is_saved(const Scene& scene, const SceneGroup& group) {
+  if (!group.saved) return false;
+  const SceneGroup* above = scene.groups().find(group.parent);
+  for (std::size_t left = scene.groups().size(); left > 0 && above != nullptr; --left) {
+    if (above == &group) return true;  // in a cycle, so at the top
+    above = scene.groups().find(above->parent);
+  }
+  return is_saved_by(scene, group.parent);
 }
 
 GroupHandle parent_of(const Scene& scene, GroupHandle group) {

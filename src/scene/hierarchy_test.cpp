@@ -55,6 +55,42 @@ TEST(Hierarchy, ShowsInstanceIfAllAncestorsAreShown) {
   EXPECT_FALSE(shown());
 }
 
+TEST(Hierarchy, SavesInstanceIfGridAndAncestorsAreSaved) {
+  Scene scene;
+  const GridHandle grid = add_voxel(scene);
+  const GroupHandle street = group_below(scene, {});
+  const GroupHandle house = group_below(scene, street);
+  const InstanceHandle door = instance_below(scene, grid, house);
+  const InstanceHandle tree = instance_below(scene, grid, {});
+  const auto saved = [&](InstanceHandle handle) { return is_saved(scene, scene.instances()[handle]); };
+  ChangeCursor cursor = scene.cursor();
+  const auto expect_changed = [&](bool door_saved, bool tree_saved) {
+    EXPECT_EQ(saved(door), door_saved);
+    EXPECT_EQ(saved(tree), tree_saved);
+    EXPECT_FALSE(scene.changes_since(cursor).empty());
+    const Scene copy = scene.snapshot();
+    EXPECT_EQ(is_saved(copy, copy.instances()[door]), door_saved);
+    EXPECT_EQ(is_saved(copy, copy.instances()[tree]), tree_saved);
+  };
+  EXPECT_TRUE(saved(door) && saved(tree));
+  scene.edit(street).saved = false;
+  expect_changed(false, true);
+  EXPECT_FALSE(is_saved(scene, scene.groups()[house]));
+  scene.edit(street).saved = true;
+  scene.edit(house).saved = false;
+  expect_changed(false, true);
+  EXPECT_TRUE(is_saved(scene, scene.groups()[street]));
+  scene.edit(house).saved = true;
+  scene.edit(grid).saved = false;
+  expect_changed(false, false);
+  EXPECT_TRUE(is_saved(scene, scene.groups()[house]));
+  scene.edit(grid).saved = true;
+  scene.edit(tree).saved = false;
+  expect_changed(true, false);
+  scene.edit(door).grid = {};  // a missing grid is another error
+  expect_changed(true, false);
+}
+
 TEST(Hierarchy, ShowsAll) {
   Scene scene;
   const LayerHandle layer = scene.add_layer({"houses", false});
@@ -86,6 +122,12 @@ TEST(Hierarchy, TreatsCyclicGroupsAsTopLevel) {
   EXPECT_TRUE(is_shown(scene, scene.instances()[instance])) << "b stands at the top, and is not below a";
   scene.edit(b).visible = false;
   EXPECT_FALSE(is_shown(scene, scene.instances()[instance]));
+  scene.edit(a).saved = false;
+  EXPECT_TRUE(is_saved(scene, scene.instances()[instance]));
+  EXPECT_TRUE(is_saved(scene, scene.groups()[b]) && is_saved(scene, scene.groups()[below]));
+  scene.edit(b).saved = false;
+  EXPECT_FALSE(is_saved(scene, scene.instances()[instance]));
+  EXPECT_FALSE(is_saved(scene, scene.groups()[below]));
   scene.edit(below).parent = below;
   EXPECT_EQ(parent_of(scene, below), GroupHandle{});
 }

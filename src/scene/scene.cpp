@@ -190,7 +190,13 @@ Scene Scene::snapshot() const {
   copy.lamps = lamps;
   copy.environment = environment;
   copy.grids_ = grids_.copied([](const SceneGrid& grid) {
-    return SceneGrid{grid.name, grid.grid.snapshot(), grid.pivot, grid.canvas, grid.field.snapshot()};
+    return SceneGrid{.name = grid.name,
+                     .grid = grid.grid.snapshot(),
+                     .pivot = grid.pivot,
+                     .canvas = grid.canvas,
+                     .field = grid.field.snapshot(),
+                     .saved = grid.saved,
+                     .whole = grid.whole};
   });
   copy.instances_ = instances_.copied([](const Instance& instance) { return instance; });
   copy.groups_ = groups_.copied([](const SceneGroup& group) { return group; });

@@ -60,6 +60,13 @@ struct SceneGrid {
   /// to their shared border. A field whose samples are voxel centres (`field_from_grid`, `distance_field`) needs its
   /// own SceneGrid, with a pivot that is 0.5 lower on each axis than the voxels' pivot.
   DensityGrid field = DensityGrid();
+  /// World files (.quoin) leave out the grid and its instances if false: see `is_saved`. Must stay true for a grid that
+  /// StreamedWorld streams.
+  bool saved = true;
+  /// Stored in world files: true if StreamedWorld loads all of the grid when it opens the file, false if it loads the
+  /// chunks around viewers. Set it for grids that are small and placed many times or far apart: props, vehicles. A
+  /// StreamedWorld also stores the grids that the program adds to its scene as whole.
+  bool whole = false;
 
   /// Returns the smallest integer box around the voxels and the field's solid; empty if there are none.
   [[nodiscard]] IBox bounds() const { return unite(grid.bounds(), field.bounds()); }
@@ -89,6 +96,7 @@ struct Instance {
   LayerHandle layer = {};   ///< layer; an invalid handle: no layer
   /// Category bits defined by the game (terrain, ships, player property) that queries select by: see QueryFilter.
   std::uint32_t categories = 1;
+  bool saved = true;  ///< the instance's own flag: world files (.quoin) leave it out if false; see `is_saved`
 };
 
 using InstanceHandle = Handle<Instance>;
@@ -103,6 +111,7 @@ struct SceneGroup {
   DQuat rotation{1.0, 0.0, 0.0, 0.0};  ///< world from group; see Instance::rotation
   bool mirrored = false;               ///< see Instance::mirrored
   bool visible = true;                 ///< false hides everything below the group
+  bool saved = true;                   ///< if false, world files leave out the group and everything below it
 };
 
 /// A layer: groups and instances that are shown or hidden together, independent of the hierarchy.
@@ -121,7 +130,7 @@ enum class InstanceFilter : std::uint8_t {
 /// longer valid.
 struct SceneChanges {
   bool all = false;               ///< true if anything may have changed; the lists are then empty
-  std::vector<GridHandle> grids;  ///< added, removed or edited grids, and grids with a changed name, pivot or canvas
+  std::vector<GridHandle> grids;  ///< added, removed or edited grids, and grids with other changed settings
   /// Added, removed or changed instances, and instances below a changed group or on a changed layer.
   std::vector<InstanceHandle> instances;
   std::vector<GroupHandle> groups;  ///< added, removed or changed groups
@@ -182,7 +191,7 @@ class Scene {
   [[nodiscard]] const SlotMap<SceneGroup>& groups() const { return groups_; }
   [[nodiscard]] const SlotMap<SceneLayer>& layers() const { return layers_; }
   /// Returns a grid for editing, now or later. The scene detects every later edit of its voxels and field. This call
-  /// itself records changes of name, pivot and canvas, so make those before the next `changes_since`.
+  /// itself records changes of the other members, so make those before the next `changes_since`.
   /// Requires: the handle is valid. Lifetime: until the grid is removed, even when the scene is moved.
   [[nodiscard]] SceneGrid& edit(GridHandle handle);
   /// Returns an instance for editing and records the change. Change it before the next `changes_since`.
@@ -232,6 +241,13 @@ class Scene {
 [[nodiscard]] bool is_shown(const Scene& scene, const Instance& instance);
 /// Returns true if a group, its layer, its parent groups and their layers are all visible.
 [[nodiscard]] bool is_shown(const Scene& scene, const SceneGroup& group);
+
+/// Returns true if world files (.quoin) hold an instance: it, its grid and its parent groups are all marked as saved.
+/// Other formats write all instances. A change of a mark adds or removes its objects at the next save.
+/// Cost: O(parent groups).
+[[nodiscard]] bool is_saved(const Scene& scene, const Instance& instance);
+/// Returns true if a group and its parent groups are all marked as saved.
+[[nodiscard]] bool is_saved(const Scene& scene, const SceneGroup& group);
 
 /// Sets `visible` of every instance, group and layer. Cost: O(instances, groups and layers).
 void show_all(Scene& scene);
