@@ -50,12 +50,36 @@ TEST_F(ToolWorld, OtherCommandsReadAndWriteWorlds) {
 TEST_F(ToolWorld, InfoDescribesWorld) {
   const ToolRun text = run("world info hills.quoin");
   EXPECT_EQ(text.status, 0) << text.err;
-  EXPECT_NE(text.out.find(": world version 3"), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find(": world version 4"), std::string::npos) << text.out;
   const Json json = Json::parse(run("world info hills.quoin --json").out);
   EXPECT_EQ(json["bytes"], std::filesystem::file_size(folder_.file("hills.quoin")));
   EXPECT_EQ(json["grids"].size(), 1U);
   EXPECT_GT(json["grids"][0]["chunks"], 0);
   EXPECT_EQ(json["grids"][0]["chunk_bounds"]["max"], Json({2, 2, 2}));
+}
+
+TEST_F(ToolWorld, InfoAndCopiesKeepWholeGrids) {
+  auto loaded = load_scene(folder_.file("hills.quoin"));
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  loaded->scene.add_grid({.name = "ship", .whole = true});
+  ASSERT_TRUE(save_scene(loaded->scene, folder_.file("w.quoin")));
+  EXPECT_NE(run("world info w.quoin").out.find("Grid 1 \"ship\": 0 chunks within 0 x 0 x 0, whole"), std::string::npos);
+  EXPECT_EQ(run("world info hills.quoin").out.find("whole"), std::string::npos);
+  EXPECT_EQ(run("world backup w.quoin backup.quoin").status, 0);
+  EXPECT_EQ(run("world repair w.quoin -o repaired.quoin").status, 0);
+  EXPECT_EQ(run("convert w.quoin copy.quoin -q").status, 0);
+  EXPECT_EQ(run("world compact w.quoin").status, 0);
+  for (const char* const name : {"w.quoin", "backup.quoin", "repaired.quoin", "copy.quoin"}) {
+    const std::string file = name;
+    EXPECT_EQ(run("world check " + file).status, 0) << name;
+    const Json summary = Json::parse(run("world info " + file + " --json").out);
+    ASSERT_EQ(summary["grids"].size(), 2U) << name;
+    EXPECT_EQ(summary["grids"][0]["whole"], false) << name;
+    EXPECT_EQ(summary["grids"][1]["whole"], true) << name;
+    const Json info = Json::parse(run("info " + file + " --json").out);
+    EXPECT_FALSE(info["grids"][0].contains("whole")) << name;
+    EXPECT_EQ(info["grids"][1]["whole"], true) << name;
+  }
 }
 
 TEST_F(ToolWorld, ReportsAndRepairsDamage) {

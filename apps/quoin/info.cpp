@@ -218,6 +218,7 @@ Json grid_json(const GridReport& report, const Hierarchy& hierarchy) {
                 {"bounds", {{"min", list_of(bounds.min)}, {"max", list_of(bounds.max)}}},
                 {"instances", Json::array()}};
   for (const Instance* instance : report.instances) entry["instances"].push_back(hierarchy.of(*instance));
+  if (report.grid->whole) entry["whole"] = true;
   if (report.grid->field.chunk_count() != 0) entry["solid_samples"] = report.grid->field.solid_count();
   return entry;
 }
@@ -290,6 +291,7 @@ std::string grid_text(const Scene& scene, const GridReport& report) {
   if (report.grid->field.chunk_count() != 0) {
     text += ", a field of " + count_of(report.grid->field.solid_count(), "solid sample");
   }
+  if (report.grid->whole) text += ", whole in streamed worlds";
   text += "\n";
   if (report.instances.empty()) text += "    not placed\n";
   for (const Instance* instance : report.instances) text += instance_text(scene, *instance);

@@ -49,13 +49,14 @@ int run_info(const WorldOptions& options) {
     for (const auto& [level, chunks] : grid.by_level) levels[std::to_string(level)] = chunks;
     grids.push_back({{"number", number},
                      {"name", grid.grid.name},
+                     {"whole", grid.grid.whole},
                      {"chunks", grid.chunks},
                      {"chunk_bounds", box_of(grid.chunk_bounds)},
                      {"levels", levels}});
     const IVec3 size = grid.chunk_bounds.size();
     text += "Grid " + std::to_string(number) + (grid.grid.name.empty() ? "" : " \"" + grid.grid.name + "\"") + ": " +
             with_thousands(grid.chunks) + " chunks within " + std::to_string(size.x) + " x " + std::to_string(size.y) +
-            " x " + std::to_string(size.z) + "\n";
+            " x " + std::to_string(size.z) + (grid.grid.whole ? ", whole" : "") + "\n";
   }
   if (!options.json) return print_summary(text);
   return print_json({{"version", summary->version},

@@ -80,6 +80,7 @@ Scene field() {
   const VoxelType rock = scene.types.add(properties).value();
   SceneGrid placed;
   placed.name = "ball";
+  placed.whole = true;  // worlds store it
   placed.field.add_sphere({4.0, 4.0, 4.0}, 3.0, rock);
   Instance instance;
   instance.name = "ball";

@@ -124,7 +124,7 @@ std::optional<std::uint32_t> WorldSaver::number_of(GridHandle) const {
 Result<LoadedWorld> load_world(const WorldStore&, const LoadOptions&, Threads, const Progress&) {
   return absent();
 }
-Result<LoadedWorld> load_partial_world(const WorldStore&, const LoadOptions&) {
+Result<LoadedWorld> load_partial_world(const WorldStore&, const LoadOptions&, std::uint64_t) {
   return absent();
 }
 Result<SavedScene> write_world(const Scene&, const std::filesystem::path& path, Threads, const Progress&,

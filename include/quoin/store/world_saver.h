@@ -43,6 +43,9 @@ struct WorldView {
 ///
 /// A chunk that becomes empty through edits is stored as air (StoredChunk). Grids, instances, groups and layers keep
 /// their numbers in the world.
+/// Marks:    objects that are not to be saved (`is_saved`) are left out: an instance also if its grid is left out, or a
+///           group above it. A changed mark removes the object from the world at the next save, or adds it with a new
+///           number.
 /// Lifetime: holds no reference between calls.
 /// Threads:  as the scene.
 class WorldSaver {
@@ -55,8 +58,9 @@ class WorldSaver {
 
   /// Saves all changes as one atomic commit, in the background. Chunks are shared with the scene, not copied. `more` is
   /// saved in the same commit: game values or a thumbnail, for example.
-  /// Errors:   InvalidArgument, and nothing is saved, for unregistered voxel types, numbers that are not finite, or an
-  ///           instance whose grid does not exist. With a default-constructed saver, also if the world already holds a
+  /// Errors:   InvalidArgument, and nothing is saved, for unregistered voxel types, numbers that are not finite, an
+  ///           instance whose grid does not exist, or a partial grid of the world that is marked as not saved, because
+  ///           its unloaded chunks would be lost. With a default-constructed saver, also if the world already holds a
   ///           scene or other types. For write errors, see WorldStore::save. If it throws bad_alloc, the next save
   ///           stores everything.
   /// Cost:     O(changes); O(chunks) the first time.
@@ -65,8 +69,8 @@ class WorldSaver {
                           std::function<void(const Status&)> on_saved = {});
   /// Sets the cameras to store with the next `save`. If not called, `save` keeps the values from load_world.
   void set_view(WorldView view);
-  /// Returns the number of a grid in the world (ChunkAddress::grid), or nullopt before its first save. Cost: O(log
-  /// grids).
+  /// Returns the number of a grid in the world (ChunkAddress::grid), or nullopt before its first save and if it is left
+  /// out. Cost: O(log grids).
   [[nodiscard]] std::optional<std::uint32_t> number_of(GridHandle grid) const;
 
   // For Quoin's own sources.
@@ -92,8 +96,16 @@ struct LoadedWorld {
                                              Threads threads = {}, const Progress& progress = {});
 
 /// Loads a world's scene without chunks: its grids are partial, with all chunks unloaded (Grid::make_partial). The
-/// saver saves edits of chunks that are loaded later; unloaded chunks stay as stored. Does not read the sky image.
-[[nodiscard]] Result<LoadedWorld> load_partial_world(const WorldStore& world, const LoadOptions& options = {});
+/// saver saves edits of chunks that are loaded later; unloaded chunks stay as stored. It stores new grids that are not
+/// partial as whole. Does not read the sky image.
+///
+/// `max_whole_bytes`: if not 0, loads the grids that are stored as whole (SceneGrid::whole) with all their chunks, if
+///           these need at most this many bytes, estimated from a sample of the chunks.
+/// Warnings: as load_world.
+/// Errors:   CannotRead, BadFormat; LimitExceeded, with the grid's name, if whole grids need more than
+///           `max_whole_bytes` or more than the available memory.
+[[nodiscard]] Result<LoadedWorld> load_partial_world(const WorldStore& world, const LoadOptions& options = {},
+                                                     std::uint64_t max_whole_bytes = 0);
 
 /// Writes a scene as a new world, replacing an existing file atomically. Returns its size. `more`: see
 /// WorldSaver::save.

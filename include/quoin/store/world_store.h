@@ -49,6 +49,9 @@ struct WorldGrid {
   DVec3 pivot{0.0};   ///< as SceneGrid
   IBox canvas{};      ///< as SceneGrid
   float band = 8.0F;  ///< band of its density field, as in DensityGrid; must not change once densities are stored
+  /// True if StreamedWorld loads all of the grid when it opens the world. Grids of files of version 3 or earlier are
+  /// not whole: StreamedWorld streams them.
+  bool whole = false;
 
   bool operator==(const WorldGrid&) const = default;
 };

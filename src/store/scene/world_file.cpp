@@ -11,6 +11,7 @@
 #include <quoin/io/file.h>
 #include <quoin/store/world_saver.h>
 
+#include "core/bytes/text.h"
 #include "core/database/connection.h"
 #include "store/database/schema.h"
 #include "store/database/world_lock.h"
@@ -71,27 +72,66 @@ Result<LoadedScene> read_world_format(std::span<const std::byte> bytes, const Lo
   return load(*world, options, threads, progress);
 }
 
-std::optional<std::uint64_t> memory_of_world(const WorldStore& world) {
+namespace {
+
+// Estimates the bytes of a grid's loaded chunks from a sample.
+std::optional<double> memory_of_grid(const WorldStore& world, std::uint32_t number) {
   constexpr std::size_t kSamples = 64;
+  const auto places = world.chunks(number, 0);
+  if (!places) return std::nullopt;
+  double bytes = 0.0;
+  std::size_t read = 0;
+  const std::size_t step = std::max<std::size_t>(places->size() / kSamples, 1);
+  for (std::size_t i = 0; i < places->size(); i += step) {
+    const auto chunk = world.load_chunk({number, 0, (*places)[i]});
+    if (!chunk || !*chunk) continue;
+    ++read;
+    bytes += static_cast<double>((*chunk)->voxels.bytes());
+    if ((*chunk)->densities) bytes += static_cast<double>((*chunk)->densities->bytes());
+  }
+  return read == 0 ? 0.0 : bytes / static_cast<double>(read) * static_cast<double>(places->size());
+}
+
+}  // namespace
+
+std::optional<std::uint64_t> memory_of_world(const WorldStore& world) {
   const auto grids = world.grids();
   if (!grids) return std::nullopt;
   double total = 0.0;
   for (const auto& [number, grid] : *grids) {
-    const auto places = world.chunks(number, 0);
-    if (!places) return std::nullopt;
-    double bytes = 0.0;
-    std::size_t read = 0;
-    const std::size_t step = std::max<std::size_t>(places->size() / kSamples, 1);
-    for (std::size_t i = 0; i < places->size(); i += step) {
-      const auto chunk = world.load_chunk({number, 0, (*places)[i]});
-      if (!chunk || !*chunk) continue;
-      ++read;
-      bytes += static_cast<double>((*chunk)->voxels.bytes());
-      if ((*chunk)->densities) bytes += static_cast<double>((*chunk)->densities->bytes());
-    }
-    if (read != 0) total += bytes / static_cast<double>(read) * static_cast<double>(places->size());
+    const auto bytes = memory_of_grid(world, number);
+    if (!bytes) return std::nullopt;
+    total += *bytes;
   }
   return static_cast<std::uint64_t>(total);
+}
+
+Status check_whole_grids(const WorldStore& world, std::uint64_t max_bytes) {
+  constexpr std::uint64_t kLargestChunk = std::uint64_t{2} << 20;  // 16-bit voxels, densities and materials
+  const auto grids = world.grids();
+  if (!grids) return grids.error();
+  const std::uint64_t limit = std::min(max_bytes, available_memory().value_or(max_bytes));
+  std::uint64_t chunks = 0;
+  for (const auto& [number, grid] : *grids) {
+    if (!grid.whole) continue;
+    const auto places = world.chunks(number, 0);
+    if (!places) return places.error();
+    chunks += places->size();
+  }
+  if (chunks <= limit / kLargestChunk) return {};
+  double needed = 0.0;
+  for (const auto& [number, grid] : *grids) {
+    if (!grid.whole) continue;
+    needed += memory_of_grid(world, number).value_or(0.0);
+    if (needed <= static_cast<double>(limit)) continue;
+    return make_error(ErrorCode::LimitExceeded,
+                      "cannot load grid " + std::to_string(number) + " \"" + printable(grid.name) +
+                          "\" as a whole: the whole grids up to it need about " +
+                          megabytes(static_cast<std::uint64_t>(needed)) + " of memory; " + megabytes(limit) +
+                          (limit == max_bytes ? " are allowed" : " are available"),
+                      world.path().string());
+  }
+  return {};
 }
 
 namespace {

@@ -12,6 +12,10 @@ namespace quoin {
 /// Estimates the bytes of memory that load_world needs for a world, from a sample of its chunks. Returns nullopt if
 /// they cannot be read.
 [[nodiscard]] std::optional<std::uint64_t> memory_of_world(const WorldStore& world);
+/// Checks that the world's whole grids (WorldGrid::whole) fit in `max_bytes` and in the available memory.
+/// Cost:   reads the keys of their chunks; a sample of the chunks too, if the largest possible chunks would not fit.
+/// Errors: LimitExceeded, with the first grid that does not fit; those of reading.
+[[nodiscard]] Status check_whole_grids(const WorldStore& world, std::uint64_t max_bytes);
 
 }  // namespace quoin
 

@@ -17,8 +17,10 @@
 #include <quoin/core/changes.h>
 
 #include "core/bytes/files.h"
+#include "core/bytes/text.h"
 #include "io/scene_file/scene_parts.h"
 #include "store/database/schema.h"
+#include "store/scene/world_file.h"
 #include "store/world/part_text.h"
 #include "store/world/world_changes.h"
 
@@ -58,6 +60,7 @@ struct SaverState {
   ChangeCursor scene;
   ChangeCursor types;
   std::map<GridHandle, SavedGrid> grids;
+  std::set<GridHandle> left_out;  ///< grids of the scene that are marked as not saved
   Numbers<Instance> instances;
   Numbers<SceneGroup> groups;
   Numbers<SceneLayer> layers;
@@ -68,6 +71,7 @@ struct SaverState {
   std::size_t saved_cameras = 0;
   bool is_view_new = false;
   bool is_begun = false;         ///< the world has a state of this scene
+  bool is_partial = false;       ///< from load_partial_world: grids that are not partial are whole
   bool needs_lamp_save = false;  ///< lamp numbers differ from the scene's order
   bool needs_full_save = false;  ///< a save was refused: the next save must contain everything
   std::vector<PartKey> pending_removals;
@@ -88,6 +92,12 @@ namespace {
 constexpr auto kBefore = [](IVec3 a, IVec3 b) { return std::tie(a.z, a.y, a.x) < std::tie(b.z, b.y, b.x); };
 using ChunkSet = std::set<IVec3, decltype(kBefore)>;
 
+template <class T>
+void sort_and_unite(std::vector<Handle<T>>& handles) {
+  std::sort(handles.begin(), handles.end());
+  handles.erase(std::unique(handles.begin(), handles.end()), handles.end());
+}
+
 /// One save: collects the changes of a scene.
 class Save {
  public:
@@ -107,6 +117,7 @@ class Save {
     for (const GridHandle handle : changed.grids) {
       if (auto done = put_grid(handle); !done) return done;
     }
+    add_instances_of(marked_, changed.instances);
     for (const InstanceHandle handle : changed.instances) {
       if (auto done = put_instance(handle); !done) return done;
     }
@@ -212,12 +223,21 @@ class Save {
     return static_cast<std::size_t>(found->second);
   }
 
-  void put_groups(const std::vector<GroupHandle>& handles) {
+  void put_groups(std::vector<GroupHandle> handles) {
+    if (handles.empty()) return;
+    scene_.groups().for_each([&](GroupHandle handle, const SceneGroup& group) {  // those below a changed mark
+      if (state_.groups.numbers.contains(handle) != is_saved(scene_, group)) handles.push_back(handle);
+    });
+    sort_and_unite(handles);
+    const auto saved_group = [&](GroupHandle handle) {
+      const SceneGroup* const group = scene_.groups().find(handle);
+      return group != nullptr && is_saved(scene_, *group) ? group : nullptr;
+    };
     for (const GroupHandle handle : handles) {  // a group may come before its parent
-      if (scene_.groups().find(handle) != nullptr) state_.groups.of(handle);
+      if (saved_group(handle) != nullptr) state_.groups.of(handle);
     }
     for (const GroupHandle handle : handles) {
-      const SceneGroup* const group = scene_.groups().find(handle);
+      const SceneGroup* const group = saved_group(handle);
       if (group == nullptr) {
         remove(part::kGroup, state_.groups, handle);
         continue;
@@ -230,7 +250,7 @@ class Save {
 
   Status put_instance(InstanceHandle handle) {
     const Instance* const instance = scene_.instances().find(handle);
-    if (instance == nullptr) {
+    if (instance == nullptr || !is_saved(scene_, *instance)) {
       remove(part::kInstance, state_.instances, handle);
       return {};
     }
@@ -245,23 +265,49 @@ class Save {
     return {};
   }
 
+  // Adds the instances of grids whose mark has changed.
+  void add_instances_of(const std::set<GridHandle>& grids, std::vector<InstanceHandle>& instances) const {
+    if (grids.empty()) return;
+    scene_.instances().for_each([&](InstanceHandle handle, const Instance& instance) {
+      if (grids.contains(instance.grid)) instances.push_back(handle);
+    });
+    sort_and_unite(instances);
+  }
+
+  // Removes a grid that the scene does not have any more, or that is marked as not saved.
+  Status leave_out(GridHandle handle, const SceneGrid* grid) {
+    const auto known = state_.grids.find(handle);
+    if (grid == nullptr) {
+      state_.left_out.erase(handle);
+    } else {
+      if (known != state_.grids.end() && (grid->grid.is_partial() || grid->field.is_partial())) {
+        return make_error(ErrorCode::InvalidArgument,
+                          "cannot leave out grid \"" + printable(grid->name) +
+                              "\": it is partial, and its unloaded chunks are only in the file; remove it from the "
+                              "scene instead");
+      }
+      if (state_.left_out.insert(handle).second) marked_.insert(handle);
+    }
+    if (known == state_.grids.end()) return {};
+    remove(part::kGrid, known->second.number);
+    state_.grids.erase(known);
+    return {};
+  }
+
   Status put_grid(GridHandle handle) {
     const SceneGrid* const grid = scene_.grids().find(handle);
+    if (grid == nullptr || !grid->saved) return leave_out(handle, grid);
     auto known = state_.grids.find(handle);
-    if (grid == nullptr) {
-      if (known == state_.grids.end()) return {};
-      remove(part::kGrid, known->second.number);
-      state_.grids.erase(known);
-      return {};
-    }
     const bool is_new = known == state_.grids.end();
     if (is_new) {
+      if (state_.left_out.erase(handle) != 0) marked_.insert(handle);
       const std::uint32_t number = world_.next_grid();
       known = state_.grids.try_emplace(handle).first;
       known->second.number = number;
     }
     SavedGrid& saved = known->second;
-    const WorldGrid header{grid->name, grid->pivot, grid->canvas, grid->field.band()};
+    const bool is_streamed = !state_.is_partial || grid->grid.is_partial() || grid->field.is_partial();
+    const WorldGrid header{grid->name, grid->pivot, grid->canvas, grid->field.band(), grid->whole || !is_streamed};
     if (is_new || state_.needs_full_save || header != saved.header) changes_.put_grid(saved.number, header);
     saved.header = header;
     return put_chunks(*grid, saved, is_new);
@@ -355,6 +401,7 @@ class Save {
   SaverState& state_;
   WorldChanges& changes_;
   std::vector<PartKey> removed_;
+  std::set<GridHandle> marked_;  // left out by this save, or no longer left out
   bool had_view_ = false;
 };
 
@@ -394,7 +441,7 @@ constexpr std::size_t kMaxLines = 20;
 /// Loads a world's parts and chunks into a scene.
 class Load {
  public:
-  enum class Chunks : std::uint8_t { All, None };
+  enum class Chunks : std::uint8_t { All, OfWholeGrids, None };
 
   Load(const WorldStore& world, Chunks chunks, const LoadOptions& options, LoadedScene& loaded, SaverState& state)
       : world_(world), wanted_(chunks), options_(options), scene_(loaded.scene), loaded_(loaded), state_(state) {}
@@ -440,10 +487,11 @@ class Load {
     grid.pivot = header.pivot;
     grid.canvas = header.canvas;
     grid.field = DensityGrid(header.band);
+    grid.whole = header.whole;
     SavedGrid saved;
     saved.number = number;
     saved.header = header;
-    if (wanted_ == Chunks::None) {
+    if (wanted_ == Chunks::None || (wanted_ == Chunks::OfWholeGrids && !header.whole)) {
       grid.grid.make_partial();
       grid.field.make_partial();
       add_grid(number, std::move(grid), std::move(saved));
@@ -586,6 +634,7 @@ class Load {
     state_.view = {loaded_.camera, loaded_.cameras};
     state_.saved_cameras = loaded_.cameras.size();
     state_.is_begun = true;
+    state_.is_partial = wanted_ != Chunks::All;
   }
 
   const WorldStore& world_;
@@ -622,10 +671,15 @@ Result<LoadedWorld> load_world(const WorldStore& world, const LoadOptions& optio
   return load(world, Load::Chunks::All, std::move(result), state, options, threads, progress);
 }
 
-Result<LoadedWorld> load_partial_world(const WorldStore& world, const LoadOptions& options) {
+Result<LoadedWorld> load_partial_world(const WorldStore& world, const LoadOptions& options,
+                                       std::uint64_t max_whole_bytes) {
+  if (max_whole_bytes != 0) {
+    if (auto fits = check_whole_grids(world, max_whole_bytes); !fits) return fits.error();
+  }
   LoadedWorld result;
   SaverState& state = result.saver.impl().state;
-  return load(world, Load::Chunks::None, std::move(result), state, options, {}, {});
+  const auto chunks = max_whole_bytes == 0 ? Load::Chunks::None : Load::Chunks::OfWholeGrids;
+  return load(world, chunks, std::move(result), state, options, {}, {});
 }
 
 std::optional<std::uint32_t> WorldSaver::number_of(GridHandle grid) const {

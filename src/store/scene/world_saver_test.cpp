@@ -1,16 +1,22 @@
 #include <quoin/store/world_saver.h>
 
+#include <algorithm>
 #include <fstream>
+#include <optional>
+#include <random>
 #include <span>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 #include <quoin/io/scene_file.h>
+#include <quoin/store/world_maintenance.h>
 #include <quoin/terrain/terrain.h>
 
 #include "core/database/connection.h"
+#include "store/scene/world_file.h"
 #include "store/world/world_for_tests.h"
 
 namespace quoin {
@@ -377,6 +383,224 @@ TEST(WorldSaver, KeepsDamagedChunks) {
   ASSERT_TRUE(loaded->saver.save(*world, scene));
   ASSERT_TRUE(world->flush());
   EXPECT_EQ(load_world(*world)->loaded.warnings.size(), 1U) << "it is damaged still, not air";
+}
+
+/// Lines for the grids with their voxel counts, the groups with their parents, and the instances with their grids and
+/// groups; of saved objects only, or of all. Sorted, since numbers in a world depend on earlier saves.
+std::vector<std::string> lines_of(const Scene& scene, bool only_saved) {
+  std::vector<std::string> lines;
+  const auto name_of = [](const auto& map, auto handle) {
+    const auto* const found = map.find(handle);
+    return found == nullptr ? std::string("none") : found->name;
+  };
+  scene.grids().for_each([&](GridHandle, const SceneGrid& grid) {
+    if (only_saved && !grid.saved) return;
+    lines.push_back("grid " + grid.name + " " + std::to_string(grid.grid.voxel_count()));
+  });
+  scene.groups().for_each([&](GroupHandle handle, const SceneGroup& group) {
+    if (only_saved && !is_saved(scene, group)) return;
+    lines.push_back("group " + group.name + " in " + name_of(scene.groups(), parent_of(scene, handle)));
+  });
+  scene.instances().for_each([&](InstanceHandle, const Instance& instance) {
+    if (only_saved && !is_saved(scene, instance)) return;
+    lines.push_back("instance " + instance.name + " of " + name_of(scene.grids(), instance.grid) + " in " +
+                    name_of(scene.groups(), instance.group));
+  });
+  std::ranges::sort(lines);
+  return lines;
+}
+
+std::vector<std::string> lines_in(WorldStore& world) {
+  const Status flushed = world.is_writable() ? world.flush() : Status();
+  EXPECT_TRUE(flushed.has_value());
+  const auto loaded = load_world(world);
+  EXPECT_TRUE(loaded) << to_string(loaded.error());
+  if (!loaded) return {};
+  EXPECT_TRUE(loaded->loaded.warnings.empty()) << loaded->loaded.warnings.front();
+  EXPECT_EQ(lines_of(loaded->loaded.scene, true), lines_of(loaded->loaded.scene, false)) << "marked in the file";
+  return lines_of(loaded->loaded.scene, false);
+}
+
+/// Returns a scene of six grids, nested groups and instances of each grid in each group.
+Scene marked_scene() {
+  Scene scene;
+  scene.types = coloured_types(3);
+  std::vector<GroupHandle> groups = {{}};
+  for (int i = 0; i < 6; ++i) {
+    const GroupHandle parent = i < 2 ? GroupHandle{} : groups[static_cast<std::size_t>(i / 2)];
+    groups.push_back(scene.add_group({.name = "group " + std::to_string(i), .parent = parent}));
+  }
+  for (int i = 0; i < 6; ++i) {
+    SceneGrid grid{.name = "grid " + std::to_string(i)};
+    grid.grid.fill_box({{0, 0, 0}, {70 + i, 2, 2}}, 1);
+    const GridHandle handle = scene.add_grid(std::move(grid));
+    for (const GroupHandle group : groups) {
+      const std::string name = "instance " + std::to_string(scene.instances().size());
+      scene.add_instance({.name = name, .grid = handle, .group = group});
+    }
+  }
+  return scene;
+}
+
+TEST(WorldSaver, LeavesOutObjectsMarkedAsNotSaved) {
+  const WorldFolder folder;
+  Scene scene = marked_scene();
+  const std::vector<GridHandle> grids = scene.grids().handles();
+  const std::vector<GroupHandle> groups = scene.groups().handles();
+  scene.edit(grids[1]).saved = false;
+  scene.edit(groups[0]).saved = false;  // with the groups 2 and 3 below
+  scene.edit(scene.instances().handles()[0]).saved = false;
+  const std::vector<std::string> wanted = lines_of(scene, true);
+  EXPECT_EQ(wanted.size(), 5U + 3U + 5U * 4U - 1U);
+  ASSERT_TRUE(save_scene(scene, folder / "w.quoin"));
+  auto written = WorldStore::open(folder / "w.quoin", WorldAccess::Read);
+  ASSERT_TRUE(written);
+  EXPECT_EQ(lines_in(*written), wanted);
+  EXPECT_EQ(lines_of(scene, false).size(), 6U + 6U + 42U) << "the scene keeps them";
+  KeptWorld kept(folder / "kept.quoin");
+  ASSERT_TRUE(kept.saver().save(kept.world(), scene));
+  EXPECT_EQ(lines_in(kept.world()), wanted);
+  EXPECT_FALSE(kept.saver().number_of(grids[1]));
+  // Edits of a grid that is left out write nothing.
+  ASSERT_TRUE(kept.world().flush());
+  static_cast<void>(kept.chunks_of_last_save());
+  scene.edit(grids[1]).grid.set({1, 1, 1}, 2);
+  ASSERT_TRUE(kept.saver().save(kept.world(), scene));
+  ASSERT_TRUE(kept.world().flush());
+  EXPECT_EQ(kept.chunks_of_last_save(), 0U);
+}
+
+TEST(WorldSaver, FollowsChangedMarks) {
+  const WorldFolder folder;
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    const auto path = folder.path() / ("w" + std::to_string(seed) + ".quoin");
+    std::minstd_rand random(seed);
+    std::optional<KeptWorld> kept(path);
+    Scene scene = marked_scene();
+    const std::vector<GridHandle> grids = scene.grids().handles();
+    const std::vector<GroupHandle> groups = scene.groups().handles();
+    const std::vector<InstanceHandle> instances = scene.instances().handles();
+    const auto flip = [&](const auto& handles) {
+      auto& object = scene.edit(handles[random() % handles.size()]);
+      object.saved = !object.saved;
+    };
+    for (int save = 0; save < 40; ++save) {
+      for (unsigned i = 0; i < 1 + random() % 4; ++i) {
+        if (random() % 3 == 0) flip(grids);
+        if (random() % 3 == 0) flip(groups);
+        if (random() % 3 == 0) flip(instances);
+      }
+      scene.edit(grids[random() % grids.size()]).grid.set({static_cast<int>(random() % 300), 3, 3}, 2);
+      if (random() % 4 == 0) {  // a refused save must not lose a mark
+        const InstanceHandle broken = scene.add_instance({.name = "broken", .grid = GridHandle{99, 1}});
+        ASSERT_FALSE(kept->saver().save(kept->world(), scene));
+        scene.remove_instance(broken);
+      }
+      ASSERT_TRUE(kept->saver().save(kept->world(), scene));
+      ASSERT_EQ(lines_in(kept->world()), lines_of(scene, true)) << "seed " << seed << ", save " << save;
+    }
+    std::size_t chunks = 0;
+    for (const auto& [number, grid] : *kept->world().grids()) chunks += kept->world().chunks(number, 0)->size();
+    kept.reset();
+    const auto check = check_world(path);
+    ASSERT_TRUE(check);
+    EXPECT_TRUE(check->damage.empty());
+    EXPECT_EQ(check->chunks, chunks) << "chunks of grids that were left out are gone";
+  }
+}
+
+TEST(WorldSaver, RefusesToLeaveOutPartialGrid) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  ASSERT_TRUE(save_scene(rich_scene(), path));
+  auto world = WorldStore::open(path, WorldAccess::Write);
+  auto loaded = load_partial_world(*world);
+  ASSERT_TRUE(loaded);
+  Scene& scene = loaded->loaded.scene;
+  const GridHandle ground = scene.grids().handles().front();
+  scene.edit(ground).saved = false;
+  const auto refused = loaded->saver.save(*world, scene);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::InvalidArgument);
+  EXPECT_NE(refused.error().message.find("cannot leave out grid \"ground\""), std::string::npos);
+  scene.edit(ground).saved = true;
+  ASSERT_TRUE(loaded->saver.save(*world, scene));
+  EXPECT_EQ(text_of(load_world(*world)->loaded.scene), text_of(rich_scene()));
+}
+
+TEST(WorldSaver, KeepsWholeGrids) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  constexpr std::size_t kGround = 0;
+  constexpr std::size_t kHill = 1;
+  const auto grid_in = [](const Scene& in, std::size_t i) -> const SceneGrid& {
+    return in.grids()[in.grids().handles().at(i)];
+  };
+  const auto edited_in = [](Scene& in, std::size_t i) -> SceneGrid& { return in.edit(in.grids().handles().at(i)); };
+  Scene scene = rich_scene();
+  edited_in(scene, kHill).whole = true;
+  ASSERT_TRUE(save_scene(scene, path));
+  auto world = WorldStore::open(path, WorldAccess::Write);
+  const auto whole_in = [&](std::uint32_t number) { return world->grids()->at(number).whole; };
+  EXPECT_FALSE(whole_in(0));
+  EXPECT_TRUE(whole_in(1));
+  {
+    auto all = load_world(*world);
+    ASSERT_TRUE(all);
+    EXPECT_FALSE(grid_in(all->loaded.scene, kGround).whole);
+    EXPECT_TRUE(grid_in(all->loaded.scene, kHill).whole);
+    EXPECT_TRUE(grid_in(all->loaded.scene.snapshot(), kHill).whole);
+    edited_in(all->loaded.scene, kGround).whole = true;
+    edited_in(all->loaded.scene, kHill).whole = false;
+    all->loaded.scene.add_grid({.name = "new"});
+    ASSERT_TRUE(all->saver.save(*world, all->loaded.scene));
+    EXPECT_TRUE(whole_in(0));
+    EXPECT_FALSE(whole_in(1));
+    EXPECT_FALSE(whole_in(2)) << "only a partial world's saver knows that a grid does not stream";
+  }
+  auto none = load_partial_world(*world);
+  ASSERT_TRUE(none);
+  EXPECT_TRUE(grid_in(none->loaded.scene, kGround).grid.is_partial()) << "no bytes were allowed";
+  EXPECT_TRUE(grid_in(none->loaded.scene, kGround).whole);
+  auto some = load_partial_world(*world, {}, std::uint64_t{1} << 30);
+  ASSERT_TRUE(some) << to_string(some.error());
+  Scene& opened = some->loaded.scene;
+  EXPECT_FALSE(grid_in(opened, kGround).grid.is_partial());
+  EXPECT_EQ(grid_in(opened, kGround).grid.voxel_count(), grid_in(scene, kGround).grid.voxel_count());
+  EXPECT_TRUE(grid_in(opened, kHill).grid.is_partial());
+  EXPECT_TRUE(grid_in(opened, kHill).field.is_partial());
+  edited_in(opened, kGround).grid.set({200, 1, 1}, 3);
+  opened.add_grid({.name = "ship"});
+  ASSERT_TRUE(some->saver.save(*world, opened));
+  EXPECT_TRUE(whole_in(0));
+  EXPECT_FALSE(whole_in(1));
+  EXPECT_TRUE(whole_in(3));
+  ASSERT_TRUE(world->flush());
+  EXPECT_EQ(grid_in(load_world(*world)->loaded.scene, kGround).grid.get({200, 1, 1}), 3);
+}
+
+TEST(WorldSaver, RefusesWholeGridsAboveLimit) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  Scene scene;
+  scene.types = coloured_types(9);
+  for (const char* const name : {"small", "huge"}) {
+    SceneGrid grid{.name = name, .whole = true};
+    const int chunks = grid.name == "small" ? 1 : 30;
+    for (int i = 0; i < chunks; ++i) grid.grid.put_chunk({i, 0, 0}, random_chunk(static_cast<std::uint32_t>(i), 9));
+    scene.add_grid(std::move(grid));
+  }
+  ASSERT_TRUE(save_scene(scene, path));
+  const auto world = WorldStore::open(path, WorldAccess::Read);
+  const std::uint64_t needed = *memory_of_world(*world);
+  EXPECT_TRUE(load_partial_world(*world, {}, needed + 1000));
+  const auto refused = load_partial_world(*world, {}, needed - 1000);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::LimitExceeded);
+  EXPECT_NE(refused.error().message.find("cannot load grid 1 \"huge\" as a whole"), std::string::npos)
+      << refused.error().message;
+  EXPECT_NE(refused.error().message.find("are allowed"), std::string::npos) << refused.error().message;
+  EXPECT_EQ(refused.error().path, path.string());
 }
 
 TEST(WorldSaver, RefusesToMixScenes) {

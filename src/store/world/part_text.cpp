@@ -29,11 +29,12 @@ VoxelProperties read(const Json& json, const Place& place, Faults& faults, Voxel
 }
 
 WorldGrid read(const Json& json, const Place& place, Faults& faults, WorldGrid*) {
-  const Object object(json, place, {"name", "pivot", "canvas", "band"}, faults);
+  const Object object(json, place, {"name", "pivot", "canvas", "band", "whole"}, faults);
   SceneGrid grid;
   scene_json::read_grid_header(object, grid);
   scene_json::read_band(object, grid);
-  return {grid.name, grid.pivot, grid.canvas, grid.field.band()};
+  object.read("whole", grid.whole);
+  return {grid.name, grid.pivot, grid.canvas, grid.field.band(), grid.whole};
 }
 
 SceneFile::Placement read(const Json& json, const Place& place, Faults& faults, SceneFile::Placement*) {
@@ -114,6 +115,7 @@ std::string text_of(const WorldGrid& grid) {
   PartWriter writer;
   OrderedJson json = writer.json_of(header);
   json["band"] = grid.band;
+  if (grid.whole) json["whole"] = true;
   return json.dump();
 }
 

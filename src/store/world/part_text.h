@@ -16,7 +16,7 @@
 namespace quoin::store {
 
 [[nodiscard]] std::string text_of(const VoxelProperties& type);
-/// Returns name, pivot and canvas as in scene files, and `band`.
+/// Returns name, pivot and canvas as in scene files, `band`, and `whole` if it is true.
 [[nodiscard]] std::string text_of(const WorldGrid& grid);
 [[nodiscard]] std::string text_of(const SceneFile::Placement& instance);
 [[nodiscard]] std::string text_of(const SceneFile::Group& group);

@@ -27,5 +27,33 @@ TEST(PartText, RejectsDeepNestingBehindBracketsInStrings) {
   EXPECT_EQ(read.error().message, "layer 1: nested too deeply");
 }
 
+Result<WorldGrid> grid_from(const std::string& text) {
+  return part_from<WorldGrid>(std::as_bytes(std::span(text)), "grid 3");
+}
+
+TEST(PartText, KeepsWholeGrids) {
+  EXPECT_EQ(text_of(WorldGrid{}).find("whole"), std::string::npos) << "as in files of version 3";
+  for (const bool is_whole : {false, true}) {
+    const WorldGrid grid{.name = "ship", .band = 3.0F, .whole = is_whole};
+    const auto read = grid_from(text_of(grid));
+    ASSERT_TRUE(read) << read.error().message;
+    EXPECT_EQ(*read, grid);
+  }
+  EXPECT_FALSE(grid_from(R"({"name": "old", "band": 8.0})")->whole);
+}
+
+TEST(PartText, RejectsDamagedMark) {
+  for (const char* const value : {"1", "\"yes\"", "null", "[true]"}) {
+    const auto read = grid_from(std::string(R"({"band": 8.0, "whole": )") + value + "}");
+    ASSERT_FALSE(read) << value;
+    EXPECT_EQ(read.error().code, ErrorCode::BadFormat);
+    EXPECT_NE(read.error().message.find("grid 3.whole"), std::string::npos) << read.error().message;
+  }
+  const std::string text = R"({"whole": 1})";
+  const Status refused = check_part({part::kGrid, std::int64_t{3}}, std::as_bytes(std::span(text)));
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::InvalidArgument);
+}
+
 }  // namespace
 }  // namespace quoin::store

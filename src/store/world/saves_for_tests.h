@@ -26,7 +26,7 @@ struct Expected {
   int saves = 0;
 };
 
-/// Performs save number `i` (from 1): a counter and some chunks, sometimes a removal.
+/// Performs save number `i` (from 1): a counter, the grid's mark and some chunks, sometimes a removal.
 template <class Put, class Remove>
 void each_of_save(int i, Put put, Remove remove) {
   std::minstd_rand random(static_cast<unsigned>(i) * 7919U);
@@ -67,6 +67,7 @@ inline WorldChanges changes_of(int i) {
   const std::string number = std::to_string(i);
   const auto bytes = std::as_bytes(std::span(number));
   changes.put_value("saves", {bytes.begin(), bytes.end()});
+  changes.put_grid(0, {.whole = i % 2 == 1});
   each_of_save(
       i, [&](int place, VoxelType type) { changes.put_chunk(place_of(place), {impl_of(type)}); },
       [&](int place) { changes.remove_chunk(place_of(place)); });
@@ -103,6 +104,11 @@ inline Found look_at(const std::string& file, const char* vfs) {
   if (!value) return {-1, value.error().message};
   int saves = 0;
   if (*value) saves = std::atoi(std::string(reinterpret_cast<const char*>((*value)->data()), (*value)->size()).c_str());
+  const auto grids = world->grids();
+  if (!grids) return {-1, grids.error().message};
+  if (grids->size() != 1 || grids->at(0).whole != (saves % 2 == 1)) {
+    return {-1, "after " + std::to_string(saves) + " saves the grid has the mark of another save"};
+  }
   Expected expected;
   for (int i = 1; i <= saves; ++i) apply(expected, i);
   for (int place = 0; place < kPlaces; ++place) {

@@ -156,12 +156,14 @@ Status add_key_index(Connection& database) {
   return database.run("CREATE INDEX chunk_keys ON chunks(key)");
 }
 
-// Version 3 has environment parts, which earlier programs would ignore.
+// Version 3 has environment parts, which earlier programs would ignore; version 4 has whole grids, which they would
+// refuse as damaged. Without the mark a grid is streamed, as all grids were before.
 Status add_nothing(Connection& /*database*/) {
   return {};
 }
 
-constexpr std::array kSteps = {MigrationStep{1, false, add_key_index}, MigrationStep{2, false, add_nothing}};
+constexpr std::array kSteps = {MigrationStep{1, false, add_key_index}, MigrationStep{2, false, add_nothing},
+                               MigrationStep{3, false, add_nothing}};
 static_assert(kSteps.back().from + 1 == kSchemaVersion, "a step for each version");
 
 Status keep_copy(Connection& database, const std::filesystem::path& path) {
