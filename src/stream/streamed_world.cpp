@@ -21,6 +21,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/io/file.h>
 
+#include "core/bytes/text.h"
 #include "core/work/workers.h"
 #include "stream/chunk_streamer.h"
 #include "stream/edit_fit.h"
@@ -188,6 +189,7 @@ Status StreamedWorld::Impl::begin() {
   for (const GridHandle handle : scene().grids().handles()) {
     const auto number = world.saver.number_of(handle);
     QUOIN_ASSERT(number.has_value(), "a loaded grid has a number");
+    if (!scene().grids()[handle].grid.is_partial()) continue;  // a whole grid
     add_streamed(handle, *number);
     const auto value = store.value(std::string(kTerrainValue) + std::to_string(*number));
     if (!value) return value.error();
@@ -579,7 +581,8 @@ Result<StreamedWorld> StreamedWorld::open(const std::filesystem::path& path, Wor
                                           const StreamOptions& options) {
   auto store = WorldStore::open(path, access);
   if (!store) return store.error();
-  auto loaded = load_partial_world(*store);
+  const std::uint64_t whole_bytes = std::max<std::size_t>(options.max_whole_bytes, 1);  // 0 would leave them unloaded
+  auto loaded = load_partial_world(*store, {}, whole_bytes);
   if (!loaded) return loaded.error();
   StreamedWorld world(std::make_unique<Impl>(std::move(*store), std::move(*loaded), options, false));
   if (auto done = world.impl_->begin(); !done) return done.error();
@@ -615,15 +618,19 @@ void StreamedWorld::set_view(WorldView view) {
 
 namespace {
 
+// Grows to hold a box of voxels, as an instance places it.
+void extend(DBox& world, const Scene& scene, const Instance& instance, const DBox& voxels) {
+  const SceneGrid& grid = scene.grids()[instance.grid];
+  for (int i = 0; i < 8; ++i) world.extend(world_from_grid(instance, grid, box_corner(voxels, i)));
+}
+
 // Grows to hold the chunks of a box (half open), as every instance of a grid places them.
 void extend(DBox& world, const Scene& scene, const std::vector<InstanceHandle>& instances, const IBox& chunks) {
   if (chunks.empty()) return;
   const DBox voxels{DVec3(chunks.min) * double{kChunkEdge}, DVec3(chunks.max) * double{kChunkEdge}};
   for (const InstanceHandle handle : instances) {
     const Instance* const instance = scene.instances().find(handle);
-    if (instance == nullptr) continue;
-    const SceneGrid& grid = scene.grids()[instance->grid];
-    for (int i = 0; i < 8; ++i) world.extend(world_from_grid(*instance, grid, box_corner(voxels, i)));
+    if (instance != nullptr) extend(world, scene, *instance, voxels);
   }
 }
 
@@ -638,6 +645,12 @@ IBox box_of(const std::vector<IVec3>& chunks) {
 Result<WorldExtent> StreamedWorld::extent() const {
   WorldExtent found;
   impl_->follow_instances();
+  scene().instances().for_each([&](InstanceHandle, const Instance& instance) {
+    const SceneGrid* const grid = scene().grids().find(instance.grid);
+    if (grid == nullptr || impl_->number_of(instance.grid) != nullptr || !has_valid_transform(instance)) return;
+    const IBox voxels = grid->bounds();
+    if (!voxels.empty()) extend(found.stored, scene(), instance, {DVec3(voxels.min), DVec3(voxels.max)});
+  });
   for (const auto& [number, grid] : impl_->grids) {
     if (scene().grids().find(grid.handle) == nullptr) continue;
     const auto chunks = impl_->store.chunks(number, 0);
@@ -654,6 +667,10 @@ Result<GridHandle> StreamedWorld::add_grid(SceneGrid grid, std::shared_ptr<const
   QUOIN_ASSERT(grid.grid.voxel_count() == 0 && grid.field.chunk_count() == 0, "an empty grid and an empty field");
   if (!impl_->store.is_writable()) {
     return make_error(ErrorCode::CannotWrite, "opened read-only", impl_->store.path().string());
+  }
+  if (!grid.saved) {
+    return make_error(ErrorCode::InvalidArgument, "cannot stream grid \"" + printable(grid.name) +
+                                                      "\": it is marked as not saved, and its chunks need the file");
   }
   grid.grid.make_partial();
   grid.field.make_partial();
@@ -677,7 +694,11 @@ std::optional<std::uint32_t> StreamedWorld::number_of(GridHandle grid) const {
 
 void StreamedWorld::use_generator(GridHandle grid, std::shared_ptr<const ChunkGenerator> generator) {
   const auto number = impl_->world.saver.number_of(grid);
-  QUOIN_ASSERT(number && impl_->streamed(*number) != nullptr, "a streamed grid");
+  QUOIN_ASSERT(number.has_value(), "a grid from the file or from add_grid");
+  if (impl_->streamed(*number) == nullptr) {  // the file decides it, so it is no programming error
+    impl_->problems.push_back("grid " + std::to_string(*number) + " is whole, so its generator is not used");
+    return;
+  }
   // Saves the generator's types first.
   if (const auto saved = impl_->save_now(); !saved) impl_->problems.push_back(to_string(saved.error()));
   impl_->streamer.set_generator(*number, std::move(generator));

@@ -18,6 +18,7 @@
 #include <quoin/store/world_maintenance.h>
 #include <quoin/terrain/terrain.h>
 
+#include "core/database/connection.h"
 #include "core/death_for_tests.h"
 #include "store/world/world_for_tests.h"
 
@@ -524,6 +525,218 @@ TEST_F(StreamedWorldTest, ReplaysLogToSameWorld) {
   EXPECT_TRUE(ends[0] == ends[1]);
 }
 
+// A game with a streamed land and one prop, placed many times at a small scale, as it opens its world each time.
+class StreamedWorldWithProps : public StreamedWorldTest {
+ protected:
+  static constexpr Viewer kEye{.position = {0.0, 20.0, 0.0}, .radius = 256.0};
+
+  StreamedWorld opened() const { return ground(path(), std::make_shared<PatternGround>()); }
+  static GridHandle add_props(Scene& scene, int count = 20) {
+    SceneGrid prop{.name = "prop"};
+    prop.grid.fill_box({{0, 0, 0}, {16, 8, 16}}, 1);
+    prop.field.add_sphere({8.0, 20.0, 8.0}, 5.0, 2);
+    const GridHandle handle = scene.add_grid(std::move(prop));
+    for (int i = 0; i < count; ++i) {
+      scene.add_instance({.name = "prop", .grid = handle, .position = {3.0 * i, 8.0, 3.0}, .voxel_size = 1.0 / 16});
+    }
+    return handle;
+  }
+  static GridHandle grid_named(const Scene& scene, const std::string& name) {
+    for (const GridHandle handle : scene.grids().handles()) {
+      if (scene.grids()[handle].name == name) return handle;
+    }
+    ADD_FAILURE() << "no grid " << name;
+    return {};
+  }
+  static bool is_streamed(const StreamedWorld& world, const std::string& name) {
+    const GridHandle handle = grid_named(world.scene(), name);
+    const SceneGrid& grid = world.scene().grids()[handle];
+    EXPECT_EQ(grid.grid.is_partial(), grid.field.is_partial());
+    EXPECT_EQ(grid.grid.is_partial(), world.number_of(handle).has_value());
+    return grid.grid.is_partial();
+  }
+};
+
+TEST_F(StreamedWorldWithProps, WholeGridStaysWhole) {
+  std::size_t wanted = 0;
+  std::int64_t voxels = 16 * 8 * 16;
+  for (int run = 0; run < 3; ++run) {
+    StreamedWorld world = opened();
+    if (run == 0) add_props(world.scene());
+    ASSERT_TRUE(world.load_all({&kEye, 1}).has_value());
+    const StreamStats stats = world.stats();
+    EXPECT_TRUE(stats.is_complete) << run;
+    EXPECT_EQ(stats.missing_chunks, 0U) << run;
+    if (run == 0) wanted = stats.wanted_chunks;
+    EXPECT_EQ(stats.wanted_chunks, wanted) << run << ": wants no chunks of the prop";
+    EXPECT_TRUE(is_streamed(world, "ground"));
+    EXPECT_FALSE(is_streamed(world, "prop"));
+    const GridHandle prop = grid_named(world.scene(), "prop");
+    EXPECT_EQ(world.scene().grids()[prop].grid.voxel_count(), voxels) << run;
+    EXPECT_LT(world.scene().grids()[prop].field.density({8, 20, 8}), 0.0F);
+    EXPECT_EQ(world.scene().instances().size(), 21U);
+    // Its edits are saved like those of other grids.
+    EXPECT_TRUE(world.scene().edit(prop).grid.set(run, 9, 0, 2));
+    ++voxels;
+    ASSERT_TRUE(world.flush().has_value());
+    EXPECT_TRUE(world.take_problems().empty());
+  }
+  EXPECT_GT(wanted, 100U);
+  EXPECT_TRUE(check_world(path())->damage.empty());
+}
+
+TEST_F(StreamedWorldWithProps, LoadsWholeGridsOfReadOnlyWorld) {
+  {
+    StreamedWorld world = opened();
+    add_props(world.scene());
+  }
+  auto world = StreamedWorld::open(path(), WorldAccess::Read);
+  ASSERT_TRUE(world.has_value());
+  EXPECT_FALSE(is_streamed(*world, "prop"));
+  EXPECT_TRUE(is_streamed(*world, "ground"));
+  EXPECT_EQ(world->apply({1, WorldEdit::FillBox{}}).error().code, ErrorCode::InvalidArgument) << "not streamed";
+  const auto extent = world->extent();
+  ASSERT_TRUE(extent.has_value());
+  EXPECT_EQ(extent->stored_chunks, 0U);
+  EXPECT_EQ(extent->stored.min, (DVec3{0.0, 8.0, 3.0}));
+  EXPECT_EQ(extent->stored.max.x, 58.0) << "20 props, 3 apart";
+}
+
+TEST_F(StreamedWorldWithProps, OpensWorldsOfVersion3AsStreamed) {
+  const std::filesystem::path sample = QUOIN_SOURCE_DIR "/tests/corpus/cases/quoin-version-3.quoin";
+  std::filesystem::copy_file(sample, path());
+  {
+    const auto world = StreamedWorld::open(path(), WorldAccess::Read);
+    ASSERT_TRUE(world.has_value()) << to_string(world.error());
+    EXPECT_TRUE(is_streamed(*world, "land"));
+    EXPECT_TRUE(is_streamed(*world, "prop"));
+  }
+  EXPECT_EQ(summarize_world(path())->version, 3) << "reading upgrades nothing";
+  {
+    auto world = StreamedWorld::open(path(), WorldAccess::Write);
+    ASSERT_TRUE(world.has_value()) << to_string(world.error());
+    const GridHandle prop = grid_named(world->scene(), "prop");
+    EXPECT_FALSE(world->scene().grids()[prop].whole);
+    world->scene().edit(prop).whole = true;
+    ASSERT_TRUE(world->flush().has_value());
+    EXPECT_TRUE(is_streamed(*world, "prop")) << "until the world is opened again";
+  }
+  EXPECT_EQ(summarize_world(path())->version, 4);
+  auto world = StreamedWorld::open(path(), WorldAccess::Write);
+  ASSERT_TRUE(world.has_value());
+  EXPECT_TRUE(is_streamed(*world, "land"));
+  EXPECT_FALSE(is_streamed(*world, "prop"));
+  EXPECT_EQ(world->scene().grids()[grid_named(world->scene(), "prop")].grid.voxel_count(), 16 * 8 * 16);
+  ASSERT_TRUE(world->load_all({&kEye, 1}).has_value());
+  EXPECT_LT(world->stats().wanted_chunks, 1000U);
+}
+
+TEST_F(StreamedWorldWithProps, RefusesWholeGridsAboveLimit) {
+  {
+    StreamedWorld world = opened();
+    add_props(world.scene());
+  }
+  StreamOptions options;
+  options.max_whole_bytes = 100;
+  const auto refused = StreamedWorld::open(path(), WorldAccess::Write, options);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::LimitExceeded);
+  EXPECT_NE(refused.error().message.find("\"prop\""), std::string::npos) << refused.error().message;
+  EXPECT_TRUE(StreamedWorld::open(path(), WorldAccess::Write).has_value()) << "the file is unchanged and free";
+}
+
+TEST_F(StreamedWorldWithProps, KeepsDamagedChunkOfWholeGrid) {
+  std::uint32_t number = 0;
+  {
+    StreamedWorld world = opened();
+    SceneGrid far{.name = "far"};
+    far.grid.set({0, 0, 0}, 1);
+    far.grid.set({1000, 0, 0}, 1);
+    world.scene().add_grid(std::move(far));
+    ASSERT_TRUE(world.flush().has_value());
+    for (const auto& [each, grid] : *world.store().grids()) {
+      if (grid.name == "far") number = each;
+    }
+  }
+  {  // the last byte of a chunk's body
+    auto connection = Connection::open(path().string(), Connection::Mode::Write);
+    ASSERT_TRUE(connection);
+    const std::string sql =
+        "UPDATE chunks SET body = substr(body, 1, length(body) - 1) || x'7E' WHERE key IN (SELECT key FROM chunks, "
+        "regions WHERE key >> 15 = id AND grid = " +
+        std::to_string(number) + " ORDER BY key LIMIT 1)";
+    ASSERT_TRUE(connection->run(sql.c_str()));
+  }
+  for (int run = 0; run < 2; ++run) {
+    StreamedWorld world = opened();
+    ASSERT_EQ(world.opened().warnings.size(), 1U) << run;
+    EXPECT_NE(world.opened().warnings[0].find("of grid " + std::to_string(number)), std::string::npos);
+    const GridHandle far = grid_named(world.scene(), "far");
+    EXPECT_EQ(world.scene().grids()[far].grid.voxel_count(), 1 + run);
+    EXPECT_TRUE(world.scene().edit(far).grid.set({1001 + run, 0, 0}, 2));
+    ASSERT_TRUE(world.flush().has_value());
+  }
+  EXPECT_EQ(check_world(path())->damage.size(), 1U) << "still damaged, not air";
+}
+
+TEST_F(StreamedWorldWithProps, LeavesOutWhatIsNotSaved) {
+  {
+    StreamedWorld world = opened();
+    Scene& scene = world.scene();
+    const GridHandle prop = add_props(scene, 3);
+    const GridHandle debris = add_props(scene, 4);
+    scene.edit(debris).name = "debris";
+    scene.edit(debris).saved = false;
+    scene.add_instance({.name = "shot", .grid = prop, .saved = false});
+    const GroupHandle wreck = scene.add_group({.name = "wreck", .saved = false});
+    scene.add_instance({.name = "part", .grid = prop, .group = scene.add_group({.parent = wreck})});
+    ASSERT_TRUE(world.flush().has_value());
+    EXPECT_EQ(world.store().grids()->size(), 2U);
+    EXPECT_EQ(scene.instances().size(), 1U + 3U + 4U + 2U) << "the scene keeps them";
+  }
+  {
+    StreamedWorld world = opened();
+    const Scene& scene = world.scene();
+    EXPECT_EQ(scene.grids().size(), 2U);
+    EXPECT_EQ(scene.instances().size(), 1U + 3U);
+    EXPECT_EQ(scene.groups().size(), 0U);
+    // A streamed grid must stay in the file.
+    const GridHandle land = grid_named(scene, "ground");
+    world.scene().edit(land).saved = false;
+    const Status refused = world.flush();
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::InvalidArgument);
+    EXPECT_NE(refused.error().message.find("\"ground\""), std::string::npos) << refused.error().message;
+    world.scene().edit(land).saved = true;
+    const auto added = world.add_grid({.name = "preview", .saved = false});
+    ASSERT_FALSE(added);
+    EXPECT_EQ(added.error().code, ErrorCode::InvalidArgument);
+    // A prop that becomes temporary leaves the file, and comes back.
+    world.scene().edit(grid_named(scene, "prop")).saved = false;
+    ASSERT_TRUE(world.flush().has_value());
+    EXPECT_EQ(world.store().grids()->size(), 1U);
+    world.scene().edit(grid_named(scene, "prop")).saved = true;
+    ASSERT_TRUE(world.flush().has_value());
+  }
+  StreamedWorld world = opened();
+  EXPECT_EQ(world.scene().instances().size(), 1U + 3U);
+  EXPECT_FALSE(is_streamed(world, "prop"));
+  EXPECT_EQ(world.scene().grids()[grid_named(world.scene(), "prop")].grid.voxel_count(), 16 * 8 * 16);
+  EXPECT_TRUE(check_world(path())->damage.empty());
+}
+
+TEST_F(StreamedWorldWithProps, ReportsGeneratorOfWholeGrid) {
+  {
+    StreamedWorld world = opened();
+    add_props(world.scene());
+  }
+  StreamedWorld world = opened();
+  world.use_generator(grid_named(world.scene(), "prop"), std::make_shared<PatternGround>());
+  const auto problems = world.take_problems();
+  ASSERT_EQ(problems.size(), 1U);
+  EXPECT_NE(problems[0].find("is whole, so its generator is not used"), std::string::npos) << problems[0];
+}
+
 TEST(TerrainGeneratorDeathTest, RejectsChunkOutsideLandscape) {
   VoxelRegistry types;
   const auto generator = make_terrain_generator({.seed = 5, .height = 2}, types);
@@ -535,7 +748,7 @@ TEST(StreamedWorldDeathTest, RejectsGeneratorForUnknownGrid) {
   const WorldFolder folder;
   auto world = StreamedWorld::open_or_create(folder / "w.quoin");
   ASSERT_TRUE(world.has_value());
-  QUOIN_EXPECT_MISTAKE(world->use_generator({}, nullptr), "a streamed grid");
+  QUOIN_EXPECT_MISTAKE(world->use_generator({}, nullptr), "a grid from the file");
 }
 
 }  // namespace

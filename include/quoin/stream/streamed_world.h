@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -69,8 +70,12 @@ struct Viewer {
 
 struct StreamOptions {
   /// Memory budget for loaded chunks and the data derived from them (`other_bytes`). If it is too small, less than the
-  /// viewers' radius is loaded. `return_freed_memory` keeps the process's resident memory within it.
+  /// viewers' radius is loaded. `return_freed_memory` keeps the process's resident memory within it. Whole grids do not
+  /// count.
   std::size_t budget_bytes = std::size_t{1} << 30;
+  /// Maximum memory for the file's whole grids, estimated from a sample of their chunks. Opening a world fails with
+  /// LimitExceeded and the name of a grid if they need more, or more than the available memory.
+  std::size_t max_whole_bytes = std::numeric_limits<std::size_t>::max();
   /// Returns the bytes held elsewhere for loaded chunks: meshes, trees, light, GPU memory. `update` calls it ten times
   /// per second. May be empty.
   std::function<std::size_t()> other_bytes{};
@@ -104,9 +109,9 @@ struct StreamStats {
 
 /// World-space bounds of everything that a world can contain, loaded or not. Instances place the grids.
 struct WorldExtent {
-  DBox stored;                    ///< bounds of the stored chunks; empty if there are none
+  DBox stored;                    ///< bounds of the stored chunks and of whole grids; empty if there are none
   DBox generated;                 ///< bounds of the chunks that generators can make; empty without generators
-  std::size_t stored_chunks = 0;  ///< of level 0, of all grids
+  std::size_t stored_chunks = 0;  ///< of level 0, of all streamed grids
 };
 
 /// A world that keeps only the surroundings of its viewers in memory. Edits are saved and restored.
@@ -122,9 +127,14 @@ struct WorldExtent {
 ///   }
 ///   if (const auto saved = world->flush(); !saved) complain(saved.error());
 ///
-/// Grids:    grids from the file and from `add_grid` are partial (Grid::make_partial). Their chunks load from near to
+/// Grids:    streamed or whole. The file stores which, so a grid is the same when the world is opened again.
+///           Streamed grids come from `add_grid`. They are partial (Grid::make_partial): their chunks load from near to
 ///           far and unload at a distance. Direct edits change loaded chunks; `apply` also changes unloaded ones.
-///           Grids that the program adds to the scene itself are fully in memory, and are saved.
+///           Whole grids are those that the program adds to the scene itself (Scene::add_grid), and grids that the file
+///           stores with SceneGrid::whole. They are fully in memory from the start; `open` loads them.
+///           All other grids of a file are streamed: those of files that earlier versions wrote, and those that
+///           write_world and WorldSaver stored without SceneGrid::whole.
+/// Saving:   grids, instances and groups are saved unless they are marked as not saved (`is_saved`).
 /// Order:    loaded, saved and generated chunks depend on the edits and viewer positions, never on threads or timing.
 /// Memory:   chunks, including pending loads, are counted before they are read. Far chunks are unloaded first.
 /// Safety:   as WorldStore; `flush` returns when everything is on disk. A read-only world keeps edits in memory.
@@ -133,7 +143,9 @@ struct WorldExtent {
 /// Lifetime: the scene keeps its address, even when the world is moved.
 class StreamedWorld {
  public:
-  /// Opens a world without loading chunks. With WorldAccess::Read, nothing is saved.
+  /// Opens a world and loads its whole grids, but no chunks of streamed ones. With WorldAccess::Read, nothing is saved.
+  /// Damaged chunks of whole grids are left out with a warning in `opened`, and stay in the file.
+  /// Cost:   O(chunks of whole grids).
   /// Errors: as WorldStore::open and load_partial_world.
   [[nodiscard]] static Result<StreamedWorld> open(const std::filesystem::path& path, WorldAccess access,
                                                   const StreamOptions& options = {});
@@ -153,14 +165,17 @@ class StreamedWorld {
   /// `scene()`.
   [[nodiscard]] const LoadedScene& opened() const;
   void set_view(WorldView view);
-  /// Returns the extent of the file's chunks and of the generators. Cost: O(stored chunks). Errors: CannotRead.
+  /// Returns the extent of the file's chunks and of the generators. Cost: O(stored chunks + instances). Errors:
+  /// CannotRead.
   [[nodiscard]] Result<WorldExtent> extent() const;
 
   /// Adds an empty grid whose chunks are loaded, or made by the generator, around viewers. It is visible only where an
-  /// instance places it. Requires: `grid` has no voxels and no densities. Errors: CannotWrite; as WorldSaver::save.
+  /// instance places it. Requires: `grid` has no voxels and no densities. Errors: CannotWrite; InvalidArgument if it is
+  /// marked as not saved; as WorldSaver::save.
   Result<GridHandle> add_grid(SceneGrid grid, std::shared_ptr<const ChunkGenerator> generator = nullptr);
   /// Sets the generator for a grid's chunks that are not in the file. Call it before the first `update`.
-  /// Requires: the grid came from the file or from `add_grid`.
+  /// Requires: the grid came from the file or from `add_grid`. Whole grids have no generator: the call does nothing,
+  /// and `take_problems` reports it.
   void use_generator(GridHandle grid, std::shared_ptr<const ChunkGenerator> generator);
   /// Adds a grid of generated landscape, placed at the origin. The file stores its parameters, so that it continues
   /// when the world is opened again.
@@ -197,7 +212,7 @@ class StreamedWorld {
   ///         saved.
   Status flush();
   /// Returns the errors of single chunks since the last call: damaged chunks (which stay unloaded) and chunks that
-  /// could not be generated (which are air).
+  /// could not be generated (which are air). Also reports generators that a grid cannot use.
   [[nodiscard]] std::vector<std::string> take_problems();
   [[nodiscard]] StreamStats stats();
   /// Returns the store, for game values and other data that WorldStore::save accepts.
