@@ -171,7 +171,9 @@ class Program {
   void instance() {
     auto one = made<quoin_instance>();
     one.grid = index();
-    one.visible = byte() % 2;
+    const std::uint8_t flags = byte();
+    one.visible = flags % 2;
+    one.unsaved = flags / 64 % 2;
     one.group = index();
     const bool is_plain = bit();
     for (int i = 0; i < 12; ++i) one.world_from_grid[i] = is_plain && i % 4 != 3 ? (i % 5 == 0 ? 1.0 : 0.0) : number();
@@ -198,7 +200,9 @@ class Program {
     took(quoin_instance_set_layer(handle(), index(), perhaps(kNames.at(byte() % 4))));
     auto group = made<quoin_group>();
     group.parent = index();
-    group.shown = byte() % 2;
+    const std::uint8_t flags = byte();
+    group.shown = flags % 2;
+    group.unsaved = flags / 64 % 2;
     group.layer[0] = kNames.at(byte() % 4)[0];
     took(quoin_group_add(handle(), perhaps(&group), perhaps(&count)));
   }
@@ -246,6 +250,10 @@ class Program {
   void step_of_later(std::uint8_t which) {
     if (which % 4 == 0) return layers_and_groups();
     if (which % 4 == 1) return views();
+    if (which % 8 == 6) {
+      const std::uint8_t flags = byte();
+      took(quoin_grid_set_storage(handle(), index(), flags % 2, flags / 2));
+    }
     const quoin_array given = array();
     took(quoin_grid_write(handle(), index(), perhaps(&given)));
   }

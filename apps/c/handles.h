@@ -158,6 +158,10 @@ inline constexpr std::size_t kFirstSize = sizeof(Struct);
 template <>
 inline constexpr std::size_t kFirstSize<quoin_grid_info> = offsetof(quoin_grid_info, pivot);
 template <>
+inline constexpr std::size_t kFirstSize<quoin_instance> = offsetof(quoin_instance, unsaved);
+template <>
+inline constexpr std::size_t kFirstSize<quoin_group> = offsetof(quoin_group, unsaved);
+template <>
 inline constexpr std::size_t kFirstSize<quoin_type> = offsetof(quoin_type, transparent);
 template <>
 inline constexpr std::size_t kFirstSize<quoin_mesh_data> = offsetof(quoin_mesh_data, types);

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <numbers>
 #include <optional>
 #include <string>
@@ -39,6 +40,7 @@ void describe(const SceneBody& body, const Instance& instance, quoin_instance& o
   const bool has_grid = scene.grids().find(instance.grid) != nullptr;
   out.grid = has_grid ? body.numbers.grid_of_slot.at(instance.grid.index) : body.numbers.grids.size();
   out.visible = instance.visible ? 1 : 0;
+  out.unsaved = instance.saved ? 0 : 1;
   // Without a grid it shows nothing.
   out.shown = is_drawn(scene, instance, InstanceFilter::Visible) && has_valid_transform(instance) ? 1 : 0;
   out.group = number_of(body, instance.group);
@@ -95,6 +97,8 @@ const char* put(const SceneBody& body, const quoin_instance& given, Instance& in
   if (std::string name = text_in(given.name); name != reported) instance.name = std::move(name);
   instance.grid = body.numbers.grids[given.grid];
   instance.visible = given.visible != 0;
+  // Programs compiled with an older header keep the flag.
+  if (given.size >= offsetof(quoin_instance, unsaved) + sizeof given.unsaved) instance.saved = given.unsaved == 0;
   instance.group = given.group == 0 ? GroupHandle{} : body.numbers.groups[given.group - 1];
   instance.position = columns * body.loaded.scene.grids()[instance.grid].pivot + moved;
   instance.voxel_size = std::abs(length - 1.0) < 1e-6 ? 1.0 : length;
@@ -376,6 +380,7 @@ quoin_status quoin_group_get(quoin_scene scene, std::size_t number, quoin_group*
     group.parent = number_of(body, parent_of(all, handle));
     group.shown = is_shown(all, found) ? 1 : 0;
     copy_text(layer_of(all, found.layer), group.layer);
+    group.unsaved = found.saved ? 0 : 1;
   });
 }
 
@@ -501,6 +506,7 @@ quoin_status quoin_group_add(quoin_scene scene, const quoin_group* group, std::s
     SceneGroup made;
     made.name = text_in(given->name);
     made.visible = given->shown != 0;
+    made.saved = given->unsaved == 0;
     made.layer = *layer;
     if (given->parent != 0) made.parent = groups[given->parent - 1];
     groups.push_back(body.loaded.scene.add_group(std::move(made)));

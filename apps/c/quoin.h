@@ -82,6 +82,8 @@ typedef struct quoin_grid_info {
   int32_t extent[3];
   int32_t has_field; /* has a density field: the surface of a volume */
   double pivot[3];   /* centre of rotation for instances, in voxels */
+  int32_t unsaved;   /* 1: world files (.quoin) leave out the grid and its instances */
+  int32_t whole;     /* 1: streamed worlds load all of the grid when the file is opened */
 } quoin_grid_info;
 
 typedef struct quoin_type {
@@ -108,6 +110,7 @@ typedef struct quoin_instance {
   int32_t shown;   /* output: also considers its groups and layer */
   size_t group;    /* parent group, counted from 1; 0: none */
   char layer[128]; /* output: layer name */
+  int32_t unsaved; /* the instance's own flag; 1: world files (.quoin) leave it out */
 } quoin_instance;
 
 /* A group of instances and other groups. All transforms are in world space, independent of groups. */
@@ -117,6 +120,8 @@ typedef struct quoin_group {
   size_t parent; /* counted from 1, less than the group's own number; 0: none */
   int32_t shown;
   char layer[128];
+  int32_t reserved; /* ignored; was padding in earlier versions */
+  int32_t unsaved;  /* the group's own flag; 1: world files (.quoin) leave out the group and everything below it */
 } quoin_group;
 
 /* A camera of a scene. right, up and forward are perpendicular unit vectors. */
@@ -331,6 +336,9 @@ QUOIN_API quoin_status quoin_grid_read(quoin_scene scene, size_t grid, const int
 /* Adds a grid from an array of types (QUOIN_UINT8 or QUOIN_UINT16), which must exist in the scene. Places it at
  * array->origin, rounded down to whole voxels. `name` may be null. `out` receives the grid's number and may be null. */
 QUOIN_API quoin_status quoin_grid_add(quoin_scene scene, const quoin_array* array, const char* name, size_t* out);
+
+/* Sets how world files (.quoin) store a grid: the fields `unsaved` and `whole` of quoin_grid_info. */
+QUOIN_API quoin_status quoin_grid_set_storage(quoin_scene scene, size_t grid, int32_t unsaved, int32_t whole);
 
 /* Voxelises triangles into a new grid and adds the required types to the scene. The cube with minimum corner
  * voxel_size * (x, y, z) becomes the world's voxel (x, y, z). `options`, `name` and `out` may be null. */

@@ -432,6 +432,18 @@ quoin_status quoin_grid_get_info(quoin_scene scene, std::size_t grid, quoin_grid
       info.pivot[axis] = found.pivot[axis];
     }
     info.has_field = found.field.bounds().empty() ? 0 : 1;
+    info.unsaved = found.saved ? 0 : 1;
+    info.whole = found.whole ? 1 : 0;
+  });
+}
+
+quoin_status quoin_grid_set_storage(quoin_scene scene, std::size_t grid, std::int32_t unsaved, std::int32_t whole) {
+  return with_scene(scene, Use::Change, [&](SceneBody& body) {
+    if (grid >= body.numbers.grids.size()) return fail(QUOIN_INVALID_ARGUMENT, "no grid has this number");
+    SceneGrid& edited = body.loaded.scene.edit(body.numbers.grids[grid]);
+    edited.saved = unsaved == 0;
+    edited.whole = whole != 0;
+    return QUOIN_OK;
   });
 }
 

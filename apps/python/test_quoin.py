@@ -187,6 +187,28 @@ class Scenes(unittest.TestCase):
         with self.assertRaises(ValueError):
             scene.place(scene.grids[0], np.eye(3))
 
+    def test_quoin_files_leave_out_what_is_not_saved(self):
+        _, scene = self.scene()
+        scene.place(scene.grids[0], np.eye(4), "shot", saved=False)
+        scene.place(scene.grids[0], np.eye(4), "part")
+        scene.assign(2, scene.add_group("wreck", saved=False))
+        self.assertEqual([one.saved for one in scene.instances], [True, False, True])
+        self.assertFalse(scene.groups[0].saved)
+        scene.grids[0].whole = True
+        with tempfile.TemporaryDirectory() as folder:
+            path = f"{folder}/marked.quoin"
+            scene.save(path)
+            again = quoin.load(path)
+            self.assertEqual((len(again.instances), len(again.groups), again.grids[0].whole), (1, 0, True))
+            scene.move(1, np.eye(4), saved=True)
+            scene.grids[0].whole = False
+            scene.save(path)
+            again = quoin.load(path)
+            self.assertEqual((len(again.instances), again.grids[0].whole, again.grids[0].saved), (2, False, True))
+            scene.grids[0].saved = False
+            scene.save(path)
+            self.assertEqual((len(quoin.load(path).grids), len(scene.grids)), (0, 1))
+
     def test_scene_files_say_what_else_they_hold(self):
         scene = quoin.load_bytes(b"""{"quoin_scene": 4, "grids": [{"voxels": []}], "layers": [{"name": "upper"}],
             "groups": [{"name": "house"}, {"name": "room", "parent": 0}],

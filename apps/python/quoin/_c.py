@@ -62,7 +62,7 @@ class Array(ctypes.Structure):
 class GridInfo(ctypes.Structure):
     _fields_ = [("size", ctypes.c_size_t), ("name", ctypes.c_char * 128), ("voxels", ctypes.c_int64),
                 ("min", ctypes.c_int32 * 3), ("extent", ctypes.c_int32 * 3), ("has_field", ctypes.c_int32),
-                ("pivot", ctypes.c_double * 3)]
+                ("pivot", ctypes.c_double * 3), ("unsaved", ctypes.c_int32), ("whole", ctypes.c_int32)]
 
 
 class Type(ctypes.Structure):
@@ -75,12 +75,13 @@ class Type(ctypes.Structure):
 class Instance(ctypes.Structure):
     _fields_ = [("size", ctypes.c_size_t), ("name", ctypes.c_char * 128), ("grid", ctypes.c_size_t),
                 ("world_from_grid", ctypes.c_double * 12), ("visible", ctypes.c_int32), ("shown", ctypes.c_int32),
-                ("group", ctypes.c_size_t), ("layer", ctypes.c_char * 128)]
+                ("group", ctypes.c_size_t), ("layer", ctypes.c_char * 128), ("unsaved", ctypes.c_int32)]
 
 
 class Group(ctypes.Structure):
     _fields_ = [("size", ctypes.c_size_t), ("name", ctypes.c_char * 128), ("parent", ctypes.c_size_t),
-                ("shown", ctypes.c_int32), ("layer", ctypes.c_char * 128)]
+                ("shown", ctypes.c_int32), ("layer", ctypes.c_char * 128), ("reserved", ctypes.c_int32),
+                ("unsaved", ctypes.c_int32)]
 
 
 class Camera(ctypes.Structure):
@@ -200,6 +201,7 @@ _SIGNATURES = {
     "quoin_grid_read": (_handle, _n, _p, _p, _p, _n),
     "quoin_grid_add": (_handle, _p, ctypes.c_char_p, _p),
     "quoin_grid_write": (_handle, _n, _p),
+    "quoin_grid_set_storage": (_handle, _n, _i, _i),
     "quoin_grid_voxelize": (_handle, _p, _p, ctypes.c_char_p, _p),
     "quoin_instance_count": (_handle, _p),
     "quoin_instance_get": (_handle, _n, _p),

@@ -41,6 +41,7 @@ class Instance(NamedTuple):
     shown: bool = True  #: false if the instance, one of its groups or a layer is hidden
     group: Optional[int] = None  #: an index into `Scene.groups`; None: no group
     layer: str = ""  #: the layer's name; empty: no layer
+    saved: bool = True  #: the instance's own flag; .quoin files leave it out if false
 
 
 class Group(NamedTuple):
@@ -50,6 +51,7 @@ class Group(NamedTuple):
     parent: Optional[int]  #: an index into `Scene.groups`; None: no parent
     shown: bool
     layer: str  #: the layer's name; empty: no layer
+    saved: bool = True  #: the group's own flag; .quoin files leave out the group and everything below it if false
 
 
 class Layer(NamedTuple):
@@ -171,9 +173,9 @@ def _rows_of(matrix: Any) -> List[float]:
     return [float(v) for v in found[:3].ravel()]
 
 
-def _instance_of(grid: int, matrix: Any, name: str, visible: bool) -> Any:
+def _instance_of(grid: int, matrix: Any, name: str, visible: bool, saved: bool) -> Any:
     given = _c.sized(_c.Instance)
-    given.grid, given.name, given.visible = grid, _c.bytes_of(name), int(visible)
+    given.grid, given.name, given.visible, given.unsaved = grid, _c.bytes_of(name), int(visible), int(not saved)
     given.world_from_grid[:] = _rows_of(matrix)
     return given
 
@@ -221,6 +223,34 @@ class Grid:
     def has_field(self) -> bool:
         """True if the grid has a density field: the smooth surface of a volume."""
         return bool(self._info().has_field)
+
+    @property
+    def saved(self) -> bool:
+        """False if .quoin files leave out the grid and its instances."""
+        return not self._info().unsaved
+
+    @saved.setter
+    def saved(self, saved: bool) -> None:
+        self._store(saved, self.whole)
+
+    @property
+    def whole(self) -> bool:
+        """True if a program that streams the saved .quoin file loads the whole grid when it opens the file: for small
+        grids that are placed many times.
+
+        >>> scene = from_numpy(np.ones((2, 2, 2), np.uint8), [(255, 0, 0)], "box")
+        >>> scene.grids[0].whole = True
+        >>> scene.grids[0].whole, scene.grids[0].saved
+        (True, True)
+        """
+        return bool(self._info().whole)
+
+    @whole.setter
+    def whole(self, whole: bool) -> None:
+        self._store(self.saved, whole)
+
+    def _store(self, saved: bool, whole: bool) -> None:
+        _c.check(_c.lib.quoin_grid_set_storage(self._scene._owner.handle, self._number, int(not saved), int(whole)))
 
     def to_numpy(self, origin: Optional[Sequence[int]] = None, shape: Optional[Sequence[int]] = None) -> NdArray:
         """Copies the voxel types of a box to a new array: uint16, (nx, ny, nz), 0 is air.
@@ -347,14 +377,14 @@ class Scene:
             matrix = np.eye(4)
             matrix[:3] = np.array(one.world_from_grid).reshape(3, 4)
             found.append(Instance(one.grid, matrix, _c.text_of(one.name), bool(one.visible), bool(one.shown),
-                                  one.group - 1 if one.group else None, _c.text_of(one.layer)))
+                                  one.group - 1 if one.group else None, _c.text_of(one.layer), not one.unsaved))
         return found
 
     @property
     def groups(self) -> List[Group]:
         """The groups of instances, parents first."""
         return [Group(_c.text_of(one.name), one.parent - 1 if one.parent else None, bool(one.shown),
-                      _c.text_of(one.layer))
+                      _c.text_of(one.layer), not one.unsaved)
                 for one in self._all(_c.lib.quoin_group_count, _c.lib.quoin_group_get, _c.Group, 1)]
 
     @property
@@ -441,23 +471,26 @@ class Scene:
         _c.check(_c.lib.quoin_grid_add(self._owner.handle, ctypes.byref(given), _c.name_of(name), ctypes.byref(out)))
         return Grid(self, out.value)
 
-    def place(self, grid: Grid, matrix: Any, name: Optional[str] = None, visible: bool = True) -> int:
+    def place(self, grid: Grid, matrix: Any, name: Optional[str] = None, visible: bool = True,
+              saved: bool = True) -> int:
         """Adds an instance of a grid and returns the instance's number.
 
         `matrix`: (4, 4) or (3, 4), transforms points of the grid, in voxels, to the world. It may rotate, mirror,
-        translate and scale uniformly. `name`: default: the grid's name. Raises ValueError if the grid belongs to
+        translate and scale uniformly. `name`: default: the grid's name. `saved`: .quoin files leave out the
+        instance if false. Raises ValueError if the grid belongs to
         another scene or the matrix has another shape, and QuoinError for any other transform.
         """
         if grid._scene._owner is not self._owner:
             raise ValueError("the grid belongs to another scene")
-        given = _instance_of(grid.number, matrix, grid.name if name is None else name, visible)
+        given = _instance_of(grid.number, matrix, grid.name if name is None else name, visible, saved)
         out = ctypes.c_size_t()
         _c.check(_c.lib.quoin_instance_add(self._owner.handle, ctypes.byref(given), ctypes.byref(out)))
         return out.value
 
-    def move(self, instance: int, matrix: Any, visible: Optional[bool] = None, name: Optional[str] = None) -> None:
-        """Moves an instance. `instance`: an index into `instances`. `matrix`: as in `place`. `visible`, `name`: None
-        keeps the present value. Raises QuoinError if there is no such instance."""
+    def move(self, instance: int, matrix: Any, visible: Optional[bool] = None, name: Optional[str] = None,
+             saved: Optional[bool] = None) -> None:
+        """Moves an instance. `instance`: an index into `instances`. `matrix`: as in `place`. `visible`, `name`,
+        `saved`: None keeps the present value. Raises QuoinError if there is no such instance."""
         given = _c.sized(_c.Instance)
         instance = _c.size(instance, "instance")
         _c.check(_c.lib.quoin_instance_get(self._owner.handle, instance, ctypes.byref(given)))
@@ -466,6 +499,8 @@ class Scene:
             given.visible = int(visible)
         if name is not None:
             given.name = _c.bytes_of(name)
+        if saved is not None:
+            given.unsaved = int(not saved)
         _c.check(_c.lib.quoin_instance_set(self._owner.handle, instance, ctypes.byref(given)))
 
     def set_layer(self, name: str, visible: bool = True) -> None:
@@ -481,11 +516,14 @@ class Scene:
         given.name, given.visible = _c.bytes_of(name), int(visible)
         _c.check(_c.lib.quoin_layer_set(self._owner.handle, ctypes.byref(given)))
 
-    def add_group(self, name: str, parent: Optional[int] = None, visible: bool = True, layer: str = "") -> int:
+    def add_group(self, name: str, parent: Optional[int] = None, visible: bool = True, layer: str = "",
+                  saved: bool = True) -> int:
         """Adds a group and returns its index in `groups`. `parent`: an index into `groups`; None: no parent. `layer`:
-        the name of an existing layer; empty: no layer."""
+        the name of an existing layer; empty: no layer. `saved`: .quoin files leave out the group and everything below
+        it if false."""
         given = _c.sized(_c.Group)
         given.name, given.layer, given.shown = _c.bytes_of(name), _c.bytes_of(layer), int(visible)
+        given.unsaved = int(not saved)
         given.parent = 0 if parent is None else _c.size(parent, "parent") + 1
         out = ctypes.c_size_t()
         _c.check(_c.lib.quoin_group_add(self._owner.handle, ctypes.byref(given), ctypes.byref(out)))
