@@ -57,6 +57,10 @@ quoin::Status run(const std::string& path) {
   if (scene.grids().empty()) {
     if (auto made = make_land(scene); !made) return made;
   }
+  // Exists only while the game runs.
+  const quoin::GridHandle torch = scene.add_grid({.name = "torch", .saved = false});
+  scene.add_instance({.name = "torch", .grid = torch});
+  scene.edit(torch).grid.set({0, 0, 0}, 1);
   Player player;
   const auto kept = world->value("player");
   if (kept && *kept && (*kept)->size() == sizeof(Player)) std::memcpy(&player, (*kept)->data(), sizeof(Player));
