@@ -126,7 +126,7 @@ std::int64_t Grid::Impl::edit_box(const LongBox& wanted, bool create, ChangeNoti
   std::int64_t changed = 0;
   double done = 0.0;
   const auto goes_on = [&](double total) { return !progress || progress(std::min(++done / total, 1.0)); };
-  if (create && loaded.is_partial()) {  // however large the box is
+  if (create && loaded.has_marks_only(chunks)) {  // however large the box is
     const std::vector<IVec3> here = loaded.within(chunks);
     for (const IVec3 at : here) {
       changed += edit_chunk(at, entries.find_or_create(at), part_of(box, at), notifier, change);
@@ -140,7 +140,7 @@ std::int64_t Grid::Impl::edit_box(const LongBox& wanted, bool create, ChangeNoti
       for (int y = chunks.min.y; y < chunks.max.y; ++y) {
         for (int x = chunks.min.x; x < chunks.max.x; ++x) {
           const IVec3 at{x, y, z};
-          changed += edit_chunk(at, entries.find_or_create(at), part_of(box, at), notifier, change);
+          if (loaded.has(at)) changed += edit_chunk(at, entries.find_or_create(at), part_of(box, at), notifier, change);
           if (!goes_on(size.x * size.y * size.z)) return changed;
         }
       }
@@ -370,6 +370,29 @@ bool Grid::is_partial() const {
   return impl().loaded.is_partial();
 }
 
+void Grid::set_extent(const IBox& chunks, std::span<const IVec3> others) {
+  QUOIN_ASSERT(is_partial(), "a partial grid");
+  LoadedChunks next = impl().loaded;
+  impl().entries.for_each([&](IVec3 at, const ChunkEntry&) { next.mark(at); });
+  next.set_extent(chunks, others);
+  impl().loaded = std::move(next);
+  if (impl().loaded.count() == 0) return;
+  impl().journal.begin_change();
+  impl().loaded.for_each([this](IVec3 at) {
+    VoxelRecord record;
+    record.chunk = at;
+    record.add_all();
+    record.is_edit = false;
+    std::uint64_t serial = 0;
+    impl().note(serial, record);
+  });
+  notifier_.notify();
+}
+
+IBox Grid::extent() const {
+  return impl().loaded.bounds();
+}
+
 bool Grid::is_loaded(IVec3 chunk) const {
   return impl().loaded.has(chunk);
 }
@@ -383,7 +406,11 @@ bool Grid::is_loaded_within(const IBox& voxels) const {
 }
 
 std::vector<IVec3> Grid::loaded_chunks() const {
-  return impl().loaded.is_partial() ? impl().loaded.sorted() : chunks();
+  std::vector<IVec3> all = chunks();
+  if (!is_partial()) return all;
+  impl().loaded.for_each([&](IVec3 at) { all.push_back(at); });
+  sort_and_unite(all);
+  return all;
 }
 
 bool Grid::load_chunk(IVec3 chunk, Chunk voxels) {

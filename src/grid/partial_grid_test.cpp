@@ -223,5 +223,91 @@ TEST(PartialGrid, DensityGridBehavesAlike) {
   EXPECT_EQ(field.density({32, 32, 32}), field.band());
 }
 
+// A partial grid with content in the chunks (0, 0, 0) to (3, 1, 3), and in (0, 5, 0).
+Grid limited() {
+  Grid grid = partial();
+  grid.set_extent({{0, 0, 0}, {4, 2, 4}}, std::vector<IVec3>{{0, 5, 0}});
+  return grid;
+}
+
+TEST(PartialGrid, ChunksOutsideOfExtentAreLoadedAir) {
+  const Grid grid = limited();
+  EXPECT_FALSE(grid.is_loaded({3, 1, 3}));
+  EXPECT_FALSE(grid.is_loaded({0, 5, 0}));
+  EXPECT_TRUE(grid.is_loaded({3, 2, 3}));
+  EXPECT_TRUE(grid.is_loaded({1 << 20, 0, 0}));
+  EXPECT_TRUE(grid.is_loaded_around({9, 9, 9}, 3));
+  EXPECT_FALSE(grid.is_loaded_around({2, 2, 2}));
+  EXPECT_TRUE(grid.is_loaded_within({{-1000, 128, -1000}, {1000, 320, 1000}}));
+  EXPECT_FALSE(grid.is_loaded_within({{-1000, 128, -1000}, {1000, 321, 1000}}));
+  EXPECT_FALSE(grid.is_loaded_within({{-1000, 127, -1000}, {1000, 320, 1000}}));
+  EXPECT_TRUE(grid.loaded_chunks().empty());
+  EXPECT_EQ(grid.extent(), (IBox{{0, 0, 0}, {4, 6, 4}}));
+  EXPECT_TRUE(Grid().extent().empty());
+  EXPECT_TRUE(partial().extent().contains({-1000, 0, 1000}));
+}
+
+TEST(PartialGrid, EditsFillChunksOutsideOfExtent) {
+  Grid grid = limited();
+  ChangeCursor cursor = grid.cursor();
+  const IVec3 above{0, 3, 0};
+  EXPECT_TRUE(grid.set(5, 200, 5, 7));
+  const GridChanges edited = grid.changes_since(cursor);
+  ASSERT_EQ(edited.items.size(), 1U);
+  EXPECT_TRUE(edited.items[0].is_edit);
+  EXPECT_EQ(grid.loaded_chunks(), std::vector<IVec3>{above});
+  // Half of the box lies in unloaded chunks, a quarter of the rest in the chunk (0, 5, 0).
+  EXPECT_EQ(grid.fill_box({{0, 126, 0}, {1, 130, 1}}, 2), 2);
+  EXPECT_EQ(grid.fill_box({{0, 318, 0}, {1, 322, 1}}, 2), 2);
+  // Once unloaded, its content is unknown until it is loaded again.
+  const Chunk kept = *grid.find_chunk(above);
+  EXPECT_FALSE(grid.load_chunk(above, Chunk(3)));
+  EXPECT_TRUE(grid.unload_chunk(above));
+  EXPECT_FALSE(grid.unload_chunk(above));
+  EXPECT_FALSE(grid.is_loaded(above));
+  EXPECT_FALSE(grid.set(5, 201, 5, 7));
+  EXPECT_EQ(grid.get(5, 200, 5), kAir);
+  EXPECT_TRUE(grid.load_chunk(above, kept));
+  EXPECT_EQ(grid.get(5, 200, 5), 7);
+  EXPECT_TRUE(grid.unload_chunk(above));
+  EXPECT_FALSE(grid.is_loaded(above));
+}
+
+TEST(PartialGrid, LoadedChunksStayWhenExtentChanges) {
+  Grid grid = limited();
+  grid.load_chunk({0, 0, 0}, Chunk(1));
+  grid.set(5, 200, 5, 7);
+  ChangeCursor cursor = grid.cursor();
+  grid.set_extent({{0, 2, 0}, {4, 4, 4}});
+  EXPECT_TRUE(grid.is_loaded({0, 0, 0}));
+  EXPECT_TRUE(grid.is_loaded({0, 3, 0})) << "it was edited";
+  EXPECT_FALSE(grid.is_loaded({1, 3, 0}));
+  EXPECT_TRUE(grid.is_loaded({0, 5, 0}));
+  const GridChanges changes = grid.changes_since(cursor);
+  ASSERT_EQ(changes.items.size(), 2U);
+  EXPECT_FALSE(changes.items[0].is_edit);
+  EXPECT_EQ(chunks_to_mesh(grid, changes), (std::vector<IVec3>{{0, 0, 0}, {0, 3, 0}}));
+  EXPECT_TRUE(grid.unload_chunk({0, 0, 0}));
+  EXPECT_FALSE(grid.is_loaded({0, 0, 0})) << "its content is unknown";
+}
+
+TEST(PartialGrid, DensityGridHasSameExtent) {
+  DensityGrid field;
+  field.make_partial();
+  field.set_extent({{0, 0, 0}, {4, 2, 4}}, std::vector<IVec3>{{0, 5, 0}});
+  EXPECT_FALSE(field.is_loaded({0, 0, 0}));
+  EXPECT_FALSE(field.is_loaded({0, 5, 0}));
+  EXPECT_TRUE(field.is_loaded({0, 3, 0}));
+  EXPECT_TRUE(field.is_loaded_within({{0, 128, 0}, {64, 320, 64}}));
+  EXPECT_EQ(field.extent(), (IBox{{0, 0, 0}, {4, 6, 4}}));
+  EXPECT_EQ(field.add_sphere({32.0, 32.0, 32.0}, 10.0, 1), 0);
+  EXPECT_GT(field.add_sphere({32.0, 224.0, 32.0}, 10.0, 1), 0);
+  EXPECT_EQ(field.loaded_chunks(), (std::vector<IVec3>{{0, 3, 0}}));
+  EXPECT_TRUE(field.unload_chunk({0, 3, 0}));
+  EXPECT_FALSE(field.is_loaded({0, 3, 0}));
+  EXPECT_TRUE(field.load_air_chunk({0, 3, 0}));
+  EXPECT_TRUE(field.is_loaded({0, 3, 0}));
+}
+
 }  // namespace
 }  // namespace quoin

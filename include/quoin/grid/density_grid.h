@@ -146,6 +146,8 @@ class DensityGrid {
   /// Makes the grid partial. All functions for partial grids work as in Grid.
   void make_partial();
   [[nodiscard]] bool is_partial() const;
+  void set_extent(const IBox& chunks, std::span<const IVec3> others = {});
+  [[nodiscard]] IBox extent() const;
   /// Loads a chunk, as Grid::load_chunk. Requires: same as `put_chunk`.
   bool load_chunk(IVec3 chunk, DensityChunk samples);
   /// Loads a chunk that is known to be far air, as `load_chunk`.

@@ -39,7 +39,8 @@ struct PlacedVoxel {
 /// Partial:  a partial grid (`make_partial`) holds some chunks of a world that is larger than memory. Unloaded chunks
 ///           read as air, but their real content is unknown. Edits do not change them. A chunk is meshed only if all
 ///           chunks around it are loaded. Scene queries report unloaded chunks (UnloadedChunks). Functions that count
-///           or read voxels see only loaded chunks; `is_loaded_within` returns true if a box is complete.
+///           or read voxels see only loaded chunks; `is_loaded_within` returns true if a box is complete. Chunks
+///           outside of the extent (`set_extent`) are loaded air.
 /// Sharing:  a `snapshot` is a copy-on-write copy and costs a pointer. An edit of either copies the shared memory that
 ///           it changes, about 4 KiB of a chunk at a time.
 /// Threads:  any number may read or take snapshots at once; an edit needs exclusive access. A snapshot is independent:
@@ -119,13 +120,23 @@ class Grid {
   /// Makes the grid partial, with no chunk loaded. Removes its previous content, as an edit.
   void make_partial();
   [[nodiscard]] bool is_partial() const;
+  /// Limits the content of a partial grid to a box of chunks (half open) and to `others`, chunks outside of the box. All
+  /// chunks elsewhere are known to be air: they count as loaded without `load_chunk`, edits can fill them, and
+  /// `unload_chunk` makes them one of the others. Loaded chunks stay loaded; `changes_since` reports them as loaded
+  /// again, because the chunks around them may now be known. Requires: the grid is partial. Cost: O(loaded chunks and
+  /// others).
+  void set_extent(const IBox& chunks, std::span<const IVec3> others = {});
+  /// Returns a box of all chunks that can be unloaded: of the whole world before `set_extent`, empty if the grid is not
+  /// partial.
+  [[nodiscard]] IBox extent() const;
   /// Loads a chunk, which may be all air. `changes_since` reports it as a load, not an edit (ChunkChange::is_edit).
   /// Returns false, without a change, if the chunk is loaded or outermost, or if the grid is not partial.
   bool load_chunk(IVec3 chunk, Chunk voxels);
   /// Unloads a chunk. `changes_since` reports it as in `load_chunk`. Returns false if the chunk is not loaded or the
   /// grid is not partial.
   bool unload_chunk(IVec3 chunk);
-  /// Returns true if the chunk is in memory. Always true if the grid is not partial.
+  /// Returns true if the chunk's content is known: it is in memory, or outside of the extent. Always true if the grid is
+  /// not partial.
   [[nodiscard]] bool is_loaded(IVec3 chunk) const;
   template <std::floating_point T>
   bool is_loaded(Point<T> point) const = delete;  // is_loaded(chunk_of(voxel_of(point)))
@@ -134,8 +145,8 @@ class Grid {
   /// Returns true if all chunks that overlap a box of voxels (half-open: `max` excluded) are loaded. Reads, counts and
   /// copies of the box are then complete. Cost: O(1) if the grid is not partial, else O(log chunks) per chunk.
   [[nodiscard]] bool is_loaded_within(const IBox& voxels) const;
-  /// Returns the loaded chunks of a partial grid, including air chunks, or `chunks` if the grid is not partial. Sorted
-  /// by z, then y, then x.
+  /// Returns the loaded chunks of a partial grid, including air chunks of the extent, or `chunks` if the grid is not
+  /// partial. Sorted by z, then y, then x.
   [[nodiscard]] std::vector<IVec3> loaded_chunks() const;
 
   /// Returns the data of a voxel; empty if never set. Lifetime: until the grid's next edit.

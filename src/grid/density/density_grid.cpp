@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include <quoin/core/assert.h>
@@ -51,6 +52,15 @@ bool DensityGrid::is_partial() const {
   return impl().store.loaded().is_partial();
 }
 
+void DensityGrid::set_extent(const IBox& chunks, std::span<const IVec3> others) {
+  const NotifyOnExit notify(impl().store, notifier_);
+  impl().store.set_extent(chunks, others);
+}
+
+IBox DensityGrid::extent() const {
+  return impl().store.loaded().bounds();
+}
+
 bool DensityGrid::load_chunk(IVec3 chunk, DensityChunk samples) {
   const NotifyOnExit notify(impl().store, notifier_);
   return impl().store.load(chunk, std::move(samples));
@@ -74,8 +84,11 @@ bool DensityGrid::is_loaded_around(IVec3 chunk, int distance) const {
 }
 
 std::vector<IVec3> DensityGrid::loaded_chunks() const {
-  const LoadedChunks& loaded = impl().store.loaded();
-  return loaded.is_partial() ? loaded.sorted() : chunks();
+  std::vector<IVec3> all = chunks();
+  if (!is_partial()) return all;
+  impl().store.loaded().for_each([&](IVec3 at) { all.push_back(at); });
+  sort_and_unite(all);
+  return all;
 }
 
 bool DensityGrid::is_loaded_within(const IBox& samples) const {
@@ -379,6 +392,23 @@ void DensityStore::replace(IVec3 chunk, DensityChunk samples) {
 void DensityStore::make_partial() {
   clear();
   loaded_.begin();
+}
+
+void DensityStore::set_extent(const IBox& chunks, std::span<const IVec3> others) {
+  QUOIN_ASSERT(loaded_.is_partial(), "a partial field");
+  LoadedChunks next = loaded_;
+  entries_.for_each([&](IVec3 at, const Entry&) { next.mark(at); });
+  next.set_extent(chunks, others);
+  loaded_ = std::move(next);
+  if (loaded_.count() == 0) return;
+  ++edits_;
+  journal_.begin_change();
+  loaded_.for_each([this](IVec3 at) {
+    ChangeReach all;
+    all.add_all();
+    std::uint64_t serial = 0;
+    journal_.note(serial, {at, all, false}, entries_.size());
+  });
 }
 
 // Skips the per-sample checks of `put`: chunks are loaded on threads that must not wait.

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cstdint>
 #include <cstring>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -87,6 +88,7 @@ class DensityStore {
   std::int64_t put(IVec3 chunk, DensityChunk samples);
   [[nodiscard]] const LoadedChunks& loaded() const { return loaded_; }
   void make_partial();
+  void set_extent(const IBox& chunks, std::span<const IVec3> others);
   bool load(IVec3 chunk, DensityChunk samples);
   bool unload(IVec3 chunk);
   void clear();
@@ -174,7 +176,7 @@ std::int64_t DensityStore::edit(const LongBox& wanted, bool creates, VoxelType m
   };
   double done = 0.0;
   const auto goes_on = [&](double total) { return !progress || progress(std::min(++done / total, 1.0)); };
-  if (creates && loaded_.is_partial()) {  // however large the box is
+  if (creates && loaded_.has_marks_only(chunks)) {  // however large the box is
     const std::vector<IVec3> here = loaded_.within(chunks);
     for (const IVec3 at : here) {
       visit(at);
@@ -185,7 +187,7 @@ std::int64_t DensityStore::edit(const LongBox& wanted, bool creates, VoxelType m
     for (int z = chunks.min.z; z < chunks.max.z; ++z) {
       for (int y = chunks.min.y; y < chunks.max.y; ++y) {
         for (int x = chunks.min.x; x < chunks.max.x; ++x) {
-          visit({x, y, z});
+          if (loaded_.has({x, y, z})) visit({x, y, z});
           if (!goes_on(size.x * size.y * size.z)) return changed;
         }
       }
