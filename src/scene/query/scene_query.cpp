@@ -205,7 +205,7 @@ std::optional<SceneOverlap> first_of_unloaded(const PlacedGrid& chunks, const Sh
   const TypesMet all(none, QueryTypes::All);
   std::optional<SceneOverlap> first;
   for_each_corner(*chunks.grid, [&](DVec3 offset, const UnloadedReader& reader) {
-    const auto found = first_of<UnloadedReader>(chunks, all, shape.moved(offset), reader, chunks_of_world());
+    const auto found = first_of<UnloadedReader>(chunks, all, shape.moved(offset), reader, extent_of(*chunks.grid));
     if (found && (!first || by_zyx(found->voxel, first->voxel))) first = found;
   });
   if (!first) return std::nullopt;

@@ -254,7 +254,7 @@ std::optional<SweepHit> first_of_unloaded(const PlacedGrid& chunks, const Moving
     Moving moved = shape;
     moved.centre += offset;
     const double until = first ? first->fraction : most;
-    const auto hit = first_of<UnloadedReader>(chunks, all, moved, until, reader, chunks_of_world());
+    const auto hit = first_of<UnloadedReader>(chunks, all, moved, until, reader, extent_of(*chunks.grid));
     if (hit && is_sooner(*hit, first)) first = hit;
   });
   if (!first) return std::nullopt;

@@ -6,17 +6,17 @@ namespace {
 // Walks along a ray from chunk to chunk, in double precision. Each crossing distance is computed from the origin.
 class ChunkWalk {
  public:
-  explicit ChunkWalk(const Ray& ray) : ray_(ray) {}
+  ChunkWalk(const Ray& ray, const IBox& box) : ray_(ray), box_(box) {}
 
-  // Moves to the entry of the ray into the world. Returns false if it misses the world, or enters it beyond `max_t`.
+  // Moves to the entry of the ray into the box. Returns false if it misses the box, or enters it beyond `max_t`.
   bool enter(double max_t) {
-    const IBox world = chunks_of_world();
+    if (box_.empty()) return false;
     double exit_t = max_t;
     for (int axis = 0; axis < 3; ++axis) {
       const double o = ray_.origin[axis];
       const double d = ray_.direction[axis];
-      const double low = world.min[axis];
-      const double high = world.max[axis];
+      const double low = box_.min[axis];
+      const double high = box_.max[axis];
       if (d == 0.0) {
         if (o < low || o >= high) return false;
         continue;
@@ -33,14 +33,13 @@ class ChunkWalk {
     if (!(t_ <= exit_t)) return false;
     for (int axis = 0; axis < 3; ++axis) {
       const double at = ray_.origin[axis] + t_ * ray_.direction[axis];
-      chunk_[axis] =
-          static_cast<int>(std::clamp(std::floor(at), double(world.min[axis]), double(world.max[axis]) - 1.0));
-      if (axis == axis_) chunk_[axis] = ray_.direction[axis] > 0.0 ? world.min[axis] : world.max[axis] - 1;
+      chunk_[axis] = static_cast<int>(std::clamp(std::floor(at), double(box_.min[axis]), double(box_.max[axis]) - 1.0));
+      if (axis == axis_) chunk_[axis] = ray_.direction[axis] > 0.0 ? box_.min[axis] : box_.max[axis] - 1;
       find_next(axis);
     }
     return true;
   }
-  // Moves to the next chunk. Returns false if the ray leaves the world or passes `max_t`.
+  // Moves to the next chunk. Returns false if the ray leaves the box or passes `max_t`.
   bool step(double max_t) {
     axis_ = 0;
     for (int axis = 1; axis < 3; ++axis) {
@@ -50,7 +49,7 @@ class ChunkWalk {
     if (!(t_ <= max_t) || std::isinf(t_)) return false;
     chunk_[axis_] += ray_.direction[axis_] > 0.0 ? 1 : -1;
     find_next(axis_);
-    return is_inside_world(chunk_);
+    return box_.contains(chunk_);
   }
 
   [[nodiscard]] IVec3 chunk() const { return chunk_; }
@@ -70,6 +69,7 @@ class ChunkWalk {
   }
 
   const Ray& ray_;
+  IBox box_;
   double t_ = 0.0;
   int axis_ = -1;  // of the last crossed plane
   IVec3 chunk_{0};
@@ -79,11 +79,12 @@ class ChunkWalk {
 }  // namespace
 
 std::optional<RayHit> first_unloaded(const SceneGrid& grid, const Ray& ray_in_chunks, double max_t) {
+  const IBox extent = extent_of(grid);
   std::optional<RayHit> first;
   for_each_corner(grid, [&](DVec3 offset, const UnloadedReader& reader) {
     const Ray ray{ray_in_chunks.origin + offset, ray_in_chunks.direction};
     const double most = first ? first->t : max_t;
-    ChunkWalk walk(ray);
+    ChunkWalk walk(ray, extent);
     if (!walk.enter(most)) return;
     do {
       if (reader.get(walk.chunk()) == kAir) continue;

@@ -39,9 +39,9 @@ class UnloadedReader {
   bool asks_voxels_;
 };
 
-/// Returns all chunks that can be unloaded.
-inline IBox chunks_of_world() {
-  return {IVec3(kMinChunk + 1), IVec3(kMaxChunk)};
+/// Returns a box of all chunks that can be unloaded.
+inline IBox extent_of(const SceneGrid& grid) {
+  return unite(grid.grid.extent(), grid.field.extent());
 }
 
 /// Calls `ask(offset in chunks, reader)` for a point. If the grid has a partial field, also calls it for the seven
@@ -59,7 +59,7 @@ void for_each_corner(const SceneGrid& grid, const Ask& ask) {
 inline bool is_surely_loaded(const SceneGrid& grid, const DBox& bounds) {
   constexpr double kFew = 256.0;
   const DBox all{bounds.min - 1e-6, bounds.max + 1e-6 + (grid.field.is_partial() ? 1.0 / kChunkEdge : 0.0)};
-  const IBox chunks = voxels_within(all, chunks_of_world());
+  const IBox chunks = voxels_within(all, extent_of(grid));
   const DVec3 size = DVec3(chunks.max) - DVec3(chunks.min);
   if (size.x * size.y * size.z > kFew) return false;
   const UnloadedReader reader(grid, true);
@@ -74,7 +74,7 @@ inline bool is_surely_loaded(const SceneGrid& grid, const DBox& bounds) {
 }
 
 /// The first chunk that is not loaded along a ray in chunks, up to and including `max_t`; as `first_hit` of voxels.
-/// Cost: O(loaded chunks on the ray).
+/// Cost: O(loaded chunks on the ray within `extent_of`).
 [[nodiscard]] std::optional<RayHit> first_unloaded(const SceneGrid& grid, const Ray& ray_in_chunks, double max_t);
 
 }  // namespace quoin

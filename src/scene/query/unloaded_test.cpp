@@ -305,5 +305,27 @@ TEST(UnloadedOverlaps, AreReportedOncePerInstance) {
   EXPECT_TRUE(overlaps(tracer, at_border, passed()).empty());
 }
 
+// Air outside of a grid's extent is known: rays and shapes pass it at any distance, without a walk over its chunks.
+TEST(UnloadedExtent, KnownAirDoesNotBlock) {
+  PartialScene world;
+  world.scene.edit(world.grid).grid.set_extent({{-2, -2, -2}, {2, 2, 2}});
+  const SceneTracer tracer(world.scene);
+  EXPECT_FALSE(first_hit(tracer, {{32.0, 200.0, 32.0}, {0.3, 1.0, 0.2}}, kInfinity, met()));
+  EXPECT_FALSE(any_hit(tracer, {{200.0, 10.0, 32.0}, {1.0, 0.0, 0.0}}, kInfinity, met()));
+  const auto hit = first_hit(tracer, {{32.0, 1e8, 32.0}, {0.0, -1.0, 0.0}}, kInfinity, met());
+  ASSERT_TRUE(hit);
+  EXPECT_TRUE(hit->is_unloaded);
+  EXPECT_EQ(hit->t, 1e8 - 128.0);
+  EXPECT_EQ(hit->voxel, IVec3(0, 64, 0));
+  OrientedBox body = kBody;
+  body.centre = {32.0, 1000.0, 32.0};
+  EXPECT_TRUE(overlaps(tracer, body, met()).empty());
+  EXPECT_FALSE(sweep_box(tracer, body, {1e7, 0.0, 0.0}, met()));
+  const auto fall = sweep_box(tracer, body, {0.0, -1000.0, 0.0}, met());
+  ASSERT_TRUE(fall);
+  EXPECT_TRUE(fall->is_unloaded);
+  EXPECT_NEAR(fall->fraction, (1000.0 - 0.9 - 128.0) / 1000.0, 1e-9);
+}
+
 }  // namespace
 }  // namespace quoin
