@@ -66,8 +66,11 @@ void ChunkStreamer::signal() {
   signal_.notify_all();
 }
 
-void ChunkStreamer::set_generator(std::uint32_t grid, std::shared_ptr<const ChunkGenerator> generator) {
+void ChunkStreamer::set_generator(std::uint32_t grid, std::shared_ptr<const ChunkGenerator> generator,
+                                  std::span<const IVec3> stored) {
+  const IBox made = generator == nullptr ? IBox{} : generator->chunks();
   const std::scoped_lock lock(plan_mutex_);
+  plan_.set_extent(grid, made, stored);
   generators_[grid] = std::move(generator);
 }
 

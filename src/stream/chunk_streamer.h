@@ -8,6 +8,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <thread>
 #include <vector>
@@ -80,8 +81,10 @@ class ChunkStreamer {
   /// Waits for the chunks that workers are processing.
   ~ChunkStreamer();
 
-  /// Sets the generator of a grid. Null: chunks that the world does not store are air.
-  void set_generator(std::uint32_t grid, std::shared_ptr<const ChunkGenerator> generator);
+  /// Sets the generator of a grid, and the stored chunks that it does not make. Null: chunks that the world does not
+  /// store are air. All other chunks are air that is never loaded.
+  void set_generator(std::uint32_t grid, std::shared_ptr<const ChunkGenerator> generator,
+                     std::span<const IVec3> stored);
   [[nodiscard]] std::shared_ptr<const ChunkGenerator> generator_of(std::uint32_t grid) const;
   /// Queues a note. Unless `is_urgent`, wakes no sleeping worker: a wake-up costs the caller more than the rest.
   void post(Note note, bool is_urgent = true);

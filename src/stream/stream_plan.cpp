@@ -11,6 +11,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/grid/chunk.h>
 
+#include "core/coordinates/chunk_order.h"
 #include "core/coordinates/long_box.h"
 
 namespace quoin::stream {
@@ -37,15 +38,44 @@ bool is_looked_at(const Eye& eye, IVec3 chunk) {
 // Maximum number of chunks in a plan at any budget and radius: a ball with a radius of 40 chunks.
 constexpr std::size_t kMaxPlanned = std::size_t{1} << 18;
 
-// Returns the radius of a ball of `max_chunks` chunks; the budget cuts any larger plan.
-double reach_of(std::size_t max_chunks) {
+// Returns the radius of a ball of `max_chunks` chunks.
+double ball_of(std::size_t max_chunks) {
   return (std::cbrt(static_cast<double>(max_chunks) * 0.75 / std::numbers::pi) + 2.0) * kChunkEdge;
 }
 
 // Returns a box of chunks around a ball.
-IBox chunks_around(const Eye& eye, double radius) {
-  const LongBox box = clipped(box_around(eye.position - radius, eye.position + radius));
+IBox chunks_around(DVec3 centre, DVec3 radius) {
+  const LongBox box = clipped(box_around(centre - radius, centre + radius));
   return is_empty(box) ? IBox{} : chunks_of(box);
+}
+
+// Calls `visit(chunk)` for the chunks of a box within a radius of a point, row by row, until it returns false.
+template <class Visit>
+void for_each_within(DVec3 centre, double radius, const IBox& chunks, Visit&& visit) {
+  const IBox box = intersect(chunks, chunks_around(centre, DVec3(radius)));
+  if (box.empty()) return;
+  // The other half edge of a right triangle; the box of its chunks has a margin for rounding.
+  const auto other_edge = [](double longest, double edge) {
+    return std::sqrt(std::max(longest * longest - edge * edge, 0.0));
+  };
+  const auto from_slab = [&](int axis, int at) {
+    const double low = double{kChunkEdge} * at;
+    return std::max({low - centre[axis], centre[axis] - low - kChunkEdge, 0.0});
+  };
+  for (int z = box.min.z; z < box.max.z; ++z) {
+    const double in_layer = other_edge(radius, from_slab(2, z));
+    const IBox layer = intersect(box, chunks_around(centre, {radius, in_layer, radius}));
+    if (layer.empty()) continue;
+    for (int y = layer.min.y; y < layer.max.y; ++y) {
+      const double in_row = other_edge(in_layer, from_slab(1, y));
+      const IBox row = intersect(box, chunks_around(centre, {in_row, radius, radius}));
+      if (row.empty()) continue;
+      for (int x = row.min.x; x < row.max.x; ++x) {
+        const IVec3 chunk{x, y, z};
+        if (distance_to_chunk(centre, chunk) <= radius && !visit(chunk)) return;
+      }
+    }
+  }
 }
 
 // Viewers that move less (voxels) and turn less (cosine) than this need no new plan.
@@ -79,34 +109,81 @@ bool StreamPlan::is_nearer(const Wanted& a, const Wanted& b) {
   return key(a) < key(b);
 }
 
-const StreamPlan::State* StreamPlan::state_of(const ChunkAddress& place) const {
-  const auto grid = states_.find(place.grid);
-  if (grid == states_.end()) return nullptr;
+void StreamPlan::set_extent(std::uint32_t grid, const IBox& chunks, std::span<const IVec3> others) {
+  Extent extent{chunks, {}};
+  for (const IVec3 other : others) extent.others.find_or_create(other, [](auto&) {});
+  extents_[grid] = std::move(extent);
+}
+
+StreamPlan::State StreamPlan::state_of(const ChunkAddress& place) const {
+  const auto grid = known_.find(place.grid);
+  if (grid == known_.end()) return State::Unknown;
   const auto found = grid->second.find(place.chunk);
-  return found == grid->second.end() ? nullptr : &found->second;
+  return found == grid->second.end() ? State::Unknown : found->second.state;
 }
 
 void StreamPlan::set_state(const ChunkAddress& place, State state) {
-  states_[place.grid][place.chunk] = state;
-  is_counted_ = false;
+  Grid& grid = known_[place.grid];
+  if (const auto extent = extents_.find(place.grid);
+      extent != extents_.end() && state != State::Unknown && !extent->second.chunks.contains(place.chunk)) {
+    extent->second.others.find_or_create(place.chunk, [](auto&) {});
+  }
+  auto known = grid.find(place.chunk);
+  if (known == grid.end()) {
+    if (state == State::Unknown) return;
+    known = grid.try_emplace(place.chunk).first;
+  }
+  const std::uint32_t wanted = known->second.wanted;
+  known.value().state = state;
+  if (wanted == kUnwanted) {
+    if (state == State::Unknown) grid.erase(known);
+    return;
+  }
+  QUOIN_ASSERT(wanted < is_missing_.size(), "an index of this plan");
+  if (is_missing_[wanted] == is_missing(state)) return;
+  is_missing_[wanted] = is_missing(state);
+  if (is_missing(state)) {
+    ++missing_count_;
+    here_ = std::min(here_, std::size_t{wanted});
+  } else {
+    --missing_count_;
+  }
 }
 
-void StreamPlan::forget(const ChunkAddress& place) {
-  states_[place.grid].erase(place.chunk);
-  is_counted_ = false;
+std::size_t StreamPlan::entries() const {
+  std::size_t sum = 0;
+  for (const auto& [grid, known] : known_) sum += known.size();
+  return sum;
 }
 
 void StreamPlan::plan(StreamRequests requests) {
-  queue_.clear();  // leaves no stale entries if memory runs out
-  leaving_.clear();
-  next_ = asked_ = here_ = 0;
-  is_counted_ = false;
+  begin_plan();
   requests_ = std::move(requests);
   requests_.max_chunks = std::min(requests_.max_chunks, kMaxPlanned);
   find_wanted();
   cut_to_budget();
+  mark_wanted();
   find_queue();
   find_leaving();
+}
+
+// Drops the last plan, so that no stale entries are left if memory runs out.
+void StreamPlan::begin_plan() {
+  queue_.clear();
+  leaving_.clear();
+  wanted_.clear();
+  is_missing_.clear();
+  next_ = asked_ = here_ = missing_count_ = 0;
+  for (auto& [grid, known] : known_) {
+    for (auto each = known.begin(); each != known.end();) {
+      if (each->second.state == State::Unknown) {
+        each = known.erase(each);
+      } else {
+        each.value().wanted = kUnwanted;
+        ++each;
+      }
+    }
+  }
 }
 
 StreamPlan::Wanted StreamPlan::measured(const ChunkAddress& place, const std::vector<Eye>& eyes) const {
@@ -120,31 +197,25 @@ StreamPlan::Wanted StreamPlan::measured(const ChunkAddress& place, const std::ve
   return all;
 }
 
+// Returns the radius to look at: the viewer's or, if the budget cuts the plan anyway, a smaller one with more chunks than
+// the budget allows.
+double StreamPlan::reach_of(const Eye& eye, const Extent& extent) const {
+  const std::size_t most = requests_.max_chunks;
+  for (double reach = ball_of(most); reach < eye.radius; reach *= 1.25) {
+    std::size_t count = 0;
+    for_each_within(eye.position, reach, extent.chunks, [&](IVec3) { return ++count <= most; });
+    if (count > most) return reach;
+    extent.others.for_each_in(chunks_around(eye.position, DVec3(reach)), [&](IVec3 chunk, const Mark&) {
+      count += static_cast<std::size_t>(distance_to_chunk(eye.position, chunk) <= reach);
+    });
+    if (count > most) return reach;
+  }
+  return eye.radius;
+}
+
 void StreamPlan::find_wanted() {
-  wanted_.clear();
-  const double reach = reach_of(requests_.max_chunks);
   for (const auto& [grid, eyes] : requests_.eyes) {
-    std::vector<IVec3> chunks;
-    for (const Eye& eye : eyes) {
-      QUOIN_ASSERT(is_finite(eye.position) && eye.radius >= 0.0 && eye.voxel_size > 0.0,
-                   "a finite position, a radius, and a positive voxel size");
-      const double radius = std::min(eye.radius, reach);
-      const IBox box = chunks_around(eye, radius);
-      for (int z = box.min.z; z < box.max.z; ++z) {
-        for (int y = box.min.y; y < box.max.y; ++y) {
-          for (int x = box.min.x; x < box.max.x; ++x) {
-            const IVec3 chunk{x, y, z};
-            if (is_inside_world(chunk) && distance_to_chunk(eye.position, chunk) <= radius) chunks.push_back(chunk);
-          }
-        }
-      }
-    }
-    if (eyes.size() > 1) {
-      const auto before = [](IVec3 a, IVec3 b) { return std::tie(a.z, a.y, a.x) < std::tie(b.z, b.y, b.x); };
-      std::ranges::sort(chunks, before);
-      chunks.erase(std::unique(chunks.begin(), chunks.end()), chunks.end());
-    }
-    for (const IVec3 chunk : chunks) wanted_.push_back(measured({grid, 0, chunk}, eyes));
+    add_wanted(grid, eyes);
     // With many grids, keeps as many as could be wanted, plus one that shows that there were more.
     if (wanted_.size() > 2 * requests_.max_chunks + 1) {
       const auto end = wanted_.begin() + static_cast<std::ptrdiff_t>(requests_.max_chunks + 1);
@@ -155,6 +226,28 @@ void StreamPlan::find_wanted() {
   std::ranges::sort(wanted_, is_nearer);
 }
 
+// Appends the chunks of a grid's extent around its viewers.
+void StreamPlan::add_wanted(std::uint32_t grid, const std::vector<Eye>& eyes) {
+  static const Extent whole{{IVec3(kMinChunk + 1), IVec3(kMaxChunk)}, {}};
+  const auto limited = extents_.find(grid);
+  const Extent& extent = limited == extents_.end() ? whole : limited->second;
+  std::vector<IVec3> chunks;
+  for (const Eye& eye : eyes) {
+    QUOIN_ASSERT(is_finite(eye.position) && eye.radius >= 0.0 && eye.voxel_size > 0.0,
+                 "a finite position, a radius, and a positive voxel size");
+    const double radius = reach_of(eye, extent);
+    for_each_within(eye.position, radius, extent.chunks, [&](IVec3 chunk) {
+      if (is_inside_world(chunk)) chunks.push_back(chunk);
+      return true;
+    });
+    extent.others.for_each_in(chunks_around(eye.position, DVec3(radius)), [&](IVec3 chunk, const Mark&) {
+      if (distance_to_chunk(eye.position, chunk) <= radius) chunks.push_back(chunk);
+    });
+  }
+  if (eyes.size() > 1) sort_and_unite(chunks);
+  for (const IVec3 chunk : chunks) wanted_.push_back(measured({grid, 0, chunk}, eyes));
+}
+
 void StreamPlan::cut_to_budget() {
   is_cut_ = wanted_.size() > requests_.max_chunks;
   if (!is_cut_) return;
@@ -162,29 +255,36 @@ void StreamPlan::cut_to_budget() {
   wanted_.resize(std::min(wanted_.size(), fits));
 }
 
+// Lists the wanted chunks by their coordinates, and which of them are not loaded.
+void StreamPlan::mark_wanted() {
+  QUOIN_ASSERT(wanted_.size() < kUnwanted, "indices of 32 bits");
+  is_missing_.assign(wanted_.size(), false);
+  for (std::size_t i = 0; i < wanted_.size(); ++i) {
+    const auto known = known_[wanted_[i].place.grid].try_emplace(wanted_[i].place.chunk).first;
+    known.value().wanted = static_cast<std::uint32_t>(i);
+    if (!is_missing(known->second.state)) continue;
+    is_missing_[i] = true;
+    ++missing_count_;
+  }
+}
+
 void StreamPlan::find_queue() {
   std::vector<Wanted> missing;
-  for (const Wanted& each : wanted_) {
-    if (state_of(each.place) == nullptr) missing.push_back(each);
+  for (std::size_t i = 0; i < wanted_.size(); ++i) {
+    if (is_missing_[i] && state_of(wanted_[i].place) == State::Unknown) missing.push_back(wanted_[i]);
   }
   std::ranges::stable_sort(missing, [](const Wanted& a, const Wanted& b) { return a.rank < b.rank; });
-  queue_.clear();
   for (const Wanted& each : missing) queue_.push_back(each.place);
-  next_ = asked_ = 0;
 }
 
 // Collects the loaded chunks to unload. Unwanted chunks stay while they are near and there is room.
 void StreamPlan::find_leaving() {
-  leaving_.clear();
-  std::map<std::uint32_t, std::unordered_map<IVec3, bool, CoordinateHash>> is_wanted;
-  for (const Wanted& each : wanted_) is_wanted[each.place.grid].emplace(each.place.chunk, true);
   std::vector<Wanted> others;
   const std::vector<Eye> nobody;
-  for (const auto& [grid, states] : states_) {
+  for (const auto& [grid, states] : known_) {
     const auto eyes = requests_.eyes.find(grid);
-    const auto& of_grid = is_wanted[grid];
-    for (const auto& [chunk, state] : states) {
-      if (state != State::Here || of_grid.contains(chunk)) continue;
+    for (const auto& [chunk, known] : states) {
+      if (known.state != State::Here || known.wanted != kUnwanted) continue;
       others.push_back(measured({grid, 0, chunk}, eyes == requests_.eyes.end() ? nobody : eyes->second));
     }
   }
@@ -209,7 +309,7 @@ bool StreamPlan::next(ChunkAddress& place, bool has_room) {
   const auto take_from = [&](const std::vector<ChunkAddress>& places, std::size_t& at) {
     while (at < places.size()) {
       place = places[at];
-      const bool is_new = state_of(place) == nullptr;
+      const bool is_new = state_of(place) == State::Unknown;
       if (is_new) set_state(place, State::Begun);
       ++at;
       if (is_new) return true;
@@ -223,22 +323,8 @@ std::vector<ChunkAddress> StreamPlan::take_leaving() {
   return std::exchange(leaving_, {});
 }
 
-std::size_t StreamPlan::missing() {
-  if (is_counted_) return missing_count_;
-  const auto is_missing = [&](const Wanted& each) {
-    const State* const state = state_of(each.place);
-    return state == nullptr || *state == State::Begun;
-  };
-  while (here_ < wanted_.size() && !is_missing(wanted_[here_])) ++here_;
-  QUOIN_ASSERT(here_ <= wanted_.size(), "at most the wanted chunks");
-  missing_count_ = static_cast<std::size_t>(
-      std::count_if(wanted_.begin() + static_cast<std::ptrdiff_t>(here_), wanted_.end(), is_missing));
-  is_counted_ = true;
-  return missing_count_;
-}
-
 double StreamPlan::complete_radius() {
-  (void)missing();
+  while (here_ < wanted_.size() && !is_missing_[here_]) ++here_;
   if (here_ < wanted_.size()) return wanted_[here_].distance;
   if (is_cut_) return wanted_.empty() ? 0.0 : wanted_.back().distance;
   double least = std::numeric_limits<double>::infinity();

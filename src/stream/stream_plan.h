@@ -6,14 +6,17 @@
 #include <limits>
 #include <map>
 #include <span>
-#include <unordered_map>
 #include <vector>
+
+#include <tsl/robin_map.h>
 
 #include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
 #include <quoin/scene/scene.h>
 #include <quoin/store/world_store.h>
 #include <quoin/stream/streamed_world.h>
+
+#include "core/coordinates/chunk_trie.h"
 
 namespace quoin::stream {
 
@@ -47,13 +50,18 @@ struct StreamRequests {
 ///
 ///   unknown -> begun -> here -> unknown
 ///
+/// Chunks outside of a grid's extent are air without being loaded: they have no state and no place in a plan.
 /// Threads: one at a time.
 class StreamPlan {
  public:
-  enum class State : std::uint8_t { Begun, Here, Broken };
+  enum class State : std::uint8_t { Unknown, Begun, Here, Broken };
 
+  /// Sets the chunks of a grid that can be loaded: a box, and others outside of the box. Before the first call all
+  /// chunks can. Takes effect with the next plan.
+  void set_extent(std::uint32_t grid, const IBox& chunks, std::span<const IVec3> others);
+  /// A chunk outside of the grid's box joins the others.
   void set_state(const ChunkAddress& place, State state);
-  void forget(const ChunkAddress& place);
+  void forget(const ChunkAddress& place) { set_state(place, State::Unknown); }
 
   /// Replaces the requests and computes the chunks to load from scratch.
   void plan(StreamRequests requests);
@@ -68,10 +76,13 @@ class StreamPlan {
   [[nodiscard]] std::vector<ChunkAddress> take_leaving();
 
   [[nodiscard]] std::size_t wanted() const { return wanted_.size(); }
-  /// Return the number of wanted chunks that are not loaded, and the distance of the nearest in world units. Cost:
-  /// O(wanted) after a change.
-  [[nodiscard]] std::size_t missing();
+  /// Returns the number of wanted chunks that are not loaded. Cost: O(1).
+  [[nodiscard]] std::size_t missing() const { return missing_count_; }
+  /// Returns the distance of the nearest of them in world units. Cost: O(wanted) in total from plan to plan, unless
+  /// wanted chunks are forgotten.
   [[nodiscard]] double complete_radius();
+  /// Returns the number of chunks with a state or in the plan.
+  [[nodiscard]] std::size_t entries() const;
 
  private:
   struct Wanted {
@@ -79,18 +90,34 @@ class StreamPlan {
     double distance = 0.0;  ///< world units, of its nearest point from the nearest eye
     double rank = 0.0;      ///< lower ranks load first
   };
-  using States = std::unordered_map<IVec3, State, CoordinateHash>;
+  struct Known {
+    State state = State::Unknown;
+    std::uint32_t wanted = kUnwanted;  ///< index in `wanted_`
+  };
+  using Grid = tsl::robin_map<IVec3, Known, CoordinateHash>;
+  struct Mark {};
+  struct Extent {
+    IBox chunks;
+    ChunkTrie<Mark> others;
+  };
+  static constexpr std::uint32_t kUnwanted = ~std::uint32_t{0};
 
+  void begin_plan();
   void find_wanted();
+  void add_wanted(std::uint32_t grid, const std::vector<Eye>& eyes);
   void cut_to_budget();
+  void mark_wanted();
   void find_queue();
   void find_leaving();
-  [[nodiscard]] const State* state_of(const ChunkAddress& place) const;
+  [[nodiscard]] double reach_of(const Eye& eye, const Extent& extent) const;
+  [[nodiscard]] State state_of(const ChunkAddress& place) const;
+  [[nodiscard]] static bool is_missing(State state) { return state == State::Unknown || state == State::Begun; }
   [[nodiscard]] static bool is_nearer(const Wanted& a, const Wanted& b);
   [[nodiscard]] Wanted measured(const ChunkAddress& place, const std::vector<Eye>& eyes) const;
 
   StreamRequests requests_;
-  std::map<std::uint32_t, States> states_;
+  std::map<std::uint32_t, Grid> known_;
+  std::map<std::uint32_t, Extent> extents_;
   std::vector<Wanted> wanted_;  ///< by distance
   bool is_cut_ = false;         ///< the budget limited the plan
   std::vector<ChunkAddress> queue_;
@@ -98,8 +125,8 @@ class StreamPlan {
   std::size_t asked_ = 0;
   std::vector<ChunkAddress> leaving_;
   std::size_t here_ = 0;           ///< all entries of `wanted_` before this index are loaded
-  std::size_t missing_count_ = 0;  ///< as of the last count
-  bool is_counted_ = false;
+  std::vector<bool> is_missing_;   ///< of `wanted_`
+  std::size_t missing_count_ = 0;  ///< true entries of `is_missing_`
 };
 
 /// The placements of one grid in a scene, nearest first: chunks loaded for these also serve the others.

@@ -13,7 +13,6 @@
 #include <string>
 #include <string_view>
 #include <tuple>
-#include <unordered_map>
 #include <unordered_set>
 #include <utility>
 
@@ -22,6 +21,7 @@
 #include <quoin/io/file.h>
 
 #include "core/bytes/text.h"
+#include "core/coordinates/chunk_trie.h"
 #include "core/work/workers.h"
 #include "stream/chunk_streamer.h"
 #include "stream/edit_fit.h"
@@ -53,12 +53,22 @@ constexpr double kQuiet = 3.0;
 // Prefix of the value that stores a grid's terrain generator.
 constexpr std::string_view kTerrainValue = "quoin.terrain.";
 
+// For tries whose entries have no pointers elsewhere.
+constexpr auto kStays = [](auto&) {};
+
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
 std::size_t bytes_of(const StoredChunk& chunk) {
   return kChunkBytes + chunk.voxels.bytes() + (chunk.densities ? chunk.densities->bytes() : 0);
+}
+
+// Returns the bytes of a loaded chunk of a grid.
+std::size_t bytes_in(const SceneGrid& content, IVec3 chunk) {
+  const Chunk* const voxels = content.grid.find_chunk(chunk);
+  const DensityChunk* const densities = content.field.find_chunk(chunk);
+  return kChunkBytes + (voxels == nullptr ? 0 : voxels->bytes()) + (densities == nullptr ? 0 : densities->bytes());
 }
 
 std::vector<std::byte> bytes_of_text(const std::string& text) {
@@ -91,8 +101,8 @@ struct StreamedWorld::Impl {
     std::uint32_t number = 0;
     Placements placements;
     ChangeCursor voxels, data, densities;
-    std::unordered_map<IVec3, std::size_t, CoordinateHash> sizes;  // of the loaded chunks, bytes
-    std::unordered_set<IVec3, CoordinateHash> kept;                // edited in a read-only world: they stay loaded
+    ChunkTrie<std::size_t> sizes;                    // of the loaded chunks, bytes; grows without copies
+    std::unordered_set<IVec3, CoordinateHash> kept;  // edited in a read-only world: they stay loaded
     WaitingEdits waiting;
     std::unordered_set<IVec3, CoordinateHash> broken;
   };
@@ -108,6 +118,7 @@ struct StreamedWorld::Impl {
   [[nodiscard]] Scene& scene() { return world.loaded.scene; }
   Status begin();
   Streamed& add_streamed(GridHandle handle, std::uint32_t number);
+  Status set_generator(Streamed& grid, std::shared_ptr<const ChunkGenerator> generator);
   Streamed* streamed(std::uint32_t number) {
     const auto found = grids.find(number);
     return found == grids.end() ? nullptr : &found->second;
@@ -142,6 +153,7 @@ struct StreamedWorld::Impl {
                                                const SceneGrid& content);
   void take_away(const ChunkAddress& place, ChunkStreamer::Note& note);
   void note_edits();
+  void adopt(Streamed& grid, const SceneGrid& content, IVec3 chunk);
   Status save_now();
   [[nodiscard]] std::size_t waiting_chunks() const;
   [[nodiscard]] Status waits_for_broken() const;
@@ -190,21 +202,41 @@ Status StreamedWorld::Impl::begin() {
     const auto number = world.saver.number_of(handle);
     QUOIN_ASSERT(number.has_value(), "a loaded grid has a number");
     if (!scene().grids()[handle].grid.is_partial()) continue;  // a whole grid
-    add_streamed(handle, *number);
+    Streamed& grid = add_streamed(handle, *number);
     const auto value = store.value(std::string(kTerrainValue) + std::to_string(*number));
     if (!value) return value.error();
-    if (!*value) continue;
-    const auto terrain = terrain_from(**value);
-    if (!terrain) {
+    const auto terrain = *value ? terrain_from(**value) : std::nullopt;
+    if (*value && !terrain) {
       problems.push_back("the terrain of grid " + std::to_string(*number) +
                          " has an unknown kind and is not generated");
-      continue;
     }
-    auto generator = make_terrain_generator(*terrain, scene().types);
-    if (!generator) return generator.error();
-    streamer.set_generator(*number, std::move(*generator));
+    std::shared_ptr<const ChunkGenerator> generator;
+    if (terrain) {
+      auto made = make_terrain_generator(*terrain, scene().types);
+      if (!made) return made.error();
+      generator = std::move(*made);
+    }
+    if (auto set = set_generator(grid, std::move(generator)); !set) return set;
   }
   return save_now();
+}
+
+// Limits the grid to the chunks that the generator makes, and to others: those that are stored, loaded or have waiting
+// edits. Requires: `note_edits` has seen all edits.
+Status StreamedWorld::Impl::set_generator(Streamed& grid, std::shared_ptr<const ChunkGenerator> generator) {
+  SceneGrid* const content = content_of_grid(grid);
+  if (content == nullptr) return {};
+  auto others = store.chunks(grid.number, 0);
+  if (!others) return others.error();
+  const IBox made = generator == nullptr ? IBox{} : generator->chunks();
+  grid.sizes.for_each([&](IVec3 chunk, std::size_t) { others->push_back(chunk); });
+  for (const auto& [chunk, edits] : grid.waiting) others->push_back(chunk);
+  std::erase_if(*others, [&](IVec3 chunk) { return made.contains(chunk); });
+  content->grid.set_extent(made, *others);
+  content->field.set_extent(made, *others);
+  streamer.set_generator(grid.number, std::move(generator), *others);
+  must_plan = true;
+  return {};
 }
 
 StreamedWorld::Impl::Streamed& StreamedWorld::Impl::add_streamed(GridHandle handle, std::uint32_t number) {
@@ -311,7 +343,7 @@ void StreamedWorld::Impl::note_edits() {
   for (auto& [number, grid] : grids) {
     const SceneGrid* const content = scene().grids().find(grid.handle);
     if (content == nullptr) {  // removed, with its loaded chunks
-      for (const auto& [chunk, size] : grid.sizes) budget.remove_chunk(size);
+      grid.sizes.for_each([&](IVec3, std::size_t size) { budget.remove_chunk(size); });
       grid.sizes.clear();
       grid.waiting.clear();
       continue;
@@ -320,20 +352,23 @@ void StreamedWorld::Impl::note_edits() {
       for (const auto& change : changes.items) {
         if (!change.is_edit) continue;
         is_edited = true;
-        const auto size = of.sizes.find(change.chunk);
-        if (size == of.sizes.end()) continue;
-        const Chunk* const voxels = content->grid.find_chunk(change.chunk);
-        const DensityChunk* const densities = content->field.find_chunk(change.chunk);
-        const std::size_t now =
-            kChunkBytes + (voxels == nullptr ? 0 : voxels->bytes()) + (densities == nullptr ? 0 : densities->bytes());
-        budget.resize_chunk(size->second, now);
-        size->second = now;
+        std::size_t* const size = of.sizes.find_to_edit(change.chunk, kStays);
+        if (size == nullptr) {
+          if (!content->grid.is_loaded(change.chunk)) continue;
+          adopt(of, *content, change.chunk);
+        } else {
+          const std::size_t now = bytes_in(*content, change.chunk);
+          budget.resize_chunk(*size, now);
+          *size = now;
+        }
         if (!store.is_writable()) of.kept.insert(change.chunk);
       }
       if (changes.all) {  // too many changes to list: any loaded chunk may have been edited
         is_edited = true;
+        for (const IVec3 chunk : content->grid.chunks()) adopt(of, *content, chunk);
+        for (const IVec3 chunk : content->field.chunks()) adopt(of, *content, chunk);
         if (store.is_writable()) return;
-        for (const auto& [chunk, size] : of.sizes) of.kept.insert(chunk);
+        of.sizes.for_each([&](IVec3 chunk, std::size_t) { of.kept.insert(chunk); });
       }
     };
     // If `note` throws, the next call reads the changes again.
@@ -347,6 +382,15 @@ void StreamedWorld::Impl::note_edits() {
     grid.data = data;
     grid.densities = densities;
   }
+}
+
+// Counts a chunk that was edited without being loaded, outside of the extent. From now on it is one of the others.
+void StreamedWorld::Impl::adopt(Streamed& grid, const SceneGrid& content, IVec3 chunk) {
+  if (grid.sizes.find(chunk.x, chunk.y, chunk.z) != nullptr) return;
+  unposted.add({grid.number, 0, chunk}, What::Here);
+  const std::size_t size = bytes_in(content, chunk);
+  grid.sizes.find_or_create(chunk, kStays) = size;
+  budget.add_chunk(size);
 }
 
 Status StreamedWorld::Impl::save_now() {
@@ -407,6 +451,12 @@ void StreamedWorld::Impl::put(CompletedLoad completed, ChunkStreamer::Note& note
     must_plan = true;
     return note.add(place, What::Gone);
   }
+  if (content->grid.is_loaded(place.chunk)) {  // the extent has changed since the chunk was requested
+    adopt(*grid, *content, place.chunk);
+    ++totals.chunks_dropped;
+    note.released.push_back(std::move(completed.chunk));
+    return note.add(place, What::Here);
+  }
   std::optional<StoredChunk> edited = edited_on_arrival(*grid, completed, *content);
   const bool is_near = is_near_anyone(place);
   if (!is_near && !edited) {
@@ -421,7 +471,7 @@ void StreamedWorld::Impl::put(CompletedLoad completed, ChunkStreamer::Note& note
   } else {
     content->field.load_air_chunk(place.chunk);
   }
-  grid->sizes[place.chunk] = size;
+  grid->sizes.find_or_create(place.chunk, kStays) = size;
   budget.add_chunk(size);
   ++moved_since_save;
   note.add(place, What::Here);
@@ -448,10 +498,10 @@ void StreamedWorld::Impl::take_away(const ChunkAddress& place, ChunkStreamer::No
   content->field.unload_chunk(place.chunk);
   note.released.push_back(std::move(last));
   note.add(place, What::Gone);
-  const auto size = grid->sizes.find(place.chunk);
-  QUOIN_ASSERT(size != grid->sizes.end(), "loaded chunks are counted");
-  budget.remove_chunk(size->second);
-  grid->sizes.erase(size);
+  const std::size_t* const size = grid->sizes.find(place.chunk.x, place.chunk.y, place.chunk.z);
+  QUOIN_ASSERT(size != nullptr, "loaded chunks are counted");
+  budget.remove_chunk(*size);
+  grid->sizes.erase(place.chunk, kStays);
   ++moved_since_save;
   ++totals.chunks_unloaded;
 }
@@ -681,9 +731,10 @@ Result<GridHandle> StreamedWorld::add_grid(SceneGrid grid, std::shared_ptr<const
   }
   const auto number = impl_->world.saver.number_of(handle);
   QUOIN_ASSERT(number.has_value(), "a saved grid has a number");
-  impl_->add_streamed(handle, *number);
-  if (generator != nullptr) impl_->streamer.set_generator(*number, std::move(generator));
-  impl_->must_plan = true;
+  if (auto set = impl_->set_generator(impl_->add_streamed(handle, *number), std::move(generator)); !set) {
+    scene().remove_grid(handle);
+    return set.error();
+  }
   return handle;
 }
 
@@ -699,9 +750,12 @@ void StreamedWorld::use_generator(GridHandle grid, std::shared_ptr<const ChunkGe
     impl_->problems.push_back("grid " + std::to_string(*number) + " is whole, so its generator is not used");
     return;
   }
+  impl_->note_edits();
   // Saves the generator's types first.
   if (const auto saved = impl_->save_now(); !saved) impl_->problems.push_back(to_string(saved.error()));
-  impl_->streamer.set_generator(*number, std::move(generator));
+  if (const auto set = impl_->set_generator(*impl_->streamed(*number), std::move(generator)); !set) {
+    impl_->problems.push_back(to_string(set.error()));
+  }
 }
 
 Result<GridHandle> StreamedWorld::add_terrain(const EndlessTerrain& terrain) {

@@ -115,7 +115,8 @@ TEST_F(StreamedWorldTest, LoadsOnlyChunksAroundViewer) {
         const IVec3 chunk{x, y, z};
         const DVec3 low = DVec3(chunk) * 64.0;
         const double distance = glm::length(glm::clamp(viewer.position, low, low + 64.0) - viewer.position);
-        EXPECT_EQ(grid.is_loaded(chunk), distance <= 150.0) << x << " " << y << " " << z;
+        // Air above and below the generator's chunks is known without loading it.
+        EXPECT_EQ(grid.is_loaded(chunk), distance <= 150.0 || y < -2 || y >= 2) << x << " " << y << " " << z;
         if (!grid.is_loaded(chunk)) continue;
         const Chunk* const held = grid.find_chunk(chunk);
         EXPECT_EQ(held == nullptr ? Chunk(kAir) : *held, y >= -2 ? PatternGround::of(chunk) : Chunk(kAir));
@@ -404,6 +405,139 @@ TEST_F(StreamedWorldTest, AppliesLargeWaitingEdit) {
     ASSERT_TRUE(kept.has_value() && kept->has_value()) << i;
     EXPECT_EQ((*kept)->voxels, Chunk(3)) << i;
   }
+}
+
+// Only the generator's chunks are loaded, planned and moved; the air around them is known.
+TEST_F(StreamedWorldTest, LoadsNothingOutsideOfGenerator) {
+  auto generator = std::make_shared<PatternGround>();
+  StreamedWorld world = ground(path(), generator);
+  const GridHandle handle = only_grid(world);
+  const Viewer viewer{.position = {10.0, 5.0, 10.0}, .radius = 400.0};
+  ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+  const StreamStats stats = world.stats();
+  EXPECT_EQ(stats.loaded_chunks, generator->asked());
+  EXPECT_EQ(stats.wanted_chunks, generator->asked());
+  EXPECT_EQ(stats.chunks_made, generator->asked());
+  EXPECT_EQ(stats.complete_radius, 400.0);
+  EXPECT_TRUE(stats.is_complete);
+  const SceneGrid& content = world.scene().grids()[handle];
+  EXPECT_EQ(content.grid.loaded_chunks().size(), generator->asked());
+  EXPECT_EQ(content.field.loaded_chunks().size(), generator->asked());
+  EXPECT_TRUE(world.is_loaded(handle, {0, 100, 0}));
+  EXPECT_FALSE(world.is_loaded(handle, {100, 0, 0}));
+  const auto stored = world.store().chunks(0, 0);
+  ASSERT_TRUE(stored.has_value());
+  EXPECT_EQ(stored->size(), generator->asked());
+}
+
+TEST_F(StreamedWorldTest, KeepsEditsOutsideOfGenerator) {
+  auto generator = std::make_shared<PatternGround>();
+  const IVec3 tower{3, 1000, 3};
+  const IVec3 chunk = chunk_of(tower);
+  Viewer viewer{.position = {0.0, 0.0, 0.0}, .radius = 100.0};
+  {
+    StreamedWorld world = ground(path(), generator);
+    const GridHandle handle = only_grid(world);
+    ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+    const std::size_t loaded = world.stats().loaded_chunks;
+    EXPECT_TRUE(world.scene().edit(handle).grid.set(tower.x, tower.y, tower.z, 3));
+    ASSERT_TRUE(world.apply({0, WorldEdit::SetVoxels{{{tower + IVec3(0, 1, 0), 2}}}}).has_value());
+    EXPECT_EQ(world.stats().waiting_edits, 0U) << "known air is edited at once";
+    ASSERT_TRUE(world.update({&viewer, 1}).has_value());
+    EXPECT_EQ(world.stats().loaded_chunks, loaded + 1);
+    // It leaves with its surroundings, and comes back.
+    ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+    viewer.position.x = 5000.0;
+    ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+    EXPECT_FALSE(world.is_loaded(handle, chunk));
+    EXPECT_EQ(world.scene().grids()[handle].grid.get(tower.x, tower.y, tower.z), kAir);
+    ASSERT_TRUE(world.apply({0, WorldEdit::SetVoxels{{{tower + IVec3(0, 2, 0), 1}}}}).has_value());
+    EXPECT_EQ(world.stats().waiting_edits, 1U) << "unloaded chunks are edited when they are loaded";
+    viewer.position = DVec3(tower);
+    ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+    EXPECT_EQ(world.stats().loaded_chunks, 1U);
+    const Grid& grid = world.scene().grids()[handle].grid;
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(grid.get(tower.x, tower.y + i, tower.z), 3 - i);
+  }
+  StreamedWorld world = ground(path(), generator);
+  const GridHandle handle = only_grid(world);
+  EXPECT_FALSE(world.is_loaded(handle, chunk)) << "it is stored";
+  EXPECT_TRUE(world.is_loaded(handle, chunk + 1));
+  ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+  EXPECT_EQ(world.stats().loaded_chunks, 1U);
+  EXPECT_EQ(world.scene().grids()[handle].grid.get(tower.x, tower.y, tower.z), 3);
+  EXPECT_EQ(generator->most_asked(), 1);
+}
+
+TEST_F(StreamedWorldTest, KeepsEditedAirOfReadOnlyWorld) {
+  auto generator = std::make_shared<PatternGround>();
+  Viewer viewer{.radius = 100.0};
+  {
+    StreamedWorld world = ground(path(), generator);
+    ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+  }
+  auto world = StreamedWorld::open(path(), WorldAccess::Read);
+  ASSERT_TRUE(world.has_value()) << to_string(world.error());
+  const GridHandle grid = only_grid(*world);
+  ASSERT_TRUE(world->load_all({&viewer, 1}).has_value());
+  EXPECT_TRUE(world->scene().edit(grid).grid.set(3, 3000, 3, 2));
+  viewer.position.x = 4000.0;
+  ASSERT_TRUE(world->load_all({&viewer, 1}).has_value());
+  EXPECT_EQ(world->scene().grids()[grid].grid.get(3, 3000, 3), 2);
+}
+
+// Without a generator, the stored chunks are all there is.
+TEST_F(StreamedWorldTest, LoadsOnlyStoredChunksWithoutGenerator) {
+  const Viewer viewer{.radius = 500.0};
+  {
+    auto world = StreamedWorld::open_or_create(path());
+    ASSERT_TRUE(world.has_value());
+    add_types(*world);
+    const auto grid = world->add_grid({.name = "ship"});
+    ASSERT_TRUE(grid.has_value());
+    Instance instance;
+    instance.grid = *grid;
+    world->scene().add_instance(instance);
+    EXPECT_EQ(world->scene().edit(*grid).grid.fill_box({{-70, 0, 0}, {70, 10, 10}}, 1), 140 * 100);
+    ASSERT_TRUE(world->load_all({&viewer, 1}).has_value());
+    EXPECT_EQ(world->stats().loaded_chunks, 4U);
+    ASSERT_TRUE(world->flush().has_value());
+  }
+  auto world = StreamedWorld::open(path(), WorldAccess::Write);
+  ASSERT_TRUE(world.has_value()) << to_string(world.error());
+  ASSERT_TRUE(world->load_all({&viewer, 1}).has_value());
+  const StreamStats stats = world->stats();
+  EXPECT_EQ(stats.loaded_chunks, 4U);
+  EXPECT_EQ(stats.wanted_chunks, 4U);
+  EXPECT_EQ(stats.chunks_read, 4U);
+  EXPECT_EQ(stats.complete_radius, 500.0);
+  EXPECT_EQ(world->scene().grids()[only_grid(*world)].grid.voxel_count(), 140 * 100);
+}
+
+// A generator that is set while the program runs: loaded and edited chunks stay, waiting edits find their chunks.
+TEST_F(StreamedWorldTest, KeepsLoadedChunksWhenGeneratorChanges) {
+  auto generator = std::make_shared<PatternGround>();
+  StreamedWorld world = ground(path(), generator);
+  const GridHandle handle = only_grid(world);
+  const Viewer viewer{.radius = 100.0};
+  ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+  EXPECT_TRUE(world.scene().edit(handle).grid.set(3, 1000, 3, 3));
+  ASSERT_TRUE(world.apply({0, WorldEdit::SetVoxels{{{{900, -1, 1}, 3}}}}).has_value());
+  world.use_generator(handle, nullptr);
+  ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+  ASSERT_TRUE(world.flush().has_value());
+  EXPECT_EQ(world.stats().waiting_edits, 0U);
+  const Grid& grid = world.scene().grids()[handle].grid;
+  EXPECT_EQ(grid.get(3, 1000, 3), 3);
+  EXPECT_EQ(grid.get(3, -1, 3) == kAir, false);
+  EXPECT_TRUE(world.is_loaded(handle, {50, 0, 0})) << "air that no generator makes";
+  const auto kept = world.store().load_chunk({0, 0, chunk_of(IVec3{900, -1, 1})});
+  ASSERT_TRUE(kept.has_value() && kept->has_value());
+  EXPECT_EQ((*kept)->voxels.get(local_of(IVec3{900, -1, 1})), 3);
+  world.use_generator(handle, generator);
+  EXPECT_FALSE(world.is_loaded(handle, {50, 0, 0}));
+  ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+  EXPECT_EQ(grid.get(3, 1000, 3), 3);
 }
 
 /// Fails for one chunk.

@@ -34,8 +34,8 @@ class ChunkGenerator {
   ChunkGenerator& operator=(const ChunkGenerator&) = delete;
   virtual ~ChunkGenerator() = default;
 
-  /// Returns the box of chunks (half open) that `make` can fill. Everything outside is air. The box must not
-  /// change.
+  /// Returns the box of chunks (half open) that `make` can fill. Everything outside is air, unless it was edited. This
+  /// air counts as loaded everywhere and takes no memory and no time, so keep the box small. The box must not change.
   [[nodiscard]] virtual IBox chunks() const = 0;
   /// Makes one chunk. It may contain only types of the world's registry, and densities within the band of the grid's
   /// field.
@@ -90,7 +90,7 @@ struct StreamOptions {
 };
 
 struct StreamStats {
-  std::size_t loaded_chunks = 0;   ///< in memory, including air
+  std::size_t loaded_chunks = 0;   ///< in memory, including air within the generators' boxes
   std::size_t loaded_bytes = 0;    ///< voxels and densities of the loaded chunks
   std::size_t other_bytes = 0;     ///< last value from StreamOptions::other_bytes
   std::size_t wanted_chunks = 0;   ///< within the viewers' radius and the budget
@@ -130,6 +130,8 @@ struct WorldExtent {
 /// Grids:    streamed or whole. The file stores which, so a grid is the same when the world is opened again.
 ///           Streamed grids come from `add_grid`. They are partial (Grid::make_partial): their chunks load from near to
 ///           far and unload at a distance. Direct edits change loaded chunks; `apply` also changes unloaded ones.
+///           Chunks that no generator makes (ChunkGenerator::chunks) and that the file does not hold are known air:
+///           they count as loaded, and edits of them are saved like others.
 ///           Whole grids are those that the program adds to the scene itself (Scene::add_grid), and grids that the file
 ///           stores with SceneGrid::whole. They are fully in memory from the start; `open` loads them.
 ///           All other grids of a file are streamed: those of files that earlier versions wrote, and those that
@@ -145,7 +147,7 @@ class StreamedWorld {
  public:
   /// Opens a world and loads its whole grids, but no chunks of streamed ones. With WorldAccess::Read, nothing is saved.
   /// Damaged chunks of whole grids are left out with a warning in `opened`, and stay in the file.
-  /// Cost:   O(chunks of whole grids).
+  /// Cost:   O(chunks of whole grids + stored chunks): the others are listed but not read.
   /// Errors: as WorldStore::open and load_partial_world.
   [[nodiscard]] static Result<StreamedWorld> open(const std::filesystem::path& path, WorldAccess access,
                                                   const StreamOptions& options = {});
@@ -173,7 +175,8 @@ class StreamedWorld {
   /// instance places it. Requires: `grid` has no voxels and no densities. Errors: CannotWrite; InvalidArgument if it is
   /// marked as not saved; as WorldSaver::save.
   Result<GridHandle> add_grid(SceneGrid grid, std::shared_ptr<const ChunkGenerator> generator = nullptr);
-  /// Sets the generator for a grid's chunks that are not in the file. Call it before the first `update`.
+  /// Sets the generator for a grid's chunks that are not in the file. Call it before the first `update`; later, loaded
+  /// chunks stay as they are. Cost: O(stored chunks). `take_problems` reports errors.
   /// Requires: the grid came from the file or from `add_grid`. Whole grids have no generator: the call does nothing,
   /// and `take_problems` reports it.
   void use_generator(GridHandle grid, std::shared_ptr<const ChunkGenerator> generator);
@@ -195,7 +198,8 @@ class StreamedWorld {
   /// Calls `update` until all chunks that these viewers want are loaded. For tools and tests. Errors: as `update`.
   Status load_all(std::span<const Viewer> viewers);
 
-  /// Returns true if a chunk of a grid is in memory.
+  /// Returns true if the content of a grid's chunk is known: it is in memory, or air that is neither generated nor
+  /// stored.
   [[nodiscard]] bool is_loaded(GridHandle grid, IVec3 chunk) const;
   /// Applies an edit: to loaded chunks at once, and to unloaded chunks after loading them for the edit. The result is
   /// saved. Edits of one chunk are applied in call order. Per-voxel data on air, or with more state bits than the
@@ -215,7 +219,8 @@ class StreamedWorld {
   /// could not be generated (which are air). Also reports generators that a grid cannot use.
   [[nodiscard]] std::vector<std::string> take_problems();
   [[nodiscard]] StreamStats stats();
-  /// Returns the store, for game values and other data that WorldStore::save accepts.
+  /// Returns the store, for game values and other data that WorldStore::save accepts. Save chunks of streamed
+  /// grids by edits, not through the store.
   [[nodiscard]] WorldStore& store();
 
  private:
