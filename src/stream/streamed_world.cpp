@@ -506,13 +506,17 @@ void StreamedWorld::Impl::take_away(const ChunkAddress& place, ChunkStreamer::No
   ++totals.chunks_unloaded;
 }
 
-// Moves arrived and leaving chunks within the time limit, at least one. Unloads no chunk while edits could not be
-// handed to the store.
+// Moves arrived and leaving chunks within the time limit, at least one. A short list is moved over several updates: it
+// gets the part of the limit that it has of the longest list that workers make. Unloads no chunk while edits could not
+// be handed to the store.
 void StreamedWorld::Impl::move_chunks(double seconds, Clock::time_point start, ChunkStreamer::Note& note) {
   has_moved = false;
   const bool may_leave = !is_edited;
+  const std::size_t waiting = completed_loads.size() + (may_leave ? leaving.size() : 0);
+  const double share = std::min(static_cast<double>(waiting) / static_cast<double>(kMaxCompletedLoads), 1.0);
+  const Clock::time_point begun = Clock::now();
   while (!completed_loads.empty() || (may_leave && !leaving.empty())) {
-    if (has_moved && seconds_since(start) >= seconds) break;
+    if (has_moved && (seconds_since(start) >= seconds || seconds_since(begun) >= share * seconds)) break;
     has_moved = true;
     // Unloads chunks first to make room for arrivals.
     const bool is_over = budget.is_over();

@@ -79,8 +79,9 @@ struct StreamOptions {
   /// Returns the bytes held elsewhere for loaded chunks: meshes, trees, light, GPU memory. `update` calls it ten times
   /// per second. May be empty.
   std::function<std::size_t()> other_bytes{};
-  /// Time limit of one `update` call in seconds; it loads or unloads at least one chunk.
-  double update_seconds = 0.0001;
+  /// Time limit of one `update` call in seconds; it loads or unloads at least one chunk. While few chunks wait, `update`
+  /// uses less: it moves them over several calls.
+  double update_seconds = 0.0005;
   /// Minimum time between two saves in `update`; 0: saves in every call.
   std::chrono::milliseconds save_interval{1000};
   /// Saves generated chunks, so that each is generated once. If false, a chunk is generated at each load until it is
