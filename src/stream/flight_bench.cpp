@@ -1,7 +1,8 @@
-// stream/flight: flies at 100 voxels per second over a landscape that is generated, meshed, edited, saved and unloaded
-// on the way, at 60 frames per second. Measures the caller's thread time and the memory in use. QUOIN_FLIGHT_SECONDS:
-// duration. QUOIN_FLIGHT_RADIUS: the viewer's radius. QUOIN_FLIGHT_BUDGET: MiB. QUOIN_FLIGHT_PLOT: output file with one
-// line per second. QUOIN_FLIGHT_KEEPS: the allocator keeps freed memory.
+// stream/flight: flies over a landscape that is generated, meshed, edited, saved and unloaded on the way, at 60 frames
+// per second. Measures the caller's thread time and the memory in use. QUOIN_FLIGHT_SECONDS: duration.
+// QUOIN_FLIGHT_SPEED: voxels per second. QUOIN_FLIGHT_RADIUS: the viewer's radius. QUOIN_FLIGHT_BUDGET: MiB.
+// QUOIN_FLIGHT_PLOT: output file with one line per second. QUOIN_FLIGHT_KEEPS: the allocator keeps freed memory.
+// QUOIN_FLIGHT_UPDATE: StreamOptions::update_seconds. QUOIN_FLIGHT_BARE: no meshes.
 
 #include <time.h>
 #include <unistd.h>
@@ -165,7 +166,7 @@ struct Flight {
     }
   }
   Status frame(int number, FlightLog& log) {
-    viewer.position.x += 100.0 / 60.0;
+    viewer.position.x += number_of("QUOIN_FLIGHT_SPEED", 100.0) / 60.0;
     if (number % 10 == 0) dig();
     const double control_before = processor_seconds();
     for (unsigned i = 0; i < 60'000; ++i) benchmark::DoNotOptimize(i);
@@ -175,8 +176,10 @@ struct Flight {
     log.control.push_back(own_before - control_before);
     const double own = processor_seconds() - own_before;
     const Clock::time_point then = Clock::now();
-    meshes.update(world.scene(), viewer.position);
-    drawn.take(meshes);
+    if (!is_bare) {
+      meshes.update(world.scene(), viewer.position);
+      drawn.take(meshes);
+    }
     log.follows.push_back(seconds_since(then));
     log.note(number, own, std::chrono::duration<double>(then - at).count(), world.stats(), base);
     return {};
@@ -184,6 +187,7 @@ struct Flight {
 
   StreamedWorld world;
   bool is_smooth;
+  bool is_bare = std::getenv("QUOIN_FLIGHT_BARE") != nullptr;
   GridHandle grid;
   LiveMeshes meshes;
   Drawn drawn;
@@ -195,7 +199,7 @@ Status fly_through(Flight& flight, benchmark::State& state) {
   const Clock::time_point began = Clock::now();
   if (auto done = flight.begin(); !done) return done;
   state.counters["first_seconds"] = seconds_since(began);
-  flight.meshes.finish(flight.world.scene(), flight.viewer.position);
+  if (!flight.is_bare) flight.meshes.finish(flight.world.scene(), flight.viewer.position);
   flight.drawn.take(flight.meshes);
   const StreamStats before = flight.world.stats();
   FlightLog log;
@@ -216,6 +220,9 @@ Status fly_through(Flight& flight, benchmark::State& state) {
   state.counters["unloaded_a_second"] = rate(static_cast<double>(after.chunks_unloaded - before.chunks_unloaded));
   state.counters["saved_chunks"] = static_cast<double>(flight.world.store().stats().saved_chunks);
   state.counters["loaded_chunks"] = static_cast<double>(after.loaded_chunks);
+  state.counters["made_chunks"] = static_cast<double>(after.chunks_made);
+  state.counters["missing_chunks"] = static_cast<double>(after.missing_chunks);
+  state.counters["last_radius"] = after.complete_radius;
   state.counters["base_MB"] = flight.base;
   state.counters["frames_a_second"] = rate(frame);
   return {};
@@ -229,6 +236,7 @@ void fly(benchmark::State& state, bool is_smooth) {
     Flight* flying = nullptr;
     StreamOptions options;
     options.budget_bytes = static_cast<std::size_t>(number_of("QUOIN_FLIGHT_BUDGET", 192.0)) << 20;
+    options.update_seconds = number_of("QUOIN_FLIGHT_UPDATE", options.update_seconds);
     options.other_bytes = [&flying] { return flying == nullptr ? 0 : flying->drawn.bytes(); };
     auto world = StreamedWorld::open_or_create(folder / "flight.quoin", options);
     if (!world) return state.SkipWithError(to_string(world.error()).c_str());
