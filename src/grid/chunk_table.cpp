@@ -1,7 +1,9 @@
 #include "grid/chunk_table.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <limits>
 #include <new>
 #include <utility>
 
@@ -14,6 +16,15 @@ constexpr std::size_t kFewCells = 64;
 constexpr std::size_t kCellsPerChunk = 8;
 // A window that exceeds its allowed size by this factor is shrunk. The factor prevents resizing for a single chunk.
 constexpr std::size_t kSlack = 4;
+
+ChunkWindow::Box box_between(IVec3 first, IVec3 last) {
+  ChunkWindow::Box box{first, {}};
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto size = static_cast<unsigned>(last[axis] - first[axis]);
+    box.log.at(static_cast<std::size_t>(axis)) = std::bit_width(size);
+  }
+  return box;
+}
 
 const ChunkStorage& all_air() {
   static const ChunkStorage air = [] {
@@ -246,23 +257,37 @@ void ChunkTable::outside_changed() {
   if (4 * outside_since_plan_ >= size()) plan();
 }
 
+// Returns a box of all chunks. One walk over the tree: a plan runs while a frame waits.
+ChunkWindow::Box ChunkTable::box_of_all() const {
+  IVec3 low(std::numeric_limits<int>::max());
+  IVec3 high(std::numeric_limits<int>::min());
+  trie_.for_each([&](IVec3 at, const ChunkEntry&) {
+    low = glm::min(low, at);
+    high = glm::max(high, at);
+  });
+  return box_between(low, high);
+}
+
 // Returns a box of all chunks except `left_out` at either end of each axis.
 ChunkWindow::Box ChunkTable::box_of_most(std::size_t left_out) const {
   QUOIN_ASSERT(2 * left_out < size(), "a box of at least one chunk");
-  std::vector<int> along(size());
-  ChunkWindow::Box box;
+  std::array<std::vector<int>, 3> places;
+  for (std::vector<int>& along : places) along.reserve(size());
+  trie_.for_each([&](IVec3 at, const ChunkEntry&) {
+    for (int axis = 0; axis < 3; ++axis) places[static_cast<std::size_t>(axis)].push_back(at[axis]);
+  });
+  IVec3 first(0);
+  IVec3 last(0);
   for (int axis = 0; axis < 3; ++axis) {
-    auto next = along.begin();
-    trie_.for_each([&](IVec3 at, const ChunkEntry&) { *next++ = at[axis]; });
+    std::vector<int>& along = places[static_cast<std::size_t>(axis)];
     const auto low = along.begin() + static_cast<std::ptrdiff_t>(left_out);
     const auto high = along.end() - 1 - static_cast<std::ptrdiff_t>(left_out);
     std::nth_element(along.begin(), low, along.end());
-    const int first = *low;
+    first[axis] = *low;
     std::nth_element(low, high, along.end());
-    box.first[axis] = first;
-    box.log.at(static_cast<std::size_t>(axis)) = std::bit_width(static_cast<unsigned>(*high - first));
+    last[axis] = *high;
   }
-  return box;
+  return box_between(first, last);
 }
 
 // If memory for a new window is short, the current window stays. Chunks outside are found in the tree.
@@ -278,10 +303,8 @@ void ChunkTable::plan() {
 void ChunkTable::try_to_plan() {
   outside_since_plan_ = 0;
   if (empty()) return window_.close();
-  for (const std::size_t left_out : {std::size_t{0}, size() / 16}) {
-    const ChunkWindow::Box box = box_of_most(left_out);
-    if (fits(box)) return move_to(box);
-  }
+  if (const ChunkWindow::Box box = box_of_all(); fits(box)) return move_to(box);
+  if (const ChunkWindow::Box box = box_of_most(size() / 16); fits(box)) return move_to(box);
   if (window_.cells() <= kSlack * max_cells() && 2 * outside_ <= size()) return;
   window_.close();
   outside_ = size();

@@ -195,6 +195,7 @@ class ChunkTable {
   void put_leaf(Leaf& leaf);
   [[nodiscard]] std::size_t max_cells() const;
   [[nodiscard]] bool fits(const ChunkWindow::Box& box) const;
+  [[nodiscard]] ChunkWindow::Box box_of_all() const;
   [[nodiscard]] ChunkWindow::Box box_of_most(std::size_t left_out) const;
   void place(const IVec3& chunk, ChunkEntry& entry);
   bool slide_to(const IVec3& chunk);
