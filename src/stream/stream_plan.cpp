@@ -197,8 +197,8 @@ StreamPlan::Wanted StreamPlan::measured(const ChunkAddress& place, const std::ve
   return all;
 }
 
-// Returns the radius to look at: the viewer's or, if the budget cuts the plan anyway, a smaller one with more chunks than
-// the budget allows.
+// Returns the radius to look at: the viewer's or, if the budget cuts the plan anyway, a smaller one with more chunks
+// than the budget allows.
 double StreamPlan::reach_of(const Eye& eye, const Extent& extent) const {
   const std::size_t most = requests_.max_chunks;
   for (double reach = ball_of(most); reach < eye.radius; reach *= 1.25) {

@@ -120,11 +120,11 @@ class Grid {
   /// Makes the grid partial, with no chunk loaded. Removes its previous content, as an edit.
   void make_partial();
   [[nodiscard]] bool is_partial() const;
-  /// Limits the content of a partial grid to a box of chunks (half open) and to `others`, chunks outside of the box. All
-  /// chunks elsewhere are known to be air: they count as loaded without `load_chunk`, edits can fill them, and
+  /// Limits the content of a partial grid to a box of chunks (half open) and to `others`, chunks outside of the box.
+  /// All chunks elsewhere are known to be air: they count as loaded without `load_chunk`, edits can fill them, and
   /// `unload_chunk` makes them one of the others. Loaded chunks stay loaded; `changes_since` reports them as loaded
-  /// again, because the chunks around them may now be known. Requires: the grid is partial. Cost: O(loaded chunks and
-  /// others).
+  /// again, because the chunks around them may now be known. If it throws, nothing has changed.
+  /// Requires: the grid is partial. Cost: O(loaded chunks and others).
   void set_extent(const IBox& chunks, std::span<const IVec3> others = {});
   /// Returns a box of all chunks that can be unloaded: of the whole world before `set_extent`, empty if the grid is not
   /// partial.
@@ -135,8 +135,8 @@ class Grid {
   /// Unloads a chunk. `changes_since` reports it as in `load_chunk`. Returns false if the chunk is not loaded or the
   /// grid is not partial.
   bool unload_chunk(IVec3 chunk);
-  /// Returns true if the chunk's content is known: it is in memory, or outside of the extent. Always true if the grid is
-  /// not partial.
+  /// Returns true if the chunk's content is known: it is in memory, or outside of the extent. Always true if the grid
+  /// is not partial.
   [[nodiscard]] bool is_loaded(IVec3 chunk) const;
   template <std::floating_point T>
   bool is_loaded(Point<T> point) const = delete;  // is_loaded(chunk_of(voxel_of(point)))

@@ -79,7 +79,7 @@ struct StreamOptions {
   /// Returns the bytes held elsewhere for loaded chunks: meshes, trees, light, GPU memory. `update` calls it ten times
   /// per second. May be empty.
   std::function<std::size_t()> other_bytes{};
-  /// Time limit of one `update` call in seconds; it loads or unloads at least one chunk. While few chunks wait, `update`
+  /// Time limit of one `update` call in seconds; it loads or unloads at least one chunk. While few chunks wait, it
   /// uses less: it moves them over several calls.
   double update_seconds = 0.0005;
   /// Minimum time between two saves in `update`; 0: saves in every call.
