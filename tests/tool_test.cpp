@@ -1,3 +1,6 @@
+#include <sys/inotify.h>
+#include <unistd.h>
+
 #include <array>
 #include <cstdlib>
 #include <fstream>
@@ -755,6 +758,57 @@ TEST_F(Tool, NamesArgumentOfWrongUsage) {
     EXPECT_EQ(result.status, 2) << arguments;
     expect_one_error_line(result);
     EXPECT_TRUE(result.err.starts_with(error)) << arguments << ": " << result.err;
+  }
+}
+
+/// Counts how often any process opens a file, from now on.
+class OpenCounter {
+ public:
+  explicit OpenCounter(const std::filesystem::path& file) : events_(::inotify_init1(IN_NONBLOCK | IN_CLOEXEC)) {
+    // With the other events between them, equal events of different opens are not merged.
+    is_watching_ = ::inotify_add_watch(events_, file.c_str(), IN_OPEN | IN_ACCESS | IN_CLOSE) >= 0;
+  }
+  OpenCounter(const OpenCounter&) = delete;
+  OpenCounter& operator=(const OpenCounter&) = delete;
+  ~OpenCounter() { ::close(events_); }
+
+  [[nodiscard]] bool is_watching() const { return is_watching_; }
+
+  [[nodiscard]] int count() {
+    std::array<inotify_event, 64> events{};  // of files, which have no names
+    for (ssize_t bytes = 1; bytes > 0;) {
+      bytes = ::read(events_, events.data(), sizeof(events));
+      const std::size_t read = bytes > 0 ? static_cast<std::size_t>(bytes) / sizeof(inotify_event) : 0;
+      for (std::size_t i = 0; i < read; ++i) opens_ += (events[i].mask & IN_OPEN) != 0 ? 1 : 0;
+    }
+    return opens_;
+  }
+
+ private:
+  int events_;
+  bool is_watching_ = false;
+  int opens_ = 0;
+};
+
+TEST_F(Tool, OpensItsInputOnce) {
+  std::ofstream(folder_.file("board.vox"), std::ios::binary) << checkerboard_vox(8);
+  std::vector<std::string> inputs = {"board.vox", "volume.nrrd"};
+  for (const std::string extension : {"json", "vxl", "nii", "gltf", "stl"}) {
+    inputs.push_back("board." + extension);
+    ASSERT_EQ(run("convert board.vox board." + extension).status, 0) << extension;
+  }
+  std::ofstream(folder_.file("volume.nrrd"))
+      << "NRRD0001\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nencoding: ascii\n\n0 0 0 9 9 0 0 9\n";
+  for (const std::string& input : inputs) {
+    for (const std::string& command :
+         {"info " + input, "convert " + input + " out.glb", "thumbnail " + input + " out.png",
+          "render " + input + " -o out.png --size 16x16"}) {
+      OpenCounter counter(folder_.file(input));
+      if (!counter.is_watching()) GTEST_SKIP() << "this system does not report opened files";
+      const ToolRun done = run(command);
+      EXPECT_EQ(done.status, 0) << command << ": " << done.err;
+      EXPECT_EQ(counter.count(), 1) << command;
+    }
   }
 }
 

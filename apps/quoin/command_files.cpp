@@ -20,11 +20,11 @@ namespace quoin::tool {
 
 Result<OpenedInput> open_input(const std::filesystem::path& path, const LoadOptions& load) {
   OpenedInput input{{path, std::nullopt}, load.raw.has_value()};
-  std::optional<FileFormat>& format = input.file.format;
+  const std::optional<FileFormat>& format = input.file.format;
   if (!load.raw) {
-    const auto found = detect_format(path);
-    if (!found) return found.error();
-    format = *found;
+    auto file = detect_file(path);
+    if (!file) return file.error();
+    input.file = std::move(*file);
     input.is_volume = can(format, FormatCapability::Volume);
   }
   const bool may_have_dimensions = format == FileFormat::Minecraft || format == FileFormat::Scene;

@@ -13,7 +13,7 @@
 
 namespace quoin::tool {
 
-/// The input of a command, recognised once.
+/// The input of a command, opened and recognised once. `file` stays open, except for worlds and folders.
 struct OpenedInput {
   DetectedFile file;
   bool is_volume = false;  ///< by --raw-size or by its content

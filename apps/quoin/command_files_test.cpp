@@ -1,6 +1,7 @@
 #include "command_files.h"
 
 #include <fstream>
+#include <span>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -66,17 +67,21 @@ TEST(OpenedInput, RejectsDimensionOfOtherFormats) {
             "cannot select a dimension: --dimension needs a Minecraft world, and the file format is vox");
 }
 
-TEST(OpenedInput, LoadsWithoutDetectingAgain) {
+Scene one_voxel() {
   Scene scene;
   const auto type = scene.types.add({});
-  ASSERT_TRUE(type);
+  EXPECT_TRUE(type);
   SceneGrid content;
   content.grid.set({0, 0, 0}, *type);
   Instance instance;
   instance.grid = scene.add_grid(std::move(content));
   scene.add_instance(instance);
+  return scene;
+}
+
+TEST(OpenedInput, LoadsWithoutDetectingAgain) {
   const TemporaryFile model(".vox");
-  ASSERT_TRUE(write_vox(scene, model.path));
+  ASSERT_TRUE(write_vox(one_voxel(), model.path));
   const auto input = open_input(model.path, {});
   ASSERT_TRUE(input);
   const auto loaded = load_scene(input->file);
@@ -84,6 +89,20 @@ TEST(OpenedInput, LoadsWithoutDetectingAgain) {
   EXPECT_EQ(loaded->format, "vox");
   EXPECT_EQ(loaded->scene.voxel_count(), 1);
   EXPECT_TRUE(load_scene(DetectedFile{model.path, std::nullopt})) << "the content decides";
+}
+
+TEST(OpenedInput, IsReadEvenIfFileIsReplaced) {
+  const TemporaryFile model(".vox");
+  ASSERT_TRUE(write_vox(one_voxel(), model.path));
+  const auto input = open_input(model.path, {});
+  ASSERT_TRUE(input);
+  ASSERT_TRUE(write_file(std::as_bytes(std::span("neither voxels nor triangles")), model.path));
+  for (int time = 0; time < 2; ++time) {
+    const auto loaded = load_scene(input->file);
+    ASSERT_TRUE(loaded) << to_string(loaded.error());
+    EXPECT_EQ(loaded->scene.voxel_count(), 1);
+  }
+  EXPECT_FALSE(load_scene(model.path)) << "another input is the new file";
 }
 
 }  // namespace

@@ -206,11 +206,12 @@ std::vector<OptionRule> raw_rules() {
   return {{{"--raw-type", "--raw-order"}, needs("--raw-size")}};
 }
 
-Result<Volume> read_input_volume(const CommonOptions& options, const Progress& progress) {
-  if (options.load.raw) return read_raw_volume(options.input, *options.load.raw, {}, progress);
+Result<Volume> read_input_volume(const CommonOptions& options, const DetectedFile& file, const Progress& progress) {
+  if (options.load.raw) return read_raw_volume(file.path, *options.load.raw, {}, progress);
   VolumeOptions allowed;
   allowed.sidecar_files = options.load.sidecar_files;
-  return read_volume(options.input, allowed, progress);
+  const auto opened = file.open();
+  return opened ? read_volume(*opened, allowed, progress) : Result<Volume>(opened.error());
 }
 
 namespace {

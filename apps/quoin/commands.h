@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <quoin/core/parallel.h>
+#include <quoin/io/formats.h>
 #include <quoin/io/volume.h>
 #include <quoin/io/vox.h>
 #include <quoin/mesh/smooth.h>
@@ -69,7 +70,8 @@ void add_volume_options(CLI::App& command, LoadOptions& load, std::optional<doub
 [[nodiscard]] std::vector<OptionRule> raw_rules();
 
 /// Reads the input as a volume. Errors: those of read_volume and read_raw_volume.
-[[nodiscard]] Result<Volume> read_input_volume(const CommonOptions& options, const Progress& progress);
+[[nodiscard]] Result<Volume> read_input_volume(const CommonOptions& options, const DetectedFile& file,
+                                               const Progress& progress);
 
 /// The options of smooth occlusion.
 inline const std::vector<std::string> kFieldOcclusion = {"--ao-form", "--ao-spread", "--ao-offset", "--ao-power"};

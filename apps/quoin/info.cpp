@@ -76,10 +76,10 @@ std::string volume_text(const std::string& name, const Volume& volume) {
 }
 
 /// Runs `quoin info` on a volume. Returns the exit status, or the error of the reader.
-Result<int> run_volume_info(const CommonOptions& options, const StandardStreams& streams) {
+Result<int> run_volume_info(const CommonOptions& options, const DetectedFile& file, const StandardStreams& streams) {
   const auto volume = [&] {
     ProgressBar bar;
-    return read_input_volume(options, bar.listener("reading"));
+    return read_input_volume(options, file, bar.listener("reading"));
   }();
   if (!volume) return volume.error();
   if (options.json) return print_json(volume_json(*volume));
@@ -361,7 +361,7 @@ std::string info_text(const CommonOptions& options, const std::string& name, con
 Result<int> info(const CommonOptions& options, const StandardStreams& streams) {
   const auto input = open_input(options.input, options.load);
   if (!input) return input.error();
-  if (input->is_volume) return run_volume_info(options, streams);
+  if (input->is_volume) return run_volume_info(options, input->file, streams);
   const auto loaded = [&] {
     ProgressBar bar;
     return load_scene(input->file, options.load, options.threads, bar.listener("reading"));

@@ -71,17 +71,18 @@ Document::Document(WorldWindow world, std::filesystem::path path)
 
 Result<std::unique_ptr<Document>> Document::open(const std::filesystem::path& path, const LoadOptions& options,
                                                  const Progress& progress, const WorldOptions& world) {
-  const auto format = detect_format(path);
-  if (format && *format == FileFormat::World && !options.raw) {
+  // Taken before opening, so that a write during the read counts as a change.
+  const auto stamp = FileStamp::of(path);
+  const auto file = options.raw ? Result<DetectedFile>(DetectedFile{path, std::nullopt}) : detect_file(path);
+  if (!file) return file.error();
+  if (file->format == FileFormat::World) {
     auto window = WorldWindow::open(path, world);
     if (!window) return window.error();
     return std::make_unique<Document>(std::move(*window), path);
   }
   LoadOptions as_saved = options;
   as_saved.show_hidden = false;
-  // Taken before reading, so that a write during the read counts as a change.
-  const auto stamp = FileStamp::of(path);
-  auto loaded = load_scene(path, as_saved, {}, progress);
+  auto loaded = load_scene(*file, as_saved, {}, progress);
   if (!loaded) return loaded.error();
   auto document = std::make_unique<Document>(std::move(*loaded), path);
   document->stamp_ = stamp;

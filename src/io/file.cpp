@@ -8,6 +8,8 @@
 #include <atomic>
 #include <cerrno>
 #include <cstdint>
+#include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <system_error>
@@ -36,15 +38,6 @@ Error cannot_read(std::string message, const std::filesystem::path& path) {
 Error cannot_write(std::string message, const std::filesystem::path& path) {
   return make_error(ErrorCode::CannotWrite, std::move(message), path.string());
 }
-
-/// Closes a descriptor at the end of its scope.
-struct DescriptorGuard {
-  int descriptor;
-  explicit DescriptorGuard(int value) : descriptor(value) {}
-  DescriptorGuard(const DescriptorGuard&) = delete;
-  DescriptorGuard& operator=(const DescriptorGuard&) = delete;
-  ~DescriptorGuard() { close_after_reading(descriptor); }
-};
 
 /// Returns an error if the folder of `path` does not exist.
 Status check_folder(const std::filesystem::path& path) {
@@ -82,34 +75,6 @@ Status check_replaceable(const std::filesystem::path& path, std::optional<mode_t
   return {};
 }
 
-/// Reads a whole file, or its first `max_bytes` bytes.
-Result<std::vector<std::byte>> read_regular_file(const std::filesystem::path& path,
-                                                 std::optional<std::size_t> max_bytes) {
-  const int descriptor = open_for_reading(path);
-  if (descriptor < 0) return cannot_read(reason(errno), path);
-  const DescriptorGuard guard(descriptor);
-  struct stat info {};
-  if (::fstat(descriptor, &info) != 0) return cannot_read(reason(errno), path);
-  if (S_ISDIR(info.st_mode)) return cannot_read("it is a folder", path);
-  if (!S_ISREG(info.st_mode)) return cannot_read("it is not a regular file", path);
-  const auto held = static_cast<std::uint64_t>(info.st_size);
-  const std::uint64_t wanted = std::min<std::uint64_t>(held, max_bytes.value_or(held));
-  if (wanted > kMaxFileBytes) {
-    return make_error(ErrorCode::LimitExceeded, "the file has " + std::to_string(held) + " bytes", path.string());
-  }
-  std::vector<std::byte> bytes(static_cast<std::size_t>(wanted));
-  std::size_t filled = 0;
-  while (filled < bytes.size()) {
-    const ssize_t count = ::pread(descriptor, bytes.data() + filled, bytes.size() - filled, static_cast<off_t>(filled));
-    if (count < 0 && errno == EINTR) continue;
-    if (count < 0) return cannot_read(reason(errno), path);
-    if (count == 0) break;
-    filled += static_cast<std::size_t>(count);
-  }
-  bytes.resize(filled);
-  return bytes;
-}
-
 }  // namespace
 
 std::filesystem::path follow_links(std::filesystem::path path) {
@@ -130,12 +95,66 @@ bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b
   return !missing && whole == std::filesystem::weakly_canonical(follow_links(b), missing) && !missing;
 }
 
+struct InputFile::Opened {
+  std::filesystem::path path;
+  int descriptor;
+
+  Opened(std::filesystem::path name, int opened) : path(std::move(name)), descriptor(opened) {}
+  Opened(const Opened&) = delete;
+  Opened& operator=(const Opened&) = delete;
+  ~Opened() {
+    if (descriptor >= 0) close_after_reading(descriptor);
+  }
+};
+
+Result<InputFile> InputFile::open(const std::filesystem::path& path) {
+  const auto opened = std::make_shared<Opened>(path, -1);
+  opened->descriptor = open_for_reading(path);
+  struct stat info {};
+  if (opened->descriptor < 0 || ::fstat(opened->descriptor, &info) != 0) return cannot_read(reason(errno), path);
+  if (S_ISDIR(info.st_mode)) return cannot_read("it is a folder", path);
+  if (!S_ISREG(info.st_mode)) return cannot_read("it is not a regular file", path);
+  return InputFile(opened);
+}
+
+const std::filesystem::path& InputFile::path() const {
+  return opened_->path;
+}
+
+Result<std::vector<std::byte>> InputFile::read() const {
+  return read_beginning(std::numeric_limits<std::size_t>::max());
+}
+
+Result<std::vector<std::byte>> InputFile::read_beginning(std::size_t max_bytes) const {
+  const auto& [path, descriptor] = *opened_;
+  struct stat info {};
+  if (::fstat(descriptor, &info) != 0) return cannot_read(reason(errno), path);
+  const auto held = static_cast<std::uint64_t>(info.st_size);
+  const std::uint64_t wanted = std::min<std::uint64_t>(held, max_bytes);
+  if (wanted > kMaxFileBytes) {
+    return make_error(ErrorCode::LimitExceeded, "the file has " + std::to_string(held) + " bytes", path.string());
+  }
+  std::vector<std::byte> bytes(static_cast<std::size_t>(wanted));
+  std::size_t filled = 0;
+  while (filled < bytes.size()) {
+    const ssize_t count = ::pread(descriptor, bytes.data() + filled, bytes.size() - filled, static_cast<off_t>(filled));
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) return cannot_read(reason(errno), path);
+    if (count == 0) break;
+    filled += static_cast<std::size_t>(count);
+  }
+  bytes.resize(filled);
+  return bytes;
+}
+
 Result<std::vector<std::byte>> read_file(const std::filesystem::path& path) {
-  return read_regular_file(path, std::nullopt);
+  const auto file = InputFile::open(path);
+  return file ? file->read() : Result<std::vector<std::byte>>(file.error());
 }
 
 Result<std::vector<std::byte>> read_file_beginning(const std::filesystem::path& path, std::size_t max_bytes) {
-  return read_regular_file(path, max_bytes);
+  const auto file = InputFile::open(path);
+  return file ? file->read_beginning(max_bytes) : Result<std::vector<std::byte>>(file.error());
 }
 
 Result<AtomicFile> AtomicFile::create(const std::filesystem::path& path) {

@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <filesystem>
@@ -11,6 +12,8 @@
 #include <string>
 
 #include <gtest/gtest.h>
+
+#include "core/bytes/files.h"
 
 namespace quoin {
 namespace {
@@ -41,6 +44,43 @@ class FileTest : public testing::Test {
 
   fs::path folder_;
 };
+
+TEST_F(FileTest, InputOutlivesItsDatabase) {
+  const fs::path path = folder_ / "a";
+  ASSERT_TRUE(write_file(bytes_in("database"), path));
+  ASSERT_TRUE(write_file(bytes_in("other"), folder_ / "b"));
+  HeldFile held(path);
+  const auto first = InputFile::open(path);
+  ASSERT_TRUE(first);
+  { const auto second = InputFile::open(path); }
+  held = HeldFile();
+  const auto other = InputFile::open(folder_ / "b");  // would get a descriptor that was closed
+  ASSERT_TRUE(other);
+  ASSERT_TRUE(first->read());
+  EXPECT_EQ(first->read()->size(), 8U);
+  EXPECT_EQ(other->read()->size(), 5U);
+}
+
+TEST_F(FileTest, InputKeepsItsContentIfReplaced) {
+  const fs::path path = folder_ / "a";
+  ASSERT_TRUE(write_file(bytes_in("first"), path));
+  auto opened = InputFile::open(path);
+  ASSERT_TRUE(opened);
+  const InputFile copy = *opened;
+  opened = InputFile::open(folder_);
+  ASSERT_FALSE(opened);
+  EXPECT_EQ(opened.error().message, "it is a folder");
+  ASSERT_TRUE(write_file(bytes_in("second"), path));
+  for (const std::size_t bytes : {std::size_t{0}, std::size_t{2}, std::size_t{5}, std::size_t{100}}) {
+    const auto read = copy.read_beginning(bytes);
+    ASSERT_TRUE(read);
+    EXPECT_EQ(std::string(reinterpret_cast<const char*>(read->data()), read->size()),
+              std::string("first", std::min<std::size_t>(bytes, 5)));
+  }
+  EXPECT_EQ(copy.read()->size(), 5U);
+  EXPECT_EQ(read_file(path)->size(), 6U);
+  EXPECT_EQ(copy.path(), path);
+}
 
 TEST_F(FileTest, RoundTrips) {
   const fs::path path = folder_ / "a";

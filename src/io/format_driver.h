@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -49,8 +50,13 @@ struct FormatDriver {
 
   // Reading: `read`, `read_mesh` or `open_chunks`.
 
-  /// The driver opens the path itself, since the file may be large, a folder, or one of several.
-  bool reads_path = false;
+  /// The form in which a reader gets a file by path. Readers of bytes get `bytes` in addition.
+  enum class Source : std::uint8_t {
+    Bytes,  ///< FormatInput::bytes
+    File,   ///< FormatInput::file, whose bytes the reader frees before it makes the scene
+    Path    ///< only FormatInput::path, since the file may be large, a folder, or one of several
+  };
+  Source source = Source::Bytes;
   Result<LoadedScene> (*read)(const FormatInput& input) = nullptr;
   /// Reads triangles in the file's axes. `sidecars` reads the files that it names.
   Result<LoadedMesh> (*read_mesh)(std::span<const std::byte> bytes, triangles::SidecarReader& sidecars) = nullptr;
@@ -60,8 +66,7 @@ struct FormatDriver {
                                                       std::string_view dimension) = nullptr;
   /// Lists the other files that belong to a file and that `allowed` permits. Null: none, or those that `read_mesh`
   /// reads.
-  std::vector<std::filesystem::path> (*sidecar_files)(const std::filesystem::path& path,
-                                                      SidecarFiles allowed) = nullptr;
+  std::vector<std::filesystem::path> (*sidecar_files)(const DetectedFile& file, SidecarFiles allowed) = nullptr;
 
   // Writing scenes: `encode`, or `write` and `unsupported_features`.
 

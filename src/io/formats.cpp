@@ -82,10 +82,10 @@ Result<LoadedScene> read_around_spawn(const FormatDriver& driver, const FormatIn
 }
 
 /// Makes voxels or a field of a file of triangles.
-Result<LoadedScene> read_triangles(const FormatInput& input) {
+Result<LoadedScene> read_triangles(const FormatDriver& driver, const FormatInput& input) {
   const MeshLoadOptions& options = input.options.mesh;
-  auto mesh = input.path.empty() ? read_mesh(input.bytes, options.up)
-                                 : read_mesh(input.path, options.up, input.options.sidecar_files);
+  triangles::SidecarReader sidecars(input.path, input.options.sidecar_files);
+  auto mesh = triangles::read_with(driver, input.bytes, sidecars, options.up);
   if (!mesh) return mesh.error();
   const std::string name = input.path.empty() ? "mesh" : stem_of_file(input.path);
   return triangles::scene_from_mesh(std::move(*mesh), options, name, input.threads, input.progress);
@@ -93,7 +93,7 @@ Result<LoadedScene> read_triangles(const FormatInput& input) {
 
 Result<LoadedScene> read_with(const FormatDriver& driver, const FormatInput& input) {
   if (driver.read != nullptr) return driver.read(input);
-  return driver.open_chunks != nullptr ? read_around_spawn(driver, input) : read_triangles(input);
+  return driver.open_chunks != nullptr ? read_around_spawn(driver, input) : read_triangles(driver, input);
 }
 
 /// `format`: the result of detect_format.
@@ -300,29 +300,49 @@ std::optional<FileFormat> detect_format(std::span<const std::byte> bytes) {
   return detect_headerless(bytes);
 }
 
-Result<std::optional<FileFormat>> detect_format(const std::filesystem::path& path) {
+namespace {
+
+/// Detects an open file by its content, else by its name.
+Result<std::optional<FileFormat>> detect_opened(const InputFile& file) {
+  // Enough compressed bytes for a decompressed header, with room for names and comments in the gzip header.
+  constexpr std::size_t kEnough = 1 << 16;
+  const auto bytes = file.read_beginning(kEnough);
+  if (!bytes) return bytes.error();
+  if (const auto format = detect_format(*bytes)) return format;
+  if (bytes->size() == kEnough && is_named_like_headerless(file.path())) {
+    const auto whole = file.read();
+    if (!whole) return whole.error();
+    if (const auto format = detect_headerless(*whole)) return format;
+  }
+  return detect_by_name(file.path(), *bytes);
+}
+
+}  // namespace
+
+Result<DetectedFile> detect_file(const std::filesystem::path& path) {
   for (const FormatDriver* const driver : format_drivers()) {
-    if (driver->detect_path != nullptr && driver->detect_path(path)) return driver->info.format;
+    if (driver->detect_path != nullptr && driver->detect_path(path)) return DetectedFile{path, driver->info.format};
   }
   std::error_code unknown;
   if (std::filesystem::is_directory(path, unknown)) {
-    if (const auto format = detect_by_name(path, {})) return format;
+    if (const auto format = detect_by_name(path, {})) return DetectedFile{path, format};
     return make_error(ErrorCode::CannotRead,
                       "a folder without a Minecraft world (level.dat and region/r.X.Z.mca) or "
                       "Luanti world (world.mt)",
                       path.string());
   }
-  // Enough compressed bytes for a decompressed header, with room for names and comments in the gzip header.
-  constexpr std::size_t kEnough = 1 << 16;
-  const auto bytes = read_file_beginning(path, kEnough);
-  if (!bytes) return bytes.error();
-  if (const auto format = detect_format(*bytes)) return format;
-  if (bytes->size() == kEnough && is_named_like_headerless(path)) {
-    const auto whole = read_file(path);
-    if (!whole) return whole.error();
-    if (const auto format = detect_headerless(*whole)) return format;
-  }
-  return detect_by_name(path, *bytes);
+  auto file = InputFile::open(path);
+  if (!file) return file.error();
+  const auto format = detect_opened(*file);
+  if (!format) return format.error();
+  // Databases must open their files themselves, with locks.
+  const bool is_kept = !*format || driver_of(**format).source != FormatDriver::Source::Path;
+  return DetectedFile{path, *format, is_kept ? std::optional(std::move(*file)) : std::nullopt};
+}
+
+Result<std::optional<FileFormat>> detect_format(const std::filesystem::path& path) {
+  const auto file = detect_file(path);
+  return file ? file->format : Result<std::optional<FileFormat>>(file.error());
 }
 
 Result<FormatInfo> format_for_writing(const std::filesystem::path& path) {
@@ -357,35 +377,41 @@ Result<LoadedScene> load_scene(std::span<const std::byte> bytes, const LoadOptio
 }
 
 std::vector<std::filesystem::path> sidecar_files_of(const std::filesystem::path& path, SidecarFiles allowed) {
-  const auto format = detect_format(path);
-  if (!format || !*format) return {};
-  const FormatDriver& driver = driver_of(**format);
-  if (driver.sidecar_files != nullptr) return driver.sidecar_files(path, allowed);
+  const auto file = detect_file(path);
+  if (!file || !file->format) return {};
+  const FormatDriver& driver = driver_of(*file->format);
+  if (driver.sidecar_files != nullptr) return driver.sidecar_files(*file, allowed);
   if (driver.read_mesh == nullptr) return {};
-  const auto mesh = read_mesh(path, {}, allowed);
+  const auto opened = file->open();
+  const auto bytes = opened ? opened->read() : Result<std::vector<std::byte>>(opened.error());
+  if (!bytes) return {};
+  triangles::SidecarReader sidecars(path, allowed);
+  const auto mesh = triangles::read_with(driver, *bytes, sidecars, {});
   return mesh ? mesh->sidecars : std::vector<std::filesystem::path>();
 }
 
 Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOptions& options, Threads threads,
                                const Progress& progress) {
-  if (options.raw) return load_scene(DetectedFile{path, std::nullopt}, options, threads, progress);
-  const auto format = detect_format(path);
-  if (!format) return format.error();
-  return load_scene(DetectedFile{path, *format}, options, threads, progress);
+  const auto file = options.raw ? Result<DetectedFile>(DetectedFile{path, std::nullopt}) : detect_file(path);
+  return file ? load_scene(*file, options, threads, progress) : Result<LoadedScene>(file.error());
 }
 
 Result<LoadedScene> load_scene(const DetectedFile& file, const LoadOptions& options, Threads threads,
                                const Progress& progress) {
   const std::filesystem::path& path = file.path;
   FormatInput input{path, {}, options, threads, progress};
-  // Volume readers take the path, since they may read sidecar files.
   if (options.raw) return with_path(read_volume_scene(input), path);
   std::optional<FileFormat> format = options.heights ? FileFormat::Heights : file.format;
-  if (format && driver_of(*format).reads_path) return with_path(read_as(format, input), path);
-  const auto bytes = read_file(path);
+  const auto source = format ? driver_of(*format).source : FormatDriver::Source::Bytes;
+  if (source == FormatDriver::Source::Path) return with_path(read_as(format, input), path);
+  const auto opened = file.open();
+  if (!opened) return opened.error();
+  input.file = &*opened;
+  if (source == FormatDriver::Source::File) return with_path(read_as(format, input), path);
+  const auto bytes = opened->read();
   if (!bytes) return bytes.error();
   input.bytes = *bytes;
-  // Detects again from the whole file: some formats need it, and the file may have changed since.
+  // Detects again from the whole file: some formats need it.
   if (format != FileFormat::Heights) {
     const auto of_all = detect_format(*bytes);
     if (of_all || !can(format, FormatCapability::Meshes)) format = of_all;
@@ -394,14 +420,18 @@ Result<LoadedScene> load_scene(const DetectedFile& file, const LoadOptions& opti
 }
 
 Result<std::unique_ptr<ChunkSource>> open_chunk_source(const std::filesystem::path& path, std::string_view dimension) {
-  const auto format = detect_format(path);
-  if (!format) return format.error();
-  if (can(*format, FormatCapability::Chunks)) return driver_of(**format).open_chunks(path, {}, dimension);
+  const auto file = detect_file(path);
+  if (!file) return file.error();
+  return open_chunk_source(*file, dimension);
+}
+
+Result<std::unique_ptr<ChunkSource>> open_chunk_source(const DetectedFile& file, std::string_view dimension) {
+  const std::optional<FileFormat>& format = file.format;
+  if (can(format, FormatCapability::Chunks)) return driver_of(*format).open_chunks(file.path, {}, dimension);
   return make_error(ErrorCode::Unsupported,
-                    *format
-                        ? "a file of format " + std::string((*format)->name()) + ", not a world that is read by chunks"
-                        : "not a world that is read by chunks",
-                    path.string());
+                    format ? "a file of format " + std::string(format->name()) + ", not a world that is read by chunks"
+                           : "not a world that is read by chunks",
+                    file.path.string());
 }
 
 }  // namespace quoin

@@ -16,13 +16,22 @@
 
 namespace quoin {
 
+struct DetectedFile;
+
 /// Returns the result of `read(bytes)` on a file. Errors: also CannotRead; they name the file.
+template <class Read>
+[[nodiscard]] auto read_whole(const InputFile& file, Read read)
+    -> std::invoke_result_t<Read, std::span<const std::byte>> {
+  const auto bytes = file.read();
+  if (!bytes) return bytes.error();
+  return with_path(read(std::span<const std::byte>(*bytes)), file.path());
+}
 template <class Read>
 [[nodiscard]] auto read_whole(const std::filesystem::path& path, Read read)
     -> std::invoke_result_t<Read, std::span<const std::byte>> {
-  const auto bytes = read_file(path);
-  if (!bytes) return bytes.error();
-  return with_path(read(std::span<const std::byte>(*bytes)), path);
+  const auto file = InputFile::open(path);
+  if (!file) return file.error();
+  return read_whole(*file, std::move(read));
 }
 
 /// Writes bytes to a file atomically; returns its size. Errors: also CannotWrite; they name the file.
@@ -34,10 +43,9 @@ template <class Read>
 }
 
 /// Returns the files that a scene file refers to, without those that sidecar_path refuses; empty if it cannot be read.
-[[nodiscard]] std::vector<std::filesystem::path> files_named_in_scene(const std::filesystem::path& path,
-                                                                      SidecarFiles allowed);
+[[nodiscard]] std::vector<std::filesystem::path> files_named_in_scene(const DetectedFile& file, SidecarFiles allowed);
 
-/// Returns the data file of a NIfTI or NRRD pair with the header `path`; empty if it is no pair or is refused.
-[[nodiscard]] std::vector<std::filesystem::path> files_of_pair(const std::filesystem::path& path, SidecarFiles allowed);
+/// Returns the data file of a NIfTI or NRRD pair with the header `file`; empty if it is no pair or is refused.
+[[nodiscard]] std::vector<std::filesystem::path> files_of_pair(const DetectedFile& file, SidecarFiles allowed);
 
 }  // namespace quoin

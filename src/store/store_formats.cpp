@@ -29,14 +29,14 @@ constinit const FormatDriver kWorldFormat = {
              FormatCapability::Read | FormatCapability::Write | FormatCapability::Fields |
                  FormatCapability::Environment | FormatCapability::Camera | FormatCapability::Cameras},
     .detect = is_world_format,
-    .reads_path = true,
+    .source = FormatDriver::Source::Path,
     .read = [](const FormatInput& input) -> Result<LoadedScene> {
       return input.path.empty() ? read_world_format(input.bytes, input.options, input.threads, input.progress)
                                 : read_world_format(input.path, input.options, input.threads, input.progress);
     },
     // Without the sky image: its name is in the database.
-    .sidecar_files = [](const std::filesystem::path& path, SidecarFiles) -> std::vector<std::filesystem::path> {
-      return {path.string() + "-wal"};
+    .sidecar_files = [](const DetectedFile& file, SidecarFiles) -> std::vector<std::filesystem::path> {
+      return {file.path.string() + "-wal"};
     },
     .write = [](const FormatOutput& output, const std::filesystem::path& path) -> Result<SavedScene> {
       return output.loaded != nullptr ? write_world(*output.loaded, path, output.threads, output.progress)

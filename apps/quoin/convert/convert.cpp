@@ -27,14 +27,15 @@ Conversion convert_file(const ConvertOptions& options, const FormatInfo& format)
   if (Status prepared = prepare_output(options); !prepared) return prepared.error();
   const std::optional<FileFormat>& from = input->file.format;
   const bool is_mesh = format.can(FormatCapability::Meshes);
-  if (format.format == FileFormat::World && can(from, FormatCapability::Chunks)) return convert_by_chunks(options);
+  if (format.format == FileFormat::World && can(from, FormatCapability::Chunks))
+    return convert_by_chunks(options, input->file);
   if (from == FileFormat::World && format.format == FileFormat::World) return copy_world_file(options);
   if (from == FileFormat::World && is_mesh && meshes_by_chunks(options)) {
     auto meshed = mesh_world_file(options);
     if (!meshed) return meshed.error();
     if (*meshed) return std::move(**meshed);
   }
-  if (input->is_volume && is_mesh) return convert_volume(options, format);
+  if (input->is_volume && is_mesh) return convert_volume(options, format, input->file);
   return convert_scene(options, format, *input);
 }
 

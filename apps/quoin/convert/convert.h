@@ -125,7 +125,7 @@ using Converted = std::map<std::filesystem::path, Stamps>;
                                            Stopwatch& watch);
 
 /// Converts a world of any size chunk by chunk to a .quoin file.
-[[nodiscard]] Result<Outcome> convert_by_chunks(const ConvertOptions& options);
+[[nodiscard]] Result<Outcome> convert_by_chunks(const ConvertOptions& options, const DetectedFile& file);
 
 /// Copies a world (.quoin) to another file, row by row.
 [[nodiscard]] Result<Outcome> copy_world_file(const ConvertOptions& options);
@@ -139,6 +139,7 @@ using Converted = std::map<std::filesystem::path, Stamps>;
 [[nodiscard]] Result<std::optional<Outcome>> mesh_world_file(const ConvertOptions& options);
 
 /// Reads a volume, meshes it and writes the mesh.
-[[nodiscard]] Result<Outcome> convert_volume(const ConvertOptions& options, const FormatInfo& format);
+[[nodiscard]] Result<Outcome> convert_volume(const ConvertOptions& options, const FormatInfo& format,
+                                             const DetectedFile& file);
 
 }  // namespace quoin::tool

@@ -28,7 +28,7 @@ Result<LoadedScene> read_scene(const ConvertOptions& options, const LoadOptions&
   ProgressBar bar(!options.is_one_of_many);
   const Progress progress = bar.listener("reading");
   if (!input.is_volume) return load_scene(input.file, load, options.common.threads, progress);
-  const auto volume = read_input_volume(options.common, part_of(progress, 0.0, 0.5));
+  const auto volume = read_input_volume(options.common, input.file, part_of(progress, 0.0, 0.5));
   if (!volume) return volume.error();
   const auto iso = surface_value(*volume, load.iso);
   if (!iso) return make_error(iso.error().code, iso.error().message, options.common.input.string());

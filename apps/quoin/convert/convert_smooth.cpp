@@ -88,11 +88,11 @@ Status convert_smoothly(const Scene& scene, const SceneAnimation& animation, con
   return write_meshes(*meshes, options, bar, outcome);
 }
 
-Result<Outcome> convert_volume(const ConvertOptions& options, const FormatInfo& format) {
+Result<Outcome> convert_volume(const ConvertOptions& options, const FormatInfo& format, const DetectedFile& file) {
   Stopwatch watch;
   auto volume = [&] {
     ProgressBar bar(!options.is_one_of_many);
-    return read_input_volume(options.common, bar.listener("reading"));
+    return read_input_volume(options.common, file, bar.listener("reading"));
   }();
   if (!volume) return volume.error();
   Outcome outcome;

@@ -43,9 +43,9 @@ Status add_thumbnail(const ChunkSource& source, const ConvertOptions& options) {
 
 }  // namespace
 
-Result<Outcome> convert_by_chunks(const ConvertOptions& options) {
+Result<Outcome> convert_by_chunks(const ConvertOptions& options, const DetectedFile& file) {
   Stopwatch watch;
-  const auto source = open_chunk_source(options.common.input, options.common.load.dimension);
+  const auto source = open_chunk_source(file, options.common.load.dimension);
   if (!source) return source.error();
   catch_interrupts();
   Outcome outcome;

@@ -130,6 +130,9 @@ class SourceTypes {
 /// Errors: CannotRead; BadFormat or Unsupported if the format is not readable; InvalidArgument for a missing dimension.
 [[nodiscard]] Result<std::unique_ptr<ChunkSource>> open_chunk_source(const std::filesystem::path& path,
                                                                      std::string_view dimension = {});
+/// Opens a world whose format was detected before.
+[[nodiscard]] Result<std::unique_ptr<ChunkSource>> open_chunk_source(const DetectedFile& file,
+                                                                     std::string_view dimension = {});
 
 /// Returns true if a type of a source was guessed from its name, because the block or node is unknown.
 [[nodiscard]] bool has_guessed_look(const VoxelProperties& properties);

@@ -3,14 +3,37 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <quoin/core/result.h>
 
 namespace quoin {
+
+/// A regular file that is open for reading. Its content is that of the file which had the name when it was opened, also
+/// after another file has replaced it. Copies share the open file; the last one closes it.
+/// Threads: any number may read at a time.
+class InputFile {
+ public:
+  /// Opens a file. Errors: CannotRead, with the system's reason (a folder, no permission, not found).
+  [[nodiscard]] static Result<InputFile> open(const std::filesystem::path& path);
+
+  /// Reads the whole file. Errors: CannotRead; LimitExceeded beyond 8 GiB.
+  [[nodiscard]] Result<std::vector<std::byte>> read() const;
+  /// Reads up to the first `max_bytes` bytes of a file of any size. Errors: as `read`.
+  [[nodiscard]] Result<std::vector<std::byte>> read_beginning(std::size_t max_bytes) const;
+  /// Returns the path that was opened.
+  [[nodiscard]] const std::filesystem::path& path() const;
+
+ private:
+  struct Opened;
+  explicit InputFile(std::shared_ptr<const Opened> opened) : opened_(std::move(opened)) {}
+  std::shared_ptr<const Opened> opened_;
+};
 
 /// Reads a whole regular file. Errors: CannotRead, with the system's reason (a folder, no permission, not found);
 /// LimitExceeded beyond 8 GiB.

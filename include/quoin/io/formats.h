@@ -31,7 +31,16 @@ namespace quoin {
 struct DetectedFile {
   std::filesystem::path path;
   std::optional<FileFormat> format;
+  /// The file, opened by detect_file. Empty if it was not opened, and for worlds and folders, whose readers open it.
+  std::optional<InputFile> input = std::nullopt;
+
+  /// Returns `input`, or opens the path. Errors: those of InputFile::open.
+  [[nodiscard]] Result<InputFile> open() const { return input ? *input : InputFile::open(path); }
 };
+
+/// Detects the format as detect_format does, and keeps the file open: it is opened once, and its reader gets the same
+/// file even if another one replaces it. Errors: CannotRead.
+[[nodiscard]] Result<DetectedFile> detect_file(const std::filesystem::path& path);
 
 /// Returns the format in which a file of this name is written, from its extension in any case.
 ///
@@ -54,7 +63,8 @@ struct DetectedFile {
 ///         (InvalidArgument for a missing frame, Cancelled, LimitExceeded). `path` is set in all.
 [[nodiscard]] Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOptions& options = {},
                                              Threads threads = {}, const Progress& progress = {});
-/// Reads a file whose format was detected before. The content decides again, except for formats that are read by path.
+/// Reads a file whose format was detected before, from DetectedFile::input if it is open. The whole content decides the
+/// format again, since some formats are recognised by their length; not for volumes and worlds.
 [[nodiscard]] Result<LoadedScene> load_scene(const DetectedFile& file, const LoadOptions& options = {},
                                              Threads threads = {}, const Progress& progress = {});
 /// Reads a scene from bytes. Errors: also Unsupported for scene files that name other files, which need a path.
@@ -92,10 +102,11 @@ struct DetectedFile {
 /// A file to read, with the options of load_scene.
 struct FormatInput {
   const std::filesystem::path& path;  ///< empty if there are only bytes
-  std::span<const std::byte> bytes;   ///< the whole file; empty for formats that open a path themselves
+  std::span<const std::byte> bytes;   ///< the whole file; empty for formats that open or read a file themselves
   const LoadOptions& options;
   Threads threads;
   const Progress& progress;
+  const InputFile* file = nullptr;  ///< for formats that read the open file themselves
 };
 
 /// A scene to save.

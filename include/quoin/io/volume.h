@@ -47,6 +47,9 @@ struct VolumeOptions {
 /// data file. A volume without a name gets the file's name. Errors: also CannotRead; errors name the file.
 [[nodiscard]] Result<Volume> read_volume(const std::filesystem::path& path, const VolumeOptions& options = {},
                                          const Progress& progress = {});
+/// Reads a volume from a file that is open, as for its path.
+[[nodiscard]] Result<Volume> read_volume(const InputFile& file, const VolumeOptions& options = {},
+                                         const Progress& progress = {});
 
 /// The layout of a file of raw values.
 struct RawVolume {

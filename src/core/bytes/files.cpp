@@ -20,11 +20,19 @@ using FileNumber = std::pair<unsigned long, unsigned long>;
 // Locks belong to the process, so this registry is global.
 struct Held {
   int databases = 0;
-  int descriptor = -1;  // opened for reading; kept open as long as databases hold the file
+  int descriptor = -1;  // opened for reading; kept open as long as databases or readers need it
+  int readers = 0;      // that got the descriptor and have not closed it
 };
 struct HeldFiles {
   std::mutex mutex;
   std::map<FileNumber, Held> files;
+
+  /// Removes a file that neither databases nor readers need. Requires: the caller has the mutex.
+  void release_unused(std::map<FileNumber, Held>::iterator file) {
+    if (file->second.databases != 0 || file->second.readers != 0) return;
+    if (file->second.descriptor >= 0) ::close(file->second.descriptor);
+    files.erase(file);
+  }
 };
 
 HeldFiles& held_files() {
@@ -64,9 +72,8 @@ HeldFile::~HeldFile() {
   const std::scoped_lock lock(held.mutex);
   const auto found = held.files.find({device_, number_});
   QUOIN_ASSERT(found != held.files.end() && found->second.databases > 0, "a file that is held");
-  if (--found->second.databases != 0) return;
-  if (found->second.descriptor >= 0) ::close(found->second.descriptor);
-  held.files.erase(found);
+  --found->second.databases;
+  held.release_unused(found);
 }
 
 int open_for_reading(const std::filesystem::path& file) {
@@ -74,10 +81,14 @@ int open_for_reading(const std::filesystem::path& file) {
   const std::scoped_lock lock(held.mutex);
   struct stat info {};
   const auto found = ::stat(file.c_str(), &info) == 0 ? held.files.find(number_of(info)) : held.files.end();
-  if (found != held.files.end() && found->second.descriptor >= 0) return found->second.descriptor;
+  const bool is_held = found != held.files.end();
+  int descriptor = is_held ? found->second.descriptor : -1;
   // O_NONBLOCK: a FIFO without a writer would otherwise block before it can be refused.
-  const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  if (found != held.files.end()) found->second.descriptor = descriptor;
+  if (descriptor < 0) descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  if (is_held && descriptor >= 0) {
+    found->second.descriptor = descriptor;
+    ++found->second.readers;
+  }
   return descriptor;
 }
 
@@ -87,9 +98,13 @@ void close_after_reading(int descriptor) {
   struct stat info {};
   if (::fstat(descriptor, &info) == 0) {
     const auto found = held.files.find(number_of(info));
-    if (found != held.files.end()) {
+    // Without databases, a descriptor of its own is closed like that of any file.
+    if (found != held.files.end() && (found->second.databases > 0 || found->second.descriptor == descriptor)) {
+      Held& file = found->second;
       // A descriptor opened before the database also stays open. It leaks if the file already has one, which is rare.
-      if (found->second.descriptor < 0) found->second.descriptor = descriptor;
+      if (file.descriptor < 0) file.descriptor = descriptor;
+      if (file.descriptor == descriptor && file.readers > 0) --file.readers;
+      held.release_unused(found);
       return;
     }
   }

@@ -28,7 +28,7 @@ class HeldFile {
 /// Opens a file for reading. For a held file the descriptor may be an earlier one with an arbitrary offset. Returns -1
 /// and sets errno if the file cannot be opened.
 [[nodiscard]] int open_for_reading(const std::filesystem::path& file);
-/// Closes a descriptor from `open_for_reading`, once the file is no longer held.
+/// Closes a descriptor from `open_for_reading`, once the file is no longer held and no other reader has it.
 void close_after_reading(int descriptor);
 
 /// Syncs a folder, so that a power cut cannot undo a rename. Some file systems do not support it.

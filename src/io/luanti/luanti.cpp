@@ -265,7 +265,7 @@ extern constinit const FormatDriver kLuantiMapFormat = {
           return std::filesystem::is_regular_file(path / "world.mt", error);
         },
     .detect = is_luanti_map,
-    .reads_path = true,
+    .source = FormatDriver::Source::Path,
     .open_chunks = [](const std::filesystem::path& path, std::span<const std::byte> bytes, std::string_view)
         -> Result<std::unique_ptr<ChunkSource>> { return path.empty() ? open_luanti(bytes) : open_luanti(path); },
 };

@@ -548,7 +548,7 @@ extern constinit const FormatDriver kMinecraftFormat = {
                      ? std::filesystem::is_regular_file(path / "level.dat", error)
                      : minecraft::parse_region_name(path).has_value();
         },
-    .reads_path = true,
+    .source = FormatDriver::Source::Path,
     .open_chunks = [](const std::filesystem::path& path, std::span<const std::byte> bytes,
                       std::string_view dimension) -> Result<std::unique_ptr<ChunkSource>> {
       return path.empty() ? minecraft::open_minecraft(bytes) : minecraft::open_minecraft(path, dimension);

@@ -12,7 +12,6 @@
 #include "core/bytes/byte_stream.h"
 #include "core/bytes/text.h"
 #include "io/gltf/glb_for_tests.h"
-#include "io/scene_file/scene_file.h"
 #include "io/scene_file/voxel_data.h"
 #include "io/vox/write/vox_parts.h"
 
@@ -44,7 +43,7 @@ std::string text_of(const Scene& scene, Threads threads = {}) {
 }
 
 Result<LoadedScene> read(const std::string& text) {
-  return read_scene_file(std::as_bytes(std::span(text)));
+  return load_scene(std::as_bytes(std::span(text)));
 }
 
 const Grid& only_grid(const Scene& scene) {

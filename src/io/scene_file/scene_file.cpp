@@ -1,5 +1,3 @@
-#include "io/scene_file/scene_file.h"
-
 #include <array>
 #include <map>
 #include <optional>
@@ -153,15 +151,22 @@ Instance placed(const Instance& inner, const Instance& outer, bool is_alone) {
 Result<LoadedScene> put_together(SceneFile& file, const std::filesystem::path& path, const LoadOptions& options,
                                  Threads threads, const Progress& progress);
 
+/// Parses a scene file that may be open. Errors name the file.
+Result<SceneFile> parse_opened(const DetectedFile& file, Threads threads) {
+  const auto opened = file.open();
+  if (!opened) return opened.error();
+  return read_whole(*opened, [&](std::span<const std::byte> text) { return parse_scene_file(text, threads); });
+}
+
 Result<LoadedScene> load_source(const std::filesystem::path& path, const LoadOptions& options, Threads threads,
                                 const Progress& progress) {
-  const auto format = detect_format(path);
-  if (!format) return format.error();
+  const auto detected = detect_file(path);
+  if (!detected) return detected.error();
   LoadOptions taken_over = options;
   taken_over.keep_source = false;
   taken_over.sky_image = false;  // the environment is not taken over
-  if (*format == FileFormat::Scene) {
-    auto file = parse_scene_file(path, threads);
+  if (detected->format == FileFormat::Scene) {
+    auto file = parse_opened(*detected, threads);
     if (!file) return file.error();
     // References between scene files could be circular.
     if (!file->sources.empty()) {
@@ -171,7 +176,7 @@ Result<LoadedScene> load_source(const std::filesystem::path& path, const LoadOpt
     }
     return with_path(put_together(*file, {}, taken_over, threads, progress), path);
   }
-  return load_scene(path, taken_over, threads, progress);
+  return load_scene(*detected, taken_over, threads, progress);
 }
 
 using Bodies = std::map<std::string, Body, std::less<>>;
@@ -306,35 +311,34 @@ Result<LoadedScene> put_together(SceneFile& file, const std::filesystem::path& p
   return loaded;
 }
 
-}  // namespace
-
-Result<LoadedScene> read_scene_file(const std::filesystem::path& path, const LoadOptions& options, Threads threads,
-                                    const Progress& progress) {
-  auto file = parse_scene_file(path, threads);
+/// Reads a scene file and all files that it names. Each file is read once, however often it is placed. The instances of
+/// a named file are placed as one body; several instances become a group. Types that equal an existing type in every
+/// property are merged with it. Warns of an unreadable sky image.
+///
+/// Errors: those of `parse_scene_file` and of reading the named files (with their paths); Unsupported if a named file
+///         is a scene file that names files itself, and for named files without a path; LimitExceeded if all files
+///         together have more types than a registry holds.
+Result<LoadedScene> read_scene_file(const FormatInput& input) {
+  auto file = parse_scene_file(input.bytes, input.threads);
   if (!file) return file.error();
-  return with_path(put_together(*file, path, options, threads, progress), path);
+  if (input.path.empty() && !file->sources.empty()) {
+    return make_error(ErrorCode::Unsupported, "the scene file references other files; load it by path, not from bytes");
+  }
+  return put_together(*file, input.path, input.options, input.threads, input.progress);
 }
 
-std::vector<std::filesystem::path> files_named_in_scene(const std::filesystem::path& path, SidecarFiles allowed) {
-  const auto file = parse_scene_file(path);
+}  // namespace
+
+std::vector<std::filesystem::path> files_named_in_scene(const DetectedFile& from, SidecarFiles allowed) {
+  const auto file = parse_opened(from, {});
   std::vector<std::filesystem::path> named;
   if (!file) return named;
   const auto add = [&](const std::string& name) {
-    if (auto found = sidecar_path(path, name, allowed)) named.push_back(std::move(*found));
+    if (auto found = sidecar_path(from.path, name, allowed)) named.push_back(std::move(*found));
   };
   for (const SceneFile::Source& source : file->sources) add(source.file);
   if (file->environment && lacks_image(file->environment->sky)) add(file->environment->sky.image_file);
   return named;
-}
-
-Result<LoadedScene> read_scene_file(std::span<const std::byte> text, const LoadOptions& options, Threads threads,
-                                    const Progress& progress) {
-  auto file = parse_scene_file(text, threads);
-  if (!file) return file.error();
-  if (!file->sources.empty()) {
-    return make_error(ErrorCode::Unsupported, "the scene file references other files; load it by path, not from bytes");
-  }
-  return put_together(*file, {}, options, threads, progress);
 }
 
 extern constinit const FormatDriver kSceneFormat = {
@@ -342,10 +346,7 @@ extern constinit const FormatDriver kSceneFormat = {
              FormatCapability::Read | FormatCapability::Write | FormatCapability::Fields |
                  FormatCapability::Environment | FormatCapability::Camera},
     .detect = is_scene_file,
-    .read = [](const FormatInput& input) -> Result<LoadedScene> {
-      return input.path.empty() ? read_scene_file(input.bytes, input.options, input.threads, input.progress)
-                                : read_scene_file(input.path, input.options, input.threads, input.progress);
-    },
+    .read = read_scene_file,
     .sidecar_files = files_named_in_scene,
     .write = [](const FormatOutput& output, const std::filesystem::path& path) -> Result<SavedScene> {
       auto file = scene_file_of(output.scene);

@@ -14,7 +14,6 @@
 
 #include "core/bytes/text.h"
 #include "io/scene_file/json_reader.h"
-#include "io/scene_file/scene_file.h"
 #include "io/scene_file/scene_parts.h"
 #include "io/scene_file/voxel_data.h"
 #include "io/whole_file.h"

@@ -18,8 +18,6 @@
 #include <quoin/io/formats.h>
 #include <quoin/io/vox.h>
 
-#include "io/scene_file/scene_file.h"
-
 namespace quoin {
 namespace {
 
@@ -83,7 +81,7 @@ TEST(SceneFile, RoundTripsRandomScenes) {
     if (seed % 3 == 0) scene.camera = look_at({number(random), 4, 5}, {number(random), 7, 8}, 0.8).value();
     const auto bytes = write_scene_file(scene);
     ASSERT_TRUE(bytes) << to_string(bytes.error());
-    EXPECT_TRUE(is_scene_file(*bytes));
+    EXPECT_EQ(detect_format(*bytes), FileFormat::Scene);
     const auto read = parse_scene_file(*bytes);
     ASSERT_TRUE(read) << to_string(read.error());
     ASSERT_EQ(read->sources.size(), scene.sources.size());

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
+#include <span>
 #include <string>
 
 #include <nlohmann/json.hpp>
@@ -11,6 +13,13 @@
 
 // The parts of a scene, except its voxels, as the JSON of scene files (docs/scene-files.md). Worlds on disk store the
 // same text per part.
+
+namespace quoin {
+
+/// Returns true if the bytes look like the start of a scene file: a JSON object with its version near the beginning.
+[[nodiscard]] bool is_scene_file(std::span<const std::byte> beginning);
+
+}  // namespace quoin
 
 namespace quoin::scene_json {
 

@@ -162,18 +162,22 @@ Result<LoadedMesh> read_as(std::optional<FileFormat> format, std::span<const std
                            std::optional<UpAxis> up) {
   if (!format) return make_error(ErrorCode::Unsupported, "unknown mesh format");
   const FormatDriver& driver = driver_of(*format);
-  if (driver.read_mesh == nullptr) {
-    return make_error(ErrorCode::Unsupported, std::string(format->name()) + " holds no triangles");
-  }
+  if (driver.read_mesh != nullptr) return read_with(driver, bytes, sidecars, up);
+  return make_error(ErrorCode::Unsupported, std::string(format->name()) + " holds no triangles");
+}
+
+}  // namespace
+
+Result<LoadedMesh> read_with(const FormatDriver& driver, std::span<const std::byte> bytes, SidecarReader& sidecars,
+                             std::optional<UpAxis> up) {
+  QUOIN_ASSERT(driver.read_mesh != nullptr, "a format of triangles");
   auto loaded = driver.read_mesh(bytes, sidecars);
   if (!loaded) return loaded;
-  loaded->format = format->name();
+  loaded->format = driver.info.name();
   if (up.value_or(driver.info.up) == UpAxis::Z) turn_up(loaded->mesh);
   loaded->sidecars = std::move(sidecars.files());
   return loaded;
 }
-
-}  // namespace
 
 Result<std::vector<std::byte>> SidecarReader::read_path(const std::filesystem::path& path) {
   auto bytes = read_file(path);

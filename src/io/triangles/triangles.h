@@ -25,6 +25,10 @@
 // Recognition is by content: `is_...` take the beginning of a file (64 KiB suffice), or the whole file for binary STL,
 // identified by its length only.
 
+namespace quoin {
+struct FormatDriver;
+}
+
 namespace quoin::triangles {
 
 inline constexpr std::size_t kMostTriangles = std::size_t{1} << 27;
@@ -83,6 +87,11 @@ class MeshBuilder {
 /// Adds an image as a texture; returns nullopt, with a warning, if it cannot be decoded.
 [[nodiscard]] std::optional<std::size_t> add_texture(std::span<const std::byte> image, const std::string& name,
                                                      LoadedMesh& loaded);
+
+/// Reads triangles of a known format, and converts them to Quoin's axes. `up`: default: the format's.
+/// Requires: driver.read_mesh.
+[[nodiscard]] Result<LoadedMesh> read_with(const FormatDriver& driver, std::span<const std::byte> bytes,
+                                           SidecarReader& sidecars, std::optional<UpAxis> up);
 
 /// Converts a mesh to a scene with one grid. `name`: the grid's name.
 [[nodiscard]] Result<LoadedScene> scene_from_mesh(LoadedMesh loaded, const MeshLoadOptions& options,

@@ -577,7 +577,7 @@ extern constinit const FormatDriver kNiftiFormat = {
           const auto first = first_bytes(beginning, nifti::kMaxHeaderBytes);
           return first && nifti::is_header(*first);
         },
-    .reads_path = true,
+    .source = FormatDriver::Source::File,
     .read = read_volume_scene,
     .sidecar_files = files_of_pair,
     .encode = write_nifti,

@@ -732,7 +732,7 @@ extern constinit const FormatDriver kNrrdFormat = {
           const auto first = first_bytes(beginning, nifti::kMaxHeaderBytes);
           return first && nrrd::is_header(*first);
         },
-    .reads_path = true,
+    .source = FormatDriver::Source::File,
     .read = read_volume_scene,
     .sidecar_files = files_of_pair,
 };

@@ -183,22 +183,28 @@ Result<Volume> read_volume(std::span<const std::byte> bytes, const VolumeOptions
 }
 
 Result<Volume> read_volume(const std::filesystem::path& path, const VolumeOptions& options, const Progress& progress) {
-  return read_whole(path, [&](std::span<const std::byte> bytes) {
-    auto volume = decode(bytes, path, options, progress);
-    if (volume && volume->name.empty()) volume->name = name_from(path);
+  const auto file = InputFile::open(path);
+  return file ? read_volume(*file, options, progress) : Result<Volume>(file.error());
+}
+
+Result<Volume> read_volume(const InputFile& file, const VolumeOptions& options, const Progress& progress) {
+  return read_whole(file, [&](std::span<const std::byte> bytes) {
+    auto volume = decode(bytes, file.path(), options, progress);
+    if (volume && volume->name.empty()) volume->name = name_from(file.path());
     return volume;
   });
 }
 
-std::vector<std::filesystem::path> files_of_pair(const std::filesystem::path& path, SidecarFiles allowed) {
-  const auto bytes = read_file(path);
+std::vector<std::filesystem::path> files_of_pair(const DetectedFile& file, SidecarFiles allowed) {
+  const auto opened = file.open();
+  const auto bytes = opened ? opened->read() : Result<std::vector<std::byte>>(opened.error());
   const auto beginning = bytes ? beginning_of(*bytes) : Result<Beginning>(bytes.error());
   if (!beginning) return {};
   const auto header = header_of(*beginning, {});
   if (!header || !header->is_data_elsewhere) return {};
   VolumeOptions options;
   options.sidecar_files = allowed;
-  const auto data = data_file_of(path, *header, options);
+  const auto data = data_file_of(file.path, *header, options);
   return data ? std::vector{*data} : std::vector<std::filesystem::path>();
 }
 
@@ -240,11 +246,15 @@ Result<LoadedScene> read_volume_scene(const FormatInput& input) {
   const Progress reading = part_of(input.progress, 0.0, 0.5);
   VolumeOptions allowed;
   allowed.sidecar_files = input.options.sidecar_files;
-  const auto read = [&](const auto& source) {
-    return input.options.raw ? read_raw_volume(source, *input.options.raw, allowed, reading)
-                             : read_volume(source, allowed, reading);
+  const auto read = [&] {
+    if (const auto& raw = input.options.raw) {
+      return input.path.empty() ? read_raw_volume(input.bytes, *raw, allowed, reading)
+                                : read_raw_volume(input.path, *raw, allowed, reading);
+    }
+    return input.file == nullptr ? read_volume(input.bytes, allowed, reading)
+                                 : read_volume(*input.file, allowed, reading);
   };
-  const auto volume = input.path.empty() ? read(input.bytes) : read(input.path);
+  const auto volume = read();
   if (!volume) return volume.error();
   const auto iso = surface_value(*volume, input.options.iso);
   if (!iso) return iso.error();
