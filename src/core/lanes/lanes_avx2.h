@@ -4,6 +4,7 @@
 
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 #include <immintrin.h>
@@ -136,8 +137,24 @@ inline Mask test_bit(I a, I at) {
   const __m256i up = _mm256_sub_epi32(_mm256_set1_epi32(31), _mm256_and_si256(at.v, _mm256_set1_epi32(31)));
   return {_mm256_castsi256_ps(_mm256_srai_epi32(_mm256_sllv_epi32(a.v, up), 31))};
 }
+inline I gather(const std::int32_t* base, I at) {
+  return {_mm256_i32gather_epi32(base, at.v, 4)};
+}
 inline I gather(const std::uint32_t* base, I at) {
-  return {_mm256_i32gather_epi32(reinterpret_cast<const int*>(base), at.v, 4)};
+  return gather(reinterpret_cast<const std::int32_t*>(base), at);
+}
+inline F gather(const float* base, I at) {
+  return {_mm256_i32gather_ps(base, at.v, 4)};
+}
+// Looks up entries of a table.
+inline F look_up(const float (&table)[32], I index) {
+  return gather(table, index);
+}
+inline I look_up(const std::int32_t (&table)[32], I index) {
+  return gather(table, index);
+}
+inline F look_up(const std::array<float, 16>& table, I index) {
+  return gather(table.data(), index);
 }
 inline I as_int(F a) {
   return {_mm256_castps_si256(a.v)};
@@ -153,6 +170,12 @@ inline F to_float(I a) {
 }
 inline void store(std::int32_t* to, I a) {
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), a.v);
+}
+inline void store(std::uint32_t* to, I a) {
+  store(reinterpret_cast<std::int32_t*>(to), a);
+}
+inline I load(const std::uint16_t* from) {
+  return {_mm256_cvtepu16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(from)))};
 }
 inline I load(const std::int32_t* from) {
   return {_mm256_loadu_si256(reinterpret_cast<const __m256i*>(from))};

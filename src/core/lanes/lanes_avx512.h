@@ -5,6 +5,7 @@
 
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 #include <immintrin.h>
@@ -140,8 +141,24 @@ inline __mmask16 each_lane() {
   __asm__("" : "+Yk"(each));
   return each;
 }
-inline I gather(const std::uint32_t* base, I at) {
+inline I gather(const std::int32_t* base, I at) {
   return {_mm512_mask_i32gather_epi32(_mm512_setzero_si512(), each_lane(), at.v, base, 4)};
+}
+inline I gather(const std::uint32_t* base, I at) {
+  return gather(reinterpret_cast<const std::int32_t*>(base), at);
+}
+inline F gather(const float* base, I at) {
+  return {_mm512_i32gather_ps(at.v, base, 4)};
+}
+// Looks up entries of a table in one or two registers. Requires: tables of 32 are aligned to 64 bytes.
+inline F look_up(const float (&table)[32], I index) {
+  return {_mm512_permutex2var_ps(_mm512_load_ps(table), index.v, _mm512_load_ps(table + 16))};
+}
+inline I look_up(const std::int32_t (&table)[32], I index) {
+  return {_mm512_permutex2var_epi32(_mm512_load_si512(table), index.v, _mm512_load_si512(table + 16))};
+}
+inline F look_up(const std::array<float, 16>& table, I index) {
+  return {_mm512_permutexvar_ps(index.v, _mm512_loadu_ps(table.data()))};
 }
 inline I as_int(F a) {
   return {_mm512_castps_si512(a.v)};
@@ -157,6 +174,12 @@ inline F to_float(I a) {
 }
 inline void store(std::int32_t* to, I a) {
   _mm512_storeu_si512(to, a.v);
+}
+inline void store(std::uint32_t* to, I a) {
+  _mm512_storeu_si512(to, a.v);
+}
+inline I load(const std::uint16_t* from) {
+  return {_mm512_cvtepu16_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(from)))};
 }
 inline I load(const std::int32_t* from) {
   return {_mm512_loadu_si512(from)};

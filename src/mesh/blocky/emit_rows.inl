@@ -28,7 +28,7 @@ QUOIN_STAGE std::size_t list_rows(int groups, const Batch& b, std::uint16_t* row
   std::uint16_t* out = rows;
   for (int i = 0; i < groups; ++i) {
     const int at = b.groups[i];
-    const __mmask8 has_runs = lanes_with_bits(load(b.ends + at));
+    const auto has_runs = static_cast<__mmask8>(lanes_with_bits(load(b.ends + at)));
     const __m128i words = _mm_add_epi16(eight, _mm_set1_epi16(static_cast<short>(at)));
     _mm_storeu_si128(reinterpret_cast<__m128i*>(out), _mm_maskz_compress_epi16(has_runs, words));
     out += __builtin_popcount(has_runs);

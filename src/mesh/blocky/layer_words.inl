@@ -14,6 +14,7 @@
 #include <immintrin.h>
 #endif
 
+#include "core/lanes/words.h"
 #include "mesh/blocky/blocky_mesher.h"
 
 #define QUOIN_INLINE inline __attribute__((always_inline))
@@ -28,14 +29,14 @@ inline constexpr int kLanes = 8;
 inline constexpr int kLanes = 4;
 #endif
 
-using Words __attribute__((vector_size(8 * kLanes))) = std::uint64_t;
-using UnalignedWords __attribute__((vector_size(8 * kLanes), aligned(8))) = std::uint64_t;
+using Words = words::WordVector<kLanes>::Type;
+using words::any;
+using words::lanes_with_bits;
+using words::load_as;
+using words::store;
 
 QUOIN_INLINE Words load(const std::uint64_t* p) {
-  return *reinterpret_cast<const UnalignedWords*>(p);
-}
-QUOIN_INLINE void store(std::uint64_t* p, Words v) {
-  *reinterpret_cast<UnalignedWords*>(p) = v;
+  return load_as<Words>(p);
 }
 
 constexpr int rounded_down(int row) {
@@ -57,12 +58,6 @@ QUOIN_INLINE Words ternary(Words a, Words b, Words c) {
   return reinterpret_cast<Words>(_mm512_ternarylogic_epi64(bits_of(a), bits_of(b), bits_of(c), kTable));
 }
 
-QUOIN_INLINE std::uint8_t lanes_with_bits(Words v) {
-  return _mm512_test_epi64_mask(bits_of(v), bits_of(v));
-}
-QUOIN_INLINE bool any(Words v) {
-  return lanes_with_bits(v) != 0;
-}
 QUOIN_INLINE Words or_difference(Words so_far, Words a, Words b) {
   return ternary<0xF6>(so_far, a, b);
 }
@@ -84,14 +79,6 @@ QUOIN_INLINE Words occlusion_high(Words side1, Words side2, Words corner) {
 
 #else
 
-QUOIN_INLINE bool any(Words v) {
-#ifdef QUOIN_KERNEL_AVX2
-  const __m256i bits = reinterpret_cast<__m256i>(v);
-  return _mm256_testz_si256(bits, bits) == 0;
-#else
-  return (v[0] | v[1] | v[2] | v[3]) != 0;
-#endif
-}
 QUOIN_INLINE Words or_difference(Words so_far, Words a, Words b) {
   return so_far | (a ^ b);
 }
@@ -309,17 +296,6 @@ QUOIN_INLINE void for_rows_and_border(const Copy& copy) {
   copy(word_index(0, 64), std::uint64_t{});
 }
 
-template <class T>
-QUOIN_INLINE T read_as(const std::uint64_t* p) {
-  T v;
-  __builtin_memcpy(&v, p, sizeof(v));
-  return v;
-}
-template <class T>
-QUOIN_INLINE void write_as(std::uint64_t* p, const T& v) {
-  __builtin_memcpy(p, &v, sizeof(v));
-}
-
 // Copies the rows outside the chunk in the y and x views from the z view.
 void copy_border(bool row_ends, Scratch& s) {
   for (int row = -1; row <= 64; ++row) {
@@ -333,12 +309,12 @@ void copy_border(bool row_ends, Scratch& s) {
     T low{};
     T high{};
     for (int z = 0; z < 64 && row_ends; ++z) {
-      const T ends = read_as<T>(s.z.ends.words + at + z * kRowStride);
+      const T ends = load_as<T>(s.z.ends.words + at + z * kRowStride);
       low |= (ends >> 63) << z;
       high |= (ends & 1) << z;
     }
-    write_as(s.x.opaque.words + at - kRowStride, low);
-    write_as(s.x.opaque.words + at + 64 * kRowStride, high);
+    store(s.x.opaque.words + at - kRowStride, low);
+    store(s.x.opaque.words + at + 64 * kRowStride, high);
   });
 }
 
@@ -354,16 +330,16 @@ void copy_row_ends(Scratch& s) {
   // Rows of the x view are along z, its planes are bits of the z view.
   for_rows_and_border([&](int at, auto like) {
     using T = decltype(like);
-    const auto before = [&](const Layer& layer) { return read_as<T>(layer.words + at - kRowStride); };
-    const auto after = [&](const Layer& layer) { return read_as<T>(layer.words + at + 64 * kRowStride); };
+    const auto before = [&](const Layer& layer) { return load_as<T>(layer.words + at - kRowStride); };
+    const auto after = [&](const Layer& layer) { return load_as<T>(layer.words + at + 64 * kRowStride); };
     std::uint64_t* out = s.x.ends.words + at;
     const T first = before(s.z.opaque);
     const T last = after(s.z.opaque);
-    for (int x = 0; x < 64; ++x) write_as(out + x * kRowStride, (first >> x) << 63 | (last >> x & 1));
+    for (int x = 0; x < 64; ++x) store(out + x * kRowStride, (first >> x) << 63 | (last >> x & 1));
     const T corner_before = before(s.z.ends);
     const T corner_after = after(s.z.ends);
-    write_as(out - kRowStride, (corner_before >> 63) << 63 | corner_after >> 63);
-    write_as(out + 64 * kRowStride, corner_before << 63 | (corner_after & 1));
+    store(out - kRowStride, (corner_before >> 63) << 63 | corner_after >> 63);
+    store(out + 64 * kRowStride, corner_before << 63 | (corner_after & 1));
   });
 }
 

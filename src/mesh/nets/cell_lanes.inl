@@ -23,10 +23,6 @@ inline Mask signs_differ(F a, F b) {
 inline F only(Mask m, F a) {
   return {_mm512_maskz_mov_ps(m.m, a.v)};
 }
-// Looks up values of a table in one register.
-inline F look_up(const std::array<float, 16>& table, I index) {
-  return {_mm512_permutexvar_ps(index.v, _mm512_loadu_ps(table.data()))};
-}
 
 #else
 
@@ -39,9 +35,6 @@ inline Mask signs_differ(F a, F b) {
 }
 inline F only(Mask m, F a) {
   return {_mm256_and_ps(a.v, m.v)};
-}
-inline F look_up(const std::array<float, 16>& table, I index) {
-  return {_mm256_i32gather_ps(table.data(), index.v, 4)};
 }
 
 #endif

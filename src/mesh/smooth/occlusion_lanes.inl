@@ -49,7 +49,7 @@ void find_batch(const Work& work, const Slice& slice, std::size_t first, std::si
         store(batch.steps[i][k] + at, axis.base[k] - axis.base[0]);
       }
     }
-    const I place = load_words(work.places + first + at) & all(kPlaceMask);
+    const I place = load(work.places + first + at) & all(kPlaceMask);
     const I column = (place & all(kPlaceStride - 1)) + lowest[0] + all(kPointX - 1);
     const I row = shift_right<kPlaceShift>(place) + lowest[1] + all(kPointX - 1);
     const I z = lowest[2] + all(slice.z + kSliceBias);
@@ -91,7 +91,7 @@ struct Listed {
 
 template <int kSpread>
 Listed listed_at(const Batch& batch, const std::uint16_t* codes) {
-  const I code = load_words(codes);
+  const I code = load(codes);
   const I sample = code & all((1 << kCodeShift) - 1);
   const I vertex = shift_right<kCodeShift>(code);
   const SampleTable<kSpread>& table = kSampleTable<kSpread>;
@@ -465,7 +465,7 @@ inline Centres find_centres(const Work& work, const Slice& slice, std::size_t fi
     fraction[i] = centre - below;
     base[i] = to_int(below) - all(whole);
   }
-  const I place = load_words(work.places + first) & all(kPlaceMask);
+  const I place = load(work.places + first) & all(kPlaceMask);
   const I x = (place & all(kPlaceStride - 1)) + base[0];
   const I y = shift_right<kPlaceShift>(place) + base[1];
   Centres centres;

@@ -22,28 +22,9 @@ using namespace lanes;
 
 #ifdef QUOIN_KERNEL_AVX512
 
-inline I load_words(const std::uint16_t* from) {
-  return {_mm512_cvtepu16_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(from)))};
-}
-inline void store(void* to, I a) {
-  _mm512_storeu_si512(to, a.v);
-}
 // Gathers the pair of halves at each place, as one number.
 inline I gather_pairs(const Half* base, I place) {
   return {_mm512_i32gather_epi32(place.v, base, 2)};
-}
-inline F gather(const float* base, I place) {
-  return {_mm512_i32gather_ps(place.v, base, 4)};
-}
-// Looks up entries of a table in two registers.
-inline F look_up(const float (&table)[32], I index) {
-  return {_mm512_permutex2var_ps(_mm512_load_ps(table), index.v, _mm512_load_ps(table + 16))};
-}
-inline I look_up(const std::int32_t (&table)[32], I index) {
-  return {_mm512_permutex2var_epi32(_mm512_load_si512(table), index.v, _mm512_load_si512(table + 16))};
-}
-inline I gather(const std::int32_t* base, I at) {
-  return {_mm512_mask_i32gather_epi32(_mm512_setzero_si512(), each_lane(), at.v, base, 4)};
 }
 // Stores the first `count` lanes at their places.
 inline void scatter(std::uint32_t* base, I place, I value, std::size_t count) {
@@ -170,34 +151,12 @@ class Thirds {
  private:
   __m512i lanes_;
 };
-// Returns one bit per lane, set if it is at least 0.
-inline std::uint32_t open_bits(F a) {
-  return _mm512_cmp_ps_mask(a.v, _mm512_setzero_ps(), _CMP_GE_OQ);
-}
 
 #else
 
-inline I load_words(const std::uint16_t* from) {
-  return {_mm256_cvtepu16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(from)))};
-}
-inline void store(void* to, I a) {
-  _mm256_storeu_si256(static_cast<__m256i*>(to), a.v);
-}
 // Gathers the pair of halves at each place, as one number.
 inline I gather_pairs(const Half* base, I place) {
   return {_mm256_i32gather_epi32(reinterpret_cast<const int*>(base), place.v, 2)};
-}
-inline F gather(const float* base, I place) {
-  return {_mm256_i32gather_ps(base, place.v, 4)};
-}
-inline F look_up(const float (&table)[32], I index) {
-  return gather(table, index);
-}
-inline I gather(const std::int32_t* base, I at) {
-  return {_mm256_i32gather_epi32(base, at.v, 4)};
-}
-inline I look_up(const std::int32_t (&table)[32], I index) {
-  return gather(table, index);
 }
 // Stores the first `count` lanes at their places.
 inline void scatter(std::uint32_t* base, I place, I value, std::size_t count) {
@@ -267,12 +226,13 @@ class Thirds {
  private:
   __m256i lanes_;
 };
-// Returns one bit per lane, set if it is at least 0.
-inline std::uint32_t open_bits(F a) {
-  return static_cast<std::uint32_t>(_mm256_movemask_ps(_mm256_cmp_ps(a.v, _mm256_setzero_ps(), _CMP_GE_OQ)));
-}
 
 #endif
+
+// Returns one bit per lane, set if it is at least 0.
+inline std::uint32_t open_bits(F a) {
+  return bits(all(0.0F) <= a);
+}
 
 }  // namespace
 }  // namespace quoin::smooth

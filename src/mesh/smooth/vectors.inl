@@ -85,7 +85,7 @@ void make_vertices(Work& work, const Slice& slice, std::size_t count, SmoothChun
   const Half* const high = work.row(0, slice.z + 1) - place_of(0, 0);
   const bool has_occlusion = work.occlusion.method != SmoothOcclusion::None;
   for (std::size_t first = 0; first < count; first += kWidth) {
-    const I place = load_words(work.places + first) & all(kPlaceMask);
+    const I place = load(work.places + first) & all(kPlaceMask);
     const CornerLanes corners = load_corners(low, high, place);
     const auto [fraction, at, normal] = cell_vertex(HalfField{}, corners.d, corners.solid);
     const I x = place & all(kPlaceStride - 1);
@@ -94,7 +94,7 @@ void make_vertices(Work& work, const Slice& slice, std::size_t count, SmoothChun
     store_vectors(out.positions.data() + vertex, (to_float(x - all(1)) + at.x) * scale,
                   (to_float(y - all(1)) + at.y) * scale, (all(static_cast<float>(slice.z)) + at.z) * scale);
     store_vectors(out.normals.data() + vertex, normal.x, normal.y, normal.z);
-    store(out.cells.data() + vertex, cell_codes(x, y, slice.z, work.n));
+    store(reinterpret_cast<std::uint32_t*>(out.cells.data() + vertex), cell_codes(x, y, slice.z, work.n));
     remember(work, slice, first, count, place, at);
     if (has_occlusion) keep_for_occlusion(work, first, at, normal);
   }
@@ -119,7 +119,7 @@ void make_quads(const Work& work, const Slice& slice, std::size_t count, std::ui
   using Cells = Around<kAxis>;
   const I firsts[2] = {all(static_cast<int>(slice.first_vertex)), all(static_cast<int>(slice.first_vertex_of_last))};
   for (std::size_t i = 0; i < count; i += kWidth) {
-    const I edge = load_words(work.places + i);
+    const I edge = load(work.places + i);
     const I place = edge & all(kPlaceMask);
     I corners[4];
     I q[4];

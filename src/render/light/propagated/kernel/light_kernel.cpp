@@ -10,6 +10,7 @@
 
 #include <quoin/core/assert.h>
 
+#include "core/lanes/words.h"
 #include "render/light/propagated/kernel/light_kernel.h"
 #include "render/light/propagated/kernel/slab_units.inl"
 
@@ -23,28 +24,13 @@ constexpr std::size_t kWidth = 4;
 #else
 constexpr std::size_t kWidth = 2;
 #endif
-using Words __attribute__((vector_size(8 * kWidth))) = std::uint64_t;
+using Words = words::WordVector<kWidth>::Type;
+using words::any;
+using words::lanes_with_bits;
+using words::store;
 
 inline Words load(const std::uint64_t* from) {
-  Words words;
-  std::memcpy(&words, from, sizeof words);
-  return words;
-}
-
-inline void store(Words words, std::uint64_t* to) {
-  std::memcpy(to, &words, sizeof words);
-}
-
-inline bool any(Words words) {
-#if defined(QUOIN_KERNEL_AVX512)
-  const auto all = reinterpret_cast<__m512i>(words);
-  return _mm512_test_epi64_mask(all, all) != 0;
-#elif defined(QUOIN_KERNEL_AVX2)
-  const auto all = reinterpret_cast<__m256i>(words);
-  return _mm256_testz_si256(all, all) == 0;
-#else
-  return (words[0] | words[1]) != 0;
-#endif
+  return words::load_as<Words>(from);
 }
 
 // Adds the voxels of this level to a block's bit planes. Overwrites the planes of a block that is not touched yet.
@@ -55,13 +41,13 @@ inline void add_to_planes(const LevelPass& step, std::size_t at, bool is_touched
     std::uint64_t* to = step.planes[plane] + at;
     for (std::size_t i = 0; i < kBlockRows; i += kWidth) {
       const Words here = has_bit ? load(step.next + at + i) : Words{};
-      store(is_touched ? here | load(to + i) : here, to + i);
+      store(to + i, is_touched ? here | load(to + i) : here);
     }
   }
 }
 
 inline void clear_block(std::uint64_t* to) {
-  for (std::size_t i = 0; i < kBlockRows; i += kWidth) store(Words{}, to + i);
+  for (std::size_t i = 0; i < kBlockRows; i += kWidth) store(to + i, Words{});
 }
 
 // Writes the voxels that light reaches in a block to `next`. Returns true if there are any. Reads words next to the
@@ -77,7 +63,7 @@ inline bool reach_in_block(const LevelPass& step, std::size_t at, bool is_touche
     around |= load(here - step.layer) | load(here + step.layer);
     if constexpr (kIsWide) around |= load(here - step.column) >> 63 | load(here + step.column) << 63;
     const Words fresh = around & load(dark + i);
-    store(fresh, step.next + at + i);
+    store(step.next + at + i, fresh);
     all |= fresh;
   }
   return any(all);
@@ -91,7 +77,7 @@ inline bool light_block(const LevelPass& step, std::size_t at, bool is_touched, 
   for (std::size_t i = 0; i < kBlockRows; i += kWidth) {
     const Words fresh = load(step.next + at + i);
     const Words left = load(dark + i) & ~fresh;
-    store(left, step.rest + at + i);
+    store(step.rest + at + i, left);
     all |= left;
   }
   if (is_wanted) add_to_planes(step, at, is_touched);
@@ -174,10 +160,10 @@ inline void take_sky_of_block(const LevelPass& step, std::size_t z, std::size_t 
                               const Words* lit, const Words* dark) {
   const bool has_planes = is_wanted(step, z, block);
   for (std::size_t i = 0; i < kBlockRows / kWidth; ++i) {
-    store(lit[i], step.front + at + i * kWidth);
-    store(dark[i], step.rest + at + i * kWidth);
+    store(step.front + at + i * kWidth, lit[i]);
+    store(step.rest + at + i * kWidth, dark[i]);
     for (std::size_t plane = 0; has_planes && plane < kPlanes; ++plane) {
-      store(lit[i], step.planes[plane] + at + i * kWidth);
+      store(step.planes[plane] + at + i * kWidth, lit[i]);
     }
   }
 }
@@ -245,19 +231,6 @@ std::uint64_t find_blocks(const std::uint64_t* words, std::size_t count) {
     blocks |= std::uint64_t{any(all)} << block;
   }
   return blocks;
-}
-
-// Bit i is set if lane i is not 0.
-inline unsigned lanes_with_bits(Words words) {
-#if defined(QUOIN_KERNEL_AVX512)
-  const auto all = reinterpret_cast<__m512i>(words);
-  return _mm512_test_epi64_mask(all, all);
-#elif defined(QUOIN_KERNEL_AVX2)
-  const __m256i zero = _mm256_cmpeq_epi64(reinterpret_cast<__m256i>(words), _mm256_setzero_si256());
-  return static_cast<unsigned>(_mm256_movemask_pd(_mm256_castsi256_pd(zero))) ^ 15U;
-#else
-  return static_cast<unsigned>(words[0] != 0) | static_cast<unsigned>(words[1] != 0) << 1;
-#endif
 }
 
 unsigned find_rows(const std::uint64_t* planes, std::size_t count, std::uint64_t mask) {
@@ -337,8 +310,8 @@ void shift_in(const std::uint64_t* from, std::size_t count, std::uint64_t mask, 
   std::size_t i = 0;
   for (; i + kWidth <= count; i += kWidth) {
     const Words words = load(from + i) & (Words{} + mask);
-    store(load(low + i) | words << shift, low + i);
-    if (shift != 0) store(load(high + i) | words >> (64 - shift), high + i);
+    store(low + i, load(low + i) | words << shift);
+    if (shift != 0) store(high + i, load(high + i) | words >> (64 - shift));
   }
   for (; i < count; ++i) {
     low[i] |= (from[i] & mask) << shift;
@@ -375,12 +348,12 @@ SlabKinds merge(const std::uint64_t* before, const std::uint64_t* inside, std::u
       const Words old = load(before + at);
       const Words other = (old ^ load(now + at)) & here;
       const Words words = old ^ other;
-      store(words, now + at);
+      store(now + at, words);
       changed_here |= other;
       ones[plane] |= words;
       zeros[plane] |= ~words;
     }
-    store(changed_here, changed + row);
+    store(changed + row, changed_here);
     all_changed |= changed_here;
   }
   SlabKinds kinds;
