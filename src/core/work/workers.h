@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
+#include <cstddef>
+#include <cstdint>
 #include <exception>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <thread>
 #include <utility>
@@ -13,6 +16,76 @@
 #include <quoin/core/parallel.h>
 
 namespace quoin {
+
+class Workers;
+
+/// Objects that workers destroy, because freeing large memory takes time: after `return_freed_memory`, each block of
+/// 32 KiB or more costs the thread that frees it a call of the system.
+///
+///   surface = workers.releases()->defer(std::move(surface), bytes);  // points to the same surface
+///   surface.reset();                                                 // the last copy: a worker destroys the surface
+///
+/// A worker destroys waiting objects before its next step; a sleeping worker is woken for it. The thread that drops the
+/// last copy destroys the object itself if the workers have ended, or if too much waits already, for example because
+/// all workers are in long steps. Waiting memory is therefore bounded.
+/// Threads: any. Copies of deferred pointers may be dropped while any lock is held, and after the workers have ended.
+class ReleaseQueue : public std::enable_shared_from_this<ReleaseQueue> {
+ public:
+  static constexpr std::size_t kMaxObjects = 4096;
+  static constexpr std::size_t kMaxBytes = std::size_t{64} << 20;
+
+  ReleaseQueue() = default;
+  ReleaseQueue(const ReleaseQueue&) = delete;
+  ReleaseQueue& operator=(const ReleaseQueue&) = delete;
+  ~ReleaseQueue() { close(); }
+
+  /// Returns a pointer to the same object. Once its last copy is dropped, a worker drops `object`. The object counts as
+  /// `bytes` towards kMaxBytes. Null stays null. Errors: bad_alloc; `object` is then dropped.
+  template <class T>
+  [[nodiscard]] std::shared_ptr<T> defer(std::shared_ptr<T> object, std::size_t bytes = 0) {
+    if (object == nullptr) return object;
+    T* const address = object.get();
+    auto held = std::make_unique<Held>(std::move(object), bytes);
+    return std::shared_ptr<T>(address, Release{shared_from_this(), held.release()});
+  }
+
+ private:
+  friend class Workers;
+  struct Held {
+    Held(std::shared_ptr<const void> kept, std::size_t size) : object(std::move(kept)), bytes(size) {}
+    std::shared_ptr<const void> object;
+    std::size_t bytes = 0;
+    Held* next = nullptr;
+  };
+  struct Release {
+    void operator()(const void* /*object*/) const noexcept { queue->put(held); }
+    std::shared_ptr<ReleaseQueue> queue;
+    Held* held = nullptr;
+  };
+
+  void put(Held* held) noexcept;
+  void open(Workers& workers);
+  void close() noexcept;
+  [[nodiscard]] bool has_objects() {
+    const std::lock_guard lock(mutex_);
+    return objects_ != 0;
+  }
+  /// Destroys some of the waiting objects. Returns false if none waited.
+  bool destroy_some() noexcept;
+
+  std::mutex mutex_;            // of all below; no other code runs while it is held, except Workers::wake_one
+  Workers* workers_ = nullptr;  // null: not started, or ended
+  Held* first_ = nullptr;
+  std::size_t objects_ = 0;
+  std::size_t bytes_ = 0;
+};
+
+/// As `queue->defer`; returns `object` itself if there is no queue.
+template <class T>
+[[nodiscard]] std::shared_ptr<T> deferred(const std::shared_ptr<ReleaseQueue>& queue, std::shared_ptr<T> object,
+                                          std::size_t bytes = 0) {
+  return queue == nullptr ? object : queue->defer(std::move(object), bytes);
+}
 
 /// Worker threads of an object. They look for work in its state, which its mutex guards:
 ///
@@ -55,8 +128,17 @@ class Workers {
   /// Returns true once `stop` or `drain` was called, so that long steps can end early. Requires: the lock is held.
   [[nodiscard]] bool is_stopping() const { return is_stopping_; }
 
-  void wake_one() { wake_.notify_one(); }
-  void wake_all() { wake_.notify_all(); }
+  void wake_one() {
+    note_wake();
+    wake_.notify_one();
+  }
+  void wake_all() {
+    note_wake();
+    wake_.notify_all();
+  }
+
+  /// Returns the queue of objects that these workers destroy.
+  [[nodiscard]] const std::shared_ptr<ReleaseQueue>& releases() const { return releases_; }
 
   /// Waits until `is_finished()`, which is called with the lock held, after each step and each `notify`.
   template <class IsFinished>
@@ -82,15 +164,27 @@ class Workers {
  private:
   void end(bool drains);
   void run(unsigned worker);
+  void note_wake() {
+    const std::lock_guard lock(wake_mutex_);
+    ++wakes_;
+  }
+  [[nodiscard]] std::uint32_t wakes() {
+    const std::lock_guard lock(wake_mutex_);
+    return wakes_;
+  }
+  void sleep(Lock& lock, Clock::time_point until, std::uint32_t seen);
   [[nodiscard]] Clock::time_point guarded_step(Lock& lock, unsigned worker);
 
   std::mutex& mutex_;
   Step step_;
+  std::mutex wake_mutex_;  // of `wakes_`; taken last, so that wakes are possible under any other lock
+  std::uint32_t wakes_ = 0;
   std::condition_variable wake_;
   std::condition_variable stepped_;
   bool is_stopping_ = false;
   bool is_draining_ = false;
   std::exception_ptr failure_;
+  std::shared_ptr<ReleaseQueue> releases_ = std::make_shared<ReleaseQueue>();
   std::vector<std::thread> threads_;
 };
 

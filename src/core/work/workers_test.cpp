@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <deque>
+#include <memory>
 #include <stdexcept>
 #include <thread>
 
@@ -246,6 +247,132 @@ TEST(Workers, StopWithoutStart) {
   workers.stop();
   const std::lock_guard lock(mutex);
   EXPECT_TRUE(workers.is_stopping());
+}
+
+// Records the thread that destroys it.
+class Destroyed {
+ public:
+  explicit Destroyed(std::atomic<std::thread::id>& by) : by_(by) {}
+  Destroyed(const Destroyed&) = delete;
+  Destroyed& operator=(const Destroyed&) = delete;
+  ~Destroyed() {
+    by_ = std::this_thread::get_id();
+    by_.notify_all();
+  }
+
+ private:
+  std::atomic<std::thread::id>& by_;
+};
+
+TEST(ReleaseQueue, DestroysOnSleepingWorker) {
+  std::atomic<std::thread::id> by;
+  Queue queue(2);
+  for (int i = 0; i < 200; ++i) {
+    by = std::thread::id();
+    auto object = queue.workers().releases()->defer(std::make_shared<Destroyed>(by));
+    auto copy = object;
+    object.reset();
+    EXPECT_EQ(by.load(), std::thread::id());
+    if (i % 3 == 0) std::this_thread::sleep_for(100us);  // until the workers sleep
+    copy.reset();
+    by.wait(std::thread::id());
+    EXPECT_NE(by.load(), std::this_thread::get_id());
+  }
+  EXPECT_EQ(queue.workers().releases()->defer(std::shared_ptr<int>()), nullptr);
+}
+
+TEST(ReleaseQueue, TakesObjectsUnderAnyLock) {
+  std::atomic<std::thread::id> by;
+  Queue queue(1);
+  auto object = queue.workers().releases()->defer(std::make_shared<Destroyed>(by));
+  {
+    const std::lock_guard lock(queue.mutex());
+    object.reset();
+  }
+  by.wait(std::thread::id());
+  EXPECT_NE(by.load(), std::this_thread::get_id());
+}
+
+TEST(ReleaseQueue, DestroysObjectsOfObjects) {
+  std::atomic<std::thread::id> by;
+  Queue queue(1);
+  const auto& releases = queue.workers().releases();
+  using Inner = std::shared_ptr<Destroyed>;
+  auto outer = releases->defer(std::make_shared<Inner>(releases->defer(std::make_shared<Destroyed>(by))));
+  outer.reset();
+  by.wait(std::thread::id());
+  EXPECT_NE(by.load(), std::this_thread::get_id());
+}
+
+TEST(ReleaseQueue, BoundsWhatWaitsForBusyWorkers) {
+  Gate gate;
+  Queue queue(1);
+  queue.push([&] { gate.pass(); });
+  gate.wait_until_reached();
+  const auto& releases = queue.workers().releases();
+  std::atomic<std::thread::id> by;
+  // Each of these limits alone makes the calling thread destroy the object.
+  releases->defer(std::make_shared<Destroyed>(by), ReleaseQueue::kMaxBytes + 1).reset();
+  EXPECT_EQ(by.load(), std::this_thread::get_id());
+  for (std::size_t i = 0; i < ReleaseQueue::kMaxObjects; ++i) {
+    by = std::thread::id();
+    releases->defer(std::make_shared<Destroyed>(by)).reset();
+    ASSERT_EQ(by.load(), std::thread::id()) << i;
+  }
+  releases->defer(std::make_shared<Destroyed>(by)).reset();
+  EXPECT_EQ(by.load(), std::this_thread::get_id());
+  gate.open();
+  queue.finish();
+  while (by.load() == std::this_thread::get_id()) std::this_thread::yield();
+  queue.workers().stop();
+}
+
+TEST(ReleaseQueue, DestroysOnCallingThreadOnceWorkersHaveEnded) {
+  std::atomic<std::thread::id> by;
+  std::shared_ptr<Destroyed> late;
+  {
+    Gate gate;
+    Queue queue(1);
+    late = queue.workers().releases()->defer(std::make_shared<Destroyed>(by));
+    std::atomic<std::thread::id> waiting_by;
+    queue.push([&] { gate.pass(); });
+    gate.wait_until_reached();
+    queue.workers().releases()->defer(std::make_shared<Destroyed>(waiting_by)).reset();
+    EXPECT_EQ(waiting_by.load(), std::thread::id());
+    gate.open();
+    queue.workers().stop();
+    EXPECT_NE(waiting_by.load(), std::thread::id());
+  }
+  EXPECT_EQ(by.load(), std::thread::id());
+  late.reset();
+  EXPECT_EQ(by.load(), std::this_thread::get_id());
+}
+
+TEST(ReleaseQueue, TakesObjectsOfManyThreadsDuringStop) {
+  for (int round = 0; round < 50; ++round) {
+    std::atomic<int> alive{0};
+    struct Counted {
+      explicit Counted(std::atomic<int>& count) : alive(count) { ++alive; }
+      Counted(const Counted&) = delete;
+      Counted& operator=(const Counted&) = delete;
+      ~Counted() { --alive; }
+      std::atomic<int>& alive;
+    };
+    std::shared_ptr<ReleaseQueue> releases;
+    std::vector<std::thread> threads;
+    {
+      Queue queue(2);
+      releases = queue.workers().releases();
+      for (int i = 0; i < 3; ++i) {
+        threads.emplace_back([&] {
+          for (int k = 0; k < 200; ++k) releases->defer(std::make_shared<Counted>(alive), 100).reset();
+        });
+      }
+      queue.workers().stop();
+    }
+    for (std::thread& each : threads) each.join();
+    EXPECT_EQ(alive, 0);
+  }
 }
 
 }  // namespace
