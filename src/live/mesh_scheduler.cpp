@@ -25,7 +25,9 @@ double seconds(SurfaceClock::duration duration) {
 // Releases the inputs of a job. Copies of chunks are freed as early as possible.
 void drop_inputs(SurfaceJob& job) {
   job.voxels = {};
+  job.light.reset();
   job.field.reset();
+  job.bodies.reset();
   job.types.reset();
   job.materials.reset();
 }
@@ -75,9 +77,7 @@ std::vector<double> MeshJobQueue::measure(const std::function<double(const Surfa
 void MeshJobQueue::renew(const std::function<void(SurfaceJob&)>& renew) {
   const std::lock_guard lock(mutex_);
   for (const std::unique_ptr<SurfaceJob>& job : queue_) {
-    if (job->voxels == nullptr) continue;
-    spent_.emplace_back(job->voxels, job->light);
-    renew(*job);
+    if (job->voxels != nullptr) renew(*job);
   }
 }
 
@@ -119,20 +119,9 @@ Workers::Clock::time_point MeshJobQueue::step(Workers::Lock& lock, SurfaceWorksp
   if (queue_.empty()) return Workers::kWhenWoken;
   std::unique_ptr<SurfaceJob> job = take_nearest();
   ++running_;
-  auto spent = std::exchange(spent_, {});
   lock.unlock();
-  spent.clear();
   const SurfaceClock::time_point start = SurfaceClock::now();
-  std::exception_ptr failure;
-  try {
-    work_(*job, workspace);
-  } catch (const std::bad_alloc&) {
-    job->outcome = SurfaceJob::Outcome::OutOfMemory;
-    job->surface.reset();
-    workspace = {};
-  } catch (...) {
-    failure = std::current_exception();
-  }
+  std::exception_ptr failure = work_on(*job, workspace);
   drop_inputs(*job);
   // Failures are not reported to the callback: an immediate retry would fail again.
   const bool is_reported = job->outcome != SurfaceJob::Outcome::OutOfMemory;
@@ -143,6 +132,30 @@ Workers::Clock::time_point MeshJobQueue::step(Workers::Lock& lock, SurfaceWorksp
   if (is_reported && on_ready_) on_ready_();
   lock.lock();
   return Workers::kAgain;
+}
+
+// Sets the job's outcome and surface. Returns an exception of a callback, or null.
+std::exception_ptr MeshJobQueue::work_on(SurfaceJob& job, SurfaceWorkspace& workspace) {
+  std::exception_ptr failure;
+  try {
+    try {
+      work_(job, workspace);
+    } catch (const std::bad_alloc&) {
+      throw;
+    } catch (...) {
+      failure = std::current_exception();
+    }
+    if (job.surface != nullptr) {
+      job.surface->converted = releases()->defer(std::move(job.surface->converted));
+      const std::size_t bytes = job.surface->bytes();
+      job.surface = releases()->defer(std::move(job.surface), bytes);
+    }
+  } catch (const std::bad_alloc&) {
+    job.outcome = SurfaceJob::Outcome::OutOfMemory;
+    job.surface.reset();
+    workspace = {};
+  }
+  return failure;
 }
 
 // Requires: the lock is held.
@@ -207,7 +220,9 @@ MeshScheduler::MeshScheduler(const LiveMeshOptions& options, MeshJobQueue::Work 
       workers_(worker_count(options.workers)),
       max_ahead_(jobs_ahead(options.style, workers_)),
       drawn_(options.instances, SceneFollower::Transforms::Valid),
-      queue_(workers_, std::move(work), options.on_ready) {}
+      queue_(workers_, std::move(work), options.on_ready) {
+  totals_.releases = queue_.releases();
+}
 
 void MeshScheduler::throw_failure() {
   if (const std::exception_ptr failure = queue_.take_failure()) std::rethrow_exception(failure);
@@ -398,7 +413,8 @@ void MeshScheduler::renew_jobs(const Scene& scene, SurfaceClock::time_point now)
   queue_.renew([&](SurfaceJob& job) {
     const GridHandle grid = job.source.grid;
     const GridLight light = light_ == nullptr ? GridLight{} : light_->of(grid);
-    SurfaceInputs& input = inputs.try_emplace(grid, scene.grids()[grid], types_, light).first->second;
+    SurfaceInputs& input =
+        inputs.try_emplace(grid, scene.grids()[grid], types_, light, queue_.releases()).first->second;
     if (job.light != nullptr && input.light() == nullptr) return;
     if (job.light != nullptr) job.light = input.light();
     job.voxels = input.voxels();
@@ -422,7 +438,8 @@ void MeshScheduler::hand_over(const Scene& scene) {
     }
     const GridHandle grid = each.source.grid;
     const GridLight light = light_ == nullptr ? GridLight{} : light_->of(grid);
-    SurfaceInputs& input = inputs.try_emplace(grid, scene.grids()[grid], types_, light).first->second;
+    SurfaceInputs& input =
+        inputs.try_emplace(grid, scene.grids()[grid], types_, light, queue_.releases()).first->second;
     std::unique_ptr<SurfaceJob> job = each.live->make_job(input, each.chunk);
     job->distance = each.distance;
     const std::uint64_t serial = job->serial;

@@ -45,16 +45,19 @@ class MeshJobQueue {
   /// Sets new distances of the waiting jobs. Returns the distances in ascending order.
   [[nodiscard]] std::vector<double> measure(const std::function<double(const SurfaceJob&)>& distance);
   /// Calls `renew` for the waiting jobs, so that blocky ones can get newer snapshots in which their chunks are
-  /// unchanged. An old snapshot keeps all memory that was released since. Workers free the old snapshots.
+  /// unchanged. An old snapshot keeps all memory that was released since.
   void renew(const std::function<void(SurfaceJob&)>& renew);
   /// Returns the jobs completed since the last call, in order of completion.
   [[nodiscard]] std::vector<std::unique_ptr<SurfaceJob>> collect();
   /// Returns once at most `waiting` jobs wait for workers; with 0, once all jobs are done.
   void wait(std::size_t waiting);
   [[nodiscard]] LiveMeshes::Stats stats() const;
+  /// Returns the queue of objects that the workers destroy. It also destroys the surfaces of jobs.
+  [[nodiscard]] const std::shared_ptr<ReleaseQueue>& releases() const { return workers_.releases(); }
 
  private:
   [[nodiscard]] Workers::Clock::time_point step(Workers::Lock& lock, SurfaceWorkspace& workspace);
+  [[nodiscard]] std::exception_ptr work_on(SurfaceJob& job, SurfaceWorkspace& workspace);
   void finish(std::unique_ptr<SurfaceJob> job, SurfaceClock::time_point start);
   [[nodiscard]] std::unique_ptr<SurfaceJob> take_nearest();
 
@@ -64,7 +67,6 @@ class MeshJobQueue {
   std::size_t running_ = 0;
   std::vector<std::unique_ptr<SurfaceJob>> queue_;
   std::vector<std::unique_ptr<SurfaceJob>> done_;  // with capacity for all waiting and running jobs
-  std::vector<std::pair<GridSnapshot, LightSnapshot>> spent_;
   LiveMeshes::Stats stats_;
   std::vector<SurfaceWorkspace> workspaces_;  // of each worker
   Workers workers_{mutex_};

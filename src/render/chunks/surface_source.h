@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 #include <unordered_set>
+#include <utility>
 #include <vector>
 
 #include <quoin/core/assert.h>
@@ -12,6 +13,7 @@
 #include <quoin/render/propagated_light.h>
 #include <quoin/scene/scene.h>
 
+#include "core/work/workers.h"
 #include "render/chunks/surface_job.h"
 
 namespace quoin {
@@ -55,6 +57,8 @@ struct SurfaceTotals {
   std::size_t unfinished = 0;
   std::size_t pending = 0;
   std::vector<ReadyChunk> ready;  ///< and perhaps some that are no more
+  /// Destroys densities that no job needs any more. Null: they are destroyed by the calls that drop them.
+  std::shared_ptr<ReleaseQueue> releases;
 };
 
 /// Keeps the totals right while a chunk's state changes, which has `is_unfinished` and `is_pending`.
@@ -93,25 +97,30 @@ struct ChangedTypes {
   std::vector<bool> colour;
 };
 
-/// The inputs of one update's jobs. A snapshot is taken when the first job needs it.
+/// The inputs of one update's jobs. A snapshot is taken when the first job needs it. Workers destroy the snapshots, if
+/// `releases` is not null: an old one holds all memory that the scene has dropped since.
 class SurfaceInputs {
  public:
-  SurfaceInputs(const SceneGrid& content, const SurfaceTypes& with, const GridLight& light = {})
-      : types(&with), content_(&content), light_(light) {}
+  SurfaceInputs(const SceneGrid& content, const SurfaceTypes& with, const GridLight& light = {},
+                std::shared_ptr<ReleaseQueue> releases = nullptr)
+      : types(&with), content_(&content), light_(light), releases_(std::move(releases)) {}
 
   [[nodiscard]] const GridSnapshot& voxels() {
-    if (voxels_ == nullptr) voxels_ = std::make_shared<const Grid>(content_->grid.snapshot());
+    if (voxels_ == nullptr) voxels_ = deferred(releases_, std::make_shared<const Grid>(content_->grid.snapshot()));
     return voxels_;
   }
   [[nodiscard]] const FieldSnapshot& field() {
-    if (field_ == nullptr) field_ = std::make_shared<const DensityGrid>(content_->field.snapshot());
+    if (field_ == nullptr) {
+      field_ = deferred(releases_, std::make_shared<const DensityGrid>(content_->field.snapshot()));
+    }
     return field_;
   }
   /// Returns the light; null if no light is used.
   [[nodiscard]] const LightSnapshot& light() {
     if (lit_ == nullptr && light_.light != nullptr) {
       QUOIN_ASSERT(light_.voxels != nullptr, "light with its voxels");
-      lit_ = std::make_shared<const LitVoxels>(LitVoxels{light_.light->snapshot(), light_.voxels->snapshot()});
+      lit_ = deferred(
+          releases_, std::make_shared<const LitVoxels>(LitVoxels{light_.light->snapshot(), light_.voxels->snapshot()}));
     }
     return lit_;
   }
@@ -121,6 +130,7 @@ class SurfaceInputs {
  private:
   const SceneGrid* content_;
   GridLight light_;
+  std::shared_ptr<ReleaseQueue> releases_;
   GridSnapshot voxels_;
   LightSnapshot lit_;
   FieldSnapshot field_;

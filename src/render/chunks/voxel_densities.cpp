@@ -228,7 +228,7 @@ std::shared_ptr<VoxelDensity> DensityCache::density(IVec3 chunk, const std::shar
   Slot& slot = slots_[chunk];
   if (slot.kept != nullptr && !slot.is_solid_stale && !slot.is_type_stale) return slot.kept;
   if (std::shared_ptr<VoxelDensity> under_way = slot.under_way.lock()) return under_way;
-  auto made = std::make_shared<VoxelDensity>(seen_, chunk, slot.kept, slot.changed, types);
+  auto made = deferred(releases_, std::make_shared<VoxelDensity>(seen_, chunk, slot.kept, slot.changed, types));
   slot.under_way = made;
   return made;
 }

@@ -7,6 +7,7 @@
 #include <memory>
 #include <mutex>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include <quoin/core/assert.h>
@@ -15,6 +16,7 @@
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
 
+#include "core/work/workers.h"
 #include "grid/change_records.h"
 
 namespace quoin {
@@ -103,10 +105,11 @@ using DensityStamps = std::array<std::uint64_t, 27>;
 /// Threads: one.
 class DensityCache {
  public:
-  /// `reach`: number of samples that meshing reads past a chunk's own.
-  explicit DensityCache(int reach) : reach_(reach) {}
+  /// `reach`: number of samples that meshing reads past a chunk's own. `releases` destroys densities; may be null.
+  explicit DensityCache(int reach, std::shared_ptr<ReleaseQueue> releases = nullptr)
+      : reach_(reach), releases_(std::move(releases)) {}
 
-  void clear() { *this = DensityCache(reach_); }
+  void clear() { *this = DensityCache(reach_, releases_); }
   /// Takes over the edits since the last call. Appends the chunks that changed, came or went to `changed`, and the
   /// chunks whose surface may have changed to `reached`, both sorted. If everything has changed, call `clear` first.
   void follow(GridSnapshot grid, const GridChanges& edits, std::vector<IVec3>& changed, std::vector<IVec3>& reached);
@@ -137,6 +140,7 @@ class DensityCache {
   [[nodiscard]] std::shared_ptr<VoxelDensity> density(IVec3 chunk, const std::shared_ptr<const VoxelRegistry>& types);
 
   int reach_;
+  std::shared_ptr<ReleaseQueue> releases_;
   GridSnapshot seen_;  // the grid as it was followed last
   std::unordered_map<IVec3, Slot, CoordinateHash> slots_;
 };

@@ -31,7 +31,7 @@ bool can_own_smooth_quads(const Grid& grid, IVec3 chunk) {
 }  // namespace
 
 VoxelSurfaces::VoxelSurfaces(GridHandle handle, const ChunkSurfaceOptions& options, SurfaceTotals& totals)
-    : handle_(handle), options_(options), totals_(totals), densities_(reach_of(options.occlusion)) {}
+    : handle_(handle), options_(options), totals_(totals), densities_(reach_of(options.occlusion), totals.releases) {}
 
 void VoxelSurfaces::follow(const Grid& grid, SurfaceClock::time_point now) {
   PendingChanges changes(followed_, grid);
@@ -123,7 +123,8 @@ void VoxelSurfaces::remove_if_there(IVec3 chunk) {
 void VoxelSurfaces::follow_smooth(const Grid& grid, const GridChanges& changes, SurfaceClock::time_point now) {
   std::vector<IVec3> changed;
   std::vector<IVec3> reached;
-  densities_.follow(std::make_shared<const Grid>(grid.snapshot()), changes, changed, reached);
+  densities_.follow(deferred(totals_.releases, std::make_shared<const Grid>(grid.snapshot())), changes, changed,
+                    reached);
   std::vector<IVec3> asked;
   for (const IVec3 chunk : changed) {
     for (const IVec3 step : {IVec3{0}, IVec3{1, 0, 0}, IVec3{0, 1, 0}, IVec3{0, 0, 1}}) asked.push_back(chunk - step);
