@@ -6,9 +6,11 @@
 #include <memory>
 #include <string>
 #include <tuple>
+#include <vector>
 
 #include <quoin/io/image_files.h>
 #include <quoin/live/live_meshes.h>
+#include <quoin/mesh/vertex_writer.h>
 #include <quoin/render/cpu_renderer.h>
 
 namespace {
@@ -30,7 +32,7 @@ quoin::Result<quoin::GridHandle> add_plain(quoin::Scene& scene) {
   return handle;
 }
 
-// The meshes that a renderer would hold; this example only counts their triangles.
+// The meshes that a renderer would hold, with the vertices to upload; this example only counts their triangles.
 class Shown {
  public:
   void apply(const std::vector<quoin::SurfaceUpdate>& updates) {
@@ -68,7 +70,19 @@ int main(int argc, char** argv) {
   if (!plain) return 1;
   const quoin::DVec3 eye{128.0, 60.0, 128.0};  // near chunks are meshed first
 
-  quoin::LiveMeshes meshes{quoin::LiveMeshOptions{}};
+  const quoin::VertexWriter writer({16,
+                                    {{quoin::VertexAttribute::Position, quoin::VertexFormat::Float32x3, 0},
+                                     {quoin::VertexAttribute::Colour, quoin::VertexFormat::Unorm8x4Srgb, 12}}},
+                                   scene.types);
+  quoin::LiveMeshOptions options;
+  options.convert = [&](const quoin::SurfaceUpdate& update) {  // on a worker
+    const quoin::QuadBuffer& quads = update.surface->quads;
+    const std::size_t bytes = writer.bytes_needed(quoin::vertices_needed(quads.size()));
+    auto vertices = std::make_shared<std::vector<std::byte>>(bytes);
+    writer.write(quads, quoin::Vec3(update.chunk * quoin::kChunkEdge), *vertices);
+    return quoin::ConvertedSurface(vertices, bytes);  // `take` counts these bytes
+  };
+  quoin::LiveMeshes meshes(options);
   Shown shown;
   unsigned random = 1;
   for (int frame = 0; frame < 60; ++frame) {

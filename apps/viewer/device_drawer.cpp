@@ -144,6 +144,7 @@ std::unique_ptr<LiveMeshes> DeviceDrawer::live_meshes(SurfaceStyle style,
                                                       const SmoothOcclusionOptions& occlusion) const {
   LiveMeshOptions live;
   live.style = style;
+  live.region_edge = kChunkEdge;  // the renderer uploads whole chunks
   live.instances = options_.cpu.instances;
   live.workers = options_.cpu.threads;
   live.on_ready = on_surfaces_;

@@ -83,6 +83,7 @@ TEST_P(LitMeshes, MatchLightAfterEdits) {
   SceneLight light;
   LiveMeshOptions options;
   options.light_merging = GetParam();
+  options.region_edge = kChunkEdge;  // as the surfaces that it is compared with
   LiveMeshes meshes(options);
   meshes.use_light(&light);
   Surfaces surfaces;
@@ -208,7 +209,9 @@ TEST(LiveLitMeshes, RestoresPlainMeshesWithoutLight) {
 TEST(LiveLitMeshes, FollowLiveLight) {
   DarkeningScene world(8);
   LiveLight light;
-  LiveMeshes meshes;
+  LiveMeshOptions options;
+  options.region_edge = kChunkEdge;  // as the surfaces that it is compared with
+  LiveMeshes meshes(options);
   meshes.use_light(&light.shown());
   Surfaces surfaces;
   std::mt19937 random(9);

@@ -9,6 +9,7 @@
 #include <set>
 #include <span>
 #include <stdexcept>
+#include <thread>
 
 #include <gtest/gtest.h>
 
@@ -240,8 +241,10 @@ TEST(LiveRegions, HoldSameFacesAndReportChanges) {
   for (const int edge : {16, 32, 64}) {
     SceneEditor editor(static_cast<std::uint32_t>(edge));
     LiveMeshOptions wanted;
+    wanted.region_edge = kChunkEdge;
     LiveMeshes whole(wanted);
-    wanted.region_edge = edge;
+    if (edge == 16) wanted = {};  // the default
+    if (edge != 16) wanted.region_edge = edge;
     LiveMeshes meshes(wanted);
     ShownSurfaces shown;
     ShownSurfaces shown_whole;
@@ -395,6 +398,62 @@ TEST(LiveBudget, LeavesRestForNextCall) {
   EXPECT_EQ(meshes.pending(), 0U);
   expect_surfaces(shown, one.scene, {});
   EXPECT_TRUE(meshes.take(0).empty());
+}
+
+TEST(LiveBudget, CountsConvertedData) {
+  OneGrid one;
+  one.grid().fill_box({{0, 0, 0}, {640, 10, 10}}, 1);
+  for (const bool is_size_known : {true, false}) {
+    LiveMeshOptions wanted;
+    wanted.convert = [&](const SurfaceUpdate&) {
+      return ConvertedSurface(std::make_shared<const int>(1), is_size_known ? 1000 : 0);
+    };
+    LiveMeshes meshes(wanted);
+    meshes.finish(one.scene, {});
+    const std::vector<SurfaceUpdate> three = meshes.take(is_size_known ? 2500 : 1);
+    ASSERT_EQ(three.size(), is_size_known ? 3U : 1U);
+    const ChunkSurface& surface = *three.front().surface;
+    EXPECT_EQ(surface.converted_bytes, is_size_known ? 1000U : 0U);
+    EXPECT_EQ(surface.upload_bytes(), is_size_known ? 1000U : surface.bytes());
+  }
+}
+
+// The game drops old surfaces, and keeps only their converted data.
+TEST(LiveMeshesMemory, IsReleasedByWorkers) {
+  struct Vertices {
+    explicit Vertices(std::atomic<int>& count, std::thread::id caller) : on_caller(count), calling(caller) {}
+    Vertices(const Vertices&) = delete;
+    Vertices& operator=(const Vertices&) = delete;
+    ~Vertices() { on_caller += std::this_thread::get_id() == calling ? 1 : 0; }
+    std::atomic<int>& on_caller;
+    std::thread::id calling;
+  };
+  OneGrid one;
+  one.grid().fill_box({{0, 0, 0}, {256, 10, 10}}, 1);
+  std::atomic<int> on_caller{0};
+  std::map<int, std::shared_ptr<const void>> converted;
+  std::map<int, std::shared_ptr<const ChunkSurface>> surfaces;
+  for (const unsigned workers : {1U, 3U}) {
+    LiveMeshOptions wanted;
+    wanted.workers = {workers};
+    wanted.convert = [&, calling = std::this_thread::get_id()](const SurfaceUpdate&) {
+      return std::make_shared<const Vertices>(on_caller, calling);
+    };
+    auto meshes = std::make_unique<LiveMeshes>(wanted);
+    for (int i = 0; i < 40; ++i) {
+      one.grid().fill_box({{0, 10, i % 10}, {256, 11, i % 10 + 1}}, static_cast<VoxelType>(i % 3));
+      meshes->finish(one.scene, {});
+      for (const SurfaceUpdate& update : meshes->take()) {
+        if (i % 2 == 0) converted[update.chunk.x] = update.surface->converted;
+        surfaces[update.chunk.x] = update.surface;
+      }
+    }
+    EXPECT_EQ(on_caller, 0);
+    meshes.reset();
+    converted.clear();
+    surfaces.clear();
+    EXPECT_EQ(on_caller.exchange(0), 4);
+  }
 }
 
 TEST(LiveMeshesDeathTest, RejectsUnknownRegionEdge) {

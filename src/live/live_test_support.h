@@ -16,6 +16,7 @@
 #include <quoin/grid/voxel_field.h>
 #include <quoin/live/live_meshes.h>
 #include <quoin/mesh/blocky.h>
+#include <quoin/mesh/quad.h>
 #include <quoin/mesh/smooth_mesh.h>
 
 #include "core/coordinates/chunk_order.h"
@@ -87,6 +88,26 @@ inline std::set<GridHandle> grids_of_drawn(const Scene& scene, InstanceFilter fi
   return drawn;
 }
 
+/// Returns the quads, cut at multiples of `edge`, in ascending order of their bits.
+inline std::vector<std::uint64_t> cut_at(const QuadBuffer& quads, int edge) {
+  std::vector<std::uint64_t> parts;
+  for (const Quad quad : quads) {
+    const FaceFrame& frame = frame_of(quad.direction());
+    const IVec3 first = quad.voxel();
+    for (int u = 0; u < quad.size_u();) {
+      const int end_u = std::min(quad.size_u(), ((first[frame.u] + u) / edge + 1) * edge - first[frame.u]);
+      for (int v = 0; v < quad.size_v();) {
+        const int end_v = std::min(quad.size_v(), ((first[frame.v] + v) / edge + 1) * edge - first[frame.v]);
+        parts.push_back(quad_part(quad, u, v, end_u - u, end_v - v).bits);
+        v = end_v;
+      }
+      u = end_u;
+    }
+  }
+  std::sort(parts.begin(), parts.end());
+  return parts;
+}
+
 inline void expect_blocky(const ShownSurfaces& shown, const Scene& scene, const LiveMeshOptions& options) {
   BlockyMesher mesher;
   std::size_t surfaces = 0;
@@ -104,9 +125,14 @@ inline void expect_blocky(const ShownSurfaces& shown, const Scene& scene, const 
       if (surface == nullptr) continue;
       ++surfaces;
       ASSERT_EQ(surface->style, SurfaceStyle::Blocky);
-      ASSERT_EQ(surface->quads, quads);
-      ASSERT_EQ(surface->opaque_quads, static_cast<std::size_t>(end_of_opaque - quads.begin()));
-      ASSERT_EQ(surface->triangles(), 2 * static_cast<std::int64_t>(quads.size()));
+      if (options.region_edge == kChunkEdge) {
+        ASSERT_EQ(surface->quads, quads);
+      }
+      ASSERT_EQ(cut_at(surface->quads, kChunkEdge), cut_at(quads, options.region_edge));
+      QuadBuffer opaque;
+      for (auto quad = quads.begin(); quad != end_of_opaque; ++quad) opaque.push_back(*quad);
+      ASSERT_EQ(surface->opaque_quads, cut_at(opaque, options.region_edge).size());
+      ASSERT_EQ(surface->triangles(), 2 * static_cast<std::int64_t>(surface->quads.size()));
     }
   }
   EXPECT_EQ(shown.all().size(), surfaces);

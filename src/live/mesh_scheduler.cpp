@@ -146,7 +146,7 @@ std::exception_ptr MeshJobQueue::work_on(SurfaceJob& job, SurfaceWorkspace& work
       failure = std::current_exception();
     }
     if (job.surface != nullptr) {
-      job.surface->converted = releases()->defer(std::move(job.surface->converted));
+      job.surface->converted = releases()->defer(std::move(job.surface->converted), job.surface->converted_bytes);
       const std::size_t bytes = job.surface->bytes();
       job.surface = releases()->defer(std::move(job.surface), bytes);
     }
@@ -187,8 +187,10 @@ ChunkSurfaceOptions surface_options(const LiveMeshOptions& options) {
 void make_live_surface(const LiveMeshOptions& options, SurfaceJob& job, SurfaceWorkspace& workspace) {
   make_chunk_surface(surface_options(options), job, workspace);
   if (options.convert && job.surface != nullptr) {
-    job.surface->converted =
+    ConvertedSurface converted =
         options.convert({job.source.grid, job.chunk, job.surface, job.source.content, ~std::uint64_t{0}});
+    job.surface->converted_bytes = converted.data == nullptr ? 0 : converted.bytes;
+    job.surface->converted = std::move(converted.data);
   }
 }
 
@@ -471,7 +473,7 @@ std::vector<SurfaceUpdate> MeshScheduler::take(std::size_t max_bytes) {
     const std::size_t before = taken.size();
     if (SurfaceSource* live = find(ready.source)) live->take(ready.chunk, taken);
     if (taken.size() == before || ready.source.content != SurfaceContent::Voxels) continue;
-    if (const auto& surface = taken.back().surface) bytes += surface->bytes();
+    if (const auto& surface = taken.back().surface) bytes += surface->upload_bytes();
   }
   totals_.ready = std::move(left);
   return taken;

@@ -363,10 +363,11 @@ TEST(MeshScheduler, StopsWithoutMeshingQueue) {
   EXPECT_LT(started, 60);
 }
 
-// GridSurfaces uses the defaults, and must give the surfaces of LiveMeshes.
+// GridSurfaces uses the defaults, and must give the surfaces of LiveMeshes with one region per chunk.
 TEST(MeshScheduler, HasDefaultsOfGridSurfaces) {
-  EXPECT_TRUE(surface_options({}) == ChunkSurfaceOptions{});
   LiveMeshOptions options;
+  options.region_edge = kChunkEdge;
+  EXPECT_TRUE(surface_options(options) == ChunkSurfaceOptions{});
   options.merge = false;
   EXPECT_FALSE(surface_options(options) == ChunkSurfaceOptions{});
 }

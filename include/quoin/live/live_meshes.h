@@ -1,11 +1,13 @@
 #pragma once
 
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <limits>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <quoin/core/parallel.h>
@@ -18,11 +20,22 @@
 
 namespace quoin {
 
+/// The result of LiveMeshOptions::convert. Any pointer that converts to a std::shared_ptr<const void> converts to it.
+struct ConvertedSurface {
+  ConvertedSurface() = default;
+  template <std::convertible_to<std::shared_ptr<const void>> Pointer>
+  ConvertedSurface(Pointer converted, std::size_t size = 0) : data(std::move(converted)), bytes(size) {}
+
+  std::shared_ptr<const void> data;
+  std::size_t bytes = 0;  ///< size of `data`; 0: unknown
+};
+
 struct LiveMeshOptions {
   SurfaceStyle style = SurfaceStyle::Blocky;  ///< of voxels
   bool merge = true;                          ///< blocky: neighbouring faces become one quad
-  /// Blocky: 16, 32 or 64. Smaller regions give more quads, but less data to upload to the GPU after an edit.
-  int region_edge = 64;
+  /// Blocky: 16, 32 or 64. Edge of the regions that a renderer replaces after an edit (SurfaceUpdate::changed_regions),
+  /// in voxels. Use 64 if it uploads whole chunks. Figures: docs/guide.md, "Blocky meshes".
+  int region_edge = 16;
   LightMerging light_merging = LightMerging::Linear;  ///< blocky, with `use_light`: condition for merged faces
   SmoothOcclusionOptions occlusion{};                 ///< of smooth surfaces, including fields
   SurfaceColours colours = SurfaceColours::Sharp;     ///< of smooth voxel surfaces; fields are always blended
@@ -35,8 +48,9 @@ struct LiveMeshOptions {
   Threads workers{};  ///< 0: one less than the hardware threads, at least 1 (different from other options)
   /// Converts a new surface before it can be taken, for example to vertices in a custom format. The result becomes
   /// ChunkSurface::converted. `changed_regions` of its argument has all bits set. Called by several workers at once.
-  /// Optional.
-  std::function<std::shared_ptr<const void>(const SurfaceUpdate&)> convert{};
+  /// Optional. A result that is returned with its size counts in `take`:
+  ///   return quoin::ConvertedSurface(vertices, vertices->size() * sizeof(Vertex));
+  std::function<ConvertedSurface(const SurfaceUpdate&)> convert{};
   /// Called by a worker after each completed chunk: there may be a surface to take, `pending` has decreased, and there
   /// is room for more chunks. Optional. It may call `take`, `pending` and `stats`, but no other member of LiveMeshes.
   std::function<void()> on_ready{};
@@ -52,7 +66,9 @@ struct LiveMeshOptions {
 /// Callbacks: the next `update` or `finish` rethrows the first exception of `on_ready` or `convert`. If `convert`
 ///            throws, the surface is still returned, with a null `converted`. A bad_alloc from `convert` counts as the
 ///            worker running out of memory (Stats::out_of_memory).
-/// Lifetime:  the scene is read only during calls; callers share ownership of the surfaces they take.
+/// Lifetime:  the scene is read only during calls; callers share ownership of the surfaces they take. After the last
+///            owner has dropped a surface, a worker destroys it with its converted data. The owner's thread does so
+///            itself once the LiveMeshes is gone, or if more than 64 MiB wait because all workers are in long steps.
 /// Threads:   `update` and `finish` must not overlap; any thread can call the other members.
 class LiveMeshes {
  public:
@@ -80,8 +96,9 @@ class LiveMeshes {
   void use_light(const SceneLight* light);
 
   /// Returns the surfaces that are new since the last call. Each chunk appears once, with its newest surface. Skips
-  /// chunks that had no surface and still have none. Once voxel surfaces reach `max_bytes` (ChunkSurface::bytes), the
-  /// rest waits for another call. Fields ignore the limit because their surfaces must fit each other.
+  /// chunks that had no surface and still have none. Once voxel surfaces reach `max_bytes`
+  /// (ChunkSurface::upload_bytes), the rest waits for another call. Fields ignore the limit because their surfaces must
+  /// fit each other.
   /// Errors: bad_alloc, as `update`.
   [[nodiscard]] std::vector<SurfaceUpdate> take(std::size_t max_bytes = std::numeric_limits<std::size_t>::max());
 

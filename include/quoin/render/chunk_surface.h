@@ -53,10 +53,13 @@ struct ChunkSurface {
   std::vector<VoxelType> types;
   /// Result of LiveMeshOptions::convert; null without `convert`.
   std::shared_ptr<const void> converted;
+  std::size_t converted_bytes = 0;  ///< size of `converted`; 0: unknown
 
   [[nodiscard]] bool is_empty() const { return quads.empty() && smooth.indices.empty(); }
   [[nodiscard]] std::int64_t triangles() const;
   [[nodiscard]] std::size_t bytes() const;  ///< excludes `converted`
+  /// Returns the size of the data that a renderer uploads: `converted_bytes` if known, otherwise `bytes`.
+  [[nodiscard]] std::size_t upload_bytes() const { return converted_bytes != 0 ? converted_bytes : bytes(); }
 };
 
 /// A new surface of a chunk.

@@ -175,6 +175,7 @@ TEST_F(VulkanImages, CopyMeshImages) {
   auto meshes = VulkanMeshRenderer::create(*renderer_);
   ASSERT_TRUE(meshes) << to_string(meshes.error());
   LiveMeshOptions options;
+  options.region_edge = kChunkEdge;  // as the viewer
   LiveMeshes live(options);
   ASSERT_TRUE(renderer_->update(scene));
   ASSERT_TRUE(meshes->update(scene));

@@ -77,6 +77,7 @@ inline std::vector<SurfaceUpdate> smooth_surfaces(GridHandle handle, const Densi
 inline std::vector<SurfaceUpdate> live_surfaces(const Scene& scene, SurfaceStyle style) {
   LiveMeshOptions options;
   options.style = style;
+  options.region_edge = kChunkEdge;  // as the viewer
   LiveMeshes live(options);
   live.finish(scene, {0, 0, 0});
   return live.take();
