@@ -52,20 +52,19 @@ void MeshJobQueue::push(std::unique_ptr<SurfaceJob> job) {
   workers_.wake_one();
 }
 
-std::vector<std::unique_ptr<SurfaceJob>> MeshJobQueue::withdraw(
-    const std::function<bool(const SurfaceJob&)>& is_unwanted) {
+std::vector<std::unique_ptr<SurfaceJob>> MeshJobQueue::withdraw(FunctionRef<bool(const SurfaceJob&)> is_unwanted) {
   std::vector<std::unique_ptr<SurfaceJob>> taken;
   const std::lock_guard lock(mutex_);
-  taken.reserve(queue_.size());
   std::erase_if(queue_, [&](std::unique_ptr<SurfaceJob>& job) {
     if (!is_unwanted(*job)) return false;
+    if (taken.empty()) taken.reserve(queue_.size());  // before the first job moves; later steps cannot fail
     taken.push_back(std::move(job));
     return true;
   });
   return taken;
 }
 
-std::vector<double> MeshJobQueue::measure(const std::function<double(const SurfaceJob&)>& distance) {
+std::vector<double> MeshJobQueue::measure(FunctionRef<double(const SurfaceJob&)> distance) {
   std::vector<double> distances;
   const std::lock_guard lock(mutex_);
   distances.reserve(queue_.size());
@@ -74,7 +73,7 @@ std::vector<double> MeshJobQueue::measure(const std::function<double(const Surfa
   return distances;
 }
 
-void MeshJobQueue::renew(const std::function<void(SurfaceJob&)>& renew) {
+void MeshJobQueue::renew(FunctionRef<void(SurfaceJob&)> renew) {
   const std::lock_guard lock(mutex_);
   for (const std::unique_ptr<SurfaceJob>& job : queue_) {
     if (job->voxels != nullptr) renew(*job);
@@ -234,11 +233,11 @@ void MeshScheduler::update(const Scene& scene, DVec3 eye, std::span<const DVec3>
   throw_failure();
   const std::lock_guard lock(mutex_);
   try {
-    std::vector<DVec3> eyes{eye};
-    eyes.insert(eyes.end(), other_eyes.begin(), other_eyes.end());
-    std::erase_if(eyes, [](DVec3 each) { return !is_finite(each); });
-    are_places_new_ |= eyes != eyes_;
-    eyes_ = std::move(eyes);
+    next_eyes_.assign(other_eyes.begin(), other_eyes.end());
+    next_eyes_.push_back(eye);
+    std::erase_if(next_eyes_, [](DVec3 each) { return !is_finite(each); });
+    are_places_new_ |= next_eyes_ != eyes_;
+    std::swap(next_eyes_, eyes_);
     update_or_throw(scene);
   } catch (...) {
     forget();
@@ -296,14 +295,17 @@ void MeshScheduler::follow_light(SurfaceClock::time_point now) {
 // Chooses levels of fields if eyes or instances moved, or if some levels are still to be chosen.
 void MeshScheduler::choose_levels(const Scene& scene, SurfaceClock::time_point now) {
   if (options_.detail_distance == std::numeric_limits<double>::infinity()) return;
-  std::map<GridHandle, ChunkDistances> distances;
+  const auto chooses = [&](const SurfaceSource& field) { return are_places_new_ || field.wants_levels(); };
+  std::erase_if(level_distances_, [&](const auto& each) {
+    const SurfaceSource* const field = find({each.first, SurfaceContent::Field});
+    return field == nullptr || !chooses(*field);
+  });
   for (const auto& [key, live] : sources_) {
-    if (key.content == SurfaceContent::Field && (are_places_new_ || live->wants_levels())) {
-      distances.try_emplace(key.grid, IBox{}, eyes_);
-    }
+    if (key.content != SurfaceContent::Field || !chooses(*live)) continue;
+    level_distances_.try_emplace(key.grid, IBox{}, eyes_).first->second.restart({}, eyes_);
   }
-  add_places(scene, distances);
-  for (const auto& [handle, places] : distances) {
+  add_places(scene, level_distances_);
+  for (const auto& [handle, places] : level_distances_) {
     find({handle, SurfaceContent::Field})->choose_levels(places, now);
   }
   are_places_new_ = false;
@@ -355,7 +357,7 @@ void MeshScheduler::collect() {
   }
 }
 
-void MeshScheduler::withdraw(const std::function<bool(const SurfaceJob&)>& is_unwanted) {
+void MeshScheduler::withdraw(FunctionRef<bool(const SurfaceJob&)> is_unwanted) {
   for (const std::unique_ptr<SurfaceJob>& job : queue_.withdraw(is_unwanted)) {
     if (SurfaceSource* live = find(job->source)) live->withdrawn(*job);
   }
@@ -393,6 +395,9 @@ bool MeshScheduler::has_waiting() const {
 // Returns the chunks that may get a job now, nearest first.
 std::vector<MeshScheduler::Candidate> MeshScheduler::candidates(const std::map<GridHandle, ChunkDistances>& distances) {
   std::vector<Candidate> all;
+  std::size_t count = 0;
+  for (const auto& [key, live] : sources_) count += live->waiting().size();
+  all.reserve(count);
   for (auto& [key, live] : sources_) {
     const ChunkDistances& places = distances.at(key.grid);
     for (const IVec3 chunk : live->waiting()) all.push_back({places.to(chunk), live.get(), key, chunk});

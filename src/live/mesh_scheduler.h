@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/function_ref.h>
 #include <quoin/core/parallel.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/live/live_meshes.h>
@@ -40,13 +41,12 @@ class MeshJobQueue {
   /// Returns the first exception of a callback since the last call, or null.
   [[nodiscard]] std::exception_ptr take_failure();
   /// Withdraws and returns the waiting jobs that match `is_unwanted`.
-  [[nodiscard]] std::vector<std::unique_ptr<SurfaceJob>> withdraw(
-      const std::function<bool(const SurfaceJob&)>& is_unwanted);
+  [[nodiscard]] std::vector<std::unique_ptr<SurfaceJob>> withdraw(FunctionRef<bool(const SurfaceJob&)> is_unwanted);
   /// Sets new distances of the waiting jobs. Returns the distances in ascending order.
-  [[nodiscard]] std::vector<double> measure(const std::function<double(const SurfaceJob&)>& distance);
+  [[nodiscard]] std::vector<double> measure(FunctionRef<double(const SurfaceJob&)> distance);
   /// Calls `renew` for the waiting jobs, so that blocky ones can get newer snapshots in which their chunks are
   /// unchanged. An old snapshot keeps all memory that was released since.
-  void renew(const std::function<void(SurfaceJob&)>& renew);
+  void renew(FunctionRef<void(SurfaceJob&)> renew);
   /// Returns the jobs completed since the last call, in order of completion.
   [[nodiscard]] std::vector<std::unique_ptr<SurfaceJob>> collect();
   /// Returns once at most `waiting` jobs wait for workers; with 0, once all jobs are done.
@@ -119,7 +119,7 @@ class MeshScheduler {
   void add_places(const Scene& scene, std::map<GridHandle, ChunkDistances>& distances) const;
   [[nodiscard]] std::map<GridHandle, ChunkDistances> distances_of_grids(const Scene& scene) const;
   [[nodiscard]] std::vector<Candidate> candidates(const std::map<GridHandle, ChunkDistances>& distances);
-  void withdraw(const std::function<bool(const SurfaceJob&)>& is_unwanted);
+  void withdraw(FunctionRef<bool(const SurfaceJob&)> is_unwanted);
   [[nodiscard]] SurfaceSource* find(SurfaceKey source);
 
   const LiveMeshOptions options_;
@@ -135,8 +135,10 @@ class MeshScheduler {
   SceneFollower drawn_;
   Sources sources_;
   std::vector<DVec3> eyes_;
-  bool are_places_new_ = true;  // eyes or instances moved since levels were last chosen
-  MeshJobQueue queue_;          // last: its threads end first
+  std::vector<DVec3> next_eyes_;                          // of the update in progress; kept for its memory
+  std::map<GridHandle, ChunkDistances> level_distances_;  // for `choose_levels`; kept for its memory
+  bool are_places_new_ = true;                            // eyes or instances moved since levels were last chosen
+  MeshJobQueue queue_;                                    // last: its threads end first
 };
 
 }  // namespace quoin

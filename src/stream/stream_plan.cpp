@@ -449,21 +449,21 @@ void Placements::look(const Scene& scene, const SceneGrid& grid, std::span<const
   }
 }
 
-std::vector<Eye> Placements::eyes(const Scene& scene, const SceneGrid& grid, std::span<const Viewer> viewers) {
+void Placements::find_eyes(const Scene& scene, const SceneGrid& grid, std::span<const Viewer> viewers,
+                           std::vector<Eye>& eyes) {
   if (placed_.size() > kNearest) look(scene, grid, viewers);
   // The order depends only on the instances.
-  std::vector<InstanceHandle> near;
-  for (std::size_t i = 0; i < std::min(kNearest, placed_.size()); ++i) near.push_back(placed_[i].instance);
-  std::sort(near.begin(), near.end());
-  std::vector<Eye> eyes;
-  for (const InstanceHandle handle : near) {
+  near_.clear();
+  for (std::size_t i = 0; i < std::min(kNearest, placed_.size()); ++i) near_.push_back(placed_[i].instance);
+  std::sort(near_.begin(), near_.end());
+  eyes.clear();
+  for (const InstanceHandle handle : near_) {
     const Instance* const instance = scene.instances().find(handle);
     if (instance != nullptr) add_eyes(*instance, grid, viewers, eyes);
   }
-  if (eyes.size() <= kNearest) return eyes;
+  if (eyes.size() <= kNearest) return;
   std::ranges::stable_sort(eyes, {}, [&](const Eye& eye) { return distance_of(eye, grid); });
   eyes.resize(kNearest);
-  return eyes;
 }
 
 namespace {

@@ -145,8 +145,9 @@ class Placements {
   void remove(InstanceHandle instance);
   [[nodiscard]] bool contains(InstanceHandle instance) const { return index_.contains(instance); }
   [[nodiscard]] std::vector<InstanceHandle> instances() const;
-  /// Returns viewers in the grid's space, at most kNearest, nearest first if there are that many.
-  [[nodiscard]] std::vector<Eye> eyes(const Scene& scene, const SceneGrid& grid, std::span<const Viewer> viewers);
+  /// Replaces `eyes` by the viewers in the grid's space: at most kNearest, nearest first if there are that many. Does
+  /// not allocate if the vector and earlier calls have enough memory.
+  void find_eyes(const Scene& scene, const SceneGrid& grid, std::span<const Viewer> viewers, std::vector<Eye>& eyes);
   /// Makes the next `eyes` check all instances.
   void look_at_all() { looked_at_ = false; }
 
@@ -161,6 +162,7 @@ class Placements {
 
   std::vector<Placed> placed_;
   std::map<InstanceHandle, std::size_t> index_;
+  std::vector<InstanceHandle> near_;   // during `find_eyes`; kept for its memory
   std::vector<InstanceHandle> moved_;  // instances outside the nearest set that moved since the last update
   std::size_t next_ = kNearest;
   bool looked_at_ = false;

@@ -57,7 +57,7 @@ TEST(Placements, FindsNearestAmongThousands) {
     scene.remove_instance(instances.front());
     instances.erase(instances.begin());
     std::vector<Eye> eyes;
-    for (int look = 0; look < 14; ++look) eyes = placements.eyes(scene, scene.grids()[grid], {&viewer, 1});
+    for (int look = 0; look < 14; ++look) placements.find_eyes(scene, scene.grids()[grid], {&viewer, 1}, eyes);
     std::vector<double> expected;
     for (const InstanceHandle each : instances) {
       expected.push_back(glm::length(grid_from_world(scene.instances()[each], scene.grids()[grid], viewer.position)));
@@ -86,8 +86,11 @@ TEST(Placements, UsesAllOfFewPlacements) {
                                     {.radius = nan},
                                     {.position = {nan, 0.0, 0.0}},
                                     {.position = {0.0, 0.0, std::numeric_limits<double>::infinity()}}};
-  EXPECT_EQ(placements.eyes(scene, scene.grids()[grid], viewers).size(), 10U);
-  EXPECT_TRUE(placements.eyes(scene, scene.grids()[grid], {}).empty());
+  std::vector<Eye> eyes;
+  placements.find_eyes(scene, scene.grids()[grid], viewers, eyes);
+  EXPECT_EQ(eyes.size(), 10U);
+  placements.find_eyes(scene, scene.grids()[grid], {}, eyes);
+  EXPECT_TRUE(eyes.empty());
 }
 
 StreamRequests around(DVec3 position, double radius, std::size_t max_chunks = 1 << 18) {

@@ -139,7 +139,7 @@ struct StreamedWorld::Impl {
   void take_in();
   void move_chunks(double seconds, Clock::time_point start, ChunkStreamer::Note& note);
   void follow_instances();
-  [[nodiscard]] Eyes eyes_of(std::span<const Viewer> viewers);
+  void find_eyes(std::span<const Viewer> viewers);
   void request(ChunkStreamer::Note& note);
   [[nodiscard]] bool is_cut() const;
   // Returns true if no requested chunk is on its way.
@@ -277,16 +277,19 @@ void StreamedWorld::Impl::follow_instances() {
   changes.commit();
 }
 
-Eyes StreamedWorld::Impl::eyes_of(std::span<const Viewer> viewers) {
+// Updates `eyes` in place, without allocations while the viewers move.
+void StreamedWorld::Impl::find_eyes(std::span<const Viewer> viewers) {
   follow_instances();
-  Eyes found;
   for (auto& [number, grid] : grids) {
     const SceneGrid* const content = scene().grids().find(grid.handle);
-    if (content == nullptr) continue;
-    std::vector<Eye> of_grid = grid.placements.eyes(scene(), *content, viewers);
-    if (!of_grid.empty()) found.emplace(number, std::move(of_grid));
+    if (content == nullptr) {
+      eyes.erase(number);
+      continue;
+    }
+    std::vector<Eye>& of_grid = eyes[number];
+    grid.placements.find_eyes(scene(), *content, viewers, of_grid);
+    if (of_grid.empty()) eyes.erase(number);
   }
-  return found;
 }
 
 bool StreamedWorld::Impl::is_cut() const {
@@ -566,7 +569,7 @@ Status StreamedWorld::Impl::plan(std::span<const Viewer> viewers) {
   if (is_due || (is_wanted && handed_over)) outcome = save_now();
   if (outcome) outcome = handed_over ? disk->last() : handed_over;
   if (!store.is_writable()) is_edited = false;
-  eyes = eyes_of(viewers);
+  find_eyes(viewers);
   return outcome;
 }
 

@@ -24,6 +24,12 @@ class ChunkDistances {
   /// `chunks` should contain all chunks that will be asked for; pass an empty box if unknown. Lifetime: `eyes` must
   /// outlive it.
   ChunkDistances(const IBox& chunks, std::span<const DVec3> eyes) : chunks_(chunks), eyes_(eyes) {}
+  /// Becomes as a new object, but keeps its memory.
+  void restart(const IBox& chunks, std::span<const DVec3> eyes) {
+    chunks_ = chunks;
+    eyes_ = eyes;
+    places_.clear();
+  }
 
   /// Requires: the instance has a place.
   void add(const Instance& instance, const SceneGrid& grid);
