@@ -1,6 +1,10 @@
 #pragma once
 
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
 #include <memory>
+#include <new>
 
 #include <quoin/core/assert.h>
 
@@ -12,5 +16,84 @@ template <class Content>
   QUOIN_ASSERT(content != nullptr, "an object that was not moved from");
   return *content;
 }
+
+/// Memory for the private implementations of many copies, for example of the grids in a scene's snapshot:
+///
+///   struct Grid::Impl : BulkAllocated { ... };
+///   BulkMemory memory(grids.size());
+///   for (...) copies.push_back(std::unique_ptr<Grid::Impl>(new (memory) Grid::Impl(impl)));
+///
+///   | block: users | block, object | block, object | ...     one allocation for kMost objects
+///
+/// A block is freed with its last object, so an object that outlives the others keeps up to kMost objects' memory.
+/// Requires: all objects of one BulkMemory have the same size.
+/// Threads:  one. The objects can be destroyed on any thread.
+class BulkMemory {
+ public:
+  static constexpr std::size_t kMost = 32;
+
+  /// `objects`: expected number. More are possible.
+  explicit BulkMemory(std::size_t objects) : expected_(objects) {}
+  BulkMemory(const BulkMemory&) = delete;
+  BulkMemory& operator=(const BulkMemory&) = delete;
+  ~BulkMemory() { drop(block_); }
+
+ private:
+  friend class BulkAllocated;
+  struct alignas(__STDCPP_DEFAULT_NEW_ALIGNMENT__) Block {
+    std::atomic<std::size_t> users{1};  // objects, and the BulkMemory that still fills it
+  };
+  struct alignas(__STDCPP_DEFAULT_NEW_ALIGNMENT__) Head {
+    Block* block = nullptr;  // null: the object has memory of its own
+  };
+
+  static void drop(Block* block) {
+    if (block == nullptr || block->users.fetch_sub(1, std::memory_order_acq_rel) != 1) return;
+    block->~Block();
+    ::operator delete(block);
+  }
+  void* allocate(std::size_t bytes) {
+    const std::size_t size = sizeof(Head) + (bytes + alignof(Head) - 1) / alignof(Head) * alignof(Head);
+    if (left_ == 0) {
+      const std::size_t count = std::clamp<std::size_t>(expected_, 1, kMost);
+      void* const memory = ::operator new(sizeof(Block) + count * size);
+      drop(block_);
+      block_ = new (memory) Block;
+      next_ = static_cast<std::byte*>(memory) + sizeof(Block);
+      left_ = count;
+      size_ = size;
+      expected_ -= std::min(expected_, count);
+    }
+    QUOIN_ASSERT(size == size_, "objects of one size");
+    Head* const head = new (next_) Head{block_};
+    block_->users.fetch_add(1, std::memory_order_relaxed);
+    next_ += size;
+    --left_;
+    return head + 1;
+  }
+
+  std::size_t expected_;
+  Block* block_ = nullptr;
+  std::byte* next_ = nullptr;
+  std::size_t left_ = 0;
+  std::size_t size_ = 0;
+};
+
+/// Base of objects that can be created in a BulkMemory, or alone. Requires: `delete` names their own type.
+class BulkAllocated {
+ public:
+  static void* operator new(std::size_t bytes) {
+    return new (::operator new(sizeof(BulkMemory::Head) + bytes)) BulkMemory::Head{} + 1;
+  }
+  static void* operator new(std::size_t bytes, BulkMemory& memory) { return memory.allocate(bytes); }
+  static void operator delete(void* object) {
+    if (object == nullptr) return;
+    auto* const head = static_cast<BulkMemory::Head*>(object) - 1;
+    BulkMemory::Block* const block = head->block;
+    if (block == nullptr) return ::operator delete(head);
+    BulkMemory::drop(block);
+  }
+  static void operator delete(void* object, BulkMemory& /*memory*/) { operator delete(object); }
+};
 
 }  // namespace quoin

@@ -13,6 +13,7 @@
 #include "core/change_journal.h"
 #include "core/coordinates/chunk_order.h"
 #include "core/coordinates/long_box.h"
+#include "core/moved_from.h"
 #include "core/rows/packed_row.h"
 #include "grid/bounds_cache.h"
 #include "grid/change_records.h"
@@ -30,7 +31,7 @@ struct VoxelBox {
 
 }  // namespace
 
-struct Grid::Impl {
+struct Grid::Impl : BulkAllocated {
   ChunkTable entries;
   LoadedChunks loaded;
   ChangeJournal<VoxelRecord> journal;
@@ -172,6 +173,11 @@ Grid::~Grid() = default;
 Grid Grid::snapshot() const {
   impl().bounds.prepare(impl().journal, impl().entries);
   return Grid(std::make_unique<Impl>(impl()));
+}
+
+Grid Grid::snapshot(BulkMemory& memory) const {
+  impl().bounds.prepare(impl().journal, impl().entries);
+  return Grid(std::unique_ptr<Impl>(new (memory) Impl(impl())));
 }
 
 VoxelType Grid::get(int x, int y, int z) const {

@@ -15,6 +15,7 @@
 
 #include "core/change_journal.h"
 #include "core/coordinates/unit_rotation.h"
+#include "core/moved_from.h"
 #include "scene/hierarchy.h"
 
 namespace quoin {
@@ -189,12 +190,14 @@ Scene Scene::snapshot() const {
   copy.types = types;
   copy.lamps = lamps;
   copy.environment = environment;
-  copy.grids_ = grids_.copied([](const SceneGrid& grid) {
+  BulkMemory voxels(grids_.size());
+  BulkMemory fields(grids_.size());
+  copy.grids_ = grids_.copied([&](const SceneGrid& grid) {
     return SceneGrid{.name = grid.name,
-                     .grid = grid.grid.snapshot(),
+                     .grid = grid.grid.snapshot(voxels),
                      .pivot = grid.pivot,
                      .canvas = grid.canvas,
-                     .field = grid.field.snapshot(),
+                     .field = grid.field.snapshot(fields),
                      .saved = grid.saved,
                      .whole = grid.whole};
   });
@@ -202,6 +205,7 @@ Scene Scene::snapshot() const {
   copy.groups_ = groups_.copied([](const SceneGroup& group) { return group; });
   copy.layers_ = layers_.copied([](const SceneLayer& layer) { return layer; });
   copy.book_ = std::make_unique<Book>(*book_);
+  if (grids_.next_index() != 0) copy.book_->notifiers.make_room(grids_.next_index() - 1);
   copy.grids_.for_each([&](GridHandle handle, const SceneGrid& grid) { copy.book_->follow(grid, handle.index); });
   return copy;
 }

@@ -89,6 +89,7 @@ class PendingChanges {
 
 // Part of the layout of Grid and DensityGrid; not for callers.
 
+class BulkMemory;
 class ChangeNotifiers;
 
 /// Notifies the owner of a container about edits, for example the scene that owns a grid. The notifier stays with

@@ -193,6 +193,7 @@ class DensityGrid {
   friend class Scene;
   struct Impl;
   explicit DensityGrid(std::unique_ptr<Impl> impl);
+  [[nodiscard]] DensityGrid snapshot(BulkMemory& memory) const;
   [[nodiscard]] inline Impl& impl() const;
 
   std::unique_ptr<Impl> impl_;

@@ -228,6 +228,7 @@ class Grid {
   friend class Scene;
   struct Impl;
   explicit Grid(std::unique_ptr<Impl> impl);
+  [[nodiscard]] Grid snapshot(BulkMemory& memory) const;
   [[nodiscard]] inline Impl& impl() const;
 
   std::unique_ptr<Impl> impl_;

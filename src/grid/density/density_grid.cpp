@@ -26,6 +26,11 @@ DensityGrid DensityGrid::snapshot() const {
   return DensityGrid(std::make_unique<Impl>(impl()));
 }
 
+DensityGrid DensityGrid::snapshot(BulkMemory& memory) const {
+  impl().solid.prepare(impl().store.journal(), impl().store.entries());
+  return DensityGrid(std::unique_ptr<Impl>(new (memory) Impl(impl())));
+}
+
 float DensityGrid::band() const {
   return impl().store.band();
 }

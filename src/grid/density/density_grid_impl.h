@@ -18,6 +18,7 @@
 #include "core/coordinates/chunk_order.h"
 #include "core/coordinates/chunk_trie.h"
 #include "core/coordinates/long_box.h"
+#include "core/moved_from.h"
 #include "grid/bounds_cache.h"
 #include "grid/change_records.h"
 #include "grid/loaded_chunks.h"
@@ -219,7 +220,7 @@ struct SolidBox {
   }
 };
 
-struct DensityGrid::Impl {
+struct DensityGrid::Impl : BulkAllocated {
   explicit Impl(float band) : store(band) {}
   DensityStore store;
   BoundsCache<DensityRecord, ChunkTrie<DensityStore::Entry>, SolidBox> solid;
