@@ -1,5 +1,5 @@
 // Consumers of changes stay correct if memory runs out during an update. This file replaces `operator new` of the test
-// program, so that a chosen allocation of the calling thread fails.
+// program, so that a chosen allocation of the calling thread fails. It also counts allocations for other tests.
 
 #include <algorithm>
 #include <cstdint>
@@ -15,6 +15,10 @@
 #include <tuple>
 #include <utility>
 #include <vector>
+
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
@@ -33,6 +37,7 @@
 #include <quoin/store/world_saver.h>
 
 #include "core/coordinates/chunk_order.h"
+#include "live/allocations_for_tests.h"
 #include "live/live_test_support.h"
 #include "render/light/emissive_cells.h"
 #include "render/light/surface/light_bricks.h"
@@ -42,23 +47,38 @@
 namespace {
 
 constinit thread_local std::int64_t allocations_left = -1;  // before one fails; negative: none fails
+constinit thread_local std::int64_t allocations_made = 0;
+constinit thread_local std::int64_t large_frees = 0;
 
 }  // namespace
 
 // Not inlined: GCC would warn that `free` does not match `new`.
 [[gnu::noinline]] void* operator new(std::size_t bytes) {
   if (allocations_left >= 0 && allocations_left-- == 0) throw std::bad_alloc();
+  ++allocations_made;
   if (void* const memory = std::malloc(bytes == 0 ? 1 : bytes)) return memory;
   throw std::bad_alloc();
 }
 [[gnu::noinline]] void operator delete(void* memory) noexcept {
+#ifdef __GLIBC__
+  constexpr std::size_t kLarge = 32 * 1024;
+  if (memory != nullptr && ::malloc_usable_size(memory) >= kLarge) ++large_frees;
+#endif
   std::free(memory);
 }
 [[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept {
-  std::free(memory);
+  operator delete(memory);
 }
 
 namespace quoin {
+
+std::int64_t allocations_of_this_thread() {
+  return allocations_made;
+}
+std::int64_t large_frees_of_this_thread() {
+  return large_frees;
+}
+
 namespace {
 
 constexpr VoxelType kStone = 1;

@@ -1,0 +1,133 @@
+// The calling thread of a game's frame neither allocates while the player walks, nor frees large blocks.
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include <quoin/live/live_light.h>
+#include <quoin/live/live_meshes.h>
+#include <quoin/scene/scene_tracer.h>
+#include <quoin/stream/streamed_world.h>
+
+#include "live/allocations_for_tests.h"
+#include "store/world/world_for_tests.h"
+
+namespace quoin {
+namespace {
+
+/// A game on streamed land, as one thread sees it.
+class Game {
+ public:
+  explicit Game(bool is_smooth) {
+    auto opened = StreamedWorld::open_or_create(folder_ / "land.quoin", {});
+    EXPECT_TRUE(opened);
+    world_.emplace(std::move(*opened));
+    const auto grid = world_->add_terrain({.seed = 9, .is_smooth = is_smooth});
+    EXPECT_TRUE(grid);
+    grid_ = *grid;
+    EXPECT_TRUE(world_->load_all({&viewer, 1}));
+    tracer_.emplace(world_->scene());
+    light_.finish(world_->scene());
+    meshes_.use_light(&light_.shown());
+    meshes_.finish(world_->scene(), viewer.position);
+    // Until workers have nothing left to do.
+    for (int idle = 0; idle < 20; ++idle) {
+      if (!frame()) idle = 0;
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+  }
+
+  /// Runs one frame. Returns true if no surface changed and none is pending.
+  bool frame() {
+    EXPECT_TRUE(world_->update({&viewer, 1}));
+    tracer_->update();
+    light_.update(world_->scene());
+    light_.take();
+    const std::int64_t freed_before = large_frees_of_this_thread();
+    meshes_.update(world_->scene(), viewer.position);
+    bool is_idle = meshes_.pending() == 0 && !light_.is_late();
+    for (SurfaceUpdate& update : meshes_.take()) {
+      is_idle = false;
+      shown_[{static_cast<int>(update.content), update.chunk.x, update.chunk.y, update.chunk.z}] =
+          std::move(update.surface);
+    }
+    freed_for_meshes += large_frees_of_this_thread() - freed_before;
+    return is_idle;
+  }
+  void dig(DVec3 at) {
+    SceneGrid& land = world_->scene().edit(grid_);
+    land.grid.fill_sphere(at, 4.0, kAir);
+    if (land.field.chunk_count() != 0) land.field.remove_sphere(at, 4.0);
+  }
+
+  std::int64_t freed_for_meshes = 0;  // large blocks, by the thread of the frames
+  Viewer viewer{.position = {0.0, 120.0, 0.0}, .direction = {1.0, 0.0, 0.0}, .radius = 160.0};
+
+ private:
+  WorldFolder folder_;
+  std::optional<StreamedWorld> world_;
+  GridHandle grid_;
+  std::optional<SceneTracer> tracer_;
+  LiveLight light_;
+  LiveMeshes meshes_;
+  std::map<std::tuple<int, int, int, int>, std::shared_ptr<const ChunkSurface>> shown_;
+};
+
+TEST(FrameAllocations, AreNoneWhileWalking) {
+  for (const bool is_smooth : {false, true}) {
+    Game game(is_smooth);
+    std::vector<std::int64_t> counts;
+    for (int i = 0; i < 100; ++i) {
+      game.viewer.position.x += 0.08;
+      const std::int64_t before = allocations_of_this_thread();
+      game.frame();
+      counts.push_back(allocations_of_this_thread() - before);
+    }
+    std::ranges::sort(counts);
+    EXPECT_EQ(counts[counts.size() / 2], 0) << (is_smooth ? "smooth" : "blocky");
+  }
+}
+
+// Freeing a large block is a call of the system after `return_freed_memory`. Workers do it.
+TEST(FrameAllocations, FreeNoLargeBlocksOfOldSurfaces) {
+  for (const bool is_smooth : {false, true}) {
+    Game game(is_smooth);
+    game.freed_for_meshes = 0;
+    for (int i = 0; i < 60; ++i) {
+      game.dig({7.0 * (i % 9) - 30.0, 50.0 + i % 30, 5.0 * (i % 11) - 20.0});
+      game.frame();
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    EXPECT_EQ(game.freed_for_meshes, 0) << (is_smooth ? "smooth" : "blocky");
+  }
+}
+
+TEST(FrameAllocations, OfSceneSnapshotsAreFewerThanGrids) {
+  Scene scene;
+  for (int i = 0; i < 300; ++i) {
+    SceneGrid grid;
+    grid.name = "a ship with a long name";
+    grid.grid.set({i, 0, 0}, 1);
+    scene.add_instance({.name = "", .grid = scene.add_grid(std::move(grid))});
+  }
+  ChangeCursor cursor;
+  (void)scene.changes_since(cursor);
+  const std::int64_t before = allocations_of_this_thread();
+  const Scene snapshot = scene.snapshot();
+  const std::int64_t count = allocations_of_this_thread() - before;
+  EXPECT_LT(count - 300, 100) << "apart from the names";
+  EXPECT_EQ(snapshot.grids().size(), 300U);
+}
+
+}  // namespace
+}  // namespace quoin
