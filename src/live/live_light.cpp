@@ -8,107 +8,97 @@
 #include <quoin/core/assert.h>
 
 #include "core/work/workers.h"
+#include "live/light_worker.h"
 
 namespace quoin {
-namespace {
 
-// The light of a scene as it was at one moment.
-struct LitScene {
-  std::shared_ptr<const Scene> scene;
-  SceneLight light;
-};
+LightWorker::LightWorker(LiveLightOptions options)
+    : shown_{nullptr, SceneLight()},
+      threads_{worker_count(options.threads)},
+      working_{nullptr, SceneLight(std::move(options.light))} {
+  worker_.start(1, [this](Workers::Lock& lock, unsigned /*worker*/) { return step(lock); });
+}
 
-// Read positions in the changes of a grid, for voxels and fields.
-struct GridCursors {
-  ChangeCursor voxels;
-  ChangeCursor field;
-};
-
-}  // namespace
-
-struct LiveLight::Impl {
-  explicit Impl(LiveLightOptions options)
-      : threads{worker_count(options.threads)}, working{nullptr, SceneLight(std::move(options.light))} {
-    worker.start(1, [this](Workers::Lock& lock, unsigned /*worker*/) { return step(lock); });
-  }
-
-  [[nodiscard]] Workers::Clock::time_point step(Workers::Lock& lock);
-  void throw_failure();
-  bool read_changes(const Scene& scene);
-  void wait() {
-    std::unique_lock lock(mutex);
-    worker.wait(lock, [&] { return !is_busy; });
-  }
-
-  // The caller's.
-  ChangeCursor followed_scene;
-  ChangeCursor followed_types;
-  std::map<GridHandle, GridCursors> followed_grids;
-  bool is_behind = true;  // something changed that no snapshot has
-  LitScene shown;
-
-  // Used only by the worker thread.
-  Threads threads;
-  LitScene working;
-
-  mutable std::mutex mutex;            // of all below
-  bool is_busy = false;                // computing the requested light
-  std::shared_ptr<const Scene> asked;  // to be lit
-  std::unique_ptr<LitScene> ready;     // to be taken
-  std::unique_ptr<LitScene> given_up;  // was shown; the worker destroys it, which takes a while
-  Workers worker{mutex};
-};
-
-Workers::Clock::time_point LiveLight::Impl::step(Workers::Lock& lock) {
-  if (asked == nullptr) return Workers::kWhenWoken;
-  QUOIN_ASSERT(is_busy, "a request in progress");
-  std::shared_ptr<const Scene> scene = std::exchange(asked, nullptr);
+Workers::Clock::time_point LightWorker::step(Workers::Lock& lock) {
+  if (asked_ == nullptr) return Workers::kWhenWoken;
+  QUOIN_ASSERT(is_busy_, "a request in progress");
+  std::shared_ptr<const Scene> scene = std::exchange(asked_, nullptr);
   lock.unlock();
   std::unique_ptr<LitScene> done;
   std::exception_ptr failure;
   try {
-    working.light.update(*scene, threads);
-    working.scene = std::move(scene);
-    done = std::make_unique<LitScene>(LitScene{working.scene, working.light.snapshot()});
+    working_.light.update(*scene, threads_);
+    working_.scene = std::move(scene);
+    done = std::make_unique<LitScene>(LitScene{working_.scene, working_.light.snapshot()});
   } catch (...) {
     failure = std::current_exception();
   }
   lock.lock();
-  std::swap(ready, done);  // `done` receives the light that was not taken
+  try {
+    if (done != nullptr) give(lock, std::move(done));
+  } catch (...) {
+    failure = std::current_exception();
+  }
+  worker_.keep_failure(std::move(failure));
+  if (asked_ == nullptr) is_busy_ = false;
+  worker_.notify();
   // Frees the former light here, so that the thread that takes the new one does not have to.
-  std::unique_ptr<LitScene> old = std::exchange(given_up, nullptr);
-  worker.keep_failure(std::move(failure));
-  is_busy = false;
-  worker.notify();
+  std::unique_ptr<LitScene> old = std::exchange(spent_, nullptr);
   lock.unlock();
-  done.reset();
   old.reset();
   lock.lock();
   return Workers::kAgain;
 }
 
+// Requires: the lock is held; it is released meanwhile.
+void LightWorker::give(Workers::Lock& lock, std::unique_ptr<LitScene> done) {
+  if (receiver_ == nullptr) {
+    std::swap(ready_, done);  // `done` receives the light that was not taken
+    lock.unlock();
+    done.reset();
+    lock.lock();
+    return;
+  }
+  const Receiver& receiver = receiver_;  // `detach` waits for the call
+  const std::uint64_t number = newest_number_ = asked_number_;
+  const Workers::Clock::time_point asked = asked_at_;
+  is_giving_ = true;
+  lock.unlock();
+  std::exception_ptr failure;
+  try {
+    auto state =
+        std::make_shared<LitState>(LitState{{done->scene, done->light.snapshot()}, number, asked, std::move(*done)});
+    receiver(std::move(state));
+  } catch (...) {
+    failure = std::current_exception();
+  }
+  lock.lock();
+  is_giving_ = false;
+  if (failure != nullptr) std::rethrow_exception(failure);
+}
+
 // Requires: the mutex is held.
-void LiveLight::Impl::throw_failure() {
-  const std::exception_ptr failure = worker.take_failure();
+void LightWorker::throw_failure() {
+  const std::exception_ptr failure = worker_.take_failure();
   if (failure == nullptr) return;
-  is_behind = true;
+  is_behind_ = true;
   std::rethrow_exception(failure);
 }
 
 // Returns true if light depends on any change since the last call. Scenes also report names and voxel data, which light
 // ignores.
-bool LiveLight::Impl::read_changes(const Scene& scene) {
-  PendingChanges types(followed_types, scene.types);
-  PendingChanges changes(followed_scene, scene);
+bool LightWorker::read_changes(const Scene& scene) {
+  PendingChanges types(followed_types_, scene.types);
+  PendingChanges changes(followed_scene_, scene);
   bool is_any = changes->all || !types->empty();
-  if (changes->all) followed_grids.clear();
+  if (changes->all) followed_grids_.clear();
   for (const GridHandle handle : changes->all ? scene.grids().handles() : changes->grids) {
     const SceneGrid* grid = scene.grids().find(handle);
     if (grid == nullptr) {
-      is_any |= followed_grids.erase(handle) > 0;
+      is_any |= followed_grids_.erase(handle) > 0;
       continue;
     }
-    GridCursors& followed = followed_grids[handle];
+    GridCursors& followed = followed_grids_[handle];
     is_any |= grid->grid.has_changed_since(followed.voxels) || grid->field.has_changed_since(followed.field);
     followed = {grid->grid.cursor(), grid->field.cursor()};
   }
@@ -117,54 +107,131 @@ bool LiveLight::Impl::read_changes(const Scene& scene) {
   return is_any;
 }
 
-LiveLight::LiveLight(LiveLightOptions options) : impl_(std::make_unique<Impl>(std::move(options))) {}
-LiveLight::~LiveLight() = default;
-
-void LiveLight::update(const Scene& scene) {
-  Impl& me = *impl_;
-  me.is_behind |= me.read_changes(scene);
+void LightWorker::ask(const Scene& scene, std::uint64_t number) {
   {
-    const std::lock_guard lock(me.mutex);
-    me.throw_failure();
-    if (!me.is_behind || me.is_busy) return;
+    const std::lock_guard lock(mutex_);
+    throw_failure();
+    if (!is_behind_ || is_busy_) return;
   }
   auto snapshot = std::make_shared<const Scene>(scene.snapshot());
   {
-    const std::lock_guard lock(me.mutex);
-    QUOIN_ASSERT(me.asked == nullptr && !me.is_busy, "one request at a time");
-    me.asked = std::move(snapshot);
-    me.is_busy = true;
-    me.is_behind = false;
+    const std::lock_guard lock(mutex_);
+    QUOIN_ASSERT(asked_ == nullptr && !is_busy_, "one request at a time");
+    asked_ = std::move(snapshot);
+    asked_number_ = number;
+    asked_at_ = Workers::Clock::now();
+    is_busy_ = true;
+    is_behind_ = false;
   }
-  me.worker.wake_one();
+  worker_.wake_one();
 }
 
-bool LiveLight::take() {
-  Impl& me = *impl_;
-  const std::lock_guard lock(me.mutex);
-  if (me.ready == nullptr) return false;
-  std::swap(*me.ready, me.shown);
-  me.given_up = std::move(me.ready);
+void LightWorker::update(const Scene& scene) {
+  if (has_receiver()) return;
+  const bool is_changed = read_changes(scene);
+  {
+    const std::lock_guard lock(mutex_);
+    is_behind_ |= is_changed;
+  }
+  ask(scene, 0);
+}
+
+void LightWorker::update_for_receiver(const Scene& scene, std::uint64_t number, bool is_other) {
+  const bool is_changed = read_changes(scene);
+  {
+    const std::lock_guard lock(mutex_);
+    QUOIN_ASSERT(receiver_ != nullptr, "a receiver");
+    is_behind_ |= is_changed || is_other;
+  }
+  ask(scene, number);
+}
+
+bool LightWorker::take() {
+  const std::lock_guard lock(mutex_);
+  if (receiver_ != nullptr) return std::exchange(is_shown_new_, false);
+  if (ready_ == nullptr) return false;
+  std::swap(*ready_, shown_);
+  spent_ = std::move(ready_);
   return true;
 }
 
+bool LightWorker::is_late() const {
+  const std::lock_guard lock(mutex_);
+  return is_behind_ || is_busy_ || ready_ != nullptr || (receiver_ != nullptr && shown_number_ != newest_number_);
+}
+
+void LightWorker::wait() {
+  std::unique_lock lock(mutex_);
+  worker_.wait(lock, [&] { return is_idle(); });
+  throw_failure();
+}
+
+void LightWorker::attach(Receiver receiver) {
+  std::unique_lock lock(mutex_);
+  QUOIN_ASSERT(receiver_ == nullptr && receiver != nullptr, "one receiver at a time");
+  worker_.wait(lock, [&] { return is_idle(); });
+  receiver_ = std::move(receiver);
+  ready_.reset();
+  is_behind_ = true;
+  newest_number_ = shown_number_ = 0;
+}
+
+void LightWorker::detach() {
+  std::unique_lock lock(mutex_);
+  if (receiver_ == nullptr) return;
+  worker_.wait(lock, [&] { return is_idle(); });
+  receiver_ = nullptr;
+  is_behind_ = true;
+}
+
+bool LightWorker::has_receiver() const {
+  const std::lock_guard lock(mutex_);
+  return receiver_ != nullptr;
+}
+
+bool LightWorker::owes_state() const {
+  const std::lock_guard lock(mutex_);
+  return is_behind_ || is_busy_;
+}
+
+void LightWorker::note_received() {
+  const std::lock_guard lock(mutex_);
+  if (asked_ == nullptr) is_busy_ = false;
+}
+
+void LightWorker::show(LitState& state) {
+  const std::lock_guard lock(mutex_);
+  if (std::exchange(state.is_shown, true)) return;
+  std::swap(state.to_show, shown_);
+  spent_ = std::make_unique<LitScene>(std::move(state.to_show));
+  shown_number_ = state.number;
+  is_shown_new_ = true;
+}
+
+LiveLight::LiveLight(LiveLightOptions options) : worker_(std::make_shared<LightWorker>(std::move(options))) {}
+LiveLight::~LiveLight() = default;
+
+void LiveLight::update(const Scene& scene) {
+  worker_->update(scene);
+}
+
+bool LiveLight::take() {
+  return worker_->take();
+}
+
 const SceneLight& LiveLight::shown() const {
-  return impl_->shown.light;
+  return worker_->shown();
 }
 
 bool LiveLight::is_late() const {
-  const std::lock_guard lock(impl_->mutex);
-  return impl_->is_behind || impl_->is_busy || impl_->ready != nullptr;
+  return worker_->is_late();
 }
 
 void LiveLight::finish(const Scene& scene) {
+  if (worker_->has_receiver()) return;
   do {
     update(scene);
-    impl_->wait();
-    {
-      const std::lock_guard lock(impl_->mutex);
-      impl_->throw_failure();
-    }
+    worker_->wait();
     take();
   } while (is_late());
 }

@@ -6,6 +6,7 @@
 #include <limits>
 #include <memory>
 #include <new>
+#include <optional>
 #include <utility>
 
 #include <quoin/core/assert.h>
@@ -76,7 +77,7 @@ std::vector<double> MeshJobQueue::measure(FunctionRef<double(const SurfaceJob&)>
 void MeshJobQueue::renew(FunctionRef<void(SurfaceJob&)> renew) {
   const std::lock_guard lock(mutex_);
   for (const std::unique_ptr<SurfaceJob>& job : queue_) {
-    if (job->voxels != nullptr) renew(*job);
+    if (job->voxels != nullptr && !job->is_in_epoch) renew(*job);
   }
 }
 
@@ -121,9 +122,9 @@ Workers::Clock::time_point MeshJobQueue::step(Workers::Lock& lock, SurfaceWorksp
   lock.unlock();
   const SurfaceClock::time_point start = SurfaceClock::now();
   std::exception_ptr failure = work_on(*job, workspace);
-  drop_inputs(*job);
   // Failures are not reported to the callback: an immediate retry would fail again.
   const bool is_reported = job->outcome != SurfaceJob::Outcome::OutOfMemory;
+  if (is_reported || !job->is_in_epoch) drop_inputs(*job);
   lock.lock();
   workers_.keep_failure(std::move(failure));
   finish(std::move(job), start);
@@ -195,6 +196,8 @@ void make_live_surface(const LiveMeshOptions& options, SurfaceJob& job, SurfaceW
 
 namespace {
 
+constexpr double kEpochDistance = -1.0;  // of jobs that come before all others
+
 // A smooth chunk takes a worker milliseconds, and its job the copies of up to 125 chunks.
 std::size_t jobs_ahead(SurfaceStyle style, unsigned workers) {
   constexpr std::size_t kBlocky = 64;
@@ -220,6 +223,7 @@ MeshScheduler::MeshScheduler(const LiveMeshOptions& options, MeshJobQueue::Work 
       surface_options_(surface_options(options)),
       workers_(worker_count(options.workers)),
       max_ahead_(jobs_ahead(options.style, workers_)),
+      placed_(options.instances, SceneFollower::Transforms::Valid),
       drawn_(options.instances, SceneFollower::Transforms::Valid),
       queue_(workers_, std::move(work), options.on_ready) {
   totals_.releases = queue_.releases();
@@ -227,9 +231,33 @@ MeshScheduler::MeshScheduler(const LiveMeshOptions& options, MeshJobQueue::Work 
 
 void MeshScheduler::throw_failure() {
   if (const std::exception_ptr failure = queue_.take_failure()) std::rethrow_exception(failure);
+  const std::lock_guard lock(mutex_);
+  if (receive_failure_ != nullptr) std::rethrow_exception(std::exchange(receive_failure_, nullptr));
 }
 
-void MeshScheduler::update(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes) {
+void MeshScheduler::use_light(const SceneLight* light, std::shared_ptr<LightWorker> worker) {
+  QUOIN_ASSERT(light == nullptr || worker == nullptr, "light from one source");
+  if (worker != nullptr && worker == light_worker_) return;
+  // The worker may be calling `receive`, which needs the mutex.
+  if (light_worker_ != nullptr) light_worker_->detach();
+  {
+    const std::lock_guard lock(mutex_);
+    light_ = light;
+    light_worker_ = std::move(worker);
+    lit_ = followed_lit_ = epoch_lit_ = complete_lit_ = nullptr;
+    placed_.forget();
+  }
+  if (light_worker_ != nullptr) {
+    light_worker_->attach([this](std::shared_ptr<LitState> lit) { receive(std::move(lit)); });
+  }
+}
+
+void MeshScheduler::stop() {
+  if (light_worker_ != nullptr) light_worker_->detach();
+  queue_.stop();
+}
+
+std::uint64_t MeshScheduler::update(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes) {
   throw_failure();
   const std::lock_guard lock(mutex_);
   try {
@@ -238,57 +266,177 @@ void MeshScheduler::update(const Scene& scene, DVec3 eye, std::span<const DVec3>
     std::erase_if(next_eyes_, [](DVec3 each) { return !is_finite(each); });
     are_places_new_ |= next_eyes_ != eyes_;
     std::swap(next_eyes_, eyes_);
+    ++updates_;
     update_or_throw(scene);
   } catch (...) {
     forget();
     throw;
   }
+  return updates_;
 }
 
 // Memory ran out during an update. Starting from scratch recovers all lost changes.
 void MeshScheduler::forget() {
   for (auto& [key, source] : sources_) source->forget();
   drawn_.forget();
+  placed_.forget();
+  is_epoch_open_ = false;
+  retries_.clear();
 }
 
 void MeshScheduler::update_or_throw(const Scene& scene) {
-  const SurfaceClock::time_point now = SurfaceClock::now();
-  collect();
-  const ChangedTypes changed_types = follow_types(scene.types);
-  for (const GridHandle handle : follow_scene(scene)) follow_grid(scene, handle, now);
-  follow_light(now);
-  choose_levels(scene, now);
-  for (auto& [key, live] : sources_) {
-    const SceneGrid* const grid = scene.grids().find(key.grid);
-    if (grid == nullptr) continue;
-    if (drawn_.places(key.grid)) live->mark_types(*grid, changed_types, now);
-    live->prepare(*grid, scene.types);
+  if (light_worker_ == nullptr) return follow({&scene, light_, updates_, SurfaceClock::now()}, scene);
+  SceneFollower::Update placed(placed_, scene);
+  light_worker_->update_for_receiver(scene, updates_, placed.has_other_placements());
+  placed.commit();
+  if (lit_ == nullptr) return;
+  if (!light_worker_->owes_state()) lit_number_ = updates_;
+  follow({lit_->lit.scene.get(), &lit_->lit.light, lit_number_, SurfaceClock::now()}, scene);
+}
+
+// Called by the worker of the light. Does what `update` does, so that the surfaces need not wait for it.
+void MeshScheduler::receive(std::shared_ptr<LitState> lit) {
+  {
+    const std::lock_guard lock(mutex_);
+    light_worker_->note_received();
+    try {
+      const Scene& scene = *lit->lit.scene;
+      lit_ = std::move(lit);
+      // Later updates without a change are in the same state.
+      lit_number_ = light_worker_->owes_state() ? lit_->number : updates_;
+      follow({&scene, &lit_->lit.light, lit_number_, lit_->asked}, scene);
+    } catch (...) {
+      forget();
+      receive_failure_ = std::current_exception();
+    }
   }
+  try {
+    if (options_.on_ready) options_.on_ready();
+  } catch (...) {
+    const std::lock_guard lock(mutex_);
+    if (receive_failure_ == nullptr) receive_failure_ = std::current_exception();
+  }
+}
+
+// Takes over the changes up to a state, and gives jobs to the workers. `places`: the scene with the newest positions of
+// instances.
+void MeshScheduler::follow(const State& state, const Scene& places) {
+  const SurfaceClock::time_point now = state.seen;
+  collect();
+  totals_.state = state.number;
+  followed_lit_ = lit_;
+  totals_.loads_only = false;  // it is still true after a failure
+  const ChangedTypes changed_types = follow_types(state.scene->types);
+  for (const GridHandle handle : follow_scene(*state.scene)) follow_grid(*state.scene, handle, now);
+  follow_light(state.light, now);
+  choose_levels(places, now);
+  for (auto& [key, live] : sources_) {
+    const SceneGrid* const grid = state.scene->grids().find(key.grid);
+    if (grid != nullptr && drawn_.places(key.grid)) live->mark_types(*grid, changed_types, now);
+  }
+  prepare(*state.scene);
   withdraw([&](const SurfaceJob& job) {
     const SurfaceSource* live = find(job.source);
     return live == nullptr || !live->is_current(job);
   });
-  renew_jobs(scene, now);
-  if (totals_.unfinished != 0) hand_over(scene);
+  push_retries();
+  begin_epoch(state);
+  renew_jobs(state, SurfaceClock::now());
+  if (totals_.unfinished != 0) hand_over(state, places);
+}
+
+void MeshScheduler::prepare(const Scene& scene) {
+  for (auto& [key, live] : sources_) {
+    if (const SceneGrid* const grid = scene.grids().find(key.grid)) live->prepare(*grid, scene.types);
+  }
+}
+
+void MeshScheduler::push_retries() {
+  for (std::unique_ptr<SurfaceJob>& job : retries_) {
+    const SurfaceSource* const live = find(job->source);
+    if (live != nullptr && live->is_current(*job)) queue_.push(std::move(job));
+  }
+  retries_.clear();
+}
+
+// Begins an epoch with all edits up to the state, unless one is in progress.
+void MeshScheduler::begin_epoch(const State& state) {
+  if (is_epoch_open_) return;
+  const auto [edited, has_edits] = count_edited();
+  if (edited > kMaxEpochChunks) release_edits(state);
+  if (!has_edits || edited > kMaxEpochChunks) return complete(state.number, followed_lit_);
+  bool may_begin = true;
+  for (const auto& [key, live] : sources_) may_begin &= live->may_begin_epoch();
+  if (!may_begin) return;
+  QUOIN_ASSERT(totals_.in_epoch == 0, "one epoch at a time");
+  is_epoch_open_ = true;
+  epoch_state_ = state.number;
+  epoch_lit_ = followed_lit_;
+  std::vector<std::unique_ptr<SurfaceJob>> jobs;
+  for (auto& [key, live] : sources_) {
+    bool is_edited = false;
+    (void)live->count_edited(is_edited);
+    if (!is_edited) continue;
+    const SceneGrid* const grid = state.scene->grids().find(key.grid);
+    std::optional<SurfaceInputs> inputs;
+    if (grid != nullptr)
+      inputs.emplace(*grid, types_, state.light == nullptr ? GridLight{} : state.light->of(key.grid));
+    live->begin_epoch(inputs ? &*inputs : nullptr, jobs);
+  }
+  for (std::unique_ptr<SurfaceJob>& job : jobs) {
+    job->is_in_epoch = true;
+    job->distance = kEpochDistance;
+    queue_.push(std::move(job));
+  }
+  end_epoch();
+}
+
+// Ends the epoch in progress if all of its surfaces are complete.
+void MeshScheduler::end_epoch() {
+  if (!is_epoch_open_ || totals_.in_epoch != 0) return;
+  for (auto& [key, live] : sources_) live->give_epoch();
+  is_epoch_open_ = false;
+  const bool has_edits = count_edited().second;
+  complete(has_edits ? epoch_state_ : totals_.state, has_edits ? epoch_lit_ : followed_lit_);
+  epoch_lit_ = nullptr;
+}
+
+void MeshScheduler::complete(std::uint64_t state, const std::shared_ptr<LitState>& lit) {
+  totals_.complete = state;
+  complete_lit_ = lit;
+}
+
+std::pair<std::size_t, bool> MeshScheduler::count_edited() const {
+  std::size_t edited = 0;
+  bool has_edits = false;
+  for (const auto& [key, live] : sources_) edited += live->count_edited(has_edits);
+  return {edited, has_edits};
+}
+
+// Too many chunks are edited to wait for all of them.
+void MeshScheduler::release_edits(const State& state) {
+  for (auto& [key, live] : sources_) live->release_edits();
+  prepare(*state.scene);
 }
 
 void MeshScheduler::follow_grid(const Scene& scene, GridHandle handle, SurfaceClock::time_point now) {
   const SceneGrid& grid = scene.grids()[handle];
   const auto [voxels, is_new] = sources_.try_emplace({handle, SurfaceContent::Voxels});
   if (voxels->second == nullptr) voxels->second = make_surface_source(voxels->first, surface_options_, totals_);
-  voxels->second->follow(grid, now);
   SurfaceSource* field = find({handle, SurfaceContent::Field});
-  if (field == nullptr) {
-    if (grid.field.chunk_count() == 0) return;
+  if (field == nullptr && grid.field.chunk_count() != 0) {
     const SurfaceKey key{handle, SurfaceContent::Field};
     field = (sources_[key] = make_surface_source(key, surface_options_, totals_)).get();
   }
-  field->follow(grid, now);
+  totals_.loads_only = is_all_new_ && is_new;
+  voxels->second->follow(grid, now);
+  if (field != nullptr) field->follow(grid, now);
+  totals_.loads_only = false;
 }
 
-void MeshScheduler::follow_light(SurfaceClock::time_point now) {
+void MeshScheduler::follow_light(const SceneLight* light, SurfaceClock::time_point now) {
   for (auto& [key, live] : sources_) {
-    live->follow_light(light_ == nullptr ? GridLight{} : light_->of(key.grid), now);
+    live->follow_light(light == nullptr ? GridLight{} : light->of(key.grid), now);
   }
 }
 
@@ -314,6 +462,7 @@ void MeshScheduler::choose_levels(const Scene& scene, SurfaceClock::time_point n
 // Returns the drawn grids that may have changed.
 std::vector<GridHandle> MeshScheduler::follow_scene(const Scene& scene) {
   SceneFollower::Update update(drawn_, scene);
+  is_all_new_ = update.all();
   std::vector<GridHandle> drawn;
   std::copy_if(update.touched().begin(), update.touched().end(), std::back_inserter(drawn),
                [&](GridHandle handle) { return drawn_.places(handle); });
@@ -352,9 +501,18 @@ ChangedTypes MeshScheduler::follow_types(const VoxelRegistry& types) {
 }
 
 void MeshScheduler::collect() {
-  for (const std::unique_ptr<SurfaceJob>& job : queue_.collect()) {
-    if (SurfaceSource* live = find(job->source)) live->collect(*job);
+  for (std::unique_ptr<SurfaceJob>& job : queue_.collect()) {
+    SurfaceSource* const live = find(job->source);
+    if (live == nullptr) continue;
+    const bool is_retried = job->outcome == SurfaceJob::Outcome::OutOfMemory && job->is_in_epoch && is_epoch_open_;
+    if (!is_retried) {
+      live->collect(*job);
+    } else if (live->is_current(*job)) {
+      job->outcome = SurfaceJob::Outcome::Meshed;
+      retries_.push_back(std::move(job));
+    }
   }
+  end_epoch();
 }
 
 void MeshScheduler::withdraw(FunctionRef<bool(const SurfaceJob&)> is_unwanted) {
@@ -400,7 +558,9 @@ std::vector<MeshScheduler::Candidate> MeshScheduler::candidates(const std::map<G
   all.reserve(count);
   for (auto& [key, live] : sources_) {
     const ChunkDistances& places = distances.at(key.grid);
-    for (const IVec3 chunk : live->waiting()) all.push_back({places.to(chunk), live.get(), key, chunk});
+    for (const IVec3 chunk : live->waiting()) {
+      all.push_back({live->is_urgent(chunk) ? kEpochDistance : places.to(chunk), live.get(), key, chunk});
+    }
   }
   const auto comes_before = [](const Candidate& a, const Candidate& b) {
     if (a.distance != b.distance) return a.distance < b.distance;
@@ -412,16 +572,16 @@ std::vector<MeshScheduler::Candidate> MeshScheduler::candidates(const std::map<G
   return all;
 }
 
-void MeshScheduler::renew_jobs(const Scene& scene, SurfaceClock::time_point now) {
+void MeshScheduler::renew_jobs(const State& state, SurfaceClock::time_point now) {
   constexpr auto kOld = std::chrono::milliseconds(250);
   if (now - renewed_ < kOld) return;
   renewed_ = now;
   std::map<GridHandle, SurfaceInputs> inputs;
   queue_.renew([&](SurfaceJob& job) {
     const GridHandle grid = job.source.grid;
-    const GridLight light = light_ == nullptr ? GridLight{} : light_->of(grid);
+    const GridLight light = state.light == nullptr ? GridLight{} : state.light->of(grid);
     SurfaceInputs& input =
-        inputs.try_emplace(grid, scene.grids()[grid], types_, light, queue_.releases()).first->second;
+        inputs.try_emplace(grid, state.scene->grids()[grid], types_, light, queue_.releases()).first->second;
     if (job.light != nullptr && input.light() == nullptr) return;
     if (job.light != nullptr) job.light = input.light();
     job.voxels = input.voxels();
@@ -429,13 +589,15 @@ void MeshScheduler::renew_jobs(const Scene& scene, SurfaceClock::time_point now)
 }
 
 // Gives jobs to the workers. Waiting jobs that are farther away than the new ones wait longer.
-void MeshScheduler::hand_over(const Scene& scene) {
+void MeshScheduler::hand_over(const State& state, const Scene& places) {
   if (!has_waiting()) return;
   constexpr double kNone = std::numeric_limits<double>::infinity();
-  const std::map<GridHandle, ChunkDistances> distances = distances_of_grids(scene);
+  const std::map<GridHandle, ChunkDistances> distances = distances_of_grids(places);
   std::map<GridHandle, SurfaceInputs> inputs;
-  std::vector<double> queued =
-      queue_.measure([&](const SurfaceJob& job) { return distances.at(job.source.grid).to(job.chunk); });
+  std::vector<double> queued = queue_.measure([&](const SurfaceJob& job) {
+    if (job.is_in_epoch || find(job.source)->is_urgent(job.chunk)) return kEpochDistance;
+    return distances.at(job.source.grid).to(job.chunk);
+  });
   double farthest = kNone;  // waiting jobs from this distance on are withdrawn
   for (const Candidate& each : candidates(distances)) {
     if (queued.size() >= max_ahead_) {
@@ -444,9 +606,9 @@ void MeshScheduler::hand_over(const Scene& scene) {
       queued.pop_back();
     }
     const GridHandle grid = each.source.grid;
-    const GridLight light = light_ == nullptr ? GridLight{} : light_->of(grid);
+    const GridLight light = state.light == nullptr ? GridLight{} : state.light->of(grid);
     SurfaceInputs& input =
-        inputs.try_emplace(grid, scene.grids()[grid], types_, light, queue_.releases()).first->second;
+        inputs.try_emplace(grid, state.scene->grids()[grid], types_, light, queue_.releases()).first->second;
     std::unique_ptr<SurfaceJob> job = each.live->make_job(input, each.chunk);
     job->distance = each.distance;
     const std::uint64_t serial = job->serial;
@@ -471,17 +633,29 @@ std::vector<SurfaceUpdate> MeshScheduler::take(std::size_t max_bytes) {
   }
   std::size_t bytes = 0;
   for (const ReadyChunk& ready : totals_.ready) {
-    if (ready.source.content == SurfaceContent::Voxels && bytes >= max_bytes) {
+    SurfaceSource* const live = find(ready.source);
+    if (live == nullptr) continue;
+    const SurfaceSource::Turn turn = live->turn_of(ready.chunk);
+    if (turn == SurfaceSource::Turn::Later || (turn == SurfaceSource::Turn::IfRoom && bytes >= max_bytes)) {
       left.push_back(ready);
       continue;
     }
     const std::size_t before = taken.size();
-    if (SurfaceSource* live = find(ready.source)) live->take(ready.chunk, taken);
+    live->take(ready.chunk, taken);
     if (taken.size() == before || ready.source.content != SurfaceContent::Voxels) continue;
     if (const auto& surface = taken.back().surface) bytes += surface->upload_bytes();
   }
   totals_.ready = std::move(left);
+  shown_ = totals_.complete;
+  if (complete_lit_ != nullptr && light_worker_ != nullptr) light_worker_->show(*complete_lit_);
+  complete_lit_ = nullptr;
   return taken;
+}
+
+std::size_t MeshScheduler::pending() const {
+  const std::lock_guard lock(mutex_);
+  const bool is_light_late = light_worker_ != nullptr && light_worker_->owes_state();
+  return totals_.pending + (is_light_late ? 1 : 0);
 }
 
 void MeshScheduler::finish(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes) {
@@ -489,13 +663,16 @@ void MeshScheduler::finish(const Scene& scene, DVec3 eye, std::span<const DVec3>
     const LiveMeshes::Stats before = stats();
     update(scene, eye, other_eyes);
     std::unique_lock lock(mutex_);
-    const bool is_done = totals_.unfinished == 0;
+    const bool is_light_late = light_worker_ != nullptr && light_worker_->owes_state();
+    const bool is_done = totals_.unfinished == 0 && !is_light_late;
     const std::size_t left = !is_done && has_waiting() ? max_ahead_ / 2 : 0;
     // A free worker may take a job.
     lock.unlock();
+    if (is_light_late) light_worker_->wait();
     queue_.wait(left);  // finally waits for jobs of removed grids
     if (is_done) return throw_failure();
     const LiveMeshes::Stats after = stats();
+    if (is_light_late) continue;
     // If all jobs failed, throws instead of retrying without end.
     if (after.out_of_memory != before.out_of_memory && after.chunks_meshed == before.chunks_meshed) {
       throw std::bad_alloc();
@@ -525,11 +702,17 @@ LiveMeshes::~LiveMeshes() {
   impl_->scheduler.stop();
 }
 
-void LiveMeshes::update(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes) {
-  impl_->scheduler.update(scene, eye, other_eyes);
+std::uint64_t LiveMeshes::update(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes) {
+  return impl_->scheduler.update(scene, eye, other_eyes);
 }
 void LiveMeshes::use_light(const SceneLight* light) {
-  impl_->scheduler.use_light(light);
+  impl_->scheduler.use_light(light, nullptr);
+}
+void LiveMeshes::use_light(LiveLight& light) {
+  impl_->scheduler.use_light(nullptr, light.worker_);
+}
+std::uint64_t LiveMeshes::shown_update() const {
+  return impl_->scheduler.shown_update();
 }
 std::vector<SurfaceUpdate> LiveMeshes::take(std::size_t max_bytes) {
   return impl_->scheduler.take(max_bytes);

@@ -18,6 +18,7 @@
 #include <quoin/scene/scene.h>
 
 #include "core/work/workers.h"
+#include "live/light_worker.h"
 #include "render/chunks/surface_job.h"
 #include "render/chunks/surface_source.h"
 #include "scene/scene_follower.h"
@@ -84,37 +85,53 @@ class MeshScheduler {
   /// Calls of `work` come from several threads at once.
   MeshScheduler(const LiveMeshOptions& options, MeshJobQueue::Work work);
 
-  void update(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes = {});
-  void use_light(const SceneLight* light) {
-    const std::lock_guard lock(mutex_);
-    light_ = light;
-  }
+  std::uint64_t update(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes = {});
+  /// At most one of both is not null. Must not overlap with `update`.
+  void use_light(const SceneLight* light, std::shared_ptr<LightWorker> worker);
   [[nodiscard]] std::vector<SurfaceUpdate> take(std::size_t max_bytes = std::numeric_limits<std::size_t>::max());
-  [[nodiscard]] std::size_t pending() const {
+  [[nodiscard]] std::size_t pending() const;
+  [[nodiscard]] std::uint64_t shown_update() const {
     const std::lock_guard lock(mutex_);
-    return totals_.pending;
+    return shown_;
   }
   void finish(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes = {});
   [[nodiscard]] LiveMeshes::Stats stats() const;
   /// Stops the workers. Do not call other functions after it.
-  void stop() { queue_.stop(); }
+  void stop();
 
  private:
   struct Candidate;
 
   using Sources = std::map<SurfaceKey, std::unique_ptr<SurfaceSource>>;
 
+  /// The input of surfaces: the scene of `update`, or a snapshot with its light.
+  struct State {
+    const Scene* scene = nullptr;
+    const SceneLight* light = nullptr;  // null: no light is used
+    std::uint64_t number = 0;           // of the newest update whose edits it contains
+    SurfaceClock::time_point seen;      // time of an update whose edits it contains
+  };
+
   void update_or_throw(const Scene& scene);
+  void follow(const State& state, const Scene& places);
+  void receive(std::shared_ptr<LitState> lit);
+  void begin_epoch(const State& state);
+  void end_epoch();
+  void complete(std::uint64_t state, const std::shared_ptr<LitState>& lit);
+  [[nodiscard]] std::pair<std::size_t, bool> count_edited() const;
+  void release_edits(const State& state);
   void throw_failure();
   [[nodiscard]] ChangedTypes follow_types(const VoxelRegistry& types);
   [[nodiscard]] std::vector<GridHandle> follow_scene(const Scene& scene);
   void follow_grid(const Scene& scene, GridHandle handle, SurfaceClock::time_point now);
-  void follow_light(SurfaceClock::time_point now);
+  void follow_light(const SceneLight* light, SurfaceClock::time_point now);
+  void prepare(const Scene& scene);
   void choose_levels(const Scene& scene, SurfaceClock::time_point now);
   void forget();
   void collect();
-  void renew_jobs(const Scene& scene, SurfaceClock::time_point now);
-  void hand_over(const Scene& scene);
+  void push_retries();
+  void renew_jobs(const State& state, SurfaceClock::time_point now);
+  void hand_over(const State& state, const Scene& places);
   [[nodiscard]] bool has_waiting() const;
   void add_places(const Scene& scene, std::map<GridHandle, ChunkDistances>& distances) const;
   [[nodiscard]] std::map<GridHandle, ChunkDistances> distances_of_grids(const Scene& scene) const;
@@ -129,7 +146,20 @@ class MeshScheduler {
   mutable std::mutex mutex_;     // guards the following members, except the queue, which has its own mutex
   SurfaceTotals totals_;
   SurfaceTypes types_;
-  const SceneLight* light_ = nullptr;  // of the caller
+  const SceneLight* light_ = nullptr;          // of the caller
+  std::shared_ptr<LightWorker> light_worker_;  // its states are followed, instead of the caller's scene
+  std::shared_ptr<LitState> lit_;              // the newest of these
+  std::shared_ptr<LitState> followed_lit_;     // the one that the sources follow
+  std::uint64_t lit_number_ = 0;               // of the newest update with the same content
+  SceneFollower placed_;                       // in the caller's scene: placements that no state may have
+  std::exception_ptr receive_failure_;
+  std::uint64_t updates_ = 0;
+  bool is_epoch_open_ = false;
+  std::uint64_t epoch_state_ = 0;           // number of the state that the epoch shows
+  std::shared_ptr<LitState> epoch_lit_;     // its light
+  std::shared_ptr<LitState> complete_lit_;  // of the newest complete state, to be shown
+  std::uint64_t shown_ = 0;
+  std::vector<std::unique_ptr<SurfaceJob>> retries_;  // jobs of the epoch that ran out of memory
   ChangeCursor followed_types_;
   SurfaceClock::time_point renewed_{};
   SceneFollower drawn_;
@@ -137,6 +167,7 @@ class MeshScheduler {
   std::vector<DVec3> eyes_;
   std::vector<DVec3> next_eyes_;                          // of the update in progress; kept for its memory
   std::map<GridHandle, ChunkDistances> level_distances_;  // for `choose_levels`; kept for its memory
+  bool is_all_new_ = false;                               // the scene that was followed last is another one
   bool are_places_new_ = true;                            // eyes or instances moved since levels were last chosen
   MeshJobQueue queue_;                                    // last: its threads end first
 };

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <map>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <quoin/core/assert.h>
@@ -43,6 +44,7 @@ class SceneFollower {
   };
 
   void read(const Scene& scene, const SceneChanges& changes) {
+    counted_.clear();
     touched_.insert(touched_.end(), changes.grids.begin(), changes.grids.end());
     if (changes.all) {
       touch_placed();
@@ -68,7 +70,7 @@ class SceneFollower {
     if (!is_drawn(scene, instance, filter_)) return false;
     if (transforms_ == Transforms::Valid && !has_valid_transform(instance)) return false;
     if (handle.index >= placed_.size()) placed_.resize(handle.index + std::size_t{1});
-    ++placements_[instance.grid];
+    if (++placements_[instance.grid] == 1) counted_.emplace_back(instance.grid, 1);
     placed_[handle.index] = {handle.generation, instance.grid};
     return true;
   }
@@ -78,16 +80,20 @@ class SceneFollower {
     touched_.push_back(placed.grid);
     const auto found = placements_.find(placed.grid);
     QUOIN_ASSERT(found != placements_.end() && found->second > 0, "a counted placement");
-    if (--found->second == 0) placements_.erase(found);
+    if (--found->second == 0) {
+      counted_.emplace_back(placed.grid, -1);
+      placements_.erase(found);
+    }
     placed = {};
   }
 
   InstanceFilter filter_;
   Transforms transforms_;
   ChangeCursor followed_;
-  std::vector<Placed> placed_;                    // drawn instances, by slot
-  std::map<GridHandle, std::size_t> placements_;  // number of drawn instances, without zeros
-  std::vector<GridHandle> touched_;               // since the last commit
+  std::vector<Placed> placed_;                       // drawn instances, by slot
+  std::map<GridHandle, std::size_t> placements_;     // number of drawn instances, without zeros
+  std::vector<GridHandle> touched_;                  // since the last commit
+  std::vector<std::pair<GridHandle, int>> counted_;  // 1: placed for the first time, -1: no longer placed
 };
 
 /// Changes of a scene that a consumer applies completely or not at all, as PendingChanges.
@@ -104,6 +110,12 @@ class SceneFollower::Update {
   /// Returns true if any instance, group or layer may have changed.
   [[nodiscard]] bool has_other_instances() const {
     return all() || !changes_->instances.empty() || !changes_->groups.empty() || !changes_->layers.empty();
+  }
+  /// Returns true if any grid may be placed that was not placed before, or the reverse.
+  [[nodiscard]] bool has_other_placements() const {
+    std::map<GridHandle, int> sums;
+    for (const auto& [grid, change] : follower_->counted_) sums[grid] += change;
+    return all() || std::any_of(sums.begin(), sums.end(), [](const auto& sum) { return sum.second != 0; });
   }
   /// Call when all changes are applied.
   void commit() {

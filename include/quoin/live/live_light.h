@@ -8,6 +8,9 @@
 
 namespace quoin {
 
+class LightWorker;
+class LiveMeshes;
+
 struct LiveLightOptions {
   PropagatedLightOptions light{};
   /// Threads that each update uses. 0: one less than the hardware threads, at least 1 (different from other options).
@@ -24,6 +27,8 @@ struct LiveLightOptions {
 /// Exact:    the light shown is always the exact light of the scene at one moment, including its voxels
 ///           (GridLight::voxels). The delay depends on the threads. Once edits stop, `take` eventually shows the light
 ///           of the current scene.
+/// Meshes:   LiveMeshes::use_light shows this light together with the surfaces of the same moment. The `update` and
+///           `take` of LiveMeshes then do the work of those of this class.
 /// Follow:   PropagatedLight::changes_since, on `shown().of(grid).light`, reports where light changed between two
 ///           states.
 /// Lifetime: the scene is read only during calls.
@@ -40,23 +45,26 @@ class LiveLight {
   /// Starts computing the light of the current scene in the background if voxel types, fields, grids or type properties
   /// have changed, unless an earlier update is still running. Call it once per frame. Voxel data, names and instance
   /// positions do not affect light and can be out of date in the light shown.
+  /// Does nothing while LiveMeshes uses this light.
   /// Cost:   no work if nothing changed; otherwise Scene::snapshot.
   /// Errors: bad_alloc, also from the background thread; the next call then computes the missing light from scratch.
   void update(const Scene& scene);
-  /// Shows the newest completed light. Returns true if there was new light. Cost: O(1).
+  /// Shows the newest completed light. Returns true if there was new light. While LiveMeshes uses this light, returns
+  /// true if LiveMeshes::take has shown new light since the last call. Cost: O(1).
   bool take();
-  /// Returns the light as of the last `take`; open sky before the first. The reference stays valid.
+  /// Returns the light as of the last `take`, also of LiveMeshes; open sky before the first. The reference stays valid.
   /// Lifetime: a GridLight from it is valid until the next `take`.
   [[nodiscard]] const SceneLight& shown() const;
 
   /// Returns true if, as of the last update, the scene has changes whose light is not shown yet.
   [[nodiscard]] bool is_late() const;
-  /// Waits until the light of the scene is shown. Errors: bad_alloc.
+  /// Waits until the light of the scene is shown. Does nothing while LiveMeshes uses this light: LiveMeshes::finish and
+  /// LiveMeshes::take show it. Errors: bad_alloc.
   void finish(const Scene& scene);
 
  private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  friend class LiveMeshes;
+  std::shared_ptr<LightWorker> worker_;
 };
 
 }  // namespace quoin

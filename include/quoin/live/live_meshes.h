@@ -12,6 +12,7 @@
 
 #include <quoin/core/parallel.h>
 #include <quoin/core/vec.h>
+#include <quoin/live/live_light.h>
 #include <quoin/mesh/smooth_mesh.h>
 #include <quoin/render/chunk_surface.h>
 #include <quoin/render/propagated_light.h>
@@ -52,17 +53,31 @@ struct LiveMeshOptions {
   ///   return quoin::ConvertedSurface(vertices, vertices->size() * sizeof(Vertex));
   std::function<ConvertedSurface(const SurfaceUpdate&)> convert{};
   /// Called by a worker after each completed chunk: there may be a surface to take, `pending` has decreased, and there
-  /// is room for more chunks. Optional. It may call `take`, `pending` and `stats`, but no other member of LiveMeshes.
+  /// is room for more chunks. Also called after each update of a LiveLight, by its worker. Optional. It may call `take`,
+  /// `pending`, `shown_update` and `stats`, but no other member of LiveMeshes.
   std::function<void()> on_ready{};
 };
 
 /// The meshes of a scene's chunks, voxels and fields, updated by worker threads while the scene is edited.
 ///
+///   meshes.use_light(light);                                  // a LiveLight; optional
+///   each frame: edit(scene); meshes.update(scene, eye); upload(meshes.take()); draw();
+///
 /// Only `update` reads the scene: workers read snapshots, so edits never wait for them. A chunk is meshed again only if
-/// an edit could have changed its mesh. Edits that arrive before a chunk is meshed are combined. Results for chunks
-/// removed in the meantime are dropped.
-/// Seams:     surfaces of a field always fit each other. Changes of neighbouring chunks, by an edit or by a level of
-///            detail, are returned together by one `take` when all are complete.
+/// an edit could have changed its mesh.
+/// Together:  all surfaces that change because of the edits between two updates are returned by one `take`, when all
+///            are complete: on both sides of a chunk border, of all grids, voxels and fields, with their light. Edits
+///            made before earlier ones are complete are combined, and follow next. An edit is therefore returned after
+///            at most twice the time that workers need for such a step. New, removed, shown and hidden grids count as
+///            edits.
+/// Loaded:    the chunks of the first update, loaded chunks (Grid::load_chunk) and new grids that are partial or have
+///            more than 256 chunks are returned one by one, nearest first. So are all chunks of a step that edits more
+///            than 256 chunks. Edits come before loaded chunks.
+/// Instances: the caller draws the instances of the scene. `update` numbers the states of the scene. `shown_update`
+///            returns the newest state with all of its edits taken. To show instances in step with surfaces, draw an
+///            instance that was added in state n as soon as `shown_update` is at least n, and an instance that was
+///            removed in state n until then. Instances that only move can be drawn at once.
+/// Seams:     surfaces of a field also fit each other when their levels of detail change.
 /// Callbacks: the next `update` or `finish` rethrows the first exception of `on_ready` or `convert`. If `convert`
 ///            throws, the surface is still returned, with a null `converted`. A bad_alloc from `convert` counts as the
 ///            worker running out of memory (Stats::out_of_memory).
@@ -84,25 +99,37 @@ class LiveMeshes {
   /// come first. Call it after edits, and once per frame while `pending` is not 0: each call queues only enough chunks
   /// to keep the workers busy. Eyes that are not finite are ignored; if all are, every chunk has distance 0.
   ///
+  /// Returns the number of this call: 1, 2, 3 and so on.
+  ///
   /// Cost:   O(changes), independent of the size of the world. O(instances) more if instances were added, removed or
-  ///         changed. O(instances + waiting chunks) more while chunks wait for workers.
+  ///         changed. O(instances + waiting chunks) more while chunks wait for workers. With a LiveLight, instead of
+  ///         the changes: Scene::snapshot if there are any.
   /// Errors: bad_alloc; the next call starts from scratch with all chunks.
-  void update(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes = {});
+  std::uint64_t update(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes = {});
 
   /// Sets the light that blocky voxel surfaces carry at their corners from the next update on. Chunks are then also
-  /// meshed again when only their light changed. Null: no light. It is read only during `update` and `finish`. With
-  /// LiveLight (`&light.shown()`), light and meshes are a few frames late.
+  /// meshed again when only their light changed. Each surface shows the voxels and the light of one moment: `update`
+  /// starts the computation of light, and workers mesh as soon as it is complete, without another call. `take` makes
+  /// the light of the surfaces that it returns the light shown (LiveLight::shown).
+  /// Requires: no other LiveMeshes uses the light. Must not overlap with `update` and `finish`. Either object may be
+  /// destroyed first.
+  void use_light(LiveLight& light);
+  /// As above, with light that the caller keeps up to date: call SceneLight::update before `update`, with the same
+  /// scene. Null: no light. It is read only during `update` and `finish`.
   /// Lifetime: the light must stay valid until another call replaces it.
   void use_light(const SceneLight* light);
 
   /// Returns the surfaces that are new since the last call. Each chunk appears once, with its newest surface. Skips
   /// chunks that had no surface and still have none. Once voxel surfaces reach `max_bytes`
-  /// (ChunkSurface::upload_bytes), the rest waits for another call. Fields ignore the limit because their surfaces must
-  /// fit each other.
+  /// (ChunkSurface::upload_bytes), the remaining loaded chunks wait for another call. Edits and fields ignore the limit
+  /// because their surfaces must fit each other.
   /// Errors: bad_alloc, as `update`.
   [[nodiscard]] std::vector<SurfaceUpdate> take(std::size_t max_bytes = std::numeric_limits<std::size_t>::max());
 
-  /// Returns the number of chunks whose newest surface has not been taken yet.
+  /// Returns the number of the newest update whose edits were all taken, and those of all earlier updates. Chunks that
+  /// are returned one by one do not count.
+  [[nodiscard]] std::uint64_t shown_update() const;
+  /// Returns the number of chunks whose newest surface has not been taken yet, plus 1 while light is computed for them.
   [[nodiscard]] std::size_t pending() const;
   /// Calls `update` until all chunks are meshed. For tests and screenshots.
   /// Errors: bad_alloc, also if workers run out of memory for every remaining chunk.

@@ -96,6 +96,7 @@ FieldSurfaces::FieldSurfaces(GridHandle handle, const ChunkSurfaceOptions& optio
     : handle_(handle), options_(options), totals_(totals) {}
 
 void FieldSurfaces::follow(const SceneGrid& content, SurfaceClock::time_point now) {
+  has_left_ = false;
   PendingChanges changes(followed_, content.field);
   if (changes->empty()) return;
   if (changes->all) {
@@ -106,12 +107,15 @@ void FieldSurfaces::follow(const SceneGrid& content, SurfaceClock::time_point no
   changes.commit();
 }
 
-// Discards all surfaces and jobs, because they belong to another field.
+// Marks all chunks, because their surfaces belong to another field. The epoch in progress shows the former field.
 void FieldSurfaces::begin_anew(const DensityGrid& field, SurfaceClock::time_point now) {
-  abandon_groups();
+  const bool is_load = totals_.loads_only || field.is_partial() || field.chunk_count() > kMaxEpochChunks;
+  if (is_load || is_forgotten_) abandon_groups();
+  is_forgotten_ = false;
   bodies_.clear();
   const bool replaces =
       std::any_of(chunks_.begin(), chunks_.end(), [](const auto& each) { return each.second.was_given; });
+  const Cause cause = !is_load ? Cause::Edit : replaces ? Cause::Level : Cause::Load;
   Members all;
   for (const IVec3 chunk : field.chunks()) {
     for (int i = 0; i < 8; ++i) all.push_back(cell_chunk(chunk, i));
@@ -119,52 +123,55 @@ void FieldSurfaces::begin_anew(const DensityGrid& field, SurfaceClock::time_poin
   for (const auto& [chunk, state] : chunks_) all.push_back(chunk);
   sort_and_unite(all);
   for (const IVec3 chunk : all) {
-    see_whether_there(field, chunk, replaces, now);
-    if (chunks_.contains(chunk)) mark(chunk, replaces, now);
+    see_whether_there(field, chunk, cause, now);
+    if (chunks_.contains(chunk)) mark(chunk, cause, now);
   }
 }
 
 void FieldSurfaces::follow_changes(const DensityGrid& field, const DensityChanges& changes,
                                    SurfaceClock::time_point now) {
+  const Cause edit = totals_.loads_only ? Cause::Level : Cause::Edit;
   for (const DensityChange& change : changes.items) {
     bodies_.erase(change.chunk);
     // A loaded chunk completes surfaces that did not exist before, and unloading removes the neighbours' surfaces.
     // Neither has to match the visible surfaces.
     if (!change.is_edit) {
-      for (int i = 0; i < 27; ++i) see_whether_there(field, change.chunk + Neighbourhood::offset(i), false, now);
+      for (int i = 0; i < 27; ++i) see_whether_there(field, change.chunk + Neighbourhood::offset(i), Cause::Load, now);
       continue;
     }
-    for (int i = 0; i < 8; ++i) see_whether_there(field, cell_chunk(change.chunk, i), true, now);
+    for (int i = 0; i < 8; ++i) see_whether_there(field, cell_chunk(change.chunk, i), edit, now);
   }
   for (const DensityChange& change : changes.items) {
     if (!change.is_edit) continue;
     for (int i = 0; i < 27; ++i) {
       const IVec3 offset = Neighbourhood::offset(i);
       const IVec3 chunk = change.chunk + offset;
-      if (chunks_.contains(chunk) && change.affects(offset, reach_at(chunk))) mark(chunk, true, now);
+      if (chunks_.contains(chunk) && change.affects(offset, reach_at(chunk))) mark(chunk, edit, now);
     }
   }
 }
 
-void FieldSurfaces::see_whether_there(const DensityGrid& field, IVec3 chunk, bool is_bound,
+void FieldSurfaces::see_whether_there(const DensityGrid& field, IVec3 chunk, Cause cause,
                                       SurfaceClock::time_point now) {
   const auto found = chunks_.find(chunk);
   const bool was_there = found != chunks_.end() && !found->second.is_gone;
   if (is_there(field, chunk) == was_there) return;
   if (!was_there) wants_levels_ = true;
-  mark(chunk, is_bound, now);
+  mark(chunk, cause, now);
   FieldChunk& state = chunks_.at(chunk);
   state.is_gone = was_there;
   if (was_there) set_level(chunk, state, 0, now);
 }
 
-void FieldSurfaces::mark(IVec3 chunk, bool is_bound, SurfaceClock::time_point now) {
+void FieldSurfaces::mark(IVec3 chunk, Cause cause, SurfaceClock::time_point now) {
   FieldChunk& state = chunks_[chunk];
   stale_.insert(chunk);
+  if (cause == Cause::Edit) edited_.insert(chunk);
   box_ = unite(box_, {chunk, chunk + 1});
   const Change change(totals_, state);
   state.is_stale = true;
-  state.is_bound |= is_bound;
+  state.is_bound |= cause != Cause::Load;
+  state.is_edited |= cause == Cause::Edit;
   state.seen = now;
   is_prepared_ = false;
 }
@@ -179,10 +186,10 @@ void FieldSurfaces::set_level(IVec3 chunk, FieldChunk& state, int level, Surface
     const IVec3 adjacent = chunk + Neighbourhood::offset(i);
     const auto found = chunks_.find(adjacent);
     if (i == 13 || found == chunks_.end() || found->second.is_new()) continue;
-    mark(adjacent, true, now);
+    mark(adjacent, Cause::Level, now);
     is_seen = true;
   }
-  if (is_seen) mark(chunk, true, now);
+  if (is_seen) mark(chunk, Cause::Level, now);
 }
 
 void FieldSurfaces::choose_levels(const ChunkDistances& distances, SurfaceClock::time_point now) {
@@ -248,7 +255,8 @@ void FieldSurfaces::mark_types(const SceneGrid& content, const ChangedTypes& cha
     for (int i = 0; i < 27; ++i) {
       const auto adjacent = chunks_.find(chunk + Neighbourhood::offset(i));
       if (adjacent == chunks_.end()) continue;
-      mark(adjacent->first, is_other_surface && !adjacent->second.is_new(), now);
+      const Cause edit = totals_.loads_only ? Cause::Level : Cause::Edit;
+      mark(adjacent->first, is_other_surface && !adjacent->second.is_new() ? edit : Cause::Load, now);
     }
   }
 }
@@ -272,6 +280,10 @@ bool FieldSurfaces::may_begin(const Members& members) const {
   return std::none_of(members.begin(), members.end(), [&](IVec3 chunk) { return chunks_.at(chunk).group != nullptr; });
 }
 
+bool FieldSurfaces::is_edited(const Members& members) const {
+  return std::any_of(members.begin(), members.end(), [&](IVec3 chunk) { return edited_.contains(chunk); });
+}
+
 void FieldSurfaces::prepare(const SceneGrid& content, const VoxelRegistry& types) {
   if (is_prepared_) return;
   is_blocked_ = false;
@@ -281,7 +293,8 @@ void FieldSurfaces::prepare(const SceneGrid& content, const VoxelRegistry& types
     if (seen.contains(chunk)) continue;
     const Members members = members_with(chunk);
     seen.insert(members.begin(), members.end());
-    const bool begins = may_begin(members);
+    // Groups with edits begin with their epoch.
+    const bool begins = may_begin(members) && !is_edited(members);
     bool is_empty = true;
     for (const IVec3 each : members) {
       FieldChunk& state = chunks_.at(each);
@@ -295,21 +308,24 @@ void FieldSurfaces::prepare(const SceneGrid& content, const VoxelRegistry& types
       }
     }
     is_blocked_ |= !begins;
-    if (begins && is_empty) begin_group(members);
+    if (begins && is_empty) begin_group(members, false);
   }
   is_prepared_ = true;
 }
 
-std::shared_ptr<FieldSurfaces::Group> FieldSurfaces::begin_group(const Members& members) {
+std::shared_ptr<FieldSurfaces::Group> FieldSurfaces::begin_group(const Members& members, bool is_in_epoch) {
   auto group = std::make_shared<Group>();
   group->chunks = members;
   group->unfinished = members.size();
+  group->is_in_epoch = is_in_epoch;
+  group->state = totals_.state;
   for (const IVec3 chunk : members) {
     FieldChunk& state = chunks_.at(chunk);
     const std::array<std::uint8_t, 27> levels = levels_around(chunk);
     stale_.erase(chunk);
+    edited_.erase(chunk);
     const Change change(totals_, state);
-    state.is_stale = state.is_bound = false;
+    state.is_stale = state.is_bound = state.is_edited = false;
     state.is_working = state.is_done = false;
     state.serial = 0;
     state.levels = levels;
@@ -319,7 +335,7 @@ std::shared_ptr<FieldSurfaces::Group> FieldSurfaces::begin_group(const Members& 
     FieldChunk& state = chunks_.at(chunk);
     if (state.is_empty) finish_chunk(state, nullptr);
   }
-  if (group->unfinished == 0) give(members);
+  if (group->unfinished == 0 && !is_in_epoch) give(*group);
   return group;
 }
 
@@ -347,15 +363,16 @@ void FieldSurfaces::finish_chunk(FieldChunk& state, std::shared_ptr<const ChunkS
 }
 
 // The whole group is done.
-void FieldSurfaces::give(const Members& members) {
-  for (const IVec3 chunk : members) {
+void FieldSurfaces::give(const Group& group) {
+  for (const IVec3 chunk : group.chunks) {
     FieldChunk& state = chunks_.at(chunk);
-    QUOIN_ASSERT(state.group != nullptr && state.is_done, "a finished chunk of the group");
+    QUOIN_ASSERT(state.group.get() == &group && state.is_done, "a finished chunk of the group");
     {
       const Change change(totals_, state);
       state.group.reset();
       state.is_done = false;
       state.was_given = true;
+      state.state = group.is_in_epoch ? 0 : group.state;
       state.surface = std::move(state.result);
       state.result.reset();
       state.is_ready = false;
@@ -374,6 +391,8 @@ void FieldSurfaces::erase_if_over(IVec3 chunk) {
 }
 
 void FieldSurfaces::abandon_groups() {
+  for (const std::shared_ptr<Group>& group : epoch_) totals_.in_epoch -= group->unfinished != 0 ? 1 : 0;
+  epoch_.clear();
   for (auto& [chunk, state] : chunks_) {
     if (state.group == nullptr) continue;
     stale_.insert(chunk);
@@ -389,21 +408,39 @@ void FieldSurfaces::abandon_groups() {
 }
 
 void FieldSurfaces::leave() {
-  abandon_groups();
+  has_left_ = true;
   bodies_.clear();
-  stale_.clear();
   Members all;
   for (auto& [chunk, state] : chunks_) {
-    all.push_back(chunk);
-    const Change change(totals_, state);
-    state.is_stale = state.is_bound = false;
-    state.is_ready = false;
-    state.is_gone = true;
-    state.surface.reset();
-    if (state.is_shown) make_ready(chunk, state);
+    const bool is_in_group = state.group != nullptr && !state.group->is_in_epoch;
+    if (!state.is_gone || state.is_stale || is_in_group) all.push_back(chunk);
   }
-  for (const IVec3 chunk : all) erase_if_over(chunk);
+  for (const IVec3 chunk : all) {
+    FieldChunk& state = chunks_.at(chunk);
+    mark(chunk, Cause::Edit, state.seen);
+    waiting_.erase(chunk);
+    state.is_gone = state.is_empty = true;
+    // Ends a group of another level. Chunks of an epoch in progress are shown before they are removed.
+    if (state.group == nullptr || state.group->is_in_epoch) continue;
+    const Change change(totals_, state);
+    state.group.reset();
+    state.is_working = state.is_done = false;
+    state.result.reset();
+    state.serial = 0;
+  }
   followed_ = {};
+}
+
+void FieldSurfaces::forget() {
+  followed_ = {};
+  is_forgotten_ = true;
+  for (const std::shared_ptr<Group>& group : epoch_) {
+    totals_.in_epoch -= group->unfinished != 0 ? 1 : 0;
+  }
+  epoch_.clear();
+  for (auto& [chunk, state] : chunks_) {
+    if (state.group != nullptr) state.group->is_in_epoch = false;
+  }
 }
 
 void FieldSurfaces::make_ready(IVec3 chunk, FieldChunk& state) {
@@ -415,13 +452,17 @@ void FieldSurfaces::make_ready(IVec3 chunk, FieldChunk& state) {
 
 std::unique_ptr<SurfaceJob> FieldSurfaces::make_job(SurfaceInputs& inputs, IVec3 chunk) {
   QUOIN_ASSERT(waiting_.contains(chunk), "a chunk that waits");
-  if (chunks_.at(chunk).group == nullptr) {
-    const Members members = members_with(chunk);
-    const std::shared_ptr<Group> group = begin_group(members);
-    group->field = inputs.field();
-    group->types = inputs.types->registry;
-    if (group->types->has_transparent()) group->bodies = bodies_around(members, *group->field);
-  }
+  if (chunks_.at(chunk).group == nullptr) set_inputs(*begin_group(members_with(chunk), false), inputs);
+  return job_of(inputs, chunk);
+}
+
+void FieldSurfaces::set_inputs(Group& group, SurfaceInputs& inputs) {
+  group.field = inputs.field();
+  group.types = inputs.types->registry;
+  if (group.types->has_transparent()) group.bodies = bodies_around(group.chunks, *group.field);
+}
+
+std::unique_ptr<SurfaceJob> FieldSurfaces::job_of(const SurfaceInputs& inputs, IVec3 chunk) {
   const FieldChunk& state = chunks_.at(chunk);
   auto job = std::make_unique<SurfaceJob>();
   job->source = {handle_, SurfaceContent::Field};
@@ -462,7 +503,89 @@ void FieldSurfaces::collect(SurfaceJob& job) {
   finish_chunk(state, std::move(job.surface));
   if (state.group->unfinished != 0) return;
   const std::shared_ptr<Group> group = state.group;
-  give(group->chunks);
+  if (group->is_in_epoch) {
+    QUOIN_ASSERT(totals_.in_epoch > 0, "an unfinished group of the epoch");
+    --totals_.in_epoch;
+  } else {
+    give(*group);
+  }
+}
+
+std::size_t FieldSurfaces::count_edited(bool& has_edits) const {
+  has_edits |= !edited_.empty();
+  return static_cast<std::size_t>(
+      std::count_if(edited_.begin(), edited_.end(), [&](IVec3 chunk) { return !chunks_.at(chunk).is_gone; }));
+}
+
+// Returns the connected groups that contain an edited chunk.
+std::vector<FieldSurfaces::Members> FieldSurfaces::edited_groups() const {
+  std::vector<Members> groups;
+  ChunkSet seen;
+  for (const IVec3 chunk : edited_) {
+    if (seen.contains(chunk)) continue;
+    groups.push_back(members_with(chunk));
+    seen.insert(groups.back().begin(), groups.back().end());
+  }
+  return groups;
+}
+
+bool FieldSurfaces::may_begin_epoch() {
+  bool may_begin = true;
+  for (const Members& members : edited_groups()) {
+    for (const IVec3 chunk : members) {
+      const std::shared_ptr<Group>& group = chunks_.at(chunk).group;
+      if (group == nullptr) continue;
+      group->is_urgent = true;
+      may_begin = false;
+    }
+  }
+  return may_begin;
+}
+
+bool FieldSurfaces::is_urgent(IVec3 chunk) const {
+  const auto found = chunks_.find(chunk);
+  return found != chunks_.end() && found->second.group != nullptr && found->second.group->is_urgent;
+}
+
+void FieldSurfaces::begin_epoch(SurfaceInputs* inputs, std::vector<std::unique_ptr<SurfaceJob>>& jobs) {
+  QUOIN_ASSERT(epoch_.empty(), "no epoch is in progress");
+  std::vector<Members> groups = edited_groups();
+  epoch_.reserve(groups.size());
+  for (Members& members : groups) {
+    sort_and_unite(members);
+    const std::shared_ptr<Group>& group = epoch_.emplace_back(begin_group(members, true));
+    if (group->unfinished == 0) continue;
+    ++totals_.in_epoch;
+    QUOIN_ASSERT(inputs != nullptr, "a field with the chunks");
+    set_inputs(*group, *inputs);
+    for (const IVec3 chunk : members) {
+      if (chunks_.at(chunk).is_done) continue;
+      jobs.push_back(job_of(*inputs, chunk));
+      hand_over(chunk, jobs.back()->serial);
+    }
+  }
+}
+
+void FieldSurfaces::give_epoch() {
+  QUOIN_ASSERT(totals_.in_epoch == 0, "all surfaces of the epoch are complete");
+  for (const std::shared_ptr<Group>& group : std::exchange(epoch_, {})) give(*group);
+}
+
+void FieldSurfaces::release_edits() {
+  for (const IVec3 chunk : edited_) chunks_.at(chunk).is_edited = false;
+  edited_.clear();
+  is_prepared_ = false;
+  if (!has_left_) return;
+  // Without a field there is nothing to mesh or to wait for.
+  for (const IVec3 chunk : Members(stale_.begin(), stale_.end())) {
+    if (chunks_.at(chunk).group == nullptr) begin_group({chunk}, false);
+  }
+}
+
+SurfaceSource::Turn FieldSurfaces::turn_of(IVec3 chunk) const {
+  const auto found = chunks_.find(chunk);
+  const bool waits = found != chunks_.end() && found->second.is_ready && found->second.state > totals_.complete;
+  return waits ? Turn::Later : Turn::Now;
 }
 
 void FieldSurfaces::take(IVec3 chunk, std::vector<SurfaceUpdate>& out) {

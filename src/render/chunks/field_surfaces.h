@@ -16,14 +16,14 @@ namespace quoin {
 /// Surfaces of neighbouring chunks share vertices. The chunks that one change reaches therefore form a group: they are
 /// meshed from one snapshot with one choice of levels, and delivered together when the last is done. A change to a
 /// chunk whose group is in progress waits until that group has been delivered. Loaded chunks that were never shown do
-/// not wait.
+/// not wait. Groups with edited chunks belong to an epoch; groups of other levels of detail are on their own.
 class FieldSurfaces final : public SurfaceSource {
  public:
   FieldSurfaces(GridHandle handle, const ChunkSurfaceOptions& options, SurfaceTotals& totals);
 
   void follow(const SceneGrid& content, SurfaceClock::time_point now) override;
   void leave() override;
-  void forget() override { followed_ = {}; }
+  void forget() override;
   void mark_types(const SceneGrid& content, const ChangedTypes& changed, SurfaceClock::time_point now) override;
 
   [[nodiscard]] bool wants_levels() const override { return wants_levels_; }
@@ -38,7 +38,14 @@ class FieldSurfaces final : public SurfaceSource {
   [[nodiscard]] bool is_current(const SurfaceJob& job) const override;
   void withdrawn(const SurfaceJob& job) override;
   void collect(SurfaceJob& job) override;
+  [[nodiscard]] Turn turn_of(IVec3 chunk) const override;
   void take(IVec3 chunk, std::vector<SurfaceUpdate>& out) override;
+  [[nodiscard]] std::size_t count_edited(bool& has_edits) const override;
+  [[nodiscard]] bool may_begin_epoch() override;
+  [[nodiscard]] bool is_urgent(IVec3 chunk) const override;
+  void begin_epoch(SurfaceInputs* inputs, std::vector<std::unique_ptr<SurfaceJob>>& jobs) override;
+  void give_epoch() override;
+  void release_edits() override;
 
  private:
   struct Group {
@@ -47,12 +54,17 @@ class FieldSurfaces final : public SurfaceSource {
     std::shared_ptr<const FieldBodies> bodies;  // of the chunks that jobs read
     std::vector<IVec3> chunks;
     std::size_t unfinished = 0;  // of these
+    std::uint64_t state = 0;     // of the scene that it shows
+    bool is_in_epoch = false;    // given with the epoch
+    bool is_urgent = false;      // an epoch waits for it
   };
   struct FieldChunk {
     std::shared_ptr<Group> group;   // that it is meshed in; null: in none
     std::uint64_t serial = 0;       // of the newest job
+    std::uint64_t state = 0;        // of the scene: `surface` waits until it is complete
     SurfaceClock::time_point seen;  // time of the last change
     bool is_stale = false;          // it changed after it was meshed or put into a group
+    bool is_edited = false;         // by an edit: its group belongs to the next epoch
     bool is_bound = false;          // the same change also reached neighbours
     bool is_working = false;        // a worker has the newest job
     bool is_done = false;           // in its group
@@ -76,19 +88,27 @@ class FieldSurfaces final : public SurfaceSource {
   using Chunks = std::unordered_map<IVec3, FieldChunk, CoordinateHash>;
   using Members = std::vector<IVec3>;
 
+  /// Reasons to mesh a chunk again. `Load`: on its own. `Level`: together with its neighbours that changed. `Edit`: so,
+  /// and in an epoch.
+  enum class Cause : std::uint8_t { Load, Level, Edit };
+
   void begin_anew(const DensityGrid& field, SurfaceClock::time_point now);
   void follow_changes(const DensityGrid& field, const DensityChanges& changes, SurfaceClock::time_point now);
-  void see_whether_there(const DensityGrid& field, IVec3 chunk, bool is_bound, SurfaceClock::time_point now);
-  void mark(IVec3 chunk, bool is_bound, SurfaceClock::time_point now);
+  void see_whether_there(const DensityGrid& field, IVec3 chunk, Cause cause, SurfaceClock::time_point now);
+  void mark(IVec3 chunk, Cause cause, SurfaceClock::time_point now);
   void set_level(IVec3 chunk, FieldChunk& state, int level, SurfaceClock::time_point now);
   [[nodiscard]] std::array<std::uint8_t, 27> levels_around(IVec3 chunk) const;
   [[nodiscard]] int reach_at(IVec3 chunk) const;
   [[nodiscard]] Members members_with(IVec3 chunk) const;
   [[nodiscard]] bool may_begin(const Members& members) const;
-  std::shared_ptr<Group> begin_group(const Members& members);
+  [[nodiscard]] bool is_edited(const Members& members) const;
+  [[nodiscard]] std::vector<Members> edited_groups() const;
+  std::shared_ptr<Group> begin_group(const Members& members, bool is_in_epoch);
+  void set_inputs(Group& group, SurfaceInputs& inputs);
+  [[nodiscard]] std::unique_ptr<SurfaceJob> job_of(const SurfaceInputs& inputs, IVec3 chunk);
   [[nodiscard]] std::shared_ptr<const FieldBodies> bodies_around(const Members& members, const DensityGrid& field);
   void finish_chunk(FieldChunk& state, std::shared_ptr<const ChunkSurface> surface);
-  void give(const Members& members);
+  void give(const Group& group);
   void abandon_groups();
   void make_ready(IVec3 chunk, FieldChunk& state);
   void erase_if_over(IVec3 chunk);
@@ -100,7 +120,11 @@ class FieldSurfaces final : public SurfaceSource {
   Chunks chunks_;
   FieldBodies bodies_;  // of the field as it is
   ChunkSet stale_;      // chunks that are
+  ChunkSet edited_;     // some of these
   ChunkSet waiting_;    // in a group that has begun, or one that may begin
+  std::vector<std::shared_ptr<Group>> epoch_;
+  bool has_left_ = false;      // the scene no longer shows the grid
+  bool is_forgotten_ = false;  // memory ran out; groups may lack jobs
   bool is_prepared_ = true;
   bool is_blocked_ = false;  // some group waits for another
   bool wants_levels_ = false;

@@ -66,6 +66,7 @@ struct SurfaceJob {
   IVec3 chunk{0};
   std::uint64_t serial = 0;
   double distance = 0.0;          ///< from the eye; the nearest job comes first
+  bool is_in_epoch = false;       ///< of an edited chunk: its inputs must not change, and it comes before all others
   SurfaceClock::time_point seen;  ///< time of the edit
 
   GridSnapshot voxels;  ///< blocky

@@ -9,7 +9,10 @@
 #include <vector>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/parallel.h>
 #include <quoin/core/vec.h>
+#include <quoin/grid/voxel_registry.h>
+#include <quoin/render/chunk_surface.h>
 #include <quoin/render/propagated_light.h>
 #include <quoin/scene/scene.h>
 
@@ -57,12 +60,29 @@ struct ReadyChunk {
   IVec3 chunk{0};
 };
 
+/// Maximum number of chunks of voxels, or of a field, that are edited together: see SurfaceTotals.
+inline constexpr std::size_t kMaxEpochChunks = 256;
+
 /// Totals over all sources.
+///
+/// The surfaces of all chunks that edits change between two states of the scene form an epoch. They are made from the
+/// later state and can be taken when the last one is complete:
+///
+///   state       1       2       3       4                 numbers of the updates
+///   edits       a       b a             c
+///   epoch       [ a .......... ][ a b .......... ][ c ...  one at a time; edits in the meantime wait for the next
+///   complete    0               1                 3
+///
+/// Loaded chunks belong to no epoch. Each can be taken on its own, once the state in which it was loaded is complete.
 struct SurfaceTotals {
   std::uint64_t serial = 0;  ///< of the job that was made last
   std::size_t unfinished = 0;
   std::size_t pending = 0;
   std::vector<ReadyChunk> ready;  ///< and perhaps some that are no more
+  std::uint64_t state = 0;        ///< number of the scene's state that the sources follow
+  std::uint64_t complete = 0;     ///< the surfaces of all edits up to this state can be taken
+  std::size_t in_epoch = 0;       ///< unfinished parts of the epoch in progress
+  bool loads_only = false;        ///< changes count as loaded chunks, not as edits
   /// Destroys densities that no job needs any more. Null: they are destroyed by the calls that drop them.
   std::shared_ptr<ReleaseQueue> releases;
 };
@@ -159,9 +179,10 @@ class SurfaceSource {
     (void)light;
     (void)now;
   }
-  /// Called when the grid left the scene: all of its surfaces are removed.
+  /// Called when the grid left the scene: the next epoch removes all of its surfaces.
   virtual void leave() = 0;
-  /// Makes the next `follow` start from scratch.
+  /// Makes the next `follow` start from scratch. Ends its part of the epoch in progress, without surfaces. Does not
+  /// throw.
   virtual void forget() = 0;
   /// Marks the chunks that show one of the types for meshing.
   virtual void mark_types(const SceneGrid& content, const ChangedTypes& changed, SurfaceClock::time_point now) = 0;
@@ -181,7 +202,7 @@ class SurfaceSource {
   [[nodiscard]] virtual bool has_chunks() const = 0;
   /// Creates the job of a waiting chunk. Requires: the chunk waits; `inputs` match the last `follow`.
   [[nodiscard]] virtual std::unique_ptr<SurfaceJob> make_job(SurfaceInputs& inputs, IVec3 chunk) = 0;
-  /// Called when a worker has received the job.
+  /// Called when a worker has received the job of a waiting chunk.
   virtual void hand_over(IVec3 chunk, std::uint64_t serial) = 0;
   /// Returns true if the job's result is still needed.
   [[nodiscard]] virtual bool is_current(const SurfaceJob& job) const = 0;
@@ -189,12 +210,59 @@ class SurfaceSource {
   virtual void withdrawn(const SurfaceJob& job) = 0;
   /// Called when the job is done.
   virtual void collect(SurfaceJob& job) = 0;
+
+  enum class Turn : std::uint8_t {
+    Now,     ///< together with all others of an epoch
+    IfRoom,  ///< on its own
+    Later,   ///< its state is not complete
+  };
+  /// Returns when the surface of a listed chunk can be taken.
+  [[nodiscard]] virtual Turn turn_of(IVec3 chunk) const = 0;
   /// Appends the surface if one is ready.
   virtual void take(IVec3 chunk, std::vector<SurfaceUpdate>& out) = 0;
+
+  /// Returns the number of chunks that must be meshed for the next epoch. Sets `has_edits` if the epoch has any chunk.
+  [[nodiscard]] virtual std::size_t count_edited(bool& has_edits) const = 0;
+  /// Returns false if the next epoch must wait for surfaces in progress, which then become urgent.
+  [[nodiscard]] virtual bool may_begin_epoch() { return true; }
+  /// Returns true if an epoch waits for the surface of a chunk.
+  [[nodiscard]] virtual bool is_urgent(IVec3 chunk) const {
+    (void)chunk;
+    return false;
+  }
+  /// Begins the next epoch: appends the jobs of all edited chunks, which are then handed over. `inputs`: null if the
+  /// grid is not in the scene. Requires: no epoch is in progress; `inputs` match the last `follow`; `prepare` was
+  /// called since.
+  virtual void begin_epoch(SurfaceInputs* inputs, std::vector<std::unique_ptr<SurfaceJob>>& jobs) = 0;
+  /// Makes the surfaces of the epoch ready to be taken. Requires: `totals.in_epoch` is 0.
+  virtual void give_epoch() = 0;
+  /// Treats the edited chunks as loaded ones.
+  virtual void release_edits() = 0;
 };
 
 /// Returns the source of the voxels or the field of a grid. Lifetime: `options` and `totals` must outlive it.
 [[nodiscard]] std::unique_ptr<SurfaceSource> make_surface_source(SurfaceKey key, const ChunkSurfaceOptions& options,
                                                                  SurfaceTotals& totals);
+
+/// The surfaces of the chunks of one grid's voxels or field, made on request instead of by workers. Equal to those of
+/// LiveMeshes; after an edit, only the affected ones are made.
+class GridSurfaces {
+ public:
+  GridSurfaces(GridHandle handle, SurfaceContent content, SurfaceStyle style);
+  GridSurfaces(const GridSurfaces&) = delete;
+  GridSurfaces& operator=(const GridSurfaces&) = delete;
+
+  [[nodiscard]] SurfaceStyle style() const { return options_.style; }
+  /// Makes the next `update` start from scratch, because the look of types may have changed.
+  void forget() { source_->forget(); }
+  /// Returns the changes since the last call, as LiveMeshes::take does. Requires: always the same grid or its
+  /// snapshots. Errors: bad_alloc; do not call it again after that.
+  [[nodiscard]] std::vector<SurfaceUpdate> update(const SceneGrid& grid, const VoxelRegistry& types, Threads threads);
+
+ private:
+  const ChunkSurfaceOptions options_;
+  SurfaceTotals totals_;
+  std::unique_ptr<SurfaceSource> source_;
+};
 
 }  // namespace quoin

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include <glm/common.hpp>
 #include <quoin/core/assert.h>
 
 #include "core/coordinates/chunk_order.h"
@@ -36,11 +37,14 @@ VoxelSurfaces::VoxelSurfaces(GridHandle handle, const ChunkSurfaceOptions& optio
 void VoxelSurfaces::follow(const Grid& grid, SurfaceClock::time_point now) {
   PendingChanges changes(followed_, grid);
   if (changes->empty()) return;
-  if (changes->all) begin_anew();
+  const bool is_load =
+      totals_.loads_only || (changes->all && (grid.is_partial() || grid.chunk_count() > kMaxEpochChunks));
+  const Cause cause = is_load ? Cause::Load : Cause::Edit;
+  if (changes->all) begin_anew(cause);
   if (options_.style == SurfaceStyle::Blocky) {
-    follow_blocky(grid, *changes, now);
+    follow_blocky(grid, *changes, cause, now);
   } else {
-    follow_smooth(grid, *changes, now);
+    follow_smooth(grid, *changes, cause, now);
   }
   changes.commit();
 }
@@ -60,25 +64,35 @@ void VoxelSurfaces::follow_light(const GridLight& light, SurfaceClock::time_poin
   for (const ChunkChange& change : changes->items) {
     for (int i = 0; i < 27; ++i) {
       const IVec3 offset = Neighbourhood::offset(i);
-      if (change.affects(offset)) mark_if_there(change.chunk + offset, now);
+      if (change.affects(offset)) mark_for_look(change.chunk + offset, now);
     }
   }
   changes.commit();
 }
 
-// Discards all surfaces and jobs, because they belong to another grid.
-void VoxelSurfaces::begin_anew() {
+// Marks all chunks, because their surfaces belong to another grid. `follow` removes those that are not in the new one.
+void VoxelSurfaces::begin_anew(Cause cause) {
   densities_.clear();
   for (auto& [chunk, state] : chunks_) {
-    if (state.is_gone) continue;
-    waiting_.insert(chunk);
+    if (state.is_gone && !state.is_edited && !state.is_in_epoch) continue;
     const Change change(totals_, state);
-    state.oldest = totals_.serial + 1;
     state.last_stamps.reset();
-    state.surface.reset();
-    state.is_ready = false;
-    // It stays pending until the new grid is known to contain it or not.
-    state.is_waiting = true;
+    state.is_gone = false;
+    if (cause == Cause::Load) {
+      leave_epoch(chunk, state);
+      edited_.erase(chunk);
+      state.is_edited = false;
+      state.surface.reset();
+      state.is_ready = state.is_together = false;
+      // It stays pending until the new grid is known to contain it or not.
+      waiting_.insert(chunk);
+      state.is_waiting = true;
+    } else {
+      note_edit(chunk, state);
+    }
+    if (state.is_in_epoch) continue;
+    state.oldest = totals_.serial + 1;
+    state.is_working = false;
   }
 }
 
@@ -87,23 +101,46 @@ void VoxelSurfaces::leave() {
   for (const auto& [chunk, state] : chunks_) {
     if (!state.is_gone) all.push_back(chunk);
   }
-  for (const IVec3 chunk : all) remove(chunk);
+  for (const IVec3 chunk : all) remove(chunk, Cause::Edit);
   followed_ = followed_light_ = {};
   densities_.clear();
 }
 
-void VoxelSurfaces::follow_blocky(const Grid& grid, const GridChanges& changes, SurfaceClock::time_point now) {
-  std::vector<IVec3> seen = chunks_to_mesh(grid, changes);
-  if (changes.all) {
-    for (const auto& [chunk, state] : chunks_) seen.push_back(chunk);
+void VoxelSurfaces::forget() {
+  followed_ = followed_light_ = {};
+  for (const auto& [chunk, member] : epoch_) {
+    VoxelChunk& state = chunks_.at(chunk);
+    const Change change(totals_, state);
+    if (!member.is_done) --totals_.in_epoch;
+    // If the chunk is gone, `follow` or `leave` finds out again.
+    state.is_in_epoch = state.is_gone = false;
   }
-  for (const IVec3 chunk : seen) {
-    if (grid.find_chunk(chunk) != nullptr && grid.is_loaded_around(chunk)) {
-      mark(chunk, chunks_[chunk], now);
-    } else {
-      remove_if_there(chunk);
+  epoch_.clear();
+}
+
+void VoxelSurfaces::follow_blocky(const Grid& grid, const GridChanges& changes, Cause cause,
+                                  SurfaceClock::time_point now) {
+  const auto see = [&](const std::vector<IVec3>& chunks, Cause why) {
+    for (const IVec3 chunk : chunks) {
+      if (grid.find_chunk(chunk) != nullptr && grid.is_loaded_around(chunk)) {
+        mark(chunk, chunks_[chunk], why, now);
+      } else {
+        remove_if_there(chunk, why);
+      }
     }
+  };
+  if (changes.all) {
+    std::vector<IVec3> all = grid.chunks();
+    for (const auto& [chunk, state] : chunks_) all.push_back(chunk);
+    return see(all, cause);
   }
+  GridChanges edits;
+  GridChanges loads;
+  for (const ChunkChange& change : changes.items) {
+    (change.is_edit && cause == Cause::Edit ? edits : loads).items.push_back(change);
+  }
+  see(chunks_to_mesh(grid, edits), Cause::Edit);
+  see(chunks_to_mesh(grid, loads), Cause::Load);
 }
 
 // Adds chunks that may have waited for a chunk to load, or must be hidden without it.
@@ -115,12 +152,13 @@ void VoxelSurfaces::add_chunks_around(IVec3 chunk, int distance, std::vector<IVe
   }
 }
 
-void VoxelSurfaces::remove_if_there(IVec3 chunk) {
+void VoxelSurfaces::remove_if_there(IVec3 chunk, Cause cause) {
   const auto found = chunks_.find(chunk);
-  if (found != chunks_.end() && !found->second.is_gone) remove(chunk);
+  if (found != chunks_.end() && !found->second.is_gone) remove(chunk, cause);
 }
 
-void VoxelSurfaces::follow_smooth(const Grid& grid, const GridChanges& changes, SurfaceClock::time_point now) {
+void VoxelSurfaces::follow_smooth(const Grid& grid, const GridChanges& changes, Cause cause,
+                                  SurfaceClock::time_point now) {
   std::vector<IVec3> changed;
   std::vector<IVec3> reached;
   densities_.follow(deferred(totals_.releases, std::make_shared<const Grid>(grid.snapshot())), changes, changed,
@@ -129,23 +167,32 @@ void VoxelSurfaces::follow_smooth(const Grid& grid, const GridChanges& changes, 
   for (const IVec3 chunk : changed) {
     for (const IVec3 step : {IVec3{0}, IVec3{1, 0, 0}, IVec3{0, 1, 0}, IVec3{0, 0, 1}}) asked.push_back(chunk - step);
   }
+  std::vector<IVec3> edited;
   for (const ChunkChange& change : changes.items) {
     if (!change.is_edit) add_chunks_around(change.chunk, kSmoothDistance, asked);
+    if (change.is_edit && edited.size() < kMaxEpochChunks) edited.push_back(change.chunk);
   }
-  for (const auto& [chunk, state] : chunks_) {
-    if (state.oldest > state.serial && !state.is_gone) asked.push_back(chunk);
+  if (changes.all) {
+    for (const auto& [chunk, state] : chunks_) asked.push_back(chunk);
   }
   sort_and_unite(asked);
-  for (const IVec3 chunk : asked) see_whether_meshed(grid, chunk, now);
-  for (const IVec3 chunk : reached) mark_if_there(chunk, now);
+  const auto cause_of = [&](IVec3 chunk) {
+    const auto is_near = [&](IVec3 edit) {
+      const IVec3 away = glm::abs(chunk - edit);
+      return std::max({away.x, away.y, away.z}) <= kSmoothDistance;
+    };
+    const bool is_edit = changes.all || std::any_of(edited.begin(), edited.end(), is_near);
+    return is_edit ? cause : Cause::Load;
+  };
+  for (const IVec3 chunk : asked) see_whether_meshed(chunk, can_own_smooth_quads(grid, chunk), cause_of(chunk), now);
+  for (const IVec3 chunk : reached) mark_if_there(chunk, cause_of(chunk), now);
 }
 
-void VoxelSurfaces::see_whether_meshed(const Grid& grid, IVec3 chunk, SurfaceClock::time_point now) {
+void VoxelSurfaces::see_whether_meshed(IVec3 chunk, bool is_meshed, Cause cause, SurfaceClock::time_point now) {
   const auto found = chunks_.find(chunk);
   const bool is_there = found != chunks_.end() && !found->second.is_gone;
-  const bool is_meshed = can_own_smooth_quads(grid, chunk);
-  if (is_meshed && !is_there) mark(chunk, chunks_[chunk], now);
-  if (!is_meshed && is_there) remove(chunk);
+  if (is_meshed && !is_there) mark(chunk, chunks_[chunk], cause, now);
+  if (!is_meshed && is_there) remove(chunk, cause);
 }
 
 void VoxelSurfaces::mark_types(const SceneGrid& content, const ChangedTypes& changed, SurfaceClock::time_point now) {
@@ -158,63 +205,113 @@ void VoxelSurfaces::mark_types(const SceneGrid& content, const ChangedTypes& cha
       return is_in(changed.visibility, type) || (is_smooth && is_in(changed.colour, type));
     };
     if (std::none_of(types.begin(), types.end(), has_changed)) continue;
-    for (int i = 0; i < 27; ++i) mark_if_there(chunk + Neighbourhood::offset(i), now);
+    for (int i = 0; i < 27; ++i) mark_for_look(chunk + Neighbourhood::offset(i), now);
   }
 }
 
-void VoxelSurfaces::mark_if_there(IVec3 chunk, SurfaceClock::time_point now) {
+void VoxelSurfaces::mark_if_there(IVec3 chunk, Cause cause, SurfaceClock::time_point now) {
   const auto found = chunks_.find(chunk);
-  if (found != chunks_.end() && !found->second.is_gone) mark(chunk, found->second, now);
+  if (found != chunks_.end() && !found->second.is_gone) mark(chunk, found->second, cause, now);
+}
+
+// Marks a chunk because light or types have changed. New surfaces do not have to match the visible ones.
+void VoxelSurfaces::mark_for_look(IVec3 chunk, SurfaceClock::time_point now) {
+  const auto found = chunks_.find(chunk);
+  if (found == chunks_.end() || found->second.is_gone) return;
+  const bool is_load = found->second.collected == 0 || totals_.loads_only;
+  mark(chunk, found->second, is_load ? Cause::Load : Cause::Edit, now);
 }
 
 void VoxelSurfaces::mark_all(SurfaceClock::time_point now) {
   for (auto& [chunk, state] : chunks_) {
-    if (!state.is_gone) mark(chunk, state, now);
+    if (!state.is_gone) mark(chunk, state, Cause::Load, now);
   }
 }
 
-void VoxelSurfaces::mark(IVec3 chunk, VoxelChunk& state, SurfaceClock::time_point now) {
-  waiting_.insert(chunk);
+// A chunk of an epoch is meshed again in the next one, so that no newer surface of it is shown first.
+void VoxelSurfaces::mark(IVec3 chunk, VoxelChunk& state, Cause cause, SurfaceClock::time_point now) {
+  const bool is_edit = cause == Cause::Edit || state.is_edited || state.is_in_epoch;
+  if (!is_edit) waiting_.insert(chunk);
   box_ = unite(box_, {chunk, chunk + 1});
   const Change change(totals_, state);
   // Jobs of a chunk that was here before may still be running.
   if (state.oldest == 0) state.oldest = totals_.serial + 1;
-  // The chunk's removal need not be reported any more.
-  if (state.is_gone) state.is_ready = false;
-  state.is_gone = false;
-  state.is_waiting = true;
   state.seen = now;
+  if (is_edit) {
+    note_edit(chunk, state);
+  } else {
+    // The chunk's removal need not be reported any more.
+    if (state.is_gone && !state.is_together) state.is_ready = false;
+    state.is_waiting = true;
+    state.state = totals_.state;
+  }
+  state.is_gone = false;
 }
 
-void VoxelSurfaces::wait_again(IVec3 chunk, VoxelChunk& state) {
-  mark(chunk, state, state.seen);
-}
-
-void VoxelSurfaces::remove(IVec3 chunk) {
-  VoxelChunk& state = chunks_.at(chunk);
+// Requires: a CountedChange of the state.
+void VoxelSurfaces::note_edit(IVec3 chunk, VoxelChunk& state) {
+  edited_.insert(chunk);
+  state.is_edited = true;
   waiting_.erase(chunk);
+  state.is_waiting = false;
+}
+
+void VoxelSurfaces::remove(IVec3 chunk, Cause cause) {
+  VoxelChunk& state = chunks_.at(chunk);
   {
     const Change change(totals_, state);
-    state.oldest = totals_.serial + 1;
-    state.is_waiting = state.is_working = false;
-    state.is_ready = false;
-    state.is_gone = true;
-    state.surface.reset();
     state.last_stamps.reset();
-    if (state.is_shown) make_ready(chunk, state);
+    if (cause == Cause::Edit) {
+      note_edit(chunk, state);
+    } else {
+      leave_epoch(chunk, state);
+      waiting_.erase(chunk);
+      edited_.erase(chunk);
+      state.is_waiting = state.is_edited = false;
+      state.is_ready = state.is_together = false;
+      state.surface.reset();
+      state.state = 0;
+      if (state.is_shown) show(chunk, state, nullptr, false);
+    }
+    state.is_gone = true;
+    if (!state.is_in_epoch) {
+      state.oldest = totals_.serial + 1;
+      state.is_working = false;
+    }
   }
-  if (!state.is_listed) chunks_.erase(chunk);
+  erase_if_over(chunk);
 }
 
-void VoxelSurfaces::make_ready(IVec3 chunk, VoxelChunk& state) {
-  state.is_ready = true;
-  if (state.is_listed) return;
+// Requires: a CountedChange of the state.
+void VoxelSurfaces::leave_epoch(IVec3 chunk, VoxelChunk& state) {
+  if (!state.is_in_epoch) return;
+  const auto member = epoch_.find(chunk);
+  QUOIN_ASSERT(member != epoch_.end(), "a chunk of the epoch");
+  if (!member->second.is_done) --totals_.in_epoch;
+  epoch_.erase(member);
+  state.is_in_epoch = false;
+}
+
+void VoxelSurfaces::erase_if_over(IVec3 chunk) {
+  const auto found = chunks_.find(chunk);
+  QUOIN_ASSERT(found != chunks_.end(), "a known chunk");
+  const VoxelChunk& state = found->second;
+  if (state.is_gone && !state.is_pending() && !state.is_listed) chunks_.erase(found);
+}
+
+// Replaces the surface that is to be taken.
+void VoxelSurfaces::show(IVec3 chunk, VoxelChunk& state, std::shared_ptr<const ChunkSurface> surface,
+                         bool is_together) {
+  state.surface = std::move(surface);
+  state.is_ready = state.surface != nullptr || state.is_shown;
+  state.is_together = is_together;
+  if (!state.is_ready || state.is_listed) return;
   totals_.ready.push_back({{handle_, SurfaceContent::Voxels}, chunk});
   state.is_listed = true;
 }
 
 std::unique_ptr<SurfaceJob> VoxelSurfaces::make_job(SurfaceInputs& inputs, IVec3 chunk) {
-  QUOIN_ASSERT(waiting_.contains(chunk), "a chunk that waits");
+  QUOIN_ASSERT(waiting_.contains(chunk) || edited_.contains(chunk), "a chunk that waits");
   // Smooth jobs have that of their densities.
   if (options_.style == SurfaceStyle::Smooth) return make_job(GridSnapshot(), chunk, *inputs.types);
   return make_job(inputs.voxels(), chunk, *inputs.types, inputs.light());
@@ -257,14 +354,16 @@ bool VoxelSurfaces::is_current(const SurfaceJob& job) const {
   const auto found = chunks_.find(job.chunk);
   if (found == chunks_.end()) return false;
   const VoxelChunk& state = found->second;
-  return !state.is_gone && !state.is_waiting && state.serial == job.serial && job.serial >= state.oldest;
+  if (state.is_in_epoch && epoch_.at(job.chunk).serial == job.serial) return true;
+  const bool waits_again = state.is_waiting || state.is_edited;
+  return !state.is_gone && !waits_again && state.serial == job.serial && job.serial >= state.oldest;
 }
 
 void VoxelSurfaces::withdrawn(const SurfaceJob& job) {
   const auto found = chunks_.find(job.chunk);
   if (found == chunks_.end() || found->second.serial != job.serial || found->second.is_gone) return;
   VoxelChunk& state = found->second;
-  wait_again(job.chunk, state);
+  mark(job.chunk, state, Cause::Load, state.seen);
   const Change change(totals_, state);
   state.is_working = false;
 }
@@ -297,8 +396,12 @@ void VoxelSurfaces::keep_stamps(const SurfaceJob& job, VoxelChunk& state) {
 void VoxelSurfaces::collect(SurfaceJob& job) {
   if (options_.style == SurfaceStyle::Smooth) keep_densities(job);
   const auto found = chunks_.find(job.chunk);
-  if (found == chunks_.end() || found->second.is_gone) return;
+  if (found == chunks_.end()) return;
   VoxelChunk& state = found->second;
+  const auto member = epoch_.find(job.chunk);
+  if (member != epoch_.end() && member->second.serial == job.serial) return collect_member(job, state, member->second);
+  // Smooth jobs of the epoch are compared with the surface that was collected last.
+  if (state.is_gone || (state.is_in_epoch && options_.style == SurfaceStyle::Smooth)) return;
   const Change change(totals_, state);
   const bool is_newest = job.serial == state.serial;
   if (is_newest) state.is_working = false;
@@ -307,7 +410,7 @@ void VoxelSurfaces::collect(SurfaceJob& job) {
   const bool is_void = job.outcome == SurfaceJob::Outcome::OutOfMemory ||
                        (job.outcome == SurfaceJob::Outcome::AsBefore && job.last_collected != state.collected);
   if (is_void) {
-    if (is_newest) {
+    if (is_newest && !state.is_edited) {
       waiting_.insert(job.chunk);
       state.is_waiting = true;
     }
@@ -316,9 +419,85 @@ void VoxelSurfaces::collect(SurfaceJob& job) {
   state.collected = job.serial;
   if (options_.style == SurfaceStyle::Smooth) keep_stamps(job, state);
   if (job.outcome == SurfaceJob::Outcome::AsBefore) return;
-  state.surface = std::move(job.surface);
-  state.is_ready = false;
-  if (state.surface != nullptr || state.is_shown) make_ready(job.chunk, state);
+  show(job.chunk, state, std::move(job.surface), false);
+}
+
+void VoxelSurfaces::collect_member(SurfaceJob& job, VoxelChunk& state, Member& member) {
+  QUOIN_ASSERT(!member.is_done && totals_.in_epoch > 0, "an unfinished chunk of the epoch");
+  QUOIN_ASSERT(job.outcome != SurfaceJob::Outcome::OutOfMemory, "jobs of an epoch are repeated");
+  QUOIN_ASSERT(job.outcome != SurfaceJob::Outcome::AsBefore || job.last_collected == state.collected,
+               "compared with the newest surface");
+  const Change change(totals_, state);
+  state.is_working = false;
+  state.collected = job.serial;
+  if (options_.style == SurfaceStyle::Smooth) keep_stamps(job, state);
+  member.is_done = true;
+  member.is_as_before = job.outcome == SurfaceJob::Outcome::AsBefore;
+  member.surface = std::move(job.surface);
+  --totals_.in_epoch;
+}
+
+std::size_t VoxelSurfaces::count_edited(bool& has_edits) const {
+  has_edits |= !edited_.empty();
+  return static_cast<std::size_t>(
+      std::count_if(edited_.begin(), edited_.end(), [&](IVec3 chunk) { return !chunks_.at(chunk).is_gone; }));
+}
+
+void VoxelSurfaces::begin_epoch(SurfaceInputs* inputs, std::vector<std::unique_ptr<SurfaceJob>>& jobs) {
+  QUOIN_ASSERT(epoch_.empty(), "no epoch is in progress");
+  std::vector<IVec3> chunks(edited_.begin(), edited_.end());
+  sort_and_unite(chunks);
+  for (const IVec3 chunk : chunks) {
+    VoxelChunk& state = chunks_.at(chunk);
+    QUOIN_ASSERT(state.is_gone || inputs != nullptr, "a grid with the chunk");
+    std::unique_ptr<SurfaceJob> job = state.is_gone ? nullptr : make_job(*inputs, chunk);
+    if (job != nullptr) jobs.push_back(nullptr);
+    Member& member = epoch_[chunk];
+    const Change change(totals_, state);
+    edited_.erase(chunk);
+    state.is_edited = false;
+    state.is_in_epoch = true;
+    if (job == nullptr) {
+      member.is_done = true;
+      state.last_stamps.reset();
+      continue;
+    }
+    member.serial = state.serial = job->serial;
+    state.is_working = true;
+    ++totals_.in_epoch;
+    jobs.back() = std::move(job);
+  }
+}
+
+void VoxelSurfaces::give_epoch() {
+  QUOIN_ASSERT(totals_.in_epoch == 0, "all surfaces of the epoch are complete");
+  while (!epoch_.empty()) {
+    const auto member = epoch_.begin();
+    const IVec3 chunk = member->first;
+    VoxelChunk& state = chunks_.at(chunk);
+    {
+      const Change change(totals_, state);
+      if (!member->second.is_as_before) show(chunk, state, std::move(member->second.surface), true);
+      state.is_in_epoch = false;
+    }
+    epoch_.erase(member);
+    erase_if_over(chunk);
+  }
+}
+
+void VoxelSurfaces::release_edits() {
+  for (const IVec3 chunk : std::exchange(edited_, {})) {
+    VoxelChunk& state = chunks_.at(chunk);
+    {
+      const Change change(totals_, state);
+      state.is_edited = false;
+    }
+    if (state.is_gone) {
+      remove(chunk, Cause::Load);
+    } else {
+      mark(chunk, state, Cause::Load, state.seen);
+    }
+  }
 }
 
 // Returns the regions that differ from the ones taken last.
@@ -343,6 +522,12 @@ std::uint64_t VoxelSurfaces::note_regions(VoxelChunk& state) const {
   return changed;
 }
 
+SurfaceSource::Turn VoxelSurfaces::turn_of(IVec3 chunk) const {
+  const auto found = chunks_.find(chunk);
+  if (found == chunks_.end() || !found->second.is_ready || found->second.is_together) return Turn::Now;
+  return found->second.state <= totals_.complete ? Turn::IfRoom : Turn::Later;
+}
+
 void VoxelSurfaces::take(IVec3 chunk, std::vector<SurfaceUpdate>& out) {
   const auto found = chunks_.find(chunk);
   if (found == chunks_.end()) return;
@@ -351,14 +536,14 @@ void VoxelSurfaces::take(IVec3 chunk, std::vector<SurfaceUpdate>& out) {
     const Change change(totals_, state);
     state.is_listed = false;
     if (state.is_ready) {
-      state.is_ready = false;
+      state.is_ready = state.is_together = false;
       state.is_shown = state.surface != nullptr;
       const std::uint64_t changed = note_regions(state);
       out.push_back({handle_, chunk, std::move(state.surface), SurfaceContent::Voxels, changed});
       state.surface.reset();
     }
   }
-  if (state.is_gone) chunks_.erase(found);
+  erase_if_over(chunk);
 }
 
 }  // namespace quoin

@@ -19,23 +19,32 @@ struct VoxelChunk {
   std::uint64_t serial = 0;       ///< of the newest job
   std::uint64_t oldest = 0;       ///< results of earlier jobs are obsolete
   std::uint64_t collected = 0;    ///< the newest collected job
+  std::uint64_t state = 0;        ///< of the scene: `surface` waits until it is complete
   SurfaceClock::time_point seen;  ///< time of the last edit
-  bool is_waiting = false;        ///< for a job
+  bool is_waiting = false;        ///< for a job, on its own
+  bool is_edited = false;         ///< waits for the next epoch
+  bool is_in_epoch = false;       ///< in the epoch in progress
   bool is_working = false;        ///< the newest job is not collected
   bool is_ready = false;          ///< `surface` is ready to be taken
+  bool is_together = false;       ///< `surface` is to be taken with all others of its epoch
   bool is_listed = false;         ///< in SurfaceTotals::ready
   bool is_shown = false;          ///< the last surface taken is not null
-  bool is_gone = false;           ///< it must no longer be visible
+  bool is_gone = false;           ///< the grid no longer has it
   std::shared_ptr<const ChunkSurface> surface;
   std::vector<std::uint64_t> region_hashes;    ///< of the surface taken last, if it has several regions; 0: no quads
   std::unique_ptr<DensityStamps> last_stamps;  ///< smooth: densities of the surface collected last
   std::uint64_t type_generation = 0;           ///< types of the surface collected last
 
-  [[nodiscard]] bool is_unfinished() const { return is_waiting || is_working; }
+  [[nodiscard]] bool is_unfinished() const { return is_waiting || is_edited || is_in_epoch || is_working; }
   [[nodiscard]] bool is_pending() const { return is_unfinished() || is_ready; }
 };
 
 /// The voxels of one grid.
+///
+/// A chunk is meshed on its own if it was loaded, and in the next epoch if it was edited:
+///
+///   loaded    is_waiting -> is_working -> is_ready
+///   edited    is_edited -> is_in_epoch -> is_ready, with the rest of the epoch
 class VoxelSurfaces final : public SurfaceSource {
  public:
   VoxelSurfaces(GridHandle handle, const ChunkSurfaceOptions& options, SurfaceTotals& totals);
@@ -44,7 +53,7 @@ class VoxelSurfaces final : public SurfaceSource {
   void follow(const Grid& grid, SurfaceClock::time_point now);
   void follow_light(const GridLight& light, SurfaceClock::time_point now) override;
   void leave() override;
-  void forget() override { followed_ = followed_light_ = {}; }
+  void forget() override;
   void mark_types(const SceneGrid& content, const ChangedTypes& changed, SurfaceClock::time_point now) override;
 
   void prepare(const SceneGrid&, const VoxelRegistry&) override {}
@@ -59,26 +68,44 @@ class VoxelSurfaces final : public SurfaceSource {
   [[nodiscard]] bool is_current(const SurfaceJob& job) const override;
   void withdrawn(const SurfaceJob& job) override;
   void collect(SurfaceJob& job) override;
+  [[nodiscard]] Turn turn_of(IVec3 chunk) const override;
   void take(IVec3 chunk, std::vector<SurfaceUpdate>& out) override;
+  [[nodiscard]] std::size_t count_edited(bool& has_edits) const override;
+  void begin_epoch(SurfaceInputs* inputs, std::vector<std::unique_ptr<SurfaceJob>>& jobs) override;
+  void give_epoch() override;
+  void release_edits() override;
 
  private:
   using Change = CountedChange<VoxelChunk>;
   using Chunks = std::unordered_map<IVec3, VoxelChunk, CoordinateHash>;
+  enum class Cause : std::uint8_t { Load, Edit };
 
-  void begin_anew();
-  void follow_blocky(const Grid& grid, const GridChanges& changes, SurfaceClock::time_point now);
-  void follow_smooth(const Grid& grid, const GridChanges& changes, SurfaceClock::time_point now);
+  /// A chunk of the epoch in progress.
+  struct Member {
+    std::uint64_t serial = 0;  // of its job; 0: the chunk is gone
+    bool is_done = false;
+    bool is_as_before = false;
+    std::shared_ptr<const ChunkSurface> surface;
+  };
+
+  void begin_anew(Cause cause);
+  void follow_blocky(const Grid& grid, const GridChanges& changes, Cause cause, SurfaceClock::time_point now);
+  void follow_smooth(const Grid& grid, const GridChanges& changes, Cause cause, SurfaceClock::time_point now);
   static void add_chunks_around(IVec3 chunk, int distance, std::vector<IVec3>& to);
-  void remove_if_there(IVec3 chunk);
-  void see_whether_meshed(const Grid& grid, IVec3 chunk, SurfaceClock::time_point now);
-  void mark_if_there(IVec3 chunk, SurfaceClock::time_point now);
+  void remove_if_there(IVec3 chunk, Cause cause);
+  void see_whether_meshed(IVec3 chunk, bool is_meshed, Cause cause, SurfaceClock::time_point now);
+  void mark_if_there(IVec3 chunk, Cause cause, SurfaceClock::time_point now);
+  void mark_for_look(IVec3 chunk, SurfaceClock::time_point now);
   void mark_all(SurfaceClock::time_point now);
-  void mark(IVec3 chunk, VoxelChunk& state, SurfaceClock::time_point now);
-  void wait_again(IVec3 chunk, VoxelChunk& state);
-  void remove(IVec3 chunk);
+  void mark(IVec3 chunk, VoxelChunk& state, Cause cause, SurfaceClock::time_point now);
+  void note_edit(IVec3 chunk, VoxelChunk& state);
+  void remove(IVec3 chunk, Cause cause);
+  void leave_epoch(IVec3 chunk, VoxelChunk& state);
+  void erase_if_over(IVec3 chunk);
   void keep_densities(const SurfaceJob& job);
   void keep_stamps(const SurfaceJob& job, VoxelChunk& state);
-  void make_ready(IVec3 chunk, VoxelChunk& state);
+  void collect_member(SurfaceJob& job, VoxelChunk& state, Member& member);
+  void show(IVec3 chunk, VoxelChunk& state, std::shared_ptr<const ChunkSurface> surface, bool is_together);
   [[nodiscard]] std::uint64_t note_regions(VoxelChunk& state) const;
 
   GridHandle handle_;
@@ -89,6 +116,8 @@ class VoxelSurfaces final : public SurfaceSource {
   bool is_lit_ = false;
   Chunks chunks_;
   ChunkSet waiting_;
+  ChunkSet edited_;
+  std::unordered_map<IVec3, Member, CoordinateHash> epoch_;
   IBox box_;                // of all chunks that there were
   DensityCache densities_;  // smooth
 };

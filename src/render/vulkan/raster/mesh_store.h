@@ -12,7 +12,7 @@
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_tracer.h>
 
-#include "render/chunks/grid_surfaces.h"
+#include "render/chunks/surface_source.h"
 #include "render/vulkan/device/device_memory.h"
 #include "scene/tracer/placed_grid.h"
 
