@@ -205,24 +205,20 @@ TEST(LiveLitMeshes, RestoresPlainMeshesWithoutLight) {
   }
 }
 
-// Workers update light and meshes at their own pace. Finally both match the scene.
 TEST(LiveLitMeshes, FollowLiveLight) {
   DarkeningScene world(8);
   LiveLight light;
   LiveMeshOptions options;
   options.region_edge = kChunkEdge;  // as the surfaces that it is compared with
   LiveMeshes meshes(options);
-  meshes.use_light(&light.shown());
+  meshes.use_light(light);
   Surfaces surfaces;
   std::mt19937 random(9);
   for (int i = 0; i < 40; ++i) {
     world.edit(random);
-    light.update(world.scene);
-    light.take();
     meshes.update(world.scene, DVec3(0.0));
     take(meshes, surfaces);
   }
-  light.finish(world.scene);
   meshes.finish(world.scene, DVec3(0.0));
   take(meshes, surfaces);
   expect_right(world, light.shown(), surfaces, LightMerging::Linear);

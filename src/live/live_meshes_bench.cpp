@@ -1,15 +1,20 @@
 // live: time from an edit to the new meshes of all affected chunks, and from an empty start to all meshes. Terrain of
-// 256x128x256 voxels, the default number of workers of `LiveMeshOptions`.
+// 256x128x256 voxels, the default number of workers of `LiveMeshOptions`. live/*/frames: a game that digs at 60 frames
+// per second, with times from the edit to the `take` that returns it. QUOIN_LIVE_DIGS: number of digs (default 120).
 
 #include <quoin/live/live_meshes.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <string>
+#include <thread>
+#include <vector>
 
 #include <benchmark/benchmark.h>
+#include <quoin/live/live_light.h>
 
 #include <quoin/terrain/terrain.h>
 
@@ -135,7 +140,66 @@ void dig(benchmark::State& state, bool corner) {
   state.counters["update_seconds"] = benchmark::Counter(update_seconds, benchmark::Counter::kAvgIterations);
 }
 
+// Digs near the border of two or four chunks every fifth frame.
+void frames(benchmark::State& state, bool is_lit) {
+  using Clock = std::chrono::steady_clock;
+  const auto milliseconds = [](Clock::duration time) {
+    return std::chrono::duration<double, std::milli>(time).count();
+  };
+  constexpr std::chrono::microseconds kFrame{16'667};
+  const char* const wanted = std::getenv("QUOIN_LIVE_DIGS");
+  const int digs = std::max(1, wanted == nullptr ? 120 : std::atoi(wanted));
+  Land land;
+  LiveLight light;
+  LiveMeshes meshes;
+  if (is_lit) meshes.use_light(light);
+  meshes.finish(land.scene, {128, 100, 128});
+  fail_unless(!meshes.take().empty(), "nothing was meshed");
+  std::vector<double> latency;
+  std::vector<double> calls;  // of `update` and `take`, in one frame
+  for (auto _ : state) {
+    Clock::time_point frame = Clock::now();
+    for (int dig = 0; dig < digs; ++dig) {
+      const IVec3 at = land.above(62 + dig % 4 + 64 * (dig % 3), 10 + dig * 7 % 236) - IVec3{0, 1, 0};
+      land.scene.edit(land.grid).grid.set(at, kAir);
+      const Clock::time_point edited = Clock::now();
+      std::uint64_t number = 0;
+      bool is_shown = false;
+      for (int i = 0; i < 5 || !is_shown; ++i) {
+        const Clock::time_point start = Clock::now();
+        const std::uint64_t update = meshes.update(land.scene, DVec3(at));
+        if (i == 0) number = update;
+        const std::size_t surfaces = meshes.take().size();
+        const Clock::time_point end = Clock::now();
+        calls.push_back(milliseconds(end - start));
+        if (!is_shown && meshes.shown_update() >= number) {
+          fail_unless(surfaces != 0, "the edit changed nothing");
+          latency.push_back(milliseconds(end - edited));
+          is_shown = true;
+        }
+        frame = std::max(frame + kFrame, end);
+        std::this_thread::sleep_until(frame);
+      }
+    }
+  }
+  const auto report = [&](const char* name, std::vector<double>& all) {
+    std::sort(all.begin(), all.end());
+    state.counters[std::string(name) + "_ms_p50"] = all[all.size() / 2];
+    state.counters[std::string(name) + "_ms_p99"] = all[all.size() * 99 / 100];
+  };
+  report("latency", latency);
+  report("calls", calls);
+}
+
 void register_all() {
+  for (const bool is_lit : {false, true}) {
+    benchmark::RegisterBenchmark(is_lit ? "live/lit/frames" : "live/blocky/frames",
+                                 [=](benchmark::State& state) { frames(state, is_lit); })
+        ->Unit(benchmark::kMillisecond)
+        ->Iterations(1)
+        ->UseRealTime();
+  }
+
   for (const bool corner : {false, true}) {
     benchmark::RegisterBenchmark(corner ? "live/density/edit_corner" : "live/density/edit",
                                  [=](benchmark::State& state) { dig(state, corner); })

@@ -191,7 +191,7 @@ TEST(MeshScheduler, MeshesTheLastOfSeveralEdits) {
   }
   gated.open();
   scheduler.finish(one.scene, {});
-  EXPECT_EQ(scheduler.stats().chunks_meshed, 2);
+  EXPECT_EQ(scheduler.stats().chunks_meshed, 3) << "chunk 0, the first edit, and all others at once";
   for (const SurfaceUpdate& update : scheduler.take()) EXPECT_EQ(faces_of(update), update.chunk.x == 0 ? 6U : 36U);
 }
 
@@ -239,6 +239,151 @@ TEST(MeshScheduler, DropsChunksRemovedOrReplacedDuringMeshing) {
       EXPECT_EQ(faces_of(taken[0]), 10U);
     }
   }
+}
+
+// Returns a scene with two chunks that were taken, and an edit of both.
+void edit_two_chunks(OneGrid& one, GatedWork& gated, MeshScheduler& scheduler) {
+  fill_row(one.grid(), 2);
+  gated.let_through(2);
+  scheduler.finish(one.scene, {});
+  EXPECT_EQ(scheduler.take().size(), 2U);
+  one.grid().fill_box({{63, 3, 3}, {65, 4, 4}}, 1);
+  scheduler.update(one.scene, {});
+}
+
+TEST(MeshScheduler, DeliversAllChunksOfAnEditTogether) {
+  for (const std::size_t max_bytes : {~std::size_t{0}, std::size_t{0}}) {
+    OneGrid one;
+    GatedWork gated(blocky(2));
+    MeshScheduler scheduler(blocky(2), gated.work());
+    edit_two_chunks(one, gated, scheduler);
+    const std::uint64_t before = scheduler.shown_update();
+    gated.wait_for_started(4);
+    gated.let_through(1);
+    while (scheduler.stats().chunks_meshed < 3) std::this_thread::yield();
+    EXPECT_TRUE(scheduler.take(max_bytes).empty());
+    EXPECT_EQ(scheduler.shown_update(), before);
+    EXPECT_EQ(scheduler.pending(), 2U);
+    gated.open();
+    while (scheduler.stats().chunks_meshed < 4) std::this_thread::yield();
+    EXPECT_EQ(scheduler.take(max_bytes).size(), 2U) << "the limit does not divide them";
+    EXPECT_EQ(scheduler.shown_update(), before + 1);
+    EXPECT_EQ(scheduler.update(one.scene, {}), before + 2);
+    EXPECT_TRUE(scheduler.take().empty());
+    EXPECT_EQ(scheduler.shown_update(), before + 2) << "nothing changed since";
+  }
+}
+
+TEST(MeshScheduler, RepeatsJobsOfAnEditWithoutMemory) {
+  OneGrid one;
+  GatedWork gated(blocky(1));
+  std::atomic<int> failures{0};
+  MeshScheduler scheduler(blocky(1), [&, work = gated.work()](SurfaceJob& job, SurfaceWorkspace& workspace) {
+    if (failures-- > 0) throw std::bad_alloc();
+    work(job, workspace);
+  });
+  edit_two_chunks(one, gated, scheduler);
+  gated.open();
+  scheduler.finish(one.scene, {});
+  EXPECT_EQ(scheduler.take().size(), 2U);
+  one.grid().set({63, 5, 5}, 1);
+  failures = 1;
+  scheduler.update(one.scene, {});
+  while (scheduler.stats().chunks_meshed < 5) std::this_thread::yield();
+  EXPECT_TRUE(scheduler.take().empty());
+  // The repeated job shows the state of the edit, not a later one.
+  one.grid().set({63, 7, 7}, 1);
+  scheduler.update(one.scene, {});
+  while (scheduler.stats().chunks_meshed < 6) std::this_thread::yield();
+  const std::vector<SurfaceUpdate> updates = scheduler.take();
+  ASSERT_EQ(updates.size(), 2U);
+  std::size_t faces = 0;
+  for (const SurfaceUpdate& update : updates) faces += faces_of(update);
+  EXPECT_EQ(faces, 6U + 6U + 10U + 6U);
+  EXPECT_EQ(scheduler.stats().out_of_memory, 1);
+}
+
+TEST(MeshScheduler, DeliversLoadedChunksOneByOne) {
+  OneGrid one;
+  fill_row(one.grid(), 3);
+  GatedWork gated(blocky(1));
+  MeshScheduler scheduler(blocky(1), gated.work());
+  scheduler.update(one.scene, {});
+  for (std::size_t done = 1; done <= 3; ++done) {
+    gated.let_through(1);
+    while (scheduler.stats().chunks_meshed < static_cast<std::int64_t>(done)) std::this_thread::yield();
+    EXPECT_EQ(scheduler.take().size(), 1U);
+  }
+}
+
+TEST(MeshScheduler, MeshesEditsBeforeLoadedChunks) {
+  OneGrid one;
+  fill_row(one.grid(), 50);
+  GatedWork gated(blocky(1));
+  MeshScheduler scheduler(blocky(1), gated.work());
+  scheduler.update(one.scene, {});
+  gated.wait_for_started(1);
+  one.grid().set({64 * 40 + 3, 3, 3}, 1);
+  scheduler.update(one.scene, {});
+  gated.let_through(2);
+  gated.wait_for_started(3);
+  EXPECT_EQ(gated.started()[1].chunk.x, 40);
+  while (scheduler.stats().chunks_meshed < 2) std::this_thread::yield();
+  EXPECT_EQ(scheduler.take().size(), 2U) << "no other chunk holds them back";
+  gated.open();
+}
+
+// Otherwise edits near the eye would wait for all of them.
+TEST(MeshScheduler, DeliversVeryLargeEditsOneByOne) {
+  for (const int chunks : {256, 257}) {
+    OneGrid one;
+    fill_row(one.grid(), chunks);
+    GatedWork gated(blocky(1));
+    MeshScheduler scheduler(blocky(1), gated.work());
+    gated.let_through(chunks);
+    scheduler.finish(one.scene, {});
+    EXPECT_EQ(scheduler.take().size(), static_cast<std::size_t>(chunks));
+    one.grid().fill_box({{0, 40, 40}, {64 * chunks, 41, 41}}, 1);
+    scheduler.update(one.scene, {});
+    gated.let_through(1);
+    while (scheduler.stats().chunks_meshed < chunks + 1) std::this_thread::yield();
+    EXPECT_EQ(scheduler.take().size(), chunks == 256 ? 0U : 1U);
+    gated.open();
+    scheduler.finish(one.scene, {});
+    EXPECT_EQ(scheduler.take().size(), chunks == 256 ? 256U : 256U);
+  }
+}
+
+// The same blocks are edited in every frame, for a long time, and workers are slower than frames: each edit is shown
+// after at most two epochs.
+TEST(MeshScheduler, ShowsEveryEditSoonWhileEditsGoOn) {
+  OneGrid one;
+  GatedWork gated(blocky(1));
+  MeshScheduler scheduler(blocky(1), gated.work());
+  edit_two_chunks(one, gated, scheduler);
+  std::map<std::uint64_t, std::int64_t> meshed_before;  // chunks, by update
+  std::int64_t most = 0;
+  std::uint64_t shown = 0;
+  int deliveries = 0;
+  for (int frame = 0; frame < 400; ++frame) {
+    one.grid().fill_box({{63, 3, 3}, {65, 4, 4}}, frame % 2 == 0 ? kAir : VoxelType{1});
+    const std::int64_t meshed = scheduler.stats().chunks_meshed;
+    meshed_before[scheduler.update(one.scene, {})] = meshed;
+    if (frame % 3 == 0) {
+      gated.let_through(1);
+      while (scheduler.stats().chunks_meshed == meshed) std::this_thread::yield();
+    }
+    const std::size_t taken = scheduler.take().size();
+    EXPECT_TRUE(taken == 0 || taken == 2) << taken;
+    deliveries += taken == 2 ? 1 : 0;
+    for (; shown < scheduler.shown_update(); ++shown) {
+      const auto found = meshed_before.find(shown + 1);
+      if (found != meshed_before.end()) most = std::max(most, scheduler.stats().chunks_meshed - found->second);
+    }
+  }
+  EXPECT_GT(deliveries, 60);
+  EXPECT_LE(most, 4) << "chunks meshed between an edit and its surfaces";
+  gated.open();
 }
 
 // Each edit adds an isolated voxel: the number of faces counts the edits.
