@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -14,6 +16,7 @@
 #include <quoin/scene/sweep.h>
 
 #include "scene/query/field_scene_for_tests.h"
+#include "scene/query/field_search.h"
 
 namespace quoin {
 namespace {
@@ -258,6 +261,80 @@ TEST(Capsule, NeverEntersFieldWithoutHit) {
     }
     if (!hit) continue;
     EXPECT_FALSE(overlaps(tracer, moved(capsule, displacement * hit->fraction - hit->normal * 2e-3)).empty()) << i;
+  }
+  EXPECT_GT(hits, 30);
+}
+
+// Sweeps the largest capsule in a player's box, and the box, one skin above random ground.
+struct CountedSweeps {
+  std::vector<int> of_capsule;  // cells and parts of cells compared with the shape, per sweep
+  std::vector<int> of_box;
+};
+
+CountedSweeps count_sweeps(double steepness) {
+  Random random(31);
+  const DensityGrid field = rolling_ground(random, 24, steepness);
+  const DensityTree tree(field);
+  const VoxelRegistry types;
+  const TypesMet all(types, QueryTypes::All);
+  CountedSweeps counted;
+  const auto sweep = [&](const auto& shape) {
+    FieldSweep<std::decay_t<decltype(shape)>> found(tree, all, shape, 1.0);
+    follow_way(shape, 1.0, found);
+    return std::pair(found.best().fraction, found.tested());
+  };
+  for (int i = 0; i < 300; ++i) {
+    const double x = 20.0 * random.share();
+    const double z = 20.0 * random.share();
+    MovingCapsule capsule{{x, height_of(field, x, z) + 3.0, z}, {0.0, 0.5, 0.0}, 0.4, {0.0, -4.0, 0.0}};
+    capsule.centre.y -= 4.0 * sweep(capsule).first - 1e-3;
+    MovingBox box;
+    box.centre = {x, height_of(field, x, z) + 3.0, z};
+    box.half_size = {0.4, 0.9, 0.4};
+    for (int axis = 0; axis < 3; ++axis) box.half_axes[axis] = box.axes[axis] * box.half_size[axis];
+    box.displacement = {0.0, -4.0, 0.0};
+    box.centre.y -= 4.0 * sweep(box).first - 1e-3;
+    const DVec3 aside = random.direction() * 0.1;
+    for (const DVec3 way : {aside, DVec3(aside.x, 0.0, aside.z), DVec3(0.0, -0.4, 0.0)}) {
+      capsule.displacement = box.displacement = way;
+      counted.of_capsule.push_back(sweep(capsule).second);
+      counted.of_box.push_back(sweep(box).second);
+    }
+  }
+  return counted;
+}
+
+TEST(Capsule, ComparesFewPartsOfCellsOnGround) {
+  for (const double steepness : {0.5, 1.0, 2.0}) {
+    CountedSweeps counted = count_sweeps(steepness);
+    const auto sum = [](const std::vector<int>& counts) { return std::accumulate(counts.begin(), counts.end(), 0); };
+    EXPECT_LE(sum(counted.of_capsule), 3 * sum(counted.of_box)) << steepness;
+    std::sort(counted.of_capsule.begin(), counted.of_capsule.end());
+    EXPECT_LE(counted.of_capsule[counted.of_capsule.size() * 99 / 100], 60) << steepness;
+    EXPECT_LE(counted.of_capsule.back(), 250) << steepness;
+  }
+}
+
+// The distance from the line is at least the radius at the contact, for points of the solid near it, and the contact
+// is not early.
+TEST(Capsule, ContactWithFieldIsExact) {
+  Random random(77);
+  int hits = 0;
+  for (int i = 0; i < 60; ++i) {
+    const Scene scene = i % 2 == 0 ? random_blobs(random) : scene_of(rolling_ground(random, 14, 1.0 + i % 3), {});
+    const SceneTracer tracer(scene);
+    Capsule capsule = random_capsule(random, 1.0);
+    capsule.centre = random.direction() * 11.0 + DVec3(0.0, i % 2 == 0 ? 0.0 : 14.0, 0.0);
+    if (!overlaps(tracer, capsule).empty()) continue;
+    const DVec3 displacement = -1.2 * capsule.centre + random.vector() * 3.0;
+    const auto hit = sweep_capsule(tracer, capsule, displacement);
+    if (!hit) continue;
+    ++hits;
+    // Deeper than the touch tolerance along the normal there is an overlap; the same distance away there is none.
+    const Capsule there = moved(capsule, hit->fraction * displacement);
+    EXPECT_TRUE(overlaps(tracer, moved(there, 2e-6 * hit->normal)).empty()) << i;
+    EXPECT_FALSE(overlaps(tracer, moved(there, -8e-6 * hit->normal)).empty()) << i;
+    EXPECT_LE(glm::dot(hit->normal, displacement), 0.0) << i;
   }
   EXPECT_GT(hits, 30);
 }

@@ -290,6 +290,238 @@ DBox BoxInField::bounds(IVec3 cell, double from, double to) const {
   return {within.min - DVec3(cell), within.max - DVec3(cell)};
 }
 
+namespace {
+
+// The product of the symmetric matrix without a diagonal that has the components yz, xz, xy `m`, and a vector.
+DVec3 across(const DVec3& m, const DVec3& v) {
+  return {m.z * v.y + m.y * v.z, m.z * v.x + m.x * v.z, m.y * v.x + m.x * v.y};
+}
+
+// The nearest point of a piece's solid to the line of a capsule at rest, and a bound on the capsule's later distance.
+//
+// The square of the distance of a point from the line is convex. Added to a multiple of the density, it is at most the
+// square for points of the solid, and still convex if the field bends less than a ball of that radius. Its minimum in
+// the piece then is the square of the distance of the solid, and quadratic bounds hold while the capsule moves.
+//
+// Source: Lagrangian duality with a bound on the second derivatives of a trilinear function.
+class CapsuleNearPiece {
+ public:
+  CapsuleNearPiece(const MovingCapsule& capsule, const FieldPiece& piece)
+      : capsule_(capsule),
+        piece_(piece),
+        per_half_(1.0 / piece.half),
+        low_(piece.middle - piece.half),
+        high_(piece.middle + piece.half),
+        point_(piece.middle) {
+    const double square = glm::dot(capsule.half_axis, capsule.half_axis);
+    if (square > 0.0) along_ = capsule.half_axis / square;
+  }
+
+  /// Moves to the nearest point at a time. Approximate, in a few steps from the previous point.
+  void find(double time) {
+    centre_ = capsule_.centre - DVec3(piece_.cell) + time * capsule_.displacement;
+    for (int turn = 0; turn < 4; ++turn) {
+      const DVec3 before = point_;
+      step();
+      const DVec3 moved = point_ - before;
+      if (glm::dot(moved, moved) < 1e-9) break;
+    }
+    on_line_ = capsule_.nearest_of_line(centre_, point_);
+  }
+  [[nodiscard]] const DVec3& point() const { return point_; }
+  /// Returns the way to there from the nearest point of the line.
+  [[nodiscard]] DVec3 away() const { return point_ - on_line_; }
+
+  /// A bound for the square of the distance: at least `at_once` + `rate` * t - `loss` * t^2 after an additional time t.
+  struct Bound {
+    double at_once = 0.0;
+    double rate = 0.0;
+    double loss = 0.0;
+    double of_line = 0.0;     ///< the part missing from `at_once` because much of the line faces the piece
+    bool is_reduced = false;  ///< the field bends too much for a good bound
+  };
+  /// Returns a bound for an additional time up to `most`.
+  [[nodiscard]] Bound bound(double most) const;
+  /// Returns the axis along which the piece has the longest part next to the line.
+  [[nodiscard]] int axis_beside_line() const {
+    const DVec3 lengths = glm::abs(along_) * piece_.half;
+    return lengths.x >= lengths.y && lengths.x >= lengths.z ? 0 : lengths.y >= lengths.z ? 1 : 2;
+  }
+
+ private:
+  static constexpr double kLeastGrowth = 0.05;
+  static constexpr double kReducedGrowth = 0.4;
+
+  struct Value {
+    double density;
+    DVec3 slope;  // density units per voxel
+  };
+  [[nodiscard]] Value value() const {
+    const DVec3 u = (point_ - piece_.middle) * per_half_;
+    const DVec3 slope = piece_.rise + across(piece_.bend, u) + piece_.warp * DVec3(u.y * u.z, u.x * u.z, u.x * u.y);
+    const double density = piece_.level + piece_.doubt + glm::dot(piece_.rise, u) + piece_.bend.x * u.y * u.z +
+                           piece_.bend.y * u.x * u.z + piece_.bend.z * u.x * u.y + piece_.warp * u.x * u.y * u.z;
+    return {density, slope * per_half_};
+  }
+
+  // Moves to the nearest point of the box below the tangent plane at the current point.
+  void step() {
+    const DVec3 from = capsule_.nearest_of_line(centre_, point_);
+    const auto [density, slope] = value();
+    const double above = density - glm::dot(slope, point_);
+    DVec3 next = glm::clamp(from, low_, high_);
+    weight_ = 0.0;
+    double left = above + glm::dot(slope, next);
+    if (left > 0.0) {
+      // The nearest point is that of the line minus a multiple of the slope, clamped to the box. In each turn
+      // a component enters or leaves the box.
+      DVec3 enter(kInfinity);
+      DVec3 leave(kInfinity);
+      for (int i = 0; i < 3; ++i) {
+        if (slope[i] == 0.0) continue;
+        const double per_slope = 1.0 / slope[i];
+        enter[i] = (from[i] - (slope[i] > 0.0 ? high_[i] : low_[i])) * per_slope;
+        leave[i] = (from[i] - (slope[i] > 0.0 ? low_[i] : high_[i])) * per_slope;
+      }
+      double multiple = 0.0;
+      for (int turn = 0; turn < 7 && left > 0.0; ++turn) {
+        double rate = 0.0;
+        double end = kInfinity;
+        for (int i = 0; i < 3; ++i) {
+          const bool is_ahead = multiple < enter[i];
+          if (!is_ahead && multiple < leave[i]) rate += slope[i] * slope[i];
+          if (multiple < leave[i]) end = std::min(end, is_ahead ? enter[i] : leave[i]);
+        }
+        const double whole = rate > 0.0 ? multiple + left / rate : kInfinity;
+        if (!(std::min(whole, end) < kInfinity)) break;
+        multiple = std::min(whole, end);
+        next = glm::clamp(from - multiple * slope, low_, high_);
+        if (whole <= end) break;
+        left = above + glm::dot(slope, next);
+      }
+      weight_ = 2.0 * multiple;
+    }
+    point_ = next;
+  }
+
+  // The movement, and the share of the half axis that the line's nearest point moves by itself, at most, for any point
+  // in the piece during an additional time. A piece next to the line sees the same line while that moves along itself.
+  // The movement along the line may then be left out.
+  struct OfLine {
+    DVec3 movement;
+    double range;
+  };
+  [[nodiscard]] OfLine of_line(double time) const {
+    const double here = std::clamp(glm::dot(on_line_ - centre_, along_), -1.0, 1.0);
+    const double middle = glm::dot(piece_.middle - centre_, along_);
+    const double spread = glm::dot(piece_.half, glm::abs(along_));
+    const double shift = time * glm::dot(capsule_.displacement, along_);
+    const double down = std::min(shift, 0.0);
+    const double up = std::max(shift, 0.0);
+    const auto range = [&](double low, double high) { return std::max({high - here, here - low, 0.0}); };
+    const double whole =
+        range(std::clamp(middle - spread - up, -1.0, 1.0), std::clamp(middle + spread - down, -1.0, 1.0));
+    const double across_line =
+        range(std::clamp(middle - spread, -1.0 + down, 1.0 + down), std::clamp(middle + spread, -1.0 + up, 1.0 + up));
+    if (whole <= across_line) return {capsule_.displacement, whole};
+    return {capsule_.displacement - glm::dot(capsule_.displacement, along_) * capsule_.half_axis, across_line};
+  }
+
+  const MovingCapsule& capsule_;
+  const FieldPiece& piece_;
+  DVec3 per_half_;
+  DVec3 low_;
+  DVec3 high_;
+  DVec3 along_{0.0};
+  DVec3 centre_{0.0};
+  DVec3 point_;
+  DVec3 on_line_{0.0};
+  double weight_ = 0.0;  // of the density
+};
+
+// The multiplier of the density may depend on the position p if it is nowhere negative in the piece: it is `weight_` +
+// tilt * (p - point_), where the tilt cancels the second derivatives of the sum along the slope. Only the bend of the
+// surface itself is left, and terms of the third order. With z, the part of p - point_ that the movement does not
+// explain, and q, the part that it does, the sum then grows by at least
+//
+//   |z|^2 + (z + q) * bend * (z + q) - |z + q| * unsure * |z + q| / 2 + error * (z + q)
+//
+// and the minimum over all z is known.
+CapsuleNearPiece::Bound CapsuleNearPiece::bound(double most) const {
+  const DVec3 away = this->away();
+  const auto [density, slope] = value();
+  const double square = glm::dot(slope, slope);
+  const double warp = piece_.warp * per_half_.x * per_half_.y * per_half_.z;
+  // Derivatives by yz, xz, xy.
+  const DVec3 second =
+      piece_.bend * DVec3(per_half_.y * per_half_.z, per_half_.x * per_half_.z, per_half_.x * per_half_.y) +
+      warp * (point_ - piece_.middle);
+  const DVec3 ends = glm::max(point_ - low_, high_ - point_);
+  double weight = weight_;
+  DVec3 tilt(0.0);
+  double most_tilt = 0.0;
+  if (square > 0.0 && weight > 0.0) {
+    const DVec3 of_slope = across(second, slope);
+    tilt = (0.5 * glm::dot(of_slope, slope) / square * slope - of_slope) * (weight / square);
+    most_tilt = glm::dot(glm::abs(tilt), ends);
+    if (most_tilt > weight) {
+      tilt *= weight / most_tilt;
+      most_tilt = weight;
+    }
+  }
+  DVec3 diagonal = tilt * slope;
+  DVec3 others =
+      0.5 * (weight * second + DVec3(tilt.y * slope.z + tilt.z * slope.y, tilt.x * slope.z + tilt.z * slope.x,
+                                     tilt.x * slope.y + tilt.y * slope.x));
+  DVec3 unsure = most_tilt * glm::abs(second) + (weight + most_tilt) * std::abs(warp) / 3.0 * ends;
+  // The least eigenvalue, from the trace and the sum of squares.
+  const double trace = diagonal.x + diagonal.y + diagonal.z;
+  const double squares = glm::dot(diagonal, diagonal) + 2.0 * glm::dot(others, others);
+  const double least = trace / 3.0 - std::sqrt(2.0 / 3.0 * std::max(squares - trace * trace / 3.0, 0.0));
+  double growth = 1.0 + std::min(least, 0.0) - std::sqrt(glm::dot(unsure, unsure) / 3.0);
+  Bound bound;
+  if (!(growth > kLeastGrowth)) {
+    // A smaller multiplier gives a worse bound, which may do for a distant piece.
+    const double share = (1.0 - kReducedGrowth) / (1.0 - growth);
+    weight *= share;
+    tilt *= share;
+    diagonal *= share;
+    others *= share;
+    unsure *= share;
+    growth = kReducedGrowth;
+    bound.is_reduced = true;
+  }
+  const auto bent = [&](const DVec3& u) { return diagonal * u + across(others, u); };
+
+  DVec3 error = 2.0 * away + weight * slope + density * tilt;
+  for (int i = 0; i < 3; ++i) {
+    // The sides of the piece hold the point.
+    const bool is_held = (point_[i] >= high_[i] && error[i] < 0.0) || (point_[i] <= low_[i] && error[i] > 0.0);
+    error[i] = is_held ? 0.0 : std::abs(error[i]);
+  }
+  const auto [v, range] = of_line(most);
+  const DVec3 speed = glm::abs(v);
+  const DVec3 unsure_speed = across(unsure, speed);
+  const DVec3 a = capsule_.half_axis * range;
+  const DVec3 aside = glm::abs(a);
+  const DVec3 unsure_aside = across(unsure, aside);
+  // Half of the greatest slope by z, of the error, the line and the movement.
+  const double of_error = 0.5 * glm::length(error);
+  const double of_line = glm::length(bent(a)) + 0.5 * glm::length(unsure_aside);
+  const double of_speed = glm::length(bent(v)) + 0.5 * glm::length(unsure_speed);
+  bound.of_line =
+      std::max(of_line * of_line / growth - glm::dot(a, bent(a)) + 0.5 * glm::dot(aside, unsure_aside), 0.0) +
+      2.0 * of_error * of_line / growth + glm::dot(error, aside);
+  bound.at_once = glm::dot(away, away) + weight * density - of_error * of_error / growth - bound.of_line;
+  bound.rate = -2.0 * (glm::dot(away, capsule_.displacement) + (of_error + of_line) * of_speed / growth +
+                       std::abs(glm::dot(v, bent(a)))) -
+               glm::dot(speed, unsure_aside + error);
+  bound.loss = std::max(of_speed * of_speed / growth - glm::dot(v, bent(v)) + 0.5 * glm::dot(speed, unsure_speed), 0.0);
+  return bound;
+}
+
+}  // namespace
+
 // Returns the unit vector from the solid of a piece to the line of a capsule at `centre`; 0 if they touch. Relative to
 // the cell.
 DVec3 CapsuleInField::parting(const FieldPiece& piece, const DVec3& centre) const {
@@ -311,19 +543,68 @@ DVec3 CapsuleInField::parting(const FieldPiece& piece, const DVec3& centre) cons
   return unit_or_zero(on_line - nearest);
 }
 
+bool CapsuleInField::is_away(FieldPiece& piece, double& time) const {
+  if (!(piece.square_of_slope > 0.0)) return false;
+  const DVec3 up = piece.slope / std::sqrt(piece.square_of_slope);
+  const DVec3 centre = capsule_.centre - DVec3(piece.cell) - piece.middle;
+  const double solid = piece.extent(up * piece.half, std::sqrt(piece.square_of_slope)).ahead;
+  const double left = glm::dot(up, centre) - std::abs(glm::dot(up, capsule_.half_axis)) - solid - radius_;
+  if (!(left > 0.0)) return false;
+  const double speed = -glm::dot(up, capsule_.displacement);
+  if (!(speed * until_ > left)) return true;
+  time = left / speed;
+  return false;
+}
+
 bool CapsuleInField::may_meet(FieldPiece& piece) const {
   constexpr int kMostTurns = 16;
-  const double radius = capsule_.radius - kFieldTouch;
-  double time = 0.0;
-  piece.enter = -1.0;
+  constexpr double kNear = 0.05;
+  double time = -1.0;
   piece.slack = 0.0;
   piece.is_exact = true;
+  piece.is_touched = false;
+  piece.split = -1;
+  if (is_away(piece, time)) return false;
+  piece.enter = time;
+  time = std::max(time, 0.0);
+  CapsuleNearPiece near(capsule_, piece);
+  for (int turn = 0; turn < kMostTurns; ++turn) {
+    near.find(time);
+    piece.nearest = near.point();
+    // The bound is better for a short time: twice that to the contact with the tangent plane.
+    const DVec3 away = near.away();
+    const double distance = glm::length(away);
+    const double speed = glm::dot(away, capsule_.displacement);
+    double most = until_ - time;
+    if (speed > 0.0) most = std::min(most, 2.0 * std::max(distance - radius_, 0.0) * distance / speed);
+    const auto bound = near.bound(most);
+    const double left = bound.at_once - radius_ * radius_;
+    if (left > 0.0) piece.enter = time;
+    if (left < 0.05 * kFieldTouch * radius_) {
+      piece.is_touched = left > 0.0 && distance <= radius_ + 0.5 * kFieldTouch;
+      if (piece.is_touched) return true;
+      if (distance < radius_ + kNear && bound.of_line > 0.5 * std::abs(left)) piece.split = near.axis_beside_line();
+      break;
+    }
+    // The first root of left + rate * t - loss * t^2.
+    const double root = std::sqrt(bound.rate * bound.rate + 4.0 * bound.loss * left);
+    time += root > bound.rate ? std::min(most, 2.0 * left / (root - bound.rate)) : most;
+    if (!(time < until_)) return false;
+    piece.enter = time;
+  }
+  // Planes are better far from the piece, and where the field bends much.
+  return follow_planes(piece, time);
+}
+
+// As `may_meet`, from a time on, with planes that separate the capsule from the piece's solid.
+bool CapsuleInField::follow_planes(FieldPiece& piece, double time) const {
+  constexpr int kMostTurns = 16;
   for (int turn = 0; turn < kMostTurns; ++turn) {
     const DVec3 centre = capsule_.centre - DVec3(piece.cell) + time * capsule_.displacement;
     const DVec3 away = parting(piece, centre);
     const double offset = glm::dot(away, centre - piece.middle) - std::abs(glm::dot(away, capsule_.half_axis)) -
                           piece.exact_extent(away * piece.half).ahead;
-    const double left = offset - radius;
+    const double left = offset - radius_;
     if (!(left > 0.0)) break;
     const double speed = -glm::dot(away, capsule_.displacement);
     if (!(speed > 0.0)) return false;
@@ -338,12 +619,21 @@ bool CapsuleInField::may_meet(FieldPiece& piece) const {
 
 std::optional<DVec3> CapsuleInField::point_in_solid(const FieldPiece& piece, double until) const {
   const DVec3 centre = capsule_.centre - DVec3(piece.cell) + until * capsule_.displacement;
-  return by_turns(piece, [&](const DVec3& point) {
+  const auto nearest = [&](const DVec3& point) {
     const DVec3 on_line = capsule_.nearest_of_line(centre, point);
     const DVec3 away = point - on_line;
     const double length = glm::length(away);
     return length > capsule_.radius ? on_line + away * (capsule_.radius / length) : point;
-  });
+  };
+  // Slightly below the surface, at the point that is already known to be the nearest.
+  const double square = glm::dot(piece.gradient(piece.nearest), piece.gradient(piece.nearest));
+  if (square > 0.0) {
+    const double above = std::max(piece.density(piece.nearest) + 0.25 * kFieldTouch * std::sqrt(square), 0.0);
+    const DVec3 point = clamped(piece, piece.nearest - piece.gradient(piece.nearest) * (above / square));
+    const DVec3 away = point - capsule_.nearest_of_line(centre, point);
+    if (piece.density(point) < 0.0 && glm::dot(away, away) <= capsule_.radius * capsule_.radius) return point;
+  }
+  return by_turns(piece, nearest);
 }
 
 double CapsuleInField::time_beyond_doubt(const FieldPiece& piece) const {
@@ -360,7 +650,12 @@ DBox CapsuleInField::bounds(IVec3 cell, double from, double to) const {
 // normal of their ridge.
 DVec3 CapsuleInField::normal(const FieldContact& contact, const DensityGrid& field) const {
   const DVec3 centre = capsule_.centre - DVec3(contact.piece.cell) + contact.fraction * capsule_.displacement;
-  DVec3 normal = parting(contact.piece, centre);
+  DVec3 normal(0.0);
+  if (contact.piece.is_touched) {
+    normal = unit_or_zero(capsule_.nearest_of_line(centre, contact.piece.nearest) - contact.piece.nearest);
+  } else {
+    normal = parting(contact.piece, centre);
+  }
   if (normal == DVec3(0.0)) normal = unit_or_zero(capsule_.nearest_of_line(centre, contact.point) - contact.point);
   if (glm::dot(normal, capsule_.displacement) < 0.0) return normal;
   normal = unit_or_zero(field.gradient_at(DVec3(contact.piece.cell) + contact.point));
@@ -454,7 +749,7 @@ VoxelType FieldCells::material(IVec3 cell, const DVec3& point) {
 template <class Moving>
 void FieldSweep<Moving>::check(const IBox& near, double from, double to) {
   const double until = std::min(to, most_);
-  const Shape shape(shape_, until);
+  Shape shape(shape_, until);
   FieldSearch<Shape> search(shape);
   CellCorners corners;
   for (int z = near.min.z; z < near.max.z; ++z) {
@@ -465,6 +760,7 @@ void FieldSweep<Moving>::check(const IBox& near, double from, double to) {
     }
   }
   const auto contact = search.first(until);
+  tested_ += search.tested();
   if (contact && contact->fraction < best_.fraction) best_ = *contact;
 }
 

@@ -34,6 +34,9 @@
 
 namespace quoin {
 
+/// Maximum penetration depth that counts as touching, in voxels.
+inline constexpr double kFieldTouch = 1e-6;
+
 /// A part of a cell of a field. Lengths are in voxels of the grid, positions relative to the cell's least sample.
 struct FieldPiece {
   IVec3 cell{0};
@@ -47,17 +50,26 @@ struct FieldPiece {
   double level = 0.0;
   double doubt = 0.0;
   DVec3 twist{0.0};  ///< each axis's contribution to the doubt
+  /// The rest of the field, as multiples of products of the position in halves from the middle: yz, xz, xy; and xyz.
+  DVec3 bend{0.0};
+  double warp = 0.0;
   // Set by the search:
-  double enter = 0.0;     ///< no contact with its solid before this time
-  double slack = 0.0;     ///< contact is certain after this additional time, except for the doubt
-  int axis = -1;          ///< the shape's direction that separates it until then; -1: none
-  bool is_exact = false;  ///< all directions were tested, not only the first few
+  double enter = 0.0;       ///< no contact with its solid before this time
+  double slack = 0.0;       ///< contact is certain after this additional time, except for the doubt
+  int axis = -1;            ///< the shape's direction that separates it until then; -1: none
+  bool is_exact = false;    ///< all directions were tested, not only the first few
+  DVec3 nearest{0.0};       ///< capsules: the point of the solid nearest to the line at the time `enter`
+  bool is_touched = false;  ///< capsules: at the time `enter` the capsule touches the solid at `nearest`
+  int split = -1;           ///< capsules: the axis along which smaller pieces have better bounds; -1: any
 
   [[nodiscard]] bool has_solid() const {
     double least = corners[0];
     for (const double corner : corners) least = std::min(least, corner);
     return least < 0.0;
   }
+
+  /// Returns true if a shape deeper than kFieldTouch below the plane is surely in the solid.
+  [[nodiscard]] bool is_flat() const { return doubt <= 2.0 * kFieldTouch * std::sqrt(square_of_slope); }
 
   [[nodiscard]] double density(const DVec3& point) const {
     return trilinear(corners, (point - middle) / (2.0 * half) + 0.5);
@@ -76,10 +88,15 @@ struct FieldPiece {
                  d[2] + d[3] + d[6] + d[7] - d[0] - d[1] - d[4] - d[5],
                  d[4] + d[5] + d[6] + d[7] - d[0] - d[1] - d[2] - d[3]) *
            0.125;
-    const double xy = std::abs(d[0] + d[3] + d[4] + d[7] - d[1] - d[2] - d[5] - d[6]) * 0.125;
-    const double xz = std::abs(d[0] + d[2] + d[5] + d[7] - d[1] - d[3] - d[4] - d[6]) * 0.125;
-    const double yz = std::abs(d[0] + d[1] + d[6] + d[7] - d[2] - d[3] - d[4] - d[5]) * 0.125;
-    const double xyz = std::abs(b - a) * 0.125;
+    bend = DVec3(d[0] + d[1] + d[6] + d[7] - d[2] - d[3] - d[4] - d[5],
+                 d[0] + d[2] + d[5] + d[7] - d[1] - d[3] - d[4] - d[6],
+                 d[0] + d[3] + d[4] + d[7] - d[1] - d[2] - d[5] - d[6]) *
+           0.125;
+    warp = (b - a) * 0.125;
+    const double xy = std::abs(bend.z);
+    const double xz = std::abs(bend.y);
+    const double yz = std::abs(bend.x);
+    const double xyz = std::abs(warp);
     doubt = xy + xz + yz + xyz;
     twist = {xy + xz + xyz, xy + yz + xyz, xz + yz + xyz};
     level = (a + b) * 0.125 - doubt;
@@ -142,9 +159,6 @@ struct FieldPiece {
   }
 };
 
-/// Maximum penetration depth that counts as touching, in voxels.
-inline constexpr double kFieldTouch = 1e-6;
-
 /// A contact of a shape with a field.
 struct FieldContact {
   double fraction = std::numeric_limits<double>::infinity();
@@ -177,6 +191,9 @@ class BoxInField {
   [[nodiscard]] bool may_meet(FieldPiece& piece) const;
   /// As `may_meet`, but tests all directions.
   [[nodiscard]] bool may_meet_exactly(FieldPiece& piece) const;
+  /// Returns true if the contact time of a piece is known, apart from `slack`.
+  [[nodiscard]] static bool is_decided(const FieldPiece& piece) { return piece.is_flat(); }
+  static void end_at(const FieldPiece& /*piece*/) {}
   /// Returns a point of the solid that the box has surely reached by the time `until`, if any.
   [[nodiscard]] std::optional<DVec3> point_in_solid(const FieldPiece& piece, double until) const;
   /// Returns the time for a call of `point_in_solid` for a piece on the path: the box is then deeper than the plane's
@@ -219,10 +236,16 @@ class BoxInField {
 class CapsuleInField {
  public:
   /// `until`: the last fraction of the movement.
-  CapsuleInField(const MovingCapsule& capsule, double until) : capsule_(capsule), until_(until) {}
+  CapsuleInField(const MovingCapsule& capsule, double until)
+      : capsule_(capsule), until_(until), radius_(capsule.radius - kFieldTouch) {}
 
   [[nodiscard]] bool may_meet(FieldPiece& piece) const;
   [[nodiscard]] bool may_meet_exactly(FieldPiece& piece) const { return may_meet(piece); }
+  [[nodiscard]] static bool is_decided(const FieldPiece& piece) { return piece.is_touched || piece.is_flat(); }
+  /// Ends the search at the contact with a piece, if that is certain: later pieces are then tested up to there only.
+  void end_at(const FieldPiece& piece) {
+    if (piece.is_touched && piece.enter < until_ && point_in_solid(piece, piece.enter)) until_ = piece.enter;
+  }
   [[nodiscard]] std::optional<DVec3> point_in_solid(const FieldPiece& piece, double until) const;
   [[nodiscard]] double time_beyond_doubt(const FieldPiece& piece) const;
   [[nodiscard]] DBox bounds(IVec3 cell, double from, double to) const;
@@ -230,10 +253,13 @@ class CapsuleInField {
   [[nodiscard]] DVec3 normal(const FieldContact& contact, const DensityGrid& field) const;
 
  private:
+  [[nodiscard]] bool is_away(FieldPiece& piece, double& time) const;
+  [[nodiscard]] bool follow_planes(FieldPiece& piece, double time) const;
   [[nodiscard]] DVec3 parting(const FieldPiece& piece, const DVec3& centre) const;
 
   const MovingCapsule& capsule_;
   double until_;
+  double radius_;  // less the touch tolerance
 };
 
 /// Maps a moving shape to its field shape.
@@ -275,7 +301,7 @@ class FieldCells {
 template <class Shape>
 class FieldSearch {
  public:
-  explicit FieldSearch(const Shape& shape) : shape_(shape) {}
+  explicit FieldSearch(Shape& shape) : shape_(shape) {}
 
   /// Adds the part of a cell that the shape passes between two fractions.
   void add(IVec3 cell, const CellCorners& corners, double from, double to) {
@@ -284,6 +310,9 @@ class FieldSearch {
     piece.corners = corners;
     if (cut(piece, from, to, 1.0) != Cut::Nothing) keep(piece);
   }
+
+  /// Returns the number of cells and parts of cells that were compared with the shape.
+  [[nodiscard]] int tested() const { return tested_; }
 
   /// Returns the first contact with the added cells, up to the fraction `until`.
   [[nodiscard]] std::optional<FieldContact> first(double until) {
@@ -296,8 +325,7 @@ class FieldSearch {
       if (piece.enter > before) break;
       const bool is_inside = piece.enter < 0.0;
       const double enter = std::max(piece.enter, 0.0);
-      const bool is_flat = piece.doubt <= kFlat * std::sqrt(piece.square_of_slope);
-      if (is_inside || is_flat) {
+      if (is_inside || shape_.is_decided(piece)) {
         const auto point = shape_.point_in_solid(piece, is_inside ? 0.0 : std::min(enter + piece.slack, until));
         if (point) return FieldContact{enter, is_inside, piece, *point};
       }
@@ -317,8 +345,6 @@ class FieldSearch {
  private:
   // Pieces no larger than this are not halved.
   static constexpr double kSmallest = 1e-6;
-  // Maximum error of a piece's plane, in voxels, such that a box deeper than kFieldTouch is surely in its solid.
-  static constexpr double kFlat = 2.0 * kFieldTouch;
   // After this many pieces the search assumes a contact.
   static constexpr int kMostPieces = 4'000;
 
@@ -364,7 +390,10 @@ class FieldSearch {
   void keep(FieldPiece& piece) {
     if (!piece.has_solid()) return;
     piece.measure();
-    if (shape_.may_meet(piece)) push(piece);
+    ++tested_;
+    if (!shape_.may_meet(piece)) return;
+    shape_.end_at(piece);
+    push(piece);
   }
 
   void push(const FieldPiece& piece) {
@@ -391,6 +420,7 @@ class FieldSearch {
     // If the doubt is large, splits along the axis that causes it. Then tests all directions, then splits the longest
     // side.
     const int longest = greatest(piece.half);
+    if (piece.split >= 0 && piece.half[piece.split] > kSmallest) return halve(piece, piece.split);
     if (piece.doubt > 0.01 * std::sqrt(piece.square_of_slope) * piece.half[longest]) {
       const int axis = greatest(piece.twist);
       return halve(piece, piece.half[axis] > kSmallest ? axis : longest);
@@ -413,14 +443,15 @@ class FieldSearch {
     }
   }
 
-  const Shape& shape_;
+  Shape& shape_;
+  int tested_ = 0;
   std::vector<FieldPiece> pieces_;  // a heap, earliest contact first
 };
 
 /// Returns the first cell (by z, y, x) whose solid a resting shape overlaps deeper than kFieldTouch. Only solid
 /// with a matching type counts.
 template <class Shape>
-std::optional<FieldContact> first_overlap_in_field(FieldCells& cells, const Shape& shape) {
+std::optional<FieldContact> first_overlap_in_field(FieldCells& cells, Shape& shape) {
   const IBox box = voxels_within(shape.bounds(IVec3{0}, 0.0, 0.0), cells.bounds());
   CellCorners corners;
   FieldSearch<Shape> search(shape);
@@ -448,6 +479,8 @@ class FieldSweep {
   void check(const IBox& near, double from, double to);
 
   [[nodiscard]] const FieldContact& best() const { return best_; }
+  /// Returns the number of cells and parts of cells that were compared with the shape.
+  [[nodiscard]] int tested() const { return tested_; }
   [[nodiscard]] VoxelType material() { return cells_.material(best_.piece.cell, best_.point); }
   [[nodiscard]] DVec3 normal() const;
 
@@ -457,6 +490,7 @@ class FieldSweep {
   FieldCells cells_;
   const Moving& shape_;
   double most_;
+  int tested_ = 0;
   FieldContact best_;
 };
 

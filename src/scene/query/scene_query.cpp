@@ -219,7 +219,7 @@ template <class Shape>
 std::optional<SceneOverlap> first_of_field(const PlacedGrid& placed, const TypesMet& types, const Shape& shape) {
   if (placed.field == nullptr) return std::nullopt;
   FieldCells cells(*placed.field, types);
-  const auto in_field = shape.in_field();
+  auto in_field = shape.in_field();
   const auto contact = first_overlap_in_field(cells, in_field);
   if (!contact) return std::nullopt;
   const IVec3 cell = contact->piece.cell;

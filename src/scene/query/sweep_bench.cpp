@@ -1,7 +1,7 @@
 // scene/sweep/*: sweeps of a player's box of 0.8x1.8x0.8 on the benchmark terrain of 256x128x256, as blocks and as a
-// smooth field, one skin above the ground. The box moves by 0.2 along the ground (level) or into it (down); it is
-// upright, turned about its height, or arbitrarily rotated. Also measured: a step of walking with gravity, and a
-// capsule of the same size. Times are per query.
+// smooth field, plain and with dug holes, one skin above the ground. The box moves by 0.2 along the ground (level) or
+// into it (down); it is upright, turned about its height, or arbitrarily rotated. Also measured: a step of walking with
+// gravity, and a capsule of the same size. Times are per query.
 
 #include <cmath>
 #include <cstdio>
@@ -52,6 +52,23 @@ const World& field_world() {
     grid.field.edit(kBounds, [](IVec3 p, DensitySample) {
       return DensitySample{static_cast<float>(p.y - workloads::smooth_height(p.x, p.z)), 1};
     });
+    return World(std::move(grid));
+  }();
+  return world;
+}
+
+// The same ground with 400 round holes, whose rims are sharp.
+const World& dug_world() {
+  static const World world = [] {
+    SceneGrid grid;
+    grid.field = field_world().scene.grids()[field_world().scene.grids().handles().front()].field.snapshot();
+    std::mt19937 random(3);
+    std::uniform_real_distribution<double> share(0.0, 1.0);
+    for (int i = 0; i < 400; ++i) {
+      const double x = 8.0 + 240.0 * share(random);
+      const double z = 8.0 + 240.0 * share(random);
+      grid.field.remove_sphere({x, workloads::smooth_height(x, z), z}, 2.0 + 2.0 * share(random));
+    }
     return World(std::move(grid));
   }();
   return world;
@@ -156,9 +173,14 @@ void free_places(benchmark::State& state, const World& (*world_of)(), Turn turn,
 }
 
 [[maybe_unused]] const bool registered = [] {
-  for (const bool is_field : {true, false}) {
-    const std::string path = is_field ? "scene/sweep/field/" : "scene/sweep/blocks/";
-    const auto world = is_field ? field_world : block_world;
+  struct Place {
+    const char* name;
+    const World& (*world)();
+  };
+  for (const Place& place :
+       {Place{"field", field_world}, Place{"dug_field", dug_world}, Place{"blocks", block_world}}) {
+    const auto world = place.world;
+    const std::string path = std::string("scene/sweep/") + place.name + "/";
     const auto add = [&](const std::string& name, Turn turn, double down) {
       benchmark::RegisterBenchmark((path + name).c_str(), sweeps, world, turn, down);
     };
