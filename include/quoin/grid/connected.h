@@ -12,6 +12,7 @@
 #include <quoin/core/parallel.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/grid.h>
+#include <quoin/grid/mass.h>
 #include <quoin/grid/voxel_registry.h>
 
 namespace quoin {
@@ -99,6 +100,7 @@ class ConnectedPieces {
   [[nodiscard]] std::size_t bytes() const;
 
  private:
+  friend MassProperties mass_properties(const ConnectedPieces& pieces, std::size_t piece, DensityOfType density);
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

@@ -15,6 +15,7 @@
 #include "core/coordinates/chunk_order.h"
 #include "core/moved_from.h"
 #include "grid/connected/chunk_parts.h"
+#include "grid/connected/mass_sum.h"
 
 namespace quoin {
 namespace {
@@ -500,6 +501,20 @@ void ConnectedPieces::for_each_row(std::size_t piece, FunctionRef<void(IVec3 row
     Impl::for_each_row(entry, of_piece,
                        [&](IVec3 row, std::uint64_t voxels) { visit(entry.at * kChunkEdge + row, voxels); });
   });
+}
+
+MassProperties mass_properties(const ConnectedPieces& pieces, std::size_t piece, DensityOfType density) {
+  VoxelMass sum(density);
+  std::array<VoxelType, kChunkEdge> types{};
+  impl_of(pieces.impl_).for_each_chunk(piece, [&](const Entry& entry, std::span<const std::size_t> of_piece) {
+    sum.begin(entry.at);
+    if (ConnectedPieces::Impl::are_all(entry, of_piece)) return sum.add_chunk(entry.parts.chunk());
+    ConnectedPieces::Impl::for_each_row(entry, of_piece, [&](IVec3 row, std::uint64_t voxels) {
+      entry.parts.chunk().read_row(row.y, row.z, types);
+      sum.add_row(row.y, row.z, voxels, types);
+    });
+  });
+  return sum.properties();
 }
 
 Grid ConnectedPieces::extract(std::size_t piece) const {

@@ -1,4 +1,5 @@
 // connected/*: finds the pieces of a 512x128x512 terrain of 128 chunks, with caves, from scratch and after an edit.
+// connected/mass/*: mass, centre and inertia of a ship and of a ball of 130,000 voxels.
 
 #include <quoin/grid/connected.h>
 
@@ -122,6 +123,77 @@ void flood(benchmark::State& state) {
   check(pieces, 114);
 }
 BENCHMARK(flood)->Name("connected/flood_fill")->Unit(benchmark::kMillisecond)->Iterations(2);
+
+// A hollow ship of some 130,000 voxels of three types.
+const Grid& ship() {
+  static const Grid made = [] {
+    Grid grid;
+    grid.fill_box({{-20, -10, -100}, {60, 30, 100}}, 1);
+    grid.fill_box({{-17, -8, -97}, {57, 28, 97}}, kAir);
+    for (int deck = 0; deck < 2; ++deck) grid.fill_box({{-17, 2 + 12 * deck, -97}, {57, 4 + 12 * deck, 97}}, 2);
+    for (int wall = -90; wall < 90; wall += 36) grid.fill_box({{-17, -8, wall}, {57, 28, wall + 1}}, 3);
+    return grid;
+  }();
+  return made;
+}
+
+double density_of(VoxelType type) {
+  return 0.5 * type;
+}
+
+// The loop that a program would write without the function.
+double mass_by_voxel(const Grid& grid, DVec3& first, DVec3& squares, DVec3& mixed) {
+  double mass = 0.0;
+  grid.for_each([&](IVec3 voxel, VoxelType type) {
+    const DVec3 at = DVec3(voxel) + 0.5;
+    const double own = density_of(type);
+    mass += own;
+    first += own * at;
+    squares += own * at * at;
+    mixed += own * DVec3(at.y * at.z, at.x * at.z, at.x * at.y);
+  });
+  return mass;
+}
+
+void mass(benchmark::State& state, bool is_plain) {
+  ConnectedPieces pieces;
+  pieces.update(ship(), {1});
+  double total = 0.0;
+  for (auto _ : state) {
+    if (is_plain) {
+      DVec3 first(0.0);
+      DVec3 squares(0.0);
+      DVec3 mixed(0.0);
+      total = mass_by_voxel(ship(), first, squares, mixed);
+      benchmark::DoNotOptimize(first);
+      benchmark::DoNotOptimize(squares);
+      benchmark::DoNotOptimize(mixed);
+    } else {
+      total = mass_properties(pieces, 0, density_of).mass;
+    }
+    benchmark::DoNotOptimize(total);
+  }
+  if (pieces.size() != 1 || total != mass_properties(ship(), density_of).mass) state.SkipWithError("another mass");
+  state.counters["voxels"] = static_cast<double>(ship().voxel_count());
+}
+BENCHMARK_CAPTURE(mass, of_piece, false)->Name("connected/mass/piece")->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(mass, plain_loop, true)->Name("connected/mass/plain_loop")->Unit(benchmark::kMicrosecond);
+
+void mass_of_field(benchmark::State& state) {
+  static const DensityGrid field = [] {
+    DensityGrid made;
+    made.add_sphere({5.0, 7.0, 9.0}, 31.4, 1);
+    return made;
+  }();
+  MassProperties found;
+  for (auto _ : state) {
+    found = mass_properties(field, density_of);
+    benchmark::DoNotOptimize(found);
+  }
+  const double wanted = 0.5 * 4.0 / 3.0 * 3.14159265 * 31.4 * 31.4 * 31.4;
+  if (std::abs(found.mass - wanted) > 0.01 * wanted) state.SkipWithError("another mass");
+}
+BENCHMARK(mass_of_field)->Name("connected/mass/field")->Unit(benchmark::kMicrosecond);
 
 }  // namespace
 }  // namespace quoin
