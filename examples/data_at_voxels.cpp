@@ -35,8 +35,8 @@ quoin::Result<int> run(const std::string& path) {
 
   // Renderers follow voxel changes. Code that manages chests also follows data changes, even if no voxel changed.
   world.set_data(box, {});
-  for (const quoin::DataChange& change : world.data_changes_since(seen).items) {
-    std::printf("data changed in chunk %d %d %d\n", change.chunk.x, change.chunk.y, change.chunk.z);
+  for (const quoin::IVec3 chunk : world.data_changes_since(seen).chunks(world)) {
+    std::printf("data changed in chunk %d %d %d\n", chunk.x, chunk.y, chunk.z);
   }
   world.for_each_data([&](quoin::IVec3 voxel, quoin::VoxelType type, const quoin::VoxelData& data) {
     std::printf("%s at %d %d %d: state %u, %zu bytes\n", scene.types[type].name.c_str(), voxel.x, voxel.y, voxel.z,

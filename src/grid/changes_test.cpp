@@ -273,5 +273,29 @@ TEST(PendingChanges, NeedNoCommitWithoutChanges) {
   EXPECT_TRUE(PendingChanges(cursor, grid)->all) << "the previous read was not committed";
 }
 
+TEST(Changes, ChunksAreAllChunksTheFirstTime) {
+  Grid grid;
+  for (int x = 0; x < 3; ++x) grid.set({64 * x, 0, 0}, 1);
+  ChangeCursor cursor;
+  EXPECT_EQ(grid.changes_since(cursor).chunks(grid), (std::vector<IVec3>{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}));
+  EXPECT_TRUE(grid.changes_since(cursor).chunks(grid).empty());
+  grid.set({70, 0, 0}, 1);
+  grid.set({128, 0, 0}, kAir);
+  EXPECT_EQ(grid.changes_since(cursor).chunks(grid), (std::vector<IVec3>{{1, 0, 0}, {2, 0, 0}})) << "one is gone";
+  ChangeCursor of_data;
+  EXPECT_EQ(grid.data_changes_since(of_data).chunks(grid), (std::vector<IVec3>{{0, 0, 0}, {1, 0, 0}}));
+
+  DensityGrid field;
+  field.add_sphere({32.0, 32.0, 32.0}, 4.0, 1);
+  ChangeCursor of_field;
+  EXPECT_EQ(field.changes_since(of_field).chunks(field), field.chunks());
+
+  Grid partial;
+  partial.make_partial();
+  (void)partial.load_chunk({5, 0, 0}, Chunk());
+  ChangeCursor of_partial;
+  EXPECT_EQ(partial.changes_since(of_partial).chunks(partial), (std::vector<IVec3>{{5, 0, 0}})) << "a chunk of air";
+}
+
 }  // namespace
 }  // namespace quoin

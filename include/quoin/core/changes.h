@@ -4,6 +4,8 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/vec.h>
+
 namespace quoin {
 
 /// Returns a serial number that is unique in this process and never 0. Identifies journals and slot-map elements.
@@ -48,9 +50,27 @@ class ChangeCursor {
 template <class Change>
 struct Changes {
   bool all = false;           ///< anything may have changed or been removed; `items` is empty
-  std::vector<Change> items;  ///< each chunk (type, handle) once, in the container's order
+  std::vector<Change> items;  ///< each chunk (type, handle) once, in the container's order; check `all` first
 
   [[nodiscard]] bool empty() const { return !all && items.empty(); }
+
+  /// Returns the chunks to process again: the changed chunks or, if `all` is set, all chunks of the grid or field (all
+  /// loaded chunks of a partial one). Sorted by z, then y, then x. A loop over `items` alone does nothing the first
+  /// time. This loop also handles `all`:
+  ///
+  ///   for (const quoin::IVec3 chunk : grid.changes_since(cursor).chunks(grid)) make_again(chunk);
+  ///
+  /// A changed chunk may no longer exist (Grid::find_chunk returns null). If `all` is set, chunks that the caller knows
+  /// from before and that are not in the result are gone.
+  /// Requires: the changes lead up to the container's present state.
+  template <class Container>
+  [[nodiscard]] std::vector<IVec3> chunks(const Container& container) const {
+    if (all) return container.loaded_chunks();
+    std::vector<IVec3> changed;
+    changed.reserve(items.size());
+    for (const Change& change : items) changed.push_back(change.chunk);
+    return changed;
+  }
 };
 
 /// Changes that a consumer applies completely or not at all.

@@ -54,7 +54,8 @@ struct PropagatedLightOptions {
 ///
 ///   PropagatedLight light;
 ///   light.update(grid, types);                                    // once, and after each edit
-///   for (const ChunkChange& change : light.changes_since(cursor).items) mesh_again(change);
+///   const GridChanges changes = light.changes_since(cursor);      // `all` the first time: mesh all chunks
+///   for (const ChunkChange& change : changes.items) mesh_again(change);
 ///   light.split(quads, chunk, lit_quads, levels);                 // one level per quad; merged where levels agree
 ///
 /// Sky:     level 15 falls straight down without loss until it meets an opaque voxel, and is 15 outside the world. y is
