@@ -2,13 +2,23 @@
 
 #include <sys/resource.h>
 #include <unistd.h>
+#ifdef __linux__
+#include <sys/mman.h>
+#endif
 #ifdef __GLIBC__
 #include <malloc.h>
 #endif
 
 #include <algorithm>
+#include <cstdlib>
+#include <cstring>
 #include <fstream>
+#include <new>
 #include <string>
+
+#include <quoin/core/assert.h>
+
+#include "core/large_array.h"
 
 namespace quoin {
 namespace {
@@ -72,7 +82,60 @@ std::optional<std::uint64_t> of_process() {
   return limit.rlim_cur > used ? limit.rlim_cur - used : 0;
 }
 
+// Returns true if a block of this size is pages of the system.
+bool is_system_block([[maybe_unused]] std::size_t bytes) {
+#ifdef __linux__
+  return bytes >= kSystemBlock;
+#else
+  return false;
+#endif
+}
+
+// Returns null if there is no memory.
+void* new_block(std::size_t bytes) {
+#ifdef __linux__
+  if (is_system_block(bytes)) {
+    void* const block = ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    return block == MAP_FAILED ? nullptr : block;
+  }
+#endif
+  return std::calloc(1, bytes);  // NOLINT(*-no-malloc): zeroed pages that are never written take no memory
+}
+
+void free_block(void* block, [[maybe_unused]] std::size_t bytes) {
+#ifdef __linux__
+  if (is_system_block(bytes)) {
+    ::munmap(block, bytes);
+    return;
+  }
+#endif
+  std::free(block);  // NOLINT(*-no-malloc)
+}
+
 }  // namespace
+
+void* resize_block(void* block, std::size_t bytes, std::size_t wanted) {
+  QUOIN_ASSERT((block == nullptr) == (bytes == 0), "an empty block or one with bytes");
+  if (bytes == wanted) return block;
+  if (wanted == 0) {
+    free_block(block, bytes);
+    return nullptr;
+  }
+#ifdef __linux__
+  if (is_system_block(bytes) && is_system_block(wanted)) {
+    void* const moved = ::mremap(block, bytes, wanted, MREMAP_MAYMOVE);
+    if (moved == MAP_FAILED) throw std::bad_alloc();
+    return moved;
+  }
+#endif
+  void* const made = new_block(wanted);
+  if (made == nullptr) throw std::bad_alloc();
+  if (block != nullptr) {
+    std::memcpy(made, block, std::min(bytes, wanted));
+    free_block(block, bytes);
+  }
+  return made;
+}
 
 std::optional<std::uint64_t> available_memory() {
   std::optional<std::uint64_t> least;

@@ -4,8 +4,6 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/make_room.h"
-
 namespace quoin::trace {
 namespace {
 
@@ -34,7 +32,7 @@ int lines_alike(const Node& words, bool is_from_last, int most) {
 
 }  // namespace
 
-BrickStore::BrickStore() : lines_(2 * kBrickLines) {
+BrickStore::BrickStore() {
   static_assert(kFullBrick == BrickCode{kBrickLines} << 4);
   for (std::size_t line = kBrickLines; line < lines_.size(); ++line) lines_[line].fill(kAll);
 }
@@ -63,8 +61,12 @@ std::uint32_t BrickStore::allocate(int lines) {
     same.push_back(first + static_cast<std::uint32_t>(lines));
     return first;
   }
-  if (is_built_) make_room(lines_, wanted, eighth_of(lines_));
-  lines_.resize(lines_.size() + wanted);
+  if (lines_.size() + wanted > lines_.capacity()) {
+    // After the build, doubling would leave half of the memory unused for long.
+    const std::size_t spare = is_built_ ? std::max<std::size_t>(lines_.size() / 8, 64) : lines_.size();
+    lines_.set_capacity(lines_.size() + wanted + spare);
+  }
+  lines_.append(wanted);
   return static_cast<std::uint32_t>(lines_.size() - wanted);
 }
 
@@ -124,7 +126,8 @@ BrickCode BrickStore::put_slab(BrickCode brick, std::size_t slab, std::span<cons
 }
 
 void BrickStore::finish_build() {
-  trim(lines_);
+  // A small reserve in large stores: untouched pages take no memory, and the first edit then moves nothing.
+  lines_.set_capacity(lines_.size() + (lines_.size() < 4096 ? 0 : lines_.size() / 64));
   is_built_ = true;
 }
 

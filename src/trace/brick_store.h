@@ -2,32 +2,16 @@
 
 // The words of a tree's bricks: consecutive runs of four to eight lines (tree_view.h).
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
 
+#include "core/large_array.h"
 #include "trace/tree_view.h"
 
 namespace quoin::trace {
-
-/// Returns the number of spare elements for make_room. Doubling would leave half of the memory unused for long.
-template <class T>
-std::size_t eighth_of(const std::vector<T>& all) {
-  return std::max<std::size_t>(all.size() / 8, 64);
-}
-
-/// Shrinks the capacity but leaves a small reserve in large vectors. Untouched pages take no memory, and the first edit
-/// then copies nothing.
-template <class T>
-void trim(std::vector<T>& all) {
-  std::vector<T> exact;
-  exact.reserve(all.size() + (all.size() < 4096 ? 0 : all.size() / 64));
-  exact.assign(all.begin(), all.end());
-  all.swap(exact);
-}
 
 class BrickStore {
  public:
@@ -62,10 +46,10 @@ class BrickStore {
   // last stored word, which also represents the omitted ones.
   std::uint64_t* find_slab(BrickCode brick, std::size_t slab, std::span<const std::uint64_t, 4> words);
 
-  std::vector<BrickLine> lines_;
+  LargeArray<BrickLine> lines_{2 * kBrickLines};
   std::array<std::vector<std::uint32_t>, kBrickLines + 1> free_;  // first lines of free runs, by run length
   std::size_t count_ = 0;
-  bool is_built_ = false;  // before finish_build, vectors may double their capacity; finish_build trims them
+  bool is_built_ = false;  // before finish_build, the capacity doubles when it must grow; finish_build trims it
 };
 
 }  // namespace quoin::trace

@@ -11,7 +11,7 @@
 
 #include "core/coordinates/chunk_boxes.h"
 #include "core/coordinates/chunk_order.h"
-#include "core/make_room.h"
+#include "core/large_array.h"
 #include "trace/brick_store.h"
 #include "trace/chunk_rows.h"
 #include "trace/tree_view.h"
@@ -21,20 +21,29 @@ namespace {
 
 using trace::ChunkBricks, trace::ChunkNode, trace::Node, trace::RegionNode;
 
-// Two tables over the bounding box of all chunks. Kernels for packets read them instead of regions and chunk nodes,
-// because an address is then a sum of products.
+// Tables over a box around all chunks. Kernels read them instead of regions, because an address is then a sum of
+// products.
 struct FlatTables {
-  IVec3 origin{0};                       // the voxel at the lowest corner
-  IVec3 chunks{0};                       // size
-  std::vector<std::uint32_t> cells;      // one bit per cell of 4^3 voxels, with a border of empty cells
-  std::vector<trace::BrickCode> bricks;  // x first, then y, then z; an empty one before and after, for pairs along x
+  IBox box;                             // of chunks; empty: no tables
+  IBox first;                           // the box of all chunks when the tables were made
+  LargeArray<std::uint32_t> cells;      // one bit per cell of 4^3 voxels, with a border of empty cells
+  LargeArray<trace::BrickCode> bricks;  // x first, then y, then z; an empty one before and after, for pairs along x
+  std::vector<trace::FlatChunk> nodes;
 
+  [[nodiscard]] IVec3 chunks() const { return box.size(); }
   // The steps between cells along x, y, z; cell (0, 0, 0) is bit x + y + z of them.
-  [[nodiscard]] IVec3 cell_strides() const { return {1, 16 * chunks.x + 2, (16 * chunks.x + 2) * (16 * chunks.y + 2)}; }
-  [[nodiscard]] IVec3 chunk_strides() const { return {1, chunks.x, chunks.x * chunks.y}; }
-  [[nodiscard]] IVec3 brick_strides() const { return {1, 4 * chunks.x, 16 * chunks.x * chunks.y}; }
+  [[nodiscard]] IVec3 cell_strides() const {
+    const IVec3 size = chunks();
+    return {1, 16 * size.x + 2, (16 * size.x + 2) * (16 * size.y + 2)};
+  }
+  [[nodiscard]] IVec3 chunk_strides() const { return {1, chunks().x, chunks().x * chunks().y}; }
+  [[nodiscard]] IVec3 brick_strides() const { return {1, 4 * chunks().x, 16 * chunks().x * chunks().y}; }
   [[nodiscard]] const trace::BrickCode* first_brick() const { return bricks.data() + 1; }
   [[nodiscard]] trace::BrickCode* first_brick() { return bricks.data() + 1; }
+  [[nodiscard]] std::size_t bytes() const {
+    return cells.capacity() * sizeof(std::uint32_t) + bricks.capacity() * sizeof(trace::BrickCode) +
+           nodes.capacity() * sizeof(trace::FlatChunk);
+  }
 };
 
 // Returns the index of a unit in a table with these strides.
@@ -48,6 +57,8 @@ constexpr std::uint64_t kAll = ~std::uint64_t{0};
 constexpr int kRegionShift = 4;  // chunks, per axis
 // If more slabs than this of a row of four bricks change, fill_row assembles each brick once.
 constexpr int kFewSlabs = 2;
+// Chunks whose tables an update copies in advance.
+constexpr int kChunksCopied = 256;
 // Flat tables up to this size are made for any world, even a sparse one.
 constexpr std::int64_t kSmallTables = std::int64_t{1} << 20;
 
@@ -109,23 +120,24 @@ std::vector<IVec3> cells_of(const std::vector<IVec3>& chunks) {
   return cells;
 }
 
-trace::TreeView make_view(const FlatTables& tables, const trace::FlatChunk* chunks, const trace::BrickLine* lines,
-                          const IBox& bounds) {
+trace::TreeView make_view(const FlatTables& tables, const trace::BrickLine* lines, const IBox& bounds) {
+  const IVec3 origin = tables.box.min * kChunkEdge;
+  const IVec3 chunks = tables.chunks();
   trace::TreeView view{};
   view.cells = tables.cells.data();
   view.bricks = tables.first_brick();
   view.lines = lines;
-  view.chunks = chunks;
+  view.chunks = tables.nodes.data();
   view.words = reinterpret_cast<const std::uint32_t*>(lines);
   view.last_cell_word = static_cast<std::uint32_t>(tables.cells.size() - 1);
   view.cell_strides = tables.cell_strides();
   view.brick_strides = tables.brick_strides();
-  view.brick_sizes = tables.chunks * 4;
+  view.brick_sizes = chunks * 4;
   view.first_cell = view.cell_strides.x + view.cell_strides.y + view.cell_strides.z;
-  view.origin = DVec3(tables.origin);
-  view.box = {bounds.min - tables.origin, bounds.max - tables.origin};
-  QUOIN_ASSERT((intersect(view.box, {IVec3(0), tables.chunks * kChunkEdge}) == view.box), "tables of every voxel");
-  const std::int32_t strides[3] = {1, tables.chunks.x, tables.chunks.x * tables.chunks.y};
+  view.origin = DVec3(origin);
+  view.box = {bounds.min - origin, bounds.max - origin};
+  QUOIN_ASSERT((intersect(view.box, {IVec3(0), chunks * kChunkEdge}) == view.box), "tables of every voxel");
+  const std::int32_t strides[3] = {1, chunks.x, chunks.x * chunks.y};
   std::copy_n(strides, 3, view.chunk_strides);
   const IVec3 size = view.box.size();
   view.is_small = std::max(std::max(size.x, size.y), size.z) <= 1'900;
@@ -142,24 +154,25 @@ trace::TreeView make_view(const FlatTables& tables, const trace::FlatChunk* chun
 }  // namespace
 
 struct OccupancyTree::Impl {
+  Impl() { chunk_nodes.push_back(std::make_unique<ChunkNode>()); }
+
   Occupancy which = Occupancy::NonAir;
   tsl::robin_map<IVec3, std::unique_ptr<RegionNode>, CoordinateHash> regions;
-  std::vector<ChunkNode> chunk_nodes = std::vector<ChunkNode>(1);  // index 0: an empty node
+  // Index 0: an empty node. Nodes keep their addresses, which the flat tables hold, so growth copies none.
+  std::vector<std::unique_ptr<ChunkNode>> chunk_nodes;
   trace::BrickStore bricks;
-  std::vector<trace::UniformBlocks> uniform;  // only for transparent voxels, parallel to `chunk_nodes`
   std::vector<std::uint32_t> free_chunks;
   ChunkBoxes chunk_boxes;  // around the occupied voxels of each chunk, in grid coordinates
   IBox bounds;
-  FlatTables flat;  // empty without chunks
-  std::vector<trace::FlatChunk> flat_nodes;
-  const ChunkNode* known_nodes = nullptr;  // data() of chunk_nodes when `flat_nodes` was made
-  IBox flat_chunks;
+  FlatTables flat;
+  // When the box of all chunks is about to outgrow the tables, updates copy them in steps to larger ones.
+  FlatTables next;
+  int next_rows = 0;  // rows of the chunks in both boxes that `next` has
   // A chunk far from all others would make the tables too large. The tables then stay as they are until that chunk is
   // gone, together with the changes that they missed.
   bool is_flat = false;
   std::vector<ChunkBricks> missed;
   trace::TreeView view{};
-  bool is_built = false;  // before finish_build, vectors may double their capacity; finish_build trims them
 
   void release_bricks(ChunkNode& node) {
     for (trace::BrickCode& brick : node.bricks) {
@@ -179,7 +192,7 @@ struct OccupancyTree::Impl {
     if (index == 0) return;
     QUOIN_ASSERT((region.chunks[word_of(unit)] >> bit_of(unit) & 1U) != 0, "a region's bits match its nodes");
     QUOIN_ASSERT(index < chunk_nodes.size(), "an existing node");
-    release_bricks(chunk_nodes[index]);
+    release_bricks(*chunk_nodes[index]);
     free_chunks.push_back(index);
     index = 0;
     region.chunks[word_of(unit)] &= ~(std::uint64_t{1} << bit_of(unit));
@@ -195,8 +208,7 @@ struct OccupancyTree::Impl {
     std::uint32_t& index = region->nodes[table_index(unit)];
     if (index == 0) {
       if (free_chunks.empty()) {
-        if (is_built) make_room(chunk_nodes, 1, trace::eighth_of(chunk_nodes));
-        chunk_nodes.emplace_back();
+        chunk_nodes.push_back(std::make_unique<ChunkNode>());
         index = static_cast<std::uint32_t>(chunk_nodes.size() - 1);
       } else {
         index = free_chunks.back();
@@ -205,7 +217,7 @@ struct OccupancyTree::Impl {
       region->chunks[word_of(unit)] |= std::uint64_t{1} << bit_of(unit);
     }
     QUOIN_ASSERT(index != 0 && index < chunk_nodes.size(), "an existing node");
-    return chunk_nodes[index];
+    return *chunk_nodes[index];
   }
 
   // Replaces the words of one brick. Returns true if they changed.
@@ -444,14 +456,15 @@ struct OccupancyTree::Impl {
 
   template <class Find>
   void set_uniform_blocks(IVec3 chunk, const Find& find_blocks) {
-    uniform.resize(chunk_nodes.size());
-    const std::size_t index = static_cast<std::size_t>(&node_of(chunk) - chunk_nodes.data());
-    QUOIN_ASSERT(index < uniform.size(), "an existing node");
-    if (index != 0) find_blocks(uniform[index]);
+    const std::uint32_t index = index_of(chunk);
+    if (index == 0) return;
+    std::unique_ptr<trace::UniformBlocks>& blocks = chunk_nodes[index]->uniform;
+    if (blocks == nullptr) blocks = std::make_unique<trace::UniformBlocks>();
+    find_blocks(*blocks);
   }
 
   // Replaces the 4 bits at `bit`.
-  static void put_bits(std::vector<std::uint32_t>& words, std::size_t bit, std::uint64_t bits) {
+  static void put_bits(LargeArray<std::uint32_t>& words, std::size_t bit, std::uint64_t bits) {
     const std::size_t word = bit / 32;
     QUOIN_ASSERT(bits < 16 && word + 1 < words.size(), "bits of the table");
     const unsigned shift = bit % 32;
@@ -462,33 +475,30 @@ struct OccupancyTree::Impl {
     words[word + 1] = static_cast<std::uint32_t>(both >> 32);
   }
 
-  [[nodiscard]] const ChunkNode& node_of(IVec3 chunk) const {
-    const RegionNode* region = find({chunk.x >> kRegionShift, chunk.y >> kRegionShift, chunk.z >> kRegionShift});
-    return chunk_nodes[region == nullptr ? 0 : region->nodes[table_index(chunk & 15)]];
+  [[nodiscard]] std::uint32_t index_of(IVec3 chunk) const {
+    const RegionNode* region = find(chunk >> kRegionShift);
+    return region == nullptr ? 0 : region->nodes[table_index(chunk & 15)];
   }
+  [[nodiscard]] const ChunkNode& node_of(IVec3 chunk) const { return *chunk_nodes[index_of(chunk)]; }
 
-  void name_node(IVec3 chunk) {
-    QUOIN_ASSERT(flat_chunks.contains(chunk), "a chunk of the tables");
+  // Copies some of a chunk's bricks and their cells into flat tables.
+  void flatten(FlatTables& tables, IVec3 chunk, std::uint64_t changed) const {
+    if (changed == 0) return;
+    QUOIN_ASSERT(tables.box.contains(chunk), "a chunk of the tables");
     const ChunkNode& node = node_of(chunk);
+    const IVec3 at = chunk - tables.box.min;
     std::uint64_t bricks_there = 0;
     for (std::size_t i = 0; i < 64; ++i) bricks_there |= std::uint64_t{node.cells[i] != 0} << i;
-    flat_nodes[place_in(flat.chunk_strides(), chunk - flat_chunks.min)] = {bricks_there, &node};
-  }
-
-  // Copies some of a chunk's bricks and their cells into the flat tables.
-  void flatten(IVec3 chunk, std::uint64_t changed) {
-    if (changed == 0) return;
-    name_node(chunk);
-    const ChunkNode& node = node_of(chunk);
-    const IVec3 cells = flat.cell_strides();
-    const IVec3 bricks_at = flat.brick_strides();
+    tables.nodes[place_in(tables.chunk_strides(), at)] = {bricks_there, &node};
+    const IVec3 cells = tables.cell_strides();
+    const IVec3 bricks_at = tables.brick_strides();
     for (; changed != 0; changed &= changed - 1) {
       const int i = std::countr_zero(changed);
-      const IVec3 brick = (chunk - flat_chunks.min) * 4 + IVec3{i & 3, i >> 2 & 3, i >> 4};
-      flat.first_brick()[place_in(bricks_at, brick)] = node.bricks[static_cast<std::size_t>(i)];
+      const IVec3 brick = at * 4 + IVec3{i & 3, i >> 2 & 3, i >> 4};
+      tables.first_brick()[place_in(bricks_at, brick)] = node.bricks[static_cast<std::size_t>(i)];
       for (int row = 0; row < 16; ++row) {
         const IVec3 cell = brick * 4 + IVec3{1, (row & 3) + 1, (row >> 2) + 1};
-        put_bits(flat.cells, place_in(cells, cell), node.cells[static_cast<std::size_t>(i)] >> (4 * row) & 15U);
+        put_bits(tables.cells, place_in(cells, cell), node.cells[static_cast<std::size_t>(i)] >> (4 * row) & 15U);
       }
     }
   }
@@ -514,30 +524,33 @@ struct OccupancyTree::Impl {
     return static_cast<double>(cells) * (16.0 * chunks_along_z + 2.0);
   }
 
-  // Makes empty tables for a box of chunks.
-  void clear_tables(const IBox& chunks) {
-    flat = {};
-    const IVec3 size = flat.chunks = chunks.size();
+  // Makes empty tables for a box of chunks around `all`.
+  [[nodiscard]] FlatTables empty_tables(const IBox& box, const IBox& all) const {
+    static_assert(trace::kEmptyBrick == 0, "as the bytes of a new array");
+    const IVec3 size = box.size();
     const std::int64_t cells = (16 * std::int64_t{size.x} + 2) * (16 * std::int64_t{size.y} + 2);
-    flat.origin = chunks.min * kChunkEdge;
     QUOIN_ASSERT(bits_of(cells, size.z) <= 2e9, "cells that kernels can count in 32 bits");
-    flat.cells.assign(static_cast<std::size_t>(bits_of(cells, size.z)) / 32 + 2, 0);
-    flat.bricks.assign(64 * volume(size) + 2, trace::kEmptyBrick);
-    flat_nodes.assign(volume(size), {0, chunk_nodes.data()});
-    flat_chunks = chunks;
+    FlatTables tables;
+    tables.cells = LargeArray<std::uint32_t>(static_cast<std::size_t>(bits_of(cells, size.z)) / 32 + 2);
+    tables.bricks = LargeArray<trace::BrickCode>(64 * volume(size) + 2);
+    tables.nodes.assign(volume(size), {0, chunk_nodes.front().get()});
+    tables.box = box;
+    tables.first = all;
+    return tables;
   }
   static std::size_t volume(IVec3 size) {
     return static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z);
   }
 
   void make_flat(const IBox& chunks) {
-    clear_tables(chunks);
-    known_nodes = chunk_nodes.data();
-    for (const auto& [chunk, box] : chunk_boxes) flatten(chunk, kAll);
+    next = {};
+    flat = {};
+    flat = empty_tables(chunks, chunks);
+    for (const auto& [chunk, box] : chunk_boxes) flatten(flat, chunk, kAll);
   }
 
   // ORs a row of bits from one table into another, where the bits are 0.
-  static void copy_bits(const std::vector<std::uint32_t>& from, std::size_t from_bit, std::vector<std::uint32_t>& to,
+  static void copy_bits(const LargeArray<std::uint32_t>& from, std::size_t from_bit, LargeArray<std::uint32_t>& to,
                         std::size_t to_bit, std::size_t count) {
     QUOIN_ASSERT((from_bit + count - 1) / 32 + 1 < from.size() && (to_bit + count - 1) / 32 + 1 < to.size(),
                  "bits of the tables");
@@ -552,72 +565,112 @@ struct OccupancyTree::Impl {
     }
   }
 
-  // Builds tables for another box of chunks, which contains all chunks of the current tables, by copying rows.
-  void move_flat(const IBox& chunks) {
-    const FlatTables old = std::move(flat);
-    const std::vector<trace::FlatChunk> old_nodes = std::move(flat_nodes);
-    const IBox old_chunks = flat_chunks;
-    clear_tables(chunks);
-    const IBox kept = intersect(old_chunks, chunks);
-    const IVec3 from = kept.min - old_chunks.min;
-    const IVec3 to = kept.min - chunks.min;
-    const IVec3 size = kept.size();
-    const auto for_each_row = [&](int edge, const auto& visit) {
-      for (int z = 0; z < size.z * edge; ++z) {
-        for (int y = 0; y < size.y * edge; ++y) visit(from * edge + IVec3{0, y, z}, to * edge + IVec3{0, y, z});
-      }
-    };
-    const IVec3 old_rows = old.chunk_strides();
-    const IVec3 rows = flat.chunk_strides();
-    for_each_row(1, [&](IVec3 a, IVec3 b) {
-      std::copy_n(&old_nodes[place_in(old_rows, a)], size.x, &flat_nodes[place_in(rows, b)]);
-    });
-    for_each_row(4, [&](IVec3 a, IVec3 b) {
-      std::copy_n(old.first_brick() + place_in(old.brick_strides(), a), 4 * size.x,
-                  flat.first_brick() + place_in(flat.brick_strides(), b));
-    });
-    for_each_row(16, [&](IVec3 a, IVec3 b) {
-      copy_bits(old.cells, place_in(old.cell_strides(), a + 1), flat.cells, place_in(flat.cell_strides(), b + 1),
-                16 * static_cast<std::size_t>(size.x));
-    });
+  // The rows along x of the chunks that `flat` and `next` share: their count, and the number of a chunk's row.
+  [[nodiscard]] static int rows_of(const IBox& shared) { return shared.size().y * shared.size().z; }
+  [[nodiscard]] static int row_of(const IBox& shared, IVec3 chunk) {
+    return chunk.y - shared.min.y + (chunk.z - shared.min.z) * shared.size().y;
   }
 
-  // Grows a box of chunks that the tables must cover, on the sides that they do not cover yet.
+  static void copy_row(const FlatTables& from, FlatTables& to, const IBox& shared, int row) {
+    const IVec3 first = shared.min + IVec3{0, row % shared.size().y, row / shared.size().y};
+    QUOIN_ASSERT(row >= 0 && shared.contains(first), "a row of the shared chunks");
+    const IVec3 a = first - from.box.min;
+    const IVec3 b = first - to.box.min;
+    const int count = shared.size().x;
+    std::copy_n(&from.nodes[place_in(from.chunk_strides(), a)], count, &to.nodes[place_in(to.chunk_strides(), b)]);
+    for (int i = 0; i < 16; ++i) {
+      const IVec3 at{0, i & 3, i >> 2};
+      std::copy_n(from.first_brick() + place_in(from.brick_strides(), 4 * a + at), 4 * count,
+                  to.first_brick() + place_in(to.brick_strides(), 4 * b + at));
+    }
+    for (int i = 0; i < 256; ++i) {
+      const IVec3 at{1, 1 + (i & 15), 1 + (i >> 4)};
+      copy_bits(from.cells, place_in(from.cell_strides(), 16 * a + at), to.cells,
+                place_in(to.cell_strides(), 16 * b + at), 16 * static_cast<std::size_t>(count));
+    }
+  }
+
+  // Copies up to `count` further rows to `next`. Returns true if it then has all.
+  bool copy_rows(int count) {
+    const IBox shared = intersect(flat.box, next.box);
+    const int rows = rows_of(shared);
+    for (; next_rows < rows && count > 0; --count) copy_row(flat, next, shared, next_rows++);
+    return next_rows == rows;
+  }
+
+  void start_next(const IBox& box, const IBox& chunks) {
+    next = {};
+    next = empty_tables(box, chunks);
+    next_rows = 0;
+  }
+
+  // Replaces the tables, which do not have all chunks, by tables that do. Copies what `next` does not have yet.
+  void move_flat(const IBox& chunks) {
+    if (!(intersect(chunks, next.box) == chunks)) start_next(with_room(chunks), chunks);
+    (void)copy_rows(rows_of(next.box));
+    flat = std::exchange(next, {});
+  }
+
+  // Does a part of the work of the next `move_flat`, so that no single update does it all.
+  void prepare_next(const IBox& chunks) {
+    if (!(intersect(chunks, next.box) == chunks)) {
+      next = {};
+      if (!needs_room_soon(chunks)) return;
+      const IBox box = with_room(chunks);
+      if (intersect(box, flat.box) == box) return;  // larger tables would be too large
+      start_next(box, chunks);
+    }
+    if (copy_rows(std::max(1, kChunksCopied / flat.chunks().x))) flat = std::exchange(next, {});
+  }
+
+  // The room, in chunks, for growth on one side of a box of all chunks.
+  static int room_along(const IBox& chunks, int axis) { return std::max(1, chunks.size()[axis] / 8); }
+
+  // Adds room to a box of all chunks, on the sides where it has grown since the tables were made.
   [[nodiscard]] IBox with_room(const IBox& chunks) const {
     IBox grown = chunks;
-    const IVec3 room = glm::max(IVec3(1), chunks.size() / 8);
     for (int axis = 0; axis < 3; ++axis) {
-      if (chunks.min[axis] < flat_chunks.min[axis]) grown.min[axis] -= room[axis];
-      if (chunks.max[axis] > flat_chunks.max[axis]) grown.max[axis] += room[axis];
+      if (chunks.min[axis] < flat.first.min[axis]) grown.min[axis] -= room_along(chunks, axis);
+      if (chunks.max[axis] > flat.first.max[axis]) grown.max[axis] += room_along(chunks, axis);
     }
     return can_be_flat(grown) ? grown : chunks;
+  }
+
+  // Returns true if half of the room is used up on a side where the box of all chunks has grown.
+  [[nodiscard]] bool needs_room_soon(const IBox& chunks) const {
+    for (int axis = 0; axis < 3; ++axis) {
+      const int half = room_along(chunks, axis) / 2;
+      if (chunks.min[axis] < flat.first.min[axis] && chunks.min[axis] - flat.box.min[axis] <= half) return true;
+      if (chunks.max[axis] > flat.first.max[axis] && flat.box.max[axis] - chunks.max[axis] <= half) return true;
+    }
+    return false;
   }
 
   // Updates the bounds after chunks were replaced, and the tables for the `changed` chunks.
   void finish(std::span<const ChunkBricks> changed) {
     renew_tables(changed);
-    QUOIN_ASSERT(flat_chunks.empty() || flat_nodes.size() == volume(flat_chunks.size()), "tables of their chunks");
-    if (is_flat) view = make_view(flat, flat_nodes.data(), bricks.middle(), bounds);
+    QUOIN_ASSERT(flat.box.empty() || flat.nodes.size() == volume(flat.chunks()), "tables of their chunks");
+    if (is_flat) view = make_view(flat, bricks.middle(), bounds);
   }
 
   [[nodiscard]] const trace::TreeView* kernel_view() const { return is_flat ? &view : nullptr; }
 
-  void drop_tables() {
-    flat = {};
-    flat_nodes = {};
-    flat_chunks = {};
-    missed = {};
-  }
   // Keeps changes for unused tables, up to a limit.
   void miss(std::span<const ChunkBricks> changed) {
     constexpr std::size_t kMostMissed = 1024;
-    if (flat_chunks.empty()) return;
+    next = {};
+    if (flat.box.empty()) return;
     missed.insert(missed.end(), changed.begin(), changed.end());
-    if (missed.size() > kMostMissed) drop_tables();
+    if (missed.size() <= kMostMissed) return;
+    flat = {};
+    missed = {};
   }
   void put_changes(std::span<const ChunkBricks> changed) {
+    const IBox shared = intersect(flat.box, next.box);
     for (const auto& [chunk, changed_bricks] : changed) {
-      if (flat_chunks.contains(chunk)) flatten(chunk, changed_bricks);
+      if (!flat.box.contains(chunk)) continue;
+      flatten(flat, chunk, changed_bricks);
+      if (shared.contains(chunk) && row_of(shared, chunk) < next_rows) flatten(next, chunk, changed_bricks);
     }
   }
 
@@ -627,19 +680,16 @@ struct OccupancyTree::Impl {
     // As in a tree built from scratch.
     is_flat = can_be_flat(chunks);
     if (!is_flat) return miss(changed);
-    const bool is_little = !flat_chunks.empty() && volume(chunks.size()) < volume(flat_chunks.size()) / 4;
-    if (flat_chunks.empty() || (is_little && !can_be_flat(flat_chunks))) {
+    const bool is_little = !flat.box.empty() && volume(chunks.size()) < volume(flat.chunks()) / 4;
+    if (flat.box.empty() || (is_little && !can_be_flat(flat.box))) {
       missed = {};
       return make_flat(chunks);
     }
-    if (!(intersect(chunks, flat_chunks) == chunks)) move_flat(with_room(chunks));
-    if (chunk_nodes.data() != known_nodes) {
-      known_nodes = chunk_nodes.data();
-      for (const auto& [chunk, box] : chunk_boxes) name_node(chunk);
-    }
+    if (!(intersect(chunks, flat.box) == chunks)) move_flat(chunks);
     put_changes(missed);
     missed.clear();
     put_changes(changed);
+    prepare_next(chunks);
   }
 };
 
@@ -679,10 +729,7 @@ OccupancyTree OccupancyTree::build(const DensityGrid& field, const VoxelRegistry
 }
 
 void OccupancyTree::finish_build() {
-  trace::trim(impl_->chunk_nodes);
   impl_->bricks.finish_build();
-  trace::trim(impl_->uniform);
-  impl_->is_built = true;
   impl_->finish({});
   view_ = impl_->kernel_view();
 }
@@ -742,7 +789,7 @@ bool OccupancyTree::is_occupied(IVec3 voxel) const {
   const RegionNode* region = impl_->find({voxel.x >> 10, voxel.y >> 10, voxel.z >> 10});
   if (region == nullptr) return false;
   const IVec3 chunk = (voxel >> kChunkShift) & 15;
-  const ChunkNode& node = impl_->chunk_nodes[region->nodes[table_index(chunk)]];
+  const ChunkNode& node = *impl_->chunk_nodes[region->nodes[table_index(chunk)]];
   const IVec3 brick = (voxel >> 4) & 3;
   const trace::BrickWords words =
       impl_->bricks.words(node.bricks[static_cast<std::size_t>(brick.x + 4 * brick.y + 16 * brick.z)]);
@@ -752,11 +799,12 @@ bool OccupancyTree::is_occupied(IVec3 voxel) const {
 
 std::size_t OccupancyTree::bytes() const {
   QUOIN_ASSERT(impl_ != nullptr, "a tree that was not moved from");
+  const bool has_blocks = impl_->which == Occupancy::Transparent;
+  const std::size_t node_bytes = sizeof(ChunkNode) + (has_blocks ? sizeof(trace::UniformBlocks) : 0);
   return sizeof(OccupancyTree) + sizeof(Impl) + impl_->regions.size() * sizeof(RegionNode) +
-         impl_->chunk_nodes.capacity() * sizeof(ChunkNode) + impl_->bricks.bytes() +
-         impl_->uniform.capacity() * sizeof(trace::UniformBlocks) + impl_->chunk_boxes.bytes() +
-         impl_->flat_nodes.capacity() * sizeof(trace::FlatChunk) + impl_->missed.capacity() * sizeof(ChunkBricks) +
-         (impl_->flat.cells.capacity() + impl_->flat.bricks.capacity()) * sizeof(std::uint32_t);
+         impl_->chunk_nodes.capacity() * sizeof(void*) + impl_->chunk_nodes.size() * node_bytes +
+         impl_->bricks.bytes() + impl_->chunk_boxes.bytes() + impl_->missed.capacity() * sizeof(ChunkBricks) +
+         impl_->flat.bytes() + impl_->next.bytes();
 }
 
 const OccupancyTree::Impl& OccupancyTree::impl() const {
@@ -765,10 +813,7 @@ const OccupancyTree::Impl& OccupancyTree::impl() const {
 }
 
 trace::TreeNodes::TreeNodes(const OccupancyTree& tree)
-    : tree_(&tree.impl()),
-      chunks_(tree_->chunk_nodes.data()),
-      lines_(tree_->bricks.middle()),
-      uniform_(tree_->uniform.data()) {}
+    : tree_(&tree.impl()), chunks_(tree_->chunk_nodes.data()), lines_(tree_->bricks.middle()) {}
 
 const RegionNode* trace::TreeNodes::find_region(IVec3 region) const {
   return tree_->find(region);
@@ -777,7 +822,7 @@ const RegionNode* trace::TreeNodes::find_region(IVec3 region) const {
 const ChunkNode* trace::TreeNodes::find_chunk(IVec3 chunk) const {
   const RegionNode* region = find_region(chunk >> kRegionShift);
   const std::uint32_t index = region == nullptr ? 0 : region->nodes[table_index(chunk & 15)];
-  return index == 0 ? nullptr : chunks_ + index;
+  return index == 0 ? nullptr : chunks_[index].get();
 }
 
 }  // namespace quoin

@@ -161,6 +161,72 @@ TEST(TreeUpdate, MatchesRebuiltTreeOfGrowingWorld) {
   expect_equal(tree, OccupancyTree::build(grid, types), random, false);
 }
 
+// The loaded part of a large world, which moves with a viewer.
+struct MovingWorld {
+  static constexpr int kWide = 20;
+  Grid grid;
+  IVec3 low{0};
+  explicit MovingWorld(Random& random) {
+    grid.make_partial();
+    for (int z = 0; z < kWide; ++z) {
+      for (int x = 0; x < kWide; ++x) load({x, 0, z}, random);
+    }
+  }
+  void load(IVec3 chunk, Random& random) {
+    Chunk voxels;
+    for (int i = 0; i < 4; ++i) voxels.set(random.below(64), random.below(64), random.below(64), 1);
+    voxels.fill_box({{0, 0, 0}, {64, 3, 64}}, 3, [](int, int, std::uint64_t) {});
+    grid.load_chunk(chunk, std::move(voxels));
+  }
+  // Loads or unloads a quarter of the chunks that a step along an axis brings, and those it leaves behind.
+  void move(int axis, int way, int quarter, Random& random) {
+    const int other = 2 - axis;
+    for (int i = quarter; i < kWide; i += 4) {
+      IVec3 chunk = low;
+      chunk[other] += i;
+      chunk[axis] = way > 0 ? low[axis] + kWide : low[axis] - 1;
+      load(chunk, random);
+      chunk[axis] = way > 0 ? low[axis] : low[axis] + kWide - 1;
+      grid.unload_chunk(chunk);
+    }
+    if (quarter == 3) low[axis] += way;
+  }
+};
+
+TEST(TreeUpdate, MatchesRebuiltTreeOfMovingWorld) {
+  const VoxelRegistry types = two_of_each();
+  Random random(9);
+  MovingWorld world(random);
+  ChangeCursor cursor = world.grid.cursor();
+  OccupancyTree tree = OccupancyTree::build(world.grid, types);
+  const auto update = [&] {
+    tree.update(world.grid, types, world.grid.changes_since(cursor));
+    expect_equal(tree, OccupancyTree::build(world.grid, types), random, false);
+  };
+  for (const auto& [axis, way] : {std::pair{0, 1}, {2, -1}, {0, -1}, {2, 1}}) {
+    for (int step = 0; step < 28; ++step) {
+      world.move(axis, way, step % 4, random);
+      update();
+      ASSERT_FALSE(HasFatalFailure()) << axis << " " << way << " " << step;
+      if (step < 8) continue;
+      // The tables have room ahead before it is needed, so that no update copies all of them.
+      const int tables = tree.view()->brick_sizes[axis] / 4;
+      const IBox& used = tree.view()->box;
+      EXPECT_TRUE(way > 0 ? used.max[axis] <= (tables - 1) * kChunkEdge : used.min[axis] >= kChunkEdge) << step;
+    }
+  }
+  // Jumps, while tables are half copied.
+  for (int jump = 0; jump < 6; ++jump) {
+    for (int step = 0; step < 4 * (1 + jump % 3); ++step)
+      world.move(jump % 2 * 2, jump % 3 == 0 ? -1 : 1, step % 4, random);
+    update();
+    world.move(0, 1, 0, random);
+    update();
+    for (int quarter = 1; quarter < 4; ++quarter) world.move(0, 1, quarter, random);
+    ASSERT_FALSE(HasFatalFailure()) << jump;
+  }
+}
+
 TEST(TreeUpdate, MatchesRebuiltTreeOfField) {
   Random random(11);
   DensityGrid field;

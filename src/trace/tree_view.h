@@ -23,6 +23,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <memory>
 
 #include <quoin/core/assert.h>
 #include <quoin/trace/occupancy_tree.h>
@@ -115,17 +116,18 @@ class BrickWords {
   const std::int8_t* places_;
 };
 
-/// A chunk of 64^3 voxels: the occupied 4^3 cells, and the addresses of its 16^3 bricks.
-struct ChunkNode {
-  Node cells{};                        ///< word b: the cells of brick b
-  std::array<BrickCode, 64> bricks{};  ///< kEmptyBrick and kFullBrick are shared by all
-};
-
 /// The aligned blocks of a transparent chunk that are full of one type.
 struct UniformBlocks {
   Node cells{};              ///< cells of 4^3, as in ChunkNode
   std::uint64_t bricks = 0;  ///< bricks of 16^3, x + 4 y + 16 z
   bool is_whole = false;
+};
+
+/// A chunk of 64^3 voxels: the occupied 4^3 cells, and the addresses of its 16^3 bricks.
+struct ChunkNode {
+  Node cells{};                            ///< word b: the cells of brick b
+  std::array<BrickCode, 64> bricks{};      ///< kEmptyBrick and kFullBrick are shared by all
+  std::unique_ptr<UniformBlocks> uniform;  ///< only in trees of transparent voxels
 };
 
 /// Some bricks of a chunk.
@@ -180,19 +182,18 @@ class TreeNodes {
   [[nodiscard]] const RegionNode* find_region(IVec3 region) const;
   /// Returns null if a chunk is empty. Chunk coordinates are voxel coordinates / 64, rounded down.
   [[nodiscard]] const ChunkNode* find_chunk(IVec3 chunk) const;
-  [[nodiscard]] const ChunkNode& chunk(std::uint32_t index) const { return chunks_[index]; }
+  [[nodiscard]] const ChunkNode& chunk(std::uint32_t index) const { return *chunks_[index]; }
   [[nodiscard]] BrickWords brick(BrickCode code) const { return {lines_, code}; }
   /// Returns the uniform blocks of one of the tree's chunks. Requires: a tree of transparent voxels.
-  [[nodiscard]] const UniformBlocks& uniform_blocks(const ChunkNode& chunk) const {
-    QUOIN_ASSERT(uniform_ != nullptr && &chunk > chunks_, "a chunk of a tree of transparent voxels");
-    return uniform_[&chunk - chunks_];
+  [[nodiscard]] static const UniformBlocks& uniform_blocks(const ChunkNode& chunk) {
+    QUOIN_ASSERT(chunk.uniform != nullptr, "a chunk of a tree of transparent voxels");
+    return *chunk.uniform;
   }
 
  private:
   const OccupancyTree::Impl* tree_;
-  const ChunkNode* chunks_;
+  const std::unique_ptr<ChunkNode>* chunks_;
   const BrickLine* lines_;
-  const UniformBlocks* uniform_;
 };
 
 }  // namespace quoin::trace

@@ -63,8 +63,9 @@ class OccupancyTree {
   /// Requires: `changes` start at the last update or at the build. If the visibility of a type has changed since then
   ///           (`has_other_visibility`), `changes.all` must be true. Neither is checked.
   /// Cost: about a microsecond per changed row of four bricks (16^3 voxels each, along x). Changes at the border of a
-  ///       chunk's bounds cost some microseconds for its bounds. If the box of all chunks outgrows the flat tables,
-  ///       they are copied once, with spare room on that side.
+  ///       chunk's bounds cost some microseconds for its bounds. While the box of all chunks grows, updates copy the
+  ///       flat tables to larger ones in steps of about 256 chunks, ahead of need. A box that grows by more than the
+  ///       spare room at once, an eighth, costs a copy of all tables.
   void update(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes);
 
   /// Applies edits of the field. Requires: the tree was built from this field. Cost: same as for a grid. An edit on the
