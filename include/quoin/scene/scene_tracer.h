@@ -42,6 +42,15 @@ class SceneTracer {
   /// Threads:  grids are updated on several threads.
   bool update(Threads threads = {});
 
+  /// Traces `scene` from now on. The result equals a newly built tracer. Use it with snapshots of one scene
+  /// (`Scene::snapshot`), or with the scene itself; for an unrelated scene it builds all trees from scratch.
+  ///
+  /// Cost:     as `update`, for the differences from the scene traced before, plus a pass over all grids and instances.
+  /// Lifetime: the former scene must live until the call returns, `scene` longer than the tracer.
+  /// Requires, threads: as `update`.
+  void update(const Scene& scene, Threads threads = {});
+  void update(Scene&&, Threads = {}) = delete;  // would dangle
+
   /// Returns a tracer of the same instances, with those in `selected` at their chosen detail. Mid and Far instances use
   /// grids (voxels and field) halved to the selected level. A grid is halved less if its voxel or field volume would
   /// change by more than an eighth, or more than an eighth of the field's surface would become one sample thin. Fields

@@ -30,6 +30,10 @@ class DensityTree {
   /// Requires: `changes` start at the last update or at construction; this is not checked.
   /// Cost: same as construction, for the changed chunks, and for the chunks below if their lower faces changed.
   void update(const DensityChanges& changes) { cells_.update(*field_, changes); }
+  /// Replaces the field by another snapshot of it (DensityGrid::snapshot), or by the field itself. Call `update` with
+  /// the changes between the two before anything else.
+  void refer_to(const DensityGrid& field) noexcept { field_ = &field; }
+  void refer_to(DensityGrid&&) = delete;  // would dangle
 
   [[nodiscard]] const DensityGrid& field() const { return *field_; }
   /// Returns the occupied cells. Cell (i, j, k) spans the points from sample (i, j, k) to (i + 1, j + 1, k + 1).

@@ -23,6 +23,11 @@ bool SceneTracer::update(Threads threads) {
   return impl_of(impl_).update(threads);
 }
 
+void SceneTracer::update(const Scene& scene, Threads threads) {
+  if (&scene != impl_of(impl_).scene) impl_of(impl_).refer_to(scene);
+  impl_of(impl_).update(threads);
+}
+
 SceneTracer::SceneTracer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
 SceneTracer SceneTracer::with_detail(std::span<const SelectedInstance> selected, Threads threads) const {
@@ -145,6 +150,18 @@ bool SceneTracer::Impl::update(Threads threads) {
   pending.commit();
   is_unfinished = false;
   return std::exchange(has_other_trees, false);
+}
+
+// Replaces the references to the former scene, except in `placed` and `unloaded`, which the next update replaces. That
+// update reads the changes: the cursors also work with another snapshot.
+void SceneTracer::Impl::refer_to(const Scene& other) noexcept {
+  scene = &other;
+  has_other_trees = true;
+  for (const auto& each : grids) {
+    if (each == nullptr) continue;
+    each->grid = other.grids().find(each->handle);
+    if (each->grid != nullptr) each->trees.refer_to(each->grid->field);
+  }
 }
 
 // Discards the data of types that became transparent or ceased to be. Returns false if there are none.

@@ -57,6 +57,7 @@ struct SceneTracer::Impl {
   HalvedGridCache coarse;  // the levels of `with_detail`
 
   bool update(Threads threads);
+  void refer_to(const Scene& other) noexcept;
 
   std::uint64_t shapes = 0;      // number of shapes so far
   bool has_other_trees = false;  // `placed` refers to outdated grids or trees

@@ -36,6 +36,11 @@ class SplitField {
   /// Takes over the edits. Requires: as DensityGlass::update. Cost: like construction, for the changed chunks and, in
   /// the trees, those below.
   void update(const VoxelRegistry& types, const DensityChanges& changes);
+  /// Replaces the field by another snapshot of it, before `update` takes over the changes.
+  void refer_to(const DensityGrid& whole) noexcept {
+    whole_ = &whole;
+    glass_.refer_to(whole);
+  }
 
   [[nodiscard]] const DensityTree& opaque() const { return *opaque_; }
   [[nodiscard]] const DensityGlass& glass() const { return glass_; }
@@ -64,6 +69,11 @@ class TreeCache {
   bool update(const Grid& grid, const VoxelRegistry& types);
   /// As above, for a field. Lifetime: as DensityTree. Cost: with transparent materials, also the cost of SplitField.
   bool update(const DensityGrid& field, const VoxelRegistry& types);
+  /// Replaces the field that the trees refer to by another snapshot of it, before `update`.
+  void refer_to(const DensityGrid& field) noexcept {
+    if (field_) field_->refer_to(field);
+    if (split_ != nullptr) split_->refer_to(field);
+  }
   void forget() { *this = {}; }
   [[nodiscard]] const ChangeCursor& followed() const { return followed_; }
   [[nodiscard]] const ChangeCursor& followed_field() const { return followed_field_; }

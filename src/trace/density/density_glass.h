@@ -28,6 +28,9 @@ class DensityGlass {
   /// the visibility of existing types has not changed.
   void update(const VoxelRegistry& types, const DensityChanges& changes);
 
+  /// As DensityTree::refer_to.
+  void refer_to(const DensityGrid& field) noexcept { field_ = &field; }
+
   [[nodiscard]] const DensityGrid& field() const { return *field_; }
   [[nodiscard]] const VoxelRegistry& types() const { return types_; }
   /// The cells with a solid corner of a transparent material. All transparent regions lie in these cells.
