@@ -1,6 +1,8 @@
 // A game loop in an endless world. Only chunks around the player are in memory: they are generated, edited, saved and
-// released on the way, and rendered at the end. The next run loads the edits.
+// released on the way, and rendered at the end. The next run loads the edits. The player keeps above the ground, which
+// rays find: a LiveTracer prepares them on a worker, so that frames never wait for it.
 
+#include <algorithm>
 #include <cstdio>
 #include <string>
 
@@ -38,6 +40,9 @@ quoin::Status run(const std::string& path, const std::string& image) {
   // Loads the chunks around the player before the first frame.
   if (auto loaded = world->load_all({&player, 1}); !loaded) return loaded;
 
+  quoin::LiveTracer tracer;
+  tracer.finish(world->scene());
+
   std::int64_t dug = 0;
   for (int frame = 0; frame < kFrames; ++frame) {
     player.position.x += 2.0;
@@ -47,6 +52,10 @@ quoin::Status run(const std::string& path, const std::string& image) {
       dug += land.fill_sphere(player.position + quoin::DVec3(30.0, -60.0, 10.0), 9.0, quoin::kAir);
     }
     if (auto saved = world->update({&player, 1}); !saved) return saved;  // edits are kept: the next update retries
+    tracer.update(world->scene());
+    tracer.take();
+    const auto ground = first_hit(tracer.shown(), {player.position, {0.0, -1.0, 0.0}});
+    if (ground) player.position.y += std::clamp(70.0 - ground->t, -0.5, 0.5);
     // A game renders here: LiveMeshes, VulkanRenderer and others follow world->scene() like any scene.
   }
   for (const std::string& problem : world->take_problems()) std::fprintf(stderr, "%s\n", problem.c_str());

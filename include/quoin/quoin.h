@@ -57,6 +57,7 @@
 #include <quoin/io/vox.h>
 #include <quoin/live/live_light.h>
 #include <quoin/live/live_meshes.h>
+#include <quoin/live/live_tracer.h>
 #include <quoin/mesh/array_surface.h>
 #include <quoin/mesh/blocky.h>
 #include <quoin/mesh/label_surfaces.h>

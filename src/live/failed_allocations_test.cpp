@@ -2,6 +2,7 @@
 // program, so that a chosen allocation of the calling thread fails. It also counts allocations for other tests.
 
 #include <algorithm>
+#include <atomic>
 #include <cstdint>
 #include <cstdlib>
 #include <functional>
@@ -12,6 +13,7 @@
 #include <random>
 #include <set>
 #include <string>
+#include <thread>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -27,6 +29,7 @@
 #include <quoin/grid/downsample.h>
 #include <quoin/live/live_light.h>
 #include <quoin/live/live_meshes.h>
+#include <quoin/live/live_tracer.h>
 #include <quoin/render/propagated_light.h>
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene_faces.h>
@@ -49,12 +52,22 @@ namespace {
 constinit thread_local std::int64_t allocations_left = -1;  // before one fails; negative: none fails
 constinit thread_local std::int64_t allocations_made = 0;
 constinit thread_local std::int64_t large_frees = 0;
+// The same for all other threads together.
+constinit std::atomic<std::int64_t> allocations_left_of_workers = -1;
+const std::thread::id kTestThread = std::this_thread::get_id();
+
+// Returns true if the allocation must fail.
+bool fails() {
+  if (allocations_left >= 0) return allocations_left-- == 0;
+  if (allocations_left_of_workers.load() < 0 || std::this_thread::get_id() == kTestThread) return false;
+  return allocations_left_of_workers.fetch_sub(1) == 0;
+}
 
 }  // namespace
 
 // Not inlined: GCC would warn that `free` does not match `new`.
 [[gnu::noinline]] void* operator new(std::size_t bytes) {
-  if (allocations_left >= 0 && allocations_left-- == 0) throw std::bad_alloc();
+  if (fails()) throw std::bad_alloc();
   ++allocations_made;
   if (void* const memory = std::malloc(bytes == 0 ? 1 : bytes)) return memory;
   throw std::bad_alloc();
@@ -377,6 +390,40 @@ TEST(FailedAllocations, KeepLiveLight) {
         fresh.update(busy.scene, {1});
         return levels_of(light.shown(), busy.scene) == levels_of(fresh, busy.scene);
       });
+}
+
+TEST(FailedAllocations, KeepLiveTracer) {
+  BusyScene busy;
+  LiveTracer tracer({InstanceFilter::Visible, {1}});
+  expect_recovery(
+      busy, [&] { tracer.update(busy.scene); },
+      [&] {
+        tracer.finish(busy.scene);
+        return hits_of(tracer.shown()) == hits_of(SceneTracer(busy.scene, InstanceFilter::Visible, {1}));
+      });
+}
+
+TEST(FailedAllocations, KeepLiveTracerIfWorkerFails) {
+  BusyScene busy;
+  LiveTracer tracer({InstanceFilter::Visible, {1}});
+  tracer.finish(busy.scene);
+  int failures = 0;
+  for (std::int64_t n = 0; n < 60; ++n) {
+    for (int i = 0; i < 3; ++i) busy.edit();
+    const auto shown = hits_of(tracer.shown());
+    allocations_left_of_workers = n;
+    try {
+      tracer.finish(busy.scene);
+    } catch (const std::bad_alloc&) {
+      ++failures;
+      EXPECT_TRUE(tracer.is_late());
+      EXPECT_EQ(hits_of(tracer.shown()), shown) << "the tracer shown stays";
+    }
+    allocations_left_of_workers = -1;
+    tracer.finish(busy.scene);
+    ASSERT_EQ(hits_of(tracer.shown()), hits_of(SceneTracer(busy.scene, InstanceFilter::Visible, {1}))) << n;
+  }
+  EXPECT_GT(failures, 10);
 }
 
 // The held bricks that let light pass, with their numbers.

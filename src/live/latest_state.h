@@ -1,0 +1,150 @@
+#pragma once
+
+#include <cstdint>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <utility>
+
+#include <quoin/core/assert.h>
+#include <quoin/scene/scene.h>
+
+#include "core/work/workers.h"
+
+namespace quoin {
+
+/// A state that one background thread derives from a scene while the scene is edited: its light, its tracer. The owner
+/// shows the newest completed state.
+///
+///   owner    update(scene): snapshot -> asked       take(): ready <-> shown, the former shown one -> given_up
+///   worker   make(asked, given_up) -> ready
+///
+/// State:    movable; a move must not throw.
+/// Lifetime: the scene is read only during calls.
+/// Threads:  calls must not overlap. `make` runs on the worker, which then has the former state for itself. Any number
+///           of threads may read the shown state until the next `take`.
+template <class State>
+class LatestState {
+ public:
+  using Snapshot = std::shared_ptr<const Scene>;
+  /// Makes the state of a snapshot. `former` is the last state given up by `take`, or null; the function may move it
+  /// away to bring it up to date. Otherwise the worker destroys it, after the new state can be taken.
+  using Make = std::function<std::unique_ptr<State>(Snapshot scene, std::unique_ptr<State>& former)>;
+  /// When the worker begins an update while the last result has not been taken.
+  enum class Begin : std::uint8_t {
+    AtOnce,     ///< the newer result replaces the one that was not taken
+    AfterTake,  ///< after `take`, so that there are never more than two states
+  };
+
+  /// Errors: std::system_error if the background thread cannot be started.
+  LatestState(State first, Begin begin, Make make) : make_(std::move(make)), begins_(begin), shown_(std::move(first)) {
+    worker_.start(1, [this](Workers::Lock& lock, unsigned /*worker*/) { return step(lock); });
+  }
+
+  /// Starts an update to the scene as it is now, if `has_changed` is or was true since the last one started. Does
+  /// nothing else while an update is requested or in progress.
+  /// Errors: bad_alloc, also from the worker; the next call then starts an update.
+  void update(const Scene& scene, bool has_changed) {
+    is_behind_ |= has_changed;
+    {
+      const std::lock_guard lock(mutex_);
+      throw_failure();
+      if (!is_behind_ || is_busy_) return;
+    }
+    auto snapshot = std::make_shared<const Scene>(scene.snapshot());
+    {
+      const std::lock_guard lock(mutex_);
+      QUOIN_ASSERT(asked_ == nullptr && !is_busy_, "one request at a time");
+      asked_ = std::move(snapshot);
+      is_busy_ = true;
+      is_behind_ = false;
+    }
+    worker_.wake_one();
+  }
+
+  /// Shows the newest completed state. Returns true if there was a new one. Cost: O(1).
+  bool take() {
+    {
+      const std::lock_guard lock(mutex_);
+      if (ready_ == nullptr) return false;
+      QUOIN_ASSERT(given_up_ == nullptr, "the update that made a result took the state given up before");
+      std::swap(*ready_, shown_);
+      given_up_ = std::move(ready_);
+      if (asked_ == nullptr) return true;
+    }
+    worker_.wake_one();
+    return true;
+  }
+  [[nodiscard]] const State& shown() const { return shown_; }
+
+  /// Returns true if, as of the last `update`, the scene has changes that are not shown yet.
+  [[nodiscard]] bool is_late() const {
+    const std::lock_guard lock(mutex_);
+    return is_behind_ || is_busy_ || ready_ != nullptr;
+  }
+  /// Waits until no update is requested or in progress, and shows its result. Errors: as `update`.
+  void wait() {
+    take();  // a requested update may wait for it
+    {
+      std::unique_lock lock(mutex_);
+      worker_.wait(lock, [&] { return !is_busy_; });
+      throw_failure();
+    }
+    take();
+  }
+
+ private:
+  [[nodiscard]] Workers::Clock::time_point step(Workers::Lock& lock) {
+    const bool waits_for_take = begins_ == Begin::AfterTake && ready_ != nullptr;
+    if (asked_ == nullptr || waits_for_take) return Workers::kWhenWoken;
+    QUOIN_ASSERT(is_busy_, "a request in progress");
+    Snapshot scene = std::exchange(asked_, nullptr);
+    std::unique_ptr<State> former = std::move(given_up_);
+    lock.unlock();
+    std::unique_ptr<State> done;
+    std::exception_ptr failure;
+    try {
+      done = make_(std::move(scene), former);
+    } catch (...) {
+      failure = std::current_exception();
+    }
+    lock.lock();
+    if (done != nullptr) std::swap(ready_, done);  // `done` receives a result that was not taken
+    std::unique_ptr<State> also_former = std::move(given_up_);
+    worker_.keep_failure(std::move(failure));
+    is_busy_ = false;
+    worker_.notify();
+    lock.unlock();
+    // Frees the former states here, so that the thread that takes the new one does not have to.
+    done.reset();
+    former.reset();
+    also_former.reset();
+    lock.lock();
+    return Workers::kAgain;
+  }
+
+  // Requires: the mutex is held.
+  void throw_failure() {
+    const std::exception_ptr failure = worker_.take_failure();
+    if (failure == nullptr) return;
+    is_behind_ = true;
+    std::rethrow_exception(failure);
+  }
+
+  Make make_;
+  Begin begins_;
+
+  // The owner's.
+  bool is_behind_ = false;  // something changed that no snapshot has
+  State shown_;
+
+  mutable std::mutex mutex_;         // of all below
+  bool is_busy_ = false;             // an update is requested or in progress
+  Snapshot asked_;                   // the scene of an update that has not begun
+  std::unique_ptr<State> ready_;     // to be taken
+  std::unique_ptr<State> given_up_;  // was shown; belongs to the next update
+  Workers worker_{mutex_};
+};
+
+}  // namespace quoin
