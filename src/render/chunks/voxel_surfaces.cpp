@@ -303,8 +303,9 @@ void VoxelSurfaces::erase_if_over(IVec3 chunk) {
 void VoxelSurfaces::show(IVec3 chunk, VoxelChunk& state, std::shared_ptr<const ChunkSurface> surface,
                          bool is_together) {
   state.surface = std::move(surface);
+  // A surface that replaces one of an epoch is taken in its place.
+  state.is_together = is_together || (state.is_ready && state.is_together);
   state.is_ready = state.surface != nullptr || state.is_shown;
-  state.is_together = is_together;
   if (!state.is_ready || state.is_listed) return;
   totals_.ready.push_back({{handle_, SurfaceContent::Voxels}, chunk});
   state.is_listed = true;
