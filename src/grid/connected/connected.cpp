@@ -505,14 +505,11 @@ void ConnectedPieces::for_each_row(std::size_t piece, FunctionRef<void(IVec3 row
 
 MassProperties mass_properties(const ConnectedPieces& pieces, std::size_t piece, DensityOfType density) {
   VoxelMass sum(density);
-  std::array<VoxelType, kChunkEdge> types{};
   impl_of(pieces.impl_).for_each_chunk(piece, [&](const Entry& entry, std::span<const std::size_t> of_piece) {
-    sum.begin(entry.at);
-    if (ConnectedPieces::Impl::are_all(entry, of_piece)) return sum.add_chunk(entry.parts.chunk());
-    ConnectedPieces::Impl::for_each_row(entry, of_piece, [&](IVec3 row, std::uint64_t voxels) {
-      entry.parts.chunk().read_row(row.y, row.z, types);
-      sum.add_row(row.y, row.z, voxels, types);
-    });
+    sum.begin(entry.at, entry.parts.chunk());
+    if (ConnectedPieces::Impl::are_all(entry, of_piece)) return sum.add_chunk();
+    ConnectedPieces::Impl::for_each_row(entry, of_piece,
+                                        [&](IVec3 row, std::uint64_t voxels) { sum.add_row(row.y, row.z, voxels); });
   });
   return sum.properties();
 }

@@ -70,11 +70,14 @@ constexpr auto kSumsOfSquares = [] {
 
 }  // namespace
 
-void VoxelMass::begin(IVec3 chunk) {
+void VoxelMass::begin(IVec3 at, const Chunk& chunk) {
   finish_chunk();
-  if (!has_origin_) origin_ = chunk * kChunkEdge;
+  if (!has_origin_) origin_ = at * kChunkEdge;
   has_origin_ = true;
-  chunk_ = chunk;
+  at_ = at;
+  chunk_ = &chunk;
+  types_ = chunk.types();
+  std::erase(types_, kAir);
 }
 
 VoxelMass::Counts& VoxelMass::counts_of(VoxelType type) {
@@ -105,24 +108,38 @@ void VoxelMass::add_run(VoxelType type, int begin, int end, int y, int z) {
   counts.xy += x * y;
 }
 
-void VoxelMass::add_row(int y, int z, std::uint64_t voxels, std::span<const VoxelType, kChunkEdge> types) {
+void VoxelMass::add_runs(VoxelType type, std::uint64_t voxels, int y, int z) {
   while (voxels != 0) {
     const int begin = std::countr_zero(voxels);
-    const int limit = begin + std::countr_one(voxels >> begin);
-    int end = begin;
-    while (end < limit) {
-      const int first = end;
-      const VoxelType type = types[static_cast<std::size_t>(first)];
-      while (end < limit && types[static_cast<std::size_t>(end)] == type) ++end;
-      if (type != kAir) add_run(type, first, end, y, z);
-    }
-    if (limit == kChunkEdge) break;
-    voxels &= ~std::uint64_t{0} << limit;
+    const int end = begin + std::countr_one(voxels >> begin);
+    add_run(type, begin, end, y, z);
+    if (end == kChunkEdge) break;
+    voxels &= ~std::uint64_t{0} << end;
   }
 }
 
-void VoxelMass::add_chunk(const Chunk& chunk) {
-  if (const auto type = chunk.uniform()) {
+void VoxelMass::add_row(int y, int z, std::uint64_t voxels) {
+  QUOIN_ASSERT(chunk_ != nullptr, "a chunk was begun");
+  // With few types, their masks are faster than reading the row.
+  constexpr std::size_t kFewTypes = 6;
+  if (types_.size() <= kFewTypes) {
+    for (const VoxelType type : types_) add_runs(type, chunk_->row_mask(y, z, type) & voxels, y, z);
+    return;
+  }
+  std::array<VoxelType, kChunkEdge> types{};
+  chunk_->read_row(y, z, types);
+  while (voxels != 0) {
+    const VoxelType type = types[static_cast<std::size_t>(std::countr_zero(voxels))];
+    std::uint64_t same = 0;
+    for (std::size_t i = 0; i < kChunkEdge; ++i) same |= std::uint64_t{types[i] == type} << i;
+    if (type != kAir) add_runs(type, same & voxels, y, z);
+    voxels &= ~same;
+  }
+}
+
+void VoxelMass::add_chunk() {
+  QUOIN_ASSERT(chunk_ != nullptr, "a chunk was begun");
+  if (const auto type = chunk_->uniform()) {
     if (*type == kAir) return;
     const std::int64_t area = std::int64_t{kChunkEdge} * kChunkEdge;
     const std::int64_t line = kSums[kChunkEdge];
@@ -134,18 +151,14 @@ void VoxelMass::add_chunk(const Chunk& chunk) {
     for (std::int64_t* const mixed : {&counts.yz, &counts.xz, &counts.xy}) *mixed += line * line * kChunkEdge;
     return;
   }
-  std::array<VoxelType, kChunkEdge> types{};
-  const IBox box = chunk.bounds();
+  const IBox box = chunk_->bounds();
   for (int z = box.min.z; z < box.max.z; ++z) {
-    for (int y = box.min.y; y < box.max.y; ++y) {
-      chunk.read_row(y, z, types);
-      add_row(y, z, ~std::uint64_t{0}, types);
-    }
+    for (int y = box.min.y; y < box.max.y; ++y) add_row(y, z, ~std::uint64_t{0});
   }
 }
 
 void VoxelMass::finish_chunk() {
-  const DVec3 offset(chunk_ * kChunkEdge - origin_);
+  const DVec3 offset(at_ * kChunkEdge - origin_);
   for (const Counts& counts : counts_) {
     const auto value = [](std::int64_t count) { return static_cast<double>(count); };
     const double density = densities_[counts.type];
@@ -167,8 +180,8 @@ MassProperties VoxelMass::properties() {
 MassProperties mass_properties(const Grid& grid, DensityOfType density) {
   VoxelMass sum(density);
   for (const IVec3 at : grid.chunks()) {
-    sum.begin(at);
-    sum.add_chunk(*grid.find_chunk(at));
+    sum.begin(at, *grid.find_chunk(at));
+    sum.add_chunk();
   }
   return sum.properties();
 }

@@ -5,7 +5,6 @@
 
 #include <cstdint>
 #include <limits>
-#include <span>
 #include <vector>
 
 #include <quoin/core/vec.h>
@@ -43,12 +42,12 @@ class VoxelMass {
  public:
   explicit VoxelMass(DensityOfType density) : densities_(density) {}
 
-  /// Begins a chunk. Each chunk may come once.
-  void begin(IVec3 chunk);
+  /// Begins a chunk. Each chunk may come once. Lifetime: the chunk must outlive its additions.
+  void begin(IVec3 at, const Chunk& chunk);
   /// Adds the voxels of row (y, z) of the chunk whose bits are set in `voxels`; air has no mass.
-  void add_row(int y, int z, std::uint64_t voxels, std::span<const VoxelType, kChunkEdge> types);
-  /// Adds all voxels of a chunk.
-  void add_chunk(const Chunk& chunk);
+  void add_row(int y, int z, std::uint64_t voxels);
+  /// Adds all voxels of the chunk.
+  void add_chunk();
   [[nodiscard]] MassProperties properties();
 
  private:
@@ -62,6 +61,7 @@ class VoxelMass {
   };
   Counts& counts_of(VoxelType type);
   void add_run(VoxelType type, int begin, int end, int y, int z);
+  void add_runs(VoxelType type, std::uint64_t voxels, int y, int z);
   void finish_chunk();
 
   DensityTable densities_;
@@ -69,7 +69,9 @@ class VoxelMass {
   std::vector<std::uint32_t> slots_;  // by type: its index in `counts_` plus 1; 0: none
   MassMoments moments_;
   IVec3 origin_{0};  // of the first chunk
-  IVec3 chunk_{0};
+  IVec3 at_{0};
+  const Chunk* chunk_ = nullptr;
+  std::vector<VoxelType> types_;  // of the chunk, except air
   bool has_origin_ = false;
 };
 

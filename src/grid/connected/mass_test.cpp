@@ -18,7 +18,7 @@
 namespace quoin {
 namespace {
 
-constexpr std::array<double, 4> kDensities = {0.25, 1.0, 2.5, 0.0};
+constexpr std::array<double, 10> kDensities = {0.25, 1.0, 2.5, 0.0, 3.0, 0.125, 7.0, 0.5, 1.5, 9.0};
 
 double density_of(VoxelType type) {
   return kDensities.at(type);
@@ -99,6 +99,7 @@ TEST(Mass, OfGridsAndPiecesEqualsPlainLoops) {
   std::mt19937 random(5);
   for (int round = 0; round < 12; ++round) {
     Grid grid;
+    const unsigned types = round < 6 ? 4 : 10;
     const IVec3 far = round % 3 == 0 ? IVec3(1'000'000, -2'000'000, 500'000) : IVec3(0);
     const auto corner = [&] {
       return far +
@@ -110,9 +111,9 @@ TEST(Mass, OfGridsAndPiecesEqualsPlainLoops) {
       const IVec3 at = corner();
       const IVec3 size(static_cast<int>(random() % 40), static_cast<int>(random() % 40),
                        static_cast<int>(random() % 40));
-      grid.fill_box({at, at + size}, static_cast<VoxelType>(random() % 4));
+      grid.fill_box({at, at + size}, static_cast<VoxelType>(random() % types));
     }
-    for (int i = 0; i < 300; ++i) grid.set(corner(), static_cast<VoxelType>(random() % 4));
+    for (int i = 0; i < 300; ++i) grid.set(corner(), static_cast<VoxelType>(random() % types));
     if (round == 1) grid.fill_box({IVec3(64), IVec3(128)}, 1);  // a uniform chunk
     expect_near(mass_properties(grid, density_of), plain(grid), 1e-9);
     ConnectedPieces pieces;
