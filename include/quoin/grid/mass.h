@@ -14,6 +14,9 @@ class ConnectedPieces;
 
 /// The mass of a rigid body, as physics engines take it.
 ///
+///   const auto body = mass_properties(pieces, i, [&](VoxelType type) { return table[type]; }).scaled(0.25);
+///   make_body(body.mass, body.centre, body.inertia);   // voxels of a quarter of a unit
+///
 /// Units: lengths are in voxels (samples, for a field). A density is a mass per volume of one voxel.
 /// Space: the grid's own. Voxel (x, y, z) fills the cube from there to (x + 1, y + 1, z + 1). Samples are points.
 struct MassProperties {
