@@ -82,7 +82,8 @@ class BulkMemory {
 /// Base of objects that can be created in a BulkMemory, or alone. Requires: `delete` names their own type.
 class BulkAllocated {
  public:
-  static void* operator new(std::size_t bytes) {
+  // Not inlined: GCC would warn that `operator delete` does not match `::operator new`.
+  [[gnu::noinline]] static void* operator new(std::size_t bytes) {
     return new (::operator new(sizeof(BulkMemory::Head) + bytes)) BulkMemory::Head{} + 1;
   }
   static void* operator new(std::size_t bytes, BulkMemory& memory) { return memory.allocate(bytes); }
