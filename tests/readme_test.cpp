@@ -23,7 +23,7 @@ std::string read_text(const fs::path& path) {
   return text.str();
 }
 
-constexpr std::array kPages = {"README.md", "docs/cookbook.md", "docs/guide.md"};
+constexpr std::array kPages = {"README.md", "docs/cookbook.md", "docs/games.md", "docs/guide.md"};
 
 // Returns the contents of a page's fenced blocks of one language.
 std::vector<std::string> blocks(const std::string& language, const std::string& page) {
