@@ -788,7 +788,9 @@ TEST_F(StreamedWorldWithProps, KeepsDamagedChunkOfWholeGrid) {
     far.grid.set({1000, 0, 0}, 1);
     world.scene().add_grid(std::move(far));
     ASSERT_TRUE(world.flush().has_value());
-    for (const auto& [each, grid] : *world.store().grids()) {
+    const auto grids = world.store().grids();
+    ASSERT_TRUE(grids);
+    for (const auto& [each, grid] : *grids) {
       if (grid.name == "far") number = each;
     }
   }

@@ -500,7 +500,9 @@ TEST(WorldSaver, FollowsChangedMarks) {
       ASSERT_EQ(lines_in(kept->world()), lines_of(scene, true)) << "seed " << seed << ", save " << save;
     }
     std::size_t chunks = 0;
-    for (const auto& [number, grid] : *kept->world().grids()) chunks += kept->world().chunks(number, 0)->size();
+    const auto grids = kept->world().grids();
+    ASSERT_TRUE(grids);
+    for (const auto& [number, grid] : *grids) chunks += kept->world().chunks(number, 0)->size();
     kept.reset();
     const auto check = check_world(path);
     ASSERT_TRUE(check);

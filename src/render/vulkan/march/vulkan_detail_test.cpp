@@ -16,6 +16,7 @@ using vulkan_test::add_blobs;
 using vulkan_test::add_crowd;
 using vulkan_test::expect_equal;
 using vulkan_test::in_detail;
+using vulkan_test::of_day;
 
 class VulkanDetail : public vulkan_test::VulkanDetailTest {
  protected:
@@ -47,7 +48,7 @@ TEST_F(VulkanDetail, HalvedGridsMatchCpu) {
   std::set<int> halvings;
   for (const double pixels : {0.4, 1.0, 2.0, 6.0}) {
     compare(camera, always_mid(pixels), "mid_" + std::to_string(static_cast<int>(10 * pixels)));
-    halvings.merge(halvings_of(camera, always_mid(pixels)));
+    halvings.merge(halvings_of(camera, of_day(always_mid(pixels))));
   }
   EXPECT_EQ(halvings, (std::set<int>{1, 2, 3, 4}));
   const RenderOptions plain = sized(128, 96);
@@ -140,7 +141,7 @@ TEST_F(VulkanDetail, HalvedFieldsMatchCpu) {
   std::set<int> halvings;
   for (const double pixels : {0.4, 1.0, 2.0, 6.0}) {
     compare(camera, always_mid(pixels), "mid_field_" + std::to_string(static_cast<int>(10 * pixels)));
-    halvings.merge(halvings_of(camera, always_mid(pixels)));
+    halvings.merge(halvings_of(camera, of_day(always_mid(pixels))));
   }
   EXPECT_EQ(halvings, (std::set<int>{1, 2, 3, 4}));
   EXPECT_NE(taken_as_is(camera, sized(128, 96)).depth.values, taken_as_is(camera, always_mid(6.0)).depth.values);
