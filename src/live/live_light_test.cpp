@@ -49,7 +49,7 @@ void expect_right(const GridLight& lit, const VoxelRegistry& types) {
   expect_equal(*lit.light, wanted);
 }
 
-struct LitScene : PlacedLightWorld {
+struct LampScene : PlacedLightWorld {
   using PlacedLightWorld::PlacedLightWorld;
   [[nodiscard]] Grid& grid() { return scene.edit(handle).grid; }
   void edit(std::mt19937& random) {
@@ -61,7 +61,7 @@ struct LitScene : PlacedLightWorld {
 };
 
 TEST(LiveLight, ShownLightIsAlwaysCorrect) {
-  LitScene world(5);
+  LampScene world(5);
   LiveLight light;
   EXPECT_EQ(light.shown().of(world.handle).light->at({0, 0, 0}), (LightLevels{15, 0, 0, 0})) << "open sky at first";
   std::mt19937 random(7);
@@ -92,7 +92,7 @@ TEST(LiveLight, ShownLightIsAlwaysCorrect) {
 TEST(LiveLight, GivesSameLightForAnyWorkerCount) {
   std::vector<std::vector<std::uint16_t>> results;
   for (const unsigned workers : {1U, 3U}) {
-    LitScene world(9);
+    LampScene world(9);
     LiveLight light({{}, {workers}});
     std::mt19937 random(3);
     for (int i = 0; i < 30; ++i) {
@@ -110,7 +110,7 @@ TEST(LiveLight, GivesSameLightForAnyWorkerCount) {
 
 // Readers use the shown light while workers compute the next light and the scene is edited.
 TEST(LiveLight, AllowsReadingWhileWorkersRun) {
-  LitScene world(2);
+  LampScene world(2);
   LiveLight light({{}, {2}});
   light.finish(world.scene);
   std::mt19937 random(8);
@@ -134,7 +134,7 @@ TEST(LiveLight, AllowsReadingWhileWorkersRun) {
 
 // A consumer that copies only the reported changes has all of the light.
 TEST(LiveLight, ReportsChangedRegions) {
-  LitScene world(4);
+  LampScene world(4);
   LiveLight light;
   std::map<std::array<int, 3>, std::vector<std::uint16_t>> copy;  // by chunk row
   ChangeCursor cursor;
@@ -175,7 +175,7 @@ TEST(LiveLight, ReportsChangedRegions) {
 }
 
 TEST(LiveLight, FollowsTypesGridsAndFields) {
-  LitScene world(1);
+  LampScene world(1);
   LiveLight light;
   light.finish(world.scene);
   VoxelProperties dark = world.scene.types[LightWorld::kLamp];
@@ -207,7 +207,7 @@ TEST(LiveLight, FollowsTypesGridsAndFields) {
 }
 
 TEST(LiveLight, IgnoresMovedInstances) {
-  LitScene world(1);
+  LampScene world(1);
   const InstanceHandle instance = world.scene.add_instance({"another", world.handle});
   LiveLight light;
   light.finish(world.scene);
@@ -217,7 +217,7 @@ TEST(LiveLight, IgnoresMovedInstances) {
 }
 
 TEST(LiveLight, IgnoresVoxelDataAndNames) {
-  LitScene world(1);
+  LampScene world(1);
   ASSERT_TRUE(world.grid().set({0, 0, 0}, LightWorld::kStone) || world.grid().get({0, 0, 0}) == LightWorld::kStone);
   LiveLight light;
   light.finish(world.scene);

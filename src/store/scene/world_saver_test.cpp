@@ -500,9 +500,9 @@ TEST(WorldSaver, FollowsChangedMarks) {
       ASSERT_EQ(lines_in(kept->world()), lines_of(scene, true)) << "seed " << seed << ", save " << save;
     }
     std::size_t chunks = 0;
-    const auto grids = kept->world().grids();
-    ASSERT_TRUE(grids);
-    for (const auto& [number, grid] : *grids) chunks += kept->world().chunks(number, 0)->size();
+    const auto stored = kept->world().grids();
+    ASSERT_TRUE(stored);
+    for (const auto& [number, grid] : *stored) chunks += kept->world().chunks(number, 0)->size();
     kept.reset();
     const auto check = check_world(path);
     ASSERT_TRUE(check);
