@@ -22,8 +22,8 @@ namespace quoin {
 ///
 /// State:    movable; a move must not throw.
 /// Lifetime: the scene is read only during calls.
-/// Threads:  calls must not overlap. `make` runs on the worker, which then has the former state for itself. Any number
-///           of threads may read the shown state until the next `take`.
+/// Threads:  calls must not overlap. `make` runs on the worker, which then has the former state for itself. Many
+///           threads may read the shown state at once, until the next `take`.
 template <class State>
 class LatestState {
  public:

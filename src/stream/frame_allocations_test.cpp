@@ -112,7 +112,7 @@ TEST(FrameAllocations, FreeNoLargeBlocksOfOldSurfaces) {
   }
 }
 
-TEST(FrameAllocations, OfSceneSnapshotsAreFewerThanGrids) {
+TEST(FrameAllocations, SnapshotsOfScenesAllocateLessThanOncePerGrid) {
   Scene scene;
   for (int i = 0; i < 300; ++i) {
     SceneGrid grid;

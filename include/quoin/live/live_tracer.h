@@ -20,9 +20,9 @@ struct LiveTracerOptions {
 ///   LiveTracer tracer;
 ///   each frame: edit(scene); tracer.update(scene); tracer.take(); first_hit(tracer.shown(), ray); ...
 ///
-/// Exact:    the tracer shown always equals a tracer built from the scene at one moment, `shown().scene()`. Positions
-///           of instances, voxels and types in results are those of that moment. The delay depends on the threads. Once
-///           edits stop, `take` eventually shows the current scene.
+/// Exact:    the tracer shown always equals a tracer built from the scene at one moment, `shown().scene()`. Results
+///           have the instance positions, voxels and types at that moment. The delay depends on the threads. Once edits
+///           stop, `take` eventually shows the current scene.
 /// Late:     a body that moves by the shown tracer can enter a voxel placed since, and is then inside it
 ///           (`depenetration`). A small scene in which it must not is traced by a SceneTracer.
 /// Memory:   twice that of a SceneTracer: one is shown while the other is updated. An update applies the changes of

@@ -67,7 +67,7 @@ void expect_near(const MassProperties& found, const MassProperties& wanted, doub
   }
 }
 
-TEST(Mass, OfBoxIsThatOfTextbooks) {
+TEST(Mass, BoxMatchesTextbooks) {
   Grid grid;
   grid.fill_box({{-10, 3, 60}, {20, 8, 72}}, 2);
   const MassProperties found = mass_properties(grid, density_of);
@@ -85,7 +85,7 @@ TEST(Mass, OfBoxIsThatOfTextbooks) {
   EXPECT_EQ(scaled.inertia[1][1], found.inertia[1][1] / 32);
 }
 
-TEST(Mass, OfNothingIsZero) {
+TEST(Mass, IsZeroWithoutVoxels) {
   Grid grid;
   EXPECT_EQ(mass_properties(grid, density_of).mass, 0.0);
   grid.fill_box({{0, 0, 0}, {4, 4, 4}}, 3);  // of density 0
@@ -95,7 +95,7 @@ TEST(Mass, OfNothingIsZero) {
   EXPECT_EQ(mass_properties(DensityGrid(), density_of).mass, 0.0);
 }
 
-TEST(Mass, OfGridsAndPiecesEqualsPlainLoops) {
+TEST(Mass, GridsAndPiecesMatchPlainLoops) {
   std::mt19937 random(5);
   for (int round = 0; round < 12; ++round) {
     Grid grid;
@@ -163,7 +163,7 @@ MassProperties plain(const DensityGrid& field, const IBox& cells) {
   return plain(cubes);
 }
 
-TEST(Mass, OfFieldsFollowsRule) {
+TEST(Mass, FieldsFollowRule) {
   std::mt19937 random(9);
   std::uniform_real_distribution<double> share(0.0, 1.0);
   for (int round = 0; round < 2; ++round) {
@@ -176,7 +176,7 @@ TEST(Mass, OfFieldsFollowsRule) {
   }
 }
 
-TEST(Mass, OfFieldBallIsNearlyExact) {
+TEST(Mass, FieldBallIsNearlyExact) {
   DensityGrid field;
   field.add_sphere({62.3, 10.1, 0.4}, 12.0, 1, 0.0);
   const MassProperties found = mass_properties(field, density_of);
