@@ -107,6 +107,7 @@ class WatchedGame {
 
   static LiveMeshOptions options_of(unsigned workers) {
     LiveMeshOptions options;
+    options.region_edge = kChunkEdge;  // as the surfaces that it is compared with
     options.workers = {workers};
     return options;
   }
