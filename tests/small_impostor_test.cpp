@@ -21,8 +21,8 @@
 #include <quoin/render/cpu_renderer.h>
 
 #include "../apps/demo/demo_scenes.h"
-#include "core/nightly_for_tests.h"
 #include "core/srgb.h"
+#include "core/work/nightly_for_tests.h"
 #include "render/cpu/environment_for_tests.h"
 #include "render/impostor/impostor_test_support.h"
 

@@ -11,7 +11,7 @@
 #include <quoin/grid/density_grid.h>
 #include <quoin/mesh/smooth.h>
 
-#include "core/nightly_for_tests.h"
+#include "core/work/nightly_for_tests.h"
 #include "mesh/smooth/smooth_cell.h"
 #include "mesh/smooth/smooth_test_support.h"
 

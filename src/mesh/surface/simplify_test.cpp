@@ -15,7 +15,7 @@
 #include <quoin/grid/voxel_field.h>
 
 #include "core/death_for_tests.h"
-#include "core/nightly_for_tests.h"
+#include "core/work/nightly_for_tests.h"
 #include "mesh/smooth/smooth_cell.h"
 #include "mesh/smooth/surface_check_for_tests.h"
 #include "mesh/surface/simplify.h"

@@ -17,7 +17,7 @@
 #include "core/bytes/bytes.h"
 #include "core/database/connection.h"
 #include "core/death_for_tests.h"
-#include "core/nightly_for_tests.h"
+#include "core/work/nightly_for_tests.h"
 #include "store/chunk/chunk_body.h"
 #include "store/world/world_for_tests.h"
 

@@ -13,7 +13,7 @@
 
 #include "core/death_for_tests.h"
 #include "core/instruction_sets_for_tests.h"
-#include "core/nightly_for_tests.h"
+#include "core/work/nightly_for_tests.h"
 #include "render/light/propagated/chunk_masks.h"
 
 namespace quoin {

@@ -15,7 +15,7 @@
 #include <quoin/io/image_files.h>
 #include <quoin/render/vulkan_renderer.h>
 
-#include "core/nightly_for_tests.h"
+#include "core/work/nightly_for_tests.h"
 #include "render/cpu/render_test_support.h"
 
 namespace quoin::vulkan_test {

@@ -7,7 +7,7 @@
 #include <limits>
 #include <thread>
 
-#include "core/nightly_for_tests.h"
+#include "core/work/nightly_for_tests.h"
 #include "render/impostor/impostor_test_support.h"
 #include "render/vulkan/march/vulkan_detail_support.h"
 

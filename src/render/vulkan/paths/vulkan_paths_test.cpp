@@ -11,7 +11,7 @@
 #include <quoin/io/image_files.h>
 #include <quoin/render/path_tracer.h>
 
-#include "core/nightly_for_tests.h"
+#include "core/work/nightly_for_tests.h"
 #include "render/cpu/environment_for_tests.h"
 #include "render/path/town_for_tests.h"
 #include "render/vulkan/device/vulkan_for_tests.h"
