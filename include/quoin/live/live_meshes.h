@@ -53,8 +53,8 @@ struct LiveMeshOptions {
   ///   return quoin::ConvertedSurface(vertices, vertices->size() * sizeof(Vertex));
   std::function<ConvertedSurface(const SurfaceUpdate&)> convert{};
   /// Called by a worker after each completed chunk: there may be a surface to take, `pending` has decreased, and there
-  /// is room for more chunks. Also called after each update of a LiveLight, by its worker. Optional. It may call `take`,
-  /// `pending`, `shown_update` and `stats`, but no other member of LiveMeshes.
+  /// is room for more chunks. Also called after each update of a LiveLight, by its worker. Optional. It may call
+  /// `take`, `pending`, `shown_update` and `stats`, but no other member of LiveMeshes.
   std::function<void()> on_ready{};
 };
 
