@@ -158,7 +158,7 @@ void VoxelMass::add_chunk() {
 }
 
 void VoxelMass::finish_chunk() {
-  const DVec3 offset(at_ * kChunkEdge - origin_);
+  const DVec3 offset = DVec3(at_ * kChunkEdge) - DVec3(origin_);  // more than an int can hold
   for (const Counts& counts : counts_) {
     const auto value = [](std::int64_t count) { return static_cast<double>(count); };
     const double density = densities_[counts.type];
@@ -246,7 +246,7 @@ void FieldMass::add(IVec3 chunk) {
   for (int z = 0; z < kChunkEdge; ++z) {
     for (int y = 0; y < kChunkEdge; ++y) add_row(y, z, moments);
   }
-  moments_.add(moments, DVec3(chunk * kChunkEdge - origin_));
+  moments_.add(moments, DVec3(chunk * kChunkEdge) - DVec3(origin_));
 }
 
 void FieldMass::add_row(int y, int z, MassMoments& moments) {

@@ -186,6 +186,20 @@ TEST(Mass, FieldBallIsNearlyExact) {
   for (int i = 0; i < 3; ++i) EXPECT_NEAR(found.inertia[i][i], 0.4 * mass * 144.0, 0.01 * 0.4 * mass * 144.0);
 }
 
+TEST(Mass, OfPartsFarApartIsRight) {
+  constexpr int kFar = 1'200'000'000;
+  Grid grid;
+  grid.set({-kFar, 0, 0}, 1);
+  grid.set({kFar, 0, 0}, 1);
+  DensityGrid field;
+  field.add_box(DVec3{-kFar - 4, -4, -4}, DVec3{-kFar + 4, 4, 4}, 1);
+  field.add_box(DVec3{kFar - 4, -4, -4}, DVec3{kFar + 4, 4, 4}, 1);
+  for (const MassProperties& found : {mass_properties(grid, density_of), mass_properties(field, density_of)}) {
+    EXPECT_NEAR(found.centre.x, 0.0, 1.0);
+    EXPECT_NEAR(found.inertia[1][1], found.mass * double{kFar} * double{kFar}, 1e-6 * found.inertia[1][1]);
+  }
+}
+
 TEST(MassDeath, RejectsBadDensities) {
   Grid grid;
   grid.set({0, 0, 0}, 1);
