@@ -106,30 +106,40 @@ std::optional<std::uint64_t> memory_of_world(const WorldStore& world) {
   return static_cast<std::uint64_t>(total);
 }
 
-Status check_whole_grids(const WorldStore& world, std::uint64_t max_bytes) {
-  constexpr std::uint64_t kLargestChunk = std::uint64_t{2} << 20;  // 16-bit voxels, densities and materials
+WholeGridLimit WholeGridLimit::of(std::uint64_t max_bytes) {
+  const std::uint64_t available = available_memory().value_or(max_bytes);
+  return {std::min(max_bytes, available), available < max_bytes};
+}
+
+Error WholeGridLimit::error(const WorldStore& world, std::uint32_t number, const std::string& name,
+                            std::uint64_t needed) const {
+  return make_error(ErrorCode::LimitExceeded,
+                    "cannot load grid " + std::to_string(number) + " \"" + printable(name) +
+                        "\" as a whole: the whole grids up to it need about " + megabytes(needed) + " of memory; " +
+                        megabytes(bytes) + (is_memory ? " are available" : " are allowed"),
+                    world.path().string());
+}
+
+Status check_whole_grids(const WorldStore& world, const WholeGridLimit& limit) {
+  constexpr std::uint64_t kLargestChunk = std::uint64_t{2} << 20;  // 16-bit voxels, densities and materials; no data
   const auto grids = world.grids();
   if (!grids) return grids.error();
-  const std::uint64_t limit = std::min(max_bytes, available_memory().value_or(max_bytes));
   std::uint64_t chunks = 0;
   for (const auto& [number, grid] : *grids) {
     if (!grid.whole) continue;
     const auto places = world.chunks(number, 0);
+    if (!places && places.error().code == ErrorCode::BadFormat) continue;  // loading it reports the damage
     if (!places) return places.error();
     chunks += places->size();
   }
-  if (chunks <= limit / kLargestChunk) return {};
+  if (chunks <= limit.bytes / kLargestChunk) return {};
   double needed = 0.0;
   for (const auto& [number, grid] : *grids) {
     if (!grid.whole) continue;
     needed += memory_of_grid(world, number).value_or(0.0);
-    if (needed <= static_cast<double>(limit)) continue;
-    return make_error(ErrorCode::LimitExceeded,
-                      "cannot load grid " + std::to_string(number) + " \"" + printable(grid.name) +
-                          "\" as a whole: the whole grids up to it need about " +
-                          megabytes(static_cast<std::uint64_t>(needed)) + " of memory; " + megabytes(limit) +
-                          (limit == max_bytes ? " are allowed" : " are available"),
-                      world.path().string());
+    if (needed > static_cast<double>(limit.bytes)) {
+      return limit.error(world, number, grid.name, static_cast<std::uint64_t>(needed));
+    }
   }
   return {};
 }

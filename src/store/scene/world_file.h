@@ -2,7 +2,9 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <optional>
+#include <string>
 
 #include <quoin/core/result.h>
 #include <quoin/store/world_store.h>
@@ -12,10 +14,24 @@ namespace quoin {
 /// Estimates the bytes of memory that load_world needs for a world, from a sample of its chunks. Returns nullopt if
 /// they cannot be read.
 [[nodiscard]] std::optional<std::uint64_t> memory_of_world(const WorldStore& world);
-/// Checks that the world's whole grids (WorldGrid::whole) fit in `max_bytes` and in the available memory.
-/// Cost:   reads the keys of their chunks; a sample of the chunks too, if the largest possible chunks would not fit.
-/// Errors: LimitExceeded, with the first grid that does not fit; those of reading.
-[[nodiscard]] Status check_whole_grids(const WorldStore& world, std::uint64_t max_bytes);
+
+/// Maximum memory for the whole grids of a world (WorldGrid::whole).
+struct WholeGridLimit {
+  std::uint64_t bytes = std::numeric_limits<std::uint64_t>::max();
+  bool is_memory = false;  ///< the available memory is less than the caller allows
+
+  /// Returns the lesser of `max_bytes` and the memory that is available now.
+  [[nodiscard]] static WholeGridLimit of(std::uint64_t max_bytes);
+  /// Returns an error for the grid whose chunks, with those of the grids before it, exceed the limit.
+  [[nodiscard]] Error error(const WorldStore& world, std::uint32_t number, const std::string& name,
+                            std::uint64_t needed) const;
+};
+
+/// Checks, before they are loaded, that the world's whole grids probably fit. Skips grids whose chunks cannot be listed.
+/// The estimate leaves out per-voxel data if chunks of the greatest size without data would fit.
+/// Cost:   reads the keys of their chunks; a sample of the chunks too, if chunks of that size would not fit.
+/// Errors: LimitExceeded, with the first grid that does not fit; CannotRead.
+[[nodiscard]] Status check_whole_grids(const WorldStore& world, const WholeGridLimit& limit);
 
 }  // namespace quoin
 

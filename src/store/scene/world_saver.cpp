@@ -443,8 +443,15 @@ class Load {
  public:
   enum class Chunks : std::uint8_t { All, OfWholeGrids, None };
 
-  Load(const WorldStore& world, Chunks chunks, const LoadOptions& options, LoadedScene& loaded, SaverState& state)
-      : world_(world), wanted_(chunks), options_(options), scene_(loaded.scene), loaded_(loaded), state_(state) {}
+  Load(const WorldStore& world, Chunks chunks, const WholeGridLimit& limit, const LoadOptions& options,
+       LoadedScene& loaded, SaverState& state)
+      : world_(world),
+        wanted_(chunks),
+        limit_(limit),
+        options_(options),
+        scene_(loaded.scene),
+        loaded_(loaded),
+        state_(state) {}
 
   Status run(Threads threads, const Progress& progress) {
     auto types = world_.types();
@@ -498,6 +505,7 @@ class Load {
       return {};
     }
     bool is_cancelled = false;
+    bool is_too_large = false;
     Status read =
         WorldParts::each_chunk(world_, number, 0, threads, [&](const ChunkAddress& place, Result<StoredChunk> chunk) {
           if (!chunk) {
@@ -505,12 +513,16 @@ class Load {
             saved.unread.push_back(place.chunk);
             return true;
           }
+          bytes_ += chunk->voxels.bytes() + (chunk->densities ? chunk->densities->bytes() : 0);
+          is_too_large = bytes_ > limit_.bytes;
+          if (is_too_large) return false;
           if (chunk->voxels.uniform() != kAir) grid.grid.put_chunk(place.chunk, std::move(chunk->voxels));
           if (chunk->densities) grid.field.put_chunk(place.chunk, std::move(*chunk->densities));
           is_cancelled = progress && (++chunks_ & 255U) == 0 && !progress(share);
           return !is_cancelled;
         });
     if (is_cancelled) return make_error(ErrorCode::Cancelled, "cancelled", world_.path().string());
+    if (is_too_large) return limit_.error(world_, number, header.name, bytes_);
     if (!read) {
       // If the tables themselves are damaged, the parts read so far are kept.
       if (read.error().code != ErrorCode::BadFormat) return read;
@@ -639,6 +651,7 @@ class Load {
 
   const WorldStore& world_;
   const Chunks wanted_;
+  const WholeGridLimit limit_;  // of the chunks that are loaded
   const LoadOptions& options_;
   Scene& scene_;
   LoadedScene& loaded_;
@@ -650,12 +663,13 @@ class Load {
   std::vector<std::int64_t> lamp_numbers_;
   std::size_t lines_ = 0;
   std::size_t chunks_ = 0;
+  std::uint64_t bytes_ = 0;  // of loaded chunks
 };
 
-Result<LoadedWorld> load(const WorldStore& world, Load::Chunks chunks, LoadedWorld result, SaverState& state,
-                         const LoadOptions& options, Threads threads, const Progress& progress) {
+Result<LoadedWorld> load(const WorldStore& world, Load::Chunks chunks, const WholeGridLimit& limit, LoadedWorld result,
+                         SaverState& state, const LoadOptions& options, Threads threads, const Progress& progress) {
   result.loaded.format = "world";
-  Load load(world, chunks, options, result.loaded, state);
+  Load load(world, chunks, limit, options, result.loaded, state);
   if (auto done = load.run(threads, progress); !done) return with_path(Result<LoadedWorld>(done.error()), world.path());
   if (options.show_hidden) show_all(result.loaded.scene);
   return result;
@@ -668,18 +682,20 @@ Result<LoadedWorld> load_world(const WorldStore& world, const LoadOptions& optio
                                const Progress& progress) {
   LoadedWorld result;
   SaverState& state = result.saver.impl().state;
-  return load(world, Load::Chunks::All, std::move(result), state, options, threads, progress);
+  return load(world, Load::Chunks::All, {}, std::move(result), state, options, threads, progress);
 }
 
 Result<LoadedWorld> load_partial_world(const WorldStore& world, const LoadOptions& options,
                                        std::uint64_t max_whole_bytes) {
+  WholeGridLimit limit;
   if (max_whole_bytes != 0) {
-    if (auto fits = check_whole_grids(world, max_whole_bytes); !fits) return fits.error();
+    limit = WholeGridLimit::of(max_whole_bytes);
+    if (auto fits = check_whole_grids(world, limit); !fits) return fits.error();
   }
   LoadedWorld result;
   SaverState& state = result.saver.impl().state;
   const auto chunks = max_whole_bytes == 0 ? Load::Chunks::None : Load::Chunks::OfWholeGrids;
-  return load(world, chunks, std::move(result), state, options, {}, {});
+  return load(world, chunks, limit, std::move(result), state, options, {}, {});
 }
 
 std::optional<std::uint32_t> WorldSaver::number_of(GridHandle grid) const {
