@@ -67,11 +67,11 @@ void ChunkStreamer::signal() {
 }
 
 void ChunkStreamer::set_generator(std::uint32_t grid, std::shared_ptr<const ChunkGenerator> generator,
-                                  std::span<const IVec3> stored) {
-  const IBox made = generator == nullptr ? IBox{} : generator->chunks();
+                                  const IBox& chunks, std::span<const IVec3> others) {
   const std::scoped_lock lock(plan_mutex_);
-  plan_.set_extent(grid, made, stored);
-  generators_[grid] = std::move(generator);
+  std::shared_ptr<const ChunkGenerator>& kept = generators_[grid];
+  plan_.set_extent(grid, chunks, others);
+  kept = std::move(generator);
 }
 
 std::shared_ptr<const ChunkGenerator> ChunkStreamer::generator_of(std::uint32_t grid) const {

@@ -81,10 +81,11 @@ class ChunkStreamer {
   /// Waits for the chunks that workers are processing.
   ~ChunkStreamer();
 
-  /// Sets the generator of a grid, and the stored chunks that it does not make. Null: chunks that the world does not
-  /// store are air. All other chunks are air that is never loaded.
-  void set_generator(std::uint32_t grid, std::shared_ptr<const ChunkGenerator> generator,
-                     std::span<const IVec3> stored);
+  /// Sets the generator of a grid, and the chunks that can be loaded: a box, and others outside of it. All other chunks
+  /// are air that is never loaded. Chunks that the world does not store and the generator does not make are air. If it
+  /// throws, nothing has changed.
+  void set_generator(std::uint32_t grid, std::shared_ptr<const ChunkGenerator> generator, const IBox& chunks,
+                     std::span<const IVec3> others);
   [[nodiscard]] std::shared_ptr<const ChunkGenerator> generator_of(std::uint32_t grid) const;
   /// Queues a note. Unless `is_urgent`, wakes no sleeping worker: a wake-up costs the caller more than the rest.
   void post(Note note, bool is_urgent = true);

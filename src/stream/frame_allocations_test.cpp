@@ -35,6 +35,7 @@ class Game {
     const auto grid = world_->add_terrain({.seed = 9, .is_smooth = is_smooth});
     EXPECT_TRUE(grid);
     grid_ = *grid;
+    EXPECT_TRUE(world_->add_grid({.name = "a ship that is not placed"}));
     EXPECT_TRUE(world_->load_all({&viewer, 1}));
     tracer_.emplace(world_->scene());
     light_.finish(world_->scene());

@@ -22,6 +22,7 @@
 
 #include "core/bytes/text.h"
 #include "core/coordinates/chunk_trie.h"
+#include "core/coordinates/long_box.h"
 #include "core/work/workers.h"
 #include "stream/chunk_streamer.h"
 #include "stream/edit_fit.h"
@@ -71,6 +72,14 @@ std::size_t bytes_in(const SceneGrid& content, IVec3 chunk) {
   return kChunkBytes + (voxels == nullptr ? 0 : voxels->bytes()) + (densities == nullptr ? 0 : densities->bytes());
 }
 
+bool is_air(const SceneGrid& content, IVec3 chunk) {
+  return content.grid.find_chunk(chunk) == nullptr && content.field.find_chunk(chunk) == nullptr;
+}
+
+bool is_air(const StoredChunk& chunk) {
+  return chunk.voxels.uniform() == kAir && !chunk.densities;
+}
+
 std::vector<std::byte> bytes_of_text(const std::string& text) {
   const auto bytes = std::as_bytes(std::span(text));
   return {bytes.begin(), bytes.end()};
@@ -105,6 +114,7 @@ struct StreamedWorld::Impl {
     std::unordered_set<IVec3, CoordinateHash> kept;  // edited in a read-only world: they stay loaded
     WaitingEdits waiting;
     std::unordered_set<IVec3, CoordinateHash> broken;
+    bool has_extent = false;  // set_generator was called; until then no chunk is loaded
   };
 
   Impl(WorldStore opened_store, LoadedWorld opened_world, StreamOptions wanted, bool made)
@@ -118,7 +128,8 @@ struct StreamedWorld::Impl {
   [[nodiscard]] Scene& scene() { return world.loaded.scene; }
   Status begin();
   Streamed& add_streamed(GridHandle handle, std::uint32_t number);
-  Status set_generator(Streamed& grid, std::shared_ptr<const ChunkGenerator> generator);
+  void set_generator(Streamed& grid, std::shared_ptr<const ChunkGenerator> generator);
+  void limit_grids();
   Streamed* streamed(std::uint32_t number) {
     const auto found = grids.find(number);
     return found == grids.end() ? nullptr : &found->second;
@@ -201,42 +212,74 @@ Status StreamedWorld::Impl::begin() {
   for (const GridHandle handle : scene().grids().handles()) {
     const auto number = world.saver.number_of(handle);
     QUOIN_ASSERT(number.has_value(), "a loaded grid has a number");
-    if (!scene().grids()[handle].grid.is_partial()) continue;  // a whole grid
-    Streamed& grid = add_streamed(handle, *number);
     const auto value = store.value(std::string(kTerrainValue) + std::to_string(*number));
     if (!value) return value.error();
+    if (!scene().grids()[handle].grid.is_partial()) {  // a whole grid
+      if (*value) {
+        problems.push_back("grid " + std::to_string(*number) +
+                           " is whole, so its terrain is not generated (to stream " +
+                           "it again, open the file with load_world, clear SceneGrid::whole, and save)");
+      }
+      continue;
+    }
+    Streamed& grid = add_streamed(handle, *number);
     const auto terrain = *value ? terrain_from(**value) : std::nullopt;
     if (*value && !terrain) {
       problems.push_back("the terrain of grid " + std::to_string(*number) +
                          " has an unknown kind and is not generated");
     }
-    std::shared_ptr<const ChunkGenerator> generator;
-    if (terrain) {
-      auto made = make_terrain_generator(*terrain, scene().types);
-      if (!made) return made.error();
-      generator = std::move(*made);
-    }
-    if (auto set = set_generator(grid, std::move(generator)); !set) return set;
+    if (!terrain) continue;  // the program may set a generator
+    auto generator = make_terrain_generator(*terrain, scene().types);
+    if (!generator) return generator.error();
+    set_generator(grid, std::move(*generator));
   }
   return save_now();
 }
 
 // Limits the grid to the chunks that the generator makes, and to others: those that are stored, loaded or have waiting
-// edits. Requires: `note_edits` has seen all edits.
-Status StreamedWorld::Impl::set_generator(Streamed& grid, std::shared_ptr<const ChunkGenerator> generator) {
+// edits. If the stored chunks cannot be listed, the grid is not limited, so that each is looked up. If it throws, the
+// grid's chunks are as before. Requires: `note_edits` has seen all edits.
+void StreamedWorld::Impl::set_generator(Streamed& grid, std::shared_ptr<const ChunkGenerator> generator) {
+  static constexpr IBox kAllChunks{IVec3(kMinChunk + 1), IVec3(kMaxChunk)};
   SceneGrid* const content = content_of_grid(grid);
-  if (content == nullptr) return {};
-  auto others = store.chunks(grid.number, 0);
-  if (!others) return others.error();
-  const IBox made = generator == nullptr ? IBox{} : generator->chunks();
-  grid.sizes.for_each([&](IVec3 chunk, std::size_t) { others->push_back(chunk); });
-  for (const auto& [chunk, edits] : grid.waiting) others->push_back(chunk);
-  std::erase_if(*others, [&](IVec3 chunk) { return made.contains(chunk); });
-  content->grid.set_extent(made, *others);
-  content->field.set_extent(made, *others);
-  streamer.set_generator(grid.number, std::move(generator), *others);
+  if (content == nullptr) return;
+  std::vector<IVec3> others;
+  IBox extent = generator == nullptr ? IBox{} : generator->chunks();
+  if (auto stored = store.chunks(grid.number, 0)) {
+    others = std::move(*stored);
+  } else {
+    problems.push_back("the stored chunks of grid " + std::to_string(grid.number) +
+                       " cannot be listed, so all its chunks are looked up: " + to_string(stored.error()));
+    extent = kAllChunks;
+  }
+  grid.sizes.for_each([&](IVec3 chunk, std::size_t) { others.push_back(chunk); });
+  for (const auto& [chunk, edits] : grid.waiting) others.push_back(chunk);
+  std::erase_if(others, [&](IVec3 chunk) { return extent.contains(chunk); });
+  Grid voxels_before = content->grid.snapshot();
+  DensityGrid field_before = content->field.snapshot();
+  try {
+    content->grid.set_extent(extent, others);
+    content->field.set_extent(extent, others);
+    // Air chunks that were loaded because they lay outside of the extent have no marks.
+    grid.sizes.for_each([&](IVec3 chunk, std::size_t) {
+      content->grid.load_chunk(chunk, Chunk(kAir));
+      content->field.load_air_chunk(chunk);
+    });
+    streamer.set_generator(grid.number, std::move(generator), extent, others);
+  } catch (...) {
+    content->grid = std::move(voxels_before);
+    content->field = std::move(field_before);
+    throw;
+  }
+  grid.has_extent = true;
   must_plan = true;
-  return {};
+}
+
+// Limits the grids from the file that have no generator to their stored chunks.
+void StreamedWorld::Impl::limit_grids() {
+  for (auto& [number, grid] : grids) {
+    if (!grid.has_extent) set_generator(grid, nullptr);
+  }
 }
 
 StreamedWorld::Impl::Streamed& StreamedWorld::Impl::add_streamed(GridHandle handle, std::uint32_t number) {
@@ -286,9 +329,7 @@ void StreamedWorld::Impl::find_eyes(std::span<const Viewer> viewers) {
       eyes.erase(number);
       continue;
     }
-    std::vector<Eye>& of_grid = eyes[number];
-    grid.placements.find_eyes(scene(), *content, viewers, of_grid);
-    if (of_grid.empty()) eyes.erase(number);
+    grid.placements.find_eyes(scene(), *content, viewers, eyes[number]);
   }
 }
 
@@ -390,7 +431,9 @@ void StreamedWorld::Impl::note_edits() {
 // Counts a chunk that was edited without being loaded, outside of the extent. From now on it is one of the others.
 void StreamedWorld::Impl::adopt(Streamed& grid, const SceneGrid& content, IVec3 chunk) {
   if (grid.sizes.find(chunk.x, chunk.y, chunk.z) != nullptr) return;
-  unposted.add({grid.number, 0, chunk}, What::Here);
+  const ChunkAddress place{grid.number, 0, chunk};
+  must_plan |= !is_near_anyone(place);  // no plan would unload it
+  unposted.add(place, What::Here);
   const std::size_t size = bytes_in(content, chunk);
   grid.sizes.find_or_create(chunk, kStays) = size;
   budget.add_chunk(size);
@@ -454,7 +497,14 @@ void StreamedWorld::Impl::put(CompletedLoad completed, ChunkStreamer::Note& note
     must_plan = true;
     return note.add(place, What::Gone);
   }
-  if (content->grid.is_loaded(place.chunk)) {  // the extent has changed since the chunk was requested
+  // If the extent has changed since the chunk was requested, it may count as air. It is stored all the same.
+  const bool is_air_by_extent = content->grid.is_loaded(place.chunk) && is_air(*content, place.chunk) &&
+                                grid->sizes.find(place.chunk.x, place.chunk.y, place.chunk.z) == nullptr;
+  const bool is_late = is_air_by_extent && !is_air(completed.chunk);
+  if (is_late) {
+    content->grid.unload_chunk(place.chunk);
+    content->field.unload_chunk(place.chunk);
+  } else if (content->grid.is_loaded(place.chunk)) {
     adopt(*grid, *content, place.chunk);
     ++totals.chunks_dropped;
     note.released.push_back(std::move(completed.chunk));
@@ -462,7 +512,7 @@ void StreamedWorld::Impl::put(CompletedLoad completed, ChunkStreamer::Note& note
   }
   std::optional<StoredChunk> edited = edited_on_arrival(*grid, completed, *content);
   const bool is_near = is_near_anyone(place);
-  if (!is_near && !edited) {
+  if (!is_near && !edited && !is_late) {
     ++totals.chunks_dropped;
     note.released.push_back(std::move(completed.chunk));
     return note.add(place, What::Gone);
@@ -478,6 +528,7 @@ void StreamedWorld::Impl::put(CompletedLoad completed, ChunkStreamer::Note& note
   budget.add_chunk(size);
   ++moved_since_save;
   note.add(place, What::Here);
+  if (!is_near) must_plan = true;
   if (!edited) return;
   // Counts as an edit of a loaded chunk: it is saved before the chunk is unloaded.
   content->grid.put_chunk(place.chunk, std::move(edited->voxels));
@@ -486,7 +537,6 @@ void StreamedWorld::Impl::put(CompletedLoad completed, ChunkStreamer::Note& note
                                             : DensityChunk(content->field.neighbourhood(place.chunk).outside));
   is_edited = true;
   if (!store.is_writable()) grid->kept.insert(place.chunk);
-  if (!is_near) must_plan = true;
 }
 
 void StreamedWorld::Impl::take_away(const ChunkAddress& place, ChunkStreamer::Note& note) {
@@ -554,6 +604,7 @@ void StreamedWorld::Impl::take_in() {
 Status StreamedWorld::Impl::plan(std::span<const Viewer> viewers) {
   const Clock::time_point start = Clock::now();
   note_edits();
+  limit_grids();
   take_in();
   if (start - asked_others >= kAskOthers) {
     const std::size_t others = options.other_bytes ? options.other_bytes() : 0;
@@ -725,9 +776,12 @@ Result<GridHandle> StreamedWorld::add_grid(SceneGrid grid, std::shared_ptr<const
   if (!impl_->store.is_writable()) {
     return make_error(ErrorCode::CannotWrite, "opened read-only", impl_->store.path().string());
   }
-  if (!grid.saved) {
-    return make_error(ErrorCode::InvalidArgument, "cannot stream grid \"" + printable(grid.name) +
-                                                      "\": it is marked as not saved, and its chunks need the file");
+  const char* const mark = !grid.saved  ? "not saved, and its chunks need the file"
+                           : grid.whole ? "whole, so it would not be streamed when the world is opened again"
+                                        : nullptr;
+  if (mark != nullptr) {
+    return make_error(ErrorCode::InvalidArgument,
+                      "cannot stream grid \"" + printable(grid.name) + "\": it is marked as " + mark);
   }
   grid.grid.make_partial();
   grid.field.make_partial();
@@ -738,10 +792,7 @@ Result<GridHandle> StreamedWorld::add_grid(SceneGrid grid, std::shared_ptr<const
   }
   const auto number = impl_->world.saver.number_of(handle);
   QUOIN_ASSERT(number.has_value(), "a saved grid has a number");
-  if (auto set = impl_->set_generator(impl_->add_streamed(handle, *number), std::move(generator)); !set) {
-    scene().remove_grid(handle);
-    return set.error();
-  }
+  impl_->set_generator(impl_->add_streamed(handle, *number), std::move(generator));
   return handle;
 }
 
@@ -751,18 +802,17 @@ std::optional<std::uint32_t> StreamedWorld::number_of(GridHandle grid) const {
 }
 
 void StreamedWorld::use_generator(GridHandle grid, std::shared_ptr<const ChunkGenerator> generator) {
-  const auto number = impl_->world.saver.number_of(grid);
-  QUOIN_ASSERT(number.has_value(), "a grid from the file or from add_grid");
-  if (impl_->streamed(*number) == nullptr) {  // the file decides it, so it is no programming error
-    impl_->problems.push_back("grid " + std::to_string(*number) + " is whole, so its generator is not used");
+  const std::uint32_t* const number = impl_->number_of(grid);
+  if (number == nullptr) {  // the file decides it, so it is no programming error
+    const SceneGrid* const content = scene().grids().find(grid);
+    QUOIN_ASSERT(content != nullptr, "a grid of the scene");
+    impl_->problems.push_back("grid \"" + printable(content->name) + "\" is whole, so its generator is not used");
     return;
   }
   impl_->note_edits();
   // Saves the generator's types first.
   if (const auto saved = impl_->save_now(); !saved) impl_->problems.push_back(to_string(saved.error()));
-  if (const auto set = impl_->set_generator(*impl_->streamed(*number), std::move(generator)); !set) {
-    impl_->problems.push_back(to_string(set.error()));
-  }
+  impl_->set_generator(*impl_->streamed(*number), std::move(generator));
 }
 
 Result<GridHandle> StreamedWorld::add_terrain(const EndlessTerrain& terrain) {
@@ -840,6 +890,7 @@ Status StreamedWorld::apply(const WorldEdit& edit) {
 Status StreamedWorld::flush() {
   constexpr double kAsLongAsItTakes = std::numeric_limits<double>::infinity();
   impl_->note_edits();
+  impl_->limit_grids();
   // Saves types first: chunks from workers and edits may need them.
   if (auto saved = impl_->save_now(); !saved) return saved;
   while (!impl_->waits_for_broken_alone()) {

@@ -1,9 +1,11 @@
 #include <quoin/stream/streamed_world.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -519,16 +521,16 @@ TEST_F(StreamedWorldTest, KeepsLoadedChunksWhenGeneratorChanges) {
   auto generator = std::make_shared<PatternGround>();
   StreamedWorld world = ground(path(), generator);
   const GridHandle handle = only_grid(world);
-  const Viewer viewer{.radius = 100.0};
+  Viewer viewer{.radius = 150.0};
   ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
-  EXPECT_TRUE(world.scene().edit(handle).grid.set(3, 1000, 3, 3));
+  EXPECT_TRUE(world.scene().edit(handle).grid.set(3, 130, 3, 3));
   ASSERT_TRUE(world.apply({0, WorldEdit::SetVoxels{{{{900, -1, 1}, 3}}}}).has_value());
   world.use_generator(handle, nullptr);
   ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
   ASSERT_TRUE(world.flush().has_value());
   EXPECT_EQ(world.stats().waiting_edits, 0U);
   const Grid& grid = world.scene().grids()[handle].grid;
-  EXPECT_EQ(grid.get(3, 1000, 3), 3);
+  EXPECT_EQ(grid.get(3, 130, 3), 3);
   EXPECT_EQ(grid.get(3, -1, 3) == kAir, false);
   EXPECT_TRUE(world.is_loaded(handle, {50, 0, 0})) << "air that no generator makes";
   const auto kept = world.store().load_chunk({0, 0, chunk_of(IVec3{900, -1, 1})});
@@ -537,7 +539,135 @@ TEST_F(StreamedWorldTest, KeepsLoadedChunksWhenGeneratorChanges) {
   world.use_generator(handle, generator);
   EXPECT_FALSE(world.is_loaded(handle, {50, 0, 0}));
   ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
-  EXPECT_EQ(grid.get(3, 1000, 3), 3);
+  EXPECT_EQ(grid.get(3, 130, 3), 3);
+  EXPECT_TRUE(world.scene().edit(handle).grid.set(4, 130, 3, 2));
+  EXPECT_GT(world.scene().edit(handle).field.add_sphere({20.0, -20.0, 20.0}, 5.0, 2), 0);
+  viewer.position.x = 5000.0;
+  ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+  ASSERT_TRUE(world.apply({0, WorldEdit::FieldSphere{{20.0, 130.0, 20.0}, 5.0, 0.0, 2}}).has_value());
+  ASSERT_TRUE(world.flush().has_value());
+  viewer.position.x = 0.0;
+  ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+  EXPECT_EQ(grid.get(4, 130, 3), 2);
+  EXPECT_LT(world.scene().grids()[handle].field.density({20, -20, 20}), 0.0F);
+  EXPECT_LT(world.scene().grids()[handle].field.density({20, 130, 20}), 0.0F);
+  EXPECT_EQ(grid.loaded_chunks(), world.scene().grids()[handle].field.loaded_chunks());
+}
+
+// Chunks of air that were edited outside of the former generator's box are loaded, in the voxels and in the field.
+TEST_F(StreamedWorldTest, KeepsEditedAirWhenGeneratorBoxGrows) {
+  auto generator = std::make_shared<PatternGround>();
+  StreamedWorld world = ground(path(), nullptr);
+  const GridHandle handle = only_grid(world);
+  const SceneGrid& content = world.scene().grids()[handle];
+  Viewer viewer{.radius = 100.0};
+  EXPECT_TRUE(world.scene().edit(handle).grid.set(3, -3, 3, 3));
+  EXPECT_GT(world.scene().edit(handle).field.add_sphere({100.0, -20.0, 20.0}, 5.0, 2), 0);
+  world.use_generator(handle, generator);
+  for (const IVec3 chunk : {IVec3{0, -1, 0}, IVec3{1, -1, 0}}) {
+    EXPECT_TRUE(content.grid.is_loaded(chunk));
+    EXPECT_TRUE(content.field.is_loaded(chunk));
+  }
+  EXPECT_GT(world.scene().edit(handle).field.add_sphere({20.0, -20.0, 20.0}, 5.0, 2), 0);
+  EXPECT_TRUE(world.scene().edit(handle).grid.set(100, -3, 3, 2));
+  ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+  EXPECT_EQ(content.grid.loaded_chunks(), content.field.loaded_chunks());
+  viewer.position.x = 5000.0;
+  ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+  EXPECT_FALSE(content.grid.is_loaded({0, -1, 0}));
+  EXPECT_FALSE(content.field.is_loaded({0, -1, 0}));
+  ASSERT_TRUE(world.apply({0, WorldEdit::FieldSphere{{30.0, -30.0, 30.0}, 5.0, 0.0, 2}}).has_value());
+  ASSERT_TRUE(world.flush().has_value());
+  viewer.position.x = 0.0;
+  ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+  EXPECT_EQ(content.grid.get(3, -3, 3), 3);
+  EXPECT_EQ(content.grid.get(100, -3, 3), 2);
+  for (const IVec3 centre : {IVec3{20, -20, 20}, IVec3{30, -30, 30}, IVec3{100, -20, 20}}) {
+    EXPECT_LT(content.field.density(centre), 0.0F) << centre.x;
+  }
+}
+
+// Until the program sets the generator, no chunk of the file's grid is known to be air.
+TEST_F(StreamedWorldTest, KeepsLandThatIsEditedBeforeGeneratorIsSet) {
+  auto generator = std::make_shared<PatternGround>();
+  { const StreamedWorld world = ground(path(), generator); }
+  auto world = StreamedWorld::open(path(), WorldAccess::Write);
+  ASSERT_TRUE(world.has_value()) << to_string(world.error());
+  const GridHandle handle = only_grid(*world);
+  EXPECT_FALSE(world->is_loaded(handle, {0, -1, 0}));
+  EXPECT_FALSE(world->scene().edit(handle).grid.set(3, -3, 3, 3));
+  ASSERT_TRUE(world->apply({0, WorldEdit::SetVoxels{{{{5, -3, 3}, 3}}}}).has_value());
+  EXPECT_EQ(world->stats().waiting_edits, 1U);
+  world->use_generator(handle, generator);
+  const Viewer viewer{.radius = 100.0};
+  ASSERT_TRUE(world->load_all({&viewer, 1}).has_value());
+  ASSERT_TRUE(world->flush().has_value());
+  Chunk expected = PatternGround::of({0, -1, 0});
+  expected.set({5, 61, 3}, 3);
+  const auto kept = world->store().load_chunk({0, 0, {0, -1, 0}});
+  ASSERT_TRUE(kept.has_value() && kept->has_value());
+  EXPECT_EQ((*kept)->voxels, expected);
+}
+
+/// Makes chunks of type 1, each after `open` was called.
+class GatedGround final : public ChunkGenerator {
+ public:
+  [[nodiscard]] IBox chunks() const override { return {{-9, -9, -9}, {9, 9, 9}}; }
+  [[nodiscard]] Result<StoredChunk> make(IVec3) const override {
+    is_begun_ = true;
+    is_begun_.notify_all();
+    is_open_.wait(false);
+    return StoredChunk{Chunk(1)};
+  }
+  void wait() const { is_begun_.wait(false); }
+  void open() {
+    is_open_ = true;
+    is_open_.notify_all();
+  }
+
+ private:
+  mutable std::atomic<bool> is_begun_{false};
+  std::atomic<bool> is_open_{false};
+};
+
+// A worker saves a chunk of the former generator while the new one, which does not make it, is set.
+TEST_F(StreamedWorldTest, LoadsChunkThatWasBegunBeforeGeneratorChanged) {
+  auto world = StreamedWorld::open_or_create(path());
+  ASSERT_TRUE(world.has_value());
+  add_types(*world);
+  const auto generator = std::make_shared<GatedGround>();
+  const auto grid = world->add_grid({}, generator);
+  ASSERT_TRUE(grid.has_value());
+  Instance instance;
+  instance.grid = *grid;
+  world->scene().add_instance(instance);
+  const Viewer viewer{.position = DVec3(32.0), .radius = 10.0};
+  ASSERT_TRUE(world->update({&viewer, 1}).has_value());
+  generator->wait();
+  world->use_generator(*grid, nullptr);
+  EXPECT_TRUE(world->is_loaded(*grid, IVec3(0)));
+  generator->open();
+  ASSERT_TRUE(world->load_all({&viewer, 1}).has_value());
+  EXPECT_EQ(world->scene().grids()[*grid].grid.get(3, 3, 3), 1);
+  ASSERT_TRUE(world->flush().has_value());
+  const auto kept = world->store().load_chunk({0, 0, IVec3(0)});
+  ASSERT_TRUE(kept.has_value() && kept->has_value());
+  EXPECT_EQ((*kept)->voxels, Chunk(1));
+}
+
+TEST_F(StreamedWorldTest, UnloadsEditedAirFarFromViewers) {
+  StreamedWorld world = ground(path(), std::make_shared<PatternGround>());
+  const Viewer viewer{.radius = 100.0};
+  ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+  const std::size_t loaded = world.stats().loaded_chunks;
+  EXPECT_TRUE(world.scene().edit(only_grid(world)).grid.set(3, 1000, 3, 3));
+  ASSERT_TRUE(world.update({&viewer, 1}).has_value());
+  EXPECT_EQ(world.stats().loaded_chunks, loaded + 1);
+  for (int i = 0; i < 500 && world.stats().loaded_chunks != loaded; ++i) {
+    ASSERT_TRUE(world.update({&viewer, 1}).has_value());
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  EXPECT_EQ(world.stats().loaded_chunks, loaded);
 }
 
 /// Fails for one chunk.
@@ -873,6 +1003,112 @@ TEST_F(StreamedWorldWithProps, ReportsGeneratorOfWholeGrid) {
   EXPECT_NE(problems[0].find("is whole, so its generator is not used"), std::string::npos) << problems[0];
 }
 
+TEST_F(StreamedWorldWithProps, ReportsGeneratorOfGridThatIsNotSaved) {
+  StreamedWorld world = opened();
+  const GridHandle prop = add_props(world.scene());
+  ASSERT_TRUE(world.flush().has_value());
+  world.scene().edit(prop).saved = false;
+  ASSERT_TRUE(world.flush().has_value());
+  world.use_generator(prop, std::make_shared<PatternGround>());
+  ASSERT_EQ(world.take_problems().size(), 1U);
+}
+
+TEST_F(StreamedWorldWithProps, ReportsLandThatIsMarkedAsWhole) {
+  const Viewer viewer{.position = {0.0, 50.0, 0.0}, .radius = 70.0};
+  {
+    auto world = StreamedWorld::open_or_create(path());
+    ASSERT_TRUE(world.has_value());
+    const auto refused = world->add_grid({.name = "land", .whole = true}, std::make_shared<PatternGround>());
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::InvalidArgument);
+    EXPECT_NE(refused.error().message.find("\"land\": it is marked as whole"), std::string::npos);
+    const auto land = world->add_terrain({.seed = 3, .height = 2});
+    ASSERT_TRUE(land.has_value());
+    world->scene().edit(*land).whole = true;
+    ASSERT_TRUE(world->load_all({&viewer, 1}).has_value());
+    ASSERT_TRUE(world->flush().has_value());
+  }
+  for (int run = 0; run < 2; ++run) {
+    auto world = StreamedWorld::open(path(), WorldAccess::Write);
+    ASSERT_TRUE(world.has_value()) << to_string(world.error());
+    const auto problems = world->take_problems();
+    EXPECT_EQ(problems.size(), run == 0 ? 1U : 0U);
+    if (run == 0) {
+      EXPECT_NE(problems.at(0).find("its terrain is not generated"), std::string::npos) << problems[0];
+    }
+    EXPECT_EQ(is_streamed(*world, "terrain"), run == 1);
+    world = StreamedWorld::open(path(), WorldAccess::Read);  // releases the file
+    auto store = WorldStore::open(path(), WorldAccess::Write);
+    ASSERT_TRUE(store.has_value()) << to_string(store.error());
+    auto loaded = load_world(*store);
+    ASSERT_TRUE(loaded.has_value());
+    Scene& scene = loaded->loaded.scene;
+    scene.edit(scene.grids().handles().front()).whole = false;
+    ASSERT_TRUE(loaded->saver.save(*store, scene).has_value());
+  }
+}
+
+TEST_F(StreamedWorldWithProps, CountsDataOfWholeGrids) {
+  {
+    StreamedWorld world = opened();
+    const GridHandle prop = add_props(world.scene());
+    const std::vector<std::byte> bytes(60'000, std::byte{7});
+    for (int i = 0; i < 400; ++i) world.scene().edit(prop).grid.set_data({i % 16, i / 16 % 8, i / 128}, {0, bytes});
+  }
+  StreamOptions options;
+  options.max_whole_bytes = std::size_t{20} << 20;  // chunks without data would fit
+  const auto refused = StreamedWorld::open(path(), WorldAccess::Write, options);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::LimitExceeded);
+  EXPECT_NE(refused.error().message.find("\"prop\""), std::string::npos) << refused.error().message;
+  options.max_whole_bytes = std::size_t{48} << 20;
+  EXPECT_TRUE(StreamedWorld::open(path(), WorldAccess::Write, options).has_value());
+}
+
+// Without the index the stored chunks cannot be listed, but each can be read.
+TEST_F(StreamedWorldWithProps, OpensWorldWithDamagedIndexOfChunks) {
+  const Viewer viewer{.radius = 100.0};
+  {
+    StreamedWorld world = opened();
+    add_props(world.scene());
+    ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+    EXPECT_TRUE(world.scene().edit(grid_named(world.scene(), "ground")).grid.set(3, -3, 3, 3));
+    ASSERT_TRUE(world.flush().has_value());
+  }
+  std::int64_t page = 0;
+  std::int64_t page_bytes = 0;
+  {
+    auto connection = Connection::open(path().string(), Connection::Mode::Write);
+    ASSERT_TRUE(connection);
+    const auto number = [&](const char* sql) {
+      auto select = connection->prepare(sql);
+      EXPECT_TRUE(select && *select->step());
+      return select->integer(0);
+    };
+    page = number("SELECT rootpage FROM sqlite_master WHERE name = 'chunk_keys'");
+    page_bytes = number("PRAGMA page_size");
+  }
+  {
+    std::fstream file(path(), std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp((page - 1) * page_bytes);
+    const std::string zeros(static_cast<std::size_t>(page_bytes), '\0');
+    file.write(zeros.data(), page_bytes);
+    ASSERT_TRUE(file.flush().good());
+  }
+  auto world = StreamedWorld::open(path(), WorldAccess::Read);
+  ASSERT_TRUE(world.has_value()) << to_string(world.error());
+  EXPECT_EQ(world->store().chunks(0, 0).error().code, ErrorCode::BadFormat);
+  EXPECT_EQ(world->scene().grids()[grid_named(world->scene(), "prop")].grid.voxel_count(), 16 * 8 * 16);
+  const GridHandle land = grid_named(world->scene(), "ground");
+  world->use_generator(land, std::make_shared<PatternGround>());
+  const auto problems = world->take_problems();
+  ASSERT_EQ(problems.size(), 1U);
+  EXPECT_NE(problems[0].find("the stored chunks of grid 0 cannot be listed"), std::string::npos) << problems[0];
+  ASSERT_TRUE(world->load_all({&viewer, 1}).has_value());
+  EXPECT_EQ(world->scene().grids()[land].grid.get(3, -3, 3), 3);
+  EXPECT_FALSE(world->is_loaded(land, {0, 50, 0})) << "it might be stored";
+}
+
 TEST(TerrainGeneratorDeathTest, RejectsChunkOutsideLandscape) {
   VoxelRegistry types;
   const auto generator = make_terrain_generator({.seed = 5, .height = 2}, types);
@@ -884,7 +1120,7 @@ TEST(StreamedWorldDeathTest, RejectsGeneratorForUnknownGrid) {
   const WorldFolder folder;
   auto world = StreamedWorld::open_or_create(folder / "w.quoin");
   ASSERT_TRUE(world.has_value());
-  QUOIN_EXPECT_MISTAKE(world->use_generator({}, nullptr), "a grid from the file");
+  QUOIN_EXPECT_MISTAKE(world->use_generator({}, nullptr), "a grid of the scene");
 }
 
 }  // namespace

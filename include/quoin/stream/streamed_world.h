@@ -73,8 +73,9 @@ struct StreamOptions {
   /// viewers' radius is loaded. `return_freed_memory` keeps the process's resident memory within it. Whole grids do not
   /// count.
   std::size_t budget_bytes = std::size_t{1} << 30;
-  /// Maximum memory for the file's whole grids, estimated from a sample of their chunks. Opening a world fails with
-  /// LimitExceeded and the name of a grid if they need more, or more than the available memory.
+  /// Maximum memory for the file's whole grids: estimated from a sample of their chunks, then counted while they load.
+  /// Opening a world fails with LimitExceeded and the name of a grid if they need more, or more than the available
+  /// memory.
   std::size_t max_whole_bytes = std::numeric_limits<std::size_t>::max();
   /// Returns the bytes held elsewhere for loaded chunks: meshes, trees, light, GPU memory. `update` calls it ten times
   /// per second. May be empty.
@@ -174,12 +175,14 @@ class StreamedWorld {
 
   /// Adds an empty grid whose chunks are loaded, or made by the generator, around viewers. It is visible only where an
   /// instance places it. Requires: `grid` has no voxels and no densities. Errors: CannotWrite; InvalidArgument if it is
-  /// marked as not saved; as WorldSaver::save.
+  /// marked as not saved or as whole; as WorldSaver::save.
   Result<GridHandle> add_grid(SceneGrid grid, std::shared_ptr<const ChunkGenerator> generator = nullptr);
-  /// Sets the generator for a grid's chunks that are not in the file. Call it before the first `update`; later, loaded
-  /// chunks stay as they are. Cost: O(stored chunks). `take_problems` reports errors.
-  /// Requires: the grid came from the file or from `add_grid`. Whole grids have no generator: the call does nothing,
-  /// and `take_problems` reports it.
+  /// Sets the generator for a grid's chunks that are not in the file. Call it before the first `update`, `plan`,
+  /// `load_all` or `flush`: until then no chunk of a grid from the file is loaded, but then it is limited to its stored
+  /// chunks, and edits can fill the air around them. Later, loaded chunks stay as they are.
+  /// Cost: O(stored and loaded chunks). If it throws bad_alloc, nothing has changed. `take_problems` reports errors.
+  /// Requires: the scene has the grid. Whole grids have no generator: the call does nothing, and `take_problems` reports
+  /// it.
   void use_generator(GridHandle grid, std::shared_ptr<const ChunkGenerator> generator);
   /// Adds a grid of generated landscape, placed at the origin. The file stores its parameters, so that it continues
   /// when the world is opened again.
@@ -217,7 +220,8 @@ class StreamedWorld {
   ///         saved.
   Status flush();
   /// Returns the errors of single chunks since the last call: damaged chunks (which stay unloaded) and chunks that
-  /// could not be generated (which are air). Also reports generators that a grid cannot use.
+  /// could not be generated (which are air). Also reports generators that a grid cannot use, and grids whose stored
+  /// chunks cannot be listed: their chunks are looked up one by one, and none counts as air without that.
   [[nodiscard]] std::vector<std::string> take_problems();
   [[nodiscard]] StreamStats stats();
   /// Returns the store, for game values and other data that WorldStore::save accepts. Save chunks of streamed
