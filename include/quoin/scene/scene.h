@@ -64,7 +64,7 @@ struct SceneGrid {
   /// StreamedWorld streams.
   bool saved = true;
   /// Stored in world files: true if StreamedWorld loads all of the grid when it opens the file, false if it loads the
-  /// chunks around viewers. Set it for grids that are small and placed many times or far apart: props, vehicles. A
+  /// chunks around viewers, later and only while a viewer is near. Set it for small grids: props, vehicles. A
   /// StreamedWorld also stores the grids that the program adds to its scene as whole.
   bool whole = false;
 

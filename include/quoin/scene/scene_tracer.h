@@ -39,6 +39,7 @@ class SceneTracer {
   ///           instance tree, which is rebuilt in O(n log n) when instances are added, removed or moved far. When a
   ///           grid's bounds change: a pass over all instances. When a type's transparency changes: all trees with such
   ///           voxels.
+  /// Errors:   if it throws (bad_alloc), only another `update` or the destructor may follow.
   /// Threads:  grids are updated on several threads.
   bool update(Threads threads = {});
 
@@ -47,7 +48,7 @@ class SceneTracer {
   ///
   /// Cost:     as `update`, for the differences from the scene traced before, plus a pass over all grids and instances.
   /// Lifetime: the former scene must live until the call returns, `scene` longer than the tracer.
-  /// Requires, threads: as `update`.
+  /// Requires, errors, threads: as `update`.
   void update(const Scene& scene, Threads threads = {});
   void update(Scene&&, Threads = {}) = delete;  // would dangle
 

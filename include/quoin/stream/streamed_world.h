@@ -80,8 +80,8 @@ struct StreamOptions {
   /// Returns the bytes held elsewhere for loaded chunks: meshes, trees, light, GPU memory. `update` calls it ten times
   /// per second. May be empty.
   std::function<std::size_t()> other_bytes{};
-  /// Time limit of one `update` call in seconds; it loads or unloads at least one chunk. While few chunks wait, it
-  /// uses less: it moves them over several calls.
+  /// Time in which one `update` call moves chunks, in seconds; it loads or unloads at least one chunk. While few chunks
+  /// wait, it uses less: it moves them over several calls.
   double update_seconds = 0.0005;
   /// Minimum time between two saves in `update`; 0: saves in every call.
   std::chrono::milliseconds save_interval{1000};
@@ -191,7 +191,7 @@ class StreamedWorld {
 
   /// Adds the chunks that workers have loaded or generated, unloads far chunks and requests new ones. Call it once per
   /// frame.
-  /// Cost:   StreamOptions::update_seconds; plus WorldSaver::save for the edits when a save is due.
+  /// Cost:   StreamOptions::update_seconds for moving chunks; plus WorldSaver::save for the edits when a save is due.
   /// Errors: as WorldSaver::save; unsaved edits stay in memory and the save is retried. bad_alloc.
   Status update(std::span<const Viewer> viewers);
   /// Does the part of `update` that only reads the scene. Another thread can draw the scene during the call.
