@@ -186,7 +186,7 @@ TEST(Mass, FieldBallIsNearlyExact) {
   for (int i = 0; i < 3; ++i) EXPECT_NEAR(found.inertia[i][i], 0.4 * mass * 144.0, 0.01 * 0.4 * mass * 144.0);
 }
 
-TEST(Mass, OfPartsFarApartIsRight) {
+TEST(Mass, PartsFarApartAreRight) {
   constexpr int kFar = 1'200'000'000;
   Grid grid;
   grid.set({-kFar, 0, 0}, 1);
