@@ -14,6 +14,8 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
+#include <quoin/live/live_light.h>
+
 #include "live/live_test_support.h"
 
 namespace quoin {
@@ -259,6 +261,36 @@ TEST(LiveField, ChoosesLevelsByNearestEyeAndInstance) {
   meshes.finish(one.scene, DVec3(0.0, 40.0, 0.0));
   shown.apply(meshes.take());
   EXPECT_TRUE(shown.all().empty());
+}
+
+// A moved instance needs no new light, so the snapshot with the light does not have its position.
+TEST(LiveField, LevelsFollowInstancesThatMoveWithLiveLight) {
+  OneGrid one;
+  one.field() = hills(4);
+  LiveMeshOptions options = options_of(2);
+  options.detail_distance = 40.0;
+  LiveLight light;
+  LiveMeshes meshes(options);
+  meshes.use_light(light);
+  ShownSurfaces shown;
+  const DVec3 eye(0.0, 40.0, 0.0);
+  meshes.finish(one.scene, eye);
+  shown.apply(meshes.take());
+  expect_levels(shown, {eye}, 40.0);
+  for (const double moved : {250.0, 0.0, 120.0}) {
+    one.scene.edit(one.placed).position = {-moved, 0.0, -moved};
+    // Once also while light is computed for an earlier state.
+    if (moved == 120.0) {
+      one.field().remove_sphere({60.0, 20.0, 60.0}, 4.0);
+      meshes.update(one.scene, eye);
+      one.scene.edit(one.placed).position = {-200.0, 0.0, -200.0};
+    }
+    meshes.finish(one.scene, eye);
+    shown.apply(meshes.take());
+    EXPECT_EQ(open_edges(shown, one.handle), 0U);
+    const double at = moved == 120.0 ? 200.0 : moved;
+    expect_levels(shown, {{at, 40.0, at}}, 40.0);
+  }
 }
 
 TEST(LiveField, FollowsTypeColours) {

@@ -287,6 +287,7 @@ void MeshScheduler::forget() {
 void MeshScheduler::update_or_throw(const Scene& scene) {
   if (light_worker_ == nullptr) return follow({&scene, light_, updates_, SurfaceClock::now()}, scene);
   SceneFollower::Update placed(placed_, scene);
+  are_places_new_ |= placed.has_other_instances();
   light_worker_->update_for_receiver(scene, updates_, placed.has_other_placements());
   placed.commit();
   if (lit_ == nullptr) return;
@@ -305,6 +306,7 @@ void MeshScheduler::receive(std::shared_ptr<LitState> lit) {
       // Later updates without a change are in the same state.
       lit_number_ = light_worker_->owes_state() ? lit_->number : updates_;
       follow({&scene, &lit_->lit.light, lit_number_, lit_->asked}, scene);
+      are_places_new_ = true;  // levels were chosen for the places of the snapshot
     } catch (...) {
       forget();
       receive_failure_ = std::current_exception();
