@@ -4,6 +4,7 @@
 #include <memory>
 #include <mutex>
 #include <new>
+#include <thread>
 
 #include <gtest/gtest.h>
 
@@ -272,6 +273,45 @@ TEST(MeshScheduler, DeliversAllChunksOfAnEditTogether) {
     EXPECT_TRUE(scheduler.take().empty());
     EXPECT_EQ(scheduler.shown_update(), before + 2) << "nothing changed since";
   }
+}
+
+// A field chunk of a complete edit gets another level while the next edit is in progress, before the first is taken.
+TEST(MeshScheduler, DeliversAnEditWithFieldsThatChangedLevelSince) {
+  OneGrid one;
+  SceneGrid& both = one.scene.edit(one.handle);
+  both.field.add_box(DVec3(10.0), DVec3(50.0), 1);
+  both.grid.set({100, 30, 30}, 1);
+  LiveMeshOptions options = blocky(2);
+  options.detail_distance = 100.0;
+  GatedWork voxels(options);
+  MeshScheduler scheduler(options, [&, work = voxels.work()](SurfaceJob& job, SurfaceWorkspace& workspace) {
+    if (job.source.content == SurfaceContent::Voxels) return work(job, workspace);
+    make_live_surface(options, job, workspace);
+  });
+  const auto wait_for_meshed = [&](std::int64_t chunks) {
+    while (scheduler.stats().chunks_meshed < chunks) std::this_thread::yield();
+  };
+  voxels.let_through(1);
+  scheduler.finish(one.scene, {});
+  EXPECT_EQ(scheduler.take().size(), 2U);
+  // The first edit changes a chunk of voxels and one of the field.
+  SceneGrid& edited = one.scene.edit(one.handle);
+  edited.grid.set({101, 30, 30}, 1);
+  edited.field.remove_sphere(DVec3(30.0), 5.0);
+  edited.field.remove_sphere({30.0, 50.0, 30.0}, 5.0);
+  voxels.let_through(1);
+  const std::uint64_t first = scheduler.update(one.scene, {});
+  wait_for_meshed(4);
+  // The next one changes voxels. The eye has moved away.
+  one.grid().set({102, 30, 30}, 1);
+  scheduler.update(one.scene, DVec3(300.0));
+  wait_for_meshed(5);
+  const std::vector<SurfaceUpdate> updates = scheduler.take();
+  EXPECT_EQ(updates.size(), 2U) << "of the first edit";
+  EXPECT_EQ(scheduler.shown_update(), first);
+  voxels.open();
+  scheduler.finish(one.scene, DVec3(300.0));
+  EXPECT_EQ(scheduler.take().size(), 1U);
 }
 
 TEST(MeshScheduler, RepeatsJobsOfAnEditWithoutMemory) {

@@ -362,8 +362,14 @@ void FieldSurfaces::finish_chunk(FieldChunk& state, std::shared_ptr<const ChunkS
   --state.group->unfinished;
 }
 
-// The whole group is done.
+// The whole group is done. It can be taken as soon as any surface that it replaces before that was taken: an epoch
+// must not lose a part, and a group must not be divided.
 void FieldSurfaces::give(const Group& group) {
+  std::uint64_t shown_from = group.is_in_epoch ? 0 : group.state;
+  for (const IVec3 chunk : group.chunks) {
+    const FieldChunk& state = chunks_.at(chunk);
+    if (state.is_ready) shown_from = std::min(shown_from, state.state);
+  }
   for (const IVec3 chunk : group.chunks) {
     FieldChunk& state = chunks_.at(chunk);
     QUOIN_ASSERT(state.group.get() == &group && state.is_done, "a finished chunk of the group");
@@ -372,7 +378,7 @@ void FieldSurfaces::give(const Group& group) {
       state.group.reset();
       state.is_done = false;
       state.was_given = true;
-      state.state = group.is_in_epoch ? 0 : group.state;
+      state.state = shown_from;
       state.surface = std::move(state.result);
       state.result.reset();
       state.is_ready = false;
