@@ -46,9 +46,9 @@ class LatestState {
   /// nothing else while an update is requested or in progress.
   /// Errors: bad_alloc, also from the worker; the next call then starts an update.
   void update(const Scene& scene, bool has_changed) {
-    is_behind_ |= has_changed;
     {
       const std::lock_guard lock(mutex_);
+      is_behind_ |= has_changed;
       throw_failure();
       if (!is_behind_ || is_busy_) return;
     }
@@ -112,6 +112,7 @@ class LatestState {
     lock.lock();
     if (done != nullptr) std::swap(ready_, done);  // `done` receives a result that was not taken
     std::unique_ptr<State> also_former = std::move(given_up_);
+    if (failure != nullptr) is_behind_ = true;
     worker_.keep_failure(std::move(failure));
     is_busy_ = false;
     worker_.notify();
@@ -127,19 +128,16 @@ class LatestState {
   // Requires: the mutex is held.
   void throw_failure() {
     const std::exception_ptr failure = worker_.take_failure();
-    if (failure == nullptr) return;
-    is_behind_ = true;
-    std::rethrow_exception(failure);
+    if (failure != nullptr) std::rethrow_exception(failure);
   }
 
   Make make_;
   Begin begins_;
 
-  // The owner's.
-  bool is_behind_ = false;  // something changed that no snapshot has
-  State shown_;
+  State shown_;  // the owner's
 
   mutable std::mutex mutex_;         // of all below
+  bool is_behind_ = false;           // something changed that no snapshot has, or an update failed
   bool is_busy_ = false;             // an update is requested or in progress
   Snapshot asked_;                   // the scene of an update that has not begun
   std::unique_ptr<State> ready_;     // to be taken

@@ -276,6 +276,13 @@ TEST(LatestState, RethrowsFailureAndRecovers) {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
     EXPECT_TRUE(has_thrown);
+    work.states.wait();
+
+    work.fails = true;
+    work.states.update(work.scene, true);
+    while (work.fails) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    EXPECT_TRUE(work.states.is_late()) << "before the next call reports it";
   }
 }
 
