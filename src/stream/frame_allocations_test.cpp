@@ -38,8 +38,7 @@ class Game {
     EXPECT_TRUE(world_->add_grid({.name = "a ship that is not placed"}));
     EXPECT_TRUE(world_->load_all({&viewer, 1}));
     tracer_.emplace(world_->scene());
-    light_.finish(world_->scene());
-    meshes_.use_light(&light_.shown());
+    meshes_.use_light(light_);
     meshes_.finish(world_->scene(), viewer.position);
     // Until workers have nothing left to do.
     for (int idle = 0; idle < 20; ++idle) {
@@ -52,8 +51,6 @@ class Game {
   bool frame() {
     EXPECT_TRUE(world_->update({&viewer, 1}));
     tracer_->update();
-    light_.update(world_->scene());
-    light_.take();
     const std::int64_t freed_before = large_frees_of_this_thread();
     meshes_.update(world_->scene(), viewer.position);
     bool is_idle = meshes_.pending() == 0 && !light_.is_late();
@@ -62,6 +59,7 @@ class Game {
       shown_[{static_cast<int>(update.content), update.chunk.x, update.chunk.y, update.chunk.z}] =
           std::move(update.surface);
     }
+    light_.take();
     freed_for_meshes += large_frees_of_this_thread() - freed_before;
     return is_idle;
   }
