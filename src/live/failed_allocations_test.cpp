@@ -537,6 +537,96 @@ TEST(FailedAllocations, KeepLiveMeshes) {
       });
 }
 
+ShownSurfaces surfaces_of(const Scene& scene) {
+  LiveMeshOptions options;
+  options.workers = {1};
+  LiveMeshes fresh(options);
+  fresh.finish(scene, {});
+  ShownSurfaces expected;
+  expected.apply(fresh.take());
+  return expected;
+}
+
+bool has_same_quads(const ShownSurfaces& lit, const Scene& scene) {
+  const ShownSurfaces expected = surfaces_of(scene);
+  return std::ranges::equal(lit.all(), expected.all(), [](const SurfaceUpdate& x, const SurfaceUpdate& y) {
+    return x.grid == y.grid && x.chunk == y.chunk && x.content == y.content;
+  });
+}
+
+// Surfaces and light that a failed call would have shown are shown by the next one.
+TEST(FailedAllocations, KeepTakenMeshes) {
+  for (const bool is_lit : {false, true}) {
+    BusyScene busy;
+    LiveLight light({{}, {1}});
+    LiveMeshOptions options;
+    options.workers = {1};
+    LiveMeshes meshes(options);
+    if (is_lit) meshes.use_light(light);
+    ShownSurfaces shown;
+    int calls = 0;
+    expect_recovery(
+        busy,
+        [&] {
+          const std::int64_t left = std::exchange(allocations_left, -1);
+          const bool is_complete = ++calls % 3 != 0;
+          meshes.update(busy.scene, {});
+          if (is_complete) meshes.finish(busy.scene, {});
+          if (!is_complete) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+          allocations_left = left;
+          const std::vector<SurfaceUpdate> taken = meshes.take();
+          const std::int64_t left_then = std::exchange(allocations_left, -1);
+          shown.apply(taken);
+          allocations_left = left_then;
+        },
+        [&] {
+          meshes.finish(busy.scene, {});
+          shown.apply(meshes.take());
+          if (is_lit) {
+            SceneLight fresh;
+            fresh.update(busy.scene, {1});
+            return levels_of(light.shown(), busy.scene) == levels_of(fresh, busy.scene) &&
+                   has_same_quads(shown, busy.scene);
+          }
+          return has_same_surfaces(shown, surfaces_of(busy.scene));
+        });
+  }
+}
+
+// A game that calls `update` only while surfaces are pending still sees every edit.
+TEST(FailedAllocations, KeepLitMeshesPendingIfWorkersFail) {
+  BusyScene busy;
+  LiveLight light({{}, {1}});
+  LiveMeshOptions options;
+  options.workers = {1};
+  LiveMeshes meshes(options);
+  meshes.use_light(light);
+  ShownSurfaces shown;
+  int failures = 0;
+  for (std::int64_t n = 0; n < 80; ++n) {
+    for (int i = 0; i < 3; ++i) busy.edit();
+    allocations_left_of_workers = n;
+    std::uint64_t number = meshes.update(busy.scene, {});
+    while (meshes.pending() != 0) {
+      std::this_thread::sleep_for(std::chrono::microseconds(200));
+      shown.apply(meshes.take());
+      if (meshes.pending() == 0) break;
+      try {
+        number = meshes.update(busy.scene, {});
+      } catch (const std::bad_alloc&) {
+        ++failures;
+      }
+    }
+    allocations_left_of_workers = -1;
+    ASSERT_EQ(meshes.shown_update(), number) << n;
+    ASSERT_TRUE(has_same_quads(shown, busy.scene)) << n;
+    SceneLight fresh;
+    fresh.update(busy.scene, {1});
+    ASSERT_EQ(levels_of(light.shown(), busy.scene), levels_of(fresh, busy.scene)) << n;
+  }
+  EXPECT_GT(failures, 5);
+}
+
 #ifdef QUOIN_HAVE_STORE
 // A failed save stores nothing; the next one stores everything. Destructors of the JSON library allocate memory, so no
 // part that is stored as JSON changes.

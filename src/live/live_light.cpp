@@ -23,6 +23,7 @@ Workers::Clock::time_point LightWorker::step(Workers::Lock& lock) {
   if (asked_ == nullptr) return Workers::kWhenWoken;
   QUOIN_ASSERT(is_busy_, "a request in progress");
   std::shared_ptr<const Scene> scene = std::exchange(asked_, nullptr);
+  const Workers::Clock::time_point asked = asked_at_;
   lock.unlock();
   std::unique_ptr<LitScene> done;
   std::exception_ptr failure;
@@ -38,6 +39,10 @@ Workers::Clock::time_point LightWorker::step(Workers::Lock& lock) {
     if (done != nullptr) give(lock, std::move(done));
   } catch (...) {
     failure = std::current_exception();
+  }
+  if (failure != nullptr) {
+    is_behind_ = true;
+    behind_since_ = asked;
   }
   worker_.keep_failure(std::move(failure));
   if (asked_ == nullptr) is_busy_ = false;
@@ -67,7 +72,7 @@ void LightWorker::give(Workers::Lock& lock, std::unique_ptr<LitScene> done) {
   std::exception_ptr failure;
   try {
     auto state =
-        std::make_shared<LitState>(LitState{{done->scene, done->light.snapshot()}, number, asked, std::move(*done)});
+        std::make_shared<LitState>(LitState{{done->scene, done->light.snapshot()}, number, asked, std::move(done)});
     receiver(std::move(state));
   } catch (...) {
     failure = std::current_exception();
@@ -80,9 +85,7 @@ void LightWorker::give(Workers::Lock& lock, std::unique_ptr<LitScene> done) {
 // Requires: the mutex is held.
 void LightWorker::throw_failure() {
   const std::exception_ptr failure = worker_.take_failure();
-  if (failure == nullptr) return;
-  is_behind_ = true;
-  std::rethrow_exception(failure);
+  if (failure != nullptr) std::rethrow_exception(failure);
 }
 
 // Returns true if light depends on any change since the last call. Scenes also report names and voxel data, which light
@@ -110,6 +113,7 @@ bool LightWorker::read_changes(const Scene& scene) {
 void LightWorker::ask(const Scene& scene, std::uint64_t number) {
   {
     const std::lock_guard lock(mutex_);
+    if (is_behind_ && behind_since_ == kNever) behind_since_ = Workers::Clock::now();
     throw_failure();
     if (!is_behind_ || is_busy_) return;
   }
@@ -119,7 +123,7 @@ void LightWorker::ask(const Scene& scene, std::uint64_t number) {
     QUOIN_ASSERT(asked_ == nullptr && !is_busy_, "one request at a time");
     asked_ = std::move(snapshot);
     asked_number_ = number;
-    asked_at_ = Workers::Clock::now();
+    asked_at_ = std::exchange(behind_since_, kNever);
     is_busy_ = true;
     is_behind_ = false;
   }
@@ -167,8 +171,10 @@ void LightWorker::wait() {
 }
 
 void LightWorker::attach(Receiver receiver) {
+  std::shared_ptr<const Scene> cancelled;  // destroyed without the lock
   std::unique_lock lock(mutex_);
   QUOIN_ASSERT(receiver_ == nullptr && receiver != nullptr, "one receiver at a time");
+  cancelled = cancel_request();
   worker_.wait(lock, [&] { return is_idle(); });
   receiver_ = std::move(receiver);
   ready_.reset();
@@ -177,11 +183,22 @@ void LightWorker::attach(Receiver receiver) {
 }
 
 void LightWorker::detach() {
+  std::shared_ptr<const Scene> cancelled;  // destroyed without the lock
   std::unique_lock lock(mutex_);
   if (receiver_ == nullptr) return;
+  cancelled = cancel_request();
   worker_.wait(lock, [&] { return is_idle(); });
   receiver_ = nullptr;
   is_behind_ = true;
+}
+
+// Cancels a request that the worker has not begun, and returns its scene. Requires: the mutex is held.
+std::shared_ptr<const Scene> LightWorker::cancel_request() {
+  if (asked_ == nullptr) return nullptr;
+  is_busy_ = false;  // a request is made only when the earlier one was received
+  is_behind_ = true;
+  behind_since_ = asked_at_;
+  return std::exchange(asked_, nullptr);
 }
 
 bool LightWorker::has_receiver() const {
@@ -189,7 +206,7 @@ bool LightWorker::has_receiver() const {
   return receiver_ != nullptr;
 }
 
-bool LightWorker::owes_state() const {
+bool LightWorker::is_state_pending() const {
   const std::lock_guard lock(mutex_);
   return is_behind_ || is_busy_;
 }
@@ -202,8 +219,8 @@ void LightWorker::note_received() {
 void LightWorker::show(LitState& state) {
   const std::lock_guard lock(mutex_);
   if (std::exchange(state.is_shown, true)) return;
-  std::swap(state.to_show, shown_);
-  spent_ = std::make_unique<LitScene>(std::move(state.to_show));
+  std::swap(*state.to_show, shown_);
+  spent_ = std::move(state.to_show);
   shown_number_ = state.number;
   is_shown_new_ = true;
 }

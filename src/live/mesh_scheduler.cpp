@@ -268,6 +268,7 @@ std::uint64_t MeshScheduler::update(const Scene& scene, DVec3 eye, std::span<con
     std::swap(next_eyes_, eyes_);
     ++updates_;
     update_or_throw(scene);
+    must_restart_ = false;
   } catch (...) {
     forget();
     throw;
@@ -282,6 +283,7 @@ void MeshScheduler::forget() {
   placed_.forget();
   is_epoch_open_ = false;
   retries_.clear();
+  must_restart_ = true;
 }
 
 void MeshScheduler::update_or_throw(const Scene& scene) {
@@ -291,7 +293,7 @@ void MeshScheduler::update_or_throw(const Scene& scene) {
   light_worker_->update_for_receiver(scene, updates_, placed.has_other_placements());
   placed.commit();
   if (lit_ == nullptr) return;
-  if (!light_worker_->owes_state()) lit_number_ = updates_;
+  if (!light_worker_->is_state_pending()) lit_number_ = updates_;
   follow({lit_->lit.scene.get(), &lit_->lit.light, lit_number_, SurfaceClock::now()}, scene);
 }
 
@@ -301,10 +303,11 @@ void MeshScheduler::receive(std::shared_ptr<LitState> lit) {
     const std::lock_guard lock(mutex_);
     light_worker_->note_received();
     try {
-      const Scene& scene = *lit->lit.scene;
-      lit_ = std::move(lit);
+      // The calls that drop it hold the mutex, and one of them is `take`.
+      lit_ = queue_.releases()->defer(std::move(lit));
+      const Scene& scene = *lit_->lit.scene;
       // Later updates without a change are in the same state.
-      lit_number_ = light_worker_->owes_state() ? lit_->number : updates_;
+      lit_number_ = light_worker_->is_state_pending() ? lit_->number : updates_;
       follow({&scene, &lit_->lit.light, lit_number_, lit_->asked}, scene);
       are_places_new_ = true;  // levels were chosen for the places of the snapshot
     } catch (...) {
@@ -382,7 +385,8 @@ void MeshScheduler::begin_epoch(const State& state) {
     const SceneGrid* const grid = state.scene->grids().find(key.grid);
     std::optional<SurfaceInputs> inputs;
     if (grid != nullptr)
-      inputs.emplace(*grid, types_, state.light == nullptr ? GridLight{} : state.light->of(key.grid));
+      inputs.emplace(*grid, types_, state.light == nullptr ? GridLight{} : state.light->of(key.grid),
+                     queue_.releases());
     live->begin_epoch(inputs ? &*inputs : nullptr, jobs);
   }
   for (std::unique_ptr<SurfaceJob>& job : jobs) {
@@ -633,6 +637,7 @@ std::vector<SurfaceUpdate> MeshScheduler::take(std::size_t max_bytes) {
     forget();
     throw;
   }
+  // The rest cannot fail, so that no surface is lost.
   std::size_t bytes = 0;
   for (const ReadyChunk& ready : totals_.ready) {
     SurfaceSource* const live = find(ready.source);
@@ -656,8 +661,8 @@ std::vector<SurfaceUpdate> MeshScheduler::take(std::size_t max_bytes) {
 
 std::size_t MeshScheduler::pending() const {
   const std::lock_guard lock(mutex_);
-  const bool is_light_late = light_worker_ != nullptr && light_worker_->owes_state();
-  return totals_.pending + (is_light_late ? 1 : 0);
+  const bool is_light_late = light_worker_ != nullptr && light_worker_->is_state_pending();
+  return totals_.pending + (is_light_late || must_restart_ ? 1 : 0);
 }
 
 void MeshScheduler::finish(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes) {
@@ -665,7 +670,7 @@ void MeshScheduler::finish(const Scene& scene, DVec3 eye, std::span<const DVec3>
     const LiveMeshes::Stats before = stats();
     update(scene, eye, other_eyes);
     std::unique_lock lock(mutex_);
-    const bool is_light_late = light_worker_ != nullptr && light_worker_->owes_state();
+    const bool is_light_late = light_worker_ != nullptr && light_worker_->is_state_pending();
     const bool is_done = totals_.unfinished == 0 && !is_light_late;
     const std::size_t left = !is_done && has_waiting() ? max_ahead_ / 2 : 0;
     // A free worker may take a job.

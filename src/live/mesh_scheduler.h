@@ -167,6 +167,7 @@ class MeshScheduler {
   std::vector<DVec3> eyes_;
   std::vector<DVec3> next_eyes_;                          // of the update in progress; kept for its memory
   std::map<GridHandle, ChunkDistances> level_distances_;  // for `choose_levels`; kept for its memory
+  bool must_restart_ = false;                             // memory ran out; `update` was not called since
   bool is_all_new_ = false;                               // the scene that was followed last is another one
   bool are_places_new_ = true;                            // eyes or instances moved since levels were last chosen
   MeshJobQueue queue_;                                    // last: its threads end first

@@ -129,7 +129,8 @@ class LiveMeshes {
   /// Returns the number of the newest update whose edits were all taken, and those of all earlier updates. Chunks that
   /// are returned one by one do not count.
   [[nodiscard]] std::uint64_t shown_update() const;
-  /// Returns the number of chunks whose newest surface has not been taken yet, plus 1 while light is computed for them.
+  /// Returns the number of chunks whose newest surface has not been taken yet, plus 1 while light is computed for them,
+  /// or if memory ran out since the last successful `update`.
   [[nodiscard]] std::size_t pending() const;
   /// Calls `update` until all chunks are meshed. For tests and screenshots.
   /// Errors: bad_alloc, also if workers run out of memory for every remaining chunk.

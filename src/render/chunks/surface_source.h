@@ -218,7 +218,7 @@ class SurfaceSource {
   };
   /// Returns when the surface of a listed chunk can be taken.
   [[nodiscard]] virtual Turn turn_of(IVec3 chunk) const = 0;
-  /// Appends the surface if one is ready.
+  /// Appends the surface if one is ready. Does not throw if `out` has memory for it.
   virtual void take(IVec3 chunk, std::vector<SurfaceUpdate>& out) = 0;
 
   /// Returns the number of chunks that must be meshed for the next epoch. Sets `has_edits` if the epoch has any chunk.

@@ -302,6 +302,7 @@ void VoxelSurfaces::erase_if_over(IVec3 chunk) {
 // Replaces the surface that is to be taken.
 void VoxelSurfaces::show(IVec3 chunk, VoxelChunk& state, std::shared_ptr<const ChunkSurface> surface,
                          bool is_together) {
+  if (surface != nullptr && has_regions()) state.region_hashes.reserve(region_count());  // for `take`
   state.surface = std::move(surface);
   // A surface that replaces one of an epoch is taken in its place.
   state.is_together = is_together || (state.is_ready && state.is_together);
@@ -501,24 +502,30 @@ void VoxelSurfaces::release_edits() {
   }
 }
 
-// Returns the regions that differ from the ones taken last.
+// Returns the regions that differ from the ones taken last. Does not throw.
 std::uint64_t VoxelSurfaces::note_regions(VoxelChunk& state) const {
   constexpr std::uint64_t kAll = ~std::uint64_t{0};
+  if (!has_regions()) return kAll;
+  if (state.surface == nullptr) {
+    state.region_hashes = std::vector<std::uint64_t>();
+    return kAll;
+  }
   const int across = kChunkEdge / options_.region_edge;
-  if (across == 1 || options_.style != SurfaceStyle::Blocky) return kAll;
-  std::vector<std::uint64_t> before = std::exchange(state.region_hashes, {});
-  if (state.surface == nullptr) return kAll;
-  state.region_hashes.resize(static_cast<std::size_t>(across * across * across));
+  QUOIN_ASSERT(state.region_hashes.capacity() >= region_count(), "memory from `show`");
+  std::array<std::uint64_t, kMaxRegions> now{};
   for (const SurfaceRegion& each : state.surface->regions) {
     const IVec3 at = each.region;
     QUOIN_ASSERT(at.x < across && at.y < across && at.z < across, "a region of the chunk");
-    state.region_hashes[static_cast<std::size_t>(at.x + across * (at.y + across * at.z))] = each.hash;
+    now[static_cast<std::size_t>(at.x + across * (at.y + across * at.z))] = each.hash;
   }
-  if (before.empty()) return kAll;
-  QUOIN_ASSERT(before.size() == state.region_hashes.size(), "regions of one size");
+  if (state.region_hashes.empty()) {
+    state.region_hashes.assign(now.begin(), now.begin() + static_cast<std::ptrdiff_t>(region_count()));
+    return kAll;
+  }
+  QUOIN_ASSERT(state.region_hashes.size() == region_count(), "regions of one size");
   std::uint64_t changed = 0;
-  for (std::size_t i = 0; i < before.size(); ++i) {
-    changed |= std::uint64_t{before[i] != state.region_hashes[i]} << i;
+  for (std::size_t i = 0; i < state.region_hashes.size(); ++i) {
+    changed |= std::uint64_t{std::exchange(state.region_hashes[i], now[i]) != now[i]} << i;
   }
   return changed;
 }

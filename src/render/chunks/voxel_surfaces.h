@@ -79,6 +79,7 @@ class VoxelSurfaces final : public SurfaceSource {
   using Change = CountedChange<VoxelChunk>;
   using Chunks = std::unordered_map<IVec3, VoxelChunk, CoordinateHash>;
   enum class Cause : std::uint8_t { Load, Edit };
+  static constexpr std::size_t kMaxRegions = 64;
 
   /// A chunk of the epoch in progress.
   struct Member {
@@ -107,6 +108,12 @@ class VoxelSurfaces final : public SurfaceSource {
   void collect_member(SurfaceJob& job, VoxelChunk& state, Member& member);
   void show(IVec3 chunk, VoxelChunk& state, std::shared_ptr<const ChunkSurface> surface, bool is_together);
   [[nodiscard]] std::uint64_t note_regions(VoxelChunk& state) const;
+  /// Returns the number of regions of a chunk, at most kMaxRegions.
+  [[nodiscard]] std::size_t region_count() const {
+    const auto across = static_cast<std::size_t>(kChunkEdge / options_.region_edge);
+    return across * across * across;
+  }
+  [[nodiscard]] bool has_regions() const { return options_.style == SurfaceStyle::Blocky && region_count() > 1; }
 
   GridHandle handle_;
   const ChunkSurfaceOptions& options_;
