@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstdint>
 #include <exception>
 #include <functional>
 #include <memory>
@@ -15,10 +14,11 @@
 namespace quoin {
 
 /// A state that one background thread derives from a scene while the scene is edited: its light, its tracer. The owner
-/// shows the newest completed state.
+/// shows the newest completed state. An update begins only when the last result was taken, so that there are never more
+/// than two states.
 ///
-///   owner    update(scene): snapshot -> asked       take(): ready <-> shown, the former shown one -> given_up
-///   worker   make(asked, given_up) -> ready
+///   owner    update(scene): snapshot -> asked       take(): ready <-> shown, the former shown one -> former
+///   worker   make(asked, former) -> ready
 ///
 /// State:    movable; a move must not throw.
 /// Lifetime: the scene is read only during calls.
@@ -28,17 +28,11 @@ template <class State>
 class LatestState {
  public:
   using Snapshot = std::shared_ptr<const Scene>;
-  /// Makes the state of a snapshot. `former` is the last state given up by `take`, or null; the function may move it
+  /// Makes the state of a snapshot. `former` is the last state that `take` replaced, or null; the function may move it
   /// away to bring it up to date. Otherwise the worker destroys it, after the new state can be taken.
   using Make = std::function<std::unique_ptr<State>(Snapshot scene, std::unique_ptr<State>& former)>;
-  /// When the worker begins an update while the last result has not been taken.
-  enum class Begin : std::uint8_t {
-    AtOnce,     ///< the newer result replaces the one that was not taken
-    AfterTake,  ///< after `take`, so that there are never more than two states
-  };
-
   /// Errors: std::system_error if the background thread cannot be started.
-  LatestState(State first, Begin begin, Make make) : make_(std::move(make)), begins_(begin), shown_(std::move(first)) {
+  LatestState(State first, Make make) : make_(std::move(make)), shown_(std::move(first)) {
     worker_.start(1, [this](Workers::Lock& lock, unsigned /*worker*/) { return step(lock); });
   }
 
@@ -68,9 +62,9 @@ class LatestState {
     {
       const std::lock_guard lock(mutex_);
       if (ready_ == nullptr) return false;
-      QUOIN_ASSERT(given_up_ == nullptr, "the update that made a result took the state given up before");
+      QUOIN_ASSERT(former_ == nullptr, "the update that made a result took the former state");
       std::swap(*ready_, shown_);
-      given_up_ = std::move(ready_);
+      former_ = std::move(ready_);
       if (asked_ == nullptr) return true;
     }
     worker_.wake_one();
@@ -96,11 +90,10 @@ class LatestState {
 
  private:
   [[nodiscard]] Workers::Clock::time_point step(Workers::Lock& lock) {
-    const bool waits_for_take = begins_ == Begin::AfterTake && ready_ != nullptr;
-    if (asked_ == nullptr || waits_for_take) return Workers::kWhenWoken;
+    if (asked_ == nullptr || ready_ != nullptr) return Workers::kWhenWoken;
     QUOIN_ASSERT(is_busy_, "a request in progress");
     Snapshot scene = std::exchange(asked_, nullptr);
-    std::unique_ptr<State> former = std::move(given_up_);
+    std::unique_ptr<State> former = std::move(former_);
     lock.unlock();
     std::unique_ptr<State> done;
     std::exception_ptr failure;
@@ -110,17 +103,14 @@ class LatestState {
       failure = std::current_exception();
     }
     lock.lock();
-    if (done != nullptr) std::swap(ready_, done);  // `done` receives a result that was not taken
-    std::unique_ptr<State> also_former = std::move(given_up_);
+    ready_ = std::move(done);
     if (failure != nullptr) is_behind_ = true;
     worker_.keep_failure(std::move(failure));
     is_busy_ = false;
     worker_.notify();
     lock.unlock();
-    // Frees the former states here, so that the thread that takes the new one does not have to.
-    done.reset();
+    // Frees the former state here, so that the thread that takes the new one does not have to.
     former.reset();
-    also_former.reset();
     lock.lock();
     return Workers::kAgain;
   }
@@ -132,16 +122,15 @@ class LatestState {
   }
 
   Make make_;
-  Begin begins_;
 
   State shown_;  // the owner's
 
-  mutable std::mutex mutex_;         // of all below
-  bool is_behind_ = false;           // something changed that no snapshot has, or an update failed
-  bool is_busy_ = false;             // an update is requested or in progress
-  Snapshot asked_;                   // the scene of an update that has not begun
-  std::unique_ptr<State> ready_;     // to be taken
-  std::unique_ptr<State> given_up_;  // was shown; belongs to the next update
+  mutable std::mutex mutex_;       // of all below
+  bool is_behind_ = false;         // something changed that no snapshot has, or an update failed
+  bool is_busy_ = false;           // an update is requested or in progress
+  Snapshot asked_;                 // the scene of an update that has not begun
+  std::unique_ptr<State> ready_;   // to be taken
+  std::unique_ptr<State> former_;  // was shown; belongs to the next update
   Workers worker_{mutex_};
 };
 

@@ -40,7 +40,7 @@ TracedScene nothing(InstanceFilter instances) {
 
 struct LiveTracer::Impl {
   explicit Impl(const LiveTracerOptions& options)
-      : states(nothing(options.instances), States::Begin::AfterTake,
+      : states(nothing(options.instances),
                [instances = options.instances, threads = Threads{worker_count(options.threads)}](
                    const States::Snapshot& scene, std::unique_ptr<TracedScene>& former) {
                  return traced(scene, former, instances, threads);

@@ -179,8 +179,8 @@ class Gate {
 using CountedStates = LatestState<Counted>;
 
 struct CountedWork {
-  explicit CountedWork(CountedStates::Begin begin)
-      : states(Counted(0, alive), begin, [this](CountedStates::Snapshot, std::unique_ptr<Counted>& former) {
+  CountedWork()
+      : states(Counted(0, alive), [this](CountedStates::Snapshot, std::unique_ptr<Counted>& former) {
           gate.pass();
           if (fails.exchange(false)) throw std::bad_alloc();
           most = std::max(most.load(), alive.load());
@@ -211,23 +211,8 @@ bool take_in_time(CountedStates& states) {
   return false;
 }
 
-TEST(LatestState, NewerResultReplacesOneNotTaken) {
-  CountedWork work(CountedStates::Begin::AtOnce);
-  work.gate.open(100);
-  // An update is ignored until the earlier one has ended.
-  while (work.made < 3) {
-    work.states.update(work.scene, true);
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  }
-  EXPECT_EQ(work.states.shown().number, 0);
-  ASSERT_TRUE(take_in_time(work.states));
-  EXPECT_GE(work.states.shown().number, 2) << "the first result was replaced";
-  work.states.wait();
-  EXPECT_EQ(work.states.shown().number, work.made);
-}
-
-TEST(LatestState, UpdateWaitsForTakeIfThereAreTwoStates) {
-  CountedWork work(CountedStates::Begin::AfterTake);
+TEST(LatestState, UpdateWaitsForTake) {
+  CountedWork work;
   work.gate.open(100);
   work.states.update(work.scene, true);
   work.states.wait();
@@ -248,51 +233,49 @@ TEST(LatestState, UpdateWaitsForTakeIfThereAreTwoStates) {
 }
 
 TEST(LatestState, RethrowsFailureAndRecovers) {
-  for (const auto begin : {CountedStates::Begin::AtOnce, CountedStates::Begin::AfterTake}) {
-    CountedWork work(begin);
-    work.gate.open(100);
-    work.states.update(work.scene, true);
-    work.states.wait();
-    EXPECT_EQ(work.states.shown().number, 1);
-    work.fails = true;
-    work.states.update(work.scene, true);
-    EXPECT_THROW(work.states.wait(), std::bad_alloc);
-    EXPECT_EQ(work.states.shown().number, 1);
-    EXPECT_TRUE(work.states.is_late());
-    work.states.update(work.scene, false);
-    work.states.wait();
-    EXPECT_EQ(work.states.shown().number, 2) << "the failed update is made up for";
-    EXPECT_FALSE(work.states.is_late());
+  CountedWork work;
+  work.gate.open(100);
+  work.states.update(work.scene, true);
+  work.states.wait();
+  EXPECT_EQ(work.states.shown().number, 1);
+  work.fails = true;
+  work.states.update(work.scene, true);
+  EXPECT_THROW(work.states.wait(), std::bad_alloc);
+  EXPECT_EQ(work.states.shown().number, 1);
+  EXPECT_TRUE(work.states.is_late());
+  work.states.update(work.scene, false);
+  work.states.wait();
+  EXPECT_EQ(work.states.shown().number, 2) << "the failed update is made up for";
+  EXPECT_FALSE(work.states.is_late());
 
-    work.fails = true;
-    work.states.update(work.scene, true);
-    bool has_thrown = false;
-    for (int i = 0; i < 20'000 && !has_thrown; ++i) {
-      try {
-        work.states.update(work.scene, false);
-      } catch (const std::bad_alloc&) {
-        has_thrown = true;
-      }
-      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  work.fails = true;
+  work.states.update(work.scene, true);
+  bool has_thrown = false;
+  for (int i = 0; i < 20'000 && !has_thrown; ++i) {
+    try {
+      work.states.update(work.scene, false);
+    } catch (const std::bad_alloc&) {
+      has_thrown = true;
     }
-    EXPECT_TRUE(has_thrown);
-    work.states.wait();
-
-    work.fails = true;
-    work.states.update(work.scene, true);
-    while (work.fails) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    EXPECT_TRUE(work.states.is_late()) << "before the next call reports it";
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
+  EXPECT_TRUE(has_thrown);
+  work.states.wait();
+
+  work.fails = true;
+  work.states.update(work.scene, true);
+  while (work.fails) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  EXPECT_TRUE(work.states.is_late()) << "before the next call reports it";
 }
 
 TEST(LatestState, KeepsNoOldStates) {
-  CountedWork work(CountedStates::Begin::AtOnce);
+  CountedWork work;
   work.gate.open(1'000);
   for (int i = 0; i < 20; ++i) {
     work.states.update(work.scene, true);
     work.states.wait();
-    EXPECT_LE(work.alive, 3);
+    EXPECT_LE(work.alive, 2);
   }
 }
 
