@@ -32,12 +32,14 @@ struct LiveLightOptions {
 /// Follow:   PropagatedLight::changes_since, on `shown().of(grid).light`, reports where light changed between two
 ///           states.
 /// Lifetime: the scene is read only during calls.
-/// Threads:  calls must not overlap. Any number of threads can read the shown light until the next `take`.
+/// Threads:  calls must not overlap. Any number of threads can read the shown light until the next `take`, also of a
+///           LiveMeshes that uses this light.
 class LiveLight {
  public:
   /// Errors: std::system_error if the background thread cannot be started.
   explicit LiveLight(LiveLightOptions options = {});
-  /// Waits for the update in progress.
+  /// Waits for the update in progress; cancels a later one. If LiveMeshes uses the light, its worker continues until
+  /// LiveMeshes no longer does.
   ~LiveLight();
   LiveLight(const LiveLight&) = delete;
   LiveLight& operator=(const LiveLight&) = delete;
@@ -53,7 +55,7 @@ class LiveLight {
   /// true if LiveMeshes::take has shown new light since the last call. Cost: O(1).
   bool take();
   /// Returns the light as of the last `take`, also of LiveMeshes; open sky before the first. The reference stays valid.
-  /// Lifetime: a GridLight from it is valid until the next `take`.
+  /// Lifetime: a GridLight from it is valid until the next `take`, also of LiveMeshes.
   [[nodiscard]] const SceneLight& shown() const;
 
   /// Returns true if, as of the last update, the scene has changes whose light is not shown yet.

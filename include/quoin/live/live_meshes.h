@@ -72,7 +72,9 @@ struct LiveMeshOptions {
 ///            edits.
 /// Loaded:    the chunks of the first update, loaded chunks (Grid::load_chunk) and new grids that are partial or have
 ///            more than 256 chunks are returned one by one, nearest first. So are all chunks of a step that edits more
-///            than 256 chunks. Edits come before loaded chunks.
+///            than 256 chunks. Edits come before loaded chunks. With a LiveLight, an edit is lit together with all
+///            chunks loaded before, and its surfaces are made when their light is complete. Light that loaded chunks
+///            change on surfaces that were shown counts as an edit.
 /// Instances: the caller draws the instances of the scene. `update` numbers the states of the scene. `shown_update`
 ///            returns the newest state with all of its edits taken. To show instances in step with surfaces, draw an
 ///            instance that was added in state n as soon as `shown_update` is at least n, and an instance that was
@@ -84,12 +86,13 @@ struct LiveMeshOptions {
 /// Lifetime:  the scene is read only during calls; callers share ownership of the surfaces they take. After the last
 ///            owner has dropped a surface, a worker destroys it with its converted data. The owner's thread does so
 ///            itself once the LiveMeshes is gone, or if more than 64 MiB wait because all workers are in long steps.
-/// Threads:   `update` and `finish` must not overlap; any thread can call the other members.
+/// Threads:   `update` and `finish` must not overlap; any thread can call the other members. With a LiveLight, no other
+///            thread may read LiveLight::shown during `take`, which changes it.
 class LiveMeshes {
  public:
   /// Requires: `region_edge` is 16, 32 or 64. Errors: std::system_error if the workers cannot be started.
   explicit LiveMeshes(const LiveMeshOptions& options = {});
-  /// Waits for the chunks being meshed; cancels the rest.
+  /// Waits for the chunks being meshed, and with a LiveLight also for the light being computed. Cancels the rest.
   ~LiveMeshes();
   LiveMeshes(const LiveMeshes&) = delete;
   LiveMeshes& operator=(const LiveMeshes&) = delete;
@@ -111,6 +114,7 @@ class LiveMeshes {
   /// meshed again when only their light changed. Each surface shows the voxels and the light of one moment: `update`
   /// starts the computation of light, and workers mesh as soon as it is complete, without another call. `take` makes
   /// the light of the surfaces that it returns the light shown (LiveLight::shown).
+  /// Waits for light being computed, also of the light used before.
   /// Requires: no other LiveMeshes uses the light. Must not overlap with `update` and `finish`. Either object may be
   /// destroyed first.
   void use_light(LiveLight& light);
@@ -139,7 +143,7 @@ class LiveMeshes {
   struct Stats {
     std::int64_t chunks_meshed = 0;     ///< in total
     double last_mesh_seconds = 0.0;     ///< of one chunk, on its worker
-    double last_latency_seconds = 0.0;  ///< from the `update` after an edit to the finished surface
+    double last_latency_seconds = 0.0;  ///< from the `update` after an edit to the finished, lit surface
     /// Number of times a worker ran out of memory. The chunk stays pending and is tried again.
     std::int64_t out_of_memory = 0;
   };

@@ -27,7 +27,7 @@ class Workers;
 ///
 /// A worker destroys waiting objects before its next step; a sleeping worker is woken for it. The thread that drops the
 /// last copy destroys the object itself if the workers have ended, or if too much waits already, for example because
-/// all workers are in long steps. Waiting memory is therefore bounded.
+/// all workers are in long steps: more than kMaxObjects objects, or kMaxBytes of those whose size was given.
 /// Threads: any. Copies of deferred pointers may be dropped while any lock is held, and after the workers have ended.
 class ReleaseQueue : public std::enable_shared_from_this<ReleaseQueue> {
  public:

@@ -245,7 +245,7 @@ class SurfaceSource {
                                                                  SurfaceTotals& totals);
 
 /// The surfaces of the chunks of one grid's voxels or field, made on request instead of by workers. Equal to those of
-/// LiveMeshes; after an edit, only the affected ones are made.
+/// LiveMeshes with a `region_edge` of 64; after an edit, only the affected ones are made.
 class GridSurfaces {
  public:
   GridSurfaces(GridHandle handle, SurfaceContent content, SurfaceStyle style);
