@@ -3,8 +3,10 @@
 #include <quoin/live/live_light.h>
 
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <map>
+#include <memory>
 #include <random>
 #include <thread>
 #include <utility>
@@ -12,6 +14,7 @@
 
 #include <gtest/gtest.h>
 
+#include "live/light_worker.h"
 #include "live/placed_light_world_for_tests.h"
 #include "render/light/surface/light_world_for_tests.h"
 
@@ -241,6 +244,34 @@ TEST(LiveLight, IgnoresVoxelDataAndNames) {
   world.scene.remove_grid(world.handle);
   light.update(world.scene);
   EXPECT_TRUE(light.is_late());
+}
+
+TEST(LightWorker, DetachCancelsRequestThatHasNotBegun) {
+  Scene scene;
+  LightWorker worker({{}, {1}});
+  std::atomic<int> calls = 0;
+  std::atomic<bool> is_blocked = true;
+  worker.attach([&](const std::shared_ptr<LitState>&) {
+    worker.note_received();
+    ++calls;
+    while (is_blocked) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  });
+  worker.update_for_receiver(scene, 1, true);
+  while (calls == 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  worker.update_for_receiver(scene, 2, true);
+  EXPECT_TRUE(worker.is_state_pending()) << "requested while the receiver is called";
+  std::thread opener([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    is_blocked = false;
+  });
+  worker.detach();
+  opener.join();
+  EXPECT_EQ(calls, 1);
+  EXPECT_TRUE(worker.is_late());
+  worker.update(scene);
+  worker.wait();
+  EXPECT_TRUE(worker.take()) << "its owner gets the cancelled light";
+  EXPECT_FALSE(worker.is_late());
 }
 
 }  // namespace
