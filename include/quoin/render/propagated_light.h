@@ -66,7 +66,8 @@ struct PropagatedLightOptions {
 /// Exact:   the result equals a search from every lamp and every sky column (Dijkstra), independent of the order of
 ///          edits.
 /// Cost:    an update costs O(rows of 64 voxels within reach of the edits, and of sky columns that the edits open or
-///          close), times the levels. The first update takes some tenths of a millisecond per chunk.
+///          close), times the levels. The first update takes some tenths of a millisecond per chunk. A chunk that a
+///          partial grid loads or unloads costs as an edit of its voxels; a chunk of air costs nothing.
 /// Memory:  one bit per voxel, channel and bit of the level where a slab of 64x4x4 voxels is not uniform; less where
 ///          rows are equal.
 /// Threads: any number can read and take snapshots at once; an update needs exclusive access. A snapshot is
@@ -99,6 +100,10 @@ class PropagatedLight {
   /// Splits quads of a chunk where the light in front of their faces changes. `light` gets one packed level per quad of
   /// `out`, in the order of the source quads. Replaces `out` and `light`.
   void split(const QuadBuffer& quads, IVec3 chunk, QuadBuffer& out, std::vector<std::uint16_t>& light) const;
+
+  /// Returns the number of rows of up to 64 voxels that all updates so far have visited to compute light: a measure of
+  /// their cost that does not depend on the machine. Depends on the thread count.
+  [[nodiscard]] std::uint64_t visited_rows() const;
 
   /// Returns the bytes held, including bytes shared with snapshots.
   [[nodiscard]] std::size_t bytes() const;

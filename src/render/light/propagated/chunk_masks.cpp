@@ -13,14 +13,6 @@ namespace {
 
 constexpr std::uint64_t kAll = ~std::uint64_t{0};
 
-TypeLight light_of(const std::vector<TypeLight>& types, VoxelType type) {
-  return type < types.size() ? types[type] : TypeLight{0, 0};
-}
-
-bool passes(const std::vector<TypeLight>& types, VoxelType type, std::size_t channel) {
-  return type == kAir || (light_of(types, type).passes >> channel & 1U) != 0;
-}
-
 }  // namespace
 
 LightLevels lamp_levels(const VoxelProperties& properties) {
@@ -114,6 +106,51 @@ void ChunkMasks::read(const Chunk* voxels, const std::vector<TypeLight>& types, 
     if (other == channel) read_rows(*voxels, types, channel, box);
   }
   read_lamps(*voxels, types, box, lamp_slabs);
+}
+
+namespace {
+
+// Lets columns fall through 4x4 rows, from `begin` to `end` within the slab. Returns the lowest row that any reaches.
+int fall_in_slab(const trace::SlabRows& stops, int begin, int end, std::uint64_t* open) {
+  int low = end;
+  for (int y = end; y-- > begin;) {
+    std::uint64_t any = 0;
+    for (std::size_t z = 0; z < 4; ++z) {
+      open[z] &= ~stops[static_cast<std::size_t>(y) + 4 * z];
+      any |= open[z];
+    }
+    if (any == 0) break;
+    low = y;
+  }
+  return low;
+}
+
+}  // namespace
+
+int fall(const Chunk* voxels, const std::vector<TypeLight>& types, int begin, int end, ColumnSet& open) {
+  QUOIN_ASSERT(begin >= 0 && begin < end && end <= kChunkEdge, "rows of a chunk");
+  if (!is_any(open)) return end;
+  const auto is_stop = [&](VoxelType type) { return !passes(types, type, kSky); };
+  const FunctionRef<bool(VoxelType)> asked(is_stop);
+  if (voxels == nullptr) return begin;
+  const trace::ChunkRows stops(*voxels, asked);
+  if (stops.none()) return begin;
+  int low = end;
+  trace::SlabRows rows;
+  for (int y = (end - 1) & ~3; y > begin - 4; y -= 4) {
+    bool goes_on = false;
+    for (int z = 0; z < kChunkEdge; z += 4) {
+      std::uint64_t* columns = open.data() + z;
+      if ((columns[0] | columns[1] | columns[2] | columns[3]) == 0) continue;
+      const trace::Slab kind = stops.read(y, z, rows);
+      if (kind != trace::Slab::Mixed) rows.fill(kind == trace::Slab::Full ? kAll : 0);
+      const int last = std::max(begin - y, 0);
+      low = std::min(low, y + fall_in_slab(rows, last, std::min(end - y, 4), columns));
+      goes_on |= (columns[0] | columns[1] | columns[2] | columns[3]) != 0;
+    }
+    if (!goes_on) break;
+  }
+  return low;
 }
 
 }  // namespace quoin::propagated

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -27,6 +28,28 @@ struct TypeLight {
 
   bool operator==(const TypeLight&) const = default;
 };
+
+/// Returns the light properties of a type. Unregistered types are opaque and dark.
+[[nodiscard]] inline TypeLight light_of(const std::vector<TypeLight>& types, VoxelType type) {
+  return type < types.size() ? types[type] : TypeLight{0, 0};
+}
+
+/// Returns true if light of a channel passes voxels of a type.
+[[nodiscard]] inline bool passes(const std::vector<TypeLight>& types, VoxelType type, std::size_t channel) {
+  return type == kAir || (light_of(types, type).passes >> channel & 1U) != 0;
+}
+
+/// Columns of voxels in a column of chunks: [z % 64], bit x % 64.
+using ColumnSet = std::array<std::uint64_t, kChunkEdge>;
+
+[[nodiscard]] inline bool is_any(const ColumnSet& columns) {
+  return std::any_of(columns.begin(), columns.end(), [](std::uint64_t row) { return row != 0; });
+}
+
+/// Lets sky columns fall from row `end` to row `begin` of a chunk. Removes the columns that stop. Returns the lowest row
+/// reached, or `end` if there is none. `voxels`: null if all is air.
+/// Cost: O(rows of 64 voxels until all columns stop); O(types) if none stops sky light.
+int fall(const Chunk* voxels, const std::vector<TypeLight>& types, int begin, int end, ColumnSet& open);
 
 /// Masks of a box of a chunk: the voxels that light passes and the lamps. Reused between calls: buffers only grow.
 class ChunkMasks {

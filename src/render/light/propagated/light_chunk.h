@@ -110,7 +110,8 @@ class LightSlab {
 };
 
 inline constexpr std::size_t kChannels = 4;  // sky, red, green, blue
-inline constexpr std::size_t kSlabs = 256;   // of a chunk
+inline constexpr std::size_t kSky = 0;
+inline constexpr std::size_t kSlabs = 256;  // of a chunk
 
 [[nodiscard]] inline std::size_t slab_index(int y, int z) {
   QUOIN_ASSERT((y | z) >= 0 && (y | z) < kChunkEdge, "0 <= y, z < 64");

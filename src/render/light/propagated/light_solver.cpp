@@ -1,7 +1,10 @@
 #include "render/light/propagated/light_solver.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <cstdint>
+#include <utility>
 
 #include <quoin/core/assert.h>
 
@@ -565,6 +568,122 @@ void LightSolver::solve(const LightRegion& region, std::vector<ChunkLightChange>
     solve(box, alike, changes);
     done |= alike;
   }
+}
+
+namespace {
+
+// Longer regions do not fit into the processor's cache.
+constexpr int kMostAlongX = 4;
+
+// Voxels that a region visits, and some more for its fixed cost.
+std::int64_t cost_of(const IBox& visited) {
+  constexpr std::int64_t kRegion = 32'768;
+  const IVec3 size = visited.size();
+  return kRegion + std::int64_t{size.x} * size.y * size.z;
+}
+
+// Calls `visit(chunk, box)` for the boxes in a box of chunks.
+template <class Boxes, class Visit>
+void visit_within(Boxes& boxes, const IBox& chunks, Visit&& visit) {
+  for (int y = chunks.max.y; y-- > chunks.min.y;) {
+    for (int z = chunks.min.z; z < chunks.max.z; ++z) {
+      auto box = boxes.lower_bound({chunks.min.x, y, z});
+      for (; box != boxes.end() && box->first.y == y && box->first.z == z && box->first.x < chunks.max.x; ++box) {
+        visit(box->first, box->second);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+void LightQueue::add(const IBox& voxels, const LightDomain& domain) {
+  QUOIN_ASSERT(!voxels.empty(), "a box of voxels");
+  const IVec3 first = chunk_of(voxels.min);
+  const IVec3 last = chunk_of(voxels.max - 1);
+  for (int z = first.z; z <= last.z; ++z) {
+    for (int x = first.x; x <= last.x; ++x) {
+      const LightDomain::Range range = domain.range(x, z);
+      for (int y = std::max(first.y, range.begin); y <= std::min(last.y, range.end - 1); ++y) {
+        const IVec3 low = IVec3(x, y, z) * kChunkEdge;
+        IBox& known = boxes_[{x, y, z}].voxels;
+        known = unite(known, intersect(voxels, {low, low + kChunkEdge}));
+      }
+    }
+  }
+}
+
+IBox LightQueue::unknown(IVec3 chunk) const {
+  const auto found = boxes_.find(chunk);
+  if (found == boxes_.end()) return {};
+  const IVec3 low = chunk * kChunkEdge;
+  return {found->second.voxels.min - low, found->second.voxels.max - low};
+}
+
+// Returns the voxels to visit for a wanted box: with all unknown light below the chunk layer `top` that reaches it. Light
+// falls from any height.
+IBox LightQueue::visited(const IBox& wanted, int top) const {
+  const IBox near{wanted.min - kReach, {wanted.max.x + kReach, top * kChunkEdge, wanted.max.z + kReach}};
+  IBox all = wanted;
+  visit_within(boxes_, {chunk_of(near.min), chunk_of(near.max - 1) + 1},
+               [&](IVec3, const Box& box) { all = unite(all, intersect(box.voxels, near)); });
+  return all;
+}
+
+// Adds the boxes of the next layer of chunks on one side, if that saves work.
+bool LightQueue::grow(Tile& tile, int axis, bool is_up) const {
+  IBox layer = tile.chunks;
+  layer.min[axis] = is_up ? tile.chunks.max[axis] : tile.chunks.min[axis] - 1;
+  layer.max[axis] = layer.min[axis] + 1;
+  Tile larger{unite(tile.chunks, layer), tile.wanted, {}};
+  if (larger.chunks.size().x > kMostAlongX) return false;
+  std::int64_t apart = cost_of(tile.visited);
+  bool is_free = true;
+  visit_within(boxes_, layer, [&](IVec3 chunk, const Box& box) {
+    is_free &= !box.is_taken;
+    larger.wanted = unite(larger.wanted, box.voxels);
+    apart += cost_of(visited(box.voxels, chunk.y + 1));
+  });
+  if (!is_free || larger.wanted == tile.wanted) return false;
+  larger.visited = visited(larger.wanted, boxes_.begin()->first.y + 1);
+  if (!LightSolver::fits(larger.visited.size()) || cost_of(larger.visited) > apart) return false;
+  tile = larger;
+  return true;
+}
+
+LightQueue::Tile LightQueue::tile_at(Boxes::const_iterator first) const {
+  const IBox& voxels = first->second.voxels;
+  Tile tile{{first->first, first->first + 1}, voxels, visited(voxels, first->first.y + 1)};
+  constexpr std::array<std::pair<int, bool>, 5> kSides{{{0, true}, {0, false}, {2, true}, {2, false}, {1, false}}};
+  for (bool goes_on = true; goes_on;) {
+    goes_on = false;
+    for (const auto& [axis, is_up] : kSides) goes_on |= grow(tile, axis, is_up);
+  }
+  return tile;
+}
+
+std::vector<LightRegion> LightQueue::next(std::size_t most) {
+  QUOIN_ASSERT(!boxes_.empty() && taken_.empty(), "boxes to be solved");
+  const int highest = boxes_.begin()->first.y;
+  std::vector<LightRegion> regions;
+  for (auto first = boxes_.begin(); first != boxes_.end() && first->first.y == highest; ++first) {
+    if (regions.size() == most) break;
+    if (first->second.is_taken) continue;
+    const Tile tile = tile_at(first);
+    visit_within(boxes_, tile.chunks, [&](IVec3 chunk, Box& box) {
+      box.is_taken = true;
+      taken_.push_back(chunk);
+    });
+    LightRegion& region = regions.emplace_back();
+    region.all = {tile.visited, tile.wanted};
+    region.channels.fill(region.all);
+  }
+  return regions;
+}
+
+void LightQueue::remove_solved() {
+  for (const IVec3 chunk : taken_) boxes_.erase(chunk);
+  taken_.clear();
 }
 
 }  // namespace quoin::propagated

@@ -77,9 +77,10 @@ class LightDomain {
     const bool is_below = found.begin != found.end && chunk.y < found.begin;
     return is_below ? 0 : 15;
   }
-  void clear() {
-    columns_.clear();
-    ranges_.clear();
+  /// Calls `visit(x, z, range)` for each column with chunks, in no particular order.
+  template <class Visit>
+  void for_each_range(Visit&& visit) const {
+    for (const auto& [column, range] : ranges_) visit(column.x, column.z, range);
   }
 
  private:
@@ -148,6 +149,15 @@ class LightStore {
     journal_.begin_change();
     note_all(chunk);
     entries_.erase(chunk, [](auto&) {});
+  }
+  /// Stores open sky for a chunk that enters the domain from open sky: no light changes.
+  void open(IVec3 chunk) {
+    journal_.begin_change();
+    Entry& entry = entries_.find_or_create(chunk, [](auto&) {});
+    ChannelChange all;
+    all.is_uniform = true;
+    all.level = 15;
+    entry.light.channels[kSky].take(std::move(all));
   }
   void clear() {
     journal_.begin_change();

@@ -1,7 +1,7 @@
 // An edit changes light at most (level - 1) voxels around it and around the sky columns that it opens or blocks. This
 // box is solved from scratch, with the light around it as boundary. Boxes that touch are merged. If the merged box is
-// too large, whole chunks are solved in layers from the top down. Each region includes the surroundings within
-// the range of light, so that no chunk is solved twice.
+// too large, or mostly not in the boxes, its parts are queued by chunks and solved from the top down (LightQueue).
+// A chunk that arrives or leaves is an edit like any other; air in place of air is none.
 #include <quoin/render/propagated_light.h>
 
 #include <algorithm>
@@ -28,28 +28,36 @@
 namespace quoin {
 namespace {
 
+using propagated::ChannelLight;
 using propagated::ChunkAround;
 using propagated::ChunkLightChange;
 using propagated::ChunkMasks;
+using propagated::ColumnSet;
+using propagated::fall;
+using propagated::is_any;
 using propagated::kChannels;
 using propagated::kReach;
 using propagated::kSky;
-using propagated::lamp_levels;
+using propagated::LightChunk;
 using propagated::LightDomain;
+using propagated::LightQueue;
 using propagated::LightReader;
 using propagated::LightRegion;
+using propagated::LightSlab;
 using propagated::LightSolver;
 using propagated::LightStore;
 using propagated::TypeLight;
 
+constexpr std::uint64_t kAll = ~std::uint64_t{0};
 constexpr unsigned kBrightest = 15;
+constexpr unsigned kAllChannels = (1U << kChannels) - 1;
 
 std::vector<TypeLight> type_lights(const VoxelRegistry& types, const PropagatedLightOptions& options) {
   std::vector<TypeLight> lights(types.size());
   for (std::size_t i = 1; i < lights.size(); ++i) {
     const auto type = static_cast<VoxelType>(i);
     const VoxelProperties& properties = types[type];
-    LightLevels lamp = options.lamp ? options.lamp(type, properties) : lamp_levels(properties);
+    LightLevels lamp = options.lamp ? options.lamp(type, properties) : propagated::lamp_levels(properties);
     lamp.sky = 0;
     for (std::uint8_t* level : {&lamp.red, &lamp.green, &lamp.blue}) {
       *level = static_cast<std::uint8_t>(std::min<unsigned>(*level, kBrightest));
@@ -67,12 +75,12 @@ std::vector<TypeLight> type_lights(const VoxelRegistry& types, const PropagatedL
   return lights;
 }
 
-// Bit c is set if any type emits light in channel c.
-unsigned lamp_channels(const std::vector<TypeLight>& lights) {
+// Returns bit c for each channel in which a chunk has lamps.
+unsigned lamp_channels(const Chunk& chunk, const std::vector<TypeLight>& lights) {
   unsigned channels = 0;
-  for (const TypeLight& light : lights) {
-    for (std::size_t c = 0; c < kChannels; ++c)
-      channels |= static_cast<unsigned>((light.lamp >> (4 * c) & 15U) != 0) << c;
+  for (const VoxelType type : chunk.types()) {
+    const unsigned lamp = propagated::light_of(lights, type).lamp;
+    for (std::size_t c = 0; c < kChannels; ++c) channels |= static_cast<unsigned>((lamp >> (4 * c) & 15U) != 0) << c;
   }
   return channels;
 }
@@ -88,9 +96,294 @@ IBox around_all(const std::array<IBox, kChannels>& boxes) {
   return all;
 }
 
-IBox grown(const IBox& box, int by) {
-  QUOIN_ASSERT(by >= 0, "a distance that is not negative");
-  return {box.min - by, box.max + by};
+std::int64_t volume(const IBox& box) {
+  const IVec3 size = box.size();
+  return std::int64_t{size.x} * size.y * size.z;
+}
+
+// Returns the number of rows of up to 64 voxels in a box.
+std::uint64_t rows_of(const IBox& box) {
+  const IVec3 size = box.size();
+  return static_cast<std::uint64_t>(std::int64_t{(size.x + kChunkEdge - 1) / kChunkEdge} * size.y * size.z);
+}
+
+// The masks of a chunk, as far as they were read.
+struct CachedMasks {
+  ChunkMasks masks;
+  IBox read;  // box of the chunk
+};
+
+// A box per channel, in grid coordinates. Outside of it, an edit changes no light of the channel.
+using LightBoxes = std::array<IBox, kChannels>;
+
+// The light that edits change, and the types' light.
+struct LightState {
+  const LightStore& store;
+  const LightDomain& domain;
+  const std::vector<TypeLight>& types;
+};
+
+// Voxels of one chunk that changed, or a chunk that enters or leaves the domain.
+struct LightEdit {
+  IBox voxels;                                // in grid coordinates
+  std::array<unsigned, kChannels> highest{};  // at least the levels before in and next to the box, and new lamps
+  unsigned raised = kAllChannels;             // bit c: levels of channel c may rise
+  unsigned lowered = kAllChannels;            // bit c: levels of channel c may fall
+  ColumnSet above{};                          // the columns of the box that were open to the sky just above it
+  ColumnSet below{};                          // ... and just below it
+};
+
+// The light of a chunk: one packed word for all voxels, or slabs.
+struct ChunkLevels {
+  bool is_held;
+  std::uint16_t even;       // if `light` is null
+  const LightChunk* light;  // null: `even` everywhere
+};
+
+ChunkLevels levels_of(const LightState& state, IVec3 chunk) {
+  if (!state.domain.holds(chunk)) return {false, state.domain.beyond(chunk), nullptr};
+  return {true, 0, state.store.find(chunk)};
+}
+
+// Calls `visit(chunk, part)` for each chunk of a box; `part` is in chunk coordinates.
+template <class Visit>
+void for_each_chunk(const IBox& voxels, Visit&& visit) {
+  const IVec3 first = chunk_of(voxels.min);
+  const IVec3 last = chunk_of(voxels.max - 1);
+  for (int z = first.z; z <= last.z; ++z) {
+    for (int y = first.y; y <= last.y; ++y) {
+      for (int x = first.x; x <= last.x; ++x) {
+        const IVec3 chunk{x, y, z};
+        const IVec3 low = chunk * kChunkEdge;
+        visit(chunk, intersect({voxels.min - low, voxels.max - low}, kWholeChunk));
+      }
+    }
+  }
+}
+
+// Calls `visit(y, z, slab)` for each slab of a part of a chunk until it returns false.
+template <class Visit>
+void for_each_slab(const ChannelLight& light, const IBox& part, Visit&& visit) {
+  for (int z = part.min.z & ~3; z < part.max.z; z += 4) {
+    for (int y = part.min.y & ~3; y < part.max.y; y += 4) {
+      if (!visit(y, z, light.stored(propagated::slab_index(y, z)))) return;
+    }
+  }
+}
+
+// Returns at least the highest level in a part of a chunk.
+unsigned highest_level(const ChannelLight& light, const IBox& part) {
+  if (light.is_uniform()) return light.level();
+  unsigned highest = 0;
+  for_each_slab(light, part, [&](int, int, const LightSlab& slab) {
+    highest = std::max(highest, slab.is_uniform() ? slab.level() : kBrightest);
+    return highest < kBrightest;
+  });
+  return highest;
+}
+
+void add_levels(unsigned word, std::array<unsigned, kChannels>& highest) {
+  for (std::size_t c = 0; c < kChannels; ++c) highest[c] = std::max(highest[c], word >> (4 * c) & 15U);
+}
+
+// Reads single voxels.
+std::array<unsigned, kChannels> exact_highest(const LightState& state, const Grid& grid, const IBox& voxels) {
+  std::array<unsigned, kChannels> highest{};
+  LightReader words(state.store, state.domain);
+  for (int z = voxels.min.z - 1; z <= voxels.max.z; ++z) {
+    for (int y = voxels.min.y - 1; y <= voxels.max.y; ++y) {
+      for (int x = voxels.min.x - 1; x <= voxels.max.x; ++x) {
+        add_levels(words.at({x, y, z}), highest);
+        if (!voxels.contains({x, y, z})) continue;
+        const VoxelType type = grid.get(x, y, z);
+        if (type < state.types.size()) add_levels(state.types[type].lamp, highest);
+      }
+    }
+  }
+  return highest;
+}
+
+// Returns upper bounds of the levels in and next to a box of one chunk, with the lamps that it has now.
+std::array<unsigned, kChannels> highest_levels(const LightState& state, const Grid& grid, const IBox& voxels) {
+  constexpr int kMany = 512;
+  const IVec3 size = voxels.size();
+  if (size.x * size.y * size.z <= kMany) return exact_highest(state, grid, voxels);
+  std::array<unsigned, kChannels> highest{};
+  for_each_chunk({voxels.min - 1, voxels.max + 1}, [&](IVec3 chunk, const IBox& part) {
+    const ChunkLevels levels = levels_of(state, chunk);
+    add_levels(levels.even, highest);
+    for (std::size_t c = 0; levels.light != nullptr && c < kChannels; ++c) {
+      highest[c] = std::max(highest[c], highest_level(levels.light->channels[c], part));
+    }
+  });
+  if (const Chunk* chunk = grid.find_chunk(chunk_of(voxels.min)); chunk != nullptr) {
+    for (const VoxelType type : chunk->types()) {
+      if (type < state.types.size()) add_levels(state.types[type].lamp, highest);
+    }
+  }
+  return highest;
+}
+
+std::uint64_t bits_of(const IBox& voxels) {
+  const int first = voxels.min.x & (kChunkEdge - 1);
+  return kAll >> (kChunkEdge - (voxels.max.x - voxels.min.x)) << first;
+}
+
+// Returns the columns of a box that are open to the sky at height y.
+ColumnSet open_columns(const LightState& state, const IBox& voxels, int y) {
+  ColumnSet open{};
+  const IVec3 first{voxels.min.x, y, voxels.min.z};
+  const ChunkLevels levels = levels_of(state, chunk_of(first));
+  const bool is_even = levels.light == nullptr || levels.light->channels[kSky].is_uniform();
+  const unsigned level = levels.light == nullptr ? levels.even & 15U
+                         : is_even               ? levels.light->channels[kSky].level()
+                                                 : 0;
+  if (is_even && level != kBrightest) return open;
+  for (int z = voxels.min.z; z < voxels.max.z; ++z) {
+    const IVec3 local = local_of({voxels.min.x, y, z});
+    std::uint64_t row = bits_of(voxels);
+    if (!is_even) {
+      for (const std::uint64_t plane : levels.light->channels[kSky].row(local.y, local.z)) row &= plane;
+    }
+    open[static_cast<std::size_t>(local.z)] = row;
+  }
+  return open;
+}
+
+// Returns a box of a chunk around columns, from row `begin` to row `end`.
+IBox box_of(const ColumnSet& columns, int begin, int end) {
+  std::uint64_t x = 0;
+  std::uint64_t z = 0;
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    x |= columns[i];
+    z |= std::uint64_t{columns[i] != 0} << i;
+  }
+  QUOIN_ASSERT(x != 0, "some columns");
+  return {{std::countr_zero(x), begin, std::countr_zero(z)}, {64 - std::countl_zero(x), end, 64 - std::countl_zero(z)}};
+}
+
+// Calls `visit(voxels)` for a box in each chunk below an edit through which sky columns fall, or fell, that the edit
+// opens or closes.
+template <class Visit>
+void follow_columns(const LightState& state, const Grid& grid, const LightEdit& edit, Visit&& visit) {
+  IVec3 chunk = chunk_of(edit.voxels.min);
+  int top = local_of(edit.voxels.min).y;
+  ColumnSet columns = edit.above;
+  fall(grid.find_chunk(chunk), state.types, top, top + edit.voxels.size().y, columns);
+  for (std::size_t z = 0; z < columns.size(); ++z) columns[z] ^= edit.below[z];
+  const LightDomain::Range range = state.domain.range(chunk.x, chunk.z);
+  while (range.begin != range.end && is_any(columns)) {
+    if (top == 0) {
+      --chunk.y;
+      top = kChunkEdge;
+    }
+    if (chunk.y < range.begin) return;
+    IBox reached = box_of(columns, 0, top);
+    reached.min.y = fall(grid.find_chunk(chunk), state.types, 0, top, columns);
+    const IVec3 low = chunk * kChunkEdge;
+    if (!reached.empty()) visit(IBox{reached.min + low, reached.max + low});
+    top = 0;
+  }
+}
+
+// Returns a box around the slabs of a part of a chunk that may change.
+IBox changeable(const ChannelLight& light, const IBox& part, bool is_raised, bool is_lowered) {
+  const auto may_change = [&](unsigned level) {
+    return (is_raised && level < kBrightest) || (is_lowered && level > 0);
+  };
+  if (light.is_uniform()) return may_change(light.level()) ? part : IBox{};
+  if (is_raised && is_lowered) return part;
+  IBox found;
+  for_each_slab(light, part, [&](int y, int z, const LightSlab& slab) {
+    if (!slab.is_uniform() || may_change(slab.level()))
+      found = unite(found, {{part.min.x, y, z}, {part.max.x, y + 4, z + 4}});
+    return true;
+  });
+  return intersect(found, part);
+}
+
+// Returns the boxes in which the light of a box and around it may change; an empty box: that channel stays as it is.
+LightBoxes reach_of(const LightState& state, const LightEdit& edit, const LightBoxes& around) {
+  static const ChannelLight dark;
+  IBox all;
+  for (const IBox& box : around) all = unite(all, box);
+  LightBoxes reach;
+  if (all.empty()) return reach;
+  for_each_chunk(all, [&](IVec3 chunk, const IBox& part) {
+    const ChunkLevels levels = levels_of(state, chunk);
+    if (!levels.is_held) return;
+    const IVec3 low = chunk * kChunkEdge;
+    for (std::size_t c = 0; c < kChannels; ++c) {
+      const IBox wanted = intersect({around[c].min - low, around[c].max - low}, part);
+      if (around[c].empty() || wanted.empty()) continue;
+      const ChannelLight& light = levels.light == nullptr ? dark : levels.light->channels[c];
+      const IBox found = changeable(light, wanted, (edit.raised >> c & 1U) != 0, (edit.lowered >> c & 1U) != 0);
+      if (!found.empty()) reach[c] = unite(reach[c], {found.min + low, found.max + low});
+    }
+  });
+  return reach;
+}
+
+void add_if_any(const LightBoxes& boxes, std::vector<LightBoxes>& reached) {
+  const bool is_empty = std::all_of(boxes.begin(), boxes.end(), [](const IBox& box) { return box.empty(); });
+  if (!is_empty) reached.push_back(boxes);
+}
+
+// Returns the edit of a box of one chunk. Requires: `state` has the light and the domain before the edit.
+// Cost: O(slabs around the box).
+LightEdit edit_of(const LightState& state, const Grid& grid, const IBox& voxels) {
+  QUOIN_ASSERT(!voxels.empty() && chunk_of(voxels.min) == chunk_of(voxels.max - 1), "a box of one chunk");
+  LightEdit edit;
+  edit.voxels = voxels;
+  edit.highest = highest_levels(state, grid, voxels);
+  edit.above = open_columns(state, voxels, voxels.max.y);
+  edit.below = open_columns(state, voxels, voxels.min.y - 1);
+  return edit;
+}
+
+// Returns the edit of a chunk that was dark, since it was below the domain, and is in it now. Requires: `state` has
+// the domain after the edits.
+LightEdit edit_of_entering(const LightState& state, const Grid& grid, IVec3 chunk) {
+  QUOIN_ASSERT(state.domain.holds(chunk) && state.store.find(chunk) == nullptr, "a chunk that enters the domain");
+  const IVec3 low = chunk * kChunkEdge;
+  LightEdit edit = edit_of(state, grid, {low, low + kChunkEdge});
+  edit.below = {};
+  edit.lowered = 0;
+  return edit;
+}
+
+// Returns the edit of a chunk that was in the domain and is dark now, since it is below it. Requires: the store still
+// has its light.
+LightEdit edit_of_leaving(const LightState& state, IVec3 chunk) {
+  const IVec3 low = chunk * kChunkEdge;
+  LightEdit edit;
+  edit.voxels = {low, low + kChunkEdge};
+  edit.raised = 0;
+  const LightChunk* light = state.store.find(chunk);
+  for (std::size_t c = 0; light != nullptr && c < kChannels; ++c) {
+    edit.highest[c] = highest_level(light->channels[c], kWholeChunk);
+  }
+  return edit;
+}
+
+// Appends the boxes in which light may change because of an edit: around the box, and around each sky column that it
+// opens or closes. Skips slabs whose light cannot change: dark ones if light only falls, fully lit ones if it only
+// rises. Requires: `grid` and `state.domain` are those after all edits of the update, `state.store` is the light
+// before.
+// Cost: O(slabs around the boxes + rows of 64 voxels along columns that change, and a step per chunk of air).
+void add_reach(const LightState& state, const Grid& grid, const LightEdit& edit, std::vector<LightBoxes>& reached) {
+  QUOIN_ASSERT(edit.raised <= kAllChannels && edit.lowered <= kAllChannels, "a bit per channel");
+  LightBoxes around;
+  for (std::size_t c = 0; c < kChannels; ++c) {
+    const int steps = static_cast<int>(edit.highest[c]) - 1;
+    if (steps >= 0) around[c] = {edit.voxels.min - steps, edit.voxels.max + steps};
+  }
+  add_if_any(reach_of(state, edit, around), reached);
+  follow_columns(state, grid, edit, [&](const IBox& columns) {
+    LightBoxes of_sky;
+    of_sky[kSky] = {columns.min - kReach, columns.max + kReach};
+    add_if_any(reach_of(state, edit, of_sky), reached);
+  });
 }
 
 }  // namespace
@@ -103,14 +396,10 @@ struct PropagatedLight::Impl {
         followed_grid(other.followed_grid),
         followed_types(other.followed_types),
         shared_lights(other.shared_lights),
-        lamp_channels(other.lamp_channels),
         shared_domain(other.shared_domain),
-        store(other.store) {}
+        store(other.store),
+        visited_rows(other.visited_rows) {}
   Impl& operator=(const Impl&) = delete;
-
-  /// Voxels whose light may be another.
-  using Dirty = std::array<IBox, kChannels>;  // [channel]
-  using Queue = std::map<IVec3, IBox, ByZyx>;
 
   [[nodiscard]] const std::vector<TypeLight>& lights() const { return *shared_lights; }
   [[nodiscard]] const LightDomain& domain() const { return shared_domain->columns; }
@@ -118,15 +407,12 @@ struct PropagatedLight::Impl {
   void follow_types(const VoxelRegistry& types);
   void begin_anew(const Grid& grid);
   void take_over(const Grid& grid, const GridChanges& changes);
-  [[nodiscard]] Dirty reach_of(const Grid& grid, const IBox& voxels) const;
-  [[nodiscard]] std::array<unsigned, kChannels> highest_levels(const Grid& grid, const IBox& voxels) const;
-  [[nodiscard]] int end_of_sky(const Grid& grid, const IBox& voxels) const;
-  void change_domain(const Grid& grid, const std::vector<IVec3>& chunks);
-  void add_chunks(const IBox& voxels);
+  [[nodiscard]] LightState state() const { return {store, domain(), lights()}; }
+  [[nodiscard]] std::optional<LightEdit> edit_of(const Grid& grid, const ChunkChange& change) const;
+  void change_domain(const Grid& grid, const std::vector<IVec3>& chunks, std::vector<LightEdit>& edits);
   void sort_dirty();
   void solve_dirty(const Grid& grid, Threads threads);
   void solve_queue(const Grid& grid, Threads threads);
-  [[nodiscard]] std::vector<LightRegion> next_layer() const;
   void read_masks(const Grid& grid, const std::vector<LightRegion>& regions, Threads threads);
   [[nodiscard]] ChunkAround around(IVec3 chunk) const;
   void look_around(LightRegion& region) const;
@@ -136,12 +422,12 @@ struct PropagatedLight::Impl {
   ChangeCursor followed_grid;
   ChangeCursor followed_types;
   std::shared_ptr<const std::vector<TypeLight>> shared_lights = std::make_shared<const std::vector<TypeLight>>();
-  unsigned lamp_channels = 0;  // channels that any type emits
   Ref<SharedDomain> shared_domain = make_ref<SharedDomain>();
-  LightStore store;          // of the chunks of the domain
-  std::vector<Dirty> dirty;  // boxes that are to be solved by themselves
-  Queue queue;               // boxes of chunks that are to be solved, a layer at a time
-  std::unordered_map<IVec3, std::unique_ptr<ChunkMasks>, CoordinateHash> masks;  // during an update
+  LightStore store;                // of the chunks of the domain
+  std::uint64_t visited_rows = 0;  // see PropagatedLight::visited_rows
+  std::vector<LightBoxes> dirty;   // boxes that are to be solved by themselves
+  LightQueue queue;                // boxes of chunks that are to be solved, from above
+  std::unordered_map<IVec3, std::unique_ptr<CachedMasks>, CoordinateHash> masks;  // during an update
 };
 
 // Unregistered types count as opaque, so new types change light.
@@ -151,7 +437,6 @@ void PropagatedLight::Impl::follow_types(const VoxelRegistry& types) {
   std::vector<TypeLight> now = type_lights(types, options);
   if (now != lights()) {
     followed_grid = {};
-    lamp_channels = quoin::lamp_channels(now);
     shared_lights = std::make_shared<const std::vector<TypeLight>>(std::move(now));
   }
   changes.commit();
@@ -163,12 +448,33 @@ void PropagatedLight::Impl::begin_anew(const Grid& grid) {
   masks.clear();
   shared_domain = make_ref<SharedDomain>();
   store.clear();
-  change_domain(grid, grid.chunks());
+  std::vector<LightDomain::Change> changed;
+  for (const IVec3 chunk : grid.chunks()) shared_domain->columns.set(chunk, true, changed);
+  domain().for_each_range([&](int x, int z, const LightDomain::Range& range) {
+    for (int y = range.begin; y < range.end; ++y) store.begin({x, y, z});
+    queue.add({IVec3(x, range.begin, z) * kChunkEdge, IVec3(x + 1, range.end, z + 1) * kChunkEdge}, domain());
+  });
 }
 
-// Handles chunks that came or went, or may have: computes the light of the new parts of the domain and around them from
-// scratch.
-void PropagatedLight::Impl::change_domain(const Grid& grid, const std::vector<IVec3>& chunks) {
+// Returns the edit of a chunk that changed. None: the chunk was air and still is, or it was dark (see change_domain).
+// Uses the domain before the edit.
+std::optional<LightEdit> PropagatedLight::Impl::edit_of(const Grid& grid, const ChunkChange& change) const {
+  const Chunk* const now = grid.find_chunk(change.chunk);
+  const bool had_voxels = domain().has_voxels(change.chunk);
+  if (!had_voxels && (now == nullptr || (!domain().holds(change.chunk) && domain().beyond(change.chunk) == 0)))
+    return {};
+  const IVec3 low = change.chunk * kChunkEdge;
+  const IBox box = had_voxels ? change.box : intersect(change.box, now->bounds());
+  LightEdit edit = quoin::edit_of(state(), grid, {box.min + low, box.max + low});
+  if (!had_voxels) edit.raised = lamp_channels(*now, lights());
+  if (now == nullptr) edit.lowered &= ~(1U << kSky);
+  return edit;
+}
+
+// Handles chunks that came or went, or may have. Chunks that enter the domain or leave it are air, or have an edit of
+// their own, unless their light was dark or will be: then this appends an edit.
+void PropagatedLight::Impl::change_domain(const Grid& grid, const std::vector<IVec3>& chunks,
+                                          std::vector<LightEdit>& edits) {
   std::vector<LightDomain::Change> changed;
   for (const IVec3 chunk : chunks) {
     const bool has_voxels = grid.find_chunk(chunk) != nullptr;
@@ -176,114 +482,44 @@ void PropagatedLight::Impl::change_domain(const Grid& grid, const std::vector<IV
     shared_domain.make_own();
     shared_domain->columns.set(chunk, has_voxels, changed);
   }
-  std::vector<IVec3> others;
-  for (const LightDomain::Change& column : changed) {
-    const LightDomain::Range old = column.before;
-    const LightDomain::Range now = column.now;
-    for (int y = std::min(old.begin, now.begin); y < std::max(old.end, now.end); ++y) {
-      const bool was_held = y >= old.begin && y < old.end;
-      const bool is_held = y >= now.begin && y < now.end;
-      if (was_held == is_held) continue;
-      store.begin({column.x, y, column.z});
-      others.push_back({column.x, y, column.z});
-    }
-  }
-  for (const IVec3 chunk : others) {
-    const IVec3 low = chunk * kChunkEdge;
-    add_chunks(grown({low, low + kChunkEdge}, kReach + 1));
-  }
-}
-
-// Queues a box of voxels by chunks, limited to chunks of the domain.
-void PropagatedLight::Impl::add_chunks(const IBox& voxels) {
-  QUOIN_ASSERT(!voxels.empty(), "a box of voxels");
-  const IVec3 first = chunk_of(voxels.min);
-  const IVec3 last = chunk_of(voxels.max - 1);
-  for (int z = first.z; z <= last.z; ++z) {
-    for (int y = first.y; y <= last.y; ++y) {
-      for (int x = first.x; x <= last.x; ++x) {
-        const IVec3 chunk{x, y, z};
-        if (!domain().holds(chunk)) continue;
-        const IVec3 low = chunk * kChunkEdge;
-        IBox& known = queue[chunk];
-        known = unite(known, intersect({voxels.min - low, voxels.max - low}, kWholeChunk));
+  std::map<IVec3, LightDomain::Range, ByZyx> before;  // [x, 0, z]
+  for (const LightDomain::Change& column : changed) before.try_emplace({column.x, 0, column.z}, column.before);
+  std::vector<IVec3> from_dark;
+  for (const auto& [column, old] : before) {
+    const LightDomain::Range now = domain().range(column.x, column.z);
+    const auto change = [&](int begin, int end, bool is_entering, const LightDomain::Range& other) {
+      for (int y = begin; y < end; ++y) {
+        const IVec3 chunk{column.x, y, column.z};
+        const bool is_dark = other.begin != other.end && y < other.begin;  // before, or now
+        if (is_entering) {
+          is_dark ? from_dark.push_back(chunk) : store.open(chunk);
+        } else {
+          if (is_dark) edits.push_back(quoin::edit_of_leaving(state(), chunk));
+          store.begin(chunk);
+        }
       }
-    }
+    };
+    const auto for_each_only_in = [&](const LightDomain::Range& a, const LightDomain::Range& b, bool is_entering) {
+      const bool is_apart = b.begin == b.end;
+      change(a.begin, is_apart ? a.end : std::clamp(b.begin, a.begin, a.end), is_entering, b);
+      if (!is_apart) change(std::clamp(b.end, a.begin, a.end), a.end, is_entering, b);
+    };
+    for_each_only_in(old, now, false);
+    for_each_only_in(now, old, true);
   }
-}
-
-// Returns upper bounds of the light levels in and next to the voxels, including the lamps that they are now.
-std::array<unsigned, kChannels> PropagatedLight::Impl::highest_levels(const Grid& grid, const IBox& voxels) const {
-  constexpr int kMany = 512;
-  std::array<unsigned, kChannels> highest{};
-  const auto add = [&](std::uint16_t word) {
-    for (std::size_t c = 0; c < kChannels; ++c) highest[c] = std::max(highest[c], word >> (4 * c) & 15U);
-  };
-  const IVec3 size = voxels.size();
-  if (std::int64_t{size.x} * size.y * size.z > kMany) {
-    for (std::size_t c = 0; c < kChannels; ++c)
-      highest[c] = c == kSky || (lamp_channels >> c & 1U) != 0 ? kBrightest : 0;
-    return highest;
-  }
-  LightReader words = reader();
-  const IBox around = grown(voxels, 1);
-  for (int z = around.min.z; z < around.max.z; ++z) {
-    for (int y = around.min.y; y < around.max.y; ++y) {
-      for (int x = around.min.x; x < around.max.x; ++x) {
-        add(words.at({x, y, z}));
-        if (!voxels.contains({x, y, z})) continue;
-        const VoxelType type = grid.get(x, y, z);
-        if (type < lights().size()) add(lights()[type].lamp);
-      }
-    }
-  }
-  return highest;
-}
-
-// Returns the lower end of the sky columns that change because of these voxels.
-int PropagatedLight::Impl::end_of_sky(const Grid& grid, const IBox& voxels) const {
-  int low = voxels.max.y;
-  LightReader words = reader();
-  for (int z = voxels.min.z; z < voxels.max.z; ++z) {
-    for (int x = voxels.min.x; x < voxels.max.x; ++x) {
-      int y = voxels.max.y;
-      while (y >= voxels.min.y && (words.at({x, y, z}) & 15U) != kBrightest) --y;
-      if (y < voxels.min.y) continue;
-      const LightDomain::Range range = domain().range(x >> kChunkShift, z >> kChunkShift);
-      const auto passes = [&](int below) {
-        const VoxelType type = grid.get(x, below, z);
-        return type < lights().size() && (type == kAir || (lights()[type].passes >> kSky & 1U) != 0);
-      };
-      y = voxels.min.y;
-      while (y - 1 >= range.begin * kChunkEdge && passes(y - 1)) --y;
-      low = std::min(low, y);
-    }
-  }
-  return low;
-}
-
-// Returns the boxes in which light may change after edits of these voxels. Uses the domain before the edit.
-PropagatedLight::Impl::Dirty PropagatedLight::Impl::reach_of(const Grid& grid, const IBox& voxels) const {
-  std::array<unsigned, kChannels> highest = highest_levels(grid, voxels);
-  IBox from = voxels;
-  if (highest[kSky] == kBrightest) from.min.y = std::min(from.min.y, end_of_sky(grid, voxels));
-  Dirty reached;
-  for (std::size_t c = 0; c < kChannels; ++c) {
-    if (highest[c] > 0) reached[c] = grown(c == kSky ? from : voxels, static_cast<int>(highest[c]) - 1);
-  }
-  return reached;
+  for (const IVec3 chunk : from_dark) edits.push_back(quoin::edit_of_entering(state(), grid, chunk));
 }
 
 void PropagatedLight::Impl::take_over(const Grid& grid, const GridChanges& changes) {
   std::vector<IVec3> chunks;
-  chunks.reserve(changes.items.size());
+  std::vector<LightEdit> edits;
   for (const ChunkChange& change : changes.items) {
     chunks.push_back(change.chunk);
-    const IVec3 low = change.chunk * kChunkEdge;
     store.add_lamps(change.chunk, change.slabs);
-    dirty.push_back(reach_of(grid, {change.box.min + low, change.box.max + low}));
+    if (std::optional<LightEdit> edit = edit_of(grid, change)) edits.push_back(*edit);
   }
-  change_domain(grid, chunks);
+  change_domain(grid, chunks, edits);
+  for (const LightEdit& edit : edits) add_reach(state(), grid, edit, dirty);
   sort_dirty();
 }
 
@@ -291,51 +527,71 @@ namespace {
 
 // Boxes that touch or share a chunk slab, so that their results would overwrite each other.
 struct Cluster {
-  std::array<IBox, kChannels> boxes;
+  LightBoxes boxes;
   IBox all;
   IBox slabs;  // around it and its rim
-  std::vector<IBox> parts;
+  bool is_alone = true;
 
-  explicit Cluster(const std::array<IBox, kChannels>& one) : boxes(one), all(around_all(one)), parts{all} {
+  explicit Cluster(const LightBoxes& one) : boxes(one), all(around_all(one)) {
     const IVec3 size{kChunkEdge, 4, 4};
     slabs = {(all.min - 1) & ~(size - 1), (all.max + size) & ~(size - 1)};
   }
   [[nodiscard]] bool touches(const Cluster& other) const { return !intersect(slabs, other.slabs).empty(); }
+  // Returns true if it is not much work to solve both as one box.
+  [[nodiscard]] bool joins(const Cluster& other) const {
+    constexpr std::int64_t kWaste = 200'000;
+    const IBox united = unite(all, other.all);
+    return LightSolver::fits(united.size()) && volume(united) <= volume(all) + volume(other.all) + kWaste;
+  }
   void add(const Cluster& other) {
     for (std::size_t c = 0; c < kChannels; ++c) boxes[c] = unite(boxes[c], other.boxes[c]);
     all = unite(all, other.all);
     slabs = unite(slabs, other.slabs);
-    parts.insert(parts.end(), other.parts.begin(), other.parts.end());
   }
 };
 
+// Adds a cluster: merges it with others, or marks it and those that it touches as not alone.
+void add_cluster(Cluster cluster, std::vector<Cluster>& clusters) {
+  for (std::size_t i = 0; i < clusters.size();) {
+    if (!clusters[i].touches(cluster) || !clusters[i].joins(cluster)) {
+      ++i;
+      continue;
+    }
+    cluster.add(clusters[i]);
+    clusters.erase(clusters.begin() + static_cast<std::ptrdiff_t>(i));
+    i = 0;
+  }
+  clusters.push_back(cluster);
+}
+
+void mark_neighbours(std::vector<Cluster>& clusters) {
+  for (std::size_t i = 0; i < clusters.size(); ++i) {
+    clusters[i].is_alone &= LightSolver::fits(clusters[i].all.size());
+    for (std::size_t j = 0; j < i; ++j) {
+      if (!clusters[i].touches(clusters[j])) continue;
+      clusters[i].is_alone = false;
+      clusters[j].is_alone = false;
+    }
+  }
+}
+
 }  // namespace
 
-// Merges dirty boxes. If the result is too large or there are too many, queues chunks instead.
+// Merges dirty boxes. Queues chunks instead where boxes touch that are not worth merging, or if there are too many.
 void PropagatedLight::Impl::sort_dirty() {
   constexpr std::size_t kMany = 1024;
   std::vector<Cluster> clusters;
-  const bool is_alone = queue.empty() && dirty.size() <= kMany;
-  for (const Dirty& each : dirty) {
-    Cluster cluster(each);
-    if (cluster.all.empty()) continue;
-    for (std::size_t i = 0; is_alone && i < clusters.size();) {
-      if (!clusters[i].touches(cluster)) {
-        ++i;
-        continue;
-      }
-      cluster.add(clusters[i]);
-      clusters.erase(clusters.begin() + static_cast<std::ptrdiff_t>(i));
-      i = 0;
-    }
-    clusters.push_back(std::move(cluster));
+  const bool are_many = dirty.size() > kMany;
+  for (const LightBoxes& each : dirty) {
+    are_many ? clusters.push_back(Cluster(each)) : add_cluster(Cluster(each), clusters);
   }
+  if (!are_many) mark_neighbours(clusters);
   dirty.clear();
   for (const Cluster& cluster : clusters) {
-    if (is_alone && LightSolver::fits(cluster.all.size())) {
+    if (!are_many && cluster.is_alone) {
       dirty.push_back(cluster.boxes);
     } else {
-      for (const IBox& part : cluster.parts) add_chunks(part);
+      queue.add(cluster.all, domain());
     }
   }
 }
@@ -348,8 +604,8 @@ ChunkAround PropagatedLight::Impl::around(IVec3 chunk) const {
     return found;
   }
   found.light = store.find(chunk);
-  if (const auto unknown = queue.find(chunk); unknown != queue.end()) found.unknown = unknown->second;
-  if (const auto known = masks.find(chunk); known != masks.end()) found.masks = known->second.get();
+  found.unknown = queue.unknown(chunk);
+  if (const auto known = masks.find(chunk); known != masks.end()) found.masks = &known->second->masks;
   return found;
 }
 
@@ -366,6 +622,7 @@ void PropagatedLight::Impl::look_around(LightRegion& region) const {
 void PropagatedLight::Impl::solve(std::vector<LightRegion>& regions, Threads threads,
                                   FunctionRef<void(LightSolver&, LightRegion&)> prepare) {
   std::vector<std::vector<ChunkLightChange>> changes(regions.size());
+  for (const LightRegion& region : regions) visited_rows += rows_of(region.all.voxels);
   parallel_for(regions.size(), threads, [&](std::size_t i) {
     thread_local LightSolver solver;
     look_around(regions[i]);
@@ -382,7 +639,7 @@ void PropagatedLight::Impl::solve(std::vector<LightRegion>& regions, Threads thr
 // Solves each box as a whole.
 void PropagatedLight::Impl::solve_dirty(const Grid& grid, Threads threads) {
   std::vector<LightRegion> regions;
-  for (const Dirty& each : dirty) {
+  for (const LightBoxes& each : dirty) {
     const IBox all = around_all(each);
     LightRegion& region = regions.emplace_back();
     region.all = {all, all};
@@ -396,8 +653,9 @@ void PropagatedLight::Impl::solve_dirty(const Grid& grid, Threads threads) {
         for (int x = chunks.min.x; x < chunks.max.x; ++x) {
           const IVec3 chunk{x, y, z};
           const IVec3 low = chunk * kChunkEdge;
-          ChunkMasks& read = solver.own_masks(i++);
           ChunkAround& around = region.at(chunk);
+          if (!around.is_held) continue;
+          ChunkMasks& read = solver.own_masks(i++);
           around.masks = &read;
           read.read(grid.find_chunk(chunk), lights(),
                     intersect({region.all.voxels.min - low, region.all.voxels.max - low}, kWholeChunk),
@@ -409,79 +667,47 @@ void PropagatedLight::Impl::solve_dirty(const Grid& grid, Threads threads) {
   dirty.clear();
 }
 
-// Returns the highest chunks of the queue. Sky light falls, so the light above them is known. Whole chunks next to each
-// other are solved together, because they share surroundings.
-std::vector<LightRegion> PropagatedLight::Impl::next_layer() const {
-  constexpr int kRun = 4;
-  QUOIN_ASSERT(!queue.empty(), "chunks that are to be solved");
-  int highest = queue.begin()->first.y;
-  for (const auto& [chunk, box] : queue) highest = std::max(highest, chunk.y);
-  std::vector<LightRegion> regions;
-  int run = 0;
-  for (const auto& [chunk, box] : queue) {
-    if (chunk.y != highest) continue;
-    const IVec3 low = chunk * kChunkEdge;
-    const bool goes_on = run > 0 && run < kRun && box == kWholeChunk && regions.back().all.wanted.max.x == low.x &&
-                         regions.back().all.wanted.min.z == low.z;
-    if (goes_on) {
-      regions.back().all.wanted.max.x += kChunkEdge;
-      ++run;
-    } else {
-      regions.emplace_back().all.wanted = {low + box.min, low + box.max};
-      run = box == kWholeChunk ? 1 : 0;
-    }
-  }
-  for (LightRegion& region : regions) {
-    region.all.voxels = grown(region.all.wanted, kReach);
-    region.all.voxels.max.y = std::min(region.all.voxels.max.y, (highest + 1) * kChunkEdge);
-    region.channels.fill(region.all);
-  }
-  return regions;
-}
-
-// Reads the masks of the chunks of a layer and of the chunks around them.
+// Reads the masks of the regions' chunks, as far as they are visited and not cached.
 void PropagatedLight::Impl::read_masks(const Grid& grid, const std::vector<LightRegion>& regions, Threads threads) {
-  std::vector<std::pair<IVec3, ChunkMasks*>> missing;
+  std::map<IVec3, IBox, ByZyx> wanted;
   for (const LightRegion& region : regions) {
     const IBox chunks{chunk_of(region.all.voxels.min), chunk_of(region.all.voxels.max - 1) + 1};
     for (int z = chunks.min.z; z < chunks.max.z; ++z) {
       for (int y = chunks.min.y; y < chunks.max.y; ++y) {
         for (int x = chunks.min.x; x < chunks.max.x; ++x) {
-          const IVec3 chunk{x, y, z};
-          if (!domain().holds(chunk)) continue;
-          std::unique_ptr<ChunkMasks>& made = masks[chunk];
-          if (made != nullptr) continue;
-          made = std::make_unique<ChunkMasks>();
-          missing.emplace_back(chunk, made.get());
+          const IVec3 low = IVec3(x, y, z) * kChunkEdge;
+          if (!domain().holds({x, y, z})) continue;
+          IBox& box = wanted[{x, y, z}];
+          box = unite(box, intersect({region.all.voxels.min - low, region.all.voxels.max - low}, kWholeChunk));
         }
       }
     }
   }
+  std::vector<std::pair<IVec3, CachedMasks*>> missing;
+  for (const auto& [chunk, box] : wanted) {
+    std::unique_ptr<CachedMasks>& known = masks[chunk];
+    if (known == nullptr) known = std::make_unique<CachedMasks>();
+    if (unite(known->read, box) == known->read) continue;
+    known->read = unite(known->read, box);
+    missing.emplace_back(chunk, known.get());
+  }
   parallel_for(missing.size(), threads, [&](std::size_t i) {
-    const auto& [chunk, read] = missing[i];
-    const propagated::LightChunk* light = store.find(chunk);
-    read->read(grid.find_chunk(chunk), lights(), kWholeChunk,
-               light == nullptr ? propagated::all_slabs() : light->lamp_slabs);
+    const auto& [chunk, known] = missing[i];
+    const LightChunk* light = store.find(chunk);
+    known->masks.read(grid.find_chunk(chunk), lights(), known->read,
+                      light == nullptr ? propagated::all_slabs() : light->lamp_slabs);
   });
 }
 
 void PropagatedLight::Impl::solve_queue(const Grid& grid, Threads threads) {
-  constexpr std::size_t kBatch = 64;        // regions at a time
-  constexpr std::size_t kMaskLimit = 1024;  // chunks with cached masks: 32 MB
+  constexpr std::size_t kMaskLimit = 1024;                // chunks with cached masks: 32 MB
+  const std::size_t batch = threads.count == 1 ? 1 : 64;  // regions at a time
   while (!queue.empty()) {
-    const std::vector<LightRegion> layer = next_layer();
-    for (std::size_t first = 0; first < layer.size(); first += kBatch) {
-      const std::size_t end = std::min(first + kBatch, layer.size());
-      std::vector<LightRegion> batch(layer.begin() + static_cast<std::ptrdiff_t>(first),
-                                     layer.begin() + static_cast<std::ptrdiff_t>(end));
-      if (masks.size() > kMaskLimit) masks.clear();
-      read_masks(grid, batch, threads);
-      solve(batch, threads, [](LightSolver&, LightRegion&) {});
-      for (const LightRegion& region : batch) {
-        IVec3 chunk = chunk_of(region.all.wanted.min);
-        for (; chunk.x * kChunkEdge < region.all.wanted.max.x; ++chunk.x) queue.erase(chunk);
-      }
-    }
+    std::vector<LightRegion> regions = queue.next(batch);
+    if (masks.size() > kMaskLimit) masks.clear();
+    read_masks(grid, regions, threads);
+    solve(regions, threads, [](LightSolver&, LightRegion&) {});
+    queue.remove_solved();
   }
   masks.clear();
 }
@@ -626,6 +852,10 @@ void split_quads(const LightReader& reader, const QuadBuffer& quads, IVec3 chunk
 void PropagatedLight::split(const QuadBuffer& quads, IVec3 chunk, QuadBuffer& out,
                             std::vector<std::uint16_t>& light) const {
   split_quads(impl_of(impl_).reader(), quads, chunk, out, light);
+}
+
+std::uint64_t PropagatedLight::visited_rows() const {
+  return impl_of(impl_).visited_rows;
 }
 
 std::size_t PropagatedLight::bytes() const {

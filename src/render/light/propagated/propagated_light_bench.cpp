@@ -1,9 +1,14 @@
 // light/propagated/*: sky and lamps of a 512x128x512 terrain of 128 chunks, with caves and a lamp in one of 2,000 cave
 // voxels, from scratch and after edits; also the sky of the same terrain without caves.
+// light/propagated/streamed/N: the same terrain under six chunks of air, loaded near to far with an update each N chunks.
 
 #include <quoin/render/propagated_light.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <utility>
@@ -76,6 +81,55 @@ void sky_and_lamps(benchmark::State& state) {
 BENCHMARK(plain)->Name("light/propagated/plain")->Unit(benchmark::kMillisecond);
 BENCHMARK(sky)->Name("light/propagated/sky")->Unit(benchmark::kMillisecond);
 BENCHMARK(sky_and_lamps)->Name("light/propagated/sky_and_lamps")->Unit(benchmark::kMillisecond);
+
+// Loads the chunks of a world, and air above them, into a partial grid.
+void stream(const World& world, const std::vector<IVec3>& order, std::size_t step, PropagatedLight& light) {
+  Grid grid;
+  grid.make_partial();
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const Chunk* voxels = world.grid.find_chunk(order[i]);
+    grid.load_chunk(order[i], voxels == nullptr ? Chunk() : *voxels);
+    if ((i + 1) % step == 0 || i + 1 == order.size()) light.update(grid, world.types, {1});
+  }
+}
+
+// Counter `rows_of_at_once`: visited rows, relative to the light of the whole world at once.
+void streamed(benchmark::State& state) {
+  const World world = made_world(true);
+  PropagatedLight once;
+  once.update(world.grid, world.types, {1});
+  std::vector<IVec3> order;
+  for (int z = 0; z < 8; ++z) {
+    for (int y = 0; y < 8; ++y) {
+      for (int x = 0; x < 8; ++x) order.push_back({x, y, z});
+    }
+  }
+  const auto distance = [](IVec3 c) { return (c.x - 4) * (c.x - 4) + c.y * c.y + (c.z - 4) * (c.z - 4); };
+  std::stable_sort(order.begin(), order.end(), [&](IVec3 a, IVec3 b) { return distance(a) < distance(b); });
+  const auto step = static_cast<std::size_t>(state.range(0));
+  PropagatedLight light;
+  stream(world, order, step, light);
+  std::array<std::uint16_t, kChunkEdge> row;
+  std::array<std::uint16_t, kChunkEdge> expected;
+  for (int z = -64; z < 576; ++z) {
+    for (int y = -64; y < 192; ++y) {
+      for (int x = -64; x < 576; x += kChunkEdge) {
+        light.read_row({x, y, z}, row);
+        once.read_row({x, y, z}, expected);
+        if (row == expected) continue;
+        std::fprintf(stderr, "light benchmark: streamed light differs at %d %d %d\n", x, y, z);
+        std::exit(1);
+      }
+    }
+  }
+  state.counters["rows_of_at_once"] =
+      static_cast<double>(light.visited_rows()) / static_cast<double>(once.visited_rows());
+  for (auto _ : state) {
+    PropagatedLight again;
+    stream(world, order, step, again);
+  }
+}
+BENCHMARK(streamed)->Name("light/propagated/streamed")->Arg(1)->Arg(16)->Arg(128)->Unit(benchmark::kMillisecond);
 
 // Returns positions in caves, or in their walls where a lamp shines at them.
 std::vector<IVec3> places_in_caves(const World& world, const PropagatedLight& light, bool in_walls) {
