@@ -286,24 +286,34 @@ void follow_columns(const LightState& state, const Grid& grid, const LightEdit& 
   }
 }
 
+// How the light of a channel may change around an edit.
+struct ChannelReach {
+  bool is_raised;
+  bool is_lowered;
+  IBox closed;  // box of the chunk outside of which voxels of level 15 do not get darker
+};
+
 // Returns a box around the slabs of a part of a chunk that may change.
-IBox changeable(const ChannelLight& light, const IBox& part, bool is_raised, bool is_lowered) {
-  const auto may_change = [&](unsigned level) {
-    return (is_raised && level < kBrightest) || (is_lowered && level > 0);
+IBox changeable(const ChannelLight& light, const IBox& part, const ChannelReach& reach) {
+  const auto of_slab = [&](unsigned level, const IBox& slab) {
+    if (level == kBrightest) return reach.is_lowered ? intersect(slab, reach.closed) : IBox{};
+    return reach.is_raised || (reach.is_lowered && level > 0) ? slab : IBox{};
   };
-  if (light.is_uniform()) return may_change(light.level()) ? part : IBox{};
-  if (is_raised && is_lowered) return part;
+  if (light.is_uniform()) return of_slab(light.level(), part);
   IBox found;
   for_each_slab(light, part, [&](int y, int z, const LightSlab& slab) {
-    if (!slab.is_uniform() || may_change(slab.level()))
-      found = unite(found, {{part.min.x, y, z}, {part.max.x, y + 4, z + 4}});
+    const IBox box = intersect({{part.min.x, y, z}, {part.max.x, y + 4, z + 4}}, part);
+    const IBox may_change = slab.is_uniform() ? of_slab(slab.level(), box) : box;
+    if (!may_change.empty()) found = unite(found, may_change);
     return true;
   });
-  return intersect(found, part);
+  return found;
 }
 
 // Returns the boxes in which the light of a box and around it may change; an empty box: that channel stays as it is.
-LightBoxes reach_of(const LightState& state, const LightEdit& edit, const LightBoxes& around) {
+// `closed`: box outside of which the edit closes no sky columns. There, sky light of level 15 stays, since it falls
+// from above and from nowhere else.
+LightBoxes reach_of(const LightState& state, const LightEdit& edit, const LightBoxes& around, const IBox& closed) {
   static const ChannelLight dark;
   IBox all;
   for (const IBox& box : around) all = unite(all, box);
@@ -317,7 +327,10 @@ LightBoxes reach_of(const LightState& state, const LightEdit& edit, const LightB
       const IBox wanted = intersect({around[c].min - low, around[c].max - low}, part);
       if (around[c].empty() || wanted.empty()) continue;
       const ChannelLight& light = levels.light == nullptr ? dark : levels.light->channels[c];
-      const IBox found = changeable(light, wanted, (edit.raised >> c & 1U) != 0, (edit.lowered >> c & 1U) != 0);
+      const IBox of_sky{closed.min - low, closed.max - low};
+      const IBox found = changeable(
+          light, wanted,
+          {(edit.raised >> c & 1U) != 0, (edit.lowered >> c & 1U) != 0, c == kSky ? of_sky : kWholeChunk});
       if (!found.empty()) reach[c] = unite(reach[c], {found.min + low, found.max + low});
     }
   });
@@ -352,6 +365,24 @@ LightEdit edit_of_entering(const LightState& state, const Grid& grid, IVec3 chun
   return edit;
 }
 
+// Returns true if sky light falls into a chunk of air from all columns above it, by the light before the edits.
+bool is_below_open_sky(const LightState& state, const Grid& grid, IVec3 chunk) {
+  if (grid.find_chunk(chunk) != nullptr) return false;
+  const IVec3 low = chunk * kChunkEdge;
+  const ColumnSet open = open_columns(state, {low, low + kChunkEdge}, low.y + kChunkEdge);
+  return std::all_of(open.begin(), open.end(), [](std::uint64_t row) { return row == kAll; });
+}
+
+// Returns the edit of a chunk that was dark, as in `edit_of_entering`, and whose sky light is known to be 15 now.
+LightEdit edit_of_opened(const LightState& state, const Grid& grid, IVec3 chunk) {
+  const IVec3 low = chunk * kChunkEdge;
+  LightEdit edit;
+  edit.voxels = {low, low + kChunkEdge};
+  edit.highest = highest_levels(state, grid, edit.voxels);
+  edit.lowered = 0;
+  return edit;
+}
+
 // Returns the edit of a chunk that was in the domain and is dark now, since it is below it. Requires: the store still
 // has its light.
 LightEdit edit_of_leaving(const LightState& state, IVec3 chunk) {
@@ -378,11 +409,11 @@ void add_reach(const LightState& state, const Grid& grid, const LightEdit& edit,
     const int steps = static_cast<int>(edit.highest[c]) - 1;
     if (steps >= 0) around[c] = {edit.voxels.min - steps, edit.voxels.max + steps};
   }
-  add_if_any(reach_of(state, edit, around), reached);
+  add_if_any(reach_of(state, edit, around, edit.voxels), reached);
   follow_columns(state, grid, edit, [&](const IBox& columns) {
     LightBoxes of_sky;
     of_sky[kSky] = {columns.min - kReach, columns.max + kReach};
-    add_if_any(reach_of(state, edit, of_sky), reached);
+    add_if_any(reach_of(state, edit, of_sky, columns), reached);
   });
 }
 
@@ -494,7 +525,7 @@ void PropagatedLight::Impl::change_domain(const Grid& grid, const std::vector<IV
         if (is_entering) {
           is_dark ? from_dark.push_back(chunk) : store.open(chunk);
         } else {
-          if (is_dark) edits.push_back(quoin::edit_of_leaving(state(), chunk));
+          if (is_dark) edits.push_back(edit_of_leaving(state(), chunk));
           store.begin(chunk);
         }
       }
@@ -507,7 +538,21 @@ void PropagatedLight::Impl::change_domain(const Grid& grid, const std::vector<IV
     for_each_only_in(old, now, false);
     for_each_only_in(now, old, true);
   }
-  for (const IVec3 chunk : from_dark) edits.push_back(quoin::edit_of_entering(state(), grid, chunk));
+  // From above, in each column of chunks.
+  for (auto chunk = from_dark.rbegin(); chunk != from_dark.rend(); ++chunk) {
+    const auto is_in_column = [&](IVec3 other) { return other.x == chunk->x && other.z == chunk->z; };
+    if (std::none_of(chunks.begin(), chunks.end(), is_in_column) && is_below_open_sky(state(), grid, *chunk)) {
+      ChunkLightChange opened;
+      opened.chunk = *chunk;
+      opened.channels[kSky].is_uniform = true;
+      opened.channels[kSky].level = kBrightest;
+      opened.record.add_all();
+      store.take(std::move(opened));
+      edits.push_back(edit_of_opened(state(), grid, *chunk));
+    } else {
+      edits.push_back(edit_of_entering(state(), grid, *chunk));
+    }
+  }
 }
 
 void PropagatedLight::Impl::take_over(const Grid& grid, const GridChanges& changes) {
