@@ -286,11 +286,11 @@ void follow_columns(const LightState& state, const Grid& grid, const LightEdit& 
   }
 }
 
-// How the light of a channel may change around an edit.
+// The directions in which the light of a channel may change around an edit.
 struct ChannelReach {
   bool is_raised;
   bool is_lowered;
-  IBox closed;  // box of the chunk outside of which voxels of level 15 do not get darker
+  IBox closed;  // box of the chunk; beyond it, voxels of level 15 do not get darker
 };
 
 // Returns a box around the slabs of a part of a chunk that may change.
@@ -311,7 +311,7 @@ IBox changeable(const ChannelLight& light, const IBox& part, const ChannelReach&
 }
 
 // Returns the boxes in which the light of a box and around it may change; an empty box: that channel stays as it is.
-// `closed`: box outside of which the edit closes no sky columns. There, sky light of level 15 stays, since it falls
+// `closed`: box of all sky columns that the edit closes. Beyond it, sky light of level 15 stays, since it falls
 // from above and from nowhere else.
 LightBoxes reach_of(const LightState& state, const LightEdit& edit, const LightBoxes& around, const IBox& closed) {
   static const ChannelLight dark;
@@ -328,9 +328,9 @@ LightBoxes reach_of(const LightState& state, const LightEdit& edit, const LightB
       if (around[c].empty() || wanted.empty()) continue;
       const ChannelLight& light = levels.light == nullptr ? dark : levels.light->channels[c];
       const IBox of_sky{closed.min - low, closed.max - low};
-      const IBox found = changeable(
-          light, wanted,
-          {(edit.raised >> c & 1U) != 0, (edit.lowered >> c & 1U) != 0, c == kSky ? of_sky : kWholeChunk});
+      const IBox found =
+          changeable(light, wanted,
+                     {(edit.raised >> c & 1U) != 0, (edit.lowered >> c & 1U) != 0, c == kSky ? of_sky : kWholeChunk});
       if (!found.empty()) reach[c] = unite(reach[c], {found.min + low, found.max + low});
     }
   });
