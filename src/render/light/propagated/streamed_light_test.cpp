@@ -18,7 +18,7 @@
 namespace quoin {
 namespace {
 
-constexpr VoxelType kStone = 1, kLamp = 2, kGlass = 3;
+constexpr VoxelType kHillStone = 1, kHillLamp = 2, kHillGlass = 3;
 constexpr int kWide = 3;                                          // chunks of land along x and z
 constexpr int kHigh = 3;                                          // chunks of land along y
 constexpr IBox kAround{{-1, -3, -1}, {kWide + 1, 7, kWide + 1}};  // chunks to compare
@@ -51,7 +51,7 @@ Chunk land(IVec3 chunk) {
         if (at.y >= height || is_shaft || std::abs(wave(at.x, 11.0) + cave_yz) < 0.3) continue;
         const std::uint32_t dice =
             static_cast<std::uint32_t>(at.x * 7919 + at.y * 104'729 + at.z * 1'299'709) * 2'654'435'761U >> 16;
-        const VoxelType type = dice % 997 == 0 ? kLamp : dice % 31 == 0 ? kGlass : kStone;
+        const VoxelType type = dice % 997 == 0 ? kHillLamp : dice % 31 == 0 ? kHillGlass : kHillStone;
         dense[static_cast<std::size_t>(x + kChunkEdge * (y + kChunkEdge * z))] = type;
       }
     }
@@ -183,10 +183,10 @@ TEST(StreamedLight, FollowsChunksThatComeAndGoAndEditsBetween) {
           grid.unload_chunk(chunk);
         } else if (below(4) > 0) {
           const int kind = below(5);
-          Chunk voxels = kind == 0 ? Chunk(kStone) : kind < 3 ? land({chunk.x, below(kHigh), chunk.z}) : Chunk();
+          Chunk voxels = kind == 0 ? Chunk(kHillStone) : kind < 3 ? land({chunk.x, below(kHigh), chunk.z}) : Chunk();
           if (kind == 3) {
             for (int x = 0; x < kChunkEdge; ++x) {
-              for (int z = 0; z < kChunkEdge; ++z) voxels.set({x, 30, z}, x % 9 == z % 7 ? kGlass : kStone);
+              for (int z = 0; z < kChunkEdge; ++z) voxels.set({x, 30, z}, x % 9 == z % 7 ? kHillGlass : kHillStone);
             }
           }
           grid.load_chunk(chunk, std::move(voxels));
