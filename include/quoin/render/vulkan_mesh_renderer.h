@@ -81,8 +81,8 @@ class VulkanMeshRenderer {
 
   /// Applies the scene's instances and types. Cost: O(instances + types).
   [[nodiscard]] Status update(const Scene& scene, InstanceFilter filter = InstanceFilter::Visible);
-  /// Uploads surfaces. If a chunk occurs several times, the last surface counts. Cost: the upload of whole chunks; with
-  /// LiveMeshes, set LiveMeshOptions::region_edge to 64, which has the fewest quads.
+  /// Uploads surfaces. If a chunk occurs several times, the last surface counts. Cost: the upload of whole chunks. For
+  /// surfaces of LiveMeshes, a LiveMeshOptions::region_edge of 64 gives the fewest quads.
   /// Errors: also InvalidArgument if a surface's arrays are inconsistent; then no surface changes. After any other
   ///         error some surfaces may be new, and the rest are unchanged.
   [[nodiscard]] Status put(std::span<const SurfaceUpdate> surfaces);
