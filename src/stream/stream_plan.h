@@ -129,6 +129,9 @@ class StreamPlan {
   std::size_t missing_count_ = 0;  ///< true entries of `is_missing_`
 };
 
+/// Grows a world-space box to hold a box of voxels, as an instance places it.
+void extend(DBox& world, const Scene& scene, const Instance& instance, const DBox& voxels);
+
 /// The placements of one grid in a scene, nearest first: chunks loaded for these also serve the others.
 ///
 ///   [ the nearest kNearest, checked each time | the others, checked a few at a time ]
@@ -144,7 +147,8 @@ class Placements {
   void put(InstanceHandle instance);
   void remove(InstanceHandle instance);
   [[nodiscard]] bool contains(InstanceHandle instance) const { return index_.contains(instance); }
-  [[nodiscard]] std::vector<InstanceHandle> instances() const;
+  /// Grows a world-space box to hold a box of chunks (half open), as all instances place it.
+  void extend(DBox& world, const Scene& scene, const IBox& chunks) const;
   /// Replaces `eyes` by the viewers in the grid's space: at most kNearest, nearest first if there are that many. Does
   /// not allocate if the vector and earlier calls have enough memory.
   void find_eyes(const Scene& scene, const SceneGrid& grid, std::span<const Viewer> viewers, std::vector<Eye>& eyes);

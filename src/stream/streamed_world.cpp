@@ -7,7 +7,6 @@
 #include <limits>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <new>
 #include <optional>
 #include <string>
@@ -76,31 +75,16 @@ bool is_air(const SceneGrid& content, IVec3 chunk) {
   return content.grid.find_chunk(chunk) == nullptr && content.field.find_chunk(chunk) == nullptr;
 }
 
-bool is_air(const StoredChunk& chunk) {
-  return chunk.voxels.uniform() == kAir && !chunk.densities;
+IBox box_of(const std::vector<IVec3>& chunks) {
+  IBox box;
+  for (const IVec3 chunk : chunks) box = unite(box, {chunk, chunk + 1});
+  return box;
 }
 
 std::vector<std::byte> bytes_of_text(const std::string& text) {
   const auto bytes = std::as_bytes(std::span(text));
   return {bytes.begin(), bytes.end()};
 }
-
-/// Results of saves, reported by the store's thread.
-class DiskOutcome {
- public:
-  void put(const Status& outcome) {
-    const std::scoped_lock lock(mutex_);
-    last_ = outcome;
-  }
-  [[nodiscard]] Status last() const {
-    const std::scoped_lock lock(mutex_);
-    return last_;
-  }
-
- private:
-  mutable std::mutex mutex_;
-  Status last_;
-};
 
 }  // namespace
 
@@ -724,32 +708,6 @@ void StreamedWorld::set_view(WorldView view) {
   impl_->world.saver.set_view(std::move(view));
 }
 
-namespace {
-
-// Grows to hold a box of voxels, as an instance places it.
-void extend(DBox& world, const Scene& scene, const Instance& instance, const DBox& voxels) {
-  const SceneGrid& grid = scene.grids()[instance.grid];
-  for (int i = 0; i < 8; ++i) world.extend(world_from_grid(instance, grid, box_corner(voxels, i)));
-}
-
-// Grows to hold the chunks of a box (half open), as every instance of a grid places them.
-void extend(DBox& world, const Scene& scene, const std::vector<InstanceHandle>& instances, const IBox& chunks) {
-  if (chunks.empty()) return;
-  const DBox voxels{DVec3(chunks.min) * double{kChunkEdge}, DVec3(chunks.max) * double{kChunkEdge}};
-  for (const InstanceHandle handle : instances) {
-    const Instance* const instance = scene.instances().find(handle);
-    if (instance != nullptr) extend(world, scene, *instance, voxels);
-  }
-}
-
-IBox box_of(const std::vector<IVec3>& chunks) {
-  IBox box;
-  for (const IVec3 chunk : chunks) box = unite(box, {chunk, chunk + 1});
-  return box;
-}
-
-}  // namespace
-
 Result<WorldExtent> StreamedWorld::extent() const {
   WorldExtent found;
   impl_->follow_instances();
@@ -764,9 +722,9 @@ Result<WorldExtent> StreamedWorld::extent() const {
     const auto chunks = impl_->store.chunks(number, 0);
     if (!chunks) return chunks.error();
     found.stored_chunks += chunks->size();
-    extend(found.stored, scene(), grid.placements.instances(), box_of(*chunks));
+    grid.placements.extend(found.stored, scene(), box_of(*chunks));
     const auto generator = impl_->streamer.generator_of(number);
-    if (generator != nullptr) extend(found.generated, scene(), grid.placements.instances(), generator->chunks());
+    if (generator != nullptr) grid.placements.extend(found.generated, scene(), generator->chunks());
   }
   return found;
 }

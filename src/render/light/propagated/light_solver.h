@@ -19,6 +19,22 @@ namespace quoin::propagated {
 /// Maximum number of steps from a light source until light is dark.
 inline constexpr int kReach = 14;
 
+/// Returns the box around the boxes of all channels.
+[[nodiscard]] inline IBox around_all(const std::array<IBox, kChannels>& boxes) {
+  IBox all;
+  for (const IBox& box : boxes) all = unite(all, box);
+  return all;
+}
+[[nodiscard]] inline std::int64_t volume(const IBox& box) {
+  const IVec3 size = box.size();
+  return std::int64_t{size.x} * size.y * size.z;
+}
+/// Returns the number of rows of up to 64 voxels in a box.
+[[nodiscard]] inline std::uint64_t rows_of(const IBox& box) {
+  const IVec3 size = box.size();
+  return static_cast<std::uint64_t>(std::int64_t{(size.x + kChunkEdge - 1) / kChunkEdge} * size.y * size.z);
+}
+
 /// A chunk in a region or next to it.
 struct ChunkAround {
   bool is_held = false;               ///< false: its light is constant, either dark ...

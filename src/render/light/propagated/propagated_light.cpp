@@ -28,6 +28,7 @@
 namespace quoin {
 namespace {
 
+using propagated::around_all;
 using propagated::ChannelLight;
 using propagated::ChunkAround;
 using propagated::ChunkLightChange;
@@ -46,7 +47,9 @@ using propagated::LightRegion;
 using propagated::LightSlab;
 using propagated::LightSolver;
 using propagated::LightStore;
+using propagated::rows_of;
 using propagated::TypeLight;
+using propagated::volume;
 
 constexpr std::uint64_t kAll = ~std::uint64_t{0};
 constexpr unsigned kBrightest = 15;
@@ -89,23 +92,6 @@ unsigned lamp_channels(const Chunk& chunk, const std::vector<TypeLight>& lights)
 struct SharedDomain : RefCounted {
   LightDomain columns;
 };
-
-IBox around_all(const std::array<IBox, kChannels>& boxes) {
-  IBox all;
-  for (const IBox& box : boxes) all = unite(all, box);
-  return all;
-}
-
-std::int64_t volume(const IBox& box) {
-  const IVec3 size = box.size();
-  return std::int64_t{size.x} * size.y * size.z;
-}
-
-// Returns the number of rows of up to 64 voxels in a box.
-std::uint64_t rows_of(const IBox& box) {
-  const IVec3 size = box.size();
-  return static_cast<std::uint64_t>(std::int64_t{(size.x + kChunkEdge - 1) / kChunkEdge} * size.y * size.z);
-}
 
 // The masks of a chunk, as far as they were read.
 struct CachedMasks {
