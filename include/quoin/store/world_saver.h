@@ -100,7 +100,8 @@ struct LoadedWorld {
 /// partial as whole. Does not read the sky image.
 ///
 /// `max_whole_bytes`: if not 0, loads the grids that are stored as whole (SceneGrid::whole) with all their chunks, if
-///           these need at most this many bytes: estimated from a sample of the chunks before, and counted while loading.
+///           these need at most this many bytes: estimated from a sample of the chunks before, and counted during
+///           loading.
 /// Warnings: as load_world.
 /// Errors:   CannotRead, BadFormat; LimitExceeded, with the grid's name, if whole grids need more than
 ///           `max_whole_bytes` or more than the available memory.

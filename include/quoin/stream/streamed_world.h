@@ -181,8 +181,8 @@ class StreamedWorld {
   /// `load_all` or `flush`: until then no chunk of a grid from the file is loaded, but then it is limited to its stored
   /// chunks, and edits can fill the air around them. Later, loaded chunks stay as they are.
   /// Cost: O(stored and loaded chunks). If it throws bad_alloc, nothing has changed. `take_problems` reports errors.
-  /// Requires: the scene has the grid. Whole grids have no generator: the call does nothing, and `take_problems` reports
-  /// it.
+  /// Requires: the scene has the grid. Whole grids have no generator: the call does nothing, and `take_problems`
+  /// reports it.
   void use_generator(GridHandle grid, std::shared_ptr<const ChunkGenerator> generator);
   /// Adds a grid of generated landscape, placed at the origin. The file stores its parameters, so that it continues
   /// when the world is opened again.

@@ -27,7 +27,8 @@ struct WholeGridLimit {
                             std::uint64_t needed) const;
 };
 
-/// Checks, before they are loaded, that the world's whole grids probably fit. Skips grids whose chunks cannot be listed.
+/// Checks, before they are loaded, that the world's whole grids probably fit. Skips grids with chunks that cannot be
+/// listed.
 /// The estimate leaves out per-voxel data if chunks of the greatest size without data would fit.
 /// Cost:   reads the keys of their chunks; a sample of the chunks too, if chunks of that size would not fit.
 /// Errors: LimitExceeded, with the first grid that does not fit; CannotRead.

@@ -46,8 +46,8 @@ using ColumnSet = std::array<std::uint64_t, kChunkEdge>;
   return std::any_of(columns.begin(), columns.end(), [](std::uint64_t row) { return row != 0; });
 }
 
-/// Lets sky columns fall from row `end` to row `begin` of a chunk. Removes the columns that stop. Returns the lowest row
-/// reached, or `end` if there is none. `voxels`: null if all is air.
+/// Lets sky columns fall from row `end` to row `begin` of a chunk. Removes the columns that stop. Returns the lowest
+/// row reached, or `end` if there is none. `voxels`: null if all is air.
 /// Cost: O(rows of 64 voxels until all columns stop); O(types) if none stops sky light.
 int fall(const Chunk* voxels, const std::vector<TypeLight>& types, int begin, int end, ColumnSet& open);
 

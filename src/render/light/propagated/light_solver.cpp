@@ -620,8 +620,8 @@ IBox LightQueue::unknown(IVec3 chunk) const {
   return {found->second.voxels.min - low, found->second.voxels.max - low};
 }
 
-// Returns the voxels to visit for a wanted box: with all unknown light below the chunk layer `top` that reaches it. Light
-// falls from any height.
+// Returns the voxels to visit for a wanted box: with all unknown light below the chunk layer `top` that reaches it.
+// Light falls from any height.
 IBox LightQueue::visited(const IBox& wanted, int top) const {
   const IBox near{wanted.min - kReach, {wanted.max.x + kReach, top * kChunkEdge, wanted.max.z + kReach}};
   IBox all = wanted;

@@ -502,7 +502,9 @@ void PropagatedLight::Impl::change_domain(const Grid& grid, const std::vector<IV
   std::map<IVec3, LightDomain::Range, ByZyx> before;  // [x, 0, z]
   for (const LightDomain::Change& column : changed) before.try_emplace({column.x, 0, column.z}, column.before);
   std::vector<IVec3> from_dark;
-  for (const auto& [column, old] : before) {
+  for (const auto& each : before) {
+    const IVec3 column = each.first;
+    const LightDomain::Range old = each.second;
     const LightDomain::Range now = domain().range(column.x, column.z);
     const auto change = [&](int begin, int end, bool is_entering, const LightDomain::Range& other) {
       for (int y = begin; y < end; ++y) {

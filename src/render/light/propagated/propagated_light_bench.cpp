@@ -1,6 +1,7 @@
 // light/propagated/*: sky and lamps of a 512x128x512 terrain of 128 chunks, with caves and a lamp in one of 2,000 cave
 // voxels, from scratch and after edits; also the sky of the same terrain without caves.
-// light/propagated/streamed/N: the same terrain under six chunks of air, loaded near to far with an update each N chunks.
+// light/propagated/streamed/N: the same terrain under six chunks of air, loaded near to far, with an update after each
+// N chunks.
 
 #include <quoin/render/propagated_light.h>
 
