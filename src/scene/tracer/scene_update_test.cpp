@@ -21,6 +21,16 @@ std::vector<SelectedInstance> random_details(const SceneTracer& tracer, Changing
   return selected;
 }
 
+// Compares both tracers in the same random levels of detail.
+void expect_same_details(const SceneTracer& tracer, const SceneTracer& fresh, ChangingScene& world,
+                         TracerCounts& counts) {
+  const auto selected = random_details(fresh, world);
+  const SceneTracer detailed = tracer.with_detail(selected, {1});
+  const SceneTracer fresh_detailed = fresh.with_detail(selected, {1});
+  expect_same_placed(detailed, fresh_detailed, true, counts);
+  expect_same_hits(detailed, fresh_detailed, world, counts);
+}
+
 TEST(SceneUpdate, UpdatedTracerMatchesNewTracer) {
   TracerCounts counts;
   for (unsigned seed = 0; seed < 60; ++seed) {
@@ -35,13 +45,7 @@ TEST(SceneUpdate, UpdatedTracerMatchesNewTracer) {
       const SceneTracer fresh(world.scene, filter, {1});
       expect_same_placed(tracer, fresh, false, counts);
       expect_same_hits(tracer, fresh, world, counts);
-      if (round % 2 == 0) {
-        const auto selected = random_details(fresh, world);
-        const SceneTracer detailed = tracer.with_detail(selected, {1});
-        const SceneTracer fresh_detailed = fresh.with_detail(selected, {1});
-        expect_same_placed(detailed, fresh_detailed, true, counts);
-        expect_same_hits(detailed, fresh_detailed, world, counts);
-      }
+      if (round % 2 == 0) expect_same_details(tracer, fresh, world, counts);
       if (HasFatalFailure()) return;
     }
   }
@@ -73,11 +77,7 @@ TEST(SceneUpdate, TracerOfNextSnapshotMatchesNewTracer) {
       EXPECT_EQ(&tracer.scene(), &fresh.scene());
       expect_same_placed(tracer, fresh, false, counts);
       expect_same_hits(tracer, fresh, world, counts);
-      const auto selected = random_details(fresh, world);
-      const SceneTracer detailed = tracer.with_detail(selected, {1});
-      const SceneTracer fresh_detailed = fresh.with_detail(selected, {1});
-      expect_same_placed(detailed, fresh_detailed, true, counts);
-      expect_same_hits(detailed, fresh_detailed, world, counts);
+      expect_same_details(tracer, fresh, world, counts);
       if (HasFatalFailure()) return;
     }
   }

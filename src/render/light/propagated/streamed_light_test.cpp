@@ -142,12 +142,18 @@ void expect_fresh(const PropagatedLight& light, const Grid& grid, const VoxelReg
   expect_equal(light, fresh);
 }
 
-TEST(StreamedLight, EqualsLightAtOnceInAnyOrder) {
-  const VoxelRegistry types = stream_types();
+// Returns the light of land that is there at once.
+PropagatedLight light_at_once(const VoxelRegistry& types) {
   Grid whole;
   for (const Part& part : world(kHigh)) whole.put_chunk(part.first, part.second);
-  PropagatedLight once;
-  once.update(whole, types, {1});
+  PropagatedLight light;
+  light.update(whole, types, {1});
+  return light;
+}
+
+TEST(StreamedLight, EqualsLightAtOnceInAnyOrder) {
+  const VoxelRegistry types = stream_types();
+  const PropagatedLight once = light_at_once(types);
   for (const Order& order : orders()) {
     for (const std::size_t step : {1, 6, 100}) {
       SCOPED_TRACE(order.name + ", " + std::to_string(step) + " chunks per update");
@@ -250,10 +256,7 @@ TEST(StreamedLight, VisitsNothingForAir) {
 // Counts rows of voxels, which no other load of the machine changes.
 TEST(StreamedLight, VisitsAtMostThreeTimesAsMuchAsAtOnce) {
   const VoxelRegistry types = stream_types();
-  Grid whole;
-  for (const Part& part : world(kHigh)) whole.put_chunk(part.first, part.second);
-  PropagatedLight once;
-  once.update(whole, types, {1});
+  const PropagatedLight once = light_at_once(types);
   for (const Order& order : orders()) {
     for (const std::size_t step : {1, 8, 32}) {
       for (const int high : {kHigh, 12}) {
