@@ -17,28 +17,35 @@ namespace {
 template <int kLanes>
 struct WordVector;
 template <>
+struct WordVector<1> {
+  using Type = std::uint64_t;
+  using Unaligned = std::uint64_t;
+};
+template <>
 struct WordVector<2> {
   using Type __attribute__((vector_size(16))) = std::uint64_t;
+  using Unaligned __attribute__((vector_size(16), aligned(8))) = std::uint64_t;
 };
 template <>
 struct WordVector<4> {
   using Type __attribute__((vector_size(32))) = std::uint64_t;
+  using Unaligned __attribute__((vector_size(32), aligned(8))) = std::uint64_t;
 };
 template <>
 struct WordVector<8> {
   using Type __attribute__((vector_size(64))) = std::uint64_t;
+  using Unaligned __attribute__((vector_size(64), aligned(8))) = std::uint64_t;
 };
 
-// Loads and stores a vector, or one word.
+// Loads and stores a vector, or one word. Memory is accessed as words: a copy of bytes could change any object, and the
+// compiler would load its registers again.
 template <class Words>
 [[gnu::always_inline]] inline Words load_as(const std::uint64_t* from) {
-  Words words;
-  __builtin_memcpy(&words, from, sizeof(words));
-  return words;
+  return *reinterpret_cast<const typename WordVector<sizeof(Words) / sizeof(std::uint64_t)>::Unaligned*>(from);
 }
 template <class Words>
 [[gnu::always_inline]] inline void store(std::uint64_t* to, const Words& words) {
-  __builtin_memcpy(to, &words, sizeof(words));
+  *reinterpret_cast<typename WordVector<sizeof(Words) / sizeof(std::uint64_t)>::Unaligned*>(to) = words;
 }
 
 // Returns bit i for each lane i that is not 0.
