@@ -1,4 +1,4 @@
-// Functions missing from the C and C++ libraries for WebAssembly: exceptions and memory information.
+// Functions missing from the C and C++ libraries for WebAssembly: exceptions and allocation.
 //
 // These libraries are built without exceptions, so nothing can be caught. An exception ends the instance: JavaScript
 // throws an Error with the exception's text through it, and the package starts a fresh instance. Exceptions occur only
@@ -12,8 +12,6 @@
 #include <typeinfo>
 
 #include <wasm_simd128.h>
-
-#include <quoin/core/memory.h>
 
 extern "C" [[noreturn]] __attribute__((import_module("quoin"), import_name("fail"))) void quoin_web_fail(
     const char* text);
@@ -102,16 +100,3 @@ void* operator new(std::size_t bytes, std::align_val_t alignment) {
   const auto step = static_cast<std::size_t>(alignment);
   return allocate((bytes + step - 1) / step * step + (bytes == 0 ? step : 0), step);
 }
-
-namespace quoin {
-
-std::optional<std::uint64_t> available_memory() {
-  constexpr std::uint64_t kPage = 65'536;
-  return (std::uint64_t{1} << 32) - __builtin_wasm_memory_size(0) * kPage;
-}
-
-bool return_freed_memory() {
-  return false;
-}
-
-}  // namespace quoin

@@ -10,7 +10,8 @@
 namespace quoin {
 
 /// Changes the size of a block of memory that was empty (null, 0) or returned by this function; frees it if `wanted` is
-/// 0. Returns the block, perhaps at another address, with its former bytes. All bytes of a new block are 0.
+/// 0. Returns the block, perhaps at another address, with its former bytes. All bytes of a new block are 0;
+/// those that a block gains are undefined.
 ///
 /// Blocks of at least kSystemBlock bytes are pages of the system. On Linux they grow without a copy: their pages move
 /// to another address. Pages that were never written take no memory.

@@ -1,7 +1,9 @@
 #include <quoin/core/memory.h>
 
+#ifndef __wasm__
 #include <sys/resource.h>
 #include <unistd.h>
+#endif
 #ifdef __linux__
 #include <sys/mman.h>
 #endif
@@ -23,6 +25,7 @@
 namespace quoin {
 namespace {
 
+#ifndef __wasm__
 // Returns the number after a word in a file of lines "WORD NUMBER ...".
 std::optional<std::uint64_t> number_in(const std::string& path, const std::string& word) {
   std::ifstream file(path);
@@ -81,15 +84,14 @@ std::optional<std::uint64_t> of_process() {
   const std::uint64_t used = number_of("/proc/self/statm").value_or(0) * static_cast<std::uint64_t>(::getpagesize());
   return limit.rlim_cur > used ? limit.rlim_cur - used : 0;
 }
-
-// Returns true if a block of this size is pages of the system.
-bool is_system_block([[maybe_unused]] std::size_t bytes) {
-#ifdef __linux__
-  return bytes >= kSystemBlock;
-#else
-  return false;
 #endif
+
+#ifdef __linux__
+// Returns true if a block of this size is pages of the system.
+bool is_system_block(std::size_t bytes) {
+  return bytes >= kSystemBlock;
 }
+#endif
 
 // Returns null if there is no memory.
 void* new_block(std::size_t bytes) {
@@ -128,7 +130,8 @@ void* resize_block(void* block, std::size_t bytes, std::size_t wanted) {
     return moved;
   }
 #endif
-  void* const made = new_block(wanted);
+  const bool is_new = block == nullptr || is_system_block(wanted);
+  void* const made = is_new ? new_block(wanted) : std::malloc(wanted);  // NOLINT(*-no-malloc)
   if (made == nullptr) throw std::bad_alloc();
   if (block != nullptr) {
     std::memcpy(made, block, std::min(bytes, wanted));
@@ -138,11 +141,16 @@ void* resize_block(void* block, std::size_t bytes, std::size_t wanted) {
 }
 
 std::optional<std::uint64_t> available_memory() {
+#ifdef __wasm__
+  constexpr std::uint64_t kPage = 65'536;
+  return (std::uint64_t{1} << 32) - __builtin_wasm_memory_size(0) * kPage;
+#else
   std::optional<std::uint64_t> least;
   for (const auto& each : {of_machine(), of_groups(), of_process()}) {
     if (each) least = std::min(least.value_or(*each), *each);
   }
   return least;
+#endif
 }
 
 bool return_freed_memory() {
