@@ -164,8 +164,8 @@ void add_sun_and_sky_options(CLI::App& command, RenderArguments& arguments) {
         arguments.environment.sun = sun.direction;
         arguments.environment.is_sun_off = !sun.direction;
       },
-      "Direction to the sun (default -0.48,0.72,0.5), or off. The sky follows the sun to dusk and night; off "
-      "keeps the sky");
+      "Direction to the sun (default -0.48,0.72,0.5), or off for no sunlight. The sky darkens when the sun is low or "
+      "below the horizon; off leaves the sky bright");
   command.add_flag("--fixed-sky", arguments.environment.is_sky_fixed,
                    "Keep the sky and the light colour of a clear day for every sun direction");
   add_parsed(command, "--sky-brightness", "X", number_from_0(), arguments.environment.sky_brightness,
@@ -183,7 +183,7 @@ void add_light_options(CLI::App& command, RenderArguments& arguments) {
       "light, soft shadows, gloss and refraction; takes minutes. propagated: light levels that spread from "
       "the sky and from emissive voxels, as in block games, without sun shadows");
   add_choice<Preset>(command, "--preset", kPresets, arguments.preset,
-                     "Shading (default full): full, no-shadows, no-ao, unlit (colours, times occlusion with --ao), ao "
+                     "Shading (default full): full, no-shadows, no-ao, unlit (colours only; --ao darkens corners), ao "
                      "(occlusion only, grey), or density (a slice through fields and volumes)");
   add_sun_and_sky_options(command, arguments);
   command

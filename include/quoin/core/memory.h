@@ -14,9 +14,9 @@ namespace quoin {
 ///
 /// Resident memory then follows the memory in use. Programs that stream worlds need this to keep their memory budget;
 /// without it they use about 20 % more. Call it first in `main`.
-/// Cost:     time for new pages: 8 to 20 % of the time of a flight through a streamed world. The thread that frees a
-///           block pays for its release. Workers free surfaces of LiveMeshes and unloaded chunks of StreamedWorld;
-///           large blocks of the program itself are freed by its own threads.
+/// Cost:     8 to 20 % more processor time in a streamed world, because the system must supply new pages. The thread
+///           that frees a block pays for its release. Workers free surfaces of LiveMeshes and unloaded chunks of
+///           StreamedWorld; large blocks of the program itself are freed by its own threads.
 /// Returns:  false, without a change, if the C library is not glibc. Has no effect if another allocator replaces
 ///           malloc.
 /// See docs/performance.md, "Worlds larger than memory".

@@ -118,9 +118,9 @@ struct RowChange {
 /// changed, the two states are compared completely.
 ///
 /// Order:    chunks by z, y, x; within a chunk, rows by z, then y.
-/// Limits:   a voxel that changed and then changed back is not reported, for example inside a stream in which each
-///           voxel is replaced by the next. A rule must therefore check the voxels that it moves itself
-///           (examples/falling_sand.cpp).
+/// Limits:   a voxel that changed and changed back is not reported. In flowing water, for example, each voxel is
+///           replaced by an equal one, so the inside does not seem to change. A rule must therefore check the voxels
+///           that it moves itself (examples/falling_sand.cpp).
 /// Partial:  chunks that are unloaded in at least one of the two states are skipped.
 /// Cost:     O(changed slabs). Chunks shared by both states cost nothing.
 void visit_changes(const Grid& before, const Grid& now, const GridChanges& changes,
@@ -149,8 +149,8 @@ void visit_data_changes(const Grid& before, const Grid& now, const DataChanges& 
 struct DensityChange {
   IVec3 chunk{0};
   IBox box;  ///< smallest box around the changed samples, in chunk coordinates
-  /// Distance in samples, by Neighbourhood::index(dx, dy, dz). The chunk at that offset reaches a changed sample if it
-  /// reads this many samples beyond its own. The distance is 0 for the chunk itself.
+  /// For each neighbouring chunk, by Neighbourhood::index(dx, dy, dz): the distance in samples from its own samples to
+  /// the nearest changed one, along the axis where it is greatest. 0 for the changed chunk itself.
   std::array<std::uint8_t, 27> distance{};
   bool is_edit = true;  ///< as in ChunkChange
 

@@ -15,9 +15,11 @@ class ConnectedPieces;
 /// The mass of a rigid body, as physics engines take it.
 ///
 ///   const auto body = mass_properties(pieces, i, [&](VoxelType type) { return table[type]; }).scaled(0.25);
-///   make_body(body.mass, body.centre, body.inertia);   // voxels of a quarter of a unit
+///   make_body(body.mass, body.centre, body.inertia);   // voxels of a quarter of a unit, table: mass per cubic unit
 ///
-/// Units: lengths are in voxels (samples, for a field). A density is a mass per volume of one voxel.
+/// Units: lengths are in voxels (samples, for a field), and a density is the mass of one voxel. For world units, return
+///        masses per cubic world unit and call `scaled`. If densities are masses per voxel, do not call it: `mass` is
+///        right, `centre` still has to be multiplied by the voxel size, and `inertia` by its square.
 /// Space: the grid's own. Voxel (x, y, z) fills the cube from there to (x + 1, y + 1, z + 1). Samples are points.
 struct MassProperties {
   double mass = 0.0;
@@ -33,8 +35,8 @@ struct MassProperties {
   [[nodiscard]] MassProperties scaled(double voxel_size) const;
 };
 
-/// Returns the mass of a type per voxel: finite, at least 0. Called once per type, on the calling thread. A table is
-/// `[&](VoxelType type) { return table[type]; }`.
+/// Returns the density of a type: finite, at least 0. Its unit is up to the caller, see MassProperties. Called once per
+/// type, on the calling thread. A table is `[&](VoxelType type) { return table[type]; }`.
 using DensityOfType = FunctionRef<double(VoxelType)>;
 
 /// Returns the mass properties of all voxels of a grid, with uniform density within each voxel. In a partial grid, only
@@ -52,8 +54,8 @@ using DensityOfType = FunctionRef<double(VoxelType)>;
 /// material. Samples beyond the field's chunks are air.
 ///
 /// Rule:  a cell between eight solid samples is solid. A cell with solid and other samples consists of 4x4x4 parts: a
-///        part is solid if the trilinear field is negative at its centre. All solid of a cell has the mean density of
-///        its solid samples.
+///        part is solid if the trilinear field is negative at its centre. The solid part of a cell has the mean density
+///        of the cell's solid samples.
 /// Cost:  O(rows of 64 cells with solid + cells that the surface crosses, 64 values each).
 [[nodiscard]] MassProperties mass_properties(const DensityGrid& field, DensityOfType density);
 

@@ -27,8 +27,8 @@ struct LiveLightOptions {
 /// Exact:    the light shown is always the exact light of the scene at one moment, including its voxels
 ///           (GridLight::voxels). The delay depends on the threads. Once edits stop, `take` eventually shows the light
 ///           of the current scene.
-/// Meshes:   LiveMeshes::use_light shows this light together with the surfaces of the same moment. The `update` and
-///           `take` of LiveMeshes then do the work of those of this class.
+/// Meshes:   LiveMeshes::use_light shows this light together with the surfaces of the same moment. Then call only
+///           `update` and `take` of LiveMeshes: they also update and show the light.
 /// Follow:   PropagatedLight::changes_since, on `shown().of(grid).light`, reports where light changed between two
 ///           states.
 /// Lifetime: the scene is read only during calls.

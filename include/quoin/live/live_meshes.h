@@ -66,10 +66,9 @@ struct LiveMeshOptions {
 /// Only `update` reads the scene: workers read snapshots, so edits never wait for them. A chunk is meshed again only if
 /// an edit could have changed its mesh.
 /// Together:  all surfaces that change because of the edits between two updates are returned by one `take`, when all
-///            are complete: on both sides of a chunk border, of all grids, voxels and fields, with their light. Edits
-///            made before earlier ones are complete are combined, and follow next. An edit is therefore returned after
-///            at most twice the time that workers need for such a step. New, removed, shown and hidden grids count as
-///            edits.
+///            are complete: on both sides of a chunk border, of all grids, voxels and fields, with their light. These
+///            surfaces form a step. Edits made while workers compute a step are combined into the next one, so an edit
+///            is returned after at most two steps. New, removed, shown and hidden grids count as edits.
 /// Loaded:    the chunks of the first update, loaded chunks (Grid::load_chunk) and new grids that are partial or have
 ///            more than 256 chunks are returned one by one, nearest first. So are all chunks of a step that edits more
 ///            than 256 chunks. Edits come before loaded chunks. With a LiveLight, an edit is lit together with all
@@ -84,8 +83,8 @@ struct LiveMeshOptions {
 ///            throws, the surface is still returned, with a null `converted`. A bad_alloc from `convert` counts as the
 ///            worker running out of memory (Stats::out_of_memory).
 /// Lifetime:  the scene is read only during calls; callers share ownership of the surfaces they take. After the last
-///            owner has dropped a surface, a worker destroys it with its converted data. The owner's thread does so
-///            itself once the LiveMeshes is gone, or if more than 64 MiB wait because all workers are in long steps.
+///            owner has dropped a surface, a worker destroys it with its converted data. The owner's thread destroys
+///            it if the LiveMeshes no longer exists, or if busy workers have left more than 64 MiB to destroy.
 /// Threads:   `update` and `finish` must not overlap; any thread can call the other members. With a LiveLight, no other
 ///            thread may read LiveLight::shown during `take`, which changes it.
 class LiveMeshes {
@@ -130,8 +129,8 @@ class LiveMeshes {
   /// Errors: bad_alloc, as `update`.
   [[nodiscard]] std::vector<SurfaceUpdate> take(std::size_t max_bytes = std::numeric_limits<std::size_t>::max());
 
-  /// Returns the number of the newest update whose edits were all taken, and those of all earlier updates. Chunks that
-  /// are returned one by one do not count.
+  /// Returns the greatest n such that the edits of updates 1 to n were all taken. Chunks that are returned one by one
+  /// do not count.
   [[nodiscard]] std::uint64_t shown_update() const;
   /// Returns the number of chunks whose newest surface has not been taken yet, plus 1 while light is computed for them,
   /// or if memory ran out since the last successful `update`.

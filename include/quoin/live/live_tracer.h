@@ -23,10 +23,11 @@ struct LiveTracerOptions {
 /// Exact:    the tracer shown always equals a tracer built from the scene at one moment, `shown().scene()`. Results
 ///           have the instance positions, voxels and types at that moment. The delay depends on the threads. Once edits
 ///           stop, `take` eventually shows the current scene.
-/// Late:     a body that moves by the shown tracer can enter a voxel placed since, and is then inside it
-///           (`depenetration`). A small scene in which it must not is traced by a SceneTracer.
-/// Memory:   twice that of a SceneTracer: one is shown while the other is updated. An update applies the changes of
-///           two updates, each once to each tracer.
+/// Late:     results are a few frames old. A body that moves by them can end up inside a voxel that was placed
+///           meanwhile; `depenetration` finds the way out. If this must not happen, use a SceneTracer; its updates are
+///           fast enough for small scenes.
+/// Memory:   twice as much as a SceneTracer. One tracer is shown while the other is updated, so each change is applied
+///           twice, once to each.
 /// Lifetime: the scene is read only during calls.
 /// Threads:  calls must not overlap. Any number of threads can use the shown tracer until the next `take`.
 class LiveTracer {

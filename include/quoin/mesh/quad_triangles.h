@@ -68,7 +68,8 @@ struct QuadVertex {
   std::uint8_t corner = 0;     ///< 0..3
   std::uint8_t occlusion = 0;  ///< 0 (open) to 3 (dark)
   VoxelType type = kAir;
-  /// Voxels from corner 0 along the quad's u and v: texture coordinates that repeat with every voxel.
+  /// Voxels from corner 0 along the quad's u and v (`frame_of`): texture coordinates that repeat with every voxel. +y
+  /// is along u on +X and -Z, and along v on -X and +Z: docs/games.md, "Textures", keeps images upright.
   int u = 0;
   int v = 0;
 };

@@ -27,7 +27,7 @@ enum class VertexAttribute : std::uint8_t {
   /// Brightness after occlusion: 1 - occlusion / 4 for blocks, 1 - occlusion for smooth meshes, 1 without occlusion.
   Brightness,
   Type,
-  Uv,  ///< voxels from the quad's corner 0, along its u and v: 0 to 64
+  Uv,  ///< voxels from the quad's corner 0, along its u and v: 0 to 64. For textures: see QuadVertex::u
 };
 
 /// Memory format of an attribute: native byte order, no padding between components.

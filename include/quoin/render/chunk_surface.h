@@ -62,11 +62,12 @@ struct ChunkSurface {
   [[nodiscard]] std::size_t upload_bytes() const { return converted_bytes != 0 ? converted_bytes : bytes(); }
 };
 
-/// A new surface of a chunk.
+/// A new surface of a chunk. It replaces the former one of the same grid, content and chunk. Draw it once for each
+/// shown instance of the grid, at world_from_grid(instance, grid); its chunk starts at grid point 64 * `chunk`.
 struct SurfaceUpdate {
   GridHandle grid;
   IVec3 chunk{0};
-  std::shared_ptr<const ChunkSurface> surface;  ///< null: the chunk no longer has a surface
+  std::shared_ptr<const ChunkSurface> surface;  ///< null: the chunk has no surface now; delete its buffers
   SurfaceContent content = SurfaceContent::Voxels;
   /// Bit mask of changed regions. Bit x + n (y + n z), with n = 64 / region_edge, is set if the quads of region
   /// (x, y, z) differ from the previous surface, are new or were removed. Smooth surfaces have one region.

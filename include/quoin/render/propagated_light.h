@@ -68,8 +68,8 @@ struct PropagatedLightOptions {
 /// Cost:    an update costs O(rows of 64 voxels within reach of the edits, and of sky columns that the edits open or
 ///          close), times the levels. The first update takes some tenths of a millisecond per chunk. A chunk that a
 ///          partial grid loads or unloads costs as an edit of its voxels; a chunk of air costs nothing.
-/// Memory:  one bit per voxel, channel and bit of the level where a slab of 64x4x4 voxels is not uniform; less where
-///          rows are equal.
+/// Memory:  at most 16 bits per voxel (4 channels of 4 bits), and only for channels that are not uniform in a slab of
+///          64x4x4 voxels. Parts of rows that equal the row before are not stored.
 /// Threads: any number can read and take snapshots at once; an update needs exclusive access. A snapshot is
 ///          independent: LiveLight updates on a worker while the game shows the earlier state.
 /// Source:  levels as in block games; spread by whole 64-bit words instead of a queue.
@@ -84,8 +84,8 @@ class PropagatedLight {
   /// emission of types changed. If it throws (bad_alloc), the next update starts from scratch.
   void update(const Grid& grid, const VoxelRegistry& types, Threads threads = {});
 
-  /// Returns a copy of the current light; later updates do not affect the copy, nor the reverse. A change cursor of
-  /// either object is valid in the other until the snapshot itself is updated, which continues from its own state.
+  /// Returns a copy of the current light. The two are independent. A cursor of one is also valid in the other until the
+  /// snapshot itself is updated.
   /// Cost: some pointers. An update copies only the shared slabs of 64x4x4 voxels that it changes.
   [[nodiscard]] PropagatedLight snapshot() const;
 
@@ -176,7 +176,7 @@ struct GridLight {
 ///   const GridLight of = light.of(handle);
 ///   SurfaceLight surface(*of.light, *of.voxels, scene.types);
 ///
-/// Fields: a solid sample blocks light like the voxel whose minimum corner it is, which is half a voxel off.
+/// Fields: a solid sample (i, j, k) blocks light like voxel (i, j, k), so the light is shifted by half a voxel.
 /// Cost:   an update costs PropagatedLight::update for the changes plus a check per grid. Fields are updated by whole
 ///         chunks.
 class SceneLight {

@@ -24,9 +24,9 @@ namespace quoin {
 /// A point or spot light without geometry. Emissive voxels also light surfaces, but are not lamps.
 ///
 /// Intensity falls off with the squared distance, times 1 - (distance / range)^4, as glTF's KHR_lights_punctual
-/// recommends. A lamp also ends, with the same smooth cut-off, at the distance where it would add less than 1/4096. A
-/// lamp gives no light if its intensity or range is not positive, if its position, colour or intensity is not finite,
-/// or, for a spot, if its direction is zero or its direction or angles are not finite.
+/// recommends. The same cut-off also ends the light at the distance where the lamp would add less than 1/4096. A lamp
+/// gives no light if its intensity or range is not positive, if its position, colour or intensity is not finite, or,
+/// for a spot, if its direction is zero or its direction or angles are not finite.
 struct Lamp {
   enum class Kind : std::uint8_t {
     Point,  ///< shines equally in all directions
@@ -63,9 +63,9 @@ struct SceneGrid {
   /// World files (.quoin) leave out the grid and its instances if false: see `is_saved`. Must stay true for a grid that
   /// StreamedWorld streams.
   bool saved = true;
-  /// Stored in world files: true if StreamedWorld loads all of the grid when it opens the file, false if it loads the
-  /// chunks around viewers, later and only while a viewer is near. Set it for small grids: props, vehicles. A
-  /// StreamedWorld also stores the grids that the program adds to its scene as whole.
+  /// Stored in world files. If true, StreamedWorld loads all of the grid when it opens the file; if false, it loads
+  /// only the chunks near viewers. Set it for small grids: props, vehicles. Grids that the program adds to the scene of
+  /// a StreamedWorld (Scene::add_grid) are stored with `whole` set.
   bool whole = false;
 
   /// Returns the smallest integer box around the voxels and the field's solid; empty if there are none.
@@ -164,8 +164,8 @@ class Scene {
   Scene(Scene&&) noexcept;
   Scene& operator=(Scene&&) noexcept;
   ~Scene();
-  /// Returns a copy of the scene as it is now; later changes to either do not affect the other. Change cursors of this
-  /// scene also work on the snapshot, and the reverse, until the snapshot is changed itself.
+  /// Returns a copy of the scene as it is now. The two are independent. A cursor of one is also valid in the other
+  /// until the snapshot itself is changed.
   /// Cost: one pointer per grid and a copy of each instance; well below 1 microsecond each, at any grid size.
   [[nodiscard]] Scene snapshot() const;
 

@@ -77,11 +77,12 @@ struct StreamOptions {
   /// Opening a world fails with LimitExceeded and the name of a grid if they need more, or more than the available
   /// memory.
   std::size_t max_whole_bytes = std::numeric_limits<std::size_t>::max();
-  /// Returns the bytes held elsewhere for loaded chunks: meshes, trees, light, GPU memory. `update` calls it ten times
-  /// per second. May be empty.
+  /// Returns the bytes held elsewhere for loaded chunks: meshes, trees, light, GPU memory. No other derived data counts
+  /// in the budget. `update`, `plan` and `load_all` call it on their thread, at most ten times per second. May be
+  /// empty.
   std::function<std::size_t()> other_bytes{};
-  /// Time in which one `update` call moves chunks, in seconds; it loads or unloads at least one chunk. While few chunks
-  /// wait, it uses less: it moves them over several calls.
+  /// Maximum time in which one `update` call adds and unloads chunks, in seconds; at least one chunk per call. If few
+  /// chunks wait, `update` spreads them over several calls.
   double update_seconds = 0.0005;
   /// Minimum time between two saves in `update`; 0: saves in every call.
   std::chrono::milliseconds save_interval{1000};
@@ -168,6 +169,7 @@ class StreamedWorld {
   /// Returns the warnings, sun and cameras read when the world was opened, as `load_world` does. For the scene, call
   /// `scene()`.
   [[nodiscard]] const LoadedScene& opened() const;
+  /// Sets the cameras that the next save stores in the file, as WorldSaver::set_view.
   void set_view(WorldView view);
   /// Returns the extent of the file's chunks and of the generators. Cost: O(stored chunks + instances). Errors:
   /// CannotRead.
@@ -178,8 +180,9 @@ class StreamedWorld {
   /// marked as not saved or as whole; as WorldSaver::save.
   Result<GridHandle> add_grid(SceneGrid grid, std::shared_ptr<const ChunkGenerator> generator = nullptr);
   /// Sets the generator for a grid's chunks that are not in the file. Call it before the first `update`, `plan`,
-  /// `load_all` or `flush`: until then no chunk of a grid from the file is loaded, but then it is limited to its stored
-  /// chunks, and edits can fill the air around them. Later, loaded chunks stay as they are.
+  /// `load_all` or `flush`. After the first of these calls, a grid from the file without a generator has only its
+  /// stored chunks; all other chunks count as loaded air and can be edited. A generator that is set later does not
+  /// change chunks that are in memory or in the file.
   /// Cost: O(stored and loaded chunks). If it throws bad_alloc, nothing has changed. `take_problems` reports errors.
   /// Requires: the scene has the grid. Whole grids have no generator: the call does nothing, and `take_problems`
   /// reports it.
@@ -194,7 +197,10 @@ class StreamedWorld {
   /// Cost:   StreamOptions::update_seconds for moving chunks; plus WorldSaver::save for the edits when a save is due.
   /// Errors: as WorldSaver::save; unsaved edits stay in memory and the save is retried. bad_alloc.
   Status update(std::span<const Viewer> viewers);
-  /// Does the part of `update` that only reads the scene. Another thread can draw the scene during the call.
+  /// Does the part of `update` that only reads the scene: finds edits, saves if a save is due, requests chunks. Another
+  /// thread can draw the scene during the call. Exception: the first call after `open` limits the grids that have no
+  /// generator (see `use_generator`). A game with a render thread calls `plan` each frame, and stops drawing for
+  /// `update` only if `has_chunks_to_move`.
   /// Errors: as `update`.
   Status plan(std::span<const Viewer> viewers);
   /// Returns true if the next `update` has chunks to add or unload, as of the last `plan`.
