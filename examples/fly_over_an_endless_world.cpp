@@ -1,6 +1,9 @@
 // A game loop in an endless world. Only chunks around the player are in memory: they are generated, edited, saved and
 // released on the way, and rendered at the end. The next run loads the edits. The player keeps above the ground, which
 // rays find: a LiveTracer prepares them on a worker, so that frames never wait for it.
+//
+// usage: example_fly_over_an_endless_world [WORLD [IMAGE]]
+//   WORLD is created or continued. Without arguments, it replaces endless.quoin, and writes endless.png.
 
 #include <algorithm>
 #include <cstdio>

@@ -1,4 +1,7 @@
 // A game that resumes where it stopped: a loop with edits and saves. The next run loads the saved world.
+//
+// usage: example_keep_a_world [WORLD]
+//   WORLD is created or continued. Without arguments, it replaces kept.quoin.
 
 #include <cstdio>
 #include <cstring>
