@@ -14,8 +14,8 @@ namespace quoin {
 ///
 /// Resident memory then follows the memory in use. Programs that stream worlds need this to keep their memory budget;
 /// without it they use about 20 % more. Call it first in `main`.
-/// Cost:     8 to 20 % more processor time in a streamed world, because the system must supply new pages. The thread
-///           that frees a block pays for its release. Workers free surfaces of LiveMeshes and unloaded chunks of
+/// Cost:     8 to 20 % more processor time in a streamed world, because the system must supply new pages. Each block's
+///           release takes time of the thread that frees it. Workers free surfaces of LiveMeshes and unloaded chunks of
 ///           StreamedWorld; large blocks of the program itself are freed by its own threads.
 /// Returns:  false, without a change, if the C library is not glibc. Has no effect if another allocator replaces
 ///           malloc.

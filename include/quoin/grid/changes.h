@@ -119,8 +119,8 @@ struct RowChange {
 ///
 /// Order:    chunks by z, y, x; within a chunk, rows by z, then y.
 /// Limits:   a voxel that changed and changed back is not reported. In flowing water, for example, each voxel is
-///           replaced by an equal one, so the inside does not seem to change. A rule must therefore check the voxels
-///           that it moves itself (examples/falling_sand.cpp).
+///           replaced by an equal one, so the inside does not seem to change. A rule must therefore check all
+///           voxels that it moves itself (examples/falling_sand.cpp).
 /// Partial:  chunks that are unloaded in at least one of the two states are skipped.
 /// Cost:     O(changed slabs). Chunks shared by both states cost nothing.
 void visit_changes(const Grid& before, const Grid& now, const GridChanges& changes,

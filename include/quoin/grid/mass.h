@@ -54,8 +54,8 @@ using DensityOfType = FunctionRef<double(VoxelType)>;
 /// material. Samples beyond the field's chunks are air.
 ///
 /// Rule:  a cell between eight solid samples is solid. A cell with solid and other samples consists of 4x4x4 parts: a
-///        part is solid if the trilinear field is negative at its centre. The solid part of a cell has the mean density
-///        of the cell's solid samples.
+///        part is solid if the trilinear field is negative at its centre. The solid part of a cell has the mean of the
+///        densities of its solid samples.
 /// Cost:  O(rows of 64 cells with solid + cells that the surface crosses, 64 values each).
 [[nodiscard]] MassProperties mass_properties(const DensityGrid& field, DensityOfType density);
 
