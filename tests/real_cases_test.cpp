@@ -14,7 +14,7 @@
 #include <quoin/io/vox.h>
 #include <quoin/scene/scene.h>
 
-#include "core/bytes/byte_stream.h"
+#include "io/byte_stream.h"
 #include "io/vox/write/vox_parts.h"
 
 namespace quoin {

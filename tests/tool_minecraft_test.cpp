@@ -6,7 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/bytes/byte_stream.h"
+#include "io/byte_stream.h"
 #include "io/minecraft/nbt.h"
 #include "tool_for_tests.h"
 

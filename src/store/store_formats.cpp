@@ -1,26 +1,12 @@
 #include "store/store_formats.h"
 
-#include <bit>
-#include <string_view>
-
+#include <quoin/io/image_files.h>
 #include <quoin/store/world_saver.h>
 
-#include "core/bytes/bytes.h"
 #include "io/format_driver.h"
+#include "io/scene_file/scene_parts.h"
 
 namespace quoin {
-
-namespace {
-
-constexpr std::string_view kSqliteHeader{"SQLite format 3\0", 16};
-constexpr std::size_t kIdAt = 68;  // the application id
-
-}  // namespace
-
-bool is_world_format(std::span<const std::byte> beginning) {
-  return beginning.size() >= kWorldHeaderBytes && text_of(beginning).starts_with(kSqliteHeader) &&
-         load<std::uint32_t>(beginning.data() + kIdAt, std::endian::big) == kWorldApplicationId;
-}
 
 namespace {
 
@@ -48,6 +34,8 @@ constinit const FormatDriver kWorldFormat = {
 
 }  // namespace quoin
 
-// Registers the format before main. The library's users link with `-u quoin_store_formats` (see CMakeLists.txt), since
-// linkers drop objects of a static library that nothing refers to.
-extern "C" [[gnu::visibility("hidden")]] const bool quoin_store_formats = quoin::register_format(quoin::kWorldFormat);
+// Part of the library of formats: registers the format of worlds with it, and its reader of sky images with the core
+// library, before main. Users link with `-u quoin_store_formats` (see CMakeLists.txt), since linkers drop objects of a
+// static library that nothing refers to.
+extern "C" [[gnu::visibility("hidden")]] const bool quoin_store_formats =
+    quoin::register_format(quoin::kWorldFormat) && quoin::scene_json::register_sky_reader(quoin::read_radiance);

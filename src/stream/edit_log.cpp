@@ -1,6 +1,5 @@
-#include <zlib.h>
-
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <string_view>
 #include <tuple>
@@ -23,9 +22,23 @@ auto order_of(const LoggedEdit& each) {
   return std::tuple(each.number, each.author);
 }
 
+// The CRC-32 of each byte value: polynomial 0xEDB88320, lowest bit first.
+constexpr std::array<std::uint32_t, 256> kChecksums = [] {
+  std::array<std::uint32_t, 256> table{};
+  for (std::uint32_t value = 0; value < table.size(); ++value) {
+    std::uint32_t rest = value;
+    for (int bit = 0; bit < 8; ++bit) rest = (rest >> 1) ^ ((rest & 1) != 0 ? 0xEDB88320U : 0U);
+    table[value] = rest;
+  }
+  return table;
+}();
+
+// Not with zlib, which the core library does not link.
 std::uint32_t checksum_of(std::span<const std::byte> bytes) {
-  return static_cast<std::uint32_t>(
-      crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));  // NOLINT: zlib's bytes
+  std::uint32_t rest = ~0U;
+  for (const std::byte byte : bytes)
+    rest = (rest >> 8) ^ kChecksums[(rest ^ std::to_integer<std::uint32_t>(byte)) & 255];
+  return ~rest;
 }
 
 /// Writes an edit's content as bytes. `visit_fields` describes each kind for reading and writing.

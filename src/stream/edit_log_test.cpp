@@ -1,3 +1,7 @@
+#include <zlib.h>
+
+#include <bit>
+#include <cstdint>
 #include <limits>
 #include <span>
 #include <utility>
@@ -6,6 +10,7 @@
 #include <gtest/gtest.h>
 #include <quoin/stream/world_edit.h>
 
+#include "core/bytes/bytes.h"
 #include "core/death_for_tests.h"
 
 namespace quoin {
@@ -28,6 +33,23 @@ TEST(EditLog, RoundTripsThroughBytes) {
   ASSERT_TRUE(read.has_value()) << to_string(read.error());
   EXPECT_EQ(read->edits(), log.edits());
   EXPECT_TRUE(EditLog::decode(EditLog().encode())->empty());
+}
+
+// As gzip does: other programs read these files.
+TEST(EditLog, StoresTheCrc32OfZlib) {
+  const std::vector<std::byte> bytes = some_log(1).encode();
+  constexpr std::size_t kHeader = 12;
+  constexpr std::size_t kEditHeader = 8;
+  int edits = 0;
+  for (std::size_t at = kHeader; at < bytes.size();) {
+    const auto size = load<std::uint32_t>(&bytes[at], std::endian::little);
+    const auto checksum = load<std::uint32_t>(&bytes[at + 4], std::endian::little);
+    const auto* const body = reinterpret_cast<const Bytef*>(&bytes[at + kEditHeader]);
+    EXPECT_EQ(checksum, crc32(0, body, size)) << at;
+    at += kEditHeader + size;
+    ++edits;
+  }
+  EXPECT_EQ(edits, 6);
 }
 
 TEST(EditLog, DetectsEveryFlippedByte) {

@@ -12,9 +12,9 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/bytes/byte_stream.h"
 #include "core/bytes/bytes.h"
 #include "core/bytes/text.h"
+#include "io/byte_stream.h"
 #include "io/format_driver.h"
 #include "io/minecraft/block_looks.h"
 #include "io/models/model_builder.h"

@@ -20,8 +20,8 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/bytes/byte_stream.h"
 #include "core/bytes/bytes.h"
+#include "io/byte_stream.h"
 
 namespace quoin::luanti {
 

@@ -16,9 +16,9 @@
 #include <quoin/core/assert.h>
 #include <quoin/io/file.h>
 
-#include "core/bytes/byte_stream.h"
 #include "core/bytes/bytes.h"
 #include "core/bytes/files.h"
+#include "io/byte_stream.h"
 
 #ifdef QUOIN_HAVE_ZSTD
 #include <zstd.h>

@@ -15,8 +15,8 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/bytes/byte_stream.h"
 #include "core/bytes/text.h"
+#include "io/byte_stream.h"
 #include "io/minecraft/block_looks.h"
 #include "io/minecraft/block_types.h"
 #include "io/minecraft/nbt.h"

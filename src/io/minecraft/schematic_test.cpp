@@ -7,7 +7,7 @@
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 
-#include "core/bytes/byte_stream.h"
+#include "io/byte_stream.h"
 #include "io/minecraft/block_types.h"
 #include "io/minecraft/minecraft_for_tests.h"
 #include "io/minecraft/nbt.h"

@@ -11,8 +11,8 @@
 
 #include <quoin/core/thousands.h>
 
-#include "core/bytes/byte_stream.h"
 #include "core/work/progress_steps.h"
+#include "io/byte_stream.h"
 #include "io/minecraft/block_looks.h"
 #include "io/minecraft/block_types.h"
 #include "io/minecraft/minecraft.h"

@@ -9,8 +9,8 @@
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 
-#include "core/bytes/byte_stream.h"
 #include "core/death_for_tests.h"
+#include "io/byte_stream.h"
 #include "io/format_driver.h"
 #include "io/image/image_codecs.h"
 #include "io/models/model_builder.h"

@@ -17,10 +17,10 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/bytes/byte_stream.h"
 #include "core/bytes/bytes.h"
 #include "core/bytes/text.h"
 #include "core/work/progress_steps.h"
+#include "io/byte_stream.h"
 #include "io/format_driver.h"
 #include "io/models/model_builder.h"
 #include "io/placed_grids.h"

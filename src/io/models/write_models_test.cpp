@@ -12,8 +12,8 @@
 #include <quoin/io/formats.h>
 #include <quoin/io/volume.h>
 
-#include "core/bytes/byte_stream.h"
 #include "core/bytes/bytes.h"
+#include "io/byte_stream.h"
 #include "io/format_driver.h"
 #include "io/placed_grids.h"
 

@@ -9,8 +9,8 @@
 #include <quoin/io/formats.h>
 #include <quoin/io/vox.h>
 
-#include "core/bytes/byte_stream.h"
 #include "core/bytes/text.h"
+#include "io/byte_stream.h"
 #include "io/gltf/glb_for_tests.h"
 #include "io/scene_file/voxel_data.h"
 #include "io/vox/write/vox_parts.h"

@@ -14,8 +14,8 @@
 #include <quoin/io/formats.h>
 #include <quoin/io/scene_file.h>
 
-#include "core/bytes/byte_stream.h"
 #include "core/bytes/text.h"
+#include "io/byte_stream.h"
 
 namespace quoin {
 namespace {

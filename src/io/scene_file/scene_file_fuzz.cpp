@@ -5,8 +5,8 @@
 #include <glm/geometric.hpp>
 #include <quoin/io/scene_file.h>
 
-#include "core/bytes/byte_stream.h"
 #include "core/bytes/text.h"
+#include "io/byte_stream.h"
 #include "io/scene_file/voxel_data.h"
 
 namespace {

@@ -11,8 +11,8 @@
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 
-#include "core/bytes/byte_stream.h"
 #include "core/bytes/text.h"
+#include "io/byte_stream.h"
 #include "io/gltf/glb_for_tests.h"
 #include "io/scene_file/voxel_data.h"
 

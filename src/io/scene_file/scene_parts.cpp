@@ -14,7 +14,6 @@
 #include <glm/geometric.hpp>
 
 #include <quoin/core/assert.h>
-#include <quoin/io/image_files.h>
 
 #include "core/bytes/text.h"
 
@@ -569,12 +568,29 @@ Environment environment_from(const Json& json, const Place& place, Faults& fault
   return environment;
 }
 
+namespace {
+
+// Written before main only.
+constinit SkyReader sky_reader = nullptr;
+
+Result<RadianceImage> read_image(const std::filesystem::path& path) {
+  if (sky_reader != nullptr) return sky_reader(path);
+  return make_error(ErrorCode::Unsupported, "the program is linked without quoin::quoin, which reads images");
+}
+
+}  // namespace
+
+bool register_sky_reader(SkyReader reader) {
+  sky_reader = reader;
+  return true;
+}
+
 std::string read_sky_image(const std::filesystem::path& from, const LoadOptions& options, Sky& sky) {
   if (!options.sky_image || !lacks_image(sky)) return "";
   std::string reason = "load the scene by path, not from bytes";
   if (!from.empty()) {
     const auto path = sidecar_path(from, sky.image_file, options.sidecar_files);
-    auto image = path ? read_radiance(*path) : Result<RadianceImage>(path.error());
+    auto image = path ? read_image(*path) : Result<RadianceImage>(path.error());
     if (image) {
       sky.image = std::make_shared<const RadianceImage>(std::move(*image));
       return "";

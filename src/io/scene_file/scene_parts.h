@@ -60,6 +60,12 @@ class PartWriter {
 [[nodiscard]] Camera camera_of(const Json& json, const Place& place, Faults& faults);
 [[nodiscard]] Environment environment_from(const Json& json, const Place& place, Faults& faults);
 
+using SkyReader = Result<RadianceImage> (*)(const std::filesystem::path& path);
+
+/// Sets the function with which `read_sky_image` reads images. Returns true. The library of formats calls it before
+/// main; programs that link only the core library have none.
+bool register_sky_reader(SkyReader reader);
+
 /// Reads the sky's image, which a scene file or world names relative to itself. `from`: the path of this file; empty:
 /// it was read from bytes. Returns a warning, or "" if the image was read, or the sky or LoadOptions::sky_image needs
 /// none.

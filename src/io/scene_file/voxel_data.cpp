@@ -11,10 +11,10 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/half.h>
 
-#include "core/bytes/byte_stream.h"
 #include "core/bytes/bytes.h"
 #include "core/bytes/text.h"
 #include "core/work/progress_steps.h"
+#include "io/byte_stream.h"
 
 namespace quoin {
 namespace {

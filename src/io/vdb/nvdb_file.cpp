@@ -19,9 +19,9 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/bytes/byte_stream.h"
 #include "core/bytes/bytes.h"
 #include "core/bytes/text.h"
+#include "io/byte_stream.h"
 
 namespace quoin::vdb {
 

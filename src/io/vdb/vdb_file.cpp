@@ -11,9 +11,9 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/half.h>
 
-#include "core/bytes/byte_stream.h"
 #include "core/bytes/bytes.h"
 #include "core/bytes/text.h"
+#include "io/byte_stream.h"
 #include "io/vdb/vdb.h"
 
 #ifdef QUOIN_HAVE_LZ4

@@ -12,7 +12,7 @@
 #include <quoin/core/progress.h>
 #include <quoin/io/volume.h>
 
-#include "core/bytes/byte_stream.h"
+#include "io/byte_stream.h"
 
 namespace quoin {
 

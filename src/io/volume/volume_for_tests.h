@@ -10,8 +10,8 @@
 
 #include <quoin/io/volume.h>
 
-#include "core/bytes/byte_stream.h"
 #include "core/bytes/bytes.h"
+#include "io/byte_stream.h"
 
 /// Shared by the tests and the fuzz target of volumes.
 namespace quoin::volume_test {

@@ -1,4 +1,4 @@
-#include "core/bytes/byte_stream.h"
+#include "io/byte_stream.h"
 
 #include <quoin/core/assert.h>
 
