@@ -4,6 +4,10 @@ if(PROJECT_IS_TOP_LEVEL AND NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYP
   set(CMAKE_BUILD_TYPE Release CACHE STRING "Build type" FORCE)
 endif()
 set(CMAKE_CXX_EXTENSIONS OFF)
+# Hides all names, also those of private headers in tests. Public headers declare theirs in
+# `namespace [[gnu::visibility("default")]] quoin`.
+set(CMAKE_CXX_VISIBILITY_PRESET hidden)
+set(CMAKE_VISIBILITY_INLINES_HIDDEN ON)
 
 find_program(QUOIN_CCACHE ccache)
 if(QUOIN_CCACHE AND PROJECT_IS_TOP_LEVEL)
@@ -92,5 +96,18 @@ function(quoin_compile_options target)
     target_compile_options(${target} PUBLIC -fsanitize=thread -fno-omit-frame-pointer)
     target_link_options(${target} PUBLIC -fsanitize=thread)
     target_compile_definitions(${target} PRIVATE QUOIN_PARALLEL_WITH_JTHREAD)
+  endif()
+endfunction()
+
+# A shared library exports only the names that public headers declare, without instances of the standard library's
+# templates. `./dev abi` compares the names with committed lists.
+set(quoin_version_script "${CMAKE_CURRENT_LIST_DIR}/quoin_cpp.map")
+function(quoin_export_names target)
+  # Without a DEFINE_SYMBOL, both libraries have the same definitions, and share precompiled headers.
+  set_target_properties(${target} PROPERTIES DEFINE_SYMBOL "")
+  get_target_property(type ${target} TYPE)
+  if(type STREQUAL "SHARED_LIBRARY")
+    target_link_options(${target} PRIVATE "LINKER:--version-script=${quoin_version_script}")
+    set_target_properties(${target} PROPERTIES LINK_DEPENDS "${quoin_version_script}")
   endif()
 endfunction()

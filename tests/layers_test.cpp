@@ -304,6 +304,32 @@ TEST(Layers, PublicHeadersIncludeNoPrivateOnes) {
   }
 }
 
+// Shared libraries export what public headers declare in a namespace with this attribute. Types without a definition in
+// public headers are private, and hidden.
+TEST(Layers, PublicHeadersExportTheirNames) {
+  static const std::regex type(R"re(^ *(class|struct) (\w+)(;| final| :| \{|<))re");
+  std::set<std::string> declared;
+  std::set<std::string> defined;
+  for (const Source& source : sources_of("include/quoin")) {
+    std::ifstream in(source.file);
+    int exporting = 0;
+    for (std::string line; std::getline(in, line);) {
+      exporting += static_cast<int>(line == "namespace [[gnu::visibility(\"default\")]] quoin {");
+      EXPECT_FALSE(line.starts_with("namespace quoin")) << source.file;
+      std::smatch match;
+      // As above: regular expressions are slow.
+      if (line.find("class ") == std::string::npos && line.find("struct ") == std::string::npos) continue;
+      if (std::regex_search(line, match, type)) (match[3] == ";" ? declared : defined).insert(match[2]);
+    }
+    EXPECT_EQ(exporting, source.path == "quoin.h" ? 0 : 1) << source.file;
+  }
+  EXPECT_GT(defined.size(), 100);
+  for (const std::string& name : declared) {
+    if (name.starts_with("Vk")) continue;  // Vulkan's
+    EXPECT_TRUE(defined.contains(name)) << name << " needs [[gnu::visibility(\"hidden\")]]";
+  }
+}
+
 // A header that serves a single source belongs in that source, unless it is long enough to be read by itself.
 TEST(Layers, SmallHeadersWithoutASourceAreShared) {
   const std::set<std::string> choices = {"lanes.h"};  // one of several, chosen by the flags of the including source

@@ -11,7 +11,7 @@
 #define QUOIN_QUOTE_EXPANDED(x) #x
 #define QUOIN_QUOTE(x) QUOIN_QUOTE_EXPANDED(x)
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Returns "MAJOR.MINOR.PATCH".
 [[nodiscard]] constexpr std::string_view version() {

@@ -28,7 +28,7 @@ template <class Content>
 /// A block is freed with its last object, so an object that outlives the others keeps up to kMost objects' memory.
 /// Requires: all objects of one BulkMemory have the same size.
 /// Threads:  one. The objects can be destroyed on any thread.
-class BulkMemory {
+class [[gnu::visibility("hidden")]] BulkMemory {
  public:
   static constexpr std::size_t kMost = 32;
 

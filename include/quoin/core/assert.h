@@ -2,7 +2,7 @@
 
 #include <source_location>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// A broken contract: a documented `Requires:` that did not hold, or a broken internal invariant, which is a bug in
 /// Quoin.

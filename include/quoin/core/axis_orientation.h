@@ -12,7 +12,7 @@
 #include <quoin/core/direction.h>
 #include <quoin/core/vec.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// An orientation that maps the coordinate axes onto each other: a signed axis permutation. There are 48 of them. 24
 /// are rotations by quarter turns; the other 24 combine such a rotation with a mirror.

@@ -8,7 +8,7 @@
 
 #include <quoin/core/assert.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// A growable array of trivially copyable values that leaves new elements uninitialised. Use it for large output that
 /// is rebuilt often. It can be moved but not copied. Pointers and iterators stay valid until the buffer grows beyond

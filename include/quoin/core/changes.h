@@ -6,7 +6,7 @@
 
 #include <quoin/core/vec.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Returns a serial number that is unique in this process and never 0. Identifies journals and slot-map elements.
 /// Threads: any.
@@ -109,8 +109,8 @@ class PendingChanges {
 
 // Part of the layout of Grid and DensityGrid; not for callers.
 
-class BulkMemory;
-class ChangeNotifiers;
+class [[gnu::visibility("hidden")]] BulkMemory;
+class [[gnu::visibility("hidden")]] ChangeNotifiers;
 
 /// Notifies the owner of a container about edits, for example the scene that owns a grid. The notifier stays with
 /// its container object when the container's content is moved.

@@ -12,7 +12,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// The six face directions. The value is also the bit index in a visible-face mask.
 enum class Direction : std::uint8_t { PosX = 0, NegX = 1, PosY = 2, NegY = 3, PosZ = 4, NegZ = 5 };

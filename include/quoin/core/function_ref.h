@@ -4,7 +4,7 @@
 #include <type_traits>
 #include <utility>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 template <class Signature>
 class FunctionRef;

@@ -3,7 +3,7 @@
 #include <bit>
 #include <cstdint>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// The bits of an IEEE 754 half: 11 bits of precision, largest value 65,504, smallest positive value 2^-24.
 using Half = std::uint16_t;

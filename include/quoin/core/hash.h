@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Mixes the bits of a word. Every input bit changes about half of the output bits.
 ///

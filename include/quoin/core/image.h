@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// An 8-bit sRGB image as stored in files. Rows run from the top, pixels from the left; channels are interleaved.
 struct Image {

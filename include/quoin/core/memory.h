@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <optional>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Returns the memory still available to this process, in bytes. Exceeding it can end the process. The result is the
 /// lowest of three limits: available system memory plus swap, the cgroup limit, and RLIMIT_AS. Returns nullopt if the

@@ -4,7 +4,7 @@
 
 #include <quoin/core/function_ref.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// The number of threads that a call may use. 0 uses all hardware threads.
 struct Threads {

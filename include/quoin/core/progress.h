@@ -2,7 +2,7 @@
 
 #include <functional>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// A progress callback. Called with a non-decreasing fraction in [0, 1]. Return false to cancel.
 ///

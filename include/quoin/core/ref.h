@@ -7,7 +7,7 @@
 
 #include <quoin/core/assert.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Base class that counts the owners of a copy-on-write object; owners hold it by Ref. A copy of the object starts
 /// without owners.

@@ -12,7 +12,7 @@
 #error "Xlib.h defines Status and None as macros: include Quoin before it, or #undef them first"
 #endif
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 enum class ErrorCode : std::uint8_t {
   InvalidArgument,  ///< The caller passed an invalid argument (a size of 0, an unknown option value).

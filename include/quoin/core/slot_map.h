@@ -12,7 +12,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/changes.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// A handle to an element of a SlotMap<T>. It becomes invalid for good when the element is removed. A default handle is
 /// invalid.

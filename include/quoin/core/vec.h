@@ -17,7 +17,7 @@
 #error "Quoin needs glm's quaternions as they are by default: stored as x, y, z, w and made of (w, x, y, z)"
 #endif
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Integer voxel or chunk coordinates.
 using IVec3 = glm::ivec3;

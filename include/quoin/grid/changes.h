@@ -15,7 +15,7 @@
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/voxel_registry.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 class Grid;
 class DensityGrid;

@@ -14,7 +14,7 @@
 #include <quoin/core/vec.h>
 #include <quoin/grid/voxel_registry.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Maximum number of data bytes per voxel.
 inline constexpr std::size_t kMaxVoxelDataBytes = std::size_t{1} << 16;
@@ -38,8 +38,8 @@ struct VoxelData {
   }
 };
 
-class ChunkData;
-struct ChunkStorage;
+class [[gnu::visibility("hidden")]] ChunkData;
+struct [[gnu::visibility("hidden")]] ChunkStorage;
 
 /// The box of all voxels of a chunk, in chunk coordinates.
 inline constexpr IBox kWholeChunk = {IVec3{0}, IVec3{kChunkEdge}};

@@ -15,7 +15,7 @@
 #include <quoin/grid/mass.h>
 #include <quoin/grid/voxel_registry.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Defines connected voxels: sharing a face, or sharing at least a face, an edge or a corner.
 enum class Connectivity : std::uint8_t { Faces6, Corners26 };
@@ -101,7 +101,7 @@ class ConnectedPieces {
 
  private:
   friend MassProperties mass_properties(const ConnectedPieces& pieces, std::size_t piece, DensityOfType density);
-  struct Impl;
+  struct [[gnu::visibility("hidden")]] Impl;
   std::unique_ptr<Impl> impl_;
 };
 

@@ -9,7 +9,7 @@
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 struct CopyOptions {
   bool copy_air = true;  ///< false: air voxels of the box are not copied

@@ -12,7 +12,7 @@
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/voxel_registry.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Rounds a density to its stored half. The result is never NaN and never -0, and its magnitude is at most `band`.
 ///
@@ -23,7 +23,7 @@ namespace quoin {
 /// Requires: 0 < band.
 [[nodiscard]] Half stored_density(float density, float band);
 
-struct DensityStorage;
+struct [[gnu::visibility("hidden")]] DensityStorage;
 
 /// A chunk of 64^3 density samples with a material each. Densities are halves: negative is solid, 0 and above is air.
 ///

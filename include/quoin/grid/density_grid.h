@@ -15,7 +15,7 @@
 #include <quoin/grid/density_chunk.h>
 #include <quoin/grid/voxel_registry.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// The density and material of a sample.
 struct DensitySample {
@@ -191,7 +191,7 @@ class DensityGrid {
 
  private:
   friend class Scene;
-  struct Impl;
+  struct [[gnu::visibility("hidden")]] Impl;
   explicit DensityGrid(std::unique_ptr<Impl> impl);
   [[nodiscard]] DensityGrid snapshot(BulkMemory& memory) const;
   [[nodiscard]] inline Impl& impl() const;

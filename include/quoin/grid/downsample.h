@@ -11,7 +11,7 @@
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Halves the resolution of a grid: voxel c of the result covers the 2^3 voxels from 2 c to 2 c + 1 (a cell).
 ///
@@ -60,7 +60,7 @@ class GridPyramid {
   [[nodiscard]] const Grid& level(int level) const;
 
  private:
-  struct Impl;
+  struct [[gnu::visibility("hidden")]] Impl;
   std::unique_ptr<Impl> impl_;
 };
 
@@ -126,7 +126,7 @@ class DensityPyramid {
   [[nodiscard]] const DownsampledDensityCounts& counts(int level) const;
 
  private:
-  struct Impl;
+  struct [[gnu::visibility("hidden")]] Impl;
   std::unique_ptr<Impl> impl_;
 };
 

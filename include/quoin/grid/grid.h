@@ -16,7 +16,7 @@
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/voxel_registry.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// A voxel position and the type to set there.
 struct PlacedVoxel {
@@ -226,7 +226,7 @@ class Grid {
 
  private:
   friend class Scene;
-  struct Impl;
+  struct [[gnu::visibility("hidden")]] Impl;
   explicit Grid(std::unique_ptr<Impl> impl);
   [[nodiscard]] Grid snapshot(BulkMemory& memory) const;
   [[nodiscard]] inline Impl& impl() const;

@@ -8,7 +8,7 @@
 #include <quoin/grid/density_grid.h>
 #include <quoin/grid/grid.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 class ConnectedPieces;
 

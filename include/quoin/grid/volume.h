@@ -17,7 +17,7 @@
 #include <quoin/grid/density_grid.h>
 #include <quoin/grid/voxel_registry.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// The type in which a file or an array stores its values.
 enum class ScalarType : std::uint8_t {

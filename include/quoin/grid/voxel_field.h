@@ -9,7 +9,7 @@
 #include <quoin/grid/density_grid.h>
 #include <quoin/grid/grid.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Converts a voxel model to a rounded density field, the input of a smooth mesher. All voxels except air are solid.
 ///

@@ -15,7 +15,7 @@
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// The id of a voxel type: an index into a VoxelRegistry. 0 is air in every registry.
 using VoxelType = std::uint16_t;
@@ -154,7 +154,7 @@ class VoxelRegistry {
     std::size_t transparent_count = 0;
     std::size_t passable_count = 0;
   };
-  struct Journal;
+  struct [[gnu::visibility("hidden")]] Journal;
   void note(TypeChange change);
 
   Ref<Content> content_;

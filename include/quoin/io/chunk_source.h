@@ -21,7 +21,7 @@
 #include <quoin/io/loaded_scene.h>
 #include <quoin/scene/scene.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Properties of a source that are known before its chunks are read.
 struct ChunkSourceInfo {
@@ -99,7 +99,7 @@ class ChunkSource {
   ChunkSource(ChunkSourceInfo info, std::vector<IBox> parts);
 
  private:
-  struct Cache;
+  struct [[gnu::visibility("hidden")]] Cache;
   ChunkSourceInfo info_;
   std::vector<IBox> parts_;
   std::vector<std::uint32_t> by_position_;  // part indices, by z, x, y

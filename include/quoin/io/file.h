@@ -12,7 +12,7 @@
 
 #include <quoin/core/result.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// A regular file that is open for reading. Its content is that of the file which had the name when it was opened, also
 /// after another file has replaced it. Copies share the open file; the last one closes it.
@@ -30,7 +30,7 @@ class InputFile {
   [[nodiscard]] const std::filesystem::path& path() const;
 
  private:
-  struct Opened;
+  struct [[gnu::visibility("hidden")]] Opened;
   explicit InputFile(std::shared_ptr<const Opened> opened) : opened_(std::move(opened)) {}
   std::shared_ptr<const Opened> opened_;
 };

@@ -9,7 +9,7 @@
 
 #include <quoin/core/result.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// A file format, identified by its short name, as in `quoin info`: FileFormat("glb") equals FileFormat::Glb.
 class FileFormat {

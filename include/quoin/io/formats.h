@@ -14,7 +14,7 @@
 #include <quoin/io/loaded_scene.h>
 #include <quoin/scene/scene.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Returns a file name without folder and extension; also removes the extension inside gzip. NAME.vox and NAME.nii.gz
 /// both give NAME.

@@ -12,7 +12,7 @@
 #include <quoin/core/result.h>
 #include <quoin/scene/scene.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// The encoding of heights in an image (PNG).
 enum class HeightEncoding : std::uint8_t {

@@ -10,7 +10,7 @@
 #include <quoin/core/image.h>
 #include <quoin/core/result.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Writes an 8-bit RGB PNG, atomically. The same image always gives the same bytes. Returns the file's size; the
 /// overload without a path returns the bytes.

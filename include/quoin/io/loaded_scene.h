@@ -17,10 +17,10 @@
 #include <quoin/scene/scene.h>
 #include <quoin/voxelize/voxelize.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// The content of a .vox file that a Scene cannot hold, kept for saving: see write_vox.
-struct VoxSource;
+struct [[gnu::visibility("hidden")]] VoxSource;
 
 /// A numbered camera of a file.
 struct FileCamera {

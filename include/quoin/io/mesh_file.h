@@ -14,7 +14,7 @@
 #include <quoin/scene/scene_meshes.h>
 #include <quoin/voxelize/triangle_mesh.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// The storage of ambient occlusion in a mesh file.
 enum class OcclusionIn : std::uint8_t {

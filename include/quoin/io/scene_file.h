@@ -16,7 +16,7 @@
 #include <quoin/scene/environment.h>
 #include <quoin/scene/scene.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// The content of a scene file, before the files that it names are read; load_scene reads these too. The format:
 /// docs/scene-files.md.

@@ -12,7 +12,7 @@
 #include <quoin/grid/volume.h>
 #include <quoin/io/file.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 struct VolumeOptions {
   /// Maximum number of values; 2^30 values take 4 GiB. A few megabytes of gzip can hold that many.

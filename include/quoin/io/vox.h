@@ -11,7 +11,7 @@
 #include <quoin/io/loaded_scene.h>
 #include <quoin/scene/scene.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Reads MagicaVoxel's format, versions 150 and 200.
 ///

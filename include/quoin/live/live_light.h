@@ -6,9 +6,9 @@
 #include <quoin/render/propagated_light.h>
 #include <quoin/scene/scene.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
-class LightWorker;
+class [[gnu::visibility("hidden")]] LightWorker;
 class LiveMeshes;
 
 struct LiveLightOptions {

@@ -19,7 +19,7 @@
 #include <quoin/render/surface_light.h>
 #include <quoin/scene/scene.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// The result of LiveMeshOptions::convert. Any pointer that converts to a std::shared_ptr<const void> converts to it.
 struct ConvertedSurface {
@@ -149,7 +149,7 @@ class LiveMeshes {
   [[nodiscard]] Stats stats() const;
 
  private:
-  struct Impl;
+  struct [[gnu::visibility("hidden")]] Impl;
   std::unique_ptr<Impl> impl_;
 };
 

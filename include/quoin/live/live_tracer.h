@@ -6,7 +6,7 @@
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_tracer.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 struct LiveTracerOptions {
   InstanceFilter instances = InstanceFilter::Visible;  ///< instances that rays can hit
@@ -58,7 +58,7 @@ class LiveTracer {
   void finish(const Scene& scene);
 
  private:
-  struct Impl;
+  struct [[gnu::visibility("hidden")]] Impl;
   std::unique_ptr<Impl> impl_;
 };
 

@@ -9,7 +9,7 @@
 #include <quoin/core/vec.h>
 #include <quoin/grid/volume.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Selects which values are solid. Samples equal to the iso value are air.
 enum class SolidSide : std::uint8_t {

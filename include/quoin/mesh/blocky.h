@@ -19,7 +19,7 @@
 #include <quoin/mesh/quad.h>
 #include <quoin/mesh/visible_faces.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 struct QuadOptions {
   bool merge = true;           ///< false: one quad per visible unit face
@@ -59,7 +59,7 @@ class BlockyMesher {
   [[nodiscard]] std::int64_t count_faces(const Neighbourhood& chunks, const VoxelRegistry& types);
 
  private:
-  struct Scratch;
+  struct [[gnu::visibility("hidden")]] Scratch;
   std::unique_ptr<Scratch> scratch_;
 };
 

@@ -12,7 +12,7 @@
 #include <quoin/grid/volume.h>
 #include <quoin/mesh/array_surface.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 struct LabelSurfaceOptions {
   std::int64_t background = 0;  ///< label of empty space and of everything beyond the array

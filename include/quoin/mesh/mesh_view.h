@@ -12,7 +12,7 @@
 #include <quoin/mesh/blocky.h>
 #include <quoin/mesh/smooth_mesh.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// A non-owning view of one triangle surface, from any mesher. Vertex arrays have one entry per vertex. There are two
 /// kinds of view:

@@ -8,7 +8,7 @@
 #include <quoin/core/direction.h>
 #include <quoin/core/vec.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Occlusion at the four corners of a face, each 0 (open) to 3 (dark). Corners are in the order (0,0) (1,0) (1,1)
 /// (0,1) of the direction's (u, v): counter-clockwise from outside.

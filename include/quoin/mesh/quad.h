@@ -9,7 +9,7 @@
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/mesh/occlusion.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// One merged face, packed into a 64-bit word.
 ///

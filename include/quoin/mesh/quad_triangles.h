@@ -13,7 +13,7 @@
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/mesh/quad.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 // Conversion of quads to vertices and triangles. All meshers, writers and renderers use these functions.
 

@@ -8,7 +8,7 @@
 #include <quoin/core/vec.h>
 #include <quoin/grid/density_chunk.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Method that estimates the occlusion of a vertex from the 3x3x3 samples of the field around it. All methods give 0 in
 /// the open and 1 inside a solid.
@@ -139,7 +139,7 @@ class SmoothMesher {
   void mesh(const DensityNeighbourhood& chunks, const SmoothOptions& options, SmoothChunkMesh& out);
 
  private:
-  struct Scratch;
+  struct [[gnu::visibility("hidden")]] Scratch;
   std::unique_ptr<Scratch> scratch_;
 };
 

@@ -13,7 +13,7 @@
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/mesh/smooth.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Linear colour, 16 bits per channel: 65,535 is 1. Eight bits would show banding in dark colours.
 using LinearRgba16 = std::array<std::uint16_t, 4>;

@@ -11,7 +11,7 @@
 #include <quoin/grid/density_grid.h>
 #include <quoin/mesh/smooth.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Positions and normals for an occlusion query, in any order.
 ///
@@ -67,7 +67,7 @@ class SmoothOccluder {
                std::span<float> out);
 
  private:
-  struct Scratch;
+  struct [[gnu::visibility("hidden")]] Scratch;
   std::unique_ptr<Scratch> scratch_;
 };
 

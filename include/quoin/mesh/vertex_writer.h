@@ -14,7 +14,7 @@
 #include <quoin/mesh/quad_triangles.h>
 #include <quoin/mesh/smooth.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Vertex attribute.
 enum class VertexAttribute : std::uint8_t {

@@ -10,7 +10,7 @@
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/voxel_registry.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 // The face of a voxel of type `a` towards a voxel of type `b` is visible if `a` is not air, and `b` is air or a
 // transparent type other than `a`.

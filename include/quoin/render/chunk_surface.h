@@ -12,7 +12,7 @@
 #include <quoin/render/surface_light.h>
 #include <quoin/scene/scene.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 enum class SurfaceStyle : std::uint8_t { Blocky, Smooth };
 

@@ -16,7 +16,7 @@
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_tracer.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 struct RenderOptions {
   int width = 1280;
@@ -96,7 +96,7 @@ class CpuRenderer {
   [[nodiscard]] const SceneTracer& tracer() const;
 
  private:
-  struct Impl;
+  struct [[gnu::visibility("hidden")]] Impl;
   std::unique_ptr<Impl> impl_;
 };
 

@@ -16,7 +16,7 @@
 #include <quoin/scene/scene.h>
 #include <quoin/trace/occupancy_tree.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Number of view directions of an impostor. The views are, in this order:
 ///
@@ -26,7 +26,7 @@ namespace quoin {
 inline constexpr int kImpostorViews = 26;
 
 class DensityTree;
-struct ImpostorFaces;
+struct [[gnu::visibility("hidden")]] ImpostorFaces;
 
 struct ImpostorOptions {
   /// Texels per side of a view; doubled for grids wider than this number of voxels. Requires: 16 to 1,024.

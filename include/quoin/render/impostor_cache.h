@@ -10,7 +10,7 @@
 #include <quoin/render/impostor.h>
 #include <quoin/scene/scene.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 struct ImpostorCacheOptions {
   std::size_t max_bytes = std::size_t{1} << 30;  ///< of all held impostors
@@ -70,7 +70,7 @@ class ImpostorCache {
   [[nodiscard]] Stats stats() const;
 
  private:
-  struct Impl;
+  struct [[gnu::visibility("hidden")]] Impl;
   std::unique_ptr<Impl> impl_;
 };
 

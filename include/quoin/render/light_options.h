@@ -6,7 +6,7 @@
 #include <quoin/core/result.h>
 #include <quoin/mesh/smooth.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Method that computes ambient occlusion.
 enum class OcclusionMode : std::uint8_t {

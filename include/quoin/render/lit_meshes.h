@@ -7,7 +7,7 @@
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_meshes.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Bakes propagated light (LightModel::Propagated) into each vertex of a scene's meshes, so that mesh files show it.
 /// Fills MeshView::light with light, exposure and the type's emission, 16 bits per channel, at most 1. Vertices of

@@ -7,7 +7,7 @@
 #include <quoin/core/parallel.h>
 #include <quoin/render/path_tracer.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Keeps a progressive path-traced view converged across edits: regions that an edit did not change stay as free of
 /// noise as they were.

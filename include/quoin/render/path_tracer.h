@@ -16,7 +16,7 @@
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_tracer.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Settings of a path-traced image.
 struct PathOptions {
@@ -96,7 +96,7 @@ class PathTracer {
                                          const Progress& progress = {}) const;
 
  private:
-  struct Impl;
+  struct [[gnu::visibility("hidden")]] Impl;
   std::unique_ptr<Impl> impl_;
 };
 

@@ -18,7 +18,7 @@
 #include <quoin/scene/environment.h>
 #include <quoin/scene/scene.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Light levels at a voxel, 0 (dark) to 15: sky light, and lamp light in three colours.
 struct LightLevels {
@@ -109,7 +109,7 @@ class PropagatedLight {
   [[nodiscard]] std::size_t bytes() const;
 
  private:
-  struct Impl;
+  struct [[gnu::visibility("hidden")]] Impl;
   explicit PropagatedLight(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };
@@ -196,7 +196,7 @@ class SceneLight {
   [[nodiscard]] std::size_t bytes() const;
 
  private:
-  struct Entry;
+  struct [[gnu::visibility("hidden")]] Entry;
   PropagatedLightOptions options_;
   std::unique_ptr<Entry> unknown_;  // returned for unknown grids
   std::map<GridHandle, std::unique_ptr<Entry>> grids_;

@@ -14,7 +14,7 @@
 #include <quoin/mesh/smooth_occlusion.h>
 #include <quoin/render/propagated_light.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Light at the four corners of a face, in the order of FaceOcclusion, one word per corner: sky in the lowest byte,
 /// then red, green and blue. Units are twelfths of a level, 0 to 180; they represent means of up to four levels
@@ -75,7 +75,7 @@ class SurfaceLight {
   void read(const SmoothSamples& samples, std::span<MeanLevels> out);
 
  private:
-  struct Rows;
+  struct [[gnu::visibility("hidden")]] Rows;
   std::unique_ptr<Rows> rows_;
 };
 

@@ -21,7 +21,7 @@ struct VkCommandBuffer_T;
 struct VkImage_T;
 struct VkDeviceCreateInfo;
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Vulkan's VkImage handle. It is a pointer on 64-bit platforms, else an integer, as in vulkan.h unless the application
 /// defines VK_USE_64_BIT_PTR_DEFINES otherwise.

@@ -9,7 +9,7 @@
 #include <quoin/render/path_tracer.h>
 #include <quoin/render/vulkan_device.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// An application's VkImage, and the position in it to copy an image to (VulkanImage::record_copy).
 ///
@@ -82,7 +82,7 @@ class VulkanImage {
   [[nodiscard]] Status copy_to(const VulkanImageTarget& target) const;
 
   // For Quoin's own sources.
-  struct Impl;
+  struct [[gnu::visibility("hidden")]] Impl;
   [[nodiscard]] Impl& impl() const { return *impl_; }
 
  private:
@@ -115,7 +115,7 @@ class VulkanPathImage {
   [[nodiscard]] Result<PathImage> read(Threads threads = {}) const;
 
   // For Quoin's own sources.
-  struct Impl;
+  struct [[gnu::visibility("hidden")]] Impl;
   [[nodiscard]] Impl& impl() const { return *impl_; }
 
  private:

@@ -17,7 +17,7 @@
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 enum class Wireframe : std::uint8_t {
   Off,
@@ -111,7 +111,7 @@ class VulkanMeshRenderer {
   [[nodiscard]] Stats stats() const;
 
  private:
-  struct Impl;
+  struct [[gnu::visibility("hidden")]] Impl;
   explicit VulkanMeshRenderer(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };

@@ -14,7 +14,7 @@
 #include <quoin/scene/camera.h>
 #include <quoin/scene/scene.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Default size of a renderer's device memory blocks.
 inline constexpr std::uint64_t kVulkanBlockBytes = std::uint64_t{64} << 20;
@@ -124,7 +124,7 @@ class VulkanRenderer {
                                   Accumulation accumulation, const Progress& progress = {});
 
   // For Quoin's own sources.
-  struct Impl;
+  struct [[gnu::visibility("hidden")]] Impl;
   [[nodiscard]] Impl& impl() const { return *impl_; }
 
  private:

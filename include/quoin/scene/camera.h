@@ -12,7 +12,7 @@
 #include <quoin/scene/scene.h>
 #include <quoin/trace/ray.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// A camera in world space. `right`, `up` and `forward` are perpendicular unit vectors, right-handed:
 /// right = forward x up.

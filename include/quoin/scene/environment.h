@@ -11,7 +11,7 @@
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 // Upper limits of the settings of an Environment and its parts.
 inline constexpr double kMaxBrightness = 1e9;  ///< also the limit of light colours

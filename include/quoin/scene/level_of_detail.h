@@ -11,7 +11,7 @@
 #include <quoin/scene/camera.h>
 #include <quoin/scene/scene.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Level of detail of one instance.
 enum class Detail : std::uint8_t {
@@ -125,7 +125,7 @@ class DetailSelector {
               std::vector<SelectedInstance>& out);
 
  private:
-  struct Impl;
+  struct [[gnu::visibility("hidden")]] Impl;
   std::unique_ptr<Impl> impl_;
 };
 

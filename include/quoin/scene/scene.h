@@ -19,7 +19,7 @@
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/scene/environment.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// A point or spot light without geometry. Emissive voxels also light surfaces, but are not lamps.
 ///
@@ -223,7 +223,7 @@ class Scene {
   [[nodiscard]] DBox bounds(InstanceFilter filter = InstanceFilter::Visible) const;
 
  private:
-  struct Book;
+  struct [[gnu::visibility("hidden")]] Book;
   [[nodiscard]] Book& book() const;
   [[nodiscard]] std::size_t keys() const;
   SlotMap<SceneGrid> grids_;

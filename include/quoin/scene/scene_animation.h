@@ -8,7 +8,7 @@
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_meshes.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Merges the frames of a changing scene into one scene whose instances appear, disappear and move. Use it to write
 /// animations into mesh files. Each frame lasts until the next; nothing is interpolated.

@@ -6,7 +6,7 @@
 #include <quoin/mesh/visible_faces.h>
 #include <quoin/scene/scene.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Counts the faces of a scene's voxels, as a mesher would find them, and keeps the counts up to date during edits.
 ///
@@ -35,7 +35,7 @@ class SceneFaces {
   [[nodiscard]] const FaceCounts& counts() const;
 
  private:
-  struct Impl;
+  struct [[gnu::visibility("hidden")]] Impl;
   std::unique_ptr<Impl> impl_;
 };
 

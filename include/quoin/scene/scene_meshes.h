@@ -25,7 +25,7 @@
 #include <quoin/scene/camera.h>
 #include <quoin/scene/scene.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// A similarity transform: uniform scale, rotation, translation, and an optional reflection.
 struct Similarity {

@@ -14,7 +14,7 @@
 #include <quoin/scene/scene_tracer.h>
 #include <quoin/trace/ray.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// The voxels and field materials that a query detects. Unregistered types, and solid without a material, count as
 /// opaque and colliding.

@@ -9,9 +9,9 @@
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
-struct PlacedGrid;
+struct [[gnu::visibility("hidden")]] PlacedGrid;
 
 /// The acceleration structures for tracing rays through a scene.
 ///
@@ -72,7 +72,7 @@ class SceneTracer {
   [[nodiscard]] std::size_t bytes() const;
 
   // For Quoin's own sources.
-  struct Impl;
+  struct [[gnu::visibility("hidden")]] Impl;
   [[nodiscard]] const Impl& impl() const;
 
  private:

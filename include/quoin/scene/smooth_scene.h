@@ -8,7 +8,7 @@
 #include <quoin/core/result.h>
 #include <quoin/scene/scene.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 struct SmoothFieldOptions {
   InstanceFilter instances = InstanceFilter::Visible;
@@ -54,7 +54,7 @@ class SmoothScene {
   [[nodiscard]] std::size_t bytes() const;
 
  private:
-  struct Impl;
+  struct [[gnu::visibility("hidden")]] Impl;
   std::unique_ptr<Impl> impl_;
 };
 

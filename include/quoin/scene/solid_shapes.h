@@ -11,7 +11,7 @@
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/mesh/quad.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 // Collision shapes of solid voxels for physics engines. Types that collide (VoxelProperties::collides) and unregistered
 // types are solid. Boxes have an inside, so fast bodies do not tunnel through them. Triangles do not, so fast bodies
@@ -71,7 +71,7 @@ class SolidShapes {
   [[nodiscard]] std::size_t bytes() const;
 
  private:
-  struct Impl;
+  struct [[gnu::visibility("hidden")]] Impl;
   std::unique_ptr<Impl> impl_;
 };
 

@@ -10,7 +10,7 @@
 #include <quoin/scene/scene_query.h>
 #include <quoin/scene/scene_tracer.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// The first contact of a moving shape with a voxel or with a field's solid.
 struct SweepHit {

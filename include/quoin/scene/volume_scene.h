@@ -7,7 +7,7 @@
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/scene/scene.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 struct VolumeSceneOptions {
   float iso = 0.0F;  ///< values above are solid

@@ -11,7 +11,7 @@
 #include <quoin/core/result.h>
 #include <quoin/io/chunk_source.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// The result of importing a world.
 struct ImportedWorld {

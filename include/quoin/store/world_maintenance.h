@@ -14,7 +14,7 @@
 
 // Maintenance of world files: summary, check, repair, backup, compaction.
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// A summary of a world, without its voxels.
 struct WorldSummary {

@@ -14,7 +14,7 @@
 #include <quoin/store/world_saver.h>
 #include <quoin/store/world_store.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 struct WorldMeshOptions {
   BlockySceneOptions scene{};  ///< must not set `atlas` or `cut`; `part_of` is ignored

@@ -17,7 +17,7 @@
 #include <quoin/scene/scene.h>
 #include <quoin/store/world_store.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 struct LoadedWorld;
 
@@ -74,7 +74,7 @@ class WorldSaver {
   [[nodiscard]] std::optional<std::uint32_t> number_of(GridHandle grid) const;
 
   // For Quoin's own sources.
-  struct Impl;
+  struct [[gnu::visibility("hidden")]] Impl;
   [[nodiscard]] Impl& impl() { return *impl_; }
 
  private:

@@ -19,7 +19,7 @@
 #include <quoin/grid/density_chunk.h>
 #include <quoin/grid/voxel_registry.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// The address of a chunk in a world.
 struct ChunkAddress {
@@ -40,7 +40,7 @@ struct StoredChunk {
 };
 
 namespace store {
-struct ChangeSet;
+struct [[gnu::visibility("hidden")]] ChangeSet;
 }
 
 /// The properties of a grid in a world, without its chunks.
@@ -188,7 +188,7 @@ class WorldStore {
   [[nodiscard]] bool is_writable() const;
 
   // For Quoin's own sources.
-  struct Impl;
+  struct [[gnu::visibility("hidden")]] Impl;
   explicit WorldStore(std::unique_ptr<Impl> impl);
   [[nodiscard]] const Impl& impl() const { return *impl_; }
 

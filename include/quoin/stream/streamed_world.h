@@ -22,7 +22,7 @@
 #include <quoin/store/world_store.h>
 #include <quoin/stream/world_edit.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Generates the chunks that a world does not hold yet: a landscape, or another program's world.
 ///
@@ -235,7 +235,7 @@ class StreamedWorld {
   [[nodiscard]] WorldStore& store();
 
  private:
-  struct Impl;
+  struct [[gnu::visibility("hidden")]] Impl;
   explicit StreamedWorld(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };

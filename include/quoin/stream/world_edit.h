@@ -13,7 +13,7 @@
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// An edit as data, to be stored, sent and replayed. Its effect on a voxel or sample depends only on that voxel or
 /// sample, so it can be applied chunk by chunk, as chunks are loaded.

@@ -4,7 +4,7 @@
 
 #include <quoin/core/hash.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Returns a hash of integer coordinates, equal on every machine.
 [[nodiscard]] constexpr std::uint32_t hash_of(std::uint32_t seed, std::int32_t x, std::int32_t y, std::int32_t z = 0) {

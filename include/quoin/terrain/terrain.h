@@ -11,7 +11,7 @@
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// Voxels per unit of the size of generated worlds.
 inline constexpr int kTerrainUnit = 32;

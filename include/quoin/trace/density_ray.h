@@ -12,7 +12,7 @@
 #include <quoin/trace/packet.h>
 #include <quoin/trace/ray.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// A density field prepared for ray tracing: the field, and the cells between its samples that touch its solid.
 ///

@@ -12,12 +12,12 @@
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 namespace trace {
-class TreeNodes;
-struct ChunkBricks;
-struct TreeView;
+class [[gnu::visibility("hidden")]] TreeNodes;
+struct [[gnu::visibility("hidden")]] ChunkBricks;
+struct [[gnu::visibility("hidden")]] TreeView;
 }  // namespace trace
 
 /// The voxels that a tree contains.
@@ -84,7 +84,7 @@ class OccupancyTree {
   [[nodiscard]] std::size_t bytes() const;
 
   // For Quoin's own sources.
-  struct Impl;
+  struct [[gnu::visibility("hidden")]] Impl;
   [[nodiscard]] const Impl& impl() const;
   /// Returns the tables that kernels read; null if the world is so sparse (distant islands) that they would be larger
   /// than the rest of the tree.

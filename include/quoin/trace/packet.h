@@ -9,7 +9,7 @@
 #include <quoin/trace/occupancy_tree.h>
 #include <quoin/trace/ray.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// A packet of 16 rays in grid space. Rays with similar origins and directions are traced several times as fast in a
 /// packet as one by one, with the same results.

@@ -8,7 +8,7 @@
 #include <quoin/core/vec.h>
 #include <quoin/trace/occupancy_tree.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// A ray in the space of the queried object: grid space (voxels) for an OccupancyTree, world space for a scene.
 /// Distances are in multiples of the length of `direction`. A ray with a non-finite component or a zero direction hits

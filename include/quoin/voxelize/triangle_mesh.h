@@ -15,7 +15,7 @@
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// The texture addressing mode outside [0, 1].
 enum class TextureWrap : std::uint8_t { Repeat, Mirror, Clamp };

@@ -14,7 +14,7 @@
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/voxelize/triangle_mesh.h>
 
-namespace quoin {
+namespace [[gnu::visibility("default")]] quoin {
 
 /// The voxel lattice of a mesh: voxel (i, j, k) is the cube of edge `voxel_size` with its minimum corner at `origin +
 /// voxel_size * (i, j, k)`.
