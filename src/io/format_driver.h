@@ -35,6 +35,9 @@ class SidecarReader;
 /// Rows of format_drivers.cpp list the drivers of this layer; higher layers call register_format.
 struct FormatDriver {
   FormatInfo info;
+  /// The CMake option that switched the format off when Quoin was built; empty if it is built. Such a driver has no
+  /// capabilities and no functions, and detect_by_name uses its extensions.
+  std::string_view left_out{};
 
   // Detection. detect_format asks all drivers for `detect_path`, then for `detect`, then for `detect_whole`, then for
   // `detect_name`.
@@ -102,7 +105,14 @@ bool register_format(const FormatDriver& driver);
 /// Returns the driver of a format. Requires: it is one of file_formats().
 [[nodiscard]] const FormatDriver& driver_of(FileFormat format);
 
-/// Detects a format by `detect_name`.
+/// Returns the error of reading or writing a format that is left out of the build: "cannot read or write .glb: Quoin
+/// was built with QUOIN_WITH_MESHES=OFF". Requires: `left_out` is not empty.
+[[nodiscard]] Error left_out_error(const FormatDriver& driver);
+
+/// Returns the options that leave formats out: "QUOIN_WITH_MESHES=OFF, QUOIN_WITH_MODELS=OFF"; "" if there are none.
+[[nodiscard]] std::string left_out_options();
+
+/// Detects a format by `detect_name`, and a format that is left out by the extension.
 [[nodiscard]] std::optional<FileFormat> detect_by_name(const std::filesystem::path& path,
                                                        std::span<const std::byte> beginning);
 

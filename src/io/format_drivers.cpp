@@ -10,35 +10,71 @@
 
 namespace quoin {
 
-// The formats of this layer, one row each. Adding a format: a folder with a FormatDriver, and a row here.
-// Weak detection comes late: the first driver that accepts a file's beginning gets it.
-#define QUOIN_FORMATS(ROW)    \
-  ROW(kVoxFormat)             \
-  ROW(kSceneFormat)           \
-  ROW(kMinecraftFormat)       \
-  ROW(kSchematicFormat)       \
-  ROW(kQubicleFormat)         \
-  ROW(kGoxelFormat)           \
-  ROW(kVoxlapFormat)          \
-  ROW(kBinvoxFormat)          \
-  ROW(kCubeWorldFormat)       \
-  ROW(kLuantiSchematicFormat) \
-  ROW(kHeightsFormat)         \
-  ROW(kVdbFormat)             \
-  ROW(kNiftiFormat)           \
-  ROW(kNrrdFormat)            \
-  ROW(kGlbFormat)             \
-  ROW(kGltfFormat)            \
-  ROW(kPlyFormat)             \
-  ROW(kStlFormat)             \
-  ROW(kThreeMfFormat)         \
-  ROW(kOffFormat)             \
-  ROW(kObjFormat)             \
-  ROW(kLuantiMapFormat)
+namespace {
 
+/// Formats that a CMake option switches off together.
+struct FormatGroup {
+  std::string_view option;
+  bool is_built = true;
+};
+
+// cmake/QuoinFormats.cmake defines QUOIN_WITHOUT_X for the groups that are switched off.
+#ifdef QUOIN_WITHOUT_MESHES
+constexpr FormatGroup kMeshes{"QUOIN_WITH_MESHES", false};
+#else
+constexpr FormatGroup kMeshes{"QUOIN_WITH_MESHES"};
+#endif
+#ifdef QUOIN_WITHOUT_MODELS
+constexpr FormatGroup kModels{"QUOIN_WITH_MODELS", false};
+#else
+constexpr FormatGroup kModels{"QUOIN_WITH_MODELS"};
+#endif
+#ifdef QUOIN_WITHOUT_GAME_WORLDS
+constexpr FormatGroup kGameWorlds{"QUOIN_WITH_GAME_WORLDS", false};
+#else
+constexpr FormatGroup kGameWorlds{"QUOIN_WITH_GAME_WORLDS"};
+#endif
+#ifdef QUOIN_WITHOUT_VOLUMES
+constexpr FormatGroup kVolumes{"QUOIN_WITH_VOLUMES", false};
+#else
+constexpr FormatGroup kVolumes{"QUOIN_WITH_VOLUMES"};
+#endif
+
+}  // namespace
+
+// The formats of this layer, one row each. Adding a format: a folder with a FormatDriver, and a row here. Rows of a
+// group repeat the format and its extensions, for builds without it; cmake/QuoinFormats.cmake lists its sources.
+// Weak detection comes late: the first driver that accepts a file's beginning gets it.
+#define QUOIN_FORMATS(ROW, GROUPED)                                                                     \
+  ROW(kVoxFormat)                                                                                       \
+  ROW(kSceneFormat)                                                                                     \
+  GROUPED(kGameWorlds, kMinecraftFormat, FileFormat::Minecraft, ".mca", "")                             \
+  GROUPED(kGameWorlds, kSchematicFormat, FileFormat::Schematic, ".schem", ".schematic .litematic .nbt") \
+  GROUPED(kModels, kQubicleFormat, FileFormat::Qubicle, ".qb", ".qbt .qbcl .qef")                       \
+  GROUPED(kModels, kGoxelFormat, FileFormat::Goxel, ".gox", "")                                         \
+  GROUPED(kModels, kVoxlapFormat, FileFormat::Voxlap, ".vxl", ".kv6 .kvx")                              \
+  GROUPED(kModels, kBinvoxFormat, FileFormat::Binvox, ".binvox", "")                                    \
+  GROUPED(kModels, kCubeWorldFormat, FileFormat::CubeWorld, ".cub", "")                                 \
+  GROUPED(kGameWorlds, kLuantiSchematicFormat, FileFormat::LuantiSchematic, ".mts", "")                 \
+  ROW(kHeightsFormat)                                                                                   \
+  GROUPED(kVolumes, kVdbFormat, FileFormat::Vdb, ".vdb", ".nvdb")                                       \
+  GROUPED(kVolumes, kNiftiFormat, FileFormat::Nifti, ".nii", "")                                        \
+  GROUPED(kVolumes, kNrrdFormat, FileFormat::Nrrd, ".nrrd", ".nhdr")                                    \
+  GROUPED(kMeshes, kGlbFormat, FileFormat::Glb, ".glb", "")                                             \
+  GROUPED(kMeshes, kGltfFormat, FileFormat::Gltf, ".gltf", "")                                          \
+  GROUPED(kMeshes, kPlyFormat, FileFormat::Ply, ".ply", "")                                             \
+  GROUPED(kMeshes, kStlFormat, FileFormat::Stl, ".stl", "")                                             \
+  GROUPED(kMeshes, kThreeMfFormat, FileFormat::ThreeMf, ".3mf", "")                                     \
+  GROUPED(kMeshes, kOffFormat, FileFormat::Off, ".off", "")                                             \
+  GROUPED(kMeshes, kObjFormat, FileFormat::Obj, ".obj", "")                                             \
+  GROUPED(kGameWorlds, kLuantiMapFormat, FileFormat::LuantiMap, ".sqlite", "")
+
+// Drivers of groups that are switched off are declared, but neither defined nor used.
 #define QUOIN_DECLARE(driver) extern const FormatDriver driver;
-QUOIN_FORMATS(QUOIN_DECLARE)
+#define QUOIN_DECLARE_GROUPED(group, driver, id, first, others) extern const FormatDriver driver;
+QUOIN_FORMATS(QUOIN_DECLARE, QUOIN_DECLARE_GROUPED)
 #undef QUOIN_DECLARE
+#undef QUOIN_DECLARE_GROUPED
 
 namespace {
 
@@ -49,8 +85,16 @@ class FormatTable {
     drivers_.reserve(kMost);
     infos_.reserve(kMost);
 #define QUOIN_ADD(driver) add(driver);
-    QUOIN_FORMATS(QUOIN_ADD)
+#define QUOIN_ADD_GROUPED(group, driver, id, first, others)                                                   \
+  if constexpr (group.is_built) {                                                                             \
+    QUOIN_ASSERT(driver.info.extension == first && driver.info.also == others, "the row repeats the driver"); \
+    add(driver);                                                                                              \
+  } else {                                                                                                    \
+    add_left_out({id, first, "left out of this build", {}, others}, group.option);                            \
+  }
+    QUOIN_FORMATS(QUOIN_ADD, QUOIN_ADD_GROUPED)
 #undef QUOIN_ADD
+#undef QUOIN_ADD_GROUPED
   }
 
   void add(const FormatDriver& driver) {
@@ -72,6 +116,13 @@ class FormatTable {
     infos_.push_back(info);
   }
 
+  /// Adds a format of a group that is switched off: it can neither be read nor written.
+  void add_left_out(const FormatInfo& info, std::string_view option) {
+    // Its content is never read.
+    left_out_.push_back({.info = info, .left_out = option, .source = FormatDriver::Source::Path});
+    add(left_out_.back());
+  }
+
   static constexpr std::size_t kMost = 64;
   [[nodiscard]] bool is_full() const { return drivers_.size() == kMost; }
   [[nodiscard]] std::span<const FormatDriver* const> drivers() const { return drivers_; }
@@ -80,6 +131,7 @@ class FormatTable {
  private:
   std::vector<const FormatDriver*> drivers_;
   std::vector<FormatInfo> infos_;
+  std::deque<FormatDriver> left_out_;  // with stable addresses
 };
 
 FormatTable& table() {
@@ -155,6 +207,27 @@ const FormatDriver& driver_of(FileFormat format) {
                                   [&](const FormatDriver* driver) { return driver->info.format == format; });
   QUOIN_ASSERT(found != drivers.end(), "the format is one of file_formats()");
   return **found;
+}
+
+Error left_out_error(const FormatDriver& driver) {
+  QUOIN_ASSERT(!driver.left_out.empty(), "the format is left out");
+  return {ErrorCode::Unsupported,
+          "cannot read or write " + std::string(driver.info.extension) + ": Quoin was built with " +
+              std::string(driver.left_out) + "=OFF",
+          {},
+          {}};
+}
+
+std::string left_out_options() {
+  std::vector<std::string_view> options;
+  for (const FormatDriver* const driver : format_drivers()) {
+    if (!driver->left_out.empty() && std::ranges::find(options, driver->left_out) == options.end()) {
+      options.push_back(driver->left_out);
+    }
+  }
+  std::string text;
+  for (const std::string_view option : options) text.append(text.empty() ? "" : ", ").append(option).append("=OFF");
+  return text;
 }
 
 const FormatInfo& format_info(FileFormat format) {

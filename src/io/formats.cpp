@@ -67,7 +67,9 @@ Error unrecognised(std::span<const std::byte> bytes, const std::filesystem::path
             {},
             {}};
   }
-  return {ErrorCode::BadFormat, "unknown file format; readable are " + extensions_with(FormatCapability::Read), {}, {}};
+  std::string message = "unknown file format; readable are " + extensions_with(FormatCapability::Read);
+  if (const std::string options = left_out_options(); !options.empty()) message += "; built with " + options;
+  return {ErrorCode::BadFormat, std::move(message), {}, {}};
 }
 
 /// Reads the surroundings of the spawn in a world that is read by chunks.
@@ -92,6 +94,7 @@ Result<LoadedScene> read_triangles(const FormatDriver& driver, const FormatInput
 }
 
 Result<LoadedScene> read_with(const FormatDriver& driver, const FormatInput& input) {
+  if (!driver.left_out.empty()) return left_out_error(driver);
   if (driver.read != nullptr) return driver.read(input);
   return driver.open_chunks != nullptr ? read_around_spawn(driver, input) : read_triangles(driver, input);
 }
@@ -286,11 +289,26 @@ std::string stem_of_file(const std::filesystem::path& path) {
   return name.stem().string();
 }
 
+namespace {
+
+/// Returns the driver of a format that is left out of the build and has the path's extension, or null.
+const FormatDriver* find_left_out(const std::filesystem::path& path) {
+  const std::string extension = lower_case_extension(path);
+  for (const FormatDriver* const driver : format_drivers()) {
+    const auto all = extensions_of(driver->info, FormatCapability::Read);
+    if (!driver->left_out.empty() && std::ranges::find(all, extension) != all.end()) return driver;
+  }
+  return nullptr;
+}
+
+}  // namespace
+
 std::optional<FileFormat> detect_by_name(const std::filesystem::path& path, std::span<const std::byte> beginning) {
   for (const FormatDriver* const driver : format_drivers()) {
     if (driver->detect_name != nullptr && driver->detect_name(path, beginning)) return driver->info.format;
   }
-  return std::nullopt;
+  const FormatDriver* const left_out = find_left_out(path);
+  return left_out != nullptr ? std::optional(left_out->info.format) : std::nullopt;
 }
 
 std::optional<FileFormat> detect_format(std::span<const std::byte> bytes) {
@@ -326,6 +344,9 @@ Result<DetectedFile> detect_file(const std::filesystem::path& path) {
   std::error_code unknown;
   if (std::filesystem::is_directory(path, unknown)) {
     if (const auto format = detect_by_name(path, {})) return DetectedFile{path, format};
+    if (const FormatDriver& worlds = driver_of(FileFormat::Minecraft); !worlds.left_out.empty()) {
+      return with_path(Result<DetectedFile>(left_out_error(worlds)), path);
+    }
     return make_error(ErrorCode::CannotRead,
                       "a folder without a Minecraft world (level.dat and region/r.X.Z.mca) or "
                       "Luanti world (world.mt)",
@@ -347,6 +368,9 @@ Result<std::optional<FileFormat>> detect_format(const std::filesystem::path& pat
 
 Result<FormatInfo> format_for_writing(const std::filesystem::path& path) {
   if (const auto format = format_with_extension(path, FormatCapability::Write)) return *format;
+  if (const FormatDriver* const driver = find_left_out(path)) {
+    return with_path(Result<FormatInfo>(left_out_error(*driver)), path);
+  }
   return make_error(ErrorCode::Unsupported, "unknown extension; use one of " + extensions_with(FormatCapability::Write),
                     path.string());
 }
@@ -428,6 +452,9 @@ Result<std::unique_ptr<ChunkSource>> open_chunk_source(const std::filesystem::pa
 Result<std::unique_ptr<ChunkSource>> open_chunk_source(const DetectedFile& file, std::string_view dimension) {
   const std::optional<FileFormat>& format = file.format;
   if (can(format, FormatCapability::Chunks)) return driver_of(*format).open_chunks(file.path, {}, dimension);
+  if (format && !driver_of(*format).left_out.empty()) {
+    return with_path(Result<std::unique_ptr<ChunkSource>>(left_out_error(driver_of(*format))), file.path);
+  }
   return make_error(ErrorCode::Unsupported,
                     format ? "a file of format " + std::string(format->name()) + ", not a world that is read by chunks"
                            : "not a world that is read by chunks",

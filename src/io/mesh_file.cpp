@@ -42,6 +42,7 @@ Result<const FormatDriver*> find_driver(FileFormat format) {
 Result<const FormatDriver*> driver_for_meshes(FileFormat format) {
   auto driver = find_driver(format);
   if (!driver || (*driver)->plan_mesh != nullptr) return driver;
+  if (!(*driver)->left_out.empty()) return left_out_error(**driver);
   return make_error(ErrorCode::Unsupported, std::string((*driver)->info.extension) + " is not a mesh format");
 }
 

@@ -128,7 +128,7 @@ bool has_jpeg() {
 
 Result<std::vector<std::byte>> write_jpeg(const Image& image, int quality) {
   if (Status status = check(image, quality); !status) return status.error();
-  return make_error(ErrorCode::Unsupported, "cannot write JPEG: Quoin was built without libjpeg");
+  return make_error(ErrorCode::Unsupported, "cannot write JPEG: Quoin was built without libjpeg" QUOIN_IMAGES_OPTION);
 }
 
 #endif
@@ -186,7 +186,7 @@ Result<AlphaImage> decode_jpeg(std::span<const std::byte> bytes) {
 #else
 
 Result<AlphaImage> decode_jpeg(std::span<const std::byte>) {
-  return make_error(ErrorCode::Unsupported, "cannot read JPEG: Quoin was built without libjpeg");
+  return make_error(ErrorCode::Unsupported, "cannot read JPEG: Quoin was built without libjpeg" QUOIN_IMAGES_OPTION);
 }
 
 #endif
@@ -239,7 +239,7 @@ Result<std::vector<std::byte>> write_webp(const Image& image) {
 #ifdef QUOIN_HAVE_WEBP
   return encoded(image.rgb, image.width, image.height, 3, WebPEncodeLosslessRGB);
 #else
-  return make_error(ErrorCode::Unsupported, "cannot write WebP: Quoin was built without libwebp");
+  return make_error(ErrorCode::Unsupported, "cannot write WebP: Quoin was built without libwebp" QUOIN_IMAGES_OPTION);
 #endif
 }
 
@@ -248,7 +248,7 @@ Result<std::vector<std::byte>> write_webp(const AlphaImage& image) {
 #ifdef QUOIN_HAVE_WEBP
   return encoded(image.rgba, image.width, image.height, 4, WebPEncodeLosslessRGBA);
 #else
-  return make_error(ErrorCode::Unsupported, "cannot write WebP: Quoin was built without libwebp");
+  return make_error(ErrorCode::Unsupported, "cannot write WebP: Quoin was built without libwebp" QUOIN_IMAGES_OPTION);
 #endif
 }
 
@@ -269,7 +269,7 @@ Result<AlphaImage> decode_webp(std::span<const std::byte> bytes) {
   return image;
 #else
   (void)bytes;
-  return make_error(ErrorCode::Unsupported, "cannot read WebP: Quoin was built without libwebp");
+  return make_error(ErrorCode::Unsupported, "cannot read WebP: Quoin was built without libwebp" QUOIN_IMAGES_OPTION);
 #endif
 }
 

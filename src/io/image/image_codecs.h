@@ -9,6 +9,13 @@
 #include <quoin/core/image.h>
 #include <quoin/core/result.h>
 
+/// Completes messages about missing image libraries.
+#ifdef QUOIN_WITHOUT_IMAGES
+#define QUOIN_IMAGES_OPTION " (QUOIN_WITH_IMAGES=OFF)"
+#else
+#define QUOIN_IMAGES_OPTION ""
+#endif
+
 namespace quoin {
 
 /// Decodes a PNG, JPEG or WebP, detected by content, to 8-bit sRGB with alpha.

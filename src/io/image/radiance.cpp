@@ -213,14 +213,15 @@ Result<std::vector<std::byte>> write_exr(int width, int height, std::span<const 
 namespace {
 
 Result<RadianceImage> decode_exr(std::span<const std::byte>, std::size_t) {
-  return make_error(ErrorCode::Unsupported, "cannot read OpenEXR: Quoin was built without OpenEXR");
+  return make_error(ErrorCode::Unsupported, "cannot read OpenEXR: Quoin was built without OpenEXR" QUOIN_IMAGES_OPTION);
 }
 
 }  // namespace
 
 Result<std::vector<std::byte>> write_exr(int width, int height, std::span<const ExrChannel> channels) {
   if (Status status = check_channels(width, height, channels); !status) return status.error();
-  return make_error(ErrorCode::Unsupported, "cannot write OpenEXR: Quoin was built without OpenEXR");
+  return make_error(ErrorCode::Unsupported,
+                    "cannot write OpenEXR: Quoin was built without OpenEXR" QUOIN_IMAGES_OPTION);
 }
 
 #endif

@@ -62,8 +62,8 @@ class PartWriter {
 
 using SkyReader = Result<RadianceImage> (*)(const std::filesystem::path& path);
 
-/// Sets the function with which `read_sky_image` reads images. Returns true. The library of formats calls it before
-/// main; programs that link only the core library have none.
+/// Sets the reader that `read_sky_image` uses. Returns true. The library of formats calls it before main; programs that
+/// link only the core library have no reader.
 bool register_sky_reader(SkyReader reader);
 
 /// Reads the sky's image, which a scene file or world names relative to itself. `from`: the path of this file; empty:

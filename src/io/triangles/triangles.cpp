@@ -163,6 +163,7 @@ Result<LoadedMesh> read_as(std::optional<FileFormat> format, std::span<const std
   if (!format) return make_error(ErrorCode::Unsupported, "unknown mesh format");
   const FormatDriver& driver = driver_of(*format);
   if (driver.read_mesh != nullptr) return read_with(driver, bytes, sidecars, up);
+  if (!driver.left_out.empty()) return left_out_error(driver);
   return make_error(ErrorCode::Unsupported, std::string(format->name()) + " holds no triangles");
 }
 

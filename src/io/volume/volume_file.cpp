@@ -34,6 +34,22 @@ Result<Beginning> beginning_of(std::span<const std::byte> bytes) {
   return Beginning{std::move(*first), begins_gzip(bytes) ? Compression::Gzip : Compression::None};
 }
 
+#ifdef QUOIN_WITHOUT_VOLUMES
+
+// Only raw volumes are left.
+Result<VolumeHeader> header_of(const Beginning&, const VolumeOptions&) {
+  return make_error(ErrorCode::Unsupported,
+                    "cannot read volumes with headers: Quoin was built with QUOIN_WITH_VOLUMES=OFF");
+}
+
+Result<std::vector<std::byte>> decode_values(std::span<const std::byte>, std::size_t, const VolumeHeader&) {
+  return make_error(ErrorCode::Unsupported, "cannot read NRRD values: Quoin was built with QUOIN_WITH_VOLUMES=OFF");
+}
+
+#else
+
+using nrrd::decode_values;
+
 Result<VolumeHeader> header_of(const Beginning& beginning, const VolumeOptions& options) {
   auto header = nifti::is_header(beginning.bytes) ? nifti::read_header(beginning.bytes, options)
                 : nrrd::is_header(beginning.bytes)
@@ -44,6 +60,8 @@ Result<VolumeHeader> header_of(const Beginning& beginning, const VolumeOptions& 
   }
   return header;
 }
+
+#endif
 
 Status skip(ByteStream& stream, std::uint64_t count, std::uint64_t byte_offset) {
   const auto skipped = stream.skip(count);
@@ -87,7 +105,7 @@ Result<Volume> read_data(std::span<const std::byte> bytes, Compression compressi
   }
   const auto begin = static_cast<std::size_t>(header.data_at);
   if (header.data_encoding != DataEncoding::Gzip) {
-    const auto raw = nrrd::decode_values(bytes, begin, header);
+    const auto raw = decode_values(bytes, begin, header);
     if (!raw) return raw.error();
     ByteStream stream(*raw, 0, Compression::None);
     const std::uint64_t skipped = header.data_encoding == DataEncoding::Bzip2 ? header.skip : 0;
