@@ -1,5 +1,5 @@
 # Installs Quoin into an empty folder, then configures, builds and runs a project that uses it.
-# Called with -DBUILD_DIR, -DSOURCE_DIR, -DWORK_DIR.
+# Called with -DBUILD_DIR, -DSOURCE_DIR, -DWORK_DIR, -DCOMPILER, -DHAS_STORE.
 
 function(step)
   execute_process(COMMAND ${ARGN} RESULT_VARIABLE status OUTPUT_VARIABLE output ERROR_VARIABLE output)
@@ -16,6 +16,11 @@ step("${CMAKE_COMMAND}" -G Ninja -S "${WORK_DIR}/consumer" -B "${WORK_DIR}/build
   "-DCMAKE_PREFIX_PATH=${WORK_DIR}/prefix")
 step("${CMAKE_COMMAND}" --build "${WORK_DIR}/build")
 step("${WORK_DIR}/build/consumer")
+# A game needs no library that reads images, meshes or archives. Worlds on disk are missing in builds without SQLite.
+if(HAS_STORE)
+  step("${WORK_DIR}/build/streams" "${WORK_DIR}/streams.quoin")
+endif()
+step("${SOURCE_DIR}/tests/install/check_libraries" "${WORK_DIR}/build/streams")
 # The same program without CMake.
 find_program(pkg_config pkg-config)
 if(pkg_config)
@@ -24,5 +29,8 @@ if(pkg_config)
   step("${CMAKE_COMMAND}" -E env "PKG_CONFIG_PATH=${folder}" sh -c
     "${COMPILER} -std=c++20 '${WORK_DIR}/consumer/main.cpp' $('${pkg_config}' --cflags --libs quoin) -o '${WORK_DIR}/plain'")
   step("${WORK_DIR}/plain")
+  step("${CMAKE_COMMAND}" -E env "PKG_CONFIG_PATH=${folder}" sh -c
+    "${COMPILER} -std=c++20 '${WORK_DIR}/consumer/streams.cpp' $('${pkg_config}' --cflags --libs quoin_core) -o '${WORK_DIR}/plain_streams'")
+  step("${SOURCE_DIR}/tests/install/check_libraries" "${WORK_DIR}/plain_streams")
 endif()
 step("${WORK_DIR}/prefix/bin/quoin" --help)
