@@ -1,4 +1,4 @@
-# Installs Quoin into an empty folder, then configures, builds and runs a project that uses it.
+# Installs Quoin into an empty folder, then configures, builds and runs projects that use it.
 # Called with -DBUILD_DIR, -DSOURCE_DIR, -DWORK_DIR, -DCOMPILER, -DHAS_STORE.
 
 function(step)
@@ -8,29 +8,40 @@ function(step)
   endif()
 endfunction()
 
+# Configures and builds a project of this folder. Usage: build(NAME [-DVARIABLE...])
+function(build name)
+  file(COPY "${SOURCE_DIR}/tests/install/${name}" DESTINATION "${WORK_DIR}")
+  step("${CMAKE_COMMAND}" -G Ninja -S "${WORK_DIR}/${name}" -B "${WORK_DIR}/build/${name}" -DCMAKE_BUILD_TYPE=Release
+    "-DCMAKE_PREFIX_PATH=${WORK_DIR}/prefix" ${ARGN})
+  step("${CMAKE_COMMAND}" --build "${WORK_DIR}/build/${name}")
+endfunction()
+
+# Builds the same program without CMake. Usage: build_plainly(NAME PACKAGE)
+function(build_plainly name package)
+  file(GLOB_RECURSE found "${WORK_DIR}/prefix/*/${package}.pc")
+  get_filename_component(folder "${found}" DIRECTORY)
+  set(flags "$('${pkg_config}' --cflags --libs ${package})")
+  step("${CMAKE_COMMAND}" -E env "PKG_CONFIG_PATH=${folder}" sh -c
+    "${COMPILER} -std=c++20 '${WORK_DIR}/${name}/main.cpp' ${flags} -o '${WORK_DIR}/plain_${name}'")
+endfunction()
+
 file(REMOVE_RECURSE "${WORK_DIR}")
 file(MAKE_DIRECTORY "${WORK_DIR}")
-file(COPY "${SOURCE_DIR}/tests/install/consumer" DESTINATION "${WORK_DIR}")
 step("${CMAKE_COMMAND}" --install "${BUILD_DIR}" --prefix "${WORK_DIR}/prefix")
-step("${CMAKE_COMMAND}" -G Ninja -S "${WORK_DIR}/consumer" -B "${WORK_DIR}/build" -DCMAKE_BUILD_TYPE=Release
-  "-DCMAKE_PREFIX_PATH=${WORK_DIR}/prefix")
-step("${CMAKE_COMMAND}" --build "${WORK_DIR}/build")
-step("${WORK_DIR}/build/consumer")
-# A game needs no library that reads images, meshes or archives. Worlds on disk are missing in builds without SQLite.
+build(consumer)
+step("${WORK_DIR}/build/consumer/consumer")
+# A game needs no library for images, meshes or archives, nor their CMake packages.
+build(streams -DCMAKE_DISABLE_FIND_PACKAGE_PNG=ON -DCMAKE_DISABLE_FIND_PACKAGE_ZLIB=ON
+  -DCMAKE_DISABLE_FIND_PACKAGE_OpenEXR=ON)
+step("${SOURCE_DIR}/tests/install/check_libraries" "${WORK_DIR}/build/streams/streams")
 if(HAS_STORE)
-  step("${WORK_DIR}/build/streams" "${WORK_DIR}/streams.quoin")
+  step("${WORK_DIR}/build/streams/streams" "${WORK_DIR}/streams.quoin")
 endif()
-step("${SOURCE_DIR}/tests/install/check_libraries" "${WORK_DIR}/build/streams")
-# The same program without CMake.
 find_program(pkg_config pkg-config)
 if(pkg_config)
-  file(GLOB_RECURSE found "${WORK_DIR}/prefix/*/quoin.pc")
-  get_filename_component(folder "${found}" DIRECTORY)
-  step("${CMAKE_COMMAND}" -E env "PKG_CONFIG_PATH=${folder}" sh -c
-    "${COMPILER} -std=c++20 '${WORK_DIR}/consumer/main.cpp' $('${pkg_config}' --cflags --libs quoin) -o '${WORK_DIR}/plain'")
-  step("${WORK_DIR}/plain")
-  step("${CMAKE_COMMAND}" -E env "PKG_CONFIG_PATH=${folder}" sh -c
-    "${COMPILER} -std=c++20 '${WORK_DIR}/consumer/streams.cpp' $('${pkg_config}' --cflags --libs quoin_core) -o '${WORK_DIR}/plain_streams'")
+  build_plainly(consumer quoin)
+  step("${WORK_DIR}/plain_consumer")
+  build_plainly(streams quoin_core)
   step("${SOURCE_DIR}/tests/install/check_libraries" "${WORK_DIR}/plain_streams")
 endif()
 step("${WORK_DIR}/prefix/bin/quoin" --help)
