@@ -89,7 +89,8 @@ struct LoadOptions {
   /// and size; for it, these are only the conversion options.
   std::optional<HeightOptions> heights = std::nullopt;
   MeshLoadOptions mesh{};  ///< for triangle files
-  /// Reads the sky image that a scene file or world names (Sky::image). Only path tracing needs it.
+  /// Reads the sky image that a scene file or world names (Sky::image). Only path tracing needs it. Programs that link
+  /// only quoin::core get a warning instead.
   bool sky_image = true;
   /// The files that the input may name: buffers, images, materials, values, models of a scene file, sky images.
   SidecarFiles sidecar_files = SidecarFiles::WithinFolder;

@@ -11,11 +11,13 @@
 #include <gtest/gtest.h>
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
+#include <quoin/io/image_files.h>
 #include <quoin/io/scene_file.h>
 #include <quoin/store/world_maintenance.h>
 #include <quoin/terrain/terrain.h>
 
 #include "core/database/connection.h"
+#include "io/scene_file/scene_parts.h"
 #include "store/scene/world_file.h"
 #include "store/world/world_for_tests.h"
 
@@ -169,6 +171,21 @@ TEST(WorldSaver, LoadsSkyImage) {
   ASSERT_TRUE(partial);
   EXPECT_TRUE(lacks_image(partial->loaded.scene.environment->sky)) << "read only with the chunks";
   EXPECT_TRUE(partial->loaded.warnings.empty());
+}
+
+// The core library has no reader of images: the library of formats sets it.
+TEST(WorldSaver, LoadsWorldsWithoutReaderOfSkyImages) {
+  const WorldFolder folder;
+  Scene scene = rich_scene();
+  scene.environment.emplace().sky.model = SkyModel::Image;
+  scene.environment->sky.image_file = "sky.hdr";
+  ASSERT_TRUE(save_scene(scene, folder / "w.quoin"));
+  scene_json::register_sky_reader(nullptr);
+  const auto loaded = load_world(*WorldStore::open(folder / "w.quoin", WorldAccess::Read));
+  scene_json::register_sky_reader(read_radiance);
+  ASSERT_TRUE(loaded);
+  ASSERT_EQ(loaded->loaded.warnings.size(), 1U);
+  EXPECT_NE(loaded->loaded.warnings[0].find("linked without quoin::quoin"), std::string::npos);
 }
 
 /// A world that is saved repeatedly, and its expected content.
