@@ -7,6 +7,7 @@
 #include <new>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/changes.h>
 
 namespace quoin {
 
