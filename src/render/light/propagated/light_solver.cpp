@@ -102,6 +102,23 @@ bool LightSolver::fits(IVec3 size) {
   return columns * blocks <= 64 && size.z <= 128;
 }
 
+IBox LightSolver::widened(const LightRegion::Box& box) {
+  const auto words = [](const IBox& voxels) { return (voxels.size().x + 2 + 63) / 64; };
+  IBox all = box.voxels;
+  for (const bool is_high : {false, true}) {
+    IBox wide = all;
+    if (is_high) {
+      wide.max.x = std::max(all.max.x, box.wanted.max.x + kReach);
+    } else {
+      wide.min.x = std::min(all.min.x, box.wanted.min.x - kReach);
+    }
+    const bool is_in_chunk_of_rim =
+        chunk_of(wide.min).x >= chunk_of(all.min - 1).x && chunk_of(wide.max - 1).x <= chunk_of(all.max).x;
+    if (is_in_chunk_of_rim && words(wide) == words(all)) all = wide;
+  }
+  return all;
+}
+
 void LightSolver::shape(const LightRegion::Box& box) {
   QUOIN_ASSERT(fits(box.voxels.size()) && intersect(box.wanted, box.voxels) == box.wanted,
                "a box that is not too large");
@@ -176,20 +193,28 @@ void LightSolver::add_source(std::size_t channel, unsigned level, IVec3 first, s
   if (bit != 0) add_word(channel, level, column + 1, first, where >> (64 - bit));
 }
 
+// Light of level 1 lights no other voxel.
 void LightSolver::add_sources(std::size_t channel, const RowPlanes& planes, IVec3 first, std::uint64_t mask) {
-  std::uint64_t left = (planes[0] | planes[1] | planes[2] | planes[3]) & mask;
+  std::uint64_t left = (planes[1] | planes[2] | planes[3]) & mask;
   while (left != 0) {
     const unsigned level = level_at(planes, std::countr_zero(left));
-    const std::uint64_t where = equal_to(planes, level) & left;
+    const bool is_last = (left & (left - 1)) == 0;
+    const std::uint64_t where = is_last ? left : equal_to(planes, level) & left;
     add_source(channel, level, first, where);
     left &= ~where;
   }
 }
 
+// Skips sides that no wanted voxel is within reach of. Sky light falls from any height.
 void LightSolver::read_rim() {
   const IBox& voxels = box_.voxels;
+  const auto is_near = [&](int axis, bool is_high) {
+    const int margin = is_high ? voxels.max[axis] - box_.wanted.max[axis] : box_.wanted.min[axis] - voxels.min[axis];
+    return margin < kReach || (axis == 1 && is_high);
+  };
   for (const int axis : {1, 2}) {
     for (const bool is_high : {false, true}) {
+      if (!is_near(axis, is_high)) continue;
       IBox side = voxels;
       side.min[axis] = is_high ? side.max[axis] : side.min[axis] - 1;
       side.max[axis] = side.min[axis] + 1;
@@ -202,10 +227,27 @@ void LightSolver::read_rim() {
     const int low = voxels.min.x - 1 - part.chunk.x * kChunkEdge;
     const int high = voxels.max.x - part.chunk.x * kChunkEdge;
     part.bits = 0;
-    if (low >= 0) part.bits |= bits_between(low, low + 1);
-    if (high < kChunkEdge) part.bits |= bits_between(high, high + 1);
+    if (low >= 0 && is_near(0, false)) part.bits |= bits_between(low, low + 1);
+    if (high < kChunkEdge && is_near(0, true)) part.bits |= bits_between(high, high + 1);
     if (part.bits != 0) read_light(part);
   });
+}
+
+// Sky light of level 15 in a mask of the chunk row that starts at `first`. It needs no source: see take_sky.
+void LightSolver::add_sky(IVec3 first, std::uint64_t where) {
+  if (where == 0) return;
+  const IVec3 p = first - origin_;
+  QUOIN_ASSERT(p.y >= 0 && p.y <= size_.y + 1 && p.z >= 0 && p.z <= size_.z + 1, "a row of the region or its rim");
+  has_sky_ = true;
+  const auto add = [&](int column, std::uint64_t bits) {
+    if (bits == 0) return;
+    QUOIN_ASSERT(column >= 0 && static_cast<std::size_t>(column) < columns_, "a word of the region or its rim");
+    front_[static_cast<std::size_t>(p.z) * layer_ + static_cast<std::size_t>(column) * column_ +
+           static_cast<std::size_t>(p.y)] |= bits;
+  };
+  const int bit = p.x & 63;
+  add(p.x >> 6, where << bit);
+  if (bit != 0) add((p.x >> 6) + 1, where >> (64 - bit));
 }
 
 // Reads the known light of a part of the rim.
@@ -235,15 +277,21 @@ void LightSolver::read_channel(const Part& part, std::size_t channel, const Chan
   SlabPlanes planes;
   part.for_each_slab([&](int y, int z) {
     const LightSlab& slab = light.is_uniform() ? uniform : light.stored(slab_index(y, z));
-    if (slab.is_uniform() && slab.level() == 0) return;
+    if (slab.is_uniform() && slab.level() <= 1) return;
     slab.read(planes);
     unsigned rows = planes.lit_rows(part.bits) & rows_of(part.box, y, z);
     const unsigned unknown_rows = unknown.empty() ? 0 : rows_of(unknown, y, z);
     for (; rows != 0; rows &= rows - 1) {
       const auto row = static_cast<unsigned>(std::countr_zero(rows));
-      const std::uint64_t mask = (unknown_rows >> row & 1U) != 0 ? known : part.bits;
+      std::uint64_t mask = (unknown_rows >> row & 1U) != 0 ? known : part.bits;
       const IVec3 first = low + IVec3(0, y + static_cast<int>(row & 3), z + static_cast<int>(row >> 2));
-      add_sources(channel, planes.row(row), first, mask);
+      const RowPlanes of_row = planes.row(row);
+      if (channel == kSky) {
+        const std::uint64_t sky = of_row[0] & of_row[1] & of_row[2] & of_row[3] & mask;
+        add_sky(first, sky);
+        mask &= ~sky;
+      }
+      add_sources(channel, of_row, first, mask);
     }
   });
 }
@@ -435,20 +483,22 @@ void LightSolver::complete_planes() {
   }
 }
 
-// Returns true if any voxel is lit in the blocks that contain rows of a slab.
-bool LightSolver::is_touched(const Part& part, int y, int z) const {
-  const IVec3 p = part.chunk * kChunkEdge + IVec3(0, y, z) - origin_;
-  const int first = std::max(p.y, 0) / 8;
-  const int last = std::min((p.y + 3) / 8, static_cast<int>(blocks_) - 1);
+// Returns the blocks along y, of any column of the part, in which a voxel of the slabs at z is lit.
+std::uint64_t LightSolver::touched_blocks(const Part& part, int z) const {
+  const int p = part.chunk.z * kChunkEdge + z - origin_.z;
+  std::uint64_t touched = 0;
+  for (int i = std::max(p, 1); i < std::min(p + 4, size_.z + 1); ++i) touched |= touched_[static_cast<std::size_t>(i)];
   std::uint64_t blocks = 0;
   for (int column = std::max(part.shift >> 6, 0); column <= (part.shift >> 6) + 1; ++column) {
-    if (column < static_cast<int>(columns_))
-      blocks |= bits_between(first, last + 1) << (column * static_cast<int>(blocks_));
+    if (column < static_cast<int>(columns_)) blocks |= touched >> (static_cast<std::size_t>(column) * blocks_);
   }
-  std::uint64_t touched = 0;
-  for (int i = std::max(p.z, 1); i < std::min(p.z + 4, size_.z + 1); ++i)
-    touched |= touched_[static_cast<std::size_t>(i)];
-  return (touched & blocks) != 0;
+  return blocks & kAll >> (64 - blocks_);
+}
+
+// Returns the blocks along y that contain rows of a slab.
+std::uint64_t LightSolver::blocks_of_slab(const Part& part, int y) const {
+  const int p = part.chunk.y * kChunkEdge + y - origin_.y;
+  return bits_between(std::max(p, 0) / 8, std::min((p + 3) / 8, static_cast<int>(blocks_) - 1) + 1);
 }
 
 void LightSolver::read_slab(const Part& part, int y, int z, SlabPlanes& now) const {
@@ -486,19 +536,25 @@ void LightSolver::write_chunk(const Part& part, std::size_t channel, ChunkLightC
   if (write_open(part, before, change)) return;
   const bool is_new = part.is_whole() && part.around->light == nullptr;
   const LightSlab uniform(before.is_uniform() ? before.level() : 0);
-  SlabPlanes now{};
+  SlabPlanes now;
   SlabPlanes old;
   alignas(64) std::array<std::uint64_t, kSlabWords> inside;
   alignas(64) std::array<std::uint64_t, kSlabWords> changed;
+  unsigned rows_inside = 0;  // the rows that `inside` has
+  int touched_z = -1;        // the slabs that `touched` is about
+  std::uint64_t touched = 0;
+  inside.fill(0);
   part.for_each_slab([&](int y, int z) {
+    if (z != std::exchange(touched_z, z)) touched = outcome_ == Outcome::Dark ? 0 : touched_blocks(part, z);
     const std::size_t index = slab_index(y, z);
     const LightSlab& was = before.is_uniform() ? uniform : before.stored(index);
-    const bool is_dark = outcome_ == Outcome::Dark || !is_touched(part, y, z);
-    if (is_dark && was.is_uniform() && was.level() == 0) return;
-    const unsigned rows = rows_of(part.box, y, z);
-    for (std::size_t row = 0; row < kSlabWords; ++row) inside[row] = (rows >> row & 1U) != 0 ? part.bits : 0;
-    is_dark ? now.words.fill(0) : read_slab(part, y, z, now);
+    const bool is_dark = (touched & blocks_of_slab(part, y)) == 0;
     const bool was_dark = was.is_uniform() && was.level() == 0;
+    if (is_dark && was_dark) return;
+    if (const unsigned rows = rows_of(part.box, y, z); rows != std::exchange(rows_inside, rows)) {
+      for (std::size_t row = 0; row < kSlabWords; ++row) inside[row] = (rows >> row & 1U) != 0 ? part.bits : 0;
+    }
+    is_dark ? now.words.fill(0) : read_slab(part, y, z, now);
     if (!was_dark) was.read(old);
     const SlabPlanes& other = was_dark ? dark_slab : old;
     const SlabKinds kinds = kernel().merge(other.words.data(), inside.data(), now.words.data(), changed.data());
@@ -554,6 +610,10 @@ void LightSolver::solve(const LightRegion& region, std::vector<ChunkLightChange>
   QUOIN_ASSERT(region.around.size() == region.index(region.chunks.max - 1) + 1, "a chunk for each index");
   region_ = &region;
   box_ = region.all;
+  if (!std::exchange(is_clean_, false)) {
+    std::fill(front_.begin(), front_.end(), 0);
+    std::fill(next_.begin(), next_.end(), 0);
+  }
   changes.clear();
   for_each_part(region.all.wanted, [&](const Part& part) {
     changes.push_back({part.chunk, {}, {}, {}});
@@ -568,6 +628,7 @@ void LightSolver::solve(const LightRegion& region, std::vector<ChunkLightChange>
     solve(box, alike, changes);
     done |= alike;
   }
+  is_clean_ = true;
 }
 
 namespace {
@@ -575,11 +636,10 @@ namespace {
 // Longer regions do not fit into the processor's cache.
 constexpr int kMostAlongX = 4;
 
-// Voxels that a region visits, and some more for its fixed cost.
-std::int64_t cost_of(const IBox& visited) {
+// Voxels that a region visits in all its channels, and some more for its fixed cost.
+std::int64_t cost_of(const IBox& visited, unsigned channels) {
   constexpr std::int64_t kRegion = 32'768;
-  const IVec3 size = visited.size();
-  return kRegion + std::int64_t{size.x} * size.y * size.z;
+  return (kRegion + volume(visited)) * std::popcount(channels);
 }
 
 // Calls `visit(chunk, box)` for the boxes in a box of chunks.
@@ -597,8 +657,8 @@ void visit_within(Boxes& boxes, const IBox& chunks, Visit&& visit) {
 
 }  // namespace
 
-void LightQueue::add(const IBox& voxels, const LightDomain& domain) {
-  QUOIN_ASSERT(!voxels.empty(), "a box of voxels");
+void LightQueue::add(const IBox& voxels, unsigned channels, const LightDomain& domain) {
+  QUOIN_ASSERT(!voxels.empty() && channels != 0 && channels <= kAllChannels, "a box of voxels, some channels");
   const IVec3 first = chunk_of(voxels.min);
   const IVec3 last = chunk_of(voxels.max - 1);
   for (int z = first.z; z <= last.z; ++z) {
@@ -606,8 +666,9 @@ void LightQueue::add(const IBox& voxels, const LightDomain& domain) {
       const LightDomain::Range range = domain.range(x, z);
       for (int y = std::max(first.y, range.begin); y <= std::min(last.y, range.end - 1); ++y) {
         const IVec3 low = IVec3(x, y, z) * kChunkEdge;
-        IBox& known = boxes_[{x, y, z}].voxels;
-        known = unite(known, intersect(voxels, {low, low + kChunkEdge}));
+        Box& known = boxes_[{x, y, z}];
+        known.voxels = unite(known.voxels, intersect(voxels, {low, low + kChunkEdge}));
+        known.channels |= channels;
       }
     }
   }
@@ -635,25 +696,26 @@ bool LightQueue::grow(Tile& tile, int axis, bool is_up) const {
   IBox layer = tile.chunks;
   layer.min[axis] = is_up ? tile.chunks.max[axis] : tile.chunks.min[axis] - 1;
   layer.max[axis] = layer.min[axis] + 1;
-  Tile larger{unite(tile.chunks, layer), tile.wanted, {}};
+  Tile larger{unite(tile.chunks, layer), tile.wanted, {}, tile.channels};
   if (larger.chunks.size().x > kMostAlongX) return false;
-  std::int64_t apart = cost_of(tile.visited);
+  std::int64_t apart = cost_of(tile.visited, tile.channels);
   bool is_free = true;
   visit_within(boxes_, layer, [&](IVec3 chunk, const Box& box) {
     is_free &= !box.is_taken;
     larger.wanted = unite(larger.wanted, box.voxels);
-    apart += cost_of(visited(box.voxels, chunk.y + 1));
+    larger.channels |= box.channels;
+    apart += cost_of(visited(box.voxels, chunk.y + 1), box.channels);
   });
   if (!is_free || larger.wanted == tile.wanted) return false;
   larger.visited = visited(larger.wanted, boxes_.begin()->first.y + 1);
-  if (!LightSolver::fits(larger.visited.size()) || cost_of(larger.visited) > apart) return false;
+  if (!LightSolver::fits(larger.visited.size()) || cost_of(larger.visited, larger.channels) > apart) return false;
   tile = larger;
   return true;
 }
 
 LightQueue::Tile LightQueue::tile_at(Boxes::const_iterator first) const {
   const IBox& voxels = first->second.voxels;
-  Tile tile{{first->first, first->first + 1}, voxels, visited(voxels, first->first.y + 1)};
+  Tile tile{{first->first, first->first + 1}, voxels, visited(voxels, first->first.y + 1), first->second.channels};
   constexpr std::array<std::pair<int, bool>, 5> kSides{{{0, true}, {0, false}, {2, true}, {2, false}, {1, false}}};
   for (bool goes_on = true; goes_on;) {
     goes_on = false;
@@ -675,8 +737,10 @@ std::vector<LightRegion> LightQueue::next(std::size_t most) {
       taken_.push_back(chunk);
     });
     LightRegion& region = regions.emplace_back();
-    region.all = {tile.visited, tile.wanted};
-    region.channels.fill(region.all);
+    region.all = {LightSolver::widened({tile.visited, tile.wanted}), tile.wanted};
+    for (std::size_t c = 0; c < kChannels; ++c) {
+      if ((tile.channels >> c & 1U) != 0) region.channels[c] = region.all;
+    }
   }
   return regions;
 }
@@ -684,6 +748,80 @@ std::vector<LightRegion> LightQueue::next(std::size_t most) {
 void LightQueue::remove_solved() {
   for (const IVec3 chunk : taken_) boxes_.erase(chunk);
   taken_.clear();
+}
+
+namespace {
+
+// Boxes that touch or share a chunk slab, so that their results would overwrite each other.
+struct Cluster {
+  LightBoxes boxes;
+  IBox all;
+  IBox slabs;  // around it and its rim
+  bool is_alone = true;
+
+  explicit Cluster(const LightBoxes& one) : boxes(one), all(around_all(one)) {
+    const IVec3 size{kChunkEdge, 4, 4};
+    slabs = {(all.min - 1) & ~(size - 1), (all.max + size) & ~(size - 1)};
+  }
+  [[nodiscard]] bool touches(const Cluster& other) const { return !intersect(slabs, other.slabs).empty(); }
+  // Returns true if it is not much work to solve both as one box.
+  [[nodiscard]] bool joins(const Cluster& other) const {
+    constexpr std::int64_t kWaste = 200'000;
+    const IBox united = unite(all, other.all);
+    return LightSolver::fits(united.size()) && volume(united) <= volume(all) + volume(other.all) + kWaste;
+  }
+  void add(const Cluster& other) {
+    for (std::size_t c = 0; c < kChannels; ++c) boxes[c] = unite(boxes[c], other.boxes[c]);
+    all = unite(all, other.all);
+    slabs = unite(slabs, other.slabs);
+  }
+};
+
+// Adds a cluster: merges it with others, or marks it and those that it touches as not alone.
+void add_cluster(Cluster cluster, std::vector<Cluster>& clusters) {
+  for (std::size_t i = 0; i < clusters.size();) {
+    if (!clusters[i].touches(cluster) || !clusters[i].joins(cluster)) {
+      ++i;
+      continue;
+    }
+    cluster.add(clusters[i]);
+    clusters.erase(clusters.begin() + static_cast<std::ptrdiff_t>(i));
+    i = 0;
+  }
+  clusters.push_back(cluster);
+}
+
+void mark_neighbours(std::vector<Cluster>& clusters) {
+  for (std::size_t i = 0; i < clusters.size(); ++i) {
+    clusters[i].is_alone &= LightSolver::fits(clusters[i].all.size());
+    for (std::size_t j = 0; j < i; ++j) {
+      if (!clusters[i].touches(clusters[j])) continue;
+      clusters[i].is_alone = false;
+      clusters[j].is_alone = false;
+    }
+  }
+}
+
+}  // namespace
+
+void sort_boxes(std::vector<LightBoxes>& boxes, LightQueue& queue, const LightDomain& domain) {
+  constexpr std::size_t kMany = 1024;
+  std::vector<Cluster> clusters;
+  const bool are_many = boxes.size() > kMany;
+  for (const LightBoxes& each : boxes) {
+    are_many ? clusters.push_back(Cluster(each)) : add_cluster(Cluster(each), clusters);
+  }
+  if (!are_many) mark_neighbours(clusters);
+  boxes.clear();
+  for (const Cluster& cluster : clusters) {
+    if (!are_many && cluster.is_alone) {
+      boxes.push_back(cluster.boxes);
+      continue;
+    }
+    for (std::size_t c = 0; c < kChannels; ++c) {
+      if (!cluster.boxes[c].empty()) queue.add(cluster.boxes[c], 1U << c, domain);
+    }
+  }
 }
 
 }  // namespace quoin::propagated

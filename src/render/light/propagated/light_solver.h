@@ -18,9 +18,13 @@ namespace quoin::propagated {
 
 /// Maximum number of steps from a light source until light is dark.
 inline constexpr int kReach = 14;
+inline constexpr unsigned kAllChannels = (1U << kChannels) - 1;
+
+/// A box per channel, in grid coordinates. Outside of it, an edit changes no light of the channel.
+using LightBoxes = std::array<IBox, kChannels>;
 
 /// Returns the box around the boxes of all channels.
-[[nodiscard]] inline IBox around_all(const std::array<IBox, kChannels>& boxes) {
+[[nodiscard]] inline IBox around_all(const LightBoxes& boxes) {
   IBox all;
   for (const IBox& box : boxes) all = unite(all, box);
   return all;
@@ -83,6 +87,11 @@ class LightSolver {
   /// Returns true if a region of this size fits into the 64-bit block masks.
   [[nodiscard]] static bool fits(IVec3 size);
 
+  /// Returns the visited voxels of a box, extended along x to all that light can reach the wanted voxels from. The rim
+  /// there is not read then, which costs more than voxels in words that are visited anyway. Leaves out a side where
+  /// more words, or another chunk than that of the rim, would be visited.
+  [[nodiscard]] static IBox widened(const LightRegion::Box& box);
+
   /// Computes the new light of the wanted voxels. The result equals a solution for all voxels if the rim voxels with
   /// unknown light are more than 14 away, and the others have their correct light. `changes`: one entry per chunk with
   /// wanted voxels, x fastest. Requires: fits(all.voxels.size()).
@@ -113,6 +122,7 @@ class LightSolver {
   void read_inside();
   void read_pass(std::size_t channel);
   void find_passable();
+  void add_sky(IVec3 first, std::uint64_t where);
   void add_sources(std::size_t channel, const RowPlanes& planes, IVec3 first, std::uint64_t mask);
   void add_source(std::size_t channel, unsigned level, IVec3 first, std::uint64_t where);
   void add_word(std::size_t channel, unsigned level, int column, IVec3 at, std::uint64_t where);
@@ -127,7 +137,8 @@ class LightSolver {
   void write(std::size_t channel, std::vector<ChunkLightChange>& changes);
   bool write_open(const Part& part, const ChannelLight& before, ChunkLightChange& change) const;
   void write_chunk(const Part& part, std::size_t channel, ChunkLightChange& change);
-  [[nodiscard]] bool is_touched(const Part& part, int y, int z) const;
+  [[nodiscard]] std::uint64_t touched_blocks(const Part& part, int z) const;
+  [[nodiscard]] std::uint64_t blocks_of_slab(const Part& part, int y) const;
   void read_slab(const Part& part, int y, int z, SlabPlanes& now) const;
 
   const LightRegion* region_ = nullptr;
@@ -142,6 +153,7 @@ class LightSolver {
   std::array<std::array<std::vector<Source>, 16>, kChannels> sources_;  // [channel][level]
   std::vector<std::unique_ptr<ChunkMasks>> own_masks_;
   bool has_sky_ = false;  // there is sky light that is not in `sources_`
+  bool is_clean_ = true;  // `front_` and `next_` are all 0: no region failed
   std::vector<std::uint64_t> pass_;
   std::vector<std::uint64_t> rest_;   // dark voxels of pass_, in touched blocks
   std::vector<std::uint64_t> front_;  // voxels of the current level; all 0 between regions
@@ -168,7 +180,8 @@ class LightSolver {
 class LightQueue {
  public:
   /// Queues the parts of a box of voxels that lie in the domain. The box of a chunk grows to contain all its parts.
-  void add(const IBox& voxels, const LightDomain& domain);
+  /// `channels`: bit c is set for each channel whose light is unknown.
+  void add(const IBox& voxels, unsigned channels, const LightDomain& domain);
   [[nodiscard]] bool empty() const { return boxes_.empty(); }
   void clear() {
     boxes_.clear();
@@ -194,6 +207,7 @@ class LightQueue {
   };
   struct Box {
     IBox voxels;            // in grid coordinates
+    unsigned channels = 0;  // bit c: channel c is unknown
     bool is_taken = false;  // a region of the last `next` wants it
   };
   using Boxes = std::map<IVec3, Box, FromAbove>;
@@ -201,6 +215,7 @@ class LightQueue {
     IBox chunks;
     IBox wanted;
     IBox visited;
+    unsigned channels;
   };
   [[nodiscard]] IBox visited(const IBox& wanted, int top) const;
   [[nodiscard]] bool grow(Tile& tile, int axis, bool is_up) const;
@@ -209,5 +224,9 @@ class LightQueue {
   Boxes boxes_;
   std::vector<IVec3> taken_;
 };
+
+/// Merges boxes that touch, if that is not much more work. Leaves the boxes that can each be solved as a whole, and
+/// queues all others, or all if there are more than 1,024. If it throws, `boxes` and `queue` are unspecified.
+void sort_boxes(std::vector<LightBoxes>& boxes, LightQueue& queue, const LightDomain& domain);
 
 }  // namespace quoin::propagated

@@ -36,9 +36,11 @@ using propagated::ChunkMasks;
 using propagated::ColumnSet;
 using propagated::fall;
 using propagated::is_any;
+using propagated::kAllChannels;
 using propagated::kChannels;
 using propagated::kReach;
 using propagated::kSky;
+using propagated::LightBoxes;
 using propagated::LightChunk;
 using propagated::LightDomain;
 using propagated::LightQueue;
@@ -49,11 +51,9 @@ using propagated::LightSolver;
 using propagated::LightStore;
 using propagated::rows_of;
 using propagated::TypeLight;
-using propagated::volume;
 
 constexpr std::uint64_t kAll = ~std::uint64_t{0};
 constexpr unsigned kBrightest = 15;
-constexpr unsigned kAllChannels = (1U << kChannels) - 1;
 
 std::vector<TypeLight> type_lights(const VoxelRegistry& types, const PropagatedLightOptions& options) {
   std::vector<TypeLight> lights(types.size());
@@ -98,9 +98,6 @@ struct CachedMasks {
   ChunkMasks masks;
   IBox read;  // box of the chunk
 };
-
-// A box per channel, in grid coordinates. Outside of it, an edit changes no light of the channel.
-using LightBoxes = std::array<IBox, kChannels>;
 
 // The light that edits change, and the types' light.
 struct LightState {
@@ -427,7 +424,6 @@ struct PropagatedLight::Impl {
   [[nodiscard]] LightState state() const { return {store, domain(), lights()}; }
   [[nodiscard]] std::optional<LightEdit> edit_of(const Grid& grid, const ChunkChange& change) const;
   void change_domain(const Grid& grid, const std::vector<IVec3>& chunks, std::vector<LightEdit>& edits);
-  void sort_dirty();
   void solve_dirty(const Grid& grid, Threads threads);
   void solve_queue(const Grid& grid, Threads threads);
   void read_masks(const Grid& grid, const std::vector<LightRegion>& regions, Threads threads);
@@ -440,10 +436,11 @@ struct PropagatedLight::Impl {
   ChangeCursor followed_types;
   std::shared_ptr<const std::vector<TypeLight>> shared_lights = std::make_shared<const std::vector<TypeLight>>();
   Ref<SharedDomain> shared_domain = make_ref<SharedDomain>();
-  LightStore store;                // of the chunks of the domain
-  std::uint64_t visited_rows = 0;  // see PropagatedLight::visited_rows
-  std::vector<LightBoxes> dirty;   // boxes that are to be solved by themselves
-  LightQueue queue;                // boxes of chunks that are to be solved, from above
+  LightStore store;                                  // of the chunks of the domain
+  std::uint64_t visited_rows = 0;                    // see PropagatedLight::visited_rows
+  std::vector<LightBoxes> dirty;                     // boxes that are to be solved by themselves
+  LightQueue queue;                                  // boxes of chunks that are to be solved, from above
+  std::vector<LightDomain::Change> changed_columns;  // during an update, until the store has recorded them
   std::unordered_map<IVec3, std::unique_ptr<CachedMasks>, CoordinateHash> masks;  // during an update
 };
 
@@ -463,13 +460,21 @@ void PropagatedLight::Impl::begin_anew(const Grid& grid) {
   queue.clear();
   dirty.clear();
   masks.clear();
+  const auto darken = [&](int x, int z, const LightDomain::Range& range) {
+    for (int y = range.begin; y < range.end; ++y) store.begin({x, y, z});
+  };
+  // Also the chunks that leave the domain, and those that left it in an update that failed.
+  domain().for_each_range(darken);
+  for (const LightDomain::Change& column : changed_columns) darken(column.x, column.z, column.before);
+  changed_columns.clear();
   shared_domain = make_ref<SharedDomain>();
   store.clear();
   std::vector<LightDomain::Change> changed;
   for (const IVec3 chunk : grid.chunks()) shared_domain->columns.set(chunk, true, changed);
+  domain().for_each_range(darken);
   domain().for_each_range([&](int x, int z, const LightDomain::Range& range) {
-    for (int y = range.begin; y < range.end; ++y) store.begin({x, y, z});
-    queue.add({IVec3(x, range.begin, z) * kChunkEdge, IVec3(x + 1, range.end, z + 1) * kChunkEdge}, domain());
+    const IBox column{IVec3(x, range.begin, z) * kChunkEdge, IVec3(x + 1, range.end, z + 1) * kChunkEdge};
+    queue.add(column, kAllChannels, domain());
   });
 }
 
@@ -492,15 +497,17 @@ std::optional<LightEdit> PropagatedLight::Impl::edit_of(const Grid& grid, const 
 // their own, unless their light was dark or will be: then this appends an edit.
 void PropagatedLight::Impl::change_domain(const Grid& grid, const std::vector<IVec3>& chunks,
                                           std::vector<LightEdit>& edits) {
-  std::vector<LightDomain::Change> changed;
+  QUOIN_ASSERT(changed_columns.empty(), "a failed update is followed by begin_anew");
   for (const IVec3 chunk : chunks) {
     const bool has_voxels = grid.find_chunk(chunk) != nullptr;
     if (has_voxels == domain().has_voxels(chunk)) continue;
     shared_domain.make_own();
-    shared_domain->columns.set(chunk, has_voxels, changed);
+    shared_domain->columns.set(chunk, has_voxels, changed_columns);
   }
   std::map<IVec3, LightDomain::Range, ByZyx> before;  // [x, 0, z]
-  for (const LightDomain::Change& column : changed) before.try_emplace({column.x, 0, column.z}, column.before);
+  for (const LightDomain::Change& column : changed_columns) {
+    before.try_emplace({column.x, 0, column.z}, column.before);
+  }
   std::vector<IVec3> from_dark;
   for (const auto& each : before) {
     const IVec3 column = each.first;
@@ -541,6 +548,7 @@ void PropagatedLight::Impl::change_domain(const Grid& grid, const std::vector<IV
       edits.push_back(edit_of_entering(state(), grid, *chunk));
     }
   }
+  changed_columns.clear();
 }
 
 void PropagatedLight::Impl::take_over(const Grid& grid, const GridChanges& changes) {
@@ -553,80 +561,7 @@ void PropagatedLight::Impl::take_over(const Grid& grid, const GridChanges& chang
   }
   change_domain(grid, chunks, edits);
   for (const LightEdit& edit : edits) add_reach(state(), grid, edit, dirty);
-  sort_dirty();
-}
-
-namespace {
-
-// Boxes that touch or share a chunk slab, so that their results would overwrite each other.
-struct Cluster {
-  LightBoxes boxes;
-  IBox all;
-  IBox slabs;  // around it and its rim
-  bool is_alone = true;
-
-  explicit Cluster(const LightBoxes& one) : boxes(one), all(around_all(one)) {
-    const IVec3 size{kChunkEdge, 4, 4};
-    slabs = {(all.min - 1) & ~(size - 1), (all.max + size) & ~(size - 1)};
-  }
-  [[nodiscard]] bool touches(const Cluster& other) const { return !intersect(slabs, other.slabs).empty(); }
-  // Returns true if it is not much work to solve both as one box.
-  [[nodiscard]] bool joins(const Cluster& other) const {
-    constexpr std::int64_t kWaste = 200'000;
-    const IBox united = unite(all, other.all);
-    return LightSolver::fits(united.size()) && volume(united) <= volume(all) + volume(other.all) + kWaste;
-  }
-  void add(const Cluster& other) {
-    for (std::size_t c = 0; c < kChannels; ++c) boxes[c] = unite(boxes[c], other.boxes[c]);
-    all = unite(all, other.all);
-    slabs = unite(slabs, other.slabs);
-  }
-};
-
-// Adds a cluster: merges it with others, or marks it and those that it touches as not alone.
-void add_cluster(Cluster cluster, std::vector<Cluster>& clusters) {
-  for (std::size_t i = 0; i < clusters.size();) {
-    if (!clusters[i].touches(cluster) || !clusters[i].joins(cluster)) {
-      ++i;
-      continue;
-    }
-    cluster.add(clusters[i]);
-    clusters.erase(clusters.begin() + static_cast<std::ptrdiff_t>(i));
-    i = 0;
-  }
-  clusters.push_back(cluster);
-}
-
-void mark_neighbours(std::vector<Cluster>& clusters) {
-  for (std::size_t i = 0; i < clusters.size(); ++i) {
-    clusters[i].is_alone &= LightSolver::fits(clusters[i].all.size());
-    for (std::size_t j = 0; j < i; ++j) {
-      if (!clusters[i].touches(clusters[j])) continue;
-      clusters[i].is_alone = false;
-      clusters[j].is_alone = false;
-    }
-  }
-}
-
-}  // namespace
-
-// Merges dirty boxes. Queues chunks instead where boxes touch that are not worth merging, or if there are too many.
-void PropagatedLight::Impl::sort_dirty() {
-  constexpr std::size_t kMany = 1024;
-  std::vector<Cluster> clusters;
-  const bool are_many = dirty.size() > kMany;
-  for (const LightBoxes& each : dirty) {
-    are_many ? clusters.push_back(Cluster(each)) : add_cluster(Cluster(each), clusters);
-  }
-  if (!are_many) mark_neighbours(clusters);
-  dirty.clear();
-  for (const Cluster& cluster : clusters) {
-    if (!are_many && cluster.is_alone) {
-      dirty.push_back(cluster.boxes);
-    } else {
-      queue.add(cluster.all, domain());
-    }
-  }
+  propagated::sort_boxes(dirty, queue, domain());
 }
 
 ChunkAround PropagatedLight::Impl::around(IVec3 chunk) const {
@@ -675,8 +610,11 @@ void PropagatedLight::Impl::solve_dirty(const Grid& grid, Threads threads) {
   for (const LightBoxes& each : dirty) {
     const IBox all = around_all(each);
     LightRegion& region = regions.emplace_back();
-    region.all = {all, all};
-    for (std::size_t c = 0; c < kChannels; ++c) region.channels[c] = {each[c], each[c]};
+    region.all = {LightSolver::widened({all, all}), all};
+    for (std::size_t c = 0; c < kChannels; ++c) {
+      if (each[c].empty()) continue;
+      region.channels[c] = {intersect(LightSolver::widened({each[c], each[c]}), region.all.voxels), each[c]};
+    }
   }
   solve(regions, threads, [&](LightSolver& solver, LightRegion& region) {
     std::size_t i = 0;
@@ -712,6 +650,8 @@ void PropagatedLight::Impl::read_masks(const Grid& grid, const std::vector<Light
           if (!domain().holds({x, y, z})) continue;
           IBox& box = wanted[{x, y, z}];
           box = unite(box, intersect({region.all.voxels.min - low, region.all.voxels.max - low}, kWholeChunk));
+          box.min.x = 0;  // rows are read as a whole
+          box.max.x = kChunkEdge;
         }
       }
     }
@@ -721,7 +661,8 @@ void PropagatedLight::Impl::read_masks(const Grid& grid, const std::vector<Light
     std::unique_ptr<CachedMasks>& known = masks[chunk];
     if (known == nullptr) known = std::make_unique<CachedMasks>();
     if (unite(known->read, box) == known->read) continue;
-    known->read = unite(known->read, box);
+    // All that later regions want of this chunk, so that it is read once.
+    known->read = unite(unite(known->read, box), queue.unknown(chunk));
     missing.emplace_back(chunk, known.get());
   }
   parallel_for(missing.size(), threads, [&](std::size_t i) {

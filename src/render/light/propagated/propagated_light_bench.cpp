@@ -1,7 +1,7 @@
 // light/propagated/*: sky and lamps of a 512x128x512 terrain of 128 chunks, with caves and a lamp in one of 2,000 cave
 // voxels, from scratch and after edits; also the sky of the same terrain without caves.
-// light/propagated/streamed/N: the same terrain under six chunks of air, loaded near to far, with an update after each
-// N chunks.
+// light/propagated/streamed/ORDER/N/AIR: the same terrain under AIR chunks of air, loaded in an order, with an update
+// after each N chunks.
 
 #include <quoin/render/propagated_light.h>
 
@@ -94,19 +94,41 @@ void stream(const World& world, const std::vector<IVec3>& order, std::size_t ste
   }
 }
 
-// Counter `rows_of_at_once`: visited rows, relative to the light of the whole world at once.
-void streamed(benchmark::State& state) {
+// Rank of a chunk in an order of arrival; equal ranks arrive by z, y and x.
+using ArrivalRank = int (*)(IVec3);
+int from_near(IVec3 c) {
+  return (c.x - 4) * (c.x - 4) + c.y * c.y + (c.z - 4) * (c.z - 4);
+}
+int from_far(IVec3 c) {
+  return -from_near(c);
+}
+int from_above(IVec3 c) {
+  return -c.y;
+}
+int from_below(IVec3 c) {
+  return c.y;
+}
+int by_column(IVec3 c) {
+  return c.x + 8 * c.z;
+}
+int at_random(IVec3 c) {
+  return static_cast<int>(static_cast<std::uint32_t>(c.x + 8 * c.z + 64 * c.y + 1) * 2'654'435'761U >> 8);
+}
+
+// Arguments: chunks per update, chunks of air. Counter `rows_of_at_once`: visited rows, relative to the light of the
+// whole world at once.
+void streamed(benchmark::State& state, ArrivalRank rank) {
   const World world = made_world(true);
   PropagatedLight once;
   once.update(world.grid, world.types, {1});
+  const int height = 2 + static_cast<int>(state.range(1));
   std::vector<IVec3> order;
   for (int z = 0; z < 8; ++z) {
-    for (int y = 0; y < 8; ++y) {
+    for (int y = 0; y < height; ++y) {
       for (int x = 0; x < 8; ++x) order.push_back({x, y, z});
     }
   }
-  const auto distance = [](IVec3 c) { return (c.x - 4) * (c.x - 4) + c.y * c.y + (c.z - 4) * (c.z - 4); };
-  std::stable_sort(order.begin(), order.end(), [&](IVec3 a, IVec3 b) { return distance(a) < distance(b); });
+  std::stable_sort(order.begin(), order.end(), [&](IVec3 a, IVec3 b) { return rank(a) < rank(b); });
   const auto step = static_cast<std::size_t>(state.range(0));
   PropagatedLight light;
   stream(world, order, step, light);
@@ -130,7 +152,15 @@ void streamed(benchmark::State& state) {
     stream(world, order, step, again);
   }
 }
-BENCHMARK(streamed)->Name("light/propagated/streamed")->Arg(1)->Arg(16)->Arg(128)->Unit(benchmark::kMillisecond);
+void stream_steps(benchmark::internal::Benchmark* of) {
+  of->ArgsProduct({{1, 16}, {4, 8, 16}})->Unit(benchmark::kMillisecond);
+}
+BENCHMARK_CAPTURE(streamed, near, from_near)->Name("light/propagated/streamed/near")->Apply(stream_steps);
+BENCHMARK_CAPTURE(streamed, far, from_far)->Name("light/propagated/streamed/far")->Apply(stream_steps);
+BENCHMARK_CAPTURE(streamed, above, from_above)->Name("light/propagated/streamed/above")->Apply(stream_steps);
+BENCHMARK_CAPTURE(streamed, below, from_below)->Name("light/propagated/streamed/below")->Apply(stream_steps);
+BENCHMARK_CAPTURE(streamed, columns, by_column)->Name("light/propagated/streamed/columns")->Apply(stream_steps);
+BENCHMARK_CAPTURE(streamed, random, at_random)->Name("light/propagated/streamed/random")->Apply(stream_steps);
 
 // Returns positions in caves, or in their walls where a lamp shines at them.
 std::vector<IVec3> places_in_caves(const World& world, const PropagatedLight& light, bool in_walls) {
