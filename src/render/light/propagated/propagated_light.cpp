@@ -340,7 +340,7 @@ LightEdit edit_of(const LightState& state, const Grid& grid, const IBox& voxels)
 // Returns the edit of a chunk that was dark, since it was below the domain, and is in it now. Requires: `state` has
 // the domain after the edits.
 LightEdit edit_of_entering(const LightState& state, const Grid& grid, IVec3 chunk) {
-  QUOIN_ASSERT(state.domain.holds(chunk) && state.store.find(chunk) == nullptr, "a chunk that enters the domain");
+  QUOIN_ASSERT(state.domain.holds(chunk), "a chunk that enters the domain");
   const IVec3 low = chunk * kChunkEdge;
   LightEdit edit = edit_of(state, grid, {low, low + kChunkEdge});
   edit.below = {};
@@ -424,6 +424,7 @@ struct PropagatedLight::Impl {
   [[nodiscard]] LightState state() const { return {store, domain(), lights()}; }
   [[nodiscard]] std::optional<LightEdit> edit_of(const Grid& grid, const ChunkChange& change) const;
   void change_domain(const Grid& grid, const std::vector<IVec3>& chunks, std::vector<LightEdit>& edits);
+  void light_entering(const Grid& grid);
   void solve_dirty(const Grid& grid, Threads threads);
   void solve_queue(const Grid& grid, Threads threads);
   void read_masks(const Grid& grid, const std::vector<LightRegion>& regions, Threads threads);
@@ -436,10 +437,11 @@ struct PropagatedLight::Impl {
   ChangeCursor followed_types;
   std::shared_ptr<const std::vector<TypeLight>> shared_lights = std::make_shared<const std::vector<TypeLight>>();
   Ref<SharedDomain> shared_domain = make_ref<SharedDomain>();
-  LightStore store;                                  // of the chunks of the domain
-  std::uint64_t visited_rows = 0;                    // see PropagatedLight::visited_rows
-  std::vector<LightBoxes> dirty;                     // boxes that are to be solved by themselves
-  LightQueue queue;                                  // boxes of chunks that are to be solved, from above
+  LightStore store;                // of the chunks of the domain
+  std::uint64_t visited_rows = 0;  // see PropagatedLight::visited_rows
+  std::vector<LightBoxes> dirty;   // boxes that are to be solved by themselves
+  LightQueue queue;                // boxes of chunks that are to be solved, from above
+  std::vector<IVec3> entering;     // chunks that entered the domain from below it, from below in each column
   std::vector<LightDomain::Change> changed_columns;  // during an update, until the store has recorded them
   std::unordered_map<IVec3, std::unique_ptr<CachedMasks>, CoordinateHash> masks;  // during an update
 };
@@ -460,6 +462,7 @@ void PropagatedLight::Impl::begin_anew(const Grid& grid) {
   queue.clear();
   dirty.clear();
   masks.clear();
+  entering.clear();
   const auto darken = [&](int x, int z, const LightDomain::Range& range) {
     for (int y = range.begin; y < range.end; ++y) store.begin({x, y, z});
   };
@@ -508,7 +511,6 @@ void PropagatedLight::Impl::change_domain(const Grid& grid, const std::vector<IV
   for (const LightDomain::Change& column : changed_columns) {
     before.try_emplace({column.x, 0, column.z}, column.before);
   }
-  std::vector<IVec3> from_dark;
   for (const auto& each : before) {
     const IVec3 column = each.first;
     const LightDomain::Range old = each.second;
@@ -518,7 +520,7 @@ void PropagatedLight::Impl::change_domain(const Grid& grid, const std::vector<IV
         const IVec3 chunk{column.x, y, column.z};
         const bool is_dark = other.begin != other.end && y < other.begin;  // before, or now
         if (is_entering) {
-          is_dark ? from_dark.push_back(chunk) : store.open(chunk);
+          is_dark ? entering.push_back(chunk) : store.open(chunk);
         } else {
           if (is_dark) edits.push_back(edit_of_leaving(state(), chunk));
           store.begin(chunk);
@@ -533,22 +535,30 @@ void PropagatedLight::Impl::change_domain(const Grid& grid, const std::vector<IV
     for_each_only_in(old, now, false);
     for_each_only_in(now, old, true);
   }
-  // From above, in each column of chunks.
-  for (auto chunk = from_dark.rbegin(); chunk != from_dark.rend(); ++chunk) {
-    const auto is_in_column = [&](IVec3 other) { return other.x == chunk->x && other.z == chunk->z; };
-    if (std::none_of(chunks.begin(), chunks.end(), is_in_column) && is_below_open_sky(state(), grid, *chunk)) {
-      ChunkLightChange opened;
-      opened.chunk = *chunk;
-      opened.channels[kSky].is_uniform = true;
-      opened.channels[kSky].level = kBrightest;
-      opened.record.add_all();
-      store.take(std::move(opened));
-      edits.push_back(edit_of_opened(state(), grid, *chunk));
-    } else {
-      edits.push_back(edit_of_entering(state(), grid, *chunk));
-    }
-  }
   changed_columns.clear();
+}
+
+// Lights the chunks that entered the domain from below it, where it is dark. Their light only rises, so all other edits
+// are solved first, with these chunks dark.
+void PropagatedLight::Impl::light_entering(const Grid& grid) {
+  // From above, in each column of chunks.
+  std::vector<LightEdit> edits;
+  for (auto chunk = entering.rbegin(); chunk != entering.rend(); ++chunk) {
+    if (!is_below_open_sky(state(), grid, *chunk)) {
+      edits.push_back(edit_of_entering(state(), grid, *chunk));
+      continue;
+    }
+    ChunkLightChange opened;
+    opened.chunk = *chunk;
+    opened.channels[kSky].is_uniform = true;
+    opened.channels[kSky].level = kBrightest;
+    opened.record.add_all();
+    store.take(std::move(opened));
+    edits.push_back(edit_of_opened(state(), grid, *chunk));
+  }
+  entering.clear();
+  for (const LightEdit& edit : edits) add_reach(state(), grid, edit, dirty);
+  propagated::sort_boxes(dirty, queue, domain());
 }
 
 void PropagatedLight::Impl::take_over(const Grid& grid, const GridChanges& changes) {
@@ -701,6 +711,11 @@ void PropagatedLight::update(const Grid& grid, const VoxelRegistry& types, Threa
   changes->all ? me.begin_anew(grid) : me.take_over(grid, *changes);
   me.solve_dirty(grid, threads);
   me.solve_queue(grid, threads);
+  if (!me.entering.empty()) {
+    me.light_entering(grid);
+    me.solve_dirty(grid, threads);
+    me.solve_queue(grid, threads);
+  }
   QUOIN_ASSERT(me.dirty.empty() && me.queue.empty(), "no light is left to be solved");
   changes.commit();
 }
