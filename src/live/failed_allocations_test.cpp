@@ -2,6 +2,7 @@
 // program, so that a chosen allocation of the calling thread fails. It also counts allocations for other tests.
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <cstdlib>
@@ -185,9 +186,73 @@ class BusyScene {
   std::mt19937 random_{11};
 };
 
+/// A partial grid whose chunks come and go: solid ones, plates with a hole and lamps, and air.
+class ComingChunks {
+ public:
+  ComingChunks() {
+    VoxelProperties properties;
+    EXPECT_TRUE(types.add(properties));
+    properties.emission = 1.0F;
+    EXPECT_TRUE(types.add(properties));
+    grid.make_partial();
+  }
+
+  void edit() {
+    for (int i = 0; i < 2; ++i) {
+      const IVec3 chunk{below(2), below(3), below(2)};
+      const int kind = below(5);
+      if (kind == 0) {
+        grid.unload_chunk(chunk);
+        continue;
+      }
+      Chunk voxels = kind == 1 ? Chunk(kStone) : Chunk();
+      if (kind > 2) {
+        for (int z = 0; z < kChunkEdge; ++z) {
+          for (int x = 0; x < kChunkEdge; ++x) voxels.set({x, 30, z}, x % 31 == 7 && z % 29 == 3 ? kAir : kStone);
+        }
+        voxels.set({30, 31, 30}, kLamp);
+        voxels.set({2, 29, 60}, kLamp);
+      }
+      grid.load_chunk(chunk, std::move(voxels));
+    }
+  }
+  /// Returns some rows of light of each chunk.
+  [[nodiscard]] static std::map<IVec3, std::vector<std::uint16_t>, ByZyx> rows_of(const PropagatedLight& light) {
+    std::map<IVec3, std::vector<std::uint16_t>, ByZyx> rows;
+    std::array<std::uint16_t, kChunkEdge> row;
+    for (int i = 0; i < 4 * 6 * 4; ++i) {
+      const IVec3 chunk{i % 4 - 1, i / 4 % 6 - 2, i / 24 - 1};
+      for (const int y : {0, 17, 29, 31, 33, 63}) {
+        for (const int z : {0, 3, 30, 63}) {
+          light.read_row(chunk * kChunkEdge + IVec3(0, y, z), row);
+          rows[chunk].insert(rows[chunk].end(), row.begin(), row.end());
+        }
+      }
+    }
+    return rows;
+  }
+
+  /// Returns true if a chunk or one next to it has voxels, so that its light can reach a surface.
+  [[nodiscard]] bool is_near_voxels(IVec3 chunk) const {
+    for (int i = 0; i < 27; ++i) {
+      if (grid.find_chunk(chunk + IVec3(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1)) != nullptr) return true;
+    }
+    return false;
+  }
+
+  Grid grid;
+  VoxelRegistry types;
+
+ private:
+  int below(int end) { return static_cast<int>(random_() % static_cast<unsigned>(end)); }
+
+  std::mt19937 random_{5};
+};
+
 /// Calls `update` after edits while the n-th allocation fails, for growing n. Calls it again without a failure, and
 /// expects `is_current` to return true. `growth`: factor from each n to the next.
-void expect_recovery(BusyScene& busy, const std::function<void()>& update, const std::function<bool()>& is_current,
+template <class Busy>
+void expect_recovery(Busy& busy, const std::function<void()>& update, const std::function<bool()>& is_current,
                      double growth = 1.125) {
   update();
   int failures = 0;
@@ -376,6 +441,29 @@ TEST(FailedAllocations, KeepLight) {
         SceneLight fresh;
         fresh.update(busy.scene, {1});
         return levels_of(light, busy.scene) == levels_of(fresh, busy.scene);
+      });
+}
+
+// After each update, all light is right, and the changes since the one before contain all chunks with other light.
+TEST(FailedAllocations, KeepLightOfChunksThatComeAndGo) {
+  ComingChunks coming;
+  PropagatedLight light;
+  ChangeCursor cursor;
+  auto shown = ComingChunks::rows_of(light);
+  expect_recovery(
+      coming, [&] { light.update(coming.grid, coming.types, {1}); },
+      [&] {
+        PropagatedLight fresh;
+        fresh.update(coming.grid, coming.types, {1});
+        auto rows = ComingChunks::rows_of(light);
+        const GridChanges changes = light.changes_since(cursor);
+        for (const auto& [chunk, row] : rows) {
+          const auto is_it = [&, at = chunk](const ChunkChange& change) { return change.chunk == at; };
+          const bool is_reported = std::any_of(changes.items.begin(), changes.items.end(), is_it);
+          if (row != shown[chunk] && !changes.all && !is_reported && coming.is_near_voxels(chunk)) return false;
+        }
+        shown = std::move(rows);
+        return shown == ComingChunks::rows_of(fresh);
       });
 }
 
