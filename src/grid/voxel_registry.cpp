@@ -22,6 +22,24 @@ std::uint64_t hash_of(const VoxelProperties& p) {
          static_cast<std::uint64_t>(p.visibility);
 }
 
+// Returns the class of a type for occlusion (VoxelRegistry::occlusion).
+Visibility occlusion_of(const VoxelProperties& p) {
+  const bool is_clear = p.visibility == Visibility::Opaque && !p.occludes.value_or(true);
+  return is_clear ? Visibility::Transparent : p.visibility;
+}
+
+// Empties properties that equal the defaults of the type's visibility, so that types that behave alike are equal.
+// Returns true if there were any.
+bool drop_defaults(VoxelProperties& p) {
+  bool has_dropped = false;
+  for (std::optional<bool>* property : {&p.blocks_light, &p.occludes}) {
+    if (*property != (p.visibility == Visibility::Opaque)) continue;
+    property->reset();
+    has_dropped = true;
+  }
+  return has_dropped;
+}
+
 // As ==, but NaN equals itself. Otherwise each lookup would add a type.
 bool is_same(const VoxelProperties& a, const VoxelProperties& b) {
   if (a == b) return true;
@@ -47,6 +65,20 @@ struct TypeRecord : TypeChange {
 
 struct VoxelRegistry::Journal : ChangeJournal<TypeRecord> {};
 
+Status validate_type(const VoxelProperties& properties) {
+  const auto wrong = [&](const char* property, const char* reason) {
+    return make_error(ErrorCode::InvalidArgument,
+                      "cannot use voxel type \"" + properties.name + "\": " + property + ": " + reason);
+  };
+  if (properties.visibility == Visibility::Air) return wrong("visibility", "only type 0 can be air");
+  if (properties.state_bits > kMaxStateBits) return wrong("state_bits", "must be 0 to 32");
+  if (properties.light_cost > kMaxLightCost) return wrong("light_cost", "must be 0 to 15");
+  if (properties.visibility == Visibility::Transparent && properties.occludes.value_or(false)) {
+    return wrong("occludes", "must be false for a transparent type, since only types that hide faces can occlude");
+  }
+  return {};
+}
+
 bool has_other_visibility(const TypeChanges& changes) {
   return changes.all || std::any_of(changes.items.begin(), changes.items.end(),
                                     [](const TypeChange& change) { return change.visibility_changed; });
@@ -60,6 +92,7 @@ VoxelRegistry::VoxelRegistry() : content_(make_ref<Content>()), journal_(std::ma
   air.collides = false;
   content_->properties.push_back(std::move(air));
   content_->visibility.push_back(Visibility::Air);
+  content_->occlusion.push_back(Visibility::Air);
   content_->serials.push_back(0);
 }
 
@@ -80,31 +113,31 @@ void VoxelRegistry::note(TypeChange change) {
 }
 
 Result<VoxelType> VoxelRegistry::add(VoxelProperties properties) {
-  if (properties.visibility == Visibility::Air) {
-    return make_error(ErrorCode::InvalidArgument, "only type 0 can be air");
-  }
-  if (properties.state_bits > kMaxStateBits) {
-    return make_error(ErrorCode::InvalidArgument, "state_bits: must be 0 to 32");
-  }
+  if (Status valid = validate_type(properties); !valid) return valid.error();
   if (size() > kMaxVoxelTypes) {
     return make_error(ErrorCode::LimitExceeded, "more than 65,535 distinct voxel types");
   }
+  drop_defaults(properties);
   journal_->begin_change();
   content_.make_own();
   Content& c = *content_;
   const auto type = static_cast<VoxelType>(size());
   const Visibility visibility = properties.visibility;
+  const Visibility occlusion = occlusion_of(properties);
   // Reserves memory first, so that a failure leaves nothing half done.
   make_room(c.serials);
   make_room(c.visibility);
+  make_room(c.occlusion);
   make_room(c.properties);
   c.by_hash.emplace(hash_of(properties), type);
   c.serials.push_back(0);
   c.visibility.push_back(visibility);
+  c.occlusion.push_back(occlusion);
   if (!properties.collides) ++c.passable_count;
   c.properties.push_back(std::move(properties));
   if (visibility == Visibility::Transparent) ++c.transparent_count;
-  note({type, visibility != Visibility::Opaque, true});
+  if (occlusion != visibility) ++c.unoccluding_count;
+  note({type, occlusion != Visibility::Opaque, true});
   return type;
 }
 
@@ -125,6 +158,9 @@ std::optional<VoxelType> VoxelRegistry::find(std::string_view name) const {
 }
 
 Result<VoxelType> VoxelRegistry::find_or_add(const VoxelProperties& properties) {
+  if (properties.blocks_light || properties.occludes) {
+    if (VoxelProperties stored = properties; drop_defaults(stored)) return find_or_add(stored);
+  }
   const auto [first, last] = std::as_const(content_->by_hash).equal_range(hash_of(properties));
   for (auto it = first; it != last; ++it) {
     if (is_same((*this)[it->second], properties)) return it->second;
@@ -135,7 +171,8 @@ Result<VoxelType> VoxelRegistry::find_or_add(const VoxelProperties& properties) 
 void VoxelRegistry::replace(VoxelType type, VoxelProperties properties) {
   QUOIN_ASSERT(type != kAir && type < size(), "a registered type, not air");
   QUOIN_ASSERT(properties.visibility != Visibility::Air, "type 0 is the only air");
-  QUOIN_ASSERT(properties.state_bits <= kMaxStateBits, "a state word has 32 bits");
+  QUOIN_ASSERT(validate_type(properties), "properties that `validate_type` accepts");
+  drop_defaults(properties);
   journal_->begin_change();
   content_.make_own();
   Content& c = *content_;
@@ -147,10 +184,15 @@ void VoxelRegistry::replace(VoxelType type, VoxelProperties properties) {
   QUOIN_ASSERT(was != Visibility::Transparent || c.transparent_count != 0, "transparent types are counted");
   if (was == Visibility::Transparent) --c.transparent_count;
   if (properties.visibility == Visibility::Transparent) ++c.transparent_count;
+  const Visibility occluded = std::exchange(c.occlusion[type], occlusion_of(properties));
+  QUOIN_ASSERT(occluded == was || c.unoccluding_count != 0, "types that do not occlude are counted");
+  if (occluded != was) --c.unoccluding_count;
+  if (c.occlusion[type] != properties.visibility) ++c.unoccluding_count;
   QUOIN_ASSERT(c.properties[type].collides || c.passable_count != 0, "passable types are counted");
   if (!c.properties[type].collides) --c.passable_count;
   if (!properties.collides) ++c.passable_count;
-  const TypeChange change{type, was != properties.visibility, !(c.properties[type].colour == properties.colour)};
+  const bool is_seen_otherwise = was != properties.visibility || occluded != c.occlusion[type];
+  const TypeChange change{type, is_seen_otherwise, !(c.properties[type].colour == properties.colour)};
   c.properties[type] = std::move(properties);
   note(change);
 }

@@ -25,8 +25,17 @@ inline constexpr std::size_t kMaxVoxelTypes = 65'535;
 
 /// Number of bits in the state word of a voxel (VoxelData).
 inline constexpr std::uint8_t kMaxStateBits = 32;
+/// The level of full propagated light, and so the highest cost of a step (VoxelProperties::light_cost).
+inline constexpr std::uint8_t kMaxLightCost = 15;
 
-/// The role of a voxel in visibility, occlusion and light.
+/// The role of a voxel type in sight, and the default of its other optical properties (VoxelProperties):
+///
+///              faces behind it   `blocks_light`   `occludes`
+///   Opaque     hidden            true             true
+///   Transparent  shown           false            false
+///
+/// Rays see an opaque type as a solid surface and a transparent one as glass (or as a medium, if it scatters light).
+/// A transparent type also hides the faces between two of its own voxels.
 enum class Visibility : std::uint8_t { Air, Opaque, Transparent };
 
 /// An sRGB colour with 8 bits per channel. Alpha is linear: 0 is fully transparent, 255 fully opaque.
@@ -66,18 +75,42 @@ struct VoxelProperties {
   /// in which a state uses more bits.
   std::uint8_t state_bits = 0;
 
+  // Each of the following properties affects the named users only. Traced shadows, traced occlusion, traced light and
+  // path tracing follow `visibility`.
+
+  /// True if propagated light does not leave a voxel of this type: a lamp's own light does, which spreads from any
+  /// type. Light enters a transparent type that blocks light, so that faces behind it are lit, and a room below stays
+  /// dark: a roof of stairs. It enters no opaque one. Default: true for opaque types.
+  std::optional<bool> blocks_light{};
+  /// True if voxels of this type darken the corners of faces next to them: in blocky meshes and `face_occlusion`.
+  /// Images that are rendered without a mesh darken corners at each opaque type. Requires an opaque type: merging
+  /// faces without loss needs occluders that hide faces. Default: true for opaque types.
+  std::optional<bool> occludes{};
+  /// Levels of propagated light that a step into a voxel of this type costs, 0 to 15, if more than the 1 level that any
+  /// step costs. Sky light of level 15, which falls straight down through air without loss, also loses it. 1 is usual
+  /// for water and leaves: the sky's level is 8 at a depth of 7 voxels, and 0 from 15 on. 15 keeps all light out.
+  /// As in block games ("light block", opacity).
+  std::uint8_t light_cost = 0;
+
   bool operator==(const VoxelProperties&) const = default;
 };
+
+/// Returns an error if a registry does not accept a type's properties. The message names the type and the property.
+///
+/// Errors: InvalidArgument if `visibility` is Air, `state_bits` exceeds 32, `light_cost` exceeds 15, or a transparent
+/// type occludes.
+[[nodiscard]] Status validate_type(const VoxelProperties& properties);
 
 /// A type that was added or replaced. Properties without a flag below can differ too.
 struct TypeChange {
   VoxelType type = kAir;
-  bool visibility_changed = false;  ///< an unregistered type counts as opaque
-  bool colour_changed = false;      ///< also true if the type was added
+  bool visibility_changed =
+      false;                    ///< `visibility` or `occludes`; an unregistered type counts as opaque, with defaults
+  bool colour_changed = false;  ///< also true if the type was added
 };
 using TypeChanges = Changes<TypeChange>;
 
-/// Returns true if the visibility of any type changed or may have changed. It is then not enough to
+/// Returns true if the visibility or occlusion of any type changed or may have changed. It is then not enough to
 /// update changed chunks: rebuild all meshes and ray-tracing trees.
 [[nodiscard]] bool has_other_visibility(const TypeChanges& changes);
 
@@ -96,10 +129,10 @@ class VoxelRegistry {
   VoxelRegistry& operator=(VoxelRegistry&&) noexcept;
   ~VoxelRegistry();
 
-  /// Adds a type and returns its id. Ids count up from 1.
+  /// Adds a type and returns its id. Ids count up from 1. `blocks_light` and `occludes` become empty if they equal their
+  /// defaults.
   ///
-  /// Errors: LimitExceeded above kMaxVoxelTypes types; InvalidArgument if `visibility` is Air or `state_bits` exceeds
-  /// 32.
+  /// Errors: LimitExceeded above kMaxVoxelTypes types; those of `validate_type`.
   [[nodiscard]] Result<VoxelType> add(VoxelProperties properties);
 
   /// Returns the id of a type with equal properties, or adds one. Errors: same as `add`. Cost: O(log types).
@@ -108,9 +141,10 @@ class VoxelRegistry {
   /// Returns the type with a name, or nullopt; the lowest id if there are several. Cost: O(types).
   [[nodiscard]] std::optional<VoxelType> find(std::string_view name) const;
 
-  /// Replaces the properties of a type. Existing meshes and images are not updated; `changes_since` reports the change.
+  /// Replaces the properties of a type, as `add` stores them. Existing meshes and images are not updated;
+  /// `changes_since` reports the change.
   ///
-  /// Requires: type is not air and is registered; visibility is not Air; at most 32 state bits.
+  /// Requires: type is not air and is registered; `validate_type` returns no error.
   void replace(VoxelType type, VoxelProperties properties);
 
   /// Returns the properties of a type. Lifetime: until a type is added or replaced. Requires: `type < size()`.
@@ -132,6 +166,19 @@ class VoxelRegistry {
   }
   [[nodiscard]] bool is_opaque(VoxelType type) const { return visibility(type) == Visibility::Opaque; }
   [[nodiscard]] bool is_transparent(VoxelType type) const { return visibility(type) == Visibility::Transparent; }
+  /// Returns true if a type darkens corners (VoxelProperties::occludes). An unregistered id does.
+  [[nodiscard]] bool occludes(VoxelType type) const { return occlusion(type) == Visibility::Opaque; }
+  /// Returns Transparent for opaque types that do not occlude, else the visibility. Cost: as `visibility`.
+  [[nodiscard]] Visibility occlusion(VoxelType type) const {
+    const std::vector<Visibility>& all = content_->occlusion;
+    return type < all.size() ? all[type] : Visibility::Opaque;
+  }
+  /// Returns true if propagated light does not leave a type (VoxelProperties::blocks_light). An unregistered id blocks.
+  [[nodiscard]] bool blocks_light(VoxelType type) const {
+    return type >= size() || content_->properties[type].blocks_light.value_or(is_opaque(type));
+  }
+  /// Returns true if any registered opaque type does not occlude.
+  [[nodiscard]] bool has_unoccluding() const { return content_->unoccluding_count > 0; }
   /// Returns true if any registered type is transparent.
   [[nodiscard]] bool has_transparent() const { return content_->transparent_count > 0; }
   /// Returns true if any registered type except air does not stop moving bodies (VoxelProperties::collides).
@@ -153,6 +200,8 @@ class VoxelRegistry {
     std::multimap<std::uint64_t, VoxelType> by_hash;
     std::size_t transparent_count = 0;
     std::size_t passable_count = 0;
+    std::vector<Visibility> occlusion;  // see `occlusion`
+    std::size_t unoccluding_count = 0;  // opaque types that do not occlude
   };
   struct [[gnu::visibility("hidden")]] Journal;
   void note(TypeChange change);

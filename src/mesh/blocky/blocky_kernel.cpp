@@ -7,6 +7,9 @@
 // row and from row to row takes a few word operations (an addition carries "every cell agrees" to a run's end). The
 // rest of the work is one flat loop over the quads, without unpredictable branches.
 
+#include <tuple>
+#include <utility>
+
 #include <quoin/core/assert.h>
 
 #ifdef QUOIN_KERNEL_AVX512
@@ -71,9 +74,8 @@ void fill_row_masks(const IBox& region, Scratch& s) {
 }
 
 // With transparent types, a face depends on both voxels' types. All six face layers are then computed in the z view's
-// layout.
-void fill_faces(const Job& job, const SlabRange& range, bool row_ends, Scratch& s) {
-  find_faces_of_all_types(job, row_ends, s);
+// layout, and turned to the others'.
+void turn_faces(const SlabRange& range, Scratch& s) {
   for (int i = 0; i < 2; ++i) {
     turn_bits(s.sides[i], s.x.faces[i], range.y);
     swap_planes_and_rows(s.sides[2 + i], s.y.faces[i], range.z, range.y);
@@ -206,7 +208,20 @@ void turn_views(const Job& job, bool row_ends, Scratch& s) {
     turn_bits(s.same_z, s.x.same_bit, range.y);
     turn_bits(s.z.same_row, s.x.same_row, range.y);
   }
-  if (job.has_transparent) fill_faces(job, range, row_ends, s);
+  if (!job.has_transparent) return;
+  if (!job.by_occlusion) find_faces_of_all_types(job, row_ends, s);
+  turn_faces(range, s);
+}
+
+// Finds the faces, then fills the layers of opaque voxels again with only those that occlude: the passes over
+// directions use them only for occlusion if the faces are given. Returns the job with these layers, and `row_ends`.
+std::pair<Job, bool> find_faces_first(Job job, bool row_ends, Scratch& s) {
+  find_faces_of_all_types(job, row_ends, s);
+  job.by_occlusion = true;
+  const SlabRange range = slabs_around(job.region);
+  fill_layers(job, range, s);
+  end_at_border(range, s);
+  return {job, gather_border(job, s)};
 }
 
 void mesh_chunk(const Job& whole, Scratch& s, QuadBuffer& out) {
@@ -216,9 +231,10 @@ void mesh_chunk(const Job& whole, Scratch& s, QuadBuffer& out) {
   const SlabRange range = slabs_around(job.region);
   fill_layers(job, range, s);
   if (!job.one_type) end_at_border(range, s);
-  const bool row_ends = gather_border(job, s);
+  bool row_ends = gather_border(job, s);
   job.region = above_solid_floor(job, row_ends, s);
   if (job.region.empty()) return;
+  if (job.has_unoccluding) std::tie(job, row_ends) = find_faces_first(job, row_ends, s);
   fill_row_masks(job.region, s);
   turn_views(job, row_ends, s);
   run_directions(job, row_ends, types, s, out);

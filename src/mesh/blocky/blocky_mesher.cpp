@@ -64,6 +64,23 @@ bool holds_transparent(const Chunk& chunk, const VoxelRegistry& types) {
   return false;
 }
 
+bool hold_unoccluding(const Neighbourhood& chunks, const VoxelRegistry& types) {
+  if (!types.has_unoccluding()) return false;
+  const auto holds_any = [&](const Chunk* chunk) {
+    if (chunk == nullptr) return false;
+    const std::vector<VoxelType> held = chunk->types();
+    return std::ranges::any_of(held, [&](VoxelType type) { return types.is_opaque(type) && !types.occludes(type); });
+  };
+  for (int z = -1; z <= 1; ++z) {
+    for (int y = -1; y <= 1; ++y) {
+      for (int x = -1; x <= 1; ++x) {
+        if (holds_any(chunks.at(x, y, z))) return true;
+      }
+    }
+  }
+  return false;
+}
+
 std::uint64_t* grow_quads(QuadBuffer& out, std::size_t used, std::size_t more) {
   if (out.size() < used + more) out.resize(std::max(used + more, out.capacity()));
   static_assert(sizeof(Quad) == sizeof(std::uint64_t));
@@ -198,13 +215,15 @@ void BlockyMesher::mesh(const Neighbourhood& chunks, const VoxelRegistry& types,
   if (centre != nullptr && !is_buried(chunks, types)) {
     const IBox region = intersect(intersect(options.region, kWholeChunk), centre->bounds());
     if (!region.empty()) {
+      const bool has_unoccluding = options.bake_occlusion && blocky::hold_unoccluding(chunks, types);
       const blocky::Job job{.chunks = &chunks,
                             .types = &types,
                             .region = region,
                             .merge = options.merge,
                             .occlusion = options.bake_occlusion,
-                            .has_transparent = blocky::holds_transparent(*centre, types),
-                            .one_type = false};
+                            .has_transparent = has_unoccluding || blocky::holds_transparent(*centre, types),
+                            .one_type = false,
+                            .has_unoccluding = has_unoccluding};
       impl_of(scratch_).kernel.mesh(job, impl_of(scratch_), out);
     }
   }
@@ -309,7 +328,7 @@ void visible_faces(const Neighbourhood& chunks, const VoxelRegistry& types, cons
 FaceOcclusion face_occlusion(const Neighbourhood& chunks, const VoxelRegistry& types, IVec3 voxel,
                              Direction direction) {
   QUOIN_ASSERT(static_cast<std::size_t>(direction) < kCornerNeighbours.size(), "one of the six directions");
-  const auto is_occluder = [&](IVec3 offset) { return types.is_opaque(chunks.get(voxel + offset)); };
+  const auto is_occluder = [&](IVec3 offset) { return types.occludes(chunks.get(voxel + offset)); };
   FaceOcclusion corners{};
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const CornerNeighbours& at = kCornerNeighbours[static_cast<std::size_t>(direction)][i];

@@ -120,6 +120,15 @@ struct Job {
   bool occlusion;
   bool has_transparent;  // some voxel of the centre chunk is transparent
   bool one_type;         // all its voxels except air have one opaque type: the layers of equal types are not filled
+  // Some opaque voxel of the 27 chunks does not occlude, and occlusion is wanted. Set only with `has_transparent`.
+  bool has_unoccluding = false;
+  bool by_occlusion = false;  // the layers of opaque voxels have occluders only
+
+  // Returns the class of a type for the layers.
+  [[nodiscard]] Visibility visibility(VoxelType type) const {
+    return by_occlusion ? types->occlusion(type) : types->visibility(type);
+  }
+  [[nodiscard]] bool is_opaque(VoxelType type) const { return visibility(type) == Visibility::Opaque; }
 };
 
 // One kernel per instruction set; all give the same bytes.
@@ -143,6 +152,9 @@ std::uint64_t* grow_quads(QuadBuffer& out, std::size_t used, std::size_t more);
 // Returns true if a voxel of the chunk is transparent.
 bool holds_transparent(const Chunk& chunk, const VoxelRegistry& types);
 
+// Returns true if an opaque voxel of the chunks may not occlude.
+bool hold_unoccluding(const Neighbourhood& chunks, const VoxelRegistry& types);
+
 // Removes, from `sides` and the z view's faces, the faces of transparent voxels that a voxel of the same type beyond
 // the chunk's border hides.
 void hide_faces_at_border(const Job& job, Scratch& scratch);
@@ -151,8 +163,8 @@ void hide_faces_at_border(const Job& job, Scratch& scratch);
 
 namespace quoin {
 
-/// Returns the occlusion of the four corners of a face of `voxel` (coordinates in the centre chunk). Only opaque voxels
-/// are occluders: glass and water do not darken.
+/// Returns the occlusion of the four corners of a face of `voxel` (coordinates in the centre chunk). Types occlude as
+/// VoxelRegistry::occludes says: glass and water do not darken.
 ///
 /// Cost: 12 voxel look-ups; meshers do 64 faces at once instead.
 [[nodiscard]] FaceOcclusion face_occlusion(const Neighbourhood& chunks, const VoxelRegistry& types, IVec3 voxel,

@@ -283,7 +283,7 @@ QUOIN_INLINE std::uint64_t transparent_cells(const Job& job, const ChunkStorage&
   } else {
     for (int x = 0; x < 64; ++x) {
       const auto type = static_cast<VoxelType>(packed_row::read(row, kBits, x));
-      mask |= std::uint64_t{job.types->is_transparent(type)} << x;
+      mask |= std::uint64_t{job.visibility(type) == Visibility::Transparent} << x;
     }
   }
   return mask;
@@ -322,7 +322,7 @@ void classify_wide(const Job& job, const ChunkStorage& voxels, const SlabRange& 
 
 void classify_uniform(const Job& job, const SlabRange& range, Scratch& s) {
   const VoxelType type = *job.chunks->centre()->uniform();
-  const std::uint64_t opaque = job.types->is_opaque(type) ? ~std::uint64_t{0} : 0;
+  const std::uint64_t opaque = job.is_opaque(type) ? ~std::uint64_t{0} : 0;
   for (int z = range.z.begin; z < range.z.end; ++z) {
     for (int y = range.y.begin; y < range.y.end; ++y) {
       const int at = word_index(z, y);
@@ -343,7 +343,7 @@ void fill_layers(const Job& job, const SlabRange& range, Scratch& s) {
     QUOIN_ASSERT(voxels->palette.size() <= 256, "a palette of at most 8 bits");
     __builtin_memset(s.index_class, 1, sizeof(s.index_class));
     for (std::size_t i = 0; i < voxels->palette.size(); ++i) {
-      s.index_class[i] = static_cast<std::uint8_t>(job.types->visibility(voxels->palette[i]));
+      s.index_class[i] = static_cast<std::uint8_t>(job.visibility(voxels->palette[i]));
     }
   }
   switch (index_planes(*voxels)) {
@@ -371,17 +371,17 @@ void fill_layers(const Job& job, const SlabRange& range, Scratch& s) {
 // The opaque voxels of a chunk, as bits.
 class OpaqueVoxels {
  public:
-  OpaqueVoxels(const Chunk* chunk, const VoxelRegistry& types) : types_(&types) {
+  OpaqueVoxels(const Chunk* chunk, const Job& job) : job_(&job) {
     if (chunk == nullptr) return;
     voxels_ = ChunkStorage::of(*chunk);
     if (voxels_ == nullptr) {
-      all_ = types.is_opaque(*chunk->uniform());
+      all_ = job.is_opaque(*chunk->uniform());
       return;
     }
     if (voxels_->direct()) return;
     QUOIN_ASSERT(voxels_->palette.size() <= 256, "a palette of at most 8 bits");
     for (std::size_t i = 0; i < voxels_->palette.size(); ++i) {
-      is_opaque_[i] = types.is_opaque(voxels_->palette[i]);
+      is_opaque_[i] = job.is_opaque(voxels_->palette[i]);
       if (is_opaque_[i] == 0 && voxels_->counts[i] != 0) others_[other_count_++] = static_cast<std::uint8_t>(i);
     }
   }
@@ -428,7 +428,7 @@ class OpaqueVoxels {
 
  private:
   [[nodiscard]] QUOIN_INLINE std::uint64_t is_opaque(std::uint32_t index) const {
-    if (__builtin_expect(voxels_->direct(), 0)) return types_->is_opaque(static_cast<VoxelType>(index));
+    if (__builtin_expect(voxels_->direct(), 0)) return job_->is_opaque(static_cast<VoxelType>(index));
     return is_opaque_[index];
   }
 
@@ -460,7 +460,7 @@ class OpaqueVoxels {
   }
 
   const ChunkStorage* voxels_ = nullptr;  // null: all or no voxels are opaque
-  const VoxelRegistry* types_;
+  const Job* job_;
   bool all_ = false;
   int other_count_ = 0;
   std::uint8_t others_[256];  // palette indices that are in use and not opaque
@@ -476,7 +476,7 @@ bool gather_rows(const Job& job, Scratch& s) {
   for (int dz = -1; dz <= 1; ++dz) {
     for (int dy = -1; dy <= 1; ++dy) {
       if (dy == 0 && dz == 0) continue;
-      const OpaqueVoxels voxels(job.chunks->at(0, dy, dz), *job.types);
+      const OpaqueVoxels voxels(job.chunks->at(0, dy, dz), job);
       other_z |= dz != 0 && !voxels.none();
       for (int z = first(dz); z <= last(dz); ++z) {
         for (int y = first(dy); y <= last(dy); ++y) {
@@ -491,7 +491,7 @@ bool gather_rows(const Job& job, Scratch& s) {
 // Returns true if one of the 18 neighbours with another x may have opaque voxels. Does not read their palettes.
 bool has_row_ends(const Job& job) {
   const auto may_be_opaque = [&](const Chunk* chunk) {
-    return chunk != nullptr && (ChunkStorage::of(*chunk) != nullptr || job.types->is_opaque(*chunk->uniform()));
+    return chunk != nullptr && (ChunkStorage::of(*chunk) != nullptr || job.is_opaque(*chunk->uniform()));
   };
   for (int dz = -1; dz <= 1; ++dz) {
     for (int dy = -1; dy <= 1; ++dy) {
@@ -503,8 +503,8 @@ bool has_row_ends(const Job& job) {
 
 // Gathers the voxels before and after the rows of the centre, or of a neighbour with the centre's x.
 void gather_row_ends(const Job& job, int dy, int dz, Scratch& s) {
-  const OpaqueVoxels before(job.chunks->at(-1, dy, dz), *job.types);
-  const OpaqueVoxels after(job.chunks->at(1, dy, dz), *job.types);
+  const OpaqueVoxels before(job.chunks->at(-1, dy, dz), job);
+  const OpaqueVoxels after(job.chunks->at(1, dy, dz), job);
   const auto first = [](int d) { return d < 0 ? 63 : 0; };
   const auto last = [](int d) { return d > 0 ? 0 : 63; };
   for (int z = first(dz) & ~3; z <= last(dz); z += 4) {

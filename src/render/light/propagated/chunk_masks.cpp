@@ -25,6 +25,47 @@ LightLevels lamp_levels(const VoxelProperties& properties) {
   return {0, level(colour.r), level(colour.g), level(colour.b)};
 }
 
+void set_passage(const VoxelRegistry& types, VoxelType type, unsigned colours, TypeLight& light) {
+  constexpr unsigned kOfSky = 1U << kSky;
+  const unsigned cost = types[type].light_cost;
+  unsigned passes = colours;
+  unsigned tolls = 0;
+  if (types.blocks_light(type)) {
+    light.absorbs = types.is_transparent(type);
+    passes = 0;
+    // A lamp's own light is the light of its voxel.
+    for (std::size_t c = 0; light.absorbs && c < kChannels; ++c) {
+      tolls |= static_cast<unsigned>((light.lamp >> (4 * c) & 15U) == 0) << c;
+    }
+  } else if (cost > 0) {
+    passes = cost == 1 ? colours & ~kOfSky : 0;  // one level, as in air; but the sky's light falls freely in air only
+    tolls = colours & ~passes;
+  }
+  light.passes = static_cast<std::uint8_t>(passes);
+  light.tolls = static_cast<std::uint8_t>(tolls);
+  light.cost = static_cast<std::uint8_t>(tolls == 0 ? 1 : std::max(cost, 1U));
+}
+
+namespace {
+
+// Reads the rows of a box that hold types that `counts` accepts; [y + 64 z]. `inverted`: or all others.
+void read_box(const Chunk& voxels, const FunctionRef<bool(VoxelType)>& counts, std::uint64_t inverted, const IBox& box,
+              std::vector<std::uint64_t>& words) {
+  words.resize(static_cast<std::size_t>(kChunkEdge) * kChunkEdge);
+  const trace::ChunkRows counted(voxels, counts);
+  trace::SlabRows slab;
+  for (int z = box.min.z & ~3; z < box.max.z; z += 4) {
+    for (int y = box.min.y & ~3; y < box.max.y; y += 4) {
+      const trace::Slab kind = counted.read(y, z, slab);
+      if (kind != trace::Slab::Mixed) slab.fill(kind == trace::Slab::Full ? kAll : 0);
+      std::uint64_t* to = words.data() + y + kChunkEdge * z;
+      for (std::size_t i = 0; i < slab.size(); ++i) to[(i & 3) + kChunkEdge * (i >> 2)] = slab[i] ^ inverted;
+    }
+  }
+}
+
+}  // namespace
+
 void ChunkMasks::read_rows(const Chunk& voxels, const std::vector<TypeLight>& types, std::size_t channel,
                            const IBox& box) {
   Rows& rows = rows_[channel];
@@ -33,18 +74,23 @@ void ChunkMasks::read_rows(const Chunk& voxels, const std::vector<TypeLight>& ty
   rows.is_uniform = stopped == 0 || static_cast<std::size_t>(stopped) == found_.size();
   rows.uniform = stopped == 0 ? kAll : 0;
   if (rows.is_uniform) return;
-  rows.words.resize(static_cast<std::size_t>(kChunkEdge) * kChunkEdge);
   const auto stops = [&](VoxelType type) { return !passes(types, type, channel); };
-  const FunctionRef<bool(VoxelType)> asked(stops);
-  const trace::ChunkRows stopping(voxels, asked);
-  trace::SlabRows slab;
-  for (int z = box.min.z & ~3; z < box.max.z; z += 4) {
-    for (int y = box.min.y & ~3; y < box.max.y; y += 4) {
-      const trace::Slab kind = stopping.read(y, z, slab);
-      if (kind != trace::Slab::Mixed) slab.fill(kind == trace::Slab::Full ? kAll : 0);
-      std::uint64_t* to = rows.words.data() + y + kChunkEdge * z;
-      for (std::size_t i = 0; i < slab.size(); ++i) to[(i & 3) + kChunkEdge * (i >> 2)] = ~slab[i];
-    }
+  read_box(voxels, stops, kAll, box, rows.words);
+}
+
+// Finds no voxel, in a few steps per type, unless some type of the chunk has a cost.
+void ChunkMasks::read_tolls(const Chunk& voxels, const std::vector<TypeLight>& types, const IBox& box) {
+  for (const VoxelType found : found_) {
+    const TypeLight light = light_of(types, found);
+    if (found == kAir || light.tolls == 0) continue;
+    if (std::ranges::any_of(tolls(), [&](const Toll& toll) { return toll.is_of(light); })) continue;
+    if (toll_count_ == tolls_.size()) tolls_.emplace_back();
+    Toll& toll = tolls_[toll_count_++];
+    toll.like = light;
+    const auto is_like = [&](VoxelType type) { return type != kAir && toll.is_of(light_of(types, type)); };
+    toll.is_uniform = std::all_of(found_.begin(), found_.end(), is_like);
+    toll.uniform = toll.is_uniform ? kAll : 0;
+    if (!toll.is_uniform) read_box(voxels, is_like, 0, box, toll.words);
   }
 }
 
@@ -89,6 +135,7 @@ void ChunkMasks::read(const Chunk* voxels, const std::vector<TypeLight>& types, 
                       const SlabSet& lamp_slabs) {
   QUOIN_ASSERT(intersect(box, kWholeChunk) == box, "a box of the chunk");
   lamps_.clear();
+  toll_count_ = 0;
   without_lamps_.fill(0);
   rows_of_.fill(0);
   rows_[0].is_uniform = true;
@@ -106,6 +153,7 @@ void ChunkMasks::read(const Chunk* voxels, const std::vector<TypeLight>& types, 
     if (other == channel) read_rows(*voxels, types, channel, box);
   }
   read_lamps(*voxels, types, box, lamp_slabs);
+  read_tolls(*voxels, types, box);
 }
 
 namespace {

@@ -24,7 +24,10 @@ namespace quoin::propagated {
 /// The light properties of a voxel type.
 struct TypeLight {
   std::uint16_t lamp = 0;    ///< packed levels that it emits
-  std::uint8_t passes = 15;  ///< bit c: channel c
+  std::uint8_t passes = 15;  ///< bit c: channel c passes, and loses one level per step; light of the sky falls freely
+  std::uint8_t tolls = 0;    ///< bit c: channel c enters and loses `cost` levels
+  std::uint8_t cost = 1;
+  bool absorbs = false;  ///< light that enters does not leave
 
   bool operator==(const TypeLight&) const = default;
 };
@@ -34,7 +37,10 @@ struct TypeLight {
   return type < types.size() ? types[type] : TypeLight{0, 0};
 }
 
-/// Returns true if light of a channel passes voxels of a type.
+/// Sets how light passes a type. `colours`: bit c: the type's colour lets channel c through, which holds for the sky.
+void set_passage(const VoxelRegistry& types, VoxelType type, unsigned colours, TypeLight& light);
+
+/// Returns true if light of a channel passes voxels of a type as it passes air.
 [[nodiscard]] inline bool passes(const std::vector<TypeLight>& types, VoxelType type, std::size_t channel) {
   return type == kAir || (light_of(types, type).passes >> channel & 1U) != 0;
 }
@@ -60,6 +66,19 @@ class ChunkMasks {
     std::uint64_t where;
   };
 
+  /// The voxels that light of some channels enters at a cost of one kind.
+  struct Toll {
+    TypeLight like;  // its `tolls`, `cost` and `absorbs`
+    bool is_uniform = true;
+    std::uint64_t uniform = 0;         // the rows of the box if they are equal
+    std::vector<std::uint64_t> words;  // else as `rows`
+
+    [[nodiscard]] bool is_of(const TypeLight& type) const {
+      return type.tolls == like.tolls && type.cost == like.cost && type.absorbs == like.absorbs;
+    }
+    [[nodiscard]] const std::uint64_t* rows() const { return is_uniform ? nullptr : words.data(); }
+  };
+
   /// `voxels`: null if all is air. `lamp_slabs`: all slabs with lamps, maybe more. Unregistered types are opaque. Cost:
   /// O(rows of the box).
   void read(const Chunk* voxels, const std::vector<TypeLight>& types, const IBox& box, const SlabSet& lamp_slabs);
@@ -80,6 +99,17 @@ class ChunkMasks {
     return rows_of_[a] == rows_of_[b];
   }
   [[nodiscard]] std::span<const LampRow> lamps() const { return lamps_; }
+  /// The voxels that are in no row of a channel, but that its light enters.
+  [[nodiscard]] std::span<const Toll> tolls() const { return {tolls_.data(), toll_count_}; }
+  /// Returns the voxels of a row that light of a channel enters and does not leave.
+  [[nodiscard]] std::uint64_t absorbing(std::size_t channel, int y, int z) const {
+    std::uint64_t found = 0;
+    for (const Toll& toll : tolls()) {
+      if (!toll.like.absorbs || (toll.like.tolls >> channel & 1U) == 0) continue;
+      found |= toll.is_uniform ? toll.uniform : toll.words[static_cast<std::size_t>(y + kChunkEdge * z)];
+    }
+    return found;
+  }
   /// Slabs that were examined and contain no lamp.
   [[nodiscard]] const SlabSet& without_lamps() const { return without_lamps_; }
 
@@ -90,12 +120,15 @@ class ChunkMasks {
     std::vector<std::uint64_t> words;
   };
   void read_rows(const Chunk& voxels, const std::vector<TypeLight>& types, std::size_t channel, const IBox& box);
+  void read_tolls(const Chunk& voxels, const std::vector<TypeLight>& types, const IBox& box);
   void read_lamps(const Chunk& voxels, const std::vector<TypeLight>& types, const IBox& box, const SlabSet& slabs);
   void add_lamps(const Chunk& voxels, const std::vector<TypeLight>& types, int y, int z, std::uint64_t where);
 
   std::array<Rows, kChannels> rows_;
   std::array<std::size_t, kChannels> rows_of_{};  // [channel]: which of them
   std::vector<LampRow> lamps_;
+  std::vector<Toll> tolls_;  // the first `toll_count_` are in use
+  std::size_t toll_count_ = 0;
   SlabSet without_lamps_{};
   std::vector<VoxelType> found_;
 };

@@ -284,6 +284,10 @@ void LightSolver::read_channel(const Part& part, std::size_t channel, const Chan
     for (; rows != 0; rows &= rows - 1) {
       const auto row = static_cast<unsigned>(std::countr_zero(rows));
       std::uint64_t mask = (unknown_rows >> row & 1U) != 0 ? known : part.bits;
+      if (has_tolls_ && part.around->masks != nullptr) {
+        const auto of_slab = static_cast<int>(row);
+        mask &= ~part.around->masks->absorbing(channel, y + (of_slab & 3), z + (of_slab >> 2));
+      }
       const IVec3 first = low + IVec3(0, y + static_cast<int>(row & 3), z + static_cast<int>(row >> 2));
       const RowPlanes of_row = planes.row(row);
       if (channel == kSky) {
@@ -331,24 +335,63 @@ void LightSolver::read_inside() {
   });
 }
 
+// Adds a part's rows to the words of a region. `rows`: of the chunk, [y + 64 z]; null: all are `uniform`.
+void LightSolver::put_rows(const Part& part, const std::uint64_t* rows, std::uint64_t uniform,
+                           std::vector<std::uint64_t>& to) {
+  std::array<std::uint64_t, kChunkEdge> same;
+  if (rows == nullptr) same.fill(uniform);
+  const auto count = static_cast<std::size_t>(part.box.max.y - part.box.min.y);
+  const auto y = static_cast<std::size_t>(part.chunk.y * kChunkEdge + part.box.min.y - origin_.y);
+  // The column before the first is written only where it is masked.
+  const std::ptrdiff_t column = part.shift >> 6;
+  for (int z = part.box.min.z; z < part.box.max.z; ++z) {
+    const std::uint64_t* from = rows == nullptr ? same.data() : rows + part.box.min.y + kChunkEdge * z;
+    const auto layer = static_cast<std::size_t>(part.chunk.z * kChunkEdge + z - origin_.z) * layer_;
+    std::uint64_t* low = to.data() + layer + y + column * static_cast<std::ptrdiff_t>(column_);
+    kernel().shift_in(from, count, part.bits, static_cast<unsigned>(part.shift & 63), low, low + column_);
+  }
+}
+
 void LightSolver::read_pass(std::size_t channel) {
   std::fill_n(pass_.begin(), (static_cast<std::size_t>(size_.z) + 2) * layer_, 0);
-  std::array<std::uint64_t, kChunkEdge> same;
   for_each_part(box_.voxels, [&](const Part& part) {
     if (!part.around->is_held) return;
     const std::uint64_t* rows = part.around->masks->rows(channel);
-    if (rows == nullptr) same.fill(part.around->masks->uniform(channel));
-    const auto count = static_cast<std::size_t>(part.box.max.y - part.box.min.y);
-    const auto y = static_cast<std::size_t>(part.chunk.y * kChunkEdge + part.box.min.y - origin_.y);
-    // The column before the first is written only where it is masked.
-    const std::ptrdiff_t column = part.shift >> 6;
-    for (int z = part.box.min.z; z < part.box.max.z; ++z) {
-      const std::uint64_t* from = rows == nullptr ? same.data() : rows + part.box.min.y + kChunkEdge * z;
-      const auto layer = static_cast<std::size_t>(part.chunk.z * kChunkEdge + z - origin_.z) * layer_;
-      std::uint64_t* low = pass_.data() + layer + y + column * static_cast<std::ptrdiff_t>(column_);
-      kernel().shift_in(from, count, part.bits, static_cast<unsigned>(part.shift & 63), low, low + column_);
+    put_rows(part, rows, rows == nullptr ? part.around->masks->uniform(channel) : 0, pass_);
+  });
+}
+
+// Sets the tolls of a channel.
+void LightSolver::read_tolls(std::size_t channel) {
+  toll_count_ = 0;
+  if (!has_tolls_) return;
+  const std::size_t layers = static_cast<std::size_t>(size_.z) + 2;
+  const auto toll_like = [&](const TypeLight& type) -> Toll& {
+    for (std::size_t i = 0; i < toll_count_; ++i) {
+      if (tolls_[i].cost == type.cost && tolls_[i].absorbs == type.absorbs) return tolls_[i];
+    }
+    if (toll_count_ == tolls_.size()) tolls_.emplace_back();
+    Toll& toll = tolls_[toll_count_++];
+    toll.cost = type.cost;
+    toll.absorbs = type.absorbs;
+    toll.left.assign(layers * layer_, 0);
+    return toll;
+  };
+  for_each_part(box_.voxels, [&](const Part& part) {
+    if (!part.around->is_held) return;
+    for (const ChunkMasks::Toll& toll : part.around->masks->tolls()) {
+      if ((toll.like.tolls >> channel & 1U) == 0) continue;
+      put_rows(part, toll.rows(), toll.uniform, toll_like(toll.like).left);
     }
   });
+  if (toll_count_ == 0) return;
+  lit_tolls_.assign(layers * layer_, 0);
+  for (std::size_t i = 0; i < toll_count_; ++i) {
+    tolls_[i].blocks.resize(layers);
+    for (std::size_t z = 0; z < layers; ++z) {
+      tolls_[i].blocks[z] = kernel().find_blocks(tolls_[i].left.data() + z * layer_, columns_ * blocks_);
+    }
+  }
 }
 
 // Finds the blocks that light can reach.
@@ -364,20 +407,38 @@ bool LightSolver::has_sources(std::size_t channel) const {
                      [](const std::vector<Source>& sources) { return !sources.empty(); });
 }
 
-// Gives this level to voxels without a higher one. A voxel that blocks light has only one source.
+// Prepares the block of a source for light.
+void LightSolver::touch(const Source& source) {
+  const std::uint64_t block = std::uint64_t{1} << source.block;
+  if ((touched_[source.z] & block) != 0) return;
+  touched_[source.z] |= block;
+  const std::size_t first = source.at & ~(kBlockRows - 1);
+  std::copy_n(pass_.data() + first, kBlockRows, rest_.data() + first);
+  for (std::uint64_t* plane : planes_) std::fill_n(plane + first, kBlockRows, 0);
+}
+
+// Gives this level to voxels that light does not leave.
+void LightSolver::absorb(const Source& source, unsigned level) {
+  touch(source);
+  for (std::size_t i = 0; i < kPlanes; ++i) {
+    if ((level >> i & 1U) != 0) planes_[i][source.at] |= source.where;
+  }
+}
+
+// Gives this level to voxels without a higher one. A voxel that blocks light has only one source; a voxel with a cost
+// has one for each lamp and at most one more.
 void LightSolver::light_up(const Source& source, unsigned level) {
   QUOIN_ASSERT(source.at < pass_.size() && source.block < 64 && source.z < touched_.size(), "a word of the region");
   const std::uint64_t block = std::uint64_t{1} << source.block;
   const bool is_touched = (touched_[source.z] & block) != 0;
   const std::uint64_t dark = is_touched ? rest_[source.at] : pass_[source.at];
-  const std::uint64_t fresh = source.where & (dark | ~pass_[source.at]);
-  if (fresh == 0) return;
-  if (!is_touched) {
-    touched_[source.z] |= block;
-    const std::size_t first = source.at & ~(kBlockRows - 1);
-    std::copy_n(pass_.data() + first, kBlockRows, rest_.data() + first);
-    for (std::uint64_t* plane : planes_) std::fill_n(plane + first, kBlockRows, 0);
+  std::uint64_t fresh = source.where & (dark | ~pass_[source.at]);
+  if (toll_count_ > 0) {
+    fresh &= ~lit_tolls_[source.at];
+    lit_tolls_[source.at] |= fresh;
   }
+  if (fresh == 0) return;
+  if (!is_touched) touch(source);
   in_front_[source.z] |= block;
   front_[source.at] |= fresh;
   rest_[source.at] &= ~fresh;
@@ -396,6 +457,48 @@ std::uint64_t LightSolver::blocks_near(int margin) const {
   return blocks;
 }
 
+// Returns the blocks of a layer that have voxels of the front or are next to them.
+std::uint64_t LightSolver::blocks_beside_front(std::size_t z) const {
+  const std::uint64_t own = in_front_[z];
+  std::uint64_t adjacent = own | own << 1 | own >> 1 | in_front_[z - 1] | in_front_[z + 1];
+  if (columns_ > 1) adjacent |= own << blocks_ | own >> blocks_;
+  return adjacent;
+}
+
+// Makes sources of the voxels of a block that the front reaches. They are not at the region's rim.
+void LightSolver::pay_toll(Toll& toll, std::size_t z, unsigned block, std::vector<Source>& out) {
+  const std::size_t first = z * layer_ + block * kBlockRows;
+  const std::size_t column = block / blocks_;
+  for (std::size_t at = first; at < first + kBlockRows; ++at) {
+    if (toll.left[at] == 0) continue;
+    const std::uint64_t own = front_[at];
+    std::uint64_t around = own << 1 | own >> 1 | front_[at - 1] | front_[at + 1];
+    around |= front_[at - layer_] | front_[at + layer_];
+    if (column > 0) around |= front_[at - column_] >> 63;
+    if (column + 1 < columns_) around |= front_[at + column_] << 63;
+    const std::uint64_t reached = around & toll.left[at];
+    if (reached == 0) continue;
+    toll.left[at] &= ~reached;
+    out.push_back(
+        {static_cast<std::uint32_t>(at), static_cast<std::uint16_t>(z), static_cast<std::uint16_t>(block), reached});
+  }
+}
+
+// Makes sources of the voxels with a cost next to the front, of the level above `level`.
+void LightSolver::pay_tolls(std::size_t channel, unsigned level) {
+  for (std::size_t i = 0; i < toll_count_; ++i) {
+    Toll& toll = tolls_[i];
+    if (toll.cost > level) continue;
+    const unsigned reached = level + 1 - toll.cost;
+    std::vector<Source>& out = toll.absorbs ? absorbed_[reached] : sources_[channel][reached];
+    for (std::size_t z = 1; z <= static_cast<std::size_t>(size_.z); ++z) {
+      for (std::uint64_t left = blocks_beside_front(z) & toll.blocks[z]; left != 0; left &= left - 1) {
+        pay_toll(toll, z, static_cast<unsigned>(std::countr_zero(left)), out);
+      }
+    }
+  }
+}
+
 // Activates the blocks next to those that changed, if light of this level can still reach the wanted box from there.
 void LightSolver::activate(unsigned level) {
   const int margin = static_cast<int>(level) - 1;
@@ -404,10 +507,7 @@ void LightSolver::activate(unsigned level) {
   const int high = box_.wanted.max.z + margin - origin_.z;
   for (std::size_t z = 1; z <= static_cast<std::size_t>(size_.z); ++z) {
     const bool is_near = static_cast<int>(z) >= low && static_cast<int>(z) < high;
-    const std::uint64_t own = in_front_[z];
-    std::uint64_t adjacent = own | own << 1 | own >> 1 | in_front_[z - 1] | in_front_[z + 1];
-    if (columns_ > 1) adjacent |= own << blocks_ | own >> blocks_;
-    active_[z] = is_near ? adjacent & open_[z] & near : 0;
+    active_[z] = is_near ? blocks_beside_front(z) & open_[z] & near : 0;
   }
 }
 
@@ -435,20 +535,24 @@ LevelPass LightSolver::step_to(unsigned level) {
 
 void LightSolver::spread(std::size_t channel) {
   const auto& sources = sources_[channel];
+  read_tolls(channel);
   open_ = passable_;
   outcome_ = Outcome::Mixed;
   for (const Source& source : sources[kBrightest]) light_up(source, kBrightest);
   if (channel == kSky) {
     LevelPass sky = step_to(kBrightest);
     sky.changed = in_front_.data();
-    if (!kernel().take_sky(sky)) outcome_ = Outcome::Open;
+    if (!kernel().take_sky(sky) && toll_count_ == 0) outcome_ = Outcome::Open;
   }
   for (unsigned level = kBrightest - 1; level > 0 && outcome_ != Outcome::Open; --level) {
+    if (toll_count_ > 0) pay_tolls(channel, level);
     activate(level);
     kernel().spread(step_to(level));
     std::swap(front_, next_);
     std::swap(in_front_, in_next_);
     for (const Source& source : sources[level]) light_up(source, level);
+    for (const Source& source : absorbed_[level]) absorb(source, level);
+    absorbed_[level].clear();
   }
   clear_fronts();
 }
@@ -609,6 +713,9 @@ void LightSolver::solve(const LightRegion& region, std::vector<ChunkLightChange>
   QUOIN_ASSERT(fits(region.all.voxels.size()), "a region that is not too large");
   QUOIN_ASSERT(region.around.size() == region.index(region.chunks.max - 1) + 1, "a chunk for each index");
   region_ = &region;
+  has_tolls_ = std::ranges::any_of(region.around, [](const ChunkAround& around) {
+    return around.masks != nullptr && !around.masks->tolls().empty();
+  });
   box_ = region.all;
   if (!std::exchange(is_clean_, false)) {
     std::fill(front_.begin(), front_.end(), 0);

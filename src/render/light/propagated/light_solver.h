@@ -81,6 +81,9 @@ struct LightRegion {
 /// voxel its final level, since no voxel is lit by a lower one. Sky light of level 15 falls first. Each level processes
 /// only the blocks of rows next to blocks that contain the previous level.
 ///
+/// Voxels that cost more, or that light does not leave, are in none of these sets. A front of level L that reaches one
+/// makes it a source of level L - cost: the first front is the highest, so each becomes a source once.
+///
 ///   words [z][column][y]: bit x of the region is bit x % 64 of column x / 64; x, y and z count from the rim
 class LightSolver {
  public:
@@ -111,6 +114,13 @@ class LightSolver {
     std::uint64_t where;
   };
   struct Part;  // of a chunk
+  // The voxels of the region that light enters at a cost of one kind.
+  struct Toll {
+    unsigned cost = 1;
+    bool absorbs = false;
+    std::vector<std::uint64_t> left;    // those that no front has reached
+    std::vector<std::uint64_t> blocks;  // [z]: blocks with such voxels
+  };
   void solve(const LightRegion::Box& box, unsigned channels, std::vector<ChunkLightChange>& changes);
   void shape(const LightRegion::Box& box);
   template <class Visit>
@@ -121,8 +131,15 @@ class LightSolver {
   void open(const Part& part);
   void read_inside();
   void read_pass(std::size_t channel);
+  void put_rows(const Part& part, const std::uint64_t* rows, std::uint64_t uniform, std::vector<std::uint64_t>& to);
   void find_passable();
   void add_sky(IVec3 first, std::uint64_t where);
+  void read_tolls(std::size_t channel);
+  void pay_tolls(std::size_t channel, unsigned level);
+  void pay_toll(Toll& toll, std::size_t z, unsigned block, std::vector<Source>& out);
+  [[nodiscard]] std::uint64_t blocks_beside_front(std::size_t z) const;
+  void touch(const Source& source);
+  void absorb(const Source& source, unsigned level);
   void add_sources(std::size_t channel, const RowPlanes& planes, IVec3 first, std::uint64_t mask);
   void add_source(std::size_t channel, unsigned level, IVec3 first, std::uint64_t where);
   void add_word(std::size_t channel, unsigned level, int column, IVec3 at, std::uint64_t where);
@@ -152,8 +169,13 @@ class LightSolver {
   std::size_t layer_ = 0;
   std::array<std::array<std::vector<Source>, 16>, kChannels> sources_;  // [channel][level]
   std::vector<std::unique_ptr<ChunkMasks>> own_masks_;
-  bool has_sky_ = false;  // there is sky light that is not in `sources_`
-  bool is_clean_ = true;  // `front_` and `next_` are all 0: no region failed
+  bool has_tolls_ = false;                        // some chunk of the region has any
+  std::vector<Toll> tolls_;                       // the first `toll_count_` are in use
+  std::size_t toll_count_ = 0;                    // of the channel
+  std::vector<std::uint64_t> lit_tolls_;          // with tolls: voxels that are sources and were lit
+  std::array<std::vector<Source>, 16> absorbed_;  // [level]: voxels that absorb light
+  bool has_sky_ = false;                          // there is sky light that is not in `sources_`
+  bool is_clean_ = true;                          // `front_` and `next_` are all 0: no region failed
   std::vector<std::uint64_t> pass_;
   std::vector<std::uint64_t> rest_;   // dark voxels of pass_, in touched blocks
   std::vector<std::uint64_t> front_;  // voxels of the current level; all 0 between regions

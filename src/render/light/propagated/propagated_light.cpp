@@ -66,16 +66,17 @@ std::vector<TypeLight> type_lights(const VoxelRegistry& types, const PropagatedL
       *level = static_cast<std::uint8_t>(std::min<unsigned>(*level, kBrightest));
     }
     lights[i].lamp = packed(lamp);
-    if (types.is_opaque(type)) {
-      lights[i].passes = 0;
-    } else {
-      const Rgba8 colour = properties.colour;
-      const int half = (std::max({colour.r, colour.g, colour.b}) + 1) / 2;
-      lights[i].passes =
-          static_cast<std::uint8_t>(1 | (colour.r >= half) << 1 | (colour.g >= half) << 2 | (colour.b >= half) << 3);
-    }
+    const Rgba8 colour = properties.colour;
+    const int half = (std::max({colour.r, colour.g, colour.b}) + 1) / 2;
+    const int colours = 1 | (colour.r >= half) << 1 | (colour.g >= half) << 2 | (colour.b >= half) << 3;
+    propagated::set_passage(types, type, static_cast<unsigned>(colours), lights[i]);
   }
   return lights;
+}
+
+// Returns the number of voxels around a region whose types the solver needs: it skips light that does not leave them.
+int rim_of(const std::vector<TypeLight>& lights) {
+  return std::ranges::any_of(lights, &TypeLight::absorbs) ? 1 : 0;
 }
 
 // Returns bit c for each channel in which a chunk has lamps.
@@ -410,6 +411,7 @@ struct PropagatedLight::Impl {
         followed_grid(other.followed_grid),
         followed_types(other.followed_types),
         shared_lights(other.shared_lights),
+        rim(other.rim),
         shared_domain(other.shared_domain),
         store(other.store),
         visited_rows(other.visited_rows) {}
@@ -436,6 +438,7 @@ struct PropagatedLight::Impl {
   ChangeCursor followed_grid;
   ChangeCursor followed_types;
   std::shared_ptr<const std::vector<TypeLight>> shared_lights = std::make_shared<const std::vector<TypeLight>>();
+  int rim = 0;  // see rim_of
   Ref<SharedDomain> shared_domain = make_ref<SharedDomain>();
   LightStore store;                // of the chunks of the domain
   std::uint64_t visited_rows = 0;  // see PropagatedLight::visited_rows
@@ -453,6 +456,7 @@ void PropagatedLight::Impl::follow_types(const VoxelRegistry& types) {
   std::vector<TypeLight> now = type_lights(types, options);
   if (now != lights()) {
     followed_grid = {};
+    rim = rim_of(now);
     shared_lights = std::make_shared<const std::vector<TypeLight>>(std::move(now));
   }
   changes.commit();
@@ -628,7 +632,8 @@ void PropagatedLight::Impl::solve_dirty(const Grid& grid, Threads threads) {
   }
   solve(regions, threads, [&](LightSolver& solver, LightRegion& region) {
     std::size_t i = 0;
-    const IBox chunks{chunk_of(region.all.voxels.min), chunk_of(region.all.voxels.max - 1) + 1};
+    const IBox voxels{region.all.voxels.min - rim, region.all.voxels.max + rim};
+    const IBox chunks{chunk_of(voxels.min), chunk_of(voxels.max - 1) + 1};
     for (int z = chunks.min.z; z < chunks.max.z; ++z) {
       for (int y = chunks.min.y; y < chunks.max.y; ++y) {
         for (int x = chunks.min.x; x < chunks.max.x; ++x) {
@@ -638,8 +643,7 @@ void PropagatedLight::Impl::solve_dirty(const Grid& grid, Threads threads) {
           if (!around.is_held) continue;
           ChunkMasks& read = solver.own_masks(i++);
           around.masks = &read;
-          read.read(grid.find_chunk(chunk), lights(),
-                    intersect({region.all.voxels.min - low, region.all.voxels.max - low}, kWholeChunk),
+          read.read(grid.find_chunk(chunk), lights(), intersect({voxels.min - low, voxels.max - low}, kWholeChunk),
                     around.light == nullptr ? propagated::all_slabs() : around.light->lamp_slabs);
         }
       }
@@ -652,14 +656,15 @@ void PropagatedLight::Impl::solve_dirty(const Grid& grid, Threads threads) {
 void PropagatedLight::Impl::read_masks(const Grid& grid, const std::vector<LightRegion>& regions, Threads threads) {
   std::map<IVec3, IBox, ByZyx> wanted;
   for (const LightRegion& region : regions) {
-    const IBox chunks{chunk_of(region.all.voxels.min), chunk_of(region.all.voxels.max - 1) + 1};
+    const IBox voxels{region.all.voxels.min - rim, region.all.voxels.max + rim};
+    const IBox chunks{chunk_of(voxels.min), chunk_of(voxels.max - 1) + 1};
     for (int z = chunks.min.z; z < chunks.max.z; ++z) {
       for (int y = chunks.min.y; y < chunks.max.y; ++y) {
         for (int x = chunks.min.x; x < chunks.max.x; ++x) {
           const IVec3 low = IVec3(x, y, z) * kChunkEdge;
           if (!domain().holds({x, y, z})) continue;
           IBox& box = wanted[{x, y, z}];
-          box = unite(box, intersect({region.all.voxels.min - low, region.all.voxels.max - low}, kWholeChunk));
+          box = unite(box, intersect({voxels.min - low, voxels.max - low}, kWholeChunk));
           box.min.x = 0;  // rows are read as a whole
           box.max.x = kChunkEdge;
         }

@@ -20,6 +20,34 @@ namespace quoin {
 namespace {
 
 constexpr VoxelType kStone = 1, kLamp = 2, kRedLamp = 3, kGlass = 4, kBlueGlass = 5, kGlowGlass = 6;
+constexpr VoxelType kWater = 7, kLeaves = 8, kThickWater = 9, kStairs = 10, kDimStairs = 11, kGlowStairs = 12,
+                    kGrate = 13, kFog = 14;
+
+// As `light_types`, and then types with costs, types that light enters and does not leave, and an opaque one that it
+// passes.
+VoxelRegistry light_types();
+VoxelRegistry costly_types() {
+  VoxelRegistry types = light_types();
+  const auto add = [&](Rgba8 colour, Visibility visibility, float emission, std::uint8_t cost,
+                       std::optional<bool> blocks_light = {}) {
+    VoxelProperties properties;
+    properties.colour = colour;
+    properties.visibility = visibility;
+    properties.emission = emission;
+    properties.light_cost = cost;
+    properties.blocks_light = blocks_light;
+    EXPECT_TRUE(types.add(properties));
+  };
+  add({60, 80, 250, 90}, Visibility::Transparent, 0.0F, 1);
+  add({240, 250, 200, 255}, Visibility::Transparent, 0.0F, 2);
+  add({60, 250, 250, 90}, Visibility::Transparent, 0.4F, 3);
+  add({150, 110, 70, 255}, Visibility::Transparent, 0.0F, 0, true);
+  add({150, 110, 70, 255}, Visibility::Transparent, 0.0F, 5, true);
+  add({250, 20, 250, 255}, Visibility::Transparent, 0.5F, 2, true);
+  add({200, 200, 200, 255}, Visibility::Opaque, 0.0F, 0, false);
+  add({200, 200, 200, 255}, Visibility::Transparent, 0.0F, 15);
+  return types;
+}
 
 VoxelRegistry light_types() {
   VoxelRegistry types;
@@ -63,11 +91,31 @@ class Search {
   [[nodiscard]] bool passes(IVec3 voxel, int channel) const {
     const VoxelType type = grid_.get(voxel);
     if (type == kAir) return true;
-    if (type >= types_.size() || types_.is_opaque(type)) return false;
+    if (type >= types_.size()) return false;
+    const VoxelProperties& properties = types_[type];
+    if (properties.blocks_light.value_or(properties.visibility == Visibility::Opaque)) {
+      // Light enters only where faces behind it show, and where it has no light of its own.
+      return properties.visibility == Visibility::Transparent && lamp(type, channel) == 0;
+    }
     const Rgba8& colour = types_[type].colour;
     const std::array<int, 3> rgb{colour.r, colour.g, colour.b};
     return channel == 0 ||
            2 * rgb.at(static_cast<std::size_t>(channel) - 1) >= *std::max_element(rgb.begin(), rgb.end());
+  }
+  [[nodiscard]] int lamp(VoxelType type, int channel) const {
+    const LightLevels lamp = propagated::lamp_levels(types_[type]);
+    return channel == 0 ? 0
+                        : std::array<int, 3>{lamp.red, lamp.green, lamp.blue}.at(static_cast<std::size_t>(channel) - 1);
+  }
+  // Returns true if light that entered the voxel stays in it.
+  [[nodiscard]] bool absorbs(IVec3 voxel, int channel) const {
+    const VoxelType type = grid_.get(voxel);
+    return type != kAir && type < types_.size() && types_[type].visibility == Visibility::Transparent &&
+           types_[type].blocks_light.value_or(false) && lamp(type, channel) == 0;
+  }
+  [[nodiscard]] int cost(IVec3 voxel) const {
+    const VoxelType type = grid_.get(voxel);
+    return type == kAir || type >= types_.size() ? 0 : types_[type].light_cost;
   }
   void find(int channel) {
     const auto c = static_cast<std::size_t>(channel);
@@ -85,11 +133,12 @@ class Search {
     for (int level = 15; level > 0; --level) {
       for (std::size_t i = 0; i < open.at(static_cast<std::size_t>(level)).size(); ++i) {
         const IVec3 voxel = open.at(static_cast<std::size_t>(level))[i];
-        if (levels_[index(voxel)][c] != level) continue;
+        if (levels_[index(voxel)][c] != level || absorbs(voxel, channel)) continue;
         for (const Direction direction : kDirections) {
           const IVec3 next = voxel + normal_of(direction);
-          const bool falls = channel == 0 && level == 15 && direction == Direction::NegY;
-          if (box_.contains(next) && passes(next, channel)) raise(next, falls ? 15 : level - 1);
+          if (!box_.contains(next) || !passes(next, channel)) continue;
+          const bool falls = channel == 0 && level == 15 && direction == Direction::NegY && !absorbs(next, channel);
+          raise(next, level - std::max(cost(next), falls ? 0 : 1));
         }
       }
     }
@@ -97,10 +146,7 @@ class Search {
   template <class Raise>
   void start(IVec3 voxel, int channel, const Raise& raise) {
     const VoxelType type = grid_.get(voxel);
-    if (channel > 0 && type < types_.size() && type != kAir) {
-      const LightLevels lamp = propagated::lamp_levels(types_[type]);
-      raise(voxel, std::array<int, 3>{lamp.red, lamp.green, lamp.blue}.at(static_cast<std::size_t>(channel) - 1));
-    }
+    if (type < types_.size() && type != kAir) raise(voxel, lamp(type, channel));
     if (channel == 0 && voxel.y == box_.max.y - 1) raise(voxel, 15);
   }
 
@@ -127,10 +173,11 @@ void expect_searched(const PropagatedLight& light, const Grid& grid, const Voxel
   }
 }
 
-void edit(Grid& grid, std::mt19937& random) {
+// `types`: number of types to place, one of which is not registered.
+void edit(Grid& grid, std::mt19937& random, unsigned types = 8) {
   const auto below = [&](unsigned n) { return static_cast<int>(random() % n); };
   const IVec3 at{below(60) - 20, below(70) - 30, below(60) - 20};
-  const auto type = static_cast<VoxelType>(random() % 8);  // one of the types is not registered
+  const auto type = static_cast<VoxelType>(random() % types);
   switch (below(6)) {
     case 0:
       grid.fill_box({at, at + IVec3(1 + below(30), 1 + below(5), 1 + below(30))}, type);
@@ -153,16 +200,17 @@ void edit(Grid& grid, std::mt19937& random) {
 
 TEST(PropagatedLight, MatchesSearchAfterRandomEdits) {
   const std::vector<InstructionSet> sets = sets_of_this_machine();
-  for (unsigned seed = 0; seed < 4; ++seed) {
+  for (unsigned seed = 0; seed < 8; ++seed) {
     SCOPED_TRACE(seed);
     const InstructionSetOverride set(sets[seed % sets.size()]);
     std::mt19937 random(seed);
-    VoxelRegistry types = light_types();
+    VoxelRegistry types = seed < 4 ? light_types() : costly_types();
+    const auto type_count = static_cast<unsigned>(types.size() + 1);
     Grid grid;
     PropagatedLight light;
     if (seed % 2 == 0) grid.fill_box({{-20, -30, -20}, {40, 0, 40}}, kStone);
     for (int step = 0; step < 12; ++step) {
-      for (unsigned i = 0; i < 1 + random() % 6; ++i) edit(grid, random);
+      for (unsigned i = 0; i < 1 + random() % 6; ++i) edit(grid, random, type_count);
       if (step == 7) {
         VoxelProperties stone = types[kStone];
         stone.emission = 0.4F;
@@ -247,7 +295,7 @@ TEST(PropagatedLight, CastsSkyShadowsOfAnyLength) {
 // Small edits are solved as a whole: lamps, stones, glass and holes at corners of chunks, one or several per update,
 // with every kernel.
 TEST(PropagatedLight, MatchesFreshLightAfterSmallEdits) {
-  const VoxelRegistry types = light_types();
+  const VoxelRegistry types = costly_types();
   for (const InstructionSet set : sets_of_this_machine()) {
     const InstructionSetOverride only(set);
     SCOPED_TRACE(name_in_tests(set));
@@ -261,7 +309,7 @@ TEST(PropagatedLight, MatchesFreshLightAfterSmallEdits) {
     for (int step = 0; step < 60; ++step) {
       for (int i = 1 + step % 3 * below(5); i > 0; --i) {
         const IVec3 at{below(40) - 20, below(60) - 40, below(40) - 20};
-        grid.set(at, static_cast<VoxelType>(below(3) == 0 ? 0 : below(7)));
+        grid.set(at, static_cast<VoxelType>(below(3) == 0 ? 0 : below(15)));
       }
       if (step % 20 == 7) grid.fill_box({{3, -30, 3}, {4, 30, 4}}, step == 7 ? kAir : kStone);
       light.update(grid, types, {1});
@@ -345,6 +393,99 @@ TEST(PropagatedLight, ColouredGlassFiltersLampsButNotSky) {
   grid.fill_box({{6, 6, 5}, {7, 20, 6}}, kBlueGlass);  // a shaft filled with it
   light.update(grid, types);
   EXPECT_EQ(light.at({6, 5, 5}).sky, 15);
+}
+
+// Water and leaves as in block games, and a sea on which light falls straight down.
+TEST(PropagatedLight, CostsLevelsInWaterAndLeaves) {
+  const VoxelRegistry types = costly_types();
+  Grid grid;
+  grid.fill_box({{-64, -40, -64}, {64, -30, 64}}, kStone);
+  grid.fill_box({{-64, -30, -64}, {64, 0, 64}}, kWater);
+  PropagatedLight light;
+  light.update(grid, types);
+  EXPECT_EQ(light.at({0, 0, 0}).sky, 15);
+  EXPECT_EQ(light.at({0, -1, 0}).sky, 14) << "1 voxel deep";
+  EXPECT_EQ(light.at({0, -7, 0}).sky, 8);
+  EXPECT_EQ(light.at({0, -14, 0}).sky, 1);
+  EXPECT_EQ(light.at({0, -27, 0}).sky, 0);
+  grid.fill_box({{-64, -30, -64}, {64, 0, 64}}, kThickWater);
+  grid.fill_box({{-3, 10, -3}, {4, 12, 4}}, kLeaves);
+  light.update(grid, types);
+  EXPECT_EQ(light.at({0, -1, 0}).sky, 15 - 3 - 4) << "in the shade of the leaves, from their side";
+  EXPECT_EQ(light.at({20, -4, 0}).sky, 15 - 4 * 3);
+  EXPECT_EQ(light.at({20, -5, 0}).sky, 0);
+  EXPECT_EQ(light.at({0, 11, 0}).sky, 13);
+  EXPECT_EQ(light.at({0, 10, 0}).sky, 11) << "two layers of leaves";
+  grid.fill_box({{-64, -30, -64}, {64, 0, 64}}, kAir);
+  grid.set({0, -29, 0}, kLamp);
+  grid.set({2, -29, 0}, kLeaves);
+  grid.set({0, -27, 0}, kFog);
+  light.update(grid, types);
+  EXPECT_EQ(light.at({1, -29, 0}).red, 14);
+  EXPECT_EQ(light.at({2, -29, 0}).red, 12);
+  EXPECT_EQ(light.at({3, -29, 0}).red, 11) << "from the leaves; around them it is as far";
+  EXPECT_EQ(light.at({0, -27, 0}).red, 0);
+  PropagatedLight fresh;
+  fresh.update(grid, types);
+  for (int y = -30; y < 14; ++y) ASSERT_EQ(light.at({1, y, 1}), fresh.at({1, y, 1})) << y;
+}
+
+// Walls that reach up beside the stairs are seen, so light is in front of them; but it does not reach the room.
+TEST(PropagatedLight, RoofOfStairsKeepsRoomDarkAndLightsWallsBehindIt) {
+  const VoxelRegistry types = costly_types();
+  Grid grid;
+  grid.fill_box({{0, 0, 0}, {10, 8, 10}}, kStone);
+  grid.fill_box({{1, 1, 1}, {9, 8, 9}}, kAir);
+  grid.fill_box({{1, 7, 1}, {9, 8, 9}}, kStairs);
+  PropagatedLight light;
+  light.update(grid, types);
+  const auto expect_dark_room = [&] {
+    for (int z = 1; z < 9; ++z) {
+      for (int y = 1; y < 7; ++y) {
+        for (int x = 1; x < 9; ++x) ASSERT_EQ(light.at({x, y, z}).sky, 0);
+      }
+    }
+    EXPECT_EQ(light.at({1, 7, 4}).sky, 14) << "in the stairs, before the wall";
+  };
+  expect_dark_room();
+  QuadBuffer quads;
+  BlockyMesher().mesh(grid.neighbourhood({0, 0, 0}), types, {}, quads);
+  const bool shows_wall = std::any_of(quads.begin(), quads.end(), [](const Quad& quad) {
+    return quad.type() == kStone && quad.direction() == Direction::PosX && quad.voxel().x == 0 &&
+           quad.voxel().y + std::max(quad.size_u(), quad.size_v()) >= 8;
+  });
+  EXPECT_TRUE(shows_wall);
+  grid.set({4, 3, 4}, kRedLamp);  // an update whose region ends at stairs
+  light.update(grid, types);
+  grid.set({4, 3, 4}, kAir);
+  light.update(grid, types);
+  expect_dark_room();
+  grid.set({4, 7, 4}, kAir);
+  light.update(grid, types);
+  EXPECT_EQ(light.at({4, 1, 4}).sky, 15);
+  grid.set({4, 7, 4}, kDimStairs);
+  light.update(grid, types);
+  expect_dark_room();
+  EXPECT_EQ(light.at({4, 7, 4}).sky, 10);
+}
+
+TEST(PropagatedLight, FollowsCostAndPassageOfTypes) {
+  VoxelRegistry types = costly_types();
+  Grid grid;
+  grid.fill_box({{-30, 0, -30}, {31, 1, 31}}, kGlass);
+  PropagatedLight light;
+  const auto level_after = [&](auto&& change) {
+    VoxelProperties glass = types[kGlass];
+    change(glass);
+    types.replace(kGlass, glass);
+    light.update(grid, types);
+    return light.at({0, -1, 0}).sky;
+  };
+  EXPECT_EQ(level_after([](VoxelProperties&) {}), 15);
+  EXPECT_EQ(level_after([](VoxelProperties& glass) { glass.light_cost = 4; }), 10);
+  EXPECT_EQ(level_after([](VoxelProperties& glass) { glass.blocks_light = true; }), 0);
+  EXPECT_EQ(level_after([](VoxelProperties& glass) { glass = {}; }), 0) << "an opaque type";
+  EXPECT_EQ(level_after([](VoxelProperties& glass) { glass.blocks_light = false; }), 15);
 }
 
 TEST(PropagatedLight, ReportsChangedRegions) {

@@ -18,7 +18,7 @@
 namespace quoin {
 namespace {
 
-constexpr VoxelType kHillStone = 1, kHillLamp = 2, kHillGlass = 3;
+constexpr VoxelType kHillStone = 1, kHillLamp = 2, kHillGlass = 3, kHillWater = 4, kHillLeaves = 5, kHillStairs = 6;
 constexpr int kWide = 3;                                          // chunks of land along x and z
 constexpr int kHigh = 3;                                          // chunks of land along y
 constexpr IBox kAround{{-1, -3, -1}, {kWide + 1, 7, kWide + 1}};  // chunks to compare
@@ -36,8 +36,24 @@ VoxelRegistry stream_types() {
   return types;
 }
 
-/// Hills with caves, shafts, windows and lamps.
-Chunk land(IVec3 chunk) {
+/// As `stream_types`, and water, leaves and stairs; windows cost light.
+VoxelRegistry costly_stream_types() {
+  VoxelRegistry types = stream_types();
+  VoxelProperties properties = types[kHillGlass];
+  properties.light_cost = 1;
+  types.replace(kHillGlass, properties);
+  EXPECT_TRUE(types.add(properties));
+  properties.light_cost = 3;
+  EXPECT_TRUE(types.add(properties));
+  properties.light_cost = 0;
+  properties.blocks_light = true;
+  EXPECT_TRUE(types.add(properties));
+  return types;
+}
+
+/// Hills with caves, shafts, windows and lamps. `has_sea`: there is water in the lower caves and shafts; and leaves and
+/// stairs on and in the hills.
+Chunk land(IVec3 chunk, bool has_sea = false) {
   const IVec3 low = chunk * kChunkEdge;
   const auto wave = [](int at, double length) { return std::sin(at / length); };
   std::vector<VoxelType> dense(kChunkVoxels, kAir);
@@ -48,11 +64,16 @@ Chunk land(IVec3 chunk) {
         const IVec3 at = low + IVec3(x, y, z);
         const double height = 110.0 + 50.0 * wave(at.x, 37.0) * wave(at.z, 29.0);
         const bool is_shaft = at.x % 50 == 20 && at.z % 40 == 11 && at.y > 8;
-        if (at.y >= height || is_shaft || std::abs(wave(at.x, 11.0) + cave_yz) < 0.3) continue;
         const std::uint32_t dice =
             static_cast<std::uint32_t>(at.x * 7919 + at.y * 104'729 + at.z * 1'299'709) * 2'654'435'761U >> 16;
-        const VoxelType type = dice % 997 == 0 ? kHillLamp : dice % 31 == 0 ? kHillGlass : kHillStone;
-        dense[static_cast<std::size_t>(x + kChunkEdge * (y + kChunkEdge * z))] = type;
+        VoxelType& type = dense[static_cast<std::size_t>(x + kChunkEdge * (y + kChunkEdge * z))];
+        if (at.y >= height || is_shaft || std::abs(wave(at.x, 11.0) + cave_yz) < 0.3) {
+          if (has_sea && at.y < 100) type = dice % 53 == 0 ? kHillStairs : kHillWater;
+          if (has_sea && at.y >= height && at.y < height + 3.0 && dice % 3 != 0) type = kHillLeaves;
+          continue;
+        }
+        type = dice % 997 == 0 ? kHillLamp : dice % 31 == 0 ? kHillGlass : kHillStone;
+        if (has_sea && dice % 37 == 0) type = kHillStairs;
       }
     }
   }
@@ -62,20 +83,21 @@ Chunk land(IVec3 chunk) {
 using Part = std::pair<IVec3, Chunk>;
 
 /// Land, then air above it up to `high` chunks.
-const std::vector<Part>& parts_of_land() {
-  static const std::vector<Part> parts = [] {
+const std::vector<Part>& parts_of_land(bool has_sea = false) {
+  const auto make = [](bool with_sea) {
     std::vector<Part> made;
     for (int z = 0; z < kWide; ++z) {
       for (int x = 0; x < kWide; ++x) {
-        for (int y = 0; y < kHigh; ++y) made.emplace_back(IVec3(x, y, z), land({x, y, z}));
+        for (int y = 0; y < kHigh; ++y) made.emplace_back(IVec3(x, y, z), land({x, y, z}, with_sea));
       }
     }
     return made;
-  }();
-  return parts;
+  };
+  static const std::array<std::vector<Part>, 2> parts{make(false), make(true)};
+  return parts[has_sea ? 1 : 0];
 }
-std::vector<Part> world(int high) {
-  std::vector<Part> parts = parts_of_land();
+std::vector<Part> world(int high, bool has_sea = false) {
+  std::vector<Part> parts = parts_of_land(has_sea);
   for (int z = 0; z < kWide; ++z) {
     for (int x = 0; x < kWide; ++x) {
       for (int y = kHigh; y < high; ++y) parts.emplace_back(IVec3(x, y, z), Chunk());
@@ -145,9 +167,9 @@ void expect_fresh(const PropagatedLight& light, const Grid& grid, const VoxelReg
 }
 
 // Returns the light of land that is there at once.
-PropagatedLight light_at_once(const VoxelRegistry& types) {
+PropagatedLight light_at_once(const VoxelRegistry& types, bool has_sea = false) {
   Grid whole;
-  for (const Part& part : world(kHigh)) whole.put_chunk(part.first, part.second);
+  for (const Part& part : world(kHigh, has_sea)) whole.put_chunk(part.first, part.second);
   PropagatedLight light;
   light.update(whole, types, {1});
   return light;
@@ -173,11 +195,28 @@ TEST(StreamedLight, EqualsLightAtOnceInAnyOrder) {
   }
 }
 
+TEST(StreamedLight, EqualsLightAtOnceWithTypesThatCostLight) {
+  const VoxelRegistry types = costly_stream_types();
+  const PropagatedLight once = light_at_once(types, true);
+  std::size_t step = 1;
+  for (const Order& order : orders()) {
+    SCOPED_TRACE(order.name);
+    Grid grid;
+    grid.make_partial();
+    PropagatedLight light;
+    stream(sorted(world(5, true), order), step, grid, light, types, [] {});
+    expect_equal(light, once);
+    if (::testing::Test::HasFatalFailure()) return;
+    step = step % 6 + 2;
+  }
+}
+
 // Chunks of land, caves open on all sides, plates and air come and go in a box of 3x6x3 chunks. Voxels change between.
 TEST(StreamedLight, FollowsChunksThatComeAndGoAndEditsBetween) {
-  const VoxelRegistry types = stream_types();
-  for (unsigned seed = 0; seed < 4; ++seed) {
+  for (unsigned seed = 0; seed < 6; ++seed) {
     SCOPED_TRACE(seed);
+    const bool has_sea = seed >= 3;
+    const VoxelRegistry types = has_sea ? costly_stream_types() : stream_types();
     std::mt19937 random(seed);
     const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
     Grid grid;
@@ -191,7 +230,9 @@ TEST(StreamedLight, FollowsChunksThatComeAndGoAndEditsBetween) {
           grid.unload_chunk(chunk);
         } else if (below(4) > 0) {
           const int kind = below(5);
-          Chunk voxels = kind == 0 ? Chunk(kHillStone) : kind < 3 ? land({chunk.x, below(kHigh), chunk.z}) : Chunk();
+          Chunk voxels = kind == 0  ? Chunk(kHillStone)
+                         : kind < 3 ? land({chunk.x, below(kHigh), chunk.z}, has_sea)
+                                    : Chunk();
           if (kind == 3) {
             for (int x = 0; x < kChunkEdge; ++x) {
               for (int z = 0; z < kChunkEdge; ++z) voxels.set({x, 30, z}, x % 9 == z % 7 ? kHillGlass : kHillStone);
@@ -201,7 +242,7 @@ TEST(StreamedLight, FollowsChunksThatComeAndGoAndEditsBetween) {
         } else if (below(2) == 0) {
           grid.fill_sphere(DVec3(low + IVec3(below(64), below(64), below(64))), 3.0 + below(20), kAir);
         } else {
-          grid.set(low + IVec3(below(64), below(64), below(64)), static_cast<VoxelType>(below(4)));
+          grid.set(low + IVec3(below(64), below(64), below(64)), static_cast<VoxelType>(below(has_sea ? 7 : 4)));
         }
       }
       light.update(grid, types, {1 + seed % 2});
