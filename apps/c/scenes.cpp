@@ -273,7 +273,19 @@ const char* validate_type(const quoin_type& type) {
     return "emission, metalness or roughness out of range";
   if (!is_amount(type.ior) || !is_amount(type.scattering) || !is_share(std::abs(type.anisotropy)))
     return "index of refraction, scattering or anisotropy out of range";
+  const auto is_sign = [](std::int32_t x) { return x >= -1 && x <= 1; };
+  if (type.light_cost < 0 || type.light_cost > kMaxLightCost || !is_sign(type.blocks_light) || !is_sign(type.occludes))
+    return "light_cost, blocks_light or occludes out of range";
+  if (type.occludes > 0 && (type.transparent != 0 || type.rgba[3] < 255)) return "a transparent type cannot occlude";
   return nullptr;
+}
+
+// Conversions of 1 (yes), -1 (no) and 0 (default).
+std::optional<bool> own_flag(std::int32_t sign) {
+  return sign == 0 ? std::nullopt : std::optional(sign > 0);
+}
+std::int32_t sign_of(std::optional<bool> flag) {
+  return !flag ? 0 : *flag ? 1 : -1;
 }
 
 VoxelProperties properties_of(const quoin_type& type) {
@@ -286,6 +298,9 @@ VoxelProperties properties_of(const quoin_type& type) {
   if (type.ior != 0.0F) properties.ior = type.ior;
   properties.scattering = type.scattering;
   properties.anisotropy = type.anisotropy;
+  properties.light_cost = static_cast<std::uint8_t>(type.light_cost);
+  properties.blocks_light = own_flag(type.blocks_light);
+  properties.occludes = own_flag(type.occludes);
   properties.name = text_in(type.name);
   return properties;
 }
@@ -399,6 +414,9 @@ quoin_status quoin_type_get(quoin_scene scene, std::size_t index, quoin_type* ou
     type.ior = found.ior;
     type.scattering = found.scattering;
     type.anisotropy = found.anisotropy;
+    type.light_cost = found.light_cost;
+    type.blocks_light = sign_of(found.blocks_light);
+    type.occludes = sign_of(found.occludes);
     copy_text(found.name, type.name);
   });
 }

@@ -34,7 +34,8 @@ void add(Given& given, const quoin_type& type) {
   const bool is_clear = type.transparent != 0;
   std::string key = look.name;
   for (const float value : {look.emission, look.metalness, look.roughness, look.ior, look.scattering, look.anisotropy,
-                            is_clear ? 1.0F : 0.0F})
+                            is_clear ? 1.0F : 0.0F, static_cast<float>(type.light_cost),
+                            static_cast<float>(type.blocks_light), static_cast<float>(type.occludes)})
     key.append(1, '\0').append(std::to_string(std::bit_cast<std::uint32_t>(value)));
   const auto [known, is_new] = given.by_key.try_emplace(std::move(key), given.looks.size());
   if (is_new) {
@@ -66,6 +67,7 @@ void finish_types(VoxelRegistry& types, std::size_t first, const Given& given) {
     VoxelProperties whole = given.looks[look];
     whole.colour = made.colour;
     whole.visibility = given.is_clear[look] ? Visibility::Transparent : made.visibility;
+    if (whole.visibility == Visibility::Transparent) whole.occludes.reset();  // no transparent type occludes
     types.replace(number, std::move(whole));
   }
 }

@@ -44,7 +44,10 @@ inline FaceOcclusion corners_of_face(const Grid& grid, const VoxelRegistry& type
     side2[frame.v] += dv[corner];
     IVec3 across = side1;
     across[frame.v] += dv[corner];
-    const auto blocks = [&](IVec3 at) { return types[grid.get(at)].visibility == Visibility::Opaque ? 1 : 0; };
+    const auto blocks = [&](IVec3 at) {
+      const VoxelProperties& type = types[grid.get(at)];
+      return type.visibility == Visibility::Opaque && type.occludes.value_or(true) ? 1 : 0;
+    };
     const int sum = blocks(side1) + blocks(side2);
     corners[corner] = static_cast<std::uint8_t>(sum == 2 ? 3 : sum + blocks(across));
   }
@@ -95,6 +98,15 @@ inline VoxelRegistry mixed_types() {
     if (i >= 3) properties.visibility = Visibility::Transparent;
     EXPECT_TRUE(types.add(properties).has_value());
   }
+  return types;
+}
+
+/// As `mixed_types`, but the opaque type 2 does not occlude.
+inline VoxelRegistry unoccluding_types() {
+  VoxelRegistry types = mixed_types();
+  VoxelProperties properties = types[2];
+  properties.occludes = false;
+  types.replace(2, properties);
   return types;
 }
 

@@ -69,7 +69,8 @@ class Type(ctypes.Structure):
     _fields_ = [("size", ctypes.c_size_t), ("rgba", ctypes.c_uint8 * 4), ("emission", ctypes.c_float),
                 ("metalness", ctypes.c_float), ("roughness", ctypes.c_float), ("name", ctypes.c_char * 128),
                 ("transparent", ctypes.c_int32), ("ior", ctypes.c_float), ("scattering", ctypes.c_float),
-                ("anisotropy", ctypes.c_float)]
+                ("anisotropy", ctypes.c_float), ("light_cost", ctypes.c_int32), ("blocks_light", ctypes.c_int32),
+                ("occludes", ctypes.c_int32)]
 
 
 class Instance(ctypes.Structure):

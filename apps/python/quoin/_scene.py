@@ -29,6 +29,9 @@ class VoxelType(NamedTuple):
     ior: float = 1.5  #: index of refraction of transparent types
     scattering: float = 0.0  #: clouds: mean number of scatterings per voxel length; 0: glass
     anisotropy: float = 0.0  #: clouds: mean cosine of the scattering angle, -1 to 1
+    light_cost: int = 0  #: levels of propagated light that a step into it costs, 0 to 15; 1: water, leaves
+    blocks_light: Optional[bool] = None  #: propagated light does not leave it; None: true unless transparent
+    occludes: Optional[bool] = None  #: darkens corners of faces in meshes; None: true unless transparent
 
 
 class Instance(NamedTuple):
@@ -163,7 +166,17 @@ def _struct_of(type: Union[VoxelType, Colour]) -> Any:
     one.emission, one.metalness, one.roughness = type.emission, type.metalness, type.roughness
     one.transparent, one.ior = int(type.transparent), type.ior
     one.scattering, one.anisotropy = type.scattering, type.anisotropy
+    one.light_cost = _c.whole(type.light_cost, "light_cost", 0, 15)
+    one.blocks_light, one.occludes = _sign_of(type.blocks_light), _sign_of(type.occludes)
     return one
+
+
+def _sign_of(flag: Optional[bool]) -> int:
+    return 0 if flag is None else 1 if flag else -1
+
+
+def _flag_of(sign: int) -> Optional[bool]:
+    return None if sign == 0 else sign > 0
 
 
 def _rows_of(matrix: Any) -> List[float]:
@@ -432,7 +445,8 @@ class Scene:
     def types(self) -> List[VoxelType]:
         """All voxel types. Entry 0 is air."""
         return [VoxelType(tuple(one.rgba), _c.text_of(one.name), one.emission, one.metalness, one.roughness,
-                          bool(one.transparent), one.ior, one.scattering, one.anisotropy)
+                          bool(one.transparent), one.ior, one.scattering, one.anisotropy, one.light_cost,
+                          _flag_of(one.blocks_light), _flag_of(one.occludes))
                 for one in self._all(_c.lib.quoin_type_count, _c.lib.quoin_type_get, _c.Type)]
 
     @property

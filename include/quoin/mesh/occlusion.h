@@ -56,7 +56,7 @@ inline constexpr std::array<std::array<CornerNeighbours, 4>, 6> kCornerNeighbour
 /// Returns the occlusion of one vertex from the three voxels that touch it in the layer in front of the face.
 ///
 /// The result is 3 if both sides are occluders; otherwise the number of occluders among the three voxels. Quoin's
-/// meshers treat only opaque voxels as occluders: glass and water do not darken.
+/// blocky mesher asks the types (VoxelRegistry::occludes): glass and water do not darken.
 [[nodiscard]] constexpr std::uint8_t vertex_occlusion(bool side1, bool side2, bool corner) {
   if (side1 && side2) return 3;
   return static_cast<std::uint8_t>(static_cast<int>(side1) + static_cast<int>(side2) + static_cast<int>(corner));

@@ -49,8 +49,8 @@ struct PropagatedLightOptions {
   std::function<LightLevels(VoxelType, const VoxelProperties&)> lamp{};
 };
 
-/// Real-time light as in block games: sky light and coloured lamp light that spread through all voxels that are not
-/// opaque, losing one level per step. Updates incrementally after edits.
+/// Real-time light as in block games: sky light and coloured lamp light that spread through all voxels of types that do
+/// not block light, and lose one level per step or more. Updates incrementally after edits.
 ///
 ///   PropagatedLight light;
 ///   light.update(grid, types);                                    // once, and after each edit
@@ -58,8 +58,11 @@ struct PropagatedLightOptions {
 ///   for (const ChunkChange& change : changes.items) mesh_again(change);
 ///   light.split(quads, chunk, lit_quads, levels);                 // one level per quad; merged where levels agree
 ///
-/// Sky:     level 15 falls straight down without loss until it meets an opaque voxel, and is 15 outside the world. y is
-///          up.
+/// Sky:     level 15 falls straight down without loss until it meets a voxel that blocks it or costs levels, and is 15
+///          outside the world. y is up.
+/// Costs:   a step into a voxel costs one level, or `light_cost` levels of its type if these are more. Light enters a
+///          transparent type that blocks light, at the same cost, and stays there (VoxelProperties::blocks_light); a
+///          channel in which such a type emits keeps the type's own level.
 /// Lamps:   a type's level applies in its own voxel and spreads from there, even if the voxel is opaque.
 /// Colours: a transparent type passes a channel of lamp light if that channel of its colour is at least half its
 ///          greatest channel. It always passes sky light.
@@ -80,8 +83,8 @@ class PropagatedLight {
   PropagatedLight& operator=(PropagatedLight&&) noexcept;
   ~PropagatedLight();
 
-  /// Applies the edits since the last update. Recomputes everything for another grid, or when the transparency or
-  /// emission of types changed. If it throws (bad_alloc), the next update starts from scratch.
+  /// Applies the edits since the last update. Recomputes everything for another grid, or when the transparency, light
+  /// properties or emission of types changed. If it throws (bad_alloc), the next update starts from scratch.
   void update(const Grid& grid, const VoxelRegistry& types, Threads threads = {});
 
   /// Returns a copy of the current light. The two are independent. A cursor of one is also valid in the other until the
@@ -89,7 +92,7 @@ class PropagatedLight {
   /// Cost: some pointers. An update copies only the shared slabs of 64x4x4 voxels that it changes.
   [[nodiscard]] PropagatedLight snapshot() const;
 
-  /// Returns the levels at a voxel as of the last update. For an opaque voxel: its emission.
+  /// Returns the levels at a voxel as of the last update. For an opaque voxel that blocks light: its emission.
   [[nodiscard]] LightLevels at(IVec3 voxel) const;
   /// Reads the packed levels of the row of 64 voxels along x that contains `voxel`.
   void read_row(IVec3 voxel, std::span<std::uint16_t, kChunkEdge> out) const;

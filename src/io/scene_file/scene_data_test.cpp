@@ -241,6 +241,55 @@ TEST(SceneData, RefusesInvalidDataWithItsPosition) {
   EXPECT_EQ(find_bytes_error(bytes_of({{.voxels = {{.place = 1}}}}), ", 5"), "grids[0].data[1]: must be a string");
 }
 
+// A file of types that follow their visibility is as before.
+TEST(SceneData, KeepsLightAndOcclusionOfTypes) {
+  Scene scene = scene_of(Grid());
+  const std::string before = text_of(scene);
+  EXPECT_NE(before.find("\"quoin_scene\": 5"), std::string::npos);
+  for (const char* key : {"light", "occludes"}) EXPECT_EQ(before.find(key), std::string::npos) << key;
+  VoxelProperties stone = scene.types[kPlain];
+  stone.blocks_light = true;
+  stone.occludes = true;
+  scene.types.replace(kPlain, stone);
+  EXPECT_EQ(text_of(scene), before) << "the defaults of an opaque type";
+  constexpr auto kClear = Visibility::Transparent;
+  EXPECT_TRUE(scene.types.add({.name = "water", .colour = {}, .visibility = kClear, .light_cost = 1}));
+  EXPECT_TRUE(scene.types.add({.name = "roof", .colour = {}, .visibility = kClear, .blocks_light = true}));
+  EXPECT_TRUE(scene.types.add({.name = "grate", .colour = {}, .blocks_light = false, .occludes = false}));
+  const std::string text = text_of(scene);
+  EXPECT_NE(text.find("\"quoin_scene\": 7"), std::string::npos) << "programs that do not know them refuse it";
+  const auto again = read(text);
+  ASSERT_TRUE(again) << to_string(again.error());
+  ASSERT_EQ(again->scene.types.size(), scene.types.size());
+  for (std::size_t i = 0; i < scene.types.size(); ++i) {
+    const auto type = static_cast<VoxelType>(i);
+    EXPECT_EQ(again->scene.types[type], scene.types[type]) << i;
+  }
+}
+
+TEST(SceneData, RejectsLightAndOcclusionOutOfRange) {
+  Scene scene = scene_of(Grid());
+  VoxelProperties water{.name = "water", .colour = {}, .visibility = Visibility::Transparent, .light_cost = 1};
+  water.blocks_light = true;
+  EXPECT_TRUE(scene.types.add(water));
+  const std::string text = text_of(scene);
+  const auto error_with = [&](const std::string& wanted, const std::string& other) {
+    std::string changed = text;
+    const std::size_t place = text.find(wanted);
+    EXPECT_NE(place, std::string::npos);
+    changed.replace(place, wanted.size(), other);
+    const auto loaded = read(changed);
+    return loaded ? std::string() : loaded.error().message;
+  };
+  for (const char* cost : {"16", "-1", "1.5", "true"}) {
+    EXPECT_EQ(error_with("\"light_cost\":1", std::string("\"light_cost\":") + cost),
+              "types[2].light_cost: must be a whole number from 0 to 15");
+  }
+  EXPECT_EQ(error_with("\"blocks_light\":true", "\"blocks_light\":1"), "types[2].blocks_light: must be true or false");
+  EXPECT_EQ(error_with("\"blocks_light\":true", "\"occludes\":true"),
+            "types[2].occludes: must be false for a transparent type");
+}
+
 TEST(SceneData, RejectsMoreThan32StateBits) {
   std::string text = text_of(scene_of(Grid()));
   const std::string wanted = "\"state_bits\":2";

@@ -35,6 +35,7 @@ class SceneText {
         const VoxelProperties& properties = scene.types[static_cast<VoxelType>(type)];
         is_fifth_ |= properties.state_bits != 0 || !is_same(properties.scattering, 0.0F) ||
                      !is_same(properties.anisotropy, 0.0F);
+        is_seventh_ |= properties.blocks_light || properties.occludes || properties.light_cost != 0;
       }
       for (std::size_t i = 0; i < scene.grids.size(); ++i) {
         put_grid(scene.grids[i], pieces.voxels[i], pieces.densities[i], pieces.data[i]);
@@ -81,7 +82,8 @@ class SceneText {
     const bool has_models = !types_.empty() || !grids_.empty();
     const bool is_fourth = !layers_.empty() || !groups_.empty();
     std::string text = "{\n  \"quoin_scene\": ";
-    text += is_sixth_                                                ? "6"
+    text += is_seventh_                                              ? "7"
+            : is_sixth_                                              ? "6"
             : is_fifth_                                              ? "5"
             : is_fourth                                              ? "4"
             : is_third_                                              ? "3"
@@ -119,6 +121,7 @@ class SceneText {
   bool is_third_ = false;
   bool is_fifth_ = false;
   bool is_sixth_ = false;
+  bool is_seventh_ = false;
 };
 
 Status check_types(const SceneFile& scene) {

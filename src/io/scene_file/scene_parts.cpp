@@ -338,6 +338,9 @@ OrderedJson PartWriter::json_of(const VoxelProperties& type) {
   put("scattering", type.scattering, plain.scattering);
   put("anisotropy", type.anisotropy, plain.anisotropy);
   if (type.state_bits != 0) json["state_bits"] = type.state_bits;
+  if (type.blocks_light) json["blocks_light"] = *type.blocks_light;
+  if (type.occludes) json["occludes"] = *type.occludes;
+  if (type.light_cost != 0) json["light_cost"] = type.light_cost;
   for (const auto& [key, value] : type.attributes) json["attributes"].push_back({text(key), text(value)});
   return json;
 }
@@ -436,7 +439,7 @@ OrderedJson PartWriter::json_of(const Environment& environment) {
 VoxelProperties properties_of(const Json& json, const Place& place, Faults& faults) {
   const Object type(json, place,
                     {"name", "colour", "visibility", "collides", "roughness", "metalness", "emission", "ior",
-                     "scattering", "anisotropy", "state_bits", "attributes"},
+                     "scattering", "anisotropy", "state_bits", "blocks_light", "occludes", "light_cost", "attributes"},
                     faults);
   VoxelProperties properties;
   type.read_text("name", properties.name);
@@ -459,12 +462,26 @@ VoxelProperties properties_of(const Json& json, const Place& place, Faults& faul
   type.read("ior", properties.ior);
   type.read("scattering", properties.scattering);
   type.read("anisotropy", properties.anisotropy);
-  if (const Json* bits = type.find("state_bits")) {
-    if (bits->is_number_unsigned() && *bits <= kMaxStateBits) {
-      properties.state_bits = bits->get<std::uint8_t>();
+  const auto read_small = [&](const char* key, int most, std::uint8_t& out) {
+    const Json* number = type.find(key);
+    if (number == nullptr) return;
+    if (number->is_number_unsigned() && *number <= most) {
+      out = number->get<std::uint8_t>();
     } else {
-      faults.add(type.place_of("state_bits"), "must be a whole number from 0 to 32");
+      faults.add(type.place_of(key), "must be a whole number from 0 to " + std::to_string(most));
     }
+  };
+  read_small("state_bits", kMaxStateBits, properties.state_bits);
+  read_small("light_cost", kMaxLightCost, properties.light_cost);
+  const auto read_own = [&](const char* key, std::optional<bool>& out) {
+    if (type.find(key) == nullptr) return;
+    out = false;
+    type.read(key, *out);
+  };
+  read_own("blocks_light", properties.blocks_light);
+  read_own("occludes", properties.occludes);
+  if (properties.visibility == Visibility::Transparent && properties.occludes.value_or(false)) {
+    faults.add(type.place_of("occludes"), "must be false for a transparent type");
   }
   if (type.find("attributes") != nullptr) read_attributes(type, properties.attributes);
   return properties;

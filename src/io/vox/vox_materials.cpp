@@ -255,6 +255,15 @@ void decode_own(const Attributes& attributes, VoxelProperties& out) {
   if (const std::string* visibility = text("visibility")) {
     out.visibility = *visibility == "transparent" ? Visibility::Transparent : Visibility::Opaque;
   }
+  const auto set_own = [&](const char* key, std::optional<bool>& value) {
+    if (const std::string* found = text(key)) value = *found != "0";
+  };
+  set_own("blocks_light", out.blocks_light);
+  set_own("occludes", out.occludes);
+  if (out.visibility == Visibility::Transparent) out.occludes.reset();  // no transparent type occludes
+  float light_cost = 0.0F;
+  set("light_cost", light_cost);
+  out.light_cost = static_cast<std::uint8_t>(std::clamp(light_cost, 0.0F, float{kMaxLightCost}));
   float alpha = out.colour.a;
   set("alpha", alpha);
   out.colour.a = static_cast<std::uint8_t>(std::clamp(alpha, 0.0F, 255.0F));
@@ -309,6 +318,11 @@ void encode_own(const VoxelProperties& wanted, const VoxelProperties& decoded, A
   if (wanted.name != decoded.name) set("name", printable(wanted.name));
   if (wanted.collides != decoded.collides) set("collides", wanted.collides ? "1" : "0");
   if (wanted.state_bits != decoded.state_bits) set("state_bits", std::to_string(wanted.state_bits));
+  if (wanted.blocks_light && wanted.blocks_light != decoded.blocks_light) {
+    set("blocks_light", *wanted.blocks_light ? "1" : "0");
+  }
+  if (wanted.occludes && wanted.occludes != decoded.occludes) set("occludes", *wanted.occludes ? "1" : "0");
+  if (wanted.light_cost != decoded.light_cost) set("light_cost", std::to_string(wanted.light_cost));
   if (wanted.visibility != decoded.visibility) {
     set("visibility", wanted.visibility == Visibility::Transparent ? "transparent" : "opaque");
   }

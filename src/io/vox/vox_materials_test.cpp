@@ -85,6 +85,19 @@ TEST(VoxMaterial, WritesNoMaterialForPlainType) {
   EXPECT_TRUE(encode_material("palette 1", p).empty());
 }
 
+TEST(VoxMaterial, RoundTripsLightAndOcclusion) {
+  for (const Visibility visibility : {Visibility::Opaque, Visibility::Transparent}) {
+    VoxelProperties p{.name = "palette 1", .colour = kRed, .visibility = visibility, .light_cost = 3};
+    p.blocks_light = visibility == Visibility::Transparent;
+    if (visibility == Visibility::Opaque) p.occludes = false;
+    p.attributes = encode_material("palette 1", p);
+    EXPECT_EQ(decode_material("palette 1", p.colour, p.attributes), p);
+    p.attributes["_quoin_occludes"] = "1";
+    p.attributes["_quoin_light_cost"] = "99";
+    EXPECT_TRUE(validate_type(decode_material("palette 1", p.colour, p.attributes)));
+  }
+}
+
 TEST(VoxMaterial, RoundTripsEveryPropertyCombination) {
   for (const Visibility visibility : {Visibility::Opaque, Visibility::Transparent}) {
     for (const float metalness : {0.0F, 0.3F, 1.0F}) {

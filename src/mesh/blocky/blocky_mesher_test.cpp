@@ -165,25 +165,25 @@ class RandomWorld : public testing::TestWithParam<World> {
 };
 
 TEST_P(RandomWorld, QuadsCoverEachVisibleFaceOnce) {
-  const VoxelRegistry types = oracle::mixed_types();
   const Grid grid = world();
-  for (const bool occlusion : {true, false}) {
-    const FaceSet expected = oracle::visible_faces(grid, types, occlusion);
-    for (const bool merge : {true, false}) {
-      QuadOptions options;
-      options.merge = merge;
-      options.bake_occlusion = occlusion;
-      std::int64_t quads = 0;
-      EXPECT_EQ(faces_of_quads(grid, types, options, &quads), expected);
-      if (!merge) {
-        EXPECT_EQ(quads, static_cast<std::int64_t>(expected.size()));
+  for (const VoxelRegistry& types : {oracle::mixed_types(), oracle::unoccluding_types()})
+    for (const bool occlusion : {true, false}) {
+      const FaceSet expected = oracle::visible_faces(grid, types, occlusion);
+      for (const bool merge : {true, false}) {
+        QuadOptions options;
+        options.merge = merge;
+        options.bake_occlusion = occlusion;
+        std::int64_t quads = 0;
+        EXPECT_EQ(faces_of_quads(grid, types, options, &quads), expected);
+        if (!merge) {
+          EXPECT_EQ(quads, static_cast<std::int64_t>(expected.size()));
+        }
       }
     }
-  }
 }
 
 TEST_P(RandomWorld, ChunkedFacesMatchSingleChunk) {
-  const VoxelRegistry types = oracle::mixed_types();
+  const VoxelRegistry types = oracle::unoccluding_types();
   const IVec3 shift{30, 30, 30};  // the whole world in one chunk
   const FaceSet cut = faces_of_quads(world(), types, {});
   const Grid whole_grid = world(shift);
@@ -232,7 +232,7 @@ class BlockyMesherKernels : public testing::TestWithParam<InstructionSet> {};
 
 TEST_P(BlockyMesherKernels, MatchPlainKernel) {
   QUOIN_SKIP_WITHOUT(GetParam());
-  const VoxelRegistry types = oracle::mixed_types();
+  const std::array<VoxelRegistry, 2> registries{oracle::mixed_types(), oracle::unoccluding_types()};
   BlockyMesher mesher = made_with<BlockyMesher>(GetParam());
   BlockyMesher plain = made_with<BlockyMesher>(InstructionSet::Plain);
   QuadBuffer quads;
@@ -240,11 +240,11 @@ TEST_P(BlockyMesherKernels, MatchPlainKernel) {
   for (const World& world : kWorlds) {
     const Grid grid = grid_of(world);
     for (const IVec3 chunk : grid.chunks()) {
-      for (const bool occlusion : {true, false}) {
+      for (const std::size_t kind : {0, 1, 2}) {
         QuadOptions options;
-        options.bake_occlusion = occlusion;
-        plain.mesh(grid.neighbourhood(chunk), types, options, plain_quads);
-        mesher.mesh(grid.neighbourhood(chunk), types, options, quads);
+        options.bake_occlusion = kind > 0;
+        plain.mesh(grid.neighbourhood(chunk), registries[kind / 2], options, plain_quads);
+        mesher.mesh(grid.neighbourhood(chunk), registries[kind / 2], options, quads);
         EXPECT_EQ(quads, plain_quads);
       }
     }
@@ -263,6 +263,8 @@ TEST_P(ManyTypes, MatchOracle) {
     VoxelProperties properties;
     properties.name = std::to_string(i);
     if (i % 7 == 3) properties.visibility = Visibility::Transparent;
+    if (GetParam() % 2 == 1 || i % 7 == 5) properties.occludes = false;
+    if (i % 7 == 1) properties.occludes.reset();
     ASSERT_TRUE(types.add(properties).has_value());
   }
   Grid grid = oracle::random_world(99, {IVec3{-10, -10, -10}, IVec3{14, 14, 14}}, GetParam(), 0.4);
@@ -275,7 +277,31 @@ TEST_P(ManyTypes, MatchOracle) {
   EXPECT_EQ(faces_of_quads(grid, types, {}), expected);
 }
 
-INSTANTIATE_TEST_SUITE_P(Counts, ManyTypes, testing::Values(3, 12, 40, 250, 1'000));
+INSTANTIATE_TEST_SUITE_P(Counts, ManyTypes, testing::Values(3, 12, 13, 40, 250, 251, 1'000, 1'001));
+
+// A pillar on a floor splits the floor where it darkens it. The faces are the same, and hidden ones stay hidden.
+TEST(BlockyMesher, OnlyOccludersDarkenAndSplitFloor) {
+  const VoxelRegistry types = oracle::unoccluding_types();
+  const auto floor_quads = [&](VoxelType pillar, int& darkened) {
+    Grid grid;
+    grid.fill_box({{0, 0, 0}, {16, 1, 16}}, 1);
+    grid.set({8, 1, 8}, pillar);
+    QuadBuffer quads;
+    BlockyMesher().mesh(grid.neighbourhood({0, 0, 0}), types, {}, quads);
+    EXPECT_EQ(face_count(quads), 16 * 16 * 2 + 4 * 16 + 4) << "no face below the pillar";
+    darkened = 0;
+    for (const Quad& quad : quads) {
+      const bool is_floor = quad.direction() == Direction::PosY && quad.voxel().y == 0;
+      darkened += is_floor && quad.occlusion() != FaceOcclusion{} ? 1 : 0;
+    }
+    return quads.size();
+  };
+  int darkened = 0;
+  const std::size_t open = floor_quads(2, darkened);
+  EXPECT_EQ(darkened, 0);
+  EXPECT_GT(floor_quads(3, darkened), open);
+  EXPECT_GT(darkened, 0);
+}
 
 TEST(BlockyMesher, EmitsOnlyVoxelsOfRegion) {
   const VoxelRegistry types = oracle::mixed_types();

@@ -42,6 +42,15 @@ TEST(PartText, KeepsWholeGrids) {
   EXPECT_FALSE(grid_from(R"({"name": "old", "band": 8.0})")->whole);
 }
 
+TEST(PartText, KeepsLightAndOcclusionOfTypes) {
+  EXPECT_EQ(text_of(VoxelProperties{.name = "stone"}).find("light"), std::string::npos) << "as in earlier files";
+  const VoxelProperties grate{.name = "grate", .blocks_light = false, .occludes = false, .light_cost = 3};
+  const std::string text = text_of(grate);
+  const auto read = part_from<VoxelProperties>(std::as_bytes(std::span(text)), "type 1");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(*read, grate);
+}
+
 TEST(PartText, RejectsDamagedMark) {
   for (const char* const value : {"1", "\"yes\"", "null", "[true]"}) {
     const auto read = grid_from(std::string(R"({"band": 8.0, "whole": )") + value + "}");

@@ -156,8 +156,9 @@ Status add_key_index(Connection& database) {
   return database.run("CREATE INDEX chunk_keys ON chunks(key)");
 }
 
-// Version 3 has environment parts, which earlier programs would ignore; version 4 has whole grids, which they would
-// refuse as damaged. Without the mark a grid is streamed, as all grids were before.
+// Version 3 has environment parts, which earlier programs would ignore. Version 4 has whole grids, and types with light
+// and occlusion of their own, which they would refuse as damaged. Without the mark a grid is streamed, as all grids were
+// before.
 Status add_nothing(Connection& /*database*/) {
   return {};
 }

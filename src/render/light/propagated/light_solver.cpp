@@ -458,7 +458,7 @@ std::uint64_t LightSolver::blocks_near(int margin) const {
 }
 
 // Returns the blocks of a layer that have voxels of the front or are next to them.
-std::uint64_t LightSolver::blocks_beside_front(std::size_t z) const {
+std::uint64_t LightSolver::blocks_near_front(std::size_t z) const {
   const std::uint64_t own = in_front_[z];
   std::uint64_t adjacent = own | own << 1 | own >> 1 | in_front_[z - 1] | in_front_[z + 1];
   if (columns_ > 1) adjacent |= own << blocks_ | own >> blocks_;
@@ -492,7 +492,7 @@ void LightSolver::pay_tolls(std::size_t channel, unsigned level) {
     const unsigned reached = level + 1 - toll.cost;
     std::vector<Source>& out = toll.absorbs ? absorbed_[reached] : sources_[channel][reached];
     for (std::size_t z = 1; z <= static_cast<std::size_t>(size_.z); ++z) {
-      for (std::uint64_t left = blocks_beside_front(z) & toll.blocks[z]; left != 0; left &= left - 1) {
+      for (std::uint64_t left = blocks_near_front(z) & toll.blocks[z]; left != 0; left &= left - 1) {
         pay_toll(toll, z, static_cast<unsigned>(std::countr_zero(left)), out);
       }
     }
@@ -507,7 +507,7 @@ void LightSolver::activate(unsigned level) {
   const int high = box_.wanted.max.z + margin - origin_.z;
   for (std::size_t z = 1; z <= static_cast<std::size_t>(size_.z); ++z) {
     const bool is_near = static_cast<int>(z) >= low && static_cast<int>(z) < high;
-    active_[z] = is_near ? blocks_beside_front(z) & open_[z] & near : 0;
+    active_[z] = is_near ? blocks_near_front(z) & open_[z] & near : 0;
   }
 }
 

@@ -137,7 +137,7 @@ class LightSolver {
   void read_tolls(std::size_t channel);
   void pay_tolls(std::size_t channel, unsigned level);
   void pay_toll(Toll& toll, std::size_t z, unsigned block, std::vector<Source>& out);
-  [[nodiscard]] std::uint64_t blocks_beside_front(std::size_t z) const;
+  [[nodiscard]] std::uint64_t blocks_near_front(std::size_t z) const;
   void touch(const Source& source);
   void absorb(const Source& source, unsigned level);
   void add_sources(std::size_t channel, const RowPlanes& planes, IVec3 first, std::uint64_t mask);

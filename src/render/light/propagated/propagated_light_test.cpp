@@ -173,7 +173,7 @@ void expect_searched(const PropagatedLight& light, const Grid& grid, const Voxel
   }
 }
 
-// `types`: number of types to place, one of which is not registered.
+// `types`: number of types to place. The last is not registered.
 void edit(Grid& grid, std::mt19937& random, unsigned types = 8) {
   const auto below = [&](unsigned n) { return static_cast<int>(random() % n); };
   const IVec3 at{below(60) - 20, below(70) - 30, below(60) - 20};
@@ -395,7 +395,7 @@ TEST(PropagatedLight, ColouredGlassFiltersLampsButNotSky) {
   EXPECT_EQ(light.at({6, 5, 5}).sky, 15);
 }
 
-// Water and leaves as in block games, and a sea on which light falls straight down.
+// Water and leaves as in block games.
 TEST(PropagatedLight, CostsLevelsInWaterAndLeaves) {
   const VoxelRegistry types = costly_types();
   Grid grid;
@@ -430,7 +430,7 @@ TEST(PropagatedLight, CostsLevelsInWaterAndLeaves) {
   for (int y = -30; y < 14; ++y) ASSERT_EQ(light.at({1, y, 1}), fresh.at({1, y, 1})) << y;
 }
 
-// Walls that reach up beside the stairs are seen, so light is in front of them; but it does not reach the room.
+// The walls next to the stairs are visible, so light is in front of them. It does not reach the room.
 TEST(PropagatedLight, RoofOfStairsKeepsRoomDarkAndLightsWallsBehindIt) {
   const VoxelRegistry types = costly_types();
   Grid grid;
