@@ -403,6 +403,35 @@ TEST_F(CScene, WritesVoxels) {
   EXPECT_EQ(quoin_grid_write(scene_, 0, &array), QUOIN_INVALID_ARGUMENT);
 }
 
+TEST(CTypes, KeepLightAndOcclusion) {
+  quoin_scene scene = 0;
+  ASSERT_EQ(quoin_scene_create(&scene), QUOIN_OK);
+  auto type = sized<quoin_type>();
+  type.rgba[3] = 255;
+  std::uint16_t number = 0;
+  const auto again = [&] {
+    auto read = sized<quoin_type>();
+    EXPECT_EQ(quoin_type_add(scene, &type, &number), QUOIN_OK);
+    EXPECT_EQ(quoin_type_get(scene, number, &read), QUOIN_OK);
+    return read;
+  };
+  type.light_cost = 15;
+  type.blocks_light = type.occludes = -1;
+  EXPECT_TRUE(again().light_cost == 15 && again().blocks_light == -1 && again().occludes == -1);
+  type.occludes = type.blocks_light = 1;
+  EXPECT_TRUE(again().blocks_light == 0 && again().occludes == 0) << "the defaults of an opaque type";
+  type.transparent = 1;
+  EXPECT_EQ(quoin_type_add(scene, &type, &number), QUOIN_INVALID_ARGUMENT) << "a transparent type cannot occlude";
+  type.occludes = 0;
+  EXPECT_EQ(again().blocks_light, 1);
+  type.light_cost = 16;
+  EXPECT_EQ(quoin_type_add(scene, &type, &number), QUOIN_INVALID_ARGUMENT);
+  type.light_cost = 0;
+  type.blocks_light = 2;
+  EXPECT_EQ(quoin_type_add(scene, &type, &number), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_free(scene), QUOIN_OK);
+}
+
 TEST(CArrays, ArePackedWithoutStrides) {
   const std::array<std::uint16_t, 24> types = {1, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0};
   quoin_scene scene = 0;
@@ -568,6 +597,8 @@ TEST_F(CTriangleTypes, KeepTheirProperties) {
   types_[1].rgba[3] = 90;
   types_[1].scattering = 0.5F;
   types_[1].anisotropy = 0.25F;
+  types_[0].blocks_light = 1;
+  types_[1].light_cost = 2;
   const auto found = added();
   ASSERT_EQ(found.size(), 2U);
   const bool is_first = std::string(found[0].name) == "ice";
@@ -575,6 +606,7 @@ TEST_F(CTriangleTypes, KeepTheirProperties) {
   const quoin_type& cloud = found[is_first ? 1 : 0];
   EXPECT_STREQ(ice.name, "ice");
   EXPECT_TRUE(ice.transparent == 1 && ice.ior == 1.31F && ice.rgba[3] == 255 && ice.rgba[0] == 100);
+  EXPECT_TRUE(ice.blocks_light == 1 && ice.light_cost == 0 && cloud.light_cost == 2 && cloud.blocks_light == 0);
   EXPECT_STREQ(cloud.name, "cloud");
   EXPECT_TRUE(cloud.transparent == 1 && cloud.scattering == 0.5F && cloud.anisotropy == 0.25F && cloud.rgba[3] == 90);
 }

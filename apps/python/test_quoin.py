@@ -139,6 +139,9 @@ class Scenes(unittest.TestCase):
         array, scene = self.scene()
         ink = scene.add_type(quoin.VoxelType((1, 2, 3), "ink"))
         self.assertEqual(scene.types[ink].rgba, (1, 2, 3, 255))
+        self.assertEqual(scene.types[ink][-3:], (0, None, None))
+        grate = quoin.VoxelType((1, 2, 3, 255), light_cost=3, blocks_light=False, occludes=False)
+        self.assertEqual(scene.types[scene.add_type(grate)], grate)
         with tempfile.TemporaryDirectory() as folder:
             scene.save(f"{folder}/house.json")
             with open(f"{folder}/house.json", "rb") as file:
@@ -615,6 +618,8 @@ class BadInput(unittest.TestCase):
             (lambda: scene.add_type((1, 2)), ValueError),
             (lambda: scene.add_type((1, 2, 300)), ValueError),
             (lambda: scene.add_type(quoin.VoxelType((1, 2, 3, 255), emission=nan)), quoin.QuoinError),
+            (lambda: scene.add_type(quoin.VoxelType((1, 2, 3, 255), light_cost=16)), ValueError),
+            (lambda: scene.add_type(quoin.VoxelType((1, 2, 3, 90), occludes=True)), quoin.QuoinError),
             (lambda: scene.save("x.unknown"), quoin.QuoinError),
             (lambda: scene.render(0, 5), ValueError),
             (lambda: scene.render(8, 8, samples=-1), quoin.QuoinError),
