@@ -44,10 +44,20 @@ bool ReleaseQueue::destroy_some() noexcept {
       bytes_ -= held->bytes;
     }
     QUOIN_ASSERT((objects_ == 0) == (first_ == nullptr), "every waiting object is counted");
+    if (first == nullptr) return false;
+    ++destroyers_;
   }
-  if (first == nullptr) return false;
   while (first != nullptr) delete std::exchange(first, first->next);
+  const std::lock_guard lock(mutex_);
+  if (--destroyers_ == 0) destroyed_.notify_all();
   return true;
+}
+
+void ReleaseQueue::finish() noexcept {
+  while (destroy_some()) {
+  }
+  std::unique_lock lock(mutex_);
+  destroyed_.wait(lock, [&] { return destroyers_ == 0; });
 }
 
 void Workers::start(unsigned count, Step step) {

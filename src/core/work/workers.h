@@ -39,6 +39,10 @@ class ReleaseQueue : public std::enable_shared_from_this<ReleaseQueue> {
   ReleaseQueue& operator=(const ReleaseQueue&) = delete;
   ~ReleaseQueue() { close(); }
 
+  /// Returns once all objects that waited at the time of the call are destroyed, by this thread or by workers.
+  /// Requires: the caller is not the destructor of such an object.
+  void finish() noexcept;
+
   /// Returns a pointer to the same object. Once its last copy is dropped, a worker drops `object`. The object counts as
   /// `bytes` towards kMaxBytes. Null stays null. Errors: bad_alloc; `object` is then dropped.
   template <class T>
@@ -78,6 +82,8 @@ class ReleaseQueue : public std::enable_shared_from_this<ReleaseQueue> {
   Held* first_ = nullptr;
   std::size_t objects_ = 0;
   std::size_t bytes_ = 0;
+  std::size_t destroyers_ = 0;  // threads that destroy objects they have taken from the list
+  std::condition_variable destroyed_;
 };
 
 /// As `queue->defer`; returns `object` itself if there is no queue.
@@ -86,6 +92,81 @@ template <class T>
                                           std::size_t bytes = 0) {
   return queue == nullptr ? object : queue->defer(std::move(object), bytes);
 }
+
+/// A function or object of the program that workers use, and that its owner can replace while they do.
+///
+///   worker   const auto use = function.use(); (*use)(...);
+///   owner    function.replace(newer);  // returns when no worker uses the former one
+///
+/// Threads: any. A thread must not replace the value that it uses.
+template <class T>
+class Replaceable {
+  struct Held {
+    T value;
+    std::size_t uses = 0;
+  };
+
+ public:
+  /// A value that is not in use, or no longer.
+  class Value {
+   public:
+    explicit Value(T value) : held_(std::make_unique<Held>(Held{std::move(value)})) {}
+
+   private:
+    friend class Replaceable;
+    std::unique_ptr<Held> held_;
+  };
+
+  /// Keeps the value of a moment until the end of its scope.
+  class Use {
+   public:
+    Use(const Use&) = delete;
+    Use& operator=(const Use&) = delete;
+    ~Use() {
+      const std::lock_guard lock(owner_.mutex_);
+      if (--held_.uses == 0) owner_.unused_.notify_all();
+    }
+    [[nodiscard]] const T& operator*() const { return held_.value; }
+
+   private:
+    friend class Replaceable;
+    // Requires: the owner's mutex is held.
+    explicit Use(const Replaceable& owner) : owner_(owner), held_(*owner.current_.held_) { ++held_.uses; }
+    const Replaceable& owner_;
+    Held& held_;
+  };
+
+  explicit Replaceable(T value = {}) : current_(std::move(value)) {}
+  Replaceable(const Replaceable&) = delete;
+  Replaceable& operator=(const Replaceable&) = delete;
+
+  [[nodiscard]] Use use() const {
+    const std::lock_guard lock(mutex_);
+    return Use(*this);
+  }
+  /// Exchanges the values. From now on, threads use the new one. Does not throw.
+  void exchange(Value& next) noexcept {
+    const std::lock_guard lock(mutex_);
+    std::swap(current_.held_, next.held_);
+  }
+  /// Returns when no thread uses a value that `exchange` returned.
+  void wait_until_unused(const Value& former) const {
+    std::unique_lock lock(mutex_);
+    unused_.wait(lock, [&] { return former.held_->uses == 0; });
+  }
+  /// Replaces the value. Returns when no thread uses the former one any more, and destroys it. If it throws
+  /// (bad_alloc), nothing has changed.
+  void replace(T value) {
+    Value next(std::move(value));
+    exchange(next);
+    wait_until_unused(next);
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  mutable std::condition_variable unused_;
+  Value current_;
+};
 
 /// Worker threads of an object. They look for work in its state, which its mutex guards:
 ///

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <stdexcept>
 #include <thread>
@@ -373,6 +374,99 @@ TEST(ReleaseQueue, TakesObjectsOfManyThreadsDuringStop) {
     for (std::thread& each : threads) each.join();
     EXPECT_EQ(alive, 0);
   }
+}
+
+// Objects in the list, and one that a worker destroys at the moment.
+TEST(ReleaseQueue, FinishWaitsForAllObjects) {
+  struct Gated {
+    Gated(Gate& closed, std::atomic<int>& count) : gate(closed), alive(count) { ++alive; }
+    Gated(const Gated&) = delete;
+    Gated& operator=(const Gated&) = delete;
+    ~Gated() {
+      gate.pass();
+      --alive;
+    }
+    Gate& gate;
+    std::atomic<int>& alive;
+  };
+  Gate gate;
+  std::atomic<int> alive{0};
+  Queue queue(1);
+  const std::shared_ptr<ReleaseQueue> releases = queue.workers().releases();
+  releases->finish();
+  for (int i = 0; i < 3; ++i) releases->defer(std::make_shared<Gated>(gate, alive)).reset();
+  gate.wait_until_reached();
+  std::thread opener([&] {
+    std::this_thread::sleep_for(20ms);
+    gate.open();
+  });
+  releases->finish();
+  EXPECT_EQ(alive, 0);
+  opener.join();
+}
+
+TEST(Replaceable, WaitsForUsesOfFormerValue) {
+  Gate gate;
+  std::atomic<int> inside{0};
+  Replaceable<std::function<int()>> function([&] {
+    ++inside;
+    gate.pass();
+    --inside;
+    return 1;
+  });
+  int first = 0;
+  std::thread user([&] {
+    const auto use = function.use();
+    first = (*use)();
+  });
+  gate.wait_until_reached();
+  std::thread opener([&] {
+    std::this_thread::sleep_for(20ms);
+    gate.open();
+  });
+  function.replace([] { return 2; });
+  EXPECT_EQ(inside, 0);
+  const auto use = function.use();
+  EXPECT_EQ((*use)(), 2);
+  user.join();
+  opener.join();
+  EXPECT_EQ(first, 1);
+}
+
+// Many threads use values while others replace them; each value ends after its last use.
+TEST(Replaceable, KeepsValuesInUse) {
+  struct Value {
+    explicit Value(std::atomic<int>& count) : alive(count) { ++alive; }
+    Value(const Value&) = delete;
+    Value& operator=(const Value&) = delete;
+    ~Value() {
+      is_over = true;
+      --alive;
+    }
+    std::atomic<int>& alive;
+    std::atomic<bool> is_over{false};
+  };
+  std::atomic<int> alive{0};
+  {
+    Replaceable<std::unique_ptr<Value>> value(std::make_unique<Value>(alive));
+    std::vector<std::thread> threads;
+    for (int i = 0; i < 3; ++i) {
+      threads.emplace_back([&] {
+        for (int k = 0; k < 500; ++k) {
+          const auto use = value.use();
+          EXPECT_FALSE((*use)->is_over);
+        }
+      });
+    }
+    for (int i = 0; i < 2; ++i) {
+      threads.emplace_back([&] {
+        for (int k = 0; k < 100; ++k) value.replace(std::make_unique<Value>(alive));
+      });
+    }
+    for (std::thread& each : threads) each.join();
+    EXPECT_EQ(alive, 1);
+  }
+  EXPECT_EQ(alive, 0);
 }
 
 }  // namespace
