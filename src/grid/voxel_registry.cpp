@@ -134,6 +134,7 @@ Result<VoxelType> VoxelRegistry::add(VoxelProperties properties) {
   c.visibility.push_back(visibility);
   c.occlusion.push_back(occlusion);
   if (!properties.collides) ++c.passable_count;
+  if (properties.remesh_on_data) ++c.remesh_on_data_count;
   c.properties.push_back(std::move(properties));
   if (visibility == Visibility::Transparent) ++c.transparent_count;
   if (occlusion != visibility) ++c.unoccluding_count;
@@ -191,6 +192,8 @@ void VoxelRegistry::replace(VoxelType type, VoxelProperties properties) {
   QUOIN_ASSERT(c.properties[type].collides || c.passable_count != 0, "passable types are counted");
   if (!c.properties[type].collides) --c.passable_count;
   if (!properties.collides) ++c.passable_count;
+  if (c.properties[type].remesh_on_data) --c.remesh_on_data_count;
+  if (properties.remesh_on_data) ++c.remesh_on_data_count;
   const bool is_seen_otherwise = was != properties.visibility || occluded != c.occlusion[type];
   const TypeChange change{type, is_seen_otherwise, !(c.properties[type].colour == properties.colour)};
   c.properties[type] = std::move(properties);

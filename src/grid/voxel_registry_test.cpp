@@ -74,6 +74,24 @@ TEST(VoxelRegistry, LightAndOcclusionFollowVisibilityUnlessSet) {
   EXPECT_TRUE(has_other_visibility(types.changes_since(cursor)));
 }
 
+TEST(VoxelRegistry, KnowsTypesWhoseDataChangesMeshes) {
+  VoxelRegistry types;
+  const auto stone = types.add({.name = "stone"});
+  EXPECT_FALSE(types.has_remesh_on_data());
+  const auto door = types.add({.name = "door", .remesh_on_data = true});
+  ASSERT_TRUE(stone && door);
+  EXPECT_TRUE(types.has_remesh_on_data());
+  EXPECT_TRUE(types.remeshes_on_data(*door));
+  EXPECT_FALSE(types.remeshes_on_data(*stone) || types.remeshes_on_data(kAir) || types.remeshes_on_data(9999));
+  EXPECT_NE(types.find_or_add({.name = "door"}), *door) << "a property of the type";
+  types.replace(*stone, {.name = "stone", .remesh_on_data = true});
+  types.replace(*door, {.name = "door", .remesh_on_data = true});
+  types.replace(*door, {.name = "door"});
+  EXPECT_TRUE(types.remeshes_on_data(*stone) && !types.remeshes_on_data(*door));
+  types.replace(*stone, {.name = "stone"});
+  EXPECT_FALSE(types.has_remesh_on_data());
+}
+
 TEST(VoxelRegistry, RoundTripsColours) {
   for (int i = 0; i < 256; ++i) {
     const auto byte = static_cast<std::uint8_t>(i);

@@ -140,7 +140,7 @@ bool comes_before(const VoxelProperties& a, const VoxelProperties& b) {
   const auto key = [](const VoxelProperties& p) {
     const std::array colour{p.colour.r, p.colour.g, p.colour.b, p.colour.a};
     const std::tuple rest(colour, p.visibility, p.collides, p.state_bits, p.emission, p.roughness, p.metalness, p.ior,
-                          p.scattering, p.anisotropy, p.blocks_light, p.occludes, p.light_cost);
+                          p.scattering, p.anisotropy, p.blocks_light, p.occludes, p.light_cost, p.remesh_on_data);
     return std::tuple<const std::string&, const std::map<std::string, std::string>&, decltype(rest)>(
         p.name, p.attributes, rest);
   };

@@ -74,6 +74,9 @@ struct VoxelProperties {
   /// `Grid::set_data` does not know the types and accepts any state. `save_scene` and WorldStore::save refuse a scene
   /// in which a state uses more bits.
   std::uint8_t state_bits = 0;
+  /// True for types whose shape depends on their data, such as doors. When the data of such a voxel changes, LiveMeshes
+  /// meshes its chunk again.
+  bool remesh_on_data = false;
 
   // Each of the following properties affects the named users only. Traced shadows, traced occlusion, traced light and
   // path tracing follow `visibility`.
@@ -183,6 +186,12 @@ class VoxelRegistry {
   [[nodiscard]] bool has_transparent() const { return content_->transparent_count > 0; }
   /// Returns true if any registered type except air does not stop moving bodies (VoxelProperties::collides).
   [[nodiscard]] bool has_passable() const { return content_->passable_count > 0; }
+  /// Returns true if the type is registered and its data changes meshes (VoxelProperties::remesh_on_data).
+  [[nodiscard]] bool remeshes_on_data(VoxelType type) const {
+    return has_remesh_on_data() && type < size() && content_->properties[type].remesh_on_data;
+  }
+  /// Returns true if the data of any registered type changes meshes.
+  [[nodiscard]] bool has_remesh_on_data() const { return content_->remesh_on_data_count > 0; }
 
   /// Returns the types that were added or replaced since the cursor's last read, ordered by id, and moves the cursor to
   /// the present. Cost: O(changed types). See ChangeCursor.
@@ -202,6 +211,7 @@ class VoxelRegistry {
     std::size_t passable_count = 0;
     std::vector<Visibility> occlusion;  // see `occlusion`
     std::size_t unoccluding_count = 0;  // opaque types that do not occlude
+    std::size_t remesh_on_data_count = 0;
   };
   struct [[gnu::visibility("hidden")]] Journal;
   void note(TypeChange change);

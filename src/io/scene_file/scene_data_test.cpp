@@ -147,6 +147,19 @@ TEST(SceneData, RefusesStatesWithMoreBitsThanTheType) {
   EXPECT_EQ(written.error().message, "grids[0]: state 4 of voxel (1, 2, 3) has more than the 2 bits of its type");
 }
 
+TEST(SceneData, KeepsTypesWhoseDataChangesMeshes) {
+  Grid grid;
+  grid.set({1, 2, 3}, kTurned, {.state = 3});
+  Scene scene = scene_of(std::move(grid));
+  EXPECT_EQ(text_of(scene).find("remesh_on_data"), std::string::npos);
+  VoxelProperties door = scene.types[kTurned];
+  door.remesh_on_data = true;
+  scene.types.replace(kTurned, door);
+  const auto again = read(text_of(scene));
+  ASSERT_TRUE(again) << to_string(again.error());
+  EXPECT_EQ(again->scene.types[kTurned], door);
+}
+
 TEST(SceneData, NamesDataThatVoxCannotHold) {
   Grid grid;
   grid.set({1, 2, 3}, kTurned, {.state = 3});

@@ -341,6 +341,7 @@ OrderedJson PartWriter::json_of(const VoxelProperties& type) {
   if (type.blocks_light) json["blocks_light"] = *type.blocks_light;
   if (type.occludes) json["occludes"] = *type.occludes;
   if (type.light_cost != 0) json["light_cost"] = type.light_cost;
+  if (type.remesh_on_data) json["remesh_on_data"] = true;
   for (const auto& [key, value] : type.attributes) json["attributes"].push_back({text(key), text(value)});
   return json;
 }
@@ -437,10 +438,11 @@ OrderedJson PartWriter::json_of(const Environment& environment) {
 }
 
 VoxelProperties properties_of(const Json& json, const Place& place, Faults& faults) {
-  const Object type(json, place,
-                    {"name", "colour", "visibility", "collides", "roughness", "metalness", "emission", "ior",
-                     "scattering", "anisotropy", "state_bits", "blocks_light", "occludes", "light_cost", "attributes"},
-                    faults);
+  const Object type(
+      json, place,
+      {"name", "colour", "visibility", "collides", "roughness", "metalness", "emission", "ior", "scattering",
+       "anisotropy", "state_bits", "blocks_light", "occludes", "light_cost", "remesh_on_data", "attributes"},
+      faults);
   VoxelProperties properties;
   type.read_text("name", properties.name);
   if (const Json* colour = type.need("colour")) {
@@ -483,6 +485,7 @@ VoxelProperties properties_of(const Json& json, const Place& place, Faults& faul
   if (properties.visibility == Visibility::Transparent && properties.occludes.value_or(false)) {
     faults.add(type.place_of("occludes"), "must be false for a transparent type");
   }
+  type.read("remesh_on_data", properties.remesh_on_data);
   if (type.find("attributes") != nullptr) read_attributes(type, properties.attributes);
   return properties;
 }

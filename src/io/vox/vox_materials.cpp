@@ -252,6 +252,7 @@ void decode_own(const Attributes& attributes, VoxelProperties& out) {
   float state_bits = 0.0F;
   set("state_bits", state_bits);
   out.state_bits = static_cast<std::uint8_t>(std::clamp(state_bits, 0.0F, float{kMaxStateBits}));
+  if (const std::string* remesh = text("remesh_on_data")) out.remesh_on_data = *remesh != "0";
   if (const std::string* visibility = text("visibility")) {
     out.visibility = *visibility == "transparent" ? Visibility::Transparent : Visibility::Opaque;
   }
@@ -323,6 +324,7 @@ void encode_own(const VoxelProperties& wanted, const VoxelProperties& decoded, A
   }
   if (wanted.occludes && wanted.occludes != decoded.occludes) set("occludes", *wanted.occludes ? "1" : "0");
   if (wanted.light_cost != decoded.light_cost) set("light_cost", std::to_string(wanted.light_cost));
+  if (wanted.remesh_on_data != decoded.remesh_on_data) set("remesh_on_data", wanted.remesh_on_data ? "1" : "0");
   if (wanted.visibility != decoded.visibility) {
     set("visibility", wanted.visibility == Visibility::Transparent ? "transparent" : "opaque");
   }

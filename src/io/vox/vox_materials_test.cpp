@@ -98,6 +98,16 @@ TEST(VoxMaterial, RoundTripsLightAndOcclusion) {
   }
 }
 
+TEST(VoxMaterial, KeepsMarkOfTypesWhoseDataChangesMeshes) {
+  VoxelProperties p;
+  p.name = "palette 1";
+  p.colour = kRed;
+  p.remesh_on_data = true;
+  const Attributes written = encode_material("palette 1", p);
+  EXPECT_EQ(written.size(), 1U);
+  EXPECT_TRUE(decode_material("palette 1", p.colour, written).remesh_on_data);
+}
+
 TEST(VoxMaterial, RoundTripsEveryPropertyCombination) {
   for (const Visibility visibility : {Visibility::Opaque, Visibility::Transparent}) {
     for (const float metalness : {0.0F, 0.3F, 1.0F}) {

@@ -51,6 +51,16 @@ TEST(PartText, KeepsLightAndOcclusionOfTypes) {
   EXPECT_EQ(*read, grate);
 }
 
+TEST(PartText, KeepsTypesWhoseDataChangesMeshes) {
+  VoxelProperties door{.name = "door", .state_bits = 1};
+  EXPECT_EQ(text_of(door), R"({"name":"door","colour":[0,0,0,255],"state_bits":1})") << "as before the property";
+  door.remesh_on_data = true;
+  const std::string text = text_of(door);
+  const auto read = part_from<VoxelProperties>(std::as_bytes(std::span(text)), "type 1");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(*read, door);
+}
+
 TEST(PartText, RejectsDamagedMark) {
   for (const char* const value : {"1", "\"yes\"", "null", "[true]"}) {
     const auto read = grid_from(std::string(R"({"band": 8.0, "whole": )") + value + "}");
