@@ -72,7 +72,7 @@ class LightWorker {
   [[nodiscard]] Workers::Clock::time_point step(Workers::Lock& lock);
   void give(Workers::Lock& lock, std::unique_ptr<LitScene> done);
   void throw_failure();
-  bool read_changes(const Scene& scene);
+  bool read_changes(const Scene& scene, bool with_data);
   void ask(const Scene& scene, std::uint64_t number);
   [[nodiscard]] std::shared_ptr<const Scene> cancel_request();
   [[nodiscard]] bool is_idle() const { return !is_busy_ && !is_giving_; }

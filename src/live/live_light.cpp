@@ -88,11 +88,12 @@ void LightWorker::throw_failure() {
   if (failure != nullptr) std::rethrow_exception(failure);
 }
 
-// Returns true if light depends on any change since the last call. Scenes also report names and voxel data, which light
-// ignores.
-bool LightWorker::read_changes(const Scene& scene) {
+// Returns true if light depends on any change since the last call; `with_data`: or meshes do. Scenes also report names
+// and other voxel data.
+bool LightWorker::read_changes(const Scene& scene, bool with_data) {
   PendingChanges types(followed_types_, scene.types);
   PendingChanges changes(followed_scene_, scene);
+  with_data &= scene.types.has_remesh_on_data();
   bool is_any = changes->all || !types->empty();
   if (changes->all) followed_grids_.clear();
   for (const GridHandle handle : changes->all ? scene.grids().handles() : changes->grids) {
@@ -103,6 +104,7 @@ bool LightWorker::read_changes(const Scene& scene) {
     }
     GridCursors& followed = followed_grids_[handle];
     is_any |= grid->grid.has_changed_since(followed.voxels) || grid->field.has_changed_since(followed.field);
+    is_any |= with_data && grid->grid.has_data_changed_since(followed.voxels);
     followed = {grid->grid.cursor(), grid->field.cursor()};
   }
   types.commit();
@@ -132,7 +134,7 @@ void LightWorker::ask(const Scene& scene, std::uint64_t number) {
 
 void LightWorker::update(const Scene& scene) {
   if (has_receiver()) return;
-  const bool is_changed = read_changes(scene);
+  const bool is_changed = read_changes(scene, false);
   {
     const std::lock_guard lock(mutex_);
     is_behind_ |= is_changed;
@@ -141,7 +143,7 @@ void LightWorker::update(const Scene& scene) {
 }
 
 void LightWorker::update_for_receiver(const Scene& scene, std::uint64_t number, bool is_other) {
-  const bool is_changed = read_changes(scene);
+  const bool is_changed = read_changes(scene, true);
   {
     const std::lock_guard lock(mutex_);
     QUOIN_ASSERT(receiver_ != nullptr, "a receiver");

@@ -37,8 +37,20 @@ void drop_inputs(SurfaceJob& job) {
 
 MeshJobQueue::MeshJobQueue(unsigned workers, Work work, std::function<void()> on_ready)
     : work_(std::move(work)), on_ready_(std::move(on_ready)), workspaces_(workers) {
-  QUOIN_ASSERT(workers > 0 && work_ != nullptr, "workers with a function");
+  QUOIN_ASSERT(workers > 0 && *work_.use() != nullptr, "workers with a function");
   workers_.start(workers, [this](Workers::Lock& lock, unsigned worker) { return step(lock, workspaces_[worker]); });
+}
+
+void MeshJobQueue::replace_work(Work work) {
+  QUOIN_ASSERT(work != nullptr, "a function");
+  work_.replace(std::move(work));
+  const std::lock_guard lock(mutex_);
+  done_.clear();
+}
+
+void MeshJobQueue::call_on_ready() const {
+  const auto on_ready = on_ready_.use();
+  if (*on_ready) (*on_ready)();
 }
 
 void MeshJobQueue::push(std::unique_ptr<SurfaceJob> job) {
@@ -119,27 +131,31 @@ Workers::Clock::time_point MeshJobQueue::step(Workers::Lock& lock, SurfaceWorksp
   if (queue_.empty()) return Workers::kWhenWoken;
   std::unique_ptr<SurfaceJob> job = take_nearest();
   ++running_;
+  bool is_reported = false;
+  {
+    const auto work = work_.use();  // until the result is listed: `replace_work` drops it then
+    lock.unlock();
+    const SurfaceClock::time_point start = SurfaceClock::now();
+    std::exception_ptr failure = work_on(*work, *job, workspace);
+    // Failures are not reported to the callback: an immediate retry would fail again.
+    is_reported = job->outcome != SurfaceJob::Outcome::OutOfMemory;
+    if (is_reported || !job->is_in_epoch) drop_inputs(*job);
+    lock.lock();
+    workers_.keep_failure(std::move(failure));
+    finish(std::move(job), start);
+  }
   lock.unlock();
-  const SurfaceClock::time_point start = SurfaceClock::now();
-  std::exception_ptr failure = work_on(*job, workspace);
-  // Failures are not reported to the callback: an immediate retry would fail again.
-  const bool is_reported = job->outcome != SurfaceJob::Outcome::OutOfMemory;
-  if (is_reported || !job->is_in_epoch) drop_inputs(*job);
-  lock.lock();
-  workers_.keep_failure(std::move(failure));
-  finish(std::move(job), start);
-  lock.unlock();
-  if (is_reported && on_ready_) on_ready_();
+  if (is_reported) call_on_ready();
   lock.lock();
   return Workers::kAgain;
 }
 
 // Sets the job's outcome and surface. Returns an exception of a callback, or null.
-std::exception_ptr MeshJobQueue::work_on(SurfaceJob& job, SurfaceWorkspace& workspace) {
+std::exception_ptr MeshJobQueue::work_on(const Work& work, SurfaceJob& job, SurfaceWorkspace& workspace) {
   std::exception_ptr failure;
   try {
     try {
-      work_(job, workspace);
+      work(job, workspace);
     } catch (const std::bad_alloc&) {
       throw;
     } catch (...) {
@@ -174,6 +190,13 @@ void MeshJobQueue::finish(std::unique_ptr<SurfaceJob> job, SurfaceClock::time_po
   workers_.notify();
 }
 
+LiveMeshOptions without_callbacks(const LiveMeshOptions& options) {
+  LiveMeshOptions plain = options;
+  plain.convert = {};
+  plain.on_ready = {};
+  return plain;
+}
+
 ChunkSurfaceOptions surface_options(const LiveMeshOptions& options) {
   return {.style = options.style,
           .merge = options.merge,
@@ -188,7 +211,8 @@ void make_live_surface(const LiveMeshOptions& options, SurfaceJob& job, SurfaceW
   make_chunk_surface(surface_options(options), job, workspace);
   if (options.convert && job.surface != nullptr) {
     ConvertedSurface converted =
-        options.convert({job.source.grid, job.chunk, job.surface, job.source.content, ~std::uint64_t{0}});
+        options.convert({job.source.grid, job.chunk, job.surface, job.source.content, ~std::uint64_t{0}},
+                        surface_context(job, workspace));
     job.surface->converted_bytes = converted.data == nullptr ? 0 : converted.bytes;
     job.surface->converted = std::move(converted.data);
   }
@@ -219,7 +243,7 @@ struct MeshScheduler::Candidate {
 };
 
 MeshScheduler::MeshScheduler(const LiveMeshOptions& options, MeshJobQueue::Work work)
-    : options_(options),
+    : options_(without_callbacks(options)),
       surface_options_(surface_options(options)),
       workers_(worker_count(options.workers)),
       max_ahead_(jobs_ahead(options.style, workers_)),
@@ -252,6 +276,18 @@ void MeshScheduler::use_light(const SceneLight* light, std::shared_ptr<LightWork
   }
 }
 
+void MeshScheduler::replace_work(MeshJobQueue::Work work) {
+  queue_.replace_work(std::move(work));
+  {
+    const std::lock_guard lock(mutex_);
+    for (auto& [key, source] : sources_) source->discard();
+    forget();
+    // The edits of the dropped surfaces were not shown.
+    complete(shown_, nullptr);
+  }
+  queue_.releases()->finish();
+}
+
 void MeshScheduler::stop() {
   if (light_worker_ != nullptr) light_worker_->detach();
   queue_.stop();
@@ -282,7 +318,9 @@ void MeshScheduler::forget() {
   drawn_.forget();
   placed_.forget();
   is_epoch_open_ = false;
+  epoch_lit_ = nullptr;
   retries_.clear();
+  forgotten_ = totals_.serial;
   must_restart_ = true;
 }
 
@@ -316,7 +354,7 @@ void MeshScheduler::receive(std::shared_ptr<LitState> lit) {
     }
   }
   try {
-    if (options_.on_ready) options_.on_ready();
+    queue_.call_on_ready();
   } catch (...) {
     const std::lock_guard lock(mutex_);
     if (receive_failure_ == nullptr) receive_failure_ = std::current_exception();
@@ -337,7 +375,9 @@ void MeshScheduler::follow(const State& state, const Scene& places) {
   choose_levels(places, now);
   for (auto& [key, live] : sources_) {
     const SceneGrid* const grid = state.scene->grids().find(key.grid);
-    if (grid != nullptr && drawn_.places(key.grid)) live->mark_types(*grid, changed_types, now);
+    if (grid == nullptr || !drawn_.places(key.grid)) continue;
+    live->mark_types(*grid, changed_types, now);
+    if (!changed_types.data.empty()) live->follow_data(*grid, state.scene->types, now);
   }
   prepare(*state.scene);
   withdraw([&](const SurfaceJob& job) {
@@ -436,6 +476,7 @@ void MeshScheduler::follow_grid(const Scene& scene, GridHandle handle, SurfaceCl
   }
   totals_.loads_only = is_all_new_ && is_new;
   voxels->second->follow(grid, now);
+  voxels->second->follow_data(grid, scene.types, now);
   if (field != nullptr) field->follow(grid, now);
   totals_.loads_only = false;
 }
@@ -484,6 +525,24 @@ std::vector<GridHandle> MeshScheduler::follow_scene(const Scene& scene) {
   return drawn;
 }
 
+namespace {
+
+// Returns the types whose data changes meshes now, but did not with the former registry, which may be null; empty if
+// there are none.
+std::vector<bool> types_with_new_data(const VoxelRegistry* former, const VoxelRegistry& types) {
+  std::vector<bool> found;
+  if (!types.has_remesh_on_data()) return found;
+  for (std::size_t i = 0; i < types.size(); ++i) {
+    const auto type = static_cast<VoxelType>(i);
+    if (!types.remeshes_on_data(type) || (former != nullptr && former->remeshes_on_data(type))) continue;
+    found.resize(types.size());
+    found[type] = true;
+  }
+  return found;
+}
+
+}  // namespace
+
 // Follows the type registry. If the registry is new, all types count as changed, including types it does not contain.
 ChangedTypes MeshScheduler::follow_types(const VoxelRegistry& types) {
   PendingChanges changes(followed_types_, types);
@@ -499,9 +558,10 @@ ChangedTypes MeshScheduler::follow_types(const VoxelRegistry& types) {
   };
   add(changed.visibility, &TypeChange::visibility_changed);
   add(changed.colour, &TypeChange::colour_changed);
-  if (!changed.visibility.empty()) types_.registry = std::make_shared<const VoxelRegistry>(types);
+  changed.data = types_with_new_data(types_.registry.get(), types);
+  types_.registry = std::make_shared<const VoxelRegistry>(types);
   if (!changed.colour.empty()) types_.materials = std::make_shared<const SurfaceMaterials>(types);
-  if (!changed.visibility.empty() || !changed.colour.empty()) ++types_.generation;
+  if (!changed.visibility.empty() || !changed.colour.empty() || !changed.data.empty()) ++types_.generation;
   changes.commit();
   return changed;
 }
@@ -509,7 +569,7 @@ ChangedTypes MeshScheduler::follow_types(const VoxelRegistry& types) {
 void MeshScheduler::collect() {
   for (std::unique_ptr<SurfaceJob>& job : queue_.collect()) {
     SurfaceSource* const live = find(job->source);
-    if (live == nullptr) continue;
+    if (live == nullptr || job->serial <= forgotten_) continue;
     const bool is_retried = job->outcome == SurfaceJob::Outcome::OutOfMemory && job->is_in_epoch && is_epoch_open_;
     if (!is_retried) {
       live->collect(*job);
@@ -692,10 +752,16 @@ LiveMeshes::Stats MeshScheduler::stats() const {
 }
 
 struct LiveMeshes::Impl {
-  explicit Impl(const LiveMeshOptions& options)
-      : scheduler(options, [options](SurfaceJob& job, SurfaceWorkspace& workspace) {
-          make_live_surface(options, job, workspace);
-        }) {}
+  explicit Impl(const LiveMeshOptions& wanted)
+      : options(without_callbacks(wanted)), scheduler(wanted, work_with(wanted.convert)) {}
+  [[nodiscard]] MeshJobQueue::Work work_with(SurfaceConverter convert) const {
+    LiveMeshOptions all = options;
+    all.convert = std::move(convert);
+    return [all = std::move(all)](SurfaceJob& job, SurfaceWorkspace& workspace) {
+      make_live_surface(all, job, workspace);
+    };
+  }
+  const LiveMeshOptions options;
   MeshScheduler scheduler;
 };
 
@@ -717,6 +783,12 @@ void LiveMeshes::use_light(const SceneLight* light) {
 }
 void LiveMeshes::use_light(LiveLight& light) {
   impl_->scheduler.use_light(nullptr, light.worker_);
+}
+void LiveMeshes::set_convert(SurfaceConverter convert) {
+  impl_->scheduler.replace_work(impl_->work_with(std::move(convert)));
+}
+void LiveMeshes::set_on_ready(std::function<void()> on_ready) {
+  impl_->scheduler.replace_on_ready(std::move(on_ready));
 }
 std::uint64_t LiveMeshes::shown_update() const {
   return impl_->scheduler.shown_update();

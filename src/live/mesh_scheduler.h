@@ -38,6 +38,13 @@ class MeshJobQueue {
 
   /// Waits for started jobs. Discards waiting jobs and all later ones.
   void stop() { workers_.stop(); }
+  /// Replaces the function of jobs that were not started. Returns when all others are done, and drops all results that
+  /// were not collected. Requires: no worker's function calls it. Errors: bad_alloc, without any change.
+  void replace_work(Work work);
+  /// Replaces the callback. Returns when no worker runs the former one. Requires: as `replace_work`. Errors: as there.
+  void replace_on_ready(std::function<void()> on_ready) { on_ready_.replace(std::move(on_ready)); }
+  /// Calls `on_ready`, if any.
+  void call_on_ready() const;
   void push(std::unique_ptr<SurfaceJob> job);
   /// Returns the first exception of a callback since the last call, or null.
   [[nodiscard]] std::exception_ptr take_failure();
@@ -58,12 +65,12 @@ class MeshJobQueue {
 
  private:
   [[nodiscard]] Workers::Clock::time_point step(Workers::Lock& lock, SurfaceWorkspace& workspace);
-  [[nodiscard]] std::exception_ptr work_on(SurfaceJob& job, SurfaceWorkspace& workspace);
+  [[nodiscard]] std::exception_ptr work_on(const Work& work, SurfaceJob& job, SurfaceWorkspace& workspace);
   void finish(std::unique_ptr<SurfaceJob> job, SurfaceClock::time_point start);
   [[nodiscard]] std::unique_ptr<SurfaceJob> take_nearest();
 
-  const Work work_;
-  const std::function<void()> on_ready_;
+  Replaceable<Work> work_;
+  Replaceable<std::function<void()>> on_ready_;
   mutable std::mutex mutex_;
   std::size_t running_ = 0;
   std::vector<std::unique_ptr<SurfaceJob>> queue_;
@@ -72,6 +79,9 @@ class MeshJobQueue {
   std::vector<SurfaceWorkspace> workspaces_;  // of each worker
   Workers workers_{mutex_};
 };
+
+/// Returns the options with neither `convert` nor `on_ready`.
+[[nodiscard]] LiveMeshOptions without_callbacks(const LiveMeshOptions& options);
 
 /// Returns the options that workers need.
 [[nodiscard]] ChunkSurfaceOptions surface_options(const LiveMeshOptions& options);
@@ -86,6 +96,11 @@ class MeshScheduler {
   MeshScheduler(const LiveMeshOptions& options, MeshJobQueue::Work work);
 
   std::uint64_t update(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes = {});
+  /// Replaces the workers' function. Drops the surfaces that were not taken, and makes all again. As
+  /// LiveMeshes::set_convert.
+  void replace_work(MeshJobQueue::Work work);
+  /// As LiveMeshes::set_on_ready.
+  void replace_on_ready(std::function<void()> on_ready) { queue_.replace_on_ready(std::move(on_ready)); }
   /// At most one of both is not null. Must not overlap with `update`.
   void use_light(const SceneLight* light, std::shared_ptr<LightWorker> worker);
   [[nodiscard]] std::vector<SurfaceUpdate> take(std::size_t max_bytes = std::numeric_limits<std::size_t>::max());
@@ -139,7 +154,7 @@ class MeshScheduler {
   void withdraw(FunctionRef<bool(const SurfaceJob&)> is_unwanted);
   [[nodiscard]] SurfaceSource* find(SurfaceKey source);
 
-  const LiveMeshOptions options_;
+  const LiveMeshOptions options_;  // without callbacks
   const ChunkSurfaceOptions surface_options_;
   const unsigned workers_;
   const std::size_t max_ahead_;  // jobs that wait for workers
@@ -159,6 +174,7 @@ class MeshScheduler {
   std::shared_ptr<LitState> epoch_lit_;     // its light
   std::shared_ptr<LitState> complete_lit_;  // of the newest complete state, to be shown
   std::uint64_t shown_ = 0;
+  std::uint64_t forgotten_ = 0;                       // results of jobs up to this serial are dropped
   std::vector<std::unique_ptr<SurfaceJob>> retries_;  // jobs of the epoch that ran out of memory
   ChangeCursor followed_types_;
   SurfaceClock::time_point renewed_{};

@@ -208,6 +208,13 @@ struct Neighbourhood {
     const Chunk* found = at(chunk.x, chunk.y, chunk.z);
     return found == nullptr ? kAir : found->get(local_of(local));
   }
+  /// Returns the data of the voxel at a position relative to the centre chunk. Requires: as `get`. Lifetime: as
+  /// Chunk::data.
+  [[nodiscard]] VoxelData data(IVec3 local) const {
+    const IVec3 chunk = chunk_of(local);
+    const Chunk* found = at(chunk.x, chunk.y, chunk.z);
+    return found == nullptr ? VoxelData{} : found->data(local_of(local));
+  }
 };
 
 /// Returns a neighbourhood of a chunk without neighbours. Lifetime: same as Neighbourhood.

@@ -122,6 +122,12 @@ struct DensityNeighbourhood {
     const IVec3 p = local_of(local);
     return found == nullptr ? outside : found->get(p.x, p.y, p.z);
   }
+  /// Returns the material at a position relative to the centre chunk. Requires: as `get`.
+  [[nodiscard]] VoxelType material(IVec3 local) const {
+    const IVec3 chunk = chunk_of(local);
+    const DensityChunk* found = at(chunk.x, chunk.y, chunk.z);
+    return found == nullptr ? kAir : found->materials().get(local_of(local));
+  }
 };
 
 }  // namespace quoin

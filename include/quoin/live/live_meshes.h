@@ -7,6 +7,7 @@
 #include <limits>
 #include <memory>
 #include <span>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -31,6 +32,48 @@ struct ConvertedSurface {
   std::size_t bytes = 0;  ///< size of `data`; 0: unknown
 };
 
+/// A function that converts surfaces: any callable with one of these parameter lists, returning a ConvertedSurface or a
+/// pointer that converts to it. Use the second one to add content that quads do not contain, such as stairs, flowers,
+/// rotated blocks, or materials per vertex.
+///
+///   [](const quoin::SurfaceUpdate& update) { ... }
+///   [](const quoin::SurfaceUpdate& update, const quoin::SurfaceContext& context) { ... }
+class SurfaceConverter {
+ public:
+  using WithContext = std::function<ConvertedSurface(const SurfaceUpdate&, const SurfaceContext&)>;
+
+  /// Converts nothing.
+  SurfaceConverter() = default;
+  SurfaceConverter(std::nullptr_t) {}
+  template <class Callable>
+    requires(
+        !std::same_as<std::remove_cvref_t<Callable>, SurfaceConverter> &&
+        std::is_invocable_r_v<ConvertedSurface, std::decay_t<Callable>&, const SurfaceUpdate&, const SurfaceContext&>)
+  SurfaceConverter(Callable&& convert) : convert_(std::forward<Callable>(convert)) {}
+  template <class Callable>
+    requires(!std::same_as<std::remove_cvref_t<Callable>, SurfaceConverter> &&
+             !std::is_invocable_r_v<ConvertedSurface, std::decay_t<Callable>&, const SurfaceUpdate&,
+                                    const SurfaceContext&> &&
+             std::is_invocable_r_v<ConvertedSurface, std::decay_t<Callable>&, const SurfaceUpdate&>)
+  SurfaceConverter(Callable&& convert) {
+    std::function<ConvertedSurface(const SurfaceUpdate&)> plain(std::forward<Callable>(convert));
+    if (!plain) return;
+    convert_ = [plain = std::move(plain)](const SurfaceUpdate& update, const SurfaceContext& /*context*/) {
+      return plain(update);
+    };
+  }
+
+  /// Returns true if there is a function.
+  [[nodiscard]] explicit operator bool() const { return convert_ != nullptr; }
+  /// Requires: there is a function.
+  ConvertedSurface operator()(const SurfaceUpdate& update, const SurfaceContext& context) const {
+    return convert_(update, context);
+  }
+
+ private:
+  WithContext convert_;
+};
+
 struct LiveMeshOptions {
   SurfaceStyle style = SurfaceStyle::Blocky;  ///< of voxels
   bool merge = true;                          ///< blocky: neighbouring faces become one quad
@@ -48,10 +91,11 @@ struct LiveMeshOptions {
   InstanceFilter instances = InstanceFilter::Visible;  ///< instances whose grids are meshed
   Threads workers{};  ///< 0: one less than the hardware threads, at least 1 (different from other options)
   /// Converts a new surface before it can be taken, for example to vertices in a custom format. The result becomes
-  /// ChunkSurface::converted. `changed_regions` of its argument has all bits set. Called by several workers at once.
-  /// Optional. A result that is returned with its size counts in `take`:
+  /// ChunkSurface::converted. `changed_regions` of its argument has all bits set. Called by several workers at once,
+  /// for each surface that is not empty. Optional. The SurfaceContext is valid only during the call. A result that is
+  /// returned with its size counts in `take`:
   ///   return quoin::ConvertedSurface(vertices, vertices->size() * sizeof(Vertex));
-  std::function<ConvertedSurface(const SurfaceUpdate&)> convert{};
+  SurfaceConverter convert{};
   /// Called by a worker after each completed chunk: there may be a surface to take, `pending` has decreased, and there
   /// is room for more chunks. Also called after each update of a LiveLight, by its worker. Optional. It may call
   /// `take`, `pending`, `shown_update` and `stats`, but no other member of LiveMeshes.
@@ -81,7 +125,8 @@ struct LiveMeshOptions {
 /// Seams:     surfaces of a field also fit each other when their levels of detail change.
 /// Callbacks: the next `update` or `finish` rethrows the first exception of `on_ready` or `convert`. If `convert`
 ///            throws, the surface is still returned, with a null `converted`. A bad_alloc from `convert` counts as the
-///            worker running out of memory (Stats::out_of_memory).
+///            worker running out of memory (Stats::out_of_memory). `set_convert` and `set_on_ready` replace them while
+///            workers run, for example when a plug-in is loaded again.
 /// Lifetime:  the scene is read only during calls; callers share ownership of the surfaces they take. After the last
 ///            owner has dropped a surface, a worker destroys it with its converted data. The owner's thread destroys
 ///            it if the LiveMeshes no longer exists, or if busy workers have left more than 64 MiB to destroy.
@@ -96,10 +141,11 @@ class LiveMeshes {
   LiveMeshes(const LiveMeshes&) = delete;
   LiveMeshes& operator=(const LiveMeshes&) = delete;
 
-  /// Applies the scene's changes since the last update: voxels, grids, visibility of types (smooth: also colour), and
-  /// instances that show a grid for the first time or no longer show it. Chunks nearest to an eye (world coordinates)
-  /// come first. Call it after edits, and once per frame while `pending` is not 0: each call queues only enough chunks
-  /// to keep the workers busy. Eyes that are not finite are ignored; if all are, every chunk has distance 0.
+  /// Applies the scene's changes since the last update: voxels, data of types with VoxelProperties::remesh_on_data,
+  /// grids, visibility of types (smooth: also colour), and instances that show a grid for the first time or no longer
+  /// show it. Chunks nearest to an eye (world coordinates) come first. Call it after edits, and once per frame while
+  /// `pending` is not 0: each call queues only enough chunks to keep the workers busy. Eyes that are not finite are
+  /// ignored; if all are, every chunk has distance 0.
   ///
   /// Returns the number of this call: 1, 2, 3 and so on.
   ///
@@ -121,6 +167,20 @@ class LiveMeshes {
   /// scene. Null: no light. It is read only during `update` and `finish`.
   /// Lifetime: the light must stay valid until another call replaces it.
   void use_light(const SceneLight* light);
+
+  /// Replaces LiveMeshOptions::convert. Returns when no worker runs the former function any more, and when all of its
+  /// results are destroyed, except those that were taken and not dropped before the call. Drop these too before the
+  /// code of the function is unloaded.
+  /// All chunks are meshed and converted again after the next `update`: those of partial grids, and of grids with more
+  /// than 256 chunks, are returned one by one, all others together. The surfaces taken before stay valid. From now on,
+  /// `take` returns only results of the new function.
+  /// Must not overlap with `update`, `finish` and `use_light`, and must not be called by a callback. Cost: waits for
+  /// the chunks that workers are meshing.
+  /// Errors: bad_alloc, without any change.
+  void set_convert(SurfaceConverter convert);
+  /// Replaces LiveMeshOptions::on_ready. Returns when no worker runs the former function any more. Must not be called
+  /// by a callback. Errors: bad_alloc, without any change.
+  void set_on_ready(std::function<void()> on_ready);
 
   /// Returns the surfaces that are new since the last call. Each chunk appears once, with its newest surface. Skips
   /// chunks that had no surface and still have none. Once voxel surfaces reach `max_bytes`

@@ -6,9 +6,15 @@
 #include <memory>
 #include <vector>
 
+#include <quoin/core/assert.h>
+#include <quoin/core/direction.h>
 #include <quoin/core/vec.h>
+#include <quoin/grid/chunk.h>
+#include <quoin/grid/density_chunk.h>
+#include <quoin/grid/voxel_registry.h>
 #include <quoin/mesh/quad.h>
 #include <quoin/mesh/smooth_mesh.h>
+#include <quoin/render/propagated_light.h>
 #include <quoin/render/surface_light.h>
 #include <quoin/scene/scene.h>
 
@@ -72,6 +78,53 @@ struct SurfaceUpdate {
   /// Bit mask of changed regions. Bit x + n (y + n z), with n = 64 / region_edge, is set if the quads of region
   /// (x, y, z) differ from the previous surface, are new or were removed. Smooth surfaces have one region.
   std::uint64_t changed_regions = ~std::uint64_t{0};
+};
+
+/// A material of a vertex and its share.
+struct MaterialWeight {
+  VoxelType type = kAir;
+  float weight = 0.0F;  ///< above 0, at most 1
+
+  bool operator==(const MaterialWeight&) const = default;
+};
+
+/// The content that the surface of a chunk was made from, at one moment: see LiveMeshOptions::convert.
+///
+/// Space:    positions are relative to the chunk: its first voxel or sample is (0, 0, 0). -64 to 127 on each axis reach
+///           the 26 neighbours.
+/// Followed: a chunk is meshed again if a voxel of it, or one of their 26 neighbours, changes its type or light, or its
+///           data if the type has VoxelProperties::remesh_on_data. Smooth surfaces and fields: if the densities or
+///           materials that its mesh reads change. Content farther away can differ from the neighbours' surfaces.
+/// Lifetime: valid only during the call that receives it, with all pointers in it. Do not keep copies.
+/// Threads:  only the thread that receives it.
+struct SurfaceContext {
+  IVec3 chunk{0};
+  const VoxelRegistry* types = nullptr;  ///< not null
+  /// Surfaces of voxels: types (`get`) and data (`data`) of the chunk and its neighbours. All null for fields.
+  Neighbourhood voxels;
+  /// Smooth surfaces: the densities (`get`) and materials (`material`) that were meshed. All null for blocky surfaces.
+  /// In smooth surfaces of voxels, a sample is the centre of the voxel with the same position.
+  DensityNeighbourhood densities;
+  std::array<std::uint8_t, 27> levels{};  ///< fields: levels of detail, by Neighbourhood::index
+  /// Blocky surfaces, with LiveMeshes::use_light: the light that ChunkSurface::light contains. Otherwise null.
+  const PropagatedLight* light = nullptr;
+  SurfaceLight* corners = nullptr;  ///< reads `light` at the corners of faces; null without light
+
+  /// Returns the light at a voxel, as PropagatedLight::at. Requires: `light` is not null.
+  [[nodiscard]] LightLevels light_at(IVec3 local) const {
+    QUOIN_ASSERT(light != nullptr, "a surface with light");
+    return light->at(chunk * kChunkEdge + local);
+  }
+  /// Returns the light at the corners of a voxel's face, as SurfaceLight::face. Requires: `light` is not null.
+  [[nodiscard]] FaceLight light_of_face(IVec3 local, Direction direction) const {
+    QUOIN_ASSERT(corners != nullptr, "a surface with light");
+    return corners->face(chunk * kChunkEdge + local, direction);
+  }
+  /// Replaces `out` with the materials around a vertex of a smooth surface and their shares: of the solid samples whose
+  /// mean colour is `albedo`, if colours are blended. The greatest share comes first, of equal ones the lowest type.
+  /// The sum is 1. Vertices of a transparent body have one material.
+  /// Requires: a vertex of the surface of this context. Cost: O(samples of the vertex's cell next to the surface).
+  void material_weights(const ChunkSurface& surface, std::size_t vertex, std::vector<MaterialWeight>& out) const;
 };
 
 }  // namespace quoin

@@ -20,15 +20,23 @@ std::uint16_t linear16(std::uint8_t encoded) {
   return static_cast<std::uint16_t>(std::lround(linear_from_srgb(encoded) * 65'535.0F));
 }
 
-bool is_solid(const DensityNeighbourhood& chunks, IVec3 sample) {
-  return DensityChunk::is_solid(chunks.get(sample));
-}
+// Most samples that a cell can have, along three sides of 9.
+constexpr std::size_t kMaxCellSamples = 729;
 
-VoxelType material_at(const DensityNeighbourhood& chunks, IVec3 sample) {
-  const IVec3 offset = chunk_of(sample);
-  const DensityChunk* chunk = chunks.at(offset.x, offset.y, offset.z);
-  return chunk == nullptr ? kAir : chunk->materials().get(local_of(sample));
-}
+// The solid samples of all bodies.
+struct AnySolid {
+  const DensityNeighbourhood& chunks;
+  bool operator()(IVec3 sample) const { return DensityChunk::is_solid(chunks.get(sample)); }
+};
+
+// The solid samples of opaque bodies.
+struct OpaqueSolid {
+  const DensityNeighbourhood& chunks;
+  const VoxelRegistry& types;
+  bool operator()(IVec3 sample) const {
+    return DensityChunk::is_solid(chunks.get(sample)) && !types.is_transparent(chunks.material(sample));
+  }
+};
 
 // Reads the materials of the solid corners of a cell within a chunk, row by row.
 std::size_t materials_of_corners(const DensityChunk& chunk, IVec3 first, VoxelType* out) {
@@ -53,13 +61,14 @@ std::size_t materials_of_corners(const DensityChunk& chunk, IVec3 first, VoxelTy
 }
 
 // Reads the materials of the solid samples in the closed box that starts at `first`, `count` per side and `step` apart.
-std::size_t solid_materials(const DensityNeighbourhood& chunks, IVec3 first, int count, int step, VoxelType* out) {
+template <class IsSolid>
+std::size_t solid_materials(const IsSolid& is_solid, IVec3 first, int count, int step, VoxelType* out) {
   std::size_t found = 0;
   for (int z = 0; z < count; ++z) {
     for (int y = 0; y < count; ++y) {
       for (int x = 0; x < count; ++x) {
         const IVec3 sample = first + IVec3{x, y, z} * step;
-        if (is_solid(chunks, sample)) out[found++] = material_at(chunks, sample);
+        if (is_solid(sample)) out[found++] = is_solid.chunks.material(sample);
       }
     }
   }
@@ -68,7 +77,8 @@ std::size_t solid_materials(const DensityNeighbourhood& chunks, IVec3 first, int
 
 // Reads the materials of the solid samples nearest to the surface along the crossed edges of a cell of width `size`:
 // the top layer of the ground, even if the corners are far below it.
-std::size_t materials_under_crossings(const DensityNeighbourhood& chunks, IVec3 first, int size, VoxelType* out) {
+template <class IsSolid>
+std::size_t materials_under_crossings(const IsSolid& is_solid, IVec3 first, int size, VoxelType* out) {
   std::size_t found = 0;
   for (int edge = 0; edge < 12; ++edge) {
     const int axis = edge / 4;
@@ -77,13 +87,25 @@ std::size_t materials_under_crossings(const DensityNeighbourhood& chunks, IVec3 
     solid[(axis + 2) % 3] += (edge >> 1 & 1) * size;
     IVec3 air = solid;
     air[axis] += size;
-    if (is_solid(chunks, solid) == is_solid(chunks, air)) continue;
-    if (is_solid(chunks, air)) std::swap(solid, air);
+    if (is_solid(solid) == is_solid(air)) continue;
+    if (is_solid(air)) std::swap(solid, air);
     for (int width = size / 2; width >= 1; width /= 2) {
       const IVec3 middle = (solid + air) / 2;
-      (is_solid(chunks, middle) ? solid : air) = middle;
+      (is_solid(middle) ? solid : air) = middle;
     }
-    out[found++] = material_at(chunks, solid);
+    out[found++] = is_solid.chunks.material(solid);
+  }
+  return found;
+}
+
+// Reads the materials of the samples whose mean is the colour of a cell that starts at `first`, as
+// SurfaceMaterials::of_cell.
+template <class IsSolid>
+std::size_t materials_of_cell(const IsSolid& is_solid, IVec3 first, int level, VoxelType* out) {
+  const int size = 1 << level;
+  std::size_t found = level > 0 ? materials_under_crossings(is_solid, first, size, out) : 0;
+  for (int step = size; found == 0 && step >= 1; step /= 2) {
+    found = solid_materials(is_solid, first, size / step + 1, step, out);
   }
   return found;
 }
@@ -138,7 +160,7 @@ CellMaterial SurfaceMaterials::of_cell(const DensityNeighbourhood& chunks, IVec3
   QUOIN_ASSERT(level >= 0 && level <= kMaxSmoothLevel, "a level of detail");
   const int size = 1 << level;
   const IVec3 first = cell * size;
-  std::array<VoxelType, 729> solid;
+  std::array<VoxelType, kMaxCellSamples> solid;
   std::size_t found = 0;
   const DensityChunk* centre = chunks.centre();
   if (centre != nullptr && std::min({first.x, first.y, first.z}) >= 0 &&
@@ -146,12 +168,8 @@ CellMaterial SurfaceMaterials::of_cell(const DensityNeighbourhood& chunks, IVec3
     if (const auto only = centre->materials().uniform()) return {albedo(*only), *only};
     if (level == 0) found = materials_of_corners(*centre, first, solid.data());
   }
-  if (level > 0) found = materials_under_crossings(chunks, first, size, solid.data());
+  if (found == 0) found = materials_of_cell(AnySolid{chunks}, first, level, solid.data());
   if (found != 0) return blend({solid.data(), found});
-  for (int step = size; step >= 1; step /= 2) {
-    found = solid_materials(chunks, first, size / step + 1, step, solid.data());
-    if (found != 0) return blend({solid.data(), found});
-  }
   return {kWhite, kAir};
 }
 
@@ -307,6 +325,14 @@ std::vector<CellMaterial> materials_of(const DensityNeighbourhood& chunks, const
     of_vertex.push_back(materials.of_cell(chunks, cell.first / cell.size(), cell.level));
   }
   return of_vertex;
+}
+
+void append_opaque_materials(const DensityNeighbourhood& chunks, const VoxelRegistry& types,
+                             const std::array<std::uint8_t, 27>& levels, SmoothCell name, std::vector<VoxelType>& out) {
+  const LevelCell cell = ChunkLevels(levels).cell_of(name);
+  std::array<VoxelType, kMaxCellSamples> solid;
+  const std::size_t found = materials_of_cell(OpaqueSolid{chunks, types}, cell.first, cell.level, solid.data());
+  out.insert(out.end(), solid.begin(), solid.begin() + static_cast<std::ptrdiff_t>(found));
 }
 
 std::size_t quad_indices_of(const SmoothChunkMesh& mesh) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -52,6 +53,12 @@ struct TriangleFace {
 /// in that chunk's mesh.
 [[nodiscard]] std::vector<CellMaterial> materials_of(const DensityNeighbourhood& chunks, const SmoothOptions& options,
                                                      const SurfaceMaterials& materials, const SmoothChunkMesh& mesh);
+
+/// Appends the materials of the samples that SurfaceMaterials::of_cell would blend for a vertex of an opaque body,
+/// unsorted. `chunks` may contain transparent bodies too, whose samples count as air. `levels`: as
+/// SmoothOptions::levels.
+void append_opaque_materials(const DensityNeighbourhood& chunks, const VoxelRegistry& types,
+                             const std::array<std::uint8_t, 27>& levels, SmoothCell name, std::vector<VoxelType>& out);
 
 /// Returns the number of indices that are quads, six each, if all cells have one level. Each of the triangles after
 /// them has a vertex in a bridge.

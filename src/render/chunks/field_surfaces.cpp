@@ -449,6 +449,18 @@ void FieldSurfaces::forget() {
   }
 }
 
+void FieldSurfaces::discard() {
+  for (auto& [chunk, state] : chunks_) {
+    state.result.reset();
+    if (!state.is_ready) continue;
+    const Change change(totals_, state);
+    state.surface.reset();
+    state.is_ready = false;
+    // If the chunk is gone, `follow` or `leave` finds out again.
+    state.is_gone = false;
+  }
+}
+
 void FieldSurfaces::make_ready(IVec3 chunk, FieldChunk& state) {
   state.is_ready = true;
   if (state.is_listed) return;

@@ -24,6 +24,7 @@ class FieldSurfaces final : public SurfaceSource {
   void follow(const SceneGrid& content, SurfaceClock::time_point now) override;
   void leave() override;
   void forget() override;
+  void discard() override;
   void mark_types(const SceneGrid& content, const ChangedTypes& changed, SurfaceClock::time_point now) override;
 
   [[nodiscard]] bool wants_levels() const override { return wants_levels_; }

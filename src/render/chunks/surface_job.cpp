@@ -404,6 +404,49 @@ void make_chunk_surface(const ChunkSurfaceOptions& options, SurfaceJob& job, Sur
   }
 }
 
+SurfaceContext surface_context(const SurfaceJob& job, SurfaceWorkspace& workspace) {
+  QUOIN_ASSERT(job.surface != nullptr && job.types != nullptr, "a job with a surface");
+  SurfaceContext context;
+  context.chunk = job.chunk;
+  context.types = job.types.get();
+  context.levels = job.levels;
+  if (job.source.content == SurfaceContent::Field) {
+    context.densities = job.field->neighbourhood(job.chunk);
+    return context;
+  }
+  QUOIN_ASSERT(job.voxels != nullptr, "a job with voxels");
+  context.voxels = job.voxels->neighbourhood(job.chunk);
+  if (job.surface->style == SurfaceStyle::Smooth) {
+    context.densities = make_densities(job.densities);
+  } else if (job.light != nullptr) {
+    QUOIN_ASSERT(workspace.lit == job.light && workspace.surface_light, "the light of the surface");
+    context.light = &job.light->light;
+    context.corners = &*workspace.surface_light;
+  }
+  return context;
+}
+
+void SurfaceContext::material_weights(const ChunkSurface& surface, std::size_t vertex,
+                                      std::vector<MaterialWeight>& out) const {
+  QUOIN_ASSERT(surface.style == SurfaceStyle::Smooth && vertex < surface.types.size(), "a vertex of a smooth surface");
+  out.clear();
+  std::vector<VoxelType> materials;
+  const VoxelType most = surface.types[vertex];
+  if (!types->is_transparent(most)) {
+    smooth::append_opaque_materials(densities, *types, levels, surface.smooth.cells[vertex], materials);
+  }
+  if (materials.empty()) return out.push_back({most, 1.0F});
+  std::sort(materials.begin(), materials.end());
+  const float share = 1.0F / static_cast<float>(materials.size());
+  for (auto first = materials.begin(); first != materials.end();) {
+    const auto end = std::upper_bound(first, materials.end(), *first);
+    out.push_back({*first, static_cast<float>(end - first) * share});
+    first = end;
+  }
+  std::stable_sort(out.begin(), out.end(),
+                   [](const MaterialWeight& a, const MaterialWeight& b) { return a.weight > b.weight; });
+}
+
 std::int64_t ChunkSurface::triangles() const {
   return 2 * static_cast<std::int64_t>(quads.size()) + static_cast<std::int64_t>(smooth.indices.size() / 3);
 }

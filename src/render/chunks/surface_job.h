@@ -69,7 +69,7 @@ struct SurfaceJob {
   bool is_in_epoch = false;       ///< of an edited chunk: its inputs must not change, and it comes before all others
   SurfaceClock::time_point seen;  ///< time of the edit
 
-  GridSnapshot voxels;  ///< blocky
+  GridSnapshot voxels;  ///< the grid; null for fields
   LightSnapshot light;  ///< blocky; null if no light is used
   std::shared_ptr<const VoxelRegistry> types;
   VoxelDensities densities;                           ///< smooth
@@ -78,6 +78,7 @@ struct SurfaceJob {
   std::optional<DensityStamps> last_stamps;
   std::uint64_t last_collected = 0;           ///< the job that made the last surface
   std::uint64_t type_generation = 0;          ///< generation of `types` and `materials`
+  std::uint64_t data_generation = 0;          ///< smooth: VoxelChunk::data_generation when the job was made
   FieldSnapshot field;                        ///< fields only; uses `materials` too
   std::shared_ptr<const FieldBodies> bodies;  ///< bodies of `field`
   std::array<std::uint8_t, 27> levels{};      ///< fields: levels of detail, in neighbourhood order
@@ -103,5 +104,9 @@ struct SurfaceWorkspace {
 
 /// Makes the surface of a job's chunk.
 void make_chunk_surface(const ChunkSurfaceOptions& options, SurfaceJob& job, SurfaceWorkspace& workspace);
+
+/// Returns the content that the surface of a job was made from. Requires: `make_chunk_surface` made it last with this
+/// workspace. Lifetime: as the job and the workspace, until either is used again.
+[[nodiscard]] SurfaceContext surface_context(const SurfaceJob& job, SurfaceWorkspace& workspace);
 
 }  // namespace quoin

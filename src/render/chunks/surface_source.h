@@ -121,6 +121,7 @@ struct SurfaceTypes {
 struct ChangedTypes {
   std::vector<bool> visibility;
   std::vector<bool> colour;
+  std::vector<bool> data;  ///< VoxelProperties::remesh_on_data became true, so that earlier data counts
 };
 
 /// The inputs of one update's jobs. A snapshot is taken when the first job needs it. Workers destroy the snapshots, if
@@ -179,11 +180,21 @@ class SurfaceSource {
     (void)light;
     (void)now;
   }
+  /// Takes over the changes of voxel data: marks the chunks that contain or touch a changed voxel of a type with
+  /// VoxelProperties::remesh_on_data. Call after `follow`.
+  virtual void follow_data(const SceneGrid& content, const VoxelRegistry& types, SurfaceClock::time_point now) {
+    (void)content;
+    (void)types;
+    (void)now;
+  }
   /// Called when the grid left the scene: the next epoch removes all of its surfaces.
   virtual void leave() = 0;
   /// Makes the next `follow` start from scratch. Ends its part of the epoch in progress, without surfaces. Does not
   /// throw.
   virtual void forget() = 0;
+  /// Drops the surfaces that were not taken; the next ones count as different in all regions. Call `forget` next. Does
+  /// not throw.
+  virtual void discard() = 0;
   /// Marks the chunks that show one of the types for meshing.
   virtual void mark_types(const SceneGrid& content, const ChangedTypes& changed, SurfaceClock::time_point now) = 0;
   /// Returns true if it needs to choose levels of detail even though no eye moved.

@@ -18,6 +18,9 @@ bool has_solid_first_layer(const Chunk* chunk, std::size_t axis) {
   return ChunkStorage::of(*chunk)->layer_counts[axis][0] != 0;
 }
 
+// The voxels of a chunk that touch no other chunk.
+constexpr IBox kInnerVoxels{IVec3(1), IVec3(kChunkEdge - 1)};
+
 // Partial grids: the densities of a chunk depend on the chunk and its 26 neighbours.
 constexpr int kSmoothDistance = 2;
 
@@ -70,6 +73,40 @@ void VoxelSurfaces::follow_light(const GridLight& light, SurfaceClock::time_poin
   changes.commit();
 }
 
+void VoxelSurfaces::mark_data(const Grid& grid, const DataChanges& changes, const VoxelRegistry& types,
+                              SurfaceClock::time_point now) {
+  ChunkSet reached;
+  visit_data_changes(*followed_voxels_, grid, changes, [&](IVec3 voxel, const VoxelData&, const VoxelData&) {
+    if (!types.remeshes_on_data(grid.get(voxel))) return;
+    const IVec3 local = local_of(voxel);
+    reached.insert(chunk_of(voxel));
+    if (kInnerVoxels.contains(local)) return;
+    for (int i = 0; i < 27; ++i) reached.insert(chunk_of(voxel + Neighbourhood::offset(i)));
+  });
+  for (const IVec3 chunk : reached) {
+    mark_for_look(chunk, now);
+    const auto found = chunks_.find(chunk);
+    if (found != chunks_.end()) ++found->second.data_generation;
+  }
+}
+
+void VoxelSurfaces::follow_data(const SceneGrid& content, const VoxelRegistry& types, SurfaceClock::time_point now) {
+  if (!types.has_remesh_on_data()) {
+    followed_voxels_ = nullptr;
+    return;
+  }
+  const Grid& grid = content.grid;
+  const bool is_first = followed_voxels_ == nullptr;
+  // Any change renews the snapshot, which would keep the memory of unloaded chunks.
+  if (!is_first && !grid.has_changed_since(followed_data_) && !grid.has_data_changed_since(followed_data_)) return;
+  ChangeCursor end = followed_data_;
+  const DataChanges changes = grid.data_changes_since(end);
+  // The first time, `follow` or `mark_types` marks the chunks, because the grid or the property is new.
+  if (!is_first) mark_data(grid, changes, types, now);
+  followed_voxels_ = deferred(totals_.releases, std::make_shared<const Grid>(grid.snapshot()));
+  followed_data_ = end;
+}
+
 // Marks all chunks, because their surfaces belong to another grid. `follow` removes those that are not in the new one.
 void VoxelSurfaces::begin_anew(Cause cause) {
   densities_.clear();
@@ -103,11 +140,13 @@ void VoxelSurfaces::leave() {
   }
   for (const IVec3 chunk : all) remove(chunk, Cause::Edit);
   followed_ = followed_light_ = {};
+  followed_voxels_ = nullptr;
   densities_.clear();
 }
 
 void VoxelSurfaces::forget() {
   followed_ = followed_light_ = {};
+  followed_voxels_ = nullptr;
   for (const auto& [chunk, member] : epoch_) {
     VoxelChunk& state = chunks_.at(chunk);
     const Change change(totals_, state);
@@ -116,6 +155,17 @@ void VoxelSurfaces::forget() {
     state.is_in_epoch = state.is_gone = false;
   }
   epoch_.clear();
+}
+
+void VoxelSurfaces::discard() {
+  for (auto& [chunk, state] : chunks_) {
+    state.region_hashes.clear();
+    if (!state.is_ready) continue;
+    const Change change(totals_, state);
+    state.surface.reset();
+    state.is_ready = state.is_together = false;
+    state.is_gone = false;  // as in `forget`
+  }
 }
 
 void VoxelSurfaces::follow_blocky(const Grid& grid, const GridChanges& changes, Cause cause,
@@ -197,12 +247,12 @@ void VoxelSurfaces::see_whether_meshed(IVec3 chunk, bool is_meshed, Cause cause,
 
 void VoxelSurfaces::mark_types(const SceneGrid& content, const ChangedTypes& changed, SurfaceClock::time_point now) {
   const bool is_smooth = options_.style == SurfaceStyle::Smooth;
-  if (changed.visibility.empty() && (!is_smooth || changed.colour.empty())) return;
+  if (changed.visibility.empty() && changed.data.empty() && (!is_smooth || changed.colour.empty())) return;
   for (const IVec3 chunk : content.grid.chunks()) {
     const std::vector<VoxelType> types = content.grid.find_chunk(chunk)->types();
     const auto is_in = [](const std::vector<bool>& set, VoxelType type) { return type < set.size() && set[type]; };
     const auto has_changed = [&](VoxelType type) {
-      return is_in(changed.visibility, type) || (is_smooth && is_in(changed.colour, type));
+      return is_in(changed.visibility, type) || is_in(changed.data, type) || (is_smooth && is_in(changed.colour, type));
     };
     if (std::none_of(types.begin(), types.end(), has_changed)) continue;
     for (int i = 0; i < 27; ++i) mark_for_look(chunk + Neighbourhood::offset(i), now);
@@ -314,9 +364,8 @@ void VoxelSurfaces::show(IVec3 chunk, VoxelChunk& state, std::shared_ptr<const C
 
 std::unique_ptr<SurfaceJob> VoxelSurfaces::make_job(SurfaceInputs& inputs, IVec3 chunk) {
   QUOIN_ASSERT(waiting_.contains(chunk) || edited_.contains(chunk), "a chunk that waits");
-  // Smooth jobs have that of their densities.
-  if (options_.style == SurfaceStyle::Smooth) return make_job(GridSnapshot(), chunk, *inputs.types);
-  return make_job(inputs.voxels(), chunk, *inputs.types, inputs.light());
+  const bool is_blocky = options_.style == SurfaceStyle::Blocky;
+  return make_job(inputs.voxels(), chunk, *inputs.types, is_blocky ? inputs.light() : nullptr);
 }
 
 std::unique_ptr<SurfaceJob> VoxelSurfaces::make_job(const GridSnapshot& grid, IVec3 chunk, const SurfaceTypes& types,
@@ -329,8 +378,8 @@ std::unique_ptr<SurfaceJob> VoxelSurfaces::make_job(const GridSnapshot& grid, IV
   job->types = types.registry;
   job->serial = ++totals_.serial;
   job->seen = state.seen;
+  job->voxels = grid;
   if (options_.style == SurfaceStyle::Blocky) {
-    job->voxels = grid;
     job->light = light;
     return job;
   }
@@ -338,7 +387,9 @@ std::unique_ptr<SurfaceJob> VoxelSurfaces::make_job(const GridSnapshot& grid, IV
   job->materials = types.materials;
   job->type_generation = types.generation;
   job->last_collected = state.collected;
-  if (state.last_stamps != nullptr && state.type_generation == types.generation) job->last_stamps = *state.last_stamps;
+  job->data_generation = state.data_generation;
+  const bool is_as_before = state.type_generation == types.generation && state.collected_data == state.data_generation;
+  if (state.last_stamps != nullptr && is_as_before) job->last_stamps = *state.last_stamps;
   return job;
 }
 
@@ -393,6 +444,7 @@ void VoxelSurfaces::keep_stamps(const SurfaceJob& job, VoxelChunk& state) {
     (*state.last_stamps)[i] = job.densities[i] == nullptr ? 0 : job.densities[i]->stamp();
   }
   state.type_generation = job.type_generation;
+  state.collected_data = job.data_generation;
 }
 
 void VoxelSurfaces::collect(SurfaceJob& job) {

@@ -34,6 +34,8 @@ struct VoxelChunk {
   std::vector<std::uint64_t> region_hashes;    ///< of the surface taken last, if it has several regions; 0: no quads
   std::unique_ptr<DensityStamps> last_stamps;  ///< smooth: densities of the surface collected last
   std::uint64_t type_generation = 0;           ///< types of the surface collected last
+  std::uint64_t data_generation = 0;           ///< number of changes of data that it was marked for
+  std::uint64_t collected_data = 0;            ///< as `data_generation`, of the surface collected last
 
   [[nodiscard]] bool is_unfinished() const { return is_waiting || is_edited || is_in_epoch || is_working; }
   [[nodiscard]] bool is_pending() const { return is_unfinished() || is_ready; }
@@ -52,8 +54,10 @@ class VoxelSurfaces final : public SurfaceSource {
   void follow(const SceneGrid& content, SurfaceClock::time_point now) override { follow(content.grid, now); }
   void follow(const Grid& grid, SurfaceClock::time_point now);
   void follow_light(const GridLight& light, SurfaceClock::time_point now) override;
+  void follow_data(const SceneGrid& content, const VoxelRegistry& types, SurfaceClock::time_point now) override;
   void leave() override;
   void forget() override;
+  void discard() override;
   void mark_types(const SceneGrid& content, const ChangedTypes& changed, SurfaceClock::time_point now) override;
 
   void prepare(const SceneGrid&, const VoxelRegistry&) override {}
@@ -61,7 +65,7 @@ class VoxelSurfaces final : public SurfaceSource {
   [[nodiscard]] const IBox& box() const override { return box_; }
   [[nodiscard]] bool has_chunks() const override { return !chunks_.empty(); }
   [[nodiscard]] std::unique_ptr<SurfaceJob> make_job(SurfaceInputs& inputs, IVec3 chunk) override;
-  /// Makes a job for the grid as of the last `follow`. `grid` is null for smooth surfaces.
+  /// Makes a job for the grid as of the last `follow`.
   [[nodiscard]] std::unique_ptr<SurfaceJob> make_job(const GridSnapshot& grid, IVec3 chunk, const SurfaceTypes& types,
                                                      const LightSnapshot& light = nullptr);
   void hand_over(IVec3 chunk, std::uint64_t serial) override;
@@ -92,6 +96,8 @@ class VoxelSurfaces final : public SurfaceSource {
   void begin_anew(Cause cause);
   void follow_blocky(const Grid& grid, const GridChanges& changes, Cause cause, SurfaceClock::time_point now);
   void follow_smooth(const Grid& grid, const GridChanges& changes, Cause cause, SurfaceClock::time_point now);
+  void mark_data(const Grid& grid, const DataChanges& changes, const VoxelRegistry& types,
+                 SurfaceClock::time_point now);
   static void add_chunks_around(IVec3 chunk, int distance, std::vector<IVec3>& to);
   void remove_if_there(IVec3 chunk, Cause cause);
   void see_whether_meshed(IVec3 chunk, bool is_meshed, Cause cause, SurfaceClock::time_point now);
@@ -121,6 +127,8 @@ class VoxelSurfaces final : public SurfaceSource {
   ChangeCursor followed_;
   ChangeCursor followed_light_;
   bool is_lit_ = false;
+  ChangeCursor followed_data_;
+  GridSnapshot followed_voxels_;  // as of `followed_data_`; null if no type's data changes meshes
   Chunks chunks_;
   ChunkSet waiting_;
   ChunkSet edited_;
