@@ -68,16 +68,21 @@ void ChunkStreamer::signal() {
 
 void ChunkStreamer::set_generator(std::uint32_t grid, std::shared_ptr<const ChunkGenerator> generator,
                                   const IBox& chunks, std::span<const IVec3> others) {
-  const std::scoped_lock lock(plan_mutex_);
-  std::shared_ptr<const ChunkGenerator>& kept = generators_[grid];
-  plan_.set_extent(grid, chunks, others);
-  kept = std::move(generator);
+  Generator::Value next(std::move(generator));
+  Generator* kept = nullptr;
+  {
+    const std::scoped_lock lock(plan_mutex_);
+    kept = &generators_[grid];
+    plan_.set_extent(grid, chunks, others);
+    kept->exchange(next);
+  }
+  kept->wait_until_unused(next);
 }
 
 std::shared_ptr<const ChunkGenerator> ChunkStreamer::generator_of(std::uint32_t grid) const {
   const std::scoped_lock lock(plan_mutex_);
   const auto found = generators_.find(grid);
-  return found == generators_.end() ? nullptr : found->second;
+  return found == generators_.end() ? nullptr : *found->second.use();
 }
 
 void ChunkStreamer::post(Note note, bool is_urgent) {
@@ -309,13 +314,15 @@ void ChunkStreamer::read_or_make(CompletedLoad& completed) {
     ++outbox_.read;
     return;
   }
-  std::shared_ptr<const ChunkGenerator> generator;
+  const Generator* set = nullptr;
   {
     const std::scoped_lock lock(plan_mutex_);
     const auto found = generators_.find(place.grid);
-    if (found != generators_.end()) generator = found->second;
+    if (found == generators_.end()) return;
+    set = &found->second;
   }
-  if (generator != nullptr && generator->chunks().contains(place.chunk)) make(*generator, completed);
+  const auto generator = set->use();
+  if (*generator != nullptr && (*generator)->chunks().contains(place.chunk)) make(**generator, completed);
 }
 
 // Waits for a limited time: a full disk must not stop the streamer.

@@ -16,6 +16,7 @@
 #include <quoin/store/world_store.h>
 #include <quoin/stream/streamed_world.h>
 
+#include "core/work/workers.h"
 #include "stream/stream_plan.h"
 
 namespace quoin::stream {
@@ -103,8 +104,8 @@ class ChunkStreamer {
   ~ChunkStreamer();
 
   /// Sets the generator of a grid, and the chunks that can be loaded: a box, and others outside of it. All other chunks
-  /// are air that is never loaded. Chunks that the world does not store and the generator does not make are air. If it
-  /// throws, nothing has changed.
+  /// are air that is never loaded. Chunks that the world does not store and the generator does not make are air.
+  /// Returns when no worker uses the grid's former generator any more. If it throws, nothing has changed.
   void set_generator(std::uint32_t grid, std::shared_ptr<const ChunkGenerator> generator, const IBox& chunks,
                      std::span<const IVec3> others);
   [[nodiscard]] std::shared_ptr<const ChunkGenerator> generator_of(std::uint32_t grid) const;
@@ -119,6 +120,8 @@ class ChunkStreamer {
   void wait();
 
  private:
+  using Generator = Replaceable<std::shared_ptr<const ChunkGenerator>>;
+
   void run();
   bool work_once();
   void read_inbox();
@@ -142,7 +145,8 @@ class ChunkStreamer {
 
   mutable std::mutex plan_mutex_;  ///< guards the members below
   StreamPlan plan_;
-  std::map<std::uint32_t, std::shared_ptr<const ChunkGenerator>> generators_;
+  /// Entries stay, so that workers can use one without the mutex.
+  std::map<std::uint32_t, Generator> generators_;
   Note reading_;  ///< its first events have already been processed
   std::size_t read_events_ = 0;
   std::uint64_t read_posts_ = 0;

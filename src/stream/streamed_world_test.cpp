@@ -609,16 +609,23 @@ TEST_F(StreamedWorldTest, KeepsLandThatIsEditedBeforeGeneratorIsSet) {
   EXPECT_EQ((*kept)->voxels, expected);
 }
 
-/// Makes chunks of type 1, each after `open` was called.
+/// Makes chunks of one type, each after `open` was called.
 class GatedGround final : public ChunkGenerator {
  public:
+  explicit GatedGround(VoxelType type = 1) : type_(type) {}
   [[nodiscard]] IBox chunks() const override { return {{-9, -9, -9}, {9, 9, 9}}; }
   [[nodiscard]] Result<StoredChunk> make(IVec3) const override {
+    ++inside_;
     is_begun_ = true;
     is_begun_.notify_all();
     is_open_.wait(false);
-    return StoredChunk{Chunk(1)};
+    ++made_;
+    --inside_;
+    return StoredChunk{Chunk(type_)};
   }
+  [[nodiscard]] int inside() const { return inside_; }
+  [[nodiscard]] int made() const { return made_; }
+  [[nodiscard]] bool is_open() const { return is_open_; }
   void wait() const { is_begun_.wait(false); }
   void open() {
     is_open_ = true;
@@ -626,8 +633,24 @@ class GatedGround final : public ChunkGenerator {
   }
 
  private:
+  VoxelType type_;
+  mutable std::atomic<int> inside_{0};
+  mutable std::atomic<int> made_{0};
   mutable std::atomic<bool> is_begun_{false};
   std::atomic<bool> is_open_{false};
+};
+
+/// Opens a generator soon, from another thread.
+class OpenGroundSoon {
+ public:
+  explicit OpenGroundSoon(GatedGround& ground)
+      : thread_([&ground] {
+          std::this_thread::sleep_for(std::chrono::milliseconds(30));
+          ground.open();
+        }) {}
+
+ private:
+  std::jthread thread_;
 };
 
 // A worker saves a chunk of the former generator while the new one, which does not make it, is set.
@@ -644,15 +667,61 @@ TEST_F(StreamedWorldTest, LoadsChunkThatWasBegunBeforeGeneratorChanged) {
   const Viewer viewer{.position = DVec3(32.0), .radius = 10.0};
   ASSERT_TRUE(world->update({&viewer, 1}).has_value());
   generator->wait();
-  world->use_generator(*grid, nullptr);
+  {
+    const OpenGroundSoon soon(*generator);
+    world->use_generator(*grid, nullptr);
+  }
   EXPECT_TRUE(world->is_loaded(*grid, IVec3(0)));
-  generator->open();
   ASSERT_TRUE(world->load_all({&viewer, 1}).has_value());
   EXPECT_EQ(world->scene().grids()[*grid].grid.get(3, 3, 3), 1);
   ASSERT_TRUE(world->flush().has_value());
   const auto kept = world->store().load_chunk({0, 0, IVec3(0)});
   ASSERT_TRUE(kept.has_value() && kept->has_value());
   EXPECT_EQ((*kept)->voxels, Chunk(1));
+}
+
+// A plug-in is loaded again: its former generator ends before `use_generator` returns, and its chunks stay.
+TEST_F(StreamedWorldTest, ReplacesGeneratorWhileWorkersRun) {
+  auto world = StreamedWorld::open_or_create(path(), {.workers = {3}});
+  ASSERT_TRUE(world.has_value());
+  add_types(*world);
+  auto former = std::make_shared<GatedGround>(VoxelType{1});
+  const auto newer = std::make_shared<GatedGround>(VoxelType{2});
+  const auto grid = world->add_grid({}, former);
+  ASSERT_TRUE(grid.has_value());
+  Instance instance;
+  instance.grid = *grid;
+  world->scene().add_instance(instance);
+  Viewer viewer{.position = DVec3(32.0), .radius = 100.0};
+  ASSERT_TRUE(world->update({&viewer, 1}).has_value());
+  former->wait();
+  newer->open();
+  {
+    const OpenGroundSoon soon(*former);
+    world->use_generator(*grid, newer);
+    EXPECT_TRUE(former->is_open());
+    EXPECT_EQ(former->inside(), 0);
+    EXPECT_EQ(former.use_count(), 1) << "no worker keeps it";
+  }
+  const int made = former->made();
+  EXPECT_GT(made, 0);
+  ASSERT_TRUE(world->load_all({&viewer, 1}).has_value());
+  EXPECT_EQ(former->made(), made);
+  EXPECT_GT(newer->made(), 0);
+  const Grid& voxels = world->scene().grids()[*grid].grid;
+  const auto count = [&](VoxelType type) {
+    const std::vector<IVec3> chunks = voxels.chunks();
+    return std::count_if(chunks.begin(), chunks.end(),
+                         [&](IVec3 chunk) { return voxels.find_chunk(chunk)->get(3, 3, 3) == type; });
+  };
+  EXPECT_EQ(count(1), made) << "the chunks made before stay";
+  EXPECT_EQ(count(2), newer->made());
+  former.reset();
+  viewer.position.x = 400.0;
+  ASSERT_TRUE(world->load_all({&viewer, 1}).has_value());
+  viewer.position.x = 32.0;
+  ASSERT_TRUE(world->load_all({&viewer, 1}).has_value());
+  EXPECT_EQ(count(1), made);
 }
 
 TEST_F(StreamedWorldTest, UnloadsEditedAirFarFromViewers) {
