@@ -51,6 +51,10 @@ std::size_t WorldChanges::chunk_count() const {
   return 0;
 }
 
+Status validate_chunk(const StoredChunk&, const VoxelRegistry&, float) {
+  return absent();
+}
+
 WorldStore::WorldStore(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 WorldStore::WorldStore(WorldStore&&) noexcept = default;
 WorldStore& WorldStore::operator=(WorldStore&&) noexcept = default;

@@ -274,6 +274,18 @@ Status read_rows(ContentReader& reader, const StoredHalves& stored, Half largest
 
 }  // namespace
 
+bool has_stored_densities(const DensityChunk& chunk, float band) {
+  const StoredHalves stored(band);
+  if (const auto all = chunk.uniform()) return stored.has(*all);
+  for (int z = 0; z < kChunkEdge; ++z) {
+    for (int y = 0; y < kChunkEdge; ++y) {
+      const Half* const row = chunk.row(y, z);
+      if (row == nullptr ? !stored.has(chunk.get(0, y, z)) : !stored.has_row(row)) return false;
+    }
+  }
+  return true;
+}
+
 Result<DensityChunk> DensityReader::read(ContentReader& reader, VoxelRunReader& materials, std::size_t type_count,
                                          float band) {
   auto of_materials = materials.read(reader, type_count);

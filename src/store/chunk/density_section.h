@@ -54,6 +54,9 @@ class DensityWriter {
   std::vector<std::byte> high_;
 };
 
+/// Returns true if every density is a `stored_density` of the band. Requires: 0 < band.
+[[nodiscard]] bool has_stored_densities(const DensityChunk& chunk, float band);
+
 /// Reads the densities of chunks. One thread at a time.
 class DensityReader {
  public:

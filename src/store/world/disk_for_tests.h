@@ -1,7 +1,11 @@
 #pragma once
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
+#include <atomic>
+#include <cerrno>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -447,6 +451,51 @@ class TestDisk {
   std::map<std::string, std::shared_ptr<File>> names_;
   std::map<std::string, std::shared_ptr<File>> synced_names_;
   int temporary_ = 0;
+};
+
+/// Lets writes of SQLite's own file system fail as on a full disk, for all files of the process. Lifetime: outlives all
+/// connections.
+class FullDisk {
+ public:
+  FullDisk() {
+    is_full() = false;
+    for (const auto& [name, call] : calls()) vfs()->xSetSystemCall(vfs(), name, call);
+  }
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+  ~FullDisk() {
+    for (const auto& [name, call] : calls()) vfs()->xSetSystemCall(vfs(), name, nullptr);
+  }
+  void set_full(bool is) { is_full() = is; }
+  /// Returns the number of writes that failed.
+  [[nodiscard]] int failures() const { return failed(); }
+
+ private:
+  static sqlite3_vfs* vfs() { return sqlite3_vfs_find(nullptr); }
+  static std::atomic<bool>& is_full() {
+    static std::atomic<bool> is{false};
+    return is;
+  }
+  static std::atomic<int>& failed() {
+    static std::atomic<int> count{0};
+    return count;
+  }
+  static bool fails() {
+    if (!is_full()) return false;
+    ++failed();
+    errno = ENOSPC;
+    return true;
+  }
+  static ssize_t write(int file, const void* bytes, std::size_t count) {
+    return fails() ? -1 : ::write(file, bytes, count);
+  }
+  static ssize_t write_at(int file, const void* bytes, std::size_t count, off_t at) {
+    return fails() ? -1 : ::pwrite(file, bytes, count, at);
+  }
+  static std::array<std::pair<const char*, sqlite3_syscall_ptr>, 3> calls() {
+    const auto call = [](auto* function) { return reinterpret_cast<sqlite3_syscall_ptr>(function); };
+    return {{{"write", call(write)}, {"pwrite", call(write_at)}, {"pwrite64", call(write_at)}}};
+  }
 };
 
 }  // namespace quoin

@@ -1,8 +1,12 @@
 // Power cuts and failing calls: acknowledged saves are present, and each save is complete or absent.
 
+#include <algorithm>
+#include <array>
 #include <atomic>
 #include <cstdlib>
+#include <mutex>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -190,6 +194,37 @@ TEST(WorldFault, SurvivesFailureOfAnyCall) {
       while (survives_fault(number, code, is_lasting) && number < 2000 && !HasFailure()) ++number;
       EXPECT_GT(number, 50);
     }
+  }
+}
+
+// A save that waits behind a failed one, in a later commit, has failed as well.
+TEST(WorldFault, ReportsFailureToSavesThatWait) {
+  TestDisk disk("disk that becomes full");
+  std::atomic<bool> is_full{true};
+  std::mutex mutex;
+  std::array<std::vector<bool>, 2> reported;
+  auto world = create_for_saves(kFile, disk.name());
+  ASSERT_TRUE(world.has_value());
+  disk.fault = [&](const char* what) { return is_full && what == std::string("write") ? SQLITE_FULL : SQLITE_OK; };
+  for (std::size_t i = 0; i < 2; ++i) {
+    WorldChanges changes;
+    for (int x = 0; x < 200; ++x) changes.put_chunk({0, 0, {x, static_cast<int>(i), 0}}, {Chunk(1)});
+    ASSERT_TRUE(world->save(std::move(changes), [&, i](const Status& outcome) {
+      const std::scoped_lock lock(mutex);
+      reported[i].push_back(outcome.has_value());
+    }));
+  }
+  const Status full = world->flush();
+  ASSERT_FALSE(full);
+  expect_one_clear_line(full.error());
+  is_full = false;
+  EXPECT_TRUE(world->flush());
+  world = make_error(ErrorCode::Cancelled, "closed");  // after the callbacks
+  for (const std::vector<bool>& each : reported) {
+    ASSERT_GE(each.size(), 2U);
+    EXPECT_FALSE(each.front());
+    EXPECT_TRUE(each.back());
+    EXPECT_EQ(std::ranges::count(each, true), 1);
   }
 }
 

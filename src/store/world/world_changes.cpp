@@ -5,6 +5,7 @@
 
 #include <quoin/core/assert.h>
 
+#include "store/chunk/density_section.h"
 #include "store/chunk/voxel_sections.h"
 #include "store/world/part_text.h"
 
@@ -60,28 +61,35 @@ Status put_type(VoxelRegistry& types, std::int64_t number, const VoxelProperties
   return {};
 }
 
-Status check_data(const ChunkAddress& place, const Chunk& chunk, const VoxelRegistry& types) {
+Status check_data(const Chunk& chunk, const VoxelRegistry& types) {
   if (chunk.data_count() == 0) return {};
   std::string fault;
   std::size_t bytes = 0;
   chunk.for_each_data([&](IVec3 local, const VoxelData& data) {
     const std::uint8_t bits = types[chunk.get(local)].state_bits;
     const bool fits = bits == kMaxStateBits || data.state >> bits == 0;
-    if (!fits && fault.empty()) fault = about(place) + ": a state has more bits than its type allows";
+    if (!fits && fault.empty()) fault = "a state has more bits than its type allows";
     bytes += data.bytes.size();
   });
-  if (bytes > kMaxChunkDataBytes) fault = about(place) + ": its voxel data exceeds 64 MiB";
+  if (bytes > kMaxChunkDataBytes) fault = "its voxel data exceeds 64 MiB";
   if (!fault.empty()) return make_error(ErrorCode::InvalidArgument, fault);
   return {};
 }
 
-Status check_types(const ChunkAddress& place, const Chunk& chunk, const VoxelRegistry& types) {
+Status check_types(const Chunk& chunk, const VoxelRegistry& types) {
   for (const VoxelType type : chunk.types()) {
     if (type < types.size()) continue;
     return make_error(ErrorCode::InvalidArgument,
-                      about(place) + " has voxels of type " + std::to_string(type) + ", which is not defined");
+                      "it has voxels of type " + std::to_string(type) + ", which is not defined");
   }
   return {};
+}
+
+// Checks everything except densities: those of saved grids are valid.
+Status check_content(const StoredChunk& chunk, const VoxelRegistry& types) {
+  if (auto done = check_types(chunk.voxels, types); !done) return done;
+  if (auto done = check_data(chunk.voxels, types); !done) return done;
+  return chunk.densities ? check_types(chunk.densities->materials(), types) : Status();
 }
 
 }  // namespace
@@ -193,10 +201,9 @@ Status check_changes(const ChangeSet& changes, const WorldRules& rules) {
     if (grid == rules.grids.end()) {
       return make_error(ErrorCode::InvalidArgument, about(place) + ": the grid is not defined");
     }
-    if (auto done = check_types(place, chunk->voxels, rules.types); !done) return done;
-    if (auto done = check_data(place, chunk->voxels, rules.types); !done) return done;
-    if (!chunk->densities) continue;
-    if (auto done = check_types(place, chunk->densities->materials(), rules.types); !done) return done;
+    if (const auto done = check_content(*chunk, rules.types); !done) {
+      return make_error(done.error().code, about(place) + ": " + done.error().message);
+    }
   }
   for (const auto& [key, body] : changes.parts) {
     if (!body) continue;
@@ -213,6 +220,13 @@ Status check_changes(const ChangeSet& changes, const WorldRules& rules) {
 }  // namespace quoin::store
 
 namespace quoin {
+
+Status validate_chunk(const StoredChunk& chunk, const VoxelRegistry& types, float band) {
+  if (auto done = store::check_content(chunk, types); !done) return done;
+  if (!chunk.densities || store::has_stored_densities(*chunk.densities, band)) return {};
+  return make_error(ErrorCode::InvalidArgument,
+                    "it has a density that is not a number, beyond the band, -0 or too close to 0");
+}
 
 WorldChanges::WorldChanges() : content_(std::make_unique<store::ChangeSet>()) {}
 WorldChanges::WorldChanges(WorldChanges&&) noexcept = default;

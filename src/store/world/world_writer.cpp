@@ -207,14 +207,7 @@ Workers::Clock::time_point WorldWriter::step(Workers::Lock& lock) {
 void WorldWriter::finish(const Status& outcome) {
   std::list<Save> saved;
   std::vector<OnSaved> to_notify;
-  if (outcome) {
-    to_notify = std::move(group_.front().on_saved);
-  } else {
-    try {
-      to_notify = group_.front().on_saved;
-    } catch (const std::bad_alloc&) {  // callers are notified after the retry
-    }
-  }
+  if (outcome) to_notify = std::move(group_.front().on_saved);
   {
     const std::scoped_lock lock(mutex_);
     if (outcome) {
@@ -231,6 +224,10 @@ void WorldWriter::finish(const Status& outcome) {
       // Later saves are not tried either, until a caller retries.
       failed_through_ = last_ticket_;
       queue_.splice(queue_.begin(), group_);
+      try {
+        for (const Save& save : queue_) std::ranges::copy(save.on_saved, std::back_inserter(to_notify));
+      } catch (const std::bad_alloc&) {  // the others are notified after the retry
+      }
     }
   }
   thread_.notify();
