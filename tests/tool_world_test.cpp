@@ -110,7 +110,7 @@ TEST_F(ToolWorld, BacksUpAndCompacts) {
   ASSERT_TRUE(writer);
   const ToolRun refused = run("world compact hills.quoin");
   EXPECT_EQ(refused.status, 1);
-  EXPECT_NE(refused.err.find("another program is writing it"), std::string::npos) << refused.err;
+  EXPECT_NE(refused.err.find("it is already open for writing"), std::string::npos) << refused.err;
   EXPECT_EQ(run("world backup hills.quoin tuesday.quoin").status, 0) << "while it is written";
 }
 

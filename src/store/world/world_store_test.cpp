@@ -152,7 +152,7 @@ TEST(WorldStore, RefusesSecondWriterButAllowsReaders) {
   const auto second = WorldStore::open(path, WorldAccess::Write);
   ASSERT_FALSE(second);
   EXPECT_EQ(second.error().code, ErrorCode::CannotWrite);
-  EXPECT_EQ(to_string(second.error()), path.string() + ": another program is writing it");
+  EXPECT_EQ(to_string(second.error()), path.string() + ": it is already open for writing, in this or another program");
   auto reader = WorldStore::open(path, WorldAccess::Read);
   ASSERT_TRUE(reader) << to_string(reader.error());
   WorldChanges changes;
