@@ -17,14 +17,8 @@ namespace {
 
 // Workers stop making chunks while more bytes than this wait to be written.
 constexpr std::uint64_t kMaxPendingBytes = std::uint64_t{128} << 20;
-constexpr std::size_t kMaxProblems = 1000;
 // After this many bytes of unloaded chunks, memory is returned to the system.
 constexpr std::size_t kTrimBytes = std::size_t{16} << 20;
-
-std::string name_of(const ChunkAddress& place) {
-  return "chunk (" + std::to_string(place.chunk.x) + ", " + std::to_string(place.chunk.y) + ", " +
-         std::to_string(place.chunk.z) + ") of grid " + std::to_string(place.grid);
-}
 
 std::size_t bytes_of(const StoredChunk& chunk) {
   return chunk.voxels.bytes() + (chunk.densities ? chunk.densities->bytes() : 0);
@@ -44,6 +38,16 @@ void append(std::vector<T>& to, std::vector<T>& from) {
 
 }  // namespace
 
+std::string name_of(const ChunkAddress& place) {
+  return "chunk (" + std::to_string(place.chunk.x) + ", " + std::to_string(place.chunk.y) + ", " +
+         std::to_string(place.chunk.z) + ") of grid " + std::to_string(place.grid);
+}
+
+std::string text_of(std::chrono::milliseconds time) {
+  if (time.count() % 1000 == 0) return std::to_string(time.count() / 1000) + " s";
+  return std::to_string(time.count()) + " ms";
+}
+
 ChunkStreamer::ChunkStreamer(WorldStore& store, Options options) : store_(store), options_(options) {
   QUOIN_ASSERT(options.workers > 0, "at least one worker");
   try {
@@ -57,6 +61,7 @@ ChunkStreamer::ChunkStreamer(WorldStore& store, Options options) : store_(store)
 
 ChunkStreamer::~ChunkStreamer() {
   is_ending_ = true;
+  cancel_calls(nullptr);
   signal();
   workers_.clear();
 }
@@ -85,8 +90,15 @@ std::shared_ptr<const ChunkGenerator> ChunkStreamer::generator_of(std::uint32_t 
   return found == generators_.end() ? nullptr : *found->second.use();
 }
 
+void ChunkStreamer::set_rules(std::shared_ptr<const Rules> rules) {
+  QUOIN_ASSERT(rules != nullptr, "rules");
+  const std::scoped_lock lock(calls_mutex_);
+  rules_ = std::move(rules);
+}
+
 void ChunkStreamer::post(Note note, bool is_urgent) {
   if (note.empty()) return;
+  if (note.requests) cancel_calls(&*note.requests);
   is_urgent |= note.requests.has_value();
   {
     const std::scoped_lock lock(inbox_mutex_);
@@ -125,7 +137,7 @@ void ChunkStreamer::take(Outbox& out) {
   if (std::exchange(is_short_, false)) out.problems.emplace_back("not enough memory to load all requested chunks");
 }
 
-void ChunkStreamer::wait() {
+bool ChunkStreamer::wait(std::chrono::milliseconds at_most) {
   std::uint64_t posted = 0;
   {
     const std::scoped_lock lock(inbox_mutex_);
@@ -135,7 +147,7 @@ void ChunkStreamer::wait() {
   // Only the caller can make room.
   if (room_ <= 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   std::unique_lock lock(outbox_mutex_);
-  came_.wait(lock, [&] {
+  return came_.wait_for(lock, at_most, [&] {
     return !outbox_.completed_loads.empty() || (working_ == 0 && !has_more_ && reported_posts_ >= posted);
   });
 }
@@ -294,9 +306,12 @@ CompletedLoad ChunkStreamer::fetch(const ChunkAddress& place) {
   } catch (const std::bad_alloc&) {
     completed.chunk = {};
     completed.outcome = CompletedLoad::Outcome::OutOfMemory;
-  } catch (const std::exception& thrown) {  // a generator that throws breaks its contract
+  } catch (const std::exception& thrown) {
     completed.chunk = {};
-    add_problem(place, make_error(ErrorCode::InvalidArgument, thrown.what()));
+    add_problem(place, std::string("its generator threw an exception: ") + thrown.what());
+  } catch (...) {
+    completed.chunk = {};
+    add_problem(place, "its generator threw an exception");
   }
   return completed;
 }
@@ -306,7 +321,7 @@ void ChunkStreamer::read_or_make(CompletedLoad& completed) {
   auto kept = store_.load_chunk(place);
   if (!kept) {
     completed.outcome = CompletedLoad::Outcome::Broken;
-    return add_problem(place, kept.error());
+    return add_problem(place, to_string(kept.error()));
   }
   if (*kept) {
     completed.chunk = std::move(**kept);
@@ -335,8 +350,23 @@ void ChunkStreamer::wait_for_disk() {
 void ChunkStreamer::make(const ChunkGenerator& generator, CompletedLoad& completed) {
   QUOIN_ASSERT(generator.chunks().contains(completed.place.chunk), "a chunk that the generator can make");
   if (options_.keeps_made) wait_for_disk();
-  auto made = generator.make(completed.place.chunk);
-  if (!made) return add_problem(completed.place, made.error());
+  Call running{completed.place};
+  auto made = call_generator(generator, running);
+  if (!made && made.error().code == ErrorCode::Cancelled && running.is_cancelled) {
+    completed.outcome = CompletedLoad::Outcome::Cancelled;
+    return;
+  }
+  if (!made) return add_problem(completed.place, to_string(made.error()));
+  std::shared_ptr<const Rules> rules;
+  {
+    const std::scoped_lock lock(calls_mutex_);
+    rules = rules_;
+  }
+  const auto band = rules->bands.find(completed.place.grid);
+  QUOIN_ASSERT(band != rules->bands.end(), "the band of a grid with a generator");
+  if (const auto valid = validate_chunk(*made, rules->types, band->second); !valid) {
+    return add_problem(completed.place, "its generator made content that is not valid: " + to_string(valid.error()));
+  }
   completed.chunk = std::move(*made);
   {
     const std::scoped_lock lock(outbox_mutex_);
@@ -346,12 +376,73 @@ void ChunkStreamer::make(const ChunkGenerator& generator, CompletedLoad& complet
   WorldChanges changes;
   changes.put_chunk(completed.place, completed.chunk);
   // The store keeps failed changes and retries them.
-  if (const auto saved = store_.save(std::move(changes)); !saved) add_problem(completed.place, saved.error());
+  if (const auto saved = store_.save(std::move(changes)); !saved) {
+    add_problem(completed.place, to_string(saved.error()));
+  }
 }
 
-void ChunkStreamer::add_problem(const ChunkAddress& place, const Error& error) {
-  const std::scoped_lock lock(outbox_mutex_);
-  if (outbox_.problems.size() < kMaxProblems) outbox_.problems.push_back(name_of(place) + ": " + to_string(error));
+// Calls the generator. `call` is listed meanwhile.
+Result<StoredChunk> ChunkStreamer::call_generator(const ChunkGenerator& generator, Call& call) {
+  struct Listed {
+    ChunkStreamer& streamer;
+    Call* call;
+    Listed(ChunkStreamer& owner, Call* running) : streamer(owner), call(running) {
+      const std::scoped_lock lock(streamer.calls_mutex_);
+      streamer.calls_.push_back(call);
+      // The list of calls may have been cancelled before.
+      if (streamer.is_ending_) call->is_cancelled = true;
+    }
+    Listed(const Listed&) = delete;
+    Listed& operator=(const Listed&) = delete;
+    ~Listed() {
+      const std::scoped_lock lock(streamer.calls_mutex_);
+      std::erase(streamer.calls_, call);
+    }
+  };
+  const Listed listed(*this, &call);
+  if (call.is_cancelled) return make_error(ErrorCode::Cancelled, "cancelled");
+  return generator.make(call.place.chunk, Cancellation(call.is_cancelled));
+}
+
+// Cancels the calls whose chunks would be dropped on arrival; without requests, all calls. Done by the caller's thread,
+// because all workers may be in calls.
+void ChunkStreamer::cancel_calls(const StreamRequests* needs) {
+  const std::scoped_lock lock(calls_mutex_);
+  for (Call* const call : calls_) {
+    if (needs == nullptr || !is_needed(*needs, call->place)) call->is_cancelled = true;
+  }
+}
+
+bool ChunkStreamer::is_slow(const Call& call) const {
+  return Clock::now() - call.begun >= options_.generator_timeout;
+}
+
+std::vector<ChunkAddress> ChunkStreamer::slow_chunks() const {
+  const std::scoped_lock lock(calls_mutex_);
+  std::vector<ChunkAddress> slow;
+  for (const Call* const call : calls_) {
+    if (is_slow(*call)) slow.push_back(call->place);
+  }
+  return slow;
+}
+
+void ChunkStreamer::report_slow_chunks(std::vector<std::string>& problems) {
+  const std::scoped_lock lock(calls_mutex_);
+  for (Call* const call : calls_) {
+    if (call->is_reported || !is_slow(*call)) continue;
+    problems.push_back(name_of(call->place) + ": its generator has not returned for " +
+                       text_of(options_.generator_timeout));
+    call->is_reported = true;
+  }
+}
+
+void ChunkStreamer::add_problem(const ChunkAddress& place, const std::string& text) {
+  try {
+    const std::scoped_lock lock(outbox_mutex_);
+    if (outbox_.problems.size() < kMaxProblems) outbox_.problems.push_back(name_of(place) + ": " + text);
+  } catch (const std::bad_alloc&) {  // the caller learns that memory is short
+    note_shortage();
+  }
 }
 
 }  // namespace quoin::stream

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -11,6 +13,7 @@
 #include <span>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <quoin/store/world_store.h>
@@ -21,25 +24,56 @@
 
 namespace quoin::stream {
 
+/// Maximum number of problems kept for the caller.
+inline constexpr std::size_t kMaxProblems = 1000;
+
 [[nodiscard]] inline bool is_air(const StoredChunk& chunk) {
   return chunk.voxels.uniform() == kAir && !chunk.densities;
 }
 
-/// Results of saves, reported by the store's thread.
+/// Returns "chunk (1, 2, 3) of grid 4".
+[[nodiscard]] std::string name_of(const ChunkAddress& place);
+/// Returns a time such as "10 s" or "250 ms".
+[[nodiscard]] std::string text_of(std::chrono::milliseconds time);
+
+/// Results of saves, reported by the store's thread. A save fails again with each retry, and chunks that generators make
+/// cause many of them: each save gives at most one error, and none if it failed together with an earlier one.
 class DiskOutcome {
  public:
-  void put(const Status& outcome) {
+  /// Returns the number of the next save.
+  [[nodiscard]] std::uint64_t begin() {
     const std::scoped_lock lock(mutex_);
-    last_ = outcome;
+    return ++begun_;
   }
-  [[nodiscard]] Status last() const {
+  void put(std::uint64_t save, const Status& outcome) {
     const std::scoped_lock lock(mutex_);
-    return last_;
+    has_failed_ = !outcome;
+    if (outcome) {
+      error_ = {};  // retried before it was taken
+    } else if (save > reported_) {
+      error_ = outcome;
+    }
+  }
+  /// Takes the error of the saves that failed since the last call, with the world's path.
+  [[nodiscard]] Status take(const std::filesystem::path& path) {
+    const std::scoped_lock lock(mutex_);
+    if (error_) return {};
+    reported_ = begun_;
+    error_.error().path = path.string();
+    return std::exchange(error_, {});
+  }
+  /// Returns true if the last finished save failed.
+  [[nodiscard]] bool has_failed() const {
+    const std::scoped_lock lock(mutex_);
+    return has_failed_;
   }
 
  private:
   mutable std::mutex mutex_;
-  Status last_;
+  std::uint64_t begun_ = 0;
+  std::uint64_t reported_ = 0;  // the error of this save and earlier ones was taken
+  bool has_failed_ = false;
+  Status error_;
 };
 
 /// A chunk that was read or generated.
@@ -50,6 +84,7 @@ struct CompletedLoad {
     Came,
     Broken,       ///< it is damaged in the world's file and will not arrive
     OutOfMemory,  ///< to be tried again
+    Cancelled,    ///< not needed any more
   };
   Outcome outcome = Outcome::Came;
 };
@@ -64,6 +99,12 @@ class ChunkStreamer {
   struct Options {
     bool keeps_made = true;
     unsigned workers = 1;
+    std::chrono::milliseconds generator_timeout{10'000};
+  };
+  /// Limits that generated chunks are checked against.
+  struct Rules {
+    VoxelRegistry types;
+    std::map<std::uint32_t, float> bands;  ///< by grid
   };
   /// A result for a chunk that the caller's thread reports to the workers.
   struct Event {
@@ -109,18 +150,35 @@ class ChunkStreamer {
   void set_generator(std::uint32_t grid, std::shared_ptr<const ChunkGenerator> generator, const IBox& chunks,
                      std::span<const IVec3> others);
   [[nodiscard]] std::shared_ptr<const ChunkGenerator> generator_of(std::uint32_t grid) const;
-  /// Queues a note. Unless `is_urgent`, wakes no sleeping worker: a wake-up costs the caller more than the rest.
+  /// Replaces the rules. Requires: they have the bands of all grids with generators.
+  void set_rules(std::shared_ptr<const Rules> rules);
+  /// Queues a note. Unless `is_urgent`, wakes no sleeping worker: a wake-up costs the caller more than the rest. Cancels
+  /// calls of generators for chunks that its requests do not need.
   void post(Note note, bool is_urgent = true);
   /// Sets the bytes of chunks that may be read or made in addition to those in progress, and the expected bytes per
   /// chunk. Chunks that edits wait for are always loaded.
   void set_room(std::int64_t bytes, std::int64_t each);
   /// Takes all results since the last call, with the current counters.
   void take(Outbox& out);
-  /// Returns when there are results, when all posted work is done, or when there is no room for more.
-  void wait();
+  /// Waits until there are results, all posted work is done, or there is no room for more. Returns false after
+  /// `at_most` without any of them.
+  bool wait(std::chrono::milliseconds at_most);
+  [[nodiscard]] unsigned workers() const { return options_.workers; }
+  /// Returns the chunks whose generators have not returned for Options::generator_timeout.
+  [[nodiscard]] std::vector<ChunkAddress> slow_chunks() const;
+  /// Appends a line for each of them that no earlier call reported.
+  void report_slow_chunks(std::vector<std::string>& problems);
 
  private:
   using Generator = Replaceable<std::shared_ptr<const ChunkGenerator>>;
+  using Clock = std::chrono::steady_clock;
+  /// A call of a generator, on a worker's stack.
+  struct Call {
+    ChunkAddress place;
+    Clock::time_point begun = Clock::now();
+    std::atomic<bool> is_cancelled{false};
+    bool is_reported = false;
+  };
 
   void run();
   bool work_once();
@@ -131,8 +189,11 @@ class ChunkStreamer {
   [[nodiscard]] CompletedLoad fetch(const ChunkAddress& place);
   void read_or_make(CompletedLoad& completed);
   void make(const ChunkGenerator& generator, CompletedLoad& completed);
+  [[nodiscard]] Result<StoredChunk> call_generator(const ChunkGenerator& generator, Call& call);
+  void cancel_calls(const StreamRequests* needs);
+  [[nodiscard]] bool is_slow(const Call& call) const;
   void wait_for_disk();
-  void add_problem(const ChunkAddress& place, const Error& error);
+  void add_problem(const ChunkAddress& place, const std::string& text);
   void report();
   void signal();
 
@@ -164,6 +225,10 @@ class ChunkStreamer {
   bool is_short_ = false;  ///< memory ran short since the last report to the caller
   std::uint64_t reported_posts_ = 0;
   bool has_more_ = false;
+
+  mutable std::mutex calls_mutex_;  ///< guards the members below, and Call::is_reported; never held for long
+  std::vector<Call*> calls_;        ///< running; at most one per worker
+  std::shared_ptr<const Rules> rules_ = std::make_shared<const Rules>();
 
   std::vector<std::jthread> workers_;  ///< last: they end first
 };

@@ -102,6 +102,13 @@ bool stays_for(const Eye& eye, IVec3 chunk) {
   return distance_to_chunk(eye.position, chunk) <= eye.radius + kMargin;
 }
 
+bool is_needed(const StreamRequests& requests, const ChunkAddress& place) {
+  const auto eyes = requests.eyes.find(place.grid);
+  return (eyes != requests.eyes.end() &&
+          std::ranges::any_of(eyes->second, [&](const Eye& eye) { return stays_for(eye, place.chunk); })) ||
+         std::ranges::find(requests.asked, place) != requests.asked.end();
+}
+
 bool StreamPlan::is_nearer(const Wanted& a, const Wanted& b) {
   const auto key = [](const Wanted& w) {
     return std::tuple(w.distance, w.place.grid, w.place.chunk.z, w.place.chunk.y, w.place.chunk.x);
@@ -474,6 +481,8 @@ void Placements::find_eyes(const Scene& scene, const SceneGrid& grid, std::span<
 
 namespace {
 
+// Bytes per loaded chunk in addition to its voxels and densities: marks, sizes and states.
+constexpr std::size_t kChunkBytes = 256;
 // Assumed bytes per chunk before any is loaded.
 constexpr double kGuessedChunkBytes = 24.0 * 1024.0;
 constexpr std::size_t kGuessBelow = 64;
@@ -491,6 +500,16 @@ constexpr double kFalls = 8.0;
 constexpr double kShareOfBudget = 0.86;
 
 }  // namespace
+
+std::size_t loaded_bytes(const StoredChunk& chunk) {
+  return kChunkBytes + chunk.voxels.bytes() + (chunk.densities ? chunk.densities->bytes() : 0);
+}
+
+std::size_t loaded_bytes(const SceneGrid& content, IVec3 chunk) {
+  const Chunk* const voxels = content.grid.find_chunk(chunk);
+  const DensityChunk* const densities = content.field.find_chunk(chunk);
+  return kChunkBytes + (voxels == nullptr ? 0 : voxels->bytes()) + (densities == nullptr ? 0 : densities->bytes());
+}
 
 StreamBudget::StreamBudget(std::size_t bytes, bool has_others)
     : budget_(bytes), ratio_(has_others ? kGuessedRatio : 0.0) {}

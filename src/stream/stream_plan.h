@@ -46,6 +46,9 @@ struct StreamRequests {
   std::uint64_t number = 0;         ///< set by the caller; increases with each request
 };
 
+/// Returns true if the requests need a chunk: it stays for an eye, or an edit waits for it.
+[[nodiscard]] bool is_needed(const StreamRequests& requests, const ChunkAddress& place);
+
 /// Selects the chunks to load, nearest first, and the chunks to unload.
 ///
 ///   unknown -> begun -> here -> unknown
@@ -171,6 +174,11 @@ class Placements {
   std::size_t next_ = kNearest;
   bool looked_at_ = false;
 };
+
+/// Returns the bytes of a chunk once it is loaded: its voxels, densities, marks, sizes and states.
+[[nodiscard]] std::size_t loaded_bytes(const StoredChunk& chunk);
+/// Returns the bytes of a loaded chunk of a grid.
+[[nodiscard]] std::size_t loaded_bytes(const SceneGrid& content, IVec3 chunk);
 
 /// Tracks how much of a byte budget is taken by chunks and by data derived from them, and how many chunks still fit.
 ///

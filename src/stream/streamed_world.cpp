@@ -10,7 +10,6 @@
 #include <new>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <tuple>
 #include <unordered_set>
 #include <utility>
@@ -41,17 +40,16 @@ using What = ChunkStreamer::Event::What;
 constexpr std::size_t kMaxCompletedLoads = 128;
 // Maximum number of chunks that edits wait for, per plan.
 constexpr std::size_t kMaxAsked = 1024;
-// Bytes per loaded chunk in addition to its voxels and densities: marks, sizes and states.
-constexpr std::size_t kChunkBytes = 256;
 // Number of moved chunks that triggers a save; it bounds the journal entries that a save reads.
 constexpr std::size_t kMaxMoved = 48;
+// Longest wait for workers before the caller checks again whether they are all in generators that do not return.
+constexpr auto kWait = std::chrono::milliseconds(100);
+constexpr double kAsLongAsItTakes = std::numeric_limits<double>::infinity();
 constexpr auto kAskOthers = std::chrono::milliseconds(100);
 // Seconds between plans that only the budget causes.
 constexpr double kReplan = 0.2;
 // After this time without moved chunks all derived data is complete, seconds.
 constexpr double kQuiet = 3.0;
-// Prefix of the value that stores a grid's terrain generator.
-constexpr std::string_view kTerrainValue = "quoin.terrain.";
 
 // For tries whose entries have no pointers elsewhere.
 constexpr auto kStays = [](auto&) {};
@@ -60,30 +58,8 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-std::size_t bytes_of(const StoredChunk& chunk) {
-  return kChunkBytes + chunk.voxels.bytes() + (chunk.densities ? chunk.densities->bytes() : 0);
-}
-
-// Returns the bytes of a loaded chunk of a grid.
-std::size_t bytes_in(const SceneGrid& content, IVec3 chunk) {
-  const Chunk* const voxels = content.grid.find_chunk(chunk);
-  const DensityChunk* const densities = content.field.find_chunk(chunk);
-  return kChunkBytes + (voxels == nullptr ? 0 : voxels->bytes()) + (densities == nullptr ? 0 : densities->bytes());
-}
-
 bool is_air(const SceneGrid& content, IVec3 chunk) {
   return content.grid.find_chunk(chunk) == nullptr && content.field.find_chunk(chunk) == nullptr;
-}
-
-IBox box_of(const std::vector<IVec3>& chunks) {
-  IBox box;
-  for (const IVec3 chunk : chunks) box = unite(box, {chunk, chunk + 1});
-  return box;
-}
-
-std::vector<std::byte> bytes_of_text(const std::string& text) {
-  const auto bytes = std::as_bytes(std::span(text));
-  return {bytes.begin(), bytes.end()};
 }
 
 }  // namespace
@@ -107,7 +83,8 @@ struct StreamedWorld::Impl {
         world(std::move(opened_world)),
         is_new(made),
         budget(options.budget_bytes, options.other_bytes != nullptr),
-        streamer(store, {options.keep_generated && store.is_writable(), worker_count(options.workers)}) {}
+        streamer(store, {options.keep_generated && store.is_writable(), worker_count(options.workers),
+                         options.generator_timeout}) {}
 
   [[nodiscard]] Scene& scene() { return world.loaded.scene; }
   Status begin();
@@ -150,9 +127,10 @@ struct StreamedWorld::Impl {
   void note_edits();
   void adopt(Streamed& grid, const SceneGrid& content, IVec3 chunk);
   Status save_now();
+  void share_rules();
   [[nodiscard]] std::size_t waiting_chunks() const;
-  [[nodiscard]] Status waits_for_broken() const;
   [[nodiscard]] bool waits_for_broken_alone() const;
+  [[nodiscard]] Status blocked_edits(const std::vector<ChunkAddress>& slow) const;
 
   StreamOptions options;
   WorldStore store;
@@ -178,7 +156,7 @@ struct StreamedWorld::Impl {
   Clock::time_point asked_others{};
   Clock::time_point moved{};         // when a chunk last arrived or left
   bool is_edited = false;            // since the last save
-  Status handed_over;                // result of the last save; failed saves are retried
+  bool is_refused = false;           // the store refused the last save; it is retried
   std::size_t moved_since_save = 0;  // chunks that arrived or left
   ChangeCursor saved_types;
   std::shared_ptr<DiskOutcome> disk = std::make_shared<DiskOutcome>();
@@ -196,7 +174,7 @@ Status StreamedWorld::Impl::begin() {
   for (const GridHandle handle : scene().grids().handles()) {
     const auto number = world.saver.number_of(handle);
     QUOIN_ASSERT(number.has_value(), "a loaded grid has a number");
-    const auto value = store.value(std::string(kTerrainValue) + std::to_string(*number));
+    const auto value = store.value(terrain_value(*number));
     if (!value) return value.error();
     if (!scene().grids()[handle].grid.is_partial()) {  // a whole grid
       if (*value) {
@@ -241,6 +219,7 @@ void StreamedWorld::Impl::set_generator(Streamed& grid, std::shared_ptr<const Ch
   std::erase_if(others, [&](IVec3 chunk) { return extent.contains(chunk); });
   Grid voxels_before = content->grid.snapshot();
   DensityGrid field_before = content->field.snapshot();
+  share_rules();
   try {
     content->grid.set_extent(extent, others);
     content->field.set_extent(extent, others);
@@ -296,8 +275,6 @@ void StreamedWorld::Impl::follow_instances() {
   if (changes->all) {
     for (auto& [number, grid] : grids) grid.placements.clear();
     grid_of_instance.clear();
-  }
-  if (changes->all) {
     for (const InstanceHandle handle : scene().instances().handles()) follow(handle);
   }
   for (const InstanceHandle handle : changes->instances) follow(handle);
@@ -385,7 +362,7 @@ void StreamedWorld::Impl::note_edits() {
           if (!content->grid.is_loaded(change.chunk)) continue;
           adopt(of, *content, change.chunk);
         } else {
-          const std::size_t now = bytes_in(*content, change.chunk);
+          const std::size_t now = loaded_bytes(*content, change.chunk);
           budget.resize_chunk(*size, now);
           *size = now;
         }
@@ -418,7 +395,7 @@ void StreamedWorld::Impl::adopt(Streamed& grid, const SceneGrid& content, IVec3 
   const ChunkAddress place{grid.number, 0, chunk};
   must_plan |= !is_near_anyone(place);  // no plan would unload it
   unposted.add(place, What::Here);
-  const std::size_t size = bytes_in(content, chunk);
+  const std::size_t size = loaded_bytes(content, chunk);
   grid.sizes.find_or_create(chunk, kStays) = size;
   budget.add_chunk(size);
 }
@@ -426,14 +403,27 @@ void StreamedWorld::Impl::adopt(Streamed& grid, const SceneGrid& content, IVec3 
 Status StreamedWorld::Impl::save_now() {
   saved = Clock::now();
   moved_since_save = 0;
-  if (!store.is_writable()) return {};
-  const ChangeCursor types = scene().types.cursor();
-  const auto ticket = world.saver.save(store, scene(), {}, [to = disk](const Status& outcome) { to->put(outcome); });
-  handed_over = ticket ? Status() : Status(ticket.error());
-  if (!ticket) return ticket.error();
-  saved_types = types;
-  is_edited = false;
+  if (store.is_writable()) {
+    const auto ticket = world.saver.save(
+        store, scene(), {}, [to = disk, save = disk->begin()](const Status& outcome) { to->put(save, outcome); });
+    is_refused = !ticket;
+    if (!ticket) return ticket.error();
+    is_edited = false;
+  }
+  if (scene().types.has_changed_since(saved_types)) share_rules();
+  saved_types = scene().types.cursor();
   return {};
+}
+
+// Hands the workers the types and bands that generated chunks are checked against.
+void StreamedWorld::Impl::share_rules() {
+  auto rules = std::make_shared<ChunkStreamer::Rules>();
+  rules->types = scene().types;
+  for (const auto& [number, grid] : grids) {
+    const SceneGrid* const content = scene().grids().find(grid.handle);
+    if (content != nullptr) rules->bands[number] = content->field.band();
+  }
+  streamer.set_rules(std::move(rules));
 }
 
 // Applies waiting edits to an arriving chunk. Returns nullopt if no edit waited or none changed it.
@@ -442,26 +432,9 @@ std::optional<StoredChunk> StreamedWorld::Impl::edited_on_arrival(Streamed& grid
   const auto waiting = grid.waiting.find(completed.place.chunk);
   if (waiting == grid.waiting.end()) return std::nullopt;
   if (asked_left != 0) --asked_left;
-  // Uses grids that hold this chunk only: the edit's effects elsewhere are dropped.
-  const IVec3 at = completed.place.chunk;
-  Grid voxels;
-  voxels.make_partial();
-  voxels.load_chunk(at, completed.chunk.voxels);
-  DensityGrid field(content.field.band());
-  field.make_partial();
-  if (completed.chunk.densities) {
-    field.load_chunk(at, *completed.chunk.densities);
-  } else {
-    field.load_air_chunk(at);
-  }
-  std::int64_t changed = 0;
-  for (const auto& edit : waiting->second) changed += apply_fitting(*edit, voxels, field, scene().types);
+  auto changed = edited(waiting->second, completed.place.chunk, completed.chunk, content.field.band(), scene().types);
   grid.waiting.erase(waiting);
-  if (changed == 0) return std::nullopt;
-  StoredChunk edited;
-  if (const Chunk* const now = voxels.find_chunk(at)) edited.voxels = *now;
-  if (const DensityChunk* const now = field.find_chunk(at)) edited.densities = *now;
-  return edited;
+  return changed;
 }
 
 void StreamedWorld::Impl::put(CompletedLoad completed, ChunkStreamer::Note& note) {
@@ -477,8 +450,9 @@ void StreamedWorld::Impl::put(CompletedLoad completed, ChunkStreamer::Note& note
     if (asked_left != 0 && grid->waiting.contains(place.chunk)) --asked_left;
     return note.add(place, What::Broken);
   }
-  if (completed.outcome == CompletedLoad::Outcome::OutOfMemory) {
-    must_plan = true;
+  if (completed.outcome != CompletedLoad::Outcome::Came) {  // requested again, if it is still needed
+    must_plan |= completed.outcome == CompletedLoad::Outcome::OutOfMemory || is_near_anyone(place) ||
+                 grid->waiting.contains(place.chunk);
     return note.add(place, What::Gone);
   }
   // If the extent has changed since the chunk was requested, it may count as air. It is stored all the same.
@@ -501,7 +475,7 @@ void StreamedWorld::Impl::put(CompletedLoad completed, ChunkStreamer::Note& note
     note.released.push_back(std::move(completed.chunk));
     return note.add(place, What::Gone);
   }
-  const std::size_t size = bytes_of(completed.chunk);
+  const std::size_t size = loaded_bytes(completed.chunk);
   content->grid.load_chunk(place.chunk, std::move(completed.chunk.voxels));
   if (completed.chunk.densities) {
     content->field.load_chunk(place.chunk, std::move(*completed.chunk.densities));
@@ -562,7 +536,7 @@ void StreamedWorld::Impl::move_chunks(double seconds, Clock::time_point start, C
       take_away(leaving.front(), note);
       leaving.pop_front();
     } else if (!completed_loads.empty()) {
-      arrived_bytes -= bytes_of(completed_loads.front().chunk);
+      arrived_bytes -= loaded_bytes(completed_loads.front().chunk);
       budget.set_arrived(arrived_bytes);
       put(std::move(completed_loads.front()), note);
       completed_loads.pop_front();
@@ -576,12 +550,14 @@ void StreamedWorld::Impl::move_chunks(double seconds, Clock::time_point start, C
 void StreamedWorld::Impl::take_in() {
   streamer.take(box);
   for (CompletedLoad& completed : box.completed_loads) {
-    arrived_bytes += bytes_of(completed.chunk);
+    arrived_bytes += loaded_bytes(completed.chunk);
     completed_loads.push_back(std::move(completed));
   }
   budget.set_arrived(arrived_bytes);
   if (box.has_leaving) leaving.assign(box.leaving.begin(), box.leaving.end());
-  std::ranges::move(box.problems, std::back_inserter(problems));
+  for (std::string& problem : box.problems) {
+    if (problems.size() < kMaxProblems) problems.push_back(std::move(problem));
+  }
 }
 
 // Plans, without changing the scene.
@@ -601,8 +577,8 @@ Status StreamedWorld::Impl::plan(std::span<const Viewer> viewers) {
   const bool is_due = start - saved >= options.save_interval;
   const bool is_wanted =
       (is_edited && !leaving.empty()) || moved_since_save > kMaxMoved || scene().types.has_changed_since(saved_types);
-  if (is_due || (is_wanted && handed_over)) outcome = save_now();
-  if (outcome) outcome = handed_over ? disk->last() : handed_over;
+  if (is_due || (is_wanted && !is_refused)) outcome = save_now();
+  if (outcome) outcome = disk->take(store.path());
   if (!store.is_writable()) is_edited = false;
   find_eyes(viewers);
   return outcome;
@@ -639,17 +615,27 @@ bool StreamedWorld::Impl::waits_for_broken_alone() const {
   });
 }
 
-Status StreamedWorld::Impl::waits_for_broken() const {
+// Returns the reason if no waiting edit can be applied: its chunk is damaged or, if it is among `slow`, its generator does
+// not return. If all workers are in such generators, no other chunk can come either.
+Status StreamedWorld::Impl::blocked_edits(const std::vector<ChunkAddress>& slow) const {
+  const bool has_worker = slow.size() < streamer.workers();
+  std::string reason;
   for (const auto& [number, grid] : grids) {
     for (const auto& [chunk, edits] : grid.waiting) {
-      if (!grid.broken.contains(chunk)) continue;
-      return make_error(ErrorCode::CannotRead,
-                        "edits wait for chunk (" + std::to_string(chunk.x) + ", " + std::to_string(chunk.y) + ", " +
-                            std::to_string(chunk.z) + ") of grid " + std::to_string(number) + ", which is damaged",
-                        store.path().string());
+      const ChunkAddress place{number, 0, chunk};
+      const bool is_slow = std::ranges::find(slow, place) != slow.end();
+      if (grid.broken.contains(chunk)) {
+        reason = name_of(place) + ", which is damaged";
+      } else if (is_slow || !has_worker) {
+        reason = name_of(is_slow ? place : slow.front()) + ", whose generator has not returned for " +
+                 text_of(options.generator_timeout);
+      } else {
+        return {};
+      }
     }
   }
-  return {};
+  if (reason.empty()) return {};
+  return make_error(ErrorCode::CannotRead, "edits wait for " + reason, store.path().string());
 }
 
 StreamedWorld::StreamedWorld(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -722,7 +708,9 @@ Result<WorldExtent> StreamedWorld::extent() const {
     const auto chunks = impl_->store.chunks(number, 0);
     if (!chunks) return chunks.error();
     found.stored_chunks += chunks->size();
-    grid.placements.extend(found.stored, scene(), box_of(*chunks));
+    IBox stored;
+    for (const IVec3 chunk : *chunks) stored = unite(stored, {chunk, chunk + 1});
+    grid.placements.extend(found.stored, scene(), stored);
     const auto generator = impl_->streamer.generator_of(number);
     if (generator != nullptr) grid.placements.extend(found.generated, scene(), generator->chunks());
   }
@@ -781,8 +769,7 @@ Result<GridHandle> StreamedWorld::add_terrain(const EndlessTerrain& terrain) {
   auto handle = add_grid(std::move(grid), std::move(*generator));
   if (!handle) return handle;
   WorldChanges changes;
-  changes.put_value(std::string(kTerrainValue) + std::to_string(*impl_->world.saver.number_of(*handle)),
-                    bytes_of_text(text_of(terrain)));
+  changes.put_value(terrain_value(*impl_->world.saver.number_of(*handle)), bytes_of(terrain));
   if (auto saved = store().save(std::move(changes)); !saved) {
     scene().remove_grid(*handle);
     return saved.error();
@@ -810,12 +797,11 @@ bool StreamedWorld::has_chunks_to_move() const {
 }
 
 Status StreamedWorld::load_all(std::span<const Viewer> viewers) {
-  constexpr double kAsLongAsItTakes = std::numeric_limits<double>::infinity();
   for (auto& [number, grid] : impl_->grids) grid.placements.look_at_all();
   for (;;) {
     if (auto done = impl_->update(viewers, kAsLongAsItTakes); !done) return done;
     if (!impl_->has_moved && impl_->is_quiet()) return {};
-    impl_->streamer.wait();
+    (void)impl_->streamer.wait(kWait);
   }
 }
 
@@ -846,7 +832,7 @@ Status StreamedWorld::apply(const WorldEdit& edit) {
 }
 
 Status StreamedWorld::flush() {
-  constexpr double kAsLongAsItTakes = std::numeric_limits<double>::infinity();
+  std::vector<ChunkAddress> slow;
   impl_->note_edits();
   impl_->limit_grids();
   // Saves types first: chunks from workers and edits may need them.
@@ -861,9 +847,11 @@ Status StreamedWorld::flush() {
     impl_->must_plan |= impl_->asked_left == 0;
     impl_->move_chunks(kAsLongAsItTakes, Clock::now(), impl_->unposted);
     impl_->notify_workers();
-    if (!impl_->waits_for_broken_alone()) impl_->streamer.wait();
+    if (impl_->waits_for_broken_alone() || impl_->streamer.wait(kWait)) continue;
+    slow = impl_->streamer.slow_chunks();
+    if (!slow.empty() && !impl_->blocked_edits(slow)) break;
   }
-  Status waits = impl_->waits_for_broken();
+  Status waits = impl_->blocked_edits(slow);
   impl_->note_edits();
   if (auto saved = impl_->save_now(); !saved) return saved;
   if (impl_->store.is_writable()) {
@@ -873,6 +861,7 @@ Status StreamedWorld::flush() {
 }
 
 std::vector<std::string> StreamedWorld::take_problems() {
+  impl_->streamer.report_slow_chunks(impl_->problems);
   return std::exchange(impl_->problems, {});
 }
 
@@ -887,6 +876,7 @@ StreamStats StreamedWorld::stats() {
   now.is_complete = impl_->is_quiet();
   now.waiting_edits = impl_->waiting_chunks();
   now.complete_radius = impl_->box.complete_radius;
+  now.has_save_failed = impl_->is_refused || impl_->disk->has_failed();
   now.chunks_read = impl_->box.read;
   now.chunks_made = impl_->box.made;
   return now;

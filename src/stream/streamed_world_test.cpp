@@ -34,7 +34,7 @@ class PatternGround final : public ChunkGenerator {
  public:
   explicit PatternGround(int delay_microseconds = 0) : delay_(delay_microseconds) {}
   [[nodiscard]] IBox chunks() const override { return {{-1000, -2, -1000}, {1000, 2, 1000}}; }
-  [[nodiscard]] Result<StoredChunk> make(IVec3 chunk) const override {
+  [[nodiscard]] Result<StoredChunk> make(IVec3 chunk, const Cancellation& /*cancelled*/) const override {
     {
       const std::scoped_lock lock(mutex_);
       ++asked_[{chunk.x, chunk.y, chunk.z}];
@@ -323,7 +323,7 @@ TEST_F(StreamedWorldTest, MatchesTerrainGeneratedInOnePiece) {
     for (int y = 0; y < 2; ++y) {
       for (int x = 1; x < 3; ++x) {
         const Chunk* const expected = whole->find_chunk(x, y, z);
-        EXPECT_EQ((*generator)->make({x, y, z})->voxels, expected == nullptr ? Chunk(kAir) : *expected);
+        EXPECT_EQ((*generator)->make({x, y, z}, {})->voxels, expected == nullptr ? Chunk(kAir) : *expected);
       }
     }
   }
@@ -430,6 +430,26 @@ TEST_F(StreamedWorldTest, LoadsNothingOutsideOfGenerator) {
   const auto stored = world.store().chunks(0, 0);
   ASSERT_TRUE(stored.has_value());
   EXPECT_EQ(stored->size(), generator->asked());
+}
+
+// A second, coarse world shows the land far away: its cost depends on its chunks, not on its size in the world.
+TEST_F(StreamedWorldTest, CoarseGridCostsAsManyChunksAsFineOne) {
+  std::vector<StreamStats> ends;
+  for (const double voxel_size : {1.0, 8.0}) {
+    std::filesystem::remove(path());
+    auto generator = std::make_shared<PatternGround>();
+    StreamedWorld world = ground(path(), generator, {.keep_generated = false});
+    const InstanceHandle instance = world.scene().instances().handles().front();
+    world.scene().edit(instance).voxel_size = voxel_size;
+    const Viewer viewer{.position = voxel_size * DVec3(10.0, 5.0, 10.0), .radius = voxel_size * 500.0};
+    ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+    ends.push_back(world.stats());
+    EXPECT_EQ(ends.back().complete_radius, viewer.radius);
+    EXPECT_EQ(ends.back().chunks_made, generator->asked());
+  }
+  EXPECT_EQ(ends[0].wanted_chunks, ends[1].wanted_chunks);
+  EXPECT_EQ(ends[0].chunks_made, ends[1].chunks_made);
+  EXPECT_EQ(ends[0].loaded_bytes, ends[1].loaded_bytes);
 }
 
 TEST_F(StreamedWorldTest, KeepsEditsOutsideOfGenerator) {
@@ -614,7 +634,7 @@ class GatedGround final : public ChunkGenerator {
  public:
   explicit GatedGround(VoxelType type = 1) : type_(type) {}
   [[nodiscard]] IBox chunks() const override { return {{-9, -9, -9}, {9, 9, 9}}; }
-  [[nodiscard]] Result<StoredChunk> make(IVec3) const override {
+  [[nodiscard]] Result<StoredChunk> make(IVec3, const Cancellation& /*cancelled*/) const override {
     ++inside_;
     is_begun_ = true;
     is_begun_.notify_all();
@@ -743,7 +763,7 @@ TEST_F(StreamedWorldTest, UnloadsEditedAirFarFromViewers) {
 class BrokenGround final : public ChunkGenerator {
  public:
   [[nodiscard]] IBox chunks() const override { return {{-9, -9, -9}, {9, 9, 9}}; }
-  [[nodiscard]] Result<StoredChunk> make(IVec3 chunk) const override {
+  [[nodiscard]] Result<StoredChunk> make(IVec3 chunk, const Cancellation& /*cancelled*/) const override {
     if (chunk == IVec3{0, 0, 0}) return make_error(ErrorCode::BadFormat, "a broken region");
     return StoredChunk{Chunk(1)};
   }
@@ -1182,7 +1202,7 @@ TEST(TerrainGeneratorDeathTest, RejectsChunkOutsideLandscape) {
   VoxelRegistry types;
   const auto generator = make_terrain_generator({.seed = 5, .height = 2}, types);
   ASSERT_TRUE(generator.has_value());
-  QUOIN_EXPECT_MISTAKE(static_cast<void>((*generator)->make({0, 2, 0})), "a chunk of the landscape");
+  QUOIN_EXPECT_MISTAKE(static_cast<void>((*generator)->make({0, 2, 0}, {})), "a chunk of the landscape");
 }
 
 TEST(StreamedWorldDeathTest, RejectsGeneratorForUnknownGrid) {

@@ -20,7 +20,7 @@ class VoxelTerrain final : public ChunkGenerator {
   VoxelTerrain(const EndlessTerrain& terrain, const TerrainTypes& types) : terrain_(terrain), types_(types) {}
 
   [[nodiscard]] IBox chunks() const override { return {{-kReach, 0, -kReach}, {kReach, terrain_.height, kReach}}; }
-  [[nodiscard]] Result<StoredChunk> make(IVec3 chunk) const override {
+  [[nodiscard]] Result<StoredChunk> make(IVec3 chunk, const Cancellation& /*cancelled*/) const override {
     QUOIN_ASSERT(chunks().contains(chunk), "a chunk of the landscape");
     // Trees end at a piece's sides: the chunk lies in the middle of one.
     constexpr int kUnits = kChunkEdge / kTerrainUnit;
@@ -42,7 +42,7 @@ class SmoothTerrain final : public ChunkGenerator {
   SmoothTerrain(const EndlessTerrain& terrain, const TerrainTypes& types) : terrain_(terrain), types_(types) {}
 
   [[nodiscard]] IBox chunks() const override { return {{-kReach, 0, -kReach}, {kReach, terrain_.height, kReach}}; }
-  [[nodiscard]] Result<StoredChunk> make(IVec3 chunk) const override {
+  [[nodiscard]] Result<StoredChunk> make(IVec3 chunk, const Cancellation& /*cancelled*/) const override {
     QUOIN_ASSERT(chunks().contains(chunk), "a chunk of the landscape");
     // A piece is closed at its sides: the chunk lies in the middle of one.
     SmoothTerrainOptions piece;
@@ -82,8 +82,15 @@ Result<std::shared_ptr<const ChunkGenerator>> make_terrain_generator(const Endle
 
 namespace quoin::stream {
 
-std::string text_of(const EndlessTerrain& terrain) {
-  return nlohmann::json{{"seed", terrain.seed}, {"height", terrain.height}, {"smooth", terrain.is_smooth}}.dump();
+std::string terrain_value(std::uint32_t grid) {
+  return "quoin.terrain." + std::to_string(grid);
+}
+
+std::vector<std::byte> bytes_of(const EndlessTerrain& terrain) {
+  const nlohmann::json json{{"seed", terrain.seed}, {"height", terrain.height}, {"smooth", terrain.is_smooth}};
+  const std::string text = json.dump();
+  const auto bytes = std::as_bytes(std::span(text));
+  return {bytes.begin(), bytes.end()};
 }
 
 std::optional<EndlessTerrain> terrain_from(std::span<const std::byte> bytes) {

@@ -125,7 +125,12 @@ std::int64_t apply_edit(const WorldEdit& edit, Grid& grid, DensityGrid& field) {
 namespace quoin::stream {
 
 Status check_types(const WorldEdit& edit, const VoxelRegistry& types) {
-  const auto is_known = [&](VoxelType type) { return type < types.size(); };
+  VoxelType unknown = kAir;
+  const auto is_known = [&](VoxelType type) {
+    if (type < types.size()) return true;
+    unknown = type;
+    return false;
+  };
   bool fits = true;
   if (const auto* const set = std::get_if<WorldEdit::SetVoxels>(&edit.content)) {
     fits = std::ranges::all_of(set->voxels, is_known, &PlacedVoxel::type);
@@ -139,7 +144,8 @@ Status check_types(const WorldEdit& edit, const VoxelRegistry& types) {
     fits = is_known(field_box->material);
   }
   if (fits) return {};
-  return make_error(ErrorCode::InvalidArgument, "the edit uses a type that the world does not have");
+  return make_error(ErrorCode::InvalidArgument,
+                    "the edit uses type " + std::to_string(unknown) + ", which the world does not have");
 }
 
 std::int64_t apply_fitting(const WorldEdit& edit, Grid& grid, DensityGrid& field, const VoxelRegistry& types) {
@@ -150,6 +156,28 @@ std::int64_t apply_fitting(const WorldEdit& edit, Grid& grid, DensityGrid& field
     if (bits < 32 && set->state >> bits != 0) return 0;
   }
   return apply_edit(edit, grid, field);
+}
+
+std::optional<StoredChunk> edited(const std::vector<std::shared_ptr<const WorldEdit>>& edits, IVec3 at,
+                                  const StoredChunk& chunk, float band, const VoxelRegistry& types) {
+  // Uses grids that hold this chunk only: the edits' effects elsewhere are dropped.
+  Grid voxels;
+  voxels.make_partial();
+  voxels.load_chunk(at, chunk.voxels);
+  DensityGrid field(band);
+  field.make_partial();
+  if (chunk.densities) {
+    field.load_chunk(at, *chunk.densities);
+  } else {
+    field.load_air_chunk(at);
+  }
+  std::int64_t changed = 0;
+  for (const auto& edit : edits) changed += apply_fitting(*edit, voxels, field, types);
+  if (changed == 0) return std::nullopt;
+  StoredChunk result;
+  if (const Chunk* const now = voxels.find_chunk(at)) result.voxels = *now;
+  if (const DensityChunk* const now = field.find_chunk(at)) result.densities = *now;
+  return result;
 }
 
 void keep_for(const WorldEdit& edit, const std::vector<IVec3>& chunks, WaitingEdits& waiting) {

@@ -518,10 +518,12 @@ void App::frame_world() {
 }
 
 void App::report_world(const Status& saving) {
-  state_.open.document->note_saving(saving);
-  const std::string text = saving ? "" : to_string(saving.error());
-  if (text != reported_saving_ && !saving) state_.report(saving.error());
-  reported_saving_ = text;
+  // A failed save gives one error, and stays failed until the next save.
+  const bool has_failed = !saving || state_.open.document->world()->stats().has_save_failed;
+  if (!saving || !has_failed) state_.open.document->note_saving(saving);
+  const std::string text = saving ? reported_saving_ : to_string(saving.error());
+  if (text != reported_saving_) state_.report(saving.error());
+  reported_saving_ = has_failed ? text : "";
   const std::vector<std::string> problems = state_.open.document->world()->take_problems();
   if (problems.empty()) return;
   if (!options_.screenshot.empty()) {

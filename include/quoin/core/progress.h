@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <functional>
 
 namespace [[gnu::visibility("default")]] quoin {
@@ -23,5 +24,25 @@ using Progress = std::function<bool(double fraction)>;
   return [&whole, begin, end](double fraction) { return whole(begin + fraction * (end - begin)); };
 }
 Progress part_of(const Progress&& whole, double begin, double end) = delete;  // would dangle
+
+/// A request to end a call early, because its result is no longer needed. The call checks it between its steps:
+///
+///   if (cancelled.is_requested()) return make_error(ErrorCode::Cancelled, "cancelled");
+///   generate_terrain(options, types, {1}, [&](double) { return !cancelled.is_requested(); });  // as a Progress
+///
+/// Threads:  any. A request is never withdrawn.
+/// Lifetime: valid during the call that receives it.
+class Cancellation {
+ public:
+  /// Never requested.
+  Cancellation() = default;
+  /// Requested as soon as `flag` is true. Lifetime: `flag` must outlive the object.
+  explicit Cancellation(const std::atomic<bool>& flag) : flag_(&flag) {}
+
+  [[nodiscard]] bool is_requested() const { return flag_ != nullptr && flag_->load(std::memory_order_relaxed); }
+
+ private:
+  const std::atomic<bool>* flag_ = nullptr;
+};
 
 }  // namespace quoin

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include <quoin/core/parallel.h>
+#include <quoin/core/progress.h>
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/voxel_registry.h>
@@ -37,11 +38,16 @@ class ChunkGenerator {
   /// Returns the box of chunks (half open) that `make` can fill. Everything outside is air, unless it was edited. This
   /// air counts as loaded everywhere and takes no memory and no time, so keep the box small. The box must not change.
   [[nodiscard]] virtual IBox chunks() const = 0;
-  /// Makes one chunk. It may contain only types of the world's registry, and densities within the band of the grid's
-  /// field.
-  /// Errors: any. The chunk is then air until the world is opened again, and StreamedWorld::take_problems reports the
-  ///         error. Throws only bad_alloc.
-  [[nodiscard]] virtual Result<StoredChunk> make(IVec3 chunk) const = 0;
+  /// Makes one chunk: voxels, densities or both. Its content must pass `validate_chunk` with the types that the scene
+  /// had in the last `use_generator`, `add_grid` or `update`, and with the band of the grid's field.
+  /// Errors:    any, also as an exception. The chunk is then air, and is not saved, until the world is opened again.
+  ///            StreamedWorld::take_problems reports the error. The same holds for content that is not valid. After
+  ///            bad_alloc the call is repeated.
+  /// Cancelled: `cancelled` is requested when no viewer and no edit needs the chunk any more, and when the world
+  ///            closes. Return ErrorCode::Cancelled then. This is no error: the call is repeated if the chunk is needed
+  ///            again. A complete chunk is used as always. The world closes after all calls have returned.
+  /// Duration:  a call occupies one worker; the others continue. See StreamOptions::generator_timeout.
+  [[nodiscard]] virtual Result<StoredChunk> make(IVec3 chunk, const Cancellation& cancelled) const = 0;
 };
 
 /// An endless landscape. The worlds of `generate_terrain` and `generate_smooth_terrain` are pieces of it.
@@ -89,6 +95,9 @@ struct StreamOptions {
   /// Saves generated chunks, so that each is generated once. If false, a chunk is generated at each load until it is
   /// edited.
   bool keep_generated = true;
+  /// Duration of a call of ChunkGenerator::make after which `take_problems` reports the call, while it still runs, and
+  /// `flush` no longer waits for it.
+  std::chrono::milliseconds generator_timeout{10'000};
   Threads workers{};  ///< unlike elsewhere, 0 means one less than the machine's threads, at least 1
 };
 
@@ -107,6 +116,7 @@ struct StreamStats {
   std::uint64_t chunks_made = 0;  ///< by generators, since the world was opened
   std::uint64_t chunks_unloaded = 0;
   std::uint64_t chunks_dropped = 0;     ///< completed loads that were no longer wanted
+  bool has_save_failed = false;         ///< the last save failed: its data is in memory until a later save succeeds
   double longest_update_seconds = 0.0;  ///< since the last call of `stats`
 };
 
@@ -159,7 +169,8 @@ class StreamedWorld {
                                                             const StreamOptions& options = {});
   StreamedWorld(StreamedWorld&&) noexcept;
   StreamedWorld& operator=(StreamedWorld&&) noexcept;
-  /// Stops the workers and saves edits. Call `flush` first to see errors.
+  /// Calls `flush`, cancels the calls of generators and waits for their return. Edits that `flush` could not apply are
+  /// lost: call `flush` first to see errors.
   ~StreamedWorld();
 
   [[nodiscard]] Scene& scene();
@@ -197,7 +208,10 @@ class StreamedWorld {
   /// Adds the chunks that workers have loaded or generated, unloads far chunks and requests new ones. Call it once per
   /// frame.
   /// Cost:   StreamOptions::update_seconds for moving chunks; plus WorldSaver::save for the edits when a save is due.
-  /// Errors: as WorldSaver::save; unsaved edits stay in memory and the save is retried. bad_alloc.
+  ///         Calls StreamOptions::other_bytes, and waits for it.
+  /// Errors: as WorldSaver::save and WorldStore::wait (disk full, ...), once per failed save. Everything else is done
+  ///         all the same. Unsaved edits stay in memory, and the next save retries (StreamStats::has_save_failed).
+  ///         bad_alloc.
   Status update(std::span<const Viewer> viewers);
   /// Does the part of `update` that only reads the scene: finds edits, saves if a save is due, requests chunks. Another
   /// thread can draw the scene during the call. Exception: the first call after `open` limits the grids that have no
@@ -207,7 +221,8 @@ class StreamedWorld {
   Status plan(std::span<const Viewer> viewers);
   /// Returns true if the next `update` has chunks to add or unload, as of the last `plan`.
   [[nodiscard]] bool has_chunks_to_move() const;
-  /// Calls `update` until all chunks that these viewers want are loaded. For tools and tests. Errors: as `update`.
+  /// Calls `update` until all chunks that these viewers want are loaded, however long their generators take. For tools
+  /// and tests. Errors: as `update`.
   Status load_all(std::span<const Viewer> viewers);
 
   /// Returns true if the content of a grid's chunk is known: it is in memory, or air that is neither generated nor
@@ -224,12 +239,14 @@ class StreamedWorld {
   [[nodiscard]] std::optional<std::uint32_t> number_of(GridHandle grid) const;
 
   /// Saves all edits, including edits that wait for chunks, and returns when they are on disk.
-  /// Errors: CannotWrite; unsaved data stays in memory. CannotRead if edits wait for a damaged chunk; the rest is
-  ///         saved.
+  /// Errors: CannotWrite; unsaved data stays in memory. CannotRead if edits wait for a damaged chunk, or for a
+  ///         generator that has not returned for StreamOptions::generator_timeout; the rest is saved, and these edits
+  ///         still wait.
   Status flush();
-  /// Returns the errors of single chunks since the last call: damaged chunks (which stay unloaded) and chunks that
-  /// could not be generated (which are air). Also reports generators that a grid cannot use, and grids whose stored
-  /// chunks cannot be listed: their chunks are looked up one by one, and none counts as air without that.
+  /// Returns the errors of single chunks since the last call, at most 1,000: damaged chunks (which stay unloaded),
+  /// chunks that could not be generated (which are air), and calls of generators that run for longer than
+  /// StreamOptions::generator_timeout (each once). Also reports generators that a grid cannot use, and grids whose
+  /// stored chunks cannot be listed: their chunks are looked up one by one, and none counts as air without that.
   [[nodiscard]] std::vector<std::string> take_problems();
   [[nodiscard]] StreamStats stats();
   /// Returns the store, for game values and other data that WorldStore::save accepts. Save chunks of streamed
