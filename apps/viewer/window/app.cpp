@@ -522,7 +522,7 @@ void App::report_world(const Status& saving) {
   const bool has_failed = !saving || state_.open.document->world()->stats().has_save_failed;
   if (!saving || !has_failed) state_.open.document->note_saving(saving);
   const std::string text = saving ? reported_saving_ : to_string(saving.error());
-  if (text != reported_saving_) state_.report(saving.error());
+  if (!saving && text != reported_saving_) state_.report(saving.error());
   reported_saving_ = has_failed ? text : "";
   const std::vector<std::string> problems = state_.open.document->world()->take_problems();
   if (problems.empty()) return;
