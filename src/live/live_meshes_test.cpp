@@ -10,6 +10,8 @@
 #include <span>
 #include <stdexcept>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -361,6 +363,56 @@ TEST(LiveCallbacks, PassExceptionsToFinish) {
     for (const SurfaceUpdate& update : updates) without += update.surface->converted == nullptr ? 1 : 0;
     EXPECT_EQ(without, from_convert ? 1 : static_cast<int>(updates.size()));
     EXPECT_EQ(meshes.pending(), 0U);
+  }
+}
+
+// All workers are in a callback for 60 frames: `update` and `take` return, with the surfaces that are ready.
+TEST(LiveCallbacks, BlockNoFrame) {
+  for (const bool in_convert : {true, false}) {
+    OneGrid one;
+    one.grid().fill_box({{0, 0, 0}, {300, 10, 10}}, 1);
+    std::atomic<int> blocked{0};
+    std::atomic<bool> is_open{false};
+    const auto wait = [&] {
+      ++blocked;
+      is_open.wait(false);
+      --blocked;
+    };
+    LiveMeshOptions wanted;
+    wanted.workers = {2};
+    if (in_convert) {
+      wanted.convert = [&](const SurfaceUpdate&) {
+        wait();
+        return std::make_shared<const int>(1);
+      };
+    } else {
+      wanted.on_ready = wait;
+    }
+    LiveMeshes meshes(wanted);
+    std::map<int, const ChunkSurface*> taken;
+    std::vector<SurfaceUpdate> held;
+    const auto take = [&] {
+      for (SurfaceUpdate& update : meshes.take()) {
+        taken[update.chunk.x] = update.surface.get();
+        held.push_back(std::move(update));
+      }
+    };
+    meshes.update(one.scene, {});
+    while (blocked != 2) std::this_thread::yield();
+    for (int frame = 0; frame < 60; ++frame) {
+      one.grid().set(frame % 300, 9, 3, kAir);
+      meshes.update(one.scene, {});
+      take();
+    }
+    EXPECT_EQ(blocked, 2);
+    EXPECT_LE(taken.size(), in_convert ? 0U : 2U);
+    EXPECT_GT(meshes.pending(), 0U);
+    is_open = true;
+    is_open.notify_all();
+    meshes.finish(one.scene, {});
+    take();
+    ASSERT_EQ(taken.size(), one.grid().chunk_count());
+    for (const auto& [x, surface] : taken) EXPECT_EQ(surface->converted != nullptr, in_convert) << x;
   }
 }
 

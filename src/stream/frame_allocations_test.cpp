@@ -14,9 +14,11 @@
 
 #include <gtest/gtest.h>
 
+#include <quoin/grid/connected.h>
 #include <quoin/live/live_light.h>
 #include <quoin/live/live_meshes.h>
 #include <quoin/scene/scene_tracer.h>
+#include <quoin/scene/solid_shapes.h>
 #include <quoin/stream/streamed_world.h>
 
 #include "live/allocations_for_tests.h"
@@ -110,6 +112,39 @@ TEST(FrameAllocations, FreeNoLargeBlocksOfOldSurfaces) {
     // With fields, the frame thread still frees some: at most every other frame.
     EXPECT_LE(game.freed_for_meshes, is_smooth ? 30 : 0) << (is_smooth ? "smooth" : "blocky");
   }
+}
+
+// Updates without changes, with default threads, as a game calls them in each frame.
+TEST(FrameAllocations, AreNoneWithoutChanges) {
+  Scene scene;
+  const VoxelType stone = *scene.types.add({.name = "stone"});
+  for (int i = 0; i < 300; ++i) {
+    SceneGrid grid;
+    grid.grid.fill_box({{0, 0, 0}, {40, 8, 12}}, stone);
+    scene.add_instance({.grid = scene.add_grid(std::move(grid)), .position = {60.0 * (i % 20), 0.0, 60.0 * (i / 20)}});
+  }
+  const Grid& grid = scene.grids()[scene.grids().handles().front()].grid;
+  SolidShapes shapes;
+  ConnectedPieces pieces;
+  SceneTracer tracer(scene);
+  LiveMeshes meshes;
+  LiveLight light;
+  light.finish(scene);
+  meshes.finish(scene, {});
+  (void)meshes.take();
+  const auto frame = [&] {
+    (void)shapes.update(grid, scene.types);
+    (void)pieces.update(grid);
+    (void)tracer.update();
+    light.update(scene);
+    light.take();
+    meshes.update(scene, {});
+    EXPECT_TRUE(meshes.take().empty());
+  };
+  frame();
+  const std::int64_t before = allocations_of_this_thread();
+  for (int i = 0; i < 100; ++i) frame();
+  EXPECT_EQ(allocations_of_this_thread() - before, 0);
 }
 
 TEST(FrameAllocations, SnapshotsOfScenesAllocateLessThanOncePerGrid) {
