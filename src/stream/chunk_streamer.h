@@ -36,8 +36,8 @@ inline constexpr std::size_t kMaxProblems = 1000;
 /// Returns a time such as "10 s" or "250 ms".
 [[nodiscard]] std::string text_of(std::chrono::milliseconds time);
 
-/// Results of saves, reported by the store's thread. A save fails again with each retry, and chunks that generators make
-/// cause many of them: each save gives at most one error, and none if it failed together with an earlier one.
+/// Results of saves, reported by the store's thread. A save fails again with each retry, and chunks that generators
+/// make cause many of them: each save gives at most one error, and none if it failed together with an earlier one.
 class DiskOutcome {
  public:
   /// Returns the number of the next save.
@@ -152,8 +152,8 @@ class ChunkStreamer {
   [[nodiscard]] std::shared_ptr<const ChunkGenerator> generator_of(std::uint32_t grid) const;
   /// Replaces the rules. Requires: they have the bands of all grids with generators.
   void set_rules(std::shared_ptr<const Rules> rules);
-  /// Queues a note. Unless `is_urgent`, wakes no sleeping worker: a wake-up costs the caller more than the rest. Cancels
-  /// calls of generators for chunks that its requests do not need.
+  /// Queues a note. Unless `is_urgent`, wakes no sleeping worker: a wake-up costs the caller more than the rest.
+  /// Cancels calls of generators for chunks that its requests do not need.
   void post(Note note, bool is_urgent = true);
   /// Sets the bytes of chunks that may be read or made in addition to those in progress, and the expected bytes per
   /// chunk. Chunks that edits wait for are always loaded.

@@ -615,8 +615,8 @@ bool StreamedWorld::Impl::waits_for_broken_alone() const {
   });
 }
 
-// Returns the reason if no waiting edit can be applied: its chunk is damaged or, if it is among `slow`, its generator does
-// not return. If all workers are in such generators, no other chunk can come either.
+// Returns the reason if no waiting edit can be applied: its chunk is damaged or, if it is among `slow`, its generator
+// does not return. If all workers are in such generators, no other chunk can come either.
 Status StreamedWorld::Impl::blocked_edits(const std::vector<ChunkAddress>& slow) const {
   const bool has_worker = slow.size() < streamer.workers();
   std::string reason;

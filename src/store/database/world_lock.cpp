@@ -22,7 +22,9 @@ bool is_without_locks(int number) {
 }
 
 Error refused(int number) {
-  if (number == EWOULDBLOCK) return make_error(ErrorCode::CannotWrite, "it is already open for writing, in this or another program");
+  if (number == EWOULDBLOCK) {
+    return make_error(ErrorCode::CannotWrite, "it is already open for writing, in this or another program");
+  }
   if (is_without_locks(number)) {
     return make_error(ErrorCode::CannotWrite, "cannot write it safely: its file system has no locks");
   }
