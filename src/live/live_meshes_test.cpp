@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 #include <mutex>
+#include <random>
 #include <set>
 #include <span>
 #include <stdexcept>
@@ -14,6 +15,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <quoin/terrain/noise.h>
 
 #include "core/death_for_tests.h"
 #include "live/live_test_support.h"
@@ -279,6 +281,51 @@ TEST(LiveRegions, HoldSameFacesAndReportChanges) {
     }
     EXPECT_EQ(kept > 0, edge < 64);
   }
+}
+
+// A game digs single blocks of a landscape and uploads 64 bytes of vertices and 24 of indices per changed quad.
+TEST(LiveRegions, UploadLessThan50KilobytesPerDugBlock) {
+  Scene scene;
+  for (const char* const name : {"grass", "dirt", "stone"}) ASSERT_TRUE(scene.types.add({.name = name}));
+  const auto height = [](int x, int z) { return static_cast<int>(66.0 + 26.0 * fractal2(7, x / 220.0, z / 220.0, 5)); };
+  const GridHandle handle = scene.add_grid({});
+  scene.add_instance({.grid = handle});
+  for (int z = 0; z < 256; ++z) {
+    for (int x = 0; x < 256; ++x) {
+      Grid& grid = scene.edit(handle).grid;
+      const int top = height(x, z);
+      grid.fill_box({{x, 0, z}, {x + 1, top - 4, z + 1}}, 3);
+      grid.fill_box({{x, top - 4, z}, {x + 1, top, z + 1}}, 2);
+      grid.set({x, top, z}, 1);
+    }
+  }
+  LiveMeshes meshes;
+  meshes.finish(scene, {});
+  (void)meshes.take();
+  std::mt19937 random(5);
+  std::size_t bytes = 0;
+  std::size_t bytes_of_chunks = 0;
+  constexpr int kDigs = 60;
+  for (int i = 0; i < kDigs; ++i) {
+    Grid& grid = scene.edit(handle).grid;
+    IVec3 top{static_cast<int>(random() % 256), 128, static_cast<int>(random() % 256)};
+    while (grid.get(top) == kAir) --top.y;
+    EXPECT_TRUE(grid.set(top, kAir)) << i;
+    meshes.finish(scene, {});
+    for (const SurfaceUpdate& update : meshes.take()) {
+      if (update.surface == nullptr) continue;
+      bytes_of_chunks += update.surface->quads.size() * 88;
+      for (const SurfaceRegion& region : update.surface->regions) {
+        const int bit = region.region.x + 4 * (region.region.y + 4 * region.region.z);
+        if ((update.changed_regions >> bit & 1U) == 0) continue;
+        bytes += static_cast<std::size_t>(region.opaque[6] - region.opaque[0]) * 88;
+        bytes += static_cast<std::size_t>(region.transparent[6] - region.transparent[0]) * 88;
+      }
+    }
+  }
+  EXPECT_GT(bytes, 0U);
+  EXPECT_LT(bytes / kDigs, 50'000U);
+  EXPECT_LT(2 * bytes, bytes_of_chunks);
 }
 
 TEST(LiveCallbacks, ConvertAndTakeSurfacesOnWorkers) {
