@@ -31,9 +31,9 @@ class LatestState {
   /// Makes the state of a snapshot. `former` is the last state that `take` replaced, or null; the function may move it
   /// away to bring it up to date. Otherwise the worker destroys it, after the new state can be taken.
   using Make = std::function<std::unique_ptr<State>(Snapshot scene, std::unique_ptr<State>& former)>;
-  /// Errors: std::system_error if the background thread cannot be started.
-  LatestState(State first, Make make) : make_(std::move(make)), shown_(std::move(first)) {
-    worker_.start(1, [this](Workers::Lock& lock, unsigned /*worker*/) { return step(lock); });
+  /// `name`: of the worker, as Workers::Options. Errors: std::system_error if the background thread cannot be started.
+  LatestState(State first, Make make, const char* name = "state") : make_(std::move(make)), shown_(std::move(first)) {
+    worker_.start(1, [this](Workers::Lock& lock, unsigned /*worker*/) { return step(lock); }, {.name = name});
   }
 
   /// Starts an update to the scene as it is now, if `has_changed` is or was true since the last one started. Does

@@ -16,7 +16,7 @@ LightWorker::LightWorker(LiveLightOptions options)
     : shown_{nullptr, SceneLight()},
       threads_{worker_count(options.threads)},
       working_{nullptr, SceneLight(std::move(options.light))} {
-  worker_.start(1, [this](Workers::Lock& lock, unsigned /*worker*/) { return step(lock); });
+  worker_.start(1, [this](Workers::Lock& lock, unsigned /*worker*/) { return step(lock); }, {.name = "light"});
 }
 
 Workers::Clock::time_point LightWorker::step(Workers::Lock& lock) {

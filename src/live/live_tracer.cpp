@@ -40,11 +40,13 @@ TracedScene nothing(InstanceFilter instances) {
 
 struct LiveTracer::Impl {
   explicit Impl(const LiveTracerOptions& options)
-      : states(nothing(options.instances),
-               [instances = options.instances, threads = Threads{worker_count(options.threads)}](
-                   const States::Snapshot& scene, std::unique_ptr<TracedScene>& former) {
-                 return traced(scene, former, instances, threads);
-               }) {}
+      : states(
+            nothing(options.instances),
+            [instances = options.instances, threads = Threads{worker_count(options.threads)}](
+                const States::Snapshot& scene, std::unique_ptr<TracedScene>& former) {
+              return traced(scene, former, instances, threads);
+            },
+            "tracer") {}
 
   // Returns true if anything that the tracer may depend on has changed since the last call.
   [[nodiscard]] bool read_changes(const Scene& scene) {

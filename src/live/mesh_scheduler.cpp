@@ -23,6 +23,13 @@ double seconds(SurfaceClock::duration duration) {
   return std::chrono::duration<double>(duration).count();
 }
 
+constexpr double kEpochDistance = -1.0;  // of jobs that come before all others
+
+// Returns true for the jobs of edits.
+bool is_first(const SurfaceJob& job) {
+  return job.distance <= kEpochDistance;
+}
+
 // Releases the inputs of a job. Copies of chunks are freed as early as possible.
 void drop_inputs(SurfaceJob& job) {
   job.voxels = {};
@@ -38,7 +45,8 @@ void drop_inputs(SurfaceJob& job) {
 MeshJobQueue::MeshJobQueue(unsigned workers, Work work, std::function<void()> on_ready)
     : work_(std::move(work)), on_ready_(std::move(on_ready)), workspaces_(workers) {
   QUOIN_ASSERT(workers > 0 && *work_.use() != nullptr, "workers with a function");
-  workers_.start(workers, [this](Workers::Lock& lock, unsigned worker) { return step(lock, workspaces_[worker]); });
+  workers_.start(workers, [this](Workers::Lock& lock, unsigned worker) { return step(lock, workspaces_[worker]); },
+                 {.name = "mesh"});
 }
 
 void MeshJobQueue::replace_work(Work work) {
@@ -60,6 +68,7 @@ void MeshJobQueue::push(std::unique_ptr<SurfaceJob> job) {
     const std::size_t wanted = done_.size() + queue_.size() + running_ + 1;
     // Reserves memory here, so that workers cannot fail when they report a failure.
     make_room(done_, wanted - done_.size(), wanted);
+    if (is_first(*job)) workers_.set_priority(JobPriority::High);
     queue_.push_back(std::move(job));
   }
   workers_.wake_one();
@@ -130,6 +139,8 @@ std::unique_ptr<SurfaceJob> MeshJobQueue::take_nearest() {
 Workers::Clock::time_point MeshJobQueue::step(Workers::Lock& lock, SurfaceWorkspace& workspace) {
   if (queue_.empty()) return Workers::kWhenWoken;
   std::unique_ptr<SurfaceJob> job = take_nearest();
+  const bool is_edit_waiting = std::ranges::any_of(queue_, [](const auto& each) { return is_first(*each); });
+  workers_.set_priority(is_edit_waiting ? JobPriority::High : JobPriority::Normal);
   ++running_;
   bool is_reported = false;
   {
@@ -219,8 +230,6 @@ void make_live_surface(const LiveMeshOptions& options, SurfaceJob& job, SurfaceW
 }
 
 namespace {
-
-constexpr double kEpochDistance = -1.0;  // of jobs that come before all others
 
 // A smooth chunk takes a worker milliseconds, and its job the copies of up to 125 chunks.
 std::size_t jobs_ahead(SurfaceStyle style, unsigned workers) {

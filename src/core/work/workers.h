@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
@@ -168,13 +169,21 @@ class Replaceable {
   Value current_;
 };
 
-/// Worker threads of an object. They look for work in its state, which its mutex guards:
+/// The workers of an object. They look for work in its state, which its mutex guards:
 ///
 ///   owner:    lock, add work, unlock, wake_one()         lock, wait(lock, is_finished)
 ///   worker:   lock, step(lock) -> kAgain, step(lock) -> kWhenWoken, wait, step(lock), ...
 ///
 /// The owner keeps the waiting work in containers of its choice: a queue, a list by priority, or the newest request
 /// alone. It cancels waiting work by removing it under the lock.
+///
+/// A worker is a thread. With a job system (quoin/core/parallel.h), it is a number that jobs of one step each use in
+/// turn: a wake posts a job for a worker that is in no step, and a job that has found work posts the next one.
+///
+///   wake_one -> post -> [step] -> kAgain: post -> [step] -> kWhenWoken -> nothing until the next wake
+///
+/// There, `wait` does steps itself, and `drain` does the last steps, so that neither waits for a free thread of the
+/// pool. A step that returns a time keeps its thread until then.
 ///
 /// An exception that leaves a step ends neither the worker nor the process. The worker keeps the first one for
 /// `take_failure` and continues after a short pause, because memory may have run out.
@@ -197,10 +206,16 @@ class Workers {
   Workers& operator=(const Workers&) = delete;
   ~Workers() { stop(); }
 
-  /// Starts `count` threads, which call `step` until `stop` or `drain`.
+  struct Options {
+    const char* name = "worker";  ///< of jobs and threads: a string literal of at most 9 characters
+    JobPriority priority = JobPriority::Normal;
+    bool has_own_threads = false;  ///< also with a job system: for steps that return times again and again
+  };
+  /// Starts `count` workers, which call `step` until `stop` or `drain`.
   /// Throws std::system_error if a thread cannot start; earlier ones continue. Requires: not started, not stopped.
-  void start(unsigned count, Step step);
-  [[nodiscard]] bool is_started() const { return !threads_.empty(); }
+  void start(unsigned count, Step step, Options options);
+  void start(unsigned count, Step step) { start(count, std::move(step), Options()); }
+  [[nodiscard]] bool is_started() const { return is_started_; }
 
   /// Ends the workers after their current steps. Waiting work stays where it is. Requires: the lock is not held.
   void stop() { end(false); }
@@ -209,14 +224,16 @@ class Workers {
   /// Returns true once `stop` or `drain` was called, so that long steps can end early. Requires: the lock is held.
   [[nodiscard]] bool is_stopping() const { return is_stopping_; }
 
-  void wake_one() {
-    note_wake();
-    wake_.notify_one();
+  /// Possible under any lock. Work is found even if it comes during a step.
+  void wake_one() { wake(false); }
+  void wake_all() { wake(true); }
+  /// Lets workers that are in a step look again, and wakes no others.
+  void note_work() {
+    const std::lock_guard lock(wake_mutex_);
+    ++wakes_;
   }
-  void wake_all() {
-    note_wake();
-    wake_.notify_all();
-  }
+  /// Sets the priority of jobs that are posted from now on. Any thread.
+  void set_priority(JobPriority priority) { priority_ = priority; }
 
   /// Returns the queue of objects that these workers destroy.
   [[nodiscard]] const std::shared_ptr<ReleaseQueue>& releases() const { return releases_; }
@@ -224,9 +241,13 @@ class Workers {
   /// Waits until `is_finished()`, which is called with the lock held, after each step and each `notify`.
   template <class IsFinished>
   void wait(Lock& lock, IsFinished is_finished) {
-    stepped_.wait(lock, std::move(is_finished));
+    while (!is_finished()) {
+      if (help(lock)) continue;
+      if (is_finished()) return;  // by a last step that found no more work
+      stepped_.wait(lock);
+    }
   }
-  /// As `wait`, for at most `seconds`. Returns the last result of `is_finished`.
+  /// As `wait`, for at most `seconds`, without steps of its own. Returns the last result of `is_finished`.
   template <class IsFinished>
   bool wait_for(Lock& lock, double seconds, IsFinished is_finished) {
     return stepped_.wait_for(lock, std::chrono::duration<double>(seconds), std::move(is_finished));
@@ -243,17 +264,22 @@ class Workers {
   [[nodiscard]] std::exception_ptr take_failure() { return std::exchange(failure_, nullptr); }
 
  private:
+  struct Jobs;
+
   void end(bool drains);
   void run(unsigned worker);
-  void note_wake() {
-    const std::lock_guard lock(wake_mutex_);
-    ++wakes_;
-  }
+  void drain_here();
+  void wake(bool all);
   [[nodiscard]] std::uint32_t wakes() {
     const std::lock_guard lock(wake_mutex_);
     return wakes_;
   }
   void sleep(Lock& lock, Clock::time_point until, std::uint32_t seen);
+  [[nodiscard]] bool step_as_job(Lock& lock, unsigned worker, std::uint32_t& seen);
+  /// With a job system: does one step on this thread, if work waits and a worker is free. Returns false otherwise.
+  bool help(Lock& lock);
+  /// Destroys released objects, or does a step. Returns the time of the next one.
+  [[nodiscard]] Clock::time_point look(Lock& lock, unsigned worker);
   [[nodiscard]] Clock::time_point guarded_step(Lock& lock, unsigned worker);
 
   std::mutex& mutex_;
@@ -262,17 +288,34 @@ class Workers {
   std::uint32_t wakes_ = 0;
   std::condition_variable wake_;
   std::condition_variable stepped_;
+  std::atomic<JobPriority> priority_{JobPriority::Normal};
+  bool is_started_ = false;
   bool is_stopping_ = false;
   bool is_draining_ = false;
   std::exception_ptr failure_;
   std::shared_ptr<ReleaseQueue> releases_ = std::make_shared<ReleaseQueue>();
+  std::shared_ptr<Jobs> jobs_;  // with a job system; set by `start`
   std::vector<std::thread> threads_;
 };
 
-/// Returns the number of worker threads in addition to the calling thread. Unlike `thread_count`, 0 means one less than
-/// the machine has, at least 1.
+/// Returns the number of workers of an object: see Threads.
 [[nodiscard]] inline unsigned worker_count(Threads threads) {
   return threads.count != 0 ? threads.count : std::max(2U, thread_count(threads)) - 1;
 }
+
+/// Names the calling thread for debuggers and profilers: at most 15 characters.
+void name_thread(const char* name);
+
+/// The priority of the job that the calling thread runs. Loops within it post theirs with the same.
+class JobPriorityScope {
+ public:
+  explicit JobPriorityScope(JobPriority priority);
+  JobPriorityScope(const JobPriorityScope&) = delete;
+  JobPriorityScope& operator=(const JobPriorityScope&) = delete;
+  ~JobPriorityScope();
+
+ private:
+  JobPriority before_;
+};
 
 }  // namespace quoin

@@ -10,6 +10,8 @@
 
 #include <gtest/gtest.h>
 
+#include "core/work/job_system_for_tests.h"
+
 namespace quoin {
 namespace {
 
@@ -467,6 +469,215 @@ TEST(Replaceable, KeepsValuesInUse) {
     EXPECT_EQ(alive, 1);
   }
   EXPECT_EQ(alive, 0);
+}
+
+// Workers whose steps are jobs of a system of 1 or 3 threads.
+class WorkersAsJobs : public testing::TestWithParam<unsigned> {
+ protected:
+  const std::shared_ptr<CountingJobs> jobs_ = std::make_shared<CountingJobs>(GetParam());
+  const ScopedJobSystem scope_{jobs_};
+};
+INSTANTIATE_TEST_SUITE_P(Workers, WorkersAsJobs, testing::Values(1U, 3U));
+
+TEST_P(WorkersAsJobs, RunWorkOfManyProducers) {
+  std::atomic<int> done{0};
+  std::atomic<int> running{0};
+  std::atomic<bool> is_exceeded{false};
+  Queue queue(2);
+  std::vector<std::thread> producers;
+  for (int i = 0; i < 4; ++i) {
+    producers.emplace_back([&] {
+      for (int k = 0; k < 500; ++k) {
+        queue.push([&] {
+          if (++running > 2) is_exceeded = true;
+          ++done;
+          --running;
+        });
+      }
+    });
+  }
+  for (std::thread& each : producers) each.join();
+  queue.finish();
+  EXPECT_EQ(done, 2000);
+  EXPECT_FALSE(is_exceeded);
+  EXPECT_LE(jobs_->most_at_once(), static_cast<int>(GetParam()));
+  EXPECT_GT(jobs_->posted()["worker"], 0);
+}
+
+// Without a caller that waits, all work is found: no wake is lost between steps.
+TEST_P(WorkersAsJobs, FindAllWorkAlone) {
+  std::atomic<int> done{0};
+  Queue queue(2);
+  for (int i = 1; i <= 2000; ++i) {
+    queue.push([&] {
+      ++done;
+      done.notify_all();
+    });
+    if (i % 3 != 0) continue;
+    for (int seen = done; seen != i; seen = done) done.wait(seen);
+  }
+}
+
+TEST_P(WorkersAsJobs, DoTheWorkOfCallersThatWaitInJobs) {
+  std::atomic<int> done{0};
+  Queue queue(1);
+  call_as_job(*jobs_, [&] {
+    for (int i = 0; i < 100; ++i) queue.push([&] { ++done; });
+    queue.finish();
+  });
+  EXPECT_EQ(done, 100);
+}
+
+TEST_P(WorkersAsJobs, SeeWhatTheirLastStepChanged) {
+  std::mutex mutex;
+  bool is_looking = false;
+  bool is_seen = false;
+  Workers workers(mutex);
+  workers.start(1, [&](Workers::Lock& /*lock*/, unsigned /*worker*/) {
+    is_seen = is_looking;
+    return Workers::kWhenWoken;
+  });
+  call_as_job(*jobs_, [&] {
+    std::unique_lock lock(mutex);
+    is_looking = true;
+    workers.wait(lock, [&] { return is_seen; });
+  });
+  workers.stop();
+}
+
+TEST_P(WorkersAsJobs, DrainWithoutAFreeWorker) {
+  std::atomic<int> done{0};
+  call_as_job(*jobs_, [&] {
+    Queue queue(2);
+    for (int i = 0; i < 10; ++i) {
+      queue.push([&] {
+        if (++done < 20) queue.push([&] { ++done; });
+      });
+    }
+    queue.workers().drain();
+  });
+  EXPECT_EQ(done, 20);
+}
+
+TEST_P(WorkersAsJobs, StopWhileTheWorkersAreBusy) {
+  std::vector<std::unique_ptr<Gate>> gates;
+  std::vector<std::thread> holders;
+  for (unsigned i = 0; i < GetParam(); ++i) {
+    Gate& gate = *gates.emplace_back(std::make_unique<Gate>());
+    holders.emplace_back([&] { call_as_job(*jobs_, [&] { gate.pass(); }); });
+    gate.wait_until_reached();
+  }
+  std::atomic<int> done{0};
+  std::atomic<std::thread::id> by;
+  {
+    Queue queue(2);
+    for (int i = 0; i < 10; ++i) queue.push([&] { ++done; });
+    queue.workers().releases()->defer(std::make_shared<Destroyed>(by)).reset();
+  }  // its jobs have not started
+  EXPECT_NE(by.load(), std::thread::id());
+  for (const auto& gate : gates) gate->open();
+  for (std::thread& each : holders) each.join();
+  while (jobs_->unfinished() != 0) std::this_thread::yield();
+  EXPECT_EQ(done, 0);
+}
+
+TEST_P(WorkersAsJobs, StopDuringStepsAndWakes) {
+  for (int round = 0; round < 100; ++round) {
+    std::atomic<int> done{0};
+    Queue queue(3);
+    for (int i = 0; i < 20; ++i) queue.push([&] { ++done; });
+    queue.workers().stop();
+    EXPECT_EQ(static_cast<std::size_t>(done) + queue.cancel(), 20U);
+  }
+}
+
+TEST_P(WorkersAsJobs, KeepTheFirstExceptionAndContinue) {
+  std::atomic<int> done{0};
+  Queue queue(1);
+  queue.push([] { throw std::runtime_error("first"); });
+  queue.push([&] { ++done; });
+  queue.finish();
+  EXPECT_EQ(done, 1);
+  EXPECT_THROW(std::rethrow_exception(queue.take_failure()), std::runtime_error);
+}
+
+TEST_P(WorkersAsJobs, RepeatStepAtReturnedTime) {
+  std::mutex mutex;
+  std::atomic<int> steps = 0;
+  Workers workers(mutex);
+  workers.start(1, [&](Workers::Lock& /*lock*/, unsigned /*worker*/) {
+    ++steps;
+    steps.notify_all();
+    return Workers::Clock::now() + 1ms;
+  });
+  for (int seen = steps; seen < 3; seen = steps) steps.wait(seen);
+  workers.stop();
+}
+
+TEST_P(WorkersAsJobs, LookWithTheNewestPriority) {
+  std::mutex mutex;
+  int work = 0;
+  Workers workers(mutex);
+  const auto step = [&](Workers::Lock& /*lock*/, unsigned /*worker*/) {
+    if (work == 0) return Workers::kWhenWoken;
+    --work;
+    return Workers::kAgain;
+  };
+  workers.start(1, step, {.name = "probe", .priority = JobPriority::Low});
+  {
+    const std::lock_guard lock(mutex);
+    work = 1;
+    workers.set_priority(JobPriority::High);
+  }
+  workers.wake_one();
+  {
+    std::unique_lock lock(mutex);
+    while (work != 0) {
+      lock.unlock();
+      std::this_thread::yield();
+      lock.lock();
+    }
+  }
+  workers.stop();
+  while (jobs_->unfinished() != 0) std::this_thread::yield();
+  EXPECT_FALSE(jobs_->run(JobPriority::High).empty());
+  EXPECT_EQ(jobs_->run(JobPriority::Normal), std::vector<std::string>());
+}
+
+TEST_P(WorkersAsJobs, ReleaseObjectsUnderAnyLock) {
+  std::atomic<std::thread::id> by;
+  Queue queue(1);
+  for (int i = 0; i < 200; ++i) {
+    by = std::thread::id();
+    auto object = queue.workers().releases()->defer(std::make_shared<Destroyed>(by));
+    {
+      const std::lock_guard lock(queue.mutex());
+      object.reset();
+    }
+    by.wait(std::thread::id());
+    EXPECT_NE(by.load(), std::this_thread::get_id());
+  }
+}
+
+TEST_P(WorkersAsJobs, KeepTheJobSystemUntilTheirEnd) {
+  std::atomic<int> done{0};
+  auto queue = std::make_unique<Queue>(2);
+  set_job_system(nullptr);
+  for (int i = 0; i < 100; ++i) queue->push([&] { ++done; });
+  queue->finish();
+  EXPECT_EQ(done, 100);
+  EXPECT_GT(jobs_->posted()["worker"], 0);
+  queue.reset();
+}
+
+TEST(Workers, BearSlowPostsOfAJobSystem) {
+  const auto jobs = std::make_shared<CountingJobs>(2, 300us);
+  const ScopedJobSystem scope(jobs);
+  std::atomic<int> done{0};
+  Queue queue(2);
+  for (int i = 0; i < 100; ++i) queue.push([&] { ++done; });
+  queue.workers().drain();
+  EXPECT_EQ(done, 100);
 }
 
 }  // namespace

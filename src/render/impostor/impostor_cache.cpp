@@ -27,7 +27,7 @@ struct Origin {
 };
 
 // The input of a worker that builds an impostor.
-struct Job {
+struct BuildInput {
   SceneGrid grid;  // snapshots of voxels and field
   Origin origin;
   GridChanges changes;  // since the impostor that the job will find, or all
@@ -37,7 +37,7 @@ struct Job {
 struct Entry {
   std::shared_ptr<const Impostor> impostor;  // null until the first is ready
   Origin origin;
-  std::optional<Job> waiting;
+  std::optional<BuildInput> waiting;
   std::optional<Origin> building;
   bool is_replaced = false;  // the grid being built has been replaced: its impostor is never shown
   std::uint64_t last_use = 0;
@@ -59,7 +59,7 @@ struct ImpostorCache::Impl {
 
   void look_at(const VoxelRegistry& types);
   void ask(Entry& entry, GridHandle handle, const SceneGrid& grid, int edge);
-  GridChanges changes_of(Entry& entry, const Job& job);
+  GridChanges changes_of(Entry& entry, const BuildInput& job);
   void start_workers();
   [[nodiscard]] Workers::Clock::time_point step(Workers::Lock& lock);
   [[nodiscard]] Entries::iterator next_to_build();
@@ -101,7 +101,7 @@ void ImpostorCache::Impl::look_at(const VoxelRegistry& now) {
 // Queues the grid's present state; replaces an older state in the queue.
 void ImpostorCache::Impl::ask(Entry& entry, GridHandle handle, const SceneGrid& grid, int edge) {
   start_workers();
-  Job job;
+  BuildInput job;
   job.grid.grid = grid.grid.snapshot();
   job.grid.field = grid.field.snapshot();
   job.origin = {grid.grid.cursor(), grid.field.cursor(), types_changed, edge};
@@ -115,7 +115,7 @@ void ImpostorCache::Impl::ask(Entry& entry, GridHandle handle, const SceneGrid& 
 
 // Returns the changes since the impostor that the job will find. An impostor of another grid (replaced, or with the
 // same handle in another scene) is never used again.
-GridChanges ImpostorCache::Impl::changes_of(Entry& entry, const Job& job) {
+GridChanges ImpostorCache::Impl::changes_of(Entry& entry, const BuildInput& job) {
   GridChanges changes{true, {}};
   const Origin* base = entry.building ? &*entry.building : entry.impostor != nullptr ? &entry.origin : nullptr;
   if (base == nullptr) return changes;
@@ -135,7 +135,8 @@ GridChanges ImpostorCache::Impl::changes_of(Entry& entry, const Job& job) {
 
 void ImpostorCache::Impl::start_workers() {
   if (workers.is_started()) return;
-  workers.start(worker_count(options.workers), [this](Workers::Lock& lock, unsigned /*worker*/) { return step(lock); });
+  workers.start(worker_count(options.workers), [this](Workers::Lock& lock, unsigned /*worker*/) { return step(lock); },
+                {.name = "impostor", .priority = JobPriority::Low});
 }
 
 Workers::Clock::time_point ImpostorCache::Impl::step(Workers::Lock& lock) {
@@ -165,7 +166,7 @@ Entries::iterator ImpostorCache::Impl::next_to_build() {
 }
 
 void ImpostorCache::Impl::build(Entries::iterator entry, std::unique_lock<std::mutex>& lock) {
-  std::optional<Job> job = std::exchange(entry->second.waiting, std::nullopt);
+  std::optional<BuildInput> job = std::exchange(entry->second.waiting, std::nullopt);
   if (!has_room(entry->second)) {
     drop(entry);  // until the next request
     workers.notify();

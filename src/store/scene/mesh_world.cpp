@@ -288,12 +288,13 @@ class SpooledMesh {
         if (auto done = spool->finish(); !done) return done;
       }
     }
-    giver_.start(1, [this](Workers::Lock& /*lock*/, unsigned /*worker*/) {
+    const auto give_back = [this](Workers::Lock& /*lock*/, unsigned /*worker*/) {
       for (Surface& surface : surfaces_) {
         for (const Spool* const spool : surface.all()) spool->give_back();
       }
       return Workers::Clock::now() + kGiveBack;
-    });
+    };
+    giver_.start(1, give_back, {.name = "give back", .has_own_threads = true});
     return {};
   }
   [[nodiscard]] std::vector<MeshView> views() const {

@@ -45,7 +45,7 @@ WorldWriter::WorldWriter(Connection connection, std::uint64_t revision, Threads 
       needs_version_(revision == 0),
       threads_(threads),
       encoders_(thread_count(threads)) {
-  thread_.start(1, [this](Workers::Lock& lock, unsigned /*worker*/) { return step(lock); });
+  thread_.start(1, [this](Workers::Lock& lock, unsigned /*worker*/) { return step(lock); }, {.name = "store"});
 }
 
 WorldWriter::~WorldWriter() {
