@@ -8,6 +8,7 @@
 #include <chrono>
 #include <exception>
 #include <new>
+#include <thread>
 #include <utility>
 
 #include <quoin/core/assert.h>
@@ -50,25 +51,14 @@ std::string text_of(std::chrono::milliseconds time) {
 
 ChunkStreamer::ChunkStreamer(WorldStore& store, Options options) : store_(store), options_(options) {
   QUOIN_ASSERT(options.workers > 0, "at least one worker");
-  try {
-    for (unsigned i = 0; i < options.workers; ++i) workers_.emplace_back([this] { run(); });
-  } catch (...) {
-    is_ending_ = true;
-    signal();
-    throw;
-  }
+  workers_.start(options.workers, [this](Workers::Lock& lock, unsigned /*worker*/) { return step(lock); },
+                 {.name = "stream"});
 }
 
 ChunkStreamer::~ChunkStreamer() {
   is_ending_ = true;
   cancel_calls(nullptr);
-  signal();
-  workers_.clear();
-}
-
-void ChunkStreamer::signal() {
-  ++signal_;
-  signal_.notify_all();
+  workers_.stop();
 }
 
 void ChunkStreamer::set_generator(std::uint32_t grid, std::shared_ptr<const ChunkGenerator> generator,
@@ -80,6 +70,13 @@ void ChunkStreamer::set_generator(std::uint32_t grid, std::shared_ptr<const Chun
     kept = &generators_[grid];
     plan_.set_extent(grid, chunks, others);
     kept->exchange(next);
+  }
+  {
+    // Every call that uses the former generator was listed before.
+    const std::scoped_lock lock(calls_mutex_);
+    for (Call* const call : calls_) {
+      if (call->place.grid == grid) call->is_cancelled = true;
+    }
   }
   kept->wait_until_unused(next);
 }
@@ -107,15 +104,17 @@ void ChunkStreamer::post(Note note, bool is_urgent) {
     append(inbox_.released, note.released);
     ++posted_;
   }
-  ++signal_;
-  if (is_urgent) signal_.notify_one();  // the planning worker wakes the others
+  if (is_urgent) {
+    workers_.wake_one();  // the planning worker wakes the others
+  } else {
+    workers_.note_work();
+  }
 }
 
 void ChunkStreamer::set_room(std::int64_t bytes, std::int64_t each) {
   each_ = each;
   if (room_.exchange(bytes) > 0 || bytes <= 0) return;
-  ++signal_;
-  signal_.notify_all();
+  workers_.wake_all();
 }
 
 void ChunkStreamer::take(Outbox& out) {
@@ -143,11 +142,12 @@ bool ChunkStreamer::wait(std::chrono::milliseconds at_most) {
     const std::scoped_lock lock(inbox_mutex_);
     posted = posted_;
   }
-  signal_.notify_one();
+  workers_.wake_one();
   // Only the caller can make room.
   if (room_ <= 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  std::unique_lock lock(outbox_mutex_);
-  return came_.wait_for(lock, at_most, [&] {
+  std::unique_lock lock(plan_mutex_);
+  return workers_.wait_for(lock, std::chrono::duration<double>(at_most).count(), [&] {
+    const std::scoped_lock outbox(outbox_mutex_);
     return !outbox_.completed_loads.empty() || (working_ == 0 && !has_more_ && reported_posts_ >= posted);
   });
 }
@@ -198,7 +198,6 @@ void ChunkStreamer::report() {
     has_more_ = plan_.has_next(has_room());
     reported_posts_ = read_posts_;
   }
-  came_.notify_all();
 }
 
 // Always admits a few chunks, so that the viewer never stands in empty space.
@@ -207,45 +206,52 @@ bool ChunkStreamer::has_room() const {
   return room_ > 0 || plan_.max_chunks() <= kFew;
 }
 
-void ChunkStreamer::run() {
+Workers::Clock::time_point ChunkStreamer::step(Workers::Lock& lock) {
   constexpr auto kUntilThereIsMemory = std::chrono::milliseconds(20);
-  bool goes_on = true;
-  while (goes_on) {
-    try {
-      goes_on = work_once();
-    } catch (const std::bad_alloc&) {
-      note_shortage();
-      std::this_thread::sleep_for(kUntilThereIsMemory);
-    }
+  try {
+    return work_once(lock);
+  } catch (const std::bad_alloc&) {
+    note_shortage();
+    if (!lock.owns_lock()) lock.lock();
+    return Workers::Clock::now() + kUntilThereIsMemory;
   }
 }
 
-// Processes the inbox and one chunk, or waits for either. Returns false when the streamer ends.
-bool ChunkStreamer::work_once() {
-  std::unique_lock lock(plan_mutex_);
+// Waits for a limited time: a full disk must not stop the streamer. Requires: the plan's lock is held.
+bool ChunkStreamer::must_wait_for_disk() {
+  constexpr auto kLongest = std::chrono::seconds(2);
+  std::optional<Workers::Clock::time_point> deadline = std::exchange(disk_deadline_, std::nullopt);
+  if (!options_.keeps_made || store_.stats().pending_bytes <= kMaxPendingBytes) return false;
+  const Workers::Clock::time_point now = Workers::Clock::now();
+  if (!deadline) deadline = now + kLongest;
+  if (now >= *deadline) return false;
+  disk_deadline_ = deadline;
+  return true;
+}
+
+// Processes the inbox and one chunk. Requires: the plan's lock is held.
+Workers::Clock::time_point ChunkStreamer::work_once(Workers::Lock& lock) {
+  constexpr auto kUntilSomeIsWritten = std::chrono::milliseconds(5);
   const auto has_post = [&] {
     const std::scoped_lock inbox(inbox_mutex_);
     return read_posts_ != posted_ || read_events_ != reading_.events.size() || reading_.requests;
   };
-  if (is_ending_) return false;
-  const std::uint32_t seen = signal_;
   const bool is_new = has_post();
   if (is_new) {
     read_inbox();
     report();
   }
+  if (plan_.has_next(has_room()) && must_wait_for_disk()) return Workers::Clock::now() + kUntilSomeIsWritten;
   ChunkAddress place;
   if (!plan_.next(place, has_room())) {
     report();
-    lock.unlock();
-    signal_.wait(seen);
-    return true;
+    return Workers::kWhenWoken;
   }
   {
     const std::scoped_lock outbox(outbox_mutex_);
     ++working_;
   }
-  if (is_new && plan_.has_next(has_room())) signal();
+  if (is_new && plan_.has_next(has_room())) workers_.wake_all();
   const bool must_trim = released_bytes_ > kTrimBytes;
   if (must_trim) released_bytes_ = 0;
   lock.unlock();
@@ -255,7 +261,8 @@ bool ChunkStreamer::work_once() {
   CompletedLoad completed = fetch(place);
   room_ += reserved - static_cast<std::int64_t>(bytes_of(completed.chunk));
   hand_over(std::move(completed));
-  return true;
+  lock.lock();
+  return Workers::kAgain;
 }
 
 namespace {
@@ -290,7 +297,6 @@ void ChunkStreamer::hand_over(CompletedLoad completed) {
     if (is_ending_) return;
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
-  came_.notify_all();
 }
 
 void ChunkStreamer::note_shortage() {
@@ -316,6 +322,25 @@ CompletedLoad ChunkStreamer::fetch(const ChunkAddress& place) {
   return completed;
 }
 
+// Lists a call while it exists.
+struct ChunkStreamer::Listed {
+  Listed(ChunkStreamer& owner, Call& running) : streamer(owner), call(running) {
+    const std::scoped_lock lock(streamer.calls_mutex_);
+    streamer.calls_.push_back(&call);
+    // The list of calls may have been cancelled before.
+    if (streamer.is_ending_) call.is_cancelled = true;
+  }
+  Listed(const Listed&) = delete;
+  Listed& operator=(const Listed&) = delete;
+  ~Listed() {
+    const std::scoped_lock lock(streamer.calls_mutex_);
+    std::erase(streamer.calls_, &call);
+  }
+
+  ChunkStreamer& streamer;
+  Call& call;
+};
+
 void ChunkStreamer::read_or_make(CompletedLoad& completed) {
   const ChunkAddress& place = completed.place;
   auto kept = store_.load_chunk(place);
@@ -336,23 +361,17 @@ void ChunkStreamer::read_or_make(CompletedLoad& completed) {
     if (found == generators_.end()) return;
     set = &found->second;
   }
+  Call call{place};
+  const Listed listed(*this, call);  // before it takes the generator: see set_generator
   const auto generator = set->use();
-  if (*generator != nullptr && (*generator)->chunks().contains(place.chunk)) make(**generator, completed);
+  if (*generator != nullptr && (*generator)->chunks().contains(place.chunk)) make(**generator, call, completed);
 }
 
-// Waits for a limited time: a full disk must not stop the streamer.
-void ChunkStreamer::wait_for_disk() {
-  for (int i = 0; i < 400 && !is_ending_ && store_.stats().pending_bytes > kMaxPendingBytes; ++i) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  }
-}
-
-void ChunkStreamer::make(const ChunkGenerator& generator, CompletedLoad& completed) {
+void ChunkStreamer::make(const ChunkGenerator& generator, const Call& call, CompletedLoad& completed) {
   QUOIN_ASSERT(generator.chunks().contains(completed.place.chunk), "a chunk that the generator can make");
-  if (options_.keeps_made) wait_for_disk();
-  Call running{completed.place};
-  auto made = call_generator(generator, running);
-  if (!made && made.error().code == ErrorCode::Cancelled && running.is_cancelled) {
+  auto made = call.is_cancelled ? Result<StoredChunk>(make_error(ErrorCode::Cancelled, "cancelled"))
+                                : generator.make(call.place.chunk, Cancellation(call.is_cancelled));
+  if (!made && made.error().code == ErrorCode::Cancelled && call.is_cancelled) {
     completed.outcome = CompletedLoad::Outcome::Cancelled;
     return;
   }
@@ -379,29 +398,6 @@ void ChunkStreamer::make(const ChunkGenerator& generator, CompletedLoad& complet
   if (const auto saved = store_.save(std::move(changes)); !saved) {
     add_problem(completed.place, to_string(saved.error()));
   }
-}
-
-// Calls the generator. `call` is listed meanwhile.
-Result<StoredChunk> ChunkStreamer::call_generator(const ChunkGenerator& generator, Call& call) {
-  struct Listed {
-    ChunkStreamer& streamer;
-    Call* call;
-    Listed(ChunkStreamer& owner, Call* running) : streamer(owner), call(running) {
-      const std::scoped_lock lock(streamer.calls_mutex_);
-      streamer.calls_.push_back(call);
-      // The list of calls may have been cancelled before.
-      if (streamer.is_ending_) call->is_cancelled = true;
-    }
-    Listed(const Listed&) = delete;
-    Listed& operator=(const Listed&) = delete;
-    ~Listed() {
-      const std::scoped_lock lock(streamer.calls_mutex_);
-      std::erase(streamer.calls_, call);
-    }
-  };
-  const Listed listed(*this, &call);
-  if (call.is_cancelled) return make_error(ErrorCode::Cancelled, "cancelled");
-  return generator.make(call.place.chunk, Cancellation(call.is_cancelled));
 }
 
 // Cancels the calls whose chunks would be dropped on arrival; without requests, all calls. Done by the caller's thread,

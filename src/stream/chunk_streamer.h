@@ -2,7 +2,6 @@
 
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -12,7 +11,6 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -179,23 +177,22 @@ class ChunkStreamer {
     std::atomic<bool> is_cancelled{false};
     bool is_reported = false;
   };
+  struct Listed;
 
-  void run();
-  bool work_once();
+  [[nodiscard]] Workers::Clock::time_point step(Workers::Lock& lock);
+  [[nodiscard]] Workers::Clock::time_point work_once(Workers::Lock& lock);
   void read_inbox();
   void hand_over(CompletedLoad completed);
   void note_shortage();
   [[nodiscard]] bool has_room() const;
   [[nodiscard]] CompletedLoad fetch(const ChunkAddress& place);
   void read_or_make(CompletedLoad& completed);
-  void make(const ChunkGenerator& generator, CompletedLoad& completed);
-  [[nodiscard]] Result<StoredChunk> call_generator(const ChunkGenerator& generator, Call& call);
+  void make(const ChunkGenerator& generator, const Call& call, CompletedLoad& completed);
   void cancel_calls(const StreamRequests* needs);
   [[nodiscard]] bool is_slow(const Call& call) const;
-  void wait_for_disk();
+  [[nodiscard]] bool must_wait_for_disk();
   void add_problem(const ChunkAddress& place, const std::string& text);
   void report();
-  void signal();
 
   WorldStore& store_;
   const Options options_;
@@ -212,15 +209,14 @@ class ChunkStreamer {
   std::size_t read_events_ = 0;
   std::uint64_t read_posts_ = 0;
   std::uint64_t plans_ = 0;
-  std::size_t released_bytes_ = 0;  ///< since memory was last returned
+  std::size_t released_bytes_ = 0;                           ///< since memory was last returned
+  std::optional<Workers::Clock::time_point> disk_deadline_;  ///< while the disk is behind: time of the next chunk
   std::atomic<bool> is_ending_{false};
   std::atomic<std::int64_t> room_{0};  ///< bytes
   std::atomic<std::int64_t> each_{0};
-  std::atomic<std::uint32_t> signal_{0};  ///< incremented when there may be work
 
   std::mutex outbox_mutex_;
   Outbox outbox_;
-  std::condition_variable came_;
   std::size_t working_ = 0;
   bool is_short_ = false;  ///< memory ran short since the last report to the caller
   std::uint64_t reported_posts_ = 0;
@@ -230,7 +226,7 @@ class ChunkStreamer {
   std::vector<Call*> calls_;        ///< running; at most one per worker
   std::shared_ptr<const Rules> rules_ = std::make_shared<const Rules>();
 
-  std::vector<std::jthread> workers_;  ///< last: they end first
+  Workers workers_{plan_mutex_};  ///< last: they end first
 };
 
 }  // namespace quoin::stream

@@ -247,10 +247,18 @@ class Workers {
       stepped_.wait(lock);
     }
   }
-  /// As `wait`, for at most `seconds`, without steps of its own. Returns the last result of `is_finished`.
+  /// As `wait`, for at most `seconds`, and longer only in a step of its own. Returns the last result of `is_finished`.
   template <class IsFinished>
   bool wait_for(Lock& lock, double seconds, IsFinished is_finished) {
-    return stepped_.wait_for(lock, std::chrono::duration<double>(seconds), std::move(is_finished));
+    const Clock::time_point begun = Clock::now();
+    const auto left = [&] { return std::chrono::duration<double>(seconds) - (Clock::now() - begun); };
+    while (!is_finished()) {
+      if (left().count() <= 0) return false;
+      if (help(lock)) continue;
+      if (is_finished()) return true;
+      stepped_.wait_for(lock, left());
+    }
+    return true;
   }
   /// Lets waiting callers check again, in the middle of a step.
   void notify() { stepped_.notify_all(); }
