@@ -24,12 +24,6 @@ namespace {
 constexpr int kFrames = 120;
 constexpr std::size_t kUploadBytes = std::size_t{4} << 20;
 
-// World, light, meshes and tracer have threads of their own, each by default one less than the machine has. With a
-// quarter each, all four together have no more than the machine.
-quoin::Threads quarter_of_threads() {
-  return {std::max(1U, quoin::thread_count({}) / 4)};
-}
-
 class Game {
  public:
   Game() { meshes_.use_light(light_); }
@@ -37,7 +31,6 @@ class Game {
   quoin::Status open(const std::string& path) {
     quoin::StreamOptions options;
     options.budget_bytes = std::size_t{512} << 20;
-    options.workers = quarter_of_threads();
     options.other_bytes = [this] { return derived_bytes(); };  // counts in the budget
     auto world = quoin::StreamedWorld::open_or_create(path, options);
     if (!world) return world.error();
@@ -140,9 +133,9 @@ class Game {
   }
 
   std::optional<quoin::StreamedWorld> world_;
-  quoin::LiveLight light_{{.threads = quarter_of_threads()}};
-  quoin::LiveMeshes meshes_{{.workers = quarter_of_threads()}};
-  quoin::LiveTracer tracer_{{.threads = quarter_of_threads()}};
+  quoin::LiveLight light_;
+  quoin::LiveMeshes meshes_;
+  quoin::LiveTracer tracer_;
   std::map<SurfaceKey, std::shared_ptr<const quoin::ChunkSurface>> surfaces_;
   std::size_t mesh_bytes_ = 0;  // of `surfaces_`
   std::size_t uploaded_ = 0;
@@ -176,6 +169,7 @@ quoin::Status play(const std::string& path, const std::string& image) {
 
 int main(int argc, char** argv) {
   quoin::return_freed_memory();  // so that the memory of the process also stays within the budget
+  quoin::set_job_system(quoin::make_worker_pool({.count = 3}));  // before the first object
   const auto played = play(argc > 1 ? argv[1] : "game.quoin", argc > 2 ? argv[2] : "game.png");
   if (!played) std::fprintf(stderr, "%s\n", quoin::to_string(played.error()).c_str());
   return played ? 0 : 1;

@@ -10,7 +10,8 @@
 ///           null pointer. A violated `Requires:` is a programming error: see QUOIN_ASSERT. Functions throw only
 ///           bad_alloc, and std::system_error if threads cannot be started.
 /// Threads:  any number of threads may read an object at once; changing it needs exclusive access. Functions that take
-///           Threads return when all their threads are done, with the same result at any thread count.
+///           Threads return when all their threads are done, with the same result at any thread count. Threads{0} means
+///           the same everywhere, and `set_job_system` sets one limit for all work: see quoin/core/parallel.h.
 /// Lifetime: arguments are read during the call and not kept. Headers document each exception and its required
 ///           lifetime.
 /// Moving:   a moved-from object may only be assigned to or destroyed.

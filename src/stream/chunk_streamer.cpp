@@ -146,10 +146,11 @@ bool ChunkStreamer::wait(std::chrono::milliseconds at_most) {
   // Only the caller can make room.
   if (room_ <= 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   std::unique_lock lock(plan_mutex_);
-  return workers_.wait_for(lock, std::chrono::duration<double>(at_most).count(), [&] {
+  const auto has_news = [&] {
     const std::scoped_lock outbox(outbox_mutex_);
     return !outbox_.completed_loads.empty() || (working_ == 0 && !has_more_ && reported_posts_ >= posted);
-  });
+  };
+  return workers_.wait_for(lock, std::chrono::duration<double>(at_most).count(), has_news, true);
 }
 
 // Processes the inbox. Requires: the plan's lock is held. If memory runs out, the next call continues there.

@@ -13,8 +13,7 @@ class LiveMeshes;
 
 struct LiveLightOptions {
   PropagatedLightOptions light{};
-  /// Threads that each update uses. 0: one less than the hardware threads, at least 1 (different from other options).
-  Threads threads{};
+  Threads threads{};  ///< workers that each update uses
 };
 
 /// Propagated light of a scene's grids. One background thread computes updates, with several threads each, while the

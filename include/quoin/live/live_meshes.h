@@ -89,7 +89,7 @@ struct LiveMeshOptions {
   ///         infinity: level 0 everywhere.
   double detail_distance = std::numeric_limits<double>::infinity();
   InstanceFilter instances = InstanceFilter::Visible;  ///< instances whose grids are meshed
-  Threads workers{};  ///< 0: one less than the hardware threads, at least 1 (different from other options)
+  Threads workers{};
   /// Converts a new surface before it can be taken, for example to vertices in a custom format. The result becomes
   /// ChunkSurface::converted. `changed_regions` of its argument has all bits set. Called by several workers at once,
   /// for each surface that is not empty. Optional. The SurfaceContext is valid only during the call. A result that is

@@ -10,8 +10,7 @@ namespace [[gnu::visibility("default")]] quoin {
 
 struct LiveTracerOptions {
   InstanceFilter instances = InstanceFilter::Visible;  ///< instances that rays can hit
-  /// Threads that each update uses. 0: one less than the hardware threads, at least 1 (different from other options).
-  Threads threads{};
+  Threads threads{};                                   ///< workers that each update uses
 };
 
 /// A tracer of a scene. One background thread computes updates, with several threads each, while the scene is edited.

@@ -14,8 +14,7 @@ namespace [[gnu::visibility("default")]] quoin {
 
 struct ImpostorCacheOptions {
   std::size_t max_bytes = std::size_t{1} << 30;  ///< of all held impostors
-  Threads workers{};                             ///< 0: one less than the hardware threads, at least 1 (different from
-                                                 ///< other options)
+  Threads workers{};
 };
 
 /// Impostors of a scene's grids, built by worker threads on first request and rebuilt after edits.

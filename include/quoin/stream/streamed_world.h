@@ -98,7 +98,7 @@ struct StreamOptions {
   /// Duration of a call of ChunkGenerator::make after which `take_problems` reports the call, while it still runs, and
   /// `flush` no longer waits for it.
   std::chrono::milliseconds generator_timeout{10'000};
-  Threads workers{};  ///< unlike elsewhere, 0 means one less than the machine's threads, at least 1
+  Threads workers{};
 };
 
 struct StreamStats {

@@ -247,14 +247,15 @@ class Workers {
       stepped_.wait(lock);
     }
   }
-  /// As `wait`, for at most `seconds`, and longer only in a step of its own. Returns the last result of `is_finished`.
+  /// As `wait`, for at most `seconds`. Returns the last result of `is_finished`. Unless `helps`, does no steps of its
+  /// own, which could take longer.
   template <class IsFinished>
-  bool wait_for(Lock& lock, double seconds, IsFinished is_finished) {
+  bool wait_for(Lock& lock, double seconds, IsFinished is_finished, bool helps = false) {
     const Clock::time_point begun = Clock::now();
     const auto left = [&] { return std::chrono::duration<double>(seconds) - (Clock::now() - begun); };
     while (!is_finished()) {
       if (left().count() <= 0) return false;
-      if (help(lock)) continue;
+      if (helps && help(lock)) continue;
       if (is_finished()) return true;
       stepped_.wait_for(lock, left());
     }
