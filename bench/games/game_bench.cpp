@@ -9,7 +9,7 @@
 #include <fstream>
 #include <new>
 #include <thread>
-#include <unordered_map>
+#include <unordered_set>
 
 #include <malloc.h>
 #include <unistd.h>
@@ -151,29 +151,10 @@ bool same_surface(const quoin::ChunkSurface& a, const quoin::ChunkSurface& b) {
          same(a.smooth.positions, b.smooth.positions) && same(a.smooth.indices, b.smooth.indices);
 }
 
-// A position in a field, exact: positions of vertices are multiples of 2^-16.
-struct Corner {
-  static constexpr std::int64_t kUnit = 65'536;
-  std::array<std::int64_t, 3> at{};
-  bool operator==(const Corner&) const = default;
-  auto operator<=>(const Corner&) const = default;
-};
+}  // namespace
 
-std::vector<Corner> corners_of(const quoin::ChunkSurface& surface, IVec3 chunk) {
-  std::vector<Corner> corners;
-  for (const quoin::Vec3& p : surface.smooth.positions) {
-    Corner corner;
-    for (int axis = 0; axis < 3; ++axis) {
-      corner.at[static_cast<std::size_t>(axis)] =
-          std::llround(static_cast<double>(p[axis]) * Corner::kUnit) + std::int64_t{64} * chunk[axis] * Corner::kUnit;
-    }
-    corners.push_back(corner);
-  }
-  return corners;
-}
-
-struct EdgeHash {
-  std::size_t operator()(const std::pair<Corner, Corner>& edge) const {
+struct Shown::EdgeHash {
+  std::size_t operator()(const Edge& edge) const {
     std::uint64_t hash = 0;
     for (const Corner& corner : {edge.first, edge.second}) {
       for (const std::int64_t value : corner.at) {
@@ -185,7 +166,14 @@ struct EdgeHash {
   }
 };
 
-}  // namespace
+// The edges that were added an odd number of times.
+struct Shown::OddEdges {
+  std::unordered_set<Edge, EdgeHash> all;
+  void add(const Edge& edge) {
+    const auto [at, is_new] = all.insert(edge);
+    if (!is_new) all.erase(at);
+  }
+};
 
 double wall_ms() {
   return clock_ms(CLOCK_MONOTONIC);
@@ -347,8 +335,11 @@ void FrameMeter::end() {
 void FrameMeter::report(Report& report, const Options& options, const std::string& phase, std::vector<Goal> goals,
                         std::optional<double> most_allocations) const {
   report.samples(phase + ": frame", "ms", frames_, std::move(goals));
-  if (options.with_parts) {
-    for (const auto& [name, part] : parts_) report.samples(phase + ":   " + name, "ms", part.ms);
+  for (const auto& [name, part] : parts_) {
+    const bool is_update = name == "StreamedWorld::update" || name == "LiveTracer::update";
+    const std::vector<Goal> limits{{Statistic::P999, 1.0}, {Statistic::Max, 2.0}};
+    if (is_update) report.samples(phase + ":   " + name, "ms", part.ms, limits);
+    if (options.with_parts && !is_update) report.samples(phase + ":   " + name, "ms", part.ms);
   }
   std::vector<Goal> few;
   if (most_allocations) few.push_back({Statistic::Median, *most_allocations});
@@ -369,14 +360,14 @@ void Shown::apply(const std::vector<quoin::SurfaceUpdate>& updates) {
     if (update.surface == nullptr) {
       surfaces_.erase(key);
     } else {
-      surfaces_[key] = update.surface;
+      surfaces_[key] = {update.surface, nullptr};
     }
   }
 }
 
 const quoin::ChunkSurface* Shown::find(quoin::GridHandle grid, IVec3 chunk, quoin::SurfaceContent content) const {
   const auto found = surfaces_.find({grid, chunk, content});
-  return found == surfaces_.end() ? nullptr : found->second.get();
+  return found == surfaces_.end() ? nullptr : found->second.surface.get();
 }
 
 std::optional<ShownFace> Shown::face(quoin::GridHandle grid, IVec3 voxel, Direction side) const {
@@ -404,18 +395,13 @@ unsigned Shown::faces_around(quoin::GridHandle grid, IVec3 voxel) const {
 }
 
 int Shown::open_edges(quoin::GridHandle grid, const quoin::IBox& chunks) const {
-  std::unordered_map<std::pair<Corner, Corner>, int, EdgeHash> edges;
-  for (const auto& [key, surface] : surfaces_) {
+  OddEdges edges;
+  for (const auto& [key, entry] : surfaces_) {
     const bool is_inside =
         glm::all(glm::greaterThanEqual(key.chunk, chunks.min)) && glm::all(glm::lessThan(key.chunk, chunks.max));
     if (key.grid != grid || key.content != quoin::SurfaceContent::Field || !is_inside) continue;
-    const std::vector<Corner> corners = corners_of(*surface, key.chunk);
-    const auto& indices = surface->smooth.indices;
-    for (std::size_t i = 0; i < indices.size(); ++i) {
-      const Corner& a = corners[indices[i]];
-      const Corner& b = corners[indices[i % 3 == 2 ? i - 2 : i + 1]];
-      if (!(a == b)) ++edges[std::minmax(a, b)];
-    }
+    if (entry.open == nullptr) entry.open = std::make_shared<const std::vector<Edge>>(open_edges_of(entry, key.chunk));
+    for (const Edge& edge : *entry.open) edges.add(edge);
   }
   const auto is_at_side = [&](const Corner& corner) {
     for (int axis = 0; axis < 3; ++axis) {
@@ -425,9 +411,29 @@ int Shown::open_edges(quoin::GridHandle grid, const quoin::IBox& chunks) const {
     }
     return false;
   };
-  return static_cast<int>(std::count_if(edges.begin(), edges.end(), [&](const auto& edge) {
-    return edge.second % 2 != 0 && !is_at_side(edge.first.first) && !is_at_side(edge.first.second);
+  return static_cast<int>(std::count_if(edges.all.begin(), edges.all.end(), [&](const Edge& edge) {
+    return !is_at_side(edge.first) && !is_at_side(edge.second);
   }));
+}
+
+std::vector<Shown::Edge> Shown::open_edges_of(const Entry& entry, IVec3 chunk) {
+  std::vector<Corner> corners;
+  for (const quoin::Vec3& p : entry.surface->smooth.positions) {
+    Corner corner;
+    for (int axis = 0; axis < 3; ++axis) {
+      corner.at[static_cast<std::size_t>(axis)] =
+          std::llround(static_cast<double>(p[axis]) * Corner::kUnit) + std::int64_t{64} * chunk[axis] * Corner::kUnit;
+    }
+    corners.push_back(corner);
+  }
+  OddEdges edges;
+  const auto& indices = entry.surface->smooth.indices;
+  for (std::size_t i = 0; i < indices.size(); ++i) {
+    const Corner& a = corners[indices[i]];
+    const Corner& b = corners[indices[i % 3 == 2 ? i - 2 : i + 1]];
+    if (!(a == b)) edges.add(std::minmax(a, b));
+  }
+  return {edges.all.begin(), edges.all.end()};
 }
 
 int Shown::differences(const quoin::Scene& scene, bool with_light, quoin::DVec3 eye) const {
@@ -438,19 +444,19 @@ int Shown::differences(const quoin::Scene& scene, bool with_light, quoin::DVec3 
   Shown fresh;
   fresh.apply(meshes.take());
   int differences = 0;
-  for (const auto& [key, surface] : surfaces_) {
+  for (const auto& [key, entry] : surfaces_) {
     const auto found = fresh.surfaces_.find(key);
-    if (found == fresh.surfaces_.end() || !same_surface(*surface, *found->second)) ++differences;
+    if (found == fresh.surfaces_.end() || !same_surface(*entry.surface, *found->second.surface)) ++differences;
   }
-  for (const auto& [key, surface] : fresh.surfaces_) differences += surfaces_.contains(key) ? 0 : 1;
+  for (const auto& [key, entry] : fresh.surfaces_) differences += surfaces_.contains(key) ? 0 : 1;
   return differences;
 }
 
 std::pair<std::size_t, std::size_t> Shown::bytes() const {
   std::pair<std::size_t, std::size_t> sum{0, 0};
-  for (const auto& [key, surface] : surfaces_) {
-    sum.first += surface->bytes();
-    sum.second += surface->converted_bytes;
+  for (const auto& [key, entry] : surfaces_) {
+    sum.first += entry.surface->bytes();
+    sum.second += entry.surface->converted_bytes;
   }
   return sum;
 }

@@ -137,7 +137,23 @@ class Shown {
     quoin::SurfaceContent content{};
     bool operator<(const Key& other) const;
   };
-  std::map<Key, std::shared_ptr<const quoin::ChunkSurface>> surfaces_;
+  // A position in a field, exact: those of vertices are multiples of 2^-16.
+  struct Corner {
+    static constexpr std::int64_t kUnit = 65'536;
+    std::array<std::int64_t, 3> at{};
+    bool operator==(const Corner&) const = default;
+    auto operator<=>(const Corner&) const = default;
+  };
+  using Edge = std::pair<Corner, Corner>;
+  struct Entry {
+    std::shared_ptr<const quoin::ChunkSurface> surface;
+    mutable std::shared_ptr<const std::vector<Edge>> open;  // edges without a neighbour, once they were needed
+  };
+  struct EdgeHash;
+  struct OddEdges;
+  static std::vector<Edge> open_edges_of(const Entry& entry, quoin::IVec3 chunk);
+
+  std::map<Key, Entry> surfaces_;
 };
 
 // The faces around a voxel that a correct picture shows, from the voxels: as Shown::faces_around.

@@ -165,7 +165,7 @@ quoin::LiveMeshOptions mesh_options() {
 // A hole that is not shown yet. Its chunks must change in one frame.
 struct Hole {
   DVec3 centre{0.0};
-  double start_ms = 0.0;
+  double start_ms = 0.0, process_start_ms = 0.0;
   std::uint64_t state = 0;
   bool was_torn = false;
 };
@@ -255,7 +255,9 @@ class Game {
     }
     settle();
     meter.report(report, options_, "digging", {{Statistic::P99, 4.0}}, std::nullopt);
+    report.samples("DensityGrid::remove_sphere", "ms", edits_ms_);
     report.samples("edit to mesh: wall time", "ms", latencies_ms_, {{Statistic::Median, 25.0}, {Statistic::P99, 60.0}});
+    report.samples("edit to mesh: processor time of the process", "ms", process_latencies_ms_);
     report.faults("torn frames", torn_, static_cast<std::int64_t>(latencies_ms_.size()), "holes");
   }
 
@@ -318,8 +320,10 @@ class Game {
   bool dig_at(DVec3 from, DVec3 direction, double reach) {
     const auto hit = first_hit(tracer_.shown(), {from, direction}, reach);
     if (!hit) return false;
+    const double start = games::thread_ms();
     world_.scene().edit(land_).field.remove_sphere(hit->position, kHole, 1.0);
-    holes_.push_back({hit->position, games::wall_ms()});
+    edits_ms_.push_back(games::thread_ms() - start);
+    holes_.push_back({hit->position, games::wall_ms(), games::process_ms()});
     return true;
   }
 
@@ -348,6 +352,7 @@ class Game {
       if (has_solid_left(hole)) hole.was_torn = true;
       torn_ += hole.was_torn ? 1 : 0;
       latencies_ms_.push_back(games::wall_ms() - hole.start_ms);
+      process_latencies_ms_.push_back(games::process_ms() - hole.process_start_ms);
       return true;
     });
   }
@@ -377,7 +382,7 @@ class Game {
   games::Shown shown_;
   games::Staging staging_{std::size_t{4} << 20};
   std::vector<Hole> holes_;
-  std::vector<double> latencies_ms_;
+  std::vector<double> latencies_ms_, process_latencies_ms_, edits_ms_;
   int dug_ = 0;
   std::int64_t torn_ = 0;
 };
