@@ -258,7 +258,8 @@ void Report::line(const std::string& row, const std::string& unit, const std::ar
     wanted += (wanted.empty() ? "" : ", ") + (is_single ? "" : std::string(kNames[of]) + ' ') + number(goal.limit);
     if (values[of] > goal.limit) missed += (missed.empty() ? "" : ", ") + std::string(is_single ? "yes" : kNames[of]);
   }
-  lines_.push_back(text + '\t' + wanted + '\t' + missed);
+  std::printf("%s\t%s\t%s\n", text.c_str(), wanted.c_str(), missed.c_str());
+  std::fflush(stdout);
 }
 
 void Report::samples(const std::string& row, const std::string& unit, std::vector<double> all,
@@ -285,8 +286,6 @@ void Report::expect(bool condition, const std::string& text) {
 }
 
 int Report::finish() const {
-  for (const std::string& text : lines_) std::printf("%s\n", text.c_str());
-  std::fflush(stdout);
   for (const std::string& text : failed_) std::fprintf(stderr, "%s: failed: %s\n", game_.c_str(), text.c_str());
   return failed_.empty() ? 0 : 1;
 }

@@ -55,7 +55,7 @@ struct Goal {
   double limit = 0.0;
 };
 
-// Collects the rows of the table and the failed checks.
+// Writes the rows of the table as lines of tab-separated fields, and collects failed checks.
 class Report {
  public:
   Report(std::string game, const Options& options) : game_(std::move(game)), options_(options) {}
@@ -66,7 +66,7 @@ class Report {
   void faults(const std::string& row, std::int64_t found, std::int64_t of, const std::string& things);
   // A condition of the result.
   void expect(bool condition, const std::string& text);
-  // Writes the rows as lines of tab-separated fields. Returns the exit status: 1 if a check failed.
+  // Writes the failed checks to standard error. Returns the exit status: 1 if there are any.
   [[nodiscard]] int finish() const;
 
  private:
@@ -75,7 +75,6 @@ class Report {
 
   std::string game_;
   Options options_;
-  std::vector<std::string> lines_;
   std::vector<std::string> failed_;
 };
 
