@@ -184,7 +184,9 @@ class Game {
       land_ = world_.scene().grids().handles().at(0);
       world_.use_generator(land_, land);
     }
-    viewer_.position = {8.5, Land::height(8, 8) + 3.0, 8.5};
+    int shore = 8;
+    while (Land::height(shore, 8) <= kSea + 4) ++shore;
+    viewer_.position = {shore + 0.5, Land::height(shore, 8) + 3.0, 8.5};
     viewer_.radius = options.radius;
   }
 
@@ -203,9 +205,10 @@ class Game {
     quoin::OrientedBox body{viewer_.position, {0.3, 0.9, 0.3}};
     double fall = 0.0;
     for (int i = 0; i < options_.frames(900); ++i) {
-      frame(meter, [&] {
+      std::optional<games::EditWatch::Voxel> dug;
+      const auto step_and_dig = [&] {
         const double turn = 0.002 * i;
-        viewer_.direction = {std::cos(turn), -0.7, std::sin(turn)};
+        viewer_.direction = {std::cos(turn), -1.6, std::sin(turn)};
         fall -= 20.0 / 60.0;
         quoin::SlideOptions slide;
         slide.floor = quoin::FloorOptions{.step_height = 1.1, .snap_distance = 0.6};
@@ -214,11 +217,19 @@ class Game {
         body.centre = moved.centre;
         fall = moved.is_on_floor ? 0.0 : 60.0 * moved.displacement.y;
         viewer_.position = body.centre + DVec3(0.0, 0.7, 0.0);
-        if (i % 30 == 15) dig_ahead();
+        if (i % 30 == 15) dug = dig_ahead();
+      };
+      frame(meter, step_and_dig, [&] {
+        if (!dug) return;
+        const quoin::Scene& scene = world_.scene();
+        dug->after = games::expected_faces(scene.grids()[land_].grid, scene.types, dug->voxel);
+        watch_.add({*dug});
       });
       pace.wait();
     }
+    settle();
     meter.report(report, options_, "walking", {}, 0.0);
+    watch_.report(report, "walking", {{Statistic::Median, 20.0}});
     report.expect(viewer_.position.y > 4.0, "the player fell through the world");
   }
 
@@ -262,7 +273,7 @@ class Game {
     }
     settle();
     meter.report(report, options_, "digging", {}, std::nullopt);
-    watch_.report(report, {{Statistic::Median, 20.0}});
+    watch_.report(report, "digging", {});
   }
 
   // Sand falls in many chunks at once, one voxel per frame.
@@ -362,10 +373,27 @@ class Game {
     }
   }
 
-  // The player digs the block in front, as the tracer shows it.
-  void dig_ahead() {
-    const auto hit = first_hit(tracer_.shown(), {viewer_.position, glm::normalize(viewer_.direction)}, 8.0);
-    if (hit) world_.scene().edit(land_).grid.set(hit->voxel, quoin::kAir);
+  // The player digs the block in front, as the tracer shows it. Returns it to be watched.
+  std::optional<games::EditWatch::Voxel> dig_ahead() {
+    const auto hit = first_hit(tracer_.shown(), {viewer_.position, glm::normalize(viewer_.direction)}, 8.0,
+                               {.types = quoin::QueryTypes::Opaque});
+    // An edit next to one that is not shown yet would make the check of that one ambiguous.
+    if (!hit || watch_.waits_near(hit->voxel)) return std::nullopt;
+    quoin::Scene& scene = world_.scene();
+    quoin::Grid& voxels = scene.edit(land_).grid;
+    const bool is_watched = is_plain_around(hit->voxel);
+    games::EditWatch::Voxel dug{land_, hit->voxel, games::expected_faces(voxels, scene.types, hit->voxel)};
+    const bool has_changed = voxels.set(hit->voxel, quoin::kAir);
+    return has_changed && is_watched ? std::optional(dug) : std::nullopt;
+  }
+
+  // True if the voxels next to one are opaque or air: transparent ones hide faces by other rules.
+  [[nodiscard]] bool is_plain_around(IVec3 voxel) const {
+    const quoin::Scene& scene = world_.scene();
+    return std::all_of(quoin::kDirections.begin(), quoin::kDirections.end(), [&](quoin::Direction side) {
+      const VoxelType type = scene.grids()[land_].grid.get(voxel + quoin::normal_of(side));
+      return type == quoin::kAir || scene.types.is_opaque(type);
+    });
   }
 
   // The highest voxel of a column, if it and the voxels around it are opaque or air, and light and meshes know them.
@@ -375,12 +403,7 @@ class Game {
     IVec3 at{x, 188, z};
     while (at.y > 2 && voxels.get(at) == quoin::kAir) --at.y;
     if (at.y < 3 || at.y > 180 || !voxels.is_loaded_around(quoin::chunk_of(at))) return std::nullopt;
-    for (int dy = 0; dy <= 1; ++dy) {
-      for (const quoin::Direction side : quoin::kDirections) {
-        const VoxelType type = voxels.get(at + IVec3{0, dy, 0} + quoin::normal_of(side));
-        if (type != quoin::kAir && !scene.types.is_opaque(type)) return std::nullopt;
-      }
-    }
+    if (!is_plain_around(at) || !is_plain_around(at + IVec3{0, 1, 0})) return std::nullopt;
     return scene.types.is_opaque(voxels.get(at)) ? std::optional(at) : std::nullopt;
   }
 

@@ -529,13 +529,14 @@ bool EditWatch::waits_near(IVec3 voxel) const {
   return false;
 }
 
-void EditWatch::report(Report& report, std::vector<Goal> latency_goals) const {
-  report.samples("edit to mesh: wall time", "ms", latencies_ms_, std::move(latency_goals));
-  report.samples("edit to mesh: processor time of the process", "ms", process_latencies_ms_);
-  report.faults("black frames", black_, edits_, "edits");
-  report.faults("torn frames", torn_, edits_, "edits");
-  report.faults("doubled frames", doubled_, edits_, "edits");
-  report.faults("frames of edits never shown", static_cast<std::int64_t>(waiting_.size()), edits_, "edits");
+void EditWatch::report(Report& report, const std::string& phase, std::vector<Goal> latency_goals) {
+  report.samples(phase + ": edit to mesh, wall time", "ms", latencies_ms_, std::move(latency_goals));
+  report.samples(phase + ": edit to mesh, processor time of the process", "ms", process_latencies_ms_);
+  report.faults(phase + ": black frames", black_, edits_, "edits");
+  report.faults(phase + ": torn frames", torn_, edits_, "edits");
+  report.faults(phase + ": doubled frames", doubled_, edits_, "edits");
+  report.faults(phase + ": frames of edits never shown", static_cast<std::int64_t>(waiting_.size()), edits_, "edits");
+  *this = EditWatch();
 }
 
 void Staging::copy(const void* from, std::size_t bytes) {

@@ -174,7 +174,8 @@ class EditWatch {
   // True if an edit that is not shown yet is near.
   [[nodiscard]] bool waits_near(quoin::IVec3 voxel) const;
   [[nodiscard]] bool empty() const { return waiting_.empty(); }
-  void report(Report& report, std::vector<Goal> latency_goals) const;
+  // Reports a phase, and begins the next one.
+  void report(Report& report, const std::string& phase, std::vector<Goal> latency_goals);
 
  private:
   struct Edits {

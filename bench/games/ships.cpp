@@ -149,7 +149,7 @@ class Game {
     }
     settle();
     meter.report(report, options_, "3 shots per frame", {{Statistic::P99, 4.0}}, std::nullopt);
-    report.samples("cut to mesh: wall time", "ms", latencies_ms_, {{Statistic::Median, 20.0}});
+    report.samples("cut to mesh, wall time", "ms", latencies_ms_, {{Statistic::Median, 20.0}});
     const auto cuts = static_cast<std::int64_t>(latencies_ms_.size());
     report.faults("frames without a piece", torn_, cuts, "pieces");
     report.faults("frames with a piece twice", doubled_, cuts, "pieces");

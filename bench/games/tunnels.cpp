@@ -255,10 +255,11 @@ class Game {
     }
     settle();
     meter.report(report, options_, "digging", {{Statistic::P99, 4.0}}, std::nullopt);
-    report.samples("DensityGrid::remove_sphere", "ms", edits_ms_);
-    report.samples("edit to mesh: wall time", "ms", latencies_ms_, {{Statistic::Median, 25.0}, {Statistic::P99, 60.0}});
-    report.samples("edit to mesh: processor time of the process", "ms", process_latencies_ms_);
-    report.faults("torn frames", torn_, static_cast<std::int64_t>(latencies_ms_.size()), "holes");
+    report.samples("digging: DensityGrid::remove_sphere", "ms", edits_ms_);
+    report.samples("digging: edit to mesh, wall time", "ms", latencies_ms_,
+                   {{Statistic::Median, 25.0}, {Statistic::P99, 60.0}});
+    report.samples("digging: edit to mesh, processor time of the process", "ms", process_latencies_ms_);
+    report.faults("digging: torn frames", torn_, static_cast<std::int64_t>(latencies_ms_.size()), "holes");
   }
 
   void report_memory(games::Report& report) {
