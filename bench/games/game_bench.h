@@ -109,7 +109,7 @@ struct ShownFace {
   quoin::VoxelType type = quoin::kAir;
 };
 
-// The surfaces that were taken and not replaced: the picture on the screen.
+// Surfaces that were taken and not replaced: the surfaces on the screen.
 class Shown {
  public:
   void apply(const std::vector<quoin::SurfaceUpdate>& updates);
@@ -155,10 +155,10 @@ class Shown {
   std::map<Key, Entry> surfaces_;
 };
 
-// The faces around a voxel that a correct picture shows, from the voxels: as Shown::faces_around.
+// The faces around a voxel that a correct screen shows, from the voxels: as Shown::faces_around.
 unsigned expected_faces(const quoin::Grid& grid, const quoin::VoxelRegistry& types, quoin::IVec3 voxel);
 
-// Compares the picture with the scene after edits, frame by frame. Edits of one frame must appear in one frame, on both
+// Compares the screen with the scene after edits, frame by frame. Edits of one frame must appear in one frame, on both
 // sides of chunk borders, with their light.
 class EditWatch {
  public:
