@@ -50,7 +50,8 @@ class Land final : public quoin::ChunkGenerator {
     return static_cast<int>(64.0 + 24.0 * hills + 44.0 * crest * crest);
   }
 
-  [[nodiscard]] quoin::Result<quoin::StoredChunk> make(IVec3 chunk) const override {
+  [[nodiscard]] quoin::Result<quoin::StoredChunk> make(IVec3 chunk,
+                                                       const quoin::Cancellation& /*cancelled*/) const override {
     const IVec3 origin = 64 * chunk;
     std::vector<int> heights(64 * 64);
     for (int z = 0; z < 64; ++z) {

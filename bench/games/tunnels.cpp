@@ -43,7 +43,8 @@ class Hills final : public quoin::ChunkGenerator {
     return 84.0 + 30.0 * quoin::fractal2(21, x / 240.0, z / 240.0, 4);
   }
 
-  [[nodiscard]] quoin::Result<quoin::StoredChunk> make(IVec3 chunk) const override {
+  [[nodiscard]] quoin::Result<quoin::StoredChunk> make(IVec3 chunk,
+                                                       const quoin::Cancellation& /*cancelled*/) const override {
     const float band = quoin::DensityGrid().band();
     const Columns columns(64 * chunk);
     quoin::StoredChunk made;
