@@ -470,7 +470,7 @@ VoxelProperties properties_of(const Json& json, const Place& place, Faults& faul
     if (number->is_number_unsigned() && *number <= most) {
       out = number->get<std::uint8_t>();
     } else {
-      faults.add(type.place_of(key), "must be a whole number from 0 to " + std::to_string(most));
+      faults.add(type.place_of(key), std::string("must be a whole number from 0 to ").append(std::to_string(most)));
     }
   };
   read_small("state_bits", kMaxStateBits, properties.state_bits);
