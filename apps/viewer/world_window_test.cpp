@@ -76,7 +76,7 @@ Scene whole_land(const IBox& chunks) {
   for (int z = chunks.min.z; z < chunks.max.z; ++z) {
     for (int y = chunks.min.y; y < chunks.max.y; ++y) {
       for (int x = chunks.min.x; x < chunks.max.x; ++x) {
-        land.grid.put_chunk({x, y, z}, (*generator)->make({x, y, z})->voxels);
+        land.grid.put_chunk({x, y, z}, (*generator)->make({x, y, z}, {})->voxels);
       }
     }
   }
