@@ -141,7 +141,8 @@ class Scenes(unittest.TestCase):
         self.assertEqual(scene.types[ink].rgba, (1, 2, 3, 255))
         self.assertEqual(scene.types[ink][-3:], (0, None, None))
         grate = quoin.VoxelType((1, 2, 3, 255), light_cost=3, blocks_light=False, occludes=False)
-        self.assertEqual(scene.types[scene.add_type(grate)], grate)
+        added = scene.add_type(grate)
+        self.assertEqual(scene.types[added], grate)
         with tempfile.TemporaryDirectory() as folder:
             scene.save(f"{folder}/house.json")
             with open(f"{folder}/house.json", "rb") as file:
