@@ -155,6 +155,7 @@ TEST(SceneData, KeepsTypesWhoseDataChangesMeshes) {
   VoxelProperties door = scene.types[kTurned];
   door.remesh_on_data = true;
   scene.types.replace(kTurned, door);
+  EXPECT_NE(text_of(scene).find("\"quoin_scene\": 7"), std::string::npos) << "programs that do not know it refuse it";
   const auto again = read(text_of(scene));
   ASSERT_TRUE(again) << to_string(again.error());
   EXPECT_EQ(again->scene.types[kTurned], door);

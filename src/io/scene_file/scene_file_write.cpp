@@ -33,9 +33,10 @@ class SceneText {
       for (std::size_t type = 1; type < scene.types.size(); ++type) {
         types_.push_back(parts_.json_of(scene.types[static_cast<VoxelType>(type)]));
         const VoxelProperties& properties = scene.types[static_cast<VoxelType>(type)];
-        is_fifth_ |= properties.state_bits != 0 || properties.remesh_on_data || !is_same(properties.scattering, 0.0F) ||
+        is_fifth_ |= properties.state_bits != 0 || !is_same(properties.scattering, 0.0F) ||
                      !is_same(properties.anisotropy, 0.0F);
-        is_seventh_ |= properties.blocks_light || properties.occludes || properties.light_cost != 0;
+        is_seventh_ |=
+            properties.blocks_light || properties.occludes || properties.light_cost != 0 || properties.remesh_on_data;
       }
       for (std::size_t i = 0; i < scene.grids.size(); ++i) {
         put_grid(scene.grids[i], pieces.voxels[i], pieces.densities[i], pieces.data[i]);
