@@ -191,13 +191,16 @@ class Game {
     viewer_.radius = options.radius;
   }
 
-  // Until everything within the radius is loaded, lit and meshed.
+  // Until everything within the radius is loaded, lit and meshed. Edits that are still not shown then are faults.
   void settle() {
     FrameMeter unused;
+    int idle_frames = 0;
     do {
       frame(unused, [] {});
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    } while (!world_.stats().is_complete || meshes_.pending() != 0 || tracer_.is_late() || !watch_.empty());
+      const bool is_busy = !world_.stats().is_complete || meshes_.pending() != 0 || tracer_.is_late();
+      idle_frames = is_busy ? 0 : idle_frames + 1;
+    } while (idle_frames == 0 || (!watch_.empty() && idle_frames < games::kMaxIdleFrames));
   }
 
   void walk(games::Report& report) {
@@ -379,13 +382,11 @@ class Game {
     const auto hit = first_hit(tracer_.shown(), {viewer_.position, glm::normalize(viewer_.direction)}, 8.0,
                                {.types = quoin::QueryTypes::Opaque});
     // An edit next to one that is not shown yet would make the check of that one ambiguous.
-    if (!hit || watch_.waits_near(hit->voxel)) return std::nullopt;
+    if (!hit || watch_.waits_near(hit->voxel) || !is_plain_around(hit->voxel)) return std::nullopt;
     quoin::Scene& scene = world_.scene();
     quoin::Grid& voxels = scene.edit(land_).grid;
-    const bool is_watched = is_plain_around(hit->voxel);
     games::EditWatch::Voxel dug{land_, hit->voxel, games::expected_faces(voxels, scene.types, hit->voxel)};
-    const bool has_changed = voxels.set(hit->voxel, quoin::kAir);
-    return has_changed && is_watched ? std::optional(dug) : std::nullopt;
+    return voxels.set(hit->voxel, quoin::kAir) ? std::optional(dug) : std::nullopt;
   }
 
   // True if the voxels next to one are opaque or air: transparent ones hide faces by other rules.

@@ -30,6 +30,9 @@ struct Options {
 // Parses the options of a game. Exits with 2 if they are wrong.
 Options parse(int argc, char** argv);
 
+// Frames without pending work after which an edit that is not shown is a fault.
+inline constexpr int kMaxIdleFrames = 500;
+
 // Milliseconds.
 double wall_ms();
 double thread_ms();
