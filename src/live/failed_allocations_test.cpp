@@ -186,7 +186,7 @@ class BusyScene {
   std::mt19937 random_{11};
 };
 
-/// A partial grid whose chunks come and go: solid ones, plates with a hole and lamps, and air.
+/// A partial grid whose chunks come and go: solid ones, plates with a hole, lamps, stairs and leaves, and air.
 class ComingChunks {
  public:
   ComingChunks() {
@@ -194,6 +194,9 @@ class ComingChunks {
     EXPECT_TRUE(types.add(properties));
     properties.emission = 1.0F;
     EXPECT_TRUE(types.add(properties));
+    constexpr Visibility kClear = Visibility::Transparent;
+    EXPECT_TRUE(types.add({.name = "stairs", .colour = {}, .visibility = kClear, .blocks_light = true}));
+    EXPECT_TRUE(types.add({.name = "leaves", .colour = {}, .visibility = kClear, .light_cost = 2}));
     grid.make_partial();
   }
 
@@ -210,6 +213,8 @@ class ComingChunks {
         for (int z = 0; z < kChunkEdge; ++z) {
           for (int x = 0; x < kChunkEdge; ++x) voxels.set({x, 30, z}, x % 31 == 7 && z % 29 == 3 ? kAir : kStone);
         }
+        const auto roof = static_cast<VoxelType>(3 + below(2));  // stairs or leaves
+        for (int n = 0; n < 1'000; ++n) voxels.set({10 + n % 40, 31, 10 + n / 40}, roof);
         voxels.set({30, 31, 30}, kLamp);
         voxels.set({2, 29, 60}, kLamp);
       }
@@ -465,6 +470,39 @@ TEST(FailedAllocations, KeepLightOfChunksThatComeAndGo) {
         shown = std::move(rows);
         return shown == ComingChunks::rows_of(fresh);
       });
+}
+
+// A failed update leaves nothing in the solver of its thread that changes the next region.
+TEST(FailedAllocations, KeepLightOfNextRegion) {
+  const ComingChunks types_only;
+  const VoxelRegistry& types = types_only.types;
+  constexpr IBox kRoof{{4, 8, 4}, {40, 9, 40}};
+  Grid stairs;
+  stairs.fill_box({{0, 0, 0}, {44, 8, 44}}, kStone);
+  Grid stone = stairs;
+  stairs.fill_box(kRoof, 3);
+  stone.fill_box(kRoof, kStone);
+  PropagatedLight expected;
+  expected.update(stone, types, {1});
+  bool has_failed = true;
+  for (std::int64_t n = 0; has_failed; ++n) {
+    bool is_right = false;
+    std::thread([&] {
+      PropagatedLight light;
+      PropagatedLight next;
+      allocations_left = n;
+      try {
+        light.update(stairs, types, {1});
+        has_failed = false;
+      } catch (const std::bad_alloc&) {
+      }
+      allocations_left = -1;
+      next.update(stone, types, {1});
+      is_right = ComingChunks::rows_of(next) == ComingChunks::rows_of(expected) &&
+                 next.at({20, 8, 20}) == expected.at({20, 8, 20});
+    }).join();
+    ASSERT_TRUE(is_right) << "after " << n << " allocations";
+  }
 }
 
 TEST(FailedAllocations, KeepLiveLight) {

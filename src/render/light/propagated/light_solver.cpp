@@ -684,8 +684,8 @@ void LightSolver::solve(const LightRegion& region, std::vector<ChunkLightChange>
   });
   box_ = region.all;
   if (!std::exchange(is_clean_, false)) {
-    std::fill(front_.begin(), front_.end(), 0);
-    std::fill(next_.begin(), next_.end(), 0);
+    for (auto* words : {&front_, &next_}) std::fill(words->begin(), words->end(), 0);
+    for (std::vector<Source>& of_level : absorbed_) of_level.clear();
   }
   changes.clear();
   for_each_part(region.all.wanted, [&](const Part& part) {

@@ -175,7 +175,7 @@ class LightSolver {
   std::vector<std::uint64_t> lit_tolls_;          // with tolls: voxels that are sources and were lit
   std::array<std::vector<Source>, 16> absorbed_;  // [level]: voxels that absorb light
   bool has_sky_ = false;                          // there is sky light that is not in `sources_`
-  bool is_clean_ = true;                          // `front_` and `next_` are all 0: no region failed
+  bool is_clean_ = true;                          // `front_`, `next_` and `absorbed_` are empty: no region failed
   std::vector<std::uint64_t> pass_;
   std::vector<std::uint64_t> rest_;   // dark voxels of pass_, in touched blocks
   std::vector<std::uint64_t> front_;  // voxels of the current level; all 0 between regions

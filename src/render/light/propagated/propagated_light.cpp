@@ -631,6 +631,8 @@ void PropagatedLight::Impl::solve_dirty(const Grid& grid, Threads threads) {
     }
   }
   solve(regions, threads, [&](LightSolver& solver, LightRegion& region) {
+    // These boxes touch no queued part. But the queue's box of a chunk is the box around its parts, with known light.
+    for (ChunkAround& each : region.around) each.unknown = {};
     std::size_t i = 0;
     const IBox voxels{region.all.voxels.min - rim, region.all.voxels.max + rim};
     const IBox chunks{chunk_of(voxels.min), chunk_of(voxels.max - 1) + 1};

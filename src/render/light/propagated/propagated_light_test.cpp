@@ -331,6 +331,32 @@ TEST(PropagatedLight, MatchesFreshLightAfterSmallEdits) {
   }
 }
 
+// Two pairs of boxes of one update touch but are not merged, so they are queued. The queue's box around the parts in
+// one chunk covers the light next to a fifth box, which is solved by itself.
+TEST(PropagatedLight, KeepsLightNextToQueuedBoxes) {
+  const VoxelRegistry types = light_types();
+  Grid grid;
+  grid.fill_box({{-60, -60, -60}, {130, 130, 140}}, kStone);
+  grid.fill_box({{-50, -50, -50}, {120, 120, 130}}, kAir);
+  grid.fill_box({{45, 32, -20}, {75, 33, 50}}, kStone);  // light of the first lamp passes it on one side only
+  grid.set({40, 31, 15}, kLamp);
+  PropagatedLight light;
+  light.update(grid, types, {1});
+  for (const IVec3 lamp : {IVec3(30, -2, 15), IVec3(78, -31, -15), IVec3(30, 47, 66), IVec3(78, 78, 96)}) {
+    grid.set(lamp, kLamp);
+  }
+  grid.set({40, 47, 15}, kLamp);
+  light.update(grid, types, {1});
+  EXPECT_EQ(light.at({47, 34, 15}).red, 15 - 7 - 3);
+  PropagatedLight fresh;
+  fresh.update(grid, types, {1});
+  for (int z = -30; z < 112; ++z) {
+    for (int y = -46; y < 94; ++y) {
+      for (int x = 10; x < 94; ++x) ASSERT_EQ(light.at({x, y, z}), fresh.at({x, y, z})) << x << ' ' << y << ' ' << z;
+    }
+  }
+}
+
 TEST(PropagatedLight, LightsShaftFromSkyAndCaveFromLamps) {
   VoxelRegistry types = light_types();
   Grid grid;
