@@ -504,7 +504,7 @@ std::optional<LightEdit> PropagatedLight::Impl::edit_of(const Grid& grid, const 
 // their own, unless their light was dark or will be: then this appends an edit.
 void PropagatedLight::Impl::change_domain(const Grid& grid, const std::vector<IVec3>& chunks,
                                           std::vector<LightEdit>& edits) {
-  QUOIN_ASSERT(changed_columns.empty(), "a failed update is followed by begin_anew");
+  QUOIN_ASSERT(changed_columns.empty(), "no changes that a failed update left");
   for (const IVec3 chunk : chunks) {
     const bool has_voxels = grid.find_chunk(chunk) != nullptr;
     if (has_voxels == domain().has_voxels(chunk)) continue;
