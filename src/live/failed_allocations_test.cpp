@@ -478,8 +478,8 @@ TEST(FailedAllocations, KeepLightOfNextRegion) {
   const VoxelRegistry& types = types_only.types;
   constexpr IBox kRoof{{4, 8, 4}, {40, 9, 40}};
   Grid stairs;
-  stairs.fill_box({{0, 0, 0}, {44, 8, 44}}, kStone);
-  Grid stone = stairs;
+  Grid stone;
+  for (Grid* const grid : {&stairs, &stone}) grid->fill_box({{0, 0, 0}, {44, 8, 44}}, kStone);
   stairs.fill_box(kRoof, 3);
   stone.fill_box(kRoof, kStone);
   PropagatedLight expected;
