@@ -372,7 +372,7 @@ class Game {
       if ((update.changed_regions >> bit & 1U) == 0) continue;
       for (const auto& range : {region.opaque, region.transparent}) {
         const std::size_t count = quoin::vertices_needed(range[6] - range[0]);
-        if (count != 0) staging_.copy(&vertices[quoin::vertices_needed(range[0])], count * sizeof(Vertex));
+        staging_.copy(std::as_bytes(std::span(vertices).subspan(quoin::vertices_needed(range[0]), count)));
       }
     }
   }

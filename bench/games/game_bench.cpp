@@ -539,16 +539,22 @@ void EditWatch::report(Report& report, const std::string& phase, std::vector<Goa
   *this = EditWatch();
 }
 
-void Staging::copy(const void* from, std::size_t bytes) {
-  total_ += bytes;
-  const auto* source = static_cast<const std::byte*>(from);
-  while (bytes > 0) {
-    const std::size_t part = std::min(bytes, memory_.size() - at_);
-    std::memcpy(memory_.data() + at_, source, part);
-    source += part;
-    bytes -= part;
+void Staging::copy(std::span<const std::byte> bytes) {
+  total_ += bytes.size();
+  while (!bytes.empty()) {
+    const std::size_t part = std::min(bytes.size(), memory_.size() - at_);
+    std::memcpy(memory_.data() + at_, bytes.data(), part);
+    bytes = bytes.subspan(part);
     at_ = (at_ + part) % memory_.size();
   }
+}
+
+bool Staging::ends_with(std::span<const std::byte> bytes) const {
+  if (bytes.size() > std::min(total_, memory_.size())) return false;
+  const std::size_t before_start = std::min(bytes.size(), at_);
+  const auto end_of_last = bytes.last(before_start), at_the_back = bytes.first(bytes.size() - before_start);
+  return std::equal(end_of_last.begin(), end_of_last.end(), memory_.data() + at_ - before_start) &&
+         std::equal(at_the_back.begin(), at_the_back.end(), memory_.data() + memory_.size() - at_the_back.size());
 }
 
 std::map<IVec3, std::uint64_t, quoin::ByZyx> hashes_of(const quoin::SceneGrid& grid) {

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -199,7 +200,9 @@ class EditWatch {
 class Staging {
  public:
   explicit Staging(std::size_t bytes) : memory_(bytes) {}
-  void copy(const void* from, std::size_t bytes);
+  void copy(std::span<const std::byte> bytes);
+  // True if these bytes were copied last.
+  [[nodiscard]] bool ends_with(std::span<const std::byte> bytes) const;
   [[nodiscard]] std::size_t total() const { return total_; }
 
  private:

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <memory>
+#include <span>
 #include <thread>
 
 #include "game_bench.h"
@@ -60,19 +61,26 @@ quoin::Grid build_ship(int number) {
   return ship;
 }
 
-quoin::ConvertedSurface vertices_of(const quoin::SurfaceUpdate& update) {
-  const auto& quads = update.surface->quads;
-  auto vertices = std::make_shared<std::vector<std::array<std::uint16_t, 6>>>(quoin::vertices_needed(quads.size()));
-  quoin::for_each_vertex(quads, [&](std::size_t i, const quoin::QuadVertex& from) {
-    (*vertices)[i] = {static_cast<std::uint16_t>(from.position.x),
-                      static_cast<std::uint16_t>(from.position.y),
-                      static_cast<std::uint16_t>(from.position.z),
-                      static_cast<std::uint16_t>(from.direction),
-                      from.type,
-                      from.occlusion};
+// The game's own vertex: position, direction, type, occlusion.
+using Vertex = std::array<std::uint16_t, 6>;
+
+std::vector<Vertex> make_vertices(const quoin::ChunkSurface& surface) {
+  std::vector<Vertex> vertices(quoin::vertices_needed(surface.quads.size()));
+  quoin::for_each_vertex(surface.quads, [&](std::size_t i, const quoin::QuadVertex& from) {
+    vertices[i] = {static_cast<std::uint16_t>(from.position.x),
+                   static_cast<std::uint16_t>(from.position.y),
+                   static_cast<std::uint16_t>(from.position.z),
+                   static_cast<std::uint16_t>(from.direction),
+                   from.type,
+                   from.occlusion};
   });
-  const std::size_t bytes = vertices->size() * sizeof((*vertices)[0]);
-  return {std::shared_ptr<const void>(std::move(vertices)), bytes};
+  return vertices;
+}
+
+quoin::ConvertedSurface vertices_of(const quoin::SurfaceUpdate& update) {
+  auto vertices = std::make_shared<const std::vector<Vertex>>(make_vertices(*update.surface));
+  const std::size_t bytes = vertices->size() * sizeof(Vertex);
+  return {std::move(vertices), bytes};
 }
 
 quoin::LiveMeshOptions mesh_options() {
@@ -154,6 +162,7 @@ class Game {
     report.faults("frames without a piece", torn_, cuts, "pieces");
     report.faults("frames with a piece twice", doubled_, cuts, "pieces");
     report.faults("wrong shapes or masses", wrong_bodies_, bodies_, "ships");
+    if (options_.is_short) report.faults("wrong vertices uploaded", wrong_uploads_, uploads_, "surfaces");
   }
 
   void report_memory(games::Report& report) {
@@ -230,10 +239,7 @@ class Game {
     tracer_.take();
     const std::vector<quoin::SurfaceUpdate> updates = meshes_.take();
     meter.part("take");
-    for (const quoin::SurfaceUpdate& update : updates) {
-      if (update.surface == nullptr || update.surface->converted == nullptr) continue;
-      staging_.copy(update.surface->converted.get(), update.surface->converted_bytes);
-    }
+    for (const quoin::SurfaceUpdate& update : updates) upload(update);
     meter.part("upload");
     meter.stop_counting();
     shown_.apply(updates);
@@ -241,6 +247,17 @@ class Game {
     meter.end();
     for (std::size_t i = cuts_before; i < cuts_.size(); ++i) cuts_[i].added_in = state;
     check_cuts();
+  }
+
+  // Copies the vertices of a surface. The short version compares the copy with the surface.
+  void upload(const quoin::SurfaceUpdate& update) {
+    if (update.surface == nullptr || update.surface->converted == nullptr) return;
+    const auto& vertices = *static_cast<const std::vector<Vertex>*>(update.surface->converted.get());
+    staging_.copy(std::as_bytes(std::span(vertices)));
+    if (!options_.is_short) return;
+    const std::vector<Vertex> expected = make_vertices(*update.surface);
+    wrong_uploads_ += staging_.ends_with(std::as_bytes(std::span(expected))) ? 0 : 1;
+    ++uploads_;
   }
 
   void move_all(quoin::Scene& scene) {
@@ -414,7 +431,7 @@ class Game {
   games::Staging staging_{std::size_t{4} << 20};
   double time_ = 0.0;
   int shots_ = 0;
-  std::int64_t torn_ = 0, doubled_ = 0, wrong_bodies_ = 0, bodies_ = 0;
+  std::int64_t torn_ = 0, doubled_ = 0, wrong_bodies_ = 0, bodies_ = 0, wrong_uploads_ = 0, uploads_ = 0;
 };
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <memory>
 #include <optional>
+#include <span>
 #include <thread>
 
 #include "game_bench.h"
@@ -311,8 +312,8 @@ class Game {
     meter.part("take");
     for (const quoin::SurfaceUpdate& update : updates) {
       if (update.surface == nullptr || update.surface->converted == nullptr) continue;
-      staging_.copy(static_cast<const std::vector<Vertex>*>(update.surface->converted.get())->data(),
-                    update.surface->converted_bytes);
+      const auto& vertices = *static_cast<const std::vector<Vertex>*>(update.surface->converted.get());
+      staging_.copy(std::as_bytes(std::span(vertices)));
     }
     meter.part("upload");
     meter.stop_counting();
