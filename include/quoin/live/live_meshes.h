@@ -29,7 +29,7 @@ struct ConvertedSurface {
   ConvertedSurface(Pointer converted, std::size_t size = 0) : data(std::move(converted)), bytes(size) {}
 
   std::shared_ptr<const void> data;
-  std::size_t bytes = 0;  ///< size of `data`; 0: unknown
+  std::size_t bytes = 0;  ///< bytes of its elements, for example of a vector's vertices; 0: unknown
 };
 
 /// A function that converts surfaces: any callable with one of these parameter lists, returning a ConvertedSurface or a

@@ -59,7 +59,7 @@ struct ChunkSurface {
   std::vector<VoxelType> types;
   /// Result of LiveMeshOptions::convert; null without `convert`.
   std::shared_ptr<const void> converted;
-  std::size_t converted_bytes = 0;  ///< size of `converted`; 0: unknown
+  std::size_t converted_bytes = 0;  ///< ConvertedSurface::bytes; 0: unknown
 
   [[nodiscard]] bool is_empty() const { return quads.empty() && smooth.indices.empty(); }
   [[nodiscard]] std::int64_t triangles() const;
