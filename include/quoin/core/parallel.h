@@ -67,7 +67,7 @@ class Job {
 ///           Destructors wait for the object's running jobs, not for its waiting ones, which then do nothing.
 /// Errors:   the objects keep exceptions of their jobs, as on threads of their own. After bad_alloc a job pauses for
 ///           20 ms on its worker.
-/// Lifetime: objects keep the job system until their last job has run.
+/// Lifetime: objects keep the job system until their last job has run, so its destructor may run within that job.
 /// Threads:  Quoin calls both functions from any thread, including workers, and from several at once.
 class JobSystem {
  public:

@@ -26,57 +26,61 @@ class CountingJobs final : public JobSystem {
   void post(Job& job) noexcept override {
     if (slowness_.count() != 0) std::this_thread::sleep_for(slowness_);
     {
-      const std::lock_guard lock(mutex_);
-      ++posted_[job.name];
+      const std::lock_guard lock(counts_->mutex);
+      ++counts_->posted[job.name];
     }
-    ++unfinished_;
-    pool_->post(*new Counted(*this, job));  // deletes itself
+    ++counts_->unfinished;
+    pool_->post(*new Counted(counts_, job));  // deletes itself
   }
 
-  [[nodiscard]] int most_at_once() const { return most_; }
-  [[nodiscard]] int unfinished() const { return unfinished_; }
+  [[nodiscard]] int most_at_once() const { return counts_->most; }
+  [[nodiscard]] int unfinished() const { return counts_->unfinished; }
   [[nodiscard]] std::map<std::string, int> posted() const {
-    const std::lock_guard lock(mutex_);
-    return posted_;
+    const std::lock_guard lock(counts_->mutex);
+    return counts_->posted;
   }
   /// Returns the names of the jobs of a priority, in the order in which they ran.
   [[nodiscard]] std::vector<std::string> run(JobPriority priority) const {
-    const std::lock_guard lock(mutex_);
-    return run_[static_cast<std::size_t>(priority)];
+    const std::lock_guard lock(counts_->mutex);
+    return counts_->run[static_cast<std::size_t>(priority)];
   }
 
  private:
+  struct Counts {
+    std::atomic<int> running{0};
+    std::atomic<int> most{0};
+    std::atomic<int> unfinished{0};
+    std::mutex mutex;  // of the next two
+    std::map<std::string, int> posted;
+    std::array<std::vector<std::string>, kJobPriorityCount> run;
+  };
+  // Shares the counts, because the last job may destroy the job system.
   struct Counted final : Job {
-    Counted(CountingJobs& counting, Job& counted) : jobs(counting), job(counted) {
+    Counted(std::shared_ptr<Counts> shared, Job& counted) : counts(std::move(shared)), job(counted) {
       priority = counted.priority;
       name = counted.name;
     }
     void run() noexcept override {
-      const int now = ++jobs.running_;
-      int most = jobs.most_;
-      while (now > most && !jobs.most_.compare_exchange_weak(most, now)) {
+      const int now = ++counts->running;
+      int most = counts->most;
+      while (now > most && !counts->most.compare_exchange_weak(most, now)) {
       }
       {
-        const std::lock_guard lock(jobs.mutex_);
-        jobs.run_[static_cast<std::size_t>(priority)].emplace_back(name);
+        const std::lock_guard lock(counts->mutex);
+        counts->run[static_cast<std::size_t>(priority)].emplace_back(name);
       }
       job.run();
-      --jobs.running_;
-      --jobs.unfinished_;
+      --counts->running;
+      --counts->unfinished;
       delete this;
     }
-    CountingJobs& jobs;
+    const std::shared_ptr<Counts> counts;
     Job& job;
   };
 
   const std::chrono::microseconds slowness_;
-  std::atomic<int> running_{0};
-  std::atomic<int> most_{0};
-  std::atomic<int> unfinished_{0};
-  mutable std::mutex mutex_;  // of the next two
-  std::map<std::string, int> posted_;
-  std::array<std::vector<std::string>, kJobPriorityCount> run_;
-  std::shared_ptr<JobSystem> pool_;  // last: its jobs use the others
+  const std::shared_ptr<Counts> counts_ = std::make_shared<Counts>();
+  const std::shared_ptr<JobSystem> pool_;
 };
 
 /// Runs a function as a job, and returns when it has ended. Only the job may destroy the job system.

@@ -58,11 +58,15 @@ bool ReleaseQueue::destroy_some() noexcept {
   return true;
 }
 
+// Repeats, because an object that a worker destroys may have owned others, which then wait.
 void ReleaseQueue::finish() noexcept {
-  while (destroy_some()) {
+  for (bool has_objects = true; has_objects;) {
+    while (destroy_some()) {
+    }
+    std::unique_lock lock(mutex_);
+    destroyed_.wait(lock, [&] { return destroyers_ == 0; });
+    has_objects = objects_ != 0;
   }
-  std::unique_lock lock(mutex_);
-  destroyed_.wait(lock, [&] { return destroyers_ == 0; });
 }
 
 // Workers with a job system. Posted jobs share ownership, because they may start after the workers have ended.

@@ -40,7 +40,8 @@ class ReleaseQueue : public std::enable_shared_from_this<ReleaseQueue> {
   ReleaseQueue& operator=(const ReleaseQueue&) = delete;
   ~ReleaseQueue() { close(); }
 
-  /// Returns once all objects that waited at the time of the call are destroyed, by this thread or by workers.
+  /// Returns once all objects that waited at the time of the call are destroyed, by this thread or by workers, and so
+  /// are the deferred objects that only they owned.
   /// Requires: the caller is not the destructor of such an object.
   void finish() noexcept;
 

@@ -407,6 +407,35 @@ TEST(ReleaseQueue, FinishWaitsForAllObjects) {
   opener.join();
 }
 
+// The worker that destroys the outer object is busy afterwards.
+TEST(ReleaseQueue, FinishDestroysObjectsOfObjects) {
+  struct Owner {
+    Owner(Gate& closed, std::shared_ptr<Destroyed> object) : gate(closed), inner(std::move(object)) {}
+    Owner(const Owner&) = delete;
+    Owner& operator=(const Owner&) = delete;
+    ~Owner() { gate.pass(); }
+    Gate& gate;
+    std::shared_ptr<Destroyed> inner;
+  };
+  Gate destroys;
+  Gate works;
+  std::atomic<std::thread::id> by;
+  Queue queue(1);
+  const std::shared_ptr<ReleaseQueue> releases = queue.workers().releases();
+  auto inner = releases->defer(std::make_shared<Destroyed>(by));
+  releases->defer(std::make_shared<Owner>(destroys, std::move(inner))).reset();
+  destroys.wait_until_reached();
+  queue.push([&] { works.pass(); });
+  std::thread opener([&] {
+    std::this_thread::sleep_for(20ms);
+    destroys.open();
+  });
+  releases->finish();
+  EXPECT_EQ(by.load(), std::this_thread::get_id());
+  works.open();
+  opener.join();
+}
+
 TEST(Replaceable, WaitsForUsesOfFormerValue) {
   Gate gate;
   std::atomic<int> inside{0};
