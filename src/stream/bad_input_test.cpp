@@ -21,6 +21,7 @@
 #include <quoin/store/world_maintenance.h>
 #include <quoin/stream/streamed_world.h>
 
+#include "core/work/job_system_for_tests.h"
 #include "store/world/disk_for_tests.h"
 #include "store/world/world_for_tests.h"
 #include "stream/chunk_streamer.h"
@@ -311,6 +312,50 @@ TEST_F(StreamedWorldBadInput, SavesLoadedChunksWithoutWorker) {
     ASSERT_TRUE(late.has_value() && late->has_value()) << x;
     EXPECT_EQ((*late)->voxels.get({0, 0, 0}), 2) << x;
   }
+}
+
+// The calling thread does the work of jobs while it waits, but not this work.
+TEST_F(StreamedWorldBadInput, LeavesGeneratorsToJobsInFlush) {
+  const ScopedJobSystem scope(make_worker_pool({2}));
+  Gate gate;
+  std::atomic<int> here = 0;
+  const auto generator =
+      std::make_shared<FunctionGround>([&, caller = std::this_thread::get_id()](IVec3, const Cancellation&) {
+        if (std::this_thread::get_id() != caller) {
+          gate.wait();
+        } else {
+          ++here;
+        }
+        return Result<StoredChunk>(StoredChunk{Chunk(1)});
+      });
+  StreamedWorld world = opened(generator, {.generator_timeout = 20ms});
+  WorldEdit::SetVoxels edit;
+  for (int i = 0; i < 10; ++i) edit.voxels.push_back({{64 * i, 0, 0}, 2});
+  ASSERT_TRUE(world.apply({0, edit}).has_value());
+  EXPECT_FALSE(world.flush().has_value());
+  EXPECT_EQ(here, 0);
+  gate.open();
+  EXPECT_TRUE(world.flush().has_value());
+}
+
+TEST_F(StreamedWorldBadInput, DropsChunksOfRemovedGrids) {
+  Gate gate;
+  const auto generator = std::make_shared<FunctionGround>([&](IVec3, const Cancellation&) {
+    gate.wait();
+    return Result<StoredChunk>(StoredChunk{Chunk(1)});
+  });
+  StreamedWorld world = opened(generator, {.workers = {2}});
+  const Viewer viewer{.position = DVec3(32.0), .radius = 20.0};
+  ASSERT_TRUE(world.update({&viewer, 1}).has_value());
+  gate.wait_until_reached();
+  world.scene().remove_grid(land(world));
+  const auto other = world.add_grid({.name = "other"}, std::make_shared<FunctionGround>());
+  ASSERT_TRUE(other.has_value()) << to_string(other.error());
+  world.scene().add_instance({.grid = *other});
+  gate.open();
+  ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+  EXPECT_EQ(world.scene().grids()[*other].grid.get(0, 0, 0), 1);
+  EXPECT_TRUE(world.take_problems().empty());
 }
 
 // Waits for its cancellation; gives up after a minute.

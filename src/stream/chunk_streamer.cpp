@@ -117,6 +117,11 @@ void ChunkStreamer::set_room(std::int64_t bytes, std::int64_t each) {
   workers_.wake_all();
 }
 
+std::size_t ChunkStreamer::working() {
+  const std::scoped_lock lock(outbox_mutex_);
+  return working_;
+}
+
 void ChunkStreamer::take(Outbox& out) {
   out.completed_loads.clear();
   out.problems.clear();
@@ -136,7 +141,7 @@ void ChunkStreamer::take(Outbox& out) {
   if (std::exchange(is_short_, false)) out.problems.emplace_back("not enough memory to load all requested chunks");
 }
 
-bool ChunkStreamer::wait(std::chrono::milliseconds at_most) {
+bool ChunkStreamer::wait(std::chrono::milliseconds at_most, bool helps) {
   std::uint64_t posted = 0;
   {
     const std::scoped_lock lock(inbox_mutex_);
@@ -150,7 +155,7 @@ bool ChunkStreamer::wait(std::chrono::milliseconds at_most) {
     const std::scoped_lock outbox(outbox_mutex_);
     return !outbox_.completed_loads.empty() || (working_ == 0 && !has_more_ && reported_posts_ >= posted);
   };
-  return workers_.wait_for(lock, std::chrono::duration<double>(at_most).count(), has_news, true);
+  return workers_.wait_for(lock, std::chrono::duration<double>(at_most).count(), has_news, helps);
 }
 
 // Processes the inbox. Requires: the plan's lock is held. If memory runs out, the next call continues there.
@@ -328,8 +333,9 @@ struct ChunkStreamer::Listed {
   Listed(ChunkStreamer& owner, Call& running) : streamer(owner), call(running) {
     const std::scoped_lock lock(streamer.calls_mutex_);
     streamer.calls_.push_back(&call);
-    // The list of calls may have been cancelled before.
-    if (streamer.is_ending_) call.is_cancelled = true;
+    // The calls may have been cancelled before, while this worker looked for the chunk in the file.
+    const auto& needs = streamer.needs_;
+    if (streamer.is_ending_ || (needs && !is_needed(*needs, call.place))) call.is_cancelled = true;
   }
   Listed(const Listed&) = delete;
   Listed& operator=(const Listed&) = delete;
@@ -383,7 +389,10 @@ void ChunkStreamer::make(const ChunkGenerator& generator, const Call& call, Comp
     rules = rules_;
   }
   const auto band = rules->bands.find(completed.place.grid);
-  QUOIN_ASSERT(band != rules->bands.end(), "the band of a grid with a generator");
+  if (band == rules->bands.end()) {  // the application removed the grid during the call
+    completed.outcome = CompletedLoad::Outcome::Cancelled;
+    return;
+  }
   if (const auto valid = validate_chunk(*made, rules->types, band->second); !valid) {
     return add_problem(completed.place, "its generator made content that is not valid: " + to_string(valid.error()));
   }
@@ -405,6 +414,11 @@ void ChunkStreamer::make(const ChunkGenerator& generator, const Call& call, Comp
 // because all workers may be in calls.
 void ChunkStreamer::cancel_calls(const StreamRequests* needs) {
   const std::scoped_lock lock(calls_mutex_);
+  try {
+    if (needs != nullptr) needs_ = *needs;
+  } catch (const std::bad_alloc&) {
+    needs_.reset();
+  }
   for (Call* const call : calls_) {
     if (needs == nullptr || !is_needed(*needs, call->place)) call->is_cancelled = true;
   }

@@ -148,7 +148,8 @@ class ChunkStreamer {
   void set_generator(std::uint32_t grid, std::shared_ptr<const ChunkGenerator> generator, const IBox& chunks,
                      std::span<const IVec3> others);
   [[nodiscard]] std::shared_ptr<const ChunkGenerator> generator_of(std::uint32_t grid) const;
-  /// Replaces the rules. Requires: they have the bands of all grids with generators.
+  /// Replaces the rules. They have the bands of all grids with generators, except grids that were removed: their chunks
+  /// are dropped.
   void set_rules(std::shared_ptr<const Rules> rules);
   /// Queues a note. Unless `is_urgent`, wakes no sleeping worker: a wake-up costs the caller more than the rest.
   /// Cancels calls of generators for chunks that its requests do not need.
@@ -159,8 +160,11 @@ class ChunkStreamer {
   /// Takes all results since the last call, with the current counters.
   void take(Outbox& out);
   /// Waits until there are results, all posted work is done, or there is no room for more. Returns false after
-  /// `at_most` without any of them.
-  bool wait(std::chrono::milliseconds at_most);
+  /// `at_most` without any of them. With a job system, `helps` lets the calling thread make chunks too, which can take
+  /// longer.
+  bool wait(std::chrono::milliseconds at_most, bool helps);
+  /// Returns the number of chunks that are being read or made.
+  [[nodiscard]] std::size_t working();
   [[nodiscard]] unsigned workers() const { return options_.workers; }
   /// Returns the chunks whose generators have not returned for Options::generator_timeout.
   [[nodiscard]] std::vector<ChunkAddress> slow_chunks() const;
@@ -222,8 +226,9 @@ class ChunkStreamer {
   std::uint64_t reported_posts_ = 0;
   bool has_more_ = false;
 
-  mutable std::mutex calls_mutex_;  ///< guards the members below, and Call::is_reported; never held for long
-  std::vector<Call*> calls_;        ///< running; at most one per worker
+  mutable std::mutex calls_mutex_;       ///< guards the members below, and Call::is_reported; never held for long
+  std::vector<Call*> calls_;             ///< running; at most one per worker
+  std::optional<StreamRequests> needs_;  ///< the last requests, for calls that begin later
   std::shared_ptr<const Rules> rules_ = std::make_shared<const Rules>();
 
   Workers workers_{plan_mutex_};  ///< last: they end first

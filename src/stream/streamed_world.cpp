@@ -44,6 +44,7 @@ constexpr std::size_t kMaxAsked = 1024;
 constexpr std::size_t kMaxMoved = 48;
 // Longest wait for workers before the caller checks again whether they are all in generators that do not return.
 constexpr auto kWait = std::chrono::milliseconds(100);
+constexpr int kHelpAfter = 10;  // such waits without a chunk in progress, after which `flush` makes chunks itself
 constexpr double kAsLongAsItTakes = std::numeric_limits<double>::infinity();
 constexpr auto kAskOthers = std::chrono::milliseconds(100);
 // Seconds between plans that only the budget causes.
@@ -801,7 +802,7 @@ Status StreamedWorld::load_all(std::span<const Viewer> viewers) {
   for (;;) {
     if (auto done = impl_->update(viewers, kAsLongAsItTakes); !done) return done;
     if (!impl_->has_moved && impl_->is_quiet()) return {};
-    (void)impl_->streamer.wait(kWait);
+    (void)impl_->streamer.wait(kWait, true);
   }
 }
 
@@ -833,6 +834,8 @@ Status StreamedWorld::apply(const WorldEdit& edit) {
 
 Status StreamedWorld::flush() {
   std::vector<ChunkAddress> slow;
+  // With a job system: a generator that never returns must not run on this thread, unless no worker is free.
+  int idle_waits = 0;
   impl_->note_edits();
   impl_->limit_grids();
   // Saves types first: chunks from workers and edits may need them.
@@ -847,15 +850,17 @@ Status StreamedWorld::flush() {
     impl_->must_plan |= impl_->asked_left == 0;
     impl_->move_chunks(kAsLongAsItTakes, Clock::now(), impl_->unposted);
     impl_->notify_workers();
-    if (impl_->waits_for_broken_alone() || impl_->streamer.wait(kWait)) continue;
+    if (impl_->waits_for_broken_alone() || impl_->streamer.wait(kWait, idle_waits >= kHelpAfter)) continue;
     slow = impl_->streamer.slow_chunks();
     if (!slow.empty() && !impl_->blocked_edits(slow)) break;
+    if (idle_waits < kHelpAfter) idle_waits = impl_->streamer.working() <= slow.size() ? idle_waits + 1 : 0;
   }
   Status waits = impl_->blocked_edits(slow);
   impl_->note_edits();
   if (auto saved = impl_->save_now(); !saved) return saved;
   if (impl_->store.is_writable()) {
     if (auto flushed = impl_->store.flush(); !flushed) return flushed;
+    impl_->disk->put(impl_->disk->begin(), {});  // the store may not have reported it yet
   }
   return waits;
 }

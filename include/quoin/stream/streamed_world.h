@@ -238,7 +238,8 @@ class StreamedWorld {
   /// nullopt for grids that are not streamed. Cost: O(log grids).
   [[nodiscard]] std::optional<std::uint32_t> number_of(GridHandle grid) const;
 
-  /// Saves all edits, including edits that wait for chunks, and returns when they are on disk.
+  /// Saves all edits, including edits that wait for chunks, and returns when they are on disk. With a job system, it
+  /// calls generators on this thread only if no worker takes such a chunk for a second.
   /// Errors: CannotWrite; unsaved data stays in memory. CannotRead if edits wait for a damaged chunk, or for a
   ///         generator that has not returned for StreamOptions::generator_timeout; the rest is saved, and these edits
   ///         still wait.
