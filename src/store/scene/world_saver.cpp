@@ -242,9 +242,9 @@ class Save {
         remove(part::kGroup, state_.groups, handle);
         continue;
       }
-      const std::string text = text_of(SceneFile::Group{*group, number_of(state_.groups, parent_of(scene_, handle)),
-                                                        number_of(state_.layers, group->layer)});
-      WorldParts::put(changes_, part::kGroup, state_.groups.of(handle), text);
+      WorldParts::put(changes_, state_.groups.of(handle),
+                      SceneFile::Group{*group, number_of(state_.groups, parent_of(scene_, handle)),
+                                       number_of(state_.layers, group->layer)});
     }
   }
 
@@ -258,10 +258,9 @@ class Save {
     if (grid == state_.grids.end()) {
       return make_error(ErrorCode::InvalidArgument, "the grid of instance \"" + instance->name + "\" does not exist");
     }
-    const std::string text =
-        text_of(SceneFile::Placement{*instance, grid->second.number, number_of(state_.groups, instance->group),
-                                     number_of(state_.layers, instance->layer)});
-    WorldParts::put(changes_, part::kInstance, state_.instances.of(handle), text);
+    WorldParts::put(changes_, state_.instances.of(handle),
+                    SceneFile::Placement{*instance, grid->second.number, number_of(state_.groups, instance->group),
+                                         number_of(state_.layers, instance->layer)});
     return {};
   }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <string_view>
 
@@ -101,6 +102,14 @@ std::string dumped(const T& part) {
   return writer.json_of(part).dump();
 }
 
+template <class Placed>
+bool has_readable_frame(const Placed& placed) {
+  constexpr std::size_t kMaxName = std::size_t{1} << 20;  // 6 MiB of text at most
+  const DQuat& q = placed.rotation;
+  return is_finite(placed.position) && is_finite(DVec3(q.x, q.y, q.z)) && std::isfinite(q.w) &&
+         placed.name.size() <= kMaxName;
+}
+
 }  // namespace
 
 std::string text_of(const VoxelProperties& type) {
@@ -155,6 +164,15 @@ std::string text_of(DVec3 vector) {
   return OrderedJson{vector.x, vector.y, vector.z}.dump();
 }
 
+bool is_readable(const SceneFile::Placement& instance) {
+  const Instance& own = instance.instance;
+  return instance.grid.has_value() && has_readable_frame(own) && std::isfinite(own.voxel_size) && own.voxel_size > 0.0;
+}
+
+bool is_readable(const SceneFile::Group& group) {
+  return has_readable_frame(group.group);
+}
+
 template <class T>
 Result<T> part_from(std::span<const std::byte> text, const std::string& name) {
   const std::string_view chars(reinterpret_cast<const char*>(text.data()), text.size());
@@ -190,20 +208,6 @@ Status check_as(std::span<const std::byte> body, const std::string& name) {
   return {};
 }
 
-// Checks that parts of the kind can have the number.
-Status check_number(const PartKey& key) {
-  const auto* const number = std::get_if<std::int64_t>(&key.id);
-  const bool is_type = key.kind == part::kType;
-  const bool is_grid = key.kind == part::kGrid;
-  const std::int64_t least = is_type ? 1 : 0;
-  const std::int64_t most = is_type   ? static_cast<std::int64_t>(kMaxVoxelTypes)
-                            : is_grid ? kMaxGridNumber
-                                      : kMaxPartNumber;
-  const bool is_valid = number != nullptr ? *number >= least && *number <= most : !is_type && !is_grid;
-  if (!is_valid) return make_error(ErrorCode::InvalidArgument, name_of(key) + " has an invalid number");
-  return {};
-}
-
 Status check_thumbnail(std::span<const std::byte> body, const std::string& name) {
   constexpr std::size_t kMaxBytes = std::size_t{16} << 20;
   constexpr std::array<std::uint8_t, 8> kPng = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n'};
@@ -216,6 +220,19 @@ Status check_thumbnail(std::span<const std::byte> body, const std::string& name)
 }
 
 }  // namespace
+
+Status check_number(const PartKey& key) {
+  const auto* const number = std::get_if<std::int64_t>(&key.id);
+  const bool is_type = key.kind == part::kType;
+  const bool is_grid = key.kind == part::kGrid;
+  const std::int64_t least = is_type ? 1 : 0;
+  const std::int64_t most = is_type   ? static_cast<std::int64_t>(kMaxVoxelTypes)
+                            : is_grid ? kMaxGridNumber
+                                      : kMaxPartNumber;
+  const bool is_valid = number != nullptr ? *number >= least && *number <= most : !is_type && !is_grid;
+  if (!is_valid) return make_error(ErrorCode::InvalidArgument, name_of(key) + " has an invalid number");
+  return {};
+}
 
 Status check_part(const PartKey& key, std::span<const std::byte> body) {
   const std::string name = name_of(key);

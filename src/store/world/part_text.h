@@ -29,10 +29,17 @@ namespace quoin::store {
 /// Returns a list of three numbers.
 [[nodiscard]] std::string text_of(DVec3 vector);
 
+/// Returns true if `check_part` accepts the text of the part: its numbers are finite, its scale is positive, and its
+/// name has at most 1 MiB, far below the limit of a part. Cost: O(1).
+[[nodiscard]] bool is_readable(const SceneFile::Placement& instance);
+[[nodiscard]] bool is_readable(const SceneFile::Group& group);
+
 /// Reads a part. `name`: its name for error messages. Errors: BadFormat.
 template <class T>
 [[nodiscard]] Result<T> part_from(std::span<const std::byte> text, const std::string& name);
 
+/// Checks that parts of the kind can have the number. Errors: InvalidArgument.
+[[nodiscard]] Status check_number(const PartKey& key);
 /// Checks that parts of the kind can have the number, and that a scene part can be read again. Parts of other kinds may
 /// have any content.
 /// Errors: InvalidArgument.

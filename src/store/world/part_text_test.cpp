@@ -1,5 +1,9 @@
 #include "store/world/part_text.h"
 
+#include <array>
+#include <cmath>
+#include <limits>
+#include <random>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -72,6 +76,44 @@ TEST(PartText, RejectsDamagedMark) {
   const Status refused = check_part({part::kGrid, std::int64_t{3}}, std::as_bytes(std::span(text)));
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::InvalidArgument);
+}
+
+// The writer makes the text of readable parts after the save was accepted, when it is too late for errors.
+TEST(PartText, AcceptsTextOfReadablePartsOnly) {
+  constexpr double kInf = std::numeric_limits<double>::infinity();
+  const std::array numbers = {0.0, -0.0, 1.0, -2.5, 0.1, 1e300, 5e-324, -1e-310, kInf, -kInf, std::nan("")};
+  const std::array<std::string, 4> names = {"", "a \"name\"", std::string("\0\xff", 2), "\xed\xa0\x80 \xc3\xa9"};
+  std::minstd_rand random(1);
+  int readable = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const auto number = [&] { return numbers[random() % (i % 2 == 0 ? 8 : numbers.size())]; };
+    SceneFile::Placement instance;
+    instance.grid = random();
+    instance.instance = {.name = names[random() % names.size()],
+                         .position = {number(), number(), number()},
+                         .rotation = {number(), number(), number(), number()},
+                         .voxel_size = number()};
+    if (random() % 2 == 0) instance.group = random();
+    const std::string text = text_of(instance);
+    const bool is_accepted = check_part({part::kInstance, std::int64_t{0}}, std::as_bytes(std::span(text))).has_value();
+    EXPECT_EQ(is_readable(instance), is_accepted) << text;
+    const SceneFile::Group group{{.name = instance.instance.name,
+                                  .position = instance.instance.position,
+                                  .rotation = instance.instance.rotation},
+                                 instance.group,
+                                 {}};
+    const std::string other = text_of(group);
+    EXPECT_EQ(is_readable(group),
+              check_part({part::kGroup, std::int64_t{0}}, std::as_bytes(std::span(other))).has_value())
+        << other;
+    readable += is_accepted ? 1 : 0;
+  }
+  EXPECT_GT(readable, 100);
+  EXPECT_LT(readable, 1000);
+  EXPECT_FALSE(is_readable(SceneFile::Placement{})) << "it has no grid";
+  SceneFile::Placement long_name{.instance = {}, .grid = 0};
+  long_name.instance.name.resize((std::size_t{1} << 20) + 1);
+  EXPECT_FALSE(is_readable(long_name)) << "its text is checked at once";
 }
 
 }  // namespace

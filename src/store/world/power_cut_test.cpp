@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "store/world/disk_for_tests.h"
+#include "store/world/part_text.h"
 #include "store/world/saves_for_tests.h"
 
 namespace quoin {
@@ -226,6 +227,48 @@ TEST(WorldFault, ReportsFailureToSavesThatWait) {
     EXPECT_TRUE(each.back());
     EXPECT_EQ(std::ranges::count(each, true), 1);
   }
+}
+
+// Instances wait as they are, and each retry makes their text again.
+TEST(WorldFault, KeepsInstancesOfFailedSaves) {
+  TestDisk disk("disk that becomes full under instances");
+  std::atomic<bool> is_full{true};
+  auto world = create_for_saves(kFile, disk.name());
+  ASSERT_TRUE(world.has_value());
+  disk.fault = [&](const char* what) { return is_full && what == std::string("write") ? SQLITE_FULL : SQLITE_OK; };
+  SceneFile::Placement instance{.instance = {}, .grid = 0};
+  const auto expect_last = [&](const WorldStore& stored, const char* when) {
+    const auto text = WorldParts::find(stored, {store::part::kInstance, std::int64_t{4}});
+    ASSERT_TRUE(text && *text) << when;
+    EXPECT_EQ(**text, store::body_of(store::text_of(instance))) << when;
+    const auto removed = WorldParts::find(stored, {store::part::kInstance, std::int64_t{5}});
+    EXPECT_TRUE(removed && !*removed) << when;
+  };
+  for (int i = 0; i < 3; ++i) {
+    instance.instance.position.x = 0.1 * i;
+    WorldChanges changes;
+    WorldParts::put(changes, 4, instance);
+    if (i == 0) {
+      WorldParts::put(changes, 5, instance);
+    } else {
+      WorldParts::remove(changes, store::part::kInstance, 5);
+    }
+    // Too many chunks for one commit, so that the saves wait one by one.
+    for (int x = 0; x < 200; ++x) changes.put_chunk({0, 0, {x, i, 0}}, {Chunk(1)});
+    ASSERT_TRUE(world->save(std::move(changes)));
+    EXPECT_FALSE(world->flush());
+    if (i > 0) expect_last(*world, "on a full disk");
+  }
+  EXPECT_FALSE(world->flush());
+  expect_last(*world, "after a retry");
+  is_full = false;
+  ASSERT_TRUE(world->flush());
+  EXPECT_EQ(world->stats().pending_bytes, 0U);
+  expect_last(*world, "on disk");
+  world = make_error(ErrorCode::Cancelled, "closed");
+  const auto again = WorldParts::open(kFile, WorldAccess::Write, {1}, disk.name());
+  ASSERT_TRUE(again.has_value());
+  expect_last(*again, "opened again");
 }
 
 }  // namespace

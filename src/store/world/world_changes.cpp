@@ -11,6 +11,20 @@
 
 namespace quoin::store {
 
+std::span<const std::byte> bytes_of(const PartContent& content, PartBody& made) {
+  if (const auto* const body = std::get_if<PartBody>(&content)) return *body;
+  const auto* const instance = std::get_if<SceneFile::Placement>(&content);
+  made = body_of(instance != nullptr ? text_of(*instance) : text_of(std::get<SceneFile::Group>(content)));
+  return made;
+}
+
+PartBody body_of(PartContent content) {
+  if (auto* const body = std::get_if<PartBody>(&content)) return std::move(*body);
+  PartBody made;
+  static_cast<void>(bytes_of(content, made));
+  return made;
+}
+
 void ChangeSet::remove_grid(std::uint32_t number) {
   std::erase_if(chunks, [&](const auto& each) { return each.first.grid == number; });
   parts.insert_or_assign({part::kGrid, std::int64_t{number}}, std::nullopt);
@@ -120,7 +134,7 @@ Result<WorldRules> WorldRules::after(const ChangeSet& changes) const {
   for (const auto& [key, body] : changes.parts) {
     const auto* const number = std::get_if<std::int64_t>(&key.id);
     if (key.kind == part::kType && body && number != nullptr) {
-      const auto type = part_from<VoxelProperties>(*body, name_of(key));
+      const auto type = part_from<VoxelProperties>(std::get<PartBody>(*body), name_of(key));
       if (!type) return make_error(ErrorCode::InvalidArgument, type.error().message);
       if (*number < 1) return make_error(ErrorCode::InvalidArgument, name_of(key) + ": number out of range");
       if (*number > static_cast<std::int64_t>(rules.types.size())) {
@@ -140,7 +154,7 @@ Result<WorldRules> WorldRules::after(const ChangeSet& changes) const {
         rules.grids.erase(grid_number);
         continue;
       }
-      const auto grid = part_from<WorldGrid>(*body, name_of(key));
+      const auto grid = part_from<WorldGrid>(std::get<PartBody>(*body), name_of(key));
       if (!grid) return make_error(ErrorCode::InvalidArgument, grid.error().message);
       rules.grids.insert_or_assign(grid_number, *grid);
     }
@@ -205,8 +219,13 @@ Status check_changes(const ChangeSet& changes, const WorldRules& rules) {
       return make_error(done.error().code, about(place) + ": " + done.error().message);
     }
   }
-  for (const auto& [key, body] : changes.parts) {
-    if (!body) continue;
+  for (const auto& [key, content] : changes.parts) {
+    if (!content) continue;
+    const auto* const body = std::get_if<PartBody>(&*content);
+    if (body == nullptr) {  // readable, as checked when it was put
+      if (auto done = check_number(key); !done) return done;
+      continue;
+    }
     if (body->size() > kMaxValueBytes) {
       return make_error(ErrorCode::InvalidArgument, name_of(key) + " exceeds 64 MiB");
     }
@@ -284,8 +303,26 @@ std::size_t WorldChanges::chunk_count() const {
   return content_->chunks.size();
 }
 
+namespace {
+
+template <class T>
+void put_content(WorldChanges& changes, const char* kind, std::int64_t id, T content) {
+  if (!store::is_readable(content)) return WorldParts::put(changes, kind, id, store::text_of(content));
+  changes.content().parts.insert_or_assign({kind, id}, std::move(content));
+}
+
+}  // namespace
+
 void WorldParts::put(WorldChanges& changes, store::PartKey key, std::optional<PartBody> body) {
   changes.content().parts.insert_or_assign(std::move(key), std::move(body));
+}
+
+void WorldParts::put(WorldChanges& changes, std::int64_t id, SceneFile::Placement instance) {
+  put_content(changes, store::part::kInstance, id, std::move(instance));
+}
+
+void WorldParts::put(WorldChanges& changes, std::int64_t id, SceneFile::Group group) {
+  put_content(changes, store::part::kGroup, id, std::move(group));
 }
 
 void WorldParts::put(WorldChanges& changes, const char* kind, std::int64_t id, std::string_view text) {

@@ -6,12 +6,15 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <unordered_map>
+#include <variant>
 #include <vector>
 
 #include <quoin/core/hash.h>
 #include <quoin/grid/voxel_registry.h>
+#include <quoin/io/scene_file.h>
 #include <quoin/store/world_store.h>
 
 #include "store/database/schema.h"
@@ -28,11 +31,18 @@ struct ChunkAddressHash {
 };
 
 using PartBody = std::vector<std::byte>;
+/// The content of a part: its bytes, or an instance or a group whose text the writer makes on its own thread.
+using PartContent = std::variant<PartBody, SceneFile::Placement, SceneFile::Group>;
+
+/// Returns the bytes that the file stores, in `made` if the content has none yet. Lifetime: of both arguments.
+[[nodiscard]] std::span<const std::byte> bytes_of(const PartContent& content, PartBody& made);
+/// Returns the bytes that the file stores.
+[[nodiscard]] PartBody body_of(PartContent content);
 
 struct ChangeSet {
   std::set<std::uint32_t> removed_grids;  ///< applied first
   std::unordered_map<ChunkAddress, std::optional<StoredChunk>, ChunkAddressHash> chunks;
-  std::map<PartKey, std::optional<PartBody>> parts;
+  std::map<PartKey, std::optional<PartContent>> parts;
 
   [[nodiscard]] bool empty() const { return removed_grids.empty() && chunks.empty() && parts.empty(); }
   void remove_grid(std::uint32_t number);
@@ -76,6 +86,11 @@ struct WorldParts {
   /// Sets a part's body; nullopt removes the part.
   static void put(WorldChanges& changes, store::PartKey key, std::optional<PartBody> body);
   static void put(WorldChanges& changes, const char* kind, std::int64_t id, std::string_view text);
+  /// Keeps a copy of the instance; the writer's thread makes its text. An instance that cannot be read again becomes
+  /// text at once, which `save` refuses.
+  static void put(WorldChanges& changes, std::int64_t id, SceneFile::Placement instance);
+  /// As for an instance.
+  static void put(WorldChanges& changes, std::int64_t id, SceneFile::Group group);
   static void remove(WorldChanges& changes, const char* kind, std::int64_t id);
   /// Returns the part's body, saved or pending. Errors: BadFormat if it is damaged; CannotRead.
   [[nodiscard]] static Result<std::optional<PartBody>> find(const WorldStore& world, const store::PartKey& key);

@@ -351,7 +351,9 @@ Result<std::optional<std::vector<std::byte>>> WorldStore::thumbnail() const {
 Result<std::optional<PartBody>> WorldParts::find(const WorldStore& world, const PartKey& key) {
   const WorldStore::Impl& impl = world.impl();
   if (impl.writer != nullptr) {
-    if (auto pending = impl.writer->pending_part(key)) return std::move(*pending);
+    if (auto pending = impl.writer->pending_part(key)) {
+      return *pending ? std::optional(body_of(std::move(**pending))) : std::optional<PartBody>();
+    }
   }
   return impl.with_kit([&](ReadKit& kit) { return kit.reader.part(key); });
 }
@@ -369,7 +371,7 @@ Status WorldParts::each(const WorldStore& world, const char* kind, FunctionRef<v
   const WorldStore::Impl& impl = world.impl();
   std::map<PartKey, PartBody> parts;
   std::set<PartKey> damaged;
-  std::vector<std::pair<PartKey, std::optional<PartBody>>> pending;
+  std::vector<std::pair<PartKey, std::optional<PartContent>>> pending;
   if (impl.writer != nullptr) pending = impl.writer->pending_parts(kind);
   Status done = impl.with_kit([&](ReadKit& kit) {
     return kit.reader.each_part(kind, [&](const Part& part, bool is_sound) {
@@ -378,10 +380,10 @@ Status WorldParts::each(const WorldStore& world, const char* kind, FunctionRef<v
     });
   });
   if (!done) return done;
-  for (auto& [key, body] : pending) {
+  for (auto& [key, content] : pending) {
     damaged.erase(key);
-    if (body) {
-      parts[key] = std::move(*body);
+    if (content) {
+      parts[key] = body_of(std::move(*content));
     } else {
       parts.erase(key);
     }

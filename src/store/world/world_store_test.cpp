@@ -2,7 +2,9 @@
 
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <climits>
+#include <cmath>
 #include <fstream>
 #include <stdexcept>
 #include <string>
@@ -14,6 +16,8 @@
 
 #include "core/death_for_tests.h"
 #include "store/database/schema.h"
+#include "store/world/part_text.h"
+#include "store/world/world_changes.h"
 #include "store/world/world_for_tests.h"
 
 namespace quoin {
@@ -189,6 +193,76 @@ TEST(WorldStore, SaveRejectsUnreadableChanges) {
   EXPECT_EQ(refused([&](auto& c) { c.put_chunk({0, 0, {}}, {chunk}); }), ErrorCode::InvalidArgument);
   EXPECT_TRUE(world.chunks(0, 0)->empty());
   EXPECT_EQ(world.grids()->size(), 1U);
+}
+
+SceneFile::Placement placed(const char* name, double x) {
+  SceneFile::Placement instance{.instance = {}, .grid = 0, .group = 2};
+  instance.instance.name = name;
+  instance.instance.position = {x, -0.0, 1e9 / 3.0};
+  return instance;
+}
+
+TEST(WorldStore, StoresInstancesAsTheirText) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  const SceneFile::Placement instance = placed("ship", 0.1);
+  const SceneFile::Group group{{.name = "not \xff UTF-8", .rotation = {0.5, 0.5, -0.5, 0.5}}, 1, {}};
+  const auto expect_texts = [&](const WorldStore& world, const char* when) {
+    const auto of_instance = WorldParts::find(world, {store::part::kInstance, std::int64_t{7}});
+    ASSERT_TRUE(of_instance && *of_instance) << when;
+    EXPECT_EQ(**of_instance, bytes_of(store::text_of(instance))) << when;
+    const auto of_group = WorldParts::find(world, {store::part::kGroup, std::int64_t{2}});
+    ASSERT_TRUE(of_group && *of_group) << when;
+    EXPECT_EQ(**of_group, bytes_of(store::text_of(group))) << when;
+    const auto removed = WorldParts::find(world, {store::part::kInstance, std::int64_t{8}});
+    EXPECT_TRUE(removed && !*removed) << when;
+    int count = 0;
+    EXPECT_TRUE(WorldParts::each(world, store::part::kInstance, [&](const store::Part& part, bool is_sound) {
+      EXPECT_TRUE(is_sound && std::ranges::equal(part.body, **of_instance)) << when;
+      ++count;
+    }));
+    EXPECT_EQ(count, 1) << when;
+  };
+  {
+    WorldStore world = made(path);
+    WorldChanges first;
+    WorldParts::put(first, 7, placed("ship", 4.0));
+    WorldParts::put(first, 8, placed("gone", 5.0));
+    ASSERT_TRUE(world.save(std::move(first)));
+    WorldChanges second;
+    WorldParts::put(second, 7, instance);
+    WorldParts::put(second, 2, group);
+    WorldParts::remove(second, store::part::kInstance, 8);
+    ASSERT_TRUE(world.save(std::move(second)));
+    expect_texts(world, "pending or just written");
+    ASSERT_TRUE(world.flush());
+    expect_texts(world, "on disk");
+  }
+  expect_texts(*WorldStore::open(path, WorldAccess::Read), "opened again");
+}
+
+TEST(WorldStore, SaveRejectsUnreadableInstancesAtOnce) {
+  const WorldFolder folder;
+  WorldStore world = made(folder / "w.quoin");
+  const auto error_of = [&](auto&& put) {
+    WorldChanges changes;
+    WorldParts::put(changes, 1, placed("sound", 1.0));
+    changes.put_value("x", bytes_of("y"));
+    put(changes);
+    const auto ticket = world.save(std::move(changes));
+    return ticket ? std::string("accepted") : ticket.error().message;
+  };
+  const SceneFile::Placement unreadable = placed("ship", std::nan(""));
+  const std::string as_text =
+      error_of([&](auto& changes) { WorldParts::put(changes, store::part::kInstance, 3, store::text_of(unreadable)); });
+  EXPECT_EQ(as_text, "instance 3.position[0]: must be a number");
+  EXPECT_EQ(error_of([&](auto& changes) { WorldParts::put(changes, 3, unreadable); }), as_text);
+  const std::int64_t too_large = store::kMaxPartNumber + 1;
+  EXPECT_NE(error_of([&](auto& c) { WorldParts::put(c, too_large, placed("ship", 1.0)); }).find("an invalid number"),
+            std::string::npos);
+  ASSERT_TRUE(world.flush());
+  EXPECT_FALSE(world.value("x")->has_value()) << "a refused save stores nothing";
+  EXPECT_FALSE(WorldParts::find(world, {store::part::kInstance, std::int64_t{1}})->has_value());
 }
 
 TEST(WorldStore, ListsChunksAtItsLimits) {

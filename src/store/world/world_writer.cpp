@@ -1,6 +1,7 @@
 #include "store/world/world_writer.h"
 
 #include <algorithm>
+#include <ranges>
 #include <span>
 #include <string>
 
@@ -84,11 +85,10 @@ void WorldWriter::note_pending(const ChangeSet& changes, std::uint64_t ticket) {
     for (auto it = pending_chunks_.begin(); it != pending_chunks_.end();) it = it->first.grid == grid ? drop(it) : ++it;
   }
   for (const auto& [place, chunk] : changes.chunks) {
-    Pending<StoredChunk>& pending = pending_chunks_[place];
+    PendingChunk& pending = pending_chunks_[place];
     stats_.pending_bytes += bytes_of(chunk) - bytes_of(pending.content);
     pending = {chunk, ticket};
   }
-  for (const auto& [key, body] : changes.parts) pending_parts_[key] = {body, ticket};
   stats_.pending_chunks = pending_chunks_.size();
 }
 
@@ -98,10 +98,6 @@ void WorldWriter::forget_pending(const Save& group) {
     if (found == pending_chunks_.end() || found->second.ticket > group.last) continue;
     stats_.pending_bytes -= bytes_of(found->second.content);
     pending_chunks_.erase(found);
-  }
-  for (const auto& [key, body] : group.changes.parts) {
-    const auto found = pending_parts_.find(key);
-    if (found != pending_parts_.end() && found->second.ticket <= group.last) pending_parts_.erase(found);
   }
   std::erase_if(pending_removed_, [&](const auto& removed) { return removed.second <= group.last; });
   stats_.pending_chunks = pending_chunks_.size();
@@ -138,11 +134,15 @@ std::optional<std::optional<StoredChunk>> WorldWriter::pending_chunk(const Chunk
   return std::nullopt;
 }
 
-std::optional<std::optional<PartBody>> WorldWriter::pending_part(const PartKey& key) const {
+std::optional<std::optional<PartContent>> WorldWriter::pending_part(const PartKey& key) const {
   const std::scoped_lock lock(mutex_);
-  const auto found = pending_parts_.find(key);
-  if (found == pending_parts_.end()) return std::nullopt;
-  return found->second.content;
+  for (const std::list<Save>* const saves : {&queue_, &group_}) {
+    for (const Save& save : *saves | std::views::reverse) {
+      const auto found = save.changes.parts.find(key);
+      if (found != save.changes.parts.end()) return found->second;
+    }
+  }
+  return std::nullopt;
 }
 
 WorldWriter::PendingChunks WorldWriter::pending_chunks(std::uint32_t grid, std::uint8_t level, const IBox& box) const {
@@ -156,11 +156,15 @@ WorldWriter::PendingChunks WorldWriter::pending_chunks(std::uint32_t grid, std::
   return found;
 }
 
-std::vector<std::pair<PartKey, std::optional<PartBody>>> WorldWriter::pending_parts(std::string_view kind) const {
+std::vector<std::pair<PartKey, std::optional<PartContent>>> WorldWriter::pending_parts(std::string_view kind) const {
   const std::scoped_lock lock(mutex_);
-  std::vector<std::pair<PartKey, std::optional<PartBody>>> found;
-  for (const auto& [key, pending] : pending_parts_) {
-    if (key.kind == kind) found.emplace_back(key, pending.content);
+  std::vector<std::pair<PartKey, std::optional<PartContent>>> found;
+  for (const std::list<Save>* const saves : {&group_, &queue_}) {
+    for (const Save& save : *saves) {
+      for (const auto& [key, content] : save.changes.parts) {
+        if (key.kind == kind) found.emplace_back(key, content);
+      }
+    }
   }
   return found;
 }
@@ -277,8 +281,8 @@ Status WorldWriter::write_all(const ChangeSet& changes) {
     if (auto done = remove_grid(grid); !done) return done;
   }
   if (auto done = write_chunks(changes); !done) return done;
-  for (const auto& [key, body] : changes.parts) {
-    if (auto done = write_part(key, body); !done) return done;
+  for (const auto& [key, content] : changes.parts) {
+    if (auto done = write_part(key, content); !done) return done;
   }
   const auto put = [&](const char* name, std::uint64_t number) {
     return write_part({part::kWorld, std::string(name)}, body_of(std::to_string(number)));
@@ -380,17 +384,18 @@ Status WorldWriter::put_chunks(std::vector<Encoded>& chunks) {
   return {};
 }
 
-Status WorldWriter::write_part(const PartKey& key, const std::optional<PartBody>& body) {
-  const auto prepared = ready(body ? kPutPart : kDeletePart);
+Status WorldWriter::write_part(const PartKey& key, const std::optional<PartContent>& content) {
+  const auto prepared = ready(content ? kPutPart : kDeletePart);
   if (!prepared) return prepared.error();
   Statement& statement = **prepared;
   statement.bind(0, std::string_view(key.kind));
   bind(statement, 1, key.id);
-  if (body) {
-    const Part part{key, revision_, *body};
+  PartBody made;
+  if (content) {
+    const Part part{key, revision_, bytes_of(*content, made)};
     statement.bind(2, static_cast<std::int64_t>(revision_));
     statement.bind(3, static_cast<std::int64_t>(sum_of(part)));
-    statement.bind(4, std::span<const std::byte>(*body));
+    statement.bind(4, part.body);
   }
   return statement.run();
 }

@@ -43,7 +43,7 @@ class WorldWriter {
   /// Returns the chunk to be saved, or an inner nullopt if it is to be removed; nullopt if it has no pending change.
   [[nodiscard]] std::optional<std::optional<StoredChunk>> pending_chunk(const ChunkAddress& place) const;
   /// As `pending_chunk`.
-  [[nodiscard]] std::optional<std::optional<PartBody>> pending_part(const PartKey& key) const;
+  [[nodiscard]] std::optional<std::optional<PartContent>> pending_part(const PartKey& key) const;
   /// The pending changes to the chunks of a grid and level in a box: each chunk with true if it will exist, false if it
   /// is removed. With `is_removed` the grid's other chunks are removed.
   struct PendingChunks {
@@ -51,8 +51,8 @@ class WorldWriter {
     std::vector<std::pair<IVec3, bool>> chunks;
   };
   [[nodiscard]] PendingChunks pending_chunks(std::uint32_t grid, std::uint8_t level, const IBox& box) const;
-  /// Returns the pending changes to the parts of a kind; nullopt for removed parts.
-  [[nodiscard]] std::vector<std::pair<PartKey, std::optional<PartBody>>> pending_parts(std::string_view kind) const;
+  /// Returns the pending changes to the parts of a kind, in the order of their saves; nullopt for removed parts.
+  [[nodiscard]] std::vector<std::pair<PartKey, std::optional<PartContent>>> pending_parts(std::string_view kind) const;
 
  private:
   struct Save {
@@ -60,9 +60,8 @@ class WorldWriter {
     ChangeSet changes;
     std::vector<OnSaved> on_saved;
   };
-  template <class T>
-  struct Pending {
-    std::optional<T> content;
+  struct PendingChunk {
+    std::optional<StoredChunk> content;
     std::uint64_t ticket = 0;
   };
   struct Encoded {
@@ -87,7 +86,7 @@ class WorldWriter {
   [[nodiscard]] Status remove_grid(std::uint32_t number);
   [[nodiscard]] Status write_chunks(const ChangeSet& changes);
   [[nodiscard]] Status put_chunks(std::vector<Encoded>& chunks);
-  [[nodiscard]] Status write_part(const PartKey& key, const std::optional<PartBody>& body);
+  [[nodiscard]] Status write_part(const PartKey& key, const std::optional<PartContent>& content);
   [[nodiscard]] Result<std::optional<std::int64_t>> region_for(const RegionPlace& place, bool may_add);
   [[nodiscard]] Result<Statement*> ready(const char* sql);
 
@@ -98,14 +97,15 @@ class WorldWriter {
   std::vector<ChunkEncoder> encoders_;
   std::map<const char*, Statement> statements_;
   std::map<RegionPlace, std::int64_t> regions_;
-  std::list<Save> group_;  ///< being saved: one save; a step that throws leaves it to the next
+  /// Being saved: one save; a step that throws leaves it to the next. While it is written, its changes stay as they
+  /// are: `pending_part` and `pending_parts` read them as well.
+  std::list<Save> group_;
   std::uint64_t bytes_of_commit_ = 0;
   std::uint64_t chunks_of_commit_ = 0;
 
   mutable std::mutex mutex_;
   std::list<Save> queue_;
-  std::unordered_map<ChunkAddress, Pending<StoredChunk>, ChunkAddressHash> pending_chunks_;
-  std::map<PartKey, Pending<PartBody>> pending_parts_;
+  std::unordered_map<ChunkAddress, PendingChunk, ChunkAddressHash> pending_chunks_;
   std::map<std::uint32_t, std::uint64_t> pending_removed_;  // grids, with their tickets
   std::uint64_t last_ticket_ = 0;
   std::uint64_t saved_through_ = 0;
