@@ -61,13 +61,13 @@ class ChangeJournal {
     }
   }
 
-  /// Moves the cursor to the present and calls `visit(record)` for each later record, oldest first. Returns false
-  /// without a visit if the changes since the cursor are unknown.
+  /// Moves the cursor to the present and calls `visit(record, serial)` for each later record, oldest first. Returns
+  /// false without a visit if the changes since the cursor are unknown.
   template <class Visit>
   bool visit_since(ChangeCursor& cursor, Visit&& visit) const {
     const bool is_known = cursor.container_ == container_ && cursor.next_ >= first_ && cursor.next_ <= end_;
     if (is_known) {
-      for (std::uint64_t serial = cursor.next_; serial < end_; ++serial) visit(at(serial));
+      for (std::uint64_t serial = cursor.next_; serial < end_; ++serial) visit(at(serial), serial);
     }
     observe();
     cursor.container_ = container_;
@@ -88,7 +88,7 @@ class ChangeJournal {
     std::vector<Record> records;
     Changes<Change> changes;
     ChangeCursor end = cursor;
-    changes.all = !visit_since(end, [&](const Record& record) { records.push_back(record); });
+    changes.all = !visit_since(end, [&](const Record& record, std::uint64_t) { records.push_back(record); });
     std::stable_sort(records.begin(), records.end(), less);
     for (std::size_t i = 0; i < records.size();) {
       Record united = records[i];
@@ -102,7 +102,7 @@ class ChangeJournal {
   /// Returns a cursor at the present, as `visit_since` leaves it.
   [[nodiscard]] ChangeCursor present() const {
     ChangeCursor cursor;
-    visit_since(cursor, [](const Record&) {});
+    visit_since(cursor, [](const Record&, std::uint64_t) {});
     return cursor;
   }
   /// Returns true if `visit_since` would visit a record or return false.
@@ -120,6 +120,8 @@ class ChangeJournal {
   static constexpr std::uint64_t kNoConsumer = ~std::uint64_t{0};
   static constexpr std::size_t kBlock = 256;
   static constexpr std::size_t kLeast = 8192;  // minimum number of records kept, even for a small container
+  // Records kept per key. If every frame changes a tenth of the keys, these are 80 frames: more than a save waits.
+  static constexpr std::size_t kPerKey = 8;
   using Block = std::array<Record, kBlock>;
 
   // Marks all records as possibly read.
@@ -139,7 +141,7 @@ class ChangeJournal {
   }
 
   void append(std::uint64_t& serial, const Record& record, std::size_t keys) {
-    if (end_ - first_ >= kLeast + 2 * keys) trim();
+    if (end_ - first_ >= kLeast + kPerKey * keys) trim();
     if (blocks_.empty() || end_ % kBlock == 0) {
       try {
         blocks_.push_back(std::make_shared<Block>());

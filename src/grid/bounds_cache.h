@@ -18,8 +18,8 @@ namespace quoin {
 /// The bounds of a grid, cached between calls. Changes inside the bounds that do not touch their sides keep the cached
 /// bounds. After any other change, the cache keeps the boxes of all chunks.
 ///
-/// `Entries` are the grid's chunks and `Record` is the record type of its journal. `BoxOfEntry::of(entry)` returns the
-/// box of the counted voxels in one chunk, in the chunk's coordinates.
+/// `Entries` are the grid's chunks, with the serial of their last record, and `Record` is the record type of its
+/// journal. `BoxOfEntry::of(entry)` returns the box of the counted voxels in one chunk, in the chunk's coordinates.
 /// Threads: queries may run concurrently.
 template <class Record, class Entries, class BoxOfEntry>
 class BoundsCache {
@@ -43,9 +43,9 @@ class BoundsCache {
     const std::lock_guard lock(mutex_);
     bool is_within_all = true;
     ChangeCursor now = cursor_;
-    const bool is_known = journal.visit_since(now, [&](const Record& record) {
-      is_within_all &= is_within(record);
-      if (boxes_ != nullptr) put(record.chunk, entries);
+    const bool is_known = journal.visit_since(now, [&](const Record& record, std::uint64_t serial) {
+      is_within_all = is_within_all && is_within(record);
+      if (boxes_ != nullptr) put(record.chunk, serial, entries);
     });
     if (!is_known) {
       boxes_.reset();
@@ -72,8 +72,10 @@ class BoundsCache {
     const IBox inside = BoxOfEntry::of(entry);
     return {inside.min + at * kChunkEdge, inside.max + at * kChunkEdge};
   }
-  void put(IVec3 chunk, const Entries& entries) {
+  // Leaves out chunks with a later record: a chunk that changes in each frame has many.
+  void put(IVec3 chunk, std::uint64_t serial, const Entries& entries) {
     const auto* const entry = entries.find(chunk.x, chunk.y, chunk.z);
+    if (entry != nullptr && entry->serial > serial) return;
     boxes_->put(chunk, entry == nullptr ? IBox{} : box_of(chunk, *entry));
   }
   [[nodiscard]] static bool changes_voxels(const Record& record) {

@@ -292,7 +292,7 @@ SceneChanges Scene::changes_since(ChangeCursor& cursor) const {
   const std::lock_guard lock(book().mutex);
   book_->collect(grids_, keys());
   ChangeCursor end = cursor;
-  changes.all = !book_->journal.visit_since(end, [&](const SceneRecord& record) {
+  changes.all = !book_->journal.visit_since(end, [&](const SceneRecord& record, std::uint64_t) {
     switch (record.kind) {
       case Kind::Grid:
         changes.grids.push_back({record.index, record.generation});

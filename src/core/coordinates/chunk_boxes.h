@@ -20,14 +20,17 @@ class ChunkBoxes {
   void put(IVec3 chunk, const IBox& box) {
     try {
       const auto found = boxes_.find(chunk);
-      if (found != boxes_.end()) {
-        if (found->second == box) return;
+      if (found == boxes_.end()) {
+        if (box.empty()) return;
+        boxes_.emplace(chunk, box);
+        if (is_counted_) count(box, 1);
+      } else if (box.empty()) {
         if (is_counted_) count(found->second, -1);
         boxes_.erase(found);
+      } else {
+        if (is_counted_) count_move(found->second, box);
+        found.value() = box;
       }
-      if (box.empty()) return;
-      boxes_.emplace(chunk, box);
-      if (is_counted_) count(box, 1);
     } catch (...) {
       is_counted_ = false;
       throw;
@@ -72,6 +75,18 @@ class ChunkBoxes {
     for (int axis = 0; axis < 3; ++axis) {
       count(mins_[static_cast<std::size_t>(axis)], box.min[axis], by);
       count(maxs_[static_cast<std::size_t>(axis)], box.max[axis], by);
+    }
+  }
+  // Most boxes that change keep some of their sides.
+  void count_move(const IBox& from, const IBox& to) {
+    const auto move = [](std::map<int, int>& ends, int before, int now) {
+      if (before == now) return;
+      count(ends, before, -1);
+      count(ends, now, 1);
+    };
+    for (int axis = 0; axis < 3; ++axis) {
+      move(mins_[static_cast<std::size_t>(axis)], from.min[axis], to.min[axis]);
+      move(maxs_[static_cast<std::size_t>(axis)], from.max[axis], to.max[axis]);
     }
   }
   static void count(std::map<int, int>& ends, int at, int by) {
