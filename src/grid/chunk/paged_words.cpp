@@ -76,10 +76,11 @@ void PagedWords::shrink_to_fit() {
   if (used_of(last) < pages_[last]->capacity()) replace_page(last, used_of(last));
 }
 
+// Without a look at each page: all except the last one have full capacity.
 std::size_t PagedWords::allocated() const {
-  std::size_t bytes = pages_.capacity() * sizeof(Ref<Page>);
-  for (const Ref<Page>& page : pages_) bytes += sizeof(Page) + page->capacity() * sizeof(std::uint64_t);
-  return bytes;
+  if (pages_.empty()) return pages_.capacity() * sizeof(Ref<Page>);
+  const std::size_t words = (pages_.size() - 1) * kPageWords + pages_.back()->capacity();
+  return pages_.capacity() * sizeof(Ref<Page>) + pages_.size() * sizeof(Page) + words * sizeof(std::uint64_t);
 }
 
 }  // namespace quoin

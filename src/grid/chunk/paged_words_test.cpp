@@ -76,6 +76,10 @@ TEST(PagedWords, GrowAndShrinkWithoutTouchingCopies) {
     }
     if (i % 7 == 0) copies.emplace_back(words, wanted);
     if (i % 11 == 0) words.shrink_to_fit();
+    std::size_t pages = 0;
+    words.for_each_page([&](std::span<const std::uint64_t>) { ++pages; });
+    EXPECT_GE(words.allocated(), 8 * words.size() + 16 * pages);
+    EXPECT_LE(words.allocated(), 8 * PagedWords::kPageWords * pages + 48 * pages);
   }
   EXPECT_EQ(all_of(words), wanted);
   for (const auto& [copy, its] : copies) EXPECT_EQ(all_of(copy), its);
