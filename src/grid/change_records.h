@@ -78,9 +78,9 @@ struct VoxelRecord {
     box.unite(PackedBox::of_row(y, z, changed));
     slabs.add(y, z);
   }
-  /// Adds one voxel that is on no side of the chunk.
-  void add_inner(int x, int y, int z) {
-    QUOIN_ASSERT(sides(x) == 0b010U && sides(y) == 0b010U && sides(z) == 0b010U, "on no side of the chunk");
+  /// Adds a changed voxel. Most are on no side of the chunk.
+  void add_voxel(int x, int y, int z) {
+    if (((sides(x) | sides(y) | sides(z)) & 0b101U) != 0) return add(y, z, std::uint64_t{1} << x);
     neighbours |= kCentreOnly;
     box.unite(PackedBox::of(x, y, z));
     slabs.add(y, z);
@@ -128,6 +128,10 @@ struct VoxelEdit {
     if (changed == 0) return;
     voxels += std::popcount(changed);
     record.add(y, z, changed);
+  }
+  void add_voxel(int x, int y, int z) {
+    ++voxels;
+    record.add_voxel(x, y, z);
   }
   void add_all() {
     voxels = kChunkVoxels;

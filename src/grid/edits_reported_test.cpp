@@ -164,6 +164,79 @@ TEST(Grid, SetsManyVoxelsAtOnce) {
   EXPECT_EQ(one.set(std::span<const PlacedVoxel>()), 0);
 }
 
+// A list that is long enough for several threads, in an order in which consecutive voxels lie in different chunks. A
+// snapshot shares all chunks before each edit, and some of them share their storage with each other.
+TEST(Grid, SetsLongListsOnSeveralThreads) {
+  const Chunk ground = [] {
+    Chunk chunk;
+    chunk.fill_box({{0, 0, 0}, {64, 30, 64}}, 7, [](int, int, std::uint64_t) {});
+    return chunk;
+  }();
+  for (const unsigned threads : {1U, 4U, 0U}) {
+    std::mt19937 random(threads);
+    Grid one;
+    Grid other;
+    for (Grid* const grid : {&one, &other}) {
+      for (int i = 0; i < 25; ++i) grid->put_chunk({i % 5 - 2, 0, i / 5 - 2}, ground);
+      for (int i = 0; i < 64; ++i) grid->set_data({i, 29, i}, {3, {}});
+    }
+    ChangeCursor cursor = one.cursor();
+    ChangeCursor of_other = other.cursor();
+    ChangeCursor data = one.cursor();
+    ChangeCursor data_of_other = other.cursor();
+    for (int round = 0; round < 6; ++round) {
+      std::vector<PlacedVoxel> voxels;
+      const auto between = [&](int low, int high) {
+        return low + static_cast<int>(random() % static_cast<unsigned>(high - low));
+      };
+      for (int i = 0; i < 4'000; ++i) {
+        const IVec3 at{between(-130, 130), between(20, 70), between(-130, 130)};
+        voxels.push_back({at, static_cast<VoxelType>(between(0, 2 + 8 * round))});
+        voxels.push_back({at - IVec3{0, 1, 0}, kAir});
+        if (i % 50 == 0) voxels.push_back({at, 1});
+      }
+      const Grid before = one.snapshot();
+      std::int64_t changed = 0;
+      for (const PlacedVoxel& each : voxels) changed += other.set(each.voxel, each.type) ? 1 : 0;
+      EXPECT_EQ(one.set(voxels, {threads}), changed);
+      EXPECT_TRUE(compared(one, other).empty());
+      EXPECT_EQ(one.voxel_count(), other.voxel_count());
+      EXPECT_EQ(one.data_count(), other.data_count());
+      EXPECT_EQ(one.chunks(), other.chunks());
+      EXPECT_EQ(one.bounds(), other.bounds());
+      const GridChanges changes = one.changes_since(cursor);
+      EXPECT_EQ(reported(before, one, changes), compared(before, one));
+      const GridChanges expected = other.changes_since(of_other);
+      ASSERT_EQ(changes.items.size(), expected.items.size());
+      for (std::size_t i = 0; i < expected.items.size(); ++i) {
+        EXPECT_EQ(changes.items[i].chunk, expected.items[i].chunk);
+        EXPECT_EQ(changes.items[i].box, expected.items[i].box);
+        EXPECT_EQ(changes.items[i].neighbours, expected.items[i].neighbours);
+      }
+      const DataChanges removed = one.data_changes_since(data);
+      const DataChanges expected_removed = other.data_changes_since(data_of_other);
+      ASSERT_EQ(removed.items.size(), expected_removed.items.size());
+      for (std::size_t i = 0; i < removed.items.size(); ++i) {
+        EXPECT_EQ(removed.items[i].chunk, expected_removed.items[i].chunk);
+        EXPECT_EQ(unite(removed.items[i].box, expected_removed.items[i].box), removed.items[i].box);
+      }
+    }
+  }
+}
+
+TEST(Grid, RemovesChunksThatListsEmpty) {
+  Grid grid;
+  std::vector<PlacedVoxel> voxels;
+  for (int i = 0; i < 2'000; ++i) voxels.push_back({{64 * (i % 50), i / 50, -64 * (i % 7)}, 3});
+  EXPECT_EQ(grid.set(voxels), 2'000);
+  EXPECT_EQ(grid.chunk_count(), 350U);
+  for (PlacedVoxel& each : voxels) each.type = kAir;
+  EXPECT_EQ(grid.set(voxels), 2'000);
+  EXPECT_EQ(grid.chunk_count(), 0U);
+  EXPECT_EQ(grid.set(voxels), 0);
+  EXPECT_EQ(grid.chunk_count(), 0U);
+}
+
 TEST(Grid, CancelsEdits) {
   const IBox endless{IVec3{-1'000'000}, IVec3{1'000'000}};
   for (int kind = 0; kind < 3; ++kind) {

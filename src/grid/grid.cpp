@@ -6,12 +6,16 @@
 #include <cmath>
 #include <memory>
 #include <set>
+#include <span>
 #include <utility>
+#include <vector>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/parallel.h>
 
 #include "core/change_journal.h"
 #include "core/coordinates/chunk_order.h"
+#include "core/coordinates/chunk_trie.h"
 #include "core/coordinates/long_box.h"
 #include "core/moved_from.h"
 #include "core/rows/packed_row.h"
@@ -28,6 +32,81 @@ namespace {
 struct VoxelBox {
   static IBox of(const ChunkEntry& entry) { return entry.chunk.bounds(); }
 };
+
+// Shorter lists are not worth several threads.
+constexpr std::size_t kVoxelsForThreads = 1024;
+
+// The voxels of a list in one chunk, and their edit.
+struct VoxelsOfChunk {
+  IVec3 chunk{0};
+  std::size_t count = 0;
+  std::span<const PlacedVoxel> voxels{};
+  Chunk* target = nullptr;
+  VoxelEdit edit{};
+};
+
+// Returns the first voxels of a list that lie in the same chunk. Requires: the list is not empty.
+std::span<const PlacedVoxel> first_run(std::span<const PlacedVoxel> voxels) {
+  const IVec3 chunk = chunk_of(voxels.front().voxel);
+  const auto end = std::ranges::find_if(voxels, [&](const PlacedVoxel& each) { return chunk_of(each.voxel) != chunk; });
+  return voxels.first(static_cast<std::size_t>(end - voxels.begin()));
+}
+
+// Copies a list to `sorted`: the voxels of each chunk one after another, in the order of the list.
+std::vector<VoxelsOfChunk> grouped(std::span<const PlacedVoxel> list, std::vector<PlacedVoxel>& sorted) {
+  struct Number {
+    std::size_t plus_one = 0;
+  };
+  struct Run {
+    std::span<const PlacedVoxel> voxels;
+    std::size_t of = 0;
+  };
+  ChunkTrie<Number> numbers;
+  std::vector<Run> runs;
+  std::vector<VoxelsOfChunk> chunks;
+  while (!list.empty()) {
+    const std::span<const PlacedVoxel> run = first_run(list);
+    const IVec3 chunk = chunk_of(run.front().voxel);
+    Number& number = numbers.find_or_create(chunk, [](auto&) {});
+    if (number.plus_one == 0) {
+      chunks.push_back({.chunk = chunk});
+      number.plus_one = chunks.size();
+    }
+    chunks[number.plus_one - 1].count += run.size();
+    runs.push_back({run, number.plus_one - 1});
+    list = list.subspan(run.size());
+  }
+  std::vector<std::size_t> next;  // place in `sorted`, by chunk
+  std::size_t end = 0;
+  for (const VoxelsOfChunk& of : chunks) next.push_back(std::exchange(end, end + of.count));
+  sorted.resize(end);
+  for (const Run& run : runs) {
+    std::ranges::copy(run.voxels, sorted.begin() + static_cast<std::ptrdiff_t>(next[run.of]));
+    next[run.of] += run.voxels.size();
+  }
+  for (std::size_t i = 0; i < chunks.size(); ++i) {
+    chunks[i].voxels = std::span(sorted).subspan(next[i] - chunks[i].count, chunks[i].count);
+  }
+  return chunks;
+}
+
+// Most of the time passes while rows come from memory, so that they are requested some voxels ahead.
+void set_voxels(VoxelsOfChunk& of) {
+  constexpr std::size_t kAhead = 8;
+  QUOIN_ASSERT(of.target != nullptr, "an existing chunk");
+  VoxelEdit edit = of.edit;  // the next one may be another thread's, in the same line of the cache
+  try {
+    for (std::size_t i = 0; i < of.voxels.size(); ++i) {
+      if (i + kAhead < of.voxels.size()) ChunkStorage::prefetch(*of.target, local_of(of.voxels[i + kAhead].voxel));
+      const IVec3 at = local_of(of.voxels[i].voxel);
+      if (of.target->set(at.x, at.y, at.z, of.voxels[i].type)) edit.add_voxel(at.x, at.y, at.z);
+    }
+  } catch (...) {
+    of.edit.add_all();
+    throw;
+  }
+  of.edit = edit;
+}
 
 }  // namespace
 
@@ -91,6 +170,9 @@ struct Grid::Impl : BulkAllocated {
     finish_edit(chunk, slot, edit, notifier);
   }
 
+  // Sets the voxels of several chunks, each once in `chunks`.
+  std::int64_t set(std::span<VoxelsOfChunk> chunks, Threads threads, ChangeNotifier& notifier);
+
   // Calls `change(chunk, voxels, part of the box in chunk coordinates, edit)` for every chunk of a box. Chunks that are
   // not there are created where `create`, left out otherwise.
   template <class Change>
@@ -116,6 +198,32 @@ std::int64_t Grid::Impl::edit_chunk(IVec3 chunk, const ChunkTable::Slot& slot, c
   }
   finish_edit(chunk, slot, edit, notifier);
   return edit.voxels;
+}
+
+// The table of chunks and the journal change on this thread only, before and after the voxels.
+std::int64_t Grid::Impl::set(std::span<VoxelsOfChunk> chunks, Threads threads, ChangeNotifier& notifier) {
+  std::size_t begun = 0;
+  const auto finish = [&] {
+    std::int64_t changed = 0;
+    for (VoxelsOfChunk& of : chunks.first(begun)) {
+      finish_edit(of.chunk, entries.find_to_edit(of.chunk), of.edit, notifier);
+      changed += of.edit.voxels;
+    }
+    return changed;
+  };
+  try {
+    for (VoxelsOfChunk& of : chunks) {
+      of.edit.data_before = quoin::data_count(entries.find_or_create(of.chunk).entry->chunk);
+      ++begun;
+    }
+    // No entry is shared now, so that their addresses stay.
+    for (VoxelsOfChunk& of : chunks) of.target = &entries.find_to_edit(of.chunk).entry->chunk;
+    parallel_for(chunks.size(), threads, [&](std::size_t i) { set_voxels(chunks[i]); });
+  } catch (...) {
+    finish();
+    throw;
+  }
+  return finish();
 }
 
 template <class Change>
@@ -200,13 +308,7 @@ bool Grid::set(int x, int y, int z, VoxelType type) {
     impl_->finish_edit(at, slot, edit, notifier_);
     throw;
   }
-  edit.voxels = 1;
-  const auto is_inner = [](int i) { return i != 0 && i != kChunkEdge - 1; };
-  if (is_inner(local.x) && is_inner(local.y) && is_inner(local.z)) {
-    edit.record.add_inner(local.x, local.y, local.z);
-  } else {
-    edit.record.add(local.y, local.z, std::uint64_t{1} << local.x);
-  }
+  edit.add_voxel(local.x, local.y, local.z);
   impl_->finish_edit(at, slot, edit, notifier_);
   return true;
 }
@@ -267,27 +369,21 @@ void Grid::for_each_data(FunctionRef<void(IVec3 voxel, VoxelType type, const Vox
   }
 }
 
-std::int64_t Grid::set(std::span<const PlacedVoxel> voxels) {
-  std::int64_t changed = 0;
-  for (auto next = voxels.begin(); next != voxels.end();) {
-    const IVec3 at = chunk_of(next->voxel);
-    const auto is_elsewhere = [at](const PlacedVoxel& each) { return chunk_of(each.voxel) != at; };
-    const auto end = std::find_if(next, voxels.end(), is_elsewhere);
-    const auto set_all = [&](IVec3, Chunk& chunk, const IBox&, VoxelEdit& edit) {
-      for (; next != end; ++next) {
-        const IVec3 local = local_of(next->voxel);
-        const bool is_other = chunk.set(local.x, local.y, local.z, next->type);
-        edit.add(local.y, local.z, std::uint64_t{is_other} << local.x);
-      }
-    };
-    const bool is_air = std::all_of(next, end, [](const PlacedVoxel& each) { return each.type == kAir; });
-    if (!impl().loaded.may_edit(at) || (is_air && impl().entries.find(at) == nullptr)) {
-      next = end;
-      continue;
-    }
-    changed += impl().edit_chunk(at, impl().entries.find_or_create(at), kWholeChunk, notifier_, set_all);
+std::int64_t Grid::set(std::span<const PlacedVoxel> voxels, Threads threads) {
+  const auto has_no_change = [this](const VoxelsOfChunk& of) {
+    const auto is_air = [](const PlacedVoxel& each) { return each.type == kAir; };
+    return !impl().loaded.may_edit(of.chunk) ||
+           (impl().entries.find(of.chunk) == nullptr && std::ranges::all_of(of.voxels, is_air));
+  };
+  if (voxels.empty()) return 0;
+  if (first_run(voxels).size() == voxels.size()) {  // in one chunk: allocates nothing
+    VoxelsOfChunk one{.chunk = chunk_of(voxels.front().voxel), .voxels = voxels};
+    return has_no_change(one) ? 0 : impl().set({&one, 1}, {1}, notifier_);
   }
-  return changed;
+  std::vector<PlacedVoxel> sorted;
+  std::vector<VoxelsOfChunk> chunks = grouped(voxels, sorted);
+  std::erase_if(chunks, has_no_change);
+  return impl().set(chunks, voxels.size() < kVoxelsForThreads ? Threads{1} : threads, notifier_);
 }
 
 namespace {

@@ -116,6 +116,15 @@ struct ChunkStorage : RefCounted {
     const std::uint64_t word = *words.at(word_of(slot, row_in_slab) + (bit >> 6));
     return static_cast<std::uint32_t>(word >> (bit & 63U)) & ((1U << bits) - 1U);
   }
+  /// Requests the memory that `Chunk::set` of a voxel reads: its row, and the end of its slab.
+  static void prefetch(const Chunk& chunk, IVec3 local) {
+    const ChunkStorage* const m = of(chunk);
+    if (m == nullptr) return;
+    const std::uint32_t slot = m->slabs[slab_index(local.y, local.z)];
+    if ((slot & kUniformSlab) != 0) return;
+    __builtin_prefetch(m->row(slot, row_in_slab(local.y, local.z)) + (static_cast<unsigned>(local.x * m->bits) >> 6));
+    __builtin_prefetch(m->row(slot, kSlabRows - 1) + m->bits - 1);
+  }
   /// Requires: 0 <= x, y, z < 64.
   [[nodiscard]] VoxelType type(int x, int y, int z) const {
     const std::uint32_t slab = slabs[slab_index(y, z)];
