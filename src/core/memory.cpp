@@ -86,12 +86,14 @@ std::optional<std::uint64_t> of_process() {
 }
 #endif
 
-#ifdef __linux__
 // Returns true if a block of this size is pages of the system.
-bool is_system_block(std::size_t bytes) {
+bool is_system_block([[maybe_unused]] std::size_t bytes) {
+#ifdef __linux__
   return bytes >= kSystemBlock;
-}
+#else
+  return false;
 #endif
+}
 
 // Returns null if there is no memory.
 void* new_block(std::size_t bytes) {
