@@ -60,10 +60,16 @@ class Queue {
     if (jobs_.empty()) return Workers::kWhenWoken;
     const Job job = std::move(jobs_.front());
     jobs_.pop_front();
-    --unfinished_;  // for the waiting, when the step ends
     lock.unlock();
-    job();
+    std::exception_ptr failure;
+    try {
+      job();
+    } catch (...) {
+      failure = std::current_exception();
+    }
     lock.lock();
+    --unfinished_;
+    if (failure != nullptr) std::rethrow_exception(failure);
     return Workers::kAgain;
   }
 
