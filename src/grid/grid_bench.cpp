@@ -160,8 +160,8 @@ void edits_undone(benchmark::State& state, std::uint32_t types) {
 BENCHMARK_CAPTURE(edits_undone, few, 4U)->Name("grid/edits_undone/4_types")->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(edits_undone, many, 60'000U)->Name("grid/edits_undone/60000_types")->Unit(benchmark::kMillisecond);
 
-// Sand that falls in 289 chunks: two voxels for each of 9,400 grains, in an order in which neighbours in the list lie in
-// different chunks. A snapshot shares all chunks.
+// Sand that falls in 289 chunks: two voxels for each of 9,400 grains, in an order in which neighbours in the list lie
+// in different chunks. A snapshot shares all chunks.
 void set_list(benchmark::State& state, Threads threads) {
   constexpr int kChunks = 17;
   constexpr int kGrains = 9'400;

@@ -132,8 +132,8 @@ class VoxelRegistry {
   VoxelRegistry& operator=(VoxelRegistry&&) noexcept;
   ~VoxelRegistry();
 
-  /// Adds a type and returns its id. Ids count up from 1. `blocks_light` and `occludes` become empty if they equal their
-  /// defaults.
+  /// Adds a type and returns its id. Ids count up from 1. `blocks_light` and `occludes` become empty if they equal
+  /// their defaults.
   ///
   /// Errors: LimitExceeded above kMaxVoxelTypes types; those of `validate_type`.
   [[nodiscard]] Result<VoxelType> add(VoxelProperties properties);

@@ -157,7 +157,7 @@ Status add_key_index(Connection& database) {
 }
 
 // Version 3 has environment parts, which earlier programs would ignore. Version 4 has whole grids, and types with light
-// and occlusion of their own, which they would refuse as damaged. Without the mark a grid is streamed, as all grids were
+// and occlusion of their own, which they would refuse as damaged. Without the mark a grid is streamed, as all were
 // before.
 Status add_nothing(Connection& /*database*/) {
   return {};

@@ -1,5 +1,5 @@
-// A game in miniature, linked with quoin::core only: streams land, meshes and lights it, digs the voxel that a ray hits,
-// saves, and finds the hole when it opens the world again.
+// A game in miniature, linked with quoin::core only: streams land, meshes and lights it, digs the voxel that a ray
+// hits, saves, and finds the hole when it opens the world again.
 
 #include <cstdio>
 #include <optional>
