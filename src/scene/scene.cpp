@@ -336,8 +336,8 @@ std::int64_t Scene::voxel_count() const {
 }
 
 const Environment& environment_of(const Scene& scene) {
-  static const Environment kReference = Environment::reference();
-  return scene.environment ? *scene.environment : kReference;
+  static const Environment reference = Environment::reference();
+  return scene.environment ? *scene.environment : reference;
 }
 
 DBox Scene::bounds(InstanceFilter filter) const {
