@@ -7,7 +7,6 @@
 #include <memory>
 #include <optional>
 #include <span>
-#include <thread>
 
 #include "game_bench.h"
 
@@ -172,7 +171,7 @@ quoin::LiveMeshOptions mesh_options() {
 class Game {
  public:
   explicit Game(const games::Options& options)
-      : options_(options), world_(open(options.folder / "blocks.quoin")), meshes_(mesh_options()) {
+      : options_(options), world_(games::open_world(options.folder / "blocks.quoin")), meshes_(mesh_options()) {
     meshes_.use_light(light_);
     auto land = std::make_shared<Land>();
     if (world_.is_new()) {
@@ -193,14 +192,8 @@ class Game {
 
   // Until everything within the radius is loaded, lit and meshed. Edits that are still not shown then are faults.
   void settle() {
-    FrameMeter unused;
-    int idle_frames = 0;
-    do {
-      frame(unused, [] {});
-      std::this_thread::sleep_for(std::chrono::milliseconds(1));
-      const bool is_busy = !world_.stats().is_complete || meshes_.pending() != 0 || tracer_.is_late();
-      idle_frames = is_busy ? 0 : idle_frames + 1;
-    } while (idle_frames == 0 || (!watch_.empty() && idle_frames < games::kMaxIdleFrames));
+    const auto is_busy = [this] { return !world_.stats().is_complete || meshes_.pending() != 0 || tracer_.is_late(); };
+    games::settle([this](FrameMeter& unused) { frame(unused, [] {}); }, is_busy, [this] { return !watch_.empty(); });
   }
 
   void walk(games::Report& report) {
@@ -326,12 +319,6 @@ class Game {
   std::vector<std::string> problems() { return world_.take_problems(); }
 
  private:
-  static quoin::StreamedWorld open(const std::filesystem::path& path) {
-    auto world = quoin::StreamedWorld::open_or_create(path);
-    require(world);
-    return std::move(*world);
-  }
-
   template <class Edit>
   void frame(FrameMeter& meter, Edit&& edit) {
     frame(meter, edit, [] {});
@@ -351,15 +338,7 @@ class Game {
     meter.part("LiveTracer::update");
     meshes_.update(world_.scene(), viewer_.position);
     meter.part("LiveMeshes::update");
-    tracer_.take();
-    const std::vector<quoin::SurfaceUpdate> updates = meshes_.take(kUploadBytes);
-    meter.part("take");
-    for (const quoin::SurfaceUpdate& update : updates) upload(update);
-    meter.part("upload");
-    meter.stop_counting();
-    shown_.apply(updates);
-    meter.part("replace surfaces");
-    meter.end();
+    games::end_frame(meter, tracer_, meshes_, kUploadBytes, shown_, [this](const auto& update) { upload(update); });
     watch_.check(shown_);
   }
 

@@ -576,4 +576,10 @@ void report_loading(Report& report, double wall_start_ms, double process_start_m
                most_seconds ? std::optional(2.0 * *most_seconds) : std::nullopt);
 }
 
+quoin::StreamedWorld open_world(const std::filesystem::path& path) {
+  auto world = quoin::StreamedWorld::open_or_create(path);
+  require(world);
+  return std::move(*world);
+}
+
 }  // namespace games

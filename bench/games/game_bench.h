@@ -11,6 +11,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -226,6 +227,39 @@ void report_loading(Report& report, double wall_start_ms, double process_start_m
 template <class R>
 void require(const R& result) {
   if (!result) fail(result.error());
+}
+
+// Opens a world, or makes it. Ends the program if that fails.
+quoin::StreamedWorld open_world(const std::filesystem::path& path);
+
+// Ends a frame: takes the new tracer and at most `max_bytes` of loaded surfaces, uploads them, and shows them. Returns
+// them.
+template <class Upload>
+std::vector<quoin::SurfaceUpdate> end_frame(FrameMeter& meter, quoin::LiveTracer& tracer, quoin::LiveMeshes& meshes,
+                                            std::size_t max_bytes, Shown& shown, Upload&& upload) {
+  tracer.take();
+  std::vector<quoin::SurfaceUpdate> updates = meshes.take(max_bytes);
+  meter.part("take");
+  for (const quoin::SurfaceUpdate& update : updates) upload(update);
+  meter.part("upload");
+  meter.stop_counting();
+  shown.apply(updates);
+  meter.part("replace surfaces");
+  meter.end();
+  return updates;
+}
+
+// Runs frames until no work is pending, and further ones while edits wait to be shown. After kMaxIdleFrames of those,
+// the waiting edits are faults.
+template <class Frame, class IsBusy, class IsWaiting>
+void settle(Frame&& frame, IsBusy&& is_busy, IsWaiting&& is_waiting) {
+  FrameMeter unused;
+  int idle_frames = 0;
+  do {
+    frame(unused);
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    idle_frames = is_busy() ? 0 : idle_frames + 1;
+  } while (idle_frames == 0 || (is_waiting() && idle_frames < kMaxIdleFrames));
 }
 
 }  // namespace games

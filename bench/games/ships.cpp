@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <memory>
 #include <span>
 #include <thread>
@@ -118,7 +119,7 @@ struct Cut {
 class Game {
  public:
   explicit Game(const games::Options& options)
-      : options_(options), world_(open(options.folder / "ships.quoin")), meshes_(mesh_options()) {
+      : options_(options), world_(games::open_world(options.folder / "ships.quoin")), meshes_(mesh_options()) {
     quoin::Scene& scene = world_.scene();
     if (world_.is_new()) {
       require(add_parts(scene.types));
@@ -202,12 +203,6 @@ class Game {
   void flush() { require(world_.flush()); }
 
  private:
-  static quoin::StreamedWorld open(const std::filesystem::path& path) {
-    auto world = quoin::StreamedWorld::open_or_create(path);
-    require(world);
-    return std::move(*world);
-  }
-
   void add_ship(int number) {
     Ship ship;
     quoin::SceneGrid grid{.name = "ship " + std::to_string(number)};
@@ -236,15 +231,8 @@ class Game {
     meter.part("LiveTracer::update");
     const std::uint64_t state = meshes_.update(scene, viewer.position);
     meter.part("LiveMeshes::update");
-    tracer_.take();
-    const std::vector<quoin::SurfaceUpdate> updates = meshes_.take();
-    meter.part("take");
-    for (const quoin::SurfaceUpdate& update : updates) upload(update);
-    meter.part("upload");
-    meter.stop_counting();
-    shown_.apply(updates);
-    meter.part("replace surfaces");
-    meter.end();
+    constexpr auto kAll = std::numeric_limits<std::size_t>::max();
+    games::end_frame(meter, tracer_, meshes_, kAll, shown_, [this](const auto& update) { upload(update); });
     for (std::size_t i = cuts_before; i < cuts_.size(); ++i) cuts_[i].added_in = state;
     check_cuts();
   }

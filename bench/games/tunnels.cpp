@@ -7,7 +7,6 @@
 #include <memory>
 #include <optional>
 #include <span>
-#include <thread>
 
 #include "game_bench.h"
 
@@ -175,7 +174,7 @@ struct Hole {
 class Game {
  public:
   explicit Game(const games::Options& options)
-      : options_(options), world_(open(options.folder / "tunnels.quoin")), meshes_(mesh_options()) {
+      : options_(options), world_(games::open_world(options.folder / "tunnels.quoin")), meshes_(mesh_options()) {
     auto land = std::make_shared<Hills>();
     if (world_.is_new()) {
       require(add_materials(world_.scene().types));
@@ -192,14 +191,8 @@ class Game {
   }
 
   void settle() {
-    FrameMeter unused;
-    int idle_frames = 0;
-    do {
-      frame(unused, [] {});
-      std::this_thread::sleep_for(std::chrono::milliseconds(1));
-      const bool is_busy = !world_.stats().is_complete || meshes_.pending() != 0 || tracer_.is_late();
-      idle_frames = is_busy ? 0 : idle_frames + 1;
-    } while (idle_frames == 0 || (!holes_.empty() && idle_frames < games::kMaxIdleFrames));
+    const auto is_busy = [this] { return !world_.stats().is_complete || meshes_.pending() != 0 || tracer_.is_late(); };
+    games::settle([this](FrameMeter& unused) { frame(unused, [] {}); }, is_busy, [this] { return !holes_.empty(); });
   }
 
   // The player digs ahead every half second.
@@ -289,12 +282,6 @@ class Game {
   std::vector<std::string> problems() { return world_.take_problems(); }
 
  private:
-  static quoin::StreamedWorld open(const std::filesystem::path& path) {
-    auto world = quoin::StreamedWorld::open_or_create(path);
-    require(world);
-    return std::move(*world);
-  }
-
   template <class Edit>
   void frame(FrameMeter& meter, Edit&& edit) {
     meter.begin();
@@ -307,19 +294,12 @@ class Game {
     meter.part("LiveTracer::update");
     const std::uint64_t state = meshes_.update(world_.scene(), viewer_.position);
     meter.part("LiveMeshes::update");
-    tracer_.take();
-    const std::vector<quoin::SurfaceUpdate> updates = meshes_.take(kUploadBytes);
-    meter.part("take");
-    for (const quoin::SurfaceUpdate& update : updates) {
-      if (update.surface == nullptr || update.surface->converted == nullptr) continue;
+    const auto upload = [this](const quoin::SurfaceUpdate& update) {
+      if (update.surface == nullptr || update.surface->converted == nullptr) return;
       const auto& vertices = *static_cast<const std::vector<Vertex>*>(update.surface->converted.get());
       staging_.copy(std::as_bytes(std::span(vertices)));
-    }
-    meter.part("upload");
-    meter.stop_counting();
-    shown_.apply(updates);
-    meter.part("replace surfaces");
-    meter.end();
+    };
+    const auto updates = games::end_frame(meter, tracer_, meshes_, kUploadBytes, shown_, upload);
     for (std::size_t i = holes_before; i < holes_.size(); ++i) holes_[i].state = state;
     check_holes(updates);
   }
