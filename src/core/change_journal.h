@@ -86,15 +86,17 @@ class ChangeJournal {
   template <class Change, class Less, class Report>
   [[nodiscard]] Changes<Change> changes_since(ChangeCursor& cursor, Less&& less, Report&& report) const {
     std::vector<Record> records;
-    Changes<Change> changes;
+    std::vector<Change> items;
     ChangeCursor end = cursor;
-    changes.all = !visit_since(end, [&](const Record& record, std::uint64_t) { records.push_back(record); });
+    const bool is_known = visit_since(end, [&](const Record& record, std::uint64_t) { records.push_back(record); });
     std::stable_sort(records.begin(), records.end(), less);
     for (std::size_t i = 0; i < records.size();) {
       Record united = records[i];
       for (++i; i < records.size() && !less(united, records[i]); ++i) united.merge(records[i]);
-      report(united, changes.items);
+      report(united, items);
     }
+    Changes<Change> changes(std::move(items));
+    changes.all = !is_known;
     cursor = end;
     return changes;
   }

@@ -45,9 +45,9 @@ struct Consumer {
 void expect_reported(Consumer& consumer, const Grid& grid) {
   const GridChanges changes = grid.changes_since(consumer.cursor);
   ASSERT_FALSE(changes.all);
-  ASSERT_EQ(changes.items.size(), consumer.expected.boxes.size());
+  ASSERT_EQ(changes.items_unless_all().size(), consumer.expected.boxes.size());
   std::set<Key> meshes;
-  for (const ChunkChange& change : changes.items) {
+  for (const ChunkChange& change : changes.items_unless_all()) {
     const auto found = consumer.expected.boxes.find(key_of(change.chunk));
     ASSERT_NE(found, consumer.expected.boxes.end());
     const IVec3 origin = change.chunk * kChunkEdge;
@@ -147,9 +147,9 @@ TEST(Changes, SnapshotReadersMissNoChanges) {
   const Grid second = grid.snapshot();
   grid.set({70, 2, 3}, 4);
   ChangeCursor other = cursor;
-  EXPECT_EQ(second.changes_since(cursor).items.size(), 1U) << "what came after it is not its own";
-  EXPECT_EQ(grid.changes_since(cursor).items.size(), 1U);
-  EXPECT_EQ(grid.changes_since(other).items.size(), 2U);
+  EXPECT_EQ(second.changes_since(cursor).items_unless_all().size(), 1U) << "what came after it is not its own";
+  EXPECT_EQ(grid.changes_since(cursor).items_unless_all().size(), 1U);
+  EXPECT_EQ(grid.changes_since(other).items_unless_all().size(), 2U);
   EXPECT_TRUE(second.changes_since(other).all) << "back in time";
 }
 
@@ -162,7 +162,7 @@ TEST(Changes, TreatsEditedSnapshotAsOtherGrid) {
   copy.set({1, 2, 3}, 5);
   EXPECT_TRUE(copy.changes_since(cursor).all);
   copy.set({1, 2, 3}, 6);
-  EXPECT_EQ(copy.changes_since(cursor).items.size(), 1U);
+  EXPECT_EQ(copy.changes_since(cursor).items_unless_all().size(), 1U);
   EXPECT_TRUE(grid.changes_since(cursor).all);
   EXPECT_EQ(grid.get({1, 2, 3}), 4);
 }
@@ -199,9 +199,9 @@ TEST(Changes, MergesEditsOfOneChunk) {
   for (int i = 0; i < 200'000; ++i) grid.set({1 + i % 5, 7, 9}, static_cast<VoxelType>(1 + i % 3));
   EXPECT_LT(grid.bytes(), bytes + 32'768U);
   const GridChanges changes = grid.changes_since(cursor);
-  ASSERT_EQ(changes.items.size(), 1U);
-  EXPECT_EQ(changes.items[0].box, (IBox{{1, 7, 9}, {6, 8, 10}}));
-  EXPECT_EQ(changes.items[0].neighbours, 1U << 13U);
+  ASSERT_EQ(changes.items_unless_all().size(), 1U);
+  EXPECT_EQ(changes.items_unless_all()[0].box, (IBox{{1, 7, 9}, {6, 8, 10}}));
+  EXPECT_EQ(changes.items_unless_all()[0].neighbours, 1U << 13U);
 }
 
 TEST(Changes, ReportsAllChunksForLateCursor) {
@@ -210,7 +210,7 @@ TEST(Changes, ReportsAllChunksForLateCursor) {
   ChangeCursor early = late;
   for (int i = 0; i < 40'000; ++i) {
     grid.set({i % 2, 0, 0}, static_cast<VoxelType>(1 + i / 2 % 2));
-    ASSERT_EQ(grid.changes_since(early).items.size(), 1U);
+    ASSERT_EQ(grid.changes_since(early).items_unless_all().size(), 1U);
   }
   EXPECT_TRUE(grid.changes_since(late).all);
   EXPECT_TRUE(grid.changes_since(late).empty());
@@ -226,17 +226,17 @@ TEST(Changes, ReportsTypeChangesWithVisibilityAndColour) {
   properties.visibility = Visibility::Transparent;
   const VoxelType glass = types.add(properties).value();
   TypeChanges changes = types.changes_since(cursor);
-  ASSERT_EQ(changes.items.size(), 2U);
-  EXPECT_EQ(changes.items[0].type, stone);
-  EXPECT_FALSE(changes.items[0].visibility_changed) << "unregistered types were opaque";
-  EXPECT_TRUE(changes.items[0].colour_changed);
-  EXPECT_EQ(changes.items[1].type, glass);
-  EXPECT_TRUE(changes.items[1].visibility_changed);
+  ASSERT_EQ(changes.items_unless_all().size(), 2U);
+  EXPECT_EQ(changes.items_unless_all()[0].type, stone);
+  EXPECT_FALSE(changes.items_unless_all()[0].visibility_changed) << "unregistered types were opaque";
+  EXPECT_TRUE(changes.items_unless_all()[0].colour_changed);
+  EXPECT_EQ(changes.items_unless_all()[1].type, glass);
+  EXPECT_TRUE(changes.items_unless_all()[1].visibility_changed);
   properties.roughness = 0.25F;
   types.replace(glass, properties);
   changes = types.changes_since(cursor);
-  ASSERT_EQ(changes.items.size(), 1U);
-  EXPECT_FALSE(changes.items[0].visibility_changed || changes.items[0].colour_changed);
+  ASSERT_EQ(changes.items_unless_all().size(), 1U);
+  EXPECT_FALSE(changes.items_unless_all()[0].visibility_changed || changes.items_unless_all()[0].colour_changed);
   VoxelRegistry copy = types;
   EXPECT_TRUE(copy.changes_since(cursor).empty());
   properties.colour = {1, 2, 3, 4};
@@ -253,7 +253,7 @@ TEST(PendingChanges, ReportEverythingAfterFailure) {
   {
     const PendingChanges changes(cursor, grid);
     EXPECT_FALSE(changes->all);
-    EXPECT_EQ(changes->items.size(), 1U);
+    EXPECT_EQ(changes->items_unless_all().size(), 1U);
   }
   grid.set({100, 2, 3}, 4);
   PendingChanges changes(cursor, grid);
@@ -261,7 +261,8 @@ TEST(PendingChanges, ReportEverythingAfterFailure) {
   changes.commit();
   EXPECT_FALSE(grid.has_changed_since(cursor));
   grid.set({1, 2, 4}, 4);
-  EXPECT_EQ(PendingChanges(cursor, grid)->items.size(), 1U) << "each read reports the changes since the commit";
+  EXPECT_EQ(PendingChanges(cursor, grid)->items_unless_all().size(), 1U)
+      << "each read reports the changes since the commit";
 }
 
 TEST(PendingChanges, NeedNoCommitWithoutChanges) {
@@ -295,6 +296,22 @@ TEST(Changes, ChunksAreAllChunksTheFirstTime) {
   (void)partial.load_chunk({5, 0, 0}, Chunk());
   ChangeCursor of_partial;
   EXPECT_EQ(partial.changes_since(of_partial).chunks(partial), (std::vector<IVec3>{{5, 0, 0}})) << "a chunk of air";
+}
+
+template <class Changes>
+concept HasPublicItems = requires(Changes changes) { changes.items; } || requires(Changes changes) { changes.items_; };
+
+TEST(Changes, ListItemsByNameThatLeavesOutAll) {
+  static_assert(!HasPublicItems<GridChanges> && !HasPublicItems<DensityChanges> && !HasPublicItems<TypeChanges>);
+  Grid grid;
+  grid.set({0, 0, 0}, 1);
+  ChangeCursor cursor;
+  EXPECT_TRUE(grid.changes_since(cursor).items_unless_all().empty()) << "everything changed, the first time";
+  grid.set({64, 0, 0}, 1);
+  std::vector<IVec3> listed;
+  // The list of a temporary lives as long as the loop.
+  for (const ChunkChange& change : grid.changes_since(cursor).items_unless_all()) listed.push_back(change.chunk);
+  EXPECT_EQ(listed, (std::vector<IVec3>{{1, 0, 0}}));
 }
 
 }  // namespace

@@ -100,7 +100,7 @@ TEST(VisitChanges, ReportsEveryVoxelAndItsOldType) {
     ASSERT_EQ(reported(before, grid, unknown), expected) << step;
     // Covers the slabs of the changed voxels, and possibly others if an edit was undone.
     std::map<Place, ChunkSlabs> slabs;
-    for (const ChunkChange& change : changes.items) {
+    for (const ChunkChange& change : changes.items_unless_all()) {
       slabs[{change.chunk.x, change.chunk.y, change.chunk.z}] = change.slabs;
     }
     for (const auto& [x, y, z, was, is] : expected) {
@@ -118,13 +118,13 @@ TEST(GridChanges, ReportChangedSlabs) {
   ChangeCursor cursor = grid.cursor();
   const auto expect = [&](const IBox& box) {
     const GridChanges changes = grid.changes_since(cursor);
-    ASSERT_EQ(changes.items.size(), 1U);
+    ASSERT_EQ(changes.items_unless_all().size(), 1U);
     for (int z = 0; z < kChunkEdge; ++z) {
       for (int y = 0; y < kChunkEdge; ++y) {
         const bool is_within = y / 4 >= box.min.y / 4 && y / 4 <= (box.max.y - 1) / 4 && z / 4 >= box.min.z / 4 &&
                                z / 4 <= (box.max.z - 1) / 4;
-        ASSERT_EQ(changes.items[0].slabs.has(y, z), is_within) << y << ' ' << z;
-        const std::uint32_t block = changes.items[0].slabs.block(y & ~15, z & ~15);
+        ASSERT_EQ(changes.items_unless_all()[0].slabs.has(y, z), is_within) << y << ' ' << z;
+        const std::uint32_t block = changes.items_unless_all()[0].slabs.block(y & ~15, z & ~15);
         ASSERT_EQ((block >> ((y >> 2 & 3) + 4 * (z >> 2 & 3)) & 1U) != 0, is_within);
       }
     }
@@ -207,18 +207,19 @@ TEST(Grid, SetsLongListsOnSeveralThreads) {
       const GridChanges changes = one.changes_since(cursor);
       EXPECT_EQ(reported(before, one, changes), compared(before, one));
       const GridChanges expected = other.changes_since(of_other);
-      ASSERT_EQ(changes.items.size(), expected.items.size());
-      for (std::size_t i = 0; i < expected.items.size(); ++i) {
-        EXPECT_EQ(changes.items[i].chunk, expected.items[i].chunk);
-        EXPECT_EQ(changes.items[i].box, expected.items[i].box);
-        EXPECT_EQ(changes.items[i].neighbours, expected.items[i].neighbours);
+      ASSERT_EQ(changes.items_unless_all().size(), expected.items_unless_all().size());
+      for (std::size_t i = 0; i < expected.items_unless_all().size(); ++i) {
+        EXPECT_EQ(changes.items_unless_all()[i].chunk, expected.items_unless_all()[i].chunk);
+        EXPECT_EQ(changes.items_unless_all()[i].box, expected.items_unless_all()[i].box);
+        EXPECT_EQ(changes.items_unless_all()[i].neighbours, expected.items_unless_all()[i].neighbours);
       }
       const DataChanges removed = one.data_changes_since(data);
       const DataChanges expected_removed = other.data_changes_since(data_of_other);
-      ASSERT_EQ(removed.items.size(), expected_removed.items.size());
-      for (std::size_t i = 0; i < removed.items.size(); ++i) {
-        EXPECT_EQ(removed.items[i].chunk, expected_removed.items[i].chunk);
-        EXPECT_EQ(unite(removed.items[i].box, expected_removed.items[i].box), removed.items[i].box);
+      ASSERT_EQ(removed.items_unless_all().size(), expected_removed.items_unless_all().size());
+      for (std::size_t i = 0; i < removed.items_unless_all().size(); ++i) {
+        EXPECT_EQ(removed.items_unless_all()[i].chunk, expected_removed.items_unless_all()[i].chunk);
+        EXPECT_EQ(unite(removed.items_unless_all()[i].box, expected_removed.items_unless_all()[i].box),
+                  removed.items_unless_all()[i].box);
       }
     }
   }

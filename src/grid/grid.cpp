@@ -601,7 +601,7 @@ ChangeCursor Grid::cursor() const {
 std::vector<IVec3> chunks_to_mesh(const Grid& grid, const GridChanges& changes) {
   if (changes.all) return grid.chunks();
   std::vector<IVec3> chunks;
-  for (const ChunkChange& change : changes.items) {
+  for (const ChunkChange& change : changes.items_unless_all()) {
     chunks.push_back(change.chunk);
     for (std::uint32_t left = change.neighbours & ~VoxelRecord::kCentreOnly; left != 0; left &= left - 1) {
       const int i = std::countr_zero(left);
@@ -643,7 +643,7 @@ void visit_changes(const Grid& before, const Grid& now, const GridChanges& chang
     visit_other_rows(before.find_chunk(chunk), now.find_chunk(chunk), chunk, box, slabs, visit);
   };
   if (!changes.all) {
-    for (const ChunkChange& change : changes.items) compare(change.chunk, change.box, change.slabs);
+    for (const ChunkChange& change : changes.items_unless_all()) compare(change.chunk, change.box, change.slabs);
     return;
   }
   for (const IVec3 chunk : chunks_of_either(before, now)) compare(chunk, kWholeChunk, ChunkSlabs::all());
@@ -655,7 +655,7 @@ void visit_data_changes(const Grid& before, const Grid& now, const DataChanges& 
   if (changes.all) {
     chunks = chunks_of_either(before, now);
   } else {
-    for (const DataChange& change : changes.items) chunks.push_back(change.chunk);
+    for (const DataChange& change : changes.items_unless_all()) chunks.push_back(change.chunk);
   }
   for (const IVec3 chunk : chunks) {
     if (!before.is_loaded(chunk) || !now.is_loaded(chunk)) continue;

@@ -64,17 +64,17 @@ TEST(PartialGrid, ReportsLoadingAsNoEdit) {
   EXPECT_EQ(grid.chunks(), (std::vector<IVec3>{{1, 0, 0}}));
   ChangeCursor data = cursor;
   const GridChanges loaded = grid.changes_since(cursor);
-  ASSERT_EQ(loaded.items.size(), 2U);
-  EXPECT_FALSE(loaded.items[0].is_edit);
-  EXPECT_FALSE(loaded.items[1].is_edit);
+  ASSERT_EQ(loaded.items_unless_all().size(), 2U);
+  EXPECT_FALSE(loaded.items_unless_all()[0].is_edit);
+  EXPECT_FALSE(loaded.items_unless_all()[1].is_edit);
   const DataChanges of_data = grid.data_changes_since(data);
-  ASSERT_EQ(of_data.items.size(), 1U);
-  EXPECT_FALSE(of_data.items[0].is_edit);
+  ASSERT_EQ(of_data.items_unless_all().size(), 1U);
+  EXPECT_FALSE(of_data.items_unless_all()[0].is_edit);
 
   grid.set(65, 2, 3, 8);
   const GridChanges edited = grid.changes_since(cursor);
-  ASSERT_EQ(edited.items.size(), 1U);
-  EXPECT_TRUE(edited.items[0].is_edit);
+  ASSERT_EQ(edited.items_unless_all().size(), 1U);
+  EXPECT_TRUE(edited.items_unless_all()[0].is_edit);
 
   EXPECT_TRUE(grid.unload_chunk({1, 0, 0}));
   EXPECT_FALSE(grid.unload_chunk({1, 0, 0}));
@@ -83,8 +83,8 @@ TEST(PartialGrid, ReportsLoadingAsNoEdit) {
   EXPECT_EQ(grid.data_count(), 0);
   EXPECT_EQ(grid.chunk_count(), 0U);
   const GridChanges unloaded = grid.changes_since(cursor);
-  ASSERT_EQ(unloaded.items.size(), 2U);
-  EXPECT_FALSE(unloaded.items[0].is_edit);
+  ASSERT_EQ(unloaded.items_unless_all().size(), 2U);
+  EXPECT_FALSE(unloaded.items_unless_all()[0].is_edit);
   EXPECT_TRUE(grid.loaded_chunks().empty());
 }
 
@@ -94,8 +94,8 @@ TEST(PartialGrid, ReportsEditsAfterLoading) {
   grid.load_chunk({0, 0, 0}, Chunk(1));
   grid.set(0, 0, 0, 2);
   const GridChanges changes = grid.changes_since(cursor);
-  ASSERT_EQ(changes.items.size(), 1U);
-  EXPECT_TRUE(changes.items[0].is_edit);
+  ASSERT_EQ(changes.items_unless_all().size(), 1U);
+  EXPECT_TRUE(changes.items_unless_all()[0].is_edit);
 }
 
 TEST(PartialGrid, HasNeighbourhoodOnceNeighboursAreLoaded) {
@@ -209,13 +209,13 @@ TEST(PartialGrid, DensityGridBehavesAlike) {
   EXPECT_FALSE(field.load_air_chunk({1, 0, 0}));
   EXPECT_LT(field.density({32, 32, 32}), 0.0F);
   const DensityChanges loaded = field.changes_since(cursor);
-  ASSERT_EQ(loaded.items.size(), 2U);
-  EXPECT_FALSE(loaded.items[0].is_edit);
+  ASSERT_EQ(loaded.items_unless_all().size(), 2U);
+  EXPECT_FALSE(loaded.items_unless_all()[0].is_edit);
   EXPECT_GT(field.add_sphere({70.0, 32.0, 32.0}, 10.0, 2), 0);  // changes the loaded part
   EXPECT_EQ(field.material({70, 32, -5}), kAir);
   const DensityChanges edited = field.changes_since(cursor);
-  ASSERT_EQ(edited.items.size(), 2U);
-  EXPECT_TRUE(edited.items[0].is_edit);
+  ASSERT_EQ(edited.items_unless_all().size(), 2U);
+  EXPECT_TRUE(edited.items_unless_all()[0].is_edit);
   EXPECT_EQ(field.smooth({70.0, 32.0, 32.0}, 10.0, 1.0), 0);  // not all samples around the sphere are loaded
   EXPECT_TRUE(field.unload_chunk({0, 0, 0}));
   EXPECT_FALSE(field.is_loaded({0, 0, 0}));
@@ -253,8 +253,8 @@ TEST(PartialGrid, EditsFillChunksOutsideOfExtent) {
   const IVec3 above{0, 3, 0};
   EXPECT_TRUE(grid.set(5, 200, 5, 7));
   const GridChanges edited = grid.changes_since(cursor);
-  ASSERT_EQ(edited.items.size(), 1U);
-  EXPECT_TRUE(edited.items[0].is_edit);
+  ASSERT_EQ(edited.items_unless_all().size(), 1U);
+  EXPECT_TRUE(edited.items_unless_all()[0].is_edit);
   EXPECT_EQ(grid.loaded_chunks(), std::vector<IVec3>{above});
   // Half of the box lies in unloaded chunks, a quarter of the rest in the chunk (0, 5, 0).
   EXPECT_EQ(grid.fill_box({{0, 126, 0}, {1, 130, 1}}, 2), 2);
@@ -284,8 +284,8 @@ TEST(PartialGrid, LoadedChunksStayWhenExtentChanges) {
   EXPECT_FALSE(grid.is_loaded({1, 3, 0}));
   EXPECT_TRUE(grid.is_loaded({0, 5, 0}));
   const GridChanges changes = grid.changes_since(cursor);
-  ASSERT_EQ(changes.items.size(), 2U);
-  EXPECT_FALSE(changes.items[0].is_edit);
+  ASSERT_EQ(changes.items_unless_all().size(), 2U);
+  EXPECT_FALSE(changes.items_unless_all()[0].is_edit);
   EXPECT_EQ(chunks_to_mesh(grid, changes), (std::vector<IVec3>{{0, 0, 0}, {0, 3, 0}}));
   EXPECT_TRUE(grid.unload_chunk({0, 0, 0}));
   EXPECT_FALSE(grid.is_loaded({0, 0, 0})) << "its content is unknown";

@@ -80,7 +80,7 @@ Status validate_type(const VoxelProperties& properties) {
 }
 
 bool has_other_visibility(const TypeChanges& changes) {
-  return changes.all || std::any_of(changes.items.begin(), changes.items.end(),
+  return changes.all || std::any_of(changes.items_unless_all().begin(), changes.items_unless_all().end(),
                                     [](const TypeChange& change) { return change.visibility_changed; });
 }
 

@@ -559,7 +559,7 @@ ChangedTypes MeshScheduler::follow_types(const VoxelRegistry& types) {
   if (changes->empty()) return changed;
   const auto add = [&](std::vector<bool>& to, bool TypeChange::*matters) {
     if (changes->all) to.assign(kMaxVoxelTypes + 1, true);
-    for (const TypeChange& change : changes->items) {
+    for (const TypeChange& change : changes->items_unless_all()) {
       if (!(change.*matters)) continue;
       to.resize(types.size());
       to[change.type] = true;

@@ -44,7 +44,7 @@ struct ChunkCount {
 
 bool has_any_of(const Grid& grid, const TypeChanges& changes) {
   const std::vector<VoxelType> types = grid.types();
-  return changes.all || std::ranges::any_of(changes.items, [&](const TypeChange& change) {
+  return changes.all || std::ranges::any_of(changes.items_unless_all(), [&](const TypeChange& change) {
            return change.visibility_changed && std::ranges::binary_search(types, change.type);
          });
 }

@@ -149,7 +149,7 @@ bool Surfaces::update(const VoxelRegistry& types) {
   surfaces_.back() = {};
   surfaces_.back().colour = {1.0F, 0.0F, 1.0F};
   for (std::size_t type = 0; changes->all && type < types.size(); ++type) put(type);
-  for (const TypeChange& change : changes->items) put(change.type);
+  for (const TypeChange& change : changes->items_unless_all()) put(change.type);
   changes.commit();
   return true;
 }

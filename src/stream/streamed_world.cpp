@@ -355,7 +355,7 @@ void StreamedWorld::Impl::note_edits() {
       continue;
     }
     const auto note = [&, &of = grid](const auto& changes) {
-      for (const auto& change : changes.items) {
+      for (const auto& change : changes.items_unless_all()) {
         if (!change.is_edit) continue;
         is_edited = true;
         std::size_t* const size = of.sizes.find_to_edit(change.chunk, kStays);

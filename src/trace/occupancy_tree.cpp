@@ -87,7 +87,7 @@ struct SlabsOfChunk {
 // Returns the slabs with cells that touch a sample changed by an edit of the field.
 std::vector<SlabsOfChunk> cells_reached(const DensityChanges& changes) {
   std::vector<SlabsOfChunk> reached;
-  for (const DensityChange& each : changes.items) {
+  for (const DensityChange& each : changes.items_unless_all()) {
     for (const IVec3 offset : kBelow) {
       // A cell begins one sample before each of its ends.
       const IBox cells{each.box.min - 1 - offset * kChunkEdge, each.box.max - offset * kChunkEdge};
@@ -746,8 +746,8 @@ void OccupancyTree::update(const Grid& grid, const VoxelRegistry& types, const G
     return;
   }
   std::vector<ChunkBricks> changed;
-  changed.reserve(changes.items.size());
-  for (const ChunkChange& each : changes.items) {
+  changed.reserve(changes.items_unless_all().size());
+  for (const ChunkChange& each : changes.items_unless_all()) {
     changed.push_back({each.chunk, impl_->put(grid.find_chunk(each.chunk), types, each.chunk, each.slabs)});
   }
   finish_update(changed);

@@ -47,18 +47,24 @@ class ChangeCursor {
 };
 
 /// The changes between two states of a container.
+///
+///   for (const quoin::IVec3 chunk : grid.changes_since(cursor).chunks(grid)) make_again(chunk);
+///
+///   if (changes.all) forget_everything();  // or, for more than the coordinates of chunks:
+///   for (const quoin::ChunkChange& change : changes.items_unless_all()) make_again(change);
 template <class Change>
-struct Changes {
-  bool all = false;           ///< anything may have changed or been removed; `items` is empty
-  std::vector<Change> items;  ///< each chunk (type, handle) once, in the container's order; check `all` first
+class Changes {
+ public:
+  Changes() = default;
+  /// Requires: each chunk (type) once, in the container's order.
+  explicit Changes(std::vector<Change> items) : items_(std::move(items)) {}
 
-  [[nodiscard]] bool empty() const { return !all && items.empty(); }
+  bool all = false;  ///< anything may have changed or been removed; nothing is listed
+
+  [[nodiscard]] bool empty() const { return !all && items_.empty(); }
 
   /// Returns the chunks to process again: the changed chunks or, if `all` is set, all chunks of the grid or field (all
-  /// loaded chunks of a partial one). Sorted by z, then y, then x. A loop over `items` alone does nothing the first
-  /// time. This loop also handles `all`:
-  ///
-  ///   for (const quoin::IVec3 chunk : grid.changes_since(cursor).chunks(grid)) make_again(chunk);
+  /// loaded chunks of a partial one). Sorted by z, then y, then x.
   ///
   /// A changed chunk may no longer exist (Grid::find_chunk returns null). If `all` is set, chunks that the caller knows
   /// from before and that are not in the result are gone.
@@ -67,10 +73,18 @@ struct Changes {
   [[nodiscard]] std::vector<IVec3> chunks(const Container& container) const {
     if (all) return container.loaded_chunks();
     std::vector<IVec3> changed;
-    changed.reserve(items.size());
-    for (const Change& change : items) changed.push_back(change.chunk);
+    changed.reserve(items_.size());
+    for (const Change& change : items_) changed.push_back(change.chunk);
     return changed;
   }
+
+  /// Returns each changed chunk (type) once, in the container's order, and nothing if `all` is set. A loop over them
+  /// does nothing the first time, so handle `all` too.
+  [[nodiscard]] const std::vector<Change>& items_unless_all() const& { return items_; }
+  [[nodiscard]] std::vector<Change> items_unless_all() && { return std::move(items_); }
+
+ private:
+  std::vector<Change> items_;
 };
 
 /// Changes that a consumer applies completely or not at all.

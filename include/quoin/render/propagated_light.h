@@ -54,8 +54,8 @@ struct PropagatedLightOptions {
 ///
 ///   PropagatedLight light;
 ///   light.update(grid, types);                                    // once, and after each edit
-///   const GridChanges changes = light.changes_since(cursor);      // `all` the first time: mesh all chunks
-///   for (const ChunkChange& change : changes.items) mesh_again(change);
+///   const GridChanges changes = light.changes_since(cursor);      // `all` the first time: chunks() has all chunks
+///   for (const IVec3 chunk : changes.chunks(grid)) mesh_again(chunk);
 ///   light.split(quads, chunk, lit_quads, levels);                 // one level per quad; merged where levels agree
 ///
 /// Sky:     level 15 falls straight down without loss until it meets a voxel that blocks it or costs levels, and is 15

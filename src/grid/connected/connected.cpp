@@ -454,7 +454,7 @@ void ConnectedPieces::Impl::take_data(IVec3 at, const Chunk* chunk) {
 void ConnectedPieces::update(const Grid& grid, Threads threads) {
   ChangeCursor of_data = impl_of(impl_).followed;
   // Voxels that also changed their type are handled below.
-  for (const DataChange& change : grid.data_changes_since(of_data).items) {
+  for (const DataChange& change : grid.data_changes_since(of_data).items_unless_all()) {
     impl_of(impl_).take_data(change.chunk, grid.find_chunk(change.chunk));
   }
   PendingChanges changes(impl_of(impl_).followed, grid);
@@ -464,7 +464,7 @@ void ConnectedPieces::update(const Grid& grid, Threads threads) {
     impl_of(impl_).entries.clear();
     chunks = grid.chunks();
   }
-  for (const ChunkChange& change : changes->items) chunks.push_back(change.chunk);
+  for (const ChunkChange& change : changes->items_unless_all()) chunks.push_back(change.chunk);
   impl_of(impl_).find_parts(grid, chunks, threads);
   impl_of(impl_).find_links(chunks, threads);
   impl_of(impl_).find_open_parts(grid, chunks);

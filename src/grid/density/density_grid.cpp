@@ -171,7 +171,7 @@ std::vector<IVec3> chunks_to_mesh(const DensityGrid& grid, const DensityChanges&
   if (changes.all) {
     for (const IVec3 chunk : grid.chunks()) add_around(chunk, [](IVec3) { return true; });
   }
-  for (const DensityChange& change : changes.items) {
+  for (const DensityChange& change : changes.items_unless_all()) {
     add_around(change.chunk, [&](IVec3 offset) { return change.affects(offset, reach); });
   }
   sort_and_unite(chunks);

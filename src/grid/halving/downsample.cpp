@@ -364,7 +364,7 @@ struct Level : Kept {
       dirty = content.chunks();
       for (const IVec3 chunk : finer.chunks()) dirty.push_back(halved_coordinates(chunk));
     }
-    for (const auto& change : changes->items) add_readers(change, dirty);
+    for (const auto& change : changes->items_unless_all()) add_readers(change, dirty);
     sort_and_unite(dirty);
     std::erase_if(dirty, [&](IVec3 chunk) {
       for (int i = 0; i < 8; ++i) {

@@ -131,7 +131,7 @@ void FieldSurfaces::begin_anew(const DensityGrid& field, SurfaceClock::time_poin
 void FieldSurfaces::follow_changes(const DensityGrid& field, const DensityChanges& changes,
                                    SurfaceClock::time_point now) {
   const Cause edit = totals_.loads_only ? Cause::Level : Cause::Edit;
-  for (const DensityChange& change : changes.items) {
+  for (const DensityChange& change : changes.items_unless_all()) {
     bodies_.erase(change.chunk);
     // A loaded chunk completes surfaces that did not exist before, and unloading removes the neighbours' surfaces.
     // Neither has to match the visible surfaces.
@@ -141,7 +141,7 @@ void FieldSurfaces::follow_changes(const DensityGrid& field, const DensityChange
     }
     for (int i = 0; i < 8; ++i) see_whether_there(field, cell_chunk(change.chunk, i), edit, now);
   }
-  for (const DensityChange& change : changes.items) {
+  for (const DensityChange& change : changes.items_unless_all()) {
     if (!change.is_edit) continue;
     for (int i = 0; i < 27; ++i) {
       const IVec3 offset = Neighbourhood::offset(i);

@@ -143,12 +143,12 @@ bool VoxelDensity::reads_as(std::uint64_t stamp, int reach, IVec3 offset) const 
 
 // Returns the differences between the edited chunks and their former states, as far as they are compared.
 std::vector<DensityCache::Change> DensityCache::changes_of(const Grid& grid, const GridChanges& edits) const {
-  QUOIN_ASSERT(edits.all || edits.items.empty() || seen_ != nullptr, "a grid that was followed before");
+  QUOIN_ASSERT(edits.all || edits.items_unless_all().empty() || seen_ != nullptr, "a grid that was followed before");
   std::vector<Change> changes;
   if (edits.all) {
     for (const IVec3 chunk : grid.chunks()) changes.push_back({chunk, everything()});
   }
-  for (const ChunkChange& edit : edits.items) {
+  for (const ChunkChange& edit : edits.items_unless_all()) {
     if (changes.size() >= kMaxCompared) {
       changes.push_back({edit.chunk, everything()});
     } else {

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
+#include <vector>
 
 #include <glm/common.hpp>
 #include <quoin/core/assert.h>
@@ -64,7 +66,7 @@ void VoxelSurfaces::follow_light(const GridLight& light, SurfaceClock::time_poin
   is_lit_ = true;
   PendingChanges changes(followed_light_, *light.light);
   if (changes->all) mark_all(now);
-  for (const ChunkChange& change : changes->items) {
+  for (const ChunkChange& change : changes->items_unless_all()) {
     for (int i = 0; i < 27; ++i) {
       const IVec3 offset = Neighbourhood::offset(i);
       if (change.affects(offset)) mark_for_look(change.chunk + offset, now);
@@ -184,13 +186,13 @@ void VoxelSurfaces::follow_blocky(const Grid& grid, const GridChanges& changes, 
     for (const auto& [chunk, state] : chunks_) all.push_back(chunk);
     return see(all, cause);
   }
-  GridChanges edits;
-  GridChanges loads;
-  for (const ChunkChange& change : changes.items) {
-    (change.is_edit && cause == Cause::Edit ? edits : loads).items.push_back(change);
+  std::vector<ChunkChange> edits;
+  std::vector<ChunkChange> loads;
+  for (const ChunkChange& change : changes.items_unless_all()) {
+    (change.is_edit && cause == Cause::Edit ? edits : loads).push_back(change);
   }
-  see(chunks_to_mesh(grid, edits), Cause::Edit);
-  see(chunks_to_mesh(grid, loads), Cause::Load);
+  see(chunks_to_mesh(grid, GridChanges(std::move(edits))), Cause::Edit);
+  see(chunks_to_mesh(grid, GridChanges(std::move(loads))), Cause::Load);
 }
 
 // Adds chunks that may have waited for a chunk to load, or must be hidden without it.
@@ -218,7 +220,7 @@ void VoxelSurfaces::follow_smooth(const Grid& grid, const GridChanges& changes, 
     for (const IVec3 step : {IVec3{0}, IVec3{1, 0, 0}, IVec3{0, 1, 0}, IVec3{0, 0, 1}}) asked.push_back(chunk - step);
   }
   std::vector<IVec3> edited;
-  for (const ChunkChange& change : changes.items) {
+  for (const ChunkChange& change : changes.items_unless_all()) {
     if (!change.is_edit) add_chunks_around(change.chunk, kSmoothDistance, asked);
     if (change.is_edit && edited.size() < kMaxEpochChunks) edited.push_back(change.chunk);
   }

@@ -266,14 +266,14 @@ std::shared_ptr<const ImpostorFaces> faces_of(const Subject& subject, const std:
 std::optional<std::vector<IBox>> small_boxes(const GridChanges& changes, const IBox& content) {
   constexpr std::size_t kMaxBoxes = 16;
   constexpr double kMaxShare = 1.0 / 16.0;  // of the content's volume
-  if (changes.all || changes.items.size() > kMaxBoxes) return std::nullopt;
+  if (changes.all || changes.items_unless_all().size() > kMaxBoxes) return std::nullopt;
   const auto volume = [](const IBox& box) {
     const DVec3 size = DVec3(box.max) - DVec3(box.min);
     return size.x * size.y * size.z;
   };
   std::vector<IBox> boxes;
   double sum = 0.0;
-  for (const ChunkChange& change : changes.items) {
+  for (const ChunkChange& change : changes.items_unless_all()) {
     const IVec3 corner = change.chunk * kChunkEdge;
     boxes.push_back({corner + change.box.min, corner + change.box.max});
     sum += volume(boxes.back());

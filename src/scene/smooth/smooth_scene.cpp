@@ -117,7 +117,7 @@ void SmoothScene::Impl::follow_grid(const SceneGrid& grid, GridFields& fields) {
     fields.to_make.clear();
     add_all_near(grid.grid, fields.to_make);
   }
-  for (const ChunkChange& change : changes->items) add_reached(change, fields.to_make);
+  for (const ChunkChange& change : changes->items_unless_all()) add_reached(change, fields.to_make);
   sort_and_unite(fields.to_make);
   fields.is_made_new = true;
   changes.commit();

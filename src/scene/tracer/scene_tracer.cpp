@@ -168,7 +168,7 @@ void SceneTracer::Impl::refer_to(const Scene& other) noexcept {
 bool SceneTracer::Impl::update_types(const TypeChanges& changes) {
   if (!has_other_visibility(changes)) return false;
   std::vector<VoxelType> changed;
-  for (const TypeChange& change : changes.items) {
+  for (const TypeChange& change : changes.items_unless_all()) {
     if (change.visibility_changed) changed.push_back(change.type);
   }
   std::vector<GridHandle> kept;

@@ -34,7 +34,7 @@ SplitField::SplitField(const DensityGrid& whole, const VoxelRegistry& types)
 }
 
 void SplitField::update(const VoxelRegistry& types, const DensityChanges& changes) {
-  for (const DensityChange& change : changes.items) {
+  for (const DensityChange& change : changes.items_unless_all()) {
     const DensityChunk* const chunk = whole_->find_chunk(change.chunk);
     const DensityChunk air(stored_density(opaque_field_.band(), opaque_field_.band()));
     opaque_field_.put_chunk(change.chunk, chunk == nullptr ? air : smooth::chunk_of_body(*chunk, types, kOpaqueBody));
@@ -51,10 +51,11 @@ bool has_glass(const DensityGrid& field, const VoxelRegistry& types) {
 }
 
 bool has_glass(const DensityGrid& field, const VoxelRegistry& types, const DensityChanges& changes) {
-  return std::any_of(changes.items.begin(), changes.items.end(), [&](const DensityChange& change) {
-    const DensityChunk* const chunk = field.find_chunk(change.chunk);
-    return chunk != nullptr && trace::has_glass(*chunk, types);
-  });
+  return std::any_of(changes.items_unless_all().begin(), changes.items_unless_all().end(),
+                     [&](const DensityChange& change) {
+                       const DensityChunk* const chunk = field.find_chunk(change.chunk);
+                       return chunk != nullptr && trace::has_glass(*chunk, types);
+                     });
 }
 
 bool TreeCache::update(const Grid& grid, const VoxelRegistry& types) {
@@ -104,7 +105,7 @@ void TreeCache::update_transparent(const Grid& grid, const VoxelRegistry& types,
     const auto holds_some = [&](IVec3 chunk) { return has_transparent_types(grid.find_chunk(chunk), types); };
     const std::vector<IVec3> present = changes.all ? grid.chunks() : std::vector<IVec3>();
     const bool has_transparent = std::any_of(present.begin(), present.end(), holds_some) ||
-                                 std::any_of(changes.items.begin(), changes.items.end(),
+                                 std::any_of(changes.items_unless_all().begin(), changes.items_unless_all().end(),
                                              [&](const ChunkChange& change) { return holds_some(change.chunk); });
     if (!has_transparent) return;
     transparent_.emplace(Occupancy::Transparent);

@@ -176,7 +176,8 @@ class Save {
       return {};
     }
     if (changed.all) changes_.put_types(scene_.types);
-    for (const TypeChange& change : changed.items) changes_.put_type(change.type, scene_.types[change.type]);
+    for (const TypeChange& change : changed.items_unless_all())
+      changes_.put_type(change.type, scene_.types[change.type]);
     return {};
   }
 
@@ -317,7 +318,7 @@ class Save {
     bool is_all = false;
     const auto add = [&](const auto& changes) {
       is_all |= changes.all;
-      for (const auto& change : changes.items) {
+      for (const auto& change : changes.items_unless_all()) {
         if (change.is_edit) changed.insert(change.chunk);
       }
     };

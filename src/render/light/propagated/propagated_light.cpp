@@ -568,7 +568,7 @@ void PropagatedLight::Impl::light_entering(const Grid& grid) {
 void PropagatedLight::Impl::take_over(const Grid& grid, const GridChanges& changes) {
   std::vector<IVec3> chunks;
   std::vector<LightEdit> edits;
-  for (const ChunkChange& change : changes.items) {
+  for (const ChunkChange& change : changes.items_unless_all()) {
     chunks.push_back(change.chunk);
     store.add_lamps(change.chunk, change.slabs);
     if (std::optional<LightEdit> edit = edit_of(grid, change)) edits.push_back(*edit);

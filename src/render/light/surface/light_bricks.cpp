@@ -111,11 +111,11 @@ std::vector<IVec3> LightBricks::bricks_to_find(OfGrid& of, const GridLight& ligh
       add({chunk * kBricksOfChunk - 1, (chunk + 1) * kBricksOfChunk + 1});
     }
   }
-  for (const ChunkChange& change : voxels.items) {
+  for (const ChunkChange& change : voxels.items_unless_all()) {
     look_at_chunk(of, light, change.chunk);
     add(bricks_of_box(in_grid(change), 1));
   }
-  for (const ChunkChange& change : levels.items) add(bricks_of_box(in_grid(change), 0));
+  for (const ChunkChange& change : levels.items_unless_all()) add(bricks_of_box(in_grid(change), 0));
   sort_and_unite(bricks);
   return bricks;
 }

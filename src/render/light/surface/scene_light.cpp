@@ -70,8 +70,8 @@ void SceneLight::Entry::unite(const SceneGrid& grid) {
       chunks.insert(chunks.end(), more.begin(), more.end());
     }
   } else {
-    for (const auto& change : of_voxels->items) chunks.push_back(change.chunk);
-    for (const auto& change : of_field->items) chunks.push_back(change.chunk);
+    for (const auto& change : of_voxels->items_unless_all()) chunks.push_back(change.chunk);
+    for (const auto& change : of_field->items_unless_all()) chunks.push_back(change.chunk);
   }
   sort_and_unite(chunks);
   for (const IVec3 chunk : chunks) {

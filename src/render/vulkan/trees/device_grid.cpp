@@ -126,7 +126,7 @@ Status DeviceGrid::update_voxels(ShaderMemory& memory, const Content& content) {
       if (Status done = put_voxels(memory, content, at); !done) return done;
     }
   }
-  for (const ChunkChange& change : changes->items) {
+  for (const ChunkChange& change : changes->items_unless_all()) {
     if (Status done = put_voxels(memory, content, change.chunk); !done) return done;
   }
   changes.commit();
