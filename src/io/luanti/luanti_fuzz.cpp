@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <span>
 
-#include "io/luanti/map_block.h"
+#include "io/luanti/luanti.h"
 
 /// Any bytes must give a block whose nodes have names, or an error.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -21,7 +21,6 @@
 #include "core/bytes/text.h"
 #include "core/database/connection.h"
 #include "io/luanti/luanti.h"
-#include "io/luanti/map_block.h"
 
 namespace quoin {
 

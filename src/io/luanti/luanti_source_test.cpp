@@ -12,7 +12,6 @@
 
 #include "io/luanti/luanti.h"
 #include "io/luanti/luanti_for_tests.h"
-#include "io/luanti/map_block.h"
 #include "store/world/world_for_tests.h"
 
 namespace quoin {

@@ -10,7 +10,7 @@
 //                      the nodes uncompressed, metadata, objects, timers
 //   names              u8 0, u16 count, each u16 number, u16 size, bytes
 
-#include "io/luanti/map_block.h"
+#include "io/luanti/luanti.h"
 
 #include <algorithm>
 #include <new>

@@ -7,7 +7,6 @@
 #include <quoin/core/assert.h>
 
 #include "render/light/propagated/kernel/light_kernel.h"
-#include "render/light/propagated/light_solver.h"
 #include "trace/chunk_rows.h"
 
 namespace quoin::propagated {
@@ -201,40 +200,6 @@ int fall(const Chunk* voxels, const std::vector<TypeLight>& types, int begin, in
     if (!goes_on) break;
   }
   return low;
-}
-
-// Makes sources of the voxels of a block that the front reaches. They are not at the region's rim.
-void LightSolver::pay_toll(Toll& toll, std::size_t z, unsigned block, std::vector<Source>& out) {
-  const std::size_t first = z * layer_ + block * kBlockRows;
-  const std::size_t column = block / blocks_;
-  for (std::size_t at = first; at < first + kBlockRows; ++at) {
-    if (toll.left[at] == 0) continue;
-    const std::uint64_t own = front_[at];
-    std::uint64_t around = own << 1 | own >> 1 | front_[at - 1] | front_[at + 1];
-    around |= front_[at - layer_] | front_[at + layer_];
-    if (column > 0) around |= front_[at - column_] >> 63;
-    if (column + 1 < columns_) around |= front_[at + column_] << 63;
-    const std::uint64_t reached = around & toll.left[at];
-    if (reached == 0) continue;
-    toll.left[at] &= ~reached;
-    out.push_back(
-        {static_cast<std::uint32_t>(at), static_cast<std::uint16_t>(z), static_cast<std::uint16_t>(block), reached});
-  }
-}
-
-// Makes sources of the voxels with a cost next to the front, of the level above `level`.
-void LightSolver::pay_tolls(std::size_t channel, unsigned level) {
-  for (std::size_t i = 0; i < toll_count_; ++i) {
-    Toll& toll = tolls_[i];
-    if (toll.cost > level) continue;
-    const unsigned reached = level + 1 - toll.cost;
-    std::vector<Source>& out = toll.absorbs ? absorbed_[reached] : sources_[channel][reached];
-    for (std::size_t z = 1; z <= static_cast<std::size_t>(size_.z); ++z) {
-      for (std::uint64_t left = blocks_near_front(z) & toll.blocks[z]; left != 0; left &= left - 1) {
-        pay_toll(toll, z, static_cast<unsigned>(std::countr_zero(left)), out);
-      }
-    }
-  }
 }
 
 }  // namespace quoin::propagated

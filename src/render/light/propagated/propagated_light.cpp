@@ -21,6 +21,7 @@
 #include "core/coordinates/chunk_order.h"
 #include "core/moved_from.h"
 #include "render/light/propagated/chunk_masks.h"
+#include "render/light/propagated/light_queue.h"
 #include "render/light/propagated/light_solver.h"
 #include "render/light/propagated/light_store.h"
 #include "render/light/quad_cutter.h"
