@@ -202,14 +202,16 @@ std::optional<VoxelProperties> node_properties(std::string_view name) {
   if (name == "air" || name == "ignore") return std::nullopt;
   const BlockLook look = look_of_node(name);
   VoxelProperties type;
+  minecraft::set_look(look, type);
+  // Nodes of "paramtype light" without "sunlight_propagates", as the mods of Luanti's own game register them. Leaves,
+  // water, ice and lava are such nodes too, and come from the table of blocks.
+  if (name == "default:snow" || name.starts_with("stairs:")) {
+    if (type.visibility == Visibility::Opaque) type.blocks_light = false;
+    type.light_cost = 1;
+  }
   type.name = printable(name);
   type.colour = minecraft::tinted_colour(look.colour, minecraft::colour_of(look.tint, {}));
   type.colour.a = std::max<std::uint8_t>(type.colour.a, 1);
-  type.visibility = type.colour.a < 255 ? Visibility::Transparent : Visibility::Opaque;
-  type.collides = look.collides;
-  type.emission = look.emission;
-  type.roughness = look.roughness;
-  type.ior = look.ior;
   if (look.knowledge != Knowledge::Table) {
     type.attributes[kNodeGuessAttribute] = look.knowledge == Knowledge::Words ? "words" : "nothing";
   }

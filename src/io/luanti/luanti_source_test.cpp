@@ -71,6 +71,26 @@ TEST(LuantiMap, ReadsSameNodesFromEveryVersionAndTable) {
   }
 }
 
+TEST(LuantiNodes, PassLightAsTheGame) {
+  const auto passage = [](const char* name) {
+    const VoxelProperties type = models::node_properties(name).value();
+    return type.blocks_light.value_or(type.visibility == Visibility::Opaque) ? int{kMaxLightCost}
+                                                                             : int{type.light_cost};
+  };
+  for (const char* name : {"default:stone", "default:tree", "mod:unheard_of"}) {
+    EXPECT_EQ(passage(name), kMaxLightCost) << name;
+  }
+  for (const char* name :
+       {"default:water_source", "default:river_water_flowing", "default:leaves", "default:pine_needles", "default:ice",
+        "default:lava_source", "default:snow", "stairs:stair_cobble", "stairs:slab_wood"}) {
+    EXPECT_EQ(passage(name), 1) << name;
+  }
+  for (const char* name :
+       {"default:glass", "default:torch", "default:fence_wood", "default:chest", "doors:door_wood_a"}) {
+    EXPECT_EQ(passage(name), 0) << name;
+  }
+}
+
 TEST(LuantiMap, ReadsNameOfFolder) {
   const WorldFolder folder;
   Map(folder / "map.sqlite").put({0, 0, 0}, row_of(some_block(), 28));

@@ -559,12 +559,14 @@ BlockLook look_of(std::uint32_t hex, Kind kind) {
       look.collides = false;
       look.roughness = 0.05F;
       look.ior = 1.33F;
+      look.light_cost = 1;
       look.tint = Tint::Water;
       break;
     case Kind::Clear:
       look.colour.a = kIceAlpha;
       look.roughness = 0.2F;
       look.ior = 1.31F;
+      look.light_cost = 1;
       break;
     case Kind::Glow:
       look.emission = 1.0F;
@@ -576,10 +578,8 @@ BlockLook look_of(std::uint32_t hex, Kind kind) {
       look.emission = 1.0F;
       break;
     case Kind::Grass:
-      look.tint = Tint::Grass;
-      break;
     case Kind::Leaves:
-      look.tint = Tint::Foliage;
+      look.tint = kind == Kind::Grass ? Tint::Grass : Tint::Foliage;
       break;
     case Kind::Solid:
     case Kind::Lamp:
@@ -820,9 +820,7 @@ std::optional<BlockLook> look_by_words(std::string_view name) {
     const Rgba8 colour = rgb(dye.cloth);
     if (!look) return look_of(dye.cloth, Kind::Solid);
     if (look->tint == Tint::None && !look->is_air) {
-      look->colour.r = colour.r;
-      look->colour.g = colour.g;
-      look->colour.b = colour.b;
+      look->colour = {colour.r, colour.g, colour.b, look->colour.a};
     }
     break;
   }
@@ -837,6 +835,35 @@ BlockLook look_of_nothing(std::string_view name) {
   const std::uint32_t grey = 0x60 + (hash & 0x3FU);
   const auto part = [&](unsigned shift) { return grey + (hash >> shift & 0x1FU); };
   return look_of(part(8) << 16 | part(14) << 8 | part(20), Kind::Solid);
+}
+
+// How light passes blocks: the value `filterLight` of the game's blocks, which minecraft-data lists
+// (https://github.com/PrismarineJS/minecraft-data, data/pc/1.21.11/blocks.json). 0: as it passes air. 1: sky light loses
+// a level. 15: not at all. See also "Opacity" in the Minecraft Wiki. Stairs, slabs and the like have 0 too, but stop
+// light at faces that they fill; as whole voxels they keep it out.
+// The last words of blocks with 1, except liquids and clear blocks:
+constexpr std::string_view kFilters[] = {"leaves",         "cobweb",     "beacon",      "spawner",      "vault",
+                                         "powder_snow",    "lava",       "end_gateway", "chorus_plant", "chorus_flower",
+                                         "shulker_box",    "kelp",       "kelp_plant",  "seagrass",     "coral",
+                                         "coral_fan",      "wall_fan",   "sea_pickle",  "conduit",      "sculk_vein",
+                                         "mangrove_roots", "resin_clump"};
+// Words of blocks with 0 that look solid, since they fill their voxel here:
+constexpr std::string_view kOpen[] = {
+    "fence",  "wall",    "door",       "trapdoor",      "sign",     "shelf",  "bed",     "chest",     "skull",
+    "head",   "lantern", "cauldron",   "anvil",         "campfire", "potted", "pot",     "cake",      "cactus",
+    "bell",   "hopper",  "grindstone", "rod",           "egg",      "bud",    "cluster", "composter", "end_portal",
+    "statue", "ghast",   "core",       "moving_piston", "torch",    "bars",   "chain",   "grate"};
+constexpr std::string_view kNotOpen[] = {"piston_head", "sea_lantern", "jack_o_lantern", "end_portal_frame",
+                                         "chain_command_block"};
+
+void set_passage(std::string_view name, BlockLook& look) {
+  const auto ends = [&](std::string_view word) { return name.ends_with(word) && has_word(name, word); };
+  const auto has = [&](std::string_view word) { return has_word(name, word); };
+  const bool is_filter = std::ranges::any_of(kFilters, ends) && name != "muddy_mangrove_roots";
+  const bool is_open = std::ranges::any_of(kOpen, has) && std::ranges::find(kNotOpen, name) == std::end(kNotOpen);
+  if (is_filter) look.light_cost = 1;
+  if (name == "tinted_glass") look.light_cost = kMaxLightCost;
+  if (look.colour.a == 255 && (is_filter || is_open)) look.blocks_light = false;
 }
 
 bool is_lamp(std::string_view name) {
@@ -861,6 +888,7 @@ BlockLook look_of_block(std::string_view name, bool is_lit, bool is_snowy) {
     look = look_of_nothing(name);
     look.knowledge = Knowledge::Nothing;
   }
+  set_passage(name, look);
   if (is_lit && is_lamp(name)) look.emission = 1.0F;
   if (is_snowy) {
     look.colour = rgb(0xF2F7F7);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -52,6 +53,8 @@ struct BlockLook {
   float emission = 0.0F;
   float roughness = 1.0F;
   float ior = 1.5F;
+  std::optional<bool> blocks_light{};  ///< as in VoxelProperties
+  std::uint8_t light_cost = 0;         ///< as in VoxelProperties
   Tint tint = Tint::None;
   Knowledge knowledge = Knowledge::Table;
 };
@@ -59,5 +62,18 @@ struct BlockLook {
 /// Returns the look of a block. `name`: "minecraft:oak_stairs", or without its namespace; also of mods. `is_lit`,
 /// `is_snowy`: the states of these names are "true". Cost: some look-ups in sorted tables.
 [[nodiscard]] BlockLook look_of_block(std::string_view name, bool is_lit, bool is_snowy);
+
+/// Sets the properties of a type that a look has, with its colour before tinting. Types with an alpha below 255 are
+/// transparent.
+inline void set_look(const BlockLook& look, VoxelProperties& type) {
+  type.colour = look.colour;
+  type.visibility = look.colour.a < 255 ? Visibility::Transparent : Visibility::Opaque;
+  type.collides = look.collides;
+  type.emission = look.emission;
+  type.roughness = look.roughness;
+  type.ior = look.ior;
+  type.blocks_light = look.blocks_light;
+  type.light_cost = look.light_cost;
+}
 
 }  // namespace quoin::minecraft

@@ -187,12 +187,7 @@ namespace {
 VoxelProperties properties_of(const BlockState& state, const BlockLook& look) {
   VoxelProperties type;
   type.name = state.name;
-  type.colour = look.colour;
-  type.visibility = look.colour.a < 255 ? Visibility::Transparent : Visibility::Opaque;
-  type.collides = look.collides;
-  type.emission = look.emission;
-  type.roughness = look.roughness;
-  type.ior = look.ior;
+  set_look(look, type);
   type.state_bits = state.bits;
   type.attributes[kStatesAttribute] = state.layout;
   if (look.knowledge != Knowledge::Table) {

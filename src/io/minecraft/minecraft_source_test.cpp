@@ -78,6 +78,28 @@ TEST(BlockLooks, DerivesShapesAndModsFromMaterials) {
   EXPECT_EQ(minecraft::look_of_block("mod:xyzzy", false, false).knowledge, minecraft::Knowledge::Nothing);
 }
 
+TEST(BlockLooks, PassLightAsTheGame) {
+  const auto passage = [](const char* name) {
+    VoxelProperties type;
+    minecraft::set_look(minecraft::look_of_block(name, false, false), type);
+    const bool blocks = type.blocks_light.value_or(type.visibility == Visibility::Opaque);
+    return blocks ? int{kMaxLightCost} : int{type.light_cost};
+  };
+  for (const char* name :
+       {"stone", "oak_log", "sea_lantern", "packed_ice", "muddy_mangrove_roots", "oak_stairs", "tuff_slab",
+        "tinted_glass", "piston_head", "chain_command_block", "mod:palm_log", "mod:xyzzy"}) {
+    EXPECT_EQ(passage(name), kMaxLightCost) << name;
+  }
+  for (const char* name : {"water", "bubble_column", "oak_leaves", "spruce_leaves", "mod:palm_leaves", "ice", "cobweb",
+                           "honey_block", "slime_block", "kelp", "lava", "red_shulker_box", "mangrove_roots"}) {
+    EXPECT_EQ(passage(name), 1) << name;
+  }
+  for (const char* name : {"glass", "red_stained_glass", "torch", "poppy", "rail", "oak_fence", "stone_brick_wall",
+                           "iron_door", "chest", "lantern", "red_bed", "potted_cactus", "mod:palm_fence"}) {
+    EXPECT_EQ(passage(name), 0) << name;
+  }
+}
+
 TEST(LegacyBlocks, MapsNumbersToModernNames) {
   EXPECT_EQ(minecraft::legacy_block(1, 3).first, "minecraft:diorite");
   EXPECT_EQ(minecraft::legacy_block(35, 14).first, "minecraft:red_wool");
