@@ -474,6 +474,7 @@ unsigned expected_faces(const quoin::Grid& grid, const quoin::VoxelRegistry& typ
 
 void EditWatch::add(std::vector<Voxel> voxels) {
   edits_ += static_cast<std::int64_t>(voxels.size());
+  ++frames_;
   waiting_.push_back({std::move(voxels), wall_ms(), process_ms()});
 }
 
@@ -532,10 +533,11 @@ bool EditWatch::waits_near(IVec3 voxel) const {
 void EditWatch::report(Report& report, const std::string& phase, std::vector<Goal> latency_goals) {
   report.samples(phase + ": edit to mesh, wall time", "ms", latencies_ms_, std::move(latency_goals));
   report.samples(phase + ": edit to mesh, processor time of the process", "ms", process_latencies_ms_);
-  report.faults(phase + ": black frames", black_, edits_, "edits");
-  report.faults(phase + ": torn frames", torn_, edits_, "edits");
-  report.faults(phase + ": doubled frames", doubled_, edits_, "edits");
-  report.faults(phase + ": frames of edits never shown", static_cast<std::int64_t>(waiting_.size()), edits_, "edits");
+  const std::string things = "frames with " + std::to_string(edits_) + " edits";
+  report.faults(phase + ": black frames", black_, frames_, things);
+  report.faults(phase + ": torn frames", torn_, frames_, things);
+  report.faults(phase + ": doubled frames", doubled_, frames_, things);
+  report.faults(phase + ": frames never shown", static_cast<std::int64_t>(waiting_.size()), frames_, things);
   *this = EditWatch();
 }
 

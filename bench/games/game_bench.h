@@ -194,7 +194,8 @@ class EditWatch {
 
   std::vector<Edits> waiting_;
   std::vector<double> latencies_ms_, process_latencies_ms_;
-  std::int64_t edits_ = 0, torn_ = 0, doubled_ = 0, black_ = 0;
+  std::int64_t edits_ = 0;
+  std::int64_t frames_ = 0, torn_ = 0, doubled_ = 0, black_ = 0;  // frames with edits
 };
 
 // Copies vertices into one buffer, as a game copies them into memory that the GPU reads.
