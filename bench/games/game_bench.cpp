@@ -1,6 +1,7 @@
 #include "game_bench.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -18,17 +19,54 @@ namespace {
 
 thread_local std::int64_t thread_allocations = 0;
 
+// Bytes of the large blocks in use. They are counted from the start of `main` on, with --arena.
+bool counts_large = false;
+std::atomic<std::int64_t> large_of_new{0}, large_of_arena{0};
+
+void* counted(void* memory) {
+  if (!counts_large || memory == nullptr) return memory;
+  const std::size_t bytes = malloc_usable_size(memory);
+  if (bytes > quoin::kLargeBlock) large_of_new += static_cast<std::int64_t>(bytes);
+  return memory;
+}
+
+void release(void* memory) {
+  if (counts_large && memory != nullptr) {
+    const std::size_t bytes = malloc_usable_size(memory);
+    if (bytes > quoin::kLargeBlock) large_of_new -= static_cast<std::int64_t>(bytes);
+  }
+  std::free(memory);
+}
+
 void* allocate(std::size_t bytes) {
   ++thread_allocations;
-  if (void* const memory = std::malloc(std::max<std::size_t>(bytes, 1))) return memory;
+  if (void* const memory = counted(std::malloc(std::max<std::size_t>(bytes, 1)))) return memory;
   throw std::bad_alloc();
 }
 
 void* allocate(std::size_t bytes, std::align_val_t alignment) {
   ++thread_allocations;
   const auto edge = static_cast<std::size_t>(alignment);
-  if (void* const memory = std::aligned_alloc(edge, (bytes + edge - 1) / edge * edge)) return memory;
+  if (void* const memory = counted(std::aligned_alloc(edge, (bytes + edge - 1) / edge * edge))) return memory;
   throw std::bad_alloc();
+}
+
+// The memory of a game with an arena: blocks of malloc, counted.
+void use_arena() {
+  quoin::BlockFunctions arena;
+  arena.allocate = [](std::size_t bytes, std::size_t alignment, void* /*context*/) noexcept {
+    large_of_arena += static_cast<std::int64_t>(bytes);
+    return std::aligned_alloc(alignment, (bytes + alignment - 1) / alignment * alignment);
+  };
+  arena.free = [](void* block, std::size_t bytes, std::size_t /*alignment*/, void* /*context*/) noexcept {
+    large_of_arena -= static_cast<std::int64_t>(bytes);
+    std::free(block);
+  };
+  if (!quoin::set_block_functions(arena)) {
+    std::fprintf(stderr, "a large block was made before main\n");
+    std::exit(2);
+  }
+  counts_large = true;
 }
 
 }  // namespace
@@ -47,28 +85,28 @@ void* operator new[](std::size_t bytes, std::align_val_t alignment) {
   return allocate(bytes, alignment);
 }
 void operator delete(void* memory) noexcept {
-  std::free(memory);
+  release(memory);
 }
 void operator delete[](void* memory) noexcept {
-  std::free(memory);
+  release(memory);
 }
 void operator delete(void* memory, std::size_t) noexcept {
-  std::free(memory);
+  release(memory);
 }
 void operator delete[](void* memory, std::size_t) noexcept {
-  std::free(memory);
+  release(memory);
 }
 void operator delete(void* memory, std::align_val_t) noexcept {
-  std::free(memory);
+  release(memory);
 }
 void operator delete[](void* memory, std::align_val_t) noexcept {
-  std::free(memory);
+  release(memory);
 }
 void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
-  std::free(memory);
+  release(memory);
 }
 void operator delete[](void* memory, std::size_t, std::align_val_t) noexcept {
-  std::free(memory);
+  release(memory);
 }
 
 namespace games {
@@ -199,6 +237,9 @@ void report_memory(Report& report, const std::vector<std::pair<std::string, std:
   }
   report.value("memory:   allocated for anything else", "MB", 1e-6 * (allocated - counted));
   report.value("memory:   code, stacks, free blocks of the allocator", "MB", 1e-6 * (resident - allocated));
+  if (!counts_large) return;
+  report.value("large blocks of Quoin from the arena", "MB", 1e-6 * static_cast<double>(large_of_arena));
+  report.value("large blocks of operator new, also of the game", "MB", 1e-6 * static_cast<double>(large_of_new));
 }
 
 std::int64_t allocations() {
@@ -219,9 +260,14 @@ Options parse(int argc, char** argv) {
       options.with_parts = true;
       continue;
     }
+    if (name == "--arena") {
+      options.with_arena = true;
+      continue;
+    }
     const bool known = name == "--radius" || name == "--edits" || name == "--folder";
     if (!known || value == nullptr) {
-      std::fprintf(stderr, "usage: %s [--radius VOXELS] [--edits N] [--folder FOLDER] [--short] [--parts]\n", argv[0]);
+      std::fprintf(stderr, "usage: %s [--radius VOXELS] [--edits N] [--folder FOLDER] [--short] [--parts] [--arena]\n",
+                   argv[0]);
       std::exit(2);
     }
     if (name == "--radius") radius = std::atof(value);
@@ -235,6 +281,7 @@ Options parse(int argc, char** argv) {
     std::fprintf(stderr, "the radius must be from 128 to 8192, and the number of edits positive\n");
     std::exit(2);
   }
+  if (options.with_arena) use_arena();
   return options;
 }
 

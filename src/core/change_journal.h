@@ -12,6 +12,7 @@
 
 #include <quoin/core/assert.h>
 #include <quoin/core/changes.h>
+#include <quoin/core/memory.h>
 
 namespace quoin {
 
@@ -85,7 +86,7 @@ class ChangeJournal {
   /// Returns the changes of one aspect: `tell(record, items)` appends the changes of this aspect in a record, if any.
   template <class Change, class Less, class Report>
   [[nodiscard]] Changes<Change> changes_since(ChangeCursor& cursor, Less&& less, Report&& report) const {
-    std::vector<Record> records;
+    BlockVector<Record> records;
     std::vector<Change> items;
     ChangeCursor end = cursor;
     const bool is_known = visit_since(end, [&](const Record& record, std::uint64_t) { records.push_back(record); });
@@ -146,7 +147,7 @@ class ChangeJournal {
     if (end_ - first_ >= kLeast + kPerKey * keys) trim();
     if (blocks_.empty() || end_ % kBlock == 0) {
       try {
-        blocks_.push_back(std::make_shared<Block>());
+        blocks_.push_back(std::allocate_shared<Block>(BlockAllocator<Block>()));
       } catch (const std::bad_alloc&) {
         return forget();
       }

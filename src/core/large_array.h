@@ -6,6 +6,7 @@
 #include <utility>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 
 namespace quoin {
 
@@ -14,10 +15,20 @@ namespace quoin {
 /// those that a block gains are undefined.
 ///
 /// Blocks of at least kSystemBlock bytes are pages of the system. On Linux they grow without a copy: their pages move
-/// to another address. Pages that were never written take no memory.
+/// to another address. Pages that were never written take no memory. Neither holds with functions of the program
+/// (set_block_functions): then these supply all large blocks.
 /// Errors: bad_alloc, unless `wanted` is 0; the block is then unchanged.
 [[nodiscard]] void* resize_block(void* block, std::size_t bytes, std::size_t wanted);
 inline constexpr std::size_t kSystemBlock = std::size_t{1} << 20;
+
+/// Returns memory of any size, as BlockAllocator does. Errors: bad_alloc.
+[[nodiscard]] inline void* allocate_block(std::size_t bytes) {
+  return BlockAllocator<std::byte>().allocate(bytes);
+}
+/// Frees memory of `allocate_block`. Requires: the same `bytes`.
+inline void free_block(void* block, std::size_t bytes) noexcept {
+  BlockAllocator<std::byte>().deallocate(static_cast<std::byte*>(block), bytes);
+}
 
 /// A contiguous array of plain numbers, for tables of many megabytes that grow during frames (`resize_block`).
 ///

@@ -12,6 +12,7 @@
 #endif
 
 #include <algorithm>
+#include <atomic>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
@@ -86,17 +87,43 @@ std::optional<std::uint64_t> of_process() {
 }
 #endif
 
+// The functions that supply large blocks. The first large block, or set_block_functions, decides them for good.
+constexpr BlockFunctions kNoFunctions;
+constinit BlockFunctions functions_of_program;  // not written after `decided` points to them
+constinit std::atomic<const BlockFunctions*> decided{nullptr};
+
+const BlockFunctions& block_functions() {
+  const BlockFunctions* functions = decided.load(std::memory_order_acquire);
+  if (functions == nullptr && decided.compare_exchange_strong(functions, &kNoFunctions)) return kNoFunctions;
+  return *functions;
+}
+
+std::size_t alignment_of_block(std::size_t alignment) {
+  QUOIN_ASSERT(alignment != 0 && (alignment & (alignment - 1)) == 0, "an alignment");
+  return std::max<std::size_t>(alignment, __STDCPP_DEFAULT_NEW_ALIGNMENT__);
+}
+
+// Returns true if the functions of the program supply blocks of this size.
+bool is_of_program(std::size_t bytes) {
+  return bytes > kLargeBlock && block_functions().allocate != nullptr;
+}
+
 // Returns true if a block of this size is pages of the system.
 bool is_system_block([[maybe_unused]] std::size_t bytes) {
 #ifdef __linux__
-  return bytes >= kSystemBlock;
+  return bytes >= kSystemBlock && !is_of_program(bytes);
 #else
   return false;
 #endif
 }
 
-// Returns null if there is no memory.
+// All bytes are 0. Returns null if there is no memory.
 void* new_block(std::size_t bytes) {
+  if (is_of_program(bytes)) {
+    const BlockFunctions& functions = block_functions();
+    void* const block = functions.allocate(bytes, __STDCPP_DEFAULT_NEW_ALIGNMENT__, functions.context);
+    return block == nullptr ? nullptr : std::memset(block, 0, bytes);
+  }
 #ifdef __linux__
   if (is_system_block(bytes)) {
     void* const block = ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
@@ -106,7 +133,18 @@ void* new_block(std::size_t bytes) {
   return std::calloc(1, bytes);  // NOLINT(*-no-malloc): zeroed pages that are never written take no memory
 }
 
-void free_block(void* block, [[maybe_unused]] std::size_t bytes) {
+// Returns null if there is no memory. Requires: not a block of the system.
+void* block_without_content(std::size_t bytes) {
+  if (!is_of_program(bytes)) return std::malloc(bytes);  // NOLINT(*-no-malloc)
+  const BlockFunctions& functions = block_functions();
+  return functions.allocate(bytes, __STDCPP_DEFAULT_NEW_ALIGNMENT__, functions.context);
+}
+
+void free_resizable(void* block, [[maybe_unused]] std::size_t bytes) {
+  if (is_of_program(bytes)) {
+    const BlockFunctions& functions = block_functions();
+    return functions.free(block, bytes, __STDCPP_DEFAULT_NEW_ALIGNMENT__, functions.context);
+  }
 #ifdef __linux__
   if (is_system_block(bytes)) {
     ::munmap(block, bytes);
@@ -122,7 +160,7 @@ void* resize_block(void* block, std::size_t bytes, std::size_t wanted) {
   QUOIN_ASSERT((block == nullptr) == (bytes == 0), "an empty block or one with bytes");
   if (bytes == wanted) return block;
   if (wanted == 0) {
-    free_block(block, bytes);
+    free_resizable(block, bytes);
     return nullptr;
   }
 #ifdef __linux__
@@ -133,13 +171,45 @@ void* resize_block(void* block, std::size_t bytes, std::size_t wanted) {
   }
 #endif
   const bool is_new = block == nullptr || is_system_block(wanted);
-  void* const made = is_new ? new_block(wanted) : std::malloc(wanted);  // NOLINT(*-no-malloc)
+  void* const made = is_new ? new_block(wanted) : block_without_content(wanted);
   if (made == nullptr) throw std::bad_alloc();
   if (block != nullptr) {
     std::memcpy(made, block, std::min(bytes, wanted));
-    free_block(block, bytes);
+    free_resizable(block, bytes);
   }
   return made;
+}
+
+bool set_block_functions(const BlockFunctions& functions) {
+  QUOIN_ASSERT(functions.allocate != nullptr && functions.free != nullptr, "both functions");
+  static constinit std::atomic_flag is_taken;
+  if (decided.load() != nullptr || is_taken.test_and_set()) return false;
+  functions_of_program = functions;
+  const BlockFunctions* none = nullptr;
+  return decided.compare_exchange_strong(none, &functions_of_program);
+}
+
+void* allocate_large_block(std::size_t bytes, std::size_t alignment) {
+  QUOIN_ASSERT(bytes > kLargeBlock, "a large block");
+  const BlockFunctions& functions = block_functions();
+  alignment = alignment_of_block(alignment);
+  if (functions.allocate == nullptr) {
+    if (alignment <= __STDCPP_DEFAULT_NEW_ALIGNMENT__) return ::operator new(bytes);
+    return ::operator new(bytes, std::align_val_t(alignment));
+  }
+  void* const block = functions.allocate(bytes, alignment, functions.context);
+  if (block == nullptr) throw std::bad_alloc();
+  QUOIN_ASSERT(reinterpret_cast<std::uintptr_t>(block) % alignment == 0, "a block with the alignment");
+  return block;
+}
+
+void free_large_block(void* block, std::size_t bytes, std::size_t alignment) noexcept {
+  QUOIN_ASSERT(bytes > kLargeBlock, "a large block");
+  const BlockFunctions& functions = block_functions();
+  alignment = alignment_of_block(alignment);
+  if (functions.free != nullptr) return functions.free(block, bytes, alignment, functions.context);
+  if (alignment <= __STDCPP_DEFAULT_NEW_ALIGNMENT__) return ::operator delete(block);
+  ::operator delete(block, std::align_val_t(alignment));
 }
 
 std::optional<std::uint64_t> available_memory() {
@@ -159,8 +229,8 @@ bool return_freed_memory() {
 #ifdef __GLIBC__
   // Setting the size keeps it fixed. Otherwise glibc would raise it to the largest freed block and keep all smaller
   // blocks.
-  constexpr int kLargeBlock = 32 * 1024;
-  return ::mallopt(M_MMAP_THRESHOLD, kLargeBlock) == 1;
+  constexpr int kReturnedBlock = 32 * 1024;
+  return ::mallopt(M_MMAP_THRESHOLD, kReturnedBlock) == 1;
 #else
   return false;
 #endif

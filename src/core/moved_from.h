@@ -9,6 +9,8 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/changes.h>
 
+#include "core/large_array.h"
+
 namespace quoin {
 
 /// Returns the implementation of an object. Requires: the object was not moved from.
@@ -42,7 +44,9 @@ class [[gnu::visibility("hidden")]] BulkMemory {
  private:
   friend class BulkAllocated;
   struct alignas(__STDCPP_DEFAULT_NEW_ALIGNMENT__) Block {
+    explicit Block(std::size_t of_block) : bytes(of_block) {}
     std::atomic<std::size_t> users{1};  // objects, and the BulkMemory that still fills it
+    std::size_t bytes;
   };
   struct alignas(__STDCPP_DEFAULT_NEW_ALIGNMENT__) Head {
     Block* block = nullptr;  // null: the object has memory of its own
@@ -50,16 +54,18 @@ class [[gnu::visibility("hidden")]] BulkMemory {
 
   static void drop(Block* block) {
     if (block == nullptr || block->users.fetch_sub(1, std::memory_order_acq_rel) != 1) return;
+    const std::size_t bytes = block->bytes;
     block->~Block();
-    ::operator delete(block);
+    free_block(block, bytes);
   }
   void* allocate(std::size_t bytes) {
     const std::size_t size = sizeof(Head) + (bytes + alignof(Head) - 1) / alignof(Head) * alignof(Head);
     if (left_ == 0) {
       const std::size_t count = std::clamp<std::size_t>(expected_, 1, kMost);
-      void* const memory = ::operator new(sizeof(Block) + count * size);
+      const std::size_t block_bytes = sizeof(Block) + count * size;
+      void* const memory = allocate_block(block_bytes);
       drop(block_);
-      block_ = new (memory) Block;
+      block_ = new (memory) Block(block_bytes);
       next_ = static_cast<std::byte*>(memory) + sizeof(Block);
       left_ = count;
       size_ = size;

@@ -61,9 +61,9 @@ void ChunkWindow::put(std::uint32_t cell, ChunkEntry* entry, std::uint32_t epoch
 void ChunkWindow::move_to(const Box& box) {
   QUOIN_ASSERT(box.log_cells() < 31, "cell numbers fit in 32 bits");
   const std::size_t cells = std::size_t{1} << box.log_cells();
-  std::vector<ChunkEntry*> entries(cells, nullptr);
-  std::vector<std::uint32_t> epochs(cells, 0);
-  voxels_ = std::vector<const ChunkStorage*>(cells, air_);
+  BlockVector<ChunkEntry*> entries(cells, nullptr);
+  BlockVector<std::uint32_t> epochs(cells, 0);
+  voxels_ = BlockVector<const ChunkStorage*>(cells, air_);
   entries_ = std::move(entries);
   epochs_ = std::move(epochs);
   set_box(box);

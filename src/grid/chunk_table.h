@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 #include <quoin/grid/chunk.h>
 
 #include "core/coordinates/chunk_trie.h"
@@ -106,9 +107,9 @@ class ChunkWindow {
   std::uint32_t mask_z_ = 0;
   int shift_y_ = 0;
   int shift_z_ = 0;
-  std::vector<const ChunkStorage*> voxels_;
-  std::vector<ChunkEntry*> entries_;
-  std::vector<std::uint32_t> epochs_;
+  BlockVector<const ChunkStorage*> voxels_;
+  BlockVector<ChunkEntry*> entries_;
+  BlockVector<std::uint32_t> epochs_;
   Box box_;
 };
 

@@ -1,5 +1,8 @@
 // Consumers of changes stay correct if memory runs out during an update. This file replaces `operator new` of the test
 // program, so that a chosen allocation of the calling thread fails. It also counts allocations for other tests.
+//
+// With QUOIN_TEST_BLOCK_FUNCTIONS in the environment, the program has functions for large blocks, of which a chosen call
+// fails too. They check all calls of all tests (block_arena_for_tests.h).
 
 #include <algorithm>
 #include <array>
@@ -26,6 +29,7 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
+#include <quoin/core/memory.h>
 #include <quoin/grid/connected.h>
 #include <quoin/grid/downsample.h>
 #include <quoin/live/live_light.h>
@@ -40,6 +44,7 @@
 #include <quoin/scene/solid_shapes.h>
 #include <quoin/store/world_saver.h>
 
+#include "core/block_arena_for_tests.h"
 #include "core/coordinates/chunk_order.h"
 #include "live/allocations_for_tests.h"
 #include "live/live_test_support.h"
@@ -63,6 +68,25 @@ bool fails() {
   if (allocations_left_of_workers.load() < 0 || std::this_thread::get_id() == kTestThread) return false;
   return allocations_left_of_workers.fetch_sub(1) == 0;
 }
+
+bool are_functions_wanted() {
+  return std::getenv("QUOIN_TEST_BLOCK_FUNCTIONS") != nullptr;
+}
+
+struct Functions {
+  Functions() {
+    if (!are_functions_wanted()) return;
+    static constinit quoin::BlockArena arena;
+    arena.fails = [] {
+      ++allocations_made;
+      return fails();
+    };
+    are_set = quoin::set_block_functions(arena.functions());
+  }
+  bool are_set = false;
+};
+// Initialised before other objects, which may make large blocks.
+[[gnu::init_priority(101)]] const Functions functions_of_program;
 
 }  // namespace
 
@@ -286,6 +310,16 @@ void expect_recovery(Busy& busy, const std::function<void()>& update, const std:
     n = 1 + static_cast<std::int64_t>(static_cast<double>(n) * growth);
   }
   EXPECT_GT(failures, 0);
+}
+
+TEST(FailedAllocations, IncludeBlocksOfTheFunctions) {
+  if (!are_functions_wanted()) GTEST_SKIP() << "QUOIN_TEST_BLOCK_FUNCTIONS is not set";
+  ASSERT_TRUE(functions_of_program.are_set) << "a large block was made before main";
+  BlockVector<std::byte> block(2 * kLargeBlock, std::byte{9});
+  allocations_left = 0;
+  EXPECT_THROW(block.resize(3 * kLargeBlock), std::bad_alloc);
+  allocations_left = -1;
+  EXPECT_EQ(block, BlockVector<std::byte>(2 * kLargeBlock, std::byte{9}));
 }
 
 TEST(FailedAllocations, KeepSurfaces) {

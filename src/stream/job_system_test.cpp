@@ -19,6 +19,7 @@
 #include <quoin/render/impostor_cache.h>
 #include <quoin/stream/streamed_world.h>
 
+#include "core/block_arena_for_tests.h"
 #include "core/work/job_system_for_tests.h"
 #include "store/world/world_for_tests.h"
 
@@ -163,6 +164,25 @@ TEST_P(GameJobs, ObjectsEndInJobsWhileWorkersAreBusy) {
       game.light.reset();
     });
   }
+}
+
+// On a thread of its own, which frees its scratch memory at its end.
+void play_with_block_functions() {
+  static BlockArena arena;
+  ASSERT_TRUE(set_block_functions(arena.functions()));
+  std::thread([] {
+    {
+      const ScopedJobSystem scope(make_worker_pool({.count = 3}));
+      const GameResult result = play();
+      EXPECT_GT(result.uploads.size(), 0U);
+    }
+    EXPECT_GT(arena.made, 100);
+  }).join();
+  EXPECT_EQ(arena.blocks, 0);
+  EXPECT_EQ(arena.bytes, 0);
+}
+TEST(BlockFunctionsDeathTest, ServeAStreamedGameAndGetAllBlocksBack) {
+  QUOIN_EXPECT_IN_NEW_PROCESS(play_with_block_functions);
 }
 
 TEST(GameJobPriority, EditsAreMeshedBeforeLoadedChunks) {

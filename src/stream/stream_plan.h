@@ -11,6 +11,7 @@
 #include <tsl/robin_map.h>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 #include <quoin/core/vec.h>
 #include <quoin/scene/scene.h>
 #include <quoin/store/world_store.h>
@@ -97,7 +98,8 @@ class StreamPlan {
     State state = State::Unknown;
     std::uint32_t wanted = kUnwanted;  ///< index in `wanted_`
   };
-  using Grid = tsl::robin_map<IVec3, Known, CoordinateHash>;
+  using Grid =
+      tsl::robin_map<IVec3, Known, CoordinateHash, std::equal_to<IVec3>, BlockAllocator<std::pair<IVec3, Known>>>;
   struct Mark {};
   struct Extent {
     IBox chunks;

@@ -10,6 +10,7 @@
 
 #include <quoin/core/assert.h>
 #include <quoin/core/function_ref.h>
+#include <quoin/core/memory.h>
 #include <quoin/grid/changes.h>
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/density_grid.h>
@@ -289,8 +290,8 @@ class SolidRows {
   void read(const DensityGrid& field, IVec3 chunk, const RowsOf& rows_of);
   void read_chunk(const DensityChunk& samples, const ChunkRows& materials, IVec3 offset);
 
-  std::vector<std::uint64_t> rows_;  // empty if no sample counts
-  std::vector<std::uint8_t> last_;   // sample 64 of each row
+  BlockVector<std::uint64_t> rows_;  // empty if no sample counts
+  BlockVector<std::uint8_t> last_;   // sample 64 of each row
 };
 
 /// Returns true if a solid sample of a chunk has a transparent material. Cost: O(1) if the chunk has no such material,

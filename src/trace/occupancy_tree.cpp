@@ -8,6 +8,7 @@
 #include <glm/common.hpp>
 #include <tsl/robin_map.h>
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 
 #include "core/coordinates/chunk_boxes.h"
 #include "core/coordinates/chunk_order.h"
@@ -28,7 +29,7 @@ struct FlatTables {
   IBox first;                           // the box of all chunks when the tables were made
   LargeArray<std::uint32_t> cells;      // one bit per cell of 4^3 voxels, with a border of empty cells
   LargeArray<trace::BrickCode> bricks;  // x first, then y, then z; an empty one before and after, for pairs along x
-  std::vector<trace::FlatChunk> nodes;
+  BlockVector<trace::FlatChunk> nodes;
 
   [[nodiscard]] IVec3 chunks() const { return box.size(); }
   // The steps between cells along x, y, z; cell (0, 0, 0) is bit x + y + z of them.
@@ -159,9 +160,9 @@ struct OccupancyTree::Impl {
   Occupancy which = Occupancy::NonAir;
   tsl::robin_map<IVec3, std::unique_ptr<RegionNode>, CoordinateHash> regions;
   // Index 0: an empty node. Nodes keep their addresses, which the flat tables hold, so growth copies none.
-  std::vector<std::unique_ptr<ChunkNode>> chunk_nodes;
+  BlockVector<std::unique_ptr<ChunkNode>> chunk_nodes;
   trace::BrickStore bricks;
-  std::vector<std::uint32_t> free_chunks;
+  BlockVector<std::uint32_t> free_chunks;
   ChunkBoxes chunk_boxes;  // around the occupied voxels of each chunk, in grid coordinates
   IBox bounds;
   FlatTables flat;

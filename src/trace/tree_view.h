@@ -26,6 +26,7 @@
 #include <memory>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 #include <quoin/trace/occupancy_tree.h>
 
 namespace quoin::trace {
@@ -137,7 +138,7 @@ struct ChunkBricks {
 };
 
 /// A region of 16^3 chunks.
-struct RegionNode {
+struct RegionNode : LargeObject {
   Node chunks{};                            ///< chunks with any voxel
   std::array<std::uint32_t, 4096> nodes{};  ///< index of a ChunkNode, x + 16 y + 256 z; 0: empty
 };

@@ -2,11 +2,11 @@
 
 #include <cstddef>
 #include <cstring>
-#include <memory>
 #include <type_traits>
 #include <utility>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 
 namespace [[gnu::visibility("default")]] quoin {
 
@@ -22,21 +22,19 @@ class Buffer {
   Buffer() = default;
   /// Moves the contents. The other buffer is left empty, without memory.
   Buffer(Buffer&& other) noexcept
-      : values_(std::move(other.values_)),
+      : values_(std::exchange(other.values_, nullptr)),
         size_(std::exchange(other.size_, 0)),
         capacity_(std::exchange(other.capacity_, 0)) {}
   Buffer& operator=(Buffer&& other) noexcept {
-    values_ = std::move(other.values_);
-    size_ = std::exchange(other.size_, 0);
-    capacity_ = std::exchange(other.capacity_, 0);
+    Buffer(std::move(other)).swap(*this);
     return *this;
   }
-  ~Buffer() = default;
+  ~Buffer() { release(); }
 
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] bool empty() const { return size_ == 0; }
-  [[nodiscard]] T* data() { return values_.get(); }
-  [[nodiscard]] const T* data() const { return values_.get(); }
+  [[nodiscard]] T* data() { return values_; }
+  [[nodiscard]] const T* data() const { return values_; }
   [[nodiscard]] T& operator[](std::size_t i) {
     QUOIN_ASSERT(i < size_, "i < size()");
     return values_[i];
@@ -45,10 +43,10 @@ class Buffer {
     QUOIN_ASSERT(i < size_, "i < size()");
     return values_[i];
   }
-  [[nodiscard]] T* begin() { return values_.get(); }
-  [[nodiscard]] T* end() { return values_.get() + size_; }
-  [[nodiscard]] const T* begin() const { return values_.get(); }
-  [[nodiscard]] const T* end() const { return values_.get() + size_; }
+  [[nodiscard]] T* begin() { return values_; }
+  [[nodiscard]] T* end() { return values_ + size_; }
+  [[nodiscard]] const T* begin() const { return values_; }
+  [[nodiscard]] const T* end() const { return values_ + size_; }
   [[nodiscard]] std::size_t capacity() const { return capacity_; }
 
   /// Sets the size to 0 and keeps the memory.
@@ -67,14 +65,24 @@ class Buffer {
   void reserve(std::size_t capacity) {
     if (capacity <= capacity_) return;
     const std::size_t larger = capacity > capacity_ + capacity_ / 2 ? capacity : capacity_ + capacity_ / 2;
-    std::unique_ptr<T[]> grown(new T[larger]);
-    if (size_ != 0) std::memcpy(static_cast<void*>(grown.get()), values_.get(), size_ * sizeof(T));
-    values_ = std::move(grown);
+    T* const grown = BlockAllocator<T>().allocate(larger);
+    if (size_ != 0) std::memcpy(static_cast<void*>(grown), values_, size_ * sizeof(T));
+    release();
+    values_ = grown;
     capacity_ = larger;
   }
 
  private:
-  std::unique_ptr<T[]> values_;
+  void release() noexcept {
+    if (values_ != nullptr) BlockAllocator<T>().deallocate(values_, capacity_);
+  }
+  void swap(Buffer& other) noexcept {
+    std::swap(values_, other.values_);
+    std::swap(size_, other.size_);
+    std::swap(capacity_, other.capacity_);
+  }
+
+  T* values_ = nullptr;
   std::size_t size_ = 0;
   std::size_t capacity_ = 0;
 };

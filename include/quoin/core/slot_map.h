@@ -11,6 +11,7 @@
 
 #include <quoin/core/assert.h>
 #include <quoin/core/changes.h>
+#include <quoin/core/memory.h>
 
 namespace [[gnu::visibility("default")]] quoin {
 
@@ -152,7 +153,7 @@ class SlotMap {
     std::uint64_t generation = 0;  // of the value; 0 means none
   };
   static constexpr std::size_t kPage = 32;
-  using Page = std::array<Slot, kPage>;
+  struct Page : std::array<Slot, kPage>, LargeObject {};
 
   [[nodiscard]] const Slot& slot_at(std::uint32_t index) const {
     QUOIN_ASSERT(index / kPage < pages_.size(), "a slot of the map");

@@ -167,7 +167,7 @@ class Chunk {
   bool set_anywhere(int x, int y, int z, VoxelType type);
   void after_writing(int y, int z, std::uint32_t index, std::uint32_t changed);
   void pack_slab(std::size_t slab, std::span<const VoxelType, kChunkVoxels> types,
-                 const std::vector<std::uint32_t>& index_of);
+                 std::span<const std::uint32_t> index_of);
   void tidy();
   void repack(int bits);
   [[nodiscard]] std::size_t used_types() const;

@@ -1,10 +1,10 @@
 #pragma once
 
 #include <cstdint>
-#include <vector>
 
 #include <quoin/core/assert.h>
 #include <quoin/core/direction.h>
+#include <quoin/core/memory.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/mesh/occlusion.h>
@@ -67,7 +67,7 @@ struct Quad {
 
 /// Quads of one chunk, in the order direction, layer, row, column. Reuse a buffer between calls: its capacity only
 /// grows.
-using QuadBuffer = std::vector<Quad>;
+using QuadBuffer = BlockVector<Quad>;
 
 /// Returns the part of a quad that starts at its voxel (u, v), counted along the direction's u and v. The part keeps
 /// the quad's type and occlusion, because all merged faces have the same.

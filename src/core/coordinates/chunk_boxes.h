@@ -2,11 +2,14 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <map>
+#include <utility>
 
 #include <tsl/robin_map.h>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 #include <quoin/core/vec.h>
 
 namespace quoin {
@@ -96,7 +99,7 @@ class ChunkBoxes {
     if (found->second == 0) ends.erase(found);
   }
 
-  tsl::robin_map<IVec3, IBox, CoordinateHash> boxes_;
+  tsl::robin_map<IVec3, IBox, CoordinateHash, std::equal_to<IVec3>, BlockAllocator<std::pair<IVec3, IBox>>> boxes_;
   bool was_asked_ = false;
   bool is_counted_ = false;
   std::array<std::map<int, int>, 3> mins_;  // number of chunk boxes that begin at a coordinate

@@ -11,6 +11,8 @@
 #include <quoin/core/ref.h>
 #include <quoin/core/vec.h>
 
+#include "core/large_array.h"
+
 namespace quoin {
 
 /// The chunks of a grid by their coordinates, in a tree that its copies share.
@@ -56,7 +58,7 @@ class ChunkTrie {
   Entry& find_or_create(IVec3 chunk, OnCopy&& on_copy) {
     const Place at = place_of(chunk.x, chunk.y, chunk.z);
     QUOIN_ASSERT((at[0] | at[1] | at[2]) < 2 * kOrigin, "its voxels have int32 coordinates");
-    if (root_ == nullptr) root_ = Ref<Node>(new Leaf(at));
+    if (root_ == nullptr) root_ = make_node<Leaf>(at);
     Ref<Node>* here = &root_;
     for (;;) {
       const bool was_shared = here->is_shared();
@@ -75,7 +77,7 @@ class ChunkTrie {
         return static_cast<Leaf&>(node).entries[slot];
       }
       here = &static_cast<Inner&>(node).children[slot];
-      if (*here == nullptr) *here = Ref<Node>(new Leaf(at));
+      if (*here == nullptr) *here = make_node<Leaf>(at);
       node.present |= bit;
     }
   }
@@ -130,10 +132,10 @@ class ChunkTrie {
     void operator delete(Node* node, std::destroying_delete_t) {
       if (node->level == 0) {
         static_cast<Leaf*>(node)->~Leaf();
-        ::operator delete(node);
+        free_block(node, sizeof(Leaf));
       } else {
         static_cast<Inner*>(node)->~Inner();
-        ::operator delete(node);
+        free_block(node, sizeof(Inner));
       }
     }
     int level;
@@ -152,6 +154,18 @@ class ChunkTrie {
     Inner(int node_level, const Place& at) : Node(node_level, prefix_of(at, node_level)) {}
     std::array<Ref<Node>, 64> children;
   };
+
+  // A leaf is a large block if its entries have more than 64 bytes.
+  template <class Made, class... Arguments>
+  static Ref<Node> make_node(Arguments&&... arguments) {
+    void* const block = allocate_block(sizeof(Made));
+    try {
+      return Ref<Node>(new (block) Made(std::forward<Arguments>(arguments)...));
+    } catch (...) {
+      free_block(block, sizeof(Made));
+      throw;
+    }
+  }
 
   static Place place_of(int x, int y, int z) {
     return {static_cast<std::uint32_t>(x) + kOrigin, static_cast<std::uint32_t>(y) + kOrigin,
@@ -183,8 +197,8 @@ class ChunkTrie {
   }
 
   static Ref<Node> copy_of(const Node& node) {
-    if (node.level == 0) return Ref<Node>(new Leaf(static_cast<const Leaf&>(node)));
-    return Ref<Node>(new Inner(static_cast<const Inner&>(node)));
+    if (node.level == 0) return make_node<Leaf>(static_cast<const Leaf&>(node));
+    return make_node<Inner>(static_cast<const Inner&>(node));
   }
 
   // Replaces a node that does not cover a chunk by the smallest node that covers both, with the old one as child.

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 
 #include "core/rows/packed_row.h"
 #include "grid/chunk/chunk_data.h"
@@ -365,7 +366,7 @@ Chunk Chunk::from_dense(std::span<const VoxelType, kChunkVoxels> types) {
   chunk.storage_ = make_ref<ChunkStorage>();
   ChunkStorage& m = *chunk.storage_;
   constexpr std::uint32_t kUnseen = 0xFFFF'FFFFU;
-  std::vector<std::uint32_t> index_of(std::size_t{1} << 16, kUnseen);
+  BlockVector<std::uint32_t> index_of(std::size_t{1} << 16, kUnseen);
   for (std::size_t first = 0; first < types.size(); first += kChunkEdge) {
     for_each_run(types.subspan(first).first<kChunkEdge>(), [&](VoxelType type, std::uint64_t voxels) {
       if (index_of[type] == kUnseen) {
@@ -379,7 +380,7 @@ Chunk Chunk::from_dense(std::span<const VoxelType, kChunkVoxels> types) {
   m.bits = bits_for(m.palette.size());
   QUOIN_ASSERT(std::accumulate(m.counts.begin(), m.counts.end(), 0U) == kChunkVoxels, "each voxel has one type");
   if (m.direct()) {
-    std::vector<std::uint32_t> counts(ChunkStorage::kRemainders);
+    BlockVector<std::uint32_t> counts(ChunkStorage::kRemainders);
     for (const VoxelType type : m.palette) {
       counts[type % ChunkStorage::kRemainders] += m.counts[index_of[type]];
       index_of[type] = type;
@@ -395,7 +396,7 @@ Chunk Chunk::from_dense(std::span<const VoxelType, kChunkVoxels> types) {
 }
 
 void Chunk::pack_slab(std::size_t slab, std::span<const VoxelType, kChunkVoxels> types,
-                      const std::vector<std::uint32_t>& index_of) {
+                      std::span<const std::uint32_t> index_of) {
   ChunkStorage& m = *storage_;
   const auto row_of = [&](int y, int z) {
     return types.subspan(static_cast<std::size_t>((z * kChunkEdge + y) * kChunkEdge)).first<kChunkEdge>();

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 
 #include "core/rows/packed_row.h"
 #include "grid/chunk/chunk_data.h"
@@ -38,14 +39,14 @@ void for_each_type(const ChunkStorage& m, Visit&& visit) {
 
 // A palette without unused entries, and the new index of each old entry.
 struct Numbering {
-  std::vector<VoxelType> palette;
-  std::vector<std::uint32_t> counts;
-  std::vector<std::uint32_t> new_index;
+  BlockVector<VoxelType> palette;
+  BlockVector<std::uint32_t> counts;
+  BlockVector<std::uint32_t> new_index;
 };
 
 // Counts voxels by type.
-std::vector<std::uint32_t> count_types(const ChunkStorage& m) {
-  std::vector<std::uint32_t> voxels(kAllTypes);
+BlockVector<std::uint32_t> count_types(const ChunkStorage& m) {
+  BlockVector<std::uint32_t> voxels(kAllTypes);
   for_each_type(m, [&](std::uint32_t type, int count) { voxels[type] += static_cast<std::uint32_t>(count); });
   return voxels;
 }
@@ -78,7 +79,7 @@ Numbering numbering_of_types(const ChunkStorage& m, int bits) {
     to.counts = m.counts;
     return to;
   }
-  const std::vector<std::uint32_t> voxels = count_types(m);
+  const BlockVector<std::uint32_t> voxels = count_types(m);
   for (std::size_t type = 0; type < kAllTypes; ++type) {
     if (voxels[type] == 0) continue;
     to.new_index[type] = static_cast<std::uint32_t>(to.palette.size());
@@ -89,7 +90,7 @@ Numbering numbering_of_types(const ChunkStorage& m, int bits) {
 }
 
 // `to` holds zeros.
-void renumber_row(const std::uint64_t* from, int from_bits, const std::vector<std::uint32_t>& new_index,
+void renumber_row(const std::uint64_t* from, int from_bits, const BlockVector<std::uint32_t>& new_index,
                   std::uint64_t* to, int to_bits) {
   constexpr std::size_t kFew = 6;
   if (new_index.size() > kFew) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 #include <quoin/grid/chunk.h>
 
 #include "grid/chunk/paged_words.h"
@@ -40,8 +41,8 @@ struct ChunkStorage : RefCounted {
   /// detect 256 types or fewer.
   static constexpr std::uint32_t kRemainders = 1'024;
   int bits = 1;                            ///< per voxel: 1, 2, 4, 8 or 16
-  std::vector<VoxelType> palette;          ///< type of each index; unused at 16 bits, where the index is the type
-  std::vector<std::uint32_t> counts;       ///< voxels of each index; at 16 bits of each remainder by kRemainders
+  BlockVector<VoxelType> palette;          ///< type of each index; unused at 16 bits, where the index is the type
+  BlockVector<std::uint32_t> counts;       ///< voxels of each index; at 16 bits of each remainder by kRemainders
   std::array<std::uint32_t, 256> slabs{};  ///< [z / 4][y / 4]: kUniformSlab | index, or a slot in `words`
   PagedWords words;                        ///< [slot][z % 4][y % 4][bits]: 64 voxels along x, lowest bits first
   std::array<std::array<std::uint16_t, kChunkEdge>, 3> layer_counts{};  ///< non-air voxels by axis and layer

@@ -7,6 +7,8 @@
 
 #include <gtest/gtest.h>
 
+#include <quoin/core/memory.h>
+
 #include "grid/chunk/chunk_storage.h"
 
 namespace quoin {
@@ -38,7 +40,7 @@ void expect_books_agree(const Chunk& chunk) {
   EXPECT_EQ(free, m->free_count);
   EXPECT_EQ(std::count(is_taken.begin(), is_taken.end(), false), 0);
   EXPECT_EQ(m->words.size(), std::size_t{m->slot_count} * kSlabRows * static_cast<std::size_t>(m->bits));
-  std::vector<std::uint32_t> counts(m->counts.size());
+  BlockVector<std::uint32_t> counts(m->counts.size());
   std::array<std::array<std::uint16_t, kChunkEdge>, 3> layers{};
   for (std::size_t i = 0; i < kChunkVoxels; ++i) {
     const IVec3 at{static_cast<int>(i % 64), static_cast<int>(i / 64 % 64), static_cast<int>(i / 4096)};

@@ -7,7 +7,7 @@ namespace quoin {
 Ref<PagedWords::Page> PagedWords::Page::make(std::size_t capacity) {
   QUOIN_ASSERT(capacity != 0 && capacity <= kPageWords, "the words of a page");
   static_assert(alignof(Page) <= __STDCPP_DEFAULT_NEW_ALIGNMENT__);
-  void* const memory = ::operator new(sizeof(Page) + capacity * sizeof(std::uint64_t));
+  void* const memory = allocate_block(bytes_of(capacity));
   return Ref<Page>(new (memory) Page(capacity));
 }
 

@@ -13,6 +13,8 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/ref.h>
 
+#include "core/large_array.h"
+
 namespace quoin {
 
 /// Words in pages that copies share until one of them writes to a page. The costs of a copy and of a first write do not
@@ -92,12 +94,19 @@ class PagedWords {
    public:
     // Words with unspecified values.
     static Ref<Page> make(std::size_t capacity);
-    static void operator delete(void* page) { ::operator delete(page); }
+    void operator delete(Page* page, std::destroying_delete_t) {
+      const std::size_t bytes = bytes_of(page->capacity_);
+      page->~Page();
+      free_block(page, bytes);
+    }
     [[nodiscard]] std::size_t capacity() const { return capacity_; }
     [[nodiscard]] std::uint64_t* words() { return reinterpret_cast<std::uint64_t*>(this + 1); }
     [[nodiscard]] const std::uint64_t* words() const { return reinterpret_cast<const std::uint64_t*>(this + 1); }
 
    private:
+    [[nodiscard]] static std::size_t bytes_of(std::size_t capacity) {
+      return sizeof(Page) + capacity * sizeof(std::uint64_t);
+    }
     explicit Page(std::size_t capacity) : capacity_(static_cast<std::uint32_t>(capacity)) {}
     std::uint32_t capacity_;
   };

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/connected.h>
@@ -86,7 +87,7 @@ class UnionFind {
   [[nodiscard]] std::size_t size() const { return parents_.size(); }
 
  private:
-  std::vector<Index> parents_;
+  BlockVector<Index> parents_;
 };
 
 /// A connected component within one chunk; in the chunk's coordinates.
@@ -109,11 +110,11 @@ struct ChunkPart {
 class ChunkParts {
  public:
   /// Scratch memory for finding parts; one per thread.
-  struct Scratch {
+  struct Scratch : LargeObject {
     std::array<std::uint64_t, std::size_t{kChunkEdge} * kChunkEdge> rows;
     std::array<std::uint32_t, std::size_t{kChunkEdge} * kChunkEdge> first_runs;
     UnionFind<std::uint32_t> runs;
-    std::vector<std::uint32_t> part_of_root;
+    BlockVector<std::uint32_t> part_of_root;
   };
 
   ChunkParts() = default;
@@ -155,10 +156,10 @@ class ChunkParts {
   Rule rule_ = Rule::AllButAir;
   std::vector<VoxelType> types_;  // types listed by the rule, ascending
   std::vector<ChunkPart> parts_;
-  std::vector<std::uint32_t> layer_starts_;  // [z]: the first run of the layer
-  std::vector<std::uint16_t> row_starts_;    // [z * 64 + y]: first run of the row, relative to its layer
-  std::vector<std::uint8_t> few_parts_;      // [run], if there are at most 256 parts
-  std::vector<std::uint32_t> many_parts_;    // [run], otherwise
+  BlockVector<std::uint32_t> layer_starts_;  // [z]: the first run of the layer
+  BlockVector<std::uint16_t> row_starts_;    // [z * 64 + y]: first run of the row, relative to its layer
+  BlockVector<std::uint8_t> few_parts_;      // [run], if there are at most 256 parts
+  BlockVector<std::uint32_t> many_parts_;    // [run], otherwise
 };
 
 }  // namespace quoin

@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 
 #include "core/rows/packed_row.h"
 #include "grid/density/density_storage.h"
@@ -196,7 +197,7 @@ void DensityChunk::compact() {
   materials_.compact();
   // Copies would keep the shared memory anyway.
   if (storage_ == nullptr || storage_.is_shared()) return;
-  std::vector<Half> values;
+  BlockVector<Half> values;
   DensityStorage& m = *storage_;
   values.reserve(m.values.size() - m.free_slots.size() * kSlabValues);
   for (std::uint32_t& slab : m.slabs) {

@@ -10,6 +10,7 @@
 
 #include <quoin/core/assert.h>
 #include <quoin/core/half.h>
+#include <quoin/core/memory.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/density_chunk.h>
 
@@ -42,7 +43,7 @@ inline Half stored_within(float density, Half band) {
 }
 
 /// The densities of a chunk of several. Shared by copies of the chunk until one of them is written.
-struct DensityStorage : RefCounted {
+struct DensityStorage : RefCounted, LargeObject {
   /// Returns the storage of a chunk; null if it is uniform.
   [[nodiscard]] static const DensityStorage* of(const DensityChunk& chunk) { return chunk.storage_.get(); }
   /// Creates a chunk of these densities. Requires: at least two values; each is a `stored_density`, and `solid` agrees.
@@ -58,8 +59,8 @@ struct DensityStorage : RefCounted {
   static void turn_outward(DensityChunk& chunk, const std::array<std::uint64_t, kChunkEdge * kChunkEdge>& rows);
 
   std::array<std::uint32_t, 256> slabs{};  ///< [z / 4][y / 4]: ChunkStorage::kUniformSlab | half, or a slot in `values`
-  std::vector<Half> values;                ///< [slot][z % 4][y % 4][x]
-  std::vector<std::uint32_t> free_slots;
+  BlockVector<Half> values;                ///< [slot][z % 4][y % 4][x]
+  BlockVector<std::uint32_t> free_slots;
   std::array<std::uint64_t, kChunkEdge * kChunkEdge> solid{};  ///< [z][y]: the signs of a row
 
   [[nodiscard]] const Half* row(std::uint32_t slot, int row_in_slab) const {

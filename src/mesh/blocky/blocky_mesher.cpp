@@ -5,6 +5,7 @@
 #include <bit>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 #include <quoin/core/thousands.h>
 #include <quoin/mesh/occlusion.h>
 #include <quoin/mesh/visible_faces.h>
@@ -197,7 +198,7 @@ blocky::Job job_of_faces(const Neighbourhood& chunks, const VoxelRegistry& types
 
 }  // namespace
 
-struct BlockyMesher::Scratch : blocky::Scratch {
+struct BlockyMesher::Scratch : blocky::Scratch, LargeObject {
   const blocky::Kernel& kernel = blocky::kKernels.widest();
 };
 

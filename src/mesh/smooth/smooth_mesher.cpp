@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 
 #include "core/moved_from.h"
 #include "grid/density/density_storage.h"
@@ -277,7 +278,7 @@ int reach_of(const SmoothOcclusionOptions& occlusion, int coarsest_level) {
   return (std::max(smooth::apron_of(limited), 1) + 1) << level;
 }
 
-struct SmoothMesher::Scratch {
+struct SmoothMesher::Scratch : LargeObject {
   const smooth::Kernel& kernel = smooth::kKernels.widest();
   smooth::Work work;
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include <quoin/core/memory.h>
 #include <quoin/grid/density_chunk.h>
 #include <quoin/mesh/smooth.h>
 
@@ -132,7 +133,7 @@ struct Work {
 
   const DensityNeighbourhood* chunks = nullptr;
   // The points of the two current slices: [z & 1], rows -1 to 64.
-  std::vector<Half> points = std::vector<Half>(std::size_t{2} * kPointSlice + 64);
+  BlockVector<Half> points = BlockVector<Half>(std::size_t{2} * kPointSlice + 64);
 
   // Indices of the active cells of a slice, or of crossed edges; edges that start at a solid point have bit 15 set.
   alignas(64) std::uint16_t places[kSlicePlaces + 64];
@@ -152,12 +153,12 @@ struct Work {
   // listed cells: [z & ring_mask]. Points: [z & ring_mask][y + 16][x + 16].
   std::uint64_t signs[2][2][kReachRows + 8]{};
   int row_step = 1;
-  std::vector<CellWords> cell_words;
+  BlockVector<CellWords> cell_words;
   std::array<RowSet, kMostSlices> listed_rows;
-  std::vector<Half> sampled;
+  BlockVector<Half> sampled;
   // Used if is_dense: points as floats, [z & ring_mask][y + kWidestApron][x + kPointX]. The first kRepeatedSlices are
   // repeated after the last slice, so that all samples of a vertex are at fixed distances.
-  std::vector<float> decoded;
+  BlockVector<float> decoded;
   int apron = 0;  // number of points below and above a cell's own that occlusion reads
 
   // Returns the row of points (y, z); the pointer is at x = 0.

@@ -15,6 +15,7 @@
 #include <tsl/robin_map.h>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 
 #include "core/caches.h"
 #include "core/moved_from.h"
@@ -108,8 +109,8 @@ class SampleKernel {
 
   const Kernel& kernel_ = kKernels.widest();
   Work work_;
-  std::vector<Entry> entries_;                                  // samples within reach, in input order
-  std::vector<Entry> sorted_;                                   // by slice
+  BlockVector<Entry> entries_;                                  // samples within reach, in input order
+  BlockVector<Entry> sorted_;                                   // by slice
   std::array<std::uint32_t, kChunkEdge + 3> first_of_slice_{};  // [z + 1], starting at cell -1
   std::array<float, kPlacesAtOnce + 64> occlusion_{};
 };
@@ -246,7 +247,7 @@ class SamplesByChunk {
     const std::size_t count = samples.positions.size();
     const float open = smooth::open_occlusion(sampling.occlusion);
     constexpr std::uint32_t kNowhere = std::numeric_limits<std::uint32_t>::max();
-    std::vector<std::uint32_t> chunk_of_sample(count);
+    BlockVector<std::uint32_t> chunk_of_sample(count);
     for (std::size_t i = 0; i < count; ++i) {
       const DVec3 position = DVec3(samples.positions[i]) + DVec3(samples.origin);
       if (smooth::is_in_int32(position)) {
@@ -258,7 +259,7 @@ class SamplesByChunk {
     }
     for (std::size_t i = 1; i < first_.size(); ++i) first_[i] += first_[i - 1];
     numbers_.resize(first_.back());
-    std::vector<std::uint32_t> next = first_;
+    BlockVector<std::uint32_t> next = first_;
     for (std::size_t i = 0; i < count; ++i) {
       if (chunk_of_sample[i] != kNowhere) numbers_[next[chunk_of_sample[i]]++] = static_cast<std::uint32_t>(i);
     }
@@ -288,9 +289,9 @@ class SamplesByChunk {
   tsl::robin_map<IVec3, std::uint32_t, CoordinateHash> indices_;
   std::vector<IVec3> chunks_;
   std::uint32_t last_ = 0;
-  std::vector<std::uint32_t> first_{
+  BlockVector<std::uint32_t> first_{
       0};  // first of each chunk, in `numbers_`; while counting, the count of the chunk before
-  std::vector<std::uint32_t> numbers_;
+  BlockVector<std::uint32_t> numbers_;
 };
 
 }  // namespace
@@ -342,7 +343,7 @@ Status smooth_occlusion(const DensityGrid& field, const SmoothSamples& samples, 
 
 struct SmoothOccluder::Scratch {
   SampleKernel kernel;
-  std::vector<std::uint32_t> numbers;
+  BlockVector<std::uint32_t> numbers;
 };
 
 SmoothOccluder::SmoothOccluder() : scratch_(std::make_unique<Scratch>()) {}

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 
 #include "core/srgb.h"
 #include "grid/chunk/chunk_storage.h"
@@ -226,8 +227,8 @@ class Copies {
 
   /// Lists the copies in the order of the vertices, and of their addition for each vertex. `places` gets the index of
   /// each vertex' first copy.
-  [[nodiscard]] std::vector<VertexCopy> list(std::vector<std::uint32_t>& places) const {
-    std::vector<VertexCopy> copies;
+  [[nodiscard]] BlockVector<VertexCopy> list(std::vector<std::uint32_t>& places) const {
+    BlockVector<VertexCopy> copies;
     copies.reserve(first_.size() + others_.size());
     places.resize(first_.size());
     for (std::uint32_t vertex = 0; vertex < first_.size(); ++vertex) {
@@ -249,9 +250,9 @@ class Copies {
     std::uint32_t next = 0;  // 0: none, otherwise the index of the next, plus one
   };
 
-  std::vector<LookCode> first_;        // by vertex
+  BlockVector<LookCode> first_;        // by vertex
   std::vector<std::uint32_t> second_;  // by vertex, as Other::next; empty while no vertex has two
-  std::vector<Other> others_;
+  BlockVector<Other> others_;
 };
 
 // Returns true if a sample in or next to the chunk is solid.
@@ -299,7 +300,7 @@ TriangleFace face_around_edge(const DensityNeighbourhood& chunks, const SmoothCh
 
 // For cells of several sizes: derives the face from the surroundings of the triangle's vertices.
 TriangleFace face_of_triangle(const SmoothChunkMesh& mesh, const std::uint32_t* triangle,
-                              const std::vector<CellMaterial>& materials) {
+                              const BlockVector<CellMaterial>& materials) {
   const auto type = [&](std::size_t i) { return materials[triangle[i]].type; };
   const DVec3 a(mesh.positions[triangle[0]]);
   const DVec3 b(mesh.positions[triangle[1]]);
@@ -315,10 +316,10 @@ TriangleFace face_of_triangle(const SmoothChunkMesh& mesh, const std::uint32_t* 
 
 }  // namespace
 
-std::vector<CellMaterial> materials_of(const DensityNeighbourhood& chunks, const SmoothOptions& options,
+BlockVector<CellMaterial> materials_of(const DensityNeighbourhood& chunks, const SmoothOptions& options,
                                        const SurfaceMaterials& materials, const SmoothChunkMesh& mesh) {
   const ChunkLevels levels(options.levels);
-  std::vector<CellMaterial> of_vertex;
+  BlockVector<CellMaterial> of_vertex;
   of_vertex.reserve(mesh.cells.size());
   for (const SmoothCell name : mesh.cells) {
     const LevelCell cell = levels.cell_of(name);
@@ -360,13 +361,13 @@ void find_faces(const DensityNeighbourhood& chunks, const SmoothOptions& options
     }
     return;
   }
-  const std::vector<CellMaterial> of_vertex = materials_of(chunks, options, materials, mesh);
+  const BlockVector<CellMaterial> of_vertex = materials_of(chunks, options, materials, mesh);
   for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
     faces.push_back(face_of_triangle(mesh, mesh.indices.data() + i, of_vertex));
   }
 }
 
-std::vector<VertexCopy> split_by_faces(std::span<std::uint32_t> indices, std::size_t vertices,
+BlockVector<VertexCopy> split_by_faces(std::span<std::uint32_t> indices, std::size_t vertices,
                                        std::span<const TriangleFace> faces, const FaceDifferences& differences) {
   QUOIN_ASSERT(faces.size() == indices.size() / 3, "a face per triangle");
   QUOIN_ASSERT(differences.groups.empty() || differences.groups.size() == faces.size(), "a group per triangle");
@@ -388,7 +389,7 @@ std::vector<VertexCopy> split_by_faces(std::span<std::uint32_t> indices, std::si
     }
   }
   std::vector<std::uint32_t> places;
-  std::vector<VertexCopy> list = copies.list(places);
+  BlockVector<VertexCopy> list = copies.list(places);
   for (std::uint32_t& index : indices) index = places[index];
   for (const Exception& exception : exceptions) indices[exception.index] += exception.number;
   return list;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <quoin/core/direction.h>
+#include <quoin/core/memory.h>
 #include <quoin/grid/density_chunk.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/mesh/smooth.h>
@@ -51,7 +52,7 @@ struct TriangleFace {
 
 /// Returns the blended materials of a chunk's vertices. A vertex of a cell before the chunk has the same material as
 /// in that chunk's mesh.
-[[nodiscard]] std::vector<CellMaterial> materials_of(const DensityNeighbourhood& chunks, const SmoothOptions& options,
+[[nodiscard]] BlockVector<CellMaterial> materials_of(const DensityNeighbourhood& chunks, const SmoothOptions& options,
                                                      const SurfaceMaterials& materials, const SmoothChunkMesh& mesh);
 
 /// Appends the materials of the samples that SurfaceMaterials::of_cell would blend for a vertex of an opaque body,
@@ -93,7 +94,7 @@ struct VertexCopy {
 /// Gives each of `vertices` vertices one copy per distinct look of its triangles' faces, and updates `indices`. Returns
 /// the copies; copies of one vertex are adjacent, in the order in which triangles need them. Vertices without triangles
 /// get no copy. `faces`: by triangle.
-std::vector<VertexCopy> split_by_faces(std::span<std::uint32_t> indices, std::size_t vertices,
+BlockVector<VertexCopy> split_by_faces(std::span<std::uint32_t> indices, std::size_t vertices,
                                        std::span<const TriangleFace> faces, const FaceDifferences& differences);
 
 }  // namespace quoin::smooth

@@ -6,6 +6,7 @@
 #include <string>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 
 #include "core/caches.h"
 #include "core/coordinates/chunk_order.h"
@@ -328,7 +329,7 @@ std::vector<std::uint32_t> finish_surface(Surface& surface, const VoxelRegistry&
   const SurfaceMaterials materials(types);
   SmoothMesh& whole = surface.mesh;
   SmoothMesh split;
-  const std::vector<VertexCopy> copies =
+  const BlockVector<VertexCopy> copies =
       split_by_faces(whole.indices, whole.positions.size(), surface.faces, {is_sharp, smoothness < 1.0F, groups});
   split.indices = std::move(whole.indices);
   split.positions.reserve(copies.size());

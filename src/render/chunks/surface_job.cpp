@@ -6,6 +6,7 @@
 #include <utility>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 
 #include "core/rows/packed_row.h"
 #include "mesh/surface/face_materials.h"
@@ -224,7 +225,7 @@ void append_by_faces(const DensityNeighbourhood& chunks, const SmoothOptions& op
                      const SurfaceMaterials& materials, SmoothChunkMesh& mesh, ChunkSurface& surface) {
   std::vector<smooth::TriangleFace> faces;
   smooth::find_faces(chunks, options, materials, mesh, faces);
-  const std::vector<smooth::VertexCopy> copies =
+  const BlockVector<smooth::VertexCopy> copies =
       smooth::split_by_faces({mesh.indices.begin(), mesh.indices.end()}, mesh.positions.size(), faces,
                              {.types = true, .directions = false, .groups = {}});
   SmoothChunkMesh split;

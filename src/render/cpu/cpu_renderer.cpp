@@ -16,6 +16,7 @@
 #include <glm/geometric.hpp>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 #include <quoin/core/vec.h>
 #include <quoin/render/propagated_light.h>
 
@@ -295,7 +296,7 @@ SurfacePoint& Tile::add_point(std::size_t pixel, Vec3 weight) {
 }
 
 void Tile::light_points() {
-  const std::vector<PlacedGrid>& placed = placed_in(context_->view->tracer());
+  const BlockVector<PlacedGrid>& placed = placed_in(context_->view->tracer());
   std::optional<GridReader> reader;
   std::int32_t known = -1;
   for (SurfacePoint& point : points_) {

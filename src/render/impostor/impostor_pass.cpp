@@ -14,6 +14,7 @@
 #include <glm/matrix.hpp>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 #include <quoin/render/impostor.h>
 
 #include "core/srgb.h"
@@ -31,7 +32,7 @@ constexpr std::size_t kLanes = RayPacket::kSize;
 constexpr std::int32_t kParts = ImpostorFaces::kLevels + 1;
 
 // Returns the index of an instance in SceneTracer::placed; -1 if it is not there.
-std::int32_t index_of(const std::vector<PlacedGrid>& placed, InstanceHandle instance) {
+std::int32_t index_of(const BlockVector<PlacedGrid>& placed, InstanceHandle instance) {
   const auto found =
       std::lower_bound(placed.begin(), placed.end(), instance,
                        [](const PlacedGrid& grid, InstanceHandle handle) { return grid.instance < handle; });
@@ -58,7 +59,7 @@ ImpostorPass::ImpostorPass(const SceneTracer& tracer, std::span<const FarInstanc
       down_((height + kTile - 1) / kTile),
       forward_(camera.forward),
       draw_(raster::draw()) {
-  const std::vector<PlacedGrid>& placed = placed_in(tracer);
+  const BlockVector<PlacedGrid>& placed = placed_in(tracer);
   const ImpostorScreen screen(camera, width, height);
   for (const FarInstance& instance : far) {
     const std::int32_t index = index_of(placed, instance.instance);

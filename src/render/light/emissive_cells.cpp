@@ -9,6 +9,7 @@
 
 #include <quoin/core/assert.h>
 #include <quoin/core/direction.h>
+#include <quoin/core/memory.h>
 
 #include "scene/surfaces.h"
 
@@ -58,8 +59,8 @@ struct Sum {
 };
 
 // Sorted by cell number.
-std::vector<EmissiveCell> cells_of(const std::map<int, Sum>& sums) {
-  std::vector<EmissiveCell> cells;
+BlockVector<EmissiveCell> cells_of(const std::map<int, Sum>& sums) {
+  BlockVector<EmissiveCell> cells;
   for (const auto& [number, sum] : sums) {
     if (sum.weight > 0.0) cells.push_back(sum.finished());
   }
@@ -113,7 +114,7 @@ std::optional<Crossing> crossing(const DensityGrid& field, const VoxelRegistry& 
 }
 
 // Finds the emissive cells of one chunk of voxels.
-std::vector<EmissiveCell> look_at(const Grid& grid, const VoxelRegistry& types, IVec3 at) {
+BlockVector<EmissiveCell> look_at(const Grid& grid, const VoxelRegistry& types, IVec3 at) {
   const Chunk* chunk = grid.find_chunk(at);
   if (chunk == nullptr || !has_emissive_types(*chunk, types)) return {};
   constexpr int kAcross = kChunkEdge / EmissiveCells::kEdge;
@@ -142,7 +143,7 @@ std::vector<EmissiveCell> look_at(const Grid& grid, const VoxelRegistry& types, 
 
 // Finds the emissive cells of one field chunk, from the lattice edges that the surface crosses and that begin or end at
 // emitting samples of the chunk.
-std::vector<EmissiveCell> look_at(const DensityGrid& field, const VoxelRegistry& types, IVec3 at) {
+BlockVector<EmissiveCell> look_at(const DensityGrid& field, const VoxelRegistry& types, IVec3 at) {
   const DensityChunk* chunk = field.find_chunk(at);
   if (chunk == nullptr || !has_emissive_types(chunk->materials(), types)) return {};
   constexpr int kAcross = kChunkEdge / EmissiveCells::kEdge;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <quoin/core/changes.h>
+#include <quoin/core/memory.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/density_grid.h>
@@ -24,7 +25,7 @@ template <class Item>
 class EmissiveChunks {
  public:
   /// `chunks_of(changes)` returns the chunks to examine again. `look_at(chunk)` returns the items of one chunk in a
-  /// vector.
+  /// BlockVector.
   template <class Content, class Find, class Look>
   void follow(const Content& content, const VoxelRegistry& types, Find&& chunks_of, Look&& look_at) {
     if (!types.changes_since(followed_types_).empty()) followed_ = {};
@@ -32,7 +33,7 @@ class EmissiveChunks {
     if (changes->all) chunks_.clear();
     for (const IVec3 chunk : chunks_of(*changes)) {
       chunks_.erase(chunk);
-      if (std::vector<Item> found = look_at(chunk); !found.empty()) chunks_[chunk] = std::move(found);
+      if (BlockVector<Item> found = look_at(chunk); !found.empty()) chunks_[chunk] = std::move(found);
     }
     changes.commit();
   }
@@ -48,7 +49,7 @@ class EmissiveChunks {
  private:
   ChangeCursor followed_;
   ChangeCursor followed_types_;
-  std::map<IVec3, std::vector<Item>, ByZyx> chunks_;  // non-empty ones
+  std::map<IVec3, BlockVector<Item>, ByZyx> chunks_;  // non-empty ones
 };
 
 /// The voxels of a cell of 4^3 that emit light, or the surface of a field there, as one lamp. In the grid, in voxels.

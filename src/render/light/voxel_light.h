@@ -10,6 +10,7 @@
 
 #include <quoin/core/assert.h>
 #include <quoin/core/direction.h>
+#include <quoin/core/memory.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
@@ -236,7 +237,7 @@ class LightRows {
   const PropagatedLight* light_;
   const Grid* grid_;
   const VoxelRegistry* types_;
-  std::vector<Row> rows_;
+  BlockVector<Row> rows_;
 };
 
 }  // namespace quoin

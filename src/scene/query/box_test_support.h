@@ -7,6 +7,7 @@
 #include <random>
 #include <vector>
 
+#include <quoin/core/memory.h>
 #include <quoin/core/vec.h>
 #include <quoin/trace/ray.h>
 
@@ -35,8 +36,8 @@ struct RandomBoxes {
   std::mt19937 random;
   std::uniform_real_distribution<double> share{-1.0, 1.0};
   DVec3 vector(double size) { return DVec3(share(random), share(random), share(random)) * size; }
-  std::vector<DBox> boxes(int count) {
-    std::vector<DBox> all(static_cast<std::size_t>(count));
+  BlockVector<DBox> boxes(int count) {
+    BlockVector<DBox> all(static_cast<std::size_t>(count));
     for (DBox& box : all) {
       const DVec3 at = vector(100.0);
       box.extend(at);

@@ -51,7 +51,7 @@ struct InstanceTree::Item {
   std::size_t box = 0;
 };
 
-InstanceTree::InstanceTree(std::vector<DBox> boxes) : boxes_(std::move(boxes)) {
+InstanceTree::InstanceTree(BlockVector<DBox> boxes) : boxes_(std::move(boxes)) {
   build();
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 #include <quoin/core/vec.h>
 #include <quoin/trace/ray.h>
 
@@ -36,11 +37,11 @@ class InstanceTree {
 
   InstanceTree() = default;
   /// Cost: O(n log n). Empty boxes are never visited.
-  explicit InstanceTree(std::vector<DBox> boxes);
+  explicit InstanceTree(BlockVector<DBox> boxes);
 
-  [[nodiscard]] const std::vector<DBox>& boxes() const { return boxes_; }
-  [[nodiscard]] const std::vector<Node>& nodes() const { return nodes_; }
-  [[nodiscard]] const std::vector<std::size_t>& order() const { return order_; }
+  [[nodiscard]] const BlockVector<DBox>& boxes() const { return boxes_; }
+  [[nodiscard]] const BlockVector<Node>& nodes() const { return nodes_; }
+  [[nodiscard]] const BlockVector<std::size_t>& order() const { return order_; }
 
   /// Replaces boxes. Refits only the nodes above them. Rebuilds the tree if the nodes have grown so much that searches
   /// would be slow, or if a box became empty or non-empty.
@@ -106,10 +107,10 @@ class InstanceTree {
   void fit(Node& node) const;
   [[nodiscard]] double search_cost() const;
 
-  std::vector<DBox> boxes_;
-  std::vector<std::size_t> order_;
-  std::vector<Node> nodes_;
-  std::vector<std::size_t> leaf_of_;  // by box: its leaf's index; kNoLeaf for an empty one
+  BlockVector<DBox> boxes_;
+  BlockVector<std::size_t> order_;
+  BlockVector<Node> nodes_;
+  BlockVector<std::size_t> leaf_of_;  // by box: its leaf's index; kNoLeaf for an empty one
   double built_cost_ = 0.0;           // `search_cost` after the last rebuild
   double areas_ = 0.0;                // of all nodes' boxes
 };

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <quoin/core/memory.h>
+
 #include "core/not_finite_for_tests.h"
 #include "scene/query/box_test_support.h"
 
@@ -16,7 +18,7 @@ std::set<std::size_t> visited(const InstanceTree& tree, const Ray& ray, double m
   return found;
 }
 
-void expect_finds_all(const InstanceTree& tree, const std::vector<DBox>& boxes, RandomBoxes& world) {
+void expect_finds_all(const InstanceTree& tree, const BlockVector<DBox>& boxes, RandomBoxes& world) {
   for (int round = 0; round < 100; ++round) {
     Ray ray{world.vector(150.0), world.vector(1.0)};
     if (round % 5 == 0) ray.direction.y = 0.0;
@@ -32,7 +34,7 @@ void expect_finds_all(const InstanceTree& tree, const std::vector<DBox>& boxes, 
 TEST(InstanceTree, FindsEveryBoxHitByRay) {
   RandomBoxes world(3);
   for (const int count : {0, 1, 2, 5, 64, 300}) {
-    const std::vector<DBox> boxes = world.boxes(count);
+    const BlockVector<DBox> boxes = world.boxes(count);
     expect_finds_all(InstanceTree(boxes), boxes, world);
   }
 }
@@ -41,11 +43,11 @@ TEST(InstanceTree, FindsEveryBoxAfterChanges) {
   for (unsigned seed = 0; seed < 20; ++seed) {
     SCOPED_TRACE(seed);
     RandomBoxes world(seed);
-    std::vector<DBox> boxes = world.boxes(1 + static_cast<int>(world.random() % 100));
+    BlockVector<DBox> boxes = world.boxes(1 + static_cast<int>(world.random() % 100));
     InstanceTree tree(boxes);
     for (int round = 0; round < 10; ++round) {
       std::vector<InstanceTree::Change> changes;
-      const std::vector<DBox> others = world.boxes(static_cast<int>(world.random() % 20));
+      const BlockVector<DBox> others = world.boxes(static_cast<int>(world.random() % 20));
       for (DBox other : others) {
         const std::size_t i = world.random() % boxes.size();
         if (world.random() % 8 == 0) other = {};
@@ -65,11 +67,11 @@ TEST(InstanceTree, FindsEveryBoxAfterChanges) {
 // After random movements of boxes, the search cost stays within a factor of a new tree's.
 TEST(InstanceTree, StaysEfficientAsBoxesMove) {
   RandomBoxes world(5);
-  std::vector<DBox> boxes = world.boxes(1000);
+  BlockVector<DBox> boxes = world.boxes(1000);
   InstanceTree tree(boxes);
   for (int round = 0; round < 20; ++round) {
     std::vector<InstanceTree::Change> changes;
-    const std::vector<DBox> others = world.boxes(100);
+    const BlockVector<DBox> others = world.boxes(100);
     for (const DBox& other : others) {
       const std::size_t i = world.random() % boxes.size();
       boxes[i] = other;

@@ -6,6 +6,8 @@
 
 #include <gtest/gtest.h>
 
+#include <quoin/core/memory.h>
+
 #include "core/death_for_tests.h"
 #include "core/not_finite_for_tests.h"
 #include "scene/query/box_test_support.h"
@@ -47,7 +49,7 @@ TEST(PacketTree, FindsEveryHitBoxAndItsRays) {
   for (const DVec3 far : {DVec3(0.0), DVec3(1e9, -2e7, 3e8)}) {
     RandomBoxes world(3);
     for (const int count : {0, 1, 2, 5, 64, 300}) {
-      std::vector<DBox> boxes = world.boxes(count);
+      BlockVector<DBox> boxes = world.boxes(count);
       for (DBox& box : boxes) box = {box.min + far, box.max + far};
       const PacketTree tree(InstanceTree(boxes), far);
       for (int round = 0; round < 210; ++round) {
@@ -68,7 +70,7 @@ TEST(PacketTree, FindsEveryHitBoxAndItsRays) {
 
 TEST(PacketTree, SkipsNearlyAllBoxesMissedByRay) {
   RandomBoxes world(4);
-  const std::vector<DBox> boxes = world.boxes(1000);
+  const BlockVector<DBox> boxes = world.boxes(1000);
   const PacketTree tree(InstanceTree(boxes), DVec3(0.0));
   int met = 0;
   int needless = 0;
@@ -87,7 +89,7 @@ TEST(PacketTree, SkipsNearlyAllBoxesMissedByRay) {
 }
 
 TEST(PacketTree, VisitsNearerBoxesFirstWithinReach) {
-  std::vector<DBox> boxes;
+  BlockVector<DBox> boxes;
   for (int i = 0; i < 50; ++i) boxes.push_back({{3.0 * i, -1, -1}, {3.0 * i + 1.0, 1, 1}});
   const PacketTree tree(InstanceTree(boxes), DVec3(0.0));
   RayPacket rays;
@@ -123,7 +125,7 @@ TEST(PacketTree, IgnoresNonFiniteAndDirectionlessRays) {
 
 TEST(PacketTree, SkipsExcludedInstances) {
   RandomBoxes world(6);
-  const std::vector<DBox> boxes = world.boxes(40);
+  const BlockVector<DBox> boxes = world.boxes(40);
   for (const std::size_t kept : {std::size_t{0}, std::size_t{3}, std::size_t{40}}) {
     std::vector<bool> left_out(boxes.size());
     for (std::size_t i = kept; i < boxes.size(); ++i) left_out[i] = true;

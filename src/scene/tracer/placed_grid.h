@@ -5,6 +5,7 @@
 
 #include <glm/mat3x3.hpp>
 
+#include <quoin/core/memory.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/grid.h>
 #include <quoin/scene/level_of_detail.h>
@@ -43,6 +44,6 @@ struct PlacedGrid {
 [[nodiscard]] DBox bounds_in_world(const PlacedGrid& placed, const IBox& tight);
 
 /// Returns the placed grids of a tracer, by instance handle. Lifetime: the tracer owns them, until its next update.
-[[nodiscard]] const std::vector<PlacedGrid>& placed_in(const SceneTracer& tracer);
+[[nodiscard]] const BlockVector<PlacedGrid>& placed_in(const SceneTracer& tracer);
 
 }  // namespace quoin

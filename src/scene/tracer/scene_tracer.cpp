@@ -6,6 +6,7 @@
 #include <utility>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 
 #include "core/moved_from.h"
 #include "scene/tracer/placed_grid.h"
@@ -68,7 +69,7 @@ const SceneTracer::Impl& SceneTracer::impl() const {
   return impl_of(impl_);
 }
 
-const std::vector<PlacedGrid>& placed_in(const SceneTracer& tracer) {
+const BlockVector<PlacedGrid>& placed_in(const SceneTracer& tracer) {
   return tracer.impl().placed;
 }
 bool SceneTracer::has_transparent() const {
@@ -324,7 +325,7 @@ void SceneTracer::Impl::place_instances() {
   for (const auto& each : grids) {
     if (each != nullptr) each->is_placed = false;
   }
-  std::vector<DBox> boxes;
+  BlockVector<DBox> boxes;
   placed.clear();
   sources.clear();
   scene->instances().for_each([&](InstanceHandle handle, const Instance& instance) {

@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include <quoin/core/memory.h>
 #include <quoin/scene/scene_tracer.h>
 
 #include "scene/tracer/instance_tree.h"
@@ -47,12 +48,12 @@ struct SceneTracer::Impl {
   ChangeCursor followed_types;
   ChangeCursor followed_scene;
   std::vector<std::unique_ptr<TracedGrid>> grids;  // by the scene's slots; null for unused ones
-  std::vector<PlacedGrid> placed;
+  BlockVector<PlacedGrid> placed;
   std::vector<Source> sources;  // of `placed`
   InstanceTree instances;       // of `placed`, in the world
   // Instances of partial grids, including empty ones, by their handles; in the space of a grid whose voxels are chunks.
   // They have no trees.
-  std::vector<PlacedGrid> unloaded;
+  BlockVector<PlacedGrid> unloaded;
   bool has_transparent = false;
   HalvedGridCache coarse;  // the levels of `with_detail`
 

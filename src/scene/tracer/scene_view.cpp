@@ -7,6 +7,7 @@
 #include <glm/matrix.hpp>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 
 #include "scene/tracer/packet_tree.h"
 #include "scene/tracer/placed_grid.h"
@@ -110,7 +111,7 @@ struct SceneView::Impl {
   std::vector<std::size_t> glass;       // their indices
 
   void find_glass_instances() {
-    const std::vector<PlacedGrid>& placed = placed_in(*tracer);
+    const BlockVector<PlacedGrid>& placed = placed_in(*tracer);
     std::vector<bool> left_out(placed.size());
     for (std::size_t i = 0; i < placed.size(); ++i) {
       left_out[i] = !has_transparent(placed[i]);
@@ -291,7 +292,7 @@ void SceneView::first_hits(const RayPacket& rays_in_view, SceneHits& hits) const
 }
 
 std::uint32_t SceneView::any_hits(std::int32_t home, const RayPacket& rays_in_grid) const {
-  const std::vector<PlacedGrid>& placed = placed_in(*impl_->tracer);
+  const BlockVector<PlacedGrid>& placed = placed_in(*impl_->tracer);
   const auto own = static_cast<std::size_t>(home);
   QUOIN_ASSERT(own < placed.size() && impl_->is_current(), "a placed grid of a tracer that was not updated since");
   std::uint32_t blocked = blocked_by(placed[own], rays_in_grid);

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 
 #include <zstd.h>
 #include <zstd_errors.h>
@@ -115,7 +116,7 @@ ChunkEncoder& ChunkEncoder::operator=(ChunkEncoder&&) noexcept = default;
 ChunkEncoder::~ChunkEncoder() = default;
 
 Status ChunkEncoder::encode(const ChunkAddress& place, std::uint64_t revision, const Chunk& voxels,
-                            const DensityChunk* densities, std::vector<std::byte>& out) {
+                            const DensityChunk* densities, BlockVector<std::byte>& out) {
   out.clear();
   content_.clear();
   std::uint8_t sections = 0;
@@ -153,7 +154,7 @@ Status ChunkEncoder::encode(const ChunkAddress& place, std::uint64_t revision, c
 }
 
 // Appends the compressed content if it is smaller.
-bool ChunkEncoder::compress(std::vector<std::byte>& out) {
+bool ChunkEncoder::compress(BlockVector<std::byte>& out) {
   const std::size_t begin = out.size();
   if (content_.empty()) return false;
   out.resize(begin + ZSTD_compressBound(content_.size()));

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include <quoin/core/memory.h>
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/chunk.h>
@@ -74,16 +75,16 @@ class ChunkEncoder {
   /// fields have none.
   /// Errors: LimitExceeded: data of more than kMaxChunkDataBytes; `out` is then empty.
   [[nodiscard]] Status encode(const ChunkAddress& place, std::uint64_t revision, const Chunk& voxels,
-                              const DensityChunk* densities, std::vector<std::byte>& out);
+                              const DensityChunk* densities, BlockVector<std::byte>& out);
 
  private:
   struct Compressor;
-  [[nodiscard]] bool compress(std::vector<std::byte>& out);
+  [[nodiscard]] bool compress(BlockVector<std::byte>& out);
 
   std::unique_ptr<Compressor> compressor_;
   VoxelRunWriter voxel_writer_;
   DensityWriter density_writer_;
-  std::vector<std::byte> content_;
+  BlockVector<std::byte> content_;
 };
 
 /// The limits that chunks are checked against. Lifetime: refers to the types without owning them.
@@ -119,7 +120,7 @@ class ChunkDecoder {
   std::unique_ptr<Expander> expander_;
   VoxelRunReader voxel_reader_;
   DensityReader density_reader_;
-  std::vector<std::byte> content_;
+  BlockVector<std::byte> content_;
 };
 
 }  // namespace quoin::store

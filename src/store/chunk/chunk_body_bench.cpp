@@ -10,6 +10,7 @@
 
 #include <benchmark/benchmark.h>
 
+#include <quoin/core/memory.h>
 #include <quoin/terrain/terrain.h>
 
 #include "store/world/terrain_chunks_for_tests.h"
@@ -20,7 +21,7 @@ namespace {
 struct Sample {
   VoxelRegistry types;
   std::vector<StoredChunk> chunks;
-  std::vector<std::vector<std::byte>> bodies;
+  std::vector<BlockVector<std::byte>> bodies;
 };
 
 void require(bool holds, const char* what) {
@@ -34,7 +35,7 @@ void encode_all(Sample& sample) {
   ChunkDecoder decoder;
   for (const StoredChunk& chunk : sample.chunks) {
     const DensityChunk* const densities = chunk.densities ? &*chunk.densities : nullptr;
-    std::vector<std::byte>& body = sample.bodies.emplace_back();
+    BlockVector<std::byte>& body = sample.bodies.emplace_back();
     require(encoder.encode({}, 1, chunk.voxels, densities, body).has_value(), "a chunk that cannot be kept");
     const auto back = decoder.decode({}, body, {&sample.types, 8.0F});
     require(back.has_value() && *back == chunk, "a chunk that is read as another");
@@ -80,7 +81,7 @@ void count_chunks(benchmark::State& state, const Sample& sample) {
 
 void encode(benchmark::State& state, const Sample& sample) {
   ChunkEncoder encoder;
-  std::vector<std::byte> body;
+  BlockVector<std::byte> body;
   for (auto _ : state) {
     for (const StoredChunk& chunk : sample.chunks) {
       require(encoder.encode({}, 1, chunk.voxels, chunk.densities ? &*chunk.densities : nullptr, body).has_value(),

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/memory.h>
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/density_chunk.h>
 #include <quoin/grid/voxel_registry.h>
@@ -52,7 +53,7 @@ inline void put_some_data(std::mt19937& random, const VoxelRegistry& types, int 
     const int bits = types[chunk.get(local)].state_bits;
     VoxelData data;
     if (bits != 0) data.state = static_cast<std::uint32_t>(random()) >> (32 - bits);
-    std::vector<std::byte> bytes(random() % 4 == 0 ? random() % 200 : 0);
+    BlockVector<std::byte> bytes(random() % 4 == 0 ? random() % 200 : 0);
     for (std::byte& byte : bytes) byte = static_cast<std::byte>(random());
     data.bytes = bytes;
     chunk.set_data(local, data);

@@ -5,6 +5,8 @@
 #include <span>
 #include <vector>
 
+#include <quoin/core/memory.h>
+
 #include "grid/chunk/chunk_storage.h"
 #include "store/chunk/chunk_body.h"
 #include "store/chunk/chunk_body_for_tests.h"
@@ -45,7 +47,7 @@ void require_sound(const quoin::Chunk& chunk) {
 }
 
 /// A body must give an error, or a chunk that is equal after encoding and decoding again.
-void read_body(std::vector<std::byte>& body) {
+void read_body(quoin::BlockVector<std::byte>& body) {
   if (body.size() < kChunkBodyHeader) return;
   put_checksum(body);
   const auto header = read_header(body);
@@ -58,7 +60,7 @@ void read_body(std::vector<std::byte>& body) {
     return;
   }
   require_sound(chunk->voxels);
-  std::vector<std::byte> again;
+  quoin::BlockVector<std::byte> again;
   const quoin::DensityChunk* const densities = chunk->densities ? &*chunk->densities : nullptr;
   require(encoder.encode(header->place, header->revision, chunk->voxels, densities, again).has_value());
   const auto back = decoder.decode(header->place, again, {&types(), 8.0F});
@@ -71,11 +73,11 @@ void read_body(std::vector<std::byte>& body) {
 // byte as the section mask: random bytes rarely get through a zstd frame.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::span bytes(reinterpret_cast<const std::byte*>(data), size);
-  std::vector<std::byte> body(bytes.begin(), bytes.end());
+  quoin::BlockVector<std::byte> body(bytes.begin(), bytes.end());
   read_body(body);
   if (size == 0) return 0;
-  static const std::vector<std::byte> air = [] {
-    std::vector<std::byte> of_air;
+  static const quoin::BlockVector<std::byte> air = [] {
+    quoin::BlockVector<std::byte> of_air;
     require(ChunkEncoder().encode({}, 1, quoin::Chunk(), nullptr, of_air).has_value());
     return of_air;
   }();

@@ -12,6 +12,7 @@
 
 #include <gtest/gtest.h>
 
+#include <quoin/core/memory.h>
 #include <quoin/terrain/terrain.h>
 
 #include "core/death_for_tests.h"
@@ -24,10 +25,10 @@ namespace {
 
 constexpr ChunkAddress kPlace{7, 3, {-5, 1 << 20, -(1 << 24)}};
 
-std::vector<std::byte> encoded(const Chunk& voxels, const DensityChunk* densities = nullptr,
+BlockVector<std::byte> encoded(const Chunk& voxels, const DensityChunk* densities = nullptr,
                                std::uint64_t revision = 11) {
   ChunkEncoder encoder;
-  std::vector<std::byte> body;
+  BlockVector<std::byte> body;
   EXPECT_TRUE(encoder.encode(kPlace, revision, voxels, densities, body).has_value());
   return body;
 }
@@ -189,7 +190,7 @@ TEST(ChunkBody, KeepsDataAtVoxels) {
 TEST(ChunkBody, KeepsLargestVoxelData) {
   const VoxelRegistry types = types_for_tests(5);
   Chunk chunk(VoxelType{5});
-  chunk.set_data({63, 63, 63}, {0xFFFF'FFFFU, std::vector<std::byte>(kMaxVoxelDataBytes, std::byte{9})});
+  chunk.set_data({63, 63, 63}, {0xFFFF'FFFFU, BlockVector<std::byte>(kMaxVoxelDataBytes, std::byte{9})});
   chunk.set_data({0, 0, 0}, {1, {}});
   const auto back = decoded(encoded(chunk), types);
   ASSERT_TRUE(back.has_value()) << to_string(back.error());
@@ -198,12 +199,12 @@ TEST(ChunkBody, KeepsLargestVoxelData) {
 
 TEST(ChunkBody, RefusesMoreDataThanWorldsKeep) {
   Chunk chunk(VoxelType{1});
-  const std::vector<std::byte> bytes(kMaxVoxelDataBytes);
+  const BlockVector<std::byte> bytes(kMaxVoxelDataBytes);
   for (int i = 0; i <= static_cast<int>(kMaxChunkDataBytes / kMaxVoxelDataBytes); ++i) {
     chunk.set_data({i % 64, i / 64 % 64, i / 4'096}, {0, bytes});
   }
   ChunkEncoder encoder;
-  std::vector<std::byte> body(5);
+  BlockVector<std::byte> body(5);
   const auto status = encoder.encode(kPlace, 1, chunk, nullptr, body);
   ASSERT_FALSE(status.has_value());
   EXPECT_EQ(status.error().code, ErrorCode::LimitExceeded);
@@ -273,7 +274,7 @@ TEST(ChunkBody, IdentifiesItsChunk) {
   }
 }
 
-std::vector<std::byte> body_with_everything() {
+BlockVector<std::byte> body_with_everything() {
   std::mt19937 random(10);
   const VoxelRegistry types = types_for_tests(20);
   Chunk chunk = chunk_of_boxes(random, 21, 10, 20);
@@ -295,7 +296,7 @@ TEST(ChunkBody, RefusesEveryTruncation) {
     EXPECT_FALSE(decoder.decode(kPlace, all.first(size), {&types, 8.0F}).has_value()) << size;
     if (size < kChunkBodyHeader) continue;
     // The same with a correct checksum.
-    std::vector<std::byte> shorter(body.begin(), body.begin() + static_cast<std::ptrdiff_t>(size));
+    BlockVector<std::byte> shorter(body.begin(), body.begin() + static_cast<std::ptrdiff_t>(size));
     put_checksum(shorter);
     EXPECT_FALSE(decoder.decode(kPlace, shorter, {&types, 8.0F}).has_value()) << size;
   }
@@ -314,7 +315,7 @@ TEST(ChunkBody, RefusesEveryFlippedBit) {
 }
 
 /// Returns a body with uncompressed content, so that corruptions of it are not masked by the zstd frame.
-std::vector<std::byte> stored_raw(const std::vector<std::byte>& content, std::uint8_t sections) {
+BlockVector<std::byte> stored_raw(const BlockVector<std::byte>& content, std::uint8_t sections) {
   auto body = encoded(Chunk());
   body[12] = static_cast<std::byte>(sections);
   for (std::size_t i = 0; i < 4; ++i) body[40 + i] = static_cast<std::byte>(content.size() >> (8 * i));
@@ -323,9 +324,9 @@ std::vector<std::byte> stored_raw(const std::vector<std::byte>& content, std::ui
   return body;
 }
 
-std::vector<std::byte> impl_of(const Chunk& chunk) {
+BlockVector<std::byte> impl_of(const Chunk& chunk) {
   VoxelRunWriter writer;
-  std::vector<std::byte> content;
+  BlockVector<std::byte> content;
   writer.write(chunk, content);
   return content;
 }
@@ -339,7 +340,7 @@ TEST(ChunkBody, SurvivesDamageWithValidChecksum) {
   for (int i = 0; i < 3'000; ++i) {
     const int kind = i % 3;
     Chunk chunk = chunk_of_boxes(random, kind == 0 ? 2 : 31, 4, 20);
-    std::vector<std::byte> content = impl_of(chunk);
+    BlockVector<std::byte> content = impl_of(chunk);
     std::uint8_t sections = chunk_sections::kVoxels;
     if (kind == 2) {
       put_some_data(random, types, 10, chunk);
@@ -427,7 +428,7 @@ TEST(ChunkBody, KeepsGeneratedTerrain) {
   ASSERT_TRUE(terrain.has_value());
   ChunkEncoder encoder;
   ChunkDecoder decoder;
-  std::vector<std::byte> body;
+  BlockVector<std::byte> body;
   for (int i = 0; i < 12; ++i) {
     const IVec3 place{i % 3, i / 3 % 2, i / 6};
     const Chunk chunk = generate_terrain_chunk({.size = {8, 4, 8}}, *terrain, place);
@@ -442,13 +443,13 @@ TEST(ChunkBody, KeepsGeneratedTerrain) {
 }
 
 TEST(ChunkBodyDeathTest, AssertsOnReadBeyondContent) {
-  const std::vector<std::byte> bytes(3);
+  const BlockVector<std::byte> bytes(3);
   ContentReader content(bytes);
   QUOIN_EXPECT_MISTAKE(static_cast<void>(content.take<std::uint32_t>()), "bytes that .has. confirmed");
 }
 
 TEST(ChunkBodyDeathTest, AssertsOnZeroBand) {
-  const std::vector<std::byte> body = encoded(Chunk());
+  const BlockVector<std::byte> body = encoded(Chunk());
   QUOIN_EXPECT_MISTAKE(static_cast<void>(decoded(body, many_types(), 0.0F)), "a positive band");
 }
 

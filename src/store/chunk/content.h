@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 #include <quoin/core/result.h>
 
 #include "core/bytes/bytes.h"
@@ -17,7 +18,7 @@ namespace quoin::store {
 
 /// Appends a number, its lowest byte first.
 template <class T>
-void put_number(std::vector<std::byte>& out, T number) {
+void put_number(BlockVector<std::byte>& out, T number) {
   static_assert(std::is_unsigned_v<T>);
   for (std::size_t i = 0; i < sizeof(T); ++i) {
     out.push_back(static_cast<std::byte>(static_cast<std::uint64_t>(number) >> (8 * i)));
@@ -31,7 +32,7 @@ template <class T>
 }
 
 /// Appends a number, seven bits per byte, lowest first; the top bit is set in all bytes except the last.
-inline void put_short_number(std::vector<std::byte>& out, std::uint32_t number) {
+inline void put_short_number(BlockVector<std::byte>& out, std::uint32_t number) {
   for (; number >= 0x80; number >>= 7) out.push_back(static_cast<std::byte>(number | 0x80U));
   out.push_back(static_cast<std::byte>(number));
 }

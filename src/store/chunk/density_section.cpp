@@ -7,6 +7,7 @@
 #include <utility>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 
 #include "core/rows/packed_row.h"
 #include "grid/density/density_storage.h"
@@ -115,7 +116,7 @@ Half largest_of(const DensityStorage& m) {
 
 }  // namespace
 
-void DensityWriter::write(const DensityChunk& chunk, VoxelRunWriter& materials, std::vector<std::byte>& out) {
+void DensityWriter::write(const DensityChunk& chunk, VoxelRunWriter& materials, BlockVector<std::byte>& out) {
   materials.write(chunk.materials(), out);
   const DensityStorage* const m = DensityStorage::of(chunk);
   const auto put_one = [&](Half density) {
@@ -134,7 +135,7 @@ void DensityWriter::write(const DensityChunk& chunk, VoxelRunWriter& materials, 
   put_rows(chunk, out);
 }
 
-void DensityWriter::put_rows(const DensityChunk& chunk, std::vector<std::byte>& out) {
+void DensityWriter::put_rows(const DensityChunk& chunk, BlockVector<std::byte>& out) {
   const DensityStorage& m = *DensityStorage::of(chunk);
   const Half largest = largest_of(m);
   put_number(out, largest);

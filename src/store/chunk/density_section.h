@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <quoin/core/half.h>
+#include <quoin/core/memory.h>
 #include <quoin/core/result.h>
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/density_chunk.h>
@@ -45,13 +46,13 @@ inline constexpr std::size_t kMaxDensitySection = kMaxVoxelSection + 3 + 32 + 51
 class DensityWriter {
  public:
   /// Appends densities and materials. Omits materials' data, since fields have none.
-  void write(const DensityChunk& chunk, VoxelRunWriter& materials, std::vector<std::byte>& out);
+  void write(const DensityChunk& chunk, VoxelRunWriter& materials, BlockVector<std::byte>& out);
 
  private:
-  void put_rows(const DensityChunk& chunk, std::vector<std::byte>& out);
+  void put_rows(const DensityChunk& chunk, BlockVector<std::byte>& out);
 
   std::array<bool, 256> is_mixed_{};
-  std::vector<std::byte> high_;
+  BlockVector<std::byte> high_;
 };
 
 /// Returns true if every density is a `stored_density` of the band. Requires: 0 < band.

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 
 #include "core/rows/packed_row.h"
 #include "grid/chunk/chunk_storage.h"
@@ -129,7 +130,7 @@ struct VoxelRunWriter::Scan {
   std::uint16_t* index = nullptr;
 };
 
-void VoxelRunWriter::write(const Chunk& chunk, std::vector<std::byte>& out) {
+void VoxelRunWriter::write(const Chunk& chunk, BlockVector<std::byte>& out) {
   const ChunkStorage* const m = ChunkStorage::of(chunk);
   if (m == nullptr) {
     palette_.assign(1, *chunk.uniform());
@@ -147,13 +148,13 @@ void VoxelRunWriter::write(const Chunk& chunk, std::vector<std::byte>& out) {
   return is_packed ? put_packed(chunk, out) : put_runs(scan, out);
 }
 
-void VoxelRunWriter::put_palette(std::vector<std::byte>& out) const {
+void VoxelRunWriter::put_palette(BlockVector<std::byte>& out) const {
   QUOIN_ASSERT(!palette_.empty() && palette_.size() <= kAllTypes, "1 to 65,536 types");
   put_number(out, static_cast<std::uint16_t>(palette_.size() - 1));
   for (const VoxelType type : palette_) put_number(out, type);
 }
 
-void VoxelRunWriter::put_runs(const Scan& scan, std::vector<std::byte>& out) const {
+void VoxelRunWriter::put_runs(const Scan& scan, BlockVector<std::byte>& out) const {
   put_number(out, static_cast<std::uint32_t>(scan.runs()));
   put_number(out, static_cast<std::uint32_t>(scan.length_bytes()));
   const std::size_t before = out.size();
@@ -167,7 +168,7 @@ void VoxelRunWriter::put_runs(const Scan& scan, std::vector<std::byte>& out) con
   for (std::size_t i = 0; i < scan.runs(); ++i) high[i] = static_cast<std::byte>(indices_[i] >> 8);
 }
 
-void VoxelRunWriter::put_packed(const Chunk& chunk, std::vector<std::byte>& out) {
+void VoxelRunWriter::put_packed(const Chunk& chunk, BlockVector<std::byte>& out) {
   const int bits = bits_for(palette_.size());
   const ChunkStorage& m = *ChunkStorage::of(chunk);
   std::array<std::uint64_t, 16> row{};
@@ -293,8 +294,8 @@ class VoxelRunReader::Builder {
   enum class Fault : std::uint8_t { None, End, Index, Length };
 
   // Requires: `changes` and `words` are scratch.
-  Builder(const std::vector<VoxelType>& palette, std::vector<std::uint32_t>& counts,
-          std::vector<std::uint64_t>& changes, std::vector<std::uint64_t>& words)
+  Builder(const BlockVector<VoxelType>& palette, BlockVector<std::uint32_t>& counts,
+          BlockVector<std::uint64_t>& changes, BlockVector<std::uint64_t>& words)
       : palette_(palette), counts_(counts), changes_(changes), words_(words) {
     QUOIN_ASSERT(!palette_.empty() && palette_.size() <= std::size_t{1} << kBits, "a palette of indices of kBits bits");
     counts_.assign(palette_.size(), 0);
@@ -467,10 +468,10 @@ class VoxelRunReader::Builder {
     }
   }
 
-  const std::vector<VoxelType>& palette_;
-  std::vector<std::uint32_t>& counts_;   // voxels of each index
-  std::vector<std::uint64_t>& changes_;  // 0 between layers
-  std::vector<std::uint64_t>& words_;
+  const BlockVector<VoxelType>& palette_;
+  BlockVector<std::uint32_t>& counts_;   // voxels of each index
+  BlockVector<std::uint64_t>& changes_;  // 0 between layers
+  BlockVector<std::uint64_t>& words_;
   Ref<ChunkStorage> m_ = make_ref<ChunkStorage>();
   std::array<std::int64_t, kRows> sums_{};  // RowSum
   std::array<int, kChunkEdge> ended_{};     // by x: runs of solid voxels that end before x, minus runs that start there
@@ -544,7 +545,7 @@ Result<Chunk> VoxelRunReader::read_packed(ContentReader& reader) {
   const auto bits = static_cast<std::size_t>(bits_for(palette_.size()));
   const std::size_t begin = reader.at();
   if (!reader.has(kChunkVoxels / 8 * bits)) return reader.cut_off();
-  std::vector<VoxelType> types(kChunkVoxels);
+  BlockVector<VoxelType> types(kChunkVoxels);
   std::uint32_t seen = 0;
   for (std::size_t i = 0; i < std::size_t{kChunkEdge} * kChunkEdge; ++i) {
     const std::size_t first = (i % kChunkEdge * kChunkEdge + i / kChunkEdge) * kChunkEdge;  // of a row: by z, then y
@@ -620,9 +621,9 @@ Status read_voxel(DataStreams& streams, const VoxelRegistry& types, std::uint32_
 
 }  // namespace
 
-Status write_placed_data(const Chunk& chunk, std::vector<std::byte>& out) {
+Status write_placed_data(const Chunk& chunk, BlockVector<std::byte>& out) {
   QUOIN_ASSERT(chunk.data_count() != 0, "a chunk with data");
-  std::array<std::vector<std::byte>, 3> streams;
+  std::array<BlockVector<std::byte>, 3> streams;
   std::size_t total = 0;
   std::uint32_t next = 0;
   chunk.for_each_data([&](IVec3 local, const VoxelData& data) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include <quoin/core/memory.h>
 #include <quoin/core/result.h>
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/voxel_registry.h>
@@ -38,18 +39,18 @@ inline constexpr std::size_t kMaxVoxelSection = 3 + 2 * (std::size_t{1} << 16) +
 class VoxelRunWriter {
  public:
   /// Appends the runs of a chunk, without its data. Cost: O(rows + runs).
-  void write(const Chunk& chunk, std::vector<std::byte>& out);
+  void write(const Chunk& chunk, BlockVector<std::byte>& out);
 
  private:
   struct Scan;
-  void put_palette(std::vector<std::byte>& out) const;
-  void put_runs(const Scan& scan, std::vector<std::byte>& out) const;
-  void put_packed(const Chunk& chunk, std::vector<std::byte>& out);
+  void put_palette(BlockVector<std::byte>& out) const;
+  void put_runs(const Scan& scan, BlockVector<std::byte>& out) const;
+  void put_packed(const Chunk& chunk, BlockVector<std::byte>& out);
 
-  std::vector<VoxelType> palette_;
-  std::vector<std::uint32_t> new_index_;  // by the index that the chunk stores
-  std::vector<std::uint8_t> lengths_;
-  std::vector<std::uint16_t> indices_;
+  BlockVector<VoxelType> palette_;
+  BlockVector<std::uint32_t> new_index_;  // by the index that the chunk stores
+  BlockVector<std::uint8_t> lengths_;
+  BlockVector<std::uint16_t> indices_;
 };
 
 /// Reads the types of chunks directly into their storage. One thread at a time. Memory: 0.6 MiB after a noisy chunk.
@@ -68,11 +69,11 @@ class VoxelRunReader {
   template <int kBits>
   [[nodiscard]] Result<Chunk> build(Streams streams);
 
-  std::vector<VoxelType> palette_;
-  std::vector<std::uint64_t> seen_;  // by type / 64: in the palette; 0 between calls
-  std::vector<std::uint32_t> counts_;
-  std::vector<std::uint64_t> changes_;  // of four layers: each voxel's index XOR the previous index
-  std::vector<std::uint64_t> words_;
+  BlockVector<VoxelType> palette_;
+  BlockVector<std::uint64_t> seen_;  // by type / 64: in the palette; 0 between calls
+  BlockVector<std::uint32_t> counts_;
+  BlockVector<std::uint64_t> changes_;  // of four layers: each voxel's index XOR the previous index
+  BlockVector<std::uint64_t> words_;
 };
 
 // The data of a chunk's voxels in addition to their types.
@@ -92,7 +93,7 @@ inline constexpr std::size_t kMaxChunkDataBytes = std::size_t{64} << 20;
 inline constexpr std::size_t kMaxDataSection = 16 + kChunkVoxels * (3 + 5 + 3) + kMaxChunkDataBytes;
 
 /// Appends the data of a chunk's voxels. Errors: LimitExceeded; `out` is then unchanged. Requires: some voxel has data.
-[[nodiscard]] Status write_placed_data(const Chunk& chunk, std::vector<std::byte>& out);
+[[nodiscard]] Status write_placed_data(const Chunk& chunk, BlockVector<std::byte>& out);
 
 /// Reads the data into a chunk. Errors: BadFormat, with the offset in the content; also for voxels of air and for
 /// states of more bits than their type allows.

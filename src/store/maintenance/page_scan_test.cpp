@@ -12,6 +12,7 @@
 
 #include <gtest/gtest.h>
 
+#include <quoin/core/memory.h>
 #include <quoin/io/file.h>
 
 #include "core/bytes/bytes.h"
@@ -36,9 +37,9 @@ Bytes body_of(std::mt19937& random, int number, std::uint64_t revision, std::siz
   Bytes noise(bytes);
   for (std::byte& byte : noise) byte = static_cast<std::byte>(random());
   chunk.set_data({number % 64, 1, 2}, {1, noise});
-  Bytes body;
+  BlockVector<std::byte> body;
   EXPECT_TRUE(ChunkEncoder().encode({0, 0, {number, 0, 0}}, revision, chunk, nullptr, body).has_value());
-  return body;
+  return {body.begin(), body.end()};
 }
 
 struct Row {

@@ -7,6 +7,7 @@
 #include <string>
 
 #include <gtest/gtest.h>
+#include <quoin/core/memory.h>
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 #include <quoin/store/world_saver.h>
@@ -256,7 +257,7 @@ void put_chunk(const std::filesystem::path& path, std::int64_t region, const Chu
     put_region->bind(2 + axis, std::int64_t{store::region_of(place).region[axis]});
   }
   ASSERT_TRUE(put_region->run());
-  std::vector<std::byte> body;
+  BlockVector<std::byte> body;
   ASSERT_TRUE(store::ChunkEncoder().encode(place, 1, Chunk(VoxelType{1}), nullptr, body));
   put_body->bind(0, store::key_of(region, place.chunk));
   put_body->bind(1, std::span<const std::byte>(body));

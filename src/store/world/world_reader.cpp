@@ -9,6 +9,7 @@
 #include <glm/common.hpp>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 
 #include "store/world/world_changes.h"
 
@@ -25,10 +26,6 @@ constexpr const char* kSelectKeys = "SELECT key FROM chunks WHERE key BETWEEN ? 
 constexpr const char* kSelectBodies = "SELECT key, body FROM chunks WHERE key BETWEEN ? AND ?";
 constexpr const char* kSelectPart = "SELECT id, revision, sum, body FROM parts WHERE kind=? AND id=?";
 constexpr const char* kSelectParts = "SELECT id, revision, sum, body FROM parts WHERE kind=? ORDER BY id";
-
-std::vector<std::byte> copy_of(std::span<const std::byte> bytes) {
-  return {bytes.begin(), bytes.end()};
-}
 
 // Returns true for few enough chunks to look each up. A range query reads the chunks' keys from their index; in a
 // version 1 world it also reads the chunks.
@@ -85,7 +82,7 @@ Result<std::optional<std::int64_t>> WorldReader::region_id(const RegionPlace& pl
   return id;
 }
 
-Result<std::optional<std::vector<std::byte>>> WorldReader::chunk_body(const ChunkAddress& place) {
+Result<std::optional<BlockVector<std::byte>>> WorldReader::chunk_body(const ChunkAddress& place) {
   const RegionPlace wanted = region_of(place);
   const auto known = known_regions_.find(wanted);
   const bool was_known = known != known_regions_.end();
@@ -99,10 +96,10 @@ Result<std::optional<std::vector<std::byte>>> WorldReader::chunk_body(const Chun
   return *now && **now != before ? body_in_region(wanted, place.chunk) : body;
 }
 
-Result<std::optional<std::vector<std::byte>>> WorldReader::body_in_region(const RegionPlace& place, IVec3 chunk) {
+Result<std::optional<BlockVector<std::byte>>> WorldReader::body_in_region(const RegionPlace& place, IVec3 chunk) {
   const auto region = region_id(place);
   if (!region) return region.error();
-  if (!*region) return std::optional<std::vector<std::byte>>();
+  if (!*region) return std::optional<BlockVector<std::byte>>();
   const auto statement = ready(chunk_, kSelectChunk);
   if (!statement) return statement.error();
   Statement& select = **statement;
@@ -110,8 +107,9 @@ Result<std::optional<std::vector<std::byte>>> WorldReader::body_in_region(const 
   select.bind(0, key_of(**region, chunk));
   const auto row = select.step();
   if (!row) return row.error();
-  if (!*row) return std::optional<std::vector<std::byte>>();
-  return copy_of(select.bytes(0));
+  if (!*row) return std::optional<BlockVector<std::byte>>();
+  const std::span<const std::byte> bytes = select.bytes(0);
+  return BlockVector<std::byte>(bytes.begin(), bytes.end());
 }
 
 Result<std::vector<WorldReader::Region>> WorldReader::find_regions(std::uint32_t grid, std::uint8_t level,
@@ -254,7 +252,7 @@ Result<std::optional<std::vector<std::byte>>> WorldReader::part(const PartKey& k
   std::uint64_t sum = 0;
   const auto found = part_of(select, key.kind, sum);
   if (!found || sum_of(*found) != sum) return make_error(ErrorCode::BadFormat, name_of(key) + " is damaged");
-  return copy_of(found->body);
+  return std::vector<std::byte>(found->body.begin(), found->body.end());
 }
 
 Status WorldReader::each_part(std::string_view kind, FunctionRef<void(const Part&, bool)> visit) {

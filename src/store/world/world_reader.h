@@ -10,6 +10,7 @@
 #include <vector>
 
 #include <quoin/core/function_ref.h>
+#include <quoin/core/memory.h>
 #include <quoin/core/progress.h>
 
 #include "core/database/connection.h"
@@ -23,7 +24,7 @@ class WorldReader {
   explicit WorldReader(Connection connection) : connection_(std::move(connection)) {}
 
   /// Returns the chunk's row; nullopt if there is none.
-  [[nodiscard]] Result<std::optional<std::vector<std::byte>>> chunk_body(const ChunkAddress& place);
+  [[nodiscard]] Result<std::optional<BlockVector<std::byte>>> chunk_body(const ChunkAddress& place);
   /// Adds the addresses of a grid's and level's chunks in a box of chunks to `out`, in no order.
   [[nodiscard]] Status find_chunks(std::uint32_t grid, std::uint8_t level, const IBox& box, std::vector<IVec3>& out);
   /// Calls `visit` for the chunks' rows in the order of their keys, until it returns false.
@@ -48,7 +49,7 @@ class WorldReader {
   };
   /// Prepares a statement on first use.
   [[nodiscard]] Result<Statement*> ready(Statement& statement, const char* sql);
-  [[nodiscard]] Result<std::optional<std::vector<std::byte>>> body_in_region(const RegionPlace& place, IVec3 chunk);
+  [[nodiscard]] Result<std::optional<BlockVector<std::byte>>> body_in_region(const RegionPlace& place, IVec3 chunk);
   [[nodiscard]] Result<std::optional<std::int64_t>> region_id(const RegionPlace& place);
   /// Returns the regions of a grid and level in a box of regions.
   [[nodiscard]] Result<std::vector<Region>> find_regions(std::uint32_t grid, std::uint8_t level, const IBox& box);

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/memory.h>
 #include <quoin/core/parallel.h>
 
 #include "core/database/connection.h"
@@ -68,7 +69,7 @@ class WorldWriter {
     std::int64_t key = 0;
     const ChunkAddress* place = nullptr;
     const StoredChunk* chunk = nullptr;  ///< null: the row is removed
-    std::vector<std::byte> body;
+    BlockVector<std::byte> body;
     Status outcome;
   };
 

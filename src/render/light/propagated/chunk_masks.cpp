@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 
 #include "render/light/propagated/kernel/light_kernel.h"
 #include "trace/chunk_rows.h"
@@ -51,7 +52,7 @@ namespace {
 
 // Reads the rows of a box that hold types that `counts` accepts; [y + 64 z]. `inverted`: or all others.
 void read_box(const Chunk& voxels, const FunctionRef<bool(VoxelType)>& counts, std::uint64_t inverted, const IBox& box,
-              std::vector<std::uint64_t>& words) {
+              BlockVector<std::uint64_t>& words) {
   words.resize(static_cast<std::size_t>(kChunkEdge) * kChunkEdge);
   const trace::ChunkRows counted(voxels, counts);
   trace::SlabRows slab;

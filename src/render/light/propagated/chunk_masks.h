@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/render/propagated_light.h>
@@ -71,7 +72,7 @@ class ChunkMasks {
     TypeLight like;  // its `tolls`, `cost` and `absorbs`
     bool is_uniform = true;
     std::uint64_t uniform = 0;         // the rows of the box if they are equal
-    std::vector<std::uint64_t> words;  // else as `rows`
+    BlockVector<std::uint64_t> words;  // else as `rows`
 
     [[nodiscard]] bool is_of(const TypeLight& type) const {
       return type.tolls == like.tolls && type.cost == like.cost && type.absorbs == like.absorbs;
@@ -117,7 +118,7 @@ class ChunkMasks {
   struct Rows {
     bool is_uniform = true;
     std::uint64_t uniform = 0;
-    std::vector<std::uint64_t> words;
+    BlockVector<std::uint64_t> words;
   };
   void read_rows(const Chunk& voxels, const std::vector<TypeLight>& types, std::size_t channel, const IBox& box);
   void read_tolls(const Chunk& voxels, const std::vector<TypeLight>& types, const IBox& box);
@@ -126,7 +127,7 @@ class ChunkMasks {
 
   std::array<Rows, kChannels> rows_;
   std::array<std::size_t, kChannels> rows_of_{};  // [channel]: which of them
-  std::vector<LampRow> lamps_;
+  BlockVector<LampRow> lamps_;
   std::vector<Toll> tolls_;  // the first `toll_count_` are in use
   std::size_t toll_count_ = 0;
   SlabSet without_lamps_{};

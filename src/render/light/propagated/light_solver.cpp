@@ -7,6 +7,7 @@
 #include <utility>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 
 #include "render/light/propagated/kernel/light_kernel.h"
 
@@ -130,7 +131,7 @@ void LightSolver::shape(const LightRegion::Box& box) {
   column_ = blocks_ * kBlockRows;
   layer_ = columns_ * column_;
   const std::size_t layers = static_cast<std::size_t>(size_.z) + 2;
-  const auto grow = [](std::vector<std::uint64_t>& words, std::size_t size) {
+  const auto grow = [](BlockVector<std::uint64_t>& words, std::size_t size) {
     if (words.size() < size) words.resize(size);
   };
   grow(pass_, layers * layer_);
@@ -151,7 +152,7 @@ void LightSolver::shape(const LightRegion::Box& box) {
   }
   for (auto* blocks : {&active_, &touched_, &in_front_, &in_next_}) blocks->assign(layers, 0);
   for (auto& of_channel : sources_) {
-    for (std::vector<Source>& of_level : of_channel) of_level.clear();
+    for (BlockVector<Source>& of_level : of_channel) of_level.clear();
   }
 }
 
@@ -337,7 +338,7 @@ void LightSolver::read_inside() {
 
 // Adds a part's rows to the words of a region. `rows`: of the chunk, [y + 64 z]; null: all are `uniform`.
 void LightSolver::put_rows(const Part& part, const std::uint64_t* rows, std::uint64_t uniform,
-                           std::vector<std::uint64_t>& to) {
+                           BlockVector<std::uint64_t>& to) {
   std::array<std::uint64_t, kChunkEdge> same;
   if (rows == nullptr) same.fill(uniform);
   const auto count = static_cast<std::size_t>(part.box.max.y - part.box.min.y);
@@ -404,7 +405,7 @@ void LightSolver::find_passable() {
 bool LightSolver::has_sources(std::size_t channel) const {
   return (channel == kSky && has_sky_) ||
          std::any_of(sources_[channel].begin(), sources_[channel].end(),
-                     [](const std::vector<Source>& sources) { return !sources.empty(); });
+                     [](const BlockVector<Source>& sources) { return !sources.empty(); });
 }
 
 // Prepares the block of a source for light.
@@ -466,7 +467,7 @@ std::uint64_t LightSolver::blocks_near_front(std::size_t z) const {
 }
 
 // Makes sources of the voxels of a block that the front reaches. They are not at the region's rim.
-void LightSolver::pay_toll(Toll& toll, std::size_t z, unsigned block, std::vector<Source>& out) {
+void LightSolver::pay_toll(Toll& toll, std::size_t z, unsigned block, BlockVector<Source>& out) {
   const std::size_t first = z * layer_ + block * kBlockRows;
   const std::size_t column = block / blocks_;
   for (std::size_t at = first; at < first + kBlockRows; ++at) {
@@ -490,7 +491,7 @@ void LightSolver::pay_tolls(std::size_t channel, unsigned level) {
     Toll& toll = tolls_[i];
     if (toll.cost > level) continue;
     const unsigned reached = level + 1 - toll.cost;
-    std::vector<Source>& out = toll.absorbs ? absorbed_[reached] : sources_[channel][reached];
+    BlockVector<Source>& out = toll.absorbs ? absorbed_[reached] : sources_[channel][reached];
     for (std::size_t z = 1; z <= static_cast<std::size_t>(size_.z); ++z) {
       for (std::uint64_t left = blocks_near_front(z) & toll.blocks[z]; left != 0; left &= left - 1) {
         pay_toll(toll, z, static_cast<unsigned>(std::countr_zero(left)), out);
@@ -719,7 +720,7 @@ void LightSolver::solve(const LightRegion& region, std::vector<ChunkLightChange>
   box_ = region.all;
   if (!std::exchange(is_clean_, false)) {
     for (auto* words : {&front_, &next_}) std::fill(words->begin(), words->end(), 0);
-    for (std::vector<Source>& of_level : absorbed_) of_level.clear();
+    for (BlockVector<Source>& of_level : absorbed_) of_level.clear();
   }
   changes.clear();
   for_each_part(region.all.wanted, [&](const Part& part) {

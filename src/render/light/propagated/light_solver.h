@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 #include <quoin/core/vec.h>
 
 #include "render/light/propagated/chunk_masks.h"
@@ -117,8 +118,8 @@ class LightSolver {
   struct Toll {
     unsigned cost = 1;
     bool absorbs = false;
-    std::vector<std::uint64_t> left;    // those that no front has reached
-    std::vector<std::uint64_t> blocks;  // [z]: blocks with such voxels
+    BlockVector<std::uint64_t> left;    // those that no front has reached
+    BlockVector<std::uint64_t> blocks;  // [z]: blocks with such voxels
   };
   void solve(const LightRegion::Box& box, unsigned channels, std::vector<ChunkLightChange>& changes);
   void shape(const LightRegion::Box& box);
@@ -130,12 +131,12 @@ class LightSolver {
   void open(const Part& part);
   void read_inside();
   void read_pass(std::size_t channel);
-  void put_rows(const Part& part, const std::uint64_t* rows, std::uint64_t uniform, std::vector<std::uint64_t>& to);
+  void put_rows(const Part& part, const std::uint64_t* rows, std::uint64_t uniform, BlockVector<std::uint64_t>& to);
   void find_passable();
   void add_sky(IVec3 first, std::uint64_t where);
   void read_tolls(std::size_t channel);
   void pay_tolls(std::size_t channel, unsigned level);
-  void pay_toll(Toll& toll, std::size_t z, unsigned block, std::vector<Source>& out);
+  void pay_toll(Toll& toll, std::size_t z, unsigned block, BlockVector<Source>& out);
   [[nodiscard]] std::uint64_t blocks_near_front(std::size_t z) const;
   void touch(const Source& source);
   void absorb(const Source& source, unsigned level);
@@ -166,26 +167,26 @@ class LightSolver {
   std::size_t blocks_ = 0;  // of a column
   std::size_t column_ = 0;  // words
   std::size_t layer_ = 0;
-  std::array<std::array<std::vector<Source>, 16>, kChannels> sources_;  // [channel][level]
+  std::array<std::array<BlockVector<Source>, 16>, kChannels> sources_;  // [channel][level]
   std::vector<std::unique_ptr<ChunkMasks>> own_masks_;
   bool has_tolls_ = false;                        // some chunk of the region has any
   std::vector<Toll> tolls_;                       // the first `toll_count_` are in use
   std::size_t toll_count_ = 0;                    // of the channel
-  std::vector<std::uint64_t> lit_tolls_;          // with tolls: voxels that are sources and were lit
-  std::array<std::vector<Source>, 16> absorbed_;  // [level]: voxels that absorb light
+  BlockVector<std::uint64_t> lit_tolls_;          // with tolls: voxels that are sources and were lit
+  std::array<BlockVector<Source>, 16> absorbed_;  // [level]: voxels that absorb light
   bool has_sky_ = false;                          // there is sky light that is not in `sources_`
   bool is_clean_ = true;                          // `front_`, `next_` and `absorbed_` are empty: no region failed
-  std::vector<std::uint64_t> pass_;
-  std::vector<std::uint64_t> rest_;   // dark voxels of pass_, in touched blocks
-  std::vector<std::uint64_t> front_;  // voxels of the current level; all 0 between regions
-  std::vector<std::uint64_t> next_;   // voxels of the level above, then of the level below; all 0 between regions
-  std::array<std::vector<std::uint64_t>, kPlanes> plane_words_;
+  BlockVector<std::uint64_t> pass_;
+  BlockVector<std::uint64_t> rest_;   // dark voxels of pass_, in touched blocks
+  BlockVector<std::uint64_t> front_;  // voxels of the current level; all 0 between regions
+  BlockVector<std::uint64_t> next_;   // voxels of the level above, then of the level below; all 0 between regions
+  std::array<BlockVector<std::uint64_t>, kPlanes> plane_words_;
   std::array<std::uint64_t*, kPlanes> planes_{};  // bits of levels, within these
-  std::vector<std::uint64_t> wanted_bits_;        // [column]
+  BlockVector<std::uint64_t> wanted_bits_;        // [column]
 
   // [z]: blocks
-  std::vector<std::uint64_t> passable_, open_, active_, touched_;
-  std::vector<std::uint64_t> in_front_, in_next_;  // where `front_` and `next_` are not 0
+  BlockVector<std::uint64_t> passable_, open_, active_, touched_;
+  BlockVector<std::uint64_t> in_front_, in_next_;  // where `front_` and `next_` are not 0
   enum class Outcome : std::uint8_t { Dark, Open, Mixed } outcome_ = Outcome::Dark;
 };
 

@@ -2,6 +2,7 @@
 // box is solved from scratch, with the light around it as boundary. Boxes that touch are merged. If the merged box is
 // too large, or mostly not in the boxes, its parts are queued by chunks and solved from the top down (LightQueue).
 // A chunk that arrives or leaves is an edit like any other; air in place of air is none.
+#include <quoin/core/memory.h>
 #include <quoin/render/propagated_light.h>
 
 #include <algorithm>
@@ -426,7 +427,7 @@ struct PropagatedLight::Impl {
   void take_over(const Grid& grid, const GridChanges& changes);
   [[nodiscard]] LightState state() const { return {store, domain(), lights()}; }
   [[nodiscard]] std::optional<LightEdit> edit_of(const Grid& grid, const ChunkChange& change) const;
-  void change_domain(const Grid& grid, const std::vector<IVec3>& chunks, std::vector<LightEdit>& edits);
+  void change_domain(const Grid& grid, const std::vector<IVec3>& chunks, BlockVector<LightEdit>& edits);
   void light_entering(const Grid& grid);
   void solve_dirty(const Grid& grid, Threads threads);
   void solve_queue(const Grid& grid, Threads threads);
@@ -504,7 +505,7 @@ std::optional<LightEdit> PropagatedLight::Impl::edit_of(const Grid& grid, const 
 // Handles chunks that came or went, or may have. Chunks that enter the domain or leave it are air, or have an edit of
 // their own, unless their light was dark or will be: then this appends an edit.
 void PropagatedLight::Impl::change_domain(const Grid& grid, const std::vector<IVec3>& chunks,
-                                          std::vector<LightEdit>& edits) {
+                                          BlockVector<LightEdit>& edits) {
   QUOIN_ASSERT(changed_columns.empty(), "no changes that a failed update left");
   for (const IVec3 chunk : chunks) {
     const bool has_voxels = grid.find_chunk(chunk) != nullptr;
@@ -547,7 +548,7 @@ void PropagatedLight::Impl::change_domain(const Grid& grid, const std::vector<IV
 // are solved first, with these chunks dark.
 void PropagatedLight::Impl::light_entering(const Grid& grid) {
   // From above, in each column of chunks.
-  std::vector<LightEdit> edits;
+  BlockVector<LightEdit> edits;
   for (auto chunk = entering.rbegin(); chunk != entering.rend(); ++chunk) {
     if (!is_below_open_sky(state(), grid, *chunk)) {
       edits.push_back(edit_of_entering(state(), grid, *chunk));
@@ -568,7 +569,7 @@ void PropagatedLight::Impl::light_entering(const Grid& grid) {
 
 void PropagatedLight::Impl::take_over(const Grid& grid, const GridChanges& changes) {
   std::vector<IVec3> chunks;
-  std::vector<LightEdit> edits;
+  BlockVector<LightEdit> edits;
   for (const ChunkChange& change : changes.items_unless_all()) {
     chunks.push_back(change.chunk);
     store.add_lamps(change.chunk, change.slabs);
@@ -798,8 +799,8 @@ class ChunkWords {
   static constexpr std::size_t kRows = std::size_t{kStride} * kStride;
   std::optional<LightReader> reader_;
   IVec3 low_{0};
-  std::vector<std::uint16_t> words_;   // [z + 1][y + 1][x]
-  std::vector<std::uint8_t> is_read_;  // [z + 1][y + 1]
+  BlockVector<std::uint16_t> words_;   // [z + 1][y + 1][x]
+  BlockVector<std::uint8_t> is_read_;  // [z + 1][y + 1]
 };
 
 /// See PropagatedLight::split.

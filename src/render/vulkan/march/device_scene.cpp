@@ -6,6 +6,7 @@
 #include <utility>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 
 #include "scene/surfaces.h"
 
@@ -78,7 +79,7 @@ void DeviceScene::clear() {
 void DeviceScene::place(const Scene& scene, InstanceFilter filter) {
   placement_.placed.clear();
   for (auto& [handle, grid] : grids_) grid.is_used = false;
-  std::vector<DBox> boxes;
+  BlockVector<DBox> boxes;
   scene.instances().for_each([&](InstanceHandle handle, const Instance& instance) {
     const SceneGrid* grid = scene.grids().find(instance.grid);
     if (!can_be_traced(scene, instance, grid, filter)) return;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 
 #include "render/path/scatter.h"
 
@@ -54,7 +55,7 @@ void DevicePaths::look_at(const Scene* scene) {
 
 void DevicePaths::find_lamps(const Placement& placement, double brightness) {
   if (scene_ == nullptr || (lamps_ != nullptr && brightness_ == brightness)) return;
-  std::vector<PlacedGrid> placed;
+  BlockVector<PlacedGrid> placed;
   placed.reserve(placement.placed.size());
   for (const DevicePlaced& each : placement.placed) placed.push_back(each.placed);
   lamps_ = cache_.lamps(*scene_, placed, *surfaces_, brightness);
