@@ -65,7 +65,7 @@ struct PropagatedLightOptions {
 ///          channel in which such a type emits keeps the type's own level.
 /// Lamps:   a type's level applies in its own voxel and spreads from there, even if the voxel is opaque.
 /// Colours: a transparent type passes a channel of lamp light if that channel of its colour is at least half its
-///          greatest channel. It always passes sky light.
+///          greatest channel. It always passes sky light. An opaque type that light passes does so for all channels.
 /// Exact:   the result equals a search from every lamp and every sky column (Dijkstra), independent of the order of
 ///          edits.
 /// Cost:    an update costs O(rows of 64 voxels within reach of the edits, and of sky columns that the edits open or

@@ -70,8 +70,10 @@ std::vector<TypeLight> type_lights(const VoxelRegistry& types, const PropagatedL
     lights[i].lamp = packed(lamp);
     const Rgba8 colour = properties.colour;
     const int half = (std::max({colour.r, colour.g, colour.b}) + 1) / 2;
-    const int colours = 1 | (colour.r >= half) << 1 | (colour.g >= half) << 2 | (colour.b >= half) << 3;
-    propagated::set_passage(types, type, static_cast<unsigned>(colours), lights[i]);
+    const int tinted = 1 | (colour.r >= half) << 1 | (colour.g >= half) << 2 | (colour.b >= half) << 3;
+    // Light passes an opaque type where the type leaves room, not through its material.
+    const unsigned colours = types.is_transparent(type) ? static_cast<unsigned>(tinted) : propagated::kAllChannels;
+    propagated::set_passage(types, type, colours, lights[i]);
   }
   return lights;
 }

@@ -44,7 +44,7 @@ VoxelRegistry costly_types() {
   add({150, 110, 70, 255}, Visibility::Transparent, 0.0F, 0, true);
   add({150, 110, 70, 255}, Visibility::Transparent, 0.0F, 5, true);
   add({250, 20, 250, 255}, Visibility::Transparent, 0.5F, 2, true);
-  add({200, 200, 200, 255}, Visibility::Opaque, 0.0F, 0, false);
+  add({200, 60, 40, 255}, Visibility::Opaque, 0.0F, 0, false);
   add({200, 200, 200, 255}, Visibility::Transparent, 0.0F, 15);
   return types;
 }
@@ -99,7 +99,7 @@ class Search {
     }
     const Rgba8& colour = types_[type].colour;
     const std::array<int, 3> rgb{colour.r, colour.g, colour.b};
-    return channel == 0 ||
+    return channel == 0 || properties.visibility == Visibility::Opaque ||
            2 * rgb.at(static_cast<std::size_t>(channel) - 1) >= *std::max_element(rgb.begin(), rgb.end());
   }
   [[nodiscard]] int lamp(VoxelType type, int channel) const {
