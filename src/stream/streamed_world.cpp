@@ -92,6 +92,9 @@ struct StreamedWorld::Impl {
   Streamed& add_streamed(GridHandle handle, std::uint32_t number);
   void set_generator(Streamed& grid, std::shared_ptr<const ChunkGenerator> generator);
   void limit_grids();
+  [[nodiscard]] bool has_unlimited_grids() const {
+    return std::ranges::any_of(grids, [](const auto& each) { return !each.second.has_extent; });
+  }
   Streamed* streamed(std::uint32_t number) {
     const auto found = grids.find(number);
     return found == grids.end() ? nullptr : &found->second;
@@ -106,7 +109,7 @@ struct StreamedWorld::Impl {
   }
 
   Status update(std::span<const Viewer> viewers, double seconds);
-  Status plan(std::span<const Viewer> viewers);
+  Status plan(std::span<const Viewer> viewers);  // without changing the scene
   void notify_workers();
   [[nodiscard]] bool has_chunks_to_move() const { return !completed_loads.empty() || (!is_edited && !leaving.empty()); }
   void take_in();
@@ -205,6 +208,7 @@ Status StreamedWorld::Impl::begin() {
 void StreamedWorld::Impl::set_generator(Streamed& grid, std::shared_ptr<const ChunkGenerator> generator) {
   static constexpr IBox kAllChunks{IVec3(kMinChunk + 1), IVec3(kMaxChunk)};
   SceneGrid* const content = content_of_grid(grid);
+  grid.has_extent |= content == nullptr;  // removed: there is nothing to limit
   if (content == nullptr) return;
   std::vector<IVec3> others;
   IBox extent = generator == nullptr ? IBox{} : generator->chunks();
@@ -241,6 +245,7 @@ void StreamedWorld::Impl::set_generator(Streamed& grid, std::shared_ptr<const Ch
 
 // Limits the grids from the file that have no generator to their stored chunks.
 void StreamedWorld::Impl::limit_grids() {
+  if (has_unlimited_grids()) note_edits();
   for (auto& [number, grid] : grids) {
     if (!grid.has_extent) set_generator(grid, nullptr);
   }
@@ -561,11 +566,9 @@ void StreamedWorld::Impl::take_in() {
   }
 }
 
-// Plans, without changing the scene.
 Status StreamedWorld::Impl::plan(std::span<const Viewer> viewers) {
   const Clock::time_point start = Clock::now();
   note_edits();
-  limit_grids();
   take_in();
   if (start - asked_others >= kAskOthers) {
     const std::size_t others = options.other_bytes ? options.other_bytes() : 0;
@@ -587,6 +590,7 @@ Status StreamedWorld::Impl::plan(std::span<const Viewer> viewers) {
 
 Status StreamedWorld::Impl::update(std::span<const Viewer> viewers, double seconds) {
   const Clock::time_point start = Clock::now();
+  limit_grids();
   Status outcome = plan(viewers);
   move_chunks(seconds, start, unposted);
   notify_workers();
@@ -794,7 +798,7 @@ Status StreamedWorld::plan(std::span<const Viewer> viewers) {
 }
 
 bool StreamedWorld::has_chunks_to_move() const {
-  return impl_->has_chunks_to_move();
+  return impl_->has_chunks_to_move() || impl_->has_unlimited_grids();
 }
 
 Status StreamedWorld::load_all(std::span<const Viewer> viewers) {
@@ -836,8 +840,8 @@ Status StreamedWorld::flush() {
   std::vector<ChunkAddress> slow;
   // With a job system: a generator that never returns must not run on this thread, unless no worker is free.
   int idle_waits = 0;
-  impl_->note_edits();
   impl_->limit_grids();
+  impl_->note_edits();
   // Saves types first: chunks from workers and edits may need them.
   if (auto saved = impl_->save_now(); !saved) return saved;
   while (!impl_->waits_for_broken_alone()) {
@@ -878,7 +882,7 @@ StreamStats StreamedWorld::stats() {
   now.other_bytes = impl_->budget.reported_bytes();
   now.wanted_chunks = impl_->box.wanted;
   now.missing_chunks = impl_->box.missing;
-  now.is_complete = impl_->is_quiet();
+  now.is_complete = impl_->is_quiet() && !impl_->has_unlimited_grids();
   now.waiting_edits = impl_->waiting_chunks();
   now.complete_radius = impl_->box.complete_radius;
   now.has_save_failed = impl_->is_refused || impl_->disk->has_failed();

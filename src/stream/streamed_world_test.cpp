@@ -53,6 +53,32 @@ TEST_F(StreamedWorldTest, LoadsOnlyChunksAroundViewer) {
   EXPECT_TRUE(world.take_problems().empty());
 }
 
+// Another thread may draw the scene during each `plan`, the first one too.
+TEST_F(StreamedWorldTest, PlanDoesNotLimitGrids) {
+  const Viewer viewer{.radius = 150.0};
+  {
+    StreamedWorld world = ground(path(), std::make_shared<PatternGround>());
+    ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+    ASSERT_TRUE(world.flush().has_value());
+  }
+  auto world = StreamedWorld::open(path(), WorldAccess::Read);  // without its generator
+  ASSERT_TRUE(world.has_value()) << to_string(world.error());
+  const Grid& grid = world->scene().grids()[only_grid(*world)].grid;
+  const IBox before = grid.extent();
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_TRUE(world->plan({&viewer, 1}).has_value());
+    EXPECT_EQ(grid.extent(), before);
+    EXPECT_TRUE(world->has_chunks_to_move());
+    EXPECT_FALSE(world->stats().is_complete);
+  }
+  ASSERT_TRUE(world->update({&viewer, 1}).has_value());
+  EXPECT_NE(grid.extent(), before);
+  ASSERT_TRUE(world->load_all({&viewer, 1}).has_value());
+  EXPECT_TRUE(world->stats().is_complete);
+  EXPECT_FALSE(world->has_chunks_to_move());
+  EXPECT_GT(world->stats().loaded_chunks, 0U);
+}
+
 TEST_F(StreamedWorldTest, KeepsEditsAfterEvictionAndGeneratesOnce) {
   auto generator = std::make_shared<PatternGround>();
   {

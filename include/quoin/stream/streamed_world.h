@@ -214,12 +214,12 @@ class StreamedWorld {
   ///         bad_alloc.
   Status update(std::span<const Viewer> viewers);
   /// Does the part of `update` that only reads the scene: finds edits, saves if a save is due, requests chunks. Another
-  /// thread can draw the scene during the call. Exception: the first call after `open` limits the grids that have no
-  /// generator (see `use_generator`). A game with a render thread calls `plan` each frame, and stops drawing for
-  /// `update` only if `has_chunks_to_move`.
+  /// thread can draw the scene during the call. A game with a render thread calls `plan` each frame, and stops drawing
+  /// for `update` only if `has_chunks_to_move`.
   /// Errors: as `update`.
   Status plan(std::span<const Viewer> viewers);
-  /// Returns true if the next `update` has chunks to add or unload, as of the last `plan`.
+  /// Returns true if the next `update` changes the scene: it has chunks to add or unload, as of the last `plan`, or it
+  /// is the first one and limits grids that have no generator to their stored chunks (see `use_generator`).
   [[nodiscard]] bool has_chunks_to_move() const;
   /// Calls `update` until all chunks that these viewers want are loaded, however long their generators take. For tools
   /// and tests. Errors: as `update`.
