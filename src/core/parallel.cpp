@@ -229,8 +229,7 @@ JobPriorityScope::~JobPriorityScope() {
 }
 
 std::shared_ptr<JobSystem> make_worker_pool(Threads workers) {
-  const unsigned count = workers.count != 0 ? workers.count : std::max(2U, hardware_threads()) - 1;
-  return std::make_shared<WorkerPool>(count);
+  return std::make_shared<WorkerPool>(worker_count(workers, hardware_threads()));
 }
 
 void set_job_system(std::shared_ptr<JobSystem> jobs) {

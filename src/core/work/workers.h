@@ -308,9 +308,13 @@ class Workers {
   std::vector<std::thread> threads_;
 };
 
+/// Returns the number of workers of an object or a pool: by default all of `available` threads except the calling one.
+[[nodiscard]] inline unsigned worker_count(Threads threads, unsigned available) {
+  return threads.count != 0 ? threads.count : std::max(2U, available) - 1;
+}
 /// Returns the number of workers of an object: see Threads.
 [[nodiscard]] inline unsigned worker_count(Threads threads) {
-  return threads.count != 0 ? threads.count : std::max(2U, thread_count(threads)) - 1;
+  return worker_count(threads, thread_count(threads));
 }
 
 /// Names the calling thread for debuggers and profilers: at most 15 characters.
