@@ -61,9 +61,9 @@ Error error_of(sqlite3* database, int code) {
     case SQLITE_LOCKED:
       return make_error(ErrorCode::CannotWrite, "another program has locked it");
     case SQLITE_NOTADB:
-      return make_error(ErrorCode::BadFormat, "not a Quoin world (not an SQLite database)");
+      return make_error(ErrorCode::BadFormat, "not an SQLite database");
     case SQLITE_CORRUPT:
-      return make_error(ErrorCode::BadFormat, "the database is damaged; run quoin world repair");
+      return make_error(ErrorCode::BadFormat, kDamagedDatabase);
     case SQLITE_NOMEM:
       throw std::bad_alloc();
     case SQLITE_TOOBIG:

@@ -102,6 +102,9 @@ class Connection {
   std::unique_ptr<int> log_pages_ = std::make_unique<int>(0);
 };
 
+/// The message of the error of a damaged database.
+inline constexpr const char* kDamagedDatabase = "the database is damaged";
+
 /// Converts SQLite's last error.
 [[nodiscard]] Error error_of(sqlite3* database, int code);
 

@@ -62,9 +62,9 @@ std::string to_string(IVec3 place) {
   return "(" + std::to_string(place.x) + ", " + std::to_string(place.y) + ", " + std::to_string(place.z) + ")";
 }
 
-/// Returns a database error without advice that only applies to Quoin's worlds.
+/// Returns an error of the map's database with its file. A missing table or column is damage too.
 Error database_error(Error error, const fs::path& path) {
-  if (error.code == ErrorCode::BadFormat) error.message = "the database is damaged";
+  if (error.code == ErrorCode::BadFormat) error.message = kDamagedDatabase;
   error.path = path.string();
   return error;
 }

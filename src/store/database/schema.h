@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 #include <tuple>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -16,6 +17,7 @@
 #include <quoin/core/vec.h>
 #include <quoin/store/world_store.h>
 
+#include "core/bytes/files.h"
 #include "core/database/connection.h"
 
 // The tables of a world; docs/formats/world.md documents them.
@@ -40,6 +42,13 @@ inline constexpr int kRegionBits = 3 * kRegionShift;
 /// upgrades earlier versions before they are written.
 /// Errors: BadFormat (another program's database), Unsupported (a later version).
 [[nodiscard]] Status check_schema(Connection& database);
+
+/// Returns `result`; its error names the world's file, as `with_path`, and the remedy for a damaged database.
+template <class T>
+[[nodiscard]] Result<T> with_world(Result<T> result, const std::filesystem::path& path) {
+  if (!result && result.error().message == kDamagedDatabase) result.error().message += "; run quoin world repair";
+  return with_path(std::move(result), path);
+}
 
 struct RegionPlace {
   std::uint32_t grid = 0;

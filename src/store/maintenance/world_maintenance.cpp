@@ -195,10 +195,10 @@ Result<std::uint64_t> back_up(const std::filesystem::path& from, const std::file
     return make_error(ErrorCode::CannotWrite, "file already exists", to.string());
   }
   const auto lock = WorldLock::take(to);
-  if (!lock) return with_path(Result<std::uint64_t>(lock.error()), to);
+  if (!lock) return with_world(Result<std::uint64_t>(lock.error()), to);
   const std::filesystem::path fresh = fresh_name(to);
   const Status done = [&]() -> Status {
-    auto reader = with_path(open_reader(from), from);
+    auto reader = with_world(open_reader(from), from);
     if (!reader) return reader.error();
     // Writing is allowed here because VACUUM INTO writes to another file.
     if (auto set = reader->connection().run("PRAGMA query_only=OFF"); !set) return set;
@@ -235,13 +235,13 @@ Status compact(const std::filesystem::path& named) {
 }  // namespace
 
 Result<WorldSummary> summarize_world(const std::filesystem::path& path, const Progress& progress) {
-  return with_path(summarize(path, progress), path);
+  return with_world(summarize(path, progress), path);
 }
 
 Result<WorldCheck> check_world(const std::filesystem::path& path, const Progress& progress) {
   auto reader = open_reader(path);
-  if (!reader) return with_path(Result<WorldCheck>(reader.error()), path);
-  return with_path(Check(*reader, progress, path).run(), path);
+  if (!reader) return with_world(Result<WorldCheck>(reader.error()), path);
+  return with_world(Check(*reader, progress, path).run(), path);
 }
 
 Result<std::uint64_t> back_up_world(const std::filesystem::path& from, const std::filesystem::path& to) {
@@ -249,7 +249,7 @@ Result<std::uint64_t> back_up_world(const std::filesystem::path& from, const std
 }
 
 Result<std::uint64_t> compact_world(const std::filesystem::path& path) {
-  if (auto done = compact(path); !done) return with_path(Result<std::uint64_t>(done.error()), path);
+  if (auto done = compact(path); !done) return with_world(Result<std::uint64_t>(done.error()), path);
   return file_bytes(path);
 }
 
@@ -402,7 +402,7 @@ class Copy {
 
 Result<WorldCopy> copy(const std::filesystem::path& from, const std::filesystem::path& fresh,
                        const Progress& progress) {
-  auto reader = with_path(open_reader(from), from);
+  auto reader = with_world(open_reader(from), from);
   if (!reader) return reader.error();
   auto database = Connection::open(fresh.string(), Connection::Mode::Create);
   if (!database) return database.error();
@@ -428,12 +428,12 @@ Result<WorldCopy> copy_world(const std::filesystem::path& from, const std::files
                              const Progress& progress) {
   const std::filesystem::path target = follow_links(to);
   const auto lock = WorldLock::take(target);
-  if (!lock) return with_path(Result<WorldCopy>(lock.error()), to);
+  if (!lock) return with_world(Result<WorldCopy>(lock.error()), to);
   const std::filesystem::path fresh = fresh_name(target);
   auto copied = copy(from, fresh, progress);
   Status done = copied ? put_world_in_place(fresh, target) : Status(copied.error());
   remove_database(fresh);
-  if (!done) return with_path(Result<WorldCopy>(done.error()), to);
+  if (!done) return with_world(Result<WorldCopy>(done.error()), to);
   std::error_code error;
   copied->bytes = std::filesystem::file_size(target, error);
   return copied;

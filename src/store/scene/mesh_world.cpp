@@ -533,7 +533,7 @@ class WorldMesher {
 Result<WorldMeshes> mesh_world(const WorldStore& world, const LoadedWorld& loaded, const WorldMeshOptions& options,
                                Threads threads, const Progress& progress) {
   QUOIN_ASSERT(!options.scene.atlas && !options.scene.cut && !options.scene.mesh.cut, "as the header says");
-  return with_path(WorldMesher(world, loaded, options, threads, progress).run(), world.path());
+  return with_world(WorldMesher(world, loaded, options, threads, progress).run(), world.path());
 }
 
 Result<FaceCounts> count_world_faces(const WorldStore& world, const LoadedWorld& loaded, InstanceFilter filter,
@@ -548,7 +548,7 @@ Result<FaceCounts> count_world_faces(const WorldStore& world, const LoadedWorld&
     ChunkCache cache(world, *number, WorldMeshOptions().cache_bytes);
     const auto share = [&](std::size_t i) { return static_cast<double>(i) / static_cast<double>(drawn.size()); };
     const auto more = count_grid_faces(cache, scene.types, threads, part_of(progress, share(done), share(done + 1)));
-    if (!more) return with_path(Result<FaceCounts>(more.error()), world.path());
+    if (!more) return with_world(Result<FaceCounts>(more.error()), world.path());
     counts += *more;
     ++done;
   }

@@ -670,7 +670,8 @@ Result<LoadedWorld> load(const WorldStore& world, Load::Chunks chunks, const Who
                          SaverState& state, const LoadOptions& options, Threads threads, const Progress& progress) {
   result.loaded.format = "world";
   Load load(world, chunks, limit, options, result.loaded, state);
-  if (auto done = load.run(threads, progress); !done) return with_path(Result<LoadedWorld>(done.error()), world.path());
+  if (auto done = load.run(threads, progress); !done)
+    return with_world(Result<LoadedWorld>(done.error()), world.path());
   if (options.show_hidden) show_all(result.loaded.scene);
   return result;
 }

@@ -113,7 +113,7 @@ struct WorldStore::Impl {
         return kit;
       }
     }
-    auto reader = in_memory.empty() ? with_path(open_reader(path, vfs), path) : open_bytes();
+    auto reader = in_memory.empty() ? with_world(open_reader(path, vfs), path) : open_bytes();
     if (!reader) return reader.error();
     return std::make_unique<ReadKit>(ReadKit{std::move(*reader), {}});
   }
@@ -133,7 +133,7 @@ struct WorldStore::Impl {
   auto with_kit(Read read) const -> std::invoke_result_t<Read, ReadKit&> {
     auto kit = take();
     if (!kit) return kit.error();
-    auto outcome = with_path(read(**kit), path);
+    auto outcome = with_world(read(**kit), path);
     give_back(std::move(*kit));
     return outcome;
   }
@@ -177,7 +177,7 @@ Result<WorldStore> WorldStore::create(const std::filesystem::path& path, Threads
 Result<WorldStore> WorldParts::create(const std::filesystem::path& named, Threads threads, const char* vfs) {
   const std::filesystem::path path = vfs == nullptr ? follow_links(named) : named;
   if (vfs != nullptr) {
-    if (auto done = make_database(path, vfs); !done) return with_path(Result<WorldStore>(done.error()), path);
+    if (auto done = make_database(path, vfs); !done) return with_world(Result<WorldStore>(done.error()), path);
     return open(path, WorldAccess::Write, threads, vfs);
   }
   std::error_code error;
@@ -186,7 +186,7 @@ Result<WorldStore> WorldParts::create(const std::filesystem::path& named, Thread
   }
   {
     const auto lock = WorldLock::take(path);
-    if (!lock) return with_path(Result<WorldStore>(lock.error()), path);
+    if (!lock) return with_world(Result<WorldStore>(lock.error()), path);
     const std::filesystem::path fresh = fresh_name(path);
     auto done = make_database(fresh, nullptr);
     if (done) {
@@ -195,7 +195,7 @@ Result<WorldStore> WorldParts::create(const std::filesystem::path& named, Thread
     }
     if (!done) {
       remove_database(fresh);
-      return with_path(Result<WorldStore>(done.error()), path);
+      return with_world(Result<WorldStore>(done.error()), path);
     }
   }
   return open(path, WorldAccess::Write, threads, nullptr);
@@ -227,7 +227,7 @@ Result<WorldStore> WorldParts::open(const std::filesystem::path& named, WorldAcc
   auto impl = std::make_unique<WorldStore::Impl>();
   impl->path = path;
   impl->vfs = vfs;
-  const auto fail = [&](const Error& error) { return with_path(Result<WorldStore>(error), path); };
+  const auto fail = [&](const Error& error) { return with_world(Result<WorldStore>(error), path); };
   if (vfs == nullptr) {
     const auto beginning = read_file_beginning(path, kWorldHeaderBytes);
     if (!beginning) return beginning.error();
@@ -263,9 +263,9 @@ Result<WorldStore> WorldParts::begin(std::unique_ptr<WorldStore::Impl> impl, std
                                      Threads threads) {
   auto kit = impl->take();
   if (!kit) return kit.error();
-  auto rules = with_path(read_rules((*kit)->reader), impl->path);
+  auto rules = with_world(read_rules((*kit)->reader), impl->path);
   if (!rules) return rules.error();
-  const auto revision = with_path(last_revision((*kit)->reader), impl->path);
+  const auto revision = with_world(last_revision((*kit)->reader), impl->path);
   if (!revision) return revision.error();
   if (!rules->grids.empty()) impl->next_grid = rules->grids.rbegin()->first + 1;
   const auto next_grid = (*kit)->reader.part({part::kWorld, std::string("next_grid")});
@@ -413,7 +413,7 @@ Status WorldParts::each_chunk(const WorldStore& world, std::uint32_t grid, std::
         rows[i].chunk = WorldStore::Impl::decode_with(decoders[worker], rows[i].place, rows[i].body, *rules);
       }
     });
-    for (Row& row : rows) is_wanted = is_wanted && visit(row.place, with_path(std::move(row.chunk), impl.path));
+    for (Row& row : rows) is_wanted = is_wanted && visit(row.place, with_world(std::move(row.chunk), impl.path));
     rows.clear();
     return is_wanted;
   };
@@ -424,7 +424,7 @@ Status WorldParts::each_chunk(const WorldStore& world, std::uint32_t grid, std::
   });
   if (is_wanted) pass_on();
   impl.give_back(std::move(*kit));
-  return with_path(done, impl.path);
+  return with_world(done, impl.path);
 }
 
 std::vector<std::string> WorldParts::damage(const WorldStore& world) {
@@ -442,7 +442,7 @@ Result<SaveTicket> WorldStore::save(WorldChanges changes, std::function<void(con
   bool stores_next_grid = false;
   if (WorldRules::concern(content)) {
     auto now = rules->after(content);
-    if (!now) return with_path(Result<SaveTicket>(now.error()), impl_->path);
+    if (!now) return with_world(Result<SaveTicket>(now.error()), impl_->path);
     for (const auto& [key, body] : content.parts) {
       const auto* const number = std::get_if<std::int64_t>(&key.id);
       const bool is_grid = key.kind == part::kGrid && body && number != nullptr;
@@ -455,7 +455,7 @@ Result<SaveTicket> WorldStore::save(WorldChanges changes, std::function<void(con
     rules = std::make_shared<const WorldRules>(std::move(*now));
   }
   if (auto done = check_changes(content, *rules); !done)
-    return with_path(Result<SaveTicket>(done.error()), impl_->path);
+    return with_world(Result<SaveTicket>(done.error()), impl_->path);
   const SaveTicket ticket = impl_->writer->save(std::move(content), std::move(on_saved));
   // A save that is refused or throws leaves these as they were.
   impl_->rules = std::move(rules);
@@ -464,11 +464,11 @@ Result<SaveTicket> WorldStore::save(WorldChanges changes, std::function<void(con
 }
 
 Status WorldStore::wait(SaveTicket ticket) {
-  return impl_->writer == nullptr ? Status() : with_path(impl_->writer->wait(ticket), impl_->path);
+  return impl_->writer == nullptr ? Status() : with_world(impl_->writer->wait(ticket), impl_->path);
 }
 
 Status WorldStore::flush() {
-  return impl_->writer == nullptr ? Status() : with_path(impl_->writer->flush(), impl_->path);
+  return impl_->writer == nullptr ? Status() : with_world(impl_->writer->flush(), impl_->path);
 }
 
 WorldStats WorldStore::stats() const {

@@ -288,6 +288,8 @@ TEST(WorldStore, ErrorsDescribeFileFaults) {
   { WorldStore world = made(folder / "w.quoin"); }
   std::filesystem::resize_file(folder / "w.quoin", 5000);
   EXPECT_EQ(WorldStore::open(folder / "w.quoin", WorldAccess::Read).error().code, ErrorCode::BadFormat);
+  EXPECT_NE(text_of(WorldStore::open(folder / "w.quoin", WorldAccess::Read)).find("run quoin world repair"),
+            std::string::npos);
 }
 
 TEST(WorldStore, ThreadsReadAndWriteAtOnce) {
