@@ -61,33 +61,44 @@ WorldWriter::~WorldWriter() {
 }
 
 SaveTicket WorldWriter::save(ChangeSet changes, OnSaved on_saved) {
-  SaveTicket ticket;
+  std::list<Save> added(1);
+  Save& save = added.front();
+  if (on_saved) save.on_saved.push_back(std::move(on_saved));
   {
     const std::scoped_lock lock(mutex_);
-    ticket.number = ++last_ticket_;
-    note_pending(changes, ticket.number);
-    Save save{ticket.number, std::move(changes), {}};
-    if (on_saved) save.on_saved.push_back(std::move(on_saved));
-    queue_.push_back(std::move(save));
+    note_pending(changes, last_ticket_ + 1);
+    // Nothing fails from here on.
+    save.last = ++last_ticket_;
+    save.changes = std::move(changes);
+    queue_.splice(queue_.end(), added);
     failed_through_ = 0;
   }
   thread_.wake_one();
-  return ticket;
+  return {save.last};
 }
 
 void WorldWriter::note_pending(const ChangeSet& changes, std::uint64_t ticket) {
+  std::map<std::uint32_t, std::uint64_t> removed;
+  for (const std::uint32_t grid : changes.removed_grids) removed.emplace(grid, ticket);
+  decltype(pending_chunks_) chunks;
+  chunks.reserve(changes.chunks.size());
+  for (const auto& [place, chunk] : changes.chunks) chunks.emplace(place, PendingChunk{chunk, ticket});
+  pending_chunks_.reserve(pending_chunks_.size() + chunks.size());
+  // No allocation from here on.
   const auto drop = [&](auto found) {
     stats_.pending_bytes -= bytes_of(found->second.content);
     return pending_chunks_.erase(found);
   };
   for (const std::uint32_t grid : changes.removed_grids) {
-    pending_removed_[grid] = ticket;
     for (auto it = pending_chunks_.begin(); it != pending_chunks_.end();) it = it->first.grid == grid ? drop(it) : ++it;
+    pending_removed_.erase(grid);
   }
-  for (const auto& [place, chunk] : changes.chunks) {
-    PendingChunk& pending = pending_chunks_[place];
-    stats_.pending_bytes += bytes_of(chunk) - bytes_of(pending.content);
-    pending = {chunk, ticket};
+  pending_removed_.merge(removed);
+  while (!chunks.empty()) {
+    auto node = chunks.extract(chunks.begin());
+    if (const auto found = pending_chunks_.find(node.key()); found != pending_chunks_.end()) drop(found);
+    stats_.pending_bytes += bytes_of(node.mapped().content);
+    pending_chunks_.insert(std::move(node));
   }
   stats_.pending_chunks = pending_chunks_.size();
 }

@@ -36,6 +36,7 @@ class WorldWriter {
   /// Saves the queue if possible, and closes the connection.
   ~WorldWriter();
 
+  /// If memory runs out, nothing is saved, and the changes are lost.
   SaveTicket save(ChangeSet changes, OnSaved on_saved);
   [[nodiscard]] Status wait(SaveTicket ticket);
   [[nodiscard]] Status flush();
@@ -76,6 +77,7 @@ class WorldWriter {
   [[nodiscard]] Workers::Clock::time_point step(Workers::Lock& lock);
   /// Fills `group_`, unless no save waits, or the last commit failed and was not retried. Requires: the lock is held.
   void begin_group();
+  /// Lets readers find the changes of a save. If memory runs out, nothing has changed.
   void note_pending(const ChangeSet& changes, std::uint64_t ticket);
   void finish(const Status& outcome);
   void roll_back();
