@@ -186,13 +186,17 @@ Status DeviceScene::try_update(const Scene& scene, InstanceFilter filter, Thread
 
 Status DeviceLamps::put(ShaderMemory& memory, std::shared_ptr<const LampTable> now) {
   if (now == table) return {};
-  table = nullptr;
+  if (std::exchange(table, nullptr) == nullptr) memory.discard();  // a call that threw may have left writes
   if (now == nullptr) return {};
   Status done = put_table(memory, bricks, std::as_bytes(std::span(now->bricks)));
   if (done) done = put_table(memory, lists, std::as_bytes(std::span(now->lists)));
   if (done) done = memory.flush();
-  if (done) table = std::move(now);
-  return done;
+  if (!done) {
+    memory.discard();
+    return done;
+  }
+  table = std::move(now);
+  return {};
 }
 
 // Bricks have spare numbers for growth.

@@ -5,14 +5,19 @@
 #include <array>
 #include <bit>
 #include <cstring>
+#include <memory>
+#include <new>
 #include <optional>
 #include <random>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "core/death_for_tests.h"
 #include "render/cpu/render_test_support.h"
+#include "render/vulkan/march/device_scene.h"
 #include "render/vulkan/trees/tree_packing.h"
 #include "scene/surfaces.h"
 
@@ -195,6 +200,51 @@ TEST(ShaderBytes, RejectsMoreThanAddressableBytes) {
     ASSERT_FALSE(second) << size;
     EXPECT_EQ(second.error().code, ErrorCode::LimitExceeded);
   }
+}
+
+/// Counts the writes that wait for `flush`. One allocation fails, or throws.
+class QueuedMemory final : public vulkan::ShaderMemory {
+ public:
+  Result<vulkan::Place> allocate(std::uint64_t size, const std::string& doing) override {
+    if (left == 0 && throws) throw std::bad_alloc();
+    if (left-- == 0) return make_error(ErrorCode::LimitExceeded, doing);
+    return vulkan::Place{.size = size};
+  }
+  void release(vulkan::Place& place) override { place = {}; }
+  Status write(const vulkan::Place& /*place*/, std::span<const std::byte> /*bytes*/,
+               std::uint64_t /*offset*/) override {
+    ++queued;
+    return {};
+  }
+  Status flush() override {
+    flushed = std::exchange(queued, 0);
+    return {};
+  }
+  void discard() override { queued = 0; }
+
+  int left = -1;  // allocations before the one that fails; negative: none fails
+  bool throws = false;
+  int queued = 0;
+  int flushed = 0;
+};
+
+TEST(DeviceLamps, DiscardsWritesOfFailedCall) {
+  const auto table = std::make_shared<LampTable>();
+  table->bricks.resize(4);
+  table->lists.resize(4);
+  QueuedMemory memory;
+  vulkan::DeviceLamps lamps;
+  memory.left = 1;  // the lists find no place, after the bricks were written
+  EXPECT_FALSE(lamps.put(memory, table));
+  EXPECT_EQ(lamps.table, nullptr);
+  EXPECT_EQ(memory.queued, 0);
+  memory.left = 0;
+  memory.throws = true;
+  EXPECT_THROW(static_cast<void>(lamps.put(memory, table)), std::bad_alloc);
+  memory.left = -1;
+  ASSERT_TRUE(lamps.put(memory, table));
+  EXPECT_EQ(lamps.table, table);
+  EXPECT_EQ(memory.flushed, 2) << "bricks and lists";
 }
 
 TEST(ShaderBytesDeathTest, RejectsWriteBeyondPlace) {
