@@ -196,6 +196,17 @@ BlockLook look_of_node(std::string_view name) {
   return minecraft::look_of_block(name, false, false);
 }
 
+// Sets the passage of light of nodes that differ from the blocks of the same look, as the mods of Luanti's own game
+// register them: "paramtype light" lets light through, at no cost to the sun with "sunlight_propagates".
+void set_passage(std::string_view name, VoxelProperties& type) {
+  const auto is_of = [&](std::string_view mod) { return name.starts_with(mod); };
+  constexpr std::string_view kAtCost[] = {"stairs:", "walls:", "beds:", "default:chest"};
+  const bool has_cost = name == "default:snow" || std::ranges::any_of(kAtCost, is_of);
+  if (!has_cost && !is_of("xpanes:")) return;
+  type.light_cost = has_cost ? 1 : 0;
+  if (type.visibility == Visibility::Opaque) type.blocks_light = false;
+}
+
 }  // namespace
 
 std::optional<VoxelProperties> node_properties(std::string_view name) {
@@ -203,12 +214,7 @@ std::optional<VoxelProperties> node_properties(std::string_view name) {
   const BlockLook look = look_of_node(name);
   VoxelProperties type;
   minecraft::set_look(look, type);
-  // Nodes of "paramtype light" without "sunlight_propagates", as the mods of Luanti's own game register them. Leaves,
-  // water, ice and lava are such nodes too, and come from the table of blocks.
-  if (name == "default:snow" || name.starts_with("stairs:")) {
-    if (type.visibility == Visibility::Opaque) type.blocks_light = false;
-    type.light_cost = 1;
-  }
+  set_passage(name, type);
   type.name = printable(name);
   type.colour = minecraft::tinted_colour(look.colour, minecraft::colour_of(look.tint, {}));
   type.colour.a = std::max<std::uint8_t>(type.colour.a, 1);

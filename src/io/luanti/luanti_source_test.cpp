@@ -77,16 +77,17 @@ TEST(LuantiNodes, PassLightAsTheGame) {
     return type.blocks_light.value_or(type.visibility == Visibility::Opaque) ? int{kMaxLightCost}
                                                                              : int{type.light_cost};
   };
-  for (const char* name : {"default:stone", "default:tree", "mod:unheard_of"}) {
+  for (const char* name : {"default:stone", "default:tree", "default:snowblock", "mod:unheard_of"}) {
     EXPECT_EQ(passage(name), kMaxLightCost) << name;
   }
   for (const char* name :
        {"default:water_source", "default:river_water_flowing", "default:leaves", "default:pine_needles", "default:ice",
-        "default:lava_source", "default:snow", "stairs:stair_cobble", "stairs:slab_wood"}) {
+        "default:lava_source", "default:snow", "stairs:stair_cobble", "stairs:slab_wood", "walls:cobble",
+        "beds:bed_bottom", "default:chest_locked"}) {
     EXPECT_EQ(passage(name), 1) << name;
   }
   for (const char* name :
-       {"default:glass", "default:torch", "default:fence_wood", "default:chest", "doors:door_wood_a"}) {
+       {"default:glass", "default:torch", "default:fence_wood", "xpanes:bar_flat", "doors:door_wood_a"}) {
     EXPECT_EQ(passage(name), 0) << name;
   }
 }
