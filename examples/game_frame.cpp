@@ -6,8 +6,11 @@
 //   IMAGE (default game.png) shows the last frame.
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
+#include <cstddef>
 #include <cstdio>
+#include <cstdlib>
 #include <map>
 #include <memory>
 #include <optional>
@@ -23,6 +26,27 @@ namespace {
 
 constexpr int kFrames = 120;
 constexpr std::size_t kUploadBytes = std::size_t{4} << 20;
+
+// The memory of the game. Here it is that of malloc, counted.
+class Arena {
+ public:
+  void* allocate(std::size_t bytes, std::size_t alignment) noexcept {
+    void* const block = std::aligned_alloc(alignment, (bytes + alignment - 1) / alignment * alignment);
+    if (block == nullptr) return nullptr;
+    const std::size_t used = used_ += bytes;
+    for (std::size_t most = most_; used > most && !most_.compare_exchange_weak(most, used);) continue;
+    return block;
+  }
+  void free(void* block, std::size_t bytes) noexcept {
+    used_ -= bytes;
+    std::free(block);
+  }
+  [[nodiscard]] std::size_t most() const { return most_; }
+
+ private:
+  std::atomic<std::size_t> used_{0};
+  std::atomic<std::size_t> most_{0};
+};
 
 class Game {
  public:
@@ -169,8 +193,20 @@ quoin::Status play(const std::string& path, const std::string& image) {
 
 int main(int argc, char** argv) {
   quoin::return_freed_memory();  // so that the memory of the process also stays within the budget
+  static Arena arena;            // not destroyed before the scratch memory of this thread
+  quoin::BlockFunctions functions;
+  functions.allocate = [](std::size_t bytes, std::size_t alignment, void* context) noexcept {
+    return static_cast<Arena*>(context)->allocate(bytes, alignment);  // null: no memory left
+  };
+  functions.free = [](void* block, std::size_t bytes, std::size_t /*alignment*/, void* context) noexcept {
+    static_cast<Arena*>(context)->free(block, bytes);
+  };
+  functions.context = &arena;
+  if (!quoin::set_block_functions(functions)) return 1;  // Quoin has already made a large block
+
   quoin::set_job_system(quoin::make_worker_pool({.count = 3}));  // before the first object
   const auto played = play(argc > 1 ? argv[1] : "game.quoin", argc > 2 ? argv[2] : "game.png");
   if (!played) std::fprintf(stderr, "%s\n", quoin::to_string(played.error()).c_str());
+  std::printf("at most %.1f MB from the arena\n", 1e-6 * static_cast<double>(arena.most()));
   return played ? 0 : 1;
 }

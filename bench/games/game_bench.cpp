@@ -55,8 +55,9 @@ void* allocate(std::size_t bytes, std::align_val_t alignment) {
 void use_arena() {
   quoin::BlockFunctions arena;
   arena.allocate = [](std::size_t bytes, std::size_t alignment, void* /*context*/) noexcept {
-    large_of_arena += static_cast<std::int64_t>(bytes);
-    return std::aligned_alloc(alignment, (bytes + alignment - 1) / alignment * alignment);
+    void* const block = std::aligned_alloc(alignment, (bytes + alignment - 1) / alignment * alignment);
+    if (block != nullptr) large_of_arena += static_cast<std::int64_t>(bytes);
+    return block;
   };
   arena.free = [](void* block, std::size_t bytes, std::size_t /*alignment*/, void* /*context*/) noexcept {
     large_of_arena -= static_cast<std::int64_t>(bytes);

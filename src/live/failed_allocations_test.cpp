@@ -1,8 +1,8 @@
 // Consumers of changes stay correct if memory runs out during an update. This file replaces `operator new` of the test
 // program, so that a chosen allocation of the calling thread fails. It also counts allocations for other tests.
 //
-// With QUOIN_TEST_BLOCK_FUNCTIONS in the environment, the program has functions for large blocks, of which a chosen call
-// fails too. They check all calls of all tests (block_arena_for_tests.h).
+// If QUOIN_TEST_BLOCK_FUNCTIONS is in the environment, the program sets functions for large blocks. A chosen call of
+// these fails too, and they check all calls of all tests (block_arena_for_tests.h).
 
 #include <algorithm>
 #include <array>
