@@ -106,9 +106,9 @@ class Tile {
     std::uint32_t pixel = 0;
     Vec3 weight{1.0F};
   };
-  std::vector<SurfacePoint> points_;
-  std::vector<Target> targets_;
-  std::vector<Vec3> lit_;
+  BlockVector<SurfacePoint> points_;
+  BlockVector<Target> targets_;
+  BlockVector<Vec3> lit_;
   std::vector<GlassBody> glass_;
   std::unique_ptr<raster::Canvas> far_;  // of the current sample; null if there are none
   FarFaces far_faces_;                   // of the current block

@@ -13,6 +13,7 @@
 #include <glm/geometric.hpp>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 #include <quoin/trace/packet.h>
 
 #include "render/impostor/impostor_surface.h"
@@ -100,7 +101,7 @@ std::uint32_t blocked_by(const OccupancyTree& opaque, const DensityTree* field, 
 // sixteen faces at a time, mostly of one direction.
 void count_open_rays(const OccupancyTree& opaque, const DensityTree* field, std::span<const std::uint32_t> wanted,
                      ImpostorFaces& impostor) {
-  std::vector<ImpostorFaces::Face>& faces = impostor.faces;
+  BlockVector<ImpostorFaces::Face>& faces = impostor.faces;
   constexpr double kLift = 0.01;
   constexpr int kRays = ImpostorFaces::Face::kRays;
   const OcclusionDirections directions(kRays);
@@ -199,7 +200,7 @@ struct Subject {
   }
 };
 
-void put_faces(const Subject& subject, const std::vector<SeenFace>& seen, KnownFaces known, ImpostorFaces& out) {
+void put_faces(const Subject& subject, const BlockVector<SeenFace>& seen, KnownFaces known, ImpostorFaces& out) {
   GridReader reader(*subject.grid);
   GridReader neighbours(*subject.grid);
   std::vector<std::uint32_t> fresh;
@@ -228,7 +229,7 @@ void put_faces(const Subject& subject, const std::vector<SeenFace>& seen, KnownF
   count_open_rays(*subject.opaque, subject.field, fresh, out);
 }
 
-void put_levels(const Subject& subject, const std::vector<SeenFace>& seen, ImpostorFaces& out) {
+void put_levels(const Subject& subject, const BlockVector<SeenFace>& seen, ImpostorFaces& out) {
   const auto is_solid = [&](IVec3 voxel) {
     return subject.shell ? subject.shell->is_occupied(voxel) : subject.opaque->is_occupied(voxel);
   };
@@ -250,7 +251,7 @@ void put_levels(const Subject& subject, const std::vector<SeenFace>& seen, Impos
   }
 }
 
-std::shared_ptr<const ImpostorFaces> faces_of(const Subject& subject, const std::vector<SeenFace>& seen,
+std::shared_ptr<const ImpostorFaces> faces_of(const Subject& subject, const BlockVector<SeenFace>& seen,
                                               KnownFaces known) {
   auto faces = std::make_shared<ImpostorFaces>();
   faces->edge = subject.edge;
@@ -295,7 +296,7 @@ Impostor Impostor::build(const Grid& grid, const VoxelRegistry& types, const Occ
   if (made.must_be_traced_) return made;
   made.box_ = subject.box;
   if (made.empty()) return made;
-  const std::vector<SeenFace> seen =
+  const BlockVector<SeenFace> seen =
       subject.shell ? faces_seen_of(*subject.shell, subject.surfels, made.box_, subject.content, subject.edge)
                     : faces_seen_by_rays(opaque, subject.content, subject.edge);
   made.faces_ = faces_of(subject, seen, {});
@@ -328,7 +329,7 @@ Impostor Impostor::rebuilt(const Grid& grid, const VoxelRegistry& types, const G
   made.options_ = options_;
   made.content_ = content_;
   made.box_ = opaque.bounds();
-  const std::vector<SeenFace> seen = faces_seen_after(*faces_, *subject.shell, content_, *changed);
+  const BlockVector<SeenFace> seen = faces_seen_after(*faces_, *subject.shell, content_, *changed);
   made.faces_ = faces_of(subject, seen, KnownFaces(*faces_, *changed));
   return made;
 }

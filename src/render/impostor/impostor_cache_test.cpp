@@ -8,6 +8,8 @@
 
 #include <gtest/gtest.h>
 
+#include <quoin/core/memory.h>
+
 #include "bench/workloads.h"
 #include "render/impostor/raster/impostor_faces.h"
 
@@ -30,7 +32,7 @@ struct CacheWorld {
 };
 
 bool shows(const Impostor& impostor, VoxelType type) {
-  const std::vector<ImpostorFaces::Face>& faces = impostor.faces().faces;
+  const BlockVector<ImpostorFaces::Face>& faces = impostor.faces().faces;
   return std::any_of(faces.begin(), faces.end(), [&](const ImpostorFaces::Face& face) { return face.type == type; });
 }
 

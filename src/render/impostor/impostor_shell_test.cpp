@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include <quoin/core/memory.h>
 #include <quoin/grid/grid.h>
 
 #include "bench/workloads.h"
@@ -47,7 +48,7 @@ TEST(ImpostorShell, HoldsEveryFaceOnce) {
     const ShellWorld world(seed);
     const auto shell = ImpostorShell::build(world.tree, kPlenty, kPlenty);
     ASSERT_TRUE(shell.has_value());
-    const std::vector<VoxelFace> faces = shell->faces();
+    const BlockVector<VoxelFace> faces = shell->faces();
     std::set<Key> expected;
     const IBox box = world.tree.bounds();
     GridReader reader(world.grid);

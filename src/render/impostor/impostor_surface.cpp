@@ -12,6 +12,7 @@
 #include <glm/geometric.hpp>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 
 #include "core/coordinates/chunk_order.h"
 #include "trace/density/density_glass.h"
@@ -129,8 +130,8 @@ std::int64_t ImpostorShell::count_faces() const {
   return count;
 }
 
-std::vector<VoxelFace> ImpostorShell::faces() const {
-  std::vector<VoxelFace> all;
+BlockVector<VoxelFace> ImpostorShell::faces() const {
+  BlockVector<VoxelFace> all;
   const auto count = static_cast<std::size_t>(count_faces());
   all.reserve(count);
   for (const Direction direction : kDirections) {

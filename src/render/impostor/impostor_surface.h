@@ -7,6 +7,7 @@
 
 #include <quoin/core/assert.h>
 #include <quoin/core/direction.h>
+#include <quoin/core/memory.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/density_grid.h>
 #include <quoin/trace/occupancy_tree.h>
@@ -38,7 +39,7 @@ class ImpostorShell {
   static std::optional<ImpostorShell> build(const OccupancyTree& tree, std::int64_t max_voxels, std::int64_t max_faces);
 
   /// Returns all faces in the order of `comes_before`.
-  [[nodiscard]] std::vector<VoxelFace> faces() const;
+  [[nodiscard]] BlockVector<VoxelFace> faces() const;
   /// Requires: `voxel` is at most one voxel outside the box.
   [[nodiscard]] bool is_occupied(IVec3 voxel) const {
     const IVec3 local = voxel - origin_;
@@ -64,8 +65,8 @@ class ImpostorShell {
 
 /// The surface of a field in pieces: a face for each surfel, and a material.
 struct FieldSurfels {
-  std::vector<VoxelFace> faces;
-  std::vector<ImpostorFaces::Surfel> surfels;
+  BlockVector<VoxelFace> faces;
+  BlockVector<ImpostorFaces::Surfel> surfels;
   std::vector<VoxelType> types;
 };
 

@@ -9,6 +9,7 @@
 #include <tsl/robin_map.h>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 #include <quoin/trace/packet.h>
 
 #include "render/impostor/raster/raster.h"
@@ -21,7 +22,7 @@ constexpr std::size_t kGroup = ImpostorFaces::kGroup;
 constexpr std::size_t kSides = ImpostorFaces::kSides;
 
 template <class ViewsOf>
-ImpostorFaces::Level level_of(const std::vector<SeenFace>& faces, const ContentSphere& content, ViewsOf views_of) {
+ImpostorFaces::Level level_of(const BlockVector<SeenFace>& faces, const ContentSphere& content, ViewsOf views_of) {
   LevelMaker maker(content);
   for (std::size_t i = 0; i < faces.size(); ++i) {
     const std::uint32_t views = views_of(faces[i]);
@@ -112,22 +113,22 @@ ImpostorFaces::Level LevelMaker::level() && {
   QUOIN_ASSERT(level_.face.size() == level_.views.size(), "one face per rectangle");
   // Kernels read past the end.
   for (auto* const boxes : {&level_.groups.centre, &level_.groups.half}) {
-    for (std::vector<float>& values : *boxes) values.resize(values.size() + kGroup);
+    for (BlockVector<float>& values : *boxes) values.resize(values.size() + kGroup);
   }
   if (level_.begin[kSides / 2] == level_.begin[kSides]) level_.slope = {};
   if (!has_reach_) level_.reach = {};
   return std::move(level_);
 }
 
-ImpostorFaces::Level unseen_faces(const std::vector<SeenFace>& faces, const ContentSphere& content) {
+ImpostorFaces::Level unseen_faces(const BlockVector<SeenFace>& faces, const ContentSphere& content) {
   return level_of(faces, content, [](const SeenFace& face) { return face.views == 0 ? kAllImpostorViews : 0U; });
 }
 
-ImpostorFaces::Level seen_faces(const std::vector<SeenFace>& faces, const ContentSphere& content) {
+ImpostorFaces::Level seen_faces(const BlockVector<SeenFace>& faces, const ContentSphere& content) {
   return level_of(faces, content, [](const SeenFace& face) { return face.views; });
 }
 
-ImpostorFaces::Level all_faces(const std::vector<SeenFace>& faces, const ContentSphere& content) {
+ImpostorFaces::Level all_faces(const BlockVector<SeenFace>& faces, const ContentSphere& content) {
   return level_of(faces, content, [](const SeenFace&) { return kAllImpostorViews; });
 }
 
@@ -175,7 +176,7 @@ void draw_texels(const ImpostorFaces::Level& level, std::uint32_t views, const S
 // state gets its texels from a wider area (`around`), which contains all of them.
 class SeenAgain {
  public:
-  SeenAgain(const std::vector<SeenFace>& old, std::vector<SeenFace>& now, const std::vector<std::uint32_t>& now_of_old,
+  SeenAgain(const BlockVector<SeenFace>& old, BlockVector<SeenFace>& now, const std::vector<std::uint32_t>& now_of_old,
             const ContentSphere& content, int edge)
       : edge_(edge),
         content_(&content),
@@ -228,7 +229,7 @@ class SeenAgain {
   ImpostorFaces::Level old_level_;
   ImpostorFaces::Level now_level_;
   const std::vector<std::uint32_t>* now_of_old_;
-  std::vector<SeenFace>* now_;
+  BlockVector<SeenFace>* now_;
   std::vector<std::uint32_t> found_;     // views by face; all 0 between calls
   std::vector<std::uint32_t> shown_;     // visible faces
   std::vector<std::uint32_t> affected_;  // may contain duplicates
@@ -236,9 +237,9 @@ class SeenAgain {
 };
 
 // Requires: `faces` are whole.
-std::vector<SeenFace> seen_of(const ImpostorFaces& faces) {
+BlockVector<SeenFace> seen_of(const ImpostorFaces& faces) {
   QUOIN_ASSERT(faces.is_whole, "complete faces");
-  std::vector<SeenFace> seen(faces.faces.size());
+  BlockVector<SeenFace> seen(faces.faces.size());
   for (std::size_t i = 0; i < seen.size(); ++i) seen[i].face = {faces.faces[i].voxel, faces.faces[i].direction};
   const ImpostorFaces::Level& from = faces.levels[0];
   for (std::size_t i = 0; i < from.views.size(); ++i) {
@@ -289,7 +290,7 @@ class MetFaces {
   }
 
   void add_neighbours(const OccupancyTree& opaque) {
-    const std::vector<SeenFace> found = faces_;
+    const BlockVector<SeenFace> found = faces_;
     for (const SeenFace& seen : found) {
       const FaceFrame& frame = frame_of(seen.face.direction);
       for (const int axis : {frame.u, frame.v}) {
@@ -298,7 +299,7 @@ class MetFaces {
     }
   }
 
-  std::vector<SeenFace> faces() && { return std::move(faces_); }
+  BlockVector<SeenFace> faces() && { return std::move(faces_); }
 
  private:
   SeenFace& at(const VoxelFace& face) {
@@ -309,21 +310,21 @@ class MetFaces {
     return faces_[last_];
   }
 
-  std::vector<SeenFace> faces_;
+  BlockVector<SeenFace> faces_;
   tsl::robin_map<VoxelFace, std::uint32_t, FaceHash> index_;
   std::uint32_t last_ = 0;
 };
 
 // Returns all faces, not seen by any view.
-std::vector<SeenFace> unseen_of(const ImpostorShell& shell) {
-  const std::vector<VoxelFace> all = shell.faces();
-  std::vector<SeenFace> faces(all.size());
+BlockVector<SeenFace> unseen_of(const ImpostorShell& shell) {
+  const BlockVector<VoxelFace> all = shell.faces();
+  BlockVector<SeenFace> faces(all.size());
   for (std::size_t i = 0; i < all.size(); ++i) faces[i].face = all[i];
   return faces;
 }
 
 // Sorts faces by direction, then along a Morton curve, which keeps neighbours together.
-std::vector<SeenFace> sorted(const std::vector<SeenFace>& faces, IVec3 least) {
+BlockVector<SeenFace> sorted(const BlockVector<SeenFace>& faces, IVec3 least) {
   std::vector<std::pair<std::uint64_t, std::uint32_t>> keys;
   keys.reserve(faces.size());
   for (const SeenFace& seen : faces) {
@@ -332,7 +333,7 @@ std::vector<SeenFace> sorted(const std::vector<SeenFace>& faces, IVec3 least) {
     keys.emplace_back(key, static_cast<std::uint32_t>(keys.size()));
   }
   std::sort(keys.begin(), keys.end());
-  std::vector<SeenFace> out;
+  BlockVector<SeenFace> out;
   out.reserve(faces.size());
   for (const auto& [key, i] : keys) out.push_back(faces[i]);
   return out;
@@ -340,10 +341,10 @@ std::vector<SeenFace> sorted(const std::vector<SeenFace>& faces, IVec3 least) {
 
 }  // namespace
 
-std::vector<SeenFace> faces_seen_of(const ImpostorShell& shell, const FieldSurfels& field, const IBox& box,
+BlockVector<SeenFace> faces_seen_of(const ImpostorShell& shell, const FieldSurfels& field, const IBox& box,
                                     const ContentSphere& content, int edge) {
   QUOIN_ASSERT(field.surfels.size() == field.faces.size(), "one surfel per face");
-  std::vector<SeenFace> faces = unseen_of(shell);
+  BlockVector<SeenFace> faces = unseen_of(shell);
   for (std::size_t i = 0; i < field.faces.size(); ++i) faces.push_back({field.faces[i], &field.surfels[i], 0});
   const ImpostorFaces::Level level = all_faces(faces, content);
   raster::Canvas canvas;
@@ -355,10 +356,10 @@ std::vector<SeenFace> faces_seen_of(const ImpostorShell& shell, const FieldSurfe
   return faces;
 }
 
-std::vector<SeenFace> faces_seen_after(const ImpostorFaces& before, const ImpostorShell& shell,
+BlockVector<SeenFace> faces_seen_after(const ImpostorFaces& before, const ImpostorShell& shell,
                                        const ContentSphere& content, std::span<const IBox> changed) {
-  const std::vector<SeenFace> old = seen_of(before);
-  std::vector<SeenFace> now = unseen_of(shell);
+  const BlockVector<SeenFace> old = seen_of(before);
+  BlockVector<SeenFace> now = unseen_of(shell);
   std::vector<std::uint32_t> now_of_old(old.size(), SeenAgain::kGone);
   std::size_t next = 0;
   for (std::size_t i = 0; i < old.size(); ++i) {
@@ -377,7 +378,7 @@ std::vector<SeenFace> faces_seen_after(const ImpostorFaces& before, const Impost
   return now;
 }
 
-std::vector<SeenFace> faces_seen_by_rays(const OccupancyTree& opaque, const ContentSphere& content, int edge) {
+BlockVector<SeenFace> faces_seen_by_rays(const OccupancyTree& opaque, const ContentSphere& content, int edge) {
   MetFaces met;
   for (int view = 0; view < kImpostorViews; ++view) met.take(opaque, content, view, edge);
   met.add_neighbours(opaque);

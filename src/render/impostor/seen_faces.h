@@ -8,6 +8,7 @@
 
 #include <quoin/core/assert.h>
 #include <quoin/core/direction.h>
+#include <quoin/core/memory.h>
 #include <quoin/core/vec.h>
 #include <quoin/render/impostor.h>
 #include <quoin/scene/level_of_detail.h>
@@ -30,30 +31,30 @@ struct SeenFace {
 /// sorted by side, neighbours mostly together. `field` must outlive the result.
 ///
 /// Source: all faces drawn from each view. Cost: about 10 ns per face and view.
-[[nodiscard]] std::vector<SeenFace> faces_seen_of(const ImpostorShell& shell, const FieldSurfels& field,
+[[nodiscard]] BlockVector<SeenFace> faces_seen_of(const ImpostorShell& shell, const FieldSurfels& field,
                                                   const IBox& box, const ContentSphere& content, int edge);
 
 /// Updates the faces after an edit. `before`: an impostor with the same content and edge, and complete faces.
 /// `changed`: boxes around the changed voxels.
 ///
 /// Cost: about 10 ns per face, plus the faces that may be visible in the texels of each box and view.
-[[nodiscard]] std::vector<SeenFace> faces_seen_after(const ImpostorFaces& before, const ImpostorShell& shell,
+[[nodiscard]] BlockVector<SeenFace> faces_seen_after(const ImpostorFaces& before, const ImpostorShell& shell,
                                                      const ContentSphere& content, std::span<const IBox> changed);
 
 /// Returns the faces that one ray per texel meets, and faces that share an edge with one of them (slivers between the
 /// rays). Works for any number of faces. Cost: about 0.15 microseconds per covered texel.
-[[nodiscard]] std::vector<SeenFace> faces_seen_by_rays(const OccupancyTree& opaque, const ContentSphere& content,
+[[nodiscard]] BlockVector<SeenFace> faces_seen_by_rays(const OccupancyTree& opaque, const ContentSphere& content,
                                                        int edge);
 
 /// Returns the level of the faces that any view saw. Level::face indexes `faces`, which are sorted by direction, voxel
 /// faces first.
-[[nodiscard]] ImpostorFaces::Level seen_faces(const std::vector<SeenFace>& faces, const ContentSphere& content);
+[[nodiscard]] ImpostorFaces::Level seen_faces(const BlockVector<SeenFace>& faces, const ContentSphere& content);
 
 /// Returns the level of the faces that no view saw, as if every view had seen them.
-[[nodiscard]] ImpostorFaces::Level unseen_faces(const std::vector<SeenFace>& faces, const ContentSphere& content);
+[[nodiscard]] ImpostorFaces::Level unseen_faces(const BlockVector<SeenFace>& faces, const ContentSphere& content);
 
 /// Returns the level of all faces, as if every view had seen them.
-[[nodiscard]] ImpostorFaces::Level all_faces(const std::vector<SeenFace>& faces, const ContentSphere& content);
+[[nodiscard]] ImpostorFaces::Level all_faces(const BlockVector<SeenFace>& faces, const ContentSphere& content);
 
 inline constexpr std::uint32_t kAllImpostorViews = (1U << kImpostorViews) - 1U;
 

@@ -13,6 +13,7 @@
 
 #include <quoin/core/assert.h>
 #include <quoin/core/hash.h>
+#include <quoin/core/memory.h>
 
 #include "render/impostor/seen_faces.h"
 #include "render/impostor/snapshot.h"
@@ -86,7 +87,7 @@ const std::array<std::array<std::uint8_t, kImpostorViews>, kImpostorViews>& view
   return all;
 }
 
-IVec3 least_voxel(const std::vector<SeenFace>& faces) {
+IVec3 least_voxel(const BlockVector<SeenFace>& faces) {
   if (faces.empty()) return IVec3(0);
   IVec3 least = faces[0].face.voxel;
   for (const SeenFace& seen : faces) least = glm::min(least, seen.face.voxel);
@@ -343,7 +344,7 @@ SurfaceCells::SurfaceCells(const ContentSphere& content, IVec3 least, int log2_w
   QUOIN_ASSERT(log2_width >= 1 && log2_width <= kWidest, "cells of 2 to 1,024 voxels");
 }
 
-SurfaceCells::SurfaceCells(const std::vector<SeenFace>& faces, const ContentSphere& content, int edge, int log2_width)
+SurfaceCells::SurfaceCells(const BlockVector<SeenFace>& faces, const ContentSphere& content, int edge, int log2_width)
     : SurfaceCells(content, least_voxel(faces), log2_width) {
   Collector collector(*this, texel_of(content, edge));
   cells_.reserve(faces.size() / 4);
@@ -354,7 +355,7 @@ SurfaceCells::SurfaceCells(const std::vector<SeenFace>& faces, const ContentSphe
   sort();
 }
 
-SurfaceCells SurfaceCells::behind(const std::vector<SeenFace>& faces, const DensityGrid& field,
+SurfaceCells SurfaceCells::behind(const BlockVector<SeenFace>& faces, const DensityGrid& field,
                                   const ContentSphere& content, int edge) {
   SurfaceCells cells(content, least_voxel(faces), 1);
   Collector collector(cells, texel_of(content, edge));
@@ -375,7 +376,7 @@ void SurfaceCells::sort() {
   std::vector<std::pair<std::uint64_t, std::uint32_t>> order;
   for (std::size_t i = 0; i < cells_.size(); ++i) order.emplace_back(cells_[i].code, static_cast<std::uint32_t>(i));
   std::sort(order.begin(), order.end());
-  std::vector<Cell> sorted;
+  BlockVector<Cell> sorted;
   sorted.reserve(cells_.size());
   for (const auto& [code, i] : order) sorted.push_back(cells_[i]);
   cells_ = std::move(sorted);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <quoin/core/direction.h>
+#include <quoin/core/memory.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/density_grid.h>
 
@@ -27,12 +28,12 @@ class SurfaceCells {
  public:
   /// Groups `faces` into cells of 2^`log2_width` voxels, 1 to 10. Cost: about 50 ns per face, 1 us per surfel. `edge`:
   /// texels per side of the snapshots that saw them.
-  SurfaceCells(const std::vector<SeenFace>& faces, const ContentSphere& content, int edge, int log2_width);
+  SurfaceCells(const BlockVector<SeenFace>& faces, const ContentSphere& content, int edge, int log2_width);
 
   /// Returns cells of 2 voxels that show through the gaps between surfels: the faces that no view saw, and for each
   /// surfel the nearest lattice cells below it whose corners are all solid. No cell reaches the field's surface, so
   /// outlines stay. Cost: about 2 us per surfel.
-  [[nodiscard]] static SurfaceCells behind(const std::vector<SeenFace>& faces, const DensityGrid& field,
+  [[nodiscard]] static SurfaceCells behind(const BlockVector<SeenFace>& faces, const DensityGrid& field,
                                            const ContentSphere& content, int edge);
 
   /// Joins each 2x2x2 cells to one. Cost: about 20 ns per cell.
@@ -70,7 +71,7 @@ class SurfaceCells {
   ContentSphere content_;
   IVec3 origin_{0};  // of the Morton curve, voxels
   int log2_width_ = 0;
-  std::vector<Cell> cells_;  // in the order of their codes
+  BlockVector<Cell> cells_;  // in the order of their codes
 };
 
 }  // namespace quoin

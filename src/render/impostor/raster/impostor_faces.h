@@ -10,6 +10,7 @@
 
 #include <quoin/core/assert.h>
 #include <quoin/core/direction.h>
+#include <quoin/core/memory.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/mesh/occlusion.h>
@@ -27,9 +28,9 @@ struct ImpostorFaces {
   /// Rectangles close together in space. Positions match those of Level. Fillers at the end allow kernels to read past
   /// it.
   struct Groups {
-    std::array<std::vector<float>, 3> centre;
-    std::array<std::vector<float>, 3> half;  ///< from the centre to the sides of the box around them
-    std::vector<std::uint32_t> views;        ///< views that saw any of them
+    std::array<BlockVector<float>, 3> centre;
+    std::array<BlockVector<float>, 3> half;  ///< from the centre to the sides of the box around them
+    BlockVector<std::uint32_t> views;        ///< views that saw any of them
   };
 
   /// The surface in a cube of 4^3 bits.
@@ -48,15 +49,15 @@ struct ImpostorFaces {
   /// every face of a voxel and form a closed layer below surfels, so a ray that meets the grid's surface meets a bit:
   /// no level has holes.
   struct Level {
-    std::array<std::vector<float>, 3> centre;       ///< of the rectangle, voxels from the content's centre
-    std::vector<std::uint32_t> views;               ///< bit i: view i saw it; coarser levels: all
-    std::vector<std::uint32_t> face;                ///< index into `faces`, or into `cells` if there are any
-    std::array<std::vector<float>, 2> reach;        ///< from the middle to the sides along kFaceFrames' u and v; empty:
+    std::array<BlockVector<float>, 3> centre;       ///< of the rectangle, voxels from the content's centre
+    BlockVector<std::uint32_t> views;               ///< bit i: view i saw it; coarser levels: all
+    BlockVector<std::uint32_t> face;                ///< index into `faces`, or into `cells` if there are any
+    std::array<BlockVector<float>, 2> reach;        ///< from the middle to the sides along kFaceFrames' u and v; empty:
                                                     ///< 0.5 everywhere
-    std::array<std::vector<float>, 2> slope;        ///< see Surfel; empty if there are no surfels
+    std::array<BlockVector<float>, 2> slope;        ///< see Surfel; empty if there are no surfels
     std::array<std::uint32_t, kSides + 1> begin{};  ///< of each side; the end of the last
     Groups groups;                                  ///< of each kGroup rectangles
-    std::vector<Cell> cells;
+    BlockVector<Cell> cells;
     float step = 0.0F;  ///< the width of a bit of these, voxels
     float size = 0.0F;  ///< no coordinate is larger
 
@@ -121,8 +122,8 @@ struct ImpostorFaces {
   ///
   /// If level 0 holds surfels: cells of such faces and of the solid behind the surfels; see SurfaceCells::behind.
   Level unseen;
-  std::vector<Face> faces;
-  std::vector<Surfel> surfels;  ///< of the last of `faces`
+  BlockVector<Face> faces;
+  BlockVector<Surfel> surfels;  ///< of the last of `faces`
   /// The rectangles of one part of a drawn impostor: `level` of `levels`, or `unseen` for kLevels.
   [[nodiscard]] const Level& level(std::size_t number) const {
     QUOIN_ASSERT(number <= kLevels, "a level, or the unseen faces");

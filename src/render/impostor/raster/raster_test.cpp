@@ -14,6 +14,8 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
+#include <quoin/core/memory.h>
+
 #include "bench/workloads.h"
 #include "core/death_for_tests.h"
 #include "core/instruction_sets_for_tests.h"
@@ -24,7 +26,7 @@ namespace quoin {
 namespace {
 
 struct Shape {
-  std::vector<SeenFace> faces;
+  BlockVector<SeenFace> faces;
   ContentSphere content;
   ImpostorFaces::Level level;
 
