@@ -55,7 +55,7 @@ function check() {
   const statuses = [faults.length === 0 && written.length > 0 ? 0 : 1];
   // The validator reports compression that it does not know.
   statuses.push(script('validate.mjs', ...(values.packed ? [] : ['--strict']), ...written.map(([, glb]) => glb)));
-  // Finding the surface under a pixel tries every triangle.
+  // A software driver takes seconds per megabyte.
   const small = written.filter(([, glb]) => statSync(glb).size < 1e6);
   const step = Math.max(1, Math.floor(small.length / Math.max(1, Number(values.pixels))));
   // The voxels define the look of blocks, not of smooth surfaces.

@@ -25,6 +25,7 @@ scene.add(lights);
 let parsed = [];
 let camera;
 let truth = null;
+let isLit = true;
 
 function addLights() {
   // Metals are black without something to reflect.
@@ -38,7 +39,6 @@ function addLights() {
 
 /** Models stand in a row along x, a quarter of their width apart. */
 async function load(urls) {
-  addLights();
   let x = 0;
   for (const url of urls) {
     const bytes = await (await fetch(url)).arrayBuffer();
@@ -65,6 +65,7 @@ async function compareWith(url) {
 
 /** The palette times the vertex colours and nothing else; blended surfaces are left out. */
 function unlit() {
+  isLit = false;
   lights.visible = false;
   models.traverse((object) => {
     if (!object.isMesh) return;
@@ -73,6 +74,12 @@ function unlit() {
       map: object.material.map, vertexColors: object.geometry.hasAttribute('color'), side: object.material.side,
     });
   });
+}
+
+/** Lights are made only for images that show them: a software driver takes seconds for the environment. */
+function render() {
+  if (isLit && lights.children.length === 0) addLights();
+  renderer.render(scene, camera);
 }
 
 /** `unit`: minimum pixels per voxel; parts that do not fit then lie outside the image. */
@@ -98,7 +105,7 @@ function look(view, zoom = 1, unit = 0) {
   const half = unit > 0 ? Math.min(whole, window.innerHeight / (2 * unit)) : whole;
   [camera.left, camera.right, camera.top, camera.bottom] = [-half * aspect, half * aspect, half, -half];
   camera.updateProjectionMatrix();
-  renderer.render(scene, camera);
+  render();
 }
 
 /** In the scene, in metres; `fov` is vertical, in degrees. */
@@ -107,23 +114,79 @@ function stand(from, to, fov) {
   camera.position.set(...from);
   camera.lookAt(...to);
   camera.updateMatrixWorld(true);
-  renderer.render(scene, camera);
+  render();
 }
 
 const linear = (byte) => (byte / 255 <= 0.04045 ? byte / 255 / 12.92 : ((byte / 255 + 0.055) / 1.055) ** 2.4);
 const encoded = (value) => Math.round(255 * (value <= 0.0031308 ? value * 12.92 : 1.055 * value ** (1 / 2.4) - 0.055));
 
+const tileSize = 8;  // pixels
+
+/** Sorts the triangles of visible meshes into tiles of the window, as a camera without perspective sees them. Returns
+ *  meshesAt(x, y): meshes of the triangles that a ray through this point, at most a tile outside the window, can hit.
+ *  Rays that try every triangle take a minute for 90,000 triangles. */
+function sortIntoTiles() {
+  const [columns, rows] = [window.innerWidth, window.innerHeight].map((size) => Math.ceil(size / tileSize) + 2);
+  const tiles = Array.from({ length: columns * rows }, () => new Map());
+  const clipFromWorld = new THREE.Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse);
+  const tileOf = (at) => Math.floor(at / tileSize) + 1;  // the first ones are outside the window
+  models.traverse((object) => {
+    if (!object.isMesh || !object.visible) return;
+    object.geometry.computeBoundingSphere();
+    const { index, attributes: { position } } = object.geometry;
+    const clipFromObject = clipFromWorld.clone().multiply(object.matrixWorld);
+    const [x, y] = [new Float64Array(position.count), new Float64Array(position.count)];
+    const point = new THREE.Vector3();
+    for (let i = 0; i < position.count; ++i) {
+      point.fromBufferAttribute(position, i).applyMatrix4(clipFromObject);
+      [x[i], y[i]] = [(1 + point.x) / 2 * window.innerWidth, (1 - point.y) / 2 * window.innerHeight];
+    }
+    const count = (index ?? position).count;
+    for (let at = 0; at < count; at += 3) {
+      const [a, b, c] = index ? [index.getX(at), index.getX(at + 1), index.getX(at + 2)] : [at, at + 1, at + 2];
+      // A pixel more, because of rounding.
+      const left = Math.max(0, tileOf(Math.min(x[a], x[b], x[c]) - 1));
+      const right = Math.min(columns - 1, tileOf(Math.max(x[a], x[b], x[c]) + 1));
+      const top = Math.max(0, tileOf(Math.min(y[a], y[b], y[c]) - 1));
+      const bottom = Math.min(rows - 1, tileOf(Math.max(y[a], y[b], y[c]) + 1));
+      for (let row = top; row <= bottom; ++row) {
+        for (let column = left; column <= right; ++column) {
+          const tile = tiles[row * columns + column];
+          if (!tile.has(object)) tile.set(object, { triangles: [], corners: [] });
+          tile.get(object).triangles.push(at / 3);
+          tile.get(object).corners.push(a, b, c);
+        }
+      }
+    }
+  });
+  const meshes = new Map();
+  return (x, y) => {
+    const tile = tiles[tileOf(y) * columns + tileOf(x)];
+    if (!meshes.has(tile)) {
+      meshes.set(tile, [...tile].map(([object, { triangles, corners }]) => {
+        const geometry = new THREE.BufferGeometry();
+        Object.assign(geometry, { attributes: object.geometry.attributes, boundingSphere: object.geometry.boundingSphere });
+        const mesh = new THREE.Mesh(geometry.setIndex(corners), object.material);
+        mesh.matrixAutoUpdate = false;
+        mesh.matrix.copy(object.matrixWorld);
+        mesh.updateMatrixWorld(true);
+        mesh.userData = { source: object.userData.source, triangles };
+        return mesh;
+      }));
+    }
+    return meshes.get(tile);
+  };
+}
+
 /** Returns the file's texel and brightness at the point where a ray through a pixel hits. */
-function hitAt(raycaster, x, y) {
+function hitAt(raycaster, meshesAt, x, y) {
   const ndc = new THREE.Vector2((x / window.innerWidth) * 2 - 1, 1 - (y / window.innerHeight) * 2);
   raycaster.setFromCamera(ndc, camera);
-  const visible = [];
-  models.traverse((object) => object.isMesh && object.visible && visible.push(object));
-  const [hit] = raycaster.intersectObjects(visible, false);
+  const [hit] = raycaster.intersectObjects(meshesAt(x, y), false);
   if (!hit) return null;
-  const source = hit.object.userData.source;
+  const { source, triangles } = hit.object.userData;
   const primitive = parsed[source.model].meshes[source.meshes].primitives[source.primitives ?? 0];
-  const corners = [0, 1, 2].map((corner) => primitive.indices[hit.faceIndex * 3 + corner]);
+  const corners = [0, 1, 2].map((corner) => primitive.indices[triangles[hit.faceIndex] * 3 + corner]);
   const local = hit.object.worldToLocal(hit.point.clone());
   const points = corners.map((index) => new THREE.Vector3().fromArray(primitive.positions, index * 3));
   const weights = THREE.Triangle.getBarycoord(local, ...points, new THREE.Vector3());
@@ -144,16 +207,17 @@ function checkPixels(count, seed) {
   const pixels = new Uint8Array(width * height * 4);
   gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
   const raycaster = new THREE.Raycaster();
+  const meshesAt = sortIntoTiles();
   const result = { checked: 0, inside_out: 0, darkened: 0, wrong: [] };
   let state = seed;
   const random = (limit) => ((state = (state * 1664525 + 1013904223) >>> 0) / 2 ** 32) * limit;
   for (let attempt = 0; attempt < count * 4 && result.checked < count; ++attempt) {
     const [x, y] = [Math.floor(random(width)), Math.floor(random(height))];
-    const hit = hitAt(raycaster, x + 0.5, y + 0.5);
+    const hit = hitAt(raycaster, meshesAt, x + 0.5, y + 0.5);
     if (!hit) continue;
     // The pixel's own corners, lest a small voxel of another colour lies in it, and points a pixel away.
     const offsets = [[0, 0], [1, 0], [0, 1], [1, 1], [-1, -1], [2, -1], [-1, 2], [2, 2]];
-    const around = offsets.map(([dx, dy]) => hitAt(raycaster, x + dx, y + dy));
+    const around = offsets.map(([dx, dy]) => hitAt(raycaster, meshesAt, x + dx, y + dy));
     const alike = (other) => other && String(other.texel) === String(hit.texel) && other.normal.dot(hit.normal) > 0.99 &&
       other.light.every((value, channel) => Math.abs(value - hit.light[channel]) < 0.03);
     if (!around.every(alike)) continue;
