@@ -173,7 +173,7 @@ void serve_threads() {
   on_threads([&](std::size_t t) {
     for (std::size_t i = (t + 1) % kThreads; i < made.size(); i += kThreads) {
       EXPECT_EQ(made[i].back(), i);
-      made[i] = {};
+      BlockVector<std::uint32_t>().swap(made[i]);
     }
   });
   EXPECT_EQ(arena.blocks, 0);
