@@ -7,7 +7,6 @@
 #include <utility>
 
 #include <quoin/core/assert.h>
-#include <quoin/core/memory.h>
 
 #include "render/light/propagated/kernel/light_kernel.h"
 
