@@ -22,7 +22,7 @@
 namespace quoin::peers {
 namespace {
 
-using Bytes = std::vector<std::byte>;
+using Bytes = BlockVector<std::byte>;
 
 void require(bool holds, const char* what) {
   if (holds) return;
