@@ -12,6 +12,7 @@
 
 #include <quoin/grid/grid.h>
 
+#include "core/work/nightly_for_tests.h"
 namespace quoin {
 namespace {
 
@@ -89,9 +90,9 @@ TEST(VisitChanges, ReportsEveryVoxelAndItsOldType) {
   for (int i = 0; i < 30; ++i) edit(grid, random);
   ChangeCursor cursor = grid.cursor();
   Grid before = grid.snapshot();
-  for (int step = 0; step < 80; ++step) {
+  for (int step = 0; step < cases(30, 80); ++step) {
     for (int i = random.between(0, 4); i >= 0; --i) edit(grid, random);
-    if (step == 50) grid.clear();
+    if (step == cases(20, 50)) grid.clear();
     const GridChanges changes = grid.changes_since(cursor);
     const Reported expected = compared(before, grid);
     ASSERT_EQ(reported(before, grid, changes), expected) << step;
@@ -184,7 +185,7 @@ TEST(Grid, SetsLongListsOnSeveralThreads) {
     ChangeCursor of_other = other.cursor();
     ChangeCursor data = one.cursor();
     ChangeCursor data_of_other = other.cursor();
-    for (int round = 0; round < 6; ++round) {
+    for (int round = 0; round < cases(3, 6); ++round) {
       std::vector<PlacedVoxel> voxels;
       const auto between = [&](int low, int high) {
         return low + static_cast<int>(random() % static_cast<unsigned>(high - low));

@@ -16,6 +16,7 @@
 
 #include <quoin/live/live_light.h>
 
+#include "core/work/nightly_for_tests.h"
 #include "live/live_test_support.h"
 
 namespace quoin {
@@ -180,7 +181,7 @@ TEST(LiveField, SurfacesStayClosedWhileEdited) {
     meshes.finish(one.scene, DVec3(0.0));
     shown.apply(meshes.take());
     std::size_t taken = 0;
-    const int edits = kIsSlow ? 10 : 60;
+    const int edits = kIsSlow ? 10 : cases(20, 60);
     // On a busy machine workers may need longer than all edits together.
     for (int i = 0; i < edits || taken == 0; ++i) {
       if (i >= edits) std::this_thread::sleep_for(std::chrono::milliseconds(1));

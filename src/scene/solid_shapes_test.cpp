@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "core/coordinates/chunk_order.h"
+#include "core/work/nightly_for_tests.h"
 #include "mesh/smooth/surface_check_for_tests.h"
 
 namespace quoin {
@@ -115,7 +116,7 @@ void expect_faces(const Grid& grid, IVec3 chunk, const VoxelRegistry& types, con
 }
 
 TEST(SolidShapes, MatchGridAfterEdits) {
-  for (unsigned seed = 0; seed < 6; ++seed) {
+  for (unsigned seed = 0; seed < static_cast<unsigned>(cases(3, 6)); ++seed) {
     SCOPED_TRACE(seed);
     std::mt19937 random(seed);
     VoxelRegistry types = three_types();

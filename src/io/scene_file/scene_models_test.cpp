@@ -12,6 +12,7 @@
 #include <quoin/io/formats.h>
 
 #include "core/bytes/text.h"
+#include "core/work/nightly_for_tests.h"
 #include "io/byte_stream.h"
 #include "io/gltf/glb_for_tests.h"
 #include "io/scene_file/voxel_data.h"
@@ -237,7 +238,7 @@ std::vector<std::byte> written(const Scene& scene, Threads threads = {}) {
 }
 
 TEST(SceneModels, RoundTripsAnySceneExactly) {
-  for (unsigned seed = 0; seed < 30; ++seed) {
+  for (unsigned seed = 0; seed < static_cast<unsigned>(cases(10, 30)); ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const Scene scene = RandomScene(seed).scene();
     const auto bytes = written(scene);

@@ -7,6 +7,7 @@
 
 #include <quoin/mesh/smooth_mesh.h>
 
+#include "core/work/nightly_for_tests.h"
 #include "mesh/smooth/surface_check_for_tests.h"
 
 namespace quoin {
@@ -67,7 +68,7 @@ TEST(SmoothClosure, BoxWithFacesOnLatticeIsClosed) {
 }
 
 TEST(SmoothClosure, RandomBlobsAreClosedAcrossBorders) {
-  for (unsigned seed = 1; seed <= 4; ++seed) {
+  for (unsigned seed = 1; seed <= static_cast<unsigned>(cases(2, 4)); ++seed) {
     for (const double wavelength : {5.0, 12.0, 40.0}) {
       SCOPED_TRACE(testing::Message() << "seed " << seed << ", wavelength " << wavelength);
       const IBox box{IVec3{64 - 21}, IVec3{64 + 23}};

@@ -12,6 +12,7 @@
 
 #include "core/instruction_sets_for_tests.h"
 #include "core/trilinear.h"
+#include "core/work/nightly_for_tests.h"
 #include "mesh/smooth/smooth_cell.h"
 #include "mesh/smooth/smooth_oracle.h"
 #include "mesh/smooth/surface_check_for_tests.h"
@@ -80,6 +81,9 @@ TEST_P(SmoothKernels, MatchOracle) {
   const DensityNeighbourhood chunks = field.neighbourhood(IVec3{0});
   for (int level = 0; level <= kMaxSmoothLevel; ++level) {
     for (const SmoothBorder border : {SmoothBorder::Shared, SmoothBorder::Open}) {
+      // By day each field has one border per level; the next field has the other.
+      const bool is_odd = (GetParam() + static_cast<unsigned>(level)) % 2 != 0;
+      if (!is_nightly() && is_odd != (border == SmoothBorder::Open)) continue;
       SmoothOptions options;
       options.border = border;
       options.split_sheets = false;
@@ -98,12 +102,15 @@ TEST_P(SmoothKernels, MatchOracleOcclusion) {
   const DensityNeighbourhood chunks = field.neighbourhood(IVec3{0});
   constexpr std::array<std::pair<int, float>, 8> kCases = {
       {{0, 1.0F}, {0, 1.7F}, {0, 2.0F}, {1, 0.8F}, {1, 2.0F}, {1, 4.0F}, {2, 4.0F}, {3, 2.0F}}};
-  unsigned form = GetParam();
-  for (const auto& [level, spread] : kCases) {
+  for (unsigned i = 0; i < kCases.size(); ++i) {
+    // By day each field takes half of them; together they take all, and all forms.
+    if (!is_nightly() && (i / 2 + GetParam()) % 2 != 0) continue;
+    const auto& [level, spread] = kCases[i];
     SmoothOptions options;
     options.split_sheets = false;
     options.levels.fill(static_cast<std::uint8_t>(level));
-    options.occlusion = {static_cast<SmoothOcclusion>(1 + form++ % 4), spread, 0.3F, level == 2 ? 1.5F : 2.0F};
+    options.occlusion = {static_cast<SmoothOcclusion>(1 + (GetParam() + i) % 4), spread, 0.3F,
+                         level == 2 ? 1.5F : 2.0F};
     SCOPED_TRACE(testing::Message() << "level " << level << ", spread " << spread << ", form "
                                     << static_cast<int>(options.occlusion.method));
     ASSERT_NO_FATAL_FAILURE(check(chunks, options));

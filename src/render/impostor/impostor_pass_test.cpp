@@ -14,6 +14,7 @@
 
 #include "core/death_for_tests.h"
 #include "core/instruction_sets_for_tests.h"
+#include "core/work/nightly_for_tests.h"
 #include "render/impostor/impostor_test_support.h"
 
 namespace quoin {
@@ -87,7 +88,7 @@ TEST(DrawImpostors, DoesNotJumpWhileOrbiting) {
     double largest_step = 0.0;
     RenderedImage last;
     RenderedImage last_truth;
-    for (int degree = 0; degree < 360; ++degree) {
+    for (int degree = 0; degree < cases(130, 360); ++degree) {
       const Camera camera = orbiting(world, degree * kDegree, 0.5, 0.0, 128.0, 148);
       RenderedImage truth = taken(world.scene, camera, options);
       RenderedImage image = world.drawn(camera, options);

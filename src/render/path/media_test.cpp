@@ -12,6 +12,7 @@
 #include <quoin/render/path_tracer.h>
 
 #include "core/srgb.h"
+#include "core/work/nightly_for_tests.h"
 #include "render/cpu/environment_for_tests.h"
 #include "render/cpu/render_test_support.h"
 #include "render/path/path_math.h"
@@ -163,7 +164,7 @@ TEST(PathMedia, LampLightsSurroundingFog) {
   lamp.colour = {255, 255, 255, 255};
   lamp.emission = 20.0F;
   const Scene scene = box_of(lamp, {IVec3(0), IVec3(2)});
-  PathOptions options = even_sky(24, 64);
+  PathOptions options = even_sky(24, cases(24, 64));
   physical_in(options).sky.brightness = 0.0;
   physical_in(options).fog = Fog{0.05, Vec3(1.0F), 0.0, 100.0};
   const PathImage image = path_image(scene, towards({1.0, 1.0, 20.0}, DVec3(1.0), 1.2), options);
@@ -225,8 +226,8 @@ double error_of(const PathImage& image, const PathImage& truth) {
 TEST(PathDenoise, ReducesErrorByFortyPercent) {
   const Scene scene = town();
   PathOptions options;
-  options.width = 240;
-  options.height = 160;
+  options.width = cases(168, 240);
+  options.height = cases(112, 160);
   options.samples = 192;
   const PathImage truth = path_image(scene, of_town(), options);
   options.samples = 8;

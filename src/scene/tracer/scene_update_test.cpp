@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/work/nightly_for_tests.h"
 #include "grid/change_follower_for_tests.h"
 #include "scene/tracer/changing_scene_for_tests.h"
 
@@ -57,7 +58,7 @@ TEST(SceneUpdate, UpdatedTracerMatchesNewTracer) {
 // Two tracers take turns with snapshots. A snapshot ends when its tracer goes over to a later one.
 TEST(SceneUpdate, TracerOfNextSnapshotMatchesNewTracer) {
   TracerCounts counts;
-  for (unsigned seed = 0; seed < 40; ++seed) {
+  for (unsigned seed = 0; seed < static_cast<unsigned>(cases(14, 40)); ++seed) {
     SCOPED_TRACE(seed);
     ChangingScene world(seed, true);
     std::array<std::unique_ptr<Scene>, 2> scenes;

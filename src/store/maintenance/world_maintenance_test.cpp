@@ -13,6 +13,7 @@
 #include <quoin/store/world_saver.h>
 
 #include "core/database/connection.h"
+#include "core/work/nightly_for_tests.h"
 #include "store/chunk/chunk_body.h"
 #include "store/database/schema.h"
 #include "store/world/part_text.h"
@@ -130,7 +131,7 @@ void damage(const std::filesystem::path& path, std::uintmax_t at, std::size_t co
 
 int wanted_damage() {
   const char* const wanted = std::getenv("QUOIN_DAMAGE");
-  return wanted != nullptr ? std::atoi(wanted) : 60;
+  return wanted != nullptr ? std::atoi(wanted) : cases(20, 60);
 }
 
 // The check names all lost items; the repaired world has all others.
