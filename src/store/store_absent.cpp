@@ -121,6 +121,16 @@ WorldSaver::~WorldSaver() = default;
 Result<SaveTicket> WorldSaver::save(WorldStore&, const Scene&, WorldChanges, std::function<void(const Status&)>) {
   return absent();
 }
+void WorldSaver::follow(const Scene&, FunctionRef<void(GridHandle, std::optional<IVec3>)>) {}
+Status WorldSaver::begin(WorldStore&, const Scene&, WorldChanges, std::function<void(const Status&)>) {
+  return absent();
+}
+bool WorldSaver::is_begun() const {
+  return false;
+}
+Result<std::optional<SaveTicket>> WorldSaver::step(WorldStore&, double) {
+  return absent();
+}
 void WorldSaver::set_view(WorldView) {}
 std::optional<std::uint32_t> WorldSaver::number_of(GridHandle) const {
   return std::nullopt;

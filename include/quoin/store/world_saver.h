@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include <quoin/core/function_ref.h>
 #include <quoin/core/parallel.h>
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
@@ -42,7 +43,14 @@ struct WorldView {
 ///   if (const auto saved = world->flush(); !saved) complain(saved.error());
 ///
 /// A chunk that becomes empty through edits is stored as air (StoredChunk). Grids, instances, groups and layers keep
-/// their numbers in the world.
+/// their numbers in the world. Objects that were edited but have the values of their last save are not written again.
+///
+/// A game that must not wait in a frame saves in steps. The saved state is that of the call of `begin`, in one commit:
+///
+///   saver.follow(scene);                                      // each frame: reads the changes
+///   if (it_is_time() && !saver.is_begun()) (void)saver.begin(*world, scene);
+///   (void)saver.step(*world, 0.0002);                         // each frame
+///
 /// Marks:    objects that are not to be saved (`is_saved`) are left out: an instance also if its grid is left out, or a
 ///           group above it. A changed mark removes the object from the world at the next save, or adds it with a new
 ///           number.
@@ -64,9 +72,38 @@ class WorldSaver {
   ///           scene or other types. For write errors, see WorldStore::save. If it throws bad_alloc, the next save
   ///           stores everything.
   /// Cost:     O(changes); O(chunks) the first time.
-  /// Requires: the same world and scene (or a snapshot of it) in every call; the world is open for writing.
+  /// Requires: the same world and scene (or a snapshot of it) in every call; the world is open for writing; no save in
+  ///           steps is begun.
   Result<SaveTicket> save(WorldStore& world, const Scene& scene, WorldChanges more = {},
                           std::function<void(const Status&)> on_saved = {});
+
+  /// Reads the changes of the scene since the last call, for the next save. `save` and `begin` call it. If saves are
+  /// rare, call it each frame: a journal keeps a limited number of changes (ChangeCursor), and a saver that reads them
+  /// too late saves every chunk.
+  ///
+  /// Calls `on_edit(grid, chunk)` for each edited chunk of the grids that were saved or loaded before, once per call
+  /// and aspect (voxels, data, densities); with nullopt if any chunk of the grid may have been edited. Chunks that
+  /// were only loaded or unloaded (Grid::load_chunk) are left out. If it throws, the next call reports again.
+  /// Cost: O(changes).
+  void follow(const Scene& scene, FunctionRef<void(GridHandle grid, std::optional<IVec3> chunk)> on_edit);
+  void follow(const Scene& scene) {
+    follow(scene, [](GridHandle, std::optional<IVec3>) {});
+  }
+  /// Begins a save of the scene as it is now. Instances, groups and other small parts are copied at once, the changed
+  /// chunks by `step`, from snapshots of their grids. Later edits belong to the next save.
+  /// Errors:   as `save`, and no save is begun.
+  /// Cost:     O(changes except those of chunks + changed grids). O(chunks) for new grids, and after a failed save.
+  /// Requires: as `save`.
+  Status begin(WorldStore& world, const Scene& scene, WorldChanges more = {},
+               std::function<void(const Status&)> on_saved = {});
+  /// Returns true between `begin` and the `step` that hands the save to the world.
+  [[nodiscard]] bool is_begun() const;
+  /// Copies changed chunks for about `seconds`, at least 16 chunks. When all are copied, hands the save to the world as
+  /// one atomic commit and returns its ticket. Returns nullopt before that, and if no save is begun.
+  /// Errors:   as `save`; the save ends, and the next one stores everything.
+  /// Cost:     `seconds`; the last step also checks all chunks of the save, about 0.2 us for each.
+  /// Requires: the world of `begin`.
+  Result<std::optional<SaveTicket>> step(WorldStore& world, double seconds);
   /// Sets the cameras to store with the next `save`. If not called, `save` keeps the values from load_world.
   void set_view(WorldView view);
   /// Returns the number of a grid in the world (ChunkAddress::grid), or nullopt before its first save and if it is left

@@ -1,6 +1,7 @@
 #include <quoin/store/world_saver.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -10,14 +11,19 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
+
+#include <tsl/robin_set.h>
 
 #include <quoin/core/assert.h>
 #include <quoin/core/changes.h>
 
 #include "core/bytes/files.h"
 #include "core/bytes/text.h"
+#include "core/coordinates/chunk_order.h"
+#include "core/make_room.h"
 #include "io/scene_file/scene_parts.h"
 #include "store/database/schema.h"
 #include "store/scene/world_file.h"
@@ -45,23 +51,73 @@ struct Numbers {
   }
 };
 
+/// Chunks that were edited since the last save began, each once, in the order of their first edits.
+class EditedChunks {
+ public:
+  void add(IVec3 chunk) {
+    quoin::make_room(chunks_);
+    if (known_.insert(chunk).second) chunks_.push_back(chunk);
+  }
+  /// Returns the chunks and forgets them.
+  [[nodiscard]] std::vector<IVec3> take() {
+    known_.clear();
+    return std::exchange(chunks_, {});
+  }
+
+ private:
+  std::vector<IVec3> chunks_;
+  tsl::robin_set<IVec3, CoordinateHash> known_;
+};
+
 struct SavedGrid {
   std::uint32_t number = 0;
   WorldGrid header;
-  ChangeCursor voxels;
+  ChangeCursor voxels;  // of `follow`
   ChangeCursor data;
   ChangeCursor densities;
+  EditedChunks edited;
+  bool is_all_edited = false;   ///< any chunk may have been edited since the last save began
   std::vector<IVec3> unread;    ///< damaged chunks: missing in the scene, and kept in the world
   bool is_partly_read = false;  ///< the scene may lack other chunks
 };
 
+/// The objects of a scene that changed since the last save began.
+struct ChangedObjects {
+  bool all = false;
+  std::set<GridHandle> grids;
+  std::set<InstanceHandle> instances;
+  std::set<GroupHandle> groups;
+  std::set<LayerHandle> layers;
+
+  void add(const SceneChanges& changes) {
+    all |= changes.all;
+    grids.insert(changes.grids.begin(), changes.grids.end());
+    instances.insert(changes.instances.begin(), changes.instances.end());
+    groups.insert(changes.groups.begin(), changes.groups.end());
+    layers.insert(changes.layers.begin(), changes.layers.end());
+  }
+  /// Returns the changes and forgets them.
+  [[nodiscard]] SceneChanges take() {
+    SceneChanges changes;
+    changes.all = all;
+    changes.grids.assign(grids.begin(), grids.end());
+    changes.instances.assign(instances.begin(), instances.end());
+    changes.groups.assign(groups.begin(), groups.end());
+    changes.layers.assign(layers.begin(), layers.end());
+    *this = {};
+    return changes;
+  }
+};
+
 /// The part of a scene that a world has stored.
 struct SaverState {
-  ChangeCursor scene;
+  ChangeCursor scene;  // of `follow`
   ChangeCursor types;
+  ChangedObjects changed;
   std::map<GridHandle, SavedGrid> grids;
   std::set<GridHandle> left_out;  ///< grids of the scene that are marked as not saved
   Numbers<Instance> instances;
+  std::map<InstanceHandle, InstancePart> saved_instances;  ///< instances as this saver saved them last
   Numbers<SceneGroup> groups;
   Numbers<SceneLayer> layers;
   std::vector<Lamp> lamps;
@@ -77,20 +133,45 @@ struct SaverState {
   std::vector<PartKey> pending_removals;
 };
 
+/// A save whose chunks are copied in steps, from snapshots that were taken when the save began.
+struct SaveInSteps {
+  struct OfGrid {
+    std::uint32_t number;
+    std::vector<IVec3> chunks;
+    Grid voxels;
+    DensityGrid field;
+  };
+  WorldChanges changes;
+  std::function<void(const Status&)> on_saved;
+  std::vector<OfGrid> grids;
+  std::size_t grid = 0;          ///< the next chunk
+  std::size_t chunk = 0;         ///< ... in this grid
+  std::vector<PartKey> removed;  ///< parts that the save removes
+  bool had_view = false;         ///< it has new cameras
+};
+
 }  // namespace quoin::store
 
 namespace quoin {
 
 struct WorldSaver::Impl {
   store::SaverState state;
+  std::optional<store::SaveInSteps> begun;
+
+  void follow(const Scene& scene, FunctionRef<void(GridHandle, std::optional<IVec3>)> on_edit);
+  /// Keeps the unsaved state after a save was refused or has failed: the next save contains everything.
+  void give_back();
 };
 
 using namespace store;
 
 namespace {
 
-constexpr auto kBefore = [](IVec3 a, IVec3 b) { return std::tie(a.z, a.y, a.x) < std::tie(b.z, b.y, b.x); };
-using ChunkSet = std::set<IVec3, decltype(kBefore)>;
+using Clock = std::chrono::steady_clock;
+using OnEdit = FunctionRef<void(GridHandle, std::optional<IVec3>)>;
+
+// Number of chunks that a step copies before it looks at the clock.
+constexpr std::size_t kChunksPerLook = 16;
 
 template <class T>
 void sort_and_unite(std::vector<Handle<T>>& handles) {
@@ -98,18 +179,18 @@ void sort_and_unite(std::vector<Handle<T>>& handles) {
   handles.erase(std::unique(handles.begin(), handles.end()), handles.end());
 }
 
-/// One save: collects the changes of a scene.
+/// The beginning of a save: collects the changes of a scene, except the content of chunks.
 class Save {
  public:
-  Save(WorldStore& world, const Scene& scene, SaverState& state, WorldChanges& changes)
-      : world_(world), scene_(scene), state_(state), changes_(changes) {}
+  Save(WorldStore& world, const Scene& scene, SaverState& state, SaveInSteps& save)
+      : world_(world), scene_(scene), state_(state), save_(save), changes_(save.changes), removed_(save.removed) {}
 
   Status run() {
     std::swap(removed_, state_.pending_removals);
     for (const PartKey& key : removed_) put_removal(key);
     if (state_.needs_full_save) start_anew();
     if (auto done = put_types(); !done) return done;
-    SceneChanges changed = scene_.changes_since(state_.scene);
+    SceneChanges changed = state_.changed.take();
     if (changed.all) name_everything(changed);
     // Parts are saved before the parts that refer to them.
     put_named(changed.layers, scene_.layers(), state_.layers, part::kLayer);
@@ -124,23 +205,18 @@ class Save {
     put_lamps();
     put_environment();
     put_view();
+    make_room(changes_.content().chunks, chunks_);
     state_.is_begun = true;
     state_.needs_full_save = false;
     return {};
-  }
-  /// Restores the unsaved state after the store refused the changes.
-  void give_back() {
-    state_.needs_full_save = true;
-    state_.is_view_new |= had_view_;
-    std::swap(removed_, state_.pending_removals);
   }
 
  private:
   // Existing numbers are kept.
   void start_anew() {
-    state_.scene = {};
+    state_.changed.all = true;
     state_.types = {};
-    for (auto& [handle, grid] : state_.grids) grid.voxels = grid.data = grid.densities = {};
+    for (auto& [handle, grid] : state_.grids) grid.is_all_edited = true;
   }
 
   void put_removal(const PartKey& key) {
@@ -253,15 +329,23 @@ class Save {
     const Instance* const instance = scene_.instances().find(handle);
     if (instance == nullptr || !is_saved(scene_, *instance)) {
       remove(part::kInstance, state_.instances, handle);
+      state_.saved_instances.erase(handle);
       return {};
     }
     const auto grid = state_.grids.find(instance->grid);
     if (grid == state_.grids.end()) {
       return make_error(ErrorCode::InvalidArgument, "the grid of instance \"" + instance->name + "\" does not exist");
     }
-    WorldParts::put(changes_, state_.instances.of(handle),
-                    SceneFile::Placement{*instance, grid->second.number, number_of(state_.groups, instance->group),
-                                         number_of(state_.layers, instance->layer)});
+    InstancePart now{{without_name(*instance), grid->second.number, number_of(state_.groups, instance->group),
+                      number_of(state_.layers, instance->layer)},
+                     {}};
+    const auto [known, is_new] = state_.saved_instances.try_emplace(handle);
+    InstancePart& saved = known->second;
+    const bool has_name = saved.name != nullptr && *saved.name == instance->name;
+    now.name = has_name ? saved.name : std::make_shared<const std::string>(instance->name);
+    if (!is_new && !state_.needs_full_save && is_same(saved, now)) return {};
+    saved = now;
+    WorldParts::put(changes_, state_.instances.of(handle), std::move(now));
     return {};
   }
 
@@ -313,36 +397,32 @@ class Save {
     return put_chunks(*grid, saved, is_new);
   }
 
+  // Names the chunks that `step` copies, and takes snapshots of the grid's content.
   Status put_chunks(const SceneGrid& grid, SavedGrid& saved, bool is_new) {
-    ChunkSet changed(kBefore);
-    bool is_all = false;
-    const auto add = [&](const auto& changes) {
-      is_all |= changes.all;
-      for (const auto& change : changes.items_unless_all()) {
-        if (change.is_edit) changed.insert(change.chunk);
-      }
-    };
-    add(grid.grid.changes_since(saved.voxels));
-    add(grid.grid.data_changes_since(saved.data));
-    add(grid.field.changes_since(saved.densities));
-    if (is_all) {
-      for (const IVec3 chunk : grid.grid.chunks()) changed.insert(chunk);
-      for (const IVec3 chunk : grid.field.chunks()) changed.insert(chunk);
+    std::vector<IVec3> chunks;
+    if (is_new) {
+      saved.voxels = saved.data = grid.grid.cursor();
+      saved.densities = grid.field.cursor();
+    }
+    if (is_new || saved.is_all_edited) {
+      static_cast<void>(saved.edited.take());
+      chunks = grid.grid.chunks();
+      const std::vector<IVec3> of_field = grid.field.chunks();
+      chunks.insert(chunks.end(), of_field.begin(), of_field.end());
       if (!is_new && !saved.is_partly_read) {  // finds chunks emptied since, except chunks that were never read
-        const auto held = world_.chunks(saved.number, 0);
+        auto held = world_.chunks(saved.number, 0);
         if (!held) return held.error();
-        ChunkSet emptied(held->begin(), held->end(), kBefore);
-        for (const IVec3 chunk : saved.unread) emptied.erase(chunk);
-        changed.merge(emptied);
+        std::erase_if(*held, [&](IVec3 chunk) { return std::ranges::find(saved.unread, chunk) != saved.unread.end(); });
+        chunks.insert(chunks.end(), held->begin(), held->end());
       }
+      quoin::sort_and_unite(chunks);
+    } else {
+      chunks = saved.edited.take();
     }
-    for (const IVec3 chunk : changed) {
-      if (!grid.grid.is_loaded(chunk) || !grid.field.is_loaded(chunk)) continue;  // unloaded chunks are unchanged
-      StoredChunk stored;
-      if (const Chunk* const voxels = grid.grid.find_chunk(chunk)) stored.voxels = *voxels;
-      if (const DensityChunk* const densities = grid.field.find_chunk(chunk)) stored.densities = *densities;
-      changes_.put_chunk({saved.number, 0, chunk}, std::move(stored));
-    }
+    saved.is_all_edited = false;
+    if (chunks.empty()) return {};
+    chunks_ += chunks.size();
+    save_.grids.push_back({saved.number, std::move(chunks), grid.grid.snapshot(), grid.field.snapshot()});
     return {};
   }
 
@@ -383,7 +463,7 @@ class Save {
 
   void put_view() {
     if (!state_.is_view_new) return;
-    had_view_ = true;
+    save_.had_view = true;
     const WorldView& view = state_.view;
     put_single(part::kView, view.camera);
     for (std::size_t i = 0; i < view.cameras.size(); ++i) {
@@ -399,13 +479,87 @@ class Save {
   WorldStore& world_;
   const Scene& scene_;
   SaverState& state_;
-  WorldChanges& changes_;
-  std::vector<PartKey> removed_;
-  std::set<GridHandle> marked_;  // left out by this save, or no longer left out
-  bool had_view_ = false;
+  SaveInSteps& save_;
+  WorldChanges& changes_;          // of `save_`
+  std::vector<PartKey>& removed_;  // of `save_`
+  std::set<GridHandle> marked_;    // left out by this save, or no longer left out
+  std::size_t chunks_ = 0;         // of all grids of `save_`
 };
 
+// Adds a grid's edits since the last call. Loaded and unloaded chunks are not edits.
+void follow_grid(GridHandle handle, const SceneGrid& grid, SavedGrid& saved, OnEdit on_edit) {
+  const auto add = [&](const auto& changes) {
+    if (changes.all) {
+      saved.is_all_edited = true;
+      on_edit(handle, std::nullopt);
+    }
+    for (const auto& change : changes.items) {
+      if (!change.is_edit) continue;
+      saved.edited.add(change.chunk);
+      on_edit(handle, change.chunk);
+    }
+  };
+  // If it throws, the next call reads the changes again.
+  ChangeCursor voxels = saved.voxels;
+  ChangeCursor data = saved.data;
+  ChangeCursor densities = saved.densities;
+  if (grid.grid.has_changed_since(voxels)) add(grid.grid.changes_since(voxels));
+  if (grid.grid.has_data_changed_since(data)) add(grid.grid.data_changes_since(data));
+  if (grid.field.has_changed_since(densities)) add(grid.field.changes_since(densities));
+  saved.voxels = voxels;
+  saved.data = data;
+  saved.densities = densities;
+}
+
+// Copies a chunk of the snapshots. Chunks that were unloaded before the save began are unchanged.
+void copy_chunk(const SaveInSteps::OfGrid& grid, IVec3 chunk, WorldChanges& changes) {
+  if (!grid.voxels.is_loaded(chunk) || !grid.field.is_loaded(chunk)) return;
+  StoredChunk stored;
+  if (const Chunk* const voxels = grid.voxels.find_chunk(chunk)) stored.voxels = *voxels;
+  if (const DensityChunk* const densities = grid.field.find_chunk(chunk)) stored.densities = *densities;
+  changes.put_chunk({grid.number, 0, chunk}, std::move(stored));
+}
+
+// Copies chunks for some seconds. Returns true if all are copied.
+bool copy_chunks(SaveInSteps& save, double seconds) {
+  const Clock::time_point start = Clock::now();
+  std::size_t copied = 0;
+  for (; save.grid < save.grids.size(); ++save.grid, save.chunk = 0) {
+    const SaveInSteps::OfGrid& grid = save.grids[save.grid];
+    for (; save.chunk < grid.chunks.size(); ++save.chunk) {
+      const bool is_time_to_look = copied != 0 && copied % kChunksPerLook == 0;
+      if (is_time_to_look && std::chrono::duration<double>(Clock::now() - start).count() >= seconds) return false;
+      copy_chunk(grid, grid.chunks[save.chunk], save.changes);
+      ++copied;
+    }
+  }
+  return true;
+}
+
 }  // namespace
+
+void WorldSaver::Impl::follow(const Scene& scene, OnEdit on_edit) {
+  ChangeCursor end = state.scene;
+  const SceneChanges changes = scene.changes_since(end);
+  const auto follow_one = [&](GridHandle handle, SavedGrid& saved) {
+    if (const SceneGrid* const grid = scene.grids().find(handle)) follow_grid(handle, *grid, saved, on_edit);
+  };
+  if (changes.all) {
+    for (auto& [handle, saved] : state.grids) follow_one(handle, saved);
+  }
+  for (const GridHandle handle : changes.grids) {
+    if (const auto known = state.grids.find(handle); known != state.grids.end()) follow_one(handle, known->second);
+  }
+  state.changed.add(changes);
+  state.scene = end;
+}
+
+void WorldSaver::Impl::give_back() {
+  state.needs_full_save = true;
+  state.is_view_new |= begun->had_view;
+  std::swap(begun->removed, state.pending_removals);
+  begun.reset();
+}
 
 WorldSaver::WorldSaver() : impl_(std::make_unique<Impl>()) {}
 WorldSaver::WorldSaver(WorldSaver&&) noexcept = default;
@@ -414,16 +568,54 @@ WorldSaver::~WorldSaver() = default;
 
 Result<SaveTicket> WorldSaver::save(WorldStore& world, const Scene& scene, WorldChanges more,
                                     std::function<void(const Status&)> on_saved) {
+  if (const auto done = begin(world, scene, std::move(more), std::move(on_saved)); !done) return done.error();
+  const auto ticket = step(world, std::numeric_limits<double>::infinity());
+  if (!ticket) return ticket.error();
+  QUOIN_ASSERT(ticket->has_value(), "a step without a limit is the last one");
+  return **ticket;
+}
+
+void WorldSaver::follow(const Scene& scene, FunctionRef<void(GridHandle, std::optional<IVec3>)> on_edit) {
+  QUOIN_ASSERT(impl_ != nullptr, "a saver that was not moved from");
+  impl_->follow(scene, on_edit);
+}
+
+Status WorldSaver::begin(WorldStore& world, const Scene& scene, WorldChanges more,
+                         std::function<void(const Status&)> on_saved) {
   QUOIN_ASSERT(impl_ != nullptr && world.is_writable(), "a saver, and a world opened for writing");
-  Save saving(world, scene, impl_->state, more);
+  QUOIN_ASSERT(!is_begun(), "one save in steps at a time");
+  follow(scene);
+  SaveInSteps& begun = impl_->begun.emplace();
+  begun.changes = std::move(more);
+  begun.on_saved = std::move(on_saved);
   try {
-    const Status put = saving.run();
-    Result<SaveTicket> ticket =
-        put ? world.save(std::move(more), std::move(on_saved)) : Result<SaveTicket>(put.error());
-    if (!ticket) saving.give_back();
-    return ticket;
+    Status put = Save(world, scene, impl_->state, begun).run();
+    if (!put) impl_->give_back();
+    return put;
   } catch (...) {
-    saving.give_back();
+    impl_->give_back();
+    throw;
+  }
+}
+
+bool WorldSaver::is_begun() const {
+  return impl_->begun.has_value();
+}
+
+Result<std::optional<SaveTicket>> WorldSaver::step(WorldStore& world, double seconds) {
+  QUOIN_ASSERT(impl_ != nullptr && world.is_writable(), "a saver, and a world opened for writing");
+  if (!is_begun()) return std::optional<SaveTicket>();
+  try {
+    if (!copy_chunks(*impl_->begun, seconds)) return std::optional<SaveTicket>();
+    const auto ticket = world.save(std::move(impl_->begun->changes), std::move(impl_->begun->on_saved));
+    if (!ticket) {
+      impl_->give_back();
+      return ticket.error();
+    }
+    impl_->begun.reset();
+    return std::optional(*ticket);
+  } catch (...) {
+    impl_->give_back();
     throw;
   }
 }

@@ -276,6 +276,136 @@ TEST(WorldSaver, SavesEveryKindOfChange) {
   EXPECT_EQ(kept.world().grids()->size(), 2U);
 }
 
+// Returns the revision of an instance in the file, -1 if it is not there.
+std::int64_t revision_of(const std::filesystem::path& path, std::int64_t instance) {
+  auto connection = Connection::open(path.string(), Connection::Mode::Read);
+  if (!connection) return -1;
+  const std::string query = "SELECT revision FROM parts WHERE kind='instance' AND id=" + std::to_string(instance);
+  const auto found = connection->text(query.c_str());
+  return found && !found->empty() ? std::stoll(*found) : -1;
+}
+
+TEST(WorldSaver, SkipsInstancesThatAreAsBefore) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  KeptWorld kept(path);
+  Scene scene = rich_scene();
+  kept.save(scene);
+  const InstanceHandle first = scene.instances().handles().front();
+  const InstanceHandle other = scene.instances().handles().back();
+  const std::int64_t before = revision_of(path, 0);
+  ASSERT_GE(before, 1);
+  scene.edit(first).position.x += 1.0;
+  scene.edit(first).position.x -= 1.0;
+  scene.edit(other).position.y = -0.0;  // not the same as 0
+  kept.save(scene);
+  EXPECT_EQ(revision_of(path, 0), before);
+  EXPECT_GT(revision_of(path, 1), before);
+  scene.edit(first).name = "another";
+  kept.save(scene);
+  EXPECT_GT(revision_of(path, 0), before);
+  // A refused save is repeated as a whole, although the saver has seen its instances.
+  const std::int64_t middle = revision_of(path, 0);
+  scene.edit(first).position.x = 77.0;
+  scene.edit(other).position.x = std::nan("");
+  EXPECT_FALSE(kept.saver().save(kept.world(), scene));
+  scene.edit(other).position.x = 3.0;
+  kept.save(scene);
+  EXPECT_GT(revision_of(path, 0), middle);
+  // An instance that leaves the file and returns has a new number.
+  scene.edit(first).saved = false;
+  ASSERT_TRUE(kept.saver().save(kept.world(), scene));
+  scene.edit(first).saved = true;
+  ASSERT_TRUE(kept.saver().save(kept.world(), scene));
+  ASSERT_TRUE(kept.world().flush());
+  EXPECT_EQ(revision_of(path, 0), -1);
+  EXPECT_GT(revision_of(path, 2), middle);
+}
+
+TEST(WorldSaver, StepsSaveTheStateOfTheirBegin) {
+  const WorldFolder folder;
+  KeptWorld kept(folder / "w.quoin");
+  Scene scene = rich_scene();
+  kept.save(scene);
+  (void)kept.chunks_of_last_save();
+  const GridHandle ground = scene.grids().handles().front();
+  const GridHandle hill = scene.grids().handles().back();
+  const auto edit_all = [&](int y) {
+    for (int i = 0; i < 100; ++i) scene.edit(ground).grid.set({64 * i, y, 0}, 3);
+    scene.edit(hill).field.edit({{0, y, 0}, {1, y + 1, 1}}, [](IVec3, DensitySample) {
+      return DensitySample{-2.0F, 3};
+    });
+    scene.edit(scene.instances().handles().front()).position.y += 1.0;
+  };
+  edit_all(0);
+  bool is_saved = false;
+  const auto on_saved = [&](const Status& outcome) { is_saved = outcome.has_value(); };
+  EXPECT_FALSE(*kept.saver().step(kept.world(), 1.0)) << "no save is begun";
+  ASSERT_TRUE(kept.saver().begin(kept.world(), scene, {}, on_saved));
+  const Scene at_begin = scene.snapshot();
+  int steps = 0;
+  while (kept.saver().is_begun()) {
+    edit_all(1 + steps);
+    const auto ticket = kept.saver().step(kept.world(), 0.0);
+    ASSERT_TRUE(ticket) << to_string(ticket.error());
+    EXPECT_EQ(ticket->has_value(), !kept.saver().is_begun());
+    ++steps;
+    if (kept.saver().is_begun()) {
+      EXPECT_EQ(kept.world().stats().pending_chunks, 0U) << "the store receives a save as a whole";
+    }
+  }
+  EXPECT_GE(steps, 100 / 16);
+  EXPECT_LT(steps, 20);
+  ASSERT_TRUE(kept.world().flush());
+  EXPECT_TRUE(is_saved);
+  EXPECT_EQ(kept.chunks_of_last_save(), 101U);
+  kept.expect_like(at_begin);
+  kept.save(scene);
+  EXPECT_EQ(kept.chunks_of_last_save(), 101U);
+}
+
+TEST(WorldSaver, RepeatsRefusedSaveInSteps) {
+  const WorldFolder folder;
+  KeptWorld kept(folder / "w.quoin");
+  Scene scene = rich_scene();
+  kept.save(scene);
+  const GridHandle ground = scene.grids().handles().front();
+  scene.edit(ground).grid.set({1, 1, 1}, 200);  // not registered
+  scene.edit(scene.instances().handles().front()).position.y += 1.0;
+  ASSERT_TRUE(kept.saver().begin(kept.world(), scene));
+  const auto refused = kept.saver().step(kept.world(), 1.0);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::InvalidArgument);
+  EXPECT_FALSE(kept.saver().is_begun());
+  scene.edit(ground).grid.set({1, 1, 1}, 3);
+  kept.save(scene);
+}
+
+TEST(WorldSaver, FollowsMoreChangesThanJournalsKeep) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  KeptWorld kept(path);
+  Scene scene = rich_scene();
+  kept.save(scene);
+  (void)kept.chunks_of_last_save();
+  const GridHandle ground = scene.grids().handles().front();
+  const InstanceHandle moving = scene.instances().handles().front();
+  const std::int64_t resting = revision_of(path, 1);
+  int reported = 0;
+  for (int i = 0; i < 12'000; ++i) {
+    scene.edit(ground).grid.set({3, 3, 4}, static_cast<VoxelType>(1 + i % 2));
+    scene.edit(moving).position.x += 1.0;
+    kept.saver().follow(scene, [&](GridHandle grid, std::optional<IVec3> chunk) {
+      EXPECT_TRUE(grid == ground && chunk == IVec3(0));
+      ++reported;
+    });
+  }
+  EXPECT_EQ(reported, 12'000);
+  kept.save(scene);
+  EXPECT_EQ(kept.chunks_of_last_save(), 1U) << "of 13";
+  EXPECT_EQ(revision_of(path, 1), resting);
+}
+
 TEST(WorldSaver, ContinuesFromLoadedWorld) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";

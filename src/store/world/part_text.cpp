@@ -104,10 +104,9 @@ std::string dumped(const T& part) {
 
 template <class Placed>
 bool has_readable_frame(const Placed& placed) {
-  constexpr std::size_t kMaxName = std::size_t{1} << 20;  // 6 MiB of text at most
   const DQuat& q = placed.rotation;
   return is_finite(placed.position) && is_finite(DVec3(q.x, q.y, q.z)) && std::isfinite(q.w) &&
-         placed.name.size() <= kMaxName;
+         is_readable_name(placed.name);
 }
 
 }  // namespace
@@ -162,6 +161,11 @@ std::string text_of(const FileCamera& camera) {
 
 std::string text_of(DVec3 vector) {
   return OrderedJson{vector.x, vector.y, vector.z}.dump();
+}
+
+bool is_readable_name(std::string_view name) {
+  constexpr std::size_t kMaxName = std::size_t{1} << 20;  // 6 MiB of text at most
+  return name.size() <= kMaxName;
 }
 
 bool is_readable(const SceneFile::Placement& instance) {

@@ -2,6 +2,7 @@
 
 #include <span>
 #include <string>
+#include <string_view>
 
 #include <quoin/core/result.h>
 #include <quoin/io/loaded_scene.h>
@@ -33,6 +34,8 @@ namespace quoin::store {
 /// name has at most 1 MiB, far below the limit of a part. Cost: O(1).
 [[nodiscard]] bool is_readable(const SceneFile::Placement& instance);
 [[nodiscard]] bool is_readable(const SceneFile::Group& group);
+/// The part of `is_readable` that concerns a name.
+[[nodiscard]] bool is_readable_name(std::string_view name);
 
 /// Reads a part. `name`: its name for error messages. Errors: BadFormat.
 template <class T>

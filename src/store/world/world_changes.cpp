@@ -1,20 +1,69 @@
 #include "store/world/world_changes.h"
 
+#include <algorithm>
+#include <iterator>
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include <quoin/core/assert.h>
 
+#include "grid/chunk/chunk_storage.h"
+#include "io/scene_file/scene_parts.h"
 #include "store/chunk/density_section.h"
 #include "store/chunk/voxel_sections.h"
 #include "store/world/part_text.h"
 
 namespace quoin::store {
 
+namespace {
+
+std::string text_of_part(const InstancePart& instance) {
+  SceneFile::Placement named = instance.placement;
+  named.instance.name = *instance.name;
+  return text_of(named);
+}
+
+bool is_readable_part(const InstancePart& instance) {
+  QUOIN_ASSERT(instance.name != nullptr && instance.placement.instance.name.empty(),
+               "the name is next to the instance");
+  return is_readable_name(*instance.name) && is_readable(instance.placement);
+}
+
+bool is_same(DVec3 a, DVec3 b) {
+  return scene_json::is_same(a.x, b.x) && scene_json::is_same(a.y, b.y) && scene_json::is_same(a.z, b.z);
+}
+
+template <class T>
+void erase_grid(ChunkMap<T>& chunks, std::uint32_t grid) {
+  for (auto at = chunks.begin(); at != chunks.end();) at = at->first.grid == grid ? chunks.erase(at) : std::next(at);
+}
+
+}  // namespace
+
+bool is_same(const InstancePart& a, const InstancePart& b) {
+  const Instance& own = a.placement.instance;
+  const Instance& other = b.placement.instance;
+  const DQuat& p = own.rotation;
+  const DQuat& q = other.rotation;
+  const auto numbers = [](const SceneFile::Placement& of) { return std::tie(of.grid, of.group, of.layer); };
+  return is_same(own.position, other.position) && is_same(DVec3(p.x, p.y, p.z), DVec3(q.x, q.y, q.z)) &&
+         scene_json::is_same(p.w, q.w) && scene_json::is_same(own.voxel_size, other.voxel_size) &&
+         own.mirrored == other.mirrored && own.visible == other.visible && own.categories == other.categories &&
+         numbers(a.placement) == numbers(b.placement) && (a.name == b.name || *a.name == *b.name);
+}
+
+// Does not compile if the number of members changes.
+Instance without_name(const Instance& instance) {
+  const auto& [name, grid, position, rotation, voxel_size, mirrored, visible, group, layer, categories, saved] =
+      instance;
+  return {{}, grid, position, rotation, voxel_size, mirrored, visible, group, layer, categories, saved};
+}
+
 std::span<const std::byte> bytes_of(const PartContent& content, PartBody& made) {
   if (const auto* const body = std::get_if<PartBody>(&content)) return *body;
-  const auto* const instance = std::get_if<SceneFile::Placement>(&content);
-  made = body_of(instance != nullptr ? text_of(*instance) : text_of(std::get<SceneFile::Group>(content)));
+  const auto* const instance = std::get_if<InstancePart>(&content);
+  made = body_of(instance != nullptr ? text_of_part(*instance) : text_of(std::get<SceneFile::Group>(content)));
   return made;
 }
 
@@ -26,23 +75,20 @@ PartBody body_of(PartContent content) {
 }
 
 void ChangeSet::remove_grid(std::uint32_t number) {
-  std::erase_if(chunks, [&](const auto& each) { return each.first.grid == number; });
+  erase_grid(chunks, number);
   parts.insert_or_assign({part::kGrid, std::int64_t{number}}, std::nullopt);
   removed_grids.insert(number);
 }
 
 void ChangeSet::add(ChangeSet&& later) {
-  chunks.reserve(chunks.size() + later.chunks.size());
-  // No allocation from here on: existing nodes move one by one.
-  for (const std::uint32_t grid : later.removed_grids) {
-    std::erase_if(chunks, [&](const auto& each) { return each.first.grid == grid; });
-  }
+  make_room(chunks, later.chunks.size());
+  // No allocation from here on: chunks have room, and existing nodes move one by one.
+  for (const std::uint32_t grid : later.removed_grids) erase_grid(chunks, grid);
   removed_grids.merge(later.removed_grids);
-  while (!later.chunks.empty()) {
-    auto node = later.chunks.extract(later.chunks.begin());
-    chunks.erase(node.key());
-    chunks.insert(std::move(node));
+  for (auto at = later.chunks.begin(); at != later.chunks.end(); ++at) {
+    chunks.insert_or_assign(at->first, std::move(at.value()));
   }
+  later.chunks.clear();
   while (!later.parts.empty()) {
     auto node = later.parts.extract(later.parts.begin());
     parts.erase(node.key());
@@ -90,13 +136,27 @@ Status check_data(const Chunk& chunk, const VoxelRegistry& types) {
   return {};
 }
 
-Status check_types(const Chunk& chunk, const VoxelRegistry& types) {
-  for (const VoxelType type : chunk.types()) {
-    if (type < types.size()) continue;
-    return make_error(ErrorCode::InvalidArgument,
-                      "it has voxels of type " + std::to_string(type) + ", which is not defined");
+// Returns a type of the chunk that is not registered, if there is one. Allocates nothing at up to 8 bits per voxel.
+std::optional<VoxelType> undefined_type(const Chunk& chunk, const VoxelRegistry& types) {
+  const auto is_undefined = [&](VoxelType type) { return type >= types.size(); };
+  if (const auto uniform = chunk.uniform()) return is_undefined(*uniform) ? uniform : std::nullopt;
+  const ChunkStorage& m = *ChunkStorage::of(chunk);
+  if (m.direct()) {
+    const std::vector<VoxelType> used = chunk.types();
+    const auto found = std::ranges::find_if(used, is_undefined);
+    return found == used.end() ? std::nullopt : std::optional(*found);
   }
-  return {};
+  for (std::size_t i = 0; i < m.palette.size(); ++i) {
+    if (m.counts[i] != 0 && is_undefined(m.palette[i])) return m.palette[i];
+  }
+  return std::nullopt;
+}
+
+Status check_types(const Chunk& chunk, const VoxelRegistry& types) {
+  const auto type = undefined_type(chunk, types);
+  if (!type) return {};
+  return make_error(ErrorCode::InvalidArgument,
+                    "it has voxels of type " + std::to_string(*type) + ", which is not defined");
 }
 
 // Checks everything except densities: those of saved grids are valid.
@@ -303,26 +363,25 @@ std::size_t WorldChanges::chunk_count() const {
   return content_->chunks.size();
 }
 
-namespace {
-
-template <class T>
-void put_content(WorldChanges& changes, const char* kind, std::int64_t id, T content) {
-  if (!store::is_readable(content)) return WorldParts::put(changes, kind, id, store::text_of(content));
-  changes.content().parts.insert_or_assign({kind, id}, std::move(content));
-}
-
-}  // namespace
-
 void WorldParts::put(WorldChanges& changes, store::PartKey key, std::optional<PartBody> body) {
   changes.content().parts.insert_or_assign(std::move(key), std::move(body));
 }
 
+void WorldParts::put(WorldChanges& changes, std::int64_t id, store::InstancePart instance) {
+  const char* const kind = store::part::kInstance;
+  if (!store::is_readable_part(instance)) return put(changes, kind, id, store::text_of_part(instance));
+  changes.content().parts.insert_or_assign({kind, id}, std::move(instance));
+}
+
 void WorldParts::put(WorldChanges& changes, std::int64_t id, SceneFile::Placement instance) {
-  put_content(changes, store::part::kInstance, id, std::move(instance));
+  auto name = std::make_shared<const std::string>(std::exchange(instance.instance.name, {}));
+  put(changes, id, store::InstancePart{std::move(instance), std::move(name)});
 }
 
 void WorldParts::put(WorldChanges& changes, std::int64_t id, SceneFile::Group group) {
-  put_content(changes, store::part::kGroup, id, std::move(group));
+  const char* const kind = store::part::kGroup;
+  if (!store::is_readable(group)) return put(changes, kind, id, store::text_of(group));
+  changes.content().parts.insert_or_assign({kind, id}, std::move(group));
 }
 
 void WorldParts::put(WorldChanges& changes, const char* kind, std::int64_t id, std::string_view text) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -8,9 +9,11 @@
 #include <set>
 #include <span>
 #include <string>
-#include <unordered_map>
+#include <utility>
 #include <variant>
 #include <vector>
+
+#include <tsl/robin_map.h>
 
 #include <quoin/core/hash.h>
 #include <quoin/grid/voxel_registry.h>
@@ -30,9 +33,30 @@ struct ChunkAddressHash {
   }
 };
 
+/// Chunks by address, in one block of memory: an entry needs no allocation of its own.
+template <class T>
+using ChunkMap = tsl::robin_map<ChunkAddress, T, ChunkAddressHash>;
+
+/// Reserves memory, so that adding `more` entries neither allocates nor throws.
+template <class T>
+void make_room(ChunkMap<T>& chunks, std::size_t more) {
+  const std::size_t wanted = chunks.size() + more;
+  if (static_cast<float>(wanted) <= chunks.max_load_factor() * static_cast<float>(chunks.bucket_count())) return;
+  chunks.reserve(std::max(wanted, 2 * chunks.size()));
+}
+
 using PartBody = std::vector<std::byte>;
+/// An instance with a name that several saves share. `placement.instance.name` is empty.
+struct InstancePart {
+  SceneFile::Placement placement;
+  std::shared_ptr<const std::string> name;
+};
+/// Returns the instance with an empty name.
+[[nodiscard]] Instance without_name(const Instance& instance);
+/// Returns true if both have the same text.
+[[nodiscard]] bool is_same(const InstancePart& a, const InstancePart& b);
 /// The content of a part: its bytes, or an instance or a group whose text the writer makes on its own thread.
-using PartContent = std::variant<PartBody, SceneFile::Placement, SceneFile::Group>;
+using PartContent = std::variant<PartBody, InstancePart, SceneFile::Group>;
 
 /// Returns the bytes that the file stores, in `made` if the content has none yet. Lifetime: of both arguments.
 [[nodiscard]] std::span<const std::byte> bytes_of(const PartContent& content, PartBody& made);
@@ -41,7 +65,7 @@ using PartContent = std::variant<PartBody, SceneFile::Placement, SceneFile::Grou
 
 struct ChangeSet {
   std::set<std::uint32_t> removed_grids;  ///< applied first
-  std::unordered_map<ChunkAddress, std::optional<StoredChunk>, ChunkAddressHash> chunks;
+  ChunkMap<std::optional<StoredChunk>> chunks;
   std::map<PartKey, std::optional<PartContent>> parts;
 
   [[nodiscard]] bool empty() const { return removed_grids.empty() && chunks.empty() && parts.empty(); }
@@ -86,8 +110,9 @@ struct WorldParts {
   /// Sets a part's body; nullopt removes the part.
   static void put(WorldChanges& changes, store::PartKey key, std::optional<PartBody> body);
   static void put(WorldChanges& changes, const char* kind, std::int64_t id, std::string_view text);
-  /// Keeps a copy of the instance; the writer's thread makes its text. An instance that cannot be read again becomes
-  /// text at once, which `save` refuses.
+  /// Keeps the instance; the writer's thread makes its text. An instance that cannot be read again becomes text at
+  /// once, and `save` refuses it.
+  static void put(WorldChanges& changes, std::int64_t id, store::InstancePart instance);
   static void put(WorldChanges& changes, std::int64_t id, SceneFile::Placement instance);
   /// As for an instance.
   static void put(WorldChanges& changes, std::int64_t id, SceneFile::Group group);

@@ -80,11 +80,8 @@ SaveTicket WorldWriter::save(ChangeSet changes, OnSaved on_saved) {
 void WorldWriter::note_pending(const ChangeSet& changes, std::uint64_t ticket) {
   std::map<std::uint32_t, std::uint64_t> removed;
   for (const std::uint32_t grid : changes.removed_grids) removed.emplace(grid, ticket);
-  decltype(pending_chunks_) chunks;
-  chunks.reserve(changes.chunks.size());
-  for (const auto& [place, chunk] : changes.chunks) chunks.emplace(place, PendingChunk{chunk, ticket});
-  pending_chunks_.reserve(pending_chunks_.size() + chunks.size());
-  // No allocation from here on.
+  make_room(pending_chunks_, changes.chunks.size());
+  // No allocation from here on: copies of chunks share their content.
   const auto drop = [&](auto found) {
     stats_.pending_bytes -= bytes_of(found->second.content);
     return pending_chunks_.erase(found);
@@ -94,11 +91,10 @@ void WorldWriter::note_pending(const ChangeSet& changes, std::uint64_t ticket) {
     pending_removed_.erase(grid);
   }
   pending_removed_.merge(removed);
-  while (!chunks.empty()) {
-    auto node = chunks.extract(chunks.begin());
-    if (const auto found = pending_chunks_.find(node.key()); found != pending_chunks_.end()) drop(found);
-    stats_.pending_bytes += bytes_of(node.mapped().content);
-    pending_chunks_.insert(std::move(node));
+  for (const auto& [place, chunk] : changes.chunks) {
+    PendingChunk& pending = pending_chunks_[place];
+    stats_.pending_bytes += bytes_of(chunk) - bytes_of(pending.content);
+    pending = {chunk, ticket};
   }
   stats_.pending_chunks = pending_chunks_.size();
 }

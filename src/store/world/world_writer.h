@@ -6,7 +6,6 @@
 #include <map>
 #include <mutex>
 #include <optional>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -108,7 +107,7 @@ class WorldWriter {
 
   mutable std::mutex mutex_;
   std::list<Save> queue_;
-  std::unordered_map<ChunkAddress, PendingChunk, ChunkAddressHash> pending_chunks_;
+  ChunkMap<PendingChunk> pending_chunks_;
   std::map<std::uint32_t, std::uint64_t> pending_removed_;  // grids, with their tickets
   std::uint64_t last_ticket_ = 0;
   std::uint64_t saved_through_ = 0;
