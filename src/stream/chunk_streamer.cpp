@@ -49,6 +49,24 @@ std::string text_of(std::chrono::milliseconds time) {
   return std::to_string(time.count()) + " ms";
 }
 
+Status SceneSaves::begin(const Scene& scene) {
+  time_ = Clock::now();
+  Status begun = saver_.begin(store_, scene, {},
+                              [to = disk_, save = disk_->begin()](const Status& outcome) { to->put(save, outcome); });
+  is_refused_ = !begun;
+  if (begun) ++begun_;
+  return begun;
+}
+
+Status SceneSaves::step(double seconds) {
+  if (!is_begun()) return {};
+  const auto ticket = saver_.step(store_, seconds);
+  is_refused_ = !ticket;
+  if (!ticket) return ticket.error();
+  if (ticket->has_value()) handed_ = begun_;
+  return {};
+}
+
 ChunkStreamer::ChunkStreamer(WorldStore& store, Options options) : store_(store), options_(options) {
   QUOIN_ASSERT(options.workers > 0, "at least one worker");
   workers_.start(options.workers, [this](Workers::Lock& lock, unsigned /*worker*/) { return step(lock); },

@@ -74,6 +74,39 @@ class DiskOutcome {
   Status error_;
 };
 
+/// The saves of a world's scene, numbered from 1. Each is collected in steps.
+/// Lifetime: both arguments must outlive it. Threads: those of the saver.
+class SceneSaves {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  SceneSaves(WorldSaver& saver, WorldStore& store) : saver_(saver), store_(store) {}
+
+  /// Begins a save of the scene as it is now. Requires: none is begun. Errors: as WorldSaver::begin.
+  Status begin(const Scene& scene);
+  /// Continues the save that is begun, if there is one. Errors: as WorldSaver::step; the next save has everything.
+  Status step(double seconds);
+  [[nodiscard]] bool is_begun() const { return saver_.is_begun(); }
+  /// Returns true if `interval` has passed since the last save began.
+  [[nodiscard]] bool is_due(Clock::duration interval) const { return Clock::now() - time_ >= interval; }
+  /// Returns the number of the first save that contains an edit of now.
+  [[nodiscard]] std::uint64_t next() const { return begun_ + 1; }
+  /// Returns true if the store has the save, on disk or pending. A save has all edits of the saves before it.
+  [[nodiscard]] bool has(std::uint64_t save) const { return save <= handed_; }
+  /// Returns true if the store refused the last save.
+  [[nodiscard]] bool is_refused() const { return is_refused_; }
+  [[nodiscard]] DiskOutcome& disk() { return *disk_; }
+
+ private:
+  WorldSaver& saver_;
+  WorldStore& store_;
+  Clock::time_point time_{};
+  std::uint64_t begun_ = 0;
+  std::uint64_t handed_ = 0;
+  bool is_refused_ = false;
+  std::shared_ptr<DiskOutcome> disk_ = std::make_shared<DiskOutcome>();  // shared with the store's callbacks
+};
+
 /// A chunk that was read or generated.
 struct CompletedLoad {
   ChunkAddress place;

@@ -1,9 +1,7 @@
 #include <quoin/stream/streamed_world.h>
 
 #include <algorithm>
-#include <cmath>
 #include <deque>
-#include <iterator>
 #include <limits>
 #include <map>
 #include <memory>
@@ -14,9 +12,7 @@
 #include <unordered_set>
 #include <utility>
 
-#include <glm/geometric.hpp>
 #include <quoin/core/assert.h>
-#include <quoin/io/file.h>
 
 #include "core/bytes/text.h"
 #include "core/coordinates/chunk_trie.h"
@@ -40,8 +36,7 @@ using What = ChunkStreamer::Event::What;
 constexpr std::size_t kMaxCompletedLoads = 128;
 // Maximum number of chunks that edits wait for, per plan.
 constexpr std::size_t kMaxAsked = 1024;
-// Number of moved chunks that triggers a save; it bounds the journal entries that a save reads.
-constexpr std::size_t kMaxMoved = 48;
+constexpr double kSaveShare = 0.5;  // part of `update_seconds` in which a call copies chunks for a save
 // Longest wait for workers before the caller checks again whether they are all in generators that do not return.
 constexpr auto kWait = std::chrono::milliseconds(100);
 constexpr int kHelpAfter = 10;  // such waits without a chunk in progress, after which `flush` makes chunks itself
@@ -66,13 +61,15 @@ bool is_air(const SceneGrid& content, IVec3 chunk) {
 }  // namespace
 
 struct StreamedWorld::Impl {
+  struct Loaded {
+    std::size_t bytes = 0;
+    std::uint64_t save = 0;  // the first save that contains all its edits
+  };
   struct Streamed {
     GridHandle handle;
     std::uint32_t number = 0;
     Placements placements;
-    ChangeCursor voxels, data, densities;
-    ChunkTrie<std::size_t> sizes;                    // of the loaded chunks, bytes; grows without copies
-    std::unordered_set<IVec3, CoordinateHash> kept;  // edited in a read-only world: they stay loaded
+    ChunkTrie<Loaded> loaded;  // grows without copies
     WaitingEdits waiting;
     std::unordered_set<IVec3, CoordinateHash> broken;
     bool has_extent = false;  // set_generator was called; until then no chunk is loaded
@@ -111,7 +108,7 @@ struct StreamedWorld::Impl {
   Status update(std::span<const Viewer> viewers, double seconds);
   Status plan(std::span<const Viewer> viewers);  // without changing the scene
   void notify_workers();
-  [[nodiscard]] bool has_chunks_to_move() const { return !completed_loads.empty() || (!is_edited && !leaving.empty()); }
+  [[nodiscard]] bool has_chunks_to_move() const { return !completed_loads.empty() || ready_to_leave != 0; }
   void take_in();
   void move_chunks(double seconds, Clock::time_point start, ChunkStreamer::Note& note);
   void follow_instances();
@@ -129,8 +126,11 @@ struct StreamedWorld::Impl {
                                                const SceneGrid& content);
   void take_away(const ChunkAddress& place, ChunkStreamer::Note& note);
   void note_edits();
-  void adopt(Streamed& grid, const SceneGrid& content, IVec3 chunk);
+  void note_edit(Streamed& grid, const SceneGrid& content, IVec3 chunk);
+  Loaded& adopt(Streamed& grid, const SceneGrid& content, IVec3 chunk);
+  void sort_leaving();
   Status save_now();
+  Status begin_save();
   void share_rules();
   [[nodiscard]] std::size_t waiting_chunks() const;
   [[nodiscard]] bool waits_for_broken_alone() const;
@@ -139,6 +139,7 @@ struct StreamedWorld::Impl {
   StreamOptions options;
   WorldStore store;
   LoadedWorld world;
+  SceneSaves saves{world.saver, store};
   bool is_new = false;
   StreamBudget budget;
   std::map<std::uint32_t, Streamed> grids;
@@ -155,17 +156,15 @@ struct StreamedWorld::Impl {
   Clock::time_point planned{};
   std::deque<CompletedLoad> completed_loads;
   std::deque<ChunkAddress> leaving;
+  std::size_t ready_to_leave = 0;  // the first of `leaving`: the store has their edits
 
   std::size_t arrived_bytes = 0;  // of `arrivals`
   Clock::time_point asked_others{};
-  Clock::time_point moved{};         // when a chunk last arrived or left
-  bool is_edited = false;            // since the last save
-  bool is_refused = false;           // the store refused the last save; it is retried
-  std::size_t moved_since_save = 0;  // chunks that arrived or left
+  Clock::time_point moved{};      // when a chunk last arrived or left
+  bool is_edited = false;         // since the last save began
+  std::uint64_t edited_save = 0;  // the first save that contains all edits
   ChangeCursor saved_types;
-  std::shared_ptr<DiskOutcome> disk = std::make_shared<DiskOutcome>();
   ChunkStreamer::Note unposted;
-  Clock::time_point saved{};
   bool has_moved = false;  // chunks arrived or left in the last update
   std::vector<std::string> problems;
   ChunkStreamer::Outbox box;
@@ -219,7 +218,7 @@ void StreamedWorld::Impl::set_generator(Streamed& grid, std::shared_ptr<const Ch
                        " cannot be listed, so all its chunks are looked up: " + to_string(stored.error()));
     extent = kAllChunks;
   }
-  grid.sizes.for_each([&](IVec3 chunk, std::size_t) { others.push_back(chunk); });
+  grid.loaded.for_each([&](IVec3 chunk, const Loaded&) { others.push_back(chunk); });
   for (const auto& [chunk, edits] : grid.waiting) others.push_back(chunk);
   std::erase_if(others, [&](IVec3 chunk) { return extent.contains(chunk); });
   Grid voxels_before = content->grid.snapshot();
@@ -229,7 +228,7 @@ void StreamedWorld::Impl::set_generator(Streamed& grid, std::shared_ptr<const Ch
     content->grid.set_extent(extent, others);
     content->field.set_extent(extent, others);
     // Air chunks that were loaded because they lay outside of the extent have no marks.
-    grid.sizes.for_each([&](IVec3 chunk, std::size_t) {
+    grid.loaded.for_each([&](IVec3 chunk, const Loaded&) {
       content->grid.load_chunk(chunk, Chunk(kAir));
       content->field.load_air_chunk(chunk);
     });
@@ -256,9 +255,6 @@ StreamedWorld::Impl::Streamed& StreamedWorld::Impl::add_streamed(GridHandle hand
   added.handle = handle;
   added.number = number;
   numbers[handle] = number;
-  const SceneGrid& content = scene().grids()[handle];
-  added.voxels = added.data = content.grid.cursor();
-  added.densities = content.field.cursor();
   followed_scene = {};
   return added;
 }
@@ -352,70 +348,78 @@ bool StreamedWorld::Impl::is_near_anyone(const ChunkAddress& place) const {
 // Records the edits since the last call; chunks that workers brought are not edits.
 void StreamedWorld::Impl::note_edits() {
   for (auto& [number, grid] : grids) {
-    const SceneGrid* const content = scene().grids().find(grid.handle);
-    if (content == nullptr) {  // removed, with its loaded chunks
-      grid.sizes.for_each([&](IVec3, std::size_t size) { budget.remove_chunk(size); });
-      grid.sizes.clear();
-      grid.waiting.clear();
-      continue;
-    }
-    const auto note = [&, &of = grid](const auto& changes) {
-      for (const auto& change : changes.items_unless_all()) {
-        if (!change.is_edit) continue;
-        is_edited = true;
-        std::size_t* const size = of.sizes.find_to_edit(change.chunk, kStays);
-        if (size == nullptr) {
-          if (!content->grid.is_loaded(change.chunk)) continue;
-          adopt(of, *content, change.chunk);
-        } else {
-          const std::size_t now = loaded_bytes(*content, change.chunk);
-          budget.resize_chunk(*size, now);
-          *size = now;
-        }
-        if (!store.is_writable()) of.kept.insert(change.chunk);
-      }
-      if (changes.all) {  // too many changes to list: any loaded chunk may have been edited
-        is_edited = true;
-        for (const IVec3 chunk : content->grid.chunks()) adopt(of, *content, chunk);
-        for (const IVec3 chunk : content->field.chunks()) adopt(of, *content, chunk);
-        if (store.is_writable()) return;
-        of.sizes.for_each([&](IVec3 chunk, std::size_t) { of.kept.insert(chunk); });
-      }
-    };
-    // If `note` throws, the next call reads the changes again.
-    ChangeCursor voxels = grid.voxels;
-    ChangeCursor data = grid.data;
-    ChangeCursor densities = grid.densities;
-    if (content->grid.has_changed_since(voxels)) note(content->grid.changes_since(voxels));
-    if (content->grid.has_data_changed_since(data)) note(content->grid.data_changes_since(data));
-    if (content->field.has_changed_since(densities)) note(content->field.changes_since(densities));
-    grid.voxels = voxels;
-    grid.data = data;
-    grid.densities = densities;
+    if (scene().grids().find(grid.handle) != nullptr) continue;  // else removed, with its loaded chunks
+    grid.loaded.for_each([&](IVec3, const Loaded& chunk) { budget.remove_chunk(chunk.bytes); });
+    grid.loaded.clear();
+    grid.waiting.clear();
   }
+  world.saver.follow(scene(), [&](GridHandle handle, std::optional<IVec3> chunk) {
+    const std::uint32_t* const number = number_of(handle);
+    if (number == nullptr) return;  // a whole grid
+    Streamed& grid = *streamed(*number);
+    const SceneGrid& content = scene().grids()[handle];
+    is_edited = true;
+    edited_save = saves.next();
+    if (chunk) return note_edit(grid, content, *chunk);
+    // Too many changes to list: any loaded chunk may have been edited.
+    for (const IVec3 each : content.grid.loaded_chunks()) note_edit(grid, content, each);
+    for (const IVec3 each : content.field.loaded_chunks()) note_edit(grid, content, each);
+  });
+}
+
+void StreamedWorld::Impl::note_edit(Streamed& grid, const SceneGrid& content, IVec3 chunk) {
+  Loaded* known = grid.loaded.find_to_edit(chunk, kStays);
+  if (known == nullptr) {
+    if (!content.grid.is_loaded(chunk)) return;
+    known = &adopt(grid, content, chunk);
+  } else {
+    const std::size_t now = loaded_bytes(content, chunk);
+    budget.resize_chunk(known->bytes, now);
+    known->bytes = now;
+  }
+  known->save = edited_save;
 }
 
 // Counts a chunk that was edited without being loaded, outside of the extent. From now on it is one of the others.
-void StreamedWorld::Impl::adopt(Streamed& grid, const SceneGrid& content, IVec3 chunk) {
-  if (grid.sizes.find(chunk.x, chunk.y, chunk.z) != nullptr) return;
+StreamedWorld::Impl::Loaded& StreamedWorld::Impl::adopt(Streamed& grid, const SceneGrid& content, IVec3 chunk) {
+  if (Loaded* const known = grid.loaded.find_to_edit(chunk, kStays)) return *known;
   const ChunkAddress place{grid.number, 0, chunk};
   must_plan |= !is_near_anyone(place);  // no plan would unload it
   unposted.add(place, What::Here);
-  const std::size_t size = loaded_bytes(content, chunk);
-  grid.sizes.find_or_create(chunk, kStays) = size;
-  budget.add_chunk(size);
+  Loaded& added = grid.loaded.find_or_create(chunk, kStays);
+  added.bytes = loaded_bytes(content, chunk);
+  budget.add_chunk(added.bytes);
+  return added;
 }
 
-Status StreamedWorld::Impl::save_now() {
-  saved = Clock::now();
-  moved_since_save = 0;
+// Moves the chunks whose edits the store does not have yet behind the others. In a read-only world they stay loaded.
+void StreamedWorld::Impl::sort_leaving() {
+  ready_to_leave = leaving.size();
+  if (saves.has(edited_save) || leaving.empty()) return;
+  const auto unsaved = std::stable_partition(leaving.begin(), leaving.end(), [&](const ChunkAddress& place) {
+    const auto found = grids.find(place.grid);
+    if (found == grids.end()) return true;
+    const Loaded* const chunk = found->second.loaded.find(place.chunk.x, place.chunk.y, place.chunk.z);
+    return chunk == nullptr || saves.has(chunk->save);
+  });
+  ready_to_leave = static_cast<std::size_t>(unsaved - leaving.begin());
+  if (!store.is_writable()) leaving.erase(unsaved, leaving.end());
+}
+
+Status StreamedWorld::Impl::begin_save() {
+  note_edits();
   if (store.is_writable()) {
-    const auto ticket = world.saver.save(
-        store, scene(), {}, [to = disk, save = disk->begin()](const Status& outcome) { to->put(save, outcome); });
-    is_refused = !ticket;
-    if (!ticket) return ticket.error();
-    is_edited = false;
+    if (auto begun = saves.begin(scene()); !begun) return begun;
   }
+  is_edited = false;
+  return {};
+}
+
+// Finishes a save in steps, if one is begun, and saves everything.
+Status StreamedWorld::Impl::save_now() {
+  static_cast<void>(saves.step(kAsLongAsItTakes));  // if this fails, the next save contains everything
+  if (auto done = begin_save(); !done) return done;
+  if (auto done = saves.step(kAsLongAsItTakes); !done) return done;
   if (scene().types.has_changed_since(saved_types)) share_rules();
   saved_types = scene().types.cursor();
   return {};
@@ -463,7 +467,7 @@ void StreamedWorld::Impl::put(CompletedLoad completed, ChunkStreamer::Note& note
   }
   // If the extent has changed since the chunk was requested, it may count as air. It is stored all the same.
   const bool is_air_by_extent = content->grid.is_loaded(place.chunk) && is_air(*content, place.chunk) &&
-                                grid->sizes.find(place.chunk.x, place.chunk.y, place.chunk.z) == nullptr;
+                                grid->loaded.find(place.chunk.x, place.chunk.y, place.chunk.z) == nullptr;
   const bool is_late = is_air_by_extent && !is_air(completed.chunk);
   if (is_late) {
     content->grid.unload_chunk(place.chunk);
@@ -488,26 +492,25 @@ void StreamedWorld::Impl::put(CompletedLoad completed, ChunkStreamer::Note& note
   } else {
     content->field.load_air_chunk(place.chunk);
   }
-  grid->sizes.find_or_create(place.chunk, kStays) = size;
+  // An edited chunk is saved before it is unloaded.
+  if (edited) edited_save = saves.next();
+  grid->loaded.find_or_create(place.chunk, kStays) = {size, edited ? edited_save : 0};
   budget.add_chunk(size);
-  ++moved_since_save;
   note.add(place, What::Here);
   if (!is_near) must_plan = true;
   if (!edited) return;
-  // Counts as an edit of a loaded chunk: it is saved before the chunk is unloaded.
   content->grid.put_chunk(place.chunk, std::move(edited->voxels));
   content->field.put_chunk(place.chunk, edited->densities
                                             ? std::move(*edited->densities)
                                             : DensityChunk(content->field.neighbourhood(place.chunk).outside));
   is_edited = true;
-  if (!store.is_writable()) grid->kept.insert(place.chunk);
 }
 
 void StreamedWorld::Impl::take_away(const ChunkAddress& place, ChunkStreamer::Note& note) {
   Streamed* const grid = streamed(place.grid);
   SceneGrid* const content = grid == nullptr ? nullptr : content_of_grid(*grid);
   if (content == nullptr) return note.add(place, What::Gone);
-  if (grid->kept.contains(place.chunk) || !content->grid.is_loaded(place.chunk)) return;
+  if (!content->grid.is_loaded(place.chunk)) return;
   StoredChunk last;  // destroyed on another thread
   if (const Chunk* const voxels = content->grid.find_chunk(place.chunk)) last.voxels = *voxels;
   if (const DensityChunk* const densities = content->field.find_chunk(place.chunk)) last.densities = *densities;
@@ -515,39 +518,34 @@ void StreamedWorld::Impl::take_away(const ChunkAddress& place, ChunkStreamer::No
   content->field.unload_chunk(place.chunk);
   note.released.push_back(std::move(last));
   note.add(place, What::Gone);
-  const std::size_t* const size = grid->sizes.find(place.chunk.x, place.chunk.y, place.chunk.z);
-  QUOIN_ASSERT(size != nullptr, "loaded chunks are counted");
-  budget.remove_chunk(*size);
-  grid->sizes.erase(place.chunk, kStays);
-  ++moved_since_save;
+  const Loaded* const counted = grid->loaded.find(place.chunk.x, place.chunk.y, place.chunk.z);
+  QUOIN_ASSERT(counted != nullptr, "loaded chunks are counted");
+  budget.remove_chunk(counted->bytes);
+  grid->loaded.erase(place.chunk, kStays);
   ++totals.chunks_unloaded;
 }
 
 // Moves arrived and leaving chunks within the time limit, at least one. A short list is moved over several updates: it
-// gets the part of the limit that it has of the longest list that workers make. Unloads no chunk while edits could not
-// be handed to the store.
+// gets the part of the limit that it has of the longest list that workers make. Requires: `sort_leaving`.
 void StreamedWorld::Impl::move_chunks(double seconds, Clock::time_point start, ChunkStreamer::Note& note) {
   has_moved = false;
-  const bool may_leave = !is_edited;
-  const std::size_t waiting = completed_loads.size() + (may_leave ? leaving.size() : 0);
+  const std::size_t waiting = completed_loads.size() + ready_to_leave;
   const double share = std::min(static_cast<double>(waiting) / static_cast<double>(kMaxCompletedLoads), 1.0);
   const Clock::time_point begun = Clock::now();
-  while (!completed_loads.empty() || (may_leave && !leaving.empty())) {
+  while (has_chunks_to_move()) {
     if (has_moved && (seconds_since(start) >= seconds || seconds_since(begun) >= share * seconds)) break;
     has_moved = true;
     // Unloads chunks first to make room for arrivals.
     const bool is_over = budget.is_over();
-    if (may_leave && !leaving.empty() &&
-        (is_over || completed_loads.empty() || leaving.size() >= completed_loads.size())) {
+    if (ready_to_leave != 0 && (is_over || ready_to_leave >= completed_loads.size())) {
       take_away(leaving.front(), note);
       leaving.pop_front();
-    } else if (!completed_loads.empty()) {
+      --ready_to_leave;
+    } else {
       arrived_bytes -= loaded_bytes(completed_loads.front().chunk);
       budget.set_arrived(arrived_bytes);
       put(std::move(completed_loads.front()), note);
       completed_loads.pop_front();
-    } else {
-      break;
     }
   }
 }
@@ -577,13 +575,20 @@ Status StreamedWorld::Impl::plan(std::span<const Viewer> viewers) {
     asked_others = start;
   }
   Status outcome;
+  sort_leaving();
   // Chunks are queued for the disk before they leave memory, and before workers save chunks with new types.
-  const bool is_due = start - saved >= options.save_interval;
-  const bool is_wanted =
-      (is_edited && !leaving.empty()) || moved_since_save > kMaxMoved || scene().types.has_changed_since(saved_types);
-  if (is_due || (is_wanted && !is_refused)) outcome = save_now();
-  if (outcome) outcome = disk->take(store.path());
+  const bool has_types = scene().types.has_changed_since(saved_types);
+  const bool is_wanted = has_types || (is_edited && ready_to_leave < leaving.size());
+  const bool begins = saves.is_due(options.save_interval) || (is_wanted && !saves.is_refused());
+  if (begins && has_types) {
+    outcome = save_now();
+  } else {
+    if (begins && !saves.is_begun()) outcome = begin_save();
+    if (outcome) outcome = saves.step(kSaveShare * options.update_seconds);
+  }
+  if (outcome) outcome = saves.disk().take(store.path());
   if (!store.is_writable()) is_edited = false;
+  sort_leaving();
   find_eyes(viewers);
   return outcome;
 }
@@ -852,6 +857,7 @@ Status StreamedWorld::flush() {
       if (auto saved = impl_->save_now(); !saved) return saved;
     }
     impl_->must_plan |= impl_->asked_left == 0;
+    impl_->sort_leaving();
     impl_->move_chunks(kAsLongAsItTakes, Clock::now(), impl_->unposted);
     impl_->notify_workers();
     if (impl_->waits_for_broken_alone() || impl_->streamer.wait(kWait, idle_waits >= kHelpAfter)) continue;
@@ -864,7 +870,7 @@ Status StreamedWorld::flush() {
   if (auto saved = impl_->save_now(); !saved) return saved;
   if (impl_->store.is_writable()) {
     if (auto flushed = impl_->store.flush(); !flushed) return flushed;
-    impl_->disk->put(impl_->disk->begin(), {});  // the store may not have reported it yet
+    impl_->saves.disk().put(impl_->saves.disk().begin(), {});  // the store may not have reported it yet
   }
   return waits;
 }
@@ -885,7 +891,7 @@ StreamStats StreamedWorld::stats() {
   now.is_complete = impl_->is_quiet() && !impl_->has_unlimited_grids();
   now.waiting_edits = impl_->waiting_chunks();
   now.complete_radius = impl_->box.complete_radius;
-  now.has_save_failed = impl_->is_refused || impl_->disk->has_failed();
+  now.has_save_failed = impl_->saves.is_refused() || impl_->saves.disk().has_failed();
   now.chunks_read = impl_->box.read;
   now.chunks_made = impl_->box.made;
   return now;

@@ -108,6 +108,88 @@ TEST_F(StreamedWorldTest, KeepsEditsAfterEvictionAndGeneratesOnce) {
   EXPECT_EQ(generator->most_asked(), 1);
 }
 
+// With updates that have no time, a save takes several of them.
+TEST_F(StreamedWorldTest, SavesManyEditsOfOneMomentInSeveralUpdates) {
+  StreamOptions options;
+  options.update_seconds = 1e-9;
+  options.save_interval = std::chrono::hours(1);
+  StreamedWorld world = ground(path(), std::make_shared<PatternGround>(), options);
+  const GridHandle handle = only_grid(world);
+  Viewer viewer{.position = {0.0, 0.0, 0.0}, .radius = 500.0};
+  ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+  std::vector<IVec3> edited;
+  for (const IVec3 chunk : world.scene().grids()[handle].grid.loaded_chunks()) {
+    if (chunk.y == -1) edited.push_back(chunk);
+  }
+  ASSERT_GT(edited.size(), 150U);
+  const auto edit_all = [&](VoxelType type) {
+    for (const IVec3 chunk : edited) {
+      if (world.is_loaded(handle, chunk)) world.scene().edit(handle).grid.set(chunk * kChunkEdge, type);
+    }
+  };
+  // Returns the type that the store has, on disk or pending.
+  const auto stored = [&](IVec3 chunk) {
+    const auto found = world.store().load_chunk({0, 0, chunk});
+    return found && *found ? (*found)->voxels.get(0, 0, 0) : kAir;
+  };
+  edit_all(2);
+  viewer.position.x = 1e5;  // chunks that leave are saved first
+  for (int i = 0; stored(edited.front()) != 2; ++i) {
+    ASSERT_LT(i, 50'000);
+    ASSERT_TRUE(world.update({&viewer, 1}).has_value());
+    const bool is_saved = stored(edited.front()) == 2;
+    for (const IVec3 chunk : edited) {
+      ASSERT_EQ(stored(chunk) == 2, is_saved) << "a save is there as a whole, or not at all";
+      ASSERT_TRUE(is_saved || world.is_loaded(handle, chunk)) << "unsaved edits are in memory";
+    }
+    std::this_thread::sleep_for(std::chrono::microseconds(100));
+  }
+  for (const IVec3 chunk : edited) ASSERT_EQ(stored(chunk), 2);
+  edit_all(3);
+  ASSERT_TRUE(world.flush());
+  viewer.position.x = 0.0;
+  ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+  const Grid& grid = world.scene().grids()[handle].grid;
+  for (const IVec3 chunk : edited) ASSERT_GE(grid.get(chunk * kChunkEdge), 2);
+}
+
+TEST_F(StreamedWorldTest, SavesOnlyEditedChunksAfterManyFrames) {
+  StreamOptions options;
+  options.save_interval = std::chrono::hours(1);
+  StreamedWorld world = ground(path(), std::make_shared<PatternGround>(), options);
+  const GridHandle handle = only_grid(world);
+  const Viewer viewer{.radius = 200.0};
+  ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+  ASSERT_TRUE(world.flush());
+  const std::uint64_t before = world.store().stats().saved_chunks;
+  for (int frame = 0; frame < 10'000; ++frame) {  // more than a journal keeps
+    world.scene().edit(handle).grid.set(1, -1, 1, static_cast<VoxelType>(1 + frame % 2));
+    ASSERT_TRUE(world.update({&viewer, 1}).has_value());
+  }
+  ASSERT_TRUE(world.flush());
+  EXPECT_EQ(world.store().stats().saved_chunks - before, 1U);
+}
+
+TEST_F(StreamedWorldTest, UnloadsSavedChunksWhileOthersAreEdited) {
+  StreamOptions options;
+  options.save_interval = std::chrono::hours(1);
+  StreamedWorld world = ground(path(), std::make_shared<PatternGround>(), options);
+  const GridHandle handle = only_grid(world);
+  Viewer viewer{.radius = 200.0};
+  ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+  const std::uint64_t unloaded = world.stats().chunks_unloaded;
+  viewer.position.x = 1e5;
+  VoxelType type = 1;
+  for (int i = 0; i < 5000 && world.is_loaded(handle, {0, 0, 1}); ++i) {
+    type = static_cast<VoxelType>(3 - type);
+    if (world.is_loaded(handle, {0, -1, 0})) world.scene().edit(handle).grid.set(1, -1, 1, type);
+    ASSERT_TRUE(world.update({&viewer, 1}).has_value());
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  EXPECT_FALSE(world.is_loaded(handle, {0, 0, 1}));
+  EXPECT_GT(world.stats().chunks_unloaded, unloaded + 10);
+}
+
 TEST_F(StreamedWorldTest, SavesEditsOnDestruction) {
   auto generator = std::make_shared<PatternGround>();
   {

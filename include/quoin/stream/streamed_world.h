@@ -88,7 +88,9 @@ struct StreamOptions {
   /// empty.
   std::function<std::size_t()> other_bytes{};
   /// Maximum time in which one `update` call adds and unloads chunks, in seconds; at least one chunk per call. If few
-  /// chunks wait, `update` spreads them over several calls.
+  /// chunks wait, `update` spreads them over several calls. Half of this time is also the maximum in which a call of
+  /// `update` or `plan` copies edited chunks for a save, at least 16 per call: a save of many chunks takes several
+  /// calls.
   double update_seconds = 0.0005;
   /// Minimum time between two saves in `update`; 0: saves in every call.
   std::chrono::milliseconds save_interval{1000};
@@ -149,7 +151,9 @@ struct WorldExtent {
 ///           stores with SceneGrid::whole. They are fully in memory from the start; `open` loads them.
 ///           All other grids of a file are streamed: those of files that earlier versions wrote, and those that
 ///           write_world and WorldSaver stored without SceneGrid::whole.
-/// Saving:   grids, instances and groups are saved unless they are marked as not saved (`is_saved`).
+/// Saving:   grids, instances and groups are saved unless they are marked as not saved (`is_saved`). Each save has the
+///           state of one moment, as one commit, however many calls of `update` collect it. Chunks with edits that no
+///           save has yet are not unloaded.
 /// Order:    loaded, saved and generated chunks depend on the edits and viewer positions, never on threads or timing.
 /// Memory:   chunks, including pending loads, are counted before they are read. Far chunks are unloaded first.
 /// Safety:   as WorldStore; `flush` returns when everything is on disk. A read-only world keeps edits in memory.
@@ -207,7 +211,8 @@ class StreamedWorld {
 
   /// Adds the chunks that workers have loaded or generated, unloads far chunks and requests new ones. Call it once per
   /// frame.
-  /// Cost:   StreamOptions::update_seconds for moving chunks; plus WorldSaver::save for the edits when a save is due.
+  /// Cost:   StreamOptions::update_seconds for moving chunks and for saving; plus O(chunks edited since the last call),
+  ///         and WorldSaver::begin when a save is due. New voxel types are saved at once, with all edits.
   ///         Calls StreamOptions::other_bytes, and waits for it.
   /// Errors: as WorldSaver::save and WorldStore::wait (disk full, ...), once per failed save. Everything else is done
   ///         all the same. Unsaved edits stay in memory, and the next save retries (StreamStats::has_save_failed).
