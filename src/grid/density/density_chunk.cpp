@@ -6,7 +6,6 @@
 #include <cstring>
 
 #include <quoin/core/assert.h>
-#include <quoin/core/memory.h>
 
 #include "core/rows/packed_row.h"
 #include "grid/density/density_storage.h"
@@ -14,7 +13,7 @@
 namespace quoin {
 namespace {
 
-constexpr std::size_t kSlabValues = std::size_t{kSlabRows} * kChunkEdge;
+constexpr std::size_t kSlabValues = SlabValues::kSlabValues;
 
 std::uint64_t differences(const Half* a, const Half* b) {
   std::uint64_t mask = 0;
@@ -92,23 +91,98 @@ void DensityChunk::make_mixed() {
   storage_->solid.fill(is_solid(uniform_) ? ~std::uint64_t{0} : 0);
 }
 
-// Returns a slot of a slab for writing. A uniform slab gets a slot filled with its density.
-std::uint32_t DensityChunk::slot_for_writing(std::size_t slab) {
-  DensityStorage& m = *storage_;
-  QUOIN_ASSERT(slab < m.slabs.size() && m.values.size() % kSlabValues == 0, "a slab of the chunk, and whole slots");
-  const std::uint32_t entry = m.slabs[slab];
-  if ((entry & ChunkStorage::kUniformSlab) == 0) return entry;
-  std::uint32_t slot = 0;
-  if (!m.free_slots.empty()) {
-    slot = m.free_slots.back();
-    m.free_slots.pop_back();
-  } else {
-    slot = static_cast<std::uint32_t>(m.values.size() / kSlabValues);
-    m.values.resize(m.values.size() + kSlabValues);
+SlabValues::SlabValues(std::size_t slots, std::size_t owned) {
+  QUOIN_ASSERT(owned <= slots, "owned slots are slots");
+  static_assert(alignof(Block) <= __STDCPP_DEFAULT_NEW_ALIGNMENT__ && sizeof(Block) % alignof(Owners) == 0);
+  if (slots == 0) return;
+  void* const memory = allocate_block(bytes_of(slots));
+  block_ = Ref<Block>(new (memory) Block(slots));
+  auto* const counts = reinterpret_cast<Owners*>(block_.get() + 1);
+  for (std::size_t i = 0; i < slots; ++i) std::construct_at(counts + i, i < owned ? 1U : 0U);
+  data_ = reinterpret_cast<Half*>(static_cast<std::byte*>(memory) + bytes_before_values(slots));
+  next_ = static_cast<std::uint32_t>(owned);
+}
+
+std::size_t SlabValues::allocated() const {
+  return block_ == nullptr ? 0 : bytes_of(block_->slots);
+}
+
+std::optional<std::uint32_t> SlabValues::take() {
+  const auto slots = static_cast<std::uint32_t>(block_ == nullptr ? 0 : block_->slots);
+  for (std::uint32_t i = 0; i < slots; ++i) {
+    const std::uint32_t slot = next_ + i < slots ? next_ + i : next_ + i - slots;
+    // Acquire: the last owner's reads come before the writes of this one.
+    std::uint32_t none = 0;
+    if (owners(slot).load(std::memory_order_relaxed) != 0 ||
+        !owners(slot).compare_exchange_strong(none, 1, std::memory_order_acquire)) {
+      continue;
+    }
+    next_ = slot + 1 == slots ? 0 : slot + 1;
+    return slot;
   }
-  std::fill_n(m.values.data() + std::size_t{slot} * kSlabValues, kSlabValues, static_cast<Half>(entry));
-  m.slabs[slab] = slot;
-  return slot;
+  return std::nullopt;
+}
+
+DensityStorage::DensityStorage(const DensityStorage& other)
+    : RefCounted(other), slabs(other.slabs), values(other.values), solid(other.solid) {
+  for (const std::uint32_t slab : slabs) {
+    if (is_mixed(slab)) values.retain(slab);
+  }
+}
+
+DensityStorage::~DensityStorage() {
+  for (const std::uint32_t slab : slabs) {
+    if (is_mixed(slab) && values.size() != 0) values.release(slab);
+  }
+}
+
+void DensityStorage::move_values(std::size_t spare) {
+  const std::size_t mixed = mixed_slabs();
+  SlabValues moved(mixed + spare, mixed);
+  std::uint32_t slot = 0;
+  for (std::uint32_t& slab : slabs) {
+    if (!is_mixed(slab)) continue;
+    std::copy_n(row(slab, 0), kSlabValues, moved.data() + slot * kSlabValues);
+    values.release(slab);
+    slab = slot++;
+  }
+  values = std::move(moved);
+}
+
+// Replaces a block without free slots by a larger one. It has spare slots for later versions of slabs if there are other
+// owners of slots, else for at most all slabs of the chunk.
+void DensityStorage::add_slots() {
+  const std::size_t mixed = mixed_slabs();
+  if (values.is_shared()) return move_values(std::max<std::size_t>(mixed / 2, 32));
+  move_values(std::clamp<std::size_t>(slabs.size() - mixed, 1, mixed / 2 + 4));
+}
+
+std::uint32_t DensityStorage::slot_for_writing(std::size_t slab) {
+  QUOIN_ASSERT(slab < slabs.size(), "a slab of the chunk");
+  const auto is_own = [&] { return is_mixed(slabs[slab]) && values.is_sole(slabs[slab]); };
+  if (is_own()) return slabs[slab];
+  std::optional<std::uint32_t> slot = values.take();
+  if (!slot) {
+    add_slots();
+    if (is_own()) return slabs[slab];
+    slot = values.take();
+  }
+  QUOIN_ASSERT(slot.has_value(), "a new block has free slots");
+  const std::uint32_t entry = slabs[slab];
+  if (is_mixed(entry)) {
+    std::copy_n(row(entry, 0), kSlabValues, row(*slot, 0));
+    values.release(entry);
+  } else {
+    std::fill_n(row(*slot, 0), kSlabValues, static_cast<Half>(entry));
+  }
+  slabs[slab] = *slot;
+  return *slot;
+}
+
+void DensityStorage::make_uniform(std::size_t slab, Half density) {
+  QUOIN_ASSERT(slab < slabs.size(), "a slab of the chunk");
+  if (is_mixed(slabs[slab])) values.release(slabs[slab]);
+  slabs[slab] = ChunkStorage::kUniformSlab | density;
 }
 
 std::uint64_t DensityChunk::write_row(int y, int z, std::span<const float, kChunkEdge> densities, float band) {
@@ -131,9 +205,9 @@ std::uint64_t DensityChunk::write_row(int y, int z, std::span<const Half, kChunk
   const std::uint64_t changed = differences(old, densities.data());
   if (storage_ == nullptr) make_mixed();
   storage_.make_own();
-  const std::uint32_t slot = slot_for_writing(ChunkStorage::slab_index(y, z));
-  const std::size_t first = (std::size_t{slot} * kSlabRows + static_cast<std::size_t>(ChunkStorage::row_in_slab(y, z)));
-  std::memcpy(storage_->values.data() + first * kChunkEdge, densities.data(), sizeof(Half) * kChunkEdge);
+  const std::uint32_t slot = storage_->slot_for_writing(ChunkStorage::slab_index(y, z));
+  Half* const written = storage_->row(slot, ChunkStorage::row_in_slab(y, z));
+  std::memcpy(written, densities.data(), sizeof(Half) * kChunkEdge);
   storage_->solid[static_cast<std::size_t>(z * kChunkEdge + y)] = solid_bits(densities.data());
   return changed;
 }
@@ -161,7 +235,7 @@ void DensityStorage::turn_outward(DensityChunk& chunk, const std::array<std::uin
       m.slabs[slab] &= ChunkStorage::kUniformSlab | kMagnitude;
       continue;
     }
-    const std::uint32_t slot = chunk.slot_for_writing(slab);
+    const std::uint32_t slot = m.slot_for_writing(slab);
     for (std::size_t row = 0; row < kSlabRows; ++row) {
       const std::uint64_t turned = rows[number(row)];
       Half* const values = m.row(slot, static_cast<int>(row));
@@ -182,8 +256,7 @@ void DensityChunk::unite_slabs() {
     if (std::memcmp(values, values + 1, sizeof(Half) * (kSlabValues - 1)) != 0) continue;
     const Half value = *values;
     storage_.make_own();
-    storage_->free_slots.push_back(slab);
-    storage_->slabs[i] = ChunkStorage::kUniformSlab | value;
+    storage_->make_uniform(i, value);
   }
   const std::uint32_t first = storage_->slabs[0];
   if ((first & ChunkStorage::kUniformSlab) == 0) return;
@@ -196,19 +269,8 @@ void DensityChunk::compact() {
   unite_slabs();
   materials_.compact();
   // Copies would keep the shared memory anyway.
-  if (storage_ == nullptr || storage_.is_shared()) return;
-  BlockVector<Half> values;
-  DensityStorage& m = *storage_;
-  values.reserve(m.values.size() - m.free_slots.size() * kSlabValues);
-  for (std::uint32_t& slab : m.slabs) {
-    if ((slab & ChunkStorage::kUniformSlab) != 0) continue;
-    const Half* from = m.row(slab, 0);
-    slab = static_cast<std::uint32_t>(values.size() / kSlabValues);
-    values.insert(values.end(), from, from + kSlabValues);
-  }
-  QUOIN_ASSERT(values.size() == m.values.size() - m.free_slots.size() * kSlabValues, "each slot is free or in use");
-  m.values = std::move(values);
-  m.free_slots = {};
+  if (storage_ == nullptr || storage_.is_shared() || storage_->values.is_shared()) return;
+  if (storage_->values.size() != storage_->mixed_slabs() * kSlabValues) storage_->move_values(0);
 }
 
 bool DensityChunk::is_full() const {
@@ -246,8 +308,7 @@ std::uint64_t DensityChunk::content_hash() const {
 std::size_t DensityChunk::bytes() const {
   const std::size_t fixed = sizeof(DensityChunk) - sizeof(Chunk) + materials_.bytes();
   if (storage_ == nullptr) return fixed;
-  return fixed + sizeof(DensityStorage) + storage_->values.capacity() * sizeof(Half) +
-         storage_->free_slots.capacity() * sizeof(std::uint32_t);
+  return fixed + sizeof(DensityStorage) + storage_->values.allocated();
 }
 
 }  // namespace quoin

@@ -1,9 +1,13 @@
 #include <quoin/grid/density_chunk.h>
 
+#include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <random>
+#include <thread>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -157,6 +161,127 @@ TEST(DensityChunk, StoresOnlyDifferingSlabs) {
   EXPECT_EQ(chunk.get(5, 0, 0), 0);
   EXPECT_EQ(chunk.solid_row(0, 0), 0U);
   EXPECT_LT(chunk.bytes(), sizeof(DensityChunk) + sizeof(DensityStorage) + 2 * 2 * 16 * 64);
+}
+
+// Returns a row of a slab that is not uniform.
+std::array<Half, kChunkEdge> mixed_row(unsigned seed) {
+  std::array<Half, kChunkEdge> row;
+  for (std::size_t x = 0; x < kChunkEdge; ++x) {
+    row[x] = stored_density(static_cast<float>((seed * 31 + x * 7) % 100) - 50.0F, 8.0F);
+  }
+  return row;
+}
+
+// Returns a chunk whose slabs all have values of their own.
+DensityChunk full_chunk() {
+  DensityChunk chunk(kFar);
+  for (int z = 0; z < kChunkEdge; z += 4) {
+    for (int y = 0; y < kChunkEdge; y += 4) chunk.write_row(y, z, mixed_row(static_cast<unsigned>(z * 64 + y)));
+  }
+  return chunk;
+}
+
+int shared_slabs(const DensityChunk& a, const DensityChunk& b) {
+  int count = 0;
+  for (int z = 0; z < kChunkEdge; z += 4) {
+    for (int y = 0; y < kChunkEdge; y += 4) count += static_cast<int>(a.row(y, z) == b.row(y, z));
+  }
+  return count;
+}
+
+TEST(DensityChunk, CopiesOnlyWrittenSlabsOfSharedChunks) {
+  DensityChunk chunk = full_chunk();
+  {
+    const DensityChunk snapshot = chunk;
+    chunk.write_row(5, 9, mixed_row(1));  // may move all slabs, to have room for more
+  }
+  const DensityChunk snapshot = chunk;
+  for (int frame = 0; frame < 20; ++frame) {
+    const DensityChunk later = chunk;
+    chunk.write_row(5, 9, mixed_row(static_cast<unsigned>(2 + frame)));
+    EXPECT_EQ(shared_slabs(later, chunk), 255) << frame;
+    chunk.write_row(62, 33, mixed_row(static_cast<unsigned>(50 + frame)));
+    chunk.write_row(63, 33, mixed_row(static_cast<unsigned>(90 + frame)));
+    EXPECT_EQ(shared_slabs(later, chunk), 254) << frame;
+    EXPECT_EQ(shared_slabs(snapshot, chunk), 254) << frame;
+  }
+  std::array<Half, kChunkEdge> row;
+  snapshot.read_row(5, 9, row);
+  EXPECT_EQ(row, mixed_row(1));
+  // Without other owners the block is as large as its contents again.
+  DensityChunk other = full_chunk();
+  const std::size_t bytes = other.bytes();
+  {
+    const DensityChunk first = other;
+    other.write_row(0, 0, mixed_row(7));
+    const DensityChunk second = other;
+    other.write_row(0, 0, mixed_row(8));
+    other.compact();
+    EXPECT_GT(other.bytes(), bytes) << "the copy would keep the memory";
+  }
+  other.compact();
+  EXPECT_EQ(other.bytes(), bytes);
+}
+
+TEST(DensityChunk, KeepsVersionsApart) {
+  std::mt19937 random(20261129);
+  struct Version {
+    DensityChunk chunk;
+    PlainChunk plain;
+  };
+  std::vector<Version> versions;
+  versions.push_back({full_chunk(), PlainChunk(kFar)});
+  for (int z = 0; z < kChunkEdge; z += 4) {
+    for (int y = 0; y < kChunkEdge; y += 4) {
+      const auto row = mixed_row(static_cast<unsigned>(z * 64 + y));
+      std::copy(row.begin(), row.end(), versions[0].plain.row(y, z));
+    }
+  }
+  for (int round = 0; round < 400; ++round) {
+    const std::size_t from = random() % versions.size();
+    Version next = versions[from];
+    const int count = 1 + static_cast<int>(random() % 12);
+    for (int i = 0; i < count; ++i) {
+      const int y = static_cast<int>(random() % 64);
+      const int z = static_cast<int>(random() % 64);
+      auto row = mixed_row(random());
+      if (random() % 3 == 0) row.fill(random() % 2 == 0 ? kDeep : kFar);
+      next.chunk.write_row(y, z, row);
+      std::copy(row.begin(), row.end(), next.plain.row(y, z));
+    }
+    if (random() % 4 == 0) next.chunk.unite_slabs();
+    if (random() % 16 == 0) next.chunk.compact();
+    if (versions.size() == 8) {
+      versions[random() % versions.size()] = std::move(next);
+    } else {
+      versions.push_back(std::move(next));
+    }
+    if (round % 50 != 49) continue;
+    for (Version& version : versions) expect_equal(version.chunk, version.plain);
+  }
+}
+
+TEST(DensityChunk, IsWrittenWhileOtherThreadsReadAndDestroyCopies) {
+  DensityChunk chunk = full_chunk();
+  std::atomic<int> wrong = 0;
+  for (int round = 0; round < 20; ++round) {
+    std::vector<std::thread> readers;
+    for (int reader = 0; reader < 3; ++reader) {
+      readers.emplace_back([&wrong, copy = chunk, reader]() mutable {
+        const std::uint64_t before = copy.content_hash();
+        DensityChunk own = copy;  // written by this thread
+        own.write_row(4 * reader, 8, mixed_row(static_cast<unsigned>(reader)));
+        wrong += static_cast<int>(copy.content_hash() != before);
+        copy = DensityChunk(kFar);
+      });
+    }
+    for (int i = 0; i < 200; ++i) {
+      const auto at = static_cast<unsigned>(round * 200 + i);
+      chunk.write_row(static_cast<int>(at * 5 % 64), static_cast<int>(at * 13 % 64), mixed_row(at));
+    }
+    for (std::thread& reader : readers) reader.join();
+  }
+  EXPECT_EQ(wrong, 0);
 }
 
 TEST(DensityNeighbourhood, ReadsAcrossChunksAndOutside) {

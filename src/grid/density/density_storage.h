@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <new>
+#include <optional>
 #include <utility>
-#include <vector>
 
 #include <quoin/core/assert.h>
 #include <quoin/core/half.h>
@@ -14,6 +17,7 @@
 #include <quoin/core/vec.h>
 #include <quoin/grid/density_chunk.h>
 
+#include "core/large_array.h"
 #include "grid/chunk/chunk_storage.h"
 
 namespace quoin {
@@ -42,8 +46,79 @@ inline Half stored_within(float density, Half band) {
   return static_cast<Half>(magnitude | (bits >> 16 & 0x8000U));
 }
 
-/// The densities of a chunk of several. Shared by copies of the chunk until one of them is written.
+/// The values of slabs in one block of memory, which several storages share. The first write to a slab whose slot has
+/// several owners takes another slot of the block, so it copies one slab and moves no other.
+///
+///   storage of a snapshot   slabs: 0 1 2          block   slot     0  1  2  3
+///   storage of the chunk    slabs: 0 3 2                  owners   2  1  2  1
+///
+/// Threads: storages with slots in one block may be read, written, copied and destroyed on several threads at once,
+///          each by one thread at a time, as Ref. Only owners read a slot, and only a sole owner writes it.
+class SlabValues {
+ public:
+  static constexpr std::size_t kSlabValues = std::size_t{kSlabRows} * kChunkEdge;
+
+  SlabValues() = default;
+  /// Creates slots with unspecified values. The caller owns the first `owned`, the others are free.
+  SlabValues(std::size_t slots, std::size_t owned);
+
+  /// Returns the values, [slot][z % 4][y % 4][x].
+  [[nodiscard]] const Half* data() const { return data_; }
+  [[nodiscard]] Half* data() { return data_; }
+  /// Returns the number of values, those of free slots included.
+  [[nodiscard]] std::size_t size() const { return block_ == nullptr ? 0 : block_->slots * kSlabValues; }
+  /// Returns the allocated bytes, including those of other owners.
+  [[nodiscard]] std::size_t allocated() const;
+
+  /// Adds an owner to a slot. Requires: it has one, which does not release it meanwhile.
+  void retain(std::uint32_t slot) const { owners(slot).fetch_add(1, std::memory_order_relaxed); }
+  /// Removes an owner from a slot. Without owners it is free.
+  void release(std::uint32_t slot) const { owners(slot).fetch_sub(1, std::memory_order_acq_rel); }
+  /// Returns true if the slot has one owner.
+  [[nodiscard]] bool is_sole(std::uint32_t slot) const { return owners(slot).load(std::memory_order_acquire) == 1; }
+  /// Takes a free slot; nullopt if there is none.
+  [[nodiscard]] std::optional<std::uint32_t> take();
+  /// Returns true if other storages use the block.
+  [[nodiscard]] bool is_shared() const { return block_ != nullptr && block_.is_shared(); }
+
+ private:
+  using Owners = std::atomic<std::uint32_t>;
+  // The owners and the values follow this object in memory.
+  struct alignas(16) Block : RefCounted {
+    explicit Block(std::size_t count) : slots(count) {}
+    static void operator delete(Block* block, std::destroying_delete_t) {
+      const std::size_t bytes = bytes_of(block->slots);
+      block->~Block();
+      free_block(block, bytes);
+    }
+    std::size_t slots;
+  };
+
+  // The bytes of a block, and those before its values.
+  static std::size_t bytes_before_values(std::size_t slots) {
+    return sizeof(Block) + (slots * sizeof(Owners) + 15) / 16 * 16;
+  }
+  static std::size_t bytes_of(std::size_t slots) {
+    return bytes_before_values(slots) + slots * kSlabValues * sizeof(Half);
+  }
+  [[nodiscard]] Owners& owners(std::uint32_t slot) const {
+    QUOIN_ASSERT(block_ != nullptr && slot < block_->slots, "a slot of the block");
+    return reinterpret_cast<Owners*>(block_.get() + 1)[slot];
+  }
+
+  Half* data_ = nullptr;
+  Ref<Block> block_;
+  std::uint32_t next_ = 0;  // where `take` begins to look
+};
+
+/// The densities of a chunk of several. Copies of the chunk share it until one of them is written: the writer copies
+/// the tables, and slabs as it writes them.
 struct DensityStorage : RefCounted, LargeObject {
+  DensityStorage() = default;
+  DensityStorage(const DensityStorage& other);
+  DensityStorage& operator=(const DensityStorage&) = delete;
+  ~DensityStorage();
+
   /// Returns the storage of a chunk; null if it is uniform.
   [[nodiscard]] static const DensityStorage* of(const DensityChunk& chunk) { return chunk.storage_.get(); }
   /// Creates a chunk of these densities. Requires: at least two values; each is a `stored_density`, and `solid` agrees.
@@ -58,9 +133,22 @@ struct DensityStorage : RefCounted, LargeObject {
   /// Negates the density of solid samples. `rows`: [z][y] masks of these samples; all must be solid.
   static void turn_outward(DensityChunk& chunk, const std::array<std::uint64_t, kChunkEdge * kChunkEdge>& rows);
 
-  std::array<std::uint32_t, 256> slabs{};  ///< [z / 4][y / 4]: ChunkStorage::kUniformSlab | half, or a slot in `values`
-  BlockVector<Half> values;                ///< [slot][z % 4][y % 4][x]
-  BlockVector<std::uint32_t> free_slots;
+  /// Returns a slot of a slab for writing, with the slab's values. A uniform slab gets a slot filled with its density.
+  /// Errors: bad_alloc; the densities are unchanged.
+  std::uint32_t slot_for_writing(std::size_t slab);
+  /// Replaces a slab by one density.
+  void make_uniform(std::size_t slab, Half density);
+  /// Moves the values to a block of their own with `spare` free slots.
+  void move_values(std::size_t spare);
+  [[nodiscard]] std::size_t mixed_slabs() const {
+    return static_cast<std::size_t>(std::count_if(slabs.begin(), slabs.end(), is_mixed));
+  }
+  [[nodiscard]] static bool is_mixed(std::uint32_t entry) { return (entry & ChunkStorage::kUniformSlab) == 0; }
+
+  // The ray kernels read both tables at their addresses.
+  std::array<std::uint32_t, 256> slabs =
+      all_uniform(0);  ///< [z / 4][y / 4]: kUniformSlab | half, or a slot in `values`
+  SlabValues values;   ///< of the mixed slabs: the storage owns their slots
   std::array<std::uint64_t, kChunkEdge * kChunkEdge> solid{};  ///< [z][y]: the signs of a row
 
   [[nodiscard]] const Half* row(std::uint32_t slot, int row_in_slab) const {
@@ -71,6 +159,14 @@ struct DensityStorage : RefCounted, LargeObject {
   [[nodiscard]] Half* row(std::uint32_t slot, int row_in_slab) {
     return const_cast<Half*>(std::as_const(*this).row(slot, row_in_slab));
   }
+
+ private:
+  static constexpr std::array<std::uint32_t, 256> all_uniform(Half density) {
+    std::array<std::uint32_t, 256> slabs{};
+    slabs.fill(ChunkStorage::kUniformSlab | density);
+    return slabs;
+  }
+  void add_slots();
 };
 
 /// Reads the densities of the eight corners of a cell between samples. Corner i lies `size` samples further along x, y

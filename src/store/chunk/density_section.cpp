@@ -244,7 +244,7 @@ Status read_rows(ContentReader& reader, const StoredHalves& stored, Half largest
   const std::size_t begin = reader.at();
   if (!reader.has(slots * kSlabValues * sizeof(Half))) return reader.cut_off();
   QUOIN_ASSERT(slots <= kSlabs, "at most the slabs of a chunk");
-  m.values.resize(slots * kSlabValues);
+  m.values = SlabValues(slots, slots);
   const std::byte* low = reader.take_bytes(m.values.size()).data();
   const std::byte* high = reader.take_bytes(m.values.size()).data();
   const std::byte* const first = low;
