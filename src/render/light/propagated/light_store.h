@@ -5,13 +5,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <set>
 #include <span>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/ref.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/changes.h>
 #include <quoin/grid/chunk.h>
@@ -26,7 +25,8 @@ namespace quoin::propagated {
 
 /// The chunks whose light is stored: chunks at most one away from a chunk with voxels, and the gaps between them in
 /// each column. Space above them, and columns without them, are open sky; space below is dark. Light that leaves the
-/// domain reaches no surface, since a chunk is wider than the range of light.
+/// domain reaches no surface, since a chunk is wider than the range of light. A copy costs a pointer and shares columns
+/// until they change.
 class LightDomain {
  public:
   struct Range {
@@ -41,30 +41,44 @@ class LightDomain {
   };
 
   [[nodiscard]] bool has_voxels(IVec3 chunk) const {
-    const auto column = columns_.find({chunk.x, 0, chunk.z});
-    return column != columns_.end() && column->second.count(chunk.y) > 0;
+    const Column* const column = find(chunk.x, chunk.z);
+    if (column == nullptr || column->filled == nullptr) return false;
+    return std::ranges::binary_search(column->filled->ys, chunk.y);
   }
   /// Records that a chunk has voxels now, or has none any more. Appends the columns whose stored range changed.
+  /// Cost: a copy of the columns next to it, if copies of the domain share them.
   void set(IVec3 chunk, bool has_voxels, std::vector<Change>& changed) {
-    std::set<int>& column = columns_[{chunk.x, 0, chunk.z}];
-    const bool is_news = has_voxels ? column.insert(chunk.y).second : column.erase(chunk.y) > 0;
-    if (column.empty()) columns_.erase({chunk.x, 0, chunk.z});
-    for (int z = chunk.z - 1; is_news && z <= chunk.z + 1; ++z) {
+    if (has_voxels == this->has_voxels(chunk)) return;
+    Column& column = columns_.find_or_create(place_of(chunk.x, chunk.z), kStays);
+    if (column.filled == nullptr) column.filled = make_ref<Filled>();
+    column.filled.make_own();
+    std::vector<int>& ys = column.filled->ys;
+    const auto at = std::ranges::lower_bound(ys, chunk.y);
+    if (has_voxels) {
+      ys.insert(at, chunk.y);
+    } else {
+      ys.erase(at);
+    }
+    if (ys.empty()) column.filled.reset();
+    for (int z = chunk.z - 1; z <= chunk.z + 1; ++z) {
       for (int x = chunk.x - 1; x <= chunk.x + 1; ++x) {
         const Range before = range(x, z);
         const Range now = found_range(x, z);
         if (before == now) continue;
         changed.push_back({x, z, before, now});
-        ranges_[{x, 0, z}] = now;
-        if (now == Range{}) ranges_.erase({x, 0, z});
+        if (now == Range{}) {
+          columns_.erase(place_of(x, z), kStays);
+        } else {
+          columns_.find_or_create(place_of(x, z), kStays).range = now;
+        }
       }
     }
   }
 
   /// y of the chunks of a column; empty for one that is open to the sky.
   [[nodiscard]] Range range(int x, int z) const {
-    const auto found = ranges_.find({x, 0, z});
-    return found == ranges_.end() ? Range{} : found->second;
+    const Column* const column = find(x, z);
+    return column == nullptr ? Range{} : column->range;
   }
   [[nodiscard]] bool holds(IVec3 chunk) const {
     const Range found = range(chunk.x, chunk.z);
@@ -80,7 +94,7 @@ class LightDomain {
   /// Calls `visit(x, z, range)` for each column with chunks, in no particular order.
   template <class Visit>
   void for_each_range(Visit&& visit) const {
-    for (const auto& [column, range] : ranges_) visit(column.x, column.z, range);
+    columns_.for_each([&](IVec3 place, const Column& column) { visit(place.x, place.y + 4 * place.z, column.range); });
   }
 
  private:
@@ -88,19 +102,34 @@ class LightDomain {
     std::optional<Range> all;
     for (int dz = -1; dz <= 1; ++dz) {
       for (int dx = -1; dx <= 1; ++dx) {
-        const auto found = columns_.find({x + dx, 0, z + dz});
-        if (found == columns_.end()) continue;
-        QUOIN_ASSERT(!found->second.empty(), "a column has chunks");
-        const int begin = *found->second.begin() - 1;
-        const int end = *found->second.rbegin() + 2;
+        const Column* const column = find(x + dx, z + dz);
+        if (column == nullptr || column->filled == nullptr) continue;
+        QUOIN_ASSERT(!column->filled->ys.empty(), "some chunks with voxels");
+        const int begin = column->filled->ys.front() - 1;
+        const int end = column->filled->ys.back() + 2;
         all = all ? Range{std::min(all->begin, begin), std::max(all->end, end)} : Range{begin, end};
       }
     }
     return all.value_or(Range{});
   }
 
-  std::unordered_map<IVec3, std::set<int>, CoordinateHash> columns_;  // [x, 0, z]: y of chunks with voxels
-  std::unordered_map<IVec3, Range, CoordinateHash> ranges_;           // [x, 0, z]: non-empty ranges
+  struct Filled : RefCounted {
+    std::vector<int> ys;  // of the chunks with voxels, ascending
+  };
+  struct Column {
+    Range range;         // empty only during `set`
+    Ref<Filled> filled;  // null: no chunk of the column has voxels
+  };
+  static constexpr auto kStays = [](auto&) {};
+
+  // 64 columns share a leaf of the trie: 4 along x, 16 along z.
+  static IVec3 place_of(int x, int z) { return {x, z & 3, z >> 2}; }
+  [[nodiscard]] const Column* find(int x, int z) const {
+    const IVec3 place = place_of(x, z);
+    return columns_.find(place.x, place.y, place.z);
+  }
+
+  ChunkTrie<Column> columns_;
 };
 
 /// The new light of one chunk.

@@ -17,7 +17,6 @@
 
 #include <quoin/core/assert.h>
 #include <quoin/core/direction.h>
-#include <quoin/core/ref.h>
 
 #include "core/coordinates/chunk_order.h"
 #include "core/moved_from.h"
@@ -92,11 +91,6 @@ unsigned lamp_channels(const Chunk& chunk, const std::vector<TypeLight>& lights)
   }
   return channels;
 }
-
-// Snapshots have it in common until chunks come or go.
-struct SharedDomain : RefCounted {
-  LightDomain columns;
-};
 
 // The masks of a chunk, as far as they were read.
 struct CachedMasks {
@@ -416,13 +410,13 @@ struct PropagatedLight::Impl {
         followed_types(other.followed_types),
         shared_lights(other.shared_lights),
         rim(other.rim),
-        shared_domain(other.shared_domain),
+        columns(other.columns),
         store(other.store),
         visited_rows(other.visited_rows) {}
   Impl& operator=(const Impl&) = delete;
 
   [[nodiscard]] const std::vector<TypeLight>& lights() const { return *shared_lights; }
-  [[nodiscard]] const LightDomain& domain() const { return shared_domain->columns; }
+  [[nodiscard]] const LightDomain& domain() const { return columns; }
   [[nodiscard]] LightReader reader() const { return {store, domain()}; }
   void follow_types(const VoxelRegistry& types);
   void begin_anew(const Grid& grid);
@@ -443,7 +437,7 @@ struct PropagatedLight::Impl {
   ChangeCursor followed_types;
   std::shared_ptr<const std::vector<TypeLight>> shared_lights = std::make_shared<const std::vector<TypeLight>>();
   int rim = 0;  // see rim_of
-  Ref<SharedDomain> shared_domain = make_ref<SharedDomain>();
+  LightDomain columns;
   LightStore store;                // of the chunks of the domain
   std::uint64_t visited_rows = 0;  // see PropagatedLight::visited_rows
   std::vector<LightBoxes> dirty;   // boxes that are to be solved by themselves
@@ -478,10 +472,10 @@ void PropagatedLight::Impl::begin_anew(const Grid& grid) {
   domain().for_each_range(darken);
   for (const LightDomain::Change& column : changed_columns) darken(column.x, column.z, column.before);
   changed_columns.clear();
-  shared_domain = make_ref<SharedDomain>();
+  columns = {};
   store.clear();
   std::vector<LightDomain::Change> changed;
-  for (const IVec3 chunk : grid.chunks()) shared_domain->columns.set(chunk, true, changed);
+  for (const IVec3 chunk : grid.chunks()) columns.set(chunk, true, changed);
   domain().for_each_range(darken);
   domain().for_each_range([&](int x, int z, const LightDomain::Range& range) {
     const IBox column{IVec3(x, range.begin, z) * kChunkEdge, IVec3(x + 1, range.end, z + 1) * kChunkEdge};
@@ -512,8 +506,7 @@ void PropagatedLight::Impl::change_domain(const Grid& grid, const std::vector<IV
   for (const IVec3 chunk : chunks) {
     const bool has_voxels = grid.find_chunk(chunk) != nullptr;
     if (has_voxels == domain().has_voxels(chunk)) continue;
-    shared_domain.make_own();
-    shared_domain->columns.set(chunk, has_voxels, changed_columns);
+    columns.set(chunk, has_voxels, changed_columns);
   }
   std::map<IVec3, LightDomain::Range, ByZyx> before;  // [x, 0, z]
   for (const LightDomain::Change& column : changed_columns) {
