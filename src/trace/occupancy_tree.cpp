@@ -63,11 +63,7 @@ constexpr int kChunksCopied = 256;
 // Flat tables up to this size are made for any world, even a sparse one.
 constexpr std::int64_t kSmallTables = std::int64_t{1} << 20;
 
-// The index of a unit in a node's table of 16^3, and its word and bit in a node.
-std::size_t table_index(IVec3 unit) {
-  QUOIN_ASSERT(((unit.x | unit.y | unit.z) & ~15) == 0, "0 <= x, y, z < 16");
-  return static_cast<std::size_t>(unit.x + 16 * unit.y + 256 * unit.z);
-}
+// The word and bit of a unit in a node.
 std::size_t word_of(IVec3 unit) {
   QUOIN_ASSERT(((unit.x | unit.y | unit.z) & ~15) == 0, "0 <= x, y, z < 16");
   return static_cast<std::size_t>((unit.x >> 2) + 4 * (unit.y >> 2) + 16 * (unit.z >> 2));
@@ -189,33 +185,28 @@ struct OccupancyTree::Impl {
     if (found == regions.end()) return;
     RegionNode& region = *found.value();
     const IVec3 unit{chunk.x & 15, chunk.y & 15, chunk.z & 15};
-    std::uint32_t& index = region.nodes[table_index(unit)];
+    const std::uint32_t index = region.node(word_of(unit), bit_of(unit));
     if (index == 0) return;
-    QUOIN_ASSERT((region.chunks[word_of(unit)] >> bit_of(unit) & 1U) != 0, "a region's bits match its nodes");
     QUOIN_ASSERT(index < chunk_nodes.size(), "an existing node");
     release_bricks(*chunk_nodes[index]);
     free_chunks.push_back(index);
-    index = 0;
-    region.chunks[word_of(unit)] &= ~(std::uint64_t{1} << bit_of(unit));
-    if (std::all_of(region.chunks.begin(), region.chunks.end(), [](std::uint64_t w) { return w == 0; })) {
-      regions.erase(at);
-    }
+    region.erase(word_of(unit), bit_of(unit));
+    if (region.nodes.empty()) regions.erase(at);
   }
 
   ChunkNode& find_or_create(IVec3 chunk) {
     auto& region = regions[{chunk.x >> kRegionShift, chunk.y >> kRegionShift, chunk.z >> kRegionShift}];
     if (region == nullptr) region = std::make_unique<RegionNode>();
     const IVec3 unit{chunk.x & 15, chunk.y & 15, chunk.z & 15};
-    std::uint32_t& index = region->nodes[table_index(unit)];
+    std::uint32_t index = region->node(word_of(unit), bit_of(unit));
     if (index == 0) {
       if (free_chunks.empty()) {
         chunk_nodes.push_back(std::make_unique<ChunkNode>());
-        index = static_cast<std::uint32_t>(chunk_nodes.size() - 1);
-      } else {
-        index = free_chunks.back();
-        free_chunks.pop_back();
+        free_chunks.push_back(static_cast<std::uint32_t>(chunk_nodes.size() - 1));
       }
-      region->chunks[word_of(unit)] |= std::uint64_t{1} << bit_of(unit);
+      index = free_chunks.back();
+      region->insert(word_of(unit), bit_of(unit), index);
+      free_chunks.pop_back();
     }
     QUOIN_ASSERT(index != 0 && index < chunk_nodes.size(), "an existing node");
     return *chunk_nodes[index];
@@ -478,7 +469,7 @@ struct OccupancyTree::Impl {
 
   [[nodiscard]] std::uint32_t index_of(IVec3 chunk) const {
     const RegionNode* region = find(chunk >> kRegionShift);
-    return region == nullptr ? 0 : region->nodes[table_index(chunk & 15)];
+    return region == nullptr ? 0 : region->node(word_of(chunk & 15), bit_of(chunk & 15));
   }
   [[nodiscard]] const ChunkNode& node_of(IVec3 chunk) const { return *chunk_nodes[index_of(chunk)]; }
 
@@ -790,7 +781,7 @@ bool OccupancyTree::is_occupied(IVec3 voxel) const {
   const RegionNode* region = impl_->find({voxel.x >> 10, voxel.y >> 10, voxel.z >> 10});
   if (region == nullptr) return false;
   const IVec3 chunk = (voxel >> kChunkShift) & 15;
-  const ChunkNode& node = *impl_->chunk_nodes[region->nodes[table_index(chunk)]];
+  const ChunkNode& node = *impl_->chunk_nodes[region->node(word_of(chunk), bit_of(chunk))];
   const IVec3 brick = (voxel >> 4) & 3;
   const trace::BrickWords words =
       impl_->bricks.words(node.bricks[static_cast<std::size_t>(brick.x + 4 * brick.y + 16 * brick.z)]);
@@ -802,10 +793,11 @@ std::size_t OccupancyTree::bytes() const {
   QUOIN_ASSERT(impl_ != nullptr, "a tree that was not moved from");
   const bool has_blocks = impl_->which == Occupancy::Transparent;
   const std::size_t node_bytes = sizeof(ChunkNode) + (has_blocks ? sizeof(trace::UniformBlocks) : 0);
-  return sizeof(OccupancyTree) + sizeof(Impl) + impl_->regions.size() * sizeof(RegionNode) +
-         impl_->chunk_nodes.capacity() * sizeof(void*) + impl_->chunk_nodes.size() * node_bytes +
-         impl_->bricks.bytes() + impl_->chunk_boxes.bytes() + impl_->missed.capacity() * sizeof(ChunkBricks) +
-         impl_->flat.bytes() + impl_->next.bytes();
+  std::size_t region_bytes = 0;
+  for (const auto& [at, region] : impl_->regions) region_bytes += region->bytes();
+  return sizeof(OccupancyTree) + sizeof(Impl) + region_bytes + impl_->chunk_nodes.capacity() * sizeof(void*) +
+         impl_->chunk_nodes.size() * node_bytes + impl_->bricks.bytes() + impl_->chunk_boxes.bytes() +
+         impl_->missed.capacity() * sizeof(ChunkBricks) + impl_->flat.bytes() + impl_->next.bytes();
 }
 
 const OccupancyTree::Impl& OccupancyTree::impl() const {
@@ -822,7 +814,7 @@ const RegionNode* trace::TreeNodes::find_region(IVec3 region) const {
 
 const ChunkNode* trace::TreeNodes::find_chunk(IVec3 chunk) const {
   const RegionNode* region = find_region(chunk >> kRegionShift);
-  const std::uint32_t index = region == nullptr ? 0 : region->nodes[table_index(chunk & 15)];
+  const std::uint32_t index = region == nullptr ? 0 : region->node(word_of(chunk & 15), bit_of(chunk & 15));
   return index == 0 ? nullptr : chunks_[index].get();
 }
 

@@ -20,6 +20,7 @@
 // all lanes of a kernel.
 
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -137,10 +138,38 @@ struct ChunkBricks {
   std::uint64_t bricks = 0;  ///< x + 4 y + 16 z
 };
 
-/// A region of 16^3 chunks.
-struct RegionNode : LargeObject {
-  Node chunks{};                            ///< chunks with any voxel
-  std::array<std::uint32_t, 4096> nodes{};  ///< index of a ChunkNode, x + 16 y + 256 z; 0: empty
+/// A region of 16^3 chunks. Takes 0.7 KB, and 4 bytes per chunk: a grid of one chunk needs a region, too.
+struct RegionNode {
+  Node chunks{};                           ///< chunks with any voxel
+  std::array<std::uint16_t, 64> before{};  ///< number of chunks in the words of `chunks` in front of each
+  BlockVector<std::uint32_t> nodes;        ///< indices of the ChunkNodes, in the order of the bits of `chunks`
+
+  /// Returns the index of a chunk's ChunkNode; 0: empty. `word`, `bit`: its bit in `chunks`.
+  [[nodiscard]] std::uint32_t node(std::size_t word, unsigned bit) const {
+    return (chunks[word] >> bit & 1U) == 0 ? 0 : nodes[place_of(word, bit)];
+  }
+  /// Sets the index of a chunk that is empty. Cost: O(chunks of the region).
+  void insert(std::size_t word, unsigned bit, std::uint32_t node) {
+    QUOIN_ASSERT((chunks[word] >> bit & 1U) == 0 && node != 0, "an empty chunk, and a node");
+    nodes.insert(nodes.begin() + static_cast<std::ptrdiff_t>(place_of(word, bit)), node);
+    chunks[word] |= std::uint64_t{1} << bit;
+    for (std::size_t i = word + 1; i < before.size(); ++i) ++before[i];
+  }
+  /// Makes a chunk empty that is not. Cost: as `insert`.
+  void erase(std::size_t word, unsigned bit) {
+    QUOIN_ASSERT((chunks[word] >> bit & 1U) != 0, "a chunk with a node");
+    nodes.erase(nodes.begin() + static_cast<std::ptrdiff_t>(place_of(word, bit)));
+    chunks[word] &= ~(std::uint64_t{1} << bit);
+    for (std::size_t i = word + 1; i < before.size(); ++i) --before[i];
+  }
+  [[nodiscard]] std::size_t bytes() const { return sizeof *this + nodes.capacity() * sizeof(std::uint32_t); }
+
+ private:
+  [[nodiscard]] std::size_t place_of(std::size_t word, unsigned bit) const {
+    QUOIN_ASSERT(word < chunks.size() && bit < 64, "a bit of `chunks`");
+    const std::uint64_t lower = chunks[word] & ((std::uint64_t{1} << bit) - 1);
+    return before[word] + static_cast<std::size_t>(std::popcount(lower));
+  }
 };
 
 /// A chunk in the form that walks of single rays read.

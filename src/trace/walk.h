@@ -248,11 +248,10 @@ class Walk {
     }
     if (region_ == nullptr) return 1'024;
     const IVec3 c = chunk & 15;
-    const std::uint64_t word = region_->chunks[static_cast<std::size_t>((c.x >> 2) + 4 * (c.y >> 2) + 16 * (c.z >> 2))];
-    if (word == 0) return 256;
-    if ((word >> ((c.x & 3) + 4 * (c.y & 3) + 16 * (c.z & 3)) & 1U) == 0) return 64;
-    const std::uint32_t index = region_->nodes[static_cast<std::size_t>(c.x + 16 * c.y + 256 * c.z)];
-    QUOIN_ASSERT(index != 0, "a region's bits match its nodes");
+    const auto word = static_cast<std::size_t>((c.x >> 2) + 4 * (c.y >> 2) + 16 * (c.z >> 2));
+    if (region_->chunks[word] == 0) return 256;
+    const std::uint32_t index = region_->node(word, static_cast<unsigned>((c.x & 3) + 4 * (c.y & 3) + 16 * (c.z & 3)));
+    if (index == 0) return 64;
     node_ = &nodes_.chunk(index);
     return 0;
   }
