@@ -17,6 +17,7 @@
 #include <quoin/grid/connected.h>
 #include <quoin/live/live_light.h>
 #include <quoin/live/live_meshes.h>
+#include <quoin/render/propagated_light.h>
 #include <quoin/scene/scene_tracer.h>
 #include <quoin/scene/solid_shapes.h>
 #include <quoin/stream/streamed_world.h>
@@ -162,6 +163,63 @@ TEST(FrameAllocations, SnapshotsOfScenesAllocateLessThanOncePerGrid) {
   const std::int64_t count = allocations_of_this_thread() - before;
   EXPECT_LT(count - 300, 100) << "apart from the names";
   EXPECT_EQ(snapshot.grids().size(), 300U);
+}
+
+// A snapshot shares the columns of the light's domain. A chunk that arrives changes nine of them.
+TEST(FrameAllocations, LightCopiesOnlyColumnsAroundNewChunk) {
+  constexpr int kColumns = 48;
+  Scene scene;
+  scene.types = coloured_types(1);
+  Grid& land = scene.edit(scene.add_grid({.name = "land"})).grid;
+  for (int z = 0; z < kColumns; ++z) {
+    for (int x = 0; x < kColumns; ++x) land.put_chunk({x, 0, z}, Chunk(1));
+  }
+  PropagatedLight light;
+  light.update(land, scene.types, {1});
+  const auto allocations_of_update = [&](IVec3 chunk) {
+    land.put_chunk(chunk, Chunk(1));
+    const std::int64_t before = allocations_of_this_thread();
+    light.update(land, scene.types, {1});
+    return allocations_of_this_thread() - before;
+  };
+  (void)allocations_of_update({10, 1, 10});
+  const std::int64_t alone = allocations_of_update({20, 1, 20});
+  const PropagatedLight snapshot = light.snapshot();
+  EXPECT_LT(allocations_of_update({30, 1, 30}), alone + 200) << "of " << kColumns * kColumns << " columns";
+}
+
+TEST(FrameAllocations, SavesAllocateLessThanOncePerChunkOrInstance) {
+  const WorldFolder folder;
+  auto store = WorldStore::create(folder / "w.quoin");
+  if (!store && store.error().code == ErrorCode::Unsupported) GTEST_SKIP() << to_string(store.error());
+  ASSERT_TRUE(store) << to_string(store.error());
+  constexpr int kCount = 500;
+  Scene scene;
+  scene.types = coloured_types(3);
+  const GridHandle grid = scene.add_grid({.name = "ground"});
+  for (int i = 0; i < kCount; ++i) scene.edit(grid).grid.set({64 * i, 0, 0}, 1);
+  WorldSaver saver;
+  const auto allocations_of_save = [&](VoxelType type) {
+    for (int i = 0; i < kCount; ++i) scene.edit(grid).grid.set({64 * i, 1, 0}, type);
+    saver.follow(scene);
+    const std::int64_t before = allocations_of_this_thread();
+    EXPECT_TRUE(saver.save(*store, scene));
+    const std::int64_t count = allocations_of_this_thread() - before;
+    EXPECT_TRUE(store->flush());
+    return count;
+  };
+  (void)allocations_of_save(1);
+  EXPECT_LT(allocations_of_save(2), kCount / 5);
+  // An instance needs a node in the list of changes. Its name is shared with the save before.
+  std::vector<InstanceHandle> ships;
+  for (int i = 0; i < kCount; ++i) {
+    ships.push_back(scene.add_instance({.name = "a ship with a long name " + std::to_string(i), .grid = grid}));
+  }
+  (void)allocations_of_save(1);
+  for (const InstanceHandle ship : ships) scene.edit(ship).position.x += 1.0;
+  EXPECT_LT(allocations_of_save(2), kCount + kCount / 5);
+  for (const InstanceHandle ship : ships) (void)scene.edit(ship);  // as before
+  EXPECT_LT(allocations_of_save(3), kCount / 5);
 }
 
 }  // namespace
