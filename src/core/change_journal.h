@@ -76,30 +76,48 @@ class ChangeJournal {
     return is_known;
   }
 
-  /// Implements `changes_since`: returns the changes since the cursor, each key once, sorted by `less(a, b)`, which
-  /// compares records by their keys. `Record::change()` returns the change. If it throws, the cursor stays unchanged.
+  /// Implements `changes_since`: writes the changes since the cursor, each key once, sorted by `less(a, b)`, which
+  /// compares records by their keys. `Record::change()` returns the change. Keeps the memory of `changes`. If it throws,
+  /// the cursor stays unchanged.
+  template <class Change, class Less>
+  void changes_since(ChangeCursor& cursor, Less&& less, Changes<Change>& changes) const {
+    changes_since(cursor, less, changes,
+                  [](const Record& record, std::vector<Change>& items) { items.push_back(record.change()); });
+  }
   template <class Change, class Less>
   [[nodiscard]] Changes<Change> changes_since(ChangeCursor& cursor, Less&& less) const {
-    return changes_since<Change>(
-        cursor, less, [](const Record& record, std::vector<Change>& items) { items.push_back(record.change()); });
+    Changes<Change> changes;
+    changes_since(cursor, less, changes);
+    return changes;
   }
-  /// Returns the changes of one aspect: `tell(record, items)` appends the changes of this aspect in a record, if any.
+  /// Writes the changes of one aspect: `report(record, items)` appends the changes of this aspect in a record, if any.
   template <class Change, class Less, class Report>
-  [[nodiscard]] Changes<Change> changes_since(ChangeCursor& cursor, Less&& less, Report&& report) const {
-    BlockVector<Record> records;
-    std::vector<Change> items;
+  void changes_since(ChangeCursor& cursor, Less&& less, Changes<Change>& changes, Report&& report) const {
+    std::vector<Change> items = std::move(changes).items_unless_all();  // for their memory
+    items.clear();
     ChangeCursor end = cursor;
-    const bool is_known = visit_since(end, [&](const Record& record, std::uint64_t) { records.push_back(record); });
-    std::stable_sort(records.begin(), records.end(), less);
-    for (std::size_t i = 0; i < records.size();) {
-      Record united = records[i];
-      for (++i; i < records.size() && !less(united, records[i]); ++i) united.merge(records[i]);
-      report(united, items);
+    const bool is_known = cursor.container_ == container_ && cursor.next_ >= first_ && cursor.next_ <= end_;
+    const std::size_t count = is_known ? static_cast<std::size_t>(end_ - cursor.next_) : 0;
+    std::array<Record, kFew> few;  // needs no memory of its own
+    if (count <= few.size()) {
+      std::size_t used = 0;
+      visit_since(end, [&](const Record& record, std::uint64_t) { insert(record, few, used, less); });
+      items.reserve(used);
+      for (std::size_t i = 0; i < used; ++i) report(few[i], items);
+    } else {
+      BlockVector<Record> records;
+      records.reserve(count);
+      visit_since(end, [&](const Record& record, std::uint64_t) { records.push_back(record); });
+      std::stable_sort(records.begin(), records.end(), less);
+      for (std::size_t i = 0; i < records.size();) {
+        Record united = records[i];
+        for (++i; i < records.size() && !less(united, records[i]); ++i) united.merge(records[i]);
+        report(united, items);
+      }
     }
-    Changes<Change> changes(std::move(items));
+    changes = Changes<Change>(std::move(items));
     changes.all = !is_known;
     cursor = end;
-    return changes;
   }
 
   /// Returns a cursor at the present, as `visit_since` leaves it.
@@ -125,7 +143,20 @@ class ChangeJournal {
   static constexpr std::size_t kLeast = 8192;  // minimum number of records kept, even for a small container
   // Records kept per key. If every frame changes a tenth of the keys, these are 80 frames: more than a save waits.
   static constexpr std::size_t kPerKey = 8;
+  static constexpr std::size_t kFew = 16;  // changes that most frames do not exceed
   using Block = std::array<Record, kBlock>;
+
+  // Inserts a record into a sorted list, or merges it into the one with its key.
+  template <class Less>
+  static void insert(const Record& record, std::array<Record, kFew>& sorted, std::size_t& used, Less& less) {
+    std::size_t at = used;
+    while (at != 0 && less(record, sorted[at - 1])) --at;
+    if (at != 0 && !less(sorted[at - 1], record)) return sorted[at - 1].merge(record);
+    QUOIN_ASSERT(used < kFew, "room for the record");
+    std::move_backward(sorted.begin() + at, sorted.begin() + used, sorted.begin() + used + 1);
+    sorted[at] = record;
+    ++used;
+  }
 
   // Marks all records as possibly read.
   void observe() const { seen_.store(end_ - 1, std::memory_order_relaxed); }
@@ -194,9 +225,8 @@ class ChangeNotifiers {
   /// Reserves memory for the number, so that neither following an item nor notifying allocates.
   void make_room(std::uint32_t index) {
     const std::lock_guard lock(mutex_);
-    if (index < is_notified_.size()) return;
-    given_.reserve(std::size_t{2} * index + 1);
-    is_notified_.resize(std::size_t{2} * index + 1);
+    if (index < next_.size()) return;
+    next_.resize(std::size_t{2} * index + 1, kNotNotified);
   }
   /// Makes the notifier report to this object under a number. Requires: this object outlives the notifier.
   void follow(ChangeNotifier& notifier, std::uint32_t index) {
@@ -206,28 +236,40 @@ class ChangeNotifiers {
     notifier.index_ = index;
     notifier.is_notified_ = false;
   }
-  /// Appends the numbers of the edited items. Each is reported again only after it is followed again.
+  /// Appends the numbers of the edited items, in the order of their notifications. Each is reported again only after it
+  /// is followed again.
   void take(std::vector<std::uint32_t>& taken) {
     const std::lock_guard lock(mutex_);
-    taken.insert(taken.end(), given_.begin(), given_.end());
-    for (const std::uint32_t index : given_) is_notified_[index] = false;
-    given_.clear();
+    taken.reserve(taken.size() + notified_);  // before the list changes
+    for (std::uint32_t index = first_; index != kEnd;) {
+      taken.push_back(index);
+      index = std::exchange(next_[index], kNotNotified);
+    }
+    first_ = last_ = kEnd;
+    notified_ = 0;
   }
 
  private:
   friend class ChangeNotifier;
   void notify(std::uint32_t index) {
     const std::lock_guard lock(mutex_);
-    QUOIN_ASSERT(index < is_notified_.size(), "an index of a followed item");
+    QUOIN_ASSERT(index < next_.size(), "an index of a followed item");
     // A number is listed once, even if its item was removed and another item now has the number.
-    if (is_notified_[index]) return;
-    is_notified_[index] = true;
-    given_.push_back(index);
+    if (next_[index] != kNotNotified) return;
+    next_[index] = kEnd;
+    (first_ == kEnd ? first_ : next_[last_]) = index;
+    last_ = index;
+    ++notified_;
   }
 
+  static constexpr std::uint32_t kEnd = ~std::uint32_t{0};
+  static constexpr std::uint32_t kNotNotified = kEnd - 1;
+
   std::mutex mutex_;
-  std::vector<std::uint32_t> given_;  // with room for every number
-  std::vector<bool> is_notified_;     // by number
+  std::vector<std::uint32_t> next_;  // by number: the next one of the list of notified ones
+  std::uint32_t first_ = kEnd;
+  std::uint32_t last_ = kEnd;
+  std::size_t notified_ = 0;
 };
 
 }  // namespace quoin

@@ -573,10 +573,15 @@ Neighbourhood Grid::neighbourhood(IVec3 chunk) const {
 }
 
 GridChanges Grid::changes_since(ChangeCursor& cursor) const {
-  const auto report = [](const VoxelRecord& record, std::vector<ChunkChange>& items) {
+  GridChanges changes;
+  changes_since(cursor, changes);
+  return changes;
+}
+
+void Grid::changes_since(ChangeCursor& cursor, GridChanges& changes) const {
+  impl().journal.changes_since(cursor, by_chunk, changes, [](const VoxelRecord& record, auto& items) {
     if (record.has_types()) items.push_back(record.change());
-  };
-  return impl().journal.changes_since<ChunkChange>(cursor, by_chunk, report);
+  });
 }
 
 bool Grid::has_changed_since(const ChangeCursor& cursor) const {
@@ -584,10 +589,11 @@ bool Grid::has_changed_since(const ChangeCursor& cursor) const {
 }
 
 DataChanges Grid::data_changes_since(ChangeCursor& cursor) const {
-  const auto report = [](const VoxelRecord& record, std::vector<DataChange>& items) {
+  DataChanges changes;
+  impl().journal.changes_since(cursor, by_chunk, changes, [](const VoxelRecord& record, auto& items) {
     if (record.has_data()) items.push_back({record.chunk, record.data.box(), record.is_edit});
-  };
-  return impl().journal.changes_since<DataChange>(cursor, by_chunk, report);
+  });
+  return changes;
 }
 
 bool Grid::has_data_changed_since(const ChangeCursor& cursor) const {

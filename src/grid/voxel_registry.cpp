@@ -84,16 +84,22 @@ bool has_other_visibility(const TypeChanges& changes) {
                                     [](const TypeChange& change) { return change.visibility_changed; });
 }
 
-VoxelRegistry::VoxelRegistry() : content_(make_ref<Content>()), journal_(std::make_unique<Journal>()) {
-  VoxelProperties air;
-  air.name = "air";
-  air.colour = {0, 0, 0, 0};
-  air.visibility = Visibility::Air;
-  air.collides = false;
-  content_->properties.push_back(std::move(air));
-  content_->visibility.push_back(Visibility::Air);
-  content_->occlusion.push_back(Visibility::Air);
-  content_->serials.push_back(0);
+// All new registries share the content that is only air, until a type is added.
+VoxelRegistry::VoxelRegistry() : journal_(std::make_unique<Journal>()) {
+  static const Ref<Content> air_only = [] {
+    VoxelProperties air;
+    air.name = "air";
+    air.colour = {0, 0, 0, 0};
+    air.visibility = Visibility::Air;
+    air.collides = false;
+    Ref<Content> content = make_ref<Content>();
+    content->properties.push_back(std::move(air));
+    content->visibility.push_back(Visibility::Air);
+    content->occlusion.push_back(Visibility::Air);
+    content->serials.push_back(0);
+    return content;
+  }();
+  content_ = air_only;
 }
 
 VoxelRegistry::VoxelRegistry(const VoxelRegistry& other)

@@ -179,15 +179,15 @@ struct Scene::Book {
 };
 
 Scene::Scene() : book_(std::make_unique<Book>()) {}
+Scene::Scene(const VoxelRegistry& with_types, std::unique_ptr<Book> book) : types(with_types), book_(std::move(book)) {}
 Scene::Scene(Scene&&) noexcept = default;
 Scene& Scene::operator=(Scene&&) noexcept = default;
 Scene::~Scene() = default;
 
 Scene Scene::snapshot() const {
-  Scene copy;
   const std::lock_guard lock(book().mutex);
   book_->collect(grids_, keys());
-  copy.types = types;
+  Scene copy(types, std::make_unique<Book>(*book_));
   copy.lamps = lamps;
   copy.environment = environment;
   BulkMemory voxels(grids_.size());
@@ -204,7 +204,6 @@ Scene Scene::snapshot() const {
   copy.instances_ = instances_.copied([](const Instance& instance) { return instance; });
   copy.groups_ = groups_.copied([](const SceneGroup& group) { return group; });
   copy.layers_ = layers_.copied([](const SceneLayer& layer) { return layer; });
-  copy.book_ = std::make_unique<Book>(*book_);
   if (grids_.next_index() != 0) copy.book_->notifiers.make_room(grids_.next_index() - 1);
   copy.grids_.for_each([&](GridHandle handle, const SceneGrid& grid) { copy.book_->follow(grid, handle.index); });
   return copy;
@@ -289,6 +288,15 @@ SceneLayer& Scene::edit(LayerHandle handle) {
 
 SceneChanges Scene::changes_since(ChangeCursor& cursor) const {
   SceneChanges changes;
+  changes_since(cursor, changes);
+  return changes;
+}
+
+void Scene::changes_since(ChangeCursor& cursor, SceneChanges& changes) const {
+  changes.grids.clear();
+  changes.instances.clear();
+  changes.groups.clear();
+  changes.layers.clear();
   const std::lock_guard lock(book().mutex);
   book_->collect(grids_, keys());
   ChangeCursor end = cursor;
@@ -314,7 +322,6 @@ SceneChanges Scene::changes_since(ChangeCursor& cursor) const {
   sort_and_unite(changes.grids);
   sort_and_unite(changes.instances);
   cursor = end;
-  return changes;
 }
 
 bool Scene::has_changed_since(const ChangeCursor& cursor) const {

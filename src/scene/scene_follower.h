@@ -33,7 +33,10 @@ class SceneFollower {
       : filter_(filter), transforms_(transforms) {}
 
   /// Returns true if a drawn instance places the grid, as of the last update.
-  [[nodiscard]] bool places(GridHandle grid) const { return placements_.contains(grid); }
+  [[nodiscard]] bool places(GridHandle grid) const {
+    const auto found = placements_.find(grid);
+    return found != placements_.end() && found->second != 0;
+  }
   /// Makes the next update report that everything changed.
   void forget() { followed_ = {}; }
 
@@ -44,7 +47,8 @@ class SceneFollower {
   };
 
   void read(const Scene& scene, const SceneChanges& changes) {
-    counted_.clear();
+    released_.clear();
+    has_other_placements_ = changes.all;
     touched_.insert(touched_.end(), changes.grids.begin(), changes.grids.end());
     if (changes.all) {
       touch_placed();
@@ -59,6 +63,10 @@ class SceneFollower {
       const Instance* const instance = scene.instances().find(handle);
       if (instance != nullptr && add(scene, handle, *instance)) touched_.push_back(instance->grid);
     }
+    // Grids whose only instance moves were placed again.
+    for (const GridHandle grid : released_) {
+      if (!places(grid)) has_other_placements_ |= placements_.erase(grid) != 0;
+    }
     std::sort(touched_.begin(), touched_.end());
     touched_.erase(std::unique(touched_.begin(), touched_.end()), touched_.end());
   }
@@ -70,7 +78,9 @@ class SceneFollower {
     if (!is_drawn(scene, instance, filter_)) return false;
     if (transforms_ == Transforms::Valid && !has_valid_transform(instance)) return false;
     if (handle.index >= placed_.size()) placed_.resize(handle.index + std::size_t{1});
-    if (++placements_[instance.grid] == 1) counted_.emplace_back(instance.grid, 1);
+    const auto [found, is_first] = placements_.try_emplace(instance.grid, 0);
+    has_other_placements_ |= is_first;
+    ++found->second;
     placed_[handle.index] = {handle.generation, instance.grid};
     return true;
   }
@@ -80,26 +90,26 @@ class SceneFollower {
     touched_.push_back(placed.grid);
     const auto found = placements_.find(placed.grid);
     QUOIN_ASSERT(found != placements_.end() && found->second > 0, "a counted placement");
-    if (--found->second == 0) {
-      counted_.emplace_back(placed.grid, -1);
-      placements_.erase(found);
-    }
+    if (--found->second == 0) released_.push_back(placed.grid);
     placed = {};
   }
 
   InstanceFilter filter_;
   Transforms transforms_;
   ChangeCursor followed_;
-  std::vector<Placed> placed_;                       // drawn instances, by slot
-  std::map<GridHandle, std::size_t> placements_;     // number of drawn instances, without zeros
-  std::vector<GridHandle> touched_;                  // since the last commit
-  std::vector<std::pair<GridHandle, int>> counted_;  // 1: placed for the first time, -1: no longer placed
+  std::vector<Placed> placed_;                    // drawn instances, by slot
+  std::map<GridHandle, std::size_t> placements_;  // number of drawn instances, without zeros except during `read`
+  std::vector<GridHandle> touched_;               // since the last commit
+  std::vector<GridHandle> released_;              // during `read`: grids that lost their last drawn instance
+  bool has_other_placements_ = false;             // in the last update
+  SceneChanges buffer_;                           // kept for its memory
 };
 
 /// Changes of a scene that a consumer applies completely or not at all, as PendingChanges.
 class SceneFollower::Update {
  public:
-  Update(SceneFollower& follower, const Scene& scene) : follower_(&follower), changes_(follower.followed_, scene) {
+  Update(SceneFollower& follower, const Scene& scene)
+      : follower_(&follower), changes_(follower.followed_, scene, follower.buffer_) {
     follower.read(scene, *changes_);
   }
 
@@ -112,11 +122,7 @@ class SceneFollower::Update {
     return all() || !changes_->instances.empty() || !changes_->groups.empty() || !changes_->layers.empty();
   }
   /// Returns true if any grid may be placed that was not placed before, or the reverse.
-  [[nodiscard]] bool has_other_placements() const {
-    std::map<GridHandle, int> sums;
-    for (const auto& [grid, change] : follower_->counted_) sums[grid] += change;
-    return all() || std::any_of(sums.begin(), sums.end(), [](const auto& sum) { return sum.second != 0; });
-  }
+  [[nodiscard]] bool has_other_placements() const { return follower_->has_other_placements_; }
   /// Call when all changes are applied.
   void commit() {
     follower_->touched_.clear();
@@ -125,7 +131,7 @@ class SceneFollower::Update {
 
  private:
   SceneFollower* follower_;
-  PendingChanges<Scene> changes_;
+  PendingChanges<Scene, SceneChanges&> changes_;
 };
 
 }  // namespace quoin

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -87,6 +88,10 @@ class Changes {
   std::vector<Change> items_;
 };
 
+/// The result of a container's `changes_since`.
+template <class Container>
+using ChangesOf = decltype(std::declval<const Container&>().changes_since(std::declval<ChangeCursor&>()));
+
 /// Changes that a consumer applies completely or not at all.
 ///
 ///   quoin::PendingChanges changes(cursor, grid);
@@ -97,11 +102,20 @@ class Changes {
 /// If the consumer throws or returns before `commit`, the next read from the cursor reports that everything changed.
 /// Without changes there is nothing to apply, and the cursor is at the present at once.
 /// Lifetime: the cursor must outlive it. Use one at a time per cursor.
-template <class Container>
+template <class Container, class Storage = ChangesOf<Container>>
 class PendingChanges {
  public:
   PendingChanges(ChangeCursor& cursor, const Container& container)
+    requires(!std::is_reference_v<Storage>)
       : cursor_(&cursor), end_(cursor), changes_(container.changes_since(end_)) {
+    cursor = changes_.empty() ? end_ : ChangeCursor{};
+  }
+  /// As above. The changes are kept in `buffer`, which keeps its memory for the next use. Lifetime: the buffer must
+  /// outlive it.
+  PendingChanges(ChangeCursor& cursor, const Container& container, ChangesOf<Container>& buffer)
+    requires(std::is_reference_v<Storage>)
+      : cursor_(&cursor), end_(cursor), changes_(buffer) {
+    container.changes_since(end_, changes_);
     cursor = changes_.empty() ? end_ : ChangeCursor{};
   }
   PendingChanges(const PendingChanges&) = delete;
@@ -118,8 +132,13 @@ class PendingChanges {
  private:
   ChangeCursor* cursor_;
   ChangeCursor end_;
-  decltype(std::declval<const Container&>().changes_since(std::declval<ChangeCursor&>())) changes_;
+  Storage changes_;
 };
+template <class Container>
+PendingChanges(ChangeCursor&, const Container&) -> PendingChanges<Container>;
+template <class Container>
+PendingChanges(ChangeCursor&, const Container&, ChangesOf<Container>&)
+    -> PendingChanges<Container, ChangesOf<Container>&>;
 
 // Part of the layout of Grid and DensityGrid; not for callers.
 

@@ -180,6 +180,8 @@ class DensityGrid {
   /// Returns the exact changes since the cursor's last read, and moves the cursor to the present.
   /// Cost: O(changed chunks), independent of the grid's size. See ChangeCursor.
   [[nodiscard]] DensityChanges changes_since(ChangeCursor& cursor) const;
+  /// As above. Replaces `changes`, and keeps its memory.
+  void changes_since(ChangeCursor& cursor, DensityChanges& changes) const;
   /// Returns true if anything has changed since the cursor, as Grid::has_changed_since.
   [[nodiscard]] bool has_changed_since(const ChangeCursor& cursor) const;
   [[nodiscard]] ChangeCursor cursor() const;

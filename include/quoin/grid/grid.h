@@ -190,6 +190,8 @@ class Grid {
   /// Returns the exact changes since the cursor's last read, and moves the cursor to the present.
   /// Cost: O(changed chunks), independent of the grid's size. See ChangeCursor.
   [[nodiscard]] GridChanges changes_since(ChangeCursor& cursor) const;
+  /// As above. Replaces `changes`, and keeps its memory.
+  void changes_since(ChangeCursor& cursor, GridChanges& changes) const;
   /// Returns true if voxel types have changed since the cursor. Cost: O(1).
   [[nodiscard]] bool has_changed_since(const ChangeCursor& cursor) const;
   /// Returns the changes of voxel data since the cursor's last read, and moves the cursor to the present. A consumer of

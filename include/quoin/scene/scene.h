@@ -208,6 +208,8 @@ class Scene {
   /// Cost: O(changed grids and instances), at any scene size; O(all instances) after a change of a group or a layer.
   ///       See ChangeCursor.
   [[nodiscard]] SceneChanges changes_since(ChangeCursor& cursor) const;
+  /// As above. Replaces `changes`, and keeps its memory.
+  void changes_since(ChangeCursor& cursor, SceneChanges& changes) const;
   /// Returns true if `changes_since` would report a change. It does not report changes of `types`, which have their own
   /// journal, or of `lamps` and `environment`. Cost: as `changes_since`.
   [[nodiscard]] bool has_changed_since(const ChangeCursor& cursor) const;
@@ -224,6 +226,7 @@ class Scene {
 
  private:
   struct [[gnu::visibility("hidden")]] Book;
+  [[gnu::visibility("hidden")]] Scene(const VoxelRegistry& with_types, std::unique_ptr<Book> book);
   [[nodiscard]] Book& book() const;
   [[nodiscard]] std::size_t keys() const;
   SlotMap<SceneGrid> grids_;

@@ -148,7 +148,13 @@ std::int64_t DensityGrid::solid_count() const {
 }
 
 DensityChanges DensityGrid::changes_since(ChangeCursor& cursor) const {
-  return impl().store.journal().changes_since<DensityChange>(cursor, by_chunk);
+  DensityChanges changes;
+  changes_since(cursor, changes);
+  return changes;
+}
+
+void DensityGrid::changes_since(ChangeCursor& cursor, DensityChanges& changes) const {
+  impl().store.journal().changes_since(cursor, by_chunk, changes);
 }
 
 bool DensityGrid::has_changed_since(const ChangeCursor& cursor) const {
@@ -387,10 +393,15 @@ std::int64_t DensityStore::put(IVec3 chunk, DensityChunk samples) {
 // Records samples that were, or now are, not loaded.
 void DensityStore::replace(IVec3 chunk, DensityChunk samples) {
   journal_.begin_change();
-  Entry& entry = find_or_create(chunk);
-  entry.samples = std::move(samples);
   ChangeReach all;
   all.add_all();
+  if (samples.uniform() == far_ && find(chunk) == nullptr) {  // air replaces nothing: no chunk is created or removed
+    ++edits_;
+    std::uint64_t serial = 0;
+    return journal_.note(serial, {chunk, all, false}, entries_.size());
+  }
+  Entry& entry = find_or_create(chunk);
+  entry.samples = std::move(samples);
   finish_edit(chunk, entry, all, false, false);
 }
 
