@@ -11,6 +11,7 @@
 #include <quoin/scene/scene.h>
 
 #include "core/work/workers.h"
+#include "live/latest_state.h"
 
 namespace quoin {
 
@@ -23,10 +24,10 @@ struct LitScene {
 /// A lit scene that LiveMeshes makes surfaces of.
 struct LitState {
   LitScene lit;
-  std::uint64_t number = 0;           ///< of the update that asked for it
-  Workers::Clock::time_point asked;   ///< time of the update that found the first of its changes
-  std::unique_ptr<LitScene> to_show;  ///< equal; becomes the light shown when the surfaces are taken
-  bool is_shown = false;
+  std::uint64_t number = 0;          ///< of the update that asked for it
+  Workers::Clock::time_point asked;  ///< time of the update that found the first of its changes
+  std::shared_ptr<LitScene>
+      to_show;  ///< equal; becomes the light shown when the surfaces are taken. Null: it was shown
 };
 
 /// The implementation of LiveLight. Either its owner asks for light and shows it, or a receiver does both:
@@ -46,10 +47,10 @@ class LightWorker {
   /// light is shown than at the last call.
   void update(const Scene& scene);
   bool take();
-  [[nodiscard]] const SceneLight& shown() const { return shown_.light; }
+  [[nodiscard]] const SceneLight& shown() const { return states_.shown().light; }
   [[nodiscard]] bool is_late() const;
-  /// Waits for the update in progress. Rethrows its exception.
-  void wait();
+  /// Waits for the update in progress, and shows its light unless there is a receiver. Rethrows its exception.
+  void wait() { states_.wait(); }
 
   /// Waits for an update in progress. Requires: there is no receiver.
   void attach(Receiver receiver);
@@ -61,21 +62,17 @@ class LightWorker {
   /// busy. Then a later call asks for it.
   void update_for_receiver(const Scene& scene, std::uint64_t number, bool is_other);
   /// Returns true if the receiver will get another state, or has not taken over the last one.
-  [[nodiscard]] bool is_state_pending() const;
-  void note_received();
-  /// Makes the light of a state the light shown. Does nothing the second time. Does not throw.
+  [[nodiscard]] bool is_state_pending() const { return states_.is_late(); }
+  void note_received() { states_.note_passed_on(); }
+  /// Makes the light of a state the light shown. The worker destroys the former one. Does nothing the second time. Does
+  /// not throw.
   void show(LitState& state);
 
  private:
-  static constexpr Workers::Clock::time_point kNever{};
+  using States = LatestState<LitScene>;
 
-  [[nodiscard]] Workers::Clock::time_point step(Workers::Lock& lock);
-  void give(Workers::Lock& lock, std::unique_ptr<LitScene> done);
-  void throw_failure();
+  [[nodiscard]] std::unique_ptr<LitScene> make(States::Request request);
   bool read_changes(const Scene& scene, bool with_data);
-  void ask(const Scene& scene, std::uint64_t number);
-  [[nodiscard]] std::shared_ptr<const Scene> cancel_request();
-  [[nodiscard]] bool is_idle() const { return !is_busy_ && !is_giving_; }
 
   // Read positions in the changes of a grid, for voxels and fields.
   struct GridCursors {
@@ -87,27 +84,19 @@ class LightWorker {
   ChangeCursor followed_scene_;
   ChangeCursor followed_types_;
   std::map<GridHandle, GridCursors> followed_grids_;
-  LitScene shown_;
+  SceneChanges changes_;  // kept for its memory
 
   // Used only by the worker thread.
   Threads threads_;
   LitScene working_;
 
-  mutable std::mutex mutex_;  // of all below
-  bool is_behind_ = true;     // something changed that no snapshot has, or that could not be lit
-  Workers::Clock::time_point behind_since_ = kNever;  // time of the first update that found it so
-  bool is_busy_ = false;                // computing the requested light, or its receiver has not taken it over
-  bool is_giving_ = false;              // calling the receiver
-  std::shared_ptr<const Scene> asked_;  // to be lit
-  std::uint64_t asked_number_ = 0;
-  Workers::Clock::time_point asked_at_;  // as `behind_since_`, for the request
-  std::unique_ptr<LitScene> ready_;      // to be taken
-  std::unique_ptr<LitScene> spent_;      // was shown; the worker destroys it, which takes a while
-  Receiver receiver_;
-  bool is_shown_new_ = false;        // shown for a receiver since the last `take`
+  mutable std::mutex mutex_;   // of the next members
+  Receiver receiver_;          // gets the states; the worker may call it without the mutex until `detach` has waited
+  bool is_shown_new_ = false;  // shown for a receiver since the last `take`
   std::uint64_t newest_number_ = 0;  // of the receiver's states
   std::uint64_t shown_number_ = 0;
-  Workers worker_{mutex_};
+
+  States states_;  // last: its worker ends first
 };
 
 }  // namespace quoin

@@ -269,9 +269,10 @@ TEST(LightWorker, DetachCancelsRequestThatHasNotBegun) {
   EXPECT_EQ(calls, 1);
   EXPECT_TRUE(worker.is_late());
   worker.update(scene);
+  EXPECT_TRUE(worker.is_late());
   worker.wait();
-  EXPECT_TRUE(worker.take()) << "its owner gets the cancelled light";
-  EXPECT_FALSE(worker.is_late());
+  EXPECT_FALSE(worker.is_late()) << "its owner gets the cancelled light";
+  EXPECT_FALSE(worker.take()) << "it is shown";
 }
 
 }  // namespace

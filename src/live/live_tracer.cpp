@@ -17,7 +17,7 @@ struct TracedScene {
 using States = LatestState<TracedScene>;
 
 // Returns the tracer of a snapshot: the former one with the changes since then, or a new one.
-std::unique_ptr<TracedScene> traced(const States::Snapshot& scene, std::unique_ptr<TracedScene>& former,
+std::unique_ptr<TracedScene> traced(const std::shared_ptr<const Scene>& scene, std::unique_ptr<TracedScene>& former,
                                     InstanceFilter instances, Threads threads) {
   if (former == nullptr) {
     return std::make_unique<TracedScene>(TracedScene{scene, SceneTracer(*scene, instances, threads)});
@@ -43,8 +43,8 @@ struct LiveTracer::Impl {
       : states(
             nothing(options.instances),
             [instances = options.instances, threads = Threads{worker_count(options.threads)}](
-                const States::Snapshot& scene, std::unique_ptr<TracedScene>& former) {
-              return traced(scene, former, instances, threads);
+                const States::Request& request, std::unique_ptr<TracedScene>& former) {
+              return traced(request.scene, former, instances, threads);
             },
             "tracer") {}
 

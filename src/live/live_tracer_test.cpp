@@ -180,7 +180,7 @@ using CountedStates = LatestState<Counted>;
 
 struct CountedWork {
   CountedWork()
-      : states(Counted(0, alive), [this](CountedStates::Snapshot, std::unique_ptr<Counted>& former) {
+      : states(Counted(0, alive), [this](const CountedStates::Request&, std::unique_ptr<Counted>& former) {
           gate.pass();
           if (fails.exchange(false)) throw std::bad_alloc();
           most = std::max(most.load(), alive.load());

@@ -379,7 +379,8 @@ void MeshScheduler::follow(const State& state, const Scene& places) {
   followed_lit_ = lit_;
   totals_.loads_only = false;  // it is still true after a failure
   const ChangedTypes changed_types = follow_types(state.scene->types);
-  for (const GridHandle handle : follow_scene(*state.scene)) follow_grid(*state.scene, handle, now);
+  follow_scene(*state.scene);
+  for (const GridHandle handle : changed_) follow_grid(*state.scene, handle, now);
   follow_light(state.light, now);
   choose_levels(places, now);
   for (auto& [key, live] : sources_) {
@@ -515,12 +516,12 @@ void MeshScheduler::choose_levels(const Scene& scene, SurfaceClock::time_point n
   are_places_new_ = false;
 }
 
-// Returns the drawn grids that may have changed.
-std::vector<GridHandle> MeshScheduler::follow_scene(const Scene& scene) {
+// Lists the drawn grids that may have changed.
+void MeshScheduler::follow_scene(const Scene& scene) {
   SceneFollower::Update update(drawn_, scene);
   is_all_new_ = update.all();
-  std::vector<GridHandle> drawn;
-  std::copy_if(update.touched().begin(), update.touched().end(), std::back_inserter(drawn),
+  changed_.clear();
+  std::copy_if(update.touched().begin(), update.touched().end(), std::back_inserter(changed_),
                [&](GridHandle handle) { return drawn_.places(handle); });
   if (update.has_other_instances()) {
     are_places_new_ = true;
@@ -531,7 +532,6 @@ std::vector<GridHandle> MeshScheduler::follow_scene(const Scene& scene) {
                   [&](const auto& each) { return !each.second->has_chunks() && !drawn_.places(each.first.grid); });
   }
   update.commit();
-  return drawn;
 }
 
 namespace {

@@ -137,7 +137,7 @@ class MeshScheduler {
   void release_edits(const State& state);
   void throw_failure();
   [[nodiscard]] ChangedTypes follow_types(const VoxelRegistry& types);
-  [[nodiscard]] std::vector<GridHandle> follow_scene(const Scene& scene);
+  void follow_scene(const Scene& scene);
   void follow_grid(const Scene& scene, GridHandle handle, SurfaceClock::time_point now);
   void follow_light(const SceneLight* light, SurfaceClock::time_point now);
   void prepare(const Scene& scene);
@@ -179,6 +179,7 @@ class MeshScheduler {
   ChangeCursor followed_types_;
   SurfaceClock::time_point renewed_{};
   SceneFollower drawn_;
+  std::vector<GridHandle> changed_;  // drawn grids that may have changed; kept for its memory
   Sources sources_;
   std::vector<DVec3> eyes_;
   std::vector<DVec3> next_eyes_;                          // of the update in progress; kept for its memory
