@@ -32,9 +32,15 @@ void trim_heaps() {
 #endif
 }
 
+// Moves all elements to the end of a list. Keeps the memory of both.
 template <class T>
 void append(std::vector<T>& to, std::vector<T>& from) {
-  to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
+  if (to.empty()) {
+    std::swap(to, from);
+  } else {
+    to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
+    from.clear();
+  }
 }
 
 }  // namespace
@@ -111,13 +117,13 @@ void ChunkStreamer::set_rules(std::shared_ptr<const Rules> rules) {
   rules_ = std::move(rules);
 }
 
-void ChunkStreamer::post(Note note, bool is_urgent) {
+void ChunkStreamer::post(Note& note, bool is_urgent) {
   if (note.empty()) return;
   if (note.requests) cancel_calls(&*note.requests);
   is_urgent |= note.requests.has_value();
   {
     const std::scoped_lock lock(inbox_mutex_);
-    if (note.requests) inbox_.requests = std::move(note.requests);
+    if (note.requests) inbox_.requests = std::exchange(note.requests, std::nullopt);
     append(inbox_.events, note.events);
     append(inbox_.released, note.released);
     ++posted_;
@@ -179,8 +185,7 @@ bool ChunkStreamer::wait(std::chrono::milliseconds at_most, bool helps) {
 // Processes the inbox. Requires: the plan's lock is held. If memory runs out, the next call continues there.
 void ChunkStreamer::read_inbox() {
   if (read_events_ == reading_.events.size() && !reading_.requests) {
-    Note done;
-    std::swap(done, reading_);
+    reading_.events.clear();
     read_events_ = 0;
     const std::scoped_lock lock(inbox_mutex_);
     std::swap(reading_, inbox_);

@@ -184,9 +184,10 @@ class ChunkStreamer {
   /// Replaces the rules. They have the bands of all grids with generators, except grids that were removed: their chunks
   /// are dropped.
   void set_rules(std::shared_ptr<const Rules> rules);
-  /// Queues a note. Unless `is_urgent`, wakes no sleeping worker: a wake-up costs the caller more than the rest.
+  /// Queues a note, which is empty afterwards and keeps memory for the next one. Unless `is_urgent`, wakes no sleeping
+  /// worker: a wake-up costs the caller more than the rest.
   /// Cancels calls of generators for chunks that its requests do not need.
-  void post(Note note, bool is_urgent = true);
+  void post(Note& note, bool is_urgent = true);
   /// Sets the bytes of chunks that may be read or made in addition to those in progress, and the expected bytes per
   /// chunk. Chunks that edits wait for are always loaded.
   void set_room(std::int64_t bytes, std::int64_t each);

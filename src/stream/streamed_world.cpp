@@ -146,6 +146,7 @@ struct StreamedWorld::Impl {
   std::map<GridHandle, std::uint32_t> numbers;  // of `grids`
   std::map<InstanceHandle, std::uint32_t> grid_of_instance;
   ChangeCursor followed_scene;
+  SceneChanges scene_changes;  // kept for its memory
 
   Eyes eyes;          // now
   Eyes planned_eyes;  // eyes of the last requests
@@ -260,7 +261,7 @@ StreamedWorld::Impl::Streamed& StreamedWorld::Impl::add_streamed(GridHandle hand
 }
 
 void StreamedWorld::Impl::follow_instances() {
-  PendingChanges changes(followed_scene, scene());
+  PendingChanges changes(followed_scene, scene(), scene_changes);
   const auto follow = [&](InstanceHandle handle) {
     const Instance* const instance = scene().instances().find(handle);
     const auto was = grid_of_instance.find(handle);
@@ -608,7 +609,7 @@ void StreamedWorld::Impl::notify_workers() {
   if (has_moved) moved = Clock::now();
   // Workers bring no more than the caller takes.
   streamer.set_room(completed_loads.size() > kMaxCompletedLoads ? 0 : budget.room(box.begun), budget.guess());
-  streamer.post(std::exchange(unposted, {}), !has_chunks_to_move());
+  streamer.post(unposted, !has_chunks_to_move());
 }
 
 std::size_t StreamedWorld::Impl::waiting_chunks() const {

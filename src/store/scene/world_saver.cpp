@@ -113,6 +113,10 @@ struct ChangedObjects {
 struct SaverState {
   ChangeCursor scene;  // of `follow`
   ChangeCursor types;
+  // Of the last `follow`, kept for their memory:
+  SceneChanges scene_changes;
+  GridChanges voxel_changes;
+  DensityChanges density_changes;
   ChangedObjects changed;
   std::map<GridHandle, SavedGrid> grids;
   std::set<GridHandle> left_out;  ///< grids of the scene that are marked as not saved
@@ -487,13 +491,13 @@ class Save {
 };
 
 // Adds a grid's edits since the last call. Loaded and unloaded chunks are not edits.
-void follow_grid(GridHandle handle, const SceneGrid& grid, SavedGrid& saved, OnEdit on_edit) {
+void follow_grid(GridHandle handle, const SceneGrid& grid, SaverState& state, SavedGrid& saved, OnEdit on_edit) {
   const auto add = [&](const auto& changes) {
     if (changes.all) {
       saved.is_all_edited = true;
       on_edit(handle, std::nullopt);
     }
-    for (const auto& change : changes.items) {
+    for (const auto& change : changes.items_unless_all()) {
       if (!change.is_edit) continue;
       saved.edited.add(change.chunk);
       on_edit(handle, change.chunk);
@@ -503,9 +507,15 @@ void follow_grid(GridHandle handle, const SceneGrid& grid, SavedGrid& saved, OnE
   ChangeCursor voxels = saved.voxels;
   ChangeCursor data = saved.data;
   ChangeCursor densities = saved.densities;
-  if (grid.grid.has_changed_since(voxels)) add(grid.grid.changes_since(voxels));
+  if (grid.grid.has_changed_since(voxels)) {
+    grid.grid.changes_since(voxels, state.voxel_changes);
+    add(state.voxel_changes);
+  }
   if (grid.grid.has_data_changed_since(data)) add(grid.grid.data_changes_since(data));
-  if (grid.field.has_changed_since(densities)) add(grid.field.changes_since(densities));
+  if (grid.field.has_changed_since(densities)) {
+    grid.field.changes_since(densities, state.density_changes);
+    add(state.density_changes);
+  }
   saved.voxels = voxels;
   saved.data = data;
   saved.densities = densities;
@@ -540,9 +550,10 @@ bool copy_chunks(SaveInSteps& save, double seconds) {
 
 void WorldSaver::Impl::follow(const Scene& scene, OnEdit on_edit) {
   ChangeCursor end = state.scene;
-  const SceneChanges changes = scene.changes_since(end);
+  scene.changes_since(end, state.scene_changes);
+  const SceneChanges& changes = state.scene_changes;
   const auto follow_one = [&](GridHandle handle, SavedGrid& saved) {
-    if (const SceneGrid* const grid = scene.grids().find(handle)) follow_grid(handle, *grid, saved, on_edit);
+    if (const SceneGrid* const grid = scene.grids().find(handle)) follow_grid(handle, *grid, state, saved, on_edit);
   };
   if (changes.all) {
     for (auto& [handle, saved] : state.grids) follow_one(handle, saved);
