@@ -129,6 +129,7 @@ struct SlideResult {
   SweepHit floor;
   /// All contacts in order, except a floor that supports the body from start to end.
   std::vector<SlideContact> contacts;
+  int sweeps = 0;  ///< number of sweeps of the move, which are its cost
 };
 
 /// Moves a box or a capsule and slides it along obstacles. At a face, the displacement into the face is dropped; in a
@@ -140,7 +141,8 @@ struct SlideResult {
 /// along them. An upward displacement leaves the floor. Add gravity to the displacement every frame.
 ///
 /// Requires: `max_contacts` is at least 1.
-/// Cost:     a sweep per contact, `max_contacts` at most. With a floor, two more, and four per attempted step.
+/// Cost:     a sweep per contact, `max_contacts` at most. With a floor, two more, and five per attempted step, at most.
+///           A step that failed is not attempted again at the same position and wall.
 /// Threads:  any number of threads may call it at once while the tracer is not updated.
 [[nodiscard]] SlideResult move_and_slide(const SceneTracer& tracer, const OrientedBox& box, DVec3 displacement,
                                          const SlideOptions& options = {});

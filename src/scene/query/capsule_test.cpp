@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 #include <optional>
 #include <type_traits>
@@ -366,6 +367,31 @@ TEST(Capsule, WalksLevelGroundStairsAndEdges) {
   for (int frame = 0; frame < 200; ++frame)
     player.centre = move_and_slide(tracer, player, {0.1, -0.05, 0.0}, walking()).centre;
   EXPECT_NEAR(player.centre.y, 5.0 + 0.9, 3e-3) << "up the stairs";
+}
+
+// In a crease of two steep slopes, a move meets the same walls again and again without getting anywhere.
+TEST(Capsule, AttemptsStepOncePerWallInCrease) {
+  for (const double degrees : {58.0, 65.0, 75.0}) {
+    const double angle = degrees * std::numbers::pi / 180.0;
+    SceneGrid content;
+    content.field.edit({{-12, -4, -12}, {13, 24, 13}}, [&](IVec3 p, DensitySample) {
+      const double height = 0.3 * p.z + std::tan(angle) * std::abs(p.x + 0.4 * p.z + 0.3);
+      return DensitySample{static_cast<float>((p.y - height) * std::cos(angle)), kStone};
+    });
+    const Scene scene = scene_of(std::move(content), {});
+    const SceneTracer tracer(scene);
+    for (const DVec3 way : {DVec3(0.1, -0.2, 0.06), DVec3(-0.08, -0.3, 0.1), DVec3(0.02, -0.1, 0.1)}) {
+      Capsule player{0.4, {-0.3, 4.0, 0.0}, {0.0, 0.5, 0.0}};
+      int most = 0;
+      for (int frame = 0; frame < 120; ++frame) {
+        const SlideResult result = move_and_slide(tracer, player, way, walking());
+        player.centre = result.centre;
+        most = std::max(most, result.sweeps);
+      }
+      EXPECT_GT(most, 6) << "it attempts steps";
+      EXPECT_LE(most, 17) << degrees << ": two steps of five sweeps, five contacts, and the floor";
+    }
+  }
 }
 
 TEST(Capsule, IsPushedOutToFreePosition) {

@@ -17,7 +17,6 @@
 #include <cstddef>
 #include <limits>
 #include <optional>
-#include <vector>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -28,6 +27,7 @@
 #include <quoin/grid/density_grid.h>
 #include <quoin/trace/density_ray.h>
 
+#include "core/make_room.h"
 #include "core/trilinear.h"
 #include "scene/query/moving_shapes.h"
 #include "scene/query/query_in_grid.h"
@@ -317,10 +317,10 @@ class FieldSearch {
   /// Returns the first contact with the added cells, up to the fraction `until`.
   [[nodiscard]] std::optional<FieldContact> first(double until) {
     std::optional<FieldContact> known;  // no later than this
-    for (int looked_at = 0; !pieces_.empty(); ++looked_at) {
-      std::pop_heap(pieces_.begin(), pieces_.end(), later);
-      FieldPiece piece = pieces_.back();
-      pieces_.pop_back();
+    for (int looked_at = 0; !pieces_->empty(); ++looked_at) {
+      std::pop_heap(pieces_->begin(), pieces_->end(), later);
+      FieldPiece piece = pieces_->back();
+      pieces_->pop_back();
       const double before = known ? known->fraction : until;
       if (piece.enter > before) break;
       const bool is_inside = piece.enter < 0.0;
@@ -397,8 +397,8 @@ class FieldSearch {
   }
 
   void push(const FieldPiece& piece) {
-    pieces_.push_back(piece);
-    std::push_heap(pieces_.begin(), pieces_.end(), later);
+    pieces_->push_back(piece);
+    std::push_heap(pieces_->begin(), pieces_->end(), later);
   }
 
   void learn(const FieldPiece& piece, double until, std::optional<FieldContact>& known) const {
@@ -445,7 +445,7 @@ class FieldSearch {
 
   Shape& shape_;
   int tested_ = 0;
-  std::vector<FieldPiece> pieces_;  // a heap, earliest contact first
+  KeptList<FieldPiece, FieldSearch> pieces_;  // a heap, earliest contact first
 };
 
 /// Returns the first cell (by z, y, x) whose solid a resting shape overlaps deeper than kFieldTouch. Only solid

@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <vector>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -16,6 +15,7 @@
 #include <quoin/scene/scene_query.h>
 
 #include "core/coordinates/unit_rotation.h"
+#include "core/make_room.h"
 #include "scene/tracer/placed_grid.h"
 #include "scene/tracer/scene_tracer_impl.h"
 
@@ -109,10 +109,10 @@ class Seen {
   /// Calls `visit(placed)` for each included instance near a box in the world, in order.
   template <class Visit>
   void visit_near(const DBox& box, const Visit& visit) const {
-    std::vector<std::size_t> near;
-    tracer_.impl().instances.visit_box(box, [&](std::size_t i) { near.push_back(i); });
-    std::sort(near.begin(), near.end());
-    for (const std::size_t i : near) {
+    KeptList<std::size_t, Seen> near;
+    tracer_.impl().instances.visit_box(box, [&](std::size_t i) { near->push_back(i); });
+    std::sort(near->begin(), near->end());
+    for (const std::size_t i : *near) {
       if (includes(placed_in(tracer_)[i])) visit(placed_in(tracer_)[i]);
     }
   }

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include <glm/geometric.hpp>
@@ -8,10 +9,14 @@
 #include <quoin/core/assert.h>
 #include <quoin/scene/sweep.h>
 
+#include "core/make_room.h"
 #include "scene/query/query_in_grid.h"
 
 namespace quoin {
 namespace {
+
+// The normals of a moving body's contacts.
+using Normals = KeptList<DVec3, struct ContactNormals>;
 
 // Removes from a displacement the components that point into the contacts so far.
 DVec3 along_contacts(DVec3 displacement, const std::vector<DVec3>& normals) {
@@ -64,8 +69,10 @@ struct Body {
   const SceneTracer& tracer;
   const SlideOptions& options;
   Shape shape;
+  int* sweeps = nullptr;  // to be counted
 
   [[nodiscard]] std::optional<SweepHit> sweep(DVec3 displacement) const {
+    if (sweeps != nullptr) ++*sweeps;
     return sweep_shape(tracer, shape, displacement, options.filter);
   }
   // Moves the shape to a contact, minus the skin. Returns the fraction of the displacement used. A previous move may
@@ -135,8 +142,10 @@ SlideResult slide(Body<Shape> body, DVec3 displacement) {
   SlideResult result;
   result.centre = body.shape.centre;
   result.displacement = displacement;
+  body.sweeps = &result.sweeps;
   DVec3 left = displacement;
-  std::vector<DVec3> normals;
+  Normals list;
+  std::vector<DVec3>& normals = *list;
   for (int contact = 0; contact < body.options.max_contacts; ++contact) {
     const auto hit = body.sweep(left);
     if (!hit) {
@@ -168,7 +177,11 @@ class Walk {
       : body_(body),
         floor_(floor),
         up_(up),
-        steepest_(std::cos(floor.max_slope_degrees * std::numbers::pi / 180.0) - 1e-6) {}
+        steepest_(std::cos(floor.max_slope_degrees * std::numbers::pi / 180.0) - 1e-6) {
+    body_.sweeps = &result_.sweeps;
+  }
+  Walk(const Walk&) = delete;
+  Walk& operator=(const Walk&) = delete;
 
   SlideResult run(DVec3 displacement) {
     displacement_ = displacement;
@@ -212,7 +225,7 @@ class Walk {
       result_.floor_normal = DVec3(0.0);
       result_.floor = {};
     }
-    return result_;
+    return std::move(result_);
   }
 
   // Moves the body out of overlaps and finds the floor below it. Returns false if the body must not move.
@@ -249,11 +262,11 @@ class Walk {
   }
 
   void make_walls_upright() {
-    std::vector<DVec3> upright;
+    std::size_t upright = 0;
     for (DVec3 wall : walls_) {
-      if (make_upright(wall)) upright.push_back(wall);
+      if (make_upright(wall)) walls_[upright++] = wall;
     }
-    walls_ = std::move(upright);
+    walls_.resize(upright);
   }
 
   // Moves to a contact and redirects the remaining path. Returns false at the end of the path.
@@ -268,7 +281,11 @@ class Walk {
       meets_floor_ = true;
       return true;
     }
-    if ((is_supported_ || is_on_floor_) && floor_.step_height > 0.0 && steps(level(left_), hit.normal)) return false;
+    if ((is_supported_ || is_on_floor_) && floor_.step_height > 0.0 && !has_failed_step(hit.normal)) {
+      const DVec3 here = body_.shape.centre;
+      if (steps(level(left_), hit.normal)) return false;
+      failed_steps_->push_back({here, hit.normal});
+    }
     note(result_, is_floor(-hit.normal) ? SlideContact::Kind::Ceiling : SlideContact::Kind::Wall, hit);
     is_on_floor_ ? turn_aside(hit.normal) : turn(hit.normal);
     return true;
@@ -301,6 +318,16 @@ class Walk {
     walls_.push_back(normal);
     left_ = turned(left_);
     displacement_ = turned(displacement_);
+  }
+
+  // Returns true if a step over a wall was attempted where the body is. In a crease, it meets the same walls several
+  // times without moving.
+  [[nodiscard]] bool has_failed_step(DVec3 normal) {
+    constexpr double kSameWall = 0.99;  // cosine of the angle between its normals
+    return std::any_of(failed_steps_->begin(), failed_steps_->end(), [&](const FailedStep& step) {
+      return glm::dot(step.normal, normal) > kSameWall &&
+             glm::distance(step.centre, body_.shape.centre) <= body_.options.skin;
+    });
   }
 
   // Tries to step up, forward and down onto a floor. On success the remaining path counts as done.
@@ -350,6 +377,11 @@ class Walk {
     is_on_floor_ = meets_floor_ && hit && hit->fraction * glm::length(down) <= probe;
   }
 
+  struct FailedStep {
+    DVec3 centre{0.0};  // of the body
+    DVec3 normal{0.0};  // of the wall
+  };
+
   Body<Shape> body_;
   const FloorOptions& floor_;
   DVec3 up_;
@@ -357,7 +389,9 @@ class Walk {
   SlideResult result_;
   DVec3 displacement_{0.0};  // total, minus the parts that went into contacts
   DVec3 left_{0.0};          // the remaining path; horizontal on a floor
-  std::vector<DVec3> walls_;
+  Normals walls_list_;
+  std::vector<DVec3>& walls_ = *walls_list_;
+  KeptList<FailedStep, Walk> failed_steps_;
   bool is_on_floor_ = false;
   bool meets_floor_ = false;   // during the move
   bool is_supported_ = false;  // by a floor or a slope at the start
