@@ -72,7 +72,9 @@ void ChannelLight::take(ChannelChange change) {
   for (ChannelChange::Slab& slab : change.slabs) {
     QUOIN_ASSERT(slab.index < kSlabs, "a slab of the chunk");
     is_any_uniform |= slab.now.is_uniform();
-    (*slabs_)[slab.index] = std::move(slab.now);
+    LightSlab& stored = (*slabs_)[slab.index];
+    slabs_->bytes += slab.now.bytes() - stored.bytes();
+    stored = std::move(slab.now);
   }
   if (is_any_uniform) unite();
 }
@@ -84,13 +86,6 @@ void ChannelLight::unite() {
   if (!std::all_of(slabs_->all.begin(), slabs_->all.end(), is_like_first)) return;
   level_ = first.level();
   slabs_.reset();
-}
-
-std::size_t ChannelLight::bytes() const {
-  if (is_uniform()) return 0;
-  std::size_t sum = sizeof(Slabs);
-  for (const LightSlab& slab : slabs_->all) sum += slab.bytes();
-  return sum;
 }
 
 void LightChunk::read_row(int y, int z, std::span<std::uint16_t, kChunkEdge> out) const {

@@ -157,11 +157,13 @@ class ChannelLight {
     return is_uniform() ? LightSlab(level_).row(0) : (*slabs_)[slab_index(y, z)].row(row_in_slab(y, z));
   }
   void take(ChannelChange change);
-  [[nodiscard]] std::size_t bytes() const;
+  /// Returns the heap memory. Cost: O(1).
+  [[nodiscard]] std::size_t bytes() const { return is_uniform() ? 0 : sizeof(Slabs) + slabs_->bytes; }
 
  private:
   struct Slabs : RefCounted {
     std::array<LightSlab, kSlabs> all;
+    std::size_t bytes = 0;  // LightSlab::bytes of all
     LightSlab& operator[](std::size_t i) { return all[i]; }
   };
   void unite();

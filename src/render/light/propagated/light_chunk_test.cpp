@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -82,6 +83,32 @@ TEST(LightSlab, StoresOnlyDifferencesBetweenPlanes) {
     for (std::size_t row = 0; row < kSlabWords; ++row) planes.plane(i)[row] = row < 8 ? 0 : std::uint64_t{1} << 40;
   }
   EXPECT_EQ(bytes(), 28 + 4U) << "one unit: the planes below equal it";
+}
+
+TEST(ChannelLight, CountsBytesOfItsSlabs) {
+  std::mt19937_64 random(4);
+  ChannelLight light;
+  EXPECT_EQ(light.bytes(), 0U);
+  const std::size_t empty = [] {
+    ChannelLight one;
+    one.take({.slabs = {{0, LightSlab(3)}}});
+    return one.bytes();
+  }();
+  for (int step = 0; step < 300; ++step) {
+    const ChannelLight before = light;
+    const std::size_t bytes_before = before.bytes();
+    ChannelChange change;
+    change.is_uniform = random() % 50 == 0;
+    for (std::size_t i = 0; !change.is_uniform && i < random() % 20; ++i) {
+      SlabPlanes planes = random_planes(random);
+      change.slabs.push_back({random() % kSlabs, LightSlab::of(planes, kinds_of(planes))});
+    }
+    light.take(std::move(change));
+    std::size_t expected = light.is_uniform() ? 0 : empty;
+    for (std::size_t i = 0; i < kSlabs && !light.is_uniform(); ++i) expected += light.stored(i).bytes();
+    ASSERT_EQ(light.bytes(), expected) << step;
+    ASSERT_EQ(before.bytes(), bytes_before) << "a copy does not change";
+  }
 }
 
 TEST(LightSlabKernel, PacksAndReadsAlikeWithEveryInstructionSet) {
