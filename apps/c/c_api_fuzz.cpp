@@ -314,6 +314,13 @@ class Program {
     for (std::int32_t& each : shape) each = byte() < 200 ? byte() % 16 : std::numeric_limits<std::int32_t>::max();
     std::array<std::uint16_t, 1024> types{};
     took(quoin_grid_read(handle(), index(), perhaps(min.data()), shape.data(), perhaps(types.data()), types.size()));
+    // Reads no further bytes, so that programs of the corpus stay the same.
+    std::array<quoin_body, 2> bodies{made<quoin_body>(), {}};
+    const std::array<double, 3> densities{1.0, static_cast<double>(min[0]), 0.5};
+    const quoin_scene last = handles_.empty() ? 0 : handles_.back();
+    std::size_t pieces = 0;
+    took(quoin_grid_body(last, 0, densities.data(), densities.size(), bodies.data()));
+    took(quoin_grid_pieces(last, 0, nullptr, 0, bodies.data(), bodies.size(), &pieces));
   }
 
   void see() {

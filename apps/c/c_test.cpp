@@ -284,6 +284,56 @@ TEST(C, RendersAndTracesScene) {
   EXPECT_EQ(quoin_free(scene), QUOIN_OK);
 }
 
+TEST(C, WeighsGridsAndPieces) {
+  std::vector<std::uint16_t> voxels;
+  const quoin_scene scene = made_scene(voxels);
+  // Two voxels of type 1, and a column of two voxels of type 2.
+  std::vector<std::uint16_t> types(5 * 2 * 1);
+  types[0 * 2] = types[1 * 2] = 1;
+  types[4 * 2] = types[4 * 2 + 1] = 2;
+  quoin_array array = array_of(types, QUOIN_UINT16);
+  array.shape[0] = 5;
+  array.shape[1] = 2;
+  array.shape[2] = 1;
+  array.origin[0] = 10.0;
+  std::size_t grid = 0;
+  ASSERT_EQ(quoin_grid_add(scene, &array, "pieces", &grid), QUOIN_OK) << quoin_last_error();
+  const std::array<double, 3> densities{0.0, 1.0, 3.0};
+  auto whole = sized<quoin_body>();
+  ASSERT_EQ(quoin_grid_body(scene, grid, densities.data(), densities.size(), &whole), QUOIN_OK) << quoin_last_error();
+  EXPECT_DOUBLE_EQ(whole.mass, 8.0);
+  EXPECT_EQ(whole.voxels, 4);
+  EXPECT_DOUBLE_EQ(whole.centre[0], whole.min[0] + (2.0 * 1.0 + 6.0 * 4.5) / 8.0);
+  EXPECT_EQ(whole.extent[0], 5);
+  ASSERT_EQ(quoin_grid_body(scene, grid, nullptr, 0, &whole), QUOIN_OK);
+  EXPECT_DOUBLE_EQ(whole.mass, 4.0);
+
+  std::size_t pieces = 0;
+  ASSERT_EQ(quoin_grid_pieces(scene, grid, nullptr, 0, nullptr, 0, &pieces), QUOIN_OK);
+  ASSERT_EQ(pieces, 2U);
+  std::array<quoin_body, 3> bodies{sized<quoin_body>(), {}, {}};
+  ASSERT_EQ(quoin_grid_pieces(scene, grid, densities.data(), densities.size(), bodies.data(), 3, &pieces), QUOIN_OK);
+  EXPECT_EQ(bodies[1].size, sizeof(quoin_body));
+  EXPECT_EQ(bodies[2].size, 0U) << "there are only two";
+  EXPECT_EQ(bodies[0].voxels, 2);
+  EXPECT_EQ(bodies[0].first[0], whole.min[0]);
+  EXPECT_DOUBLE_EQ(bodies[1].mass, 6.0);
+  EXPECT_DOUBLE_EQ(bodies[1].centre[0], whole.min[0] + 4.5);
+  EXPECT_EQ(bodies[1].extent[1], 2);
+  // A box of 1x2x1 with the mass 6: mass * (a^2 + b^2) / 12.
+  EXPECT_NEAR(bodies[1].inertia[0], 6.0 * (4.0 + 1.0) / 12.0, 1e-12);
+  EXPECT_NEAR(bodies[1].inertia[4], 6.0 * (1.0 + 1.0) / 12.0, 1e-12);
+  EXPECT_NEAR(bodies[1].inertia[1], 0.0, 1e-12);
+
+  const double wrong = std::nan("");
+  EXPECT_EQ(quoin_grid_body(scene, grid, &wrong, 1, &whole), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_grid_body(scene, 9, nullptr, 0, &whole), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_grid_body(scene, grid, nullptr, 0, nullptr), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_grid_pieces(scene, grid, nullptr, 0, nullptr, 1, &pieces), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_grid_pieces(scene, grid, nullptr, 0, nullptr, 0, nullptr), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_free(scene), QUOIN_OK);
+}
+
 TEST(C, ReportsErrorsForInvalidArguments) {
   std::vector<std::uint16_t> voxels;
   const quoin_scene scene = made_scene(voxels);

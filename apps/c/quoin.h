@@ -388,6 +388,32 @@ QUOIN_API quoin_status quoin_scene_rays(quoin_scene scene, size_t count, const d
  * the types, nothing changes. */
 QUOIN_API quoin_status quoin_grid_write(quoin_scene scene, size_t grid, const quoin_array* array);
 
+/* A rigid body, as physics engines take it: a grid, or one of its pieces. Lengths are in voxels (of a field: samples),
+ * in the grid's space. A density is the mass of one voxel. For voxels that are s world units wide, and densities per
+ * cubic world unit: multiply mass by s^3, centre by s and inertia by s^5. */
+typedef struct quoin_body {
+  size_t size;
+  double mass;
+  double centre[3];  /* centre of mass; 0 if the mass is 0 */
+  double inertia[9]; /* tensor about the centre of mass, along the grid's axes: three rows, symmetric */
+  int64_t voxels;    /* 0 for a field */
+  int32_t min[3];    /* minimum corner of its tight box */
+  int32_t extent[3];
+  int32_t first[3]; /* pieces: the first voxel by z, then y, then x */
+} quoin_body;
+
+/* Computes the mass of a grid: of its field's solid if it has a field, otherwise of its voxels. `densities` has one
+ * entry per type, 0 or more and finite; entry 0 is for a field's solid without a material. Types from `count` on weigh
+ * nothing. Null: every voxel weighs 1. */
+QUOIN_API quoin_status quoin_grid_body(quoin_scene scene, size_t grid, const double* densities, size_t count,
+                                       quoin_body* out);
+/* Finds the pieces of a grid's voxels: connected by faces, of any type except air. Writes the bodies of the first
+ * `capacity` pieces in the order of their first voxels, and the number of all pieces to `pieces`. Set the size of the
+ * first element of `out`: it is the size of each. With a capacity of 0, `out` may be null. Fields have no pieces.
+ * Densities: as in quoin_grid_body. */
+QUOIN_API quoin_status quoin_grid_pieces(quoin_scene scene, size_t grid, const double* densities, size_t count,
+                                         quoin_body* out, size_t capacity, size_t* pieces);
+
 /* Layers, cameras, lamps and the sun of a scene. If a format does not support some of them, saving adds warnings. */
 
 /* A layer: instances and groups that are shown or hidden together, independent of the hierarchy. Layers are identified

@@ -8,6 +8,8 @@
 #include <span>
 #include <string>
 
+#include <quoin/grid/connected.h>
+#include <quoin/grid/mass.h>
 #include <quoin/io/formats.h>
 #include <quoin/io/mesh_file.h>
 #include <quoin/scene/scene_meshes.h>
@@ -194,6 +196,32 @@ const char* validate_load_options(const quoin_load_options& options) {
   if (options.raw_scalar < QUOIN_UINT8 || options.raw_scalar > QUOIN_FLOAT64) return "no scalar has this number";
   if (is_raw(options) && options.heights != QUOIN_HEIGHTS_NONE) return "both raw_shape and heights are set";
   return validate_heights(options);
+}
+
+// The densities of voxel types that a caller gives; null: 1 for all.
+struct Densities {
+  const double* of_type;
+  std::size_t count;
+
+  [[nodiscard]] bool are_valid() const {
+    return of_type == nullptr ||
+           std::all_of(of_type, of_type + count, [](double x) { return std::isfinite(x) && x >= 0.0; });
+  }
+  double operator()(VoxelType type) const { return of_type == nullptr ? 1.0 : type < count ? of_type[type] : 0.0; }
+};
+constexpr const char* kInvalidDensities = "a density is negative or not finite";
+
+quoin_body body_of(const MassProperties& mass, const IBox& box, std::int64_t voxels) {
+  quoin_body body{};
+  body.mass = mass.mass;
+  body.voxels = voxels;
+  for (int row = 0; row < 3; ++row) {
+    body.centre[row] = mass.centre[row];
+    for (int column = 0; column < 3; ++column) body.inertia[3 * row + column] = mass.inertia[column][row];
+    body.extent[row] = std::max(box.max[row] - box.min[row], 0);
+    body.min[row] = body.extent[row] > 0 ? box.min[row] : 0;
+  }
+  return body;
 }
 
 }  // namespace
@@ -486,6 +514,44 @@ quoin_status quoin_grid_read(quoin_scene scene, std::size_t grid, const std::int
         for (std::int32_t x = 0; x < shape[0]; ++x, to += plane) *to = reader.get(min[0] + x, min[1] + y, min[2] + z);
       }
     }
+    return QUOIN_OK;
+  });
+}
+
+quoin_status quoin_grid_body(quoin_scene scene, std::size_t grid, const double* densities, std::size_t count,
+                             quoin_body* out) {
+  return with_scene(scene, Use::Read, [&](SceneBody& body) {
+    if (grid >= body.numbers.grids.size()) return fail(QUOIN_INVALID_ARGUMENT, "no grid has this number");
+    const Densities density{densities, count};
+    if (!density.are_valid()) return fail(QUOIN_INVALID_ARGUMENT, kInvalidDensities);
+    const SceneGrid& found = body.loaded.scene.grids()[body.numbers.grids[grid]];
+    const IBox solid = found.field.bounds();
+    return report(solid.empty()
+                      ? body_of(mass_properties(found.grid, density), found.grid.bounds(), found.grid.voxel_count())
+                      : body_of(mass_properties(found.field, density), solid, 0),
+                  out);
+  });
+}
+
+quoin_status quoin_grid_pieces(quoin_scene scene, std::size_t grid, const double* densities, std::size_t count,
+                               quoin_body* out, std::size_t capacity, std::size_t* pieces) {
+  return with_scene(scene, Use::Read, [&](SceneBody& body) {
+    if (pieces == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "pieces is null");
+    if (grid >= body.numbers.grids.size()) return fail(QUOIN_INVALID_ARGUMENT, "no grid has this number");
+    const Densities density{densities, count};
+    if (!density.are_valid()) return fail(QUOIN_INVALID_ARGUMENT, kInvalidDensities);
+    if (capacity != 0 && !has_fit_size(out)) return fail(QUOIN_INVALID_ARGUMENT, "out is null, or its size");
+    ConnectedPieces found;
+    found.update(body.loaded.scene.grids()[body.numbers.grids[grid]].grid);
+    const std::size_t size = capacity == 0 ? 0 : out->size;
+    for (std::size_t i = 0; i < std::min(capacity, found.size()); ++i) {
+      const ConnectedPiece& piece = found.pieces()[i];
+      quoin_body whole = body_of(mass_properties(found, i, density), piece.box, piece.voxels);
+      whole.size = size;
+      for (int axis = 0; axis < 3; ++axis) whole.first[axis] = piece.first[axis];
+      std::memcpy(reinterpret_cast<std::byte*>(out) + i * size, &whole, size);
+    }
+    *pieces = found.size();
     return QUOIN_OK;
   });
 }

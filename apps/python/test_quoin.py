@@ -172,6 +172,25 @@ class Scenes(unittest.TestCase):
         self.assertTrue((hits.type == np.where(height == 5, 2, 1)).all())
         self.assertTrue((hits.normal == [0, 1, 0]).all())
 
+    def test_bodies_of_grids_and_pieces(self):
+        array = np.zeros((6, 2, 1), np.uint8)
+        array[:2, 0] = 1
+        array[4, :] = 2
+        grid = quoin.from_numpy(array, [(255, 0, 0), (0, 255, 0)]).grids[0]
+        whole = grid.body([0, 1, 3])
+        self.assertEqual((whole.mass, whole.voxel_count, whole.origin, whole.shape), (8, 4, (0, 0, 0), (5, 2, 1)))
+        self.assertEqual(whole.centre, (29 / 8, (1 + 6) / 8, 0.5))
+        self.assertTrue((whole.inertia == whole.inertia.T).all())
+        self.assertEqual(grid.body().mass, 4)
+        first, second = grid.pieces((0, 1, 3))
+        self.assertEqual((first.mass, first.first), (2, (0, 0, 0)))
+        self.assertEqual((second.mass, second.centre, second.origin), (6, (4.5, 1, 0.5), (4, 0, 0)))
+        np.testing.assert_allclose(second.inertia, np.diag([2.5, 1, 2.5]), atol=1e-12)
+        for wrong in ([-1.0, 1.0], [np.nan]):
+            with self.assertRaises(quoin.QuoinError):
+                grid.body(wrong)
+            with self.assertRaises(quoin.QuoinError):
+                grid.pieces(wrong)
 
     def test_instances_are_placed_and_moved(self):
         _, scene = self.scene()

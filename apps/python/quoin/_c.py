@@ -153,6 +153,12 @@ class RenderOptions(ctypes.Structure):
                 ("fov_degrees", ctypes.c_double), ("has_sun", ctypes.c_int32), ("sun", ctypes.c_double * 3)]
 
 
+class Body(ctypes.Structure):
+    _fields_ = [("size", ctypes.c_size_t), ("mass", ctypes.c_double), ("centre", ctypes.c_double * 3),
+                ("inertia", ctypes.c_double * 9), ("voxels", ctypes.c_int64), ("min", ctypes.c_int32 * 3),
+                ("extent", ctypes.c_int32 * 3), ("first", ctypes.c_int32 * 3)]
+
+
 class HitArrays(ctypes.Structure):
     _fields_ = [("size", ctypes.c_size_t), ("t", ctypes.c_void_p), ("voxel", ctypes.c_void_p),
                 ("type", ctypes.c_void_p), ("normal", ctypes.c_void_p)]
@@ -203,6 +209,8 @@ _SIGNATURES = {
     "quoin_grid_add": (_handle, _p, ctypes.c_char_p, _p),
     "quoin_grid_write": (_handle, _n, _p),
     "quoin_grid_set_storage": (_handle, _n, _i, _i),
+    "quoin_grid_body": (_handle, _n, _p, _n, _p),
+    "quoin_grid_pieces": (_handle, _n, _p, _n, _p, _n, _p),
     "quoin_grid_voxelize": (_handle, _p, _p, ctypes.c_char_p, _p),
     "quoin_instance_count": (_handle, _p),
     "quoin_instance_get": (_handle, _n, _p),

@@ -145,6 +145,22 @@ class Format(NamedTuple):
     is_mesh: bool  #: contains triangles
 
 
+class Body(NamedTuple):
+    """A rigid body: a grid, or one of its pieces. Lengths are in voxels, in the grid's space.
+
+    Densities are masses per voxel. For voxels that are s world units wide, and masses per cubic world unit: multiply
+    `mass` by s**3, `centre` by s and `inertia` by s**5.
+    """
+
+    mass: float
+    centre: Tuple[float, ...]  #: centre of mass
+    inertia: NdArray  #: float64, (3, 3): tensor about the centre of mass, along the grid's axes
+    voxel_count: int  #: 0 for a density field
+    origin: Tuple[int, ...]  #: minimum corner of its tight box
+    shape: Tuple[int, ...]
+    first: Tuple[int, ...]  #: pieces: a voxel of the piece, the first by z, then y, then x
+
+
 class Hits(NamedTuple):
     """Ray hits, one entry per ray."""
 
@@ -177,6 +193,15 @@ def _sign_of(flag: Optional[bool]) -> int:
 
 def _flag_of(sign: int) -> Optional[bool]:
     return None if sign == 0 else sign > 0
+
+
+def _numbers_of(numbers: Optional[Sequence[float]]) -> Tuple[Any, int]:
+    return (None, 0) if numbers is None else ((ctypes.c_double * len(numbers))(*numbers), len(numbers))
+
+
+def _body_of(body: Any) -> Body:
+    return Body(body.mass, tuple(body.centre), np.array(body.inertia).reshape(3, 3), body.voxels, tuple(body.min),
+                tuple(body.extent), tuple(body.first))
 
 
 def _rows_of(matrix: Any) -> List[float]:
@@ -298,6 +323,42 @@ class Grid:
         """
         given = _c.types_of(array, self.origin if origin is None else origin)
         _c.check(_c.lib.quoin_grid_write(self._scene._owner.handle, self._number, ctypes.byref(given)))
+
+    def body(self, densities: Optional[Sequence[float]] = None) -> Body:
+        """Returns the mass, the centre of mass and the inertia of the grid: of its density field if it has one.
+
+        `densities`: mass of one voxel by type, 0 or more and finite; entry 0 is for a field's solid without a material.
+        Types beyond the list weigh nothing. Default: 1 for all. Raises QuoinError for invalid densities.
+
+        >>> scene = from_numpy(np.ones((4, 2, 2), np.uint8), [(255, 0, 0)])
+        >>> body = scene.grids[0].body([0, 0.5])
+        >>> body.mass, body.centre
+        (8.0, (2.0, 1.0, 1.0))
+        """
+        out = _c.sized(_c.Body)
+        given, count = _numbers_of(densities)
+        _c.check(_c.lib.quoin_grid_body(self._scene._owner.handle, self._number, given, count, ctypes.byref(out)))
+        return _body_of(out)
+
+    def pieces(self, densities: Optional[Sequence[float]] = None) -> List[Body]:
+        """Finds the pieces of the grid's voxels, connected by faces, in the order of their first voxels.
+
+        `densities`: as in `body`. Density fields have no pieces.
+
+        >>> array = np.zeros((5, 1, 1), np.uint8)
+        >>> array[[0, 3, 4]] = 1
+        >>> [piece.mass for piece in from_numpy(array, [(255, 0, 0)]).grids[0].pieces()]
+        [1.0, 2.0]
+        """
+        given, count = _numbers_of(densities)
+        found = ctypes.c_size_t()
+        room: Any = ()
+        while True:
+            _c.check(_c.lib.quoin_grid_pieces(self._scene._owner.handle, self._number, given, count, room or None,
+                                              len(room), ctypes.byref(found)))
+            if found.value <= len(room):
+                return [_body_of(one) for one in room[:found.value]]
+            room = (_c.Body * found.value)(_c.sized(_c.Body))  # again if another thread adds pieces
 
     def mesh(self, smooth: bool = False, occlusion: bool = True, threads: int = 0, watertight: bool = False) -> Mesh:
         """Meshes the grid as blocks with merged faces, or as a smooth surface. Positions are in the grid's voxels.
