@@ -200,6 +200,7 @@ class Game {
     FrameMeter meter;
     games::Pace pace(options_);
     quoin::OrientedBox body{viewer_.position, {0.3, 0.9, 0.3}};
+    quoin::SlideResult moved;
     double fall = 0.0;
     for (int i = 0; i < options_.frames(900); ++i) {
       std::optional<games::EditWatch::Voxel> dug;
@@ -210,7 +211,7 @@ class Game {
         quoin::SlideOptions slide;
         slide.floor = quoin::FloorOptions{.step_height = 1.1, .snap_distance = 0.6};
         const DVec3 step{std::cos(turn) * 5.0 / 60.0, fall / 60.0, std::sin(turn) * 5.0 / 60.0};
-        const quoin::SlideResult moved = move_and_slide(tracer_.shown(), body, step, slide);
+        move_and_slide(tracer_.shown(), body, step, slide, moved);
         body.centre = moved.centre;
         fall = moved.is_on_floor ? 0.0 : 60.0 * moved.displacement.y;
         viewer_.position = body.centre + DVec3(0.0, 0.7, 0.0);

@@ -200,6 +200,7 @@ class Game {
     FrameMeter meter;
     games::Pace pace(options_);
     quoin::Capsule body{0.4, viewer_.position, {0.0, 0.5, 0.0}};
+    quoin::SlideResult moved;
     double fall = 0.0;
     std::vector<double> moves_ms;
     for (int i = 0; i < options_.frames(900); ++i) {
@@ -211,7 +212,7 @@ class Game {
         slide.floor = quoin::FloorOptions{.max_slope_degrees = 50.0, .step_height = 0.5, .snap_distance = 0.4};
         const DVec3 step{std::cos(turn) * 5.0 / 60.0, fall / 60.0, std::sin(turn) * 5.0 / 60.0};
         const double start = games::thread_ms();
-        const quoin::SlideResult moved = move_and_slide(tracer_.shown(), body, step, slide);
+        move_and_slide(tracer_.shown(), body, step, slide, moved);
         moves_ms.push_back(games::thread_ms() - start);
         body.centre = moved.centre;
         fall = moved.is_on_floor ? 0.0 : 60.0 * moved.displacement.y;

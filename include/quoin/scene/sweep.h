@@ -148,5 +148,10 @@ struct SlideResult {
                                          const SlideOptions& options = {});
 [[nodiscard]] SlideResult move_and_slide(const SceneTracer& tracer, const Capsule& capsule, DVec3 displacement,
                                          const SlideOptions& options = {});
+/// As above. Replaces `result`, and keeps the memory of its contacts: for bodies that move in each frame.
+void move_and_slide(const SceneTracer& tracer, const OrientedBox& box, DVec3 displacement, const SlideOptions& options,
+                    SlideResult& result);
+void move_and_slide(const SceneTracer& tracer, const Capsule& capsule, DVec3 displacement, const SlideOptions& options,
+                    SlideResult& result);
 
 }  // namespace quoin

@@ -138,8 +138,7 @@ void note(SlideResult& result, SlideContact::Kind kind, const SweepHit& hit) {
 }
 
 template <class Shape>
-SlideResult slide(Body<Shape> body, DVec3 displacement) {
-  SlideResult result;
+void slide(Body<Shape> body, DVec3 displacement, SlideResult& result) {
   result.centre = body.shape.centre;
   result.displacement = displacement;
   body.sweeps = &result.sweeps;
@@ -165,7 +164,6 @@ SlideResult slide(Body<Shape> body, DVec3 displacement) {
   }
   result.displacement = along_contacts(displacement, normals);
   result.centre = body.shape.centre;
-  return result;
 }
 
 // A walking body. On a floor its displacement is horizontal: walls deflect it, and the floor raises and lowers it. In
@@ -173,19 +171,20 @@ SlideResult slide(Body<Shape> body, DVec3 displacement) {
 template <class Shape>
 class Walk {
  public:
-  Walk(const Body<Shape>& body, const FloorOptions& floor, DVec3 up)
+  Walk(const Body<Shape>& body, const FloorOptions& floor, DVec3 up, SlideResult& result)
       : body_(body),
         floor_(floor),
         up_(up),
-        steepest_(std::cos(floor.max_slope_degrees * std::numbers::pi / 180.0) - 1e-6) {
+        steepest_(std::cos(floor.max_slope_degrees * std::numbers::pi / 180.0) - 1e-6),
+        result_(result) {
     body_.sweeps = &result_.sweeps;
   }
   Walk(const Walk&) = delete;
   Walk& operator=(const Walk&) = delete;
 
-  SlideResult run(DVec3 displacement) {
+  void run(DVec3 displacement) {
     displacement_ = displacement;
-    if (!find_ground(displacement)) return result();
+    if (!find_ground(displacement)) return finish();
     if (is_on_floor_) displacement_ = level(displacement_);
     left_ = displacement_;
     for (int contact = 0; contact < body_.options.max_contacts && left_ != DVec3(0.0); ++contact) {
@@ -198,7 +197,7 @@ class Walk {
       if (!meet(*hit, way)) break;
     }
     if (is_on_floor_) settle();
-    return result();
+    finish();
   }
 
  private:
@@ -217,7 +216,7 @@ class Walk {
   [[nodiscard]] DVec3 along_floor(DVec3 v) const {
     return v - up_ * (glm::dot(v, result_.floor_normal) / glm::dot(result_.floor_normal, up_));
   }
-  [[nodiscard]] SlideResult result() {
+  void finish() {
     result_.centre = body_.shape.centre;
     result_.displacement = displacement_;
     result_.is_on_floor = is_on_floor_;
@@ -225,7 +224,6 @@ class Walk {
       result_.floor_normal = DVec3(0.0);
       result_.floor = {};
     }
-    return std::move(result_);
   }
 
   // Moves the body out of overlaps and finds the floor below it. Returns false if the body must not move.
@@ -386,7 +384,7 @@ class Walk {
   const FloorOptions& floor_;
   DVec3 up_;
   double steepest_;  // minimum of dot(normal, up_) for floors
-  SlideResult result_;
+  SlideResult& result_;
   DVec3 displacement_{0.0};  // total, minus the parts that went into contacts
   DVec3 left_{0.0};          // the remaining path; horizontal on a floor
   Normals walls_list_;
@@ -397,29 +395,49 @@ class Walk {
   bool is_supported_ = false;  // by a floor or a slope at the start
 };
 
+// Keeps the memory of the result's contacts.
 template <class Shape>
-SlideResult moved(const SceneTracer& tracer, const Shape& shape, DVec3 displacement, const SlideOptions& options) {
+void move_shape(const SceneTracer& tracer, const Shape& shape, DVec3 displacement, const SlideOptions& options,
+                SlideResult& result) {
   QUOIN_ASSERT(options.max_contacts >= 1, "at least one contact");
+  std::vector<SlideContact> contacts = std::move(result.contacts);
+  contacts.clear();
+  result = {};
+  result.contacts = std::move(contacts);
   const Body<Shape> body{tracer, options, shape};
   if (options.floor) {
     const double length = glm::length(options.floor->up);
     if (length > 0.0 && std::isfinite(length) && is_finite(displacement)) {
-      return Walk<Shape>(body, *options.floor, options.floor->up / length).run(displacement);
+      return Walk<Shape>(body, *options.floor, options.floor->up / length, result).run(displacement);
     }
   }
-  return slide(body, displacement);
+  slide(body, displacement, result);
 }
 
 }  // namespace
 
 SlideResult move_and_slide(const SceneTracer& tracer, const OrientedBox& box, DVec3 displacement,
                            const SlideOptions& options) {
-  return moved(tracer, box, displacement, options);
+  SlideResult result;
+  move_shape(tracer, box, displacement, options, result);
+  return result;
 }
 
 SlideResult move_and_slide(const SceneTracer& tracer, const Capsule& capsule, DVec3 displacement,
                            const SlideOptions& options) {
-  return moved(tracer, capsule, displacement, options);
+  SlideResult result;
+  move_shape(tracer, capsule, displacement, options, result);
+  return result;
+}
+
+void move_and_slide(const SceneTracer& tracer, const OrientedBox& box, DVec3 displacement, const SlideOptions& options,
+                    SlideResult& result) {
+  move_shape(tracer, box, displacement, options, result);
+}
+
+void move_and_slide(const SceneTracer& tracer, const Capsule& capsule, DVec3 displacement, const SlideOptions& options,
+                    SlideResult& result) {
+  move_shape(tracer, capsule, displacement, options, result);
 }
 
 }  // namespace quoin
