@@ -24,7 +24,7 @@ struct Options {
   int edits = 10'000;      // in the digging phase
   bool is_short = false;   // few frames, more checks of the result, no times
   bool with_parts = false;
-  bool with_arena = false;  // the game supplies the large blocks of Quoin: see quoin::set_block_functions
+  bool with_arena = false;             // the game supplies the large blocks of Quoin: see quoin::set_block_functions
   std::filesystem::path folder = ".";  // for worlds
   // Frames of a phase that has `frames` in the full run.
   [[nodiscard]] int frames(int full) const { return is_short ? full / 10 : full; }
