@@ -15,7 +15,7 @@ TEST_F(VulkanGolden, ImagesMatchCpu) {
   const Scene scene = golden::terrain_scene();
   const CpuRenderer cpu(scene);
   for (const golden::GoldenView& view : golden::kViews) {
-    const RenderOptions options = golden::options_for(view);
+    const RenderOptions options = of_day(golden::options_for(view));
     const Camera camera = golden::camera_for(view);
     expect_equal(taken(scene, camera, options), cpu.render(camera, options).value(), view.name);
   }

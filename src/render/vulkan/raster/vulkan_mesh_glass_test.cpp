@@ -68,7 +68,7 @@ Scene panes(const std::vector<VoxelType Types::*>& panes) {
 }
 
 TEST_F(VulkanMeshGlass, OneVoxelPanesMatchCpu) {
-  RenderOptions options = without_shadows(sized(120, 120));
+  RenderOptions options = vulkan_test::of_day(without_shadows(sized(120, 120)));
   const Camera camera = straight({20.03, 20.02, 500}, 44);
   for (const bool is_lit : {true, false}) {
     options.light.shading = is_lit ? Shading::Lit : Shading::Unlit;

@@ -114,7 +114,7 @@ TEST_F(VulkanMeshSeeThrough, HidesSeamsBetweenQuads) {
   grid.fill_box({{0, 0, 0}, {200, 1, 200}}, stone);
   grid.fill_box({{0, 1, 0}, {200, 5, 200}}, water);
   place(scene, std::move(grid));
-  RenderOptions options = glass_yard_options(200, 150);
+  RenderOptions options = vulkan_test::of_day(glass_yard_options(200, 150));
   options.light.shadows = false;
   options.light.max_lamps = 0;
   const Camera camera = towards({100.3, 60.2, 230.7}, {100, 0, 100}, 0.7);
@@ -183,6 +183,29 @@ TEST_F(VulkanMeshSeeThrough, ShowsEdgesThroughGlass) {
   options.wireframe = Wireframe::Over;
   const Image edges = drawn(camera, options);
   EXPECT_GT(bytes_that_differ(plain, edges, 20), 3000);
+}
+
+// Impostors of distant instances have no glass, so its quads are drawn from the meshes.
+TEST_F(VulkanMeshSeeThrough, DrawsGlassOfFarInstances) {
+  Scene scene;
+  const VoxelType glass = add_type(scene, {90, 120, 220, 120}, Visibility::Transparent);
+  const VoxelType stone = add_type(scene, {200, 180, 150});
+  Grid grid;
+  grid.fill_box({{0, 0, 0}, {40, 4, 40}}, stone);
+  grid.fill_box({{0, 4, 0}, {40, 30, 1}}, glass);
+  place(scene, std::move(grid));
+  put(scene, blocky_surfaces(scene, false));
+  const Camera camera = towards({20, 40, 300}, {20, 10, 0}, 0.3);
+  RenderOptions options = vulkan_test::with_mesh_light(sized(256, 192));
+  options.detail.policy.emplace().rule = DetailPolicy::Rule::ByRadius;
+  options.detail.policy->near_radii = options.detail.policy->mid_radii = 0.0;
+  options.detail.policy->cell_pixels = 1.0;
+  options = vulkan_test::of_day(options);
+  const Image far = drawn(camera, mesh_options(options));
+  options.detail.policy.reset();
+  const Image whole = drawn(camera, mesh_options(options));
+  const int different = bytes_that_differ(far, whole, 3);
+  EXPECT_LE(different * 100, static_cast<int>(far.rgb.size()));
 }
 
 // Views of the middles of glass walls, two voxels across: where bodies are smooth, no edge is near enough to be
