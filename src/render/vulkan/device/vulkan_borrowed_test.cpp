@@ -65,7 +65,7 @@ TEST_F(VulkanBorrowed, DeviceAndImageOutliveRenderer) {
   const Scene scene = golden::terrain_scene();
   OwnImage image(*own_, VK_FORMAT_B8G8R8A8_UNORM, 80, 60);
   Image right;
-  for (int round = 0; round < 3; ++round) {
+  for (int round = 0; round < cases(2, 3); ++round) {
     VulkanRenderer shortlived = renderer();
     right = drawn(shortlived, scene);
     VulkanImage rendered(shortlived);
@@ -90,7 +90,7 @@ TEST_F(VulkanBorrowed, TwoRenderersShareOneDevice) {
   std::vector<std::thread> threads;
   for (VulkanRenderer* one : {&first, &second}) {
     threads.emplace_back([&, one] {
-      for (int i = 0; i < 4; ++i) EXPECT_EQ(drawn(*one, scene).rgb, right.rgb);
+      for (int i = 0; i < cases(2, 4); ++i) EXPECT_EQ(drawn(*one, scene).rgb, right.rgb);
     });
   }
   for (std::thread& thread : threads) thread.join();

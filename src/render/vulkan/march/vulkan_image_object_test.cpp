@@ -8,6 +8,9 @@ namespace {
 
 using vulkan_test::VulkanTest;
 
+constexpr int kWidth = 140;  // more than one tile
+constexpr int kHeight = 40;
+
 class VulkanImageObject : public VulkanTest {
  protected:
   void SetUp() override {
@@ -16,7 +19,7 @@ class VulkanImageObject : public VulkanTest {
     ASSERT_TRUE(renderer_->update(golden::terrain_scene()));
   }
 
-  void add(VulkanImage& rendered, int samples, Accumulation accumulation, int width = 200) {
+  void add(VulkanImage& rendered, int samples, Accumulation accumulation, int width = kWidth) {
     options_.width = width;
     options_.samples = samples;
     const Status drawn = renderer_->draw(rendered, golden::camera_for(golden::kViews[0]), options_, accumulation);
@@ -34,7 +37,7 @@ class VulkanImageObject : public VulkanTest {
 
   RenderOptions options_ = [] {
     RenderOptions options;
-    options.height = 130;
+    options.height = kHeight;
     return options;
   }();
 };
@@ -64,10 +67,10 @@ TEST_F(VulkanImageObject, RestartsOnRequestAndOnResize) {
 }
 
 TEST_F(VulkanImageObject, RestartsAfterWrittenImage) {
-  options_.width = 200;
+  options_.width = kWidth;
   const std::vector<std::uint8_t> alone = rendered(1).colour.rgb;
   VulkanImage image(*renderer_);
-  Image grey{200, 130, std::vector<std::uint8_t>(std::size_t{3} * 200 * 130, 128)};
+  Image grey{kWidth, kHeight, std::vector<std::uint8_t>(std::size_t{3} * kWidth * kHeight, 128)};
   for (const bool was_drawn : {false, true}) {
     if (was_drawn) add(image, 2, Accumulation::Restart);
     ASSERT_TRUE(image.write(grey));

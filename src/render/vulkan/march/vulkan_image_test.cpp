@@ -21,18 +21,27 @@ using vulkan_test::OwnImage;
 constexpr std::array kFormats = {VK_FORMAT_R8G8B8A8_UNORM, VK_FORMAT_R8G8B8A8_SRGB, VK_FORMAT_B8G8R8A8_UNORM,
                                  VK_FORMAT_B8G8R8A8_SRGB};
 
-/// Skips without a device; fails on every message of the validation layer.
+/// Skips without a device; fails on every message of the validation layer. The tests share a device and a renderer:
+/// creating them takes longer than most of the images.
 class VulkanImages : public ::testing::Test {
  protected:
+  static void TearDownTestSuite() {
+    renderer_.reset();
+    own_.reset();
+  }
+
   void SetUp() override {
-    std::string why;
-    own_ = OwnDevice::create(why);
-    if (!own_) GTEST_SKIP() << why;
-    auto made = VulkanRenderer::create(own_->lent());
-    ASSERT_TRUE(made) << to_string(made.error());
-    renderer_ = std::make_unique<VulkanRenderer>(std::move(*made));
+    if (!renderer_) {
+      std::string why;
+      own_ = OwnDevice::create(why);
+      if (!own_) GTEST_SKIP() << why;
+      auto made = VulkanRenderer::create(own_->lent());
+      ASSERT_TRUE(made) << to_string(made.error());
+      renderer_ = std::make_unique<VulkanRenderer>(std::move(*made));
+    }
     image_ = std::make_unique<VulkanImage>(*renderer_);
   }
+  void TearDown() override { image_.reset(); }
 
   void draw(int width, int height) {
     RenderOptions options;
@@ -83,8 +92,8 @@ class VulkanImages : public ::testing::Test {
     });
   }
 
-  std::unique_ptr<OwnDevice> own_;
-  std::unique_ptr<VulkanRenderer> renderer_;
+  static inline std::unique_ptr<OwnDevice> own_;
+  static inline std::unique_ptr<VulkanRenderer> renderer_;
   std::unique_ptr<VulkanImage> image_;
 };
 
@@ -188,6 +197,7 @@ TEST_F(VulkanImages, CopyMeshImages) {
   MeshImageOptions wanted;
   wanted.width = 64;
   wanted.height = 48;
+  wanted.light.shading = Shading::Unlit;  // drawn by shaders that other tests use too, not only by this one
   ASSERT_TRUE(meshes->draw(*image_, golden::camera_for(golden::kViews[0]), wanted));
   for (const VkFormat format : kFormats) {
     OwnImage image(*own_, format, 64, 48);

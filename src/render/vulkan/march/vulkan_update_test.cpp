@@ -16,11 +16,13 @@ using vulkan_test::expect_equal;
 
 class VulkanUpdate : public vulkan_test::VulkanTest {
  protected:
-  /// Expects the updated image to match the CPU renderer's, and to equal a fresh renderer's image byte for byte.
-  void expect_current(const Scene& scene, const Camera& camera, const std::string& name) {
+  /// Expects the updated image to match the CPU renderer's, and to equal a fresh renderer's image byte for byte. Fresh
+  /// renderers take long to create, so by day only the last of several updates is compared with one.
+  void expect_current(const Scene& scene, const Camera& camera, const std::string& name, bool is_last) {
     const RenderOptions options = sized(64, 48);
     const RenderedImage updated = taken_as_is(camera, options);
     expect_equal(updated, render_test::taken(scene, camera, options), name);
+    if (!is_last && !is_nightly()) return;
     auto fresh = VulkanRenderer::create(test_options());
     if (!fresh) return;
     ASSERT_TRUE(fresh->update(scene));
@@ -54,18 +56,23 @@ TEST_F(VulkanUpdate, UploadsOnlyChanges) {
   const std::uint64_t all = renderer_->uploaded_bytes();
   ASSERT_TRUE(renderer_->update(scene));
   EXPECT_EQ(renderer_->uploaded_bytes(), 0U) << "nothing changed";
-  const auto edited = [&](const char* name, const std::function<void()>& edit) {
+  const auto edited = [&](const char* name, const std::function<void()>& edit, bool is_last = false) {
     edit();
     ASSERT_TRUE(renderer_->update(scene)) << name;
     EXPECT_GT(renderer_->uploaded_bytes(), 0U) << name;
     EXPECT_LT(renderer_->uploaded_bytes(), all / 8) << name;
-    expect_current(scene, camera, name);
+    expect_current(scene, camera, name, is_last);
   };
   edited("one_voxel", [&] { grid.set({100, 60, 100}, stone); });
   edited("hole", [&] { grid.fill_sphere({70, 8, 90}, 12, kAir); });
   edited("glass", [&] { grid.fill_box({{80, 30, 80}, {101, 51, 83}}, glass); });
   edited("new_chunk_below", [&] { grid.fill_box({{-70, 0, 60}, {-65, 31, 65}}, stone); });
-  edited("chunk_away", [&] { grid.fill_box({{-70, 0, 60}, {-65, 31, 65}}, kAir); });
+  edited(
+      "chunk_away",
+      [&] {
+        grid.fill_box({{-70, 0, 60}, {-65, 31, 65}}, kAir);
+      },
+      true);
 }
 
 TEST_F(VulkanUpdate, FollowsInstancesAndTypes) {
@@ -79,9 +86,9 @@ TEST_F(VulkanUpdate, FollowsInstancesAndTypes) {
   tower.fill_box({{0, 0, 0}, {8, 24, 8}}, brick);
   const InstanceHandle first = place(scene, tower.snapshot(), {12, 2, 12});
   const Camera camera = towards({90, 60, 100}, {30, 8, 30});
-  const auto then = [&](const char* name) {
+  const auto then = [&](const char* name, bool is_last = false) {
     ASSERT_TRUE(renderer_->update(scene)) << name;
-    expect_current(scene, camera, name);
+    expect_current(scene, camera, name, is_last);
   };
   then("two");
   const InstanceHandle second = place(scene, tower.snapshot(), {40, 2, 30});
@@ -103,7 +110,7 @@ TEST_F(VulkanUpdate, FollowsInstancesAndTypes) {
   const GridHandle grid = scene.instances()[first].grid;
   scene.remove_instance(first);
   scene.edit(grid).grid.set({3, 3, 3}, kAir);
-  then("removed_and_edited");
+  then("removed_and_edited", true);
 }
 
 TEST_F(VulkanUpdate, FollowsOtherSceneWithSameHandles) {
@@ -115,7 +122,7 @@ TEST_F(VulkanUpdate, FollowsOtherSceneWithSameHandles) {
     grid.fill_box({{0, 0, 0}, {size + 1, size + 1, size + 1}}, stone);
     place(scene, std::move(grid));
     ASSERT_TRUE(renderer_->update(scene));
-    expect_current(scene, camera, "scene_" + std::to_string(size));
+    expect_current(scene, camera, "scene_" + std::to_string(size), size + 5 >= 16);
   }
 }
 
