@@ -26,6 +26,12 @@ struct Origin {
   int edge = 0;
 };
 
+GridChanges everything() {
+  GridChanges changes;
+  changes.all = true;
+  return changes;
+}
+
 // The input of a worker that builds an impostor.
 struct BuildInput {
   SceneGrid grid;  // snapshots of voxels and field
@@ -116,7 +122,7 @@ void ImpostorCache::Impl::ask(Entry& entry, GridHandle handle, const SceneGrid& 
 // Returns the changes since the impostor that the job will find. An impostor of another grid (replaced, or with the
 // same handle in another scene) is never used again.
 GridChanges ImpostorCache::Impl::changes_of(Entry& entry, const BuildInput& job) {
-  GridChanges changes{true, {}};
+  GridChanges changes = everything();
   const Origin* base = entry.building ? &*entry.building : entry.impostor != nullptr ? &entry.origin : nullptr;
   if (base == nullptr) return changes;
   ChangeCursor of_grid = base->grid;
@@ -201,7 +207,7 @@ void ImpostorCache::Impl::build(Entries::iterator entry, std::unique_lock<std::m
   } else {
     ++stats.out_of_memory;
     built.building.reset();
-    if (built.waiting) built.waiting->changes = {true, {}};
+    if (built.waiting) built.waiting->changes = everything();
   }
   workers.notify();
   workers.wake_all();
@@ -219,7 +225,7 @@ void ImpostorCache::Impl::put(GridHandle handle, const Origin& origin, std::shar
   if (!make_room(bytes, entry->second.last_use)) {
     ++stats.dropped;
     entry->second.refused_bytes = bytes;
-    if (entry->second.waiting) entry->second.waiting->changes = {true, {}};
+    if (entry->second.waiting) entry->second.waiting->changes = everything();
     drop(entry);
     return;
   }
