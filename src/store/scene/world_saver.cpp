@@ -503,7 +503,9 @@ void follow_grid(GridHandle handle, const SceneGrid& grid, SaverState& state, Sa
       on_edit(handle, change.chunk);
     }
   };
-  // If it throws, the next call reads the changes again.
+  // If it throws, the next call reads the changes again. All cursors move to the present, also those that have read
+  // nothing: a journal drops old records, whichever aspect they concern.
+  const ChangeCursor now = grid.grid.cursor();
   ChangeCursor voxels = saved.voxels;
   ChangeCursor data = saved.data;
   ChangeCursor densities = saved.densities;
@@ -516,8 +518,7 @@ void follow_grid(GridHandle handle, const SceneGrid& grid, SaverState& state, Sa
     grid.field.changes_since(densities, state.density_changes);
     add(state.density_changes);
   }
-  saved.voxels = voxels;
-  saved.data = data;
+  saved.voxels = saved.data = now;
   saved.densities = densities;
 }
 
