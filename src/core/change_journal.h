@@ -77,8 +77,8 @@ class ChangeJournal {
   }
 
   /// Implements `changes_since`: writes the changes since the cursor, each key once, sorted by `less(a, b)`, which
-  /// compares records by their keys. `Record::change()` returns the change. Keeps the memory of `changes`. If it throws,
-  /// the cursor stays unchanged.
+  /// compares records by their keys. `Record::change()` returns the change. Keeps the memory of `changes`. If it
+  /// throws, the cursor stays unchanged.
   template <class Change, class Less>
   void changes_since(ChangeCursor& cursor, Less&& less, Changes<Change>& changes) const {
     changes_since(cursor, less, changes,

@@ -28,6 +28,9 @@ inline constexpr std::size_t kMaxProblems = 1000;
 [[nodiscard]] inline bool is_air(const StoredChunk& chunk) {
   return chunk.voxels.uniform() == kAir && !chunk.densities;
 }
+[[nodiscard]] inline bool is_air(const SceneGrid& content, IVec3 chunk) {
+  return content.grid.find_chunk(chunk) == nullptr && content.field.find_chunk(chunk) == nullptr;
+}
 
 /// Returns "chunk (1, 2, 3) of grid 4".
 [[nodiscard]] std::string name_of(const ChunkAddress& place);

@@ -54,10 +54,6 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-bool is_air(const SceneGrid& content, IVec3 chunk) {
-  return content.grid.find_chunk(chunk) == nullptr && content.field.find_chunk(chunk) == nullptr;
-}
-
 }  // namespace
 
 struct StreamedWorld::Impl {
