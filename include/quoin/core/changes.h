@@ -135,8 +135,6 @@ class PendingChanges {
   Storage changes_;
 };
 template <class Container>
-PendingChanges(ChangeCursor&, const Container&) -> PendingChanges<Container>;
-template <class Container>
 PendingChanges(ChangeCursor&, const Container&, ChangesOf<Container>&)
     -> PendingChanges<Container, ChangesOf<Container>&>;
 
