@@ -29,8 +29,8 @@ using render_test::town;
 
 PathOptions small(int samples = 4) {
   PathOptions options;
-  options.width = 64;
-  options.height = 48;
+  options.width = cases(48, 64);
+  options.height = cases(36, 48);
   options.samples = samples;
   options.layers = true;
   options.environment = physical_day();
@@ -173,7 +173,8 @@ TEST_F(VulkanPaths, DenoiseLikeCpu) {
 
 // From the fifth sample on, paths on the CPU use the learned shares of lamps.
 TEST_F(VulkanPaths, ConvergeToCpuImage) {
-  const PathOptions options = small(48);
+  PathOptions options = small(48);
+  options.height = cases(32, 48);  // whole blocks
   const Scene scene = town();
   const PathImage device = drawn(scene, of_town(), options);
   const auto cpu = PathTracer(scene).render(of_town(), options);
@@ -214,7 +215,10 @@ TEST_F(VulkanPaths, MatchCpuOnFields) {
     return DensitySample{glm::length(Vec3(p)) - 4.0F, kAir};
   });
   scene.add_instance({"", scene.add_grid(std::move(plain)), DVec3(-8.0, 3.0, 14.0)});
-  expect_same_light(scene, of_town(), small(), "fields");
+  PathOptions options = small();
+  options.width = 64;
+  options.height = 48;
+  expect_same_light(scene, of_town(), options, "fields");
 }
 
 // More glass bodies along a ray than a pixel's list holds.
@@ -267,19 +271,25 @@ TEST_F(VulkanPaths, AddSamplesToImage) {
   VulkanPathImage image(*renderer_);
   EXPECT_EQ(image.samples(), 0);
   EXPECT_EQ(image.read().error().code, ErrorCode::InvalidArgument);
-  PathOptions options = small(3);
+  const int edge = cases(24, 64);
+  const auto wanted = [&](int samples) {
+    PathOptions made = small(samples);
+    made.width = edge;
+    return made;
+  };
+  PathOptions options = wanted(3);
   ASSERT_TRUE(renderer_->draw_paths(image, of_town(), options, Accumulation::Restart));
   options.samples = 5;
   ASSERT_TRUE(renderer_->draw_paths(image, of_town(), options, Accumulation::Continue));
   EXPECT_EQ(image.samples(), 8);
-  EXPECT_EQ(image.width(), 64);
-  EXPECT_GE(image.bytes(), std::size_t{64} * 48 * 112);
+  EXPECT_EQ(image.width(), edge);
+  EXPECT_GE(image.bytes(), static_cast<std::size_t>(edge * options.height) * 112);
   const auto in_parts = image.read();
-  const auto at_once = renderer_->render_paths(of_town(), small(8));
+  const auto at_once = renderer_->render_paths(of_town(), wanted(8));
   ASSERT_TRUE(in_parts && at_once);
   EXPECT_EQ(in_parts->radiance, at_once->radiance);
   EXPECT_EQ(in_parts->rays, at_once->rays);
-  ASSERT_TRUE(renderer_->draw_paths(image, of_town(), small(1), Accumulation::Restart));
+  ASSERT_TRUE(renderer_->draw_paths(image, of_town(), wanted(1), Accumulation::Restart));
   EXPECT_EQ(image.samples(), 1);
 }
 
