@@ -90,6 +90,10 @@ std::uint64_t other_types(const std::array<VoxelType, kChunkEdge>& a, const std:
 }  // namespace
 
 void difference_of_types(const Chunk& before, const Chunk& after, VoxelEdit& edit) {
+  if (before.uniform().has_value() && after.uniform().has_value()) {
+    if (before.uniform() != after.uniform()) edit.add_all();
+    return;
+  }
   if (before.uniform().has_value() || after.uniform().has_value()) {
     // One state is uniform: compares masks of the other's rows, as for a missing chunk, instead of types.
     const Chunk& one = before.uniform().has_value() ? before : after;
