@@ -149,9 +149,10 @@ struct World {
   double density;
 };
 
-// Prints a name for the test; gtest would print the bytes, including padding.
+// Prints a name for the test; gtest would print the bytes, including padding. CTest reads no times of names with
+// spaces.
 void PrintTo(const World& world, std::ostream* out) {
-  *out << "seed " << world.seed << ", " << world.types << " types, density " << world.density;
+  *out << "seed=" << world.seed << ",types=" << world.types << ",density=" << world.density;
 }
 
 // Spans a corner where eight chunks meet.
