@@ -10,6 +10,7 @@
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/scene/smooth_scene.h>
 
+#include "core/work/nightly_for_tests.h"
 #include "loader.h"
 #include "viewer_fixture.h"
 
@@ -54,8 +55,8 @@ class DeviceBackendTest : public ::testing::Test {
 
   static ViewRequest request_for(const Document& document, DrawMode mode) {
     ViewRequest request;
-    request.width = 160;
-    request.height = 100;
+    request.width = cases(112, 160);
+    request.height = cases(70, 100);
     request.camera = frame_scene(document.scene(), View::Iso, 1.6);
     request.samples = 4;
     request.mode = mode;
@@ -255,9 +256,9 @@ TEST_F(DeviceBackendTest, PathTracingTimesDoNotAffectRays) {
     const std::vector<Image> images = settle(*backend);
     return images.empty() ? 0 : images.front().width;
   };
-  EXPECT_EQ(width_of_first(), 20) << "no time is known yet";
+  EXPECT_EQ(width_of_first(), request.width / 8) << "no time is known yet";
   request.camera.position.y += 1.0;
-  EXPECT_EQ(width_of_first(), 160);
+  EXPECT_EQ(width_of_first(), request.width);
   ViewRequest of_paths = request;
   of_paths.mode = DrawMode::Paths;
   of_paths.width = 16;
@@ -270,7 +271,7 @@ TEST_F(DeviceBackendTest, PathTracingTimesDoNotAffectRays) {
     EXPECT_EQ(first->on_device->read().value_or(Image{}).width, width);
     of_paths.camera.position.y += 1.0;
   }
-  EXPECT_EQ(width_of_first(), 20);
+  EXPECT_EQ(width_of_first(), request.width / 8);
 }
 
 TEST_F(DeviceBackendTest, SmoothMeshesUseRequestedOcclusion) {
@@ -548,8 +549,8 @@ TEST_F(DeviceBackendTest, KeepsMeshImagesAboveQuarterSize) {
     backend->show(request);
     std::optional<ViewFrame> frame;
     ASSERT_TRUE(comes([&] { return (frame = backend->take()).has_value(); }));
-    EXPECT_GE(frame->colour.width, 40);
-    EXPECT_GE(frame->colour.height, 25);
+    EXPECT_GE(frame->colour.width, request.width / 4);
+    EXPECT_GE(frame->colour.height, request.height / 4);
   }
   const auto images = settle(*backend);
   ASSERT_FALSE(images.empty());
@@ -639,7 +640,7 @@ TEST_F(DeviceBackendTest, FirstMeshImageShowsSurfaces) {
 
 TEST_F(DeviceBackendTest, SettlesAfterPausesWithoutEdits) {
   const Document document = small_document();
-  for (int attempt = 0; attempt < 10; ++attempt) {
+  for (int attempt = 0; attempt < cases(3, 10); ++attempt) {
     const auto backend = backend_of(document, false);
     backend->show(request_for(document, DrawMode::Blocks));
     for (int i = 0; i < 100; ++i) {

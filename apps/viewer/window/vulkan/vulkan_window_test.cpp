@@ -11,6 +11,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/work/nightly_for_tests.h"
 #include "viewer/viewer_fixture.h"
 #include "viewer/window/process_facts_for_tests.h"
 #include "viewer/window/screen.h"
@@ -150,7 +151,7 @@ TEST_F(VulkanWindowTest, ReopensGuiForNewContext) {
 TEST_F(VulkanWindowTest, AllowsDestroyingImagesAfterPresenting) {
   auto window = VulkanWindow::create(device_);
   ASSERT_TRUE(window) << to_string(window.error());
-  for (int i = 0; i < 40; ++i) {
+  for (int i = 0; i < cases(14, 40); ++i) {
     VulkanImage image(*renderer_);
     const int edge = 1500 + 10 * (i % 7);
     const auto bytes = std::size_t{3} * static_cast<std::size_t>(edge) * static_cast<std::size_t>(edge);
