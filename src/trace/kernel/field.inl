@@ -293,7 +293,7 @@ class FieldLanes {
         density[i] = __builtin_convertvector(some<FloatsToDoubles>(corners[i] + first), Doubles);
       }
       const Meetings meetings = meet_cells<kAsksWhere>(ray, cell, density);
-      for (std::uint32_t left = bits_of(meetings.met); left != 0; left &= left - 1) {
+      for (std::uint32_t left = words::lanes_with_bits(meetings.met); left != 0; left &= left - 1) {
         const int place = std::countr_zero(left);
         const int i = first + place;
         if (i >= count) break;

@@ -14,6 +14,8 @@
 
 #include <immintrin.h>
 
+#include "core/lanes/lanes_avx2.h"
+#include "core/lanes/words.h"
 #include "grid/density/density_storage.h"
 #include "trace/kernel/cell_cubic.inl"
 #include "trace/kernel/lockstep.inl"
@@ -48,8 +50,9 @@ constexpr float kStretch = 1e-3F;
 constexpr float kDoubtHere = 1e-4F;
 constexpr float kDoubtFurther = 2e-6F;
 
+// Returns bit i for each lane i of a mask.
 inline std::uint32_t bits_of(I8 mask) {
-  return static_cast<std::uint32_t>(_mm256_movemask_ps(reinterpret_cast<__m256>(mask)));
+  return lanes_avx2::bits({reinterpret_cast<__m256>(mask)});
 }
 
 // Gathers entries of a table, `kBytes` apart, in the lanes of the mask; other lanes get `others`.
@@ -83,7 +86,8 @@ inline I8 from_16(const std::int32_t* table, I8 at) {
 constexpr int kCellsAtOnce = 16;
 
 inline std::uint32_t bits_of(Int32s<16> mask) {
-  return _mm512_movepi32_mask(reinterpret_cast<__m512i>(mask));
+  const I lanes = {reinterpret_cast<__m512i>(mask)};
+  return bits(test(lanes, lanes));
 }
 template <int kBytes>
 inline Int32s<16> gather_some(const void* table, Int32s<16> at, Int32s<16> mask, Int32s<16> others) {
@@ -103,9 +107,6 @@ inline Int32s<16> lane_numbers(Vectors<16>, std::uint32_t mask) {
   const __m512i all = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
   return reinterpret_cast<Int32s<16>>(_mm512_maskz_compress_epi32(static_cast<__mmask16>(mask), all));
 }
-inline std::uint32_t bits_of(Longs mask) {
-  return _mm512_movepi64_mask(reinterpret_cast<__m512i>(mask));
-}
 inline Doubles gather_doubles(const double* table, Ints at) {
   return reinterpret_cast<Doubles>(_mm512_mask_i32gather_pd(_mm512_setzero_pd(), static_cast<__mmask8>(each_lane()),
                                                             reinterpret_cast<__m256i>(at), table, sizeof(double)));
@@ -119,9 +120,6 @@ constexpr int kCellsAtOnce = 8;
 
 inline I8 lane_numbers(Vectors<8>, std::uint32_t mask) {
   return reinterpret_cast<I8>(half::lane_numbers(mask));
-}
-inline std::uint32_t bits_of(Longs mask) {
-  return static_cast<std::uint32_t>(_mm256_movemask_pd(reinterpret_cast<__m256d>(mask)));
 }
 inline Doubles gather_doubles(const double* table, Ints at) {
   const auto each = reinterpret_cast<__m256d>(Longs{} == 0);
@@ -324,7 +322,7 @@ inline Meetings meet_cells(const CellRayOf<Doubles>& ray, const Doubles (&cell)[
   if (kAsksWhere) is_simple &= ~((curve.b1 < 0.0) & (curve.b2 >= 0.0));
   Meetings out = {starts_negative | is_simple, kAsksWhere ? is_simple : Longs{}, f, {}, span.t_in, length};
   // Only a few lanes.
-  for (std::uint32_t left = bits_of(is_open & ~is_simple); left != 0; left &= left - 1) {
+  for (std::uint32_t left = words::lanes_with_bits(is_open & ~is_simple); left != 0; left &= left - 1) {
     const int i = std::countr_zero(left);
     out.s[i] = first_negative<kAsksWhere>(CellCubic<double>{f.c0[i], f.c1[i], f.c2[i], f.c3[i]});
     out.met[i] = out.s[i] >= 0.0 ? -1 : 0;
@@ -360,7 +358,7 @@ inline void find_roots(const CellCubic<Doubles> (&f)[kCount], Longs (&wanted)[kC
       wanted[k] &= ~((change <= 1e-13) & (change >= -1e-13));
       any_wanted |= wanted[k];
     }
-    if (bits_of(any_wanted) == 0) break;
+    if (!words::any(any_wanted)) break;
   }
 }
 
