@@ -1,5 +1,6 @@
 // Conversion of surfaces with the content that was meshed, and its replacement while workers run.
 
+#include <quoin/core/memory.h>
 #include <quoin/live/live_meshes.h>
 
 #include <algorithm>
@@ -289,7 +290,7 @@ TEST(LiveConvert, BuildsStairsFromNeighbourhood) {
 
 struct ReadLight {
   std::vector<std::pair<IVec3, LightLevels>> levels;  // of voxels in front of faces
-  std::vector<FaceLight> corners;                     // of the faces, in this order
+  BlockVector<FaceLight> corners;                     // of the faces, in this order
   std::vector<std::pair<IVec3, Direction>> faces;
 };
 

@@ -1,5 +1,6 @@
 // After each `take`, one state of the scene is shown: all surfaces, their light, and the instances to draw.
 
+#include <quoin/core/memory.h>
 #include <quoin/live/live_meshes.h>
 
 #include <algorithm>
@@ -31,7 +32,7 @@ namespace {
 
 using LitQuads = std::vector<std::pair<std::uint64_t, FaceLight>>;
 
-LitQuads lit_quads(const QuadBuffer& quads, const std::vector<FaceLight>& light) {
+LitQuads lit_quads(const QuadBuffer& quads, const BlockVector<FaceLight>& light) {
   LitQuads all;
   for (std::size_t i = 0; i < quads.size(); ++i)
     all.emplace_back(quads[i].bits, light.empty() ? FaceLight{} : light[i]);
@@ -72,7 +73,7 @@ class ExpectedSurfaces {
     if (is_lit_) surface_light.emplace(*lit.light, *lit.voxels, scene.types);
     QuadBuffer quads;
     QuadBuffer split;
-    std::vector<FaceLight> corners;
+    BlockVector<FaceLight> corners;
     for (const IVec3 chunk : grid.chunks()) {
       mesher_.mesh(grid.neighbourhood(chunk), scene.types, {}, quads);
       if (is_lit_) surface_light->split(quads, chunk, LightMerging::Linear, split, corners);

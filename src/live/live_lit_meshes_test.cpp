@@ -1,5 +1,6 @@
 // Lit blocky surfaces follow changes of light, even without changed voxels nearby.
 
+#include <quoin/core/memory.h>
 #include <quoin/live/live_meshes.h>
 
 #include <algorithm>
@@ -43,7 +44,7 @@ void take(LiveMeshes& meshes, Surfaces& surfaces, int* count = nullptr) {
 
 using LitQuads = std::vector<std::pair<std::uint64_t, FaceLight>>;
 
-LitQuads sorted(const QuadBuffer& quads, const std::vector<FaceLight>& light) {
+LitQuads sorted(const QuadBuffer& quads, const BlockVector<FaceLight>& light) {
   EXPECT_EQ(quads.size(), light.size());
   LitQuads all;
   for (std::size_t i = 0; i < std::min(quads.size(), light.size()); ++i) all.emplace_back(quads[i].bits, light[i]);
@@ -59,7 +60,7 @@ void expect_right(const DarkeningScene& world, const SceneLight& light, const Su
   BlockyMesher mesher;
   QuadBuffer quads;
   QuadBuffer split;
-  std::vector<FaceLight> corners;
+  BlockVector<FaceLight> corners;
   std::size_t lit_quads = 0;
   for (const IVec3 chunk : world.grid().chunks()) {
     SCOPED_TRACE(testing::Message() << chunk.x << " " << chunk.y << " " << chunk.z);

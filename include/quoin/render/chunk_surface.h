@@ -8,6 +8,7 @@
 
 #include <quoin/core/assert.h>
 #include <quoin/core/direction.h>
+#include <quoin/core/memory.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/density_chunk.h>
@@ -47,16 +48,16 @@ struct ChunkSurface {
   ///         sorted by region, then direction, layer, row, column. No quad crosses a region border.
   QuadBuffer quads;
   std::size_t opaque_quads = 0;
-  std::vector<FaceLight> light;        ///< one per quad if LiveMeshes uses light; otherwise empty
-  std::vector<SurfaceRegion> regions;  ///< blocky: regions that have quads, sorted by z, then y, then x
+  BlockVector<FaceLight> light;        ///< one per quad if LiveMeshes uses light; otherwise empty
+  BlockVector<SurfaceRegion> regions;  ///< blocky: regions that have quads, sorted by z, then y, then x
   /// Smooth: mesh point p is grid point p + 64 * chunk; for voxels p + 0.5 + 64 * chunk, because samples are voxel
   ///         centres. Each vertex has a linear colour and a type. Each transparent type is a closed body of its own.
   ///         Thin voxel features are kept (SmoothMeshOptions::keep_thin), as in mesh_scene_smoothly. Instances are not
   ///         united.
   SmoothChunkMesh smooth;
   std::size_t glass_indices = 0;  ///< number of indices of transparent bodies, which come last
-  std::vector<LinearRgba16> albedo;
-  std::vector<VoxelType> types;
+  BlockVector<LinearRgba16> albedo;
+  BlockVector<VoxelType> types;
   /// Result of LiveMeshOptions::convert; null without `convert`.
   std::shared_ptr<const void> converted;
   std::size_t converted_bytes = 0;  ///< ConvertedSurface::bytes; 0: unknown

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <quoin/core/direction.h>
+#include <quoin/core/memory.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
@@ -68,7 +69,7 @@ class SurfaceLight {
   /// `corners` gets the corner light of each quad of `out`, in the order of the source quads. Replaces `out` and
   /// `corners`.
   void split(const QuadBuffer& quads, IVec3 chunk, LightMerging merging, QuadBuffer& out,
-             std::vector<FaceLight>& corners);
+             BlockVector<FaceLight>& corners);
 
   /// Writes the light of vertices, or of any positions at a surface. Sample (i, j, k) is the centre of voxel (i, j, k).
   /// Requires: as many unit normals as positions; `out` has at least as many elements.

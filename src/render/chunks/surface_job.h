@@ -9,6 +9,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include <quoin/core/memory.h>
 #include <quoin/grid/density_grid.h>
 #include <quoin/mesh/blocky.h>
 #include <quoin/mesh/smooth.h>
@@ -95,7 +96,7 @@ struct SurfaceWorkspace {
   QuadBuffer quads;
   QuadBuffer cut_quads;
   QuadBuffer lit_quads;
-  std::vector<FaceLight> face_light;  // of `lit_quads`
+  BlockVector<FaceLight> face_light;  // of `lit_quads`
   LightSnapshot lit;                  // with the types
   std::shared_ptr<const VoxelRegistry> lit_types;
   std::optional<SurfaceLight> surface_light;  // of both; it remembers rows from chunk to chunk

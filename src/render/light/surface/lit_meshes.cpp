@@ -1,3 +1,4 @@
+#include <quoin/core/memory.h>
 #include <quoin/render/lit_meshes.h>
 
 #include <algorithm>
@@ -162,7 +163,7 @@ Result<SceneMeshes> mesh_lit_scene(const Scene& scene, const LightOptions& light
     const GridLight of = levels.of(grid);
     SurfaceLight surface(*of.light, *of.voxels, scene.types);
     QuadBuffer lit;
-    std::vector<FaceLight> corners;
+    BlockVector<FaceLight> corners;
     surface.split(quads, chunk, LightMerging::Constant, lit, corners);
     quads = std::move(lit);
   };

@@ -1,3 +1,4 @@
+#include <quoin/core/memory.h>
 #include <quoin/render/surface_light.h>
 
 #include <algorithm>
@@ -107,7 +108,7 @@ std::uint32_t corner_of_quad(const std::vector<FrontLight>& fronts, int width, i
 }  // namespace
 
 void SurfaceLight::split(const QuadBuffer& quads, IVec3 chunk, LightMerging merging, QuadBuffer& out,
-                         std::vector<FaceLight>& corners) {
+                         BlockVector<FaceLight>& corners) {
   out.clear();
   corners.clear();
   Rows& rows = impl_of(rows_);

@@ -1,6 +1,7 @@
 // light/surface/*: light at the quads of a 512x128x512 terrain of 128 chunks, with caves and a lamp in one of 2,000
 // cave voxels, and at the vertices of its smooth surface.
 
+#include <quoin/core/memory.h>
 #include <quoin/render/surface_light.h>
 
 #include <cstdlib>
@@ -62,7 +63,7 @@ void split(benchmark::State& state, std::optional<LightMerging> merging) {
   SurfaceLight surface(world.light, world.grid, world.types);
   const std::vector<IVec3> chunks = world.grid.chunks();
   QuadBuffer lit;
-  std::vector<FaceLight> corners;
+  BlockVector<FaceLight> corners;
   std::vector<std::uint16_t> levels;
   std::size_t before = 0;
   std::size_t after = 0;

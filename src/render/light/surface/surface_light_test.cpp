@@ -1,3 +1,4 @@
+#include <quoin/core/memory.h>
 #include <quoin/render/surface_light.h>
 
 #include <algorithm>
@@ -116,7 +117,7 @@ TEST(SurfaceLight, SplitQuadsMatchSingleFaces) {
     BlockyMesher mesher;
     QuadBuffer quads;
     QuadBuffer lit;
-    std::vector<FaceLight> corners;
+    BlockVector<FaceLight> corners;
     for (const IVec3 chunk : world.grid.chunks()) {
       mesher.mesh(world.grid.neighbourhood(chunk), world.types, {}, quads);
       for (const LightMerging merging : {LightMerging::Constant, LightMerging::Linear}) {
@@ -339,7 +340,7 @@ TEST(SurfaceLight, LinearMergingSplitsFloorIntoFewQuads) {
   QuadBuffer constant;
   QuadBuffer linear;
   std::vector<std::uint16_t> levels;
-  std::vector<FaceLight> corners;
+  BlockVector<FaceLight> corners;
   world.light.split(floor, {0, 0, 0}, flat, levels);
   surface.split(floor, {0, 0, 0}, LightMerging::Constant, constant, corners);
   surface.split(floor, {0, 0, 0}, LightMerging::Linear, linear, corners);
