@@ -61,20 +61,21 @@ WorldWriter::~WorldWriter() {
 }
 
 SaveTicket WorldWriter::save(ChangeSet changes, OnSaved on_saved) {
+  SaveTicket ticket;
   std::list<Save> added(1);
-  Save& save = added.front();
-  if (on_saved) save.on_saved.push_back(std::move(on_saved));
+  if (on_saved) added.front().on_saved.push_back(std::move(on_saved));
   {
     const std::scoped_lock lock(mutex_);
     note_pending(changes, last_ticket_ + 1);
     // Nothing fails from here on.
-    save.last = ++last_ticket_;
-    save.changes = std::move(changes);
-    queue_.splice(queue_.end(), added);
+    ticket.number = ++last_ticket_;
+    added.front().last = ticket.number;
+    added.front().changes = std::move(changes);
+    queue_.splice(queue_.end(), added);  // the writer may destroy the save when the lock is free
     failed_through_ = 0;
   }
   thread_.wake_one();
-  return {save.last};
+  return ticket;
 }
 
 void WorldWriter::note_pending(const ChangeSet& changes, std::uint64_t ticket) {
