@@ -201,8 +201,13 @@ BlockLook look_of_node(std::string_view name) {
 void set_passage(std::string_view name, VoxelProperties& type) {
   const auto is_of = [&](std::string_view mod) { return name.starts_with(mod); };
   constexpr std::string_view kAtCost[] = {"stairs:", "walls:", "beds:", "default:chest"};
+  constexpr std::string_view kFree[] = {"xpanes:", "doors:"};  // also gates: "doors:gate_wood_closed"
+  if (name == "default:cactus" || name == "vessels:shelf") {   // whole nodes without "paramtype light"
+    type.blocks_light = std::nullopt;
+    return;
+  }
   const bool has_cost = name == "default:snow" || std::ranges::any_of(kAtCost, is_of);
-  if (!has_cost && !is_of("xpanes:")) return;
+  if (!has_cost && !std::ranges::any_of(kFree, is_of)) return;
   type.light_cost = has_cost ? 1 : 0;
   if (type.visibility == Visibility::Opaque) type.blocks_light = false;
 }

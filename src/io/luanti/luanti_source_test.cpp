@@ -77,7 +77,8 @@ TEST(LuantiNodes, PassLightAsTheGame) {
     return type.blocks_light.value_or(type.visibility == Visibility::Opaque) ? int{kMaxLightCost}
                                                                              : int{type.light_cost};
   };
-  for (const char* name : {"default:stone", "default:tree", "default:snowblock", "mod:unheard_of"}) {
+  for (const char* name : {"default:stone", "default:tree", "default:snowblock", "default:cactus", "default:bookshelf",
+                           "vessels:shelf", "mod:unheard_of"}) {
     EXPECT_EQ(passage(name), kMaxLightCost) << name;
   }
   for (const char* name :
@@ -86,8 +87,8 @@ TEST(LuantiNodes, PassLightAsTheGame) {
         "beds:bed_bottom", "default:chest_locked"}) {
     EXPECT_EQ(passage(name), 1) << name;
   }
-  for (const char* name :
-       {"default:glass", "default:torch", "default:fence_wood", "xpanes:bar_flat", "doors:door_wood_a"}) {
+  for (const char* name : {"default:glass", "default:torch", "default:fence_wood", "xpanes:bar_flat",
+                           "doors:door_wood_a", "doors:gate_wood_closed", "doors:trapdoor_steel_open"}) {
     EXPECT_EQ(passage(name), 0) << name;
   }
 }
