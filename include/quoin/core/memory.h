@@ -61,6 +61,8 @@ struct BlockFunctions {
 ///           it handles bad_alloc of `operator new`.
 /// Lifetime: the functions must work until all objects of Quoin are destroyed and all threads that called Quoin have
 ///           ended. Scratch memory of a thread is freed when the thread ends, that of the main thread after `main`.
+///           Without a job system, parallel loops run on threads of oneTBB, which may keep theirs until the process
+///           ends: the functions must then work even after static objects are destroyed.
 /// Requires: both functions are set.
 /// Threads:  any.
 [[nodiscard]] bool set_block_functions(const BlockFunctions& functions);

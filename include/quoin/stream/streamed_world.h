@@ -195,10 +195,10 @@ class StreamedWorld {
   /// marked as not saved or as whole; as WorldSaver::save.
   Result<GridHandle> add_grid(SceneGrid grid, std::shared_ptr<const ChunkGenerator> generator = nullptr);
   /// Sets the generator for a grid's chunks that are not in the file. Call it before the first `update`, `plan`,
-  /// `load_all` or `flush`. After the first of these calls, a grid from the file without a generator has only its
-  /// stored chunks; all other chunks count as loaded air and can be edited. A generator that is set later replaces the
-  /// former one. It does not change chunks that are in memory or in the file. Returns when no worker calls or holds the
-  /// former generator of this grid any more, so that a plug-in can be unloaded.
+  /// `load_all` or `flush`. From the first `update`, `load_all` or `flush` on, a grid from the file without a generator
+  /// has only its stored chunks; all other chunks count as loaded air and can be edited. A generator that is set later
+  /// replaces the former one. It does not change chunks that are in memory or in the file. Returns when no worker calls
+  /// or holds the former generator of this grid any more, so that a plug-in can be unloaded.
   /// Cost: O(stored and loaded chunks), and waits for calls of the former `make`. If it throws bad_alloc, nothing has
   /// changed. `take_problems` reports errors.
   /// Requires: the scene has the grid. Whole grids have no generator: the call does nothing, and `take_problems`
