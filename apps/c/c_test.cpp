@@ -295,6 +295,8 @@ TEST(C, WeighsGridsAndPieces) {
   array.shape[0] = 5;
   array.shape[1] = 2;
   array.shape[2] = 1;
+  array.strides[0] = 4;
+  array.strides[1] = array.strides[2] = 2;
   array.origin[0] = 10.0;
   std::size_t grid = 0;
   ASSERT_EQ(quoin_grid_add(scene, &array, "pieces", &grid), QUOIN_OK) << quoin_last_error();

@@ -55,8 +55,8 @@ struct BlockFunctions {
 ///
 /// Call it once, first in `main`, so that each block is freed by the function that belongs to the one that made it.
 /// Returns:  false, without a change, if functions were set before, or if Quoin has already made a large block.
-/// Blocks:   those of voxels, densities, meshes, trees, light, tracers, impostors and saves. docs/games.md lists blocks
-///           that do not come from the functions, for example vectors of public types and those of SQLite.
+/// Blocks:   those of voxels, densities, meshes, trees, light, tracers, impostors and saves. See docs/games.md for blocks
+///           from elsewhere, for example vectors of public types and those of SQLite.
 /// Errors:   if `allocate` returns null, the call of Quoin that needs the block throws std::bad_alloc, or handles it as
 ///           it handles bad_alloc of `operator new`.
 /// Lifetime: the functions must work until all objects of Quoin are destroyed and all threads that called Quoin have
