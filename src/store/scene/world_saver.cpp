@@ -15,15 +15,12 @@
 #include <utility>
 #include <vector>
 
-#include <tsl/robin_set.h>
-
 #include <quoin/core/assert.h>
 #include <quoin/core/changes.h>
 
 #include "core/bytes/files.h"
 #include "core/bytes/text.h"
 #include "core/coordinates/chunk_order.h"
-#include "core/make_room.h"
 #include "io/scene_file/scene_parts.h"
 #include "store/database/schema.h"
 #include "store/scene/world_file.h"
@@ -51,24 +48,6 @@ struct Numbers {
   }
 };
 
-/// Chunks that were edited since the last save began, each once, in the order of their first edits.
-class EditedChunks {
- public:
-  void add(IVec3 chunk) {
-    quoin::make_room(chunks_);
-    if (known_.insert(chunk).second) chunks_.push_back(chunk);
-  }
-  /// Returns the chunks and forgets them.
-  [[nodiscard]] std::vector<IVec3> take() {
-    known_.clear();
-    return std::exchange(chunks_, {});
-  }
-
- private:
-  std::vector<IVec3> chunks_;
-  tsl::robin_set<IVec3, CoordinateHash> known_;
-};
-
 struct SavedGrid {
   std::uint32_t number = 0;
   WorldGrid header;
@@ -89,8 +68,15 @@ struct ChangedObjects {
   std::set<GroupHandle> groups;
   std::set<LayerHandle> layers;
 
-  void add(const SceneChanges& changes) {
+  /// A list of more than `most` objects, such as instances that came and went, is replaced by `all`.
+  void add(const SceneChanges& changes, std::size_t most) {
     all |= changes.all;
+    const std::size_t size = grids.size() + instances.size() + groups.size() + layers.size();
+    if (all || size > most) {
+      *this = {};
+      all = true;
+      return;
+    }
     grids.insert(changes.grids.begin(), changes.grids.end());
     instances.insert(changes.instances.begin(), changes.instances.end());
     groups.insert(changes.groups.begin(), changes.groups.end());
@@ -113,7 +99,7 @@ struct ChangedObjects {
 struct SaverState {
   ChangeCursor scene;  // of `follow`
   ChangeCursor types;
-  // Of the last `follow`, kept for their memory:
+  // Results of the last `follow`, kept for their memory:
   SceneChanges scene_changes;
   GridChanges voxel_changes;
   DensityChanges density_changes;
@@ -410,7 +396,8 @@ class Save {
     }
     if (is_new || saved.is_all_edited) {
       static_cast<void>(saved.edited.take());
-      chunks = grid.grid.chunks();
+      // All loaded chunks of a partial grid: the world may lack a chunk that edits made air.
+      chunks = is_new ? grid.grid.chunks() : grid.grid.loaded_chunks();
       const std::vector<IVec3> of_field = grid.field.chunks();
       chunks.insert(chunks.end(), of_field.begin(), of_field.end());
       if (!is_new && !saved.is_partly_read) {  // finds chunks emptied since, except chunks that were never read
@@ -562,7 +549,9 @@ void WorldSaver::Impl::follow(const Scene& scene, OnEdit on_edit) {
   for (const GridHandle handle : changes.grids) {
     if (const auto known = state.grids.find(handle); known != state.grids.end()) follow_one(handle, known->second);
   }
-  state.changed.add(changes);
+  // With more, it is as fast to look at all objects. The list of a saver that never saves stays short.
+  constexpr std::size_t kFew = 4096;
+  state.changed.add(changes, kFew + 2 * (scene.instances().size() + state.instances.numbers.size()));
   state.scene = end;
 }
 

@@ -456,6 +456,51 @@ TEST(WorldSaver, SavesRefusedChangesNextTime) {
   kept.save(scene);
 }
 
+// The chunk is in no list of the grid, since it is air, nor in the world, since no save contained it before.
+TEST(WorldSaver, SavesEmptiedChunkOfPartialGridAfterRefusedSave) {
+  const WorldFolder folder;
+  KeptWorld kept(folder / "w.quoin");
+  Scene scene = rich_scene();
+  SceneGrid streamed;
+  streamed.grid.make_partial();
+  streamed.field.make_partial();
+  const GridHandle handle = scene.add_grid(std::move(streamed));
+  ASSERT_TRUE(kept.saver().save(kept.world(), scene));
+  const IVec3 chunk{1, 2, 3};
+  scene.edit(handle).grid.load_chunk(chunk, Chunk(1));  // as from a generator
+  scene.edit(handle).field.load_air_chunk(chunk);
+  scene.edit(handle).grid.put_chunk(chunk, Chunk(kAir));
+  const InstanceHandle other = scene.instances().handles().back();
+  scene.edit(other).position.x = std::nan("");
+  ASSERT_FALSE(kept.saver().save(kept.world(), scene));
+  scene.edit(other).position.x = 3.0;
+  ASSERT_TRUE(kept.saver().save(kept.world(), scene));
+  const auto stored = kept.world().load_chunk({*kept.saver().number_of(handle), 0, chunk});
+  ASSERT_TRUE(stored);
+  ASSERT_TRUE(stored->has_value());
+  EXPECT_EQ((*stored)->voxels.uniform(), kAir);
+}
+
+TEST(WorldSaver, FollowsInstancesThatComeAndGo) {
+  const WorldFolder folder;
+  KeptWorld kept(folder / "w.quoin");
+  Scene scene = rich_scene();
+  kept.save(scene);
+  const GridHandle ground = scene.grids().handles().front();
+  scene.edit(scene.instances().handles().front()).name = "before";
+  for (int i = 0; i < 12'000; ++i) {
+    const InstanceHandle grain = scene.add_instance({.name = "grain", .grid = ground});
+    kept.saver().follow(scene);
+    if (i % 6000 == 0) {
+      kept.save(scene);
+      scene.edit(ground).grid.set({i, 0, 0}, 2);
+    }
+    scene.remove_instance(grain);
+    kept.saver().follow(scene);
+  }
+  kept.save(scene);
+}
+
 TEST(WorldSaver, RefusesSceneWithOtherTypes) {
   const WorldFolder folder;
   KeptWorld kept(folder / "w.quoin");

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -14,12 +15,16 @@
 #include <vector>
 
 #include <tsl/robin_map.h>
+#include <tsl/robin_set.h>
 
 #include <quoin/core/hash.h>
+#include <quoin/core/memory.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/io/scene_file.h>
 #include <quoin/store/world_store.h>
 
+#include "core/coordinates/chunk_order.h"
+#include "core/make_room.h"
 #include "store/database/schema.h"
 #include "store/world/world_reader.h"
 
@@ -35,7 +40,26 @@ struct ChunkAddressHash {
 
 /// Chunks by address, in one block of memory: an entry needs no allocation of its own.
 template <class T>
-using ChunkMap = tsl::robin_map<ChunkAddress, T, ChunkAddressHash>;
+using ChunkMap = tsl::robin_map<ChunkAddress, T, ChunkAddressHash, std::equal_to<ChunkAddress>,
+                                BlockAllocator<std::pair<ChunkAddress, T>>>;
+
+/// Chunks that were edited since the last save began, each once, in the order of their first edits.
+class EditedChunks {
+ public:
+  void add(IVec3 chunk) {
+    quoin::make_room(chunks_);
+    if (known_.insert(chunk).second) chunks_.push_back(chunk);
+  }
+  /// Returns the chunks and forgets them.
+  [[nodiscard]] std::vector<IVec3> take() {
+    known_.clear();
+    return std::exchange(chunks_, {});
+  }
+
+ private:
+  std::vector<IVec3> chunks_;
+  tsl::robin_set<IVec3, CoordinateHash> known_;
+};
 
 /// Reserves memory, so that adding `more` entries neither allocates nor throws.
 template <class T>
