@@ -521,6 +521,13 @@ TEST(DiskOutcome, GivesOneErrorPerSave) {
   EXPECT_TRUE(takes_error());
   disk.put(third, full);
   EXPECT_FALSE(takes_error());
+  // A save that is collected in steps while the error of an earlier one is taken.
+  disk.put(disk.begin(), full);
+  const std::uint64_t collected = disk.next();
+  EXPECT_TRUE(takes_error());
+  EXPECT_EQ(collected, disk.begin());
+  disk.put(collected, full);
+  EXPECT_TRUE(takes_error());
   disk.put(disk.begin(), full);
   disk.put(third, {});  // retried before the error was taken
   EXPECT_FALSE(takes_error());

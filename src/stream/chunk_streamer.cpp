@@ -57,8 +57,9 @@ std::string text_of(std::chrono::milliseconds time) {
 
 Status SceneSaves::begin(const Scene& scene) {
   time_ = Clock::now();
+  is_refused_ = true;  // if it throws: not retried in each frame, so that chunks can leave memory
   Status begun = saver_.begin(store_, scene, {},
-                              [to = disk_, save = disk_->begin()](const Status& outcome) { to->put(save, outcome); });
+                              [to = disk_, save = disk_->next()](const Status& outcome) { to->put(save, outcome); });
   is_refused_ = !begun;
   if (begun) ++begun_;
   return begun;
@@ -66,10 +67,13 @@ Status SceneSaves::begin(const Scene& scene) {
 
 Status SceneSaves::step(double seconds) {
   if (!is_begun()) return {};
+  is_refused_ = true;
   const auto ticket = saver_.step(store_, seconds);
   is_refused_ = !ticket;
   if (!ticket) return ticket.error();
-  if (ticket->has_value()) handed_ = begun_;
+  if (!ticket->has_value()) return {};
+  handed_ = begun_;
+  disk_->begin();
   return {};
 }
 

@@ -41,10 +41,15 @@ inline constexpr std::size_t kMaxProblems = 1000;
 /// make cause many of them: each save gives at most one error, and none if it failed together with an earlier one.
 class DiskOutcome {
  public:
-  /// Returns the number of the next save.
-  [[nodiscard]] std::uint64_t begin() {
+  /// Returns the number of a save that the store receives.
+  std::uint64_t begin() {
     const std::scoped_lock lock(mutex_);
     return ++begun_;
+  }
+  /// Returns the next result of `begin`, for a save that is collected in steps first.
+  [[nodiscard]] std::uint64_t next() const {
+    const std::scoped_lock lock(mutex_);
+    return begun_ + 1;
   }
   void put(std::uint64_t save, const Status& outcome) {
     const std::scoped_lock lock(mutex_);
@@ -96,7 +101,7 @@ class SceneSaves {
   [[nodiscard]] std::uint64_t next() const { return begun_ + 1; }
   /// Returns true if the store has the save, on disk or pending. A save has all edits of the saves before it.
   [[nodiscard]] bool has(std::uint64_t save) const { return save <= handed_; }
-  /// Returns true if the store refused the last save.
+  /// Returns true if the store refused the last save, or memory ran out.
   [[nodiscard]] bool is_refused() const { return is_refused_; }
   [[nodiscard]] DiskOutcome& disk() { return *disk_; }
 

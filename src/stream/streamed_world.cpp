@@ -158,7 +158,6 @@ struct StreamedWorld::Impl {
   std::size_t arrived_bytes = 0;  // of `arrivals`
   Clock::time_point asked_others{};
   Clock::time_point moved{};      // when a chunk last arrived or left
-  bool is_edited = false;         // since the last save began
   std::uint64_t edited_save = 0;  // the first save that contains all edits
   ChangeCursor saved_types;
   ChunkStreamer::Note unposted;
@@ -355,7 +354,6 @@ void StreamedWorld::Impl::note_edits() {
     if (number == nullptr) return;  // a whole grid
     Streamed& grid = *streamed(*number);
     const SceneGrid& content = scene().grids()[handle];
-    is_edited = true;
     edited_save = saves.next();
     if (chunk) return note_edit(grid, content, *chunk);
     // Too many changes to list: any loaded chunk may have been edited.
@@ -405,11 +403,7 @@ void StreamedWorld::Impl::sort_leaving() {
 
 Status StreamedWorld::Impl::begin_save() {
   note_edits();
-  if (store.is_writable()) {
-    if (auto begun = saves.begin(scene()); !begun) return begun;
-  }
-  is_edited = false;
-  return {};
+  return store.is_writable() ? saves.begin(scene()) : Status();
 }
 
 // Finishes a save in steps, if one is begun, and saves everything.
@@ -500,7 +494,6 @@ void StreamedWorld::Impl::put(CompletedLoad completed, ChunkStreamer::Note& note
   content->field.put_chunk(place.chunk, edited->densities
                                             ? std::move(*edited->densities)
                                             : DensityChunk(content->field.neighbourhood(place.chunk).outside));
-  is_edited = true;
 }
 
 void StreamedWorld::Impl::take_away(const ChunkAddress& place, ChunkStreamer::Note& note) {
@@ -575,7 +568,7 @@ Status StreamedWorld::Impl::plan(std::span<const Viewer> viewers) {
   sort_leaving();
   // Chunks are queued for the disk before they leave memory, and before workers save chunks with new types.
   const bool has_types = scene().types.has_changed_since(saved_types);
-  const bool is_wanted = has_types || (is_edited && ready_to_leave < leaving.size());
+  const bool is_wanted = has_types || ready_to_leave < leaving.size();
   const bool begins = saves.is_due(options.save_interval) || (is_wanted && !saves.is_refused());
   if (begins && has_types) {
     outcome = save_now();
@@ -584,7 +577,6 @@ Status StreamedWorld::Impl::plan(std::span<const Viewer> viewers) {
     if (outcome) outcome = saves.step(kSaveShare * options.update_seconds);
   }
   if (outcome) outcome = saves.disk().take(store.path());
-  if (!store.is_writable()) is_edited = false;
   sort_leaving();
   find_eyes(viewers);
   return outcome;
@@ -762,7 +754,6 @@ void StreamedWorld::use_generator(GridHandle grid, std::shared_ptr<const ChunkGe
     impl_->problems.push_back("grid \"" + printable(content->name) + "\" is whole, so its generator is not used");
     return;
   }
-  impl_->note_edits();
   // Saves the generator's types first.
   if (const auto saved = impl_->save_now(); !saved) impl_->problems.push_back(to_string(saved.error()));
   impl_->set_generator(*impl_->streamed(*number), std::move(generator));
@@ -843,14 +834,13 @@ Status StreamedWorld::flush() {
   // With a job system: a generator that never returns must not run on this thread, unless no worker is free.
   int idle_waits = 0;
   impl_->limit_grids();
-  impl_->note_edits();
   // Saves types first: chunks from workers and edits may need them.
   if (auto saved = impl_->save_now(); !saved) return saved;
   while (!impl_->waits_for_broken_alone()) {
     // Loads around the viewers of the last update: other chunks are edited, saved and unloaded again.
     impl_->take_in();
     impl_->note_edits();
-    if (impl_->is_edited) {
+    if (!impl_->saves.has(impl_->edited_save)) {
       if (auto saved = impl_->save_now(); !saved) return saved;
     }
     impl_->must_plan |= impl_->asked_left == 0;
@@ -863,7 +853,6 @@ Status StreamedWorld::flush() {
     if (idle_waits < kHelpAfter) idle_waits = impl_->streamer.working() <= slow.size() ? idle_waits + 1 : 0;
   }
   Status waits = impl_->blocked_edits(slow);
-  impl_->note_edits();
   if (auto saved = impl_->save_now(); !saved) return saved;
   if (impl_->store.is_writable()) {
     if (auto flushed = impl_->store.flush(); !flushed) return flushed;
