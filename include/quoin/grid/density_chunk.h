@@ -32,7 +32,7 @@ struct [[gnu::visibility("hidden")]] DensityStorage;
 /// Layout:   samples lie in rows of 64 along x. A slab is 4x4 rows, as in Chunk. The grid clamps densities far from the
 ///           surface to one value, and a slab of one value stores no samples. The signs of each row are also stored as
 ///           one word, so that the surface search reads 1/16 of the bytes.
-/// Sharing:  copies share their storage. The first write to a copy copies its tables (35 KB), and the first write to a
+/// Sharing:  copies share their storage. The first write to a copy copies its tables (34 KB), and the first write to a
 ///           slab that slab (2 KB).
 class DensityChunk {
  public:

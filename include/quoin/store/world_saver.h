@@ -43,7 +43,7 @@ struct WorldView {
 ///   if (const auto saved = world->flush(); !saved) complain(saved.error());
 ///
 /// A chunk that becomes empty through edits is stored as air (StoredChunk). Grids, instances, groups and layers keep
-/// their numbers in the world. Objects that were edited but have the values of their last save are not written again.
+/// their numbers in the world. Instances that were edited but have the values of their last save are not written again.
 ///
 /// A game that must not wait in a frame saves in steps. The saved state is that of the call of `begin`, in one commit:
 ///
