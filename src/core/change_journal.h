@@ -98,8 +98,10 @@ class ChangeJournal {
     ChangeCursor end = cursor;
     const bool is_known = cursor.container_ == container_ && cursor.next_ >= first_ && cursor.next_ <= end_;
     const std::size_t count = is_known ? static_cast<std::size_t>(end_ - cursor.next_) : 0;
-    std::array<Record, kFew> few;  // needs no memory of its own
-    if (count <= few.size()) {
+    if (count == 0) {
+      visit_since(end, [](const Record&, std::uint64_t) {});
+    } else if (count <= kFew) {
+      std::array<Record, kFew> few;  // needs no memory of its own
       std::size_t used = 0;
       visit_since(end, [&](const Record& record, std::uint64_t) { insert(record, few, used, less); });
       items.reserve(used);
