@@ -9,7 +9,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/changes.h>
 
-#include "core/large_array.h"
+#include "core/memory/large_array.h"
 
 namespace quoin {
 

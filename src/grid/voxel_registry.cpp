@@ -8,7 +8,7 @@
 #include <quoin/core/assert.h>
 
 #include "core/change_journal.h"
-#include "core/make_room.h"
+#include "core/memory/make_room.h"
 #include "core/srgb.h"
 
 namespace quoin {

@@ -44,8 +44,8 @@
 #include <quoin/scene/solid_shapes.h>
 #include <quoin/store/world_saver.h>
 
-#include "core/block_arena_for_tests.h"
 #include "core/coordinates/chunk_order.h"
+#include "core/memory/block_arena_for_tests.h"
 #include "live/allocations_for_tests.h"
 #include "live/live_test_support.h"
 #include "render/light/emissive_cells.h"

@@ -13,7 +13,7 @@
 #include <quoin/live/live_meshes.h>
 
 #include "core/coordinates/chunk_order.h"
-#include "core/make_room.h"
+#include "core/memory/make_room.h"
 #include "core/work/workers.h"
 
 namespace quoin {

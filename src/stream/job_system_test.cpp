@@ -19,7 +19,7 @@
 #include <quoin/render/impostor_cache.h>
 #include <quoin/stream/streamed_world.h>
 
-#include "core/block_arena_for_tests.h"
+#include "core/memory/block_arena_for_tests.h"
 #include "core/work/job_system_for_tests.h"
 #include "store/world/world_for_tests.h"
 

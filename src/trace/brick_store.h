@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "core/large_array.h"
+#include "core/memory/large_array.h"
 #include "trace/tree_view.h"
 
 namespace quoin::trace {

@@ -12,7 +12,7 @@
 
 #include "core/coordinates/chunk_boxes.h"
 #include "core/coordinates/chunk_order.h"
-#include "core/large_array.h"
+#include "core/memory/large_array.h"
 #include "trace/brick_store.h"
 #include "trace/chunk_rows.h"
 #include "trace/tree_view.h"

@@ -11,7 +11,7 @@
 #include <quoin/core/ref.h>
 #include <quoin/core/vec.h>
 
-#include "core/large_array.h"
+#include "core/memory/large_array.h"
 
 namespace quoin {
 

@@ -4,7 +4,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/make_room.h"
+#include "core/memory/make_room.h"
 
 namespace quoin {
 

@@ -13,7 +13,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/ref.h>
 
-#include "core/large_array.h"
+#include "core/memory/large_array.h"
 
 namespace quoin {
 

@@ -17,7 +17,7 @@
 #include <quoin/core/vec.h>
 #include <quoin/grid/density_chunk.h>
 
-#include "core/large_array.h"
+#include "core/memory/large_array.h"
 #include "grid/chunk/chunk_storage.h"
 
 namespace quoin {

@@ -27,7 +27,7 @@
 #include <quoin/grid/density_grid.h>
 #include <quoin/trace/density_ray.h>
 
-#include "core/make_room.h"
+#include "core/memory/make_room.h"
 #include "core/trilinear.h"
 #include "scene/query/moving_shapes.h"
 #include "scene/query/query_in_grid.h"

@@ -15,7 +15,7 @@
 #include <quoin/scene/scene_query.h>
 
 #include "core/coordinates/unit_rotation.h"
-#include "core/make_room.h"
+#include "core/memory/make_room.h"
 #include "scene/tracer/placed_grid.h"
 #include "scene/tracer/scene_tracer_impl.h"
 

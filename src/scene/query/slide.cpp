@@ -9,7 +9,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/scene/sweep.h>
 
-#include "core/make_room.h"
+#include "core/memory/make_room.h"
 #include "scene/query/query_in_grid.h"
 
 namespace quoin {

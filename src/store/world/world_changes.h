@@ -24,7 +24,7 @@
 #include <quoin/store/world_store.h>
 
 #include "core/coordinates/chunk_order.h"
-#include "core/make_room.h"
+#include "core/memory/make_room.h"
 #include "store/database/schema.h"
 #include "store/world/world_reader.h"
 

@@ -21,7 +21,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "core/large_array.h"
+#include "core/memory/large_array.h"
 
 namespace quoin {
 namespace {

@@ -12,8 +12,8 @@
 
 #include <quoin/core/buffer.h>
 
-#include "core/block_arena_for_tests.h"
-#include "core/large_array.h"
+#include "core/memory/block_arena_for_tests.h"
+#include "core/memory/large_array.h"
 
 namespace quoin {
 namespace {

@@ -1,4 +1,4 @@
-#include "core/large_array.h"
+#include "core/memory/large_array.h"
 
 #include <algorithm>
 #include <cstddef>
