@@ -68,7 +68,7 @@ class WorkingGame {
   }
   void dig(int step) { world->scene().edit(land).grid.fill_sphere({7.0 * step - 10.0, 60.0, 5.0 * step}, 12.0, kAir); }
 
-  Viewer viewer{.position = {0.0, 100.0, 0.0}, .direction = {1.0, 0.0, 0.0}, .radius = 60.0};
+  Viewer viewer{.position = {0.0, 100.0, 0.0}, .direction = {1.0, 0.0, 0.0}, .radius = 100.0};
   GridHandle land;
   std::map<std::tuple<int, int, int>, std::size_t> uploads;  // bytes of the surfaces shown
   std::unique_ptr<StreamedWorld> world;
@@ -116,6 +116,7 @@ TEST_P(GameJobs, OneLimitHoldsForAllObjects) {
   const std::ptrdiff_t threads = threads_of_process();
   const GameResult result = play();
   EXPECT_LE(result.threads, threads) << "Quoin started threads";
+  EXPECT_FALSE(expected.uploads.empty());
   EXPECT_EQ(result.uploads, expected.uploads);
   EXPECT_EQ(result.voxels, expected.voxels);
   EXPECT_LE(jobs->most_at_once(), static_cast<int>(GetParam()));
@@ -139,6 +140,7 @@ TEST_P(GameJobs, BlockingCallsReturnInJobs) {
     EXPECT_EQ(game.impostors->wait(game.world->scene()), 0U);
     EXPECT_TRUE(game.world->flush());
   });
+  EXPECT_FALSE(game.meshes->take().empty());
   EXPECT_EQ(game.meshes->pending(), 0U);
   EXPECT_FALSE(game.tracer->is_late());
 }

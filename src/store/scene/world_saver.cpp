@@ -491,7 +491,7 @@ void follow_grid(GridHandle handle, const SceneGrid& grid, SaverState& state, Sa
     }
   };
   // If it throws, the next call reads the changes again. All cursors move to the present, also those that have read
-  // nothing: a journal drops old records, whichever aspect they concern.
+  // nothing: a journal drops old records of both aspects.
   const ChangeCursor now = grid.grid.cursor();
   ChangeCursor voxels = saved.voxels;
   ChangeCursor data = saved.data;
