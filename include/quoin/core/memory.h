@@ -55,8 +55,8 @@ struct BlockFunctions {
 ///
 /// Call it once, first in `main`, so that each block is freed by the function that belongs to the one that made it.
 /// Returns:  false, without a change, if functions were set before, or if Quoin has already made a large block.
-/// Blocks:   those of voxels, densities, meshes, trees, light, tracers, impostors and saves. See docs/games.md for blocks
-///           from elsewhere, for example vectors of public types and those of SQLite.
+/// Blocks:   those of voxels, densities, meshes, trees, light, tracers, impostors and saves. See docs/games.md for
+///           blocks from elsewhere, for example vectors of public types and those of SQLite.
 /// Errors:   if `allocate` returns null, the call of Quoin that needs the block throws std::bad_alloc, or handles it as
 ///           it handles bad_alloc of `operator new`.
 /// Lifetime: the functions must work until all objects of Quoin are destroyed and all threads that called Quoin have
@@ -84,17 +84,20 @@ class BlockAllocator {
   BlockAllocator(const BlockAllocator<U>& /*other*/) noexcept {}
 
   [[nodiscard]] T* allocate(std::size_t count) {
-    if (count > std::numeric_limits<std::size_t>::max() / sizeof(T)) throw std::bad_array_new_length();
-    const std::size_t bytes = count * sizeof(T);
+    if (count > std::numeric_limits<std::size_t>::max() / kSize) throw std::bad_array_new_length();
+    const std::size_t bytes = count * kSize;
     if (bytes > kLargeBlock) return static_cast<T*>(allocate_large_block(bytes, alignof(T)));
     return std::allocator<T>().allocate(count);
   }
   void deallocate(T* block, std::size_t count) noexcept {
-    const std::size_t bytes = count * sizeof(T);
+    const std::size_t bytes = count * kSize;
     if (bytes > kLargeBlock) return free_large_block(block, bytes, alignof(T));
     std::allocator<T>().deallocate(block, count);
   }
   bool operator==(const BlockAllocator& /*other*/) const noexcept { return true; }
+
+ private:
+  static constexpr std::size_t kSize = sizeof(T);  // NOLINT(bugprone-sizeof-expression): T may be a pointer
 };
 
 /// Base of types with large objects: `new` and `delete` of them, also within std::make_unique, take blocks as

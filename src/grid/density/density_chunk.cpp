@@ -149,8 +149,8 @@ void DensityStorage::move_values(std::size_t spare) {
   values = std::move(moved);
 }
 
-// Replaces a block without free slots by a larger one. It has spare slots for later versions of slabs if there are other
-// owners of slots, else for at most all slabs of the chunk.
+// Replaces a block without free slots by a larger one. It has spare slots for later versions of slabs if there are
+// other owners of slots, else for at most all slabs of the chunk.
 void DensityStorage::add_slots() {
   const std::size_t mixed = mixed_slabs();
   if (values.is_shared()) return move_values(std::max<std::size_t>(mixed / 2, 32));

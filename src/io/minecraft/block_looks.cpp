@@ -839,8 +839,8 @@ BlockLook look_of_nothing(std::string_view name) {
 
 // The passage of light is the value `filterLight` of the game's blocks, which minecraft-data lists
 // (https://github.com/PrismarineJS/minecraft-data, data/pc/1.21.11/blocks.json). 0: as through air. 1: sky light loses
-// a level. 15: no light passes. See also "Opacity" in the Minecraft Wiki. Stairs, slabs and the like have 0 too, but stop
-// light at faces that they fill; as whole voxels they keep it out.
+// a level. 15: no light passes. See also "Opacity" in the Minecraft Wiki. Stairs, slabs and the like have 0 too, but
+// stop light at faces that they fill; as whole voxels they keep it out.
 // The last words of blocks with 1, except liquids and clear blocks:
 constexpr std::string_view kFilters[] = {"leaves",         "cobweb",     "beacon",      "spawner",      "vault",
                                          "powder_snow",    "lava",       "end_gateway", "chorus_plant", "chorus_flower",
