@@ -129,9 +129,10 @@ class Game {
 
   [[nodiscard]] std::size_t ships() const { return ships_.size(); }
 
-  // Until everything is loaded and meshed. Pieces that are still not shown then are faults.
+  // Until everything is loaded and meshed. Pieces that are still not shown then are faults. The tracer is always late,
+  // because ships move in each frame.
   void settle() {
-    const auto is_busy = [this] { return !world_.stats().is_complete || meshes_.pending() != 0 || tracer_.is_late(); };
+    const auto is_busy = [this] { return !world_.stats().is_complete || meshes_.pending() != 0; };
     games::settle([this](FrameMeter& unused) { frame(unused, 0); }, is_busy, [this] { return !cuts_.empty(); });
   }
 
