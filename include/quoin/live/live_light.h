@@ -45,8 +45,8 @@ class LiveLight {
 
   /// Starts computing the light of the current scene in the background if voxel types, fields, grids or type properties
   /// have changed, unless an earlier update is still running. Call it and `take` once per frame: no update begins
-  /// before the last result is taken. Voxel data, names and instance positions do not affect light and can be out of date in
-  /// the light shown.
+  /// before the last result is taken. Voxel data, names and instance positions do not affect light and can be out of
+  /// date in the light shown.
   /// Does nothing while LiveMeshes uses this light.
   /// Cost:   no work if nothing changed; otherwise Scene::snapshot.
   /// Errors: bad_alloc, also from the background thread; the next call then computes the missing light from scratch.
