@@ -66,7 +66,7 @@ class ChangeJournal {
   /// false without a visit if the changes since the cursor are unknown.
   template <class Visit>
   bool visit_since(ChangeCursor& cursor, Visit&& visit) const {
-    const bool is_known = cursor.container_ == container_ && cursor.next_ >= first_ && cursor.next_ <= end_;
+    const bool is_known = knows(cursor);
     if (is_known) {
       for (std::uint64_t serial = cursor.next_; serial < end_; ++serial) visit(at(serial), serial);
     }
@@ -96,7 +96,7 @@ class ChangeJournal {
     std::vector<Change> items = std::move(changes).items_unless_all();  // for their memory
     items.clear();
     ChangeCursor end = cursor;
-    const bool is_known = cursor.container_ == container_ && cursor.next_ >= first_ && cursor.next_ <= end_;
+    const bool is_known = knows(cursor);
     const std::size_t count = is_known ? static_cast<std::size_t>(end_ - cursor.next_) : 0;
     if (count == 0) {
       visit_since(end, [](const Record&, std::uint64_t) {});
@@ -158,6 +158,11 @@ class ChangeJournal {
     std::move_backward(sorted.begin() + at, sorted.begin() + used, sorted.begin() + used + 1);
     sorted[at] = record;
     ++used;
+  }
+
+  // Returns true if the journal has all changes since the cursor.
+  [[nodiscard]] bool knows(const ChangeCursor& cursor) const {
+    return cursor.container_ == container_ && cursor.next_ >= first_ && cursor.next_ <= end_;
   }
 
   // Marks all records as possibly read.
