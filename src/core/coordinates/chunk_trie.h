@@ -3,7 +3,6 @@
 #include <array>
 #include <bit>
 #include <cstdint>
-#include <memory>
 #include <new>
 #include <utility>
 
@@ -216,10 +215,10 @@ class ChunkTrie {
       slot |= (here->prefix[axis] >> down & (kEdge - 1)) << (kLog * static_cast<int>(axis));
     }
     QUOIN_ASSERT(slot_of(at, level) != slot, "the smallest node that covers both");
-    auto inner = std::make_unique<Inner>(level, at);
-    inner->children[slot] = std::move(here);
+    Ref<Node> inner = make_node<Inner>(level, at);
+    static_cast<Inner&>(*inner).children[slot] = std::move(here);
     inner->present = std::uint64_t{1} << slot;
-    here = Ref<Node>(inner.release());
+    here = std::move(inner);
   }
 
   // Requires: the entry exists, and no node on the path to it is shared.
