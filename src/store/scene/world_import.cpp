@@ -91,7 +91,8 @@ Result<Done> parse_done(std::span<const std::byte> bytes, const std::string& ide
     if (line.is_string()) done.broken.push_back(line.get<std::string>());
   }
   done.lamps = number("lamps");
-  for (const auto& [name, count] : json.value("invisible", Json::object()).items()) {
+  const Json invisible = json.value("invisible", Json::object());
+  for (const auto& [name, count] : invisible.items()) {
     if (count.is_number_unsigned()) done.invisible[name] = count.get<std::uint64_t>();
   }
   return done;
