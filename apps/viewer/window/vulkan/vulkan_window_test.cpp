@@ -187,7 +187,7 @@ TEST_F(VulkanWindowTest, OpensAndClosesFiftyTimes) {
   }
 }
 
-TEST_F(VulkanWindowTest, LeaksNothingOverFiftyViewerStarts) {
+TEST_F(VulkanWindowTest, LeaksNothingOverManyViewerStarts) {
   // The viewer starts and ends SDL itself.
   renderer_.reset();
   device_.reset();
@@ -213,12 +213,13 @@ TEST_F(VulkanWindowTest, LeaksNothingOverFiftyViewerStarts) {
   const std::size_t threads_before = threads();
   const double memory = held_megabytes();
   const double in_ram = resident_megabytes();
-  for (int i = 0; i < 45; ++i) start();
+  for (int i = 0; i < cases(15, 45); ++i) start();
   EXPECT_EQ(open_files(), files);
   EXPECT_LE(threads_after_joining(threads_before), threads_before);
   RecordProperty("megabytes_in_ram", std::to_string(resident_megabytes() - in_ram));
   RecordProperty("megabytes", std::to_string(held_megabytes() - memory));
-  EXPECT_LT(held_megabytes() - memory, 25.0);
+  // Mesa keeps 6 to 10 MB of compiled code, however often the viewer starts.
+  EXPECT_LT(held_megabytes() - memory, cases(16, 25));
 }
 
 TEST_F(VulkanWindowTest, PresentsUploadedCpuImages) {
