@@ -317,8 +317,8 @@ constexpr Legacy kLegacy[] = {
     {255, "structure_block", How::Data},
 };
 
-constexpr std::string_view kWoods = "oak spruce birch jungle acacia dark_oak";
-constexpr std::string_view kDyes =
+constexpr std::string_view kLegacyWoods = "oak spruce birch jungle acacia dark_oak";
+constexpr std::string_view kLegacyDyes =
     "white orange magenta light_blue yellow lime pink gray light_gray cyan purple blue brown green red black";
 
 /// Returns the i-th word of a text, or the first one if there are fewer.
@@ -471,12 +471,12 @@ std::string name_of(const Legacy& block, int data) {
     case How::Kinds:
       return word(block.kinds, data);
     case How::Woods8:
-      return word(kWoods, data & 7) + end;
+      return word(kLegacyWoods, data & 7) + end;
     case How::Woods4:
     case How::Logs:
       return word(block.kinds, data & 3) + end;
     case How::Dyed:
-      return word(kDyes, data) + end;
+      return word(kLegacyDyes, data) + end;
     case How::Slab:
     case How::DoubleSlab:
     case How::DoublePlant:

@@ -27,12 +27,11 @@ namespace quoin::minecraft {
 
 namespace {
 
-constexpr std::size_t kMaxBytes = std::size_t{1} << 30;
+constexpr std::size_t kMaxSchematicBytes = std::size_t{1} << 30;
 constexpr std::int64_t kMaxBlocks = std::int64_t{1} << 30;
 constexpr std::size_t kMaxPalette = 65'535;
 constexpr int kMaxEdge = 1 << 20;
 constexpr std::int64_t kMaxPlace = 1 << 26;
-constexpr std::uint16_t kNoIndex = 0xFFFF;
 
 std::string text_of(IVec3 size) {
   return std::to_string(size.x) + " x " + std::to_string(size.y) + " x " + std::to_string(size.z);
@@ -48,7 +47,7 @@ struct ColumnBiomes {
 };
 
 /// The blocks of one array.
-struct Region {
+struct SchematicRegion {
   std::string name;
   IVec3 min{0};
   IVec3 size{0};
@@ -166,17 +165,17 @@ class SchematicReader {
   Status read_litematic(nbt::Value regions);
   Status read_litematic_region(nbt::Value from);
   Status read_structure();
-  Status put_structure(Region& region, nbt::Value blocks);
-  void take_biomes(Region& region, nbt::Value palette, nbt::Value data, int layers);
-  void take_numbered_biomes(Region& region, nbt::Value numbers);
-  Status put(const Region& region);
-  void take_invisible(const Region& region);
-  Status fill(const Region& region, int first_y, std::span<const std::uint16_t> layers);
+  Status put_structure(SchematicRegion& region, nbt::Value blocks);
+  void take_biomes(SchematicRegion& region, nbt::Value palette, nbt::Value data, int layers);
+  void take_numbered_biomes(SchematicRegion& region, nbt::Value numbers);
+  Status put(const SchematicRegion& region);
+  void take_invisible(const SchematicRegion& region);
+  Status fill(const SchematicRegion& region, int first_y, std::span<const std::uint16_t> layers);
   Result<IVec3> size_of(nbt::Value schematic) const;
   void note_left_out();
 
   [[nodiscard]] VarintReader varints(nbt::Value array) const;
-  bool put_uniform(const Region& region, int first_y, int height, Grid& grid);
+  bool put_uniform(const SchematicRegion& region, int first_y, int height, Grid& grid);
 
   nbt::Value root_;
   const std::map<std::size_t, PagedBytes>& arrays_;
@@ -281,7 +280,7 @@ Status SchematicReader::read_sponge(nbt::Value schematic) {
   const nbt::Value data = is_third ? blocks["Data"] : schematic["BlockData"];
   auto palette = palette_of_texts(holder["Palette"], types_);
   if (!palette) return palette.error();
-  Region region;
+  SchematicRegion region;
   region.name = schematic["Metadata"]["Name"].text().value_or("");
   region.min = vector_of_list(schematic["Offset"]).value_or(IVec3(0));
   region.size = *size;
@@ -324,7 +323,7 @@ VarintReader SchematicReader::varints(nbt::Value array) const {
 }
 
 // Reads biome indices into a palette of names: one per column, or one per block, where the lowest of 16 is used.
-void SchematicReader::take_biomes(Region& region, nbt::Value palette, nbt::Value data, int layers) {
+void SchematicReader::take_biomes(SchematicRegion& region, nbt::Value palette, nbt::Value data, int layers) {
   ColumnBiomes& biomes = region.biomes;
   std::vector<std::uint8_t> of_palette;
   palette.for_each([&](nbt::Value entry) {
@@ -355,7 +354,7 @@ void SchematicReader::take_biomes(Region& region, nbt::Value palette, nbt::Value
 }
 
 // One number per column.
-void SchematicReader::take_numbered_biomes(Region& region, nbt::Value numbers) {
+void SchematicReader::take_numbered_biomes(SchematicRegion& region, nbt::Value numbers) {
   if (numbers.count() == 0) return;
   const auto area = static_cast<std::size_t>(region.size.x) * static_cast<std::size_t>(region.size.z);
   has_lost_biomes_ = !numbers.is_integers() || numbers.count() != area;
@@ -388,7 +387,7 @@ Status SchematicReader::read_mcedit() {
   if (root_["SchematicaMapping"] || root_["BlockIDs"]) {
     loaded_.warnings.emplace_back("the file's own block numbers are ignored; the game's are used");
   }
-  Region region;
+  SchematicRegion region;
   region.size = *size;
   block_entities_ += root_["TileEntities"].count();
   entities_ += root_["Entities"].count();
@@ -429,7 +428,7 @@ Status SchematicReader::read_litematic_region(nbt::Value from) {
   const auto place = vector_of(from["Position"]);
   const auto reach = vector_of(from["Size"]);
   if (!place || !reach) return fault("a region has no position or no size", from);
-  Region region;
+  SchematicRegion region;
   region.name = from.name();
   region.size = glm::abs(*reach);
   region.min = *place;
@@ -475,7 +474,7 @@ Status SchematicReader::read_structure() {
   if (std::int64_t{size->x} * size->z > kMaxArea) {
     return make_error(ErrorCode::LimitExceeded, "the structure of " + text_of(*size) + " blocks is too large");
   }
-  Region region;
+  SchematicRegion region;
   region.size = *size;
   nbt::Value palette = root_["palette"];
   if (!palette) {  // the game picks one of several at random; this reads the first
@@ -513,7 +512,7 @@ void ColumnBiomes::put_into(Section& section, IVec3 corner, IVec3 size) const {
 }
 
 // Positions without a block are air.
-Status SchematicReader::put_structure(Region& region, nbt::Value blocks) {
+Status SchematicReader::put_structure(SchematicRegion& region, nbt::Value blocks) {
   struct Placed {
     int y;
     std::uint32_t at;
@@ -549,7 +548,7 @@ Status SchematicReader::put_structure(Region& region, nbt::Value blocks) {
 }
 
 // Cuts one slab of 16 layers at a time into sections.
-Status SchematicReader::fill(const Region& region, int first_y, std::span<const std::uint16_t> layers) {
+Status SchematicReader::fill(const SchematicRegion& region, int first_y, std::span<const std::uint16_t> layers) {
   const auto width = static_cast<std::size_t>(region.size.x);
   const std::size_t area = width * static_cast<std::size_t>(region.size.z);
   const int height = static_cast<int>(layers.size() / area);
@@ -592,7 +591,7 @@ Status SchematicReader::fill(const Region& region, int first_y, std::span<const 
   return {};
 }
 
-void SchematicReader::take_invisible(const Region& region) {
+void SchematicReader::take_invisible(const SchematicRegion& region) {
   SourcePart part;
   builder_.take_invisible(part);
   for (const auto& [name, count] : part.skipped_blocks) invisible_[name] += count;
@@ -604,7 +603,7 @@ void SchematicReader::take_invisible(const Region& region) {
 
 // Adds layers of one block up to the next chunk border, without visiting each block. Returns false and reads nothing if
 // a block has more than its type, or if blocks differ.
-bool SchematicReader::put_uniform(const Region& region, int first_y, int height, Grid& grid) {
+bool SchematicReader::put_uniform(const SchematicRegion& region, int first_y, int height, Grid& grid) {
   if (!region.read_uniform || !std::ranges::all_of(region.palette, &Block::is_plain)) return false;
   const auto index = region.read_uniform(height);
   if (!index) return false;
@@ -615,7 +614,7 @@ bool SchematicReader::put_uniform(const Region& region, int first_y, int height,
   return true;
 }
 
-Status SchematicReader::put(const Region& region) {
+Status SchematicReader::put(const SchematicRegion& region) {
   SceneGrid grid;
   grid.name = region.name;
   const auto area = static_cast<std::size_t>(region.size.x) * static_cast<std::size_t>(region.size.z);
@@ -723,11 +722,11 @@ Result<LoadedScene> read_schematic(std::span<const std::byte> bytes, const Progr
   }
   LargeNbt content;
   if (begins_gzip(bytes)) {
-    auto large = read_large_nbt(bytes, kMaxBytes);
+    auto large = read_large_nbt(bytes, kMaxSchematicBytes);
     if (!large) return large.error();
     content = std::move(*large);
   } else {
-    auto expanded = decompress_file(bytes, kMaxBytes);
+    auto expanded = decompress_file(bytes, kMaxSchematicBytes);
     if (!expanded) return expanded.error();
     content.bytes = std::move(*expanded);
   }

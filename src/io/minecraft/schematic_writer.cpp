@@ -25,15 +25,15 @@ namespace {
 
 constexpr models::FormatHolds kHolds = {
     .extension = ".schem", .names = true, .transparency = true, .materials = true, .type_names = true};
-constexpr int kMaxEdge = 65'535;
-constexpr std::int64_t kMaxBlocks = (std::int64_t{1} << 30) - (std::int64_t{1} << 20);
+constexpr int kMaxWrittenEdge = 65'535;
+constexpr std::int64_t kMaxWrittenBlocks = (std::int64_t{1} << 30) - (std::int64_t{1} << 20);
 constexpr std::int32_t kVersion = 2;
 // The data version of the game's 1.20.1.
 constexpr std::int32_t kDataVersion = 3465;
 
-constexpr std::array<std::string_view, 16> kDyes = {"white", "orange", "magenta",    "light_blue", "yellow", "lime",
-                                                    "pink",  "gray",   "light_gray", "cyan",       "purple", "blue",
-                                                    "brown", "green",  "red",        "black"};
+constexpr std::array<std::string_view, 16> kWrittenDyes = {
+    "white",      "orange", "magenta", "light_blue", "yellow", "lime",  "pink", "gray",
+    "light_gray", "cyan",   "purple",  "blue",       "brown",  "green", "red",  "black"};
 
 /// Full blocks of one colour.
 std::vector<std::string> plain_blocks() {
@@ -43,15 +43,15 @@ std::vector<std::string> plain_blocks() {
       "gold_block",    "quartz_block", "netherrack",      "end_stone",  "prismarine", "coal_block", "diamond_block",
       "emerald_block", "lapis_block",  "terracotta"};
   for (const std::string_view kind : {"_concrete", "_wool", "_terracotta"}) {
-    for (const std::string_view dye : kDyes) names.push_back(std::string(dye).append(kind));
+    for (const std::string_view dye : kWrittenDyes) names.push_back(std::string(dye).append(kind));
   }
   return names;
 }
 
 std::vector<std::string> glass_blocks() {
   std::vector<std::string> names;
-  names.reserve(kDyes.size());
-  for (const std::string_view dye : kDyes) names.push_back(std::string(dye).append("_stained_glass"));
+  names.reserve(kWrittenDyes.size());
+  for (const std::string_view dye : kWrittenDyes) names.push_back(std::string(dye).append("_stained_glass"));
   return names;
 }
 
@@ -189,8 +189,8 @@ Result<EncodedFile> write_schematic(const Scene& scene, const Progress& progress
   if (merged->box.empty())
     return make_error(ErrorCode::Unsupported, "the scene has no voxels, and .schem needs at least one");
   const IVec3 size = merged->box.size();
-  if (std::max({size.x, size.y, size.z}) > kMaxEdge ||
-      std::int64_t{size.x} * size.y > kMaxBlocks / std::max(size.z, 1)) {
+  if (std::max({size.x, size.y, size.z}) > kMaxWrittenEdge ||
+      std::int64_t{size.x} * size.y > kMaxWrittenBlocks / std::max(size.z, 1)) {
     return make_error(ErrorCode::LimitExceeded, "more than 65,535 blocks per side, or about 2^30 in total");
   }
   Palette palette(scene.types);

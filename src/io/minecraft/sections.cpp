@@ -16,7 +16,6 @@ namespace quoin::minecraft {
 
 namespace {
 
-constexpr std::uint16_t kNoIndex = 0xFFFF;
 constexpr std::size_t kLegacyCodes = std::size_t{4096} * 16;
 
 std::uint64_t word(std::span<const std::byte> longs, std::size_t i) {

@@ -17,6 +17,7 @@ namespace quoin::minecraft {
 
 inline constexpr int kSectionEdge = 16;
 inline constexpr std::size_t kSectionBlocks = 4096;
+inline constexpr std::uint16_t kNoIndex = 0xFFFF;  ///< in no palette
 
 /// 16^3 blocks of a chunk.
 struct Section {

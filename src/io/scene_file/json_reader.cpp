@@ -115,7 +115,7 @@ void Object::read(std::string_view key, DVec3& out) const {
 std::vector<double> Object::numbers(const Json& json, const Place& place, std::size_t count) const {
   std::vector<double> values(count, 0.0);
   if (!json.is_array() || json.size() != count) {
-    faults_.add(place, "must be a list of " + std::to_string(count) + " numbers");
+    faults_.add(place, std::string("must be a list of ").append(std::to_string(count)).append(" numbers"));
     return values;
   }
   for (std::size_t i = 0; i < count; ++i) values[i] = number(json[i], {&place, {}, i});

@@ -379,7 +379,7 @@ namespace quoin {
 
 namespace {
 
-constexpr double kMostSteps = 1 << 20;
+constexpr double kMostPlySteps = 1 << 20;
 static_assert(std::endian::native == std::endian::little, "the format written is little-endian");
 
 constexpr std::size_t kVertexBytes = 6 * 4 + 3;  // position and normal as floats, red, green and blue as bytes
@@ -510,7 +510,7 @@ void write_content(const SceneMeshes& meshes, const PlyPlan& plan, BlockWriter& 
 
 Result<std::vector<MeshFile>> plan_ply(const SceneMeshes& meshes, const std::filesystem::path& path,
                                        const MeshFileOptions& options) {
-  PlyPlan plan{{}, options.occlusion_in, file_origin(meshes, kMostSteps)};
+  PlyPlan plan{{}, options.occlusion_in, file_origin(meshes, kMostPlySteps)};
   Counts counts;
   for_each_surface(meshes, plan.origin, [&](const MeshView& view, const VertexTransform&) {
     counts.vertices += view.positions.size();
@@ -539,7 +539,7 @@ extern constinit const FormatDriver kPlyFormat = {
     .detect = triangles::is_ply,
     .read_mesh = triangles::read_ply,
     .plan_mesh = plan_ply,
-    .most_steps = kMostSteps,
+    .most_steps = kMostPlySteps,
 };
 
 }  // namespace quoin

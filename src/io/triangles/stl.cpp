@@ -156,7 +156,7 @@ namespace quoin {
 namespace {
 
 /// Surfaces for printers are separated by a hundredth of a voxel.
-constexpr double kMostSteps = 1 << 16;
+constexpr double kMostStlSteps = 1 << 16;
 static_assert(std::endian::native == std::endian::little, "the format written is little-endian");
 
 constexpr std::size_t kHeader = 80;
@@ -181,7 +181,7 @@ std::string offset_text(const DVec3& offset) {
 }
 
 void write_content(const SceneMeshes& meshes, std::uint32_t triangles, BlockWriter& out) {
-  const DVec3 origin = file_origin(meshes, kMostSteps);
+  const DVec3 origin = file_origin(meshes, kMostStlSteps);
   std::string header = "Quoin ";
   header.append(version()).append(", millimetres");
   if (origin != DVec3(0.0)) header += offset_text(origin);
@@ -228,7 +228,7 @@ extern constinit const FormatDriver kStlFormat = {
     .detect_name = triangles::is_named_stl,
     .read_mesh = triangles::read_stl,
     .plan_mesh = plan_stl,
-    .most_steps = kMostSteps,
+    .most_steps = kMostStlSteps,
 };
 
 }  // namespace quoin

@@ -36,7 +36,7 @@
 namespace quoin::vdb {
 namespace {
 
-constexpr std::string_view kMagic{" BDV\0\0\0\0", 8};
+constexpr std::string_view kVdbMagic{" BDV\0\0\0\0", 8};
 constexpr std::uint32_t kOldest = 222;
 constexpr std::uint32_t kNewest = 225;
 constexpr std::uint32_t kZip = 1;
@@ -379,12 +379,12 @@ class FileReader {
   explicit FileReader(std::span<const std::byte> bytes) : bytes_(bytes), reader_(bytes) {}
 
   Result<File> read() {
-    static_cast<void>(reader_.take(kMagic.size()));
+    static_cast<void>(reader_.take(kVdbMagic.size()));
     const std::uint32_t version = reader_.u32();
     if (version < kOldest || version > kNewest) {
       return make_error(ErrorCode::Unsupported,
                         ".vdb version " + std::to_string(version) + " is not supported (222 to 225 are)", {},
-                        kMagic.size());
+                        kVdbMagic.size());
     }
     static_cast<void>(reader_.take(8));  // version of the library
     const std::size_t offsets_at = reader_.position();
@@ -483,7 +483,7 @@ class FileReader {
 }  // namespace
 
 bool is_vdb(std::span<const std::byte> beginning) {
-  return text_of(beginning).starts_with(kMagic);
+  return text_of(beginning).starts_with(kVdbMagic);
 }
 
 Result<File> read_vdb_file(std::span<const std::byte> bytes) {
@@ -496,7 +496,7 @@ Result<File> read_vdb_file(std::span<const std::byte> bytes) {
 
 namespace {
 
-constexpr std::size_t kHeader = 16;
+constexpr std::size_t kBloscHeader = 16;
 
 struct Header {
   unsigned flags = 0;
@@ -572,7 +572,7 @@ Status expand_blosc(std::span<const std::byte> frame, std::span<std::byte> out) 
     return bad_at(0, "Blosc: the frame does not have the expected number of bytes");
   if (header.is_stored()) {
     const auto stored = reader.take(out.size());
-    if (reader.failed()) return bad_at(kHeader, "Blosc: cut off");
+    if (reader.failed()) return bad_at(kBloscHeader, "Blosc: cut off");
     std::ranges::copy(stored, out.begin());
     return {};
   }

@@ -629,7 +629,7 @@ void WorldSaver::set_view(WorldView view) {
 namespace {
 
 // Maximum number of damage lines, for readable reports on broken worlds.
-constexpr std::size_t kMaxLines = 20;
+constexpr std::size_t kMaxWarnings = 20;
 
 /// Loads a world's parts and chunks into a scene.
 class Load {
@@ -672,11 +672,11 @@ class Load {
 
  private:
   void add_line(std::string line) {
-    if (lines_++ < kMaxLines) loaded_.warnings.push_back(std::move(line));
+    if (lines_++ < kMaxWarnings) loaded_.warnings.push_back(std::move(line));
   }
   void report_rest() {
-    if (lines_ > kMaxLines) {
-      loaded_.warnings.push_back("and " + std::to_string(lines_ - kMaxLines) + " more (quoin world check)");
+    if (lines_ > kMaxWarnings) {
+      loaded_.warnings.push_back("and " + std::to_string(lines_ - kMaxWarnings) + " more (quoin world check)");
     }
   }
 

@@ -18,7 +18,6 @@ namespace quoin::store {
 namespace {
 
 constexpr const char* kSelectChunk = "SELECT body FROM chunks WHERE key=?";
-constexpr const char* kSelectRegion = "SELECT id FROM regions WHERE grid=? AND level=? AND x=? AND y=? AND z=?";
 constexpr const char* kSelectRegionsIn =
     "SELECT id, x, y, z FROM regions WHERE grid=? AND level=? AND x BETWEEN ? AND ? AND y BETWEEN ? AND ?"
     " AND z BETWEEN ? AND ?";

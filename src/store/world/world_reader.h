@@ -18,6 +18,9 @@
 
 namespace quoin::store {
 
+/// Selects the number of the region at a place.
+inline constexpr const char* kSelectRegion = "SELECT id FROM regions WHERE grid=? AND level=? AND x=? AND y=? AND z=?";
+
 /// Reads a world through its own connection, one thread at a time. Each call sees the state of the last commit.
 class WorldReader {
  public:

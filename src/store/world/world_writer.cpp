@@ -24,7 +24,6 @@ constexpr int kMaxLogPages = (16 << 20) / kPageBytes;
 constexpr const char* kPutChunk = "REPLACE INTO chunks(key, body) VALUES(?, ?)";
 constexpr const char* kDeleteChunk = "DELETE FROM chunks WHERE key=?";
 constexpr const char* kDeleteChunks = "DELETE FROM chunks WHERE key BETWEEN ? AND ?";
-constexpr const char* kSelectRegion = "SELECT id FROM regions WHERE grid=? AND level=? AND x=? AND y=? AND z=?";
 constexpr const char* kAddRegion = "INSERT INTO regions(grid, level, x, y, z) VALUES(?, ?, ?, ?, ?) RETURNING id";
 constexpr const char* kSelectGridRegion = "SELECT id FROM regions WHERE grid=? LIMIT 1";
 constexpr const char* kDeleteRegion = "DELETE FROM regions WHERE id=?";

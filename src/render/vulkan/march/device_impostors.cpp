@@ -21,7 +21,7 @@ constexpr std::uint32_t kSides = ImpostorFaces::kSides;
 constexpr std::uint32_t kIsSurfel = 8;  // as in far.glsl
 constexpr std::uint32_t kSurfelHalvesShift = 4;
 
-Vec4 to_vec4(const raster::Vector& v, float w = 0.0F) {
+Vec4 vec4_of(const raster::Vector& v, float w = 0.0F) {
   return {v[0], v[1], v[2], w};
 }
 
@@ -118,15 +118,15 @@ std::uint32_t seen_sides(const raster::Job& job, const PixelArea& area) {
 void set_aim(const DrawnImpostor& drawn, int width, int height, ShaderFar& far) {
   raster::Job job;
   raster::set_aim(drawn.aim, drawn.area.left - 0.5 * width, drawn.area.top - 0.5 * height, job);
-  far.point = to_vec4(job.point.at, job.depth_at);
-  far.point_x = to_vec4(job.point.x);
-  far.point_y = to_vec4(job.point.y);
-  far.direction = to_vec4(job.direction.at, job.depth_step);
-  far.direction_x = to_vec4(job.direction.x);
-  far.direction_y = to_vec4(job.direction.y);
-  far.across = to_vec4(job.across, job.across_at);
-  far.down = to_vec4(job.down, job.down_at);
-  far.ahead = to_vec4(job.ahead, job.ahead_at);
+  far.point = vec4_of(job.point.at, job.depth_at);
+  far.point_x = vec4_of(job.point.x);
+  far.point_y = vec4_of(job.point.y);
+  far.direction = vec4_of(job.direction.at, job.depth_step);
+  far.direction_x = vec4_of(job.direction.x);
+  far.direction_y = vec4_of(job.direction.y);
+  far.across = vec4_of(job.across, job.across_at);
+  far.down = vec4_of(job.down, job.down_at);
+  far.ahead = vec4_of(job.ahead, job.ahead_at);
   far.at = {job.column_at, job.row_at, drawn.faces->levels[drawn.level].room(), static_cast<float>(drawn.coarser)};
   for (ShaderFarLevel* level : {&far.level, &far.coarser, &far.unseen}) level->sides = seen_sides(job, drawn.area);
   far.area = {drawn.area.left, drawn.area.top, drawn.area.right, drawn.area.bottom};

@@ -28,10 +28,6 @@ namespace {
 // farther points have no precision to lose.
 constexpr double kNearby = 1024.0;
 
-Vec4 to_vec4(DVec3 v, double w = 0.0) {
-  return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z), static_cast<float>(w)};
-}
-
 // Returns the rounding error of `to_vec4`.
 Vec4 low_vec4(DVec3 v) {
   return to_vec4(v - DVec3(Vec3(v)));

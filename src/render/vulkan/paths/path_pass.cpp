@@ -299,10 +299,6 @@ constexpr int kSamplesAtOnce = 16;  // samples of a tile between progress report
 constexpr int kDispatchesAtOnce = 8;
 constexpr int kFewSamples = 4;  // fewer samples finish before larger buffers are allocated
 
-Vec4 to_vec4(DVec3 v, double w = 0.0) {
-  return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z), static_cast<float>(w)};
-}
-
 double capped(double value) {
   return std::min(value, 1e30);
 }

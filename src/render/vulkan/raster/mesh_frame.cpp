@@ -25,10 +25,6 @@ constexpr double kNearest = 1.0 / 1024.0;  // voxels
 // faces there were 168 holes without it and 12 with 0.25; in 34.6 million pixels there were none with 0.5.
 constexpr double kWidening = 0.5;
 
-Vec4 to_vec4(DVec3 v, double w = 0.0) {
-  return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z), static_cast<float>(w)};
-}
-
 // The image and the visible part of the world.
 struct View {
   CameraRays rays;

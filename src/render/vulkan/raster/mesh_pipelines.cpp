@@ -122,7 +122,7 @@ std::array<std::size_t, 2> shaders_of(const MeshWay& way) {
   return {};
 }
 
-const char* const kDoing = "compiling shaders";
+const char* const kCompiling = "compiling shaders";
 
 VkAttachmentDescription attachment(VkFormat format, std::uint32_t samples, VkAttachmentLoadOp load, bool is_copied,
                                    VkImageLayout layout) {
@@ -254,7 +254,7 @@ Result<std::unique_ptr<MeshPipelines>> MeshPipelines::create(Device& device) {
   for (std::size_t i = 0; i < kShaders && result == VK_SUCCESS; ++i) {
     result = make_shader(device, kCode[i], made->shaders_[i]);
   }
-  if (Status status = device.check(result, kDoing); !status) return status.error();
+  if (Status status = device.check(result, kCompiling); !status) return status.error();
   return made;
 }
 
@@ -271,7 +271,7 @@ MeshPipelines::~MeshPipelines() {
 Result<VkRenderPass> MeshPipelines::render_pass(std::uint32_t samples) {
   if (const auto known = passes_.find(samples); known != passes_.end()) return known->second;
   VkRenderPass pass = VK_NULL_HANDLE;
-  if (Status status = device_->check(make_pass(samples, pass), kDoing); !status) return status.error();
+  if (Status status = device_->check(make_pass(samples, pass), kCompiling); !status) return status.error();
   passes_[samples] = pass;
   return pass;
 }
@@ -281,7 +281,7 @@ Result<VkPipeline> MeshPipelines::pipeline(const MeshWay& way) {
   const auto pass = render_pass(way.samples);
   if (!pass) return pass.error();
   VkPipeline pipeline = VK_NULL_HANDLE;
-  if (Status status = device_->check(make(way, *pass, pipeline), kDoing); !status) {
+  if (Status status = device_->check(make(way, *pass, pipeline), kCompiling); !status) {
     return status.error();
   }
   pipelines_[way] = pipeline;

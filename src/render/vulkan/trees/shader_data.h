@@ -17,6 +17,10 @@ namespace quoin::vulkan {
 using Vec4 = glm::vec4;
 using IVec4 = glm::ivec4;
 
+[[nodiscard]] inline Vec4 to_vec4(DVec3 v, double w = 0.0) {
+  return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z), static_cast<float>(w)};
+}
+
 /// Edge of a density block: a field chunk's record has, for each word of 4^3 cells at the surface, the samples from one
 /// before its first corner to one past its last, along each axis.
 constexpr int kFieldBlockEdge = 7;
