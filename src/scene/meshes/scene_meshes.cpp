@@ -87,11 +87,11 @@ Status check_atlas(const Scene& scene, const std::vector<GridHandle>& grids, con
     return make_error(ErrorCode::InvalidArgument,
                       "cannot make an atlas: it needs merged faces with occlusion, neither cut nor watertight");
   }
-  constexpr int kFarthest = 1 << 24;  // floats cannot represent larger integers exactly
+  constexpr int kFarthestVoxel = 1 << 24;  // floats cannot represent larger integers exactly
   for (const GridHandle handle : grids) {
     const IBox bounds = scene.grids()[handle].grid.bounds();
-    const bool is_near = bounds.empty() || (glm::all(glm::greaterThanEqual(bounds.min, IVec3(-kFarthest))) &&
-                                            glm::all(glm::lessThanEqual(bounds.max, IVec3(kFarthest))));
+    const bool is_near = bounds.empty() || (glm::all(glm::greaterThanEqual(bounds.min, IVec3(-kFarthestVoxel))) &&
+                                            glm::all(glm::lessThanEqual(bounds.max, IVec3(kFarthestVoxel))));
     if (!is_near) return make_error(ErrorCode::LimitExceeded, "cannot make an atlas: voxel coordinates exceed 2^24");
   }
   return {};
