@@ -99,7 +99,7 @@ typedef struct quoin_type {
   float anisotropy;    /* clouds: mean cosine of the scattering angle, -1 to 1 */
   int32_t light_cost;  /* levels of propagated light that a step into it costs, 0 to 15; 1: water, leaves */
   /* 1: yes, -1: no, 0: yes unless transparent. blocks_light: propagated light does not leave it. occludes: it darkens
-   * corners of faces in meshes; a transparent type cannot. */
+   * corners of faces; a transparent type cannot. */
   int32_t blocks_light;
   int32_t occludes;
 } quoin_type;

@@ -85,9 +85,9 @@ struct VoxelProperties {
   /// type. Light enters a transparent type that blocks light, so that faces behind it are lit, and a room below stays
   /// dark: a roof of stairs. It enters no opaque one. Default: true for opaque types.
   std::optional<bool> blocks_light{};
-  /// True if voxels of this type darken the corners of faces next to them: in blocky meshes and `face_occlusion`.
-  /// Images that are rendered without a mesh darken corners at each opaque type. Requires an opaque type: merging
-  /// faces without loss needs occluders that hide faces. Default: true for opaque types.
+  /// True if voxels of this type darken the corners of faces next to them: in blocky meshes, `face_occlusion`,
+  /// impostors and images with OcclusionMode::Vertex. Requires an opaque type: merging faces without loss needs
+  /// occluders that hide faces. Default: true for opaque types.
   std::optional<bool> occludes{};
   /// Levels of propagated light that a step into a voxel of this type costs, 0 to 15, if more than the 1 level that any
   /// step costs. Sky light of level 15, which falls straight down through air without loss, also loses it. 1 is usual

@@ -211,6 +211,28 @@ TEST(RenderLight, VertexOcclusionMatchesMesh) {
   }
 }
 
+// The voxel at the foot of a wall, as in the mesh: its light falls towards the wall only if the wall's type occludes.
+TEST(RenderLight, OnlyTypesThatOccludeDarkenCorners) {
+  RenderOptions options = sized(40, 1);
+  options.light.shading = Shading::Occlusion;
+  const Camera camera = from_above(3.5, 3, 0.5, 1.0 / 40);
+  for (const bool occludes : {false, true}) {
+    Scene scene;
+    Grid grid = floor_of(add_type(scene, kGrey));
+    const auto wall = scene.types.add({.name = "wall", .colour = kGrey, .occludes = occludes});
+    ASSERT_TRUE(wall);
+    grid.fill_box({{4, 0, -40}, {5, 6, 40}}, *wall);
+    place(scene, std::move(grid));
+    options.light.occlusion_mode = OcclusionMode::Vertex;
+    const RenderedImage image = taken(scene, camera, options);
+    const int dark = occludes ? 85 : 255;
+    EXPECT_NEAR(pixel_at(image, 0, 0)[0], 255, 3);
+    EXPECT_NEAR(pixel_at(image, 39, 0)[0], dark, 3);
+    options.light.occlusion_mode = OcclusionMode::Rays;
+    EXPECT_LT(pixel_at(taken(scene, camera, options), 39, 0)[0], 255) << "rays meet each opaque voxel";
+  }
+}
+
 TEST(RenderLight, SolidFromInsideShowsOwnColour) {
   Scene scene;
   place(scene, floor_of(add_type(scene, kGrey)));

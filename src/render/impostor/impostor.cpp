@@ -195,8 +195,9 @@ struct Subject {
     if (found) surfels = std::move(*found);
   }
 
-  [[nodiscard]] bool is_opaque(IVec3 voxel, GridReader& reader) const {
-    return shell ? shell->is_occupied(voxel) : types->is_opaque(reader.get(voxel));
+  [[nodiscard]] bool occludes(IVec3 voxel, GridReader& reader) const {
+    if (!shell || types->has_unoccluding()) return types->occludes(reader.get(voxel));
+    return shell->is_occupied(voxel);
   }
 };
 
@@ -221,8 +222,8 @@ void put_faces(const Subject& subject, const BlockVector<SeenFace>& seen, KnownF
       continue;
     }
     face.type = reader.get(face.voxel);
-    face.occlusion = packed(corner_occlusion([&](IVec3 voxel) { return subject.is_opaque(voxel, neighbours); },
-                                             face.voxel, face.direction));
+    face.occlusion = packed(
+        corner_occlusion([&](IVec3 voxel) { return subject.occludes(voxel, neighbours); }, face.voxel, face.direction));
   }
   QUOIN_ASSERT(out.faces.size() == seen.size() && out.surfels.size() <= seen.size(),
                "one entry per face, and its surfels last");

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <random>
 #include <set>
 #include <tuple>
@@ -15,6 +16,7 @@
 #include <quoin/trace/ray.h>
 
 #include "core/death_for_tests.h"
+#include "mesh/blocky/blocky_mesher.h"
 #include "render/cpu/render_test_support.h"
 #include "render/impostor/raster/impostor_faces.h"
 #include "render/impostor/snapshot.h"
@@ -118,6 +120,20 @@ TEST(ImpostorViews, CamerasFitWholeSphere) {
   EXPECT_EQ(snapshot_camera({{0, 0, 0}, 0.2}, 0, 128).distance, 8.0) << "a radius of 1 at least";
 }
 
+// Returns the occlusion of the corners of all faces of a grid's impostor, compared with the mesh's.
+std::vector<std::uint8_t> occlusion_of_faces(const Grid& grid, const VoxelRegistry& types) {
+  std::vector<std::uint8_t> all;
+  const Impostor impostor = Impostor::build(grid, types);
+  for (const ImpostorFaces::Face& face : impostor.faces().faces) {
+    const FaceOcclusion corners = unpacked_corners(face.occlusion);
+    EXPECT_EQ(corners,
+              face_occlusion(grid.neighbourhood(chunk_of(face.voxel)), types, local_of(face.voxel), face.direction));
+    all.insert(all.end(), corners.begin(), corners.end());
+  }
+  EXPECT_FALSE(all.empty());
+  return all;
+}
+
 TEST(Impostor, MatchesSingleRays) {
   const VoxelRegistry types = two_types();
   const Grid grid = blobs(4);
@@ -140,6 +156,18 @@ TEST(Impostor, MatchesSingleRays) {
       ASSERT_NEAR(snapshot.occlusion[i], occlusion * 85.0F, 0.51F);
     }
   }
+}
+
+TEST(Impostor, FacesHaveCornerOcclusionOfMeshes) {
+  VoxelRegistry types = two_types();
+  const auto lamp = types.add({.name = "lamp", .occludes = false});
+  ASSERT_TRUE(lamp);
+  Grid grid = blobs(4);
+  const std::vector<std::uint8_t> before = occlusion_of_faces(grid, types);
+  // Some of the voxels no longer occlude.
+  grid.edit(grid.bounds(), [&](IVec3 at, VoxelType type) { return type == 1 && at.x % 2 == 0 ? *lamp : type; });
+  const std::vector<std::uint8_t> after = occlusion_of_faces(grid, types);
+  EXPECT_LT(std::accumulate(after.begin(), after.end(), 0), std::accumulate(before.begin(), before.end(), 0));
 }
 
 TEST(Impostor, ShowsBlackVoxels) {

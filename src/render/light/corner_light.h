@@ -10,9 +10,9 @@
 
 namespace quoin {
 
-/// Returns the occlusion of a face's corners from a predicate for opaque voxels. Cost: 8 calls.
-template <class IsOpaque>
-[[nodiscard]] FaceOcclusion corner_occlusion(IsOpaque&& is_opaque, IVec3 voxel, Direction face) {
+/// Returns the occlusion of a face's corners from a predicate for voxels that occlude. Cost: 8 calls.
+template <class Occludes>
+[[nodiscard]] FaceOcclusion corner_occlusion(Occludes&& occludes, IVec3 voxel, Direction face) {
   const FaceFrame& frame = frame_of(face);
   const IVec3 front = voxel + normal_of(face);
   std::array<std::array<bool, 3>, 3> is_occluder{};
@@ -22,7 +22,7 @@ template <class IsOpaque>
       IVec3 at = front;
       at[frame.u] += du;
       at[frame.v] += dv;
-      is_occluder[static_cast<std::size_t>(dv + 1)][static_cast<std::size_t>(du + 1)] = is_opaque(at);
+      is_occluder[static_cast<std::size_t>(dv + 1)][static_cast<std::size_t>(du + 1)] = occludes(at);
     }
   }
   const auto occlusion = [&](std::size_t u, std::size_t v) {
@@ -34,7 +34,7 @@ template <class IsOpaque>
 /// The occlusion of the four corners that a blocky mesh carries for a face. Cost: 8 voxel look-ups.
 [[nodiscard]] inline FaceOcclusion corner_occlusion(GridReader& grid, const VoxelRegistry& types, IVec3 voxel,
                                                     Direction face) {
-  return corner_occlusion([&](IVec3 at) { return types.is_opaque(grid.get(at)); }, voxel, face);
+  return corner_occlusion([&](IVec3 at) { return types.occludes(grid.get(at)); }, voxel, face);
 }
 
 /// A quad's corner occlusion at (u, v), both 0 to 1, over the triangles that `flips_diagonal` chooses.

@@ -1,8 +1,14 @@
-// The corner occlusion of blocky meshes, found in a tree; matches render/light/corner_light.h on the CPU.
+// The corner occlusion of blocky meshes, found in a tree; matches render/light/corner_light.h on the CPU. The including
+// file includes walk.glsl and lit.glsl before it.
 
 // Returns 3 if both sides are occluders, otherwise the number of occluders among the three.
 float vertex_occlusion(bool side_u, bool side_v, bool corner) {
   return side_u && side_v ? 3.0 : float(side_u) + float(side_v) + float(corner);
+}
+
+// Returns true if a voxel of a grid's opaque tree darkens corners.
+bool is_occluder(Tree opaque, ivec3 voxel) {
+  return holds(opaque, voxel) && (!has(kUnoccluding) || occludes(type_at(opaque, voxel)));
 }
 
 // Returns the corner occlusion that a blocky mesh stores, in order around the face.
@@ -16,7 +22,7 @@ vec4 corner_occlusion(Tree opaque, ivec3 voxel, uint face) {
     ivec3 at = front;
     at[u] += int(i % 3) - 1;
     at[v] += int(i / 3) - 1;
-    if (i != 4 && holds(opaque, at)) occluders |= 1u << i;
+    if (i != 4 && is_occluder(opaque, at)) occluders |= 1u << i;
   }
   bool west = (occluders & 8) != 0;
   bool east = (occluders & 32) != 0;

@@ -24,6 +24,7 @@ const uint kShowNormals = 1024;
 const uint kLamps = 2048;
 const uint kGlassSurfaces = 4096;
 const uint kPropagated = 8192;
+const uint kUnoccluding = 16384;  // some opaque types do not darken corners
 
 #define kInfinity uintBitsToFloat(0x7F800000u)
 
@@ -202,6 +203,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
   uvec2 tree;    // nodes of the tree over the instances: low and high, w: first, count or -1 - axis
   uvec2 leaves;  // their boxes: low and high, w: the instance, and 1 if it is drawn from its impostor
   uvec2 surfaces;    // three vectors each: colour and log clarity, emitted and index of refraction, log transmittance
+                     // and 1 for opaque types that do not darken corners
   uvec2 directions;  // of occlusion: nine per face; or the rings' angles
   uvec2 turns;
   uvec2 thresholds;  // the least light of each byte

@@ -17,6 +17,11 @@ Surface surface_of(uint type) {
   return Surface(colour.xyz, colour.w, emitted.xyz, surfaces.at[i + 2].xyz, emitted.w);
 }
 
+// Returns true if an opaque type darkens corners.
+bool occludes(uint type) {
+  return Vectors(frame().surfaces).at[3 * min(type, frame().last_surface) + 2].w == 0.0;
+}
+
 // Returns the surface of a field without materials.
 Surface white_surface() {
   return Surface(vec3(1.0), 0.0, vec3(0.0), vec3(0.0), 1.0);

@@ -444,11 +444,11 @@ vec3 normal_found(vec3 inside) {
   return block_found(block) ? normal_in(block, (walk_voxel & 3) + 1, inside) : vec3(0.0);
 }
 
-// Returns the type of a field's sample; 0 if the tree has no chunk there.
-uint type_at(Tree field, ivec3 at) {
-  if (any(lessThan(at, field.low.xyz)) || any(greaterThanEqual(at, field.high.xyz))) return 0;
-  uvec4 node = field.root;
-  for (int level = field.low.w; level > 2; --level) {
+// Returns the type of a voxel, or of a field's sample; 0 if the tree has no chunk there.
+uint type_at(Tree tree, ivec3 at) {
+  if (any(lessThan(at, tree.low.xyz)) || any(greaterThanEqual(at, tree.high.xyz))) return 0;
+  uvec4 node = tree.root;
+  for (int level = tree.low.w; level > 2; --level) {
     if ((node.z & 1) != 0) break;
     uint index = index_in(at, level);
     if (!has_child(node, index)) return 0;

@@ -280,8 +280,8 @@ std::vector<Vec4> surface_table(const VoxelRegistry& types) {
   const Surfaces surfaces(types);
   std::vector<Vec4> table;
   for (std::size_t type = 0; type <= types.size(); ++type) {
-    const Surface& surface = surfaces[static_cast<VoxelType>(std::min(type, kMaxVoxelTypes))];
-    add_surface(surface, 0.0F, table);
+    const auto id = static_cast<VoxelType>(std::min(type, kMaxVoxelTypes));
+    add_surface(surfaces[id], types.is_opaque(id) && !types.occludes(id) ? 1.0F : 0.0F, table);
   }
   return table;
 }
@@ -289,6 +289,7 @@ std::vector<Vec4> surface_table(const VoxelRegistry& types) {
 Status DeviceScene::put_surfaces(const VoxelRegistry& types) {
   std::vector<Vec4> table = surface_table(types);
   last_surface_ = static_cast<std::uint32_t>(types.size());
+  has_unoccluding_ = types.has_unoccluding();
   if (table == surface_table_) return {};
   surface_table_ = std::move(table);
   return put_table(*memory_, surfaces_place_, bytes_of(surface_table_));

@@ -57,7 +57,7 @@ struct Placement {
 /// Appends a type's surface in shader form: three vectors; the last number is `last`.
 void add_surface(const Surface& surface, float last, std::vector<Vec4>& table);
 /// Returns the surfaces of all types in the form of shaders/data.glsl: three vectors each; the last entry is for types
-/// out of range.
+/// out of range. Requires: a frame with it has kUnoccluding if any of the types does not occlude.
 [[nodiscard]] std::vector<Vec4> surface_table(const VoxelRegistry& types);
 
 /// A table of lamps, its bricks and lists in device memory.
@@ -103,6 +103,8 @@ class DeviceScene {
   [[nodiscard]] const std::vector<ShaderGrid>& grid_table() const { return grid_table_; }
   [[nodiscard]] std::uint64_t surfaces_address() const { return surfaces_place_.address; }
   [[nodiscard]] std::uint32_t last_surface() const { return last_surface_; }
+  /// Returns true if some opaque types do not darken corners.
+  [[nodiscard]] bool has_unoccluding() const { return has_unoccluding_; }
 
  private:
   struct KnownGrid {
@@ -135,6 +137,7 @@ class DeviceScene {
   Place surfaces_place_;
   std::vector<Vec4> surface_table_;
   std::uint32_t last_surface_ = 0;
+  bool has_unoccluding_ = false;
 };
 
 }  // namespace quoin::vulkan

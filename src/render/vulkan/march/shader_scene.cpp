@@ -279,6 +279,7 @@ void put_scene(const DeviceScene& scene, const Placement& placement, FrameData& 
   data.frame.grids = placement.grids;
   data.frame.last_surface = scene.last_surface();
   data.frame.surfaces = scene.surfaces_address();
+  if (scene.has_unoccluding()) data.frame.flags |= kUnoccluding;
 }
 
 std::vector<ShaderLamp> shader_lamps(const LampTable& table, DVec3 camera, DVec3 view_origin) {

@@ -208,6 +208,27 @@ TEST_F(VulkanScene, MatchesCpuForEveryLightOption) {
   with("colours", [](RenderOptions& o) { o.detail.colours = true; });
 }
 
+TEST_F(VulkanScene, TypesThatDoNotOccludeMatchCpu) {
+  Scene scene;
+  const Types types = add_types(scene);
+  place(scene, hut(types));
+  const Camera camera = towards({34, 26, 46}, {9, 5, 9});
+  RenderOptions options = sized(96, 72);
+  options.light.shading = Shading::UnlitWithOcclusion;
+  options.light.occlusion_mode = OcclusionMode::Vertex;
+  const Image dark = taken(scene, camera, options).colour;
+  // The renderer follows the types.
+  for (const VoxelType type : {types.wall, types.roof}) {
+    VoxelProperties properties = scene.types[type];
+    properties.occludes = false;
+    scene.types.replace(type, properties);
+    compare(scene, camera, options, "unoccluding_" + std::to_string(type));
+  }
+  EXPECT_NE(taken(scene, camera, options).colour.rgb, dark.rgb);
+  options.light.shading = Shading::Lit;
+  compare(scene, camera, options, "unoccluding_lit");
+}
+
 TEST_F(VulkanScene, MatchesCpuForEveryShading) {
   Scene scene;
   scene.edit(place(scene, hut(add_types(scene)))).rotation = glm::angleAxis(0.4, glm::normalize(DVec3(1, 3, 2)));

@@ -83,6 +83,24 @@ TEST_F(VulkanMeshGlass, OneVoxelPanesMatchCpu) {
   }
 }
 
+// A pane behind two bars. Only the upper bar darkens the corners next to it.
+TEST_F(VulkanMeshGlass, TypesThatDoNotOccludeMatchCpu) {
+  Scene scene;
+  const Types types = add_types(scene);
+  const auto bar = scene.types.add({.name = "bar", .colour = {90, 90, 90, 255}, .occludes = false});
+  ASSERT_TRUE(bar);
+  Grid grid;
+  grid.fill_box({{0, 0, -5}, {20, 20, 0}}, types.wall);
+  grid.fill_box({{0, 9, 0}, {20, 10, 1}}, *bar);
+  grid.fill_box({{4, 4, 10}, {16, 16, 11}}, types.blue);
+  grid.fill_box({{4, 6, 11}, {16, 7, 12}}, *bar);
+  grid.fill_box({{4, 12, 11}, {16, 13, 12}}, types.wall);
+  place(scene, std::move(grid));
+  RenderOptions options = vulkan_test::of_day(without_shadows(sized(80, 80)));
+  options.light.occlusion_mode = OcclusionMode::Vertex;
+  compare_both(scene, straight({10.03, 10.02, 50}, 26), options, "bars");
+}
+
 TEST_F(VulkanMeshGlass, OrdersGlassByCamera) {
   Scene scene;
   const Types types = add_types(scene);

@@ -113,6 +113,7 @@ struct VulkanMeshRenderer::Impl {
   std::vector<vulkan::MeshInstance> instances;  // in the order of their handles; voxels, then the field
   vulkan::Place surfaces;
   std::vector<Vec4> surface_table;  // the content of `surfaces`
+  bool has_unoccluding = false;     // some of its opaque types do not darken corners
   std::int64_t drawn_triangles = 0;
 };
 
@@ -169,6 +170,7 @@ Status VulkanMeshRenderer::Impl::put_surfaces(const VoxelRegistry& types) {
   if (done) done = memory->flush();
   if (done) {
     surface_table = std::move(table);
+    has_unoccluding = types.has_unoccluding();
   } else {
     memory->discard();
   }
@@ -266,6 +268,7 @@ Status VulkanMeshRenderer::Impl::put_image(const vulkan::Placement& placement, c
   frame.grids = placement.grids;
   frame.surfaces = surfaces.address;
   frame.last_surface = static_cast<std::uint32_t>(std::max<std::size_t>(surface_table.size() / 3, 1) - 1);
+  if (has_unoccluding) frame.flags |= vulkan::kUnoccluding;
   if (scene == nullptr || !traces_light(request)) return {};
   const auto lamps = renderer->lamp_table(request, threads);
   if (!lamps) return lamps.error();

@@ -156,6 +156,7 @@ constexpr std::uint32_t kShowNormals = 1024;
 constexpr std::uint32_t kLamps = 2048;
 constexpr std::uint32_t kGlassSurfaces = 4096;
 constexpr std::uint32_t kPropagated = 8192;
+constexpr std::uint32_t kUnoccluding = 16384;
 
 constexpr std::uint32_t kBodies = 16;
 constexpr std::size_t kPointBytes = 48;
