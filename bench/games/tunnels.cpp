@@ -326,9 +326,11 @@ class Game {
     if (dig_at(from, {0.0, -1.0, 0.0}, 190.0)) ++dug_;
   }
 
-  // New surfaces near a hole must be closed: those of only one side of a chunk border are not.
+  // New surfaces near a hole must be closed: those of only one side of a chunk border are not. To find their open edges
+  // takes longer than a frame, so the times of all holes are taken before.
   void check_holes(const std::vector<quoin::SurfaceUpdate>& updates) {
     const std::uint64_t shown = meshes_.shown_update();
+    const double now_ms = games::wall_ms(), process_now_ms = games::process_ms();
     std::erase_if(holes_, [&](Hole& hole) {
       const IVec3 min = quoin::chunk_of(quoin::voxel_of(hole.centre - (kHole + 4.0)));
       const IVec3 max = quoin::chunk_of(quoin::voxel_of(hole.centre + (kHole + 4.0))) + 1;
@@ -340,8 +342,8 @@ class Game {
       if (shown < hole.state) return false;
       if (has_solid_left(hole)) hole.was_torn = true;
       torn_ += hole.was_torn ? 1 : 0;
-      latencies_ms_.push_back(games::wall_ms() - hole.start_ms);
-      process_latencies_ms_.push_back(games::process_ms() - hole.process_start_ms);
+      latencies_ms_.push_back(now_ms - hole.start_ms);
+      process_latencies_ms_.push_back(process_now_ms - hole.process_start_ms);
       return true;
     });
   }
