@@ -140,6 +140,21 @@ void dig(benchmark::State& state, bool corner) {
   state.counters["update_seconds"] = benchmark::Counter(update_seconds, benchmark::Counter::kAvgIterations);
 }
 
+// An update of 300 grids after no change.
+void unchanged(benchmark::State& state) {
+  Scene scene;
+  fail_unless(scene.types.add({}).has_value(), "no type");
+  for (int i = 0; i < 300; ++i) {
+    SceneGrid ship;
+    ship.grid.fill_box({{0, 0, 0}, {40, 8, 12}}, 1);
+    scene.add_instance({.grid = scene.add_grid(std::move(ship)), .position = {60.0 * (i % 20), 0.0, 60.0 * (i / 20)}});
+  }
+  LiveMeshes meshes;
+  meshes.finish(scene, {});
+  fail_unless(meshes.take().size() >= 300, "a grid was not meshed");
+  for (auto _ : state) meshes.update(scene, {});
+}
+
 // Digs near the border of two or four chunks every fifth frame.
 void frames(benchmark::State& state, bool is_lit) {
   using Clock = std::chrono::steady_clock;
@@ -215,6 +230,7 @@ void register_all() {
     add("/edit", [=](benchmark::State& state) { edit(state, style, 96, 96); });
     add("/edit_corner", [=](benchmark::State& state) { edit(state, style, 128, 128); });
   }
+  benchmark::RegisterBenchmark("live/blocky/unchanged", unchanged)->Unit(benchmark::kMicrosecond);
 }
 
 const bool kRegistered = (register_all(), true);

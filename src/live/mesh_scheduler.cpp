@@ -278,6 +278,7 @@ void MeshScheduler::use_light(const SceneLight* light, std::shared_ptr<LightWork
     light_ = light;
     light_worker_ = std::move(worker);
     lit_ = followed_lit_ = epoch_lit_ = complete_lit_ = nullptr;
+    must_follow_light_ = true;
     placed_.forget();
   }
   if (light_worker_ != nullptr) {
@@ -326,6 +327,7 @@ void MeshScheduler::forget() {
   for (auto& [key, source] : sources_) source->forget();
   drawn_.forget();
   placed_.forget();
+  must_follow_light_ = true;
   is_epoch_open_ = false;
   epoch_lit_ = nullptr;
   retries_.clear();
@@ -383,21 +385,27 @@ void MeshScheduler::follow(const State& state, const Scene& places) {
   for (const GridHandle handle : changed_) follow_grid(*state.scene, handle, now);
   follow_light(state.light, now);
   choose_levels(places, now);
-  for (auto& [key, live] : sources_) {
-    const SceneGrid* const grid = state.scene->grids().find(key.grid);
-    if (grid == nullptr || !drawn_.places(key.grid)) continue;
-    live->mark_types(*grid, changed_types, now);
-    if (!changed_types.data.empty()) live->follow_data(*grid, state.scene->types, now);
-  }
-  prepare(*state.scene);
+  if (!changed_types.empty()) mark_types(*state.scene, changed_types, now);
   withdraw([&](const SurfaceJob& job) {
     const SurfaceSource* live = find(job.source);
     return live == nullptr || !live->is_current(job);
   });
+  // A frame without changes visits no grid: the rest is for unfinished chunks.
+  if (totals_.unfinished == 0 && !is_epoch_open_) return complete(state.number, followed_lit_);
+  prepare(*state.scene);
   push_retries();
   begin_epoch(state);
   renew_jobs(state, SurfaceClock::now());
   if (totals_.unfinished != 0) hand_over(state, places);
+}
+
+void MeshScheduler::mark_types(const Scene& scene, const ChangedTypes& changed, SurfaceClock::time_point now) {
+  for (auto& [key, live] : sources_) {
+    const SceneGrid* const grid = scene.grids().find(key.grid);
+    if (grid == nullptr || !drawn_.places(key.grid)) continue;
+    live->mark_types(*grid, changed, now);
+    if (!changed.data.empty()) live->follow_data(*grid, scene.types, now);
+  }
 }
 
 void MeshScheduler::prepare(const Scene& scene) {
@@ -492,6 +500,11 @@ void MeshScheduler::follow_grid(const Scene& scene, GridHandle handle, SurfaceCl
 }
 
 void MeshScheduler::follow_light(const SceneLight* light, SurfaceClock::time_point now) {
+  // The light of a worker's state does not change, that of the caller may.
+  const bool may_change = light != nullptr && light_worker_ == nullptr;
+  if (light == followed_light_ && !must_follow_light_ && !may_change) return;
+  followed_light_ = light;
+  must_follow_light_ = false;
   for (auto& [key, live] : sources_) {
     live->follow_light(light == nullptr ? GridLight{} : light->of(key.grid), now);
   }
@@ -570,7 +583,7 @@ ChangedTypes MeshScheduler::follow_types(const VoxelRegistry& types) {
   changed.data = types_with_new_data(types_.registry.get(), types);
   types_.registry = std::make_shared<const VoxelRegistry>(types);
   if (!changed.colour.empty()) types_.materials = std::make_shared<const SurfaceMaterials>(types);
-  if (!changed.visibility.empty() || !changed.colour.empty() || !changed.data.empty()) ++types_.generation;
+  if (!changed.empty()) ++types_.generation;
   changes.commit();
   return changed;
 }

@@ -140,6 +140,7 @@ class MeshScheduler {
   void follow_scene(const Scene& scene);
   void follow_grid(const Scene& scene, GridHandle handle, SurfaceClock::time_point now);
   void follow_light(const SceneLight* light, SurfaceClock::time_point now);
+  void mark_types(const Scene& scene, const ChangedTypes& changed, SurfaceClock::time_point now);
   void prepare(const Scene& scene);
   void choose_levels(const Scene& scene, SurfaceClock::time_point now);
   void forget();
@@ -161,12 +162,14 @@ class MeshScheduler {
   mutable std::mutex mutex_;     // guards the following members, except the queue, which has its own mutex
   SurfaceTotals totals_;
   SurfaceTypes types_;
-  const SceneLight* light_ = nullptr;          // of the caller
-  std::shared_ptr<LightWorker> light_worker_;  // its states are followed, instead of the caller's scene
-  std::shared_ptr<LitState> lit_;              // the newest of these
-  std::shared_ptr<LitState> followed_lit_;     // the one that the sources follow
-  std::uint64_t lit_number_ = 0;               // of the newest update with the same content
-  SceneFollower placed_;                       // in the caller's scene: placements that no state may have
+  const SceneLight* light_ = nullptr;           // of the caller
+  std::shared_ptr<LightWorker> light_worker_;   // its states are followed, instead of the caller's scene
+  std::shared_ptr<LitState> lit_;               // the newest of these
+  std::shared_ptr<LitState> followed_lit_;      // the one that the sources follow
+  std::uint64_t lit_number_ = 0;                // of the newest update with the same content
+  const SceneLight* followed_light_ = nullptr;  // by the sources; only its address is used
+  bool must_follow_light_ = false;              // also if it is the same
+  SceneFollower placed_;                        // in the caller's scene: placements that no state may have
   std::exception_ptr receive_failure_;
   std::uint64_t updates_ = 0;
   bool is_epoch_open_ = false;

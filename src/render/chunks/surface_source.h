@@ -122,6 +122,8 @@ struct ChangedTypes {
   std::vector<bool> visibility;
   std::vector<bool> colour;
   std::vector<bool> data;  ///< VoxelProperties::remesh_on_data became true, so that earlier data counts
+
+  [[nodiscard]] bool empty() const { return visibility.empty() && colour.empty() && data.empty(); }
 };
 
 /// The inputs of one update's jobs. A snapshot is taken when the first job needs it. Workers destroy the snapshots, if
