@@ -60,41 +60,6 @@ struct SavedGrid {
   bool is_partly_read = false;  ///< the scene may lack other chunks
 };
 
-/// The objects of a scene that changed since the last save began.
-struct ChangedObjects {
-  bool all = false;
-  std::set<GridHandle> grids;
-  std::set<InstanceHandle> instances;
-  std::set<GroupHandle> groups;
-  std::set<LayerHandle> layers;
-
-  /// A list of more than `most` objects, such as instances that came and went, is replaced by `all`.
-  void add(const SceneChanges& changes, std::size_t most) {
-    all |= changes.all;
-    const std::size_t size = grids.size() + instances.size() + groups.size() + layers.size();
-    if (all || size > most) {
-      *this = {};
-      all = true;
-      return;
-    }
-    grids.insert(changes.grids.begin(), changes.grids.end());
-    instances.insert(changes.instances.begin(), changes.instances.end());
-    groups.insert(changes.groups.begin(), changes.groups.end());
-    layers.insert(changes.layers.begin(), changes.layers.end());
-  }
-  /// Returns the changes and forgets them.
-  [[nodiscard]] SceneChanges take() {
-    SceneChanges changes;
-    changes.all = all;
-    changes.grids.assign(grids.begin(), grids.end());
-    changes.instances.assign(instances.begin(), instances.end());
-    changes.groups.assign(groups.begin(), groups.end());
-    changes.layers.assign(layers.begin(), layers.end());
-    *this = {};
-    return changes;
-  }
-};
-
 /// The part of a scene that a world has stored.
 struct SaverState {
   ChangeCursor scene;  // of `follow`
@@ -107,7 +72,7 @@ struct SaverState {
   std::map<GridHandle, SavedGrid> grids;
   std::set<GridHandle> left_out;  ///< grids of the scene that are marked as not saved
   Numbers<Instance> instances;
-  std::map<InstanceHandle, InstancePart> saved_instances;  ///< instances as this saver saved them last
+  SavedInstances saved_instances;
   Numbers<SceneGroup> groups;
   Numbers<SceneLayer> layers;
   std::vector<Lamp> lamps;
@@ -123,22 +88,26 @@ struct SaverState {
   std::vector<PartKey> pending_removals;
 };
 
-/// A save whose chunks are copied in steps, from snapshots that were taken when the save began.
-struct SaveInSteps {
-  struct OfGrid {
-    std::uint32_t number;
-    std::vector<IVec3> chunks;
-    Grid voxels;
-    DensityGrid field;
-  };
-  WorldChanges changes;
-  std::function<void(const Status&)> on_saved;
-  std::vector<OfGrid> grids;
-  std::size_t grid = 0;          ///< the next chunk
-  std::size_t chunk = 0;         ///< ... in this grid
-  std::vector<PartKey> removed;  ///< parts that the save removes
-  bool had_view = false;         ///< it has new cameras
-};
+void put_removal(WorldChanges& changes, const PartKey& key) {
+  const auto number = std::get<std::int64_t>(key.id);
+  if (key.kind == part::kGrid) {
+    changes.remove_grid(static_cast<std::uint32_t>(number));
+  } else {
+    WorldParts::remove(changes, key.kind.c_str(), number);
+  }
+}
+
+void remove(SaveInSteps& save, const char* kind, std::int64_t number) {
+  put_removal(save.changes, save.removed.emplace_back(PartKey{kind, number}));
+}
+/// Removes an element that the scene does not have any more.
+template <class T>
+void remove(SaveInSteps& save, const char* kind, Numbers<T>& numbers, Handle<T> handle) {
+  const auto found = numbers.numbers.find(handle);
+  if (found == numbers.numbers.end()) return;
+  remove(save, kind, found->second);
+  numbers.numbers.erase(found);
+}
 
 }  // namespace quoin::store
 
@@ -157,11 +126,7 @@ using namespace store;
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
 using OnEdit = FunctionRef<void(GridHandle, std::optional<IVec3>)>;
-
-// Number of chunks that a step copies before it looks at the clock.
-constexpr std::size_t kChunksPerLook = 16;
 
 template <class T>
 void sort_and_unite(std::vector<Handle<T>>& handles) {
@@ -169,7 +134,14 @@ void sort_and_unite(std::vector<Handle<T>>& handles) {
   handles.erase(std::unique(handles.begin(), handles.end()), handles.end());
 }
 
-/// The beginning of a save: collects the changes of a scene, except the content of chunks.
+template <class T>
+[[nodiscard]] std::optional<std::size_t> number_of(const Numbers<T>& numbers, Handle<T> handle) {
+  const auto found = numbers.numbers.find(handle);
+  if (found == numbers.numbers.end()) return std::nullopt;
+  return static_cast<std::size_t>(found->second);
+}
+
+/// The beginning of a save: collects the changes of a scene, except most chunks, and keeps instances for the steps.
 class Save {
  public:
   Save(WorldStore& world, const Scene& scene, SaverState& state, SaveInSteps& save)
@@ -177,7 +149,7 @@ class Save {
 
   Status run() {
     std::swap(removed_, state_.pending_removals);
-    for (const PartKey& key : removed_) put_removal(key);
+    for (const PartKey& key : removed_) put_removal(changes_, key);
     if (state_.needs_full_save) start_anew();
     if (auto done = put_types(); !done) return done;
     SceneChanges changed = state_.changed.take();
@@ -189,13 +161,18 @@ class Save {
       if (auto done = put_grid(handle); !done) return done;
     }
     add_instances_of(marked_, changed.instances);
+    save_.instances.reserve(changed.instances.size());
     for (const InstanceHandle handle : changed.instances) {
-      if (auto done = put_instance(handle); !done) return done;
+      if (auto done = keep_instance(handle); !done) return done;
     }
     put_lamps();
     put_environment();
     put_view();
     make_room(changes_.content().chunks, chunks_);
+    for (const FewChunks& of : few_chunks_) {
+      for (const IVec3 chunk : of.chunks) save_.put_chunk(of.number, of.grid.grid, of.grid.field, chunk);
+    }
+    save_.is_full = state_.needs_full_save;
     state_.is_begun = true;
     state_.needs_full_save = false;
     return {};
@@ -204,27 +181,15 @@ class Save {
  private:
   // Existing numbers are kept.
   void start_anew() {
-    state_.changed.all = true;
+    state_.changed.add_all();
     state_.types = {};
     for (auto& [handle, grid] : state_.grids) grid.is_all_edited = true;
   }
 
-  void put_removal(const PartKey& key) {
-    const auto number = std::get<std::int64_t>(key.id);
-    if (key.kind == part::kGrid) {
-      changes_.remove_grid(static_cast<std::uint32_t>(number));
-    } else {
-      WorldParts::remove(changes_, key.kind.c_str(), number);
-    }
-  }
-  void remove(const char* kind, std::int64_t number) { put_removal(removed_.emplace_back(PartKey{kind, number})); }
-  // Removes an element that the scene does not have any more.
+  void remove(const char* kind, std::int64_t number) { store::remove(save_, kind, number); }
   template <class T>
   void remove(const char* kind, Numbers<T>& numbers, Handle<T> handle) {
-    const auto found = numbers.numbers.find(handle);
-    if (found == numbers.numbers.end()) return;
-    remove(kind, found->second);
-    numbers.numbers.erase(found);
+    store::remove(save_, kind, numbers, handle);
   }
 
   Status put_types() {
@@ -283,13 +248,6 @@ class Save {
     }
   }
 
-  template <class T>
-  [[nodiscard]] static std::optional<std::size_t> number_of(const Numbers<T>& numbers, Handle<T> handle) {
-    const auto found = numbers.numbers.find(handle);
-    if (found == numbers.numbers.end()) return std::nullopt;
-    return static_cast<std::size_t>(found->second);
-  }
-
   void put_groups(std::vector<GroupHandle> handles) {
     if (handles.empty()) return;
     scene_.groups().for_each([&](GroupHandle handle, const SceneGroup& group) {  // those below a changed mark
@@ -315,27 +273,24 @@ class Save {
     }
   }
 
-  Status put_instance(InstanceHandle handle) {
+  // Keeps an instance as it is now. `step` numbers it, and compares it with the last save.
+  Status keep_instance(InstanceHandle handle) {
     const Instance* const instance = scene_.instances().find(handle);
     if (instance == nullptr || !is_saved(scene_, *instance)) {
-      remove(part::kInstance, state_.instances, handle);
-      state_.saved_instances.erase(handle);
+      save_.instances.push_back({.handle = handle});
       return {};
     }
-    const auto grid = state_.grids.find(instance->grid);
-    if (grid == state_.grids.end()) {
+    if (scene_.grids().find(instance->grid) == nullptr) {
       return make_error(ErrorCode::InvalidArgument, "the grid of instance \"" + instance->name + "\" does not exist");
     }
-    InstancePart now{{without_name(*instance), grid->second.number, number_of(state_.groups, instance->group),
-                      number_of(state_.layers, instance->layer)},
-                     {}};
-    const auto [known, is_new] = state_.saved_instances.try_emplace(handle);
-    InstancePart& saved = known->second;
-    const bool has_name = saved.name != nullptr && *saved.name == instance->name;
-    now.name = has_name ? saved.name : std::make_shared<const std::string>(instance->name);
-    if (!is_new && !state_.needs_full_save && is_same(saved, now)) return {};
-    saved = now;
-    WorldParts::put(changes_, state_.instances.of(handle), std::move(now));
+    const auto known = state_.saved_instances.find(handle);
+    const bool has_name = known != state_.saved_instances.end() && known->second.name != nullptr &&
+                          *known->second.name == instance->name;
+    save_.instances.push_back(
+        {.handle = handle,
+         .is_saved = true,
+         .instance = without_name(*instance),
+         .name = has_name ? known->second.name : std::make_shared<const std::string>(instance->name)});
     return {};
   }
 
@@ -387,7 +342,7 @@ class Save {
     return put_chunks(*grid, saved, is_new);
   }
 
-  // Names the chunks that `step` copies, and takes snapshots of the grid's content.
+  // Names the chunks that `step` copies, and takes snapshots of the grid's content. To copy a few chunks is faster.
   Status put_chunks(const SceneGrid& grid, SavedGrid& saved, bool is_new) {
     std::vector<IVec3> chunks;
     if (is_new) {
@@ -413,6 +368,10 @@ class Save {
     saved.is_all_edited = false;
     if (chunks.empty()) return {};
     chunks_ += chunks.size();
+    if (chunks.size() <= StepTime::kItemsPerLook) {
+      few_chunks_.push_back({saved.number, grid, std::move(chunks)});
+      return {};
+    }
     save_.grids.push_back({saved.number, std::move(chunks), grid.grid.snapshot(), grid.field.snapshot()});
     return {};
   }
@@ -467,6 +426,12 @@ class Save {
     state_.is_view_new = false;
   }
 
+  struct FewChunks {
+    std::uint32_t number;
+    const SceneGrid& grid;
+    std::vector<IVec3> chunks;
+  };
+
   WorldStore& world_;
   const Scene& scene_;
   SaverState& state_;
@@ -474,8 +439,37 @@ class Save {
   WorldChanges& changes_;          // of `save_`
   std::vector<PartKey>& removed_;  // of `save_`
   std::set<GridHandle> marked_;    // left out by this save, or no longer left out
-  std::size_t chunks_ = 0;         // of all grids of `save_`
+  std::vector<FewChunks> few_chunks_;
+  std::size_t chunks_ = 0;  // of all grids of `save_`
 };
+
+// Numbers an instance as it was when the save began, and adds it unless the last save had it like this.
+void put_instance(SaverState& state, SaveInSteps& save, SaveInSteps::OfInstance& kept) {
+  if (!kept.is_saved) {
+    store::remove(save, part::kInstance, state.instances, kept.handle);
+    state.saved_instances.erase(kept.handle);
+    return;
+  }
+  const auto grid = state.grids.find(kept.instance.grid);
+  QUOIN_ASSERT(grid != state.grids.end(), "the grid of a saved instance has a number since the save began");
+  const auto group = number_of(state.groups, kept.instance.group);
+  const auto layer = number_of(state.layers, kept.instance.layer);
+  InstancePart now{{std::move(kept.instance), grid->second.number, group, layer}, std::move(kept.name)};
+  const auto [known, is_new] = state.saved_instances.try_emplace(kept.handle);
+  InstancePart& saved = known.value();
+  if (!is_new && !save.is_full && is_same(saved, now)) return;
+  saved = now;
+  WorldParts::put(save.changes, state.instances.of(kept.handle), std::move(now));
+}
+
+// Copies a part of a save. Returns true if nothing is left.
+bool copy_some(SaverState& state, SaveInSteps& save, StepTime& time) {
+  for (; save.next_instance < save.instances.size(); ++save.next_instance) {
+    if (time.is_over()) return false;
+    put_instance(state, save, save.instances[save.next_instance]);
+  }
+  return save.copy_chunks(time);
+}
 
 // Adds a grid's edits since the last call. Loaded and unloaded chunks are not edits.
 void follow_grid(GridHandle handle, const SceneGrid& grid, SaverState& state, SavedGrid& saved, OnEdit on_edit) {
@@ -507,31 +501,6 @@ void follow_grid(GridHandle handle, const SceneGrid& grid, SaverState& state, Sa
   }
   saved.voxels = saved.data = now;
   saved.densities = densities;
-}
-
-// Copies a chunk of the snapshots. Chunks that were unloaded before the save began are unchanged.
-void copy_chunk(const SaveInSteps::OfGrid& grid, IVec3 chunk, WorldChanges& changes) {
-  if (!grid.voxels.is_loaded(chunk) || !grid.field.is_loaded(chunk)) return;
-  StoredChunk stored;
-  if (const Chunk* const voxels = grid.voxels.find_chunk(chunk)) stored.voxels = *voxels;
-  if (const DensityChunk* const densities = grid.field.find_chunk(chunk)) stored.densities = *densities;
-  changes.put_chunk({grid.number, 0, chunk}, std::move(stored));
-}
-
-// Copies chunks for some seconds. Returns true if all are copied.
-bool copy_chunks(SaveInSteps& save, double seconds) {
-  const Clock::time_point start = Clock::now();
-  std::size_t copied = 0;
-  for (; save.grid < save.grids.size(); ++save.grid, save.chunk = 0) {
-    const SaveInSteps::OfGrid& grid = save.grids[save.grid];
-    for (; save.chunk < grid.chunks.size(); ++save.chunk) {
-      const bool is_time_to_look = copied != 0 && copied % kChunksPerLook == 0;
-      if (is_time_to_look && std::chrono::duration<double>(Clock::now() - start).count() >= seconds) return false;
-      copy_chunk(grid, grid.chunks[save.chunk], save.changes);
-      ++copied;
-    }
-  }
-  return true;
 }
 
 }  // namespace
@@ -607,8 +576,11 @@ Result<std::optional<SaveTicket>> WorldSaver::step(WorldStore& world, double sec
   QUOIN_ASSERT(impl_ != nullptr && world.is_writable(), "a saver, and a world opened for writing");
   if (!is_begun()) return std::optional<SaveTicket>();
   try {
-    if (!copy_chunks(*impl_->begun, seconds)) return std::optional<SaveTicket>();
-    const auto ticket = world.save(std::move(impl_->begun->changes), std::move(impl_->begun->on_saved));
+    SaveInSteps& save = *impl_->begun;
+    StepTime time(seconds);
+    save.is_copied = save.is_copied || copy_some(impl_->state, save, time);
+    if (!save.is_copied || !time.has_begun_only()) return std::optional<SaveTicket>();
+    const auto ticket = world.save(std::move(save.changes), std::move(save.on_saved));
     if (!ticket) {
       impl_->give_back();
       return ticket.error();

@@ -364,6 +364,26 @@ TEST(WorldSaver, StepsSaveTheStateOfTheirBegin) {
   EXPECT_EQ(kept.chunks_of_last_save(), 101U);
 }
 
+TEST(WorldSaver, SavesAllInstancesAfterRefusedSaveInSteps) {
+  const WorldFolder folder;
+  KeptWorld kept(folder / "w.quoin");
+  Scene scene = rich_scene();
+  const GridHandle ground = scene.grids().handles().front();
+  std::vector<InstanceHandle> ships;
+  for (int i = 0; i < 40; ++i) ships.push_back(scene.add_instance({.name = "ship", .grid = ground}));
+  kept.save(scene);
+  for (const InstanceHandle ship : ships) scene.edit(ship).position.x += 1.0;
+  scene.remove_instance(ships.back());
+  scene.edit(ground).grid.set({1, 1, 1}, 200);  // not registered
+  ASSERT_TRUE(kept.saver().begin(kept.world(), scene));
+  ASSERT_TRUE(kept.saver().step(kept.world(), 0.0)) << "a part of the instances";
+  ASSERT_TRUE(kept.saver().is_begun());
+  EXPECT_FALSE(kept.saver().step(kept.world(), 1e9));
+  EXPECT_FALSE(kept.saver().is_begun());
+  scene.edit(ground).grid.set({1, 1, 1}, 3);
+  kept.save(scene);
+}
+
 TEST(WorldSaver, RepeatsRefusedSaveInSteps) {
   const WorldFolder folder;
   KeptWorld kept(folder / "w.quoin");
@@ -373,7 +393,7 @@ TEST(WorldSaver, RepeatsRefusedSaveInSteps) {
   scene.edit(ground).grid.set({1, 1, 1}, 200);  // not registered
   scene.edit(scene.instances().handles().front()).position.y += 1.0;
   ASSERT_TRUE(kept.saver().begin(kept.world(), scene));
-  const auto refused = kept.saver().step(kept.world(), 1.0);
+  const auto refused = kept.saver().step(kept.world(), 1e9);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::InvalidArgument);
   EXPECT_FALSE(kept.saver().is_begun());
@@ -577,8 +597,8 @@ TEST(WorldSaver, KeepsDamagedChunks) {
   EXPECT_EQ(load_world(*world)->loaded.warnings.size(), 1U) << "it is damaged still, not air";
 }
 
-/// Lines for the grids with their voxel counts, the groups with their parents, and the instances with their grids and
-/// groups; of saved objects only, or of all. Sorted, since numbers in a world depend on earlier saves.
+/// Lines for the grids with their voxel counts, the groups with their parents, and the instances with their grids,
+/// groups and positions; of saved objects only, or of all. Sorted, since numbers in a world depend on earlier saves.
 std::vector<std::string> lines_of(const Scene& scene, bool only_saved) {
   std::vector<std::string> lines;
   const auto name_of = [](const auto& map, auto handle) {
@@ -596,7 +616,7 @@ std::vector<std::string> lines_of(const Scene& scene, bool only_saved) {
   scene.instances().for_each([&](InstanceHandle, const Instance& instance) {
     if (only_saved && !is_saved(scene, instance)) return;
     lines.push_back("instance " + instance.name + " of " + name_of(scene.grids(), instance.grid) + " in " +
-                    name_of(scene.groups(), instance.group));
+                    name_of(scene.groups(), instance.group) + " at " + std::to_string(instance.position.x));
   });
   std::ranges::sort(lines);
   return lines;
@@ -701,6 +721,47 @@ TEST(WorldSaver, FollowsChangedMarks) {
     EXPECT_TRUE(check->damage.empty());
     EXPECT_EQ(check->chunks, chunks) << "chunks of grids that were left out are gone";
   }
+}
+
+// Moving, renaming, removing and adding instances between two steps belongs to the next save.
+TEST(WorldSaver, StepsCopyInstancesOfTheirBegin) {
+  const WorldFolder folder;
+  KeptWorld kept(folder / "w.quoin");
+  Scene scene = rich_scene();
+  const GridHandle ground = scene.grids().handles().front();
+  const GroupHandle group = scene.groups().handles().front();
+  std::vector<InstanceHandle> ships;
+  for (int i = 0; i < 100; ++i) {
+    ships.push_back(scene.add_instance({.name = "a ship with a long name " + std::to_string(i), .grid = ground}));
+  }
+  kept.save(scene);
+  const auto move_all = [&] {
+    for (const InstanceHandle ship : ships) scene.edit(ship).position.x += 1.0;
+  };
+  const auto remove = [&](std::size_t i) {
+    scene.remove_instance(ships[i]);
+    ships.erase(ships.begin() + static_cast<std::ptrdiff_t>(i));
+  };
+  move_all();
+  scene.edit(ships[1]).name = "renamed before";
+  scene.edit(ships[2]).saved = false;
+  remove(3);
+  ASSERT_TRUE(kept.saver().begin(kept.world(), scene));
+  const std::vector<std::string> at_begin = lines_of(scene, true);
+  int steps = 0;
+  for (; kept.saver().is_begun(); ++steps) {
+    move_all();
+    scene.edit(ships[50]).name = "renamed after step " + std::to_string(steps);
+    scene.edit(ships[51]).group = group;
+    remove(60);
+    scene.add_instance({.name = "added", .grid = ground});
+    ASSERT_TRUE(kept.saver().step(kept.world(), 0.0));
+    ASSERT_LT(steps, 20);
+  }
+  EXPECT_GT(steps, 100 / 16);
+  EXPECT_EQ(lines_in(kept.world()), at_begin);
+  ASSERT_TRUE(kept.saver().save(kept.world(), scene));
+  EXPECT_EQ(lines_in(kept.world()), lines_of(scene, true));
 }
 
 TEST(WorldSaver, RefusesToLeaveOutPartialGrid) {

@@ -74,6 +74,56 @@ PartBody body_of(PartContent content) {
   return made;
 }
 
+namespace {
+
+// Replaces `known` by the union of two sorted lists. `united` is only used for its memory.
+template <class T>
+void unite(std::vector<Handle<T>>& known, const std::vector<Handle<T>>& more, std::vector<Handle<T>>& united) {
+  QUOIN_ASSERT(std::is_sorted(more.begin(), more.end()), "sorted changes");
+  if (std::includes(known.begin(), known.end(), more.begin(), more.end())) return;
+  united.clear();
+  std::set_union(known.begin(), known.end(), more.begin(), more.end(), std::back_inserter(united));
+  std::swap(known, united);
+}
+
+}  // namespace
+
+void ChangedObjects::add(const SceneChanges& changes, std::size_t most) {
+  if (changes.all) return add_all();
+  if (changes_.all) return;
+  unite(changes_.grids, changes.grids, united_.grids);
+  unite(changes_.instances, changes.instances, united_.instances);
+  unite(changes_.groups, changes.groups, united_.groups);
+  unite(changes_.layers, changes.layers, united_.layers);
+  const std::size_t size =
+      changes_.grids.size() + changes_.instances.size() + changes_.groups.size() + changes_.layers.size();
+  if (size > most) add_all();
+}
+
+void ChangedObjects::add_all() {
+  changes_ = {};
+  changes_.all = true;
+}
+
+void SaveInSteps::put_chunk(std::uint32_t number, const Grid& voxels, const DensityGrid& field, IVec3 chunk) {
+  if (!voxels.is_loaded(chunk) || !field.is_loaded(chunk)) return;
+  StoredChunk stored;
+  if (const Chunk* const found = voxels.find_chunk(chunk)) stored.voxels = *found;
+  if (const DensityChunk* const found = field.find_chunk(chunk)) stored.densities = *found;
+  changes.put_chunk({number, 0, chunk}, std::move(stored));
+}
+
+bool SaveInSteps::copy_chunks(StepTime& time) {
+  for (; next_grid < grids.size(); ++next_grid, next_chunk = 0) {
+    const OfGrid& of = grids[next_grid];
+    for (; next_chunk < of.chunks.size(); ++next_chunk) {
+      if (time.is_over()) return false;
+      put_chunk(of.number, of.voxels, of.field, of.chunks[next_chunk]);
+    }
+  }
+  return true;
+}
+
 void ChangeSet::remove_grid(std::uint32_t number) {
   erase_grid(chunks, number);
   parts.insert_or_assign({part::kGrid, std::int64_t{number}}, std::nullopt);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -19,8 +20,11 @@
 
 #include <quoin/core/hash.h>
 #include <quoin/core/memory.h>
+#include <quoin/grid/density_grid.h>
+#include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/io/scene_file.h>
+#include <quoin/scene/scene.h>
 #include <quoin/store/world_store.h>
 
 #include "core/coordinates/chunk_order.h"
@@ -61,6 +65,22 @@ class EditedChunks {
   tsl::robin_set<IVec3, CoordinateHash> known_;
 };
 
+/// The objects of a scene that changed since the last save began.
+class ChangedObjects {
+ public:
+  /// A list of more than `most` objects, such as instances that came and went, is replaced by `all`.
+  /// Requires: the lists of `changes` are sorted. Cost: O(objects of both); no allocation for known objects.
+  void add(const SceneChanges& changes, std::size_t most);
+  /// Any object may have changed.
+  void add_all();
+  /// Returns the changes, sorted, and forgets them.
+  [[nodiscard]] SceneChanges take() { return std::exchange(changes_, {}); }
+
+ private:
+  SceneChanges changes_;
+  SceneChanges united_;  // during `add`; kept for its memory
+};
+
 /// Reserves memory, so that adding `more` entries neither allocates nor throws.
 template <class T>
 void make_room(ChunkMap<T>& chunks, std::size_t more) {
@@ -79,6 +99,10 @@ struct InstancePart {
 [[nodiscard]] Instance without_name(const Instance& instance);
 /// Returns true if both have the same text.
 [[nodiscard]] bool is_same(const InstancePart& a, const InstancePart& b);
+/// Instances as a saver saved them last.
+using SavedInstances =
+    tsl::robin_map<InstanceHandle, InstancePart, std::hash<InstanceHandle>, std::equal_to<InstanceHandle>,
+                   BlockAllocator<std::pair<InstanceHandle, InstancePart>>>;
 /// The content of a part: its bytes, or an instance or a group whose text the writer makes on its own thread.
 using PartContent = std::variant<PartBody, InstancePart, SceneFile::Group>;
 
@@ -122,6 +146,69 @@ struct WorldRules {
 [[nodiscard]] Status check_address(const ChunkAddress& place);
 /// Checks changes as documented for WorldStore::save.
 [[nodiscard]] Status check_changes(const ChangeSet& changes, const WorldRules& rules);
+
+/// The time of a step, which copies some items of a save.
+class StepTime {
+ public:
+  explicit StepTime(double seconds) : seconds_(seconds) {}
+  /// Call before each item. Returns true if the step must end. It copies at least kItemsPerLook items.
+  [[nodiscard]] bool is_over() {
+    const bool is_time_to_look = items_ != 0 && items_ % kItemsPerLook == 0;
+    ++items_;
+    return is_time_to_look && passed() >= seconds_;
+  }
+  /// Returns true if little of the time has passed.
+  [[nodiscard]] bool has_begun_only() const { return items_ == 0 || passed() < 0.5 * seconds_; }
+
+  static constexpr std::size_t kItemsPerLook = 16;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  [[nodiscard]] double passed() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+
+  double seconds_;
+  std::size_t items_ = 0;
+  Clock::time_point start_ = Clock::now();
+};
+
+/// A save that is copied in steps, with the state of the moment when it began:
+///
+///   begin   small parts -> changes    few chunks -> changes    other chunks: a snapshot of their grid
+///           instances -> `instances`, in memory order
+///   step    instances -> changes, with their numbers           chunks of the snapshots -> changes
+///
+struct SaveInSteps {
+  /// A grid with many changed chunks.
+  struct OfGrid {
+    std::uint32_t number;
+    std::vector<IVec3> chunks;
+    Grid voxels;
+    DensityGrid field;
+  };
+  /// A changed instance.
+  struct OfInstance {
+    InstanceHandle handle{};
+    bool is_saved = false;  ///< false: the scene does not have it, or leaves it out; the rest is empty
+    Instance instance{};    ///< without its name
+    std::shared_ptr<const std::string> name{};
+  };
+  WorldChanges changes;
+  std::function<void(const Status&)> on_saved;
+  BlockVector<OfInstance> instances;
+  std::vector<OfGrid> grids;
+  std::size_t next_instance = 0;
+  std::size_t next_grid = 0;
+  std::size_t next_chunk = 0;    ///< of this grid
+  bool is_copied = false;        ///< nothing is left to copy
+  bool is_full = false;          ///< the save contains everything, also instances that are as before
+  std::vector<PartKey> removed;  ///< parts that the save removes
+  bool had_view = false;         ///< it has new cameras
+
+  /// Adds a chunk of a grid. Chunks that are not loaded are unchanged.
+  void put_chunk(std::uint32_t number, const Grid& voxels, const DensityGrid& field, IVec3 chunk);
+  /// Copies chunks of the snapshots. Returns true if all are copied.
+  [[nodiscard]] bool copy_chunks(StepTime& time);
+};
 
 }  // namespace quoin::store
 
