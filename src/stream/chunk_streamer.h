@@ -101,6 +101,8 @@ class SceneSaves {
   [[nodiscard]] std::uint64_t next() const { return begun_ + 1; }
   /// Returns true if the store has the save, on disk or pending. A save has all edits of the saves before it.
   [[nodiscard]] bool has(std::uint64_t save) const { return save <= handed_; }
+  /// Returns the number of the last save that the store has.
+  [[nodiscard]] std::uint64_t handed() const { return handed_; }
   /// Returns true if the store refused the last save, or memory ran out.
   [[nodiscard]] bool is_refused() const { return is_refused_; }
   [[nodiscard]] DiskOutcome& disk() { return *disk_; }

@@ -284,7 +284,8 @@ void StreamedWorld::Impl::find_eyes(std::span<const Viewer> viewers) {
   follow_instances();
   for (auto& [number, grid] : grids) {
     const SceneGrid* const content = scene().grids().find(grid.handle);
-    if (content == nullptr) {
+    // A grid that is not limited yet could load any chunk, of endless air. The next `update` limits it.
+    if (content == nullptr || !grid.has_extent) {
       eyes.erase(number);
       continue;
     }
@@ -566,6 +567,7 @@ Status StreamedWorld::Impl::plan(std::span<const Viewer> viewers) {
   }
   Status outcome;
   sort_leaving();
+  const std::uint64_t handed = saves.handed();
   // Chunks are queued for the disk before they leave memory, and before workers save chunks with new types.
   const bool has_types = scene().types.has_changed_since(saved_types);
   const bool is_wanted = has_types || ready_to_leave < leaving.size();
@@ -576,8 +578,8 @@ Status StreamedWorld::Impl::plan(std::span<const Viewer> viewers) {
     if (begins && !saves.is_begun()) outcome = begin_save();
     if (outcome) outcome = saves.step(kSaveShare * options.update_seconds);
   }
+  if (saves.handed() != handed) sort_leaving();
   if (outcome) outcome = saves.disk().take(store.path());
-  sort_leaving();
   find_eyes(viewers);
   return outcome;
 }
