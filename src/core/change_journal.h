@@ -13,6 +13,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/changes.h>
 #include <quoin/core/memory.h>
+#include <quoin/core/ref.h>
 
 namespace quoin {
 
@@ -28,7 +29,8 @@ namespace quoin {
 /// again.
 ///
 /// A copy (as in a snapshot) shares the existing records and keeps the container's identity. The first change of the
-/// copy makes it a separate container.
+/// copy makes it a separate container. Copies share the list of blocks, so they allocate nothing. A change that adds a
+/// block replaces a shared list.
 ///
 /// Record: copyable, `merge(const Record&)`.
 /// Threads: several threads may read and copy at once. Copies may be read while this object is written.
@@ -43,6 +45,16 @@ class ChangeJournal {
     seen_.store(other.seen_.load(std::memory_order_relaxed), std::memory_order_relaxed);
   }
   ChangeJournal& operator=(const ChangeJournal&) = delete;
+
+  /// Brings an unchanged copy up to date. `later` is its original, or a later copy of that.
+  void copy_again(const ChangeJournal& later) {
+    QUOIN_ASSERT(is_copy_ && container_ == later.container_ && end_ <= later.end_, "a later state of the same journal");
+    later.observe();
+    first_ = later.first_;
+    end_ = later.end_;
+    blocks_ = later.blocks_;
+    seen_.store(later.seen_.load(std::memory_order_relaxed), std::memory_order_relaxed);
+  }
 
   /// Call before any other step of a change: a copy becomes a separate container.
   void begin_change() {
@@ -137,7 +149,7 @@ class ChangeJournal {
     return cursor.container_ != container_ || cursor.next_ < first_ || cursor.next_ <= serial;
   }
 
-  [[nodiscard]] std::size_t bytes() const { return blocks_.size() * (sizeof(Block) + sizeof(blocks_[0])); }
+  [[nodiscard]] std::size_t bytes() const { return block_count() * (sizeof(Block) + sizeof(std::shared_ptr<Block>)); }
 
  private:
   static constexpr std::uint64_t kNoConsumer = ~std::uint64_t{0};
@@ -147,6 +159,11 @@ class ChangeJournal {
   static constexpr std::size_t kPerKey = 8;
   static constexpr std::size_t kFew = 16;  // changes that most frames do not exceed
   using Block = std::array<Record, kBlock>;
+  struct Blocks : RefCounted {
+    std::vector<std::shared_ptr<Block>> list;  // [serial / kBlock - first_ / kBlock]
+  };
+
+  [[nodiscard]] std::size_t block_count() const { return blocks_ == nullptr ? 0 : blocks_->list.size(); }
 
   // Inserts a record into a sorted list, or merges it into the one with its key.
   template <class Less>
@@ -170,43 +187,60 @@ class ChangeJournal {
 
   [[nodiscard]] Record& at(std::uint64_t serial) const {
     QUOIN_ASSERT(serial >= first_ && serial < end_, "a kept record");
-    QUOIN_ASSERT(serial / kBlock - first_ / kBlock < blocks_.size(), "blocks cover all kept records");
-    return (*blocks_[static_cast<std::size_t>(serial / kBlock - first_ / kBlock)])[serial % kBlock];
+    QUOIN_ASSERT(serial / kBlock - first_ / kBlock < block_count(), "blocks cover all kept records");
+    return (*blocks_->list[static_cast<std::size_t>(serial / kBlock - first_ / kBlock)])[serial % kBlock];
   }
 
   // Every cursor reads that everything has changed.
   void forget() {
-    blocks_.clear();
+    blocks_.reset();
     first_ = ++end_;
     seen_.store(end_ - 1, std::memory_order_relaxed);
   }
 
   void append(std::uint64_t& serial, const Record& record, std::size_t keys) {
-    if (end_ - first_ >= kLeast + kPerKey * keys) trim();
-    if (blocks_.empty() || end_ % kBlock == 0) {
-      try {
-        blocks_.push_back(std::allocate_shared<Block>(BlockAllocator<Block>()));
-      } catch (const std::bad_alloc&) {
-        return forget();
-      }
+    try {
+      if (end_ - first_ >= kLeast + kPerKey * keys) trim();
+      if (block_count() == 0 || end_ % kBlock == 0) add_block();
+    } catch (const std::bad_alloc&) {
+      return forget();
     }
     serial = end_++;
-    QUOIN_ASSERT(serial / kBlock - first_ / kBlock + 1 == blocks_.size(), "the last block has the last record");
+    QUOIN_ASSERT(serial / kBlock - first_ / kBlock + 1 == block_count(), "the last block has the last record");
     at(serial) = record;
+  }
+
+  void add_block() {
+    auto block = std::allocate_shared<Block>(BlockAllocator<Block>());
+    own_list().push_back(std::move(block));
+  }
+
+  // Returns the list to change it. If copies of the journal share it, this is a new one with the same blocks.
+  std::vector<std::shared_ptr<Block>>& own_list() {
+    if (blocks_ == nullptr) {
+      blocks_ = make_ref<Blocks>();
+    } else if (blocks_.is_shared()) {
+      Ref<Blocks> own = make_ref<Blocks>();
+      own->list.reserve(blocks_->list.size() + 1);
+      own->list.insert(own->list.end(), blocks_->list.begin(), blocks_->list.end());
+      blocks_ = std::move(own);
+    }
+    return blocks_->list;
   }
 
   // Drops the oldest block. Records up to its end count as read, so that no change merges into them.
   void trim() {
-    QUOIN_ASSERT(end_ - first_ > kBlock && blocks_.size() > 1, "more blocks than are removed");
+    QUOIN_ASSERT(end_ - first_ > kBlock && block_count() > 1, "more blocks than are removed");
+    std::vector<std::shared_ptr<Block>>& list = own_list();
+    list.erase(list.begin());
     first_ = (first_ / kBlock + 1) * kBlock;
-    blocks_.erase(blocks_.begin());
     if (seen_.load(std::memory_order_relaxed) + 1 < first_) seen_.store(first_ - 1, std::memory_order_relaxed);
   }
 
   void become_own() {
     is_copy_ = false;
     container_ = next_serial();
-    blocks_.clear();
+    blocks_.reset();
     first_ = end_;
     seen_.store(kNoConsumer, std::memory_order_relaxed);
   }
@@ -216,8 +250,8 @@ class ChangeJournal {
   std::uint64_t first_ = 1;
   std::uint64_t end_ = 1;
   mutable std::atomic<std::uint64_t> seen_{
-      kNoConsumer};  // the last serial that a cursor may have read; kNoConsumer: no cursor exists
-  std::vector<std::shared_ptr<Block>> blocks_;  // [serial / kBlock - first_ / kBlock]
+      kNoConsumer};     // the last serial that a cursor may have read; kNoConsumer: no cursor exists
+  Ref<Blocks> blocks_;  // null: no records
 };
 
 /// The notifiers of one container: lists which of its items were edited since the last `take`.

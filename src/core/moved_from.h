@@ -23,13 +23,13 @@ template <class Content>
 /// Memory for the private implementations of many copies, for example of the grids in a scene's snapshot:
 ///
 ///   struct Grid::Impl : BulkAllocated { ... };
-///   BulkMemory memory(grids.size());
+///   BulkMemory memory(grids.size());  // 2 * grids.size() if their fields get memory from it, too
 ///   for (...) copies.push_back(std::unique_ptr<Grid::Impl>(new (memory) Grid::Impl(impl)));
 ///
 ///   | block: users | block, object | block, object | ...     one allocation for kMost objects
 ///
 /// A block is freed with its last object, so an object that outlives the others keeps up to kMost objects' memory.
-/// Requires: all objects of one BulkMemory have the same size.
+/// Objects may have several sizes: begin with the largest one.
 /// Threads:  one. The objects can be destroyed on any thread.
 class [[gnu::visibility("hidden")]] BulkMemory {
  public:
@@ -60,30 +60,27 @@ class [[gnu::visibility("hidden")]] BulkMemory {
   }
   void* allocate(std::size_t bytes) {
     const std::size_t size = sizeof(Head) + (bytes + alignof(Head) - 1) / alignof(Head) * alignof(Head);
-    if (left_ == 0) {
-      const std::size_t count = std::clamp<std::size_t>(expected_, 1, kMost);
-      const std::size_t block_bytes = sizeof(Block) + count * size;
+    if (left_ < size) {
+      const std::size_t block_bytes = sizeof(Block) + std::clamp<std::size_t>(expected_, 1, kMost) * size;
       void* const memory = allocate_block(block_bytes);
       drop(block_);
       block_ = new (memory) Block(block_bytes);
       next_ = static_cast<std::byte*>(memory) + sizeof(Block);
-      left_ = count;
-      size_ = size;
-      expected_ -= std::min(expected_, count);
+      left_ = block_bytes - sizeof(Block);
     }
-    QUOIN_ASSERT(size == size_, "objects of one size");
+    QUOIN_ASSERT(left_ >= size, "room for the object");
     Head* const head = new (next_) Head{block_};
     block_->users.fetch_add(1, std::memory_order_relaxed);
     next_ += size;
-    --left_;
+    left_ -= size;
+    expected_ -= std::min<std::size_t>(expected_, 1);
     return head + 1;
   }
 
   std::size_t expected_;
   Block* block_ = nullptr;
   std::byte* next_ = nullptr;
-  std::size_t left_ = 0;
-  std::size_t size_ = 0;
+  std::size_t left_ = 0;  // bytes of the block
 };
 
 /// Base of objects that can be created in a BulkMemory, or alone. Requires: `delete` names their own type.

@@ -19,8 +19,10 @@ namespace quoin {
 /// shows the newest completed state. An update begins only when the last result was taken, so that there are never more
 /// than two states.
 ///
-///   owner    update(scene): snapshot -> asked       take(): ready <-> shown, the former shown one -> former
-///   worker   make(asked, former) -> ready
+///   owner    update(scene): spare, brought up to date -> asked     take(): ready <-> shown, the former one -> former
+///   worker   copy of asked -> spare     make(asked, former) -> ready
+///
+/// The owner copies the changes since the last request only, however large the scene is.
 ///
 /// State:    movable; a move must not throw.
 /// Lifetime: the scene is read only during calls.
@@ -49,13 +51,19 @@ class LatestState {
   /// nothing else while an update is requested or in progress.
   /// Errors: bad_alloc, also from the worker; the next call then starts an update.
   void update(const Scene& scene, bool has_changed, std::uint64_t number = 0) {
+    std::shared_ptr<Scene> snapshot;
     {
       const std::lock_guard lock(mutex_);
       if (has_changed) note_behind(Workers::Clock::now());
       throw_failure();
       if (!is_behind_ || is_busy_) return;
+      std::swap(snapshot, spare_);
     }
-    auto snapshot = std::make_shared<const Scene>(scene.snapshot());
+    if (snapshot != nullptr) {
+      scene.update_snapshot(*snapshot, changes_);
+    } else {
+      snapshot = std::make_shared<Scene>(scene.snapshot());
+    }
     {
       const std::lock_guard lock(mutex_);
       QUOIN_ASSERT(asked_.scene == nullptr && !is_busy_, "one request at a time");
@@ -122,6 +130,11 @@ class LatestState {
   [[nodiscard]] const std::shared_ptr<ReleaseQueue>& releases() const { return worker_.releases(); }
 
  private:
+  // Requires: the lock is free.
+  void keep_spare(std::shared_ptr<Scene> spare) {
+    const std::lock_guard lock(mutex_);
+    std::swap(spare_, spare);
+  }
   [[nodiscard]] Workers::Clock::time_point step(Workers::Lock& lock) {
     if (asked_.scene == nullptr || ready_ != nullptr) return Workers::kWhenWoken;
     QUOIN_ASSERT(is_busy_, "a request in progress");
@@ -133,6 +146,7 @@ class LatestState {
     std::unique_ptr<State> done;
     std::exception_ptr failure;
     try {
+      keep_spare(std::make_shared<Scene>(request.scene->snapshot()));
       done = make_(std::move(request), former);
     } catch (...) {
       failure = std::current_exception();
@@ -164,7 +178,8 @@ class LatestState {
 
   Make make_;
 
-  State shown_;  // the owner's
+  State shown_;           // the owner's
+  SceneChanges changes_;  // the owner's, kept for its memory
 
   mutable std::mutex mutex_;                 // of all below
   bool is_behind_ = false;                   // something changed that no snapshot has, or an update failed
@@ -172,6 +187,7 @@ class LatestState {
   bool is_busy_ = false;                     // an update is requested or in progress, and its state not passed on
   bool is_making_ = false;                   // `make` runs
   Request asked_;                            // an update that has not begun
+  std::shared_ptr<Scene> spare_;             // as the last request's scene; becomes the next one. Null: none is ready
   std::unique_ptr<State> ready_;             // to be taken
   std::unique_ptr<State> former_;            // was shown; belongs to the next update
   Workers worker_{mutex_};

@@ -117,8 +117,8 @@ void sort_and_unite(std::vector<Handle<T>>& handles) {
 struct Scene::Book {
   Book() = default;
   // A copy needs no serials: the first change of the copy makes its journal a separate one, in which no object has a
-  // record.
-  Book(const Book& other) : journal(other.journal) {}
+  // record. It follows its grids when one of them can be edited for the first time.
+  Book(const Book& other) : journal(other.journal), follows_grids(false) {}
 
   std::mutex mutex;  // guards concurrent queries
   ChangeJournal<SceneRecord> journal;
@@ -126,6 +126,7 @@ struct Scene::Book {
   std::array<std::vector<std::uint64_t>, 4> serials;
   ChangeNotifiers notifiers;
   std::vector<std::uint32_t> notified;
+  bool follows_grids = true;
 
   std::vector<std::uint64_t>& serials_of(Kind kind) { return serials[static_cast<std::size_t>(kind)]; }
   // `keys` are grids, instances, groups and layers: they share a journal.
@@ -178,6 +179,12 @@ struct Scene::Book {
     }
     notified.clear();
   }
+  // Call before the caller gets a grid to edit.
+  void follow_all(const SlotMap<SceneGrid>& grids) {
+    if (follows_grids) return;
+    grids.for_each([&](GridHandle handle, const SceneGrid& grid) { follow(grid, handle.index); });
+    follows_grids = true;
+  }
   // Edits of either come under the grid's number.
   void follow(const SceneGrid& grid, std::uint32_t index) {
     notifiers.follow(grid.grid.notifier_, index);
@@ -191,29 +198,58 @@ Scene::Scene(Scene&&) noexcept = default;
 Scene& Scene::operator=(Scene&&) noexcept = default;
 Scene::~Scene() = default;
 
+namespace {
+
+// Returns a copy of a grid, whose implementations are made by `snapshot`.
+template <class Snapshot>
+SceneGrid copy_of(const SceneGrid& grid, Snapshot&& snapshot) {
+  return {.name = grid.name,
+          .grid = snapshot(grid.grid),
+          .pivot = grid.pivot,
+          .canvas = grid.canvas,
+          .field = snapshot(grid.field),
+          .saved = grid.saved,
+          .whole = grid.whole};
+}
+
+constexpr auto kPlainCopy = [](const auto& value) { return value; };
+
+}  // namespace
+
 Scene Scene::snapshot() const {
   const std::lock_guard lock(book().mutex);
   book_->collect(grids_, keys());
   Scene copy(types, std::make_unique<Book>(*book_));
   copy.lamps = lamps;
   copy.environment = environment;
-  BulkMemory voxels(grids_.size());
-  BulkMemory fields(grids_.size());
+  BulkMemory memory(2 * grids_.size());
   copy.grids_ = grids_.copied([&](const SceneGrid& grid) {
-    return SceneGrid{.name = grid.name,
-                     .grid = grid.grid.snapshot(voxels),
-                     .pivot = grid.pivot,
-                     .canvas = grid.canvas,
-                     .field = grid.field.snapshot(fields),
-                     .saved = grid.saved,
-                     .whole = grid.whole};
+    return copy_of(grid, [&](const auto& content) { return content.snapshot(memory); });
   });
-  copy.instances_ = instances_.copied([](const Instance& instance) { return instance; });
-  copy.groups_ = groups_.copied([](const SceneGroup& group) { return group; });
-  copy.layers_ = layers_.copied([](const SceneLayer& layer) { return layer; });
-  if (grids_.next_index() != 0) copy.book_->notifiers.make_room(grids_.next_index() - 1);
-  copy.grids_.for_each([&](GridHandle handle, const SceneGrid& grid) { copy.book_->follow(grid, handle.index); });
+  copy.instances_ = instances_.copied(kPlainCopy);
+  copy.groups_ = groups_.copied(kPlainCopy);
+  copy.layers_ = layers_.copied(kPlainCopy);
   return copy;
+}
+
+void Scene::update_snapshot(Scene& snapshot, SceneChanges& changes) const {
+  ChangeCursor cursor = snapshot.book().journal.present();
+  changes_since(cursor, changes);
+  if (changes.all) {
+    snapshot = this->snapshot();
+    return;
+  }
+  if (types.has_changed_since(snapshot.types.cursor())) snapshot.types = types;
+  if (snapshot.lamps != lamps) snapshot.lamps = lamps;
+  if (snapshot.environment != environment) snapshot.environment = environment;
+  grids_.update_copy(snapshot.grids_, changes.grids, [](const SceneGrid& grid) {
+    return copy_of(grid, [](const auto& content) { return content.snapshot(); });
+  });
+  instances_.update_copy(snapshot.instances_, changes.instances, kPlainCopy);
+  groups_.update_copy(snapshot.groups_, changes.groups, kPlainCopy);
+  layers_.update_copy(snapshot.layers_, changes.layers, kPlainCopy);
+  const std::lock_guard lock(book().mutex);
+  snapshot.book_->journal.copy_again(book_->journal);
 }
 
 std::size_t Scene::keys() const {
@@ -281,6 +317,7 @@ bool Scene::remove_layer(LayerHandle handle) {
 }
 
 SceneGrid& Scene::edit(GridHandle handle) {
+  book().follow_all(grids_);
   return book().edit(grids_, handle, keys());
 }
 Instance& Scene::edit(InstanceHandle handle) {

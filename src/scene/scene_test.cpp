@@ -6,7 +6,9 @@
 #include <map>
 #include <random>
 #include <set>
+#include <sstream>
 #include <stdexcept>
+#include <string>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -289,6 +291,26 @@ TEST(SceneChanges, SnapshotStaysUnchanged) {
   EXPECT_EQ(scene.voxel_count(), 0);
 }
 
+// A snapshot follows its grids from the first edit on.
+TEST(SceneChanges, SnapshotReportsEditsOfItsGrids) {
+  Scene scene;
+  const GridHandle first = scene.add_grid({});
+  const GridHandle second = scene.add_grid({});
+  Scene copy = scene.snapshot();
+  SceneGrid& edited = copy.edit(first);
+  ChangeCursor cursor = copy.cursor();
+  edited.grid.set({1, 2, 3}, 1);
+  EXPECT_EQ(copy.changes_since(cursor).grids, std::vector<GridHandle>{first});
+  edited.field.edit({{0, 0, 0}, {1, 1, 1}}, [](IVec3, DensitySample) { return DensitySample{-1.0F, 1}; });
+  EXPECT_EQ(copy.changes_since(cursor).grids, std::vector<GridHandle>{first});
+  const GridHandle added = copy.add_grid({});
+  EXPECT_EQ(copy.changes_since(cursor).grids, std::vector<GridHandle>{added});
+  Scene of_copy = copy.snapshot();
+  of_copy.edit(second).grid.set({1, 2, 3}, 1);
+  EXPECT_TRUE(copy.changes_since(cursor).empty());
+  EXPECT_TRUE(scene.grids()[second].grid.chunks().empty());
+}
+
 // The grids that instances place, found by a scan of all instances.
 std::set<GridHandle> slow_placed_grids(const Scene& scene, InstanceFilter filter) {
   std::set<GridHandle> placed;
@@ -330,6 +352,74 @@ void edit_at_random(Scene& scene, std::mt19937& random) {
     }
     default:
       scene.edit(any(grids)).grid.set({static_cast<int>(random() % 64), 0, 0}, 1);
+  }
+}
+
+// The content of a scene, with its handles.
+std::string text_of(const Scene& scene) {
+  std::ostringstream text;
+  const auto begin = [&](const char* kind, auto handle) -> std::ostream& {
+    return text << '\n' << kind << ' ' << handle.index << ' ' << handle.generation << ' ';
+  };
+  scene.grids().for_each([&](GridHandle handle, const SceneGrid& grid) {
+    begin("grid", handle) << grid.name << ' ' << grid.grid.voxel_count() << ' ' << grid.field.chunk_count();
+  });
+  scene.instances().for_each([&](InstanceHandle handle, const Instance& instance) {
+    begin("instance", handle) << instance.grid.generation << ' ' << instance.voxel_size << ' ' << instance.visible;
+  });
+  scene.groups().for_each(
+      [&](GroupHandle handle, const SceneGroup& group) { begin("group", handle) << group.visible; });
+  scene.layers().for_each([&](LayerHandle handle, const SceneLayer& layer) { begin("layer", handle) << layer.name; });
+  text << '\n' << scene.types.size() << ' ' << scene.lamps.size() << ' ' << scene.environment.has_value();
+  return text.str();
+}
+
+// One snapshot is brought up to date again and again, by the scene or by later snapshots.
+TEST(SceneChanges, UpdatedSnapshotEqualsNewOne) {
+  std::mt19937 random(5);
+  Scene scene;
+  scene.add_grid({});
+  scene.add_grid({.name = "field"});
+  scene.add_group({.name = "group"});
+  Scene kept = scene.snapshot();
+  SceneChanges memory;
+  ChangeCursor of_scene;
+  ChangeCursor of_kept;
+  for (int step = 0; step < 2'000; ++step) {
+    edit_at_random(scene, random);
+    switch (random() % 50) {
+      case 0:
+        scene.lamps.push_back({});
+        break;
+      case 1:
+        scene.environment.emplace();
+        break;
+      case 2:
+        EXPECT_TRUE(scene.types.add({.name = "type " + std::to_string(step)}));
+        break;
+      case 3:
+        scene.add_layer({"layer"});
+        break;
+      case 4:  // not a snapshot of the scene any more
+        kept.edit(kept.grids().handles().front()).grid.set({1, 1, 1}, 1);
+        break;
+      default:
+        break;
+    }
+    if (random() % 3 == 0) continue;
+    if (random() % 2 == 0) {
+      scene.update_snapshot(kept, memory);
+    } else {
+      scene.snapshot().update_snapshot(kept, memory);
+    }
+    ASSERT_EQ(text_of(kept), text_of(scene)) << step;
+    const SceneChanges changes = scene.changes_since(of_scene);
+    const SceneChanges same = kept.changes_since(of_kept);
+    ASSERT_EQ(changes.all, same.all) << step;
+    ASSERT_EQ(changes.grids, same.grids) << step;
+    ASSERT_EQ(changes.instances, same.instances) << step;
+    ASSERT_EQ(changes.groups, same.groups) << step;
+    ASSERT_EQ(changes.layers, same.layers) << step;
   }
 }
 

@@ -146,6 +146,25 @@ class SlotMap {
     made.size_ = size_;
     return made;
   }
+  /// Brings a map that `copied` returned up to date, by copying the slots in `changed` again. Elements that were there
+  /// before keep their addresses. Requires: all other slots are as they were when the map was copied.
+  template <class Copy>
+  void update_copy(SlotMap& made, const std::vector<Handle<T>>& changed, Copy&& copy) const {
+    while (made.pages_.size() < pages_.size()) made.pages_.push_back(std::make_unique<Page>());
+    for (const Handle<T> handle : changed) {
+      const Slot& from = slot_at(handle.index);
+      Slot& to = made.slot_at(handle.index);
+      if (from.value.has_value()) {
+        to.value = copy(*from.value);
+      } else {
+        to.value.reset();
+      }
+      to.generation = from.generation;
+    }
+    made.free_ = free_;
+    made.count_ = count_;
+    made.size_ = size_;
+  }
 
  private:
   struct Slot {

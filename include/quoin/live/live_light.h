@@ -48,7 +48,8 @@ class LiveLight {
   /// before the last result is taken. Voxel data, names and instance positions do not affect light and can be out of
   /// date in the light shown.
   /// Does nothing while LiveMeshes uses this light.
-  /// Cost:   no work if nothing changed; otherwise Scene::snapshot.
+  /// Cost:   no work if nothing changed; otherwise a copy of the grids and instances that changed since the last update
+  ///         began, and for the first update Scene::snapshot.
   /// Errors: bad_alloc, also from the background thread; the next call then computes the missing light from scratch.
   void update(const Scene& scene);
   /// Shows the newest completed light. Returns true if there was new light. While LiveMeshes uses this light, returns

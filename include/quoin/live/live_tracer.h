@@ -41,7 +41,8 @@ class LiveTracer {
   /// Starts updating the tracer to the current scene in the background if the scene or its types have changed, unless
   /// an earlier update is still running. Call it once per frame, before `take`. If the last result was not taken, the
   /// update begins after `take`.
-  /// Cost:   no work if nothing changed; otherwise Scene::snapshot.
+  /// Cost:   no work if nothing changed; otherwise a copy of the grids and instances that changed since the last update
+  ///         began, and for the first update Scene::snapshot.
   /// Errors: bad_alloc, also from the background thread; the next call then starts a new update, which may build the
   ///         tracer from scratch.
   void update(const Scene& scene);

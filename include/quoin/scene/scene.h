@@ -168,6 +168,11 @@ class Scene {
   /// until the snapshot itself is changed.
   /// Cost: one pointer per grid and a copy of each instance; well below 1 microsecond each, at any grid size.
   [[nodiscard]] Scene snapshot() const;
+  // For Quoin's own sources.
+  /// Brings an earlier snapshot of this scene up to date; a snapshot that was changed, or of another scene, becomes a
+  /// new one. `changes` is only used for its memory. If it throws, the snapshot may only be assigned to or destroyed.
+  /// Cost: O(changes since the snapshot), as `changes_since`, and O(lamps).
+  [[gnu::visibility("hidden")]] void update_snapshot(Scene& snapshot, SceneChanges& changes) const;
 
   /// Adds a grid, which the scene then owns. The grid is visible only where an instance places it.
   GridHandle add_grid(SceneGrid grid);
