@@ -12,6 +12,7 @@
 
 #include <quoin/core/assert.h>
 #include <quoin/core/parallel.h>
+#include <quoin/grid/density_grid.h>
 
 #include "core/change_journal.h"
 #include "core/coordinates/chunk_order.h"
@@ -525,6 +526,26 @@ bool Grid::unload_chunk(IVec3 chunk) {
   if (!impl().loaded.remove(chunk)) return false;
   impl().replace(chunk, Chunk(kAir), notifier_);
   return true;
+}
+
+bool Grid::load_chunk(IVec3 chunk, Chunk voxels, DensityGrid& field, std::optional<DensityChunk> samples) {
+  const auto [is_new, is_new_in_field] =
+      LoadedChunks::change_both(impl().loaded, field.loaded(), [&](LoadedChunks& loaded) { return loaded.add(chunk); });
+  if (is_new) impl().replace(chunk, std::move(voxels), notifier_);
+  if (is_new_in_field) field.replace_loaded(chunk, std::move(samples));
+  return is_new;
+}
+
+bool Grid::unload_chunk(IVec3 chunk, DensityGrid& field) {
+  const auto [is_gone, is_gone_in_field] = LoadedChunks::change_both(
+      impl().loaded, field.loaded(), [&](LoadedChunks& loaded) { return loaded.remove(chunk); });
+  if (is_gone) impl().replace(chunk, Chunk(kAir), notifier_);
+  if (is_gone_in_field) field.replace_loaded(chunk, std::nullopt);
+  return is_gone;
+}
+
+void Grid::share_loaded(DensityGrid& field) const {
+  if (field.loaded().is_same(impl().loaded)) field.loaded() = impl().loaded;
 }
 
 void Grid::clear() {

@@ -1,8 +1,11 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cstddef>
+#include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <quoin/core/vec.h>
@@ -12,6 +15,77 @@
 #include "core/coordinates/long_box.h"
 
 namespace quoin {
+
+/// A set of chunks that copies share. An entry of its tree has a bit for each chunk of a cube of 4^3, so a change copies
+/// few nodes: one below the root covers 16^3 chunks.
+/// Threads: as ChunkTrie.
+class ChunkSet {
+ public:
+  [[nodiscard]] bool contains(IVec3 chunk) const {
+    const Cube* const cube = cubes_.find(chunk.x >> 2, chunk.y >> 2, chunk.z >> 2);
+    return cube != nullptr && (cube->chunks & bit_of(chunk)) != 0;
+  }
+  [[nodiscard]] std::size_t size() const { return size_; }
+  [[nodiscard]] std::size_t bytes() const { return cubes_.bytes(); }
+  void insert(IVec3 chunk) {
+    if (contains(chunk)) return;
+    cubes_.find_or_create(cube_of(chunk), [](auto&) {}).chunks |= bit_of(chunk);
+    ++size_;
+  }
+  void erase(IVec3 chunk) {
+    if (!contains(chunk)) return;
+    Cube& cube = cubes_.find_or_create(cube_of(chunk), [](auto&) {});
+    cube.chunks &= ~bit_of(chunk);
+    --size_;
+    if (cube.chunks == 0) cubes_.erase(cube_of(chunk), [](auto&) {});
+  }
+  void clear() {
+    cubes_.clear();
+    size_ = 0;
+  }
+  /// Returns true if both are one set: copies without changes since, or empty. Cost: O(1).
+  [[nodiscard]] bool shares_all_with(const ChunkSet& other) const { return cubes_.shares_all_with(other.cubes_); }
+  /// Returns true if both have the same chunks.
+  [[nodiscard]] bool is_same(const ChunkSet& other) const {
+    bool has_all = size_ == other.size_;
+    for_each([&](IVec3 chunk) { has_all = has_all && other.contains(chunk); });
+    return has_all;
+  }
+  /// Calls `visit(chunk)` for each chunk. The order depends only on the coordinates.
+  template <class Visit>
+  void for_each(Visit&& visit) const {
+    cubes_.for_each([&](IVec3 at, const Cube& cube) { visit_cube(at, cube, visit); });
+  }
+  template <class Visit>
+  void for_each_in(const IBox& chunks, Visit&& visit) const {
+    if (chunks.empty()) return;
+    const IBox cubes{cube_of(chunks.min), cube_of(chunks.max - 1) + 1};
+    cubes_.for_each_in(cubes, [&](IVec3 at, const Cube& cube) {
+      visit_cube(at, cube, [&](IVec3 chunk) {
+        if (chunks.contains(chunk)) visit(chunk);
+      });
+    });
+  }
+
+ private:
+  struct Cube {
+    std::uint64_t chunks = 0;
+  };
+  static IVec3 cube_of(IVec3 chunk) { return {chunk.x >> 2, chunk.y >> 2, chunk.z >> 2}; }
+  static std::uint64_t bit_of(IVec3 chunk) {
+    return std::uint64_t{1} << ((chunk.x & 3) | (chunk.y & 3) << 2 | (chunk.z & 3) << 4);
+  }
+  template <class Visit>
+  static void visit_cube(IVec3 at, const Cube& cube, Visit&& visit) {
+    for (std::uint64_t left = cube.chunks; left != 0; left &= left - 1) {
+      const int bit = std::countr_zero(left);
+      visit(at * 4 + IVec3{bit & 3, bit >> 2 & 3, bit >> 4});
+    }
+  }
+
+  ChunkTrie<Cube> cubes_;
+  std::size_t size_ = 0;
+};
 
 /// The loaded chunks of a partial grid. In a grid that is not partial, all chunks count as loaded. Shared with copies.
 ///
@@ -31,8 +105,7 @@ class LoadedChunks {
   [[nodiscard]] bool is_partial() const { return is_partial_; }
   [[nodiscard]] bool has(IVec3 chunk) const {
     if (!is_partial_ || !is_inside_world(chunk)) return true;
-    if (marks_.find(chunk.x, chunk.y, chunk.z) != nullptr) return true;
-    return !extent_.contains(chunk) && others_.find(chunk.x, chunk.y, chunk.z) == nullptr;
+    return marks_.contains(chunk) || (!extent_.contains(chunk) && !others_.contains(chunk));
   }
   /// Returns true if edits may change the chunk.
   [[nodiscard]] bool may_edit(IVec3 chunk) const { return is_inside_world(chunk) && has(chunk); }
@@ -53,7 +126,7 @@ class LoadedChunks {
     const IBox chunks = intersect(chunks_of(box_from(voxels)), all_chunks());
     if (chunks.empty()) return true;
     bool has_others = true;
-    others_.for_each_in(chunks, [&](IVec3 at, const Mark&) { has_others = has_others && has(at); });
+    others_.for_each_in(chunks, [&](IVec3 at) { has_others = has_others && has(at); });
     return has_others && has_all_of(intersect(chunks, extent_));
   }
   /// Returns the number of marks: the loaded chunks, except edited ones outside of the extent.
@@ -61,13 +134,13 @@ class LoadedChunks {
   /// Calls `visit(chunk)` for each chunk with a mark.
   template <class Visit>
   void for_each(Visit&& visit) const {
-    marks_.for_each([&](IVec3 at, const Mark&) { visit(at); });
+    marks_.for_each(visit);
   }
   /// Returns the chunks of a box with marks, sorted by z, y, x. Without a chunk outside of the extent in the box, these
   /// are all loaded chunks in it.
   [[nodiscard]] std::vector<IVec3> within(const IBox& chunks) const {
     std::vector<IVec3> found;
-    marks_.for_each_in(chunks, [&](IVec3 at, const Mark&) { found.push_back(at); });
+    marks_.for_each_in(chunks, [&](IVec3 at) { found.push_back(at); });
     std::sort(found.begin(), found.end(), by_zyx);
     return found;
   }
@@ -82,7 +155,7 @@ class LoadedChunks {
   /// Returns false if the chunk is already loaded or outside of the world, or the grid is not partial.
   bool add(IVec3 chunk) {
     if (!is_partial_ || has(chunk)) return false;
-    marks_.find_or_create(chunk, [](auto&) {});
+    marks_.insert(chunk);
     return true;
   }
   /// Returns false if the chunk is not loaded or outside of the world, or the grid is not partial. A chunk outside of
@@ -90,8 +163,34 @@ class LoadedChunks {
   bool remove(IVec3 chunk) {
     if (!is_partial_ || !may_edit(chunk)) return false;
     if (!extent_.contains(chunk)) add_other(chunk);
-    marks_.erase(chunk, [](auto&) {});
+    marks_.erase(chunk);
     return true;
+  }
+  [[nodiscard]] bool is_same(const LoadedChunks& other) const {
+    return is_partial_ == other.is_partial_ && extent_ == other.extent_ && marks_.is_same(other.marks_) &&
+           others_.is_same(other.others_);
+  }
+  /// Calls `change(list)` for two lists and returns both results. Two lists that share all chunks share them afterwards,
+  /// too, and are changed once. `change` leaves a list as it is if it throws.
+  template <class Change>
+  static std::pair<bool, bool> change_both(LoadedChunks& one, LoadedChunks& other, Change&& change) {
+    const bool is_shared = one.marks_.shares_all_with(other.marks_) && one.others_.shares_all_with(other.others_) &&
+                           one.extent_ == other.extent_ && one.is_partial_ == other.is_partial_;
+    if (!is_shared) {
+      const bool has_changed = change(one);
+      return {has_changed, change(other)};
+    }
+    other = LoadedChunks();  // else the change would copy nodes that only these two share
+    const auto share = [&] { other = one; };
+    bool has_changed = false;
+    try {
+      has_changed = change(one);
+    } catch (...) {
+      share();
+      throw;
+    }
+    share();
+    return {has_changed, has_changed};
   }
   /// Requires: the grid is partial, and chunks with content have marks.
   void set_extent(const IBox& chunks, std::span<const IVec3> others) {
@@ -104,13 +203,9 @@ class LoadedChunks {
     }
   }
   /// Marks a chunk as loaded. Requires: the grid is partial.
-  void mark(IVec3 chunk) {
-    marks_.find_or_create(chunk, [](auto&) {});
-  }
+  void mark(IVec3 chunk) { marks_.insert(chunk); }
 
  private:
-  struct Mark {};
-
   // Requires: the box lies in the extent.
   [[nodiscard]] bool has_all_of(const IBox& chunks) const {
     if (chunks.empty()) return true;
@@ -120,7 +215,7 @@ class LoadedChunks {
     for (int z = chunks.min.z; z < chunks.max.z; ++z) {
       for (int y = chunks.min.y; y < chunks.max.y; ++y) {
         for (int x = chunks.min.x; x < chunks.max.x; ++x) {
-          if (marks_.find(x, y, z) == nullptr) return false;
+          if (!marks_.contains({x, y, z})) return false;
         }
       }
     }
@@ -128,12 +223,12 @@ class LoadedChunks {
   }
   static IBox all_chunks() { return {IVec3(kMinChunk + 1), IVec3(kMaxChunk)}; }
   void add_other(IVec3 chunk) {
-    others_.find_or_create(chunk, [](auto&) {});
+    others_.insert(chunk);
     bounds_ = unite(bounds_, {chunk, chunk + 1});
   }
 
-  ChunkTrie<Mark> marks_;
-  ChunkTrie<Mark> others_;
+  ChunkSet marks_;
+  ChunkSet others_;
   IBox extent_;
   IBox bounds_;  // of the extent and the others
   bool is_partial_ = false;

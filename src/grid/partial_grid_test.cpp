@@ -1,6 +1,9 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <optional>
+#include <random>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -149,6 +152,69 @@ TEST(PartialGrid, SnapshotsKeepLoadedChunks) {
   EXPECT_FALSE(before.is_loaded({5, 5, 5}));
   EXPECT_EQ(before.get(1, 1, 1), 1);
   EXPECT_TRUE(grid.is_loaded({5, 5, 5}));
+}
+
+// A grid and the field of its scene grid, loaded together, against two that are loaded one by one.
+TEST(PartialGrid, LoadsChunksOfGridAndFieldTogether) {
+  std::mt19937 random(11);
+  Grid grid = partial();
+  DensityGrid field;
+  field.make_partial();
+  Grid slow_grid = grid.snapshot();
+  DensityGrid slow_field = field.snapshot();
+  std::vector<Grid> snapshots;
+  const auto chunk_at_random = [&] {
+    const auto coordinate = [&] { return static_cast<int>(random() % 20U) - 10; };
+    return IVec3{coordinate(), coordinate() / 4, coordinate()};
+  };
+  for (int step = 0; step < 3'000; ++step) {
+    const IVec3 chunk = chunk_at_random();
+    const Chunk voxels(static_cast<VoxelType>(random() % 2U));
+    switch (random() % 9U) {
+      case 0:  // one of them
+        EXPECT_EQ(field.load_air_chunk(chunk), slow_field.load_air_chunk(chunk));
+        break;
+      case 1:
+        grid.share_loaded(field);
+        break;
+      case 2:
+        snapshots.push_back(grid.snapshot());
+        if (snapshots.size() > 4) snapshots.erase(snapshots.begin());
+        break;
+      case 3:
+      case 4:
+        EXPECT_EQ(grid.unload_chunk(chunk, field), slow_grid.unload_chunk(chunk));
+        slow_field.unload_chunk(chunk);
+        break;
+      default: {
+        std::optional<DensityChunk> samples;
+        if (random() % 3U == 0) samples = DensityChunk(half_from_float(-1.0F), 1);
+        const bool is_new = !slow_field.is_loaded(chunk);
+        if (is_new && samples) slow_field.load_chunk(chunk, *samples);
+        if (is_new && !samples) slow_field.load_air_chunk(chunk);
+        EXPECT_EQ(grid.load_chunk(chunk, voxels, field, std::move(samples)), slow_grid.load_chunk(chunk, voxels));
+      }
+    }
+    if (step == 1'500) {
+      const std::vector<IVec3> others = {{3, 9, 3}, {4, 9, 4}};
+      grid.set_extent({{-8, -2, -8}, {8, 2, 8}}, others);
+      slow_grid.set_extent({{-8, -2, -8}, {8, 2, 8}}, others);
+      field.set_extent({{-8, -2, -8}, {8, 2, 8}}, others);
+      slow_field.set_extent({{-8, -2, -8}, {8, 2, 8}}, others);
+    }
+    const IVec3 other = chunk_at_random();
+    for (const IVec3 each : {chunk, other}) {
+      ASSERT_EQ(grid.is_loaded(each), slow_grid.is_loaded(each)) << step;
+      ASSERT_EQ(field.is_loaded(each), slow_field.is_loaded(each)) << step;
+      ASSERT_EQ(grid.get(each * kChunkEdge), slow_grid.get(each * kChunkEdge)) << step;
+      ASSERT_EQ(field.density(each * kChunkEdge), slow_field.density(each * kChunkEdge)) << step;
+    }
+    if (step % 100 != 0) continue;
+    ASSERT_EQ(grid.loaded_chunks(), slow_grid.loaded_chunks()) << step;
+    ASSERT_EQ(field.loaded_chunks(), slow_field.loaded_chunks()) << step;
+    const IBox box{chunk * kChunkEdge, (chunk + 2) * kChunkEdge};
+    ASSERT_EQ(grid.is_loaded_within(box), slow_grid.is_loaded_within(box)) << step;
+  }
 }
 
 TEST(PartialGrid, BoxIsLoadedIfAllItsChunksAre) {

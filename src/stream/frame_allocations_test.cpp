@@ -237,7 +237,10 @@ TEST(FrameAllocations, SnapshotsOfScenesAllocateLessThanOncePerGrid) {
     SceneGrid grid;
     grid.name = "a ship with a long name";
     grid.grid.set({i, 0, 0}, 1);
-    scene.add_instance({.name = "", .grid = scene.add_grid(std::move(grid))});
+    const GridHandle handle = scene.add_grid(std::move(grid));
+    scene.add_instance({.name = "", .grid = handle});
+    (void)scene.grids()[handle].grid.cursor();  // from now on, its journal has records, which snapshots share
+    scene.edit(handle).grid.set({i, 1, 0}, 1);
   }
   ChangeCursor cursor;
   (void)scene.changes_since(cursor);
@@ -246,6 +249,48 @@ TEST(FrameAllocations, SnapshotsOfScenesAllocateLessThanOncePerGrid) {
   const std::int64_t count = allocations_of_this_thread() - before;
   EXPECT_LT(count - 300, 100) << "apart from the names";
   EXPECT_EQ(snapshot.grids().size(), 300U);
+}
+
+TEST(FrameAllocations, UpdatedSnapshotsAllocateForChangedGridsOnly) {
+  Scene scene;
+  std::vector<InstanceHandle> instances;
+  for (int i = 0; i < 300; ++i) {
+    SceneGrid grid;
+    grid.grid.set({i, 0, 0}, 1);
+    instances.push_back(scene.add_instance({.name = "ship", .grid = scene.add_grid(std::move(grid))}));
+  }
+  Scene snapshot = scene.snapshot();
+  SceneChanges memory;
+  for (int frame = 0; frame < 4; ++frame) {
+    for (const InstanceHandle instance : instances) scene.edit(instance).position.y += 1.0;
+    scene.edit(scene.instances()[instances[7]].grid).grid.set({frame, 1, 0}, 1);
+    const std::int64_t before = allocations_of_this_thread();
+    scene.update_snapshot(snapshot, memory);
+    const std::int64_t count = allocations_of_this_thread() - before;
+    if (frame == 0) continue;  // lists grow
+    EXPECT_LE(count, 3) << "the implementations of a grid and of its field";
+    EXPECT_EQ(snapshot.instances()[instances[9]].position.y, frame + 1.0);
+  }
+}
+
+// After a snapshot, a chunk that comes or goes copies parts of one list of loaded chunks: not those of the field, too.
+TEST(FrameAllocations, LoadedChunksAreOneListOfGridAndField) {
+  Scene scene;
+  SceneGrid& land = scene.edit(scene.add_grid({.name = "land"}));
+  land.grid.make_partial();
+  land.field.make_partial();
+  for (int z = 0; z < 32; ++z) {
+    for (int x = 0; x < 32; ++x) land.grid.load_chunk({x, 0, z}, Chunk(kAir), land.field, std::nullopt);
+  }
+  (void)scene.cursor();
+  for (int i = 0; i < 10; ++i) {
+    const Scene snapshot = scene.snapshot();
+    const std::int64_t before = allocations_of_this_thread();
+    for (int y = 1; y < 4; ++y) land.grid.load_chunk({3 * i, y, 7}, Chunk(kAir), land.field, std::nullopt);
+    land.grid.unload_chunk({3 * i, 0, 8}, land.field);
+    const std::int64_t count = allocations_of_this_thread() - before;
+    EXPECT_LE(count, i == 0 ? 8 : 2) << "the root and the node of 16^3 chunks; first, the blocks of two journals";
+  }
 }
 
 // A snapshot shares the columns of the light's domain. A chunk that arrives changes nine of them.
@@ -282,11 +327,14 @@ TEST(FrameAllocations, SavesAllocateLessThanOncePerChunkOrInstance) {
   const GridHandle grid = scene.add_grid({.name = "ground"});
   for (int i = 0; i < kCount; ++i) scene.edit(grid).grid.set({64 * i, 0, 0}, 1);
   WorldSaver saver;
+  std::int64_t of_begin = 0;
   const auto allocations_of_save = [&](VoxelType type) {
     for (int i = 0; i < kCount; ++i) scene.edit(grid).grid.set({64 * i, 1, 0}, type);
     saver.follow(scene);
     const std::int64_t before = allocations_of_this_thread();
-    EXPECT_TRUE(saver.save(*store, scene));
+    EXPECT_TRUE(saver.begin(*store, scene));
+    of_begin = allocations_of_this_thread() - before;
+    EXPECT_TRUE(saver.step(*store, 1e9));
     const std::int64_t count = allocations_of_this_thread() - before;
     EXPECT_TRUE(store->flush());
     return count;
@@ -301,6 +349,14 @@ TEST(FrameAllocations, SavesAllocateLessThanOncePerChunkOrInstance) {
   (void)allocations_of_save(1);
   for (const InstanceHandle ship : ships) scene.edit(ship).position.x += 1.0;
   EXPECT_LT(allocations_of_save(2), kCount + kCount / 5);
+  EXPECT_LT(of_begin, kCount / 10) << "steps do the rest";
+  for (const InstanceHandle ship : ships) scene.edit(ship).position.x += 1.0;
+  saver.follow(scene);
+  for (const InstanceHandle ship : ships) scene.edit(ship).position.x += 1.0;
+  const std::int64_t before_follow = allocations_of_this_thread();
+  saver.follow(scene);
+  EXPECT_LT(allocations_of_this_thread() - before_follow, 10) << "known changes";
+  (void)allocations_of_save(1);
   for (const InstanceHandle ship : ships) (void)scene.edit(ship);  // as before
   EXPECT_LT(allocations_of_save(3), kCount / 5);
 }

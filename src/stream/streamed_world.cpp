@@ -1,7 +1,6 @@
 #include <quoin/stream/streamed_world.h>
 
 #include <algorithm>
-#include <deque>
 #include <limits>
 #include <map>
 #include <memory>
@@ -17,6 +16,7 @@
 #include "core/bytes/text.h"
 #include "core/coordinates/chunk_trie.h"
 #include "core/coordinates/long_box.h"
+#include "core/memory/make_room.h"
 #include "core/work/workers.h"
 #include "stream/chunk_streamer.h"
 #include "stream/edit_fit.h"
@@ -151,8 +151,8 @@ struct StreamedWorld::Impl {
   std::uint64_t posted_plans = 0;
   bool must_plan = true;
   Clock::time_point planned{};
-  std::deque<CompletedLoad> completed_loads;
-  std::deque<ChunkAddress> leaving;
+  KeptQueue<CompletedLoad> completed_loads;
+  KeptQueue<ChunkAddress> leaving;
   std::size_t ready_to_leave = 0;  // the first of `leaving`: the store has their edits
 
   std::size_t arrived_bytes = 0;  // of `arrivals`
@@ -228,6 +228,7 @@ void StreamedWorld::Impl::set_generator(Streamed& grid, std::shared_ptr<const Ch
       content->grid.load_chunk(chunk, Chunk(kAir));
       content->field.load_air_chunk(chunk);
     });
+    content->grid.share_loaded(content->field);
     streamer.set_generator(grid.number, std::move(generator), extent, others);
   } catch (...) {
     content->grid = std::move(voxels_before);
@@ -399,7 +400,7 @@ void StreamedWorld::Impl::sort_leaving() {
     return chunk == nullptr || saves.has(chunk->save);
   });
   ready_to_leave = static_cast<std::size_t>(unsaved - leaving.begin());
-  if (!store.is_writable()) leaving.erase(unsaved, leaving.end());
+  if (!store.is_writable()) leaving.erase_from(unsaved);
 }
 
 Status StreamedWorld::Impl::begin_save() {
@@ -462,8 +463,7 @@ void StreamedWorld::Impl::put(CompletedLoad completed, ChunkStreamer::Note& note
                                 grid->loaded.find(place.chunk.x, place.chunk.y, place.chunk.z) == nullptr;
   const bool is_late = is_air_by_extent && !is_air(completed.chunk);
   if (is_late) {
-    content->grid.unload_chunk(place.chunk);
-    content->field.unload_chunk(place.chunk);
+    content->grid.unload_chunk(place.chunk, content->field);
   } else if (content->grid.is_loaded(place.chunk)) {
     adopt(*grid, *content, place.chunk);
     ++totals.chunks_dropped;
@@ -478,12 +478,8 @@ void StreamedWorld::Impl::put(CompletedLoad completed, ChunkStreamer::Note& note
     return note.add(place, What::Gone);
   }
   const std::size_t size = loaded_bytes(completed.chunk);
-  content->grid.load_chunk(place.chunk, std::move(completed.chunk.voxels));
-  if (completed.chunk.densities) {
-    content->field.load_chunk(place.chunk, std::move(*completed.chunk.densities));
-  } else {
-    content->field.load_air_chunk(place.chunk);
-  }
+  content->grid.load_chunk(place.chunk, std::move(completed.chunk.voxels), content->field,
+                           std::move(completed.chunk.densities));
   // An edited chunk is saved before it is unloaded.
   if (edited) edited_save = saves.next();
   grid->loaded.find_or_create(place.chunk, kStays) = {size, edited ? edited_save : 0};
@@ -505,8 +501,7 @@ void StreamedWorld::Impl::take_away(const ChunkAddress& place, ChunkStreamer::No
   StoredChunk last;  // destroyed on another thread
   if (const Chunk* const voxels = content->grid.find_chunk(place.chunk)) last.voxels = *voxels;
   if (const DensityChunk* const densities = content->field.find_chunk(place.chunk)) last.densities = *densities;
-  content->grid.unload_chunk(place.chunk);
-  content->field.unload_chunk(place.chunk);
+  content->grid.unload_chunk(place.chunk, content->field);
   note.released.push_back(std::move(last));
   note.add(place, What::Gone);
   const Loaded* const counted = grid->loaded.find(place.chunk.x, place.chunk.y, place.chunk.z);
@@ -549,7 +544,7 @@ void StreamedWorld::Impl::take_in() {
     completed_loads.push_back(std::move(completed));
   }
   budget.set_arrived(arrived_bytes);
-  if (box.has_leaving) leaving.assign(box.leaving.begin(), box.leaving.end());
+  if (box.has_leaving) leaving.assign(box.leaving);
   for (std::string& problem : box.problems) {
     if (problems.size() < kMaxProblems) problems.push_back(std::move(problem));
   }

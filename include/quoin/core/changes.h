@@ -142,6 +142,7 @@ PendingChanges(ChangeCursor&, const Container&, ChangesOf<Container>&)
 
 class [[gnu::visibility("hidden")]] BulkMemory;
 class [[gnu::visibility("hidden")]] ChangeNotifiers;
+class [[gnu::visibility("hidden")]] LoadedChunks;
 
 /// Notifies the owner of a container about edits, for example the scene that owns a grid. The notifier stays with
 /// its container object when the container's content is moved.

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -190,6 +191,11 @@ class DensityGrid {
   [[nodiscard]] std::size_t bytes() const;
   /// Frees memory that edits left unused.
   void compact();
+
+  // For Grid::load_chunk and Grid::unload_chunk of both.
+  [[gnu::visibility("hidden")]] LoadedChunks& loaded();
+  /// Replaces the content of a chunk that was loaded or unloaded: by far air without `samples`.
+  [[gnu::visibility("hidden")]] void replace_loaded(IVec3 chunk, std::optional<DensityChunk> samples);
 
  private:
   friend class Scene;

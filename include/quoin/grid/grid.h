@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -18,6 +19,9 @@
 #include <quoin/grid/voxel_registry.h>
 
 namespace [[gnu::visibility("default")]] quoin {
+
+class DensityChunk;
+class DensityGrid;
 
 /// A voxel position and the type to set there.
 struct PlacedVoxel {
@@ -227,6 +231,17 @@ class Grid {
   [[nodiscard]] std::size_t bytes() const;
   /// Frees memory that edits left unused, except memory shared with snapshots.
   void compact();
+
+  // For Quoin's own sources: a grid and the field of the same scene grid, whose loaded chunks are the same. Both share
+  // one list of them, so that a chunk that comes or goes changes one list.
+
+  /// Loads a chunk of both, far air without `samples`. Returns true if it was not loaded in this grid.
+  [[gnu::visibility("hidden")]] bool load_chunk(IVec3 chunk, Chunk voxels, DensityGrid& field,
+                                                std::optional<DensityChunk> samples);
+  /// Unloads a chunk of both. Returns true if it was loaded in this grid.
+  [[gnu::visibility("hidden")]] bool unload_chunk(IVec3 chunk, DensityGrid& field);
+  /// Lets the field share the list if both have the same loaded chunks. Cost: O(loaded chunks).
+  [[gnu::visibility("hidden")]] void share_loaded(DensityGrid& field) const;
 
  private:
   friend class Scene;

@@ -96,6 +96,8 @@ class ChunkTrie {
   }
 
   [[nodiscard]] std::size_t size() const { return size_; }
+  /// Returns true if both are the same tree: copies of each other without changes since, or empty. Cost: O(1).
+  [[nodiscard]] bool shares_all_with(const ChunkTrie& other) const { return root_ == other.root_; }
 
   /// Calls `visit(chunk, entry)` for each entry in the box of chunks. The order depends only on the coordinates.
   template <class Visit>

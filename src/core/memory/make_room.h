@@ -52,4 +52,39 @@ class KeptList {
   std::vector<T> list_;
 };
 
+/// A queue that keeps its memory, unlike std::deque, which allocates and frees blocks as elements pass through.
+template <class T>
+class KeptQueue {
+ public:
+  [[nodiscard]] std::size_t size() const { return all_.size() - first_; }
+  [[nodiscard]] bool empty() const { return size() == 0; }
+  [[nodiscard]] auto begin() { return all_.begin() + static_cast<std::ptrdiff_t>(first_); }
+  [[nodiscard]] auto end() { return all_.end(); }
+  [[nodiscard]] T& front() { return all_[first_]; }
+  void push_back(T element) {
+    if (all_.size() == all_.capacity() && first_ > all_.size() / 2) {
+      all_.erase(all_.begin(), begin());
+      first_ = 0;
+    }
+    all_.push_back(std::move(element));
+  }
+  void pop_front() {
+    all_[first_] = T();  // not kept until the queue is empty
+    if (++first_ != all_.size()) return;
+    all_.clear();
+    first_ = 0;
+  }
+  /// Drops all elements from one on.
+  void erase_from(typename std::vector<T>::iterator first) { all_.erase(first, all_.end()); }
+  /// Replaces the elements.
+  void assign(const std::vector<T>& elements) {
+    all_ = elements;
+    first_ = 0;
+  }
+
+ private:
+  std::vector<T> all_;
+  std::size_t first_ = 0;  // those before were taken
+};
+
 }  // namespace quoin

@@ -80,6 +80,15 @@ bool DensityGrid::unload_chunk(IVec3 chunk) {
   return impl().store.unload(chunk);
 }
 
+LoadedChunks& DensityGrid::loaded() {
+  return impl().store.loaded();
+}
+
+void DensityGrid::replace_loaded(IVec3 chunk, std::optional<DensityChunk> samples) {
+  const NotifyOnExit notify(impl().store, notifier_);
+  impl().store.replace(chunk, samples ? std::move(*samples) : DensityChunk(impl().store.far()));
+}
+
 bool DensityGrid::is_loaded(IVec3 chunk) const {
   return impl().store.loaded().has(chunk);
 }
@@ -390,8 +399,9 @@ std::int64_t DensityStore::put(IVec3 chunk, DensityChunk samples) {
   return changes.samples;
 }
 
-// Records samples that were, or now are, not loaded.
+// Skips the per-sample checks of `put`: chunks are loaded on threads that must not wait.
 void DensityStore::replace(IVec3 chunk, DensityChunk samples) {
+  samples.unite_slabs();
   journal_.begin_change();
   ChangeReach all;
   all.add_all();
@@ -427,10 +437,8 @@ void DensityStore::set_extent(const IBox& chunks, std::span<const IVec3> others)
   });
 }
 
-// Skips the per-sample checks of `put`: chunks are loaded on threads that must not wait.
 bool DensityStore::load(IVec3 chunk, DensityChunk samples) {
   if (!loaded_.add(chunk)) return false;
-  samples.unite_slabs();
   replace(chunk, std::move(samples));
   return true;
 }

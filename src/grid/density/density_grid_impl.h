@@ -88,10 +88,13 @@ class DensityStore {
   /// Returns how many samples changed.
   std::int64_t put(IVec3 chunk, DensityChunk samples);
   [[nodiscard]] const LoadedChunks& loaded() const { return loaded_; }
+  [[nodiscard]] LoadedChunks& loaded() { return loaded_; }
   void make_partial();
   void set_extent(const IBox& chunks, std::span<const IVec3> others);
   bool load(IVec3 chunk, DensityChunk samples);
   bool unload(IVec3 chunk);
+  /// Replaces the samples of a chunk that was loaded or unloaded. The change is reported as a load, not as an edit.
+  void replace(IVec3 chunk, DensityChunk samples);
   void clear();
   [[nodiscard]] std::vector<IVec3> chunks() const;
   [[nodiscard]] std::size_t bytes() const;
@@ -110,7 +113,6 @@ class DensityStore {
   // Records an edit of one chunk, and removes the chunk if it is all far air. `has_even_row`: an edited row became
   // uniform, so slabs may need to be united.
   void finish_edit(IVec3 chunk, Entry& entry, const ChangeReach& changes, bool has_even_row, bool is_edit = true);
-  void replace(IVec3 chunk, DensityChunk samples);
   template <class ChangeRow>
   std::int64_t edit_rows(IVec3 chunk, const IBox& part, ChangeRow& change);
   std::int64_t make_solid(IVec3 chunk, VoxelType material);

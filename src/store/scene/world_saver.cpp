@@ -284,8 +284,8 @@ class Save {
       return make_error(ErrorCode::InvalidArgument, "the grid of instance \"" + instance->name + "\" does not exist");
     }
     const auto known = state_.saved_instances.find(handle);
-    const bool has_name = known != state_.saved_instances.end() && known->second.name != nullptr &&
-                          *known->second.name == instance->name;
+    const bool has_name =
+        known != state_.saved_instances.end() && known->second.name != nullptr && *known->second.name == instance->name;
     save_.instances.push_back(
         {.handle = handle,
          .is_saved = true,
