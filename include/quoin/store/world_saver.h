@@ -90,11 +90,10 @@ class WorldSaver {
     follow(scene, [](GridHandle, std::optional<IVec3>) {});
   }
   /// Begins a save of the scene as it is now. Later edits belong to the next save. Groups and other small parts are
-  /// copied at once. Changed instances are kept in memory order, and `step` compares and numbers them. If a grid has
-  /// more than 16 changed chunks, `step` copies them from a snapshot of the grid.
+  /// copied at once. Changed instances are copied as they are, and `step` compares and numbers the copies. If a grid
+  /// has more than 16 changed chunks, `step` copies them from a snapshot of the grid.
   /// Errors:   as `save`, and no save is begun.
-  /// Cost:     O(changes except those of chunks + changed grids), about 0.1 us per instance. O(chunks) for new grids,
-  ///           and after a failed save.
+  /// Cost:     O(changes except those of chunks + changed grids). O(chunks) for new grids, and after a failed save.
   /// Requires: as `save`.
   Status begin(WorldStore& world, const Scene& scene, WorldChanges more = {},
                std::function<void(const Status&)> on_saved = {});

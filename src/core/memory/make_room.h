@@ -4,6 +4,8 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
+
 namespace quoin {
 
 /// Reserves memory, so that adding `more` elements cannot fail. If memory must grow, also reserves room for `spare`
@@ -60,8 +62,12 @@ class KeptQueue {
   [[nodiscard]] bool empty() const { return size() == 0; }
   [[nodiscard]] auto begin() { return all_.begin() + static_cast<std::ptrdiff_t>(first_); }
   [[nodiscard]] auto end() { return all_.end(); }
-  [[nodiscard]] T& front() { return all_[first_]; }
-  void push_back(T element) {
+  [[nodiscard]] T& front() {
+    QUOIN_ASSERT(!empty(), "an element");
+    return all_[first_];
+  }
+  /// If it throws, the element is still the caller's.
+  void push_back(T&& element) {
     if (all_.size() == all_.capacity() && first_ > all_.size() / 2) {
       all_.erase(all_.begin(), begin());
       first_ = 0;
@@ -69,6 +75,7 @@ class KeptQueue {
     all_.push_back(std::move(element));
   }
   void pop_front() {
+    QUOIN_ASSERT(!empty(), "an element");
     all_[first_] = T();  // not kept until the queue is empty
     if (++first_ != all_.size()) return;
     all_.clear();

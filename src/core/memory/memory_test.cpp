@@ -1,9 +1,12 @@
 #include <quoin/core/memory.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <new>
+#include <random>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -14,6 +17,7 @@
 
 #include "core/memory/block_arena_for_tests.h"
 #include "core/memory/large_array.h"
+#include "core/memory/make_room.h"
 
 namespace quoin {
 namespace {
@@ -180,6 +184,43 @@ void serve_threads() {
 }
 TEST(BlockFunctionsDeathTest, ServeSeveralThreads) {
   QUOIN_EXPECT_IN_NEW_PROCESS(serve_threads);
+}
+
+// Compares with std::deque.
+TEST(KeptQueue, PassesElementsInOrder) {
+  std::mt19937 random(3);
+  KeptQueue<int> queue;
+  std::deque<int> slow;
+  for (int step = 0; step < 5'000; ++step) {
+    switch (random() % 9U) {
+      case 0: {
+        const std::vector<int> all(random() % 20U, step);
+        queue.assign(all);
+        slow.assign(all.begin(), all.end());
+        break;
+      }
+      case 1: {
+        const auto kept = static_cast<std::ptrdiff_t>(slow.size() / 2);
+        queue.erase_from(queue.begin() + kept);
+        slow.erase(slow.begin() + kept, slow.end());
+        break;
+      }
+      case 2:
+      case 3:
+      case 4:
+        if (slow.empty()) break;
+        queue.pop_front();
+        slow.pop_front();
+        break;
+      default:
+        queue.push_back(int{step});
+        slow.push_back(step);
+    }
+    ASSERT_EQ(queue.empty(), slow.empty());
+    ASSERT_TRUE(std::equal(queue.begin(), queue.end(), slow.begin(), slow.end())) << step;
+    if (slow.empty()) continue;
+    ASSERT_EQ(queue.front(), slow.front()) << step;
+  }
 }
 
 TEST(BlockAllocator, RejectsMoreElementsThanMemoryHas) {

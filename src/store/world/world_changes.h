@@ -174,7 +174,7 @@ class StepTime {
 /// A save that is copied in steps, with the state of the moment when it began:
 ///
 ///   begin   small parts -> changes    few chunks -> changes    other chunks: a snapshot of their grid
-///           instances -> `instances`, in memory order
+///           instances -> `instances`, as they are
 ///   step    instances -> changes, with their numbers           chunks of the snapshots -> changes
 ///
 struct SaveInSteps {
