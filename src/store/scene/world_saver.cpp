@@ -1,7 +1,6 @@
 #include <quoin/store/world_saver.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -139,6 +138,10 @@ template <class T>
   const auto found = numbers.numbers.find(handle);
   if (found == numbers.numbers.end()) return std::nullopt;
   return static_cast<std::size_t>(found->second);
+}
+
+Error lacks_grid(const std::string& instance) {
+  return make_error(ErrorCode::InvalidArgument, "the grid of instance \"" + instance + "\" does not exist");
 }
 
 /// The beginning of a save: collects the changes of a scene, except most chunks, and keeps instances for the steps.
@@ -280,9 +283,7 @@ class Save {
       save_.instances.push_back({.handle = handle});
       return {};
     }
-    if (scene_.grids().find(instance->grid) == nullptr) {
-      return make_error(ErrorCode::InvalidArgument, "the grid of instance \"" + instance->name + "\" does not exist");
-    }
+    if (scene_.grids().find(instance->grid) == nullptr) return lacks_grid(instance->name);
     const auto known = state_.saved_instances.find(handle);
     const bool has_name =
         known != state_.saved_instances.end() && known->second.name != nullptr && *known->second.name == instance->name;
@@ -444,29 +445,30 @@ class Save {
 };
 
 // Numbers an instance as it was when the save began, and adds it unless the last save had it like this.
-void put_instance(SaverState& state, SaveInSteps& save, SaveInSteps::OfInstance& kept) {
+Status put_instance(SaverState& state, SaveInSteps& save, SaveInSteps::OfInstance& kept) {
   if (!kept.is_saved) {
     store::remove(save, part::kInstance, state.instances, kept.handle);
     state.saved_instances.erase(kept.handle);
-    return;
+    return {};
   }
   const auto grid = state.grids.find(kept.instance.grid);
-  QUOIN_ASSERT(grid != state.grids.end(), "the grid of a saved instance has a number since the save began");
+  if (grid == state.grids.end()) return lacks_grid(*kept.name);  // marked as saved, but without `edit`
   const auto group = number_of(state.groups, kept.instance.group);
   const auto layer = number_of(state.layers, kept.instance.layer);
   InstancePart now{{std::move(kept.instance), grid->second.number, group, layer}, std::move(kept.name)};
   const auto [known, is_new] = state.saved_instances.try_emplace(kept.handle);
   InstancePart& saved = known.value();
-  if (!is_new && !save.is_full && is_same(saved, now)) return;
+  if (!is_new && !save.is_full && is_same(saved, now)) return {};
   saved = now;
   WorldParts::put(save.changes, state.instances.of(kept.handle), std::move(now));
+  return {};
 }
 
 // Copies a part of a save. Returns true if nothing is left.
-bool copy_some(SaverState& state, SaveInSteps& save, StepTime& time) {
+Result<bool> copy_some(SaverState& state, SaveInSteps& save, StepTime& time) {
   for (; save.next_instance < save.instances.size(); ++save.next_instance) {
     if (time.is_over()) return false;
-    put_instance(state, save, save.instances[save.next_instance]);
+    if (const auto done = put_instance(state, save, save.instances[save.next_instance]); !done) return done.error();
   }
   return save.copy_chunks(time);
 }
@@ -578,7 +580,12 @@ Result<std::optional<SaveTicket>> WorldSaver::step(WorldStore& world, double sec
   try {
     SaveInSteps& save = *impl_->begun;
     StepTime time(seconds);
-    save.is_copied = save.is_copied || copy_some(impl_->state, save, time);
+    const Result<bool> copied = save.is_copied ? true : copy_some(impl_->state, save, time);
+    if (!copied) {
+      impl_->give_back();
+      return copied.error();
+    }
+    save.is_copied = *copied;
     if (!save.is_copied || !time.has_begun_only()) return std::optional<SaveTicket>();
     const auto ticket = world.save(std::move(save.changes), std::move(save.on_saved));
     if (!ticket) {
