@@ -569,9 +569,10 @@ Status StreamedWorld::Impl::plan(std::span<const Viewer> viewers) {
   const bool begins = saves.is_due(options.save_interval) || (is_wanted && !saves.is_refused());
   if (begins && has_types) {
     outcome = save_now();
+  } else if (begins && !saves.is_begun()) {
+    outcome = begin_save();  // the next call copies
   } else {
-    if (begins && !saves.is_begun()) outcome = begin_save();
-    if (outcome) outcome = saves.step(kSaveShare * options.update_seconds);
+    outcome = saves.step(kSaveShare * options.update_seconds);
   }
   if (saves.handed() != handed) sort_leaving();
   if (outcome) outcome = saves.disk().take(store.path());
