@@ -7,6 +7,7 @@
 #include <limits>
 #include <random>
 #include <tuple>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -15,6 +16,7 @@
 #include "core/not_finite_for_tests.h"
 #include "grid/change_follower_for_tests.h"
 #include "mesh/mesh_oracle.h"
+#include "trace/kernel/ray_kernel.h"
 #include "trace/trace_oracle.h"
 #include "trace/tree_view.h"
 
@@ -190,6 +192,67 @@ TEST_P(Packets, MatchPlainPacketsAndSingleRays) {
     ASSERT_FALSE(HasFatalFailure()) << "packet " << i;
   }
   EXPECT_GT(hits, 500);
+}
+
+// Compares the results for arrays of packets with those of single plain rays. Returns the number of hits.
+int hits_if_array_agrees(const OccupancyTree& tree, const std::vector<RayPacket>& packets, InstructionSet with) {
+  std::vector<std::uint32_t> expected(packets.size());
+  int hits = 0;
+  for (std::size_t i = 0; i < packets.size(); ++i) {
+    const InstructionSetOverride over(InstructionSet::Plain);
+    for (std::uint32_t left = packets[i].active; left != 0; left &= left - 1) {
+      const int lane = std::countr_zero(left);
+      const bool is_hit = any_hit(tree, packets[i].ray(lane), packets[i].max_t[static_cast<std::size_t>(lane)]);
+      expected[i] |= std::uint32_t{is_hit} << lane;
+    }
+    hits += std::popcount(expected[i]);
+  }
+  constexpr std::uint32_t kUntouched = 0xABCD1234;
+  for (const InstructionSet set : {InstructionSet::Plain, with}) {
+    const InstructionSetOverride over(set);
+    std::vector<std::uint32_t> found(packets.size() + 1, kUntouched);
+    any_hits(tree, packets, found);
+    EXPECT_EQ(found.back(), kUntouched);
+    found.pop_back();
+    EXPECT_EQ(found, expected) << name_in_tests(set);
+  }
+  return hits;
+}
+
+TEST_P(Packets, ArraysMatchSingleRays) {
+  int hits = 0;
+  for (int i = 0; i < 200 && !HasFailure(); ++i) {
+    std::vector<RayPacket> packets(static_cast<std::size_t>(whole(0, 3) == 0 ? whole(0, 3) : whole(4, 60)));
+    const bool is_endless = whole(0, 2) != 0;
+    for (RayPacket& rays : packets) {
+      const int kind = whole(0, 3);
+      rays = kind == 0 ? packet() : kind == 1 ? bunch() : beam();
+      if (is_endless || whole(0, 1) == 0) rays.max_t.fill(kInfinity);
+      if (whole(0, 5) == 0) rays.active &= static_cast<std::uint32_t>(whole(0, 0xFFFF));
+    }
+    hits += hits_if_array_agrees(tree_, packets, set());
+  }
+  EXPECT_GT(hits, 1'000);
+}
+
+// As shadow rays: from the faces of voxels, most of them blocked soon or never.
+TEST_P(Packets, ArraysOfShadowRaysMatchSingleRays) {
+  int hits = 0;
+  for (int i = 0; i < 100 && !HasFailure(); ++i) {
+    const DVec3 sun = glm::normalize(DVec3{uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)});
+    std::vector<RayPacket> packets(static_cast<std::size_t>(whole(1, 40)));
+    for (RayPacket& rays : packets) {
+      for (int lane = 0; lane < RayPacket::kSize; ++lane) {
+        const Ray towards = ray();
+        const auto hit = first_hit(tree_, towards);
+        if (!hit) continue;
+        const DVec3 lift = (whole(0, 2) == 0 ? 0.0 : 0.001) * DVec3(normal_of(hit->face));
+        rays.set(lane, {towards.origin + towards.direction * hit->t + lift, sun}, kInfinity);
+      }
+    }
+    hits += hits_if_array_agrees(tree_, packets, set());
+  }
+  EXPECT_GT(hits, 400);
 }
 
 // Values in inactive lanes change no bit, however small they are.
@@ -412,6 +475,50 @@ TEST(PacketTracing, MatchesDenseTracerOverLongDistances) {
   }
 }
 
+// More packets than a kernel takes at once, of rays that only a walk in double precision can finish.
+TEST(PacketTracing, LongArraysMatchSingleRays) {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> uniform(0.0, 40.0);
+  std::vector<RayPacket> packets(2 * trace::kMostPackets + 44);
+  for (RayPacket& rays : packets) {
+    for (int lane = 0; lane < RayPacket::kSize; ++lane) {
+      const DVec3 from{8.5, uniform(random), uniform(random)};
+      const DVec3 to{random() % 3 == 0 ? 9.5 : 5'000, uniform(random), uniform(random)};
+      rays.set(lane, {from, glm::normalize(to - from)}, random() % 40 == 0 ? 1'000.0 : kInfinity);
+    }
+  }
+  for (const bool has_table : {true, false}) {
+    Grid grid;
+    grid.fill_box({{0, 0, 0}, {9, 41, 41}}, 1);
+    grid.fill_sphere({5'000, 20, 20}, 15.0, 2);
+    if (!has_table) grid.fill_box({{1'000'000, 0, 0}, {1'000'009, 41, 41}}, 1);
+    const OccupancyTree tree = OccupancyTree::build(grid, oracle::mixed_types());
+    EXPECT_EQ(tree.view() != nullptr, has_table);
+    for (const InstructionSet set : sets_of_this_machine()) EXPECT_GT(hits_if_array_agrees(tree, packets, set), 1'000);
+  }
+}
+
+TEST(PacketTracing, EmptyArraysAreTraced) {
+  const OccupancyTree empty;
+  Grid grid;
+  grid.set({0, 0, 0}, 1);
+  const OccupancyTree tree = OccupancyTree::build(grid, oracle::mixed_types());
+  for (const InstructionSet set : sets_of_this_machine()) {
+    const InstructionSetOverride over(set);
+    any_hits(tree, {}, {});
+    std::array<std::uint32_t, 2> blocked{7, 7};
+    const std::array<RayPacket, 2> idle{};
+    any_hits(tree, idle, blocked);
+    EXPECT_EQ(blocked, (std::array<std::uint32_t, 2>{}));
+    std::array<RayPacket, 2> rays{};
+    rays[1].set(5, {{0.5, 0.5, -3.0}, {0.0, 0.0, 1.0}}, kInfinity);
+    any_hits(empty, rays, blocked);
+    EXPECT_EQ(blocked, (std::array<std::uint32_t, 2>{}));
+    any_hits(tree, rays, blocked);
+    EXPECT_EQ(blocked, (std::array<std::uint32_t, 2>{0, 1U << 5}));
+  }
+}
+
 TEST(PacketTracing, InvalidRaysHitNothing) {
   Grid grid;
   grid.fill_box({{-5, -5, -5}, {6, 6, 6}}, 1);
@@ -426,12 +533,17 @@ TEST(PacketTracing, InvalidRaysHitNothing) {
   rays.set(7, {{0, 0, 0}, {1, 0, 0}}, -1.0);
   rays.set(8, {{1e300, 0, 0}, {-1, 0, 0}}, kInfinity);
   rays.set(9, {{0, 0, 0}, {1, 0, 0}}, 0.0);
+  std::vector<RayPacket> endless(20, rays);
+  for (RayPacket& each : endless) each.max_t.fill(kInfinity);
   for (const InstructionSet set : sets_of_this_machine()) {
     const InstructionSetOverride over(set);
     PacketHits found;
     first_hits(tree, rays, found);
     EXPECT_EQ(found.hit, 0x300U) << "the far one and the one that starts inside";
     EXPECT_EQ(any_hits(tree, rays), 0x300U);
+    std::vector<std::uint32_t> blocked(endless.size());
+    any_hits(tree, endless, blocked);
+    EXPECT_EQ(blocked, std::vector<std::uint32_t>(endless.size(), 0x3C0U)) << "towards the box or in it";
     EXPECT_EQ(any_hits(OccupancyTree::build(Grid(), oracle::mixed_types()), rays), 0U);
   }
 }
@@ -452,6 +564,13 @@ TEST(PacketDeathTest, RejectsActiveLanesBeyondThePacket) {
   const OccupancyTree tree;
   QUOIN_EXPECT_MISTAKE(first_hits(tree, rays, hits), "active lanes are lanes of the packet");
   QUOIN_EXPECT_MISTAKE((void)any_hits(tree, rays), "active lanes are lanes of the packet");
+}
+
+TEST(PacketDeathTest, RejectsTooFewMasks) {
+  const OccupancyTree tree;
+  const std::vector<RayPacket> packets(2);
+  std::vector<std::uint32_t> blocked(1);
+  QUOIN_EXPECT_MISTAKE(any_hits(tree, packets, blocked), "a mask for every packet");
 }
 
 TEST(PacketDeathTest, AssertsOnReadOfLaneWithoutHit) {

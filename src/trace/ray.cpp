@@ -1,6 +1,8 @@
 #include <quoin/trace/ray.h>
 
+#include <algorithm>
 #include <bit>
+#include <span>
 
 #include <quoin/core/assert.h>
 #include <quoin/trace/packet.h>
@@ -21,6 +23,33 @@ std::optional<RayHit> walk_to_first_hit(const OccupancyTree& tree, const Ray& ra
   Walk walk(tree, ray);
   if (!walk.enter(tree.bounds(), max_t) || !walk.find(max_t)) return std::nullopt;
   return RayHit{walk.voxel(), face_of(walk, ray), walk.t(), walk.axis() < 0};
+}
+
+// Finds the blocked rays of at most trace::kMostPackets packets.
+void some_any_hits(const OccupancyTree& tree, std::span<const RayPacket> packets, std::span<std::uint32_t> blocked) {
+  for (const RayPacket& rays : packets) {
+    QUOIN_ASSERT(rays.active >> RayPacket::kSize == 0, "active lanes are lanes of the packet");
+  }
+  const trace::TreeView* const view = tree.view();
+  std::uint32_t unfinished[trace::kMostPackets];
+  if (view != nullptr) {
+    trace::kernel().any_hits(*view, packets.data(), packets.size(), blocked.data(), unfinished);
+  } else {
+    for (std::size_t i = 0; i < packets.size(); ++i) {
+      blocked[i] = 0;
+      unfinished[i] = packets[i].active;
+    }
+  }
+  for (std::size_t i = 0; i < packets.size(); ++i) {
+    const RayPacket& rays = packets[i];
+    QUOIN_ASSERT(((blocked[i] | unfinished[i]) & ~rays.active) == 0, "results of active lanes only");
+    for (std::uint32_t left = unfinished[i]; left != 0; left &= left - 1) {
+      const int lane = std::countr_zero(left);
+      const double max_t = rays.max_t[static_cast<std::size_t>(lane)];
+      const bool is_blocked = walk_to_first_hit(tree, rays.ray(lane), max_t).has_value();
+      blocked[i] |= std::uint32_t{is_blocked} << lane;
+    }
+  }
 }
 
 }  // namespace
@@ -67,20 +96,17 @@ void first_hits(const OccupancyTree& tree, const RayPacket& rays, PacketHits& hi
   }
 }
 
+void any_hits(const OccupancyTree& tree, std::span<const RayPacket> packets, std::span<std::uint32_t> blocked) {
+  QUOIN_ASSERT(blocked.size() >= packets.size(), "a mask for every packet");
+  for (std::size_t first = 0; first < packets.size(); first += trace::kMostPackets) {
+    const std::size_t size = std::min(trace::kMostPackets, packets.size() - first);
+    some_any_hits(tree, packets.subspan(first, size), blocked.subspan(first, size));
+  }
+}
+
 std::uint32_t any_hits(const OccupancyTree& tree, const RayPacket& rays) {
-  QUOIN_ASSERT(rays.active >> RayPacket::kSize == 0, "active lanes are lanes of the packet");
-  std::uint32_t unfinished = rays.active;
   std::uint32_t blocked = 0;
-  if (const trace::TreeView* view = tree.view()) {
-    blocked = trace::kernel().any_hits(*view, rays, unfinished);
-    QUOIN_ASSERT(((blocked | unfinished) & ~rays.active) == 0, "results of active lanes only");
-  }
-  for (; unfinished != 0; unfinished &= unfinished - 1) {
-    const int lane = std::countr_zero(unfinished);
-    const bool is_blocked =
-        walk_to_first_hit(tree, rays.ray(lane), rays.max_t[static_cast<std::size_t>(lane)]).has_value();
-    blocked |= std::uint32_t{is_blocked} << lane;
-  }
+  some_any_hits(tree, std::span(&rays, 1), std::span(&blocked, 1));
   return blocked;
 }
 

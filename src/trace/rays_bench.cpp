@@ -1,4 +1,5 @@
-// rays/*: the 256x128x256 terrain, primary, shadow and occlusion rays, one at a time and in packets; rays/random600.
+// rays/*: the 256x128x256 terrain, primary, shadow and occlusion rays, one at a time, in packets and in arrays of
+// packets; rays/random600.
 // rays/*/subnormal_lanes: the same with subnormal numbers in unused lanes. ratio_to_zeroed is its time divided by the
 // time with zeros there, at most 1.1.
 
@@ -100,6 +101,19 @@ void trace_packets(benchmark::State& state, const Case& c, InstructionSet set) {
   report(state, c.rays().size(), hits, c.expected);
 }
 
+void trace_array(benchmark::State& state, const Case& c, InstructionSet set) {
+  const InstructionSetOverride over(set);
+  const std::vector<RayPacket> packets = workloads::ray_packets(c.rays());
+  std::vector<std::uint32_t> blocked(packets.size());
+  int hits = 0;
+  for (auto _ : state) {
+    any_hits(ray_workload().tree, packets, blocked);
+    hits = 0;
+    for (const std::uint32_t each : blocked) hits += std::popcount(each);
+  }
+  report(state, c.rays().size(), hits, c.expected);
+}
+
 // Subnormal as a float, and as a double.
 constexpr double kSubnormalFloat = 1e-40;
 constexpr double kSubnormalDouble = 1e-310;
@@ -170,6 +184,9 @@ void trace_subnormal_packets(benchmark::State& state, const Case& c, Instruction
     const std::string name = "rays/" + std::string(c.name);
     benchmark::RegisterBenchmark((name + "/single" + suffix).c_str(), trace, c, set)->Unit(benchmark::kMillisecond);
     benchmark::RegisterBenchmark((name + "/packet" + suffix).c_str(), trace_packets, c, set)
+        ->Unit(benchmark::kMillisecond);
+    if (c.ask == Ask::First) return;
+    benchmark::RegisterBenchmark((name + "/array" + suffix).c_str(), trace_array, c, set)
         ->Unit(benchmark::kMillisecond);
   };
   for (const Case& c : kCases) add(c, "", instruction_set());

@@ -103,6 +103,10 @@ inline F first_of(const Planes& t, Crossing& which) {
   return min(t.x, y_or_z);
 }
 
+inline int count(Mask lanes) {
+  return std::popcount(bits(lanes));
+}
+
 // The start positions of the rays.
 struct Starts {
   alignas(64) double position[3][kWidth];
@@ -375,18 +379,27 @@ inline F first_cell(const Axis& axis, F t, Mask entered, Mask ties_before, Mask 
   return select(entered, select(axis.forward, low, high), at);
 }
 
+inline Planes first_cells(const Lanes& lanes, F t, const Crossing& entered) {
+  // Most packets start in their boxes.
+  if (!any(lanes.live & (entered.x | entered.y | entered.z))) {
+    const auto at_start = [](const Axis& axis) { return floor(axis.origin * all(0.25F)); };
+    return {at_start(lanes.x), at_start(lanes.y), at_start(lanes.z)};
+  }
+  return {first_cell(lanes.x, t, entered.x, entered.y | entered.z, mask_of(0)),
+          first_cell(lanes.y, t, entered.y, entered.z, entered.x),
+          first_cell(lanes.z, t, entered.z, mask_of(0), entered.x | entered.y)};
+}
+
 inline CellWalk enter_box(const TreeView& tree, const Lanes& lanes, F t, const Crossing& entered) {
-  const F cx = first_cell(lanes.x, t, entered.x, entered.y | entered.z, mask_of(0));
-  const F cy = first_cell(lanes.y, t, entered.y, entered.z, entered.x);
-  const F cz = first_cell(lanes.z, t, entered.z, mask_of(0), entered.x | entered.y);
+  const Planes cells = first_cells(lanes, t, entered);
   const auto after = [](const Axis& axis, F cell) {
     const F corner = cell * all(4.0F);
     return select(axis.still, all(kNever), select(axis.forward, corner + all(8.0F), corner - all(4.0F)));
   };
   const auto place = [](const Axis& axis, F cell) { return to_int(cell) + shift_right_signed<2>(axis.base); };
-  return {{after(lanes.x, cx), after(lanes.y, cy), after(lanes.z, cz)},
-          all(tree.first_cell) + place(lanes.x, cx) + place(lanes.y, cy) * all(tree.cell_strides.y) +
-              place(lanes.z, cz) * all(tree.cell_strides.z)};
+  return {{after(lanes.x, cells.x), after(lanes.y, cells.y), after(lanes.z, cells.z)},
+          all(tree.first_cell) + place(lanes.x, cells.x) + place(lanes.y, cells.y) * all(tree.cell_strides.y) +
+              place(lanes.z, cells.z) * all(tree.cell_strides.z)};
 }
 
 inline Mask is_occupied(const TreeView& tree, I index) {
@@ -394,16 +407,18 @@ inline Mask is_occupied(const TreeView& tree, I index) {
   return test_bit(gather(tree.cells, word), index);
 }
 
-// Walks until each lane of `walking` is in an occupied cell or has left its box. Stores the occupied cells in `at`.
-// Returns the lanes that found a cell.
-inline Mask find_cells(const TreeView& tree, const Lanes& lanes, CellWalk& at, Mask walking) {
+// Walks until fewer than `few` lanes of `walking` are left, which neither are in an occupied cell nor have left their
+// box; `walking` becomes these lanes. Stores their positions and the occupied cells in `at`. Returns the lanes that
+// found a cell. Requires: few > 0.
+[[gnu::always_inline]] inline Mask find_some_cells(const TreeView& tree, const Lanes& lanes, CellWalk& at,
+                                                   Mask& walking, int few) {
   const Strides strides = strides_of(lanes, tree.cell_strides.x, tree.cell_strides.y, tree.cell_strides.z);
   const Planes four = steps_of(lanes, 4.0F);
   Nexts nexts = {next_planes(lanes.x, at.after.x, four.x), next_planes(lanes.y, at.after.y, four.y),
                  next_planes(lanes.z, at.after.z, four.z)};
   I index = at.index;
   Mask found_any = mask_of(0);
-  while (any(walking)) {
+  while (count(walking) >= few) {
     Crossing crossing;
     const F t = cross_next(lanes, four, nexts, crossing);
     index = stepped(index, crossing, strides);
@@ -416,7 +431,19 @@ inline Mask find_cells(const TreeView& tree, const Lanes& lanes, CellWalk& at, M
     found_any = found_any | found;
     walking = walking & ~found;
   }
+  if (few > 1) {
+    at.after.x = select(walking, nexts.x.after, at.after.x);
+    at.after.y = select(walking, nexts.y.after, at.after.y);
+    at.after.z = select(walking, nexts.z.after, at.after.z);
+    at.index = select(walking, index, at.index);
+  }
   return found_any;
+}
+
+// Walks until each lane of `walking` is in an occupied cell or has left its box. Stores the occupied cells in `at`.
+// Returns the lanes that found a cell.
+inline Mask find_cells(const TreeView& tree, const Lanes& lanes, CellWalk& at, Mask walking) {
+  return find_some_cells(tree, lanes, at, walking, 1);
 }
 
 // Returns the time when a lane crossed this plane; a negative number if it never did.
@@ -538,6 +565,17 @@ inline VoxelWalk enter_cells(const Lanes& lanes, const Planes& entries, const Vo
   return walk;
 }
 
+// Enters the lanes' current cells, whose words are read for the lanes of `found`. Returns the cells.
+[[gnu::always_inline]] inline Cells enter_voxels(const TreeView& tree, const Lanes& lanes, const VoxelSteps& steps,
+                                                 const Planes& after, Mask found, VoxelWalk& voxels) {
+  const Planes eight = steps_of(lanes, 8.0F);
+  const Planes entries = {after.x - eight.x, after.y - eight.y, after.z - eight.z};
+  const Cells at = {cell_of(lanes.x, entries.x), cell_of(lanes.y, entries.y), cell_of(lanes.z, entries.z)};
+  voxels = enter_cells(lanes, entries, steps);
+  read_words(tree, at, found, voxels);
+  return at;
+}
+
 // Walks each lane of `walking` through the voxels of its cell. Calls `meet(met)` at each step with the lanes in
 // occupied voxels; it returns the lanes that stop.
 template <class Meet>
@@ -591,17 +629,14 @@ template <class Meet>
 [[gnu::always_inline]] inline Mask walk_apart(const TreeView& tree, const Lanes& lanes, const VoxelSteps& steps, F t,
                                               const Crossing& entered, Meet&& meet) {
   CellWalk cells = enter_box(tree, lanes, t, entered);
-  const Planes eight = steps_of(lanes, 8.0F);
   Mask searching = lanes.live;
   Mask found = searching & is_occupied(tree, cells.index);
   Mask done = mask_of(0);
   for (;;) {
     found = found | find_cells(tree, lanes, cells, searching & ~found);
     if (!any(found)) return done;
-    const Planes entries = {cells.after.x - eight.x, cells.after.y - eight.y, cells.after.z - eight.z};
-    const Cells at = {cell_of(lanes.x, entries.x), cell_of(lanes.y, entries.y), cell_of(lanes.z, entries.z)};
-    VoxelWalk voxels = enter_cells(lanes, entries, steps);
-    read_words(tree, at, found, voxels);
+    VoxelWalk voxels;
+    const Cells at = enter_voxels(tree, lanes, steps, cells.after, found, voxels);
     const Mask met = meet(at, voxels, found);
     done = done | met;
     searching = found & ~met;

@@ -375,49 +375,265 @@ inline void trace_first(const TreeView& tree, const RayPacket& rays, PacketHits&
   trace_filled(rays, [&](const RayPacket& filled) { trace_first_lanes(tree, filled, hits, unfinished); });
 }
 
-// Returns the blocked rays. Short rays walk in a window, other rays in the usual way.
-inline std::uint32_t trace_any_lanes(const TreeView& tree, const RayPacket& rays, std::uint32_t& unfinished) {
-  LaneHits others;
-  std::uint32_t blocked = 0;
-  std::uint32_t doubtful = 0;
-  for (int first = 0; first < RayPacket::kSize; first += kWidth) {
-    const std::uint32_t active = rays.active >> first & kAllLanes;
-    const std::uint32_t wanted = trace_short(tree, rays, first, active, [&](const IVec3& origin, ShortRays& in_window) {
-      blocked |= bits(walk_short(tree, origin, in_window)) << first;
-      doubtful |= bits(in_window.doubtful) << first;
-    });
-    if (wanted == 0) continue;
-    F t;
-    Crossing entered;
-    Lanes lanes = set_up(tree, rays, first, wanted, t, entered);
-    others.unfinished |= bits(lanes.unfinished) << first;
-    if (!any(lanes.live)) continue;
-    if (any(lanes.live & (narrow(rays.max_t.data() + first) < all(kEndless)))) {
-      keep(trace<Ask::Where>(tree, lanes, t, entered), first, others);
-    } else {
-      blocked |= bits(trace<Ask::Whether>(tree, lanes, t, entered).hit) << first;
+// Rays on their way from cell to cell that are asked only if they are blocked.
+struct Walkers {
+  Lanes lanes;  // `live`, directions and boxes are not kept
+  CellWalk cells;
+  I ray;  // the number of the ray, above nine flags of its axes
+};
+
+constexpr int kAxisFlags = 9;
+alignas(64) constexpr std::int32_t kLaneNumbers[RayPacket::kSize] = {0, 1, 2,  3,  4,  5,  6,  7,
+                                                                     8, 9, 10, 11, 12, 13, 14, 15};
+
+// Returns Walkers::ray for rays numbered from `first` on.
+inline I rays_from(const Lanes& lanes, int first) {
+  I ray = shift_left<kAxisFlags>(load(kLaneNumbers) + all(first));
+  int flag = 1;
+  for (const Axis* axis : {&lanes.x, &lanes.y, &lanes.z}) {
+    for (const Mask mask : {axis->forward, axis->still, axis->moved}) {
+      ray = add_if(mask, ray, all(flag));
+      flag *= 2;
     }
   }
-  unfinished = others.unfinished & ~(others.hit | blocked);
-  if (others.hit != 0) {
-    RayPacket::Lanes<double> t;
-    RayPacket::Lanes<std::int32_t> forward;
-    blocked |= measure(tree, rays, others, t, forward);
-  }
-  // Short rays are never left unfinished.
-  for (; doubtful != 0; doubtful &= doubtful - 1) {
-    const int lane = std::countr_zero(doubtful);
-    RayHit hit;
-    bool is_unfinished = false;
-    const bool is_blocked =
-        first_single<PathTracer>(tree, rays.ray(lane), rays.max_t[static_cast<std::size_t>(lane)], hit, is_unfinished);
-    blocked = (blocked & ~(1U << lane)) | std::uint32_t{is_blocked} << lane;
-  }
-  return blocked;
+  return ray;
 }
 
-inline std::uint32_t trace_any(const TreeView& tree, const RayPacket& rays, std::uint32_t& unfinished) {
-  return trace_filled(rays, [&](const RayPacket& filled) { return trace_any_lanes(tree, filled, unfinished); });
+// A pool of rays that left groups with too few of their kind, until they fill a group again:
+//
+//   origin x     | 0 | 1 | ... |count - 1| - | - |
+//   inverse x    | 0 | 1 | ...                        by axis: origin, inverse, base, the plane after the next;
+//   ...                                               index, exit_t, ray
+class RayPool {
+ public:
+  [[nodiscard]] int count() const { return count_; }
+
+  void add(const Walkers& from, Mask which) {
+    const Packing packing = packing_of(which);
+    std::int32_t* to = numbers_[0] + count_;
+    const auto put = [&](I numbers) {
+      store_packed(to, packing, numbers);
+      to += kRoom;
+    };
+    const auto put_axis = [&](const Axis& axis, F after) {
+      put(as_int(axis.origin));
+      put(as_int(axis.inverse));
+      put(axis.base);
+      put(as_int(after));
+    };
+    put_axis(from.lanes.x, from.cells.after.x);
+    put_axis(from.lanes.y, from.cells.after.y);
+    put_axis(from.lanes.z, from.cells.after.z);
+    put(from.cells.index);
+    put(as_int(from.lanes.exit_t));
+    put(from.ray);
+    count_ += trace::count(which);
+    QUOIN_ASSERT(count_ + kWidth <= kRoom, "room for a register after the last ray");
+  }
+
+  // Takes out the last rays, up to `kWidth`. Returns their lanes.
+  Mask take(Walkers& to) {
+    QUOIN_ASSERT(count_ > 0, "rays in the pool");
+    const int taken = std::min(count_, kWidth);
+    count_ -= taken;
+    const Mask lanes = mask_of(kAllLanes >> (kWidth - taken));
+    const std::int32_t* from = numbers_[0] + count_;
+    // Zeros in other lanes: subnormal numbers would be slow.
+    const auto get = [&] {
+      const I numbers = select(lanes, load(from), all(0));
+      from += kRoom;
+      return numbers;
+    };
+    const auto get_axis = [&](Axis& axis, F& after) {
+      axis.origin = as_float(get());
+      axis.inverse = as_float(get());
+      axis.base = get();
+      after = as_float(get());
+    };
+    get_axis(to.lanes.x, to.cells.after.x);
+    get_axis(to.lanes.y, to.cells.after.y);
+    get_axis(to.lanes.z, to.cells.after.z);
+    to.cells.index = get();
+    to.lanes.exit_t = as_float(get());
+    to.ray = get();
+    int flag = 1;
+    for (Axis* axis : {&to.lanes.x, &to.lanes.y, &to.lanes.z}) {
+      for (Mask* mask : {&axis->forward, &axis->still, &axis->moved}) {
+        *mask = test(to.ray, all(flag));
+        flag *= 2;
+      }
+    }
+    return lanes;
+  }
+
+ private:
+  static constexpr int kKinds = 15;
+  // Both pools together hold less than a group each, and a new group. Packing writes whole registers.
+  static constexpr int kRoom = 4 * kWidth;
+  alignas(64) std::int32_t numbers_[kKinds][kRoom];
+  int count_ = 0;
+};
+
+// Adds the short rays that are blocked to `blocked`, and doubtful rays to `doubtful`. Returns the rays that are not
+// short. Not inlined: its loop would lack registers.
+[[gnu::noinline]] inline std::uint32_t trace_windows(const TreeView& tree, const RayPacket& rays, int first,
+                                                     std::uint32_t wanted, std::uint32_t& blocked,
+                                                     std::uint32_t& doubtful) {
+  return trace_short(tree, rays, first, wanted, [&](const IVec3& origin, ShortRays& in_window) {
+    blocked |= bits(walk_short(tree, origin, in_window)) << first;
+    doubtful |= bits(in_window.doubtful) << first;
+  });
+}
+
+// Finds the blocked rays of several packets. Short rays walk in windows, and other rays of limited length as in
+// `trace_first`. Endless rays leave their packet when few of them remain in it. They then walk on in groups of rays
+// from several packets, so that most lanes are in use. Each ray takes the same steps as alone:
+//
+//   packet --> group --> few in an occupied cell --> arrived_   --> group
+//               |  ^ --> few between cells       --> searching_ --> group
+//               v  |
+//             voxels --> blocked
+class BlockedRays {
+ public:
+  // `blocked` and `unfinished` have an element for each packet, 0 at first.
+  BlockedRays(const TreeView& tree, bool is_alone, std::uint32_t* blocked, std::uint32_t* unfinished)
+      : tree_(tree), is_alone_(is_alone), blocked_(blocked), unfinished_(unfinished) {}
+
+  // Traces a packet with its inactive lanes filled. Some results are known only after `finish`.
+  void trace(const RayPacket& rays, int packet) {
+    LaneHits limited;
+    std::uint32_t blocked = 0;
+    std::uint32_t doubtful = 0;
+    for (int first = 0; first < RayPacket::kSize; first += kWidth) {
+      const std::uint32_t active = rays.active >> first & kAllLanes;
+      const std::uint32_t wanted = trace_windows(tree_, rays, first, active, blocked, doubtful);
+      if (wanted == 0) continue;
+      F t;
+      Crossing entered;
+      Walkers group;
+      group.lanes = set_up(tree_, rays, first, wanted, t, entered);
+      unfinished_[packet] |= bits(group.lanes.unfinished) << first;
+      if (!any(group.lanes.live)) continue;
+      if (any(group.lanes.live & (narrow(rays.max_t.data() + first) < all(kEndless)))) {
+        keep(trace::trace<Ask::Where>(tree_, group.lanes, t, entered), first, limited);
+      } else {
+        trace_endless(group, t, entered, packet, first);
+      }
+    }
+    unfinished_[packet] &= ~limited.hit;
+    if (limited.hit != 0) {
+      RayPacket::Lanes<double> t;
+      RayPacket::Lanes<std::int32_t> forward;
+      blocked |= measure(tree_, rays, limited, t, forward);
+    }
+    if (doubtful != 0) blocked = decide(rays, doubtful, blocked);
+    blocked_[packet] |= blocked;
+  }
+
+  // Walks all remaining rays to their ends.
+  void finish() {
+    while (arrived_.count() + searching_.count() > 0) walk_pool(1, 1);
+  }
+
+ private:
+  // Groups of fewer rays go to a pool (measured). A group between cells has cheaper steps.
+  static constexpr int kFewArrived = 9;
+  static constexpr int kFewSearching = 6;
+
+  // Traces the doubtful rays alone. Returns `blocked` with their results. Short rays are never left unfinished.
+  [[nodiscard]] std::uint32_t decide(const RayPacket& rays, std::uint32_t doubtful, std::uint32_t blocked) const {
+    for (; doubtful != 0; doubtful &= doubtful - 1) {
+      const int lane = std::countr_zero(doubtful);
+      RayHit hit;
+      bool is_unfinished = false;
+      const double max_t = rays.max_t[static_cast<std::size_t>(lane)];
+      const bool is_blocked = first_single<PathTracer>(tree_, rays.ray(lane), max_t, hit, is_unfinished);
+      blocked = (blocked & ~(1U << lane)) | std::uint32_t{is_blocked} << lane;
+    }
+    return blocked;
+  }
+
+  void trace_endless(Walkers& group, F t, const Crossing& entered, int packet, int first) {
+    const auto note_hits = [&](Mask hit) {
+      blocked_[packet] |= bits(hit) << first;
+      unfinished_[packet] &= ~(bits(hit) << first);
+    };
+#ifndef QUOIN_KERNEL_AVX512
+    Met met{mask_of(0), mask_of(0), all(0), all(0), all(0), all(0)};
+    group.lanes.live = trace_beam(tree_, group.lanes, t, entered, met);
+    note_hits(met.hit);
+    if (!any(group.lanes.live)) return;
+#endif
+    group.cells = enter_box(tree_, group.lanes, t, entered);
+    const Mask arrived = group.lanes.live & is_occupied(tree_, group.cells.index);
+    const Mask searching = group.lanes.live & ~arrived;
+    if (is_alone_) return walk(group, arrived, searching, 1, 1, note_hits);
+    group.ray = rays_from(group.lanes, packet * RayPacket::kSize + first);
+    walk(group, arrived, searching, kFewArrived, kFewSearching, note_hits);
+    while (std::max(arrived_.count(), searching_.count()) >= kWidth) walk_pool(kFewArrived, kFewSearching);
+  }
+
+  // Walks a group of rays from the fuller pool.
+  void walk_pool(int few_arrived, int few_searching) {
+    const bool are_arrived = arrived_.count() >= searching_.count();
+    Walkers group;
+    const Mask lanes = (are_arrived ? arrived_ : searching_).take(group);
+    const Mask none = mask_of(0);
+    walk(group, are_arrived ? lanes : none, are_arrived ? none : lanes, few_arrived, few_searching, [&](Mask hit) {
+      alignas(64) std::int32_t rays[kWidth];
+      store(rays, group.ray);
+      for (std::uint32_t left = bits(hit); left != 0; left &= left - 1) {
+        const int number = rays[std::countr_zero(left)] >> kAxisFlags;
+        const std::uint32_t lane = std::uint32_t{1} << (number % RayPacket::kSize);
+        blocked_[number / RayPacket::kSize] |= lane;
+        unfinished_[number / RayPacket::kSize] &= ~lane;
+      }
+    });
+  }
+
+  // Walks rays in occupied cells (`arrived`) and between cells, until fewer than these numbers are left, which go to
+  // the pools. Calls `note_hits(lanes)` with the lanes that are blocked.
+  template <class NoteHits>
+  [[gnu::always_inline]] void walk(Walkers& group, Mask arrived, Mask searching, int few_arrived, int few_searching,
+                                   NoteHits&& note_hits) {
+    const VoxelSteps steps = voxel_steps(group.lanes);
+    for (;;) {
+      if (count(arrived) >= few_arrived) {
+        VoxelWalk voxels;
+        enter_voxels(tree_, group.lanes, steps, group.cells.after, arrived, voxels);
+        I code = all(0);
+        const Mask hit = find_voxels<Ask::Whether>(group.lanes, steps, voxels, arrived, code);
+        note_hits(hit);
+        searching = searching | (arrived & ~hit);
+      } else if (any(arrived)) {
+        arrived_.add(group, arrived);
+      }
+      if (count(searching) < few_searching) {
+        if (any(searching)) searching_.add(group, searching);
+        return;
+      }
+      arrived = find_some_cells(tree_, group.lanes, group.cells, searching, few_searching);
+    }
+  }
+
+  const TreeView& tree_;
+  bool is_alone_;  // no other packet follows
+  std::uint32_t* blocked_;
+  std::uint32_t* unfinished_;
+  RayPool arrived_;
+  RayPool searching_;
+};
+
+inline void trace_any(const TreeView& tree, const RayPacket* packets, std::size_t size, std::uint32_t* blocked,
+                      std::uint32_t* unfinished) {
+  QUOIN_ASSERT(size <= kMostPackets, "at most kMostPackets");
+  BlockedRays rays(tree, size == 1, blocked, unfinished);
+  for (std::size_t i = 0; i < size; ++i) {
+    blocked[i] = unfinished[i] = 0;
+    if (packets[i].active == 0) continue;
+    trace_filled(packets[i], [&](const RayPacket& filled) { rays.trace(filled, static_cast<int>(i)); });
+  }
+  rays.finish();
 }
 
 }  // namespace

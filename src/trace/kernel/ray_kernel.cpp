@@ -307,7 +307,7 @@ void first_one_by_one(const TreeView& tree, const RayPacket& rays, PacketHits& h
   }
 }
 
-std::uint32_t any_one_by_one(const TreeView& tree, const RayPacket& rays, std::uint32_t& unfinished) {
+std::uint32_t any_of_packet(const TreeView& tree, const RayPacket& rays, std::uint32_t& unfinished) {
   std::uint32_t blocked = unfinished = 0;
   for (std::uint32_t left = rays.active; left != 0; left &= left - 1) {
     const int lane = std::countr_zero(left);
@@ -318,6 +318,11 @@ std::uint32_t any_one_by_one(const TreeView& tree, const RayPacket& rays, std::u
     blocked |= std::uint32_t{is_blocked} << lane;
   }
   return blocked;
+}
+
+void any_one_by_one(const TreeView& tree, const RayPacket* packets, std::size_t size, std::uint32_t* blocked,
+                    std::uint32_t* unfinished) {
+  for (std::size_t i = 0; i < size; ++i) blocked[i] = any_of_packet(tree, packets[i], unfinished[i]);
 }
 
 }  // namespace

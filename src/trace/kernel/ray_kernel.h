@@ -32,6 +32,9 @@ struct FieldHit {
   float corners[8];
 };
 
+/// The most packets in one call of Kernel::any_hits.
+inline constexpr std::size_t kMostPackets = 256;
+
 // All kernels return the same results as a walk over lattice planes. The walk crosses plane P of an axis at t = (P -
 // origin) * (1 / direction), in single precision, rounded after each operation. Crossings are ordered by t, and by axis
 // at ties. The origin is relative to a multiple of 64 voxels near the ray's start.
@@ -42,8 +45,10 @@ struct Kernel {
   bool (*any_hit)(const TreeView& tree, const Ray& ray, double max_t, bool& unfinished);
   /// Fills in `PacketHits`. The caller must trace the lanes of `unfinished` with other code.
   void (*first_hits)(const TreeView& tree, const RayPacket& rays, PacketHits& hits, std::uint32_t& unfinished);
-  /// Returns the lanes that are blocked.
-  std::uint32_t (*any_hits)(const TreeView& tree, const RayPacket& rays, std::uint32_t& unfinished);
+  /// Writes the blocked lanes of `size` packets. The caller must trace the lanes of `unfinished` with other code.
+  /// Requires: size <= kMostPackets.
+  void (*any_hits)(const TreeView& tree, const RayPacket* packets, std::size_t size, std::uint32_t* blocked,
+                   std::uint32_t* unfinished);
 };
 
 /// Kernels for density fields, in separate files: in one file with the voxel kernels, compilers turn shared functions

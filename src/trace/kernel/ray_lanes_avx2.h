@@ -221,6 +221,9 @@ inline I as_int(F a) {
 inline I to_int(F a) {
   return {half::to_int(a.low), half::to_int(a.high)};
 }
+inline F as_float(I a) {
+  return {half::as_float(a.low), half::as_float(a.high)};
+}
 inline F to_float(I a) {
   return {half::to_float(a.low), half::to_float(a.high)};
 }
