@@ -32,6 +32,9 @@ void set_direction(RayPacket& rays, std::size_t lane, DVec3 direction) {
   rays.direction_z[lane] = direction.z;
 }
 
+// The groups of points that are lit together.
+constexpr std::size_t kGroups = 16;
+
 DVec3 normal_at(const SurfacePoint& point) {
   return point.in_field ? DVec3(point.normal) : DVec3(normal_of(point.face));
 }
@@ -153,19 +156,26 @@ std::int64_t Lighting::light(std::span<const SurfacePoint> points, std::span<Vec
   OcclusionDirections::Fixed directions;
   if (directions_.is_fixed())
     directions = directions_.turned(OcclusionDirections::turn_of(sample, directions_.count()));
-  std::array<Vec3, RayPacket::kSize> lit;
+  std::array<Vec3, kGroups * RayPacket::kSize> lit;
   const std::vector<std::uint32_t> order = coherent_order(points);
+  const auto is_of = [&](std::size_t at, std::int32_t placed) {
+    return at < order.size() && points[order[at]].placed == placed;
+  };
   for (std::size_t begin = 0; begin < order.size();) {
-    Group group;
-    if (directions_.is_fixed()) group.directions = &directions;
-    while (begin + group.size < order.size() && group.size < RayPacket::kSize) {
-      const SurfacePoint& next = points[order[begin + group.size]];
-      if (group.size > 0 && next.placed != group.placed) break;
-      group.add(next, kRayLift / voxels_per_cell(next.placed));
+    const std::int32_t placed = points[order[begin]].placed;
+    const double lift = kRayLift / voxels_per_cell(placed);
+    std::array<Group, kGroups> groups;
+    std::size_t size = 0;
+    std::size_t end = begin;
+    for (; size < kGroups && is_of(end, placed); ++size) {
+      Group& group = groups[size];
+      if (directions_.is_fixed()) group.directions = &directions;
+      for (; group.size < RayPacket::kSize && is_of(end, placed); ++end) group.add(points[order[end]], lift);
     }
-    rays += light_group(group, lit);
-    for (std::size_t i = 0; i < group.size; ++i) colours[order[begin + i]] = lit[i];
-    begin += group.size;
+    rays += light_groups(std::span(groups).first(size), lit);
+    // All groups except the last are full.
+    for (std::size_t i = begin; i < end; ++i) colours[order[i]] = lit[i - begin];
+    begin = end;
   }
   return rays;
 }
@@ -175,18 +185,22 @@ double Lighting::voxels_per_cell(std::int32_t placed) const {
   return frames_[static_cast<std::size_t>(placed)].voxels_per_cell;
 }
 
-std::int64_t Lighting::light_group(const Group& group, std::span<Vec3> colours) const {
-  QUOIN_ASSERT(group.size <= colours.size(), "a colour for every point");
-  std::array<Vec3, RayPacket::kSize> direct{};
-  std::array<float, RayPacket::kSize> openness{};
-  std::int64_t rays = find_openness(group, openness);
-  if (is_propagated()) {
-    find_propagated(group, direct);
-  } else if (options_.shading == Shading::Lit) {
-    rays += find_sunlight(group, direct);
-    if (lamps_ != nullptr) rays += add_lamplight(group, direct);
+std::int64_t Lighting::light_groups(std::span<const Group> groups, std::span<Vec3> colours) const {
+  QUOIN_ASSERT(groups.size() <= kGroups && groups.size() * RayPacket::kSize <= colours.size(), "a colour per point");
+  std::array<Vec3, kGroups * RayPacket::kSize> all_direct{};
+  const bool has_sun = !is_propagated() && options_.shading == Shading::Lit;
+  std::int64_t rays = has_sun ? find_sunlight(groups, all_direct) : 0;
+  for (std::size_t k = 0; k < groups.size(); ++k) {
+    const Group& group = groups[k];
+    const auto direct = std::span(all_direct).subspan(k * RayPacket::kSize, RayPacket::kSize);
+    std::array<float, RayPacket::kSize> openness{};
+    rays += find_openness(group, openness);
+    if (is_propagated()) find_propagated(group, direct);
+    if (has_sun && lamps_ != nullptr) rays += add_lamplight(group, direct);
+    for (std::size_t i = 0; i < group.size; ++i) {
+      colours[k * RayPacket::kSize + i] = shade(*group.points[i], direct[i], openness[i]);
+    }
   }
-  for (std::size_t i = 0; i < group.size; ++i) colours[i] = shade(*group.points[i], direct[i], openness[i]);
   return rays;
 }
 
@@ -232,31 +246,59 @@ float Lighting::diffuse(const Frame& frame, const SurfacePoint& point) const {
   return static_cast<float>(std::max(glm::dot(DVec3(point.normal), frame.to_sun), 0.0) * daylight_.sun_brightness);
 }
 
-std::int64_t Lighting::find_sunlight(const Group& group, std::span<Vec3> sunlight) const {
+std::uint32_t Lighting::sunlit_lanes(const Group& group, std::span<Vec3> sunlight) const {
   const Frame& frame = frames_[static_cast<std::size_t>(group.placed)];
-  RayPacket rays = group.origins;
+  std::uint32_t lanes = 0;
   for (std::size_t i = 0; i < group.size; ++i) {
     const float unshadowed = diffuse(frame, *group.points[i]);
     sunlight[i] = unshadowed * daylight_.sun;
-    if (unshadowed > 0.0F && (group.surfaces >> i & 1U) != 0) rays.active |= 1U << i;
+    if (unshadowed > 0.0F && (group.surfaces >> i & 1U) != 0) lanes |= 1U << i;
   }
-  if (!options_.shadows || rays.active == 0) return 0;
-  rays.direction_x.fill(frame.to_sun.x);
-  rays.direction_y.fill(frame.to_sun.y);
-  rays.direction_z.fill(frame.to_sun.z);
-  rays.max_t.fill(options_.shadow_distance_voxels / voxels_per_cell(group.placed));
-  return shadow(group, rays, sunlight);
+  return lanes;
+}
+
+std::int64_t Lighting::find_sunlight(std::span<const Group> groups, std::span<Vec3> sunlight) const {
+  std::array<RayPacket, kGroups> packets;
+  std::array<std::size_t, kGroups> group_of{};
+  std::size_t size = 0;
+  std::int64_t rays = 0;
+  const auto light_of = [&](std::size_t k) { return sunlight.subspan(k * RayPacket::kSize, RayPacket::kSize); };
+  for (std::size_t k = 0; k < groups.size(); ++k) {
+    const Group& group = groups[k];
+    const std::uint32_t lanes = sunlit_lanes(group, light_of(k));
+    if (!options_.shadows || lanes == 0) continue;
+    const Frame& frame = frames_[static_cast<std::size_t>(group.placed)];
+    group_of[size] = k;
+    RayPacket& to_sun = packets[size++];
+    to_sun = group.origins;
+    to_sun.active = lanes;
+    to_sun.direction_x.fill(frame.to_sun.x);
+    to_sun.direction_y.fill(frame.to_sun.y);
+    to_sun.direction_z.fill(frame.to_sun.z);
+    to_sun.max_t.fill(options_.shadow_distance_voxels / voxels_per_cell(group.placed));
+    rays += std::popcount(lanes);
+  }
+  if (size == 0) return 0;
+  std::array<std::uint32_t, kGroups> blocked;
+  view_->any_hits(groups[0].placed, std::span(packets).first(size), blocked);
+  for (std::size_t i = 0; i < size; ++i) {
+    darken(groups[group_of[i]], packets[i], blocked[i], light_of(group_of[i]));
+  }
+  return rays;
 }
 
 std::int64_t Lighting::shadow(const Group& group, RayPacket& rays, std::span<Vec3> light) const {
   const std::int64_t count = std::popcount(rays.active);
-  const std::uint32_t blocked = view_->any_hits(group.placed, rays);
+  darken(group, rays, view_->any_hits(group.placed, rays), light);
+  return count;
+}
+
+void Lighting::darken(const Group& group, RayPacket& rays, std::uint32_t blocked, std::span<Vec3> light) const {
   for (std::uint32_t left = blocked; left != 0; left &= left - 1) {
     light[static_cast<std::size_t>(std::countr_zero(left))] = Vec3(0.0F);
   }
   rays.active &= ~blocked;
   if (view_->tracer().has_transparent() && rays.active != 0) tint(group, rays, light);
-  return count;
 }
 
 void Lighting::tint(const Group& group, const RayPacket& rays, std::span<Vec3> light) const {

@@ -79,11 +79,17 @@ class Lighting {
   struct Group;
   [[nodiscard]] static std::vector<std::uint32_t> coherent_order(std::span<const SurfacePoint> points);
   [[nodiscard]] double voxels_per_cell(std::int32_t placed) const;
-  std::int64_t light_group(const Group& group, std::span<Vec3> colours) const;
+  // Lights groups of one placed grid; the shadow rays of all groups are traced together.
+  std::int64_t light_groups(std::span<const Group> groups, std::span<Vec3> colours) const;
   void find_propagated(const Group& group, std::span<Vec3> light) const;
-  std::int64_t find_sunlight(const Group& group, std::span<Vec3> sunlight) const;
+  // Finds the sunlight of groups of one placed grid: sixteen colours for each group.
+  std::int64_t find_sunlight(std::span<const Group> groups, std::span<Vec3> sunlight) const;
+  // Sets the sunlight of a group's points without shadows. Returns the lanes whose rays to the sun are to be traced.
+  std::uint32_t sunlit_lanes(const Group& group, std::span<Vec3> sunlight) const;
   // Multiplies the light of each active lane by the transmittance of its ray. Returns how many rays were traced.
   std::int64_t shadow(const Group& group, RayPacket& rays, std::span<Vec3> light) const;
+  // As `shadow`, with the blocked rays known.
+  void darken(const Group& group, RayPacket& rays, std::uint32_t blocked, std::span<Vec3> light) const;
   void tint(const Group& group, const RayPacket& rays, std::span<Vec3> light) const;
   std::int64_t add_lamplight(const Group& group, std::span<Vec3> lamplight) const;
   struct LampPlaces;

@@ -680,30 +680,43 @@ void PathTile::trace_requests() {
   std::size_t first = 0;
   while (first < order_.size()) {
     std::size_t end = first + 1;
-    while (end < order_.size() && end - first < RayPacket::kSize &&
+    while (end < order_.size() && end - first < kShadowPackets * RayPacket::kSize &&
            requests_[order_[end]].home == requests_[order_[first]].home) {
       ++end;
     }
-    trace_request_packet(std::span(order_).subspan(first, end - first));
+    trace_some_requests(std::span(order_).subspan(first, end - first));
     first = end;
   }
   // In the order of the requests, independent of the order of the rays.
   for (const Request& request : requests_) paths_[request.path].radiance += request.light;
 }
 
-void PathTile::trace_request_packet(std::span<const std::uint32_t> requests) {
-  QUOIN_ASSERT(!requests.empty() && requests.size() <= RayPacket::kSize, "1 to 16 requests");
+void PathTile::trace_some_requests(std::span<const std::uint32_t> requests) {
+  constexpr std::size_t kLanes = RayPacket::kSize;
+  QUOIN_ASSERT(!requests.empty() && requests.size() <= kShadowPackets * kLanes, "as many requests as fit");
   const std::int32_t home = requests_[requests.front()].home;
   QUOIN_ASSERT(home >= 0 && static_cast<std::size_t>(home) < context_->placed.size(), "one of the placed grids");
   const PlacedGrid& placed = context_->placed[static_cast<std::size_t>(home)];
-  RayPacket rays;
+  const std::size_t size = (requests.size() + kLanes - 1) / kLanes;
+  // Only grows: clearing packets takes longer than filling them.
+  if (shadow_packets_.size() < size) shadow_packets_.resize(size);
+  for (std::size_t k = 0; k < size; ++k) shadow_packets_[k].active = 0;
   for (std::size_t i = 0; i < requests.size(); ++i) {
     const Request& request = requests_[requests[i]];
-    rays.set(static_cast<int>(i), {request.origin, in_grid(placed, request.direction)},
-             static_cast<double>(request.max_t));
+    shadow_packets_[i / kLanes].set(static_cast<int>(i % kLanes), {request.origin, in_grid(placed, request.direction)},
+                                    static_cast<double>(request.max_t));
   }
   rays_ += static_cast<std::int64_t>(requests.size());
-  const std::uint32_t blocked = context_->view->any_hits(home, rays);
+  std::array<std::uint32_t, kShadowPackets> blocked;
+  context_->view->any_hits(home, std::span(shadow_packets_).first(size), blocked);
+  for (std::size_t k = 0; k < size; ++k) {
+    const std::size_t first = k * kLanes;
+    finish_requests(requests.subspan(first, std::min(kLanes, requests.size() - first)), shadow_packets_[k], blocked[k]);
+  }
+}
+
+void PathTile::finish_requests(std::span<const std::uint32_t> requests, RayPacket& rays, std::uint32_t blocked) {
+  const std::int32_t home = requests_[requests.front()].home;
   for (std::size_t i = 0; i < requests.size(); ++i) {
     Request& request = requests_[requests[i]];
     const bool is_blocked = (blocked >> i & 1U) != 0;

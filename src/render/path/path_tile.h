@@ -196,7 +196,10 @@ class PathTile {
   // Requests a shadow ray. Returns false if no light would arrive from there.
   bool ask(const Vertex& vertex, Vec3 direction, float max_t, Vec3 light, bool is_sun);
   void trace_requests();
-  void trace_request_packet(std::span<const std::uint32_t> requests);
+  // Traces the rays of requests of one placed grid, at most as many as fit into `shadow_packets_`.
+  void trace_some_requests(std::span<const std::uint32_t> requests);
+  // Uses the results of a packet of requests.
+  void finish_requests(std::span<const std::uint32_t> requests, RayPacket& rays, std::uint32_t blocked);
 
   const TileContext* context_;
   int column_;
@@ -217,6 +220,8 @@ class PathTile {
   std::vector<std::uint32_t> starts_;  // of counting sorts
   std::vector<GlassBody> glass_;
   RayPacket packet_;  // of `meet_packet`
+  static constexpr std::size_t kShadowPackets = 16;
+  std::vector<RayPacket> shadow_packets_;
   SceneHits hits_;
   std::vector<PixelSums> sums_;
 };

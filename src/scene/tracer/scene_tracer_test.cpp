@@ -123,6 +123,29 @@ TEST(SceneTracer, AnyHitsMatchFirstHits) {
   EXPECT_GT(blocked_count, 100);
 }
 
+TEST(SceneTracer, AnyHitsOfArraysMatchPackets) {
+  const Scene scene = random_scene(5, 25);
+  const SceneTracer tracer(scene);
+  const SceneView view(tracer, {3, 4, 5});
+  std::mt19937 random(7);
+  int blocked_count = 0;
+  for (int round = 0; round < 40; ++round) {
+    const auto home = static_cast<std::int32_t>(random() % placed_in(tracer).size());
+    std::vector<RayPacket> packets(random() % 20);
+    for (RayPacket& rays : packets) {
+      rays = random_packet(random, DVec3(0.0));
+      if (random() % 2 == 0) rays.max_t.fill(kInfinity);
+    }
+    std::vector<std::uint32_t> blocked(packets.size());
+    view.any_hits(home, packets, blocked);
+    for (std::size_t i = 0; i < packets.size(); ++i) {
+      EXPECT_EQ(blocked[i], view.any_hits(home, packets[i]));
+      blocked_count += blocked[i] != 0;
+    }
+  }
+  EXPECT_GT(blocked_count, 50);
+}
+
 TEST(SceneTracer, IsExactFarFromOrigin) {
   const DVec3 away{1e9, -1e9, 1e9};
   const Scene near_scene = random_scene(9, 12);

@@ -78,13 +78,19 @@ bool has_transparent(const PlacedGrid& placed) {
   return placed.transparent != nullptr || placed.glass != nullptr;
 }
 
-// Rays in the space of a placed grid.
-std::uint32_t blocked_by(const PlacedGrid& placed, const RayPacket& rays_in_grid) {
-  std::uint32_t blocked = has_opaque(placed) ? quoin::any_hits(*placed.opaque, rays_in_grid) : 0;
+// Adds the rays that hit the opaque field of a placed grid to `blocked`, the rays that hit its voxels. Rays are in its
+// space.
+std::uint32_t blocked_by_field(const PlacedGrid& placed, const RayPacket& rays_in_grid, std::uint32_t blocked) {
   if (placed.opaque_field == nullptr || blocked == rays_in_grid.active) return blocked;
   RayPacket rest = rays_in_grid;
   rest.active &= ~blocked;
   return blocked | quoin::any_hits(*placed.opaque_field, rest);
+}
+
+// Returns the rays that hit an opaque voxel or field of a placed grid. They are in its space.
+std::uint32_t blocked_by(const PlacedGrid& placed, const RayPacket& rays_in_grid) {
+  const std::uint32_t blocked = has_opaque(placed) ? quoin::any_hits(*placed.opaque, rays_in_grid) : 0;
+  return blocked_by_field(placed, rays_in_grid, blocked);
 }
 
 // Returns the maximum distance of the active rays.
@@ -132,6 +138,9 @@ struct SceneView::Impl {
     if (placed.glass != nullptr) met |= quoin::any_hits(placed.glass->cells(), room);
     return met;
   }
+  // Returns `blocked` and the other rays, in the space of grid `own`, that hit another instance.
+  [[nodiscard]] std::uint32_t blocked_by_others(std::size_t own, const RayPacket& rays_in_grid,
+                                                std::uint32_t blocked) const;
   [[nodiscard]] bool sees_all() const { return left_to_impostors.empty(); }
   // Returns false if an update of the tracer added or removed placed grids, which invalidates the view.
   [[nodiscard]] bool is_current() const { return placed_in(*tracer).size() == grid_from_view.size(); }
@@ -292,24 +301,45 @@ void SceneView::first_hits(const RayPacket& rays_in_view, SceneHits& hits) const
 }
 
 std::uint32_t SceneView::any_hits(std::int32_t home, const RayPacket& rays_in_grid) const {
+  std::uint32_t blocked = 0;
+  any_hits(home, std::span(&rays_in_grid, 1), std::span(&blocked, 1));
+  return blocked;
+}
+
+void SceneView::any_hits(std::int32_t home, std::span<const RayPacket> packets_in_grid,
+                         std::span<std::uint32_t> blocked) const {
   const BlockVector<PlacedGrid>& placed = placed_in(*impl_->tracer);
   const auto own = static_cast<std::size_t>(home);
   QUOIN_ASSERT(own < placed.size() && impl_->is_current(), "a placed grid of a tracer that was not updated since");
-  std::uint32_t blocked = blocked_by(placed[own], rays_in_grid);
-  if (impl_->is_alone || blocked == rays_in_grid.active) return blocked;
+  QUOIN_ASSERT(blocked.size() >= packets_in_grid.size(), "a mask for every packet");
+  if (has_opaque(placed[own])) {
+    quoin::any_hits(*placed[own].opaque, packets_in_grid, blocked);
+  } else {
+    std::fill_n(blocked.begin(), packets_in_grid.size(), 0U);
+  }
+  for (std::size_t i = 0; i < packets_in_grid.size(); ++i) {
+    blocked[i] = blocked_by_field(placed[own], packets_in_grid[i], blocked[i]);
+    if (!impl_->is_alone) blocked[i] = impl_->blocked_by_others(own, packets_in_grid[i], blocked[i]);
+  }
+}
+
+std::uint32_t SceneView::Impl::blocked_by_others(std::size_t own, const RayPacket& rays_in_grid,
+                                                 std::uint32_t blocked) const {
+  if (blocked == rays_in_grid.active) return blocked;
+  const BlockVector<PlacedGrid>& placed = placed_in(*tracer);
   RoomFor<RayPacket> room_in_view;
   RayPacket& in_view = *room_in_view;
-  move(impl_->view_from_grid[own], rays_in_grid, in_view);
+  move(view_from_grid[own], rays_in_grid, in_view);
   in_view.active &= ~blocked;
   const PacketBounds bounds(in_view);
   LanesWhenNeeded lanes(in_view, bounds);
   RoomFor<RayPacket> room_for_rays;
   RayPacket& rays = *room_for_rays;
-  impl_->instances.visit(bounds, [&](std::size_t i, const FourBoxes& boxes, std::size_t box) {
+  instances.visit(bounds, [&](std::size_t i, const FourBoxes& boxes, std::size_t box) {
     if (i == own) return true;
     const std::uint32_t near = (*lanes).meet(boxes, box) & in_view.active;
     if (near == 0) return true;
-    move(impl_->grid_from_view[i], in_view, rays);
+    move(grid_from_view[i], in_view, rays);
     rays.active = near;
     const std::uint32_t found = blocked_by(placed[i], rays);
     blocked |= found;
