@@ -16,7 +16,7 @@
 
 namespace quoin {
 
-/// A set of chunks that copies share. An entry of its tree has a bit for each chunk of a cube of 4^3, so a change copies
+/// A set of chunks that copies share. An entry of its tree has a bit for each chunk of a cube of 4^3. A change copies
 /// few nodes: one below the root covers 16^3 chunks.
 /// Threads: as ChunkTrie.
 class ChunkSet {
@@ -170,8 +170,8 @@ class LoadedChunks {
     return is_partial_ == other.is_partial_ && extent_ == other.extent_ && marks_.is_same(other.marks_) &&
            others_.is_same(other.others_);
   }
-  /// Calls `change(list)` for two lists and returns both results. Two lists that share all chunks share them afterwards,
-  /// too, and are changed once. `change` leaves a list as it is if it throws.
+  /// Calls `change(list)` for two lists and returns both results. Two lists that share all chunks are changed once, and
+  /// share them again. `change` leaves a list as it is if it throws.
   template <class Change>
   static std::pair<bool, bool> change_both(LoadedChunks& one, LoadedChunks& other, Change&& change) {
     const bool is_shared = one.marks_.shares_all_with(other.marks_) && one.others_.shares_all_with(other.others_) &&
