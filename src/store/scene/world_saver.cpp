@@ -87,6 +87,8 @@ struct SaverState {
   std::vector<PartKey> pending_removals;
 };
 
+namespace {
+
 void put_removal(WorldChanges& changes, const PartKey& key) {
   const auto number = std::get<std::int64_t>(key.id);
   if (key.kind == part::kGrid) {
@@ -108,6 +110,7 @@ void remove(SaveInSteps& save, const char* kind, Numbers<T>& numbers, Handle<T> 
   numbers.numbers.erase(found);
 }
 
+}  // namespace
 }  // namespace quoin::store
 
 namespace quoin {
