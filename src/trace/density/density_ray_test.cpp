@@ -271,6 +271,60 @@ TEST_P(DensityRays, RaysThroughZerosMatchPackets) {
   EXPECT_GT(hits, 20'000);
 }
 
+// Cells at the faces of a rough chunk, whose neighbours are solid, air, missing or rough: their corners lie in up to
+// eight chunks, some without storage. Rays run along the faces, through many cells with a solid corner.
+TEST_P(DensityRays, RaysAlongChunkFacesMatchPlainCode) {
+  std::mt19937 random(21);
+  std::uniform_real_distribution<float> rough(-0.9F, 0.9F);
+  DensityGrid field;
+  const IBox chunk{IVec3{64}, IVec3{128}};
+  field.edit(chunk, [&](IVec3 p, DensitySample) {
+    const int out = (p.x + p.y + p.z) % 9 - 4;
+    return DensitySample{static_cast<float>(out) * 0.5F + rough(random), 1};
+  });
+  const auto fill = [&](IVec3 at, float density) {
+    field.edit({at * 64, at * 64 + 64}, [&](IVec3, DensitySample) { return DensitySample{density, 2}; });
+  };
+  fill({2, 1, 1}, -8.0F);
+  fill({1, 2, 1}, 3.0F);
+  fill({1, 0, 1}, -2.5F);
+  field.edit({{64, 64, 128}, {128, 128, 140}}, [&](IVec3, DensitySample) {
+    return DensitySample{rough(random) + 0.3F, 3};
+  });
+  const DensityTree tree(field);
+  int hits = 0;
+  int misses = 0;
+  for (int i = 0; i < 1'500; ++i) {
+    const int axis = i % 3;
+    const double face = i % 2 == 0 ? 127.5 : 63.5;
+    RayPacket packet;
+    for (int lane = 0; lane < RayPacket::kSize; ++lane) {
+      DVec3 from = random_in(random, 66.0, 126.0);
+      from[axis] = face + random_in(random, -1.2, 1.2).x;
+      DVec3 way = random_in(random, -1.0, 1.0);
+      way[axis] *= i % 5 == 0 ? 1.0 : 0.02;
+      packet.set(lane, {from, way}, i % 4 == 0 ? kInfinity : random_in(random, 0.1, 9.0).x);
+    }
+    DensityPacketHits found;
+    first_hits(tree, packet, found);
+    const std::uint32_t blocked = any_hits(tree, packet);
+    EXPECT_EQ(blocked, found.hit);
+    const InstructionSetOverride plain(InstructionSet::Plain);
+    for (int lane = 0; lane < RayPacket::kSize; ++lane) {
+      const auto at = static_cast<std::size_t>(lane);
+      const auto expected = first_hit(tree, packet.ray(lane), packet.max_t[at]);
+      ASSERT_EQ((found.hit >> lane & 1U) != 0, expected.has_value()) << "packet " << i << " lane " << lane;
+      expected ? ++hits : ++misses;
+      if (!expected) continue;
+      ASSERT_EQ(found.lanes[at].t, expected->t) << "packet " << i << " lane " << lane;
+      ASSERT_EQ(found.lanes[at].cell, expected->cell);
+      ASSERT_EQ(found.lanes[at].normal, expected->normal);
+    }
+  }
+  EXPECT_GT(hits, 12'000);
+  EXPECT_GT(misses, 500);
+}
+
 TEST_P(DensityRays, HitSphereAtItsSurface) {
   for (const DVec3 centre : {DVec3(31.5), DVec3(64.0, -64.0, 0.0), DVec3(1'000'000.0, -2'000'000.0, 500'000.0)}) {
     DensityGrid field;

@@ -39,8 +39,6 @@ inline NearRay<float> near_ray(const PathRay& path, const Ray& ray, I4 base) {
                                  : path.origin[axis];
     out.direction[axis] = is_still ? 0.0F : static_cast<float>(ray.direction[axis]);
     out.inverse[axis] = is_back ? -path.inverse[axis] : path.inverse[axis];
-    out.entry[axis] = is_back ? 1.0F + kStretch : -kStretch;
-    out.exit[axis] = is_back ? -kStretch : 1.0F + kStretch;
     out.size = std::max(out.size, std::abs(out.direction[axis]));
   }
   return out;
@@ -89,7 +87,9 @@ class CellGroup {
       const I8 in_word = ((code >> 2 * axis & 3) ^ backward_[axis]) - backward_[axis];
       cells.at[axis] = from_8(words_[axis], code >> 6) + in_word;
     }
-    screen(field_, last_, near_, base_, count, cells);
+    CornerPairs<kGroup> corners;
+    read_cells<kGroup>(field_, chunks_, cells.at, first_lanes(Vectors<kGroup>{}, count), corners);
+    screen(corners, near_, base_, count, cells);
     if (cells.lanes == 0) return false;
     const CellRay ray = cell_ray(ray_, max_t_);
     for (std::uint32_t left = cells.lanes; left != 0; left &= left - 1) {
@@ -103,7 +103,7 @@ class CellGroup {
   const Ray& ray_;
   double max_t_;
   NearRay<float> near_;
-  LastChunk last_;
+  NearChunks chunks_;
   std::int32_t backward_[3];
   std::int32_t base_[3];
   int count_ = 0;
@@ -140,17 +140,20 @@ inline bool first_in_field(const FieldView& field, const Ray& ray, double max_t,
 }
 
 // Traces packets of rays in a density field: the walk of trace/kernel/lockstep.inl, or of trace/kernel/window.inl for
-// short rays, through the cells with a solid corner. Lanes append such cells to a list and continue. When the list
-// fills the registers, its cells are tested: in single precision for a possible negative value along the ray, then the
-// few candidates in double. Lanes stop after a hit.
+// short rays, through the cells with a solid corner. Steps only append the codes of such cells: no step waits for a
+// look-up in the tree, and no branch depends on its result. After the cells of a word of 4^3 cells, after a short ray,
+// or when there are many codes, lanes with a hit are left out, and the other codes become cells in a list. Packing is
+// slow with AVX2, so steps append to the list there. When the list fills the registers, its cells are tested: in single
+// precision for a possible negative value along the ray, then the few candidates in double. Lanes stop after a hit.
 //
 //   lane          | 0 | 1 | 2 | ... | 15 |
 //   step 1        | A | . | B | ... |  C |    a cell with a solid corner, or none
 //   step 2        | D | E | . | ... |  . |
 //
-//   list          | A | B | C | D | E | ...    with the lane of each; the cells of a lane are in the order of its walk
-//   candidates    | x |   | x |   |   | ...    found in single precision
-//   hits          | x |   |   |   |   | ...    found in double; hits[lane] gets the cell and its corners
+//   codes         | A | B | C | D | E | ...    a cell's place in the word or window, and its lane
+//   list          | A | C | D | E | ...        x, y, z and lane; the cells of a lane are in the order of its walk
+//   candidates    | x | x |   |   | ...        found in single precision
+//   hits          | x |   |   |   | ...        found in double; hits[lane] gets the cell and its corners
 //
 // The positions of hits are roots, which are computed at the end for all lanes at once. If they are requested, the
 // rest of the list is tested at the end of each word of 4^3 cells, so that lanes do not walk far beyond a hit.
@@ -169,24 +172,24 @@ class FieldLanes {
     set_axis(lanes.z, 2, origin.z);
     store(size_, lanes.reach_scale);
     std::int32_t lane[kWidth];
-    for (int i = 0; i < kWidth; ++i) lane[i] = i;
-    lane_numbers_ = load(lane);
+    for (int i = 0; i < kWidth; ++i) lane[i] = i << kLaneShift;
+    lane_codes_ = load(lane);
   }
 
   /// Walks the lanes of `walking` through the 4^3 cells of a word. Returns all lanes with a hit so far.
   Mask walk(const Lanes& lanes, const VoxelSteps& steps, const Cells& word, VoxelWalk& voxels, Mask walking) {
-    const I origin[3] = {all(origin_[0]), all(origin_[1]), all(origin_[2])};
-    walk_voxels(lanes, steps, voxels, walking,
-                [&](Mask met) { return visit(met, voxels_at(word, voxels.code), origin); });
-    return kAsksWhere ? ask(1) : mask_of(met_);
+    const I first[3] = {shift_left<2>(word.x) + all(origin_[0]), shift_left<2>(word.y) + all(origin_[1]),
+                        shift_left<2>(word.z) + all(origin_[2])};
+    walk_voxels(lanes, steps, voxels, walking, [&](Mask met) { return visit<in_word>(met, voxels.code, first); });
+    if (kPacksFast) list<in_word>(first);
+    return ask(kAsksWhere ? 1 : kCellsAtOnce);
   }
 
   /// Walks short rays to their ends, in the window that begins at `window`.
   void walk_short(const TreeView& tree, const IVec3& window, ShortRays& rays) {
-    const I origin[3] = {all(origin_[0] + window.x), all(origin_[1] + window.y), all(origin_[2] + window.z)};
-    walk_window(tree, window, rays, [&](Mask met, Mask) {
-      return visit(met, {gathered<0>(rays.code), gathered<1>(rays.code), gathered<2>(rays.code)}, origin);
-    });
+    const I first[3] = {all(origin_[0] + window.x), all(origin_[1] + window.y), all(origin_[2] + window.z)};
+    walk_window(tree, window, rays, [&](Mask met, Mask) { return visit<in_window>(met, rays.code, first); });
+    if (kPacksFast) list<in_window>(first);
   }
 
   /// Tests the rest of the list, and completes the hits.
@@ -197,39 +200,84 @@ class FieldLanes {
   }
 
  private:
+  // A code: 18 bits of a place in a window (trace/kernel/window.inl) or of VoxelWalk::code, then the lane.
+  static constexpr int kLaneShift = 18;
+  // Codes are tested at the latest when there are so many. Open surfaces rarely have so many per packet.
+  static constexpr int kManyCodes = 4 * kWidth;
+  // The rest of a list, and the cells of all codes; at least one group of cells per register.
+  static constexpr int kMostCells = kCellsAtOnce + kManyCodes + kWidth;
+  using CellInts = Int32s<kCellsAtOnce>;
+
   void set_axis(const Axis& axis, int index, int origin) {
     origin_[index] = origin;
     store(base_[index], axis.base + all(origin));
     store(rays_near_.origin[index], axis.origin);
     store(rays_near_.direction[index], axis.direction);
     store(rays_near_.inverse[index], select(axis.still, all(kNever), axis.inverse));
-    const Mask is_back = ~(axis.forward | axis.still);
-    store(rays_near_.entry[index], select(is_back, all(1.0F + kStretch), all(-kStretch)));
-    store(rays_near_.exit[index], select(is_back, all(-kStretch), all(1.0F + kStretch)));
   }
 
-  // Appends the cells of these lanes, and tests the list if it fills the registers. Returns the lanes with a hit.
-  [[gnu::always_inline]] Mask visit(Mask which, const Cells& cells, const I (&origin)[3]) {
+  // Return the cells of codes, from the first cells of the words or of the window.
+  static Cells in_word(I code) { return {code & all(3), shift_right<2>(code) & all(3), shift_right<4>(code) & all(3)}; }
+  static Cells in_window(I code) { return {gathered<0>(code), gathered<1>(code), gathered<2>(code)}; }
+
+  // Appends the codes of these lanes, or their cells if packing is slow. If there are many, tests them. Returns lanes
+  // with a hit. `kCellsOf`: in_word or in_window. `first`: the first cells, by lane.
+  template <Cells (*kCellsOf)(I)>
+  [[gnu::always_inline]] Mask visit(Mask which, I code, const I (&first)[3]) {
+    if (kPacksFast) {
+      store_packed(codes_ + code_count_, packing_of(which), code + lane_codes_);
+      code_count_ += std::popcount(bits(which));
+      if (code_count_ < kManyCodes) return mask_of(0);
+      list<kCellsOf>(first);
+      return ask(kCellsAtOnce);
+    }
     if (!any(which)) return mask_of(0);
-    add(which, cells, origin);
+    const Cells cells = kCellsOf(code);
+    add(which, shift_right<kLaneShift>(lane_codes_), {cells.x + first[0], cells.y + first[1], cells.z + first[2]});
     return count_ >= kCellsAtOnce ? ask(kCellsAtOnce) : mask_of(0);
   }
 
-  void add(Mask which, const Cells& cells, const I (&origin)[3]) {
-    const Packing packing = packing_of(which);
-    store_packed(lane_ + count_, packing, lane_numbers_);
-    store_packed(at_[0] + count_, packing, cells.x + origin[0]);
-    store_packed(at_[1] + count_, packing, cells.y + origin[1]);
-    store_packed(at_[2] + count_, packing, cells.z + origin[2]);
-    count_ += std::popcount(bits(which));
-    QUOIN_ASSERT(count_ <= kCellsAtOnce + kWidth, "room for one more register");
+  // Moves the cells of all codes to the list, except those of lanes with a hit.
+  template <Cells (*kCellsOf)(I)>
+  [[gnu::noinline]] void list(const I (&first)[3]) {
+    for (int i = 0; i < code_count_; i += kWidth) {
+      const I code = load(codes_ + i);
+      const I lane = shift_right<kLaneShift>(code) & all(kWidth - 1);
+      const std::uint32_t some = code_count_ - i >= kWidth ? kAllLanes : (1U << (code_count_ - i)) - 1U;
+      const Mask wanted = mask_of(some) & ~test_bit(all(static_cast<std::int32_t>(met_)), lane);
+      const Cells cells = kCellsOf(code);
+      add(wanted, lane,
+          {cells.x + from_16(first[0], lane), cells.y + from_16(first[1], lane), cells.z + from_16(first[2], lane)});
+      if (kAsksWhere && count_ >= kCellsAtOnce) ask(kCellsAtOnce);
+    }
+    code_count_ = 0;
   }
 
-  // Tests groups of cells while at least `least_count` cells are left. Returns all lanes with a hit so far.
+  [[gnu::always_inline]] void add(Mask which, I lane, const Cells& cells) {
+    const Packing packing = packing_of(which);
+    store_packed(lane_ + count_, packing, lane);
+    store_packed(at_[0] + count_, packing, cells.x);
+    store_packed(at_[1] + count_, packing, cells.y);
+    store_packed(at_[2] + count_, packing, cells.z);
+    count_ += std::popcount(bits(which));
+    QUOIN_ASSERT(count_ <= kMostCells, "room for one more register");
+  }
+
+  // Tests groups of cells while at least `least_count` cells are left. Returns all lanes with a hit so far. Reads the
+  // corners of all groups first, so that the processor waits for several groups at a time.
   Mask ask(int least_count) {
     int first = 0;
-    for (; count_ - first >= least_count; first += kCellsAtOnce) {
-      ask_some(first, std::min(count_ - first, kCellsAtOnce));
+    for (int group = 0; count_ - first >= least_count; ++group, first += kCellsAtOnce) {
+      CellInts at[3];
+      for (int axis = 0; axis < 3; ++axis) std::memcpy(&at[axis], at_[axis] + first, sizeof at[axis]);
+      const CellInts wanted = first_lanes(Vectors<kCellsAtOnce>{}, count_ - first);
+      read_cells<kCellsAtOnce>(field_, chunks_, at, wanted, corners_[group]);
+    }
+    if (first == 0) return mask_of(met_);
+    const int end = first;
+    first = 0;
+    for (int group = 0; first < end; ++group, first += kCellsAtOnce) {
+      ask_some(first, std::min(count_ - first, kCellsAtOnce), corners_[group]);
     }
     count_ = std::max(count_ - first, 0);
     if (count_ != 0) {
@@ -239,9 +287,8 @@ class FieldLanes {
     return mask_of(met_);
   }
 
-  void ask_some(int first, int count) {
+  void ask_some(int first, int count, const CornerPairs<kCellsAtOnce>& corners) {
     using CellFloats = Floats<kCellsAtOnce>;
-    using CellInts = Int32s<kCellsAtOnce>;
     CellInts lane;
     std::memcpy(&lane, lane_ + first, sizeof lane);
     lane &= kWidth - 1;  // entries beyond the end are not set
@@ -257,17 +304,14 @@ class FieldLanes {
       ray.origin[axis] = of_lane(rays_near_.origin[axis]);
       ray.direction[axis] = of_lane(rays_near_.direction[axis]);
       ray.inverse[axis] = of_lane(rays_near_.inverse[axis]);
-      ray.entry[axis] = of_lane(rays_near_.entry[axis]);
-      ray.exit[axis] = of_lane(rays_near_.exit[axis]);
     }
     ray.size = of_lane(size_);
-    screen(field_, last_, ray, base, count, cells);
+    screen(corners, ray, base, count, cells);
     if (cells.lanes != 0) meet(cells, lane);
   }
 
   // Tests the candidates in double.
   void meet(const Candidates<kCellsAtOnce>& cells, Int32s<kCellsAtOnce> lane) {
-    using CellInts = Int32s<kCellsAtOnce>;
     // Packed, without gaps.
     const CellInts order = lane_numbers(Vectors<kCellsAtOnce>{}, cells.lanes);
     alignas(64) std::int32_t from[kWidth] = {};
@@ -384,23 +428,24 @@ class FieldLanes {
     alignas(64) float origin[3][kWidth];
     alignas(64) float direction[3][kWidth];
     alignas(64) float inverse[3][kWidth];
-    alignas(64) float entry[3][kWidth];
-    alignas(64) float exit[3][kWidth];
   };
 
   const FieldView& field_;
   int first_;
   FieldHit* hits_;
   int origin_[3];
-  LastChunk last_;
-  I lane_numbers_;
+  NearChunks chunks_;
+  I lane_codes_;
   NearRays rays_near_;
   alignas(64) float size_[kWidth];
   alignas(64) std::int32_t base_[3][kWidth];  // origin of each lane's coordinates, in the field
+  int code_count_ = 0;
+  alignas(64) std::int32_t codes_[kManyCodes + 2 * kWidth];
   // The list. Packing writes whole registers, so it has room for one more.
   int count_ = 0;
-  alignas(64) std::int32_t lane_[3 * kWidth];
-  alignas(64) std::int32_t at_[3][3 * kWidth];
+  alignas(64) std::int32_t lane_[kMostCells + kWidth];
+  alignas(64) std::int32_t at_[3][kMostCells + kWidth];
+  CornerPairs<kCellsAtOnce> corners_[kMostCells / kCellsAtOnce];
   std::uint32_t met_ = 0;
   // Hits by lane, without their t; has_root is 0 in lanes without a hit.
   struct Kept {

@@ -3,11 +3,12 @@
 // only.
 //
 //   x, y, z      | 0 | 1 | ... | 7 |    the cells; eight, or with AVX-512 also sixteen
-//   corners      | 0 | 1 | ... | 7 |    eight times: gathered from rows of halves, two of a row at once
+//   corners      | 0 | 1 | ... | 7 |    four times: gathered from rows of halves, two of a row at once
 //   the cubic    | 0 | 1 | ... | 7 |    along one ray, or one ray per lane, in a slightly extended interval
 
 #pragma once
 
+#include <algorithm>
 #include <bit>
 #include <cstring>
 #include <limits>
@@ -149,28 +150,74 @@ inline Places pairs_of(const DensityStorage& chunk, Places x, Places y, Places z
   return gather_some<sizeof(Half)>(chunk.values.data(), row * kChunkEdge + x, mask & ~is_uniform, known);
 }
 
-/// Caches the chunk of the last look-up in a field.
-class LastChunk {
+/// Caches the chunks of look-ups in a field, up to 2^3 neighbours.
+class NearChunks {
  public:
+  NearChunks() { std::fill_n(at_[0], 8, std::numeric_limits<int>::min()); }  // no chunk is there
+
   /// Returns null if the chunk is missing or uniform.
   const DensityStorage* find(const FieldView& field, int x, int y, int z) {
-    if (x != at_[0] || y != at_[1] || z != at_[2]) {
-      at_[0] = x, at_[1] = y, at_[2] = z;
-      chunk_ = field.find(*field.grid, x, y, z);
+    const int i = (x & 1) + 2 * (y & 1) + 4 * (z & 1);
+    if (x != at_[0][i] || y != at_[1][i] || z != at_[2][i]) {
+      at_[0][i] = x, at_[1][i] = y, at_[2][i] = z;
+      chunks_[i] = field.find(*field.grid, x, y, z);
     }
-    return chunk_;
+    return chunks_[i];
   }
 
  private:
-  int at_[3] = {std::numeric_limits<int>::min(), 0, 0};  // no chunk is there
-  const DensityStorage* chunk_ = nullptr;
+  int at_[3][8];
+  const DensityStorage* chunks_[8];
 };
 
-/// Reads the densities of the corners of the cells at `at`, by x + 2 y + 4 z, in the lanes of `wanted`.
-/// Requires: lane 0 is wanted.
+/// The densities of the corners of several cells, as stored: two halves of a row, the first in the lower bits, by row
+/// y + 2 z and cell.
 template <int kLanes>
-[[gnu::always_inline]] inline void read_cells(const FieldView& field, LastChunk& last, const Int32s<kLanes> (&at)[3],
-                                              Int32s<kLanes> wanted, Floats<kLanes> (&corners)[8]) {
+struct CornerPairs {
+  alignas(64) std::int32_t rows[4][kLanes];
+
+  [[nodiscard]] Int32s<kLanes> row(int row) const {
+    Int32s<kLanes> pairs;
+    std::memcpy(&pairs, rows[row], sizeof pairs);
+    return pairs;
+  }
+};
+
+/// Reads the corners of any cell.
+template <int kLanes>
+inline void read_cell(const FieldView& field, NearChunks& chunks, const int (&at)[3], int lane,
+                      CornerPairs<kLanes>& corners) {
+  const auto pair_of = [](std::uint32_t first, std::uint32_t second) {
+    return static_cast<std::int32_t>(first | second << 16);
+  };
+  const int x = at[0] & 63;
+  for (int row = 0; row < 4; ++row) {
+    const int y = at[1] + (row & 1);
+    const int z = at[2] + (row >> 1);
+    const DensityStorage* const chunk = chunks.find(field, at[0] >> 6, y >> 6, z >> 6);
+    const DensityStorage* const next = x < 63 ? chunk : chunks.find(field, (at[0] + 1) >> 6, y >> 6, z >> 6);
+    if (chunk == nullptr || next == nullptr) {
+      float densities[8];
+      field.read(*field.grid, at[0], at[1], at[2], densities);
+      for (int i = 0; i < 4; ++i) {  // exact
+        corners.rows[i][lane] = pair_of(half_from_float(densities[2 * i]), half_from_float(densities[2 * i + 1]));
+      }
+      return;
+    }
+    const std::size_t slab = ChunkStorage::slab_index(y & 63, z & 63);
+    const int in_slab = ChunkStorage::row_in_slab(y & 63, z & 63);
+    const auto density = [&](const DensityStorage& of, int i) -> Half {
+      const std::uint32_t entry = of.slabs[slab];
+      return DensityStorage::is_mixed(entry) ? of.row(entry, in_slab)[i & 63] : static_cast<Half>(entry);
+    };
+    corners.rows[row][lane] = pair_of(density(*chunk, x), density(*next, x + 1));
+  }
+}
+
+/// Reads the corners of the cells at `at`, in the lanes of `wanted`. Requires: lane 0 is wanted.
+template <int kLanes>
+[[gnu::always_inline]] inline void read_cells(const FieldView& field, NearChunks& chunks, const Int32s<kLanes> (&at)[3],
+                                              Int32s<kLanes> wanted, CornerPairs<kLanes>& corners) {
   using Places = Int32s<kLanes>;
   Places chunk[3];
   Places cell[3];
@@ -189,7 +236,7 @@ template <int kLanes>
     Places here = is_within;
     for (const Places& at_axis : chunk) here &= at_axis == of_lane(at_axis, lane);
     const std::uint32_t those = bits_of(here);
-    const DensityStorage* const storage = last.find(field, chunk[0][lane], chunk[1][lane], chunk[2][lane]);
+    const DensityStorage* const storage = chunks.find(field, chunk[0][lane], chunk[1][lane], chunk[2][lane]);
     if (storage == nullptr) {
       separate |= those;
       return those;
@@ -202,20 +249,11 @@ template <int kLanes>
   left &= ~read_chunk_of(0);
   // There is usually one chunk.
   while (left != 0) left &= ~read_chunk_of(std::countr_zero(left));
-  for (int row = 0; row < 4; ++row) {
-    corners[2 * row] = floats_from_halves<kLanes>(pairs[row] << 16);
-    corners[2 * row + 1] = floats_from_halves<kLanes>(pairs[row]);
-  }
-  if (separate == 0) return;
-  alignas(64) float numbers[8][kLanes];  // a copy in memory, so that `corners` stays in registers
-  std::memcpy(numbers, corners, sizeof numbers);
+  for (int row = 0; row < 4; ++row) std::memcpy(corners.rows[row], &pairs[row], sizeof pairs[row]);
   for (; separate != 0; separate &= separate - 1) {
     const int lane = std::countr_zero(separate);
-    float its[8];
-    field.read(*field.grid, at[0][lane], at[1][lane], at[2][lane], its);
-    for (int i = 0; i < 8; ++i) numbers[i][lane] = its[i];
+    read_cell(field, chunks, {at[0][lane], at[1][lane], at[2][lane]}, lane, corners);
   }
-  std::memcpy(corners, numbers, sizeof numbers);
 }
 
 /// A ray in single precision, or several rays in lanes, relative to a position near its start; by axis.
@@ -224,10 +262,16 @@ struct NearRay {
   Number origin[3];
   Number direction[3];
   Number inverse[3];  // huge for an axis without motion
-  Number entry[3];    // the plane of a cell that the ray passes first, and the other one, each moved outwards
-  Number exit[3];
-  Number size;  // the direction's greatest component
+  Number size;        // the direction's greatest component
 };
+
+inline float magnitude(float number) {
+  return std::abs(number);
+}
+template <class Numbers>
+inline Numbers magnitude(Numbers numbers) {
+  return greatest(numbers, -numbers);
+}
 
 /// Returns the cells in which the field may become negative along the ray, given their corners. `place`: the cells,
 /// relative to the ray's origin of coordinates.
@@ -241,8 +285,11 @@ inline Int32s<kLanes> may_be_negative(const NearRay<Number>& ray, const Floats<k
   for (int axis = 0; axis < 3; ++axis) {
     const auto lower = __builtin_convertvector(place[axis], Values);
     start[axis] = ray.origin[axis] - lower;
-    t_in = greatest(t_in, (ray.entry[axis] - start[axis]) * ray.inverse[axis]);
-    t_out = least(t_out, (ray.exit[axis] - start[axis]) * ray.inverse[axis]);
+    // The times at the middle plane and, from there, at the planes of the cell, each moved outwards.
+    const Values middle = (0.5F - start[axis]) * ray.inverse[axis];
+    const Number half = (0.5F + kStretch) * magnitude(ray.inverse[axis]);
+    t_in = greatest(t_in, middle - half);
+    t_out = least(t_out, middle + half);
   }
   const Values length = greatest(t_out - t_in, Values{});
   Values entry[3];
@@ -285,13 +332,15 @@ struct Candidates {
 /// Finds the cells, among the first `count`, that must be tested in double. `base`: the ray's origin of coordinates, in
 /// the field.
 template <int kLanes, class Number, class Base>
-[[gnu::always_inline]] inline void screen(const FieldView& field, LastChunk& last, const NearRay<Number>& ray,
+[[gnu::always_inline]] inline void screen(const CornerPairs<kLanes>& stored, const NearRay<Number>& ray,
                                           const Base (&base)[3], int count, Candidates<kLanes>& cells) {
-  const Int32s<kLanes> wanted = first_lanes(Vectors<kLanes>{}, count);
   Floats<kLanes> corners[8];
-  read_cells<kLanes>(field, last, cells.at, wanted, corners);
+  for (int row = 0; row < 4; ++row) {
+    corners[2 * row] = floats_from_halves<kLanes>(stored.row(row) << 16);
+    corners[2 * row + 1] = floats_from_halves<kLanes>(stored.row(row));
+  }
   const Int32s<kLanes> place[3] = {cells.at[0] - base[0], cells.at[1] - base[1], cells.at[2] - base[2]};
-  cells.lanes = bits_of(may_be_negative<kLanes>(ray, corners, place) & wanted);
+  cells.lanes = bits_of(may_be_negative<kLanes>(ray, corners, place) & first_lanes(Vectors<kLanes>{}, count));
   if (cells.lanes != 0) std::memcpy(cells.corners, corners, sizeof corners);
 }
 
@@ -320,7 +369,14 @@ inline Meetings meet_cells(const CellRayOf<Doubles>& ray, const Doubles (&cell)[
   const Longs is_open = is_in & ~starts_negative & ~(curve.low() >= 0.0);
   Longs is_simple = is_open & (curve.b3 < 0.0);
   if (kAsksWhere) is_simple &= ~((curve.b1 < 0.0) & (curve.b2 >= 0.0));
-  Meetings out = {starts_negative | is_simple, kAsksWhere ? is_simple : Longs{}, f, {}, span.t_in, length};
+  // Compilers write zeros to memory first if this is one initializer.
+  Meetings out;
+  out.met = starts_negative | is_simple;
+  out.has_root = kAsksWhere ? is_simple : Longs{};
+  out.field = f;
+  out.s = Doubles{};
+  out.t_in = span.t_in;
+  out.length = length;
   // Only a few lanes.
   for (std::uint32_t left = words::lanes_with_bits(is_open & ~is_simple); left != 0; left &= left - 1) {
     const int i = std::countr_zero(left);

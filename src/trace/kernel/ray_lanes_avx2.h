@@ -242,6 +242,8 @@ inline void split(const double* from, double corner, I& base, F& rest, F& whole)
   half::split(from, corner, base.low, rest.low, whole.low);
   half::split(from + half::kWidth, corner, base.high, rest.high, whole.high);
 }
+// Packing takes longer than a branch around it.
+constexpr bool kPacksFast = false;
 // Selects lanes that store_packed writes without gaps.
 struct Packing {
   __m256i low, high;  // the source lane of each number written
@@ -256,6 +258,16 @@ inline void store_packed(std::int32_t* to, const Packing& packing, I a) {
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm256_permutevar8x32_epi32(a.low.v, packing.low));
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(to + packing.low_count),
                       _mm256_permutevar8x32_epi32(a.high.v, packing.high));
+}
+
+// Looks up entry `at % 16` of a table.
+inline I from_16(I table, I at) {
+  const auto look_up = [&](half::I place) {
+    const half::I low = {_mm256_permutevar8x32_epi32(table.low.v, place.v)};
+    const half::I high = {_mm256_permutevar8x32_epi32(table.high.v, place.v)};
+    return half::select(half::test(place, half::all(half::kWidth)), high, low);
+  };
+  return {look_up(at.low), look_up(at.high)};
 }
 
 inline float least_of(F a) {
