@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "core/not_finite_for_tests.h"
+#include "grid/density/density_storage.h"
 
 namespace quoin {
 namespace {
@@ -50,6 +51,38 @@ TEST(DensityAt, EqualsSamplesAtTheirPositions) {
     for (int y = -12; y < 10; ++y) {
       for (int x = -12; x < 10; ++x) EXPECT_EQ(grid.density_at({x, y, z}), grid.density({x, y, z}));
     }
+  }
+}
+
+// In chunks with and without storage, at their faces, at whole numbers, at points whose sums round to the next cell, and
+// at points without a cell.
+TEST(DensityAt, DifferencesEqualSixDensities) {
+  std::mt19937 random(41);
+  std::uniform_real_distribution<float> rough(-3.0F, 3.0F);
+  DensityGrid grid(4.0F);
+  grid.edit({IVec3(-64), IVec3(64)}, [&](IVec3, DensitySample) { return DensitySample{rough(random), 1}; });
+  grid.edit({{0, 20, -64}, {64, 24, 0}}, [](IVec3, DensitySample) { return DensitySample{-1.5F, 1}; });
+  grid.edit({{-64, 0, 0}, {0, 64, 64}}, [](IVec3, DensitySample) { return DensitySample{2.0F, 1}; });
+  const auto matches = [&](const DVec3& point) {
+    const DVec3 differences = density_differences(grid, point);
+    for (int axis = 0; axis < 3; ++axis) {
+      DVec3 step(0.0);
+      step[axis] = 1.0;
+      EXPECT_EQ(differences[axis], double{grid.density_at(point + step)} - double{grid.density_at(point - step)})
+          << point.x << ' ' << point.y << ' ' << point.z << " axis " << axis;
+    }
+  };
+  std::uniform_real_distribution<double> any(-66.0, 66.0);
+  for (int i = 0; i < 20'000; ++i) {
+    DVec3 point{any(random), any(random), any(random)};
+    if (i % 4 == 1) point = glm::round(point);
+    if (i % 4 == 2) point.y = std::round(point.y) - 1e-17;
+    if (i % 4 == 3) point[i % 3] = std::nextafter(std::round(point[i % 3]), -kInfinity);
+    matches(point);
+  }
+  for (const double odd : {-1e-300, -1e-20, 1e-20}) matches({odd, 31.5 + odd, -31.5});
+  for (const double odd : {1e30, -1e30, kInfinity, 2'147'483'647.5}) {
+    EXPECT_EQ(density_differences(grid, {odd, 0.5, 0.5}), DVec3(0.0));
   }
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <optional>
 #include <span>
 #include <utility>
 
@@ -239,6 +240,99 @@ float DensityGrid::density_at(DVec3 point) const {
   Cell cell;
   if (!cell.locate(point)) return band();
   return static_cast<float>(trilinear(corners_of(impl_->store, cell.low), cell.fraction));
+}
+
+namespace {
+
+// The densities around a cell of a chunk with storage, from one sample before it to one after it: [z][y][x]. Without
+// the rows that are outside the cell along both y and z.
+class SamplesAround {
+ public:
+  // Requires: 1 <= x, y, z <= 61.
+  SamplesAround(const DensityStorage& chunk, IVec3 low) {
+    for (int i = 0; i < 16; ++i) {
+      const int y = i & 3;
+      const int z = i >> 2;
+      if ((y == 0 || y == 3) && (z == 0 || z == 3)) continue;
+      read_row(chunk, low + IVec3{-1, y - 1, z - 1}, at_[z][y]);
+    }
+  }
+
+  // Returns the corners of the cell that is `shift` cells away.
+  [[nodiscard]] CellCorners corners(IVec3 shift) const {
+    CellCorners corners;
+    for (int i = 0; i < 8; ++i) {
+      corners[static_cast<std::size_t>(i)] =
+          at_[1 + shift.z + (i >> 2)][1 + shift.y + (i >> 1 & 1)][1 + shift.x + (i & 1)];
+    }
+    return corners;
+  }
+
+ private:
+  static void read_row(const DensityStorage& chunk, IVec3 first, float (&row)[4]) {
+    const std::uint32_t slab = chunk.slabs[ChunkStorage::slab_index(first.y, first.z)];
+    if (!DensityStorage::is_mixed(slab)) {
+      std::fill_n(row, 4, float_from_half(static_cast<Half>(slab)));
+      return;
+    }
+    const Half* const samples = chunk.row(slab, ChunkStorage::row_in_slab(first.y, first.z)) + first.x;
+    for (int x = 0; x < 4; ++x) row[x] = float_from_half(samples[x]);
+  }
+
+  float at_[4][4][4];
+};
+
+// Returns the densities one sample before and after a point along an axis. Requires: `point` is in `cell`.
+struct TwoDensities {
+  float before = 0.0F;
+  float after = 0.0F;
+};
+std::optional<TwoDensities> densities_along(const SamplesAround& around, const DVec3& point, const Cell& cell,
+                                            int axis) {
+  const auto density_of = [&](double at, int side, float& density) {
+    const double whole = std::floor(at);
+    if (whole != static_cast<double>(cell.low[axis] + side)) return false;  // the sum was rounded to the next cell
+    IVec3 shift{0};
+    shift[axis] = side;
+    DVec3 fraction = cell.fraction;
+    fraction[axis] = at - whole;
+    density = static_cast<float>(trilinear(around.corners(shift), fraction));
+    return true;
+  };
+  TwoDensities both;
+  const bool are_near = density_of(point[axis] - 1.0, -1, both.before) && density_of(point[axis] + 1.0, 1, both.after);
+  return are_near ? std::optional(both) : std::nullopt;
+}
+
+// Returns the storage with all samples around a cell, if one chunk has them.
+const DensityStorage* storage_around(const DensityGrid& field, IVec3 low) {
+  const IVec3 local = local_of(low);
+  for (int axis = 0; axis < 3; ++axis) {
+    if (local[axis] < 1 || local[axis] > kChunkEdge - 3) return nullptr;
+  }
+  const DensityChunk* const chunk = field.find_chunk(chunk_of(low));
+  return chunk == nullptr ? nullptr : DensityStorage::of(*chunk);
+}
+
+}  // namespace
+
+DVec3 density_differences(const DensityGrid& field, const DVec3& point) {
+  DVec3 differences;
+  Cell cell;
+  const DensityStorage* const storage = cell.locate(point) ? storage_around(field, cell.low) : nullptr;
+  std::optional<SamplesAround> around;
+  if (storage != nullptr) around.emplace(*storage, local_of(cell.low));
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto both = around ? densities_along(*around, point, cell, axis) : std::nullopt;
+    if (both) {
+      differences[axis] = double{both->after} - double{both->before};
+      continue;
+    }
+    DVec3 step(0.0);
+    step[axis] = 1.0;
+    differences[axis] = double{field.density_at(point + step)} - double{field.density_at(point - step)};
+  }
+  return differences;
 }
 
 DVec3 DensityGrid::gradient_at(DVec3 point) const {

@@ -10,6 +10,8 @@
 #include <quoin/trace/occupancy_tree.h>
 #include <quoin/trace/ray.h>
 
+#include "grid/density/density_storage.h"
+
 namespace quoin {
 
 /// The transparent part of a density field, for tracing.
@@ -69,12 +71,7 @@ void visit_glass(const DensityGlass& glass, const Ray& ray, double max_t, Functi
 /// cells. It is computed from differences of the field one sample to each side. Where these point away from the hit's
 /// normal, as at solids thinner than two samples, it returns the hit's normal.
 [[nodiscard]] inline DVec3 smooth_normal(const DensityGrid& field, const DVec3& point, const DensityHit& hit) {
-  DVec3 gradient;
-  for (int axis = 0; axis < 3; ++axis) {
-    DVec3 step(0.0);
-    step[axis] = 1.0;
-    gradient[axis] = double{field.density_at(point + step)} - double{field.density_at(point - step)};
-  }
+  const DVec3 gradient = density_differences(field, point);
   constexpr double kAgrees = 0.5;
   const double length = glm::length(gradient);
   return glm::dot(gradient, hit.normal) > kAgrees * length ? gradient / length : hit.normal;
