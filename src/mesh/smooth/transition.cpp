@@ -37,7 +37,7 @@ class Transitions {
 
  private:
   [[nodiscard]] float density(IVec3 sample) const { return float_from_half(chunks_.get(sample)); }
-  [[nodiscard]] bool is_solid(IVec3 sample) const { return DensityChunk::is_solid(chunks_.get(sample)); }
+  [[nodiscard]] bool is_solid(IVec3 sample) const { return is_solid_at(chunks_, sample); }
 
   // Computes the vertices of the chunk's own cells that touch a finer chunk.
   void recompute_own_cells() {

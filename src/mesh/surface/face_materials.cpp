@@ -27,7 +27,7 @@ constexpr std::size_t kMaxCellSamples = 729;
 // The solid samples of all bodies.
 struct AnySolid {
   const DensityNeighbourhood& chunks;
-  bool operator()(IVec3 sample) const { return DensityChunk::is_solid(chunks.get(sample)); }
+  bool operator()(IVec3 sample) const { return smooth::is_solid_at(chunks, sample); }
 };
 
 // The solid samples of opaque bodies.
@@ -35,7 +35,7 @@ struct OpaqueSolid {
   const DensityNeighbourhood& chunks;
   const VoxelRegistry& types;
   bool operator()(IVec3 sample) const {
-    return DensityChunk::is_solid(chunks.get(sample)) && !types.is_transparent(chunks.material(sample));
+    return smooth::is_solid_at(chunks, sample) && !types.is_transparent(chunks.material(sample));
   }
 };
 
@@ -47,7 +47,7 @@ std::size_t materials_of_corners(const DensityChunk& chunk, IVec3 first, VoxelTy
   for (int row = 0; row < 4; ++row) {
     const int y = first.y + (row & 1);
     const int z = first.z + (row >> 1);
-    const auto solid = static_cast<std::uint32_t>(chunk.solid_row(y, z) >> first.x & 3U);
+    const auto solid = static_cast<std::uint32_t>(smooth::signs_of(chunk, y, z) >> first.x & 3U);
     if (solid == 0) continue;
     const std::uint32_t slab = mixed->slabs[ChunkStorage::slab_index(y, z)];
     const bool is_uniform = (slab & ChunkStorage::kUniformSlab) != 0;
@@ -157,10 +157,9 @@ CellMaterial SurfaceMaterials::blend(std::span<VoxelType> solid) const {
   return blended;
 }
 
-CellMaterial SurfaceMaterials::of_cell(const DensityNeighbourhood& chunks, IVec3 cell, int level) const {
+CellMaterial SurfaceMaterials::of_cell(const DensityNeighbourhood& chunks, IVec3 first, int level) const {
   QUOIN_ASSERT(level >= 0 && level <= kMaxSmoothLevel, "a level of detail");
   const int size = 1 << level;
-  const IVec3 first = cell * size;
   std::array<VoxelType, kMaxCellSamples> solid;
   std::size_t found = 0;
   const DensityChunk* centre = chunks.centre();
@@ -255,19 +254,6 @@ class Copies {
   BlockVector<Other> others_;
 };
 
-// Returns true if a sample in or next to the chunk is solid.
-bool is_solid_at(const DensityNeighbourhood& chunks, IVec3 sample) {
-  const IVec3 chunk = chunk_of(sample);
-  const IVec3 local = local_of(sample);
-  const DensityChunk* const found = chunks.at(chunk.x, chunk.y, chunk.z);
-  if (found == nullptr) return DensityChunk::is_solid(chunks.outside);
-  const DensityStorage* const storage = DensityStorage::of(*found);
-  const std::uint64_t row = storage == nullptr
-                                ? found->solid_row(0, 0)
-                                : storage->solid[static_cast<std::size_t>(local.z * kChunkEdge + local.y)];
-  return (row >> local.x & 1U) != 0;
-}
-
 // Returns the face around a crossed lattice edge. The cells that the triangle's vertices are in or between are three or
 // four of the cells around the edge.
 TriangleFace face_around_edge(const DensityNeighbourhood& chunks, const SmoothChunkMesh& mesh,
@@ -323,7 +309,7 @@ BlockVector<CellMaterial> materials_of(const DensityNeighbourhood& chunks, const
   of_vertex.reserve(mesh.cells.size());
   for (const SmoothCell name : mesh.cells) {
     const LevelCell cell = levels.cell_of(name);
-    of_vertex.push_back(materials.of_cell(chunks, cell.first / cell.size(), cell.level));
+    of_vertex.push_back(materials.of_cell(chunks, cell.first, cell.level));
   }
   return of_vertex;
 }

@@ -25,11 +25,11 @@ class SurfaceMaterials {
  public:
   explicit SurfaceMaterials(const VoxelRegistry& types);
 
-  /// Returns the material of a cell of the centre chunk or of a chunk before it, in cells of `level`. Level 0: from its
-  /// solid corners. Coarser levels: from the solid samples next to the surface along its crossed edges, since corners
-  /// may be far below the surface; if none of its edges is crossed, from the solid samples of the coarsest lattice
-  /// within the cell that has any. A cell of air gives air, white.
-  [[nodiscard]] CellMaterial of_cell(const DensityNeighbourhood& chunks, IVec3 cell, int level) const;
+  /// Returns the material of a cell of the centre chunk or of a chunk before it. The cell starts at the sample `first`
+  /// and is 2^level samples wide. Level 0: from its solid corners. Coarser levels: from the solid samples next to the
+  /// surface along its crossed edges, since corners may be far below the surface; if none of its edges is crossed, from
+  /// the solid samples of the coarsest lattice within the cell that has any. A cell of air gives air, white.
+  [[nodiscard]] CellMaterial of_cell(const DensityNeighbourhood& chunks, IVec3 first, int level) const;
   /// Returns the colour of a type; white if it is not registered.
   [[nodiscard]] LinearRgba16 albedo(VoxelType type) const;
 

@@ -133,7 +133,7 @@ Part make_part(const DensityNeighbourhood& chunks, int level, const SurfaceMater
     part.positions.push_back(mesh.positions[i]);
     part.normals.push_back(mesh.normals[i]);
     if (!mesh.occlusion.empty()) part.occlusion.push_back(mesh.occlusion[i]);
-    if (materials != nullptr) part.materials.push_back(materials->of_cell(chunks, cell, level));
+    if (materials != nullptr) part.materials.push_back(materials->of_cell(chunks, cell * (1 << level), level));
     if (cell.x == last || cell.y == last || cell.z == last) part.border.push_back({name.bits, place});
   }
   QUOIN_ASSERT(part.positions.size() < Part::kForeign && part.foreign.size() < Part::kForeign, "places of 31 bits");
