@@ -414,6 +414,39 @@ TEST_F(StreamedWorldBadInput, CancelsChunksThatNoViewerNeeds) {
   EXPECT_TRUE(world.take_problems().empty()) << "a cancelled chunk is no problem";
 }
 
+// A viewer turns back while chunks leave. Workers plan his way back before they learn of chunks that leave meanwhile.
+TEST_F(StreamedWorldBadInput, LoadsChunksThatLeaveWhileTheirViewerReturns) {
+  Gate gate;
+  std::atomic<bool> is_gated = false;
+  const auto generator = std::make_shared<FunctionGround>([&](IVec3 chunk, const Cancellation&) {
+    if (is_gated && chunk.x > 10) gate.wait();
+    return Result<StoredChunk>(StoredChunk{Chunk(1)});
+  });
+  bool is_planned_meanwhile = false;
+  const auto other_bytes = [&] {  // called between the arrival of plans and the departure of chunks
+    if (std::exchange(is_planned_meanwhile, false)) {
+      gate.open();
+      std::this_thread::sleep_for(100ms);
+    }
+    return std::size_t{0};
+  };
+  StreamedWorld world = opened(generator, {.other_bytes = other_bytes, .update_seconds = 1e-9, .workers = {1}});
+  Viewer viewer{.position = DVec3(32.0), .radius = 200.0};
+  ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+  is_gated = true;
+  viewer.position.x = 1'500.0;
+  ASSERT_TRUE(update_until(world, viewer, [&] { return world.stats().chunks_unloaded > 0; }));
+  gate.wait_until_reached();
+  viewer.position.x = 32.0;
+  std::this_thread::sleep_for(150ms);  // so that the second call asks for other bytes
+  ASSERT_TRUE(world.update({&viewer, 1}).has_value());
+  std::this_thread::sleep_for(150ms);
+  is_planned_meanwhile = true;
+  ASSERT_TRUE(world.update({&viewer, 1}).has_value());
+  EXPECT_FALSE(is_planned_meanwhile);
+  EXPECT_TRUE(update_until(world, viewer, [&] { return world.stats().is_complete; }));
+}
+
 TEST_F(StreamedWorldBadInput, FinishesChunksThatEditsNeed) {
   Gate gate;
   std::atomic<bool> was_cancelled = false;

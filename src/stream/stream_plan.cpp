@@ -141,6 +141,9 @@ void StreamPlan::set_state(const ChunkAddress& place, State state) {
     known = grid.try_emplace(place.chunk).first;
   }
   const std::uint32_t wanted = known->second.wanted;
+  if (wanted != kUnwanted && state == State::Unknown && known->second.state != State::Unknown) {
+    queue_.push_back(place);  // it left, or its load was dropped, after the plan was made
+  }
   known.value().state = state;
   if (wanted == kUnwanted) {
     if (state == State::Unknown) grid.erase(known);

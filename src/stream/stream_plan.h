@@ -65,6 +65,7 @@ class StreamPlan {
   void set_extent(std::uint32_t grid, const IBox& chunks, std::span<const IVec3> others);
   /// A chunk outside of the grid's box joins the others.
   void set_state(const ChunkAddress& place, State state);
+  /// Wanted chunks are loaded again, after the others.
   void forget(const ChunkAddress& place) { set_state(place, State::Unknown); }
 
   /// Replaces the requests and computes the chunks to load from scratch.

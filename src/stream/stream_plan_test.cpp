@@ -226,5 +226,31 @@ TEST(StreamPlan, EditedAirJoinsTheChunksToLoad) {
   EXPECT_FALSE(plan.next(place, true));
 }
 
+// Chunks of the list before may leave after the plan was made with them.
+TEST(StreamPlan, LoadsWantedChunksAgainThatAreForgotten) {
+  StreamPlan plan;
+  plan.set_extent(0, {IVec3(-1), IVec3(1)}, {});
+  const ChunkAddress here{0, 0, {0, 0, 0}};
+  plan.set_state(here, StreamPlan::State::Here);
+  plan.plan(around(DVec3(0.0), 200.0));
+  EXPECT_EQ(plan.wanted(), 8U);
+  ChunkAddress place;
+  for (int i = 0; i < 7; ++i) {
+    ASSERT_TRUE(plan.next(place, true));
+    EXPECT_NE(place, here);
+    plan.set_state(place, StreamPlan::State::Here);
+  }
+  EXPECT_FALSE(plan.has_next(true));
+  plan.forget(here);
+  EXPECT_EQ(plan.missing(), 1U);
+  EXPECT_TRUE(plan.has_next(true));
+  ASSERT_TRUE(plan.next(place, true));
+  EXPECT_EQ(place, here);
+  plan.forget(here);  // its load was dropped
+  ASSERT_TRUE(plan.next(place, true));
+  EXPECT_EQ(place, here);
+  EXPECT_FALSE(plan.next(place, true));
+}
+
 }  // namespace
 }  // namespace quoin

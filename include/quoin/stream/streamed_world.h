@@ -84,8 +84,8 @@ struct StreamOptions {
   /// memory.
   std::size_t max_whole_bytes = std::numeric_limits<std::size_t>::max();
   /// Returns the bytes held elsewhere for loaded chunks: meshes, trees, light, GPU memory. No other derived data counts
-  /// in the budget. `update`, `plan` and `load_all` call it on their thread, at most ten times per second. May be
-  /// empty.
+  /// in the budget. `update`, `plan` and `load_all` call it on their thread, at most ten times per second; it must not
+  /// edit the scene. May be empty.
   std::function<std::size_t()> other_bytes{};
   /// Maximum time in which one `update` call adds and unloads chunks, in seconds; at least one chunk per call. If few
   /// chunks wait, `update` spreads them over several calls. Half of this time is also the maximum in which a call of
