@@ -467,6 +467,7 @@ std::int64_t Grid::put_chunk(IVec3 at, Chunk voxels) {
 void Grid::make_partial() {
   clear();
   impl().loaded.begin();
+  notifier_.notify();
 }
 
 bool Grid::is_partial() const {
@@ -479,7 +480,6 @@ void Grid::set_extent(const IBox& chunks, std::span<const IVec3> others) {
   impl().entries.for_each([&](IVec3 at, const ChunkEntry&) { next.mark(at); });
   next.set_extent(chunks, others);
   impl().loaded = std::move(next);
-  if (impl().loaded.count() == 0) return;
   impl().journal.begin_change();
   impl().loaded.for_each([this](IVec3 at) {
     VoxelRecord record;

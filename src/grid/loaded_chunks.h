@@ -19,7 +19,7 @@ namespace quoin {
 /// A set of chunks that copies share. An entry of its tree has a bit for each chunk of a cube of 4^3. A change copies
 /// few nodes: one below the root covers 16^3 chunks.
 /// Threads: as ChunkTrie.
-class ChunkSet {
+class ChunkBits {
  public:
   [[nodiscard]] bool contains(IVec3 chunk) const {
     const Cube* const cube = cubes_.find(chunk.x >> 2, chunk.y >> 2, chunk.z >> 2);
@@ -44,9 +44,9 @@ class ChunkSet {
     size_ = 0;
   }
   /// Returns true if both are one set: copies without changes since, or empty. Cost: O(1).
-  [[nodiscard]] bool shares_all_with(const ChunkSet& other) const { return cubes_.shares_all_with(other.cubes_); }
+  [[nodiscard]] bool shares_all_with(const ChunkBits& other) const { return cubes_.shares_all_with(other.cubes_); }
   /// Returns true if both have the same chunks.
-  [[nodiscard]] bool is_same(const ChunkSet& other) const {
+  [[nodiscard]] bool is_same(const ChunkBits& other) const {
     bool has_all = size_ == other.size_;
     for_each([&](IVec3 chunk) { has_all = has_all && other.contains(chunk); });
     return has_all;
@@ -171,7 +171,7 @@ class LoadedChunks {
            others_.is_same(other.others_);
   }
   /// Calls `change(list)` for two lists and returns both results. Two lists that share all chunks are changed once, and
-  /// share them again. `change` leaves a list as it is if it throws.
+  /// share them again. If `change` throws for the second of two lists, the first stays changed.
   template <class Change>
   static std::pair<bool, bool> change_both(LoadedChunks& one, LoadedChunks& other, Change&& change) {
     const bool is_shared = one.marks_.shares_all_with(other.marks_) && one.others_.shares_all_with(other.others_) &&
@@ -227,8 +227,8 @@ class LoadedChunks {
     bounds_ = unite(bounds_, {chunk, chunk + 1});
   }
 
-  ChunkSet marks_;
-  ChunkSet others_;
+  ChunkBits marks_;
+  ChunkBits others_;
   IBox extent_;
   IBox bounds_;  // of the extent and the others
   bool is_partial_ = false;

@@ -423,6 +423,30 @@ TEST(SceneChanges, UpdatedSnapshotEqualsNewOne) {
   }
 }
 
+// Snapshots know the loaded chunks of a grid, even if it has no chunk.
+TEST(SceneChanges, UpdatedSnapshotHasLoadedChunksOfEmptyGrids) {
+  Scene scene;
+  const GridHandle handle = scene.add_grid({});
+  SceneGrid& land = scene.edit(handle);
+  Scene kept = scene.snapshot();
+  SceneChanges memory;
+  const auto expect_copied = [&](bool is_partial, bool is_loaded) {
+    scene.update_snapshot(kept, memory);
+    const SceneGrid& copy = kept.grids()[handle];
+    EXPECT_EQ(copy.grid.is_partial(), is_partial);
+    EXPECT_EQ(copy.field.is_partial(), is_partial);
+    EXPECT_EQ(copy.grid.is_loaded(IVec3(5)), is_loaded);
+    EXPECT_EQ(copy.field.is_loaded(IVec3(5)), is_loaded);
+  };
+  expect_copied(false, true);
+  land.grid.make_partial();
+  land.field.make_partial();
+  expect_copied(true, false);
+  land.grid.set_extent({IVec3(0), IVec3(2)});
+  land.field.set_extent({IVec3(0), IVec3(2)});
+  expect_copied(true, true);
+}
+
 // A consumer that keeps the voxel counts of placed grids, and fails at random before it has read all of them.
 struct VoxelCounts {
   SceneFollower follower;

@@ -511,6 +511,7 @@ void DensityStore::replace(IVec3 chunk, DensityChunk samples) {
 
 void DensityStore::make_partial() {
   clear();
+  ++edits_;
   loaded_.begin();
 }
 
@@ -520,7 +521,6 @@ void DensityStore::set_extent(const IBox& chunks, std::span<const IVec3> others)
   entries_.for_each([&](IVec3 at, const Entry&) { next.mark(at); });
   next.set_extent(chunks, others);
   loaded_ = std::move(next);
-  if (loaded_.count() == 0) return;
   ++edits_;
   journal_.begin_change();
   loaded_.for_each([this](IVec3 at) {
