@@ -151,7 +151,7 @@ class LiveMeshes {
   ///
   /// Cost:   O(changes), independent of the size of the world. O(instances) more if instances were added, removed or
   ///         changed. O(instances + waiting chunks) more while chunks wait for workers. With a LiveLight, instead of
-  ///         the changes: Scene::snapshot if there are any.
+  ///         the changes: as LiveLight::update.
   /// Errors: bad_alloc; the next call starts from scratch with all chunks.
   std::uint64_t update(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes = {});
 

@@ -171,7 +171,8 @@ class Scene {
   // For Quoin's own sources.
   /// Brings an earlier snapshot of this scene up to date; a snapshot that was changed, or of another scene, becomes a
   /// new one. `changes` is only used for its memory. If it throws, the snapshot may only be assigned to or destroyed.
-  /// Cost: O(changes since the snapshot), as `changes_since`, and O(lamps).
+  /// Cost: O(changes since the snapshot), as `changes_since`, O(lamps) and O(handles of removed objects); O(types) if
+  /// types changed.
   [[gnu::visibility("hidden")]] void update_snapshot(Scene& snapshot, SceneChanges& changes) const;
 
   /// Adds a grid, which the scene then owns. The grid is visible only where an instance places it.

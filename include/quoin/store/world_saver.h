@@ -84,7 +84,7 @@ class WorldSaver {
   /// Calls `on_edit(grid, chunk)` for each edited chunk of the grids that were saved or loaded before, once per call
   /// and aspect (voxels, data, densities); with nullopt if any chunk of the grid may have been edited. Chunks that
   /// were only loaded or unloaded (Grid::load_chunk) are left out. If it throws, the next call reports again.
-  /// Cost: O(changes).
+  /// Cost: O(changes), and O(objects changed since the last save) if there are new ones among them.
   void follow(const Scene& scene, FunctionRef<void(GridHandle grid, std::optional<IVec3> chunk)> on_edit);
   void follow(const Scene& scene) {
     follow(scene, [](GridHandle, std::optional<IVec3>) {});

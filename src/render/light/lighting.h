@@ -88,7 +88,7 @@ class Lighting {
   std::uint32_t sunlit_lanes(const Group& group, std::span<Vec3> sunlight) const;
   // Multiplies the light of each active lane by the transmittance of its ray. Returns how many rays were traced.
   std::int64_t shadow(const Group& group, RayPacket& rays, std::span<Vec3> light) const;
-  // As `shadow`, with the blocked rays known.
+  // Does what `shadow` does, with the blocked rays known.
   void darken(const Group& group, RayPacket& rays, std::uint32_t blocked, std::span<Vec3> light) const;
   void tint(const Group& group, const RayPacket& rays, std::span<Vec3> light) const;
   std::int64_t add_lamplight(const Group& group, std::span<Vec3> lamplight) const;

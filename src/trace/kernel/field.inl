@@ -140,11 +140,12 @@ inline bool first_in_field(const FieldView& field, const Ray& ray, double max_t,
 }
 
 // Traces packets of rays in a density field: the walk of trace/kernel/lockstep.inl, or of trace/kernel/window.inl for
-// short rays, through the cells with a solid corner. Steps only append the codes of such cells: no step waits for a
-// look-up in the tree, and no branch depends on its result. After the cells of a word of 4^3 cells, after a short ray,
-// or when there are many codes, lanes with a hit are left out, and the other codes become cells in a list. Packing is
-// slow with AVX2, so steps append to the list there. When the list fills the registers, its cells are tested: in single
-// precision for a possible negative value along the ray, then the few candidates in double. Lanes stop after a hit.
+// short rays, through the cells with a solid corner. With AVX-512, steps append the codes of such cells: no step waits
+// for a look-up in the tree, and the only branch is rarely taken. After the cells of a word of 4^3 cells, after a short
+// ray, or when there are many codes, lanes with a hit are left out, and the other codes become cells in a list. Packing
+// is slow with AVX2, so steps append to the list there. When the list fills the registers, its cells are tested: in
+// single precision for a possible negative value along the ray, then the few candidates in double. Lanes stop after a
+// hit.
 //
 //   lane          | 0 | 1 | 2 | ... | 15 |
 //   step 1        | A | . | B | ... |  C |    a cell with a solid corner, or none
@@ -204,7 +205,7 @@ class FieldLanes {
   static constexpr int kLaneShift = 18;
   // Codes are tested at the latest when there are so many. Open surfaces rarely have so many per packet.
   static constexpr int kManyCodes = 4 * kWidth;
-  // The rest of a list, and the cells of all codes; at least one group of cells per register.
+  // The cells left over of a group, the cells of all codes, and a register.
   static constexpr int kMostCells = kCellsAtOnce + kManyCodes + kWidth;
   using CellInts = Int32s<kCellsAtOnce>;
 
@@ -225,6 +226,7 @@ class FieldLanes {
   template <Cells (*kCellsOf)(I)>
   [[gnu::always_inline]] Mask visit(Mask which, I code, const I (&first)[3]) {
     if (kPacksFast) {
+      QUOIN_ASSERT(code_count_ < kManyCodes, "room for a register of codes");
       store_packed(codes_ + code_count_, packing_of(which), code + lane_codes_);
       code_count_ += std::popcount(bits(which));
       if (code_count_ < kManyCodes) return mask_of(0);

@@ -383,6 +383,7 @@ struct Walkers {
 };
 
 constexpr int kAxisFlags = 9;
+static_assert(kMostPackets * RayPacket::kSize <= std::size_t{1} << (31 - kAxisFlags), "numbers of rays have room");
 alignas(64) constexpr std::int32_t kLaneNumbers[RayPacket::kSize] = {0, 1, 2,  3,  4,  5,  6,  7,
                                                                      8, 9, 10, 11, 12, 13, 14, 15};
 
