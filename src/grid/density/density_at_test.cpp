@@ -54,8 +54,8 @@ TEST(DensityAt, EqualsSamplesAtTheirPositions) {
   }
 }
 
-// In chunks with and without storage, at their faces, at whole numbers, at points whose sums round to the next cell, and
-// at points without a cell.
+// In chunks with and without storage, at their faces, at whole numbers, at points whose sums round to the next cell,
+// and at points without a cell.
 TEST(DensityAt, DifferencesEqualSixDensities) {
   std::mt19937 random(41);
   std::uniform_real_distribution<float> rough(-3.0F, 3.0F);
