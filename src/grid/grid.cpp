@@ -78,6 +78,7 @@ std::vector<VoxelsOfChunk> grouped(std::span<const PlacedVoxel> list, std::vecto
     list = list.subspan(run.size());
   }
   std::vector<std::size_t> next;  // place in `sorted`, by chunk
+  next.reserve(chunks.size());
   std::size_t end = 0;
   for (const VoxelsOfChunk& of : chunks) next.push_back(std::exchange(end, end + of.count));
   sorted.resize(end);

@@ -45,6 +45,7 @@ class SurfaceConverter {
   /// Converts nothing.
   SurfaceConverter() = default;
   SurfaceConverter(std::nullptr_t) {}
+  // NOLINTBEGIN(bugprone-forwarding-reference-overload): never a SurfaceConverter
   template <class Callable>
     requires(
         !std::same_as<std::remove_cvref_t<Callable>, SurfaceConverter> &&
@@ -62,6 +63,7 @@ class SurfaceConverter {
       return plain(update);
     };
   }
+  // NOLINTEND(bugprone-forwarding-reference-overload)
 
   /// Returns true if there is a function.
   [[nodiscard]] explicit operator bool() const { return convert_ != nullptr; }
