@@ -18,6 +18,10 @@ endif()
 function(quoin_kernel stem)
   # Wide vectors never cross a call.
   set(common -Wno-psabi -fno-trapping-math)
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    # GCC stops inlining when a source has grown by a share of its size. So code for packets made single rays slower.
+    list(APPEND common --param=large-unit-insns=100000)
+  endif()
   set_source_files_properties("${stem}.cpp" PROPERTIES COMPILE_OPTIONS "${common}" SKIP_PRECOMPILE_HEADERS ON)
   if(NOT quoin_x86_kernels)
     return()
