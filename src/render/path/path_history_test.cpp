@@ -32,7 +32,7 @@ using render_test::place;
 using render_test::towards;
 using render_test::under_even_sky;
 
-constexpr int kEdge = 48;             // image size in pixels
+constexpr int kImageEdge = 48;        // image size in pixels
 constexpr IVec3 kTower{-16, 0, -16};  // the tower built on the meadow
 constexpr std::array kSamples{1, 4, 16, 64};
 
@@ -59,7 +59,7 @@ double mean_square(const PathImage& a, const PathImage& b) {
 /// A meadow with a wall and lamps, seen from above, with visible noise.
 class PathHistoryTest : public testing::Test {
  protected:
-  PathHistoryTest() : scene_(meadow(grid_)), tracer_(scene_), options_(under_even_sky(kEdge, kEdge, 1)) {
+  PathHistoryTest() : scene_(meadow(grid_)), tracer_(scene_), options_(under_even_sky(kImageEdge, kImageEdge, 1)) {
     physical_in(options_).sun.brightness = 1.0;
     physical_in(options_).sun.direction = {0.5, 0.7, 0.2};
     options_.max_bounces = 3;
@@ -92,7 +92,7 @@ class PathHistoryTest : public testing::Test {
   }
 
   void converge(std::uint32_t seed = 0) {
-    for (const int samples : kSamples) static_cast<void>(refined(kEdge, samples, seed));
+    for (const int samples : kSamples) static_cast<void>(refined(kImageEdge, samples, seed));
   }
 
   void edit(VoxelType type) {
@@ -132,67 +132,67 @@ TEST(PackedLight, ClampsOutOfRangeValues) {
 
 TEST_F(PathHistoryTest, KeepsImagesWithoutEdits) {
   for (const int samples : kSamples) {
-    const PathImage taken = take(kEdge, samples);
+    const PathImage taken = take(kImageEdge, samples);
     PathImage shown = taken;
     history_.refine(shown, samples);
     EXPECT_EQ(shown.radiance, taken.radiance);
     EXPECT_FALSE(history_.has_earlier());
   }
-  EXPECT_GE(history_.bytes(), 4U * kSamples.size() * kEdge * kEdge);
+  EXPECT_GE(history_.bytes(), 4U * kSamples.size() * kImageEdge * kImageEdge);
 }
 
 TEST_F(PathHistoryTest, KeepsPixelsUnaffectedByAnEdit) {
   converge();
-  const PathImage before = take(kEdge, kSamples.back());
+  const PathImage before = take(kImageEdge, kSamples.back());
   edit(2);
   ASSERT_TRUE(history_.has_earlier());
-  const PathImage plain = take(kEdge, 1);
-  const PathImage shown = refined(kEdge, 1);
-  const PathImage converged = take(kEdge, 1'024);
+  const PathImage plain = take(kImageEdge, 1);
+  const PathImage shown = refined(kImageEdge, 1);
+  const PathImage converged = take(kImageEdge, 1'024);
   // Hardly any path behind the wall passes the tower.
   EXPECT_LT(mean_square(shown, converged), 0.5 * mean_square(plain, converged));
-  EXPECT_GT(greatest_difference(plain, before, kEdge / 2), 0.2F);
+  EXPECT_GT(greatest_difference(plain, before, kImageEdge / 2), 0.2F);
   int same = 0;
   for (std::size_t i = 0; i < shown.radiance.size(); ++i) {
     const Vec3 difference = shown.radiance[i] - before.radiance[i];
     same += std::max({std::abs(difference.x), std::abs(difference.y), std::abs(difference.z)}) < 0.01F ? 1 : 0;
   }
-  EXPECT_GT(same, kEdge * kEdge / 2);
+  EXPECT_GT(same, kImageEdge * kImageEdge / 2);
 }
 
 TEST_F(PathHistoryTest, ConvergesToImageOfNewTracer) {
   converge();
   edit(2);
   PathImage shown;
-  for (const int samples : kSamples) shown = refined(kEdge, samples);
-  EXPECT_EQ(shown.radiance, take(kEdge, kSamples.back()).radiance);
+  for (const int samples : kSamples) shown = refined(kImageEdge, samples);
+  EXPECT_EQ(shown.radiance, take(kImageEdge, kSamples.back()).radiance);
   EXPECT_FALSE(history_.has_earlier()) << "the new image has as many samples as the earlier one";
 }
 
 TEST_F(PathHistoryTest, RestoresEarlierImageAfterUndoneEdit) {
   converge();
-  const PathImage before = take(kEdge, kSamples.back());
+  const PathImage before = take(kImageEdge, kSamples.back());
   edit(2);
-  for (const int samples : {1, 4}) static_cast<void>(refined(kEdge, samples));
+  for (const int samples : {1, 4}) static_cast<void>(refined(kImageEdge, samples));
   edit(kAir);
   EXPECT_TRUE(history_.has_earlier());
-  EXPECT_LT(greatest_difference(refined(kEdge, 1), before), 0.02F);
+  EXPECT_LT(greatest_difference(refined(kImageEdge, 1), before), 0.02F);
 }
 
 // The edit removes only little of the light.
 TEST_F(PathHistoryTest, MatchesMeanOfNewScene) {
   constexpr int kTries = 24;
-  std::vector<DVec3> shown(static_cast<std::size_t>(kEdge) * kEdge, DVec3(0.0));
+  std::vector<DVec3> shown(static_cast<std::size_t>(kImageEdge) * kImageEdge, DVec3(0.0));
   for (std::uint32_t seed = 1; seed <= kTries; ++seed) {
     history_.clear();
     converge(seed);
     edit(2);
-    const PathImage image = refined(kEdge, 1, seed);
+    const PathImage image = refined(kImageEdge, 1, seed);
     for (std::size_t i = 0; i < shown.size(); ++i) shown[i] += DVec3(image.radiance[i]) / static_cast<double>(kTries);
     edit(kAir);
   }
   edit(2);
-  const PathImage converged = take(kEdge, 1'024);
+  const PathImage converged = take(kImageEdge, 1'024);
   DVec3 all(0.0);
   DVec3 right(0.0);
   for (std::size_t i = 0; i < shown.size(); ++i) {
@@ -213,7 +213,7 @@ TEST(PathHistory, DarkensClosedRoomWithinFewSamples) {
   grid.fill_box(kWindow, kAir);
   const GridHandle room = scene.instances()[place(scene, std::move(grid))].grid;
   PathTracer tracer(scene);
-  PathOptions options = under_even_sky(kEdge, kEdge, 1);
+  PathOptions options = under_even_sky(kImageEdge, kImageEdge, 1);
   options.max_bounces = 4;
   PathHistory history;
   const auto mean_shown = [&](int samples) {
@@ -237,23 +237,23 @@ TEST(PathHistory, DarkensClosedRoomWithinFewSamples) {
 }
 
 TEST_F(PathHistoryTest, RefinesSmallImagesFromLargerOnes) {
-  for (const int edge : {kEdge / 4, kEdge / 2, kEdge}) static_cast<void>(refined(edge, 1));
+  for (const int edge : {kImageEdge / 4, kImageEdge / 2, kImageEdge}) static_cast<void>(refined(edge, 1));
   converge();
-  const PathImage before = take(kEdge, kSamples.back());
-  EXPECT_FALSE(history_.knows(kEdge / 4, kEdge / 4, 1)) << "only images of earlier scenes are known";
+  const PathImage before = take(kImageEdge, kSamples.back());
+  EXPECT_FALSE(history_.knows(kImageEdge / 4, kImageEdge / 4, 1)) << "only images of earlier scenes are known";
   edit(2);
-  ASSERT_TRUE(history_.knows(kEdge / 4, kEdge / 4, 1));
-  EXPECT_FALSE(history_.knows(kEdge / 3, kEdge / 3, 1));
-  const PathImage small = take(kEdge / 4, 1);
+  ASSERT_TRUE(history_.knows(kImageEdge / 4, kImageEdge / 4, 1));
+  EXPECT_FALSE(history_.knows(kImageEdge / 3, kImageEdge / 3, 1));
+  const PathImage small = take(kImageEdge / 4, 1);
   PathImage plain = before;
-  for (int i = 0; i < kEdge * kEdge; ++i)
+  for (int i = 0; i < kImageEdge * kImageEdge; ++i)
     plain.radiance[static_cast<std::size_t>(i)] =
-        small.radiance[static_cast<std::size_t>(i / kEdge / 4 * (kEdge / 4) + i % kEdge / 4)];
-  const PathImage shown = refined(kEdge / 4, 1);
-  ASSERT_EQ(shown.width, kEdge);
+        small.radiance[static_cast<std::size_t>(i / kImageEdge / 4 * (kImageEdge / 4) + i % kImageEdge / 4)];
+  const PathImage shown = refined(kImageEdge / 4, 1);
+  ASSERT_EQ(shown.width, kImageEdge);
   ASSERT_EQ(shown.radiance.size(), before.radiance.size());
   ASSERT_EQ(shown.alpha.size(), before.radiance.size());
-  const PathImage converged = take(kEdge, 1'024);
+  const PathImage converged = take(kImageEdge, 1'024);
   EXPECT_LT(mean_square(shown, converged), 0.5 * mean_square(plain, converged));
   EXPECT_GT(greatest_difference(shown, before), 0.1F) << "and the tower is there";
 }
@@ -261,8 +261,8 @@ TEST_F(PathHistoryTest, RefinesSmallImagesFromLargerOnes) {
 TEST_F(PathHistoryTest, KeepsImagesOfUnknownSampleCounts) {
   converge();
   edit(2);
-  const PathImage taken = take(kEdge, 2);
-  EXPECT_EQ(refined(kEdge, 2).radiance, taken.radiance);
+  const PathImage taken = take(kImageEdge, 2);
+  EXPECT_EQ(refined(kImageEdge, 2).radiance, taken.radiance);
   history_.clear();
   EXPECT_FALSE(history_.has_earlier());
   EXPECT_EQ(history_.bytes(), 0U);
@@ -270,12 +270,12 @@ TEST_F(PathHistoryTest, KeepsImagesOfUnknownSampleCounts) {
 
 TEST_F(PathHistoryTest, KeepsLayersOfFullSizeImages) {
   options_.layers = true;
-  for (const int edge : {kEdge / 2, kEdge}) static_cast<void>(refined(edge, 1));
+  for (const int edge : {kImageEdge / 2, kImageEdge}) static_cast<void>(refined(edge, 1));
   converge();
   edit(2);
-  EXPECT_TRUE(refined(kEdge / 2, 1).albedo.empty());
-  const PathImage taken = take(kEdge, 1);
-  const PathImage shown = refined(kEdge, 1);
+  EXPECT_TRUE(refined(kImageEdge / 2, 1).albedo.empty());
+  const PathImage taken = take(kImageEdge, 1);
+  const PathImage shown = refined(kImageEdge, 1);
   EXPECT_EQ(shown.albedo, taken.albedo);
   EXPECT_EQ(shown.depth.values, taken.depth.values);
   EXPECT_EQ(shown.alpha, taken.alpha);
