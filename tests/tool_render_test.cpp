@@ -265,33 +265,55 @@ TEST_F(ToolRender, PathTracedImagesHaveBrightBackground) {
 // A cave is wider than rooms of blocks. A distance set by an option applies to fields too.
 TEST_F(ToolRender, OcclusionShapesCaveOfField) {
   ASSERT_EQ(run("generate smooth-terrain s.json --chunks 3x2x3").status, 0);
-  const std::string base =
-      "s.json -o out.png --size 64x48 --camera 98,35,161 --look-at 100.8,41.2,142.2 --fov 80 --exposure 3 ";
-  const auto rock = [&](const std::string& flags) {  // the mean and the standard deviation of the rock
-    drawn(base + flags);
-    const auto image = read_png(folder_.file("out.png"));
+  const auto image = [&](const std::string& flags) {
+    drawn("s.json -o out.png --size 64x48 --camera 98,35,161 --look-at 100.8,41.2,142.2 --fov 80 --exposure 3 " +
+          flags);
+    const auto read = read_png(folder_.file("out.png"));
+    return read ? read->rgb : std::vector<std::uint8_t>(3 * 64 * 48);
+  };
+  const std::vector<std::uint8_t> open = image("--preset no-ao");
+  // Returns the mean and the standard deviation of the rock that no sunlight reaches, which has one colour in `open`.
+  const auto rock = [&open](const std::vector<std::uint8_t>& rgb) {
     double sum = 0.0;
     double squares = 0.0;
     double count = 0.0;
-    for (std::size_t i = 0; image && i < image->rgb.size(); i += 3) {
-      const int green = image->rgb[i + 1];
-      if (std::abs(green - image->rgb[i]) > 8) continue;  // grass
-      sum += green;
-      squares += green * green;
+    for (std::size_t i = 0; i < rgb.size(); i += 3) {
+      if (std::abs(open[i] - 72) > 1 || std::abs(open[i + 1] - 72) > 1) continue;
+      sum += rgb[i + 1];
+      squares += rgb[i + 1] * rgb[i + 1];
       count += 1.0;
     }
-    EXPECT_GT(count, 2000.0);
+    EXPECT_GT(count, 2800.0);
     const double mean = sum / std::max(count, 1.0);
     return std::array{mean, std::sqrt(squares / std::max(count, 1.0) - mean * mean)};
   };
-  const auto plain = rock("");
-  const auto open = rock("--preset no-ao");
-  EXPECT_LE(plain[0], open[0]);
+  const auto plain = rock(image(""));
   EXPECT_GE(plain[1], 15.0);
-  EXPECT_GT(plain[1], open[1] + 5.0) << "it is not the sun's light that varies";
-  const auto far = rock("--ao-distance 18 --ao-rays 9");
-  EXPECT_NEAR(plain[0], far[0], 1e-9);
-  EXPECT_GT(rock("--ao-distance 6")[0], plain[0] + 10.0);
+  EXPECT_LE(plain[0], rock(open)[0]);
+  EXPECT_LT(rock(open)[1], 1.0) << "it is not the sun's light that varies";
+  EXPECT_LT(rock(image("--ao-distance 18 --ao-rays 9"))[0], plain[0] - 3.0);
+  EXPECT_GT(rock(image("--ao-distance 6"))[0], plain[0] + 10.0);
+}
+
+// Long rays from open slopes of fields also meet the ground.
+TEST_F(ToolRender, LongOcclusionRaysKeepOpenSlopesOfField) {
+  ASSERT_EQ(run("generate smooth-terrain s.json --chunks 3x2x3").status, 0);
+  const auto image = [&](const std::string& flags) {
+    drawn("s.json -o out.png --size 96x72 " + flags);
+    const auto read = read_png(folder_.file("out.png"));
+    return read ? read->rgb : std::vector<std::uint8_t>();
+  };
+  const std::vector<std::uint8_t> longer = image("");
+  const std::vector<std::uint8_t> shorter = image("--ao-distance 6");
+  ASSERT_EQ(longer.size(), shorter.size());
+  ASSERT_FALSE(longer.empty());
+  std::size_t changed = 0;
+  for (std::size_t i = 0; i < longer.size(); i += 3) {
+    int most = 0;
+    for (std::size_t k = i; k < i + 3; ++k) most = std::max(most, std::abs(longer[k] - shorter[k]));
+    changed += most > 4;
+  }
+  EXPECT_LE(static_cast<double>(changed), 0.03 * static_cast<double>(longer.size() / 3));
 }
 
 TEST_F(ToolRender, FileSettingsApplyWithoutOptions) {

@@ -59,7 +59,8 @@ struct LightOptions {
   int occlusion_rays = 9;  ///< 6: the reference's set; 9: the symmetric set; other counts are spread per pixel
   double occlusion_distance_voxels = 6.0;
   /// Scales occlusion_distance_voxels at surfaces of fields, 0 to 1,024. Caves are wider than rooms made of blocks and
-  /// need longer rays to show their shape.
+  /// need longer rays to show their shape. With a reach r > 1, a share of 0.3 (1 - 1 / r) of the rays may be blocked
+  /// without darkening: long rays also meet the ground around open slopes. Darker points are brightened in proportion.
   double field_occlusion_reach = 1.0;
   SmoothOcclusionOptions smooth_occlusion{};                                ///< of OcclusionMode::Smooth
   double shadow_distance_voxels = std::numeric_limits<double>::infinity();  ///< occluders farther away cast no shadow

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "core/not_finite_for_tests.h"
+#include "render/light/light_model.h"
 
 namespace quoin {
 namespace {
@@ -31,6 +32,13 @@ TEST(LightOptions, NaturalLightHasLampsAndReflectingGlass) {
 TEST(LightOptions, LengthensFieldOcclusionOnlyInNaturalLight) {
   EXPECT_EQ(LightOptions{}.field_occlusion_reach, 1.0);
   EXPECT_EQ(natural_light().field_occlusion_reach, 3.0);
+  EXPECT_EQ(field_openness_factor(LightOptions{}), 1.0F);
+  EXPECT_FLOAT_EQ(field_openness_factor(natural_light()), 1.25F) << "a fifth of the rays may be blocked";
+  LightOptions options;
+  options.field_occlusion_reach = 0.0;
+  EXPECT_EQ(field_openness_factor(options), 1.0F);
+  options.field_occlusion_reach = 1024.0;
+  EXPECT_LT(field_openness_factor(options), 1.5F);
 }
 
 TEST(LightOptions, RejectsInvalidValuesByName) {

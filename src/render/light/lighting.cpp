@@ -470,13 +470,16 @@ std::int64_t Lighting::trace_openness(const Group& group, std::uint32_t lanes, s
     rays.max_t[i] = group.points[i]->in_field ? reach * options_.field_occlusion_reach : reach;
   }
   const int count = directions_.count();
+  const float factor = field_openness_factor(options_);
   for (int ray = 0; ray < count && rays.active != 0; ++ray) {
     set_occlusion_directions(group, ray, rays);
     const std::uint32_t blocked = view_->any_hits(group.placed, rays);
     for (std::size_t i = 0; i < group.size; ++i) open[i] += static_cast<int>((blocked >> i & 1U) == 0);
   }
   for (std::size_t i = 0; i < group.size; ++i) {
-    if ((lanes >> i & 1U) != 0) openness[i] = static_cast<float>(open[i]) / static_cast<float>(count);
+    if ((lanes >> i & 1U) == 0) continue;
+    openness[i] = static_cast<float>(open[i]) / static_cast<float>(count);
+    if (group.points[i]->in_field) openness[i] = std::min(openness[i] * factor, 1.0F);
   }
   return std::int64_t{count} * std::popcount(rays.active);
 }

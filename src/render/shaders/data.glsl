@@ -193,7 +193,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
   vec4 sky_horizon;
   vec4 sky_ground;
   vec4 light;  // ambient, ambient without occlusion, light left by full occlusion, reach of its rays at fields
-  vec4 ambient;  // colours: of the ambient light, of the sun's
+  vec4 ambient;  // colours: of the ambient light (w: factor on the openness of fields), of the sun's
   vec4 sun;
   vec4 level_sky;  // light at level 15, from the sky and from lamps; and the minimum light
   vec4 level_lamps;

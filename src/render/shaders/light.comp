@@ -150,7 +150,9 @@ float openness_of(Point point, Placed placed, int open) {
     uint face = point.what.y;
     return 1.0 - occlusion_at(corner_occlusion(opaque, point.voxel.xyz, face), face, point.inside.xyz) / 3.0;
   }
-  return traces_occlusion(point) ? float(open) / float(frame().occlusion_count) : 0.0;
+  if (!traces_occlusion(point)) return 0.0;
+  float share = float(open) / float(frame().occlusion_count);
+  return is_of_field(point) ? min(share * frame().ambient.w, 1.0) : share;
 }
 
 LevelPlace level_place(Point point) {

@@ -175,7 +175,8 @@ fn trace_light(point: Point) -> Lit {
       of_lamps += brought * passed;
     }
   }
-  return Lit(sunlight + of_lamps, f32(open) / f32(frame.occlusion_count));
+  let share = f32(open) / f32(frame.occlusion_count);
+  return Lit(sunlight + of_lamps, select(share, min(share * frame.ambient.w, 1.0), is_field));
 }
 
 fn surface_at(point: Point) -> Surface {

@@ -234,7 +234,7 @@ void set_light(const RenderOptions& options, ShaderFrame& frame) {
                  static_cast<float>(light.field_occlusion_reach)};
   frame.lift = static_cast<float>(kRayLift);
   const Daylight daylight = daylight_of(environment);
-  frame.ambient = {daylight.ambient, 0.0F};
+  frame.ambient = {daylight.ambient, field_openness_factor(light)};
   frame.sun = {daylight.sun, 0.0F};
   frame.sky_zenith = {sky * daylight.sky.zenith, 0.0F};
   frame.sky_horizon = {sky * daylight.sky.horizon, 0.0F};
