@@ -97,6 +97,20 @@ std::uint32_t blocked_by(const OccupancyTree& opaque, const DensityTree* field, 
   return blocked | any_hits(*field, rest);
 }
 
+// Sets the directions of one of the occlusion rays of each face at `wanted`.
+void set_directions(const OcclusionDirections& directions, int ray, std::span<const std::uint32_t> wanted,
+                    const ImpostorFaces& impostor, RayPacket& rays) {
+  QUOIN_ASSERT(wanted.size() <= RayPacket::kSize, "a face per lane");
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    const ImpostorFaces::Face& face = impostor.faces[wanted[i]];
+    // Faces of a field's surface use the values of an upper face, rotated with it.
+    const auto side = static_cast<std::size_t>(face.in_field ? Direction::PosY : face.direction);
+    DVec3 direction = directions.fixed(side, ray);
+    if (face.in_field) direction = turned_from_up(direction, DVec3(impostor.surfel_of(wanted[i]).normal));
+    rays.direction_x[i] = direction.x, rays.direction_y[i] = direction.y, rays.direction_z[i] = direction.z;
+  }
+}
+
 // Counts the rays of OcclusionDirections that reach open space from the middle of each face at `wanted`. Handles
 // sixteen faces at a time, mostly of one direction.
 void count_open_rays(const OccupancyTree& opaque, const DensityTree* field, std::span<const std::uint32_t> wanted,
@@ -116,17 +130,17 @@ void count_open_rays(const OccupancyTree& opaque, const DensityTree* field, std:
                                          : DVec3(face.voxel) + 0.5 + (0.5 + kLift) * DVec3(normal_of(face.direction));
       rays.origin_x[i] = origin.x, rays.origin_y[i] = origin.y, rays.origin_z[i] = origin.z;
     }
+    const ImpostorFaces::Face& first = faces[wanted[begin]];
+    const bool is_one_side = std::ranges::all_of(wanted.subspan(begin, size), [&](std::uint32_t i) {
+      return !faces[i].in_field && faces[i].direction == first.direction;
+    });
     std::array<int, RayPacket::kSize> open{};
     for (int ray = 0; ray < kRays; ++ray) {
-      for (std::size_t i = 0; i < size; ++i) {
-        const ImpostorFaces::Face& face = faces[wanted[begin + i]];
-        // Faces of a field's surface use the values of an upper face, rotated with it.
-        const auto side = static_cast<std::size_t>(face.in_field ? Direction::PosY : face.direction);
-        DVec3 direction = directions.fixed(side, ray);
-        if (face.in_field) {
-          direction = turned_from_up(direction, DVec3(impostor.surfel_of(wanted[begin + i]).normal));
-        }
-        rays.direction_x[i] = direction.x, rays.direction_y[i] = direction.y, rays.direction_z[i] = direction.z;
+      if (is_one_side) {
+        const DVec3 direction = directions.fixed(static_cast<std::size_t>(first.direction), ray);
+        rays.direction_x.fill(direction.x), rays.direction_y.fill(direction.y), rays.direction_z.fill(direction.z);
+      } else {
+        set_directions(directions, ray, wanted.subspan(begin, size), impostor, rays);
       }
       const std::uint32_t blocked = blocked_by(opaque, field, rays);
       for (std::size_t i = 0; i < size; ++i) open[i] += (blocked >> i & 1U) == 0;
@@ -230,9 +244,20 @@ void put_faces(const Subject& subject, const BlockVector<SeenFace>& seen, KnownF
   count_open_rays(*subject.opaque, subject.field, fresh, out);
 }
 
+bool is_full(const OccupancyTree& tree, const IBox& box) {
+  for (int z = box.min.z; z < box.max.z; ++z) {
+    for (int y = box.min.y; y < box.max.y; ++y) {
+      for (int x = box.min.x; x < box.max.x; ++x) {
+        if (!tree.is_occupied({x, y, z})) return false;
+      }
+    }
+  }
+  return true;
+}
+
 void put_levels(const Subject& subject, const BlockVector<SeenFace>& seen, ImpostorFaces& out) {
-  const auto is_solid = [&](IVec3 voxel) {
-    return subject.shell ? subject.shell->is_occupied(voxel) : subject.opaque->is_occupied(voxel);
+  const auto is_solid = [&](const IBox& box) {
+    return subject.shell ? subject.shell->is_full(box) : is_full(*subject.opaque, box);
   };
   std::size_t level = 0;
   int width = subject.first_width;  // log2

@@ -1,5 +1,6 @@
 #include "render/impostor/impostor_surface.h"
 
+#include <algorithm>
 #include <random>
 #include <set>
 #include <tuple>
@@ -72,6 +73,38 @@ TEST(ImpostorShell, HoldsEveryFaceOnce) {
       ASSERT_LE(faces[i == 0 ? 0 : i - 1].direction, faces[i].direction);
     }
   }
+}
+
+TEST(ImpostorShell, FullBoxesHaveOnlyOccupiedVoxels) {
+  std::mt19937 random(7);
+  int full = 0;
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    const ShellWorld world(seed);
+    const auto shell = ImpostorShell::build(world.tree, kPlenty, kPlenty);
+    ASSERT_TRUE(shell.has_value());
+    const IBox around{world.tree.bounds().min - 1, world.tree.bounds().max + 1};
+    const BlockVector<VoxelFace> faces = shell->faces();
+    for (int i = 0; i < 20'000; ++i) {
+      const IVec3 near = faces[random() % faces.size()].voxel;
+      IBox box;
+      for (int axis = 0; axis < 3; ++axis) {
+        const int length = 1 + static_cast<int>(random() % (i % 4 == 0 ? 9U : 3U));
+        const int low = near[axis] - static_cast<int>(random() % static_cast<unsigned>(length));
+        box.min[axis] = std::max(low, around.min[axis]);
+        box.max[axis] = std::min(low + length, around.max[axis]);
+      }
+      bool expected = true;
+      for (int z = box.min.z; z < box.max.z; ++z) {
+        for (int y = box.min.y; y < box.max.y; ++y) {
+          for (int x = box.min.x; x < box.max.x; ++x) expected &= shell->is_occupied({x, y, z});
+        }
+      }
+      ASSERT_EQ(shell->is_full(box), expected) << seed << ", box " << i;
+      full += expected ? 1 : 0;
+    }
+    EXPECT_TRUE(shell->is_full({around.min, around.min})) << "an empty box";
+  }
+  EXPECT_GT(full, 10'000);
 }
 
 TEST(ImpostorShell, BuildsNothingBeyondLimits) {

@@ -121,6 +121,35 @@ std::uint64_t ImpostorShell::exposed(Direction direction, std::size_t cell) cons
   return exposed_bits(cells_[cell], cells_[next], direction);
 }
 
+namespace {
+
+// Returns a mask with `unit` bits for each of the positions from `first` to `end` that lie in a row of four.
+std::uint64_t bits_of_row(int first, int end, int unit) {
+  first = std::max(first, 0), end = std::min(end, 4);
+  QUOIN_ASSERT(first < end, "at least one of four");
+  return ~std::uint64_t{0} >> (64 - unit * end) & ~std::uint64_t{0} << unit * first;
+}
+
+}  // namespace
+
+bool ImpostorShell::is_full(const IBox& box) const {
+  const IVec3 low = box.min - origin_;
+  const IVec3 high = box.max - origin_;
+  QUOIN_ASSERT(box.empty() || (unite({IVec3{0}, size_ * 4}, {low, high}) == IBox{IVec3{0}, size_ * 4}),
+               "positions in the box or next to it");
+  for (int z = low.z & ~3; z < high.z; z += 4) {
+    const std::uint64_t in_z = bits_of_row(low.z - z, high.z - z, 16);
+    for (int y = low.y & ~3; y < high.y; y += 4) {
+      const std::uint64_t in_y = in_z & bits_of_row(low.y - y, high.y - y, 4) * 0x0001'0001'0001'0001U;
+      for (int x = low.x & ~3; x < high.x; x += 4) {
+        const std::uint64_t wanted = in_y & bits_of_row(low.x - x, high.x - x, 1) * 0x1111'1111'1111'1111U;
+        if ((~cells_[cell_of({x, y, z})] & wanted) != 0) return false;
+      }
+    }
+  }
+  return true;
+}
+
 std::int64_t ImpostorShell::count_faces() const {
   std::int64_t count = 0;
   for (std::size_t cell = 0; cell < cells_.size(); ++cell) {

@@ -46,6 +46,8 @@ class ImpostorShell {
     QUOIN_ASSERT((IBox{IVec3{0}, size_ * 4}.contains(local)), "a position in the box or next to it");
     return (cells_[cell_of(local)] >> bit_of(local) & 1U) != 0;
   }
+  /// Returns true if all voxels of a box are occupied. Requires: `box` is at most one voxel outside the tree's box.
+  [[nodiscard]] bool is_full(const IBox& box) const;
 
  private:
   explicit ImpostorShell(const IBox& box);

@@ -24,6 +24,8 @@ constexpr std::size_t kSides = ImpostorFaces::kSides;
 template <class ViewsOf>
 ImpostorFaces::Level level_of(const BlockVector<SeenFace>& faces, const ContentSphere& content, ViewsOf views_of) {
   LevelMaker maker(content);
+  maker.reserve(static_cast<std::size_t>(
+      std::count_if(faces.begin(), faces.end(), [&](const SeenFace& face) { return views_of(face) != 0; })));
   for (std::size_t i = 0; i < faces.size(); ++i) {
     const std::uint32_t views = views_of(faces[i]);
     if (views != 0) maker.add(rectangle_of(faces[i], content.centre), views, static_cast<std::uint32_t>(i));
@@ -32,14 +34,6 @@ ImpostorFaces::Level level_of(const BlockVector<SeenFace>& faces, const ContentS
 }
 
 }  // namespace
-
-Vec3 Rectangle::half_box() const {
-  const FaceFrame& frame = frame_of(direction);
-  Vec3 half;
-  half[frame.u] = reach[0], half[frame.v] = reach[1];
-  half[frame.axis] = is_inclined ? reach[0] * std::abs(slope[0]) + reach[1] * std::abs(slope[1]) : 0.0F;
-  return half;
-}
 
 Rectangle rectangle_of(const SeenFace& seen, DVec3 centre) {
   const auto [voxel, direction] = seen.face;
@@ -62,10 +56,24 @@ Rectangle rectangle_of(const SeenFace& seen, DVec3 centre) {
   return out;
 }
 
+void LevelMaker::reserve(std::size_t count) {
+  count += kSides * (kGroup - 1);
+  for (BlockVector<float>& values : level_.centre) values.reserve(count);
+  level_.views.reserve(count);
+  level_.face.reserve(count);
+}
+
 void LevelMaker::add(const Rectangle& rectangle, std::uint32_t views, std::uint32_t face) {
   QUOIN_ASSERT(views != 0 && rectangle.side() >= side_, "sides in their order");
   end_sides(rectangle.side());
-  has_reach_ |= rectangle.is_inclined || rectangle.reach != std::array{0.5F, 0.5F};
+  if (!has_reach_ && (rectangle.is_inclined || rectangle.reach != std::array{0.5F, 0.5F})) {
+    has_reach_ = true;
+    for (BlockVector<float>& values : level_.reach) values.assign(level_.views.size(), 0.5F);
+  }
+  if (!has_slope_ && rectangle.is_inclined) {
+    has_slope_ = true;
+    for (BlockVector<float>& values : level_.slope) values.assign(level_.views.size(), 0.0F);
+  }
   put(rectangle, views, face);
 }
 
@@ -78,8 +86,8 @@ void LevelMaker::put(const Rectangle& rectangle, std::uint32_t views, std::uint3
   level_.views.push_back(views);
   level_.face.push_back(face);
   for (std::size_t k = 0; k < 2; ++k) {
-    level_.reach[k].push_back(rectangle.reach[k]);
-    level_.slope[k].push_back(rectangle.slope[k]);
+    if (has_reach_) level_.reach[k].push_back(rectangle.reach[k]);
+    if (has_slope_) level_.slope[k].push_back(rectangle.slope[k]);
   }
   last_ = rectangle;
   if (level_.views.size() % kGroup == 0) end_group();
@@ -115,8 +123,6 @@ ImpostorFaces::Level LevelMaker::level() && {
   for (auto* const boxes : {&level_.groups.centre, &level_.groups.half}) {
     for (BlockVector<float>& values : *boxes) values.resize(values.size() + kGroup);
   }
-  if (level_.begin[kSides / 2] == level_.begin[kSides]) level_.slope = {};
-  if (!has_reach_) level_.reach = {};
   return std::move(level_);
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -67,7 +68,13 @@ struct Rectangle {
   bool is_inclined = false;
 
   /// Half the sides of the box around it.
-  [[nodiscard]] Vec3 half_box() const;
+  [[nodiscard]] Vec3 half_box() const {
+    const FaceFrame& frame = frame_of(direction);
+    Vec3 half;
+    half[frame.u] = reach[0], half[frame.v] = reach[1];
+    half[frame.axis] = is_inclined ? reach[0] * std::abs(slope[0]) + reach[1] * std::abs(slope[1]) : 0.0F;
+    return half;
+  }
   [[nodiscard]] std::size_t side() const {
     return static_cast<std::size_t>(direction) + (is_inclined ? ImpostorFaces::kSides / 2 : 0);
   }
@@ -80,6 +87,8 @@ struct Rectangle {
 class LevelMaker {
  public:
   explicit LevelMaker(const ContentSphere& content) { level_.size = static_cast<float>(content.radius); }
+  /// Reserves memory for this number of rectangles.
+  void reserve(std::size_t count);
 
   /// Requires: sides come in their order; `views` has a bit set. `face`: see ImpostorFaces::Level::face.
   void add(const Rectangle& rectangle, std::uint32_t views, std::uint32_t face);
@@ -95,7 +104,8 @@ class LevelMaker {
   Rectangle last_;
   Vec3 low_{0.0F};  // of the current group
   Vec3 high_{0.0F};
-  bool has_reach_ = false;
+  bool has_reach_ = false;  // of another length than 0.5
+  bool has_slope_ = false;
 };
 
 // Faces and cells are sorted along a Morton curve.

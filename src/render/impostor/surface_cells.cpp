@@ -390,11 +390,12 @@ void SurfaceCells::halve() {
   ++log2_width_;
   std::size_t count = 0;
   for (std::size_t i = 0; i < cells_.size(); ++i) {
-    Cell cell = cells_[i];
+    Cell& cell = cells_[i];
     cell.bits = halved_bits(cell.bits, static_cast<unsigned>(cell.code & 7U));
     cell.code >>= 3;
     if (count == 0 || cells_[count - 1].code != cell.code) {
-      cells_[count++] = cell;
+      if (count != i) cells_[count] = cell;
+      ++count;
       continue;
     }
     Cell& into = cells_[count - 1];
@@ -429,23 +430,17 @@ void SurfaceCells::fill_from(const OccupancyTree& tree) {
   }
 }
 
-// Returns true if solid voxels lie against all of a side.
-bool SurfaceCells::is_covered(const Cell& cell, Direction direction, const std::function<bool(IVec3)>& is_solid) const {
-  if (cell.has_field) return false;
+namespace {
+
+// Returns the layer of voxels against a side of a box.
+IBox layer_at(IBox box, Direction direction) {
   const FaceFrame& frame = frame_of(direction);
-  IVec3 low = voxel_of(DVec3(cell.low) + content_.centre + 0.5);
-  IVec3 high = voxel_of(DVec3(cell.high) + content_.centre + 0.5);
-  const int layer = frame.sign > 0 ? high[frame.axis] : low[frame.axis] - 1;
-  low[frame.axis] = layer, high[frame.axis] = layer + 1;
-  for (int z = low.z; z < high.z; ++z) {
-    for (int y = low.y; y < high.y; ++y) {
-      for (int x = low.x; x < high.x; ++x) {
-        if (!is_solid({x, y, z})) return false;
-      }
-    }
-  }
-  return true;
+  const int layer = frame.sign > 0 ? box.max[frame.axis] : box.min[frame.axis] - 1;
+  box.min[frame.axis] = layer, box.max[frame.axis] = layer + 1;
+  return box;
 }
+
+}  // namespace
 
 ImpostorFaces::Cell SurfaceCells::finished(const Cell& cell) const {
   ImpostorFaces::Cell out;
@@ -466,8 +461,14 @@ ImpostorFaces::Cell SurfaceCells::finished(const Cell& cell) const {
   return out;
 }
 
-ImpostorFaces::Level SurfaceCells::level(const std::function<bool(IVec3)>& is_solid) const {
+ImpostorFaces::Level SurfaceCells::level(FunctionRef<bool(const IBox&)> is_solid) const {
   LevelMaker maker(content_);
+  std::vector<IBox> boxes;  // of cells without a field, in voxels
+  boxes.reserve(cells_.size());
+  for (const Cell& cell : cells_) {
+    boxes.push_back(
+        {voxel_of(DVec3(cell.low) + content_.centre + 0.5), voxel_of(DVec3(cell.high) + content_.centre + 0.5)});
+  }
   for (const Direction direction : kDirections) {
     const FaceFrame& frame = frame_of(direction);
     for (std::size_t i = 0; i < cells_.size(); ++i) {
@@ -477,7 +478,9 @@ ImpostorFaces::Level SurfaceCells::level(const std::function<bool(IVec3)>& is_so
       side.centre[frame.axis] = (frame.sign > 0 ? cell.high : cell.low)[frame.axis];
       side.direction = direction;
       side.reach = {0.5F * (cell.high - cell.low)[frame.u], 0.5F * (cell.high - cell.low)[frame.v]};
-      if (!(side.reach[0] > 0.0F && side.reach[1] > 0.0F) || is_covered(cell, direction, is_solid)) continue;
+      if (!(side.reach[0] > 0.0F && side.reach[1] > 0.0F)) continue;
+      // No ray comes through solid voxels that lie against all of a side.
+      if (!cell.has_field && is_solid(layer_at(boxes[i], direction))) continue;
       maker.add(side, kAllImpostorViews, static_cast<std::uint32_t>(i));
     }
   }

@@ -2,10 +2,10 @@
 
 #include <array>
 #include <cstdint>
-#include <functional>
 #include <vector>
 
 #include <quoin/core/direction.h>
+#include <quoin/core/function_ref.h>
 #include <quoin/core/memory.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/density_grid.h>
@@ -42,9 +42,10 @@ class SurfaceCells {
   /// least.
   void fill_from(const OccupancyTree& tree);
 
-  /// Returns the box sides that a ray may reach from outside. `is_solid(voxel)` must accept voxels of the content's box
-  /// and their neighbours. Order: direction, then cells along a Morton curve.
-  [[nodiscard]] ImpostorFaces::Level level(const std::function<bool(IVec3)>& is_solid) const;
+  /// Returns the box sides that a ray may reach from outside. `is_solid(box)` returns true if all voxels of a box are
+  /// solid, and must accept voxels of the content's box and their neighbours. Order: direction, then cells along a
+  /// Morton curve.
+  [[nodiscard]] ImpostorFaces::Level level(FunctionRef<bool(const IBox&)> is_solid) const;
 
  private:
   // For each view, a face that it saw, and its rank: the lowest of all faces in the cell. Ranks are random numbers
@@ -64,8 +65,6 @@ class SurfaceCells {
   SurfaceCells(const ContentSphere& content, IVec3 least, int log2_width);
   void sort();
   [[nodiscard]] IVec3 corner_of(const Cell& cell) const;
-  [[nodiscard]] bool is_covered(const Cell& cell, Direction direction,
-                                const std::function<bool(IVec3)>& is_solid) const;
   [[nodiscard]] ImpostorFaces::Cell finished(const Cell& cell) const;
 
   ContentSphere content_;

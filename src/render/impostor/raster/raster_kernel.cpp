@@ -121,11 +121,26 @@ inline int follow(const Job& job, const ImpostorFaces::Cell& cell, std::size_t s
   }
 }
 
+// Stores a hit if it is nearer than the pixel's hit so far.
+inline void keep(std::int32_t id, std::size_t pixel, float depth, Met met, Canvas& canvas) {
+  const float nearest = canvas.depth[pixel];
+  if (!(depth <= nearest)) return;
+  const std::int32_t face = met.packed();
+  if (depth == nearest) {
+    // Rectangles in one plane may overlap, and their order differs between register widths.
+    const bool is_lower = id < canvas.id[pixel] || (id == canvas.id[pixel] && face < canvas.face[pixel]);
+    if (!is_lower) return;
+  }
+  canvas.depth[pixel] = depth;
+  canvas.id[pixel] = id;
+  canvas.face[pixel] = face;
+}
+
 inline void put(const Job& job, std::size_t side, float x, float y, float depth, std::uint32_t rectangle,
                 Canvas& canvas) {
   const std::size_t pixel = index_of(static_cast<int>(x), static_cast<int>(y));
-  const float nearest = canvas.depth[pixel];
-  if (nearest < depth || canvas.pattern[pixel] < job.share.first || canvas.pattern[pixel] >= job.share.end) return;
+  if (canvas.depth[pixel] < depth || canvas.pattern[pixel] < job.share.first || canvas.pattern[pixel] >= job.share.end)
+    return;
   std::uint32_t view = 0;
   if (!job.level->cells.empty()) {
     float along = (depth - job.depth_at) / job.depth_step;
@@ -137,13 +152,16 @@ inline void put(const Job& job, std::size_t side, float x, float y, float depth,
     view = job.near.chosen(64 * number + static_cast<std::uint32_t>(bit));
     depth = std::max(depth, job.depth_at + along * job.depth_step);
   }
-  const std::int32_t met = Met{rectangle, view}.packed();
-  // Rectangles in one plane may overlap, and their order differs between register widths.
-  const bool is_lower = job.id < canvas.id[pixel] || (job.id == canvas.id[pixel] && met < canvas.face[pixel]);
-  if (!(depth < nearest) && !(depth == nearest && is_lower)) return;
-  canvas.depth[pixel] = depth;
-  canvas.id[pixel] = job.id;
-  canvas.face[pixel] = met;
+  keep(job.id, pixel, depth, {rectangle, view}, canvas);
+}
+
+// Returns index_of the pixels, which have integer coordinates.
+inline I indices_of(F x, F y) {
+  static_assert(kTile == 32 && kBlock == 4);
+  const I column = to_int(x);
+  const I row = to_int(y);
+  return shift_left<7>(shift_right<2>(row)) + shift_left<4>(shift_right<2>(column)) + shift_left<2>(row & all(3)) +
+         (column & all(3));
 }
 
 // Writes the faces that rays met to the canvas.
@@ -151,9 +169,21 @@ inline void put_met(const Job& job, const Side& side, F x, F y, F depth, Mask me
   std::uint32_t left = bits(met);
   if (left == 0) return;
   alignas(64) float depths[kLanes];
+  store(depths, depth);
+  if (job.share.is_whole() && job.level->cells.empty()) {
+    alignas(64) std::int32_t pixels[kLanes];
+    store(pixels, indices_of(x, y));
+    for (; left != 0; left &= left - 1) {
+      const auto lane = static_cast<std::size_t>(std::countr_zero(left));
+      const auto pixel = static_cast<std::size_t>(pixels[lane]);
+      QUOIN_ASSERT(pixel < kPixels, "a pixel of the tile");
+      keep(job.id, pixel, depths[lane], {static_cast<std::uint32_t>(first + lane), 0}, canvas);
+    }
+    return;
+  }
   alignas(64) float columns[kLanes];
   alignas(64) float rows[kLanes];
-  store(depths, depth), store(columns, x), store(rows, y);
+  store(columns, x), store(rows, y);
   for (; left != 0; left &= left - 1) {
     const auto lane = static_cast<std::size_t>(std::countr_zero(left));
     put(job, side.axis, columns[lane], rows[lane], depths[lane], static_cast<std::uint32_t>(first + lane), canvas);

@@ -51,7 +51,7 @@ struct Shape {
 
   // Boxes of cells give rectangles of many sizes.
   [[nodiscard]] ImpostorFaces::Level coarse() const {
-    return SurfaceCells(faces, content, 128, 2).level([](IVec3) { return false; });
+    return SurfaceCells(faces, content, 128, 2).level([](const IBox&) { return false; });
   }
 };
 
