@@ -49,6 +49,7 @@ Result<WorldLock> WorldLock::take(const std::filesystem::path& world) {
     lock.descriptor_ = ::open(lock.file_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
     if (lock.descriptor_ < 0) {
       const int number = errno;
+      if (number == ENOENT) return make_error(ErrorCode::CannotWrite, "its folder does not exist");
       return make_error(ErrorCode::CannotWrite,
                         "cannot create its lock file: " + std::generic_category().message(number));
     }
