@@ -24,29 +24,36 @@ struct CrossingSum {
   std::uint8_t links;
 };
 
+// Each set of crossings extends one without its last edge: clang evaluates at most 2^20 steps of a constant.
 constexpr auto kCrossingSums = [] {
   std::array<CrossingSum, 4096> sums{};
-  for (unsigned crossings = 0; crossings < 4096; ++crossings) {
-    CrossingSum& sum = sums[crossings];
-    unsigned on_face[6] = {};
-    for (std::size_t edge = 0; edge < smooth::kEdges; ++edge) {
-      if ((crossings >> edge & 1U) == 0) continue;
-      const std::size_t axis = edge / 4;
+  unsigned on_face[4096][6] = {};
+  for (std::size_t edge = 0; edge < smooth::kEdges; ++edge) {
+    const std::size_t axis = edge / 4;
+    const std::size_t others[] = {(axis + 1) % 3, (axis + 2) % 3};
+    for (unsigned before = 0; before < 1U << edge; ++before) {
+      const unsigned crossings = before | 1U << edge;
+      CrossingSum& sum = sums[crossings];
+      sum = sums[before];
+      for (unsigned face = 0; face < 6; ++face) on_face[crossings][face] = on_face[before][face];
       ++sum.count;
       ++sum.halves[axis];
-      for (const std::size_t other : {(axis + 1) % 3, (axis + 2) % 3}) {
+      for (const std::size_t other : others) {
         const std::size_t end = smooth::edge_start(edge) >> other & 1U;
         sum.halves[other] = static_cast<std::uint8_t>(sum.halves[other] + 2 * end);
-        ++on_face[2 * other + end];
+        ++on_face[crossings][2 * other + end];
       }
     }
+  }
+  for (unsigned crossings = 0; crossings < 4096; ++crossings) {
+    CrossingSum& sum = sums[crossings];
     // A face with three crossings has three labels: a line where surfaces meet leaves the cell there. Vertices on such
     // lines are linked only with their neighbours on the line, so that the line is smooth too. Four crossings may also
     // be two labels on opposite corners.
     unsigned least = 1;
-    for (const unsigned count : on_face) least = count == 3 ? 3 : least;
+    for (const unsigned count : on_face[crossings]) least = count == 3 ? 3 : least;
     for (unsigned face = 0; face < 6; ++face) {
-      if (on_face[face] >= least) sum.links = static_cast<std::uint8_t>(sum.links | 1U << face);
+      if (on_face[crossings][face] >= least) sum.links = static_cast<std::uint8_t>(sum.links | 1U << face);
     }
   }
   return sums;
