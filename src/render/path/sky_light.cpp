@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -259,11 +260,13 @@ class MultipleScattering {
  public:
   MultipleScattering(const AirOptions& air, const Transmittance& transmittance) {
     for (int j = 0; j < kEdge; ++j) {
+      const float share = (static_cast<float>(j) + 0.5F) / kEdge;
+      const float radius = kGround + (kTop - kGround) * share * share;
+      Rings rings;
+      for (int ring = 0; ring < kRings; ++ring) rings[static_cast<std::size_t>(ring)] = ring_of(ring, radius, air);
       for (int i = 0; i < kEdge; ++i) {
-        const float share = (static_cast<float>(j) + 0.5F) / kEdge;
         table_[static_cast<std::size_t>(j * kEdge + i)] =
-            integrate(kGround + (kTop - kGround) * share * share, static_cast<float>(i) / (kEdge - 1) * 2.0F - 1.0F,
-                      air, transmittance);
+            integrate(rings, radius, static_cast<float>(i) / (kEdge - 1) * 2.0F - 1.0F, transmittance);
       }
     }
   }
@@ -283,42 +286,63 @@ class MultipleScattering {
 
  private:
   static constexpr int kEdge = 20;
+  static constexpr int kRings = 6;
+  static constexpr int kTurns = 6;
+  static constexpr int kSteps = 16;
 
-  static Vec3 integrate(float radius, float cosine_of_sun, const AirOptions& air, const Transmittance& transmittance) {
-    constexpr int kRings = 6;
-    constexpr int kTurns = 6;
-    constexpr int kSteps = 16;
+  // Rays of one height and elevation, without the sun.
+  struct Ring {
+    float cosine = 0.0F;
+    float sine = 0.0F;
+    float length = 0.0F;
+    bool on_ground = false;
+    std::array<float, kSteps> t{};       // distances of the steps' middles
+    std::array<float, kSteps> radius{};  // their distances from the Earth's centre
+    std::array<Vec3, kSteps> part{};     // the share of each step in the light of the ray
+    Vec3 passed{1.0F};                   // the transmittance of the ray
+  };
+  using Rings = std::array<Ring, kRings>;
+
+  static Ring ring_of(int number, float radius, const AirOptions& air) {
+    Ring ring;
+    ring.cosine = 1.0F - 2.0F * (static_cast<float>(number) + 0.5F) / kRings;
+    ring.sine = std::sqrt(1.0F - ring.cosine * ring.cosine);
+    ring.on_ground = meets_ground(radius, ring.cosine);
+    ring.length = std::max(ring.on_ground ? distance_to(radius, ring.cosine, kGround, true)
+                                          : distance_to(radius, ring.cosine, kTop, false),
+                           0.0F);
+    const float step = ring.length / kSteps;
+    for (std::size_t i = 0; i < kSteps; ++i) {
+      ring.t[i] = step * (static_cast<float>(i) + 0.5F);
+      ring.radius[i] = along(radius, ring.cosine, ring.t[i]);
+      const Medium medium = medium_at(ring.radius[i], air);
+      const Vec3 scattering = medium.rayleigh + Vec3(medium.mie);
+      const Vec3 step_passes = through(medium.extinction * step);
+      ring.part[i] = ring.passed * scattering * (Vec3(1.0F) - step_passes) / glm::max(medium.extinction, Vec3(1e-9F));
+      ring.passed *= step_passes;
+    }
+    return ring;
+  }
+
+  static Vec3 integrate(const Rings& rings, float radius, float cosine_of_sun, const Transmittance& transmittance) {
     const float sine_of_sun = std::sqrt(std::max(0.0F, 1.0F - cosine_of_sun * cosine_of_sun));
     Vec3 second(0.0F);
     Vec3 again(0.0F);
-    for (int ring = 0; ring < kRings; ++ring) {
-      const float cosine = 1.0F - 2.0F * (static_cast<float>(ring) + 0.5F) / kRings;
-      const float sine = std::sqrt(1.0F - cosine * cosine);
+    for (const Ring& ring : rings) {
       for (int turn = 0; turn < kTurns; ++turn) {
-        const float to_sun_across = sine * of_turns((static_cast<float>(turn) + 0.5F) / kTurns).cosine;
-        const bool on_ground = meets_ground(radius, cosine);
-        const float length = std::max(
-            on_ground ? distance_to(radius, cosine, kGround, true) : distance_to(radius, cosine, kTop, false), 0.0F);
-        const float step = length / kSteps;
-        Vec3 passed(1.0F);
+        const float to_sun_across = ring.sine * of_turns((static_cast<float>(turn) + 0.5F) / kTurns).cosine;
         const auto sun_at = [&](float t, float here) {
           // The vertical there, and the sun's angle with it.
-          return (radius * cosine_of_sun + t * (cosine * cosine_of_sun + to_sun_across * sine_of_sun)) / here;
+          return (radius * cosine_of_sun + t * (ring.cosine * cosine_of_sun + to_sun_across * sine_of_sun)) / here;
         };
-        for (int i = 0; i < kSteps; ++i) {
-          const float t = step * (static_cast<float>(i) + 0.5F);
-          const float here = along(radius, cosine, t);
-          const Medium medium = medium_at(here, air);
-          const Vec3 scattering = medium.rayleigh + Vec3(medium.mie);
-          const Vec3 step_passes = through(medium.extinction * step);
-          const Vec3 part = passed * scattering * (Vec3(1.0F) - step_passes) / glm::max(medium.extinction, Vec3(1e-9F));
-          second += part * transmittance.at(here, sun_at(t, here)) * (1.0F / (4.0F * kPi));
-          again += part;
-          passed *= step_passes;
+        for (std::size_t i = 0; i < kSteps; ++i) {
+          second += ring.part[i] * transmittance.at(ring.radius[i], sun_at(ring.t[i], ring.radius[i])) *
+                    (1.0F / (4.0F * kPi));
+          again += ring.part[i];
         }
-        if (on_ground) {
-          const float angle = sun_at(length, kGround);
-          second += passed * transmittance.at(kGround, angle) * (std::max(angle, 0.0F) * kGroundAlbedo / kPi);
+        if (ring.on_ground) {
+          const float angle = sun_at(ring.length, kGround);
+          second += ring.passed * transmittance.at(kGround, angle) * (std::max(angle, 0.0F) * kGroundAlbedo / kPi);
         }
       }
     }
@@ -329,65 +353,97 @@ class MultipleScattering {
   std::array<Vec3, std::size_t{kEdge} * kEdge> table_{};
 };
 
-class Sky {
+// The tables of an atmosphere, for any sun.
+struct Atmosphere {
+  explicit Atmosphere(const AirOptions& options)
+      : air(options), transmittance(options), scattering(options, transmittance) {}
+
+  AirOptions air;
+  Transmittance transmittance;
+  MultipleScattering scattering;
+};
+
+// Returns the tables. The default atmosphere's are made once per process.
+std::shared_ptr<const Atmosphere> atmosphere_of(const AirOptions& air) {
+  if (air != AirOptions{}) return std::make_shared<const Atmosphere>(air);
+  static const auto usual = std::make_shared<const Atmosphere>(AirOptions{});
+  return usual;
+}
+
+// The rays from the eye of one elevation, for a sun of irradiance 1.
+class SkyRow {
  public:
-  explicit Sky(const AirOptions& air) : air_(air), transmittance_(air), scattering_(air, transmittance_) {}
-
-  [[nodiscard]] Vec3 sunlight(float sun_up) const { return transmittance_.at(kEye, sun_up); }
-
-  // Returns the radiance for an irradiance of 1. `up`: the y of the ray; `towards`: its cosine with the sun's
-  // direction.
-  [[nodiscard]] Vec3 radiance(float up, float towards, float sun_up) const {
-    constexpr int kSteps = 32;
+  // `up`: the y of the rays.
+  SkyRow(const Atmosphere& atmosphere, float up, float sun_up) : atmosphere_(atmosphere), sun_up_(sun_up) {
     const bool on_ground = meets_ground(kEye, up);
     const float length =
         std::max(on_ground ? distance_to(kEye, up, kGround, true) : distance_to(kEye, up, kTop, false), 0.0F);
-    const float rayleigh_phase = 3.0F / (16.0F * kPi) * (1.0F + towards * towards);
-    const auto g = static_cast<float>(air_.mie_anisotropy);
-    const float gg = g * g;
-    const float under = std::max(1.0F + gg - 2.0F * g * towards, 1e-4F);
-    const float mie_phase =
-        3.0F / (8.0F * kPi) * (1.0F - gg) * (1.0F + towards * towards) / ((2.0F + gg) * under * std::sqrt(under));
-    Vec3 sum(0.0F);
     Vec3 passed(1.0F);
     float before = 0.0F;
     for (int i = 0; i < kSteps; ++i) {
       const float share = static_cast<float>(i + 1) / kSteps;
       const float end = length * share * share;  // shorter steps first, in dense air
-      const float t = (before + end) * 0.5F;
-      const float here = along(kEye, up, t);
-      const float sun_here = (kEye * sun_up + t * towards) / here;
-      const Medium medium = medium_at(here, air_);
-      const Vec3 step_passes = through(medium.extinction * (end - before));
-      const Vec3 direct =
-          transmittance_.at(here, sun_here) * (medium.rayleigh * rayleigh_phase + medium.mie * mie_phase);
-      const Vec3 all = direct + scattering_.at(here, sun_here) * (medium.rayleigh + medium.mie);
-      sum += passed * all * (Vec3(1.0F) - step_passes) / glm::max(medium.extinction, Vec3(1e-9F));
+      Step& step = steps_[static_cast<std::size_t>(i)];
+      step.t = (before + end) * 0.5F;
+      step.radius = along(kEye, up, step.t);
+      step.medium = medium_at(step.radius, atmosphere.air);
+      const Vec3 step_passes = through(step.medium.extinction * (end - before));
+      step.passed = passed;
+      step.absorbed = Vec3(1.0F) - step_passes;
       passed *= step_passes;
       before = end;
+    }
+  }
+
+  // Returns the radiance. `towards`: the cosine of the ray with the sun's direction.
+  [[nodiscard]] Vec3 radiance(float towards) const {
+    const float rayleigh_phase = 3.0F / (16.0F * kPi) * (1.0F + towards * towards);
+    const auto g = static_cast<float>(atmosphere_.air.mie_anisotropy);
+    const float gg = g * g;
+    const float under = std::max(1.0F + gg - 2.0F * g * towards, 1e-4F);
+    const float mie_phase =
+        3.0F / (8.0F * kPi) * (1.0F - gg) * (1.0F + towards * towards) / ((2.0F + gg) * under * std::sqrt(under));
+    Vec3 sum(0.0F);
+    for (const Step& step : steps_) {
+      const Medium& medium = step.medium;
+      const float sun_here = (kEye * sun_up_ + step.t * towards) / step.radius;
+      const Vec3 direct = atmosphere_.transmittance.at(step.radius, sun_here) *
+                          (medium.rayleigh * rayleigh_phase + medium.mie * mie_phase);
+      const Vec3 all = direct + atmosphere_.scattering.at(step.radius, sun_here) * (medium.rayleigh + medium.mie);
+      sum += step.passed * all * step.absorbed / glm::max(medium.extinction, Vec3(1e-9F));
     }
     return sum;
   }
 
  private:
-  AirOptions air_;
-  Transmittance transmittance_;
-  MultipleScattering scattering_;
+  static constexpr int kSteps = 32;
+  struct Step {
+    float t = 0.0F;       // the distance of its middle
+    float radius = 0.0F;  // from the Earth's centre
+    Medium medium;
+    Vec3 passed{1.0F};  // the transmittance from the eye
+    Vec3 absorbed{0.0F};
+  };
+
+  const Atmosphere& atmosphere_;
+  float sun_up_;
+  std::array<Step, kSteps> steps_{};
 };
 
 // A table of the sky above the horizon, by elevation and by azimuth from the sun. Steps are finer near the horizon and
 // near the sun.
 class Dome {
  public:
-  Dome(const Sky& sky, float sun_up, float irradiance) {
+  Dome(const Atmosphere& atmosphere, float sun_up, float irradiance) {
     const float sun_across = std::sqrt(std::max(0.0F, 1.0F - sun_up * sun_up));
     for (int j = 0; j < kUps; ++j) {
       const float up = std::max(square(static_cast<float>(j) / (kUps - 1)), 1e-5F);
       const float across = std::sqrt(std::max(0.0F, 1.0F - up * up));
+      const SkyRow row(atmosphere, up, sun_up);
       for (int i = 0; i < kTurns; ++i) {
         const float turns = 0.5F * square(static_cast<float>(i) / (kTurns - 1));
         const float towards = std::clamp(up * sun_up + across * sun_across * of_turns(turns).cosine, -1.0F, 1.0F);
-        entries_[index(i, j)] = sky.radiance(up, towards, sun_up) * irradiance + kNight;
+        entries_[index(i, j)] = row.radiance(towards) * irradiance + kNight;
       }
     }
   }
@@ -426,12 +482,12 @@ class Dome {
 }  // namespace
 
 AtmosphericSky atmospheric_sky(DVec3 to_sun, float irradiance, const AirOptions& air) {
-  const Sky sky(air);
+  const std::shared_ptr<const Atmosphere> atmosphere = atmosphere_of(air);
   const auto sun_up = static_cast<float>(to_sun.y);
   AtmosphericSky made;
-  made.sunlight = sky.sunlight(sun_up) * irradiance;
+  made.sunlight = atmosphere->transmittance.at(kEye, sun_up) * irradiance;
   made.radiance = {kWidth, kHeight, std::vector<float>(std::size_t{3} * kWidth * kHeight)};
-  const Dome dome(sky, sun_up, irradiance);
+  const Dome dome(*atmosphere, sun_up, irradiance);
   // The colour of the ground below the horizon.
   const Vec3 ground = (dome.on_level_ground() + made.sunlight * std::max(sun_up, 0.0F)) * (kGroundAlbedo / kPi);
   const double sun_turns = arc_tangent(to_sun.x, -to_sun.z) / (2.0 * std::numbers::pi) + 0.5;

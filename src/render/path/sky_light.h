@@ -126,7 +126,7 @@ class SkyMap {
 /// Returns true if both have the same SkyLight.
 [[nodiscard]] bool is_same_sky(const Environment& a, const Environment& b);
 
-/// The sun and the sky of an image. Cost: 70 ms for a physical sky.
+/// The sun and the sky of an image. Cost: 20 ms for a physical sky.
 class SkyLight {
  public:
   /// Requires: `check` accepts the options.
