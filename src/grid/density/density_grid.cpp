@@ -369,6 +369,11 @@ bool are_one_value(const DensityChunk& a, const DensityChunk& b, int y, int z) {
   return material.has_value() && material == b.materials().uniform();
 }
 
+// Returns true if a row is known to lie beyond the band throughout. Null: there is no chunk.
+bool is_far(const DensityChunk* samples, Half far, int y, int z) {
+  return samples == nullptr || (samples->row(y, z) == nullptr && samples->get(0, y, z) == far);
+}
+
 // Returns true if edits within this band could have stored every density.
 [[maybe_unused]] bool is_stored_within(const DensityChunk& samples, Half far) {
   const auto is_stored = [far](Half density) { return stored_within(float_from_half(density), far) == density; };
@@ -436,7 +441,8 @@ ChangeReach DensityStore::differences(const DensityChunk* before, const DensityC
   for (int z = 0; z < kChunkEdge; ++z) {
     for (int y = 0; y < kChunkEdge; ++y) {
       const bool are_both = before != nullptr && after != nullptr;
-      if (are_both && are_one_value(*before, *after, y, z)) continue;
+      if (are_both ? are_one_value(*before, *after, y, z) : is_far(before == nullptr ? after : before, far_, y, z))
+        continue;
       read_densities(before, far_, y, z, old_row);
       read_densities(after, far_, y, z, new_row);
       if (are_both) {

@@ -85,21 +85,31 @@ std::uint64_t solid_row(const Neighbourhood& chunks, int dx, int y, int z) {
   return chunk == nullptr ? 0 : ~chunk->row_mask(y & (kChunkEdge - 1), z & (kChunkEdge - 1), kAir);
 }
 
-// Returns true if all voxels of the region are solid, false if all are air, and nothing if both occur.
-std::optional<bool> read_region(const Neighbourhood& chunks, const Window& window, Scratch& scratch) {
+/// The voxels of a region.
+struct RegionContent {
   bool is_all_solid = true;
   bool is_all_air = true;
+  Window near_solid{kChunkEdge, 0, kChunkEdge, 0};  // the rows with solid voxels in their reach; others are far away
+};
+
+RegionContent read_region(const Neighbourhood& chunks, const Window& window, Scratch& scratch) {
+  RegionContent content;
+  Window& near = content.near_solid;
   for_each_row(window, 2 * kMargin, 2 * kMargin, [&](int y, int z) {
     const auto part = [&](int dx) { return solid_row(chunks, dx, y - kMargin, z - kMargin); };
     const std::uint64_t middle = part(0);
     RegionRow& row = scratch.rows[static_cast<std::size_t>(z * kRegion + y)];
     row.low = part(-1) >> (64 - kMargin) | middle << kMargin;
     row.high = (middle >> (64 - kMargin) | part(1) << kMargin) & RegionRow::kHighBits;
-    is_all_solid = is_all_solid && row.has_all();
-    is_all_air = is_all_air && row.has_none();
+    content.is_all_solid = content.is_all_solid && row.has_all();
+    if (row.has_none()) return;
+    content.is_all_air = false;
+    near.first_y = std::min(near.first_y, std::max(y - 2 * kMargin, 0));
+    near.last_y = std::max(near.last_y, std::min(y + 1, kChunkEdge));
+    near.first_z = std::min(near.first_z, std::max(z - 2 * kMargin, 0));
+    near.last_z = std::max(near.last_z, std::min(z + 1, kChunkEdge));
   });
-  if (is_all_solid) return true;
-  return is_all_air ? std::optional(false) : std::nullopt;
+  return content;
 }
 
 // For each byte, its bits as eight bytes of 0 or 1.
@@ -279,19 +289,14 @@ DensityChunk density_of_voxels(const Neighbourhood& chunks) {
   const Chunk* voxels = chunks.at(0, 0, 0);
   DensityChunk made(far);
   if (voxels != nullptr) made.materials() = *voxels;
-  std::optional<bool> is_solid;
-  std::unique_ptr<Scratch> scratch;
   if (is_one_kind_throughout(chunks)) {
-    is_solid = voxels != nullptr;
-  } else {
-    scratch.reset(new Scratch);  // without writing zeros first
-    is_solid = read_region(chunks, {}, *scratch);
-  }
-  if (is_solid.has_value()) {
-    if (*is_solid) made.fill(deep);
+    if (voxels != nullptr) made.fill(deep);
     return made;
   }
-  write_window(*scratch, {}, far, made);
+  const std::unique_ptr<Scratch> scratch(new Scratch);  // without writing zeros first
+  const RegionContent content = read_region(chunks, {}, *scratch);
+  if (content.is_all_solid) made.fill(deep);
+  if (!content.is_all_solid && !content.is_all_air) write_window(*scratch, content.near_solid, far, made);
   return made;
 }
 

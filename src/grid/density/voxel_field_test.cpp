@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include "grid/density/density_storage.h"
+
 namespace quoin {
 namespace {
 
@@ -150,6 +152,25 @@ TEST(VoxelField, UpdateMatchesFreshChunk) {
     update_density_of_voxels(grid.neighbourhood({0, 0, 0}), {{-64, -64, -64}, {128, 128, 128}}, kept);
     EXPECT_TRUE(kept.uniform().has_value()) << "all of one kind takes no room";
     EXPECT_EQ(kept.content_hash(), density_of_voxels(grid.neighbourhood({0, 0, 0})).content_hash());
+  }
+}
+
+// Chunks compute only the rows near solid voxels; an update of the whole chunk computes all rows.
+TEST(VoxelField, SmallModelsEqualUpdateOfWholeChunk) {
+  std::mt19937 random(12);
+  const auto below = [&](int end) { return static_cast<int>(random() % static_cast<unsigned>(end)); };
+  const IBox whole{{0, 0, 0}, IVec3(kChunkEdge)};
+  for (int i = 0; i < 40; ++i) {
+    Grid grid;
+    const IVec3 at{below(88) - 12, below(88) - 12, below(88) - 12};
+    grid.fill_box({at, at + IVec3{1 + below(4), 1 + below(9), 1 + below(3)}}, 2);
+    if (i % 2 == 0) grid.set({below(64), below(64), below(64)}, 1);
+    DensityChunk updated(largest_within(8.0F));
+    updated.fill(0x3C00);  // every row must be written
+    update_density_of_voxels(grid.neighbourhood({0, 0, 0}), whole, updated);
+    const DensityChunk made = density_of_voxels(grid.neighbourhood({0, 0, 0}));
+    ASSERT_EQ(made.content_hash(), updated.content_hash()) << at.x << ' ' << at.y << ' ' << at.z;
+    ASSERT_EQ(made.uniform(), updated.uniform());
   }
 }
 
