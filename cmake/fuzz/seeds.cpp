@@ -177,7 +177,7 @@ void put_cases(const Seeds& seeds, const fs::path& cases) {
     if (!entry.is_regular_file() || entry.file_size() > kMostBytes) continue;
     const std::vector<std::byte> bytes = read(entry.path());
     const std::optional<FileFormat> format = detect_format(bytes);
-    if (format) seeds.put(target_of(*format), "case_" + entry.path().filename().string(), bytes);
+    if (format) seeds.put(target_of(format_info(*format)), "case_" + entry.path().filename().string(), bytes);
   }
 }
 
