@@ -163,6 +163,11 @@ void put_images(const Seeds& seeds) {
   const auto pfm = write_pfm(depths);
   require(pfm.has_value(), "seed.pfm", pfm ? "" : to_string(pfm.error()));
   seeds.put("pfm", "seed.pfm", *pfm);
+  const std::vector<float> light = {0.0F, 0.5F, 1.0F, 2.0F, 4.0F, 8.0F};
+  const auto half = ExrChannel::Type::Float16;
+  const auto exr =
+      write_exr(3, 2, std::vector<ExrChannel>{{"R", half, light, {}}, {"G", half, light, {}}, {"B", half, light, {}}});
+  if (exr) seeds.put("radiance", "seed.exr", *exr);  // not without OpenEXR
 }
 
 /// The first byte gives the number of 256-byte blocks that belong to the database; the rest is its log.

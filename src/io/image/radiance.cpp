@@ -152,8 +152,46 @@ constexpr std::size_t max_pixels_in(std::size_t file_bytes) {
   return (std::size_t{1} << 16) + 516 * file_bytes;
 }
 
+// Returns the position of the first attribute that does not lie in the file, for which OpenEXR would allocate as many
+// bytes as it claims; nullopt if there is none.
+//
+// Layout: 8 bytes; per attribute a name and a type with terminators, 32 bits of length and the value; an empty name ends
+//         a header. Files with several parts have a header for each, and an empty one.
+std::optional<std::size_t> overlong_attribute(std::span<const std::byte> bytes) {
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  const auto number_at = [&](std::size_t at) {
+    std::uint64_t number = 0;
+    for (std::size_t i = 4; i > 0; --i) number = number << 8 | std::to_integer<std::uint64_t>(bytes[at + i - 1]);
+    return number;
+  };
+  constexpr unsigned char kManyParts = 0x10;  // in the second byte of the version
+  const bool has_parts = text.size() > 5 && (static_cast<unsigned char>(text[5]) & kManyParts) != 0;
+  std::size_t header = 8;
+  for (std::size_t at = header; at < text.size();) {
+    if (text[at] == '\0') {
+      if (!has_parts || at == header) return std::nullopt;
+      header = ++at;
+      continue;
+    }
+    const std::size_t type = text.find('\0', at);
+    const std::size_t length = type == std::string_view::npos ? type : text.find('\0', type + 1);
+    if (length == std::string_view::npos || text.size() - length <= 4) return std::nullopt;  // the file ends
+    const std::size_t value = length + 5;
+    const std::uint64_t size = number_at(length + 1);
+    if (size > text.size() - value) return at;
+    // A thumbnail: width, height, pixels of four bytes.
+    const bool is_preview = text.substr(type + 1, length - type - 1) == "preview";
+    if (is_preview && (size < 8 || number_at(value) * number_at(value + 4) != (size - 8) / 4)) return at;
+    at = value + static_cast<std::size_t>(size);
+  }
+  return std::nullopt;
+}
+
 // Reads the channels R, G and B, or Y. OpenEXR reports errors by exceptions, which must not leave this file.
 Result<RadianceImage> decode_exr(std::span<const std::byte> bytes, std::size_t max_pixels) {
+  if (const auto at = overlong_attribute(bytes)) {
+    return make_error(ErrorCode::BadFormat, "the attribute is longer than the file", {}, *at);
+  }
   try {
     MemoryIn in(bytes);
     imf::InputFile file(in, 0);

@@ -133,6 +133,38 @@ TEST(Exr, RejectsSizesThatTheFileCannotHold) {
       read_radiance(*write_exr(2048, 1024, three_channels(std::vector<float>(flat, 0.5F), ExrChannel::Type::Float16))));
 }
 
+// OpenEXR allocates as many bytes as an attribute claims.
+TEST(Exr, RejectsAttributesThatTheFileCannotHold) {
+  if (!has_exr()) GTEST_SKIP() << "built without OpenEXR";
+  const auto bytes = write_exr(1, 1, three_channels({1.0F}, ExrChannel::Type::Float16));
+  ASSERT_TRUE(bytes) << bytes.error().message;
+  const std::string plain(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+  const auto with = [&](const std::string& type, const std::string& length, const std::string& value) {
+    const std::string attribute = "aa" + std::string(1, '\0') + type + '\0' + length + value;
+    std::string file = plain.substr(0, 8) + attribute + plain.substr(8);
+    // The position of the row precedes the row: y, length and three halves.
+    const std::size_t table = file.size() - 8 - 14;
+    const std::size_t row = table + 8;
+    file[table] = static_cast<char>(row & 0xFFU);
+    file[table + 1] = static_cast<char>(row >> 8);
+    return file;
+  };
+  for (const char* type : {"unknown", "string", "preview"}) {
+    for (const std::string& length : {std::string("\xF0\xFF\xFF\x7F", 4), std::string("\xFF\xFF\xFF\xFF", 4)}) {
+      const auto image = read(with(type, length, {}));
+      ASSERT_FALSE(image);
+      EXPECT_EQ(image.error().message, "the attribute is longer than the file");
+      EXPECT_EQ(image.error().byte_offset, 8U);
+    }
+  }
+  const std::string thumbnail("\x0C\0\0\0", 4);
+  const auto claims = read(with("preview", thumbnail, std::string("\xFF\x7F\0\0\xFF\x7F\0\0....", 12)));
+  ASSERT_FALSE(claims);
+  EXPECT_EQ(claims.error().message, "the attribute is longer than the file");
+  const auto sound = read(with("preview", thumbnail, std::string("\1\0\0\0\1\0\0\0....", 12)));
+  EXPECT_TRUE(sound) << sound.error().message;
+}
+
 TEST(Exr, ClampsValuesTooBrightForHalf) {
   if (!has_exr()) GTEST_SKIP() << "built without OpenEXR";
   const auto image = read_radiance(*write_exr(1, 1, three_channels({1e9F}, ExrChannel::Type::Float16)));
