@@ -347,13 +347,17 @@ class MapWriter {
  private:
   using Slice = std::vector<VoxelType>;  // of a z: [y][x] in this library's axes
   void read_slice(int z, Slice& slice) const;
+  /// Returns true if the scene's box reaches into the columns of a z.
+  [[nodiscard]] bool reaches_slice(int z) const;
   void write_column(int x, ByteWriter& out);
+  void write_bare_columns(int count, ByteWriter& out);
   void write_span(int begin, int end, bool is_last, int air, ByteWriter& out);
   [[nodiscard]] VoxelType at(const Slice& slice, int x, int depth) const {
     return slice[static_cast<std::size_t>(size_.y - 1 - depth) * static_cast<std::size_t>(size_.x) +
                  static_cast<std::size_t>(x)];
   }
   void colour(int depth, ByteWriter& out) const;
+  static void write_colour(Rgba8 colour, ByteWriter& out);
 
   const MergedGrid& merged_;
   const std::vector<Rgba8>& colours_;
@@ -363,11 +367,12 @@ class MapWriter {
   std::vector<VoxelType> column_;
   std::vector<bool> has_colour_;
   std::int64_t grounded_ = 0;
+  ByteWriter bare_;  // a row of columns of air
 };
 
 void MapWriter::read_slice(int z, Slice& slice) const {
   slice.assign(static_cast<std::size_t>(size_.x) * static_cast<std::size_t>(size_.y), kAir);
-  if (z < 0 || z >= size_.z) return;
+  if (z < 0 || z >= size_.z || !reaches_slice(z)) return;
   for (int y = 0; y < size_.y; ++y) {
     const auto row = std::span(slice).subspan(static_cast<std::size_t>(y) * static_cast<std::size_t>(size_.x),
                                               static_cast<std::size_t>(size_.x));
@@ -375,13 +380,34 @@ void MapWriter::read_slice(int z, Slice& slice) const {
   }
 }
 
+bool MapWriter::reaches_slice(int z) const {
+  return min_.z + z >= merged_.box.min.z && min_.z + z < merged_.box.max.z;
+}
+
 void MapWriter::colour(int depth, ByteWriter& out) const {
   const VoxelType type = column_[static_cast<std::size_t>(depth)];
-  const Rgba8 colour = type == kAir ? kEarth : colours_[type];
+  write_colour(type == kAir ? kEarth : colours_[type], out);
+}
+
+void MapWriter::write_colour(Rgba8 colour, ByteWriter& out) {
   out.u8(colour.b);
   out.u8(colour.g);
   out.u8(colour.r);
   out.u8(kFullLight);
+}
+
+/// Writes columns of air, with their ground.
+void MapWriter::write_bare_columns(int count, ByteWriter& out) {
+  QUOIN_ASSERT(count <= size_.x, "at most a row of columns");
+  if (bare_.size() == 0) {
+    const auto ground = static_cast<std::uint8_t>(size_.y - 1);
+    for (int x = 0; x < size_.x; ++x) {
+      for (const std::uint8_t part : {std::uint8_t{0}, ground, ground, std::uint8_t{0}}) bare_.u8(part);
+      write_colour(kEarth, bare_);
+    }
+  }
+  grounded_ += count;
+  out.raw(bare_.bytes().first(bare_.size() / static_cast<std::size_t>(size_.x) * static_cast<std::size_t>(count)));
 }
 
 void MapWriter::write_column(int x, ByteWriter& out) {
@@ -460,7 +486,11 @@ Status MapWriter::run(ByteWriter& out, const Progress& progress) {
   read_slice(0, slices_[1]);
   read_slice(1, slices_[2]);
   for (int z = 0; z < size_.z; ++z) {
-    for (int x = 0; x < size_.x; ++x) write_column(x, out);
+    const int first = reaches_slice(z) ? std::clamp(merged_.box.min.x - min_.x, 0, size_.x) : size_.x;
+    const int last = reaches_slice(z) ? std::clamp(merged_.box.max.x - min_.x, first, size_.x) : size_.x;
+    write_bare_columns(first, out);
+    for (int x = first; x < last; ++x) write_column(x, out);
+    write_bare_columns(size_.x - last, out);
     std::rotate(slices_.begin(), slices_.begin() + 1, slices_.end());
     if (z + 2 < size_.z) {
       read_slice(z + 2, slices_[2]);
