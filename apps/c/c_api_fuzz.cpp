@@ -11,6 +11,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <limits>
+#include <string>
 #include <vector>
 
 #include "quoin.h"
@@ -20,7 +21,8 @@ namespace {
 
 constexpr std::size_t kRoom = 1 << 14;  // bytes of memory for arrays
 constexpr int kMostCalls = 48;
-constexpr int kMostLongCalls = 1;  // the slowest calls: smooth voxels, path-traced images
+constexpr std::uint8_t kLater = 251;  // the first byte of calls that were added later
+constexpr int kMostLongCalls = 1;     // the slowest calls: smooth voxels, path-traced images, maps of 2^24 voxels
 
 class Program {
  public:
@@ -246,8 +248,30 @@ class Program {
     took(quoin_environment_set(handle(), perhaps(&environment)));
   }
 
+  // Encodes a scene in any format. The folder does not exist, so that nothing is written.
+  void save() {
+    const quoin_scene scene = handle();
+    std::size_t count = 0;
+    took(quoin_type_count(scene, perhaps(&count)));
+    took(quoin_group_count(scene, &count));
+    took(quoin_camera_count(scene, &count));
+    took(quoin_lamp_count(scene, &count));
+    took(quoin_scene_warning_count(scene, &count));
+    took(quoin_format_count(&count));
+    if (quoin_version()[0] == '\0') std::abort();
+    auto format = sized<quoin_format>();
+    took(quoin_format_get(byte() % count, &format));
+    if (std::strcmp(format.name, "voxlap") == 0 && !may_take_long()) return;
+    const std::string extensions(format.extensions);
+    const std::string path = "/no folder/scene" + extensions.substr(0, extensions.find(' '));
+    took(quoin_scene_save(scene, perhaps(path.c_str())));
+    quoin_scene loaded = 0;
+    took(quoin_scene_load(path.c_str(), &loaded), &loaded);
+  }
+
   // Calls added later. They use byte values that meant little before, so that programs of the corpus hardly change.
   void step_of_later(std::uint8_t which) {
+    if (which == kLater) return save();
     if (which % 4 == 0) return layers_and_groups();
     if (which % 4 == 1) return views();
     if (which % 8 == 6) {
@@ -414,7 +438,6 @@ class Program {
 
   void step() {
     quoin_scene scene = 0;
-    constexpr std::uint8_t kLater = 252;
     const std::uint8_t which = byte();
     if (which >= kLater) return step_of_later(which);
     switch (which % 14) {
