@@ -152,60 +152,99 @@ constexpr std::size_t max_pixels_in(std::size_t file_bytes) {
   return (std::size_t{1} << 16) + 516 * file_bytes;
 }
 
-// Returns the position of the first attribute that does not lie in the file, for which OpenEXR would allocate as many
-// bytes as it claims; nullopt if there is none.
+// Requires: the width and height are the differences of 32-bit numbers.
+Status check_exr_size(std::int64_t width, std::int64_t height, std::size_t file_bytes, std::size_t max_pixels) {
+  if (width <= 0 || height <= 0) return make_error(ErrorCode::BadFormat, "the OpenEXR file has no pixels");
+  if (static_cast<std::uint64_t>(width) > max_pixels / static_cast<std::uint64_t>(height)) {
+    return make_error(ErrorCode::LimitExceeded, "the image has more than " + std::to_string(max_pixels) + " pixels");
+  }
+  if (static_cast<std::size_t>(width * height) <= max_pixels_in(file_bytes)) return {};
+  return make_error(ErrorCode::BadFormat, "the OpenEXR file is too short for its " + std::to_string(width) + " x " +
+                                              std::to_string(height) + " pixels");
+}
+
+// Checks the sizes for which OpenEXR would allocate memory before it reads the content: of attributes, thumbnails,
+// images and tiles.
 //
 // Layout: 8 bytes; per attribute a name and a type with terminators, 32 bits of length and the value; an empty name ends
 //         a header. Files with several parts have a header for each, and an empty one.
-std::optional<std::size_t> overlong_attribute(std::span<const std::byte> bytes) {
-  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  const auto number_at = [&](std::size_t at) {
-    std::uint64_t number = 0;
-    for (std::size_t i = 4; i > 0; --i) number = number << 8 | std::to_integer<std::uint64_t>(bytes[at + i - 1]);
-    return number;
-  };
-  constexpr unsigned char kManyParts = 0x10;  // in the second byte of the version
-  const bool has_parts = text.size() > 5 && (static_cast<unsigned char>(text[5]) & kManyParts) != 0;
-  std::size_t header = 8;
-  for (std::size_t at = header; at < text.size();) {
-    if (text[at] == '\0') {
-      if (!has_parts || at == header) return std::nullopt;
-      header = ++at;
-      continue;
+class ExrHeaders {
+ public:
+  ExrHeaders(std::span<const std::byte> bytes, std::size_t max_pixels)
+      : text_(reinterpret_cast<const char*>(bytes.data()), bytes.size()), max_pixels_(max_pixels) {}
+
+  Status check() const {
+    constexpr unsigned char kManyParts = 0x10;  // in the second byte of the version
+    const bool has_parts = text_.size() > 5 && (static_cast<unsigned char>(text_[5]) & kManyParts) != 0;
+    std::size_t header = 8;
+    for (std::size_t at = header; at < text_.size();) {
+      if (text_[at] == '\0') {
+        if (!has_parts || at == header) return {};
+        header = ++at;
+        continue;
+      }
+      const std::size_t type = text_.find('\0', at);
+      const std::size_t length = type == std::string_view::npos ? type : text_.find('\0', type + 1);
+      if (length == std::string_view::npos || text_.size() - length <= 4) return {};  // OpenEXR reports the early end
+      const std::size_t value = length + 5;
+      const std::uint64_t size = number_at(length + 1);
+      if (size > text_.size() - value) return too_long(at);
+      const std::string_view name = text_.substr(at, type - at);
+      if (Status sound = check_value(name, text_.substr(type + 1, length - type - 1), at, value, size); !sound)
+        return sound;
+      at = value + static_cast<std::size_t>(size);
     }
-    const std::size_t type = text.find('\0', at);
-    const std::size_t length = type == std::string_view::npos ? type : text.find('\0', type + 1);
-    if (length == std::string_view::npos || text.size() - length <= 4) return std::nullopt;  // the file ends
-    const std::size_t value = length + 5;
-    const std::uint64_t size = number_at(length + 1);
-    if (size > text.size() - value) return at;
-    // A thumbnail: width, height, pixels of four bytes.
-    const bool is_preview = text.substr(type + 1, length - type - 1) == "preview";
-    if (is_preview && (size < 8 || number_at(value) * number_at(value + 4) != (size - 8) / 4)) return at;
-    at = value + static_cast<std::size_t>(size);
+    return {};
   }
-  return std::nullopt;
-}
+
+ private:
+  [[nodiscard]] std::uint32_t number_at(std::size_t at) const {
+    QUOIN_ASSERT(at + 4 <= text_.size(), "four bytes of the file");
+    std::uint32_t number = 0;
+    for (std::size_t i = 4; i > 0; --i) number = number << 8 | static_cast<unsigned char>(text_[at + i - 1]);
+    return number;
+  }
+  static Status too_long(std::size_t at) {
+    return make_error(ErrorCode::BadFormat, "the attribute is longer than the file", {}, at);
+  }
+  Status check_value(std::string_view name, std::string_view type, std::size_t at, std::size_t value,
+                     std::uint64_t size) const {
+    // Width, height, pixels of four bytes.
+    if (type == "preview") {
+      const bool is_sound = size >= 8 && std::uint64_t{number_at(value)} * number_at(value + 4) == (size - 8) / 4;
+      return is_sound ? Status() : too_long(at);
+    }
+    // The first and the last x and y.
+    if (name == "dataWindow" && type == "box2i" && size == 16) {
+      const auto side = [&](std::size_t axis) {
+        const auto first = static_cast<std::int32_t>(number_at(value + axis));
+        return std::int64_t{static_cast<std::int32_t>(number_at(value + axis + 8))} - first + 1;
+      };
+      return check_exr_size(side(0), side(4), text_.size(), max_pixels_);
+    }
+    // Tiles may be larger than the image.
+    constexpr std::uint64_t kUsualTile = std::uint64_t{1} << 22;
+    if (type == "tiledesc" && size >= 8 &&
+        std::uint64_t{number_at(value)} * number_at(value + 4) > kUsualTile + max_pixels_in(text_.size())) {
+      return make_error(ErrorCode::BadFormat, "the OpenEXR file is too short for its tiles", {}, at);
+    }
+    return {};
+  }
+
+  std::string_view text_;
+  std::size_t max_pixels_;
+};
 
 // Reads the channels R, G and B, or Y. OpenEXR reports errors by exceptions, which must not leave this file.
 Result<RadianceImage> decode_exr(std::span<const std::byte> bytes, std::size_t max_pixels) {
-  if (const auto at = overlong_attribute(bytes)) {
-    return make_error(ErrorCode::BadFormat, "the attribute is longer than the file", {}, *at);
-  }
+  if (Status sound = ExrHeaders(bytes, max_pixels).check(); !sound) return sound.error();
   try {
     MemoryIn in(bytes);
     imf::InputFile file(in, 0);
     const auto window = file.header().dataWindow();
     const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1;
     const std::int64_t height = std::int64_t{window.max.y} - window.min.y + 1;
-    if (width <= 0 || height <= 0) return make_error(ErrorCode::BadFormat, "the OpenEXR file has no pixels");
-    if (static_cast<std::uint64_t>(width) > max_pixels / static_cast<std::uint64_t>(height)) {
-      return make_error(ErrorCode::LimitExceeded, "the image has more than " + std::to_string(max_pixels) + " pixels");
-    }
-    if (static_cast<std::size_t>(width * height) > max_pixels_in(bytes.size())) {
-      return make_error(ErrorCode::BadFormat, "the OpenEXR file is too short for its " + std::to_string(width) + " x " +
-                                                  std::to_string(height) + " pixels");
-    }
+    if (Status sound = check_exr_size(width, height, bytes.size(), max_pixels); !sound) return sound.error();
     const imf::ChannelList& channels = file.header().channels();
     const bool is_grey = channels.findChannel("R") == nullptr && channels.findChannel("Y") != nullptr;
     if (!is_grey && channels.findChannel("R") == nullptr) {

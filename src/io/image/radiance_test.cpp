@@ -161,6 +161,11 @@ TEST(Exr, RejectsAttributesThatTheFileCannotHold) {
   const auto claims = read(with("preview", thumbnail, std::string("\xFF\x7F\0\0\xFF\x7F\0\0....", 12)));
   ASSERT_FALSE(claims);
   EXPECT_EQ(claims.error().message, "the attribute is longer than the file");
+  for (const std::string& tile : {std::string("\xFF\xFF\0\0\xFF\xFF\0\0\0", 9), std::string(8, '\xFF') + '\0'}) {
+    const auto tiles = read(with("tiledesc", std::string("\x09\0\0\0", 4), tile));
+    ASSERT_FALSE(tiles);
+    EXPECT_EQ(tiles.error().message, "the OpenEXR file is too short for its tiles");
+  }
   const auto sound = read(with("preview", thumbnail, std::string("\1\0\0\0\1\0\0\0....", 12)));
   EXPECT_TRUE(sound) << sound.error().message;
 }
