@@ -1,6 +1,7 @@
 // grid/*: memory of the 256x128x256 terrain and the cost of getting and setting its voxels.
 
 #include <quoin/grid/grid.h>
+#include <quoin/grid/voxel_field.h>
 
 #include <cstdio>
 #include <cstdlib>
@@ -192,6 +193,18 @@ void set_list(benchmark::State& state, Threads threads) {
 }
 BENCHMARK_CAPTURE(set_list, one, Threads{1})->Name("grid/set_list/1_thread")->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(set_list, all, Threads{})->Name("grid/set_list/threads")->Unit(benchmark::kMillisecond);
+
+// A sphere becomes a field.
+void to_field(benchmark::State& state) {
+  const auto width = static_cast<int>(state.range(0));
+  Grid grid;
+  grid.fill_sphere(IVec3(width / 2), width / 2.0, 1);
+  for (auto _ : state) {
+    const auto field = field_from_grid(grid, Threads{1});
+    if (!field || field->solid_count() != grid.voxel_count()) std::exit(1);
+  }
+}
+BENCHMARK(to_field)->Name("grid/to_field")->Arg(4)->Arg(64)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace quoin

@@ -1,5 +1,6 @@
 // path/terrain/640x360: the 256x128x256 terrain by day, four samples and four bounces, one thread; rays per second.
 // path/lamps: the same by night, with a thousand lamps.
+// path/sky: a physical sky for another position of the sun.
 
 #include <benchmark/benchmark.h>
 
@@ -8,6 +9,7 @@
 
 #include "bench/image_workload.h"
 #include "render/cpu/environment_for_tests.h"
+#include "render/path/sky_light.h"
 
 namespace quoin {
 namespace {
@@ -64,8 +66,19 @@ void lamps(benchmark::State& state) {
   time_paths(state, scene, options);
 }
 
+void sky(benchmark::State& state) {
+  PathOptions options;
+  Environment& environment = physical_in(options);
+  for (auto _ : state) {
+    environment.sun.direction.x += 0.01;
+    const path::SkyLight light(environment);
+    fail_unless(light.air() != nullptr && light.has_sun(), "a sky with a sun", 0);
+  }
+}
+
 BENCHMARK(terrain)->Name("path/terrain/640x360")->Unit(benchmark::kMillisecond)->Iterations(3);
 BENCHMARK(lamps)->Name("path/lamps/640x360")->Unit(benchmark::kMillisecond)->Iterations(3);
+BENCHMARK(sky)->Name("path/sky")->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace quoin
