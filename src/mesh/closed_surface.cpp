@@ -18,7 +18,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "mesh/corner_sheets.h"
+#include "mesh/nets/sheets.h"
 
 namespace quoin {
 

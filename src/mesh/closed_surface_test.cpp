@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "core/death_for_tests.h"
-#include "mesh/corner_sheets.h"
+#include "mesh/nets/sheets.h"
 
 namespace quoin {
 namespace {

@@ -1,4 +1,4 @@
-#include "scene/hierarchy.h"
+#include <quoin/scene/scene.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +11,7 @@
 #include <quoin/core/assert.h>
 
 #include "core/coordinates/unit_rotation.h"
+#include "scene/scene_follower.h"
 
 namespace quoin {
 

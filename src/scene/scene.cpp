@@ -16,7 +16,7 @@
 #include "core/change_journal.h"
 #include "core/coordinates/unit_rotation.h"
 #include "core/moved_from.h"
-#include "scene/hierarchy.h"
+#include "scene/scene_follower.h"
 
 namespace quoin {
 

@@ -14,6 +14,11 @@
 
 namespace quoin {
 
+/// Adds the instances below changed groups and on changed layers to the changed instances, possibly twice.
+/// Requires: `groups` and `layers` of the changes are sorted.
+/// Cost: nothing without changed groups and layers; else O(instances + groups * depth).
+void add_instances_below(const Scene& scene, SceneChanges& changes);
+
 /// Follows a scene for a consumer with data per grid: the grids that drawn instances place, and which of them changed.
 ///
 ///   SceneFollower::Update update(follower, scene);
