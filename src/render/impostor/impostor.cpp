@@ -163,9 +163,9 @@ class KnownFaces {
   }
 
   // Returns null if the face must be computed. Requires: faces are queried in list order.
-  [[nodiscard]] const ImpostorFaces::Face* find(const VoxelFace& face) {
+  [[nodiscard]] const ImpostorFaces::Face* find(const ShellFace& face) {
     // The two lists mostly advance together.
-    const auto next = [&] { return VoxelFace{faces_[next_].voxel, faces_[next_].direction}; };
+    const auto next = [&] { return ShellFace{faces_[next_].voxel, faces_[next_].direction}; };
     while (next_ < faces_.size() && next() != face && comes_before(next(), face)) ++next_;
     if (next_ == faces_.size() || next() != face) return nullptr;
     const auto is_near = [&](const IBox& box) { return box.contains(face.voxel); };

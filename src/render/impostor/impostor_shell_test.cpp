@@ -19,7 +19,7 @@ namespace {
 constexpr std::int64_t kPlenty = std::int64_t{1} << 40;
 
 using Key = std::tuple<int, int, int, int>;
-Key key_of(const VoxelFace& face) {
+Key key_of(const ShellFace& face) {
   return {face.voxel.x, face.voxel.y, face.voxel.z, static_cast<int>(face.direction)};
 }
 
@@ -49,7 +49,7 @@ TEST(ImpostorShell, HoldsEveryFaceOnce) {
     const ShellWorld world(seed);
     const auto shell = ImpostorShell::build(world.tree, kPlenty, kPlenty);
     ASSERT_TRUE(shell.has_value());
-    const BlockVector<VoxelFace> faces = shell->faces();
+    const BlockVector<ShellFace> faces = shell->faces();
     std::set<Key> expected;
     const IBox box = world.tree.bounds();
     GridReader reader(world.grid);

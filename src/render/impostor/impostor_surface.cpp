@@ -31,7 +31,7 @@ IVec3 cells_around(const IBox& box) {
 
 }  // namespace
 
-bool comes_before(const VoxelFace& a, const VoxelFace& b) {
+bool comes_before(const ShellFace& a, const ShellFace& b) {
   if (a.direction != b.direction) return a.direction < b.direction;
   for (int axis = 2; axis >= 0; --axis) {
     const int cell_a = a.voxel[axis] >> 2;
@@ -159,8 +159,8 @@ std::int64_t ImpostorShell::count_faces() const {
   return count;
 }
 
-BlockVector<VoxelFace> ImpostorShell::faces() const {
-  BlockVector<VoxelFace> all;
+BlockVector<ShellFace> ImpostorShell::faces() const {
+  BlockVector<ShellFace> all;
   const auto count = static_cast<std::size_t>(count_faces());
   all.reserve(count);
   for (const Direction direction : kDirections) {

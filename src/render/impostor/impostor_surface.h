@@ -17,14 +17,14 @@
 namespace quoin {
 
 /// A face of a voxel.
-struct VoxelFace {
+struct ShellFace {
   IVec3 voxel{0};
   Direction direction = Direction::PosX;
-  bool operator==(const VoxelFace&) const = default;
+  bool operator==(const ShellFace&) const = default;
 };
 
 /// The order in which ImpostorShell lists faces: by direction, then by cell of 4^3 voxels, then by voxel; by z, y, x.
-[[nodiscard]] bool comes_before(const VoxelFace& a, const VoxelFace& b);
+[[nodiscard]] bool comes_before(const ShellFace& a, const ShellFace& b);
 
 /// Returns the voxels of a cell of 4^3 that have a face in `direction`: bit x + 4 y + 16 z. `next`: the cell on that
 /// side.
@@ -39,7 +39,7 @@ class ImpostorShell {
   static std::optional<ImpostorShell> build(const OccupancyTree& tree, std::int64_t max_voxels, std::int64_t max_faces);
 
   /// Returns all faces in the order of `comes_before`.
-  [[nodiscard]] BlockVector<VoxelFace> faces() const;
+  [[nodiscard]] BlockVector<ShellFace> faces() const;
   /// Requires: `voxel` is at most one voxel outside the box.
   [[nodiscard]] bool is_occupied(IVec3 voxel) const {
     const IVec3 local = voxel - origin_;
@@ -67,7 +67,7 @@ class ImpostorShell {
 
 /// The surface of a field in pieces: a face for each surfel, and a material.
 struct FieldSurfels {
-  BlockVector<VoxelFace> faces;
+  BlockVector<ShellFace> faces;
   BlockVector<ImpostorFaces::Surfel> surfels;
   std::vector<VoxelType> types;
 };

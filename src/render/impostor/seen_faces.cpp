@@ -255,7 +255,7 @@ BlockVector<SeenFace> seen_of(const ImpostorFaces& faces) {
 }
 
 // Returns the adjacent face across the edge towards `sign` along `axis`: in the same plane, or around the edge.
-VoxelFace face_beside(const VoxelFace& face, int axis, int sign, const OccupancyTree& opaque) {
+ShellFace face_beside(const ShellFace& face, int axis, int sign, const OccupancyTree& opaque) {
   IVec3 adjacent = face.voxel;
   adjacent[axis] += sign;
   const IVec3 front = adjacent + normal_of(face.direction);
@@ -266,7 +266,7 @@ VoxelFace face_beside(const VoxelFace& face, int axis, int sign, const Occupancy
 }
 
 struct FaceHash {
-  std::size_t operator()(const VoxelFace& face) const {
+  std::size_t operator()(const ShellFace& face) const {
     const auto bits = [](int coordinate) { return static_cast<std::uint64_t>(static_cast<std::uint32_t>(coordinate)); };
     std::uint64_t hash = bits(face.voxel.x) * 0x9E37'79B9'7F4A'7C15U;
     hash = (hash ^ bits(face.voxel.y)) * 0xC2B2'AE3D'27D4'EB4FU;
@@ -308,7 +308,7 @@ class MetFaces {
   BlockVector<SeenFace> faces() && { return std::move(faces_); }
 
  private:
-  SeenFace& at(const VoxelFace& face) {
+  SeenFace& at(const ShellFace& face) {
     if (last_ < faces_.size() && faces_[last_].face == face) return faces_[last_];
     const auto [found, is_new] = index_.try_emplace(face, static_cast<std::uint32_t>(faces_.size()));
     if (is_new) faces_.push_back({face, nullptr, 0});
@@ -317,13 +317,13 @@ class MetFaces {
   }
 
   BlockVector<SeenFace> faces_;
-  tsl::robin_map<VoxelFace, std::uint32_t, FaceHash> index_;
+  tsl::robin_map<ShellFace, std::uint32_t, FaceHash> index_;
   std::uint32_t last_ = 0;
 };
 
 // Returns all faces, not seen by any view.
 BlockVector<SeenFace> unseen_of(const ImpostorShell& shell) {
-  const BlockVector<VoxelFace> all = shell.faces();
+  const BlockVector<ShellFace> all = shell.faces();
   BlockVector<SeenFace> faces(all.size());
   for (std::size_t i = 0; i < all.size(); ++i) faces[i].face = all[i];
   return faces;
@@ -370,7 +370,7 @@ BlockVector<SeenFace> faces_seen_after(const ImpostorFaces& before, const Impost
   std::size_t next = 0;
   for (std::size_t i = 0; i < old.size(); ++i) {
     // The two lists mostly advance together.
-    const VoxelFace& face = old[i].face;
+    const ShellFace& face = old[i].face;
     while (next < now.size() && now[next].face != face && comes_before(now[next].face, face)) ++next;
     if (next == now.size()) break;
     if (now[next].face != face) continue;

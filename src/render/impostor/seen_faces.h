@@ -23,7 +23,7 @@ namespace quoin {
 
 /// A face and the views that saw it.
 struct SeenFace {
-  VoxelFace face;
+  ShellFace face;
   const ImpostorFaces::Surfel* surfel = nullptr;  ///< null: a voxel face
   std::uint32_t views = 0;
 };

@@ -26,14 +26,14 @@ constexpr int kWidest = 10;           // log2 of the widest cells, voxels; the M
 constexpr std::uint32_t kNone = ~0U;  // as a rank
 
 // Returns the face's rectangle as a box without thickness.
-IBox box_of(const VoxelFace& face) {
+IBox box_of(const ShellFace& face) {
   const FaceFrame& frame = frame_of(face.direction);
   IBox box{face.voxel, face.voxel + 1};
   (frame.sign > 0 ? box.min : box.max)[frame.axis] = (frame.sign > 0 ? box.max : box.min)[frame.axis];
   return box;
 }
 
-std::uint32_t hash_of(const VoxelFace& face) {
+std::uint32_t hash_of(const ShellFace& face) {
   std::uint32_t hash =
       mix_bits(static_cast<std::uint32_t>(face.voxel.x) * 8U + static_cast<std::uint32_t>(face.direction));
   hash = mix_bits(hash ^ static_cast<std::uint32_t>(face.voxel.y));

@@ -41,7 +41,7 @@ struct Shape {
     content = content_sphere(grid);
     const OccupancyTree tree = OccupancyTree::build(grid, workloads::three_types(), Occupancy::Opaque);
     const auto shell = ImpostorShell::build(tree, 1 << 20, 1 << 20);
-    for (const VoxelFace& face : shell.value().faces()) faces.push_back({face, nullptr, 0});
+    for (const ShellFace& face : shell.value().faces()) faces.push_back({face, nullptr, 0});
     level = all_faces(faces, content);
     for (std::size_t i = 0; i < level.views.size(); ++i) {
       if (level.views[i] != 0) level.views[i] = 1U << random() % 26;
@@ -90,7 +90,7 @@ Met met_by(const Shape& shape, const raster::Aim& aim, std::uint32_t views, doub
   for (std::size_t i = 0; i < shape.level.views.size(); ++i) {
     if ((shape.level.views[i] & views) == 0) continue;
     const auto index = shape.level.face[i];
-    const VoxelFace& face = shape.faces[index].face;
+    const ShellFace& face = shape.faces[index].face;
     const FaceFrame& frame = frame_of(face.direction);
     const DVec3 middle = DVec3(face.voxel) + 0.5 + 0.5 * DVec3(normal_of(face.direction)) - shape.content.centre;
     if (direction[frame.axis] * frame.sign >= 0.0) continue;
@@ -231,7 +231,7 @@ TEST(ImpostorSeen, DrawingSeesSameFacesAsRays) {
     const auto drawn = faces_seen_of(*shell, {}, tree.bounds(), content, 128);
     const auto met = faces_seen_by_rays(tree, content, 128);
     ASSERT_GT(drawn.size(), 5'000U);
-    const auto key_of = [](const VoxelFace& face) {
+    const auto key_of = [](const ShellFace& face) {
       return std::tuple(face.voxel.x, face.voxel.y, face.voxel.z, static_cast<int>(face.direction));
     };
     std::map<std::tuple<int, int, int, int>, SeenFace> by_face;
