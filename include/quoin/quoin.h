@@ -42,6 +42,7 @@
 #include <quoin/grid/downsample.h>
 #include <quoin/grid/grid.h>
 #include <quoin/grid/mass.h>
+#include <quoin/grid/texture.h>
 #include <quoin/grid/volume.h>
 #include <quoin/grid/voxel_field.h>
 #include <quoin/grid/voxel_registry.h>

@@ -9,7 +9,6 @@
 
 #include "core/change_journal.h"
 #include "core/memory/make_room.h"
-#include "core/srgb.h"
 
 namespace quoin {
 namespace {
@@ -28,16 +27,38 @@ Visibility occlusion_of(const VoxelProperties& p) {
   return is_clear ? Visibility::Transparent : p.visibility;
 }
 
-// Empties properties that equal the defaults of the type's visibility, so that types that behave alike are equal.
-// Returns true if there were any.
-bool drop_defaults(VoxelProperties& p) {
-  bool has_dropped = false;
+// Makes types that behave alike equal: empties properties that equal the defaults of the type's visibility, and derives
+// the colour of textured types. Returns true if a property changed.
+bool settle(VoxelProperties& p) {
+  bool has_changed = false;
   for (std::optional<bool>* property : {&p.blocks_light, &p.occludes}) {
     if (*property != (p.visibility == Visibility::Opaque)) continue;
     property->reset();
-    has_dropped = true;
+    has_changed = true;
   }
-  return has_dropped;
+  if (p.faces.empty()) return has_changed;
+  const Rgba8 colour = std::exchange(p.colour, p.faces.mean_colour());
+  return has_changed || !(colour == p.colour);
+}
+
+// Returns the reason if a type's faces are not valid, or an empty string.
+std::string fault_of_faces(const VoxelProperties& p) {
+  if (p.faces.empty()) return {};
+  for (const Direction direction : kDirections) {
+    const VoxelFace& face = p.faces[direction];
+    const std::string where = "the face " + std::string(name_of(direction)) + " ";
+    if (face.texture.is_null()) return where + "has no texture";
+    if (face.turn > 3) return where + "has a turn that is not 0 to 3";
+    const std::string texture = "texture \"" + face.texture.name() + "\"";
+    if (face.alpha == FaceAlpha::Opaque && !face.texture.is_opaque()) {
+      return where + "is opaque, but its " + texture + " has transparent texels";
+    }
+    if (face.alpha > FaceAlpha::Translucent) return where + "has an unknown alpha mode";
+    if (face.alpha != FaceAlpha::Opaque && p.visibility != Visibility::Transparent) {
+      return where + "is not opaque, which needs a transparent type";
+    }
+  }
+  return {};
 }
 
 // As ==, but NaN equals itself. Otherwise each lookup would add a type.
@@ -76,6 +97,7 @@ Status validate_type(const VoxelProperties& properties) {
   if (properties.visibility == Visibility::Transparent && properties.occludes.value_or(false)) {
     return wrong("occludes", "must be false for a transparent type, since only types that hide faces can occlude");
   }
+  if (const std::string fault = fault_of_faces(properties); !fault.empty()) return wrong("faces", fault.c_str());
   return {};
 }
 
@@ -123,7 +145,7 @@ Result<VoxelType> VoxelRegistry::add(VoxelProperties properties) {
   if (size() > kMaxVoxelTypes) {
     return make_error(ErrorCode::LimitExceeded, "more than 65,535 distinct voxel types");
   }
-  drop_defaults(properties);
+  settle(properties);
   journal_->begin_change();
   content_.make_own();
   Content& c = *content_;
@@ -141,20 +163,12 @@ Result<VoxelType> VoxelRegistry::add(VoxelProperties properties) {
   c.occlusion.push_back(occlusion);
   if (!properties.collides) ++c.passable_count;
   if (properties.remesh_on_data) ++c.remesh_on_data_count;
+  if (!properties.faces.empty()) ++c.textured_count;
   c.properties.push_back(std::move(properties));
   if (visibility == Visibility::Transparent) ++c.transparent_count;
   if (occlusion != visibility) ++c.unoccluding_count;
   note({type, occlusion != Visibility::Opaque, true});
   return type;
-}
-
-Vec3 linear_colour(Rgba8 colour) {
-  return {linear_from_srgb(colour.r), linear_from_srgb(colour.g), linear_from_srgb(colour.b)};
-}
-
-Rgba8 srgb_colour(Vec3 light) {
-  const SrgbEncoder& encode = SrgbEncoder::shared();
-  return {encode(light.x), encode(light.y), encode(light.z), 255};
 }
 
 std::optional<VoxelType> VoxelRegistry::find(std::string_view name) const {
@@ -165,8 +179,9 @@ std::optional<VoxelType> VoxelRegistry::find(std::string_view name) const {
 }
 
 Result<VoxelType> VoxelRegistry::find_or_add(const VoxelProperties& properties) {
-  if (properties.blocks_light || properties.occludes) {
-    if (VoxelProperties stored = properties; drop_defaults(stored)) return find_or_add(stored);
+  if (properties.blocks_light || properties.occludes || !properties.faces.empty()) {
+    if (Status valid = validate_type(properties); !valid) return valid.error();
+    if (VoxelProperties stored = properties; settle(stored)) return find_or_add(stored);
   }
   const auto [first, last] = std::as_const(content_->by_hash).equal_range(hash_of(properties));
   for (auto it = first; it != last; ++it) {
@@ -179,7 +194,7 @@ void VoxelRegistry::replace(VoxelType type, VoxelProperties properties) {
   QUOIN_ASSERT(type != kAir && type < size(), "a registered type, not air");
   QUOIN_ASSERT(properties.visibility != Visibility::Air, "type 0 is the only air");
   QUOIN_ASSERT(validate_type(properties), "properties that `validate_type` accepts");
-  drop_defaults(properties);
+  settle(properties);
   journal_->begin_change();
   content_.make_own();
   Content& c = *content_;
@@ -200,8 +215,12 @@ void VoxelRegistry::replace(VoxelType type, VoxelProperties properties) {
   if (!properties.collides) ++c.passable_count;
   if (c.properties[type].remesh_on_data) --c.remesh_on_data_count;
   if (properties.remesh_on_data) ++c.remesh_on_data_count;
+  if (!c.properties[type].faces.empty()) --c.textured_count;
+  if (!properties.faces.empty()) ++c.textured_count;
   const bool is_seen_otherwise = was != properties.visibility || occluded != c.occlusion[type];
-  const TypeChange change{type, is_seen_otherwise, !(c.properties[type].colour == properties.colour)};
+  const bool is_coloured_otherwise =
+      !(c.properties[type].colour == properties.colour && c.properties[type].faces == properties.faces);
+  const TypeChange change{type, is_seen_otherwise, is_coloured_otherwise};
   c.properties[type] = std::move(properties);
   note(change);
 }

@@ -14,6 +14,7 @@
 #include <quoin/core/ref.h>
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
+#include <quoin/grid/texture.h>
 
 namespace [[gnu::visibility("default")]] quoin {
 
@@ -38,26 +39,10 @@ inline constexpr std::uint8_t kMaxLightCost = 15;
 /// A transparent type also hides the faces between two of its own voxels.
 enum class Visibility : std::uint8_t { Air, Opaque, Transparent };
 
-/// An sRGB colour with 8 bits per channel. Alpha is linear: 0 is fully transparent, 255 fully opaque.
-struct Rgba8 {
-  std::uint8_t r = 0;
-  std::uint8_t g = 0;
-  std::uint8_t b = 0;
-  std::uint8_t a = 255;
-  bool operator==(const Rgba8&) const = default;
-};
-
-/// Converts an sRGB colour to linear light, 0 to 1 per channel, and ignores its alpha. Lamps, environments and vertex
-/// colours are in linear light.
-[[nodiscard]] Vec3 linear_colour(Rgba8 colour);
-/// Converts linear light to an opaque sRGB colour, each channel rounded to nearest. Values are clamped to [0, 1]; NaN
-/// becomes 0.
-[[nodiscard]] Rgba8 srgb_colour(Vec3 light);
-
 /// The properties of a voxel type.
 struct VoxelProperties {
   std::string name{};
-  Rgba8 colour{};  ///< sRGB; an alpha below 255 matters only for transparent types
+  Rgba8 colour{};  ///< sRGB; an alpha below 255 matters only for transparent types; see `faces`
   Visibility visibility = Visibility::Opaque;
   bool collides = true;    ///< true if it stops moving bodies
   float roughness = 1.0F;  ///< glTF's perceptual roughness, 0 to 1
@@ -95,13 +80,17 @@ struct VoxelProperties {
   /// As in block games ("light block", opacity).
   std::uint8_t light_cost = 0;
 
+  /// Textures of the six faces. With textures, `colour` is their mean, for all uses that show one colour per type:
+  /// a registry sets it. Opaque types have opaque faces; cutout and translucent faces need a transparent type.
+  VoxelFaces faces{};
+
   bool operator==(const VoxelProperties&) const = default;
 };
 
 /// Returns an error if a registry does not accept a type's properties. The message names the type and the property.
 ///
-/// Errors: InvalidArgument if `visibility` is Air, `state_bits` exceeds 32, `light_cost` exceeds 15, or a transparent
-/// type occludes.
+/// Errors: InvalidArgument if `visibility` is Air, `state_bits` exceeds 32, `light_cost` exceeds 15, a transparent type
+/// occludes, or a face has no texture, a turn above 3, an alpha mode that its texture or `visibility` does not allow.
 [[nodiscard]] Status validate_type(const VoxelProperties& properties);
 
 /// A type that was added or replaced. Properties without a flag below can differ too.
@@ -109,7 +98,7 @@ struct TypeChange {
   VoxelType type = kAir;
   bool visibility_changed =
       false;                    ///< `visibility` or `occludes`; an unregistered type counts as opaque, with defaults
-  bool colour_changed = false;  ///< also true if the type was added
+  bool colour_changed = false;  ///< `colour` or `faces`; also true if the type was added
 };
 using TypeChanges = Changes<TypeChange>;
 
@@ -133,7 +122,7 @@ class VoxelRegistry {
   ~VoxelRegistry();
 
   /// Adds a type and returns its id. Ids count up from 1. `blocks_light` and `occludes` become empty if they equal
-  /// their defaults.
+  /// their defaults, and `colour` becomes the mean of `faces` if the type has textures.
   ///
   /// Errors: LimitExceeded above kMaxVoxelTypes types; those of `validate_type`.
   [[nodiscard]] Result<VoxelType> add(VoxelProperties properties);
@@ -192,6 +181,8 @@ class VoxelRegistry {
   }
   /// Returns true if the data of any registered type changes meshes.
   [[nodiscard]] bool has_remesh_on_data() const { return content_->remesh_on_data_count > 0; }
+  /// Returns true if any registered type has textures (VoxelProperties::faces).
+  [[nodiscard]] bool has_textures() const { return content_->textured_count > 0; }
 
   /// Returns the types that were added or replaced since the cursor's last read, ordered by id, and moves the cursor to
   /// the present. Cost: O(changed types). See ChangeCursor.
@@ -212,6 +203,7 @@ class VoxelRegistry {
     std::vector<Visibility> occlusion;  // see `occlusion`
     std::size_t unoccluding_count = 0;  // opaque types that do not occlude
     std::size_t remesh_on_data_count = 0;
+    std::size_t textured_count = 0;
   };
   struct [[gnu::visibility("hidden")]] Journal;
   void note(TypeChange change);

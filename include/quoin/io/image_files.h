@@ -31,6 +31,13 @@ namespace [[gnu::visibility("default")]] quoin {
 [[nodiscard]] Result<Image> read_png(const std::filesystem::path& path);
 [[nodiscard]] Result<Image> read_png(std::span<const std::byte> bytes);
 
+/// Reads a PNG, JPEG or WebP, detected by content, as 8-bit sRGB with alpha: the images of textures.
+///
+/// Errors: CannotRead; BadFormat; Unsupported for other formats and for formats missing from the build; LimitExceeded
+///         beyond 2^28 pixels. Memory stays within a multiple of the file's size, except for images of one colour.
+[[nodiscard]] Result<AlphaImage> read_alpha_image(const std::filesystem::path& path);
+[[nodiscard]] Result<AlphaImage> read_alpha_image(std::span<const std::byte> bytes);
+
 /// Writes one float per pixel as a greyscale PFM ("Pf"), atomically. The file is little-endian with rows from the
 /// bottom, as the format defines. Floats are stored exactly, including infinity. Returns the file's size; the overload
 /// without a path returns the bytes.

@@ -24,7 +24,7 @@
 
 namespace quoin {
 
-Result<AlphaImage> decode_image(std::span<const std::byte> bytes) {
+Result<AlphaImage> read_alpha_image(std::span<const std::byte> bytes) {
   const std::string_view text = text_of(bytes);
   if (text.starts_with("\x89PNG")) {
     auto decoded = decode_png(bytes);
@@ -34,6 +34,10 @@ Result<AlphaImage> decode_image(std::span<const std::byte> bytes) {
   if (text.starts_with("\xFF\xD8\xFF")) return decode_jpeg(bytes);
   if (text.starts_with("RIFF") && text.substr(0, 12).ends_with("WEBP")) return decode_webp(bytes);
   return make_error(ErrorCode::Unsupported, "not a PNG, JPEG or WebP image");
+}
+
+Result<AlphaImage> read_alpha_image(const std::filesystem::path& path) {
+  return read_whole(path, [](std::span<const std::byte> bytes) { return read_alpha_image(bytes); });
 }
 
 namespace {

@@ -18,13 +18,7 @@
 
 namespace quoin {
 
-/// Decodes a PNG, JPEG or WebP, detected by content, to 8-bit sRGB with alpha.
-///
-/// Errors: BadFormat; Unsupported for other formats and for formats missing from the build; LimitExceeded beyond 2^28
-/// pixels.
-[[nodiscard]] Result<AlphaImage> decode_image(std::span<const std::byte> bytes);
-
-/// Errors: as decode_image.
+/// Errors: as read_alpha_image.
 [[nodiscard]] Result<AlphaImage> decode_jpeg(std::span<const std::byte> bytes);
 [[nodiscard]] Result<AlphaImage> decode_webp(std::span<const std::byte> bytes);
 

@@ -7,9 +7,9 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/thousands.h>
 #include <quoin/io/file.h>
+#include <quoin/io/image_files.h>
 
 #include "io/format_driver.h"
-#include "io/image/image_codecs.h"
 #include "io/whole_file.h"
 
 namespace quoin {
@@ -266,7 +266,7 @@ bool is_occlusion_grey(double linear) {
 
 std::optional<std::size_t> add_texture(std::span<const std::byte> file_bytes, const std::string& name,
                                        LoadedMesh& loaded) {
-  auto image = decode_image(file_bytes);
+  auto image = read_alpha_image(file_bytes);
   if (!image) {
     loaded.warnings.push_back("left out: the texture " + name + ": " + image.error().message);
     return std::nullopt;

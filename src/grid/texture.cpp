@@ -1,0 +1,309 @@
+#include <quoin/grid/texture.h>
+
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+#include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
+#include <quoin/grid/voxel_registry.h>
+
+#include "core/srgb.h"
+
+namespace quoin {
+
+Vec3 linear_colour(Rgba8 colour) {
+  static const std::array<float, 256> linear = [] {
+    std::array<float, 256> values{};
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] = linear_from_srgb(static_cast<std::uint8_t>(i));
+    return values;
+  }();
+  return {linear[colour.r], linear[colour.g], linear[colour.b]};
+}
+
+Rgba8 srgb_colour(Vec3 light) {
+  const SrgbEncoder& encode = SrgbEncoder::shared();
+  return {encode(light.x), encode(light.y), encode(light.z), 255};
+}
+
+struct Texture::Content {
+  std::string name;
+  int size = 0;
+  bool is_opaque = true;
+  Vec3 mean{0.0F};
+  float mean_alpha = 1.0F;
+  float coverage = 1.0F;
+  std::uint64_t hash = 0;
+  BlockVector<Rgba8> texels;                  // of all levels, level 0 first
+  std::array<std::size_t, 12> level_begin{};  // [level], and the end
+};
+
+namespace {
+
+static_assert(sizeof(Rgba8) == 4 && kMaxTextureSize == 1 << 10);
+
+/// A texel of a mipmap before it is rounded: linear light and alpha, 0 to 1.
+struct Light {
+  Vec3 colour{0.0F};
+  float alpha = 1.0F;
+};
+
+Light mean_of(const Light& a, const Light& b, const Light& c, const Light& d) {
+  const float alpha = a.alpha + b.alpha + c.alpha + d.alpha;
+  if (!(alpha > 0.0F)) return {(a.colour + b.colour + c.colour + d.colour) * 0.25F, 0.0F};
+  const Vec3 sum = a.colour * a.alpha + b.colour * b.alpha + c.colour * c.alpha + d.colour * d.alpha;
+  return {sum / alpha, alpha * 0.25F};
+}
+
+/// Replaces a square of `size` texels per side with the next level.
+void halve(BlockVector<Light>& texels, std::size_t size) {
+  QUOIN_ASSERT(size > 1 && texels.size() == size * size, "a square of texels");
+  const std::size_t half = size / 2;
+  for (std::size_t y = 0; y < half; ++y) {
+    for (std::size_t x = 0; x < half; ++x) {
+      const Light* const at = texels.data() + 2 * y * size + 2 * x;
+      const Light mean = mean_of(at[0], at[1], at[size], at[size + 1]);
+      texels[y * half + x] = mean;  // the place was read before, since it lies in an earlier or equal place
+    }
+  }
+  texels.resize(half * half);
+}
+
+std::uint8_t byte_of(float unit) {
+  return static_cast<std::uint8_t>(std::lround(unit * 255.0F));
+}
+
+// Mixes the bits of 8 bytes at a time (the finaliser of MurmurHash3, A. Appleby).
+std::uint64_t mixed(std::uint64_t hash, std::uint64_t word) {
+  hash = (hash ^ word) * 0xFF51'AFD7'ED55'8CCDU;
+  hash = (hash ^ (hash >> 33)) * 0xC4CE'B9FE'1A85'EC53U;
+  return hash ^ (hash >> 33);
+}
+
+std::uint64_t hash_of(const std::string& name, const BlockVector<Rgba8>& texels) {
+  std::uint64_t hash = texels.size();
+  for (const char c : name) hash = mixed(hash, static_cast<unsigned char>(c));
+  for (std::size_t i = 0; i + 1 < texels.size(); i += 2) {
+    std::uint64_t word = 0;
+    std::memcpy(&word, &texels[i], sizeof(word));
+    hash = mixed(hash, word);
+  }
+  return hash;
+}
+
+std::string fault_of(const AlphaImage& image) {
+  const std::string sizes = std::to_string(image.width) + " x " + std::to_string(image.height) + " texels";
+  const bool is_power = image.width > 0 && std::has_single_bit(static_cast<unsigned>(image.width));
+  if (image.width != image.height || !is_power || image.width < kMinTextureSize || image.width > kMaxTextureSize) {
+    return "its sides must be equal, and 16, 32, 64, 128, 256, 512 or 1024 texels long, not " + sizes;
+  }
+  const auto side = static_cast<std::size_t>(image.width);
+  return image.rgba.size() == 4 * side * side ? "" : "it must have 4 bytes for each of its " + sizes;
+}
+
+}  // namespace
+
+Result<Texture> Texture::from_image(std::string name, const AlphaImage& image) {
+  if (const std::string fault = fault_of(image); !fault.empty()) {
+    return make_error(ErrorCode::InvalidArgument, "cannot use texture \"" + name + "\": " + fault);
+  }
+  const auto content = std::make_shared<Content>();
+  content->name = std::move(name);
+  content->size = image.width;
+  const auto side = static_cast<std::size_t>(image.width);
+  content->texels.resize((4 * side * side - 1) / 3);  // side^2 * (1 + 1/4 + 1/16 + ...)
+  std::memcpy(content->texels.data(), image.rgba.data(), image.rgba.size());
+  BlockVector<Light> level(side * side);
+  std::size_t visible = 0;
+  for (std::size_t i = 0; i < level.size(); ++i) {
+    const Rgba8 texel = content->texels[i];
+    level[i] = {linear_colour(texel), static_cast<float>(texel.a) / 255.0F};
+    content->is_opaque &= texel.a == 255;
+    visible += texel.a >= kCutoutAlpha ? 1 : 0;
+  }
+  content->coverage = static_cast<float>(visible) / static_cast<float>(level.size());
+  std::size_t end = level.size();
+  std::size_t number = 1;
+  content->level_begin[number] = end;
+  for (std::size_t size = side; size > 1; size /= 2) {
+    halve(level, size);
+    for (const Light& texel : level) {
+      Rgba8& out = content->texels[end++];
+      out = srgb_colour(texel.colour);
+      out.a = byte_of(texel.alpha);
+    }
+    content->level_begin[++number] = end;
+  }
+  QUOIN_ASSERT(end == content->texels.size() && level.size() == 1, "all levels are full");
+  content->mean = level.front().colour;
+  content->mean_alpha = level.front().alpha;
+  content->hash = hash_of(content->name, content->texels);
+  return Texture(content);
+}
+
+const std::string& Texture::name() const {
+  QUOIN_ASSERT(content_ != nullptr, "a texture that is not null");
+  return content_->name;
+}
+
+int Texture::size() const {
+  QUOIN_ASSERT(content_ != nullptr, "a texture that is not null");
+  return content_->size;
+}
+
+int Texture::level_count() const {
+  return std::bit_width(static_cast<unsigned>(size()));
+}
+
+std::span<const Rgba8> Texture::level(int level) const {
+  QUOIN_ASSERT(level >= 0 && level < level_count(), "a level of the texture");
+  const std::size_t* const begin = content_->level_begin.data() + level;
+  return std::span<const Rgba8>(content_->texels).subspan(begin[0], begin[1] - begin[0]);
+}
+
+bool Texture::is_opaque() const {
+  QUOIN_ASSERT(content_ != nullptr, "a texture that is not null");
+  return content_->is_opaque;
+}
+
+Vec3 Texture::mean() const {
+  QUOIN_ASSERT(content_ != nullptr, "a texture that is not null");
+  return content_->mean;
+}
+
+float Texture::mean_alpha() const {
+  QUOIN_ASSERT(content_ != nullptr, "a texture that is not null");
+  return content_->mean_alpha;
+}
+
+float Texture::coverage() const {
+  QUOIN_ASSERT(content_ != nullptr, "a texture that is not null");
+  return content_->coverage;
+}
+
+std::uint64_t Texture::hash() const {
+  QUOIN_ASSERT(content_ != nullptr, "a texture that is not null");
+  return content_->hash;
+}
+
+std::size_t Texture::bytes() const {
+  QUOIN_ASSERT(content_ != nullptr, "a texture that is not null");
+  return content_->texels.size() * sizeof(Rgba8);
+}
+
+bool Texture::operator==(const Texture& other) const {
+  if (content_ == other.content_) return true;
+  if (content_ == nullptr || other.content_ == nullptr || content_->hash != other.content_->hash) return false;
+  return content_->name == other.content_->name && content_->texels == other.content_->texels;
+}
+
+VoxelFaces::VoxelFaces(const VoxelFace& all) : VoxelFaces(std::array{all, all, all, all, all, all}) {}
+
+VoxelFaces::VoxelFaces(const VoxelFace& sides, const VoxelFace& top, const VoxelFace& bottom)
+    : VoxelFaces(std::array{sides, sides, top, bottom, sides, sides}) {}
+
+VoxelFaces::VoxelFaces(const std::array<VoxelFace, 6>& by_direction)
+    : faces_(std::make_shared<const std::array<VoxelFace, 6>>(by_direction)) {}
+
+Rgba8 VoxelFaces::mean_colour() const {
+  Vec3 sum(0.0F);
+  Vec3 plain(0.0F);
+  float alpha = 0.0F;
+  for (const Direction direction : kDirections) {
+    const VoxelFace& face = (*this)[direction];
+    const Texture& texture = face.texture;
+    const float share = face.alpha == FaceAlpha::Cutout ? texture.coverage() : texture.mean_alpha();
+    const Vec3 colour = texture.mean() * linear_colour(face.tint);
+    plain += colour;
+    sum += colour * share;
+    alpha += share;
+  }
+  Rgba8 mean = srgb_colour(alpha > 0.0F ? sum / alpha : plain / 6.0F);
+  mean.a = byte_of(alpha / 6.0F);
+  return mean;
+}
+
+TextureFrame texture_frame(const VoxelFace& face, Direction direction) {
+  QUOIN_ASSERT(face.turn < 4 && static_cast<std::size_t>(direction) < 6, "a turn of 0 to 3, and a direction");
+  using Axes = std::array<std::array<int, 3>, 6>;
+  constexpr Axes kRight = {{{0, 0, -1}, {0, 0, 1}, {0, 0, 1}, {1, 0, 0}, {1, 0, 0}, {-1, 0, 0}}};
+  constexpr Axes kDown = {{{0, -1, 0}, {0, -1, 0}, {-1, 0, 0}, {0, 0, -1}, {0, -1, 0}, {0, -1, 0}}};
+  const auto axis_of = [&](const Axes& axes) {
+    const std::array<int, 3>& axis = axes[static_cast<std::size_t>(direction)];
+    return IVec3(axis[0], axis[1], axis[2]);
+  };
+  TextureFrame frame{axis_of(kRight), axis_of(kDown)};
+  // A clockwise turn moves the texture's right to where its bottom was.
+  for (int i = 0; i < face.turn; ++i) frame = {frame.down, -frame.right};
+  if (face.mirrored) frame.right = -frame.right;
+  return frame;
+}
+
+std::array<float, 4> texel_at(const VoxelFace& face, Direction direction, const DVec3& inside, int level) {
+  const TextureFrame frame = texture_frame(face, direction);
+  const int number = std::clamp(level, 0, face.texture.level_count() - 1);
+  const int size = face.texture.size() >> number;
+  const auto along = [&](const IVec3& axis) {
+    const double at = glm::dot(inside, DVec3(axis));
+    const double share = at - std::floor(at);
+    // NaN gives the first texel.
+    return share > 0.0 ? std::min(static_cast<int>(share * size), size - 1) : 0;
+  };
+  const Rgba8 texel =
+      face.texture.level(number)[static_cast<std::size_t>(along(frame.down) * size + along(frame.right))];
+  const Vec3 colour = linear_colour(texel) * linear_colour(face.tint);
+  return {colour.x, colour.y, colour.z, static_cast<float>(texel.a) / 255.0F};
+}
+
+TextureSet::TextureSet(std::size_t max_layers) : max_layers_(max_layers) {
+  QUOIN_ASSERT(max_layers > 0, "at least one layer per array");
+}
+
+TextureLayer TextureSet::add(const Texture& texture) {
+  if (const auto known = find(texture)) return *known;
+  const auto [open, is_new] = open_.try_emplace(texture.size(), 0);
+  if (is_new || arrays_[open->second].layers.size() >= max_layers_) {
+    arrays_.push_back({texture.size(), {}});
+    open->second = static_cast<std::uint32_t>(arrays_.size() - 1);
+  }
+  std::vector<Texture>& layers = arrays_[open->second].layers;
+  const TextureLayer added{open->second, static_cast<std::uint32_t>(layers.size())};
+  layers.push_back(texture);
+  by_hash_.emplace(texture.hash(), added);
+  return added;
+}
+
+void TextureSet::add(const VoxelRegistry& types) {
+  if (!types.has_textures()) return;
+  for (std::size_t type = 1; type < types.size(); ++type) {
+    const VoxelFaces& faces = types[static_cast<VoxelType>(type)].faces;
+    for (const Direction direction : kDirections) {
+      if (!faces.empty()) add(faces[direction].texture);
+    }
+  }
+}
+
+std::optional<TextureLayer> TextureSet::find(const Texture& texture) const {
+  QUOIN_ASSERT(!texture.is_null(), "a texture that is not null");
+  const auto [first, last] = by_hash_.equal_range(texture.hash());
+  for (auto it = first; it != last; ++it) {
+    if ((*this)[it->second] == texture) return it->second;
+  }
+  return std::nullopt;
+}
+
+const Texture& TextureSet::operator[](TextureLayer layer) const {
+  QUOIN_ASSERT(layer.array < arrays_.size() && layer.layer < arrays_[layer.array].layers.size(), "a layer of the set");
+  return arrays_[layer.array].layers[layer.layer];
+}
+
+std::size_t TextureSet::bytes() const {
+  std::size_t total = 0;
+  for (const Array& array : arrays_) {
+    for (const Texture& texture : array.layers) total += texture.bytes();
+  }
+  return total;
+}
+
+}  // namespace quoin
