@@ -5,7 +5,10 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <numeric>
+#include <set>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <quoin/core/assert.h>
@@ -83,7 +86,9 @@ const char* material_name(SurfaceClass surface) {
 
 }  // namespace
 
-MaterialPalette::MaterialPalette(const SceneMeshes& meshes) : types_(meshes.types) {
+MaterialPalette::MaterialPalette(const SceneMeshes& meshes, FaceColours faces)
+    : types_(meshes.types),
+      draws_textures_(faces == FaceColours::Textures && meshes.types.has_textures() && meshes.atlas.rgb.empty()) {
   const auto rows = static_cast<std::uint32_t>((types_.size() + kPaletteWidth - 1) / kPaletteWidth);
   rows_ = std::bit_ceil(std::max(rows, 1U));
   row_height_ = 1.0F / static_cast<float>(rows_);
@@ -95,14 +100,86 @@ MaterialPalette::MaterialPalette(const SceneMeshes& meshes) : types_(meshes.type
       std::vector<bool>& of_class = used.at(static_cast<std::size_t>(view.surface));
       for (const VoxelType type : view.types) {
         QUOIN_ASSERT(type < types_.size(), "a type of the registry");
-        of_class[type] = true;
+        of_class[type] = !draws_textures_ || types_[type].faces.empty();
       }
+      if (draws_textures_) add_textures_of(view);
     }
   }
   find_bands(used);
   make_materials(used);
   find_glass(meshes);
   make_smooth_materials(meshes);
+  make_textured_materials();
+}
+
+const VoxelProperties* MaterialPalette::textured_type(const MeshView& view, std::size_t vertex) const {
+  if (!draws_textures_) return nullptr;
+  QUOIN_ASSERT(vertex < view.types.size() && view.types[vertex] < types_.size(), "a vertex of a registered type");
+  const VoxelProperties& type = types_[view.types[vertex]];
+  return type.faces.empty() ? nullptr : &type;
+}
+
+MaterialPalette::TexturedLook MaterialPalette::textured_look(const MeshView& view, std::size_t vertex) const {
+  const VoxelProperties* const type = textured_type(view, vertex);
+  QUOIN_ASSERT(type != nullptr, "a textured face");
+  const VoxelFace& face = type->faces[view.directions[vertex]];
+  const auto layer = texture_layers_.find(face.texture);
+  QUOIN_ASSERT(layer.has_value(), "a texture that was added");
+  const auto unit = [](float value, float otherwise) { return value >= 0.0F ? std::min(value, 1.0F) : otherwise; };
+  TexturedLook look;
+  look.surface = view.surface;
+  look.texture = texture_by_layer_.at({layer->array, layer->layer});
+  look.alpha = face.alpha;
+  look.tint = {face.tint.r, face.tint.g, face.tint.b};
+  look.roughness = unit(type->roughness, 1.0F);
+  look.metalness = unit(type->metalness, 0.0F);
+  look.emission = emits(view.surface) ? clamped_emission(type->emission) : 0.0F;
+  return look;
+}
+
+void MaterialPalette::add_textures_of(const MeshView& view) {
+  // Most vertices have the face of the one before.
+  std::pair<VoxelType, Direction> last{kAir, Direction::PosX};
+  for (std::size_t i = 0; i < view.types.size(); ++i) {
+    const VoxelProperties* const type = textured_type(view, i);
+    if (type == nullptr || std::pair(view.types[i], view.directions[i]) == last) continue;
+    last = {view.types[i], view.directions[i]};
+    const Texture& texture = type->faces[view.directions[i]].texture;
+    const TextureLayer layer = texture_layers_.add(texture);
+    if (texture_by_layer_.try_emplace({layer.array, layer.layer}, textures_.size()).second) {
+      textures_.push_back(texture);
+    }
+    textured_by_look_.try_emplace(textured_look(view, i));
+  }
+}
+
+void MaterialPalette::make_textured_materials() {
+  std::set<std::string> names;
+  for (const auto* const materials : {&materials_, &smooth_materials_}) {
+    for (const SurfaceMaterial& material : *materials) names.insert(material.name);
+  }
+  for (auto& [look, number] : textured_by_look_) {
+    number = textured_materials_.size();
+    SurfaceMaterial& material = textured_materials_.emplace_back();
+    const std::string& name = textures_[look.texture].name();
+    material.name = name;
+    for (int i = 2; !names.insert(material.name).second; ++i) material.name = name + " " + std::to_string(i);
+    material.surface = look.surface;
+    material.emission = look.emission;
+    material.roughness = look.roughness;
+    material.metalness = look.metalness;
+    material.texture = look.texture;
+    material.alpha = look.alpha;
+    material.tint = linear_colour(Rgba8{look.tint[0], look.tint[1], look.tint[2]});
+  }
+}
+
+std::size_t MaterialPalette::material_of(const MeshView& view, std::size_t vertex) const {
+  QUOIN_ASSERT(vertex < view.types.size(), "a vertex with a type");
+  if (textured_type(view, vertex) == nullptr) return material_of(view.surface, view.types[vertex]);
+  const auto found = textured_by_look_.find(textured_look(view, vertex));
+  QUOIN_ASSERT(found != textured_by_look_.end(), "a face that the meshes have");
+  return materials_.size() + smooth_materials_.size() + found->second;
 }
 
 void MaterialPalette::find_bands(const Usage& used) {
@@ -310,6 +387,58 @@ PngImage MaterialPalette::emissive() const {
   return image;
 }
 
+namespace {
+
+/// Returns for each vertex the lowest corner of the face that contains it: of all triangles that share vertices with
+/// its own. Coordinates relative to it are small, and exact in the samplers of clients.
+std::vector<Vec3> corners_of_faces(const MeshView& view) {
+  std::vector<std::uint32_t> face(view.positions.size());  // a vertex of the same face, at most its own index
+  std::iota(face.begin(), face.end(), 0U);
+  const auto first_of = [&](std::uint32_t vertex) {
+    for (; face[vertex] != vertex; vertex = face[vertex]) face[vertex] = face[face[vertex]];
+    return vertex;
+  };
+  for (std::size_t i = 0; i < view.indices.size(); i += 3) {
+    const std::array<std::uint32_t, 3> first = {first_of(view.indices[i]), first_of(view.indices[i + 1]),
+                                                first_of(view.indices[i + 2])};
+    for (const std::uint32_t each : first) face[first_of(each)] = std::min({first[0], first[1], first[2]});
+  }
+  std::vector<Vec3> corners(view.positions.begin(), view.positions.end());
+  const auto vertices = static_cast<std::uint32_t>(face.size());
+  for (std::uint32_t i = 0; i < vertices; ++i) {
+    const std::uint32_t first = first_of(i);
+    corners[first] = glm::min(corners[first], view.positions[i]);
+  }
+  for (std::uint32_t i = 0; i < vertices; ++i) corners[i] = glm::floor(corners[first_of(i)]);
+  return corners;
+}
+
+}  // namespace
+
+std::vector<std::array<float, 2>> MaterialPalette::face_coordinates(const MeshView& view) const {
+  const std::vector<Vec3> corners = corners_of_faces(view);
+  std::vector<std::array<float, 2>> coordinates(corners.size());
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    QUOIN_ASSERT(textured_type(view, i) != nullptr, "a textured face");
+    const Direction direction = view.directions[i];
+    const TextureFrame frame = texture_frame(types_[view.types[i]].faces[direction], direction);
+    coordinates[i] = texture_coordinates(frame, view.positions[i] - corners[i]);
+  }
+  return coordinates;
+}
+
+PngImage MaterialPalette::image_of(std::size_t texture) const {
+  QUOIN_ASSERT(texture < textures_.size(), "a texture that materials use");
+  const Texture& of = textures_[texture];
+  const auto size = static_cast<std::uint32_t>(of.size());
+  PngImage image{size, size, of.is_opaque() ? 3U : 4U, {}};
+  for (const Rgba8 texel : of.level(0)) {
+    image.pixels.insert(image.pixels.end(), {texel.r, texel.g, texel.b});
+    if (!of.is_opaque()) image.pixels.push_back(texel.a);
+  }
+  return image;
+}
+
 MaterialSurfaces::MaterialSurfaces(const MeshPart& part, const MaterialPalette& palette) {
   for (const MeshView& view : part.surfaces) {
     if (!view.indices.empty()) add(view, palette);
@@ -318,22 +447,29 @@ MaterialSurfaces::MaterialSurfaces(const MeshPart& part, const MaterialPalette& 
 
 void MaterialSurfaces::add(const MeshView& view, const MaterialPalette& palette) {
   if (view.has_albedo()) return add_smooth(view, palette);
-  std::map<std::size_t, Owned*> by_material;
-  if (emits(view.surface) || is_transparent(view.surface)) {
-    for (const VoxelType type : view.types) by_material.try_emplace(palette.material_of(view.surface, type));
-  }
   QUOIN_ASSERT(!view.types.empty(), "blocks have types");
-  if (by_material.size() < 2) return surfaces_.push_back({view, palette.material_of(view.surface, view.types.front())});
+  std::vector<std::size_t> materials;  // by vertex, if there may be several
+  std::map<std::size_t, Owned*> by_material;
+  if (emits(view.surface) || is_transparent(view.surface) || palette.draws_textures()) {
+    materials.resize(view.types.size());
+    for (std::size_t i = 0; i < materials.size(); ++i) {
+      const bool is_as_before =
+          i > 0 && view.types[i] == view.types[i - 1] && view.directions[i] == view.directions[i - 1];
+      materials[i] = is_as_before ? materials[i - 1] : palette.material_of(view, i);
+      if (!is_as_before) by_material.try_emplace(materials[i]);
+    }
+  }
+  if (by_material.size() < 2) return surfaces_.push_back({view, palette.material_of(view, 0)});
   for (auto& [material, owned] : by_material) owned = owned_.emplace_back(std::make_unique<Owned>()).get();
   // A triangle lies in one face, so its three vertices have the same type and move together.
   std::vector<std::uint32_t> moved_to(view.positions.size());
   for (std::size_t i = 0; i < view.positions.size(); ++i) {
-    Owned& owned = *by_material.at(palette.material_of(view.surface, view.types[i]));
+    Owned& owned = *by_material.at(materials[i]);
     moved_to[i] = copy_vertex(view, i, owned.triangles);
     if (!view.light.empty()) owned.light.push_back(view.light[i]);
   }
   for (const std::uint32_t index : view.indices) {
-    by_material.at(palette.material_of(view.surface, view.types[index]))->triangles.indices.push_back(moved_to[index]);
+    by_material.at(materials[index])->triangles.indices.push_back(moved_to[index]);
   }
   for (const auto& [material, owned] : by_material) {
     surfaces_.push_back({view_of(owned->triangles, view.surface), material});

@@ -6,12 +6,15 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/direction.h>
 #include <quoin/core/vec.h>
+#include <quoin/grid/texture.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/mesh/mesh_view.h>
 #include <quoin/scene/scene_meshes.h>
@@ -96,9 +99,14 @@ struct SurfaceMaterial {
   VoxelType type = kAir;  ///< the only type of a transparent material
   GlassMaterial glass{};
   float unit = 1.0F;  ///< its voxel size in the world, the mean over its placements
-  // For smooth surfaces, which have no textures:
+  // For smooth surfaces and textured faces, which do not use the palette:
   float roughness = 1.0F;
   float metalness = 0.0F;
+  // For textured faces:
+  std::optional<std::size_t> texture{};  ///< index into MaterialPalette::textures
+  FaceAlpha alpha = FaceAlpha::Opaque;
+  Vec3 tint{1.0F};  ///< linear, multiplies the texture
+  // For smooth surfaces:
   Vec3 emission_colour{0.0F};  ///< linear, times `emission`
 
   [[nodiscard]] bool is_transparent() const {
@@ -109,10 +117,17 @@ struct SurfaceMaterial {
   }
 };
 
+/// The appearance of types with textures (VoxelProperties::faces) in a file.
+enum class FaceColours : std::uint8_t {
+  Means,     ///< the colour of the type
+  Textures,  ///< a material per texture, tint and use of alpha; not in meshes with an atlas, which has their colours
+};
+
 /// The voxel types of a scene's meshes in the form of mesh formats: textures with one texel per type, and the few
 /// materials that use them.
 ///
 /// Each transparent type has its own material, with the light transmission of glass of the type's typical thickness.
+/// With FaceColours::Textures, textured faces have materials of their own instead.
 ///
 /// Emission: strengths are sorted into bands, each from its strongest down to half of it; a band is a material. Within
 /// a band the emissive texel is the type's colour, scaled in linear light by strength / strongest. A file with one
@@ -121,16 +136,33 @@ class MaterialPalette {
  public:
   /// Only types used by blocks of the meshes get materials; all registered types get texels.
   /// Requires: valid meshes, whose types outlive this object.
-  explicit MaterialPalette(const SceneMeshes& meshes);
+  explicit MaterialPalette(const SceneMeshes& meshes, FaceColours faces = FaceColours::Means);
 
   [[nodiscard]] const VoxelRegistry& types() const { return types_; }
   [[nodiscard]] const std::vector<SurfaceMaterial>& materials() const { return materials_; }
-  /// Requires: the meshes have a triangle of this class and type.
+  /// Returns the material of a class and type without textures. Requires: the meshes have such a triangle.
   [[nodiscard]] std::size_t material_of(SurfaceClass surface, VoxelType type) const;
+  /// Returns the material of a block's vertex. Requires: the meshes have a triangle with this vertex.
+  [[nodiscard]] std::size_t material_of(const MeshView& view, std::size_t vertex) const;
   [[nodiscard]] bool has_emission() const;
   /// Returns the materials of smooth surfaces, which come after all others: one per roughness and metalness, and one
   /// per type that emits or is transparent.
   [[nodiscard]] const std::vector<SurfaceMaterial>& smooth_materials() const { return smooth_materials_; }
+  /// Returns the materials of textured faces, which come after those of smooth surfaces.
+  [[nodiscard]] const std::vector<SurfaceMaterial>& textured_materials() const { return textured_materials_; }
+  /// Returns true if the material with this number is one of textured faces.
+  [[nodiscard]] bool is_textured(std::size_t material) const {
+    return material >= materials_.size() + smooth_materials_.size();
+  }
+  /// Returns the textures that materials use, each once.
+  [[nodiscard]] const std::vector<Texture>& textures() const { return textures_; }
+  /// Returns a texture as an image, without alpha if it is opaque. Requires: an index into `textures`.
+  [[nodiscard]] PngImage image_of(std::size_t texture) const;
+  /// Returns the texture coordinates of each vertex of textured faces, from the upper left corner. Textures repeat, so
+  /// each face has coordinates relative to its own lowest corner, which are small. Requires: all faces are textured.
+  [[nodiscard]] std::vector<std::array<float, 2>> face_coordinates(const MeshView& view) const;
+  /// Returns true if blocks may have textured faces.
+  [[nodiscard]] bool draws_textures() const { return draws_textures_; }
   /// Returns the material number of a smooth triangle, by its first vertex.
   /// Requires: the meshes have such a triangle.
   [[nodiscard]] std::size_t smooth_material(const MeshView& view, std::uint32_t vertex) const;
@@ -171,6 +203,23 @@ class MaterialPalette {
     auto operator<=>(const SmoothLook&) const = default;
   };
 
+  /// The key of a material of textured faces.
+  struct TexturedLook {
+    SurfaceClass surface = SurfaceClass::Opaque;
+    std::size_t texture = 0;
+    FaceAlpha alpha = FaceAlpha::Opaque;
+    std::array<std::uint8_t, 3> tint{};
+    float roughness = 1.0F;
+    float metalness = 0.0F;
+    float emission = 0.0F;
+    auto operator<=>(const TexturedLook&) const = default;
+  };
+
+  /// Returns the type of a block's vertex if its face is drawn with a texture.
+  [[nodiscard]] const VoxelProperties* textured_type(const MeshView& view, std::size_t vertex) const;
+  [[nodiscard]] TexturedLook textured_look(const MeshView& view, std::size_t vertex) const;
+  void add_textures_of(const MeshView& view);
+  void make_textured_materials();
   void find_bands(const Usage& used);
   void make_materials(const Usage& used);
   void add_material(SurfaceClass surface, std::size_t group, std::string name);
@@ -193,6 +242,12 @@ class MaterialPalette {
   bool has_light_ = false;         ///< vertex colours include all light, so types do not matter
   float smooth_thickness_ = 1.0F;  ///< the material of all transparent surfaces without types
   std::map<std::pair<SurfaceClass, std::size_t>, std::size_t> by_class_and_group_;
+  bool draws_textures_ = false;
+  TextureSet texture_layers_;
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> texture_by_layer_;  // by array and layer
+  std::vector<Texture> textures_;
+  std::vector<SurfaceMaterial> textured_materials_;
+  std::map<TexturedLook, std::size_t> textured_by_look_;
 };
 
 /// The surfaces of a part, one per material. A surface with a single material is borrowed, not copied.

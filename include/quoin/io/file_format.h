@@ -97,6 +97,7 @@ enum class FormatCapability : std::uint32_t {
   Cameras = 1U << 14,            ///< LoadedScene::cameras
   Metres = 1U << 15,             ///< one file unit is a metre
   Fields = 1U << 16,             ///< density fields, and instances of any rotation and voxel size
+  Faces = 1U << 17,              ///< textures of voxel types (VoxelProperties::faces)
 };
 
 [[nodiscard]] constexpr FormatCapability operator|(FormatCapability a, FormatCapability b) {

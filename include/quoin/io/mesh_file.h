@@ -53,6 +53,11 @@ struct MeshFileOptions {
 ///            are opaque, transparent or emissive. Emission is texture times emissiveFactor times
 ///            KHR_materials_emissive_strength. Strengths within a factor of two share a material and are scaled
 ///            in the texture, which costs at most one of its 8 bits.
+///            Textured faces (VoxelProperties::faces): one material per texture, tint, use of alpha, roughness,
+///            metalness and emission, instead of the palette. TEXCOORD_0 counts voxels, and the texture repeats:
+///            nearest filter when enlarged, mipmaps when reduced. The tint is the baseColorFactor. Emission has the
+///            colours of the texture. Cutout faces have the alpha mode MASK and two sides, translucent ones BLEND,
+///            without transmission. With an atlas, blocks have the mean colours of their textures.
 ///            Transparent types: one blended material each, with KHR_materials_transmission, KHR_materials_volume and
 ///            KHR_materials_ior. These and alpha match rendered images of the type's bodies at typical thickness
 ///            (MeshPart::thickness).
@@ -83,10 +88,11 @@ struct MeshFileOptions {
 ///            STL are relative to mesh_file_offset; 3MF stores that offset in the transform of its items.
 /// OBJ:       one object per placement, in world units. Blocks: coordinates to a millionth of a unit, with NAME.mtl,
 ///            NAME_palette.png, NAME_emissive.png (if a type emits light) and NAME_atlas.png (with an atlas) next to
-///            NAME.obj. Without an atlas, occlusion is a grey colour after the vertex coordinates ("v x y z r g b"), an
-///            extension that many programs read. Each transparent type has its own material with d, Tf and Ni. Smooth
-///            meshes: nine digits, sRGB colours after the coordinates, no materials. OcclusionIn::Attribute is not
-///            supported.
+///            NAME.obj. Textured faces have materials as in glTF, with NAME_texture_1.png and so on: the tint in Kd
+///            (sRGB), alpha in map_d. Without an atlas, occlusion is a grey colour after the vertex coordinates
+///            ("v x y z r g b"), an extension that many programs read. Each transparent type has its own material with
+///            d, Tf and Ni. Smooth meshes: nine digits, sRGB colours after the coordinates, no materials.
+///            OcclusionIn::Attribute is not supported.
 /// PLY:       version 1.0, binary, little-endian, in world units: floats x y z and nx ny nz, bytes red green blue
 ///            (sRGB; occlusion is multiplied in linear light), triangles as lists of int. Transparency, metalness and
 ///            emission are lost. OcclusionIn::Attribute adds a float ao, which is 1 for meshes without occlusion.
@@ -98,10 +104,12 @@ struct MeshFileOptions {
 /// Occlusion: in meshes, 0 is open, and 3 (blocks) or 1 is dark. Files store the remaining light, 1 open to 0 dark, as
 ///            a colour factor or as the attribute: 1 - occlusion / 4 for blocks (1, 0.75, 0.5, 0.25), 1 - occlusion for
 ///            smooth meshes.
-/// Left out:  parts without triangles (their placements become glTF nodes without a mesh) or without placements.
+/// Left out:  parts without triangles (their placements become glTF nodes without a mesh) or without placements;
+///            outside glTF and OBJ, textures of types, whose mean colours are written.
 /// Order:     the same bytes on every run.
 /// Memory:    vertices are streamed: 1 MiB, the glTF JSON, and, for one part at a time (in glTF for all), a copy of
-///            surfaces whose emission needs several materials. `compress` adds all compressed data and the largest
+///            surfaces with several materials (emission, glass, textures). Coordinates of textured faces need 16 bytes
+///            per vertex of a material while they are written. `compress` adds all compressed data and the largest
 ///            array as stored.
 /// Errors:    Unsupported for formats without meshes; for light, `quantize` and `compress` outside glTF; for an atlas
 ///            with occlusion in PLY, STL and 3MF; for OcclusionIn::Attribute in OBJ, STL and 3MF; for `compress` in

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <string>
@@ -25,6 +26,8 @@ constexpr int kArrayBuffer = 34962;
 constexpr int kElementArrayBuffer = 34963;
 constexpr int kNearest = 9728;
 constexpr int kLinear = 9729;
+constexpr int kNearestLinearMipmaps = 9986;
+constexpr int kRepeat = 10497;
 constexpr int kClampToEdge = 33071;
 
 constexpr const char* kEmissiveStrength = "KHR_materials_emissive_strength";
@@ -112,6 +115,8 @@ const char* attribute_name(const GltfPrimitive& primitive, GltfArrayKind kind) {
     case GltfArrayKind::Normal:
       return "NORMAL";
     case GltfArrayKind::AtlasCoordinate:
+      return "TEXCOORD_0";
+    case GltfArrayKind::FaceCoordinate:
       return "TEXCOORD_0";
     case GltfArrayKind::PaletteCoordinate:
       return primitive.view.atlas.empty() ? "TEXCOORD_0" : "TEXCOORD_1";
@@ -207,6 +212,34 @@ Json smooth_json(const SurfaceMaterial& material, const MaterialPalette& palette
   return entry;
 }
 
+/// Returns a material of textured faces. Its emission has the colours of the texture.
+Json textured_json(const SurfaceMaterial& material, const GltfLayout& layout) {
+  QUOIN_ASSERT(material.texture.has_value() && layout.texture(GltfImageKind::Face).has_value(), "a textured material");
+  const Json texture = {{"index", *layout.texture(GltfImageKind::Face) + *material.texture}};
+  Json entry = layout.is_unlit ? unlit_json(material.name, false, std::nullopt) : Json{{"name", material.name}};
+  Json& surface = entry["pbrMetallicRoughness"];
+  surface["baseColorTexture"] = texture;
+  if (material.tint != Vec3(1.0F)) {
+    surface["baseColorFactor"] = {material.tint.x, material.tint.y, material.tint.z, 1.0F};
+  }
+  if (!layout.is_unlit) {
+    surface["metallicFactor"] = material.metalness;
+    surface["roughnessFactor"] = material.roughness;
+    if (material.is_emissive()) {
+      entry["emissiveTexture"] = texture;
+      entry["emissiveFactor"] = json_from(material.tint * std::min(material.emission, 1.0F));
+      entry["extensions"][kEmissiveStrength] = {{"emissiveStrength", std::max(material.emission, 1.0F)}};
+    }
+  }
+  if (material.alpha == FaceAlpha::Translucent) entry["alphaMode"] = "BLEND";
+  if (material.alpha == FaceAlpha::Cutout) {
+    entry["alphaMode"] = "MASK";
+    entry["alphaCutoff"] = kCutoutAlpha / 255.0;
+    entry["doubleSided"] = true;
+  }
+  return entry;
+}
+
 Json materials_json(const GltfLayout& layout) {
   Json materials = Json::array();
   for (const SurfaceMaterial& material : layout.palette.materials()) {
@@ -232,20 +265,38 @@ Json materials_json(const GltfLayout& layout) {
     materials.push_back(layout.is_unlit ? unlit_json(material.name, material.is_transparent(), std::nullopt)
                                         : smooth_json(material, layout.palette));
   }
+  for (const SurfaceMaterial& material : layout.palette.textured_materials()) {
+    materials.push_back(textured_json(material, layout));
+  }
   return materials;
 }
 
 void add_textures(const GltfLayout& layout, Arrays& arrays, Json& document) {
-  const auto sampler = [](int filter) {
-    return Json{{"magFilter", filter}, {"minFilter", filter}, {"wrapS", kClampToEdge}, {"wrapT", kClampToEdge}};
+  const auto sampler = [](int filter, int far_filter, int wrap) {
+    return Json{{"magFilter", filter}, {"minFilter", far_filter}, {"wrapS", wrap}, {"wrapT", wrap}};
   };
-  document["samplers"] = Json::array({sampler(kNearest)});
-  // Linear filtering interpolates between the corners of voxels, never across patches.
-  if (layout.texture(GltfImageKind::Atlas)) document["samplers"].push_back(sampler(kLinear));
+  // Linear filtering interpolates between the corners of voxels, never across patches. Textures of faces repeat.
+  const std::array<std::pair<GltfImageKind, Json>, 3> samplers = {
+      {{GltfImageKind::Palette, sampler(kNearest, kNearest, kClampToEdge)},
+       {GltfImageKind::Atlas, sampler(kLinear, kLinear, kClampToEdge)},
+       {GltfImageKind::Face, sampler(kNearest, kNearestLinearMipmaps, kRepeat)}}};
+  const auto kind_of = [](GltfImageKind kind) {
+    return kind == GltfImageKind::Atlas || kind == GltfImageKind::Face ? kind : GltfImageKind::Palette;
+  };
+  document["samplers"] = Json::array();
+  std::map<GltfImageKind, std::size_t> number_of;
+  for (const auto& [kind, sampler_of_kind] : samplers) {
+    const bool is_default =
+        kind == GltfImageKind::Palette && kind_of(layout.images.front().kind) != GltfImageKind::Face;
+    const auto has_kind = [&](const GltfImage& image) { return kind_of(image.kind) == kind; };
+    if (!is_default && std::ranges::none_of(layout.images, has_kind)) continue;
+    number_of[kind] = document["samplers"].size();
+    document["samplers"].push_back(sampler_of_kind);
+  }
   Json images = Json::array();
   Json textures = Json::array();
   for (const GltfImage& image : layout.images) {
-    textures.push_back({{"sampler", image.kind == GltfImageKind::Atlas ? 1 : 0}, {"source", images.size()}});
+    textures.push_back({{"sampler", number_of.at(kind_of(image.kind))}, {"source", images.size()}});
     images.push_back({{"name", image.name}, {"mimeType", "image/png"}, {"bufferView", arrays.add_view(image.view)}});
   }
   document["textures"] = std::move(textures);
@@ -410,7 +461,8 @@ void add_extensions(const GltfLayout& layout, Json& document) {
   bool has_emission = false;
   bool has_ior = false;
   bool has_glass = false;
-  for (const auto* const materials : {&palette.materials(), &palette.smooth_materials()}) {
+  for (const auto* const materials :
+       {&palette.materials(), &palette.smooth_materials(), &palette.textured_materials()}) {
     for (const SurfaceMaterial& material : *materials) {
       const bool is_glass = material.is_transparent() && material.type != kAir;
       has_emission |= !layout.is_unlit && material.is_emissive();

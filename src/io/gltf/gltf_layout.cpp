@@ -113,8 +113,8 @@ void measure(const GltfMesh& mesh, GltfPrimitive& primitive) {
 /// yet.
 class ArrayPlan {
  public:
-  ArrayPlan(const GltfMesh& mesh, const MeshView& view, const MeshFileOptions& options)
-      : mesh_(mesh), view_(view), options_(options) {}
+  ArrayPlan(const GltfMesh& mesh, const MeshView& view, bool is_textured, const MeshFileOptions& options)
+      : mesh_(mesh), view_(view), is_textured_(is_textured), options_(options) {}
 
   [[nodiscard]] std::vector<GltfArray> arrays() {
     const bool is_smooth = view_.has_albedo();
@@ -125,7 +125,9 @@ class ArrayPlan {
     const bool is_short = options_.quantize;
     // A step of 1/65,535 may be a noticeable part of an atlas texel.
     if (!view_.atlas.empty()) add(GltfArrayKind::AtlasCoordinate, GltfComponent::Float, 2, vertices);
-    if (!is_smooth)
+    if (is_textured_) {
+      add(GltfArrayKind::FaceCoordinate, GltfComponent::Float, 2, vertices);
+    } else if (!is_smooth)
       add(GltfArrayKind::PaletteCoordinate, is_short ? GltfComponent::UnsignedShort : GltfComponent::Float, 2,
           vertices);
     const bool is_wide_colour = is_smooth || !view_.light.empty();
@@ -161,6 +163,7 @@ class ArrayPlan {
 
   const GltfMesh& mesh_;
   const MeshView& view_;
+  bool is_textured_;
   const MeshFileOptions& options_;
   std::vector<GltfArray> arrays_;
 };
@@ -230,6 +233,23 @@ std::vector<std::byte> packed_array(const MaterialPalette& palette, const GltfMe
   return compress_gltf_array(array, bytes);
 }
 
+Status add_image(GltfImageKind kind, std::string name, const PngImage& image, GltfLayout& layout) {
+  auto png = encode_png(image);
+  if (!png) return png.error();
+  const GltfView view = reserve_view(png->size(), layout.buffer_bytes);
+  layout.images.push_back({kind, std::move(name), std::move(*png), view});
+  return {};
+}
+
+Status add_face_images(GltfLayout& layout) {
+  const std::vector<Texture>& textures = layout.palette.textures();
+  for (std::size_t i = 0; i < textures.size(); ++i) {
+    const PngImage image = layout.palette.image_of(i);
+    if (Status added = add_image(GltfImageKind::Face, textures[i].name(), image, layout); !added) return added;
+  }
+  return {};
+}
+
 /// Omits images that no material uses.
 Status add_images(const Image& atlas, GltfLayout& layout) {
   const MaterialPalette& palette = layout.palette;
@@ -247,10 +267,7 @@ Status add_images(const Image& atlas, GltfLayout& layout) {
     images.emplace_back(GltfImageKind::Emissive, "palette emissive", palette.emissive());
   if (has_atlas) images.emplace_back(GltfImageKind::Atlas, "atlas", png_of(atlas));
   for (auto& [kind, name, image] : images) {
-    auto png = encode_png(image);
-    if (!png) return png.error();
-    const GltfView view = reserve_view(png->size(), layout.buffer_bytes);
-    layout.images.push_back({kind, name, std::move(*png), view});
+    if (Status added = add_image(kind, name, image, layout); !added) return added;
   }
   return {};
 }
@@ -333,7 +350,7 @@ class MeshLayout {
     primitive.view = surface.view;
     primitive.material = surface.material;
     measure(mesh, primitive);
-    primitive.arrays = ArrayPlan(mesh, surface.view, options_).arrays();
+    primitive.arrays = ArrayPlan(mesh, surface.view, layout_.palette.is_textured(surface.material), options_).arrays();
     const auto place_of = options_.compress ? places_by_use(surface.view) : std::vector<std::uint32_t>();
     for (GltfArray& array : primitive.arrays) {
       std::uint64_t& end = options_.compress ? layout_.decoded_bytes : layout_.buffer_bytes;
@@ -491,7 +508,11 @@ Result<GltfLayout> lay_out_gltf(const SceneMeshes& meshes, const MeshFileOptions
                       "cannot compress meshes: Quoin was built without meshoptimizer (Debian: libmeshoptimizer-dev)");
   }
   QUOIN_ASSERT(check_meshes(meshes).has_value(), "sound meshes");
-  GltfLayout layout{.palette = MaterialPalette(meshes), .nodes = {}, .meshes = {}, .images = {}, .surfaces = {}};
+  GltfLayout layout{.palette = MaterialPalette(meshes, FaceColours::Textures),
+                    .nodes = {},
+                    .meshes = {},
+                    .images = {},
+                    .surfaces = {}};
   layout.is_unlit = has_light(meshes);
   for (const MeshPart& part : meshes.parts) layout.surfaces.emplace_back(part, layout.palette);
   for (const MeshPlacement& placement : meshes.placements) {
@@ -505,6 +526,7 @@ Result<GltfLayout> lay_out_gltf(const SceneMeshes& meshes, const MeshFileOptions
   if (!layout.palette.materials().empty() && !layout.meshes.empty()) {
     if (auto added = add_images(meshes.atlas, layout); !added) return added.error();
   }
+  if (auto added = add_face_images(layout); !added) return added.error();
   add_channels(meshes, layout);
   std::ranges::copy_if(meshes.lamps, std::back_inserter(layout.lamps), can_light);
   std::ranges::copy_if(meshes.cameras, std::back_inserter(layout.cameras),

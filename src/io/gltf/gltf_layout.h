@@ -29,6 +29,7 @@ enum class GltfArrayKind : std::uint8_t {
   Normal,
   AtlasCoordinate,
   PaletteCoordinate,  ///< the first coordinate set, except for the atlas coordinates
+  FaceCoordinate,     ///< of textured faces, instead of PaletteCoordinate
   Colour,
   Occlusion,
   Index,
@@ -116,7 +117,7 @@ struct GltfChannel {
 };
 
 /// The purpose of a file's image.
-enum class GltfImageKind : std::uint8_t { Palette, MetallicRoughness, Emissive, Atlas };
+enum class GltfImageKind : std::uint8_t { Palette, MetallicRoughness, Emissive, Atlas, Face };
 
 struct GltfImage {
   GltfImageKind kind{};
@@ -130,7 +131,7 @@ struct GltfLayout {
   MaterialPalette palette;
   std::vector<GltfNode> nodes;  ///< the placements in their order, then the groups
   std::vector<GltfMesh> meshes;
-  std::vector<GltfImage> images;           ///< block textures; the first is the first texture
+  std::vector<GltfImage> images;           ///< textures of blocks; those of MaterialPalette::textures come last
   std::vector<MaterialSurfaces> surfaces;  ///< by part
   std::vector<GltfChannel> channels{};     ///< the animation's times and values; after the images
   std::vector<Lamp> lamps{};               ///< lamps that give light; their nodes come after `nodes`
@@ -141,7 +142,7 @@ struct GltfLayout {
   bool is_unlit = false;  ///< vertex colours include all light
 
   [[nodiscard]] bool is_compressed() const { return decoded_bytes > 0; }
-  /// Returns the index of the texture; nullopt if the file has none of that kind.
+  /// Returns the index of the texture, of faces the first; nullopt if the file has none of that kind.
   [[nodiscard]] std::optional<std::size_t> texture(GltfImageKind kind) const;
 };
 

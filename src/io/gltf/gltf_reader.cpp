@@ -773,8 +773,8 @@ namespace {
 
 constexpr FormatCapability kGltfCapabilities =
     triangles::kReading | FormatCapability::Write | FormatCapability::Meshes | FormatCapability::Textures |
-    FormatCapability::OcclusionAttribute | FormatCapability::VertexLight | FormatCapability::Lamps |
-    FormatCapability::Animation | FormatCapability::Compression | FormatCapability::Metres;
+    FormatCapability::Faces | FormatCapability::OcclusionAttribute | FormatCapability::VertexLight |
+    FormatCapability::Lamps | FormatCapability::Animation | FormatCapability::Compression | FormatCapability::Metres;
 
 }  // namespace
 

@@ -223,6 +223,9 @@ void write_gltf_array(const MaterialPalette& palette, const GltfMesh& mesh, cons
       return;
     case GltfArrayKind::PaletteCoordinate:
       return write_texture_coordinates(palette, view, array.component, out);
+    case GltfArrayKind::FaceCoordinate:
+      for (const std::array<float, 2>& uv : palette.face_coordinates(view)) out.put(uv);
+      return;
     case GltfArrayKind::Colour:
       return write_colours(palette, primitive.material,
                            has_array(primitive, GltfArrayKind::Occlusion) ? without_occlusion(view) : view, out);

@@ -523,11 +523,16 @@ std::string shortest(float value) {
   return {text.data(), end};
 }
 
-/// Returns a material's name for OBJ and MTL, without spaces.
-std::string mtl_name(const SurfaceMaterial& material) {
-  std::string name = material.name;
-  std::replace(name.begin(), name.end(), ' ', '_');
-  return name;
+/// Returns the name of a material of blocks for OBJ and MTL, in one word. Those of textured faces end in their number,
+/// so that names are unique that differ in blanks only.
+std::string mtl_name(const MaterialPalette& palette, std::size_t material) {
+  const auto& plain = palette.materials();
+  if (!palette.is_textured(material)) {
+    QUOIN_ASSERT(material < plain.size(), "a material of the palette");
+    return one_word(plain[material].name);
+  }
+  const std::size_t number = material - plain.size() - palette.smooth_materials().size();
+  return one_word(palette.textured_materials()[number].name) + "_texture_" + std::to_string(number + 1);
 }
 
 /// Returns the coverage, tint and refraction of glass as MTL lines. Most clients read `d`; they disagree about texture
@@ -549,18 +554,41 @@ struct ObjNames {
   std::filesystem::path palette;
   std::filesystem::path emissive;
   std::filesystem::path atlas;
+  std::string texture_stem;
+
+  /// Returns the path of a texture of MaterialPalette::textures. Names of textures may not be file names.
+  [[nodiscard]] std::filesystem::path texture(std::size_t number) const {
+    return texture_stem + std::to_string(number + 1) + ".png";
+  }
 };
 
 ObjNames names_beside(const std::filesystem::path& path) {
   const std::string stem = (path.parent_path() / path.stem()).string();
-  return {stem + ".mtl", stem + "_palette.png", stem + "_emissive.png", stem + "_atlas.png"};
+  return {stem + ".mtl", stem + "_palette.png", stem + "_emissive.png", stem + "_atlas.png", stem + "_texture_"};
+}
+
+/// Returns a material of textured faces. The tint is in Kd, which clients multiply by the texture.
+std::string mtl_textured(const SurfaceMaterial& material, const std::string& name, const ObjNames& names) {
+  QUOIN_ASSERT(material.texture.has_value(), "a textured material");
+  const std::string image = names.texture(*material.texture).filename().string();
+  const auto colour = [](const char* key, const Vec3& c) {
+    return std::string(key) + " " + shortest(c.x) + " " + shortest(c.y) + " " + shortest(c.z) + "\n";
+  };
+  const Rgba8 tint = quoin::srgb_colour(material.tint);
+  std::string text = "\nnewmtl " + name + "\nKa 0 0 0\n";
+  text.append(colour("Kd", Vec3(tint.r, tint.g, tint.b) / 255.0F)).append("Ks 0 0 0\nillum 1\nmap_Kd " + image + "\n");
+  if (material.alpha != FaceAlpha::Opaque) text.append("map_d " + image + "\n");
+  if (material.is_emissive())
+    text.append(colour("Ke", material.tint * material.emission)).append("map_Ke " + image + "\n");
+  return text;
 }
 
 /// Writes one material for each of the palette's, by name. MTL has no emission strength, so Ke holds it.
 std::string mtl_text(const SceneMeshes& meshes, const MaterialPalette& palette, const ObjNames& names) {
   std::string text = first_line();
-  for (const SurfaceMaterial& material : palette.materials()) {
-    text.append("\nnewmtl ").append(mtl_name(material)).append("\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\n");
+  for (std::size_t i = 0; i < palette.materials().size(); ++i) {
+    const SurfaceMaterial& material = palette.materials()[i];
+    text.append("\nnewmtl ").append(mtl_name(palette, i)).append("\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\n");
     const bool is_in_atlas = material.surface == SurfaceClass::Opaque && !meshes.atlas.rgb.empty();
     text.append("map_Kd ").append((is_in_atlas ? names.atlas : names.palette).filename().string()).append("\n");
     if (material.is_transparent()) text.append(mtl_glass(material, meshes.types[material.type]));
@@ -569,6 +597,10 @@ std::string mtl_text(const SceneMeshes& meshes, const MaterialPalette& palette, 
       text.append("Ke ").append(strength).append(" ").append(strength).append(" ").append(strength);
       text.append("\nmap_Ke ").append(names.emissive.filename().string()).append("\n");
     }
+  }
+  const std::size_t first = palette.materials().size() + palette.smooth_materials().size();
+  for (std::size_t i = 0; i < palette.textured_materials().size(); ++i) {
+    text.append(mtl_textured(palette.textured_materials()[i], mtl_name(palette, first + i), names));
   }
   return text;
 }
@@ -639,16 +671,18 @@ class ObjText {
     write_face_normals(transform);
     for (const auto& [view, material] : split.surfaces()) {
       write_vertices(view, transform);
-      QUOIN_ASSERT(material < palette_.materials().size(), "a material of the palette");
-      out_.put_text("usemtl " + mtl_name(palette_.materials()[material]) + "\n");
-      for (const std::array<float, 2>& uv : view.atlas) write_texture_coordinate(uv);
-      write_faces(view, transform.mirrors(), [&view = view, this](std::uint32_t corner) {
+      out_.put_text("usemtl " + mtl_name(palette_, material) + "\n");
+      std::vector<std::array<float, 2>> of_faces;
+      if (palette_.is_textured(material)) of_faces = palette_.face_coordinates(view);
+      const std::span<const std::array<float, 2>> own = of_faces.empty() ? view.atlas : of_faces;
+      for (const std::array<float, 2>& uv : own) write_texture_coordinate(uv);
+      write_faces(view, transform.mirrors(), [&view = view, own, this](std::uint32_t corner) {
         QUOIN_ASSERT(corner < view.types.size() && corner < view.directions.size(), "a vertex of the surface");
-        const std::uint64_t texture = view.atlas.empty() ? view.types[corner] : textures_ + corner + 1;
+        const std::uint64_t texture = own.empty() ? view.types[corner] : textures_ + corner + 1;
         return std::pair(static_cast<std::uint64_t>(view.directions[corner]), texture);
       });
       vertices_ += view.positions.size();
-      textures_ += view.atlas.size();
+      textures_ += own.size();
     }
     normals_ += kDirections.size();
   }
@@ -746,7 +780,7 @@ Status add_image(const std::filesystem::path& path, const PngImage& image, std::
 
 Result<std::vector<MeshFile>> plan_obj(const SceneMeshes& meshes, const std::filesystem::path& path,
                                        const MeshFileOptions& /*options*/) {
-  const auto palette = std::make_shared<const MaterialPalette>(meshes);
+  const auto palette = std::make_shared<const MaterialPalette>(meshes, FaceColours::Textures);
   const ObjNames names = names_beside(path);
   std::vector<MeshFile> files;
   if (has_materials(meshes)) {
@@ -756,6 +790,9 @@ Result<std::vector<MeshFile>> plan_obj(const SceneMeshes& meshes, const std::fil
     }
     if (!meshes.atlas.rgb.empty()) {
       if (auto added = add_image(names.atlas, png_of(meshes.atlas), files); !added) return added.error();
+    }
+    for (std::size_t i = 0; i < palette->textures().size(); ++i) {
+      if (auto added = add_image(names.texture(i), palette->image_of(i), files); !added) return added.error();
     }
     std::string text = mtl_text(meshes, *palette, names);
     files.push_back({names.library, 0, [text = std::move(text)](BlockWriter& out) { out.put_text(text); }});
@@ -772,6 +809,12 @@ std::vector<std::filesystem::path> obj_companions(const SceneMeshes& meshes, con
   const ObjNames names = names_beside(path);
   std::vector<std::filesystem::path> files = {names.library, names.palette};
   if (!meshes.atlas.rgb.empty()) files.push_back(names.atlas);
+  if (meshes.types.has_textures() && check_meshes(meshes)) {
+    const MaterialPalette palette(meshes, FaceColours::Textures);
+    if (palette.has_emission()) files.push_back(names.emissive);
+    for (std::size_t i = 0; i < palette.textures().size(); ++i) files.push_back(names.texture(i));
+    return files;
+  }
   for (const MeshPart& part : meshes.parts) {
     for (const MeshView& view : part.surfaces) {
       const bool emits = view.surface == SurfaceClass::Emissive || view.surface == SurfaceClass::EmissiveTransparent;
@@ -785,7 +828,8 @@ std::vector<std::filesystem::path> obj_companions(const SceneMeshes& meshes, con
 
 extern constinit const FormatDriver kObjFormat = {
     .info = {FileFormat::Obj, ".obj", "Wavefront OBJ with .mtl and palette images",
-             triangles::kReading | FormatCapability::Write | FormatCapability::Meshes | FormatCapability::Textures},
+             triangles::kReading | FormatCapability::Write | FormatCapability::Meshes | FormatCapability::Textures |
+                 FormatCapability::Faces},
     .detect = triangles::is_obj,
     .read_mesh = triangles::read_obj,
     .plan_mesh = plan_obj,

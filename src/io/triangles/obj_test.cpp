@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <set>
 #include <sstream>
 #include <string>
@@ -20,6 +21,7 @@ struct ParsedObj {
   std::vector<std::array<double, 2>> textures;
   std::vector<DVec3> normals;
   std::vector<std::array<Corner, 3>> faces;
+  std::vector<std::size_t> material_of_face;  ///< index into `materials`
   std::vector<std::string> objects;
   std::vector<std::string> materials;
   std::string library;
@@ -49,6 +51,7 @@ void parse_line(const std::string& line, ParsedObj& obj) {
     --corner.position, --corner.texture, --corner.normal;
   }
   obj.faces.push_back(face);
+  obj.material_of_face.push_back(obj.materials.size() - 1);
 }
 
 std::string text_of(const std::filesystem::path& path) {
@@ -205,6 +208,63 @@ TEST_F(Obj, WritesOcclusionAsVertexColoursIfPresent) {
   EXPECT_EQ(shaded.greys.size(), shaded.positions.size());
   EXPECT_EQ(std::set<double>(shaded.greys.begin(), shaded.greys.end()), (std::set<double>{0.75, 1.0}));
   EXPECT_TRUE(write(false).greys.empty());
+}
+
+// Each triangle shows the texels of its voxel's face at points within it.
+TEST_F(Obj, RepeatsTexturesOnFaces) {
+  AlphaImage noise{16, 16, {}};
+  for (int i = 0; i < 4 * 16 * 16; ++i) noise.rgba.push_back(i % 4 == 3 ? 255 : static_cast<std::uint8_t>(i * i % 251));
+  AlphaImage leaves = noise;
+  leaves.rgba[3] = 0;
+  const Texture bark = Texture::from_image("bark/1", noise).value();
+  const VoxelFace turned{.texture = bark, .turn = 1, .mirrored = true, .tint = {255, 188, 0, 255}};
+  const auto log = scene_.types.add({.name = "log", .faces = {{bark}, turned, {.texture = bark, .turn = 2}}}).value();
+  VoxelProperties leaf{.name = "leaf", .visibility = Visibility::Transparent};
+  leaf.faces = VoxelFace{.texture = Texture::from_image("leaf", leaves).value(), .alpha = FaceAlpha::Cutout};
+  const auto bush = scene_.types.add(leaf).value();
+  Grid& grid = scene_.edit(grid_).grid;
+  grid.fill_box({{-9, 0, 0}, {-2, 5, 3}}, log);
+  grid.fill_box({{-9, 5, 0}, {-2, 7, 3}}, bush);
+  scene_.edit(grid_).pivot = DVec3(0.0);
+  place({0, 0, 0});
+  const ParsedObj obj = write();
+  const std::string library = text_of(folder_.file("my model.mtl"));
+  const std::string tinted = "Kd 1 0.7372549 0\nKs 0 0 0\nillum 1\nmap_Kd my model_texture_1.png\n";
+  EXPECT_NE(library.find(tinted), std::string::npos) << library;
+  EXPECT_NE(library.find("map_Kd my model_texture_2.png\nmap_d my model_texture_2.png\n"), std::string::npos);
+  int points = 0;
+  for (std::size_t i = 0; i < obj.faces.size(); ++i) {
+    const auto& face = obj.faces[i];
+    const bool is_leaf = obj.materials[obj.material_of_face[i]].starts_with("leaf_texture_");
+    if (!is_leaf && !obj.materials[obj.material_of_face[i]].starts_with("bark/1_")) continue;
+    const PngImage image =
+        *decode_png(*read_file(folder_.file(is_leaf ? "my model_texture_2.png" : "my model_texture_1.png")));
+    const Direction direction = nearest_direction(obj.normals.at(face[0].normal));
+    for (const auto& [a, b] : {std::pair{0.61, 0.23}, {0.11, 0.57}, {0.29, 0.05}}) {
+      const std::array<double, 3> share = {a, b, 1.0 - a - b};
+      DVec3 at(0.0);
+      std::array<double, 2> uv{};
+      for (std::size_t k = 0; k < 3; ++k) {
+        at += share[k] * obj.positions.at(face[k].position);
+        for (std::size_t c = 0; c < 2; ++c) uv[c] += share[k] * obj.textures.at(face[k].texture)[c];
+      }
+      const IVec3 voxel = voxel_of(at - DVec3(normal_of(direction)) * 0.5);
+      const VoxelFaces& faces = scene_.types[grid.get(voxel)].faces;
+      ASSERT_FALSE(faces.empty());
+      VoxelFace plain = faces[direction];
+      plain.tint = {255, 255, 255};
+      const auto expected = texel_at(plain, direction, at - DVec3(voxel), 0);
+      const auto x = static_cast<std::size_t>((uv[0] - std::floor(uv[0])) * 16);
+      const auto y = static_cast<std::size_t>((1.0 - uv[1] - std::floor(1.0 - uv[1])) * 16);
+      const std::uint8_t* texel = image.pixels.data() + (y * 16 + x) * 4;
+      EXPECT_EQ(linear_colour(Rgba8{texel[0], texel[1], texel[2]}), Vec3(expected[0], expected[1], expected[2]));
+      ++points;
+    }
+  }
+  EXPECT_GT(points, 50);
+  const auto files = mesh_files(meshes_, folder_.file("my model.obj")).value();
+  for (const auto& file : files) EXPECT_TRUE(std::filesystem::exists(file)) << file;
+  EXPECT_EQ(files.size(), folder_.count());
 }
 
 TEST_F(Obj, FailuresLeaveNoFile) {
