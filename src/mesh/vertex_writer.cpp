@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 #include <initializer_list>
+#include <optional>
 #include <utility>
 
 #include <quoin/core/assert.h>
@@ -224,6 +225,23 @@ std::size_t face_of(Direction direction) {
   return static_cast<std::size_t>(direction);
 }
 
+// Returns the axes of textures by [direction][turn + 4 * mirrored].
+const std::array<std::array<TextureFrame, 8>, 6>& texture_frames() {
+  static const std::array<std::array<TextureFrame, 8>, 6> frames = [] {
+    std::array<std::array<TextureFrame, 8>, 6> made{};
+    for (const Direction direction : kDirections) {
+      for (std::uint8_t i = 0; i < 8; ++i) {
+        VoxelFace face;
+        face.turn = i % 4;
+        face.mirrored = i >= 4;
+        made[face_of(direction)][i] = texture_frame(face, direction);
+      }
+    }
+    return made;
+  }();
+  return frames;
+}
+
 // Calls `make(first, count, block)` for blocks of at most `per_block` items with `vertices` vertices each.
 template <class Make>
 void by_blocks(std::size_t count, std::size_t vertices, std::size_t stride, std::byte* out, Make&& make) {
@@ -301,18 +319,69 @@ bool is_whole(Vec3 origin, float low, float high) {
 
 }  // namespace
 
-VertexWriter::VertexWriter(VertexLayout layout, const VoxelRegistry& types) : layout_(std::move(layout)) {
+VertexWriter::VertexWriter(VertexLayout layout, const VoxelRegistry& types, const TextureSet& textures)
+    : layout_(std::move(layout)) {
   QUOIN_ASSERT(some_source_has(layout_), "a layout that can be written");
   colours_.resize(layout_.elements.size());
   for (std::size_t i = 0; i < colours_.size(); ++i) {
     const VertexElement& element = layout_.elements[i];
-    if (element.attribute != VertexAttribute::Colour) continue;
-    colours_[i].reserve(types.size() + 1);
+    const bool is_tint = element.attribute == VertexAttribute::Tint;
+    if (element.attribute != VertexAttribute::Colour && !is_tint) continue;
+    colours_[i].reserve((is_tint ? 6 : 1) * types.size() + 1);
     for (std::size_t type = 0; type < types.size(); ++type) {
-      colours_[i].push_back(encoded(types[static_cast<VoxelType>(type)].colour, element.format));
+      const VoxelProperties& properties = types[static_cast<VoxelType>(type)];
+      if (!is_tint) colours_[i].push_back(encoded(properties.colour, element.format));
+      for (const Direction direction : kDirections) {
+        if (!is_tint) break;
+        Rgba8 tint = properties.colour;
+        if (!properties.faces.empty()) tint = properties.faces[direction].tint;
+        if (!properties.faces.empty()) tint.a = 255;
+        colours_[i].push_back(encoded(tint, element.format));
+      }
     }
     colours_[i].push_back(encoded(Rgba8{255, 255, 255, 255}, element.format));
   }
+  read_faces(types, textures);
+}
+
+void VertexWriter::read_faces(const VoxelRegistry& types, const TextureSet& textures) {
+  const auto has = [&](VertexAttribute attribute) {
+    return std::ranges::any_of(layout_.elements,
+                               [&](const VertexElement& each) { return each.attribute == attribute; });
+  };
+  const auto is_narrow = [](const VertexElement& each) {
+    return each.attribute == VertexAttribute::Texture && each.format == VertexFormat::Uint16;
+  };
+  QUOIN_ASSERT(textures.arrays().size() <= 1 || std::ranges::none_of(layout_.elements, is_narrow),
+               "at most one array for layers of 16 bits");
+  if (!types.has_textures()) return;
+  if (has(VertexAttribute::Texture)) textures_.assign(6 * types.size(), ~std::uint32_t{0});
+  if (has(VertexAttribute::TextureUv)) turns_.assign(6 * types.size(), 0);
+  for (std::size_t type = 1; type < types.size(); ++type) {
+    const VoxelFaces& faces = types[static_cast<VoxelType>(type)].faces;
+    if (faces.empty()) continue;
+    for (const Direction direction : kDirections) {
+      const VoxelFace& face = faces[direction];
+      const std::size_t number = face_number(static_cast<VoxelType>(type), direction);
+      if (!turns_.empty()) turns_[number] = static_cast<std::uint8_t>(face.turn + (face.mirrored ? 4 : 0));
+      const auto layer = textures_.empty() ? std::nullopt : textures.find(face.texture);
+      QUOIN_ASSERT(!layer || layer->layer <= 0xFFFFU, "layers of 16 bits");
+      if (layer) textures_[number] = layer->array << 16 | layer->layer;
+    }
+  }
+}
+
+std::array<std::array<float, 2>, 4> VertexWriter::texture_uvs(const Quad& quad) const {
+  const Direction direction = quad.direction();
+  const std::size_t number = face_number(quad.type(), direction);
+  const std::uint8_t turn = number < turns_.size() ? turns_[number] : std::uint8_t{0};
+  const TextureFrame& frame = texture_frames()[face_of(direction)][turn];
+  const std::array<IVec3, 4> corners = corners_of(quad);
+  std::array<std::array<float, 2>, 4> coordinates{};
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    coordinates[i] = texture_coordinates(frame, Vec3(corners[i] - quad.voxel()));
+  }
+  return coordinates;
 }
 
 void VertexWriter::write(std::span<const Quad> quads, Vec3 origin, std::span<std::byte> out) const {
@@ -348,6 +417,16 @@ void VertexWriter::write_element(std::size_t index, std::span<const Quad> quads,
       return put_numbers(format, PerQuad{column, quads, [](Quad quad) { return quad.type(); }});
     case VertexAttribute::Uv:
       return put_uvs(format, quads, column);
+    case VertexAttribute::Texture:
+      return put_numbers(format,
+                         PerQuad{column, quads, [&](Quad quad) { return texture(quad.type(), quad.direction()); }});
+    case VertexAttribute::TextureUv:
+      return PerCorner{column, quads, [&](Quad quad) { return texture_uvs(quad); }}.put<std::array<float, 2>>(
+          [](const std::array<float, 2>& uv) { return uv; });
+    case VertexAttribute::Tint:
+      return put_encoded(format, PerQuad{column, quads, [&](Quad quad) -> const Colour& {
+                                           return colour(index, face_number(quad.type(), quad.direction()));
+                                         }});
   }
 }
 
@@ -401,7 +480,15 @@ void VertexWriter::write_element(std::size_t index, const MeshView& mesh, std::s
       return write_shading(format, mesh, first, count, column.at);
     case VertexAttribute::Type:
       return put_numbers(format, vertices([&](auto i) { return mesh.types[first + i]; }));
+    case VertexAttribute::Texture:
+      return put_numbers(format,
+                         vertices([&](auto i) { return texture(mesh.types[first + i], mesh.directions[first + i]); }));
+    case VertexAttribute::Tint:
+      return put_encoded(format, vertices([&](auto i) -> const Colour& {
+                           return colour(index, face_number(mesh.types[first + i], mesh.directions[first + i]));
+                         }));
     case VertexAttribute::Uv:
+    case VertexAttribute::TextureUv:
       return;  // no view has any
   }
 }
@@ -450,6 +537,12 @@ bool can_write(const VertexElement& element, VertexSource source) {
       return !is_smooth && is_one_of(format, {Uint16, Uint32});
     case VertexAttribute::Uv:
       return source == VertexSource::Quads && is_one_of(format, {Float32x2, Uint8x2});
+    case VertexAttribute::Texture:
+      return !is_smooth && is_one_of(format, {Uint16, Uint32});
+    case VertexAttribute::TextureUv:
+      return source == VertexSource::Quads && format == Float32x2;
+    case VertexAttribute::Tint:
+      return !is_smooth && is_one_of(format, {Float32x4, Unorm16x4, Unorm8x4, Unorm8x4Srgb});
   }
   return false;
 }

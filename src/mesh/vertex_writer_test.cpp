@@ -116,6 +116,102 @@ TEST(VertexWriter, WritesViewLikeQuads) {
   EXPECT_EQ(found, written(grid, types, writer, SurfaceClass::Opaque).vertices);
 }
 
+AlphaImage noise(int size, unsigned seed) {
+  std::mt19937 random(seed);
+  AlphaImage image{size, size, {}};
+  for (int i = 0; i < 4 * size * size; ++i) {
+    image.rgba.push_back(i % 4 == 3 ? 255 : static_cast<std::uint8_t>(random()));
+  }
+  return image;
+}
+
+// Types with random textures, turns, mirrors and tints, and a plain one.
+VoxelRegistry textured_types() {
+  std::mt19937 random(9);
+  VoxelRegistry types;
+  for (int i = 0; i < 3; ++i) {
+    std::array<VoxelFace, 6> faces;
+    for (VoxelFace& face : faces) {
+      face.texture = Texture::from_image("t", noise(16 << (random() % 2), random() % 4)).value();
+      face.turn = static_cast<std::uint8_t>(random() % 4);
+      face.mirrored = random() % 2 == 0;
+      face.tint = {static_cast<std::uint8_t>(random()), 7, 8, 9};
+    }
+    EXPECT_TRUE(types.add({.name = std::to_string(i), .faces = VoxelFaces(faces)}));
+  }
+  EXPECT_TRUE(types.add({.name = "plain", .colour = {1, 2, 3, 4}}));
+  return types;
+}
+
+TEST(VertexWriter, WritesTexturesOfFaces) {
+  const VoxelRegistry types = textured_types();
+  TextureSet textures;
+  textures.add(types);
+  ASSERT_EQ(textures.arrays().size(), 2U);
+  const VertexLayout layout{16,
+                            {{VertexAttribute::Texture, Uint32, 0},
+                             {VertexAttribute::TextureUv, Float32x2, 4},
+                             {VertexAttribute::Tint, Unorm8x4Srgb, 12}}};
+  ASSERT_TRUE(can_write(layout, VertexSource::Quads) && !can_write(layout, VertexSource::Blocks));
+  const VertexWriter writer(layout, types, textures);
+  Grid grid;
+  std::mt19937 random(2);
+  for (int i = 0; i < 60; ++i) {
+    const IVec3 low(random() % 40, random() % 40, random() % 40);
+    grid.fill_box({low, low + IVec3(1 + random() % 9, 1 + random() % 5, 1 + random() % 7)},
+                  static_cast<VoxelType>(random() % 6));  // 5 is not registered
+  }
+  QuadBuffer quads;
+  BlockyMesher().mesh(grid.neighbourhood({0, 0, 0}), types, {}, quads);
+  std::vector<std::byte> bytes(writer.bytes_needed(vertices_needed(quads.size())));
+  writer.write(quads, Vec3(0.0F), bytes);
+  for (std::size_t i = 0; i < 4 * quads.size(); ++i) {
+    const Quad& quad = quads[i / 4];
+    const std::size_t at = 16 * i;
+    const auto number = read<std::uint32_t>(bytes, at);
+    const auto tint = read<Rgba8>(bytes, at + 12);
+    VoxelFace face;
+    if (quad.type() < 4) {
+      face = types[quad.type()].faces[quad.direction()];
+      ASSERT_EQ(textures[(TextureLayer{number >> 16, number & 0xFFFF})], face.texture);
+      ASSERT_EQ(tint, (Rgba8{face.tint.r, face.tint.g, face.tint.b, 255}));
+    } else {
+      ASSERT_EQ(number, 0xFFFF'FFFFU);
+      ASSERT_EQ(tint, (quad.type() == 4 ? Rgba8{1, 2, 3, 4} : Rgba8{255, 255, 255, 255}));
+    }
+    const IVec3 corner = quad.corner(static_cast<int>(i % 4)) - quad.voxel();
+    const auto expected = texture_coordinates(texture_frame(face, quad.direction()), Vec3(corner));
+    ASSERT_EQ((read<std::array<float, 2>>(bytes, at + 4)), expected);
+  }
+}
+
+TEST(VertexWriter, WritesTexturesOfViewsAndOfOneArray) {
+  VoxelRegistry types;
+  const Texture first = Texture::from_image("a", noise(16, 1)).value();
+  const Texture second = Texture::from_image("b", noise(16, 2)).value();
+  const VoxelFace tinted{.texture = second, .tint = {9, 8, 7, 6}};
+  const VoxelType type = types.add({.name = "block", .faces = {{first}, tinted, {first}}}).value();
+  TextureSet textures;
+  textures.add(types);
+  const VertexLayout layout{6, {{VertexAttribute::Texture, Uint16, 0}, {VertexAttribute::Tint, Unorm8x4Srgb, 2}}};
+  Grid grid;
+  grid.set({1, 2, 3}, type);
+  const auto mesh = build_blocky_mesh(grid, types, {});
+  const MeshView view = view_of(mesh->surfaces[0], SurfaceClass::Opaque);
+  for (const bool has_textures : {false, true}) {
+    const VertexWriter writer = has_textures ? VertexWriter(layout, types, textures) : VertexWriter(layout, types);
+    std::vector<std::byte> bytes(writer.bytes_needed(view.positions.size()));
+    writer.write(view, Vec3(0.0F), bytes);
+    for (std::size_t i = 0; i < view.positions.size(); ++i) {
+      const bool is_top = view.directions[i] == Direction::PosY;
+      const int layer = is_top ? 1 : 0;
+      EXPECT_EQ(read<std::uint16_t>(bytes, 6 * i), has_textures ? layer : 0xFFFF);
+      EXPECT_EQ(read<Rgba8>(bytes, 6 * i + 2), (is_top ? Rgba8{9, 8, 7, 255} : Rgba8{255, 255, 255, 255}));
+    }
+    EXPECT_EQ(bytes, written(grid, types, writer, SurfaceClass::Opaque).vertices);
+  }
+}
+
 TEST(VertexWriter, MatchesLayoutOfStruct) {
   struct Vertex {
     Vec3 position;

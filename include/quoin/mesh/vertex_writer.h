@@ -8,6 +8,7 @@
 
 #include <quoin/core/direction.h>
 #include <quoin/core/vec.h>
+#include <quoin/grid/texture.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/mesh/mesh_view.h>
 #include <quoin/mesh/quad.h>
@@ -28,6 +29,14 @@ enum class VertexAttribute : std::uint8_t {
   Brightness,
   Type,
   Uv,  ///< voxels from the quad's corner 0, along its u and v: 0 to 64. For textures: see QuadVertex::u
+  /// Layer of the face's texture (VoxelProperties::faces) in a TextureSet: TextureLayer::layer, in Uint32 plus
+  /// TextureLayer::array << 16. Faces without a texture have the greatest number of the format.
+  Texture,
+  /// Texture coordinates from the upper left corner, rightwards and downwards, with the face's turn and mirror:
+  /// `texture_coordinates` relative to the quad's voxel, -64 to 64. They repeat with every voxel.
+  TextureUv,
+  /// Tint of the face; for types without textures their colour. The face shows tint times texture.
+  Tint,
 };
 
 /// Memory format of an attribute: native byte order, no padding between components.
@@ -69,6 +78,9 @@ struct VertexElement {
 /// | Brightness | Float32, Unorm8 | |
 /// | Type | Uint16, Uint32 | |
 /// | Uv | Float32x2, Uint8x2 | |
+/// | Texture | Uint16, Uint32 | |
+/// | TextureUv | Float32x2 | |
+/// | Tint | as Colour | 1 for faces with textures, else alpha |
 struct VertexLayout {
   std::uint32_t stride = 0;  ///< bytes per vertex, 1 to kMaxStride
   std::vector<VertexElement> elements;
@@ -79,7 +91,7 @@ struct VertexLayout {
 /// Source of vertices.
 enum class VertexSource : std::uint8_t {
   Quads,        ///< has all attributes
-  Blocks,       ///< MeshView of blocks: all except Uv; positions as floats
+  Blocks,       ///< MeshView of blocks: all except Uv and TextureUv; positions as floats
   SmoothChunk,  ///< SmoothChunkMesh: Position as floats, Normal, Brightness
   Smooth,       ///< MeshView of a smooth mesh: as SmoothChunk, plus Colour
 };
@@ -99,9 +111,11 @@ enum class VertexSource : std::uint8_t {
 /// Faster:   for a layout known at compile time, use `for_each_vertex`.
 class VertexWriter {
  public:
-  /// Copies the types' colours. After a type has changed, make another writer.
-  /// Requires: at least one source can be written in this layout.
-  VertexWriter(VertexLayout layout, const VoxelRegistry& types);
+  /// Copies the types' colours and faces. After a type has changed, make another writer. `textures`: gives the layers of
+  /// VertexAttribute::Texture; faces whose texture it lacks count as faces without one.
+  /// Requires: at least one source can be written in this layout. With Texture in Uint16, `textures` has at most one
+  ///           array.
+  VertexWriter(VertexLayout layout, const VoxelRegistry& types, const TextureSet& textures = TextureSet());
 
   [[nodiscard]] const VertexLayout& layout() const { return layout_; }
   [[nodiscard]] std::size_t bytes_needed(std::size_t vertices) const { return vertices * layout_.stride; }
@@ -128,13 +142,27 @@ class VertexWriter {
                      std::byte* block) const;
   void write_shading(VertexFormat format, const MeshView& mesh, std::size_t first, std::size_t count,
                      std::byte* at) const;
-  [[nodiscard]] const Colour& colour(std::size_t element, VoxelType type) const {
+  // Returns the entry of a type or face; the last one for unregistered types.
+  [[nodiscard]] const Colour& colour(std::size_t element, std::size_t number) const {
     const std::vector<Colour>& colours = colours_[element];
-    return type + std::size_t{1} < colours.size() ? colours[type] : colours.back();
+    return number + 1 < colours.size() ? colours[number] : colours.back();
   }
+  // Returns the number of a face in tables of faces.
+  [[nodiscard]] static std::size_t face_number(VoxelType type, Direction direction) {
+    return std::size_t{6} * type + static_cast<std::size_t>(direction);
+  }
+  [[nodiscard]] std::uint32_t texture(VoxelType type, Direction direction) const {
+    const std::size_t number = face_number(type, direction);
+    return number < textures_.size() ? textures_[number] : ~std::uint32_t{0};
+  }
+  [[nodiscard]] std::array<std::array<float, 2>, 4> texture_uvs(const Quad& quad) const;
+  void read_faces(const VoxelRegistry& types, const TextureSet& textures);
 
   VertexLayout layout_;
-  std::vector<std::vector<Colour>> colours_;  // [element][type]; the last entry is for unregistered types
+  // [element][type], of tints [element][face_number]; the last entry is for unregistered types
+  std::vector<std::vector<Colour>> colours_;
+  std::vector<std::uint32_t> textures_;  // [face_number]; empty if no element needs them
+  std::vector<std::uint8_t> turns_;      // [face_number]: turn + 4 * mirrored; empty if no element needs them
 };
 
 }  // namespace quoin
