@@ -15,6 +15,10 @@ std::optional<float> glass_ior(const VoxelProperties& properties) {
   return properties.ior;
 }
 
+float emission_of(const VoxelProperties& properties) {
+  return properties.emission > 0.0F ? std::min(properties.emission, std::numeric_limits<float>::max() / 4.0F) : 0.0F;
+}
+
 void set_absorption(float alpha, Surface& surface) {
   QUOIN_ASSERT(alpha >= 0.0F && alpha <= 1.0F, "0 <= alpha <= 1");
   // One voxel covers `alpha` of the background and tints the rest. The tint increases with `alpha`.
@@ -34,10 +38,7 @@ Surface surface_of(const VoxelProperties& properties, Clouds clouds) {
   Surface surface;
   const Rgba8 c = properties.colour;
   surface.colour = linear_colour(c);
-  // Clamps infinite emission; negative values and NaN emit no light.
-  const float emission =
-      properties.emission > 0.0F ? std::min(properties.emission, std::numeric_limits<float>::max() / 4.0F) : 0.0F;
-  surface.emitted = surface.colour * emission;
+  surface.emitted = surface.colour * emission_of(properties);
   surface.roughness = properties.roughness >= 0.0F ? std::min(properties.roughness, 1.0F) : 1.0F;
   surface.metalness = properties.metalness >= 0.0F ? std::min(properties.metalness, 1.0F) : 0.0F;
   if (properties.visibility != Visibility::Transparent) return surface;

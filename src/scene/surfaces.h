@@ -33,6 +33,9 @@ struct Surface {
 /// is invalid: less than that of air, infinite or NaN.
 [[nodiscard]] std::optional<float> glass_ior(const VoxelProperties& properties);
 
+/// Returns the emission of a type, as a multiple of its colour: 0 for negative values and NaN, finite.
+[[nodiscard]] float emission_of(const VoxelProperties& properties);
+
 /// Sets the transmittance per voxel length of a transparent surface from its colour and alpha.
 void set_absorption(float alpha, Surface& surface);
 

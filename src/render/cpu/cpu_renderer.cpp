@@ -211,6 +211,7 @@ void Tile::add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, st
   const bool is_far = (far_faces_.found >> lane & 1U) != 0;
   point.is_blended = point.in_field && point.kind == PointKind::Surface;
   if (!is_far) return;
+  point.is_far = true;
   QUOIN_ASSERT(far_faces_.face[i] != nullptr, "a lane that found a far face");
   if (point.in_field) {
     point.position = far_faces_.start_of_light(i, point.position);
@@ -439,9 +440,11 @@ Result<RenderedImage> CpuRenderer::render(const Camera& camera, const RenderOpti
   const CameraRays rays(camera, options.width, options.height);
   const std::shared_ptr<const LampTable> lamps =
       impl_of(impl_).lamp_table(options.light, environment.lamp_brightness, threads);
-  const Lighting lighting(view, impl_of(impl_).scene->types, impl_of(impl_).surfaces, options.light, environment,
-                          lamps.get(), options.detail.colours,
-                          impl_of(impl_).levels_of(view.tracer(), options.light, threads));
+  Lighting lighting(view, impl_of(impl_).scene->types, impl_of(impl_).surfaces, options.light, environment, lamps.get(),
+                    options.detail.colours, impl_of(impl_).levels_of(view.tracer(), options.light, threads));
+  if (impl_of(impl_).scene->types.has_textures()) {
+    lighting.show_textures(glm::length(rays.down()) / std::sqrt(options.samples), rays.is_perspective());
+  }
   const TileContext context{&view, &rays, &lighting, &options, subject.impostors ? &*subject.impostors : nullptr};
   RenderedImage image = empty_image(options);
   if (Status drawn = draw_tiles<Tile>(context, options, threads, progress, image); !drawn) return drawn.error();

@@ -5,6 +5,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include <glm/geometric.hpp>
@@ -117,6 +118,7 @@ Lighting::Lighting(const SceneView& view, const VoxelRegistry& types, const Surf
       daylight_(daylight_of(environment)) {
   QUOIN_ASSERT(check(options).has_value() && check(environment).has_value(), "options that `check` accepts");
   QUOIN_ASSERT(!is_propagated() || levels_.size() == placed_in(view.tracer()).size(), "levels of each placed grid");
+  has_other_surfaces_ = detail_colours;
   const DVec3 sun = environment.sun.unit_direction();
   for (const PlacedGrid& placed : placed_in(view.tracer())) {
     if (detail_colours) detail_surfaces_.emplace_back().colour = colour_of_detail(placed.detail, placed.level);
@@ -505,10 +507,11 @@ void Lighting::set_occlusion_directions(const Group& group, int ray, RayPacket& 
 }
 
 Surface Lighting::surface_at(const SurfacePoint& point) const {
-  const bool is_bare = point.in_field && point.type == kAir;
   const auto placed = static_cast<std::size_t>(point.placed);
   QUOIN_ASSERT(placed < frames_.size(), "one of the placed grids");
-  if (!detail_surfaces_.empty() && !is_bare) return detail_surfaces_[placed];
+  if (has_other_surfaces_) {
+    if (const std::optional<Surface> other = other_surface_at(point)) return *other;
+  }
   if (point.is_blended) {
     const DensityGrid& field = placed_in(view_->tracer())[placed].opaque_field->field();
     const DVec3 at = point.position - double{point.lift} * DVec3(point.normal);
@@ -516,6 +519,37 @@ Surface Lighting::surface_at(const SurfacePoint& point) const {
     return surfaces_->blend_of_field(field, cell, at - DVec3(cell), point.type);
   }
   return point.in_field ? surfaces_->of_field(point.type) : (*surfaces_)[point.type];
+}
+
+void Lighting::show_textures(double spacing, bool is_perspective) {
+  QUOIN_ASSERT(spacing > 0.0, "a positive distance of samples");
+  texel_spacing_ = spacing;
+  is_perspective_ = is_perspective;
+  has_other_surfaces_ = true;
+}
+
+// Not inlined: the loop over unlit points stays small.
+__attribute__((noinline)) std::optional<Surface> Lighting::other_surface_at(const SurfacePoint& point) const {
+  const bool is_bare = point.in_field && point.type == kAir;
+  if (!detail_surfaces_.empty() && !is_bare) return detail_surfaces_[static_cast<std::size_t>(point.placed)];
+  const bool shows_type = !(texel_spacing_ > 0.0) || point.in_field || point.is_far || point.type >= types_->size();
+  if (shows_type || !types_->is_opaque(point.type) || voxels_per_cell(point.placed) != 1.0) return std::nullopt;
+  const VoxelFaces& faces = (*types_)[point.type].faces;
+  if (faces.empty()) return std::nullopt;
+  return textured_surface(point, faces[point.face]);
+}
+
+Surface Lighting::textured_surface(const SurfacePoint& point, const VoxelFace& face) const {
+  const double distance =
+      is_perspective_ ? glm::length(view_->view_from_grid(point.placed).point(point.position)) : 1.0;
+  const PlacedGrid& placed = placed_in(view_->tracer())[static_cast<std::size_t>(point.placed)];
+  const double texels = texel_spacing_ * distance / placed.voxel_size * face.texture.size();
+  const int level = texels > 1.0 ? std::ilogb(texels * std::numbers::sqrt2) : 0;
+  const auto texel = texel_at(face, point.face, point.position - DVec3(point.voxel), level);
+  Surface surface = (*surfaces_)[point.type];
+  surface.colour = {texel[0], texel[1], texel[2]};
+  surface.emitted = surface.colour * emission_of((*types_)[point.type]);
+  return surface;
 }
 
 Vec3 Lighting::normal_colour(const SurfacePoint& point) const {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -32,6 +33,7 @@ struct SurfacePoint {
   VoxelType type = kAir;
   Direction face = Direction::PosX;  ///< fields: the direction nearest to the normal
   bool in_field = false;
+  bool is_far = false;      ///< of an impostor, which has no textures
   bool is_blended = false;  ///< fields: a blend of the materials around, as Surfaces::blend_of_field
   Vec3 normal{0.0F};        ///< of a field, in its grid, of unit length or 0
   float lift = 0.0F;        ///< of a field: height of the position above the surface, along the normal
@@ -58,6 +60,14 @@ class Lighting {
   Lighting(const SceneView& view, const VoxelRegistry& types, const Surfaces& surfaces, const LightOptions& options,
            const Environment& environment, const LampTable* lamps = nullptr, bool detail_colours = false,
            std::vector<GridLight> levels = {});
+
+  /// Shows the textures of opaque types (VoxelProperties::faces) instead of their mean colours, except on halved grids
+  /// and impostors. `spacing`: the distance of an image's samples in world units; with `is_perspective` at distance 1
+  /// from the view's origin.
+  ///
+  /// Filter: the nearest texel of the mipmap level whose texels are nearest in size to the samples' distance.
+  /// Requires: `spacing` is positive.
+  void show_textures(double spacing, bool is_perspective);
 
   /// Computes the linear light of each point, not clamped. Returns the number of rays traced.
   ///
@@ -100,6 +110,9 @@ class Lighting {
   std::int64_t trace_openness(const Group& group, std::uint32_t lanes, std::span<float> openness) const;
   void set_occlusion_directions(const Group& group, int ray, RayPacket& rays) const;
   [[nodiscard]] Surface surface_at(const SurfacePoint& point) const;
+  // Returns the surface of a point that does not show its type's: of coarse detail, or textured.
+  [[nodiscard]] std::optional<Surface> other_surface_at(const SurfacePoint& point) const;
+  [[nodiscard]] Surface textured_surface(const SurfacePoint& point, const VoxelFace& face) const;
   [[nodiscard]] Vec3 shade(const SurfacePoint& point, Vec3 direct, float openness) const;
   [[nodiscard]] Vec3 shade_lit(const SurfacePoint& point, Vec3 direct, float openness) const;
   // Returns the sun's diffuse term without shadows.
@@ -116,6 +129,9 @@ class Lighting {
   OcclusionDirections directions_;
   std::vector<Frame> frames_;
   std::vector<Surface> detail_surfaces_;  // of each placed grid; empty where types have their own colours
+  bool has_other_surfaces_ = false;       // with `detail_surfaces_` or textures
+  double texel_spacing_ = 0.0;            // see `show_textures`; 0: no textures
+  bool is_perspective_ = false;
   std::vector<GridLight> levels_;
   LightLook look_;
   float exposure_ = 1.0F;

@@ -1,0 +1,215 @@
+// Textures in ray-traced images: each pixel of an unlit image is compared with the texel of its face.
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+
+#include "render/cpu/render_test_support.h"
+
+namespace quoin {
+namespace {
+
+using namespace render_test;
+
+Texture random_texture(int size, unsigned seed) {
+  std::mt19937 random(seed);
+  AlphaImage image{size, size, {}};
+  for (int i = 0; i < 4 * size * size; ++i) {
+    image.rgba.push_back(i % 4 == 3 ? 255 : static_cast<std::uint8_t>(random()));
+  }
+  return Texture::from_image("noise", image).value();
+}
+
+VoxelFaces random_faces(unsigned seed) {
+  std::mt19937 random(seed);
+  std::array<VoxelFace, 6> faces;
+  for (VoxelFace& face : faces) {
+    face.texture = random_texture(16 << (random() % 3), seed + random() % 3);
+    face.turn = static_cast<std::uint8_t>(random() % 4);
+    face.mirrored = random() % 2 == 0;
+    if (random() % 2 == 0) face.tint = {255, 100, 30, 255};
+  }
+  return VoxelFaces(faces);
+}
+
+RenderOptions unlit(int width, int height) {
+  RenderOptions options = sized(width, height);
+  options.light.shading = Shading::Unlit;
+  return options;
+}
+
+// A parallel view of a face direction, `size` voxels wide and high, centred on `at`.
+Camera facing(Direction direction, DVec3 at, double size) {
+  const FaceFrame& frame = frame_of(direction);
+  Camera camera;
+  camera.forward = -DVec3(normal_of(direction));
+  camera.position = at - camera.forward * 40.0;
+  camera.up = DVec3(0.0);
+  camera.up[frame.u] = 1.0;
+  camera.right = glm::cross(camera.forward, camera.up);
+  camera.projection = Camera::Projection::Orthographic;
+  camera.view_height = size;
+  return camera;
+}
+
+Pixel shown(const VoxelFace& face, Direction direction, DVec3 inside, int level) {
+  const auto texel = texel_at(face, direction, inside, level);
+  return encoded({texel[0], texel[1], texel[2]});
+}
+
+TEST(RenderTextures, ShowsNearestTexelsOnAllSides) {
+  constexpr int kPixels = 192;
+  constexpr double kWidth = 3.0;
+  Scene scene;
+  VoxelProperties properties;
+  properties.faces = random_faces(7);
+  const VoxelType type = scene.types.add(properties).value();
+  Grid grid;
+  grid.fill_box({{-1, -1, -1}, {2, 2, 2}}, type);
+  place(scene, std::move(grid));
+  for (const Direction direction : kDirections) {
+    const Camera camera = facing(direction, DVec3(0.5), kWidth);
+    const RenderedImage image = taken(scene, camera, unlit(kPixels, kPixels));
+    const VoxelFace& face = scene.types[type].faces[direction];
+    int wrong = 0;
+    for (int y = 0; y < kPixels; ++y) {
+      for (int x = 0; x < kPixels; ++x) {
+        DVec3 at = DVec3(0.5) + DVec3(normal_of(direction)) * 1.5 +
+                   camera.right * (((x + 0.5) / kPixels - 0.5) * kWidth) -
+                   camera.up * (((y + 0.5) / kPixels - 0.5) * kWidth);
+        const DVec3 inside = at - glm::floor(at - DVec3(normal_of(direction)) * 0.5);
+        wrong += pixel_at(image, x, y) == shown(face, direction, inside, 0) ? 0 : 1;
+      }
+    }
+    EXPECT_EQ(wrong, 0) << name_of(direction);
+  }
+}
+
+TEST(RenderTextures, FollowsMirroredTurnedAndScaledGrids) {
+  Scene scene;
+  VoxelProperties properties;
+  properties.faces = random_faces(8);
+  const VoxelType type = scene.types.add(properties).value();
+  Grid grid;
+  grid.set({3, 4, 5}, type);
+  const InstanceHandle handle = place(scene, std::move(grid), {1e9, 0, 0});
+  Instance& moved = scene.edit(handle);
+  moved.voxel_size = 0.25;
+  moved.mirrored = true;
+  moved.rotation = glm::angleAxis(0.7, glm::normalize(DVec3(1, 2, 3)));
+  const CpuRenderer renderer(scene);
+  for (const Direction direction : kDirections) {
+    const VoxelFace& face = scene.types[type].faces[direction];
+    const auto world = [&](const DVec3& in_grid) { return world_from_grid(moved, scene.grids()[moved.grid], in_grid); };
+    const DVec3 normal(normal_of(direction));
+    const FaceFrame& frame = frame_of(direction);
+    for (const auto& [u, v] : {std::pair{0.21, 0.34}, {0.77, 0.09}, {0.52, 0.93}}) {
+      DVec3 inside = DVec3(0.5) + normal * 0.5;
+      inside[frame.u] = u;
+      inside[frame.v] = v;
+      const DVec3 at = world(DVec3(3, 4, 5) + inside);
+      const DVec3 eye = world(DVec3(3, 4, 5) + inside + normal * 3.0);
+      const auto image = renderer.render(towards(eye, at, 0.01), unlit(9, 9));
+      ASSERT_TRUE(image);
+      EXPECT_EQ(pixel_at(*image, 4, 4), shown(face, direction, inside, 0)) << name_of(direction);
+    }
+  }
+}
+
+TEST(RenderTextures, ChoosesMipmapsByDistanceAndSamples) {
+  Scene scene;
+  VoxelProperties properties;
+  properties.faces = random_texture(64, 3);
+  const VoxelType type = scene.types.add(properties).value();
+  Grid grid;
+  grid.fill_box({{-200, 0, -200}, {200, 1, 200}}, type);
+  place(scene, std::move(grid));
+  const VoxelFace& face = scene.types[type].faces[Direction::PosY];
+  for (int level = 0; level <= 7; ++level) {
+    // Each pixel is 2^level texels wide; the middle of the image lies in the middle of a texel of that level.
+    const double pixel = std::ldexp(1.0 / 64, level);
+    const DVec3 at{0.5 + pixel / 2, 1.0, 0.5 - pixel / 2};
+    const DVec3 inside = at - glm::floor(DVec3(at.x, 0.0, at.z));
+    const Pixel expected = shown(face, Direction::PosY, inside, level);
+    const Camera flat = from_above(at.x, 30, at.z, 5 * pixel);
+    EXPECT_EQ(pixel_at(taken(scene, flat, unlit(5, 5)), 2, 2), expected) << level;
+    const double height = 5 * pixel / (2.0 * std::tan(0.4));
+    Camera perspective = flat;
+    perspective.projection = Camera::Projection::Perspective;
+    perspective.vertical_fov_radians = 0.8;
+    perspective.position.y = 1.0 + height;
+    EXPECT_EQ(pixel_at(taken(scene, perspective, unlit(5, 5)), 2, 2), expected) << level;
+  }
+  // The colour of a pixel with many samples is the mean of its texels.
+  RenderOptions many = unlit(3, 3);
+  many.samples = 256;
+  const Pixel smooth = pixel_at(taken(scene, from_above(0.5, 30, 0.5, 3.0), many), 1, 1);
+  const Pixel mean = encoded(face.texture.mean());
+  for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(smooth[c], mean[c], 4);
+}
+
+TEST(RenderTextures, TintsLightAndEmission) {
+  Scene scene;
+  VoxelProperties properties;
+  properties.emission = 0.5F;
+  properties.faces = VoxelFace{.texture = random_texture(16, 5), .tint = {255, 0, 128, 255}};
+  const VoxelType type = scene.types.add(properties).value();
+  Grid grid;
+  grid.set({0, 0, 0}, type);
+  place(scene, std::move(grid));
+  RenderOptions options = sized(16, 16);
+  options.light.occlusion_mode = OcclusionMode::Off;
+  options.light.max_lamps = 0;
+  const Camera camera = from_above(0.5, 30, 0.5, 1.0);
+  const RenderedImage image = taken(scene, camera, options);
+  // A plain voxel shows the light that a colour receives.
+  Scene plain;
+  Grid block;
+  block.set({0, 0, 0}, add_type(plain, {255, 255, 255, 255}));
+  place(plain, std::move(block));
+  RenderOptions dim = options;
+  const Pixel white = pixel_at(taken(plain, camera, dim), 8, 8);
+  const Vec3 light{linear_from_srgb(white[0]), linear_from_srgb(white[1]), linear_from_srgb(white[2])};
+  for (int y = 0; y < 16; ++y) {
+    for (int x = 0; x < 16; ++x) {
+      const auto texel =
+          texel_at(scene.types[type].faces[Direction::PosY], Direction::PosY, {(x + 0.5) / 16, 1.0, (y + 0.5) / 16}, 0);
+      const Vec3 colour(texel[0], texel[1], texel[2]);
+      const Pixel expected = encoded(glm::min(colour * (light + 0.5F), Vec3(1.0F)));
+      const Pixel found = pixel_at(image, x, y);
+      for (std::size_t c = 0; c < 3; ++c) ASSERT_NEAR(found[c], expected[c], 2) << x << ' ' << y;
+    }
+  }
+}
+
+TEST(RenderTextures, ShowsMeansOfGlassAndCoarseGrids) {
+  Scene scene;
+  VoxelProperties properties;
+  properties.faces = random_texture(16, 5);
+  const VoxelType type = scene.types.add(properties).value();
+  Grid grid;
+  grid.fill_box({{-64, 0, -64}, {64, 2, 64}}, type);
+  place(scene, std::move(grid));
+  const Rgba8 mean = scene.types[type].colour;
+  RenderOptions options = unlit(3, 3);
+  options.detail.policy = DetailPolicy{.rule = DetailPolicy::Rule::ByPixels, .voxel_pixels = 1e6, .cell_pixels = 1e6};
+  EXPECT_EQ(pixel_at(taken(scene, from_above(0.3, 30, 0.4, 1.0), options), 1, 1), (Pixel{mean.r, mean.g, mean.b}));
+  // The registry gives a textured type the colour that images without textures show.
+  properties.visibility = Visibility::Transparent;
+  scene.types.replace(type, properties);
+  Scene plain;
+  VoxelProperties glass = scene.types[type];
+  glass.faces = {};
+  Grid same;
+  same.fill_box({{-64, 0, -64}, {64, 2, 64}}, plain.types.add(glass).value());
+  place(plain, std::move(same));
+  const Camera camera = towards({5, 9, 20}, {0, 0, 0});
+  EXPECT_EQ(taken(scene, camera, sized(40, 30)).colour.rgb, taken(plain, camera, sized(40, 30)).colour.rgb);
+}
+
+}  // namespace
+}  // namespace quoin
