@@ -183,9 +183,22 @@ Result<const FormatDriver*> driver_for_saving(const std::filesystem::path& path)
   return &driver_of(format->format);
 }
 
-/// Adds warnings of the loaded file's data that the saved file lacks.
+/// Returns the number of types with textures.
+std::size_t textured_types(const VoxelRegistry& types) {
+  std::size_t count = 0;
+  for (std::size_t type = 1; types.has_textures() && type < types.size(); ++type) {
+    count += types[static_cast<VoxelType>(type)].faces.empty() ? 0 : 1;
+  }
+  return count;
+}
+
+/// Adds warnings of textures, and of the loaded file's data, that the saved file lacks.
 void add_lost_data(const FormatDriver& driver, const FormatOutput& output, const std::filesystem::path& path,
                    std::vector<std::string>& warnings) {
+  const std::size_t textured = driver.info.can(FormatCapability::Faces) ? 0 : textured_types(output.scene.types);
+  if (textured > 0) {
+    warnings.push_back("textures of types left out, their mean colours are kept: " + std::to_string(textured));
+  }
   if (driver.reports_loaded_data) return;
   std::ranges::move(lost_with_source(output), std::back_inserter(warnings));
   std::ranges::move(lost_views(output, driver.info, path), std::back_inserter(warnings));

@@ -12,7 +12,7 @@ namespace {
 
 constinit const FormatDriver kWorldFormat = {
     .info = {FileFormat::World, ".quoin", "Quoin world, can be larger than memory",
-             FormatCapability::Read | FormatCapability::Write | FormatCapability::Fields |
+             FormatCapability::Read | FormatCapability::Write | FormatCapability::Fields | FormatCapability::Faces |
                  FormatCapability::Environment | FormatCapability::Camera | FormatCapability::Cameras},
     .detect = is_world_format,
     .source = FormatDriver::Source::Path,

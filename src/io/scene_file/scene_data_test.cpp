@@ -304,6 +304,114 @@ TEST(SceneData, RejectsLightAndOcclusionOutOfRange) {
             "types[2].occludes: must be false for a transparent type");
 }
 
+Texture random_texture(const std::string& name, int size, unsigned seed, bool with_alpha) {
+  std::mt19937 random(seed);
+  AlphaImage image{size, size, {}};
+  for (int i = 0; i < 4 * size * size; ++i) {
+    image.rgba.push_back(i % 4 == 3 && !with_alpha ? 255 : static_cast<std::uint8_t>(random()));
+  }
+  return Texture::from_image(name, image).value();
+}
+
+VoxelProperties textured_type() {
+  VoxelProperties type{.name = "window", .visibility = Visibility::Transparent};
+  const Texture frame = random_texture("frame", 32, 1, false);
+  const Texture pane = random_texture("pane \xff", 16, 2, true);
+  type.faces = VoxelFaces(std::array<VoxelFace, 6>{VoxelFace{.texture = frame, .turn = 3},
+                                                   {.texture = frame, .mirrored = true},
+                                                   {.texture = frame, .tint = {1, 2, 3, 4}},
+                                                   {.texture = pane, .alpha = FaceAlpha::Cutout},
+                                                   {.texture = pane, .alpha = FaceAlpha::Translucent},
+                                                   {.texture = frame}});
+  return type;
+}
+
+TEST(SceneData, KeepsTextures) {
+  Scene scene = scene_of(Grid());
+  ASSERT_TRUE(scene.types.add({.name = "wall", .faces = random_texture("wall", 16, 3, false)}));
+  ASSERT_TRUE(scene.types.add(textured_type()));
+  const std::string text = text_of(scene);
+  EXPECT_NE(text.find("\"quoin_scene\": 8"), std::string::npos);
+  const auto loaded = read(text);
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  ASSERT_EQ(loaded->scene.types.size(), scene.types.size());
+  for (VoxelType type = 1; type < scene.types.size(); ++type) {
+    EXPECT_EQ(loaded->scene.types[type], scene.types[type]) << scene.types[type].name;
+  }
+  EXPECT_EQ(text_of(loaded->scene), text);
+  const TestFolder folder("scene_textures");
+  for (const char* name : {"a.json", "a.quoin"}) {
+    ASSERT_TRUE(unsupported_features(scene, folder.file(name)).value().empty()) << name;
+    const auto saved = save_scene(scene, folder.file(name));
+    ASSERT_TRUE(saved) << to_string(saved.error());
+    EXPECT_TRUE(saved->warnings.empty());
+    const auto again = load_scene(folder.file(name));
+    ASSERT_TRUE(again) << to_string(again.error());
+    ASSERT_EQ(again->scene.types.size(), scene.types.size());
+    EXPECT_EQ(again->scene.types[4], scene.types[4]) << name;
+  }
+}
+
+TEST(SceneData, NamesTexturesThatAFormatLacks) {
+  Scene scene = scene_of(Grid());
+  ASSERT_TRUE(scene.types.add({.name = "wall", .faces = random_texture("wall", 16, 3, false)}));
+  Grid grid;
+  grid.set({0, 0, 0}, 3);
+  const GridHandle handle = scene.add_grid({.grid = std::move(grid)});
+  scene.add_instance({.grid = handle});
+  const TestFolder folder("scene_textures");
+  const std::string line = "textures of types left out, their mean colours are kept: 1";
+  for (const char* name : {"a.vox", "a.qb"}) {
+    const auto warnings = unsupported_features(scene, folder.file(name)).value();
+    EXPECT_EQ(std::ranges::count(warnings, line), 1) << name;
+    const auto saved = save_scene(scene, folder.file(name));
+    ASSERT_TRUE(saved) << to_string(saved.error());
+    EXPECT_EQ(std::ranges::count(saved->warnings, line), 1) << name;
+  }
+}
+
+// Replaces a piece of the text of a scene with textures, and returns the reader's error.
+std::string error_after(const std::string& from, const std::string& to) {
+  Scene scene;
+  EXPECT_TRUE(scene.types.add(textured_type()));
+  std::string text = text_of(scene);
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  text.replace(at, from.size(), to);
+  const auto loaded = read(text);
+  return loaded ? "" : loaded.error().message;
+}
+
+TEST(SceneData, RefusesInvalidTexturesWithTheirPosition) {
+  const std::string faces = "types[0].faces";
+  EXPECT_EQ(error_after("\"size\":32", "\"size\":31"),
+            faces +
+                ".textures[0]: cannot use texture \"frame\": its sides must be equal, and 16, 32, 64, 128, 256, 512 "
+                "or 1024 texels long, not 31 x 31 texels");
+  EXPECT_EQ(error_after("\"size\":32", "\"size\":64"),
+            faces + ".textures[0]: cannot use texture \"frame\": it must have 4 bytes for each of its 64 x 64 texels");
+  EXPECT_EQ(error_after("\"size\":32", "\"size\":-1"),
+            faces + ".textures[0].size: must be a whole number from 0 to 1024");
+  EXPECT_EQ(error_after("\"size\":32,", ""), faces + ".textures[0]: \"size\" is missing");
+  EXPECT_EQ(error_after("\"texels\":\"", "\"texels\":\"*"),
+            faces + ".textures[0].texels: the base64 text is cut off: its length is not a multiple of 4");
+  EXPECT_EQ(error_after("\"texture\":1", "\"texture\":2"),
+            faces + ".sides[3].texture: must be an index into textures, from 0");
+  EXPECT_EQ(error_after("\"turn\":3", "\"turn\":4"), faces + ".sides[0].turn: must be a whole number from 0 to 3");
+  EXPECT_EQ(error_after("\"tint\":[1,2,3,4]", "\"tint\":[1,2,3]"),
+            faces + ".sides[2].tint: must be a list of 4 numbers");
+  EXPECT_EQ(error_after("\"alpha\":\"cutout\"", "\"alpha\":\"no\""),
+            faces + ".sides[3].alpha: must be one of opaque, cutout, translucent");
+  EXPECT_EQ(error_after("{\"texture\":0,\"turn\":3},", ""), faces + ".sides: must be a list of 6 faces");
+  EXPECT_EQ(
+      error_after("\"visibility\":\"transparent\"", "\"visibility\":\"opaque\""),
+      faces + ": cannot use voxel type \"window\": faces: the face -Y is not opaque, which needs a transparent type");
+  EXPECT_EQ(error_after(",\"alpha\":\"translucent\"", ""),
+            faces +
+                ": cannot use voxel type \"window\": faces: the face +Z is opaque, but its texture \"pane \xff\" has "
+                "transparent texels");
+}
+
 TEST(SceneData, RejectsMoreThan32StateBits) {
   std::string text = text_of(scene_of(Grid()));
   const std::string wanted = "\"state_bits\":2";

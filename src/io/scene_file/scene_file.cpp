@@ -343,7 +343,7 @@ std::vector<std::filesystem::path> files_named_in_scene(const DetectedFile& from
 
 extern constinit const FormatDriver kSceneFormat = {
     .info = {FileFormat::Scene, ".json", "Quoin scene file",
-             FormatCapability::Read | FormatCapability::Write | FormatCapability::Fields |
+             FormatCapability::Read | FormatCapability::Write | FormatCapability::Fields | FormatCapability::Faces |
                  FormatCapability::Environment | FormatCapability::Camera},
     .detect = is_scene_file,
     .read = read_scene_file,

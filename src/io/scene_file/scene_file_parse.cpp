@@ -221,7 +221,7 @@ constexpr std::size_t kMaxBytes = std::size_t{64} << 20;
 constexpr int kMaxDepth = 32;
 constexpr std::size_t kMaxFiles = 65'536;
 constexpr std::size_t kMaxInstances = std::size_t{1} << 22;
-constexpr int kVersion = 7;
+constexpr int kVersion = 8;
 
 SceneFile::Source source_of(const Json& json, const Place& place, Faults& faults) {
   const Object object(json, place, {"id", "path"}, faults);

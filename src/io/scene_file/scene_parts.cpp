@@ -148,6 +148,9 @@ constexpr std::array<std::pair<const char*, SkyModel>, 5> kSkies = {{{"fixed", S
 constexpr std::array<std::pair<const char*, ToneCurve>, 4> kTones = {
     {{"clamp", ToneCurve::Clamp}, {"neutral", ToneCurve::Neutral}, {"agx", ToneCurve::Agx}, {"aces", ToneCurve::Aces}}};
 
+constexpr std::array<std::pair<const char*, FaceAlpha>, 3> kFaceAlphas = {
+    {{"opaque", FaceAlpha::Opaque}, {"cutout", FaceAlpha::Cutout}, {"translucent", FaceAlpha::Translucent}}};
+
 template <class T, std::size_t kCount>
 const char* name_of(const std::array<std::pair<const char*, T>, kCount>& names, T value) {
   const char* found = nullptr;
@@ -321,6 +324,39 @@ OrderedJson PartWriter::text(const std::string& bytes) {
   return {{"base64", to_base64(std::as_bytes(std::span(bytes)))}};
 }
 
+OrderedJson PartWriter::json_of(const Texture& texture) {
+  const std::size_t channels = texture.is_opaque() ? 3 : 4;
+  std::vector<std::byte> bytes;
+  bytes.reserve(channels * texture.level(0).size());
+  for (const Rgba8 texel : texture.level(0)) {
+    const std::array<std::uint8_t, 4> values = {texel.r, texel.g, texel.b, texel.a};
+    for (std::size_t i = 0; i < channels; ++i) bytes.push_back(std::byte{values[i]});
+  }
+  return {{"name", text(texture.name())}, {"size", texture.size()}, {"texels", to_base64(bytes)}};
+}
+
+OrderedJson PartWriter::json_of(const VoxelFaces& faces) {
+  QUOIN_ASSERT(!faces.empty(), "textured faces");
+  OrderedJson json = OrderedJson::object();
+  std::vector<Texture> textures;
+  for (const Direction direction : kDirections) {
+    const VoxelFace& face = faces[direction];
+    auto known = std::ranges::find(textures, face.texture);
+    if (known == textures.end()) {
+      json["textures"].push_back(json_of(face.texture));
+      known = textures.insert(textures.end(), face.texture);
+    }
+    OrderedJson each = {{"texture", known - textures.begin()}};
+    if (face.turn != 0) each["turn"] = face.turn;
+    if (face.mirrored) each["mirrored"] = true;
+    const Rgba8 tint = face.tint;
+    if (!(tint == VoxelFace{}.tint)) each["tint"] = {tint.r, tint.g, tint.b, tint.a};
+    if (face.alpha != FaceAlpha::Opaque) each["alpha"] = name_of(kFaceAlphas, face.alpha);
+    json["sides"].push_back(std::move(each));
+  }
+  return json;
+}
+
 OrderedJson PartWriter::json_of(const VoxelProperties& type) {
   const VoxelProperties plain;
   OrderedJson json = OrderedJson::object();
@@ -342,6 +378,7 @@ OrderedJson PartWriter::json_of(const VoxelProperties& type) {
   if (type.occludes) json["occludes"] = *type.occludes;
   if (type.light_cost != 0) json["light_cost"] = type.light_cost;
   if (type.remesh_on_data) json["remesh_on_data"] = true;
+  if (!type.faces.empty()) json["faces"] = json_of(type.faces);
   for (const auto& [key, value] : type.attributes) json["attributes"].push_back({text(key), text(value)});
   return json;
 }
@@ -437,11 +474,81 @@ OrderedJson PartWriter::json_of(const Environment& environment) {
   return writer.json_of(environment, Environment::natural());
 }
 
+namespace {
+
+// Reads a whole number from 0 to `most`.
+std::size_t small_number(const Object& object, std::string_view key, std::size_t most, std::size_t usual) {
+  const Json* number = object.find(key);
+  if (number == nullptr) return usual;
+  if (number->is_number_unsigned() && *number <= most) return number->get<std::size_t>();
+  object.faults().add(object.place_of(key), "must be a whole number from 0 to " + std::to_string(most));
+  return usual;
+}
+
+Texture texture_of(const Json& json, const Place& place, Faults& faults) {
+  const Object object(json, place, {"name", "size", "texels"}, faults);
+  std::string name;
+  object.read_text("name", name);
+  const auto size = static_cast<int>(small_number(object, "size", kMaxTextureSize, 0));
+  const Json* texels = object.need("texels");
+  if (texels == nullptr || object.need("size") == nullptr || faults.error()) return {};
+  const auto bytes = from_base64(object.text(*texels, object.place_of("texels")));
+  if (!bytes) {
+    faults.add(object.place_of("texels"), bytes.error().message);
+    return {};
+  }
+  const std::size_t count = static_cast<std::size_t>(size) * static_cast<std::size_t>(size);
+  const std::size_t channels = bytes->size() == 3 * count ? 3 : 4;
+  AlphaImage image{size, size, {}};
+  if (bytes->size() == channels * count) image.rgba.resize(4 * count, 255);
+  for (std::size_t i = 0; i < image.rgba.size(); ++i) {
+    if (i % 4 < channels) image.rgba[i] = std::to_integer<std::uint8_t>((*bytes)[i / 4 * channels + i % 4]);
+  }
+  auto texture = Texture::from_image(std::move(name), image);
+  if (!texture) faults.add(place, texture.error().message);
+  return texture ? *texture : Texture();
+}
+
+VoxelFace face_of(const Json& json, const Place& place, const std::vector<Texture>& textures, Faults& faults) {
+  const Object object(json, place, {"texture", "turn", "mirrored", "tint", "alpha"}, faults);
+  VoxelFace face;
+  const std::size_t texture = small_number(object, "texture", 5, 0);
+  if (texture < textures.size()) {
+    face.texture = textures[texture];
+  } else {
+    faults.add(object.place_of("texture"), "must be an index into textures, from 0");
+  }
+  face.turn = static_cast<std::uint8_t>(small_number(object, "turn", 3, 0));
+  object.read("mirrored", face.mirrored);
+  if (const Json* tint = object.find("tint")) {
+    const std::vector<int> c = object.whole_numbers(*tint, object.place_of("tint"), 4, 0, 255);
+    const auto channel = [&](std::size_t i) { return static_cast<std::uint8_t>(c[i]); };
+    face.tint = {channel(0), channel(1), channel(2), channel(3)};
+  }
+  read_name(object, "alpha", kFaceAlphas, face.alpha);
+  return face;
+}
+
+VoxelFaces faces_of(const Json& json, const Place& place, Faults& faults) {
+  const Object object(json, place, {"textures", "sides"}, faults);
+  std::vector<Texture> textures;
+  read_list(object, "textures", 6,
+            [&](const Json& each, const Place& at) { textures.push_back(texture_of(each, at, faults)); });
+  std::array<VoxelFace, 6> sides;
+  std::size_t count = 0;
+  read_list(object, "sides", sides.size(),
+            [&](const Json& each, const Place& at) { sides[count++] = face_of(each, at, textures, faults); });
+  if (count != sides.size() && !faults.error()) faults.add(object.place_of("sides"), "must be a list of 6 faces");
+  return VoxelFaces(sides);
+}
+
+}  // namespace
+
 VoxelProperties properties_of(const Json& json, const Place& place, Faults& faults) {
   const Object type(
       json, place,
       {"name", "colour", "visibility", "collides", "roughness", "metalness", "emission", "ior", "scattering",
-       "anisotropy", "state_bits", "blocks_light", "occludes", "light_cost", "remesh_on_data", "attributes"},
+       "anisotropy", "state_bits", "blocks_light", "occludes", "light_cost", "remesh_on_data", "attributes", "faces"},
       faults);
   VoxelProperties properties;
   type.read_text("name", properties.name);
@@ -464,17 +571,8 @@ VoxelProperties properties_of(const Json& json, const Place& place, Faults& faul
   type.read("ior", properties.ior);
   type.read("scattering", properties.scattering);
   type.read("anisotropy", properties.anisotropy);
-  const auto read_small = [&](const char* key, int most, std::uint8_t& out) {
-    const Json* number = type.find(key);
-    if (number == nullptr) return;
-    if (number->is_number_unsigned() && *number <= most) {
-      out = number->get<std::uint8_t>();
-    } else {
-      faults.add(type.place_of(key), std::string("must be a whole number from 0 to ").append(std::to_string(most)));
-    }
-  };
-  read_small("state_bits", kMaxStateBits, properties.state_bits);
-  read_small("light_cost", kMaxLightCost, properties.light_cost);
+  properties.state_bits = static_cast<std::uint8_t>(small_number(type, "state_bits", kMaxStateBits, 0));
+  properties.light_cost = static_cast<std::uint8_t>(small_number(type, "light_cost", kMaxLightCost, 0));
   const auto read_own = [&](const char* key, std::optional<bool>& out) {
     if (type.find(key) == nullptr) return;
     out = false;
@@ -487,6 +585,14 @@ VoxelProperties properties_of(const Json& json, const Place& place, Faults& faul
   }
   type.read("remesh_on_data", properties.remesh_on_data);
   if (type.find("attributes") != nullptr) read_attributes(type, properties.attributes);
+  if (const Json* faces = type.find("faces")) {
+    properties.faces = faces_of(*faces, type.place_of("faces"), faults);
+    if (faults.error()) {
+      properties.faces = {};
+    } else if (const Status valid = validate_type(properties); !valid) {
+      faults.add(type.place_of("faces"), valid.error().message);
+    }
+  }
   return properties;
 }
 

@@ -46,6 +46,8 @@ class PartWriter {
   [[nodiscard]] bool needs_second() const { return needs_second_; }
 
  private:
+  [[nodiscard]] OrderedJson json_of(const VoxelFaces& faces);
+  [[nodiscard]] OrderedJson json_of(const Texture& texture);
   [[nodiscard]] OrderedJson text(const std::string& bytes);
 
   bool needs_second_ = false;

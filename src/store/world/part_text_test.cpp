@@ -65,6 +65,20 @@ TEST(PartText, KeepsTypesWhoseDataChangesMeshes) {
   EXPECT_EQ(*read, door);
 }
 
+TEST(PartText, KeepsTextures) {
+  const AlphaImage image{16, 16, std::vector<std::uint8_t>(std::size_t{4} * 16 * 16, 255)};
+  const VoxelProperties snow{
+      .name = "snow", .colour = {255, 255, 255}, .faces = Texture::from_image("snow", image).value()};
+  const std::string text = text_of(snow);
+  const auto read = part_from<VoxelProperties>(std::as_bytes(std::span(text)), "type 1");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(*read, snow);
+  const std::string wrong = R"({"colour": [0, 0, 0, 255], "faces": {"textures": [], "sides": []}})";
+  const Status refused = check_part({part::kType, std::int64_t{1}}, std::as_bytes(std::span(wrong)));
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().message, "type 1.faces.sides: must be a list of 6 faces");
+}
+
 TEST(PartText, RejectsDamagedMark) {
   for (const char* const value : {"1", "\"yes\"", "null", "[true]"}) {
     const auto read = grid_from(std::string(R"({"band": 8.0, "whole": )") + value + "}");
