@@ -1,5 +1,7 @@
 // render/terrain/1280x720: the 256x128x256 terrain with shadows and nine occlusion rays per hit, one thread.
 
+#include <random>
+
 #include <benchmark/benchmark.h>
 
 #include <quoin/render/cpu_renderer.h>
@@ -11,8 +13,25 @@ namespace {
 
 using workloads::fail_unless;
 
-void image(benchmark::State& state, const LightOptions& light, Threads threads = {1}) {
-  static const Scene scene = workloads::image_scene();
+// Gives each type of a scene a texture of 64 x 64 texels.
+Scene textured(Scene scene) {
+  std::mt19937 random(1);
+  for (std::size_t i = 1; i < scene.types.size(); ++i) {
+    AlphaImage noise{64, 64, {}};
+    for (int k = 0; k < 4 * 64 * 64; ++k) {
+      noise.rgba.push_back(k % 4 == 3 ? 255 : static_cast<std::uint8_t>(random()));
+    }
+    VoxelProperties type = scene.types[static_cast<VoxelType>(i)];
+    type.faces = Texture::from_image(type.name, noise).value();
+    scene.types.replace(static_cast<VoxelType>(i), type);
+  }
+  return scene;
+}
+
+void image(benchmark::State& state, const LightOptions& light, Threads threads = {1}, bool with_textures = false) {
+  static const Scene plain = workloads::image_scene();
+  static const Scene with = textured(workloads::image_scene());
+  const Scene& scene = with_textures ? with : plain;
   fail_unless(scene.voxel_count() == workloads::kImageVoxels, "the number of voxels", scene.voxel_count());
   const CpuRenderer renderer(scene, InstanceFilter::Visible, {1});
   RenderOptions options;
@@ -34,6 +53,14 @@ void unlit(benchmark::State& state) {
   light.shading = Shading::Unlit;
   image(state, light);
 }
+void unlit_textures(benchmark::State& state) {
+  LightOptions light;
+  light.shading = Shading::Unlit;
+  image(state, light, {1}, true);
+}
+void full_textures(benchmark::State& state) {
+  image(state, {}, {1}, true);
+}
 void vertex(benchmark::State& state) {
   LightOptions light;
   light.occlusion_mode = OcclusionMode::Vertex;
@@ -46,6 +73,8 @@ BENCHMARK(all_threads)
     ->Iterations(5)
     ->UseRealTime();
 BENCHMARK(unlit)->Name("render/terrain/1280x720/unlit")->Unit(benchmark::kMillisecond)->Iterations(5);
+BENCHMARK(unlit_textures)->Name("render/terrain/1280x720/unlit/textures")->Unit(benchmark::kMillisecond)->Iterations(5);
+BENCHMARK(full_textures)->Name("render/terrain/1280x720/textures")->Unit(benchmark::kMillisecond)->Iterations(5);
 BENCHMARK(vertex)->Name("render/terrain/1280x720/vertex")->Unit(benchmark::kMillisecond)->Iterations(5);
 
 }  // namespace
