@@ -332,6 +332,29 @@ TEST(VoxelFaces, DistinguishTypes) {
   }
 }
 
+TEST(VoxelFaces, ShareEqualTextures) {
+  VoxelRegistry types;
+  const auto made = [](unsigned seed) { return texture_of(noise(16, seed, false), "same"); };
+  const auto texels_of = [&](VoxelType type, Direction direction) {
+    return types[type].faces[direction].texture.level(0).data();
+  };
+  const Texture first = made(1);
+  const VoxelType a = types.add({.name = "a", .faces = first}).value();
+  const VoxelType b = types.add({.name = "b", .faces = {{made(2)}, {made(1)}, {made(2)}}}).value();
+  EXPECT_EQ(texels_of(a, Direction::PosX), first.level(0).data());
+  EXPECT_EQ(texels_of(b, Direction::PosY), first.level(0).data());
+  EXPECT_EQ(texels_of(b, Direction::NegY), texels_of(b, Direction::PosX)) << "within a type";
+  const VoxelRegistry copy = types;
+  types.replace(a, {.name = "a"});
+  types.replace(b, {.name = "b", .faces = made(2)});
+  const Texture later = made(1);
+  const VoxelType c = types.add({.name = "c", .faces = later}).value();
+  EXPECT_EQ(texels_of(c, Direction::PosX), later.level(0).data()) << "no type used the first one any more";
+  EXPECT_EQ(copy[b].faces[Direction::PosY].texture.level(0).data(), first.level(0).data());
+  types.replace(c, types[c]);
+  EXPECT_EQ(texels_of(c, Direction::PosX), later.level(0).data());
+}
+
 TEST(VoxelFaces, AreReportedAndCounted) {
   VoxelRegistry types;
   const VoxelType stone = types.add({.name = "stone", .colour = {7, 7, 7, 255}}).value();

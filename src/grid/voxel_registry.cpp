@@ -1,6 +1,7 @@
 #include <quoin/grid/voxel_registry.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <utility>
@@ -84,6 +85,34 @@ struct TypeRecord : TypeChange {
   [[nodiscard]] TypeChange change() const { return *this; }
 };
 
+void VoxelRegistry::Content::share_textures(VoxelFaces& faces) {
+  if (faces.empty()) return;
+  std::array<VoxelFace, 6> shared;
+  bool is_shared = true;
+  for (const Direction direction : kDirections) {
+    VoxelFace& face = shared[static_cast<std::size_t>(direction)];
+    face = faces[direction];
+    const auto [first, last] = textures.equal_range(face.texture.hash());
+    auto known = std::find_if(first, last, [&](const auto& each) { return each.second.texture == face.texture; });
+    if (known == last) known = textures.emplace(face.texture.hash(), SharedTexture{face.texture});
+    ++known->second.faces;
+    is_shared = is_shared && known->second.texture.level(0).data() == face.texture.level(0).data();
+    face.texture = known->second.texture;
+  }
+  if (!is_shared) faces = VoxelFaces(shared);
+}
+
+void VoxelRegistry::Content::release_textures(const VoxelFaces& faces) noexcept {
+  if (faces.empty()) return;
+  for (const Direction direction : kDirections) {
+    const Texture& texture = faces[direction].texture;
+    const auto [first, last] = textures.equal_range(texture.hash());
+    const auto known = std::find_if(first, last, [&](const auto& each) { return each.second.texture == texture; });
+    QUOIN_ASSERT(known != last && known->second.faces > 0, "a texture that the faces of types share");
+    if (--known->second.faces == 0) textures.erase(known);
+  }
+}
+
 struct VoxelRegistry::Journal : ChangeJournal<TypeRecord> {};
 
 Status validate_type(const VoxelProperties& properties) {
@@ -157,6 +186,7 @@ Result<VoxelType> VoxelRegistry::add(VoxelProperties properties) {
   make_room(c.visibility);
   make_room(c.occlusion);
   make_room(c.properties);
+  c.share_textures(properties.faces);
   c.by_hash.emplace(hash_of(properties), type);
   c.serials.push_back(0);
   c.visibility.push_back(visibility);
@@ -198,6 +228,7 @@ void VoxelRegistry::replace(VoxelType type, VoxelProperties properties) {
   journal_->begin_change();
   content_.make_own();
   Content& c = *content_;
+  c.share_textures(properties.faces);
   const auto [first, last] = c.by_hash.equal_range(hash_of(c.properties[type]));
   const auto old = std::find_if(first, last, [type](const auto& each) { return each.second == type; });
   c.by_hash.emplace(hash_of(properties), type);
@@ -215,6 +246,7 @@ void VoxelRegistry::replace(VoxelType type, VoxelProperties properties) {
   if (!properties.collides) ++c.passable_count;
   if (c.properties[type].remesh_on_data) --c.remesh_on_data_count;
   if (properties.remesh_on_data) ++c.remesh_on_data_count;
+  c.release_textures(c.properties[type].faces);
   if (!c.properties[type].faces.empty()) --c.textured_count;
   if (!properties.faces.empty()) ++c.textured_count;
   const bool is_seen_otherwise = was != properties.visibility || occluded != c.occlusion[type];

@@ -81,7 +81,8 @@ struct VoxelProperties {
   std::uint8_t light_cost = 0;
 
   /// Textures of the six faces. With textures, `colour` is their mean, for all uses that show one colour per type:
-  /// a registry sets it. Opaque types have opaque faces; cutout and translucent faces need a transparent type.
+  /// a registry sets it. Opaque types have opaque faces; cutout and translucent faces need a transparent type. Equal
+  /// textures of a registry's types share their texels.
   VoxelFaces faces{};
 
   bool operator==(const VoxelProperties&) const = default;
@@ -204,6 +205,16 @@ class VoxelRegistry {
     std::size_t unoccluding_count = 0;  // opaque types that do not occlude
     std::size_t remesh_on_data_count = 0;
     std::size_t textured_count = 0;
+
+    struct SharedTexture {
+      Texture texture;
+      std::size_t faces = 0;  // that use it
+    };
+    std::multimap<std::uint64_t, SharedTexture> textures;  // of all types, each once, by hash
+
+    // Makes a type's faces use the texels of equal textures of other types. If it throws, some texels are kept longer.
+    [[gnu::visibility("hidden")]] void share_textures(VoxelFaces& faces);
+    [[gnu::visibility("hidden")]] void release_textures(const VoxelFaces& faces) noexcept;
   };
   struct [[gnu::visibility("hidden")]] Journal;
   void note(TypeChange change);
