@@ -294,7 +294,7 @@ void read_file_object(const Json& json, std::size_t file_bytes, Threads threads,
   if (version != nullptr && !version->is_number_unsigned())
     faults.add(file.place_of("quoin_scene"), "must be the version, a whole number");
   if (version != nullptr && version->is_number_unsigned() && (*version < 1 || *version > kVersion)) {
-    faults.add(file.place_of("quoin_scene"), "version " + version->dump() + " is not supported (1 to 7 are)",
+    faults.add(file.place_of("quoin_scene"), "version " + version->dump() + " is not supported (1 to 8 are)",
                ErrorCode::Unsupported);
   }
   scene.types = read_types(file);

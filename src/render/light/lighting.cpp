@@ -5,7 +5,6 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include <glm/geometric.hpp>
@@ -506,12 +505,9 @@ void Lighting::set_occlusion_directions(const Group& group, int ray, RayPacket& 
   }
 }
 
-Surface Lighting::surface_at(const SurfacePoint& point) const {
+Surface Lighting::surface_of_type(const SurfacePoint& point) const {
   const auto placed = static_cast<std::size_t>(point.placed);
   QUOIN_ASSERT(placed < frames_.size(), "one of the placed grids");
-  if (has_other_surfaces_) {
-    if (const std::optional<Surface> other = other_surface_at(point)) return *other;
-  }
   if (point.is_blended) {
     const DensityGrid& field = placed_in(view_->tracer())[placed].opaque_field->field();
     const DVec3 at = point.position - double{point.lift} * DVec3(point.normal);
@@ -521,34 +517,95 @@ Surface Lighting::surface_at(const SurfacePoint& point) const {
   return point.in_field ? surfaces_->of_field(point.type) : (*surfaces_)[point.type];
 }
 
+Surface Lighting::surface_at(const SurfacePoint& point) const {
+  return has_other_surfaces_ ? other_surface_at(point) : surface_of_type(point);
+}
+
+Lighting::FaceTexels Lighting::face_texels(const VoxelProperties& type, Direction direction) {
+  const VoxelFace& face = type.faces[direction];
+  const Texture& texture = face.texture;
+  FaceTexels found;
+  found.texels = texture.level(0).data();
+  found.last_level = static_cast<std::int8_t>(texture.level_count() - 1);
+  found.log_size = static_cast<std::uint8_t>(texture.level_count() - 1);
+  for (int level = 0; level < texture.level_count(); ++level) {
+    found.level_begin[static_cast<std::size_t>(level)] =
+        static_cast<std::uint32_t>(texture.level(level).data() - found.texels);
+  }
+  const TextureFrame frame = texture_frame(face, direction);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const IVec3& along = i == 0 ? frame.right : frame.down;
+    const int axis = along.x != 0 ? 0 : along.y != 0 ? 1 : 2;
+    found.axis[i] = static_cast<std::uint8_t>(axis);
+    found.is_negated[i] = along[axis] < 0;
+  }
+  found.tint = linear_colour(face.tint);
+  found.emission = emission_of(type);
+  return found;
+}
+
 void Lighting::show_textures(double spacing, bool is_perspective) {
   QUOIN_ASSERT(spacing > 0.0, "a positive distance of samples");
-  texel_spacing_ = spacing;
   is_perspective_ = is_perspective;
   has_other_surfaces_ = true;
+  number_of_faces_.assign(types_->size(), 0);
+  for (std::size_t i = 0; i < types_->size(); ++i) {
+    const VoxelProperties& type = (*types_)[static_cast<VoxelType>(i)];
+    if (type.faces.empty() || type.visibility != Visibility::Opaque) continue;
+    std::array<FaceTexels, 6>& faces = faces_.emplace_back();
+    for (const Direction direction : kDirections) faces[index_of(direction)] = face_texels(type, direction);
+    number_of_faces_[i] = static_cast<std::uint32_t>(faces_.size());
+  }
+  const BlockVector<PlacedGrid>& placed = placed_in(view_->tracer());
+  for (std::size_t i = 0; i < frames_.size(); ++i) {
+    // Distances from the eye are in voxels, too.
+    const double in_voxels = is_perspective ? spacing : spacing / placed[i].voxel_size;
+    frames_[i].square_spacing = in_voxels * in_voxels;
+    frames_[i].eye = view_->grid_from_view(static_cast<std::int32_t>(i)).offset;
+  }
+}
+
+// Returns null for a point that shows the colour of its type.
+const Lighting::FaceTexels* Lighting::texels_at(const SurfacePoint& point) const {
+  if (point.type >= number_of_faces_.size() || point.in_field || point.is_far) return nullptr;
+  const std::uint32_t number = number_of_faces_[point.type];
+  if (number == 0 || frames_[static_cast<std::size_t>(point.placed)].voxels_per_cell != 1.0) return nullptr;
+  return &faces_[number - 1][index_of(point.face)];
+}
+
+// As `texel_at`, for points inside a face.
+Vec3 Lighting::texel_colour(const FaceTexels& face, const SurfacePoint& point) const {
+  const Frame& frame = frames_[static_cast<std::size_t>(point.placed)];
+  double square = frame.square_spacing;
+  if (is_perspective_) {
+    const DVec3 away = point.position - frame.eye;
+    square *= glm::dot(away, away);
+  }
+  // The level is log2 of the texels between samples, rounded. That is half the exponent of twice their square, plus
+  // the texture's own size.
+  const auto exponent = static_cast<int>(std::bit_cast<std::uint64_t>(2.0 * square) >> 52 & 0x7FF) - 1023;
+  const int level = std::clamp((exponent >> 1) + face.log_size, 0, int{face.last_level});
+  const unsigned log_size = static_cast<unsigned>(face.log_size - level);
+  const auto texel_along = [&](std::size_t i) {
+    const int axis = face.axis[i];
+    const double share = point.position[axis] - point.voxel[axis];
+    const double at = (face.is_negated[i] ? 1.0 - share : share) * static_cast<double>(1U << log_size);
+    return std::min(static_cast<std::uint32_t>(std::max(0.0, at)), (1U << log_size) - 1U);
+  };
+  const std::uint32_t number = (texel_along(1) << log_size) + texel_along(0);
+  return linear_colour(face.texels[face.level_begin[static_cast<std::size_t>(level)] + number]) * face.tint;
 }
 
 // Not inlined: the loop over unlit points stays small.
-__attribute__((noinline)) std::optional<Surface> Lighting::other_surface_at(const SurfacePoint& point) const {
+__attribute__((noinline)) Surface Lighting::other_surface_at(const SurfacePoint& point) const {
   const bool is_bare = point.in_field && point.type == kAir;
+  QUOIN_ASSERT(static_cast<std::size_t>(point.placed) < frames_.size(), "one of the placed grids");
   if (!detail_surfaces_.empty() && !is_bare) return detail_surfaces_[static_cast<std::size_t>(point.placed)];
-  const bool shows_type = !(texel_spacing_ > 0.0) || point.in_field || point.is_far || point.type >= types_->size();
-  if (shows_type || !types_->is_opaque(point.type) || voxels_per_cell(point.placed) != 1.0) return std::nullopt;
-  const VoxelFaces& faces = (*types_)[point.type].faces;
-  if (faces.empty()) return std::nullopt;
-  return textured_surface(point, faces[point.face]);
-}
-
-Surface Lighting::textured_surface(const SurfacePoint& point, const VoxelFace& face) const {
-  const double distance =
-      is_perspective_ ? glm::length(view_->view_from_grid(point.placed).point(point.position)) : 1.0;
-  const PlacedGrid& placed = placed_in(view_->tracer())[static_cast<std::size_t>(point.placed)];
-  const double texels = texel_spacing_ * distance / placed.voxel_size * face.texture.size();
-  const int level = texels > 1.0 ? std::ilogb(texels * std::numbers::sqrt2) : 0;
-  const auto texel = texel_at(face, point.face, point.position - DVec3(point.voxel), level);
-  Surface surface = (*surfaces_)[point.type];
-  surface.colour = {texel[0], texel[1], texel[2]};
-  surface.emitted = surface.colour * emission_of((*types_)[point.type]);
+  Surface surface = surface_of_type(point);
+  if (const FaceTexels* const face = texels_at(point)) {
+    surface.colour = texel_colour(*face, point);
+    surface.emitted = surface.colour * face->emission;
+  }
   return surface;
 }
 

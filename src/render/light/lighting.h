@@ -1,12 +1,13 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
 #include <quoin/core/direction.h>
 #include <quoin/core/vec.h>
+#include <quoin/grid/texture.h>
 #include <quoin/render/light_options.h>
 #include <quoin/render/propagated_light.h>
 
@@ -66,7 +67,8 @@ class Lighting {
   /// from the view's origin.
   ///
   /// Filter: the nearest texel of the mipmap level whose texels are nearest in size to the samples' distance.
-  /// Requires: `spacing` is positive.
+  /// Cost:   O(types with textures).
+  /// Requires: `spacing` is positive. Types do not change while this object is used.
   void show_textures(double spacing, bool is_perspective);
 
   /// Computes the linear light of each point, not clamped. Returns the number of rays traced.
@@ -85,6 +87,8 @@ class Lighting {
     DVec3 to_sun{0.0};
     double voxels_per_cell = 1.0;
     std::array<float, 6> diffuse{};
+    DVec3 eye{0.0};               // of a perspective view
+    double square_spacing = 0.0;  // of samples, in voxels; of a perspective view at a distance of 1 voxel
   };
   struct Group;
   [[nodiscard]] static std::vector<std::uint32_t> coherent_order(std::span<const SurfacePoint> points);
@@ -110,9 +114,23 @@ class Lighting {
   std::int64_t trace_openness(const Group& group, std::uint32_t lanes, std::span<float> openness) const;
   void set_occlusion_directions(const Group& group, int ray, RayPacket& rays) const;
   [[nodiscard]] Surface surface_at(const SurfacePoint& point) const;
-  // Returns the surface of a point that does not show its type's: of coarse detail, or textured.
-  [[nodiscard]] std::optional<Surface> other_surface_at(const SurfacePoint& point) const;
-  [[nodiscard]] Surface textured_surface(const SurfacePoint& point, const VoxelFace& face) const;
+  // As `surface_at`, with textures or the colours of detail.
+  [[nodiscard]] Surface other_surface_at(const SurfacePoint& point) const;
+  [[nodiscard]] Surface surface_of_type(const SurfacePoint& point) const;
+  /// The texture of one face of a type, ready for lookups.
+  struct FaceTexels {
+    const Rgba8* texels = nullptr;  // of all levels
+    std::array<std::uint32_t, 11> level_begin{};
+    std::int8_t last_level = 0;
+    std::uint8_t log_size = 0;
+    std::array<std::uint8_t, 2> axis{};  // of the grid, along the texture's rows and down its columns
+    std::array<bool, 2> is_negated{};
+    Vec3 tint{1.0F};
+    float emission = 0.0F;
+  };
+  [[nodiscard]] static FaceTexels face_texels(const VoxelProperties& type, Direction direction);
+  [[nodiscard]] const FaceTexels* texels_at(const SurfacePoint& point) const;
+  [[nodiscard]] Vec3 texel_colour(const FaceTexels& face, const SurfacePoint& point) const;
   [[nodiscard]] Vec3 shade(const SurfacePoint& point, Vec3 direct, float openness) const;
   [[nodiscard]] Vec3 shade_lit(const SurfacePoint& point, Vec3 direct, float openness) const;
   // Returns the sun's diffuse term without shadows.
@@ -130,8 +148,9 @@ class Lighting {
   std::vector<Frame> frames_;
   std::vector<Surface> detail_surfaces_;  // of each placed grid; empty where types have their own colours
   bool has_other_surfaces_ = false;       // with `detail_surfaces_` or textures
-  double texel_spacing_ = 0.0;            // see `show_textures`; 0: no textures
   bool is_perspective_ = false;
+  std::vector<std::array<FaceTexels, 6>> faces_;  // of types with textures
+  std::vector<std::uint32_t> number_of_faces_;    // [type]: index into `faces_` plus 1, or 0; empty without textures
   std::vector<GridLight> levels_;
   LightLook look_;
   float exposure_ = 1.0F;
