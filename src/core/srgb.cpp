@@ -21,6 +21,15 @@ float linear_from_srgb(float encoded) {
   return static_cast<float>(decode(encoded));
 }
 
+const std::array<float, 256>& linear_bytes() {
+  static const std::array<float, 256> linear = [] {
+    std::array<float, 256> values{};
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] = linear_from_srgb(static_cast<std::uint8_t>(i));
+    return values;
+  }();
+  return linear;
+}
+
 SrgbEncoder::SrgbEncoder() {
   for (std::size_t byte = 1; byte < 256; ++byte) {
     const long double exact = decode((static_cast<long double>(byte) - 0.5L) / 255.0L);

@@ -12,6 +12,8 @@ namespace quoin {
 [[nodiscard]] float linear_from_srgb(std::uint8_t encoded);
 /// As above, for values between bytes: `encoded` is 0 to 1 for bytes 0 to 255.
 [[nodiscard]] float linear_from_srgb(float encoded);
+/// Returns the linear light of all bytes, which is computed at the first call.
+[[nodiscard]] const std::array<float, 256>& linear_bytes();
 
 /// Turns linear light into sRGB bytes, rounded to the nearest: exactly, for every float. Less than 0 and NaN give 0,
 /// more than 1 gives 255.

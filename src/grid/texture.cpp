@@ -14,11 +14,7 @@
 namespace quoin {
 
 Vec3 linear_colour(Rgba8 colour) {
-  static const std::array<float, 256> linear = [] {
-    std::array<float, 256> values{};
-    for (std::size_t i = 0; i < values.size(); ++i) values[i] = linear_from_srgb(static_cast<std::uint8_t>(i));
-    return values;
-  }();
+  const std::array<float, 256>& linear = linear_bytes();
   return {linear[colour.r], linear[colour.g], linear[colour.b]};
 }
 

@@ -145,7 +145,7 @@ std::int64_t Lighting::light(std::span<const SurfacePoint> points, std::span<Vec
   if (options_.shading == Shading::Unlit) {
     // Inlined: a call per point would take half of the remaining time.
     for (std::size_t i = 0; i < points.size(); ++i) {
-      colours[i] = points[i].kind == PointKind::Glow ? Vec3(0.0F) : surface_at(points[i]).colour;
+      colours[i] = points[i].kind == PointKind::Glow ? Vec3(0.0F) : colours_at(points[i]).own;
     }
     return 0;
   }
@@ -505,20 +505,23 @@ void Lighting::set_occlusion_directions(const Group& group, int ray, RayPacket& 
   }
 }
 
-Surface Lighting::surface_of_type(const SurfacePoint& point) const {
+// Inlined, as `colours_at`: a call per point would take a noticeable part of an unlit image's time.
+__attribute__((always_inline)) inline Lighting::Colours Lighting::colours_of_type(const SurfacePoint& point) const {
   const auto placed = static_cast<std::size_t>(point.placed);
   QUOIN_ASSERT(placed < frames_.size(), "one of the placed grids");
   if (point.is_blended) {
     const DensityGrid& field = placed_in(view_->tracer())[placed].opaque_field->field();
     const DVec3 at = point.position - double{point.lift} * DVec3(point.normal);
     const IVec3 cell = voxel_of(at);
-    return surfaces_->blend_of_field(field, cell, at - DVec3(cell), point.type);
+    const Surface blend = surfaces_->blend_of_field(field, cell, at - DVec3(cell), point.type);
+    return {blend.colour, blend.emitted};
   }
-  return point.in_field ? surfaces_->of_field(point.type) : (*surfaces_)[point.type];
+  const Surface& surface = point.in_field ? surfaces_->of_field(point.type) : (*surfaces_)[point.type];
+  return {surface.colour, surface.emitted};
 }
 
-Surface Lighting::surface_at(const SurfacePoint& point) const {
-  return has_other_surfaces_ ? other_surface_at(point) : surface_of_type(point);
+__attribute__((always_inline)) inline Lighting::Colours Lighting::colours_at(const SurfacePoint& point) const {
+  return has_other_surfaces_ ? other_colours_at(point) : colours_of_type(point);
 }
 
 Lighting::FaceTexels Lighting::face_texels(const VoxelProperties& type, Direction direction) {
@@ -526,18 +529,13 @@ Lighting::FaceTexels Lighting::face_texels(const VoxelProperties& type, Directio
   const Texture& texture = face.texture;
   FaceTexels found;
   found.texels = texture.level(0).data();
-  found.last_level = static_cast<std::int8_t>(texture.level_count() - 1);
   found.log_size = static_cast<std::uint8_t>(texture.level_count() - 1);
-  for (int level = 0; level < texture.level_count(); ++level) {
-    found.level_begin[static_cast<std::size_t>(level)] =
-        static_cast<std::uint32_t>(texture.level(level).data() - found.texels);
-  }
   const TextureFrame frame = texture_frame(face, direction);
   for (std::size_t i = 0; i < 2; ++i) {
     const IVec3& along = i == 0 ? frame.right : frame.down;
     const int axis = along.x != 0 ? 0 : along.y != 0 ? 1 : 2;
     found.axis[i] = static_cast<std::uint8_t>(axis);
-    found.is_negated[i] = along[axis] < 0;
+    found.sign[i] = along[axis] < 0 ? -1.0F : 1.0F;
   }
   found.tint = linear_colour(face.tint);
   found.emission = emission_of(type);
@@ -547,6 +545,7 @@ Lighting::FaceTexels Lighting::face_texels(const VoxelProperties& type, Directio
 void Lighting::show_textures(double spacing, bool is_perspective) {
   QUOIN_ASSERT(spacing > 0.0, "a positive distance of samples");
   is_perspective_ = is_perspective;
+  linear_ = linear_bytes().data();
   has_other_surfaces_ = true;
   number_of_faces_.assign(types_->size(), 0);
   for (std::size_t i = 0; i < types_->size(); ++i) {
@@ -584,29 +583,32 @@ Vec3 Lighting::texel_colour(const FaceTexels& face, const SurfacePoint& point) c
   // The level is log2 of the texels between samples, rounded. That is half the exponent of twice their square, plus
   // the texture's own size.
   const auto exponent = static_cast<int>(std::bit_cast<std::uint64_t>(2.0 * square) >> 52 & 0x7FF) - 1023;
-  const int level = std::clamp((exponent >> 1) + face.log_size, 0, int{face.last_level});
+  const int level = std::clamp((exponent >> 1) + face.log_size, 0, int{face.log_size});
   const unsigned log_size = static_cast<unsigned>(face.log_size - level);
   const auto texel_along = [&](std::size_t i) {
     const int axis = face.axis[i];
     const double share = point.position[axis] - point.voxel[axis];
-    const double at = (face.is_negated[i] ? 1.0 - share : share) * static_cast<double>(1U << log_size);
+    const double sign = face.sign[i];
+    const double at = (sign * share + (0.5 - 0.5 * sign)) * static_cast<double>(1U << log_size);
     return std::min(static_cast<std::uint32_t>(std::max(0.0, at)), (1U << log_size) - 1U);
   };
   const std::uint32_t number = (texel_along(1) << log_size) + texel_along(0);
-  return linear_colour(face.texels[face.level_begin[static_cast<std::size_t>(level)] + number]) * face.tint;
+  // The levels before have size^2 * (1 + 1/4 + ...) texels.
+  const std::uint32_t begin = ((4U << 2 * face.log_size) - (4U << 2 * log_size)) / 3U;
+  const Rgba8 texel = face.texels[begin + number];
+  return Vec3(linear_[texel.r], linear_[texel.g], linear_[texel.b]) * face.tint;
 }
 
 // Not inlined: the loop over unlit points stays small.
-__attribute__((noinline)) Surface Lighting::other_surface_at(const SurfacePoint& point) const {
+__attribute__((noinline)) Lighting::Colours Lighting::other_colours_at(const SurfacePoint& point) const {
+  const auto placed = static_cast<std::size_t>(point.placed);
+  QUOIN_ASSERT(placed < frames_.size(), "one of the placed grids");
   const bool is_bare = point.in_field && point.type == kAir;
-  QUOIN_ASSERT(static_cast<std::size_t>(point.placed) < frames_.size(), "one of the placed grids");
-  if (!detail_surfaces_.empty() && !is_bare) return detail_surfaces_[static_cast<std::size_t>(point.placed)];
-  Surface surface = surface_of_type(point);
-  if (const FaceTexels* const face = texels_at(point)) {
-    surface.colour = texel_colour(*face, point);
-    surface.emitted = surface.colour * face->emission;
-  }
-  return surface;
+  if (!detail_surfaces_.empty() && !is_bare) return {detail_surfaces_[placed].colour, detail_surfaces_[placed].emitted};
+  const FaceTexels* const face = texels_at(point);
+  if (face == nullptr) return colours_of_type(point);
+  const Vec3 colour = texel_colour(*face, point);
+  return {colour, colour * face->emission};
 }
 
 Vec3 Lighting::normal_colour(const SurfacePoint& point) const {
@@ -632,15 +634,15 @@ Vec3 Lighting::shade(const SurfacePoint& point, Vec3 direct, float openness) con
       break;
   }
   if (point.kind == PointKind::Glow) return Vec3(0.0F);
-  const Vec3 colour = surface_at(point).colour;
+  const Vec3 colour = colours_at(point).own;
   const bool is_plain = options_.shading == Shading::Unlit || !is_surface;
   return is_plain ? colour : colour * (kLeastOfAll + (1.0F - kLeastOfAll) * openness);
 }
 
 Vec3 Lighting::shade_lit(const SurfacePoint& point, Vec3 direct, float openness) const {
-  const Surface surface = surface_at(point);
-  if (point.kind == PointKind::Unlit) return surface.colour;
-  Vec3 colour = surface.emitted;
+  const Colours shown = colours_at(point);
+  if (point.kind == PointKind::Unlit) return shown.own;
+  Vec3 colour = shown.emitted;
   if (point.kind == PointKind::Surface) {
     Vec3 light(0.0F);
     if (is_propagated()) {
@@ -653,7 +655,7 @@ Vec3 Lighting::shade_lit(const SurfacePoint& point, Vec3 direct, float openness)
     } else {
       light = (sky_ * kAmbient * daylight_.ambient + direct) * (kLeastOfAll + (1.0F - kLeastOfAll) * openness);
     }
-    colour += surface.colour * light;
+    colour += shown.own * light;
   }
   return colour * exposure_;
 }

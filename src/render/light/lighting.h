@@ -113,18 +113,21 @@ class Lighting {
   [[nodiscard]] float smooth_openness(const SurfacePoint& point) const;
   std::int64_t trace_openness(const Group& group, std::uint32_t lanes, std::span<float> openness) const;
   void set_occlusion_directions(const Group& group, int ray, RayPacket& rays) const;
-  [[nodiscard]] Surface surface_at(const SurfacePoint& point) const;
-  // As `surface_at`, with textures or the colours of detail.
-  [[nodiscard]] Surface other_surface_at(const SurfacePoint& point) const;
-  [[nodiscard]] Surface surface_of_type(const SurfacePoint& point) const;
+  /// The colours that a point shows.
+  struct Colours {
+    Vec3 own{0.0F};
+    Vec3 emitted{0.0F};
+  };
+  [[nodiscard]] Colours colours_at(const SurfacePoint& point) const;
+  // As `colours_at`, with textures or the colours of detail.
+  [[nodiscard]] Colours other_colours_at(const SurfacePoint& point) const;
+  [[nodiscard]] Colours colours_of_type(const SurfacePoint& point) const;
   /// The texture of one face of a type, ready for lookups.
   struct FaceTexels {
-    const Rgba8* texels = nullptr;  // of all levels
-    std::array<std::uint32_t, 11> level_begin{};
-    std::int8_t last_level = 0;
-    std::uint8_t log_size = 0;
+    const Rgba8* texels = nullptr;       // of all levels, level 0 first
+    std::uint8_t log_size = 0;           // also the number of the last level
     std::array<std::uint8_t, 2> axis{};  // of the grid, along the texture's rows and down its columns
-    std::array<bool, 2> is_negated{};
+    std::array<float, 2> sign{};         // of that axis
     Vec3 tint{1.0F};
     float emission = 0.0F;
   };
@@ -149,6 +152,7 @@ class Lighting {
   std::vector<Surface> detail_surfaces_;  // of each placed grid; empty where types have their own colours
   bool has_other_surfaces_ = false;       // with `detail_surfaces_` or textures
   bool is_perspective_ = false;
+  const float* linear_ = nullptr;                 // by sRGB byte; set with textures
   std::vector<std::array<FaceTexels, 6>> faces_;  // of types with textures
   std::vector<std::uint32_t> number_of_faces_;    // [type]: index into `faces_` plus 1, or 0; empty without textures
   std::vector<GridLight> levels_;
