@@ -108,8 +108,8 @@ enum class FaceAlpha : std::uint8_t {
 
 /// One face of a voxel: a texture that covers it once.
 ///
-/// Turn 0 shows the texture to a viewer outside as docs/games.md, "Textures", does: on the four sides, its top is at +Y;
-/// on +Y its right is at +Z and its top at +X; on -Y its right is at +X and its top at +Z.
+/// Turn 0 shows the texture to a viewer outside as docs/games.md, "Textures", does: on the four sides, its top is at
+/// +Y; on +Y its right is at +Z and its top at +X; on -Y its right is at +X and its top at +Z.
 struct VoxelFace {
   Texture texture{};
   std::uint8_t turn = 0;      ///< clockwise quarter turns for a viewer outside, 0 to 3

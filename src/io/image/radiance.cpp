@@ -163,11 +163,11 @@ Status check_exr_size(std::int64_t width, std::int64_t height, std::size_t file_
                                               std::to_string(height) + " pixels");
 }
 
-// Checks the sizes for which OpenEXR would allocate memory before it reads the content: of attributes, thumbnails,
-// images and tiles.
+// Checks the sizes of attributes, thumbnails, images and tiles: OpenEXR allocates memory by them before it reads the
+// content.
 //
-// Layout: 8 bytes; per attribute a name and a type with terminators, 32 bits of length and the value; an empty name ends
-//         a header. Files with several parts have a header for each, and an empty one.
+// Layout: 8 bytes; per attribute a name and a type with terminators, 32 bits of length and the value; an empty name
+//         ends a header. Files with several parts have a header for each, and an empty one.
 class ExrHeaders {
  public:
   ExrHeaders(std::span<const std::byte> bytes, std::size_t max_pixels)

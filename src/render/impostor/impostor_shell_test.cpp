@@ -83,7 +83,7 @@ TEST(ImpostorShell, FullBoxesHaveOnlyOccupiedVoxels) {
     const auto shell = ImpostorShell::build(world.tree, kPlenty, kPlenty);
     ASSERT_TRUE(shell.has_value());
     const IBox around{world.tree.bounds().min - 1, world.tree.bounds().max + 1};
-    const BlockVector<VoxelFace> faces = shell->faces();
+    const BlockVector<ShellFace> faces = shell->faces();
     for (int i = 0; i < 20'000; ++i) {
       const IVec3 near = faces[random() % faces.size()].voxel;
       IBox box;
