@@ -111,8 +111,8 @@ enum class VertexSource : std::uint8_t {
 /// Faster:   for a layout known at compile time, use `for_each_vertex`.
 class VertexWriter {
  public:
-  /// Copies the types' colours and faces. After a type has changed, make another writer. `textures`: gives the layers
-  /// of VertexAttribute::Texture; faces whose texture it lacks count as faces without one.
+  /// Copies the types' colours and faces. After a type has changed, make another writer. `textures` has the layers for
+  /// VertexAttribute::Texture; faces whose texture it lacks count as faces without one.
   /// Requires: at least one source can be written in this layout. With Texture in Uint16, `textures` has at most one
   ///           array.
   VertexWriter(VertexLayout layout, const VoxelRegistry& types, const TextureSet& textures = TextureSet());
