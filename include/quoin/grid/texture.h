@@ -63,7 +63,7 @@ class Texture {
   ///
   /// Errors: InvalidArgument, naming the texture, if the image is not square, its side is not a power of two from
   ///         kMinTextureSize to kMaxTextureSize, or it has another number of bytes than its sizes require.
-  /// Cost:   O(texels), about 30 ns each.
+  /// Cost:   O(texels), about 50 ns each.
   [[nodiscard]] static Result<Texture> from_image(std::string name, const AlphaImage& image);
 
   [[nodiscard]] bool is_null() const { return content_ == nullptr; }
