@@ -133,9 +133,10 @@ std::uint64_t bits_of_row(int first, int end, int unit) {
 }  // namespace
 
 bool ImpostorShell::is_full(const IBox& box) const {
+  if (box.empty()) return true;
   const IVec3 low = box.min - origin_;
   const IVec3 high = box.max - origin_;
-  QUOIN_ASSERT(box.empty() || (unite({IVec3{0}, size_ * 4}, {low, high}) == IBox{IVec3{0}, size_ * 4}),
+  QUOIN_ASSERT((unite({IVec3{0}, size_ * 4}, {low, high}) == IBox{IVec3{0}, size_ * 4}),
                "positions in the box or next to it");
   for (int z = low.z & ~3; z < high.z; z += 4) {
     const std::uint64_t in_z = bits_of_row(low.z - z, high.z - z, 16);
