@@ -1,5 +1,6 @@
 #include <quoin/grid/texture.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -239,15 +240,12 @@ TextureFrame texture_frame(const VoxelFace& face, Direction direction) {
 std::array<float, 4> texel_at(const VoxelFace& face, Direction direction, const DVec3& inside, int level) {
   const TextureFrame frame = texture_frame(face, direction);
   const int number = std::clamp(level, 0, face.texture.level_count() - 1);
-  const int size = face.texture.size() >> number;
+  const auto size = static_cast<std::uint32_t>(face.texture.size()) >> number;
   const auto along = [&](const IVec3& axis) {
-    const double at = glm::dot(inside, DVec3(axis));
-    const double share = at - std::floor(at);
-    // NaN gives the first texel.
-    return share > 0.0 ? std::min(static_cast<int>(share * size), size - 1) : 0;
+    const int i = axis.x != 0 ? 0 : axis.y != 0 ? 1 : 2;
+    return texel_number(std::clamp(inside[i], -1.0, 2.0), axis[i], size);
   };
-  const Rgba8 texel =
-      face.texture.level(number)[static_cast<std::size_t>(along(frame.down) * size + along(frame.right))];
+  const Rgba8 texel = face.texture.level(number)[along(frame.down) * size + along(frame.right)];
   const Vec3 colour = linear_colour(texel) * linear_colour(face.tint);
   return {colour.x, colour.y, colour.z, static_cast<float>(texel.a) / 255.0F};
 }

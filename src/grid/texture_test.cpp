@@ -253,11 +253,41 @@ TEST(TextureFrame, ClampsPositionsAndLevels) {
   const Texture texture = texture_of(noise(16, 6, false));
   const VoxelFace face{texture};
   const double nan = std::nan("");
-  for (const DVec3& at : {DVec3(0.0), DVec3(1.0), DVec3(nan), DVec3(1e300), DVec3(1.0 - 1e-17)}) {
-    for (const int level : {-3, 0, 4, 99}) EXPECT_GE(texel_at(face, Direction::NegZ, at, level)[0], 0.0F);
+  // On -Z, the texture runs towards -X and -Y.
+  for (const int level : {-3, 0, 2, 4, 99}) {
+    const std::span<const Rgba8> texels = texture.level(std::clamp(level, 0, 4));
+    const auto colour_at = [&](double all) {
+      const auto found = texel_at(face, Direction::NegZ, DVec3(all), level);
+      return Vec3(found[0], found[1], found[2]);
+    };
+    for (const double first : {1.0, 1.0 - 1e-17, 1e300, nan}) EXPECT_EQ(colour_at(first), linear_colour(texels[0]));
+    for (const double last : {0.0, 1e-17, -1e300}) EXPECT_EQ(colour_at(last), linear_colour(texels.back()));
   }
-  const auto last = texel_at(face, Direction::NegZ, DVec3(0.5), 99);
-  EXPECT_EQ(Vec3(last[0], last[1], last[2]), linear_colour(texture.level(4)[0]));
+}
+
+// Points on the edges of a face belong to this face, so their texels do not wrap.
+TEST(TextureFrame, ShowsTexelsOfCornersAtCorners) {
+  constexpr int kSize = 16;
+  const Texture texture = texture_of(noise(kSize, 6, false));
+  for (const Direction direction : kDirections) {
+    for (std::uint8_t i = 0; i < 8; ++i) {
+      const VoxelFace face{.texture = texture, .turn = static_cast<std::uint8_t>(i % 4), .mirrored = i >= 4};
+      const TextureFrame frame = texture_frame(face, direction);
+      for (const double beyond : {0.0, 1e-9, 3.0}) {
+        for (const int corner : {0, 1, 2, 3}) {
+          const double right = corner % 2 - 0.5;
+          const double down = corner / 2 - 0.5;
+          const DVec3 inside =
+              DVec3(0.5) + (DVec3(frame.right) * right + DVec3(frame.down) * down) * (1.0 + 2.0 * beyond);
+          const auto found = texel_at(face, direction, inside, 0);
+          const std::size_t row = corner / 2 == 0 ? 0 : kSize - 1;
+          const std::size_t column = corner % 2 == 0 ? 0 : kSize - 1;
+          EXPECT_EQ(Vec3(found[0], found[1], found[2]), linear_colour(texture.level(0)[row * kSize + column]))
+              << name_of(direction) << ", corner " << corner << ", " << beyond << " voxels outside";
+        }
+      }
+    }
+  }
 }
 
 // ---- faces of types

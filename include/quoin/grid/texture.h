@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -176,8 +177,18 @@ struct TextureFrame {
   return {along(frame.right), along(frame.down)};
 }
 
+/// Returns the column or row of the nearest texel to a point of a face, clamped to the texture. `share`: the point's
+/// position in its voxel along an axis of the grid, 0 to 1, or up to 1 voxel outside. `sign`: 1 or -1, the direction
+/// along this axis in which the texture's columns or rows are numbered (TextureFrame). `size`: texels per side of the
+/// mipmap level. NaN gives 0.
+[[nodiscard]] inline std::uint32_t texel_number(double share, double sign, std::uint32_t size) {
+  const double at = (sign * share + (0.5 - 0.5 * sign)) * static_cast<double>(size);
+  return std::min(static_cast<std::uint32_t>(std::max(0.0, at)), size - 1U);
+}
+
 /// Returns the nearest texel to a point of a face, tinted, in linear light, with its alpha (0 to 1) as the fourth
-/// number. `inside`: the position in its voxel, 0 to 1 on each axis. `level`: of the mipmaps, clamped to the texture's.
+/// number. `inside`: the position in its voxel, 0 to 1 on each axis; positions outside give texels at the texture's
+/// edges. `level`: of the mipmaps, clamped to the texture's.
 /// Requires: the face has a texture.
 [[nodiscard]] std::array<float, 4> texel_at(const VoxelFace& face, Direction direction, const DVec3& inside, int level);
 

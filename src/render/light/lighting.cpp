@@ -587,10 +587,7 @@ Vec3 Lighting::texel_colour(const FaceTexels& face, const SurfacePoint& point) c
   const unsigned log_size = static_cast<unsigned>(face.log_size - level);
   const auto texel_along = [&](std::size_t i) {
     const int axis = face.axis[i];
-    const double share = point.position[axis] - point.voxel[axis];
-    const double sign = face.sign[i];
-    const double at = (sign * share + (0.5 - 0.5 * sign)) * static_cast<double>(1U << log_size);
-    return std::min(static_cast<std::uint32_t>(std::max(0.0, at)), (1U << log_size) - 1U);
+    return texel_number(point.position[axis] - point.voxel[axis], face.sign[i], 1U << log_size);
   };
   const std::uint32_t number = (texel_along(1) << log_size) + texel_along(0);
   // The levels before have size^2 * (1 + 1/4 + ...) texels.
