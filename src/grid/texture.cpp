@@ -10,6 +10,7 @@
 #include <quoin/core/memory.h>
 #include <quoin/grid/voxel_registry.h>
 
+#include "core/memory/make_room.h"
 #include "core/srgb.h"
 
 namespace quoin {
@@ -256,15 +257,22 @@ TextureSet::TextureSet(std::size_t max_layers) : max_layers_(max_layers) {
 
 TextureLayer TextureSet::add(const Texture& texture) {
   if (const auto known = find(texture)) return *known;
-  const auto [open, is_new] = open_.try_emplace(texture.size(), 0);
-  if (is_new || arrays_[open->second].layers.size() >= max_layers_) {
-    arrays_.push_back({texture.size(), {}});
-    open->second = static_cast<std::uint32_t>(arrays_.size() - 1);
+  // Allocates first, so that a failure leaves the set as it was. A size without an array counts as none.
+  std::optional<std::uint32_t>& open = open_[texture.size()];
+  if (open && arrays_[*open].layers.size() < max_layers_) {
+    std::vector<Texture>& layers = arrays_[*open].layers;
+    make_room(layers);
+    const TextureLayer added{*open, static_cast<std::uint32_t>(layers.size())};
+    by_hash_.emplace(texture.hash(), added);
+    layers.push_back(texture);
+    return added;
   }
-  std::vector<Texture>& layers = arrays_[open->second].layers;
-  const TextureLayer added{open->second, static_cast<std::uint32_t>(layers.size())};
-  layers.push_back(texture);
+  make_room(arrays_);
+  Array array{texture.size(), {texture}};
+  const TextureLayer added{static_cast<std::uint32_t>(arrays_.size()), 0};
   by_hash_.emplace(texture.hash(), added);
+  arrays_.push_back(std::move(array));
+  open = added.array;
   return added;
 }
 

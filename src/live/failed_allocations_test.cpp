@@ -32,6 +32,7 @@
 #include <quoin/core/memory.h>
 #include <quoin/grid/connected.h>
 #include <quoin/grid/downsample.h>
+#include <quoin/grid/texture.h>
 #include <quoin/live/live_light.h>
 #include <quoin/live/live_meshes.h>
 #include <quoin/live/live_tracer.h>
@@ -321,6 +322,40 @@ TEST(FailedAllocations, IncludeBlocksOfTheFunctions) {
   EXPECT_THROW(block.resize(3 * kLargeBlock), std::bad_alloc);
   allocations_left = -1;
   EXPECT_EQ(block, BlockVector<std::byte>(2 * kLargeBlock, std::byte{9}));
+}
+
+TEST(FailedAllocations, LeaveTextureSetsUnchanged) {
+  std::vector<Texture> textures;
+  for (const int size : {16, 16, 32, 16, 32, 16}) {
+    const auto shade = static_cast<std::uint8_t>(10 * textures.size());
+    const auto bytes = static_cast<std::size_t>(4 * size * size);
+    textures.push_back(
+        Texture::from_image("t", AlphaImage{size, size, std::vector<std::uint8_t>(bytes, shade)}).value());
+  }
+  TextureSet set(2);
+  TextureSet expected(2);
+  int failures = 0;
+  for (std::size_t i = 0; i < textures.size(); ++i) {
+    bool has_failed = true;
+    for (std::int64_t n = 0; has_failed; ++n) {
+      allocations_left = n;
+      try {
+        set.add(textures[i]);
+        has_failed = false;
+      } catch (const std::bad_alloc&) {
+        ++failures;
+      }
+      allocations_left = -1;
+      ASSERT_EQ(set.find(textures[i]).has_value(), !has_failed);
+      if (has_failed) {
+        ASSERT_EQ(set.arrays().size(), expected.arrays().size());
+      }
+      ASSERT_EQ(set.bytes(), expected.bytes() + (has_failed ? 0 : textures[i].bytes()));
+    }
+    EXPECT_EQ(set.find(textures[i]), expected.add(textures[i]));
+    for (std::size_t j = 0; j <= i; ++j) EXPECT_EQ(set.find(textures[j]), expected.find(textures[j]));
+  }
+  EXPECT_GT(failures, 6);
 }
 
 TEST(FailedAllocations, KeepSurfaces) {

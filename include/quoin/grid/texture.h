@@ -211,8 +211,8 @@ class TextureSet {
   /// `max_layers`: the limit of the device per array, at least 1. A full array is followed by another of the same size.
   explicit TextureSet(std::size_t max_layers = 2'048);
 
-  /// Adds a texture and returns its layer, or returns the layer of an equal one. Layers never move.
-  /// Cost: O(log layers). Requires: not null.
+  /// Adds a texture and returns its layer, or returns the layer of an equal one. Layers never move. Errors: bad_alloc;
+  /// the set is then unchanged. Cost: O(log layers). Requires: not null.
   TextureLayer add(const Texture& texture);
   /// Adds the textures of all types, in the order of the types and of kDirections. Cost: O(types).
   void add(const VoxelRegistry& types);
@@ -228,7 +228,7 @@ class TextureSet {
  private:
   std::size_t max_layers_;
   std::vector<Array> arrays_;
-  std::map<int, std::uint32_t> open_;  // by size: the array with room
+  std::map<int, std::optional<std::uint32_t>> open_;  // by size: the array with room
   std::multimap<std::uint64_t, TextureLayer> by_hash_;
 };
 
