@@ -186,6 +186,35 @@ TEST(RenderTextures, TintsLightAndEmission) {
   }
 }
 
+// A plain top, sides and bottom of several colours: halved grids and impostors show the mean of the face that is seen.
+TEST(RenderTextures, ShowsMeansOfFacesFarAway) {
+  Scene scene;
+  std::array<VoxelFace, 6> faces;
+  for (std::size_t i = 0; i < faces.size(); ++i) {
+    faces[i].texture = random_texture(i % 2 == 0 ? 16 : 64, static_cast<unsigned>(i));
+    faces[i].tint = {static_cast<std::uint8_t>(255 - 40 * i), static_cast<std::uint8_t>(40 * i), 90, 255};
+  }
+  VoxelProperties properties;
+  properties.faces = VoxelFaces(faces);
+  const VoxelType type = scene.types.add(properties).value();
+  Grid grid;
+  grid.fill_box({{-8, -8, -8}, {8, 8, 8}}, type);
+  place(scene, std::move(grid));
+  RenderOptions halved = unlit(5, 5);
+  halved.detail.policy =
+      DetailPolicy{.rule = DetailPolicy::Rule::ByPixels, .voxel_pixels = 1e6, .cell_pixels = 1e6, .far_pixels = 0};
+  RenderOptions far = unlit(32, 32);
+  far.detail.policy = DetailPolicy{.far_pixels = 1000};
+  for (const Direction direction : kDirections) {
+    const VoxelFace& face = scene.types[type].faces[direction];
+    const Pixel expected = shown(face, direction, DVec3(0.5), face.texture.level_count() - 1);
+    EXPECT_EQ(pixel_at(taken(scene, facing(direction, DVec3(0.3), 1.0), halved), 2, 2), expected)
+        << name_of(direction) << ", halved";
+    EXPECT_EQ(pixel_at(taken(scene, facing(direction, DVec3(0.3), 32.0), far), 16, 16), expected)
+        << name_of(direction) << ", impostor";
+  }
+}
+
 TEST(RenderTextures, ShowsMeansOfGlassAndCoarseGrids) {
   Scene scene;
   VoxelProperties properties;

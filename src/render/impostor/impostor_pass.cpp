@@ -252,6 +252,7 @@ class FarTile {
       point.voxel = {hits.grids.x[i], hits.grids.y[i], hits.grids.z[i]};
       point.face = hits.grids.face[i];
       point.placed = hits.placed[i];
+      point.is_far = true;
       point.position = view_->grid_from_view(point.placed).point(ray.origin + ray.direction * hits.grids.t[i]);
       point.in_field = (hits.in_field >> lane & 1U) != 0;
       if (point.in_field) {
@@ -292,8 +293,9 @@ void draw_impostors(const SceneTracer& scene, std::span<const FarInstance> far, 
   const SceneView view(scene, camera.position);
   const VoxelRegistry& types = scene.scene().types;
   const Surfaces surfaces(types);
-  const Lighting lighting(view, types, surfaces, options.light, environment);
+  Lighting lighting(view, types, surfaces, options.light, environment);
   const CameraRays rays(camera, options.width, options.height);
+  if (types.has_textures()) lighting.show_textures(glm::length(rays.down()), rays.is_perspective());
   const ImpostorPass pass(scene, far, camera, options.width, options.height);
   const int across = (options.width + kTile - 1) / kTile;
   const int down = (options.height + kTile - 1) / kTile;

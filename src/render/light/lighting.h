@@ -34,7 +34,7 @@ struct SurfacePoint {
   VoxelType type = kAir;
   Direction face = Direction::PosX;  ///< fields: the direction nearest to the normal
   bool in_field = false;
-  bool is_far = false;      ///< of an impostor, which has no textures
+  bool is_far = false;      ///< of an impostor, whose faces show the means of their textures
   bool is_blended = false;  ///< fields: a blend of the materials around, as Surfaces::blend_of_field
   Vec3 normal{0.0F};        ///< of a field, in its grid, of unit length or 0
   float lift = 0.0F;        ///< of a field: height of the position above the surface, along the normal
@@ -62,9 +62,9 @@ class Lighting {
            const Environment& environment, const LampTable* lamps = nullptr, bool detail_colours = false,
            std::vector<GridLight> levels = {});
 
-  /// Shows the textures of opaque types (VoxelProperties::faces) instead of their mean colours, except on halved grids
-  /// and impostors. `spacing`: the distance of an image's samples in world units; with `is_perspective` at distance 1
-  /// from the view's origin.
+  /// Shows the textures of opaque types (VoxelProperties::faces) instead of their mean colours. Faces of halved grids
+  /// and impostors show the last mipmap level, the mean of their texture. `spacing`: the distance of an image's samples
+  /// in world units; with `is_perspective` at distance 1 from the view's origin.
   ///
   /// Filter: the nearest texel of the mipmap level whose texels are nearest in size to the samples' distance.
   /// Cost:   O(types with textures).
@@ -133,6 +133,8 @@ class Lighting {
   };
   [[nodiscard]] static FaceTexels face_texels(const VoxelProperties& type, Direction direction);
   [[nodiscard]] const FaceTexels* texels_at(const SurfacePoint& point) const;
+  [[nodiscard]] bool shows_mean_of_face(const SurfacePoint& point) const;
+  [[nodiscard]] Vec3 mean_of_face(const FaceTexels& face) const;
   [[nodiscard]] Vec3 texel_colour(const FaceTexels& face, const SurfacePoint& point) const;
   [[nodiscard]] Vec3 shade(const SurfacePoint& point, Vec3 direct, float openness) const;
   [[nodiscard]] Vec3 shade_lit(const SurfacePoint& point, Vec3 direct, float openness) const;
