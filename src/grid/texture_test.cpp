@@ -352,6 +352,10 @@ TEST(VoxelFaces, DistinguishTypes) {
   EXPECT_EQ(types.find_or_add(block).value(), first);
   EXPECT_EQ(types.find_or_add({.name = "block", .faces = texture_of(image, "stone")}).value(), first) << "equal texels";
   EXPECT_EQ(types.find_or_add(types[first]).value(), first);
+  EXPECT_EQ(
+      types.find_or_add({.name = "block", .faces = VoxelFace{.texture = stone, .tint = {255, 255, 255, 9}}}).value(),
+      first)
+      << "the alpha of tints has no effect";
   VoxelProperties plain_block = types[first];
   plain_block.faces = {};
   EXPECT_NE(types.find_or_add(plain_block).value(), first);
@@ -361,6 +365,27 @@ TEST(VoxelFaces, DistinguishTypes) {
     const std::size_t before = types.size();
     EXPECT_EQ(types.find_or_add({.name = "block", .faces = other}).value(), before);
   }
+}
+
+TEST(VoxelFaces, OfOneColourAreFound) {
+  VoxelRegistry types;
+  const Texture texture = texture_of(noise(16, 5, false));
+  const auto block = [&](unsigned i) {
+    std::array<VoxelFace, 6> faces;
+    for (VoxelFace& face : faces) {
+      face.texture = texture;
+      face.turn = static_cast<std::uint8_t>(i % 4);
+      face.mirrored = i / 4 % 2 == 1;
+      i /= 8;
+    }
+    return VoxelProperties{.name = "block", .faces = VoxelFaces(faces)};
+  };
+  for (const bool again : {false, true}) {
+    for (unsigned i = 0; i < 512; ++i) EXPECT_EQ(types.find_or_add(block(i)).value(), i + 1) << again;
+  }
+  types.replace(7, block(600));
+  EXPECT_EQ(types.find_or_add(block(600)).value(), 7);
+  EXPECT_EQ(types.find_or_add(block(6)).value(), 513);
 }
 
 TEST(VoxelFaces, ShareEqualTextures) {

@@ -16,10 +16,21 @@ namespace {
 
 // Hashes only properties that are cheap to mix. Equal properties have equal hashes; `find_or_add` compares the rest.
 std::uint64_t hash_of(const VoxelProperties& p) {
+  constexpr std::uint64_t kFactor = 0x9E37'79B9'7F4A'7C15U;
   const std::uint64_t colour = (std::uint64_t{p.colour.r} << 24) | (std::uint64_t{p.colour.g} << 16) |
                                (std::uint64_t{p.colour.b} << 8) | p.colour.a;
-  return std::hash<std::string>{}(p.name) * 0x9E37'79B9'7F4A'7C15U + colour * 4 +
-         static_cast<std::uint64_t>(p.visibility);
+  std::uint64_t hash =
+      std::hash<std::string>{}(p.name) * kFactor + colour * 4 + static_cast<std::uint64_t>(p.visibility);
+  if (p.faces.empty()) return hash;
+  // Types of one name and mean colour often differ in their faces alone.
+  for (const Direction direction : kDirections) {
+    const VoxelFace& face = p.faces[direction];
+    const std::uint64_t tint = (std::uint64_t{face.tint.r} << 16) | (std::uint64_t{face.tint.g} << 8) | face.tint.b;
+    const std::uint64_t rest =
+        tint * 32 + static_cast<std::uint64_t>(face.alpha) * 8 + std::uint64_t{face.turn} * 2 + (face.mirrored ? 1 : 0);
+    hash = (hash ^ (hash >> 32)) * kFactor + (face.texture.hash() ^ rest * kFactor);
+  }
+  return hash;
 }
 
 // Returns the class of a type for occlusion (VoxelRegistry::occlusion).
@@ -29,7 +40,7 @@ Visibility occlusion_of(const VoxelProperties& p) {
 }
 
 // Makes types that behave alike equal: empties properties that equal the defaults of the type's visibility, and derives
-// the colour of textured types. Returns true if a property changed.
+// the colour of textured types, whose tints become opaque. Returns true if a property changed.
 bool settle(VoxelProperties& p) {
   bool has_changed = false;
   for (std::optional<bool>* property : {&p.blocks_light, &p.occludes}) {
@@ -38,6 +49,17 @@ bool settle(VoxelProperties& p) {
     has_changed = true;
   }
   if (p.faces.empty()) return has_changed;
+  std::array<VoxelFace, 6> faces;
+  bool is_opaque = true;
+  for (const Direction direction : kDirections) {
+    VoxelFace& face = faces[static_cast<std::size_t>(direction)];
+    face = p.faces[direction];
+    is_opaque &= std::exchange(face.tint.a, std::uint8_t{255}) == 255;
+  }
+  if (!is_opaque) {
+    p.faces = VoxelFaces(faces);
+    has_changed = true;
+  }
   const Rgba8 colour = std::exchange(p.colour, p.faces.mean_colour());
   return has_changed || !(colour == p.colour);
 }

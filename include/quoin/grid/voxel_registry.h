@@ -123,7 +123,7 @@ class VoxelRegistry {
   ~VoxelRegistry();
 
   /// Adds a type and returns its id. Ids count up from 1. `blocks_light` and `occludes` become empty if they equal
-  /// their defaults, and `colour` becomes the mean of `faces` if the type has textures.
+  /// their defaults. If the type has textures, `colour` becomes the mean of `faces`, and the alpha of tints 255.
   ///
   /// Errors: LimitExceeded above kMaxVoxelTypes types; those of `validate_type`.
   [[nodiscard]] Result<VoxelType> add(VoxelProperties properties);

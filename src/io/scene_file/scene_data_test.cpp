@@ -398,7 +398,7 @@ TEST(SceneData, RefusesInvalidTexturesWithTheirPosition) {
   EXPECT_EQ(error_after("\"texture\":1", "\"texture\":2"),
             faces + ".sides[3].texture: must be an index into textures, from 0");
   EXPECT_EQ(error_after("\"turn\":3", "\"turn\":4"), faces + ".sides[0].turn: must be a whole number from 0 to 3");
-  EXPECT_EQ(error_after("\"tint\":[1,2,3,4]", "\"tint\":[1,2,3]"),
+  EXPECT_EQ(error_after("\"tint\":[1,2,3,255]", "\"tint\":[1,2,3]"),
             faces + ".sides[2].tint: must be a list of 4 numbers");
   EXPECT_EQ(error_after("\"alpha\":\"cutout\"", "\"alpha\":\"no\""),
             faces + ".sides[3].alpha: must be one of opaque, cutout, translucent");
