@@ -152,14 +152,16 @@ void put_block_occlusion(VertexFormat format, const Source& occlusion) {
   }
 }
 
-// Writes numbers, in as many bytes as the format has.
+// Writes numbers, in as many bytes as the format has. Numbers above 16 bits (of textures) become the greatest one.
 template <class Source>
 void put_numbers(VertexFormat format, const Source& numbers) {
   switch (format) {
     case VertexFormat::Uint8:
       return numbers.template put<std::uint8_t>([](auto number) { return static_cast<std::uint8_t>(number); });
     case VertexFormat::Uint16:
-      return numbers.template put<std::uint16_t>([](auto number) { return static_cast<std::uint16_t>(number); });
+      return numbers.template put<std::uint16_t>([](auto number) {
+        return static_cast<std::uint16_t>(std::min(static_cast<std::uint32_t>(number), std::uint32_t{0xFFFF}));
+      });
     default:
       return numbers.template put<std::uint32_t>([](auto number) { return static_cast<std::uint32_t>(number); });
   }
@@ -335,7 +337,6 @@ VertexWriter::VertexWriter(VertexLayout layout, const VoxelRegistry& types, cons
         if (!is_tint) break;
         Rgba8 tint = properties.colour;
         if (!properties.faces.empty()) tint = properties.faces[direction].tint;
-        if (!properties.faces.empty()) tint.a = 255;
         colours_[i].push_back(encoded(tint, element.format));
       }
     }
@@ -349,11 +350,6 @@ void VertexWriter::read_faces(const VoxelRegistry& types, const TextureSet& text
     return std::ranges::any_of(layout_.elements,
                                [&](const VertexElement& each) { return each.attribute == attribute; });
   };
-  const auto is_narrow = [](const VertexElement& each) {
-    return each.attribute == VertexAttribute::Texture && each.format == VertexFormat::Uint16;
-  };
-  QUOIN_ASSERT(textures.arrays().size() <= 1 || std::ranges::none_of(layout_.elements, is_narrow),
-               "at most one array for layers of 16 bits");
   if (!types.has_textures()) return;
   if (has(VertexAttribute::Texture)) textures_.assign(6 * types.size(), ~std::uint32_t{0});
   if (has(VertexAttribute::TextureUv)) turns_.assign(6 * types.size(), 0);
@@ -365,8 +361,9 @@ void VertexWriter::read_faces(const VoxelRegistry& types, const TextureSet& text
       const std::size_t number = face_number(static_cast<VoxelType>(type), direction);
       if (!turns_.empty()) turns_[number] = static_cast<std::uint8_t>(face.turn + (face.mirrored ? 4 : 0));
       const auto layer = textures_.empty() ? std::nullopt : textures.find(face.texture);
-      QUOIN_ASSERT(!layer || layer->layer <= 0xFFFFU, "layers of 16 bits");
-      if (layer) textures_[number] = layer->array << 16 | layer->layer;
+      if (layer && layer->array <= 0xFFFFU && layer->layer <= 0xFFFFU) {
+        textures_[number] = layer->array << 16 | layer->layer;
+      }
     }
   }
 }

@@ -212,6 +212,30 @@ TEST(VertexWriter, WritesTexturesOfViewsAndOfOneArray) {
   }
 }
 
+// Files can have textures of several sizes, so a set can have more arrays than 16 bits can name.
+TEST(VertexWriter, WritesNoTextureForArraysBeyondItsFormat) {
+  VoxelRegistry types;
+  const Texture small = Texture::from_image("a", noise(16, 1)).value();
+  const Texture large = Texture::from_image("b", noise(32, 2)).value();
+  const VoxelType type = types.add({.name = "block", .faces = {{small}, {large}, {small}}}).value();
+  TextureSet textures;
+  textures.add(types);
+  ASSERT_EQ(textures.arrays().size(), 2U);
+  const VertexLayout layout{6, {{VertexAttribute::Texture, Uint16, 0}, {VertexAttribute::Texture, Uint32, 2}}};
+  Grid grid;
+  grid.set({1, 2, 3}, type);
+  QuadBuffer quads;
+  BlockyMesher().mesh(grid.neighbourhood({0, 0, 0}), types, {}, quads);
+  const VertexWriter writer(layout, types, textures);
+  std::vector<std::byte> bytes(writer.bytes_needed(vertices_needed(quads.size())));
+  writer.write(quads, Vec3(0.0F), bytes);
+  for (std::size_t i = 0; i < 4 * quads.size(); ++i) {
+    const bool is_top = quads[i / 4].direction() == Direction::PosY;
+    EXPECT_EQ(read<std::uint16_t>(bytes, 6 * i), is_top ? 0xFFFF : 0);
+    EXPECT_EQ(read<std::uint32_t>(bytes, 6 * i + 2), is_top ? 0x10000U : 0U);
+  }
+}
+
 TEST(VertexWriter, MatchesLayoutOfStruct) {
   struct Vertex {
     Vec3 position;

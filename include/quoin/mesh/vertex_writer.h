@@ -30,7 +30,9 @@ enum class VertexAttribute : std::uint8_t {
   Type,
   Uv,  ///< voxels from the quad's corner 0, along its u and v: 0 to 64. For textures: see QuadVertex::u
   /// Layer of the face's texture (VoxelProperties::faces) in a TextureSet: TextureLayer::layer, in Uint32 plus
-  /// TextureLayer::array << 16. Faces without a texture have the greatest number of the format.
+  /// TextureLayer::array << 16. Faces without a texture have the greatest number of the format, as have faces whose
+  /// layer or array the format cannot hold: in Uint16 layers from 65,535 and all arrays except the first, in Uint32
+  /// layers or arrays from 65,536.
   Texture,
   /// Texture coordinates from the upper left corner, rightwards and downwards, with the face's turn and mirror:
   /// `texture_coordinates` relative to the quad's voxel, -64 to 64. They repeat with every voxel.
@@ -113,8 +115,7 @@ class VertexWriter {
  public:
   /// Copies the types' colours and faces. After a type has changed, make another writer. `textures` has the layers for
   /// VertexAttribute::Texture; faces whose texture it lacks count as faces without one.
-  /// Requires: at least one source can be written in this layout. With Texture in Uint16, `textures` has at most one
-  ///           array.
+  /// Requires: at least one source can be written in this layout.
   VertexWriter(VertexLayout layout, const VoxelRegistry& types, const TextureSet& textures = TextureSet());
 
   [[nodiscard]] const VertexLayout& layout() const { return layout_; }
