@@ -225,9 +225,9 @@ bool Document::show(const SceneNode& node, bool is_visible) {
 Result<VoxelType> Document::type_of_colour(Rgba8 colour, float emission) {
   for (std::size_t type = 1; type < scene().types.size(); ++type) {
     const VoxelProperties& known = scene().types[static_cast<VoxelType>(type)];
-    if (known.colour == colour && known.visibility == Visibility::Opaque && known.emission == emission) {
-      return static_cast<VoxelType>(type);
-    }
+    // The colour of a textured type is only a mean.
+    const bool is_plain = known.visibility == Visibility::Opaque && known.faces.empty();
+    if (is_plain && known.colour == colour && known.emission == emission) return static_cast<VoxelType>(type);
   }
   VoxelProperties properties;
   properties.colour = colour;

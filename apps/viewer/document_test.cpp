@@ -526,5 +526,18 @@ TEST(Document, ReusesTypeOfEqualColour) {
   EXPECT_EQ(document.scene().types[torch].emission, 8.0F);
 }
 
+TEST(Document, PaintsColoursWithoutTextures) {
+  LoadedScene loaded = small_scene();
+  std::vector<std::uint8_t> texels(4 * 16 * 16, 255);
+  for (std::size_t i = 0; i < texels.size(); i += 4) texels[i] = 7;
+  const VoxelFaces faces = Texture::from_image("teal", AlphaImage{16, 16, texels}).value();
+  const VoxelType textured = loaded.scene.types.add({.name = "teal", .faces = faces}).value();
+  ASSERT_EQ(loaded.scene.types[textured].colour, (Rgba8{7, 255, 255, 255}));
+  Document document(std::move(loaded), "hill.vox");
+  const VoxelType painted = document.type_of_colour({7, 255, 255, 255}).value();
+  EXPECT_NE(painted, textured);
+  EXPECT_TRUE(document.scene().types[painted].faces.empty());
+}
+
 }  // namespace
 }  // namespace quoin::viewer
