@@ -6,7 +6,6 @@
 #include <functional>
 #include <limits>
 #include <numeric>
-#include <set>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -154,16 +153,14 @@ void MaterialPalette::add_textures_of(const MeshView& view) {
 }
 
 void MaterialPalette::make_textured_materials() {
-  std::set<std::string> names;
+  UniqueNames names;
   for (const auto* const materials : {&materials_, &smooth_materials_}) {
-    for (const SurfaceMaterial& material : *materials) names.insert(material.name);
+    for (const SurfaceMaterial& material : *materials) (void)names.add(material.name, " ");
   }
   for (auto& [look, number] : textured_by_look_) {
     number = textured_materials_.size();
     SurfaceMaterial& material = textured_materials_.emplace_back();
-    const std::string& name = textures_[look.texture].name();
-    material.name = name;
-    for (int i = 2; !names.insert(material.name).second; ++i) material.name = name + " " + std::to_string(i);
+    material.name = names.add(textures_[look.texture].name(), " ");
     material.surface = look.surface;
     material.emission = look.emission;
     material.roughness = look.roughness;

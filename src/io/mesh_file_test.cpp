@@ -7,6 +7,9 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <random>
+#include <set>
+#include <string>
 #include <vector>
 
 #include <glm/geometric.hpp>
@@ -569,6 +572,26 @@ TEST(MeshFiles, MeshesBallWhereVolumePlacesIt) {
       EXPECT_NEAR(glm::length(in_voxels - DVec3(40, 15, 13)), 10.0, 0.06);
     }
   }
+}
+
+TEST(UniqueNames, TakesTheFirstFreeNumber) {
+  const std::array<std::string, 5> bases = {"a", "a 2", "a 3", "", "b 2 2"};
+  std::mt19937 random(1);
+  UniqueNames names;
+  std::set<std::string> taken;
+  for (int i = 0; i < 2'000; ++i) {
+    const std::string& name = bases[random() % bases.size()];
+    std::string expected = name;
+    for (int n = 2; !taken.insert(expected).second; ++n) expected = name + " " + std::to_string(n);
+    ASSERT_EQ(names.add(name, " "), expected);
+  }
+}
+
+TEST(UniqueNames, NumberManyEqualNames) {
+  UniqueNames names;
+  std::string last;
+  for (int i = 0; i < 300'000; ++i) last = names.add("stone", "_");
+  EXPECT_EQ(last, "stone_300000");
 }
 
 TEST(MeshFileDeathTest, AssertsOnSingularTransforms) {

@@ -14,6 +14,16 @@
 namespace quoin {
 
 void BlockWriter::put(std::span<const std::byte> bytes) {
+std::string UniqueNames::add(const std::string& name, std::string_view separator) {
+  const auto [known, is_new] = next_number_.try_emplace(name, 2U);
+  if (is_new) return name;
+  while (true) {
+    std::string numbered = name;
+    numbered.append(separator).append(std::to_string(known->second++));
+    if (next_number_.try_emplace(numbered, 2U).second) return numbered;
+  }
+}
+
   while (!bytes.empty()) {
     if (used_ == kBlockBytes) flush();
     const std::size_t count = std::min(bytes.size(), kBlockBytes - used_);

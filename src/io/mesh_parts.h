@@ -6,6 +6,7 @@
 #include <cstring>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <span>
 #include <string>
 #include <string_view>
@@ -23,6 +24,17 @@
 #include <quoin/scene/scene_meshes.h>
 
 namespace quoin {
+
+/// Makes the names of a file unique.
+class UniqueNames {
+ public:
+  /// Returns the name; if it was returned before, with `separator` and the first free number from 2 on after it.
+  /// Cost: O(log names), averaged over all calls with one separator.
+  [[nodiscard]] std::string add(const std::string& name, std::string_view separator);
+
+ private:
+  std::map<std::string, std::uint32_t> next_number_;  // by returned name: all lower numbers are taken
+};
 
 /// Collects small values in blocks of 1 MiB on their way to a file or to memory. After an error it ignores further
 /// writes; `finish` returns the error.

@@ -10,7 +10,6 @@
 #include <istream>
 #include <map>
 #include <memory>
-#include <set>
 #include <streambuf>
 #include <string>
 #include <string_view>
@@ -487,7 +486,7 @@ class ObjLines {
 
  private:
   BlockWriter& out_;
-  std::set<std::string> names_;
+  UniqueNames names_;
 };
 
 std::string ObjLines::text_of(double value) {
@@ -512,9 +511,7 @@ void ObjLines::triple(std::string_view keyword, const DVec3& v, int digits) {
 void ObjLines::object(const std::string& name) {
   std::string word = one_word(name);
   if (word.empty()) word = "object";
-  std::string unique = word;
-  for (int n = 2; !names_.insert(unique).second; ++n) unique = word + "_" + std::to_string(n);
-  out_.put_text("o " + unique + "\n");
+  out_.put_text("o " + names_.add(word, "_") + "\n");
 }
 
 std::string shortest(float value) {
