@@ -129,7 +129,9 @@ MaterialPalette::TexturedLook MaterialPalette::textured_look(const MeshView& vie
   look.surface = view.surface;
   look.texture = texture_by_layer_.at({layer->array, layer->layer});
   look.alpha = face.alpha;
-  look.tint = {face.tint.r, face.tint.g, face.tint.b};
+  look.red = face.tint.r;
+  look.green = face.tint.g;
+  look.blue = face.tint.b;
   look.roughness = unit(type->roughness, 1.0F);
   look.metalness = unit(type->metalness, 0.0F);
   look.emission = emits(view.surface) ? clamped_emission(type->emission) : 0.0F;
@@ -167,7 +169,7 @@ void MaterialPalette::make_textured_materials() {
     material.metalness = look.metalness;
     material.texture = look.texture;
     material.alpha = look.alpha;
-    material.tint = linear_colour(Rgba8{look.tint[0], look.tint[1], look.tint[2]});
+    material.tint = linear_colour(Rgba8{look.red, look.green, look.blue});
   }
 }
 
@@ -424,13 +426,15 @@ std::vector<std::array<float, 2>> MaterialPalette::face_coordinates(const MeshVi
   return coordinates;
 }
 
-PngImage MaterialPalette::image_of(std::size_t texture) const {
+PngImage MaterialPalette::image_of(std::size_t texture, const Vec3& tint) const {
   QUOIN_ASSERT(texture < textures_.size(), "a texture that materials use");
   const Texture& of = textures_[texture];
   const auto size = static_cast<std::uint32_t>(of.size());
   PngImage image{size, size, of.is_opaque() ? 3U : 4U, {}};
+  image.pixels.reserve(image.channels * of.level(0).size());
   for (const Rgba8 texel : of.level(0)) {
-    image.pixels.insert(image.pixels.end(), {texel.r, texel.g, texel.b});
+    const Rgba8 shown = tint == Vec3(1.0F) ? texel : quoin::srgb_colour(linear_colour(texel) * tint);
+    image.pixels.insert(image.pixels.end(), {shown.r, shown.g, shown.b});
     if (!of.is_opaque()) image.pixels.push_back(texel.a);
   }
   return image;

@@ -156,8 +156,9 @@ class MaterialPalette {
   }
   /// Returns the textures that materials use, each once.
   [[nodiscard]] const std::vector<Texture>& textures() const { return textures_; }
-  /// Returns a texture as an image, without alpha if it is opaque. Requires: an index into `textures`.
-  [[nodiscard]] PngImage image_of(std::size_t texture) const;
+  /// Returns a texture as an image, without alpha if it is opaque. `tint`: multiplies it in linear light, 0 to 1.
+  /// Requires: an index into `textures`.
+  [[nodiscard]] PngImage image_of(std::size_t texture, const Vec3& tint = Vec3(1.0F)) const;
   /// Returns the texture coordinates of each vertex of textured faces, from the upper left corner. Textures repeat, so
   /// each face has coordinates relative to its own lowest corner, which are small. Requires: all faces are textured.
   [[nodiscard]] std::vector<std::array<float, 2>> face_coordinates(const MeshView& view) const;
@@ -208,7 +209,10 @@ class MaterialPalette {
     SurfaceClass surface = SurfaceClass::Opaque;
     std::size_t texture = 0;
     FaceAlpha alpha = FaceAlpha::Opaque;
-    std::array<std::uint8_t, 3> tint{};
+    // The tint, sRGB. Not as an array: those of libc++ 16 have no order.
+    std::uint8_t red = 255;
+    std::uint8_t green = 255;
+    std::uint8_t blue = 255;
     float roughness = 1.0F;
     float metalness = 0.0F;
     float emission = 0.0F;

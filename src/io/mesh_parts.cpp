@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include <glm/matrix.hpp>
 #include <quoin/core/assert.h>
@@ -13,7 +14,6 @@
 
 namespace quoin {
 
-void BlockWriter::put(std::span<const std::byte> bytes) {
 std::string UniqueNames::add(const std::string& name, std::string_view separator) {
   const auto [known, is_new] = next_number_.try_emplace(name, 2U);
   if (is_new) return name;
@@ -24,6 +24,7 @@ std::string UniqueNames::add(const std::string& name, std::string_view separator
   }
 }
 
+void BlockWriter::put(std::span<const std::byte> bytes) {
   while (!bytes.empty()) {
     if (used_ == kBlockBytes) flush();
     const std::size_t count = std::min(bytes.size(), kBlockBytes - used_);

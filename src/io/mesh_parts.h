@@ -71,13 +71,17 @@ class BlockWriter {
     used_ = used;
   }
   void put_text(std::string_view text) { put(std::as_bytes(std::span(text))); }
+  /// Ends with an error of the caller, unless there was one before.
+  void fail(Error error) {
+    if (status_) status_ = std::move(error);
+  }
   /// Pads to a multiple of four bytes since the start.
   void align(char filler);
 
   /// Returns true if further writes are ignored; lets long loops end early.
   [[nodiscard]] bool failed() const { return !status_.has_value(); }
   [[nodiscard]] std::uint64_t bytes() const { return written_ + used_; }
-  /// Errors: the sink's first error; Cancelled.
+  /// Errors: the first error of the sink or of `fail`; Cancelled.
   [[nodiscard]] Status finish();
 
  private:

@@ -88,8 +88,9 @@ struct MeshFileOptions {
 ///            STL are relative to mesh_file_offset; 3MF stores that offset in the transform of its items.
 /// OBJ:       one object per placement, in world units. Blocks: coordinates to a millionth of a unit, with NAME.mtl,
 ///            NAME_palette.png, NAME_emissive.png (if a type emits light) and NAME_atlas.png (with an atlas) next to
-///            NAME.obj. Textured faces have materials as in glTF, with NAME_texture_1.png and so on: the tint in Kd
-///            (sRGB), alpha in map_d. Without an atlas, occlusion is a grey colour after the vertex coordinates
+///            NAME.obj. Textured faces have materials as in glTF: map_Kd is NAME_texture_1.png and so on, an image of
+///            each texture and tint, with the texture's alpha; map_d of cutout and translucent faces is a grey image,
+///            NAME_alpha_1.png and so on. Without an atlas, occlusion is a grey colour after the vertex coordinates
 ///            ("v x y z r g b"), an extension that many programs read. Each transparent type has its own material with
 ///            d, Tf and Ni. Smooth meshes: nine digits, sRGB colours after the coordinates, no materials.
 ///            OcclusionIn::Attribute is not supported.

@@ -545,6 +545,12 @@ std::string mtl_glass(const SurfaceMaterial& material, const VoxelProperties& pr
   return text;
 }
 
+/// Returns emission as MTL lines. MTL has no emission strength, so Ke holds it.
+std::string mtl_emission(float strength, const std::string& image) {
+  const std::string text = shortest(strength);
+  return "Ke " + text + " " + text + " " + text + "\nmap_Ke " + image + "\n";
+}
+
 /// The names of an OBJ's sidecar files.
 struct ObjNames {
   std::filesystem::path library;
@@ -552,36 +558,91 @@ struct ObjNames {
   std::filesystem::path emissive;
   std::filesystem::path atlas;
   std::string texture_stem;
-
-  /// Returns the path of a texture of MaterialPalette::textures. Names of textures may not be file names.
-  [[nodiscard]] std::filesystem::path texture(std::size_t number) const {
-    return texture_stem + std::to_string(number + 1) + ".png";
-  }
+  std::string alpha_stem;
 };
 
 ObjNames names_beside(const std::filesystem::path& path) {
   const std::string stem = (path.parent_path() / path.stem()).string();
-  return {stem + ".mtl", stem + "_palette.png", stem + "_emissive.png", stem + "_atlas.png", stem + "_texture_"};
+  return {stem + ".mtl",       stem + "_palette.png", stem + "_emissive.png",
+          stem + "_atlas.png", stem + "_texture_",    stem + "_alpha_"};
 }
 
-/// Returns a material of textured faces. The tint is in Kd, which clients multiply by the texture.
-std::string mtl_textured(const SurfaceMaterial& material, const std::string& name, const ObjNames& names) {
-  QUOIN_ASSERT(material.texture.has_value(), "a textured material");
-  const std::string image = names.texture(*material.texture).filename().string();
-  const auto colour = [](const char* key, const Vec3& c) {
-    return std::string(key) + " " + shortest(c.x) + " " + shortest(c.y) + " " + shortest(c.z) + "\n";
+/// The images of textured faces: one of each texture and tint, and a grey one of each alpha. Many programs show an
+/// image instead of Kd, and read one channel of map_d.
+class FaceImages {
+ public:
+  FaceImages(std::shared_ptr<const MaterialPalette> palette, const ObjNames& names) : palette_(std::move(palette)) {
+    for (const SurfaceMaterial& material : palette_->textured_materials()) {
+      add(colour_of(material), names.texture_stem);
+      if (material.alpha != FaceAlpha::Opaque) add(alpha_of(material), names.alpha_stem);
+    }
+  }
+
+  /// Returns the names of a material's images in its folder.
+  [[nodiscard]] std::string colour_file(const SurfaceMaterial& of) const { return file_of(colour_of(of)); }
+  [[nodiscard]] std::string alpha_file(const SurfaceMaterial& of) const { return file_of(alpha_of(of)); }
+
+  /// Adds all images to the files to write. They are encoded when they are written, one at a time.
+  void add_to(std::vector<MeshFile>& files) const {
+    for (const auto& [image, path] : paths_) {
+      files.push_back({path, 0, [image = image, palette = palette_](BlockWriter& out) {
+                         const auto png = encode_png(pixels_of(image, *palette));
+                         if (!png) return out.fail(png.error());
+                         out.put(std::span(*png));
+                       }});
+    }
+  }
+
+ private:
+  struct Image {
+    bool is_alpha = false;
+    std::size_t texture = 0;  // of the palette
+    float red = 1.0F;         // the tint, linear
+    float green = 1.0F;
+    float blue = 1.0F;
+    auto operator<=>(const Image&) const = default;
   };
-  const Rgba8 tint = quoin::srgb_colour(material.tint);
-  std::string text = "\nnewmtl " + name + "\nKa 0 0 0\n";
-  text.append(colour("Kd", Vec3(tint.r, tint.g, tint.b) / 255.0F)).append("Ks 0 0 0\nillum 1\nmap_Kd " + image + "\n");
-  if (material.alpha != FaceAlpha::Opaque) text.append("map_d " + image + "\n");
-  if (material.is_emissive())
-    text.append(colour("Ke", material.tint * material.emission)).append("map_Ke " + image + "\n");
+
+  static Image colour_of(const SurfaceMaterial& material) {
+    QUOIN_ASSERT(material.texture.has_value(), "a textured material");
+    return {false, *material.texture, material.tint.x, material.tint.y, material.tint.z};
+  }
+  static Image alpha_of(const SurfaceMaterial& material) { return {true, colour_of(material).texture}; }
+
+  static PngImage pixels_of(const Image& image, const MaterialPalette& palette) {
+    if (!image.is_alpha) return palette.image_of(image.texture, {image.red, image.green, image.blue});
+    const Texture& texture = palette.textures()[image.texture];
+    const auto size = static_cast<std::uint32_t>(texture.size());
+    PngImage grey{size, size, 3, {}};
+    for (const Rgba8 texel : texture.level(0)) grey.pixels.insert(grey.pixels.end(), 3, texel.a);
+    return grey;
+  }
+
+  // Textures' own names may not be file names.
+  void add(const Image& image, const std::string& stem) {
+    const auto [added, is_new] = paths_.try_emplace(image);
+    if (is_new) added->second = stem + std::to_string(++(image.is_alpha ? alphas_ : colours_)) + ".png";
+  }
+  [[nodiscard]] std::string file_of(const Image& image) const { return paths_.at(image).filename().string(); }
+
+  std::shared_ptr<const MaterialPalette> palette_;
+  std::map<Image, std::filesystem::path> paths_;
+  std::size_t colours_ = 0;
+  std::size_t alphas_ = 0;
+};
+
+/// Returns a material of textured faces. Its image has the tint.
+std::string mtl_textured(const SurfaceMaterial& material, const std::string& name, const FaceImages& images) {
+  const std::string image = images.colour_file(material);
+  std::string text = "\nnewmtl " + name + "\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\nmap_Kd " + image + "\n";
+  if (material.alpha != FaceAlpha::Opaque) text.append("map_d " + images.alpha_file(material) + "\n");
+  if (material.is_emissive()) text.append(mtl_emission(material.emission, image));
   return text;
 }
 
-/// Writes one material for each of the palette's, by name. MTL has no emission strength, so Ke holds it.
-std::string mtl_text(const SceneMeshes& meshes, const MaterialPalette& palette, const ObjNames& names) {
+/// Writes one material for each of the palette's, by name.
+std::string mtl_text(const SceneMeshes& meshes, const MaterialPalette& palette, const ObjNames& names,
+                     const FaceImages& images) {
   std::string text = first_line();
   for (std::size_t i = 0; i < palette.materials().size(); ++i) {
     const SurfaceMaterial& material = palette.materials()[i];
@@ -589,15 +650,11 @@ std::string mtl_text(const SceneMeshes& meshes, const MaterialPalette& palette, 
     const bool is_in_atlas = material.surface == SurfaceClass::Opaque && !meshes.atlas.rgb.empty();
     text.append("map_Kd ").append((is_in_atlas ? names.atlas : names.palette).filename().string()).append("\n");
     if (material.is_transparent()) text.append(mtl_glass(material, meshes.types[material.type]));
-    if (material.is_emissive()) {
-      const std::string strength = shortest(material.emission);
-      text.append("Ke ").append(strength).append(" ").append(strength).append(" ").append(strength);
-      text.append("\nmap_Ke ").append(names.emissive.filename().string()).append("\n");
-    }
+    if (material.is_emissive()) text.append(mtl_emission(material.emission, names.emissive.filename().string()));
   }
   const std::size_t first = palette.materials().size() + palette.smooth_materials().size();
   for (std::size_t i = 0; i < palette.textured_materials().size(); ++i) {
-    text.append(mtl_textured(palette.textured_materials()[i], mtl_name(palette, first + i), names));
+    text.append(mtl_textured(palette.textured_materials()[i], mtl_name(palette, first + i), images));
   }
   return text;
 }
@@ -788,10 +845,9 @@ Result<std::vector<MeshFile>> plan_obj(const SceneMeshes& meshes, const std::fil
     if (!meshes.atlas.rgb.empty()) {
       if (auto added = add_image(names.atlas, png_of(meshes.atlas), files); !added) return added.error();
     }
-    for (std::size_t i = 0; i < palette->textures().size(); ++i) {
-      if (auto added = add_image(names.texture(i), palette->image_of(i), files); !added) return added.error();
-    }
-    std::string text = mtl_text(meshes, *palette, names);
+    const FaceImages images(palette, names);
+    images.add_to(files);
+    std::string text = mtl_text(meshes, *palette, names, images);
     files.push_back({names.library, 0, [text = std::move(text)](BlockWriter& out) { out.put_text(text); }});
   }
   const auto write = [&meshes, palette, library = names.library.filename().string()](BlockWriter& out) {
@@ -807,9 +863,11 @@ std::vector<std::filesystem::path> obj_companions(const SceneMeshes& meshes, con
   std::vector<std::filesystem::path> files = {names.library, names.palette};
   if (!meshes.atlas.rgb.empty()) files.push_back(names.atlas);
   if (meshes.types.has_textures() && check_meshes(meshes)) {
-    const MaterialPalette palette(meshes, FaceColours::Textures);
-    if (palette.has_emission()) files.push_back(names.emissive);
-    for (std::size_t i = 0; i < palette.textures().size(); ++i) files.push_back(names.texture(i));
+    const auto palette = std::make_shared<const MaterialPalette>(meshes, FaceColours::Textures);
+    if (palette->has_emission()) files.push_back(names.emissive);
+    std::vector<MeshFile> images;
+    FaceImages(palette, names).add_to(images);
+    for (const MeshFile& image : images) files.push_back(image.path);
     return files;
   }
   for (const MeshPart& part : meshes.parts) {
