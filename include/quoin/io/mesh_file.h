@@ -109,9 +109,9 @@ struct MeshFileOptions {
 ///            outside glTF and OBJ, textures of types, whose mean colours are written.
 /// Order:     the same bytes on every run.
 /// Memory:    vertices are streamed: 1 MiB, the glTF JSON, and, for one part at a time (in glTF for all), a copy of
-///            surfaces with several materials (emission, glass, textures). Coordinates of textured faces need 16 bytes
-///            per vertex of a material while they are written. `compress` adds all compressed data and the largest
-///            array as stored.
+///            surfaces with several materials (emission, glass, textures). Coordinates of textured faces need up to 20
+///            bytes per vertex of a material while they are written. `compress` adds all compressed data and the
+///            largest array as stored.
 /// Errors:    Unsupported for formats without meshes; for light, `quantize` and `compress` outside glTF; for an atlas
 ///            with occlusion in PLY, STL and 3MF; for OcclusionIn::Attribute in OBJ, STL and 3MF; for `compress` in
 ///            builds without meshoptimizer. CannotWrite. Cancelled. LimitExceeded beyond 4 GiB of GLB, or 2^31 - 1
