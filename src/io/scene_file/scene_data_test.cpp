@@ -352,6 +352,64 @@ TEST(SceneData, KeepsTextures) {
   }
 }
 
+// 400 types with the same two textures, each on all or some of their faces.
+VoxelRegistry types_with_shared_textures() {
+  const Texture bark = random_texture("bark", 64, 1, false);
+  const Texture wood = random_texture("wood", 64, 2, false);
+  VoxelRegistry types;
+  EXPECT_TRUE(types.add({.name = "plain"}));
+  for (int i = 0; i < 400; ++i) {
+    const VoxelFace tinted{.texture = bark, .tint = {static_cast<std::uint8_t>(i % 256), 9, 9}};
+    const std::string name = "log " + std::to_string(i);
+    const VoxelFaces faces = i % 3 == 0 ? VoxelFaces(tinted) : VoxelFaces(tinted, {wood}, {wood});
+    EXPECT_TRUE(types.add({.name = name, .faces = faces}));
+  }
+  return types;
+}
+
+TEST(SceneData, WritesSharedTexturesOnce) {
+  Scene scene;
+  scene.types = types_with_shared_textures();
+  const std::string text = text_of(scene);
+  constexpr std::size_t kTexture = 64 * 64 * 4;  // base64 of 3 bytes per texel
+  EXPECT_LT(text.size(), 2 * kTexture + 401 * 400);
+  EXPECT_NE(text.find(R"({"type":2,"texture":0})"), std::string::npos);
+  const auto loaded = read(text);
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  ASSERT_EQ(loaded->scene.types.size(), scene.types.size());
+  for (VoxelType type = 1; type < scene.types.size(); ++type) {
+    ASSERT_EQ(loaded->scene.types[type], scene.types[type]) << type;
+  }
+  EXPECT_EQ(text_of(loaded->scene), text);
+}
+
+TEST(SceneData, RefusesInvalidReferencesToTextures) {
+  Scene scene;
+  scene.types = types_with_shared_textures();
+  const std::string text = text_of(scene);
+  const std::string wanted = R"({"type":2,"texture":0})";
+  const std::size_t at = text.find(wanted);
+  ASSERT_NE(at, std::string::npos);
+  const auto error_of = [&](const std::string& reference) {
+    const auto loaded = read(std::string(text).replace(at, wanted.size(), reference));
+    return loaded ? "" : loaded.error().message;
+  };
+  const std::string place = "types[2].faces.textures[0]";
+  EXPECT_EQ(error_of(wanted), "");
+  EXPECT_EQ(error_of(R"({"type":3,"texture":0})"), place + ".type: type 3 does not come before this type") << "itself";
+  EXPECT_EQ(error_of(R"({"type":4,"texture":0})"), place + ".type: type 4 does not come before this type");
+  EXPECT_EQ(error_of(R"({"type":65535,"texture":0})"), place + ".type: type 65535 does not come before this type");
+  EXPECT_EQ(error_of(R"({"type":0,"texture":0})"), place + ".type: type 0 does not come before this type");
+  EXPECT_EQ(error_of(R"({"type":1,"texture":0})"), place + ".texture: type 1 has no texture 0 in its list");
+  EXPECT_EQ(error_of(R"({"type":2,"texture":1})"), place + ".texture: type 2 has no texture 1 in its list");
+  EXPECT_EQ(error_of(R"({"type":2,"texture":6})"), place + ".texture: must be a whole number from 0 to 5");
+  EXPECT_EQ(error_of(R"({"type":-1,"texture":0})"), place + ".type: must be a whole number from 0 to 65535");
+  EXPECT_EQ(error_of(R"({"type":1e99,"texture":0})"), place + ".type: must be a whole number from 0 to 65535");
+  EXPECT_EQ(error_of(R"({"type":[2],"texture":0})"), place + ".type: must be a whole number from 0 to 65535");
+  EXPECT_EQ(error_of(R"({"type":2})"), place + ": \"texture\" is missing");
+  EXPECT_EQ(error_of(R"({"type":2,"texture":0,"size":64})"), place + ": \"size\" is unknown here");
+}
+
 TEST(SceneData, NamesTexturesThatAFormatLacks) {
   Scene scene = scene_of(Grid());
   ASSERT_TRUE(scene.types.add({.name = "wall", .faces = random_texture("wall", 16, 3, false)}));
@@ -389,7 +447,7 @@ TEST(SceneData, RefusesInvalidTexturesWithTheirPosition) {
                 ".textures[0]: cannot use texture \"frame\": its sides must be equal, and 16, 32, 64, 128, 256, 512 "
                 "or 1024 texels long, not 31 x 31 texels");
   EXPECT_EQ(error_after("\"size\":32", "\"size\":64"),
-            faces + ".textures[0]: cannot use texture \"frame\": it must have 4 bytes for each of its 64 x 64 texels");
+            faces + ".textures[0].texels: must have 3 or 4 bytes for each of the 64 x 64 texels, not 3072 bytes");
   EXPECT_EQ(error_after("\"size\":32", "\"size\":-1"),
             faces + ".textures[0].size: must be a whole number from 0 to 1024");
   EXPECT_EQ(error_after("\"size\":32,", ""), faces + ".textures[0]: \"size\" is missing");

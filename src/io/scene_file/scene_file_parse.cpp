@@ -187,8 +187,9 @@ void read_voxels(const std::vector<Piece>& pieces, const VoxelRegistry& types, s
 VoxelRegistry read_types(const Object& file) {
   VoxelRegistry types;
   if (file.find("types") == nullptr) return types;
+  TexturesOfTypes textures;
   read_list(file, "types", kMaxVoxelTypes, [&](const Json& each, const Place& place) {
-    const auto added = types.add(properties_of(each, place, file.faults()));
+    const auto added = types.add(properties_of(each, place, textures, file.faults()));
     if (!added) file.faults().add(place, added.error().message, added.error().code);
   });
   return types;

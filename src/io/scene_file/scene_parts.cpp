@@ -324,7 +324,11 @@ OrderedJson PartWriter::text(const std::string& bytes) {
   return {{"base64", to_base64(std::as_bytes(std::span(bytes)))}};
 }
 
-OrderedJson PartWriter::json_of(const Texture& texture) {
+OrderedJson PartWriter::json_of(const Texture& texture, std::size_t index) {
+  const auto [first, last] = written_.equal_range(texture.hash());
+  const auto same = std::find_if(first, last, [&](const auto& each) { return each.second.texture == texture; });
+  if (same != last) return {{"type", same->second.type}, {"texture", same->second.index}};
+  written_.emplace(texture.hash(), WrittenTexture{texture, types_, index});
   const std::size_t channels = texture.is_opaque() ? 3 : 4;
   std::vector<std::byte> bytes;
   bytes.reserve(channels * texture.level(0).size());
@@ -343,7 +347,7 @@ OrderedJson PartWriter::json_of(const VoxelFaces& faces) {
     const VoxelFace& face = faces[direction];
     auto known = std::ranges::find(textures, face.texture);
     if (known == textures.end()) {
-      json["textures"].push_back(json_of(face.texture));
+      json["textures"].push_back(json_of(face.texture, textures.size()));
       known = textures.insert(textures.end(), face.texture);
     }
     OrderedJson each = {{"texture", known - textures.begin()}};
@@ -358,6 +362,7 @@ OrderedJson PartWriter::json_of(const VoxelFaces& faces) {
 }
 
 OrderedJson PartWriter::json_of(const VoxelProperties& type) {
+  ++types_;
   const VoxelProperties plain;
   OrderedJson json = OrderedJson::object();
   if (!type.name.empty()) json["name"] = text(type.name);
@@ -485,7 +490,25 @@ std::size_t small_number(const Object& object, std::string_view key, std::size_t
   return usual;
 }
 
-Texture texture_of(const Json& json, const Place& place, Faults& faults) {
+// Reads a texture that an earlier type has.
+Texture shared_texture(const Json& json, const Place& place, const TexturesOfTypes& earlier, Faults& faults) {
+  const Object object(json, place, {"type", "texture"}, faults);
+  constexpr std::size_t kMostTextures = 6;
+  const std::size_t type = small_number(object, "type", kMaxVoxelTypes, 0);
+  const std::size_t texture = small_number(object, "texture", kMostTextures - 1, 0);
+  if (object.need("texture") == nullptr || faults.error()) return {};
+  if (type == 0 || type > earlier.size()) {
+    faults.add(object.place_of("type"), "type " + std::to_string(type) + " does not come before this type");
+    return {};
+  }
+  if (const std::vector<Texture>& of_type = earlier[type - 1]; texture < of_type.size()) return of_type[texture];
+  faults.add(object.place_of("texture"),
+             "type " + std::to_string(type) + " has no texture " + std::to_string(texture) + " in its list");
+  return {};
+}
+
+Texture texture_of(const Json& json, const Place& place, const TexturesOfTypes& earlier, Faults& faults) {
+  if (json.is_object() && json.contains("type")) return shared_texture(json, place, earlier, faults);
   const Object object(json, place, {"name", "size", "texels"}, faults);
   std::string name;
   object.read_text("name", name);
@@ -499,13 +522,19 @@ Texture texture_of(const Json& json, const Place& place, Faults& faults) {
   }
   const std::size_t count = static_cast<std::size_t>(size) * static_cast<std::size_t>(size);
   const std::size_t channels = bytes->size() == 3 * count ? 3 : 4;
-  AlphaImage image{size, size, {}};
-  if (bytes->size() == channels * count) image.rgba.resize(4 * count, 255);
-  for (std::size_t i = 0; i < image.rgba.size(); ++i) {
+  const bool is_complete = bytes->size() == channels * count;
+  AlphaImage image{size, size, std::vector<std::uint8_t>(4 * count, 255)};
+  for (std::size_t i = 0; is_complete && i < image.rgba.size(); ++i) {
     if (i % 4 < channels) image.rgba[i] = std::to_integer<std::uint8_t>((*bytes)[i / 4 * channels + i % 4]);
   }
   auto texture = Texture::from_image(std::move(name), image);
-  if (!texture) faults.add(place, texture.error().message);
+  if (!texture) {
+    faults.add(place, texture.error().message);
+  } else if (!is_complete) {
+    const std::string side = std::to_string(size);
+    faults.add(object.place_of("texels"), "must have 3 or 4 bytes for each of the " + side + " x " + side +
+                                              " texels, not " + std::to_string(bytes->size()) + " bytes");
+  }
   return texture ? *texture : Texture();
 }
 
@@ -529,22 +558,24 @@ VoxelFace face_of(const Json& json, const Place& place, const std::vector<Textur
   return face;
 }
 
-VoxelFaces faces_of(const Json& json, const Place& place, Faults& faults) {
+// Reads the faces of the next type.
+VoxelFaces faces_of(const Json& json, const Place& place, TexturesOfTypes& earlier, Faults& faults) {
   const Object object(json, place, {"textures", "sides"}, faults);
   std::vector<Texture> textures;
   read_list(object, "textures", 6,
-            [&](const Json& each, const Place& at) { textures.push_back(texture_of(each, at, faults)); });
+            [&](const Json& each, const Place& at) { textures.push_back(texture_of(each, at, earlier, faults)); });
   std::array<VoxelFace, 6> sides;
   std::size_t count = 0;
   read_list(object, "sides", sides.size(),
             [&](const Json& each, const Place& at) { sides[count++] = face_of(each, at, textures, faults); });
   if (count != sides.size() && !faults.error()) faults.add(object.place_of("sides"), "must be a list of 6 faces");
+  earlier.push_back(std::move(textures));
   return VoxelFaces(sides);
 }
 
 }  // namespace
 
-VoxelProperties properties_of(const Json& json, const Place& place, Faults& faults) {
+VoxelProperties properties_of(const Json& json, const Place& place, TexturesOfTypes& earlier, Faults& faults) {
   const Object type(
       json, place,
       {"name", "colour", "visibility", "collides", "roughness", "metalness", "emission", "ior", "scattering",
@@ -585,8 +616,11 @@ VoxelProperties properties_of(const Json& json, const Place& place, Faults& faul
   }
   type.read("remesh_on_data", properties.remesh_on_data);
   if (type.find("attributes") != nullptr) read_attributes(type, properties.attributes);
-  if (const Json* faces = type.find("faces")) {
-    properties.faces = faces_of(*faces, type.place_of("faces"), faults);
+  const Json* const faces = type.find("faces");
+  if (faces == nullptr) {
+    earlier.emplace_back();
+  } else {
+    properties.faces = faces_of(*faces, type.place_of("faces"), earlier, faults);
     if (faults.error()) {
       properties.faces = {};
     } else if (const Status valid = validate_type(properties); !valid) {

@@ -1,9 +1,12 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
+#include <map>
 #include <span>
 #include <string>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 #include <quoin/io/loaded_scene.h>
@@ -32,6 +35,7 @@ using OrderedJson = nlohmann::ordered_json;
 /// Writes parts, and records if they need version 2 of the format.
 class PartWriter {
  public:
+  /// Writes the next type, counted from 1. A texture of a type that this object wrote before is a reference to it.
   [[nodiscard]] OrderedJson json_of(const VoxelProperties& type);
   /// Writes a grid without its voxels, densities and data.
   [[nodiscard]] OrderedJson json_of(const SceneGrid& grid);
@@ -46,15 +50,29 @@ class PartWriter {
   [[nodiscard]] bool needs_second() const { return needs_second_; }
 
  private:
+  struct WrittenTexture {
+    Texture texture;
+    std::size_t type = 0;
+    std::size_t index = 0;  // in the type's list
+  };
+
   [[nodiscard]] OrderedJson json_of(const VoxelFaces& faces);
-  [[nodiscard]] OrderedJson json_of(const Texture& texture);
+  [[nodiscard]] OrderedJson json_of(const Texture& texture, std::size_t index);
   [[nodiscard]] OrderedJson text(const std::string& bytes);
 
+  std::size_t types_ = 0;                                 // that were written
+  std::multimap<std::uint64_t, WrittenTexture> written_;  // of all types, each once, by hash
   bool needs_second_ = false;
 };
 
+/// The textures of the types that were read, as their texts list them: of type i + 1 at index i.
+using TexturesOfTypes = std::vector<std::vector<Texture>>;
+
 // Reads parts; appends errors to `faults`.
-[[nodiscard]] VoxelProperties properties_of(const Json& json, const Place& place, Faults& faults);
+
+/// Reads the next type, whose textures may refer to those of `earlier` types, and appends its textures to `earlier`.
+[[nodiscard]] VoxelProperties properties_of(const Json& json, const Place& place, TexturesOfTypes& earlier,
+                                            Faults& faults);
 [[nodiscard]] SceneFile::Placement placement_of(const Json& json, const Place& place, Faults& faults);
 [[nodiscard]] SceneFile::Group group_of(const Json& json, const Place& place, Faults& faults);
 [[nodiscard]] SceneLayer layer_of(const Json& json, const Place& place, Faults& faults);

@@ -26,7 +26,8 @@ using scene_json::Place;
 constexpr int kMaxDepth = 32;
 
 VoxelProperties read(const Json& json, const Place& place, Faults& faults, VoxelProperties*) {
-  return scene_json::properties_of(json, place, faults);
+  scene_json::TexturesOfTypes none;  // a type's part has all of its textures, since parts change one by one
+  return scene_json::properties_of(json, place, none, faults);
 }
 
 WorldGrid read(const Json& json, const Place& place, Faults& faults, WorldGrid*) {
