@@ -209,12 +209,28 @@ class Save {
         if (type < scene_.types.size() && (*held)[number] == scene_.types[number]) continue;
         return make_error(ErrorCode::InvalidArgument, "the world and the scene differ in type " + std::to_string(type));
       }
-      changes_.put_types(scene_.types, static_cast<VoxelType>(std::min<std::size_t>(held->size(), kMaxVoxelTypes)));
-      return {};
+      return put_types(types_from(held->size()));
     }
-    if (changed.all) changes_.put_types(scene_.types);
-    for (const TypeChange& change : changed.items_unless_all())
-      changes_.put_type(change.type, scene_.types[change.type]);
+    std::vector<VoxelType> types = types_from(changed.all ? 1 : scene_.types.size());
+    for (const TypeChange& change : changed.items_unless_all()) types.push_back(change.type);
+    return put_types(types);
+  }
+
+  [[nodiscard]] std::vector<VoxelType> types_from(std::size_t first) const {
+    std::vector<VoxelType> types;
+    for (std::size_t type = first; type < scene_.types.size(); ++type) types.push_back(static_cast<VoxelType>(type));
+    return types;
+  }
+
+  // Each type's part has all of its textures, also those that types share, and a save keeps all parts in memory.
+  Status put_types(std::span<const VoxelType> types) {
+    constexpr std::uint64_t kMaxTextureBytes = std::uint64_t{2} << 30;
+    std::uint64_t bytes = 0;
+    for (const VoxelType type : types) bytes += texture_bytes(scene_.types[type]);
+    if (bytes > kMaxTextureBytes) {
+      return make_error(ErrorCode::LimitExceeded, "the textures of the types would have more than 2 GiB in the world");
+    }
+    for (const VoxelType type : types) changes_.put_type(type, scene_.types[type]);
     return {};
   }
 

@@ -834,6 +834,21 @@ TEST(WorldSaver, KeepsWholeGrids) {
   EXPECT_EQ(grid_in(load_world(*world)->loaded.scene, kGround).grid.get({200, 1, 1}), 3);
 }
 
+// The texts of the types would have 4 MiB each, although all share one texture.
+TEST(WorldSaver, RefusesTexturesAboveLimitBeforeEncodingThem) {
+  const WorldFolder folder;
+  const AlphaImage image{1024, 1024, std::vector<std::uint8_t>(std::size_t{4} * 1024 * 1024, 255)};
+  const Texture snow = Texture::from_image("snow", image).value();
+  Scene scene;
+  for (int i = 0; i < 520; ++i) ASSERT_TRUE(scene.types.add({.name = std::to_string(i), .faces = snow}));
+  auto world = WorldStore::create(folder / "w.quoin");
+  ASSERT_TRUE(world);
+  WorldSaver saver;
+  const auto refused = saver.save(*world, scene);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::LimitExceeded);
+}
+
 TEST(WorldSaver, RefusesWholeGridsAboveLimit) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";

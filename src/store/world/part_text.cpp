@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <string_view>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -114,6 +115,20 @@ bool has_readable_frame(const Placed& placed) {
 
 std::string text_of(const VoxelProperties& type) {
   return dumped(type);
+}
+
+std::uint64_t texture_bytes(const VoxelProperties& type) {
+  std::uint64_t bytes = 0;
+  std::vector<Texture> counted;
+  for (const Direction direction : kDirections) {
+    if (type.faces.empty()) break;
+    const Texture& texture = type.faces[direction].texture;
+    if (std::ranges::find(counted, texture) != counted.end()) continue;
+    counted.push_back(texture);
+    const std::uint64_t channels = texture.is_opaque() ? 3 : 4;
+    bytes += (channels * texture.level(0).size() + 2) / 3 * 4;  // base64
+  }
+  return bytes;
 }
 
 std::string text_of(const WorldGrid& grid) {

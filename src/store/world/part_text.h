@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
@@ -17,6 +18,8 @@
 namespace quoin::store {
 
 [[nodiscard]] std::string text_of(const VoxelProperties& type);
+/// Returns the bytes of a type's textures in its text, without making the text.
+[[nodiscard]] std::uint64_t texture_bytes(const VoxelProperties& type);
 /// Returns name, pivot and canvas as in scene files, `band`, and `whole` if it is true.
 [[nodiscard]] std::string text_of(const WorldGrid& grid);
 [[nodiscard]] std::string text_of(const SceneFile::Placement& instance);

@@ -79,6 +79,34 @@ TEST(PartText, KeepsTextures) {
   EXPECT_EQ(refused.error().message, "type 1.faces.sides: must be a list of 6 faces");
 }
 
+TEST(PartText, CountsBytesOfTextures) {
+  for (const std::uint8_t alpha : {255, 200}) {
+    for (const int side : {16, 64}) {
+      const auto texels = static_cast<std::size_t>(side) * static_cast<std::size_t>(side);
+      const AlphaImage image{side, side, std::vector<std::uint8_t>(4 * texels, alpha)};
+      const VoxelFace face{.texture = Texture::from_image("t", image).value(), .alpha = FaceAlpha::Translucent};
+      const VoxelProperties type{.visibility = Visibility::Transparent, .faces = face};
+      EXPECT_LE(texture_bytes(type), text_of(type).size());
+      EXPECT_GT(texture_bytes(type) + 600, text_of(type).size());
+    }
+  }
+  EXPECT_EQ(texture_bytes(VoxelProperties{}), 0U);
+}
+
+// A type's part must stay whole when another type changes.
+TEST(PartText, HasAllTexturesOfAType) {
+  const AlphaImage image{16, 16, std::vector<std::uint8_t>(std::size_t{4} * 16 * 16, 255)};
+  const Texture snow = Texture::from_image("snow", image).value();
+  for (const char* const name : {"a", "b"}) {
+    EXPECT_NE(text_of(VoxelProperties{.name = name, .faces = snow}).find("\"texels\""), std::string::npos) << name;
+  }
+  const std::string text =
+      R"({"colour": [0, 0, 0, 255], "faces": {"textures": [{"type": 1, "texture": 0}], "sides": []}})";
+  const auto read = part_from<VoxelProperties>(std::as_bytes(std::span(text)), "type 2");
+  ASSERT_FALSE(read);
+  EXPECT_EQ(read.error().message, "type 2.faces.textures[0].type: type 1 does not come before this type");
+}
+
 TEST(PartText, RejectsDamagedMark) {
   for (const char* const value : {"1", "\"yes\"", "null", "[true]"}) {
     const auto read = grid_from(std::string(R"({"band": 8.0, "whole": )") + value + "}");
