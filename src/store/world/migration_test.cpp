@@ -95,6 +95,21 @@ TEST(Migration, UpgradesWhenOpenedForWriting) {
   EXPECT_FALSE(std::filesystem::exists(path.string() + "~"));  // steps that only add keep no copy
 }
 
+// Programs of version 4 cannot read types with textures, and report them as damage unless the version is later.
+TEST(Migration, MarksWorldsThatMayHaveTextures) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  make_world(path);
+  {
+    Connection database = write(path);
+    set_version(database, 4);
+    ASSERT_TRUE(database.close());
+  }
+  ASSERT_TRUE(WorldStore::open(path, WorldAccess::Write));
+  EXPECT_EQ(version_of(path), 5);
+  EXPECT_EQ(sound_chunks(path), std::size_t{kChunks});
+}
+
 TEST(Migration, ListsKeysWithoutReadingBodies) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
