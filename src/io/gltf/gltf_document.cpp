@@ -234,7 +234,9 @@ Json textured_json(const SurfaceMaterial& material, const GltfLayout& layout) {
   if (material.alpha == FaceAlpha::Translucent) entry["alphaMode"] = "BLEND";
   if (material.alpha == FaceAlpha::Cutout) {
     entry["alphaMode"] = "MASK";
-    entry["alphaCutoff"] = kCutoutAlpha / 255.0;
+    // Between two bytes, so that rounding decides for no texel.
+    static_assert(kCutoutAlpha == 128, "the first byte above half");
+    entry["alphaCutoff"] = 0.5;
     entry["doubleSided"] = true;
   }
   return entry;
