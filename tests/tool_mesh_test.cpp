@@ -4,6 +4,7 @@
 #include <string>
 
 #include <nlohmann/json.hpp>
+#include <quoin/io/formats.h>
 
 #include "tests/tool_for_tests.h"
 
@@ -88,6 +89,27 @@ TEST_F(ToolMesh, ClosesMeshesForPrinting) {
   EXPECT_NEAR(bounds["max"][0].get<double>() - bounds["min"][0].get<double>(), 8.0, 0.1);
   // An existing mesh is an output, replaced without --force.
   EXPECT_EQ(run("convert tiny.vox a.stl").status, 0);
+}
+
+TEST_F(ToolMesh, NamesTexturesThatAreLeftOut) {
+  const AlphaImage image{16, 16, std::vector<std::uint8_t>(std::size_t{4} * 16 * 16, 255)};
+  Scene scene;
+  const VoxelType snow = scene.types.add({.name = "snow", .faces = Texture::from_image("snow", image).value()}).value();
+  SceneGrid grid;
+  grid.grid.set({0, 0, 0}, snow);
+  scene.add_instance({.grid = scene.add_grid(std::move(grid))});
+  ASSERT_TRUE(save_scene(scene, folder_.file("snow.json")));
+  const auto warnings = [&](const std::string& rest) {
+    const ToolRun result = run("convert snow.json --json " + rest);
+    EXPECT_EQ(result.status, 0) << result.err;
+    return Json::parse(result.out)["warnings"];
+  };
+  const std::string reason = ", since the atlas holds the colours of blocks";
+  EXPECT_EQ(warnings("a.glb"), Json::array());
+  EXPECT_EQ(warnings("a.obj"), Json::array());
+  EXPECT_EQ(warnings("a.glb --texture atlas"), Json::array({"textures of types left out" + reason + ": 1"}));
+  EXPECT_EQ(warnings("a.obj --texture atlas"), Json::array({"textures of types left out" + reason + ": 1"}));
+  EXPECT_EQ(warnings("a.ply"), Json::array({"textures of types left out: 1"}));
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <set>
 #include <system_error>
 
 #include <quoin/io/chunk_source.h>
@@ -183,19 +184,26 @@ Result<const FormatDriver*> driver_for_saving(const std::filesystem::path& path)
   return &driver_of(format->format);
 }
 
-/// Returns the number of types with textures.
-std::size_t textured_types(const VoxelRegistry& types) {
-  std::size_t count = 0;
-  for (std::size_t type = 1; types.has_textures() && type < types.size(); ++type) {
-    count += types[static_cast<VoxelType>(type)].faces.empty() ? 0 : 1;
-  }
-  return count;
+/// Returns the number of types with textures that voxels or samples of the scene have.
+std::size_t textured_types(const Scene& scene) {
+  std::set<VoxelType> textured;
+  const auto add = [&](const std::vector<VoxelType>& types) {
+    for (const VoxelType type : types) {
+      if (type < scene.types.size() && !scene.types[type].faces.empty()) textured.insert(type);
+    }
+  };
+  if (!scene.types.has_textures()) return 0;
+  scene.grids().for_each([&](GridHandle /*handle*/, const SceneGrid& grid) {
+    add(grid.grid.types());
+    for (const IVec3 chunk : grid.field.chunks()) add(grid.field.find_chunk(chunk)->materials().types());
+  });
+  return textured.size();
 }
 
 /// Adds warnings of textures, and of the loaded file's data, that the saved file lacks.
 void add_lost_data(const FormatDriver& driver, const FormatOutput& output, const std::filesystem::path& path,
                    std::vector<std::string>& warnings) {
-  const std::size_t textured = driver.info.can(FormatCapability::Faces) ? 0 : textured_types(output.scene.types);
+  const std::size_t textured = driver.info.can(FormatCapability::Faces) ? 0 : textured_types(output.scene);
   if (textured > 0) {
     warnings.push_back("textures of types left out, their mean colours are kept: " + std::to_string(textured));
   }

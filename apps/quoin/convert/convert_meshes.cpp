@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <set>
+#include <string>
 
 #include <quoin/io/mesh_file.h>
 #include <quoin/io/vox.h>
@@ -162,7 +164,23 @@ MeshFileOptions mesh_file_options(const ConvertOptions& options, FileFormat form
   return file;
 }
 
-/// Warns of open edges in 3D printing files and of coordinates relative to an offset.
+/// Returns the number of types of the meshes whose textures the file lacks.
+std::size_t lost_textures(const SceneMeshes& meshes, FileFormat format) {
+  if (!meshes.types.has_textures()) return 0;
+  const bool has_blocks = can(format, FormatCapability::Faces) && meshes.atlas.rgb.empty();
+  std::set<VoxelType> lost;
+  for (const MeshPart& part : meshes.parts) {
+    for (const MeshView& view : part.surfaces) {
+      if (has_blocks && !view.has_albedo()) continue;
+      for (const VoxelType type : view.types) {
+        if (!meshes.types[type].faces.empty()) lost.insert(type);
+      }
+    }
+  }
+  return lost.size();
+}
+
+/// Warns of open edges in 3D printing files, of coordinates relative to an offset, and of textures that are left out.
 void warn_of_meshes(const SceneMeshes& meshes, FileFormat format, const MeshFileOptions& file,
                     std::vector<std::string>& warnings) {
   if (can(format, FormatCapability::Printing)) {
@@ -170,6 +188,10 @@ void warn_of_meshes(const SceneMeshes& meshes, FileFormat format, const MeshFile
       warnings.push_back(with_thousands(static_cast<std::int64_t>(open)) +
                          " open edges: the mesh is not closed for printing");
     }
+  }
+  if (const std::size_t lost = lost_textures(meshes, format); lost > 0) {
+    const char* const reason = meshes.atlas.rgb.empty() ? "" : ", since the atlas holds the colours of blocks";
+    warnings.push_back("textures of types left out" + std::string(reason) + ": " + std::to_string(lost));
   }
   if (const DVec3 offset = mesh_file_offset(meshes, format, file); offset != DVec3(0.0)) {
     warnings.push_back("coordinates in the file are relative to (" + number_for_people(offset.x) + ", " +

@@ -413,6 +413,7 @@ TEST(SceneData, RefusesInvalidReferencesToTextures) {
 TEST(SceneData, NamesTexturesThatAFormatLacks) {
   Scene scene = scene_of(Grid());
   ASSERT_TRUE(scene.types.add({.name = "wall", .faces = random_texture("wall", 16, 3, false)}));
+  ASSERT_TRUE(scene.types.add({.name = "unused", .faces = random_texture("roof", 16, 4, false)}));
   Grid grid;
   grid.set({0, 0, 0}, 3);
   const GridHandle handle = scene.add_grid({.grid = std::move(grid)});
