@@ -38,7 +38,7 @@ Texture texture_of(const AlphaImage& image, const char* name = "t") {
   return Texture::from_image(name, image).value();
 }
 
-std::string fault_of_image(const AlphaImage& image) {
+std::string error_of_image(const AlphaImage& image) {
   const auto made = Texture::from_image("wall", image);
   return made ? "" : made.error().message;
 }
@@ -46,16 +46,16 @@ std::string fault_of_image(const AlphaImage& image) {
 TEST(Texture, RefusesWrongSizesByName) {
   const std::string sides =
       "cannot use texture \"wall\": its sides must be equal, and 16, 32, 64, 128, 256, 512 or 1024 texels long, not ";
-  EXPECT_EQ(fault_of_image({0, 0, {}}), sides + "0 x 0 texels");
-  EXPECT_EQ(fault_of_image({16, 32, std::vector<std::uint8_t>(4 * 16 * 32)}), sides + "16 x 32 texels");
-  EXPECT_EQ(fault_of_image({-16, -16, std::vector<std::uint8_t>(1024)}), sides + "-16 x -16 texels");
-  EXPECT_EQ(fault_of_image(plain(8, {})), sides + "8 x 8 texels");
-  EXPECT_EQ(fault_of_image(plain(48, {})), sides + "48 x 48 texels");
-  EXPECT_EQ(fault_of_image({2048, 2048, {}}), sides + "2048 x 2048 texels");
-  EXPECT_EQ(fault_of_image({16, 16, std::vector<std::uint8_t>(1023)}),
+  EXPECT_EQ(error_of_image({0, 0, {}}), sides + "0 x 0 texels");
+  EXPECT_EQ(error_of_image({16, 32, std::vector<std::uint8_t>(4 * 16 * 32)}), sides + "16 x 32 texels");
+  EXPECT_EQ(error_of_image({-16, -16, std::vector<std::uint8_t>(1024)}), sides + "-16 x -16 texels");
+  EXPECT_EQ(error_of_image(plain(8, {})), sides + "8 x 8 texels");
+  EXPECT_EQ(error_of_image(plain(48, {})), sides + "48 x 48 texels");
+  EXPECT_EQ(error_of_image({2048, 2048, {}}), sides + "2048 x 2048 texels");
+  EXPECT_EQ(error_of_image({16, 16, std::vector<std::uint8_t>(1023)}),
             "cannot use texture \"wall\": it must have 4 bytes for each of its 16 x 16 texels");
   for (int size = kMinTextureSize; size <= kMaxTextureSize; size *= 2)
-    EXPECT_EQ(fault_of_image(plain(size, {})), "") << size;
+    EXPECT_EQ(error_of_image(plain(size, {})), "") << size;
 }
 
 TEST(Texture, KeepsTexelsAndHalvesToOne) {
@@ -292,7 +292,7 @@ TEST(TextureFrame, ShowsTexelsOfCornersAtCorners) {
 
 // ---- faces of types
 
-std::string fault_of_type(const VoxelProperties& type) {
+std::string error_of_type(const VoxelProperties& type) {
   const Status valid = validate_type(type);
   return valid ? "" : valid.error().message;
 }
@@ -301,19 +301,19 @@ TEST(VoxelFaces, AreRefusedByName) {
   const Texture stone = texture_of(plain(16, {90, 90, 90, 255}), "stone");
   const Texture pane = texture_of(plain(16, {90, 90, 90, 60}), "pane");
   const std::string start = "cannot use voxel type \"a\": faces: the face ";
-  EXPECT_EQ(fault_of_type({.name = "a", .faces = stone}), "");
-  EXPECT_EQ(fault_of_type({.name = "a", .faces = {{stone}, {Texture()}, {stone}}}), start + "+Y has no texture");
-  EXPECT_EQ(fault_of_type({.name = "a", .faces = VoxelFace{.texture = stone, .turn = 4}}),
+  EXPECT_EQ(error_of_type({.name = "a", .faces = stone}), "");
+  EXPECT_EQ(error_of_type({.name = "a", .faces = {{stone}, {Texture()}, {stone}}}), start + "+Y has no texture");
+  EXPECT_EQ(error_of_type({.name = "a", .faces = VoxelFace{.texture = stone, .turn = 4}}),
             start + "+X has a turn that is not 0 to 3");
-  EXPECT_EQ(fault_of_type({.name = "a", .faces = pane}),
+  EXPECT_EQ(error_of_type({.name = "a", .faces = pane}),
             start + "+X is opaque, but its texture \"pane\" has transparent texels");
   for (const FaceAlpha mode : {FaceAlpha::Cutout, FaceAlpha::Translucent}) {
     const VoxelFace face{.texture = pane, .alpha = mode};
-    EXPECT_EQ(fault_of_type({.name = "a", .faces = face}), start + "+X is not opaque, which needs a transparent type");
-    EXPECT_EQ(fault_of_type({.name = "a", .visibility = Visibility::Transparent, .faces = face}), "");
+    EXPECT_EQ(error_of_type({.name = "a", .faces = face}), start + "+X is not opaque, which needs a transparent type");
+    EXPECT_EQ(error_of_type({.name = "a", .visibility = Visibility::Transparent, .faces = face}), "");
   }
   const VoxelFace unknown{.texture = stone, .alpha = static_cast<FaceAlpha>(7)};
-  EXPECT_EQ(fault_of_type({.name = "a", .faces = unknown}), start + "+X has an unknown alpha mode");
+  EXPECT_EQ(error_of_type({.name = "a", .faces = unknown}), start + "+X has an unknown alpha mode");
   VoxelRegistry types;
   EXPECT_FALSE(types.add({.name = "a", .faces = pane}));
   EXPECT_FALSE(types.find_or_add({.name = "a", .faces = {{stone}, {Texture()}, {stone}}}));

@@ -65,7 +65,7 @@ bool settle(VoxelProperties& p) {
 }
 
 // Returns the reason if a type's faces are not valid, or an empty string.
-std::string fault_of_faces(const VoxelProperties& p) {
+std::string error_of_faces(const VoxelProperties& p) {
   if (p.faces.empty()) return {};
   for (const Direction direction : kDirections) {
     const VoxelFace& face = p.faces[direction];
@@ -148,7 +148,7 @@ Status validate_type(const VoxelProperties& properties) {
   if (properties.visibility == Visibility::Transparent && properties.occludes.value_or(false)) {
     return wrong("occludes", "must be false for a transparent type, since only types that hide faces can occlude");
   }
-  if (const std::string fault = fault_of_faces(properties); !fault.empty()) return wrong("faces", fault.c_str());
+  if (const std::string fault = error_of_faces(properties); !fault.empty()) return wrong("faces", fault.c_str());
   return {};
 }
 
