@@ -267,22 +267,20 @@ TEST(TextureFrame, ClampsPositionsAndLevels) {
 
 // Points on the edges of a face belong to this face, so their texels do not wrap.
 TEST(TextureFrame, ShowsTexelsOfCornersAtCorners) {
-  constexpr int kSize = 16;
-  const Texture texture = texture_of(noise(kSize, 6, false));
+  constexpr std::size_t kSize = 16;
+  const Texture texture = texture_of(noise(16, 6, false));
   for (const Direction direction : kDirections) {
     for (std::uint8_t i = 0; i < 8; ++i) {
       const VoxelFace face{.texture = texture, .turn = static_cast<std::uint8_t>(i % 4), .mirrored = i >= 4};
       const TextureFrame frame = texture_frame(face, direction);
       for (const double beyond : {0.0, 1e-9, 3.0}) {
-        for (const int corner : {0, 1, 2, 3}) {
-          const double right = corner % 2 - 0.5;
-          const double down = corner / 2 - 0.5;
-          const DVec3 inside =
-              DVec3(0.5) + (DVec3(frame.right) * right + DVec3(frame.down) * down) * (1.0 + 2.0 * beyond);
-          const auto found = texel_at(face, direction, inside, 0);
-          const std::size_t row = corner / 2 == 0 ? 0 : kSize - 1;
-          const std::size_t column = corner % 2 == 0 ? 0 : kSize - 1;
-          EXPECT_EQ(Vec3(found[0], found[1], found[2]), linear_colour(texture.level(0)[row * kSize + column]))
+        for (const std::size_t corner : {0U, 1U, 2U, 3U}) {
+          const bool is_right = corner % 2 == 1;
+          const bool is_low = corner >= 2;
+          const DVec3 offset = DVec3(frame.right) * (is_right ? 0.5 : -0.5) + DVec3(frame.down) * (is_low ? 0.5 : -0.5);
+          const auto found = texel_at(face, direction, DVec3(0.5) + offset * (1.0 + 2.0 * beyond), 0);
+          const std::size_t texel = (is_low ? kSize * (kSize - 1) : 0) + (is_right ? kSize - 1 : 0);
+          EXPECT_EQ(Vec3(found[0], found[1], found[2]), linear_colour(texture.level(0)[texel]))
               << name_of(direction) << ", corner " << corner << ", " << beyond << " voxels outside";
         }
       }
