@@ -365,7 +365,7 @@ TEST(VoxelFaces, DistinguishTypes) {
   }
 }
 
-TEST(VoxelFaces, OfOneColourAreFound) {
+TEST(VoxelFaces, FindsTypesOfOneColour) {
   VoxelRegistry types;
   const Texture texture = texture_of(noise(16, 5, false));
   const auto block = [&](unsigned i) {
