@@ -115,7 +115,6 @@ const char* attribute_name(const GltfPrimitive& primitive, GltfArrayKind kind) {
     case GltfArrayKind::Normal:
       return "NORMAL";
     case GltfArrayKind::AtlasCoordinate:
-      return "TEXCOORD_0";
     case GltfArrayKind::FaceCoordinate:
       return "TEXCOORD_0";
     case GltfArrayKind::PaletteCoordinate:
