@@ -11,6 +11,7 @@
 #include <quoin/grid/voxel_registry.h>
 
 #include "core/memory/make_room.h"
+#include "core/rows/packed_row.h"
 #include "core/srgb.h"
 
 namespace quoin {
@@ -72,20 +73,13 @@ std::uint8_t byte_of(float unit) {
   return static_cast<std::uint8_t>(std::lround(unit * 255.0F));
 }
 
-// Mixes the bits of 8 bytes at a time (the finaliser of MurmurHash3, A. Appleby).
-std::uint64_t mixed(std::uint64_t hash, std::uint64_t word) {
-  hash = (hash ^ word) * 0xFF51'AFD7'ED55'8CCDU;
-  hash = (hash ^ (hash >> 33)) * 0xC4CE'B9FE'1A85'EC53U;
-  return hash ^ (hash >> 33);
-}
-
 std::uint64_t hash_of(const std::string& name, const BlockVector<Rgba8>& texels) {
   std::uint64_t hash = texels.size();
-  for (const char c : name) hash = mixed(hash, static_cast<unsigned char>(c));
+  for (const char c : name) hash = mixed_with(hash, static_cast<unsigned char>(c));
   for (std::size_t i = 0; i + 1 < texels.size(); i += 2) {
     std::uint64_t word = 0;
     std::memcpy(&word, &texels[i], sizeof(word));
-    hash = mixed(hash, word);
+    hash = mixed_with(hash, word);
   }
   return hash;
 }

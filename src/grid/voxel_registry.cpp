@@ -10,17 +10,17 @@
 
 #include "core/change_journal.h"
 #include "core/memory/make_room.h"
+#include "core/rows/packed_row.h"
 
 namespace quoin {
 namespace {
 
 // Hashes only properties that are cheap to mix. Equal properties have equal hashes; `find_or_add` compares the rest.
 std::uint64_t hash_of(const VoxelProperties& p) {
-  constexpr std::uint64_t kFactor = 0x9E37'79B9'7F4A'7C15U;
   const std::uint64_t colour = (std::uint64_t{p.colour.r} << 24) | (std::uint64_t{p.colour.g} << 16) |
                                (std::uint64_t{p.colour.b} << 8) | p.colour.a;
   std::uint64_t hash =
-      std::hash<std::string>{}(p.name) * kFactor + colour * 4 + static_cast<std::uint64_t>(p.visibility);
+      std::hash<std::string>{}(p.name) * 0x9E37'79B9'7F4A'7C15U + colour * 4 + static_cast<std::uint64_t>(p.visibility);
   if (p.faces.empty()) return hash;
   // Types of one name and mean colour often differ in their faces alone.
   for (const Direction direction : kDirections) {
@@ -28,7 +28,7 @@ std::uint64_t hash_of(const VoxelProperties& p) {
     const std::uint64_t tint = (std::uint64_t{face.tint.r} << 16) | (std::uint64_t{face.tint.g} << 8) | face.tint.b;
     const std::uint64_t rest =
         tint * 32 + static_cast<std::uint64_t>(face.alpha) * 8 + std::uint64_t{face.turn} * 2 + (face.mirrored ? 1 : 0);
-    hash = (hash ^ (hash >> 32)) * kFactor + (face.texture.hash() ^ rest * kFactor);
+    hash = mixed_with(mixed_with(hash, face.texture.hash()), rest);
   }
   return hash;
 }

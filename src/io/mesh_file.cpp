@@ -13,6 +13,7 @@
 
 #include <quoin/core/assert.h>
 
+#include "core/rows/packed_row.h"
 #include "io/format_driver.h"
 #include "io/mesh_parts.h"
 #include "io/whole_file.h"
@@ -245,17 +246,12 @@ struct Bits {
   bool operator==(const Bits&) const = default;
 };
 
-std::uint64_t mixed(std::uint64_t hash, std::uint64_t value) {
-  hash = (hash ^ value) * 0x9E37'79B9'7F4A'7C15U;
-  return hash ^ hash >> 29;
-}
-
 struct BitsHash {
-  std::size_t operator()(const Bits& bits) const { return mixed(mixed(bits.of[0], bits.of[1]), bits.of[2]); }
+  std::size_t operator()(const Bits& bits) const { return mixed_with(mixed_with(bits.of[0], bits.of[1]), bits.of[2]); }
 };
 
 struct KeyHash {
-  std::size_t operator()(std::uint64_t key) const { return mixed(key, key >> 32); }
+  std::size_t operator()(std::uint64_t key) const { return mixed_with(key, key >> 32); }
 };
 
 /// The uses of an edge, by direction.
