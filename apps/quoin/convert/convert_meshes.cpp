@@ -4,8 +4,8 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <set>
 #include <string>
+#include <vector>
 
 #include <quoin/io/mesh_file.h>
 #include <quoin/io/vox.h>
@@ -168,16 +168,16 @@ MeshFileOptions mesh_file_options(const ConvertOptions& options, FileFormat form
 std::size_t lost_textures(const SceneMeshes& meshes, FileFormat format) {
   if (!meshes.types.has_textures()) return 0;
   const bool has_blocks = can(format, FormatCapability::Faces) && meshes.atlas.rgb.empty();
-  std::set<VoxelType> lost;
+  std::vector<bool> is_lost(meshes.types.size());
   for (const MeshPart& part : meshes.parts) {
     for (const MeshView& view : part.surfaces) {
       if (has_blocks && !view.has_albedo()) continue;
       for (const VoxelType type : view.types) {
-        if (!meshes.types[type].faces.empty()) lost.insert(type);
+        if (!meshes.types[type].faces.empty()) is_lost[type] = true;
       }
     }
   }
-  return lost.size();
+  return static_cast<std::size_t>(std::ranges::count(is_lost, true));
 }
 
 /// Warns of open edges in 3D printing files, of coordinates relative to an offset, and of textures that are left out.

@@ -36,6 +36,17 @@ VoxelFaces random_faces(unsigned seed) {
   return VoxelFaces(faces);
 }
 
+// Places a grid that is a box of a new type with this texture, and returns the type.
+VoxelType place_box(Scene& scene, const Texture& texture, const IBox& box) {
+  VoxelProperties properties;
+  properties.faces = texture;
+  const VoxelType type = scene.types.add(properties).value();
+  Grid grid;
+  grid.fill_box(box, type);
+  place(scene, std::move(grid));
+  return type;
+}
+
 RenderOptions unlit(int width, int height) {
   RenderOptions options = sized(width, height);
   options.light.shading = Shading::Unlit;
@@ -122,12 +133,7 @@ TEST(RenderTextures, FollowsMirroredTurnedAndScaledGrids) {
 
 TEST(RenderTextures, ChoosesMipmapsByDistanceAndSamples) {
   Scene scene;
-  VoxelProperties properties;
-  properties.faces = random_texture(64, 3);
-  const VoxelType type = scene.types.add(properties).value();
-  Grid grid;
-  grid.fill_box({{-200, 0, -200}, {200, 1, 200}}, type);
-  place(scene, std::move(grid));
+  const VoxelType type = place_box(scene, random_texture(64, 3), {{-200, 0, -200}, {200, 1, 200}});
   const VoxelFace& face = scene.types[type].faces[Direction::PosY];
   for (int level = 0; level <= 7; ++level) {
     // Each pixel is 2^level texels wide; the middle of the image lies in the middle of a texel of that level.
@@ -217,17 +223,13 @@ TEST(RenderTextures, ShowsMeansOfFacesFarAway) {
 
 TEST(RenderTextures, ShowsMeansOfGlassAndCoarseGrids) {
   Scene scene;
-  VoxelProperties properties;
-  properties.faces = random_texture(16, 5);
-  const VoxelType type = scene.types.add(properties).value();
-  Grid grid;
-  grid.fill_box({{-64, 0, -64}, {64, 2, 64}}, type);
-  place(scene, std::move(grid));
+  const VoxelType type = place_box(scene, random_texture(16, 5), {{-64, 0, -64}, {64, 2, 64}});
   const Rgba8 mean = scene.types[type].colour;
   RenderOptions options = unlit(3, 3);
   options.detail.policy = DetailPolicy{.rule = DetailPolicy::Rule::ByPixels, .voxel_pixels = 1e6, .cell_pixels = 1e6};
   EXPECT_EQ(pixel_at(taken(scene, from_above(0.3, 30, 0.4, 1.0), options), 1, 1), (Pixel{mean.r, mean.g, mean.b}));
   // The registry gives a textured type the colour that images without textures show.
+  VoxelProperties properties = scene.types[type];
   properties.visibility = Visibility::Transparent;
   scene.types.replace(type, properties);
   Scene plain;
