@@ -72,9 +72,9 @@ std::string error_of_faces(const VoxelProperties& p) {
     const std::string where = "the face " + std::string(name_of(direction)) + " ";
     if (face.texture.is_null()) return where + "has no texture";
     if (face.turn > 3) return where + "has a turn that is not 0 to 3";
-    const std::string texture = "texture \"" + face.texture.name() + "\"";
     if (face.alpha == FaceAlpha::Opaque && !face.texture.is_opaque()) {
-      return where + "is opaque, but its " + texture + " has transparent texels";
+      std::string reason = where + "is opaque, but its texture \"";
+      return reason.append(face.texture.name()).append("\" has transparent texels");
     }
     if (face.alpha > FaceAlpha::Translucent) return where + "has an unknown alpha mode";
     if (face.alpha != FaceAlpha::Opaque && p.visibility != Visibility::Transparent) {
