@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <functional>
 #include <utility>
@@ -33,10 +34,21 @@ std::uint64_t hash_of(const VoxelProperties& p) {
   return hash;
 }
 
+// Returns the visibility of a whole voxel of a type (VoxelRegistry::visibility).
+Visibility visibility_of(const VoxelProperties& p) {
+  return p.shapes.empty() ? p.visibility : Visibility::Transparent;
+}
+
 // Returns the class of a type for occlusion (VoxelRegistry::occlusion).
 Visibility occlusion_of(const VoxelProperties& p) {
-  const bool is_clear = p.visibility == Visibility::Opaque && !p.occludes.value_or(true);
-  return is_clear ? Visibility::Transparent : p.visibility;
+  const Visibility visibility = visibility_of(p);
+  const bool is_clear = visibility == Visibility::Opaque && !p.occludes.value_or(true);
+  return is_clear ? Visibility::Transparent : visibility;
+}
+
+// Returns true if a change of a voxel's state changes its mesh (VoxelRegistry::remeshes_on_data).
+bool remeshes(const VoxelProperties& p) {
+  return p.remesh_on_data || !p.shapes.empty() || !p.orientations.empty();
 }
 
 // Makes types that behave alike equal: empties properties that equal the defaults of the type's visibility, and derives
@@ -44,7 +56,7 @@ Visibility occlusion_of(const VoxelProperties& p) {
 bool settle(VoxelProperties& p) {
   bool has_changed = false;
   for (std::optional<bool>* property : {&p.blocks_light, &p.occludes}) {
-    if (*property != (p.visibility == Visibility::Opaque)) continue;
+    if (*property != (visibility_of(p) == Visibility::Opaque)) continue;
     property->reset();
     has_changed = true;
   }
@@ -64,6 +76,20 @@ bool settle(VoxelProperties& p) {
   return has_changed || !(colour == p.colour);
 }
 
+// Returns the reason if a textured face is not valid, or an empty string. `where` begins the reason.
+std::string error_of_face(const VoxelFace& face, const VoxelProperties& p, const std::string& where) {
+  if (face.turn > 3) return where + "has a turn that is not 0 to 3";
+  if (face.alpha > FaceAlpha::Translucent) return where + "has an unknown alpha mode";
+  if (face.alpha == FaceAlpha::Opaque && !face.texture.is_null() && !face.texture.is_opaque()) {
+    std::string reason = where + "is opaque, but its texture \"";
+    return reason.append(face.texture.name()).append("\" has transparent texels");
+  }
+  if (face.alpha != FaceAlpha::Opaque && p.visibility != Visibility::Transparent) {
+    return where + "is not opaque, which needs a transparent type";
+  }
+  return {};
+}
+
 // Returns the reason if a type's faces are not valid, or an empty string.
 std::string error_of_faces(const VoxelProperties& p) {
   if (p.faces.empty()) return {};
@@ -71,14 +97,38 @@ std::string error_of_faces(const VoxelProperties& p) {
     const VoxelFace& face = p.faces[direction];
     const std::string where = "the face " + std::string(name_of(direction)) + " ";
     if (face.texture.is_null()) return where + "has no texture";
-    if (face.turn > 3) return where + "has a turn that is not 0 to 3";
-    if (face.alpha == FaceAlpha::Opaque && !face.texture.is_opaque()) {
-      std::string reason = where + "is opaque, but its texture \"";
-      return reason.append(face.texture.name()).append("\" has transparent texels");
-    }
-    if (face.alpha > FaceAlpha::Translucent) return where + "has an unknown alpha mode";
-    if (face.alpha != FaceAlpha::Opaque && p.visibility != Visibility::Transparent) {
-      return where + "is not opaque, which needs a transparent type";
+    if (std::string reason = error_of_face(face, p, where); !reason.empty()) return reason;
+  }
+  return {};
+}
+
+// Returns the reason if a type does not declare the bits of its state that select its orientation, or an empty string.
+std::string error_of_orientations(const VoxelProperties& p) {
+  if (p.orientations.by_value.size() > AxisOrientation::kCount) return "more than 48 orientations";
+  if (p.orientations.first_bit + p.orientations.bit_count() > p.state_bits) {
+    return "they use bits of the state that `state_bits` does not declare";
+  }
+  return {};
+}
+
+// Returns the reason if a type's shapes are not valid, or an empty string.
+std::string error_of_shapes(const VoxelProperties& p) {
+  if (p.shapes.empty()) return {};
+  if (static_cast<int>(std::bit_width(p.shapes.state_mask())) > p.state_bits &&
+      p.shapes.rules().neighbours != ShapeNeighbours::Fluid) {
+    return "they use bits of the state that `state_bits` does not declare";
+  }
+  if (p.occludes.value_or(false))
+    return "leave `occludes` empty: a type with shapes darkens corners by their content";
+  for (std::size_t part = 0; part < p.shapes.rules().parts.size(); ++part) {
+    for (const ShapeElement& element : p.shapes.rules().parts[part].shape.elements()) {
+      for (const Direction direction : kDirections) {
+        const ElementFace& face = element.faces[static_cast<std::size_t>(direction)];
+        if (!face.face) continue;
+        const std::string where =
+            "the face " + std::string(name_of(direction)) + " of an element of part " + std::to_string(part) + " ";
+        if (std::string reason = error_of_face(*face.face, p, where); !reason.empty()) return reason;
+      }
     }
   }
   return {};
@@ -103,6 +153,7 @@ struct TypeRecord : TypeChange {
   void merge(const TypeRecord& other) {
     visibility_changed |= other.visibility_changed;
     colour_changed |= other.colour_changed;
+    shape_changed |= other.shape_changed;
   }
   [[nodiscard]] TypeChange change() const { return *this; }
 };
@@ -149,6 +200,10 @@ Status validate_type(const VoxelProperties& properties) {
     return wrong("occludes", "must be false for a transparent type, since only types that hide faces can occlude");
   }
   if (const std::string fault = error_of_faces(properties); !fault.empty()) return wrong("faces", fault.c_str());
+  if (const std::string fault = error_of_orientations(properties); !fault.empty()) {
+    return wrong("orientations", fault.c_str());
+  }
+  if (const std::string fault = error_of_shapes(properties); !fault.empty()) return wrong("shapes", fault.c_str());
   return {};
 }
 
@@ -201,7 +256,7 @@ Result<VoxelType> VoxelRegistry::add(VoxelProperties properties) {
   content_.make_own();
   Content& c = *content_;
   const auto type = static_cast<VoxelType>(size());
-  const Visibility visibility = properties.visibility;
+  const Visibility visibility = visibility_of(properties);
   const Visibility occlusion = occlusion_of(properties);
   // Reserves memory first, so that a failure leaves nothing half done.
   make_room(c.serials);
@@ -214,12 +269,16 @@ Result<VoxelType> VoxelRegistry::add(VoxelProperties properties) {
   c.visibility.push_back(visibility);
   c.occlusion.push_back(occlusion);
   if (!properties.collides) ++c.passable_count;
-  if (properties.remesh_on_data) ++c.remesh_on_data_count;
+  const bool is_shaped = !properties.shapes.empty();
+  const bool is_turned = !properties.orientations.empty();
+  if (remeshes(properties)) ++c.remesh_on_data_count;
   if (!properties.faces.empty()) ++c.textured_count;
+  if (is_shaped) ++c.shaped_count;
+  if (is_turned) ++c.turned_count;
   c.properties.push_back(std::move(properties));
   if (visibility == Visibility::Transparent) ++c.transparent_count;
   if (occlusion != visibility) ++c.unoccluding_count;
-  note({type, occlusion != Visibility::Opaque, true});
+  note({type, occlusion != Visibility::Opaque, true, is_shaped || is_turned});
   return type;
 }
 
@@ -255,26 +314,31 @@ void VoxelRegistry::replace(VoxelType type, VoxelProperties properties) {
   const auto old = std::find_if(first, last, [type](const auto& each) { return each.second == type; });
   c.by_hash.emplace(hash_of(properties), type);
   if (old != last) c.by_hash.erase(old);
-  const Visibility was = std::exchange(c.visibility[type], properties.visibility);
+  const Visibility visibility = visibility_of(properties);
+  const Visibility was = std::exchange(c.visibility[type], visibility);
   QUOIN_ASSERT(was != Visibility::Transparent || c.transparent_count != 0, "transparent types are counted");
   if (was == Visibility::Transparent) --c.transparent_count;
-  if (properties.visibility == Visibility::Transparent) ++c.transparent_count;
+  if (visibility == Visibility::Transparent) ++c.transparent_count;
   const Visibility occluded = std::exchange(c.occlusion[type], occlusion_of(properties));
   QUOIN_ASSERT(occluded == was || c.unoccluding_count != 0, "types that do not occlude are counted");
   if (occluded != was) --c.unoccluding_count;
-  if (c.occlusion[type] != properties.visibility) ++c.unoccluding_count;
+  if (c.occlusion[type] != visibility) ++c.unoccluding_count;
   QUOIN_ASSERT(c.properties[type].collides || c.passable_count != 0, "passable types are counted");
   if (!c.properties[type].collides) --c.passable_count;
   if (!properties.collides) ++c.passable_count;
-  if (c.properties[type].remesh_on_data) --c.remesh_on_data_count;
-  if (properties.remesh_on_data) ++c.remesh_on_data_count;
+  const VoxelProperties& old_properties = c.properties[type];
+  c.remesh_on_data_count += std::size_t{remeshes(properties)} - std::size_t{remeshes(old_properties)};
+  c.shaped_count += std::size_t{!properties.shapes.empty()} - std::size_t{!old_properties.shapes.empty()};
+  c.turned_count += std::size_t{!properties.orientations.empty()} - std::size_t{!old_properties.orientations.empty()};
   c.release_textures(c.properties[type].faces);
   if (!c.properties[type].faces.empty()) --c.textured_count;
   if (!properties.faces.empty()) ++c.textured_count;
-  const bool is_seen_otherwise = was != properties.visibility || occluded != c.occlusion[type];
+  const bool is_formed_otherwise =
+      !(c.properties[type].shapes == properties.shapes && c.properties[type].orientations == properties.orientations);
+  const bool is_seen_otherwise = was != visibility || occluded != c.occlusion[type];
   const bool is_coloured_otherwise =
       !(c.properties[type].colour == properties.colour && c.properties[type].faces == properties.faces);
-  const TypeChange change{type, is_seen_otherwise, is_coloured_otherwise};
+  const TypeChange change{type, is_seen_otherwise, is_coloured_otherwise, is_formed_otherwise};
   c.properties[type] = std::move(properties);
   note(change);
 }

@@ -335,4 +335,8 @@ class GridWriter {
   std::array<std::uint8_t, kChunkEdge> is_set_{};  // bytes, because writes to one mask would depend on each other
 };
 
+/// Returns the shape of a voxel, as its state and its neighbours select it; null if its type has no shapes. Lifetime:
+/// until the type is replaced. Cost: a few lookups.
+[[nodiscard]] const ShapeModel* shape_at(const Grid& grid, const VoxelRegistry& types, IVec3 voxel);
+
 }  // namespace quoin

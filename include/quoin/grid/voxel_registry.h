@@ -15,6 +15,7 @@
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/texture.h>
+#include <quoin/grid/voxel_shape.h>
 
 namespace [[gnu::visibility("default")]] quoin {
 
@@ -59,7 +60,8 @@ struct VoxelProperties {
   /// `Grid::set_data` does not know the types and accepts any state. `save_scene` and WorldStore::save refuse a scene
   /// in which a state uses more bits.
   std::uint8_t state_bits = 0;
-  /// True for types whose shape depends on their data, such as doors. When the data of such a voxel changes, LiveMeshes
+  /// True for types that a game draws by their data in ways of its own (types with `shapes` or `orientations` need no
+  /// flag). When the data of such a voxel changes, LiveMeshes
   /// meshes its chunk again.
   bool remesh_on_data = false;
 
@@ -84,14 +86,21 @@ struct VoxelProperties {
   /// a registry sets it. Opaque types have opaque faces; cutout and translucent faces need a transparent type. Equal
   /// textures of a registry's types share their texels.
   VoxelFaces faces{};
+  /// The orientations of this type's faces and shapes that the state selects.
+  StateOrientations orientations{};
+  /// The shapes of a type that is no cube. `visibility` is then that of their material: a stair of stone is opaque,
+  /// although faces behind it are shown. VoxelRegistry::visibility is Transparent for it.
+  VoxelShapes shapes{};
 
   bool operator==(const VoxelProperties&) const = default;
 };
 
 /// Returns an error if a registry does not accept a type's properties. The message names the type and the property.
 ///
-/// Errors: InvalidArgument if `visibility` is Air, `state_bits` exceeds 32, `light_cost` exceeds 15, a transparent type
-/// occludes, or a face has no texture, a turn above 3, an alpha mode that its texture or `visibility` does not allow.
+/// Errors: InvalidArgument if `visibility` is Air, `state_bits` exceeds 32, `light_cost` exceeds 15, a type that is
+/// transparent or has shapes occludes, a face (of the type or of its shapes) has no texture, a turn above 3, an alpha
+/// mode that its texture or `visibility` does not allow, or orientations or shapes use bits that `state_bits` does not
+/// declare.
 [[nodiscard]] Status validate_type(const VoxelProperties& properties);
 
 /// A type that was added or replaced. Properties without a flag below can differ too.
@@ -100,6 +109,7 @@ struct TypeChange {
   bool visibility_changed =
       false;                    ///< `visibility` or `occludes`; an unregistered type counts as opaque, with defaults
   bool colour_changed = false;  ///< `colour` or `faces`; also true if the type was added
+  bool shape_changed = false;   ///< `shapes` or `orientations`; also true if the type was added with some
 };
 using TypeChanges = Changes<TypeChange>;
 
@@ -152,7 +162,8 @@ class VoxelRegistry {
     return content_->properties.size();
   }
 
-  /// Returns the visibility of a type. An unregistered id counts as opaque, so that a wrong id is visible.
+  /// Returns the visibility of a whole voxel of a type: Transparent for types with shapes, else
+  /// VoxelProperties::visibility. An unregistered id counts as opaque, so that a wrong id is visible.
   [[nodiscard]] Visibility visibility(VoxelType type) const {
     const std::vector<Visibility>& all = content_->visibility;
     return type < all.size() ? all[type] : Visibility::Opaque;
@@ -176,14 +187,30 @@ class VoxelRegistry {
   [[nodiscard]] bool has_transparent() const { return content_->transparent_count > 0; }
   /// Returns true if any registered type except air does not stop moving bodies (VoxelProperties::collides).
   [[nodiscard]] bool has_passable() const { return content_->passable_count > 0; }
-  /// Returns true if the type is registered and its data changes meshes (VoxelProperties::remesh_on_data).
+  /// Returns true if the type is registered and its data changes meshes: it has shapes or orientations, or
+  /// VoxelProperties::remesh_on_data.
   [[nodiscard]] bool remeshes_on_data(VoxelType type) const {
-    return has_remesh_on_data() && type < size() && content_->properties[type].remesh_on_data;
+    if (!has_remesh_on_data() || type >= size()) return false;
+    const VoxelProperties& properties = content_->properties[type];
+    return properties.remesh_on_data || !properties.shapes.empty() || !properties.orientations.empty();
   }
   /// Returns true if the data of any registered type changes meshes.
   [[nodiscard]] bool has_remesh_on_data() const { return content_->remesh_on_data_count > 0; }
   /// Returns true if any registered type has textures (VoxelProperties::faces).
   [[nodiscard]] bool has_textures() const { return content_->textured_count > 0; }
+
+  /// Returns true if the type is registered and has shapes (VoxelProperties::shapes).
+  [[nodiscard]] bool is_shaped(VoxelType type) const {
+    return has_shapes() && type < size() && !content_->properties[type].shapes.empty();
+  }
+  /// Returns true if any registered type has shapes.
+  [[nodiscard]] bool has_shapes() const { return content_->shaped_count > 0; }
+  /// Returns true if the state of a type turns it (VoxelProperties::orientations).
+  [[nodiscard]] bool is_turned_by_state(VoxelType type) const {
+    return has_turned_by_state() && type < size() && !content_->properties[type].orientations.empty();
+  }
+  /// Returns true if the state turns any registered type.
+  [[nodiscard]] bool has_turned_by_state() const { return content_->turned_count > 0; }
 
   /// Returns the types that were added or replaced since the cursor's last read, ordered by id, and moves the cursor to
   /// the present. Cost: O(changed types). See ChangeCursor.
@@ -205,6 +232,8 @@ class VoxelRegistry {
     std::size_t unoccluding_count = 0;  // opaque types that do not occlude
     std::size_t remesh_on_data_count = 0;
     std::size_t textured_count = 0;
+    std::size_t shaped_count = 0;
+    std::size_t turned_count = 0;  // types that their state turns
 
     struct SharedTexture {
       Texture texture;

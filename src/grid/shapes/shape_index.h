@@ -1,0 +1,88 @@
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+#include <quoin/core/vec.h>
+#include <quoin/grid/changes.h>
+#include <quoin/grid/grid.h>
+#include <quoin/grid/voxel_registry.h>
+#include <quoin/grid/voxel_shape.h>
+
+namespace quoin {
+
+// A voxel with a shape.
+struct PlacedShape {
+  IVec3 voxel{0};
+  VoxelType type = kAir;
+  const ShapeModel* model = nullptr;
+};
+
+// The shaped voxels of a grid, by the voxels that they touch: a shape may reach outside its own voxel. Chunks without
+// shapes take no memory; a copy shares all chunks with the original until either is updated.
+class ShapeIndex {
+ public:
+  // Replaces everything. Cost: O(rows) per chunk with shaped types.
+  void build(const Grid& grid, const VoxelRegistry& types);
+  // Applies edits of the grid and of its data. Requires: as OccupancyTree::update; if any type's shapes have changed,
+  // `changes.all` is true. Cost: O(rows) per chunk within two voxels of a change.
+  void update(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes, const DataChanges& data);
+
+  [[nodiscard]] bool empty() const { return chunks_.empty(); }
+  // Returns the shapes that touch a voxel, its own first, then in the order of their voxels (z, y, x). Lifetime: until
+  // the next update. Cost: one hash lookup.
+  [[nodiscard]] std::span<const PlacedShape> at(IVec3 voxel) const;
+  [[nodiscard]] bool touches(IVec3 voxel) const { return !at(voxel).empty(); }
+  // Returns the row of 64 voxels along x that contains a voxel: bit i is set if shapes touch voxel i of the row.
+  [[nodiscard]] std::uint64_t touched_row(IVec3 voxel) const;
+  // Calls `visit(const PlacedShape&)` once for each shaped voxel of a chunk, by z, y, x.
+  template <class Visit>
+  void for_each_in(IVec3 chunk, Visit&& visit) const {
+    const auto found = chunks_.find(chunk);
+    if (found == chunks_.end()) return;
+    const ChunkShapes& all = *found->second;
+    std::size_t cell = 0;
+    for (std::size_t row = 0; row < all.touched.size(); ++row) {
+      for (std::uint64_t left = all.touched[row]; left != 0; left &= left - 1, ++cell) {
+        const PlacedShape& shape = all.shapes[all.starts[cell]];  // the cell's own, if it has one
+        const auto i = static_cast<int>(row);
+        if (shape.voxel == chunk * kChunkEdge + IVec3(std::countr_zero(left), i % kChunkEdge, i / kChunkEdge))
+          visit(shape);
+      }
+    }
+  }
+  // Returns the smallest box around the voxels that shapes touch.
+  [[nodiscard]] IBox bounds() const;
+  [[nodiscard]] std::size_t bytes() const;
+
+ private:
+  // Voxels are numbered x + 64 y + 4096 z. `touched` has a bit for each; `first[i]` is the number of set bits before
+  // row i, and cell k of those lists shapes[starts[k]] to shapes[starts[k + 1]].
+  struct ChunkShapes {
+    std::vector<std::uint64_t> touched;
+    std::vector<std::uint32_t> first;
+    std::vector<std::uint32_t> starts;
+    std::vector<PlacedShape> shapes;
+    IBox bounds;  // voxels of the grid
+  };
+
+  [[nodiscard]] std::shared_ptr<const ChunkShapes> made(const Grid& grid, IVec3 chunk) const;
+  void rebuild(const Grid& grid, IVec3 chunk);
+
+  VoxelRegistry types_;  // keeps the models
+  std::vector<std::uint8_t> is_shaped_;
+  std::unordered_map<IVec3, std::shared_ptr<const ChunkShapes>, CoordinateHash> chunks_;
+};
+
+// Returns true if the neighbour of a voxel in a direction covers a face (ModelFace::mask) on the voxel's side there.
+// `neighbour_model`: null for a cube. `type`: of the voxel with the face: voxels of one transparent type hide
+// each other's common faces.
+[[nodiscard]] bool covers(const VoxelRegistry& types, VoxelType neighbour, const ShapeModel* neighbour_model,
+                          VoxelType type, Direction direction, const SideMask& mask);
+
+}  // namespace quoin

@@ -1,0 +1,148 @@
+#include <quoin/grid/voxel_shape.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <string>
+#include <utility>
+
+namespace quoin {
+namespace {
+
+bool is_finite(const Vec3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+// Returns the reason if an element is not valid, or an empty string.
+std::string error_of(const ShapeElement& element) {
+  if (!is_finite(element.min) || !is_finite(element.max)) return "a corner is not finite";
+  int plates = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (element.min[axis] < static_cast<float>(kMinShapeUnit) ||
+        element.max[axis] > static_cast<float>(kMaxShapeUnit)) {
+      return "a corner is outside -16 to 32 sixteenths";
+    }
+    if (element.max[axis] < element.min[axis]) return "the upper corner is below the lower one";
+    if (element.max[axis] == element.min[axis]) ++plates;
+  }
+  if (plates > 1) return "the box has no extent along two axes";
+  if (element.turn) {
+    if (element.turn->axis < 0 || element.turn->axis > 2) return "the axis of the turn is not 0, 1 or 2";
+    if (!is_finite(element.turn->origin) || !std::isfinite(element.turn->degrees)) return "the turn is not finite";
+    if (std::abs(element.turn->degrees) > 360.0F) return "the turn is not between -360 and 360 degrees";
+    if (element.turn->rescales && std::abs(std::cos(element.turn->degrees * 0.01745329252F)) < 0.1F) {
+      return "the turn cannot be rescaled";
+    }
+  }
+  for (const ElementFace& face : element.faces) {
+    if (!face.part) continue;
+    for (const float at : *face.part) {
+      if (!std::isfinite(at) || std::abs(at) > 1'024.0F) return "a part of a texture is not finite";
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<VoxelShape> VoxelShape::from_elements(std::vector<ShapeElement> elements) {
+  if (elements.empty()) return make_error(ErrorCode::InvalidArgument, "cannot make a shape without elements");
+  if (elements.size() > kMaxShapeElements) {
+    return make_error(ErrorCode::InvalidArgument, "cannot make a shape of " + std::to_string(elements.size()) +
+                                                      " elements: at most " + std::to_string(kMaxShapeElements));
+  }
+  for (std::size_t i = 0; i < elements.size(); ++i) {
+    if (const std::string reason = error_of(elements[i]); !reason.empty()) {
+      return make_error(ErrorCode::InvalidArgument,
+                        "cannot use element " + std::to_string(i) + " of a shape: " + reason);
+    }
+  }
+  VoxelShape shape;
+  shape.elements_ = std::make_shared<const std::vector<ShapeElement>>(std::move(elements));
+  return shape;
+}
+
+VoxelShape VoxelShape::box(IVec3 lower, IVec3 upper) {
+  return boxes({{lower, upper}});
+}
+
+VoxelShape VoxelShape::boxes(std::initializer_list<IBox> boxes) {
+  std::vector<ShapeElement> elements;
+  elements.reserve(boxes.size());
+  for (const IBox& box : boxes) {
+    for (int axis = 0; axis < 3; ++axis) {
+      QUOIN_ASSERT(box.min[axis] >= 0 && box.min[axis] < box.max[axis] && box.max[axis] <= kShapeUnits,
+                   "0 <= lower < upper <= 16 on each axis");
+    }
+    elements.push_back({.min = Vec3(box.min), .max = Vec3(box.max)});
+  }
+  Result<VoxelShape> shape = from_elements(std::move(elements));
+  QUOIN_ASSERT(shape, "1 to kMaxShapeElements boxes");
+  return *std::move(shape);
+}
+
+VoxelShape VoxelShape::crossed_plates(float height) {
+  QUOIN_ASSERT(height > 0.0F && height <= static_cast<float>(kShapeUnits), "0 < height <= 16");
+  std::vector<ShapeElement> elements;
+  for (const float degrees : {45.0F, -45.0F}) {
+    ShapeElement plate{.min = Vec3(0.0F, 0.0F, 8.0F), .max = Vec3(16.0F, height, 8.0F)};
+    plate.turn = ElementTurn{.degrees = degrees};
+    plate.collides = false;
+    elements.push_back(std::move(plate));
+  }
+  return *from_elements(std::move(elements));
+}
+
+StateOrientations StateOrientations::about_y(std::uint8_t first_bit) {
+  StateOrientations orientations{.first_bit = first_bit};
+  for (int turns = 0; turns < 4; ++turns) orientations.by_value.push_back(AxisOrientation::quarter_turns(1, turns));
+  return orientations;
+}
+
+StateOrientations StateOrientations::along_axes(std::uint8_t first_bit) {
+  return {first_bit, {AxisOrientation(), AxisOrientation::quarter_turns(2, -1), AxisOrientation::quarter_turns(0, 1)}};
+}
+
+StateOrientations StateOrientations::to_directions(std::uint8_t first_bit) {
+  using Orientation = AxisOrientation;
+  return {first_bit,
+          {Orientation::quarter_turns(2, -1), Orientation::quarter_turns(2, 1), Orientation(),
+           Orientation::quarter_turns(0, 2), Orientation::quarter_turns(0, 1), Orientation::quarter_turns(0, -1)}};
+}
+
+StateOrientations StateOrientations::about_y_and_upside_down(std::uint8_t first_bit) {
+  StateOrientations orientations = about_y(first_bit);
+  for (int turns = 0; turns < 4; ++turns) {
+    orientations.by_value.push_back(AxisOrientation::quarter_turns(1, turns) * AxisOrientation::quarter_turns(0, 2));
+  }
+  return orientations;
+}
+
+int StateOrientations::bit_count() const {
+  return by_value.size() < 2 ? 0 : std::bit_width(by_value.size() - 1);
+}
+
+std::uint32_t StateOrientations::turned(std::uint32_t state, const AxisOrientation& turn) const {
+  if (by_value.empty()) return state;
+  const AxisOrientation wanted = turn * of(state);
+  // Prefers the orientation itself, then equal directions of up, then of front.
+  const auto fit_of = [&](const AxisOrientation& orientation) {
+    if (orientation == wanted) return 4;
+    const bool is_up_equal = orientation.apply(Direction::PosY) == wanted.apply(Direction::PosY);
+    const bool is_front_equal = orientation.apply(Direction::PosX) == wanted.apply(Direction::PosX);
+    return (is_up_equal ? 2 : 0) + (is_front_equal ? 1 : 0);
+  };
+  std::optional<std::size_t> best;
+  int best_fit = 0;
+  for (std::size_t value = 0; value < by_value.size(); ++value) {
+    if (const int fit = fit_of(by_value[value]); fit > best_fit) {
+      best = value;
+      best_fit = fit;
+    }
+  }
+  if (!best) return state;
+  const std::uint32_t mask = ((std::uint32_t{1} << bit_count()) - 1) << first_bit;
+  return (state & ~mask) | static_cast<std::uint32_t>(*best) << first_bit;
+}
+
+}  // namespace quoin

@@ -1,0 +1,277 @@
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+
+#include <quoin/grid/grid.h>
+#include <quoin/grid/voxel_registry.h>
+#include <quoin/grid/voxel_shape.h>
+
+#include "grid/shapes/shape_index.h"
+
+namespace quoin {
+namespace {
+
+VoxelShape slab() {
+  return VoxelShape::box({0, 0, 0}, {16, 8, 16});
+}
+
+const ShapeModel& model_of(const VoxelShapes& shapes, const AxisOrientation& orientation = {}) {
+  return shapes.model(0, orientation, {});
+}
+
+// Stairs of one box below and quarters above it, as ShapeNeighbours::Stairs describes.
+VoxelShapes stairs() {
+  const auto quarter = [](int x, int z) { return VoxelShape::box({x, 8, z}, {x + 8, 16, z + 8}); };
+  const auto at = [](StairCorner corner) { return ShapeCondition{.corner = corner}; };
+  using enum StairCorner;
+  return *VoxelShapes::from_rules(
+      {.parts = {{.shape = slab()},
+                 {.shape = quarter(8, 0), .when = {at(Straight), at(OuterLeft), at(InnerLeft), at(InnerRight)}},
+                 {.shape = quarter(8, 8), .when = {at(Straight), at(OuterRight), at(InnerLeft), at(InnerRight)}},
+                 {.shape = quarter(0, 0), .when = {at(InnerLeft)}},
+                 {.shape = quarter(0, 8), .when = {at(InnerRight)}}},
+       .neighbours = ShapeNeighbours::Stairs});
+}
+
+VoxelShapes fence() {
+  std::vector<ShapePart> parts = {{.shape = VoxelShape::box({6, 0, 6}, {10, 16, 10})}};
+  for (int turns = 0; turns < 4; ++turns) {
+    const AxisOrientation turn = AxisOrientation::quarter_turns(1, turns);
+    parts.push_back({.shape = VoxelShape::box({10, 6, 7}, {16, 9, 9}),
+                     .orientation = turn,
+                     .when = {{.connected = {turn.apply(Direction::PosX)}}}});
+  }
+  return *VoxelShapes::from_rules({.parts = std::move(parts), .neighbours = ShapeNeighbours::Connected});
+}
+
+int filled(const ShapeModel& model) {
+  int count = 0;
+  for (const std::uint16_t bits : model.bits) count += __builtin_popcount(bits);
+  return count;
+}
+
+TEST(VoxelShape, SlabCoversItsSides) {
+  const VoxelShapes shapes(slab());
+  const ShapeModel& model = model_of(shapes);
+  EXPECT_EQ(filled(model), 16 * 16 * 8);
+  ASSERT_EQ(model.faces.size(), 6U);
+  EXPECT_TRUE(model.covers_side[3]);
+  EXPECT_FALSE(model.covers_side[0] || model.covers_side[2]);
+  EXPECT_EQ(model.filled_octants, 0b0011'0011);
+  EXPECT_FALSE(model.is_full);
+  for (const ModelFace& face : model.faces) {
+    EXPECT_EQ(face.on_side, face.direction != Direction::PosY);
+    const Vec3 normal = glm::cross(face.corners[1] - face.corners[0], face.corners[2] - face.corners[0]);
+    EXPECT_EQ(nearest_direction(DVec3(normal)), face.direction);
+  }
+}
+
+TEST(VoxelShape, TurnsKeepFacesOutwardAndBoxesEqual) {
+  const VoxelShapes shapes(VoxelShape::box({1, 2, 3}, {7, 5, 16}));
+  for (int i = 0; i < AxisOrientation::kCount; ++i) {
+    const ShapeModel& model = model_of(shapes, AxisOrientation::at(i));
+    EXPECT_EQ(filled(model), 6 * 3 * 13);
+    ASSERT_EQ(model.faces.size(), 6U);
+    const ModelBox& box = model.boxes[0];
+    for (const Direction direction : kDirections) {
+      const ModelFace& face = model.faces[static_cast<std::size_t>(box.faces[static_cast<std::size_t>(direction)])];
+      EXPECT_EQ(face.direction, direction);
+      EXPECT_GT(glm::dot(glm::cross(face.corners[1] - face.corners[0], face.corners[3] - face.corners[0]),
+                         Vec3(normal_of(direction))),
+                0.0F);
+      const FaceFrame& frame = frame_of(direction);
+      EXPECT_EQ(face.corners[0][frame.axis], (frame.sign > 0 ? box.max : box.min)[frame.axis]);
+    }
+  }
+}
+
+TEST(VoxelShape, CrossedPlatesHaveFourFacesAndNoBits) {
+  const VoxelShapes shapes(VoxelShape::crossed_plates());
+  const ShapeModel& model = model_of(shapes);
+  ASSERT_EQ(model.faces.size(), 4U);
+  EXPECT_EQ(filled(model), 0);
+  for (const ModelFace& face : model.faces) {
+    EXPECT_NEAR(std::abs(face.normal.x), std::sqrt(0.5F), 1e-6F);
+    EXPECT_FALSE(face.on_side);
+  }
+  // A turned box maps its corners back to itself.
+  const ModelBox& box = model.boxes[0];
+  const ModelFace& face = model.faces[static_cast<std::size_t>(box.faces[4])];
+  for (const Vec3& corner : face.corners) {
+    const Vec3 p = corner - box.origin;
+    const Vec3 own(glm::dot(box.inverse[0], p), glm::dot(box.inverse[1], p), glm::dot(box.inverse[2], p));
+    EXPECT_NEAR(own.z, 0.5F, 1e-6F);
+    EXPECT_NEAR(std::abs(own.x - 0.5F), 0.5F, 1e-6F);
+  }
+}
+
+TEST(VoxelShape, TextureCoordinatesAgreeWithCubes) {
+  const VoxelShapes shapes(VoxelShape::box({0, 0, 0}, {16, 16, 16}));
+  const ShapeModel& model = model_of(shapes);
+  EXPECT_TRUE(model.is_full);
+  for (const ModelFace& face : model.faces) {
+    for (const bool mirrored : {false, true}) {
+      for (std::uint8_t turn = 0; turn < 4; ++turn) {
+        VoxelFace look;
+        look.turn = turn;
+        look.mirrored = mirrored;
+        const TextureFrame frame = texture_frame(look, face.direction);
+        for (std::size_t i = 0; i < 4; ++i) {
+          const std::array<float, 2> uv = texture_uv(face, look, face.uv[i]);
+          std::array<float, 2> cube = texture_coordinates(frame, face.corners[i]);
+          const auto is_negative = [](const IVec3& axis) { return axis.x + axis.y + axis.z < 0; };
+          if (is_negative(frame.right)) cube[0] += 1.0F;
+          if (is_negative(frame.down)) cube[1] += 1.0F;
+          EXPECT_EQ(uv, cube) << name_of(face.direction) << " turn " << int{turn} << " mirrored " << mirrored;
+        }
+      }
+    }
+  }
+}
+
+TEST(VoxelShape, RejectsBadElementsByIndex) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const auto reason = [](ShapeElement element) {
+    const auto shape = VoxelShape::from_elements({ShapeElement{}, std::move(element)});
+    return shape ? std::string() : shape.error().message;
+  };
+  EXPECT_EQ(reason({.min = Vec3(nan)}), "cannot use element 1 of a shape: a corner is not finite");
+  EXPECT_EQ(reason({.min = Vec3(-17.0F)}), "cannot use element 1 of a shape: a corner is outside -16 to 32 sixteenths");
+  EXPECT_EQ(reason({.min = Vec3(9.0F), .max = Vec3(8.0F)}),
+            "cannot use element 1 of a shape: the upper corner is below the lower one");
+  EXPECT_EQ(reason({.turn = ElementTurn{.degrees = nan}}), "cannot use element 1 of a shape: the turn is not finite");
+  EXPECT_FALSE(VoxelShape::from_elements(std::vector<ShapeElement>(200)));
+  EXPECT_FALSE(VoxelShape::from_elements({}));
+  EXPECT_FALSE(VoxelShapes::from_rules({}));
+}
+
+TEST(VoxelShape, RegistryChecksStatesAndTexturesOfShapes) {
+  VoxelRegistry types;
+  EXPECT_FALSE(types.add({.name = "furnace", .state_bits = 1, .orientations = StateOrientations::about_y()}));
+  const auto furnace = types.add({.name = "furnace", .state_bits = 2, .orientations = StateOrientations::about_y()});
+  ASSERT_TRUE(furnace);
+  EXPECT_TRUE(types.is_opaque(*furnace));
+  EXPECT_TRUE(types.is_turned_by_state(*furnace));
+  const auto half = types.add({.name = "slab", .shapes = slab()});
+  ASSERT_TRUE(half);
+  EXPECT_TRUE(types.is_shaped(*half));
+  EXPECT_TRUE(types.is_transparent(*half));
+  EXPECT_FALSE(types.occludes(*half));
+  EXPECT_FALSE(types.blocks_light(*half));
+  EXPECT_TRUE(types.remeshes_on_data(*half));
+  VoxelRegistry copy = types;
+  copy.replace(*half, {.name = "slab"});
+  EXPECT_FALSE(copy.has_shapes());
+  EXPECT_FALSE(copy.has_transparent());
+  EXPECT_TRUE(types.has_shapes());
+}
+
+TEST(VoxelShape, StatesTurn) {
+  const StateOrientations turns = StateOrientations::about_y(1);
+  EXPECT_EQ(turns.bit_count(), 2);
+  EXPECT_EQ(turns.of(0b111).apply(Direction::PosX), AxisOrientation::quarter_turns(1, 3).apply(Direction::PosX));
+  EXPECT_EQ(turns.turned(0b101, AxisOrientation::quarter_turns(1, 1)), 0b111U);
+  // A log has no front: any turn about its axis keeps its state.
+  EXPECT_EQ(StateOrientations::along_axes().turned(0, AxisOrientation::quarter_turns(1, 1)), 0U);
+  EXPECT_EQ(StateOrientations::along_axes().turned(0, AxisOrientation::quarter_turns(2, 1)), 1U);
+}
+
+TEST(ShapeAt, FencesConnectToFencesAndFullSides) {
+  VoxelRegistry types;
+  const VoxelType stone = *types.add({.name = "stone"});
+  const VoxelType post = *types.add({.name = "fence", .shapes = fence()});
+  const VoxelType half = *types.add({.name = "slab", .shapes = slab()});
+  Grid grid;
+  grid.set({0, 0, 0}, post);
+  EXPECT_EQ(filled(*shape_at(grid, types, {0, 0, 0})), 4 * 4 * 16);
+  grid.set({1, 0, 0}, post);
+  grid.set({0, 0, -1}, stone);
+  grid.set({-1, 0, 0}, half);
+  EXPECT_EQ(filled(*shape_at(grid, types, {0, 0, 0})), 4 * 4 * 16 + 2 * 6 * 3 * 2);
+  EXPECT_EQ(filled(*shape_at(grid, types, {1, 0, 0})), 4 * 4 * 16 + 6 * 3 * 2);
+  EXPECT_EQ(shape_at(grid, types, {0, 0, -1}), nullptr);
+}
+
+TEST(ShapeAt, StairsFormCornersInAllTurns) {
+  VoxelRegistry types;
+  const VoxelType type = *types.add({.name = "stairs",
+                                     .state_bits = 3,
+                                     .orientations = StateOrientations::about_y_and_upside_down(),
+                                     .shapes = stairs()});
+  constexpr int kStraight = 2048 + 1024;
+  for (std::uint32_t state = 0; state < 8; ++state) {
+    const AxisOrientation turn = types[type].orientations.of(state);
+    const IVec3 front = normal_of(turn.apply(Direction::PosX));
+    const std::uint32_t quarter = types[type].orientations.turned(state, AxisOrientation::quarter_turns(1, 1));
+    Grid grid;
+    grid.set({0, 0, 0}, type, {.state = state});
+    EXPECT_EQ(filled(*shape_at(grid, types, {0, 0, 0})), kStraight);
+    grid.set(front, type, {.state = quarter});
+    EXPECT_EQ(filled(*shape_at(grid, types, {0, 0, 0})), kStraight - 512) << "an outer corner, state " << state;
+    grid.set(front, kAir);
+    grid.set(-front, type, {.state = quarter});
+    EXPECT_EQ(filled(*shape_at(grid, types, {0, 0, 0})), kStraight + 512) << "an inner corner, state " << state;
+  }
+}
+
+TEST(ShapeAt, FluidsInclineTowardsLowerNeighbours) {
+  VoxelRegistry types;
+  const VoxelType water = *types.add({.name = "water",
+                                      .visibility = Visibility::Transparent,
+                                      .state_bits = 4,
+                                      .shapes = *VoxelShapes::from_rules({.neighbours = ShapeNeighbours::Fluid})});
+  Grid grid;
+  for (int x = 0; x < 4; ++x) grid.set({x, 0, 0}, water, {.state = static_cast<std::uint32_t>(2 * x)});
+  const ShapeModel* source = shape_at(grid, types, {0, 0, 0});
+  const ShapeModel* next = shape_at(grid, types, {1, 0, 0});
+  EXPECT_GT(source->free_faces, 0);
+  // Common corners have equal heights.
+  EXPECT_EQ(source->max.y, source->faces[0].corners[0].y);
+  EXPECT_GT(source->max.y, next->max.y - 1e-6F);
+  grid.set({1, 1, 0}, water);
+  EXPECT_TRUE(shape_at(grid, types, {1, 0, 0})->is_full);
+}
+
+TEST(ShapeIndex, ListsShapesInVoxelsThatTheyTouchAndFollowsEdits) {
+  VoxelRegistry types;
+  const VoxelType half = *types.add({.name = "slab", .shapes = slab()});
+  const VoxelType post = *types.add({.name = "fence", .shapes = fence()});
+  const VoxelType tall = *types.add(
+      {.name = "tall", .shapes = *VoxelShape::from_elements({{.min = Vec3(0.0F), .max = Vec3(16, 24, 16)}})});
+  Grid grid;
+  grid.set({63, 63, 0}, tall);
+  grid.set({64, 63, 0}, post);
+  grid.set({5, 5, 5}, half);
+  grid.set({5, 6, 5}, half);
+  grid.set({5, 7, 5}, tall);
+  ChangeCursor cursor = grid.cursor();
+  ChangeCursor data_cursor = grid.cursor();
+  ShapeIndex index;
+  index.build(grid, types);
+  ASSERT_EQ(index.at({63, 64, 0}).size(), 1U);
+  EXPECT_EQ(index.at({63, 64, 0})[0].voxel, IVec3(63, 63, 0));
+  EXPECT_TRUE(index.at({63, 65, 0}).empty());
+  EXPECT_EQ(index.at({5, 6, 5})[0].type, half);
+  EXPECT_EQ(index.touched_row({0, 8, 5}), std::uint64_t{1} << 5);
+  int count = 0;
+  index.for_each_in({0, 0, 0}, [&](const PlacedShape&) { ++count; });
+  EXPECT_EQ(count, 4);
+
+  // The fence connects to a fence in the next chunk, and its shape changes although its own voxel does not.
+  grid.set({63, 63, 0}, post);
+  index.update(grid, types, grid.changes_since(cursor), grid.data_changes_since(data_cursor));
+  EXPECT_TRUE(index.at({63, 64, 0}).empty());
+  EXPECT_EQ(filled(*index.at({64, 63, 0})[0].model), 4 * 4 * 16 + 6 * 3 * 2);
+  ShapeIndex fresh;
+  fresh.build(grid, types);
+  EXPECT_EQ(index.bounds(), fresh.bounds());
+}
+
+}  // namespace
+}  // namespace quoin
