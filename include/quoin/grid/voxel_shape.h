@@ -106,7 +106,10 @@ class VoxelShape {
 ///   VoxelProperties furnace{.name = "furnace", .state_bits = 2, .orientations = StateOrientations::about_y()};
 ///   world.set(at, furnace_type, {.state = 1});  // turned by a quarter
 struct StateOrientations {
-  std::uint8_t first_bit = 0;               ///< lowest bit of the state that selects
+  std::uint8_t first_bit = 0;  ///< lowest bit of the state that selects
+  /// The unturned direction that stays exact when a mirrored voxel needs a rotation: the door of a furnace, the high
+  /// side of stairs.
+  Direction front = Direction::PosX;
   std::vector<AxisOrientation> by_value{};  ///< by the value of those bits; empty: never turned; at most 48
 
   /// Returns the four turns about y: 0, 1, 2 and 3 quarter turns, counter-clockwise seen from above.
@@ -128,8 +131,8 @@ struct StateOrientations {
     return value < by_value.size() ? by_value[value] : AxisOrientation();
   }
   /// Returns the state of a voxel after it was turned or mirrored, with the other bits as they were: the value whose
-  /// orientation is `turn * of(state)`; if there is none, one that turns +Y and then +X to the same directions as far
-  /// as possible; the state itself if nothing fits.
+  /// orientation is `turn * of(state)`; if there is none, one that turns +Y, then the front, to the same directions, or
+  /// at least to the same axes (a log has no front); the state itself if +Y has none of them.
   [[nodiscard]] std::uint32_t turned(std::uint32_t state, const AxisOrientation& turn) const;
 
   bool operator==(const StateOrientations&) const = default;

@@ -100,14 +100,16 @@ StateOrientations StateOrientations::about_y(std::uint8_t first_bit) {
 }
 
 StateOrientations StateOrientations::along_axes(std::uint8_t first_bit) {
-  return {first_bit, {AxisOrientation(), AxisOrientation::quarter_turns(2, -1), AxisOrientation::quarter_turns(0, 1)}};
+  return {.first_bit = first_bit,
+          .by_value = {AxisOrientation(), AxisOrientation::quarter_turns(2, -1), AxisOrientation::quarter_turns(0, 1)}};
 }
 
 StateOrientations StateOrientations::to_directions(std::uint8_t first_bit) {
   using Orientation = AxisOrientation;
-  return {first_bit,
-          {Orientation::quarter_turns(2, -1), Orientation::quarter_turns(2, 1), Orientation(),
-           Orientation::quarter_turns(0, 2), Orientation::quarter_turns(0, 1), Orientation::quarter_turns(0, -1)}};
+  return {.first_bit = first_bit,
+          .by_value = {Orientation::quarter_turns(2, -1), Orientation::quarter_turns(2, 1), Orientation(),
+                       Orientation::quarter_turns(0, 2), Orientation::quarter_turns(0, 1),
+                       Orientation::quarter_turns(0, -1)}};
 }
 
 StateOrientations StateOrientations::about_y_and_upside_down(std::uint8_t first_bit) {
@@ -125,12 +127,16 @@ int StateOrientations::bit_count() const {
 std::uint32_t StateOrientations::turned(std::uint32_t state, const AxisOrientation& turn) const {
   if (by_value.empty()) return state;
   const AxisOrientation wanted = turn * of(state);
-  // Prefers the orientation itself, then equal directions of up, then of front.
+  // Prefers the orientation itself, then equal directions of up and of the front, then equal axes.
+  const auto likeness = [&](const AxisOrientation& orientation, Direction direction) {
+    const Direction is = orientation.apply(direction);
+    const Direction should = wanted.apply(direction);
+    return is == should ? 2 : frame_of(is).axis == frame_of(should).axis ? 1 : 0;
+  };
   const auto fit_of = [&](const AxisOrientation& orientation) {
-    if (orientation == wanted) return 4;
-    const bool is_up_equal = orientation.apply(Direction::PosY) == wanted.apply(Direction::PosY);
-    const bool is_front_equal = orientation.apply(Direction::PosX) == wanted.apply(Direction::PosX);
-    return (is_up_equal ? 2 : 0) + (is_front_equal ? 1 : 0);
+    if (orientation == wanted) return 9;
+    const int up = likeness(orientation, Direction::PosY);
+    return up == 0 ? 0 : 3 * up + likeness(orientation, front);
   };
   std::optional<std::size_t> best;
   int best_fit = 0;

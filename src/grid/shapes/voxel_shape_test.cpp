@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -180,6 +181,11 @@ TEST(VoxelShape, StatesTurn) {
   // A log has no front: any turn about its axis keeps its state.
   EXPECT_EQ(StateOrientations::along_axes().turned(0, AxisOrientation::quarter_turns(1, 1)), 0U);
   EXPECT_EQ(StateOrientations::along_axes().turned(0, AxisOrientation::quarter_turns(2, 1)), 1U);
+  // A mirror across x leaves a front at +Z, and turns one at +X.
+  StateOrientations furnace = StateOrientations::about_y();
+  EXPECT_EQ(furnace.turned(0, AxisOrientation::mirror(0)), 2U);
+  furnace.front = Direction::PosZ;
+  EXPECT_EQ(furnace.turned(0, AxisOrientation::mirror(0)), 0U);
 }
 
 TEST(ShapeAt, FencesConnectToFencesAndFullSides) {
@@ -231,9 +237,19 @@ TEST(ShapeAt, FluidsInclineTowardsLowerNeighbours) {
   const ShapeModel* source = shape_at(grid, types, {0, 0, 0});
   const ShapeModel* next = shape_at(grid, types, {1, 0, 0});
   EXPECT_GT(source->free_faces, 0);
+  const auto height = [](const ShapeModel& model, float x, float z) {
+    float highest = 0.0F;
+    for (const ModelFace& face : model.faces) {
+      for (const Vec3& corner : face.corners) {
+        if (corner.x == x && corner.z == z) highest = std::max(highest, corner.y);
+      }
+    }
+    return highest;
+  };
   // Common corners have equal heights.
-  EXPECT_EQ(source->max.y, source->faces[0].corners[0].y);
-  EXPECT_GT(source->max.y, next->max.y - 1e-6F);
+  EXPECT_EQ(height(*source, 1, 0), height(*next, 0, 0));
+  EXPECT_EQ(height(*source, 1, 1), height(*next, 0, 1));
+  EXPECT_GT(height(*source, 1, 0), height(*next, 1, 0));
   grid.set({1, 1, 0}, water);
   EXPECT_TRUE(shape_at(grid, types, {1, 0, 0})->is_full);
 }
