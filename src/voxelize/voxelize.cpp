@@ -20,7 +20,6 @@
 #include "core/work/progress_steps.h"
 #include "grid/colour_table.h"
 #include "voxelize/crossings.h"
-#include "voxelize/nearest.h"
 #include "voxelize/surface_colours.h"
 #include "voxelize/voxel_frame.h"
 

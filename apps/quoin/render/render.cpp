@@ -13,7 +13,6 @@
 #include "command_files.h"
 #include "output.h"
 #include "render/image_output.h"
-#include "render/image_series.h"
 #include "render/render_arguments.h"
 #include "run_control.h"
 

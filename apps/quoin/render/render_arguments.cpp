@@ -11,7 +11,6 @@
 #include "commands.h"
 #include "options.h"
 #include "render/image_output.h"
-#include "render/image_series.h"
 
 namespace quoin::tool {
 

@@ -1,4 +1,4 @@
-#include "io/vox/orientation.h"
+#include "io/vox/chunks.h"
 
 #include <cmath>
 #include <set>

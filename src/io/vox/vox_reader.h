@@ -15,7 +15,6 @@
 #include <quoin/scene/scene.h>
 
 #include "io/vox/chunks.h"
-#include "io/vox/orientation.h"
 
 namespace quoin::vox {
 

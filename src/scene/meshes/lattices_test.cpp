@@ -1,4 +1,4 @@
-#include "scene/meshes/lattices.h"
+#include "scene/meshes/scene_mesh_parts.h"
 
 #include <gtest/gtest.h>
 

@@ -21,7 +21,6 @@
 #include "core/database/connection.h"
 #include "core/work/progress_steps.h"
 #include "store/chunk/chunk_body.h"
-#include "store/database/world_lock.h"
 #include "store/scene/world_file.h"
 #include "store/world/part_text.h"
 #include "store/world/world_changes.h"

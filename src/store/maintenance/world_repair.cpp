@@ -18,7 +18,6 @@
 #include "core/bytes/files.h"
 #include "core/database/connection.h"
 #include "store/chunk/chunk_body.h"
-#include "store/database/world_lock.h"
 #include "store/maintenance/page_scan.h"
 #include "store/world/part_text.h"
 #include "store/world/world_changes.h"

@@ -14,7 +14,6 @@
 #include "core/bytes/text.h"
 #include "core/database/connection.h"
 #include "store/database/schema.h"
-#include "store/database/world_lock.h"
 #include "store/store_formats.h"
 #include "store/world/world_changes.h"
 #include "store/world/world_open.h"

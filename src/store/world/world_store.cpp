@@ -17,7 +17,6 @@
 #include "core/bytes/files.h"
 #include "core/database/connection.h"
 #include "store/chunk/chunk_body.h"
-#include "store/database/world_lock.h"
 #include "store/store_formats.h"
 #include "store/world/world_changes.h"
 #include "store/world/world_open.h"

@@ -17,7 +17,6 @@
 #include "io/vox/vox_reader.h"
 #include "io/vox/write/graph_revision.h"
 #include "io/vox/write/node_content.h"
-#include "io/vox/write/view_plan.h"
 #include "io/vox/write/vox_parts.h"
 #include "io/whole_file.h"
 

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "core/death_for_tests.h"
-#include "io/vox/orientation.h"
+#include "io/vox/chunks.h"
 #include "io/vox/vox_for_tests.h"
 #include "io/vox/vox_reader.h"
 #include "io/vox/write/vox_parts.h"
