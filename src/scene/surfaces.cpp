@@ -8,6 +8,8 @@
 
 #include <quoin/core/assert.h>
 
+#include "core/srgb.h"
+
 namespace quoin {
 
 std::optional<float> glass_ior(const VoxelProperties& properties) {
@@ -51,6 +53,35 @@ Surface surface_of(const VoxelProperties& properties, Clouds clouds) {
   surface.log_clarity = -surface.scattering;
   surface.log_transmittance = Vec3(-surface.scattering);
   return surface;
+}
+
+FaceTexels face_texels(const VoxelFace& face, Direction direction, float emission) {
+  const Texture& texture = face.texture;
+  FaceTexels found;
+  found.texels = texture.level(0).data();
+  found.log_size = static_cast<std::uint8_t>(texture.level_count() - 1);
+  found.alpha = face.alpha;
+  const TextureFrame frame = texture_frame(face, direction);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const IVec3& along = i == 0 ? frame.right : frame.down;
+    const int axis = along.x != 0 ? 0 : along.y != 0 ? 1 : 2;
+    found.axis[i] = static_cast<std::uint8_t>(axis);
+    found.sign[i] = along[axis] < 0 ? -1.0F : 1.0F;
+  }
+  found.linear = linear_bytes().data();
+  found.tint = linear_colour(face.tint);
+  found.emission = emission;
+  return found;
+}
+
+CellContent content_of(const VoxelProperties& properties, Clouds clouds) {
+  if (properties.visibility != Visibility::Transparent) return CellContent::Glass;
+  const bool is_glass = std::ranges::all_of(
+      kDirections, [&](Direction each) { return properties.faces[each].alpha == FaceAlpha::Translucent; });
+  if (!is_glass) return CellContent::Faces;
+  // A cloud has no surface to show a texture on.
+  const bool is_cloud = clouds == Clouds::Scatter && properties.scattering > 0.0F;
+  return is_cloud ? CellContent::Glass : CellContent::TexturedGlass;
 }
 
 // The shares of three neighbouring samples of an axis at a place. `off`: from the middle sample to the place, -0.5 to
@@ -139,20 +170,79 @@ const Surface& Surfaces::of_field(VoxelType material) const {
   return material == kAir ? white : (*this)[material];
 }
 
+void Surfaces::put(VoxelType type, const VoxelProperties& properties) {
+  QUOIN_ASSERT(type + std::size_t{1} < surfaces_.size(), "a registered type");
+  surfaces_[type] = surface_of(properties, clouds_);
+  is_opaque_[type] = properties.visibility == Visibility::Opaque ? 1 : 0;
+  if (faces_.empty()) return;
+  faces_[type] = nullptr;
+  if (properties.faces.empty()) return;
+  const auto made = std::make_shared<TypeFaces>();
+  made->kept = properties.faces;
+  made->content = content_of(properties, clouds_);
+  for (const Direction each : kDirections) {
+    made->sides[static_cast<std::size_t>(each)] = face_texels(properties.faces[each], each, emission_of(properties));
+  }
+  faces_[type] = made;
+}
+
 bool Surfaces::update(const VoxelRegistry& types) {
   PendingChanges changes(followed_, types);
   if (changes->empty()) return false;
-  const auto put = [&](std::size_t type) {
-    QUOIN_ASSERT(type + 1 < surfaces_.size(), "a registered type");
-    surfaces_[type] = surface_of(types[static_cast<VoxelType>(type)], clouds_);
-  };
   surfaces_.resize(types.size() + 1);
   surfaces_.back() = {};
   surfaces_.back().colour = {1.0F, 0.0F, 1.0F};
-  for (std::size_t type = 0; changes->all && type < types.size(); ++type) put(type);
-  for (const TypeChange& change : changes->items_unless_all()) put(change.type);
+  is_opaque_.resize(types.size());
+  if (types.has_textures() || !faces_.empty()) faces_.resize(types.size());
+  for (std::size_t type = 0; changes->all && type < types.size(); ++type) {
+    put(static_cast<VoxelType>(type), types[static_cast<VoxelType>(type)]);
+  }
+  for (const TypeChange& change : changes->items_unless_all()) put(change.type, types[change.type]);
+  has_ = {};
+  for (const auto& each : faces_) {
+    if (each != nullptr) has_[static_cast<std::size_t>(each->content)] = true;
+  }
   changes.commit();
   return true;
+}
+
+namespace {
+
+// Appends the texel of a side at `met.t`, if it is visible. Returns false if it ends the ray.
+bool meet_side(const FaceTexels& side, const Ray& ray, IVec3 cell, MetFace& met, std::vector<MetFace>& out) {
+  const Rgba8 texel = side.texel(ray.origin + ray.direction * met.t - DVec3(cell), 0);
+  met.cover = side.cover(texel);
+  if (met.cover == 0.0F) return true;
+  met.colour = side.colour(texel);
+  out.push_back(met);
+  return met.cover < 1.0F;
+}
+
+}  // namespace
+
+bool meet_cell(const Surfaces& surfaces, GridReader& voxels, std::int32_t placed, VoxelType type,
+               const Ray& ray_in_grid, const CellSpan& span, double max_t, std::vector<MetFace>& out) {
+  const TypeFaces* const faces = surfaces.faces(type);
+  QUOIN_ASSERT(faces != nullptr && faces->content == CellContent::Faces, "a type with faces");
+  const auto is_hidden_by = [&](VoxelType other) { return other == type || surfaces.is_opaque(other); };
+  MetFace met;
+  met.placed = placed;
+  met.type = type;
+  if (!span.starts_inside && span.t_enter <= max_t && !is_hidden_by(voxels.get(span.first + normal_of(span.face)))) {
+    met.voxel = span.first;
+    met.face = span.face;
+    met.side = static_cast<std::uint16_t>(span.face);
+    met.t = span.t_enter;
+    if (!meet_side(faces->sides[met.side], ray_in_grid, span.first, met, out)) return false;
+  }
+  const FaceTexels& far_side = faces->sides[static_cast<std::size_t>(span.exit_face)];
+  if (far_side.alpha == FaceAlpha::Translucent || !(span.t_exit <= max_t)) return true;
+  if (is_hidden_by(voxels.get(span.behind))) return true;
+  met.voxel = span.behind;
+  met.face = static_cast<Direction>(static_cast<int>(span.exit_face) ^ 1);
+  met.side = static_cast<std::uint16_t>(span.exit_face);
+  met.t = span.t_exit;
+  return meet_side(far_side, ray_in_grid, span.behind - normal_of(span.exit_face), met, out);
 }
 
 }  // namespace quoin

@@ -1,15 +1,21 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <vector>
 
 #include <quoin/core/assert.h>
 #include <quoin/core/changes.h>
+#include <quoin/core/direction.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/density_grid.h>
+#include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
+#include <quoin/trace/ray.h>
 
 namespace quoin {
 
@@ -45,6 +51,54 @@ enum class Clouds : std::uint8_t {
   Scatter,  ///< no refraction, tint or absorption; `log_clarity` is the unscattered light
 };
 
+/// The content of the cells of a transparent type, for rays.
+enum class CellContent : std::uint8_t {
+  Glass,  ///< one colour; also the kind of opaque types
+  /// All faces are translucent: glass with the colour and alpha of the texel where a ray enters it.
+  TexturedGlass,
+  /// Any other textured type: a hollow cell, whose faces a ray meets one by one (meet_cell).
+  Faces,
+};
+
+/// A textured face, ready for lookups of texels.
+struct FaceTexels {
+  const Rgba8* texels = nullptr;  ///< of all mipmap levels, level 0 first
+  std::uint8_t log_size = 0;      ///< of level 0; also the number of the last level
+  FaceAlpha alpha = FaceAlpha::Opaque;
+  std::array<std::uint8_t, 2> axis{};  ///< of the grid, along the texture's rows and down its columns
+  std::array<float, 2> sign{};         ///< of that axis
+  const float* linear = nullptr;       ///< linear light by sRGB byte
+  Vec3 tint{1.0F};
+  float emission = 0.0F;
+
+  /// Returns the texel that `texel_at` returns. `inside`: the position in its voxel. `level`: 0 to `log_size`.
+  [[nodiscard]] Rgba8 texel(const DVec3& inside, int level) const {
+    const auto log_width = static_cast<unsigned>(log_size - level);
+    const auto along = [&](std::size_t i) { return texel_number(inside[axis[i]], sign[i], 1U << log_width); };
+    // The levels before have size^2 * (1 + 1/4 + ...) texels.
+    const std::uint32_t begin = ((4U << 2U * log_size) - (4U << 2U * log_width)) / 3U;
+    return texels[begin + (along(1) << log_width) + along(0)];
+  }
+  /// Returns the texel's tinted colour in linear light.
+  [[nodiscard]] Vec3 colour(Rgba8 texel) const {
+    return Vec3(linear[texel.r], linear[texel.g], linear[texel.b]) * tint;
+  }
+  /// Returns the tinted mean of the texture, weighted by alpha: its last mipmap level.
+  [[nodiscard]] Vec3 mean() const { return colour(texel(DVec3(0.5), log_size)); }
+  /// Returns the share of the light behind it that a texel hides, 0 to 1.
+  [[nodiscard]] float cover(Rgba8 texel) const {
+    if (alpha == FaceAlpha::Translucent) return static_cast<float>(texel.a) / 255.0F;
+    return alpha == FaceAlpha::Opaque || texel.a >= kCutoutAlpha ? 1.0F : 0.0F;
+  }
+};
+
+/// The textured faces of a type.
+struct TypeFaces {
+  VoxelFaces kept;  ///< owns the texels
+  CellContent content = CellContent::Glass;
+  std::array<FaceTexels, 6> sides;  ///< by direction
+};
+
 /// Surfaces by type. Unregistered ids give a conspicuous magenta.
 class Surfaces {
  public:
@@ -59,6 +113,16 @@ class Surfaces {
     QUOIN_ASSERT(!surfaces_.empty(), "an entry for unregistered types");
     return surfaces_[type < surfaces_.size() - 1 ? type : surfaces_.size() - 1];
   }
+  /// Returns the textured faces of a type; null if it has none. Lifetime: until the next update.
+  [[nodiscard]] const TypeFaces* faces(VoxelType type) const {
+    return type < faces_.size() ? faces_[type].get() : nullptr;
+  }
+  /// Returns true if any type has this content. Cost: O(1).
+  [[nodiscard]] bool has(CellContent content) const { return has_[static_cast<std::size_t>(content)]; }
+  /// Returns true if a type hides the faces of its neighbours. Unregistered ids do.
+  [[nodiscard]] bool is_opaque(VoxelType type) const {
+    return type + std::size_t{1} >= surfaces_.size() || is_opaque_[type] != 0;
+  }
   /// Returns the surface of a field's material. kAir has no material and is white, as in smooth meshes.
   [[nodiscard]] const Surface& of_field(VoxelType material) const;
   /// Returns the colour, emission, roughness and metalness at a point of a field's surface: the weighted mean of the
@@ -71,9 +135,57 @@ class Surfaces {
                                        VoxelType nearest) const;
 
  private:
+  void put(VoxelType type, const VoxelProperties& properties);
+
   Clouds clouds_;
   std::vector<Surface> surfaces_;  // the last entry is for unregistered types
   ChangeCursor followed_;
+  std::vector<std::shared_ptr<const TypeFaces>> faces_;  // empty without textures
+  std::vector<std::uint8_t> is_opaque_;
+  std::array<bool, 3> has_{};  // by CellContent, of types with faces
 };
+
+/// The way of a ray through a cell, or through a block of cells of one type.
+struct CellSpan {
+  IVec3 first{0};                         ///< the voxel that the ray enters
+  IVec3 behind{0};                        ///< the voxel that it enters when it leaves the last one
+  Direction face = Direction::PosX;       ///< of `first`, through which it enters
+  Direction exit_face = Direction::PosX;  ///< through which it leaves
+  bool starts_inside = false;
+  double t_enter = 0.0;
+  double t_exit = 0.0;
+};
+
+/// A visible texel that a ray meets.
+struct MetFace {
+  std::int32_t placed = 0;  ///< the grid
+  /// The lit side. The inner side of a cell's face is the face of the neighbour that looks into the cell.
+  IVec3 voxel{0};
+  Direction face = Direction::PosX;
+  VoxelType type = kAir;
+  std::uint16_t side = 0;  ///< index into TypeFaces::sides
+  double t = 0.0;
+  Vec3 colour{0.0F};   ///< of the texel of level 0, in linear light
+  float cover = 0.0F;  ///< share of the light behind that it hides; 1 ends the ray
+
+  /// Returns the transmittance per channel: that of a voxel of glass of this colour and alpha.
+  [[nodiscard]] Vec3 passed() const { return (1.0F - cover) * (Vec3(1.0F) - cover * (Vec3(1.0F) - colour)); }
+};
+
+/// Finds the content of a cell that a ray meets, for types with CellContent::Faces. All rays that see such a cell call
+/// this: those of the camera, shadow and occlusion rays, and paths.
+///
+/// A face is there if the mesher draws it: its neighbour is neither opaque nor of the same type. The ray meets the
+/// outer side of its entry face, unless it starts inside, and the inner side of its exit face. Opaque and cutout faces
+/// have two sides; translucent ones are seen from outside only. Texels are those of level 0, so that all rays agree.
+///
+/// To join: other content than faces of cubes, such as shapes, is found here too. It appends its texels in order of t,
+/// with `side` as their index in TypeFaces::sides. A span covers a whole block of one type; `largest` in
+/// render/light/glass_bodies.cpp limits it to one voxel for content inside of voxels.
+///
+/// Appends to `out`, nearest first, texels with some cover up to and including `max_t`. Returns false if the last one
+/// ends the ray. `voxels`: reads the grid of `ray_in_grid`. `placed`: its index, for MetFace.
+bool meet_cell(const Surfaces& surfaces, GridReader& voxels, std::int32_t placed, VoxelType type,
+               const Ray& ray_in_grid, const CellSpan& span, double max_t, std::vector<MetFace>& out);
 
 }  // namespace quoin

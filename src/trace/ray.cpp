@@ -112,7 +112,7 @@ std::uint32_t any_hits(const OccupancyTree& tree, const RayPacket& rays) {
 
 void visit_hits(const OccupancyTree& tree, const Ray& ray, double max_t, FunctionRef<bool(const VoxelSpan&)> visit) {
   trace::visit_spans(
-      tree, ray, max_t, [](Walk& walk) { walk.leave_voxel(); }, visit);
+      tree, ray, max_t, [](Walk& walk, const trace::WalkSpan& /*begun*/) { walk.leave_voxel(); }, visit);
 }
 
 }  // namespace quoin

@@ -296,13 +296,14 @@ inline Direction face_of(const Walk& walk, const Ray& ray) {
   return static_cast<Direction>(2 * walk.axis() + (ray.direction[walk.axis()] > 0.0 ? 1 : 0));
 }
 
-/// A span, and the face through which the ray leaves it.
+/// A span, the face through which the ray leaves it, and the voxel behind that face.
 struct WalkSpan : VoxelSpan {
   Direction exit_face = Direction::PosX;
+  IVec3 behind{0};
 };
 
 /// Calls `visit` with a WalkSpan for each block that `leave` crosses, starting at an occupied voxel, until it returns
-/// false.
+/// false. `leave` gets the walk and the beginning of its span.
 template <class Leave, class Visit>
 void visit_spans(const OccupancyTree& tree, const Ray& ray, double max_t, const Leave& leave, const Visit& visit) {
   if (!is_usable(ray, max_t)) return;
@@ -310,8 +311,9 @@ void visit_spans(const OccupancyTree& tree, const Ray& ray, double max_t, const 
   if (!walk.enter(tree.bounds(), max_t)) return;
   while (walk.find(max_t)) {
     WalkSpan span{{walk.voxel(), face_of(walk, ray), walk.t(), 0.0, walk.axis() < 0}};
-    leave(walk);
+    leave(walk, span);
     span.t_exit = walk.t();
+    span.behind = walk.voxel();
     span.exit_face = static_cast<Direction>(static_cast<int>(face_of(walk, ray)) ^ 1);
     if (!visit(span) || !walk.is_within(max_t)) return;
   }
@@ -319,15 +321,15 @@ void visit_spans(const OccupancyTree& tree, const Ray& ray, double max_t, const 
 
 /// Like `visit_hits`, for a tree of transparent voxels, but visits whole blocks of voxels of one type: a span covers a
 /// block, and its voxel is the entry voxel. Together the spans cover the same intervals as the spans of single voxels.
-/// `enter` is called first, with the entry voxel. `largest` returns the maximum edge length of a block, where there is
-/// one.
+/// `enter` is called first, with the beginning of the span. `largest` returns the maximum edge length of a block, where
+/// there is one.
 template <class Enter, class Largest, class Visit>
 void visit_blocks(const OccupancyTree& tree, const Ray& ray, double max_t, const Enter& enter, const Largest& largest,
                   const Visit& visit) {
   visit_spans(
       tree, ray, max_t,
-      [&](Walk& walk) {
-        enter(walk.voxel());
+      [&](Walk& walk, const WalkSpan& begun) {
+        enter(begun);
         walk.leave_block(largest);
       },
       visit);

@@ -57,7 +57,7 @@ class BlockWalk : public ::testing::Test {
 
   std::vector<VoxelSpan> blocks(const OccupancyTree& tree, const Ray& ray, double max_t, double largest = 64.0) {
     std::vector<VoxelSpan> spans;
-    const auto no_matter = [](IVec3 /*voxel*/) {};
+    const auto no_matter = [](const VoxelSpan& /*begun*/) {};
     const auto any = [&] { return largest; };
     trace::visit_blocks(tree, ray, max_t, no_matter, any, [&](const VoxelSpan& span) {
       spans.push_back(span);

@@ -74,11 +74,14 @@ class Tile {
   void add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, std::size_t pixel, Vec3 weight);
   // The effect of glass on a ray.
   struct Sight {
-    Vec3 passed{1.0F};    // transmittance for the light behind
-    Vec3 mirrored{0.0F};  // light reflected by surfaces
+    Vec3 passed{1.0F};       // transmittance for the light behind
+    Vec3 mirrored{0.0F};     // light reflected by surfaces
+    bool is_closed = false;  // nothing behind is visible
   };
-  // Adds the glass visible before `max_t`, without the reflections of its surfaces.
-  Sight add_glass(const Ray& ray, double max_t, std::size_t pixel);
+  // Adds the transparent content visible before `max_t`, without the reflections of its surfaces.
+  Sight add_transparent(const Ray& ray, double max_t, std::size_t pixel);
+  void add_body(const Ray& ray, const GlassBody& body, const DVec3& normal, std::size_t pixel, Sight& sight);
+  void add_face(const Ray& ray, const MetFace& face, std::size_t pixel, Sight& sight);
   // Processes a ray's entry into a body from air (null) or from a touching body. `normal`: of that surface, in its
   // grid.
   void enter_body(const Ray& ray, const GlassBody* from, const GlassBody& to, const DVec3& normal, Sight& sight) const;
@@ -109,7 +112,7 @@ class Tile {
   BlockVector<SurfacePoint> points_;
   BlockVector<Target> targets_;
   BlockVector<Vec3> lit_;
-  std::vector<GlassBody> glass_;
+  SeenThrough seen_;                     // of the current ray
   std::unique_ptr<raster::Canvas> far_;  // of the current sample; null if there are none
   FarFaces far_faces_;                   // of the current block
 };
@@ -167,14 +170,15 @@ void Tile::take_block(int x, int y, const RayPacket& rays, int sample) {
     const auto pixel = static_cast<std::size_t>((y + lane / kBlock) * kEdge + x + lane % kBlock);
     const bool is_hit = (hits.grids.hit >> lane & 1U) != 0;
     const double t = is_hit ? hits.grids.t[i] : std::numeric_limits<double>::infinity();
-    glass_.clear();
+    seen_.clear();
     Sight sight;
-    if ((through_glass >> lane & 1U) != 0) sight = add_glass(rays.ray(lane), t, pixel);
+    if ((through_glass >> lane & 1U) != 0) sight = add_transparent(rays.ray(lane), t, pixel);
     if (sample == 0) {
-      depth_[pixel] = static_cast<float>(glass_.empty() ? t : glass_.front().t_enter);
-      pixels_hit_ += is_hit || !glass_.empty();
+      depth_[pixel] = static_cast<float>(std::min(t, seen_.begin()));
+      pixels_hit_ += is_hit || !seen_.empty();
     }
     sample_[pixel] = sight.mirrored;
+    if (sight.is_closed) continue;
     if (is_hit) {
       add_opaque(lane, rays, hits, pixel, sight.passed);
     } else {
@@ -221,31 +225,59 @@ void Tile::add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, st
   point.openness = openness_of(*far_faces_.face[i], context_->options->light.occlusion_mode, point.position);
 }
 
-Tile::Sight Tile::add_glass(const Ray& ray, double max_t, std::size_t pixel) {
-  const Surfaces& surfaces = context_->lighting->surfaces();
-  find_glass(*context_->view, surfaces, ray, max_t, glass_);
+Tile::Sight Tile::add_transparent(const Ray& ray, double max_t, std::size_t pixel) {
+  find_transparent(*context_->view, context_->lighting->surfaces(), ray, max_t, seen_);
   Sight sight;
   const LightOptions& light = context_->options->light;
-  const bool as_solid = shows_values(light.shading);
   const bool has_surfaces = light.glass_surfaces && light.shading == Shading::Lit;
   const GlassBody* last = nullptr;
-  for (const GlassBody& body : glass_) {
+  auto face = seen_.faces.begin();
+  const auto add_faces = [&](double up_to) {
+    for (; face != seen_.faces.end() && face->t <= up_to; ++face) add_face(ray, *face, pixel, sight);
+  };
+  for (const GlassBody& body : seen_.bodies) {
     const DVec3 normal = normal_entered(*context_->view, ray, body);
     const bool touches = last != nullptr && reaches(*last, body.t_enter);
-    if (has_surfaces && last != nullptr && !touches) leave_body(ray, *last, sight);
+    if (has_surfaces && last != nullptr && !touches) {
+      add_faces(last->t_exit);
+      leave_body(ray, *last, sight);
+    }
+    add_faces(body.t_enter);
     if (has_surfaces && (touches || !body.starts_inside)) {
       enter_body(ray, touches ? last : nullptr, body, normal, sight);
     }
     last = &body;
-    if (as_solid && body.starts_inside) continue;
-    const GlassLook look = as_solid ? GlassLook{Vec3(0.0F), 1.0F} : look_of(surfaces[body.type], body);
-    fill_in(ray, body, normal, add_point(pixel, sight.passed * look.own));
-    sight.passed *= look.passed;
+    add_body(ray, body, normal, pixel, sight);
   }
-  if (has_surfaces && last != nullptr && !lies_on_opaque(*context_->view, ray, *last, max_t)) {
+  if (last != nullptr) add_faces(last->t_exit);
+  if (has_surfaces && last != nullptr && !lies_on_opaque(*context_->view, ray, *last, seen_.end)) {
     leave_body(ray, *last, sight);
   }
+  add_faces(std::numeric_limits<double>::infinity());
   return sight;
+}
+
+void Tile::add_body(const Ray& ray, const GlassBody& body, const DVec3& normal, std::size_t pixel, Sight& sight) {
+  const bool as_solid = shows_values(context_->options->light.shading);
+  if (as_solid && body.starts_inside) return;
+  const GlassLook look =
+      as_solid ? GlassLook{Vec3(0.0F), 1.0F} : look_of(surface_of(context_->lighting->surfaces(), body), body);
+  fill_in(ray, body, normal, add_point(pixel, sight.passed * look.own));
+  sight.passed *= look.passed;
+}
+
+void Tile::add_face(const Ray& ray, const MetFace& face, std::size_t pixel, Sight& sight) {
+  const bool is_solid = face.cover >= 1.0F || shows_values(context_->options->light.shading);
+  SurfacePoint& point = add_point(pixel, is_solid ? sight.passed : sight.passed * face.cover);
+  point.voxel = face.voxel;
+  point.face = face.face;
+  point.side = face.side;
+  point.placed = face.placed;
+  point.type = face.type;
+  point.position = on_face(context_->view->grid_from_view(face.placed).point(ray.origin + ray.direction * face.t),
+                           face.voxel, face.face);
+  sight.passed *= is_solid ? Vec3(0.0F) : face.passed();
+  sight.is_closed |= is_solid;
 }
 
 void Tile::fill_in(const Ray& ray, const GlassBody& body, const DVec3& normal, SurfacePoint& point) const {

@@ -97,8 +97,9 @@ TEST(RenderGlass, SeparatesBodiesOfDifferentGlass) {
   place(s.scene, std::move(grid));
   const SceneTracer tracer(s.scene);
   const SceneView view(tracer, DVec3(0.0));
-  std::vector<GlassBody> bodies;
-  find_glass(view, Surfaces(s.scene.types), {{0.5, 0.5, -3.0}, {0, 0, 2.0}}, 3.25, bodies);
+  SeenThrough seen;
+  find_transparent(view, Surfaces(s.scene.types), {{0.5, 0.5, -3.0}, {0, 0, 2.0}}, 3.25, seen);
+  const std::vector<GlassBody>& bodies = seen.bodies;
   ASSERT_EQ(bodies.size(), 2U);
   EXPECT_EQ(bodies[0].type, s.glass);
   EXPECT_DOUBLE_EQ(bodies[0].voxels, 2.0);
@@ -114,8 +115,9 @@ TEST(RenderGlass, MeasuresLengthInVoxels) {
   s.scene.edit(instance).voxel_size = 0.5;
   const SceneTracer tracer(s.scene);
   const SceneView view(tracer, {0.25, 0.25, 0});
-  std::vector<GlassBody> bodies;
-  find_glass(view, Surfaces(s.scene.types), {{0, 0, 0}, {0, 0, 1}}, 100.0, bodies);
+  SeenThrough seen;
+  find_transparent(view, Surfaces(s.scene.types), {{0, 0, 0}, {0, 0, 1}}, 100.0, seen);
+  const std::vector<GlassBody>& bodies = seen.bodies;
   ASSERT_EQ(bodies.size(), 1U);
   EXPECT_DOUBLE_EQ(bodies[0].voxels, 4.0);
   EXPECT_DOUBLE_EQ(bodies[0].t_enter, 10.0);

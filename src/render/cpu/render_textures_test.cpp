@@ -221,25 +221,13 @@ TEST(RenderTextures, ShowsMeansOfFacesFarAway) {
   }
 }
 
-TEST(RenderTextures, ShowsMeansOfGlassAndCoarseGrids) {
+TEST(RenderTextures, ShowsMeansOfCoarseGrids) {
   Scene scene;
   const VoxelType type = place_box(scene, random_texture(16, 5), {{-64, 0, -64}, {64, 2, 64}});
   const Rgba8 mean = scene.types[type].colour;
   RenderOptions options = unlit(3, 3);
   options.detail.policy = DetailPolicy{.rule = DetailPolicy::Rule::ByPixels, .voxel_pixels = 1e6, .cell_pixels = 1e6};
   EXPECT_EQ(pixel_at(taken(scene, from_above(0.3, 30, 0.4, 1.0), options), 1, 1), (Pixel{mean.r, mean.g, mean.b}));
-  // The registry gives a textured type the colour that images without textures show.
-  VoxelProperties properties = scene.types[type];
-  properties.visibility = Visibility::Transparent;
-  scene.types.replace(type, properties);
-  Scene plain;
-  VoxelProperties glass = scene.types[type];
-  glass.faces = {};
-  Grid same;
-  same.fill_box({{-64, 0, -64}, {64, 2, 64}}, plain.types.add(glass).value());
-  place(plain, std::move(same));
-  const Camera camera = towards({5, 9, 20}, {0, 0, 0});
-  EXPECT_EQ(taken(scene, camera, sized(40, 30)).colour.rgb, taken(plain, camera, sized(40, 30)).colour.rgb);
 }
 
 }  // namespace

@@ -21,6 +21,7 @@ constexpr double kClosed = -11.0;
 
 constexpr double kDiagonal = 1.7320508075688774;  // of a cube of 1
 constexpr double kLeastClosing = 1e-9;            // for clear materials
+constexpr double kLargestBlock = 64.0;            // of one type in a tree
 
 bool continues(const GlassBody& body, VoxelType type, double t_enter) {
   return type == body.type && reaches(body, t_enter);
@@ -30,7 +31,7 @@ bool continues(const GlassBody& body, VoxelType type, double t_enter) {
 class BodiesOfGrid {
  public:
   BodiesOfGrid(const SceneView& view, const Surfaces& surfaces, std::int32_t index, const Ray& ray_in_grid,
-               double max_t, double length, std::vector<GlassBody>& out)
+               double max_t, double length, SeenThrough& out)
       : placed_(placed_in(view.tracer())[static_cast<std::size_t>(index)]),
         surfaces_(surfaces),
         index_(index),
@@ -38,17 +39,31 @@ class BodiesOfGrid {
         max_t_(max_t),
         length_(length),
         voxels_per_cell_(placed_.voxels_per_cell()),
-        out_(out) {
+        has_faces_(placed_.level == 0 && surfaces.has(CellContent::Faces)),
+        has_textured_glass_(placed_.level == 0 && surfaces.has(CellContent::TexturedGlass)),
+        out_(out.bodies),
+        faces_(out.faces) {
     QUOIN_ASSERT(placed_.voxel_size > 0.0, "a positive voxel size");
   }
 
-  void add_voxels() {
+  // Returns false if a face ends the ray.
+  bool add_voxels() {
     begin();
     GridReader voxels_of(*placed_.voxels);
     VoxelType type = kAir;
-    const auto largest = [&] { return largest_block(type); };
-    const auto enter = [&](IVec3 voxel) { type = voxels_of.get(voxel); };
+    bool is_cell_of_faces = false;
+    bool is_open = true;
+    const auto largest = [&] { return is_cell_of_faces ? kLargestBlock : largest_block(log_clarity_); };
+    const auto enter = [&](const trace::WalkSpan& begun) {
+      type = voxels_of.get(begun.voxel);
+      is_cell_of_faces = has_faces_ && has_content(type, CellContent::Faces);
+      log_clarity_ = has_textured_glass_ ? log_clarity_at(type, begun) : surfaces_[type].log_clarity;
+    };
     trace::visit_blocks(*placed_.transparent, ray_, max_t_, enter, largest, [&](const trace::WalkSpan& span) {
+      if (is_cell_of_faces) {
+        is_open = meet_cell(surfaces_, voxels_of, index_, type, ray_, cell_span(span), max_t_, faces_);
+        return is_open;
+      }
       const double t_exit = std::min(span.t_exit, max_t_);
       const double voxels = voxels_between(span.t_enter, t_exit);
       if (!(voxels > 0.0)) return true;  // an edge that it only touches
@@ -59,14 +74,16 @@ class BodiesOfGrid {
         GlassBody& next = out_.emplace_back(body_of(span.voxel, type, span.t_enter, t_exit, span.starts_inside));
         next.face = span.face;
         next.exit_face = span.exit_face;
+        if (has_textured_glass_) take_texel(next);
       }
-      return is_seen_beyond(type, voxels);
+      return is_seen_beyond(log_clarity_, voxels);
     });
+    return is_open;
   }
 
   void add_field() {
     begin();
-    const auto largest = [this](VoxelType type) { return largest_block(type); };
+    const auto largest = [this](VoxelType type) { return largest_block(surfaces_[type].log_clarity); };
     visit_glass(*placed_.glass, ray_, max_t_, largest, [&](const GlassSpan& span) {
       GlassBody next = body_of(span.cell, span.type, span.t_enter, span.t_exit, span.starts_inside);
       next.in_field = next.exit_in_field = true;
@@ -83,8 +100,8 @@ class BodiesOfGrid {
 
   // Uses blocks only if the body does not close along their diagonal; it then closes at the same voxel as voxel by
   // voxel.
-  [[nodiscard]] double largest_block(VoxelType type) const {
-    const double closing = -static_cast<double>(surfaces_[type].log_clarity) * voxels_per_cell_ * kDiagonal;
+  [[nodiscard]] double largest_block(float log_clarity) const {
+    const double closing = -static_cast<double>(log_clarity) * voxels_per_cell_ * kDiagonal;
     return (clarity_ - kClosed) / std::max(closing, kLeastClosing);
   }
 
@@ -110,9 +127,43 @@ class BodiesOfGrid {
     body.exit_face = exit_face;
     body.voxels += voxels;
   }
-  bool is_seen_beyond(VoxelType type, double voxels) {
-    clarity_ += static_cast<double>(surfaces_[type].log_clarity) * voxels;
+  bool is_seen_beyond(float log_clarity, double voxels) {
+    clarity_ += static_cast<double>(log_clarity) * voxels;
     return clarity_ > kClosed;
+  }
+
+  [[nodiscard]] bool has_content(VoxelType type, CellContent content) const {
+    const TypeFaces* const faces = surfaces_.faces(type);
+    return faces != nullptr && faces->content == content;
+  }
+  // Returns the texel where the ray enters a body of textured glass; null for any other body.
+  [[nodiscard]] const FaceTexels* texels_at(VoxelType type, Direction face, bool starts_inside) const {
+    if (starts_inside || !has_content(type, CellContent::TexturedGlass)) return nullptr;
+    return &surfaces_.faces(type)->sides[static_cast<std::size_t>(face)];
+  }
+  [[nodiscard]] Rgba8 texel_at(const FaceTexels& side, IVec3 voxel, double t) const {
+    return side.texel(ray_.origin + ray_.direction * t - DVec3(voxel), 0);
+  }
+  // Returns the clarity of the body that continues or begins with a span.
+  [[nodiscard]] float log_clarity_at(VoxelType type, const trace::WalkSpan& begun) const {
+    if (out_.size() > first_ && continues(out_.back(), type, begun.t_enter)) {
+      return out_.back().is_textured ? log_of_clear(out_.back().alpha) : surfaces_[type].log_clarity;
+    }
+    const FaceTexels* const side = texels_at(type, begun.face, begun.starts_inside);
+    if (side == nullptr) return surfaces_[type].log_clarity;
+    return log_of_clear(side->cover(texel_at(*side, begun.voxel, begun.t_enter)));
+  }
+  [[nodiscard]] static float log_of_clear(float cover) { return std::log(1.0F - cover); }
+  void take_texel(GlassBody& body) const {
+    const FaceTexels* const side = texels_at(body.type, body.face, body.starts_inside);
+    if (side == nullptr) return;
+    const Rgba8 texel = texel_at(*side, body.voxel, body.t_enter);
+    body.is_textured = true;
+    body.colour = side->colour(texel);
+    body.alpha = side->cover(texel);
+  }
+  static CellSpan cell_span(const trace::WalkSpan& span) {
+    return {span.voxel, span.behind, span.face, span.exit_face, span.starts_inside, span.t_enter, span.t_exit};
   }
 
   // Returns false if nothing behind the body is visible.
@@ -123,7 +174,7 @@ class BodiesOfGrid {
     } else {
       out_.push_back(next);
     }
-    return is_seen_beyond(next.type, next.voxels);
+    return is_seen_beyond(surfaces_[next.type].log_clarity, next.voxels);
   }
 
   const PlacedGrid& placed_;
@@ -133,9 +184,13 @@ class BodiesOfGrid {
   double max_t_;
   double length_;  // of the ray's direction, in the world
   double voxels_per_cell_;
+  bool has_faces_;
+  bool has_textured_glass_;
   std::vector<GlassBody>& out_;
+  std::vector<MetFace>& faces_;
   std::size_t first_ = 0;
   double clarity_ = 0.0;
+  float log_clarity_ = 0.0F;  // of the body that the ray is in
 };
 
 // Sorts bodies along the ray and joins those of neighbouring grids that touch.
@@ -160,20 +215,47 @@ void join_touching(std::vector<GlassBody>& bodies) {
   if (!bodies.empty()) bodies.resize(kept + 1);
 }
 
+// Sorts the faces, and removes everything behind the first face that hides it.
+void end_at_first_closed(SeenThrough& seen) {
+  std::vector<MetFace>& faces = seen.faces;
+  std::stable_sort(faces.begin(), faces.end(), [](const MetFace& a, const MetFace& b) { return a.t < b.t; });
+  const auto closed = std::ranges::find_if(faces, [](const MetFace& face) { return face.cover >= 1.0F; });
+  if (closed == faces.end()) return;
+  faces.erase(closed + 1, faces.end());
+  seen.end = faces.back().t;
+  std::erase_if(seen.bodies, [&](const GlassBody& body) { return body.t_enter >= seen.end; });
+  for (GlassBody& body : seen.bodies) {
+    if (!(body.t_exit > seen.end)) continue;
+    body.voxels *= (seen.end - body.t_enter) / (body.t_exit - body.t_enter);
+    body.t_exit = seen.end;
+  }
+}
+
 }  // namespace
 
-void find_glass(const SceneView& view, const Surfaces& surfaces, const Ray& ray_in_view, double max_t,
-                std::vector<GlassBody>& out) {
+void find_transparent(const SceneView& view, const Surfaces& surfaces, const Ray& ray_in_view, double max_t,
+                      SeenThrough& out) {
   out.clear();
+  out.end = max_t;
   const double length = glm::length(ray_in_view.direction);
   view.visit_transparent(ray_in_view, max_t, [&](std::int32_t index, const Ray& ray) {
     QUOIN_ASSERT(static_cast<std::size_t>(index) < placed_in(view.tracer()).size(), "one of the placed grids");
     const PlacedGrid& placed = placed_in(view.tracer())[static_cast<std::size_t>(index)];
-    BodiesOfGrid bodies(view, surfaces, index, ray, max_t, length, out);
-    if (placed.transparent != nullptr) bodies.add_voxels();
+    BodiesOfGrid bodies(view, surfaces, index, ray, out.end, length, out);
+    if (placed.transparent != nullptr && !bodies.add_voxels()) out.end = out.faces.back().t;
     if (placed.glass != nullptr) bodies.add_field();
   });
-  join_touching(out);
+  join_touching(out.bodies);
+  if (!out.faces.empty()) end_at_first_closed(out);
+}
+
+Surface surface_of(const Surfaces& surfaces, const GlassBody& body) {
+  Surface surface = surfaces[body.type];
+  if (!body.is_textured) return surface;
+  surface.colour = body.colour;
+  surface.emitted = body.colour * surfaces.faces(body.type)->sides.front().emission;
+  set_absorption(body.alpha, surface);
+  return surface;
 }
 
 GlassLook look_of(const Surface& surface, const GlassBody& body) {
@@ -227,11 +309,13 @@ Mirror mirror_at(const SceneView& view, const Ray& ray_in_view, std::int32_t pla
   return {share, direction.y - 2.0F * along * normal.y};
 }
 
-Vec3 transmittance_along(const SceneView& view, const Surfaces& surfaces, const Ray& ray_in_view, double max_t) {
+Vec3 transmittance_along(const SceneView& view, const Surfaces& surfaces, const Ray& ray_in_view, double max_t,
+                         SeenThrough& room) {
   Vec3 passed(1.0F);
-  std::vector<GlassBody> bodies;
-  find_glass(view, surfaces, ray_in_view, max_t, bodies);
-  for (const GlassBody& body : bodies) passed *= look_of(surfaces[body.type], body).passed;
+  find_transparent(view, surfaces, ray_in_view, max_t, room);
+  if (room.is_closed()) return Vec3(0.0F);
+  for (const GlassBody& body : room.bodies) passed *= look_of(surface_of(surfaces, body), body).passed;
+  for (const MetFace& face : room.faces) passed *= face.passed();
   return passed;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <limits>
 #include <vector>
 
 #include <quoin/core/vec.h>
@@ -26,12 +27,40 @@ struct GlassBody {
   bool in_field = false;                  ///< the ray enters through a field's surface; `face` is unused
   bool exit_in_field = false;             ///< the ray leaves through a field's surface; `exit_face` is unused
   VoxelType before = kAir;                ///< fields only: the transparent material that ends where this one begins
+  /// True for CellContent::TexturedGlass that the ray enters: colour and alpha are those of a texel, of level 0.
+  bool is_textured = false;
+  Vec3 colour{0.0F};
+  float alpha = 0.0F;
 };
 
-/// Finds the bodies that a ray passes before `max_t`, nearest first. Clears `out` first. The list ends deep inside a
-/// body that absorbs all light.
-void find_glass(const SceneView& view, const Surfaces& surfaces, const Ray& ray_in_view, double max_t,
-                std::vector<GlassBody>& out);
+/// The transparent voxels and field parts that a ray meets: bodies of glass, and visible texels of other transparent
+/// types. Both nearest first.
+struct SeenThrough {
+  std::vector<GlassBody> bodies;
+  std::vector<MetFace> faces;
+  double end = 0.0;  ///< where the ray ends: the first face that hides everything, or `max_t`
+
+  /// Returns where the first content begins; infinity if there is none.
+  [[nodiscard]] double begin() const {
+    const double body = bodies.empty() ? std::numeric_limits<double>::infinity() : bodies.front().t_enter;
+    return faces.empty() ? body : std::min(body, faces.front().t);
+  }
+  [[nodiscard]] bool empty() const { return bodies.empty() && faces.empty(); }
+  /// Returns true if the last face hides everything behind it.
+  [[nodiscard]] bool is_closed() const { return !faces.empty() && faces.back().cover >= 1.0F; }
+  void clear() {
+    bodies.clear();
+    faces.clear();
+  }
+};
+
+/// Finds the transparent content that a ray passes before `max_t`. Clears `out` first. The lists end at a face that
+/// hides everything behind it, and deep inside a body that absorbs all light.
+void find_transparent(const SceneView& view, const Surfaces& surfaces, const Ray& ray_in_view, double max_t,
+                      SeenThrough& out);
+
+/// Returns the surface of a body: that of its type, with the colour and alpha of its texel.
+[[nodiscard]] Surface surface_of(const Surfaces& surfaces, const GlassBody& body);
 
 /// The appearance of a body to a ray that passes through it.
 struct GlassLook {
@@ -72,8 +101,8 @@ struct Mirror {
 [[nodiscard]] Mirror mirror_at(const SceneView& view, const Ray& ray_in_view, std::int32_t placed,
                                const DVec3& normal_in_grid, float ior, float other_ior);
 
-/// Returns the transmittance per channel of all transparent bodies on a ray.
+/// Returns the transmittance per channel of all transparent content on a ray. `room`: memory to be reused.
 [[nodiscard]] Vec3 transmittance_along(const SceneView& view, const Surfaces& surfaces, const Ray& ray_in_view,
-                                       double max_t);
+                                       double max_t, SeenThrough& room);
 
 }  // namespace quoin

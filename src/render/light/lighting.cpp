@@ -304,11 +304,24 @@ void Lighting::darken(const Group& group, RayPacket& rays, std::uint32_t blocked
 
 void Lighting::tint(const Group& group, const RayPacket& rays, std::span<Vec3> light) const {
   const RayPacket in_view = view_->view_from_grid(group.placed, rays);
+  SeenThrough room;
   for (std::uint32_t left = view_->any_transparent(in_view); left != 0; left &= left - 1) {
     const int lane = std::countr_zero(left);
     const auto i = static_cast<std::size_t>(lane);
-    light[i] *= transmittance_along(*view_, *surfaces_, in_view.ray(lane), in_view.max_t[i]);
+    light[i] *= transmittance_along(*view_, *surfaces_, in_view.ray(lane), in_view.max_t[i], room);
   }
+}
+
+std::uint32_t Lighting::blocked_by_faces(const Group& group, const RayPacket& rays) const {
+  const RayPacket in_view = view_->view_from_grid(group.placed, rays);
+  SeenThrough room;
+  std::uint32_t blocked = 0;
+  for (std::uint32_t left = view_->any_transparent(in_view); left != 0; left &= left - 1) {
+    const int lane = std::countr_zero(left);
+    find_transparent(*view_, *surfaces_, in_view.ray(lane), in_view.max_t[static_cast<std::size_t>(lane)], room);
+    if (room.is_closed()) blocked |= 1U << lane;
+  }
+  return blocked;
 }
 
 // A group's points, from their grid's pivot, and their normals, along the world's axes: lamps light them.
@@ -472,9 +485,15 @@ std::int64_t Lighting::trace_openness(const Group& group, std::uint32_t lanes, s
   }
   const int count = directions_.count();
   const float factor = field_openness_factor(options_);
+  const bool has_faces = surfaces_->has(CellContent::Faces) && view_->tracer().has_transparent();
   for (int ray = 0; ray < count && rays.active != 0; ++ray) {
     set_occlusion_directions(group, ray, rays);
-    const std::uint32_t blocked = view_->any_hits(group.placed, rays);
+    std::uint32_t blocked = view_->any_hits(group.placed, rays);
+    if (has_faces) {
+      rays.active = lanes & ~blocked;
+      blocked |= blocked_by_faces(group, rays);
+      rays.active = lanes;
+    }
     for (std::size_t i = 0; i < group.size; ++i) open[i] += static_cast<int>((blocked >> i & 1U) == 0);
   }
   for (std::size_t i = 0; i < group.size; ++i) {
@@ -524,37 +543,10 @@ __attribute__((always_inline)) inline Lighting::Colours Lighting::colours_at(con
   return has_other_surfaces_ ? other_colours_at(point) : colours_of_type(point);
 }
 
-Lighting::FaceTexels Lighting::face_texels(const VoxelProperties& type, Direction direction) {
-  const VoxelFace& face = type.faces[direction];
-  const Texture& texture = face.texture;
-  FaceTexels found;
-  found.texels = texture.level(0).data();
-  found.log_size = static_cast<std::uint8_t>(texture.level_count() - 1);
-  const TextureFrame frame = texture_frame(face, direction);
-  for (std::size_t i = 0; i < 2; ++i) {
-    const IVec3& along = i == 0 ? frame.right : frame.down;
-    const int axis = along.x != 0 ? 0 : along.y != 0 ? 1 : 2;
-    found.axis[i] = static_cast<std::uint8_t>(axis);
-    found.sign[i] = along[axis] < 0 ? -1.0F : 1.0F;
-  }
-  found.tint = linear_colour(face.tint);
-  found.emission = emission_of(type);
-  return found;
-}
-
 void Lighting::show_textures(double spacing, bool is_perspective) {
   QUOIN_ASSERT(spacing > 0.0, "a positive distance of samples");
   is_perspective_ = is_perspective;
-  linear_ = linear_bytes().data();
   has_other_surfaces_ = true;
-  number_of_faces_.assign(types_->size(), 0);
-  for (std::size_t i = 0; i < types_->size(); ++i) {
-    const VoxelProperties& type = (*types_)[static_cast<VoxelType>(i)];
-    if (type.faces.empty() || type.visibility != Visibility::Opaque) continue;
-    std::array<FaceTexels, 6>& faces = faces_.emplace_back();
-    for (const Direction direction : kDirections) faces[index_of(direction)] = face_texels(type, direction);
-    number_of_faces_[i] = static_cast<std::uint32_t>(faces_.size());
-  }
   const BlockVector<PlacedGrid>& placed = placed_in(view_->tracer());
   for (std::size_t i = 0; i < frames_.size(); ++i) {
     // Distances from the eye are in voxels, too.
@@ -565,21 +557,15 @@ void Lighting::show_textures(double spacing, bool is_perspective) {
 }
 
 // Returns null for a point that shows the colour of its type.
-const Lighting::FaceTexels* Lighting::texels_at(const SurfacePoint& point) const {
-  if (point.type >= number_of_faces_.size() || point.in_field) return nullptr;
-  const std::uint32_t number = number_of_faces_[point.type];
-  return number == 0 ? nullptr : &faces_[number - 1][index_of(point.face)];
+const FaceTexels* Lighting::texels_at(const SurfacePoint& point) const {
+  const TypeFaces* const faces = surfaces_->faces(point.type);
+  if (faces == nullptr || point.in_field || point.kind == PointKind::Glow) return nullptr;
+  return &faces->sides[point.side == SurfacePoint::kSideOfFace ? index_of(point.face) : point.side];
 }
 
 // Cells of halved grids stand for many voxels, as faces of impostors do.
 bool Lighting::shows_mean_of_face(const SurfacePoint& point) const {
   return point.is_far || frames_[static_cast<std::size_t>(point.placed)].voxels_per_cell != 1.0;
-}
-
-Vec3 Lighting::mean_of_face(const FaceTexels& face) const {
-  // The levels before the last one have 4 * (1 + 4 + ...) texels.
-  const Rgba8 mean = face.texels[((4U << 2 * face.log_size) - 4U) / 3U];
-  return Vec3(linear_[mean.r], linear_[mean.g], linear_[mean.b]) * face.tint;
 }
 
 // As `texel_at`, with the mipmap level of the point's distance.
@@ -594,16 +580,7 @@ Vec3 Lighting::texel_colour(const FaceTexels& face, const SurfacePoint& point) c
   // the texture's own size.
   const auto exponent = static_cast<int>(std::bit_cast<std::uint64_t>(2.0 * square) >> 52 & 0x7FF) - 1023;
   const int level = std::clamp((exponent >> 1) + face.log_size, 0, int{face.log_size});
-  const unsigned log_size = static_cast<unsigned>(face.log_size - level);
-  const auto texel_along = [&](std::size_t i) {
-    const int axis = face.axis[i];
-    return texel_number(point.position[axis] - point.voxel[axis], face.sign[i], 1U << log_size);
-  };
-  const std::uint32_t number = (texel_along(1) << log_size) + texel_along(0);
-  // The levels before have size^2 * (1 + 1/4 + ...) texels.
-  const std::uint32_t begin = ((4U << 2 * face.log_size) - (4U << 2 * log_size)) / 3U;
-  const Rgba8 texel = face.texels[begin + number];
-  return Vec3(linear_[texel.r], linear_[texel.g], linear_[texel.b]) * face.tint;
+  return face.colour(face.texel(point.position - DVec3(point.voxel), level));
 }
 
 // Not inlined: the loop over unlit points stays small.
@@ -616,7 +593,7 @@ __attribute__((noinline)) Lighting::Colours Lighting::other_colours_at(const Sur
   if (face == nullptr) return colours_of_type(point);
   // A return of its own: a choice of colours would cost near points 8 % more.
   if (shows_mean_of_face(point)) [[unlikely]] {
-    const Vec3 mean = mean_of_face(*face);
+    const Vec3 mean = face->mean();
     return {mean, mean * face->emission};
   }
   const Vec3 colour = texel_colour(*face, point);

@@ -28,6 +28,8 @@ enum class PointKind : std::uint8_t {
 
 /// A point of a voxel's face, or of a field's surface, to be lit.
 struct SurfacePoint {
+  static constexpr std::uint16_t kSideOfFace = 0xFFFF;
+
   DVec3 position{0.0};  ///< in its grid, on the face or surface
   IVec3 voxel{0};
   std::int32_t placed = 0;  ///< index into SceneTracer::placed
@@ -36,8 +38,10 @@ struct SurfacePoint {
   bool in_field = false;
   bool is_far = false;      ///< of an impostor, whose faces show the means of their textures
   bool is_blended = false;  ///< fields: a blend of the materials around, as Surfaces::blend_of_field
-  Vec3 normal{0.0F};        ///< of a field, in its grid, of unit length or 0
-  float lift = 0.0F;        ///< of a field: height of the position above the surface, along the normal
+  /// Index into TypeFaces::sides of the texture that it shows; kSideOfFace: that of `face`.
+  std::uint16_t side = kSideOfFace;
+  Vec3 normal{0.0F};  ///< of a field, in its grid, of unit length or 0
+  float lift = 0.0F;  ///< of a field: height of the position above the surface, along the normal
   PointKind kind = PointKind::Surface;
   std::uint32_t pixel = 0;  ///< seed for random numbers: combines pixel and sample
   float openness = -1.0F;   ///< 0 to 1 if already known, independent of the occlusion options; less than 0: unknown
@@ -62,13 +66,13 @@ class Lighting {
            const Environment& environment, const LampTable* lamps = nullptr, bool detail_colours = false,
            std::vector<GridLight> levels = {});
 
-  /// Shows the textures of opaque types (VoxelProperties::faces) instead of their mean colours. Faces of halved grids
+  /// Shows the textures of types (VoxelProperties::faces) instead of their mean colours. Faces of halved grids
   /// and impostors show the last mipmap level, the mean of their texture. `spacing`: the distance of an image's samples
   /// in world units; with `is_perspective` at distance 1 from the view's origin.
   ///
   /// Filter: the nearest texel of the mipmap level whose texels are nearest in size to the samples' distance.
-  /// Cost:   O(types with textures).
-  /// Requires: `spacing` is positive. Types do not change while this object is used.
+  /// Cost:   O(placed grids).
+  /// Requires: `spacing` is positive.
   void show_textures(double spacing, bool is_perspective);
 
   /// Computes the linear light of each point, not clamped. Returns the number of rays traced.
@@ -112,6 +116,8 @@ class Lighting {
   std::int64_t find_openness(const Group& group, std::span<float> openness) const;
   [[nodiscard]] float smooth_openness(const SurfacePoint& point) const;
   std::int64_t trace_openness(const Group& group, std::uint32_t lanes, std::span<float> openness) const;
+  // Returns the rays that meet a visible texel of a cell of faces that hides everything behind it.
+  [[nodiscard]] std::uint32_t blocked_by_faces(const Group& group, const RayPacket& rays) const;
   void set_occlusion_directions(const Group& group, int ray, RayPacket& rays) const;
   /// The colours that a point shows.
   struct Colours {
@@ -122,19 +128,8 @@ class Lighting {
   // As `colours_at`, with textures or the colours of detail.
   [[nodiscard]] Colours other_colours_at(const SurfacePoint& point) const;
   [[nodiscard]] Colours colours_of_type(const SurfacePoint& point) const;
-  /// The texture of one face of a type, ready for lookups.
-  struct FaceTexels {
-    const Rgba8* texels = nullptr;       // of all levels, level 0 first
-    std::uint8_t log_size = 0;           // also the number of the last level
-    std::array<std::uint8_t, 2> axis{};  // of the grid, along the texture's rows and down its columns
-    std::array<float, 2> sign{};         // of that axis
-    Vec3 tint{1.0F};
-    float emission = 0.0F;
-  };
-  [[nodiscard]] static FaceTexels face_texels(const VoxelProperties& type, Direction direction);
   [[nodiscard]] const FaceTexels* texels_at(const SurfacePoint& point) const;
   [[nodiscard]] bool shows_mean_of_face(const SurfacePoint& point) const;
-  [[nodiscard]] Vec3 mean_of_face(const FaceTexels& face) const;
   [[nodiscard]] Vec3 texel_colour(const FaceTexels& face, const SurfacePoint& point) const;
   [[nodiscard]] Vec3 shade(const SurfacePoint& point, Vec3 direct, float openness) const;
   [[nodiscard]] Vec3 shade_lit(const SurfacePoint& point, Vec3 direct, float openness) const;
@@ -154,9 +149,6 @@ class Lighting {
   std::vector<Surface> detail_surfaces_;  // of each placed grid; empty where types have their own colours
   bool has_other_surfaces_ = false;       // with `detail_surfaces_` or textures
   bool is_perspective_ = false;
-  const float* linear_ = nullptr;                 // by sRGB byte; set with textures
-  std::vector<std::array<FaceTexels, 6>> faces_;  // of types with textures
-  std::vector<std::uint32_t> number_of_faces_;    // [type]: index into `faces_` plus 1, or 0; empty without textures
   std::vector<GridLight> levels_;
   LightLook look_;
   float exposure_ = 1.0F;

@@ -426,6 +426,12 @@ void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const Scen
     vertex.normal = (*context_->face_normals)[static_cast<std::size_t>(vertex.placed)][of_face];
     type = placed.voxels->get(voxel);
     surface = (*context_->surfaces)[type];
+    const TypeFaces* const faces = context_->surfaces->faces(type);
+    if (faces != nullptr && !starts_inside) {
+      const FaceTexels& side = faces->sides[of_face];
+      surface.colour = side.colour(side.texel(vertex.in_grid - DVec3(voxel), 0));
+      surface.emitted = surface.colour * side.emission;
+    }
   }
   if (path.is_first) sums_[path.pixel].scene_share += 1.0F;
   if (starts_inside) {  // from inside: its own colour, unlit
@@ -717,6 +723,26 @@ void PathTile::trace_some_requests(std::span<const std::uint32_t> requests) {
 
 void PathTile::finish_requests(std::span<const std::uint32_t> requests, RayPacket& rays, std::uint32_t blocked) {
   const std::int32_t home = requests_[requests.front()].home;
+  rays.active &= ~blocked;
+  if (context_->view->tracer().has_transparent() && rays.active != 0) {
+    const RayPacket in_view = context_->view->view_from_grid(home, rays);
+    for (std::uint32_t left = context_->view->any_transparent(in_view); left != 0; left &= left - 1) {
+      const int lane = std::countr_zero(left);
+      Request& request = requests_[requests[static_cast<std::size_t>(lane)]];
+      find_transparent(*context_->view, *context_->surfaces, in_view.ray(lane), static_cast<double>(request.max_t),
+                       seen_);
+      if (seen_.is_closed()) {
+        blocked |= 1U << lane;
+        continue;
+      }
+      for (const GlassBody& body : seen_.bodies) {
+        const Surface surface = surface_of(*context_->surfaces, body);
+        const double voxels = length_of(surface, body);
+        request.light *= tint_of(surface, voxels) * (1.0F - cover_of(surface, voxels));
+      }
+      for (const MetFace& face : seen_.faces) request.light *= face.passed();
+    }
+  }
   for (std::size_t i = 0; i < requests.size(); ++i) {
     Request& request = requests_[requests[i]];
     const bool is_blocked = (blocked >> i & 1U) != 0;
@@ -724,19 +750,6 @@ void PathTile::finish_requests(std::span<const std::uint32_t> requests, RayPacke
       memory_.note(context_->lamps->tree(), request.place, request.lamp, request.brightness, is_blocked);
     }
     if (is_blocked) request.light = Vec3(0.0F);
-  }
-  rays.active &= ~blocked;
-  if (!context_->view->tracer().has_transparent() || rays.active == 0) return;
-  const RayPacket in_view = context_->view->view_from_grid(home, rays);
-  for (std::uint32_t left = context_->view->any_transparent(in_view); left != 0; left &= left - 1) {
-    const int lane = std::countr_zero(left);
-    Request& request = requests_[requests[static_cast<std::size_t>(lane)]];
-    find_glass(*context_->view, *context_->surfaces, in_view.ray(lane), static_cast<double>(request.max_t), glass_);
-    for (const GlassBody& body : glass_) {
-      const Surface& surface = (*context_->surfaces)[body.type];
-      const double voxels = length_of(surface, body);
-      request.light *= tint_of(surface, voxels) * (1.0F - cover_of(surface, voxels));
-    }
   }
 }
 

@@ -154,8 +154,11 @@ class PathTile {
   // Traces a ray through glass before `t`, if the scene has glass. Returns true if the path's ray ends there.
   bool meet_glass(std::uint32_t index, double t);
   bool pass_glass(std::uint32_t index);
-  // Traces the scattering bodies before the first glass.
+  // Traces the scattering bodies and the faces before the first glass, and removes them from `seen_`.
   bool pass_clouds(std::uint32_t index);
+  // Traces the faces up to `max_t`, from `seen_.faces[next]` on. Returns true if the path ends at one of them. `u`: a
+  // random number, which stays uniform.
+  bool pass_faces(std::uint32_t index, double max_t, std::size_t& next, float& u);
   // Scatters a path in a body if `u` is below the share of paths that scatter there.
   void scatter_in(std::uint32_t index, const GlassBody& body, float u);
   // Returns the part of a ray that lies in fog, up to `max_t`.
@@ -170,6 +173,7 @@ class PathTile {
   void meet_lane(std::uint32_t index, const RayPacket& rays, const SceneHits& hits, int lane, double until);
   void hit_matter(std::uint32_t index, const RayPacket& rays, const SceneHits& hits, int lane);
   void hit_glass(std::uint32_t index, const GlassBody& body, const DVec3& normal_in_grid);
+  void hit_face(std::uint32_t index, const MetFace& face);
   void hit_ground(std::uint32_t index, double t);
   [[nodiscard]] double ground_at(const DVec3& origin, Vec3 direction) const;  // infinite: nowhere
   void add_emitted(Path& path, Vec3 emitted, std::int32_t lamp, float distance) const;
@@ -218,8 +222,8 @@ class PathTile {
   std::vector<Request> requests_;
   std::vector<std::uint32_t> order_;
   std::vector<std::uint32_t> starts_;  // of counting sorts
-  std::vector<GlassBody> glass_;
-  RayPacket packet_;  // of `meet_packet`
+  SeenThrough seen_;                   // of the current ray
+  RayPacket packet_;                   // of `meet_packet`
   static constexpr std::size_t kShadowPackets = 16;
   std::vector<RayPacket> shadow_packets_;
   SceneHits hits_;
@@ -247,6 +251,11 @@ inline std::uint32_t bin_of(Vec3 direction) {
   const std::uint32_t side = direction[axis] < 0.0F ? 1U : 0U;
   return 1 + (static_cast<std::uint32_t>(axis) * 2 + side) * 16 + step(direction[(axis + 1) % 3]) * 4 +
          step(direction[(axis + 2) % 3]);
+}
+
+// Makes a random number that is at least `cover` uniform between 0 and 1 again.
+inline float rest_of(float u, float cover) {
+  return std::min((u - cover) / (1.0F - cover), 0x1.fffffep-1F);
 }
 
 inline Vec3 tint_of(const Surface& surface, double voxels) {

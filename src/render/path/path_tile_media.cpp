@@ -41,19 +41,34 @@ Refraction refraction(float cosine, float eta) {
 
 bool PathTile::meet_glass(std::uint32_t index, double t) {
   Path& path = paths_[index];
-  find_glass(*context_->view, *context_->surfaces, {path.origin, DVec3(path.direction)}, t, glass_);
+  find_transparent(*context_->view, *context_->surfaces, {path.origin, DVec3(path.direction)}, t, seen_);
   if (!path.is_seen) return pass_glass(index);
   if (path.inside == kAir && pass_clouds(index)) return true;
   if (path.inside != kAir) return leave_glass(index);
-  return !glass_.empty() && enter_glass(index);
+  return !seen_.bodies.empty() && enter_glass(index);
+}
+
+bool PathTile::pass_faces(std::uint32_t index, double max_t, std::size_t& next, float& u) {
+  for (; next < seen_.faces.size() && seen_.faces[next].t <= max_t; ++next) {
+    const MetFace& face = seen_.faces[next];
+    if (u < face.cover) {
+      hit_face(index, face);
+      return true;
+    }
+    u = rest_of(u, face.cover);
+    paths_[index].throughput *= face.passed() / (1.0F - face.cover);
+  }
+  return false;
 }
 
 // Light between surfaces passes straight through glass; the opaque share of the glass blocks it at random.
 bool PathTile::pass_glass(std::uint32_t index) {
   Path& path = paths_[index];
   float u = path.random.one(path.dimension + dimension::kGlass);
-  for (const GlassBody& body : glass_) {
-    const Surface& surface = (*context_->surfaces)[body.type];
+  std::size_t next_face = 0;
+  for (const GlassBody& body : seen_.bodies) {
+    if (pass_faces(index, body.t_enter, next_face, u)) return true;
+    const Surface surface = surface_of(*context_->surfaces, body);
     const double voxels = length_of(surface, body);
     const float cover = cover_of(surface, voxels);
     if (u < cover) {
@@ -70,28 +85,33 @@ bool PathTile::pass_glass(std::uint32_t index) {
       }
       return true;
     }
-    u = std::min((u - cover) / (1.0F - cover), 0x1.fffffep-1F);
+    u = rest_of(u, cover);
     path.throughput *= tint_of(surface, voxels);
   }
-  return false;
+  return pass_faces(index, kInfinite, next_face, u);
 }
 
 bool PathTile::pass_clouds(std::uint32_t index) {
   Path& path = paths_[index];
   const auto first_glass = std::ranges::find_if(
-      glass_, [&](const GlassBody& body) { return !((*context_->surfaces)[body.type].scattering > 0.0F); });
-  if (first_glass == glass_.begin()) return false;
+      seen_.bodies, [&](const GlassBody& body) { return !((*context_->surfaces)[body.type].scattering > 0.0F); });
+  if (first_glass == seen_.bodies.begin() && seen_.faces.empty()) return false;
   float u = path.random.one(path.dimension + dimension::kGlass);
-  for (auto body = glass_.begin(); body != first_glass; ++body) {
+  std::size_t next_face = 0;
+  for (auto body = seen_.bodies.begin(); body != first_glass; ++body) {
+    if (pass_faces(index, body->t_enter, next_face, u)) return true;
     const Surface& surface = (*context_->surfaces)[body->type];
     const float cover = cover_of(surface, body->voxels);
     if (u < cover) {
       scatter_in(index, *body, u);
       return true;
     }
-    u = std::min((u - cover) / (1.0F - cover), 0x1.fffffep-1F);
+    u = rest_of(u, cover);
   }
-  glass_.erase(glass_.begin(), first_glass);
+  const double until = first_glass == seen_.bodies.end() ? kInfinite : first_glass->t_enter;
+  if (pass_faces(index, until, next_face, u)) return true;
+  seen_.bodies.erase(seen_.bodies.begin(), first_glass);
+  seen_.faces.erase(seen_.faces.begin(), seen_.faces.begin() + static_cast<std::ptrdiff_t>(next_face));
   return false;
 }
 
@@ -104,10 +124,10 @@ void PathTile::scatter_in(std::uint32_t index, const GlassBody& body, float u) {
 }
 
 bool PathTile::enter_glass(std::uint32_t index) {
-  QUOIN_ASSERT(!glass_.empty(), "a path that meets glass");
+  QUOIN_ASSERT(!seen_.bodies.empty(), "a path that meets glass");
   Path& path = paths_[index];
-  const GlassBody body = glass_.front();
-  const Surface& surface = (*context_->surfaces)[body.type];
+  const GlassBody body = seen_.bodies.front();
+  const Surface surface = surface_of(*context_->surfaces, body);
   const Ray ray{path.origin, DVec3(path.direction)};
   const float u = path.random.one(path.dimension + dimension::kGlass);
   if (body.starts_inside) {  // the camera is inside
@@ -148,18 +168,25 @@ bool PathTile::leave_glass(std::uint32_t index) {
   QUOIN_ASSERT(paths_[index].inside != kAir, "a path within glass");
   Path& path = paths_[index];
   const Ray ray{path.origin, DVec3(path.direction)};
-  const bool is_within = !glass_.empty() && glass_.front().starts_inside && glass_.front().type == path.inside;
+  const std::vector<GlassBody>& bodies = seen_.bodies;
+  const bool is_within = !bodies.empty() && bodies.front().starts_inside && bodies.front().type == path.inside;
   if (!is_within) {  // the path left through a corner, or by rounding
     path.inside = kAir;
-    return !glass_.empty() && !glass_.front().starts_inside && enter_glass(index);
+    if (pass_clouds(index)) return true;
+    return !bodies.empty() && !bodies.front().starts_inside && enter_glass(index);
   }
-  const GlassBody body = glass_.front();
+  const GlassBody body = bodies.front();
   const Surface& surface = (*context_->surfaces)[body.type];
   path.throughput *= tint_of(surface, body.voxels);
   const PlacedGrid& placed = context_->placed[static_cast<std::size_t>(body.exit_placed)];
   const double lift = kRayLift * placed.voxel_size;
+  float u = path.random.one(path.dimension + dimension::kGlass);
+  // Faces of another grid, within the glass or at its end.
+  std::size_t next_face = 0;
+  const bool is_closed = seen_.is_closed() && seen_.end <= body.t_exit + lift;
+  if (pass_faces(index, is_closed ? kInfinite : body.t_exit, next_face, u)) return true;
   if (!(body.t_exit < kInfinite)) return false;
-  const bool has_next = glass_.size() > 1 && reaches(body, glass_[1].t_enter);
+  const bool has_next = bodies.size() > 1 && reaches(body, bodies[1].t_enter);
   const DVec3 end = ray.origin + ray.direction * body.t_exit;
   if (!has_next) {
     RayPacket ahead;
@@ -169,18 +196,17 @@ bool PathTile::leave_glass(std::uint32_t index) {
     const double ground = ground_at(path.origin, path.direction);
     if (met.grids.hit != 0 || ground <= body.t_exit + lift) return false;  // the glass lies on an opaque surface
   }
-  const float other = has_next ? (*context_->surfaces)[glass_[1].type].ior : 1.0F;
+  const float other = has_next ? (*context_->surfaces)[bodies[1].type].ior : 1.0F;
   Vec3 normal(placed.world_axes * normal_left(*context_->view, ray, body));
   if (glm::dot(normal, path.direction) < 0.0F) normal = -normal;
   const float cosine = std::clamp(glm::dot(normal, path.direction), 1e-4F, 1.0F);
   const float eta = surface.ior / other;
   const Refraction through = refraction(cosine, eta);
-  const float u = path.random.one(path.dimension + dimension::kGlass);
   if (u < through.mirrored) {
     turn_at(path, end, path.direction - normal * (2.0F * cosine), -normal, lift, body.type);
   } else {
     turn_at(path, end, path.direction * eta + normal * (through.cosine - eta * cosine), normal, lift,
-            has_next ? glass_[1].type : kAir);
+            has_next ? bodies[1].type : kAir);
   }
   next_.push_back(index);
   return true;
@@ -203,7 +229,7 @@ void PathTile::hit_glass(std::uint32_t index, const GlassBody& body, const DVec3
   QUOIN_ASSERT(body.placed >= 0 && static_cast<std::size_t>(body.placed) < context_->placed.size(),
                "a body of one of the placed grids");
   Path& path = paths_[index];
-  const Surface& surface = (*context_->surfaces)[body.type];
+  const Surface surface = surface_of(*context_->surfaces, body);
   Vertex vertex;
   vertex.path = index;
   vertex.placed = body.placed;
@@ -218,6 +244,27 @@ void PathTile::hit_glass(std::uint32_t index, const GlassBody& body, const DVec3
   if (path.is_first) sums_[path.pixel].scene_share += 1.0F;
   note_layers(path, vertex, body.t_enter, body.type);
   add_emitted(path, surface.emitted, -1, 0.0F);
+  vertices_.push_back(vertex);
+}
+
+void PathTile::hit_face(std::uint32_t index, const MetFace& face) {
+  Path& path = paths_[index];
+  const Surface& surface = (*context_->surfaces)[face.type];
+  Vertex vertex;
+  vertex.path = index;
+  vertex.placed = face.placed;
+  const auto of_face = static_cast<std::size_t>(face.face);
+  const DVec3 met = context_->view->grid_from_view(face.placed).point(path.origin + DVec3(path.direction) * face.t);
+  vertex.in_grid = on_face(met, face.voxel, face.face) + DVec3(normal_of(face.face)) * kRayLift;
+  vertex.normal = (*context_->face_normals)[static_cast<std::size_t>(face.placed)][of_face];
+  vertex.in_view = context_->view->view_from_grid(face.placed).point(vertex.in_grid);
+  vertex.material = {face.colour, surface.roughness, surface.metalness};
+  if (light_.lamps != nullptr) vertex.place = memory_.place_of(face.placed, face.voxel, face.face);
+  if (path.is_first) sums_[path.pixel].scene_share += 1.0F;
+  if (!path.is_noted) note_part(path, vertex, surface_id(face.voxel, face.face, false, face.placed, face.type), false);
+  note_layers(path, vertex, face.t, face.type);
+  // Lamps are faces of opaque types.
+  add_emitted(path, face.colour * context_->surfaces->faces(face.type)->sides[face.side].emission, -1, 0.0F);
   vertices_.push_back(vertex);
 }
 
@@ -263,6 +310,14 @@ void PathTile::note_behind(Path& path, const SceneHits& hits, int lane, double t
   const auto i = static_cast<std::size_t>(lane);
   Vertex whole;
   whole.material.colour = Vec3(1.0F);
+  if (context_->surfaces->has(CellContent::Faces)) {
+    find_transparent(*context_->view, *context_->surfaces, {path.origin, DVec3(path.direction)}, t, seen_);
+    if (seen_.is_closed()) {
+      const MetFace& face = seen_.faces.back();
+      note_part(path, whole, surface_id(face.voxel, face.face, false, face.placed, face.type), false);
+      return;
+    }
+  }
   if ((hits.grids.hit >> lane & 1U) != 0 && hits.grids.t[i] <= t) {
     const IVec3 voxel{hits.grids.x[i], hits.grids.y[i], hits.grids.z[i]};
     const bool in_field = (hits.in_field >> lane & 1U) != 0;

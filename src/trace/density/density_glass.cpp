@@ -240,7 +240,7 @@ void visit_glass(const DensityGlass& glass, const Ray& ray, double max_t, Functi
                  FunctionRef<bool(const GlassSpan&)> visit) {
   CellReader reader(glass);
   BodiesInCell cell;
-  const auto enter = [&](IVec3 at) { reader.read(at, cell); };
+  const auto enter = [&](const trace::WalkSpan& begun) { reader.read(begun.voxel, cell); };
   const auto largest_here = [&] { return cell.is_full() ? largest(cell.transparent[0]) : 1.0; };
   trace::visit_blocks(glass.cells(), ray, max_t, enter, largest_here, [&](const trace::WalkSpan& span) {
     const double t_exit = std::min(span.t_exit, max_t);

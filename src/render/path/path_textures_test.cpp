@@ -1,0 +1,244 @@
+// Textures in path-traced images: texels of opaque types, paths through cutout and translucent texels, textured lamps.
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+
+#include <quoin/render/path_tracer.h>
+
+#include "render/cpu/environment_for_tests.h"
+#include "render/cpu/render_test_support.h"
+#include "render/path/town_for_tests.h"
+
+namespace quoin {
+namespace {
+
+using render_test::add_type;
+using render_test::from_above;
+using render_test::path_image;
+using render_test::place;
+using render_test::towards;
+using render_test::under_even_sky;
+
+// A texture of 16 texels per side; `texel(x, y)` returns an Rgba8.
+template <class Texel>
+Texture drawn(const Texel& texel) {
+  AlphaImage image{16, 16, {}};
+  for (int y = 0; y < 16; ++y) {
+    for (int x = 0; x < 16; ++x) {
+      const Rgba8 c = texel(x, y);
+      image.rgba.insert(image.rgba.end(), {c.r, c.g, c.b, c.a});
+    }
+  }
+  return Texture::from_image("drawn", image).value();
+}
+Texture noise(std::uint8_t alpha, unsigned seed = 1) {
+  std::mt19937 random(seed);
+  const auto byte = [&] { return static_cast<std::uint8_t>(random()); };
+  return drawn([&](int, int) { return Rgba8{byte(), byte(), byte(), alpha}; });
+}
+
+VoxelProperties textured(const VoxelFace& face, Visibility visibility = Visibility::Opaque) {
+  VoxelProperties properties;
+  properties.faces = face;
+  properties.visibility = visibility;
+  return properties;
+}
+
+DVec3 mean_of(const PathImage& image) {
+  DVec3 sum(0.0);
+  for (const Vec3& light : image.radiance) sum += DVec3(light);
+  return sum / static_cast<double>(image.radiance.size());
+}
+
+// Returns the mean difference of two images, as a share of the first one's brightness.
+double difference(const PathImage& a, const PathImage& b) {
+  double sum = 0.0;
+  double all = 0.0;
+  for (std::size_t i = 0; i < a.radiance.size(); ++i) {
+    for (int c = 0; c < 3; ++c) {
+      sum += std::abs(static_cast<double>(a.radiance[i][c] - b.radiance[i][c]));
+      all += static_cast<double>(a.radiance[i][c]);
+    }
+  }
+  return sum / all;
+}
+
+// Under a sky of radiance 1 a plane shows its colour, which the CPU renderer draws without light.
+TEST(PathTextures, ShowsTexelsOfALitPlaneAsRaysDo) {
+  Scene scene;
+  const VoxelType type =
+      scene.types.add(textured({.texture = noise(255), .turn = 1, .tint = {255, 180, 90, 255}})).value();
+  Grid grid;
+  grid.fill_box({{-40, -1, -40}, {40, 0, 40}}, type);
+  place(scene, std::move(grid));
+  const Camera camera = from_above(1.0, 5.0, 1.0, 2.0);
+  PathOptions options = under_even_sky(32, 32, 4);
+  options.layers = true;
+  const PathImage image = path_image(scene, camera, options);
+  RenderOptions unlit = render_test::sized(32, 32);
+  unlit.light.shading = Shading::Unlit;
+  const RenderedImage expected = render_test::taken(scene, camera, unlit);
+  for (int y = 0; y < 32; ++y) {
+    for (int x = 0; x < 32; ++x) {
+      const auto i = static_cast<std::size_t>(32 * y + x);
+      const auto shown = render_test::pixel_at(expected, x, y);
+      for (int c = 0; c < 3; ++c) {
+        const float colour = linear_from_srgb(shown[static_cast<std::size_t>(c)]);
+        ASSERT_NEAR(image.radiance[i][c], colour, 0.01F) << x << ' ' << y;
+        ASSERT_NEAR(image.albedo[i][c], colour, 0.005F) << x << ' ' << y;
+      }
+    }
+  }
+}
+
+// Cutout types without invisible texels look as opaque ones, and those without visible texels as air.
+TEST(PathTextures, ShowsVisibleTexelsAsOpaqueOnesAndInvisibleOnesAsAir) {
+  const auto image_of = [](const VoxelProperties* wall) {
+    Scene scene;
+    const VoxelType ground = add_type(scene, {180, 180, 170, 255});
+    const VoxelType lamp = add_type(scene, {255, 190, 90, 255}, Visibility::Opaque, 3.0F);
+    Grid grid;
+    grid.fill_box({{-8, -1, -8}, {8, 0, 8}}, ground);
+    if (wall != nullptr) {
+      const VoxelType type = scene.types.add(*wall).value();
+      grid.fill_box({{-3, 0, -2}, {4, 4, -1}}, type);
+      grid.fill_box({{2, 0, 1}, {5, 2, 4}}, type);
+    }
+    grid.set({-6, 0, 5}, lamp);
+    place(scene, std::move(grid));
+    PathOptions options;
+    options.width = 64;
+    options.height = 48;
+    options.samples = 16;
+    physical_in(options).fog = Fog{.density = 0.005, .top = 6.0};
+    return path_image(scene, towards({12, 9, 14}, {0, 1, 0}), options);
+  };
+  const VoxelProperties opaque = textured({.texture = noise(255)});
+  const VoxelProperties visible =
+      textured({.texture = noise(255), .alpha = FaceAlpha::Cutout}, Visibility::Transparent);
+  const VoxelProperties invisible =
+      textured({.texture = noise(0), .alpha = FaceAlpha::Cutout}, Visibility::Transparent);
+  const PathImage solid = image_of(&opaque);
+  const PathImage air = image_of(nullptr);
+  EXPECT_GT(difference(solid, air), 0.05);
+  EXPECT_LT(difference(solid, image_of(&visible)), 0.01);
+  EXPECT_LT(difference(air, image_of(&invisible)), 0.001);
+}
+
+// Half of the sun's light passes a chess board of visible and invisible texels.
+TEST(PathTextures, LetsLightThroughInvisibleTexels) {
+  const auto light_below = [](bool has_leaves) {
+    Scene scene;
+    const VoxelType white = add_type(scene, {255, 255, 255, 255});
+    const Texture chess = drawn([](int x, int y) {
+      return Rgba8{40, 160, 40, static_cast<std::uint8_t>((x / 2 + y / 2) % 2 == 0 ? 255 : 0)};
+    });
+    const VoxelType leaf =
+        scene.types.add(textured({.texture = chess, .alpha = FaceAlpha::Cutout}, Visibility::Transparent)).value();
+    Grid grid;
+    grid.fill_box({{-8, -1, -8}, {8, 0, 8}}, white);
+    if (has_leaves) grid.fill_box({{-8, 2, -8}, {8, 3, 8}}, leaf);
+    place(scene, std::move(grid));
+    PathOptions options = under_even_sky(32, 32, 32);
+    physical_in(options).sky.brightness = 0.0;
+    physical_in(options).sun.brightness = 1.0;
+    physical_in(options).sun.direction = {0, 1, 0};
+    options.max_bounces = 1;
+    return mean_of(path_image(scene, from_above(0.0, 1.5, 0.0, 4.0), options));
+  };
+  const DVec3 open = light_below(false);
+  const DVec3 shaded = light_below(true);
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(shaded[c] / open[c], 0.5, 0.03);
+}
+
+// A pane whose texels are all equal looks as one of plain glass of their colour.
+TEST(PathTextures, ShowsEqualTranslucentTexelsAsGlass) {
+  const auto image_of = [](bool has_texture, bool is_hollow) {
+    Scene scene;
+    const VoxelType ground = add_type(scene, {180, 180, 170, 255});
+    const Rgba8 colour{200, 90, 40, 120};
+    VoxelProperties pane;
+    pane.visibility = Visibility::Transparent;
+    pane.colour = colour;
+    pane.ior = 1.0F;
+    if (has_texture) {
+      std::array<VoxelFace, 6> faces;
+      for (VoxelFace& face : faces) {
+        face = {.texture = drawn([&](int, int) { return colour; }), .alpha = FaceAlpha::Translucent};
+      }
+      // A type with one cutout face is a cell of faces.
+      if (is_hollow) faces[static_cast<std::size_t>(Direction::PosX)].alpha = FaceAlpha::Cutout;
+      pane.faces = VoxelFaces(faces);
+    }
+    const VoxelType type = scene.types.add(pane).value();
+    Grid grid;
+    grid.fill_box({{-8, -1, -8}, {8, 0, 8}}, ground);
+    grid.fill_box({{-8, 3, -8}, {8, 4, 8}}, type);
+    place(scene, std::move(grid));
+    PathOptions options;
+    options.width = options.height = 32;
+    options.samples = 64;
+    physical_in(options).sun.direction = {0.1, 1, 0.2};
+    return mean_of(path_image(scene, from_above(0.0, 9.0, 0.0, 6.0), options));
+  };
+  const DVec3 plain = image_of(false, false);
+  const DVec3 textured_glass = image_of(true, false);
+  const DVec3 hollow = image_of(true, true);
+  for (int c = 0; c < 3; ++c) {
+    EXPECT_NEAR(textured_glass[c] / plain[c], 1.0, 0.03) << c;
+    EXPECT_NEAR(hollow[c] / plain[c], 1.0, 0.1) << c << ": oblique rays have a longer way in glass";
+  }
+}
+
+// A dark ceiling with one lamp, of which the texture lights one half, and a lamp of half the size.
+TEST(PathTextures, SamplesLightOfTexels) {
+  const auto image_of = [](bool has_texture) {
+    Scene scene;
+    const VoxelType ground = add_type(scene, {200, 200, 200, 255});
+    const VoxelType bright = add_type(scene, {255, 255, 255, 255}, Visibility::Opaque, 4.0F);
+    const VoxelType dark = add_type(scene, {0, 0, 0, 255});
+    VoxelProperties half = textured({.texture = drawn([](int x, int) {
+                                       const auto c = static_cast<std::uint8_t>(x < 8 ? 255 : 0);
+                                       return Rgba8{c, c, c, 255};
+                                     })});
+    half.emission = 4.0F;
+    const VoxelType lamp = scene.types.add(half).value();
+    Grid floor;
+    floor.fill_box({{-8, -2, -8}, {8, -1, 8}}, ground);
+    place(scene, std::move(floor));
+    Grid ceiling;
+    if (has_texture) {
+      ceiling.fill_box({{-4, 4, -4}, {5, 5, 5}}, dark);
+      ceiling.set({0, 4, 0}, lamp);
+      place(scene, std::move(ceiling));
+    } else {
+      // On the bottom, the texture's right is at +X.
+      ceiling.fill_box({{-8, 8, -8}, {10, 10, 10}}, dark);
+      ceiling.fill_box({{0, 8, 0}, {1, 9, 2}}, bright);
+      scene.edit(place(scene, std::move(ceiling))).voxel_size = 0.5;
+    }
+    PathOptions options = under_even_sky(24, 24, 64);
+    physical_in(options).sky.brightness = 0.0;
+    options.max_bounces = 2;
+    // Below the lamp.
+    return path_image(scene, from_above(0.5, 3.5, 0.5, 5.0), options);
+  };
+  const PathImage a = image_of(true);
+  const PathImage b = image_of(false);
+  const auto part = [](const PathImage& image, int from, int to) {
+    double sum = 0.0;
+    for (int y = 0; y < 24; ++y) {
+      for (int x = from; x < to; ++x)
+        sum += static_cast<double>(image.radiance[static_cast<std::size_t>(24 * y + x)].x);
+    }
+    return sum;
+  };
+  for (int x = 0; x < 24; x += 6) EXPECT_NEAR(part(a, x, x + 6) / part(b, x, x + 6), 1.0, 0.05) << x;
+}
+
+}  // namespace
+}  // namespace quoin
