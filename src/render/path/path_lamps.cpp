@@ -118,6 +118,20 @@ LampSample sample_point_lamp(const PathLamp& lamp, DVec3 point) {
   return sample;
 }
 
+// Returns the radiance of the texel at a point of a textured lamp. `from_corner`: in the world.
+Vec3 radiance_at(const PathLamp& lamp, Vec3 from_corner) {
+  QUOIN_ASSERT(lamp.texels != nullptr, "a lamp with a texture");
+  const auto in_voxel = [&](Vec3 along, float size) {
+    const float voxels = std::clamp(glm::dot(from_corner, along), 0.0F, size) / lamp.voxel_size;
+    return static_cast<double>(voxels - std::floor(voxels));
+  };
+  const FaceFrame& frame = frame_of(lamp.face);
+  DVec3 inside(0.0);
+  inside[frame.u] = in_voxel(lamp.u, lamp.size_u);
+  inside[frame.v] = in_voxel(lamp.v, lamp.size_v);
+  return lamp.texels->colour(lamp.texels->texel(inside, 0)) * lamp.light_of_texel;
+}
+
 LampSample sample_rectangle(const PathLamp& lamp, DVec3 point, Pair u) {
   QUOIN_ASSERT(!lamp.is_point, "a lamp with a body");
   LampSample sample;
@@ -137,7 +151,9 @@ LampSample sample_rectangle(const PathLamp& lamp, DVec3 point, Pair u) {
   if (!(sample.distance > 0.0F)) return {};
   sample.direction = way / sample.distance;
   if (seen.is_small) sample.density = density_of(lamp, sample.direction, sample.distance);
-  if (sample.density > 0.0F) sample.radiance = lamp.radiance / sample.density;
+  if (!(sample.density > 0.0F)) return sample;
+  const Vec3 radiance = lamp.texels == nullptr ? lamp.radiance : radiance_at(lamp, way - seen.to_corner);
+  sample.radiance = radiance / sample.density;
   return sample;
 }
 
@@ -252,6 +268,8 @@ PathLamp lamp_of_quad(const Quad& quad, IVec3 chunk, const PlacedGrid& placed, V
   lamp.size_u = static_cast<float>(quad.size_u() * placed.voxel_size);
   lamp.size_v = static_cast<float>(quad.size_v() * placed.voxel_size);
   lamp.radiance = radiance;
+  lamp.face = quad.direction();
+  lamp.voxel_size = static_cast<float>(placed.voxel_size);
   return lamp;
 }
 
@@ -296,11 +314,18 @@ std::shared_ptr<const PathLamps> PathLampCache::lamps(const Scene& scene, std::s
           [&](IVec3 chunk) { return emissive_quads(grid, scene.types, chunk, mesher); });
     }
     quads.for_each([&](IVec3 chunk, const Quad& quad) {
-      const Vec3 radiance = surfaces[quad.type()].emitted * static_cast<float>(std::min(brightness, 1e9));
+      const auto factor = static_cast<float>(std::min(brightness, 1e9));
+      const TypeFaces* const textured = surfaces.faces(quad.type());
+      const FaceTexels* const side =
+          textured == nullptr ? nullptr : &textured->sides[static_cast<std::size_t>(quad.direction())];
+      const Vec3 radiance = (side == nullptr ? surfaces[quad.type()].emitted : side->mean() * side->emission) * factor;
       if (is_black(radiance)) return;
       faces.push_back(
           {static_cast<std::int32_t>(i), chunk * kChunkEdge, quad, static_cast<std::int32_t>(lamps.size())});
-      lamps.push_back(lamp_of_quad(quad, chunk, placed[i], radiance));
+      PathLamp& lamp = lamps.emplace_back(lamp_of_quad(quad, chunk, placed[i], radiance));
+      if (side == nullptr) return;
+      lamp.texels = side;
+      lamp.light_of_texel = side->emission * factor;
     });
   }
   DBox bounds;

@@ -33,6 +33,11 @@ struct PathLamp {
   float cos_inner = -2.0F;  ///< of a spot, as in PlacedLamp
   float cos_outer = -3.0F;
   float reach = 0.0F;  ///< of a lamp without a body
+  /// The texture of the face, whose mean is `radiance`; null without one. The Surfaces of PathLampCache::lamps own it.
+  const FaceTexels* texels = nullptr;
+  Direction face = Direction::PosX;  ///< in the grid
+  float voxel_size = 1.0F;           ///< world units
+  float light_of_texel = 0.0F;       ///< radiance as a multiple of the texel's colour
 };
 
 /// Light from a lamp towards a point.
@@ -91,7 +96,8 @@ class PathLamps {
 /// Keeps the emissive faces of a scene's grids up to date across edits.
 class PathLampCache {
  public:
-  /// Returns the lamps of the placed instances. `surfaces`: of the scene's types. `brightness`: factor of the lamps'
+  /// Returns the lamps of the placed instances. `surfaces`: of the scene's types; `sample` requires that they were not
+  /// updated since. `brightness`: factor of the lamps'
   /// light. Cost: the quads of changed chunks, and O(faces that emit).
   [[nodiscard]] std::shared_ptr<const PathLamps> lamps(const Scene& scene, std::span<const PlacedGrid> placed,
                                                        const Surfaces& surfaces, double brightness);
