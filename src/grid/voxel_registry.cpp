@@ -118,8 +118,7 @@ std::string error_of_shapes(const VoxelProperties& p) {
       p.shapes.rules().neighbours != ShapeNeighbours::Fluid) {
     return "they use bits of the state that `state_bits` does not declare";
   }
-  if (p.occludes.value_or(false))
-    return "leave `occludes` empty: a type with shapes darkens corners by their content";
+  if (p.occludes.value_or(false)) return "leave `occludes` empty: a type with shapes darkens corners by their content";
   for (std::size_t part = 0; part < p.shapes.rules().parts.size(); ++part) {
     for (const ShapeElement& element : p.shapes.rules().parts[part].shape.elements()) {
       for (const Direction direction : kDirections) {
@@ -200,6 +199,13 @@ Status validate_type(const VoxelProperties& properties) {
     return wrong("occludes", "must be false for a transparent type, since only types that hide faces can occlude");
   }
   if (const std::string fault = error_of_faces(properties); !fault.empty()) return wrong("faces", fault.c_str());
+  const FieldTextures& field = properties.field_textures;
+  if (!(field.voxels >= 1.0F / 64.0F && field.voxels <= 4'096.0F)) {
+    return wrong("field_textures", "the edge of a texture must be from 1/64 to 4,096 voxels");
+  }
+  if (!(field.flat_degrees >= 0.0F && field.flat_degrees < field.steep_degrees && field.steep_degrees <= 90.0F)) {
+    return wrong("field_textures", "slopes must be 0 <= flat < steep <= 90 degrees");
+  }
   if (const std::string fault = error_of_orientations(properties); !fault.empty()) {
     return wrong("orientations", fault.c_str());
   }
@@ -337,7 +343,8 @@ void VoxelRegistry::replace(VoxelType type, VoxelProperties properties) {
       !(c.properties[type].shapes == properties.shapes && c.properties[type].orientations == properties.orientations);
   const bool is_seen_otherwise = was != visibility || occluded != c.occlusion[type];
   const bool is_coloured_otherwise =
-      !(c.properties[type].colour == properties.colour && c.properties[type].faces == properties.faces);
+      !(c.properties[type].colour == properties.colour && c.properties[type].faces == properties.faces &&
+        c.properties[type].field_textures == properties.field_textures);
   const TypeChange change{type, is_seen_otherwise, is_coloured_otherwise, is_formed_otherwise};
   c.properties[type] = std::move(properties);
   note(change);

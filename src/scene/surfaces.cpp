@@ -2,9 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <span>
+
+#include <glm/common.hpp>
 
 #include <quoin/core/assert.h>
 
@@ -146,16 +150,53 @@ class MaterialShares {
 
 }  // namespace
 
-Surface Surfaces::blend_of_field(const DensityGrid& field, IVec3 cell, const DVec3& inside, VoxelType nearest) const {
+Vec3 triplanar_colour(const TypeFaces& faces, const FieldPoint& point) {
+  const Vec3& n = point.normal;
+  const float rise = std::clamp((std::abs(n.y) - faces.steep_y) / (faces.flat_y - faces.steep_y), 0.0F, 1.0F);
+  std::array<float, 3> weights{};
+  weights[1] = rise * rise * (3.0F - 2.0F * rise);
+  // Fourth powers keep the range narrow in which both pairs of sides are seen.
+  const float x = n.x * n.x * n.x * n.x;
+  const float z = n.z * n.z * n.z * n.z;
+  const float share_of_x = x + z > 0.0F ? x / (x + z) : 0.5F;
+  weights[0] = (1.0F - weights[1]) * share_of_x;
+  weights[2] = (1.0F - weights[1]) * (1.0F - share_of_x);
+  const DVec3 position = point.position * double{faces.field_scale};
+  const DVec3 inside = position - glm::floor(position);
+  const double square = point.square_spacing * double{faces.field_scale} * double{faces.field_scale};
+  // log2 of the distance of samples in textures, rounded; see Lighting::texel_colour.
+  const int log_spacing = (static_cast<int>(std::bit_cast<std::uint64_t>(2.0 * square) >> 52 & 0x7FF) - 1023) >> 1;
+  Vec3 colour(0.0F);
+  for (int axis = 0; axis < 3; ++axis) {
+    const float weight = weights[static_cast<std::size_t>(axis)];
+    if (!(weight > 0.0F)) continue;
+    const FaceTexels& side = faces.sides[static_cast<std::size_t>(2 * axis + (n[axis] < 0.0F ? 1 : 0))];
+    const int level = std::clamp(log_spacing + side.log_size, 0, int{side.log_size});
+    colour += weight * side.colour(side.texel(inside, level));
+  }
+  return colour;
+}
+
+Surface Surfaces::field_surface(VoxelType material, const FieldPoint* point) const {
+  Surface surface = of_field(material);
+  const TypeFaces* const textured = point == nullptr ? nullptr : faces(material);
+  if (textured == nullptr) return surface;
+  surface.colour = triplanar_colour(*textured, *point);
+  surface.emitted = surface.colour * textured->sides[0].emission;
+  return surface;
+}
+
+Surface Surfaces::blend_of_field(const DensityGrid& field, IVec3 cell, const DVec3& inside, VoxelType nearest,
+                                 const FieldPoint* point) const {
   const MaterialShares shares(field, cell, inside);
   float total = 0.0F;
   for (const MaterialShares::Share& each : shares.all()) total += each.share;
-  if (shares.all().size() < 2 || !(total > 0.0F)) return of_field(nearest);
+  if (shares.all().size() < 2 || !(total > 0.0F)) return field_surface(nearest, point);
   Surface blend = of_field(nearest);
   blend.colour = blend.emitted = Vec3(0.0F);
   blend.roughness = blend.metalness = 0.0F;
   for (const MaterialShares::Share& each : shares.all()) {
-    const Surface& surface = of_field(each.material);
+    const Surface surface = field_surface(each.material, point);
     const float share = each.share / total;
     blend.colour += share * surface.colour;
     blend.emitted += share * surface.emitted;
@@ -180,6 +221,11 @@ void Surfaces::put(VoxelType type, const VoxelProperties& properties) {
   const auto made = std::make_shared<TypeFaces>();
   made->kept = properties.faces;
   made->content = content_of(properties, clouds_);
+  const FieldTextures& field = properties.field_textures;
+  constexpr float kRadians = std::numbers::pi_v<float> / 180.0F;
+  made->field_scale = 1.0F / field.voxels;
+  made->steep_y = std::cos(field.steep_degrees * kRadians);
+  made->flat_y = std::cos(field.flat_degrees * kRadians);
   for (const Direction each : kDirections) {
     made->sides[static_cast<std::size_t>(each)] = face_texels(properties.faces[each], each, emission_of(properties));
   }

@@ -97,7 +97,24 @@ struct TypeFaces {
   VoxelFaces kept;  ///< owns the texels
   CellContent content = CellContent::Glass;
   std::array<FaceTexels, 6> sides;  ///< by direction
+  /// On fields (FieldTextures): textures per voxel, and the y of unit normals from where sides, or only upper and lower
+  /// textures, are seen.
+  float field_scale = 1.0F;
+  float steep_y = 0.0F;
+  float flat_y = 1.0F;
 };
+
+/// A point of a field's surface that shows textures.
+struct FieldPoint {
+  DVec3 position{0.0};          ///< in voxels of the full grid
+  Vec3 normal{0.0F};            ///< of unit length; 0: all sides count alike
+  double square_spacing = 0.0;  ///< of the image's samples, in voxels; 0: level 0 of the mipmaps
+};
+
+/// Returns the colour of a material at a point: its textures along the three axes, weighted by the normal.
+///
+/// Source: R. Geiss, "Generating complex procedural terrains using the GPU" (GPU Gems 3, 2007), triplanar texturing.
+[[nodiscard]] Vec3 triplanar_colour(const TypeFaces& faces, const FieldPoint& point);
 
 /// Surfaces by type. Unregistered ids give a conspicuous magenta.
 class Surfaces {
@@ -125,17 +142,22 @@ class Surfaces {
   }
   /// Returns the surface of a field's material. kAir has no material and is white, as in smooth meshes.
   [[nodiscard]] const Surface& of_field(VoxelType material) const;
+  /// Returns true if any type has textures. Cost: O(1).
+  [[nodiscard]] bool has_textures() const { return !faces_.empty(); }
   /// Returns the colour, emission, roughness and metalness at a point of a field's surface: the weighted mean of the
-  /// solid samples among the 27 around it. A flat smooth mesh has the same colours: at the middle of a cell the
-  /// samples of its corners have equal weights, and between cell centres the weights change linearly.
+  /// solid samples among the 27 around it. With `point`, textured materials show their textures there. A flat smooth
+  /// mesh has the same colours: at the middle of a cell the samples of its corners have equal weights, and between cell
+  /// centres the weights change linearly.
   ///
   /// `inside`: the position in the cell, 0 to 1 on each axis. `nearest`: the material if no sample around is solid.
   /// Cost: 9 rows of samples, and 27 materials if these differ.
-  [[nodiscard]] Surface blend_of_field(const DensityGrid& field, IVec3 cell, const DVec3& inside,
-                                       VoxelType nearest) const;
+  [[nodiscard]] Surface blend_of_field(const DensityGrid& field, IVec3 cell, const DVec3& inside, VoxelType nearest,
+                                       const FieldPoint* point = nullptr) const;
 
  private:
   void put(VoxelType type, const VoxelProperties& properties);
+  // As `of_field`, with textures at `point`, which may be null.
+  [[nodiscard]] Surface field_surface(VoxelType material, const FieldPoint* point) const;
 
   Clouds clouds_;
   std::vector<Surface> surfaces_;  // the last entry is for unregistered types

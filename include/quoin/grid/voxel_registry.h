@@ -40,6 +40,17 @@ inline constexpr std::uint8_t kMaxLightCost = 15;
 /// A transparent type also hides the faces between two of its own voxels.
 enum class Visibility : std::uint8_t { Air, Opaque, Transparent };
 
+/// The look of a type's textures on the surfaces of density fields, where each texture is projected along its axis: the
+/// upper and the lower one on flat ground, those of the sides on slopes. Grass above and rock at the sides thus give
+/// hills whose steep parts are bare.
+struct FieldTextures {
+  float voxels = 1.0F;          ///< edge of the square that a texture covers, in voxels
+  float flat_degrees = 35.0F;   ///< up to this slope, ground shows the upper (or lower) texture only
+  float steep_degrees = 55.0F;  ///< from this slope on, it shows those of the sides only; blended in between
+
+  bool operator==(const FieldTextures&) const = default;
+};
+
 /// The properties of a voxel type.
 struct VoxelProperties {
   std::string name{};
@@ -86,6 +97,8 @@ struct VoxelProperties {
   /// a registry sets it. Opaque types have opaque faces; cutout and translucent faces need a transparent type. Equal
   /// textures of a registry's types share their texels.
   VoxelFaces faces{};
+  /// Used if the type has textures and is the material of a density field.
+  FieldTextures field_textures{};
   /// The orientations of this type's faces and shapes that the state selects.
   StateOrientations orientations{};
   /// The shapes of a type that is no cube. `visibility` is then that of their material: a stair of stone is opaque,
@@ -100,7 +113,8 @@ struct VoxelProperties {
 /// Errors: InvalidArgument if `visibility` is Air, `state_bits` exceeds 32, `light_cost` exceeds 15, a type that is
 /// transparent or has shapes occludes, a face (of the type or of its shapes) has no texture, a turn above 3, an alpha
 /// mode that its texture or `visibility` does not allow, or orientations or shapes use bits that `state_bits` does not
-/// declare.
+/// declare, or `field_textures` has an edge that is not from 1/64 to 4,096, or slopes that are not
+/// 0 <= flat < steep <= 90.
 [[nodiscard]] Status validate_type(const VoxelProperties& properties);
 
 /// A type that was added or replaced. Properties without a flag below can differ too.
@@ -108,7 +122,7 @@ struct TypeChange {
   VoxelType type = kAir;
   bool visibility_changed =
       false;                    ///< `visibility` or `occludes`; an unregistered type counts as opaque, with defaults
-  bool colour_changed = false;  ///< `colour` or `faces`; also true if the type was added
+  bool colour_changed = false;  ///< `colour`, `faces`, `field_textures`; also true if it was added
   bool shape_changed = false;   ///< `shapes` or `orientations`; also true if the type was added with some
 };
 using TypeChanges = Changes<TypeChange>;

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <random>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
@@ -228,6 +230,86 @@ TEST(RenderTextures, ShowsMeansOfCoarseGrids) {
   RenderOptions options = unlit(3, 3);
   options.detail.policy = DetailPolicy{.rule = DetailPolicy::Rule::ByPixels, .voxel_pixels = 1e6, .cell_pixels = 1e6};
   EXPECT_EQ(pixel_at(taken(scene, from_above(0.3, 30, 0.4, 1.0), options), 1, 1), (Pixel{mean.r, mean.g, mean.b}));
+}
+
+Texture plain_texture(Rgba8 colour) {
+  AlphaImage image{16, 16, {}};
+  for (int i = 0; i < 16 * 16; ++i) image.rgba.insert(image.rgba.end(), {colour.r, colour.g, colour.b, 255});
+  return Texture::from_image("plain", image).value();
+}
+
+void place_field(Scene& scene, DensityGrid field) {
+  SceneGrid placed;
+  placed.field = std::move(field);
+  scene.add_instance({"", scene.add_grid(std::move(placed))});
+}
+
+constexpr Rgba8 kGrass{40, 200, 60, 255};
+constexpr Rgba8 kRock{120, 110, 100, 255};
+constexpr Rgba8 kEarth{90, 60, 30, 255};
+
+// A ball with grass above and rock at its sides, seen along x, in 61x61 pixels of one voxel.
+RenderedImage view_of_ball(FieldTextures textures) {
+  Scene scene;
+  VoxelProperties hill;
+  hill.faces = VoxelFaces({plain_texture(kRock)}, {plain_texture(kGrass)}, {plain_texture(kEarth)});
+  hill.field_textures = textures;
+  DensityGrid field;
+  field.add_sphere(DVec3(0.0), 28.0, scene.types.add(hill).value());
+  place_field(scene, std::move(field));
+  return taken(scene, facing(Direction::PosX, DVec3(0.0), 61.0), unlit(61, 61));
+}
+
+TEST(RenderTextures, FieldsShowUpperTexturesOnFlatGroundAndSidesOnSlopes) {
+  const RenderedImage image = view_of_ball({.flat_degrees = 30.0F, .steep_degrees = 60.0F});
+  // facing() sets `up` to the face's u, which is y for +X.
+  const auto at_slope = [&](double degrees) {
+    const double radians = degrees * std::numbers::pi / 180.0;
+    return pixel_at(image, 30, static_cast<int>(std::lround(30.0 - 28.0 * std::cos(radians))));
+  };
+  EXPECT_EQ(at_slope(20.0), encoded(linear(kGrass)));
+  EXPECT_EQ(at_slope(70.0), encoded(linear(kRock)));
+  EXPECT_EQ(at_slope(110.0), encoded(linear(kRock)));
+  EXPECT_EQ(at_slope(160.0), encoded(linear(kEarth)));
+  const Pixel between = at_slope(45.0);
+  EXPECT_GT(between[1], kRock.g + 20);
+  EXPECT_LT(between[1], kGrass.g - 20);
+}
+
+TEST(RenderTextures, FieldsRepeatTexturesByTheirEdge) {
+  for (const float edge : {1.0F, 4.0F}) {
+    Scene scene;
+    VoxelProperties ground;
+    ground.faces = random_texture(16, 21);
+    ground.field_textures.voxels = edge;
+    const VoxelType type = scene.types.add(ground).value();
+    DensityGrid field;
+    field.add_box({-20, -20, -20}, {20, 0, 20}, type);
+    place_field(scene, std::move(field));
+    constexpr int kPixels = 256;
+    constexpr double kWidth = 16.0;
+    const Camera camera = facing(Direction::PosY, {0.0, 0.0, 0.0}, kWidth);
+    const RenderedImage image = taken(scene, camera, unlit(kPixels, kPixels));
+    const VoxelFace& face = scene.types[type].faces[Direction::PosY];
+    int wrong = 0;
+    for (int y = 0; y < kPixels; ++y) {
+      for (int x = 0; x < kPixels; ++x) {
+        const DVec3 at =
+            camera.right * (((x + 0.5) / kPixels - 0.5) * kWidth) - camera.up * (((y + 0.5) / kPixels - 0.5) * kWidth);
+        const DVec3 inside = glm::fract(at / double{edge});
+        wrong += pixel_at(image, x, y) == shown(face, Direction::PosY, inside, 0) ? 0 : 1;
+      }
+    }
+    EXPECT_EQ(wrong, 0) << "an edge of " << edge;
+  }
+}
+
+TEST(RenderTextures, RejectsSlopesAndEdgesOfFields) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  for (const FieldTextures& bad : {FieldTextures{.voxels = 0.0F}, FieldTextures{.voxels = nan},
+                                   FieldTextures{.flat_degrees = 60.0F}, FieldTextures{.steep_degrees = 91.0F}}) {
+    EXPECT_FALSE(validate_type({.name = "hill", .field_textures = bad}));
+  }
 }
 
 }  // namespace

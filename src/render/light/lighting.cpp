@@ -524,16 +524,28 @@ void Lighting::set_occlusion_directions(const Group& group, int ray, RayPacket& 
   }
 }
 
+Lighting::Colours Lighting::colours_of_field(const SurfacePoint& point, const FieldPoint* textured) const {
+  const auto placed = static_cast<std::size_t>(point.placed);
+  const DensityGrid& field = placed_in(view_->tracer())[placed].opaque_field->field();
+  const DVec3 at = point.position - double{point.lift} * DVec3(point.normal);
+  const IVec3 cell = voxel_of(at);
+  const Surface blend = surfaces_->blend_of_field(field, cell, at - DVec3(cell), point.type, textured);
+  return {blend.colour, blend.emitted};
+}
+
+double Lighting::square_spacing_at(const SurfacePoint& point) const {
+  const Frame& frame = frames_[static_cast<std::size_t>(point.placed)];
+  if (!is_perspective_) return frame.square_spacing;
+  const DVec3 away = point.position - frame.eye;
+  return frame.square_spacing * glm::dot(away, away);
+}
+
 // Inlined, as `colours_at`: a call per point would take a noticeable part of an unlit image's time.
 __attribute__((always_inline)) inline Lighting::Colours Lighting::colours_of_type(const SurfacePoint& point) const {
   const auto placed = static_cast<std::size_t>(point.placed);
   QUOIN_ASSERT(placed < frames_.size(), "one of the placed grids");
   if (point.is_blended) {
-    const DensityGrid& field = placed_in(view_->tracer())[placed].opaque_field->field();
-    const DVec3 at = point.position - double{point.lift} * DVec3(point.normal);
-    const IVec3 cell = voxel_of(at);
-    const Surface blend = surfaces_->blend_of_field(field, cell, at - DVec3(cell), point.type);
-    return {blend.colour, blend.emitted};
+    return colours_of_field(point, nullptr);
   }
   const Surface& surface = point.in_field ? surfaces_->of_field(point.type) : (*surfaces_)[point.type];
   return {surface.colour, surface.emitted};
@@ -570,12 +582,7 @@ bool Lighting::shows_mean_of_face(const SurfacePoint& point) const {
 
 // As `texel_at`, with the mipmap level of the point's distance.
 Vec3 Lighting::texel_colour(const FaceTexels& face, const SurfacePoint& point) const {
-  const Frame& frame = frames_[static_cast<std::size_t>(point.placed)];
-  double square = frame.square_spacing;
-  if (is_perspective_) {
-    const DVec3 away = point.position - frame.eye;
-    square *= glm::dot(away, away);
-  }
+  const double square = square_spacing_at(point);
   // The level is log2 of the texels between samples, rounded. That is half the exponent of twice their square, plus
   // the texture's own size.
   const auto exponent = static_cast<int>(std::bit_cast<std::uint64_t>(2.0 * square) >> 52 & 0x7FF) - 1023;
@@ -589,6 +596,12 @@ __attribute__((noinline)) Lighting::Colours Lighting::other_colours_at(const Sur
   QUOIN_ASSERT(placed < frames_.size(), "one of the placed grids");
   const bool is_bare = point.in_field && point.type == kAir;
   if (!detail_surfaces_.empty() && !is_bare) return {detail_surfaces_[placed].colour, detail_surfaces_[placed].emitted};
+  if (point.is_blended && surfaces_->has_textures()) {
+    // Cells of halved fields are larger, but textures keep their size.
+    const double scale = voxels_per_cell(point.placed);
+    const FieldPoint textured{point.position * scale, point.normal, square_spacing_at(point) * scale * scale};
+    return colours_of_field(point, &textured);
+  }
   const FaceTexels* const face = texels_at(point);
   if (face == nullptr) return colours_of_type(point);
   // A return of its own: a choice of colours would cost near points 8 % more.

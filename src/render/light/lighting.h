@@ -128,6 +128,9 @@ class Lighting {
   // As `colours_at`, with textures or the colours of detail.
   [[nodiscard]] Colours other_colours_at(const SurfacePoint& point) const;
   [[nodiscard]] Colours colours_of_type(const SurfacePoint& point) const;
+  [[nodiscard]] Colours colours_of_field(const SurfacePoint& point, const FieldPoint* textured) const;
+  // Returns the square of the distance between samples at a point, in voxels of its grid.
+  [[nodiscard]] double square_spacing_at(const SurfacePoint& point) const;
   [[nodiscard]] const FaceTexels* texels_at(const SurfacePoint& point) const;
   [[nodiscard]] bool shows_mean_of_face(const SurfacePoint& point) const;
   [[nodiscard]] Vec3 texel_colour(const FaceTexels& face, const SurfacePoint& point) const;

@@ -415,9 +415,12 @@ void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const Scen
   Surface surface;
   if (in_field) {
     const DVec3 inside = vertex.in_grid - DVec3(voxel);
-    surface = starts_inside ? context_->surfaces->of_field(type)
-                            : context_->surfaces->blend_of_field(placed.opaque_field->field(), voxel, inside, type);
     const DVec3 normal(hits.normal(i));
+    const FieldPoint point{vertex.in_grid * placed.voxels_per_cell(), Vec3(normal)};
+    const FieldPoint* const textured = context_->surfaces->has_textures() ? &point : nullptr;
+    surface = starts_inside
+                  ? context_->surfaces->of_field(type)
+                  : context_->surfaces->blend_of_field(placed.opaque_field->field(), voxel, inside, type, textured);
     vertex.in_grid += normal * kRayLift;
     vertex.normal = glm::normalize(Vec3(placed.world_axes * normal));
   } else {
