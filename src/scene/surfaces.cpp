@@ -59,25 +59,6 @@ Surface surface_of(const VoxelProperties& properties, Clouds clouds) {
   return surface;
 }
 
-FaceTexels face_texels(const VoxelFace& face, Direction direction, float emission) {
-  const Texture& texture = face.texture;
-  FaceTexels found;
-  found.texels = texture.level(0).data();
-  found.log_size = static_cast<std::uint8_t>(texture.level_count() - 1);
-  found.alpha = face.alpha;
-  const TextureFrame frame = texture_frame(face, direction);
-  for (std::size_t i = 0; i < 2; ++i) {
-    const IVec3& along = i == 0 ? frame.right : frame.down;
-    const int axis = along.x != 0 ? 0 : along.y != 0 ? 1 : 2;
-    found.axis[i] = static_cast<std::uint8_t>(axis);
-    found.sign[i] = along[axis] < 0 ? -1.0F : 1.0F;
-  }
-  found.linear = linear_bytes().data();
-  found.tint = linear_colour(face.tint);
-  found.emission = emission;
-  return found;
-}
-
 CellContent content_of(const VoxelProperties& properties, Clouds clouds) {
   if (properties.visibility != Visibility::Transparent) return CellContent::Glass;
   const bool is_glass = std::ranges::all_of(
@@ -149,6 +130,25 @@ class MaterialShares {
 };
 
 }  // namespace
+
+FaceTexels face_texels(const VoxelFace& face, Direction direction, float emission) {
+  const Texture& texture = face.texture;
+  FaceTexels found;
+  found.texels = texture.level(0).data();
+  found.log_size = static_cast<std::uint8_t>(texture.level_count() - 1);
+  found.alpha = face.alpha;
+  const TextureFrame frame = texture_frame(face, direction);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const IVec3& along = i == 0 ? frame.right : frame.down;
+    const int axis = along.x != 0 ? 0 : along.y != 0 ? 1 : 2;
+    found.axis[i] = static_cast<std::uint8_t>(axis);
+    found.sign[i] = along[axis] < 0 ? -1.0F : 1.0F;
+  }
+  found.linear = linear_bytes().data();
+  found.tint = linear_colour(face.tint);
+  found.emission = emission;
+  return found;
+}
 
 Vec3 triplanar_colour(const TypeFaces& faces, const FieldPoint& point) {
   const Vec3& n = point.normal;

@@ -92,6 +92,9 @@ struct FaceTexels {
   }
 };
 
+/// Prepares a face. Lifetime: that of its texture. Requires: the face has one.
+[[nodiscard]] FaceTexels face_texels(const VoxelFace& face, Direction direction, float emission);
+
 /// The textured faces of a type.
 struct TypeFaces {
   VoxelFaces kept;  ///< owns the texels

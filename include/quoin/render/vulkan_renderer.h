@@ -94,7 +94,8 @@ class VulkanRenderer {
 
   /// Draws into an image on the device: adds `options.samples` samples per pixel. Starts from scratch with
   /// Accumulation::Restart, if the size changes, or if another function drew or wrote the image. The accumulated image
-  /// equals the result of `render` with as many samples. After an error, including Cancelled, the image has no samples.
+  /// equals the result of `render` with as many samples, except that textures are smoother: samples of earlier calls
+  /// show the mipmap levels for fewer samples. After an error, including Cancelled, the image has no samples.
   ///
   /// Requires: unless it starts from scratch, camera, light and scene are the same as for the existing samples; the
   ///           scene is not checked.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
+#include <random>
 #include <utility>
 
 #include <glm/geometric.hpp>
@@ -35,6 +36,29 @@ inline InstanceHandle place(Scene& scene, Grid grid, DVec3 position = DVec3(0.0)
   SceneGrid placed;
   placed.grid = std::move(grid);
   return scene.add_instance({"", scene.add_grid(std::move(placed)), position});
+}
+
+/// Returns an opaque texture of noise.
+inline Texture random_texture(int size, unsigned seed) {
+  std::mt19937 random(seed);
+  AlphaImage image{size, size, {}};
+  for (int i = 0; i < 4 * size * size; ++i) {
+    image.rgba.push_back(i % 4 == 3 ? 255 : static_cast<std::uint8_t>(random()));
+  }
+  return Texture::from_image("noise", image).value();
+}
+
+/// Returns faces of noise of three sizes, with random turns, mirrors and tints.
+inline VoxelFaces random_faces(unsigned seed) {
+  std::mt19937 random(seed);
+  std::array<VoxelFace, 6> faces;
+  for (VoxelFace& face : faces) {
+    face.texture = random_texture(16 << (random() % 3), seed + random() % 3);
+    face.turn = static_cast<std::uint8_t>(random() % 4);
+    face.mirrored = random() % 2 == 0;
+    if (random() % 2 == 0) face.tint = {255, 100, 30, 255};
+  }
+  return VoxelFaces(faces);
 }
 
 /// Looks straight down from `height` above (x, z), `view_height` wide and high; the image's right is +X, its top -Z.

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <random>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -16,27 +15,6 @@ namespace quoin {
 namespace {
 
 using namespace render_test;
-
-Texture random_texture(int size, unsigned seed) {
-  std::mt19937 random(seed);
-  AlphaImage image{size, size, {}};
-  for (int i = 0; i < 4 * size * size; ++i) {
-    image.rgba.push_back(i % 4 == 3 ? 255 : static_cast<std::uint8_t>(random()));
-  }
-  return Texture::from_image("noise", image).value();
-}
-
-VoxelFaces random_faces(unsigned seed) {
-  std::mt19937 random(seed);
-  std::array<VoxelFace, 6> faces;
-  for (VoxelFace& face : faces) {
-    face.texture = random_texture(16 << (random() % 3), seed + random() % 3);
-    face.turn = static_cast<std::uint8_t>(random() % 4);
-    face.mirrored = random() % 2 == 0;
-    if (random() % 2 == 0) face.tint = {255, 100, 30, 255};
-  }
-  return VoxelFaces(faces);
-}
 
 // Places a grid that is a box of a new type with this texture, and returns the type.
 VoxelType place_box(Scene& scene, const Texture& texture, const IBox& box) {

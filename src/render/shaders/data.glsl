@@ -141,6 +141,16 @@ layout(buffer_reference, std430, buffer_reference_align = 4) readonly buffer Flo
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Vectors {
   vec4 at[];
 };
+// A face of a type: the address of its texels, of all mipmap levels, level 0 first; then log2 of the texels per side in
+// bits 0-3, and for the texture's rows (bits 4-6) and columns (8-10) the axis of the grid, and 4 if they run against it.
+// `tint`: in linear light; w: the emission.
+struct TexturedFace {
+  uvec4 what;
+  vec4 tint;
+};
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer TexturedFaces {
+  TexturedFace at[];
+};
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Grids {
   GridTrees at[];
 };
@@ -179,7 +189,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) buffer Counters {
 // The data of an image. Vectors are read as a whole: see docs/decisions/040.
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Frame {
   vec4 right;  // per pixel to the right and down, and the image's upper left corner, at distance 1
-  vec4 down;
+  vec4 down;   // w: the distance of the image's samples, for textures
   vec4 corner;
   vec4 forward;
   vec4 start;  // ray of pixel (x, y): start + x start_x + y start_y
@@ -244,6 +254,8 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
   uint lamp_mask;  // for slots of bricks
   uint light_mask;  // for slots of light-level bricks
   uvec2 paths;  // for path tracing: paths/path_data.glsl
+  uvec2 texture_numbers;  // of each type: of its six textured faces, from 1; 0: none. The last is for types out of range
+  uvec2 textured_faces;
 };
 
 #include "core.glsl"

@@ -193,6 +193,23 @@ void trace_light(Point point, Placed placed, uint slot, out vec3 light, out floa
   openness = openness_of(point, placed, open);
 }
 
+// Shows the texture of a voxel's face. Seen from inside, it lies around the ray's start.
+void show_texture(Point point, Placed placed, inout Surface surface) {
+  uint face = point.what.y;
+  vec3 inside = point.inside.xyz;
+  float away = point.inside.w / placed.ref_inside.w;
+  if (kind_of(point) == kUnlit) {
+    vec3 start = start_from(exact_ray_in(placed, exact_direction()), placed, point.voxel.xyz).high;
+    inside = on_face(start, face);
+    away = length(inside - start);
+  }
+  float spacing = frame().down.w;
+  spacing *= has(kPerspective) ? away : 1.0 / placed.ref_inside.w;
+  // Cells of halved grids and impostors stand for many voxels.
+  bool is_mean = (point.what.z & kIsFar) != 0 || placed.ref_view.w != 1.0;
+  show_texture(point.what.x, face, inside, is_mean ? kMeanOfFace : spacing * spacing, surface);
+}
+
 Surface surface_at(Point point, Placed placed) {
   bool is_bare = is_of_field(point) && point.what.x == 0;
   Surface surface = is_bare ? white_surface() : surface_of(point.what.x);
@@ -205,6 +222,8 @@ Surface surface_at(Point point, Placed placed) {
     vec3 at = point.inside.xyz - (is_far ? kSurfelLift * normal_of(point.what.y) : vec3(0.0));
     vec3 cell = floor(at);
     return blend_of_field(opaque_tree(placed, 1), point.voxel.xyz + ivec3(cell), at - cell, point.what.x);
+  } else if (kHasTextures && !is_of_field(point)) {
+    show_texture(point, placed, surface);
   }
   return surface;
 }

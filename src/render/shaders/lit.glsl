@@ -17,6 +17,40 @@ Surface surface_of(uint type) {
   return Surface(colour.xyz, colour.w, emitted.xyz, surfaces.at[i + 2].xyz, emitted.w);
 }
 
+// True if any opaque type has textures; otherwise shaders are compiled without them.
+layout(constant_id = 7) const bool kHasTextures = false;
+
+const float kMeanOfFace = 1e30;
+
+// Returns the column or row of the nearest texel: grid/texture.h. `axis`: bits 4-6 or 8-10 of a textured face.
+uint texel_number(vec3 inside, uint axis, uint size) {
+  float along = inside[axis & 3];
+  if ((axis & 4) != 0) along = 1.0 - along;
+  return min(uint(max(0.0, along * float(size))), size - 1);
+}
+
+// Shows the nearest texel of a type's face, in the mipmap level that fits the distance of samples; does nothing if the
+// type has no textures. Matches render/light/lighting.h on the CPU. `inside`: the position in the voxel.
+// `square_spacing`: the square of the distance of samples there, in voxels; kMeanOfFace: shows the mean of the texture.
+void show_texture(uint type, uint face, vec3 inside, float square_spacing, inout Surface surface) {
+  uint number = Numbers(frame().texture_numbers).at[min(type, frame().last_surface)];
+  if (number == 0) return;
+  TexturedFaces faces = TexturedFaces(frame().textured_faces);
+  uvec4 what = faces.at[6 * (number - 1) + face].what;
+  vec4 tint = faces.at[6 * (number - 1) + face].tint;
+  int last = int(what.z & 15);
+  // log2 of the texels between samples, rounded: half the exponent of twice their square, plus that of the size.
+  int exponent = int(floatBitsToUint(2.0 * square_spacing) >> 23) - 127;
+  uint log_size = uint(last - clamp((exponent >> 1) + last, 0, last));
+  uint column = texel_number(inside, what.z >> 4 & 7, 1u << log_size);
+  uint row = texel_number(inside, what.z >> 8 & 7, 1u << log_size);
+  // The levels before have size^2 * (1 + 1/4 + ...) texels.
+  uint begin = ((4u << 2 * last) - (4u << 2 * log_size)) / 3;
+  uint texel = Numbers(what.xy).at[begin + (row << log_size) + column];
+  surface.colour = linear_from_srgb(unpackUnorm4x8(texel).xyz) * tint.xyz;
+  surface.emitted = surface.colour * tint.w;
+}
+
 // Returns true if an opaque type darkens corners.
 bool occludes(uint type) {
   return Vectors(frame().surfaces).at[3 * min(type, frame().last_surface) + 2].w == 0.0;

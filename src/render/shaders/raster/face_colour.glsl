@@ -3,13 +3,12 @@
 #include "lit.glsl"
 
 // Returns a colour, or a value that is displayed directly; w: opacity, of the channel drawn.
-vec4 colour_of_face(uint face, uint type, uint instance, vec3 sunlight, float openness) {
+vec4 colour_of_face(uint face, Surface surface, uint instance, vec3 sunlight, float openness) {
   if (has(kShowOcclusion)) return vec4(vec3(openness), 1.0);
   if (has(kShowNormals)) {
     vec4 axis = mesh_frame().instances[instance].axes[axis_of(face)];
     return vec4(0.5 + 0.5 * sign_of(face) * axis.xyz, 1.0);
   }
-  Surface surface = surface_of(type);
   if (has(kDetailColours)) {
     ivec4 home = mesh_frame().instances[instance].home;
     if (home.w >= 0) {

@@ -22,6 +22,13 @@ layout(location = 6) flat in uvec2 cell;
 
 layout(location = 0) out vec4 pixel;
 
+// Returns the surface of a type's face, which shows the mean of its texture.
+Surface surface_of_face(uint type, uint face) {
+  Surface surface = surface_of(type);
+  if (kHasTextures) show_texture(type, face, vec3(0.0), kMeanOfFace, surface);
+  return surface;
+}
+
 // Returns true if the impostor's other level is drawn at this pixel.
 bool is_of_other_level() {
   bool is_coarser = (push.numbers >> 28 & 1) != 0;
@@ -61,9 +68,9 @@ bool find_face() {
   vec4 levels = vec4(corners & 3, corners >> 2 & 3, corners >> 4 & 3, corners >> 6 & 3);
   place = vec4(on, 1.0 - occlusion_at(levels, face, on) / 3.0);
   colour = vec4(0.0);
-  if (!kTraces) {
+  if (!kTraces && !kHasTextures) {
     vec3 sunlight = sunlight_of(diffuse_of(face, push.instance));
-    colour = colour_of_face(face, uint(base.w), push.instance, sunlight, place.w);
+    colour = colour_of_face(face, surface_of(uint(base.w)), push.instance, sunlight, place.w);
   }
   return true;
 }
@@ -78,6 +85,9 @@ void main() {
   gl_FragDepth = gl_FragCoord.z;
   if ((push.numbers >> 29 & 1) != 0 && !find_face()) discard;
   vec4 seen = colour;
-  if (kTraces) seen = colour_of_face(what.x, uint(base.w), what.y, light_of(what.x), place.w);
+  if (kTraces || kHasTextures) {
+    Surface surface = surface_of_face(uint(base.w), what.x);
+    seen = colour_of_face(what.x, surface, what.y, light_of(what.x), place.w);
+  }
   pixel = vec4(shown(seen.xyz), 1.0);
 }

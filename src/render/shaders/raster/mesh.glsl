@@ -15,7 +15,8 @@ const uint kGlassAdded = 9;
 // An instance, relative to a point of its grid near the camera. A grid's axes have unit length in the world.
 struct MeshInstance {
   vec4 clip[4];     // columns: clip space from there, in voxels
-  vec4 axes[3];     // columns: the grid's axes in the world
+  vec4 axes[3];     // columns: the grid's axes in the world; w of the first: the distance of the image's samples, for
+                    // textures: in voxels, with perspective at a distance of 1 voxel; 1e15: shows the means of faces
   vec4 eye;         // the camera, in voxels from there, and 1; orthographic: the direction towards it, and 0
   vec4 diffuse[2];  // the sun's light on its faces
   ivec4 home;       // that point in its tree's coordinates (an impostor's: the grid's origin); w: index of the

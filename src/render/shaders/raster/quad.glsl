@@ -1,5 +1,5 @@
-// Shared by blocky.vert and far.vert: corners of faces, and their outputs for fragments. Without traced light the
-// output is the colour, which is linear in the openness.
+// Shared by blocky.vert and far.vert: corners of faces, and their outputs for fragments. Without traced light and
+// textures the output is the colour, which is linear in the openness.
 #include "mesh.glsl"
 
 layout(constant_id = 1) const bool kIsGlass = false;
@@ -66,5 +66,6 @@ void put_face(uint face, uint type, uint instance, vec3 local, vec3 low, vec3 hi
   edges = vec4(low[u], low[v], high[u], high[v]);
   what = uvec2(face, instance);
   colour = vec4(0.0);
-  if (!kTraces) colour = colour_of_face(face, type, instance, sunlight_of(diffuse_of(face, instance)), openness);
+  if (kTraces || kHasTextures) return;
+  colour = colour_of_face(face, surface_of(type), instance, sunlight_of(diffuse_of(face, instance)), openness);
 }

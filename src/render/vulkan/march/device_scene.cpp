@@ -38,6 +38,13 @@ bool can_be_traced(const Scene& scene, const Instance& instance, const SceneGrid
          is_finite(grid->pivot) && !content_bounds(*grid).empty();
 }
 
+const char* const kSendingTextures = "uploading textures";
+
+ShaderTexturedFace shader_face(const FaceTexels& face, std::uint64_t address) {
+  const auto axis = [&](std::size_t i) { return std::uint32_t{face.axis[i]} | (face.sign[i] < 0.0F ? 4U : 0U); };
+  return {address, face.log_size | axis(0) << 4 | axis(1) << 8, 0, Vec4(face.tint, face.emission)};
+}
+
 PlacedGrid placed_as(const Instance& instance, const SceneGrid& grid, InstanceHandle handle) {
   PlacedGrid placed;
   placed.instance = handle;
@@ -182,6 +189,87 @@ Status DeviceScene::try_update(const Scene& scene, InstanceFilter filter, Thread
     if (Status done = put_surfaces(scene.types); !done) return done;
   }
   return put_grids();
+}
+
+Status DeviceTexels::send() {
+  QUOIN_ASSERT(!texture_.is_null() && place_.size == 0, "a texture, sent once");
+  const auto place = memory_->allocate(texture_.bytes(), kSendingTextures);
+  if (!place) return place.error();
+  place_ = *place;
+  const std::span<const Rgba8> all(texture_.level(0).data(), texture_.bytes() / sizeof(Rgba8));
+  return memory_->write(place_, std::as_bytes(all));
+}
+
+void DeviceTextures::clear() {
+  texels_.clear();
+  memory_->release(numbers_);
+  memory_->release(faces_);
+  std::erase_if(*known_, [](const auto& each) { return each.second.expired(); });
+}
+
+Status DeviceTextures::put(const VoxelRegistry& types) {
+  PendingChanges changes(followed_, types);
+  if (changes->empty()) return {};
+  Status done;
+  try {
+    done = try_put(types);
+  } catch (...) {
+    memory_->discard();
+    clear();
+    throw;
+  }
+  if (done) {
+    changes.commit();
+  } else {
+    memory_->discard();
+    clear();
+  }
+  return done;
+}
+
+// Returns the address of a texture's texels, and adds them to `used`.
+Result<std::uint64_t> DeviceTextures::send(const Texture& texture,
+                                           std::vector<std::shared_ptr<const DeviceTexels>>& used) {
+  std::weak_ptr<const DeviceTexels>& known = (*known_)[texture.level(0).data()];
+  std::shared_ptr<const DeviceTexels> found = known.lock();
+  if (found == nullptr) {
+    const auto made = std::make_shared<DeviceTexels>(*memory_, texture);
+    if (Status done = made->send(); !done) return done.error();
+    known = found = made;
+  }
+  if (used.empty() || used.back() != found) used.push_back(found);
+  return found->address();
+}
+
+Status DeviceTextures::try_put(const VoxelRegistry& types) {
+  std::vector<std::uint32_t> numbers(types.size() + 1);
+  std::vector<ShaderTexturedFace> faces;
+  std::vector<std::shared_ptr<const DeviceTexels>> used;
+  for (std::size_t i = 0; types.has_textures() && i < types.size(); ++i) {
+    const VoxelProperties& type = types[static_cast<VoxelType>(i)];
+    if (type.faces.empty() || type.visibility != Visibility::Opaque) continue;
+    for (const Direction direction : kDirections) {
+      const auto address = send(type.faces[direction].texture, used);
+      if (!address) return address.error();
+      faces.push_back(shader_face(face_texels(type.faces[direction], direction, emission_of(type)), *address));
+    }
+    numbers[i] = static_cast<std::uint32_t>(faces.size() / kDirections.size());
+  }
+  texels_ = std::move(used);
+  if (faces.empty()) {
+    clear();
+    return {};
+  }
+  Status done = put_table(*memory_, numbers_, bytes_of(numbers));
+  if (done) done = put_table(*memory_, faces_, bytes_of(faces));
+  if (done) done = memory_->flush();
+  if (done) std::erase_if(*known_, [](const auto& each) { return each.second.expired(); });
+  return done;
+}
+
+void DeviceTextures::put_in(ShaderFrame& frame) const {
+  frame.texture_numbers = numbers_.address;
+  frame.textured_faces = faces_.address;
 }
 
 Status DeviceLamps::put(ShaderMemory& memory, std::shared_ptr<const LampTable> now) {

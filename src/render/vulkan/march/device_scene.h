@@ -60,6 +60,60 @@ void add_surface(const Surface& surface, float last, std::vector<Vec4>& table);
 /// out of range. Requires: a frame with it has kUnoccluding if any of the types does not occlude.
 [[nodiscard]] std::vector<Vec4> surface_table(const VoxelRegistry& types);
 
+/// The texels of a texture in device memory, of all mipmap levels.
+class DeviceTexels {
+ public:
+  explicit DeviceTexels(ShaderMemory& memory, Texture texture) : memory_(&memory), texture_(std::move(texture)) {}
+  ~DeviceTexels() { memory_->release(place_); }
+  DeviceTexels(const DeviceTexels&) = delete;
+  DeviceTexels& operator=(const DeviceTexels&) = delete;
+
+  /// Queues the texels for the next `flush`. Called once. Errors: LimitExceeded if the memory is full.
+  [[nodiscard]] Status send();
+  [[nodiscard]] std::uint64_t address() const { return place_.address; }
+
+ private:
+  ShaderMemory* memory_;
+  Texture texture_;  // keeps the texels, whose address identifies them
+  Place place_;
+};
+
+/// Finds textures in device memory, so that a renderer and its mesh renderers hold each texture once.
+using KnownTexels = std::map<const Rgba8*, std::weak_ptr<const DeviceTexels>>;
+
+/// The textures of opaque types in device memory: texels, and a table of faces. Shaders follow the addresses of texels,
+/// so there are no limits of layers, sizes or numbers, except the memory.
+class DeviceTextures {
+ public:
+  /// Lifetime: `memory` and `known` must outlive it.
+  DeviceTextures(ShaderMemory& memory, KnownTexels& known) : memory_(&memory), known_(&known) {}
+  ~DeviceTextures() { clear(); }
+  DeviceTextures(const DeviceTextures&) = delete;
+  DeviceTextures& operator=(const DeviceTextures&) = delete;
+
+  /// Sends the changes since the last call. After an error it is empty and sends everything at the next call.
+  /// Cost: O(types), if any type changed.
+  [[nodiscard]] Status put(const VoxelRegistry& types);
+
+  /// Returns true if no opaque type has textures. Images then need no shaders for textures.
+  [[nodiscard]] bool empty() const { return texels_.empty(); }
+  /// Sets the addresses of a frame. Requires: the frame's types are those of the last `put`.
+  void put_in(ShaderFrame& frame) const;
+
+ private:
+  void clear();
+  Status try_put(const VoxelRegistry& types);
+  [[nodiscard]] Result<std::uint64_t> send(const Texture& texture,
+                                           std::vector<std::shared_ptr<const DeviceTexels>>& used);
+
+  ShaderMemory* memory_;
+  KnownTexels* known_;
+  ChangeCursor followed_;
+  std::vector<std::shared_ptr<const DeviceTexels>> texels_;
+  Place numbers_;
+  Place faces_;
+};
+
 /// A table of lamps, its bricks and lists in device memory.
 struct DeviceLamps {
   std::shared_ptr<const LampTable> table;  ///< null: no lamps
@@ -96,6 +150,8 @@ class DeviceScene {
 
   /// As VulkanRenderer::update. After an error it is empty.
   [[nodiscard]] Status update(const Scene& scene, InstanceFilter filter, Threads threads);
+  /// Removes the scene.
+  void clear();
 
   [[nodiscard]] const Placement& placement() const { return placement_; }
   /// Returns the lamps of the last update's scene. Requires: the scene has not been edited since.
@@ -116,7 +172,6 @@ class DeviceScene {
     std::int32_t index = 0;
   };
 
-  void clear();
   void place(const Scene& scene, InstanceFilter filter);
   [[nodiscard]] std::vector<GridHandle> changed_grids(const Scene& scene, InstanceFilter filter, bool& places);
   Status update_grids(const Scene& scene, const std::vector<GridHandle>& changed, Threads threads);

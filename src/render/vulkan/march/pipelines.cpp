@@ -42,10 +42,8 @@ std::span<const std::uint32_t> code_of(Pass pass) {
     case Pass::FarFaces:
       return kFar;
     case Pass::Primary:
-    case Pass::PrimaryWithFields:
       return kPrimary;
     case Pass::Glass:
-    case Pass::FieldGlass:
       return kGlass;
     case Pass::Resolve:
       return kResolve;
@@ -56,71 +54,56 @@ std::span<const std::uint32_t> code_of(Pass pass) {
   }
 }
 
-bool is_of_fields(Pass pass) {
-  return pass == Pass::PrimaryWithFields || pass == Pass::LightWithFields || pass == Pass::LightWithGlassAndFields;
-}
-bool is_of_field_glass(Pass pass) {
-  return pass == Pass::FieldGlass || pass == Pass::LightWithFieldGlass;
-}
-
 }  // namespace
 
 Result<std::unique_ptr<Pipelines>> Pipelines::create(Device& device) {
   std::unique_ptr<Pipelines> made(new Pipelines(device));
   VkResult result = make_push_layout(device, VK_SHADER_STAGE_COMPUTE_BIT, sizeof(ShaderPush), made->layout_);
-  for (std::size_t i = 0; i < kPassCount && result == VK_SUCCESS; ++i) {
-    const auto pass = static_cast<Pass>(i);
-    if (!is_of_fields(pass) && !is_of_field_glass(pass)) result = made->make(pass);
-  }
+  for (std::size_t i = 0; i < kPassCount && result == VK_SUCCESS; ++i) result = made->make(static_cast<Pass>(i), {});
   if (Status status = device.check(result, "compiling shaders"); !status) return status.error();
   return made;
 }
 
-Status Pipelines::add_fields() {
-  return add(is_of_fields);
-}
-
-Status Pipelines::add_field_glass() {
-  return add(is_of_field_glass);
-}
-
-Status Pipelines::add(bool (*is_wanted)(Pass)) {
-  VkResult result = VK_SUCCESS;
-  for (std::size_t i = 0; i < kPassCount && result == VK_SUCCESS; ++i) {
-    const auto pass = static_cast<Pass>(i);
-    if (is_wanted(pass) && pipelines_[i] == VK_NULL_HANDLE) result = make(pass);
-  }
+Status Pipelines::add(const PassFeatures& features, bool has_glass) {
+  VkResult result = make(Pass::Primary, features);
+  if (result == VK_SUCCESS && has_glass) result = make(Pass::Glass, features);
+  if (result == VK_SUCCESS) result = make(has_glass ? Pass::LightWithGlass : Pass::Light, features);
   return device_->check(result, "compiling shaders");
 }
 
 Pipelines::~Pipelines() {
   const Api& api = device_->api();
-  for (const VkPipeline pipeline : pipelines_) {
-    if (pipeline != VK_NULL_HANDLE) api.vkDestroyPipeline(device_->handle(), pipeline, nullptr);
+  for (const Variants& variants : pipelines_) {
+    for (const VkPipeline pipeline : variants) {
+      if (pipeline != VK_NULL_HANDLE) api.vkDestroyPipeline(device_->handle(), pipeline, nullptr);
+    }
   }
   if (layout_ != VK_NULL_HANDLE) api.vkDestroyPipelineLayout(device_->handle(), layout_, nullptr);
 }
 
-VkResult Pipelines::make(Pass pass) {
+// Makes the pass's pipeline with the features that it depends on, once.
+VkResult Pipelines::make(Pass pass, const PassFeatures& features) {
+  const PassFeatures used = features.of(pass);
+  VkPipeline& pipeline = pipelines_[static_cast<std::size_t>(pass)][used.index()];
+  if (pipeline != VK_NULL_HANDLE) return VK_SUCCESS;
   // Passes of one shader differ in its constants.
-  const bool is_second = pass == Pass::LightWithGlass || pass == Pass::LightWithGlassAndFields ||
-                         pass == Pass::LightWithFieldGlass || pass == Pass::FarFaces;
-  const bool has_field_glass = is_of_field_glass(pass);
-  const std::array constants = {ShaderConstant{0, is_second}, ShaderConstant{4, is_of_fields(pass) || has_field_glass},
-                                ShaderConstant{6, has_field_glass}};
-  return make_compute_pipeline(*device_, layout_, code_of(pass), constants, pipelines_[static_cast<std::size_t>(pass)]);
+  const bool is_second = pass == Pass::LightWithGlass || pass == Pass::FarFaces;
+  const std::array constants = {ShaderConstant{0, is_second}, ShaderConstant{4, used.fields},
+                                ShaderConstant{6, used.field_glass}, ShaderConstant{7, used.textures}};
+  return make_compute_pipeline(*device_, layout_, code_of(pass), constants, pipeline);
 }
 
-void Pipelines::dispatch(VkCommandBuffer commands, Pass pass, const ShaderPush& push) const {
+void Pipelines::dispatch(VkCommandBuffer commands, Pass pass, const ShaderPush& push,
+                         const PassFeatures& features) const {
   constexpr std::int32_t kGroup = 8;
   const auto groups = [](std::int32_t pixels) { return static_cast<std::uint32_t>((pixels + kGroup - 1) / kGroup); };
-  dispatch(commands, pass, bytes_of(push), groups(push.size_x), groups(push.size_y));
+  dispatch(commands, pipeline(pass, features), bytes_of(push), groups(push.size_x), groups(push.size_y));
 }
 
 void Pipelines::dispatch_far(VkCommandBuffer commands, Pass pass, const ShaderPush& push) const {
   QUOIN_ASSERT(push.far_groups > 0, "at least one group");
   const std::uint32_t across = std::min(push.far_groups, kMaxAcross);
-  dispatch(commands, pass, bytes_of(push), across, (push.far_groups + across - 1) / across);
+  dispatch(commands, pipeline(pass, {}), bytes_of(push), across, (push.far_groups + across - 1) / across);
 }
 
 void Pipelines::swap_red_and_blue(VkCommandBuffer commands, const SwapPush& push) const {
@@ -130,15 +113,15 @@ void Pipelines::swap_red_and_blue(VkCommandBuffer commands, const SwapPush& push
   const std::uint32_t across = std::min(groups, kMaxAcross);
   SwapPush whole = push;
   whole.across = across * kGroup;
-  dispatch(commands, Pass::Swap, bytes_of(whole), across, (groups + across - 1) / across);
+  dispatch(commands, pipeline(Pass::Swap, {}), bytes_of(whole), across, (groups + across - 1) / across);
 }
 
-void Pipelines::dispatch(VkCommandBuffer commands, Pass pass, std::span<const std::byte> push, std::uint32_t across,
-                         std::uint32_t down) const {
-  QUOIN_ASSERT(pipelines_[static_cast<std::size_t>(pass)] != VK_NULL_HANDLE, "a pass that was made");
+void Pipelines::dispatch(VkCommandBuffer commands, VkPipeline pipeline, std::span<const std::byte> push,
+                         std::uint32_t across, std::uint32_t down) const {
+  QUOIN_ASSERT(pipeline != VK_NULL_HANDLE, "a pass that was made");
   QUOIN_ASSERT(across > 0 && across <= kMaxAcross && down > 0, "1 to 32,768 workgroups");
   const Api& api = device_->api();
-  api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines_[static_cast<std::size_t>(pass)]);
+  api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline);
   api.vkCmdPushConstants(commands, layout_, VK_SHADER_STAGE_COMPUTE_BIT, 0, static_cast<std::uint32_t>(push.size()),
                          push.data());
   api.vkCmdDispatch(commands, across, down, 1);

@@ -18,58 +18,67 @@ enum class Pass : std::uint8_t {
   Primary,    ///< the nearest opaque voxel of each pixel
   Glass,      ///< the transparent bodies in front of it
   Light,
-  LightWithGlass,
-  PrimaryWithFields,  ///< the same passes, if grids have fields
-  LightWithFields,
-  LightWithGlassAndFields,
-  FieldGlass,  ///< the same passes, if fields have transparent parts
-  LightWithFieldGlass,
-  Resolve,  ///< the samples' mean as bytes
-  Swap,     ///< swaps red and blue of a whole image
+  LightWithGlass,  ///< Light, for scenes with transparent bodies
+  Resolve,         ///< the samples' mean as bytes
+  Swap,            ///< swaps red and blue of a whole image
 };
-constexpr std::size_t kPassCount = 13;
+constexpr std::size_t kPassCount = 8;
 
-/// Returns the variant of a pass for grids with fields.
-[[nodiscard]] constexpr Pass with_fields(Pass pass) {
-  if (pass == Pass::Primary) return Pass::PrimaryWithFields;
-  if (pass == Pass::Light) return Pass::LightWithFields;
-  return pass == Pass::LightWithGlass ? Pass::LightWithGlassAndFields : pass;
-}
+/// The features of a scene that passes are compiled with. Passes that do not depend on a feature have one pipeline.
+struct PassFeatures {
+  bool fields = false;
+  bool field_glass = false;  ///< fields have transparent parts
+  bool textures = false;     ///< opaque types have textures
 
-/// Returns the variant of a pass for fields with transparent parts.
-[[nodiscard]] constexpr Pass with_field_glass(Pass pass) {
-  if (pass == Pass::Glass) return Pass::FieldGlass;
-  return pass == Pass::LightWithGlass ? Pass::LightWithFieldGlass : with_fields(pass);
-}
+  static constexpr std::size_t kCount = 8;
+  /// Returns a number below kCount.
+  [[nodiscard]] constexpr std::size_t index() const {
+    return (fields ? 1U : 0U) + (field_glass ? 2U : 0U) + (textures ? 4U : 0U);
+  }
+  /// Returns the features that a pass depends on.
+  [[nodiscard]] constexpr PassFeatures of(Pass pass) const {
+    const bool is_light = pass == Pass::Light || pass == Pass::LightWithGlass;
+    const bool in_glass = pass == Pass::Glass || pass == Pass::LightWithGlass;
+    PassFeatures used;
+    used.field_glass = field_glass && in_glass;
+    used.fields = used.field_glass || (fields && (is_light || pass == Pass::Primary));
+    used.textures = textures && is_light;
+    return used;
+  }
+};
 
 class Pipelines {
  public:
+  /// Makes the pipelines of all passes without features.
   [[nodiscard]] static Result<std::unique_ptr<Pipelines>> create(Device& device);
   ~Pipelines();
-  /// Makes the pipelines of `with_fields`, once.
-  [[nodiscard]] Status add_fields();
-  /// Makes the additional pipelines of `with_field_glass`, once.
-  [[nodiscard]] Status add_field_glass();
+  /// Makes the missing pipelines of scenes with these features. `has_glass`: scenes with transparent bodies.
+  [[nodiscard]] Status add(const PassFeatures& features, bool has_glass);
   Pipelines(const Pipelines&) = delete;
   Pipelines& operator=(const Pipelines&) = delete;
 
   /// Records the pass over a tile, and a barrier before its results are read.
-  void dispatch(VkCommandBuffer commands, Pass pass, const ShaderPush& push) const;
+  /// Requires: `add` made the pipelines of these features.
+  void dispatch(VkCommandBuffer commands, Pass pass, const ShaderPush& push, const PassFeatures& features = {}) const;
   /// As `dispatch`, over impostors: ShaderPush::far_groups workgroups.
   void dispatch_far(VkCommandBuffer commands, Pass pass, const ShaderPush& push) const;
   /// Records a copy of an image's words with red and blue swapped, and a barrier before it is read.
   void swap_red_and_blue(VkCommandBuffer commands, const SwapPush& push) const;
 
  private:
+  using Variants = std::array<VkPipeline, PassFeatures::kCount>;
+
   explicit Pipelines(Device& device) : device_(&device) {}
-  VkResult make(Pass pass);
-  Status add(bool (*is_wanted)(Pass));
-  void dispatch(VkCommandBuffer commands, Pass pass, std::span<const std::byte> push, std::uint32_t across,
+  VkResult make(Pass pass, const PassFeatures& features);
+  void dispatch(VkCommandBuffer commands, VkPipeline pipeline, std::span<const std::byte> push, std::uint32_t across,
                 std::uint32_t down) const;
+  [[nodiscard]] VkPipeline pipeline(Pass pass, const PassFeatures& features) const {
+    return pipelines_[static_cast<std::size_t>(pass)][features.of(pass).index()];
+  }
 
   Device* device_;
   VkPipelineLayout layout_ = VK_NULL_HANDLE;
-  std::array<VkPipeline, kPassCount> pipelines_{};
+  std::array<Variants, kPassCount> pipelines_{};
 };
 
 }  // namespace quoin::vulkan

@@ -37,6 +37,7 @@ struct VulkanRenderer::Impl {
         pipelines(std::move(with_pipelines)),
         memory(*device, block_bytes),
         scene(memory),
+        textures(memory, texels),
         detail(memory) {}
 
   /// Sets the current scene; null: none.
@@ -59,6 +60,8 @@ struct VulkanRenderer::Impl {
   std::unique_ptr<vulkan::Pipelines> pipelines;
   vulkan::DeviceMemory memory;
   vulkan::DeviceScene scene;
+  vulkan::KnownTexels texels;  ///< of this renderer and its mesh renderers
+  vulkan::DeviceTextures textures;
   vulkan::DeviceDetail detail;
   /// The source of levels of detail, as of the last update; null before the first.
   const Scene* voxels = nullptr;

@@ -257,7 +257,7 @@ FrameData make_frame(const Placement& scene, const Camera& camera, const RenderO
   ShaderFrame& frame = data.frame;
   frame.flags = flags_of(camera, options);
   frame.right = to_vec4(rays.right);
-  frame.down = to_vec4(rays.down);
+  frame.down = to_vec4(rays.down, glm::length(rays.down) / std::sqrt(options.samples));
   frame.corner = to_vec4(rays.corner);
   frame.forward = to_vec4(rays.forward);
   frame.right_low = low_vec4(rays.right);

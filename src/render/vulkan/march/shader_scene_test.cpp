@@ -202,15 +202,19 @@ TEST(ShaderBytes, RejectsMoreThanAddressableBytes) {
   }
 }
 
-/// Counts the writes that wait for `flush`. One allocation fails, or throws.
+/// Counts the places in use and the writes that wait for `flush`. One allocation fails, or throws.
 class QueuedMemory final : public vulkan::ShaderMemory {
  public:
   Result<vulkan::Place> allocate(std::uint64_t size, const std::string& doing) override {
     if (left == 0 && throws) throw std::bad_alloc();
     if (left-- == 0) return make_error(ErrorCode::LimitExceeded, doing);
+    ++held;
     return vulkan::Place{.size = size};
   }
-  void release(vulkan::Place& place) override { place = {}; }
+  void release(vulkan::Place& place) override {
+    held -= place.size != 0 ? 1 : 0;
+    place = {};
+  }
   Status write(const vulkan::Place& /*place*/, std::span<const std::byte> /*bytes*/,
                std::uint64_t /*offset*/) override {
     ++queued;
@@ -224,6 +228,7 @@ class QueuedMemory final : public vulkan::ShaderMemory {
 
   int left = -1;  // allocations before the one that fails; negative: none fails
   bool throws = false;
+  int held = 0;
   int queued = 0;
   int flushed = 0;
 };
@@ -245,6 +250,112 @@ TEST(DeviceLamps, DiscardsWritesOfFailedCall) {
   ASSERT_TRUE(lamps.put(memory, table));
   EXPECT_EQ(lamps.table, table);
   EXPECT_EQ(memory.flushed, 2) << "bricks and lists";
+}
+
+Texture grey(int size, std::uint8_t value) {
+  AlphaImage image{size, size, std::vector<std::uint8_t>(static_cast<std::size_t>(4 * size * size), value)};
+  for (std::size_t i = 3; i < image.rgba.size(); i += 4) image.rgba[i] = 255;
+  return Texture::from_image("grey", image).value();
+}
+
+VoxelProperties textured(const VoxelFaces& faces) {
+  VoxelProperties type;
+  type.faces = faces;
+  return type;
+}
+
+TEST(DeviceTextures, SendsEachTextureOnce) {
+  constexpr int kTables = 2;  // numbers of types, and faces
+  VoxelRegistry types;
+  const Texture shared = grey(16, 20);
+  const VoxelType first =
+      types.add(textured(VoxelFaces(VoxelFace{shared}, VoxelFace{grey(32, 90)}, VoxelFace{shared}))).value();
+  ASSERT_TRUE(types.add(textured(VoxelFace{.texture = grey(16, 20), .turn = 3})));
+  QueuedMemory memory;
+  vulkan::KnownTexels known;
+  vulkan::DeviceTextures textures(memory, known);
+  EXPECT_TRUE(textures.empty());
+  ASSERT_TRUE(textures.put(types));
+  EXPECT_FALSE(textures.empty());
+  EXPECT_EQ(memory.flushed, 2 + kTables);
+  memory.flushed = 0;
+  ASSERT_TRUE(textures.put(types));
+  EXPECT_EQ(memory.flushed, 0) << "unchanged types";
+  {
+    vulkan::DeviceTextures other(memory, known);
+    ASSERT_TRUE(other.put(types));
+    EXPECT_EQ(memory.flushed, kTables);
+    EXPECT_EQ(memory.held, 2 + 2 * kTables);
+    types.replace(first, textured(grey(64, 70)));
+    ASSERT_TRUE(textures.put(types));
+    EXPECT_EQ(memory.flushed, 1 + kTables);
+    EXPECT_EQ(known.size(), 3U) << "the other table still shows the texture that was replaced";
+  }
+  EXPECT_EQ(known.size(), 2U);
+  EXPECT_EQ(memory.held, 2 + kTables);
+  for (VoxelType type = first; type < types.size(); ++type) types.replace(type, {});
+  ASSERT_TRUE(textures.put(types));
+  EXPECT_TRUE(textures.empty());
+  EXPECT_EQ(memory.held, 0);
+}
+
+TEST(DeviceTextures, IgnoresTransparentTypes) {
+  VoxelRegistry types;
+  VoxelProperties glass = textured(grey(16, 20));
+  glass.visibility = Visibility::Transparent;
+  ASSERT_TRUE(types.add(glass));
+  QueuedMemory memory;
+  vulkan::KnownTexels known;
+  vulkan::DeviceTextures textures(memory, known);
+  ASSERT_TRUE(textures.put(types));
+  EXPECT_TRUE(textures.empty());
+  EXPECT_EQ(memory.held, 0);
+}
+
+TEST(DeviceTextures, IsEmptyAfterFailedCall) {
+  VoxelRegistry types;
+  ASSERT_TRUE(types.add(textured(VoxelFaces(VoxelFace{grey(16, 1)}, VoxelFace{grey(16, 2)}, VoxelFace{grey(16, 3)}))));
+  for (const bool throws : {false, true}) {
+    for (int successes = 0; successes < 5; ++successes) {  // three textures and two tables
+      QueuedMemory memory;
+      memory.left = successes;
+      memory.throws = throws;
+      vulkan::KnownTexels known;
+      vulkan::DeviceTextures textures(memory, known);
+      if (throws) {
+        EXPECT_THROW(static_cast<void>(textures.put(types)), std::bad_alloc);
+      } else {
+        const Status done = textures.put(types);
+        ASSERT_FALSE(done);
+        EXPECT_EQ(done.error().code, ErrorCode::LimitExceeded);
+        EXPECT_EQ(done.error().message, successes < 3 ? "uploading textures" : "uploading the scene");
+      }
+      EXPECT_TRUE(textures.empty());
+      EXPECT_TRUE(known.empty());
+      EXPECT_EQ(memory.held, 0);
+      EXPECT_EQ(memory.queued, 0);
+      memory.left = -1;
+      ASSERT_TRUE(textures.put(types));
+      EXPECT_EQ(memory.flushed, 5);
+    }
+  }
+}
+
+// Device memory for textures is that of their texels: 22 MB for 1,024 textures of 64 texels per side.
+TEST(DeviceTextures, TakesMemoryOfTexels) {
+  VoxelRegistry types;
+  TextureSet set;
+  for (int i = 0; i < 200; ++i) {
+    const Texture texture = grey(64, static_cast<std::uint8_t>(i));
+    set.add(texture);
+    ASSERT_TRUE(types.add(textured(texture)));
+  }
+  vulkan::ShaderBytes memory;
+  vulkan::KnownTexels known;
+  vulkan::DeviceTextures textures(memory, known);
+  ASSERT_TRUE(textures.put(types));
+  EXPECT_GE(memory.bytes().size(), set.bytes());
+  EXPECT_LE(memory.bytes().size(), set.bytes() + set.bytes() / 100);
 }
 
 TEST(ShaderBytesDeathTest, RejectsWriteBeyondPlace) {

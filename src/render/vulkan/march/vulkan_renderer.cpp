@@ -26,17 +26,18 @@ namespace {
 // Draws one image tile by tile: each tile is drawn in device memory and then read back, or stays there.
 class ImagePass {
  public:
-  // Requires: `placement` and `light` belong to `scene`. `content`: the source of that scene; null: empty.
-  ImagePass(Device& device, DeviceMemory& memory, const Pipelines& pipelines, const DeviceScene& scene,
-            const Placement& placement, DeviceLight light, const Scene* content)
-      : device_(&device),
-        memory_(&memory),
-        pipelines_(&pipelines),
-        scene_(&scene),
+  // Requires: `placement` and `light` belong to the renderer's scene.
+  ImagePass(RendererImpl& renderer, const Placement& placement, DeviceLight light)
+      : device_(renderer.device.get()),
+        memory_(&renderer.memory),
+        pipelines_(renderer.pipelines.get()),
+        scene_(&renderer.scene),
+        textures_(&renderer.textures),
         placement_(&placement),
+        features_{placement.has_fields, placement.has_field_glass, !renderer.textures.empty()},
         light_(std::move(light)),
-        content_(content),
-        places_(memory, "drawing") {}
+        content_(renderer.voxels),
+        places_(renderer.memory, "drawing") {}
   ImagePass(const ImagePass&) = delete;
   ImagePass& operator=(const ImagePass&) = delete;
 
@@ -67,21 +68,19 @@ class ImagePass {
   Status take_sample(std::span<const Tile> tiles, int sample);
   Status resolve(std::span<const Tile> tiles);
   Status finish_glass(ShaderPush push);
-  [[nodiscard]] Pass variant_of(Pass pass) const {
-    if (placement_->has_field_glass) return with_field_glass(pass);
-    return placement_->has_fields ? with_fields(pass) : pass;
-  }
   Status read_tile(const Tile& tile, RenderedImage& image);
   Status read_counters(ShaderCounters& counters);
   [[nodiscard]] ShaderPush push_for(const Tile& tile) const;
 
   Device* device_;
   DeviceMemory* memory_;
-  const Pipelines* pipelines_;
+  Pipelines* pipelines_;
   const DeviceScene* scene_;
+  const DeviceTextures* textures_;
   const Placement* placement_;
+  PassFeatures features_;
   DeviceLight light_;
-  const Scene* content_;
+  const Scene* content_;               // the source of the scene; null: empty
   const ImageImpl* target_ = nullptr;  // null: the image is read back
   Places places_;
   ShaderFrame frame_;
@@ -124,6 +123,7 @@ const std::vector<float>& thresholds() {
 Status ImagePass::put_frame(const Camera& camera, const RenderOptions& options) {
   FrameData data = make_frame(*placement_, camera, options);
   put_scene(*scene_, *placement_, data);
+  textures_->put_in(data.frame);
   occlusion_rays_ = options.light.occlusion_rays;
   std::vector<ShaderLamp> lamps;
   if (light_.lamps.table != nullptr) lamps = put_lamps(light_.lamps, camera, data);
@@ -224,7 +224,7 @@ void ImagePass::find_hits(VkCommandBuffer commands, const ShaderPush& push) cons
     pipelines_->dispatch_far(commands, Pass::FarDepths, push);
     pipelines_->dispatch_far(commands, Pass::FarFaces, push);
   }
-  pipelines_->dispatch(commands, variant_of(Pass::Primary), push);
+  pipelines_->dispatch(commands, Pass::Primary, push, features_);
 }
 
 Status ImagePass::take_sample(const Tile& tile, int sample) {
@@ -233,7 +233,7 @@ Status ImagePass::take_sample(const Tile& tile, int sample) {
   Status done = device_->run(kDoing, [&](VkCommandBuffer commands) {
     find_hits(commands, push);
     if (has_glass) return;
-    pipelines_->dispatch(commands, variant_of(Pass::Light), push);
+    pipelines_->dispatch(commands, Pass::Light, push, features_);
   });
   return done && has_glass ? finish_glass(push) : done;
 }
@@ -245,8 +245,8 @@ Status ImagePass::finish_glass(ShaderPush push) {
       const VkDeviceSize pending = offsetof(ShaderCounters, pending);
       device_->api().vkCmdFillBuffer(commands, output_.handle(), pending, 4, 0);
       device_->separate(commands);
-      pipelines_->dispatch(commands, variant_of(Pass::Glass), push);
-      pipelines_->dispatch(commands, variant_of(Pass::LightWithGlass), push);
+      pipelines_->dispatch(commands, Pass::Glass, push, features_);
+      pipelines_->dispatch(commands, Pass::LightWithGlass, push, features_);
       const VkBufferCopy counters{0, 0, sizeof(ShaderCounters)};
       device_->api().vkCmdCopyBuffer(commands, output_.handle(), results_.handle(), 1, &counters);
     });
@@ -305,6 +305,7 @@ std::vector<ImagePass::Tile> ImagePass::tiles_of(const RenderOptions& options) c
 }
 
 Status ImagePass::begin(const Camera& camera, const RenderOptions& options) {
+  if (Status done = pipelines_->add(features_, placement_->has_transparent); !done) return done;
   if (Status done = put_frame(camera, options); !done) return done;
   return device_->run(kDoing, [&](VkCommandBuffer commands) {
     device_->api().vkCmdFillBuffer(commands, output_.handle(), 0, sizeof(ShaderCounters), 0);
@@ -346,7 +347,7 @@ Status ImagePass::take_sample(std::span<const Tile> tiles, int sample) {
     for (const Tile& tile : tiles) {
       const ShaderPush push = push_for_sample(tile, sample);
       find_hits(commands, push);
-      pipelines_->dispatch(commands, variant_of(Pass::Light), push);
+      pipelines_->dispatch(commands, Pass::Light, push, features_);
     }
   });
 }
@@ -447,12 +448,13 @@ Status VulkanRenderer::update(const Scene& scene, InstanceFilter filter, Threads
   const std::uint64_t before = impl_->memory.written();
   try {
     Status done = impl_->scene.update(scene, filter, threads);
-    if (done && impl_->scene.placement().has_fields) done = impl_->pipelines->add_fields();
-    if (done && impl_->scene.placement().has_field_glass) done = impl_->pipelines->add_field_glass();
+    if (done) done = impl_->textures.put(scene.types);
+    if (!done) impl_->scene.clear();
     impl_->uploaded = impl_->memory.written() - before;
     impl_->look_at(done ? &scene : nullptr, filter);
     return done;
   } catch (...) {
+    impl_->scene.clear();
     impl_->look_at(nullptr, filter);  // the previous scene may be destroyed before the next image
     throw;
   }
@@ -474,8 +476,7 @@ Result<RenderedImage> VulkanRenderer::render(const Camera& camera, const RenderO
   if (!subject) return subject.error();
   auto light = impl_->light_tables(options, threads);
   if (!light) return light.error();
-  vulkan::ImagePass pass(*impl_->device, impl_->memory, *impl_->pipelines, impl_->scene, subject->placement(),
-                         std::move(*light), impl_->voxels);
+  vulkan::ImagePass pass(*impl_, subject->placement(), std::move(*light));
   return pass.render(camera, options, progress);
 }
 
@@ -504,8 +505,7 @@ Status VulkanRenderer::draw(VulkanImage& image, const Camera& camera, const Rend
   if (!subject) return subject.error();
   auto light = impl_->light_tables(options, threads);
   if (!light) return light.error();
-  vulkan::ImagePass pass(*impl_->device, impl_->memory, *impl_->pipelines, impl_->scene, subject->placement(),
-                         std::move(*light), impl_->voxels);
+  vulkan::ImagePass pass(*impl_, subject->placement(), std::move(*light));
   return pass.draw(target, camera, options, progress);
 }
 

@@ -199,6 +199,9 @@ ShaderMeshInstance shader_instance(const Space& space, const View& view, const E
   out.eye = to_vec4(space.eye, view.rays.is_perspective() ? 1.0 : 0.0);
   const double depth_per_w = view.rays.is_perspective() ? view.nearest : 1.0;
   const double pixel = glm::length(view.rays.right());
+  constexpr float kMeanOfFace = 1e15F;
+  const double spacing = glm::length(view.rays.down()) / (view.rays.is_perspective() ? 1.0 : instance.voxel_size);
+  out.axes[0].w = instance.shows_means ? kMeanOfFace : static_cast<float>(spacing);
   out.room = static_cast<float>(depth_per_w * kWidening * pixel / instance.voxel_size / subpixels);
   return out;
 }

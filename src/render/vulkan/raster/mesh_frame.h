@@ -46,6 +46,7 @@ struct MeshInstance {
   std::int32_t placed = -1;  ///< index among the frame's placed grids; -1: not placed
   IVec3 origin{0};           ///< of its tree's coordinates
   bool is_far = false;       ///< only the transparent parts of its own meshes are drawn
+  bool shows_means = false;  ///< of textures, as halved grids and impostors do
   MeshImpostor impostor;     ///< of a far instance, if visible
 };
 
@@ -95,6 +96,7 @@ struct MeshFrameData {
   std::size_t glass_quads = 0;
   bool has_smooth_glass = false;
   bool has_fields = false;     ///< among the placed content
+  bool has_textures = false;   ///< colours are shown, and opaque types have textures
   bool glass_by_rays = false;  ///< only the nearest glass of a pixel is drawn, including everything visible through it
 
   [[nodiscard]] bool has(std::uint32_t flag) const { return (image.frame.flags & flag) != 0; }

@@ -329,12 +329,14 @@ Status MeshPass::find_pipelines(std::vector<Step>& steps, std::uint32_t samples,
   for (Step& step : steps) {
     // Edges are as bright as their surface, but without shadows.
     const bool is_lit = step.over != Step::Over::Sky && (step.mode == kDrawSurfaces || is_channel_of_glass(step.mode));
+    const bool is_coloured = data.has_textures && step.mode == kDrawSurfaces && step.over != Step::Over::Sky;
     MeshLight lit = is_lit ? light : MeshLight::Plain;
     if (is_nearest_glass(step.mode)) lit = data.glass_by_rays ? MeshLight::TracedThroughGlass : light;
     const auto find = [&](MeshWay::What what, bool mirrored, VkPipeline& out) -> Status {
       const auto found = pipelines_->pipeline({what, step.mode, mirrored, step.over == Step::Over::GlassInOrder, lit,
                                                data.glass_by_rays && is_nearest_glass(step.mode),
-                                               lit != MeshLight::Plain && data.has_fields, samples});
+                                               lit != MeshLight::Plain && data.has_fields,
+                                               is_coloured && what != MeshWay::What::Smooth, samples});
       if (!found) return found.error();
       out = *found;
       return {};

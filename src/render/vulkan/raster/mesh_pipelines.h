@@ -31,6 +31,7 @@ struct MeshWay {
   MeshLight light = MeshLight::Plain;
   bool glass_by_rays = false;  ///< the nearest glass includes everything visible through it
   bool fields = false;         ///< rays may meet fields
+  bool textures = false;       ///< opaque surfaces show textures
   std::uint32_t samples = 1;
 
   auto operator<=>(const MeshWay&) const = default;

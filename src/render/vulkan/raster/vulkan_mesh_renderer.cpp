@@ -84,7 +84,8 @@ struct VulkanMeshRenderer::Impl {
         memory(&of_renderer.memory),
         pass(std::move(with_pass)),
         store(of_renderer.memory),
-        levels(store) {}
+        levels(store),
+        textures(of_renderer.memory, of_renderer.texels) {}
   ~Impl() { memory->release(surfaces); }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
@@ -114,6 +115,7 @@ struct VulkanMeshRenderer::Impl {
   vulkan::Place surfaces;
   std::vector<Vec4> surface_table;  // the content of `surfaces`
   bool has_unoccluding = false;     // some of its opaque types do not darken corners
+  vulkan::DeviceTextures textures;  // of the same types
   std::int64_t drawn_triangles = 0;
 };
 
@@ -132,7 +134,10 @@ Result<VulkanMeshRenderer> VulkanMeshRenderer::create(VulkanRenderer& renderer) 
 Status VulkanMeshRenderer::update(const Scene& scene, InstanceFilter filter) {
   impl_->place(scene, filter);
   impl_->levels.look_at(scene);
-  return impl_->put_surfaces(scene.types);
+  Status done = impl_->put_surfaces(scene.types);
+  if (done) done = impl_->textures.put(scene.types);
+  if (!done) impl_->surface_table.clear();
+  return done;
 }
 
 void VulkanMeshRenderer::Impl::place(const Scene& of_scene, InstanceFilter filter) {
@@ -231,6 +236,7 @@ Result<std::vector<vulkan::MeshInstance>> VulkanMeshRenderer::Impl::detailed(con
     instance.placed = static_cast<std::int32_t>(next - placement.placed.begin());
     instance.origin = next->origin;
     // Surfels are not rasterised: grids with a field are drawn from their meshes, whose levels the live meshes choose.
+    instance.shows_means = next->is_far || placed.level > 0;
     instance.is_far = next->is_far && (next->impostor == nullptr || next->impostor->surfels.empty());
     if (placed.level == 0) continue;
     instance.mesh.level = placed.level;
@@ -269,6 +275,9 @@ Status VulkanMeshRenderer::Impl::put_image(const vulkan::Placement& placement, c
   frame.surfaces = surfaces.address;
   frame.last_surface = static_cast<std::uint32_t>(std::max<std::size_t>(surface_table.size() / 3, 1) - 1);
   if (has_unoccluding) frame.flags |= vulkan::kUnoccluding;
+  textures.put_in(frame);
+  const bool shows_colours = !shows_values(request.light.shading) && !request.detail.colours;
+  data.has_textures = shows_colours && !textures.empty();
   if (scene == nullptr || !traces_light(request)) return {};
   const auto lamps = renderer->lamp_table(request, threads);
   if (!lamps) return lamps.error();

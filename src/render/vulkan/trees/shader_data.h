@@ -241,6 +241,16 @@ struct ShaderFrame {
   std::uint32_t lamp_mask = 0;
   std::uint32_t light_mask = 0;
   std::uint64_t paths = 0;
+  std::uint64_t texture_numbers = 0;
+  std::uint64_t textured_faces = 0;
+};
+
+/// A face of a type with textures; see data.glsl.
+struct ShaderTexturedFace {
+  std::uint64_t texels = 0;
+  std::uint32_t shape = 0;
+  std::uint32_t pad = 0;
+  Vec4 tint{0.0F};
 };
 
 struct ShaderPush {
@@ -280,8 +290,8 @@ static_assert(sizeof(SwapPush) == 24);
 static_assert(sizeof(Node) == 16 && sizeof(ShaderTree) == 48 && sizeof(ShaderGrid) == 192);
 static_assert(sizeof(ShaderFarFace) == 32 && sizeof(ShaderVoxelFace) == 16 && sizeof(ShaderFar) == 21 * 16 &&
               sizeof(ShaderFarCell) == 128);
-static_assert(sizeof(ShaderPlaced) == 384 && sizeof(ShaderFrame) == 20 * 16 + 26 * 8 + 20 * 4);
-static_assert(sizeof(ShaderLamp) == 13 * 16);
+static_assert(sizeof(ShaderPlaced) == 384 && sizeof(ShaderFrame) == 20 * 16 + 28 * 8 + 20 * 4);
+static_assert(sizeof(ShaderLamp) == 13 * 16 && sizeof(ShaderTexturedFace) == 32);
 static_assert(sizeof(ShaderPush) == 104 && sizeof(ShaderCounters) == 16);
 
 /// Packs -1 to 1 in 16 bits.

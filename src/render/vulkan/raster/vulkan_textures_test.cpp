@@ -1,0 +1,226 @@
+// Marched and rasterised images show the textures of types as the CPU renderer does.
+
+#include <array>
+#include <string>
+#include <utility>
+
+#include <glm/gtc/quaternion.hpp>
+
+#include "render/vulkan/march/renderer_impl.h"
+#include "render/vulkan/raster/mesh_for_tests.h"
+
+namespace quoin {
+namespace {
+
+using render_test::add_type;
+using render_test::from_above;
+using render_test::place;
+using render_test::random_faces;
+using render_test::random_texture;
+using render_test::sized;
+using render_test::towards;
+using vulkan_test::expect_equal;
+using vulkan_test::mesh_options;
+using vulkan_test::with_mesh_light;
+using vulkan_test::without_shadows;
+
+VoxelType add_textured(Scene& scene, const VoxelFaces& faces, float emission = 0.0F) {
+  VoxelProperties properties;
+  properties.faces = faces;
+  properties.emission = emission;
+  return scene.types.add(properties).value();
+}
+
+/// Blocks of two textured types and a plain one. Faces of the textured types merge to quads of several voxels.
+struct Blocks {
+  VoxelType first, second, plain;
+  GridHandle grid;
+};
+
+Blocks add_blocks(Scene& scene, DVec3 position = DVec3(0.0)) {
+  Blocks made{};
+  made.plain = add_type(scene, {90, 160, 210});
+  made.first = add_textured(scene, random_faces(11));
+  made.second = add_textured(scene, random_faces(25), 0.3F);
+  SceneGrid blocks;
+  blocks.grid.fill_box({{-6, -2, -6}, {7, 0, 7}}, made.first);
+  blocks.grid.fill_box({{-5, 0, -5}, {-1, 4, -1}}, made.second);
+  blocks.grid.fill_box({{1, 0, -4}, {5, 2, 5}}, made.first);
+  blocks.grid.fill_box({{2, 2, -3}, {4, 5, 0}}, made.plain);
+  blocks.grid.set({3, 2, 3}, made.second);
+  blocks.pivot = {0.5, 0.25, -0.5};
+  made.grid = scene.add_grid(std::move(blocks));
+  scene.add_instance({"", made.grid, position});
+  return made;
+}
+
+/// Adds a turned, mirrored instance of another voxel size, which shows other sides.
+void add_turned(Scene& scene, GridHandle grid, DVec3 position) {
+  Instance instance;
+  instance.grid = grid;
+  instance.position = position;
+  instance.rotation = glm::angleAxis(2.3, glm::normalize(DVec3(3, 1, 2)));
+  instance.voxel_size = 0.6;
+  instance.mirrored = true;
+  scene.add_instance(instance);
+}
+
+class VulkanTextures : public vulkan_test::VulkanMeshTest {
+ protected:
+  /// Compares the scene's images with those of the CPU: marched, and rasterised with and without shadows.
+  void compare_both(const Scene& scene, const Camera& camera, const RenderOptions& options, const std::string& name) {
+    compare_marched(scene, camera, options, name);
+    compare(scene, camera, with_mesh_light(options), name + "_lit");
+    compare(scene, camera, without_shadows(options), name + "_plain");
+  }
+  void compare_marched(const Scene& scene, const Camera& camera, const RenderOptions& options,
+                       const std::string& name) {
+    expect_equal(taken(scene, camera, options), render_test::taken(scene, camera, options), "textures_" + name);
+  }
+  /// Returns the number of textures in device memory.
+  [[nodiscard]] std::size_t texel_count() const { return renderer_->impl().texels.size(); }
+};
+
+TEST_F(VulkanTextures, NearAndDistantTexelsMatchCpu) {
+  Scene scene;
+  const Blocks blocks = add_blocks(scene);
+  add_turned(scene, blocks.grid, {-3.0, 7.5, 2.0});
+  const RenderOptions options = sized(160, 120);
+  compare_both(scene, towards({9, 8, 14}, {0, 1, 0}), options, "near");
+  compare_both(scene, towards({-10, -9, -7}, {0, 1, 0}), options, "below");
+  compare_both(scene, towards({60, 40, 90}, {0, 1, 0}, 0.3), options, "distant");
+  compare_both(scene, from_above(0.31, 30, -0.43, 15.7), options, "flat");
+}
+
+TEST_F(VulkanTextures, TexelsFarFromOriginMatchCpu) {
+  const DVec3 far{1e9 + 0.25, -1e9 - 0.5, 1e9};
+  Scene scene;
+  const Blocks blocks = add_blocks(scene, far);
+  add_turned(scene, blocks.grid, far + DVec3(-3.0, 7.5, 2.0));
+  compare_both(scene, towards(far + DVec3(9, 8, 14), far), sized(128, 96), "far");
+}
+
+// The mean colours stay the same where only the turns change.
+TEST_F(VulkanTextures, EditedTypesMatchCpu) {
+  Scene scene;
+  const Blocks blocks = add_blocks(scene);
+  const Camera camera = towards({9, 8, 14}, {0, 1, 0});
+  const RenderOptions options = sized(128, 96);
+  const auto compare_edited = [&](const std::string& name) {
+    compare_marched(scene, camera, options, name);
+    compare(scene, camera, without_shadows(options), name);
+  };
+  const auto change_faces = [&](VoxelType type, const VoxelFaces& faces) {
+    VoxelProperties changed = scene.types[type];
+    changed.faces = faces;
+    scene.types.replace(type, changed);
+  };
+  compare_edited("before_edits");
+  std::array<VoxelFace, 6> turned;
+  for (const Direction direction : kDirections) {
+    VoxelFace& face = turned.at(static_cast<std::size_t>(direction));
+    face = scene.types[blocks.first].faces[direction];
+    face.turn = static_cast<std::uint8_t>((face.turn + 1) % 4);
+  }
+  change_faces(blocks.first, VoxelFaces(turned));
+  compare_edited("turned");
+  change_faces(blocks.first, random_texture(32, 5));
+  compare_edited("other_texture");
+  const VoxelType added = add_textured(scene, random_faces(77));
+  scene.edit(blocks.grid).grid.fill_box({{-5, 0, 2}, {-2, 3, 5}}, added);
+  compare_edited("added_type");
+  const VoxelFaces all = scene.types[added].faces;
+  for (const VoxelType type : {blocks.first, blocks.second, added}) change_faces(type, {});
+  EXPECT_GT(texel_count(), 0U);
+  compare_edited("no_textures");
+  EXPECT_EQ(texel_count(), 0U);
+  change_faces(added, all);
+  compare_edited("textures_again");
+}
+
+// Halved grids and impostors show the mean of each face.
+TEST_F(VulkanTextures, DetailMatchesCpu) {
+  Scene scene;
+  const VoxelType first = add_textured(scene, random_faces(3));
+  const VoxelType second = add_textured(scene, random_faces(4));
+  SceneGrid blocks;
+  blocks.grid.fill_box({{-16, -16, -16}, {16, 0, 16}}, first);
+  blocks.grid.fill_box({{-8, 0, -8}, {4, 16, 4}}, second);
+  scene.add_instance({"", scene.add_grid(std::move(blocks))});
+  const Camera camera = towards({60, 45, 80}, {0, 0, 0}, 0.6);
+  RenderOptions halved = sized(128, 96);
+  halved.detail.policy =
+      DetailPolicy{.rule = DetailPolicy::Rule::ByPixels, .voxel_pixels = 1e6, .cell_pixels = 12, .far_pixels = 0};
+  compare_both(scene, camera, halved, "halved");
+  RenderOptions far = sized(128, 96);
+  far.detail.policy = DetailPolicy{.far_pixels = 1000};
+  compare_marched(scene, camera, far, "impostor");
+  // A mesh with fewer quads than the impostor is drawn in its place.
+  for (const bool merges : {true, false}) {
+    for (const RenderOptions& options : {with_mesh_light(far), without_shadows(far)}) {
+      meshes_->clear();
+      put(scene, vulkan_test::blocky_surfaces(scene, merges));
+      expect_like(drawn(camera, mesh_options(options)), render_test::taken(scene, camera, options), "far_meshes");
+    }
+  }
+  far.detail.colours = true;
+  compare_marched(scene, camera, far, "detail_colours");
+}
+
+TEST_F(VulkanTextures, SamplesAndShadingMatchCpu) {
+  Scene scene;
+  add_blocks(scene);
+  const Camera camera = towards({30, 22, 45}, {0, 1, 0}, 0.4);
+  RenderOptions options = sized(96, 72);
+  options.samples = 4;
+  compare_marched(scene, camera, options, "samples");
+  options.samples = 1;
+  for (const Shading shading : {Shading::Unlit, Shading::UnlitWithOcclusion, Shading::Occlusion, Shading::Normals}) {
+    options.light.shading = shading;
+    const std::string name = "shading_" + std::to_string(static_cast<int>(shading));
+    compare_marched(scene, camera, options, name);
+    compare(scene, camera, without_shadows(options), name);
+  }
+}
+
+// From inside a voxel the image shows its own texture.
+TEST_F(VulkanTextures, InsideOfVoxelMatchesCpu) {
+  Scene scene;
+  const Blocks blocks = add_blocks(scene);
+  add_turned(scene, blocks.grid, {40.0, 0.0, 0.0});
+  compare_marched(scene, towards({3.3, 0.9, 2.2}, {5, -4, 1}, 1.2), sized(64, 48), "inside");
+}
+
+TEST_F(VulkanTextures, TexelsBehindGlassMatchCpu) {
+  Scene scene;
+  const Blocks blocks = add_blocks(scene);
+  const VoxelType glass = add_type(scene, {120, 200, 230, 90}, Visibility::Transparent);
+  scene.edit(blocks.grid).grid.fill_box({{-2, 0, 5}, {6, 6, 6}}, glass);
+  compare_marched(scene, towards({9, 8, 14}, {0, 1, 0}), sized(96, 72), "glass");
+}
+
+// Renderers and their mesh renderers share the texels in device memory.
+TEST_F(VulkanTextures, TexelsAreSentOnce) {
+  Scene scene;
+  const Texture texture = random_texture(256, 1);
+  Grid grid;
+  grid.set({0, 0, 0}, add_textured(scene, texture));
+  place(scene, std::move(grid));
+  ASSERT_TRUE(meshes_->update(scene));
+  ASSERT_TRUE(renderer_->update(scene));
+  EXPECT_EQ(texel_count(), 1U);
+  EXPECT_LT(renderer_->uploaded_bytes(), texture.bytes() / 100);
+  VoxelProperties other;
+  other.faces = VoxelFace{.texture = texture, .tint = {90, 90, 255}};
+  ASSERT_TRUE(scene.types.add(other));
+  ASSERT_TRUE(renderer_->update(scene));
+  EXPECT_LT(renderer_->uploaded_bytes(), texture.bytes() / 100);
+  other.faces = random_texture(256, 2);
+  ASSERT_TRUE(scene.types.add(other));
+  ASSERT_TRUE(renderer_->update(scene));
+  EXPECT_GT(renderer_->uploaded_bytes(), texture.bytes());
+  EXPECT_EQ(texel_count(), 2U);
+}
+
+}  // namespace
+}  // namespace quoin
