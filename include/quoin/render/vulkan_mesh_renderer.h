@@ -52,7 +52,7 @@ struct MeshImageOptions {
 /// Equal:    a blocky mesh equals CpuRenderer's image with `OcclusionMode::Vertex` to 2 of 255, except at silhouettes
 ///           and shadow edges; also glass with `glass_by_rays`. Walls of smooth glass bodies are equal to 4, away from
 ///           their edges. Light brighter than white counts as white behind glass. There is no inside view: only faces
-///           towards the camera are drawn. A pixel shows one texel of each face in it, whatever the number of samples.
+///           towards the camera are drawn. Textures are sampled once per pixel and face, at any number of samples.
 /// Light:    rays from each visible point through the VulkanRenderer's voxels, at the image's level of detail, find
 ///           shadows and lamp light. Everything that casts shadows in that renderer also casts them here, drawn or not.
 ///           Rays from smooth surfaces start one voxel in front of the surface. Glass tints sunlight separately per
