@@ -31,6 +31,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"grid/chunk/chunk_storage.h", {"mesh", "render", "store", "trace"}},
     {"grid/colour_table.h", {"io", "voxelize"}},
     {"grid/density/density_storage.h", {"mesh", "store", "trace"}},
+    {"grid/shapes/shape_index.h", {"scene"}},
     {"io/format_driver.h", {"store"}},
     {"io/scene_file/scene_parts.h", {"store"}},
     {"scene/surfaces.h", {"io", "render"}},
@@ -52,7 +53,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
 };
 
 // Pairs of a lent header and its user. Lower it when a pair goes; a higher number needs a reason in docs/decisions.
-constexpr std::size_t kMaxLoans = 32;
+constexpr std::size_t kMaxLoans = 33;
 
 // A file with fewer lines needs a reason, because compile time and a reader's way are paid per file.
 constexpr int kSmallFile = 60;

@@ -341,6 +341,8 @@ void VoxelRegistry::replace(VoxelType type, VoxelProperties properties) {
   if (!properties.faces.empty()) ++c.textured_count;
   const bool is_formed_otherwise =
       !(c.properties[type].shapes == properties.shapes && c.properties[type].orientations == properties.orientations);
+  // Equal shapes stay the same, with the models that consumers know.
+  if (!is_formed_otherwise) properties.shapes = c.properties[type].shapes;
   const bool is_seen_otherwise = was != visibility || occluded != c.occlusion[type];
   const bool is_coloured_otherwise =
       !(c.properties[type].colour == properties.colour && c.properties[type].faces == properties.faces &&

@@ -16,7 +16,8 @@ constexpr std::uint64_t kAll = ~std::uint64_t{0};
 bool counts(const VoxelRegistry& types, VoxelType type, Occupancy which) {
   if (type == kAir) return false;
   if (which == Occupancy::NonAir) return true;
-  return types.is_transparent(type) == (which == Occupancy::Transparent);
+  if (which == Occupancy::Glass && types.is_shaped(type)) return false;
+  return types.is_transparent(type) == (which != Occupancy::Opaque);
 }
 
 std::uint32_t index_of(const ChunkStorage& mixed, VoxelType type) {

@@ -117,6 +117,27 @@ std::vector<IVec3> cells_of(const std::vector<IVec3>& chunks) {
   return cells;
 }
 
+// The rows of one chunk, for a tree of listed voxels.
+class ListedRows {
+ public:
+  ListedRows(const OccupancyTree::RowsOfVoxels& rows, IVec3 chunk) : rows_(rows), origin_(chunk * kChunkEdge) {
+    for (int i = 0; i < kChunkEdge * kChunkEdge && is_empty_; ++i) {
+      is_empty_ = rows_(origin_ + IVec3(0, i % kChunkEdge, i / kChunkEdge)) == 0;
+    }
+  }
+  [[nodiscard]] bool none() const { return is_empty_; }
+  [[nodiscard]] trace::Slab read(int y, int z, trace::SlabRows& rows) const {
+    for (int i = 0; i < 16; ++i)
+      rows[static_cast<std::size_t>(i)] = rows_(origin_ + IVec3(0, y + (i & 3), z + (i >> 2)));
+    return trace::slab_of(rows);
+  }
+
+ private:
+  const OccupancyTree::RowsOfVoxels& rows_;
+  IVec3 origin_;
+  bool is_empty_ = true;
+};
+
 trace::TreeView make_view(const FlatTables& tables, const trace::BrickLine* lines, const IBox& bounds) {
   const IVec3 origin = tables.box.min * kChunkEdge;
   const IVec3 chunks = tables.chunks();
@@ -170,6 +191,8 @@ struct OccupancyTree::Impl {
   bool is_flat = false;
   std::vector<ChunkBricks> missed;
   trace::TreeView view{};
+
+  [[nodiscard]] bool has_blocks() const { return which == Occupancy::Transparent || which == Occupancy::Glass; }
 
   void release_bricks(ChunkNode& node) {
     for (trace::BrickCode& brick : node.bricks) {
@@ -413,7 +436,7 @@ struct OccupancyTree::Impl {
     const bool was_there = chunk_boxes.find(chunk) != nullptr;
     const std::uint64_t changed = put(trace::ChunkRows(*voxels, types, which), chunk, wanted);
     // A voxel may have changed its type without a change of occupancy. Then no brick has changed.
-    if (which == Occupancy::Transparent) {
+    if (has_blocks()) {
       set_uniform_blocks(chunk, [&](trace::UniformBlocks& blocks) {
         const ChunkSlabs part = was_there ? with_any(node_of(chunk), changed, wanted) : ChunkSlabs::all();
         if (!(part == ChunkSlabs())) trace::find_uniform_blocks(*voxels, types, part, blocks);
@@ -720,6 +743,13 @@ OccupancyTree OccupancyTree::build(const DensityGrid& field, const VoxelRegistry
   return tree;
 }
 
+OccupancyTree OccupancyTree::build(std::span<const IVec3> chunks, const RowsOfVoxels& rows) {
+  OccupancyTree tree;
+  for (const IVec3 chunk : chunks) tree.impl_->put(ListedRows(rows, chunk), chunk);
+  tree.finish_build();
+  return tree;
+}
+
 void OccupancyTree::finish_build() {
   impl_->bricks.finish_build();
   impl_->finish({});
@@ -771,6 +801,13 @@ void OccupancyTree::update(const DensityGrid& field, const VoxelRegistry& types,
   finish_update(changed);
 }
 
+void OccupancyTree::update(std::span<const IVec3> chunks, const RowsOfVoxels& rows) {
+  QUOIN_ASSERT(impl_ != nullptr, "a tree that was not moved from");
+  std::vector<ChunkBricks> changed;
+  for (const IVec3 chunk : chunks) changed.push_back({chunk, impl_->put(ListedRows(rows, chunk), chunk)});
+  finish_update(changed);
+}
+
 IBox OccupancyTree::bounds() const {
   QUOIN_ASSERT(impl_ != nullptr, "a tree that was not moved from");
   return impl_->bounds;
@@ -791,8 +828,7 @@ bool OccupancyTree::is_occupied(IVec3 voxel) const {
 
 std::size_t OccupancyTree::bytes() const {
   QUOIN_ASSERT(impl_ != nullptr, "a tree that was not moved from");
-  const bool has_blocks = impl_->which == Occupancy::Transparent;
-  const std::size_t node_bytes = sizeof(ChunkNode) + (has_blocks ? sizeof(trace::UniformBlocks) : 0);
+  const std::size_t node_bytes = sizeof(ChunkNode) + (impl_->has_blocks() ? sizeof(trace::UniformBlocks) : 0);
   std::size_t region_bytes = 0;
   for (const auto& [at, region] : impl_->regions) region_bytes += region->bytes();
   return sizeof(OccupancyTree) + sizeof(Impl) + region_bytes + impl_->chunk_nodes.capacity() * sizeof(void*) +

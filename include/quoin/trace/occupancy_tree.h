@@ -6,6 +6,7 @@
 #include <memory>
 #include <span>
 
+#include <quoin/core/function_ref.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/changes.h>
 #include <quoin/grid/density_grid.h>
@@ -25,6 +26,7 @@ enum class Occupancy : std::uint8_t {
   NonAir,       ///< all voxels that a ray can hit
   Opaque,       ///< voxels that block light
   Transparent,  ///< voxels that tint light
+  Glass,        ///< the transparent voxels whose type has no shapes (VoxelRegistry::is_shaped)
 };
 
 /// The ray-traversal structure: a bit per occupied voxel of a grid, at every level of detail.
@@ -85,6 +87,13 @@ class OccupancyTree {
 
   // For Quoin's own sources.
   struct [[gnu::visibility("hidden")]] Impl;
+  // Rows of voxels: returns the 64 voxels along x of a chunk's row, whose first voxel is given, as bits.
+  using RowsOfVoxels = FunctionRef<std::uint64_t(IVec3 first)>;
+  // Builds a tree of the voxels that `rows` lists in some chunks.
+  [[nodiscard, gnu::visibility("hidden")]] static OccupancyTree build(std::span<const IVec3> chunks,
+                                                                      const RowsOfVoxels& rows);
+  // Replaces all voxels of some chunks of such a tree.
+  [[gnu::visibility("hidden")]] void update(std::span<const IVec3> chunks, const RowsOfVoxels& rows);
   [[nodiscard]] const Impl& impl() const;
   /// Returns the tables that kernels read; null if the world is so sparse (distant islands) that they would be larger
   /// than the rest of the tree.

@@ -287,13 +287,17 @@ void ShapeIndex::rebuild(const Grid& grid, IVec3 chunk) {
   }
 }
 
-void ShapeIndex::build(const Grid& grid, const VoxelRegistry& types) {
-  chunks_.clear();
+void ShapeIndex::take_types(const VoxelRegistry& types) {
   types_ = types;
   is_shaped_.assign(types.has_shapes() ? types.size() : 0, 0);
   for (std::size_t type = 0; type < is_shaped_.size(); ++type) {
     is_shaped_[type] = types.is_shaped(static_cast<VoxelType>(type)) ? 1 : 0;
   }
+}
+
+void ShapeIndex::build(const Grid& grid, const VoxelRegistry& types) {
+  chunks_.clear();
+  take_types(types);
   if (is_shaped_.empty()) return;
   std::set<IVec3, ByZyx> chunks;  // with shapes, and around them
   for (const IVec3 chunk : grid.chunks()) {
@@ -302,12 +306,25 @@ void ShapeIndex::build(const Grid& grid, const VoxelRegistry& types) {
   for (const IVec3 chunk : chunks) rebuild(grid, chunk);
 }
 
-void ShapeIndex::update(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes,
-                        const DataChanges& data) {
-  if (changes.all || data.all || types.size() != types_.size()) return build(grid, types);
-  types_ = types;
-  if (is_shaped_.empty()) return;
+std::vector<IVec3> ShapeIndex::chunks() const {
+  std::vector<IVec3> chunks;
+  for (const auto& [chunk, shapes] : chunks_) chunks.push_back(chunk);
+  std::sort(chunks.begin(), chunks.end(), ByZyx());
+  return chunks;
+}
+
+std::vector<IVec3> ShapeIndex::update(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes,
+                                      const DataChanges& data) {
   std::set<IVec3, ByZyx> chunks;
+  if (changes.all || data.all) {
+    for (const auto& [chunk, shapes] : chunks_) chunks.insert(chunk);
+    build(grid, types);
+    for (const auto& [chunk, shapes] : chunks_) chunks.insert(chunk);
+    return {chunks.begin(), chunks.end()};
+  }
+  // No voxel has a new type except within the changes.
+  take_types(types);
+  if (is_shaped_.empty()) return {};
   const auto add = [&](IVec3 chunk, const IBox& box) {
     // A shape follows its neighbours and reaches one voxel outside.
     const IVec3 origin = chunk * kChunkEdge;
@@ -322,6 +339,7 @@ void ShapeIndex::update(const Grid& grid, const VoxelRegistry& types, const Grid
   for (const ChunkChange& change : changes.items_unless_all()) add(change.chunk, change.box);
   for (const DataChange& change : data.items_unless_all()) add(change.chunk, change.box);
   for (const IVec3 chunk : chunks) rebuild(grid, chunk);
+  return {chunks.begin(), chunks.end()};
 }
 
 std::span<const PlacedShape> ShapeIndex::at(IVec3 voxel) const {

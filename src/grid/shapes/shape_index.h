@@ -29,11 +29,15 @@ class ShapeIndex {
  public:
   // Replaces everything. Cost: O(rows) per chunk with shaped types.
   void build(const Grid& grid, const VoxelRegistry& types);
-  // Applies edits of the grid and of its data. Requires: as OccupancyTree::update; if any type's shapes have changed,
-  // `changes.all` is true. Cost: O(rows) per chunk within two voxels of a change.
-  void update(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes, const DataChanges& data);
+  // Applies edits of the grid and of its data. Returns the chunks whose touched voxels may have changed, by z, y, x.
+  // Requires: as OccupancyTree::update; if any type's shapes have changed, `changes.all` is true.
+  // Cost: O(rows) per chunk within two voxels of a change.
+  std::vector<IVec3> update(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes,
+                            const DataChanges& data);
 
   [[nodiscard]] bool empty() const { return chunks_.empty(); }
+  // Returns the chunks with voxels that shapes touch, by z, y, x.
+  [[nodiscard]] std::vector<IVec3> chunks() const;
   // Returns the shapes that touch a voxel, its own first, then in the order of their voxels (z, y, x). Lifetime: until
   // the next update. Cost: one hash lookup.
   [[nodiscard]] std::span<const PlacedShape> at(IVec3 voxel) const;
@@ -73,6 +77,7 @@ class ShapeIndex {
 
   [[nodiscard]] std::shared_ptr<const ChunkShapes> made(const Grid& grid, IVec3 chunk) const;
   void rebuild(const Grid& grid, IVec3 chunk);
+  void take_types(const VoxelRegistry& types);
 
   VoxelRegistry types_;  // keeps the models
   std::vector<std::uint8_t> is_shaped_;

@@ -18,6 +18,7 @@
 #include "core/not_finite_for_tests.h"
 #include "scene/tracer/placed_grid.h"
 #include "scene/tracer/scene_view.h"
+#include "scene/tracer/tree_cache.h"
 
 namespace quoin {
 
@@ -25,7 +26,9 @@ namespace quoin {
 class ChangingScene {
  public:
   /// `has_fields`: some changes edit fields, or load and unload chunks of partial grids.
-  explicit ChangingScene(unsigned seed, bool has_fields = false) : has_fields_(has_fields), random_(seed) {
+  /// `has_shapes`: some types have shapes, which their state selects, and some changes edit states.
+  explicit ChangingScene(unsigned seed, bool has_fields = false, bool has_shapes = false)
+      : has_fields_(has_fields), has_shapes_(has_shapes), random_(seed) {
     for (int i = 0; i < 3; ++i) EXPECT_TRUE(scene.types.add(properties()).has_value());
     for (int i = 0; i < 4; ++i) add_grid();
     for (int i = 0; i < 12; ++i) add_instance();
@@ -33,6 +36,7 @@ class ChangingScene {
 
   void change() {
     if (has_fields_ && below(3) == 0) return change_field_or_load();
+    if (has_shapes_ && below(4) == 0) return change_states();
     switch (below(14)) {
       case 0:
         return add_grid();
@@ -75,6 +79,18 @@ class ChangingScene {
   VoxelProperties properties() {
     VoxelProperties properties;
     properties.visibility = below(3) == 0 ? Visibility::Transparent : Visibility::Opaque;
+    if (!has_shapes_) return properties;
+    properties.state_bits = 2;
+    if (below(3) == 0) return properties;
+    properties.orientations = StateOrientations::about_y();
+    const auto box = [](IVec3 lower, IVec3 upper) { return ShapePart{.shape = VoxelShape::box(lower, upper)}; };
+    ShapeRules rules{.parts = {box({0, 0, 0}, {16, 4 + 4 * below(3), 8})}};
+    if (below(2) == 0) {
+      rules.parts.push_back({.shape = *VoxelShape::from_elements({{.min = {-6, 2, 6}, .max = {0, 20, 10}}})});
+      rules.neighbours = ShapeNeighbours::Connected;
+      rules.parts.back().when = {{.connected = {Direction::PosX}}};
+    }
+    properties.shapes = *VoxelShapes::from_rules(std::move(rules));
     return properties;
   }
   // Returns a type, which may be unregistered.
@@ -110,6 +126,16 @@ class ChangingScene {
       grid->field.remove_sphere(at, 4.0 + below(12));
     } else {
       grid->field.add_sphere(at, 4.0 + below(12), type());
+    }
+  }
+  void change_states() {
+    SceneGrid* grid = any_grid();
+    if (grid == nullptr || grid->grid.bounds().empty()) return;
+    const IBox box = grid->grid.bounds();
+    for (int i = 0; i < 20; ++i) {
+      const IVec3 size = box.size();
+      const IVec3 at = box.min + IVec3(below(size.x), below(size.y), below(size.z));
+      (void)grid->grid.set_data(at, {static_cast<std::uint32_t>(below(4)), {}});
     }
   }
   void empty(Grid& grid) {
@@ -169,6 +195,7 @@ class ChangingScene {
   }
 
   bool has_fields_;
+  bool has_shapes_;
   std::mt19937 random_;
 };
 
@@ -177,7 +204,36 @@ struct TracerCounts {
   int hits = 0;
   int transparent = 0;
   int halved = 0;
+  int shapes = 0;
 };
+
+inline void expect_same_shapes(const TracedShapes* a, const TracedShapes* b, TracerCounts& counts) {
+  ASSERT_EQ(a == nullptr, b == nullptr);
+  if (a == nullptr) return;
+  ++counts.shapes;
+  EXPECT_EQ(a->index.chunks(), b->index.chunks());
+  EXPECT_EQ(a->index.bounds(), b->index.bounds());
+  EXPECT_EQ(a->touched.bounds(), b->index.bounds());
+  for (const IVec3 chunk : b->index.chunks()) {
+    for (int i = 0; i < kChunkEdge * kChunkEdge; i += 7) {
+      const IVec3 first = chunk * kChunkEdge + IVec3(0, i % kChunkEdge, i / kChunkEdge);
+      const std::uint64_t row = b->index.touched_row(first);
+      ASSERT_EQ(a->index.touched_row(first), row);
+      for (int x = 0; x < kChunkEdge; x += 5) {
+        const IVec3 voxel = first + IVec3(x, 0, 0);
+        ASSERT_EQ(a->touched.is_occupied(voxel), (row >> x & 1U) != 0);
+        const auto shapes_a = a->index.at(voxel);
+        const auto shapes_b = b->index.at(voxel);
+        ASSERT_EQ(shapes_a.size(), shapes_b.size());
+        for (std::size_t k = 0; k < shapes_a.size(); ++k) {
+          EXPECT_EQ(shapes_a[k].voxel, shapes_b[k].voxel);
+          EXPECT_EQ(shapes_a[k].type, shapes_b[k].type);
+          EXPECT_EQ(shapes_a[k].model, shapes_b[k].model);
+        }
+      }
+    }
+  }
+}
 
 inline void expect_same_placed(const SceneTracer& updated, const SceneTracer& fresh, bool is_detailed,
                                TracerCounts& counts) {
@@ -202,6 +258,9 @@ inline void expect_same_placed(const SceneTracer& updated, const SceneTracer& fr
       EXPECT_EQ(a.transparent->bounds(), b.transparent->bounds());
     }
     counts.halved += b.level > 0;
+    EXPECT_TRUE(b.level == 0 || b.shapes == nullptr);
+    // Instances share them.
+    if (i == 0 || b.shapes != placed_in(fresh)[i - 1].shapes) expect_same_shapes(a.shapes, b.shapes, counts);
   }
 }
 

@@ -17,6 +17,7 @@
 namespace quoin {
 
 class DensityGlass;
+struct TracedShapes;
 
 /// A grid with the placement of an instance, ready to be traced. Instances of one grid share its trees. Lifetime: owns
 /// nothing; the tracer and its scene must outlive it, and an update invalidates it.
@@ -26,7 +27,8 @@ struct PlacedGrid {
   const Grid* voxels = nullptr;     ///< the traced grid: its voxels, or the halved grid
   DVec3 pivot{0.0};                 ///< in the coordinates of `voxels`
   const OccupancyTree* opaque = nullptr;
-  const OccupancyTree* transparent = nullptr;  ///< null if the grid has no transparent voxel
+  const OccupancyTree* transparent = nullptr;  ///< null if the grid has no transparent voxel; without shaped voxels
+  const TracedShapes* shapes = nullptr;        ///< null if no voxel has a shape; halved grids have cubes instead
   const DensityTree* field = nullptr;          ///< in the space of `voxels`; null if the field has no solid
   const DensityTree* opaque_field = nullptr;   ///< the opaque part of the field: `field` if all is opaque; may be null
   const DensityGlass* glass = nullptr;         ///< the transparent part of the field, or null

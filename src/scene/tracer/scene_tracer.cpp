@@ -5,6 +5,8 @@
 #include <set>
 #include <utility>
 
+#include <glm/vector_relational.hpp>
+
 #include <quoin/core/assert.h>
 #include <quoin/core/memory.h>
 
@@ -77,17 +79,23 @@ bool SceneTracer::has_transparent() const {
 }
 std::size_t SceneTracer::bytes() const {
   std::set<const OccupancyTree*> trees;
+  std::set<const ShapeIndex*> indices;
   const auto add_cells = [&](const DensityTree* field) {
     if (field != nullptr) trees.insert(&field->cells());
   };
   for (const PlacedGrid& placed : impl_of(impl_).placed) {
     trees.insert({placed.opaque, placed.transparent});
+    if (placed.shapes != nullptr) {
+      trees.insert(&placed.shapes->touched);
+      indices.insert(&placed.shapes->index);
+    }
     add_cells(placed.field);
     add_cells(placed.opaque_field);
   }
   trees.erase(nullptr);
   std::size_t total = 0;
   for (const OccupancyTree* tree : trees) total += tree->bytes();
+  for (const ShapeIndex* index : indices) total += index->bytes();
   return total;
 }
 
@@ -106,9 +114,26 @@ bool has_type_of(const SceneGrid& grid, const std::vector<VoxelType>& ascending)
   });
 }
 
+// Returns how many voxels the shapes of any type reach outside their own: 0 or 1, not less than the true number.
+int reach_of_shapes(const VoxelRegistry& types) {
+  if (!types.has_shapes()) return 0;
+  const auto stays_inside = [](const ShapeElement& element) {
+    return !element.turn && glm::all(glm::greaterThanEqual(element.min, Vec3(0.0F))) &&
+           glm::all(glm::lessThanEqual(element.max, Vec3(kShapeUnits)));
+  };
+  for (std::size_t type = 0; type < types.size(); ++type) {
+    if (!types.is_shaped(static_cast<VoxelType>(type))) continue;
+    for (const ShapePart& part : types[static_cast<VoxelType>(type)].shapes.rules().parts) {
+      if (!std::ranges::all_of(part.shape.elements(), stays_inside)) return 1;
+    }
+  }
+  return 0;
+}
+
 void put_trees(const TreeCache& trees, PlacedGrid& placed) {
   placed.opaque = &trees.opaque();
   placed.transparent = trees.transparent();
+  placed.shapes = trees.shapes();
   placed.field = trees.field();
   placed.opaque_field = trees.opaque_field();
   placed.glass = trees.glass();
@@ -138,6 +163,8 @@ bool SceneTracer::Impl::update(Threads threads) {
   const bool was_unfinished = std::exchange(is_unfinished, true);
   // Discarded trees are rebuilt, in all placed grids.
   changes.all |= update_types(*types);
+  const int reach = types->empty() ? shape_reach : reach_of_shapes(scene->types);
+  changes.all |= std::exchange(shape_reach, reach) != reach;
   const bool are_shapes_same = look_at_grids(changes);
   const bool moves_all = changes.all || !are_shapes_same;
   const bool are_placed = !was_unfinished && (moves_all ? move_all_instances() : move_instances(changes));
@@ -165,13 +192,14 @@ void SceneTracer::Impl::refer_to(const Scene& other) noexcept {
   }
 }
 
-// Discards the data of types that became transparent or ceased to be. Returns false if there are none.
+// Discards the data of types that became transparent or ceased to be, or whose shapes changed. Returns false if there
+// are none.
 bool SceneTracer::Impl::update_types(const TypeChanges& changes) {
-  if (!has_other_visibility(changes)) return false;
   std::vector<VoxelType> changed;
   for (const TypeChange& change : changes.items_unless_all()) {
-    if (change.visibility_changed) changed.push_back(change.type);
+    if (change.visibility_changed || change.shape_changed) changed.push_back(change.type);
   }
+  if (!has_other_visibility(changes) && changed.empty()) return false;
   std::vector<GridHandle> kept;
   bool has_forgotten = false;
   for (const auto& each : grids) {
@@ -229,7 +257,8 @@ bool SceneTracer::Impl::look_at(GridHandle handle) {
   }
   has_other_trees |= known->grid != &grid;
   const bool is_new = std::exchange(known->grid, &grid) == nullptr;
-  const IBox tight = grid.bounds();
+  IBox tight = grid.bounds();
+  if (!tight.empty()) tight = {tight.min - shape_reach, tight.max + shape_reach};
   const bool was_partial = std::exchange(known->is_partial, grid.grid.is_partial() || grid.field.is_partial());
   // NaN differs from itself, so such a pivot counts as changed each time.
   if (!is_new && tight == known->tight && known->pivot == grid.pivot && was_partial == known->is_partial) return true;

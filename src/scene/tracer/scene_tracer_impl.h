@@ -19,11 +19,11 @@ struct TracedGrid {
   const SceneGrid* grid = nullptr;
   DVec3 pivot{0.0};
   IBox tight;
-  bool can_be_placed = false;  ///< it is not empty, and its pivot is finite
-  bool is_placed = false;      ///< by a traced instance
-  bool is_partial = false;     ///< its voxels or its field
-  std::uint64_t shape = 0;     ///< unique number; replaced when pivot or bounds change
-  TreeCache trees;             ///< up to date while it is placed
+  bool can_be_placed = false;              ///< it is not empty, and its pivot is finite
+  bool is_placed = false;                  ///< by a traced instance
+  bool is_partial = false;                 ///< its voxels or its field
+  std::uint64_t shape = 0;                 ///< unique number; replaced when pivot or bounds change
+  TreeCache trees{ShapedVoxels::ByShape};  ///< up to date while it is placed
 };
 
 struct SceneTracer::Impl {
@@ -55,6 +55,7 @@ struct SceneTracer::Impl {
   // They have no trees.
   BlockVector<PlacedGrid> unloaded;
   bool has_transparent = false;
+  int shape_reach = 0;     // how far the shapes of any type reach outside their voxel, rounded up
   HalvedGridCache coarse;  // the levels of `with_detail`
 
   bool update(Threads threads);

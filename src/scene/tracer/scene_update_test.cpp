@@ -87,21 +87,6 @@ TEST(SceneUpdate, TracerOfNextSnapshotMatchesNewTracer) {
   EXPECT_GT(counts.halved, 100);
 }
 
-TEST(SceneUpdate, TracesUnrelatedScene) {
-  ChangingScene first(1, true);
-  ChangingScene second(2, true);
-  SceneTracer tracer(first.scene, InstanceFilter::Visible, {1});
-  TracerCounts counts;
-  for (ChangingScene* world : {&second, &first, &second}) {
-    for (int i = 0; i < 4; ++i) world->change();
-    tracer.update(world->scene, {1});
-    const SceneTracer fresh(world->scene, InstanceFilter::Visible, {1});
-    expect_same_placed(tracer, fresh, false, counts);
-    expect_same_hits(tracer, fresh, *world, counts);
-  }
-  EXPECT_GT(counts.hits, 0);
-}
-
 struct TwoCubes {
   Scene scene;
   GridHandle grid;
@@ -118,6 +103,77 @@ struct TwoCubes {
     return scene.add_grid(std::move(cube));
   }
 };
+
+TEST(SceneUpdate, ShapesFollowEditsStatesAndTypes) {
+  TracerCounts counts;
+  for (unsigned seed = 0; seed < static_cast<unsigned>(cases(12, 40)); ++seed) {
+    SCOPED_TRACE(seed);
+    ChangingScene world(seed, false, true);
+    SceneTracer tracer(world.scene, InstanceFilter::Visible, {1});
+    auto copy = std::make_unique<Scene>(world.scene.snapshot());
+    SceneTracer of_copies(*copy, InstanceFilter::Visible, {1});
+    for (int round = 0; round < 12; ++round) {
+      SCOPED_TRACE(round);
+      for (int i = world.below(6); i >= 0; --i) world.change();
+      tracer.update({1});
+      auto now = std::make_unique<Scene>(world.scene.snapshot());
+      of_copies.update(*now, {1});
+      copy = std::move(now);
+      const SceneTracer fresh(world.scene, InstanceFilter::Visible, {1});
+      expect_same_placed(tracer, fresh, false, counts);
+      expect_same_placed(of_copies, fresh, true, counts);
+      expect_same_hits(tracer, fresh, world, counts);
+      if (round % 3 == 0) expect_same_details(tracer, fresh, world, counts);
+      if (HasFatalFailure()) return;
+    }
+  }
+  EXPECT_GT(counts.hits, 100);
+  EXPECT_GT(counts.shapes, 300);
+}
+
+TEST(SceneUpdate, OnlyGridsWithShapesHaveIndex) {
+  TwoCubes world;
+  SceneTracer tracer(world.scene);
+  VoxelProperties slab{.name = "slab"};
+  slab.shapes = VoxelShape::box({0, 0, 0}, {16, 8, 16});
+  const VoxelType type = *world.scene.types.add(slab);
+  tracer.update();
+  EXPECT_EQ(placed_in(tracer)[0].shapes, nullptr);
+  Grid& grid = world.scene.edit(world.grid).grid;
+  grid.set({3, 10, 3}, type);
+  const std::size_t bytes = tracer.bytes();
+  EXPECT_TRUE(tracer.update());
+  const TracedShapes* const shapes = placed_in(tracer)[0].shapes;
+  ASSERT_NE(shapes, nullptr);
+  EXPECT_GT(tracer.bytes(), bytes);
+  EXPECT_EQ(placed_in(tracer)[0].transparent, nullptr) << "a shaped voxel is no cube";
+  EXPECT_EQ(placed_in(tracer)[1].shapes, nullptr);
+  EXPECT_TRUE(shapes->touched.is_occupied({3, 10, 3}));
+  EXPECT_EQ(shapes->index.at({3, 10, 3}).size(), 1U);
+  EXPECT_FALSE(shapes->touched.is_occupied({3, 9, 3}));
+  slab.shapes = *VoxelShape::from_elements({{.min = {0, 0, 0}, .max = {16, 32, 16}}});
+  world.scene.types.replace(type, slab);
+  EXPECT_TRUE(tracer.update());
+  EXPECT_TRUE(placed_in(tracer)[0].shapes->touched.is_occupied({3, 11, 3}));
+  grid.set({3, 10, 3}, kAir);
+  EXPECT_TRUE(tracer.update());
+  EXPECT_EQ(placed_in(tracer)[0].shapes, nullptr);
+}
+
+TEST(SceneUpdate, TracesUnrelatedScene) {
+  ChangingScene first(1, true);
+  ChangingScene second(2, true);
+  SceneTracer tracer(first.scene, InstanceFilter::Visible, {1});
+  TracerCounts counts;
+  for (ChangingScene* world : {&second, &first, &second}) {
+    for (int i = 0; i < 4; ++i) world->change();
+    tracer.update(world->scene, {1});
+    const SceneTracer fresh(world->scene, InstanceFilter::Visible, {1});
+    expect_same_placed(tracer, fresh, false, counts);
+    expect_same_hits(tracer, fresh, *world, counts);
+  }
+  EXPECT_GT(counts.hits, 0);
+}
 
 TEST(SceneUpdate, KeepsTreesAndReportsChanges) {
   TwoCubes world;

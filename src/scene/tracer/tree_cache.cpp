@@ -17,11 +17,23 @@ namespace {
 
 constexpr std::uint32_t kOpaqueBody = 0;
 
-bool has_transparent_types(const Chunk* chunk, const VoxelRegistry& types) {
-  if (chunk == nullptr || !types.has_transparent()) return false;
-  const std::vector<VoxelType> all = chunk->types();
-  return std::any_of(all.begin(), all.end(), [&](VoxelType type) { return types.is_transparent(type); });
+// Returns true if any chunk of a grid that may have changed has a type that `counts` accepts.
+template <class Counts>
+bool has_new_types(const Grid& grid, const GridChanges& changes, const Counts& counts) {
+  const std::vector<IVec3> chunks = changes.chunks(grid);
+  return std::any_of(chunks.begin(), chunks.end(), [&](IVec3 at) {
+    const Chunk* const chunk = grid.find_chunk(at);
+    if (chunk == nullptr) return false;
+    const std::vector<VoxelType> all = chunk->types();
+    return std::any_of(all.begin(), all.end(), counts);
+  });
 }
+
+// The voxel data of a grid, for PendingChanges.
+struct GridData {
+  const Grid& grid;
+  [[nodiscard]] DataChanges changes_since(ChangeCursor& cursor) const { return grid.data_changes_since(cursor); }
+};
 
 }  // namespace
 
@@ -60,11 +72,34 @@ bool has_glass(const DensityGrid& field, const VoxelRegistry& types, const Densi
 
 bool TreeCache::update(const Grid& grid, const VoxelRegistry& types) {
   PendingChanges changes(followed_, grid);
-  if (changes->empty()) return false;
+  const bool has_other_shapes = update_shapes(grid, types, *changes);
+  if (changes->empty()) return has_other_shapes;
   if (changes->all) transparent_.reset();
   opaque_.update(grid, types, *changes);
   update_transparent(grid, types, *changes);
   changes.commit();
+  return true;
+}
+
+// If there were no shapes, only the changed chunks can contain some.
+bool TreeCache::update_shapes(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes) {
+  if (shaped_ == ShapedVoxels::AsCubes || (!types.has_shapes() && shapes_ == nullptr)) return false;
+  if (changes.all) shapes_.reset();
+  const bool is_new = shapes_ == nullptr;
+  if (is_new) {
+    if (changes.empty()) return false;
+    if (!has_new_types(grid, changes, [&](VoxelType type) { return types.is_shaped(type); })) return false;
+    followed_data_ = {};
+  }
+  const GridData data{grid};
+  PendingChanges data_changes(followed_data_, data);
+  if (changes.empty() && data_changes->empty()) return false;
+  if (is_new) shapes_ = std::make_unique<TracedShapes>();
+  const std::vector<IVec3> changed = shapes_->index.update(grid, types, changes, *data_changes);
+  const auto rows = [this](IVec3 first) { return shapes_->index.touched_row(first); };
+  shapes_->touched.update(changed, rows);
+  if (shapes_->index.empty()) shapes_.reset();
+  data_changes.commit();
   return true;
 }
 
@@ -102,13 +137,13 @@ void TreeCache::update_split(const DensityGrid& field, const VoxelRegistry& type
 // If there was no tree, only the changed chunks can contain transparent voxels.
 void TreeCache::update_transparent(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes) {
   if (!transparent_) {
-    const auto holds_some = [&](IVec3 chunk) { return has_transparent_types(grid.find_chunk(chunk), types); };
-    const std::vector<IVec3> present = changes.all ? grid.chunks() : std::vector<IVec3>();
-    const bool has_transparent = std::any_of(present.begin(), present.end(), holds_some) ||
-                                 std::any_of(changes.items_unless_all().begin(), changes.items_unless_all().end(),
-                                             [&](const ChunkChange& change) { return holds_some(change.chunk); });
-    if (!has_transparent) return;
-    transparent_.emplace(Occupancy::Transparent);
+    if (!types.has_transparent()) return;
+    const bool has_cubes_only = shaped_ == ShapedVoxels::ByShape;
+    const auto counts = [&](VoxelType type) {
+      return types.is_transparent(type) && !(has_cubes_only && types.is_shaped(type));
+    };
+    if (!has_new_types(grid, changes, counts)) return;
+    transparent_.emplace(has_cubes_only ? Occupancy::Glass : Occupancy::Transparent);
   }
   transparent_->update(grid, types, changes);
   if (transparent_->bounds().empty()) transparent_.reset();
@@ -144,6 +179,7 @@ void CoarseLevel::put_in(PlacedGrid& placed) const {
   placed.voxels = voxels;
   placed.opaque = &trees.opaque();
   placed.transparent = trees.transparent();
+  placed.shapes = nullptr;
   placed.field = trees.field();
   placed.opaque_field = trees.opaque_field();
   placed.glass = trees.glass();

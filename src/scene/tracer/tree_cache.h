@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -17,6 +18,7 @@
 #include <quoin/trace/density_ray.h>
 #include <quoin/trace/occupancy_tree.h>
 
+#include "grid/shapes/shape_index.h"
 #include "scene/tracer/placed_grid.h"
 #include "trace/density/density_glass.h"
 
@@ -58,14 +60,30 @@ class SplitField {
 /// As above, but tests only the changed chunks.
 [[nodiscard]] bool has_glass(const DensityGrid& field, const VoxelRegistry& types, const DensityChanges& changes);
 
+/// The shapes of a grid, for rays and other queries.
+struct TracedShapes {
+  ShapeIndex index;
+  OccupancyTree touched;  ///< the voxels that shapes touch, also air: their own, and those that they reach into
+};
+
+/// The treatment of voxels whose type has shapes.
+enum class ShapedVoxels : std::uint8_t {
+  AsCubes,  ///< transparent cubes of their type's colour
+  ByShape,  ///< not in the trees of opaque and transparent voxels, but in `shapes`
+};
+
 /// The tracing data of one grid for rendering, and its read position in the grid's changes.
 class TreeCache {
  public:
+  TreeCache() = default;
+  explicit TreeCache(ShapedVoxels shaped) : shaped_(shaped) {}
+
   /// Makes the trees, or updates them with the edits since the last call; rebuilds them for another grid. Returns true
   /// if there was anything to do.
   ///
-  /// Requires: the types' visibility is unchanged since the last call; otherwise call `forget` first.
-  /// Cost:     that of OccupancyTree::update for the chunks that changed.
+  /// Requires: the types' visibility and shapes are unchanged since the last call; otherwise call `forget` first.
+  /// Cost:     that of OccupancyTree::update and ShapeIndex::update for the chunks that changed. Grids without shapes
+  ///           have no index.
   bool update(const Grid& grid, const VoxelRegistry& types);
   /// As above, for a field. Lifetime: as DensityTree. Cost: with transparent materials, also the cost of SplitField.
   bool update(const DensityGrid& field, const VoxelRegistry& types);
@@ -74,13 +92,15 @@ class TreeCache {
     if (field_) field_->refer_to(field);
     if (split_ != nullptr) split_->refer_to(field);
   }
-  void forget() { *this = {}; }
+  void forget() { *this = TreeCache(shaped_); }
   [[nodiscard]] const ChangeCursor& followed() const { return followed_; }
   [[nodiscard]] const ChangeCursor& followed_field() const { return followed_field_; }
 
   [[nodiscard]] const OccupancyTree& opaque() const { return opaque_; }
   /// Returns null if the grid has no transparent voxel.
   [[nodiscard]] const OccupancyTree* transparent() const { return transparent_ ? &*transparent_ : nullptr; }
+  /// Returns null if the grid has no shapes, or ShapedVoxels::AsCubes. Lifetime: until the next update.
+  [[nodiscard]] const TracedShapes* shapes() const { return shapes_.get(); }
   /// Returns all solid of the field; null if there is none.
   [[nodiscard]] const DensityTree* field() const { return field_ ? if_any(*field_) : nullptr; }
   /// Returns the opaque part of the field, or the whole field if all is opaque; null if there is none.
@@ -93,11 +113,15 @@ class TreeCache {
  private:
   static const DensityTree* if_any(const DensityTree& tree) { return tree.cells().bounds().empty() ? nullptr : &tree; }
   void update_transparent(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes);
+  bool update_shapes(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes);
   void update_split(const DensityGrid& field, const VoxelRegistry& types, const DensityChanges& changes);
 
+  ShapedVoxels shaped_ = ShapedVoxels::AsCubes;
   ChangeCursor followed_;
   OccupancyTree opaque_{Occupancy::Opaque};
   std::optional<OccupancyTree> transparent_;
+  ChangeCursor followed_data_;  // unused without shapes
+  std::unique_ptr<TracedShapes> shapes_;
   ChangeCursor followed_field_;
   std::optional<DensityTree> field_;
   std::unique_ptr<SplitField> split_;  // null if the field has no transparent part
