@@ -20,7 +20,7 @@ namespace [[gnu::visibility("default")]] quoin {
 /// opaque and colliding.
 enum class QueryTypes : std::uint8_t {
   All,        ///< all voxels except air
-  Colliding,  ///< voxels that stop moving bodies (VoxelProperties::collides)
+  Colliding,  ///< voxels that stop moving bodies (VoxelProperties::collides, ShapeElement::collides)
   Opaque,     ///< voxels that block sight
 };
 
@@ -45,17 +45,20 @@ struct QueryFilter {
 /// A ray hit in a scene.
 struct SceneHit {
   InstanceHandle instance;
-  /// Voxel in the traced grid: the instance's grid, unless the tracer uses a halved one. For a field, the cell as in
+  /// Voxel in the traced grid: the instance's grid, unless the tracer uses a halved one. For a shape, the voxel that has
+  /// it, although the hit may lie outside: a shape reaches up to a voxel beyond its own. For a field, the cell as in
   /// DensityHit.
   IVec3 voxel{0};
   VoxelType type = kAir;  ///< for a field, the material
-  /// Face of the voxel, in its grid, as in RayHit; for a field, the direction nearest to its normal.
+  /// Face of the voxel, in its grid, as in RayHit; for a shape or a field, the direction nearest to its normal.
   Direction face = Direction::PosX;
   double t = 0.0;       ///< in multiples of the ray direction's length: world units for a unit direction
   DVec3 position{0.0};  ///< in world space
   bool starts_inside = false;
   bool in_field = false;
-  DVec3 normal{0.0};  ///< unit normal in world space, pointing out of the solid; 0 if a field has no gradient
+  /// Unit normal in world space, pointing out of the solid; that of the side that the ray meets, also for turned
+  /// elements of shapes; 0 if a field has no gradient.
+  DVec3 normal{0.0};
   /// True for a hit on an unloaded chunk (UnloadedChunks::Block): `voxel` is the chunk's first voxel, `type` is air.
   bool is_unloaded = false;
   /// Ray distance of the first entry into unloaded space, before `t`. Unknown content may stop the ray there.
@@ -68,6 +71,10 @@ struct SceneHit {
 /// the voxel. Returns nullopt if there is no hit, the ray is not finite, its direction is zero, or `max_t` is negative
 /// or NaN.
 ///
+/// Shapes:    a voxel with a shape (VoxelProperties::shapes) consists of the shape's elements, with drawn sides or
+///            without, whatever their textures show: a ray meets the wooden frame and the panes of a window. With
+///            QueryTypes::Colliding, elements with `collides = false` are air; with QueryTypes::Opaque, all elements of
+///            types whose `visibility` is Transparent. Halved grids have cubes in place of shapes.
 /// Precision: the ray is transformed into each grid in double, so at 10^9 from the origin a hit is as exact as the ray.
 /// Filters:   excluded voxels and instances count as air; a ray that starts inside them starts in air.
 /// Partial:   with UnloadedChunks::Block, a hit is certain or reports the entry into unloaded space, and a miss

@@ -18,6 +18,7 @@
 #include "core/memory/make_room.h"
 #include "scene/tracer/placed_grid.h"
 #include "scene/tracer/scene_tracer_impl.h"
+#include "scene/tracer/shape_rays.h"
 
 namespace quoin {
 
@@ -69,13 +70,17 @@ inline glm::dmat3 half_axes_of(const OrientedBox& box) {
 /// The set of types that a query meets. Unregistered types count as colliding and opaque.
 class TypesMet {
  public:
-  TypesMet(const VoxelRegistry& types, QueryTypes which) : types_(&types), which_(which) {
+  TypesMet(const VoxelRegistry& types, QueryTypes which) : types_(&types), which_(which), parts_(parts_of(which)) {
     // If all types match, skips the lookup.
     if (which == QueryTypes::Colliding && !types.has_passable()) which_ = QueryTypes::All;
     if (which == QueryTypes::Opaque && !types.has_transparent()) which_ = QueryTypes::All;
   }
   [[nodiscard]] bool are_all() const { return which_ == QueryTypes::All; }
   [[nodiscard]] bool are_opaque() const { return which_ == QueryTypes::Opaque; }
+  /// Returns the parts of shapes that count. Shapes of an opaque material are opaque, although their voxels are not.
+  [[nodiscard]] ShapeParts parts() const { return parts_; }
+  [[nodiscard]] const VoxelRegistry& registry() const { return *types_; }
+  /// For cubes: voxels without shapes.
   [[nodiscard]] bool holds(VoxelType type) const { return type != kAir && holds_solid(type); }
   /// For a field's solid. Solid without a material also counts.
   [[nodiscard]] bool holds_solid(VoxelType material) const {
@@ -84,8 +89,14 @@ class TypesMet {
   }
 
  private:
+  static ShapeParts parts_of(QueryTypes which) {
+    if (which == QueryTypes::All) return ShapeParts::All;
+    return which == QueryTypes::Opaque ? ShapeParts::Opaque : ShapeParts::Colliding;
+  }
+
   const VoxelRegistry* types_;
   QueryTypes which_;
+  ShapeParts parts_;
 };
 
 /// The part of a scene that a filter includes.

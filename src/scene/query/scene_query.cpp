@@ -87,6 +87,14 @@ std::optional<GridHit> first_of_grid(const PlacedGrid& placed, const TypesMet& t
     const std::optional<RayHit> hit = first_of_tree(*tree, placed, types, ray, best ? best->hit.t : max_t);
     if (hit && (!best || hit->t < best->hit.t)) best = GridHit{*hit, false, kAir, DVec3(normal_of(hit->face))};
   }
+  ShapeHit in_shape;
+  if (placed.shapes != nullptr &&
+      first_shape(*placed.shapes, types.registry(), ray, best ? best->hit.t : max_t, types.parts(), in_shape)) {
+    best = GridHit{{in_shape.voxel, in_shape.direction, in_shape.t, in_shape.starts_inside},
+                   false,
+                   in_shape.type,
+                   glm::normalize(DVec3(in_shape.normal))};
+  }
   const std::optional<DensityHit> hit = first_of_field(placed, types, ray, best ? best->hit.t : max_t);
   if (!hit || (best && hit->t >= best->hit.t)) return best;
   return GridHit{
@@ -94,6 +102,10 @@ std::optional<GridHit> first_of_grid(const PlacedGrid& placed, const TypesMet& t
 }
 
 bool is_any_in_grid(const PlacedGrid& placed, const TypesMet& types, const Ray& ray, double max_t) {
+  ShapeHit in_shape;
+  if (placed.shapes != nullptr && first_shape(*placed.shapes, types.registry(), ray, max_t, types.parts(), in_shape)) {
+    return true;
+  }
   if (types.are_opaque()) {
     return any_hit(*placed.opaque, ray, max_t) ||
            (placed.opaque_field != nullptr && any_hit(*placed.opaque_field, ray, max_t));

@@ -87,9 +87,19 @@ std::uint32_t blocked_by_field(const PlacedGrid& placed, const RayPacket& rays_i
   return blocked | quoin::any_hits(*placed.opaque_field, rest);
 }
 
-// Returns the rays that hit an opaque voxel or field of a placed grid. They are in its space.
-std::uint32_t blocked_by(const PlacedGrid& placed, const RayPacket& rays_in_grid) {
-  const std::uint32_t blocked = has_opaque(placed) ? quoin::any_hits(*placed.opaque, rays_in_grid) : 0;
+// As above, for the shapes of a placed grid.
+std::uint32_t blocked_by_shapes(const PlacedGrid& placed, const VoxelRegistry& types, const RayPacket& rays_in_grid,
+                                std::uint32_t blocked) {
+  if (placed.shapes == nullptr || blocked == rays_in_grid.active) return blocked;
+  RayPacket rest = rays_in_grid;
+  rest.active &= ~blocked;
+  return blocked | any_shapes(*placed.shapes, types, rest);
+}
+
+// Returns the rays that hit an opaque voxel, shape or field of a placed grid. They are in its space.
+std::uint32_t blocked_by(const PlacedGrid& placed, const VoxelRegistry& types, const RayPacket& rays_in_grid) {
+  std::uint32_t blocked = has_opaque(placed) ? quoin::any_hits(*placed.opaque, rays_in_grid) : 0;
+  blocked = blocked_by_shapes(placed, types, rays_in_grid, blocked);
   return blocked_by_field(placed, rays_in_grid, blocked);
 }
 
@@ -162,6 +172,7 @@ struct SceneView::Impl {
       hits.grids.face[i] = found.face[i];
       hits.placed[i] = index;
       hits.in_field &= ~bit;
+      hits.in_shape &= ~bit;
       rays.max_t[i] = found.t[i];
     }
   }
@@ -175,11 +186,12 @@ struct SceneView::Impl {
     move(grid_from_view.front(), rays_in_view, rays);
     if (has_opaque(placed)) quoin::first_hits(*placed.opaque, rays, hits.grids);
     hits.placed.fill(0);
-    if (placed.opaque_field == nullptr) return;
+    if (placed.opaque_field == nullptr && placed.shapes == nullptr) return;
     for (std::size_t i = 0; i < kLanes; ++i) {
       if ((hits.grids.hit >> i & 1U) != 0) rays.max_t[i] = hits.grids.t[i];
     }
-    (void)add_field(placed, 0, rays, hits);
+    if (placed.shapes != nullptr) (void)add_shapes(placed, 0, rays, hits);
+    if (placed.opaque_field != nullptr) (void)add_field(placed, 0, rays, hits);
   }
 
   // Finds hits of the lanes `near` in an instance that are nearer than those in `hits`. Lowers the max_t of these rays.
@@ -199,14 +211,46 @@ struct SceneView::Impl {
       met = found.hit;
       take_nearer(index, found, left, hits);
     }
-    if (placed.opaque_field == nullptr) return met;
+    if (placed.opaque_field == nullptr && placed.shapes == nullptr) return met;
     rays.max_t = left.max_t;
-    const std::uint32_t taken = add_field(placed, index, rays, hits);
+    std::uint32_t taken = placed.shapes == nullptr ? 0 : add_shapes(placed, index, rays, hits);
+    if (placed.opaque_field != nullptr) taken |= add_field(placed, index, rays, hits);
     for (std::uint32_t each = taken; each != 0; each &= each - 1) {
       const auto lane = static_cast<std::size_t>(std::countr_zero(each));
       left.max_t[lane] = hits.grids.t[lane];
     }
     return met | taken;
+  }
+
+  // Adds hits with shapes of a placed grid that are nearer than those in `hits`, or not farther than its own voxels. The
+  // rays are in the grid's space and limited to the known hits. Lowers the max_t of these rays. Returns the lanes with
+  // a new hit.
+  std::uint32_t add_shapes(const PlacedGrid& placed, std::size_t index, RayPacket& rays_in_grid,
+                           SceneHits& hits) const {
+    QUOIN_ASSERT(placed.shapes != nullptr, "a placed grid with shapes");
+    RoomFor<RayPacket::Lanes<ShapeHit>> room;
+    RayPacket::Lanes<ShapeHit>& found = *room;
+    std::uint32_t taken = 0;
+    const std::uint32_t met = first_shapes(*placed.shapes, tracer->scene().types, rays_in_grid, found);
+    for (std::uint32_t left = met; left != 0; left &= left - 1) {
+      const int lane = std::countr_zero(left);
+      const auto i = static_cast<std::size_t>(lane);
+      const std::uint32_t bit = 1U << lane;
+      const ShapeHit& hit = found[i];
+      const auto number = static_cast<std::int32_t>(index);
+      if ((hits.grids.hit & bit) != 0) {
+        if (hit.t > hits.grids.t[i] || (hit.t == hits.grids.t[i] && number > hits.placed[i])) continue;
+      }
+      hits.grids.starts_inside &= ~bit;
+      hits.grids.set(lane, {hit.voxel, hit.direction, hit.t, hit.starts_inside});
+      hits.placed[i] = number;
+      hits.shapes[i] = hit;
+      hits.in_shape |= bit;
+      hits.in_field &= ~bit;
+      rays_in_grid.max_t[i] = hit.t;
+      taken |= bit;
+    }
+    return taken;
   }
 
   // Adds hits with the opaque field of a placed grid that are nearer than those in `hits`. The rays are in the grid's
@@ -237,6 +281,7 @@ struct SceneView::Impl {
       taken |= 1U << lane;
     }
     hits.in_field |= taken;
+    hits.in_shape &= ~taken;
     return taken;
   }
 };
@@ -277,7 +322,7 @@ void SceneView::leave_to_impostors(std::span<const std::int32_t> placed) {
 }
 
 void SceneView::first_hits(const RayPacket& rays_in_view, SceneHits& hits) const {
-  hits.grids.hit = hits.grids.starts_inside = hits.in_field = 0;
+  hits.grids.hit = hits.grids.starts_inside = hits.in_field = hits.in_shape = 0;
   if (impl_->is_alone && impl_->sees_all()) {
     impl_->meet_alone(rays_in_view, hits);
     return;
@@ -317,7 +362,9 @@ void SceneView::any_hits(std::int32_t home, std::span<const RayPacket> packets_i
   } else {
     std::fill_n(blocked.begin(), packets_in_grid.size(), 0U);
   }
+  const VoxelRegistry& types = impl_->tracer->scene().types;
   for (std::size_t i = 0; i < packets_in_grid.size(); ++i) {
+    blocked[i] = blocked_by_shapes(placed[own], types, packets_in_grid[i], blocked[i]);
     blocked[i] = blocked_by_field(placed[own], packets_in_grid[i], blocked[i]);
     if (!impl_->is_alone) blocked[i] = impl_->blocked_by_others(own, packets_in_grid[i], blocked[i]);
   }
@@ -341,7 +388,7 @@ std::uint32_t SceneView::Impl::blocked_by_others(std::size_t own, const RayPacke
     if (near == 0) return true;
     move(grid_from_view[i], in_view, rays);
     rays.active = near;
-    const std::uint32_t found = blocked_by(placed[i], rays);
+    const std::uint32_t found = blocked_by(placed[i], tracer->scene().types, rays);
     blocked |= found;
     in_view.active &= ~found;
     return in_view.active != 0;

@@ -12,6 +12,7 @@
 #include <quoin/trace/ray.h>
 
 #include "scene/tracer/placed_grid.h"
+#include "scene/tracer/shape_rays.h"
 
 namespace quoin {
 
@@ -22,7 +23,7 @@ struct Affine {
   [[nodiscard]] DVec3 point(const DVec3& p) const { return axes * p + offset; }
 };
 
-/// The hits of a ray packet in a scene, with voxels or fields. Lanes without a bit in `grids.hit` are undefined.
+/// The hits of a ray packet in a scene, with voxels, shapes or fields. Lanes without a bit in `grids.hit` are undefined.
 struct SceneHits {
   PacketHits grids;                         ///< voxels and faces in the grid, distances of the packet's rays
   RayPacket::Lanes<std::int32_t> placed{};  ///< index into SceneTracer::placed
@@ -31,6 +32,10 @@ struct SceneHits {
   std::uint32_t in_field = 0;
   RayPacket::Lanes<float> normal_x{}, normal_y{}, normal_z{};
   RayPacket::Lanes<VoxelType> material{};
+
+  /// Lanes that hit a shape. For these, the voxel is that of the shape, and the face is ShapeHit::direction.
+  std::uint32_t in_shape = 0;
+  RayPacket::Lanes<ShapeHit> shapes;
 
   [[nodiscard]] Vec3 normal(std::size_t lane) const { return {normal_x[lane], normal_y[lane], normal_z[lane]}; }
 };
@@ -55,11 +60,12 @@ class SceneView {
   /// still block other rays. Cost: O(instances * log instances).
   void leave_to_impostors(std::span<const std::int32_t> placed);
 
-  /// Finds the nearest opaque voxel or field surface of all instances for each ray, in view space. Of equally near
-  /// hits, the one of the first instance counts, and a voxel before a field.
+  /// Finds the nearest opaque voxel, visible part of a shape (ShapeParts::Visible) or field surface of all instances
+  /// for each ray, in view space. Of equally near hits, the one of the first instance counts, and a shape before a
+  /// voxel, and a voxel before a field.
   void first_hits(const RayPacket& rays_in_view, SceneHits& hits) const;
 
-  /// Returns the rays that hit an opaque voxel or field of any instance. They are in the space of grid `home`, which is
+  /// Returns the rays that hit an opaque voxel, visible part of a shape or field of any instance. They are in the space of grid `home`, which is
   /// tested first.
   [[nodiscard]] std::uint32_t any_hits(std::int32_t home, const RayPacket& rays_in_grid) const;
   /// Sets `blocked[i]` to the result of `any_hits` for packet i. Faster than one by one for endless rays.

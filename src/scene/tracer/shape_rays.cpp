@@ -1,0 +1,346 @@
+#include "scene/tracer/shape_rays.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <glm/geometric.hpp>
+
+#include <quoin/core/assert.h>
+#include <quoin/grid/texture.h>
+
+namespace quoin {
+namespace {
+
+constexpr double kFar = std::numeric_limits<double>::infinity();
+// A side that lies in the plane between two cells may be found in either: the rounding of both distances, in voxels.
+constexpr double kBetweenCells = 1e-6;
+
+double component(const Vec3& a, const DVec3& b) {
+  return double{a.x} * b.x + double{a.y} * b.y + double{a.z} * b.z;
+}
+
+Direction side_of(int axis, bool is_upper) {
+  return static_cast<Direction>(2 * axis + (is_upper ? 0 : 1));
+}
+
+// Finds the way of a ray, relative to the shape's voxel, through a box. Returns false if there is none.
+bool cross_box(const ModelBox& box, const Ray& ray, ShapeSpan& span) {
+  DVec3 origin = ray.origin;
+  DVec3 direction = ray.direction;
+  if (box.is_turned) {
+    const DVec3 from = ray.origin - DVec3(box.origin);
+    for (int axis = 0; axis < 3; ++axis) {
+      const Vec3& row = box.inverse[static_cast<std::size_t>(axis)];
+      origin[axis] = component(row, from);
+      direction[axis] = component(row, ray.direction);
+    }
+  }
+  span.enter.t = -kFar;
+  span.exit.t = kFar;
+  int enter_axis = -1;
+  int exit_axis = -1;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double low = box.min[axis];
+    const double high = box.max[axis];
+    if (direction[axis] == 0.0) {
+      if (origin[axis] < low || origin[axis] > high || low == high) return false;
+      continue;
+    }
+    const bool is_forward = direction[axis] > 0.0;
+    const double near = ((is_forward ? low : high) - origin[axis]) / direction[axis];
+    const double far = ((is_forward ? high : low) - origin[axis]) / direction[axis];
+    // Of several planes at once, the last one counts, as for voxels.
+    if (near >= span.enter.t) {
+      span.enter.t = near;
+      enter_axis = axis;
+    }
+    if (far < span.exit.t) {
+      span.exit.t = far;
+      exit_axis = axis;
+    }
+  }
+  if (!(span.enter.t <= span.exit.t) || !(span.exit.t >= 0.0)) return false;
+  if (span.enter.t == span.exit.t ? enter_axis != exit_axis : span.exit.t == 0.0) return false;
+  span.enter.side = side_of(enter_axis, direction[enter_axis] < 0.0);
+  span.exit.side = side_of(exit_axis, direction[exit_axis] > 0.0);
+  span.enter.face = box.faces[static_cast<std::size_t>(span.enter.side)];
+  span.exit.face = box.faces[static_cast<std::size_t>(span.exit.side)];
+  return true;
+}
+
+// Returns where a ray, relative to the shape's voxel, crosses a face; NaN if it does not. Neighbouring faces agree
+// about their common edge, except that both may contain it.
+double crossing_of(const ModelFace& face, const Ray& ray) {
+  bool is_left = true;
+  bool is_right = true;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const DVec3 from = DVec3(face.corners[i]) - ray.origin;
+    const DVec3 to = DVec3(face.corners[(i + 1) % 4]) - ray.origin;
+    const double volume = glm::dot(ray.direction, glm::cross(from, to));
+    is_left = is_left && volume >= 0.0;
+    is_right = is_right && volume <= 0.0;
+  }
+  const double along = component(face.normal, ray.direction);
+  if (is_left == is_right || along == 0.0) return std::numeric_limits<double>::quiet_NaN();
+  return component(face.normal, DVec3(face.corners[0]) - ray.origin) / along;
+}
+
+// Visits the ways of a ray, relative to the shape's voxel, through the closed surface of the free faces.
+template <class Visit>
+void cross_fluid(const ShapeModel& model, const Ray& ray, ShapeSpan& span, const Visit& visit) {
+  struct Crossing {
+    ShapeSpan::End end;
+    bool enters = false;
+  };
+  std::array<Crossing, 16> crossings;
+  std::size_t count = 0;
+  for (std::size_t i = model.faces.size() - model.free_faces; i < model.faces.size(); ++i) {
+    const double t = crossing_of(model.faces[i], ray);
+    if (std::isnan(t) || count == crossings.size()) continue;
+    crossings[count++] = {{t, static_cast<std::int16_t>(i), model.faces[i].direction},
+                          component(model.faces[i].normal, ray.direction) < 0.0};
+  }
+  std::sort(crossings.begin(), crossings.begin() + static_cast<std::ptrdiff_t>(count),
+            [](const Crossing& a, const Crossing& b) { return a.end.t != b.end.t ? a.end.t < b.end.t : a.enters; });
+  bool is_inside = false;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (crossings[i].enters) {
+      if (!is_inside) span.enter = crossings[i].end;
+      is_inside = true;
+    } else if (std::exchange(is_inside, false)) {
+      span.exit = crossings[i].end;
+      if (span.exit.t > 0.0 && span.exit.t > span.enter.t) visit(span);
+    }
+  }
+}
+
+template <class Visit>
+void cross_shape(const PlacedShape& shape, const Ray& ray_in_grid, const Visit& visit) {
+  const ShapeModel& model = *shape.model;
+  const Ray ray{ray_in_grid.origin - DVec3(shape.voxel), ray_in_grid.direction};
+  ShapeSpan span;
+  span.shape = &shape;
+  for (const ModelBox& box : model.boxes) {
+    span.box = &box;
+    if (cross_box(box, ray, span)) visit(static_cast<const ShapeSpan&>(span));
+  }
+  if (model.free_faces == 0) return;
+  span.box = nullptr;
+  cross_fluid(model, ray, span, visit);
+}
+
+// The texture coordinates of a point, relative to the shape's voxel, of a face: an affine map, known at the corners.
+std::array<float, 2> uv_at(const ModelFace& face, const DVec3& point) {
+  const auto& corners = face.corners;
+  // A corner may be there twice.
+  const std::size_t middle = corners[1] == corners[2] ? 2 : 1;
+  const DVec3 first = DVec3(corners[middle]) - DVec3(corners[0]);
+  const DVec3 second = DVec3(corners[middle + 1]) - DVec3(corners[middle]);
+  const DVec3 from = point - DVec3(corners[0]);
+  const double aa = glm::dot(first, first);
+  const double ab = glm::dot(first, second);
+  const double bb = glm::dot(second, second);
+  const double a = glm::dot(from, first);
+  const double b = glm::dot(from, second);
+  const double scale = 1.0 / (aa * bb - ab * ab);
+  const double s = (a * bb - b * ab) * scale;
+  const double r = (b * aa - a * ab) * scale;
+  std::array<float, 2> uv;
+  for (std::size_t i = 0; i < 2; ++i) {
+    const double at0 = face.uv[0][i];
+    const double at1 = face.uv[middle][i];
+    uv[i] = static_cast<float>(at0 + s * (at1 - at0) + r * (double{face.uv[middle + 1][i]} - at1));
+  }
+  return uv;
+}
+
+// Returns true if a face hides what is behind it at a point, relative to the shape's voxel.
+bool is_visible_at(const VoxelProperties& type, const ShapeModel& model, const ModelFace& face, const DVec3& point) {
+  if (type.visibility == Visibility::Opaque) return true;
+  const VoxelFace* const look = look_of(model, face, type.faces);
+  if (look == nullptr || look->texture.is_null() || look->alpha == FaceAlpha::Translucent) return false;
+  if (look->alpha == FaceAlpha::Opaque) return true;
+  const std::array<float, 2> uv = texture_uv(face, *look, uv_at(face, point));
+  const auto size = static_cast<std::uint32_t>(look->texture.size());
+  const std::size_t texel = texel_number(uv[1], 1.0, size) * std::size_t{size} + texel_number(uv[0], 1.0, size);
+  return look->texture.level(0)[texel].a >= kCutoutAlpha;
+}
+
+// A ray on its way through the cells that shapes touch.
+class ShapeRay {
+ public:
+  ShapeRay(const TracedShapes& shapes, const VoxelRegistry& types, const Ray& ray, double max_t, ShapeParts parts)
+      : shapes_(shapes), types_(types), ray_(ray), max_t_(max_t), parts_(parts) {
+    const DVec3 size = glm::abs(ray.direction);
+    room_ = kBetweenCells / std::max(std::max(size.x, size.y), size.z);
+  }
+
+  // Looks at one cell. Returns true if there is a hit, which is then the nearest one.
+  bool meet_cell(IVec3 cell, double t_enter, double t_exit) {
+    begin_ = t_enter - room_;
+    end_ = std::min(t_exit + room_, max_t_);
+    for (const PlacedShape& shape : shapes_.index.at(cell)) {
+      if (parts_ == ShapeParts::Opaque && types_[shape.type].visibility != Visibility::Opaque) continue;
+      if (parts_ == ShapeParts::Colliding && !types_[shape.type].collides) continue;
+      cross_shape(shape, ray_, [&](const ShapeSpan& span) {
+        if (parts_ == ShapeParts::Visible) return take_visible(span);
+        if (parts_ != ShapeParts::Colliding || span.collides()) take_solid(span);
+      });
+    }
+    return found_;
+  }
+
+  // As above, for a cell that the ray enters at `t_enter`. Sets `t_exit`.
+  bool meet_cell_from(IVec3 cell, double t_enter, double& t_exit) {
+    t_exit = kFar;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double d = ray_.direction[axis];
+      if (d == 0.0) continue;
+      t_exit = std::min(t_exit, (cell[axis] + (d > 0.0 ? 1.0 : 0.0) - ray_.origin[axis]) / d);
+    }
+    return meet_cell(cell, t_enter, t_exit);
+  }
+
+  // Looks at all cells from `t_begin` on.
+  bool meet_rest(double t_begin) {
+    if (t_begin > max_t_) return false;
+    const Ray rest{ray_.origin + t_begin * ray_.direction, ray_.direction};
+    visit_hits(shapes_.touched, rest, max_t_ - t_begin, [&](const VoxelSpan& span) {
+      return !meet_cell(span.voxel, t_begin + span.t_enter, t_begin + span.t_exit);
+    });
+    return found_;
+  }
+
+  [[nodiscard]] ShapeHit hit() const {
+    const PlacedShape& shape = *best_.shape;
+    ShapeHit hit{std::max(best_t_, 0.0), shape.voxel, shape.model, Vec3(0.0F), shape.type, -1, Direction::PosX, false};
+    if (is_inside_) {
+      hit.starts_inside = true;
+      hit.direction = nearest_direction(-ray_.direction);
+      hit.normal = Vec3(normal_of(hit.direction));
+      return hit;
+    }
+    const ShapeSpan::End& end = is_exit_ ? best_.exit : best_.enter;
+    hit.face = end.face;
+    hit.normal = is_exit_ ? -best_.normal(end) : best_.normal(end);
+    hit.direction = nearest_direction(DVec3(hit.normal));
+    return hit;
+  }
+
+ private:
+  void take(const ShapeSpan& span, double t, bool is_exit, bool is_inside) {
+    if (found_ && !(t < best_t_)) return;
+    found_ = true;
+    best_ = span;
+    best_t_ = t;
+    is_exit_ = is_exit;
+    is_inside_ = is_inside;
+  }
+  [[nodiscard]] bool is_in_cell(double t) const { return t >= begin_ && t <= end_; }
+  // Returns true if the ray, up to `max_t`, meets a side here that is drawn and visible.
+  [[nodiscard]] bool is_visible(const ShapeSpan& span, const ShapeSpan::End& end) const {
+    if (end.face < 0 || !(end.t >= 0.0) || !is_in_cell(end.t)) return false;
+    const PlacedShape& shape = *span.shape;
+    const DVec3 point = ray_.origin - DVec3(shape.voxel) + end.t * ray_.direction;
+    return is_visible_at(types_[shape.type], *shape.model, shape.model->faces[static_cast<std::size_t>(end.face)],
+                         point);
+  }
+  void take_visible(const ShapeSpan& span) {
+    const bool is_opaque = types_[span.shape->type].visibility == Visibility::Opaque;
+    if (span.starts_inside() && is_opaque) {
+      if (is_in_cell(0.0)) take(span, 0.0, false, true);
+    } else if (is_visible(span, span.enter)) {
+      take(span, span.enter.t, false, false);
+    } else if (is_visible(span, span.exit)) {
+      take(span, span.exit.t, true, false);
+    }
+  }
+  void take_solid(const ShapeSpan& span) {
+    const double t = std::max(span.enter.t, 0.0);
+    if (is_in_cell(t)) take(span, t, false, span.starts_inside());
+  }
+
+  const TracedShapes& shapes_;
+  const VoxelRegistry& types_;
+  const Ray& ray_;
+  double max_t_;
+  ShapeParts parts_;
+  double room_;
+  double begin_ = 0.0;
+  double end_ = 0.0;
+  ShapeSpan best_;
+  double best_t_ = 0.0;
+  bool found_ = false;
+  bool is_exit_ = false;
+  bool is_inside_ = false;
+};
+
+}  // namespace
+
+Vec3 ShapeSpan::normal(const End& end) const {
+  if (end.face >= 0) return shape->model->faces[static_cast<std::size_t>(end.face)].normal;
+  QUOIN_ASSERT(box != nullptr, "a free surface has a face");
+  if (!box->is_turned) return Vec3(normal_of(end.side));
+  const FaceFrame& frame = frame_of(end.side);
+  return glm::normalize(box->inverse[frame.axis]) * static_cast<float>(frame.sign);
+}
+
+std::array<float, 2> ShapeHit::uv(const DVec3& position) const {
+  QUOIN_ASSERT(face >= 0 && static_cast<std::size_t>(face) < model->faces.size(), "a face of the model");
+  return uv_at(model->faces[static_cast<std::size_t>(face)], position - DVec3(voxel));
+}
+
+void visit_shape(const PlacedShape& shape, const Ray& ray_in_grid, FunctionRef<void(const ShapeSpan&)> visit) {
+  cross_shape(shape, ray_in_grid, visit);
+}
+
+bool first_shape(const TracedShapes& shapes, const VoxelRegistry& types, const Ray& ray_in_grid, double max_t,
+                 ShapeParts parts, ShapeHit& hit) {
+  ShapeRay ray(shapes, types, ray_in_grid, max_t, parts);
+  if (!ray.meet_rest(0.0)) return false;
+  hit = ray.hit();
+  return true;
+}
+
+namespace {
+
+// Calls `visit(lane, ShapeRay&)` for each ray that meets a visible part of a shape.
+template <class Visit>
+void meet_lanes(const TracedShapes& shapes, const VoxelRegistry& types, const RayPacket& rays, const Visit& visit) {
+  PacketHits cells;
+  first_hits(shapes.touched, rays, cells);
+  for (std::uint32_t left = cells.hit; left != 0; left &= left - 1) {
+    const int lane = std::countr_zero(left);
+    const auto i = static_cast<std::size_t>(lane);
+    const Ray in_grid = rays.ray(lane);
+    ShapeRay ray(shapes, types, in_grid, rays.max_t[i], ShapeParts::Visible);
+    double t_exit = 0.0;
+    const bool is_met = ray.meet_cell_from({cells.x[i], cells.y[i], cells.z[i]}, cells.t[i], t_exit);
+    // The kernel and the exact walk may choose different cells next to an edge.
+    if (is_met || ray.meet_rest(std::max(cells.t[i], t_exit))) visit(lane, ray);
+  }
+}
+
+}  // namespace
+
+std::uint32_t first_shapes(const TracedShapes& shapes, const VoxelRegistry& types, const RayPacket& rays_in_grid,
+                           RayPacket::Lanes<ShapeHit>& hits) {
+  std::uint32_t met = 0;
+  meet_lanes(shapes, types, rays_in_grid, [&](int lane, const ShapeRay& ray) {
+    hits[static_cast<std::size_t>(lane)] = ray.hit();
+    met |= 1U << lane;
+  });
+  return met;
+}
+
+std::uint32_t any_shapes(const TracedShapes& shapes, const VoxelRegistry& types, const RayPacket& rays_in_grid) {
+  std::uint32_t met = 0;
+  meet_lanes(shapes, types, rays_in_grid, [&](int lane, const ShapeRay&) { met |= 1U << lane; });
+  return met;
+}
+
+}  // namespace quoin

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include <quoin/core/direction.h>
+#include <quoin/core/function_ref.h>
+#include <quoin/core/vec.h>
+#include <quoin/grid/voxel_registry.h>
+#include <quoin/grid/voxel_shape.h>
+#include <quoin/trace/packet.h>
+#include <quoin/trace/ray.h>
+
+#include "grid/shapes/shape_index.h"
+#include "scene/tracer/tree_cache.h"
+
+namespace quoin {
+
+/// The way of a ray through a box of a shape, or through a fluid with an inclined surface. A plate has no length.
+struct ShapeSpan {
+  /// One end of the way.
+  struct End {
+    double t = 0.0;
+    std::int16_t face = -1;            ///< index into ShapeModel::faces; -1: a side that is not drawn
+    Direction side = Direction::PosX;  ///< of the box, in its own space
+  };
+
+  const PlacedShape* shape = nullptr;
+  const ModelBox* box = nullptr;  ///< null for fluids
+  End enter;                      ///< negative t: the ray starts inside
+  End exit;
+
+  [[nodiscard]] bool starts_inside() const { return enter.t < 0.0; }
+  /// Returns true if bodies collide with the box.
+  [[nodiscard]] bool collides() const { return box == nullptr || box->collides; }
+  /// Returns the outward unit normal at an end, in the grid's space.
+  [[nodiscard]] Vec3 normal(const End& end) const;
+};
+
+/// Finds the ways of a ray through the boxes of a shape: all that end at or after t = 0, in the order of the boxes. A
+/// ray that only touches an edge meets nothing. Precision: double, relative to the shape's voxel.
+void visit_shape(const PlacedShape& shape, const Ray& ray_in_grid, FunctionRef<void(const ShapeSpan&)> visit);
+
+/// A surface of a shape that a ray meets, in the space of its grid. Without default values, so that packets of them
+/// need not be cleared.
+struct ShapeHit {
+  double t;
+  IVec3 voxel;              ///< of the shape, not of the cell in which the ray meets it
+  const ShapeModel* model;  ///< of that voxel
+  Vec3 normal;              ///< unit, towards the ray's origin
+  VoxelType type;
+  std::int16_t face;    ///< index into `model->faces`; -1: a side that is not drawn, or none
+  Direction direction;  ///< nearest to `normal`
+  bool starts_inside;   ///< `t` is 0, and `normal` is the direction that is most opposed to the ray's
+
+  /// Returns the texture coordinates of a point of the hit face, as ModelFace::uv has them. `position`: in the grid.
+  /// Requires: `face` is not -1.
+  [[nodiscard]] std::array<float, 2> uv(const DVec3& position) const;
+};
+
+/// The parts of shapes that a ray can hit.
+enum class ShapeParts : std::uint8_t {
+  All,        ///< boxes and fluids, with drawn sides or without
+  Colliding,  ///< those with which bodies collide
+  Opaque,     ///< those of an opaque material
+  Visible,    ///< drawn sides that hide what is behind: opaque ones, and cutout ones where their texel is visible
+};
+
+/// Finds the nearest part of the shapes that a ray meets from 0 up to and including `max_t`. Returns false if there is
+/// none. Cost: O(cells on the ray that shapes touch).
+bool first_shape(const TracedShapes& shapes, const VoxelRegistry& types, const Ray& ray_in_grid, double max_t,
+                 ShapeParts parts, ShapeHit& hit);
+
+/// As `first_shape` for each active ray of a packet, with ShapeParts::Visible. Returns the lanes with a hit.
+std::uint32_t first_shapes(const TracedShapes& shapes, const VoxelRegistry& types, const RayPacket& rays_in_grid,
+                           RayPacket::Lanes<ShapeHit>& hits);
+/// Returns the rays that hit visible parts of shapes.
+[[nodiscard]] std::uint32_t any_shapes(const TracedShapes& shapes, const VoxelRegistry& types,
+                                       const RayPacket& rays_in_grid);
+
+}  // namespace quoin
