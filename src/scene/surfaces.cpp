@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -164,15 +163,12 @@ Vec3 triplanar_colour(const TypeFaces& faces, const FieldPoint& point) {
   const DVec3 position = point.position * double{faces.field_scale};
   const DVec3 inside = position - glm::floor(position);
   const double square = point.square_spacing * double{faces.field_scale} * double{faces.field_scale};
-  // log2 of the distance of samples in textures, rounded; see Lighting::texel_colour.
-  const int log_spacing = (static_cast<int>(std::bit_cast<std::uint64_t>(2.0 * square) >> 52 & 0x7FF) - 1023) >> 1;
   Vec3 colour(0.0F);
   for (int axis = 0; axis < 3; ++axis) {
     const float weight = weights[static_cast<std::size_t>(axis)];
     if (!(weight > 0.0F)) continue;
     const FaceTexels& side = faces.sides[static_cast<std::size_t>(2 * axis + (n[axis] < 0.0F ? 1 : 0))];
-    const int level = std::clamp(log_spacing + side.log_size, 0, int{side.log_size});
-    colour += weight * side.colour(side.texel(inside, level));
+    colour += weight * side.colour(side.texel(inside, mipmap_level(square, side.log_size)));
   }
   return colour;
 }

@@ -71,6 +71,7 @@ class Tile {
   void take_sample(int sample);
   void take_block(int x, int y, const RayPacket& rays, int sample);
   [[nodiscard]] std::uint32_t lanes_through_glass(const RayPacket& rays, const SceneHits& hits) const;
+  static void put_on_shape(const ShapeModel& model, const ModelFace& face, const Vec3& normal, SurfacePoint& point);
   void add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, std::size_t pixel, Vec3 weight);
   // The effect of glass on a ray.
   struct Sight {
@@ -92,6 +93,7 @@ class Tile {
   void fill_in(const Ray& ray, const GlassBody& body, const DVec3& normal, SurfacePoint& point) const;
   // Adds a point for the caller to fill in; its light counts with `weight` in that pixel.
   SurfacePoint& add_point(std::size_t pixel, Vec3 weight);
+  void turn_by_state(const VoxelRegistry& types, SurfacePoint& point) const;
   void light_points();
 
   const TileContext* context_;
@@ -208,6 +210,11 @@ void Tile::add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, st
   if (point.in_field) {
     point.normal = hits.normal(i);
     point.type = hits.material[i];
+  } else if ((hits.in_shape >> lane & 1U) != 0) {
+    const ShapeHit& hit = hits.shapes[i];
+    point.type = hit.type;
+    if (hit.face >= 0)
+      put_on_shape(*hit.model, hit.model->faces[static_cast<std::size_t>(hit.face)], hit.normal, point);
   } else {
     point.position = on_face(point.position, point.voxel, point.face);
   }
@@ -223,6 +230,17 @@ void Tile::add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, st
   }
   point.type = far_faces_.face[i]->type;
   point.openness = openness_of(*far_faces_.face[i], context_->options->light.occlusion_mode, point.position);
+}
+
+// Sets the side of a shape that a point shows. Corrects the rounding of its position.
+void Tile::put_on_shape(const ShapeModel& model, const ModelFace& face, const Vec3& normal, SurfacePoint& point) {
+  point.model = &model;
+  point.shape_face = &face;
+  point.normal = normal;
+  point.is_tilted = normal != Vec3(normal_of(point.face));
+  if (point.is_tilted) return;
+  const int axis = frame_of(point.face).axis;
+  point.position[axis] = double{face.corners[0][axis]} + point.voxel[axis];
 }
 
 Tile::Sight Tile::add_transparent(const Ray& ray, double max_t, std::size_t pixel) {
@@ -290,6 +308,9 @@ void Tile::fill_in(const Ray& ray, const GlassBody& body, const DVec3& normal, S
     point.normal = Vec3(normal);
     point.face = nearest_direction(normal);
     point.type = body.type;
+  } else if (body.model != nullptr) {
+    point.type = body.type;
+    if (body.shape_face != nullptr) put_on_shape(*body.model, *body.shape_face, body.normal, point);
   } else {
     point.position = on_face(point.position, body.voxel, body.face);
   }
@@ -328,8 +349,18 @@ SurfacePoint& Tile::add_point(std::size_t pixel, Vec3 weight) {
   return added;
 }
 
+// Turns the textures of a cube that is seen in full detail.
+void Tile::turn_by_state(const VoxelRegistry& types, SurfacePoint& point) const {
+  const PlacedGrid& placed = placed_in(context_->view->tracer())[static_cast<std::size_t>(point.placed)];
+  if (placed.level != 0 || point.is_far || !types.is_opaque(point.type)) return;
+  const std::uint32_t state = placed.voxels->data(point.voxel).state;
+  point.orientation = static_cast<std::uint8_t>(types[point.type].orientations.of(state).index());
+}
+
 void Tile::light_points() {
   const BlockVector<PlacedGrid>& placed = placed_in(context_->view->tracer());
+  const VoxelRegistry& types = context_->view->tracer().scene().types;
+  const bool has_turned = types.has_turned_by_state();
   std::optional<GridReader> reader;
   std::int32_t known = -1;
   for (SurfacePoint& point : points_) {
@@ -340,6 +371,7 @@ void Tile::light_points() {
       reader.emplace(*placed[static_cast<std::size_t>(known)].voxels);
     }
     if (point.type == kAir) point.type = reader->get(point.voxel);
+    if (has_turned && types.is_turned_by_state(point.type)) turn_by_state(types, point);
   }
   QUOIN_ASSERT(targets_.size() == points_.size(), "one target per point");
   lit_.resize(points_.size());
@@ -408,6 +440,7 @@ struct CpuRenderer::Impl {
     std::vector<LampPlace> places;
     for (const PlacedGrid& each : placed_in(tracer)) {
       places.push_back(lamp_place(*scene, each, *each.opaque, each.transparent, each.field));
+      if (each.shapes != nullptr) places.back().shapes = &each.shapes->touched;
     }
     return places;
   }
@@ -474,7 +507,8 @@ Result<RenderedImage> CpuRenderer::render(const Camera& camera, const RenderOpti
       impl_of(impl_).lamp_table(options.light, environment.lamp_brightness, threads);
   Lighting lighting(view, impl_of(impl_).scene->types, impl_of(impl_).surfaces, options.light, environment, lamps.get(),
                     options.detail.colours, impl_of(impl_).levels_of(view.tracer(), options.light, threads));
-  if (impl_of(impl_).scene->types.has_textures()) {
+  const VoxelRegistry& types = impl_of(impl_).scene->types;
+  if (types.has_textures() || types.has_shapes()) {
     lighting.show_textures(glm::length(rays.down()) / std::sqrt(options.samples), rays.is_perspective());
   }
   const TileContext context{&view, &rays, &lighting, &options, subject.impostors ? &*subject.impostors : nullptr};

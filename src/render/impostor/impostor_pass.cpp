@@ -189,6 +189,7 @@ void ImpostorPass::find(int column, int row, const RayPacket& rays, const raster
     hits.grids.starts_inside &= ~bit;
     hits.placed[i] = drawn.placed;
     hits.in_field &= ~bit;
+    hits.in_shape &= ~bit;
     faces.surfel[i] = face.in_field ? &drawn.faces->surfel_of(number) : nullptr;
     if (face.in_field) {
       const Vec3 normal = faces.surfel[i]->normal;
@@ -237,7 +238,7 @@ class FarTile {
   void draw_block(int column, int row, const RayPacket& rays) {
     SceneHits hits;
     FarFaces faces;
-    hits.grids.hit = hits.grids.starts_inside = hits.in_field = 0;
+    hits.grids.hit = hits.grids.starts_inside = hits.in_field = hits.in_shape = 0;
     pass_->find(column, row, rays, *far_, hits, faces);
     for (std::uint32_t left = faces.found; left != 0; left &= left - 1) {
       const int lane = std::countr_zero(left);

@@ -22,6 +22,7 @@ constexpr double kClosed = -11.0;
 constexpr double kDiagonal = 1.7320508075688774;  // of a cube of 1
 constexpr double kLeastClosing = 1e-9;            // for clear materials
 constexpr double kLargestBlock = 64.0;            // of one type in a tree
+constexpr double kThinnest = 1e-9;                // length in voxels of a plate, which has none
 
 bool continues(const GlassBody& body, VoxelType type, double t_enter) {
   return type == body.type && reaches(body, t_enter);
@@ -33,6 +34,7 @@ class BodiesOfGrid {
   BodiesOfGrid(const SceneView& view, const Surfaces& surfaces, std::int32_t index, const Ray& ray_in_grid,
                double max_t, double length, SeenThrough& out)
       : placed_(placed_in(view.tracer())[static_cast<std::size_t>(index)]),
+        types_(&view.tracer().scene().types),
         surfaces_(surfaces),
         index_(index),
         ray_(ray_in_grid),
@@ -79,6 +81,24 @@ class BodiesOfGrid {
       return is_seen_beyond(log_clarity_, voxels);
     });
     return is_open;
+  }
+
+  void add_shapes() {
+    begin();
+    const TracedShapes& shapes = *placed_.shapes;
+    visit_hits(shapes.glass, ray_, max_t_, [&](const VoxelSpan& cell) {
+      const std::size_t old_size = parts_.size();
+      for (const PlacedShape& shape : shapes.index.at(cell.voxel)) {
+        if (shape.type >= shapes.is_glass.size() || shapes.is_glass[shape.type] == 0) continue;
+        visit_shape(shape, ray_, [&](const ShapeSpan& span) { note_part(span, cell); });
+      }
+      std::sort(parts_.begin() + static_cast<std::ptrdiff_t>(old_size), parts_.end(),
+                [](const GlassBody& a, const GlassBody& b) { return a.t_enter < b.t_enter; });
+      bool is_open = true;
+      for (std::size_t i = old_size; i < parts_.size() && is_open; ++i) is_open = add(parts_[i]);
+      parts_.resize(old_size);
+      return is_open;
+    });
   }
 
   void add_field() {
@@ -166,18 +186,54 @@ class BodiesOfGrid {
     return {span.voxel, span.behind, span.face, span.exit_face, span.starts_inside, span.t_enter, span.t_exit};
   }
 
+  // Notes the part of a shape's glass within a cell.
+  void note_part(const ShapeSpan& span, const VoxelSpan& cell) {
+    const ShapeModel& model = *span.shape->model;
+    const bool is_plate = span.enter.t == span.exit.t;
+    const double t_enter = std::max(span.enter.t, cell.t_enter);
+    const double t_exit = std::min({span.exit.t, cell.t_exit, max_t_});
+    if (is_plate ? t_enter != span.enter.t || t_exit != span.exit.t : !(t_enter < t_exit)) return;
+    const bool starts_inside = span.starts_inside();
+    if (!starts_inside && span.enter.face < 0) return;
+    const ModelFace* const face = starts_inside ? nullptr : &model.faces[static_cast<std::size_t>(span.enter.face)];
+    const VoxelFace* const look = face == nullptr ? nullptr : look_of(model, *face, (*types_)[span.shape->type].faces);
+    const bool has_texture = look != nullptr && !look->texture.is_null();
+    if (has_texture && look->alpha != FaceAlpha::Translucent) return;  // no glass
+    GlassBody& part = parts_.emplace_back(body_of(span.shape->voxel, span.shape->type, t_enter, t_exit, starts_inside));
+    if (is_plate) part.voxels = kThinnest;
+    part.model = &model;
+    part.shape_face = face;
+    part.exit_in_shape = true;
+    part.normal = span.normal(span.enter);
+    part.exit_normal = span.normal(span.exit);
+    part.face = nearest_direction(DVec3(part.normal));
+    part.exit_face = nearest_direction(DVec3(part.exit_normal));
+    if (!has_texture) return;
+    const DVec3 point = ray_.origin + ray_.direction * span.enter.t - DVec3(span.shape->voxel);
+    const Rgba8 texel = shape_texel(*face, *look, point);
+    part.is_textured = true;
+    part.colour = linear_colour(texel) * linear_colour(look->tint);
+    part.alpha = static_cast<float>(texel.a) / 255.0F;
+  }
+
   // Returns false if nothing behind the body is visible.
   bool add(const GlassBody& next) {
     if (!(next.voxels > 0.0)) return true;  // an edge that it only touches
     if (out_.size() > first_ && continues(out_.back(), next.type, next.t_enter)) {
+      GlassBody& body = out_.back();
+      if (next.t_exit <= body.t_exit) return true;  // within it: the same box in another cell, or crossing plates
+      body.exit_in_shape = next.exit_in_shape;
+      body.exit_normal = next.exit_normal;
       lengthen(next.t_exit, next.exit_face, next.voxels);
     } else {
       out_.push_back(next);
     }
-    return is_seen_beyond(surfaces_[next.type].log_clarity, next.voxels);
+    const float log_clarity = next.is_textured ? log_of_clear(next.alpha) : surfaces_[next.type].log_clarity;
+    return is_seen_beyond(log_clarity, next.voxels);
   }
 
   const PlacedGrid& placed_;
+  const VoxelRegistry* types_;
   const Surfaces& surfaces_;
   std::int32_t index_;
   const Ray& ray_;
@@ -188,6 +244,7 @@ class BodiesOfGrid {
   bool has_textured_glass_;
   std::vector<GlassBody>& out_;
   std::vector<MetFace>& faces_;
+  std::vector<GlassBody> parts_;  // of shapes, in the cell that the ray is in
   std::size_t first_ = 0;
   double clarity_ = 0.0;
   float log_clarity_ = 0.0F;  // of the body that the ray is in
@@ -206,6 +263,8 @@ void join_touching(std::vector<GlassBody>& bodies) {
         bodies[kept].exit_placed = bodies[i].exit_placed;
         bodies[kept].exit_face = bodies[i].exit_face;
         bodies[kept].exit_in_field = bodies[i].exit_in_field;
+        bodies[kept].exit_in_shape = bodies[i].exit_in_shape;
+        bodies[kept].exit_normal = bodies[i].exit_normal;
       }
       bodies[kept].voxels += bodies[i].voxels;
     } else {
@@ -243,6 +302,7 @@ void find_transparent(const SceneView& view, const Surfaces& surfaces, const Ray
     const PlacedGrid& placed = placed_in(view.tracer())[static_cast<std::size_t>(index)];
     BodiesOfGrid bodies(view, surfaces, index, ray, out.end, length, out);
     if (placed.transparent != nullptr && !bodies.add_voxels()) out.end = out.faces.back().t;
+    if (placed.shapes != nullptr && placed.shapes->has_glass()) bodies.add_shapes();
     if (placed.glass != nullptr) bodies.add_field();
   });
   join_touching(out.bodies);
@@ -253,7 +313,8 @@ Surface surface_of(const Surfaces& surfaces, const GlassBody& body) {
   Surface surface = surfaces[body.type];
   if (!body.is_textured) return surface;
   surface.colour = body.colour;
-  surface.emitted = body.colour * surfaces.faces(body.type)->sides.front().emission;
+  const TypeFaces* const faces = surfaces.faces(body.type);
+  surface.emitted = body.colour * (faces == nullptr ? 0.0F : faces->sides.front().emission);
   set_absorption(body.alpha, surface);
   return surface;
 }
@@ -275,6 +336,7 @@ bool lies_on_opaque(const SceneView& view, const Ray& ray_in_view, const GlassBo
 }
 
 DVec3 normal_entered(const SceneView& view, const Ray& ray_in_view, const GlassBody& body) {
+  if (body.model != nullptr) return DVec3(body.normal);
   if (!body.in_field) return DVec3(normal_of(body.face));
   const DVec3 point = view.grid_from_view(body.placed).point(ray_in_view.origin + ray_in_view.direction * body.t_enter);
   const PlacedGrid& placed = placed_in(view.tracer())[static_cast<std::size_t>(body.placed)];
@@ -283,6 +345,7 @@ DVec3 normal_entered(const SceneView& view, const Ray& ray_in_view, const GlassB
 }
 
 DVec3 normal_left(const SceneView& view, const Ray& ray_in_view, const GlassBody& body) {
+  if (body.exit_in_shape) return DVec3(body.exit_normal);
   if (!body.exit_in_field) return DVec3(normal_of(body.exit_face));
   const DVec3 point =
       view.grid_from_view(body.exit_placed).point(ray_in_view.origin + ray_in_view.direction * body.t_exit);

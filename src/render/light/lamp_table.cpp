@@ -131,7 +131,7 @@ class ListMaker {
       find_near(sphere_of(place, corner, kChunkEdge));
       if (near_.empty()) continue;
       std::uint64_t held = bricks_of(opaque, chunk);
-      for (const OccupancyTree* const other : {place.transparent, place.cells}) {
+      for (const OccupancyTree* const other : {place.transparent, place.cells, place.shapes}) {
         if (other != nullptr) held |= bricks_of(trace::TreeNodes(*other), chunk);
       }
       for (std::uint64_t left = held; left != 0; left &= left - 1) {

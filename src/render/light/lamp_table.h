@@ -95,6 +95,7 @@ struct LampPlace {
   const OccupancyTree* opaque = nullptr;
   const OccupancyTree* transparent = nullptr;  ///< may be null
   const OccupancyTree* cells = nullptr;        ///< of the field; may be null
+  const OccupancyTree* shapes = nullptr;       ///< voxels that shapes touch; may be null
 };
 
 /// Returns the lamp data of a placed grid at full detail. Requires: `placed` belongs to `scene`; does not use its

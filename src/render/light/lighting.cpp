@@ -36,7 +36,7 @@ void set_direction(RayPacket& rays, std::size_t lane, DVec3 direction) {
 constexpr std::size_t kGroups = 16;
 
 DVec3 normal_at(const SurfacePoint& point) {
-  return point.in_field ? DVec3(point.normal) : DVec3(normal_of(point.face));
+  return point.has_normal() ? DVec3(point.normal) : DVec3(normal_of(point.face));
 }
 
 }  // namespace
@@ -85,7 +85,7 @@ struct Lighting::Group {
       if (point.openness < 0.0F) unknown |= 1U << size;
     }
     DVec3 origin = point.position;
-    if (point.in_field) {
+    if (point.has_normal()) {
       origin += lift * DVec3(point.normal);
     } else {
       const FaceFrame& frame = frame_of(point.face);
@@ -96,7 +96,7 @@ struct Lighting::Group {
     origins.origin_z[size] = origin.z;
     set_direction(origins, size, normal_at(point));
     placed = point.placed;
-    is_one_face &= !point.in_field && (size == 0 || point.face == points[0]->face);
+    is_one_face &= !point.has_normal() && (size == 0 || point.face == points[0]->face);
     points[size++] = &point;
   }
 };
@@ -232,8 +232,8 @@ void Lighting::find_propagated(const Group& group, std::span<Vec3> light) const 
     const auto i = static_cast<std::size_t>(std::countr_zero(left));
     const SurfacePoint& point = *group.points[i];
     MeanLevels levels;
-    if (point.in_field) {
-      levels = light_before(voxels, point.position * std::ldexp(1.0, level), point.normal, 1 << level);
+    if (point.has_normal() || point.model != nullptr) {
+      levels = light_before(voxels, point.position * std::ldexp(1.0, level), Vec3(normal_at(point)), 1 << level);
     } else {
       const FacePlace place(point.voxel, point.face, point.position - DVec3(point.voxel), level);
       levels = light_on_face(voxels, place, point.face, level);
@@ -243,7 +243,7 @@ void Lighting::find_propagated(const Group& group, std::span<Vec3> light) const 
 }
 
 float Lighting::diffuse(const Frame& frame, const SurfacePoint& point) const {
-  if (!point.in_field) return frame.diffuse[index_of(point.face)];
+  if (!point.has_normal()) return frame.diffuse[index_of(point.face)];
   return static_cast<float>(std::max(glm::dot(DVec3(point.normal), frame.to_sun), 0.0) * daylight_.sun_brightness);
 }
 
@@ -457,6 +457,11 @@ std::int64_t Lighting::find_openness(const Group& group, std::span<float> openne
   for (std::size_t i = 0; i < group.size; ++i) {
     if (((group.unknown & ~traced) >> i & 1U) == 0) continue;
     const SurfacePoint& point = *group.points[i];
+    // Sides inside a voxel have no corners of voxels.
+    if (point.model != nullptr && (point.shape_face == nullptr || !point.shape_face->on_side)) {
+      openness[i] = 1.0F;
+      continue;
+    }
     // Neighbours often lie on the same face.
     const bool is_new = last == nullptr || point.voxel != last->voxel || point.face != last->face;
     last = &point;
@@ -516,10 +521,10 @@ void Lighting::set_occlusion_directions(const Group& group, int ray, RayPacket& 
     const SurfacePoint& point = *group.points[i];
     const std::size_t face = index_of(point.face);
     const bool is_fixed = group.directions != nullptr;
-    // For a field's surface, uses the directions of an upward face, rotated to the normal.
-    const std::size_t of = point.in_field ? index_of(Direction::PosY) : face;
+    // For an inclined surface, uses the directions of an upward face, rotated to the normal.
+    const std::size_t of = point.has_normal() ? index_of(Direction::PosY) : face;
     DVec3 direction = is_fixed ? (*group.directions)[of][number] : directions_.spread(of, ray, point.pixel);
-    if (point.in_field) direction = turned_from_up(direction, DVec3(point.normal));
+    if (point.has_normal()) direction = turned_from_up(direction, DVec3(point.normal));
     set_direction(rays, i, direction);
   }
 }
@@ -531,13 +536,6 @@ Lighting::Colours Lighting::colours_of_field(const SurfacePoint& point, const Fi
   const IVec3 cell = voxel_of(at);
   const Surface blend = surfaces_->blend_of_field(field, cell, at - DVec3(cell), point.type, textured);
   return {blend.colour, blend.emitted};
-}
-
-double Lighting::square_spacing_at(const SurfacePoint& point) const {
-  const Frame& frame = frames_[static_cast<std::size_t>(point.placed)];
-  if (!is_perspective_) return frame.square_spacing;
-  const DVec3 away = point.position - frame.eye;
-  return frame.square_spacing * glm::dot(away, away);
 }
 
 // Inlined, as `colours_at`: a call per point would take a noticeable part of an unlit image's time.
@@ -572,7 +570,9 @@ void Lighting::show_textures(double spacing, bool is_perspective) {
 const FaceTexels* Lighting::texels_at(const SurfacePoint& point) const {
   const TypeFaces* const faces = surfaces_->faces(point.type);
   if (faces == nullptr || point.in_field || point.kind == PointKind::Glow) return nullptr;
-  return &faces->sides[point.side == SurfacePoint::kSideOfFace ? index_of(point.face) : point.side];
+  if (point.side != SurfacePoint::kSideOfFace) return &faces->sides[point.side];
+  if (point.orientation == 0) return &faces->sides[index_of(point.face)];
+  return &faces->sides[index_of(AxisOrientation::at(point.orientation).inverse().apply(point.face))];
 }
 
 // Cells of halved grids stand for many voxels, as faces of impostors do.
@@ -580,14 +580,39 @@ bool Lighting::shows_mean_of_face(const SurfacePoint& point) const {
   return point.is_far || frames_[static_cast<std::size_t>(point.placed)].voxels_per_cell != 1.0;
 }
 
+// Inlined: `texel_colour` stays one function.
+__attribute__((always_inline)) inline double Lighting::square_spacing_at(const SurfacePoint& point) const {
+  const Frame& frame = frames_[static_cast<std::size_t>(point.placed)];
+  if (!is_perspective_) return frame.square_spacing;
+  const DVec3 away = point.position - frame.eye;
+  return frame.square_spacing * glm::dot(away, away);
+}
+
 // As `texel_at`, with the mipmap level of the point's distance.
 Vec3 Lighting::texel_colour(const FaceTexels& face, const SurfacePoint& point) const {
-  const double square = square_spacing_at(point);
-  // The level is log2 of the texels between samples, rounded. That is half the exponent of twice their square, plus
-  // the texture's own size.
-  const auto exponent = static_cast<int>(std::bit_cast<std::uint64_t>(2.0 * square) >> 52 & 0x7FF) - 1023;
-  const int level = std::clamp((exponent >> 1) + face.log_size, 0, int{face.log_size});
-  return face.colour(face.texel(point.position - DVec3(point.voxel), level));
+  const int level = mipmap_level(square_spacing_at(point), face.log_size);
+  DVec3 inside = point.position - DVec3(point.voxel);
+  if (point.orientation != 0) [[unlikely]] {
+    inside = AxisOrientation::at(point.orientation).inverse().apply(inside - 0.5) + 0.5;
+  }
+  return face.colour(face.texel(inside, level));
+}
+
+Lighting::Colours Lighting::colours_of_shape(const SurfacePoint& point) const {
+  const VoxelProperties& type = (*types_)[point.type];
+  const ModelFace& face = *point.shape_face;
+  const VoxelFace* const look = look_of(*point.model, face, type.faces);
+  if (look == nullptr) return colours_of_type(point);
+  const Vec3 tint = linear_colour(look->tint);
+  const float emission = emission_of(type);
+  if (look->texture.is_null()) return {tint, tint * emission};
+  const ShapeUv at = shape_uv(face, *look, point.position - DVec3(point.voxel));
+  const int log_size = look->texture.level_count() - 1;
+  const int level = mipmap_level(square_spacing_at(point) * at.square_density, log_size);
+  const std::uint32_t size = 1U << (log_size - level);
+  const std::size_t number = texel_number(at.uv[1], 1.0, size) * std::size_t{size} + texel_number(at.uv[0], 1.0, size);
+  const Vec3 colour = linear_colour(look->texture.level(level)[number]) * tint;
+  return {colour, colour * emission};
 }
 
 // Not inlined: the loop over unlit points stays small.
@@ -596,6 +621,7 @@ __attribute__((noinline)) Lighting::Colours Lighting::other_colours_at(const Sur
   QUOIN_ASSERT(placed < frames_.size(), "one of the placed grids");
   const bool is_bare = point.in_field && point.type == kAir;
   if (!detail_surfaces_.empty() && !is_bare) return {detail_surfaces_[placed].colour, detail_surfaces_[placed].emitted};
+  if (point.shape_face != nullptr) return colours_of_shape(point);
   if (point.is_blended && surfaces_->has_textures()) {
     // Cells of halved fields are larger, but textures keep their size.
     const double scale = voxels_per_cell(point.placed);

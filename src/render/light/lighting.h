@@ -8,6 +8,7 @@
 #include <quoin/core/direction.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/texture.h>
+#include <quoin/grid/voxel_shape.h>
 #include <quoin/render/light_options.h>
 #include <quoin/render/propagated_light.h>
 
@@ -30,21 +31,29 @@ enum class PointKind : std::uint8_t {
 struct SurfacePoint {
   static constexpr std::uint16_t kSideOfFace = 0xFFFF;
 
-  DVec3 position{0.0};  ///< in its grid, on the face or surface
-  IVec3 voxel{0};
+  DVec3 position{0.0};      ///< in its grid, on the face or surface
+  IVec3 voxel{0};           ///< of a shape's point: the voxel that has the shape
   std::int32_t placed = 0;  ///< index into SceneTracer::placed
   VoxelType type = kAir;
   Direction face = Direction::PosX;  ///< fields: the direction nearest to the normal
   bool in_field = false;
-  bool is_far = false;      ///< of an impostor, whose faces show the means of their textures
-  bool is_blended = false;  ///< fields: a blend of the materials around, as Surfaces::blend_of_field
+  bool is_far = false;           ///< of an impostor, whose faces show the means of their textures
+  bool is_blended = false;       ///< fields: a blend of the materials around, as Surfaces::blend_of_field
+  bool is_tilted = false;        ///< of a shape's turned element, or inclined fluid: `normal` counts, not `face`
+  std::uint8_t orientation = 0;  ///< AxisOrientation::index of a cube that its state turns
+  /// For a shape: the side that is seen, and the model of `voxel`; null for others, and for what has the type's colour.
+  const ModelFace* shape_face = nullptr;
+  const ShapeModel* model = nullptr;
   /// Index into TypeFaces::sides of the texture that it shows; kSideOfFace: that of `face`.
   std::uint16_t side = kSideOfFace;
-  Vec3 normal{0.0F};  ///< of a field, in its grid, of unit length or 0
+  Vec3 normal{0.0F};  ///< of a field or where `is_tilted`, in its grid, of unit length or 0
   float lift = 0.0F;  ///< of a field: height of the position above the surface, along the normal
   PointKind kind = PointKind::Surface;
   std::uint32_t pixel = 0;  ///< seed for random numbers: combines pixel and sample
   float openness = -1.0F;   ///< 0 to 1 if already known, independent of the occlusion options; less than 0: unknown
+
+  /// Returns true if `normal` counts, not `face`.
+  [[nodiscard]] bool has_normal() const { return in_field || is_tilted; }
 };
 
 /// The reference lighting model: a sun with shadows, an ambient term with occlusion, and emission.
@@ -134,6 +143,7 @@ class Lighting {
   [[nodiscard]] const FaceTexels* texels_at(const SurfacePoint& point) const;
   [[nodiscard]] bool shows_mean_of_face(const SurfacePoint& point) const;
   [[nodiscard]] Vec3 texel_colour(const FaceTexels& face, const SurfacePoint& point) const;
+  [[nodiscard]] Colours colours_of_shape(const SurfacePoint& point) const;
   [[nodiscard]] Vec3 shade(const SurfacePoint& point, Vec3 direct, float openness) const;
   [[nodiscard]] Vec3 shade_lit(const SurfacePoint& point, Vec3 direct, float openness) const;
   // Returns the sun's diffuse term without shadows.

@@ -75,7 +75,8 @@ bool has_opaque(const PlacedGrid& placed) {
 }
 
 bool has_transparent(const PlacedGrid& placed) {
-  return placed.transparent != nullptr || placed.glass != nullptr;
+  return placed.transparent != nullptr || placed.glass != nullptr ||
+         (placed.shapes != nullptr && placed.shapes->has_glass());
 }
 
 // Adds the rays that hit the opaque field of a placed grid to `blocked`, the rays that hit its voxels. Rays are in its
@@ -146,7 +147,9 @@ struct SceneView::Impl {
     std::uint32_t met = placed.transparent == nullptr ? 0 : quoin::any_hits(*placed.transparent, room);
     room.active &= ~met;
     if (placed.glass != nullptr) met |= quoin::any_hits(placed.glass->cells(), room);
-    return met;
+    if (placed.shapes == nullptr) return met;
+    room.active &= ~met;
+    return met | quoin::any_hits(placed.shapes->glass, room);
   }
   // Returns `blocked` and the other rays, in the space of grid `own`, that hit another instance.
   [[nodiscard]] std::uint32_t blocked_by_others(std::size_t own, const RayPacket& rays_in_grid,

@@ -72,8 +72,8 @@ class SceneView {
   /// Requires: at least as many elements in `blocked` as packets.
   void any_hits(std::int32_t home, std::span<const RayPacket> packets_in_grid, std::span<std::uint32_t> blocked) const;
 
-  /// Returns the rays that hit a transparent voxel of any instance, or a field cell that may contain transparent
-  /// material.
+  /// Returns the rays that hit a transparent voxel of any instance, or a voxel or field cell that may contain
+  /// transparent parts of a shape or transparent material.
   [[nodiscard]] std::uint32_t any_transparent(const RayPacket& rays_in_view) const;
 
   /// Calls `visit` for each instance with transparent voxels or transparent field parts that one ray may hit before

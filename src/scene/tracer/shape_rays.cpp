@@ -133,41 +133,13 @@ void cross_shape(const PlacedShape& shape, const Ray& ray_in_grid, const Visit& 
   cross_fluid(model, ray, span, visit);
 }
 
-// The texture coordinates of a point, relative to the shape's voxel, of a face: an affine map, known at the corners.
-std::array<float, 2> uv_at(const ModelFace& face, const DVec3& point) {
-  const auto& corners = face.corners;
-  // A corner may be there twice.
-  const std::size_t middle = corners[1] == corners[2] ? 2 : 1;
-  const DVec3 first = DVec3(corners[middle]) - DVec3(corners[0]);
-  const DVec3 second = DVec3(corners[middle + 1]) - DVec3(corners[middle]);
-  const DVec3 from = point - DVec3(corners[0]);
-  const double aa = glm::dot(first, first);
-  const double ab = glm::dot(first, second);
-  const double bb = glm::dot(second, second);
-  const double a = glm::dot(from, first);
-  const double b = glm::dot(from, second);
-  const double scale = 1.0 / (aa * bb - ab * ab);
-  const double s = (a * bb - b * ab) * scale;
-  const double r = (b * aa - a * ab) * scale;
-  std::array<float, 2> uv;
-  for (std::size_t i = 0; i < 2; ++i) {
-    const double at0 = face.uv[0][i];
-    const double at1 = face.uv[middle][i];
-    uv[i] = static_cast<float>(at0 + s * (at1 - at0) + r * (double{face.uv[middle + 1][i]} - at1));
-  }
-  return uv;
-}
-
 // Returns true if a face hides what is behind it at a point, relative to the shape's voxel.
 bool is_visible_at(const VoxelProperties& type, const ShapeModel& model, const ModelFace& face, const DVec3& point) {
   if (type.visibility == Visibility::Opaque) return true;
   const VoxelFace* const look = look_of(model, face, type.faces);
   if (look == nullptr || look->texture.is_null() || look->alpha == FaceAlpha::Translucent) return false;
   if (look->alpha == FaceAlpha::Opaque) return true;
-  const std::array<float, 2> uv = texture_uv(face, *look, uv_at(face, point));
-  const auto size = static_cast<std::uint32_t>(look->texture.size());
-  const std::size_t texel = texel_number(uv[1], 1.0, size) * std::size_t{size} + texel_number(uv[0], 1.0, size);
-  return look->texture.level(0)[texel].a >= kCutoutAlpha;
+  return shape_texel(face, *look, point).a >= kCutoutAlpha;
 }
 
 // A ray on its way through the cells that shapes touch.
@@ -249,13 +221,17 @@ class ShapeRay {
     return is_visible_at(types_[shape.type], *shape.model, shape.model->faces[static_cast<std::size_t>(end.face)],
                          point);
   }
+  // Both sides of a plate are at one place: the ray meets the side that it looks at.
+  static bool is_seen_from_inside(const ShapeSpan& span) {
+    return span.enter.t < span.exit.t || span.enter.face < 0;
+  }
   void take_visible(const ShapeSpan& span) {
     const bool is_opaque = types_[span.shape->type].visibility == Visibility::Opaque;
     if (span.starts_inside() && is_opaque) {
       if (is_in_cell(0.0)) take(span, 0.0, false, true);
     } else if (is_visible(span, span.enter)) {
       take(span, span.enter.t, false, false);
-    } else if (is_visible(span, span.exit)) {
+    } else if (is_seen_from_inside(span) && is_visible(span, span.exit)) {
       take(span, span.exit.t, true, false);
     }
   }
@@ -289,9 +265,42 @@ Vec3 ShapeSpan::normal(const End& end) const {
   return glm::normalize(box->inverse[frame.axis]) * static_cast<float>(frame.sign);
 }
 
-std::array<float, 2> ShapeHit::uv(const DVec3& position) const {
-  QUOIN_ASSERT(face >= 0 && static_cast<std::size_t>(face) < model->faces.size(), "a face of the model");
-  return uv_at(model->faces[static_cast<std::size_t>(face)], position - DVec3(voxel));
+// The coordinates are an affine map, known at the corners.
+ShapeUv shape_uv(const ModelFace& face, const VoxelFace& look, const DVec3& point) {
+  const auto& corners = face.corners;
+  // A corner may be there twice.
+  const std::size_t middle = corners[1] == corners[2] ? 2 : 1;
+  const DVec3 first = DVec3(corners[middle]) - DVec3(corners[0]);
+  const DVec3 second = DVec3(corners[middle + 1]) - DVec3(corners[middle]);
+  const DVec3 from = point - DVec3(corners[0]);
+  const double aa = glm::dot(first, first);
+  const double ab = glm::dot(first, second);
+  const double bb = glm::dot(second, second);
+  const double a = glm::dot(from, first);
+  const double b = glm::dot(from, second);
+  const double scale = 1.0 / (aa * bb - ab * ab);
+  const double along_first = (a * bb - b * ab) * scale;
+  const double along_second = (b * aa - a * ab) * scale;
+  ShapeUv result;
+  std::array<float, 2> uv{};
+  double square = 0.0;
+  for (std::size_t i = 0; i < 2; ++i) {
+    const double begin = face.uv[0][i];
+    const double step = face.uv[middle][i] - begin;
+    uv[i] = static_cast<float>(begin + along_first * step +
+                               along_second * (double{face.uv[middle + 1][i]} - double{face.uv[middle][i]}));
+    square += step * step;
+  }
+  result.uv = texture_uv(face, look, uv);
+  result.square_density = square / aa;
+  return result;
+}
+
+Rgba8 shape_texel(const ModelFace& face, const VoxelFace& look, const DVec3& point) {
+  QUOIN_ASSERT(!look.texture.is_null(), "a face with a texture");
+  const std::array<float, 2> uv = shape_uv(face, look, point).uv;
+  const auto size = static_cast<std::uint32_t>(look.texture.size());
+  return look.texture.level(0)[texel_number(uv[1], 1.0, size) * std::size_t{size} + texel_number(uv[0], 1.0, size)];
 }
 
 void visit_shape(const PlacedShape& shape, const Ray& ray_in_grid, FunctionRef<void(const ShapeSpan&)> visit) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -7,6 +8,7 @@
 #include <quoin/core/direction.h>
 #include <quoin/core/function_ref.h>
 #include <quoin/core/vec.h>
+#include <quoin/grid/texture.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/grid/voxel_shape.h>
 #include <quoin/trace/packet.h>
@@ -53,11 +55,19 @@ struct ShapeHit {
   std::int16_t face;    ///< index into `model->faces`; -1: a side that is not drawn, or none
   Direction direction;  ///< nearest to `normal`
   bool starts_inside;   ///< `t` is 0, and `normal` is the direction that is most opposed to the ray's
-
-  /// Returns the texture coordinates of a point of the hit face, as ModelFace::uv has them. `position`: in the grid.
-  /// Requires: `face` is not -1.
-  [[nodiscard]] std::array<float, 2> uv(const DVec3& position) const;
 };
+
+/// A point of a texture.
+struct ShapeUv {
+  std::array<float, 2> uv{};    ///< 0 to 1 within the texture, rightwards and downwards
+  double square_density = 1.0;  ///< square of the sides of the texture per voxel, along its rows or columns
+};
+
+/// Returns the point of the texture that a point of a face shows. `point`: relative to the face's voxel. `look`: of the
+/// face, from `look_of`, not null.
+[[nodiscard]] ShapeUv shape_uv(const ModelFace& face, const VoxelFace& look, const DVec3& point);
+/// Returns the texel of level 0 at such a point. Requires: the look has a texture.
+[[nodiscard]] Rgba8 shape_texel(const ModelFace& face, const VoxelFace& look, const DVec3& point);
 
 /// The parts of shapes that a ray can hit.
 enum class ShapeParts : std::uint8_t {

@@ -1,6 +1,7 @@
 #include "scene/tracer/tree_cache.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <utility>
 #include <vector>
@@ -27,6 +28,49 @@ bool has_new_types(const Grid& grid, const GridChanges& changes, const Counts& c
     const std::vector<VoxelType> all = chunk->types();
     return std::any_of(all.begin(), all.end(), counts);
   });
+}
+
+// Returns true if a type's shapes have parts that tint light: without textures or with translucent ones.
+bool has_glass_parts(const VoxelProperties& type) {
+  if (type.visibility != Visibility::Transparent) return false;
+  const auto is_glass = [](const VoxelFace* look) {
+    return look == nullptr || look->texture.is_null() || look->alpha == FaceAlpha::Translucent;
+  };
+  const auto has_glass_side = [&](const ShapeElement& element) {
+    return std::ranges::any_of(kDirections, [&](Direction side) {
+      const ElementFace& face = element.faces[static_cast<std::size_t>(side)];
+      if (face.face) return face.is_drawn && is_glass(&*face.face);
+      return face.is_drawn && is_glass(type.faces.empty() ? nullptr : &type.faces[side]);
+    });
+  };
+  const ShapeRules& rules = type.shapes.rules();
+  if (rules.neighbours == ShapeNeighbours::Fluid) return has_glass_side({});
+  return std::ranges::any_of(
+      rules.parts, [&](const ShapePart& part) { return std::ranges::any_of(part.shape.elements(), has_glass_side); });
+}
+
+// Returns a flag per type: its shapes have glass. Empty if no type's have.
+std::vector<std::uint8_t> glass_types(const VoxelRegistry& types) {
+  std::vector<std::uint8_t> is_glass(types.size());
+  for (std::size_t i = 0; i < types.size(); ++i) {
+    const auto type = static_cast<VoxelType>(i);
+    is_glass[i] = types.is_shaped(type) && has_glass_parts(types[type]) ? 1 : 0;
+  }
+  if (std::ranges::count(is_glass, 1) == 0) is_glass.clear();
+  return is_glass;
+}
+
+// Returns the voxels of a row that shapes with glass touch.
+std::uint64_t glass_row(const TracedShapes& shapes, IVec3 first) {
+  std::uint64_t row = 0;
+  for (std::uint64_t left = shapes.index.touched_row(first); left != 0; left &= left - 1) {
+    const int x = std::countr_zero(left);
+    const auto is_glass = [&](const PlacedShape& shape) {
+      return shape.type < shapes.is_glass.size() && shapes.is_glass[shape.type] != 0;
+    };
+    if (std::ranges::any_of(shapes.index.at(first + IVec3(x, 0, 0)), is_glass)) row |= std::uint64_t{1} << x;
+  }
+  return row;
 }
 
 // The voxel data of a grid, for PendingChanges.
@@ -96,8 +140,12 @@ bool TreeCache::update_shapes(const Grid& grid, const VoxelRegistry& types, cons
   if (changes.empty() && data_changes->empty()) return false;
   if (is_new) shapes_ = std::make_unique<TracedShapes>();
   const std::vector<IVec3> changed = shapes_->index.update(grid, types, changes, *data_changes);
-  const auto rows = [this](IVec3 first) { return shapes_->index.touched_row(first); };
+  const TracedShapes& shapes = *shapes_;
+  const auto rows = [&](IVec3 first) { return shapes.index.touched_row(first); };
   shapes_->touched.update(changed, rows);
+  shapes_->is_glass = glass_types(types);
+  const auto glass_rows = [&](IVec3 first) { return glass_row(shapes, first); };
+  if (!shapes_->is_glass.empty()) shapes_->glass.update(changed, glass_rows);
   if (shapes_->index.empty()) shapes_.reset();
   data_changes.commit();
   return true;

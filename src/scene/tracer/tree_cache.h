@@ -64,6 +64,12 @@ class SplitField {
 struct TracedShapes {
   ShapeIndex index;
   OccupancyTree touched;  ///< the voxels that shapes touch, also air: their own, and those that they reach into
+  /// The voxels that shapes with glass touch: without textures or with translucent ones, of transparent types. Empty if
+  /// there are none.
+  OccupancyTree glass;
+  std::vector<std::uint8_t> is_glass;  ///< [type]: 1 if its shapes have glass; types beyond it have none
+
+  [[nodiscard]] bool has_glass() const { return !glass.bounds().empty(); }
 };
 
 /// The treatment of voxels whose type has shapes.
@@ -107,8 +113,10 @@ class TreeCache {
   [[nodiscard]] const DensityTree* opaque_field() const { return split_ ? if_any(split_->opaque()) : field(); }
   /// Returns the transparent part of the field; null if there is none.
   [[nodiscard]] const DensityGlass* glass() const { return split_ ? &split_->glass() : nullptr; }
-  /// Returns true if there are transparent voxels or field parts.
-  [[nodiscard]] bool has_transparent() const { return transparent_.has_value() || split_ != nullptr; }
+  /// Returns true if there are transparent voxels, shapes or field parts.
+  [[nodiscard]] bool has_transparent() const {
+    return transparent_.has_value() || split_ != nullptr || (shapes_ != nullptr && shapes_->has_glass());
+  }
 
  private:
   static const DensityTree* if_any(const DensityTree& tree) { return tree.cells().bounds().empty() ? nullptr : &tree; }

@@ -1,0 +1,243 @@
+// Shapes of voxel types in ray-traced images.
+
+#include <cmath>
+#include <random>
+#include <utility>
+
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <gtest/gtest.h>
+
+#include "grid/shapes/shapes_for_tests.h"
+#include "render/cpu/render_test_support.h"
+
+namespace quoin {
+namespace {
+
+using namespace render_test;
+
+RenderOptions unlit(int width, int height) {
+  RenderOptions options = sized(width, height);
+  options.light.shading = Shading::Unlit;
+  return options;
+}
+
+// Red, green, blue and white quarters, so that each turn and mirror looks different.
+Texture quarters() {
+  AlphaImage image{16, 16, {}};
+  for (int y = 0; y < 16; ++y) {
+    for (int x = 0; x < 16; ++x) {
+      const bool is_right = x >= 8;
+      const bool is_low = y >= 8;
+      const std::array<std::uint8_t, 4> texel = {std::uint8_t(!is_right || is_low ? 255 : 0),
+                                                 std::uint8_t(is_right ? 255 : 0), std::uint8_t(is_low ? 255 : 0), 255};
+      image.rgba.insert(image.rgba.end(), texel.begin(), texel.end());
+    }
+  }
+  return Texture::from_image("quarters", image).value();
+}
+
+// A texture whose left half is invisible.
+Texture right_half(std::uint8_t alpha_of_left = 0) {
+  AlphaImage image{16, 16, {}};
+  for (int i = 0; i < 256; ++i) {
+    const std::array<std::uint8_t, 4> texel = {30, 200, 30, i % 16 >= 8 ? std::uint8_t{255} : alpha_of_left};
+    image.rgba.insert(image.rgba.end(), texel.begin(), texel.end());
+  }
+  return Texture::from_image("half", image).value();
+}
+
+// Random cubes, of types that are cubes or have a shape that is one.
+Scene cubes(bool with_shapes, bool has_textures) {
+  std::mt19937 random(3);
+  Scene scene;
+  std::vector<VoxelType> types;
+  for (int i = 0; i < 4; ++i) {
+    VoxelProperties properties{.name = std::to_string(i)};
+    properties.colour = {static_cast<std::uint8_t>(60 * i), 200, static_cast<std::uint8_t>(255 - 50 * i), 255};
+    if (has_textures) {
+      std::array<VoxelFace, 6> faces;
+      for (VoxelFace& face : faces) {
+        face.texture = quarters();
+        face.turn = static_cast<std::uint8_t>(random() % 4);
+        face.mirrored = random() % 2 == 0;
+      }
+      properties.faces = VoxelFaces(faces);
+    }
+    if (with_shapes && i > 0) properties.shapes = VoxelShape::box({0, 0, 0}, {16, 16, 16});
+    types.push_back(*scene.types.add(properties));
+  }
+  Grid grid;
+  grid.fill_box({{-20, -3, -20}, {20, 0, 20}}, types[0]);
+  for (int i = 0; i < 200; ++i) {
+    const auto at = [&](int size) { return static_cast<int>(random() % static_cast<unsigned>(size)); };
+    grid.set({at(36) - 18, at(5), at(36) - 18}, types[random() % 4]);
+  }
+  const InstanceHandle first = place(scene, grid.snapshot());
+  scene.edit(first).rotation = glm::angleAxis(0.3, DVec3(0.0, 1.0, 0.0));
+  place(scene, std::move(grid), {10.0, 12.0, 0.0});
+  scene.lamps.push_back({.position = {3.2, 7.1, 4.3}, .intensity = 60.0});
+  return scene;
+}
+
+TEST(RenderShapes, CubeAsShapeLooksLikeCube) {
+  const Camera camera = towards({22.0, 20.0, 31.0}, {0.0, 2.0, 0.0});
+  for (const bool has_textures : {false, true}) {
+    for (const bool has_lamps : {false, true}) {
+      RenderOptions options = sized(96, 64);
+      if (has_lamps) options.light = natural_light();
+      const RenderedImage a = taken(cubes(true, has_textures), camera, options);
+      const RenderedImage b = taken(cubes(false, has_textures), camera, options);
+      EXPECT_EQ(count_different(a, b, 1), 0) << "textures " << has_textures << ", lamps " << has_lamps;
+      int depths = 0;
+      for (std::size_t i = 0; i < a.depth.values.size(); ++i) {
+        depths += std::abs(a.depth.values[i] - b.depth.values[i]) > 1e-4F ? 1 : 0;
+      }
+      EXPECT_EQ(depths, 0);
+    }
+  }
+}
+
+TEST(RenderShapes, SlabShowsItsSidesAtTheirDistance) {
+  Scene scene;
+  const ShapeTypes types(scene.types);
+  Grid grid;
+  grid.set({0, 0, 0}, types.slab);
+  place(scene, std::move(grid));
+  const RenderedImage image = taken(scene, from_above(0.5, 10.0, 0.5, 2.0), unlit(16, 16));
+  EXPECT_EQ(pixel_at(image, 8, 8), encoded(linear(scene.types[types.slab].colour)));
+  EXPECT_FLOAT_EQ(depth_at(image, 8, 8), 9.5F);
+  EXPECT_TRUE(std::isinf(depth_at(image, 1, 1)));
+}
+
+// A slab two voxels above the ground casts a shadow whose edges lie where its sides are.
+TEST(RenderShapes, CastsHardShadowsOfItsForm) {
+  Scene scene;
+  const ShapeTypes types(scene.types);
+  VoxelProperties post{.name = "post"};
+  post.shapes = VoxelShape::box({4, 0, 4}, {12, 16, 12});
+  const VoxelType type = *scene.types.add(post);
+  Grid grid;
+  grid.fill_box({{-8, -1, -8}, {8, 0, 8}}, types.stone);
+  grid.set({0, 2, 0}, type);
+  place(scene, std::move(grid));
+  scene.environment = Environment{};
+  scene.environment->sun.direction = {0.0, 1.0, 0.0};
+  RenderOptions options = sized(64, 64);
+  options.light.occlusion_mode = OcclusionMode::Off;
+  // From below the post, so that the camera sees the ground under it.
+  Camera camera = from_above(0.5, 1.5, 0.5, 2.0);
+  const RenderedImage image = taken(scene, camera, options);
+  const Pixel lit = pixel_at(image, 2, 2);
+  const Pixel dark = pixel_at(image, 32, 32);
+  EXPECT_GT(lit[0], dark[0] + 20);
+  int wrong = 0;
+  for (int y = 0; y < 64; ++y) {
+    for (int x = 0; x < 64; ++x) {
+      const bool is_below = x >= 24 && x < 40 && y >= 24 && y < 40;
+      wrong += pixel_at(image, x, y) == (is_below ? dark : lit) ? 0 : 1;
+    }
+  }
+  EXPECT_EQ(wrong, 0);
+}
+
+TEST(RenderShapes, RaysAndShadowsPassCutoutTexels) {
+  Scene scene;
+  const ShapeTypes types(scene.types);
+  VoxelProperties leaf{.name = "leaf", .visibility = Visibility::Transparent};
+  leaf.faces = VoxelFaces(VoxelFace{.texture = right_half(), .alpha = FaceAlpha::Cutout});
+  leaf.shapes = *VoxelShape::from_elements({{.min = {0, 8, 0}, .max = {16, 8, 16}}});  // a plate
+  const VoxelType type = *scene.types.add(leaf);
+  Grid grid;
+  grid.fill_box({{-4, -1, -4}, {4, 0, 4}}, types.stone);
+  grid.set({0, 0, 0}, type);
+  place(scene, std::move(grid));
+  const RenderedImage image = taken(scene, from_above(0.5, 10.0, 0.5, 1.0), unlit(32, 32));
+  int near = 0;
+  for (const float depth : image.depth.values) near += depth == 9.5F ? 1 : 0;
+  EXPECT_EQ(near, 32 * 16);
+  EXPECT_EQ(std::count(image.depth.values.begin(), image.depth.values.end(), 10.0F), 32 * 16);
+  // The shadow has the same form as the visible half: seen from below the plate.
+  scene.environment = Environment{};
+  scene.environment->sun.direction = {0.0, 1.0, 0.0};
+  RenderOptions options = sized(32, 32);
+  options.light.occlusion_mode = OcclusionMode::Off;
+  const RenderedImage below = taken(scene, from_above(0.5, 0.4, 0.5, 1.0), options);
+  int agree = 0;
+  for (int y = 0; y < 32; ++y) {
+    for (int x = 0; x < 32; ++x) {
+      const bool is_shown = depth_at(image, x, y) == 9.5F;
+      agree += is_shown == (pixel_at(below, x, y)[0] < 128) ? 1 : 0;
+    }
+  }
+  EXPECT_EQ(agree, 32 * 32);
+}
+
+TEST(RenderShapes, PanesTintWhatIsBehind) {
+  Scene scene;
+  const ShapeTypes types(scene.types);
+  Grid grid;
+  grid.fill_box({{-4, 0, -4}, {4, 4, -3}}, types.stone);
+  for (int y = 0; y < 4; ++y) {
+    for (int x = -4; x < 0; ++x) grid.set({x, y, 0}, types.pane);
+  }
+  place(scene, std::move(grid));
+  const RenderedImage image = taken(scene, towards({0.0, 2.0, 6.0}, {0.0, 2.0, 0.0}), unlit(64, 64));
+  const Pixel through = pixel_at(image, 26, 32);
+  const Pixel beside = pixel_at(image, 38, 32);
+  EXPECT_GT(through[0], through[1] + 20) << "the pane is red";
+  EXPECT_LE(std::abs(beside[0] - beside[1]), 1);
+  // The pane's front is 9/16 behind its voxel's.
+  EXPECT_NEAR(depth_at(image, 26, 32), 6.0F - 9.0F / 16.0F, 0.05F);
+}
+
+TEST(RenderShapes, WaterTintsByItsDepth) {
+  Scene scene;
+  const ShapeTypes types(scene.types);
+  Grid grid;
+  grid.fill_box({{-8, -5, -8}, {8, -4, 8}}, types.stone);
+  grid.fill_box({{-8, -4, -8}, {8, 0, 0}}, types.water);
+  place(scene, std::move(grid));
+  const RenderedImage image = taken(scene, from_above(0.0, 10.0, 0.0, 8.0), unlit(32, 32));
+  // Sources are 8/9 high.
+  EXPECT_NEAR(depth_at(image, 16, 4), 10.0 + 1.0 - 14.0 / 16.0, 0.05);
+  const Pixel wet = pixel_at(image, 16, 4);
+  EXPECT_GT(wet[2], wet[0] + 20);
+  EXPECT_FLOAT_EQ(depth_at(image, 16, 28), 14.0F);
+}
+
+// A cube whose state turns it looks like the cube in a turned grid.
+TEST(RenderShapes, StateTurnsFacesOfCubes) {
+  for (std::uint32_t state = 0; state < 4; ++state) {
+    const auto scene_of = [&](std::uint32_t of_voxel, double angle, bool with_shapes) {
+      Scene scene;
+      VoxelProperties furnace{.name = "furnace", .state_bits = 2};
+      std::array<VoxelFace, 6> faces;
+      for (std::size_t i = 0; i < 6; ++i) {
+        faces[i].texture = quarters();
+        faces[i].tint = {static_cast<std::uint8_t>(255 - 40 * i), static_cast<std::uint8_t>(40 * i + 20), 200};
+      }
+      furnace.faces = VoxelFaces(faces);
+      furnace.orientations = StateOrientations::about_y();
+      if (with_shapes) furnace.shapes = VoxelShape::box({0, 0, 0}, {16, 16, 16});
+      const VoxelType type = *scene.types.add(furnace);
+      SceneGrid grid;
+      grid.pivot = DVec3(0.5);
+      grid.grid.set({0, 0, 0}, type, {of_voxel, {}});
+      const InstanceHandle handle = scene.add_instance({.grid = scene.add_grid(std::move(grid))});
+      scene.edit(handle).rotation = glm::angleAxis(angle, DVec3(0.0, 1.0, 0.0));
+      return scene;
+    };
+    const Camera camera = towards({2.0, 1.7, 2.6}, DVec3(0.0));
+    const double angle = state * 1.5707963267948966;
+    const RenderedImage turned_grid = taken(scene_of(0, angle, false), camera, unlit(64, 64));
+    const RenderedImage turned_cube = taken(scene_of(state, 0.0, false), camera, unlit(64, 64));
+    const RenderedImage turned_shape = taken(scene_of(state, 0.0, true), camera, unlit(64, 64));
+    // Texels at edges may round to either side.
+    EXPECT_LT(count_different(turned_cube, turned_grid, 1), 8) << state;
+    EXPECT_LT(count_different(turned_shape, turned_grid, 1), 8) << state;
+  }
+}
+
+}  // namespace
+}  // namespace quoin
